@@ -1,0 +1,64 @@
+# What we build on, as targets. Packages: tools/packages.list.
+#   retrograde_dep_llvm            LLVM 19, shared; only compiler/codegen and compiler/jit may use it
+#   retrograde_dep_isl             integer relations
+#   retrograde_dep_tbb             parallel loops
+#   retrograde_dep_sleef           vector math
+#   retrograde_dep_halide_runtime  HalideRuntime.h and HalideBuffer.h, headers only
+#   retrograde_dep_halide          the Halide 14 compiler, for tests and benchmarks only
+#   retrograde_dep_image           OpenImageIO, for apps
+#   retrograde_dep_cli, retrograde_dep_json   command lines and reports, for apps
+find_package(PkgConfig REQUIRED)
+find_package(Threads REQUIRED)
+
+# LLVM by its own config program: the CMake package wants development packages (terminfo, zstd,
+# libxml2 ...) that the shared library does not need.
+find_program(RETROGRADE_LLVM_CONFIG NAMES llvm-config-19 PATHS /usr/lib/llvm-19/bin REQUIRED)
+execute_process(COMMAND ${RETROGRADE_LLVM_CONFIG} --includedir
+  OUTPUT_VARIABLE llvm_include OUTPUT_STRIP_TRAILING_WHITESPACE COMMAND_ERROR_IS_FATAL ANY)
+execute_process(COMMAND ${RETROGRADE_LLVM_CONFIG} --libdir
+  OUTPUT_VARIABLE llvm_libdir OUTPUT_STRIP_TRAILING_WHITESPACE COMMAND_ERROR_IS_FATAL ANY)
+find_library(RETROGRADE_LLVM_LIBRARY NAMES LLVM-19 PATHS ${llvm_libdir} NO_DEFAULT_PATH REQUIRED)
+add_library(retrograde_dep_llvm INTERFACE)
+target_include_directories(retrograde_dep_llvm SYSTEM INTERFACE ${llvm_include})
+target_compile_definitions(retrograde_dep_llvm INTERFACE
+  _GNU_SOURCE __STDC_CONSTANT_MACROS __STDC_FORMAT_MACROS __STDC_LIMIT_MACROS)
+target_link_libraries(retrograde_dep_llvm INTERFACE ${RETROGRADE_LLVM_LIBRARY})
+
+find_path(RETROGRADE_ISL_INCLUDE isl/map.h REQUIRED)
+find_library(RETROGRADE_ISL_LIBRARY isl REQUIRED)
+add_library(retrograde_dep_isl INTERFACE)
+target_include_directories(retrograde_dep_isl SYSTEM INTERFACE ${RETROGRADE_ISL_INCLUDE})
+target_link_libraries(retrograde_dep_isl INTERFACE ${RETROGRADE_ISL_LIBRARY})
+
+find_package(TBB REQUIRED)
+add_library(retrograde_dep_tbb INTERFACE)
+target_link_libraries(retrograde_dep_tbb INTERFACE TBB::tbb Threads::Threads)
+
+find_library(RETROGRADE_SLEEF_LIBRARY sleef REQUIRED)
+add_library(retrograde_dep_sleef INTERFACE)
+target_link_libraries(retrograde_dep_sleef INTERFACE ${RETROGRADE_SLEEF_LIBRARY})
+
+# -idirafter: the folder holds Halide's own Halide.h too, which must never hide ours.
+find_path(RETROGRADE_HALIDE_RUNTIME_INCLUDE HalideRuntime.h PATH_SUFFIXES halide14 REQUIRED)
+add_library(retrograde_dep_halide_runtime INTERFACE)
+target_compile_options(retrograde_dep_halide_runtime INTERFACE
+  "SHELL:-idirafter ${RETROGRADE_HALIDE_RUNTIME_INCLUDE}")
+target_link_libraries(retrograde_dep_halide_runtime INTERFACE ${CMAKE_DL_LIBS})
+
+find_library(RETROGRADE_HALIDE_LIBRARY NAMES Halide14 REQUIRED)
+add_library(retrograde_dep_halide INTERFACE)
+target_include_directories(retrograde_dep_halide SYSTEM INTERFACE
+  ${RETROGRADE_HALIDE_RUNTIME_INCLUDE})
+target_link_libraries(retrograde_dep_halide INTERFACE ${RETROGRADE_HALIDE_LIBRARY} ${CMAKE_DL_LIBS})
+
+pkg_check_modules(OIIO REQUIRED IMPORTED_TARGET OpenImageIO)
+add_library(retrograde_dep_image INTERFACE)
+target_link_libraries(retrograde_dep_image INTERFACE PkgConfig::OIIO)
+
+find_path(RETROGRADE_CLI_INCLUDE CLI/CLI.hpp REQUIRED)
+add_library(retrograde_dep_cli INTERFACE)
+target_include_directories(retrograde_dep_cli SYSTEM INTERFACE ${RETROGRADE_CLI_INCLUDE})
+
+find_path(RETROGRADE_JSON_INCLUDE nlohmann/json.hpp REQUIRED)
+add_library(retrograde_dep_json INTERFACE)
+target_include_directories(retrograde_dep_json SYSTEM INTERFACE ${RETROGRADE_JSON_INCLUDE})

@@ -1,0 +1,58 @@
+# libretrograde.so: every layer in one shared library, and its installation (CMake package,
+# pkg-config file, umbrella header, Halide.h of the compatibility folder).
+get_property(layers GLOBAL PROPERTY RETROGRADE_LAYERS)
+get_property(outside GLOBAL PROPERTY RETROGRADE_OUTSIDE)
+add_library(retrograde SHARED)
+add_library(retrograde::retrograde ALIAS retrograde)
+# All objects, not the archives: a layer may be reached only through a registration or by a test.
+foreach(layer IN LISTS layers)
+  target_sources(retrograde PRIVATE $<TARGET_OBJECTS:${layer}>)
+endforeach()
+list(REMOVE_DUPLICATES outside)
+target_link_libraries(retrograde PRIVATE ${outside})
+set_target_properties(retrograde PROPERTIES LINKER_LANGUAGE CXX)
+target_link_options(retrograde PRIVATE -Wl,-Bsymbolic-functions)
+if(NOT RETROGRADE_SANITIZER)
+  target_link_options(retrograde PRIVATE -Wl,--no-undefined)
+endif()
+target_include_directories(retrograde INTERFACE
+  $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/compiler/frontend/include>
+  $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/compiler>
+  $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>
+  $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}/retrograde>)
+target_compile_options(retrograde INTERFACE
+  "SHELL:-idirafter ${RETROGRADE_HALIDE_RUNTIME_INCLUDE}")
+target_compile_features(retrograde INTERFACE cxx_std_20)
+target_link_libraries(retrograde INTERFACE Threads::Threads ${CMAKE_DL_LIBS})
+set_target_properties(retrograde PROPERTIES
+  VERSION ${PROJECT_VERSION} SOVERSION ${PROJECT_VERSION_MAJOR})
+
+# retrograde::halide_compat: the same, with `#include "Halide.h"` meaning ours.
+add_library(retrograde_halide_compat INTERFACE)
+set_target_properties(retrograde_halide_compat PROPERTIES EXPORT_NAME halide_compat)
+add_library(retrograde::halide_compat ALIAS retrograde_halide_compat)
+target_include_directories(retrograde_halide_compat BEFORE INTERFACE
+  $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/compiler/frontend/compat>
+  $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}/retrograde-halide>)
+target_link_libraries(retrograde_halide_compat INTERFACE retrograde)
+
+include(CMakePackageConfigHelpers)
+set(package_dir ${CMAKE_INSTALL_LIBDIR}/cmake/retrograde)
+install(TARGETS retrograde retrograde_halide_compat EXPORT retrogradeTargets)
+install(EXPORT retrogradeTargets NAMESPACE retrograde:: DESTINATION ${package_dir})
+configure_package_config_file(${PROJECT_SOURCE_DIR}/cmake/retrogradeConfig.cmake.in
+  ${CMAKE_BINARY_DIR}/retrogradeConfig.cmake INSTALL_DESTINATION ${package_dir})
+write_basic_package_version_file(${CMAKE_BINARY_DIR}/retrogradeConfigVersion.cmake
+  COMPATIBILITY SameMinorVersion)
+install(FILES ${CMAKE_BINARY_DIR}/retrogradeConfig.cmake
+  ${CMAKE_BINARY_DIR}/retrogradeConfigVersion.cmake DESTINATION ${package_dir})
+
+configure_file(${PROJECT_SOURCE_DIR}/cmake/retrograde.pc.in ${CMAKE_BINARY_DIR}/retrograde.pc @ONLY)
+configure_file(${PROJECT_SOURCE_DIR}/cmake/retrograde-halide.pc.in
+  ${CMAKE_BINARY_DIR}/retrograde-halide.pc @ONLY)
+install(FILES ${CMAKE_BINARY_DIR}/retrograde.pc ${CMAKE_BINARY_DIR}/retrograde-halide.pc
+  DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig)
+install(DIRECTORY ${PROJECT_SOURCE_DIR}/compiler/frontend/include/
+  DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} FILES_MATCHING PATTERN "*.h")
+install(DIRECTORY ${PROJECT_SOURCE_DIR}/compiler/frontend/compat/
+  DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/retrograde-halide FILES_MATCHING PATTERN "*.h")

@@ -1,0 +1,7 @@
+// Halide.h -- Retrograde under Halide's names: put this folder first on the include path, and a
+// pipeline written for Halide compiles as it stands.
+#pragma once
+
+#include <retrograde/retrograde.h>
+
+namespace Halide = retrograde;
