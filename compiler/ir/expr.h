@@ -1,0 +1,444 @@
+// Expr and Stmt: handles to immutable, reference-counted nodes; and the node types themselves.
+// Kinds are listed in kinds.def, operators in operators.def. Nodes are built by the functions of build.h, which check
+// types; a node's children never change. Two handles to one node share it: expressions are DAGs.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "ir/type.h"
+
+namespace retrograde {
+
+namespace ir {
+
+enum class Kind : uint8_t {
+#define RETROGRADE_EXPR(Kind) Kind,
+#define RETROGRADE_BINARY(Kind) Kind,
+#define RETROGRADE_STMT(Kind) Kind,
+#include "ir/kinds.def"
+};
+const char* kind_name(Kind kind);
+
+enum class Op : uint8_t {
+#define RETROGRADE_OP(name, arity, cls) name,
+#include "ir/operators.def"
+  none,
+};
+enum class OpClass : uint8_t { Pure, Marker, Effect, Internal };
+struct OpInfo {
+  const char* name;
+  int arity;  // -1: any
+  OpClass cls;
+};
+const OpInfo& op_info(Op op);
+Op op_from_name(const std::string& name);  // Op::none when unknown
+constexpr int op_count = static_cast<int>(Op::none);
+
+struct Node {
+  explicit Node(Kind kind) : kind(kind) {}
+  virtual ~Node() = default;
+  Node(const Node&) = delete;
+  Node& operator=(const Node&) = delete;
+  mutable std::atomic<int> references{0};
+  const Kind kind;
+};
+struct ExprNode : Node {
+  ExprNode(Kind kind, Type type) : Node(kind), type(type) {}
+  const Type type;
+};
+struct StmtNode : Node {
+  using Node::Node;
+};
+
+// Deletes without recursing on the C++ stack: chains of a million nodes are legal.
+void release(const Node* node) noexcept;
+
+template <class T>
+class Ref {
+ public:
+  Ref() = default;
+  Ref(const T* node) : node_(node) { retain(); }
+  Ref(const Ref& other) : node_(other.node_) { retain(); }
+  Ref(Ref&& other) noexcept : node_(std::exchange(other.node_, nullptr)) {}
+  Ref& operator=(Ref other) noexcept {
+    std::swap(node_, other.node_);
+    return *this;
+  }
+  ~Ref() {
+    if (node_ && node_->references.fetch_sub(1, std::memory_order_acq_rel) == 1) release(node_);
+  }
+
+  bool defined() const { return node_ != nullptr; }
+  bool same_as(const Ref& other) const { return node_ == other.node_; }
+  const T* get() const { return node_; }
+  const T* operator->() const { return node_; }
+  Kind kind() const { return node_->kind; }
+  // The node as a concrete type (ir::Select, ...), or null when it is of another kind.
+  template <class N>
+  const N* as() const {
+    return node_ && N::is_kind(node_->kind) ? static_cast<const N*>(static_cast<const Node*>(node_)) : nullptr;
+  }
+
+ private:
+  void retain() const {
+    if (node_) node_->references.fetch_add(1, std::memory_order_relaxed);
+  }
+  const T* node_ = nullptr;
+};
+
+}  // namespace ir
+
+// A scalar or vector expression. Constructing one from a C++ constant gives an immediate of that type.
+class Expr : public ir::Ref<ir::ExprNode> {
+ public:
+  using Ref::Ref;
+  Expr() = default;
+  Expr(bool value);
+  Expr(int8_t value);
+  Expr(int16_t value);
+  Expr(int32_t value);
+  Expr(int64_t value);
+  Expr(uint8_t value);
+  Expr(uint16_t value);
+  Expr(uint32_t value);
+  Expr(uint64_t value);
+  Expr(float16_t value);
+  Expr(bfloat16_t value);
+  Expr(float value);
+  Expr(double value);
+  Expr(long long value) : Expr(static_cast<int64_t>(value)) {}
+  Expr(unsigned long long value) : Expr(static_cast<uint64_t>(value)) {}
+  Expr(const std::string& text);
+  Expr(const char* text);
+  Type type() const { return get()->type; }
+};
+
+class Stmt : public ir::Ref<ir::StmtNode> {
+ public:
+  using Ref::Ref;
+};
+
+struct ExprCompare {  // by identity, not by value
+  bool operator()(const Expr& a, const Expr& b) const { return a.get() < b.get(); }
+};
+
+// [min, min + extent)
+struct Range {
+  Expr min, extent;
+};
+
+enum class ForType : uint8_t { Serial, Parallel, Vectorized, Unrolled };
+enum class MemoryType : uint8_t { Auto, Heap, Stack };
+
+namespace ir {
+
+// What a name in the IR stands for when it is more than a name: a Func, a parameter, a buffer, a reduction domain.
+// Layers above derive their contents from it; the IR only carries it along.
+struct Symbol {
+  virtual ~Symbol() = default;
+};
+
+// A reference to a Symbol. A Func's own update definitions refer to it weakly, so that no cycle owns itself.
+class SymbolRef {
+ public:
+  SymbolRef() = default;
+  SymbolRef(std::shared_ptr<Symbol> symbol) : strong_(std::move(symbol)), raw_(strong_.get()) {}
+  static SymbolRef weak(const std::shared_ptr<Symbol>& symbol) {
+    SymbolRef result;
+    result.weak_ = symbol;
+    result.raw_ = symbol.get();
+    return result;
+  }
+  bool defined() const { return raw_ != nullptr; }
+  bool is_weak() const { return raw_ && !strong_; }
+  Symbol* raw() const { return raw_; }  // identity; may dangle when weak
+  std::shared_ptr<Symbol> lock() const { return strong_ ? strong_ : weak_.lock(); }
+
+ private:
+  std::shared_ptr<Symbol> strong_;
+  std::weak_ptr<Symbol> weak_;
+  Symbol* raw_ = nullptr;
+};
+
+// ---- expressions ----
+
+#define RETROGRADE_NODE(Name) \
+  static constexpr bool is_kind(Kind kind) { return kind == Kind::Name; }
+
+struct IntImm : ExprNode {
+  RETROGRADE_NODE(IntImm)
+  IntImm(Type type, int64_t value) : ExprNode(Kind::IntImm, type), value(value) {}
+  const int64_t value;
+};
+struct UIntImm : ExprNode {
+  RETROGRADE_NODE(UIntImm)
+  UIntImm(Type type, uint64_t value) : ExprNode(Kind::UIntImm, type), value(value) {}
+  const uint64_t value;
+};
+struct FloatImm : ExprNode {  // value already rounded to the type
+  RETROGRADE_NODE(FloatImm)
+  FloatImm(Type type, double value) : ExprNode(Kind::FloatImm, type), value(value) {}
+  const double value;
+};
+struct StringImm : ExprNode {
+  RETROGRADE_NODE(StringImm)
+  explicit StringImm(std::string value) : ExprNode(Kind::StringImm, Handle()), value(std::move(value)) {}
+  const std::string value;
+};
+// A pure variable, loop variable, let-bound name, scalar parameter, reduction variable, or a fact of a buffer
+// ("input.min.0", "input.extent.1", "input.stride.0").
+struct Variable : ExprNode {
+  RETROGRADE_NODE(Variable)
+  Variable(Type type, std::string name, SymbolRef symbol)
+      : ExprNode(Kind::Variable, type), name(std::move(name)), symbol(std::move(symbol)) {}
+  const std::string name;
+  const SymbolRef symbol;
+};
+struct Cast : ExprNode {  // integers wrap; float to integer truncates toward zero
+  RETROGRADE_NODE(Cast)
+  Cast(Type type, Expr value) : ExprNode(Kind::Cast, type), value(std::move(value)) {}
+  const Expr value;
+};
+struct Reinterpret : ExprNode {  // same bits, other type
+  RETROGRADE_NODE(Reinterpret)
+  Reinterpret(Type type, Expr value) : ExprNode(Kind::Reinterpret, type), value(std::move(value)) {}
+  const Expr value;
+};
+struct Binary : ExprNode {
+  static constexpr bool is_kind(Kind kind) { return kind >= Kind::Add && kind <= Kind::Or; }
+  const Expr a, b;
+
+ protected:
+  Binary(Kind kind, Type type, Expr a, Expr b) : ExprNode(kind, type), a(std::move(a)), b(std::move(b)) {}
+};
+// Binary nodes of one kind, for as<>(): e.as<Add>()->a
+template <Kind K>
+struct BinaryOf : Binary {
+  static constexpr bool is_kind(Kind kind) { return kind == K; }
+  BinaryOf(Type type, Expr a, Expr b) : Binary(K, type, std::move(a), std::move(b)) {}
+};
+#define RETROGRADE_BINARY(Name) using Name = BinaryOf<Kind::Name>;
+#include "ir/kinds.def"
+
+struct Not : ExprNode {
+  RETROGRADE_NODE(Not)
+  explicit Not(Expr a) : ExprNode(Kind::Not, a.type()), a(std::move(a)) {}
+  const Expr a;
+};
+struct Select : ExprNode {
+  RETROGRADE_NODE(Select)
+  Select(Expr condition, Expr true_value, Expr false_value)
+      : ExprNode(Kind::Select, true_value.type()),
+        condition(std::move(condition)),
+        true_value(std::move(true_value)),
+        false_value(std::move(false_value)) {}
+  const Expr condition, true_value, false_value;
+};
+// FlatStorage phase. Element number `index` of the allocation or buffer `name`.
+struct Load : ExprNode {
+  RETROGRADE_NODE(Load)
+  Load(Type type, std::string name, Expr index, Expr predicate, SymbolRef symbol)
+      : ExprNode(Kind::Load, type),
+        name(std::move(name)),
+        index(std::move(index)),
+        predicate(std::move(predicate)),
+        symbol(std::move(symbol)) {}
+  const std::string name;
+  const Expr index, predicate;  // predicate: bool with the load's lanes; lanes that are off give any value
+  const SymbolRef symbol;       // the parameter or buffer, undefined for internal allocations
+};
+struct Ramp : ExprNode {  // base, base + stride, ...; base may be a vector: then lanes are base-major
+  RETROGRADE_NODE(Ramp)
+  Ramp(Expr base, Expr stride, int lanes)
+      : ExprNode(Kind::Ramp, base.type().with_lanes(base.type().lanes() * lanes)),
+        base(std::move(base)),
+        stride(std::move(stride)),
+        lanes(lanes) {}
+  const Expr base, stride;
+  const int lanes;
+};
+struct Broadcast : ExprNode {  // value repeated `lanes` times; value may be a vector (concatenated)
+  RETROGRADE_NODE(Broadcast)
+  Broadcast(Expr value, int lanes)
+      : ExprNode(Kind::Broadcast, value.type().with_lanes(value.type().lanes() * lanes)),
+        value(std::move(value)),
+        lanes(lanes) {}
+  const Expr value;
+  const int lanes;
+};
+enum class CallType : uint8_t {
+  Operator,  // `op`, see operators.def
+  Func,      // a value of another Func at integer coordinates; symbol: the Func's contents
+  Image,     // an element of an ImageParam or Buffer at integer coordinates; symbol: the parameter
+  Extern,    // a C function `name` by value, pure
+};
+struct Call : ExprNode {
+  RETROGRADE_NODE(Call)
+  Call(Type type, CallType call_type, Op op, std::string name, std::vector<Expr> args, int value_index,
+       SymbolRef symbol)
+      : ExprNode(Kind::Call, type),
+        call_type(call_type),
+        op(op),
+        name(std::move(name)),
+        args(std::move(args)),
+        value_index(value_index),
+        symbol(std::move(symbol)) {}
+  bool is_op(Op which) const { return call_type == CallType::Operator && op == which; }
+  const CallType call_type;
+  const Op op;            // Op::none unless Operator
+  const std::string name;  // of the Func, image or C function; the operator's name for operators
+  const std::vector<Expr> args;
+  const int value_index;  // which value of a Tuple-valued Func
+  const SymbolRef symbol;
+};
+struct Let : ExprNode {
+  RETROGRADE_NODE(Let)
+  Let(std::string name, Expr value, Expr body)
+      : ExprNode(Kind::Let, body.type()), name(std::move(name)), value(std::move(value)), body(std::move(body)) {}
+  const std::string name;
+  const Expr value, body;
+};
+struct Shuffle : ExprNode {  // lane i = lane indices[i] of the concatenated vectors
+  RETROGRADE_NODE(Shuffle)
+  Shuffle(Type type, std::vector<Expr> vectors, std::vector<int> indices)
+      : ExprNode(Kind::Shuffle, type), vectors(std::move(vectors)), indices(std::move(indices)) {}
+  const std::vector<Expr> vectors;
+  const std::vector<int> indices;
+};
+enum class ReduceOp : uint8_t { Add, Mul, Min, Max, And, Or };
+struct VectorReduce : ExprNode {  // groups of neighbouring lanes combined, to type.lanes() lanes
+  RETROGRADE_NODE(VectorReduce)
+  VectorReduce(Type type, ReduceOp op, Expr value)
+      : ExprNode(Kind::VectorReduce, type), op(op), value(std::move(value)) {}
+  const ReduceOp op;
+  const Expr value;
+};
+
+// ---- statements ----
+
+struct LetStmt : StmtNode {
+  RETROGRADE_NODE(LetStmt)
+  LetStmt(std::string name, Expr value, Stmt body)
+      : StmtNode(Kind::LetStmt), name(std::move(name)), value(std::move(value)), body(std::move(body)) {}
+  const std::string name;
+  const Expr value;
+  const Stmt body;
+};
+struct Assert : StmtNode {  // when the condition is false the function returns `error` (an int32, see Op::error)
+  RETROGRADE_NODE(Assert)
+  Assert(Expr condition, Expr error)
+      : StmtNode(Kind::Assert), condition(std::move(condition)), error(std::move(error)) {}
+  const Expr condition, error;
+};
+struct ProducerConsumer : StmtNode {
+  RETROGRADE_NODE(ProducerConsumer)
+  ProducerConsumer(std::string name, bool is_producer, Stmt body)
+      : StmtNode(Kind::ProducerConsumer), name(std::move(name)), is_producer(is_producer), body(std::move(body)) {}
+  const std::string name;
+  const bool is_producer;
+  const Stmt body;
+};
+struct For : StmtNode {  // name in [min, min + extent)
+  RETROGRADE_NODE(For)
+  For(std::string name, Expr min, Expr extent, ForType for_type, Stmt body)
+      : StmtNode(Kind::For),
+        name(std::move(name)),
+        min(std::move(min)),
+        extent(std::move(extent)),
+        for_type(for_type),
+        body(std::move(body)) {}
+  const std::string name;
+  const Expr min, extent;
+  const ForType for_type;
+  const Stmt body;
+};
+struct Store : StmtNode {
+  RETROGRADE_NODE(Store)
+  Store(std::string name, Expr value, Expr index, Expr predicate, SymbolRef symbol)
+      : StmtNode(Kind::Store),
+        name(std::move(name)),
+        value(std::move(value)),
+        index(std::move(index)),
+        predicate(std::move(predicate)),
+        symbol(std::move(symbol)) {}
+  const std::string name;
+  const Expr value, index, predicate;
+  const SymbolRef symbol;
+};
+struct Provide : StmtNode {  // Loops phase: store to a point of a Func; one value per Tuple element, stored together
+  RETROGRADE_NODE(Provide)
+  Provide(std::string name, std::vector<Expr> values, std::vector<Expr> args, Expr predicate)
+      : StmtNode(Kind::Provide),
+        name(std::move(name)),
+        values(std::move(values)),
+        args(std::move(args)),
+        predicate(std::move(predicate)) {}
+  const std::string name;
+  const std::vector<Expr> values, args;
+  const Expr predicate;
+};
+struct Realize : StmtNode {  // Loops phase: storage for a Func over a box, alive during body
+  RETROGRADE_NODE(Realize)
+  Realize(std::string name, std::vector<Type> types, MemoryType memory, std::vector<Range> bounds, Stmt body)
+      : StmtNode(Kind::Realize),
+        name(std::move(name)),
+        types(std::move(types)),
+        memory(memory),
+        bounds(std::move(bounds)),
+        body(std::move(body)) {}
+  const std::string name;
+  const std::vector<Type> types;
+  const MemoryType memory;
+  const std::vector<Range> bounds;
+  const Stmt body;
+};
+struct Allocate : StmtNode {  // FlatStorage phase: `elements` (int64) elements of `type`, alive during body
+  RETROGRADE_NODE(Allocate)
+  Allocate(std::string name, Type type, MemoryType memory, Expr elements, Stmt body)
+      : StmtNode(Kind::Allocate),
+        name(std::move(name)),
+        type(type),
+        memory(memory),
+        elements(std::move(elements)),
+        body(std::move(body)) {}
+  const std::string name;
+  const Type type;
+  const MemoryType memory;
+  const Expr elements;
+  const Stmt body;
+};
+struct Free : StmtNode {  // no use of the allocation follows; at most one on every path of its Allocate's body
+  RETROGRADE_NODE(Free)
+  explicit Free(std::string name) : StmtNode(Kind::Free), name(std::move(name)) {}
+  const std::string name;
+};
+struct Block : StmtNode {
+  RETROGRADE_NODE(Block)
+  explicit Block(std::vector<Stmt> stmts) : StmtNode(Kind::Block), stmts(std::move(stmts)) {}
+  const std::vector<Stmt> stmts;
+};
+struct IfThenElse : StmtNode {
+  RETROGRADE_NODE(IfThenElse)
+  IfThenElse(Expr condition, Stmt then_case, Stmt else_case)
+      : StmtNode(Kind::IfThenElse),
+        condition(std::move(condition)),
+        then_case(std::move(then_case)),
+        else_case(std::move(else_case)) {}
+  const Expr condition;
+  const Stmt then_case, else_case;  // else_case may be undefined
+};
+struct Evaluate : StmtNode {
+  RETROGRADE_NODE(Evaluate)
+  explicit Evaluate(Expr value) : StmtNode(Kind::Evaluate), value(std::move(value)) {}
+  const Expr value;
+};
+
+#undef RETROGRADE_NODE
+
+}  // namespace ir
+}  // namespace retrograde

@@ -1,0 +1,129 @@
+// Types of expressions: a scalar code and width, times a number of lanes.
+#pragma once
+
+#include <cstdint>
+#include <limits>
+#include <string>
+#include <type_traits>
+
+namespace retrograde {
+
+enum class TypeCode : uint8_t { Int, UInt, Float, BFloat, Handle };
+
+// A 16-bit IEEE half; arithmetic happens in float32 and rounds to nearest even at each operation.
+struct float16_t {
+  uint16_t bits = 0;
+  float16_t() = default;
+  explicit float16_t(float value);
+  explicit float16_t(double value);
+  explicit float16_t(int value) : float16_t(static_cast<float>(value)) {}
+  explicit operator float() const;
+  explicit operator double() const { return static_cast<double>(static_cast<float>(*this)); }
+  static float16_t make_from_bits(uint16_t bits) {
+    float16_t result;
+    result.bits = bits;
+    return result;
+  }
+  uint16_t to_bits() const { return bits; }
+};
+
+// The upper half of a float32, rounded to nearest even.
+struct bfloat16_t {
+  uint16_t bits = 0;
+  bfloat16_t() = default;
+  explicit bfloat16_t(float value);
+  explicit bfloat16_t(double value);
+  explicit bfloat16_t(int value) : bfloat16_t(static_cast<float>(value)) {}
+  explicit operator float() const;
+  explicit operator double() const { return static_cast<double>(static_cast<float>(*this)); }
+  static bfloat16_t make_from_bits(uint16_t bits) {
+    bfloat16_t result;
+    result.bits = bits;
+    return result;
+  }
+  uint16_t to_bits() const { return bits; }
+};
+
+class Type {
+ public:
+  constexpr Type() = default;
+  constexpr Type(TypeCode code, int bits, int lanes = 1)
+      : code_(code), bits_(static_cast<uint8_t>(bits)), lanes_(static_cast<uint16_t>(lanes)) {}
+
+  constexpr TypeCode code() const { return code_; }
+  constexpr int bits() const { return bits_; }
+  constexpr int bytes() const { return (bits_ + 7) / 8; }
+  constexpr int lanes() const { return lanes_; }
+
+  constexpr bool is_bool() const { return code_ == TypeCode::UInt && bits_ == 1; }
+  constexpr bool is_int() const { return code_ == TypeCode::Int; }
+  constexpr bool is_uint() const { return code_ == TypeCode::UInt; }
+  constexpr bool is_int_or_uint() const { return is_int() || is_uint(); }
+  constexpr bool is_float() const { return code_ == TypeCode::Float || code_ == TypeCode::BFloat; }
+  constexpr bool is_bfloat() const { return code_ == TypeCode::BFloat; }
+  constexpr bool is_handle() const { return code_ == TypeCode::Handle; }
+  constexpr bool is_scalar() const { return lanes_ == 1; }
+  constexpr bool is_vector() const { return lanes_ > 1; }
+
+  constexpr Type with_lanes(int lanes) const { return Type(code_, bits_, lanes); }
+  constexpr Type with_bits(int bits) const { return Type(code_, bits, lanes_); }
+  constexpr Type with_code(TypeCode code) const { return Type(code, bits_, lanes_); }
+  constexpr Type element_of() const { return with_lanes(1); }
+
+  // Largest and smallest finite values, for scalar integer types as 64-bit patterns.
+  int64_t min_int() const;
+  int64_t max_int() const;
+  uint64_t max_uint() const;
+  // Whether the value survives conversion to this type unchanged (floats: up to rounding, within range).
+  bool can_represent(int64_t value) const;
+  bool can_represent(uint64_t value) const;
+  bool can_represent(double value) const;
+  bool can_represent(Type other) const;  // every value of `other`
+
+  friend constexpr bool operator==(const Type& a, const Type& b) = default;
+  friend constexpr bool operator<(const Type& a, const Type& b) {
+    return a.key() < b.key();
+  }
+  constexpr uint32_t key() const {
+    return static_cast<uint32_t>(code_) | static_cast<uint32_t>(bits_) << 8 |
+           static_cast<uint32_t>(lanes_) << 16;
+  }
+
+ private:
+  TypeCode code_ = TypeCode::Handle;
+  uint8_t bits_ = 0;
+  uint16_t lanes_ = 0;
+};
+
+constexpr Type Int(int bits, int lanes = 1) { return Type(TypeCode::Int, bits, lanes); }
+constexpr Type UInt(int bits, int lanes = 1) { return Type(TypeCode::UInt, bits, lanes); }
+constexpr Type Float(int bits, int lanes = 1) { return Type(TypeCode::Float, bits, lanes); }
+constexpr Type BFloat(int bits, int lanes = 1) { return Type(TypeCode::BFloat, bits, lanes); }
+constexpr Type Bool(int lanes = 1) { return UInt(1, lanes); }
+constexpr Type Handle(int lanes = 1) { return Type(TypeCode::Handle, 64, lanes); }
+
+template <typename T>
+constexpr Type type_of() {
+  if constexpr (std::is_same_v<T, bool>) {
+    return Bool();
+  } else if constexpr (std::is_same_v<T, float16_t>) {
+    return Float(16);
+  } else if constexpr (std::is_same_v<T, bfloat16_t>) {
+    return BFloat(16);
+  } else if constexpr (std::is_floating_point_v<T>) {
+    static_assert(sizeof(T) <= 8, "no 80-bit floats");
+    return Float(8 * sizeof(T));
+  } else if constexpr (std::is_pointer_v<T>) {
+    return Handle();
+  } else if constexpr (std::is_signed_v<T>) {
+    return Int(8 * sizeof(T));
+  } else {
+    static_assert(std::is_unsigned_v<T>, "no Retrograde type for this C++ type");
+    return UInt(8 * sizeof(T));
+  }
+}
+
+// "int32", "float32x8", "bfloat16", "bool", "handle"
+std::string to_string(Type type);
+
+}  // namespace retrograde

@@ -1,0 +1,134 @@
+// Walking and rewriting the IR with lambdas.
+//
+//   match(e, [&](const ir::Select& s) {...}, [&](const ir::Binary& b) {...}, [&](const ir::ExprNode& n) {default});
+//
+// calls the lambda of the node's type, else the default, which every match states. Expressions are DAGs: `walk` and
+// `Rewriter` visit a shared node once. A hand-written recursion must do the same or take exponential time.
+#pragma once
+
+#include <functional>
+#include <map>
+#include <string>
+#include <unordered_map>
+#include <unordered_set>
+
+#include "ir/expr.h"
+
+namespace retrograde::ir {
+
+// A non-owning reference to a callable; lives only as long as the callable.
+template <class Signature>
+class FunctionRef;
+template <class R, class... Args>
+class FunctionRef<R(Args...)> {
+ public:
+  template <class F>
+    requires(!std::is_same_v<std::remove_cvref_t<F>, FunctionRef>)
+  FunctionRef(F&& f)
+      : object_(const_cast<void*>(static_cast<const void*>(std::addressof(f)))), call_([](void* object, Args... args) -> R {
+          return (*static_cast<std::remove_reference_t<F>*>(object))(std::forward<Args>(args)...);
+        }) {}
+  R operator()(Args... args) const { return call_(object_, std::forward<Args>(args)...); }
+
+ private:
+  void* object_;
+  R (*call_)(void*, Args...);
+};
+
+template <class... Fs>
+struct Overloaded : Fs... {
+  using Fs::operator()...;
+};
+template <class... Fs>
+Overloaded(Fs...) -> Overloaded<Fs...>;
+
+template <class... Fs>
+decltype(auto) match(const Expr& e, Fs&&... fs) {
+  Overloaded f{std::forward<Fs>(fs)...};
+  const Node* node = e.get();
+  switch (node->kind) {
+#define RETROGRADE_EXPR(K) \
+  case Kind::K:            \
+    return f(*static_cast<const K*>(node));
+#define RETROGRADE_BINARY(K) \
+  case Kind::K:              \
+    return f(*static_cast<const K*>(node));
+#include "ir/kinds.def"
+    default:
+      return f(*static_cast<const ExprNode*>(node));
+  }
+}
+
+template <class... Fs>
+decltype(auto) match(const Stmt& s, Fs&&... fs) {
+  Overloaded f{std::forward<Fs>(fs)...};
+  const Node* node = s.get();
+  switch (node->kind) {
+#define RETROGRADE_STMT(K) \
+  case Kind::K:            \
+    return f(*static_cast<const K*>(node));
+#include "ir/kinds.def"
+    default:
+      return f(*static_cast<const StmtNode*>(node));
+  }
+}
+
+using ExprVisit = FunctionRef<void(const Expr&)>;
+using StmtVisit = FunctionRef<void(const Stmt&)>;
+using ExprMap = FunctionRef<Expr(const Expr&)>;
+using StmtMap = FunctionRef<Stmt(const Stmt&)>;
+
+// The direct children, in evaluation order; undefined optional children are skipped.
+void for_each_child(const Expr& e, ExprVisit on_expr);
+void for_each_child(const Stmt& s, ExprVisit on_expr, StmtVisit on_stmt);
+
+// The same node with its children replaced; the same handle when none changed.
+Expr map_children(const Expr& e, ExprMap map);
+Stmt map_children(const Stmt& s, ExprMap map, StmtMap map_stmt);
+
+// Visits every node once, parents before children; descends where the lambda returns true.
+void walk(const Expr& e, FunctionRef<bool(const Expr&)> enter);
+void walk(const Stmt& s, FunctionRef<bool(const Expr&)> enter_expr, FunctionRef<bool(const Stmt&)> enter_stmt);
+
+// A context-free rewriting, memoised by node identity. Derive, and override `rewrite` for the kinds of interest,
+// ending in `return children(e)`. Call the object on children to recurse.
+class Rewriter {
+ public:
+  virtual ~Rewriter() = default;
+  Expr operator()(const Expr& e);
+  Stmt operator()(const Stmt& s) { return s.defined() ? rewrite(s) : s; }
+
+ protected:
+  virtual Expr rewrite(const Expr& e) { return children(e); }
+  virtual Stmt rewrite(const Stmt& s) { return children(s); }
+  Expr children(const Expr& e);
+  Stmt children(const Stmt& s);
+  // To be called when the answer for a node may have changed (entering a scope).
+  void forget() { memo_.clear(); }
+
+ private:
+  struct Entry {
+    Expr key, value;  // the key is kept alive so that its address stays its own
+  };
+  std::unordered_map<const ExprNode*, Entry> memo_;
+};
+
+// Rewriting with a lambda: f(e, recurse) gives the new node; `recurse` maps the children of e.
+using RewriteStep = std::function<Expr(const Expr&, const std::function<Expr(const Expr&)>& recurse)>;
+Expr rewrite(const Expr& e, const RewriteStep& step);
+
+// Names are unique: a let or loop inside `e` never rebinds a name of the map.
+using Substitution = std::map<std::string, Expr>;
+Expr substitute(const Expr& e, const Substitution& values);
+Stmt substitute(const Stmt& s, const Substitution& values);
+Expr substitute(const Expr& e, const std::string& name, const Expr& value);
+Stmt substitute(const Stmt& s, const std::string& name, const Expr& value);
+
+bool uses_variable(const Expr& e, const std::string& name);
+bool uses_variable(const Stmt& s, const std::string& name);
+bool uses_any_variable(const Expr& e, const std::unordered_set<std::string>& names);
+
+// A fresh name "prefix$N", unique in the process (thread-safe). unique_name("x") may give "x$3".
+std::string unique_name(const std::string& prefix);
+
+}  // namespace retrograde::ir
