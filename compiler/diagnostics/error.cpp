@@ -7,22 +7,22 @@ namespace retrograde {
 
 namespace {
 
-void append_sentence(std::string &out, std::string sentence) {
+void append_sentence(std::string& out, std::string sentence) {
   sentence.front() = static_cast<char>(std::toupper(static_cast<unsigned char>(sentence.front())));
   out += ' ';
   out += sentence;
   if (out.back() != '.' && out.back() != '!' && out.back() != '?') out += '.';
 }
 
-std::string with_place(const std::string &what, const std::source_location &where) {
+std::string with_place(const std::string& what, const std::source_location& where) {
   if (where.line() == 0) return what;
   std::string_view file = where.file_name();
   file.remove_prefix(file.find_last_of('/') + 1);
   return text(what, " [", file, ":", where.line(), "]");
 }
 
-std::string internal_text(const std::string &what, const std::string &pass,
-                          const std::string &ir_before) {
+std::string internal_text(const std::string& what, const std::string& pass,
+                          const std::string& ir_before) {
   std::string out = "internal error";
   if (!pass.empty()) out += " in pass " + quoted(pass);
   out += ": " + what + "\nThis is a bug in Retrograde, not in your program.";
@@ -47,19 +47,19 @@ Error::Error(Message message)
     : std::runtime_error(message.render()),
       message_(std::make_shared<const Message>(std::move(message))) {}
 
-Error::Error(const std::string &text)
+Error::Error(const std::string& text)
     : std::runtime_error(text),
       message_(std::make_shared<const Message>(Message{text, {}, {}, {}})) {}
 
 RuntimeError::RuntimeError(Message message, int code)
     : UserError(std::move(message)), code_(code) {}
 
-RuntimeError::RuntimeError(const std::string &text, int code) : UserError(text), code_(code) {}
+RuntimeError::RuntimeError(const std::string& text, int code) : UserError(text), code_(code) {}
 
-InternalError::InternalError(const std::string &what) : InternalError(what, {}, {}) {}
+InternalError::InternalError(const std::string& what) : InternalError(what, {}, {}) {}
 
-InternalError::InternalError(const std::string &what, const std::string &pass,
-                             const std::string &ir_before)
+InternalError::InternalError(const std::string& what, const std::string& pass,
+                             const std::string& ir_before)
     : Error(internal_text(what, pass, ir_before)),
       details_(std::make_shared<const Details>(Details{pass, ir_before})) {}
 
@@ -79,7 +79,7 @@ void unsupported(std::string asked, std::string rule, std::string evidence, std:
       Message{std::move(asked), std::move(rule), std::move(evidence), std::move(instead)});
 }
 
-void internal_error(const std::string &what, std::source_location where) {
+void internal_error(const std::string& what, std::source_location where) {
   throw InternalError(with_place(what, where));
 }
 
@@ -92,7 +92,7 @@ std::string quoted(std::string_view name) {
 
 namespace detail {
 
-void assertion_failed(const char *condition, const std::string &what, std::source_location where) {
+void assertion_failed(const char* condition, const std::string& what, std::source_location where) {
   std::string out = *condition ? text("expected ", condition) : std::string();
   if (!what.empty()) out += out.empty() ? what : ": " + what;
   throw InternalError(with_place(out, where));

@@ -39,10 +39,10 @@ struct Message {
 class Error : public std::runtime_error {
  public:
   explicit Error(Message message);
-  explicit Error(const std::string &text);
+  explicit Error(const std::string& text);
 
   // The parts. For an error made from plain text everything stands in `asked`.
-  const Message &message() const noexcept { return *message_; }
+  const Message& message() const noexcept { return *message_; }
 
  private:
   std::shared_ptr<const Message> message_;  // shared: copying an exception must not throw
@@ -63,7 +63,7 @@ class RuntimeError : public UserError {
   // `code` is what the generated code or the runtime returned, 0 when the check came before the
   // call.
   explicit RuntimeError(Message message, int code = 0);
-  explicit RuntimeError(const std::string &text, int code = 0);
+  explicit RuntimeError(const std::string& text, int code = 0);
 
   int code() const noexcept { return code_; }
 
@@ -78,13 +78,13 @@ class Unsupported : public Error {
 
 class InternalError : public Error {
  public:
-  explicit InternalError(const std::string &what);
+  explicit InternalError(const std::string& what);
 
   // What a bug report needs. `ir_before` is the program that the pass was given, as IR text.
-  InternalError(const std::string &what, const std::string &pass, const std::string &ir_before);
+  InternalError(const std::string& what, const std::string& pass, const std::string& ir_before);
 
-  const std::string &pass() const noexcept { return details_->pass; }
-  const std::string &ir_before() const noexcept { return details_->ir_before; }
+  const std::string& pass() const noexcept { return details_->pass; }
+  const std::string& ir_before() const noexcept { return details_->ir_before; }
 
  private:
   struct Details {
@@ -107,7 +107,7 @@ class InternalError : public Error {
                               std::string instead = {});
 
 // Throws InternalError with the place where it was called.
-[[noreturn]] void internal_error(const std::string &what,
+[[noreturn]] void internal_error(const std::string& what,
                                  std::source_location where = std::source_location::current());
 
 // A user's name in quotes, the way all messages show names: blur_x => "blur_x".
@@ -115,21 +115,21 @@ std::string quoted(std::string_view name);
 
 // Everything streamable, put together: text("extent ", 3, " of ", quoted("x")).
 template <typename... Parts>
-std::string text(const Parts &...parts) {
+std::string text(const Parts&... parts) {
   std::ostringstream out;
   ((out << parts), ...);
   return std::move(out).str();
 }
 
 namespace detail {
-[[noreturn]] void assertion_failed(const char *condition, const std::string &what,
+[[noreturn]] void assertion_failed(const char* condition, const std::string& what,
                                    std::source_location where);
 }  // namespace detail
 
 // An invariant of ours, checked in every build. The parts after the condition explain the failure
 // and are put together only when it fails.
 template <typename... Parts>
-void internal_assert(bool condition, const Parts &...parts) {
+void internal_assert(bool condition, const Parts&... parts) {
   if (!condition) [[unlikely]] {
     detail::assertion_failed("", text(parts...), {});
   }

@@ -1,6 +1,8 @@
 // The four parts of a message, how they are rendered, and which class each helper throws.
 #include <gtest/gtest.h>
 
+#include <type_traits>
+
 #include "diagnostics/error.h"
 
 namespace retrograde {
@@ -27,9 +29,10 @@ TEST(Message, KeepsAFinalStopSingle) {
 
 TEST(Error, UserErrorHelperThrowsCompileErrorWithItsParts) {
   try {
-    user_error("split \"x\"", "the factor must be positive", "it is 0", "use a factor of 1 or more");
+    user_error("split \"x\"", "the factor must be positive", "it is 0",
+               "use a factor of 1 or more");
     FAIL() << "nothing was thrown";
-  } catch (const CompileError &error) {
+  } catch (const CompileError& error) {
     EXPECT_EQ(error.message().asked, "split \"x\"");
     EXPECT_EQ(error.message().evidence, "it is 0");
     EXPECT_STREQ(error.what(),
@@ -42,7 +45,7 @@ TEST(Error, CallErrorHelperThrowsRuntimeErrorWithItsCode) {
   try {
     call_error("call \"f\"", "an argument is null", "argument \"in\"", "", -12);
     FAIL() << "nothing was thrown";
-  } catch (const RuntimeError &error) {
+  } catch (const RuntimeError& error) {
     EXPECT_EQ(error.code(), -12);
   }
 }
@@ -52,12 +55,7 @@ TEST(Error, ClassesAreToldApart) {
   EXPECT_THROW(call_error("a", "b"), UserError);
   EXPECT_THROW(unsupported("a", "b"), Unsupported);
   EXPECT_THROW(internal_error("a"), InternalError);
-  try {
-    unsupported("a", "b");
-  } catch (const UserError &) {
-    FAIL() << "a known gap is not the user's error";
-  } catch (const Error &) {
-  }
+  static_assert(!std::is_base_of_v<UserError, Unsupported>, "a known gap is not the user's error");
 }
 
 TEST(InternalError, AssertShowsConditionPartsAndPlace) {
@@ -65,7 +63,7 @@ TEST(InternalError, AssertShowsConditionPartsAndPlace) {
   try {
     RETROGRADE_ASSERT(extent >= 0, "extent of ", quoted("x"), " is ", extent);
     FAIL() << "nothing was thrown";
-  } catch (const InternalError &error) {
+  } catch (const InternalError& error) {
     const std::string what = error.what();
     EXPECT_NE(what.find("expected extent >= 0: extent of \"x\" is -1"), std::string::npos) << what;
     EXPECT_NE(what.find("error_message_test.cpp:"), std::string::npos) << what;
