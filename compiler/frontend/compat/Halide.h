@@ -4,4 +4,7 @@
 
 #include <retrograde/retrograde.h>
 
-namespace Halide = retrograde;
+// Not an alias: HalideBuffer.h opens namespace Halide for Halide::Runtime.
+namespace Halide {
+using namespace ::retrograde;
+}  // namespace Halide
