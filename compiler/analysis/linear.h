@@ -1,0 +1,60 @@
+// Integer expressions as sums: e = c1 * atom1 + c2 * atom2 + ... + constant, and what follows from that form: canonical
+// text, differences that are constant, and linear conditions solved for a variable.
+// Signed integers of 32 bits and more only (they are assumed not to overflow); everything else is an atom.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "analysis/interval.h"
+#include "analysis/scope.h"
+#include "ir/expr.h"
+
+namespace retrograde::ir {
+
+struct LinearTerm {
+  Expr atom;  // not a sum, not a difference, not a product with a constant
+  int64_t coefficient = 0;
+};
+struct LinearForm {
+  Type type = Int(32);
+  std::vector<LinearTerm> terms;  // atoms in structural order, each once, no coefficient 0
+  int64_t constant = 0;
+  bool is_constant() const { return terms.empty(); }
+  int64_t coefficient_of(const std::string& variable) const;  // of the atom that is this Variable, else 0
+};
+
+// The type is Int of 32 or 64 bits, scalar.
+bool has_linear_form(Type type);
+LinearForm linear_form(const Expr& e);
+Expr to_expr(const LinearForm& form);  // undefined when a coefficient does not fit the type
+LinearForm plus(const LinearForm& a, const LinearForm& b, int64_t factor_of_b = 1);
+LinearForm times(const LinearForm& a, int64_t factor);
+
+// a - b when it is the same for all values of all variables.
+std::optional<int64_t> constant_difference(const Expr& a, const Expr& b);
+// The expression in canonical form: like terms gathered, min and max of operands with a constant difference decided.
+Expr canonical(const Expr& e);
+
+// e = sum of coefficient * variable over the given variables, plus `rest`, in which none of them occurs.
+// nullopt when e is not linear in them.
+struct LinearDecomposition {
+  std::vector<std::pair<std::string, int64_t>> coefficients;  // as the variables were given
+  Expr rest;
+};
+std::optional<LinearDecomposition> decompose(const Expr& e, const std::vector<std::string>& variables);
+
+// Where a condition certainly holds: for every value of `variable` in `interval`, provided that `needed` (free of the
+// variable; undefined: true) holds, and for all values of the inner variables in their intervals.
+struct Solution {
+  Interval interval;
+  Expr needed;
+};
+// The condition: conjunctions, disjunctions and negations of comparisons of integers, linear in `variable`, also
+// through division by a positive constant, min and max. Names in `inner` are quantified over their intervals, whose
+// ends may mention `variable` but no other inner name. nullopt: no such set was found.
+std::optional<Solution> solve_for(const Expr& condition, const std::string& variable, const Scope<Interval>& inner);
+
+}  // namespace retrograde::ir
