@@ -74,22 +74,48 @@ Expr constant_like(const Expr& other, int64_t value, const char* what);
 
 }  // namespace ir
 
-// ---- C++ operators on Expr. An int operand takes the type of the other operand and must fit it. ----
-#define RETROGRADE_DECLARE_OPERATOR(op)       \
-  Expr operator op(Expr a, Expr b);           \
-  Expr operator op(Expr a, int b);            \
-  Expr operator op(int a, Expr b);
-RETROGRADE_DECLARE_OPERATOR(+)
-RETROGRADE_DECLARE_OPERATOR(-)
-RETROGRADE_DECLARE_OPERATOR(*)
-RETROGRADE_DECLARE_OPERATOR(/)
-RETROGRADE_DECLARE_OPERATOR(%)
-RETROGRADE_DECLARE_OPERATOR(<)
-RETROGRADE_DECLARE_OPERATOR(<=)
-RETROGRADE_DECLARE_OPERATOR(>)
-RETROGRADE_DECLARE_OPERATOR(>=)
-RETROGRADE_DECLARE_OPERATOR(==)
-RETROGRADE_DECLARE_OPERATOR(!=)
+// ---- C++ operators on Expr ----
+
+// A C++ integer beside an Expr takes the Expr's type, and must fit it (UserError). A template, because a plain `int`
+// parameter would also swallow `e + 0.5f`. C++ floats become Exprs of their own type.
+template <class T>
+concept IntegerConstant = std::is_integral_v<T> && !std::is_same_v<T, bool>;
+
+namespace ir {
+template <IntegerConstant T>
+Expr constant_for(const Expr& other, T value, const char* what) {
+  if constexpr (std::is_same_v<T, uint64_t> || std::is_same_v<T, unsigned long long>) {
+    if (value > static_cast<uint64_t>(INT64_MAX)) return make_uint_const(UInt(64), value);
+  }
+  return constant_like(other, static_cast<int64_t>(value), what);
+}
+}  // namespace ir
+
+#define RETROGRADE_DECLARE_OPERATOR(name)                              \
+  Expr name(Expr a, Expr b);                                           \
+  template <IntegerConstant T>                                         \
+  Expr name(Expr a, T b) {                                             \
+    Expr constant = ir::constant_for(a, b, #name);                     \
+    return name(std::move(a), std::move(constant));                    \
+  }                                                                    \
+  template <IntegerConstant T>                                         \
+  Expr name(T a, Expr b) {                                             \
+    Expr constant = ir::constant_for(b, a, #name);                     \
+    return name(std::move(constant), std::move(b));                    \
+  }
+RETROGRADE_DECLARE_OPERATOR(operator+)
+RETROGRADE_DECLARE_OPERATOR(operator-)
+RETROGRADE_DECLARE_OPERATOR(operator*)
+RETROGRADE_DECLARE_OPERATOR(operator/)
+RETROGRADE_DECLARE_OPERATOR(operator%)
+RETROGRADE_DECLARE_OPERATOR(operator<)
+RETROGRADE_DECLARE_OPERATOR(operator<=)
+RETROGRADE_DECLARE_OPERATOR(operator>)
+RETROGRADE_DECLARE_OPERATOR(operator>=)
+RETROGRADE_DECLARE_OPERATOR(operator==)
+RETROGRADE_DECLARE_OPERATOR(operator!=)
+RETROGRADE_DECLARE_OPERATOR(min)
+RETROGRADE_DECLARE_OPERATOR(max)
 #undef RETROGRADE_DECLARE_OPERATOR
 Expr operator&&(Expr a, Expr b);
 Expr operator||(Expr a, Expr b);
@@ -99,12 +125,6 @@ Expr& operator+=(Expr& a, Expr b);
 Expr& operator-=(Expr& a, Expr b);
 Expr& operator*=(Expr& a, Expr b);
 Expr& operator/=(Expr& a, Expr b);
-Expr min(Expr a, Expr b);
-Expr max(Expr a, Expr b);
-Expr min(Expr a, int b);
-Expr max(Expr a, int b);
-Expr min(int a, Expr b);
-Expr max(int a, Expr b);
 Expr cast(Type type, Expr value);  // UserError for handles
 Expr select(Expr condition, Expr true_value, Expr false_value);  // promotes the arms
 Expr clamp(Expr value, Expr low, Expr high);                     // low and high take value's type

@@ -50,6 +50,7 @@ struct Node {
 struct ExprNode : Node {
   ExprNode(Kind kind, Type type) : Node(kind), type(type) {}
   const Type type;
+  mutable std::atomic<uint64_t> hash{0};  // structural (equal.h); 0 until asked for
 };
 struct StmtNode : Node {
   using Node::Node;
@@ -199,7 +200,7 @@ struct Variable : ExprNode {
   const std::string name;
   const SymbolRef symbol;
 };
-struct Cast : ExprNode {  // integers wrap; float to integer truncates toward zero
+struct Cast : ExprNode {  // integers wrap; float to integer truncates toward zero; to bool means != 0
   RETROGRADE_NODE(Cast)
   Cast(Type type, Expr value) : ExprNode(Kind::Cast, type), value(std::move(value)) {}
   const Expr value;

@@ -1,0 +1,429 @@
+// Node builders: type checks and constant folding.
+#include "ir/build.h"
+
+#include <cmath>
+#include <limits>
+
+#include "ir/print.h"
+#include "ir/scalar.h"
+
+namespace retrograde::ir {
+
+// ---- constants ----
+
+namespace {
+
+Expr splat(Expr scalar, int lanes) { return lanes == 1 ? scalar : Expr(new Broadcast(std::move(scalar), lanes)); }
+
+// Every NaN becomes the one quiet NaN that the printer knows.
+Expr float_const(Type scalar, double value) {
+  if (std::isnan(value)) value = std::numeric_limits<double>::quiet_NaN();
+  return new FloatImm(scalar, round_to_type(scalar, value));
+}
+
+Expr scalar_const(const Scalar& s) {
+  if (s.type.is_float()) return float_const(s.type, s.f);
+  if (s.type.is_int()) return new IntImm(s.type, s.i);
+  if (s.type.is_uint()) return new UIntImm(s.type, s.u);
+  return new Reinterpret(s.type, new UIntImm(UInt(64), s.u));
+}
+
+Expr constant(const Scalar& s, int lanes) { return splat(scalar_const(s), lanes); }
+
+}  // namespace
+
+Expr make_const(Type type, int64_t value) {
+  if (type.is_float()) return constant(eval_cast(type.element_of(), Scalar::of_int(Int(64), value)), type.lanes());
+  return constant(Scalar::of_int(type, value), type.lanes());
+}
+
+Expr make_const(Type type, double value) {
+  if (type.is_float()) return splat(float_const(type.element_of(), value), type.lanes());
+  return constant(eval_cast(type.element_of(), Scalar::of_float(Float(64), value)), type.lanes());
+}
+
+Expr make_uint_const(Type type, uint64_t value) {
+  if (type.is_float()) return constant(eval_cast(type.element_of(), Scalar::of_uint(UInt(64), value)), type.lanes());
+  return constant(Scalar::of_uint(type, value), type.lanes());
+}
+
+Expr make_zero(Type type) { return make_const(type, int64_t{0}); }
+Expr make_one(Type type) { return make_const(type, int64_t{1}); }
+Expr const_true(int lanes) { return make_one(Bool(lanes)); }
+Expr const_false(int lanes) { return make_zero(Bool(lanes)); }
+
+std::optional<int64_t> as_const_int(const Expr& e) {
+  const std::optional<Scalar> s = as_scalar(e);
+  if (!s || !s->type.is_int_or_uint()) return std::nullopt;
+  if (s->type.is_uint() && s->u > static_cast<uint64_t>(INT64_MAX)) return std::nullopt;
+  return s->i;
+}
+
+std::optional<double> as_const_float(const Expr& e) {
+  const std::optional<Scalar> s = as_scalar(e);
+  if (!s || !s->type.is_float()) return std::nullopt;
+  return s->f;
+}
+
+namespace {
+bool is_number(const Expr& e, int value) {
+  const std::optional<Scalar> s = as_scalar(e);
+  return s && (s->type.is_float() ? s->f == value : s->type.is_int() ? s->i == value : s->u == uint64_t(value));
+}
+}  // namespace
+
+bool is_const(const Expr& e) { return as_scalar(e).has_value(); }
+bool is_zero(const Expr& e) { return is_number(e, 0); }
+bool is_one(const Expr& e) { return is_number(e, 1); }
+bool is_const_true(const Expr& e) { return e.defined() && e.type().is_bool() && is_one(e); }
+bool is_const_false(const Expr& e) { return e.defined() && e.type().is_bool() && is_zero(e); }
+bool is_const_int(const Expr& e, int64_t value) { return as_const_int(e) == value; }
+
+Expr variable(const std::string& name, Type type, SymbolRef symbol) {
+  return new Variable(type, name, std::move(symbol));
+}
+
+// ---- binary nodes ----
+
+namespace {
+
+bool is_comparison(Kind kind) { return kind >= Kind::EQ && kind <= Kind::GE; }
+
+void match_lanes(Expr& a, Expr& b) {
+  if (a.type().lanes() == b.type().lanes()) return;
+  if (a.type().is_scalar()) a = make_broadcast(std::move(a), b.type().lanes());
+  else if (b.type().is_scalar()) b = make_broadcast(std::move(b), a.type().lanes());
+}
+
+Expr new_binary(Kind kind, Type type, Expr a, Expr b) {
+  switch (kind) {
+#define RETROGRADE_BINARY(K) \
+  case Kind::K:              \
+    return new K(type, std::move(a), std::move(b));
+#include "ir/kinds.def"
+    default:
+      internal_error(text(kind_name(kind), " is not a binary node"));
+  }
+}
+
+bool is_negative_zero(const Expr& e) {
+  const std::optional<double> value = as_const_float(e);
+  return value && *value == 0 && std::signbit(*value);
+}
+
+// x + -0.0, x - 0.0, x * 1.0 and x / 1.0 are x for every x, NaN, infinities and -0.0 among them. x + 0.0 is not.
+Expr fold_float(Kind kind, const Expr& a, const Expr& b) {
+  switch (kind) {
+    case Kind::Add:
+      return is_negative_zero(b) ? a : is_negative_zero(a) ? b : Expr();
+    case Kind::Sub:
+      return is_zero(b) && !is_negative_zero(b) ? a : Expr();
+    case Kind::Mul:
+      return is_one(b) ? a : is_one(a) ? b : Expr();
+    case Kind::Div:
+      return is_one(b) ? a : Expr();
+    case Kind::Min:
+    case Kind::Max:
+      return a.same_as(b) ? a : Expr();
+    default:
+      return {};
+  }
+}
+
+Expr fold_integer_compare(Kind kind, const Expr& a, const Expr& b) {
+  if (!a.same_as(b)) return {};
+  const bool result = kind == Kind::EQ || kind == Kind::LE || kind == Kind::GE;
+  return make_const(Bool(a.type().lanes()), int64_t{result});
+}
+
+Expr fold_integer(Kind kind, const Expr& a, const Expr& b) {
+  switch (kind) {
+    case Kind::Add:
+      return is_zero(b) ? a : is_zero(a) ? b : Expr();
+    case Kind::Sub:
+      return is_zero(b) ? a : a.same_as(b) ? make_zero(a.type()) : Expr();
+    case Kind::Mul:
+      return is_one(b) || is_zero(a) ? a : is_one(a) || is_zero(b) ? b : Expr();
+    case Kind::Div:  // 0 / x and x / 0 are 0
+      return is_one(b) || is_zero(a) ? a : is_zero(b) ? b : Expr();
+    case Kind::Mod:
+      return is_one(b) || is_zero(b) || is_zero(a) ? make_zero(a.type()) : Expr();
+    case Kind::Min:
+    case Kind::Max:
+      return a.same_as(b) ? a : Expr();
+    default:
+      return fold_integer_compare(kind, a, b);
+  }
+}
+
+Expr fold_logical(Kind kind, const Expr& a, const Expr& b) {
+  const bool absorbing = kind == Kind::Or;  // true || x, false && x
+  for (const auto& [x, y] : {std::pair(a, b), std::pair(b, a)}) {
+    if (is_const_true(x)) return absorbing ? x : y;
+    if (is_const_false(x)) return absorbing ? y : x;
+  }
+  return a.same_as(b) ? a : Expr();
+}
+
+Expr fold_binary(Kind kind, Type result, const Expr& a, const Expr& b) {
+  const std::optional<Scalar> x = as_scalar(a);
+  const std::optional<Scalar> y = x ? as_scalar(b) : std::nullopt;
+  if (x && y) return constant(eval_binary(kind, *x, *y), result.lanes());
+  if (kind == Kind::And || kind == Kind::Or) return fold_logical(kind, a, b);
+  if (a.type().is_float()) return fold_float(kind, a, b);
+  return a.type().is_int_or_uint() ? fold_integer(kind, a, b) : Expr();
+}
+
+}  // namespace
+
+Expr binary(Kind kind, Expr a, Expr b) {
+  match_lanes(a, b);
+  RETROGRADE_ASSERT(a.type() == b.type(), kind_name(kind), " of ", a.type(), " and ", b.type(), ": ", a, ", ", b);
+  const bool logical = kind == Kind::And || kind == Kind::Or;
+  RETROGRADE_ASSERT(!logical || a.type().is_bool(), kind_name(kind), " of ", a.type());
+  const Type type = is_comparison(kind) ? Bool(a.type().lanes()) : a.type();
+  if (Expr folded = fold_binary(kind, type, a, b); folded.defined()) return folded;
+  return new_binary(kind, type, std::move(a), std::move(b));
+}
+
+// ---- other expressions ----
+
+Expr logical_not(Expr a) {
+  RETROGRADE_ASSERT(a.type().is_bool(), "Not of ", a.type());
+  if (const std::optional<Scalar> s = as_scalar(a)) return constant(eval_not(*s), a.type().lanes());
+  if (const auto* inner = a.as<Not>()) return inner->a;
+  return new Not(std::move(a));
+}
+
+namespace {
+
+// What a float out of an integer type's range becomes is left to the machine, so it is not folded.
+bool cast_is_defined(Type to, const Scalar& from) {
+  if (!from.type.is_float() || to.is_float() || to.is_bool()) return true;
+  return std::isfinite(from.f) && to.can_represent(std::trunc(from.f));
+}
+
+}  // namespace
+
+Expr cast_to(Type type, Expr value) {
+  if (type.lanes() != value.type().lanes()) {
+    RETROGRADE_ASSERT(type.is_scalar() || value.type().is_scalar(), "cast of ", value.type(), " to ", type);
+    if (value.type().is_scalar()) return make_broadcast(cast_to(type.element_of(), std::move(value)), type.lanes());
+    type = type.with_lanes(value.type().lanes());
+  }
+  if (type == value.type()) return value;
+  RETROGRADE_ASSERT(!type.is_handle() && !value.type().is_handle(), "cast of ", value.type(), " to ", type);
+  const std::optional<Scalar> s = as_scalar(value);
+  if (s && cast_is_defined(type.element_of(), *s)) return constant(eval_cast(type.element_of(), *s), type.lanes());
+  return new Cast(type, std::move(value));
+}
+
+Expr reinterpret_as(Type type, Expr value) {
+  if (type == value.type()) return value;
+  RETROGRADE_ASSERT(type.bits() * type.lanes() == value.type().bits() * value.type().lanes(), "reinterpret ",
+                    value.type(), " as ", type);
+  const std::optional<Scalar> s = as_scalar(value);
+  if (s && type.lanes() == value.type().lanes() && !type.is_handle()) {
+    const Scalar result = eval_reinterpret(type.element_of(), *s);
+    if (!type.is_float() || !std::isnan(result.f)) return constant(result, type.lanes());  // NaNs carry payloads
+  }
+  return new Reinterpret(type, std::move(value));
+}
+
+Expr make_select(Expr condition, Expr true_value, Expr false_value) {
+  match_lanes(true_value, false_value);
+  const int lanes = condition.type().lanes();
+  if (lanes > 1 && true_value.type().is_scalar()) {
+    true_value = make_broadcast(std::move(true_value), lanes);
+    false_value = make_broadcast(std::move(false_value), lanes);
+  }
+  RETROGRADE_ASSERT(condition.type().is_bool(), "select on ", condition.type());
+  RETROGRADE_ASSERT(true_value.type() == false_value.type(), "select between ", true_value.type(), " and ",
+                    false_value.type());
+  RETROGRADE_ASSERT(lanes == 1 || lanes == true_value.type().lanes(), "select of ", true_value.type(), " on ",
+                    condition.type());
+  if (is_const_true(condition)) return true_value;
+  if (is_const_false(condition)) return false_value;
+  if (true_value.same_as(false_value)) return true_value;
+  return new Select(std::move(condition), std::move(true_value), std::move(false_value));
+}
+
+Expr make_load(Type type, const std::string& name, Expr index, Expr predicate, SymbolRef symbol) {
+  if (predicate.defined() && is_const_true(predicate)) predicate = {};
+  return new Load(type, name, std::move(index), std::move(predicate), std::move(symbol));
+}
+
+Expr make_ramp(Expr base, Expr stride, int lanes) {
+  RETROGRADE_ASSERT(lanes >= 1, "a ramp of ", lanes, " lanes");
+  if (lanes == 1) return base;
+  match_lanes(base, stride);
+  RETROGRADE_ASSERT(base.type() == stride.type(), "ramp from ", base.type(), " by ", stride.type());
+  return new Ramp(std::move(base), std::move(stride), lanes);
+}
+
+Expr make_broadcast(Expr value, int lanes) {
+  RETROGRADE_ASSERT(lanes >= 1, "a broadcast to ", lanes, " lanes");
+  if (lanes == 1) return value;
+  if (const auto* inner = value.as<Broadcast>()) return new Broadcast(inner->value, inner->lanes * lanes);
+  return new Broadcast(std::move(value), lanes);
+}
+
+Expr make_let(const std::string& name, Expr value, Expr body) {
+  return new Let(name, std::move(value), std::move(body));
+}
+
+Expr make_shuffle(std::vector<Expr> vectors, std::vector<int> indices) {
+  RETROGRADE_ASSERT(!vectors.empty() && !indices.empty(), "an empty shuffle");
+  int lanes = 0;
+  for (const Expr& v : vectors) {
+    RETROGRADE_ASSERT(v.type().element_of() == vectors[0].type().element_of(), "a shuffle of mixed types");
+    lanes += v.type().lanes();
+  }
+  bool identity = vectors.size() == 1 && static_cast<int>(indices.size()) == lanes;
+  for (size_t i = 0; i < indices.size(); ++i) {
+    RETROGRADE_ASSERT(indices[i] >= 0 && indices[i] < lanes, "shuffle index ", indices[i], " of ", lanes, " lanes");
+    identity &= indices[i] == static_cast<int>(i);
+  }
+  if (identity) return vectors[0];
+  const Type type = vectors[0].type().with_lanes(static_cast<int>(indices.size()));
+  return new Shuffle(type, std::move(vectors), std::move(indices));
+}
+
+Expr make_vector_reduce(ReduceOp op, Expr value, int result_lanes) {
+  const int lanes = value.type().lanes();
+  RETROGRADE_ASSERT(result_lanes >= 1 && lanes % result_lanes == 0, "reducing ", lanes, " lanes to ", result_lanes);
+  if (lanes == result_lanes) return value;
+  const Type type = value.type().with_lanes(result_lanes);
+  return new VectorReduce(type, op, std::move(value));
+}
+
+namespace {
+
+Expr fold_operator(Op op, Type type, const std::vector<Expr>& args) {
+  std::vector<Scalar> values;
+  for (const Expr& arg : args) {
+    const std::optional<Scalar> value = as_scalar(arg);
+    if (!value) return {};
+    values.push_back(*value);
+  }
+  return constant(*eval_operator(op, values, type.element_of()), type.lanes());
+}
+
+// Scalar arguments of a vector operator are broadcast.
+Type match_argument_lanes(Type type, std::vector<Expr>& args) {
+  int lanes = type.lanes();
+  for (const Expr& arg : args) lanes = std::max(lanes, arg.type().lanes());
+  for (Expr& arg : args) {
+    if (lanes > 1 && arg.type().is_scalar()) arg = make_broadcast(std::move(arg), lanes);
+    RETROGRADE_ASSERT(arg.type().lanes() == lanes, "operator arguments of ", arg.type().lanes(), " and ", lanes,
+                      " lanes");
+  }
+  return type.with_lanes(lanes);
+}
+
+}  // namespace
+
+Expr call_op(Op op, Type type, std::vector<Expr> args) {
+  const OpInfo& info = op_info(op);
+  RETROGRADE_ASSERT(info.arity < 0 || info.arity == static_cast<int>(args.size()), info.name, " of ", args.size(),
+                    " arguments");
+  if (info.cls == OpClass::Pure || info.cls == OpClass::Marker) type = match_argument_lanes(type, args);
+  if (info.cls == OpClass::Pure) {
+    if (Expr folded = fold_operator(op, type, args); folded.defined()) return folded;
+  }
+  return new Call(type, CallType::Operator, op, info.name, std::move(args), 0, {});
+}
+
+Expr call_op(Op op, std::vector<Expr> args) {
+  RETROGRADE_ASSERT(!args.empty(), op_info(op).name, " of no arguments needs a type");
+  const Type type = args[0].type();
+  return call_op(op, type, std::move(args));
+}
+
+Expr call_extern(const std::string& name, Type type, std::vector<Expr> args) {
+  return new Call(type, CallType::Extern, Op::none, name, std::move(args), 0, {});
+}
+
+Expr call_func(const std::string& name, Type type, std::vector<Expr> args, int value_index, SymbolRef symbol) {
+  return new Call(type, CallType::Func, Op::none, name, std::move(args), value_index, std::move(symbol));
+}
+
+Expr call_image(const std::string& name, Type type, std::vector<Expr> args, SymbolRef symbol) {
+  return new Call(type, CallType::Image, Op::none, name, std::move(args), 0, std::move(symbol));
+}
+
+Expr likely(Expr e) { return call_op(Op::likely, {std::move(e)}); }
+
+Expr conjunction(const std::vector<Expr>& terms) {
+  Expr result;
+  for (const Expr& term : terms) result = result.defined() ? binary(Kind::And, result, term) : term;
+  return result.defined() ? result : const_true();
+}
+
+// ---- statements. An undefined body is the empty statement; what wraps it is empty too. ----
+
+Stmt make_let(const std::string& name, Expr value, Stmt body) {
+  return body.defined() ? Stmt(new LetStmt(name, std::move(value), std::move(body))) : Stmt();
+}
+
+Stmt make_assert(Expr condition, Expr error) { return new Assert(std::move(condition), std::move(error)); }
+
+Stmt make_producer_consumer(const std::string& name, bool is_producer, Stmt body) {
+  return body.defined() ? Stmt(new ProducerConsumer(name, is_producer, std::move(body))) : Stmt();
+}
+
+Stmt make_for(const std::string& name, Expr min, Expr extent, ForType type, Stmt body) {
+  if (!body.defined()) return {};
+  return new For(name, std::move(min), std::move(extent), type, std::move(body));
+}
+
+Stmt make_store(const std::string& name, Expr value, Expr index, Expr predicate, SymbolRef symbol) {
+  match_lanes(value, index);
+  if (predicate.defined() && is_const_true(predicate)) predicate = {};
+  return new Store(name, std::move(value), std::move(index), std::move(predicate), std::move(symbol));
+}
+
+Stmt make_provide(const std::string& name, std::vector<Expr> values, std::vector<Expr> args, Expr predicate) {
+  if (predicate.defined() && is_const_true(predicate)) predicate = {};
+  return new Provide(name, std::move(values), std::move(args), std::move(predicate));
+}
+
+Stmt make_realize(const std::string& name, std::vector<Type> types, MemoryType memory, std::vector<Range> bounds,
+                  Stmt body) {
+  if (!body.defined()) return {};
+  return new Realize(name, std::move(types), memory, std::move(bounds), std::move(body));
+}
+
+Stmt make_allocate(const std::string& name, Type type, MemoryType memory, Expr elements, Stmt body) {
+  if (!body.defined()) return {};
+  return new Allocate(name, type, memory, std::move(elements), std::move(body));
+}
+
+Stmt make_free(const std::string& name) { return new Free(name); }
+
+Stmt make_block(std::vector<Stmt> stmts) {
+  std::vector<Stmt> flat;
+  flat.reserve(stmts.size());
+  for (Stmt& s : stmts) {
+    if (const auto* block = s.as<Block>()) {
+      flat.insert(flat.end(), block->stmts.begin(), block->stmts.end());
+    } else if (s.defined()) {
+      flat.push_back(std::move(s));
+    }
+  }
+  if (flat.empty()) return {};
+  return flat.size() == 1 ? flat[0] : Stmt(new Block(std::move(flat)));
+}
+
+Stmt make_if(Expr condition, Stmt then_case, Stmt else_case) {
+  if (is_const_true(condition)) return then_case;
+  if (is_const_false(condition)) return else_case;
+  if (!then_case.defined()) {
+    return else_case.defined() ? make_if(logical_not(std::move(condition)), std::move(else_case)) : Stmt();
+  }
+  return new IfThenElse(std::move(condition), std::move(then_case), std::move(else_case));
+}
+
+Stmt make_evaluate(Expr value) { return new Evaluate(std::move(value)); }
+
+}  // namespace retrograde::ir

@@ -1,0 +1,79 @@
+// The tables of kinds and operators, destruction of nodes, and immediates from C++ values.
+#include <string_view>
+#include <unordered_map>
+
+#include "ir/build.h"
+#include "ir/expr.h"
+
+namespace retrograde {
+
+namespace ir {
+
+const char* kind_name(Kind kind) {
+  static constexpr const char* names[] = {
+#define RETROGRADE_EXPR(Kind) #Kind,
+#define RETROGRADE_BINARY(Kind) #Kind,
+#define RETROGRADE_STMT(Kind) #Kind,
+#include "ir/kinds.def"
+  };
+  return names[static_cast<int>(kind)];
+}
+
+namespace {
+constexpr OpInfo op_table[] = {
+#define RETROGRADE_OP(name, arity, cls) {#name, arity, OpClass::cls},
+#include "ir/operators.def"
+    {"none", 0, OpClass::Internal},
+};
+}  // namespace
+
+const OpInfo& op_info(Op op) { return op_table[static_cast<int>(op)]; }
+
+Op op_from_name(const std::string& name) {
+  static const std::unordered_map<std::string_view, Op> by_name = [] {
+    std::unordered_map<std::string_view, Op> result;
+    for (int i = 0; i < op_count; ++i) result.emplace(op_table[i].name, static_cast<Op>(i));
+    return result;
+  }();
+  const auto found = by_name.find(name);
+  return found == by_name.end() ? Op::none : found->second;
+}
+
+// A deleted node drops its children, which may end here again: those are queued in the outermost call, on whose stack
+// the queue lives. (A thread_local queue with a destructor would be gone before the last static Expr is.)
+void release(const Node* node) noexcept {
+  thread_local std::vector<const Node*>* pending = nullptr;
+  if (pending) {
+    pending->push_back(node);
+    return;
+  }
+  std::vector<const Node*> queue;
+  pending = &queue;
+  delete node;
+  while (!queue.empty()) {
+    const Node* next = queue.back();
+    queue.pop_back();
+    delete next;
+  }
+  pending = nullptr;
+}
+
+}  // namespace ir
+
+Expr::Expr(bool value) : Expr(ir::make_uint_const(Bool(), value)) {}
+Expr::Expr(int8_t value) : Expr(ir::make_const(Int(8), int64_t{value})) {}
+Expr::Expr(int16_t value) : Expr(ir::make_const(Int(16), int64_t{value})) {}
+Expr::Expr(int32_t value) : Expr(ir::make_const(Int(32), int64_t{value})) {}
+Expr::Expr(int64_t value) : Expr(ir::make_const(Int(64), value)) {}
+Expr::Expr(uint8_t value) : Expr(ir::make_uint_const(UInt(8), value)) {}
+Expr::Expr(uint16_t value) : Expr(ir::make_uint_const(UInt(16), value)) {}
+Expr::Expr(uint32_t value) : Expr(ir::make_uint_const(UInt(32), value)) {}
+Expr::Expr(uint64_t value) : Expr(ir::make_uint_const(UInt(64), value)) {}
+Expr::Expr(float16_t value) : Expr(ir::make_const(Float(16), static_cast<double>(value))) {}
+Expr::Expr(bfloat16_t value) : Expr(ir::make_const(BFloat(16), static_cast<double>(value))) {}
+Expr::Expr(float value) : Expr(ir::make_const(Float(32), static_cast<double>(value))) {}
+Expr::Expr(double value) : Expr(ir::make_const(Float(64), value)) {}
+Expr::Expr(const std::string& text) : Ref(new ir::StringImm(text)) {}
+Expr::Expr(const char* text) : Ref(new ir::StringImm(text)) {}
+
+}  // namespace retrograde

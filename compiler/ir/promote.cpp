@@ -1,0 +1,173 @@
+// Promotion of operands, and the C++ operators that users write.
+#include "ir/build.h"
+#include "ir/print.h"
+
+namespace retrograde {
+
+namespace ir {
+
+namespace {
+
+void check_operand(const Expr& e, const char* what) {
+  if (!e.defined()) {
+    user_error(text("apply ", what), "both operands must be defined", "one is an undefined Expr",
+               "Give the Expr a value before using it");
+  }
+  if (e.type().is_handle()) {
+    user_error(text("apply ", what), "operands must be numbers", text("one has the type ", e.type()),
+               "Use the numbers behind the handle");
+  }
+}
+
+[[noreturn]] void no_common_type(Type a, Type b, const char* what) {
+  user_error(text("apply ", what), "both operands must have a common type",
+             text("the types are ", a, " and ", b), "Cast one of them explicitly");
+}
+
+Type common_scalar_type(Type a, Type b, const char* what) {
+  if (a == b) return a;
+  if (a.is_float() != b.is_float()) return a.is_float() ? a : b;
+  if (a.is_float() && a.bits() == b.bits()) no_common_type(a, b, what);
+  if (a.is_float() || a.code() == b.code()) return a.bits() > b.bits() ? a : b;
+  return Int(std::max(a.bits(), b.bits()));
+}
+
+}  // namespace
+
+void match_types(Expr& a, Expr& b, const char* what) {
+  check_operand(a, what);
+  check_operand(b, what);
+  if (a.type() == b.type()) return;
+  const int lanes = std::max(a.type().lanes(), b.type().lanes());
+  for (Expr* e : {&a, &b}) {
+    if (e->type().lanes() == lanes) continue;
+    if (e->type().is_vector()) no_common_type(a.type(), b.type(), what);
+    *e = make_broadcast(*e, lanes);
+  }
+  const Type type = common_scalar_type(a.type().element_of(), b.type().element_of(), what).with_lanes(lanes);
+  a = cast_to(type, std::move(a));
+  b = cast_to(type, std::move(b));
+}
+
+Expr constant_like(const Expr& other, int64_t value, const char* what) {
+  check_operand(other, what);
+  if (!other.type().element_of().can_represent(value)) {
+    user_error(text("apply ", what, " to an expression and the constant ", value),
+               "a constant takes the type of the other operand and must fit it",
+               text("the other operand has the type ", other.type()), "Cast the other operand to a wider type");
+  }
+  return make_const(other.type(), value);
+}
+
+}  // namespace ir
+
+using ir::Kind;
+
+#define RETROGRADE_DEFINE_OPERATOR(name, kind)             \
+  Expr name(Expr a, Expr b) {                              \
+    ir::match_types(a, b, #name);                          \
+    return ir::binary(kind, std::move(a), std::move(b));   \
+  }
+RETROGRADE_DEFINE_OPERATOR(operator+, Kind::Add)
+RETROGRADE_DEFINE_OPERATOR(operator-, Kind::Sub)
+RETROGRADE_DEFINE_OPERATOR(operator*, Kind::Mul)
+RETROGRADE_DEFINE_OPERATOR(operator/, Kind::Div)
+RETROGRADE_DEFINE_OPERATOR(operator%, Kind::Mod)
+RETROGRADE_DEFINE_OPERATOR(operator<, Kind::LT)
+RETROGRADE_DEFINE_OPERATOR(operator<=, Kind::LE)
+RETROGRADE_DEFINE_OPERATOR(operator>, Kind::GT)
+RETROGRADE_DEFINE_OPERATOR(operator>=, Kind::GE)
+RETROGRADE_DEFINE_OPERATOR(operator==, Kind::EQ)
+RETROGRADE_DEFINE_OPERATOR(operator!=, Kind::NE)
+RETROGRADE_DEFINE_OPERATOR(min, Kind::Min)
+RETROGRADE_DEFINE_OPERATOR(max, Kind::Max)
+#undef RETROGRADE_DEFINE_OPERATOR
+
+namespace {
+
+void check_bool(const Expr& e, const char* what) {
+  ir::check_operand(e, what);
+  if (e.type().is_bool()) return;
+  user_error(text("apply ", what), "operands must be bool", text("one has the type ", e.type()),
+             "Compare it with something, as in x != 0");
+}
+
+Expr logical(Kind kind, Expr a, Expr b, const char* what) {
+  check_bool(a, what);
+  check_bool(b, what);
+  ir::match_types(a, b, what);
+  return ir::binary(kind, std::move(a), std::move(b));
+}
+
+}  // namespace
+
+Expr operator&&(Expr a, Expr b) { return logical(Kind::And, std::move(a), std::move(b), "operator&&"); }
+Expr operator||(Expr a, Expr b) { return logical(Kind::Or, std::move(a), std::move(b), "operator||"); }
+
+Expr operator!(Expr a) {
+  check_bool(a, "operator!");
+  return ir::logical_not(std::move(a));
+}
+
+// -0.0 - x negates every float, the zeros too; 0.0 - 0.0 would be +0.0.
+Expr operator-(Expr a) {
+  ir::check_operand(a, "operator-");
+  const Type type = a.type();
+  return ir::binary(Kind::Sub, type.is_float() ? ir::make_const(type, -0.0) : ir::make_zero(type), std::move(a));
+}
+
+// The left side keeps its type, as in C++.
+#define RETROGRADE_DEFINE_ASSIGNMENT(assign, op)      \
+  Expr& operator assign(Expr& a, Expr b) {            \
+    const Type type = a.type();                       \
+    return a = cast(type, a op std::move(b));         \
+  }
+RETROGRADE_DEFINE_ASSIGNMENT(+=, +)
+RETROGRADE_DEFINE_ASSIGNMENT(-=, -)
+RETROGRADE_DEFINE_ASSIGNMENT(*=, *)
+RETROGRADE_DEFINE_ASSIGNMENT(/=, /)
+#undef RETROGRADE_DEFINE_ASSIGNMENT
+
+Expr cast(Type type, Expr value) {
+  ir::check_operand(value, "cast");
+  if (type.is_handle() || type.bits() == 0) {
+    user_error("cast", "the new type must be a number", text("it is ", type), "Use reinterpret for handles");
+  }
+  if (type.is_vector() && value.type().is_vector() && type.lanes() != value.type().lanes()) {
+    ir::no_common_type(type, value.type(), "cast");
+  }
+  return ir::cast_to(type, std::move(value));
+}
+
+namespace {
+
+// An integer literal beside another value is of that value's type: select(c, f(x), 0).
+void match_literals(Expr& a, Expr& b, const char* what) {
+  ir::check_operand(a, what);
+  ir::check_operand(b, what);
+  const auto adopt = [](Expr& literal, const Expr& other) {
+    const std::optional<int64_t> value = ir::as_const_int(literal);
+    if (value && literal.type() == Int(32) && other.type().element_of().can_represent(*value)) {
+      literal = ir::make_const(other.type(), *value);
+    }
+  };
+  if (ir::is_const(a) != ir::is_const(b)) ir::is_const(a) ? adopt(a, b) : adopt(b, a);
+  ir::match_types(a, b, what);
+}
+
+}  // namespace
+
+Expr select(Expr condition, Expr true_value, Expr false_value) {
+  check_bool(condition, "select");
+  match_literals(true_value, false_value, "select");
+  return ir::make_select(std::move(condition), std::move(true_value), std::move(false_value));
+}
+
+Expr clamp(Expr value, Expr low, Expr high) {
+  for (const Expr* e : {&value, &low, &high}) ir::check_operand(*e, "clamp");
+  low = cast(value.type(), std::move(low));
+  high = cast(value.type(), std::move(high));
+  return ir::binary(Kind::Max, ir::binary(Kind::Min, std::move(value), std::move(high)), std::move(low));
+}
+
+}  // namespace retrograde

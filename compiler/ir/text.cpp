@@ -1,0 +1,83 @@
+// Words that the printer and the parser share.
+#include "ir/text.h"
+
+#include <cctype>
+#include <unordered_set>
+
+namespace retrograde::ir {
+
+const char* for_name(ForType type) {
+  static constexpr const char* names[] = {"serial", "parallel", "vectorized", "unrolled"};
+  return names[static_cast<int>(type)];
+}
+
+const char* memory_name(MemoryType memory) {
+  static constexpr const char* names[] = {"auto", "heap", "stack"};
+  return names[static_cast<int>(memory)];
+}
+
+const char* reduce_name(ReduceOp op) {
+  static constexpr const char* names[] = {"add", "mul", "min", "max", "and", "or"};
+  return names[static_cast<int>(op)];
+}
+
+bool read_type(const std::string& word, Type& type) {
+  size_t at = 0;
+  const auto number = [&](int& value) {
+    const size_t start = at;
+    for (value = 0; at < word.size() && at < start + 5 && std::isdigit(static_cast<unsigned char>(word[at])); ++at) {
+      value = 10 * value + (word[at] - '0');
+    }
+    return at > start;
+  };
+  const auto starts = [&](const char* prefix) {
+    if (word.rfind(prefix, 0) != 0) return false;
+    at = std::string(prefix).size();
+    return true;
+  };
+  int bits = 0, lanes = 1;
+  TypeCode code;
+  if (starts("bool")) {
+    code = TypeCode::UInt, bits = 1;
+  } else if (starts("handle")) {
+    code = TypeCode::Handle, bits = 64;
+  } else {
+    if (starts("int")) code = TypeCode::Int;
+    else if (starts("uint")) code = TypeCode::UInt;
+    else if (starts("float")) code = TypeCode::Float;
+    else if (starts("bfloat")) code = TypeCode::BFloat;
+    else return false;
+    if (!number(bits)) return false;
+    const bool is_float = code == TypeCode::Float || code == TypeCode::BFloat;
+    if (bits != 16 && bits != 32 && bits != 64 && (is_float || bits != 8)) return false;
+  }
+  if (at < word.size() && (word[at++] != 'x' || !number(lanes) || lanes < 2 || lanes > 65535)) return false;
+  if (at != word.size()) return false;
+  type = Type(code, bits, lanes);
+  return true;
+}
+
+bool is_reserved(const std::string& word) {
+  static const std::unordered_set<std::string> keywords = {
+      "true", "false", "min", "max", "select", "reinterpret", "ramp", "broadcast", "shuffle", "reduce",
+      "image", "extern", "let", "if", "else", "assert", "free", "evaluate", "produce", "consume", "for",
+      "serial", "parallel", "vectorized", "unrolled", "realize", "allocate"};
+  Type type;
+  return keywords.count(word) || op_from_name(word) != Op::none || read_type(word, type) ||
+         word.rfind("nan_", 0) == 0 || word.rfind("inf_", 0) == 0;
+}
+
+std::string quote_name(const std::string& name) {
+  const auto is_name_char = [](char c) {
+    return std::isalnum(static_cast<unsigned char>(c)) || c == '_' || c == '.' || c == '$';
+  };
+  bool plain = !name.empty() && !std::isdigit(static_cast<unsigned char>(name[0])) && name[0] != '.' &&
+               name.back() != '.' && !is_reserved(name);
+  for (char c : name) plain &= is_name_char(c);
+  if (plain) return name;
+  std::string quoted = "`";
+  for (char c : name) quoted += c == '`' ? std::string("``") : std::string(1, c);
+  return quoted + '`';
+}
+
+}  // namespace retrograde::ir
