@@ -1,0 +1,20 @@
+// emit_definition -- the innermost statement of a stage, and what it reads.
+//
+//   f(x) = select(p, a * a, 0), a = g(x) + 1      let t = g(f.s0.x) + 1
+//                                            =>   f(f.s0.x) = select(p, t * t, 0)
+//
+// Shared sub-expressions become lets, so that from here on expressions are trees whose size is that of the DAG.
+#pragma once
+
+#include "lower/build_loop_nests.h"
+#include "lower/stage_nest.h"
+
+namespace retrograde::ir {
+
+// if (guards && predicate) { lets; Provide }
+Stmt emit_definition(const LoopedFunc& f, int stage, const StageNest& nest);
+
+// Boxes that one point of the loops reads of other Funcs, images and (in updates) of f, and that it writes of f.
+Requirements requirements_of(const LoopedFunc& f, int stage, const StageNest& nest);
+
+}  // namespace retrograde::ir

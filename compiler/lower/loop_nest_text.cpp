@@ -1,0 +1,84 @@
+// The loop nest of a pipeline as a user schedules it: one line a loop, producers marked.
+#include <sstream>
+
+#include "diagnostics/error.h"
+#include "ir/build.h"
+#include "ir/visit.h"
+#include "lower/build_loop_nests.h"
+#include "lower/inline_functions.h"
+#include "lower/large_stack.h"
+#include "lower/lower.h"
+
+namespace retrograde::ir {
+namespace {
+
+const char* keyword(ForType type) {
+  switch (type) {
+    case ForType::Serial:
+      return "for";
+    case ForType::Parallel:
+      return "parallel";
+    case ForType::Vectorized:
+      return "vectorized";
+    case ForType::Unrolled:
+      return "unrolled";
+  }
+  internal_error("a loop of no type");
+}
+
+// "f.s0.xo" -> "xo". A Func's own name may contain dots, a variable's may not start a stage.
+std::string user_name(const std::string& loop) {
+  size_t stage = loop.find(".s");
+  size_t dot = stage == std::string::npos ? std::string::npos : loop.find('.', stage + 2);
+  return dot == std::string::npos ? loop : loop.substr(dot + 1);
+}
+
+class LoopNestPrinter {
+ public:
+  std::string print(const Stmt& s) {
+    visit(s);
+    return out_.str();
+  }
+
+ private:
+  std::ostringstream out_;
+  int depth_ = 0;
+
+  std::ostream& line() { return out_ << std::string(2 * depth_, ' '); }
+  void nested(const Stmt& s) {
+    depth_++;
+    visit(s);
+    depth_--;
+  }
+  void visit(const Stmt& s) {
+    match(
+        s,
+        [&](const ProducerConsumer& p) {
+          line() << (p.is_producer ? "produce " : "consume ") << p.name << ":\n";
+          nested(p.body);
+        },
+        [&](const For& loop) {
+          line() << keyword(loop.for_type) << ' ' << user_name(loop.name);
+          auto min = as_const_int(loop.min), extent = as_const_int(loop.extent);
+          if (min && extent) out_ << " in [" << *min << ", " << *min + *extent - 1 << "]";
+          out_ << ":\n";
+          nested(loop.body);
+        },
+        [&](const Provide& p) { line() << p.name << "(...) = ...\n"; },
+        [&](const Realize& r) { visit(r.body); },
+        [&](const StmtNode&) { for_each_child(s, [](const Expr&) {}, [&](const Stmt& child) { visit(child); }); });
+  }
+};
+
+}  // namespace
+
+std::string loop_nest_text(const std::vector<FuncPtr>& outputs) {
+  std::string result;
+  run_on_large_stack([&] {
+    Program program = inline_functions(outputs);
+    result = LoopNestPrinter().print(build_loop_nests(program).body);
+  });
+  return result;
+}
+
+}  // namespace retrograde::ir

@@ -1,0 +1,37 @@
+// From a Func graph with schedules to a flat function for code generation.
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "frontend/function.h"
+#include "ir/lowered_function.h"
+#include "ir/target.h"
+
+namespace retrograde::ir {
+
+struct LowerOptions {
+  Target target;
+  bool validate = false;  // after every pass, blaming it by name
+  // Told of every pass that ran: its name, seconds, and the statement it gave. May be empty.
+  std::function<void(const std::string& pass, double seconds, const Stmt& after)> observe;
+  std::string stop_after;  // name of a pass; empty: all of them
+};
+
+// `inputs`: scalars and input buffers in the order the caller wants; outputs are appended as the last arguments, one for
+// each value of each output Func.
+// Errors: UserError for illegal schedules, unbounded regions, recursion; see the passes.
+LoweredFunction lower(const std::string& name, const std::vector<FuncPtr>& outputs, const std::vector<LoweredArgument>& inputs,
+                      const LowerOptions& options);
+
+// The inputs that `outputs` need, in first-use order.
+std::vector<LoweredArgument> infer_arguments(const std::vector<FuncPtr>& outputs);
+
+// Loops and producers as indented text, for Func::print_loop_nest.
+std::string loop_nest_text(const std::vector<FuncPtr>& outputs);
+
+// Names of the passes in order.
+std::vector<std::string> pass_names();
+
+}  // namespace retrograde::ir

@@ -1,0 +1,132 @@
+// The ordered list of passes.
+#include <algorithm>
+#include <chrono>
+
+#include "diagnostics/error.h"
+#include "ir/build.h"
+#include "ir/validate.h"
+#include "lower/argument_checks.h"
+#include "lower/build_loop_nests.h"
+#include "lower/flatten_storage.h"
+#include "lower/free_early.h"
+#include "lower/inline_functions.h"
+#include "lower/large_stack.h"
+#include "lower/lower.h"
+#include "lower/partition_loops.h"
+#include "lower/unroll_loops.h"
+#include "lower/vectorize_loops.h"
+#include "simplify/simplify.h"
+
+namespace retrograde::ir {
+namespace {
+
+struct Lowering {
+  const std::vector<FuncPtr>& outputs;
+  const std::vector<LoweredArgument>& args;
+  Program program;
+};
+
+struct Pass {
+  const char* name;
+  Phase phase;  // of what it gives
+  Stmt (*run)(Lowering&, const Stmt&);
+};
+
+StorageOrder storage_order(const Program& program) {
+  StorageOrder order;
+  for (const LoopedFunc& f : program.funcs) {
+    if (f.schedule.storage_dims.empty() || f.schedule.storage_dims == f.func->args) continue;
+    std::vector<int>& dims = order[f.name()];
+    for (const std::string& var : f.schedule.storage_dims)
+      dims.push_back(static_cast<int>(std::find(f.func->args.begin(), f.func->args.end(), var) - f.func->args.begin()));
+  }
+  return order;
+}
+
+Stmt nest_loops(Lowering& lowering, const Stmt&) {
+  lowering.program = inline_functions(lowering.outputs);
+  return add_argument_checks(build_loop_nests(lowering.program), lowering.args, lowering.program);
+}
+
+Stmt run_simplify(Lowering&, const Stmt& s) { return simplify(s); }
+
+constexpr Pass passes[] = {
+    {"build_loop_nests", Phase::Loops, nest_loops},
+    {"simplify_loops", Phase::Loops, run_simplify},
+    {"flatten_storage", Phase::FlatStorage,
+     [](Lowering& lowering, const Stmt& s) { return flatten_storage(s, storage_order(lowering.program)); }},
+    {"simplify_flat", Phase::FlatStorage, run_simplify},
+    {"partition_loops", Phase::FlatStorage, [](Lowering&, const Stmt& s) { return partition_loops(s); }},
+    {"unroll_loops", Phase::FlatStorage, [](Lowering&, const Stmt& s) { return unroll_loops(s); }},
+    {"vectorize_loops", Phase::Vector, [](Lowering&, const Stmt& s) { return vectorize_loops(s); }},
+    {"simplify_vectors", Phase::Vector, run_simplify},
+    {"free_early", Phase::Vector, [](Lowering&, const Stmt& s) { return free_early(s); }},
+};
+
+std::vector<std::string> names_of(const std::vector<LoweredArgument>& args) {
+  std::vector<std::string> names;
+  for (const LoweredArgument& arg : args) names.push_back(arg.is_buffer() ? arg.name + ".buffer" : arg.name);
+  return names;
+}
+
+void append_outputs(const std::vector<FuncPtr>& outputs, std::vector<LoweredArgument>& args) {
+  for (const FuncPtr& f : outputs) {
+    for (size_t i = 0; i < f->types.size(); i++) {
+      LoweredArgument arg;
+      arg.name = value_buffer_name(*f, static_cast<int>(i));
+      arg.kind = LoweredArgument::Kind::OutputBuffer;
+      arg.type = f->types[i];
+      arg.dimensions = f->dimensions();
+      if (i < f->outputs.size()) arg.symbol = SymbolRef(f->outputs[i]);
+      args.push_back(std::move(arg));
+    }
+  }
+}
+
+Stmt run_passes(Lowering& lowering, const LowerOptions& options) {
+  Stmt stmt;
+  for (const Pass& pass : passes) {
+    auto start = std::chrono::steady_clock::now();
+    stmt = pass.run(lowering, stmt);
+    std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - start;
+    if (options.validate) validate(stmt, pass.phase, pass.name, names_of(lowering.args));
+    if (options.observe) options.observe(pass.name, seconds.count(), stmt);
+    if (options.stop_after == pass.name) break;
+  }
+  return stmt;
+}
+
+}  // namespace
+
+LoweredFunction lower(const std::string& name, const std::vector<FuncPtr>& outputs, const std::vector<LoweredArgument>& inputs,
+                      const LowerOptions& options) {
+  LoweredFunction function{name, inputs, {}};
+  run_on_large_stack([&] {
+    append_outputs(outputs, function.args);
+    Lowering lowering{outputs, function.args, {}};
+    function.body = run_passes(lowering, options);
+  });
+  return function;
+}
+
+std::vector<LoweredArgument> infer_arguments(const std::vector<FuncPtr>& outputs) {
+  std::vector<LoweredArgument> args;
+  for (const std::shared_ptr<ParameterContents>& param : parameters_of(outputs)) {
+    LoweredArgument arg;
+    arg.name = param->name;
+    arg.kind = param->is_buffer ? LoweredArgument::Kind::InputBuffer : LoweredArgument::Kind::Scalar;
+    arg.type = param->type;
+    arg.dimensions = param->dimensions;
+    arg.symbol = SymbolRef(param);
+    args.push_back(std::move(arg));
+  }
+  return args;
+}
+
+std::vector<std::string> pass_names() {
+  std::vector<std::string> names;
+  for (const Pass& pass : passes) names.push_back(pass.name);
+  return names;
+}
+
+}  // namespace retrograde::ir

@@ -1,0 +1,45 @@
+// program.h -- the working copy of a pipeline that lowering starts from.
+//
+// Users' Funcs are never changed by compiling them: lowering copies definitions and schedules here, inlines what is
+// scheduled inline, and builds loops from what is left.
+#pragma once
+
+#include <string>
+#include <unordered_map>
+#include <vector>
+
+#include "frontend/function.h"
+
+namespace retrograde::ir {
+
+// A Func that gets loops of its own. Expressions are DAGs over the names that the user wrote: pure variables, reduction
+// variables, parameters.
+struct LoopedFunc {
+  FuncPtr func;
+  FuncSchedule schedule;
+  std::vector<Definition> stages;  // pure definition first
+  bool is_output = false;
+
+  const std::string& name() const { return func->name; }
+  // A Func with updates whose schedule says inline: it has no single value to substitute, so it is computed in the
+  // innermost loop of every stage that uses it.
+  bool is_computed_innermost() const { return schedule.compute_level.kind == LoopLevel::Kind::Inlined; }
+};
+
+struct Program {
+  std::vector<LoopedFunc> funcs;  // producers before consumers; no pure inlined Func is left
+  std::unordered_map<std::string, int> index_of;
+
+  const LoopedFunc* find(const std::string& name) const {
+    auto it = index_of.find(name);
+    return it == index_of.end() ? nullptr : &funcs[it->second];
+  }
+};
+
+// "f" alone, or "f.0", "f.1" ... for Tuples: the buffer that holds value `index` of a Func.
+std::string value_buffer_name(const FuncContents& f, int index);
+
+// "f.s1.": what the names of loops and bounds of a stage begin with.
+std::string stage_prefix(const std::string& func, int stage);
+
+}  // namespace retrograde::ir

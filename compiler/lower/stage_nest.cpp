@@ -1,0 +1,129 @@
+#include "lower/stage_nest.h"
+
+#include "diagnostics/error.h"
+#include "ir/build.h"
+#include "simplify/simplify.h"
+
+namespace retrograde::ir {
+
+Interval Loop::range() const { return {min, simplify(min + extent - 1)}; }
+
+namespace {
+
+// How the value of a variable that was split or fused away follows from those that replaced it.
+struct Derived {
+  std::string var;
+  Expr value;          // over the variables that replaced it
+  Expr guarded_value;  // the same, clamped where a guard applies
+};
+
+class NestBuilder {
+ public:
+  NestBuilder(const LoopedFunc& f, int stage, const Domain& domain)
+      : definition_(f.stages[stage]),
+        prefix_(stage_prefix(f.name(), stage)),
+        is_update_(stage > 0),
+        ranges_(domain) {}
+
+  StageNest build() {
+    for (const Split& split : definition_.schedule.splits) apply(split);
+    StageNest nest;
+    for (const Dim& dim : definition_.schedule.dims) nest.loops.push_back(loop_of(dim));
+    resolve(nest);
+    return nest;
+  }
+
+ private:
+  const Definition& definition_;
+  const std::string prefix_;
+  const bool is_update_;
+  Domain ranges_;  // of every variable that exists after the splits so far
+  std::vector<Derived> derived_;
+  std::vector<Expr> guards_;
+
+  Expr loop_variable(const std::string& var) const { return variable(prefix_ + var); }
+
+  Loop loop_of(const Dim& dim) const {
+    auto it = ranges_.find(dim.var);
+    RETROGRADE_ASSERT(it != ranges_.end(), "loop over a variable that does not exist: " + dim.var);
+    return {dim.var, prefix_ + dim.var, it->second.min, it->second.extent, dim.for_type};
+  }
+
+  void apply(const Split& split) {
+    switch (split.kind) {
+      case Split::Kind::Split:
+        return apply_split(split);
+      case Split::Kind::Fuse:
+        return apply_fuse(split);
+      case Split::Kind::Rename:
+        ranges_[split.outer] = ranges_.at(split.old_var);
+        return derive(split.old_var, loop_variable(split.outer), {});
+    }
+  }
+
+  void derive(const std::string& var, Expr value, Expr guarded_value) {
+    if (!guarded_value.defined()) guarded_value = value;
+    derived_.push_back({var, std::move(value), std::move(guarded_value)});
+  }
+
+  TailStrategy tail_of(const Split& split, const Expr& extent) const {
+    if (is_zero(simplify(extent % split.factor))) return TailStrategy::RoundUp;  // there is no tail
+    if (split.tail != TailStrategy::Auto) return split.tail;
+    // An update may read what it writes, so no point of it may run twice.
+    return is_update_ || split.exact ? TailStrategy::GuardWithIf : TailStrategy::ShiftInwards;
+  }
+
+  void apply_split(const Split& split) {
+    const Range old = ranges_.at(split.old_var);
+    Expr factor = cast(Int(32), split.factor);
+    ranges_[split.outer] = {0, simplify((old.extent + factor - 1) / factor)};
+    ranges_[split.inner] = {0, factor};
+    Expr base = loop_variable(split.outer) * factor;
+    Expr inner = loop_variable(split.inner);
+    switch (tail_of(split, old.extent)) {
+      case TailStrategy::RoundUp:
+        return derive(split.old_var, base + inner + old.min, {});
+      case TailStrategy::ShiftInwards:
+        base = min(likely(base), old.extent - factor);
+        return derive(split.old_var, base + inner + old.min, {});
+      default:  // GuardWithIf and its predicated forms
+        guards_.push_back(likely(base + inner < old.extent));
+        return derive(split.old_var, base + inner + old.min, min(base + inner, old.extent - 1) + old.min);
+    }
+  }
+
+  // The outer variable is recovered by division, the inner by remainder.
+  void apply_fuse(const Split& split) {
+    const Range outer = ranges_.at(split.outer), inner = ranges_.at(split.inner);
+    ranges_[split.old_var] = {0, simplify(outer.extent * inner.extent)};
+    Expr fused = loop_variable(split.old_var);
+    derive(split.inner, fused % inner.extent + inner.min, {});
+    derive(split.outer, fused / inner.extent + outer.min, {});
+  }
+
+  // Later derivations replace variables that earlier ones introduced: resolve from the last to the first.
+  void resolve(StageNest& nest) {
+    Substitution values, guarded;
+    for (auto it = derived_.rbegin(); it != derived_.rend(); ++it) {
+      values[prefix_ + it->var] = simplify(substitute(it->value, values));
+      guarded[prefix_ + it->var] = simplify(substitute(it->guarded_value, guarded));
+    }
+    for (const Expr& guard : guards_) nest.guards.push_back(simplify(substitute(guard, values)));
+    auto value_in = [&](const Substitution& map, const std::string& var) {
+      auto it = map.find(prefix_ + var);
+      return it == map.end() ? loop_variable(var) : it->second;
+    };
+    for (const auto& [var, range] : ranges_) {
+      nest.coordinate[var] = value_in(values, var);
+      nest.guarded_coordinate[var] = value_in(guarded, var);
+    }
+  }
+};
+
+}  // namespace
+
+StageNest build_stage_nest(const LoopedFunc& f, int stage, const Domain& domain) {
+  return NestBuilder(f, stage, domain).build();
+}
+
+}  // namespace retrograde::ir
