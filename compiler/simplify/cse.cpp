@@ -1,0 +1,157 @@
+// Common sub-expressions by hash-consing: structurally equal nodes become one node, and nodes with several parents
+// become Lets, in the order in which they are needed.
+#include "simplify/cse.h"
+
+#include <unordered_map>
+#include <unordered_set>
+
+#include "ir/build.h"
+#include "ir/equal.h"
+#include "ir/visit.h"
+
+namespace retrograde::ir {
+
+namespace {
+
+struct StructuralHash {
+  size_t operator()(const Expr& e) const { return hash(e); }
+};
+struct StructuralEqual {
+  bool operator()(const Expr& a, const Expr& b) const { return equal(a, b); }
+};
+
+// Makes structurally equal nodes identical. Children are unique before their parent is looked up, so that each
+// comparison stops one level down.
+class HashCons : public Rewriter {
+ protected:
+  using Rewriter::rewrite;
+  Expr rewrite(const Expr& e) override { return *unique_.insert(children(e)).first; }
+
+ private:
+  std::unordered_set<Expr, StructuralHash, StructuralEqual> unique_;
+};
+
+// Reporting an error is no value, and undef is any value.
+bool must_stay(const Expr& e) {
+  const auto* call = e.as<Call>();
+  return call && (call->is_op(Op::error) || call->is_op(Op::undef) || call->is_op(Op::address_of));
+}
+
+// Cheaper to repeat than to name: leaves, and what costs no instruction on a leaf.
+bool is_trivial(const Expr& e) {
+  if (e.kind() == Kind::Variable || is_const(e) || e.kind() == Kind::StringImm) return true;
+  if (const auto* splat = e.as<Broadcast>()) return is_trivial(splat->value);
+  if (const auto* ramp = e.as<Ramp>()) return is_trivial(ramp->base) && is_const(ramp->stride);
+  if (const auto* bits = e.as<Reinterpret>()) return is_trivial(bits->value);
+  return e.type().is_handle() || (e.kind() == Kind::Call && e.as<Call>()->args.empty());
+}
+
+const Call* as_if_then_else(const Expr& e) {
+  const auto* call = e.as<Call>();
+  return call && call->is_op(Op::if_then_else) ? call : nullptr;
+}
+
+// Counts the parents of each node among what is evaluated for certain.
+class UseCounter {
+ public:
+  explicit UseCounter(const std::vector<Expr>& es) {
+    for (const Expr& e : es) count(e);
+  }
+  bool is_shared(const Expr& e) const {
+    const auto it = uses_.find(e.get());
+    return it != uses_.end() && it->second > 1;
+  }
+
+ private:
+  void count(const Expr& e) {
+    if (uses_[e.get()]++ > 0) return;
+    if (const Call* branch = as_if_then_else(e)) {
+      count(branch->args[0]);  // the arms run only when chosen
+    } else {
+      for_each_child(e, [&](const Expr& child) { count(child); });
+    }
+  }
+  std::unordered_map<const ExprNode*, int> uses_;
+};
+
+// The first value, inside its Lets.
+Expr wrap(const SharedLets& shared) {
+  Expr result = shared.values[0];
+  for (auto it = shared.lets.rbegin(); it != shared.lets.rend(); ++it) {
+    result = make_let(it->first, it->second, std::move(result));
+  }
+  return result;
+}
+
+SharedLets make_lets(const std::vector<Expr>& es);
+
+class LetMaker : public Rewriter {
+ public:
+  LetMaker(const UseCounter& uses, std::vector<std::pair<std::string, Expr>>& lets) : uses_(uses), lets_(lets) {}
+
+ protected:
+  using Rewriter::rewrite;
+  Expr rewrite(const Expr& e) override {
+    Expr rebuilt = as_if_then_else(e) ? branch(*as_if_then_else(e)) : children(e);
+    if (!uses_.is_shared(e) || is_trivial(e) || must_stay(e)) return rebuilt;
+    const std::string name = unique_name("t");
+    lets_.emplace_back(name, rebuilt);
+    return variable(name, rebuilt.type());
+  }
+
+ private:
+  // What only an arm shares is bound inside the arm.
+  Expr branch(const Call& e) {
+    const auto arm = [&](const Expr& value) { return wrap(make_lets({(*this)(value)})); };
+    return call_op(e.op, e.type, {(*this)(e.args[0]), arm(e.args[1]), arm(e.args[2])});
+  }
+  const UseCounter& uses_;
+  std::vector<std::pair<std::string, Expr>>& lets_;
+};
+
+// Values of the enclosing Lets stand for their names. Names are unique, so one memo serves all scopes.
+class LetExpander : public Rewriter {
+ protected:
+  using Rewriter::rewrite;
+  Expr rewrite(const Expr& e) override {
+    if (const auto* let = e.as<Let>()) {
+      values_[let->name] = (*this)(let->value);
+      return (*this)(let->body);
+    }
+    if (const auto* var = e.as<Variable>()) {
+      const auto found = values_.find(var->name);
+      return found == values_.end() ? e : found->second;
+    }
+    return children(e);
+  }
+
+ private:
+  std::unordered_map<std::string, Expr> values_;
+};
+
+// Of expressions without Lets.
+SharedLets make_lets(const std::vector<Expr>& es) {
+  HashCons unique;
+  std::vector<Expr> shared;
+  for (const Expr& e : es) shared.push_back(unique(e));
+  const UseCounter uses(shared);
+  SharedLets result;
+  LetMaker maker(uses, result.lets);
+  for (const Expr& e : shared) result.values.push_back(maker(e));
+  return result;
+}
+
+}  // namespace
+
+SharedLets introduce_lets(const std::vector<Expr>& es) {
+  LetExpander expand;
+  std::vector<Expr> expanded;
+  for (const Expr& e : es) expanded.push_back(expand(e));
+  return make_lets(expanded);
+}
+
+Expr introduce_lets(const Expr& e) { return wrap(introduce_lets(std::vector<Expr>{e})); }
+
+Expr expand_lets(const Expr& e) { return LetExpander()(e); }
+
+}  // namespace retrograde::ir
