@@ -26,9 +26,9 @@ Stmt emit_definition(const LoopedFunc& f, int stage, const StageNest& nest) {
   for (const Expr& arg : definition.args) exprs.push_back(substitute(arg, nest.coordinate));
   if (!stores) return make_evaluate(0);
 
-  LetBoundExprs shared = introduce_lets(exprs);
-  auto args_begin = shared.exprs.begin() + definition.values.size();
-  Stmt stmt = make_provide(f.name(), {shared.exprs.begin(), args_begin}, {args_begin, shared.exprs.end()});
+  SharedLets shared = introduce_lets(exprs);
+  auto args_begin = shared.values.begin() + definition.values.size();
+  Stmt stmt = make_provide(f.name(), {shared.values.begin(), args_begin}, {args_begin, shared.values.end()});
   for (auto it = shared.lets.rbegin(); it != shared.lets.rend(); ++it) stmt = make_let(it->first, it->second, stmt);
 
   if (definition.predicate.defined())

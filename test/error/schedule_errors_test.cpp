@@ -1,0 +1,89 @@
+// Schedules that lowering refuses, and what it says.
+#include <gtest/gtest.h>
+
+#include "retrograde/retrograde.h"
+
+namespace retrograde {
+namespace {
+
+template <class Action>
+std::string error_of(Action&& action) {
+  try {
+    action();
+  } catch (const UserError& error) {
+    return error.what();
+  }
+  return "no error";
+}
+
+void expect_mentions(const std::string& message, std::initializer_list<const char*> phrases) {
+  for (const char* phrase : phrases) EXPECT_NE(message.find(phrase), std::string::npos) << "no '" << phrase << "' in: " << message;
+}
+
+struct ScheduleErrors : testing::Test {
+  Func f{"producer"}, g{"consumer"};
+  Var x{"x"}, y{"y"};
+  ScheduleErrors() {
+    f(x, y) = x + y;
+    g(x, y) = f(x, y) + f(x + 1, y);
+  }
+  std::string message() {
+    return error_of([&] { g.realize({8, 8}); });
+  }
+};
+
+TEST_F(ScheduleErrors, compute_level_that_is_no_loop) {
+  f.compute_at(g, Var("nowhere"));
+  expect_mentions(message(), {"compute \"producer", "\"nowhere\"", "encloses every use", "\"x\", \"y\"", "compute_root()"});
+}
+
+TEST_F(ScheduleErrors, compute_level_that_does_not_enclose_every_use) {
+  Func h("second_consumer");
+  h(x, y) = f(x, y) + g(x, y);
+  f.compute_at(g, y);
+  g.compute_root();
+  expect_mentions(error_of([&] { h.realize({8, 8}); }), {"encloses every use", "\"second_consumer"});
+}
+
+TEST_F(ScheduleErrors, compute_level_in_an_inlined_func) {
+  Func h("last");
+  h(x, y) = g(x, y);
+  f.compute_at(g, y);
+  expect_mentions(error_of([&] { h.realize({8, 8}); }), {"has no loops"});
+}
+
+TEST_F(ScheduleErrors, storage_outside_of_a_parallel_loop) {
+  f.store_root().compute_at(g, y);
+  g.parallel(y);
+  expect_mentions(message(), {"parallel loop over \"y\"", "share"});
+}
+
+TEST_F(ScheduleErrors, unbounded_data_dependent_read) {
+  Func h("scatter");
+  h(x, y) = f(cast<int>(cast<float>(x) * 1.5f), y);
+  f.compute_root();
+  expect_mentions(error_of([&] { h.realize({8, 8}); }), {"without", "bound", "Clamp"});
+}
+
+TEST_F(ScheduleErrors, vectorizing_a_loop_of_unknown_extent) {
+  g.vectorize(x);
+  expect_mentions(message(), {"\"x\"", "constant"});
+}
+
+TEST_F(ScheduleErrors, promised_bounds_that_are_too_small) {
+  f.compute_root().bound(x, 0, 4);
+  expect_mentions(message(), {"bounded to [0, 3]", "need [0, 8]"});
+}
+
+TEST_F(ScheduleErrors, recursion_among_funcs_is_named) {
+  Func a("a"), b("b");
+  EXPECT_NE(error_of([&] {
+              b(x) = a(x);
+              a(x) = b(x);
+              a.realize({4});
+            }),
+            "no error");
+}
+
+}  // namespace
+}  // namespace retrograde

@@ -1,0 +1,105 @@
+// Loop nests that schedules ask for, as text.
+#include <gtest/gtest.h>
+
+#include "lower/lower.h"
+#include "retrograde/retrograde.h"
+
+namespace retrograde {
+namespace {
+
+std::string nest_of(const Func& f) { return ir::loop_nest_text({f.function()}); }
+
+// Names are unique in the process ("f", "f$1"), so the text is compared with every "$N" taken out.
+std::string without_numbers(const std::string& text) {
+  std::string result;
+  for (size_t i = 0; i < text.size(); i++) {
+    if (text[i] != '$') {
+      result += text[i];
+      continue;
+    }
+    while (i + 1 < text.size() && isdigit(text[i + 1])) i++;
+  }
+  return result;
+}
+
+TEST(LoopNest, inlines_by_default) {
+  Func f("f"), g("g");
+  Var x("x"), y("y");
+  f(x, y) = x + y;
+  g(x, y) = f(x, y) * 2;
+  EXPECT_EQ(without_numbers(nest_of(g)),
+            "produce g:\n"
+            "  for y:\n"
+            "    for x:\n"
+            "      g(...) = ...\n");
+}
+
+TEST(LoopNest, computes_at_root_before_the_consumer) {
+  Func f("f"), g("g");
+  Var x("x");
+  f(x) = x;
+  g(x) = f(x) + f(x + 1);
+  f.compute_root();
+  EXPECT_EQ(without_numbers(nest_of(g)),
+            "produce f:\n"
+            "  for x:\n"
+            "    f(...) = ...\n"
+            "consume f:\n"
+            "  produce g:\n"
+            "    for x:\n"
+            "      g(...) = ...\n");
+}
+
+TEST(LoopNest, computes_inside_a_loop_of_the_consumer) {
+  Func f("f"), g("g");
+  Var x("x"), y("y");
+  f(x, y) = x + y;
+  g(x, y) = f(x, y) + f(x + 1, y);
+  f.compute_at(g, y);
+  EXPECT_EQ(without_numbers(nest_of(g)),
+            "produce g:\n"
+            "  for y:\n"
+            "    produce f:\n"
+            "      for y in [0, 0]:\n"
+            "        for x:\n"
+            "          f(...) = ...\n"
+            "    consume f:\n"
+            "      for x:\n"
+            "        g(...) = ...\n");
+}
+
+TEST(LoopNest, shows_splits_and_loop_types) {
+  Func f("f");
+  Var x("x"), y("y"), xo("xo"), xi("xi");
+  f(x, y) = x + y;
+  f.split(x, xo, xi, 8).vectorize(xi).parallel(y);
+  EXPECT_EQ(without_numbers(nest_of(f)),
+            "produce f:\n"
+            "  parallel y:\n"
+            "    for xo:\n"
+            "      vectorized xi in [0, 7]:\n"
+            "        f(...) = ...\n");
+}
+
+TEST(LoopNest, computes_a_reduction_in_the_innermost_loop_of_its_consumer) {
+  Func f("f"), g("g");
+  Var x("x");
+  RDom r(0, 5, "r");
+  f(x) = 0;
+  f(x) += x * r;
+  g(x) = f(x);
+  EXPECT_EQ(without_numbers(nest_of(g)),
+            "produce g:\n"
+            "  for x:\n"
+            "    produce f:\n"
+            "      for x in [0, 0]:\n"
+            "        f(...) = ...\n"
+            "      for x in [0, 0]:\n"
+            "        for r.x in [0, 4]:\n"
+            "          f(...) = ...\n"
+            "    consume f:\n"
+            "      g(...) = ...\n");
+}
+
+}  // namespace
+}  // namespace retrograde
