@@ -11,7 +11,7 @@
 //               (let t = v in body)
 //               {#0 = v; #1 = w; body}                            nodes used more than once in a large expression
 // Statements    let t = v            its body is the rest of the block
-//               assert(c, e)  free a  evaluate v  a[i if p] = v  f(x, y) = {u, v} if p
+//               assert(c, e)  free a  evaluate v  a[i if p] = v  f(x, y if p) = {u, v}
 //               produce f {..}  consume f {..}  if (c) {..} else {..}  {..}
 //               for (x, min, extent) {..}                         serial; or parallel, vectorized, unrolled before it
 //               realize f(float32, int8) auto [min, extent], [min, extent] {..}
@@ -370,10 +370,10 @@ void Printer::print(const Stmt& s) {
       [&](const Provide& n) {
         out_ += quote_name(n.name) + '(';
         root_list(n.args);
+        store_predicate(n.predicate);
         out_ += ") = {";
         root_list(n.values);
         out_ += '}';
-        store_predicate(n.predicate);
       },
       [&](const Realize& n) { print_realize(n); },
       [&](const Allocate& n) {

@@ -1,0 +1,547 @@
+// Recursive descent over IR text; print.cpp shows the language. Operators may also be written without parentheses, with
+// C's precedence.
+#include "ir/parse.h"
+
+#include <charconv>
+#include <limits>
+#include <optional>
+#include <unordered_map>
+
+#include "diagnostics/error.h"
+#include "ir/build.h"
+#include "ir/lexer.h"
+#include "ir/text.h"
+
+namespace retrograde::ir {
+
+namespace {
+
+// The C++ stack bounds how deep a text may nest.
+constexpr int max_depth = 4000;
+
+class Parser {
+ public:
+  explicit Parser(const std::string& text) : lexer_(text), token_(lexer_.next()), ahead_(lexer_.next()) {}
+
+  Expr whole_expr() {
+    Expr e = expr();
+    if (!at_end()) fail("the end of the expression");
+    return e;
+  }
+  Stmt whole_stmt() {
+    Stmt s = block_rest();
+    if (!at_end()) fail("a statement");
+    return s;
+  }
+
+ private:
+  // ---- tokens ----
+  bool at_end() const { return token_.kind == Token::Kind::End; }
+  bool is(const char* text) const {
+    if (token_.kind == Token::Kind::Name) return !token_.quoted && token_.text == text;
+    return token_.kind == Token::Kind::Punctuation && token_.text == text;
+  }
+  bool ahead_is(const char* text) const { return ahead_.kind == Token::Kind::Punctuation && ahead_.text == text; }
+  Token take() {
+    Token result = std::move(token_);
+    token_ = std::move(ahead_);
+    ahead_ = lexer_.next();
+    return result;
+  }
+  bool accept(const char* text) {
+    if (!is(text)) return false;
+    take();
+    return true;
+  }
+  void expect(const char* text) {
+    if (!accept(text)) fail(quoted(text));
+  }
+  [[noreturn]] void fail(const std::string& expected) const { Lexer::fail(token_, expected); }
+  std::string name() {
+    if (token_.kind != Token::Kind::Name) fail("a name");
+    return take().text;
+  }
+  int integer() {
+    int value = 0;
+    const std::string& digits = token_.text;
+    const auto end = std::from_chars(digits.data(), digits.data() + digits.size(), value);
+    if (token_.kind != Token::Kind::Number || end.ptr != digits.data() + digits.size()) fail("an integer");
+    take();
+    return value;
+  }
+  Type type() {
+    Type result;
+    if (token_.kind != Token::Kind::Name || !read_type(token_.text, result)) fail("a type");
+    take();
+    return result;
+  }
+  Type type_suffix() { return accept(":") ? type() : Int(32); }
+
+  // Runs a builder whose complaint is about the text.
+  template <class F>
+  auto build(const Token& at, F make) {
+    try {
+      return make();
+    } catch (const InternalError& error) {
+      const std::string what = error.what();
+      user_error("read IR text", text("line ", at.line, ", column ", at.column, ": operands must fit each other"),
+                 what.substr(0, what.find('\n')), "Cast an operand, or write its type after a colon");
+    }
+  }
+
+  // ---- expressions ----
+  struct Depth {
+    explicit Depth(Parser& parser) : parser(parser) {
+      if (++parser.depth_ > max_depth) parser.fail("a text that nests less deeply");
+    }
+    ~Depth() { --parser.depth_; }
+    Parser& parser;
+  };
+  Expr expr() { return infix(0); }
+  Expr infix(int min_precedence);
+  Expr prefix();
+  Expr number(bool negative);
+  Expr shared_block();
+  Expr let_expr();
+  Expr named();
+  Expr keyword_call(const Token& at);
+  Expr operator_call(Op op);
+  Expr call(CallType call_type);
+  Expr load(const std::string& name);
+  Expr shuffle();
+  Expr reduce();
+  std::vector<Expr> expr_list(const char* close) {
+    std::vector<Expr> result;
+    if (accept(close)) return result;
+    do result.push_back(expr());
+    while (accept(","));
+    expect(close);
+    return result;
+  }
+  std::vector<Expr> arguments(size_t count) {
+    const Token at = token_;
+    expect("(");
+    std::vector<Expr> result = expr_list(")");
+    if (result.size() != count) Lexer::fail(at, text(count, " arguments"));
+    return result;
+  }
+
+  // ---- statements ----
+  Stmt block_rest();
+  Stmt block() {
+    const Depth depth(*this);
+    expect("{");
+    Stmt s = block_rest();
+    expect("}");
+    return s;
+  }
+  Stmt stmt();
+  Stmt loop(ForType for_type);
+  Stmt realize();
+  Stmt allocate();
+  Stmt if_stmt();
+  Stmt store_or_provide();
+  MemoryType memory();
+
+  Lexer lexer_;
+  Token token_, ahead_;
+  int depth_ = 0;
+  std::unordered_map<std::string, Expr> shared_;
+};
+
+struct Infix {
+  Kind kind;
+  int precedence;
+};
+
+std::optional<Infix> infix_operator(const Token& token) {
+  static const std::unordered_map<std::string, Infix> table = {
+      {"||", {Kind::Or, 0}}, {"&&", {Kind::And, 1}}, {"==", {Kind::EQ, 2}}, {"!=", {Kind::NE, 2}},
+      {"<", {Kind::LT, 3}},  {"<=", {Kind::LE, 3}},  {">", {Kind::GT, 3}},  {">=", {Kind::GE, 3}},
+      {"+", {Kind::Add, 4}}, {"-", {Kind::Sub, 4}},  {"*", {Kind::Mul, 5}}, {"/", {Kind::Div, 5}},
+      {"%", {Kind::Mod, 5}}};
+  if (token.kind != Token::Kind::Punctuation) return std::nullopt;
+  const auto found = table.find(token.text);
+  if (found == table.end()) return std::nullopt;
+  return found->second;
+}
+
+Expr Parser::infix(int min_precedence) {
+  const Depth depth(*this);
+  Expr left = prefix();
+  for (auto op = infix_operator(token_); op && op->precedence >= min_precedence; op = infix_operator(token_)) {
+    const Token at = take();
+    Expr right = infix(op->precedence + 1);
+    left = build(at, [&] { return binary(op->kind, left, right); });
+  }
+  return left;
+}
+
+Expr Parser::prefix() {
+  const Depth depth(*this);
+  const Token at = token_;
+  if (accept("-")) return number(true);
+  if (accept("!")) {
+    Expr a = prefix();
+    return build(at, [&] { return logical_not(a); });
+  }
+  if (is("{")) return shared_block();
+  if (is("(")) {
+    take();
+    if (is("let")) return let_expr();
+    Expr e = expr();
+    expect(")");
+    return e;
+  }
+  switch (token_.kind) {
+    case Token::Kind::Number:
+      return number(false);
+    case Token::Kind::String:
+      return Expr(take().text);
+    case Token::Kind::Shared: {
+      const auto found = shared_.find(token_.text);
+      if (found == shared_.end()) fail("a shared node defined before");
+      take();
+      return found->second;
+    }
+    case Token::Kind::Name:
+      return named();
+    default:
+      fail("an expression");
+  }
+}
+
+// The type that a suffix names: "_u8", "_f64", or "f" for float32.
+std::optional<Type> suffix_type(const std::string& suffix) {
+  if (suffix == "f") return Float(32);
+  static const std::pair<const char*, const char*> prefixes[] = {
+      {"_i", "int"}, {"_u", "uint"}, {"_f", "float"}, {"_bf", "bfloat"}};
+  for (const auto& [short_name, long_name] : prefixes) {
+    Type type;
+    const std::string prefix = short_name;
+    if (suffix.rfind(prefix, 0) == 0 && read_type(long_name + suffix.substr(prefix.size()), type)) return type;
+  }
+  return std::nullopt;
+}
+
+Expr special_float(const std::string& word, bool negative) {
+  const bool is_nan = word.rfind("nan_", 0) == 0;
+  if (!is_nan && word.rfind("inf_", 0) != 0) return {};
+  const std::optional<Type> type = suffix_type(word.substr(3));
+  if (!type || !type->is_float()) return {};
+  const double infinity = std::numeric_limits<double>::infinity();
+  return make_const(*type, is_nan ? std::numeric_limits<double>::quiet_NaN() : negative ? -infinity : infinity);
+}
+
+Expr Parser::number(bool negative) {
+  if (token_.kind == Token::Kind::Name) {
+    Expr special = special_float(token_.text, negative);
+    if (!special.defined()) fail("a number");
+    take();
+    return special;
+  }
+  if (token_.kind != Token::Kind::Number) fail("a number");
+  const std::string literal = (negative ? "-" : "") + token_.text;
+  const char* const end = literal.data() + literal.size();
+  size_t digits = literal.find_first_of("_f");
+  if (digits == std::string::npos) digits = literal.size();
+  const std::optional<Type> type =
+      digits == literal.size() ? Int(32) : suffix_type(literal.substr(digits));
+  if (!type) fail("a number with a known suffix");
+  Expr result;
+  const char* stop = nullptr;
+  if (type->is_float()) {
+    double value = 0;
+    stop = std::from_chars(literal.data(), end, value).ptr;
+    result = make_const(*type, value);
+  } else if (type->is_uint()) {
+    uint64_t value = 0;
+    stop = std::from_chars(literal.data(), end, value).ptr;
+    if (type->can_represent(value)) result = make_uint_const(*type, value);
+  } else {
+    int64_t value = 0;
+    stop = std::from_chars(literal.data(), end, value).ptr;
+    if (type->can_represent(value)) result = make_const(*type, value);
+  }
+  if (stop != literal.data() + digits || !result.defined()) fail("a number that fits its type");
+  take();
+  return result;
+}
+
+Expr Parser::shared_block() {
+  const auto outer = shared_;
+  expect("{");
+  while (token_.kind == Token::Kind::Shared && ahead_is("=")) {
+    const std::string name = take().text;
+    take();
+    shared_[name] = expr();
+    expect(";");
+  }
+  Expr result = expr();
+  expect("}");
+  shared_ = outer;
+  return result;
+}
+
+Expr Parser::let_expr() {
+  expect("let");
+  const std::string bound = name();
+  expect("=");
+  Expr value = expr();
+  expect("in");
+  Expr body = expr();
+  expect(")");
+  return make_let(bound, value, body);
+}
+
+Expr Parser::named() {
+  if (token_.quoted) return ahead_is("(") ? call(CallType::Func) : load(take().text);
+  if (is("true") || is("false")) return make_uint_const(Bool(), take().text == "true");
+  if (Expr special = special_float(token_.text, false); special.defined()) {
+    take();
+    return special;
+  }
+  if (accept("image")) return call(CallType::Image);
+  if (accept("extern")) return call(CallType::Extern);
+  if (is_reserved(token_.text)) return keyword_call(token_);
+  return ahead_is("(") ? call(CallType::Func) : load(take().text);
+}
+
+// A load, or a variable when no bracket follows.
+Expr Parser::load(const std::string& name) {
+  const Token at = token_;
+  if (!accept("[")) return variable(name, type_suffix());
+  Expr index = expr(), predicate;
+  if (accept("if")) predicate = expr();
+  expect("]");
+  return make_load(type_suffix(), name, index, predicate);
+}
+
+Expr Parser::keyword_call(const Token& keyword) {
+  const Token at = keyword;
+  Type type_name;
+  if (read_type(at.text, type_name)) {
+    take();
+    const std::vector<Expr> args = arguments(1);
+    return build(at, [&] { return cast_to(type_name, args[0]); });
+  }
+  if (accept("min") || accept("max")) {
+    const std::vector<Expr> args = arguments(2);
+    return build(at, [&] { return binary(at.text == "min" ? Kind::Min : Kind::Max, args[0], args[1]); });
+  }
+  if (accept("select")) {
+    const std::vector<Expr> args = arguments(3);
+    return build(at, [&] { return make_select(args[0], args[1], args[2]); });
+  }
+  if (accept("reinterpret")) {
+    expect("<");
+    const Type to = type();
+    expect(">");
+    const std::vector<Expr> args = arguments(1);
+    return build(at, [&] { return reinterpret_as(to, args[0]); });
+  }
+  if (is("ramp") || is("broadcast")) {
+    const bool is_ramp = take().text == "ramp";
+    expect("(");
+    Expr first = expr(), stride;
+    expect(",");
+    if (is_ramp) {
+      stride = expr();
+      expect(",");
+    }
+    const int lanes = integer();
+    expect(")");
+    return build(at, [&] { return is_ramp ? make_ramp(first, stride, lanes) : make_broadcast(first, lanes); });
+  }
+  if (is("shuffle")) return shuffle();
+  if (is("reduce")) return reduce();
+  const Op op = op_from_name(at.text);
+  if (op == Op::none) fail("an expression");
+  return operator_call(op);
+}
+
+Expr Parser::operator_call(Op op) {
+  const Token at = take();
+  std::optional<Type> result;
+  if (accept("<")) {
+    result = type();
+    expect(">");
+  }
+  expect("(");
+  std::vector<Expr> args = expr_list(")");
+  return build(at, [&] { return result ? call_op(op, *result, args) : call_op(op, args); });
+}
+
+Expr Parser::call(CallType call_type) {
+  const std::string callee = name();
+  expect("(");
+  std::vector<Expr> args = expr_list(")");
+  const int value_index = accept(".") ? integer() : 0;
+  const Type result = type_suffix();
+  return new Call(result, call_type, Op::none, callee, std::move(args), value_index, {});
+}
+
+Expr Parser::shuffle() {
+  const Token at = take();
+  expect("(");
+  std::vector<Expr> vectors;
+  do vectors.push_back(expr());
+  while (accept(","));
+  expect(";");
+  std::vector<int> indices;
+  do indices.push_back(integer());
+  while (accept(","));
+  expect(")");
+  return build(at, [&] { return make_shuffle(vectors, indices); });
+}
+
+Expr Parser::reduce() {
+  const Token at = take();
+  expect("(");
+  std::optional<ReduceOp> op;
+  for (ReduceOp candidate :
+       {ReduceOp::Add, ReduceOp::Mul, ReduceOp::Min, ReduceOp::Max, ReduceOp::And, ReduceOp::Or}) {
+    if (is(reduce_name(candidate))) op = candidate;
+  }
+  if (!op) fail("add, mul, min, max, and, or");
+  take();
+  expect(",");
+  Expr value = expr();
+  expect(",");
+  const int lanes = integer();
+  expect(")");
+  return build(at, [&] { return make_vector_reduce(*op, value, lanes); });
+}
+
+// ---- statements ----
+
+Stmt Parser::block_rest() {
+  std::vector<Stmt> stmts;
+  while (!at_end() && !is("}")) stmts.push_back(stmt());
+  return make_block(std::move(stmts));
+}
+
+Stmt Parser::stmt() {
+  const Depth depth(*this);
+  if (is("{")) return block();
+  if (accept("let")) {
+    const std::string bound = name();
+    expect("=");
+    Expr value = expr();
+    return make_let(bound, value, block_rest());
+  }
+  if (accept("assert")) {
+    const std::vector<Expr> args = arguments(2);
+    return make_assert(args[0], args[1]);
+  }
+  if (is("produce") || is("consume")) {
+    const bool is_producer = take().text == "produce";
+    const std::string func = name();
+    return make_producer_consumer(func, is_producer, block());
+  }
+  for (ForType type : {ForType::Serial, ForType::Parallel, ForType::Vectorized, ForType::Unrolled}) {
+    if (!is(for_name(type))) continue;
+    take();
+    return loop(type);
+  }
+  if (is("for")) return loop(ForType::Serial);
+  if (accept("realize")) return realize();
+  if (accept("allocate")) return allocate();
+  if (accept("free")) return make_free(name());
+  if (accept("if")) return if_stmt();
+  if (accept("evaluate")) return make_evaluate(expr());
+  return store_or_provide();
+}
+
+Stmt Parser::loop(ForType for_type) {
+  expect("for");
+  expect("(");
+  const std::string variable = name();
+  expect(",");
+  Expr min = expr();
+  expect(",");
+  Expr extent = expr();
+  expect(")");
+  return make_for(variable, min, extent, for_type, block());
+}
+
+MemoryType Parser::memory() {
+  for (MemoryType type : {MemoryType::Auto, MemoryType::Heap, MemoryType::Stack}) {
+    if (accept(memory_name(type))) return type;
+  }
+  fail("auto, heap or stack");
+}
+
+Stmt Parser::realize() {
+  const std::string func = name();
+  expect("(");
+  std::vector<Type> types;
+  do types.push_back(type());
+  while (accept(","));
+  expect(")");
+  const MemoryType where = memory();
+  std::vector<Range> bounds;
+  while (is("[")) {
+    take();
+    Expr min = expr();
+    expect(",");
+    Expr extent = expr();
+    expect("]");
+    bounds.push_back({min, extent});
+    if (!accept(",")) break;
+  }
+  return make_realize(func, std::move(types), where, std::move(bounds), block());
+}
+
+Stmt Parser::allocate() {
+  const std::string buffer = name();
+  expect("[");
+  Expr elements = expr();
+  expect("]");
+  expect(":");
+  const Type element = type();
+  const MemoryType where = memory();
+  return make_allocate(buffer, element, where, elements, block());
+}
+
+Stmt Parser::if_stmt() {
+  expect("(");
+  Expr condition = expr();
+  expect(")");
+  Stmt then_case = block(), else_case;
+  if (accept("else")) else_case = block();
+  return make_if(condition, then_case, else_case);
+}
+
+Stmt Parser::store_or_provide() {
+  const Token at = token_;
+  const std::string target = name();
+  if (accept("[")) {
+    Expr index = expr(), predicate;
+    if (accept("if")) predicate = expr();
+    expect("]");
+    expect("=");
+    Expr value = expr();
+    return build(at, [&] { return make_store(target, value, index, predicate); });
+  }
+  if (!accept("(")) Lexer::fail(at, "a statement");
+  std::vector<Expr> args;
+  Expr predicate;
+  while (!is(")") && !is("if")) {
+    args.push_back(expr());
+    if (!accept(",")) break;
+  }
+  if (accept("if")) predicate = expr();
+  expect(")");
+  expect("=");
+  expect("{");
+  std::vector<Expr> values = expr_list("}");
+  return make_provide(target, std::move(values), std::move(args), predicate);
+}
+
+}  // namespace
+
+Expr parse_expr(const std::string& text) { return Parser(text).whole_expr(); }
+Stmt parse_stmt(const std::string& text) { return Parser(text).whole_stmt(); }
+
+}  // namespace retrograde::ir
