@@ -1,0 +1,602 @@
+// Evaluation by demand. Recursion goes from Func to Func, so it is as deep as the pipeline; it runs
+// on a stack of its own (deep_stack.h).
+#include "testing/interpreter.h"
+
+#include <HalideRuntime.h>
+
+#include <algorithm>
+#include <map>
+#include <unordered_map>
+
+#include "diagnostics/error.h"
+#include "ir/random.h"
+#include "testing/deep_stack.h"
+#include "testing/stage_program.h"
+
+namespace retrograde::oracle {
+
+using ir::FuncContents;
+using ir::FuncPtr;
+using ir::Kind;
+using ir::ParameterContents;
+using ir::Scalar;
+
+namespace {
+
+using Point = std::vector<int>;
+
+struct PointHash {
+  size_t operator()(const Point& point) const {
+    uint64_t hash = 0x9e3779b97f4a7c15u;
+    for (const int x : point) {
+      hash = (hash ^ static_cast<uint32_t>(x)) * 0xff51afd7ed558ccdu;
+      hash ^= hash >> 32;
+    }
+    return hash;
+  }
+};
+
+// A box that grows; empty until the first point.
+struct Hull {
+  Point mins, maxs;
+  bool empty = true;
+
+  bool contains(const Point& p) const {
+    if (empty) return false;
+    for (size_t d = 0; d < p.size(); ++d) {
+      if (p[d] < mins[d] || p[d] > maxs[d]) return false;
+    }
+    return true;
+  }
+  void include(const Point& p) {
+    if (empty) {
+      mins = maxs = p;
+      empty = false;
+    }
+    for (size_t d = 0; d < p.size(); ++d) {
+      mins[d] = std::min(mins[d], p[d]);
+      maxs[d] = std::max(maxs[d], p[d]);
+    }
+  }
+  bool contains(const Hull& other) const {
+    return other.empty || (contains(other.mins) && contains(other.maxs));
+  }
+  void include(const Hull& other) {
+    if (other.empty) return;
+    include(other.mins);
+    include(other.maxs);
+  }
+  Region region() const {
+    Region result;
+    for (size_t d = 0; d < mins.size(); ++d) {
+      result.mins.push_back(mins[d]);
+      result.extents.push_back(maxs[d] - mins[d] + 1);
+    }
+    return result;
+  }
+};
+
+// A stage ready to run: its program and the values of the steps at the current point. No Func calls
+// itself except through its own storage, so one frame per stage is enough.
+struct Frame {
+  StageProgram program;
+  std::vector<Value> slots;
+  std::vector<uint64_t> stamps;  // slots[i] is valid when stamps[i] == epoch
+  uint64_t epoch = 0;
+  Point point;  // pure args, then rvars
+};
+
+// Storage of one slice of a Func with updates, over a box of its scattered dimensions. Cells are
+// initialised from the pure definition when they are first read.
+struct Island {
+  Region box;
+  std::vector<Value> cells;  // point-major, one per Tuple element
+  std::vector<bool> written;
+  Hull reached;              // outside of the box included
+  bool grows_on_store = true;
+  bool poisoned = false;     // a store went to an unstable place
+};
+
+struct FuncState {
+  const FuncContents* func = nullptr;
+  std::vector<Frame> stages;
+  std::vector<int> pure_dims, scattered_dims;
+  std::unordered_map<Point, std::vector<Value>, PointHash> memo;          // pure Funcs
+  std::unordered_map<Point, std::vector<std::unique_ptr<Island>>, PointHash> slices;
+  Island* active = nullptr;  // being computed
+  Point active_slice;
+};
+
+Point pick(const Point& point, const std::vector<int>& dims) {
+  Point result;
+  for (const int d : dims) result.push_back(point[d]);
+  return result;
+}
+
+std::string show(const Point& point) {
+  std::string result = "(";
+  for (size_t d = 0; d < point.size(); ++d) {
+    result += (d ? ", " : "") + std::to_string(point[d]);
+  }
+  return result + ")";
+}
+
+}  // namespace
+
+class Interpreter::Impl {
+ public:
+  explicit Impl(InterpreterOptions options) : options_(options) {}
+
+  InterpreterOptions options_;
+  std::map<const ir::Symbol*, Scalar> scalars_;
+  std::map<const ir::Symbol*, const halide_buffer_t*> buffers_;
+  std::map<std::string, ExternFunction> externs_;
+  std::map<const ir::Symbol*, Hull> touched_;
+  uint64_t operations_ = 0;
+
+  std::vector<Array> realize(const std::vector<FuncPtr>& funcs,
+                             const std::vector<Region>& regions) {
+    states_.clear();
+    std::vector<Array> result;
+    for (size_t i = 0; i < funcs.size(); ++i) {
+      if (regions[i].dimensions() != funcs[i]->dimensions()) {
+        call_error("interpret " + quoted(funcs[i]->name),
+                   "the region has as many dimensions as the Func",
+                   text(regions[i].dimensions(), " instead of ", funcs[i]->dimensions()));
+      }
+      realize_one(*funcs[i], regions[i], result);
+    }
+    return result;
+  }
+
+ private:
+  void realize_one(const FuncContents& func, const Region& region, std::vector<Array>& result) {
+    FuncState& state = state_of(func);
+    const size_t first = result.size();
+    for (Type type : func.types) {
+      if (options_.widen && type.is_float()) type = Float(64);
+      result.push_back({type, region, std::vector<Value>(region.points())});
+    }
+    size_t index = 0;
+    region.for_each([&](const Point& point) {
+      for (size_t v = 0; v < func.types.size(); ++v) {
+        result[first + v].values[index] = read(state, point, static_cast<int>(v));
+      }
+      ++index;
+    });
+  }
+
+  FuncState& state_of(const FuncContents& func) {
+    auto& state = states_[&func];
+    if (!state) {
+      if (!func.is_defined()) {
+        user_error("interpret " + quoted(func.name), "a Func needs a pure definition first");
+      }
+      state = make_state(func);
+    }
+    return *state;
+  }
+
+  std::unique_ptr<FuncState> make_state(const FuncContents& func) const {
+    auto state = std::make_unique<FuncState>();
+    state->func = &func;
+    for (int s = 0; s < func.stage_count(); ++s) {
+      Frame frame;
+      frame.program = flatten_stage(func, s, options_.widen);
+      frame.slots.resize(frame.program.steps.size());
+      frame.stamps.resize(frame.program.steps.size());
+      frame.point.resize(func.args.size() + frame.program.rvars.size());
+      state->stages.push_back(std::move(frame));
+    }
+    for (int d = 0; d < func.dimensions(); ++d) {
+      const bool pure = std::all_of(state->stages.begin(), state->stages.end(),
+                                    [&](const Frame& f) { return f.program.is_pure_arg[d]; });
+      (pure ? state->pure_dims : state->scattered_dims).push_back(d);
+    }
+    return state;
+  }
+
+  // ---- values of Funcs ----
+
+  Value read(FuncState& f, const Point& point, int value_index) {
+    if (f.func->is_pure()) return pure_values(f, point)[value_index];
+    const Point slice = pick(point, f.pure_dims);
+    const Point place = pick(point, f.scattered_dims);
+    if (f.active) return read_self(f, point, slice, place, value_index);
+    Island& island = island_at(f, slice, place);
+    const Value value = cell(f, island, point, place)[value_index];
+    return island.poisoned ? Value::unstable(value.scalar) : value;
+  }
+
+  const std::vector<Value>& pure_values(FuncState& f, const Point& point) {
+    auto it = f.memo.find(point);
+    if (it != f.memo.end()) return it->second;
+    std::vector<Value> values = evaluate_pure(f, point);
+    check_size(f, f.memo.size());
+    return f.memo.emplace(point, std::move(values)).first->second;
+  }
+
+  std::vector<Value> evaluate_pure(FuncState& f, const Point& point) {
+    Frame& frame = f.stages[0];
+    std::copy(point.begin(), point.end(), frame.point.begin());
+    ++frame.epoch;
+    std::vector<Value> values;
+    for (const int root : frame.program.values) values.push_back(get(frame, root));
+    return values;
+  }
+
+  void check_size(const FuncState& f, size_t points) const {
+    if (points >= options_.max_points) {
+      call_error("interpret " + quoted(f.func->name), "a Func is evaluated at a bounded number of points",
+                 text("more than ", options_.max_points), "Raise InterpreterOptions::max_points.");
+    }
+  }
+
+  // The cells of a point inside the island's box.
+  Value* cell(FuncState& f, Island& island, const Point& point, const Point& place) {
+    size_t index = 0, stride = 1;
+    for (size_t d = 0; d < place.size(); ++d) {
+      index += (place[d] - island.box.mins[d]) * stride;
+      stride *= island.box.extents[d];
+    }
+    Value* values = &island.cells[index * f.func->types.size()];
+    if (!island.written[index]) {
+      island.written[index] = true;
+      const std::vector<Value> initial = evaluate_pure(f, point);
+      std::copy(initial.begin(), initial.end(), values);
+    }
+    return values;
+  }
+
+  static bool inside(const Region& box, const Point& place) {
+    for (size_t d = 0; d < place.size(); ++d) {
+      if (place[d] < box.mins[d] || place[d] >= box.mins[d] + box.extents[d]) return false;
+    }
+    return true;
+  }
+
+  Value read_self(FuncState& f, const Point& point, const Point& slice, const Point& place,
+                  int value_index) {
+    if (slice != f.active_slice) {
+      internal_error(quoted(f.func->name) + " reads itself at " + show(point) +
+                     ", across a dimension that is pure in all of its definitions");
+    }
+    f.active->reached.include(place);
+    if (!inside(f.active->box, place)) return evaluate_pure(f, point)[value_index];
+    return cell(f, *f.active, point, place)[value_index];
+  }
+
+  Island& island_at(FuncState& f, const Point& slice, const Point& place) {
+    auto& islands = f.slices[slice];
+    for (auto& island : islands) {
+      if (inside(island->box, place)) return *island;
+    }
+    // Later islands lie outside of what the stores touch, so they need not hold the stores.
+    auto island = std::make_unique<Island>();
+    island->grows_on_store = islands.empty();
+    compute(f, slice, place, *island);
+    islands.push_back(std::move(island));
+    return *islands.back();
+  }
+
+  void compute(FuncState& f, const Point& slice, const Point& place, Island& island) {
+    Hull hull;
+    hull.include(place);
+    do {
+      hull.include(island.reached);
+      island.box = hull.region();
+      const size_t points = island.box.points();
+      check_size(f, points);
+      island.cells.assign(points * f.func->types.size(), Value());
+      island.written.assign(points, false);
+      f.active = &island;
+      f.active_slice = slice;
+      for (size_t s = 1; s < f.stages.size(); ++s) run_update(f, f.stages[s], island);
+      f.active = nullptr;
+    } while (!hull.contains(island.reached));
+  }
+
+  // ---- updates ----
+
+  void run_update(FuncState& f, Frame& frame, Island& island) {
+    std::fill(frame.point.begin(), frame.point.end(), 0);
+    for (size_t i = 0; i < f.pure_dims.size(); ++i) frame.point[f.pure_dims[i]] = f.active_slice[i];
+    Region loops;                // the reduction domain, then the pure dimensions of this stage
+    std::vector<int> positions;  // in frame.point
+    add_reduction_loops(f, frame, loops, positions);
+    for (size_t i = 0; i < f.scattered_dims.size(); ++i) {
+      if (!frame.program.is_pure_arg[f.scattered_dims[i]]) continue;
+      loops.mins.push_back(island.box.mins[i]);
+      loops.extents.push_back(island.box.extents[i]);
+      positions.push_back(f.scattered_dims[i]);
+    }
+    loops.for_each([&](const Point& at) {
+      for (size_t i = 0; i < at.size(); ++i) frame.point[positions[i]] = at[i];
+      ++frame.epoch;
+      update_point(f, frame, island);
+    });
+  }
+
+  void add_reduction_loops(FuncState& f, Frame& frame, Region& loops, std::vector<int>& positions) {
+    ++frame.epoch;
+    int position = f.func->dimensions();
+    for (const auto& rvar : frame.program.rvars) {
+      loops.mins.push_back(static_cast<int>(get(frame, rvar.min).scalar.i));
+      loops.extents.push_back(static_cast<int>(get(frame, rvar.extent).scalar.i));
+      positions.push_back(position++);
+    }
+  }
+
+  void update_point(FuncState& f, Frame& frame, Island& island) {
+    bool unsure = false;
+    if (frame.program.predicate >= 0) {
+      const Value& condition = get(frame, frame.program.predicate);
+      unsure = !condition.is_stable();
+      if (!unsure && !condition.scalar.as_bool()) return;
+    }
+    std::vector<Value> values;
+    for (const int root : frame.program.values) values.push_back(get(frame, root));
+    Point point;
+    for (const int root : frame.program.args) {
+      const Value& coordinate = get(frame, root);
+      if (!coordinate.is_stable()) island.poisoned = true;
+      point.push_back(static_cast<int>(coordinate.scalar.i));
+    }
+    store(f, island, point, values, unsure);
+  }
+
+  void store(FuncState& f, Island& island, const Point& point, const std::vector<Value>& values,
+             bool unsure) {
+    const bool nothing = std::all_of(values.begin(), values.end(),
+                                     [](const Value& v) { return v.is_undef(); });
+    if (nothing) return;
+    const Point place = pick(point, f.scattered_dims);
+    if (island.grows_on_store) island.reached.include(place);
+    if (!inside(island.box, place)) return;
+    Value* cells = cell(f, island, point, place);
+    for (size_t v = 0; v < values.size(); ++v) {
+      if (values[v].is_undef()) continue;
+      cells[v] = unsure ? Value::unstable(values[v].scalar) : values[v];
+    }
+  }
+
+  // ---- expressions ----
+
+  const Value& get(Frame& frame, int step) {
+    if (frame.stamps[step] != frame.epoch) {
+      frame.slots[step] = evaluate(frame, frame.program.steps[step]);
+      frame.stamps[step] = frame.epoch;
+    }
+    return frame.slots[step];
+  }
+
+  Value evaluate(Frame& frame, const Step& step) {
+    const auto child = [&](int i) -> const Value& { return get(frame, step.children[i]); };
+    switch (step.code) {
+      case Step::Code::Constant:
+        return step.constant;
+      case Step::Code::Coordinate:
+        return {Scalar::of_int(Int(32), frame.point[step.index])};
+      case Step::Code::Parameter:
+        return parameter(step);
+      case Step::Code::BufferFact:
+        return buffer_fact(step);
+      case Step::Code::Cast:
+        ++operations_;
+        return apply_cast(step.type, child(0));
+      case Step::Code::Reinterpret:
+        return reinterpret(frame, step);
+      case Step::Code::Binary:
+        return binary(frame, step);
+      case Step::Code::Not:
+        ++operations_;
+        return apply_not(child(0));
+      case Step::Code::Select:
+        return select(frame, step);
+      case Step::Code::Operator:
+        ++operations_;
+        return apply_operator(options_.rounding, step.op, children(frame, step), step.type);
+      case Step::Code::Random:
+        return random(frame, step);
+      case Step::Code::Require:
+        return require(frame, step);
+      case Step::Code::Print:
+        return child(step.index);
+      case Step::Code::Undef:
+        return Value::undef();
+      case Step::Code::FuncCall:
+        return func_call(frame, step);
+      case Step::Code::ImageCall:
+        return image_call(frame, step);
+      case Step::Code::ExternCall:
+        return extern_call(frame, step);
+      case Step::Code::Text:
+        break;
+    }
+    internal_error("a string has no value");
+  }
+
+  std::vector<Value> children(Frame& frame, const Step& step) {
+    std::vector<Value> result;
+    for (const int child : step.children) result.push_back(get(frame, child));
+    return result;
+  }
+
+  // An arm of && and || that decides alone keeps the other from being evaluated.
+  Value binary(Frame& frame, const Step& step) {
+    ++operations_;
+    const Value a = get(frame, step.children[0]);
+    if ((step.kind == Kind::And || step.kind == Kind::Or) && !a.is_undef()) {
+      const bool deciding = step.kind == Kind::Or;
+      if (a.is_stable() && a.scalar.as_bool() == deciding) return a;
+      const Value& b = get(frame, step.children[1]);
+      if (!b.is_undef() && b.is_stable() && b.scalar.as_bool() == deciding) return b;
+    }
+    return apply_binary(options_.rounding, step.kind, a, get(frame, step.children[1]));
+  }
+
+  Value select(Frame& frame, const Step& step) {
+    ++operations_;
+    const Value& condition = get(frame, step.children[0]);
+    if (condition.is_undef()) return condition;
+    const bool stable = condition.is_stable();
+    const Value& chosen = get(frame, step.children[condition.scalar.as_bool() ? 1 : 2]);
+    return stable || chosen.is_undef() ? chosen : Value::unstable(chosen.scalar);
+  }
+
+  Value reinterpret(Frame& frame, const Step& step) {
+    ++operations_;
+    const int child = step.children[0];
+    const Value exact = apply_cast(frame.program.steps[child].declared, get(frame, child));
+    return apply_cast(step.type, apply_reinterpret(step.declared, exact));
+  }
+
+  Value random(Frame& frame, const Step& step) {
+    std::vector<uint32_t> words;
+    bool stable = true;
+    for (const Value& word : children(frame, step)) {
+      words.push_back(static_cast<uint32_t>(word.scalar.u));
+      stable &= word.is_stable();
+    }
+    const uint32_t bits = ir::random_bits(words.data(), static_cast<int>(words.size()));
+    const Scalar number = step.declared.is_float()
+                              ? Scalar::of_float(step.declared, ir::random_float(bits))
+                              : Scalar::of_uint(UInt(32), bits);
+    const Value value = apply_cast(step.type, {number});
+    return stable ? value : Value::unstable(value.scalar);
+  }
+
+  Value require(Frame& frame, const Step& step) {
+    const Value& condition = get(frame, step.children[0]);
+    if (condition.scalar.as_bool()) return get(frame, step.children[1]);
+    std::string message;
+    for (size_t i = 2; i < step.children.size(); ++i) {
+      const Step& part = frame.program.steps[step.children[i]];
+      if (!message.empty()) message += " ";
+      if (part.code == Step::Code::Text) {
+        message += part.name;
+      } else {
+        message += text(get(frame, step.children[i]).scalar.as_double());
+      }
+    }
+    call_error("interpret", "the condition of a require holds", message);
+  }
+
+  // ---- what lies outside of the pipeline ----
+
+  static const ParameterContents& parameter_of(const Step& step) {
+    return *static_cast<const ParameterContents*>(step.symbol);
+  }
+
+  Value parameter(const Step& step) {
+    const ParameterContents& p = parameter_of(step);
+    const auto bound = scalars_.find(&p);
+    if (bound == scalars_.end() && !p.value) {
+      call_error("interpret with parameter " + quoted(p.name), "every parameter needs a value");
+    }
+    return apply_cast(step.type, {bound != scalars_.end() ? bound->second : *p.value});
+  }
+
+  const halide_buffer_t& buffer_of(const ParameterContents& p) const {
+    const auto bound = buffers_.find(&p);
+    const halide_buffer_t* buffer = bound != buffers_.end() ? bound->second : p.buffer;
+    if (!buffer || !buffer->host) {
+      call_error("interpret with image " + quoted(p.name), "every image needs a host buffer");
+    }
+    return *buffer;
+  }
+
+  Value buffer_fact(const Step& step) {
+    const ParameterContents& p = parameter_of(step);
+    const std::string fact = step.name.substr(p.name.size());  // ".extent.1"
+    const size_t dot = fact.rfind('.');
+    const int d = std::stoi(fact.substr(dot + 1));
+    const halide_dimension_t& dim = buffer_of(p).dim[d];
+    const std::string kind = fact.substr(1, dot - 1);
+    const int value = kind == "min" ? dim.min : kind == "extent" ? dim.extent : dim.stride;
+    return {Scalar::of_int(step.type, value)};
+  }
+
+  Value func_call(Frame& frame, const Step& step) {
+    bool stable = true;
+    const Point point = coordinates(frame, step, stable);
+    FuncState& callee = state_of(*static_cast<const FuncContents*>(step.symbol));
+    const Value value = read(callee, point, step.index);
+    return stable || value.is_undef() ? value : Value::unstable(value.scalar);
+  }
+
+  Point coordinates(Frame& frame, const Step& step, bool& stable) {
+    Point point;
+    for (const int child : step.children) {
+      const Value& coordinate = get(frame, child);
+      stable &= coordinate.is_stable();
+      point.push_back(static_cast<int>(coordinate.scalar.i));
+    }
+    return point;
+  }
+
+  Value image_call(Frame& frame, const Step& step) {
+    bool stable = true;
+    const Point point = coordinates(frame, step, stable);
+    const ParameterContents& p = parameter_of(step);
+    const halide_buffer_t& buffer = buffer_of(p);
+    if (!inside(region_of(buffer), point)) {
+      call_error("interpret", "an image is read inside of its bounds",
+                 quoted(p.name) + " is read at " + show(point));
+    }
+    touched_[&p].include(point);
+    const Value value = apply_cast(step.type, {read_element(buffer, point)});
+    return stable ? value : Value::unstable(value.scalar);
+  }
+
+  Value extern_call(Frame& frame, const Step& step) {
+    const auto it = externs_.find(step.name);
+    if (it == externs_.end()) {
+      unsupported("interpret a call of " + quoted(step.name),
+                  "the interpreter knows C functions by Interpreter::define_extern only");
+    }
+    ++operations_;
+    std::vector<Scalar> args;
+    for (const Value& arg : children(frame, step)) args.push_back(arg.scalar);
+    return apply_cast(step.type, {it->second(args)});
+  }
+
+  std::unordered_map<const FuncContents*, std::unique_ptr<FuncState>> states_;
+};
+
+Interpreter::Interpreter(InterpreterOptions options) : impl_(std::make_unique<Impl>(options)) {}
+Interpreter::~Interpreter() = default;
+Interpreter::Interpreter(Interpreter&&) noexcept = default;
+Interpreter& Interpreter::operator=(Interpreter&&) noexcept = default;
+
+void Interpreter::bind(const ParameterContents& parameter, const Scalar& value) {
+  impl_->scalars_[&parameter] = value;
+}
+
+void Interpreter::bind(const ParameterContents& parameter, const halide_buffer_t* buffer) {
+  impl_->buffers_[&parameter] = buffer;
+}
+
+void Interpreter::define_extern(const std::string& name, ExternFunction function) {
+  impl_->externs_[name] = std::move(function);
+}
+
+std::vector<Array> Interpreter::realize(const FuncPtr& func, const Region& region) {
+  return realize(std::vector<FuncPtr>{func}, std::vector<Region>{region});
+}
+
+std::vector<Array> Interpreter::realize(const std::vector<FuncPtr>& funcs,
+                                        const std::vector<Region>& regions) {
+  std::vector<Array> result;
+  on_deep_stack([&] { result = impl_->realize(funcs, regions); });
+  return result;
+}
+
+uint64_t Interpreter::operations() const { return impl_->operations_; }
+
+Region Interpreter::touched(const ParameterContents& image) const {
+  const auto it = impl_->touched_.find(&image);
+  return it == impl_->touched_.end() ? Region{} : it->second.region();
+}
+
+}  // namespace retrograde::oracle

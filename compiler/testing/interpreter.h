@@ -1,0 +1,64 @@
+// The oracle: evaluates the definitions of Funcs point by point, in the declared order, without
+// schedules, bounds inference or lowering.
+//
+//   Interpreter interpreter;
+//   interpreter.bind(*image, buffer);            // else what the parameter is bound to already
+//   std::vector<Array> out = interpreter.realize(func, {{0, 0}, {64, 48}});
+//
+// Order: the pure definition, then the updates in turn, each over its reduction domain with the
+// first RVar fastest; all loads of a point happen before its stores.
+//
+// Demand: a pure Func is evaluated at the points that are read, memoised. A Func with updates is
+// cut into slices along the dimensions that every definition leaves pure: slices are independent.
+// Within a slice the domain is the smallest box around what was asked for and what the updates
+// touch; it is found by running them, and running them again when they reached outside.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "frontend/function.h"
+#include "testing/array.h"
+
+namespace retrograde::oracle {
+
+struct InterpreterOptions {
+  bool widen = false;                     // every float type becomes float64
+  Rounding rounding = Rounding::Strict;   // freedom to account for in Value::error
+  size_t max_points = size_t{1} << 24;    // of one Func; more is a UserError, not a hang
+};
+
+class Interpreter {
+ public:
+  explicit Interpreter(InterpreterOptions options = {});
+  ~Interpreter();
+  Interpreter(Interpreter&&) noexcept;
+  Interpreter& operator=(Interpreter&&) noexcept;
+
+  // These take precedence over the value or buffer that the parameter itself holds.
+  void bind(const ir::ParameterContents& parameter, const ir::Scalar& value);
+  void bind(const ir::ParameterContents& parameter, const halide_buffer_t* buffer);
+  // The meaning of a call of the C function `name`.
+  using ExternFunction = std::function<ir::Scalar(const std::vector<ir::Scalar>&)>;
+  void define_extern(const std::string& name, ExternFunction function);
+
+  // One Array for each value of the Func. RuntimeError: an image read outside of its bounds, an
+  // unbound parameter, a require that fails.
+  std::vector<Array> realize(const ir::FuncPtr& func, const Region& region);
+  std::vector<Array> realize(const std::vector<ir::FuncPtr>& funcs,
+                             const std::vector<Region>& regions);
+
+  // Arithmetic evaluated so far: binary operators, casts, selects, other operators.
+  uint64_t operations() const;
+  // The smallest box around the elements of an image that were read so far; no extents when none.
+  Region touched(const ir::ParameterContents& image) const;
+
+ private:
+  class Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace retrograde::oracle

@@ -1,0 +1,59 @@
+// A scalar together with a bound on how far another legal evaluation of the same program may be
+// from it.
+//
+// The interpreter computes strictly: every operation rounds to its declared type. A compiler may
+// contract a * b + c into one rounding, another one may reassociate sums. Comparing results with
+// "a few ULP" is then either too loose or wrong (cancellation makes any ULP count wrong). So every
+// value carries `error`: the largest distance that the freedom granted by a Rounding model allows.
+// Arithmetic that happens to be exact keeps error 0, and is compared bit for bit.
+//
+// A discrete decision (comparison, float to integer) that the error could tip makes its result
+// unstable: error is infinity, and nothing can be said about that value.
+//
+// Source: running error analysis, N. Higham, Accuracy and Stability of Numerical Algorithms, 3.3.
+#pragma once
+
+#include <limits>
+#include <vector>
+
+#include "ir/scalar.h"
+
+namespace retrograde::oracle {
+
+enum class Rounding {
+  Strict,       // no freedom: error stays 0
+  Contraction,  // a * b + c may round once; math functions differ by math_ulps
+  Reordering,   // every rounding may happen elsewhere: sums reassociated, x / c as x * (1 / c)
+};
+
+struct Value {
+  ir::Scalar scalar;
+  double error = 0;  // infinity: unstable. Of an integer or bool only 0 or infinity
+
+  bool is_undef() const { return scalar.type.is_handle(); }  // the value of undef()
+  bool is_stable() const { return error < std::numeric_limits<double>::infinity(); }
+  static Value undef() {
+    Value result;
+    result.scalar.type = Handle();
+    return result;
+  }
+  static Value unstable(ir::Scalar scalar) {
+    return {scalar, std::numeric_limits<double>::infinity()};
+  }
+};
+
+// The distance between neighbouring numbers of a float type at x.
+double ulp(Type type, double x);
+
+// How many ULP a correct implementation of the operator may be off; 0 for exact ones. The fast_*
+// forms are stated as a relative error instead: 2^-fast_bits.
+int math_ulps(ir::Op op);
+
+// The operations of ir/scalar.h with errors carried along.
+Value apply_binary(Rounding rounding, ir::Kind kind, const Value& a, const Value& b);
+Value apply_not(const Value& a);
+Value apply_cast(Type type, const Value& a);
+Value apply_reinterpret(Type type, const Value& a);
+Value apply_operator(Rounding rounding, ir::Op op, const std::vector<Value>& args, Type type);
+
+}  // namespace retrograde::oracle

@@ -1,0 +1,54 @@
+// The same pipelines in Halide 14, in Retrograde's machine code and in its interpreter.
+//
+// Types must be the same; integers, and floats whose arithmetic happens to be exact, bit for bit;
+// other floats within twice the error bound that the interpreter derives for each element from the
+// roundings a compiler may move (testing/tracked_value.h).
+#include <gtest/gtest.h>
+
+#include "differential/side.h"
+
+namespace differential {
+namespace {
+
+using retrograde::oracle::Array;
+using retrograde::oracle::Comparison;
+
+// What may be left uncompared: elements whose discrete choices hang on a rounding.
+constexpr double max_unstable_fraction = 0.05;
+
+void expect_agreement(const std::vector<Array>& expected, const std::vector<HostBuffer>& actual,
+                      const std::string& who) {
+  ASSERT_EQ(expected.size(), actual.size()) << who;
+  for (size_t i = 0; i < expected.size(); ++i) {
+    const halide_buffer_t& buffer = *actual[i].raw_buffer();
+    EXPECT_EQ(retrograde::to_string(expected[i].type),
+              retrograde::to_string(retrograde::oracle::type_of_buffer(buffer)))
+        << who << ", value " << i;
+    if (expected[i].type != retrograde::oracle::type_of_buffer(buffer)) continue;
+    const Comparison comparison = compare(expected[i], buffer);
+    EXPECT_TRUE(comparison.agrees())
+        << who << ", value " << i << " of type " << retrograde::to_string(expected[i].type) << ": "
+        << comparison.mismatches << " differ, first " << comparison.first_mismatch;
+    EXPECT_LE(comparison.unstable, max_unstable_fraction * expected[i].region.points())
+        << who << ", value " << i << ": too much depends on rounding to be compared";
+  }
+}
+
+class Differential : public ::testing::TestWithParam<std::string> {};
+
+TEST_P(Differential, InterpreterAgreesWithHalide) {
+  expect_agreement(interpret(GetParam()), run_in_halide(GetParam(), false), "Halide");
+}
+
+TEST_P(Differential, MachineCodeAgreesWithHalide) {
+  const std::vector<Array> expected = interpret(GetParam());
+  expect_agreement(expected, run_in_halide(GetParam(), true), "Halide, scheduled");
+  expect_agreement(expected, run_in_retrograde(GetParam(), false), "Retrograde");
+  expect_agreement(expected, run_in_retrograde(GetParam(), true), "Retrograde, scheduled");
+}
+
+INSTANTIATE_TEST_SUITE_P(Pipelines, Differential, ::testing::ValuesIn(case_names()),
+                         [](const auto& info) { return info.param; });
+
+}  // namespace
+}  // namespace differential
