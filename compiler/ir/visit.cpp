@@ -83,11 +83,11 @@ Expr map_children(const Expr& e, ExprMap map) {
       e,
       [&](const Cast& n) {
         Expr value = map(n.value);
-        return value.same_as(n.value) ? e : cast_to(n.type.with_lanes(value.type().lanes()), std::move(value));
+        return value.same_as(n.value) ? e : cast_to(n.type.with_lanes(value.type().lanes()), value);
       },
       [&](const Reinterpret& n) {
         Expr value = map(n.value);
-        return value.same_as(n.value) ? e : reinterpret_as(n.type.with_lanes(value.type().lanes()), std::move(value));
+        return value.same_as(n.value) ? e : reinterpret_as(n.type.with_lanes(value.type().lanes()), value);
       },
       [&](const Binary& n) {
         Expr a = map(n.a), b = map(n.b);
