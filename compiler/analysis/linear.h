@@ -35,8 +35,14 @@ LinearForm times(const LinearForm& a, int64_t factor);
 
 // a - b when it is the same for all values of all variables.
 std::optional<int64_t> constant_difference(const Expr& a, const Expr& b);
-// The expression in canonical form: like terms gathered, min and max of operands with a constant difference decided.
+// The expression in canonical form: like terms gathered; the same handle when it is no sum.
 Expr canonical(const Expr& e);
+
+// min and max in canonical form. Operands that a constant difference decides are dropped; the rest keep their order.
+Expr canonical_min(const Expr& a, const Expr& b);
+Expr canonical_max(const Expr& a, const Expr& b);
+// floor(e / divisor), divisor > 0, with multiples of the divisor taken out of the division.
+Expr canonical_div(const Expr& e, int64_t divisor);
 
 // e = sum of coefficient * variable over the given variables, plus `rest`, in which none of them occurs.
 // nullopt when e is not linear in them.

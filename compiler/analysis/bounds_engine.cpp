@@ -1,0 +1,416 @@
+// Sums are taken apart into linear form first, so that a variable that occurs twice counts once; each atom of the sum
+// then has its own rule below. What does not vary stands for itself.
+#include "analysis/bounds_engine.h"
+
+#include "analysis/interval_arithmetic.h"
+#include "ir/build.h"
+#include "ir/visit.h"
+
+namespace retrograde::ir {
+
+BoundsEngine::BoundsEngine(const Scope<Interval>& variables, const ValueBounds* values)
+    : shared_(std::make_shared<Shared>(Shared{values})), scope_(&variables) {}
+
+BoundsEngine::BoundsEngine(const BoundsEngine& outer) : shared_(outer.shared_), scope_(&outer.scope_) {}
+
+void BoundsEngine::bind(const Let& let) {
+  if (!scope_.contains(let.name)) scope_.push(let.name, bounds(let.value));
+}
+
+bool BoundsEngine::varies(const Expr& e) {
+  auto it = varies_.find(e.get());
+  if (it != varies_.end()) return it->second.value;
+  bool result = match(
+      e, [&](const Variable& v) { return scope_.contains(v.name); }, [](const Load&) { return true; },
+      [](const Let&) { return true; },
+      [&](const Call& call) {
+        if (call.call_type == CallType::Func || call.call_type == CallType::Image) return true;
+        if (call.op != Op::none && op_info(call.op).cls == OpClass::Effect) return true;
+        for (const Expr& arg : call.args) {
+          if (varies(arg)) return true;
+        }
+        return false;
+      },
+      [&](const ExprNode&) {
+        bool any = false;
+        for_each_child(e, [&](const Expr& child) { any = any || varies(child); });
+        return any;
+      });
+  varies_.emplace(e.get(), Flag{e, result});
+  return result;
+}
+
+Interval BoundsEngine::bounds(const Expr& e) {
+  auto it = memo_.find(e.get());
+  if (it != memo_.end()) return it->second.value;
+  Interval result = compute(e);
+  memo_.emplace(e.get(), Entry{e, result});
+  return result;
+}
+
+Interval BoundsEngine::compute(const Expr& e) {
+  if (const Broadcast* b = e.as<Broadcast>()) return bounds(b->value);
+  if (const Ramp* ramp = e.as<Ramp>()) return ramp_bounds(*ramp);
+  if (!e.type().is_scalar()) return type_range(e.type());
+  if (!varies(e)) return Interval::point(canonical(e));
+  if (!has_linear_form(e.type())) return atom_bounds(e);
+  LinearForm form = with_remainders(linear_form(e));
+  bool is_atom = form.terms.size() == 1 && form.terms[0].atom.same_as(e);
+  return is_atom ? atom_bounds(e) : sum_bounds(form);
+}
+
+Interval BoundsEngine::ramp_bounds(const Ramp& ramp) {
+  Type type = ramp.type.element_of();
+  Interval last = interval_mul(type, bounds(ramp.stride), Interval::point(make_const(type, ramp.lanes - 1)));
+  Interval base = bounds(ramp.base);
+  return hull(base, interval_add(type, base, last));
+}
+
+// Every end adds up on its own; the part that does not vary goes into both.
+Interval BoundsEngine::sum_bounds(const LinearForm& form) {
+  LinearForm fixed{form.type, {}, form.constant};
+  std::vector<std::pair<Interval, int64_t>> varying;
+  for (const LinearTerm& term : form.terms) {
+    if (varies(term.atom)) {
+      varying.emplace_back(bounds(term.atom), term.coefficient);
+    } else {
+      fixed = plus(fixed, linear_form(term.atom), term.coefficient);
+    }
+  }
+  auto end = [&](bool upper) -> Expr {
+    LinearForm sum = fixed;
+    for (const auto& [interval, coefficient] : varying) {
+      const Expr& part = upper == (coefficient > 0) ? interval.max : interval.min;
+      if (!part.defined()) return {};
+      sum = plus(sum, linear_form(part), coefficient);
+    }
+    return to_expr(sum);
+  };
+  Interval result{end(false), end(true)};
+  // One handle for both ends where they are equal, so that is_point() holds.
+  if (result.is_bounded() && constant_difference(result.min, result.max) == 0) result.max = result.min;
+  return result;
+}
+
+// c*y - c*k*(y / k)  is  c*(y % k): two correlated terms become one.
+LinearForm BoundsEngine::with_remainders(LinearForm form) {
+  for (const LinearTerm& term : std::vector<LinearTerm>(form.terms)) {
+    const Div* div = term.atom.as<Div>();
+    auto k = div ? as_const_int(div->b) : std::nullopt;
+    if (!k || *k <= 0 || term.coefficient % *k != 0) continue;
+    int64_t c = -term.coefficient / *k;
+    LinearForm y = linear_form(div->a);
+    bool contains = !y.terms.empty();
+    for (const LinearTerm& part : y.terms) {
+      bool found = false;
+      for (const LinearTerm& t : form.terms) found |= t.atom.same_as(part.atom) && t.coefficient == c * part.coefficient;
+      contains &= found;
+    }
+    if (!contains) continue;
+    form = plus(form, y, -c);
+    form = plus(form, linear_form(term.atom), -term.coefficient);
+    form = plus(form, linear_form(binary(Kind::Mod, div->a, div->b)), c);
+  }
+  return form;
+}
+
+Interval BoundsEngine::atom_bounds(const Expr& e) {
+  return match(
+      e,
+      [&](const Variable& v) {
+        const Interval* interval = scope_.find(v.name);
+        return interval ? *interval : Interval::point(e);
+      },
+      [&](const Cast& n) { return cast_bounds(n.type, n.value); },
+      [&](const Binary& n) { return binary_bounds(e, n); },
+      [&](const Select& n) { return select_bounds(n.condition, n.true_value, n.false_value); },
+      [&](const Call& n) { return call_bounds(n); },
+      [&](const Let& n) {
+        bind(n);
+        return bounds(n.body);
+      },
+      [&](const Not& n) {
+        Truth value = truth(n.a);
+        if (value == Truth::Unknown) return type_range(n.type);
+        return Interval::point(make_const(n.type, value == Truth::False));
+      },
+      [&](const ExprNode& n) { return type_range(n.type); });
+}
+
+Interval BoundsEngine::cast_bounds(Type type, const Expr& value) {
+  return interval_cast(type, value.type(), bounds(value));
+}
+
+Interval BoundsEngine::binary_bounds(const Expr& e, const Binary& op) {
+  Type type = op.a.type();
+  switch (e.kind()) {
+    case Kind::Add:
+      return interval_add(type, bounds(op.a), bounds(op.b));
+    case Kind::Sub:
+      return interval_sub(type, bounds(op.a), bounds(op.b));
+    case Kind::Mul:
+      return interval_mul(type, bounds(op.a), bounds(op.b));
+    case Kind::Div:
+      return interval_div(type, bounds(op.a), bounds(op.b));
+    case Kind::Mod:
+      return interval_mod(type, bounds(op.a), bounds(op.b));
+    case Kind::Min:
+      return interval_min(bounds(op.a), bounds(op.b));
+    case Kind::Max:
+      return interval_max(bounds(op.a), bounds(op.b));
+    default: {
+      Truth value = truth(e);
+      if (value == Truth::Unknown) return type_range(e.type());
+      return Interval::point(make_const(e.type(), value == Truth::True));
+    }
+  }
+}
+
+Interval BoundsEngine::select_bounds(const Expr& condition, const Expr& true_value, const Expr& false_value) {
+  Truth decided = truth(condition);
+  if (decided == Truth::True) return bounds(true_value);
+  if (decided == Truth::False) return bounds(false_value);
+  return hull(under(condition, true).bounds(true_value), under(condition, false).bounds(false_value));
+}
+
+// ---- conditions ----
+
+namespace {
+
+BoundsEngine::Truth negated(BoundsEngine::Truth t) {
+  using Truth = BoundsEngine::Truth;
+  return t == Truth::Unknown ? t : t == Truth::True ? Truth::False : Truth::True;
+}
+
+}  // namespace
+
+BoundsEngine::Truth BoundsEngine::truth(const Expr& condition) {
+  if (is_const_true(condition)) return Truth::True;
+  if (is_const_false(condition)) return Truth::False;
+  if (!condition.type().is_scalar()) return Truth::Unknown;
+  if (const Not* n = condition.as<Not>()) return negated(truth(n->a));
+  if (const Call* call = condition.as<Call>()) {
+    bool is_marker = call->op != Op::none && op_info(call->op).cls == OpClass::Marker;
+    return is_marker ? truth(call->args[0]) : Truth::Unknown;
+  }
+  const Binary* op = condition.as<Binary>();
+  if (!op) return Truth::Unknown;
+  if (condition.kind() == Kind::And || condition.kind() == Kind::Or) {
+    Truth decisive = condition.kind() == Kind::And ? Truth::False : Truth::True;
+    Truth a = truth(op->a), b = truth(op->b);
+    if (a == decisive || b == decisive) return decisive;
+    return a == b ? a : Truth::Unknown;
+  }
+  return compare_truth(condition.kind(), op->a, op->b);
+}
+
+BoundsEngine::Truth BoundsEngine::compare_truth(Kind kind, const Expr& a, const Expr& b) {
+  if (kind == Kind::GT || kind == Kind::GE) return compare_truth(kind == Kind::GT ? Kind::LT : Kind::LE, b, a);
+  if (kind == Kind::NE) return negated(compare_truth(Kind::EQ, a, b));
+  if (a.type().is_bool() || !a.type().is_int_or_uint()) return Truth::Unknown;
+  std::optional<int64_t> low, high;  // of a - b
+  if (has_linear_form(a.type())) {
+    Interval d = sum_bounds(with_remainders(plus(linear_form(a), linear_form(b), -1)));
+    low = constant_min(d);
+    high = constant_max(d);
+  } else if (a.type().bits() < 64) {
+    Interval x = bounds(a), y = bounds(b);
+    auto difference = [](auto p, auto q) { return p && q ? std::optional<int64_t>(*p - *q) : std::nullopt; };
+    low = difference(constant_min(x), constant_max(y));
+    high = difference(constant_max(x), constant_min(y));
+  }
+  if (kind == Kind::EQ) {
+    if (low && high && *low == 0 && *high == 0) return Truth::True;
+    return (low && *low > 0) || (high && *high < 0) ? Truth::False : Truth::Unknown;
+  }
+  int64_t limit = kind == Kind::LT ? -1 : 0;  // holds while a - b <= limit
+  if (high && *high <= limit) return Truth::True;
+  return low && *low > limit ? Truth::False : Truth::Unknown;
+}
+
+BoundsEngine& BoundsEngine::under(const Expr& condition, bool is_true) {
+  for (const Child& child : children_) {
+    if (child.condition.same_as(condition) && child.is_true == is_true) return child.engine ? *child.engine : *this;
+  }
+  if (shared_->engines_left <= 0) return *this;
+  children_.push_back({condition, is_true, nullptr});
+  size_t index = children_.size() - 1;
+  Narrowed narrowed;
+  narrow(condition, is_true, narrowed);
+  if (narrowed.empty()) return *this;
+  --shared_->engines_left;
+  std::unique_ptr<BoundsEngine> child(new BoundsEngine(*this));
+  for (auto& [name, interval] : narrowed) child->scope_.push(name, interval);
+  children_[index].engine = std::move(child);
+  return *children_[index].engine;
+}
+
+void BoundsEngine::narrow(const Expr& condition, bool is_true, Narrowed& narrowed) {
+  if (!condition.type().is_scalar()) return;
+  if (const Not* n = condition.as<Not>()) return narrow(n->a, !is_true, narrowed);
+  if (const Call* call = condition.as<Call>()) {
+    if (call->is_op(Op::likely) || call->is_op(Op::likely_if_innermost)) narrow(call->args[0], is_true, narrowed);
+    return;
+  }
+  const Binary* op = condition.as<Binary>();
+  if (!op) return;
+  Kind kind = condition.kind();
+  if (kind == Kind::And || kind == Kind::Or) {
+    if (is_true != (kind == Kind::And)) return;  // "one of both" says nothing about either
+    narrow(op->a, is_true, narrowed);
+    narrow(op->b, is_true, narrowed);
+  } else if (is_true) {
+    narrow_by_comparison(kind, op->a, op->b, narrowed);
+  } else if (kind == Kind::LT || kind == Kind::LE) {  // !(a < b) is b <= a
+    narrow_by_comparison(kind == Kind::LT ? Kind::LE : Kind::LT, op->b, op->a, narrowed);
+  } else if (kind == Kind::GT || kind == Kind::GE) {
+    narrow_by_comparison(kind == Kind::GT ? Kind::LE : Kind::LT, op->a, op->b, narrowed);
+  } else if (kind == Kind::NE) {
+    narrow_by_comparison(Kind::EQ, op->a, op->b, narrowed);
+  }
+}
+
+void BoundsEngine::narrow_by_comparison(Kind kind, const Expr& a, const Expr& b, Narrowed& narrowed) {
+  if (!has_linear_form(a.type())) return;
+  LinearForm d = plus(linear_form(a), linear_form(b), -1);
+  LinearForm reversed = times(d, -1);
+  switch (kind) {
+    case Kind::LT:
+      d.constant += 1;
+      return narrow_nonpositive(d, narrowed);
+    case Kind::LE:
+      return narrow_nonpositive(d, narrowed);
+    case Kind::GT:
+      reversed.constant += 1;
+      return narrow_nonpositive(reversed, narrowed);
+    case Kind::GE:
+      return narrow_nonpositive(reversed, narrowed);
+    case Kind::EQ:
+      narrow_nonpositive(d, narrowed);
+      return narrow_nonpositive(reversed, narrowed);
+    default:
+      return;
+  }
+}
+
+// form <= 0 bounds each variable v of the scope in it: c*v <= -rest, and -rest <= -(min of rest).
+void BoundsEngine::narrow_nonpositive(const LinearForm& form, Narrowed& narrowed) {
+  for (const LinearTerm& term : form.terms) {
+    const Variable* v = term.atom.as<Variable>();
+    const Interval* old = v ? scope_.find(v->name) : nullptr;
+    if (!old) continue;
+    LinearForm rest = plus(form, linear_form(term.atom), -term.coefficient);
+    Expr least = sum_bounds(with_remainders(rest)).min;
+    if (!least.defined()) continue;
+    int64_t c = term.coefficient;
+    LinearForm limit = linear_form(least);  // c*v + limit <= 0
+    Interval implied;
+    if (c > 0) {
+      Expr numerator = to_expr(times(limit, -1));
+      if (numerator.defined()) implied.max = canonical_div(numerator, c);
+    } else {  // v >= limit / |c|, rounded up
+      limit.constant += -c - 1;
+      Expr numerator = to_expr(limit);
+      if (numerator.defined()) implied.min = canonical_div(numerator, -c);
+    }
+    auto it = narrowed.find(v->name);
+    narrowed[v->name] = intersection(it == narrowed.end() ? *old : it->second, implied);
+  }
+}
+
+// ---- calls ----
+
+Interval BoundsEngine::call_bounds(const Call& call) {
+  switch (call.call_type) {
+    case CallType::Func:
+      return value_of_func(call);
+    case CallType::Operator:
+      return operator_bounds(call);
+    default:
+      return type_range(call.type);
+  }
+}
+
+Interval BoundsEngine::value_of_func(const Call& call) {
+  if (!shared_->values) return type_range(call.type);
+  auto it = shared_->values->find({call.name, call.value_index});
+  return it == shared_->values->end() ? type_range(call.type) : it->second;
+}
+
+namespace {
+
+Interval unit_interval(Type type, int min) { return {make_const(type, min), make_const(type, 1)}; }
+
+Interval bounded_unless_nan(const Interval& operand, const Interval& result) {
+  return operand.min.defined() || operand.max.defined() ? result : Interval::everything();
+}
+
+}  // namespace
+
+Interval BoundsEngine::operator_bounds(const Call& call) {
+  Type type = call.type;
+  auto arg = [&](int i) { return bounds(call.args[i]); };
+  switch (call.op) {
+    case Op::likely:
+    case Op::likely_if_innermost:
+    case Op::strict_float:
+    case Op::stop_gradient:
+    case Op::print:
+      return arg(0);
+    case Op::print_when:
+    case Op::require:
+      return arg(1);
+    case Op::promise_clamped:
+    case Op::unsafe_promise_clamped:
+      return interval_clamp(arg(0), arg(1), arg(2));
+    case Op::if_then_else:
+      return select_bounds(call.args[0], call.args[1], call.args[2]);
+    case Op::abs:
+      return interval_abs(type, call.args[0].type(), arg(0));
+    case Op::absd:
+      return interval_absd(type, call.args[0].type(), arg(0), arg(1));
+    case Op::bitwise_and:
+    case Op::bitwise_or:
+    case Op::bitwise_xor:
+      return interval_bitwise(call.op, type, arg(0), arg(1));
+    case Op::shift_left:
+    case Op::shift_right:
+      return interval_shift(call.op, type, arg(0), arg(1));
+    case Op::floor:
+    case Op::ceil:
+    case Op::round:
+    case Op::trunc:
+      return interval_monotone(call.op, type, arg(0));
+    case Op::sqrt: {
+      Interval v = arg(0);
+      auto min = v.min.defined() ? as_const_float(v.min) : std::nullopt;
+      return min && *min >= 0 ? interval_monotone(Op::sqrt, type, v) : Interval::everything();
+    }
+    case Op::sin:
+    case Op::cos: {  // of an infinity: NaN
+      Interval v = arg(0);
+      return v.is_bounded() ? unit_interval(type, -1) : Interval::everything();
+    }
+    case Op::tanh:
+    case Op::erf:
+      return bounded_unless_nan(arg(0), unit_interval(type, -1));
+    case Op::lerp:
+      return type.is_float() ? Interval::everything() : hull(arg(0), arg(1));
+    case Op::saturating_cast: {
+      Interval v = arg(0), range = type_range(type);
+      Type from = call.args[0].type();
+      if (from.is_float() || !type.can_represent(from)) return range;
+      return interval_cast(type, from, v);
+    }
+    case Op::popcount:
+    case Op::count_leading_zeros:
+    case Op::count_trailing_zeros:
+      return constant_interval(type, 0, call.args[0].type().bits());
+    case Op::random:
+      return type.is_float() ? unit_interval(type, 0) : type_range(type);
+    default:
+      return type_range(type);
+  }
+}
+
+}  // namespace retrograde::ir

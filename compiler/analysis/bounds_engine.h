@@ -1,0 +1,81 @@
+// The machine behind bounds_of and footprints: one memoised answer per node, and child engines for code that runs only
+// under a condition.
+//
+// Meaning of an Interval here
+//   integers  every value lies between the ends that are defined
+//   floats    the same, and with at least one end defined the value is no NaN; only an unbounded value may be NaN
+// Ends are built in canonical linear form (linear.h), so differences between ends cancel without a simplifier.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <unordered_map>
+#include <vector>
+
+#include "analysis/interval.h"
+#include "analysis/linear.h"
+#include "analysis/scope.h"
+#include "ir/expr.h"
+
+namespace retrograde::ir {
+
+class BoundsEngine {
+ public:
+  BoundsEngine(const Scope<Interval>& variables, const ValueBounds* values);
+
+  Interval bounds(const Expr& e);
+  void bind(const Let& let);  // the body's variable ranges over the value
+
+  enum class Truth { False, True, Unknown };
+  Truth truth(const Expr& condition);
+  bool varies(const Expr& e);  // mentions a variable of the scope, or a value that only the running program knows
+
+  // The engine for code that runs only where `condition` is (or is not) true: variables of the scope are narrowed by
+  // the comparisons in it. This engine itself when nothing is gained or too many engines exist.
+  BoundsEngine& under(const Expr& condition, bool is_true);
+
+ private:
+  struct Shared {
+    const ValueBounds* values;
+    int engines_left = 16;  // contexts multiply with nested conditions: beyond this many, conditions are not used
+  };
+  explicit BoundsEngine(const BoundsEngine& outer);
+
+  Interval compute(const Expr& e);
+  Interval sum_bounds(const LinearForm& form);
+  LinearForm with_remainders(LinearForm form);
+  Interval atom_bounds(const Expr& e);
+  Interval cast_bounds(Type type, const Expr& value);
+  Interval ramp_bounds(const Ramp& ramp);
+  Interval binary_bounds(const Expr& e, const Binary& op);
+  Interval select_bounds(const Expr& condition, const Expr& true_value, const Expr& false_value);
+  Interval call_bounds(const Call& call);
+  Interval operator_bounds(const Call& call);
+  Interval value_of_func(const Call& call);
+  Truth compare_truth(Kind kind, const Expr& a, const Expr& b);
+  using Narrowed = std::map<std::string, Interval>;
+  void narrow(const Expr& condition, bool is_true, Narrowed& narrowed);
+  void narrow_by_comparison(Kind kind, const Expr& a, const Expr& b, Narrowed& narrowed);
+  void narrow_nonpositive(const LinearForm& form, Narrowed& narrowed);
+
+  std::shared_ptr<Shared> shared_;
+  Scope<Interval> scope_;
+  struct Entry {
+    Expr key;
+    Interval value;
+  };
+  std::unordered_map<const ExprNode*, Entry> memo_;
+  struct Flag {
+    Expr key;
+    bool value;
+  };
+  std::unordered_map<const ExprNode*, Flag> varies_;
+  struct Child {
+    Expr condition;
+    bool is_true;
+    std::unique_ptr<BoundsEngine> engine;  // null: nothing gained
+  };
+  std::vector<Child> children_;
+};
+
+}  // namespace retrograde::ir

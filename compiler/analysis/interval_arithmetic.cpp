@@ -1,0 +1,383 @@
+// Two representations meet here. Ends of wide signed integers are expressions in canonical linear form; ends of all
+// other types are useful only where they fold to constants, or where the operation keeps them as they are.
+#include "analysis/interval_arithmetic.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <optional>
+
+#include "analysis/linear.h"
+#include "ir/build.h"
+#include "ir/scalar.h"
+
+namespace retrograde::ir {
+
+namespace {
+
+using Wide = __int128;
+
+// A constant end; nullopt when the type cannot hold it.
+Expr wide_const(Type type, Wide value) {
+  if (type.is_uint()) {
+    if (value < 0 || value > static_cast<Wide>(type.max_uint())) return {};
+    return make_uint_const(type, static_cast<uint64_t>(value));
+  }
+  if (value < type.min_int() || value > type.max_int()) return {};
+  return make_const(type, static_cast<int64_t>(value));
+}
+
+// Both ends constant, or unbounded where the type cannot hold them (then a narrow type falls back to its range).
+Interval wide_interval(Type type, Wide min, Wide max) {
+  Interval v{wide_const(type, min), wide_const(type, max)};
+  if (has_linear_form(type)) return v;  // does not overflow: each end stands alone
+  return v.is_bounded() ? v : type_range(type);
+}
+
+std::optional<Wide> wide_end(const Expr& end) {
+  if (!end.defined()) return std::nullopt;
+  auto s = as_scalar(end);
+  if (!s || !s->type.is_int_or_uint()) return std::nullopt;
+  return s->type.is_uint() ? static_cast<Wide>(s->u) : static_cast<Wide>(s->i);
+}
+
+struct WidePair {
+  Wide min, max;
+};
+std::optional<WidePair> wide_ends(const Interval& v) {
+  auto min = wide_end(v.min), max = wide_end(v.max);
+  if (min && max) return WidePair{*min, *max};
+  return std::nullopt;
+}
+
+Wide wide_floor_div(Wide a, Wide b) { return a / b - (a % b < 0); }
+
+// Hull of the four combinations of ends.
+template <class F>
+Interval combine_corners(Type type, const WidePair& a, const WidePair& b, F f) {
+  std::array<Wide, 4> corners = {f(a.min, b.min), f(a.min, b.max), f(a.max, b.min), f(a.max, b.max)};
+  auto [min, max] = std::minmax_element(corners.begin(), corners.end());
+  return wide_interval(type, *min, *max);
+}
+
+std::optional<double> float_end(const Expr& end) {
+  auto value = end.defined() ? as_const_float(end) : std::nullopt;
+  return value && !std::isnan(*value) ? value : std::nullopt;
+}
+
+// Constant, finite ends.
+struct DoublePair {
+  double min, max;
+};
+std::optional<DoublePair> float_ends(const Interval& v) {
+  auto min = float_end(v.min), max = float_end(v.max);
+  if (!min || !max || !std::isfinite(*min) || !std::isfinite(*max)) return std::nullopt;
+  return DoublePair{*min, *max};
+}
+
+bool is_nan_end(const Expr& end) {
+  auto value = end.defined() ? as_const_float(end) : std::nullopt;
+  return value && std::isnan(*value);
+}
+
+Interval without_nan(const Interval& v) {
+  return is_nan_end(v.min) || is_nan_end(v.max) ? Interval::everything() : v;
+}
+
+Expr end_op(Kind kind, const Expr& a, const Expr& b) {
+  return a.defined() && b.defined() ? canonical(binary(kind, a, b)) : Expr();
+}
+
+Expr negate(const Expr& e) { return e.defined() ? canonical(binary(Kind::Sub, make_zero(e.type()), e)) : e; }
+
+Interval float_corners(Type type, Kind kind, const Interval& a, const Interval& b) {
+  if (!float_ends(a) || !float_ends(b)) return Interval::everything();
+  Interval result;
+  for (const Expr& x : {a.min, a.max}) {
+    for (const Expr& y : {b.min, b.max}) {
+      Expr corner = binary(kind, x, y);
+      if (!float_end(corner)) return Interval::everything();
+      result.min = result.min.defined() ? binary(Kind::Min, result.min, corner) : corner;
+      result.max = result.max.defined() ? binary(Kind::Max, result.max, corner) : corner;
+    }
+  }
+  (void)type;
+  return result;
+}
+
+// v * factor, where factor is one value, for wide signed integers.
+Interval scaled(Type type, const Interval& v, const Expr& factor) {
+  Interval product{end_op(Kind::Mul, v.min, factor), end_op(Kind::Mul, v.max, factor)};
+  if (auto c = as_const_int(factor)) {
+    if (*c == 0) return Interval::point(make_zero(type));
+    return *c > 0 ? product : Interval{product.max, product.min};
+  }
+  if (!product.is_bounded()) return Interval::everything();
+  return {canonical_min(product.min, product.max), canonical_max(product.min, product.max)};
+}
+
+}  // namespace
+
+Interval type_range(Type type) {
+  type = type.element_of();
+  if (type.is_uint() && type.bits() >= 32) return {make_zero(type), {}};
+  if (!type.is_int_or_uint() || type.bits() >= 32) return Interval::everything();
+  if (type.is_uint()) return {make_zero(type), make_uint_const(type, type.max_uint())};
+  return {make_const(type, type.min_int()), make_const(type, type.max_int())};
+}
+
+Interval constant_interval(Type type, int64_t min, int64_t max) { return wide_interval(type.element_of(), min, max); }
+
+std::optional<int64_t> constant_min(const Interval& v) {
+  return v.min.defined() ? as_const_int(v.min) : std::nullopt;
+}
+std::optional<int64_t> constant_max(const Interval& v) {
+  return v.max.defined() ? as_const_int(v.max) : std::nullopt;
+}
+bool is_nonnegative(const Interval& v) {
+  auto min = wide_end(v.min);
+  return min && *min >= 0;
+}
+
+Interval interval_add(Type type, const Interval& a, const Interval& b) {
+  if (type.is_float() || has_linear_form(type)) {
+    return without_nan({end_op(Kind::Add, a.min, b.min), end_op(Kind::Add, a.max, b.max)});
+  }
+  auto x = wide_ends(a), y = wide_ends(b);
+  return x && y ? wide_interval(type, x->min + y->min, x->max + y->max) : type_range(type);
+}
+
+Interval interval_sub(Type type, const Interval& a, const Interval& b) {
+  if (type.is_float() || has_linear_form(type)) {
+    return without_nan({end_op(Kind::Sub, a.min, b.max), end_op(Kind::Sub, a.max, b.min)});
+  }
+  auto x = wide_ends(a), y = wide_ends(b);
+  return x && y ? wide_interval(type, x->min - y->max, x->max - y->min) : type_range(type);
+}
+
+Interval interval_mul(Type type, const Interval& a, const Interval& b) {
+  if (type.is_float()) return float_corners(type, Kind::Mul, a, b);
+  auto x = wide_ends(a), y = wide_ends(b);
+  if (x && y) return combine_corners(type, *x, *y, [](Wide p, Wide q) { return p * q; });
+  if (!has_linear_form(type)) return type_range(type);
+  if (b.is_point()) return scaled(type, a, b.min);
+  if (a.is_point()) return scaled(type, b, a.min);
+  if (is_nonnegative(a) && is_nonnegative(b)) {
+    return {end_op(Kind::Mul, a.min, b.min), end_op(Kind::Mul, a.max, b.max)};
+  }
+  if (!a.is_bounded() || !b.is_bounded()) return Interval::everything();
+  return hull(scaled(type, a, b.min), scaled(type, a, b.max));
+}
+
+Interval interval_div(Type type, const Interval& a, const Interval& b) {
+  if (type.is_float()) {
+    auto divisor = float_ends(b);
+    if (!divisor || (divisor->min <= 0 && divisor->max >= 0)) return Interval::everything();
+    return float_corners(type, Kind::Div, a, b);
+  }
+  auto low = wide_end(b.min), high = wide_end(b.max);
+  if (low && high && *low == *high && *low != 0) {  // one constant: monotone, falling when it is negative
+    Interval q{end_op(Kind::Div, a.min, b.min), end_op(Kind::Div, a.max, b.min)};
+    return *low > 0 ? q : Interval{q.max, q.min};
+  }
+  auto x = wide_ends(a);
+  if (x && low && high && *low > 0) {
+    return combine_corners(type, *x, {*low, *high}, [](Wide p, Wide q) { return wide_floor_div(p, q); });
+  }
+  if (is_nonnegative(a) && low && *low > 0) {
+    Expr min = high ? end_op(Kind::Div, a.min, b.max) : make_zero(type);
+    return {min, end_op(Kind::Div, a.max, b.min)};
+  }
+  if (type.is_uint()) return {make_zero(type), a.max};
+  if (!a.is_bounded()) return type_range(type);
+  // |a / b| <= |a| whatever b is; the narrow types' -128 / -1 wraps.
+  if (!has_linear_form(type)) return type_range(type);
+  return {canonical_min(a.min, negate(a.max)), canonical_max(a.max, negate(a.min))};
+}
+
+namespace {
+
+// a % c for a constant c > 0: exact when a stays within one period.
+Interval remainder_of(Type type, const Interval& a, int64_t c) {
+  Interval period{make_zero(type), make_const(type, c - 1)};
+  if (auto x = wide_ends(a)) {
+    bool one_period = wide_floor_div(x->min, c) == wide_floor_div(x->max, c);
+    Wide start = wide_floor_div(x->min, c) * c;
+    return one_period ? wide_interval(type, x->min - start, x->max - start) : period;
+  }
+  if (!has_linear_form(type) || !a.is_bounded()) return period;
+  // min == c*q + r and max == c*q + s with constants 0 <= r <= s < c
+  Expr r = canonical(binary(Kind::Mod, a.min, make_const(type, c)));
+  auto distance = constant_difference(a.max, a.min);
+  auto rest = as_const_int(r);
+  if (!distance || !rest || *distance < 0 || *rest + *distance >= c) return period;
+  return constant_interval(type, *rest, *rest + *distance);
+}
+
+}  // namespace
+
+Interval interval_mod(Type type, const Interval& a, const Interval& b) {
+  if (type.is_float()) {
+    auto divisor = float_ends(b);
+    if (!divisor || divisor->min <= 0 || !float_ends(a)) return Interval::everything();
+    return {make_zero(type), b.max};
+  }
+  auto low = constant_min(b), high = constant_max(b);
+  if (low && high && *low == *high && *low > 0) return remainder_of(type, a, *low);
+  Expr zero = make_zero(type);
+  if (type.is_uint()) return {zero, b.max};
+  if (low && *low > 0) return {zero, end_op(Kind::Sub, b.max, make_one(type))};
+  if (!b.is_bounded() || !has_linear_form(type)) return {zero, type_range(type).max};
+  Expr largest = canonical_max(b.max, negate(b.min));  // of |b|
+  return {zero, canonical_max(zero, canonical(binary(Kind::Sub, largest, make_one(type))))};
+}
+
+namespace {
+
+bool may_be_nan(Type type, const Interval& v) { return type.is_float() && !v.min.defined() && !v.max.defined(); }
+
+Type end_type(const Interval& v) { return v.min.defined() ? v.min.type() : v.max.type(); }
+
+Expr both(Kind kind, const Expr& a, const Expr& b) {
+  if (!a.defined() || !b.defined()) return {};
+  return kind == Kind::Min ? canonical_min(a, b) : canonical_max(a, b);
+}
+Expr either(Kind kind, const Expr& a, const Expr& b) {
+  if (!a.defined()) return b;
+  if (!b.defined()) return a;
+  return both(kind, a, b);
+}
+
+// min and max keep a NaN of their second operand only.
+bool loses_bounds(const Interval& b) {
+  return !b.min.defined() && !b.max.defined();
+}
+
+}  // namespace
+
+Interval interval_min(const Interval& a, const Interval& b) {
+  if (loses_bounds(b)) {  // an integer a still bounds the result
+    return a.max.defined() && !may_be_nan(end_type(a), b) ? Interval{{}, a.max} : Interval::everything();
+  }
+  return {both(Kind::Min, a.min, b.min), either(Kind::Min, a.max, b.max)};
+}
+
+Interval interval_max(const Interval& a, const Interval& b) {
+  if (loses_bounds(b)) {
+    return a.min.defined() && !may_be_nan(end_type(a), b) ? Interval{a.min, {}} : Interval::everything();
+  }
+  return {either(Kind::Max, a.min, b.min), both(Kind::Max, a.max, b.max)};
+}
+
+Interval interval_clamp(const Interval& v, const Interval& low, const Interval& high) {
+  return interval_max(interval_min(v, high), low);
+}
+
+namespace {
+
+Interval cast_ends(Type to, const Interval& v) {
+  return {v.min.defined() ? canonical(cast_to(to, v.min)) : Expr(), v.max.defined() ? canonical(cast_to(to, v.max)) : Expr()};
+}
+
+Interval float_to_int(Type to, const Interval& v) {
+  if (!v.min.defined() && !v.max.defined()) return type_range(to);
+  auto end = [&](const Expr& e) -> Expr {  // truncation never decreases
+    if (!e.defined()) return {};
+    auto value = as_const_float(e);
+    if (!value) return has_linear_form(to) ? cast_to(to, e) : Expr();
+    double whole = std::trunc(*value);
+    return std::isfinite(whole) && to.can_represent(whole) ? cast_to(to, e) : Expr();
+  };
+  // A value beyond the type is undefined: one unbounded end makes both unknown.
+  Interval ends{end(v.min), end(v.max)};
+  return ends.is_bounded() ? ends : type_range(to);
+}
+
+Interval int_to_int(Type to, Type from, const Interval& v) {
+  if (to.can_represent(from)) return cast_ends(to, v);
+  auto min = wide_end(v.min), max = wide_end(v.max);
+  if (min && max) return wide_interval(to, *min, *max);
+  if (has_linear_form(to)) {  // does not overflow; a constant end that would is no end
+    auto fits = [&](const Expr& e, const std::optional<Wide>& c) { return e.defined() && (!c || wide_const(to, *c).defined()); };
+    return cast_ends(to, {fits(v.min, min) ? v.min : Expr(), fits(v.max, max) ? v.max : Expr()});
+  }
+  bool grows = to.bits() >= 32 && to.bits() >= from.bits() && is_nonnegative(v);
+  return grows ? cast_ends(to, v) : type_range(to);
+}
+
+}  // namespace
+
+Interval interval_cast(Type to, Type from, const Interval& v) {
+  if (to == from) return v;
+  if (to.is_float()) return cast_ends(to, v);
+  if (!to.is_int_or_uint()) return Interval::everything();
+  if (from.is_float()) return to.is_bool() ? type_range(to) : float_to_int(to, v);
+  if (!from.is_int_or_uint() || to.is_bool()) return type_range(to);
+  return int_to_int(to, from, v);
+}
+
+Interval interval_abs(Type result, Type operand, const Interval& v) {
+  if (operand.is_float()) {
+    auto ends = float_ends(v);
+    if (!ends) return may_be_nan(operand, v) ? Interval::everything() : Interval{make_zero(result), {}};
+    double largest = std::max(std::abs(ends->min), std::abs(ends->max));
+    double least = ends->min <= 0 && ends->max >= 0 ? 0 : std::min(std::abs(ends->min), std::abs(ends->max));
+    return {make_const(result, least), make_const(result, largest)};
+  }
+  if (auto x = wide_ends(v)) {
+    Wide low = x->min < 0 ? -x->min : x->min, high = x->max < 0 ? -x->max : x->max;
+    bool crosses = x->min <= 0 && x->max >= 0;
+    return wide_interval(result, crosses ? 0 : std::min(low, high), std::max(low, high));
+  }
+  if (!has_linear_form(operand) || !v.is_bounded()) return type_range(result);
+  if (is_nonnegative(v)) return cast_ends(result, v);
+  return {make_zero(result), cast_to(result, canonical_max(v.max, negate(v.min)))};
+}
+
+Interval interval_absd(Type result, Type operand, const Interval& a, const Interval& b) {
+  if (operand.is_float()) return interval_abs(result, operand, interval_sub(operand, a, b));
+  auto x = wide_ends(a), y = wide_ends(b);
+  if (!x || !y) {
+    if (!has_linear_form(operand)) return type_range(result);
+    return interval_abs(result, operand, interval_sub(operand, a, b));
+  }
+  Wide least = std::max<Wide>({0, x->min - y->max, y->min - x->max});
+  return wide_interval(result, least, std::max(x->max - y->min, y->max - x->min));
+}
+
+Interval interval_bitwise(Op op, Type type, const Interval& a, const Interval& b) {
+  if (type.is_bool()) return type_range(type);
+  auto x = wide_ends(a), y = wide_ends(b);
+  bool a_positive = is_nonnegative(a), b_positive = is_nonnegative(b);
+  Expr zero = make_zero(type);
+  if (op == Op::bitwise_and) {  // no larger than either operand that is not negative
+    if (a_positive && b_positive) return {zero, either(Kind::Min, a.max, b.max)};
+    if (a_positive) return {zero, a.max};
+    if (b_positive) return {zero, b.max};
+    return type_range(type);
+  }
+  if (!x || !y || !a_positive || !b_positive) return type_range(type);
+  Wide bits = 1;
+  while (bits <= std::max(x->max, y->max)) bits *= 2;
+  Wide least = op == Op::bitwise_or ? std::max(x->min, y->min) : 0;
+  return wide_interval(type, least, bits - 1);
+}
+
+Interval interval_shift(Op op, Type type, const Interval& a, const Interval& amount) {
+  auto low = constant_min(amount), high = constant_max(amount);
+  bool is_fixed = low && high && *low == *high && *low >= 0 && *low < type.bits() && *low < 62;
+  if (!is_fixed) {
+    bool shrinks = op == Op::shift_right && low && *low >= 0 && is_nonnegative(a);
+    return shrinks ? Interval{make_zero(type), a.max} : type_range(type);
+  }
+  if (type.is_uint() ? *low >= type.bits() : *low >= type.bits() - 1) return type_range(type);
+  Interval factor = Interval::point(make_const(type, int64_t{1} << *low));
+  return op == Op::shift_left ? interval_mul(type, a, factor) : interval_div(type, a, factor);
+}
+
+Interval interval_monotone(Op op, Type type, const Interval& v) {
+  auto end = [&](const Expr& e) { return e.defined() ? call_op(op, type, {e}) : e; };
+  return without_nan({end(v.min), end(v.max)});
+}
+
+}  // namespace retrograde::ir

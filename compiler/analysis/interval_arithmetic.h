@@ -1,0 +1,36 @@
+// Interval arithmetic proper: the interval of an operation from the intervals of its operands.
+// The meaning of an Interval is the one of bounds_engine.h.
+#pragma once
+
+#include <optional>
+
+#include "analysis/interval.h"
+#include "ir/expr.h"
+
+namespace retrograde::ir {
+
+Interval type_range(Type type);  // of an element: bool and integers below 32 bits are bounded, floats are not
+Interval constant_interval(Type type, int64_t min, int64_t max);
+
+std::optional<int64_t> constant_min(const Interval& v);  // of integers
+std::optional<int64_t> constant_max(const Interval& v);
+bool is_nonnegative(const Interval& v);  // certainly
+
+Interval interval_add(Type type, const Interval& a, const Interval& b);
+Interval interval_sub(Type type, const Interval& a, const Interval& b);
+Interval interval_mul(Type type, const Interval& a, const Interval& b);
+Interval interval_div(Type type, const Interval& a, const Interval& b);
+Interval interval_mod(Type type, const Interval& a, const Interval& b);
+Interval interval_min(const Interval& a, const Interval& b);
+Interval interval_max(const Interval& a, const Interval& b);
+Interval interval_clamp(const Interval& v, const Interval& low, const Interval& high);
+Interval interval_cast(Type to, Type from, const Interval& v);
+Interval interval_abs(Type result, Type operand, const Interval& v);
+Interval interval_absd(Type result, Type operand, const Interval& a, const Interval& b);
+// and, or, xor of integers
+Interval interval_bitwise(Op op, Type type, const Interval& a, const Interval& b);
+Interval interval_shift(Op op, Type type, const Interval& a, const Interval& amount);
+// A function that never decreases and maps no number to NaN: both ends through it.
+Interval interval_monotone(Op op, Type type, const Interval& v);
+
+}  // namespace retrograde::ir

@@ -1,0 +1,213 @@
+// Solving a condition for one variable. Every comparison of integers becomes "form <= 0"; inner variables are replaced by
+// the end of their interval that makes the form largest; what remains is solved for the variable atom by atom:
+//
+//   c*v + rest <= 0,  c > 0          v <= floor(-rest / c)
+//   c*v + rest <= 0,  c < 0          v >= ceil(rest / -c)
+//   c*max(p, q) + rest, c > 0        both forms with p and with q      (min with c < 0 alike)
+//   c*min(p, q) + rest, c > 0        one of the two is enough          (max with c < 0 alike)
+//   c*(p / k) + rest <= 0, k > 0     p <= k*floor(-rest / c) + k - 1,  or for c < 0  p >= k*ceil(rest / -c)
+//   c*atom + rest                    the atom's largest value, when it has bounds whatever v is (v % 4)
+#include <algorithm>
+
+#include "analysis/bounds_engine.h"
+#include "analysis/linear.h"
+#include "ir/build.h"
+#include "ir/visit.h"
+
+namespace retrograde::ir {
+
+namespace {
+
+constexpr int max_depth = 8;  // of min, max and division inside one another; each level may try two forms
+
+LinearForm without(const LinearForm& form, const LinearTerm& term) {
+  return plus(form, linear_form(term.atom), -term.coefficient);
+}
+
+LinearForm with_replaced(const LinearForm& form, const LinearTerm& term, const Expr& replacement) {
+  return plus(without(form, term), linear_form(replacement), term.coefficient);
+}
+
+class Solver {
+ public:
+  Solver(const std::string& variable, const Scope<Interval>& inner)
+      : variable_(variable), inner_(inner), engine_(inner, nullptr) {}
+
+  std::optional<Solution> solve(const Expr& condition, bool is_true) {
+    if (is_const_true(condition)) return is_true ? anywhere() : std::nullopt;
+    if (is_const_false(condition)) return is_true ? std::nullopt : anywhere();
+    if (!condition.type().is_scalar()) return std::nullopt;
+    if (const Not* n = condition.as<Not>()) return solve(n->a, !is_true);
+    if (const Call* call = condition.as<Call>()) {
+      bool is_marker = call->op != Op::none && op_info(call->op).cls == OpClass::Marker;
+      return is_marker ? solve(call->args[0], is_true) : if_fixed(condition, is_true);
+    }
+    const Binary* op = condition.as<Binary>();
+    if (!op) return if_fixed(condition, is_true);
+    if (condition.kind() == Kind::And || condition.kind() == Kind::Or) {
+      bool needs_both = is_true == (condition.kind() == Kind::And);
+      auto a = solve(op->a, is_true), b = solve(op->b, is_true);
+      return needs_both ? all_of(a, b) : one_of(a, b);
+    }
+    if (!has_linear_form(op->a.type())) return if_fixed(condition, is_true);
+    return solve_comparison(condition.kind(), op->a, op->b, is_true);
+  }
+
+ private:
+  static std::optional<Solution> anywhere() { return Solution{}; }
+
+  // A condition that mentions neither the variable nor inner names holds everywhere or nowhere.
+  std::optional<Solution> if_fixed(const Expr& condition, bool is_true) {
+    if (uses_variable(condition, variable_) || engine_.varies(condition)) return std::nullopt;
+    return Solution{{}, is_true ? condition : logical_not(condition)};
+  }
+
+  static std::optional<Solution> all_of(const std::optional<Solution>& a, const std::optional<Solution>& b) {
+    if (!a || !b) return std::nullopt;
+    Solution both{intersection(a->interval, b->interval), a->needed};
+    if (!both.needed.defined()) {
+      both.needed = b->needed;
+    } else if (b->needed.defined()) {
+      both.needed = binary(Kind::And, both.needed, b->needed);
+    }
+    return both;
+  }
+
+  // Either is right; the one that needs no further condition is better.
+  static std::optional<Solution> one_of(const std::optional<Solution>& a, const std::optional<Solution>& b) {
+    if (!a || !b) return a ? a : b;
+    return a->needed.defined() && !b->needed.defined() ? b : a;
+  }
+
+  std::optional<Solution> solve_comparison(Kind kind, const Expr& a, const Expr& b, bool is_true) {
+    LinearForm d = plus(linear_form(a), linear_form(b), -1);
+    LinearForm less = d, greater = times(d, -1);  // a < b and a > b as "<= 0"
+    less.constant += 1;
+    greater.constant += 1;
+    auto nonpositive = [&](const LinearForm& form) { return solve_nonpositive(form); };
+    switch (kind) {
+      case Kind::LT:
+        return is_true ? nonpositive(less) : nonpositive(times(d, -1));
+      case Kind::LE:
+        return is_true ? nonpositive(d) : nonpositive(greater);
+      case Kind::GT:
+        return is_true ? nonpositive(greater) : nonpositive(d);
+      case Kind::GE:
+        return is_true ? nonpositive(times(d, -1)) : nonpositive(less);
+      case Kind::EQ:
+      case Kind::NE:
+        if (is_true == (kind == Kind::EQ)) return all_of(nonpositive(d), nonpositive(times(d, -1)));
+        return one_of(nonpositive(less), nonpositive(greater));
+      default:
+        return std::nullopt;
+    }
+  }
+
+  std::optional<Solution> solve_nonpositive(const LinearForm& form) {
+    Expr whole = to_expr(form);
+    if (!whole.defined()) return std::nullopt;
+    Expr largest = engine_.bounds(whole).max;
+    if (!largest.defined()) return std::nullopt;
+    return isolate(linear_form(largest), max_depth);
+  }
+
+  // form <= 0, free of inner names.
+  std::optional<Solution> isolate(const LinearForm& form, int depth) {
+    if (depth == 0) return std::nullopt;
+    const LinearTerm* direct = nullptr;
+    const LinearTerm* compound = nullptr;
+    for (const LinearTerm& term : form.terms) {
+      if (!uses_variable(term.atom, variable_)) continue;
+      (term.atom.as<Variable>() ? direct : compound) = &term;
+    }
+    if (compound) return isolate_compound(form, *compound, depth);
+    return direct ? isolate_variable(form, *direct) : if_nonpositive(form);
+  }
+
+  static std::optional<Solution> if_nonpositive(const LinearForm& form) {
+    if (form.is_constant()) return form.constant <= 0 ? anywhere() : std::nullopt;
+    Expr e = to_expr(form);
+    if (!e.defined()) return std::nullopt;
+    return Solution{{}, binary(Kind::LE, e, make_zero(e.type()))};
+  }
+
+  // The largest m with c*m + rest <= 0 for c > 0; the smallest for c < 0.
+  static Expr limit(const LinearForm& rest, int64_t c) {
+    LinearForm numerator = c > 0 ? times(rest, -1) : rest;
+    if (c < 0) numerator.constant += -c - 1;
+    Expr e = to_expr(numerator);
+    return e.defined() ? canonical_div(e, c > 0 ? c : -c) : e;
+  }
+
+  std::optional<Solution> isolate_variable(const LinearForm& form, const LinearTerm& term) {
+    Expr m = limit(without(form, term), term.coefficient);
+    if (!m.defined()) return std::nullopt;
+    return term.coefficient > 0 ? Solution{{{}, m}, {}} : Solution{{m, {}}, {}};
+  }
+
+  std::optional<Solution> isolate_compound(const LinearForm& form, const LinearTerm& term, int depth) {
+    const Binary* op = term.atom.as<Binary>();
+    Kind kind = term.atom.kind();
+    if (op && (kind == Kind::Min || kind == Kind::Max)) {
+      auto a = isolate(with_replaced(form, term, op->a), depth - 1);
+      auto b = isolate(with_replaced(form, term, op->b), depth - 1);
+      bool needs_both = (kind == Kind::Max) == (term.coefficient > 0);
+      return needs_both ? all_of(a, b) : one_of(a, b);
+    }
+    if (op && kind == Kind::Div) {
+      if (auto solution = isolate_division(form, term, *op, depth)) return solution;
+    }
+    Scope<Interval> any_value;
+    any_value.push(variable_, Interval::everything());
+    Interval range = bounds_of(term.atom, any_value);
+    const Expr& worst = term.coefficient > 0 ? range.max : range.min;
+    if (!worst.defined()) return std::nullopt;
+    return isolate(with_replaced(form, term, worst), depth - 1);
+  }
+
+  std::optional<Solution> isolate_division(const LinearForm& form, const LinearTerm& term, const Binary& op, int depth) {
+    auto k = as_const_int(op.b);
+    LinearForm rest = without(form, term);
+    auto mentions = [&](const LinearTerm& t) { return uses_variable(t.atom, variable_); };
+    if (!k || *k <= 0 || std::any_of(rest.terms.begin(), rest.terms.end(), mentions)) return std::nullopt;
+    Expr m = limit(rest, term.coefficient);
+    if (!m.defined()) return std::nullopt;
+    LinearForm p = linear_form(op.a);
+    if (term.coefficient > 0) {
+      LinearForm above = plus(p, linear_form(m), -*k);
+      above.constant -= *k - 1;
+      return isolate(above, depth - 1);
+    }
+    return isolate(plus(times(p, -1), linear_form(m), *k), depth - 1);
+  }
+
+  const std::string& variable_;
+  const Scope<Interval>& inner_;
+  BoundsEngine engine_;
+};
+
+}  // namespace
+
+std::optional<Solution> solve_for(const Expr& condition, const std::string& variable, const Scope<Interval>& inner) {
+  return Solver(variable, inner).solve(condition, true);
+}
+
+std::optional<LinearDecomposition> decompose(const Expr& e, const std::vector<std::string>& variables) {
+  if (!has_linear_form(e.type())) return std::nullopt;
+  LinearForm form = linear_form(e);
+  LinearDecomposition result;
+  std::unordered_set<std::string> names(variables.begin(), variables.end());
+  LinearForm rest{form.type, {}, form.constant};
+  for (const LinearTerm& term : form.terms) {
+    const Variable* v = term.atom.as<Variable>();
+    if (v && names.count(v->name)) continue;
+    if (uses_any_variable(term.atom, names)) return std::nullopt;
+    rest.terms.push_back(term);
+  }
+  for (const std::string& name : variables) result.coefficients.emplace_back(name, form.coefficient_of(name));
+  result.rest = to_expr(rest);
+  if (!result.rest.defined()) return std::nullopt;
+  return result;
+}
+
+}  // namespace retrograde::ir

@@ -1,0 +1,170 @@
+// Tightness of interval arithmetic on the index expressions that pipelines are made of. Soundness: see
+// property/interval_property_test.cpp.
+#include "analysis/interval.h"
+
+#include <gtest/gtest.h>
+
+#include "analysis/linear.h"
+#include "ir/build.h"
+#include "ir/print.h"
+
+namespace retrograde::ir {
+namespace {
+
+Expr var(const char* name) { return variable(name, Int(32)); }
+
+class IntervalTest : public testing::Test {
+ protected:
+  IntervalTest() {
+    scope.push("x", {var("xmin"), var("xmax")});
+    scope.push("i", {0, 7});
+    scope.push("s", {-5, 5});
+    scope.push("anything", Interval::everything());
+  }
+  std::string bounds(const Expr& e, const ValueBounds* values = nullptr) {
+    Interval v = bounds_of(e, scope, values);
+    auto end = [](const Expr& x) { return x.defined() ? print(x) : std::string("?"); };
+    return "[" + end(v.min) + ", " + end(v.max) + "]";
+  }
+  static std::string interval(const Expr& min, const Expr& max) { return "[" + print(min) + ", " + print(max) + "]"; }
+
+  Scope<Interval> scope;
+  Expr x = var("x"), i = var("i"), s = var("s"), n = var("n"), anything = var("anything");
+  Expr xmin = var("xmin"), xmax = var("xmax");
+};
+
+TEST_F(IntervalTest, ShiftedAndScaled) {
+  EXPECT_EQ(bounds(x + 3 - 1), interval(xmin + 2, xmax + 2));
+  EXPECT_EQ(bounds(x * 2), interval(xmin * 2, xmax * 2));
+  EXPECT_EQ(bounds(7 - x), interval(7 - xmax, 7 - xmin));
+  EXPECT_EQ(bounds(i * -3), "[-21, 0]");
+}
+
+TEST_F(IntervalTest, WhatDoesNotVaryIsAPoint) {
+  Interval v = bounds_of(n * n + 1, scope);
+  EXPECT_TRUE(v.is_point());
+}
+
+TEST_F(IntervalTest, CorrelatedTermsCancel) {
+  EXPECT_EQ(bounds((x + 1) - x), "[1, 1]");
+  EXPECT_EQ(bounds(x - x / 2 * 2), "[0, 1]");
+  EXPECT_EQ(bounds((x + i) * 2 - x * 2), "[0, 14]");
+}
+
+TEST_F(IntervalTest, DivisionTakesOutMultiples) {
+  EXPECT_EQ(bounds((n * 8 + i) / 8), interval(n, n));
+  EXPECT_EQ(bounds((n * 8 + i) % 8), "[0, 7]");
+  EXPECT_EQ(bounds(s / 2), "[-3, 2]");
+  EXPECT_EQ(bounds(s / -2), "[-2, 3]");
+  EXPECT_EQ(bounds(i / 4), "[0, 1]");
+}
+
+TEST_F(IntervalTest, RemainderWithinOnePeriodIsTight) {
+  scope.push("small", {9, 11});
+  EXPECT_EQ(bounds(var("small") % 8), "[1, 3]");
+  EXPECT_EQ(bounds(i % 5), "[0, 4]");
+  scope.push("near", {n * 8 + 2, n * 8 + 5});
+  EXPECT_EQ(bounds(var("near") % 8), "[2, 5]");
+}
+
+TEST_F(IntervalTest, ClampBoundsTheUnbounded) {
+  EXPECT_EQ(bounds(clamp(anything, 0, 255)), "[0, 255]");
+  Expr loaded = call_image("in", Float(32), {x}, {});
+  EXPECT_EQ(bounds(clamp(cast(Int(32), loaded * 8.0f), 0, 7)), "[0, 7]");
+  EXPECT_EQ(bounds(cast(Int(32), clamp(loaded, 0.0f, 1.0f) * 8.0f)), "[0, 8]");
+  EXPECT_EQ(bounds(cast(Int(32), call_op(Op::floor, {clamp(loaded, 0.0f, 1.0f) * 7.5f}))), "[0, 7]");
+}
+
+TEST_F(IntervalTest, AValueThatMayBeNaNHasNoBounds) {
+  Expr loaded = call_image("in", Float(32), {x}, {});
+  EXPECT_EQ(bounds(cast(Int(32), loaded)), "[?, ?]");
+  // A NaN on the right passes through min.
+  EXPECT_EQ(bounds(cast(Int(32), max(Expr(0.0f), min(Expr(1.0f), loaded)))), "[?, ?]");
+}
+
+TEST_F(IntervalTest, NarrowTypesHaveTheirRange) {
+  EXPECT_EQ(bounds(cast(Int(32), call_image("in", UInt(8), {x}, {}))), "[0, 255]");
+  EXPECT_EQ(bounds(cast(Int(32), call_image("in", UInt(8), {x}, {})) + 1), "[1, 256]");
+  Expr wraps = call_image("in", UInt(8), {x}, {}) + make_const(UInt(8), 1);
+  EXPECT_EQ(bounds(cast(Int(32), wraps)), "[0, 255]");
+  Expr a = call_image("a", UInt(8), {x}, {}), b = call_image("b", UInt(8), {x}, {});
+  EXPECT_EQ(bounds(cast(Int(32), call_op(Op::absd, UInt(8), {a, b}))), "[0, 255]");
+  EXPECT_EQ(bounds(call_op(Op::bitwise_and, {cast(Int(32), a), Expr(15)})), "[0, 15]");
+  EXPECT_EQ(bounds(call_op(Op::shift_right, {cast(Int(32), a), Expr(4)})), "[0, 15]");
+}
+
+TEST_F(IntervalTest, MinAndMaxOfShiftedTermsAreDecided) {
+  EXPECT_EQ(bounds(min(x + 1, x + 3)), interval(xmin + 1, xmax + 1));
+  EXPECT_EQ(print(hull({xmin - 1, xmax - 1}, {xmin + 1, xmax + 1}).min), print(xmin - 1));
+  EXPECT_EQ(print(canonical_min(n, canonical_max(n, xmin))), print(n));
+}
+
+TEST_F(IntervalTest, SelectNarrowsByItsCondition) {
+  EXPECT_EQ(bounds(select(s < 0, 0 - s, s)), "[0, 5]");
+  EXPECT_EQ(bounds(select(i < 10, s, anything)), "[-5, 5]");
+  EXPECT_EQ(bounds(select(s >= 0 && s <= 2, s, Expr(1))), "[0, 2]");
+}
+
+TEST_F(IntervalTest, LetsAndPromisesAreFollowed) {
+  EXPECT_EQ(bounds(make_let("t", x + 1, variable("t", Int(32)) * 2)), interval(xmin * 2 + 2, xmax * 2 + 2));
+  EXPECT_EQ(bounds(call_op(Op::unsafe_promise_clamped, {anything, Expr(0), n - 1})), interval(Expr(0), max(n - 1, 0)));
+}
+
+TEST_F(IntervalTest, ValuesOfFuncsComeFromTheCaller) {
+  Expr f = call_func("f", Int(32), {x}, 0, {});
+  EXPECT_EQ(bounds(f), "[?, ?]");
+  ValueBounds values{{{"f", 0}, {3, 9}}};
+  EXPECT_EQ(bounds(f + 1, &values), "[4, 10]");
+}
+
+TEST_F(IntervalTest, FootprintIsTheHullOfAllReads) {
+  Expr f = call_func("f", Float(32), {x - 1, i}, 0, {}) + call_func("f", Float(32), {x + 2, i * 2}, 0, {});
+  auto found = footprints(f, scope);
+  ASSERT_EQ(found.size(), 1u);
+  const Box& box = found["f"].box;
+  EXPECT_EQ(print(box[0].min), print(xmin - 1));
+  EXPECT_EQ(print(box[0].max), print(xmax + 2));
+  EXPECT_EQ(print(box[1].max), "14");
+}
+
+TEST_F(IntervalTest, FootprintUnderAConditionIsNarrowed) {
+  Expr read = call_image("in", Int(32), {s}, {});
+  Expr guarded = call_op(Op::if_then_else, Int(32), {s >= 0, read, Expr(0)});
+  EXPECT_EQ(print(footprints(guarded, scope)["in"].box[0].min), "0");
+  // Both arms of a select may be evaluated.
+  EXPECT_EQ(print(footprints(select(s >= 0, read, Expr(0)), scope)["in"].box[0].min), "-5");
+}
+
+TEST_F(IntervalTest, SharedNodesCostOnce) {
+  Expr e = i;
+  for (int k = 0; k < 200; ++k) e = min(e * e / 7, Expr(100)) + select(e < 3, e, Expr(5));
+  EXPECT_TRUE(bounds_of(e, scope).has_upper_bound());
+}
+
+TEST_F(IntervalTest, LinearFormsGatherTerms) {
+  EXPECT_EQ(constant_difference(x * 3 + n, n + x + x * 2 - 4), 4);
+  EXPECT_FALSE(constant_difference(x, n));
+  auto d = decompose(x * 2 - i + n * 4 + 1, {"x", "i"});
+  ASSERT_TRUE(d);
+  EXPECT_EQ(d->coefficients[0].second, 2);
+  EXPECT_EQ(d->coefficients[1].second, -1);
+  EXPECT_EQ(print(d->rest), print(n * 4 + 1));
+  EXPECT_FALSE(decompose(x * x, {"x"}));
+}
+
+TEST_F(IntervalTest, ConditionsAreSolved) {
+  Scope<Interval> inner;
+  inner.push("i", {0, 7});
+  auto solution = solve_for(x * 8 + i < n, "x", inner);
+  ASSERT_TRUE(solution);
+  EXPECT_FALSE(solution->interval.min.defined());
+  EXPECT_EQ(constant_difference(solution->interval.max, (n - 8) / 8), 0);
+  solution = solve_for(x - 1 >= 0 && x / 2 < n, "x", inner);
+  ASSERT_TRUE(solution);
+  EXPECT_EQ(print(solution->interval.min), "1");
+  EXPECT_EQ(constant_difference(solution->interval.max, n * 2 - 1), 0);
+  EXPECT_FALSE(solve_for(x * n < 3, "x", inner));
+}
+
+}  // namespace
+}  // namespace retrograde::ir
