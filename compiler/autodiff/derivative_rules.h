@@ -1,0 +1,52 @@
+// The scalar derivative rules: one table over all operators and binary kinds, with domains, conventions and sources.
+// Structural rules (select, calls of Funcs, updates) stand in reverse_sweep.h and synthesis.h.
+#pragma once
+
+#include <vector>
+
+#include "ir/expr.h"
+
+namespace retrograde::ir {
+
+enum class RuleClass : uint8_t {
+  Smooth,       // has partials
+  Constant,     // piecewise constant: derivative 0 wherever it exists, and 0 by convention elsewhere
+  Transparent,  // the value of one argument: its adjoint is the call's
+  Blocked,      // 0 because the user says so
+  NoRule,       // no derivative; `convention` says why. Reaching one with an adjoint is an error.
+};
+
+// How a partial meets the adjoint.
+enum class Strength : uint8_t {
+  Plain,   // finite wherever the operands are
+  Strong,  // may be infinite or NaN where the primal is finite: an adjoint of 0 makes the product 0
+};
+
+struct Partial {
+  Expr factor;  // undefined: this operand gets nothing
+  Strength strength = Strength::Plain;
+};
+
+// Partials for operands `args` with value `value` (the node itself, for rules that reuse it).
+using PartialsFn = std::vector<Partial> (*)(const std::vector<Expr>& args, const Expr& value);
+
+struct DerivativeRule {
+  RuleClass cls;
+  PartialsFn partials;     // Smooth only
+  int transparent_arg;     // Transparent only: which argument
+  const char* domain;      // where the primal is finite and differentiable
+  const char* convention;  // at kinks and poles, or the reason for having no rule
+  const char* source;
+};
+
+const DerivativeRule& derivative_rule(Op op);
+// Binary kinds of kinds.def and Not, Cast, Reinterpret, Select.
+const DerivativeRule& derivative_rule(Kind kind);
+bool has_derivative_rule(Kind kind);  // whether the table has a row for the kind
+
+// The type in which the adjoint of a value of floating `type` is accumulated: float32 for the 16-bit floats.
+Type adjoint_type(Type type);
+// adjoint * partial, by the partial's strength; `adjoint` and the result are of the adjoint type.
+Expr times_partial(const Expr& adjoint, const Partial& partial);
+
+}  // namespace retrograde::ir
