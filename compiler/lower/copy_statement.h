@@ -1,0 +1,37 @@
+// Copies of statements, for passes that run one body several times: names stay unique because every copy binds names of
+// its own. Fresh names depend on the program alone, so that passes are deterministic.
+#pragma once
+
+#include <string>
+#include <unordered_map>
+#include <unordered_set>
+
+#include "ir/expr.h"
+#include "ir/visit.h"
+
+namespace retrograde::ir {
+
+// Makes names that occur nowhere in a statement: "f.s0.x" gives "f.s0.x$1", "f.s0.x$2", ...
+class FreshNames {
+ public:
+  explicit FreshNames(const Stmt& s);
+  std::string operator()(const std::string& base);
+
+ private:
+  std::unordered_set<std::string> taken_;
+  std::unordered_map<std::string, int> next_;
+};
+
+// The statement with `values` substituted and every name that it binds (lets, loops, allocations) replaced by a fresh
+// one.
+Stmt copy_statement(const Stmt& s, FreshNames& fresh, const Substitution& values = {});
+
+// The user's words for a loop: "f.s1.x" is the loop over "x" in stage 1 of "f".
+struct LoopName {
+  std::string func, stage, var;
+};
+LoopName decode_loop_name(const std::string& loop);
+// `"x" of "f"`, with the stage when it is an update.
+std::string describe_loop(const std::string& loop);
+
+}  // namespace retrograde::ir
