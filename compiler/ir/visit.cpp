@@ -324,8 +324,8 @@ class StepRewriter : public Rewriter {
 
  private:
   const RewriteStep& step_;
-  // Maps the children of its argument.
-  const std::function<Expr(const Expr&)> recurse_ = [this](const Expr& e) { return children(e); };
+  // Rewrites its argument, a child of the node at hand.
+  const std::function<Expr(const Expr&)> recurse_ = [this](const Expr& e) { return (*this)(e); };
 };
 
 class Substituter : public Rewriter {

@@ -113,7 +113,8 @@ class Rewriter {
   std::unordered_map<const ExprNode*, Entry> memo_;
 };
 
-// Rewriting with a lambda: f(e, recurse) gives the new node; `recurse` maps the children of e.
+// Rewriting with a lambda: f(e, recurse) gives the new node; `recurse` rewrites a child, so that
+// `map_children(e, recurse)` is e with all children rewritten.
 using RewriteStep = std::function<Expr(const Expr&, const std::function<Expr(const Expr&)>& recurse)>;
 Expr rewrite(const Expr& e, const RewriteStep& step);
 
