@@ -1,0 +1,44 @@
+// Machine code from a lowered function. Nothing of LLVM shows here.
+//
+// A module holds `int32 name(context, args...)` and `int32 name_argv(context, void **args)`, as the
+// runtime's header describes. Compilations share nothing and may run at once on several threads.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "ir/lowered_function.h"
+#include "ir/target.h"
+
+namespace retrograde::codegen {
+
+struct Options {
+  Target target = get_host_target();
+  // Choose instructions for the processor that this runs on, within the target's features.
+  bool tune_for_host = true;
+  // 0: straight from the IR; 1: what the passes of optimize.cpp make of it.
+  int optimization_level = 1;
+};
+
+struct Times {
+  double generate_seconds = 0;  // our IR to LLVM's
+  double optimize_seconds = 0;
+  double emit_seconds = 0;  // LLVM's IR to bytes or text
+};
+
+struct Module {
+  std::vector<uint8_t> object;         // ELF, relocatable
+  std::vector<std::string> externals;  // symbols that it needs, sorted
+  Times times;
+};
+
+// InternalError when the function is not what lowering promises; Unsupported for a target without a
+// code generator.
+Module compile_object(const std::vector<ir::LoweredFunction> &functions, const Options &options);
+Module compile_object(const ir::LoweredFunction &function, const Options &options);
+
+std::string compile_llvm_ir(const ir::LoweredFunction &function, const Options &options);
+std::string compile_assembly(const ir::LoweredFunction &function, const Options &options);
+
+}  // namespace retrograde::codegen

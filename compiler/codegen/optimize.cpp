@@ -1,0 +1,62 @@
+// A short pipeline, because the schedule has decided what LLVM's standard one would guess at: vector widths, unrolling
+// and inlining are done. What is left is scalar: per function, in this order,
+//
+//   SROA           slots of owned blocks become registers
+//   EarlyCSE       the same subexpression in several statements; loads of closures and descriptors
+//   SimplifyCFG    blocks of asserts and scopes that turned out empty
+//   InstCombine    address arithmetic, comparisons with constants, shuffles of shuffles
+//   LICM           loop-invariant loads and address parts, with memory SSA to see past unrelated stores
+//   GVN            loads that an earlier iteration's tail or another block already did, where EarlyCSE is too local
+//   InstCombine, SimplifyCFG, ADCE to clean up
+//
+// Left out: loop and SLP vectorization, unrolling, inlining, loop idioms (a memset call is slower on the short rows that
+// schedules produce). Strength reduction of addresses is part of LLVM's code generator.
+#include "codegen/optimize.h"
+
+#include <llvm/Analysis/TargetTransformInfo.h>
+#include <llvm/IR/Module.h>
+#include <llvm/Passes/PassBuilder.h>
+#include <llvm/Target/TargetMachine.h>
+#include <llvm/Transforms/InstCombine/InstCombine.h>
+#include <llvm/Transforms/Scalar/ADCE.h>
+#include <llvm/Transforms/Scalar/EarlyCSE.h>
+#include <llvm/Transforms/Scalar/GVN.h>
+#include <llvm/Transforms/Scalar/LICM.h>
+#include <llvm/Transforms/Scalar/LoopPassManager.h>
+#include <llvm/Transforms/Scalar/SROA.h>
+#include <llvm/Transforms/Scalar/SimplifyCFG.h>
+
+namespace retrograde::codegen {
+
+static llvm::FunctionPassManager pipeline() {
+  llvm::FunctionPassManager passes;
+  passes.addPass(llvm::SROAPass(llvm::SROAOptions::ModifyCFG));
+  passes.addPass(llvm::EarlyCSEPass(true));
+  passes.addPass(llvm::SimplifyCFGPass());
+  passes.addPass(llvm::InstCombinePass());
+  passes.addPass(llvm::createFunctionToLoopPassAdaptor(llvm::LICMPass(llvm::LICMOptions()), /*UseMemorySSA=*/true));
+  passes.addPass(llvm::GVNPass());
+  passes.addPass(llvm::InstCombinePass());
+  passes.addPass(llvm::SimplifyCFGPass());
+  passes.addPass(llvm::ADCEPass());
+  return passes;
+}
+
+void optimize(llvm::Module &module, llvm::TargetMachine &machine) {
+  llvm::LoopAnalysisManager loops;
+  llvm::FunctionAnalysisManager functions;
+  llvm::CGSCCAnalysisManager call_graph;
+  llvm::ModuleAnalysisManager modules;
+  llvm::PassBuilder builder(&machine);
+  builder.registerModuleAnalyses(modules);
+  builder.registerCGSCCAnalyses(call_graph);
+  builder.registerFunctionAnalyses(functions);
+  builder.registerLoopAnalyses(loops);
+  builder.crossRegisterProxies(loops, functions, call_graph, modules);
+  llvm::FunctionPassManager passes = pipeline();
+  for (llvm::Function &function : module) {
+    if (!function.isDeclaration()) passes.run(function, functions);
+  }
+}
+
+}  // namespace retrograde::codegen

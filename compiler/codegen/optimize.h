@@ -1,0 +1,11 @@
+// The optimization of generated code. See optimize.cpp for the choice of passes.
+#pragma once
+
+namespace llvm {
+class Module;
+class TargetMachine;
+}  // namespace llvm
+
+namespace retrograde::codegen {
+void optimize(llvm::Module &module, llvm::TargetMachine &machine);
+}

@@ -1,0 +1,327 @@
+// Functions, loops, branches, allocations, assertions.
+//
+// Leaving early: every failure jumps to one block of its function, which frees the heap blocks that are still held and
+// returns the code. Each Allocate keeps its block in a slot of the stack that is null before and after; LLVM makes
+// registers of the slots.
+#include <llvm/IR/MDBuilder.h>
+
+#include "codegen/function_generator.h"
+#include "diagnostics/error.h"
+#include "ir/build.h"
+#include "ir/print.h"
+#include "ir/visit.h"
+
+namespace retrograde::codegen {
+
+using namespace ir;
+
+namespace {
+constexpr int64_t max_stack_bytes = 16 << 10;        // of an allocation that may go anywhere
+constexpr int64_t max_asked_stack_bytes = 256 << 10;  // of one that asks for the stack: threads have 8 MB
+}  // namespace
+
+FunctionGenerator::FunctionGenerator(Emitter &emitter, const LoweredFunction &function)
+    : e_(emitter), b_(emitter.b), source_(function) {}
+
+// ---- functions ----
+
+void FunctionGenerator::begin_function(llvm::Function *function) {
+  function->addFnAttr(llvm::Attribute::NoUnwind);
+  function->addFnAttr("target-cpu", e_.machine.cpu);
+  function->addFnAttr("target-features", e_.machine.features);
+  if (!e_.machine.tune_cpu.empty()) function->addFnAttr("tune-cpu", e_.machine.tune_cpu);
+  // Vectors are as wide as the schedule says, whatever width the processor would prefer.
+  const std::string bits = std::to_string(e_.machine.vector_bits);
+  function->addFnAttr("min-legal-vector-width", bits);
+  function->addFnAttr("prefer-vector-width", bits);
+  frame_.function = function;
+  frame_.context = function->getArg(0);
+  frame_.context->setName("context");
+  frame_.entry = llvm::BasicBlock::Create(e_.context(), "entry", function);
+  llvm::BasicBlock *body = new_block("body");
+  b_.SetInsertPoint(body);
+}
+
+void FunctionGenerator::finish_function() {
+  b_.CreateRet(b_.getInt32(0));
+  if (frame_.error_exit) {
+    b_.SetInsertPoint(frame_.error_exit);
+    const auto free = runtime_function("retrograde_free", b_.getVoidTy(), {b_.getPtrTy(), b_.getPtrTy()});
+    for (size_t i = frame_.owned_slots.size(); i-- > 0;) {
+      b_.CreateCall(free, {frame_.context, b_.CreateLoad(b_.getPtrTy(), frame_.owned_slots[i])});
+    }
+    b_.CreateRet(frame_.error_code);
+  }
+  b_.SetInsertPoint(frame_.entry);
+  b_.CreateBr(&*std::next(frame_.function->begin()));
+}
+
+void FunctionGenerator::bind_arguments() {
+  unsigned index = 1;
+  for (const LoweredArgument &arg : source_.args) {
+    Value *v = frame_.function->getArg(index++);
+    v->setName(arg.name);
+    if (arg.is_buffer()) {
+      frame_.variables[arg.name + ".buffer"] = v;
+      // Inputs and outputs may be one buffer: they share a tag.
+      frame_.storages[arg.name] = {host_pointer(v), nullptr, alias_tag("arguments")};
+    } else {
+      frame_.variables[arg.name] = v;
+    }
+  }
+}
+
+void FunctionGenerator::generate() {
+  std::vector<llvm::Type *> params = {b_.getPtrTy()};
+  for (const LoweredArgument &arg : source_.args) {
+    params.push_back(arg.is_buffer() ? b_.getPtrTy() : llvm_type(e_, arg.type));
+  }
+  auto *type = llvm::FunctionType::get(b_.getInt32Ty(), params, false);
+  auto *function = llvm::Function::Create(type, llvm::GlobalValue::ExternalLinkage, source_.name, e_.module);
+  const Contraction contraction(e_, !e_.machine.target.has_feature(Target::StrictFloat));
+  begin_function(function);
+  frame_.memo.push_back({{}, {}, false});
+  bind_arguments();
+  if (source_.body.defined()) statement(source_.body);
+  finish_function();
+  make_argv_wrapper(function);
+}
+
+// args[i] is the buffer, or points to the scalar.
+void FunctionGenerator::make_argv_wrapper(llvm::Function *function) {
+  auto *type = llvm::FunctionType::get(b_.getInt32Ty(), {b_.getPtrTy(), b_.getPtrTy()}, false);
+  auto *wrapper =
+      llvm::Function::Create(type, llvm::GlobalValue::ExternalLinkage, source_.name + "_argv", e_.module);
+  frame_ = {};
+  begin_function(wrapper);
+  std::vector<Value *> args = {wrapper->getArg(0)};
+  for (size_t i = 0; i < source_.args.size(); i++) {
+    const LoweredArgument &arg = source_.args[i];
+    Value *pointer = b_.CreateLoad(b_.getPtrTy(), b_.CreateConstGEP1_64(b_.getPtrTy(), wrapper->getArg(1), i));
+    if (!arg.is_buffer()) pointer = from_memory(arg.type, b_.CreateLoad(memory_type(e_, arg.type), pointer));
+    args.push_back(pointer);
+  }
+  b_.CreateRet(b_.CreateCall(function, args));
+  b_.SetInsertPoint(frame_.entry);
+  b_.CreateBr(&*std::next(wrapper->begin()));
+}
+
+llvm::FunctionCallee FunctionGenerator::runtime_function(const std::string &name, llvm::Type *result,
+                                                         const std::vector<llvm::Type *> &params, bool variadic) {
+  auto callee = e_.module.getOrInsertFunction(name, llvm::FunctionType::get(result, params, variadic));
+  llvm::cast<llvm::Function>(callee.getCallee())->setDoesNotThrow();
+  return callee;
+}
+
+llvm::BasicBlock *FunctionGenerator::new_block(const std::string &name) {
+  return llvm::BasicBlock::Create(e_.context(), name, frame_.function);
+}
+
+llvm::AllocaInst *FunctionGenerator::entry_alloca(llvm::Type *type, int64_t count, const std::string &name) {
+  const llvm::IRBuilderBase::InsertPointGuard guard(b_);
+  b_.SetInsertPoint(frame_.entry);
+  return b_.CreateAlloca(type, b_.getInt64(static_cast<uint64_t>(count)), name);
+}
+
+// Tags are types of LLVM's type-based alias analysis: siblings in its tree never overlap. Allocations have names of
+// their own, so the tags hold across functions too.
+llvm::MDNode *FunctionGenerator::alias_tag(const std::string &name) {
+  llvm::MDBuilder md(e_.context());
+  llvm::MDNode *root = md.createTBAARoot("retrograde");
+  llvm::MDNode *type = md.createTBAAScalarTypeNode(name, root);
+  return md.createTBAAStructTagNode(type, type, 0);
+}
+
+// ---- failures and branches ----
+
+void FunctionGenerator::fail(Value *code) {
+  if (!frame_.error_exit) {
+    const llvm::IRBuilderBase::InsertPointGuard guard(b_);
+    frame_.error_exit = new_block("error_exit");
+    b_.SetInsertPoint(frame_.error_exit);
+    frame_.error_code = b_.CreatePHI(b_.getInt32Ty(), 4, "error_code");
+  }
+  frame_.error_code->addIncoming(code, b_.GetInsertBlock());
+  b_.CreateBr(frame_.error_exit);
+}
+
+void FunctionGenerator::fail_unless(Value *condition, const std::function<Value *()> &code) {
+  llvm::BasicBlock *bad = new_block("bad"), *good = new_block("good");
+  b_.CreateCondBr(condition, good, bad, llvm::MDBuilder(e_.context()).createLikelyBranchWeights());
+  b_.SetInsertPoint(bad);
+  {
+    const MemoScope scope(*this, true);
+    fail(code());
+  }
+  b_.SetInsertPoint(good);
+}
+
+void FunctionGenerator::if_true(Value *condition, const std::function<void()> &body) {
+  llvm::BasicBlock *then_block = new_block("if_true"), *after = new_block("after");
+  b_.CreateCondBr(condition, then_block, after);
+  b_.SetInsertPoint(then_block);
+  {
+    const MemoScope scope(*this, true);
+    body();
+  }
+  b_.CreateBr(after);
+  b_.SetInsertPoint(after);
+}
+
+void FunctionGenerator::make(const Assert &s) {
+  const MemoScope scope(*this, false);
+  Value *condition = value(s.condition);
+  fail_unless(condition, [&] { return value(s.error); });
+}
+
+void FunctionGenerator::make(const IfThenElse &s) {
+  Value *condition;
+  {
+    const MemoScope scope(*this, false);
+    condition = value(s.condition);
+  }
+  llvm::BasicBlock *then_block = new_block("then"), *after = new_block("after");
+  llvm::BasicBlock *else_block = s.else_case.defined() ? new_block("else") : after;
+  b_.CreateCondBr(condition, then_block, else_block);
+  b_.SetInsertPoint(then_block);
+  statement(s.then_case);
+  b_.CreateBr(after);
+  if (s.else_case.defined()) {
+    b_.SetInsertPoint(else_block);
+    statement(s.else_case);
+    b_.CreateBr(after);
+  }
+  b_.SetInsertPoint(after);
+}
+
+// ---- statements ----
+
+void FunctionGenerator::statement(const Stmt &s) {
+  match(
+      s, [&](const LetStmt &let) { make(let); }, [&](const Assert &a) { make(a); },
+      [&](const ProducerConsumer &p) { statement(p.body); }, [&](const For &f) { make(f); },
+      [&](const Store &store) { make(store); }, [&](const Allocate &a) { make(a); },
+      [&](const Free &f) { make(f); },
+      [&](const Block &block) {
+        for (const Stmt &part : block.stmts) statement(part);
+      },
+      [&](const IfThenElse &branch) { make(branch); },
+      [&](const Evaluate &e) {
+        const MemoScope scope(*this, false);
+        value(e.value);
+      },
+      [&](const StmtNode &node) {
+        throw InternalError(text(kind_name(node.kind), " reached code generation: lowering replaces it"), "codegen",
+                            ir::print(s));
+      });
+}
+
+void FunctionGenerator::make(const LetStmt &s) {
+  // Chains of lets are long where bounds are computed: no recursion along them.
+  const LetStmt *let = &s;
+  for (;;) {
+    {
+      const MemoScope scope(*this, false);
+      bind_let(let->name, let->value);
+    }
+    const auto *next = let->body.as<LetStmt>();
+    if (!next) break;
+    let = next;
+  }
+  statement(let->body);
+}
+
+void FunctionGenerator::make(const For &s) {
+  switch (s.for_type) {
+    case ForType::Serial: return serial_loop(s);
+    case ForType::Parallel: return parallel_loop(s);
+    default:
+      throw InternalError("a vectorized or unrolled loop over " + quoted(s.name) + " reached code generation", "codegen",
+                          ir::print(Stmt(&s)));
+  }
+}
+
+// Counts in 64 bits, where nothing wraps; the body sees the variable in its own width.
+void FunctionGenerator::serial_loop(const For &s) {
+  Value *min, *extent;
+  {
+    const MemoScope scope(*this, false);
+    min = index64(s.min);
+    extent = b_.CreateSExt(value(s.extent), b_.getInt64Ty());
+  }
+  Value *end = b_.CreateNSWAdd(min, extent);
+  llvm::BasicBlock *before = b_.GetInsertBlock(), *body = new_block(s.name), *after = new_block("end " + s.name);
+  b_.CreateCondBr(b_.CreateICmpSGT(extent, b_.getInt64(0)), body, after);
+  b_.SetInsertPoint(body);
+  llvm::PHINode *counter = b_.CreatePHI(b_.getInt64Ty(), 2, s.name);
+  counter->addIncoming(min, before);
+  frame_.variables[s.name] = b_.CreateTrunc(counter, llvm_type(e_, s.min.type()));
+  if (s.min.type() == Int(32)) frame_.indices[s.name] = counter;
+  statement(s.body);
+  Value *next = b_.CreateNSWAdd(counter, b_.getInt64(1));
+  counter->addIncoming(next, b_.GetInsertBlock());
+  b_.CreateCondBr(b_.CreateICmpSLT(next, end), body, after);
+  b_.SetInsertPoint(after);
+  frame_.indices.erase(s.name);
+}
+
+// ---- allocations ----
+
+FunctionGenerator::Storage FunctionGenerator::allocate_on_stack(const Allocate &s, int64_t elements) {
+  const int64_t bytes = elements * s.type.bytes() * s.type.lanes() + 64;  // readable past the end, as on the heap
+  llvm::AllocaInst *block = entry_alloca(b_.getInt8Ty(), bytes, s.name);
+  block->setAlignment(llvm::Align(64));
+  return {block, nullptr, alias_tag(s.name)};
+}
+
+FunctionGenerator::Storage FunctionGenerator::allocate_on_heap(const Allocate &s) {
+  auto *pointer = b_.getPtrTy();
+  auto *int64 = b_.getInt64Ty();
+  Value *null = llvm::ConstantPointerNull::get(pointer);
+  auto allocate = runtime_function("retrograde_allocate", pointer, {pointer, int64, int64});
+  llvm::cast<llvm::Function>(allocate.getCallee())->setReturnDoesNotAlias();
+  Value *elements;
+  {
+    const MemoScope scope(*this, false);
+    elements = b_.CreateIntCast(value(s.elements), int64, s.elements.type().is_int());
+  }
+  Value *element_bytes = b_.getInt64(static_cast<uint64_t>(s.type.bytes() * s.type.lanes()));
+  Value *block = b_.CreateCall(allocate, {frame_.context, elements, element_bytes}, s.name);
+  fail_unless(b_.CreateICmpNE(block, null), [&] {
+    const auto error =
+        runtime_function("retrograde_allocation_error", b_.getInt32Ty(), {pointer, pointer, int64, int64});
+    return b_.CreateCall(error, {frame_.context, string_constant(s.name), elements, element_bytes});
+  });
+  llvm::AllocaInst *slot = entry_alloca(pointer, 1, s.name + ".owned");
+  {
+    const llvm::IRBuilderBase::InsertPointGuard guard(b_);
+    b_.SetInsertPoint(frame_.entry);
+    b_.CreateStore(null, slot);
+  }
+  b_.CreateStore(block, slot);
+  frame_.owned_slots.push_back(slot);
+  return {block, slot, alias_tag(s.name)};
+}
+
+void FunctionGenerator::free_owned(Storage &owned) {
+  if (!owned.owned) return;
+  const auto free = runtime_function("retrograde_free", b_.getVoidTy(), {b_.getPtrTy(), b_.getPtrTy()});
+  b_.CreateCall(free, {frame_.context, b_.CreateLoad(b_.getPtrTy(), owned.owned)});
+  b_.CreateStore(llvm::ConstantPointerNull::get(b_.getPtrTy()), owned.owned);
+}
+
+void FunctionGenerator::make(const Allocate &s) {
+  const auto elements = as_const_int(s.elements);
+  const int64_t limit = s.memory == MemoryType::Stack ? max_asked_stack_bytes : max_stack_bytes;
+  const int64_t element_bytes = s.type.bytes() * s.type.lanes();
+  const bool on_stack =
+      s.memory != MemoryType::Heap && elements && *elements >= 0 && *elements <= limit / element_bytes;
+  frame_.storages[s.name] = on_stack ? allocate_on_stack(s, *elements) : allocate_on_heap(s);
+  statement(s.body);
+  free_owned(frame_.storages[s.name]);  // after a Free the slot is null, and freeing null does nothing
+  frame_.storages.erase(s.name);
+}
+
+void FunctionGenerator::make(const Free &s) { free_owned(storage(s.name)); }
+
+}  // namespace retrograde::codegen

@@ -1,0 +1,203 @@
+// Memory of intermediate results: a pool of large blocks above the system's allocator.
+//
+// A pipeline asks for the same few large blocks on every call. The system would map and zero their
+// pages each time, which costs more than computing most stages. So released blocks stay in a list,
+// oldest first, and are given again to requests that they fit without much waste; the oldest go when
+// the list holds more than its limit.
+#include <sys/mman.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <mutex>
+#include <new>
+#include <vector>
+
+#include "report.h"
+
+namespace retrograde::runtime {
+namespace {
+
+constexpr size_t alignment = retrograde_allocation_alignment;
+constexpr size_t small_bytes = size_t{64} << 10;       // below: the system's lists are fast
+constexpr size_t huge_page_bytes = size_t{2} << 20;    // x86-64 and AArch64 Linux
+constexpr size_t page_bytes = 4096;
+constexpr size_t max_blocks = 256;
+
+// Stands in front of every block, one alignment unit long.
+struct Header {
+  size_t capacity;   // bytes behind the header
+  void *allocation;  // what the system gave
+};
+static_assert(sizeof(Header) <= alignment);
+
+Header *header_of(void *block) {
+  return reinterpret_cast<Header *>(static_cast<char *>(block) - alignment);
+}
+
+size_t round_up(size_t bytes, size_t multiple) { return (bytes + multiple - 1) / multiple * multiple; }
+
+size_t capacity_for(size_t bytes) {
+  return bytes < small_bytes ? round_up(std::max<size_t>(bytes, 1), alignment)
+                             : round_up(bytes + alignment, page_bytes) - alignment;
+}
+
+void *system_malloc(size_t capacity) {
+  const size_t bytes = capacity + alignment;
+  const bool huge = bytes >= 4 * huge_page_bytes;
+  void *allocation = nullptr;
+  if (posix_memalign(&allocation, huge ? huge_page_bytes : alignment, bytes) != 0) return nullptr;
+#ifdef MADV_HUGEPAGE
+  if (huge) madvise(allocation, bytes, MADV_HUGEPAGE);  // only advice: failure changes nothing
+#endif
+  void *block = static_cast<char *>(allocation) + alignment;
+  *header_of(block) = {capacity, allocation};
+  return block;
+}
+
+void system_free(void *block) { std::free(header_of(block)->allocation); }
+
+size_t default_limit() {
+  const long pages = sysconf(_SC_PHYS_PAGES), bytes = sysconf(_SC_PAGESIZE);
+  return pages > 0 && bytes > 0 ? static_cast<size_t>(pages) / 4 * static_cast<size_t>(bytes)
+                                : size_t{1} << 30;
+}
+
+class Pool {
+ public:
+  // A released block with room for `capacity`, at most a quarter larger; null when there is none.
+  void *take(size_t capacity) {
+    const std::lock_guard lock(mutex_);
+    auto best = blocks_.end();
+    for (auto it = blocks_.begin(); it != blocks_.end(); ++it) {
+      const size_t has = header_of(*it)->capacity;
+      if (has < capacity || has > capacity + capacity / 4) continue;
+      if (best == blocks_.end() || has <= header_of(*best)->capacity) best = it;
+    }
+    if (best == blocks_.end()) return nullptr;
+    void *block = *best;
+    held_ -= header_of(block)->capacity;
+    blocks_.erase(best);
+    return block;
+  }
+
+  void give(void *block) {
+    const std::lock_guard lock(mutex_);
+    const size_t capacity = header_of(block)->capacity;
+    if (capacity > limit_ || !reserve()) return system_free(block);
+    blocks_.push_back(block);
+    held_ += capacity;
+    shrink_to(limit_);
+  }
+
+  void set_limit(size_t bytes) {
+    const std::lock_guard lock(mutex_);
+    limit_ = bytes;
+    shrink_to(limit_);
+  }
+  void release() {
+    const std::lock_guard lock(mutex_);
+    shrink_to(0);
+  }
+  size_t held() {
+    const std::lock_guard lock(mutex_);
+    return held_;
+  }
+
+ private:
+  bool reserve() {
+    try {
+      blocks_.reserve(max_blocks);
+      return true;
+    } catch (const std::bad_alloc &) {
+      return false;
+    }
+  }
+  void shrink_to(size_t bytes) {
+    size_t gone = 0;
+    while (gone < blocks_.size() && (held_ > bytes || blocks_.size() - gone >= max_blocks)) {
+      held_ -= header_of(blocks_[gone])->capacity;
+      system_free(blocks_[gone++]);
+    }
+    blocks_.erase(blocks_.begin(), blocks_.begin() + static_cast<std::ptrdiff_t>(gone));
+  }
+
+  std::mutex mutex_;
+  std::vector<void *> blocks_;  // oldest first
+  size_t held_ = 0;
+  size_t limit_ = default_limit();
+};
+
+Pool &pool() {
+  static Pool &instance = *new Pool;  // never destroyed: other static objects may free at exit
+  return instance;
+}
+
+// False when the request is negative or does not fit the address space.
+bool allocation_bytes(int64_t elements, int64_t element_bytes, size_t *bytes) {
+  constexpr int64_t largest = INT64_MAX - 4 * static_cast<int64_t>(page_bytes);
+  int64_t product = 0;
+  if (elements < 0 || element_bytes < 0) return false;
+  if (__builtin_mul_overflow(elements, element_bytes, &product) || product > largest) return false;
+  *bytes = static_cast<size_t>(product) + retrograde_allocation_padding;
+  return true;
+}
+
+}  // namespace
+}  // namespace retrograde::runtime
+
+namespace rt = retrograde::runtime;
+
+void *retrograde_pool_malloc(size_t bytes) {
+  if (bytes > SIZE_MAX / 2) return nullptr;
+  const size_t capacity = rt::capacity_for(bytes);
+  if (capacity < rt::small_bytes - rt::alignment) return rt::system_malloc(capacity);
+  if (void *block = rt::pool().take(capacity)) return block;
+  if (void *block = rt::system_malloc(capacity)) return block;
+  rt::pool().release();  // what we hoard may be what is missing
+  return rt::system_malloc(capacity);
+}
+
+void retrograde_pool_free(void *block) {
+  if (!block) return;
+  const bool small = rt::header_of(block)->capacity < rt::small_bytes - rt::alignment;
+  small ? rt::system_free(block) : rt::pool().give(block);
+}
+
+void retrograde_pool_set_limit(size_t bytes) { rt::pool().set_limit(bytes); }
+size_t retrograde_pool_bytes(void) { return rt::pool().held(); }
+void retrograde_pool_release(void) { rt::pool().release(); }
+
+void *retrograde_allocate(retrograde_context *context, int64_t elements, int64_t element_bytes) {
+  size_t bytes = 0;
+  if (!rt::allocation_bytes(elements, element_bytes, &bytes)) return nullptr;
+  return context && context->malloc_handler ? context->malloc_handler(context, bytes)
+                                            : retrograde_pool_malloc(bytes);
+}
+
+int32_t retrograde_allocation_error(retrograde_context *context, const char *name, int64_t elements,
+                                    int64_t element_bytes) {
+  size_t bytes = 0;
+  if (elements < 0) {
+    return retrograde_report_error(context, retrograde_error_extents_negative,
+                                   "cannot allocate \"%s\": its number of elements is negative; it is "
+                                   "%i. Check the extents of the buffers",
+                                   name, elements);
+  }
+  if (!rt::allocation_bytes(elements, element_bytes, &bytes)) {
+    return retrograde_report_error(context, retrograde_error_allocation_too_large,
+                                   "cannot allocate \"%s\": its size does not fit 64 bits; it has %i "
+                                   "elements of %i bytes. Compute it in smaller parts",
+                                   name, elements, element_bytes);
+  }
+  return retrograde_report_error(context, retrograde_error_out_of_memory,
+                                 "cannot allocate \"%s\": there is not enough memory; it needs %u bytes. "
+                                 "Compute it in smaller parts, for example with compute_at",
+                                 name, static_cast<uint64_t>(bytes));
+}
+
+void retrograde_free(retrograde_context *context, void *block) {
+  if (!block) return;
+  context && context->free_handler ? context->free_handler(context, block)
+                                   : retrograde_pool_free(block);
+}

@@ -1,0 +1,119 @@
+/* retrograde_runtime.h -- the C ABI between generated code and its host.
+ *
+ * A generated function is
+ *
+ *     int32_t name(retrograde_context *, <halide_buffer_t * or scalar>...);
+ *     int32_t name_argv(retrograde_context *, void **args);
+ *
+ * where args[i] is the halide_buffer_t * itself, or points to the scalar. It returns 0 or a negative
+ * code of retrograde_error_code. A null context stands for one whose fields are all zero.
+ *
+ * Nothing here prints, aborts, exits or throws. Every function may be called from several threads at
+ * once. Beyond TBB's own threads, the only state of the process is the pool of free memory blocks
+ * (retrograde_pool_*) and the arenas of thread limits. */
+#ifndef RETROGRADE_RUNTIME_H
+#define RETROGRADE_RUNTIME_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* The values that HalideRuntime.h gives these conditions, under our own names. */
+enum retrograde_error_code {
+  retrograde_error_success = 0,
+  retrograde_error_generic = -1,
+  retrograde_error_explicit_bounds_too_small = -2,
+  retrograde_error_bad_type = -3,
+  retrograde_error_access_out_of_bounds = -4,
+  retrograde_error_allocation_too_large = -5,
+  retrograde_error_extents_too_large = -6,
+  retrograde_error_constraints_make_required_region_smaller = -7,
+  retrograde_error_constraint_violated = -8,
+  retrograde_error_param_too_small = -9,
+  retrograde_error_param_too_large = -10,
+  retrograde_error_out_of_memory = -11,
+  retrograde_error_buffer_argument_is_null = -12,
+  retrograde_error_internal = -22,
+  retrograde_error_unaligned_host_ptr = -24,
+  retrograde_error_bad_fold = -25,
+  retrograde_error_fold_factor_too_small = -26,
+  retrograde_error_requirement_failed = -27,
+  retrograde_error_extents_negative = -28,
+  retrograde_error_specialize_fail = -31,
+  retrograde_error_host_is_null = -34,
+  retrograde_error_bad_dimensions = -43
+};
+
+/* What one call, or a family of calls, of generated code may use. A field that is null or zero means
+ * the default. The handlers get the context that the generated function was called with. */
+typedef struct retrograde_context {
+  /* Told of every error, just before its code is returned; of several errors in one parallel loop
+   * only the one with the lowest iteration is told, after the loop. Default: nobody is told. */
+  void (*error_handler)(struct retrograde_context *, int code, const char *message);
+  /* Gets the text of print() and print_when(), a line at a time and from any thread. Default: the
+   * text is thrown away. */
+  void (*print_handler)(struct retrograde_context *, const char *message);
+  /* Memory for intermediate results, aligned to retrograde_allocation_alignment; null when there is
+   * none. Set both or neither. Default: the process's pool, see retrograde_pool_malloc. */
+  void *(*malloc_handler)(struct retrograde_context *, size_t bytes);
+  void (*free_handler)(struct retrograde_context *, void *block);
+  /* Threads that parallel loops may use, the caller included. 0: as many as TBB has. */
+  int32_t thread_limit;
+  /* For the handlers; never looked at here. */
+  void *user_data;
+} retrograde_context;
+
+/* ---- called by generated code ---- */
+
+enum { retrograde_allocation_alignment = 128 };
+
+/* One iteration of a parallel loop. */
+typedef int32_t (*retrograde_task)(retrograde_context *, int32_t index, uint8_t *closure);
+
+/* Runs task for every index of [min, min + extent), in any order and in parallel. When iterations
+ * fail, those above the lowest failing one may be skipped; its code is the result. */
+int32_t retrograde_parallel_for(retrograde_context *, retrograde_task task, int32_t min,
+                                int32_t extent, uint8_t *closure);
+
+/* Room for `elements` of `element_bytes` each, plus retrograde_allocation_padding readable bytes; null when the
+ * count is negative, the size overflows, or there is no memory. */
+enum { retrograde_allocation_padding = 64 };
+void *retrograde_allocate(retrograde_context *, int64_t elements, int64_t element_bytes);
+/* Tells the error handler why retrograde_allocate gave null, and returns the code for it. */
+int32_t retrograde_allocation_error(retrograde_context *, const char *name, int64_t elements,
+                                    int64_t element_bytes);
+/* Null is allowed. */
+void retrograde_free(retrograde_context *, void *block);
+
+/* Reports an error and returns its code. The format is text with the fields of
+ * retrograde_format_message. */
+int32_t retrograde_report_error(retrograde_context *, int32_t code, const char *format, ...);
+void retrograde_print(retrograde_context *, const char *format, ...);
+
+/* ---- for hosts ---- */
+
+/* Writes at most `size` bytes, the final 0 included, and returns the length written. Fields:
+ *   %i int64_t   %u uint64_t   %f double, as the shortest text that reads back the same
+ *   %g the same for a float passed as double   %s const char *   %p const void *   %% a percent */
+size_t retrograde_format_message(char *text, size_t size, const char *format, ...);
+
+/* Name of an error code, or "unknown error". */
+const char *retrograde_error_name(int32_t code);
+
+/* The default allocator. Large blocks are kept after their release, because mapping and zeroing
+ * pages afresh costs more than most stages of a pipeline. */
+void *retrograde_pool_malloc(size_t bytes);
+void retrograde_pool_free(void *block);
+/* Bytes that released blocks may hold. Default: a quarter of the machine's memory. */
+void retrograde_pool_set_limit(size_t bytes);
+size_t retrograde_pool_bytes(void); /* held now */
+void retrograde_pool_release(void); /* gives all of them back to the system */
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif
