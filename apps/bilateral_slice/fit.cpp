@@ -1,0 +1,128 @@
+// fit.cpp -- see fit.h.
+//
+// The two languages alternate in blocks of a few steps, so that whatever else the machine does
+// meets both alike. While one works, the other sleeps: the peer waits for its next request, and our
+// threads wait for the next loop.
+#include "fit.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <numeric>
+
+#include "diagnostics/error.h"
+#include "peer.h"
+#include "render.h"
+#include "trainer.h"
+
+namespace bilateral_slice {
+
+namespace {
+
+constexpr int block_steps = 5;
+constexpr float first_rate = 0.03f, last_rate = 0.003f;
+
+using Clock = std::chrono::steady_clock;
+
+double seconds_since(Clock::time_point start) {
+  return std::chrono::duration<double>(Clock::now() - start).count();
+}
+
+float rate_of(int step, int steps) {
+  return first_rate * std::pow(last_rate / first_rate, static_cast<float>(step) / steps);
+}
+
+std::vector<float> rates_of(int first, int count, int steps) {
+  std::vector<float> rates;
+  for (int s = first; s < first + count; ++s) rates.push_back(rate_of(s, steps));
+  return rates;
+}
+
+// The peer, until its time is over or it fails; its failure does not end our run.
+class PeerRun {
+ public:
+  PeerRun(const Shape& shape, const std::vector<float>& photo, const std::vector<float>& target,
+          const FitOptions& options, Fit& fit)
+      : options_(options), fit_(fit) {
+    if (options.peer_seconds <= 0) return;
+    guarded([&] {
+      const auto program = Peer::find();
+      if (program.empty()) {
+        fit_.why_no_peer =
+            "cannot measure Halide 14: its peer program is installed with this one; "
+            "no bilateral_slice_halide_peer was found. Build with libhalide14-0-dev.";
+        return;
+      }
+      peer_.emplace(program, shape, photo, target, options.threads);
+      fit_.peer.compile_seconds = peer_->compile_seconds();
+    });
+  }
+
+  void run_block(int first, int count) {
+    if (!peer_ || fit_.peer.total_seconds() > options_.peer_seconds) return;
+    guarded([&] {
+      for (const PeerStep& step : peer_->run(rates_of(first, count, options_.steps))) {
+        fit_.peer.add(step.loss, step.seconds);
+      }
+    });
+  }
+
+ private:
+  template <typename Body>
+  void guarded(Body&& body) {
+    try {
+      body();
+    } catch (const retrograde::Error& error) {
+      fit_.why_no_peer = error.what();
+      fit_.peer = Series();
+      peer_.reset();
+    }
+  }
+
+  const FitOptions& options_;
+  Fit& fit_;
+  std::optional<Peer> peer_;
+};
+
+}  // namespace
+
+void Series::add(double step_loss, double step_seconds) {
+  loss.push_back(step_loss);
+  seconds.push_back(step_seconds);
+}
+
+double Series::total_seconds() const {
+  return std::accumulate(seconds.begin(), seconds.end(), 0.0);
+}
+
+double Series::median_ms() const {
+  std::vector<double> sorted = seconds;
+  const auto middle = sorted.begin() + static_cast<long>(sorted.size() / 2);
+  std::nth_element(sorted.begin(), middle, sorted.end());
+  return 1e3 * *middle;
+}
+
+Fit fit(const Shape& shape, std::vector<float>& photo, std::vector<float>& target,
+        const FitOptions& options, const std::function<void(int, double)>& progress) {
+  Fit fit;
+  const auto start = Clock::now();
+  Trainer trainer(shape, photo.data(), target.data(), options.threads);
+  fit.ours.compile_seconds = seconds_since(start);
+  PeerRun peer(shape, photo, target, options, fit);
+
+  for (int first = 0; first < options.steps; first += block_steps) {
+    const int count = std::min(block_steps, options.steps - first);
+    for (int step = first; step < first + count; ++step) {
+      const auto before = Clock::now();
+      const double loss = trainer.step(rate_of(step, options.steps));
+      fit.ours.add(loss, seconds_since(before));
+      progress(step + 1, loss);
+    }
+    peer.run_block(first, count);
+  }
+  fit.result.resize(3 * shape.pixels());
+  render(shape, photo.data(), trainer.grid(), trainer.mix(), trainer.curve(), fit.result.data());
+  return fit;
+}
+
+}  // namespace bilateral_slice

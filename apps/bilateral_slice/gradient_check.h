@@ -1,0 +1,17 @@
+// gradient_check.h -- the model's adjoints against central differences, both in double.
+#pragma once
+
+#include "shape.h"
+
+namespace bilateral_slice {
+
+struct GradientCheck {
+  double max_relative_error = 0;
+  int compared = 0;  // derivatives: along random directions, and of single parameters
+};
+
+// On a crop from the middle of the pair (layout as for Trainer), with a grid of 8 x 8 x 8 and
+// parameters away from the identity. An error is relative to the larger of the two values.
+GradientCheck check_gradient(const Shape& shape, const float* photo, const float* target);
+
+}  // namespace bilateral_slice

@@ -1,0 +1,57 @@
+// model.h -- the look: a bilateral grid of affine colour transforms, sliced along a learned guide.
+//
+//   light(x, y)      = mix . (r, g, b, 1)                                    learned mix
+//   guide(x, y)      = sum over k of curve(k) * max(light(x, y) - k / knots, 0)    learned curve
+//   depth(x, y)      = clamp(guide, 0, 1) * (grid_z - 1)
+//   row_grid(i, o, gz, gx, y): the grid at the height of pixel row y (linear between grid rows)
+//   transform(i, x, o, k, y): row_grid at pixel x (linear) and gz = floor(depth) + k
+//   plane(x, y, o, k)  = sum over i of transform(i, x, o, k, y) * (r, g, b, 1)(i)
+//   result(x, y, o)  = plane 0 and 1, linear in depth's fraction
+//   loss             = mean squared difference of result and target
+//
+// That is trilinear interpolation of the grid, done one axis at a time: the step along y is shared
+// by a whole pixel row, so that a pixel reads four transforms and not eight. Pixel coordinates
+// enter the grid's indices as x / cell_width and y / cell_height only, so the grid's gradient is a
+// gather over (gx, gy); gz depends on data.
+#pragma once
+
+#include "language.h"
+#include "shape.h"
+
+namespace bilateral_slice {
+
+struct Model {
+  // `scalar` is the type of everything: float to learn, double to check gradients.
+  Model(const Shape& shape, lang::Type scalar);
+
+  Shape shape;
+  lang::Type scalar;
+
+  // Inputs. Homogeneous photo: plane 3 holds ones.
+  lang::ImageParam photo;   // [4, height, width], width innermost
+  lang::ImageParam target;  // [3, height, width]
+  lang::ImageParam grid;    // [grid_y, grid_x, grid_z, 3 (o), 4 (i)], i innermost
+  lang::ImageParam mix;     // [4]
+  lang::ImageParam curve;   // [knots]
+
+  lang::Var x{"x"}, y{"y"}, i{"i"}, o{"o"}, k{"k"}, gx{"gx"}, gy{"gy"}, gz{"gz"};
+
+  // The parameters as Funcs: what gradients are asked for.
+  lang::Func affine{"affine"}, mixture{"mixture"}, slopes{"slopes"};
+
+  lang::Func row_mixture{"row_mixture"}, row_slopes{"row_slopes"};
+  lang::Func light{"light"}, guide{"guide"}, depth{"depth"}, layer{"layer"};
+  lang::Func row_grid{"row_grid"}, transform{"transform"}, plane{"plane"}, result{"result"};
+  lang::Func row_loss{"row_loss"}, loss{"loss"};
+
+ private:
+  lang::Expr number(double value) const;
+  lang::Expr as_scalar(lang::Expr e) const;
+
+  void define_parameters();
+  void define_guide(const lang::Func& pixels);
+  void define_slice(const lang::Func& pixels);
+  void define_loss(const lang::Func& wanted);
+};
+
+}  // namespace bilateral_slice

@@ -1,0 +1,28 @@
+// peer_protocol.h -- what the program and the Halide peer say to each other through pipes.
+//
+//   program -> peer   PeerJob, then the photo's and the target's planes (layout as for Trainer)
+//   peer -> program   PeerReady, when its pipeline is compiled
+//   program -> peer   int32 n, then n floats: the rates of the next n steps       any number of
+//   times peer -> program   n PeerSteps
+//
+// The peer ends when its standard input does.
+#pragma once
+
+#include <cstdint>
+
+namespace bilateral_slice {
+
+struct PeerJob {
+  int32_t width, height, threads;
+};
+
+struct PeerReady {
+  double compile_seconds;
+};
+
+struct PeerStep {
+  double loss;  // before the step
+  double seconds;
+};
+
+}  // namespace bilateral_slice

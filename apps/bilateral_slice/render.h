@@ -1,0 +1,13 @@
+// render.h -- the photo through a learned look.
+#pragma once
+
+#include "language.h"
+#include "shape.h"
+
+namespace bilateral_slice {
+
+// photo: [4, height, width] -> result: [3, height, width].
+void render(const Shape& shape, float* photo, const lang::Buffer<float>& grid,
+            const lang::Buffer<float>& mix, const lang::Buffer<float>& curve, float* result);
+
+}  // namespace bilateral_slice

@@ -1,0 +1,104 @@
+// report.cpp -- see report.h.
+#include "report.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <nlohmann/json.hpp>
+
+#include "common/files.h"
+#include "common/process.h"
+#include "diagnostics/error.h"
+
+namespace bilateral_slice {
+
+using nlohmann::json;
+using retrograde::quoted;
+using retrograde::text;
+
+namespace {
+
+constexpr const char* script_name = "plot_error_against_time.py";
+
+// Error against time: the loss before step n, at the time that the n steps before it took.
+json curve_of(const Series& series) {
+  json seconds = json::array(), psnr = json::array();
+  double elapsed = 0;
+  for (size_t n = 0; n < series.loss.size(); ++n) {
+    seconds.push_back(elapsed);
+    psnr.push_back(psnr_db(series.loss[n]));
+    elapsed += series.seconds[n];
+  }
+  return {{"seconds", seconds}, {"psnr_db", psnr}, {"compile_seconds", series.compile_seconds}};
+}
+
+json or_null(bool known, double value) { return known ? json(value) : json(nullptr); }
+
+std::filesystem::path find_script() {
+  const auto here = apps::program_folder();
+  for (const auto& place :
+       {here / ".." / "share" / "retrograde" / script_name, here / script_name}) {
+    if (std::filesystem::exists(place)) return place;
+  }
+  return script_name;
+}
+
+// Debian's Python has Debian's matplotlib; another one that comes first on the path may not.
+std::string find_python() {
+  if (const char* chosen = std::getenv("RETROGRADE_PYTHON")) return chosen;
+  return std::filesystem::exists("/usr/bin/python3") ? "/usr/bin/python3" : "python3";
+}
+
+std::string last_line(std::string output) {
+  while (!output.empty() && output.back() == '\n') output.pop_back();
+  const size_t start = output.rfind('\n');
+  return start == std::string::npos ? output : output.substr(start + 1);
+}
+
+}  // namespace
+
+double psnr_db(double mean_squared_error) {
+  return -10 * std::log10(std::max(mean_squared_error, 1e-20));
+}
+
+void write_report(const std::filesystem::path& path, const Report& report, const Fit& fit) {
+  const bool has_peer = !fit.peer.seconds.empty();
+  const double ours = fit.ours.median_ms(), peer = has_peer ? fit.peer.median_ms() : 0;
+  json out = {
+      {"width", report.shape.width},
+      {"height", report.shape.height},
+      {"grid", {report.shape.grid_x, report.shape.grid_y, report.shape.grid_z, 12}},
+      {"threads", report.threads},
+      {"steps", fit.ours.seconds.size()},
+      {"seconds", report.seconds},
+      {"ms_per_step", ours},
+      {"psnr_initial_db", report.psnr_initial_db},
+      {"psnr_final_db", report.psnr_final_db},
+      {"gradient_check_max_relative_error", report.gradient_check.max_relative_error},
+      {"gradient_check_derivatives", report.gradient_check.compared},
+      {"halide_steps", fit.peer.seconds.size()},
+      {"halide_ms_per_step", or_null(has_peer, peer)},
+      {"ratio_to_halide", or_null(has_peer, peer / ours)},
+      {"halide_missing_because", fit.why_no_peer},
+      {"peak_memory_mb", report.peak_memory_mb},
+      {"retrograde", curve_of(fit.ours)},
+      {"halide", curve_of(fit.peer)},
+  };
+  apps::write_file(path, out.dump(1) + "\n");
+}
+
+void draw_plot(const std::filesystem::path& report, const std::filesystem::path& plot) {
+  const std::string script = find_script().string();
+  const apps::Outcome outcome =
+      apps::run_program({find_python(), script, report.string(), plot.string()});
+  if (outcome.started && outcome.status == 0) return;
+  retrograde::call_error(
+      text("draw ", quoted(plot.string())), "the plot is drawn by Python with matplotlib",
+      outcome.started ? text(script_name, " ended with status ", outcome.status, ", saying \"",
+                             last_line(outcome.output), "\"")
+                      : text(find_python(), " did not start"),
+      "Install python3-matplotlib, or set RETROGRADE_PYTHON to a Python that has it; all other "
+      "results are written");
+}
+
+}  // namespace bilateral_slice

@@ -1,0 +1,31 @@
+// report.h -- report.json, and the plot that is drawn from it.
+#pragma once
+
+#include <filesystem>
+
+#include "fit.h"
+#include "gradient_check.h"
+
+namespace bilateral_slice {
+
+// Peak signal-to-noise ratio of samples whose peak is 1, in dB; 200 for samples that agree.
+double psnr_db(double mean_squared_error);
+
+struct Report {
+  Shape shape;
+  int threads = 0;
+  double seconds = 0;  // the whole run, from the images read to the result rendered
+  double psnr_initial_db = 0;
+  double psnr_final_db = 0;
+  GradientCheck gradient_check;
+  double peak_memory_mb = 0;
+};
+
+// What was not measured is null. Throws retrograde::UserError; see apps::write_file.
+void write_report(const std::filesystem::path& path, const Report& report, const Fit& fit);
+
+// Draws error against run time. Throws retrograde::UserError when Python, matplotlib or the disk
+// does not play along.
+void draw_plot(const std::filesystem::path& report, const std::filesystem::path& plot);
+
+}  // namespace bilateral_slice

@@ -1,0 +1,52 @@
+// schedule_halide.cpp -- Halide 14's own schedule for its own gradients: Li2018.
+#include <string>
+
+#include "training_pipeline.h"
+
+namespace bilateral_slice {
+
+namespace {
+
+using Bounds = Halide::Region;
+
+void estimate(Learned& learned, const Bounds& bounds) {
+  for (Halide::ImageParam* input : {&learned.value, &learned.moment, &learned.square}) {
+    input->set_estimates(bounds);
+  }
+  learned.next.set_estimates(bounds);
+}
+
+void estimate_sizes(TrainingPipeline& training) {
+  const Shape& shape = training.model.shape;
+  training.model.photo.set_estimates({{0, shape.width}, {0, shape.height}, {0, 4}});
+  training.model.target.set_estimates({{0, shape.width}, {0, shape.height}, {0, 3}});
+  estimate(training.grid,
+           {{0, 4}, {0, 3}, {0, shape.grid_z}, {0, shape.grid_x}, {0, shape.grid_y}});
+  estimate(training.mix, {{0, 4}});
+  estimate(training.curve, {{0, shape.knots}});
+  training.rate.set_estimate(0.01f);
+  training.m_scale.set_estimate(1.0f);
+  training.v_scale.set_estimate(1.0f);
+}
+
+// The autoscheduler's view of this machine; the cache size and the cost of a load relative to an
+// operation are Halide's own generic ones.
+Halide::MachineParams machine(int threads) {
+  Halide::MachineParams params = Halide::MachineParams::generic();
+  params.parallelism = threads;
+  return params;
+}
+
+}  // namespace
+
+void schedule(TrainingPipeline& training, int threads) {
+  estimate_sizes(training);
+  Halide::load_plugin(BILATERAL_SLICE_LI2018);
+  // Halide 14 takes AMD's Zen 4 for a Sapphire Rapids, some of whose instructions it has not.
+  const Halide::Target target =
+      Halide::get_host_target().without_feature(Halide::Target::AVX512_SapphireRapids);
+  training.pipeline.auto_schedule("Li2018", target, machine(threads));
+  training.pipeline.compile_jit(target);
+}
+
+}  // namespace bilateral_slice

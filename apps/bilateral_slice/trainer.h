@@ -1,0 +1,42 @@
+// trainer.h -- fits the look to a pair of images, step by step.
+#pragma once
+
+#include <array>
+
+#include "training_pipeline.h"
+
+namespace bilateral_slice {
+
+class Trainer {
+ public:
+  // photo: [4, height, width], target: [3, height, width]; both must outlive the trainer. The first
+  // look is the identity, with the mean of the colours as guide.
+  Trainer(const Shape& shape, float* photo, float* target, int threads);
+
+  // One step of Adam at this rate. Returns the loss before it.
+  double step(float rate);
+
+  using Buffer = lang::Buffer<float>;
+  const Buffer& grid() const { return grid_[now_].value; }
+  const Buffer& mix() const { return mix_[now_].value; }
+  const Buffer& curve() const { return curve_[now_].value; }
+
+ private:
+  struct Moments {
+    Buffer value, moment, square;
+  };
+  // A step reads one copy and writes the other.
+  using State = std::array<Moments, 2>;
+
+  static State zeros(const std::vector<int>& sizes);
+  void start_from_identity();
+  void bind(Learned& learned, const State& state);
+
+  TrainingPipeline training_;
+  Buffer photo_, target_, loss_;
+  State grid_, mix_, curve_;
+  int now_ = 0;
+  int steps_ = 0;
+};
+
+}  // namespace bilateral_slice

@@ -1,0 +1,50 @@
+// training_pipeline.cpp -- see training_pipeline.h. Compiled once with each language.
+#include "training_pipeline.h"
+
+#include <string>
+#include <utility>
+
+namespace bilateral_slice {
+
+using lang::Expr;
+
+namespace {
+// Kingma and Ba's constants; `tiny` is smaller than theirs because the loss is a mean over millions
+// of samples, and so are its gradients.
+constexpr float b1 = 0.9f, b2 = 0.999f, tiny = 1e-11f;
+// The guide bends every pixel's depth at once: it learns more slowly than a grid node.
+constexpr float guide_rate = 0.1f;
+}  // namespace
+
+Learned::Learned(const lang::ImageParam& value, const lang::Func& gradient,
+                 std::vector<lang::Var> at, float rate)
+    : value(value),
+      moment(value.type(), value.dimensions(), value.name() + "_moment"),
+      square(value.type(), value.dimensions(), value.name() + "_square"),
+      gradient(gradient),
+      at(std::move(at)),
+      rate(rate),
+      next(value.name() + "_next") {}
+
+TrainingPipeline::TrainingPipeline(const Shape& shape)
+    : model(shape, lang::Float(32)),
+      adjoints(lang::propagate_adjoints(model.loss)),
+      grid(model.grid, adjoints(model.affine), {model.i, model.o, model.gz, model.gx, model.gy}, 1),
+      mix(model.mix, adjoints(model.mixture), {model.i}, guide_rate),
+      curve(model.curve, adjoints(model.slopes), {model.k}, guide_rate) {
+  define_next(grid);
+  define_next(mix);
+  define_next(curve);
+  pipeline = lang::Pipeline({model.loss, grid.next, mix.next, curve.next});
+}
+
+void TrainingPipeline::define_next(Learned& learned) {
+  const auto& at = learned.at;
+  const Expr g = learned.gradient(at);
+  const Expr m = b1 * learned.moment(at) + (1 - b1) * g;
+  const Expr v = b2 * learned.square(at) + (1 - b2) * g * g;
+  const Expr move = m * m_scale / (lang::sqrt(v * v_scale) + tiny);
+  learned.next(at) = lang::Tuple(learned.value(at) - learned.rate * rate * move, m, v);
+}
+
+}  // namespace bilateral_slice

@@ -1,0 +1,48 @@
+// training_pipeline.h -- one step of Adam as a pipeline: loss, gradients, and the next parameters.
+//
+//   m'  = b1 m + (1 - b1) g          g: the gradient of the loss by propagate_adjoints
+//   v'  = b2 v + (1 - b2) g^2
+//   p'  = p - rate m' m_scale / (sqrt(v' v_scale) + tiny)
+//
+// after Kingma and Ba, "Adam: a method for stochastic optimization" (2015), algorithm 1; m_scale
+// and v_scale are the bias corrections 1 / (1 - b^t), which the caller knows.
+#pragma once
+
+#include <vector>
+
+#include "model.h"
+
+namespace bilateral_slice {
+
+// A parameter array with its two moments, read by a step, and the Func that computes all three
+// anew.
+struct Learned {
+  // `rate` is relative to the step's rate.
+  Learned(const lang::ImageParam& value, const lang::Func& gradient, std::vector<lang::Var> at,
+          float rate);
+
+  lang::ImageParam value, moment, square;
+  lang::Func gradient;
+  std::vector<lang::Var> at;
+  float rate;
+  lang::Func next;  // Tuple of value, moment, square
+};
+
+struct TrainingPipeline {
+  explicit TrainingPipeline(const Shape& shape);
+
+  Model model;
+  lang::Derivative adjoints;
+  lang::Param<float> rate{"rate"}, m_scale{"m_scale"}, v_scale{"v_scale"};
+  Learned grid, mix, curve;
+  lang::Pipeline pipeline;  // outputs: loss, grid.next, mix.next, curve.next
+
+ private:
+  void define_next(Learned& learned);
+};
+
+// Schedules and compiles it for `threads` threads. One file a language: schedule_retrograde.cpp by
+// hand, schedule_halide.cpp by Halide's Li2018 autoscheduler.
+void schedule(TrainingPipeline& training, int threads);
+
+}  // namespace bilateral_slice
