@@ -1,5 +1,6 @@
-// What a Func is made of: plain data that the front end fills in, and that analysis, autodiff, lowering and the
-// interpreter read. The classes users meet (Func, Stage, RDom, Param, ImageParam) are handles onto these.
+// What a Func is made of: plain data that the front end fills in, and that analysis, autodiff,
+// lowering and the interpreter read. The classes users meet (Func, Stage, RDom, Param, ImageParam)
+// are handles onto these.
 #pragma once
 
 #include <functional>
@@ -17,13 +18,14 @@ namespace retrograde {
 
 // How a split treats an extent that its factor does not divide.
 enum class TailStrategy : uint8_t {
-  RoundUp,          // runs past the end: extents grow to a multiple (storage too)
-  GuardWithIf,      // an if (a predicate when vectorized) around the body
-  Predicate,        // as GuardWithIf, by predicated loads and stores
+  RoundUp,      // runs past the end: extents grow to a multiple (storage too)
+  GuardWithIf,  // an if (a predicate when vectorized) around the body
+  Predicate,    // as GuardWithIf, by predicated loads and stores
   PredicateLoads,
   PredicateStores,
-  ShiftInwards,     // the last block moves inwards and recomputes (pure definitions only)
-  Auto,             // ShiftInwards for pure definitions, GuardWithIf for updates; RoundUp inside storage we size ourselves
+  ShiftInwards,  // the last block moves inwards and recomputes (pure definitions only)
+  Auto,  // ShiftInwards for pure definitions, GuardWithIf for updates; RoundUp inside storage we
+         // size ourselves
 };
 
 namespace ir {
@@ -44,6 +46,9 @@ struct Split {
   enum class Kind : uint8_t { Split, Fuse, Rename };
   Kind kind = Kind::Split;
   // Split:  old -> outer * factor + inner.   Fuse: (outer, inner) -> old.   Rename: old -> outer.
+  // `outer` or `inner` may be old_var's own name (vectorize(x, 8) splits x into x and a fresh
+  // inner): from this split on the name means the new loop, so a list of splits is read in order,
+  // and what an earlier entry says about the name is to be resolved with the later entries only.
   std::string old_var, outer, inner;
   Expr factor;  // Split only
   TailStrategy tail = TailStrategy::Auto;
@@ -53,7 +58,8 @@ struct Split {
 struct Dim {
   std::string var;
   ForType for_type = ForType::Serial;
-  bool is_reduction = false;  // derives from a reduction variable: order matters unless proven otherwise
+  bool is_reduction =
+      false;  // derives from a reduction variable: order matters unless proven otherwise
 };
 
 struct StageSchedule {
@@ -89,18 +95,20 @@ struct SourceLocation {
   int line = 0;
 };
 
-// One definition: for all points of the pure args (and the reduction variables), args <- values, where predicate.
+// One definition: for all points of the pure args (and the reduction variables), args <- values,
+// where predicate.
 struct Definition {
-  std::vector<Expr> args;    // pure definition: exactly the Func's args as Variables
-  std::vector<Expr> values;  // one per Tuple element; all loads of one point happen before its stores
-  Expr predicate;            // undefined: always
+  std::vector<Expr> args;  // pure definition: exactly the Func's args as Variables
+  std::vector<Expr>
+      values;      // one per Tuple element; all loads of one point happen before its stores
+  Expr predicate;  // undefined: always
   std::vector<ReductionVariable> rvars;
   StageSchedule schedule;
 };
 
 // Parameter of the compiled function: scalar (Param), image (ImageParam), or an embedded Buffer.
 struct BufferConstraint {
-  Expr min, extent, stride;                  // undefined: unconstrained
+  Expr min, extent, stride;  // undefined: unconstrained
   Expr min_estimate, extent_estimate;
 };
 struct ParameterContents : Symbol {
@@ -108,26 +116,30 @@ struct ParameterContents : Symbol {
   Type type;
   bool is_buffer = false;
   // scalar
-  std::optional<Scalar> value;       // current value
+  std::optional<Scalar> value;  // current value
   Expr min_value, max_value, estimate;
   // buffer
   int dimensions = 0;
   std::vector<BufferConstraint> constraints;
-  std::shared_ptr<void> buffer_owner;       // keeps `buffer` alive
-  halide_buffer_t* buffer = nullptr;        // currently bound; null when unset
-  bool is_literal = false;                  // a Buffer named in the program, not an ImageParam
+  std::shared_ptr<void> buffer_owner;  // keeps `buffer` alive
+  halide_buffer_t* buffer = nullptr;   // currently bound; null when unset
+  bool is_literal = false;             // a Buffer named in the program, not an ImageParam
+  uint64_t version = 0;  // grows when anything but the value or the bound buffer changes
 };
 
 // The contents of a Func. Symbol behind each Call to it.
 struct FuncContents : Symbol, std::enable_shared_from_this<FuncContents> {
-  std::string name;                 // unique in the process
-  std::vector<std::string> args;    // pure variables, dimension 0 first
-  std::vector<Type> types;          // of the values
-  std::optional<Definition> pure;   // empty until defined
+  std::string name;                // unique in the process
+  std::vector<std::string> args;   // pure variables, dimension 0 first
+  std::vector<Type> types;         // of the values
+  std::optional<Definition> pure;  // empty until defined
   std::vector<Definition> updates;
   FuncSchedule schedule;
-  std::vector<std::shared_ptr<ParameterContents>> outputs;  // constraints on the buffers when it is an output
-  bool frozen = false;              // used by another Func or realized: no more updates
+  std::vector<std::shared_ptr<ParameterContents>>
+      outputs;          // constraints on the buffers when it is an output
+  bool frozen = false;  // used by another Func: no more updates
+  uint64_t version =
+      0;  // grows with every definition and directive: compiled code of an older one is stale
   bool debug_trace = false;
   // Type the user asked for in the declaration (Func f(type, dims)), empty when none
   std::vector<Type> required_types;
@@ -145,8 +157,9 @@ using FuncPtr = std::shared_ptr<FuncContents>;
 // The Func behind a Call (CallType::Func); throws InternalError when it is gone.
 FuncPtr func_of(const Call& call);
 
-// Every Func that the outputs depend on (themselves too), producers before consumers; an order that depends only on
-// the program. UserError on recursion among Funcs and on undefined Funcs, naming the path.
+// Every Func that the outputs depend on (themselves too), producers before consumers; an order that
+// depends only on the program. UserError on recursion among Funcs and on undefined Funcs, naming
+// the path.
 std::vector<FuncPtr> topological_order(const std::vector<FuncPtr>& outputs);
 // Funcs called directly by any stage of f (f itself excluded), in first-use order.
 std::vector<FuncPtr> direct_callees(const FuncContents& f);

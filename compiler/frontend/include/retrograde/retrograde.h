@@ -2,3 +2,13 @@
 #pragma once
 
 #include "diagnostics/error.h"
+#include "frontend/buffer.h"
+#include "frontend/expr_ops.h"
+#include "frontend/func.h"
+#include "frontend/image_param.h"
+#include "frontend/param.h"
+#include "frontend/pipeline.h"
+#include "frontend/rdom.h"
+#include "frontend/var.h"
+#include "ir/print.h"
+#include "ir/target.h"

@@ -1,0 +1,55 @@
+// compiler_interface.h -- what the front end asks of the compiler above it.
+//
+// Layers point down, but f.realize() needs the whole compiler: so the front end names the interface
+// here and compiler/jit implements it, in default_compiler().
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "frontend/function.h"
+#include "ir/lowered_function.h"
+#include "ir/target.h"
+
+namespace retrograde {
+
+struct PipelineSpec {
+  std::string name;
+  std::vector<ir::FuncPtr> outputs;
+};
+
+// One call. Handlers may be called from several threads at once.
+struct CallContext {
+  std::function<void(const char*)> print;  // text of print() and print_when(); empty: thrown away
+  int thread_limit = 0;                    // 0: as many as there are
+  std::string error;                       // out: the message of the error code that run() returned
+};
+
+class CompiledPipeline {
+ public:
+  virtual ~CompiledPipeline() = default;
+  // Parameters in the order of parameters_of(outputs), then the output buffers, one for each value
+  // of each output.
+  virtual const std::vector<ir::LoweredArgument>& arguments() const = 0;
+  // argv[i] is the halide_buffer_t* of a buffer, or points to the value of a scalar. When an input
+  // buffer has neither host nor device memory the call writes the shapes that it needs into such
+  // buffers and computes nothing. Returns 0 or an error code, with the message in context.error.
+  // Never throws. Thread-safe.
+  virtual int run(void* const* argv, CallContext& context) const = 0;
+};
+
+class Compiler {
+ public:
+  virtual ~Compiler() = default;
+  // UserError for programs and schedules that cannot be compiled.
+  virtual std::shared_ptr<CompiledPipeline> compile(const PipelineSpec& pipeline,
+                                                    const Target& target) = 0;
+  // The loops of the schedule, as text.
+  virtual std::string loop_nest(const PipelineSpec& pipeline, const Target& target) = 0;
+};
+
+Compiler& default_compiler();  // defined by compiler/jit
+
+}  // namespace retrograde

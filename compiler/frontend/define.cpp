@@ -1,0 +1,403 @@
+// define.cpp -- the rules for definitions.
+//
+// Checks of every definition, in this order: number of arguments, defined expressions, types, free
+// variables; for pure definitions that the arguments are distinct Vars; for updates that all
+// reduction variables are of one domain, that the Func is not frozen, and that a pure variable
+// keeps its place in every reference of the Func to itself.
+#include "frontend/define.h"
+
+#include <algorithm>
+#include <unordered_map>
+#include <unordered_set>
+
+#include "frontend/rdom.h"
+#include "frontend/var.h"
+#include "ir/print.h"
+#include "ir/visit.h"
+
+namespace retrograde::ir {
+
+namespace {
+
+std::string list(const std::vector<Expr>& exprs) {
+  std::string out = "(";
+  for (size_t i = 0; i < exprs.size(); i++) out += text(i ? ", " : "", exprs[i]);
+  return out + ")";
+}
+
+// What is being defined, for messages: "define "f"(x, r.x)".
+struct Site {
+  const FuncContents& f;
+  std::string asked;
+};
+
+Site site_of(const FuncContents& f, const std::vector<Expr>& args, bool is_update) {
+  for (const Expr& arg : args) {
+    if (arg.defined()) continue;
+    user_error("define " + quoted(f.name),
+               "every argument on the left-hand side must be a defined expression",
+               "one of them was never assigned");
+  }
+  return {f, text(is_update ? "update " : "define ", quoted(f.name), list(args))};
+}
+
+void check_values(const Site& site, const std::vector<Expr>& values) {
+  if (values.empty())
+    user_error(site.asked, "a definition has at least one value", "the Tuple is empty");
+  for (size_t i = 0; i < values.size(); i++) {
+    if (!values[i].defined()) {
+      user_error(site.asked, "the right-hand side must be a defined expression",
+                 values.size() == 1 ? "it was never assigned"
+                                    : text("element ", i, " of the Tuple was never assigned"),
+                 "Assign every Expr before it is used");
+    }
+    if (values[i].type().is_handle()) {
+      user_error(site.asked, "values are numbers", text(values[i], " is a handle"), "");
+    }
+  }
+}
+
+void check_types(const Site& site, const std::vector<Expr>& values, const std::vector<Type>& types,
+                 const char* whose) {
+  if (values.size() != types.size()) {
+    user_error(site.asked, "all definitions of a Func have as many values",
+               text(whose, " has ", types.size(), " and this one has ", values.size()), "");
+  }
+  for (size_t i = 0; i < types.size(); i++) {
+    if (values[i].type() == types[i]) continue;
+    user_error(site.asked, "all definitions of a Func have the same types",
+               text(whose, values.size() > 1 ? text(" for element ", i) : std::string(), " gives ",
+                    to_string(types[i]), " and this one ", to_string(values[i].type())),
+               text("Convert the right-hand side: cast(", to_string(types[i]), ", ...)"));
+  }
+}
+
+// Everything in the definition that is a name: each variable once, lets inside excluded.
+struct Names {
+  std::vector<const Variable*> free;
+  std::vector<const Call*> self_calls;
+  std::vector<FuncPtr> callees;
+};
+
+Names names_in(const FuncContents& f, const std::vector<Expr>& roots) {
+  Names names;
+  std::unordered_set<const ExprNode*> seen;
+  std::unordered_set<std::string> bound;
+  std::unordered_set<const Symbol*> called;
+  for (const Expr& root : roots) {
+    if (!root.defined()) continue;
+    walk(root, [&](const Expr& e) {
+      if (!seen.insert(e.get()).second) return false;
+      if (const Variable* v = e.as<Variable>()) names.free.push_back(v);
+      if (const Let* let = e.as<Let>()) bound.insert(let->name);
+      const Call* call = e.as<Call>();
+      if (call && call->call_type == CallType::Func) {
+        if (call->symbol.raw() == &f) {
+          names.self_calls.push_back(call);
+        } else if (called.insert(call->symbol.raw()).second) {
+          names.callees.push_back(func_of(*call));
+        }
+      }
+      return true;
+    });
+  }
+  std::erase_if(names.free, [&](const Variable* v) { return bound.count(v->name) != 0; });
+  return names;
+}
+
+// Plain Vars only: a parameter or reduction variable carries a symbol.
+const Variable* as_plain_var(const Expr& e) {
+  const Variable* v = e.as<Variable>();
+  return v && !v->symbol.defined() && v->type == Int(32) ? v : nullptr;
+}
+
+// The reduction domain of a definition, null when it has none.
+std::shared_ptr<ReductionDomainContents> domain_in(const Site& site, const Names& names) {
+  std::shared_ptr<ReductionDomainContents> result;
+  for (const Variable* v : names.free) {
+    auto domain = domain_of(*v);
+    if (!domain) continue;
+    if (result && domain != result) {
+      user_error(
+          site.asked, "all reduction variables of one definition come from one RDom",
+          text(quoted(v->name), " and ", quoted(result->vars[0].var), " are of different RDoms"),
+          "Make one RDom with all of the variables");
+    }
+    result = domain;
+  }
+  return result;
+}
+
+void check_free_variables(const Site& site, const Names& names,
+                          const std::vector<std::string>& args) {
+  for (const Variable* v : names.free) {
+    const bool is_arg = std::find(args.begin(), args.end(), v->name) != args.end();
+    if (v->symbol.defined()) {
+      if (is_arg && !domain_of(*v)) {
+        user_error(site.asked,
+                   "a parameter and a pure variable of one definition have different names",
+                   "both are called " + quoted(v->name), "Rename the Var or the Param");
+      }
+      continue;
+    }
+    if (is_arg) continue;
+    if (Var::is_implicit(v->name) || Var::is_placeholder(v->name)) {
+      user_error(site.asked, "a right-hand side that uses _ needs _ on the left-hand side",
+                 text("it uses ", quoted(v->name)),
+                 text("Write ", quoted(site.f.name), "(..., _) = ..."));
+    }
+    user_error(
+        site.asked,
+        "every variable on the right-hand side stands on the left-hand side, or is of an RDom",
+        text(quoted(v->name), " does not"), "Add it as an argument, or reduce over an RDom");
+  }
+}
+
+void freeze(const Names& names) {
+  for (const FuncPtr& callee : names.callees) callee->frozen = true;
+}
+
+// A random number depends on the Func, the stage and the point where it is evaluated.
+Expr bind_random(const Expr& e, const std::vector<Expr>& point) {
+  return rewrite(e, [&](const Expr& part, const std::function<Expr(const Expr&)>& recurse) {
+    const Call* call = part.as<Call>();
+    if (!call || !call->is_op(Op::random) || call->args.size() != 1)
+      return map_children(part, recurse);
+    std::vector<Expr> words{recurse(call->args[0])};
+    words.insert(words.end(), point.begin(), point.end());
+    return call_op(Op::random, call->type, std::move(words));
+  });
+}
+
+bool has_random(const std::vector<Expr>& values) {
+  bool found = false;
+  for (const Expr& value : values) {
+    walk(value, [&](const Expr& e) {
+      const Call* call = e.as<Call>();
+      found = found || (call && call->is_op(Op::random));
+      return !found;
+    });
+  }
+  return found;
+}
+
+// FNV-1a: equal programs draw equal numbers, whatever was compiled before.
+int32_t tag_of(const FuncContents& f, int stage) {
+  uint32_t hash = 2166136261u;
+  for (unsigned char c : f.name) hash = (hash ^ c) * 16777619u;
+  return static_cast<int32_t>(hash + static_cast<uint32_t>(stage));
+}
+
+std::vector<Expr> bind_all_random(const FuncContents& f, int stage,
+                                  const std::vector<std::string>& variables,
+                                  std::vector<Expr> values) {
+  if (!has_random(values)) return values;
+  std::vector<Expr> point{Expr(tag_of(f, stage))};
+  for (const std::string& name : variables) point.push_back(variable(name));
+  for (Expr& value : values) value = bind_random(value, point);
+  return values;
+}
+
+std::vector<std::string> pure_names(const Site& site, const std::vector<Expr>& args) {
+  std::vector<std::string> names;
+  for (const Expr& arg : args) {
+    const Variable* v = as_plain_var(arg);
+    if (!v) {
+      user_error(site.asked, "the arguments of a first definition are Vars",
+                 text(arg, " is not a Var"),
+                 "Define all points first, as in f(x) = 0, then update some of them");
+    }
+    if (std::find(names.begin(), names.end(), v->name) != names.end()) {
+      user_error(site.asked, "the arguments of a first definition are different Vars",
+                 quoted(v->name) + " stands there twice", "");
+    }
+    names.push_back(v->name);
+  }
+  return names;
+}
+
+void check_declared(const Site& site, size_t dimensions, const std::vector<Expr>& values) {
+  const FuncContents& f = site.f;
+  if (f.required_dimensions >= 0 && static_cast<int>(dimensions) != f.required_dimensions) {
+    user_error(site.asked, "a definition has the dimensions that the Func was declared with",
+               text("it was declared with ", f.required_dimensions, " and is given ", dimensions),
+               "");
+  }
+  if (!f.required_types.empty()) check_types(site, values, f.required_types, "the declaration");
+}
+
+void make_outputs(FuncContents& f) {
+  for (size_t i = 0; i < f.types.size(); i++) {
+    auto output = std::make_shared<ParameterContents>();
+    output->name = f.types.size() == 1 ? f.name : f.name + "." + std::to_string(i);
+    output->type = f.types[i];
+    output->is_buffer = true;
+    output->dimensions = f.dimensions();
+    output->constraints.resize(f.args.size());
+    f.outputs.push_back(std::move(output));
+  }
+}
+
+std::vector<Expr> with(std::vector<Expr> all, const std::vector<Expr>& more) {
+  all.insert(all.end(), more.begin(), more.end());
+  return all;
+}
+
+void check_update_arity(const Site& site, const std::vector<Expr>& args) {
+  if (args.size() == site.f.args.size()) return;
+  user_error(site.asked, "all definitions of a Func have as many arguments",
+             text("its first definition has ", site.f.args.size(), " and this one ", args.size()),
+             "");
+}
+
+// Coordinates of the left-hand side as int32.
+std::vector<Expr> update_coordinates(const Site& site, const std::vector<Expr>& args) {
+  std::vector<Expr> result;
+  for (const Expr& arg : args) {
+    if (!arg.type().is_int_or_uint() || !arg.type().is_scalar()) {
+      user_error(site.asked, "coordinates are integers",
+                 text(arg, " has type ", to_string(arg.type())), "Convert it: cast<int>(...)");
+    }
+    result.push_back(cast_to(Int(32), arg));
+  }
+  return result;
+}
+
+// Dimensions in which the left-hand side is the pure variable itself: those are done independently
+// of each other.
+std::vector<std::string> pure_positions(const FuncContents& f, const std::vector<Expr>& args) {
+  std::vector<std::string> result(args.size());
+  for (size_t i = 0; i < args.size(); i++) {
+    const Variable* v = as_plain_var(args[i]);
+    if (v && v->name == f.args[i]) result[i] = v->name;
+  }
+  return result;
+}
+
+void check_self_calls(const Site& site, const Names& names, const std::vector<std::string>& pure) {
+  for (const Call* call : names.self_calls) {
+    for (size_t i = 0; i < pure.size(); i++) {
+      if (pure[i].empty()) continue;
+      const Variable* v = call->args[i].as<Variable>();
+      if (v && v->name == pure[i]) continue;
+      user_error(site.asked,
+                 "a pure variable stands at its own place in every reference of a Func to itself, "
+                 "so that its "
+                 "iterations are independent",
+                 text("the right-hand side reads ", quoted(site.f.name), list(call->args),
+                      ", where argument ", i, " is not ", quoted(pure[i])),
+                 "Use an RDom for the dimension that the recurrence runs along");
+    }
+  }
+}
+
+Definition make_update(const FuncPtr& f, std::vector<Expr> args, std::vector<Expr> values,
+                       const std::shared_ptr<ReductionDomainContents>& domain) {
+  Definition update;
+  update.args = std::move(args);
+  update.values = std::move(values);
+  if (domain) {
+    domain->frozen = true;
+    update.rvars = domain->vars;
+    if (domain->predicate.defined())
+      update.predicate = rebind_symbol(domain->predicate, SymbolRef(domain));
+  }
+  return map_exprs(update, [&](const Expr& e) { return redirect_calls(e, f, f, true); });
+}
+
+// Loops innermost first: the reduction variables, then the pure variables.
+void add_loops(Definition& definition, const std::vector<std::string>& pure) {
+  for (const ReductionVariable& rvar : definition.rvars) {
+    definition.schedule.dims.push_back({rvar.var, ForType::Serial, true});
+  }
+  for (const std::string& name : pure) {
+    if (!name.empty()) definition.schedule.dims.push_back({name, ForType::Serial, false});
+  }
+}
+
+}  // namespace
+
+std::string stage_name(const FuncContents& f, int stage) {
+  return stage == 0 ? f.name : text(f.name, ".update(", stage - 1, ")");
+}
+
+Expr redirect_calls(const Expr& e, const FuncPtr& from, const FuncPtr& to, bool weak) {
+  return rewrite(e, [&](const Expr& part, const std::function<Expr(const Expr&)>& recurse) {
+    const Call* call = part.as<Call>();
+    if (!call || call->call_type != CallType::Func || call->symbol.raw() != from.get()) {
+      return map_children(part, recurse);
+    }
+    std::vector<Expr> args;
+    for (const Expr& arg : call->args) args.push_back(recurse(arg));
+    SymbolRef symbol = weak ? SymbolRef::weak(to) : SymbolRef(to);
+    return call_func(to->name, call->type, std::move(args), call->value_index, std::move(symbol));
+  });
+}
+
+void define_pure(const FuncPtr& f, const std::vector<Expr>& args, const std::vector<Expr>& values) {
+  const Site site = site_of(*f, args, false);
+  if (f->is_defined())
+    user_error(site.asked, "a Func is defined once", "it has a definition already", "Update it");
+  check_values(site, values);
+  const std::vector<std::string> variables = pure_names(site, args);
+  check_declared(site, args.size(), values);
+  const Names names = names_in(*f, values);
+  if (auto domain = domain_in(site, names)) {
+    user_error(site.asked, "a first definition has no reduction variables",
+               text("it uses ", quoted(domain->vars[0].var)),
+               "Reduce in an update, f(x) += ..., or inside the expression with sum(...)");
+  }
+  check_free_variables(site, names, variables);
+
+  freeze(names);
+  f->args = variables;
+  for (const Expr& value : values) f->types.push_back(value.type());
+  Definition pure;
+  for (const std::string& name : variables) pure.args.push_back(variable(name));
+  pure.values = bind_all_random(*f, 0, variables, values);
+  add_loops(pure, variables);
+  f->pure = std::move(pure);
+  f->schedule.storage_dims = variables;
+  make_outputs(*f);
+  f->version++;
+}
+
+void define_update(const FuncPtr& f, const std::vector<Expr>& raw_args,
+                   const std::vector<Expr>& values) {
+  const Site site = site_of(*f, raw_args, true);
+  if (!f->is_defined())
+    user_error(site.asked, "a Func is updated after its first definition", "it has none", "");
+  if (f->frozen) {
+    user_error(site.asked, "a Func is complete when another Func uses it",
+               "another Func uses it already",
+               "Move the update before that use, or put it into a new Func");
+  }
+  check_update_arity(site, raw_args);
+  check_values(site, values);
+  check_types(site, values, f->types, "the first definition");
+  const std::vector<Expr> args = update_coordinates(site, raw_args);
+  std::vector<Expr> exprs = with(args, values);
+  const auto domain = domain_in(site, names_in(*f, exprs));
+  if (domain && domain->predicate.defined()) exprs.push_back(domain->predicate);
+  const Names names = names_in(*f, exprs);
+  domain_in(site, names);  // the predicate may bring in another one
+  const std::vector<std::string> pure = pure_positions(*f, args);
+  check_free_variables(site, names, pure);
+  check_self_calls(site, names, pure);
+
+  freeze(names);
+  std::vector<std::string> variables;
+  for (const std::string& name : pure) {
+    if (!name.empty()) variables.push_back(name);
+  }
+  if (domain) {
+    for (const ReductionVariable& rvar : domain->vars) variables.push_back(rvar.var);
+  }
+  const int stage = f->stage_count();
+  Definition update = make_update(f, args, bind_all_random(*f, stage, variables, values), domain);
+  add_loops(update, pure);
+  f->updates.push_back(std::move(update));
+  f->version++;
+}
+
+}  // namespace retrograde::ir

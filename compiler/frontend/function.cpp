@@ -1,0 +1,238 @@
+// function.cpp -- walks over the graph of Funcs.
+#include "frontend/function.h"
+
+#include <unordered_map>
+#include <unordered_set>
+
+#include "diagnostics/error.h"
+#include "ir/print.h"
+#include "ir/visit.h"
+
+namespace retrograde::ir {
+
+namespace {
+
+// All nodes of a definition, each once.
+void walk_definition(const Definition& definition, FunctionRef<void(const Expr&)> visit) {
+  std::unordered_set<const ExprNode*> seen;
+  for_each_expr(definition, [&](const Expr& root) {
+    walk(root, [&](const Expr& e) {
+      if (!seen.insert(e.get()).second) return false;
+      visit(e);
+      return true;
+    });
+  });
+}
+
+void add_callees(const Definition& definition, const FuncContents* self,
+                 std::vector<FuncPtr>& callees, std::unordered_set<const Symbol*>& seen) {
+  walk_definition(definition, [&](const Expr& e) {
+    const Call* call = e.as<Call>();
+    if (!call || call->call_type != CallType::Func || call->symbol.raw() == self) return;
+    if (seen.insert(call->symbol.raw()).second) callees.push_back(func_of(*call));
+  });
+}
+
+// Depth-first search without recursion: chains of thousands of Funcs are legal.
+class Sorter {
+ public:
+  std::vector<FuncPtr> sort(const std::vector<FuncPtr>& outputs) {
+    for (const FuncPtr& output : outputs) {
+      if (enter(output)) run();
+    }
+    return std::move(order_);
+  }
+
+ private:
+  enum class State { Open, Done };
+  struct Frame {
+    FuncPtr func;
+    std::vector<FuncPtr> callees;
+    size_t next = 0;
+  };
+  std::unordered_map<const FuncContents*, State> state_;
+  std::vector<Frame> stack_;
+  std::vector<FuncPtr> order_;
+
+  bool enter(const FuncPtr& f) {
+    auto [it, is_new] = state_.try_emplace(f.get(), State::Open);
+    if (!is_new) {
+      if (it->second == State::Open) report_recursion(f);
+      return false;
+    }
+    if (!f->is_defined()) report_undefined(f);
+    stack_.push_back({f, direct_callees(*f)});
+    return true;
+  }
+
+  void run() {
+    while (!stack_.empty()) {
+      Frame& frame = stack_.back();
+      if (frame.next < frame.callees.size()) {
+        const FuncPtr callee = frame.callees[frame.next++];
+        enter(callee);
+      } else {
+        state_[frame.func.get()] = State::Done;
+        order_.push_back(frame.func);
+        stack_.pop_back();
+      }
+    }
+  }
+
+  std::string path_to(const FuncPtr& f, bool from_f) const {
+    std::string path;
+    bool on = !from_f;
+    for (const Frame& frame : stack_) {
+      on = on || frame.func == f;
+      if (on) path += quoted(frame.func->name) + " -> ";
+    }
+    return path + quoted(f->name);
+  }
+
+  [[noreturn]] void report_recursion(const FuncPtr& f) const {
+    user_error("order the Funcs that " + quoted(stack_.front().func->name) + " depends on",
+               "Funcs may not depend on each other in a circle", "the calls go " + path_to(f, true),
+               "A Func may read itself in an update definition over an RDom");
+  }
+
+  [[noreturn]] void report_undefined(const FuncPtr& f) const {
+    user_error("compile a pipeline with the Func " + quoted(f->name),
+               "every Func that is used needs a definition",
+               stack_.empty() ? "it is an output" : "it is reached by " + path_to(f, false),
+               "Define it before it is used: f(x, y) = ...");
+  }
+};
+
+}  // namespace
+
+FuncPtr func_of(const Call& call) {
+  FuncPtr f = std::dynamic_pointer_cast<FuncContents>(call.symbol.lock());
+  RETROGRADE_ASSERT(f != nullptr, "the Func behind the call of ", quoted(call.name), " is gone");
+  return f;
+}
+
+std::vector<FuncPtr> topological_order(const std::vector<FuncPtr>& outputs) {
+  return Sorter().sort(outputs);
+}
+
+std::vector<FuncPtr> direct_callees(const FuncContents& f) {
+  std::vector<FuncPtr> callees;
+  std::unordered_set<const Symbol*> seen;
+  for (int i = 0; i < f.stage_count(); i++) add_callees(f.stage(i), &f, callees, seen);
+  return callees;
+}
+
+void for_each_expr(const Definition& definition, const std::function<void(const Expr&)>& visit) {
+  const auto visit_defined = [&](const Expr& e) {
+    if (e.defined()) visit(e);
+  };
+  for (const Expr& arg : definition.args) visit_defined(arg);
+  for (const Expr& value : definition.values) visit_defined(value);
+  visit_defined(definition.predicate);
+  for (const ReductionVariable& rvar : definition.rvars) {
+    visit_defined(rvar.min);
+    visit_defined(rvar.extent);
+  }
+}
+
+Definition map_exprs(const Definition& definition, const std::function<Expr(const Expr&)>& map) {
+  Definition result = definition;
+  const auto map_defined = [&](Expr& e) {
+    if (e.defined()) e = map(e);
+  };
+  for (Expr& arg : result.args) map_defined(arg);
+  for (Expr& value : result.values) map_defined(value);
+  map_defined(result.predicate);
+  for (ReductionVariable& rvar : result.rvars) {
+    map_defined(rvar.min);
+    map_defined(rvar.extent);
+  }
+  return result;
+}
+
+namespace {
+
+using ParameterPtr = std::shared_ptr<ParameterContents>;
+
+class ParameterCollector {
+ public:
+  void add_expr(const Expr& root) {
+    if (!root.defined()) return;
+    walk(root, [&](const Expr& e) {
+      if (!seen_exprs_.insert(e.get()).second) return false;
+      if (const Variable* v = e.as<Variable>()) add_symbol(v->symbol);
+      if (const Call* call = e.as<Call>(); call && call->call_type == CallType::Image)
+        add_symbol(call->symbol);
+      return true;
+    });
+  }
+
+  // Schedules and promises about sizes may mention parameters too.
+  void add_schedule(const FuncContents& f) {
+    for (const Bound& bound : f.schedule.bounds) {
+      add_expr(bound.min);
+      add_expr(bound.extent);
+    }
+    for (int i = 0; i < f.stage_count(); i++) {
+      for (const Split& split : f.stage(i).schedule.splits) add_expr(split.factor);
+    }
+    for (const ParameterPtr& output : f.outputs) add_constraints(*output);
+  }
+
+  std::vector<ParameterPtr> take() { return std::move(found_); }
+  void exclude(const ParameterPtr& parameter) { excluded_.insert(parameter.get()); }
+
+ private:
+  std::vector<ParameterPtr> found_;
+  std::unordered_set<const Symbol*> seen_, excluded_;
+  std::unordered_set<const ExprNode*> seen_exprs_;
+
+  void add_symbol(const SymbolRef& symbol) {
+    if (!symbol.defined() || excluded_.count(symbol.raw())) return;
+    ParameterPtr parameter = std::dynamic_pointer_cast<ParameterContents>(symbol.lock());
+    if (!parameter || !seen_.insert(parameter.get()).second) return;
+    found_.push_back(parameter);
+    add_constraints(*parameter);
+  }
+
+  void add_constraints(const ParameterContents& parameter) {
+    for (const BufferConstraint& constraint : parameter.constraints) {
+      add_expr(constraint.min);
+      add_expr(constraint.extent);
+      add_expr(constraint.stride);
+    }
+    add_expr(parameter.min_value);
+    add_expr(parameter.max_value);
+  }
+};
+
+void check_names(const std::vector<ParameterPtr>& parameters) {
+  std::unordered_map<std::string, const ParameterContents*> by_name;
+  for (const ParameterPtr& parameter : parameters) {
+    if (by_name.emplace(parameter->name, parameter.get()).second) continue;
+    user_error("compile a pipeline with the parameter " + quoted(parameter->name),
+               "parameters of one pipeline have different names",
+               "two of them are called " + quoted(parameter->name), "Rename one of them");
+  }
+}
+
+}  // namespace
+
+std::vector<ParameterPtr> parameters_of(const std::vector<FuncPtr>& outputs) {
+  ParameterCollector collector;
+  // What is said about an output's own buffer names that output, not an input.
+  for (const FuncPtr& output : outputs) {
+    for (const ParameterPtr& parameter : output->outputs) collector.exclude(parameter);
+  }
+  for (const FuncPtr& f : topological_order(outputs)) {
+    for (int i = 0; i < f->stage_count(); i++) {
+      for_each_expr(f->stage(i), [&](const Expr& e) { collector.add_expr(e); });
+    }
+    collector.add_schedule(*f);
+  }
+  std::vector<ParameterPtr> parameters = collector.take();
+  check_names(parameters);
+  return parameters;
+}
+
+}  // namespace retrograde::ir

@@ -1,0 +1,100 @@
+// image_param.h -- buffers that a compiled pipeline takes as arguments, and what is known about
+// their shape.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "frontend/buffer.h"
+#include "frontend/rdom.h"
+
+namespace retrograde {
+
+class Func;
+
+// Facts of one dimension as Exprs, and promises about it: set_min(0), set_stride(3). A call with a
+// buffer that breaks a promise fails.
+class Dimension {
+ public:
+  Dimension(std::shared_ptr<ir::ParameterContents> parameter, int d);
+  Expr min() const;
+  Expr extent() const;
+  Expr max() const { return min() + extent() - 1; }
+  Expr stride() const;
+  Dimension& set_min(Expr min);
+  Dimension& set_extent(Expr extent);
+  Dimension& set_stride(Expr stride);
+  Dimension& set_bounds(Expr min, Expr extent);
+  Dimension& set_estimate(Expr min, Expr extent);
+  Dimension& set_bounds_estimate(Expr min, Expr extent) {
+    return set_estimate(std::move(min), std::move(extent));
+  }
+  Expr min_estimate() const { return constraint().min_estimate; }
+  Expr extent_estimate() const { return constraint().extent_estimate; }
+  Dimension dim(int d) const { return Dimension(parameter_, d); }
+
+ private:
+  ir::BufferConstraint& constraint() const { return parameter_->constraints[d_]; }
+  Expr fact(const char* which) const;
+  void set(Expr ir::BufferConstraint::*field, Expr value, const char* which);
+  std::shared_ptr<ir::ParameterContents> parameter_;
+  int d_;
+};
+
+// What inputs and outputs have in common. For outputs: Func::output_buffer().
+class OutputImageParam {
+ public:
+  OutputImageParam() = default;
+  explicit OutputImageParam(std::shared_ptr<ir::ParameterContents> parameter)
+      : parameter_(std::move(parameter)) {}
+  bool defined() const { return parameter_ != nullptr; }
+  const std::string& name() const { return checked().name; }
+  Type type() const { return checked().type; }
+  int dimensions() const { return checked().dimensions; }
+  Dimension dim(int i) const;
+  Expr left() const { return dim(0).min(); }
+  Expr right() const { return dim(0).max(); }
+  Expr top() const { return dim(1).min(); }
+  Expr bottom() const { return dim(1).max(); }
+  Expr width() const { return dim(0).extent(); }
+  Expr height() const { return dim(1).extent(); }
+  Expr channels() const { return dim(2).extent(); }
+  OutputImageParam& set_estimates(const Region& estimates);
+  const std::shared_ptr<ir::ParameterContents>& parameter() const { return parameter_; }
+
+ protected:
+  ir::ParameterContents& checked() const;
+  std::shared_ptr<ir::ParameterContents> parameter_;
+};
+
+class ImageParam : public OutputImageParam {
+ public:
+  ImageParam() = default;
+  ImageParam(Type type, int dimensions);
+  ImageParam(Type type, int dimensions, const std::string& name);
+
+  explicit ImageParam(std::shared_ptr<ir::ParameterContents> parameter)
+      : OutputImageParam(std::move(parameter)) {}
+
+  // The buffer of the next calls. CompileError when type or dimensions differ.
+  void set(const Buffer<>& buffer);
+  Buffer<> get() const;
+  void reset();
+
+  template <typename... Args>
+  requires((std::is_convertible_v<Args, Expr> && ...)) Expr operator()(Args&&... args) const {
+    return access({Expr(std::forward<Args>(args))...});
+  }
+  Expr operator()(const std::vector<Expr>& args) const { return access(args); }
+  Expr operator()(const std::vector<Var>& args) const {
+    return access(std::vector<Expr>(args.begin(), args.end()));
+  }
+  // A Func that reads this image point by point.
+  operator Func() const;
+
+ private:
+  Expr access(const std::vector<Expr>& args) const;
+};
+
+}  // namespace retrograde

@@ -1,0 +1,101 @@
+// pipeline.h -- one or more output Funcs, compiled and run together.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "frontend/compiler_interface.h"
+#include "frontend/realization.h"
+
+namespace retrograde {
+
+class Func;
+
+struct Argument {
+  enum Kind { InputScalar, InputBuffer, OutputBuffer };
+  std::string name;
+  Kind kind = InputScalar;
+  Type type;
+  int dimensions = 0;
+  bool is_buffer() const { return kind != InputScalar; }
+  bool is_scalar() const { return kind == InputScalar; }
+  bool is_input() const { return kind != OutputBuffer; }
+  bool is_output() const { return kind == OutputBuffer; }
+};
+
+// What compiled code may call back.
+struct JITHandlers {
+  std::function<void(const char*)> print;  // text of print(); default: the standard error stream
+  int thread_limit = 0;                    // threads of parallel loops; 0: as many as there are
+};
+
+class Pipeline {
+ public:
+  // Buffers to compute into: one, several in braces, a Realization, or one of the runtime.
+  class RealizationArg {
+   public:
+    RealizationArg(Realization& realization);
+    RealizationArg(Realization&& realization) : RealizationArg(realization) {}
+    RealizationArg(halide_buffer_t* buffer) : raw_{buffer} {}
+    RealizationArg(std::vector<Buffer<>> buffers);
+    template <typename T, int Dims, int Storage>
+    RealizationArg(Runtime::Buffer<T, Dims, Storage>& buffer) : raw_{buffer.raw_buffer()} {
+      static_assert(!std::is_const_v<T>, "an output cannot be a Buffer of const elements");
+    }
+    template <typename T, int Dims>
+    RealizationArg(const Buffer<T, Dims>& buffer) : RealizationArg(std::vector<Buffer<>>{buffer}) {
+      static_assert(!std::is_const_v<T>, "an output cannot be a Buffer of const elements");
+    }
+    template <typename T, int Dims, typename... Rest>
+    requires(sizeof...(Rest) >= 1 && (std::is_convertible_v<Rest, Buffer<>> && ...))
+        RealizationArg(const Buffer<T, Dims>& first, Rest&&... rest)
+        : RealizationArg(std::vector<Buffer<>>{first, Buffer<>(std::forward<Rest>(rest))...}) {}
+    const std::vector<halide_buffer_t*>& buffers() const { return raw_; }
+
+   private:
+    std::vector<Buffer<>> owners_;
+    std::vector<halide_buffer_t*> raw_;
+  };
+
+  Pipeline() = default;
+  Pipeline(const Func& output);
+  Pipeline(const std::vector<Func>& outputs);
+
+  bool defined() const { return contents_ != nullptr; }
+  std::vector<Func> outputs() const;
+  Func get_func(size_t index) const;  // of all Funcs, producers first
+
+  // Computes all outputs over [0, size) in each dimension, into new buffers.
+  Realization realize(const std::vector<int32_t>& sizes = {}, const Target& target = Target());
+  // Computes all outputs over the given buffers. RuntimeError when a buffer or parameter does not
+  // fit.
+  void realize(RealizationArg outputs, const Target& target = Target());
+  // Gives every ImageParam without a buffer one of exactly the region that the outputs need.
+  void infer_input_bounds(const std::vector<int32_t>& sizes, const Target& target = Target());
+  void infer_input_bounds(RealizationArg outputs, const Target& target = Target());
+  // Compiles now what realize would compile on its first call.
+  void compile_jit(const Target& target = Target());
+  void invalidate_cache();
+  std::string loop_nest(const Target& target = Target()) const;
+  void print_loop_nest() const;  // to the standard error stream
+  std::vector<Argument> infer_arguments() const;
+  JITHandlers& jit_handlers();
+
+  PipelineSpec spec() const;
+
+ private:
+  struct Contents;
+  Contents& checked() const;
+  std::shared_ptr<CompiledPipeline> compiled(const Target& target) const;
+  std::vector<Buffer<>> make_outputs(const std::vector<int32_t>& sizes, bool with_memory) const;
+  std::vector<halide_buffer_t*> checked_outputs(const RealizationArg& outputs,
+                                                bool with_memory) const;
+  void run(const std::vector<halide_buffer_t*>& outputs, const Target& target) const;
+  void infer(const std::vector<halide_buffer_t*>& outputs, const Target& target) const;
+
+  std::shared_ptr<Contents> contents_;
+};
+
+}  // namespace retrograde

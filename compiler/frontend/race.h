@@ -1,0 +1,20 @@
+// race.h -- which loops over reduction variables may run in another order, or at the same time.
+#pragma once
+
+#include <string>
+
+#include "frontend/function.h"
+
+namespace retrograde::ir {
+
+// Whether iterations of `rvar` touch different elements: some coordinate of the left-hand side is a
+// * rvar + b with a constant a != 0 and b free of other reduction variables, and every read of the
+// Func by itself has that very coordinate. Then they may run at the same time. False means unknown.
+bool can_prove_race_free(const FuncContents& f, const Definition& update, const std::string& rvar);
+
+// Whether all points of the update commute: each value is `f(same point) op e`, with one
+// associative and commutative op and e free of f. Floats count: their sums change by rounding only.
+// False means unknown.
+bool can_prove_commutative(const FuncContents& f, const Definition& update);
+
+}  // namespace retrograde::ir

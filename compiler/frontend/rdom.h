@@ -1,0 +1,95 @@
+// rdom.h -- reduction domains: the loops that belong to an update definition.
+//
+// RDom r(0, width, 0, height); r.where(r.x < r.y); f(x) += g(x + r.x, r.y);
+// The first variable runs innermost. Points that fail a predicate are left out.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <type_traits>
+#include <vector>
+
+#include "frontend/function.h"
+#include "frontend/var.h"
+
+namespace retrograde {
+
+using Region = std::vector<Range>;
+
+class OutputImageParam;
+template <typename T, int Dims>
+class Buffer;
+
+// One variable of a reduction domain. One made by name alone stands for a loop in a schedule, as in
+// f.update().split(r.x, outer, inner, 8).
+class RVar {
+ public:
+  RVar();  // a fresh name
+  explicit RVar(const std::string& name);
+  explicit RVar(const char* name) : RVar(std::string(name)) {}
+  RVar(std::shared_ptr<ir::ReductionDomainContents> domain, int index);
+
+  const std::string& name() const { return name_; }
+  Expr min() const;
+  Expr extent() const;
+  operator Expr() const;
+  const std::shared_ptr<ir::ReductionDomainContents>& domain() const { return domain_; }
+
+ private:
+  const ir::ReductionVariable& variable(const char* asked) const;
+  std::string name_;
+  std::shared_ptr<ir::ReductionDomainContents> domain_;
+  int index_ = -1;
+};
+
+class RDom {
+ public:
+  RDom() = default;
+  RDom(const Region& region, const std::string& name = "");
+  // (min, extent) of each variable, and optionally a name: RDom r(0, 3, 0, 3, "r").
+  template <typename... Args>
+  RDom(Expr min, Expr extent, Args&&... rest) {
+    Region region{{std::move(min), std::move(extent)}};
+    collect(region, std::forward<Args>(rest)...);
+  }
+  template <typename T, int Dims>
+  RDom(const Buffer<T, Dims>& buffer);  // all of its elements
+  RDom(const OutputImageParam& image);
+  explicit RDom(std::shared_ptr<ir::ReductionDomainContents> domain);
+
+  bool defined() const { return domain_ != nullptr; }
+  bool same_as(const RDom& other) const { return domain_ == other.domain_; }
+  int dimensions() const;
+  RVar operator[](int i) const;
+  operator RVar() const;  // of a domain of one variable
+  operator Expr() const;
+  // Keeps only the points where the predicate holds. Before the domain's first use in a definition.
+  void where(Expr predicate);
+  const std::shared_ptr<ir::ReductionDomainContents>& domain() const { return domain_; }
+
+  RVar x, y, z, w;  // the first four variables
+
+ private:
+  void initialize(const Region& region, const std::string& name);
+  void name_variables();
+  const RVar only_variable() const;
+  void collect(const Region& region) { initialize(region, ""); }
+  void collect(const Region& region, const std::string& name) { initialize(region, name); }
+  template <typename... Args>
+  void collect(Region& region, const Expr& min, const Expr& extent, Args&&... rest) {
+    region.push_back({min, extent});
+    collect(region, std::forward<Args>(rest)...);
+  }
+  std::shared_ptr<ir::ReductionDomainContents> domain_;
+};
+
+std::ostream& operator<<(std::ostream& out, const RVar& var);
+std::ostream& operator<<(std::ostream& out, const RDom& domain);
+
+namespace ir {
+// The reduction domain that a variable belongs to; null for any other variable.
+std::shared_ptr<ReductionDomainContents> domain_of(const Variable& variable);
+// `e` with every mention of `symbol`'s entity made through this very reference (weak or strong).
+Expr rebind_symbol(const Expr& e, const SymbolRef& symbol);
+}  // namespace ir
+}  // namespace retrograde

@@ -1,0 +1,361 @@
+// stage.cpp -- scheduling directives. Each lists its legality conditions as numbered checks, then
+// writes the schedule.
+#include "frontend/stage.h"
+
+#include <algorithm>
+#include <unordered_set>
+
+#include "frontend/define.h"
+#include "frontend/race.h"
+#include "ir/print.h"
+
+namespace retrograde {
+
+namespace {
+
+std::string loops_of(const ir::StageSchedule& schedule) {
+  std::string out;
+  for (auto dim = schedule.dims.rbegin(); dim != schedule.dims.rend(); ++dim) {
+    out += (out.empty() ? "" : ", ") + quoted(dim->var);
+  }
+  return out.empty() ? "it has no loops" : "its loops are, outermost first, " + out;
+}
+
+// What became of a variable that is no loop any more; empty when it never was one.
+std::string fate_of(const ir::StageSchedule& schedule, const std::string& var) {
+  for (const ir::Split& split : schedule.splits) {
+    switch (split.kind) {
+      case ir::Split::Kind::Split:
+        if (split.old_var != var) continue;
+        return text(quoted(var), " was split into ", quoted(split.outer), " and ",
+                    quoted(split.inner));
+      case ir::Split::Kind::Fuse:
+        if (split.outer != var && split.inner != var) continue;
+        return text(quoted(var), " was fused into ", quoted(split.old_var));
+      case ir::Split::Kind::Rename:
+        if (split.old_var != var) continue;
+        return text(quoted(var), " was renamed to ", quoted(split.outer));
+    }
+  }
+  return "";
+}
+
+// The reduction variables that a loop was made of.
+std::unordered_set<std::string> reduction_roots(const ir::Definition& definition,
+                                                const std::string& loop) {
+  std::unordered_set<std::string> names{loop};
+  const auto& splits = definition.schedule.splits;
+  for (auto split = splits.rbegin(); split != splits.rend(); ++split) {
+    if (split->kind == ir::Split::Kind::Fuse) {
+      if (names.erase(split->old_var)) names.insert({split->outer, split->inner});
+    } else if (names.erase(split->outer) + names.erase(split->inner) > 0) {
+      names.insert(split->old_var);
+    }
+  }
+  std::unordered_set<std::string> roots;
+  for (const ir::ReductionVariable& rvar : definition.rvars) {
+    if (names.count(rvar.var)) roots.insert(rvar.var);
+  }
+  return roots;
+}
+
+void check_factor(const Expr& factor, const std::string& asked) {
+  if (!factor.defined()) user_error(asked, "the factor must be a defined expression");
+  if (!factor.type().is_int_or_uint() || !factor.type().is_scalar()) {
+    user_error(asked, "a factor is an integer",
+               text(factor, " has type ", to_string(factor.type())));
+  }
+  auto constant = ir::as_const_int(factor);
+  if (constant && *constant <= 0) {
+    user_error(asked, "a factor is at least 1", text("it is ", *constant),
+               "Give a positive factor");
+  }
+  if (constant && *constant > INT32_MAX) {
+    user_error(asked, "a factor fits an int32", text("it is ", *constant), "Give a smaller factor");
+  }
+}
+
+void check_tail(TailStrategy tail, bool is_update, bool is_reduction, const std::string& asked) {
+  if (is_reduction && (tail == TailStrategy::RoundUp || tail == TailStrategy::ShiftInwards)) {
+    user_error(asked, "a loop over a reduction variable runs exactly over its domain",
+               "this tail strategy would run points twice or beyond it",
+               "Use TailStrategy::GuardWithIf or TailStrategy::Auto");
+  }
+  if (is_update && tail == TailStrategy::ShiftInwards) {
+    user_error(asked, "an update definition does not run a point twice",
+               "TailStrategy::ShiftInwards would, at the end of the range",
+               "Use TailStrategy::GuardWithIf or TailStrategy::RoundUp");
+  }
+}
+
+std::string names_of(const std::vector<VarOrRVar>& vars) {
+  std::string out;
+  for (const VarOrRVar& var : vars) out += (out.empty() ? "" : ", ") + quoted(var.name());
+  return out;
+}
+
+}  // namespace
+
+std::string Stage::name() const { return ir::stage_name(*func_, index_); }
+
+const ir::StageSchedule& Stage::get_schedule() const { return definition().schedule; }
+
+std::string Stage::dump_argument_list() const {
+  std::string out;
+  for (const ir::Dim& dim : get_schedule().dims) out += (out.empty() ? "" : ", ") + dim.var;
+  return out;
+}
+
+ir::StageSchedule& Stage::touch() const {
+  func_->version++;
+  definition().schedule.touched = true;
+  return definition().schedule;
+}
+
+size_t Stage::loop_index(const VarOrRVar& var, const std::string& asked) const {
+  const ir::StageSchedule& schedule = get_schedule();
+  for (size_t i = 0; i < schedule.dims.size(); i++) {
+    if (schedule.dims[i].var == var.name()) return i;
+  }
+  const std::string fate = fate_of(schedule, var.name());
+  user_error(asked, text(quoted(var.name()), " must be a loop of this stage"),
+             fate.empty() ? loops_of(schedule) : fate + "; " + loops_of(schedule),
+             "Name one of its loops");
+}
+
+void Stage::check_new_name(const VarOrRVar& var, const std::string& replaced,
+                           const std::string& asked) const {
+  const std::string& name = var.name();
+  if (name == replaced) return;
+  const ir::StageSchedule& schedule = get_schedule();
+  const bool is_loop = std::any_of(schedule.dims.begin(), schedule.dims.end(),
+                                   [&](const ir::Dim& dim) { return dim.var == name; });
+  const std::string fate = fate_of(schedule, name);
+  if (!is_loop && fate.empty()) return;
+  user_error(asked, "a new loop needs a name that this stage has not used yet",
+             is_loop ? text(quoted(name), " is a loop already; ", loops_of(schedule)) : fate,
+             "Use a new Var");
+}
+
+void Stage::check_race_free(const VarOrRVar& var, const std::string& asked) const {
+  const ir::Definition& stage = definition();
+  for (const std::string& root : reduction_roots(stage, var.name())) {
+    if (ir::can_prove_race_free(*func_, stage, root)) continue;
+    std::string pure;
+    for (const ir::Dim& dim : stage.schedule.dims) {
+      if (!dim.is_reduction) pure += (pure.empty() ? "" : " or ") + quoted(dim.var);
+    }
+    user_error(
+        asked, "iterations that run at the same time must not touch the same element",
+        text(quoted(root),
+             " is a reduction variable, and its iterations may read or write one element of ",
+             quoted(func_->name)),
+        pure.empty() ? "Keep the loop serial, or reduce into more elements first"
+                     : "Use " + pure + " instead: its iterations are independent");
+  }
+}
+
+Stage& Stage::split(const VarOrRVar& old, const VarOrRVar& outer, const VarOrRVar& inner,
+                    const Expr& factor, TailStrategy tail) {
+  const std::string asked = text("split ", quoted(old.name()), " of ", quoted(name()), " into ",
+                                 quoted(outer.name()), " and ", quoted(inner.name()));
+  // 1. The loop exists. 2. The new names differ and are new. 3. The factor is positive. 4. The tail
+  // fits the stage.
+  const size_t at = loop_index(old, asked);
+  if (outer.name() == inner.name()) {
+    user_error(asked, "the two new loops have different names", "both are " + quoted(outer.name()),
+               "Use another Var");
+  }
+  check_new_name(outer, old.name(), asked);
+  check_new_name(inner, old.name(), asked);
+  check_factor(factor, asked);
+  const bool is_reduction = get_schedule().dims[at].is_reduction;
+  check_tail(tail, index_ > 0, is_reduction, asked);
+
+  ir::StageSchedule& schedule = touch();
+  ir::Split split;
+  split.kind = ir::Split::Kind::Split;
+  split.old_var = old.name();
+  split.outer = outer.name();
+  split.inner = inner.name();
+  split.factor = ir::cast_to(Int(32), factor);
+  split.tail = tail;
+  split.exact = is_reduction;
+  schedule.splits.push_back(std::move(split));
+  ir::Dim outer_dim = schedule.dims[at], inner_dim = outer_dim;
+  outer_dim.var = outer.name();
+  inner_dim.var = inner.name();
+  schedule.dims[at] = std::move(inner_dim);
+  schedule.dims.insert(schedule.dims.begin() + at + 1, std::move(outer_dim));
+  return *this;
+}
+
+Stage& Stage::fuse(const VarOrRVar& inner, const VarOrRVar& outer, const VarOrRVar& fused) {
+  const std::string asked =
+      text("fuse ", quoted(inner.name()), " and ", quoted(outer.name()), " of ", quoted(name()));
+  // 1. Both loops exist and differ. 2. The fused name is new. 3. They are neighbours. 4. Both of
+  // one kind.
+  const size_t inner_at = loop_index(inner, asked), outer_at = loop_index(outer, asked);
+  if (inner_at == outer_at)
+    user_error(asked, "it takes two loops", "both are " + quoted(inner.name()));
+  if (fused.name() != outer.name()) check_new_name(fused, inner.name(), asked);
+  if (outer_at != inner_at + 1) {
+    user_error(asked, "the outer loop must be directly around the inner one",
+               loops_of(get_schedule()), "Reorder the loops first");
+  }
+  ir::StageSchedule& schedule = touch();
+  const ir::Dim inner_dim = schedule.dims[inner_at], outer_dim = schedule.dims[outer_at];
+  ir::Split split;
+  split.kind = ir::Split::Kind::Fuse;
+  split.old_var = fused.name();
+  split.outer = outer.name();
+  split.inner = inner.name();
+  split.exact = inner_dim.is_reduction || outer_dim.is_reduction;
+  schedule.dims[inner_at] = {fused.name(), outer_dim.for_type, split.exact};
+  schedule.dims.erase(schedule.dims.begin() + outer_at);
+  schedule.splits.push_back(std::move(split));
+  return *this;
+}
+
+Stage& Stage::rename(const VarOrRVar& old_name, const VarOrRVar& new_name) {
+  const std::string asked = text("rename ", quoted(old_name.name()), " of ", quoted(name()), " to ",
+                                 quoted(new_name.name()));
+  const size_t at = loop_index(old_name, asked);
+  check_new_name(new_name, old_name.name(), asked);
+  if (old_name.name() == new_name.name()) return *this;
+  ir::StageSchedule& schedule = touch();
+  ir::Split split;
+  split.kind = ir::Split::Kind::Rename;
+  split.old_var = old_name.name();
+  split.outer = new_name.name();
+  split.exact = schedule.dims[at].is_reduction;
+  schedule.splits.push_back(std::move(split));
+  schedule.dims[at].var = new_name.name();
+  return *this;
+}
+
+Stage& Stage::reorder(const std::vector<VarOrRVar>& vars) {
+  const std::string asked = text("reorder ", names_of(vars), " of ", quoted(name()));
+  // 1. Every loop exists. 2. None is named twice. 3. Reduction loops keep their order, unless it
+  // does not matter.
+  std::vector<size_t> places;
+  for (const VarOrRVar& var : vars) places.push_back(loop_index(var, asked));
+  std::vector<size_t> sorted = places;
+  std::sort(sorted.begin(), sorted.end());
+  for (size_t i = 0; i < vars.size(); i++) {
+    if (std::count(places.begin(), places.end(), places[i]) > 1) {
+      user_error(asked, "each loop is named once", quoted(vars[i].name()) + " is named twice",
+                 "Drop one of them");
+    }
+  }
+  std::vector<ir::Dim> dims = get_schedule().dims;
+  for (size_t i = 0; i < sorted.size(); i++) dims[sorted[i]] = get_schedule().dims[places[i]];
+
+  const auto reduction_order = [](const std::vector<ir::Dim>& all) {
+    std::vector<std::string> order;
+    for (const ir::Dim& dim : all) {
+      if (dim.is_reduction) order.push_back(dim.var);
+    }
+    return order;
+  };
+  if (reduction_order(dims) != reduction_order(get_schedule().dims) &&
+      !ir::can_prove_commutative(*func_, definition())) {
+    for (const VarOrRVar& var : vars) {
+      for (const std::string& root : reduction_roots(definition(), var.name())) {
+        if (ir::can_prove_race_free(*func_, definition(), root)) continue;
+        user_error(asked, "the order of reduction loops may change only where it changes no result",
+                   text("the update of ", quoted(func_->name), " over ", quoted(root),
+                        " is neither an accumulation nor independent from point to point"),
+                   "Keep the reduction loops in their order; pure loops may go anywhere");
+      }
+    }
+  }
+  touch().dims = std::move(dims);
+  return *this;
+}
+
+Stage& Stage::set_for_type(const VarOrRVar& var, ForType type, const char* verb) {
+  const std::string asked = text(verb, " ", quoted(name()), " over ", quoted(var.name()));
+  const size_t at = loop_index(var, asked);
+  if (type == ForType::Parallel || type == ForType::Vectorized) check_race_free(var, asked);
+  touch().dims[at].for_type = type;
+  return *this;
+}
+
+Stage& Stage::serial(const VarOrRVar& var) {
+  return set_for_type(var, ForType::Serial, "serialize");
+}
+Stage& Stage::parallel(const VarOrRVar& var) {
+  return set_for_type(var, ForType::Parallel, "parallelize");
+}
+Stage& Stage::vectorize(const VarOrRVar& var) {
+  return set_for_type(var, ForType::Vectorized, "vectorize");
+}
+Stage& Stage::unroll(const VarOrRVar& var) {
+  return set_for_type(var, ForType::Unrolled, "unroll");
+}
+
+namespace {
+VarOrRVar fresh_like(const VarOrRVar& var) {
+  return var.is_rvar ? VarOrRVar(RVar()) : VarOrRVar(Var());
+}
+}  // namespace
+
+Stage& Stage::parallel(const VarOrRVar& var, const Expr& task_size, TailStrategy tail) {
+  loop_index(var, text("parallelize ", quoted(name()), " over ", quoted(var.name())));
+  check_race_free(var, text("parallelize ", quoted(name()), " over ", quoted(var.name())));
+  return split(var, var, fresh_like(var), task_size, tail).parallel(var);
+}
+
+Stage& Stage::vectorize(const VarOrRVar& var, const Expr& factor, TailStrategy tail) {
+  loop_index(var, text("vectorize ", quoted(name()), " over ", quoted(var.name())));
+  check_race_free(var, text("vectorize ", quoted(name()), " over ", quoted(var.name())));
+  const VarOrRVar lanes = fresh_like(var);
+  return split(var, var, lanes, factor, tail).vectorize(lanes);
+}
+
+Stage& Stage::unroll(const VarOrRVar& var, const Expr& factor, TailStrategy tail) {
+  const VarOrRVar copies = fresh_like(var);
+  return split(var, var, copies, factor, tail).unroll(copies);
+}
+
+Stage& Stage::tile(const VarOrRVar& x, const VarOrRVar& y, const VarOrRVar& xo, const VarOrRVar& yo,
+                   const VarOrRVar& xi, const VarOrRVar& yi, const Expr& xfactor,
+                   const Expr& yfactor, TailStrategy tail) {
+  return split(x, xo, xi, xfactor, tail).split(y, yo, yi, yfactor, tail).reorder(xi, yi, xo, yo);
+}
+
+Stage& Stage::tile(const VarOrRVar& x, const VarOrRVar& y, const VarOrRVar& xi, const VarOrRVar& yi,
+                   const Expr& xfactor, const Expr& yfactor, TailStrategy tail) {
+  return tile(x, y, x, y, xi, yi, xfactor, yfactor, tail);
+}
+
+Stage& Stage::tile(const std::vector<VarOrRVar>& previous, const std::vector<VarOrRVar>& outers,
+                   const std::vector<VarOrRVar>& inners, const std::vector<Expr>& factors,
+                   const std::vector<TailStrategy>& tails) {
+  const size_t count = previous.size();
+  if (outers.size() != count || inners.size() != count || factors.size() != count ||
+      tails.size() != count) {
+    user_error(
+        text("tile ", names_of(previous), " of ", quoted(name())), "all lists have one length",
+        text("they have ", count, " loops, ", outers.size(), " outer and ", inners.size(),
+             " inner names, ", factors.size(), " factors and ", tails.size(), " tail strategies"));
+  }
+  for (size_t i = 0; i < count; i++) split(previous[i], outers[i], inners[i], factors[i], tails[i]);
+  std::vector<VarOrRVar> order = inners;
+  order.insert(order.end(), outers.begin(), outers.end());
+  return reorder(order);
+}
+
+Stage& Stage::tile(const std::vector<VarOrRVar>& previous, const std::vector<VarOrRVar>& outers,
+                   const std::vector<VarOrRVar>& inners, const std::vector<Expr>& factors,
+                   TailStrategy tail) {
+  return tile(previous, outers, inners, factors, std::vector<TailStrategy>(previous.size(), tail));
+}
+
+Stage& Stage::tile(const std::vector<VarOrRVar>& previous, const std::vector<VarOrRVar>& inners,
+                   const std::vector<Expr>& factors, TailStrategy tail) {
+  return tile(previous, previous, inners, factors, tail);
+}
+
+}  // namespace retrograde
