@@ -207,7 +207,8 @@ Expr lerp(Expr zero, Expr one, Expr weight) {
     type_error("lerp", "its weight is a float or an unsigned integer", weight);
   }
   if (zero.type().is_float() && weight.type().is_uint()) {
-    type_error("lerp", "floats need a float weight", weight);
+    const auto whole = static_cast<double>(weight.type().max_uint());
+    weight = ir::cast_to(zero.type(), weight) / ir::make_const(zero.type(), whole);
   }
   if (weight.type().is_float() && zero.type().is_float()) weight = ir::cast_to(zero.type(), weight);
   return call_op(Op::lerp, zero.type(), {zero, one, weight});
@@ -268,7 +269,7 @@ RETROGRADE_UNARY_FLOAT(erf)
 
 Expr fract(Expr x) {
   x = as_float(std::move(x), "fract");
-  return x - floor(x);
+  return x - trunc(x);
 }
 
 Expr pow(Expr x, Expr y) {

@@ -73,13 +73,13 @@ inline Expr f64(Expr e) { return cast(Float(64), std::move(e)); }
 template <typename A, typename B, typename C, typename... Rest>
 requires(std::is_convertible_v<A, Expr>&& std::is_convertible_v<B, Expr>&&
              std::is_convertible_v<C, Expr>) Expr min(A&& a, B&& b, C&& c, Rest&&... rest) {
-  return min(min(Expr(std::forward<A>(a)), Expr(std::forward<B>(b))), std::forward<C>(c),
+  return min(min(Expr(std::forward<A>(a)), std::forward<B>(b)), std::forward<C>(c),
              std::forward<Rest>(rest)...);
 }
 template <typename A, typename B, typename C, typename... Rest>
 requires(std::is_convertible_v<A, Expr>&& std::is_convertible_v<B, Expr>&&
              std::is_convertible_v<C, Expr>) Expr max(A&& a, B&& b, C&& c, Rest&&... rest) {
-  return max(max(Expr(std::forward<A>(a)), Expr(std::forward<B>(b))), std::forward<C>(c),
+  return max(max(Expr(std::forward<A>(a)), std::forward<B>(b)), std::forward<C>(c),
              std::forward<Rest>(rest)...);
 }
 // The value of the first condition that holds, else the last: select(c0, v0, c1, v1, otherwise).
@@ -118,7 +118,7 @@ Expr floor(Expr x);
 Expr ceil(Expr x);
 Expr round(Expr x);  // half to even
 Expr trunc(Expr x);
-Expr fract(Expr x);  // x - floor(x)
+Expr fract(Expr x);  // x - trunc(x): has the sign of x
 Expr sqrt(Expr x);
 Expr exp(Expr x);
 Expr log(Expr x);
