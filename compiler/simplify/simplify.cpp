@@ -1,17 +1,158 @@
-// Entry points.
+// Entry points and dispatch.
 #include "simplify/simplify.h"
 
 #include "ir/build.h"
+#include "ir/equal.h"
 #include "ir/visit.h"
+#include "simplify/simplifier.h"
 
 namespace retrograde::ir {
 
-namespace {
-class Folder : public Rewriter {};
-}  // namespace
+Expr simplify(const Expr& e, const BoundsMap& bounds) {
+  if (!e.defined()) return e;
+  return Simplifier(bounds)(e);
+}
 
-Expr simplify(const Expr& e, const BoundsMap&) { return Folder()(e); }
-Stmt simplify(const Stmt& s) { return Folder()(s); }
+Stmt simplify(const Stmt& s) {
+  if (!s.defined()) return s;
+  return drop_dead_lets(Simplifier(BoundsMap())(s));
+}
+
 bool can_prove(const Expr& condition, const BoundsMap& bounds) { return is_const_true(simplify(condition, bounds)); }
+
+// An end of a variable's bounds may mention another variable only when that one's bounds come first.
+Simplifier::Simplifier(const BoundsMap& bounds) {
+  std::unordered_set<std::string> done;
+  const std::function<void(const std::string&)> bind = [&](const std::string& name) {
+    const auto found = bounds.find(name);
+    if (found == bounds.end() || !done.insert(name).second) return;
+    for (const Expr& end : {found->second.min, found->second.max}) {
+      if (!end.defined()) continue;
+      walk(end, [&](const Expr& e) {
+        if (const auto* var = e.as<Variable>()) bind(var->name);
+        return true;
+      });
+    }
+    const auto simplified = [&](const Expr& end) { return end.defined() ? (*this)(end) : end; };
+    const Expr min = simplified(found->second.min), max = simplified(found->second.max);
+    facts_.bind(name, min, max);
+    forget();
+  };
+  for (const auto& [name, ends] : bounds) bind(name);
+}
+
+Expr Simplifier::operator()(const Expr& e) {
+  if (const auto* var = e.as<Variable>()) {
+    const auto found = replacements_.find(var->name);
+    return found == replacements_.end() ? e : found->second;
+  }
+  if (e.kind() <= Kind::StringImm) return e;
+  if (const auto found = memo_.find(e.get()); found != memo_.end()) return found->second.value;
+  Expr result = node(e);
+  if (equal(result, e)) result = e;
+  memo_.emplace(e.get(), Entry{e, result});
+  memo_.emplace(result.get(), Entry{result, result});
+  return result;
+}
+
+Expr Simplifier::node(const Expr& e) {
+  Simplifier& s = *this;
+  return match(
+      e, [&](const Binary& n) { return apply(n.kind, s(n.a), s(n.b)); }, [&](const Not& n) { return negate(s(n.a)); },
+      [&](const Select& n) { return select(s(n.condition), s(n.true_value), s(n.false_value)); },
+      [&](const Cast& n) { return cast(n.type, s(n.value)); },
+      [&](const Ramp& n) { return ramp(s(n.base), s(n.stride), n.lanes); },
+      [&](const Broadcast& n) { return broadcast(s(n.value), n.lanes); }, [&](const Call& n) { return call(e, n); },
+      [&](const Let&) { return let(e); }, [&](const VectorReduce& n) { return vector_reduce(n); },
+      [&](const Load& n) {
+        Expr index = s(n.index), predicate = n.predicate.defined() ? s(n.predicate) : Expr();
+        const auto* splat = index.as<Broadcast>();
+        if (splat && !predicate.defined()) {
+          const Type type = n.type.with_lanes(splat->value.type().lanes());
+          return broadcast(make_load(type, n.name, splat->value, {}, n.symbol), splat->lanes);
+        }
+        return make_load(n.type, n.name, index, predicate, n.symbol);
+      },
+      [&](const ExprNode&) { return map_children(e, [&](const Expr& child) { return s(child); }); });
+}
+
+Expr Simplifier::apply(Kind kind, const Expr& a, const Expr& b) {
+  if (Expr splat = distribute_broadcast(kind, a, b); splat.defined()) return splat;
+  if (++depth_ > 60) {  // rules must not run away on rules' results
+    --depth_;
+    return binary(kind, a, b);
+  }
+  Expr result;
+  switch (kind) {
+    case Kind::Add:
+      result = add(a, b);
+      break;
+    case Kind::Sub:
+      result = sub(a, b);
+      break;
+    case Kind::Mul:
+      result = mul(a, b);
+      break;
+    case Kind::Div:
+      result = div(a, b);
+      break;
+    case Kind::Mod:
+      result = mod(a, b);
+      break;
+    case Kind::Min:
+    case Kind::Max:
+      result = min_max(kind, a, b);
+      break;
+    case Kind::EQ:
+      result = equals(a, b);
+      break;
+    case Kind::NE:
+      result = negate(equals(a, b));
+      break;
+    case Kind::LT:
+    case Kind::LE:
+      result = less(kind, a, b);
+      break;
+    case Kind::GT:
+      result = less(Kind::LT, b, a);
+      break;
+    case Kind::GE:
+      result = less(Kind::LE, b, a);
+      break;
+    default:
+      result = logical(kind, a, b);
+      break;
+  }
+  --depth_;
+  return result;
+}
+
+Expr Simplifier::constant(const Expr& like, int64_t value) const { return make_const(like.type(), value); }
+
+// ---- scopes ----
+
+Simplifier::Binding::Binding(Simplifier& owner, const std::string& name, const Expr& min, const Expr& max,
+                             const Expr& replacement)
+    : owner_(owner), name_(name) {
+  // What was found for a name of another scope does not hold for this one.
+  if (!owner.seen_names_.insert(name).second) owner.forget();
+  if (replacement.defined()) {
+    owner.replacements_[name] = replacement;
+  } else {
+    owner.facts_.bind(name, min, max);
+  }
+}
+
+Simplifier::Binding::~Binding() {
+  owner_.replacements_.erase(name_);
+  owner_.facts_.unbind(name_);
+}
+
+Simplifier::Given::Given(Simplifier& owner, const Expr& condition)
+    : owner_(owner), assumption_(owner.facts_, condition) {
+  if (condition.defined()) owner_.memo_.clear();
+}
+
+Simplifier::Given::~Given() { owner_.memo_.clear(); }
 
 }  // namespace retrograde::ir

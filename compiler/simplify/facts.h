@@ -1,0 +1,101 @@
+// What is known while simplifying: bounds of variables, conditions that hold, and what follows for a sum.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <unordered_map>
+#include <vector>
+
+#include "ir/expr.h"
+#include "simplify/sum.h"
+
+namespace retrograde::ir {
+
+// Closed; the extremes of int64 mean unbounded.
+struct ConstantRange {
+  int64_t min = INT64_MIN, max = INT64_MAX;
+  bool is_point() const { return min == max; }
+  bool within(int64_t low, int64_t high) const { return min >= low && max <= high; }
+  static ConstantRange of(Type type);
+  static ConstantRange point(int64_t value) { return {value, value}; }
+};
+ConstantRange hull(const ConstantRange& a, const ConstantRange& b);
+ConstantRange intersection(const ConstantRange& a, const ConstantRange& b);
+ConstantRange operator+(const ConstantRange& a, const ConstantRange& b);
+ConstantRange operator*(const ConstantRange& a, int64_t factor);
+
+class Facts {
+ public:
+  // Simplified ends; undefined: unknown. Later variables may mention earlier ones in their bounds, not vice versa.
+  void bind(const std::string& name, Expr min, Expr max);
+  void unbind(const std::string& name);
+
+  // While alive, the condition (simplified) holds. Takes conjunctions apart.
+  class Assumption {
+   public:
+    Assumption(Facts& facts, const Expr& condition);
+    ~Assumption();
+    Assumption(const Assumption&) = delete;
+    Assumption& operator=(const Assumption&) = delete;
+
+   private:
+    Facts& facts_;
+    size_t first_;
+  };
+  // Until the end of time (or of an enclosing Assumption).
+  void assume(const Expr& condition);
+  // Whether the condition itself, or its negation, was assumed.
+  std::optional<bool> decided(const Expr& condition) const;
+
+  ConstantRange range(const Expr& e);
+  // The tightest constants found around a sum of an index type.
+  int64_t upper_bound(const Sum& sum);
+  int64_t lower_bound(const Sum& sum);
+  // Ranges of expressions are remembered; to be called when variables or conditions change.
+  void forget() { ranges_.clear(); }
+
+ private:
+  struct Bounds {
+    Expr min, max;
+    ConstantRange range;
+    int order;  // of binding: inner variables are eliminated first
+  };
+  // A fact is a sum that is at most `bound`, or a condition known to be true or false.
+  struct Known {
+    std::vector<Term> terms;
+    int64_t bound = 0;
+    Expr condition;
+    bool value = true;
+  };
+  struct Remembered {
+    Expr key;
+    ConstantRange range;
+  };
+
+  void assume(const Expr& condition, bool value);
+  void assume_comparison(const Binary& comparison, bool value);
+  void assume_at_most(Sum sum, int64_t bound);
+  void add(uint64_t key, Known known);
+  int64_t known_bound(const Sum& sum) const;
+  int64_t known_bound(const Expr& atom, int64_t factor) const;
+
+  ConstantRange range_of_node(const Expr& e);
+  ConstantRange range_of_variable(const Expr& e, const Variable& n);
+  ConstantRange range_of_binary(const Binary& n);
+  ConstantRange range_of_call(const Call& n);
+
+  int64_t search(const Sum& sum, int& budget);
+  int64_t bound_by_ranges(const Sum& sum);
+  int64_t replace(const Sum& sum, const Term& term, const Expr& by, int& budget);
+  int64_t eliminate_structure(const Sum& sum, int& budget);
+  int64_t eliminate_division(const Sum& sum, const Term& term, const Div& n, int& budget);
+  int64_t eliminate_variable(const Sum& sum, int& budget);
+
+  std::unordered_map<std::string, Bounds> variables_;
+  std::vector<Known> known_;
+  std::unordered_multimap<uint64_t, size_t> index_;  // hash of the terms or condition -> position in known_
+  std::unordered_map<const ExprNode*, Remembered> ranges_;
+  int next_order_ = 0;
+};
+
+}  // namespace retrograde::ir

@@ -1,0 +1,136 @@
+// The simplifier: one bottom-up, memoised walk. Each operator has a rule function that takes simplified operands and
+// gives a simplified result; rules call each other on smaller things.
+//   rules_sum.cpp      + - *, and what cancels inside sums
+//   rules_divide.cpp   / %
+//   rules_min_max.cpp  min max
+//   rules_compare.cpp  == != < <=
+//   rules_logic.cpp    && || ! select
+//   rules_other.cpp    casts, vectors, operators, lets
+//   simplify_stmt.cpp  statements
+#pragma once
+
+#include <string>
+#include <unordered_map>
+#include <unordered_set>
+
+#include "ir/expr.h"
+#include "simplify/facts.h"
+#include "simplify/simplify.h"
+#include "simplify/sum.h"
+
+namespace retrograde::ir {
+
+class Simplifier {
+ public:
+  explicit Simplifier(const BoundsMap& bounds);
+
+  Expr operator()(const Expr& e);
+  Stmt operator()(const Stmt& s);
+
+ private:
+  // ---- rules: operands simplified, of one type ----
+  Expr apply(Kind kind, const Expr& a, const Expr& b);
+  Expr add(const Expr& a, const Expr& b);
+  Expr sub(const Expr& a, const Expr& b);
+  Expr mul(const Expr& a, const Expr& b);
+  Expr div(const Expr& a, const Expr& b);
+  Expr mod(const Expr& a, const Expr& b);
+  Expr min_max(Kind kind, const Expr& a, const Expr& b);
+  Expr equals(const Expr& a, const Expr& b);
+  Expr less(Kind kind, const Expr& a, const Expr& b);  // LT or LE
+  Expr logical(Kind kind, const Expr& a, const Expr& b);
+  Expr negate(const Expr& a);
+  Expr select(const Expr& condition, const Expr& t, const Expr& f);
+  Expr cast(Type type, const Expr& value);
+  Expr call(const Expr& e, const Call& n);
+  Expr ramp(const Expr& base, const Expr& stride, int lanes);
+  Expr broadcast(const Expr& value, int lanes);
+  Expr vector_reduce(const VectorReduce& n);
+  Expr let(const Expr& e);
+  Expr node(const Expr& e);
+
+  // ---- sums ----
+  Expr rebuild(Sum sum, Kind kind, const Expr& a, const Expr& b);
+  Expr rebuild(Sum sum);
+  bool join_divisions(Sum& sum);
+  bool expand_product(Sum& sum);
+  Expr push_into_min_max(const Sum& sum);
+  Expr gather_vectors(const Sum& sum);
+  Expr fold_select(const Sum& sum);
+  Expr float_arithmetic(Kind kind, const Expr& a, const Expr& b);
+
+  // ---- divisions, by a constant greater than one ----
+  Expr div_by(const Expr& a, int64_t c);
+  Expr mod_by(const Expr& a, int64_t c);
+  Expr div_vector(const Ramp& a, int64_t c);
+  Expr mod_vector(const Ramp& a, int64_t c);
+  Expr div_atom(const Sum& rest, int64_t c);
+
+  // ---- comparisons of index sums ----
+  Expr less_than_zero(Sum sum);
+  Expr distribute_comparison(const Sum& sum);
+  Expr unfold_division(const Sum& sum);
+  Expr compare_sides(const Sum& sum);
+  Expr compare_vectors(Kind kind, const Expr& a, const Expr& b);
+
+  Expr combine_conditions(Kind kind, const Expr& a, const Expr& b, bool& drop_a, bool& drop_b);
+  Expr distribute_broadcast(Kind kind, const Expr& a, const Expr& b);
+  Expr constant(const Expr& like, int64_t value) const;
+
+  // ---- statements ----
+  Stmt let_stmt(const Stmt& s);
+  Stmt loop(const Stmt& s, const For& n);
+  Stmt block(const Block& n);
+  Stmt branches(const Stmt& s, const IfThenElse& n);
+  Stmt store(const Stmt& s, const Store& n);
+  Stmt provide(const Stmt& s, const Provide& n);
+  Stmt children(const Stmt& s);
+
+  // A name bound while this lives; `replacement`, when defined, stands for it.
+  class Binding {
+   public:
+    Binding(Simplifier& owner, const std::string& name, const Expr& min, const Expr& max, const Expr& replacement);
+    ~Binding();
+    Binding(const Binding&) = delete;
+    Binding& operator=(const Binding&) = delete;
+
+   private:
+    Simplifier& owner_;
+    const std::string name_;
+  };
+  friend class Binding;
+  // A condition that holds while this lives.
+  class Given {
+   public:
+    Given(Simplifier& owner, const Expr& condition);
+    ~Given();
+    Given(const Given&) = delete;
+    Given& operator=(const Given&) = delete;
+
+   private:
+    Simplifier& owner_;
+    Facts::Assumption assumption_;
+  };
+  void forget() {
+    memo_.clear();
+    facts_.forget();
+  }
+
+  struct Entry {
+    Expr key, value;  // the key is kept alive so that its address stays its own
+  };
+  Facts facts_;
+  std::unordered_map<const ExprNode*, Entry> memo_;
+  std::unordered_map<std::string, Expr> replacements_;
+  std::unordered_set<std::string> seen_names_;
+  int depth_ = 0;  // of rules calling rules
+};
+
+bool has_effect(const Expr& e);  // beyond its value
+// Cheap enough to stand wherever its name does.
+bool is_trivial_value(const Expr& e);
+// Drops lets whose names are not used.
+Expr drop_dead_lets(const Expr& e);
+Stmt drop_dead_lets(const Stmt& s);
+
+}  // namespace retrograde::ir

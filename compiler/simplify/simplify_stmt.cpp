@@ -1,0 +1,100 @@
+// Statements: loop bounds, conditions and asserts are known inside what they guard.
+#include "ir/build.h"
+#include "ir/visit.h"
+#include "simplify/simplifier.h"
+
+namespace retrograde::ir {
+
+Stmt Simplifier::operator()(const Stmt& s) {
+  if (!s.defined()) return s;
+  return match(
+      s, [&](const LetStmt&) { return let_stmt(s); }, [&](const For& n) { return loop(s, n); },
+      [&](const IfThenElse& n) { return branches(s, n); }, [&](const Block& n) { return block(n); },
+      [&](const Store& n) { return store(s, n); }, [&](const Provide& n) { return provide(s, n); },
+      [&](const Assert& n) {
+        const Expr condition = (*this)(n.condition);
+        if (is_const_true(condition)) return Stmt();
+        return make_assert(condition, (*this)(n.error));
+      },
+      [&](const Evaluate& n) {
+        Expr value = (*this)(n.value);
+        return has_effect(value) ? make_evaluate(std::move(value)) : Stmt();
+      },
+      [&](const StmtNode&) { return children(s); });
+}
+
+Stmt Simplifier::children(const Stmt& s) {
+  return map_children(
+      s, [this](const Expr& e) { return (*this)(e); }, [this](const Stmt& child) { return (*this)(child); });
+}
+
+Stmt Simplifier::let_stmt(const Stmt& s) {
+  const auto* n = s.as<LetStmt>();
+  const Expr value = (*this)(n->value);
+  const bool trivial = is_trivial_value(value);
+  const Binding binding(*this, n->name, value, value, trivial ? value : Expr());
+  Stmt body = (*this)(n->body);
+  if (trivial) return body;
+  if (value.same_as(n->value) && body.same_as(n->body)) return s;
+  if (!body.defined()) return has_effect(value) ? make_evaluate(value) : Stmt();
+  return make_let(n->name, value, std::move(body));
+}
+
+// for (x, min, 0) {..} => nothing; for (x, min, 1) {..} => let x = min in {..}
+Stmt Simplifier::loop(const Stmt& s, const For& n) {
+  const Expr min = (*this)(n.min), extent = (*this)(n.extent);
+  if (is_const_true(less(Kind::LE, extent, make_zero(extent.type())))) return {};
+  if (is_const_int(extent, 1)) return let_stmt(Stmt(new LetStmt(n.name, min, n.body)));
+  Stmt body;
+  {
+    const Binding binding(*this, n.name, min, sub(add(min, extent), make_one(min.type())), Expr());
+    // Inside, the loop runs at least once.
+    const Given runs(*this, less(Kind::LT, make_zero(extent.type()), extent));
+    body = (*this)(n.body);
+  }
+  if (min.same_as(n.min) && extent.same_as(n.extent) && body.same_as(n.body)) return s;
+  return make_for(n.name, min, extent, n.for_type, std::move(body));
+}
+
+// What follows an assert may rely on it, to the end of the block.
+Stmt Simplifier::block(const Block& n) {
+  const Given scope(*this, Expr());
+  std::vector<Stmt> stmts;
+  for (const Stmt& child : n.stmts) {
+    stmts.push_back((*this)(child));
+    if (const auto* check = stmts.back().as<Assert>()) {
+      facts_.assume(check->condition);
+      memo_.clear();
+    }
+  }
+  return make_block(std::move(stmts));
+}
+
+Stmt Simplifier::branches(const Stmt& s, const IfThenElse& n) {
+  Expr condition = (*this)(n.condition);
+  if (const std::optional<bool> known = facts_.decided(condition)) condition = make_const(Bool(), int64_t{*known});
+  if (is_const(condition)) return (*this)(is_const_true(condition) ? n.then_case : n.else_case);
+  Stmt then_case, else_case;
+  {
+    const Given holds(*this, condition);
+    then_case = (*this)(n.then_case);
+  }
+  if (n.else_case.defined()) {
+    const Given fails(*this, negate(condition));
+    else_case = (*this)(n.else_case);
+  }
+  if (condition.same_as(n.condition) && then_case.same_as(n.then_case) && else_case.same_as(n.else_case)) return s;
+  return make_if(condition, std::move(then_case), std::move(else_case));
+}
+
+Stmt Simplifier::store(const Stmt& s, const Store& n) {
+  if (n.predicate.defined() && is_const_false((*this)(n.predicate))) return {};
+  return children(s);
+}
+
+Stmt Simplifier::provide(const Stmt& s, const Provide& n) {
+  if (n.predicate.defined() && is_const_false((*this)(n.predicate))) return {};
+  return children(s);
+}
+
+}  // namespace retrograde::ir

@@ -1,0 +1,50 @@
+// Integer expressions as sums: factor1 * atom1 + factor2 * atom2 + ... + constant.
+// All integer types: sums are exact modulo 2^bits. For index types (Int(32), Int(64)), which do not overflow, a factor or
+// constant that leaves the type's range makes the sum invalid instead of wrapping.
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "ir/expr.h"
+
+namespace retrograde::ir {
+
+struct Term {
+  Expr atom;  // not a sum, a difference, a constant, or a product with a constant
+  int64_t factor = 1;
+};
+
+struct Sum {
+  Type type = Int(32);
+  std::vector<Term> terms;  // atoms structurally different, no factor 0
+  int64_t constant = 0;     // factors and constant are sign-extended from the type's width, unsigned types too
+  bool valid = true;
+
+  bool is_constant() const { return terms.empty(); }
+  const Term* find(const Expr& atom) const;
+  void add(const Expr& atom, int64_t factor);
+  void add_constant(int64_t value);
+  void add(const Sum& other, int64_t factor);
+};
+
+// Larger sums are left alone, so that a chain of n additions costs O(n).
+constexpr size_t max_terms = 24;
+
+inline bool is_index_type(Type type) { return type.is_int() && type.bits() >= 32; }
+inline bool has_sums(Type type) { return type.is_int_or_uint() && !type.is_bool(); }
+
+// Of an expression whose sums are already gathered, as simplified ones are.
+Sum sum_of(const Expr& e);
+Sum plus(const Sum& a, const Sum& b, int64_t factor_of_b = 1);
+Sum times(const Sum& a, int64_t factor);
+Sum constant_sum(Type type, int64_t value);
+// The terms in structural order, positive ones first, then the constant.
+Expr to_expr(const Sum& sum);
+// The greatest common divisor of the factors; 0 when there are none.
+int64_t common_factor(const Sum& sum);
+
+int64_t floor_div(int64_t a, int64_t b);  // b > 0
+int64_t floor_mod(int64_t a, int64_t b);  // b > 0
+
+}  // namespace retrograde::ir
