@@ -92,6 +92,11 @@ requires(sizeof...(Rest) >= 1 && (std::is_convertible_v<Rest, Expr> && ...)) Exp
 // Element by element; the condition is one for all, or a Tuple of its own.
 Tuple select(const Tuple& condition, const Tuple& true_value, const Tuple& false_value);
 Tuple select(const Expr& condition, const Tuple& true_value, const Tuple& false_value);
+// Halide's name for the two above.
+template <typename... Args>
+Tuple tuple_select(const Args&... args) {
+  return select(args...);
+}
 template <typename... Rest>
 requires(sizeof...(Rest) >= 1) Tuple
     select(const Expr& c0, const Tuple& v0, const Expr& c1, const Tuple& v1, Rest&&... rest) {
