@@ -393,14 +393,14 @@ void Printer::print(const Stmt& s) {
 
 }  // namespace
 
-std::string print(const Expr& e) {
+std::string PrintFunction::operator()(const Expr& e) const {
   std::string out;
   if (!e.defined()) return "<undefined>";
   Printer(out).print_root(e);
   return out;
 }
 
-std::string print(const Stmt& s) {
+std::string PrintFunction::operator()(const Stmt& s) const {
   std::string out;
   if (s.defined()) Printer(out).print(s);
   return out;

@@ -11,7 +11,12 @@ std::ostream& operator<<(std::ostream& out, const Type& type);
 std::ostream& operator<<(std::ostream& out, const Expr& e);
 std::ostream& operator<<(std::ostream& out, const Stmt& s);
 namespace ir {
-std::string print(const Expr& e);
-std::string print(const Stmt& s);
+// An object, not functions: argument-dependent lookup must not find it where a user writes print(e), which is an
+// operator of the language.
+struct PrintFunction {
+  std::string operator()(const Expr& e) const;
+  std::string operator()(const Stmt& s) const;
+};
+inline constexpr PrintFunction print{};
 }  // namespace ir
 }  // namespace retrograde
