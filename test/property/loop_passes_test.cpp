@@ -1,0 +1,266 @@
+// Random loop nests, run before and after the passes over loops and memory: the same buffers, the same prints. The seed
+// of a failure is in its message.
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "ir/validate.h"
+#include "lower/free_early.h"
+#include "lower/partition_loops.h"
+#include "lower/unroll_loops.h"
+#include "lower/vectorize_loops.h"
+#include "property/statement_evaluator.h"
+
+namespace retrograde::ir {
+namespace {
+
+constexpr int width = 24, height = 6, margin = 40;  // of the image; the buffers have a margin on both sides
+
+// Programs whose iterations are independent, but for reductions.
+class RandomProgram {
+ public:
+  explicit RandomProgram(unsigned seed) : random_(seed) {}
+
+  Stmt make() {
+    std::vector<Stmt> nests;
+    for (int i = number(1, 2); i > 0; --i) nests.push_back(nest());
+    return make_block(std::move(nests));
+  }
+
+ private:
+  std::mt19937 random_;
+  int names_ = 0;
+  std::vector<Expr> coordinates_;  // in scope: loop variables and lets over them
+
+  int number(int low, int high) { return std::uniform_int_distribution<int>(low, high)(random_); }
+  bool flip() { return number(0, 1) == 1; }
+  std::string name(const char* base) { return std::string(base) + std::to_string(names_++); }
+  Expr any_coordinate() { return coordinates_[number(0, static_cast<int>(coordinates_.size()) - 1)]; }
+
+  ForType loop_type() {
+    static constexpr ForType types[] = {ForType::Serial, ForType::Parallel, ForType::Vectorized, ForType::Unrolled};
+    return types[number(0, 3)];
+  }
+
+  // y outside; x inside, perhaps split into blocks with a guard or shifted inwards.
+  Stmt nest() {
+    coordinates_.clear();
+    Expr y = variable(name("y")), x = variable(name("x"));
+    std::string y_name = y.as<Variable>()->name, x_name = x.as<Variable>()->name;
+    ForType y_type = flip() ? ForType::Serial : loop_type();
+    bool is_split = flip();
+    coordinates_ = {y};
+    if (!is_split) {
+      coordinates_.push_back(x);
+      ForType type = loop_type();
+      bool needs_constant = type == ForType::Vectorized || type == ForType::Unrolled;
+      Expr extent = needs_constant || flip() ? Expr(number(1, 9)) : variable("w");
+      Stmt loop = make_for(x_name, flip() ? Expr(0) : variable("x_min"), extent, type, body(x, y, 2));
+      return make_for(y_name, 0, number(1, height), y_type, loop);
+    }
+    Expr xi = variable(name("xi"));
+    int factor = number(2, 5);
+    bool shifts = flip();
+    Expr base = x * factor;
+    Expr position = (shifts ? min(likely(base), variable("w") - factor) : base) + xi;
+    Expr t = variable(name("t"));
+    coordinates_.push_back(t);
+    Stmt inside = body(t, y, 2);
+    if (!shifts) inside = make_if(likely(t < variable("w")), inside);
+    Stmt loop = make_let(t.as<Variable>()->name, position, inside);
+    loop = make_for(xi.as<Variable>()->name, 0, factor, loop_type(), loop);
+    ForType outer = flip() ? ForType::Serial : ForType::Parallel;
+    loop = make_for(x_name, 0, (variable("w") + (factor - 1)) / factor, outer, loop);
+    return make_for(y_name, 0, number(1, height), y_type, loop);
+  }
+
+  // Writes only elements that belong to (x, y).
+  Stmt body(const Expr& x, const Expr& y, int depth) {
+    std::vector<Stmt> stmts;
+    for (int i = number(1, 2); i > 0; --i) stmts.push_back(statement(x, y, depth));
+    return make_block(std::move(stmts));
+  }
+
+  Stmt statement(const Expr& x, const Expr& y, int depth) {
+    switch (depth == 0 ? number(0, 1) : number(0, 9)) {
+      case 0:
+      case 1:
+        return make_store(flip() ? "a" : "b", value(2), x + y * width + margin);
+      case 2: {  // a reduction over x (with f.s == out[y] in memory)
+        Expr index = y + margin;
+        Expr old = make_load(Int(32), "s", index);
+        Expr g = value(1);
+        Expr sums[] = {old + g, g + old, (old - g) + value(1), old - g};
+        return make_store("s", sums[number(0, 3)], index);
+      }
+      case 3: {  // keeps two values together, as argmax does
+        Expr index = y + margin;
+        Expr g = value(1), best = make_load(Int(32), "m", index);
+        Expr t = variable(name("better"), Bool());
+        Stmt stores = make_block({make_store("m", make_select(t, g, best), index),
+                                  make_store("p", make_select(t, x, make_load(Int(32), "p", index)), index)});
+        return make_let(t.as<Variable>()->name, g > best, stores);
+      }
+      case 4: {
+        Expr c = condition();
+        if (flip()) c = likely(c);
+        return make_if(c, body(x, y, depth - 1), flip() ? body(x, y, depth - 1) : Stmt());
+      }
+      case 5: {
+        Expr t = variable(name("let"));
+        Expr v = flip() ? position() : value(1);
+        coordinates_.push_back(t);
+        Stmt rest = body(x, y, depth - 1);
+        coordinates_.pop_back();
+        return make_let(t.as<Variable>()->name, v, rest);
+      }
+      case 6:
+        return scratch(x, y);
+      case 7:
+        return make_evaluate(call_op(Op::print, {value(1)}));
+      case 8: {  // extent may vary
+        Expr r = variable(name("r"));
+        bool is_constant = flip();
+        Expr extent = is_constant ? Expr(number(1, 4)) : max(position() % 4, 0);
+        ForType type = is_constant && flip() ? ForType::Unrolled : ForType::Serial;
+        coordinates_.push_back(r);
+        Expr index = x + y * width + margin;
+        Stmt sum = make_store("a", make_load(Int(32), "a", index) + value(1), index);
+        coordinates_.pop_back();
+        return make_for(r.as<Variable>()->name, number(-1, 1), extent, type, sum);
+      }
+      default:  // reads only where it may
+        return make_if(x >= 3 && x < 10, make_store("b", make_load(Int(32), "tight", x - 3) + value(1),
+                                                    x + y * width + margin));
+    }
+  }
+
+  // Storage of one iteration.
+  Stmt scratch(const Expr& x, const Expr& y) {
+    std::string buffer = name("scratch");
+    Expr k = variable(name("k"));
+    coordinates_.push_back(k);
+    Stmt fill = make_for(k.as<Variable>()->name, 0, 3, flip() ? ForType::Serial : ForType::Vectorized,
+                         make_store(buffer, value(1), k));
+    coordinates_.pop_back();
+    Stmt use = make_store("b", make_load(Int(32), buffer, 0) + make_load(Int(32), buffer, any_coordinate() % 3),
+                          x + y * width + margin);
+    return make_allocate(buffer, Int(32), MemoryType::Auto, make_const(Int(64), 3), make_block({fill, use}));
+  }
+
+  Expr position() { return any_coordinate() + number(-4, 4); }
+
+  Expr condition() {
+    Expr a = position();
+    switch (number(0, 4)) {
+      case 0: return a < variable("w") - 2;
+      case 1: return a >= 2;
+      case 2: return a >= 1 && any_coordinate() < 4;
+      case 3: return value(0) % 2 == 0;
+      default: return a <= any_coordinate() + 1;
+    }
+  }
+
+  Expr read() {
+    Expr at = position();
+    Expr last = flip() ? Expr(width - 1) : variable("w") - 1;
+    switch (number(0, 3)) {
+      case 0: return make_load(Int(32), "in", clamp(likely(at), 0, last));
+      case 1: return make_load(Int(32), "in", max(min(at, last), 0));
+      case 2: {
+        Expr outside = at < 0 || at > last;
+        Expr inside_value = make_load(Int(32), "in", clamp(at, 0, last));
+        return make_select(outside, Expr(-1), likely(inside_value));
+      }
+      default: return make_load(Int(32), "in", max(likely_if_innermost(at), 0) % width);
+    }
+  }
+  static Expr likely_if_innermost(const Expr& e) { return call_op(Op::likely_if_innermost, {e}); }
+
+  Expr value(int depth) {
+    if (depth == 0) return flip() ? read() : any_coordinate();
+    Expr a = value(depth - 1), b = value(0);
+    switch (number(0, 8)) {
+      case 0: return a + b;
+      case 1: return a - b * 2;
+      case 2: return min(a, b) % 64;
+      case 3: return make_select(a < b, b, a % 32);
+      case 4: return (a % 8) * (b % 8);
+      case 5: return call_op(Op::if_then_else, Int(32), {a < b, read(), b});
+      case 6: {
+        std::string t = name("e");
+        return make_let(t, a, variable(t) + variable(t) % 4 - b);
+      }
+      case 7: return call_extern("first_of", Int(32), {a, b});
+      default: return cast(Int(32), cast(UInt(8), a)) + b;
+    }
+  }
+};
+
+struct Outcome {
+  std::map<std::string, std::vector<int64_t>> buffers;
+  std::vector<int64_t> printed;
+  std::string error;
+  bool operator==(const Outcome&) const = default;
+};
+
+Outcome run(const Stmt& s, int w, int x_min) {
+  StatementEvaluator evaluator;
+  auto fill = [&](const char* name, int size) {
+    std::vector<Scalar>& buffer = evaluator.buffers[name];
+    for (int i = 0; i < size; ++i) buffer.push_back(Scalar::of_int(Int(32), (i * 37 + 11) % 101 - 40));
+  };
+  for (const char* name : {"a", "b", "s", "m", "p"}) fill(name, width * height + 2 * margin);
+  fill("in", width);
+  fill("tight", 7);
+  evaluator.set("w", w);
+  evaluator.set("x_min", x_min);
+  Outcome outcome;
+  try {
+    evaluator.run(s);
+  } catch (const std::runtime_error& e) {
+    outcome.error = e.what();
+  }
+  for (const auto& [name, buffer] : evaluator.buffers) {
+    for (const Scalar& element : buffer) outcome.buffers[name].push_back(element.i);
+  }
+  outcome.printed = evaluator.printed;
+  std::sort(outcome.printed.begin(), outcome.printed.end());  // lanes of one statement run before the next statement
+  return outcome;
+}
+
+const std::vector<std::string> free_names = {"w", "x_min"};
+
+void expect_same(const char* pass, unsigned seed, const Stmt& before, const Stmt& after, Phase phase) {
+  ASSERT_NO_THROW(validate(after, phase, pass, free_names)) << "seed " << seed << "\n" << before << "\n=>\n" << after;
+  for (auto [w, x_min] : {std::pair(17, 1), std::pair(6, -2), std::pair(width, 0)}) {
+    Outcome expected = run(before, w, x_min), found = run(after, w, x_min);
+    ASSERT_EQ(expected.error, "") << "seed " << seed << "\n" << before;
+    ASSERT_EQ(found.error, "") << pass << ", seed " << seed << "\n" << before << "\n=>\n" << after;
+    ASSERT_TRUE(expected == found) << pass << ", seed " << seed << ", w " << w << "\n" << before << "\n=>\n" << after;
+  }
+}
+
+class LoopPasses : public testing::TestWithParam<int> {};
+
+TEST_P(LoopPasses, KeepWhatProgramsCompute) {
+  constexpr unsigned count = 150;
+  for (unsigned seed = GetParam() * count; seed < (GetParam() + 1) * count; ++seed) {
+    Stmt program = RandomProgram(seed).make();
+    ASSERT_NO_THROW(validate(program, Phase::FlatStorage, "generator", free_names)) << "seed " << seed << "\n" << program;
+    Stmt partitioned = partition_loops(program);
+    expect_same("partition_loops", seed, program, partitioned, Phase::FlatStorage);
+    Stmt unrolled = unroll_loops(partitioned);
+    expect_same("unroll_loops", seed, program, unrolled, Phase::FlatStorage);
+    Stmt vectorized = vectorize_loops(unrolled);
+    expect_same("vectorize_loops", seed, program, vectorized, Phase::Vector);
+    expect_same("free_early", seed, program, free_early(vectorized), Phase::Vector);
+    expect_same("vectorize_loops alone", seed, program, vectorize_loops(unroll_loops(program)), Phase::Vector);
+    if (HasFatalFailure()) return;
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Seeds, LoopPasses, testing::Range(0, 8));
+
+}  // namespace
+}  // namespace retrograde::ir
