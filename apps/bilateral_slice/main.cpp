@@ -1,11 +1,13 @@
 // main.cpp -- bilateral_slice: learn a photographic look. See README.md beside this file.
 #include <tbb/global_control.h>
 
+#include <algorithm>
 #include <chrono>
 #include <csignal>
 #include <cstdio>
 #include <exception>
 #include <new>
+#include <string>
 #include <vector>
 
 #include "common/files.h"
@@ -27,6 +29,12 @@ using retrograde::text;
 namespace {
 
 using Planes = std::vector<float>;
+
+std::string one_line(std::string text) {
+  while (!text.empty() && text.back() == '\n') text.pop_back();
+  std::replace(text.begin(), text.end(), '\n', ' ');
+  return text;
+}
 
 // Three colour planes, and a fourth of ones when `homogeneous`.
 Planes to_planes(const apps::Image& image, bool homogeneous) {
@@ -164,8 +172,11 @@ int main(int argc, char** argv) {
         "bilateral_slice: cannot hold the images: a run needs memory for some forty floats a "
         "pixel; none was left. Make the images smaller.\n",
         stderr);
+  } catch (const retrograde::InternalError& error) {
+    std::fprintf(stderr, "bilateral_slice: %s\n",
+                 error.what());  // with all that a bug report needs
   } catch (const std::exception& error) {
-    std::fprintf(stderr, "bilateral_slice: %s\n", error.what());
+    std::fprintf(stderr, "bilateral_slice: %s\n", bilateral_slice::one_line(error.what()).c_str());
   }
   return 1;
 }

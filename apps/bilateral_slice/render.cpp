@@ -9,14 +9,13 @@ namespace {
 
 // Row by row: nothing the size of the photo is stored but the result.
 void schedule(Model& m) {
-  m.result.reorder(m.x, m.o, m.y).vectorize(m.x, 8).parallel(m.y);
+  const auto guarded = lang::TailStrategy::GuardWithIf;  // never reads beside the photo
+  m.result.reorder(m.x, m.o, m.y).vectorize(m.x, 8, guarded).parallel(m.y);
   m.row_grid.compute_at(m.result, m.y).vectorize(m.i, 4);
-  m.light.compute_at(m.result, m.y).vectorize(m.x, 8);
-  m.light.update().vectorize(m.x, 8);
-  m.guide.compute_at(m.result, m.y).vectorize(m.x, 8);
-  m.guide.update().vectorize(m.x, 8);
-  m.plane.compute_at(m.result, m.y).vectorize(m.x, 8);
-  m.plane.update().vectorize(m.x, 8);
+  for (lang::Func f : {m.light, m.guide, m.plane}) {
+    f.compute_at(m.result, m.y).vectorize(m.x, 8, guarded);
+    f.update().vectorize(m.x, 8, guarded);
+  }
 }
 
 }  // namespace

@@ -34,7 +34,9 @@ Func luminance(const lang::ImageParam& photo) {
   return f;
 }
 
-void store(Func f) { f.compute_root().vectorize(x, 8).parallel(y, 8); }
+constexpr auto guarded = lang::TailStrategy::GuardWithIf;  // never reads beside the photo
+
+void store(Func f) { f.compute_root().vectorize(x, 8, guarded).parallel(y); }
 
 // Mean over a square, one axis at a time.
 Func box_mean(const Func& f, int radius, const std::string& name) {
@@ -81,7 +83,7 @@ void tone_edit(const Shape& shape, float* photo, float* edited) {
   const Expr colour = input(x, y, c) * gain;
   const Expr gray = light(x, y) * gain;
   out(x, y, c) = lang::clamp(gray + saturation * (colour - gray), 0.0f, 1.0f);
-  out.vectorize(x, 8).parallel(y, 8);
+  out.vectorize(x, 8, guarded).parallel(y);
 
   input.set(lang::Buffer<float>(photo, shape.width, shape.height, 4));
   lang::Buffer<float> result(edited, shape.width, shape.height, 3);

@@ -3,6 +3,8 @@
 
 #include <OpenImageIO/filesystem.h>
 #include <OpenImageIO/imageio.h>
+#include <fcntl.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <cmath>
@@ -27,6 +29,26 @@ namespace {
     evidence.pop_back();
   retrograde::call_error(text("read ", quoted(path.string())), rule, evidence, instead);
 }
+
+// Decoders' libraries print to standard error what they also report: silent while this lives.
+class QuietErrors {
+ public:
+  QuietErrors() : kept_(::dup(STDERR_FILENO)) {
+    const int nowhere = ::open("/dev/null", O_WRONLY | O_CLOEXEC);
+    if (kept_ >= 0 && nowhere >= 0) ::dup2(nowhere, STDERR_FILENO);
+    if (nowhere >= 0) ::close(nowhere);
+  }
+  ~QuietErrors() {
+    if (kept_ < 0) return;
+    ::dup2(kept_, STDERR_FILENO);
+    ::close(kept_);
+  }
+  QuietErrors(const QuietErrors&) = delete;
+  QuietErrors& operator=(const QuietErrors&) = delete;
+
+ private:
+  int kept_;
+};
 
 std::unique_ptr<OIIO::ImageInput> open_image(const std::filesystem::path& path) {
   std::error_code failed;
@@ -74,6 +96,7 @@ void spread_channels(const std::vector<float>& from, int channels, std::vector<f
 }  // namespace
 
 Image read_image(const std::filesystem::path& path) {
+  const QuietErrors quiet;
   auto input = open_image(path);
   const OIIO::ImageSpec spec = input->spec();
   check_size(path, spec);

@@ -1,0 +1,217 @@
+// What bilateral_slice says to bad input: one line in four parts, status 1, and no file left
+// behind.
+#include <gtest/gtest.h>
+#include <sys/mount.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+
+#include "common/images.h"
+
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string contents(const fs::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  std::ostringstream text;
+  text << file.rdbuf();
+  return text.str();
+}
+
+class BilateralSliceErrors : public testing::Test {
+ protected:
+  void SetUp() override {
+    std::string name = (fs::temp_directory_path() / "bilateral_slice_errors.XXXXXX").string();
+    ASSERT_NE(mkdtemp(name.data()), nullptr);
+    folder_ = name;
+    photo_ = write_photo("photo.png", 12, 10);
+  }
+  void TearDown() override { fs::remove_all(folder_); }
+
+  fs::path write_photo(const std::string& name, int width, int height) {
+    apps::Image image{width, height, 8, {}};
+    uint32_t noise = 1;  // which no compression makes small
+    for (long n = 0; n < image.elems(); ++n) {
+      noise = noise * 1664525 + 1013904223;
+      image.pixels.push_back(static_cast<float>(noise >> 24) / 255.0f);
+    }
+    apps::write_png(folder_ / name, image);
+    return folder_ / name;
+  }
+
+  // Runs the program through the shell, after `before`, and keeps its status and messages.
+  void run(const std::string& arguments, const std::string& before = "") {
+    const std::string command = before + " " BILATERAL_SLICE_PROGRAM " " + arguments + " >" +
+                                (folder_ / "stdout").string() + " 2>" +
+                                (folder_ / "stderr").string();
+    const int status = std::system(command.c_str());
+    status_ = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
+    message_ = contents(folder_ / "stderr");
+  }
+
+  void run_on(const fs::path& input, const std::string& more = "") {
+    run("--halide-seconds 0 --input " + input.string() + " --output " + out().string() + " " +
+        more);
+  }
+
+  // The last line of standard error is the message; before it there may be lines of progress.
+  void expect_refused(const std::vector<std::string>& parts, bool after_progress = false) {
+    EXPECT_EQ(status_, 1) << message_;
+    ASSERT_FALSE(message_.empty());
+    EXPECT_EQ(message_.back(), '\n');
+    if (!after_progress) {
+      EXPECT_EQ(std::count(message_.begin(), message_.end(), '\n'), 1) << message_;
+    }
+    const size_t start = message_.rfind('\n', message_.size() - 2);
+    const std::string line = message_.substr(start == std::string::npos ? 0 : start + 1);
+    EXPECT_TRUE(line.starts_with("bilateral_slice: cannot ")) << line;
+    for (const std::string& part : parts) {
+      EXPECT_NE(line.find(part), std::string::npos) << "no \"" << part << "\" in: " << line;
+    }
+  }
+
+  void expect_no_results() {
+    if (!fs::exists(out())) return;
+    for (const auto& entry : fs::directory_iterator(out())) {
+      ADD_FAILURE() << "left behind: " << entry.path();
+    }
+  }
+
+  fs::path out() const { return folder_ / "out"; }
+
+  fs::path folder_, photo_;
+  int status_ = 0;
+  std::string message_;
+};
+
+TEST_F(BilateralSliceErrors, AMissingImageIsNamed) {
+  run_on(folder_ / "nowhere.png");
+  expect_refused({"read \"", "nowhere.png", "must be an image file", "Give the name of"});
+  expect_no_results();
+}
+
+TEST_F(BilateralSliceErrors, AFolderIsNoImage) {
+  run_on(folder_);
+  expect_refused({"must be an image file", "no regular file"});
+}
+
+TEST_F(BilateralSliceErrors, TextIsNoImage) {
+  std::ofstream(folder_ / "text.png") << "this is no picture";
+  run_on(folder_ / "text.png");
+  expect_refused({"text.png", "OpenImageIO decodes", "Give a PNG"});
+  expect_no_results();
+}
+
+TEST_F(BilateralSliceErrors, AnEmptyFileIsNoImage) {
+  std::ofstream(folder_ / "empty.png").close();
+  run_on(folder_ / "empty.png");
+  expect_refused({"empty.png", "OpenImageIO decodes"});
+}
+
+TEST_F(BilateralSliceErrors, ATruncatedImageIsRefused) {
+  const fs::path whole = write_photo("whole.png", 300, 200);
+  fs::copy_file(whole, folder_ / "half.png");
+  fs::resize_file(folder_ / "half.png", fs::file_size(whole) / 2);
+  run_on(folder_ / "half.png");
+  expect_refused({"half.png", "must be a whole image", "damaged or truncated"});
+  expect_no_results();
+}
+
+TEST_F(BilateralSliceErrors, SizesMustAgree) {
+  const fs::path other = write_photo("other.png", 12, 11);
+  run_on(photo_, "--target " + other.string());
+  expect_refused({"photo.png", "other.png", "must have the same size", "12 x 10", "12 x 11",
+                  "Resize or crop"});
+  expect_no_results();
+}
+
+TEST_F(BilateralSliceErrors, StepsMustBePositive) {
+  for (const char* steps : {"0", "-3"}) {
+    run_on(photo_, std::string("--steps ") + steps);
+    expect_refused({"--steps", steps, "must lie between 1 and", "too small"});
+  }
+}
+
+TEST_F(BilateralSliceErrors, StepsMustBeANumber) {
+  run_on(photo_, "--steps many");
+  expect_refused({"understand the command line", "many", "--help"});
+}
+
+TEST_F(BilateralSliceErrors, HugeStepsAreRefused) {
+  run_on(photo_, "--steps 99999999999999999999");
+  expect_refused({"--steps"});
+}
+
+TEST_F(BilateralSliceErrors, ThreadsMustBePositive) {
+  for (const char* threads : {"0", "-1", "5000"}) {
+    run_on(photo_, std::string("--threads ") + threads);
+    expect_refused({"--threads", threads, "must lie between 1 and 1024"});
+  }
+}
+
+TEST_F(BilateralSliceErrors, InputAndOutputAreNeeded) {
+  run("--output " + out().string());
+  expect_refused({"understand the command line", "--input is required"});
+  run("--input " + photo_.string());
+  expect_refused({"understand the command line", "--output is required"});
+}
+
+TEST_F(BilateralSliceErrors, UnknownOptionsAreRefused) {
+  run_on(photo_, "--sepia");
+  expect_refused({"understand the command line", "--sepia"});
+}
+
+TEST_F(BilateralSliceErrors, TheOutputMustBeAFolder) {
+  run("--input " + photo_.string() + " --output " + photo_.string());
+  expect_refused({"photo.png", "must be a folder", "Give another --output"});
+  run("--input " + photo_.string() + " --output " + (photo_ / "deeper").string());
+  expect_refused({"must be a folder"});
+}
+
+TEST_F(BilateralSliceErrors, AnUnwritableFolderIsFoundBeforeTheRun) {
+  // Root may write anywhere but where no file can be made.
+  const fs::path folder = getuid() == 0 ? fs::path("/proc") : out();
+  if (getuid() != 0) {
+    fs::create_directories(folder);
+    fs::permissions(folder, fs::perms::owner_read | fs::perms::owner_exec);
+  }
+  run("--input " + photo_.string() + " --output " + folder.string());
+  if (getuid() != 0) fs::permissions(folder, fs::perms::owner_all);
+  expect_refused({"write", "stored whole or not at all", "Give a folder that you may write to"});
+}
+
+TEST_F(BilateralSliceErrors, AFileThatMayNotGrowIsNotLeftHalfWritten) {
+  const fs::path large = write_photo("large.png", 100, 100);
+  // The limit is in blocks of 512 bytes: enough for the trial file, not for an image.
+  run("--halide-seconds 0 --steps 1 --input " + large.string() + " --output " + out().string(),
+      "ulimit -f 8;");
+  expect_refused({"input.png", "stored whole or not at all", "File too large", "Free some space"},
+                 true);
+  expect_no_results();
+}
+
+TEST_F(BilateralSliceErrors, AFullDiskLeavesNothingHalfWritten) {
+  fs::create_directories(out());
+  if (mount("tmpfs", out().c_str(), "tmpfs", 0, "size=16k") != 0) {
+    GTEST_SKIP() << "may not mount a small disk here";
+  }
+  const fs::path large = write_photo("large.png", 100, 100);
+  run_on(large, "--steps 1");
+  expect_refused({"input.png", "No space left on device", "Free some space"}, true);
+  expect_no_results();
+  umount(out().c_str());
+}
+
+TEST_F(BilateralSliceErrors, APlotThatCannotBeDrawnIsAnError) {
+  run("--halide-seconds 0 --steps 1 --input " + photo_.string() + " --output " + out().string(),
+      "RETROGRADE_PYTHON=/bin/false");
+  expect_refused({"draw", "error_against_time.png", "status 1", "python3-matplotlib"}, true);
+  EXPECT_TRUE(fs::exists(out() / "report.json"));
+  EXPECT_FALSE(fs::exists(out() / "error_against_time.png"));
+}
+
+}  // namespace

@@ -1,0 +1,108 @@
+// bilateral_slice on small images of awkward shapes: it ends well, and its report keeps its
+// promises.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "common/images.h"
+#include "common/process.h"
+
+namespace {
+
+namespace fs = std::filesystem;
+
+class BilateralSlice : public testing::Test {
+ protected:
+  void SetUp() override {
+    std::string name = (fs::temp_directory_path() / "bilateral_slice.XXXXXX").string();
+    ASSERT_NE(mkdtemp(name.data()), nullptr);
+    folder_ = name;
+  }
+  void TearDown() override { fs::remove_all(folder_); }
+
+  fs::path write_photo(const std::string& name, int width, int height, float power = 1) {
+    apps::Image image{width, height, 8, {}};
+    for (int y = 0; y < height; ++y) {
+      for (int x = 0; x < width; ++x) {
+        for (int c = 0; c < 3; ++c) {
+          const double wave = 0.5 + 0.4 * std::sin(0.31 * x + 0.5 * c) * std::cos(0.17 * y);
+          image.pixels.push_back(std::pow(static_cast<float>(wave), power));
+        }
+      }
+    }
+    apps::write_png(folder_ / name, image);
+    return folder_ / name;
+  }
+
+  nlohmann::json run(const std::vector<std::string>& more) {
+    std::vector<std::string> command{BILATERAL_SLICE_PROGRAM, "--output",
+                                     (folder_ / "out").string()};
+    command.insert(command.end(), more.begin(), more.end());
+    const apps::Outcome outcome = apps::run_program(command);
+    EXPECT_EQ(outcome.status, 0) << outcome.output;
+    for (const char* name : {"input.png", "target.png", "result.png", "error_against_time.png"}) {
+      EXPECT_TRUE(fs::exists(folder_ / "out" / name)) << name;
+    }
+    std::ifstream file(folder_ / "out" / "report.json");
+    return nlohmann::json::parse(file);
+  }
+
+  fs::path folder_;
+};
+
+TEST_F(BilateralSlice, LearnsACurveAndReportsIt) {
+  const auto photo = write_photo("photo.png", 150, 90);
+  const auto target = write_photo("target.png", 150, 90, 0.5f);
+  const auto report = run({"--input", photo, "--target", target, "--steps", "60", "--threads", "2",
+                           "--halide-seconds", "0"});
+  EXPECT_EQ(report["width"], 150);
+  EXPECT_EQ(report["height"], 90);
+  EXPECT_EQ(report["steps"], 60);
+  EXPECT_GT(report["psnr_final_db"], report["psnr_initial_db"].get<double>() + 10);
+  EXPECT_LE(report["gradient_check_max_relative_error"], 1e-3);
+  EXPECT_GT(report["ms_per_step"], 0);
+  EXPECT_GT(report["seconds"], 0);
+  EXPECT_GT(report["peak_memory_mb"], 0);
+  EXPECT_TRUE(report["halide_ms_per_step"].is_null());
+  EXPECT_TRUE(report["ratio_to_halide"].is_null());
+  EXPECT_EQ(report["retrograde"]["psnr_db"].size(), 60);
+}
+
+TEST_F(BilateralSlice, HalideTakesTheSameSteps) {
+  const auto photo = write_photo("photo.png", 120, 70);
+  const auto report = run({"--input", photo, "--steps", "12", "--threads", "2"});
+  ASSERT_EQ(report["halide"]["psnr_db"].size(), 12);
+  // The same function and the same steps: only rounding differs.
+  for (int step = 0; step < 12; ++step) {
+    EXPECT_NEAR(report["halide"]["psnr_db"][step].get<double>(),
+                report["retrograde"]["psnr_db"][step].get<double>(), 0.02)
+        << "step " << step;
+  }
+  EXPECT_GT(report["ratio_to_halide"], 0);
+}
+
+TEST_F(BilateralSlice, ShapesThatHardlyFillTheGridWork) {
+  for (const auto& [width, height] : {std::pair{1, 1}, {64, 1}, {1, 65}, {127, 3}}) {
+    SCOPED_TRACE(testing::Message() << width << " x " << height);
+    const auto photo = write_photo("photo.png", width, height);
+    const auto report =
+        run({"--input", photo, "--steps", "2", "--threads", "1", "--halide-seconds", "0"});
+    EXPECT_EQ(report["width"], width);
+    EXPECT_EQ(report["height"], height);
+    EXPECT_LE(report["gradient_check_max_relative_error"], 1e-3);
+  }
+}
+
+TEST_F(BilateralSlice, TheResultDoesNotDependOnTheThreads) {
+  const auto photo = write_photo("photo.png", 100, 80);
+  const std::vector<std::string> common{"--input", photo, "--steps", "5", "--halide-seconds", "0"};
+  auto one = common, three = common;
+  one.insert(one.end(), {"--threads", "1"});
+  three.insert(three.end(), {"--threads", "3"});
+  EXPECT_EQ(run(one)["retrograde"]["psnr_db"], run(three)["retrograde"]["psnr_db"]);
+}
+
+}  // namespace

@@ -1,0 +1,111 @@
+// Images of every kind come in as RGB floats, and go out as PNG.
+#include <OpenImageIO/imageio.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+#include <limits>
+
+#include "common/files.h"
+#include "common/images.h"
+#include "diagnostics/error.h"
+
+namespace {
+
+namespace fs = std::filesystem;
+
+void expect_pixels(const apps::Image& image, const std::vector<float>& expected) {
+  ASSERT_EQ(image.pixels.size(), expected.size());
+  for (size_t n = 0; n < expected.size(); ++n) EXPECT_FLOAT_EQ(image.pixels[n], expected[n]);
+}
+
+class AppImages : public testing::Test {
+ protected:
+  void SetUp() override {
+    std::string name = (fs::temp_directory_path() / "app_images.XXXXXX").string();
+    ASSERT_NE(mkdtemp(name.data()), nullptr);
+    folder_ = name;
+  }
+  void TearDown() override { fs::remove_all(folder_); }
+
+  // Sample n of the file is values[n].
+  fs::path store(const std::string& name, int width, int height, int channels, OIIO::TypeDesc type,
+                 const std::vector<float>& values) {
+    const fs::path path = folder_ / name;
+    auto output = OIIO::ImageOutput::create(path.string());
+    OIIO::ImageSpec spec(width, height, channels, type);
+    spec["oiio:UnassociatedAlpha"] = 1;
+    EXPECT_TRUE(output && output->open(path.string(), spec) &&
+                output->write_image(OIIO::TypeDesc::FLOAT, values.data()) && output->close());
+    return path;
+  }
+
+  fs::path folder_;
+};
+
+TEST_F(AppImages, EightBitsSurviveARoundTrip) {
+  apps::Image image{5, 3, 8, {}};
+  for (long n = 0; n < image.elems(); ++n) {
+    image.pixels.push_back(static_cast<float>(n * 11 % 256) / 255.0f);
+  }
+  apps::write_png(folder_ / "a.png", image);
+  const apps::Image back = apps::read_image(folder_ / "a.png");
+  EXPECT_EQ(back.width, 5);
+  EXPECT_EQ(back.height, 3);
+  EXPECT_EQ(back.bits, 8);
+  for (long n = 0; n < image.elems(); ++n) EXPECT_FLOAT_EQ(back.pixels[n], image.pixels[n]);
+}
+
+TEST_F(AppImages, SixteenBitsSurviveARoundTrip) {
+  apps::Image image{4, 2, 16, {}};
+  for (long n = 0; n < image.elems(); ++n) {
+    image.pixels.push_back(static_cast<float>(n * 2711 % 65536) / 65535.0f);
+  }
+  apps::write_png(folder_ / "a.png", image);
+  const apps::Image back = apps::read_image(folder_ / "a.png");
+  EXPECT_EQ(back.bits, 16);
+  for (long n = 0; n < image.elems(); ++n) EXPECT_NEAR(back.pixels[n], image.pixels[n], 1e-6);
+}
+
+TEST_F(AppImages, FloatsComeAsTheyAre) {
+  const auto path = store("a.exr", 2, 1, 3, OIIO::TypeDesc::FLOAT, {0, 0.25f, 3, -1, 0.5f, 1e-6f});
+  const apps::Image image = apps::read_image(path);
+  EXPECT_EQ(image.bits, 32);
+  EXPECT_EQ(image.pixels, (std::vector<float>{0, 0.25f, 3, -1, 0.5f, 1e-6f}));
+}
+
+TEST_F(AppImages, GrayIsSpreadOverTheColours) {
+  const auto path = store("a.png", 2, 1, 1, OIIO::TypeDesc::UINT8, {0.2f, 1.0f});
+  expect_pixels(apps::read_image(path), {0.2f, 0.2f, 0.2f, 1.0f, 1.0f, 1.0f});
+}
+
+TEST_F(AppImages, AlphaIsLeftOutAndDoesNotDarken) {
+  const auto path = store("a.png", 1, 1, 4, OIIO::TypeDesc::UINT8, {1.0f, 0.6f, 0.2f, 0.4f});
+  expect_pixels(apps::read_image(path), {1.0f, 0.6f, 0.2f});
+}
+
+TEST_F(AppImages, SamplesAreClampedInPng) {
+  apps::write_png(folder_ / "a.png", {1, 1, 8, {-2.0f, 0.0f, 7.0f}});
+  EXPECT_EQ(apps::read_image(folder_ / "a.png").pixels, (std::vector<float>{0, 0, 1}));
+}
+
+TEST_F(AppImages, ASampleThatIsNoNumberIsRefused) {
+  const auto path = store("a.exr", 2, 1, 3, OIIO::TypeDesc::FLOAT,
+                          {0, 0, 0, 0, std::numeric_limits<float>::quiet_NaN(), 0});
+  try {
+    apps::read_image(path);
+    FAIL() << "read a NaN";
+  } catch (const retrograde::UserError& error) {
+    EXPECT_NE(std::string(error.what()).find("pixel (1, 0) holds"), std::string::npos)
+        << error.what();
+  }
+}
+
+TEST_F(AppImages, AWrittenFileReplacesTheOldOneWhole) {
+  apps::write_file(folder_ / "f", "the old and longer text");
+  apps::write_file(folder_ / "f", "new");
+  EXPECT_EQ(fs::file_size(folder_ / "f"), 3u);
+  EXPECT_EQ(std::distance(fs::directory_iterator(folder_), fs::directory_iterator()), 1);
+}
+
+}  // namespace
