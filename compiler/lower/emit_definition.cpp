@@ -46,7 +46,7 @@ Requirements requirements_of(const LoopedFunc& f, int stage, const StageNest& ne
   for (const Expr& value : definition.values) {
     // Where the predicate is false nothing is read.
     bool guarded = definition.predicate.defined() && !value.type().is_handle() && !is_undef(value);
-    add(guarded ? make_select(definition.predicate, value, make_zero(value.type())) : value);
+    add(guarded ? call_op(Op::if_then_else, value.type(), {definition.predicate, value, make_zero(value.type())}) : value);
   }
   Footprint written;
   for (const Expr& arg : definition.args) {
