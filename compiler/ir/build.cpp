@@ -13,7 +13,9 @@ namespace retrograde::ir {
 
 namespace {
 
-Expr splat(Expr scalar, int lanes) { return lanes == 1 ? scalar : Expr(new Broadcast(std::move(scalar), lanes)); }
+Expr splat(Expr scalar, int lanes) {
+  return lanes == 1 ? scalar : Expr(new Broadcast(std::move(scalar), lanes));
+}
 
 // Every NaN becomes the one quiet NaN that the printer knows.
 Expr float_const(Type scalar, double value) {
@@ -33,7 +35,8 @@ Expr constant(const Scalar& s, int lanes) { return splat(scalar_const(s), lanes)
 }  // namespace
 
 Expr make_const(Type type, int64_t value) {
-  if (type.is_float()) return constant(eval_cast(type.element_of(), Scalar::of_int(Int(64), value)), type.lanes());
+  if (type.is_float())
+    return constant(eval_cast(type.element_of(), Scalar::of_int(Int(64), value)), type.lanes());
   return constant(Scalar::of_int(type, value), type.lanes());
 }
 
@@ -43,7 +46,8 @@ Expr make_const(Type type, double value) {
 }
 
 Expr make_uint_const(Type type, uint64_t value) {
-  if (type.is_float()) return constant(eval_cast(type.element_of(), Scalar::of_uint(UInt(64), value)), type.lanes());
+  if (type.is_float())
+    return constant(eval_cast(type.element_of(), Scalar::of_uint(UInt(64), value)), type.lanes());
   return constant(Scalar::of_uint(type, value), type.lanes());
 }
 
@@ -68,7 +72,9 @@ std::optional<double> as_const_float(const Expr& e) {
 namespace {
 bool is_number(const Expr& e, int value) {
   const std::optional<Scalar> s = as_scalar(e);
-  return s && (s->type.is_float() ? s->f == value : s->type.is_int() ? s->i == value : s->u == uint64_t(value));
+  return s && (s->type.is_float() ? s->f == value
+               : s->type.is_int() ? s->i == value
+                                  : s->u == uint64_t(value));
 }
 }  // namespace
 
@@ -91,8 +97,10 @@ bool is_comparison(Kind kind) { return kind >= Kind::EQ && kind <= Kind::GE; }
 
 void match_lanes(Expr& a, Expr& b) {
   if (a.type().lanes() == b.type().lanes()) return;
-  if (a.type().is_scalar()) a = make_broadcast(std::move(a), b.type().lanes());
-  else if (b.type().is_scalar()) b = make_broadcast(std::move(b), a.type().lanes());
+  if (a.type().is_scalar())
+    a = make_broadcast(std::move(a), b.type().lanes());
+  else if (b.type().is_scalar())
+    b = make_broadcast(std::move(b), a.type().lanes());
 }
 
 Expr new_binary(Kind kind, Type type, Expr a, Expr b) {
@@ -111,7 +119,8 @@ bool is_negative_zero(const Expr& e) {
   return value && *value == 0 && std::signbit(*value);
 }
 
-// x + -0.0, x - 0.0, x * 1.0 and x / 1.0 are x for every x, NaN, infinities and -0.0 among them. x + 0.0 is not.
+// x + -0.0, x - 0.0, x * 1.0 and x / 1.0 are x for every x, NaN, infinities and -0.0 among them. x
+// + 0.0 is not.
 Expr fold_float(Kind kind, const Expr& a, const Expr& b) {
   switch (kind) {
     case Kind::Add:
@@ -178,7 +187,8 @@ Expr fold_binary(Kind kind, Type result, const Expr& a, const Expr& b) {
 
 Expr binary(Kind kind, Expr a, Expr b) {
   match_lanes(a, b);
-  RETROGRADE_ASSERT(a.type() == b.type(), kind_name(kind), " of ", a.type(), " and ", b.type(), ": ", a, ", ", b);
+  RETROGRADE_ASSERT(a.type() == b.type(), kind_name(kind), " of ", a.type(), " and ", b.type(),
+                    ": ", a, ", ", b);
   const bool logical = kind == Kind::And || kind == Kind::Or;
   RETROGRADE_ASSERT(!logical || a.type().is_bool(), kind_name(kind), " of ", a.type());
   const Type type = is_comparison(kind) ? Bool(a.type().lanes()) : a.type();
@@ -207,25 +217,30 @@ bool cast_is_defined(Type to, const Scalar& from) {
 
 Expr cast_to(Type type, Expr value) {
   if (type.lanes() != value.type().lanes()) {
-    RETROGRADE_ASSERT(type.is_scalar() || value.type().is_scalar(), "cast of ", value.type(), " to ", type);
-    if (value.type().is_scalar()) return make_broadcast(cast_to(type.element_of(), std::move(value)), type.lanes());
+    RETROGRADE_ASSERT(type.is_scalar() || value.type().is_scalar(), "cast of ", value.type(),
+                      " to ", type);
+    if (value.type().is_scalar())
+      return make_broadcast(cast_to(type.element_of(), std::move(value)), type.lanes());
     type = type.with_lanes(value.type().lanes());
   }
   if (type == value.type()) return value;
-  RETROGRADE_ASSERT(!type.is_handle() && !value.type().is_handle(), "cast of ", value.type(), " to ", type);
+  RETROGRADE_ASSERT(!type.is_handle() && !value.type().is_handle(), "cast of ", value.type(),
+                    " to ", type);
   const std::optional<Scalar> s = as_scalar(value);
-  if (s && cast_is_defined(type.element_of(), *s)) return constant(eval_cast(type.element_of(), *s), type.lanes());
+  if (s && cast_is_defined(type.element_of(), *s))
+    return constant(eval_cast(type.element_of(), *s), type.lanes());
   return new Cast(type, std::move(value));
 }
 
 Expr reinterpret_as(Type type, Expr value) {
   if (type == value.type()) return value;
-  RETROGRADE_ASSERT(type.bits() * type.lanes() == value.type().bits() * value.type().lanes(), "reinterpret ",
-                    value.type(), " as ", type);
+  RETROGRADE_ASSERT(type.bits() * type.lanes() == value.type().bits() * value.type().lanes(),
+                    "reinterpret ", value.type(), " as ", type);
   const std::optional<Scalar> s = as_scalar(value);
   if (s && type.lanes() == value.type().lanes() && !type.is_handle()) {
     const Scalar result = eval_reinterpret(type.element_of(), *s);
-    if (!type.is_float() || !std::isnan(result.f)) return constant(result, type.lanes());  // NaNs carry payloads
+    if (!type.is_float() || !std::isnan(result.f))
+      return constant(result, type.lanes());  // NaNs carry payloads
   }
   return new Reinterpret(type, std::move(value));
 }
@@ -238,10 +253,10 @@ Expr make_select(Expr condition, Expr true_value, Expr false_value) {
     false_value = make_broadcast(std::move(false_value), lanes);
   }
   RETROGRADE_ASSERT(condition.type().is_bool(), "select on ", condition.type());
-  RETROGRADE_ASSERT(true_value.type() == false_value.type(), "select between ", true_value.type(), " and ",
-                    false_value.type());
-  RETROGRADE_ASSERT(lanes == 1 || lanes == true_value.type().lanes(), "select of ", true_value.type(), " on ",
-                    condition.type());
+  RETROGRADE_ASSERT(true_value.type() == false_value.type(), "select between ", true_value.type(),
+                    " and ", false_value.type());
+  RETROGRADE_ASSERT(lanes == 1 || lanes == true_value.type().lanes(), "select of ",
+                    true_value.type(), " on ", condition.type());
   if (is_const_true(condition)) return true_value;
   if (is_const_false(condition)) return false_value;
   if (true_value.same_as(false_value)) return true_value;
@@ -264,7 +279,8 @@ Expr make_ramp(Expr base, Expr stride, int lanes) {
 Expr make_broadcast(Expr value, int lanes) {
   RETROGRADE_ASSERT(lanes >= 1, "a broadcast to ", lanes, " lanes");
   if (lanes == 1) return value;
-  if (const auto* inner = value.as<Broadcast>()) return new Broadcast(inner->value, inner->lanes * lanes);
+  if (const auto* inner = value.as<Broadcast>())
+    return new Broadcast(inner->value, inner->lanes * lanes);
   return new Broadcast(std::move(value), lanes);
 }
 
@@ -276,12 +292,14 @@ Expr make_shuffle(std::vector<Expr> vectors, std::vector<int> indices) {
   RETROGRADE_ASSERT(!vectors.empty() && !indices.empty(), "an empty shuffle");
   int lanes = 0;
   for (const Expr& v : vectors) {
-    RETROGRADE_ASSERT(v.type().element_of() == vectors[0].type().element_of(), "a shuffle of mixed types");
+    RETROGRADE_ASSERT(v.type().element_of() == vectors[0].type().element_of(),
+                      "a shuffle of mixed types");
     lanes += v.type().lanes();
   }
   bool identity = vectors.size() == 1 && static_cast<int>(indices.size()) == lanes;
   for (size_t i = 0; i < indices.size(); ++i) {
-    RETROGRADE_ASSERT(indices[i] >= 0 && indices[i] < lanes, "shuffle index ", indices[i], " of ", lanes, " lanes");
+    RETROGRADE_ASSERT(indices[i] >= 0 && indices[i] < lanes, "shuffle index ", indices[i], " of ",
+                      lanes, " lanes");
     identity &= indices[i] == static_cast<int>(i);
   }
   if (identity) return vectors[0];
@@ -291,7 +309,8 @@ Expr make_shuffle(std::vector<Expr> vectors, std::vector<int> indices) {
 
 Expr make_vector_reduce(ReduceOp op, Expr value, int result_lanes) {
   const int lanes = value.type().lanes();
-  RETROGRADE_ASSERT(result_lanes >= 1 && lanes % result_lanes == 0, "reducing ", lanes, " lanes to ", result_lanes);
+  RETROGRADE_ASSERT(result_lanes >= 1 && lanes % result_lanes == 0, "reducing ", lanes,
+                    " lanes to ", result_lanes);
   if (lanes == result_lanes) return value;
   const Type type = value.type().with_lanes(result_lanes);
   return new VectorReduce(type, op, std::move(value));
@@ -315,8 +334,8 @@ Type match_argument_lanes(Type type, std::vector<Expr>& args) {
   for (const Expr& arg : args) lanes = std::max(lanes, arg.type().lanes());
   for (Expr& arg : args) {
     if (lanes > 1 && arg.type().is_scalar()) arg = make_broadcast(std::move(arg), lanes);
-    RETROGRADE_ASSERT(arg.type().lanes() == lanes, "operator arguments of ", arg.type().lanes(), " and ", lanes,
-                      " lanes");
+    RETROGRADE_ASSERT(arg.type().lanes() == lanes, "operator arguments of ", arg.type().lanes(),
+                      " and ", lanes, " lanes");
   }
   return type.with_lanes(lanes);
 }
@@ -325,9 +344,10 @@ Type match_argument_lanes(Type type, std::vector<Expr>& args) {
 
 Expr call_op(Op op, Type type, std::vector<Expr> args) {
   const OpInfo& info = op_info(op);
-  RETROGRADE_ASSERT(info.arity < 0 || info.arity == static_cast<int>(args.size()), info.name, " of ", args.size(),
-                    " arguments");
-  if (info.cls == OpClass::Pure || info.cls == OpClass::Marker) type = match_argument_lanes(type, args);
+  RETROGRADE_ASSERT(info.arity < 0 || info.arity == static_cast<int>(args.size()), info.name,
+                    " of ", args.size(), " arguments");
+  if (info.cls == OpClass::Pure || info.cls == OpClass::Marker)
+    type = match_argument_lanes(type, args);
   if (info.cls == OpClass::Pure) {
     if (Expr folded = fold_operator(op, type, args); folded.defined()) return folded;
   }
@@ -344,8 +364,10 @@ Expr call_extern(const std::string& name, Type type, std::vector<Expr> args) {
   return new Call(type, CallType::Extern, Op::none, name, std::move(args), 0, {});
 }
 
-Expr call_func(const std::string& name, Type type, std::vector<Expr> args, int value_index, SymbolRef symbol) {
-  return new Call(type, CallType::Func, Op::none, name, std::move(args), value_index, std::move(symbol));
+Expr call_func(const std::string& name, Type type, std::vector<Expr> args, int value_index,
+               SymbolRef symbol) {
+  return new Call(type, CallType::Func, Op::none, name, std::move(args), value_index,
+                  std::move(symbol));
 }
 
 Expr call_image(const std::string& name, Type type, std::vector<Expr> args, SymbolRef symbol) {
@@ -366,7 +388,9 @@ Stmt make_let(const std::string& name, Expr value, Stmt body) {
   return body.defined() ? Stmt(new LetStmt(name, std::move(value), std::move(body))) : Stmt();
 }
 
-Stmt make_assert(Expr condition, Expr error) { return new Assert(std::move(condition), std::move(error)); }
+Stmt make_assert(Expr condition, Expr error) {
+  return new Assert(std::move(condition), std::move(error));
+}
 
 Stmt make_producer_consumer(const std::string& name, bool is_producer, Stmt body) {
   return body.defined() ? Stmt(new ProducerConsumer(name, is_producer, std::move(body))) : Stmt();
@@ -380,21 +404,24 @@ Stmt make_for(const std::string& name, Expr min, Expr extent, ForType type, Stmt
 Stmt make_store(const std::string& name, Expr value, Expr index, Expr predicate, SymbolRef symbol) {
   match_lanes(value, index);
   if (predicate.defined() && is_const_true(predicate)) predicate = {};
-  return new Store(name, std::move(value), std::move(index), std::move(predicate), std::move(symbol));
+  return new Store(name, std::move(value), std::move(index), std::move(predicate),
+                   std::move(symbol));
 }
 
-Stmt make_provide(const std::string& name, std::vector<Expr> values, std::vector<Expr> args, Expr predicate) {
+Stmt make_provide(const std::string& name, std::vector<Expr> values, std::vector<Expr> args,
+                  Expr predicate) {
   if (predicate.defined() && is_const_true(predicate)) predicate = {};
   return new Provide(name, std::move(values), std::move(args), std::move(predicate));
 }
 
-Stmt make_realize(const std::string& name, std::vector<Type> types, MemoryType memory, std::vector<Range> bounds,
-                  Stmt body) {
+Stmt make_realize(const std::string& name, std::vector<Type> types, MemoryType memory,
+                  std::vector<Range> bounds, Stmt body) {
   if (!body.defined()) return {};
   return new Realize(name, std::move(types), memory, std::move(bounds), std::move(body));
 }
 
-Stmt make_allocate(const std::string& name, Type type, MemoryType memory, Expr elements, Stmt body) {
+Stmt make_allocate(const std::string& name, Type type, MemoryType memory, Expr elements,
+                   Stmt body) {
   if (!body.defined()) return {};
   return new Allocate(name, type, memory, std::move(elements), std::move(body));
 }
@@ -419,7 +446,8 @@ Stmt make_if(Expr condition, Stmt then_case, Stmt else_case) {
   if (is_const_true(condition)) return then_case;
   if (is_const_false(condition)) return else_case;
   if (!then_case.defined()) {
-    return else_case.defined() ? make_if(logical_not(std::move(condition)), std::move(else_case)) : Stmt();
+    return else_case.defined() ? make_if(logical_not(std::move(condition)), std::move(else_case))
+                               : Stmt();
   }
   return new IfThenElse(std::move(condition), std::move(then_case), std::move(else_case));
 }

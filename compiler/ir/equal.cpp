@@ -1,5 +1,5 @@
-// Structural order, equality and hash. The hash is kept in the node, so unequal trees are told apart at once and equal
-// ones are compared once per pair of nodes.
+// Structural order, equality and hash. The hash is kept in the node, so unequal trees are told
+// apart at once and equal ones are compared once per pair of nodes.
 #include "ir/equal.h"
 
 #include <bit>
@@ -18,7 +18,8 @@ int order(const T& a, const T& b) {
   return a < b ? -1 : b < a ? 1 : 0;
 }
 
-// Compares two trees, remembering the pairs of nodes that were equal: linear in the product of sharing.
+// Compares two trees, remembering the pairs of nodes that were equal: linear in the product of
+// sharing.
 class Comparer {
  public:
   int compare(const Expr& a, const Expr& b) {
@@ -68,7 +69,9 @@ class Comparer {
 
 int Comparer::compare_nodes(const Expr& a, const Expr& b) {
   // Other kinds than `a`'s were ruled out before.
-  const auto same_kind = [&]<class N>(const N&) -> const N& { return *static_cast<const N*>(b.get()); };
+  const auto same_kind = [&]<class N>(const N&) -> const N& {
+    return *static_cast<const N*>(b.get());
+  };
   return match(
       a, [&](const IntImm& n) { return order(n.value, same_kind(n).value); },
       [&](const UIntImm& n) { return order(n.value, same_kind(n).value); },
@@ -93,32 +96,38 @@ int Comparer::compare_nodes(const Expr& a, const Expr& b) {
       },
       [&](const Load& n) {
         const Load& m = same_kind(n);
-        return first([&] { return order(n.name, m.name); }, [&] { return compare(n.index, m.index); },
+        return first([&] { return order(n.name, m.name); },
+                     [&] { return compare(n.index, m.index); },
                      [&] { return compare(n.predicate, m.predicate); });
       },
       [&](const Ramp& n) {
         const Ramp& m = same_kind(n);
-        return first([&] { return order(n.lanes, m.lanes); }, [&] { return compare(n.base, m.base); },
+        return first([&] { return order(n.lanes, m.lanes); },
+                     [&] { return compare(n.base, m.base); },
                      [&] { return compare(n.stride, m.stride); });
       },
       [&](const Broadcast& n) {
         const Broadcast& m = same_kind(n);
-        return first([&] { return order(n.lanes, m.lanes); }, [&] { return compare(n.value, m.value); });
+        return first([&] { return order(n.lanes, m.lanes); },
+                     [&] { return compare(n.value, m.value); });
       },
       [&](const Call& n) {
         const Call& m = same_kind(n);
-        return first([&] { return order(n.call_type, m.call_type); }, [&] { return order(n.op, m.op); },
-                     [&] { return order(n.name, m.name); }, [&] { return order(n.value_index, m.value_index); },
+        return first([&] { return order(n.call_type, m.call_type); },
+                     [&] { return order(n.op, m.op); }, [&] { return order(n.name, m.name); },
+                     [&] { return order(n.value_index, m.value_index); },
                      [&] { return compare_all(n.args, m.args); });
       },
       [&](const Let& n) {
         const Let& m = same_kind(n);
-        return first([&] { return order(n.name, m.name); }, [&] { return compare(n.value, m.value); },
+        return first([&] { return order(n.name, m.name); },
+                     [&] { return compare(n.value, m.value); },
                      [&] { return compare(n.body, m.body); });
       },
       [&](const Shuffle& n) {
         const Shuffle& m = same_kind(n);
-        return first([&] { return order(n.indices, m.indices); }, [&] { return compare_all(n.vectors, m.vectors); });
+        return first([&] { return order(n.indices, m.indices); },
+                     [&] { return compare_all(n.vectors, m.vectors); });
       },
       [&](const VectorReduce& n) {
         const VectorReduce& m = same_kind(n);
@@ -135,49 +144,62 @@ int Comparer::compare(const Stmt& a, const Stmt& b) {
 }
 
 int Comparer::compare_nodes(const Stmt& a, const Stmt& b) {
-  const auto same_kind = [&]<class N>(const N&) -> const N& { return *static_cast<const N*>(b.get()); };
+  const auto same_kind = [&]<class N>(const N&) -> const N& {
+    return *static_cast<const N*>(b.get());
+  };
   return match(
       a,
       [&](const LetStmt& n) {
         const LetStmt& m = same_kind(n);
-        return first([&] { return order(n.name, m.name); }, [&] { return compare(n.value, m.value); },
+        return first([&] { return order(n.name, m.name); },
+                     [&] { return compare(n.value, m.value); },
                      [&] { return compare(n.body, m.body); });
       },
       [&](const Assert& n) {
         const Assert& m = same_kind(n);
-        return first([&] { return compare(n.condition, m.condition); }, [&] { return compare(n.error, m.error); });
+        return first([&] { return compare(n.condition, m.condition); },
+                     [&] { return compare(n.error, m.error); });
       },
       [&](const ProducerConsumer& n) {
         const ProducerConsumer& m = same_kind(n);
-        return first([&] { return order(n.name, m.name); }, [&] { return order(n.is_producer, m.is_producer); },
+        return first([&] { return order(n.name, m.name); },
+                     [&] { return order(n.is_producer, m.is_producer); },
                      [&] { return compare(n.body, m.body); });
       },
       [&](const For& n) {
         const For& m = same_kind(n);
-        return first([&] { return order(n.name, m.name); }, [&] { return order(n.for_type, m.for_type); },
-                     [&] { return compare(n.min, m.min); }, [&] { return compare(n.extent, m.extent); },
-                     [&] { return compare(n.body, m.body); });
+        return first(
+            [&] { return order(n.name, m.name); }, [&] { return order(n.for_type, m.for_type); },
+            [&] { return compare(n.min, m.min); }, [&] { return compare(n.extent, m.extent); },
+            [&] { return compare(n.body, m.body); });
       },
       [&](const Store& n) {
         const Store& m = same_kind(n);
-        return first([&] { return order(n.name, m.name); }, [&] { return compare(n.value, m.value); },
-                     [&] { return compare(n.index, m.index); }, [&] { return compare(n.predicate, m.predicate); });
+        return first([&] { return order(n.name, m.name); },
+                     [&] { return compare(n.value, m.value); },
+                     [&] { return compare(n.index, m.index); },
+                     [&] { return compare(n.predicate, m.predicate); });
       },
       [&](const Provide& n) {
         const Provide& m = same_kind(n);
-        return first([&] { return order(n.name, m.name); }, [&] { return compare_all(n.values, m.values); },
-                     [&] { return compare_all(n.args, m.args); }, [&] { return compare(n.predicate, m.predicate); });
+        return first([&] { return order(n.name, m.name); },
+                     [&] { return compare_all(n.values, m.values); },
+                     [&] { return compare_all(n.args, m.args); },
+                     [&] { return compare(n.predicate, m.predicate); });
       },
       [&](const Realize& n) {
         const Realize& m = same_kind(n);
-        return first([&] { return order(n.name, m.name); }, [&] { return compare_all(n.types, m.types); },
-                     [&] { return order(n.memory, m.memory); }, [&] { return compare_all(n.bounds, m.bounds); },
+        return first([&] { return order(n.name, m.name); },
+                     [&] { return compare_all(n.types, m.types); },
+                     [&] { return order(n.memory, m.memory); },
+                     [&] { return compare_all(n.bounds, m.bounds); },
                      [&] { return compare(n.body, m.body); });
       },
       [&](const Allocate& n) {
         const Allocate& m = same_kind(n);
         return first([&] { return order(n.name, m.name); }, [&] { return order(n.type, m.type); },
-                     [&] { return order(n.memory, m.memory); }, [&] { return compare(n.elements, m.elements); },
+                     [&] { return order(n.memory, m.memory); },
+                     [&] { return compare(n.elements, m.elements); },
                      [&] { return compare(n.body, m.body); });
       },
       [&](const Free& n) { return order(n.name, same_kind(n).name); },
@@ -188,7 +210,8 @@ int Comparer::compare_nodes(const Stmt& a, const Stmt& b) {
                      [&] { return compare(n.then_case, m.then_case); },
                      [&] { return compare(n.else_case, m.else_case); });
       },
-      [&](const Evaluate& n) { return compare(n.value, same_kind(n).value); }, [](const StmtNode&) { return 0; });
+      [&](const Evaluate& n) { return compare(n.value, same_kind(n).value); },
+      [](const StmtNode&) { return 0; });
 }
 
 // ---- hash ----
@@ -205,9 +228,11 @@ uint64_t text_hash(const std::string& s) { return std::hash<std::string_view>()(
 // What a node says beyond its kind, type and children.
 uint64_t payload(const Expr& e) {
   return match(
-      e, [](const IntImm& n) { return static_cast<uint64_t>(n.value); }, [](const UIntImm& n) { return n.value; },
+      e, [](const IntImm& n) { return static_cast<uint64_t>(n.value); },
+      [](const UIntImm& n) { return n.value; },
       [](const FloatImm& n) { return std::bit_cast<uint64_t>(n.value); },
-      [](const StringImm& n) { return text_hash(n.value); }, [](const Variable& n) { return text_hash(n.name); },
+      [](const StringImm& n) { return text_hash(n.value); },
+      [](const Variable& n) { return text_hash(n.name); },
       [](const Load& n) { return mix(text_hash(n.name), n.predicate.defined()); },
       [](const Ramp& n) { return static_cast<uint64_t>(n.lanes); },
       [](const Broadcast& n) { return static_cast<uint64_t>(n.lanes); },
@@ -222,7 +247,8 @@ uint64_t payload(const Expr& e) {
         for (int index : n.indices) h = mix(h, static_cast<uint64_t>(index));
         return h;
       },
-      [](const VectorReduce& n) { return static_cast<uint64_t>(n.op); }, [](const ExprNode&) { return uint64_t{0}; });
+      [](const VectorReduce& n) { return static_cast<uint64_t>(n.op); },
+      [](const ExprNode&) { return uint64_t{0}; });
 }
 
 }  // namespace

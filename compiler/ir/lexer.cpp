@@ -9,14 +9,18 @@ namespace retrograde::ir {
 
 namespace {
 bool is_digit(char c) { return std::isdigit(static_cast<unsigned char>(c)); }
-bool starts_name(char c) { return std::isalpha(static_cast<unsigned char>(c)) || c == '_' || c == '$'; }
+bool starts_name(char c) {
+  return std::isalpha(static_cast<unsigned char>(c)) || c == '_' || c == '$';
+}
 bool continues_name(char c) { return starts_name(c) || is_digit(c) || c == '.'; }
 }  // namespace
 
 void Lexer::fail(const Token& at, const std::string& expected) {
   const std::string found = at.kind == Token::Kind::End ? "the end of the text" : quoted(at.text);
-  user_error("read IR text", text("line ", at.line, ", column ", at.column, ": expected ", expected),
-             "found " + found, "The language is the printer's output; compare with the text of a similar program");
+  user_error("read IR text",
+             text("line ", at.line, ", column ", at.column, ": expected ", expected),
+             "found " + found,
+             "The language is the printer's output; compare with the text of a similar program");
 }
 
 void Lexer::skip_space() {
@@ -63,7 +67,8 @@ void Lexer::read_quoted_name(Token& token) {
   token.kind = Token::Kind::Name;
   token.quoted = true;
   for (advance();; advance()) {
-    if (at_ >= text_.size()) fail(Token{Token::Kind::End, {}, false, line_, column_}, "a closing back quote");
+    if (at_ >= text_.size())
+      fail(Token{Token::Kind::End, {}, false, line_, column_}, "a closing back quote");
     if (peek() == '`') {
       advance();
       if (peek() != '`') return;  // two stand for one inside
@@ -92,7 +97,8 @@ void Lexer::read_number(Token& token) {
 void Lexer::read_string(Token& token) {
   token.kind = Token::Kind::String;
   for (advance(); peek() != '"'; advance()) {
-    if (at_ >= text_.size()) fail(Token{Token::Kind::End, {}, false, line_, column_}, "a closing quote");
+    if (at_ >= text_.size())
+      fail(Token{Token::Kind::End, {}, false, line_, column_}, "a closing quote");
     const bool escaped = peek() == '\\';
     if (escaped) advance();
     token.text += escaped && peek() == 'n' ? '\n' : peek();

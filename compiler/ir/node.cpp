@@ -39,8 +39,9 @@ Op op_from_name(const std::string& name) {
   return found == by_name.end() ? Op::none : found->second;
 }
 
-// A deleted node drops its children, which may end here again: those are queued in the outermost call, on whose stack
-// the queue lives. (A thread_local queue with a destructor would be gone before the last static Expr is.)
+// A deleted node drops its children, which may end here again: those are queued in the outermost
+// call, on whose stack the queue lives. (A thread_local queue with a destructor would be gone
+// before the last static Expr is.)
 void release(const Node* node) noexcept {
   thread_local std::vector<const Node*>* pending = nullptr;
   if (pending) {

@@ -1,5 +1,5 @@
-// What the operators of operators.def do to scalars. Floats narrower than 64 bits are computed in double and rounded
-// once, so these are the exact functions that vector math approximates.
+// What the operators of operators.def do to scalars. Floats narrower than 64 bits are computed in
+// double and rounded once, so these are the exact functions that vector math approximates.
 #include <bit>
 #include <cmath>
 
@@ -33,7 +33,9 @@ int64_t shift_amount(const Scalar& b) {
 }
 
 Scalar eval_bitwise(Op op, const Scalar& a, const Scalar& b) {
-  const uint64_t bits = op == Op::bitwise_and ? a.u & b.u : op == Op::bitwise_or ? a.u | b.u : a.u ^ b.u;
+  const uint64_t bits = op == Op::bitwise_and  ? a.u & b.u
+                        : op == Op::bitwise_or ? a.u | b.u
+                                               : a.u ^ b.u;
   return Scalar::of_uint(a.type, bits);
 }
 
@@ -50,11 +52,13 @@ double unit_weight(const Scalar& weight) {
   return static_cast<double>(weight.u) / static_cast<double>(weight.type.max_uint());
 }
 
-// A float weight is first scaled to the width of the values, rounding down: 0.5 of 8 bits is 127 / 255.
+// A float weight is first scaled to the width of the values, rounding down: 0.5 of 8 bits is 127 /
+// 255.
 Scalar fixed_point_weight(const Scalar& weight, Type values) {
   const Type fixed = UInt(values.bits());
   if (!weight.type.is_float()) return weight;
-  return eval_cast(fixed, Scalar::of_float(Float(64), weight.f * static_cast<double>(fixed.max_uint())));
+  return eval_cast(fixed,
+                   Scalar::of_float(Float(64), weight.f * static_cast<double>(fixed.max_uint())));
 }
 
 // Nearest integer to a + (b - a) * w / max_w. max_w is odd, so there are no ties.
@@ -84,12 +88,16 @@ Scalar eval_lerp(const Scalar& a, const Scalar& b, const Scalar& weight, Type ty
 Scalar eval_saturating_cast(Type type, const Scalar& a) {
   if (type.is_float()) {
     const Scalar value = eval_cast(type, a);
-    if (!std::isinf(value.f) || (a.type.is_float() && std::isinf(a.f) && a.type.bits() == type.bits())) return value;
-    const uint64_t infinity_pattern = eval_reinterpret(UInt(type.bits()), value).u;  // one below: the largest finite
+    if (!std::isinf(value.f) ||
+        (a.type.is_float() && std::isinf(a.f) && a.type.bits() == type.bits()))
+      return value;
+    const uint64_t infinity_pattern =
+        eval_reinterpret(UInt(type.bits()), value).u;  // one below: the largest finite
     return eval_reinterpret(type, Scalar::of_uint(UInt(type.bits()), infinity_pattern - 1));
   }
   if (a.type.is_float()) return eval_cast(type, a);  // saturates already
-  if (a.type.is_int() ? type.can_represent(a.i) : type.can_represent(a.u)) return eval_cast(type, a);
+  if (a.type.is_int() ? type.can_represent(a.i) : type.can_represent(a.u))
+    return eval_cast(type, a);
   const bool negative = a.type.is_int() && a.i < 0;
   return negative ? Scalar::of_int(type, type.min_int()) : Scalar::of_uint(type, type.max_uint());
 }
@@ -168,7 +176,8 @@ Scalar eval_unary(Op op, const Scalar& a, Type type) {
     case Op::bitwise_not:
       return Scalar::of_uint(a.type, ~a.u);
     case Op::abs:
-      return a.type.is_float() ? Scalar::of_float(type, std::fabs(a.f)) : Scalar::of_uint(type, magnitude(a));
+      return a.type.is_float() ? Scalar::of_float(type, std::fabs(a.f))
+                               : Scalar::of_uint(type, magnitude(a));
     case Op::is_nan:
       return Scalar::of_bool(std::isnan(a.f));
     case Op::is_inf:
@@ -214,7 +223,8 @@ std::optional<Scalar> eval_operator(Op op, const Args& args, Type type) {
   const OpInfo& info = op_info(op);
   if (info.cls == OpClass::Marker) return args.at(0);
   if (info.cls != OpClass::Pure) return std::nullopt;
-  RETROGRADE_ASSERT(static_cast<int>(args.size()) == info.arity, info.name, " of ", args.size(), " arguments");
+  RETROGRADE_ASSERT(static_cast<int>(args.size()) == info.arity, info.name, " of ", args.size(),
+                    " arguments");
   const Type scalar = type.element_of();
   if (info.arity == 1) return eval_unary(op, args[0], scalar);
   if (info.arity == 2) return eval_two(op, args[0], args[1], scalar);

@@ -1,5 +1,5 @@
-// Recursive descent over IR text; print.cpp shows the language. Operators may also be written without parentheses, with
-// C's precedence.
+// Recursive descent over IR text; print.cpp shows the language. Operators may also be written
+// without parentheses, with C's precedence.
 #include "ir/parse.h"
 
 #include <charconv>
@@ -21,7 +21,8 @@ constexpr int max_depth = 4000;
 
 class Parser {
  public:
-  explicit Parser(const std::string& text) : lexer_(text), token_(lexer_.next()), ahead_(lexer_.next()) {}
+  explicit Parser(const std::string& text)
+      : lexer_(text), token_(lexer_.next()), ahead_(lexer_.next()) {}
 
   Expr whole_expr() {
     Expr e = expr();
@@ -41,7 +42,9 @@ class Parser {
     if (token_.kind == Token::Kind::Name) return !token_.quoted && token_.text == text;
     return token_.kind == Token::Kind::Punctuation && token_.text == text;
   }
-  bool ahead_is(const char* text) const { return ahead_.kind == Token::Kind::Punctuation && ahead_.text == text; }
+  bool ahead_is(const char* text) const {
+    return ahead_.kind == Token::Kind::Punctuation && ahead_.text == text;
+  }
   Token take() {
     Token result = std::move(token_);
     token_ = std::move(ahead_);
@@ -65,7 +68,8 @@ class Parser {
     int value = 0;
     const std::string& digits = token_.text;
     const auto end = std::from_chars(digits.data(), digits.data() + digits.size(), value);
-    if (token_.kind != Token::Kind::Number || end.ptr != digits.data() + digits.size()) fail("an integer");
+    if (token_.kind != Token::Kind::Number || end.ptr != digits.data() + digits.size())
+      fail("an integer");
     take();
     return value;
   }
@@ -84,8 +88,10 @@ class Parser {
       return make();
     } catch (const InternalError& error) {
       const std::string what = error.what();
-      user_error("read IR text", text("line ", at.line, ", column ", at.column, ": operands must fit each other"),
-                 what.substr(0, what.find('\n')), "Cast an operand, or write its type after a colon");
+      user_error("read IR text",
+                 text("line ", at.line, ", column ", at.column, ": operands must fit each other"),
+                 what.substr(0, what.find('\n')),
+                 "Cast an operand, or write its type after a colon");
     }
   }
 
@@ -169,7 +175,8 @@ std::optional<Infix> infix_operator(const Token& token) {
 Expr Parser::infix(int min_precedence) {
   const Depth depth(*this);
   Expr left = prefix();
-  for (auto op = infix_operator(token_); op && op->precedence >= min_precedence; op = infix_operator(token_)) {
+  for (auto op = infix_operator(token_); op && op->precedence >= min_precedence;
+       op = infix_operator(token_)) {
     const Token at = take();
     Expr right = infix(op->precedence + 1);
     left = build(at, [&] { return binary(op->kind, left, right); });
@@ -219,7 +226,8 @@ std::optional<Type> suffix_type(const std::string& suffix) {
   for (const auto& [short_name, long_name] : prefixes) {
     Type type;
     const std::string prefix = short_name;
-    if (suffix.rfind(prefix, 0) == 0 && read_type(long_name + suffix.substr(prefix.size()), type)) return type;
+    if (suffix.rfind(prefix, 0) == 0 && read_type(long_name + suffix.substr(prefix.size()), type))
+      return type;
   }
   return std::nullopt;
 }
@@ -230,7 +238,9 @@ Expr special_float(const std::string& word, bool negative) {
   const std::optional<Type> type = suffix_type(word.substr(3));
   if (!type || !type->is_float()) return {};
   const double infinity = std::numeric_limits<double>::infinity();
-  return make_const(*type, is_nan ? std::numeric_limits<double>::quiet_NaN() : negative ? -infinity : infinity);
+  return make_const(*type, is_nan     ? std::numeric_limits<double>::quiet_NaN()
+                           : negative ? -infinity
+                                      : infinity);
 }
 
 Expr Parser::number(bool negative) {
@@ -327,7 +337,8 @@ Expr Parser::keyword_call(const Token& keyword) {
   }
   if (accept("min") || accept("max")) {
     const std::vector<Expr> args = arguments(2);
-    return build(at, [&] { return binary(at.text == "min" ? Kind::Min : Kind::Max, args[0], args[1]); });
+    return build(
+        at, [&] { return binary(at.text == "min" ? Kind::Min : Kind::Max, args[0], args[1]); });
   }
   if (accept("select")) {
     const std::vector<Expr> args = arguments(3);
@@ -351,7 +362,9 @@ Expr Parser::keyword_call(const Token& keyword) {
     }
     const int lanes = integer();
     expect(")");
-    return build(at, [&] { return is_ramp ? make_ramp(first, stride, lanes) : make_broadcast(first, lanes); });
+    return build(at, [&] {
+      return is_ramp ? make_ramp(first, stride, lanes) : make_broadcast(first, lanes);
+    });
   }
   if (is("shuffle")) return shuffle();
   if (is("reduce")) return reduce();
@@ -439,7 +452,8 @@ Stmt Parser::stmt() {
     const std::string func = name();
     return make_producer_consumer(func, is_producer, block());
   }
-  for (ForType type : {ForType::Serial, ForType::Parallel, ForType::Vectorized, ForType::Unrolled}) {
+  for (ForType type :
+       {ForType::Serial, ForType::Parallel, ForType::Vectorized, ForType::Unrolled}) {
     if (!is(for_name(type))) continue;
     take();
     return loop(type);

@@ -1,20 +1,22 @@
 // IR text.
 //
-// Expressions   3  2.5f  7_u8  1.5_f64  true  nan_f32  "text"     immediates: int32, float32, others by suffix
+// Expressions   3  2.5f  7_u8  1.5_f64  true  nan_f32  "text"     immediates: int32, float32,
+// others by suffix
 //               x  y:float32  `odd name`                          variables: int32 unless said
 //               (a + b)  min(a, b)  !c  select(c, a, b)
 //               float32x8(v)  reinterpret<int32>(v)
 //               ramp(b, s, 8)  broadcast(v, 8)  shuffle(u, v; 0, 2, 1)  reduce(add, v, 1)
 //               a[i]:float32x8  a[i if p]:float32                 loads
-//               floor(v)  abs<uint32>(v)                          operators; <type> unless that of the first argument
-//               f(x, y).1:float32  image in(x, y):uint8  extern hypotf(x, y):float32
-//               (let t = v in body)
-//               {#0 = v; #1 = w; body}                            nodes used more than once in a large expression
+//               floor(v)  abs<uint32>(v)                          operators; <type> unless that of
+//               the first argument f(x, y).1:float32  image in(x, y):uint8  extern hypotf(x,
+//               y):float32 (let t = v in body)
+//               {#0 = v; #1 = w; body}                            nodes used more than once in a
+//               large expression
 // Statements    let t = v            its body is the rest of the block
 //               assert(c, e)  free a  evaluate v  a[i if p] = v  f(x, y if p) = {u, v}
 //               produce f {..}  consume f {..}  if (c) {..} else {..}  {..}
-//               for (x, min, extent) {..}                         serial; or parallel, vectorized, unrolled before it
-//               realize f(float32, int8) auto [min, extent], [min, extent] {..}
+//               for (x, min, extent) {..}                         serial; or parallel, vectorized,
+//               unrolled before it realize f(float32, int8) auto [min, extent], [min, extent] {..}
 //               allocate a[elements]:float32 heap {..}
 #include "ir/print.h"
 
@@ -40,8 +42,9 @@ std::string suffix(Type type) {
 
 std::string float_digits(Type type, double value) {
   char buffer[64];
-  const auto end = type == Float(32) ? std::to_chars(buffer, buffer + sizeof buffer, static_cast<float>(value))
-                                     : std::to_chars(buffer, buffer + sizeof buffer, value);
+  const auto end = type == Float(32)
+                       ? std::to_chars(buffer, buffer + sizeof buffer, static_cast<float>(value))
+                       : std::to_chars(buffer, buffer + sizeof buffer, value);
   return std::string(buffer, end.ptr);
 }
 
@@ -97,8 +100,8 @@ const char* infix(Kind kind) {
   }
 }
 
-// Small trees are printed as trees, however shared. In a large one every node used twice gets a name, lest the text
-// be exponential in the size of the DAG.
+// Small trees are printed as trees, however shared. In a large one every node used twice gets a
+// name, lest the text be exponential in the size of the DAG.
 class Sharing {
  public:
   // The nodes to name, children first.
@@ -178,7 +181,8 @@ class Printer {
       print_root(es[i]);
     }
   }
-  void function(const std::string& name, std::initializer_list<Expr> args, const std::string& tail = "") {
+  void function(const std::string& name, std::initializer_list<Expr> args,
+                const std::string& tail = "") {
     out_ += name + '(';
     list(args);
     out_ += tail + ')';
@@ -235,7 +239,8 @@ void Printer::print_node(const Expr& e) {
         out_ += std::to_string(n.value) + (n.type == Int(32) ? "" : "_" + suffix(n.type));
       },
       [&](const UIntImm& n) {
-        out_ += n.type.is_bool() ? (n.value ? "true" : "false") : std::to_string(n.value) + "_" + suffix(n.type);
+        out_ += n.type.is_bool() ? (n.value ? "true" : "false")
+                                 : std::to_string(n.value) + "_" + suffix(n.type);
       },
       [&](const FloatImm& n) { out_ += float_text(n.type, n.value); },
       [&](const StringImm& n) { out_ += string_text(n.value); },
@@ -246,7 +251,8 @@ void Printer::print_node(const Expr& e) {
       [&](const Cast& n) { function(to_string(n.type), {n.value}); },
       [&](const Reinterpret& n) { function("reinterpret<" + to_string(n.type) + ">", {n.value}); },
       [&](const Binary& n) {
-        if (n.kind == Kind::Min || n.kind == Kind::Max) return function(n.kind == Kind::Min ? "min" : "max", {n.a, n.b});
+        if (n.kind == Kind::Min || n.kind == Kind::Max)
+          return function(n.kind == Kind::Min ? "min" : "max", {n.a, n.b});
         out_ += '(';
         print(n.a);
         out_ += std::string(" ") + infix(n.kind) + ' ';
@@ -257,7 +263,9 @@ void Printer::print_node(const Expr& e) {
         out_ += '!';
         print(n.a);
       },
-      [&](const Select& n) { function("select", {n.condition, n.true_value, n.false_value}); },
+      [&](const Select& n) {
+        function("select", {n.condition, n.true_value, n.false_value});
+      },
       [&](const Load& n) {
         out_ += quote_name(n.name) + '[';
         print(n.index);
@@ -268,7 +276,9 @@ void Printer::print_node(const Expr& e) {
         out_ += ']';
         type_unless_int32(n.type);
       },
-      [&](const Ramp& n) { function("ramp", {n.base, n.stride}, ", " + std::to_string(n.lanes)); },
+      [&](const Ramp& n) {
+        function("ramp", {n.base, n.stride}, ", " + std::to_string(n.lanes));
+      },
       [&](const Broadcast& n) { function("broadcast", {n.value}, ", " + std::to_string(n.lanes)); },
       [&](const Call& n) { print_call(n); },
       [&](const Let& n) {
@@ -281,7 +291,8 @@ void Printer::print_node(const Expr& e) {
       [&](const Shuffle& n) {
         out_ += "shuffle(";
         list(n.vectors);
-        for (size_t i = 0; i < n.indices.size(); ++i) out_ += (i ? ", " : "; ") + std::to_string(n.indices[i]);
+        for (size_t i = 0; i < n.indices.size(); ++i)
+          out_ += (i ? ", " : "; ") + std::to_string(n.indices[i]);
         out_ += ')';
       },
       [&](const VectorReduce& n) {
@@ -382,7 +393,8 @@ void Printer::print(const Stmt& s) {
         out_ += "]:" + to_string(n.type) + ' ' + memory_name(n.memory);
         body(n.body);
       },
-      [&](const Free& n) { out_ += "free " + quote_name(n.name); }, [&](const IfThenElse& n) { print_if(n); },
+      [&](const Free& n) { out_ += "free " + quote_name(n.name); },
+      [&](const IfThenElse& n) { print_if(n); },
       [&](const Evaluate& n) {
         out_ += "evaluate ";
         print_root(n.value);

@@ -14,8 +14,8 @@ void check_operand(const Expr& e, const char* what) {
                "Give the Expr a value before using it");
   }
   if (e.type().is_handle()) {
-    user_error(text("apply ", what), "operands must be numbers", text("one has the type ", e.type()),
-               "Use the numbers behind the handle");
+    user_error(text("apply ", what), "operands must be numbers",
+               text("one has the type ", e.type()), "Use the numbers behind the handle");
   }
 }
 
@@ -44,7 +44,8 @@ void match_types(Expr& a, Expr& b, const char* what) {
     if (e->type().is_vector()) no_common_type(a.type(), b.type(), what);
     *e = make_broadcast(*e, lanes);
   }
-  const Type type = common_scalar_type(a.type().element_of(), b.type().element_of(), what).with_lanes(lanes);
+  const Type type =
+      common_scalar_type(a.type().element_of(), b.type().element_of(), what).with_lanes(lanes);
   a = cast_to(type, std::move(a));
   b = cast_to(type, std::move(b));
 }
@@ -54,7 +55,8 @@ Expr constant_like(const Expr& other, int64_t value, const char* what) {
   if (!other.type().element_of().can_represent(value)) {
     user_error(text("apply ", what, " to an expression and the constant ", value),
                "a constant takes the type of the other operand and must fit it",
-               text("the other operand has the type ", other.type()), "Cast the other operand to a wider type");
+               text("the other operand has the type ", other.type()),
+               "Cast the other operand to a wider type");
   }
   return make_const(other.type(), value);
 }
@@ -63,10 +65,10 @@ Expr constant_like(const Expr& other, int64_t value, const char* what) {
 
 using ir::Kind;
 
-#define RETROGRADE_DEFINE_OPERATOR(name, kind)             \
-  Expr name(Expr a, Expr b) {                              \
-    ir::match_types(a, b, #name);                          \
-    return ir::binary(kind, std::move(a), std::move(b));   \
+#define RETROGRADE_DEFINE_OPERATOR(name, kind)           \
+  Expr name(Expr a, Expr b) {                            \
+    ir::match_types(a, b, #name);                        \
+    return ir::binary(kind, std::move(a), std::move(b)); \
   }
 RETROGRADE_DEFINE_OPERATOR(operator+, Kind::Add)
 RETROGRADE_DEFINE_OPERATOR(operator-, Kind::Sub)
@@ -101,8 +103,12 @@ Expr logical(Kind kind, Expr a, Expr b, const char* what) {
 
 }  // namespace
 
-Expr operator&&(Expr a, Expr b) { return logical(Kind::And, std::move(a), std::move(b), "operator&&"); }
-Expr operator||(Expr a, Expr b) { return logical(Kind::Or, std::move(a), std::move(b), "operator||"); }
+Expr operator&&(Expr a, Expr b) {
+  return logical(Kind::And, std::move(a), std::move(b), "operator&&");
+}
+Expr operator||(Expr a, Expr b) {
+  return logical(Kind::Or, std::move(a), std::move(b), "operator||");
+}
 
 Expr operator!(Expr a) {
   check_bool(a, "operator!");
@@ -113,14 +119,15 @@ Expr operator!(Expr a) {
 Expr operator-(Expr a) {
   ir::check_operand(a, "operator-");
   const Type type = a.type();
-  return ir::binary(Kind::Sub, type.is_float() ? ir::make_const(type, -0.0) : ir::make_zero(type), std::move(a));
+  return ir::binary(Kind::Sub, type.is_float() ? ir::make_const(type, -0.0) : ir::make_zero(type),
+                    std::move(a));
 }
 
 // The left side keeps its type, as in C++.
-#define RETROGRADE_DEFINE_ASSIGNMENT(assign, op)      \
-  Expr& operator assign(Expr& a, Expr b) {            \
-    const Type type = a.type();                       \
-    return a = cast(type, a op std::move(b));         \
+#define RETROGRADE_DEFINE_ASSIGNMENT(assign, op) \
+  Expr& operator assign(Expr& a, Expr b) {       \
+    const Type type = a.type();                  \
+    return a = cast(type, a op std::move(b));    \
   }
 RETROGRADE_DEFINE_ASSIGNMENT(+=, +)
 RETROGRADE_DEFINE_ASSIGNMENT(-=, -)
@@ -131,7 +138,8 @@ RETROGRADE_DEFINE_ASSIGNMENT(/=, /)
 Expr cast(Type type, Expr value) {
   ir::check_operand(value, "cast");
   if (type.is_handle() || type.bits() == 0) {
-    user_error("cast", "the new type must be a number", text("it is ", type), "Use reinterpret for handles");
+    user_error("cast", "the new type must be a number", text("it is ", type),
+               "Use reinterpret for handles");
   }
   if (type.is_vector() && value.type().is_vector() && type.lanes() != value.type().lanes()) {
     ir::no_common_type(type, value.type(), "cast");
@@ -167,7 +175,8 @@ Expr clamp(Expr value, Expr low, Expr high) {
   for (const Expr* e : {&value, &low, &high}) ir::check_operand(*e, "clamp");
   low = cast(value.type(), std::move(low));
   high = cast(value.type(), std::move(high));
-  return ir::binary(Kind::Max, ir::binary(Kind::Min, std::move(value), std::move(high)), std::move(low));
+  return ir::binary(Kind::Max, ir::binary(Kind::Min, std::move(value), std::move(high)),
+                    std::move(low));
 }
 
 }  // namespace retrograde

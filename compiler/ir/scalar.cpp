@@ -17,10 +17,13 @@ int64_t wrap_int(int bits, int64_t value) {
 }
 
 // Wraps modulo 2^64 first: signed overflow in C++ is undefined.
-uint64_t wrap_uint(int bits, uint64_t value) { return bits >= 64 ? value : value & (~uint64_t{0} >> (64 - bits)); }
+uint64_t wrap_uint(int bits, uint64_t value) {
+  return bits >= 64 ? value : value & (~uint64_t{0} >> (64 - bits));
+}
 
 Scalar of_pattern(Type type, uint64_t bits) {
-  return type.is_int() ? Scalar::of_int(type, static_cast<int64_t>(bits)) : Scalar::of_uint(type, bits);
+  return type.is_int() ? Scalar::of_int(type, static_cast<int64_t>(bits))
+                       : Scalar::of_uint(type, bits);
 }
 
 int64_t euclidean_div(int64_t a, int64_t b) {
@@ -60,7 +63,9 @@ Scalar compare_scalars(Kind kind, T a, T b) {
 }
 
 Scalar int_binary(Kind kind, const Scalar& a, const Scalar& b) {
-  const auto wrap = [&](uint64_t value) { return Scalar::of_int(a.type, static_cast<int64_t>(value)); };
+  const auto wrap = [&](uint64_t value) {
+    return Scalar::of_int(a.type, static_cast<int64_t>(value));
+  };
   switch (kind) {
     case Kind::Add:
       return wrap(a.u + b.u);
@@ -106,8 +111,8 @@ Scalar uint_binary(Kind kind, const Scalar& a, const Scalar& b) {
   }
 }
 
-// Each of + - * / in double, rounded once, is the correctly rounded result of the narrower type (53 >= 2 p + 2).
-// Modulus rounds at each of its steps, as machine code in the narrower type does.
+// Each of + - * / in double, rounded once, is the correctly rounded result of the narrower type (53
+// >= 2 p + 2). Modulus rounds at each of its steps, as machine code in the narrower type does.
 Scalar float_binary(Kind kind, const Scalar& a, const Scalar& b) {
   const auto round = [&](double value) { return Scalar::of_float(a.type, value); };
   switch (kind) {
@@ -177,7 +182,9 @@ Scalar Scalar::of_int(Type type, int64_t value) {
   return result;
 }
 
-Scalar Scalar::of_uint(Type type, uint64_t value) { return of_int(type, static_cast<int64_t>(value)); }
+Scalar Scalar::of_uint(Type type, uint64_t value) {
+  return of_int(type, static_cast<int64_t>(value));
+}
 
 Scalar Scalar::of_float(Type type, double value) {
   Scalar result;
@@ -187,7 +194,8 @@ Scalar Scalar::of_float(Type type, double value) {
 }
 
 Scalar eval_binary(Kind kind, const Scalar& a, const Scalar& b) {
-  RETROGRADE_ASSERT(a.type == b.type, kind_name(kind), " of ", to_string(a.type), " and ", to_string(b.type));
+  RETROGRADE_ASSERT(a.type == b.type, kind_name(kind), " of ", to_string(a.type), " and ",
+                    to_string(b.type));
   if (a.type.is_float()) return float_binary(kind, a, b);
   return a.type.is_int() ? int_binary(kind, a, b) : uint_binary(kind, a, b);
 }
@@ -199,7 +207,8 @@ Scalar eval_cast(Type type, const Scalar& value) {
     if (value.type.is_float()) return Scalar::of_float(type, value.f);
     return Scalar::of_float(type, integer_to_float(type, value));
   }
-  if (type.is_bool()) return Scalar::of_uint(type, value.type.is_float() ? value.f != 0 : value.u != 0);
+  if (type.is_bool())
+    return Scalar::of_uint(type, value.type.is_float() ? value.f != 0 : value.u != 0);
   return value.type.is_float() ? float_to_integer(type, value.f) : of_pattern(type, value.u);
 }
 
@@ -207,10 +216,12 @@ Scalar eval_reinterpret(Type type, const Scalar& value) {
   const uint64_t bits = bit_pattern(value);
   if (!type.is_float()) return of_pattern(type, bits);
   if (type.bits() == 64) return Scalar::of_float(type, std::bit_cast<double>(bits));
-  if (type.bits() == 32) return Scalar::of_float(type, std::bit_cast<float>(static_cast<uint32_t>(bits)));
+  if (type.bits() == 32)
+    return Scalar::of_float(type, std::bit_cast<float>(static_cast<uint32_t>(bits)));
   const auto half = static_cast<uint16_t>(bits);
-  return Scalar::of_float(type, type.is_bfloat() ? static_cast<double>(bfloat16_t::make_from_bits(half))
-                                                 : static_cast<double>(float16_t::make_from_bits(half)));
+  return Scalar::of_float(type, type.is_bfloat()
+                                    ? static_cast<double>(bfloat16_t::make_from_bits(half))
+                                    : static_cast<double>(float16_t::make_from_bits(half)));
 }
 
 std::optional<Scalar> as_scalar(const Expr& e) {
@@ -224,7 +235,8 @@ std::optional<Scalar> as_scalar(const Expr& e) {
 
 Expr to_expr(const Scalar& value) {
   if (value.type.is_float()) return make_const(value.type, value.f);
-  return value.type.is_int() ? make_const(value.type, value.i) : make_uint_const(value.type, value.u);
+  return value.type.is_int() ? make_const(value.type, value.i)
+                             : make_uint_const(value.type, value.u);
 }
 
 }  // namespace retrograde::ir

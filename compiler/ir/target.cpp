@@ -103,9 +103,10 @@ void add_host_features(Target& target) {
   add(__builtin_cpu_supports("fma"), Target::FMA);
   add(__builtin_cpu_supports("avx2"), Target::AVX2);
   const bool avx512 = __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512cd");
-  const bool skylake = avx512 && __builtin_cpu_supports("avx512vl") && __builtin_cpu_supports("avx512bw") &&
-                       __builtin_cpu_supports("avx512dq");
-  const bool cannonlake = skylake && __builtin_cpu_supports("avx512ifma") && __builtin_cpu_supports("avx512vbmi");
+  const bool skylake = avx512 && __builtin_cpu_supports("avx512vl") &&
+                       __builtin_cpu_supports("avx512bw") && __builtin_cpu_supports("avx512dq");
+  const bool cannonlake =
+      skylake && __builtin_cpu_supports("avx512ifma") && __builtin_cpu_supports("avx512vbmi");
   add(avx512, Target::AVX512);
   add(skylake, Target::AVX512_Skylake);
   add(cannonlake, Target::AVX512_Cannonlake);
@@ -127,7 +128,8 @@ Target from_environment(const char* first, const char* second) {
 
 }  // namespace
 
-Target::Target(OS os, Arch arch, int bits, const std::vector<Feature>& features) : os(os), arch(arch), bits(bits) {
+Target::Target(OS os, Arch arch, int bits, const std::vector<Feature>& features)
+    : os(os), arch(arch), bits(bits) {
   for (Feature feature : features) set_feature(feature);
 }
 
@@ -137,8 +139,10 @@ Target::Target(const std::string& text) {
     if (first && word == "host") {
       *this = get_host_target();
     } else if (!read_word(word, *this)) {
-      user_error("read the target " + quoted(text), "a target is arch-bits-os or host, then features, joined by dashes",
-                 quoted(word) + " is none of them", "Write for example \"host\" or \"x86-64-linux-avx2-fma\"");
+      user_error("read the target " + quoted(text),
+                 "a target is arch-bits-os or host, then features, joined by dashes",
+                 quoted(word) + " is none of them",
+                 "Write for example \"host\" or \"x86-64-linux-avx2-fma\"");
     }
     first = false;
   }
@@ -171,7 +175,8 @@ bool Target::features_all_of(const std::vector<Feature>& features) const {
 }
 
 int Target::natural_vector_size(Type type) const {
-  const bool wide = features_any_of({AVX512, AVX512_Skylake, AVX512_Cannonlake, AVX512_SapphireRapids});
+  const bool wide =
+      features_any_of({AVX512, AVX512_Skylake, AVX512_Cannonlake, AVX512_SapphireRapids});
   const int vector_bytes = wide ? 64 : has_feature(AVX2) ? 32 : 16;
   return vector_bytes / std::max(type.bytes(), 1);
 }

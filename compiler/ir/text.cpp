@@ -25,7 +25,9 @@ bool read_type(const std::string& word, Type& type) {
   size_t at = 0;
   const auto number = [&](int& value) {
     const size_t start = at;
-    for (value = 0; at < word.size() && at < start + 5 && std::isdigit(static_cast<unsigned char>(word[at])); ++at) {
+    for (value = 0;
+         at < word.size() && at < start + 5 && std::isdigit(static_cast<unsigned char>(word[at]));
+         ++at) {
       value = 10 * value + (word[at] - '0');
     }
     return at > start;
@@ -42,16 +44,22 @@ bool read_type(const std::string& word, Type& type) {
   } else if (starts("handle")) {
     code = TypeCode::Handle, bits = 64;
   } else {
-    if (starts("int")) code = TypeCode::Int;
-    else if (starts("uint")) code = TypeCode::UInt;
-    else if (starts("float")) code = TypeCode::Float;
-    else if (starts("bfloat")) code = TypeCode::BFloat;
-    else return false;
+    if (starts("int"))
+      code = TypeCode::Int;
+    else if (starts("uint"))
+      code = TypeCode::UInt;
+    else if (starts("float"))
+      code = TypeCode::Float;
+    else if (starts("bfloat"))
+      code = TypeCode::BFloat;
+    else
+      return false;
     if (!number(bits)) return false;
     const bool is_float = code == TypeCode::Float || code == TypeCode::BFloat;
     if (bits != 16 && bits != 32 && bits != 64 && (is_float || bits != 8)) return false;
   }
-  if (at < word.size() && (word[at++] != 'x' || !number(lanes) || lanes < 2 || lanes > 65535)) return false;
+  if (at < word.size() && (word[at++] != 'x' || !number(lanes) || lanes < 2 || lanes > 65535))
+    return false;
   if (at != word.size()) return false;
   type = Type(code, bits, lanes);
   return true;
@@ -59,9 +67,10 @@ bool read_type(const std::string& word, Type& type) {
 
 bool is_reserved(const std::string& word) {
   static const std::unordered_set<std::string> keywords = {
-      "true", "false", "min", "max", "select", "reinterpret", "ramp", "broadcast", "shuffle", "reduce",
-      "image", "extern", "let", "if", "else", "assert", "free", "evaluate", "produce", "consume", "for",
-      "serial", "parallel", "vectorized", "unrolled", "realize", "allocate"};
+      "true",      "false",    "min",        "max",      "select",  "reinterpret", "ramp",
+      "broadcast", "shuffle",  "reduce",     "image",    "extern",  "let",         "if",
+      "else",      "assert",   "free",       "evaluate", "produce", "consume",     "for",
+      "serial",    "parallel", "vectorized", "unrolled", "realize", "allocate"};
   Type type;
   return keywords.count(word) || op_from_name(word) != Op::none || read_type(word, type) ||
          word.rfind("nan_", 0) == 0 || word.rfind("inf_", 0) == 0;
@@ -71,8 +80,8 @@ std::string quote_name(const std::string& name) {
   const auto is_name_char = [](char c) {
     return std::isalnum(static_cast<unsigned char>(c)) || c == '_' || c == '.' || c == '$';
   };
-  bool plain = !name.empty() && !std::isdigit(static_cast<unsigned char>(name[0])) && name[0] != '.' &&
-               name.back() != '.' && !is_reserved(name);
+  bool plain = !name.empty() && !std::isdigit(static_cast<unsigned char>(name[0])) &&
+               name[0] != '.' && name.back() != '.' && !is_reserved(name);
   for (char c : name) plain &= is_name_char(c);
   if (plain) return name;
   std::string quoted = "`";

@@ -17,7 +17,8 @@ struct SmallFloat {
 constexpr SmallFloat half_format{5, 10};
 constexpr SmallFloat brain_format{8, 7};
 
-// One rounding, to nearest even, whatever the distance between the formats. Relies on the default rounding mode.
+// One rounding, to nearest even, whatever the distance between the formats. Relies on the default
+// rounding mode.
 uint16_t encode(const SmallFloat& format, double value) {
   const int sign = std::signbit(value) ? 0x8000 : 0;
   if (std::isnan(value)) return sign | format.infinity() | 1 << (format.fraction_bits - 1);
@@ -28,10 +29,11 @@ uint16_t encode(const SmallFloat& format, double value) {
   exponent -= 1;  // value in [2^exponent, 2^(exponent + 1))
   if (exponent > format.bias()) return sign | format.infinity();
   const int clamped = std::max(exponent, format.min_exponent());
-  const int steps =
-      static_cast<int>(std::nearbyint(std::ldexp(std::fabs(value), format.fraction_bits - clamped)));
-  // Denormals have the biased exponent 0 and no hidden bit; a carry out of the fraction moves into the exponent, which
-  // is what rounding up to the next power of two, to the first normal, or to infinity means.
+  const int steps = static_cast<int>(
+      std::nearbyint(std::ldexp(std::fabs(value), format.fraction_bits - clamped)));
+  // Denormals have the biased exponent 0 and no hidden bit; a carry out of the fraction moves into
+  // the exponent, which is what rounding up to the next power of two, to the first normal, or to
+  // infinity means.
   const int biased = exponent < format.min_exponent() ? 0 : clamped + format.bias() - 1;
   return sign | ((biased << format.fraction_bits) + steps);
 }
@@ -41,10 +43,12 @@ double decode(const SmallFloat& format, uint16_t bits) {
   const int magnitude = bits & 0x7fff;
   const int fraction = magnitude & ((1 << format.fraction_bits) - 1);
   const int biased = magnitude >> format.fraction_bits;
-  if (magnitude > format.infinity()) return std::copysign(std::numeric_limits<double>::quiet_NaN(), sign);
+  if (magnitude > format.infinity())
+    return std::copysign(std::numeric_limits<double>::quiet_NaN(), sign);
   if (magnitude == format.infinity()) return sign * std::numeric_limits<double>::infinity();
   if (biased == 0) return sign * std::ldexp(fraction, format.min_exponent() - format.fraction_bits);
-  return sign * std::ldexp(fraction | 1 << format.fraction_bits, biased - format.bias() - format.fraction_bits);
+  return sign * std::ldexp(fraction | 1 << format.fraction_bits,
+                           biased - format.bias() - format.fraction_bits);
 }
 
 double largest_finite(Type type) {

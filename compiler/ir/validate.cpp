@@ -27,16 +27,21 @@ std::string shortened(std::string text) {
 
 class Validator {
  public:
-  Validator(const Stmt& root, Phase phase, const std::string& pass, const std::vector<std::string>& free_names)
-      : root_(root), phase_(phase), pass_(pass), visible_(free_names.begin(), free_names.end()), bound_(visible_) {}
+  Validator(const Stmt& root, Phase phase, const std::string& pass,
+            const std::vector<std::string>& free_names)
+      : root_(root),
+        phase_(phase),
+        pass_(pass),
+        visible_(free_names.begin(), free_names.end()),
+        bound_(visible_) {}
 
   void check(const Stmt& s);
 
  private:
   template <class Tree>
   [[noreturn]] void fail(const Tree& node, const std::string& rule) const {
-    throw InternalError(text("after this pass the program breaks a rule of the phase ", phase_name(phase_), ": ", rule,
-                             "\n  in: ", shortened(print(node))),
+    throw InternalError(text("after this pass the program breaks a rule of the phase ",
+                             phase_name(phase_), ": ", rule, "\n  in: ", shortened(print(node))),
                         pass_, shortened(print(root_)));
   }
   template <class Tree>
@@ -51,7 +56,8 @@ class Validator {
    public:
     template <class Tree>
     Binding(Validator& v, const std::string& name, const Tree& where) : v_(v), name_(name) {
-      if (!v.bound_.insert(name).second) v.fail(where, "names are unique: " + quoted(name) + " is bound twice");
+      if (!v.bound_.insert(name).second)
+        v.fail(where, "names are unique: " + quoted(name) + " is bound twice");
       v.visible_.insert(name);
     }
     ~Binding() {
@@ -93,16 +99,19 @@ class Validator {
   template <class Tree>
   void check_storage(const std::string& name, const Tree& node) {
     if (allocated_.count(name) && !live_.count(name)) {
-      fail(node, "an allocation is used inside its Allocate and before its Free: " + quoted(name) + " is not alive");
+      fail(node, "an allocation is used inside its Allocate and before its Free: " + quoted(name) +
+                     " is not alive");
     }
   }
   template <class Tree>
   void only_in_loops(const Tree& node) {
-    if (phase_ != Phase::Loops) fail(node, std::string(kind_name(node.kind())) + " belongs to the phase Loops");
+    if (phase_ != Phase::Loops)
+      fail(node, std::string(kind_name(node.kind())) + " belongs to the phase Loops");
   }
   template <class Tree>
   void only_in_flat(const Tree& node) {
-    if (phase_ == Phase::Loops) fail(node, std::string(kind_name(node.kind())) + " belongs to the phase FlatStorage");
+    if (phase_ == Phase::Loops)
+      fail(node, std::string(kind_name(node.kind())) + " belongs to the phase FlatStorage");
   }
 
   const Stmt& root_;
@@ -110,7 +119,8 @@ class Validator {
   const std::string pass_;
   std::unordered_set<std::string> visible_, bound_;
   std::unordered_set<const ExprNode*> checked_, lets_;
-  std::unordered_set<std::string> allocated_, live_;  // names of all allocations so far; those alive here
+  std::unordered_set<std::string> allocated_,
+      live_;  // names of all allocations so far; those alive here
 };
 
 // ---- expressions ----
@@ -124,7 +134,8 @@ void Validator::check_node(const Expr& e) {
   match(
       e,
       [&](const Variable& n) {
-        if (!visible_.count(n.name)) fail(e, "every variable is bound before use: " + quoted(n.name) + " is not");
+        if (!visible_.count(n.name))
+          fail(e, "every variable is bound before use: " + quoted(n.name) + " is not");
       },
       [&](const Let& n) {
         if (!lets_.insert(e.get()).second) return;  // a shared node binds its name once
@@ -165,14 +176,16 @@ void Validator::check_select(const Expr& e, const Select& n) {
   require(n.true_value.type() == n.false_value.type(), e, "both arms of a select have one type");
   require(n.condition.type().is_bool(), e, "the condition of a select is bool");
   const int lanes = n.condition.type().lanes();
-  require(lanes == 1 || lanes == n.type.lanes(), e, "the condition of a select is scalar or has the arms' lanes");
+  require(lanes == 1 || lanes == n.type.lanes(), e,
+          "the condition of a select is scalar or has the arms' lanes");
 }
 
 void Validator::check_call(const Expr& e, const Call& n) {
   check_children(e);
   if (n.call_type == CallType::Operator) {
     const int arity = op_info(n.op).arity;
-    require(arity < 0 || arity == static_cast<int>(n.args.size()), e, "an operator takes the arguments of its arity");
+    require(arity < 0 || arity == static_cast<int>(n.args.size()), e,
+            "an operator takes the arguments of its arity");
     return;
   }
   if (n.call_type == CallType::Extern) return;
@@ -184,7 +197,8 @@ template <class Tree>
 void Validator::check_predicate(const Tree& node, const Expr& predicate, int lanes) {
   if (!predicate.defined()) return;
   check(predicate);
-  require(predicate.type() == Bool(lanes), node, "a predicate is bool with the lanes of the access");
+  require(predicate.type() == Bool(lanes), node,
+          "a predicate is bool with the lanes of the access");
 }
 
 void Validator::check_load(const Expr& e, const Load& n) {
@@ -214,8 +228,8 @@ void Validator::check(const Stmt& s) {
       },
       [&](const ProducerConsumer& n) { check(n.body); }, [&](const For& n) { check_for(s, n); },
       [&](const Store& n) { check_store(s, n); }, [&](const Provide& n) { check_provide(s, n); },
-      [&](const Realize& n) { check_realize(s, n); }, [&](const Allocate& n) { check_allocate(s, n); },
-      [&](const Free& n) { check_free(s, n); },
+      [&](const Realize& n) { check_realize(s, n); },
+      [&](const Allocate& n) { check_allocate(s, n); }, [&](const Free& n) { check_free(s, n); },
       [&](const Block& n) {
         for (const Stmt& child : n.stmts) check(child);
       },
@@ -231,7 +245,8 @@ void Validator::check_for(const Stmt& s, const For& n) {
   check(n.extent);
   require(n.min.type() == Int(32) && n.extent.type() == Int(32), s, "loop bounds are int32");
   const bool gone = n.for_type == ForType::Vectorized || n.for_type == ForType::Unrolled;
-  require(phase_ != Phase::Vector || !gone, s, "no vectorized or unrolled loop is left in the phase Vector");
+  require(phase_ != Phase::Vector || !gone, s,
+          "no vectorized or unrolled loop is left in the phase Vector");
   const Binding binding(*this, n.name, s);
   check(n.body);
 }
@@ -241,7 +256,8 @@ void Validator::check_store(const Stmt& s, const Store& n) {
   check(n.value);
   check(n.index);
   check_index(n.index);
-  require(n.value.type().lanes() == n.index.type().lanes(), s, "a store's value has the lanes of its index");
+  require(n.value.type().lanes() == n.index.type().lanes(), s,
+          "a store's value has the lanes of its index");
   check_predicate(s, n.predicate, n.index.type().lanes());
   check_storage(n.name, s);
 }
@@ -268,7 +284,8 @@ void Validator::check_realize(const Stmt& s, const Realize& n) {
   for (const Range& r : n.bounds) {
     check(r.min);
     check(r.extent);
-    require(r.min.type() == Int(32) && r.extent.type() == Int(32), s, "bounds of a Realize are int32");
+    require(r.min.type() == Int(32) && r.extent.type() == Int(32), s,
+            "bounds of a Realize are int32");
   }
   check(n.body);
 }
@@ -278,7 +295,8 @@ void Validator::check_allocate(const Stmt& s, const Allocate& n) {
   check(n.elements);
   require(n.elements.type() == Int(64), s, "the size of an Allocate is an int64");
   require(n.type.is_scalar(), s, "an Allocate holds scalars");
-  if (!allocated_.insert(n.name).second) fail(s, "names are unique: two allocations are called " + quoted(n.name));
+  if (!allocated_.insert(n.name).second)
+    fail(s, "names are unique: two allocations are called " + quoted(n.name));
   live_.insert(n.name);
   check(n.body);
   live_.erase(n.name);
@@ -303,7 +321,8 @@ void Validator::check_branches(const IfThenElse& n) {
 
 }  // namespace
 
-void validate(const Stmt& s, Phase phase, const std::string& after_pass, const std::vector<std::string>& free_names) {
+void validate(const Stmt& s, Phase phase, const std::string& after_pass,
+              const std::vector<std::string>& free_names) {
   Validator(s, phase, after_pass, free_names).check(s);
 }
 

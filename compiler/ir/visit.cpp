@@ -11,9 +11,7 @@ namespace retrograde::ir {
 
 namespace {
 
-bool is_leaf(const Expr& e) {
-  return e.kind() == Kind::Variable || e.kind() <= Kind::StringImm;
-}
+bool is_leaf(const Expr& e) { return e.kind() == Kind::Variable || e.kind() <= Kind::StringImm; }
 
 // Maps a list; says whether anything changed.
 std::vector<Expr> map_all(const std::vector<Expr>& es, ExprMap map, bool& changed) {
@@ -74,7 +72,9 @@ void for_each_child(const Stmt& s, ExprVisit on, StmtVisit on_stmt) {
       [&](const Block& n) {
         for (const Stmt& child : n.stmts) maybe_stmt(child);
       },
-      [&](const IfThenElse& n) { on(n.condition), maybe_stmt(n.then_case), maybe_stmt(n.else_case); },
+      [&](const IfThenElse& n) {
+        on(n.condition), maybe_stmt(n.then_case), maybe_stmt(n.else_case);
+      },
       [&](const Evaluate& n) { on(n.value); }, [](const StmtNode&) {});
 }
 
@@ -87,7 +87,9 @@ Expr map_children(const Expr& e, ExprMap map) {
       },
       [&](const Reinterpret& n) {
         Expr value = map(n.value);
-        return value.same_as(n.value) ? e : reinterpret_as(n.type.with_lanes(value.type().lanes()), value);
+        return value.same_as(n.value)
+                   ? e
+                   : reinterpret_as(n.type.with_lanes(value.type().lanes()), value);
       },
       [&](const Binary& n) {
         Expr a = map(n.a), b = map(n.b);
@@ -122,7 +124,8 @@ Expr map_children(const Expr& e, ExprMap map) {
         std::vector<Expr> args = map_all(n.args, map, changed);
         if (!changed) return e;
         if (n.call_type == CallType::Operator) return call_op(n.op, n.type, std::move(args));
-        return Expr(new Call(n.type, n.call_type, n.op, n.name, std::move(args), n.value_index, n.symbol));
+        return Expr(
+            new Call(n.type, n.call_type, n.op, n.name, std::move(args), n.value_index, n.symbol));
       },
       [&](const Let& n) {
         Expr value = map(n.value), body = map(n.body);
@@ -136,7 +139,8 @@ Expr map_children(const Expr& e, ExprMap map) {
       },
       [&](const VectorReduce& n) {
         Expr value = map(n.value);
-        return value.same_as(n.value) ? e : make_vector_reduce(n.op, std::move(value), n.type.lanes());
+        return value.same_as(n.value) ? e
+                                      : make_vector_reduce(n.op, std::move(value), n.type.lanes());
       },
       [&](const ExprNode&) { return e; });
 }
@@ -192,7 +196,9 @@ Stmt map_children(const Stmt& s, ExprMap map, StmtMap map_stmt) {
       },
       [&](const ProducerConsumer& n) {
         Stmt body = map_optional(n.body, map_stmt);
-        return body.same_as(n.body) ? s : make_producer_consumer(n.name, n.is_producer, std::move(body));
+        return body.same_as(n.body)
+                   ? s
+                   : make_producer_consumer(n.name, n.is_producer, std::move(body));
       },
       [&](const For& n) {
         Expr min = map(n.min), extent = map(n.extent);
@@ -202,8 +208,10 @@ Stmt map_children(const Stmt& s, ExprMap map, StmtMap map_stmt) {
       },
       [&](const Store& n) {
         Expr value = map(n.value), index = map(n.index), predicate = map_optional(n.predicate, map);
-        if (value.same_as(n.value) && index.same_as(n.index) && predicate.same_as(n.predicate)) return s;
-        return make_store(n.name, std::move(value), std::move(index), std::move(predicate), n.symbol);
+        if (value.same_as(n.value) && index.same_as(n.index) && predicate.same_as(n.predicate))
+          return s;
+        return make_store(n.name, std::move(value), std::move(index), std::move(predicate),
+                          n.symbol);
       },
       [&](const Provide& n) { return map_provide(s, n, map); },
       [&](const Realize& n) { return map_realize(s, n, map, map_stmt); },
@@ -216,8 +224,10 @@ Stmt map_children(const Stmt& s, ExprMap map, StmtMap map_stmt) {
       [&](const Block& n) { return map_block(s, n, map_stmt); },
       [&](const IfThenElse& n) {
         Expr condition = map(n.condition);
-        Stmt then_case = map_optional(n.then_case, map_stmt), else_case = map_optional(n.else_case, map_stmt);
-        if (condition.same_as(n.condition) && then_case.same_as(n.then_case) && else_case.same_as(n.else_case)) {
+        Stmt then_case = map_optional(n.then_case, map_stmt),
+             else_case = map_optional(n.else_case, map_stmt);
+        if (condition.same_as(n.condition) && then_case.same_as(n.then_case) &&
+            else_case.same_as(n.else_case)) {
           return s;
         }
         return make_if(std::move(condition), std::move(then_case), std::move(else_case));
@@ -269,7 +279,8 @@ class Walker {
       } else {
         if (!visited_.insert(item.stmt.get()).second || !enter_stmt_(item.stmt)) continue;
         for_each_child(
-            item.stmt, [&](const Expr& child) { push(child); }, [&](const Stmt& child) { push(child); });
+            item.stmt, [&](const Expr& child) { push(child); },
+            [&](const Stmt& child) { push(child); });
       }
       std::reverse(stack_.begin() + first, stack_.end());
     }
@@ -288,7 +299,8 @@ void walk(const Expr& e, FunctionRef<bool(const Expr&)> enter) {
   Walker(enter, no_stmts).run(e);
 }
 
-void walk(const Stmt& s, FunctionRef<bool(const Expr&)> enter_expr, FunctionRef<bool(const Stmt&)> enter_stmt) {
+void walk(const Stmt& s, FunctionRef<bool(const Expr&)> enter_expr,
+          FunctionRef<bool(const Stmt&)> enter_stmt) {
   Walker(enter_expr, enter_stmt).run(s);
 }
 
@@ -309,7 +321,8 @@ Expr Rewriter::children(const Expr& e) {
 
 Stmt Rewriter::children(const Stmt& s) {
   return map_children(
-      s, [this](const Expr& child) { return (*this)(child); }, [this](const Stmt& child) { return (*this)(child); });
+      s, [this](const Expr& child) { return (*this)(child); },
+      [this](const Stmt& child) { return (*this)(child); });
 }
 
 namespace {
@@ -349,8 +362,12 @@ class Substituter : public Rewriter {
 
 Expr rewrite(const Expr& e, const RewriteStep& step) { return StepRewriter(step)(e); }
 
-Expr substitute(const Expr& e, const Substitution& values) { return values.empty() ? e : Substituter(values)(e); }
-Stmt substitute(const Stmt& s, const Substitution& values) { return values.empty() ? s : Substituter(values)(s); }
+Expr substitute(const Expr& e, const Substitution& values) {
+  return values.empty() ? e : Substituter(values)(e);
+}
+Stmt substitute(const Stmt& s, const Substitution& values) {
+  return values.empty() ? s : Substituter(values)(s);
+}
 Expr substitute(const Expr& e, const std::string& name, const Expr& value) {
   return substitute(e, Substitution{{name, value}});
 }

@@ -1,5 +1,5 @@
-// Common sub-expressions by hash-consing: structurally equal nodes become one node, and nodes with several parents
-// become Lets, in the order in which they are needed.
+// Common sub-expressions by hash-consing: structurally equal nodes become one node, and nodes with
+// several parents become Lets, in the order in which they are needed.
 #include "simplify/cse.h"
 
 #include <unordered_map>
@@ -20,8 +20,8 @@ struct StructuralEqual {
   bool operator()(const Expr& a, const Expr& b) const { return equal(a, b); }
 };
 
-// Makes structurally equal nodes identical. Children are unique before their parent is looked up, so that each
-// comparison stops one level down.
+// Makes structurally equal nodes identical. Children are unique before their parent is looked up,
+// so that each comparison stops one level down.
 class HashCons : public Rewriter {
  protected:
   using Rewriter::rewrite;
@@ -87,7 +87,8 @@ SharedLets make_lets(const std::vector<Expr>& es);
 
 class LetMaker : public Rewriter {
  public:
-  LetMaker(const UseCounter& uses, std::vector<std::pair<std::string, Expr>>& lets) : uses_(uses), lets_(lets) {}
+  LetMaker(const UseCounter& uses, std::vector<std::pair<std::string, Expr>>& lets)
+      : uses_(uses), lets_(lets) {}
 
  protected:
   using Rewriter::rewrite;
@@ -109,7 +110,8 @@ class LetMaker : public Rewriter {
   std::vector<std::pair<std::string, Expr>>& lets_;
 };
 
-// Values of the enclosing Lets stand for their names. Names are unique, so one memo serves all scopes.
+// Values of the enclosing Lets stand for their names. Names are unique, so one memo serves all
+// scopes.
 class LetExpander : public Rewriter {
  protected:
   using Rewriter::rewrite;

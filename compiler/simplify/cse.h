@@ -7,13 +7,13 @@
 
 namespace retrograde::ir {
 
-// Sub-expressions that occur more than once (structurally; leaves and trivial operations excepted) become Lets around
-// the expression, with fresh names. What only an arm of if_then_else computes stays in
-// the arm. Lets already there are expanded first.
+// Sub-expressions that occur more than once (structurally; leaves and trivial operations excepted)
+// become Lets around the expression, with fresh names. What only an arm of if_then_else computes
+// stays in the arm. Lets already there are expanded first.
 Expr introduce_lets(const Expr& e);
 
-// The same for several expressions that are evaluated together: `lets` outermost first, each visible in the later ones
-// and in the values.
+// The same for several expressions that are evaluated together: `lets` outermost first, each
+// visible in the later ones and in the values.
 struct SharedLets {
   std::vector<std::pair<std::string, Expr>> lets;
   std::vector<Expr> values;

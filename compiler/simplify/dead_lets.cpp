@@ -1,5 +1,5 @@
-// Lets whose names are not used. One walk from the inside out: names are unique, so what was seen so far is what the
-// rest of the program uses.
+// Lets whose names are not used. One walk from the inside out: names are unique, so what was seen
+// so far is what the rest of the program uses.
 #include <unordered_set>
 
 #include "ir/build.h"
@@ -48,7 +48,9 @@ class DeadLets : public Rewriter {
   }
 
  private:
-  bool is_needed(const std::string& name, const Expr& value) const { return used_.count(name) || has_effect(value); }
+  bool is_needed(const std::string& name, const Expr& value) const {
+    return used_.count(name) || has_effect(value);
+  }
   std::unordered_set<std::string> used_;
 };
 

@@ -1,8 +1,9 @@
 // Constant ranges of expressions, and bounds of sums by elimination.
 //
-// To bound a sum from above, terms are replaced one by one by something that is never less: a variable by its upper
-// end, c * (x / c) by x, a minimum by either operand, a maximum or a select by the worse of both. What cancels after a
-// replacement makes the bound tight. Each replacement costs one unit of a fixed budget.
+// To bound a sum from above, terms are replaced one by one by something that is never less: a
+// variable by its upper end, c * (x / c) by x, a minimum by either operand, a maximum or a select
+// by the worse of both. What cancels after a replacement makes the bound tight. Each replacement
+// costs one unit of a fixed budget.
 #include "simplify/facts.h"
 
 #include <algorithm>
@@ -22,7 +23,9 @@ namespace {
 constexpr int64_t infinity = INT64_MAX;
 
 int64_t saturate(__int128 value) {
-  return value > INT64_MAX ? INT64_MAX : value < INT64_MIN ? INT64_MIN : static_cast<int64_t>(value);
+  return value > INT64_MAX   ? INT64_MAX
+         : value < INT64_MIN ? INT64_MIN
+                             : static_cast<int64_t>(value);
 }
 bool is_infinite(int64_t value) { return value == INT64_MAX || value == INT64_MIN; }
 
@@ -64,13 +67,18 @@ ConstantRange operator*(const ConstantRange& a, int64_t factor) {
 
 namespace {
 
-ConstantRange multiply(const ConstantRange& a, const ConstantRange& b) { return hull(a * b.min, a * b.max); }
+ConstantRange multiply(const ConstantRange& a, const ConstantRange& b) {
+  return hull(a * b.min, a * b.max);
+}
 
-// Division by b > 0 rounds down and is monotonic in both operands' corners; otherwise only |a / b| <= |a| is used.
+// Division by b > 0 rounds down and is monotonic in both operands' corners; otherwise only |a / b|
+// <= |a| is used.
 ConstantRange divide(const ConstantRange& a, const ConstantRange& b) {
   if (b.min > 0) {
     const int64_t high = b.max == infinity ? infinity : b.max;
-    const auto far = [&](int64_t end) { return end < 0 ? -1 : 0; };  // the limit for an unbounded divisor
+    const auto far = [&](int64_t end) {
+      return end < 0 ? -1 : 0;
+    };  // the limit for an unbounded divisor
     const int64_t corners[] = {divide_ends(a.min, b.min), divide_ends(a.max, b.min),
                                high == infinity ? far(a.min) : divide_ends(a.min, high),
                                high == infinity ? far(a.max) : divide_ends(a.max, high)};
@@ -91,7 +99,8 @@ ConstantRange modulo(const ConstantRange& a, const ConstantRange& b) {
 ConstantRange wrapped(const ConstantRange& r, Type type) {
   const ConstantRange whole = ConstantRange::of(type);
   if (is_index_type(type)) return intersection(r, whole);  // does not overflow
-  // The largest value of uint64 is not an int64: its range has no upper end, and sums of it may wrap.
+  // The largest value of uint64 is not an int64: its range has no upper end, and sums of it may
+  // wrap.
   if (type.is_uint() && type.bits() == 64 && r.max == infinity) return whole;
   return r.within(whole.min, whole.max) ? r : whole;
 }
@@ -99,18 +108,23 @@ ConstantRange wrapped(const ConstantRange& r, Type type) {
 }  // namespace
 
 ConstantRange Facts::range(const Expr& e) {
-  if (const std::optional<int64_t> value = as_const_int(e)) return ConstantRange::point(*value);
+  if (const std::optional<int64_t> value =
+          as_const_int(e)) {  // the extremes of int64 also stand for infinity
+    return {*value == INT64_MAX ? *value - 1 : *value, *value == INT64_MIN ? *value + 1 : *value};
+  }
   if (!e.type().is_int_or_uint()) return {};
   if (const auto found = ranges_.find(e.get()); found != ranges_.end()) return found->second.range;
   ConstantRange result = intersection(range_of_node(e), ConstantRange::of(e.type()));
-  if (result.min > result.max) result = ConstantRange::of(e.type());  // contradictory facts: unreachable code
+  if (result.min > result.max)
+    result = ConstantRange::of(e.type());  // contradictory facts: unreachable code
   ranges_.emplace(e.get(), Remembered{e, result});
   return result;
 }
 
 ConstantRange Facts::range_of_variable(const Expr& e, const Variable& n) {
   ConstantRange result;
-  if (const auto found = variables_.find(n.name); found != variables_.end()) result = found->second.range;
+  if (const auto found = variables_.find(n.name); found != variables_.end())
+    result = found->second.range;
   if (!index_.empty() && is_index_type(n.type)) {
     const int64_t low = known_bound(e, -1);
     result = intersection(result, {low == infinity ? INT64_MIN : -low, known_bound(e, 1)});
@@ -125,8 +139,10 @@ ConstantRange Facts::range_of_node(const Expr& e) {
       [&](const Cast& n) {
         if (!n.value.type().is_int_or_uint() || n.type.is_bool()) return whole;
         const ConstantRange source = range(n.value);
-        return source.within(whole.min, whole.max) && !(n.value.type() == UInt(64) && source.max == infinity) ? source
-                                                                                                              : whole;
+        return source.within(whole.min, whole.max) &&
+                       !(n.value.type() == UInt(64) && source.max == infinity)
+                   ? source
+                   : whole;
       },
       [&](const Binary& n) { return range_of_binary(n); },
       [&](const Select& n) { return hull(range(n.true_value), range(n.false_value)); },
@@ -134,7 +150,8 @@ ConstantRange Facts::range_of_node(const Expr& e) {
         const ConstantRange steps = multiply(range(n.stride), {0, n.lanes - 1});
         return wrapped(range(n.base) + steps, n.type);
       },
-      [&](const Broadcast& n) { return range(n.value); }, [&](const Let& n) { return range(n.body); },
+      [&](const Broadcast& n) { return range(n.value); },
+      [&](const Let& n) { return range(n.body); },
       [&](const VectorReduce& n) {
         return n.op == ReduceOp::Min || n.op == ReduceOp::Max ? range(n.value) : whole;
       },
@@ -216,7 +233,8 @@ namespace {
 uint64_t terms_key(const std::vector<Term>& terms, int64_t divisor) {
   uint64_t key = terms.size();
   for (const Term& term : terms) {
-    key += (hash(term.atom) | 1) * (static_cast<uint64_t>(term.factor / divisor) * 0x9e3779b97f4a7c15ull + 1);
+    key += (hash(term.atom) | 1) *
+           (static_cast<uint64_t>(term.factor / divisor) * 0x9e3779b97f4a7c15ull + 1);
   }
   return key;
 }
@@ -276,7 +294,8 @@ void Facts::assume(const Expr& condition, bool value) {
     return;
   }
   if (const auto* negation = condition.as<Not>()) return assume(negation->a, !value);
-  if (const auto* call = condition.as<Call>(); call && (call->is_op(Op::likely) || call->is_op(Op::likely_if_innermost))) {
+  if (const auto* call = condition.as<Call>();
+      call && (call->is_op(Op::likely) || call->is_op(Op::likely_if_innermost))) {
     return assume(call->args[0], value);
   }
   if (is_const(condition)) return;
@@ -289,7 +308,8 @@ void Facts::assume(const Expr& condition) {
   forget();
 }
 
-Facts::Assumption::Assumption(Facts& facts, const Expr& condition) : facts_(facts), first_(facts.known_.size()) {
+Facts::Assumption::Assumption(Facts& facts, const Expr& condition)
+    : facts_(facts), first_(facts.known_.size()) {
   if (condition.defined()) facts_.assume(condition);
 }
 
@@ -348,7 +368,8 @@ int64_t Facts::bound_by_ranges(const Sum& sum) {
   int64_t result = sum.constant;
   for (const Term& term : sum.terms) {
     const int64_t end = (range(term.atom) * term.factor).max;
-    // The ends of the type say nothing about a difference: x - y of int32 may be anything as far as ranges tell.
+    // The ends of the type say nothing about a difference: x - y of int32 may be anything as far as
+    // ranges tell.
     if (end == infinity) return infinity;
     result = add_ends(result, end);
   }
@@ -369,7 +390,8 @@ int64_t Facts::replace(const Sum& sum, const Term& term, const Expr& by, int& bu
   return replaced.valid ? search(replaced, budget) : infinity;
 }
 
-// f * (x / c) with c dividing f: at most (f / c) * x for f > 0, and (f / c) * (x - (c - 1)) for f < 0.
+// f * (x / c) with c dividing f: at most (f / c) * x for f > 0, and (f / c) * (x - (c - 1)) for f <
+// 0.
 int64_t Facts::eliminate_division(const Sum& sum, const Term& term, const Div& n, int& budget) {
   const std::optional<int64_t> divisor = as_const_int(n.b);
   if (!divisor || *divisor <= 1 || term.factor % *divisor != 0) return infinity;
@@ -392,7 +414,8 @@ int64_t Facts::eliminate_structure(const Sum& sum, int& budget) {
       return either ? std::min(a, b) : std::max(a, b);
     }
     if (const auto* n = term.atom.as<Select>()) {
-      const int64_t a = replace(sum, term, n->true_value, budget), b = replace(sum, term, n->false_value, budget);
+      const int64_t a = replace(sum, term, n->true_value, budget),
+                    b = replace(sum, term, n->false_value, budget);
       return std::max(a, b);
     }
     if (const auto* n = term.atom.as<Div>()) {

@@ -1,4 +1,5 @@
-// What is known while simplifying: bounds of variables, conditions that hold, and what follows for a sum.
+// What is known while simplifying: bounds of variables, conditions that hold, and what follows for
+// a sum.
 #pragma once
 
 #include <optional>
@@ -26,7 +27,8 @@ ConstantRange operator*(const ConstantRange& a, int64_t factor);
 
 class Facts {
  public:
-  // Simplified ends; undefined: unknown. Later variables may mention earlier ones in their bounds, not vice versa.
+  // Simplified ends; undefined: unknown. Later variables may mention earlier ones in their bounds,
+  // not vice versa.
   void bind(const std::string& name, Expr min, Expr max);
   void unbind(const std::string& name);
 
@@ -93,7 +95,8 @@ class Facts {
 
   std::unordered_map<std::string, Bounds> variables_;
   std::vector<Known> known_;
-  std::unordered_multimap<uint64_t, size_t> index_;  // hash of the terms or condition -> position in known_
+  std::unordered_multimap<uint64_t, size_t>
+      index_;  // hash of the terms or condition -> position in known_
   std::unordered_map<const ExprNode*, Remembered> ranges_;
   int next_order_ = 0;
 };

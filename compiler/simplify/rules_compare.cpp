@@ -57,26 +57,33 @@ Expr Simplifier::equals(const Expr& a, const Expr& b) {
   if (sum.terms.size() == 1) {  // select(c, 3, 4) == 3 => c
     const auto* choice = sum.terms[0].atom.as<Select>();
     const auto is_zero_with = [&](const Expr& arm) {
-      const Sum value = plus(times(sum_of(arm), sum.terms[0].factor), constant_sum(sum.type, sum.constant));
+      const Sum value =
+          plus(times(sum_of(arm), sum.terms[0].factor), constant_sum(sum.type, sum.constant));
       return make_const(Bool(), int64_t{value.valid && value.constant == 0});
     };
     if (choice && is_const(choice->true_value) && is_const(choice->false_value)) {
-      return select(choice->condition, is_zero_with(choice->true_value), is_zero_with(choice->false_value));
+      return select(choice->condition, is_zero_with(choice->true_value),
+                    is_zero_with(choice->false_value));
     }
   }
+  if (sum.may_be_extreme()) return binary(Kind::EQ, a, b);
   const int64_t g = common_factor(sum);
   if (sum.constant % g != 0) return const_false();
   divide_by_common_factor(sum);
   const Sides sides = sides_of(sum);
-  if (!sides.left.valid || !sides.right.valid || sum.constant == INT64_MIN) return binary(Kind::EQ, a, b);
+  if (!sides.left.valid || !sides.right.valid || sum.constant == INT64_MIN)
+    return binary(Kind::EQ, a, b);
   Sum left = sides.left, right = sides.right;
   if (left.is_constant()) std::swap(left, right), sum.constant = -sum.constant;
   // A constant stands on the right: x == y + 3.
-  if (right.is_constant() || sum.constant < 0) right.add_constant(-sum.constant);
-  else left.add_constant(sum.constant);
+  if (right.is_constant() || sum.constant < 0)
+    right.add_constant(-sum.constant);
+  else
+    left.add_constant(sum.constant);
   if (!left.valid || !right.valid) return binary(Kind::EQ, a, b);
   Expr result = binary(Kind::EQ, rebuild(left), rebuild(right));
-  if (const std::optional<bool> known = facts_.decided(result)) return make_const(Bool(), int64_t{*known});
+  if (const std::optional<bool> known = facts_.decided(result))
+    return make_const(Bool(), int64_t{*known});
   return result;
 }
 
@@ -85,8 +92,10 @@ Expr Simplifier::less(Kind kind, const Expr& a, const Expr& b) {
   if (a.type().is_int_or_uint()) {
     const ConstantRange ra = facts_.range(a), rb = facts_.range(b);
     const int64_t slack = kind == Kind::LE ? 0 : 1;
-    if (ra.max != INT64_MAX && rb.min != INT64_MIN && ra.max <= rb.min - slack) return const_true(lanes);
-    if (ra.min != INT64_MIN && rb.max != INT64_MAX && (kind == Kind::LE ? ra.min > rb.max : ra.min >= rb.max)) {
+    if (ra.max != INT64_MAX && rb.min != INT64_MIN && ra.max <= rb.min - slack)
+      return const_true(lanes);
+    if (ra.min != INT64_MIN && rb.max != INT64_MAX &&
+        (kind == Kind::LE ? ra.min > rb.max : ra.min >= rb.max)) {
       return const_false(lanes);
     }
     if (equal(a, b)) return make_const(Bool(lanes), int64_t{kind == Kind::LE});
@@ -112,12 +121,13 @@ Expr Simplifier::less_than_zero(Sum sum) {
   if (Expr distributed = distribute_comparison(sum); distributed.defined()) return distributed;
   Expr result = compare_sides(sum);
   if (!result.defined()) return result;
-  if (const std::optional<bool> known = facts_.decided(result)) return make_const(Bool(), int64_t{*known});
+  if (const std::optional<bool> known = facts_.decided(result))
+    return make_const(Bool(), int64_t{*known});
   return result;
 }
 
-// min(x, y) < z => x < z || y < z, when one of the two is decided; so for max with &&, and for a select between
-// constants.
+// min(x, y) < z => x < z || y < z, when one of the two is decided; so for max with &&, and for a
+// select between constants.
 Expr Simplifier::distribute_comparison(const Sum& sum) {
   if (depth_ > 8) return {};
   for (const Term& term : sum.terms) {
@@ -131,9 +141,11 @@ Expr Simplifier::distribute_comparison(const Sum& sum) {
       depth_ -= 4;
       return result;
     };
-    if (const auto* n = term.atom.as<Select>(); n && is_const(n->true_value) && is_const(n->false_value)) {
+    if (const auto* n = term.atom.as<Select>();
+        n && is_const(n->true_value) && is_const(n->false_value)) {
       const Expr t = with(n->true_value), f = with(n->false_value);
-      if (t.defined() && f.defined() && (is_const(t) || is_const(f))) return select(n->condition, t, f);
+      if (t.defined() && f.defined() && (is_const(t) || is_const(f)))
+        return select(n->condition, t, f);
     }
     if (term.atom.kind() != Kind::Min && term.atom.kind() != Kind::Max) continue;
     const auto* n = term.atom.as<Binary>();
@@ -153,7 +165,8 @@ Expr Simplifier::unfold_division(const Sum& sum) {
   if (!c || *c < 1) return {};
   if (factor != 1 && factor != -1) return {};
   // factor 1: x / c < -constant. factor -1: constant < x / c, which is not (x / c < constant + 1).
-  const __int128 limit = factor == 1 ? -__int128{sum.constant} * *c : (__int128{sum.constant} + 1) * *c;
+  const __int128 limit =
+      factor == 1 ? -__int128{sum.constant} * *c : (__int128{sum.constant} + 1) * *c;
   if (limit > sum.type.max_int() || limit < sum.type.min_int()) return {};
   const Expr bound = make_const(sum.type, static_cast<int64_t>(limit));
   return factor == 1 ? less(Kind::LT, n->a, bound) : less(Kind::LE, bound, n->a);
@@ -161,6 +174,7 @@ Expr Simplifier::unfold_division(const Sum& sum) {
 
 // left + constant < right, written with the fewest constants.
 Expr Simplifier::compare_sides(const Sum& sum) {
+  if (sum.may_be_extreme()) return {};
   Sides sides = sides_of(sum);
   Sum& left = sides.left;
   Sum& right = sides.right;

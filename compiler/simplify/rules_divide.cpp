@@ -1,5 +1,5 @@
-// Division and modulus by a constant c > 1. Terms that c divides leave the quotient; the rest shrinks by common
-// factors, is decided by its range, or merges with an inner division.
+// Division and modulus by a constant c > 1. Terms that c divides leave the quotient; the rest
+// shrinks by common factors, is decided by its range, or merges with an inner division.
 #include <numeric>
 
 #include "ir/build.h"
@@ -14,7 +14,8 @@ struct Split {
   Sum quotient, rest;
 };
 Split split_by(const Sum& x, int64_t c) {
-  Split split{constant_sum(x.type, floor_div(x.constant, c)), constant_sum(x.type, floor_mod(x.constant, c))};
+  Split split{constant_sum(x.type, floor_div(x.constant, c)),
+              constant_sum(x.type, floor_mod(x.constant, c))};
   for (const Term& term : x.terms) {
     if (term.factor % c == 0) {
       split.quotient.add(term.atom, term.factor / c);
@@ -48,14 +49,16 @@ Expr Simplifier::mod(const Expr& a, const Expr& b) {
 
 Expr Simplifier::div_by(const Expr& a, int64_t c) {
   const ConstantRange range = facts_.range(a);
-  if (range.min != INT64_MIN && range.max != INT64_MAX && floor_div(range.min, c) == floor_div(range.max, c)) {
+  if (range.min != INT64_MIN && range.max != INT64_MAX &&
+      floor_div(range.min, c) == floor_div(range.max, c)) {
     return constant(a, floor_div(range.min, c));
   }
   const auto* inner = a.as<Div>();
   const std::optional<int64_t> inner_divisor = inner ? as_const_int(inner->b) : std::nullopt;
   if (inner_divisor && *inner_divisor > 1) {
     const __int128 product = __int128{*inner_divisor} * c;
-    if (product <= a.type().max_int()) return apply(Kind::Div, inner->a, constant(a, static_cast<int64_t>(product)));
+    if (product <= a.type().max_int())
+      return apply(Kind::Div, inner->a, constant(a, static_cast<int64_t>(product)));
   }
   if (!is_index_type(a.type())) return binary(Kind::Div, a, constant(a, c));
   if (const auto* line = a.as<Ramp>()) {
@@ -87,7 +90,7 @@ Expr Simplifier::div_atom(const Sum& rest, int64_t c) {
     const Expr& atom = rest.terms[0].atom;
     const auto* inner = atom.as<Div>();
     const std::optional<int64_t> d = inner ? as_const_int(inner->b) : std::nullopt;
-    if (d && *d > 1 && __int128{*d} * c <= rest.type.max_int()) {
+    if (d && *d > 1 && __int128{*d} * c <= rest.type.max_int() / 2) {
       Sum numerator = sum_of(inner->a);
       numerator.add_constant(rest.constant * *d);
       if (numerator.valid) return apply(Kind::Div, rebuild(numerator), as_constant(c * *d));
@@ -99,7 +102,9 @@ Expr Simplifier::div_atom(const Sum& rest, int64_t c) {
         return apply(Kind::Div, apply(Kind::Add, e, as_constant(rest.constant)), as_constant(c));
       };
       const Expr a = operand(n->a), b = operand(n->b);
-      const auto divided = [](const Expr& e) { return e.kind() != Kind::Div && e.kind() != Kind::Add && e.kind() != Kind::Sub; };
+      const auto divided = [](const Expr& e) {
+        return e.kind() != Kind::Div && e.kind() != Kind::Add && e.kind() != Kind::Sub;
+      };
       if (divided(a) || divided(b)) return apply(atom.kind(), a, b);
     }
   }
@@ -114,6 +119,7 @@ Expr Simplifier::mod_by(const Expr& a, int64_t c) {
     if (Expr result = mod_vector(*line, c); result.defined()) return result;
   }
   Sum rest = split_by(sum_of(a), c).rest;
+  if (!rest.valid) return binary(Kind::Mod, a, constant(a, c));
   // f * (x % m) => f * x, when c divides f * m
   for (const Term& term : Sum(rest).terms) {
     const auto* inner = term.atom.as<Mod>();
@@ -146,12 +152,14 @@ Expr Simplifier::mod_by(const Expr& a, int64_t c) {
   return binary(Kind::Mod, to_expr(rest), constant(a, c));
 }
 
-// A ramp whose stride c divides is divided lane by lane; one that stays inside a multiple of c gives one quotient.
+// A ramp whose stride c divides is divided lane by lane; one that stays inside a multiple of c
+// gives one quotient.
 Expr Simplifier::div_vector(const Ramp& a, int64_t c) {
   const std::optional<int64_t> stride = as_const_int(a.stride);
   if (!stride || a.base.type().is_vector()) return {};
   const Expr divisor = constant(a.base, c);
-  if (*stride % c == 0) return ramp(apply(Kind::Div, a.base, divisor), constant(a.base, *stride / c), a.lanes);
+  if (*stride % c == 0)
+    return ramp(apply(Kind::Div, a.base, divisor), constant(a.base, *stride / c), a.lanes);
   const ConstantRange offset = facts_.range(apply(Kind::Mod, a.base, divisor));
   const ConstantRange last = offset + ConstantRange::point(*stride * (a.lanes - 1));
   if (*stride > 0 && last.max < c) return broadcast(apply(Kind::Div, a.base, divisor), a.lanes);

@@ -38,8 +38,10 @@ std::optional<Sum> negative_sum(const Expr& e) {
 
 }  // namespace
 
-// Two conditions of a conjunction or disjunction: gives the constant that decides the whole, or says which is implied.
-Expr Simplifier::combine_conditions(Kind kind, const Expr& a, const Expr& b, bool& drop_a, bool& drop_b) {
+// Two conditions of a conjunction or disjunction: gives the constant that decides the whole, or
+// says which is implied.
+Expr Simplifier::combine_conditions(Kind kind, const Expr& a, const Expr& b, bool& drop_a,
+                                    bool& drop_b) {
   const bool is_and = kind == Kind::And;
   const Expr decided = is_and ? const_false(a.type().lanes()) : const_true(a.type().lanes());
   if (equal(a, b)) {
@@ -74,7 +76,9 @@ Expr Simplifier::logical(Kind kind, const Expr& a, const Expr& b) {
     for (const Expr& part : parts) {
       bool drop_part = false;
       if (!drop_other) {
-        if (Expr decided = combine_conditions(kind, part, other, drop_part, drop_other); decided.defined()) return decided;
+        if (Expr decided = combine_conditions(kind, part, other, drop_part, drop_other);
+            decided.defined())
+          return decided;
       }
       if (!drop_part) kept.push_back(part);
       changed |= drop_part;
@@ -91,7 +95,8 @@ Expr Simplifier::logical(Kind kind, const Expr& a, const Expr& b) {
 
 // Floats: !(a < b) also holds for NaNs, so it stays.
 Expr Simplifier::negate(const Expr& a) {
-  if (const auto* splat = a.as<Broadcast>(); splat && !is_const(a)) return broadcast(negate(splat->value), splat->lanes);
+  if (const auto* splat = a.as<Broadcast>(); splat && !is_const(a))
+    return broadcast(negate(splat->value), splat->lanes);
   const Kind kind = a.kind();
   const auto* n = a.as<Binary>();
   if (kind == Kind::EQ) return binary(Kind::NE, n->a, n->b);
@@ -115,9 +120,11 @@ Expr Simplifier::select(const Expr& condition, const Expr& t, const Expr& f) {
     return select(splat->value, t, f);
   }
   const auto* inner_t = t.as<Select>();
-  if (inner_t && equal(inner_t->condition, condition)) return select(condition, inner_t->true_value, f);
+  if (inner_t && equal(inner_t->condition, condition))
+    return select(condition, inner_t->true_value, f);
   const auto* inner_f = f.as<Select>();
-  if (inner_f && equal(inner_f->condition, condition)) return select(condition, t, inner_f->false_value);
+  if (inner_f && equal(inner_f->condition, condition))
+    return select(condition, t, inner_f->false_value);
   const bool same_lanes = condition.type().lanes() == t.type().lanes();
   if (t.type().is_bool() && same_lanes) {
     if (is_const_true(t)) return logical(Kind::Or, condition, f);
@@ -126,7 +133,8 @@ Expr Simplifier::select(const Expr& condition, const Expr& t, const Expr& f) {
     if (is_const_true(f)) return logical(Kind::Or, negate(condition), t);
   }
   const auto* n = condition.as<Binary>();
-  const bool orders = condition.kind() == Kind::LT || (condition.kind() == Kind::LE && t.type().is_int_or_uint());
+  const bool orders =
+      condition.kind() == Kind::LT || (condition.kind() == Kind::LE && t.type().is_int_or_uint());
   if (orders && same_lanes && n->a.type() == t.type()) {  // a < b ? a : b is the definition of min
     if (equal(n->a, t) && equal(n->b, f)) return apply(Kind::Min, t, f);
     if (equal(n->b, t) && equal(n->a, f)) return apply(Kind::Max, t, f);

@@ -79,7 +79,8 @@ Expr Simplifier::min_max(Kind kind, const Expr& a, const Expr& b) {
   std::vector<Sum> sums;
   for (const Expr& operand : operands) sums.push_back(sum_of(operand));
   const Sum common = take_common(sums);
-  const bool valid = common.valid && std::all_of(sums.begin(), sums.end(), [](const Sum& s) { return s.valid; });
+  const bool valid =
+      common.valid && std::all_of(sums.begin(), sums.end(), [](const Sum& s) { return s.valid; });
   if (!valid || (common.is_constant() && common.constant == 0)) return nest(kind, operands);
   for (size_t i = 0; i < operands.size(); ++i) operands[i] = rebuild(sums[i]);
   return apply(Kind::Add, nest(kind, operands), rebuild(common));

@@ -13,10 +13,12 @@ namespace retrograde::ir {
 
 Expr Simplifier::cast(Type type, const Expr& value) {
   if (const auto* splat = value.as<Broadcast>(); splat && !is_const(value)) {
-    return broadcast(cast(type.with_lanes(splat->value.type().lanes()), splat->value), splat->lanes);
+    return broadcast(cast(type.with_lanes(splat->value.type().lanes()), splat->value),
+                     splat->lanes);
   }
   const Type from = value.type();
-  if (const auto* line = value.as<Ramp>(); line && is_index_type(from) && is_index_type(type) && type.bits() > from.bits()) {
+  if (const auto* line = value.as<Ramp>();
+      line && is_index_type(from) && is_index_type(type) && type.bits() > from.bits()) {
     const Type lane = type.with_lanes(line->base.type().lanes());
     return ramp(cast(lane, line->base), cast(lane, line->stride), line->lanes);
   }
@@ -38,8 +40,9 @@ Expr Simplifier::cast(Type type, const Expr& value) {
 
 Expr Simplifier::ramp(const Expr& base, const Expr& stride, int lanes) {
   if (lanes == 1) return base;
-  return base.type().is_scalar() && is_zero(stride) && stride.type().is_int_or_uint() ? broadcast(base, lanes)
-                                                                                      : make_ramp(base, stride, lanes);
+  return base.type().is_scalar() && is_zero(stride) && stride.type().is_int_or_uint()
+             ? broadcast(base, lanes)
+             : make_ramp(base, stride, lanes);
 }
 
 Expr Simplifier::broadcast(const Expr& value, int lanes) { return make_broadcast(value, lanes); }
@@ -60,7 +63,9 @@ Expr Simplifier::vector_reduce(const VectorReduce& n) {
     if (idempotent) return broadcast(splat->value, n.type.lanes());
     if (n.op == ReduceOp::Add && has_sums(n.type)) {
       const int group = n.value.type().lanes() / n.type.lanes();
-      return broadcast(apply(Kind::Mul, splat->value, make_const(splat->value.type(), int64_t{group})), n.type.lanes());
+      return broadcast(
+          apply(Kind::Mul, splat->value, make_const(splat->value.type(), int64_t{group})),
+          n.type.lanes());
     }
   }
   return make_vector_reduce(n.op, std::move(value), n.type.lanes());
@@ -111,23 +116,28 @@ Expr Simplifier::call(const Expr& e, const Call& n) {
     changed |= !args.back().same_as(arg);
   }
   if (n.call_type != CallType::Operator) {
-    return changed ? Expr(new Call(n.type, n.call_type, n.op, n.name, std::move(args), n.value_index, n.symbol)) : e;
+    return changed ? Expr(new Call(n.type, n.call_type, n.op, n.name, std::move(args),
+                                   n.value_index, n.symbol))
+                   : e;
   }
-  if (n.op == Op::if_then_else && is_const(args[0])) return is_const_true(args[0]) ? args[1] : args[2];
+  if (n.op == Op::if_then_else && is_const(args[0]))
+    return is_const_true(args[0]) ? args[1] : args[2];
   const bool hint = n.op == Op::likely || n.op == Op::likely_if_innermost;
   if (hint && is_const(args[0])) return args[0];
   if (hint && args[0].kind() == Kind::Call && args[0].as<Call>()->is_op(n.op)) return args[0];
   const bool promise = n.op == Op::promise_clamped || n.op == Op::unsafe_promise_clamped;
   if (promise && args[0].type().is_int_or_uint()) {  // kept only while it says something new
     if (is_const(args[0])) return args[0];
-    const Expr inside = apply(Kind::And, apply(Kind::LE, args[1], args[0]), apply(Kind::LE, args[0], args[2]));
+    const Expr inside =
+        apply(Kind::And, apply(Kind::LE, args[1], args[0]), apply(Kind::LE, args[0], args[2]));
     if (is_const_true(inside)) return args[0];
   }
   if (is_pure_operator(n)) {
     if (Expr same = bit_identity(n.op, args); same.defined()) return same;
     if (n.type.is_vector()) {
       std::vector<Expr> scalars = scalar_arguments(args);
-      if (!scalars.empty()) return broadcast(call_op(n.op, n.type.element_of(), std::move(scalars)), n.type.lanes());
+      if (!scalars.empty())
+        return broadcast(call_op(n.op, n.type.element_of(), std::move(scalars)), n.type.lanes());
     }
   }
   return changed ? call_op(n.op, n.type, std::move(args)) : e;
@@ -142,7 +152,8 @@ bool is_trivial_value(const Expr& e) {
     return e.type().is_int() && n->a.kind() == Kind::Variable && is_const(n->b);
   }
   if (const auto* splat = e.as<Broadcast>()) return is_trivial_value(splat->value);
-  if (const auto* line = e.as<Ramp>()) return is_trivial_value(line->base) && is_const(line->stride);
+  if (const auto* line = e.as<Ramp>())
+    return is_trivial_value(line->base) && is_const(line->stride);
   return false;
 }
 
@@ -154,7 +165,8 @@ Expr Simplifier::let(const Expr& e) {
   while (const auto* n = body.as<Let>()) {
     Expr value = (*this)(n->value);
     const bool trivial = is_trivial_value(value);
-    bindings.push_back(std::make_unique<Binding>(*this, n->name, value, value, trivial ? value : Expr()));
+    bindings.push_back(
+        std::make_unique<Binding>(*this, n->name, value, value, trivial ? value : Expr()));
     if (!trivial) kept.emplace_back(n->name, value);
     body = n->body;
   }
@@ -162,7 +174,8 @@ Expr Simplifier::let(const Expr& e) {
   while (!bindings.empty()) bindings.pop_back();
   for (auto it = kept.rbegin(); it != kept.rend(); ++it) {
     const auto* var = result.as<Variable>();
-    result = var && var->name == it->first ? it->second : make_let(it->first, it->second, std::move(result));
+    result = var && var->name == it->first ? it->second
+                                           : make_let(it->first, it->second, std::move(result));
   }
   return drop_dead_lets(result);
 }

@@ -1,4 +1,5 @@
-// Sums: gather like terms; x / c * c + x % c is x; what cancels against an operand of min or max moves into it.
+// Sums: gather like terms; x / c * c + x % c is x; what cancels against an operand of min or max
+// moves into it.
 #include <cmath>
 
 #include "ir/build.h"
@@ -38,15 +39,17 @@ Expr Simplifier::sub(const Expr& a, const Expr& b) {
 
 Expr Simplifier::mul(const Expr& a, const Expr& b) {
   if (!has_sums(a.type())) return float_arithmetic(Kind::Mul, a, b);
-  if (const std::optional<int64_t> c = as_const_int(b)) return rebuild(times(sum_of(a), *c), Kind::Mul, a, b);
-  if (const std::optional<int64_t> c = as_const_int(a)) return rebuild(times(sum_of(b), *c), Kind::Mul, b, a);
+  if (const std::optional<int64_t> c = as_const_int(b))
+    return rebuild(times(sum_of(a), *c), Kind::Mul, a, b);
+  if (const std::optional<int64_t> c = as_const_int(a))
+    return rebuild(times(sum_of(b), *c), Kind::Mul, b, a);
   if (a.type().is_vector()) {
     for (const auto& [x, y] : {std::pair(a, b), std::pair(b, a)}) {
       const auto* slope = x.as<Ramp>();
       const auto* splat = y.as<Broadcast>();
       if (!slope || !splat || slope->lanes != splat->lanes) continue;
-      return ramp(apply(Kind::Mul, slope->base, splat->value), apply(Kind::Mul, slope->stride, splat->value),
-                  slope->lanes);
+      return ramp(apply(Kind::Mul, slope->base, splat->value),
+                  apply(Kind::Mul, slope->stride, splat->value), slope->lanes);
     }
   }
   // (2 * x) * (3 * y) => 6 * (x * y)
@@ -80,8 +83,8 @@ Expr Simplifier::rebuild(Sum sum) {
   return gathered.defined() ? gathered : to_expr(sum);
 }
 
-// n * c * (x / c) + n * (x % c) => n * x, and n * x - n * c * (x / c) => n * (x % c). Both follow from
-// x == x / c * c + x % c.
+// n * c * (x / c) + n * (x % c) => n * x, and n * x - n * c * (x / c) => n * (x % c). Both follow
+// from x == x / c * c + x % c.
 bool Simplifier::join_divisions(Sum& sum) {
   for (const Term& quotient : sum.terms) {
     const std::optional<int64_t> c = constant_divisor(quotient.atom, Kind::Div);
@@ -115,7 +118,8 @@ bool Simplifier::expand_product(Sum& sum) {
   for (const Term& term : sum.terms) {
     const auto* product = term.atom.as<Mul>();
     if (!product) continue;
-    for (const auto& [x, y] : {std::pair(product->a, product->b), std::pair(product->b, product->a)}) {
+    for (const auto& [x, y] :
+         {std::pair(product->a, product->b), std::pair(product->b, product->a)}) {
       if (x.kind() != Kind::Add && x.kind() != Kind::Sub) continue;
       Sum parts = constant_sum(sum.type, 0);
       const Sum inner = sum_of(x);
@@ -144,15 +148,18 @@ Expr Simplifier::push_into_min_max(const Sum& sum) {
     Sum moved = constant_sum(sum.type, 0);
     for (const Term& other : sum.terms) {
       const Term *in_a = a.find(other.atom), *in_b = b.find(other.atom);
-      const bool cancels = (in_a && in_a->factor == -other.factor) || (in_b && in_b->factor == -other.factor);
+      const bool cancels =
+          (in_a && in_a->factor == -other.factor) || (in_b && in_b->factor == -other.factor);
       if (cancels && other.factor != INT64_MIN) moved.add(other.atom, other.factor);
     }
-    if (moved.is_constant()) continue;
+    if (moved.is_constant() || a.may_be_extreme() || b.may_be_extreme()) continue;
     Sum rest = plus(sum, moved, -1);
     rest.add(term.atom, -term.factor);
     a.add(moved, 1);
     b.add(moved, 1);
-    if (!a.valid || !b.valid || !rest.valid || a.terms.size() + b.terms.size() >= before + moved.terms.size()) continue;
+    if (!a.valid || !b.valid || !rest.valid ||
+        a.terms.size() + b.terms.size() >= before + moved.terms.size())
+      continue;
     const Kind pushed = (term.factor > 0) == (kind == Kind::Min) ? Kind::Min : Kind::Max;
     return apply(Kind::Add, apply(pushed, rebuild(a), rebuild(b)), rebuild(rest));
   }
@@ -164,7 +171,9 @@ Expr Simplifier::fold_select(const Sum& sum) {
   if (sum.terms.size() != 1) return {};
   const auto [atom, factor] = sum.terms[0];
   const auto* n = atom.as<Select>();
-  if (!n || (factor == 1 && sum.constant == 0) || !is_const(n->true_value) || !is_const(n->false_value)) return {};
+  if (!n || (factor == 1 && sum.constant == 0) || !is_const(n->true_value) ||
+      !is_const(n->false_value))
+    return {};
   const auto arm = [&, factor = factor](const Expr& value) {
     Sum folded = times(sum_of(value), factor);
     folded.add_constant(sum.constant);
@@ -178,7 +187,8 @@ Expr Simplifier::fold_select(const Sum& sum) {
 // All ramps and broadcasts of scalars in a vector sum become one ramp or broadcast.
 Expr Simplifier::gather_vectors(const Sum& sum) {
   const Type scalar = sum.type.element_of();
-  Sum base = constant_sum(scalar, 0), stride = constant_sum(scalar, 0), rest = constant_sum(sum.type, 0);
+  Sum base = constant_sum(scalar, 0), stride = constant_sum(scalar, 0),
+      rest = constant_sum(sum.type, 0);
   bool found = false;
   for (const Term& term : sum.terms) {
     const auto* splat = term.atom.as<Broadcast>();
@@ -195,7 +205,9 @@ Expr Simplifier::gather_vectors(const Sum& sum) {
     found = true;
   }
   base.add_constant(sum.constant);
-  if (!found || !base.valid || !stride.valid || base.terms.size() > max_terms || stride.terms.size() > max_terms) return {};
+  if (!found || !base.valid || !stride.valid || base.terms.size() > max_terms ||
+      stride.terms.size() > max_terms)
+    return {};
   Expr line = ramp(rebuild(base), rebuild(stride), sum.type.lanes());
   return rest.is_constant() ? line : binary(Kind::Add, to_expr(rest), line);
 }

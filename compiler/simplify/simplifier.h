@@ -1,5 +1,5 @@
-// The simplifier: one bottom-up, memoised walk. Each operator has a rule function that takes simplified operands and
-// gives a simplified result; rules call each other on smaller things.
+// The simplifier: one bottom-up, memoised walk. Each operator has a rule function that takes
+// simplified operands and gives a simplified result; rules call each other on smaller things.
 //   rules_sum.cpp      + - *, and what cancels inside sums
 //   rules_divide.cpp   / %
 //   rules_min_max.cpp  min max
@@ -89,7 +89,8 @@ class Simplifier {
   // A name bound while this lives; `replacement`, when defined, stands for it.
   class Binding {
    public:
-    Binding(Simplifier& owner, const std::string& name, const Expr& min, const Expr& max, const Expr& replacement);
+    Binding(Simplifier& owner, const std::string& name, const Expr& min, const Expr& max,
+            const Expr& replacement);
     ~Binding();
     Binding(const Binding&) = delete;
     Binding& operator=(const Binding&) = delete;

@@ -18,9 +18,12 @@ Stmt simplify(const Stmt& s) {
   return drop_dead_lets(Simplifier(BoundsMap())(s));
 }
 
-bool can_prove(const Expr& condition, const BoundsMap& bounds) { return is_const_true(simplify(condition, bounds)); }
+bool can_prove(const Expr& condition, const BoundsMap& bounds) {
+  return is_const_true(simplify(condition, bounds));
+}
 
-// An end of a variable's bounds may mention another variable only when that one's bounds come first.
+// An end of a variable's bounds may mention another variable only when that one's bounds come
+// first.
 Simplifier::Simplifier(const BoundsMap& bounds) {
   std::unordered_set<std::string> done;
   const std::function<void(const std::string&)> bind = [&](const std::string& name) {
@@ -58,12 +61,14 @@ Expr Simplifier::operator()(const Expr& e) {
 Expr Simplifier::node(const Expr& e) {
   Simplifier& s = *this;
   return match(
-      e, [&](const Binary& n) { return apply(n.kind, s(n.a), s(n.b)); }, [&](const Not& n) { return negate(s(n.a)); },
+      e, [&](const Binary& n) { return apply(n.kind, s(n.a), s(n.b)); },
+      [&](const Not& n) { return negate(s(n.a)); },
       [&](const Select& n) { return select(s(n.condition), s(n.true_value), s(n.false_value)); },
       [&](const Cast& n) { return cast(n.type, s(n.value)); },
       [&](const Ramp& n) { return ramp(s(n.base), s(n.stride), n.lanes); },
-      [&](const Broadcast& n) { return broadcast(s(n.value), n.lanes); }, [&](const Call& n) { return call(e, n); },
-      [&](const Let&) { return let(e); }, [&](const VectorReduce& n) { return vector_reduce(n); },
+      [&](const Broadcast& n) { return broadcast(s(n.value), n.lanes); },
+      [&](const Call& n) { return call(e, n); }, [&](const Let&) { return let(e); },
+      [&](const VectorReduce& n) { return vector_reduce(n); },
       [&](const Load& n) {
         Expr index = s(n.index), predicate = n.predicate.defined() ? s(n.predicate) : Expr();
         const auto* splat = index.as<Broadcast>();
@@ -73,7 +78,9 @@ Expr Simplifier::node(const Expr& e) {
         }
         return make_load(n.type, n.name, index, predicate, n.symbol);
       },
-      [&](const ExprNode&) { return map_children(e, [&](const Expr& child) { return s(child); }); });
+      [&](const ExprNode&) {
+        return map_children(e, [&](const Expr& child) { return s(child); });
+      });
 }
 
 Expr Simplifier::apply(Kind kind, const Expr& a, const Expr& b) {
@@ -127,12 +134,14 @@ Expr Simplifier::apply(Kind kind, const Expr& a, const Expr& b) {
   return result;
 }
 
-Expr Simplifier::constant(const Expr& like, int64_t value) const { return make_const(like.type(), value); }
+Expr Simplifier::constant(const Expr& like, int64_t value) const {
+  return make_const(like.type(), value);
+}
 
 // ---- scopes ----
 
-Simplifier::Binding::Binding(Simplifier& owner, const std::string& name, const Expr& min, const Expr& max,
-                             const Expr& replacement)
+Simplifier::Binding::Binding(Simplifier& owner, const std::string& name, const Expr& min,
+                             const Expr& max, const Expr& replacement)
     : owner_(owner), name_(name) {
   // What was found for a name of another scope does not hold for this one.
   if (!owner.seen_names_.insert(name).second) owner.forget();

@@ -25,7 +25,8 @@ Stmt Simplifier::operator()(const Stmt& s) {
 
 Stmt Simplifier::children(const Stmt& s) {
   return map_children(
-      s, [this](const Expr& e) { return (*this)(e); }, [this](const Stmt& child) { return (*this)(child); });
+      s, [this](const Expr& e) { return (*this)(e); },
+      [this](const Stmt& child) { return (*this)(child); });
 }
 
 Stmt Simplifier::let_stmt(const Stmt& s) {
@@ -72,7 +73,8 @@ Stmt Simplifier::block(const Block& n) {
 
 Stmt Simplifier::branches(const Stmt& s, const IfThenElse& n) {
   Expr condition = (*this)(n.condition);
-  if (const std::optional<bool> known = facts_.decided(condition)) condition = make_const(Bool(), int64_t{*known});
+  if (const std::optional<bool> known = facts_.decided(condition))
+    condition = make_const(Bool(), int64_t{*known});
   if (is_const(condition)) return (*this)(is_const_true(condition) ? n.then_case : n.else_case);
   Stmt then_case, else_case;
   {
@@ -83,7 +85,9 @@ Stmt Simplifier::branches(const Stmt& s, const IfThenElse& n) {
     const Given fails(*this, negate(condition));
     else_case = (*this)(n.else_case);
   }
-  if (condition.same_as(n.condition) && then_case.same_as(n.then_case) && else_case.same_as(n.else_case)) return s;
+  if (condition.same_as(n.condition) && then_case.same_as(n.then_case) &&
+      else_case.same_as(n.else_case))
+    return s;
   return make_if(condition, std::move(then_case), std::move(else_case));
 }
 

@@ -16,10 +16,12 @@ int64_t sign_extend(int bits, int64_t value) {
   return static_cast<int64_t>(static_cast<uint64_t>(value) << (64 - bits)) >> (64 - bits);
 }
 
-// Puts `value` into the type: wraps, or makes the sum invalid when an index type would overflow.
+// Puts `value` into the type: wraps, or makes the sum of an index type invalid when it becomes
+// extreme.
 int64_t fit(Sum& sum, __int128 value) {
   const int64_t wrapped = sign_extend(sum.type.bits(), static_cast<int64_t>(value));
-  if (is_index_type(sum.type) && wrapped != value) sum.valid = false;
+  if (is_index_type(sum.type) && (wrapped != value || is_extreme(sum.type, wrapped)))
+    sum.valid = false;
   return wrapped;
 }
 
@@ -29,12 +31,15 @@ bool gather(Sum& sum, const Expr& e, int64_t factor) {
     sum.constant = fit(sum, __int128{sum.constant} + __int128{*value} * factor);
     return true;
   }
-  if (const auto* add = e.as<Add>()) return gather(sum, add->a, factor) && gather(sum, add->b, factor);
-  if (const auto* sub = e.as<Sub>(); sub && factor != INT64_MIN) return gather(sum, sub->a, factor) && gather(sum, sub->b, -factor);
+  if (const auto* add = e.as<Add>())
+    return gather(sum, add->a, factor) && gather(sum, add->b, factor);
+  if (const auto* sub = e.as<Sub>(); sub && factor != INT64_MIN)
+    return gather(sum, sub->a, factor) && gather(sum, sub->b, -factor);
   if (const auto* mul = e.as<Mul>()) {
     if (const std::optional<int64_t> value = as_const_int(mul->b)) {
       const __int128 product = __int128{*value} * factor;
-      if (product == static_cast<int64_t>(product)) return gather(sum, mul->a, static_cast<int64_t>(product));
+      if (product == static_cast<int64_t>(product))
+        return gather(sum, mul->a, static_cast<int64_t>(product));
     }
   }
   sum.add(e, factor);
@@ -42,6 +47,31 @@ bool gather(Sum& sum, const Expr& e, int64_t factor) {
 }
 
 }  // namespace
+
+bool is_extreme(Type type, int64_t value) {
+  const int64_t limit = type.max_int() / 2;
+  return value > limit || value < -limit;
+}
+
+bool may_be_extreme(const Expr& e, int depth) {
+  const std::optional<int64_t> value = as_const_int(e);
+  if (value) return is_extreme(e.type(), *value);
+  if (depth == 0) return false;
+  if (const auto* n = e.as<Select>()) {
+    return may_be_extreme(n->true_value, depth - 1) || may_be_extreme(n->false_value, depth - 1);
+  }
+  const Kind kind = e.kind();
+  const bool looks_through = kind == Kind::Min || kind == Kind::Max || kind == Kind::Add ||
+                             kind == Kind::Sub || kind == Kind::Mul;
+  if (!looks_through) return false;
+  const auto* n = e.as<Binary>();
+  return may_be_extreme(n->a, depth - 1) || may_be_extreme(n->b, depth - 1);
+}
+
+bool Sum::may_be_extreme() const {
+  return std::any_of(terms.begin(), terms.end(),
+                     [](const Term& term) { return ir::may_be_extreme(term.atom, 5); });
+}
 
 int64_t floor_div(int64_t a, int64_t b) { return a / b - (a % b < 0 ? 1 : 0); }
 int64_t floor_mod(int64_t a, int64_t b) { return a % b + (a % b < 0 ? b : 0); }
@@ -125,18 +155,25 @@ Expr to_expr(const Sum& sum) {
   Expr result;
   for (const auto& [atom, factor] : terms) {
     if (factor > 0) {
-      result = result.defined() ? binary(Kind::Add, result, scaled(atom, factor)) : scaled(atom, factor);
+      result =
+          result.defined() ? binary(Kind::Add, result, scaled(atom, factor)) : scaled(atom, factor);
       continue;
     }
-    if (!result.defined() && (constant > 0 || factor == -1)) result = make_const(sum.type, std::exchange(constant, 0));
-    const bool negatable = factor != INT64_MIN && !(sum.type.is_int() && factor == sum.type.min_int());
-    if (!result.defined()) result = scaled(atom, factor);
-    else if (negatable) result = new Sub(sum.type, result, scaled(atom, -factor));
-    else result = binary(Kind::Add, result, scaled(atom, factor));
+    if (!result.defined() && (constant > 0 || factor == -1))
+      result = make_const(sum.type, std::exchange(constant, 0));
+    const bool negatable =
+        factor != INT64_MIN && !(sum.type.is_int() && factor == sum.type.min_int());
+    if (!result.defined())
+      result = scaled(atom, factor);
+    else if (negatable)
+      result = new Sub(sum.type, result, scaled(atom, -factor));
+    else
+      result = binary(Kind::Add, result, scaled(atom, factor));
   }
   if (!result.defined()) return make_const(sum.type, constant);
   // The most negative constant has no negation in a signed type.
-  const bool negatable = constant < 0 && constant != INT64_MIN && !(sum.type.is_int() && constant == sum.type.min_int());
+  const bool negatable = constant < 0 && constant != INT64_MIN &&
+                         !(sum.type.is_int() && constant == sum.type.min_int());
   return negatable ? binary(Kind::Sub, result, make_const(sum.type, -constant))
                    : binary(Kind::Add, result, make_const(sum.type, constant));
 }

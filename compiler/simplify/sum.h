@@ -1,6 +1,7 @@
 // Integer expressions as sums: factor1 * atom1 + factor2 * atom2 + ... + constant.
-// All integer types: sums are exact modulo 2^bits. For index types (Int(32), Int(64)), which do not overflow, a factor or
-// constant that leaves the type's range makes the sum invalid instead of wrapping.
+// All integer types: sums are exact modulo 2^bits. Index types (Int(32), Int(64)) do not overflow;
+// there a factor or constant beyond half of the type's range makes the sum invalid: moving a
+// sentinel like INT_MAX to the other side of a comparison would overflow where the program did not.
 #pragma once
 
 #include <optional>
@@ -18,10 +19,12 @@ struct Term {
 struct Sum {
   Type type = Int(32);
   std::vector<Term> terms;  // atoms structurally different, no factor 0
-  int64_t constant = 0;     // factors and constant are sign-extended from the type's width, unsigned types too
+  int64_t constant =
+      0;  // factors and constant are sign-extended from the type's width, unsigned types too
   bool valid = true;
 
   bool is_constant() const { return terms.empty(); }
+  bool may_be_extreme() const;  // some atom is
   const Term* find(const Expr& atom) const;
   void add(const Expr& atom, int64_t factor);
   void add_constant(int64_t value);
@@ -33,6 +36,11 @@ constexpr size_t max_terms = 24;
 
 inline bool is_index_type(Type type) { return type.is_int() && type.bits() >= 32; }
 inline bool has_sums(Type type) { return type.is_int_or_uint() && !type.is_bool(); }
+
+bool is_extreme(Type type, int64_t value);
+// Whether an extreme constant takes part in the value, as far as `depth` levels show: then it is
+// not moved around.
+bool may_be_extreme(const Expr& e, int depth);
 
 // Of an expression whose sums are already gathered, as simplified ones are.
 Sum sum_of(const Expr& e);

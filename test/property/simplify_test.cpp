@@ -1,0 +1,170 @@
+// Random expressions mean the same before and after simplification, for ordinary and for extreme
+// inputs.
+#include <gtest/gtest.h>
+
+#include "ir/print.h"
+#include "ir/visit.h"
+#include "simplify/cse.h"
+#include "simplify/simplify.h"
+#include "support/evaluate.h"
+#include "support/random_ir.h"
+
+namespace retrograde {
+namespace {
+
+using ir::Scalar;
+using test::Evaluator;
+using test::RandomIr;
+
+enum class Inputs { Ordinary, Extreme };
+
+Scalar random_value(RandomIr& random, Type type, Inputs inputs) {
+  if (inputs == Inputs::Extreme && random.chance(40) && !type.is_float() && !type.is_bool()) {
+    const int64_t offset = random.below(3);
+    return Scalar::of_int(type, type.is_int() && random.chance(50) ? type.min_int() + offset
+                                                                   : type.max_int() - offset);
+  }
+  return *ir::as_scalar(inputs == Inputs::Extreme ? random.constant(type)
+                        : type.is_float() ? ir::make_const(type, (random.below(801) - 400) / 16.0)
+                                          : ir::make_const(type, int64_t{random.below(60) - 20}));
+}
+
+std::map<std::string, Scalar> random_inputs(RandomIr& random, const Expr& e, Inputs inputs) {
+  std::map<std::string, Scalar> values;
+  ir::walk(e, [&](const Expr& node) {
+    if (const auto* var = node.as<ir::Variable>())
+      values[var->name] = random_value(random, var->type, inputs);
+    return true;
+  });
+  return values;
+}
+
+std::string shown(const std::map<std::string, Scalar>& values) {
+  std::string result;
+  for (const auto& [name, value] : values)
+    result += name + " = " + ir::print(ir::to_expr(value)) + "  ";
+  return result;
+}
+
+// Compares the two at random points; gives how many were compared (not skipped for overflow).
+int compare_at_points(RandomIr& random, const Expr& before, const Expr& after, Inputs inputs,
+                      int points) {
+  int compared = 0;
+  for (int i = 0; i < points; ++i) {
+    const std::map<std::string, Scalar> values = random_inputs(random, before, inputs);
+    Evaluator old_values(values), new_values(values);
+    const test::Lanes expected = old_values(before);
+    if (old_values.overflowed()) continue;
+    const test::Lanes actual = new_values(after);
+    // Sums may be regrouped: only where a part is extreme may that overflow when the original does
+    // not.
+    if (new_values.overflowed() && old_values.met_extreme()) continue;
+    ++compared;
+    EXPECT_EQ(expected.size(), actual.size());
+    for (size_t lane = 0; lane < expected.size() && lane < actual.size(); ++lane) {
+      EXPECT_TRUE(test::same_value(expected[lane], actual[lane]))
+          << "before: " << before << "\nafter:  " << after << "\nat:     " << shown(values)
+          << "\nlane " << lane << ": " << ir::to_expr(expected[lane]) << " became "
+          << ir::to_expr(actual[lane]);
+      if (testing::Test::HasFailure()) return compared;
+    }
+  }
+  return compared;
+}
+
+void check_random(Type type, int depth, uint32_t first_seed, int count, Inputs inputs) {
+  int compared = 0;
+  for (uint32_t seed = first_seed; seed < first_seed + static_cast<uint32_t>(count); ++seed) {
+    RandomIr random(seed);
+    const Expr before = random.expr(type, depth);
+    const Expr after = ir::simplify(before);
+    ASSERT_EQ(before.type(), after.type()) << before << "\n" << after;
+    compared += compare_at_points(random, before, after, inputs, 12);
+    ASSERT_FALSE(testing::Test::HasFailure()) << "seed " << seed;
+  }
+  EXPECT_GT(compared, count) << "too many points overflow for the test to mean anything";
+}
+
+TEST(SimplifyRandom, KeepsIndexExpressions) { check_random(Int(32), 5, 1, 6000, Inputs::Ordinary); }
+TEST(SimplifyRandom, KeepsSmallIndexExpressions) {
+  check_random(Int(32), 3, 100001, 12000, Inputs::Ordinary);
+}
+TEST(SimplifyRandom, KeepsIndexExpressionsAtExtremes) {
+  check_random(Int(32), 3, 200001, 6000, Inputs::Extreme);
+}
+TEST(SimplifyRandom, KeepsConditions) { check_random(Bool(), 4, 300001, 8000, Inputs::Ordinary); }
+TEST(SimplifyRandom, KeepsConditionsAtExtremes) {
+  check_random(Bool(), 3, 400001, 4000, Inputs::Extreme);
+}
+TEST(SimplifyRandom, KeepsWideIntegers) { check_random(Int(64), 4, 500001, 3000, Inputs::Extreme); }
+TEST(SimplifyRandom, KeepsFloatsBitForBit) {
+  check_random(Float(32), 4, 600001, 4000, Inputs::Extreme);
+}
+TEST(SimplifyRandom, KeepsDoubles) { check_random(Float(64), 4, 700001, 2000, Inputs::Extreme); }
+TEST(SimplifyRandom, KeepsHalves) {
+  check_random(Float(16), 4, 800001, 1000, Inputs::Extreme);
+  check_random(BFloat(16), 4, 810001, 1000, Inputs::Extreme);
+}
+TEST(SimplifyRandom, KeepsWrappingIntegers) {
+  uint32_t seed = 900001;
+  for (Type type : {UInt(8), UInt(16), UInt(32), UInt(64), Int(8), Int(16)}) {
+    check_random(type, 4, seed, 1500, Inputs::Extreme);
+    seed += 10000;
+  }
+}
+TEST(SimplifyRandom, KeepsVectors) {
+  check_random(Int(32, 4), 4, 1000001, 4000, Inputs::Ordinary);
+  check_random(Bool(4), 4, 1100001, 3000, Inputs::Ordinary);
+  check_random(Float(32, 4), 3, 1200001, 1000, Inputs::Extreme);
+  check_random(UInt(8, 4), 4, 1300001, 1500, Inputs::Extreme);
+}
+
+// Variables within given bounds, some of them symbolic: y in [x, x + 9].
+TEST(SimplifyRandom, KeepsExpressionsWithinGivenBounds) {
+  const Expr x = ir::variable("x");
+  const ir::BoundsMap bounds = {
+      {"x", {Expr(0), Expr(15)}}, {"y", {x, x + 9}}, {"z", {Expr(), Expr(4)}}};
+  for (uint32_t seed = 1; seed <= 8000; ++seed) {
+    RandomIr random(seed);
+    const Expr before = random.expr(seed % 2 ? Bool() : Int(32), 3);
+    const Expr after = ir::simplify(before, bounds);
+    for (int i = 0; i < 12; ++i) {
+      std::map<std::string, Scalar> values = random_inputs(random, before, Inputs::Ordinary);
+      const int at_x = random.below(16);
+      values["x"] = Scalar::of_int(Int(32), at_x);
+      values["y"] = Scalar::of_int(Int(32), at_x + random.below(10));
+      values["z"] = Scalar::of_int(Int(32), 4 - random.below(100));
+      Evaluator old_values(values), new_values(values);
+      const Scalar expected = old_values(before)[0];
+      const Scalar actual = new_values(after)[0];
+      if (old_values.overflowed() || (new_values.overflowed() && old_values.met_extreme()))
+        continue;
+      ASSERT_TRUE(test::same_value(expected, actual))
+          << "seed " << seed << "\nbefore: " << before << "\nafter:  " << after
+          << "\nat:     " << shown(values);
+    }
+  }
+}
+
+TEST(SimplifyRandom, IsStable) {
+  int changed = 0;
+  for (uint32_t seed = 1; seed <= 2000; ++seed) {
+    RandomIr random(seed);
+    const Expr once = ir::simplify(random.expr(Int(32), 3));
+    changed += !ir::simplify(once).same_as(once);
+  }
+  EXPECT_LT(changed, 100) << "of 2000 expressions simplify further the second time";
+}
+
+TEST(CseRandom, LetsAndSharingMeanTheSame) {
+  for (uint32_t seed = 1; seed <= 3000; ++seed) {
+    RandomIr random(seed);
+    const Expr before = random.expr(seed % 3 ? Int(32) : Float(32), 5);
+    compare_at_points(random, before, ir::introduce_lets(before), Inputs::Ordinary, 3);
+    compare_at_points(random, before, ir::expand_lets(before), Inputs::Ordinary, 3);
+    ASSERT_FALSE(testing::Test::HasFailure()) << "seed " << seed;
+  }
+}
+
+}  // namespace
+}  // namespace retrograde
