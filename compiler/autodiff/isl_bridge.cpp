@@ -28,6 +28,13 @@ IslBridge::IslBridge(IslContext& context, std::vector<std::string> dims) : ctx_(
   universe_ = isl::manage(isl_set_universe(space));
 }
 
+IslBridge IslBridge::with_dims(std::vector<std::string> dims) const {
+  IslBridge result = *this;
+  result.universe_ = isl::manage(isl_set_universe(isl_space_set_alloc(ctx_, 0, static_cast<unsigned>(dims.size()))));
+  result.dims_ = std::move(dims);
+  return result;
+}
+
 isl::pw_aff IslBridge::constant(int64_t value) const {
   return isl::manage(isl_pw_aff_val_on_domain(universe_.copy(), isl_val_int_from_si(ctx_, value)));
 }

@@ -31,6 +31,9 @@ class IslBridge {
   // Dimensions in tuple order.
   IslBridge(IslContext& context, std::vector<std::string> dims);
 
+  // The same parameters over another tuple. Parameters met later are not shared.
+  IslBridge with_dims(std::vector<std::string> dims) const;
+
   isl::set universe() const { return universe_; }
   isl_ctx* ctx() const { return ctx_; }
   int rank() const { return static_cast<int>(dims_.size()); }

@@ -1,0 +1,245 @@
+#include "autodiff/accumulation.h"
+
+#include <algorithm>
+#include <map>
+
+#include "autodiff/regions.h"
+#include "frontend/define.h"
+#include "frontend/var.h"
+#include "ir/build.h"
+#include "ir/print.h"
+#include "simplify/simplify.h"
+
+namespace retrograde::ir {
+
+namespace {
+
+// Parts of a privatised accumulation: enough for the threads of today's machines, few enough to sum and to store.
+constexpr int part_count = 32;
+
+bool is_pointwise(const Gather& g) {
+  return !g.rdom && !g.scatters && std::all_of(g.pure.begin(), g.pure.end(), [](bool p) { return p; });
+}
+
+// Conditions on ranges are true but for borders; those on residues are not.
+bool is_range_condition(const Expr& e) {
+  bool result = true;
+  walk(e, [&](const Expr& node) {
+    Kind k = node.kind();
+    bool ordered = k == Kind::LT || k == Kind::LE || k == Kind::GT || k == Kind::GE || k == Kind::And;
+    bool arithmetic = k == Kind::Add || k == Kind::Sub || k == Kind::Mul || k == Kind::Min || k == Kind::Max;
+    result &= ordered || arithmetic || k == Kind::Variable || k == Kind::IntImm;
+    return result;
+  });
+  return result;
+}
+
+Expr masked(const Expr& predicate, const Expr& value) {
+  if (!predicate.defined()) return value;
+  Expr condition = is_range_condition(predicate) ? likely(predicate) : predicate;
+  return make_select(condition, value, make_zero(value.type()));
+}
+
+// Contributions that can share one update definition.
+struct UpdateGroup {
+  Gather gather;
+  std::vector<Expr> sums;  // one a value; undefined: nothing is added
+};
+
+// What two gathers must agree on, with the reduction variables numbered.
+std::string shape_of(const Gather& g) {
+  Substitution canonical;
+  std::string key;
+  if (g.rdom) {
+    for (size_t i = 0; i < g.rdom->vars.size(); ++i) {
+      canonical[g.rdom->vars[i].var] = variable("rho" + std::to_string(i));
+      key += print(g.rdom->vars[i].min) + ":" + print(g.rdom->vars[i].extent) + ";";
+    }
+  }
+  for (const Expr& e : g.lhs) key += print(substitute(e, canonical)) + ",";
+  if (g.predicate.defined()) key += "|" + print(substitute(g.predicate, canonical));
+  return key;
+}
+
+Expr rename_rdom(const Expr& e, const Gather& from, const Gather& to) {
+  if (!from.rdom || from.rdom == to.rdom) return e;
+  Substitution names;
+  for (size_t i = 0; i < from.rdom->vars.size(); ++i) {
+    names[from.rdom->vars[i].var] = variable(to.rdom->vars[i].var, Int(32), SymbolRef(to.rdom));
+  }
+  return substitute(e, names);
+}
+
+std::vector<UpdateGroup> group_updates(const std::vector<Contribution>& contributions, size_t values) {
+  std::vector<UpdateGroup> groups;
+  std::map<std::string, size_t> index;
+  for (const Contribution& c : contributions) {
+    if (is_pointwise(c.gather)) continue;
+    auto [it, is_new] = index.try_emplace(shape_of(c.gather), groups.size());
+    if (is_new) groups.push_back({c.gather, std::vector<Expr>(values)});
+    UpdateGroup& group = groups[it->second];
+    Expr& sum = group.sums[static_cast<size_t>(c.value_index)];
+    Expr term = rename_rdom(c.adjoint, c.gather, group.gather);
+    sum = sum.defined() ? sum + term : term;
+  }
+  return groups;
+}
+
+bool has_pure_dimension(const Gather& g) { return std::find(g.pure.begin(), g.pure.end(), true) != g.pure.end(); }
+
+std::vector<ReductionVariable> rvars_of(const Gather& g) {
+  return g.rdom ? g.rdom->vars : std::vector<ReductionVariable>{};
+}
+
+class Builder {
+ public:
+  Builder(const AdjointTarget& target, const std::string& name) : target_(target) {
+    result_.func = std::make_shared<FuncContents>();
+    result_.func->name = claim_name(name);
+    for (const std::string& arg : target.args) args_.push_back(variable(arg));
+  }
+
+  AdjointFunc build(const std::vector<Contribution>& contributions, const std::vector<Expr>& initial) {
+    define_pointwise(contributions, initial);
+    for (const UpdateGroup& group : group_updates(contributions, target_.types.size())) {
+      bool serial = !has_pure_dimension(group.gather) && group.gather.rdom;
+      serial &= is_worth_splitting(group.gather);
+      serial ? add_privatised(group) : add_update(group);
+    }
+    return std::move(result_);
+  }
+
+ private:
+  void define_pointwise(const std::vector<Contribution>& contributions, const std::vector<Expr>& initial) {
+    std::vector<Expr> values(target_.types.size());
+    for (size_t k = 0; k < initial.size(); ++k) values[k] = initial[k];
+    for (const Contribution& c : contributions) {
+      if (!is_pointwise(c.gather)) continue;
+      Expr& value = values[static_cast<size_t>(c.value_index)];
+      Expr term = masked(c.gather.predicate, c.adjoint);
+      value = value.defined() ? value + term : term;
+    }
+    for (size_t k = 0; k < values.size(); ++k) {
+      values[k] = values[k].defined() ? cast_to(target_.types[k], values[k]) : make_zero(target_.types[k]);
+    }
+    define_pure(result_.func, args_, values);
+    result_.stages.push_back(Accumulation::Pointwise);
+  }
+
+  void add_update(const UpdateGroup& group) {
+    const Gather& g = group.gather;
+    std::vector<Expr> values;
+    for (size_t k = 0; k < target_.types.size(); ++k) {
+      Expr self = call_value(result_.func, g.lhs, static_cast<int>(k));
+      Expr term = group.sums[k];
+      if (term.defined() && !g.rdom) term = masked(g.predicate, term);
+      values.push_back(term.defined() ? self + cast_to(self.type(), term) : self);
+    }
+    append_update(result_.func, g.lhs, values, rvars_of(g), g.rdom ? g.predicate : Expr());
+    result_.stages.push_back(g.scatters ? Accumulation::Scatter : Accumulation::Gather);
+  }
+
+  static bool is_worth_splitting(const Gather& g) {
+    auto extent = as_const_int(g.rdom->vars.back().extent);
+    return !extent || *extent >= part_count;
+  }
+
+  // parts(y..., t) accumulates the slice [t * chunk, (t + 1) * chunk) of the outermost reduction variable;
+  // adj(y...) += sum over t of parts(y..., t). A fixed element needs no y.
+  void add_privatised(const UpdateGroup& group) {
+    const Gather& g = group.gather;
+    FuncPtr parts = std::make_shared<FuncContents>();
+    parts->name = claim_name(result_.func->name + "_parts");
+    Expr part = variable(unique_name("part"));
+    std::vector<Expr> point = g.scatters ? args_ : std::vector<Expr>{};
+    point.push_back(part);
+    std::vector<Expr> zeros;
+    for (Type t : target_.types) zeros.push_back(make_zero(t));
+    define_pure(parts, point, zeros);
+
+    std::vector<ReductionVariable> rvars = rvars_of(g);
+    ReductionVariable& outer = rvars.back();
+    Expr chunk = simplify((outer.extent + (part_count - 1)) / part_count);
+    Expr all = outer.extent;
+    auto rdom = std::make_shared<ReductionDomainContents>();
+    Substitution slice;
+    for (ReductionVariable& r : rvars) {
+      std::string old = r.var;
+      r.var = unique_name(r.var);
+      slice[old] = variable(r.var, Int(32), SymbolRef(rdom));
+    }
+    Expr position = part * chunk + variable(outer.var, Int(32), SymbolRef(rdom));
+    outer.extent = chunk;
+    rdom->vars = rvars;
+    rdom->frozen = true;
+    // Beyond the end the position is clamped: what it reads must exist even where the predicate is false.
+    slice[g.rdom->vars.back().var] = outer.min + min(likely(position), all - 1);
+    std::vector<Expr> predicates{position < all};
+    if (g.predicate.defined()) predicates.push_back(substitute(g.predicate, slice));
+
+    std::vector<Expr> lhs;
+    if (g.scatters) {
+      for (const Expr& e : g.lhs) lhs.push_back(substitute(e, slice));
+    }
+    lhs.push_back(part);
+    std::vector<Expr> values;
+    for (size_t k = 0; k < target_.types.size(); ++k) {
+      Expr self = call_value(parts, lhs, static_cast<int>(k));
+      const Expr& term = group.sums[k];
+      values.push_back(term.defined() ? self + cast_to(self.type(), substitute(term, slice)) : self);
+    }
+    append_update(parts, lhs, values, rvars, conjunction(predicates));
+    result_.helpers.push_back(parts);
+    sum_parts(g, parts);
+  }
+
+  void sum_parts(const Gather& g, const FuncPtr& parts) {
+    auto rdom = std::make_shared<ReductionDomainContents>();
+    rdom->vars.push_back({unique_name("part"), make_zero(Int(32)), make_const(Int(32), part_count)});
+    rdom->frozen = true;
+    const std::vector<Expr>& lhs = g.scatters ? args_ : g.lhs;
+    std::vector<Expr> point = g.scatters ? args_ : std::vector<Expr>{};
+    point.push_back(variable(rdom->vars[0].var, Int(32), SymbolRef(rdom)));
+    std::vector<Expr> values;
+    for (size_t k = 0; k < target_.types.size(); ++k) {
+      values.push_back(call_value(result_.func, lhs, static_cast<int>(k)) + call_value(parts, point, static_cast<int>(k)));
+    }
+    append_update(result_.func, lhs, values, rdom->vars, {});
+    result_.stages.push_back(Accumulation::Privatised);
+  }
+
+  const AdjointTarget& target_;
+  std::vector<Expr> args_;
+  AdjointFunc result_;
+};
+
+}  // namespace
+
+Expr call_value(const FuncPtr& f, const std::vector<Expr>& args, int index) {
+  return call_func(f->name, f->types.at(static_cast<size_t>(index)), args, index, SymbolRef(f));
+}
+
+void append_update(const FuncPtr& f, std::vector<Expr> args, std::vector<Expr> values,
+                   const std::vector<ReductionVariable>& rvars, Expr predicate) {
+  Definition update;
+  for (Expr& e : args) e = cast_to(Int(32), e);
+  update.args = std::move(args);
+  update.values = std::move(values);
+  update.rvars = rvars;
+  if (predicate.defined() && !is_const_true(predicate)) update.predicate = predicate;
+  update = map_exprs(update, [&](const Expr& e) { return redirect_calls(e, f, f, true); });
+  for (const ReductionVariable& r : rvars) update.schedule.dims.push_back({r.var, ForType::Serial, true});
+  for (size_t d = 0; d < f->args.size(); ++d) {
+    if (is_pure_position(*f, update, d)) update.schedule.dims.push_back({f->args[d], ForType::Serial, false});
+  }
+  f->updates.push_back(std::move(update));
+  for (const FuncPtr& callee : direct_callees(*f)) callee->frozen = true;
+  f->version++;
+}
+
+AdjointFunc make_adjoint(const AdjointTarget& target, const std::string& name,
+                         const std::vector<Contribution>& contributions, const std::vector<Expr>& initial) {
+  return Builder(target, name).build(contributions, initial);
+}
+
+}  // namespace retrograde::ir

@@ -1,0 +1,51 @@
+// From contributions to a Func: the adjoint of one target.
+//
+// Contributions that reach each element at most once make the pure definition, a sum. The others become update
+// definitions; those with the same left-hand side, reduction domain and predicate share one. Who owns an element:
+//   gather      each element is written by the iterations of its own pure variables only: race-free in parallel.
+//   scatter     an index depends on data: serial inside each element of the pure dimensions.
+//   privatised  no pure dimension is left: a fixed number of parts of the outermost reduction variable accumulate
+//               apart, in a Func of their own, and are then summed in order. The result does not depend on threads.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "autodiff/access_inversion.h"
+#include "frontend/function.h"
+
+namespace retrograde::ir {
+
+struct Contribution {
+  int value_index = 0;
+  Gather gather;
+  Expr adjoint;  // over the gather's variables
+};
+
+struct AdjointTarget {
+  std::string name;               // of the primal
+  std::vector<std::string> args;  // pure variables of the adjoint
+  std::vector<Type> types;        // of the adjoint, one a value
+  std::vector<LoopVariable> region;
+};
+
+enum class Accumulation : uint8_t { Pointwise, Gather, Scatter, Privatised };
+
+struct AdjointFunc {
+  FuncPtr func;
+  std::vector<FuncPtr> helpers;          // private parts
+  std::vector<Accumulation> stages;      // how each stage of func accumulates; the first is Pointwise
+};
+
+// `initial`: values that the pure definition starts from, empty for zeros.
+AdjointFunc make_adjoint(const AdjointTarget& target, const std::string& name,
+                         const std::vector<Contribution>& contributions, const std::vector<Expr>& initial = {});
+
+// f(args) <- values over the reduction variables, where predicate. As an update written by a user, but the domain need
+// not be mentioned. Calls of `f` in it become weak.
+void append_update(const FuncPtr& f, std::vector<Expr> args, std::vector<Expr> values,
+                   const std::vector<ReductionVariable>& rvars, Expr predicate);
+// A call of value `index` of f.
+Expr call_value(const FuncPtr& f, const std::vector<Expr>& args, int index);
+
+}  // namespace retrograde::ir

@@ -1,0 +1,95 @@
+// derivative.h -- the gradient: propagate_adjoints and what it gives.
+//
+// Func loss; RDom r(input); loss() += pow(model(r.x, r.y) - target(r.x, r.y), 2);
+// Derivative d = propagate_adjoints(loss);
+// Func grad = d(weights);            // weights: a Func, Buffer, ImageParam or Param; schedule it like any other
+//
+// The adjoint of a Func or image has its dimensions; that of a Param has none. It is 0 outside of the region that the
+// output depends on. Adjoints are ordinary Funcs without side effects: they can be differentiated again.
+#pragma once
+
+#include <map>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "autodiff/explain.h"
+#include "frontend/buffer.h"
+#include "frontend/func.h"
+#include "frontend/image_param.h"
+#include "frontend/param.h"
+
+namespace retrograde {
+
+namespace ir {
+struct SynthesisResult;
+}
+
+class Derivative {
+ public:
+  explicit Derivative(std::shared_ptr<const ir::SynthesisResult> result);
+
+  // The adjoint of `func` as it is after update definition `update_id`; -1: after its pure definition. For a Func that
+  // is only accumulated into, all of these are the same. An undefined Func when there is none: integers, and what was
+  // not requested. Zero everywhere when the output does not depend on it.
+  Func operator()(const Func& func, int update_id = -1) const;
+  Func operator()(const Buffer<>& buffer) const;
+  Func operator()(const ImageParam& image) const;
+  template <typename T>
+  Func operator()(const Param<T>& param) const {
+    return of_parameter(*param.parameter());
+  }
+  // The adjoint of `func` as its consumers see it: after its last definition.
+  Func adjoint(const Func& func) const;
+
+  // Everything that was made, producers before consumers: adjoints, private parts, helpers.
+  std::vector<Func> funcs() const;
+  // What was built and how, what was left out, and why a gradient is zero.
+  const std::vector<Explanation>& explanations() const;
+  std::string explain() const { return to_string(explanations()); }
+
+ private:
+  Func of_parameter(const ir::ParameterContents& parameter) const;
+  std::shared_ptr<const ir::SynthesisResult> result_;
+};
+
+// What to do about an update that overwrites a value which a partial derivative needs.
+enum class Overwritten {
+  Error,  // a CompileError that names the update, the value and the rewrite
+  Store,  // keep the versions, in Funcs with one more dimension or in copies
+};
+
+// Something to differentiate by.
+class AdjointInput {
+ public:
+  AdjointInput(const Func& f) : symbol_(f.function()) {}
+  AdjointInput(const ImageParam& image) : symbol_(image.parameter()) {}
+  template <typename T>
+  AdjointInput(const Param<T>& param) : symbol_(param.parameter()) {}
+  template <typename T, int Dims>
+  AdjointInput(const Buffer<T, Dims>& buffer) : symbol_(buffer.parameter()) {}
+  const std::shared_ptr<ir::Symbol>& symbol() const { return symbol_; }
+
+ private:
+  std::shared_ptr<ir::Symbol> symbol_;
+};
+
+struct AdjointOptions {
+  Overwritten overwritten = Overwritten::Error;
+  std::vector<AdjointInput> wrt = {};  // only these gradients are wanted; empty: all
+};
+
+// The gradient of sum over output_bounds of adjoint * output with respect to everything that `output` depends on.
+// output_bounds: min and extent of each dimension of the output; `adjoint` is read there only.
+Derivative propagate_adjoints(const Func& output, const Func& adjoint, const Region& output_bounds,
+                              const AdjointOptions& options = {});
+Derivative propagate_adjoints(const Func& output, const Func& adjoint,
+                              const std::vector<std::pair<Expr, Expr>>& output_bounds,
+                              const AdjointOptions& options = {});
+// The same with an adjoint in memory, whose shape gives the bounds.
+Derivative propagate_adjoints(const Func& output, const Buffer<float>& adjoint, const AdjointOptions& options = {});
+// Of a scalar: a Func without dimensions, or its element at 0.
+Derivative propagate_adjoints(const Func& output, const AdjointOptions& options = {});
+
+}  // namespace retrograde

@@ -1,0 +1,104 @@
+#include "autodiff/regions.h"
+
+#include <algorithm>
+#include <set>
+
+#include "autodiff/reverse_sweep.h"
+#include "ir/build.h"
+#include "simplify/simplify.h"
+
+namespace retrograde::ir {
+
+namespace {
+
+Scope<Interval> scope_of(const FuncContents& f, const Definition& definition, const Box& box) {
+  Scope<Interval> scope;
+  for (size_t d = 0; d < f.args.size(); ++d) {
+    if (is_pure_position(f, definition, d)) scope.push(f.args[d], box.at(d));
+  }
+  for (const ReductionVariable& r : definition.rvars) scope.push(r.var, {r.min, simplify(r.min + r.extent - 1)});
+  return scope;
+}
+
+}  // namespace
+
+bool is_pure_position(const FuncContents& f, const Definition& definition, size_t d) {
+  const auto* v = definition.args[d].as<Variable>();
+  return v && !v->symbol.defined() && v->name == f.args[d];
+}
+
+Regions::Regions(const std::vector<FuncPtr>& order, const Box& output) {
+  if (order.empty()) return;
+  boxes_[order.back().get()] = output;
+  for (auto f = order.rbegin(); f != order.rend(); ++f) add_func(*f);
+}
+
+void Regions::add(const FuncPtr& f, const Box& box) {
+  grow(f.get(), box);
+  add_func(f);
+}
+
+void Regions::grow(const Symbol* symbol, const Box& box) {
+  Box& mine = boxes_[symbol];
+  mine = hull(mine, box);
+  for (Interval& i : mine) {
+    if (i.min.defined()) i.min = simplify(i.min);
+    if (i.max.defined()) i.max = simplify(i.max);
+  }
+}
+
+void Regions::add_func(const FuncPtr& f) {
+  auto found = boxes_.find(f.get());
+  if (found == boxes_.end() || (found->second.empty() && !f->args.empty())) return;  // nothing of it is read
+  std::map<const Symbol*, Box> callees;
+  // From the last stage back: what an update reads of the Func itself, the stages before it must hold.
+  for (int s = f->stage_count() - 1; s >= 0; --s) {
+    const Definition& definition = f->stage(s);
+    Scope<Interval> scope = scope_of(*f, definition, boxes_[f.get()]);
+    Box written;
+    for (size_t d = 0; d < f->args.size(); ++d) {
+      Interval i = is_pure_position(*f, definition, d) ? boxes_[f.get()][d] : bounds_of(definition.args[d], scope);
+      written.push_back(i);
+    }
+    if (s > 0) grow(f.get(), written);
+    for_each_expr(definition, [&](const Expr& e) {
+      for (const auto& [name, footprint] : footprints(without_lets(e), scope)) {
+        Symbol* symbol = footprint.symbol.raw();
+        if (symbol == f.get()) grow(f.get(), footprint.box);
+        else callees[symbol] = hull(callees[symbol], footprint.box);
+      }
+    });
+  }
+  for (const auto& [symbol, box] : callees) grow(symbol, box);
+}
+
+const Box& Regions::of(const Symbol* symbol) const {
+  static const Box nothing;
+  auto found = boxes_.find(symbol);
+  return found == boxes_.end() ? nothing : found->second;
+}
+
+std::vector<LoopVariable> Regions::loop_variables(const Symbol* symbol, const std::vector<std::string>& names) const {
+  const Box& box = of(symbol);
+  std::vector<LoopVariable> result;
+  for (size_t d = 0; d < names.size() && d < box.size(); ++d) {
+    result.push_back({names[d], box[d].min, box[d].max, false});
+  }
+  return result;
+}
+
+IterationDomain Regions::domain(const FuncContents& f, int stage) const {
+  const Definition& definition = f.stage(stage);
+  const Box& box = of(&f);
+  IterationDomain result;
+  for (size_t d = 0; d < f.args.size(); ++d) {
+    if (is_pure_position(f, definition, d)) result.vars.push_back({f.args[d], box.at(d).min, box.at(d).max, false});
+  }
+  for (const ReductionVariable& r : definition.rvars) {
+    result.vars.push_back({r.var, r.min, simplify(r.min + r.extent - 1), true});
+  }
+  if (definition.predicate.defined()) result.predicate = without_lets(definition.predicate);
+  return result;
+}
+
+}  // namespace retrograde::ir

@@ -1,0 +1,267 @@
+#include "autodiff/synthesis.h"
+
+#include <algorithm>
+
+#include "autodiff/derivative_rules.h"
+#include "autodiff/reverse_sweep.h"
+#include "autodiff/update.h"
+#include "diagnostics/error.h"
+#include "frontend/define.h"
+#include "ir/build.h"
+#include "ir/print.h"
+#include "simplify/simplify.h"
+
+namespace retrograde::ir {
+
+namespace {
+
+const ParameterContents* as_parameter(const Symbol* symbol) { return dynamic_cast<const ParameterContents*>(symbol); }
+
+// What a wanted leaf refers to; null for variables that are no parameter.
+Symbol* symbol_of(const Expr& leaf) {
+  if (const auto* call = leaf.as<Call>()) return call->symbol.raw();
+  const auto* v = leaf.as<Variable>();
+  return v && as_parameter(v->symbol.raw()) && !as_parameter(v->symbol.raw())->is_buffer ? v->symbol.raw() : nullptr;
+}
+
+std::vector<std::string> implicit_args(int n) {
+  std::vector<std::string> names;
+  for (int d = 0; d < n; ++d) names.push_back("_" + std::to_string(d));
+  return names;
+}
+
+using SelfValues = std::map<Expr, Expr, StructuralLess>;
+
+class Synthesis {
+ public:
+  Synthesis(const Seed& seed, const SynthesisOptions& options)
+      : seed_(seed),
+        options_(options),
+        order_(topological_order({seed.output})),
+        regions_(order_, seed.region) {
+    find_active();
+  }
+
+  SynthesisResult run() {
+    add_seed();
+    for (auto f = order_.rbegin(); f != order_.rend(); ++f) {
+      if (active_.contains(f->get())) differentiate(*f);
+    }
+    for (const auto& parameter : parameters_of({seed_.output})) finish_parameter(parameter);
+    explain_absent();
+    return std::move(result_);
+  }
+
+ private:
+  // ---- which symbols lie between the requested inputs and the output ----
+
+  bool is_requested(const Symbol* symbol) const { return !options_.only_requested || options_.requested.contains(symbol); }
+
+  void find_active() {
+    for (const auto& parameter : parameters_of({seed_.output})) {
+      if (parameter->type.is_float() && is_requested(parameter.get())) active_.insert(parameter.get());
+    }
+    for (const FuncPtr& f : order_) {
+      bool active = is_requested(f.get());
+      for (int s = 0; s < f->stage_count() && !active; ++s) active = reads_active(f->stage(s));
+      bool floating = std::any_of(f->types.begin(), f->types.end(), [](Type t) { return t.is_float(); });
+      if (active && floating) active_.insert(f.get());
+    }
+  }
+  bool reads_active(const Definition& definition) const {
+    bool found = false;
+    for_each_expr(definition, [&](const Expr& root) {
+      walk(root, [&](const Expr& e) {
+        Symbol* symbol = e.as<Call>() || e.as<Variable>() ? symbol_of(e) : nullptr;
+        found |= symbol && active_.contains(symbol);
+        return !found;
+      });
+    });
+    return found;
+  }
+
+  // ---- contributions ----
+
+  void add_seed() {
+    const FuncPtr& f = seed_.output;
+    AccessQuery query{{regions_.loop_variables(f.get(), f->args), {}}, {}, f->args, {}};
+    for (const std::string& arg : f->args) query.indices.push_back(variable(arg));
+    Inversion inversion = invert_access(query);
+    for (size_t k = 0; k < seed_.values.size(); ++k) {
+      if (!seed_.values[k].defined()) continue;
+      for (const Gather& g : inversion.gathers) {
+        pending_[f.get()].push_back({static_cast<int>(k), g, substitute(seed_.values[k], g.iteration)});
+      }
+    }
+  }
+
+  AdjointTarget target_of(const FuncContents& f) const {
+    AdjointTarget target{f.name, f.args, {}, regions_.loop_variables(&f, f.args)};
+    for (Type t : f.types) target.types.push_back(t.is_float() ? adjoint_type(t) : Float(32));
+    return target;
+  }
+  AdjointTarget target_of(const ParameterContents& p) const {
+    AdjointTarget target{p.name, implicit_args(p.is_buffer ? p.dimensions : 0), {adjoint_type(p.type)}, {}};
+    target.region = regions_.loop_variables(&p, target.args);
+    return target;
+  }
+
+  void differentiate(const FuncPtr& f) {
+    auto found = pending_.find(f.get());
+    if (found == pending_.end() || found->second.empty()) return;
+    AdjointTarget target = target_of(*f);
+    AdjointFunc adjoint = make_adjoint(target, f->name + "_adj", found->second);
+    bool extendable = true;  // nothing has read it yet
+    record(*f, f->stage_count() - 1, adjoint);
+    register_func(adjoint, f->name);
+    for (int s = f->stage_count() - 1; s >= 1; --s) {
+      UpdateAdjoint update = differentiate_update({f, s, regions_, target, adjoint, extendable, options_.store_overwritten,
+                                                   [&](const Expr& leaf) { return is_wanted(leaf); }});
+      for (size_t v = 0; v < update.versions.size(); ++v) {
+        regions_.add(update.versions[v], update.version_regions[v]);
+        active_.insert(update.versions[v].get());
+      }
+      if (update.current.func != adjoint.func) register_func(update.current, f->name);
+      for (const IterationDomain& domain : update.domains) {
+        contribute_stage(f, s, update.values, domain, update.current.func, update.self_values);
+      }
+      if (update.previous.func) register_func(update.previous, f->name);
+      for (const Explanation& e : update.explanations) result_.explanations.push_back(e);
+      for (const FuncPtr& version : update.versions) differentiate(version);
+      adjoint = update.previous.func ? update.previous : update.current;
+      extendable = update.previous.func != nullptr;
+      record(*f, s - 1, adjoint);
+    }
+    contribute_pure(f, adjoint.func);
+    pending_.erase(f.get());
+  }
+
+  void record(const FuncContents& f, int stage, const AdjointFunc& adjoint) { result_.after_stage[{&f, stage}] = adjoint.func; }
+
+  bool is_wanted(const Expr& leaf) const {
+    Symbol* symbol = symbol_of(leaf);
+    return symbol && active_.contains(symbol);
+  }
+
+  void contribute_pure(const FuncPtr& f, const FuncPtr& adjoint) {
+    std::vector<Expr> values;
+    for (const Expr& v : f->pure->values) values.push_back(without_lets(v));
+    contribute_stage(f, 0, values, regions_.domain(*f, 0), adjoint, {});
+  }
+
+  void contribute_stage(const FuncPtr& f, int stage, const std::vector<Expr>& values, const IterationDomain& domain,
+                        const FuncPtr& adjoint, const SelfValues& self_values) {
+    std::vector<Expr> seeds;
+    for (size_t k = 0; k < values.size(); ++k) {
+      seeds.push_back(f->types[k].is_float() ? call_value(adjoint, f->stage(stage).args, static_cast<int>(k)) : Expr());
+    }
+    SweepResult sweep = sweep_reverse(values, seeds, [&](const Expr& leaf) {
+      return is_wanted(leaf) && symbol_of(leaf) != f.get();
+    });
+    for (const std::string& note : sweep.notes) explain(Explanation::Kind::Zero, f->name, note);
+    for (const LeafAdjoint& leaf : sweep.leaves) {
+      add_contribution(f, {leaf.leaf, with_values(f, leaf.adjoint, self_values)}, domain);
+    }
+  }
+
+  void add_contribution(const FuncPtr& f, const LeafAdjoint& leaf, const IterationDomain& domain) {
+    Symbol* symbol = symbol_of(leaf.leaf);
+    const auto* call = leaf.leaf.as<Call>();
+    AdjointTarget target = as_parameter(symbol) ? target_of(*as_parameter(symbol)) : target_of(*func_of(*call));
+    AccessQuery query{domain, call ? call->args : std::vector<Expr>{}, target.args, target.region};
+    const Inversion& inversion = invert_cached(f, symbol, query);
+    if (!inversion.note.empty()) explain(Explanation::Kind::Scattered, target.name, text("read by ", quoted(f->name), ": ", inversion.note));
+    for (const Gather& g : inversion.gathers) {
+      pending_[symbol].push_back({call ? call->value_index : 0, g, substitute(leaf.adjoint, g.iteration)});
+    }
+  }
+
+  // Accesses of one stage often share their indices; the inversion is the expensive part.
+  const Inversion& invert_cached(const FuncPtr& f, const Symbol* symbol, const AccessQuery& query) {
+    std::string key = std::to_string(reinterpret_cast<uintptr_t>(symbol));
+    for (const Expr& e : query.indices) key += "," + print(e);
+    if (query.domain.predicate.defined()) key += "|" + print(query.domain.predicate);
+    for (const LoopVariable& v : query.domain.vars) key += ";" + v.name;
+    key += f->name;
+    auto [it, is_new] = inversions_.try_emplace(key);
+    if (is_new) it->second = invert_access(query);
+    return it->second;
+  }
+
+  // Calls of the Func by itself: kept versions where the final value is another; strong, since the adjoint owns it.
+  static Expr with_values(const FuncPtr& f, const Expr& e, const SelfValues& self_values) {
+    if (f->updates.empty()) return e;
+    Expr replaced = self_values.empty() ? e : rewrite(e, [&](const Expr& node, const auto& recurse) {
+      auto it = self_values.find(node);
+      return it != self_values.end() ? it->second : map_children(node, recurse);
+    });
+    return redirect_calls(replaced, f, f, false);
+  }
+
+  // ---- results ----
+
+  void finish_parameter(const std::shared_ptr<ParameterContents>& p) {
+    auto found = pending_.find(p.get());
+    if (found == pending_.end()) return;
+    AdjointFunc adjoint = make_adjoint(target_of(*p), p->name + "_adj", found->second);
+    result_.parameters[p.get()] = adjoint.func;
+    register_func(adjoint, p->name);
+  }
+
+  void register_func(const AdjointFunc& adjoint, const std::string& primal) {
+    for (const FuncPtr& helper : adjoint.helpers) result_.funcs.push_back(helper);
+    result_.funcs.push_back(adjoint.func);
+    int gathers = 0, scatters = 0, privatised = 0;
+    for (Accumulation a : adjoint.stages) {
+      gathers += a == Accumulation::Gather;
+      scatters += a == Accumulation::Scatter;
+      privatised += a == Accumulation::Privatised;
+    }
+    explain(Explanation::Kind::Built, primal,
+            text(quoted(adjoint.func->name), ", ", gathers, " gathers over reduction domains, ", scatters,
+                 " scatters inside pure dimensions, ", privatised, " privatised sums"));
+    if (privatised > 0) {
+      explain(Explanation::Kind::Privatised, primal, "accumulated in a fixed number of parts, which are summed in order");
+    }
+  }
+
+  void explain(Explanation::Kind kind, const std::string& subject, const std::string& detail) {
+    for (const Explanation& e : result_.explanations) {
+      if (e.kind == kind && e.subject == subject && e.detail == detail) return;
+    }
+    result_.explanations.push_back({kind, subject, detail});
+  }
+
+  void explain_absent() {
+    auto absent = [&](const Symbol* symbol, const std::string& name, bool floating, bool built, Type type) {
+      if (built) return;
+      if (!floating) return explain(Explanation::Kind::Zero, name, "its type is " + to_string(type) + ": integers have no derivative");
+      if (!active_.contains(symbol)) return explain(Explanation::Kind::NotRequested, name, "nothing that was requested depends on it");
+      explain(Explanation::Kind::Zero, name, "the output does not depend on its value by a differentiable path");
+    };
+    for (const FuncPtr& f : order_) {
+      bool floating = std::any_of(f->types.begin(), f->types.end(), [](Type t) { return t.is_float(); });
+      absent(f.get(), f->name, floating, result_.after_stage.contains({f.get(), 0}), f->types[0]);
+    }
+    for (const auto& p : parameters_of({seed_.output})) {
+      absent(p.get(), p->name, p->type.is_float(), result_.parameters.contains(p.get()), p->type);
+    }
+  }
+
+  const Seed& seed_;
+  const SynthesisOptions& options_;
+  std::vector<FuncPtr> order_;
+  Regions regions_;
+  std::unordered_set<const Symbol*> active_;
+  std::unordered_map<const Symbol*, std::vector<Contribution>> pending_;
+  std::map<std::string, Inversion> inversions_;
+  SynthesisResult result_;
+};
+
+}  // namespace
+
+SynthesisResult synthesize_adjoints(const Seed& seed, const SynthesisOptions& options) {
+  return Synthesis(seed, options).run();
+}
+
+}  // namespace retrograde::ir

@@ -1,0 +1,88 @@
+// Gradients of small programs against central differences in double, element by element, in the interpreter.
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+#include <random>
+
+#include "autodiff/derivative.h"
+#include "frontend/boundary_conditions.h"
+#include "frontend/func.h"
+#include "frontend/inline_reductions.h"
+#include "ir/print.h"
+#include "testing/interpreter.h"
+
+namespace retrograde::gradient {
+
+// Values that are exact in float32, far from each other's kinks: odd multiples of 2^-7 in (low, high).
+inline Buffer<float> random_image(const std::vector<int>& sizes, double low, double high, unsigned seed) {
+  Buffer<float> result(sizes);
+  std::mt19937 random(seed);
+  int steps = static_cast<int>((high - low) * 64);
+  std::uniform_int_distribution<int> pick(0, steps - 1);
+  result.get()->for_each_value([&](float& v) { v = static_cast<float>(low + (2 * pick(random) + 1) / 128.0); });
+  return result;
+}
+
+inline oracle::Array evaluate(const Func& f, const oracle::Region& region) {
+  oracle::InterpreterOptions options;
+  options.widen = true;
+  return oracle::Interpreter(options).realize(f.function(), region).front();
+}
+
+inline double evaluate_scalar(const Func& f) {
+  oracle::Region region;
+  region.mins.assign(static_cast<size_t>(f.dimensions()), 0);
+  region.extents.assign(static_cast<size_t>(f.dimensions()), 1);
+  return evaluate(f, region).values[0].scalar.as_double();
+}
+
+// d loss / d element of `image`, Richardson extrapolated: the error is of fourth order in the step.
+inline double difference(const Func& loss, Buffer<float>& image, const std::vector<int>& point) {
+  float& element = image.get()->operator()(point.data());
+  const float center = element;
+  auto slope = [&](float h) {
+    element = center + h;
+    double up = evaluate_scalar(loss);
+    element = center - h;
+    double down = evaluate_scalar(loss);
+    element = center;
+    return (up - down) / (2.0 * h);
+  };
+  double coarse = slope(1.0f / 256), fine = slope(1.0f / 512);
+  return (4 * fine - coarse) / 3;
+}
+
+// Checks d(image) on all of the image, and that it is 0 in a ring around it.
+inline void expect_gradient(const Func& loss, const Derivative& d, Buffer<float>& image, double tolerance = 1e-5) {
+  Func gradient = d(image);
+  ASSERT_TRUE(gradient.defined()) << d.explain();
+  oracle::Region region = oracle::region_of(*image.raw_buffer()), around = region;
+  for (size_t k = 0; k < region.mins.size(); ++k) around.mins[k] -= 2, around.extents[k] += 4;
+  oracle::Array found;
+  ASSERT_NO_THROW(found = evaluate(gradient, region)) << d.explain();
+  region.for_each([&](const std::vector<int>& point) {
+    double expected = difference(loss, image, point), actual = found.at(point).scalar.as_double();
+    std::string where;
+    for (int p : point) where += std::to_string(p) + " ";
+    EXPECT_NEAR(expected, actual, tolerance * (1 + std::abs(expected))) << "at " << where << "\n" << d.explain();
+  });
+  if (::testing::Test::HasFailure()) return;
+  oracle::Array outside = evaluate(gradient, around);
+  around.for_each([&](const std::vector<int>& point) {
+    bool inside = true;
+    for (size_t k = 0; k < point.size(); ++k) {
+      inside &= point[k] >= region.mins[k] && point[k] < region.mins[k] + region.extents[k];
+    }
+    if (!inside) EXPECT_EQ(outside.at(point).scalar.as_double(), 0.0) << "outside of the image";
+  });
+}
+
+inline void expect_gradient(const Func& loss, Buffer<float>& image, const AdjointOptions& options = {}) {
+  Derivative d = propagate_adjoints(loss, options);
+  expect_gradient(loss, d, image);
+}
+
+}  // namespace retrograde::gradient

@@ -1,0 +1,335 @@
+// Whole programs against central differences.
+#include "gradient/gradient_check.h"
+
+namespace retrograde::gradient {
+namespace {
+
+Var x("x"), y("y"), c("c"), t("t");
+
+// A scalar that weighs every element differently, so that misplaced gradients show.
+Func weighted_sum(const Func& f, const std::vector<int>& sizes) {
+  Func loss("loss");
+  std::vector<Range> ranges;
+  for (int n : sizes) ranges.push_back({0, n});
+  RDom r(ranges);
+  std::vector<Expr> at;
+  Expr weight = 1.0f;
+  for (size_t d = 0; d < sizes.size(); ++d) {
+    at.push_back(r[static_cast<int>(d)]);
+    weight = weight + cast<float>(r[static_cast<int>(d)] + 1) * (0.25f + 0.125f * static_cast<float>(d));
+  }
+  loss() = 0.0f;
+  loss() += f(at) * weight + 0.5f * f(at) * f(at);
+  return loss;
+}
+
+class Programs : public ::testing::Test {
+ protected:
+  Buffer<float> a = random_image({9}, 0.25, 2, 1);
+  Buffer<float> image = random_image({7, 6}, 0.25, 2, 2);
+};
+
+TEST_F(Programs, Pointwise) {
+  Func f("f");
+  f(x) = a(x) * a(x) + exp(-a(x)) * 2.0f;
+  Func loss = weighted_sum(f, {9});
+  expect_gradient(loss, a);
+}
+
+TEST_F(Programs, ChainOfStencils) {
+  Func f("f"), g("g"), h("h");
+  f(x) = a(x) * 1.5f;
+  g(x) = f(x) * f(x + 1) - f(x + 2);
+  h(x) = g(x) + g(x + 2) * g(x + 1);
+  Func loss = weighted_sum(h, {5});
+  expect_gradient(loss, a);
+}
+
+TEST_F(Programs, ConvolutionWithLearnedKernel) {
+  Buffer<float> kernel = random_image({3}, -1, 1, 7);
+  Func f("f");
+  RDom r(0, 3);
+  f(x) = 0.0f;
+  f(x) += a(x + r) * kernel(r);
+  Func loss = weighted_sum(f, {7});
+  expect_gradient(loss, a);
+  expect_gradient(loss, kernel);
+}
+
+TEST_F(Programs, StridedConvolutionAndUpsampling) {
+  Buffer<float> kernel = random_image({3}, -1, 1, 7);
+  Func down("down"), up("up");
+  RDom r(0, 3);
+  down(x) = sum(a(2 * x + r) * kernel(r));
+  up(x) = down(x / 2) * (0.5f + cast<float>(x % 2));
+  Func loss = weighted_sum(up, {8});
+  expect_gradient(loss, a);
+  expect_gradient(loss, kernel);
+}
+
+TEST_F(Programs, BoundaryConditions) {
+  for (int which = 0; which < 5; ++which) {
+    SCOPED_TRACE(which);
+    Func bounded;
+    if (which == 0) bounded = BoundaryConditions::repeat_edge(image);
+    if (which == 1) bounded = BoundaryConditions::constant_exterior(image, 0.5f);
+    if (which == 2) bounded = BoundaryConditions::repeat_image(image);
+    if (which == 3) bounded = BoundaryConditions::mirror_image(image);
+    if (which == 4) bounded = BoundaryConditions::mirror_interior(image);
+    Func blur("blur");
+    RDom r(-2, 5, -1, 3);
+    blur(x, y) = sum(bounded(x + r.x, y + r.y) * cast<float>(r.x + 2 * r.y + 6));
+    Func loss = weighted_sum(blur, {7, 6});
+    expect_gradient(loss, image);
+  }
+}
+
+TEST_F(Programs, RotationDiagonalAndTranspose) {
+  Func f("f"), g("g");
+  f(x, y) = image(y, 5 - x) * image(x, y);
+  g(x) = f(x, x) + image(x, x) * image(x + 1, x);
+  Func loss = weighted_sum(g, {5});
+  expect_gradient(loss, image);
+}
+
+TEST_F(Programs, SelectAndMinMax) {
+  Func f("f");
+  f(x) = select(a(x) > 1.0f, a(x) * 3.0f, a(x) * a(x)) + max(a(x), 1.25f * a(x + 1)) + clamp(a(x), 0.5f, 1.5f);
+  Func loss = weighted_sum(f, {8});
+  expect_gradient(loss, a);
+}
+
+TEST_F(Programs, ParamsAndTuples) {
+  Param<float> gain("gain", 1.5f);
+  Func f("f"), g("g");
+  f(x) = Tuple(a(x) * gain, sin(a(x)) + gain);
+  g(x) = f(x)[0] * f(x + 1)[1] + f(x)[1];
+  Func loss = weighted_sum(g, {8});
+  Derivative d = propagate_adjoints(loss);
+  expect_gradient(loss, d, a);
+  double found = evaluate_scalar(d(gain));
+  gain.set(1.5f + 1.0f / 256);
+  double up = evaluate_scalar(loss);
+  gain.set(1.5f - 1.0f / 256);
+  double down = evaluate_scalar(loss);
+  EXPECT_NEAR(found, (up - down) * 128, 1e-3);
+}
+
+TEST_F(Programs, HistogramOfDataDependentPlaces) {
+  Func h("h");
+  RDom r(0, 7, 0, 6);
+  h(x) = 0.0f;
+  h(cast<int>(image(r.x, r.y) * 3.0f)) += image(r.x, r.y) * image(r.x, r.y);
+  Func loss = weighted_sum(h, {6});
+  expect_gradient(loss, image);
+}
+
+TEST_F(Programs, DataDependentGatherScatters) {
+  Func index("index"), f("f");
+  index(x) = cast<int>(floor(a(x) * 3.5f));
+  f(x) = a(clamp(index(x), 0, 8)) * a(x);
+  Func loss = weighted_sum(f, {9});
+  Derivative d = propagate_adjoints(loss);
+  expect_gradient(loss, d, a);
+  EXPECT_NE(d.explain().find("scattered"), std::string::npos) << d.explain();
+}
+
+TEST_F(Programs, LookupTableAtDataDependentPlace) {
+  Buffer<float> table = random_image({8}, 0.25, 2, 3);
+  Func f("f");
+  Expr u = a(x) * 3.0f;
+  Expr cell = clamp(cast<int>(floor(u)), 0, 6);
+  Expr w = u - cast<float>(cell);
+  f(x) = lerp(table(cell), table(cell + 1), w);
+  Func loss = weighted_sum(f, {9});
+  expect_gradient(loss, table);
+  expect_gradient(loss, a);
+}
+
+TEST_F(Programs, BilateralSlice) {
+  const int size = 4, cells = 3;
+  Buffer<float> photo = random_image({12, 12}, 0.05, 0.95, 5);
+  Buffer<float> grid = random_image({2, cells, cells, 3}, -1, 1, 6);
+  Func out("out");
+  auto low = [&](const Expr& v) { return (2 * v + 1 - size) / (2 * size); };
+  auto at = [&](const Expr& v) { return clamp(v, 0, cells - 1); };
+  Expr z = photo(x, y) * 3.0f - 0.5f, iz = cast<int>(floor(z)), wz = z - floor(z);
+  Expr result = 0.0f;
+  for (int dx = 0; dx < 2; ++dx) {
+    for (int dz = 0; dz < 2; ++dz) {
+      Expr fx = (2.0f * cast<float>(x) + 1.0f - size) / (2.0f * size), wx = fx - floor(fx);
+      result = result + (dx ? wx : 1.0f - wx) * (dz ? wz : 1.0f - wz) *
+                            grid(c, at(low(x) + dx), at(low(y)), clamp(iz + dz, 0, 2));
+    }
+  }
+  out(x, y, c) = result;
+  Func loss = weighted_sum(out, {12, 12, 2});
+  Derivative d = propagate_adjoints(loss);
+  expect_gradient(loss, d, grid);
+  Func adjoint = d(grid);
+  for (int i = 0; i < adjoint.num_update_definitions(); ++i) {
+    std::vector<Expr> lhs = adjoint.update_args(i);
+    for (int k = 0; k < 3; ++k) EXPECT_TRUE(lhs[static_cast<size_t>(k)].as<ir::Variable>()) << "race-free in all but depth";
+  }
+}
+
+// ---- updates ----
+
+TEST_F(Programs, OverwrittenElementGetsNoGradientFromBefore) {
+  Func f("f");
+  f(x) = a(x) * a(x);
+  f(3) = a(0) * 2.0f;
+  f(x) += a(x);
+  Func loss = weighted_sum(f, {9});
+  expect_gradient(loss, a);
+}
+
+TEST_F(Programs, LastWriterOfAnElementGetsTheGradient) {
+  Func f("f");
+  RDom r(0, 5);
+  f(x) = a(x);
+  f(2) = a(r) * a(r);
+  Func loss = weighted_sum(f, {9});
+  expect_gradient(loss, a);
+}
+
+TEST_F(Programs, ScanForward) {
+  Func f("f");
+  RDom r(1, 8);
+  f(x) = a(x);
+  f(r) = f(r) * 0.5f + f(r - 1) * a(r);
+  Func loss = weighted_sum(f, {9});
+  EXPECT_NO_THROW(expect_gradient(loss, a));
+}
+
+TEST_F(Programs, ScanBackwardWithTwoTaps) {
+  Func f("f");
+  RDom r(0, 7);
+  f(x) = a(x);
+  f(6 - r) = a(6 - r) + 0.25f * f(7 - r) * f(8 - r);
+  Func loss = weighted_sum(f, {9});
+  expect_gradient(loss, a);
+}
+
+TEST_F(Programs, ScanNotStartingAtZero) {
+  Func f("f");
+  RDom r(3, 4);
+  f(x) = a(x) * a(x);
+  f(r) = sin(f(r - 1)) + a(r - 2);
+  Func loss = weighted_sum(f, {9});
+  expect_gradient(loss, a);
+}
+
+TEST_F(Programs, SummedAreaTable) {
+  Func f("f");
+  RDom rx(1, 6), ry(1, 5);
+  f(x, y) = image(x, y) * image(x, y);
+  f(rx, y) += f(rx - 1, y);
+  f(x, ry) += f(x, ry - 1);
+  Func loss = weighted_sum(f, {7, 6});
+  expect_gradient(loss, image);
+}
+
+TEST_F(Programs, RecursionInTimeOverAStencil) {
+  Func u("u");
+  RDom r(0, 4);
+  u(x, t) = 0.0f;
+  u(x, 0) = a(clamp(x, 0, 8));
+  Expr left = u(clamp(x - 1, 0, 8), r);
+  (void)left;
+  u(x, r + 1) = u(x, r) + 0.25f * sin(u(x, r)) * cast<float>(r + 1);
+  Func loss = weighted_sum(u, {9, 5});
+  expect_gradient(loss, a);
+}
+
+TEST_F(Programs, MaximumAndMinimumSelectTheirWinner) {
+  Func f("f");
+  RDom r(0, 4);
+  f(x) = maximum(a(x + r)) * minimum(a(x + r) * 2.0f);
+  Func loss = weighted_sum(f, {6});
+  expect_gradient(loss, a);
+}
+
+TEST_F(Programs, ArgmaxCarriesItsValue) {
+  Func f("f");
+  RDom r(0, 4);
+  f(x) = argmax(a(x + r))[1] * 3.0f;
+  Func loss = weighted_sum(f, {6});
+  expect_gradient(loss, a);
+}
+
+TEST_F(Programs, ProductNeedsStoredVersions) {
+  Func f("f");
+  RDom r(0, 4);
+  f(x) = 1.0f;
+  f(x) *= a(x + r);
+  Func loss = weighted_sum(f, {6});
+  EXPECT_THROW(propagate_adjoints(loss), UserError);
+  expect_gradient(loss, a, {.overwritten = Overwritten::Store});
+}
+
+TEST_F(Programs, InPlaceSquareNeedsStoredVersions) {
+  Func f("f");
+  f(x) = a(x) + 1.0f;
+  f(x) = f(x) * f(x) * a(x);
+  f(x) += f(x) * f(x);
+  Func loss = weighted_sum(f, {9});
+  EXPECT_THROW(propagate_adjoints(loss), UserError);
+  expect_gradient(loss, a, {.overwritten = Overwritten::Store});
+}
+
+TEST_F(Programs, ReductionWithPredicate) {
+  Func f("f");
+  RDom r(0, 7, 0, 6);
+  r.where(r.x + r.y < 8 && r.x >= r.y - 2);
+  f(x) = 0.0f;
+  f(r.x) += image(r.x, r.y) * image(r.y, r.x);
+  Func loss = weighted_sum(f, {6});
+  Buffer<float> square = random_image({9, 9}, 0.25, 2, 9);
+  Func g("g");
+  RDom q(0, 7, 0, 6);
+  q.where(q.x + q.y < 8 && q.x >= q.y - 2);
+  g(x) = 0.0f;
+  g(q.x) += square(q.x, q.y) * square(q.y, q.x);
+  Func loss2 = weighted_sum(g, {6});
+  expect_gradient(loss2, square);
+}
+
+TEST_F(Programs, SeedFromBufferAndFromFunc) {
+  Func f("f"), weight("weight"), loss("loss");
+  f(x) = a(x) * a(x);
+  Buffer<float> seed = random_image({5}, -1, 1, 11);
+  seed.set_min(2);
+  weight(x) = seed(x);
+  RDom r(2, 5);
+  loss() = 0.0f;
+  loss() += f(r) * seed(r);
+  Derivative by_buffer = propagate_adjoints(f, seed);
+  expect_gradient(loss, by_buffer, a);
+  Derivative by_func = propagate_adjoints(f, weight, std::vector<std::pair<Expr, Expr>>{{2, 5}});
+  expect_gradient(loss, by_func, a);
+}
+
+TEST_F(Programs, OnlyRequestedGradientsAreBuilt) {
+  Func f("f"), g("g");
+  f(x) = a(x) * 2.0f;
+  g(x) = f(x) * image(x, 0);
+  Func loss = weighted_sum(g, {7});
+  Derivative d = propagate_adjoints(loss, {.wrt = {a}});
+  EXPECT_TRUE(d(a).defined());
+  EXPECT_FALSE(d(image).defined());
+  EXPECT_NE(d.explain().find("not requested"), std::string::npos) << d.explain();
+  expect_gradient(loss, d, a);
+}
+
+TEST_F(Programs, SecondDerivative) {
+  Func f("f");
+  f(x) = a(x) * a(x) * a(x);
+  Func loss = weighted_sum(f, {9});
+  Func gradient = propagate_adjoints(loss)(a);
+  Func again = weighted_sum(gradient, {9});
+  expect_gradient(again, a);
+}
+
+}  // namespace
+}  // namespace retrograde::gradient
