@@ -87,13 +87,14 @@ class Checks {
     if (promised.defined()) promises.emplace_back(name, promised);
   }
 
-  // What the user promised; of a buffer that is named in the program: what it is.
+  // What the user promised; of a buffer that is named in the program: what it is. Dimension 0 is dense unless the user
+  // says otherwise.
   static BufferConstraint constraint_of(const LoweredArgument& arg, int d) {
     auto param = std::dynamic_pointer_cast<ParameterContents>(arg.symbol.lock());
-    if (!param) return {};
     BufferConstraint promised;
-    if (d < static_cast<int>(param->constraints.size())) promised = param->constraints[d];
-    if (param->is_literal && param->buffer) {
+    if (param && d < static_cast<int>(param->constraints.size())) promised = param->constraints[d];
+    if (d == 0 && !promised.stride.defined() && !promised.any_stride) promised.stride = 1;
+    if (param && param->is_literal && param->buffer) {
       const halide_dimension_t& dim = param->buffer->dim[d];
       promised.min = dim.min;
       promised.extent = dim.extent;

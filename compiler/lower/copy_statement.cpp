@@ -10,6 +10,14 @@ namespace retrograde::ir {
 
 namespace {
 
+// Without the number of a copy.
+std::string original_name(const std::string& name) {
+  size_t mark = name.rfind(".$");
+  bool is_copy = mark != std::string::npos && mark + 2 < name.size() &&
+                 name.find_first_not_of("0123456789", mark + 2) == std::string::npos;
+  return is_copy ? name.substr(0, mark) : name;
+}
+
 template <class Found>
 void for_each_name(const Stmt& s, Found found) {
   walk(
@@ -106,10 +114,10 @@ FreshNames::FreshNames(const Stmt& s) {
   for_each_name(s, [&](const std::string& name) { taken_.insert(name); });
 }
 
-std::string FreshNames::operator()(const std::string& base) {
-  std::string name;
+std::string FreshNames::operator()(const std::string& model) {
+  std::string base = original_name(model), name;
   do {
-    name = base + "$" + std::to_string(++next_[base]);
+    name = base + ".$" + std::to_string(++next_[base]);
   } while (!taken_.insert(name).second);
   return name;
 }
@@ -118,7 +126,8 @@ Stmt copy_statement(const Stmt& s, FreshNames& fresh, const Substitution& values
   return s.defined() ? Copier(s, fresh, values)(s) : s;
 }
 
-LoopName decode_loop_name(const std::string& loop) {
+LoopName decode_loop_name(const std::string& name) {
+  std::string loop = original_name(name);
   for (size_t dot = loop.find(".s"); dot != std::string::npos; dot = loop.find(".s", dot + 1)) {
     size_t end = dot + 2;
     while (end < loop.size() && std::isdigit(static_cast<unsigned char>(loop[end]))) ++end;

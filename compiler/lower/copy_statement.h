@@ -11,11 +11,11 @@
 
 namespace retrograde::ir {
 
-// Makes names that occur nowhere in a statement: "f.s0.x" gives "f.s0.x$1", "f.s0.x$2", ...
+// Makes names that occur nowhere in a statement: "f.s0.x" and "f.s0.x.$1" give "f.s0.x.$2", "f.s0.x.$3", ...
 class FreshNames {
  public:
   explicit FreshNames(const Stmt& s);
-  std::string operator()(const std::string& base);
+  std::string operator()(const std::string& model);
 
  private:
   std::unordered_set<std::string> taken_;
@@ -30,6 +30,7 @@ Stmt copy_statement(const Stmt& s, FreshNames& fresh, const Substitution& values
 struct LoopName {
   std::string func, stage, var;
 };
+// A copy's number is left out.
 LoopName decode_loop_name(const std::string& loop);
 // `"x" of "f"`, with the stage when it is an update.
 std::string describe_loop(const std::string& loop);

@@ -300,7 +300,8 @@ class Partitioner : public Rewriter {
     Expr var = variable(loop.name, loop.min.type());
     std::vector<Expr> conditions;
     std::vector<std::pair<std::string, Expr>> lets;
-    auto bind = [&](const char* what, const Expr& value) {
+    auto bind = [&](const char* what, const Expr& value) -> Expr {
+      if (is_const(value) || value.as<Variable>()) return value;
       lets.emplace_back(fresh_(loop.name + what), value);
       return variable(lets.back().first, value.type());
     };

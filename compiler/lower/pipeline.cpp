@@ -52,10 +52,9 @@ Stmt run_simplify(Lowering&, const Stmt& s) { return simplify(s); }
 
 constexpr Pass passes[] = {
     {"build_loop_nests", Phase::Loops, nest_loops},
-    {"simplify_loops", Phase::Loops, run_simplify},
     {"flatten_storage", Phase::FlatStorage,
      [](Lowering& lowering, const Stmt& s) { return flatten_storage(s, storage_order(lowering.program)); }},
-    {"simplify_flat", Phase::FlatStorage, run_simplify},
+    {"simplify_storage", Phase::FlatStorage, run_simplify},
     {"partition_loops", Phase::FlatStorage, [](Lowering&, const Stmt& s) { return partition_loops(s); }},
     {"unroll_loops", Phase::FlatStorage, [](Lowering&, const Stmt& s) { return unroll_loops(s); }},
     {"vectorize_loops", Phase::Vector, [](Lowering&, const Stmt& s) { return vectorize_loops(s); }},

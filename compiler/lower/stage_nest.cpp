@@ -10,11 +10,13 @@ Interval Loop::range() const { return {min, simplify(min + extent - 1)}; }
 
 namespace {
 
-// How the value of a variable that was split or fused away follows from those that replaced it.
+// How the value of a variable that was split or fused away follows from those that replaced it. One of these may have its
+// name: vectorize(x, 8) replaces x by an outer x and an inner loop.
 struct Derived {
   std::string var;
   Expr value;          // over the variables that replaced it
   Expr guarded_value;  // the same, clamped where a guard applies
+  Expr guard;          // over them, too; undefined when there is none
 };
 
 class NestBuilder {
@@ -39,7 +41,6 @@ class NestBuilder {
   const bool is_update_;
   Domain ranges_;  // of every variable that exists after the splits so far
   std::vector<Derived> derived_;
-  std::vector<Expr> guards_;
 
   Expr loop_variable(const std::string& var) const { return variable(prefix_ + var); }
 
@@ -57,14 +58,11 @@ class NestBuilder {
         return apply_fuse(split);
       case Split::Kind::Rename:
         ranges_[split.outer] = ranges_.at(split.old_var);
-        return derive(split.old_var, loop_variable(split.outer), {});
+        return derive(split.old_var, loop_variable(split.outer));
     }
   }
 
-  void derive(const std::string& var, Expr value, Expr guarded_value) {
-    if (!guarded_value.defined()) guarded_value = value;
-    derived_.push_back({var, std::move(value), std::move(guarded_value)});
-  }
+  void derive(const std::string& var, const Expr& value) { derived_.push_back({var, value, value, {}}); }
 
   TailStrategy tail_of(const Split& split, const Expr& extent) const {
     if (is_zero(simplify(extent % split.factor))) return TailStrategy::RoundUp;  // there is no tail
@@ -82,13 +80,13 @@ class NestBuilder {
     Expr inner = loop_variable(split.inner);
     switch (tail_of(split, old.extent)) {
       case TailStrategy::RoundUp:
-        return derive(split.old_var, base + inner + old.min, {});
+        return derive(split.old_var, base + inner + old.min);
       case TailStrategy::ShiftInwards:
         base = min(likely(base), old.extent - factor);
-        return derive(split.old_var, base + inner + old.min, {});
+        return derive(split.old_var, base + inner + old.min);
       default:  // GuardWithIf and its predicated forms
-        guards_.push_back(likely(base + inner < old.extent));
-        return derive(split.old_var, base + inner + old.min, min(base + inner, old.extent - 1) + old.min);
+        derived_.push_back({split.old_var, base + inner + old.min, min(base + inner, old.extent - 1) + old.min,
+                            likely(base + inner < old.extent)});
     }
   }
 
@@ -97,18 +95,19 @@ class NestBuilder {
     const Range outer = ranges_.at(split.outer), inner = ranges_.at(split.inner);
     ranges_[split.old_var] = {0, simplify(outer.extent * inner.extent)};
     Expr fused = loop_variable(split.old_var);
-    derive(split.inner, fused % inner.extent + inner.min, {});
-    derive(split.outer, fused / inner.extent + outer.min, {});
+    derive(split.inner, fused % inner.extent + inner.min);
+    derive(split.outer, fused / inner.extent + outer.min);
   }
 
-  // Later derivations replace variables that earlier ones introduced: resolve from the last to the first.
+  // Later derivations replace variables that earlier ones introduced: resolve from the last to the first. At each step
+  // `values` holds what the variables stand for that exist after that split.
   void resolve(StageNest& nest) {
     Substitution values, guarded;
     for (auto it = derived_.rbegin(); it != derived_.rend(); ++it) {
+      if (it->guard.defined()) nest.guards.push_back(simplify(substitute(it->guard, values)));
       values[prefix_ + it->var] = simplify(substitute(it->value, values));
       guarded[prefix_ + it->var] = simplify(substitute(it->guarded_value, guarded));
     }
-    for (const Expr& guard : guards_) nest.guards.push_back(simplify(substitute(guard, values)));
     auto value_in = [&](const Substitution& map, const std::string& var) {
       auto it = map.find(prefix_ + var);
       return it == map.end() ? loop_variable(var) : it->second;

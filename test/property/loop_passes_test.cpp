@@ -244,7 +244,7 @@ void expect_same(const char* pass, unsigned seed, const Stmt& before, const Stmt
 class LoopPasses : public testing::TestWithParam<int> {};
 
 TEST_P(LoopPasses, KeepWhatProgramsCompute) {
-  constexpr unsigned count = 150;
+  constexpr unsigned count = 100;
   for (unsigned seed = GetParam() * count; seed < (GetParam() + 1) * count; ++seed) {
     Stmt program = RandomProgram(seed).make();
     ASSERT_NO_THROW(validate(program, Phase::FlatStorage, "generator", free_names)) << "seed " << seed << "\n" << program;

@@ -1,0 +1,31 @@
+#include "lower/pass_table.h"
+
+#include "lower/flatten_storage.h"
+#include "lower/free_early.h"
+#include "lower/partition_loops.h"
+#include "lower/unroll_loops.h"
+#include "lower/vectorize_loops.h"
+#include "simplify/simplify.h"
+
+namespace retrograde::ir {
+
+const std::vector<StatementPass>& statement_passes() {
+  static const std::vector<StatementPass> passes = {
+      {"flatten_storage", [](const Stmt& s) { return flatten_storage(s); }},
+      {"free_early", free_early},
+      {"partition_loops", partition_loops},
+      {"simplify", [](const Stmt& s) { return simplify(s); }},
+      {"unroll_loops", unroll_loops},
+      {"vectorize_loops", vectorize_loops},
+  };
+  return passes;
+}
+
+const StatementPass* find_statement_pass(const std::string& name) {
+  for (const StatementPass& pass : statement_passes()) {
+    if (name == pass.name) return &pass;
+  }
+  return nullptr;
+}
+
+}  // namespace retrograde::ir

@@ -1,0 +1,89 @@
+// Every golden/lower/<pass>/<case>.in through its pass must give <case>.out. RETROGRADE_UPDATE_GOLDEN=1 writes the .out
+// files instead; read the difference before you commit it.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+
+#include "diagnostics/error.h"
+#include "ir/equal.h"
+#include "ir/parse.h"
+#include "ir/print.h"
+#include "ir/validate.h"
+#include "lower/pass_table.h"
+
+namespace retrograde::ir {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct GoldenCase {
+  std::string pass;
+  fs::path input;
+};
+void PrintTo(const GoldenCase& c, std::ostream* out) { *out << c.input; }
+
+std::string read_file(const fs::path& path) {
+  std::ifstream in(path);
+  return {std::istreambuf_iterator<char>(in), {}};
+}
+
+std::vector<GoldenCase> find_cases() {
+  std::vector<GoldenCase> cases;
+  for (const auto& entry : fs::recursive_directory_iterator(fs::path(RETROGRADE_TEST_DIR) / "golden/lower")) {
+    if (entry.path().extension() == ".in") {
+      cases.push_back({entry.path().parent_path().filename().string(), entry.path()});
+    }
+  }
+  std::sort(cases.begin(), cases.end(), [](const GoldenCase& a, const GoldenCase& b) { return a.input < b.input; });
+  return cases;
+}
+
+// A pass that must refuse its input has the message as its output.
+std::string outcome(const StatementPass& pass, const std::string& source) {
+  try {
+    return print(pass.run(parse_stmt(source)));
+  } catch (const UserError& e) {
+    return text("error: ", e.what(), "\n");
+  }
+}
+
+class LowerGolden : public testing::TestWithParam<GoldenCase> {};
+
+TEST_P(LowerGolden, GivesTheExpectedProgram) {
+  const StatementPass* pass = find_statement_pass(GetParam().pass);
+  ASSERT_NE(pass, nullptr) << GetParam().pass;
+  std::string result = outcome(*pass, read_file(GetParam().input));
+  fs::path expected = fs::path(GetParam().input).replace_extension(".out");
+  if (std::getenv("RETROGRADE_UPDATE_GOLDEN")) {
+    std::ofstream(expected) << result;
+    return;
+  }
+  ASSERT_TRUE(fs::exists(expected)) << expected << " is missing; see the head of this test";
+  EXPECT_EQ(result, read_file(expected));
+}
+
+TEST_P(LowerGolden, TwiceGivesTheSameText) {
+  const StatementPass* pass = find_statement_pass(GetParam().pass);
+  ASSERT_NE(pass, nullptr);
+  std::string source = read_file(GetParam().input);
+  EXPECT_EQ(outcome(*pass, source), outcome(*pass, source));
+}
+
+INSTANTIATE_TEST_SUITE_P(Cases, LowerGolden, testing::ValuesIn(find_cases()), [](const auto& info) {
+  std::string name = info.param.pass + "_" + info.param.input.stem().string();
+  std::replace_if(name.begin(), name.end(), [](unsigned char c) { return !std::isalnum(c); }, '_');
+  return name;
+});
+
+// What was parsed prints as what was parsed: golden inputs double as tests of the printer.
+TEST_P(LowerGolden, InputRoundTrips) {
+  Stmt program = parse_stmt(read_file(GetParam().input));
+  EXPECT_TRUE(equal(program, parse_stmt(print(program))));
+}
+
+}  // namespace
+}  // namespace retrograde::ir
