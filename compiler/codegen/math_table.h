@@ -24,7 +24,7 @@ inline constexpr MathFunction math_functions[] = {
     {ir::Op::exp, "exp", "u10", 1.0, 1.0, 0, 0},
     {ir::Op::log, "log", "u10", 1.0, 1.0, 0, 0},
     {ir::Op::pow, "pow", "u10", 1.0, 1.0, 0, 0},
-    {ir::Op::hypot, "hypot", "u05", 0.6, 0.6, 0, 0},
+    {ir::Op::hypot, "hypot", "u05", 1.0, 0.6, 0, 0},  // float32: 0.6 but for denormals
     {ir::Op::sin, "sin", "u10", 1.0, 1.0, 0, 0},
     {ir::Op::cos, "cos", "u10", 1.0, 1.0, 0, 0},
     {ir::Op::tan, "tan", "u10", 1.0, 1.0, 0, 0},
@@ -35,12 +35,12 @@ inline constexpr MathFunction math_functions[] = {
     // Near overflow: (exp(x / 2) / 2) * exp(x / 2), 3 ULP.
     {ir::Op::sinh, "sinh", "u10", 3.0, 3.0, 88.0, 709.0},
     {ir::Op::cosh, "cosh", "u10", 3.0, 3.0, 88.0, 709.0},
-    {ir::Op::tanh, "tanh", "u10", 1.0, 1.0, 0, 0},
+    {ir::Op::tanh, "tanh", "u10", 1.1, 1.0, 0, 0},
     // Where the square overflows: log(x) + log(2), 1.5 ULP.
     {ir::Op::asinh, "asinh", "u10", 1.5, 1.5, 0x1p60, 0x1p500},
     {ir::Op::acosh, "acosh", "u10", 1.5, 1.5, 0x1p60, 0x1p500},
-    {ir::Op::atanh, "atanh", "u10", 1.0, 1.0, 0, 0},
-    {ir::Op::erf, "erf", "u10", 1.0, 1.0, 0, 0},
+    {ir::Op::atanh, "atanh", "u10", 1.1, 1.0, 0, 0},
+    {ir::Op::erf, "erf", "u10", 1.1, 1.0, 0, 0},
 };
 
 // The fast forms of float32, inlined. Doubles use the full functions (and 1 / x, 1 / sqrt(x)).

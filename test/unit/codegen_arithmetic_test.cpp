@@ -10,27 +10,37 @@ const int widths[] = {1, 2, 3, 4, 5, 8, 12, 16, 20};
 const Type number_types[] = {Int(8),    Int(16),   Int(32),   Int(64),   UInt(8),   UInt(16),
                              UInt(32),  UInt(64),  Float(16), BFloat(16), Float(32), Float(64)};
 
-// out[i] = make(a[i], b[i] ...) for i in [0, count), `lanes` at a time.
-using Make = std::function<Expr(const std::vector<Expr> &)>;
-LoweredFunction elementwise(const std::vector<Type> &inputs, Type result, int lanes, int count, const Make &make) {
+// Something to compute from the operands, in machine code and by the scalar definitions.
+struct Case {
+  std::string name;
+  Type result;
+  std::function<Expr(const std::vector<Expr> &)> make;
+  std::function<Scalar(const std::vector<Scalar> &)> oracle;
+};
+using Cases = std::vector<Case>;
+
+// out<k>[i] = cases[k](in0[i], in1[i] ...) for i in [0, count), `lanes` at a time.
+LoweredFunction elementwise(const std::vector<Type> &inputs, const Cases &cases, int lanes, int count) {
   LoweredFunction function;
   function.name = "elementwise";
-  const Expr index = variable("i") * lanes;
+  const Expr index = lanes_at(variable("i") * lanes, lanes);
   std::vector<Expr> operands;
   for (size_t k = 0; k < inputs.size(); k++) {
     const std::string name = "in" + std::to_string(k);
     function.args.push_back(input(name, inputs[k]));
-    operands.push_back(make_load(inputs[k].with_lanes(lanes), name, lanes_at(index, lanes)));
+    operands.push_back(make_load(inputs[k].with_lanes(lanes), name, index));
   }
-  function.args.push_back(output("out", result));
-  const Stmt store = make_store("out", make(operands), lanes_at(index, lanes));
-  function.body = make_for("i", 0, count / lanes, ForType::Serial, store);
+  std::vector<Stmt> stores;
+  for (size_t k = 0; k < cases.size(); k++) {
+    const std::string name = "out" + std::to_string(k);
+    function.args.push_back(output(name, cases[k].result));
+    stores.push_back(make_store(name, cases[k].make(operands), index));
+  }
+  function.body = make_for("i", 0, count / lanes, ForType::Serial, make_block(stores));
   return function;
 }
 
-using Oracle = std::function<Scalar(const std::vector<Scalar> &)>;
-void check(const std::string &what, const std::vector<Type> &inputs, Type result, int lanes, const Make &make,
-           const Oracle &oracle, const Target &target = test_target()) {
+void check(const std::vector<Type> &inputs, int lanes, const Cases &cases, const Target &target = test_target()) {
   const int count = 240;  // divisible by all widths
   RandomScalars random(static_cast<uint32_t>(lanes));
   std::vector<std::unique_ptr<Array>> arrays;
@@ -38,10 +48,10 @@ void check(const std::string &what, const std::vector<Type> &inputs, Type result
     arrays.push_back(std::make_unique<Array>(type, count));
     for (size_t i = 0; i < count; i++) arrays.back()->set(i, random(type));
   }
-  arrays.push_back(std::make_unique<Array>(result, count));
+  for (const Case &c : cases) arrays.push_back(std::make_unique<Array>(c.result, count));
   std::vector<Array *> raw;
   for (auto &array : arrays) raw.push_back(array.get());
-  ASSERT_EQ(call(elementwise(inputs, result, lanes, count, make), raw, nullptr, target), 0) << what;
+  ASSERT_EQ(call(elementwise(inputs, cases, lanes, count), raw, nullptr, target), 0) << cases[0].name;
   for (size_t i = 0; i < count; i++) {
     std::vector<Scalar> operands;
     std::string text;
@@ -49,27 +59,37 @@ void check(const std::string &what, const std::vector<Type> &inputs, Type result
       operands.push_back(arrays[k]->get(i));
       text += " " + show(operands.back());
     }
-    const Scalar expected = oracle(operands), got = arrays.back()->get(i);
-    ASSERT_TRUE(same(expected, got)) << what << " of" << text << " in " << lanes << " lanes: " << show(got)
-                                     << ", expected " << show(expected);
+    for (size_t k = 0; k < cases.size(); k++) {
+      const Scalar expected = cases[k].oracle(operands), got = arrays[inputs.size() + k]->get(i);
+      ASSERT_TRUE(same(expected, got)) << cases[k].name << " of" << text << " in " << lanes << " lanes: " << show(got)
+                                       << ", expected " << show(expected);
+    }
   }
 }
 
-void check_binary(Kind kind, Type type, int lanes, const Target &target = test_target()) {
+Case binary_case(Kind kind, Type type) {
   const bool compares = kind >= Kind::EQ && kind <= Kind::GE;
-  check(
-      kind_name(kind), {type, type}, compares ? Bool() : type, lanes,
-      [&](const std::vector<Expr> &args) { return binary(kind, args[0], args[1]); },
-      [&](const std::vector<Scalar> &args) { return eval_binary(kind, args[0], args[1]); }, target);
+  return {kind_name(kind), compares ? Bool() : type,
+          [=](const auto &args) { return binary(kind, args[0], args[1]); },
+          [=](const auto &args) { return eval_binary(kind, args[0], args[1]); }};
+}
+
+Case operator_case(Op op, Type result, int lanes) {
+  return {op_info(op).name, result, [=](const auto &args) { return call_op(op, result.with_lanes(lanes), args); },
+          [=](const auto &args) { return *eval_operator(op, args, result); }};
+}
+
+Cases all_binary_cases(Type type) {
+  Cases cases;
+  for (int kind = static_cast<int>(Kind::Add); kind <= static_cast<int>(Kind::GE); kind++) {
+    cases.push_back(binary_case(static_cast<Kind>(kind), type));
+  }
+  return cases;
 }
 
 TEST(CodegenArithmetic, BinaryOperatorsInEveryTypeAndWidth) {
   for (int lanes : widths) {
-    for (Type type : number_types) {
-      for (int kind = static_cast<int>(Kind::Add); kind <= static_cast<int>(Kind::GE); kind++) {
-        check_binary(static_cast<Kind>(kind), type, lanes);
-      }
-    }
+    for (Type type : number_types) check({type, type}, lanes, all_binary_cases(type));
   }
 }
 
@@ -92,27 +112,23 @@ std::vector<Target> older_targets() {
 
 TEST(CodegenArithmetic, BinaryOperatorsOnOlderProcessors) {
   for (const Target &target : older_targets()) {
-    for (int lanes : {1, 8, 12}) {
-      for (Type type : number_types) {
-        for (Kind kind : {Kind::Add, Kind::Mul, Kind::Div, Kind::Mod, Kind::Min, Kind::Max, Kind::LT}) {
-          check_binary(kind, type, lanes, target);
-        }
-      }
+    for (int lanes : {1, 12}) {
+      for (Type type : number_types) check({type, type}, lanes, all_binary_cases(type), target);
     }
   }
 }
 
 TEST(CodegenArithmetic, BooleansAndSelect) {
   for (int lanes : widths) {
-    for (Kind kind : {Kind::And, Kind::Or, Kind::EQ, Kind::NE}) check_binary(kind, Bool(), lanes);
-    check(
-        "not", {Bool()}, Bool(), lanes, [](const auto &args) { return logical_not(args[0]); },
-        [](const auto &args) { return eval_not(args[0]); });
+    check({Bool(), Bool()}, lanes,
+          {binary_case(Kind::And, Bool()), binary_case(Kind::Or, Bool()), binary_case(Kind::EQ, Bool()),
+           binary_case(Kind::NE, Bool()),
+           {"not", Bool(), [](const auto &args) { return logical_not(args[0]); },
+            [](const auto &args) { return eval_not(args[0]); }}});
     for (Type type : {Int(16), Float(16), Float(32), Bool()}) {
-      check(
-          "select", {Bool(), type, type}, type, lanes,
-          [](const auto &args) { return make_select(args[0], args[1], args[2]); },
-          [](const auto &args) { return args[0].as_bool() ? args[1] : args[2]; });
+      check({Bool(), type, type}, lanes,
+            {{"select", type, [](const auto &args) { return make_select(args[0], args[1], args[2]); },
+              [](const auto &args) { return args[0].as_bool() ? args[1] : args[2]; }}});
     }
   }
 }
@@ -126,15 +142,16 @@ TEST(CodegenArithmetic, DivisionByConstants) {
       divisors.push_back(type.max_int());
     }
     for (int lanes : {1, 5, 16}) {
+      Cases cases;
       for (int64_t divisor : divisors) {
         const Scalar b = Scalar::of_int(type, divisor);
         for (Kind kind : {Kind::Div, Kind::Mod}) {
-          check(
-              text(kind_name(kind), " by ", divisor), {type}, type, lanes,
-              [&](const auto &args) { return binary(kind, args[0], make_broadcast(to_expr(b), lanes)); },
-              [&](const auto &args) { return eval_binary(kind, args[0], b); });
+          cases.push_back({text(kind_name(kind), " by ", divisor), type,
+                           [=](const auto &args) { return binary(kind, args[0], make_broadcast(to_expr(b), lanes)); },
+                           [=](const auto &args) { return eval_binary(kind, args[0], b); }});
         }
       }
+      check({type}, lanes, cases);
     }
   }
 }
@@ -147,69 +164,62 @@ bool is_open(Type to, const Scalar &from) {
            whole < std::ldexp(1.0, to.is_int() ? to.bits() - 1 : to.bits()));
 }
 
+// The cast, or zero where its result is open.
+Expr defined_cast(Type to, const Expr &value) {
+  const Type from = value.type();
+  const int lanes = from.lanes();
+  const Expr result = cast_to(to.with_lanes(lanes), value);
+  if (!from.is_float() || to.is_float() || to.is_bool()) return result;
+  const double low = static_cast<double>(to.is_int() ? to.min_int() : 0);
+  const double high = std::ldexp(1.0, to.is_int() ? to.bits() - 1 : to.bits());
+  const Expr whole = call_op(Op::trunc, {cast_to(Float(64, lanes), value)});
+  const Expr fits = binary(Kind::And, binary(Kind::GE, whole, make_const(Float(64, lanes), low)),
+                           binary(Kind::LT, whole, make_const(Float(64, lanes), high)));
+  return make_select(fits, result, make_zero(to.with_lanes(lanes)));
+}
+
 TEST(CodegenArithmetic, CastsBetweenAllTypes) {
   std::vector<Type> types(std::begin(number_types), std::end(number_types));
   types.push_back(Bool());
-  for (Type from : types) {
-    for (Type to : types) {
-      for (int lanes : {1, 3, 16}) {
-        check(
-            "cast to " + to_string(to), {from, to}, to, lanes,
-            [&](const auto &args) {
-              // The second operand stands in where the first one's result is open.
-              const Expr value = args[0];
-              Expr result = cast_to(to.with_lanes(lanes), value);
-              if (from.is_float() && !to.is_float() && !to.is_bool()) {
-                const double low = static_cast<double>(to.is_int() ? to.min_int() : 0);
-                const double high = std::ldexp(1.0, to.is_int() ? to.bits() - 1 : to.bits());
-                const Expr wide = call_op(Op::trunc, {cast_to(Float(64, lanes), value)});
-                const Expr fits = binary(Kind::And, binary(Kind::GE, wide, make_const(Float(64, lanes), low)),
-                                         binary(Kind::LT, wide, make_const(Float(64, lanes), high)));
-                result = make_select(fits, result, args[1]);
-              }
-              return result;
-            },
-            [&](const auto &args) { return is_open(to, args[0]) ? args[1] : eval_cast(to, args[0]); });
-        check(
-            "saturating_cast to " + to_string(to), {from}, to, lanes,
-            [&](const auto &args) { return call_op(Op::saturating_cast, to.with_lanes(lanes), {args[0]}); },
-            [&](const auto &args) { return *eval_operator(Op::saturating_cast, {args[0]}, to); });
+  std::vector<std::pair<Target, int>> setups = {{test_target(), 1}, {test_target(), 12}};
+  for (const Target &target : older_targets()) setups.push_back({target, 5});
+  for (const auto &[target, lanes_] : setups) {
+    const int lanes = lanes_;
+    for (Type from : types) {
+      Cases cases;
+      for (Type to : types) {
+        cases.push_back({"cast to " + to_string(to), to, [=](const auto &args) { return defined_cast(to, args[0]); },
+                         [=](const auto &args) {
+                           return is_open(to, args[0]) ? Scalar::of_int(to, 0) : eval_cast(to, args[0]);
+                         }});
+        cases.push_back(operator_case(Op::saturating_cast, to, lanes));
       }
+      check({from}, lanes, cases, target);
     }
   }
 }
 
-void check_operator(Op op, const std::vector<Type> &inputs, Type result, int lanes,
-                    const Target &target = test_target()) {
-  check(
-      op_info(op).name, inputs, result, lanes,
-      [&](const auto &args) { return call_op(op, result.with_lanes(lanes), args); },
-      [&](const auto &args) { return *eval_operator(op, args, result); }, target);
-}
-
 TEST(CodegenArithmetic, IntegerOperators) {
-  for (int lanes : {1, 5, 8, 32}) {
-    if (240 % lanes) lanes = 16;
+  for (int lanes : {1, 5, 8, 16}) {
     for (Type type : number_types) {
       if (type.is_float()) continue;
       const Type magnitude = UInt(type.bits());
-      for (Op op : {Op::bitwise_and, Op::bitwise_or, Op::bitwise_xor}) check_operator(op, {type, type}, type, lanes);
-      check_operator(Op::bitwise_not, {type}, type, lanes);
-      for (Op op : {Op::shift_left, Op::shift_right}) {
-        check_operator(op, {type, type}, type, lanes);
-        check_operator(op, {type, Int(type.bits())}, type, lanes);
-        check_operator(op, {type, UInt(8)}, type, lanes);
-        check_operator(op, {type, Int(64)}, type, lanes);
+      Cases cases = {operator_case(Op::absd, magnitude, lanes)};
+      for (Op op : {Op::bitwise_and, Op::bitwise_or, Op::bitwise_xor, Op::shift_left, Op::shift_right}) {
+        cases.push_back(operator_case(op, type, lanes));
       }
-      check_operator(Op::abs, {type}, magnitude, lanes);
-      check_operator(Op::absd, {type, type}, magnitude, lanes);
-      for (Op op : {Op::popcount, Op::count_leading_zeros, Op::count_trailing_zeros}) {
-        check_operator(op, {type}, type, lanes);
+      check({type, type}, lanes, cases);
+      cases = {operator_case(Op::abs, magnitude, lanes)};
+      for (Op op : {Op::bitwise_not, Op::popcount, Op::count_leading_zeros, Op::count_trailing_zeros}) {
+        cases.push_back(operator_case(op, type, lanes));
       }
-      if (type.bits() < 64) {
-        check_operator(Op::lerp, {type, type, magnitude}, type, lanes);
-        check_operator(Op::lerp, {type, type, UInt(8)}, type, lanes);
+      check({type}, lanes, cases);
+      for (Type amount : {Int(type.bits()), UInt(8), Int(64)}) {
+        check({type, amount}, lanes,
+              {operator_case(Op::shift_left, type, lanes), operator_case(Op::shift_right, type, lanes)});
       }
+      if (type.bits() == 64) continue;
+      for (Type weight : {magnitude, UInt(8)}) check({type, type, weight}, lanes, {operator_case(Op::lerp, type, lanes)});
     }
   }
 }
@@ -220,43 +230,46 @@ TEST(CodegenArithmetic, FloatOperators) {
   for (const Target &target : targets) {
     for (int lanes : {1, 3, 16}) {
       for (Type type : {Float(16), BFloat(16), Float(32), Float(64)}) {
+        Cases cases;
         for (Op op : {Op::abs, Op::floor, Op::ceil, Op::round, Op::trunc, Op::sqrt}) {
-          check_operator(op, {type}, type, lanes, target);
+          cases.push_back(operator_case(op, type, lanes));
         }
-        for (Op op : {Op::is_nan, Op::is_inf, Op::is_finite}) check_operator(op, {type}, Bool(), lanes, target);
-        for (Op op : {Op::absd, Op::strong_mul}) check_operator(op, {type, type}, type, lanes, target);
+        for (Op op : {Op::is_nan, Op::is_inf, Op::is_finite}) cases.push_back(operator_case(op, Bool(), lanes));
+        check({type}, lanes, cases, target);
+        check({type, type}, lanes, {operator_case(Op::absd, type, lanes), operator_case(Op::strong_mul, type, lanes)},
+              target);
       }
     }
   }
 }
 
 TEST(CodegenArithmetic, LerpWithFloatWeights) {
-  RandomScalars random(7);
   for (Type type : {UInt(8), Int(16), UInt(32), Bool()}) {
+    Cases cases;
     for (int step = 0; step <= 8; step++) {
       const Scalar weight = Scalar::of_float(Float(32), step / 8.0);
-      check(
-          text("lerp by ", weight.f), {type, type}, type, 8,
-          [&](const auto &args) {
-            return call_op(Op::lerp, {args[0], args[1], make_broadcast(to_expr(weight), 8)});
-          },
-          [&](const auto &args) { return *eval_operator(Op::lerp, {args[0], args[1], weight}, type); });
+      cases.push_back({text("lerp by ", weight.f), type,
+                       [=](const auto &args) {
+                         return call_op(Op::lerp, {args[0], args[1], make_broadcast(to_expr(weight), 8)});
+                       },
+                       [=](const auto &args) { return *eval_operator(Op::lerp, {args[0], args[1], weight}, type); }});
     }
+    check({type, type}, 8, cases);
   }
 }
 
 // A float lerp may fuse, so it is only near its definition; at the ends it is exact.
 TEST(CodegenArithmetic, FloatLerpIsExactAtTheEnds) {
+  Cases cases;
   for (double end : {0.0, 1.0}) {
-    const Scalar weight = Scalar::of_float(Float(32), end);
-    check(
-        text("lerp by ", end), {UInt(16), UInt(16)}, Float(32), 4,
-        [&](const auto &args) {
-          return call_op(Op::lerp, {cast_to(Float(32, 4), args[0]), cast_to(Float(32, 4), args[1]),
-                                    make_broadcast(to_expr(weight), 4)});
-        },
-        [&](const auto &args) { return eval_cast(Float(32), end == 0 ? args[0] : args[1]); });
+    const Expr weight = make_broadcast(Expr(static_cast<float>(end)), 4);
+    cases.push_back({text("lerp by ", end), Float(32),
+                     [=](const auto &args) {
+                       return call_op(Op::lerp, {cast_to(Float(32, 4), args[0]), cast_to(Float(32, 4), args[1]), weight});
+                     },
+                     [=](const auto &args) { return eval_cast(Float(32), end == 0 ? args[0] : args[1]); }});
   }
+  check({UInt(16), UInt(16)}, 4, cases);
 }
 
 TEST(CodegenArithmetic, ContractionHappensUnlessStrict) {
@@ -286,10 +299,9 @@ TEST(CodegenArithmetic, ReinterpretKeepsBits) {
   for (int lanes : {1, 4, 5}) {
     for (auto [from, to] : {std::pair{Float(32), UInt(32)}, {Int(32), Float(32)}, {Float(64), Int(64)},
                             {Float(16), UInt(16)}, {UInt(16), BFloat(16)}}) {
-      check(
-          "reinterpret", {from}, to, lanes,
-          [&, to = to](const auto &args) { return reinterpret_as(to.with_lanes(lanes), args[0]); },
-          [&, to = to](const auto &args) { return eval_reinterpret(to, args[0]); });
+      check({from}, lanes,
+            {{"reinterpret", to, [=, to = to](const auto &args) { return reinterpret_as(to.with_lanes(lanes), args[0]); },
+              [=, to = to](const auto &args) { return eval_reinterpret(to, args[0]); }}});
     }
   }
 }

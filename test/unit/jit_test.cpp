@@ -1,0 +1,239 @@
+// The JIT around the code generator: cache, threads, targets, symbols, memory protection, objects for other machines.
+#include "jit/jit.h"
+
+#include <fstream>
+#include <sstream>
+#include <thread>
+
+#include "codegen/codegen.h"
+#include "unit/codegen_testing.h"
+
+namespace retrograde::testing_codegen {
+namespace {
+
+// out[x] = x * factor, under chosen names.
+LoweredFunction scaled(int factor, const std::string &suffix = "", Type type = Int(32)) {
+  LoweredFunction f;
+  f.name = "scaled" + suffix;
+  f.args = {output("out" + suffix, type)};
+  const Expr x = variable("x" + suffix);
+  const Expr t = variable("t" + suffix);
+  f.body = make_for("x" + suffix, 0, 16, ForType::Serial,
+                    make_let("t" + suffix, x * factor, make_store("out" + suffix, cast_to(type, t), x)));
+  return f;
+}
+
+TEST(JitCache, TheSameProgramIsCompiledOnceWhateverItsNames) {
+  jit::clear_cache();
+  const auto first = compile_test(scaled(3, "$1"));
+  EXPECT_EQ(compile_test(scaled(3, "$1")), first);
+  EXPECT_EQ(compile_test(scaled(3, "$2")), first);
+  EXPECT_EQ(jit::cache_statistics().size, 1u);
+}
+
+TEST(JitCache, DifferentProgramsAreKeptApart) {
+  jit::clear_cache();
+  const auto first = compile_test(scaled(3));
+  EXPECT_NE(compile_test(scaled(4)), first);
+  EXPECT_NE(compile_test(scaled(3, "", Int(64))), first);
+  if (test_target().arch == Target::X86) {
+    EXPECT_NE(compile_test(scaled(3), Target("x86-64-linux")), first);
+  }
+  jit::Options fresh;
+  fresh.use_cache = false;
+  EXPECT_NE(jit::compile(scaled(3), test_target(), fresh), first);
+  // The same loads from other buffers.
+  LoweredFunction a;
+  a.name = "a";
+  a.args = {input("p", Int(32)), input("q", Int(32)), output("out", Int(32))};
+  LoweredFunction b = a;
+  a.body = make_store("out", make_load(Int(32), "p", 0) - make_load(Int(32), "q", 0), 0);
+  b.body = make_store("out", make_load(Int(32), "q", 0) - make_load(Int(32), "p", 0), 0);
+  EXPECT_NE(compile_test(a), compile_test(b));
+}
+
+TEST(JitCache, IsBoundedAndEvictedFunctionsLiveOn) {
+  jit::clear_cache();
+  const auto first = compile_test(scaled(0));
+  for (int factor = 1; factor <= static_cast<int>(jit::cache_capacity); factor++) compile_test(scaled(factor));
+  EXPECT_EQ(jit::cache_statistics().size, jit::cache_capacity);
+  EXPECT_NE(compile_test(scaled(0)), first) << "the oldest should have gone";
+  Array out(Int(32), 16);
+  void *args[] = {out.raw()};
+  EXPECT_EQ(first->call(nullptr, args), 0);
+  jit::clear_cache();
+}
+
+TEST(Jit, CompilesOnManyThreads) {
+  jit::clear_cache();
+  std::vector<std::thread> threads;
+  std::vector<int> wrong(4, 0);
+  for (int t = 0; t < 4; t++) {
+    threads.emplace_back([t, &wrong] {
+      for (int i = 0; i < 12; i++) {
+        const int factor = (i * 5 + t) % 16;
+        Array out(Int(32), 16);
+        void *args[] = {out.raw()};
+        compile_test(scaled(factor))->run(args);
+        for (int x = 0; x < 16; x++) wrong[static_cast<size_t>(t)] += out.data<int32_t>()[x] != x * factor;
+      }
+    });
+  }
+  for (std::thread &thread : threads) thread.join();
+  EXPECT_EQ(wrong, std::vector<int>(4, 0));
+  EXPECT_EQ(jit::cache_statistics().size, 16u);
+}
+
+TEST(Jit, RunThrowsWithCodeAndMessage) {
+  LoweredFunction f;
+  f.name = "fails";
+  f.args = {scalar_argument("k", Int(32))};
+  f.body = make_assert(variable("k") > 0, call_op(Op::error, Int(32), {Expr(-9), Expr("k = "), variable("k")}));
+  int32_t k = -2;
+  void *args[] = {&k};
+  try {
+    compile_test(f)->run(args);
+    FAIL() << "nothing was thrown";
+  } catch (const RuntimeError &error) {
+    EXPECT_EQ(error.code(), -9);
+    EXPECT_NE(std::string(error.what()).find("k = -2"), std::string::npos) << error.what();
+  }
+  k = 1;
+  EXPECT_NO_THROW(compile_test(f)->run(args));
+}
+
+TEST(Jit, RunHandsPrintsOn) {
+  LoweredFunction f;
+  f.name = "prints";
+  f.body = make_for("x", 0, 100, ForType::Parallel,
+                    make_evaluate(call_op(Op::print, Int(32), {variable("x"), Expr("seen")})));
+  int lines = 0;
+  jit::CallOptions options;
+  options.thread_limit = 2;
+  options.on_print = [&](const std::string &) { lines++; };
+  compile_test(f)->run(nullptr, options);
+  EXPECT_EQ(lines, 100);
+}
+
+TEST(Jit, CallsOfUnknownFunctionsAreUserErrors) {
+  LoweredFunction f;
+  f.name = "escapes";
+  f.args = {output("out", Int(32))};
+  f.body = make_store("out", call_extern("getpid", Int(32), {}), 0);
+  try {
+    compile_test(f);
+    FAIL() << "nothing was thrown";
+  } catch (const UserError &error) {
+    EXPECT_NE(std::string(error.what()).find("\"getpid\""), std::string::npos) << error.what();
+  }
+}
+
+TEST(Jit, ForeignTargetsAreRefused) {
+  const char *foreign = test_target().arch == Target::X86 ? "arm-64-linux" : "x86-64-linux";
+  EXPECT_THROW(compile_test(scaled(1), Target(foreign)), Unsupported);
+}
+
+TEST(Jit, NoPageIsWritableAndExecutable) {
+  std::vector<std::shared_ptr<const jit::CompiledFunction>> functions;
+  for (int factor = 0; factor < 5; factor++) functions.push_back(compile_test(scaled(factor)));
+  std::ifstream maps("/proc/self/maps");
+  for (std::string line; std::getline(maps, line);) {
+    EXPECT_EQ(line.find("rwx"), std::string::npos) << line;
+  }
+}
+
+TEST(Jit, TimesAreMeasured) {
+  jit::Options options;
+  options.use_cache = false;
+  const auto times = jit::compile(scaled(2), test_target(), options)->times();
+  EXPECT_GT(times.generate_seconds, 0);
+  EXPECT_GT(times.optimize_seconds, 0);
+  EXPECT_GT(times.emit_seconds, 0);
+  EXPECT_GT(times.link_seconds, 0);
+  EXPECT_LT(times.total(), 60);
+}
+
+// ---- objects ----
+
+LoweredFunction vector_sum() {
+  LoweredFunction f;
+  f.name = "vector_sum";
+  f.args = {input("in", Float(32)), output("out", Float(32))};
+  const Expr x = variable("x"), index = make_ramp(x * 4, 1, 4);
+  const Expr in = make_load(Float(32, 4), "in", index);
+  f.body = make_for("x", 0, 64, ForType::Parallel, make_store("out", call_op(Op::exp, {in}) + in * in, index));
+  return f;
+}
+
+codegen::Options options_for(const std::string &target) {
+  codegen::Options options;
+  options.target = Target(target);
+  return options;
+}
+
+TEST(Codegen, WritesObjectsForBothMachines) {
+  for (const auto &[target, machine] : {std::pair<std::string, int>{"x86-64-linux", 62}, {"arm-64-linux", 183}}) {
+    const codegen::Module module = codegen::compile_object(vector_sum(), options_for(target));
+    ASSERT_GT(module.object.size(), 64u);
+    EXPECT_EQ(std::string(module.object.begin(), module.object.begin() + 4), "\x7f" "ELF") << target;
+    EXPECT_EQ(module.object[18] | module.object[19] << 8, machine) << target;  // e_machine
+    EXPECT_NE(std::find(module.externals.begin(), module.externals.end(), "retrograde_parallel_for"),
+              module.externals.end());
+  }
+}
+
+TEST(Codegen, Aarch64UsesNeonAndItsSleef) {
+  const std::string assembly = codegen::compile_assembly(vector_sum(), options_for("arm-64-linux"));
+  EXPECT_NE(assembly.find("fmla\tv"), std::string::npos) << assembly;
+  EXPECT_NE(assembly.find("Sleef_finz_expf4_u10advsimd"), std::string::npos);
+}
+
+TEST(Codegen, X86WidthFollowsTheTarget) {
+  LoweredFunction f = vector_sum();
+  const Expr index = make_ramp(variable("x") * 16, 1, 16);
+  const Expr in = make_load(Float(32, 16), "in", index);
+  f.body = make_for("x", 0, 16, ForType::Serial, make_store("out", in * in + in, index));
+  const std::string avx512 = codegen::compile_assembly(f, options_for("x86-64-linux-avx512_skylake"));
+  EXPECT_NE(avx512.find("zmm"), std::string::npos) << avx512;
+  EXPECT_NE(avx512.find("vfmadd"), std::string::npos) << avx512;
+  const std::string avx2 = codegen::compile_assembly(f, options_for("x86-64-linux-sse41-avx-avx2"));
+  EXPECT_NE(avx2.find("ymm"), std::string::npos) << avx2;
+  EXPECT_EQ(avx2.find("zmm"), std::string::npos) << avx2;
+  const std::string sse2 = codegen::compile_assembly(f, options_for("x86-64-linux"));
+  EXPECT_EQ(sse2.find("ymm"), std::string::npos) << sse2;
+}
+
+TEST(Codegen, StrictTargetsDoNotFuse) {
+  LoweredFunction f = vector_sum();
+  const Expr in = make_load(Float(32), "in", 0);
+  f.body = make_store("out", in * in + in, 0);
+  const std::string base = "x86-64-linux-sse41-avx-fma-avx2";
+  EXPECT_NE(codegen::compile_assembly(f, options_for(base)).find("vfmadd"), std::string::npos);
+  EXPECT_EQ(codegen::compile_assembly(f, options_for(base + "-strict_float")).find("vfmadd"), std::string::npos);
+}
+
+TEST(Codegen, StrongMultiplicationIsMasked) {
+  LoweredFunction f = vector_sum();
+  const Expr index = make_ramp(variable("x") * 16, 1, 16);
+  const Expr in = make_load(Float(32, 16), "in", index);
+  f.body = make_for("x", 0, 16, ForType::Serial,
+                    make_store("out", call_op(Op::strong_mul, {in, in + 1.0f}), index));
+  const std::string assembly = codegen::compile_assembly(f, options_for("x86-64-linux-avx512_skylake"));
+  EXPECT_NE(assembly.find("{z}"), std::string::npos) << assembly;
+}
+
+TEST(Codegen, OutputIsDeterministic) {
+  const auto object = [] { return codegen::compile_object(vector_sum(), options_for("x86-64-linux")).object; };
+  EXPECT_EQ(object(), object());
+}
+
+TEST(Codegen, UnknownTargetsAreUnsupported) {
+  codegen::Options options;
+  options.target = Target(Target::Windows, Target::X86, 64);
+  EXPECT_THROW(codegen::compile_object(vector_sum(), options), Unsupported);
+  options.target = Target(Target::Linux, Target::ARM, 32);
+  EXPECT_THROW(codegen::compile_object(vector_sum(), options), Unsupported);
+}
+
+}  // namespace
+}  // namespace retrograde::testing_codegen
