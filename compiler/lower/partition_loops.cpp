@@ -127,6 +127,10 @@ class SteadyRewriter : public Rewriter {
  protected:
   Expr rewrite(const Expr& e) override {
     if (const Let* n = e.as<Let>()) return rewrite_let(e, *n);
+    if (const Variable* v = e.as<Variable>()) {
+      auto it = decided_lets_.find(v->name);
+      return it == decided_lets_.end() ? e : it->second;
+    }
     Expr copy = children(e);
     if (const Call* n = e.as<Call>(); is_likely(n) && e.type().is_bool() && is_mark(*n)) {
       return holds(copy.as<Call>()->args[0], true) ? const_true() : copy;
@@ -138,8 +142,7 @@ class SteadyRewriter : public Rewriter {
 
   Stmt rewrite(const Stmt& s) override {
     if (const LetStmt* n = s.as<LetStmt>()) {
-      Expr value = (*this)(n->value);
-      context_.add_let(n->name, value);
+      Expr value = bind(n->name, n->value);
       Stmt body = (*this)(n->body);
       return value.same_as(n->value) && body.same_as(n->body) ? s : make_let(n->name, value, body);
     }
@@ -153,10 +156,18 @@ class SteadyRewriter : public Rewriter {
 
  private:
   Expr rewrite_let(const Expr& e, const Let& n) {
-    Expr value = (*this)(n.value);
-    context_.add_let(n.name, value);
+    Expr value = bind(n.name, n.value);
     Expr body = (*this)(n.body);
     return value.same_as(n.value) && body.same_as(n.body) ? e : make_let(n.name, value, body);
+  }
+
+  // The value of a let. Marks and decided conditions go on into the body.
+  Expr bind(const std::string& name, const Expr& original) {
+    Expr value = (*this)(original);
+    context_.add_let(name, value);
+    if (is_marked(original)) marked_lets_.insert(name);
+    if (is_const(value) && !value.same_as(original)) decided_lets_[name] = value;
+    return value;
   }
 
   // Inner loops of unknown extent keep their variables to themselves.
@@ -199,7 +210,7 @@ class SteadyRewriter : public Rewriter {
     auto it = marked_.find(e.get());
     if (it != marked_.end()) return it->second;
     bool result = match(
-        e, [&](const Load&) { return false; },
+        e, [&](const Variable& n) { return marked_lets_.count(n.name) > 0; },
         [&](const Call& n) {
           if (is_likely(&n)) return is_mark(n) || is_marked(n.args[0]);
           bool is_promise = n.is_op(Op::promise_clamped) || n.is_op(Op::unsafe_promise_clamped);
@@ -217,7 +228,7 @@ class SteadyRewriter : public Rewriter {
 
   // Whether the steady state can be where the condition is `is_true`; then it is from now on.
   bool holds(const Expr& condition, bool is_true) {
-    Expr expanded = context_.expand(MarkerRemover()(is_true ? condition : logical_not(condition)));
+    Expr expanded = MarkerRemover()(context_.expand(is_true ? condition : logical_not(condition)));
     if (!uses_variable(expanded, loop_.name)) return false;
     auto solution = solve_for(expanded, loop_.name, context_.ranges());
     if (!solution) return false;
@@ -234,6 +245,8 @@ class SteadyRewriter : public Rewriter {
   Context context_;
   SteadyState steady_;
   std::unordered_set<std::string> inner_serial_;
+  std::unordered_set<std::string> marked_lets_;
+  std::unordered_map<std::string, Expr> decided_lets_;
   std::unordered_map<const ExprNode*, bool> marked_;  // of nodes of the body, which outlives this
 };
 
