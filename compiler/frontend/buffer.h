@@ -392,7 +392,7 @@ class Buffer {
   template <typename T2, int D2>
   void copy_from(const Buffer<T2, D2>& source) {
     if (runtime().type() != source.runtime().type() || dimensions() != source.dimensions()) {
-      user_error(text("copy ", quoted(source.name()), " into ", quoted(name())),
+      user_error(text("copy ", retrograde::quoted(source.name()), " into ", retrograde::quoted(name())),
                  "both Buffers have one type and as many dimensions");
     }
     get()->copy_from(*source.get());

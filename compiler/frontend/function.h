@@ -108,8 +108,9 @@ struct Definition {
 
 // Parameter of the compiled function: scalar (Param), image (ImageParam), or an embedded Buffer.
 struct BufferConstraint {
-  Expr min, extent, stride;  // undefined: unconstrained
+  Expr min, extent, stride;  // undefined: unconstrained, but see any_stride
   Expr min_estimate, extent_estimate;
+  bool any_stride = false;  // set_stride(Expr()): lifts the promise that dimension 0 is dense
 };
 struct ParameterContents : Symbol {
   std::string name;

@@ -85,6 +85,7 @@ Dimension& Dimension::set_extent(Expr extent) {
 }
 
 Dimension& Dimension::set_stride(Expr stride) {
+  constraint().any_stride = !stride.defined();
   set(&ir::BufferConstraint::stride, std::move(stride), "stride");
   return *this;
 }

@@ -1,6 +1,7 @@
 // retrograde.h -- everything that a pipeline's author needs, in one include.
 #pragma once
 
+#include "autodiff/derivative.h"
 #include "diagnostics/error.h"
 #include "frontend/boundary_conditions.h"
 #include "frontend/buffer.h"
