@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <map>
 
+#include "autodiff/default_schedule.h"
 #include "autodiff/regions.h"
 #include "frontend/define.h"
 #include "frontend/var.h"
@@ -94,7 +95,7 @@ std::vector<ReductionVariable> rvars_of(const Gather& g) {
 class Builder {
  public:
   Builder(const AdjointTarget& target, const std::string& name) : target_(target) {
-    result_.func = std::make_shared<FuncContents>();
+    result_.func = std::make_shared<AdjointContents>();
     result_.func->name = claim_name(name);
     for (const std::string& arg : target.args) args_.push_back(variable(arg));
   }
@@ -102,8 +103,8 @@ class Builder {
   AdjointFunc build(const std::vector<Contribution>& contributions, const std::vector<Expr>& initial) {
     define_pointwise(contributions, initial);
     for (const UpdateGroup& group : group_updates(contributions, target_.types.size())) {
-      bool serial = !has_pure_dimension(group.gather) && group.gather.rdom;
-      serial &= is_worth_splitting(group.gather);
+      const Gather& g = group.gather;
+      bool serial = !has_pure_dimension(g) && g.rdom && is_worth_splitting(g);
       serial ? add_privatised(group) : add_update(group);
     }
     return std::move(result_);
@@ -148,7 +149,7 @@ class Builder {
   // adj(y...) += sum over t of parts(y..., t). A fixed element needs no y.
   void add_privatised(const UpdateGroup& group) {
     const Gather& g = group.gather;
-    FuncPtr parts = std::make_shared<FuncContents>();
+    FuncPtr parts = std::make_shared<AdjointContents>();
     parts->name = claim_name(result_.func->name + "_parts");
     Expr part = variable(unique_name("part"));
     std::vector<Expr> point = g.scatters ? args_ : std::vector<Expr>{};

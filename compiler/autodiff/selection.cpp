@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "autodiff/accumulation.h"
+#include "autodiff/default_schedule.h"
 #include "autodiff/regions.h"
 #include "autodiff/reverse_sweep.h"
 #include "autodiff/versions.h"
@@ -82,7 +83,7 @@ class Finder {
   }
 
   FuncPtr make_winner(const Expr& condition) const {
-    FuncPtr w = std::make_shared<FuncContents>();
+    FuncPtr w = std::make_shared<AdjointContents>();
     w->name = claim_name(f_->name + "_winner");
     std::vector<Expr> args, initial;
     for (const std::string& arg : f_->args) args.push_back(variable(arg));

@@ -1,6 +1,7 @@
 #include "autodiff/versions.h"
 
 #include "autodiff/accumulation.h"
+#include "autodiff/default_schedule.h"
 #include "autodiff/reverse_sweep.h"
 #include "frontend/define.h"
 #include "frontend/var.h"
@@ -11,7 +12,7 @@
 namespace retrograde::ir {
 
 FuncPtr clone_prefix(const FuncPtr& f, int stages) {
-  FuncPtr g = std::make_shared<FuncContents>();
+  FuncPtr g = std::make_shared<AdjointContents>();
   g->name = claim_name(f->name + "_before_update" + std::to_string(stages - 1));
   std::vector<Expr> args;
   for (const std::string& arg : f->args) args.push_back(variable(arg));
@@ -76,7 +77,7 @@ bool reads_at_pure_point_only(const FuncPtr& f, const Definition& definition) {
 std::optional<Versions> keep_versions(const FuncPtr& f, int stage, const FuncPtr& before, const Box& region) {
   const Definition& definition = f->stage(stage);
   if (definition.rvars.empty() || !reads_at_pure_point_only(f, definition)) return std::nullopt;
-  FuncPtr g = std::make_shared<FuncContents>();
+  FuncPtr g = std::make_shared<AdjointContents>();
   g->name = claim_name(f->name + "_versions");
   std::vector<Expr> args;
   for (const std::string& arg : f->args) args.push_back(variable(arg));

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <functional>
 
+#include "autodiff/default_schedule.h"
 #include "diagnostics/error.h"
 #include "ir/visit.h"
 
@@ -49,8 +50,8 @@ class Inliner : public Rewriter {
   const InlinedFuncs& inlined_;
 };
 
-bool is_inlined(const FuncContents& f, bool is_output) {
-  return !is_output && f.is_pure() && f.schedule.compute_level.kind == LoopLevel::Kind::Inlined;
+bool is_inlined(const FuncContents& f, const FuncSchedule& schedule, bool is_output) {
+  return !is_output && f.is_pure() && schedule.compute_level.kind == LoopLevel::Kind::Inlined;
 }
 
 }  // namespace
@@ -59,16 +60,22 @@ Program inline_functions(const std::vector<FuncPtr>& outputs) {
   Program program;
   InlinedFuncs inlined;
   Inliner inliner(inlined);
+  const DefaultSchedules defaults = default_schedules(outputs);  // of adjoints that nobody scheduled
   for (const FuncPtr& f : topological_order(outputs)) {
     bool is_output = std::find(outputs.begin(), outputs.end(), f) != outputs.end();
     std::vector<Definition> stages;
     for (int i = 0; i < f->stage_count(); i++) stages.push_back(map_exprs(f->stage(i), std::ref(inliner)));
-    if (is_inlined(*f, is_output)) {
+    const auto chosen = defaults.find(f.get());
+    const FuncSchedule& schedule = chosen == defaults.end() ? f->schedule : chosen->second.func;
+    if (is_inlined(*f, schedule, is_output)) {
       inlined[f.get()] = {f->args, stages[0].values};
       continue;
     }
     program.index_of[f->name] = static_cast<int>(program.funcs.size());
-    program.funcs.push_back({f, f->schedule, std::move(stages), is_output});
+    for (size_t i = 0; chosen != defaults.end() && i < stages.size(); i++) {
+      stages[i].schedule = chosen->second.stages[i];
+    }
+    program.funcs.push_back({f, schedule, std::move(stages), is_output});
   }
   return program;
 }
