@@ -279,7 +279,7 @@ class NestEmitter {
     Emitted code;
     code.stmt = emit_definition(f, s, nest);
     code.uses = requirements_of(f, s, nest);
-    code = emit_children(innermost_, std::move(code));
+    code = emit_children(computed_innermost_in(f), std::move(code));
     for (const Loop& loop : nest.loops) {
       code = emit_children(children_at(f, s, loop), std::move(code));
       code = store_here(f, s, loop, std::move(code));
@@ -289,6 +289,13 @@ class NestEmitter {
     }
     range_over_loops(code);
     return code;
+  }
+
+  // An update that reads its own Func does not compute it again.
+  std::vector<int> computed_innermost_in(const LoopedFunc& f) const {
+    std::vector<int> children = innermost_;
+    std::erase_if(children, [&](int i) { return program_.funcs[i].func == f.func; });
+    return children;
   }
 
   std::vector<int> children_at(const LoopedFunc& f, int s, const Loop& loop) const {

@@ -6,7 +6,8 @@
 //     out[x] = in[max(likely(x - 1), 0)]   =>    for (x, begin, end - begin) { out[x] = in[x - 1] }
 //   }                                            (and an epilogue where there is an upper limit)
 //
-// with  let begin = clamp(1, 0, w), let end = w.  A parallel loop stays one loop, with an if inside.
+// with  let begin = clamp(1, 0, w), let end = w.  A parallel loop, and one whose borders are as large as tiles, stays one
+// loop, with an if inside.
 //
 // What likely says:  likely(c)                     c is true
 //                    min(likely(a), b), max        the marked operand is the result
@@ -90,7 +91,8 @@ class Context {
     Expr last = binary(Kind::Sub, binary(Kind::Add, loop.min, loop.extent), make_one(loop.min.type()));
     add_range(loop.name, {bounds_of(expand(loop.min), ranges_).min, bounds_of(expand(last), ranges_).max});
   }
-  Expr expand(const Expr& e) const { return substitute(e, lets_); }
+  // Without lets and markers.
+  Expr expand(const Expr& e) const { return MarkerRemover()(substitute(e, lets_)); }
   const Scope<Interval>& ranges() const { return ranges_; }
 
  private:
@@ -121,7 +123,7 @@ struct SteadyState {
 // Rewrites the body of a loop for its steady state, and finds where that lies.
 class SteadyRewriter : public Rewriter {
  public:
-  SteadyRewriter(const For& loop, const Context& outer) : loop_(loop), context_(outer) {}
+  SteadyRewriter(const For& loop, const Context& outer) : loop_(loop), context_(outer), dependent_{loop.name} {}
   const SteadyState& steady() const { return steady_; }
 
  protected:
@@ -175,6 +177,7 @@ class SteadyRewriter : public Rewriter {
     bool is_known = !is_serial(n) || is_const(simplify(n.extent));
     if (is_known) {
       context_.add_loop(n);
+      if (uses_any_variable(context_.expand(n.min), dependent_)) dependent_.insert(n.name);
     } else {
       context_.add_range(n.name, Interval::everything());
     }
@@ -228,8 +231,8 @@ class SteadyRewriter : public Rewriter {
 
   // Whether the steady state can be where the condition is `is_true`; then it is from now on.
   bool holds(const Expr& condition, bool is_true) {
-    Expr expanded = MarkerRemover()(context_.expand(is_true ? condition : logical_not(condition)));
-    if (!uses_variable(expanded, loop_.name)) return false;
+    Expr expanded = context_.expand(is_true ? condition : logical_not(condition));
+    if (!uses_any_variable(expanded, dependent_)) return false;
     auto solution = solve_for(expanded, loop_.name, context_.ranges());
     if (!solution) return false;
     ++steady_.solved;
@@ -244,6 +247,7 @@ class SteadyRewriter : public Rewriter {
   const For& loop_;
   Context context_;
   SteadyState steady_;
+  std::unordered_set<std::string> dependent_;  // the loop's variable, and those of inner loops that start from it
   std::unordered_set<std::string> inner_serial_;
   std::unordered_set<std::string> marked_lets_;
   std::unordered_map<std::string, Expr> decided_lets_;
@@ -305,8 +309,9 @@ class Partitioner : public Rewriter {
     if (!ends.begin.defined() && !ends.end.defined() && !steady.needed.defined()) {
       return make_for(loop.name, loop.min, loop.extent, loop.for_type, steady_body);
     }
-    return loop.for_type == ForType::Parallel ? branch_inside(loop, steady_body, rest, ends, steady.needed)
-                                              : three_loops(loop, steady_body, rest, ends, steady.needed);
+    bool stays_one = loop.for_type == ForType::Parallel || steady.has_thick_border;
+    return stays_one ? branch_inside(loop, steady_body, rest, ends, steady.needed)
+                     : three_loops(loop, steady_body, rest, ends, steady.needed);
   }
 
   Stmt branch_inside(const For& loop, const Stmt& steady_body, const Stmt& rest, const Ends& ends, const Expr& needed) {
