@@ -402,7 +402,7 @@ Stmt make_for(const std::string& name, Expr min, Expr extent, ForType type, Stmt
 }
 
 Stmt make_store(const std::string& name, Expr value, Expr index, Expr predicate, SymbolRef symbol) {
-  match_lanes(value, index);
+  if (value.type().is_scalar()) value = make_broadcast(std::move(value), index.type().lanes());
   if (predicate.defined() && is_const_true(predicate)) predicate = {};
   return new Store(name, std::move(value), std::move(index), std::move(predicate),
                    std::move(symbol));

@@ -355,7 +355,7 @@ int64_t Facts::known_bound(const Expr& atom, int64_t factor) const {
 // ---- bounds of sums ----
 
 int64_t Facts::upper_bound(const Sum& sum) {
-  int budget = 48;
+  int budget = 32;
   return sum.valid ? search(sum, budget) : infinity;
 }
 
@@ -378,7 +378,8 @@ int64_t Facts::bound_by_ranges(const Sum& sum) {
 
 int64_t Facts::search(const Sum& sum, int& budget) {
   int64_t best = std::min(bound_by_ranges(sum), known_bound(sum));
-  if (sum.is_constant() || --budget <= 0) return best;
+  constexpr size_t max_searched_terms = 12;
+  if (sum.is_constant() || sum.terms.size() > max_searched_terms || --budget <= 0) return best;
   best = std::min(best, eliminate_structure(sum, budget));
   return std::min(best, eliminate_variable(sum, budget));
 }

@@ -9,17 +9,6 @@ namespace retrograde::ir {
 
 namespace {
 
-constexpr size_t max_conditions = 16;
-
-void flatten(Kind kind, const Expr& e, std::vector<Expr>& parts) {
-  if (e.kind() == kind && parts.size() < max_conditions) {
-    flatten(kind, e.as<Binary>()->a, parts);
-    flatten(kind, e.as<Binary>()->b, parts);
-  } else {
-    parts.push_back(e);
-  }
-}
-
 bool is_negation(const Expr& a, const Expr& b) {
   const auto* not_a = a.as<Not>();
   const auto* not_b = b.as<Not>();
@@ -66,9 +55,8 @@ Expr Simplifier::combine_conditions(Kind kind, const Expr& a, const Expr& b, boo
 
 Expr Simplifier::logical(Kind kind, const Expr& a, const Expr& b) {
   if (is_const(a) || is_const(b)) return binary(kind, a, b);
-  std::vector<Expr> parts, others;
-  flatten(kind, a, parts);
-  flatten(kind, b, others);
+  std::vector<Expr> parts = operands_of(kind, a);
+  const std::vector<Expr> others = operands_of(kind, b);
   bool changed = false;
   for (const Expr& other : others) {
     bool drop_other = false;

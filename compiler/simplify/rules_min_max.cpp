@@ -9,21 +9,13 @@ namespace retrograde::ir {
 
 namespace {
 
-constexpr size_t max_operands = 8;
-
-void flatten(Kind kind, const Expr& e, std::vector<Expr>& operands) {
-  if (e.kind() == kind && operands.size() < max_operands) {
-    flatten(kind, e.as<Binary>()->a, operands);
-    flatten(kind, e.as<Binary>()->b, operands);
-  } else {
-    operands.push_back(e);
-  }
-}
+// Beyond this many terms nothing is expected to decide a difference.
+constexpr size_t max_compared_terms = 8;
 
 Expr nest(Kind kind, std::vector<Expr> operands) {
   std::stable_sort(operands.begin(), operands.end(), [](const Expr& a, const Expr& b) {
     if (is_const(a) != is_const(b)) return is_const(b);  // the constant last
-    return compare(a, b) < 0;
+    return canonical_less(a, b);
   });
   Expr result = operands[0];
   for (size_t i = 1; i < operands.size(); ++i) result = binary(kind, result, operands[i]);
@@ -56,9 +48,8 @@ Expr Simplifier::min_max(Kind kind, const Expr& a, const Expr& b) {
   if (ra.max <= rb.min && ra.max != INT64_MAX) return is_min ? a : b;
   if (rb.max <= ra.min && rb.max != INT64_MAX) return is_min ? b : a;
 
-  std::vector<Expr> operands, others;
-  flatten(kind, a, operands);
-  flatten(kind, b, others);
+  std::vector<Expr> operands = operands_of(kind, a);
+  const std::vector<Expr> others = operands_of(kind, b);
   // Whether x is never chosen over y: always at least (min) or at most (max) y.
   const auto dominated = [&](const Expr& x, const Expr& y) {
     if (equal(x, y)) return true;
@@ -66,6 +57,7 @@ Expr Simplifier::min_max(Kind kind, const Expr& a, const Expr& b) {
     if (cx && cy) return is_min ? *cx >= *cy : *cx <= *cy;
     if (!is_index_type(x.type()) || x.type().is_vector()) return false;
     const Sum difference = plus(sum_of(x), sum_of(y), -1);
+    if (difference.terms.size() > max_compared_terms) return false;
     return is_min ? facts_.lower_bound(difference) >= 0 : facts_.upper_bound(difference) <= 0;
   };
   for (const Expr& other : others) {

@@ -62,7 +62,7 @@ Expr Simplifier::mul(const Expr& a, const Expr& b) {
       return rebuild(times(sum_of(product), static_cast<int64_t>(factor)), Kind::Mul, a, b);
     }
   }
-  return compare(a, b) <= 0 ? binary(Kind::Mul, a, b) : binary(Kind::Mul, b, a);
+  return canonical_less(b, a) ? binary(Kind::Mul, b, a) : binary(Kind::Mul, a, b);
 }
 
 // The sum, or the plain node when it has become too large or would overflow.

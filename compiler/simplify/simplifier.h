@@ -80,7 +80,7 @@ class Simplifier {
   // ---- statements ----
   Stmt let_stmt(const Stmt& s);
   Stmt loop(const Stmt& s, const For& n);
-  Stmt block(const Block& n);
+  Stmt block(const Stmt& s, const Block& n);
   Stmt branches(const Stmt& s, const IfThenElse& n);
   Stmt store(const Stmt& s, const Store& n);
   Stmt provide(const Stmt& s, const Provide& n);

@@ -9,16 +9,21 @@ Stmt Simplifier::operator()(const Stmt& s) {
   if (!s.defined()) return s;
   return match(
       s, [&](const LetStmt&) { return let_stmt(s); }, [&](const For& n) { return loop(s, n); },
-      [&](const IfThenElse& n) { return branches(s, n); }, [&](const Block& n) { return block(n); },
-      [&](const Store& n) { return store(s, n); }, [&](const Provide& n) { return provide(s, n); },
+      [&](const IfThenElse& n) { return branches(s, n); },
+      [&](const Block& n) { return block(s, n); }, [&](const Store& n) { return store(s, n); },
+      [&](const Provide& n) { return provide(s, n); },
       [&](const Assert& n) {
         const Expr condition = (*this)(n.condition);
         if (is_const_true(condition)) return Stmt();
-        return make_assert(condition, (*this)(n.error));
+        const Expr error = (*this)(n.error);
+        return condition.same_as(n.condition) && error.same_as(n.error)
+                   ? s
+                   : make_assert(condition, error);
       },
       [&](const Evaluate& n) {
         Expr value = (*this)(n.value);
-        return has_effect(value) ? make_evaluate(std::move(value)) : Stmt();
+        if (!has_effect(value)) return Stmt();
+        return value.same_as(n.value) ? s : make_evaluate(std::move(value));
       },
       [&](const StmtNode&) { return children(s); });
 }
@@ -58,17 +63,19 @@ Stmt Simplifier::loop(const Stmt& s, const For& n) {
 }
 
 // What follows an assert may rely on it, to the end of the block.
-Stmt Simplifier::block(const Block& n) {
+Stmt Simplifier::block(const Stmt& s, const Block& n) {
   const Given scope(*this, Expr());
   std::vector<Stmt> stmts;
+  bool changed = false;
   for (const Stmt& child : n.stmts) {
     stmts.push_back((*this)(child));
+    changed |= !stmts.back().same_as(child);
     if (const auto* check = stmts.back().as<Assert>()) {
       facts_.assume(check->condition);
       memo_.clear();
     }
   }
-  return make_block(std::move(stmts));
+  return changed ? make_block(std::move(stmts)) : s;
 }
 
 Stmt Simplifier::branches(const Stmt& s, const IfThenElse& n) {

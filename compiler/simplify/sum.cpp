@@ -25,28 +25,46 @@ int64_t fit(Sum& sum, __int128 value) {
   return wrapped;
 }
 
-// Adds factor * e; false when there would be too many terms.
-bool gather(Sum& sum, const Expr& e, int64_t factor) {
-  if (const std::optional<int64_t> value = as_const_int(e)) {
-    sum.constant = fit(sum, __int128{sum.constant} + __int128{*value} * factor);
-    return true;
-  }
-  if (const auto* add = e.as<Add>())
-    return gather(sum, add->a, factor) && gather(sum, add->b, factor);
-  if (const auto* sub = e.as<Sub>(); sub && factor != INT64_MIN)
-    return gather(sum, sub->a, factor) && gather(sum, sub->b, -factor);
-  if (const auto* mul = e.as<Mul>()) {
-    if (const std::optional<int64_t> value = as_const_int(mul->b)) {
-      const __int128 product = __int128{*value} * factor;
-      if (product == static_cast<int64_t>(product))
-        return gather(sum, mul->a, static_cast<int64_t>(product));
+// Adds factor * e; false when that takes too many steps or terms.
+class Gatherer {
+ public:
+  explicit Gatherer(Sum& sum) : sum_(sum) {}
+
+  bool gather(const Expr& e, int64_t factor) {
+    if (++steps_ > 3 * max_terms) return false;
+    if (const std::optional<int64_t> value = as_const_int(e)) {
+      sum_.constant = fit(sum_, __int128{sum_.constant} + __int128{*value} * factor);
+      return true;
     }
+    if (const auto* add = e.as<Add>()) return gather(add->a, factor) && gather(add->b, factor);
+    if (const auto* sub = e.as<Sub>(); sub && factor != INT64_MIN) {
+      return gather(sub->a, factor) && gather(sub->b, -factor);
+    }
+    if (const auto* mul = e.as<Mul>()) {
+      if (const std::optional<int64_t> value = as_const_int(mul->b)) {
+        const __int128 product = __int128{*value} * factor;
+        if (product == static_cast<int64_t>(product))
+          return gather(mul->a, static_cast<int64_t>(product));
+      }
+    }
+    sum_.add(e, factor);
+    return sum_.terms.size() <= max_terms;
   }
-  sum.add(e, factor);
-  return sum.terms.size() <= max_terms;
-}
+
+ private:
+  Sum& sum_;
+  size_t steps_ = 0;
+};
 
 }  // namespace
+
+// Structural order would be nicer to read, but may look at all of both trees.
+bool canonical_less(const Expr& a, const Expr& b) {
+  if (a->kind != b->kind) return a->kind < b->kind;
+  if (const auto* x = a.as<Variable>()) return x->name < b.as<Variable>()->name;
+  const size_t x = hash(a), y = hash(b);
+  return x != y ? x < y : compare(a, b) < 0;
+}
 
 bool is_extreme(Type type, int64_t value) {
   const int64_t limit = type.max_int() / 2;
@@ -71,6 +89,23 @@ bool may_be_extreme(const Expr& e, int depth) {
 bool Sum::may_be_extreme() const {
   return std::any_of(terms.begin(), terms.end(),
                      [](const Term& term) { return ir::may_be_extreme(term.atom, 5); });
+}
+
+std::vector<Expr> operands_of(Kind kind, const Expr& e) {
+  constexpr size_t max_operands = 8;
+  std::vector<Expr> pending = {e}, operands;
+  while (!pending.empty()) {
+    const Expr next = pending.back();
+    pending.pop_back();
+    if (next.kind() == kind) {
+      pending.push_back(next.as<Binary>()->b);
+      pending.push_back(next.as<Binary>()->a);
+    } else {
+      operands.push_back(next);
+    }
+    if (pending.size() + operands.size() > max_operands) return {e};
+  }
+  return operands;
 }
 
 int64_t floor_div(int64_t a, int64_t b) { return a / b - (a % b < 0 ? 1 : 0); }
@@ -109,7 +144,7 @@ void Sum::add(const Sum& other, int64_t factor) {
 Sum sum_of(const Expr& e) {
   Sum sum;
   sum.type = e.type();
-  if (gather(sum, e, 1) && sum.valid) return sum;
+  if (Gatherer(sum).gather(e, 1) && sum.valid) return sum;
   Sum atom;  // too large or overflowing: taken as a whole
   atom.type = e.type();
   atom.terms.push_back({e, 1});
@@ -146,7 +181,7 @@ Expr to_expr(const Sum& sum) {
   std::vector<Term> terms = sum.terms;
   std::sort(terms.begin(), terms.end(), [](const Term& a, const Term& b) {
     if ((a.factor > 0) != (b.factor > 0)) return a.factor > 0;
-    return compare(a.atom, b.atom) < 0;
+    return canonical_less(a.atom, b.atom);
   });
   const auto scaled = [&](const Expr& atom, int64_t factor) {
     return binary(Kind::Mul, atom, make_const(sum.type, factor));

@@ -52,6 +52,11 @@ Expr to_expr(const Sum& sum);
 // The greatest common divisor of the factors; 0 when there are none.
 int64_t common_factor(const Sum& sum);
 
+// The order of operands that commute: variables by name, then others.
+bool canonical_less(const Expr& a, const Expr& b);
+// The operands of a nest of the same associative operator; e itself when the nest is large.
+std::vector<Expr> operands_of(Kind kind, const Expr& e);
+
 int64_t floor_div(int64_t a, int64_t b);  // b > 0
 int64_t floor_mod(int64_t a, int64_t b);  // b > 0
 

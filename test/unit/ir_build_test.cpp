@@ -1,0 +1,209 @@
+// Builders: promotion, folding, equality, walks, trees of a million nodes, targets.
+#include "ir/build.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "ir/equal.h"
+#include "ir/print.h"
+#include "ir/scalar.h"
+#include "ir/target.h"
+#include "ir/visit.h"
+
+namespace retrograde {
+namespace {
+
+using namespace ir;
+
+Expr var(Type type) { return variable("v_" + to_string(type), type); }
+Type sum_type(Type a, Type b) { return (var(a) + var(b)).type(); }
+
+TEST(Promotion, FollowsTheLanguage) {
+  EXPECT_EQ(sum_type(Int(8), Int(32)), Int(32));
+  EXPECT_EQ(sum_type(UInt(8), UInt(16)), UInt(16));
+  EXPECT_EQ(sum_type(UInt(8), Int(8)), Int(8));
+  EXPECT_EQ(sum_type(UInt(32), Int(16)), Int(32));
+  EXPECT_EQ(sum_type(Int(64), Float(32)), Float(32));
+  EXPECT_EQ(sum_type(Int(32), Float(16)), Float(16));
+  EXPECT_EQ(sum_type(Float(32), Float(64)), Float(64));
+  EXPECT_EQ(sum_type(BFloat(16), Float(32)), Float(32));
+  EXPECT_EQ(sum_type(Float(32), Int(32, 4)), Float(32, 4));
+  EXPECT_THROW(sum_type(BFloat(16), Float(16)), UserError);
+  EXPECT_THROW(sum_type(Int(32, 4), Int(32, 8)), UserError);
+  EXPECT_THROW(var(Int(32)) + Expr(), UserError);
+  EXPECT_THROW(var(Handle()) + 1, UserError);
+  EXPECT_THROW(var(Int(32)) && var(Bool()), UserError);
+}
+
+TEST(Promotion, ConstantsTakeTheTypeOfTheOtherSide) {
+  EXPECT_EQ((var(UInt(8)) + 200).type(), UInt(8));
+  EXPECT_EQ((3 - var(Float(32))).type(), Float(32));
+  EXPECT_EQ((var(Int(32)) * 0.5f).type(), Float(32));
+  EXPECT_EQ((var(Float(32)) * 0.5).type(), Float(64));
+  EXPECT_EQ(min(var(Int(16)), 7).type(), Int(16));
+  EXPECT_EQ((var(UInt(8)) < 255).type(), Bool());
+  EXPECT_THROW(var(UInt(8)) + 256, UserError);
+  EXPECT_THROW(var(UInt(32)) - -1, UserError);
+  EXPECT_THROW(var(Int(32)) + (int64_t{1} << 40), UserError);
+  EXPECT_EQ(select(var(Bool()), var(UInt(8)), 0).type(), UInt(8));
+}
+
+TEST(Folding, ConstantsOfEveryType) {
+  for (Type type :
+       {Int(8), UInt(16), Int(32), UInt(64), Float(16), BFloat(16), Float(32), Float(64)}) {
+    const Expr sum = binary(Kind::Add, make_const(type, 2), make_const(type, 3));
+    EXPECT_TRUE(is_const(sum)) << sum;
+    EXPECT_TRUE(equal(sum, make_const(type, 5))) << sum;
+  }
+  EXPECT_TRUE(is_const_int(make_const(UInt(8), 250) + 10, 4));
+  EXPECT_TRUE(equal(call_op(Op::sqrt, {Expr(9.0f)}), Expr(3.0f)));
+  EXPECT_TRUE(is_const_true(Expr(2) < Expr(3)));
+  EXPECT_TRUE(
+      is_const_int(binary(Kind::Add, make_const(Int(32, 4), 1), make_const(Int(32, 4), 2)), 3));
+  EXPECT_EQ(cast_to(Int(8), Expr(1000.0f)).kind(), Kind::Cast)
+      << "out of range is left to the machine";
+}
+
+TEST(Folding, IntegerIdentities) {
+  const Expr x = variable("x");
+  EXPECT_TRUE((x + 0).same_as(x));
+  EXPECT_TRUE((0 + x).same_as(x));
+  EXPECT_TRUE((x * 1).same_as(x));
+  EXPECT_TRUE(is_const_int(x * 0, 0));
+  EXPECT_TRUE((x / 1).same_as(x));
+  EXPECT_TRUE(is_const_int(x / 0, 0));
+  EXPECT_TRUE(is_const_int(x % 1, 0));
+  EXPECT_TRUE(is_const_int(x - x, 0));
+  EXPECT_TRUE(is_const_true(x == x));
+}
+
+TEST(Folding, FloatIdentitiesKeepEveryBit) {
+  const Expr f = variable("f", Float(32));
+  EXPECT_TRUE((f * 1.0f).same_as(f));
+  EXPECT_TRUE((f / 1.0f).same_as(f));
+  EXPECT_TRUE((f - 0.0f).same_as(f));
+  EXPECT_TRUE((f + -0.0f).same_as(f));
+  EXPECT_EQ((f + 0.0f).kind(), Kind::Add);
+  EXPECT_EQ((f * 0.0f).kind(), Kind::Mul);
+  EXPECT_EQ((f - f).kind(), Kind::Sub);
+  EXPECT_EQ((f == f).kind(), Kind::EQ);
+  EXPECT_TRUE(std::signbit(*as_const_float(-Expr(0.0f))));
+}
+
+TEST(Folding, Conditions) {
+  const Expr c = variable("c", Bool()), x = variable("x"), y = variable("y");
+  EXPECT_TRUE((c && Expr(true)).same_as(c));
+  EXPECT_TRUE(is_const_false(c && Expr(false)));
+  EXPECT_TRUE(is_const_true(Expr(true) || c));
+  EXPECT_TRUE((!!c).same_as(c));
+  EXPECT_TRUE(select(Expr(true), x, y).same_as(x));
+  EXPECT_TRUE(select(c, x, x).same_as(x));
+}
+
+TEST(Builders, RejectWhatDoesNotFit) {
+  const Expr x = variable("x"), f = variable("f", Float(32));
+  EXPECT_THROW(binary(Kind::Add, x, f), InternalError);
+  EXPECT_THROW(binary(Kind::And, x, x), InternalError);
+  EXPECT_THROW(make_select(x, x, x), InternalError);
+  EXPECT_THROW(call_op(Op::floor, {f, f}), InternalError);
+  EXPECT_THROW(make_shuffle({make_broadcast(x, 2)}, {2}), InternalError);
+  EXPECT_THROW(reinterpret_as(Int(64), x), InternalError);
+}
+
+TEST(Builders, BlocksFlattenAndEmptyStatementsVanish) {
+  const Stmt s = make_store("a", Expr(1), Expr(0));
+  EXPECT_FALSE(make_block({}).defined());
+  EXPECT_TRUE(make_block({Stmt(), s, Stmt()}).same_as(s));
+  EXPECT_EQ(make_block({make_block({s, s}), s}).as<Block>()->stmts.size(), 3u);
+  EXPECT_FALSE(make_for("x", 0, 5, ForType::Serial, Stmt()).defined());
+}
+
+TEST(Equality, IsStructuralAndHashesAgree) {
+  const auto make = [](int c) {
+    const Expr x = variable("x"), f = variable("f", Float(32));
+    return select(x * c < x + 2, call_op(Op::sqrt, {f}), cast(Float(32), x % 7));
+  };
+  EXPECT_TRUE(equal(make(3), make(3)));
+  EXPECT_EQ(hash(make(3)), hash(make(3)));
+  EXPECT_FALSE(equal(make(3), make(4)));
+  EXPECT_EQ(compare(make(3), make(4)), -compare(make(4), make(3)));
+  EXPECT_NE(compare(make(3), make(4)), 0);
+  EXPECT_FALSE(equal(Expr(0.0f), Expr(-0.0f)));
+}
+
+TEST(Equality, IsLinearOnSharedNodes) {
+  const auto tower = [] {
+    Expr e = variable("x");
+    for (int i = 0; i < 500; ++i) e = e * e + 1;
+    return e;
+  };
+  EXPECT_TRUE(equal(tower(), tower()));
+}
+
+TEST(Depth, AMillionNodesAreWalkedAndDestroyed) {
+  Expr e = variable("x");
+  Stmt s = make_evaluate(variable("y"));
+  for (int i = 0; i < 1000000; ++i) {
+    e = binary(Kind::Add, e, e);
+    s = make_for("i", 0, 2, ForType::Serial, s);
+  }
+  int nodes = 0;
+  walk(e, [&](const Expr&) { return ++nodes > 0; });
+  EXPECT_EQ(nodes, 1000001);
+  EXPECT_TRUE(uses_variable(s, "y"));
+  EXPECT_FALSE(uses_variable(e, "z"));
+}
+
+TEST(Visit, SubstituteIsLinearOnSharedNodesAndKeepsWhatDoesNotChange) {
+  Expr e = variable("x");
+  for (int i = 0; i < 500; ++i) e = e * e + variable("y");
+  EXPECT_TRUE(substitute(e, "z", Expr(3)).same_as(e));
+  const Expr replaced = substitute(e, "x", variable("z"));
+  EXPECT_TRUE(uses_variable(replaced, "z"));
+  EXPECT_FALSE(uses_variable(replaced, "x"));
+  EXPECT_TRUE(uses_any_variable(e, {"q", "y"}));
+}
+
+TEST(Visit, EveryKindRebuildsWithItsChildren) {
+  const Expr x = variable("x"), v = make_ramp(x, 2, 4);
+  const Expr all[] = {cast(Float(32), x),
+                      reinterpret_as(Float(32), x),
+                      x + 3,
+                      !(x < 3),
+                      make_select(x < 3, x, Expr(1)),
+                      make_load(Float(32), "a", x, x < 4),
+                      v,
+                      make_broadcast(x, 4),
+                      call_op(Op::bitwise_and, {x, Expr(3)}),
+                      call_image("im", Float(32), {x, x}, {}),
+                      make_let("t", x, variable("t") + x),
+                      make_shuffle({v, v}, {0, 5}),
+                      make_vector_reduce(ReduceOp::Add, v, 1)};
+  for (const Expr& e : all) {
+    const Expr renamed = substitute(e, "x", variable("w"));
+    EXPECT_EQ(renamed.kind(), e.kind());
+    EXPECT_EQ(renamed.type(), e.type());
+    EXPECT_FALSE(uses_variable(renamed, "x")) << renamed;
+    EXPECT_TRUE(equal(substitute(renamed, "w", x), e)) << renamed;
+  }
+}
+
+TEST(Visit, UniqueNamesDiffer) { EXPECT_NE(unique_name("x"), unique_name("x")); }
+
+TEST(Target, RoundTripsThroughText) {
+  for (const char* text :
+       {"x86-64-linux", "x86-64-linux-avx-f16c-fma-avx2", "arm-64-linux-no_asserts"}) {
+    EXPECT_EQ(Target(text).to_string(), std::string(text));
+  }
+  EXPECT_EQ(Target(get_host_target().to_string()), get_host_target());
+  EXPECT_TRUE(Target("host-no_asserts").has_feature(Target::NoAsserts));
+  EXPECT_THROW(Target("x86-64-linux-avx3"), UserError);
+  EXPECT_THROW(Target(""), UserError);
+  EXPECT_EQ(Target("x86-64-linux-avx2").natural_vector_size<float>(), 8);
+  EXPECT_EQ(Target("x86-64-linux-avx512_skylake").natural_vector_size<uint8_t>(), 64);
+  EXPECT_EQ(Target("arm-64-linux").natural_vector_size<int16_t>(), 8);
+}
+
+}  // namespace
+}  // namespace retrograde
