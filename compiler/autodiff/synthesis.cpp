@@ -232,20 +232,30 @@ class Synthesis {
     result_.explanations.push_back({kind, subject, detail});
   }
 
+  // What was asked for and got no contribution is zero, and says why.
   void explain_absent() {
-    auto absent = [&](const Symbol* symbol, const std::string& name, bool floating, bool built, Type type) {
-      if (built) return;
-      if (!floating) return explain(Explanation::Kind::Zero, name, "its type is " + to_string(type) + ": integers have no derivative");
-      if (!active_.contains(symbol)) return explain(Explanation::Kind::NotRequested, name, "nothing that was requested depends on it");
-      explain(Explanation::Kind::Zero, name, "the output does not depend on its value by a differentiable path");
-    };
     for (const FuncPtr& f : order_) {
       bool floating = std::any_of(f->types.begin(), f->types.end(), [](Type t) { return t.is_float(); });
-      absent(f.get(), f->name, floating, result_.after_stage.contains({f.get(), 0}), f->types[0]);
+      if (result_.after_stage.contains({f.get(), 0}) || !explain_absent(f.get(), f->name, floating, f->types[0])) continue;
+      AdjointFunc zero = make_adjoint(target_of(*f), f->name + "_adj", {});
+      for (int s = 0; s < f->stage_count(); ++s) record(*f, s, zero);
     }
     for (const auto& p : parameters_of({seed_.output})) {
-      absent(p.get(), p->name, p->type.is_float(), result_.parameters.contains(p.get()), p->type);
+      if (result_.parameters.contains(p.get()) || !explain_absent(p.get(), p->name, p->type.is_float(), p->type)) continue;
+      result_.parameters[p.get()] = make_adjoint(target_of(*p), p->name + "_adj", {}).func;
     }
+  }
+  // Whether its gradient is a zero that somebody may ask for.
+  bool explain_absent(const Symbol* symbol, const std::string& name, bool floating, Type type) {
+    if (!floating) {
+      explain(Explanation::Kind::Zero, name, "its type is " + to_string(type) + ": integers have no derivative");
+    } else if (!active_.contains(symbol)) {
+      explain(Explanation::Kind::NotRequested, name, "nothing that was requested depends on it");
+    } else {
+      explain(Explanation::Kind::Zero, name, "the output does not depend on its value by a differentiable path");
+      return true;
+    }
+    return false;
   }
 
   const Seed& seed_;

@@ -112,15 +112,15 @@ TEST_F(Programs, ParamsAndTuples) {
   double up = evaluate_scalar(loss);
   gain.set(1.5f - 1.0f / 256);
   double down = evaluate_scalar(loss);
-  EXPECT_NEAR(found, (up - down) * 128, 1e-3);
+  EXPECT_NEAR(found / ((up - down) * 128), 1, 1e-4);
 }
 
 TEST_F(Programs, HistogramOfDataDependentPlaces) {
   Func h("h");
   RDom r(0, 7, 0, 6);
   h(x) = 0.0f;
-  h(cast<int>(image(r.x, r.y) * 3.0f)) += image(r.x, r.y) * image(r.x, r.y);
-  Func loss = weighted_sum(h, {6});
+  h(cast<int>(image(r.x, r.y) * 4.0f)) += image(r.x, r.y) * image(r.x, r.y);
+  Func loss = weighted_sum(h, {8});
   expect_gradient(loss, image);
 }
 
@@ -199,7 +199,7 @@ TEST_F(Programs, ScanForward) {
   f(x) = a(x);
   f(r) = f(r) * 0.5f + f(r - 1) * a(r);
   Func loss = weighted_sum(f, {9});
-  EXPECT_NO_THROW(expect_gradient(loss, a));
+  expect_gradient(loss, a);
 }
 
 TEST_F(Programs, ScanBackwardWithTwoTaps) {

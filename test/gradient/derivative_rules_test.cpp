@@ -1,0 +1,239 @@
+// The rule table: total, right against central differences in double, and as conventional at kinks and poles as it says.
+#include "autodiff/derivative_rules.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <map>
+#include <string>
+
+#include "autodiff/reverse_sweep.h"
+#include "diagnostics/error.h"
+#include "ir/build.h"
+#include "ir/print.h"
+#include "ir/scalar.h"
+
+namespace retrograde::ir {
+namespace {
+
+constexpr double inf = std::numeric_limits<double>::infinity();
+const double nan = std::nan("");
+using Env = std::map<std::string, double>;
+
+Scalar eval(const Expr& e, const Env& env) {
+  if (auto s = as_scalar(e)) return *s;
+  return match(
+      e, [&](const Variable& v) { return Scalar::of_float(v.type, env.at(v.name)); },
+      [&](const Cast& c) { return eval_cast(c.type, eval(c.value, env)); },
+      [&](const Binary& b) { return eval_binary(b.kind, eval(b.a, env), eval(b.b, env)); },
+      [&](const Not& n) { return eval_not(eval(n.a, env)); },
+      [&](const Select& s) { return eval(s.condition, env).as_bool() ? eval(s.true_value, env) : eval(s.false_value, env); },
+      [&](const Call& c) {
+        std::vector<Scalar> args;
+        for (const Expr& a : c.args) args.push_back(eval(a, env));
+        auto result = eval_operator(c.op, args, c.type);
+        if (!result) ADD_FAILURE() << "cannot evaluate " << e;
+        return result.value_or(Scalar());
+      },
+      [&](const ExprNode&) {
+        ADD_FAILURE() << "cannot evaluate " << e;
+        return Scalar();
+      });
+}
+
+// Leaves are Variables that count as reads of images: every one is wanted.
+Env gradient(const Expr& e, const Env& env, double seed = 1) {
+  SweepResult sweep = sweep_reverse({e}, {make_const(adjoint_type(e.type()), seed)}, [](const Expr& leaf) {
+    return leaf.as<Variable>() != nullptr;
+  });
+  Env result;
+  for (const auto& [name, value] : env) result[name] = 0;
+  for (const LeafAdjoint& leaf : sweep.leaves) {
+    result[leaf.leaf.as<Variable>()->name] += eval(leaf.adjoint, env).as_double();
+  }
+  return result;
+}
+
+void expect_central_differences(const Expr& e, const Env& env) {
+  Env found = gradient(e, env);
+  for (const auto& [name, value] : env) {
+    auto slope = [&](double h) {
+      Env up = env, down = env;
+      up[name] += h;
+      down[name] -= h;
+      return (eval(e, up).as_double() - eval(e, down).as_double()) / (2 * h);
+    };
+    double h = 1e-3 * (1 + std::abs(value));
+    double expected = (4 * slope(h / 2) - slope(h)) / 3;
+    EXPECT_NEAR(found[name], expected, 1e-6 * (1 + std::abs(expected))) << "d/d" << name << " of " << e;
+  }
+}
+
+const Type f64 = Float(64);
+const Expr x = variable("x", f64), y = variable("y", f64), w = variable("w", f64);
+Expr op(Op o, const std::vector<Expr>& args) { return call_op(o, args[0].type(), args); }
+Expr num(double v) { return make_const(f64, v); }
+
+TEST(DerivativeRules, EveryOperatorHasARuleOrAReason) {
+  for (int i = 0; i < op_count; ++i) {
+    const Op o = static_cast<Op>(i);
+    const DerivativeRule& rule = derivative_rule(o);
+    EXPECT_STRNE(rule.convention, "") << op_info(o).name;
+    EXPECT_STRNE(rule.source, "") << op_info(o).name;
+    EXPECT_EQ(rule.cls == RuleClass::Smooth, rule.partials != nullptr) << op_info(o).name;
+    EXPECT_TRUE(rule.cls != RuleClass::NoRule || op_info(o).cls == OpClass::Internal) << op_info(o).name;
+  }
+#define RETROGRADE_BINARY(K) EXPECT_TRUE(has_derivative_rule(Kind::K)) << #K;
+#include "ir/kinds.def"
+  for (Kind k : {Kind::Cast, Kind::Select, Kind::Not, Kind::Reinterpret}) EXPECT_TRUE(has_derivative_rule(k));
+}
+
+// Points inside each operator's domain; every smooth operator must be listed.
+TEST(DerivativeRules, SmoothOperatorsAgreeWithCentralDifferences) {
+  const std::map<Op, std::vector<Env>> points = {
+      {Op::abs, {{{"x", 0.7}}, {{"x", -1.3}}}},
+      {Op::absd, {{{"x", 0.7}, {"y", 1.5}}, {{"x", 2.0}, {"y", 0.5}}}},
+      {Op::lerp, {{{"x", 0.7}, {"y", 1.5}, {"w", 0.3}}}},
+      {Op::sqrt, {{{"x", 0.4}}, {{"x", 9.0}}}},
+      {Op::exp, {{{"x", -1.2}}, {{"x", 2.0}}}},
+      {Op::log, {{{"x", 0.4}}, {{"x", 7.0}}}},
+      {Op::pow, {{{"x", 1.7}, {"y", 2.3}}, {{"x", 0.6}, {"y", -1.2}}}},
+      {Op::hypot, {{{"x", 3.0}, {"y", -4.0}}, {{"x", 0.1}, {"y", 0.0}}}},
+      {Op::sin, {{{"x", 0.9}}}},
+      {Op::cos, {{{"x", 0.9}}}},
+      {Op::tan, {{{"x", 0.9}}}},
+      {Op::asin, {{{"x", 0.6}}, {{"x", -0.9}}}},
+      {Op::acos, {{{"x", 0.6}}, {{"x", -0.9}}}},
+      {Op::atan, {{{"x", 1.6}}}},
+      {Op::atan2, {{{"x", 1.6}, {"y", -0.7}}, {{"x", -0.2}, {"y", 0.0}}}},
+      {Op::sinh, {{{"x", 1.1}}}},
+      {Op::cosh, {{{"x", -1.1}}}},
+      {Op::tanh, {{{"x", 0.8}}}},
+      {Op::asinh, {{{"x", 2.2}}}},
+      {Op::acosh, {{{"x", 1.9}}}},
+      {Op::atanh, {{{"x", 0.55}}}},
+      {Op::erf, {{{"x", 0.4}}}},
+      {Op::fast_exp, {{{"x", 0.3}}}},
+      {Op::fast_log, {{{"x", 1.4}}}},
+      {Op::fast_pow, {{{"x", 1.4}, {"y", 1.5}}}},
+      {Op::fast_sin, {{{"x", 0.8}}}},
+      {Op::fast_cos, {{{"x", 0.8}}}},
+      {Op::fast_inverse, {{{"x", 1.7}}}},
+      {Op::fast_inverse_sqrt, {{{"x", 1.7}}}},
+      {Op::saturating_cast, {{{"x", 1.7}}}},
+      {Op::strong_mul, {{{"x", 1.7}, {"y", 0.4}}}},
+  };
+  for (int i = 0; i < op_count; ++i) {
+    const Op o = static_cast<Op>(i);
+    if (derivative_rule(o).cls != RuleClass::Smooth) continue;
+    auto listed = points.find(o);
+    ASSERT_NE(listed, points.end()) << "no test point for " << op_info(o).name;
+    std::vector<Expr> args{x, y, w};
+    args.resize(static_cast<size_t>(op_info(o).arity));
+    for (const Env& env : listed->second) expect_central_differences(op(o, args), env);
+  }
+}
+
+TEST(DerivativeRules, ArithmeticAgreesWithCentralDifferences) {
+  const Env env{{"x", 1.75}, {"y", -0.6}};
+  for (const Expr& e : {x + y, x - y, x * y, x / y, x % num(0.5), min(x, y), max(x, y), select(x > y, x * x, y),
+                        x / num(3), clamp(x, num(0), num(1)), clamp(x, num(0), num(5))}) {
+    expect_central_differences(e, env);
+  }
+  expect_central_differences(x % y, {{"x", 7.3}, {"y", 2.1}});
+}
+
+TEST(DerivativeRules, SharedNodesAreVisitedOnce) {
+  Expr e = x;
+  for (int i = 0; i < 64; ++i) e = e * num(0.5) + e * num(0.5);  // 2^64 paths
+  EXPECT_DOUBLE_EQ(gradient(e, {{"x", 1}})["x"], 1);
+}
+
+TEST(DerivativeRules, TiesOfMinAndMaxSumToOne) {
+  for (const Expr& e : {min(x, y), max(x, y)}) {
+    Env g = gradient(e, {{"x", 0.5}, {"y", 0.5}});
+    EXPECT_GE(g["x"], 0);
+    EXPECT_GE(g["y"], 0);
+    EXPECT_EQ(g["x"] + g["y"], 1);
+  }
+}
+
+TEST(DerivativeRules, ClampAtItsBoundsStaysInUnitInterval) {
+  for (double at : {0.0, 1.0}) {
+    double g = gradient(clamp(x, num(0), num(1)), {{"x", at}})["x"];
+    EXPECT_TRUE(g >= 0 && g <= 1) << g;
+  }
+}
+
+TEST(DerivativeRules, KinksGiveZeroWhereTheConventionSaysSo) {
+  EXPECT_EQ(gradient(op(Op::abs, {x}), {{"x", 0}})["x"], 0);
+  Env origin{{"x", 0}, {"y", 0}};
+  for (Op o : {Op::hypot, Op::atan2}) {
+    Env g = gradient(op(o, {x, y}), origin);
+    EXPECT_EQ(g["x"], 0) << op_info(o).name;
+    EXPECT_EQ(g["y"], 0) << op_info(o).name;
+  }
+  EXPECT_EQ(gradient(op(Op::pow, {x, y}), {{"x", 0}, {"y", 2}})["y"], 0);
+  EXPECT_EQ(gradient(op(Op::pow, {x, y}), {{"x", 0}, {"y", 0}})["x"], 0);
+  EXPECT_EQ(gradient(op(Op::floor, {x}), {{"x", 0.5}})["x"], 0);
+}
+
+TEST(DerivativeRules, PolesAreInfiniteForANonzeroAdjointOnly) {
+  const std::map<Op, double> poles = {{Op::sqrt, 0}, {Op::log, 0}, {Op::asin, 1}, {Op::acos, 1}, {Op::acosh, 1}, {Op::atanh, 1}};
+  for (const auto& [o, at] : poles) {
+    EXPECT_TRUE(std::isinf(gradient(op(o, {x}), {{"x", at}})["x"])) << op_info(o).name;
+    // The branch not taken passes exactly zero, not inf * 0.
+    Expr guarded = select(x > num(at), op(o, {x}), x * num(2));
+    if (o == Op::asin || o == Op::acos || o == Op::atanh) guarded = select(x < num(at), op(o, {x}), x * num(2));
+    EXPECT_EQ(gradient(guarded, {{"x", at}})["x"], 2) << op_info(o).name;
+  }
+}
+
+TEST(DerivativeRules, UnselectedBranchesLeakNothingThroughProducts) {
+  Expr risky = select(x > num(0), y * op(Op::sqrt, {num(1) / x}), y);
+  Env g = gradient(risky, {{"x", 0}, {"y", 3}});
+  EXPECT_EQ(g["x"], 0);
+  EXPECT_EQ(g["y"], 1);
+  Expr overflow = select(x > num(800), num(1), y / op(Op::exp, {x * num(1000)}));
+  EXPECT_EQ(gradient(overflow, {{"x", 900}, {"y", 1}})["x"], 0);
+}
+
+TEST(DerivativeRules, TrueNaNsStayNaN) {
+  EXPECT_TRUE(std::isnan(gradient(op(Op::sqrt, {x}) * y, {{"x", -1}, {"y", 1}})["x"]));
+  EXPECT_TRUE(std::isnan(gradient(x * y, {{"x", 1}, {"y", nan}})["x"]));
+  EXPECT_TRUE(std::isinf(gradient(x * y, {{"x", 1}, {"y", inf}})["x"]));
+}
+
+TEST(DerivativeRules, LargeArgumentsDoNotOverflowInThePartials) {
+  Env huge{{"x", 3e200}, {"y", 4e200}};
+  Env h = gradient(op(Op::hypot, {x, y}), huge);
+  EXPECT_NEAR(h["x"], 0.6, 1e-12);
+  Env a = gradient(op(Op::atan2, {y, x}), huge);
+  EXPECT_NEAR(a["x"] * 1e201, -4.0 / 25 * 10, 1e-9);
+  EXPECT_NEAR(gradient(op(Op::asinh, {x}), {{"x", 1e200}})["x"] * 1e200, 1, 1e-12);
+}
+
+TEST(DerivativeRules, StopGradientAndIntegersPassNothing) {
+  EXPECT_EQ(gradient(op(Op::stop_gradient, {x}) * y, {{"x", 2}, {"y", 3}})["x"], 0);
+  EXPECT_EQ(gradient(cast_to(f64, cast_to(Int(32), x)) * y, {{"x", 2.5}, {"y", 3}})["x"], 0);
+  EXPECT_EQ(gradient(op(Op::likely, {x}) * y, {{"x", 2}, {"y", 3}})["x"], 3);
+}
+
+TEST(DerivativeRules, CallsOfCFunctionsAreRefusedOnlyWhereTheGradientIsWanted) {
+  Expr call = call_extern("mystery", f64, {x});
+  EXPECT_THROW(gradient(call, {{"x", 1}}), Unsupported);
+  SweepResult sweep = sweep_reverse({call * y}, {num(1)}, [](const Expr& leaf) {
+    return leaf.as<Variable>() && leaf.as<Variable>()->name == "y";
+  });
+  EXPECT_EQ(sweep.leaves.size(), 1u);
+}
+
+TEST(DerivativeRules, HalfPrecisionAccumulatesInFloat32) {
+  EXPECT_EQ(adjoint_type(Float(16)), Float(32));
+  EXPECT_EQ(adjoint_type(BFloat(16)), Float(32));
+  EXPECT_EQ(adjoint_type(Float(64)), Float(64));
+}
+
+}  // namespace
+}  // namespace retrograde::ir

@@ -1,0 +1,120 @@
+// What cannot be differentiated as written: each error has its kind, its four parts and the names in it.
+#include <gtest/gtest.h>
+
+#include "autodiff/derivative.h"
+#include "frontend/func.h"
+#include "frontend/inline_reductions.h"
+
+namespace retrograde {
+namespace {
+
+Var x("x"), y("y");
+
+template <class Kind, class Action>
+void expect_error(Action action, const std::vector<std::string>& phrases) {
+  try {
+    action();
+  } catch (const Kind& e) {
+    for (const std::string& phrase : phrases) {
+      EXPECT_NE(std::string(e.what()).find(phrase), std::string::npos) << phrase << " is not in: " << e.what();
+    }
+    EXPECT_FALSE(e.message().asked.empty());
+    EXPECT_FALSE(e.message().rule.empty());
+    EXPECT_FALSE(e.message().evidence.empty()) << e.what();
+    EXPECT_FALSE(e.message().instead.empty()) << e.what();
+    return;
+  } catch (const Error& e) {
+    FAIL() << "another kind of error: " << e.what();
+  }
+  FAIL() << "no error";
+}
+
+struct Gradients : ::testing::Test {
+  Buffer<float> a{8};
+  Func f{"f"}, loss{"loss"};
+  void sum_up() {
+    RDom r(0, 8);
+    loss() = 0.0f;
+    loss() += f(r);
+  }
+};
+
+TEST_F(Gradients, OverwrittenValueThatAPartialNeeds) {
+  f(x) = a(x);
+  f(x) = f(x) * f(x);
+  sum_up();
+  expect_error<UserError>([&] { propagate_adjoints(loss); }, {"differentiate the update \"f", "Overwritten::Store"});
+}
+
+TEST_F(Gradients, ProductInPlace) {
+  RDom r(0, 8);
+  f(x) = 1.0f;
+  f(x) *= a(r);
+  sum_up();
+  expect_error<UserError>([&] { propagate_adjoints(loss); }, {"\"f", "Overwritten::Store"});
+}
+
+TEST_F(Gradients, ValueOverwrittenByALaterUpdate) {
+  f(x) = a(x);
+  RDom r(1, 7), q(0, 8);
+  f(r) = f(r) + f(r - 1) * f(r - 1);
+  f(q) = f(q) * 2.0f;
+  sum_up();
+  expect_error<UserError>([&] { propagate_adjoints(loss); }, {"overwrote"});
+  EXPECT_NO_THROW(propagate_adjoints(loss, {.overwritten = Overwritten::Store}));
+}
+
+TEST_F(Gradients, OverwritingAtPlacesThatDependOnData) {
+  f(x) = a(x);
+  RDom r(0, 8);
+  f(clamp(cast<int>(a(r)), 0, 7)) = a(r) * 2.0f;
+  sum_up();
+  expect_error<UserError>([&] { propagate_adjoints(loss); }, {"\"f", "depends on data", "+="});
+}
+
+TEST_F(Gradients, PlaceThatDependsOnTheFuncItself) {
+  f(x) = a(x);
+  RDom r(0, 8);
+  f(clamp(cast<int>(f(r)), 0, 7)) += a(r);
+  sum_up();
+  expect_error<UserError>([&] { propagate_adjoints(loss); }, {"where an update writes"});
+}
+
+TEST_F(Gradients, IntegerOutput) {
+  f(x) = cast<int>(a(x));
+  expect_error<UserError>([&] { propagate_adjoints(f); }, {"\"f", "int32", "float"});
+}
+
+TEST_F(Gradients, UndefinedOutput) {
+  expect_error<UserError>([&] { propagate_adjoints(f); }, {"\"f", "defined"});
+}
+
+TEST_F(Gradients, BoundsOfWrongRank) {
+  f(x) = a(x);
+  Func seed("seed");
+  seed(x) = 1.0f;
+  expect_error<UserError>([&] { propagate_adjoints(f, seed, Region{{0, 8}, {0, 8}}); }, {"1 dimensions", "2 bounds"});
+}
+
+TEST_F(Gradients, AdjointOfWrongRank) {
+  f(x) = a(x);
+  Buffer<float> seed(4, 4);
+  expect_error<UserError>([&] { propagate_adjoints(f, seed); }, {"dimensions"});
+}
+
+TEST_F(Gradients, ZeroGradientsSayWhy) {
+  Buffer<uint8_t> bytes(8);
+  Func g("g");
+  g(x) = floor(a(x)) + cast<float>(bytes(x));
+  f(x) = g(x) * 2.0f;
+  sum_up();
+  Derivative d = propagate_adjoints(loss);
+  EXPECT_NE(d.explain().find("floor has derivative 0"), std::string::npos) << d.explain();
+  EXPECT_NE(d.explain().find("uint8"), std::string::npos) << d.explain();
+  EXPECT_FALSE(d(bytes).defined());
+  ASSERT_TRUE(d(a).defined()) << "a float that the output reads has a gradient, here zero";
+  EXPECT_EQ(d(a).num_update_definitions(), 0);
+}
+
+}  // namespace
+}  // namespace retrograde
