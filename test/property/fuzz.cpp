@@ -1,0 +1,145 @@
+// fuzz_pipelines -- looks for random programs whose machine code disagrees with the interpreter.
+//
+//   fuzz_pipelines [--seed N | --from N] [--count N | --seconds N] [--no-shrink] [--print]
+//
+// Each program runs in a process of its own, so that a crash or a hang is a finding like any other.
+// A finding is shrunk and printed as C++. Exit code: 0 nothing found, 1 something found.
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <string>
+
+#include "ir/target.h"
+#include "testing/check_program.h"
+#include "testing/print_program.h"
+#include "testing/reducer.h"
+
+namespace {
+
+using namespace retrograde;
+using namespace retrograde::fuzz;
+
+constexpr unsigned seconds_per_program = 60;
+constexpr int crashed = 100;  // exit codes of a child: a Verdict, or this plus the signal
+
+struct Options {
+  uint64_t seed = 1000;
+  uint64_t count = 100;
+  double seconds = 1e9;
+  bool shrink = true, print = false;
+};
+
+Options parse(int argc, char** argv) {
+  Options options;
+  for (int i = 1; i < argc; ++i) {
+    const std::string name = argv[i];
+    const bool has_value = i + 1 < argc;
+    if (name == "--no-shrink") {
+      options.shrink = false;
+    } else if (name == "--print") {
+      options.print = true;
+    } else if (name == "--seed" && has_value) {
+      options.seed = std::strtoull(argv[++i], nullptr, 10);
+      options.count = 1;
+    } else if (name == "--from" && has_value) {
+      options.seed = std::strtoull(argv[++i], nullptr, 10);
+    } else if (name == "--count" && has_value) {
+      options.count = std::strtoull(argv[++i], nullptr, 10);
+    } else if (name == "--seconds" && has_value) {
+      options.seconds = std::strtod(argv[++i], nullptr);
+      options.count = UINT64_MAX;
+    } else {
+      std::fprintf(stderr, "fuzz_pipelines: unknown argument %s\n", argv[i]);
+      std::exit(2);
+    }
+  }
+  return options;
+}
+
+struct Finding {
+  int code = 0;        // a Verdict, or `crashed` + signal
+  std::string detail;
+};
+
+std::string read_all(int descriptor) {
+  std::string result;
+  char chunk[4096];
+  for (ssize_t n; (n = read(descriptor, chunk, sizeof(chunk))) > 0;) result.append(chunk, n);
+  return result;
+}
+
+[[noreturn]] void run_child(const Program& program, int descriptor) {
+  alarm(seconds_per_program);
+  const Outcome outcome =
+      check_program(program.pipeline, program.schedule, get_jit_target_from_environment());
+  const ssize_t written = write(descriptor, outcome.detail.data(), outcome.detail.size());
+  _exit(written < 0 ? 2 : static_cast<int>(outcome.verdict));
+}
+
+Finding run_apart(const Program& program) {
+  int ends[2];
+  if (pipe(ends) != 0) std::exit(2);
+  const pid_t child = fork();
+  if (child == 0) {
+    close(ends[0]);
+    run_child(program, ends[1]);
+  }
+  close(ends[1]);
+  Finding finding;
+  finding.detail = read_all(ends[0]);
+  close(ends[0]);
+  int status = 0;
+  waitpid(child, &status, 0);
+  finding.code = WIFSIGNALED(status) ? crashed + WTERMSIG(status) : WEXITSTATUS(status);
+  return finding;
+}
+
+std::string describe(const Finding& finding) {
+  if (finding.code >= crashed) return std::string("crashes: ") + strsignal(finding.code - crashed);
+  return std::string(verdict_name(static_cast<Verdict>(finding.code))) + ": " + finding.detail;
+}
+
+// A refusal is the same finding only with the same kind of message: its first words.
+std::string kind_of(const Finding& finding) {
+  const bool by_text = finding.code == static_cast<int>(Verdict::Refused) ||
+                       finding.code == static_cast<int>(Verdict::Broken);
+  return std::to_string(finding.code) + (by_text ? finding.detail.substr(0, 14) : "");
+}
+
+void report(uint64_t seed, const Program& program, const Finding& finding, bool may_shrink) {
+  std::printf("seed %llu %s\n", static_cast<unsigned long long>(seed), describe(finding).c_str());
+  std::fflush(stdout);
+  if (!may_shrink) return;
+  const std::string kind = kind_of(finding);
+  const Program small = shrink(program, [&](const Program& p) { return kind_of(run_apart(p)) == kind; });
+  std::printf("shrunk, it %s\n%s\n", describe(run_apart(small)).c_str(),
+              to_cpp(small.pipeline, small.schedule).c_str());
+  std::fflush(stdout);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  const Options options = parse(argc, argv);
+  const auto start = std::chrono::steady_clock::now();
+  uint64_t found = 0, tried = 0;
+  for (; tried < options.count; ++tried) {
+    const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - start;
+    if (elapsed.count() > options.seconds) break;
+    const uint64_t seed = options.seed + tried;
+    Program program{random_pipeline(seed), {}};
+    program.schedule = random_schedule(program.pipeline, seed);
+    if (options.print) std::puts(to_cpp(program.pipeline, program.schedule).c_str());
+    const Finding finding = run_apart(program);
+    if (finding.code == static_cast<int>(Verdict::Agrees)) continue;
+    ++found;
+    report(seed, program, finding, options.shrink);
+  }
+  std::printf("%llu programs, %llu findings\n", static_cast<unsigned long long>(tried),
+              static_cast<unsigned long long>(found));
+  return found > 0 ? 1 : 0;
+}
