@@ -33,7 +33,8 @@ std::vector<retrograde::oracle::Array> interpret(const std::string& name) {
     funcs.push_back(built.outputs[i].function());
     regions.push_back({in_retrograde::mins_of(built, i), built.extents[i]});
   }
-  oracle::Interpreter interpreter({.rounding = oracle::Rounding::Reordering});
+  oracle::Interpreter interpreter(
+      oracle::InterpreterOptions{.widen = false, .rounding = oracle::Rounding::Reordering});
   return interpreter.realize(funcs, regions);
 }
 
