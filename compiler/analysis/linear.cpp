@@ -167,11 +167,34 @@ std::optional<int64_t> difference(const LinearForm& a, const LinearForm& b) {
   return std::nullopt;
 }
 
+// p / k + c == (p + k*c) / k, for forms that are nothing else.
+struct FloorQuotient {
+  LinearForm numerator;
+  int64_t divisor;
+};
+std::optional<FloorQuotient> as_quotient(const LinearForm& f) {
+  if (f.terms.size() != 1 || f.terms[0].coefficient != 1) return std::nullopt;
+  const Div* div = f.terms[0].atom.as<Div>();
+  auto k = div ? as_const_int(div->b) : std::nullopt;
+  if (!k || *k <= 0) return std::nullopt;
+  auto numerator = checked_plus(linear_form(div->a), constant_form(f.type, f.constant), *k);
+  if (!numerator) return std::nullopt;
+  return FloorQuotient{*numerator, *k};
+}
+
+// Not positive: a <= b for certain. Not negative: a >= b.
+std::optional<int64_t> sign_of_difference(const LinearForm& a, const LinearForm& b) {
+  if (auto d = difference(a, b)) return d;
+  auto x = as_quotient(a), y = as_quotient(b);
+  if (!x || !y || x->divisor != y->divisor) return std::nullopt;
+  return difference(x->numerator, y->numerator);
+}
+
 // Whether min(kept, dropped) == kept for certain (for max with the order reversed). Looks through one level of the
 // opposite operator: min(a, max(a, b)) == a.
 bool makes_redundant(Kind kind, const LinearForm& kept, const LinearForm& dropped) {
   auto wins = [&](int64_t difference) { return kind == Kind::Min ? difference <= 0 : difference >= 0; };
-  if (auto d = difference(kept, dropped)) return wins(*d);
+  if (auto d = sign_of_difference(kept, dropped)) return wins(*d);
   std::vector<LinearForm> inner;
   add_operands(kind == Kind::Min ? Kind::Max : Kind::Min, dropped, inner);
   if (inner.size() < 2) return false;

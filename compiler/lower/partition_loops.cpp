@@ -24,6 +24,7 @@
 // Source: folklore (index-set splitting). Tests: test/golden/lower/partition_loops/, test/property/loop_passes_test.cpp.
 #include "lower/partition_loops.h"
 
+#include <algorithm>
 #include <unordered_map>
 
 #include "analysis/interval.h"
@@ -40,6 +41,10 @@ namespace {
 
 // Border bodies with more nodes than this are not partitioned further.
 constexpr int small_body = 1500;
+// A border is thick when the inner loops that a condition is about run a serial loop of at least this extent, ...
+constexpr int64_t thick_loop = 8;
+// ... and at least this many points in all: a tile then, and not a stencil or a vector.
+constexpr int64_t thick_points = 32;
 
 bool is_likely(const Call* call) {
   return call && (call->is_op(Op::likely) || call->is_op(Op::likely_if_innermost));
@@ -116,7 +121,7 @@ class Context {
 struct SteadyState {
   Interval range;           // of the loop variable
   Expr needed;              // and only if this holds; undefined: always
-  bool has_thick_border = false;  // a condition involves an inner loop that is not vectorized: the rest is a tile or more
+  bool has_thick_border = false;  // some iteration of the rest is a tile or more
   int solved = 0;
 };
 
@@ -174,8 +179,9 @@ class SteadyRewriter : public Rewriter {
 
   // Inner loops of unknown extent keep their variables to themselves.
   Stmt rewrite_loop(const Stmt& s, const For& n) {
-    bool is_known = !is_serial(n) || is_const(simplify(n.extent));
-    if (is_known) {
+    auto extent = as_const_int(simplify(n.extent));
+    if (!is_serial(n) || extent) {
+      inner_extents_[n.name] = extent.value_or(1);
       context_.add_loop(n);
       if (uses_any_variable(context_.expand(n.min), dependent_)) dependent_.insert(n.name);
     } else {
@@ -240,8 +246,24 @@ class SteadyRewriter : public Rewriter {
     if (solution->needed.defined()) {
       steady_.needed = steady_.needed.defined() ? binary(Kind::And, steady_.needed, solution->needed) : solution->needed;
     }
-    steady_.has_thick_border |= uses_any_variable(expanded, inner_serial_);
+    steady_.has_thick_border |= is_about_tiles(expanded);
     return true;
+  }
+
+  bool is_about_tiles(const Expr& condition) const {
+    std::unordered_set<std::string> names;
+    walk(condition, [&](const Expr& e) {
+      if (const Variable* v = e.as<Variable>()) names.insert(v->name);
+      return true;
+    });
+    int64_t points = 1, longest = 0;
+    for (const std::string& name : names) {
+      auto it = inner_extents_.find(name);
+      if (it == inner_extents_.end()) continue;
+      points *= it->second;
+      if (inner_serial_.count(name)) longest = std::max(longest, it->second);
+    }
+    return longest >= thick_loop && points >= thick_points;
   }
 
   const For& loop_;
@@ -249,6 +271,7 @@ class SteadyRewriter : public Rewriter {
   SteadyState steady_;
   std::unordered_set<std::string> dependent_;  // the loop's variable, and those of inner loops that start from it
   std::unordered_set<std::string> inner_serial_;
+  std::unordered_map<std::string, int64_t> inner_extents_;  // constant ones
   std::unordered_set<std::string> marked_lets_;
   std::unordered_map<std::string, Expr> decided_lets_;
   std::unordered_map<const ExprNode*, bool> marked_;  // of nodes of the body, which outlives this
