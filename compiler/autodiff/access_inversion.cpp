@@ -6,6 +6,7 @@
 #include <functional>
 #include <optional>
 
+#include "analysis/interval.h"
 #include "autodiff/isl_bridge.h"
 #include "ir/build.h"
 #include "simplify/simplify.h"
@@ -375,7 +376,7 @@ class GroupInverter {
       g.iteration[group_.vars[static_cast<size_t>(j)].name] = simplify(bridge_.to_expr(c.value, names));
     }
     add_predicate(piece, p, g, names);
-    protect(piece, p, g);
+    protect(g);
     return g;
   }
 
@@ -428,21 +429,28 @@ class GroupInverter {
   }
 
   // Where the predicate is false the point found may lie outside the domain, and what is read there outside of
-  // buffers. Unless isl proves the opposite for all elements of the region, the point is clamped into the domain.
-  void protect(const isl::map& piece, const Plan& p, GroupPiece& g) {
-    isl::set elements = rho_box(p).intersect(region_set(p)).intersect(fixed_elements(piece, p));
-    for (int j = 0; j < var_count(); ++j) {
-      const LoopVariable& v = group_.vars[static_cast<size_t>(j)];
-      const Coordinate& c = p.coordinates[static_cast<size_t>(j)];
-      isl::map value = output_equals(pad(c.value, elements), j, var_count());
-      isl::set inside = value.intersect_range(own_range_[static_cast<size_t>(j)]).domain();
-      if (elements.is_subset(inside)) continue;
+  // buffers: it is clamped into the domain, unless interval arithmetic, which is what bounds inference will use, shows
+  // that it is inside for every element. Where bounds are constants the simplifier drops these clamps again.
+  void protect(GroupPiece& g) const {
+    Scope<Interval> scope;
+    for (int d : group_.dims) scope.push(element_name(d), Interval::everything());
+    for (const auto& free : g.free) {
+      const std::string& name = group_.vars[static_cast<size_t>(free.var)].name;
+      scope.push(rho_name(name), {make_zero(Int(32)), simplify(free.extent - 1)});
+    }
+    for (const LoopVariable& v : group_.vars) {
       Expr& e = g.iteration[v.name];
+      if (is_const(e)) continue;
+      Interval range = bounds_of(e, scope);
+      bool above = !v.min.defined() || (range.min.defined() && can_prove(range.min >= v.min));
+      bool below = !v.max.defined() || (range.max.defined() && can_prove(range.max <= v.max));
+      if (above && below) continue;
       e = likely(e);
       if (v.min.defined()) e = max(e, v.min);
       if (v.max.defined()) e = min(e, v.max);
     }
   }
+
   // y_d as a function on the plan's space.
   static isl::pw_aff element_dim(const isl::set& space, int d) {
     isl_local_space* local = isl_local_space_from_space(isl_set_get_space(space.get()));
@@ -456,16 +464,6 @@ class GroupInverter {
   }
   static isl::set whole_space(const Plan& p) { return isl::manage(isl_set_universe(isl_set_get_space(p.valid.get()))); }
 
-  isl::set region_set(const Plan& p) {
-    isl::set result = whole_space(p);
-    for (int d = 0; d < index_count() && !group_.region.empty(); ++d) {
-      const LoopVariable& v = group_.region[static_cast<size_t>(d)];
-      isl::pw_aff y = element_dim(result, d);
-      if (v.min.defined()) result = result.intersect(y.ge_set(constant_on(result, bridge_.bound(v.min))));
-      if (v.max.defined()) result = result.intersect(y.le_set(constant_on(result, bridge_.bound(v.max))));
-    }
-    return result;
-  }
   // {y : y_d is the index that all points of the piece share}
   isl::set fixed_elements(const isl::map& piece, const Plan& p) const {
     isl::set result = whole_space(p);

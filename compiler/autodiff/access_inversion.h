@@ -34,7 +34,7 @@ struct AccessQuery {
   IterationDomain domain;
   std::vector<Expr> indices;             // of the access, over the domain's variables
   std::vector<std::string> target_args;  // pure variables of the target's adjoint, one an index
-  std::vector<LoopVariable> region;      // of the target; may be empty (unknown). Only to leave out clamps.
+  std::vector<LoopVariable> region;      // of the target; may be empty (unknown). Assumed not to be an empty set.
 };
 
 // One way in which elements are read: g_adj(lhs...) += sum over rvars where predicate of a(iteration).

@@ -57,8 +57,10 @@ void Regions::add_func(const FuncPtr& f) {
     Scope<Interval> scope = scope_of(*f, definition, boxes_[f.get()]);
     Box written;
     for (size_t d = 0; d < f->args.size(); ++d) {
-      Interval i = is_pure_position(*f, definition, d) ? boxes_[f.get()][d] : bounds_of(definition.args[d], scope);
-      written.push_back(i);
+      // Where the place depends on data, only what somebody reads counts.
+      const Interval mine = boxes_[f.get()][d];
+      Interval i = is_pure_position(*f, definition, d) ? mine : bounds_of(definition.args[d], scope);
+      written.push_back({i.min.defined() ? i.min : mine.min, i.max.defined() ? i.max : mine.max});
     }
     if (s > 0) grow(f.get(), written);
     for_each_expr(definition, [&](const Expr& e) {

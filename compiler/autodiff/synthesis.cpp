@@ -153,7 +153,7 @@ class Synthesis {
                         const FuncPtr& adjoint, const SelfValues& self_values) {
     std::vector<Expr> seeds;
     for (size_t k = 0; k < values.size(); ++k) {
-      seeds.push_back(f->types[k].is_float() ? call_value(adjoint, f->stage(stage).args, static_cast<int>(k)) : Expr());
+      seeds.push_back(f->types[k].is_float() ? adjoint_at(*f, stage, adjoint, static_cast<int>(k)) : Expr());
     }
     SweepResult sweep = sweep_reverse(values, seeds, [&](const Expr& leaf) {
       return is_wanted(leaf) && symbol_of(leaf) != f.get();
@@ -162,6 +162,28 @@ class Synthesis {
     for (const LeafAdjoint& leaf : sweep.leaves) {
       add_contribution(f, {leaf.leaf, with_values(f, leaf.adjoint, self_values)}, domain);
     }
+  }
+
+  // The adjoint where the stage writes. A place that depends on data may lie outside of all that is read: 0 there.
+  Expr adjoint_at(const FuncContents& f, int stage, const FuncPtr& adjoint, int k) const {
+    std::vector<Expr> place;
+    Expr inside = const_true();
+    const Box& box = regions_.of(&f);
+    for (size_t d = 0; d < f.args.size(); ++d) {
+      Expr index = without_lets(f.stage(stage).args[d]);
+      bool depends_on_data = false;
+      walk(index, [&](const Expr& e) {
+        const auto* call = e.as<Call>();
+        return !(depends_on_data |= call && call->call_type != CallType::Operator);
+      });
+      if (depends_on_data && box[d].is_bounded()) {
+        inside = inside && index >= box[d].min && index <= box[d].max;
+        index = clamp(index, box[d].min, box[d].max);
+      }
+      place.push_back(index);
+    }
+    Expr value = call_value(adjoint, place, k);
+    return is_const_true(inside) ? value : make_select(inside, value, make_zero(value.type()));
   }
 
   void add_contribution(const FuncPtr& f, const LeafAdjoint& leaf, const IterationDomain& domain) {
