@@ -1,6 +1,7 @@
 // buffer.cpp -- checks of Buffers, and their place in Exprs.
 #include "frontend/buffer.h"
 
+#include <algorithm>
 #include <cstdlib>
 
 #include "ir/visit.h"
@@ -176,13 +177,14 @@ void check_in_bounds(const Runtime::Buffer<>& buffer, const std::string& name, c
     for (int d = 0; d < count; d++) out += text(d ? ", " : "", at[d]);
     return text("access (", out, ") of the Buffer ", quoted(name));
   };
-  if (count > buffer.dimensions()) {
+  for (int d = buffer.dimensions(); d < count; d++) {
+    if (at[d] == 0) continue;  // Halide's users write scalar(0)
     user_error(place(), "an access gives one coordinate for each dimension",
                text("it has ", buffer.dimensions(), " dimensions"));
   }
   if (!buffer.raw_buffer()->host)
     user_error(place(), "the buffer must have memory", "it has only a shape", "Call allocate()");
-  for (int d = 0; d < count; d++) {
+  for (int d = 0; d < std::min(count, buffer.dimensions()); d++) {
     const auto dim = buffer.dim(d);
     if (at[d] >= dim.min() && at[d] <= dim.max()) continue;
     user_error(place(), "a coordinate lies inside the buffer",

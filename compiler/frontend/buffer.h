@@ -9,6 +9,7 @@
 
 #include <HalideBuffer.h>
 
+#include <algorithm>
 #include <memory>
 #include <mutex>
 #include <string>
@@ -392,8 +393,9 @@ class Buffer {
   template <typename T2, int D2>
   void copy_from(const Buffer<T2, D2>& source) {
     if (runtime().type() != source.runtime().type() || dimensions() != source.dimensions()) {
-      user_error(text("copy ", retrograde::quoted(source.name()), " into ", retrograde::quoted(name())),
-                 "both Buffers have one type and as many dimensions");
+      user_error(
+          text("copy ", retrograde::quoted(source.name()), " into ", retrograde::quoted(name())),
+          "both Buffers have one type and as many dimensions");
     }
     get()->copy_from(*source.get());
   }
@@ -505,7 +507,7 @@ class Buffer {
     ir::check_in_bounds(contents_->buffer, contents_->name, at, count);
 #endif
     ptrdiff_t offset = 0;
-    for (int d = 0; d < count; d++)
+    for (int d = 0; d < std::min(count, raw.dimensions); d++)
       offset += static_cast<ptrdiff_t>(raw.dim[d].stride) * (at[d] - raw.dim[d].min);
     return reinterpret_cast<T*>(raw.host)[offset];
   }

@@ -23,6 +23,12 @@ ir::FuncPtr make_func(const std::string& unique_name) {
 // ---- loop levels ----
 
 LoopLevel::LoopLevel(const Func& f, const VarOrRVar& var, int stage_index) {
+  // Outside of all loops of f. Computing it at root gives the same values and is always legal;
+  // storage lives longer only where f itself is computed inside another Func.
+  if (var.name() == Var::outermost().name()) {
+    level_.kind = ir::LoopLevel::Kind::Root;
+    return;
+  }
   level_.kind = ir::LoopLevel::Kind::At;
   level_.func = f.name();
   level_.var = var.name();
