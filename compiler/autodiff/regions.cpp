@@ -20,6 +20,16 @@ Scope<Interval> scope_of(const FuncContents& f, const Definition& definition, co
   return scope;
 }
 
+// Where the place of an update depends on data, only what others read counts.
+Box or_else(const Box& box, const Box& other) {
+  Box result = box;
+  for (size_t d = 0; d < box.size(); ++d) {
+    if (!result[d].min.defined()) result[d].min = other[d].min;
+    if (!result[d].max.defined()) result[d].max = other[d].max;
+  }
+  return result;
+}
+
 }  // namespace
 
 bool is_pure_position(const FuncContents& f, const Definition& definition, size_t d) {
@@ -57,16 +67,14 @@ void Regions::add_func(const FuncPtr& f) {
     Scope<Interval> scope = scope_of(*f, definition, boxes_[f.get()]);
     Box written;
     for (size_t d = 0; d < f->args.size(); ++d) {
-      // Where the place depends on data, only what somebody reads counts.
       const Interval mine = boxes_[f.get()][d];
-      Interval i = is_pure_position(*f, definition, d) ? mine : bounds_of(definition.args[d], scope);
-      written.push_back({i.min.defined() ? i.min : mine.min, i.max.defined() ? i.max : mine.max});
+      written.push_back(is_pure_position(*f, definition, d) ? mine : bounds_of(definition.args[d], scope));
     }
-    if (s > 0) grow(f.get(), written);
+    if (s > 0) grow(f.get(), or_else(written, boxes_[f.get()]));
     for_each_expr(definition, [&](const Expr& e) {
       for (const auto& [name, footprint] : footprints(without_lets(e), scope)) {
         Symbol* symbol = footprint.symbol.raw();
-        if (symbol == f.get()) grow(f.get(), footprint.box);
+        if (symbol == f.get()) grow(f.get(), or_else(footprint.box, boxes_[f.get()]));
         else callees[symbol] = hull(callees[symbol], footprint.box);
       }
     });

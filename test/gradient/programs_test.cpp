@@ -230,16 +230,108 @@ TEST_F(Programs, SummedAreaTable) {
   expect_gradient(loss, image);
 }
 
-TEST_F(Programs, RecursionInTimeOverAStencil) {
+TEST_F(Programs, RecurrenceInTime) {
   Func u("u");
   RDom r(0, 4);
   u(x, t) = 0.0f;
   u(x, 0) = a(clamp(x, 0, 8));
-  Expr left = u(clamp(x - 1, 0, 8), r);
-  (void)left;
   u(x, r + 1) = u(x, r) + 0.25f * sin(u(x, r)) * cast<float>(r + 1);
   Func loss = weighted_sum(u, {9, 5});
   expect_gradient(loss, a);
+}
+
+TEST_F(Programs, DiffusionInTimeOverAStencil) {
+  Func u("u");
+  RDom r(0, 9, 0, 4);
+  u(x, t) = 0.0f;
+  u(x, 0) = a(clamp(x, 0, 8));
+  Expr left = u(clamp(r.x - 1, 0, 8), r.y), right = u(clamp(r.x + 1, 0, 8), r.y), mid = u(r.x, r.y);
+  u(r.x, r.y + 1) = mid + 0.25f * (left - 2.0f * mid + right) + 0.125f * mid * left;
+  Func loss = weighted_sum(u, {9, 5});
+  expect_gradient(loss, a);
+}
+
+TEST_F(Programs, CoupledTupleRecurrence) {
+  Func s("s");
+  RDom r(0, 6);
+  s(t) = Tuple(0.5f, a(0));
+  s(r + 1) = Tuple(s(r)[0] + 0.25f * s(r)[1], s(r)[1] - 0.25f * sin(s(r)[0]) * a(r));
+  Func last("last");
+  last(x) = s(x)[0] * s(x)[1] + s(x)[1];
+  Func loss = weighted_sum(last, {7});
+  expect_gradient(loss, a);
+}
+
+TEST_F(Programs, MovingAverageInPlaceReadsOldAndNewValues) {
+  Func f("f");
+  RDom r(1, 7);
+  f(x) = a(x) * a(x);
+  f(r) = 0.5f * f(r - 1) + 0.25f * f(r) + 0.25f * f(r + 1);
+  Func loss = weighted_sum(f, {8});
+  expect_gradient(loss, a);
+}
+
+TEST_F(Programs, MaskedOverwrite) {
+  Func f("f");
+  RDom r(0, 9);
+  r.where(a(r) > 1.0f);
+  f(x) = a(x) * 2.0f;
+  f(r) = a(8 - r) * 3.0f;
+  Func loss = weighted_sum(f, {9});
+  expect_gradient(loss, a);
+}
+
+TEST_F(Programs, UpdateOfOneColumn) {
+  Func f("f");
+  f(x, y) = image(x, y);
+  f(2, y) += image(1, y) * image(2, y);
+  f(x, 3) = 2.0f * f(x, 3);
+  Func loss = weighted_sum(f, {7, 6});
+  expect_gradient(loss, image);
+}
+
+TEST_F(Programs, DeepChainOfStencilsIsNotInlined) {
+  std::vector<Func> chain;
+  Buffer<float> wide = random_image({70}, 0.25, 2, 21);
+  for (int i = 0; i < 24; ++i) {
+    Func f("stage");
+    auto at = [&](const Expr& p) { return i == 0 ? Expr(wide(p)) : Expr(chain.back()(p)); };
+    f(x) = (at(x) + at(x + 1) * 0.5f + at(x + 2)) * 0.4f;
+    f.compute_root();
+    chain.push_back(f);
+  }
+  Func loss = weighted_sum(chain.back(), {9});
+  Derivative d = propagate_adjoints(loss);
+  expect_machine_code_agrees(d(wide), {{0}, {57}});
+}
+
+TEST_F(Programs, ScalarParameterSumsInParts) {
+  Param<float> gain("gain", 0.75f);
+  Func f("f"), loss("loss");
+  RDom r(0, 64, 0, 48);
+  f(x, y) = cast<float>(x + 2 * y) * gain * gain;
+  loss() = 0.0f;
+  loss() += f(r.x, r.y);
+  Derivative d = propagate_adjoints(loss);
+  EXPECT_NE(d.explain().find("privatised"), std::string::npos) << d.explain();
+  double expected = 0;
+  for (int j = 0; j < 48; ++j) {
+    for (int i = 0; i < 64; ++i) expected += (i + 2 * j) * 1.5;
+  }
+  EXPECT_NEAR(evaluate_scalar(d(gain)), expected, 1e-6 * expected);
+  expect_machine_code_agrees(d(gain), {{}, {}});
+}
+
+TEST_F(Programs, PrivatisedScatterIsTheSameForEveryNumberOfThreads) {
+  Buffer<float> table = random_image({16}, 0.25, 2, 3), big = random_image({200, 100}, 0.05, 3.9, 4);
+  Func f("f"), loss("loss");
+  RDom r(0, 200, 0, 100);
+  f(x, y) = table(clamp(cast<int>(big(x, y) * 4.0f), 0, 15)) * big(x, y);
+  loss() = 0.0f;
+  loss() += f(r.x, r.y) * f(r.x, r.y);
+  Derivative d = propagate_adjoints(loss);
+  EXPECT_NE(d.explain().find("privatised"), std::string::npos) << d.explain();
+  expect_machine_code_agrees(d(table), {{0}, {16}});
 }
 
 TEST_F(Programs, MaximumAndMinimumSelectTheirWinner) {
