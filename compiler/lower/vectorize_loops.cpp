@@ -266,29 +266,29 @@ class LoopVectorizer {
     if (!branch.defined()) return branch;
     Expr outer = widen_.mask();
     Expr mask = outer.defined() ? binary(Kind::And, outer, condition) : condition;
-    bool must_run_somewhere = needs_an_active_lane(branch);
     conditions_.push_back(scalar_condition);
-    widen_.set_mask(mask);  // forgets what was widened while the branch's lets were not bound yet
+    widen_.set_mask(mask);
     Stmt body = visit(branch);
     widen_.set_mask(outer);
     conditions_.pop_back();
-    if (!body.defined() || !must_run_somewhere) return body;
+    if (!body.defined() || !needs_an_active_lane(body)) return body;
     return make_if(make_vector_reduce(ReduceOp::Or, mask, 1), body);
   }
 
-  // Loads that do not vary are not predicated, and loops and reductions are not worth running for nobody.
-  bool needs_an_active_lane(const Stmt& branch) {
+  // In what a branch has become: accesses that did not vary have no predicate, and loops are not worth running for
+  // nobody.
+  static bool needs_an_active_lane(const Stmt& branch) {
     bool found = false;
     walk(
         branch,
         [&](const Expr& e) {
           const Load* load = e.as<Load>();
-          found |= load && !varies(e);
+          found |= load && !load->predicate.defined();
           return !found;
         },
         [&](const Stmt& s) {
           const Store* store = s.as<Store>();
-          found |= s.kind() == Kind::For || (store && !varies(store->index));
+          found |= s.kind() == Kind::For || (store && !store->predicate.defined());
           return !found;
         });
     return found;
