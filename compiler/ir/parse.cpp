@@ -17,7 +17,7 @@ namespace retrograde::ir {
 namespace {
 
 // The C++ stack bounds how deep a text may nest.
-constexpr int max_depth = 4000;
+constexpr int max_depth = 2000;
 
 class Parser {
  public:
