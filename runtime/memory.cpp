@@ -42,8 +42,15 @@ size_t capacity_for(size_t bytes) {
                              : round_up(bytes + alignment, page_bytes) - alignment;
 }
 
+size_t machine_bytes() {
+  const long pages = sysconf(_SC_PHYS_PAGES), bytes = sysconf(_SC_PAGESIZE);
+  return pages > 0 && bytes > 0 ? static_cast<size_t>(pages) * static_cast<size_t>(bytes) : size_t{4} << 30;
+}
+
+// Systems that overcommit would map a block larger than the machine's memory, and kill the process when it is filled.
 void *system_malloc(size_t capacity) {
   const size_t bytes = capacity + alignment;
+  if (bytes >= small_bytes && bytes > machine_bytes()) return nullptr;
   const bool huge = bytes >= 4 * huge_page_bytes;
   void *allocation = nullptr;
   if (posix_memalign(&allocation, huge ? huge_page_bytes : alignment, bytes) != 0) return nullptr;
@@ -56,12 +63,6 @@ void *system_malloc(size_t capacity) {
 }
 
 void system_free(void *block) { std::free(header_of(block)->allocation); }
-
-size_t default_limit() {
-  const long pages = sysconf(_SC_PHYS_PAGES), bytes = sysconf(_SC_PAGESIZE);
-  return pages > 0 && bytes > 0 ? static_cast<size_t>(pages) / 4 * static_cast<size_t>(bytes)
-                                : size_t{1} << 30;
-}
 
 class Pool {
  public:
@@ -125,7 +126,7 @@ class Pool {
   std::mutex mutex_;
   std::vector<void *> blocks_;  // oldest first
   size_t held_ = 0;
-  size_t limit_ = default_limit();
+  size_t limit_ = machine_bytes() / 4;
 };
 
 Pool &pool() {
@@ -200,4 +201,8 @@ void retrograde_free(retrograde_context *context, void *block) {
   if (!block) return;
   context && context->free_handler ? context->free_handler(context, block)
                                    : retrograde_pool_free(block);
+}
+
+void retrograde_free_all(retrograde_context *context, void **blocks, int64_t count) {
+  while (count > 0) retrograde_free(context, blocks[--count]);
 }

@@ -2,16 +2,11 @@
 //
 // Why every lower iteration runs: an iteration is skipped only when one below it has failed, so the
 // lowest of all failing iterations is never skipped, and no other can take its place.
-#include <oneapi/tbb/blocked_range.h>
-#include <oneapi/tbb/parallel_for.h>
-#include <oneapi/tbb/task_arena.h>
-
 #include <atomic>
-#include <map>
-#include <memory>
 #include <mutex>
 
 #include "report.h"
+#include "threads.h"
 
 namespace retrograde::runtime {
 namespace {
@@ -70,37 +65,16 @@ struct Loop {
     fence.fetch_add(1, std::memory_order_release);
   }
 
-  void run_parallel() {
-    // Grain 1 and TBB's auto partitioner: iterations are rows or tiles, each worth far more than a
-    // task; ranges split further only where a thread runs dry.
+  int32_t run_all() {
     fence.store(1, std::memory_order_release);
-    tbb::parallel_for(tbb::blocked_range<int64_t>(0, extent),
-                      [this](const tbb::blocked_range<int64_t> &range) {
-                        run_range(range.begin(), range.end());
-                      });
+    const auto run_part = [](void *loop, int64_t begin, int64_t end) {
+      static_cast<Loop *>(loop)->run_range(begin, end);
+    };
+    run_on_threads(extent, context ? context->thread_limit : 0, run_part, this);
     fence.load(std::memory_order_acquire);
+    return failures.report_to(context);
   }
 };
-
-// Arenas cost threads' attention to create, so there is one for each limit ever asked for.
-tbb::task_arena &arena_of(int32_t thread_limit) {
-  static std::mutex mutex;
-  static auto &arenas = *new std::map<int32_t, std::unique_ptr<tbb::task_arena>>;  // outlives TBB
-  const std::lock_guard lock(mutex);
-  auto &arena = arenas[thread_limit];
-  if (!arena) arena = std::make_unique<tbb::task_arena>(thread_limit);
-  return *arena;
-}
-
-void run_limited(Loop &loop, int32_t thread_limit) {
-  if (thread_limit == 1 || loop.extent == 1) {
-    loop.run_range(0, loop.extent);
-  } else if (thread_limit <= 0 || tbb::this_task_arena::max_concurrency() <= thread_limit) {
-    loop.run_parallel();
-  } else {
-    arena_of(thread_limit).execute([&] { loop.run_parallel(); });
-  }
-}
 
 }  // namespace
 }  // namespace retrograde::runtime
@@ -111,8 +85,7 @@ int32_t retrograde_parallel_for(retrograde_context *context, retrograde_task tas
   if (extent <= 0) return 0;
   try {
     Loop loop{context, task, min, extent, closure, {}, {}};
-    retrograde::runtime::run_limited(loop, context ? context->thread_limit : 0);
-    return loop.failures.report_to(context);
+    return loop.run_all();
   } catch (...) {  // TBB could not start: no memory or no threads
     return retrograde_report_error(context, retrograde_error_out_of_memory,
                                    "cannot run a parallel loop of %i iterations: the thread pool has "

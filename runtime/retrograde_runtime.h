@@ -87,6 +87,8 @@ int32_t retrograde_allocation_error(retrograde_context *, const char *name, int6
                                     int64_t element_bytes);
 /* Null is allowed. */
 void retrograde_free(retrograde_context *, void *block);
+/* Frees those of the blocks that are not null, the last first. */
+void retrograde_free_all(retrograde_context *, void **blocks, int64_t count);
 
 /* Reports an error and returns its code. The format is text with the fields of
  * retrograde_format_message. */

@@ -30,7 +30,7 @@ class FunctionGenerator {
   // Memory that loads and stores name.
   struct Storage {
     Value *base = nullptr;              // of element 0
-    llvm::AllocaInst *owned = nullptr;  // slot of a heap block to free, null once freed; null when not ours to free
+    Value *owned = nullptr;             // slot of a heap block to free, null once freed; null when not ours to free
     llvm::MDNode *alias = nullptr;      // what else it may overlap: only memory of the same tag
   };
 
@@ -65,7 +65,8 @@ class FunctionGenerator {
     llvm::BasicBlock *entry = nullptr;       // allocas go here
     llvm::BasicBlock *error_exit = nullptr;  // frees what is owned, returns the code
     llvm::PHINode *error_code = nullptr;
-    std::vector<llvm::AllocaInst *> owned_slots;
+    llvm::AllocaInst *owned_slots = nullptr;  // an array of pointers, as long as the function needs
+    int64_t owned_count = 0;
     std::vector<MemoFrame> memo;
     std::unordered_map<std::string, Value *> variables;
     std::unordered_map<std::string, Value *> indices;  // int32 variables as 64-bit integers, see index64
@@ -89,6 +90,7 @@ class FunctionGenerator {
   void serial_loop(const ir::For &s);
   Storage allocate_on_stack(const ir::Allocate &s, int64_t elements);
   Storage allocate_on_heap(const ir::Allocate &s);
+  Value *new_owned_slot();
   void free_owned(Storage &storage);
   void bind_arguments();
   void make_argv_wrapper(llvm::Function *function);

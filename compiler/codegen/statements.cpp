@@ -1,8 +1,9 @@
 // Functions, loops, branches, allocations, assertions.
 //
 // Leaving early: every failure jumps to one block of its function, which frees the heap blocks that are still held and
-// returns the code. Each Allocate keeps its block in a slot of the stack that is null before and after; LLVM makes
-// registers of the slots.
+// returns the code. Each Allocate keeps its block in a slot of an array on the stack, null before and after. The array
+// is memory for good, because the runtime gets its address: in registers, n slots that are alive at n failures would
+// be n^2 copies.
 #include <llvm/IR/MDBuilder.h>
 
 #include "codegen/function_generator.h"
@@ -44,15 +45,21 @@ void FunctionGenerator::begin_function(llvm::Function *function) {
 
 void FunctionGenerator::finish_function() {
   b_.CreateRet(b_.getInt32(0));
+  Value *count = b_.getInt64(static_cast<uint64_t>(frame_.owned_count));
   if (frame_.error_exit) {
     b_.SetInsertPoint(frame_.error_exit);
-    const auto free = runtime_function("retrograde_free", b_.getVoidTy(), {b_.getPtrTy(), b_.getPtrTy()});
-    for (size_t i = frame_.owned_slots.size(); i-- > 0;) {
-      b_.CreateCall(free, {frame_.context, b_.CreateLoad(b_.getPtrTy(), frame_.owned_slots[i])});
+    if (frame_.owned_slots) {
+      const auto free_all =
+          runtime_function("retrograde_free_all", b_.getVoidTy(), {b_.getPtrTy(), b_.getPtrTy(), b_.getInt64Ty()});
+      b_.CreateCall(free_all, {frame_.context, frame_.owned_slots, count});
     }
     b_.CreateRet(frame_.error_code);
   }
   b_.SetInsertPoint(frame_.entry);
+  if (frame_.owned_slots) {
+    frame_.owned_slots->setOperand(0, count);
+    b_.CreateMemSet(frame_.owned_slots, b_.getInt8(0), static_cast<uint64_t>(8 * frame_.owned_count), llvm::Align(8));
+  }
   b_.CreateBr(&*std::next(frame_.function->begin()));
 }
 
@@ -292,15 +299,14 @@ FunctionGenerator::Storage FunctionGenerator::allocate_on_heap(const Allocate &s
         runtime_function("retrograde_allocation_error", b_.getInt32Ty(), {pointer, pointer, int64, int64});
     return b_.CreateCall(error, {frame_.context, string_constant(s.name), elements, element_bytes});
   });
-  llvm::AllocaInst *slot = entry_alloca(pointer, 1, s.name + ".owned");
-  {
-    const llvm::IRBuilderBase::InsertPointGuard guard(b_);
-    b_.SetInsertPoint(frame_.entry);
-    b_.CreateStore(null, slot);
-  }
+  Value *slot = new_owned_slot();
   b_.CreateStore(block, slot);
-  frame_.owned_slots.push_back(slot);
   return {block, slot, alias_tag(s.name)};
+}
+
+Value *FunctionGenerator::new_owned_slot() {
+  if (!frame_.owned_slots) frame_.owned_slots = entry_alloca(b_.getPtrTy(), 1, "owned");
+  return b_.CreateConstGEP1_64(b_.getPtrTy(), frame_.owned_slots, static_cast<uint64_t>(frame_.owned_count++));
 }
 
 void FunctionGenerator::free_owned(Storage &owned) {

@@ -26,6 +26,7 @@ void add_runtime(Table &table) {
   table["retrograde_allocate"] = pointer(retrograde_allocate);
   table["retrograde_allocation_error"] = pointer(retrograde_allocation_error);
   table["retrograde_free"] = pointer(retrograde_free);
+  table["retrograde_free_all"] = pointer(retrograde_free_all);
   table["retrograde_report_error"] = pointer(retrograde_report_error);
   table["retrograde_print"] = pointer(retrograde_print);
 }
