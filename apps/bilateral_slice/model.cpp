@@ -58,9 +58,10 @@ void Model::define_slice(const Func& pixels) {
                               along_y * affine(i, o, gz, gx, y / height + 1);
 
   // What node r, the one before (0) or after (1) pixel x, adds to a coefficient.
+  const Expr nearest = lang::unsafe_promise_clamped(layer(x, y) + k, 0, shape.grid_z - 1);
   const auto at_node = [&](const Expr& coefficient, const Expr& r) {
     return lang::select(r == 0, number(1) - along_x, along_x) *
-           row_grid(coefficient, o, layer(x, y) + k, dialect::node(x, width, r, shape.grid_x), y);
+           row_grid(coefficient, o, nearest, dialect::node(x, width, r, shape.grid_x), y);
   };
   plane(x, y, o, k) = number(0);
   if (dialect::stage_transforms) {

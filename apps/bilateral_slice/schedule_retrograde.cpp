@@ -85,25 +85,56 @@ void schedule_forward(Model& m) {
   m.row_loss.compute_root().update().parallel(m.y);
 }
 
+// A pixel adds to four transforms: layers k = 0, 1 of the nodes before and after it. The reduction
+// is over the cell's pixels, k and the node, in this order.
+void schedule_row_gradient(const Model& m, Func rows) {
+  rows.compute_root().bound(m.i, 0, 4).bound(m.o, 0, 3).vectorize(m.i).unroll(m.o).parallel(m.y);
+  const auto r = rows.rvars(0);
+  rows.update()
+      .reorder(m.i, m.o, r[1], r[2], r[0], m.gx, m.y)
+      .vectorize(m.i)
+      .unroll(m.o)
+      .unroll(r[1])
+      .unroll(r[2])
+      .parallel(m.y);
+}
+
+void schedule_grid_gradient(const Model& m, Func grid) {
+  grid.compute_root().bound(m.i, 0, 4).bound(m.o, 0, 3).vectorize(m.i).parallel(m.gy);
+  for (int u = 0; u < grid.num_update_definitions(); ++u) {
+    grid.update(u).reorder(reductions_inside(grid, u, {m.gx, m.gy}));
+    grid.update(u).reorder(m.i, m.o, m.gz).vectorize(m.i).unroll(m.o).parallel(m.gy);
+  }
+}
+
+void schedule_guide_gradient(TrainingPipeline& t) {
+  const Model& m = t.model;
+  const Func guide = t.adjoints(m.guide), light = t.adjoints(m.light), depth = t.adjoints(m.depth);
+  store_rows(guide, m.x, m.y);
+  store_rows(light, m.x, m.y);
+  unroll_reduction(light, 0, {m.x, m.y});
+  Func(depth).compute_at(guide, m.y);
+  vectorize_all(depth, m.x);
+  unroll_reduction(depth, 0, {m.x, m.y});
+
+  Func slopes = t.adjoints(m.row_slopes), mixture = t.adjoints(m.row_mixture);
+  slopes.compute_root().bound(m.k, 0, m.shape.knots).vectorize(m.k).parallel(m.y);
+  slopes.update().reorder(m.k, slopes.rvars(0)[0], m.y).vectorize(m.k).parallel(m.y);
+  mixture.compute_root().bound(m.i, 0, 4).vectorize(m.i).parallel(m.y);
+  mixture.update().reorder(m.i, mixture.rvars(0)[0], m.y).vectorize(m.i).parallel(m.y);
+  t.mix.gradient.compute_root();
+  t.curve.gradient.compute_root();
+}
+
 void schedule_backward(TrainingPipeline& t) {
-  Model& m = t.model;
+  const Model& m = t.model;
+  t.adjoints(m.row_loss).compute_root();
   store_rows(t.adjoints(m.result), m.x, m.y);
   store_rows(t.adjoints(m.plane), m.x, m.y);
-
-  Func rows = t.adjoints(m.row_grid);
-  rows.compute_root().bound(m.i, 0, 4).bound(m.o, 0, 3).vectorize(m.i).parallel(m.y);
-  for (int u = 0; u < rows.num_update_definitions(); ++u) {
-    std::vector<VarOrRVar> order{m.i, m.o};
-    for (const lang::RVar& r : rows.rvars(u)) order.emplace_back(r);
-    order.emplace_back(m.y);
-    rows.update(u).reorder(order).vectorize(m.i).unroll(m.o).parallel(m.y);
-  }
-  t.grid.gradient.compute_root().bound(m.i, 0, 4).bound(m.o, 0, 3).vectorize(m.i);
-  for (int u = 0; u < t.grid.gradient.num_update_definitions(); ++u) {
-    t.grid.gradient.update(u).vectorize(m.i).parallel(m.gy);
-  }
-  store_rows(t.adjoints(m.guide), m.x, m.y);
-  store_rows(t.adjoints(m.light), m.x, m.y);
+  t.adjoints(m.transform).compute_inline();
+  schedule_row_gradient(m, t.adjoints(m.row_grid));
+  schedule_grid_gradient(m, t.grid.gradient);
+  schedule_guide_gradient(t);
 }
 
 void schedule_steps(TrainingPipeline& t) {
