@@ -1,0 +1,139 @@
+#include "autodiff/default_schedule.h"
+
+#include <algorithm>
+#include <unordered_set>
+
+#include "autodiff/regions.h"
+#include "frontend/stage.h"
+#include "ir/build.h"
+#include "ir/visit.h"
+
+namespace retrograde::ir {
+
+namespace {
+
+constexpr int lanes = 16;
+// Operations up to which a value is computed again rather than stored.
+constexpr double cheap = 6;
+// One read inside a reduction counts as this many.
+constexpr double reads_of_a_reduction = 8;
+
+bool is_touched(const FuncContents& f) {
+  if (f.schedule.touched) return true;
+  for (int s = 0; s < f.stage_count(); ++s) {
+    if (f.stage(s).schedule.touched) return true;
+  }
+  return false;
+}
+
+struct Use {
+  double reads = 0;
+  double operations = 0;  // of one value, with what is inlined into it
+};
+
+class Chooser {
+ public:
+  explicit Chooser(const std::vector<FuncPtr>& outputs) : outputs_(outputs), order_(topological_order(outputs)) {}
+
+  DefaultSchedules choose() {
+    bool differentiated = std::any_of(order_.begin(), order_.end(), is_adjoint);
+    if (!differentiated) return {};
+    for (const FuncPtr& f : order_) count_reads(*f);
+    for (const FuncPtr& f : order_) {  // producers first: the cost of what is inlined is known
+      uses_[f.get()].operations = operations(*f);
+      if (is_touched(*f)) continue;
+      bool stored = is_output(f) || !f->is_pure() || is_worth_storing(uses_[f.get()]);
+      if (stored) result_[f.get()] = stored_schedule(*f);
+    }
+    return std::move(result_);
+  }
+
+ private:
+  static bool is_adjoint(const FuncPtr& f) { return dynamic_cast<const AdjointContents*>(f.get()) != nullptr; }
+  bool is_output(const FuncPtr& f) const { return std::find(outputs_.begin(), outputs_.end(), f) != outputs_.end(); }
+  static bool is_worth_storing(const Use& use) { return use.reads > 1.5 && use.operations > cheap; }
+
+  void count_reads(const FuncContents& f) {
+    for (int s = 0; s < f.stage_count(); ++s) {
+      double weight = f.stage(s).rvars.empty() ? 1 : reads_of_a_reduction;
+      std::unordered_set<const ExprNode*> seen;
+      for_each_expr(f.stage(s), [&](const Expr& root) {
+        walk(root, [&](const Expr& e) {
+          if (!seen.insert(e.get()).second) return false;
+          const auto* call = e.as<Call>();
+          if (call && call->call_type == CallType::Func && call->symbol.raw() != &f) {
+            uses_[call->symbol.raw()].reads += weight;
+          }
+          return true;
+        });
+      });
+    }
+  }
+
+  double operations(const FuncContents& f) const {
+    double total = 0;
+    std::unordered_set<const ExprNode*> seen;
+    for (const Expr& value : f.pure->values) {
+      walk(value, [&](const Expr& e) {
+        if (!seen.insert(e.get()).second) return false;
+        total += cost_of(e);
+        return true;
+      });
+    }
+    return total;
+  }
+  double cost_of(const Expr& e) const {
+    const auto* call = e.as<Call>();
+    if (!call) return e.as<Binary>() || e.as<Select>() || e.as<Cast>() ? (e.type().is_float() ? 1 : 0.25) : 0;
+    if (call->call_type != CallType::Func) return call->call_type == CallType::Operator ? 4 : 1;
+    auto found = uses_.find(call->symbol.raw());
+    auto callee = std::dynamic_pointer_cast<FuncContents>(call->symbol.lock());
+    bool stored = !callee || !callee->is_pure() || result_.contains(callee.get()) ||
+                  callee->schedule.compute_level.kind != LoopLevel::Kind::Inlined;
+    return stored || found == uses_.end() ? 1 : found->second.operations;
+  }
+
+  static ChosenSchedule stored_schedule(const FuncContents& f) {
+    auto scratch = std::make_shared<FuncContents>(f);
+    ChosenSchedule result{f.schedule, {}};
+    result.func.compute_level.kind = result.func.store_level.kind = LoopLevel::Kind::Root;
+    for (int s = 0; s < f.stage_count(); ++s) {
+      schedule_stage(scratch, s);
+      result.stages.push_back(scratch->stage(s).schedule);
+    }
+    return result;
+  }
+
+  // Pure dimensions only: their iterations are independent whatever the stage does.
+  static void schedule_stage(const FuncPtr& f, int s) {
+    Stage stage(f, s);
+    std::vector<size_t> pure;
+    for (size_t d = 0; d < f->args.size(); ++d) {
+      if (is_pure_position(*f, f->stage(s), d)) pure.push_back(d);
+    }
+    if (pure.empty()) return;
+    Var outermost(f->args[pure.back()]);
+    bool reduces = !f->stage(s).rvars.empty();
+    if (pure.size() > 1 || (reduces && pure[0] != 0)) stage.parallel(outermost);
+    if (pure[0] != 0) return;
+    Var innermost(f->args[0]);
+    if (pure.size() > 1) {
+      stage.vectorize(innermost, lanes, TailStrategy::GuardWithIf);
+    } else if (reduces) {
+      stage.parallel(innermost);  // few elements, much work for each
+    } else {
+      stage.vectorize(innermost, lanes, TailStrategy::GuardWithIf);
+    }
+  }
+
+  const std::vector<FuncPtr>& outputs_;
+  std::vector<FuncPtr> order_;
+  std::unordered_map<const Symbol*, Use> uses_;
+  DefaultSchedules result_;
+};
+
+}  // namespace
+
+DefaultSchedules default_schedules(const std::vector<FuncPtr>& outputs) { return Chooser(outputs).choose(); }
+
+}  // namespace retrograde::ir
