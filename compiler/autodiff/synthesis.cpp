@@ -164,6 +164,13 @@ class Synthesis {
     }
   }
 
+  bool is_inside(const Expr& index, const FuncContents& f, int stage, const Interval& range) const {
+    Scope<Interval> scope;
+    for (const LoopVariable& v : regions_.domain(f, stage).vars) scope.push(v.name, {v.min, v.max});
+    Interval found = bounds_of(index, scope);
+    return found.is_bounded() && can_prove(found.min >= range.min) && can_prove(found.max <= range.max);
+  }
+
   // The adjoint where the stage writes. A place that depends on data may lie outside of all that is read: 0 there.
   Expr adjoint_at(const FuncContents& f, int stage, const FuncPtr& adjoint, int k) const {
     std::vector<Expr> place;
@@ -176,7 +183,7 @@ class Synthesis {
         const auto* call = e.as<Call>();
         return !(depends_on_data |= call && call->call_type != CallType::Operator);
       });
-      if (depends_on_data && box[d].is_bounded()) {
+      if (depends_on_data && box[d].is_bounded() && !is_inside(index, f, stage, box[d])) {
         inside = inside && index >= box[d].min && index <= box[d].max;
         index = clamp(index, box[d].min, box[d].max);
       }

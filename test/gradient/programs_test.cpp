@@ -119,7 +119,7 @@ TEST_F(Programs, HistogramOfDataDependentPlaces) {
   Func h("h");
   RDom r(0, 7, 0, 6);
   h(x) = 0.0f;
-  h(cast<int>(image(r.x, r.y) * 4.0f)) += image(r.x, r.y) * image(r.x, r.y);
+  h(clamp(cast<int>(image(r.x, r.y) * 4.0f), 0, 7)) += image(r.x, r.y) * image(r.x, r.y);
   Func loss = weighted_sum(h, {8});
   expect_gradient(loss, image);
 }
@@ -288,6 +288,30 @@ TEST_F(Programs, UpdateOfOneColumn) {
   f(x, 3) = 2.0f * f(x, 3);
   Func loss = weighted_sum(f, {7, 6});
   expect_gradient(loss, image);
+}
+
+// Sizes are known when the pipeline is called only.
+TEST_F(Programs, ParametricSizes) {
+  ImageParam in(Float(32), 2, "in");
+  in.set(image);
+  Buffer<float> kernel = random_image({3, 3}, -1, 1, 8);
+  Func bounded = BoundaryConditions::repeat_edge(in), blur("blur"), down("down"), loss("loss");
+  RDom k(0, 3, 0, 3), all(0, in.width(), 0, in.height() / 2);
+  blur(x, y) = 0.0f;
+  blur(x, y) += bounded(x + k.x - 1, y + k.y - 1) * kernel(k.x, k.y);
+  down(x, y) = blur(x, 2 * y) * blur(x, 2 * y + 1);
+  loss() = 0.0f;
+  loss() += down(all.x, all.y) * cast<float>(all.x + 2 * all.y + 1);
+  Derivative d = propagate_adjoints(loss);
+  expect_gradient(loss, d, kernel);
+  Func gradient = d(in);
+  oracle::Region region{{0, 0}, {7, 6}};
+  oracle::Array found = evaluate(gradient, region);
+  region.for_each([&](const std::vector<int>& point) {
+    double expected = difference(loss, image, point);
+    EXPECT_NEAR(found.at(point).scalar.as_double(), expected, 1e-5 * (1 + std::abs(expected)));
+  });
+  expect_machine_code_agrees(gradient, region);
 }
 
 TEST_F(Programs, DeepChainOfStencilsIsNotInlined) {
