@@ -1,0 +1,168 @@
+// Schedules that exercise the passes over loops, end to end: the scheduled pipeline gives what the unscheduled one
+// gives, bit for bit. Sizes are odd, so that every split has a tail.
+#include <gtest/gtest.h>
+
+#include <functional>
+#include <retrograde/retrograde.h>
+
+namespace retrograde {
+namespace {
+
+constexpr int width = 37, height = 29;
+
+class LoopSchedules : public testing::Test {
+ protected:
+  LoopSchedules() : input(width, height) {
+    for (int j = 0; j < height; ++j) {
+      for (int i = 0; i < width; ++i) input(i, j) = static_cast<float>((i * 37 + j * 11) % 53) * 0.25f - 3;
+    }
+  }
+
+  Func edge() { return BoundaryConditions::repeat_edge(input); }
+
+  // `make(true)` is the same program with a schedule.
+  template <class T>
+  static void expect_same(const std::function<Func(bool)>& make, int w = width, int h = height) {
+    Buffer<T> expected = make(false).realize({w, h}), found = make(true).realize({w, h});
+    for (int j = 0; j < h; ++j) {
+      for (int i = 0; i < w; ++i) ASSERT_EQ(expected(i, j), found(i, j)) << "at " << i << ", " << j;
+    }
+  }
+
+  Buffer<float> input;
+  Var x{"x"}, y{"y"}, xi{"xi"}, yi{"yi"}, xo{"xo"}, yo{"yo"}, i{"i"};
+};
+
+TEST_F(LoopSchedules, VectorsInTwoDimensions) {
+  expect_same<float>([&](bool scheduled) {
+    Func c = edge(), f("f");
+    f(x, y) = c(x - 1, y) * 2.0f + c(x + 1, y + 1) * c(y, x);
+    if (scheduled) f.tile(x, y, xo, yo, xi, yi, 4, 2, TailStrategy::GuardWithIf).vectorize(xi).vectorize(yi);
+    return f;
+  });
+}
+
+TEST_F(LoopSchedules, UnrolledRowsOfShiftedVectors) {
+  expect_same<float>([&](bool scheduled) {
+    Func c = edge(), f("f");
+    f(x, y) = c(x - 1, y) * 2.0f + c(x + 1, y + 1) * c(y, x);
+    if (scheduled) f.tile(x, y, xo, yo, xi, yi, 8, 4).vectorize(xi).unroll(yi).parallel(yo);
+    return f;
+  });
+}
+
+TEST_F(LoopSchedules, TilesOfEveryBoundaryCondition) {
+  std::vector<std::function<Func()>> conditions = {
+      [&] { return BoundaryConditions::repeat_edge(input); },
+      [&] { return BoundaryConditions::constant_exterior(input, 5.0f); },
+      [&] { return BoundaryConditions::mirror_image(input); },
+      [&] { return BoundaryConditions::mirror_interior(input); },
+      [&] { return BoundaryConditions::repeat_image(input); },
+  };
+  for (size_t k = 0; k < conditions.size(); ++k) {
+    SCOPED_TRACE(k);
+    auto make = [&](bool scheduled) {
+      Func c = conditions[k](), f("f"), g("g");
+      g(x, y) = c(x - 2, y) + c(x + 3, y - 1);
+      f(x, y) = g(x, y - 1) + g(x, y + 1) * 2.0f;
+      if (scheduled) {
+        f.tile(x, y, xo, yo, xi, yi, 16, 8, TailStrategy::GuardWithIf).vectorize(xi, 8).parallel(yo);
+        g.compute_at(f, xo).vectorize(x, 8);
+      }
+      return f;
+    };
+    expect_same<float>(make, 50, 40);  // beyond the input
+  }
+}
+
+TEST_F(LoopSchedules, LoopBoundsAndPredicatesThatVaryByLane) {
+  auto triangle = [&](bool scheduled) {
+    Func f("f");
+    RDom r(0, 40);
+    r.where(r.x < x + y % 3);
+    f(x, y) = 0;
+    f(x, y) += r.x * y;
+    if (scheduled) f.update().vectorize(x, 8);
+    return f;
+  };
+  expect_same<int>(triangle);
+  expect_same<int>([&](bool scheduled) {
+    Func f = triangle(false);
+    Func g("g");
+    g(x, y) = f(x, y);
+    if (scheduled) {
+      f.compute_root().update().vectorize(x, 8).parallel(y);
+      g.vectorize(x, 8);
+    }
+    return g;
+  });
+}
+
+TEST_F(LoopSchedules, TupleOfIndexAndMaximum) {
+  expect_same<int>([&](bool scheduled) {
+    Func c = edge(), m("m"), f("f");
+    RDom r(0, 9);
+    m(x, y) = Tuple(0, -100.0f);
+    Expr v = c(x + r.x, y);
+    m(x, y) = Tuple(select(v > m(x, y)[1], cast<int>(r.x), m(x, y)[0]), max(v, m(x, y)[1]));
+    f(x, y) = m(x, y)[0];
+    if (scheduled) {
+      m.compute_root().vectorize(x, 8);
+      m.update().reorder(x, r.x).vectorize(x, 8).parallel(y);
+    }
+    return f;
+  });
+}
+
+TEST_F(LoopSchedules, ProducerInsideVectorLanes) {
+  expect_same<float>([&](bool scheduled) {
+    Func c = edge(), g("g"), f("f");
+    g(x, y) = c(x, y) * 3.0f;
+    f(x, y) = g(x - 1, y) + g(x + 1, y);
+    if (scheduled) {
+      f.split(x, xo, xi, 8).vectorize(xi);
+      g.compute_at(f, xi);
+    }
+    return f;
+  });
+}
+
+TEST_F(LoopSchedules, GathersFromATable) {
+  expect_same<float>([&](bool scheduled) {
+    Func c = edge(), table("table"), f("f");
+    table(i) = cast<float>(i * i);
+    f(x, y) = table(clamp(cast<int>(c(x, y) * 4.0f), 0, 20)) + table(cast<int>(clamp(c(x, y), 0.0f, 1.0f) * 15.0f));
+    if (scheduled) {
+      table.compute_root().vectorize(i, 8, TailStrategy::GuardWithIf);
+      f.vectorize(x, 8).parallel(y);
+    }
+    return f;
+  });
+}
+
+TEST_F(LoopSchedules, StencilWithHoles) {
+  expect_same<float>([&](bool scheduled) {
+    Func c = edge(), f("f");
+    RDom r(-2, 5, -2, 5);
+    r.where(r.x * r.x + r.y * r.y < 5);
+    f(x, y) = 0.0f;
+    f(x, y) += c(x + r.x, y + r.y);
+    if (scheduled) {
+      f.vectorize(x, 8).parallel(y);
+      f.update().vectorize(x, 8).parallel(y).unroll(r.x);
+    }
+    return f;
+  });
+}
+
+TEST_F(LoopSchedules, NarrowTypesWrapTheSame) {
+  expect_same<uint8_t>([&](bool scheduled) {
+    Func c = edge(), f("f");
+    f(x, y) = cast<uint8_t>(cast<int>(c(x, y) * 100.0f) + x * y);
+    if (scheduled) f.vectorize(x, 16).parallel(y);
+    return f;
+  });
+}
+
+}  // namespace
+}  // namespace retrograde
