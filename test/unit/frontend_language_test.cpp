@@ -2,6 +2,8 @@
 #include <gtest/gtest.h>
 #include <retrograde/retrograde.h>
 
+#include <limits>
+
 #include "ir/equal.h"
 #include "ir/print.h"
 #include "ir/visit.h"
@@ -364,6 +366,17 @@ TEST(Parameters, FactsOfShapesAreExprs) {
 }
 
 // ---- made inside expressions ----
+
+TEST(InlineReductions, ExtremesStartFromTheLimitsOfTheType) {
+  RDom r(0, 5);
+  const auto initial = [](const Expr& e) {
+    return ir::func_of(*e.as<ir::Call>())->pure->values[0];
+  };
+  EXPECT_EQ(*ir::as_const_int(initial(maximum(cast<int8_t>(r)))), -128);
+  EXPECT_EQ(*ir::as_const_int(initial(minimum(cast<uint8_t>(r)))), 255);
+  EXPECT_EQ(*ir::as_const_float(initial(minimum(cast<float>(r)))),
+            std::numeric_limits<double>::infinity());
+}
 
 TEST(InlineReductions, SumMakesAFuncWithAnUpdate) {
   Var x("x");

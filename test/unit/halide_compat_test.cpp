@@ -233,6 +233,9 @@ TEST(HalideCompat, TargetsTypesAndErrors) {
   EXPECT_THROW(f.vectorize(Var("q"), 4), CompileError);
   EXPECT_THROW(f.realize({1, 2}), RuntimeError);
   EXPECT_THROW(f.realize({1, 2}), Halide::Error);
+  EXPECT_TRUE(Halide::exceptions_enabled());
+  Runtime::Buffer<float> both_namespaces_name_it(3);
+  EXPECT_EQ(both_namespaces_name_it.width(), 3);
 }
 
 TEST(HalideCompat, ConciseCastsAndBits) {

@@ -7,4 +7,7 @@
 // Not an alias: HalideBuffer.h opens namespace Halide for Halide::Runtime.
 namespace Halide {
 using namespace ::retrograde;
+
+// Errors are always exceptions here.
+inline bool exceptions_enabled() { return true; }
 }  // namespace Halide
