@@ -17,6 +17,10 @@ namespace {
 
 // Parts of a privatised accumulation: enough for the threads of today's machines, few enough to sum and to store.
 constexpr int part_count = 32;
+// Elements of a part's vector: neighbouring iterations accumulate apart.
+constexpr int lane_count = 16;
+// Below so many elements, with so many iterations each, the pure dimensions alone do not fill a machine.
+constexpr double few_elements = 64, many_iterations = 4096, unknown_elements = 1e9;
 
 bool is_pointwise(const Gather& g) {
   return !g.rdom && !g.scatters && std::all_of(g.pure.begin(), g.pure.end(), [](bool p) { return p; });
@@ -123,9 +127,7 @@ class Builder {
   AdjointFunc build(const std::vector<Contribution>& contributions, const std::vector<Expr>& initial) {
     define_pointwise(contributions, initial);
     for (const UpdateGroup& group : group_updates(contributions, target_.types.size())) {
-      const Gather& g = group.gather;
-      bool serial = !has_pure_dimension(g) && g.rdom && is_worth_splitting(g);
-      serial ? add_privatised(group) : add_update(group);
+      is_worth_splitting(group.gather) ? add_privatised(group) : add_update(group);
     }
     return std::move(result_);
   }
@@ -160,67 +162,112 @@ class Builder {
     result_.stages.push_back(g.scatters ? Accumulation::Scatter : Accumulation::Gather);
   }
 
-  static bool is_worth_splitting(const Gather& g) {
-    auto extent = as_const_int(g.rdom->vars.back().extent);
-    return !extent || *extent >= part_count;
+  // Whether the elements alone give too little to do in parallel, and each sums over many iterations.
+  bool is_worth_splitting(const Gather& g) const {
+    if (!g.rdom || elements_of(g) > few_elements) return false;
+    double iterations = 1;
+    for (const ReductionVariable& r : g.rdom->vars) {
+      auto extent = as_const_int(r.extent);
+      iterations *= extent ? static_cast<double>(*extent) : many_iterations;
+    }
+    return iterations >= (has_pure_dimension(g) ? many_iterations : part_count * lane_count);
+  }
+  // Elements that the pure dimensions of the update run over; a great many when unknown.
+  double elements_of(const Gather& g) const {
+    double elements = 1;
+    for (size_t d = 0; d < g.pure.size(); ++d) {
+      if (!g.pure[d]) continue;
+      if (target_.region.size() != g.pure.size()) return unknown_elements;
+      const LoopVariable& v = target_.region[d];
+      auto extent = v.min.defined() && v.max.defined() ? as_const_int(simplify(v.max - v.min + 1)) : std::nullopt;
+      elements *= extent ? static_cast<double>(*extent) : unknown_elements;
+    }
+    return elements;
   }
 
-  // parts(y..., t) accumulates the slice [t * chunk, (t + 1) * chunk) of the outermost reduction variable;
-  // adj(y...) += sum over t of parts(y..., t). A fixed element needs no y.
+  // One slice of the reduction domain, in which lane and part are fixed.
+  struct Slice {
+    std::vector<ReductionVariable> rvars;
+    Substitution place;            // reduction variable of the gather -> its value
+    std::vector<Expr> conditions;  // inside the domain
+  };
+
+  // x = (part * chunk + rho) * lanes + lane for the outermost variable when it is the innermost too; else lanes split
+  // the innermost and parts the outermost variable. Without `lane` there are no lanes. Beyond the end the place is
+  // clamped: what it reads must exist even where the condition is false.
+  static Slice slice_of(const Gather& g, const Expr& lane, const Expr& part) {
+    Slice slice;
+    slice.rvars = rvars_of(g);
+    auto rdom = std::make_shared<ReductionDomainContents>();
+    size_t last = slice.rvars.size() - 1;
+    for (size_t i = 0; i <= last; ++i) {
+      ReductionVariable& r = slice.rvars[i];
+      std::string old = r.var;
+      Expr all = r.extent, min = r.min;
+      r = {unique_name(old), make_zero(Int(32)), all};
+      if (i == 0 && lane.defined()) r.extent = simplify((r.extent + (lane_count - 1)) / lane_count);
+      if (i == last) r.extent = simplify((r.extent + (part_count - 1)) / part_count);
+      Expr at = variable(r.var, Int(32), SymbolRef(rdom));
+      if (i == last) at = part * r.extent + at;
+      if (i == 0 && lane.defined()) at = at * lane_count + lane;
+      if (i == last || (i == 0 && lane.defined())) {
+        slice.conditions.push_back(at < all);
+        at = min_of(likely(at), all - 1);
+      }
+      slice.place[old] = min + at;
+    }
+    rdom->vars = slice.rvars;
+    rdom->frozen = true;
+    return slice;
+  }
+  static Expr min_of(const Expr& a, const Expr& b) { return binary(Kind::Min, a, b); }
+
+  // parts(lane, y..., part) accumulates a slice of the reduction domain; then adj(y...) sums over lanes and parts.
+  // Elements fixed on the left-hand side need no y. A scatter has no lanes: its iterations may meet.
   void add_privatised(const UpdateGroup& group) {
     const Gather& g = group.gather;
     FuncPtr parts = std::make_shared<AdjointContents>();
     parts->name = claim_name(result_.func->name + "_parts");
-    Expr part = variable(unique_name("part"));
-    std::vector<Expr> point = g.scatters ? args_ : std::vector<Expr>{};
-    point.push_back(part);
+    Expr part = variable(unique_name("part")), lane = g.scatters ? Expr() : variable(unique_name("lane"));
     std::vector<Expr> zeros;
     for (Type t : target_.types) zeros.push_back(make_zero(t));
-    define_pure(parts, point, zeros);
+    define_pure(parts, parts_point(g, args_, lane, part), zeros);
 
-    std::vector<ReductionVariable> rvars = rvars_of(g);
-    ReductionVariable& outer = rvars.back();
-    Expr chunk = simplify((outer.extent + (part_count - 1)) / part_count);
-    Expr all = outer.extent;
-    auto rdom = std::make_shared<ReductionDomainContents>();
-    Substitution slice;
-    for (ReductionVariable& r : rvars) {
-      std::string old = r.var;
-      r.var = unique_name(r.var);
-      slice[old] = variable(r.var, Int(32), SymbolRef(rdom));
-    }
-    Expr position = part * chunk + variable(outer.var, Int(32), SymbolRef(rdom));
-    outer.extent = chunk;
-    rdom->vars = rvars;
-    rdom->frozen = true;
-    // Beyond the end the position is clamped: what it reads must exist even where the predicate is false.
-    slice[g.rdom->vars.back().var] = outer.min + min(likely(position), all - 1);
-    std::vector<Expr> predicates{position < all};
-    if (g.predicate.defined()) predicates.push_back(substitute(g.predicate, slice));
-
-    std::vector<Expr> lhs;
-    if (g.scatters) {
-      for (const Expr& e : g.lhs) lhs.push_back(substitute(e, slice));
-    }
-    lhs.push_back(part);
-    std::vector<Expr> values;
+    Slice slice = slice_of(g, lane, part);
+    if (g.predicate.defined()) slice.conditions.push_back(substitute(g.predicate, slice.place));
+    std::vector<Expr> element;
+    for (const Expr& e : g.lhs) element.push_back(substitute(e, slice.place));
+    std::vector<Expr> lhs = parts_point(g, element, lane, part), values;
     for (size_t k = 0; k < target_.types.size(); ++k) {
       Expr self = call_value(parts, lhs, static_cast<int>(k));
       const Expr& term = group.sums[k];
-      values.push_back(term.defined() ? self + cast_to(self.type(), substitute(term, slice)) : self);
+      values.push_back(term.defined() ? self + cast_to(self.type(), substitute(term, slice.place)) : self);
     }
-    append_update(parts, lhs, values, rvars, conjunction(predicates));
+    append_update(parts, lhs, values, slice.rvars, conjunction(slice.conditions));
     result_.helpers.push_back(parts);
-    sum_parts(g, parts);
+    sum_parts(g, parts, lane.defined());
   }
 
-  void sum_parts(const Gather& g, const FuncPtr& parts) {
+  // Coordinates of `parts`: the lane, the elements that a scatter reaches or the pure ones, the part.
+  static std::vector<Expr> parts_point(const Gather& g, const std::vector<Expr>& element, const Expr& lane,
+                                       const Expr& part) {
+    std::vector<Expr> point;
+    if (lane.defined()) point.push_back(lane);
+    for (size_t d = 0; d < element.size(); ++d) {
+      if (g.scatters || g.pure[d]) point.push_back(element[d]);
+    }
+    point.push_back(part);
+    return point;
+  }
+
+  void sum_parts(const Gather& g, const FuncPtr& parts, bool has_lanes) {
     auto rdom = std::make_shared<ReductionDomainContents>();
+    if (has_lanes) rdom->vars.push_back({unique_name("lane"), make_zero(Int(32)), make_const(Int(32), lane_count)});
     rdom->vars.push_back({unique_name("part"), make_zero(Int(32)), make_const(Int(32), part_count)});
     rdom->frozen = true;
+    auto rvar = [&](size_t i) { return variable(rdom->vars[i].var, Int(32), SymbolRef(rdom)); };
     const std::vector<Expr>& lhs = g.scatters ? args_ : g.lhs;
-    std::vector<Expr> point = g.scatters ? args_ : std::vector<Expr>{};
-    point.push_back(variable(rdom->vars[0].var, Int(32), SymbolRef(rdom)));
+    std::vector<Expr> point = parts_point(g, lhs, has_lanes ? rvar(0) : Expr(), rvar(rdom->vars.size() - 1));
     std::vector<Expr> values;
     for (size_t k = 0; k < target_.types.size(); ++k) {
       values.push_back(call_value(result_.func, lhs, static_cast<int>(k)) + call_value(parts, point, static_cast<int>(k)));

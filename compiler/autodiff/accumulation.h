@@ -4,8 +4,9 @@
 // definitions; those with the same left-hand side, reduction domain and predicate share one. Who owns an element:
 //   gather      each element is written by the iterations of its own pure variables only: race-free in parallel.
 //   scatter     an index depends on data: serial inside each element of the pure dimensions.
-//   privatised  no pure dimension is left: a fixed number of parts of the outermost reduction variable accumulate
-//               apart, in a Func of their own, and are then summed in order. The result does not depend on threads.
+//   privatised  few elements are left to run over in parallel: a fixed number of parts of the outermost reduction
+//               variable, and lanes of the innermost, accumulate apart in a Func of their own, and are then summed in
+//               order. The result does not depend on the number of threads.
 #pragma once
 
 #include <string>

@@ -249,6 +249,11 @@ class Synthesis {
     explain(Explanation::Kind::Built, primal,
             text(quoted(adjoint.func->name), ", ", gathers, " gathers over reduction domains, ", scatters,
                  " scatters inside pure dimensions, ", privatised, " privatised sums"));
+    if (gathers + scatters + privatised > 0) {
+      explain(Explanation::Kind::Performance, primal,
+              text("unless a directive schedules ", quoted(adjoint.func->name),
+                   ", it is computed at root, in parallel over its outermost dimension, in vectors along its first"));
+    }
     if (privatised > 0) {
       explain(Explanation::Kind::Privatised, primal, "accumulated in a fixed number of parts, which are summed in order");
     }
