@@ -45,11 +45,12 @@ void verify(const llvm::Module &module) {
 // One compilation: nothing in it is shared with another.
 class Compilation {
  public:
-  Compilation(const std::vector<ir::LoweredFunction> &functions, const Options &options)
+  // Names of values cost time, and only people read them.
+  Compilation(const std::vector<ir::LoweredFunction> &functions, const Options &options, bool keep_names)
       : machine_(machine_for(options.target, options.tune_for_host)),
         target_machine_(make_target_machine(machine_)),
         module_(functions.empty() ? "retrograde" : functions[0].name, context_) {
-    context_.setDiscardValueNames(false);
+    context_.setDiscardValueNames(!keep_names);
     Stopwatch watch;
     module_.setTargetTriple(machine_.triple);
     module_.setDataLayout(target_machine_->createDataLayout());
@@ -102,17 +103,18 @@ class Compilation {
 
 // Compiles on a deep stack and gives what `use` makes of the compilation.
 template <typename Use>
-static auto compile(const std::vector<ir::LoweredFunction> &functions, const Options &options, const Use &use) {
+static auto compile(const std::vector<ir::LoweredFunction> &functions, const Options &options, bool keep_names,
+                    const Use &use) {
   decltype(use(std::declval<Compilation &>())) result;
   run_on_deep_stack([&] {
-    Compilation compilation(functions, options);
+    Compilation compilation(functions, options, keep_names);
     result = use(compilation);
   });
   return result;
 }
 
 Module compile_object(const std::vector<ir::LoweredFunction> &functions, const Options &options) {
-  return compile(functions, options, [](Compilation &compilation) {
+  return compile(functions, options, false, [](Compilation &compilation) {
     Module result;
     result.externals = compilation.externals();
     const std::string bytes = compilation.emit(llvm::CodeGenFileType::ObjectFile);
@@ -127,11 +129,11 @@ Module compile_object(const ir::LoweredFunction &function, const Options &option
 }
 
 std::string compile_llvm_ir(const ir::LoweredFunction &function, const Options &options) {
-  return compile({function}, options, [](Compilation &compilation) { return compilation.print(); });
+  return compile({function}, options, true, [](Compilation &compilation) { return compilation.print(); });
 }
 
 std::string compile_assembly(const ir::LoweredFunction &function, const Options &options) {
-  return compile({function}, options,
+  return compile({function}, options, true,
                  [](Compilation &compilation) { return compilation.emit(llvm::CodeGenFileType::AssemblyFile); });
 }
 

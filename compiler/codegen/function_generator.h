@@ -67,6 +67,7 @@ class FunctionGenerator {
     llvm::PHINode *error_code = nullptr;
     llvm::AllocaInst *owned_slots = nullptr;  // an array of pointers, as long as the function needs
     int64_t owned_count = 0;
+    int64_t stack_bytes = 0;  // of allocations
     std::vector<MemoFrame> memo;
     std::unordered_map<std::string, Value *> variables;
     std::unordered_map<std::string, Value *> indices;  // int32 variables as 64-bit integers, see index64
@@ -88,6 +89,7 @@ class FunctionGenerator {
   void make(const ir::Free &s);
   void make(const ir::IfThenElse &s);
   void serial_loop(const ir::For &s);
+  bool fits_stack(const ir::Allocate &s, int64_t elements) const;
   Storage allocate_on_stack(const ir::Allocate &s, int64_t elements);
   Storage allocate_on_heap(const ir::Allocate &s);
   Value *new_owned_slot();

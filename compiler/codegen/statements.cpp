@@ -17,8 +17,13 @@ namespace retrograde::codegen {
 using namespace ir;
 
 namespace {
-constexpr int64_t max_stack_bytes = 16 << 10;        // of an allocation that may go anywhere
-constexpr int64_t max_asked_stack_bytes = 256 << 10;  // of one that asks for the stack: threads have 8 MB
+// Threads of the pool have stacks of a few MB, and an iteration may wait on top of another.
+struct StackLimit {
+  int64_t block_bytes, function_bytes;
+};
+constexpr StackLimit free_choice{16 << 10, 128 << 10};      // of allocations that may go anywhere
+constexpr StackLimit asked_for{256 << 10, 512 << 10};       // of those that ask for the stack
+constexpr int64_t stack_padding_bytes = 64;                 // readable past the end, as on the heap
 }  // namespace
 
 FunctionGenerator::FunctionGenerator(Emitter &emitter, const LoweredFunction &function)
@@ -274,8 +279,17 @@ void FunctionGenerator::serial_loop(const For &s) {
 
 // ---- allocations ----
 
+bool FunctionGenerator::fits_stack(const Allocate &s, int64_t elements) const {
+  if (s.memory == MemoryType::Heap || elements < 0) return false;
+  const StackLimit &limit = s.memory == MemoryType::Stack ? asked_for : free_choice;
+  const int64_t element_bytes = s.type.bytes() * s.type.lanes();
+  if (elements > limit.block_bytes / element_bytes) return false;
+  return frame_.stack_bytes + elements * element_bytes + stack_padding_bytes <= limit.function_bytes;
+}
+
 FunctionGenerator::Storage FunctionGenerator::allocate_on_stack(const Allocate &s, int64_t elements) {
-  const int64_t bytes = elements * s.type.bytes() * s.type.lanes() + 64;  // readable past the end, as on the heap
+  const int64_t bytes = elements * s.type.bytes() * s.type.lanes() + stack_padding_bytes;
+  frame_.stack_bytes += bytes;
   llvm::AllocaInst *block = entry_alloca(b_.getInt8Ty(), bytes, s.name);
   block->setAlignment(llvm::Align(64));
   return {block, nullptr, alias_tag(s.name)};
@@ -318,10 +332,7 @@ void FunctionGenerator::free_owned(Storage &owned) {
 
 void FunctionGenerator::make(const Allocate &s) {
   const auto elements = as_const_int(s.elements);
-  const int64_t limit = s.memory == MemoryType::Stack ? max_asked_stack_bytes : max_stack_bytes;
-  const int64_t element_bytes = s.type.bytes() * s.type.lanes();
-  const bool on_stack =
-      s.memory != MemoryType::Heap && elements && *elements >= 0 && *elements <= limit / element_bytes;
+  const bool on_stack = elements && fits_stack(s, *elements);
   frame_.storages[s.name] = on_stack ? allocate_on_stack(s, *elements) : allocate_on_heap(s);
   statement(s.body);
   free_owned(frame_.storages[s.name]);  // after a Free the slot is null, and freeing null does nothing

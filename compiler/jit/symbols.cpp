@@ -70,7 +70,8 @@ Table make_table() {
   return table;
 }
 
-// By the file that holds a known function: the process may have loaded us and SLEEF privately.
+// By the file that holds a known function: the process may have loaded us and SLEEF privately, where a search of the
+// whole process does not look. (Where the address is that of a jump inside a program, that search does find it.)
 void *sleef_library() {
   static void *const library = [] {
     Dl_info info;
@@ -80,14 +81,18 @@ void *sleef_library() {
   return library;
 }
 
+void *find_in_sleef(const char *name) {
+  void *library = sleef_library(), *address = library ? dlsym(library, name) : nullptr;
+  return address ? address : dlsym(RTLD_DEFAULT, name);
+}
+
 }  // namespace
 
 void *find_symbol(const std::string &name) {
   static const Table table = make_table();
   const auto found = table.find(name);
   if (found != table.end()) return found->second;
-  void *library = name.rfind("Sleef_", 0) == 0 ? sleef_library() : nullptr;
-  return library ? dlsym(library, name.c_str()) : nullptr;
+  return name.rfind("Sleef_", 0) == 0 ? find_in_sleef(name.c_str()) : nullptr;
 }
 
 }  // namespace retrograde::jit

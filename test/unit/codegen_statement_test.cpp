@@ -225,6 +225,39 @@ TEST(CodegenStatement, NoMemoryAtAnyPointLeaksNothing) {
   }
 }
 
+// n nested allocations, each used by a parallel loop that may fail.
+LoweredFunction nested_allocations(int n, Expr elements) {
+  LoweredFunction f;
+  f.name = "nested_allocations";
+  f.args = {output("out", Int(32)), scalar_argument("n", Int(64))};
+  Stmt body = make_store("out", make_load(Int(32), "a0", 0), 0);
+  for (int k = n - 1; k >= 0; k--) {
+    const std::string name = "a" + std::to_string(k), x = "x" + std::to_string(k);
+    const Stmt loop = make_for(x, 0, 4, ForType::Parallel, make_store(name, variable(x) + k, variable(x)));
+    body = make_allocate(name, Int(32), MemoryType::Auto, elements, make_block({loop, body}));
+  }
+  f.body = body;
+  return f;
+}
+
+TEST(CodegenStatement, CodeGrowsLinearlyWithAllocations) {
+  const auto size_for = [](int n) {
+    codegen::Options options;
+    options.target = test_target();
+    return codegen::compile_llvm_ir(nested_allocations(n, variable("n", Int(64))), options).size();
+  };
+  EXPECT_LT(static_cast<double>(size_for(60)), 4.5 * static_cast<double>(size_for(15)));
+}
+
+TEST(CodegenStatement, ManySmallAllocationsDoNotExhaustTheStack) {
+  Host host;
+  Array out(Int(32), 1);
+  int64_t count = 0;
+  ASSERT_EQ(run(nested_allocations(1000, make_const(Int(64), 4000)), {out.raw(), &count}, host), 0);
+  EXPECT_GT(host.requests, 900) << "16 MB of allocations belong on the heap";
+  EXPECT_LT(host.requests, 1000) << "the first ones belong on the stack";
+}
+
 // ---- parallel loops ----
 
 TEST(CodegenStatement, ParallelBodiesSeeWhatIsAroundThem) {
@@ -430,6 +463,20 @@ TEST(CodegenStatement, BufferFieldsAndQueries) {
   args[0] = nullptr;
   Host host;
   EXPECT_EQ(compile_test(f)->call(&host.context, args), -12);
+}
+
+TEST(CodegenStatement, AddressesOfElements) {
+  LoweredFunction f;
+  f.name = "addresses";
+  f.args = {input("in", Int(16)), output("out", UInt(64))};
+  const Expr host = call_op(Op::buffer_host, Handle(), {variable("in.buffer", Handle())});
+  const Expr third = call_op(Op::address_of, Handle(), {make_load(Int(16), "in", 3)});
+  f.body = make_block({make_store("out", reinterpret_as(UInt(64), host), 0),
+                       make_store("out", reinterpret_as(UInt(64), third), 1)});
+  Array in(Int(16), 4), out(UInt(64), 2);
+  ASSERT_EQ(call(f, {&in, &out}), 0);
+  EXPECT_EQ(out.data<uint64_t>()[0], reinterpret_cast<uintptr_t>(in.data<void>()));
+  EXPECT_EQ(out.data<uint64_t>()[1], reinterpret_cast<uintptr_t>(in.data<void>()) + 6);
 }
 
 TEST(CodegenStatement, ExternCallsReachLibm) {
