@@ -229,7 +229,29 @@ class Generator {
       output.extents.push_back(random_.between(1 + extent / 4, extent));
       output.mins.push_back(random_.chance(70) ? 0 : random_.between(-8, 8));
     }
+    for (const UpdateSpec& update : spec_.funcs[func].updates) cover(update, output);
     return output;
+  }
+
+  // An output must hold whatever its updates touch.
+  static void cover(const UpdateSpec& update, OutputSpec& output) {
+    const int dimensions = static_cast<int>(output.mins.size());
+    for (int d = 0; d < dimensions; ++d) {
+      const Index& left = update.left[d];
+      if (is_pure(left, d)) continue;
+      int low = left.offset, high = left.offset;
+      if (!left.data.empty()) {
+        low = left.low;
+        high = left.high;
+      } else if (left.variable >= dimensions) {
+        const ReductionRange& range = update.domain[left.variable - dimensions];
+        low += range.min - 1;  // a scan reads one step back
+        high += range.min + range.extent - 1;
+      }
+      const int end = std::max(output.mins[d] + output.extents[d], high + 1);
+      output.mins[d] = std::min(output.mins[d], low);
+      output.extents[d] = end - output.mins[d];
+    }
   }
 
   // ---- terms ----
