@@ -1,4 +1,5 @@
-// opt -- runs one pass of the compiler on IR text: the smallest way to look at a pass, or to report what it does wrong.
+// opt -- runs one pass of the compiler on IR text: the smallest way to look at a pass, or to report
+// what it does wrong.
 //
 //   opt --pass=vectorize_loops program.ir      reads a file; "-" or nothing: standard input
 //   opt --list                                 names the passes
@@ -60,11 +61,13 @@ void run(const Options& options) {
   }
   const ir::StatementPass* pass = ir::find_statement_pass(options.pass);
   if (!pass) {
-    user_error(text("run the pass ", quoted(options.pass)), "a pass must be one of those that --list names");
+    user_error(text("run the pass ", quoted(options.pass)),
+               "a pass must be one of those that --list names");
   }
   std::string source = read_all(options.file);
   if (options.is_expr) {
-    if (options.pass != "simplify") user_error("read one expression", "only the pass \"simplify\" takes one");
+    if (options.pass != "simplify")
+      user_error("read one expression", "only the pass \"simplify\" takes one");
     std::cout << ir::simplify(ir::parse_expr(source)) << "\n";
   } else {
     std::cout << pass->run(ir::parse_stmt(source));

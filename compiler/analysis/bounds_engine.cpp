@@ -1,5 +1,5 @@
-// Sums are taken apart into linear form first, so that a variable that occurs twice counts once; each atom of the sum
-// then has its own rule below. What does not vary stands for itself.
+// Sums are taken apart into linear form first, so that a variable that occurs twice counts once;
+// each atom of the sum then has its own rule below. What does not vary stands for itself.
 #include "analysis/bounds_engine.h"
 
 #include "analysis/interval_arithmetic.h"
@@ -11,7 +11,8 @@ namespace retrograde::ir {
 BoundsEngine::BoundsEngine(const Scope<Interval>& variables, const ValueBounds* values)
     : shared_(std::make_shared<Shared>(Shared{values})), scope_(&variables) {}
 
-BoundsEngine::BoundsEngine(const BoundsEngine& outer) : shared_(outer.shared_), scope_(&outer.scope_) {}
+BoundsEngine::BoundsEngine(const BoundsEngine& outer)
+    : shared_(outer.shared_), scope_(&outer.scope_) {}
 
 void BoundsEngine::bind(const Let& let) {
   if (!scope_.contains(let.name)) scope_.push(let.name, bounds(let.value));
@@ -21,8 +22,8 @@ bool BoundsEngine::varies(const Expr& e) {
   auto it = varies_.find(e.get());
   if (it != varies_.end()) return it->second.value;
   bool result = match(
-      e, [&](const Variable& v) { return scope_.contains(v.name); }, [](const Load&) { return true; },
-      [](const Let&) { return true; },
+      e, [&](const Variable& v) { return scope_.contains(v.name); },
+      [](const Load&) { return true; }, [](const Let&) { return true; },
       [&](const Call& call) {
         if (call.call_type == CallType::Func || call.call_type == CallType::Image) return true;
         if (call.op != Op::none && op_info(call.op).cls == OpClass::Effect) return true;
@@ -61,7 +62,8 @@ Interval BoundsEngine::compute(const Expr& e) {
 
 Interval BoundsEngine::ramp_bounds(const Ramp& ramp) {
   Type type = ramp.type.element_of();
-  Interval last = interval_mul(type, bounds(ramp.stride), Interval::point(make_const(type, ramp.lanes - 1)));
+  Interval last =
+      interval_mul(type, bounds(ramp.stride), Interval::point(make_const(type, ramp.lanes - 1)));
   Interval base = bounds(ramp.base);
   return hull(base, interval_add(type, base, last));
 }
@@ -88,7 +90,8 @@ Interval BoundsEngine::sum_bounds(const LinearForm& form) {
   };
   Interval result{end(false), end(true)};
   // One handle for both ends where they are equal, so that is_point() holds.
-  if (result.is_bounded() && constant_difference(result.min, result.max) == 0) result.max = result.min;
+  if (result.is_bounded() && constant_difference(result.min, result.max) == 0)
+    result.max = result.min;
   return result;
 }
 
@@ -103,7 +106,8 @@ LinearForm BoundsEngine::with_remainders(LinearForm form) {
     bool contains = !y.terms.empty();
     for (const LinearTerm& part : y.terms) {
       bool found = false;
-      for (const LinearTerm& t : form.terms) found |= t.atom.same_as(part.atom) && t.coefficient == c * part.coefficient;
+      for (const LinearTerm& t : form.terms)
+        found |= t.atom.same_as(part.atom) && t.coefficient == c * part.coefficient;
       contains &= found;
     }
     if (!contains) continue;
@@ -166,11 +170,13 @@ Interval BoundsEngine::binary_bounds(const Expr& e, const Binary& op) {
   }
 }
 
-Interval BoundsEngine::select_bounds(const Expr& condition, const Expr& true_value, const Expr& false_value) {
+Interval BoundsEngine::select_bounds(const Expr& condition, const Expr& true_value,
+                                     const Expr& false_value) {
   Truth decided = truth(condition);
   if (decided == Truth::True) return bounds(true_value);
   if (decided == Truth::False) return bounds(false_value);
-  return hull(under(condition, true).bounds(true_value), under(condition, false).bounds(false_value));
+  return hull(under(condition, true).bounds(true_value),
+              under(condition, false).bounds(false_value));
 }
 
 // ---- conditions ----
@@ -205,7 +211,8 @@ BoundsEngine::Truth BoundsEngine::truth(const Expr& condition) {
 }
 
 BoundsEngine::Truth BoundsEngine::compare_truth(Kind kind, const Expr& a, const Expr& b) {
-  if (kind == Kind::GT || kind == Kind::GE) return compare_truth(kind == Kind::GT ? Kind::LT : Kind::LE, b, a);
+  if (kind == Kind::GT || kind == Kind::GE)
+    return compare_truth(kind == Kind::GT ? Kind::LT : Kind::LE, b, a);
   if (kind == Kind::NE) return negated(compare_truth(Kind::EQ, a, b));
   if (a.type().is_bool() || !a.type().is_int_or_uint()) return Truth::Unknown;
   std::optional<int64_t> low, high;  // of a - b
@@ -215,7 +222,9 @@ BoundsEngine::Truth BoundsEngine::compare_truth(Kind kind, const Expr& a, const 
     high = constant_max(d);
   } else if (a.type().bits() < 64) {
     Interval x = bounds(a), y = bounds(b);
-    auto difference = [](auto p, auto q) { return p && q ? std::optional<int64_t>(*p - *q) : std::nullopt; };
+    auto difference = [](auto p, auto q) {
+      return p && q ? std::optional<int64_t>(*p - *q) : std::nullopt;
+    };
     low = difference(constant_min(x), constant_max(y));
     high = difference(constant_max(x), constant_min(y));
   }
@@ -230,7 +239,8 @@ BoundsEngine::Truth BoundsEngine::compare_truth(Kind kind, const Expr& a, const 
 
 BoundsEngine& BoundsEngine::under(const Expr& condition, bool is_true) {
   for (const Child& child : children_) {
-    if (child.condition.same_as(condition) && child.is_true == is_true) return child.engine ? *child.engine : *this;
+    if (child.condition.same_as(condition) && child.is_true == is_true)
+      return child.engine ? *child.engine : *this;
   }
   if (shared_->engines_left <= 0) return *this;
   children_.push_back({condition, is_true, nullptr});
@@ -249,7 +259,8 @@ void BoundsEngine::narrow(const Expr& condition, bool is_true, Narrowed& narrowe
   if (!condition.type().is_scalar()) return;
   if (const Not* n = condition.as<Not>()) return narrow(n->a, !is_true, narrowed);
   if (const Call* call = condition.as<Call>()) {
-    if (call->is_op(Op::likely) || call->is_op(Op::likely_if_innermost)) narrow(call->args[0], is_true, narrowed);
+    if (call->is_op(Op::likely) || call->is_op(Op::likely_if_innermost))
+      narrow(call->args[0], is_true, narrowed);
     return;
   }
   const Binary* op = condition.as<Binary>();
@@ -270,7 +281,8 @@ void BoundsEngine::narrow(const Expr& condition, bool is_true, Narrowed& narrowe
   }
 }
 
-void BoundsEngine::narrow_by_comparison(Kind kind, const Expr& a, const Expr& b, Narrowed& narrowed) {
+void BoundsEngine::narrow_by_comparison(Kind kind, const Expr& a, const Expr& b,
+                                        Narrowed& narrowed) {
   if (!has_linear_form(a.type())) return;
   LinearForm d = plus(linear_form(a), linear_form(b), -1);
   LinearForm reversed = times(d, -1);

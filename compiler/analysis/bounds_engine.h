@@ -1,10 +1,11 @@
-// The machine behind bounds_of and footprints: one memoised answer per node, and child engines for code that runs only
-// under a condition.
+// The machine behind bounds_of and footprints: one memoised answer per node, and child engines for
+// code that runs only under a condition.
 //
 // Meaning of an Interval here
 //   integers  every value lies between the ends that are defined
-//   floats    the same, and with at least one end defined the value is no NaN; only an unbounded value may be NaN
-// Ends are built in canonical linear form (linear.h), so differences between ends cancel without a simplifier.
+//   floats    the same, and with at least one end defined the value is no NaN
+// Ends are built in canonical linear form (linear.h), so differences between ends cancel without a
+// simplifier.
 #pragma once
 
 #include <memory>
@@ -28,16 +29,19 @@ class BoundsEngine {
 
   enum class Truth { False, True, Unknown };
   Truth truth(const Expr& condition);
-  bool varies(const Expr& e);  // mentions a variable of the scope, or a value that only the running program knows
+  bool varies(const Expr& e);  // mentions a variable of the scope, or a value that only the running
+                               // program knows
 
-  // The engine for code that runs only where `condition` is (or is not) true: variables of the scope are narrowed by
-  // the comparisons in it. This engine itself when nothing is gained or too many engines exist.
+  // The engine for code that runs only where `condition` is (or is not) true: variables of the
+  // scope are narrowed by the comparisons in it. This engine itself when nothing is gained or too
+  // many engines exist.
   BoundsEngine& under(const Expr& condition, bool is_true);
 
  private:
   struct Shared {
     const ValueBounds* values;
-    int engines_left = 16;  // contexts multiply with nested conditions: beyond this many, conditions are not used
+    int engines_left =
+        16;  // contexts multiply with nested conditions: beyond this many, conditions are not used
   };
   explicit BoundsEngine(const BoundsEngine& outer);
 

@@ -32,7 +32,8 @@ Interval intersection(const Interval& a, const Interval& b) {
 Box hull(const Box& a, const Box& b) {
   if (a.empty()) return b;
   if (b.empty()) return a;
-  RETROGRADE_ASSERT(a.size() == b.size(), "hull of boxes with ", a.size(), " and ", b.size(), " dimensions");
+  RETROGRADE_ASSERT(a.size() == b.size(), "hull of boxes with ", a.size(), " and ", b.size(),
+                    " dimensions");
   Box result(a.size());
   for (size_t d = 0; d < a.size(); ++d) result[d] = hull(a[d], b[d]);
   return result;
@@ -44,7 +45,8 @@ Interval bounds_of(const Expr& e, const Scope<Interval>& variables, const ValueB
 
 namespace {
 
-// Visits every node once per engine: a node under a condition is visited again only for the engine of that condition.
+// Visits every node once per engine: a node under a condition is visited again only for the engine
+// of that condition.
 class FootprintCollector {
  public:
   explicit FootprintCollector(std::map<std::string, Footprint>& found) : found_(found) {}
@@ -58,7 +60,8 @@ class FootprintCollector {
     }
     const Call* call = e.as<Call>();
     if (call && call->is_op(Op::if_then_else)) return visit_branches(*call, engine);
-    if (call && (call->call_type == CallType::Func || call->call_type == CallType::Image)) add(*call, engine);
+    if (call && (call->call_type == CallType::Func || call->call_type == CallType::Image))
+      add(*call, engine);
     for_each_child(e, [&](const Expr& child) { visit(child, engine); });
   }
 
@@ -66,8 +69,10 @@ class FootprintCollector {
   void visit_branches(const Call& call, BoundsEngine& engine) {
     visit(call.args[0], engine);
     BoundsEngine::Truth decided = engine.truth(call.args[0]);
-    if (decided != BoundsEngine::Truth::False) visit(call.args[1], engine.under(call.args[0], true));
-    if (decided != BoundsEngine::Truth::True) visit(call.args[2], engine.under(call.args[0], false));
+    if (decided != BoundsEngine::Truth::False)
+      visit(call.args[1], engine.under(call.args[0], true));
+    if (decided != BoundsEngine::Truth::True)
+      visit(call.args[2], engine.under(call.args[0], false));
   }
 
   void add(const Call& call, BoundsEngine& engine) {
@@ -98,7 +103,8 @@ std::map<std::string, Footprint> footprints(const Expr& e, const Scope<Interval>
   return found;
 }
 
-void merge_footprints(std::map<std::string, Footprint>& into, const std::map<std::string, Footprint>& from) {
+void merge_footprints(std::map<std::string, Footprint>& into,
+                      const std::map<std::string, Footprint>& from) {
   for (const auto& [name, footprint] : from) {
     auto [it, is_new] = into.emplace(name, footprint);
     if (!is_new) it->second.box = hull(it->second.box, footprint.box);

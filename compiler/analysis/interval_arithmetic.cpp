@@ -1,5 +1,6 @@
-// Two representations meet here. Ends of wide signed integers are expressions in canonical linear form; ends of all
-// other types are useful only where they fold to constants, or where the operation keeps them as they are.
+// Two representations meet here. Ends of wide signed integers are expressions in canonical linear
+// form; ends of all other types are useful only where they fold to constants, or where the
+// operation keeps them as they are.
 #include "analysis/interval_arithmetic.h"
 
 #include <algorithm>
@@ -27,7 +28,8 @@ Expr wide_const(Type type, Wide value) {
   return make_const(type, static_cast<int64_t>(value));
 }
 
-// Both ends constant, or unbounded where the type cannot hold them (then a narrow type falls back to its range).
+// Both ends constant, or unbounded where the type cannot hold them (then a narrow type falls back
+// to its range).
 Interval wide_interval(Type type, Wide min, Wide max) {
   Interval v{wide_const(type, min), wide_const(type, max)};
   if (has_linear_form(type)) return v;  // does not overflow: each end stands alone
@@ -55,7 +57,8 @@ Wide wide_floor_div(Wide a, Wide b) { return a / b - (a % b < 0); }
 // Hull of the four combinations of ends.
 template <class F>
 Interval combine_corners(Type type, const WidePair& a, const WidePair& b, F f) {
-  std::array<Wide, 4> corners = {f(a.min, b.min), f(a.min, b.max), f(a.max, b.min), f(a.max, b.max)};
+  std::array<Wide, 4> corners = {f(a.min, b.min), f(a.min, b.max), f(a.max, b.min),
+                                 f(a.max, b.max)};
   auto [min, max] = std::minmax_element(corners.begin(), corners.end());
   return wide_interval(type, *min, *max);
 }
@@ -88,7 +91,9 @@ Expr end_op(Kind kind, const Expr& a, const Expr& b) {
   return a.defined() && b.defined() ? canonical(binary(kind, a, b)) : Expr();
 }
 
-Expr negate(const Expr& e) { return e.defined() ? canonical(binary(Kind::Sub, make_zero(e.type()), e)) : e; }
+Expr negate(const Expr& e) {
+  return e.defined() ? canonical(binary(Kind::Sub, make_zero(e.type()), e)) : e;
+}
 
 Interval float_corners(Type type, Kind kind, const Interval& a, const Interval& b) {
   if (!float_ends(a) || !float_ends(b)) return Interval::everything();
@@ -126,7 +131,9 @@ Interval type_range(Type type) {
   return {make_const(type, type.min_int()), make_const(type, type.max_int())};
 }
 
-Interval constant_interval(Type type, int64_t min, int64_t max) { return wide_interval(type.element_of(), min, max); }
+Interval constant_interval(Type type, int64_t min, int64_t max) {
+  return wide_interval(type.element_of(), min, max);
+}
 
 std::optional<int64_t> constant_min(const Interval& v) {
   return v.min.defined() ? as_const_int(v.min) : std::nullopt;
@@ -176,13 +183,15 @@ Interval interval_div(Type type, const Interval& a, const Interval& b) {
     return float_corners(type, Kind::Div, a, b);
   }
   auto low = wide_end(b.min), high = wide_end(b.max);
-  if (low && high && *low == *high && *low != 0) {  // one constant: monotone, falling when it is negative
+  if (low && high && *low == *high &&
+      *low != 0) {  // one constant: monotone, falling when it is negative
     Interval q{end_op(Kind::Div, a.min, b.min), end_op(Kind::Div, a.max, b.min)};
     return *low > 0 ? q : Interval{q.max, q.min};
   }
   auto x = wide_ends(a);
   if (x && low && high && *low > 0) {
-    return combine_corners(type, *x, {*low, *high}, [](Wide p, Wide q) { return wide_floor_div(p, q); });
+    return combine_corners(type, *x, {*low, *high},
+                           [](Wide p, Wide q) { return wide_floor_div(p, q); });
   }
   if (is_nonnegative(a) && low && *low > 0) {
     Expr min = high ? end_op(Kind::Div, a.min, b.max) : make_zero(type);
@@ -234,7 +243,9 @@ Interval interval_mod(Type type, const Interval& a, const Interval& b) {
 
 namespace {
 
-bool may_be_nan(Type type, const Interval& v) { return type.is_float() && !v.min.defined() && !v.max.defined(); }
+bool may_be_nan(Type type, const Interval& v) {
+  return type.is_float() && !v.min.defined() && !v.max.defined();
+}
 
 Type end_type(const Interval& v) { return v.min.defined() ? v.min.type() : v.max.type(); }
 
@@ -249,22 +260,22 @@ Expr either(Kind kind, const Expr& a, const Expr& b) {
 }
 
 // min and max keep a NaN of their second operand only.
-bool loses_bounds(const Interval& b) {
-  return !b.min.defined() && !b.max.defined();
-}
+bool loses_bounds(const Interval& b) { return !b.min.defined() && !b.max.defined(); }
 
 }  // namespace
 
 Interval interval_min(const Interval& a, const Interval& b) {
   if (loses_bounds(b)) {  // an integer a still bounds the result
-    return a.max.defined() && !may_be_nan(end_type(a), b) ? Interval{{}, a.max} : Interval::everything();
+    return a.max.defined() && !may_be_nan(end_type(a), b) ? Interval{{}, a.max}
+                                                          : Interval::everything();
   }
   return {both(Kind::Min, a.min, b.min), either(Kind::Min, a.max, b.max)};
 }
 
 Interval interval_max(const Interval& a, const Interval& b) {
   if (loses_bounds(b)) {
-    return a.min.defined() && !may_be_nan(end_type(a), b) ? Interval{a.min, {}} : Interval::everything();
+    return a.min.defined() && !may_be_nan(end_type(a), b) ? Interval{a.min, {}}
+                                                          : Interval::everything();
   }
   return {either(Kind::Max, a.min, b.min), both(Kind::Max, a.max, b.max)};
 }
@@ -276,7 +287,8 @@ Interval interval_clamp(const Interval& v, const Interval& low, const Interval& 
 namespace {
 
 Interval cast_ends(Type to, const Interval& v) {
-  return {v.min.defined() ? canonical(cast_to(to, v.min)) : Expr(), v.max.defined() ? canonical(cast_to(to, v.max)) : Expr()};
+  return {v.min.defined() ? canonical(cast_to(to, v.min)) : Expr(),
+          v.max.defined() ? canonical(cast_to(to, v.max)) : Expr()};
 }
 
 Interval float_to_int(Type to, const Interval& v) {
@@ -298,7 +310,9 @@ Interval int_to_int(Type to, Type from, const Interval& v) {
   auto min = wide_end(v.min), max = wide_end(v.max);
   if (min && max) return wide_interval(to, *min, *max);
   if (has_linear_form(to)) {  // does not overflow; a constant end that would is no end
-    auto fits = [&](const Expr& e, const std::optional<Wide>& c) { return e.defined() && (!c || wide_const(to, *c).defined()); };
+    auto fits = [&](const Expr& e, const std::optional<Wide>& c) {
+      return e.defined() && (!c || wide_const(to, *c).defined());
+    };
     return cast_ends(to, {fits(v.min, min) ? v.min : Expr(), fits(v.max, max) ? v.max : Expr()});
   }
   bool grows = to.bits() >= 32 && to.bits() >= from.bits() && is_nonnegative(v);
@@ -319,9 +333,11 @@ Interval interval_cast(Type to, Type from, const Interval& v) {
 Interval interval_abs(Type result, Type operand, const Interval& v) {
   if (operand.is_float()) {
     auto ends = float_ends(v);
-    if (!ends) return may_be_nan(operand, v) ? Interval::everything() : Interval{make_zero(result), {}};
+    if (!ends)
+      return may_be_nan(operand, v) ? Interval::everything() : Interval{make_zero(result), {}};
     double largest = std::max(std::abs(ends->min), std::abs(ends->max));
-    double least = ends->min <= 0 && ends->max >= 0 ? 0 : std::min(std::abs(ends->min), std::abs(ends->max));
+    double least =
+        ends->min <= 0 && ends->max >= 0 ? 0 : std::min(std::abs(ends->min), std::abs(ends->max));
     return {make_const(result, least), make_const(result, largest)};
   }
   if (auto x = wide_ends(v)) {

@@ -9,7 +9,8 @@
 
 namespace retrograde::ir {
 
-Interval type_range(Type type);  // of an element: bool and integers below 32 bits are bounded, floats are not
+Interval type_range(
+    Type type);  // of an element: bool and integers below 32 bits are bounded, floats are not
 Interval constant_interval(Type type, int64_t min, int64_t max);
 
 std::optional<int64_t> constant_min(const Interval& v);  // of integers

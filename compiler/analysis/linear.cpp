@@ -1,5 +1,6 @@
-// Linear forms are kept sorted by the structural order of their atoms, so that adding two is a merge and equal sums
-// have equal text. Collection is memoised by node: a DAG that shares sums costs its nodes, not its paths.
+// Linear forms are kept sorted by the structural order of their atoms, so that adding two is a
+// merge and equal sums have equal text. Collection is memoised by node: a DAG that shares sums
+// costs its nodes, not its paths.
 #include "analysis/linear.h"
 
 #include <algorithm>
@@ -12,7 +13,8 @@ namespace retrograde::ir {
 
 namespace {
 
-// A form with more terms than this is an atom to the expressions around it: keeps collection linear in the DAG.
+// A form with more terms than this is an atom to the expressions around it: keeps collection linear
+// in the DAG.
 constexpr size_t max_terms = 32;
 // Operands of nested min (max) that are compared with each other.
 constexpr size_t max_operands = 8;
@@ -32,8 +34,8 @@ std::optional<LinearForm> checked_plus(const LinearForm& a, const LinearForm& b,
   }
   auto ia = a.terms.begin(), ib = b.terms.begin();
   while (ia != a.terms.end() || ib != b.terms.end()) {
-    int order = ia == a.terms.end()   ? 1
-                : ib == b.terms.end() ? -1
+    int order = ia == a.terms.end()          ? 1
+                : ib == b.terms.end()        ? -1
                 : ia->atom.same_as(ib->atom) ? 0
                                              : compare(ia->atom, ib->atom);
     LinearTerm term;
@@ -42,7 +44,8 @@ std::optional<LinearForm> checked_plus(const LinearForm& a, const LinearForm& b,
     } else {
       term.atom = ib->atom;
       if (__builtin_mul_overflow(ib->coefficient, factor, &term.coefficient)) return std::nullopt;
-      if (order == 0 && __builtin_add_overflow(term.coefficient, ia++->coefficient, &term.coefficient)) {
+      if (order == 0 &&
+          __builtin_add_overflow(term.coefficient, ia++->coefficient, &term.coefficient)) {
         return std::nullopt;
       }
       ++ib;
@@ -52,7 +55,8 @@ std::optional<LinearForm> checked_plus(const LinearForm& a, const LinearForm& b,
   return sum;
 }
 
-// The multiples of `divisor` in `f`, divided by it, and what is left (its constant in [0, divisor)).
+// The multiples of `divisor` in `f`, divided by it, and what is left (its constant in [0,
+// divisor)).
 struct Quotient {
   LinearForm whole, rest;
 };
@@ -128,7 +132,9 @@ class Collector {
     return is_div ? checked_plus(q.whole, rest, 1).value_or(atom_form(e)) : rest;
   }
 
-  static Expr binary_of(Kind kind, const Expr& a, int64_t b) { return binary(kind, a, make_const(a.type(), b)); }
+  static Expr binary_of(Kind kind, const Expr& a, int64_t b) {
+    return binary(kind, a, make_const(a.type(), b));
+  }
 
   // Widening distributes over sums, since the narrower sum does not overflow.
   LinearForm collect_cast(const Expr& e, const Cast& cast) {
@@ -148,7 +154,8 @@ class Collector {
 
 // The operands of nested mins (or maxes) as forms: min(a, b) + 1 is a + 1, b + 1.
 void add_operands(Kind kind, const LinearForm& f, std::vector<LinearForm>& operands) {
-  bool nested = f.terms.size() == 1 && f.terms[0].coefficient == 1 && f.terms[0].atom.kind() == kind;
+  bool nested =
+      f.terms.size() == 1 && f.terms[0].coefficient == 1 && f.terms[0].atom.kind() == kind;
   if (!nested || operands.size() >= max_operands) {
     operands.push_back(f);
     return;
@@ -190,10 +197,12 @@ std::optional<int64_t> sign_of_difference(const LinearForm& a, const LinearForm&
   return difference(x->numerator, y->numerator);
 }
 
-// Whether min(kept, dropped) == kept for certain (for max with the order reversed). Looks through one level of the
-// opposite operator: min(a, max(a, b)) == a.
+// Whether min(kept, dropped) == kept for certain (for max with the order reversed). Looks through
+// one level of the opposite operator: min(a, max(a, b)) == a.
 bool makes_redundant(Kind kind, const LinearForm& kept, const LinearForm& dropped) {
-  auto wins = [&](int64_t difference) { return kind == Kind::Min ? difference <= 0 : difference >= 0; };
+  auto wins = [&](int64_t difference) {
+    return kind == Kind::Min ? difference <= 0 : difference >= 0;
+  };
   if (auto d = sign_of_difference(kept, dropped)) return wins(*d);
   std::vector<LinearForm> inner;
   add_operands(kind == Kind::Min ? Kind::Max : Kind::Min, dropped, inner);
@@ -250,10 +259,13 @@ LinearForm plus(const LinearForm& a, const LinearForm& b, int64_t factor_of_b) {
   return *sum;
 }
 
-LinearForm times(const LinearForm& a, int64_t factor) { return plus(constant_form(a.type, 0), a, factor); }
+LinearForm times(const LinearForm& a, int64_t factor) {
+  return plus(constant_form(a.type, 0), a, factor);
+}
 
 Expr to_expr(const LinearForm& form) {
-  if (form.terms.size() == 1 && form.terms[0].coefficient == 1 && form.constant == 0) return form.terms[0].atom;
+  if (form.terms.size() == 1 && form.terms[0].coefficient == 1 && form.constant == 0)
+    return form.terms[0].atom;
   if (!form.type.can_represent(form.constant)) return {};
   Expr sum;
   auto add = [&](const LinearTerm& term) {
@@ -262,12 +274,15 @@ Expr to_expr(const LinearForm& form) {
       sum = c == 1 ? term.atom : binary(Kind::Mul, term.atom, make_const(form.type, c));
     } else {
       int64_t magnitude = c < 0 ? -c : c;
-      Expr product = magnitude == 1 ? term.atom : binary(Kind::Mul, term.atom, make_const(form.type, magnitude));
+      Expr product = magnitude == 1
+                         ? term.atom
+                         : binary(Kind::Mul, term.atom, make_const(form.type, magnitude));
       sum = binary(c < 0 ? Kind::Sub : Kind::Add, sum, product);
     }
   };
   for (const LinearTerm& term : form.terms) {
-    if (!form.type.can_represent(term.coefficient) || !form.type.can_represent(-term.coefficient)) return {};
+    if (!form.type.can_represent(term.coefficient) || !form.type.can_represent(-term.coefficient))
+      return {};
   }
   for (const LinearTerm& term : form.terms) {
     if (term.coefficient > 0) add(term);

@@ -1,6 +1,7 @@
-// Integer expressions as sums: e = c1 * atom1 + c2 * atom2 + ... + constant, and what follows from that form: canonical
-// text, differences that are constant, and linear conditions solved for a variable.
-// Signed integers of 32 bits and more only (they are assumed not to overflow); everything else is an atom.
+// Integer expressions as sums: e = c1 * atom1 + c2 * atom2 + ... + constant, and what follows from
+// that form: canonical text, differences that are constant, and linear conditions solved for a
+// variable. Signed integers of 32 bits and more only (they are assumed not to overflow); everything
+// else is an atom.
 #pragma once
 
 #include <cstdint>
@@ -23,7 +24,8 @@ struct LinearForm {
   std::vector<LinearTerm> terms;  // atoms in structural order, each once, no coefficient 0
   int64_t constant = 0;
   bool is_constant() const { return terms.empty(); }
-  int64_t coefficient_of(const std::string& variable) const;  // of the atom that is this Variable, else 0
+  int64_t coefficient_of(
+      const std::string& variable) const;  // of the atom that is this Variable, else 0
 };
 
 // The type is Int of 32 or 64 bits, scalar.
@@ -38,29 +40,34 @@ std::optional<int64_t> constant_difference(const Expr& a, const Expr& b);
 // The expression in canonical form: like terms gathered; the same handle when it is no sum.
 Expr canonical(const Expr& e);
 
-// min and max in canonical form. Operands that a constant difference decides are dropped; the rest keep their order.
+// min and max in canonical form. Operands that a constant difference decides are dropped; the rest
+// keep their order.
 Expr canonical_min(const Expr& a, const Expr& b);
 Expr canonical_max(const Expr& a, const Expr& b);
 // floor(e / divisor), divisor > 0, with multiples of the divisor taken out of the division.
 Expr canonical_div(const Expr& e, int64_t divisor);
 
-// e = sum of coefficient * variable over the given variables, plus `rest`, in which none of them occurs.
-// nullopt when e is not linear in them.
+// e = sum of coefficient * variable over the given variables, plus `rest`, in which none of them
+// occurs. nullopt when e is not linear in them.
 struct LinearDecomposition {
   std::vector<std::pair<std::string, int64_t>> coefficients;  // as the variables were given
   Expr rest;
 };
-std::optional<LinearDecomposition> decompose(const Expr& e, const std::vector<std::string>& variables);
+std::optional<LinearDecomposition> decompose(const Expr& e,
+                                             const std::vector<std::string>& variables);
 
-// Where a condition certainly holds: for every value of `variable` in `interval`, provided that `needed` (free of the
-// variable; undefined: true) holds, and for all values of the inner variables in their intervals.
+// Where a condition certainly holds: for every value of `variable` in `interval`, provided that
+// `needed` (free of the variable; undefined: true) holds, and for all values of the inner variables
+// in their intervals.
 struct Solution {
   Interval interval;
   Expr needed;
 };
-// The condition: conjunctions, disjunctions and negations of comparisons of integers, linear in `variable`, also
-// through division by a positive constant, min and max. Names in `inner` are quantified over their intervals, whose
-// ends may mention `variable` but no other inner name. nullopt: no such set was found.
-std::optional<Solution> solve_for(const Expr& condition, const std::string& variable, const Scope<Interval>& inner);
+// The condition: conjunctions, disjunctions and negations of comparisons of integers, linear in
+// `variable`, also through division by a positive constant, min and max. Names in `inner` are
+// quantified over their intervals, whose ends may mention `variable` but no other inner name.
+// nullopt: no such set was found.
+std::optional<Solution> solve_for(const Expr& condition, const std::string& variable,
+                                  const Scope<Interval>& inner);
 
 }  // namespace retrograde::ir

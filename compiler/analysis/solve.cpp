@@ -1,12 +1,14 @@
-// Solving a condition for one variable. Every comparison of integers becomes "form <= 0"; inner variables are replaced by
-// the end of their interval that makes the form largest; what remains is solved for the variable atom by atom:
+// Solving a condition for one variable. Every comparison of integers becomes "form <= 0"; inner
+// variables are replaced by the end of their interval that makes the form largest; what remains is
+// solved for the variable atom by atom:
 //
-//   c*v + rest <= 0,  c > 0          v <= floor(-rest / c)
-//   c*v + rest <= 0,  c < 0          v >= ceil(rest / -c)
-//   c*max(p, q) + rest, c > 0        both forms with p and with q      (min with c < 0 alike)
-//   c*min(p, q) + rest, c > 0        one of the two is enough          (max with c < 0 alike)
-//   c*(p / k) + rest <= 0, k > 0     p <= k*floor(-rest / c) + k - 1,  or for c < 0  p >= k*ceil(rest / -c)
-//   c*atom + rest                    the atom's largest value, when it has bounds whatever v is (v % 4)
+//   c*v + rest <= 0,  c > 0         v <= floor(-rest / c)
+//   c*v + rest <= 0,  c < 0         v >= ceil(rest / -c)
+//   c*max(p, q) + rest, c > 0       both forms with p and with q      (min with c < 0 alike)
+//   c*min(p, q) + rest, c > 0       one of the two is enough          (max with c < 0 alike)
+//   c*(p / k) + rest, c > 0, k > 0  p <= k*floor(-rest / c) + k - 1
+//   c*(p / k) + rest, c < 0, k > 0  p >= k*ceil(rest / -c)
+//   c*atom + rest                   the atom's largest value, when it has bounds whatever v is
 #include <algorithm>
 
 #include "analysis/bounds_engine.h"
@@ -18,7 +20,8 @@ namespace retrograde::ir {
 
 namespace {
 
-constexpr int max_depth = 8;  // of min, max and division inside one another; each level may try two forms
+constexpr int max_depth =
+    8;  // of min, max and division inside one another; each level may try two forms
 
 LinearForm without(const LinearForm& form, const LinearTerm& term) {
   return plus(form, linear_form(term.atom), -term.coefficient);
@@ -62,7 +65,8 @@ class Solver {
     return Solution{{}, is_true ? condition : logical_not(condition)};
   }
 
-  static std::optional<Solution> all_of(const std::optional<Solution>& a, const std::optional<Solution>& b) {
+  static std::optional<Solution> all_of(const std::optional<Solution>& a,
+                                        const std::optional<Solution>& b) {
     if (!a || !b) return std::nullopt;
     Solution both{intersection(a->interval, b->interval), a->needed};
     if (!both.needed.defined()) {
@@ -74,7 +78,8 @@ class Solver {
   }
 
   // Either is right; the one that needs no further condition is better.
-  static std::optional<Solution> one_of(const std::optional<Solution>& a, const std::optional<Solution>& b) {
+  static std::optional<Solution> one_of(const std::optional<Solution>& a,
+                                        const std::optional<Solution>& b) {
     if (!a || !b) return a ? a : b;
     return a->needed.defined() && !b->needed.defined() ? b : a;
   }
@@ -145,7 +150,8 @@ class Solver {
     return term.coefficient > 0 ? Solution{{{}, m}, {}} : Solution{{m, {}}, {}};
   }
 
-  std::optional<Solution> isolate_compound(const LinearForm& form, const LinearTerm& term, int depth) {
+  std::optional<Solution> isolate_compound(const LinearForm& form, const LinearTerm& term,
+                                           int depth) {
     const Binary* op = term.atom.as<Binary>();
     Kind kind = term.atom.kind();
     if (op && (kind == Kind::Min || kind == Kind::Max)) {
@@ -165,11 +171,13 @@ class Solver {
     return isolate(with_replaced(form, term, worst), depth - 1);
   }
 
-  std::optional<Solution> isolate_division(const LinearForm& form, const LinearTerm& term, const Binary& op, int depth) {
+  std::optional<Solution> isolate_division(const LinearForm& form, const LinearTerm& term,
+                                           const Binary& op, int depth) {
     auto k = as_const_int(op.b);
     LinearForm rest = without(form, term);
     auto mentions = [&](const LinearTerm& t) { return uses_variable(t.atom, variable_); };
-    if (!k || *k <= 0 || std::any_of(rest.terms.begin(), rest.terms.end(), mentions)) return std::nullopt;
+    if (!k || *k <= 0 || std::any_of(rest.terms.begin(), rest.terms.end(), mentions))
+      return std::nullopt;
     Expr m = limit(rest, term.coefficient);
     if (!m.defined()) return std::nullopt;
     LinearForm p = linear_form(op.a);
@@ -188,11 +196,13 @@ class Solver {
 
 }  // namespace
 
-std::optional<Solution> solve_for(const Expr& condition, const std::string& variable, const Scope<Interval>& inner) {
+std::optional<Solution> solve_for(const Expr& condition, const std::string& variable,
+                                  const Scope<Interval>& inner) {
   return Solver(variable, inner).solve(condition, true);
 }
 
-std::optional<LinearDecomposition> decompose(const Expr& e, const std::vector<std::string>& variables) {
+std::optional<LinearDecomposition> decompose(const Expr& e,
+                                             const std::vector<std::string>& variables) {
   if (!has_linear_form(e.type())) return std::nullopt;
   LinearForm form = linear_form(e);
   LinearDecomposition result;
@@ -204,7 +214,8 @@ std::optional<LinearDecomposition> decompose(const Expr& e, const std::vector<st
     if (uses_any_variable(term.atom, names)) return std::nullopt;
     rest.terms.push_back(term);
   }
-  for (const std::string& name : variables) result.coefficients.emplace_back(name, form.coefficient_of(name));
+  for (const std::string& name : variables)
+    result.coefficients.emplace_back(name, form.coefficient_of(name));
   result.rest = to_expr(rest);
   if (!result.rest.defined()) return std::nullopt;
   return result;

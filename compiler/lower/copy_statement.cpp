@@ -51,9 +51,10 @@ class Copier : public Rewriter {
         },
         [&](const Stmt& node) {
           match(
-              node, [&](const LetStmt& n) { rename(n.name, fresh); }, [&](const For& n) { rename(n.name, fresh); },
-              [&](const Allocate& n) { rename(n.name, fresh); }, [&](const Realize& n) { rename(n.name, fresh); },
-              [](const StmtNode&) {});
+              node, [&](const LetStmt& n) { rename(n.name, fresh); },
+              [&](const For& n) { rename(n.name, fresh); },
+              [&](const Allocate& n) { rename(n.name, fresh); },
+              [&](const Realize& n) { rename(n.name, fresh); }, [](const StmtNode&) {});
           return true;
         });
   }
@@ -68,7 +69,9 @@ class Copier : public Rewriter {
     Expr copy = children(e);
     if (const Let* n = copy.as<Let>()) return make_let(name_of(n->name), n->value, n->body);
     if (const Load* n = copy.as<Load>()) {
-      return is_renamed(n->name) ? make_load(n->type, name_of(n->name), n->index, n->predicate, n->symbol) : copy;
+      return is_renamed(n->name)
+                 ? make_load(n->type, name_of(n->name), n->index, n->predicate, n->symbol)
+                 : copy;
     }
     const Call* n = copy.as<Call>();
     if (!n || n->call_type != CallType::Func || !is_renamed(n->name)) return copy;
@@ -80,14 +83,23 @@ class Copier : public Rewriter {
     if (!copy.defined()) return copy;
     return match(
         copy, [&](const LetStmt& n) { return make_let(name_of(n.name), n.value, n.body); },
-        [&](const For& n) { return make_for(name_of(n.name), n.min, n.extent, n.for_type, n.body); },
-        [&](const Allocate& n) { return make_allocate(name_of(n.name), n.type, n.memory, n.elements, n.body); },
-        [&](const Realize& n) { return make_realize(name_of(n.name), n.types, n.memory, n.bounds, n.body); },
+        [&](const For& n) {
+          return make_for(name_of(n.name), n.min, n.extent, n.for_type, n.body);
+        },
+        [&](const Allocate& n) {
+          return make_allocate(name_of(n.name), n.type, n.memory, n.elements, n.body);
+        },
+        [&](const Realize& n) {
+          return make_realize(name_of(n.name), n.types, n.memory, n.bounds, n.body);
+        },
         [&](const Store& n) {
-          return is_renamed(n.name) ? make_store(name_of(n.name), n.value, n.index, n.predicate, n.symbol) : copy;
+          return is_renamed(n.name)
+                     ? make_store(name_of(n.name), n.value, n.index, n.predicate, n.symbol)
+                     : copy;
         },
         [&](const Provide& n) {
-          return is_renamed(n.name) ? make_provide(name_of(n.name), n.values, n.args, n.predicate) : copy;
+          return is_renamed(n.name) ? make_provide(name_of(n.name), n.values, n.args, n.predicate)
+                                    : copy;
         },
         [&](const Free& n) { return is_renamed(n.name) ? make_free(name_of(n.name)) : copy; },
         [&](const StmtNode&) { return copy; });
@@ -142,7 +154,8 @@ std::string describe_loop(const std::string& loop) {
   LoopName name = decode_loop_name(loop);
   if (name.func.empty()) return quoted(name.var);
   std::string text = quoted(name.var) + " of " + quoted(name.func);
-  return name.stage == "0" ? text : text + " (update " + std::to_string(std::stoi(name.stage) - 1) + ")";
+  return name.stage == "0" ? text
+                           : text + " (update " + std::to_string(std::stoi(name.stage) - 1) + ")";
 }
 
 }  // namespace retrograde::ir

@@ -1,5 +1,6 @@
-// Copies of statements, for passes that run one body several times: names stay unique because every copy binds names of
-// its own. Fresh names depend on the program alone, so that passes are deterministic.
+// Copies of statements, for passes that run one body several times: names stay unique because every
+// copy binds names of its own. Fresh names depend on the program alone, so that passes are
+// deterministic.
 #pragma once
 
 #include <string>
@@ -11,7 +12,8 @@
 
 namespace retrograde::ir {
 
-// Makes names that occur nowhere in a statement: "f.s0.x" and "f.s0.x.$1" give "f.s0.x.$2", "f.s0.x.$3", ...
+// Makes names that occur nowhere in a statement: "f.s0.x" and "f.s0.x.$1" give "f.s0.x.$2",
+// "f.s0.x.$3", ...
 class FreshNames {
  public:
   explicit FreshNames(const Stmt& s);
@@ -22,8 +24,8 @@ class FreshNames {
   std::unordered_map<std::string, int> next_;
 };
 
-// The statement with `values` substituted and every name that it binds (lets, loops, allocations) replaced by a fresh
-// one.
+// The statement with `values` substituted and every name that it binds (lets, loops, allocations)
+// replaced by a fresh one.
 Stmt copy_statement(const Stmt& s, FreshNames& fresh, const Substitution& values = {});
 
 // The user's words for a loop: "f.s1.x" is the loop over "x" in stage 1 of "f".

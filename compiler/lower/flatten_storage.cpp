@@ -1,16 +1,18 @@
-// flatten_storage -- replace points of Funcs and images by elements of flat allocations and buffers.
+// flatten_storage -- replace points of Funcs and images by elements of allocations and buffers.
 // In:  Loops; names unique.
-// Out: FlatStorage; the same stores in the same order, except that values of a Tuple are all computed before the first
-//      of them is stored.
+// Out: FlatStorage; the same stores in the same order, except that the values of a Tuple are all
+//      computed before the first of them is stored.
 //
 //   realize f(float32) auto [a, n], [b, m] {       let f.min.0 = a
 //     f(x, y) = f(x - 1, y) + in(x, y)       =>    let f.min.1 = b
 //   }                                              let f.stride.1 = n
 //                                                  allocate f[int64(n) * int64(m)]:float32 auto {
-//                                                    f[x - f.min.0 + (y - f.min.1)*f.stride.1] = f[...] + in[...]
+//                                                    f[x - f.min.0 + (y - f.min.1)*f.stride.1] = ..
+//                                                  }
 //
-// Method: one rewriting walk; each Realize puts its strides in scope. Constant minima and strides are substituted
-//         right away, so that indices of Funcs with constant bounds are free of them.
+// Method: one rewriting walk; each Realize puts its strides in scope. Constant minima and strides
+//         are substituted right away, so that indices of Funcs with constant bounds are free of
+//         them.
 // Not done: padding of strides, folding of dimensions.
 // Source: folklore. Tests: test/golden/lower/flatten_storage/.
 #include "lower/flatten_storage.h"
@@ -70,12 +72,14 @@ Usage find_usage(const Stmt& s) {
 
 class Flattener : public Rewriter {
  public:
-  Flattener(const Stmt& s, const StorageOrder& order) : order_(order), usage_(find_usage(s)), fresh_(s) {}
+  Flattener(const Stmt& s, const StorageOrder& order)
+      : order_(order), usage_(find_usage(s)), fresh_(s) {}
 
  protected:
   Expr rewrite(const Expr& e) override {
     const Call* call = e.as<Call>();
-    if (!call || (call->call_type != CallType::Func && call->call_type != CallType::Image)) return children(e);
+    if (!call || (call->call_type != CallType::Func && call->call_type != CallType::Image))
+      return children(e);
     bool is_func = call->call_type == CallType::Func;
     std::string buffer = is_func ? element_of(call->name, call->value_index) : call->name;
     Expr index = index_of(is_func ? call->name : "", buffer, mapped(call->args));
@@ -119,8 +123,8 @@ class Flattener : public Rewriter {
   std::vector<int> storage_order(const std::string& func, size_t dimensions) const {
     auto it = order_.find(func);
     if (it != order_.end()) {
-      RETROGRADE_ASSERT(it->second.size() == dimensions, "storage order of ", func, " has ", it->second.size(), " of ",
-                        dimensions, " dimensions");
+      RETROGRADE_ASSERT(it->second.size() == dimensions, "storage order of ", func, " has ",
+                        it->second.size(), " of ", dimensions, " dimensions");
       return it->second;
     }
     std::vector<int> order(dimensions);
@@ -159,9 +163,11 @@ class Flattener : public Rewriter {
     layouts_[n.name] = std::move(layout);
     Stmt body = (*this)(n.body);
     for (size_t i = n.types.size(); i-- > 0;) {
-      body = make_allocate(element_name(n.name, n.types.size(), i), n.types[i], n.memory, elements, body);
+      body = make_allocate(element_name(n.name, n.types.size(), i), n.types[i], n.memory, elements,
+                           body);
     }
-    for (size_t i = bindings.size(); i-- > 0;) body = make_let(bindings[i].name, bindings[i].value, body);
+    for (size_t i = bindings.size(); i-- > 0;)
+      body = make_let(bindings[i].name, bindings[i].value, body);
     return body;
   }
 
@@ -180,13 +186,15 @@ class Flattener : public Rewriter {
       stores.push_back(make_store(buffer, values[i], index_of(n.name, buffer, args), predicate));
     }
     Stmt result = make_block(std::move(stores));
-    for (size_t i = bindings.size(); i-- > 0;) result = make_let(bindings[i].name, bindings[i].value, result);
+    for (size_t i = bindings.size(); i-- > 0;)
+      result = make_let(bindings[i].name, bindings[i].value, result);
     return result.defined() ? result : make_evaluate(Expr(0));
   }
 
-  // Values of a Tuple are stored one after the other: what reads storage is read before the first store.
-  void bind_operands(const Provide& n, std::vector<Expr>& values, std::vector<Expr>& args, Expr& predicate,
-                     std::vector<Binding>& bindings) {
+  // Values of a Tuple are stored one after the other: what reads storage is read before the first
+  // store.
+  void bind_operands(const Provide& n, std::vector<Expr>& values, std::vector<Expr>& args,
+                     Expr& predicate, std::vector<Binding>& bindings) {
     auto bind_if_loading = [&](Expr& e, const std::string& part) {
       if (!e.defined() || !has_load(e)) return;
       std::string name = fresh_(n.name + "." + part);

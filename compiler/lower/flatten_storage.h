@@ -1,4 +1,5 @@
-// flatten_storage -- replace points of Funcs and images by elements of flat allocations and buffers.
+// flatten_storage -- replace points of Funcs and images by elements of flat allocations and
+// buffers.
 #pragma once
 
 #include <map>
@@ -9,17 +10,18 @@
 
 namespace retrograde::ir {
 
-// Func name -> its dimensions in storage order, innermost first. A Func that is missing is stored with dimension 0
-// innermost.
+// Func name -> its dimensions in storage order, innermost first. A Func that is missing is stored
+// with dimension 0 innermost.
 using StorageOrder = std::map<std::string, std::vector<int>>;
 
 // Loops -> FlatStorage. Names afterwards:
-//   Realize of "f"              Allocate "f"; "f.min.d" and, for all but the innermost dimension, "f.stride.d" are bound
-//                               around its body ("f.extent.d" where the body mentions it)
-//   Realize of a Tuple "f"      Allocate "f.0", "f.1", ..., which share "f.min.d" and "f.stride.d"
-//   Func without a Realize      an output: buffer "f" ("f.0", ... when it has several values), whose facts
-//                               "<buffer>.min.d" and "<buffer>.stride.d" are bound by the caller
-//   image "in"                  the same: buffer "in"
+//   Realize of "f"           Allocate "f". "f.min.d" and, for all but the innermost dimension,
+//                            "f.stride.d" are bound around its body where they are no constants;
+//                            "f.extent.d" where the body mentions it
+//   Realize of a Tuple "f"   Allocate "f.0", "f.1", ..., which share "f.min.d" and "f.stride.d"
+//   Func without a Realize   an output: buffer "f" ("f.0", ... when it has several values), whose
+//                            facts "<buffer>.min.d" and "<buffer>.stride.d" the caller binds
+//   image "in"               the same: buffer "in"
 Stmt flatten_storage(const Stmt& s, const StorageOrder& order = {});
 
 }  // namespace retrograde::ir

@@ -1,6 +1,7 @@
 // free_early -- end the life of an allocation right after its last use.
 // In:  FlatStorage or Vector; names unique.
-// Out: the same phase, with a Free after the last statement that uses an allocation; at most one on every path.
+// Out: the same phase, with a Free after the last statement that uses an allocation; at most one on
+//      every path.
 //
 //   allocate a[n] {                    allocate a[n] {
 //     for ... { a[..] = .. }             for ... { a[..] = .. }
@@ -12,10 +13,11 @@
 //                                        }
 //                                      }
 //
-// Method: a region is a stretch of straight-line code: the body of the function, of a loop or of a branch, looking
-//         through lets, allocations, producers and blocks. What remains in it (loops, stores, branches) are its steps.
-//         One walk numbers the steps and notes the last one that uses each allocation of the region; a second walk puts
-//         the Frees there. Both are linear, however deep the allocations nest.
+// Method: a region is a stretch of straight-line code: the body of the function, of a loop or of a
+//         branch, looking through lets, allocations, producers and blocks. What remains in it
+//         (loops, stores, branches) are its steps. One walk numbers the steps and notes the last
+//         one that uses each allocation of the region; a second walk puts the Frees there. Both are
+//         linear, however deep the allocations nest.
 // Not done: allocations that are never used; moving an allocation to its first use.
 // Source: folklore. Tests: test/golden/lower/free_early/.
 #include "lower/free_early.h"
@@ -33,15 +35,16 @@ namespace {
 
 // What a region's straight-line code looks through.
 bool is_transparent(const Stmt& s) {
-  return s.kind() == Kind::LetStmt || s.kind() == Kind::ProducerConsumer || s.kind() == Kind::Allocate ||
-         s.kind() == Kind::Block;
+  return s.kind() == Kind::LetStmt || s.kind() == Kind::ProducerConsumer ||
+         s.kind() == Kind::Allocate || s.kind() == Kind::Block;
 }
 
 // Statements by their place in the order of execution: one node may stand in several places.
 using Place = size_t;
 
 struct LastUses {
-  std::unordered_map<Place, std::vector<std::string>> frees;  // what to free after the statement at a place
+  std::unordered_map<Place, std::vector<std::string>>
+      frees;  // what to free after the statement at a place
 };
 
 // Walks in the order of execution.

@@ -1,27 +1,33 @@
-// partition_loops -- split loops so that conditions marked likely() vanish from most of their iterations.
+// partition_loops -- split loops so that likely() conditions vanish from most of their iterations.
 // In:  Loops or FlatStorage, before unrolling and vectorization; names unique.
 // Out: the same phase without likely markers; the same stores in the same order; names unique.
 //
-//   for (x, 0, w) {                              for (x$1, 0, begin) { out[x$1] = in[max(x$1 - 1, 0)] }
-//     out[x] = in[max(likely(x - 1), 0)]   =>    for (x, begin, end - begin) { out[x] = in[x - 1] }
-//   }                                            (and an epilogue where there is an upper limit)
+//   for (x, 0, w) {                            for (x.$1, 0, begin) {
+//     out[x] = in[max(likely(x - 1), 0)]         out[x.$1] = in[max(x.$1 - 1, 0)]
+//   }                                    =>    }
+//                                              for (x, begin, end - begin) { out[x] = in[x - 1] }
 //
-// with  let begin = clamp(1, 0, w), let end = w.  A parallel loop, and one whose borders are as large as tiles, stays one
-// loop, with an if inside.
+// with  let begin = clamp(1, 0, w), let end = w,  and an epilogue where there is an upper limit. A
+// parallel loop, and one whose borders are as large as tiles, stays one loop, with an if inside.
 //
 // What likely says:  likely(c)                     c is true
 //                    min(likely(a), b), max        the marked operand is the result
 //                    select(c, likely(a), b)       the marked arm is the result
-// A marked value stays marked through arithmetic, min, max and select, so that max(min(likely(x), hi), lo) is x.
+// A marked value stays marked through lets, arithmetic, min, max and select, so that
+// max(min(likely(x), hi), lo) is x.
 //
-// Method: outermost loop first. One walk over the body of a loop rewrites it as if its likely conditions held, and asks
-//         analysis/linear.h where each of them holds: an interval of the loop variable, for all values of inner
-//         vectorized and unrolled loops and of loops with constant extents. Conditions without such an interval stay.
-//         The intersection of the intervals is the steady state. Inner loops are then partitioned in the steady state
-//         only; in the rest too where the rest may be large (a border of whole tiles) and the body is small.
-// Not done: a condition that both this loop and an inner loop of unknown extent decide: it is left to the inner loop.
-//         Ends that depend on the lane of an enclosing vectorized loop: the worst lane decides.
-// Source: folklore (index-set splitting). Tests: test/golden/lower/partition_loops/, test/property/loop_passes_test.cpp.
+// Method: outermost loop first. One walk over the body of a loop rewrites it as if its likely
+//         conditions held, and asks analysis/linear.h where each of them holds: an interval of the
+//         loop variable, for all values of inner vectorized and unrolled loops and of loops with
+//         constant extents. Conditions without such an interval stay. The intersection of the
+//         intervals is the steady state. Inner loops are then partitioned in the steady state
+//         only; in the rest too where the rest may be large (a border of whole tiles) and the body
+//         is small.
+// Not done: a condition that both this loop and an inner loop of unknown extent decide: it is left
+//         to the inner loop. Ends that depend on the lane of an enclosing vectorized loop: the
+//         worst lane decides.
+// Source: folklore (index-set splitting).
+// Tests: test/golden/lower/partition_loops/, test/property/loop_passes_test.cpp.
 #include "lower/partition_loops.h"
 
 #include <algorithm>
@@ -41,7 +47,8 @@ namespace {
 
 // Border bodies with more nodes than this are not partitioned further.
 constexpr int small_body = 1500;
-// A border is thick when the inner loops that a condition is about run a serial loop of at least this extent, ...
+// A border is thick when the inner loops that a condition is about run a serial loop of at least
+// this extent, ...
 constexpr int64_t thick_loop = 8;
 // ... and at least this many points in all: a tile then, and not a stencil or a vector.
 constexpr int64_t thick_points = 32;
@@ -75,13 +82,17 @@ class MarkerRemover : public Rewriter {
 int node_count(const Stmt& s) {
   int count = 0;
   auto visit = [&](const auto&) { return ++count, true; };
-  walk(s, [&](const Expr& e) { return visit(e); }, [&](const Stmt& child) { return visit(child); });
+  walk(
+      s, [&](const Expr& e) { return visit(e); }, [&](const Stmt& child) { return visit(child); });
   return count;
 }
 
-bool is_serial(const For& loop) { return loop.for_type == ForType::Serial || loop.for_type == ForType::Parallel; }
+bool is_serial(const For& loop) {
+  return loop.for_type == ForType::Serial || loop.for_type == ForType::Parallel;
+}
 
-// Names whose values a solution may not mention: what a let stands for, and between what a loop variable lies.
+// Names whose values a solution may not mention: what a let stands for, and between what a loop
+// variable lies.
 class Context {
  public:
   void add_let(const std::string& name, const Expr& value) {
@@ -93,8 +104,10 @@ class Context {
   }
   void add_range(const std::string& name, const Interval& range) { ranges_.push(name, range); }
   void add_loop(const For& loop) {
-    Expr last = binary(Kind::Sub, binary(Kind::Add, loop.min, loop.extent), make_one(loop.min.type()));
-    add_range(loop.name, {bounds_of(expand(loop.min), ranges_).min, bounds_of(expand(last), ranges_).max});
+    Expr last =
+        binary(Kind::Sub, binary(Kind::Add, loop.min, loop.extent), make_one(loop.min.type()));
+    add_range(loop.name,
+              {bounds_of(expand(loop.min), ranges_).min, bounds_of(expand(last), ranges_).max});
   }
   // Without lets and markers.
   Expr expand(const Expr& e) const { return MarkerRemover()(substitute(e, lets_)); }
@@ -107,7 +120,8 @@ class Context {
     walk(e, [&](const Expr& node) {
       const Call* call = node.as<Call>();
       pure &= node.kind() != Kind::Load && node.kind() != Kind::Let;
-      pure &= !call || (call->call_type == CallType::Operator && op_info(call->op).cls != OpClass::Effect);
+      pure &= !call ||
+              (call->call_type == CallType::Operator && op_info(call->op).cls != OpClass::Effect);
       return pure;
     });
     return pure;
@@ -119,8 +133,8 @@ class Context {
 
 // Where the steady state of one loop lies.
 struct SteadyState {
-  Interval range;           // of the loop variable
-  Expr needed;              // and only if this holds; undefined: always
+  Interval range;                 // of the loop variable
+  Expr needed;                    // and only if this holds; undefined: always
   bool has_thick_border = false;  // some iteration of the rest is a tile or more
   int solved = 0;
 };
@@ -128,7 +142,8 @@ struct SteadyState {
 // Rewrites the body of a loop for its steady state, and finds where that lies.
 class SteadyRewriter : public Rewriter {
  public:
-  SteadyRewriter(const For& loop, const Context& outer) : loop_(loop), context_(outer), dependent_{loop.name} {}
+  SteadyRewriter(const For& loop, const Context& outer)
+      : loop_(loop), context_(outer), dependent_{loop.name} {}
   const SteadyState& steady() const { return steady_; }
 
  protected:
@@ -142,7 +157,8 @@ class SteadyRewriter : public Rewriter {
     if (const Call* n = e.as<Call>(); is_likely(n) && e.type().is_bool() && is_mark(*n)) {
       return holds(copy.as<Call>()->args[0], true) ? const_true() : copy;
     }
-    if (e.kind() == Kind::Min || e.kind() == Kind::Max) return rewrite_extreme(*e.as<Binary>(), copy);
+    if (e.kind() == Kind::Min || e.kind() == Kind::Max)
+      return rewrite_extreme(*e.as<Binary>(), copy);
     if (const Select* n = e.as<Select>()) return rewrite_select(*n, copy);
     return copy;
   }
@@ -225,7 +241,8 @@ class SteadyRewriter : public Rewriter {
           bool is_promise = n.is_op(Op::promise_clamped) || n.is_op(Op::unsafe_promise_clamped);
           return is_promise && is_marked(n.args[0]);
         },
-        [&](const Cast& n) { return is_marked(n.value); }, [&](const Let& n) { return is_marked(n.body); },
+        [&](const Cast& n) { return is_marked(n.value); },
+        [&](const Let& n) { return is_marked(n.body); },
         [&](const Select& n) { return is_marked(n.true_value) || is_marked(n.false_value); },
         [&](const Binary& n) { return !n.type.is_bool() && (is_marked(n.a) || is_marked(n.b)); },
         [&](const ExprNode&) { return false; });
@@ -244,7 +261,9 @@ class SteadyRewriter : public Rewriter {
     ++steady_.solved;
     steady_.range = intersection(steady_.range, solution->interval);
     if (solution->needed.defined()) {
-      steady_.needed = steady_.needed.defined() ? binary(Kind::And, steady_.needed, solution->needed) : solution->needed;
+      steady_.needed = steady_.needed.defined()
+                           ? binary(Kind::And, steady_.needed, solution->needed)
+                           : solution->needed;
     }
     steady_.has_thick_border |= is_about_tiles(expanded);
     return true;
@@ -269,7 +288,8 @@ class SteadyRewriter : public Rewriter {
   const For& loop_;
   Context context_;
   SteadyState steady_;
-  std::unordered_set<std::string> dependent_;  // the loop's variable, and those of inner loops that start from it
+  std::unordered_set<std::string>
+      dependent_;  // the loop's variable, and those of inner loops that start from it
   std::unordered_set<std::string> inner_serial_;
   std::unordered_map<std::string, int64_t> inner_extents_;  // constant ones
   std::unordered_set<std::string> marked_lets_;
@@ -321,13 +341,15 @@ class Partitioner : public Rewriter {
     Ends ends;
     const Interval& range = steady.range;
     if (range.min.defined()) ends.begin = simplify(range.min);
-    if (range.max.defined()) ends.end = simplify(binary(Kind::Add, range.max, make_one(range.max.type())));
+    if (range.max.defined())
+      ends.end = simplify(binary(Kind::Add, range.max, make_one(range.max.type())));
     if (ends.begin.defined() && can_prove(ends.begin <= loop.min)) ends.begin = {};
     if (ends.end.defined() && can_prove(ends.end >= loop_end)) ends.end = {};
     return ends;
   }
 
-  Stmt assemble(const For& loop, const Stmt& steady_body, const Stmt& rest, const SteadyState& steady) {
+  Stmt assemble(const For& loop, const Stmt& steady_body, const Stmt& rest,
+                const SteadyState& steady) {
     Ends ends = find_ends(loop, steady);
     if (!ends.begin.defined() && !ends.end.defined() && !steady.needed.defined()) {
       return make_for(loop.name, loop.min, loop.extent, loop.for_type, steady_body);
@@ -337,7 +359,8 @@ class Partitioner : public Rewriter {
                      : three_loops(loop, steady_body, rest, ends, steady.needed);
   }
 
-  Stmt branch_inside(const For& loop, const Stmt& steady_body, const Stmt& rest, const Ends& ends, const Expr& needed) {
+  Stmt branch_inside(const For& loop, const Stmt& steady_body, const Stmt& rest, const Ends& ends,
+                     const Expr& needed) {
     Expr var = variable(loop.name, loop.min.type());
     std::vector<Expr> conditions;
     std::vector<std::pair<std::string, Expr>> lets;
@@ -356,7 +379,8 @@ class Partitioner : public Rewriter {
   }
 
   // loop.min <= begin <= end <= loop_end, whatever the loop's extent.
-  Stmt three_loops(const For& loop, const Stmt& steady_body, const Stmt& rest, const Ends& ends, const Expr& needed) {
+  Stmt three_loops(const For& loop, const Stmt& steady_body, const Stmt& rest, const Ends& ends,
+                   const Expr& needed) {
     Expr loop_end = simplify(binary(Kind::Add, loop.min, loop.extent));
     std::string begin_name = fresh_(loop.name + ".begin"), end_name = fresh_(loop.name + ".end");
     bool has_prologue = ends.begin.defined();
@@ -378,7 +402,8 @@ class Partitioner : public Rewriter {
   }
 
   Stmt border_loop(const For& loop, const Expr& begin, const Expr& end, const Stmt& body) {
-    return copy_statement(make_for(loop.name, begin, simplify(end - begin), loop.for_type, body), fresh_);
+    return copy_statement(make_for(loop.name, begin, simplify(end - begin), loop.for_type, body),
+                          fresh_);
   }
 
   FreshNames fresh_;

@@ -1,5 +1,5 @@
-// The passes from statement to statement, by name: for tools/opt and the golden tests. (pipeline.cpp is the order in
-// which the compiler runs them.)
+// The passes from statement to statement, by name: for tools/opt and the golden tests.
+// (pipeline.cpp is the order in which the compiler runs them.)
 #pragma once
 
 #include <string>

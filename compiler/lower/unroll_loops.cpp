@@ -37,9 +37,10 @@ class Unroller : public Rewriter {
     if (!loop || loop->for_type != ForType::Unrolled) return inner;
     auto extent = as_const_int(simplify(loop->extent));
     if (!extent) {
-      user_error("unroll " + describe_loop(loop->name), "the extent of an unrolled loop must be a constant",
-                 text("its extent is ", loop->extent),
-                 "Unroll the inner variable of a split by a constant, or promise the extent with bound()");
+      user_error(
+          "unroll " + describe_loop(loop->name),
+          "the extent of an unrolled loop must be a constant", text("its extent is ", loop->extent),
+          "Unroll the inner variable of a split by a constant, or promise the extent with bound()");
     }
     return unrolled(*loop, *extent);
   }
@@ -50,7 +51,8 @@ class Unroller : public Rewriter {
     for (int64_t i = 0; i < extent; ++i) {
       Expr value = binary(Kind::Add, loop.min, make_const(loop.min.type(), i));
       Substitution iteration{{loop.name, value}};
-      copies.push_back(i == 0 ? substitute(loop.body, iteration) : copy_statement(loop.body, fresh_, iteration));
+      copies.push_back(i == 0 ? substitute(loop.body, iteration)
+                              : copy_statement(loop.body, fresh_, iteration));
     }
     return make_block(std::move(copies));
   }
@@ -62,12 +64,13 @@ class Unroller : public Rewriter {
 
 Stmt unroll_loops(const Stmt& s) {
   bool has_unrolled = false;
-  walk(s, [](const Expr&) { return false; },
-       [&](const Stmt& node) {
-         const For* loop = node.as<For>();
-         has_unrolled |= loop && loop->for_type == ForType::Unrolled;
-         return !has_unrolled;
-       });
+  walk(
+      s, [](const Expr&) { return false; },
+      [&](const Stmt& node) {
+        const For* loop = node.as<For>();
+        has_unrolled |= loop && loop->for_type == ForType::Unrolled;
+        return !has_unrolled;
+      });
   return has_unrolled ? Unroller(s)(s) : s;
 }
 

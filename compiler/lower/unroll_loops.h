@@ -5,7 +5,8 @@
 
 namespace retrograde::ir {
 
-// Any phase -> the same phase without Unrolled loops. UserError when the extent of such a loop is not a constant.
+// Any phase -> the same phase without Unrolled loops. UserError when the extent of such a loop is
+// not a constant.
 Stmt unroll_loops(const Stmt& s);
 
 }  // namespace retrograde::ir

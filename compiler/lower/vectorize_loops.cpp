@@ -1,22 +1,26 @@
 // vectorize_loops -- turn the iterations of Vectorized loops into lanes of vectors.
-// In:  FlatStorage; names unique; extents of Vectorized loops are constants; iterations are independent, except for
-//      stores of the form f[i] = f[i] op g with an associative op and an i that does not vary.
-// Out: FlatStorage without Vectorized loops; names unique. All lanes of a statement run before the next statement.
+// In:  FlatStorage; names unique; extents of Vectorized loops are constants; iterations are
+//      independent, except for stores of the form f[i] = f[i] op g with an associative op and an i
+//      that does not vary.
+// Out: FlatStorage without Vectorized loops; names unique. All lanes of a statement run before the
+//      next statement.
 //
 //   vectorized for (x, a, 8) {
-//     out[x + 1] = in[x] * k                 =>  out[ramp(a + 1, 1, 8)] = in[ramp(a, 1, 8)] * broadcast(k, 8)
-//     if (x < n) { f[x*2] = 0 }                  f[ramp(a*2, 2, 8) if (ramp(a, 1, 8) < broadcast(n, 8))] = 0 ...
-//     s[0] = s[0] + in[x]                        s[0] = s[0] + reduce(add, in[ramp(a, 1, 8)], 1)
+//     out[x + 1] = in[x] * k         =>   out[ramp(a + 1, 1, 8)] = in[ramp(a, 1, 8)] * broadcast(k)
+//     if (x < n) { f[x*2] = 0 }           f[ramp(a*2, 2, 8) if ramp(a, 1, 8) < broadcast(n)] = 0
+//     s[0] = s[0] + in[x]                 s[0] = s[0] + reduce(add, in[ramp(a, 1, 8)], 1)
 //   }
 //
-// Method: inner loops first. Expressions are widened by widen_expr.h; a condition that varies becomes the predicate of
-//         the loads and stores under it. What has no vector form runs lane by lane: statements with effects (print,
-//         require, assertions), loops whose bounds vary, allocations whose size varies, stores to one element that
-//         are no reduction.
-//         The whole loop stays a serial one when a store may hit one element in several lanes and the body reads that
-//         buffer elsewhere (argmax: two stores and the comparison of the old value; histograms).
+// Method: inner loops first. Expressions are widened by widen_expr.h; a condition that varies
+//         becomes the predicate of the loads and stores under it. What has no vector form runs lane
+//         by lane: statements with effects (print, require, assertions), loops whose bounds vary,
+//         allocations whose size varies, stores to one element that are no reduction.
+//         The whole loop stays a serial one when a store may hit one element in several lanes and
+//         the body reads that buffer elsewhere (argmax: two stores and the comparison of the old
+//         value; histograms).
 // Not done: loops with varying bounds under a mask; reductions through casts.
-// Source: folklore; the mask of a branch is Allen, Kennedy, Porterfield & Warren 1983 (if-conversion).
+// Source: folklore; the mask of a branch is Allen, Kennedy, Porterfield & Warren 1983
+//         (if-conversion).
 // Tests: test/golden/lower/vectorize_loops/, test/property/loop_passes_test.cpp.
 #include "lower/vectorize_loops.h"
 
@@ -44,10 +48,11 @@ constexpr int max_lanes = 4096;
 // ---- facts of a loop body ----
 
 struct BodyFacts {
-  std::unordered_map<std::string, int> loads;  // nodes that load from a buffer, counted once per statement
-  std::unordered_set<std::string> allocated;   // inside the body
+  std::unordered_map<std::string, int>
+      loads;  // nodes that load from a buffer, counted once per statement
+  std::unordered_set<std::string> allocated;  // inside the body
   std::unordered_map<std::string, int> stores;
-  std::unordered_set<std::string> produced;    // Funcs computed inside the body
+  std::unordered_set<std::string> produced;  // Funcs computed inside the body
 };
 
 void count_loads(const Expr& e, std::unordered_map<std::string, int>& loads) {
@@ -64,15 +69,18 @@ void find_facts(const Stmt& s, BodyFacts& facts) {
   const ProducerConsumer* p = s.as<ProducerConsumer>();
   if (p && p->is_producer) facts.produced.insert(p->name);
   for_each_child(
-      s, [&](const Expr& e) { count_loads(e, facts.loads); }, [&](const Stmt& child) { find_facts(child, facts); });
+      s, [&](const Expr& e) { count_loads(e, facts.loads); },
+      [&](const Stmt& child) { find_facts(child, facts); });
 }
 
-// A Func computed in every iteration into storage that all of them share: where their regions overlap, an iteration
-// initializes again what another has updated, so they must not be interleaved.
+// A Func computed in every iteration into storage that all of them share: where their regions
+// overlap, an iteration initializes again what another has updated, so they must not be
+// interleaved.
 bool recomputes_shared_updates(const BodyFacts& facts) {
   for (const auto& [buffer, count] : facts.stores) {
     if (count < 2 || facts.allocated.count(buffer)) continue;
-    if (facts.produced.count(buffer) || facts.produced.count(buffer.substr(0, buffer.rfind('.')))) return true;
+    if (facts.produced.count(buffer) || facts.produced.count(buffer.substr(0, buffer.rfind('.'))))
+      return true;
   }
   return false;
 }
@@ -108,15 +116,16 @@ bool has_load(const Expr& e) {
 }
 
 bool is_associative(Kind kind) {
-  return kind == Kind::Add || kind == Kind::Mul || kind == Kind::Min || kind == Kind::Max || kind == Kind::And ||
-         kind == Kind::Or;
+  return kind == Kind::Add || kind == Kind::Mul || kind == Kind::Min || kind == Kind::Max ||
+         kind == Kind::And || kind == Kind::Or;
 }
 
 // Follows the operand that loads f[i] down; everything beside the way is a term.
 std::optional<Reduction> find_reduction(const Store& store) {
   auto is_own_load = [&](const Expr& e) {
     const Load* load = e.as<Load>();
-    return load && load->name == store.name && !load->predicate.defined() && equal(load->index, store.index);
+    return load && load->name == store.name && !load->predicate.defined() &&
+           equal(load->index, store.index);
   };
   Kind kind = store.value.kind() == Kind::Sub ? Kind::Add : store.value.kind();
   if (!is_associative(kind) || is_own_load(store.value)) return std::nullopt;
@@ -137,29 +146,39 @@ std::optional<Reduction> find_reduction(const Store& store) {
 
 ReduceOp reduce_op(Kind kind) {
   switch (kind) {
-    case Kind::Add: return ReduceOp::Add;
-    case Kind::Mul: return ReduceOp::Mul;
-    case Kind::Min: return ReduceOp::Min;
-    case Kind::Max: return ReduceOp::Max;
-    case Kind::And: return ReduceOp::And;
-    default: return ReduceOp::Or;
+    case Kind::Add:
+      return ReduceOp::Add;
+    case Kind::Mul:
+      return ReduceOp::Mul;
+    case Kind::Min:
+      return ReduceOp::Min;
+    case Kind::Max:
+      return ReduceOp::Max;
+    case Kind::And:
+      return ReduceOp::And;
+    default:
+      return ReduceOp::Or;
   }
 }
 
-Expr infinity(Type type, int sign) { return make_const(type, sign * std::numeric_limits<double>::infinity()); }
+Expr infinity(Type type, int sign) {
+  return make_const(type, sign * std::numeric_limits<double>::infinity());
+}
 
 // x op identity == x, bit for bit.
 Expr identity_of(Kind kind, Type type) {
   Type element = type.element_of();
   auto largest = [&] {
     if (type.is_float()) return infinity(element, 1);
-    return type.is_int() ? make_const(element, type.max_int()) : make_uint_const(element, type.max_uint());
+    return type.is_int() ? make_const(element, type.max_int())
+                         : make_uint_const(element, type.max_uint());
   };
   auto smallest = [&] {
     if (type.is_float()) return infinity(element, -1);
     return type.is_int() ? make_const(element, type.min_int()) : make_zero(element);
   };
-  Expr value = kind == Kind::Add   ? (type.is_float() ? make_const(element, -0.0) : make_zero(element))
+  Expr value = kind == Kind::Add
+                   ? (type.is_float() ? make_const(element, -0.0) : make_zero(element))
                : kind == Kind::Min ? largest()
                : kind == Kind::Max ? smallest()
                : kind == Kind::Or  ? make_zero(element)
@@ -172,7 +191,10 @@ Expr identity_of(Kind kind, Type type) {
 class LoopVectorizer {
  public:
   LoopVectorizer(const For& loop, int iterations, FreshNames& fresh)
-      : loop_(loop), iterations_(iterations), fresh_(fresh), widen_(loop.name, loop.min, iterations, fresh) {
+      : loop_(loop),
+        iterations_(iterations),
+        fresh_(fresh),
+        widen_(loop.name, loop.min, iterations, fresh) {
     find_facts(loop.body, facts_);
     must_stay_serial_ = recomputes_shared_updates(facts_);
   }
@@ -189,13 +211,18 @@ class LoopVectorizer {
   Stmt visit(const Stmt& s) {
     if (!s.defined()) return s;
     return match(
-        s, [&](const LetStmt& n) { return visit_let(s, n); }, [&](const For& n) { return visit_for(s, n); },
-        [&](const IfThenElse& n) { return visit_if(s, n); }, [&](const Allocate& n) { return visit_allocate(s, n); },
+        s, [&](const LetStmt& n) { return visit_let(s, n); },
+        [&](const For& n) { return visit_for(s, n); },
+        [&](const IfThenElse& n) { return visit_if(s, n); },
+        [&](const Allocate& n) { return visit_allocate(s, n); },
         [&](const Store& n) { return visit_store(s, n); },
         [&](const Assert& n) {
-          return varies(n.condition) || varies(n.error) || widen_.mask().defined() ? lane_by_lane(s) : s;
+          return varies(n.condition) || varies(n.error) || widen_.mask().defined() ? lane_by_lane(s)
+                                                                                   : s;
         },
-        [&](const Evaluate& n) { return has_effects(n.value) ? lane_by_lane(s) : make_evaluate(Expr(0)); },
+        [&](const Evaluate& n) {
+          return has_effects(n.value) ? lane_by_lane(s) : make_evaluate(Expr(0));
+        },
         [&](const StmtNode&) {
           return map_children(
               s, [](const Expr& e) { return e; }, [&](const Stmt& child) { return visit(child); });
@@ -247,18 +274,22 @@ class LoopVectorizer {
     Stmt body = visit(n.body);
     if (body.same_as(n.body)) return s;
     // Vectors are not handed to other threads.
-    return make_for(n.name, n.min, n.extent, n.for_type == ForType::Parallel ? ForType::Serial : n.for_type, body);
+    return make_for(n.name, n.min, n.extent,
+                    n.for_type == ForType::Parallel ? ForType::Serial : n.for_type, body);
   }
 
   Stmt visit_if(const Stmt& s, const IfThenElse& n) {
     if (has_effects(n.condition)) return lane_by_lane(s);
     Expr condition = widen_(n.condition);
-    if (condition.same_as(n.condition)) return make_if(n.condition, visit(n.then_case), visit(n.else_case));
-    bool must_bind = has_load(condition);  // a store of the branch may change what the condition reads
+    if (condition.same_as(n.condition))
+      return make_if(n.condition, visit(n.then_case), visit(n.else_case));
+    bool must_bind =
+        has_load(condition);  // a store of the branch may change what the condition reads
     std::string name = must_bind ? fresh_(loop_.name + ".mask") : "";
     Expr mask = must_bind ? variable(name, condition.type()) : condition;
-    Stmt branches = make_block({masked_branch(n.condition, mask, n.then_case),
-                                masked_branch(logical_not(n.condition), logical_not(mask), n.else_case)});
+    Stmt branches =
+        make_block({masked_branch(n.condition, mask, n.then_case),
+                    masked_branch(logical_not(n.condition), logical_not(mask), n.else_case)});
     return must_bind ? make_let(name, condition, branches) : branches;
   }
 
@@ -275,8 +306,8 @@ class LoopVectorizer {
     return make_if(make_vector_reduce(ReduceOp::Or, mask, 1), body);
   }
 
-  // In what a branch has become: accesses that did not vary have no predicate, and loops are not worth running for
-  // nobody.
+  // In what a branch has become: accesses that did not vary have no predicate, and loops are not
+  // worth running for nobody.
   static bool needs_an_active_lane(const Stmt& branch) {
     bool found = false;
     walk(
@@ -313,7 +344,8 @@ class LoopVectorizer {
     if (varies(n.index)) {
       Expr index = widen_(n.index);
       if (!hits_each_element_once(index)) require_no_load(n.name, 0);
-      return make_store(n.name, widen_.spread(n.value), index, widen_.masked(n.predicate, lanes), n.symbol);
+      return make_store(n.name, widen_.spread(n.value), index, widen_.masked(n.predicate, lanes),
+                        n.symbol);
     }
     if (auto reduction = find_reduction(n)) return store_reduction(s, n, *reduction);
     require_no_load(n.name, 0);
@@ -321,7 +353,8 @@ class LoopVectorizer {
     return is_same ? s : lane_by_lane(s);  // the last lane wins
   }
 
-  // A buffer that several lanes store to may be read by nothing but the `own` loads of the store itself.
+  // A buffer that several lanes store to may be read by nothing but the `own` loads of the store
+  // itself.
   void require_no_load(const std::string& buffer, int own) {
     auto it = facts_.loads.find(buffer);
     must_stay_serial_ |= it != facts_.loads.end() && it->second > own;
@@ -364,7 +397,8 @@ class LoopVectorizer {
     if (lanes > 1) {  // iteration-major to lane-major: the groups that are reduced lie side by side
       std::vector<int> indices;
       for (int lane = 0; lane < lanes; ++lane) {
-        for (int iteration = 0; iteration < iterations_; ++iteration) indices.push_back(iteration * lanes + lane);
+        for (int iteration = 0; iteration < iterations_; ++iteration)
+          indices.push_back(iteration * lanes + lane);
       }
       wide = make_shuffle({wide}, indices);
     }
@@ -373,11 +407,9 @@ class LoopVectorizer {
 
   // ---- lane by lane ----
 
-  // A loop over the lanes when everything the statement needs of its surroundings can be computed again, else one copy
-  // of the statement per lane, which takes its operands out of the vectors.
-  Stmt lane_by_lane(const Stmt& s) {
-    return can_recompute() ? lane_loop(s) : lane_copies(s);
-  }
+  // A loop over the lanes when everything the statement needs of its surroundings can be computed
+  // again, else one copy of the statement per lane, which takes its operands out of the vectors.
+  Stmt lane_by_lane(const Stmt& s) { return can_recompute() ? lane_loop(s) : lane_copies(s); }
 
   bool can_recompute() const {
     auto is_pure = [](const Expr& e) { return !has_effects(e) && !has_load(e); };
@@ -397,7 +429,8 @@ class LoopVectorizer {
     Expr number = binary(Kind::Sub, variable(lane), loop_.min);
     body = with_own_elements(body, number);
     body = copy_statement(body, fresh_, {{loop_.name, variable(lane)}});
-    return make_for(lane, loop_.min, make_const(loop_.min.type(), iterations_), ForType::Serial, body);
+    return make_for(lane, loop_.min, make_const(loop_.min.type(), iterations_), ForType::Serial,
+                    body);
   }
 
   Stmt lane_copies(const Stmt& s) {
@@ -439,7 +472,9 @@ class LoopVectorizer {
      private:
       Expr own_index(const Expr& index) {
         Expr scaled = binary(Kind::Mul, index, make_const(index.type(), widener_.iterations()));
-        return binary(Kind::Add, scaled, make_broadcast(cast_to(index.type().element_of(), lane_), index.type().lanes()));
+        return binary(
+            Kind::Add, scaled,
+            make_broadcast(cast_to(index.type().element_of(), lane_), index.type().lanes()));
       }
       const Widener& widener_;
       const Expr lane_;
@@ -452,8 +487,8 @@ class LoopVectorizer {
   FreshNames& fresh_;
   Widener widen_;
   BodyFacts facts_;
-  std::vector<OuterLet> lets_;      // around the current statement, those that vary
-  std::vector<Expr> conditions_;    // of one iteration, that make up the mask
+  std::vector<OuterLet> lets_;    // around the current statement, those that vary
+  std::vector<Expr> conditions_;  // of one iteration, that make up the mask
   bool must_stay_serial_ = false;
 };
 
@@ -485,14 +520,17 @@ class Vectorizer : public Rewriter {
     auto extent = as_const_int(simplify(loop->extent));
     std::string what = "vectorize " + describe_loop(loop->name);
     if (!extent) {
-      user_error(what, "the extent of a vectorized loop must be a constant", text("its extent is ", loop->extent),
-                 "Vectorize the inner variable of a split by a constant, or promise the extent with bound()");
+      user_error(what, "the extent of a vectorized loop must be a constant",
+                 text("its extent is ", loop->extent),
+                 "Vectorize the inner variable of a split by a constant, or promise the extent "
+                 "with bound()");
     }
     if (*extent <= 0) return {};
     if (*extent == 1) return substitute(loop->body, loop->name, loop->min);
     int64_t lanes = *extent * widest_vector(loop->body);
     if (lanes > max_lanes) {
-      user_error(what, text("vectors have at most ", max_lanes, " lanes"), text("this loop needs ", lanes),
+      user_error(what, text("vectors have at most ", max_lanes, " lanes"),
+                 text("this loop needs ", lanes),
                  "Split the variable, and vectorize the inner part");
     }
     return LoopVectorizer(*loop, static_cast<int>(*extent), fresh_).run();
@@ -506,12 +544,13 @@ class Vectorizer : public Rewriter {
 
 Stmt vectorize_loops(const Stmt& s) {
   bool has_vectorized = false;
-  walk(s, [](const Expr&) { return false; },
-       [&](const Stmt& node) {
-         const For* loop = node.as<For>();
-         has_vectorized |= loop && loop->for_type == ForType::Vectorized;
-         return !has_vectorized;
-       });
+  walk(
+      s, [](const Expr&) { return false; },
+      [&](const Stmt& node) {
+        const For* loop = node.as<For>();
+        has_vectorized |= loop && loop->for_type == ForType::Vectorized;
+        return !has_vectorized;
+      });
   if (!has_vectorized) return s;
   Stmt result = Vectorizer(s)(s);
   return result.defined() ? result : make_evaluate(Expr(0));

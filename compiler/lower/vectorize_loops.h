@@ -5,7 +5,8 @@
 
 namespace retrograde::ir {
 
-// FlatStorage -> FlatStorage without Vectorized loops. UserError when the extent of such a loop is not a constant.
+// FlatStorage -> FlatStorage without Vectorized loops. UserError when the extent of such a loop is
+// not a constant.
 Stmt vectorize_loops(const Stmt& s);
 
 }  // namespace retrograde::ir

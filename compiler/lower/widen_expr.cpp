@@ -27,13 +27,16 @@ Expr combine_ramps(Kind kind, const Expr& a, const Expr& b) {
   if (ra && rb) {
     bool adds = kind == Kind::Add || kind == Kind::Sub;
     if (!adds || ra->lanes != rb->lanes || ra->base.type() != rb->base.type()) return {};
-    return make_ramp(binary(kind, ra->base, rb->base), binary(kind, ra->stride, rb->stride), ra->lanes);
+    return make_ramp(binary(kind, ra->base, rb->base), binary(kind, ra->stride, rb->stride),
+                     ra->lanes);
   }
   if (ra) {
     Expr part = repeated_part(b, ra->lanes);
     if (!part.defined()) return {};
-    if (kind == Kind::Add || kind == Kind::Sub) return make_ramp(binary(kind, ra->base, part), ra->stride, ra->lanes);
-    if (kind == Kind::Mul) return make_ramp(binary(kind, ra->base, part), binary(kind, ra->stride, part), ra->lanes);
+    if (kind == Kind::Add || kind == Kind::Sub)
+      return make_ramp(binary(kind, ra->base, part), ra->stride, ra->lanes);
+    if (kind == Kind::Mul)
+      return make_ramp(binary(kind, ra->base, part), binary(kind, ra->stride, part), ra->lanes);
     return {};
   }
   if (!rb) return {};
@@ -47,7 +50,8 @@ Expr combine_ramps(Kind kind, const Expr& a, const Expr& b) {
 Expr combine(Kind kind, const Expr& a, const Expr& b) {
   const Broadcast* x = a.as<Broadcast>();
   const Broadcast* y = b.as<Broadcast>();
-  if (x && y && x->lanes == y->lanes) return make_broadcast(binary(kind, x->value, y->value), x->lanes);
+  if (x && y && x->lanes == y->lanes)
+    return make_broadcast(binary(kind, x->value, y->value), x->lanes);
   if (a.type().is_int_or_uint()) {
     Expr ramp = combine_ramps(kind, a, b);
     if (ramp.defined()) return ramp;
@@ -60,7 +64,9 @@ Expr conjoin(const Expr& a, const Expr& b) {
   return b.defined() ? binary(Kind::And, a, b) : a;
 }
 
-Expr counting_ramp(Type type, int lanes) { return make_ramp(make_zero(type), make_one(type), lanes); }
+Expr counting_ramp(Type type, int lanes) {
+  return make_ramp(make_zero(type), make_one(type), lanes);
+}
 
 }  // namespace
 
@@ -85,7 +91,8 @@ Expr repeat_each(const Expr& v, int times) {
   if (b && b->value.type().is_scalar()) return make_broadcast(b->value, b->lanes * times);
   const Ramp* ramp = v.as<Ramp>();
   if (ramp && ramp->base.type().is_scalar()) {
-    return make_ramp(make_broadcast(ramp->base, times), make_broadcast(ramp->stride, times), ramp->lanes);
+    return make_ramp(make_broadcast(ramp->base, times), make_broadcast(ramp->stride, times),
+                     ramp->lanes);
   }
   std::vector<int> indices;
   for (int lane = 0; lane < v.type().lanes(); ++lane) indices.insert(indices.end(), times, lane);
@@ -98,7 +105,8 @@ bool has_effects(const Expr& e) {
     const Call* call = node.as<Call>();
     if (call && call->call_type == CallType::Operator) {
       OpClass cls = op_info(call->op).cls;
-      bool is_value = call->op == Op::random || call->op == Op::undef || call->op == Op::if_then_else;
+      bool is_value =
+          call->op == Op::random || call->op == Op::undef || call->op == Op::if_then_else;
       bool is_fact = call->op >= Op::buffer_host && call->op <= Op::buffer_is_query;
       found |= (cls == OpClass::Effect || cls == OpClass::Internal) && !is_value && !is_fact;
     }
@@ -143,33 +151,44 @@ Expr Widener::masked(const Expr& predicate, int narrow_lanes) {
 
 Expr Widener::index_in_wide_allocation(const Expr& index) {
   Type type = index.type();
-  Expr scaled = combine(Kind::Mul, spread(index), make_const(type.with_lanes(type.lanes() * iterations_), iterations_));
-  return combine(Kind::Add, scaled, repeat_each(counting_ramp(type.element_of(), iterations_), type.lanes()));
+  Expr scaled = combine(Kind::Mul, spread(index),
+                        make_const(type.with_lanes(type.lanes() * iterations_), iterations_));
+  return combine(Kind::Add, scaled,
+                 repeat_each(counting_ramp(type.element_of(), iterations_), type.lanes()));
 }
 
 Expr Widener::widen(const Expr& e) {
   return match(
-      e, [&](const Binary& n) { return widen_binary(e, n); }, [&](const Select& n) { return widen_select(e, n); },
-      [&](const Load& n) { return widen_load(e, n); }, [&](const Ramp& n) { return widen_ramp(e, n); },
-      [&](const Broadcast& n) { return widen_broadcast(e, n); }, [&](const Call& n) { return widen_call(e, n); },
-      [&](const Let& n) { return widen_let(e, n); }, [&](const Shuffle& n) { return widen_shuffle(e, n); },
+      e, [&](const Binary& n) { return widen_binary(e, n); },
+      [&](const Select& n) { return widen_select(e, n); },
+      [&](const Load& n) { return widen_load(e, n); },
+      [&](const Ramp& n) { return widen_ramp(e, n); },
+      [&](const Broadcast& n) { return widen_broadcast(e, n); },
+      [&](const Call& n) { return widen_call(e, n); },
+      [&](const Let& n) { return widen_let(e, n); },
+      [&](const Shuffle& n) { return widen_shuffle(e, n); },
       [&](const Cast& n) {
         Expr value = (*this)(n.value);
         if (value.same_as(n.value)) return e;
         const Ramp* ramp = value.as<Ramp>();
-        bool keeps_ramp = ramp && n.type.is_int() && n.type.bits() >= 32 && n.value.type().is_int() &&
-                          n.value.type().bits() >= 32 && n.type.bits() >= n.value.type().bits();
+        bool keeps_ramp = ramp && n.type.is_int() && n.type.bits() >= 32 &&
+                          n.value.type().is_int() && n.value.type().bits() >= 32 &&
+                          n.type.bits() >= n.value.type().bits();
         if (keeps_ramp) {
-          return make_ramp(cast_to(n.type.element_of(), ramp->base), cast_to(n.type.element_of(), ramp->stride),
-                           ramp->lanes);
+          return make_ramp(cast_to(n.type.element_of(), ramp->base),
+                           cast_to(n.type.element_of(), ramp->stride), ramp->lanes);
         }
         return cast_to(n.type.with_lanes(value.type().lanes()), value);
       },
       [&](const VectorReduce& n) {
         Expr value = (*this)(n.value);
-        return value.same_as(n.value) ? e : make_vector_reduce(n.op, value, n.type.lanes() * iterations_);
+        return value.same_as(n.value)
+                   ? e
+                   : make_vector_reduce(n.op, value, n.type.lanes() * iterations_);
       },
-      [&](const ExprNode&) { return map_children(e, [&](const Expr& child) { return (*this)(child); }); });
+      [&](const ExprNode&) {
+        return map_children(e, [&](const Expr& child) { return (*this)(child); });
+      });
 }
 
 Expr Widener::widen_binary(const Expr& e, const Binary& n) {
@@ -196,7 +215,8 @@ Expr Widener::widen_load(const Expr& e, const Load& n) {
   int lanes = n.type.lanes();
   Type type = n.type.with_lanes(lanes * iterations_);
   if (is_wide_allocation(n.name)) {
-    return make_load(type, n.name, index_in_wide_allocation(n.index), masked(n.predicate, lanes), n.symbol);
+    return make_load(type, n.name, index_in_wide_allocation(n.index), masked(n.predicate, lanes),
+                     n.symbol);
   }
   Expr index = (*this)(n.index), predicate = (*this)(n.predicate);
   bool varies = !index.same_as(n.index) || !predicate.same_as(n.predicate);
@@ -210,7 +230,8 @@ Expr Widener::widen_ramp(const Expr& e, const Ramp& n) {
   if (base.same_as(n.base) && stride.same_as(n.stride)) return e;
   const Ramp* affine = base.as<Ramp>();
   if (affine && affine->lanes == iterations_ && stride.same_as(n.stride)) {
-    return make_ramp(make_ramp(affine->base, n.stride, n.lanes), make_broadcast(affine->stride, n.lanes), iterations_);
+    return make_ramp(make_ramp(affine->base, n.stride, n.lanes),
+                     make_broadcast(affine->stride, n.lanes), iterations_);
   }
   int base_lanes = n.base.type().lanes();
   std::vector<int> blocks;  // every iteration's base n.lanes times
@@ -220,8 +241,10 @@ Expr Widener::widen_ramp(const Expr& e, const Ramp& n) {
     }
   }
   Type element = n.base.type().element_of();
-  Expr steps = make_broadcast(repeat_each(counting_ramp(element, n.lanes), base_lanes), iterations_);
-  Expr bases = make_shuffle({spread(n.base)}, blocks), strides = make_shuffle({spread(n.stride)}, blocks);
+  Expr steps =
+      make_broadcast(repeat_each(counting_ramp(element, n.lanes), base_lanes), iterations_);
+  Expr bases = make_shuffle({spread(n.base)}, blocks),
+       strides = make_shuffle({spread(n.stride)}, blocks);
   return binary(Kind::Add, bases, binary(Kind::Mul, strides, steps));
 }
 
@@ -233,7 +256,8 @@ Expr Widener::widen_broadcast(const Expr& e, const Broadcast& n) {
   std::vector<int> blocks;
   for (int iteration = 0; iteration < iterations_; ++iteration) {
     for (int copy = 0; copy < n.lanes; ++copy) {
-      for (int lane = 0; lane < value_lanes; ++lane) blocks.push_back(iteration * value_lanes + lane);
+      for (int lane = 0; lane < value_lanes; ++lane)
+        blocks.push_back(iteration * value_lanes + lane);
     }
   }
   return make_shuffle({value}, blocks);
@@ -245,7 +269,8 @@ Expr Widener::widen_call(const Expr& e, const Call& n) {
   for (const Expr& arg : n.args) varies |= !(*this)(arg).same_as(arg);
   if (!varies) return e;
   if (n.call_type == CallType::Extern) return widen_extern(n);
-  RETROGRADE_ASSERT(n.call_type == CallType::Operator, "a call of ", n.name, " in the phase FlatStorage");
+  RETROGRADE_ASSERT(n.call_type == CallType::Operator, "a call of ", n.name,
+                    " in the phase FlatStorage");
   std::vector<Expr> args;
   for (const Expr& arg : n.args) args.push_back(spread(arg));
   return call_op(n.op, n.type.with_lanes(n.type.lanes() * iterations_), std::move(args));
@@ -272,7 +297,8 @@ Expr Widener::widen_branches(const Expr& e, const Call& n) {
   }
   Expr t = (*this)(n.args[1]), f = (*this)(n.args[2]);
   if (t.same_as(n.args[1]) && f.same_as(n.args[2])) return e;
-  return call_op(Op::if_then_else, n.type.with_lanes(lanes * iterations_), {c, spread(n.args[1]), spread(n.args[2])});
+  return call_op(Op::if_then_else, n.type.with_lanes(lanes * iterations_),
+                 {c, spread(n.args[1]), spread(n.args[2])});
 }
 
 // C functions take scalars: one call for each lane.
@@ -333,7 +359,8 @@ Expr Widener::widen_shuffle(const Expr& e, const Shuffle& n) {
   std::vector<int> indices;
   for (int iteration = 0; iteration < iterations_; ++iteration) {
     for (int index : n.indices) {
-      indices.push_back(of_lane[index].start + iteration * of_lane[index].lanes + lane_in_source[index]);
+      indices.push_back(of_lane[index].start + iteration * of_lane[index].lanes +
+                        lane_in_source[index]);
     }
   }
   return make_shuffle(std::move(vectors), std::move(indices));

@@ -1,7 +1,9 @@
-// Expressions of a loop body, for all iterations at once: the vector of the values that an expression takes.
+// Expressions of a loop body, for all iterations at once: the vector of the values that an
+// expression takes.
 //
-// Layout: an expression of L lanes becomes one of N*L lanes, iteration-major: lanes [i*L, (i+1)*L) are its value in
-// iteration i. In the program's terms a Ramp or Broadcast around a vector concatenates: Ramp(b, s, N) is b, b + s, ...
+// Layout: an expression of L lanes becomes one of N*L lanes, iteration-major: lanes [i*L, (i+1)*L)
+// are its value in iteration i. In the program's terms a Ramp or Broadcast around a vector
+// concatenates: Ramp(b, s, N) is b, b + s, ...
 #pragma once
 
 #include <string>
@@ -17,14 +19,16 @@ namespace retrograde::ir {
 Expr extract_iteration(const Expr& wide, int iteration, int narrow_lanes);
 // Every lane of `v` repeated `times` in place: a b -> a a b b.
 Expr repeat_each(const Expr& v, int times);
-// Calls that do more than compute a value: print, require, error, ... (random and undef are values).
+// Calls that do more than compute a value: print, require, error, ... (random and undef are
+// values).
 bool has_effects(const Expr& e);
 
 class Widener {
  public:
   Widener(const std::string& variable, const Expr& min, int iterations, FreshNames& fresh);
 
-  // For all iterations; the same handle when the value is the same in all of them (then with L lanes still).
+  // For all iterations; the same handle when the value is the same in all of them (then with L
+  // lanes still).
   Expr operator()(const Expr& e);
   // Always with N*L lanes.
   Expr spread(const Expr& e);
@@ -34,14 +38,17 @@ class Widener {
   void bind(const std::string& name, const Expr& wide) { wide_values_[name] = wide; }
   const std::unordered_map<std::string, Expr>& bound() const { return wide_values_; }
 
-  // An allocation that every iteration has its own copy of: element e of iteration i is element e*N + i.
+  // An allocation that every iteration has its own copy of: element e of iteration i is element e*N
+  // + i.
   void bind_allocation(const std::string& name) { wide_allocations_.insert(name); }
-  bool is_wide_allocation(const std::string& name) const { return wide_allocations_.count(name) > 0; }
+  bool is_wide_allocation(const std::string& name) const {
+    return wide_allocations_.count(name) > 0;
+  }
   const std::unordered_set<std::string>& wide_allocations() const { return wide_allocations_; }
   Expr index_in_wide_allocation(const Expr& index);
 
-  // Bool of N lanes: the iterations that run; undefined when all do. Loads that vary are predicated by it. What does
-  // not vary is loaded as it was, so some iteration must run.
+  // Bool of N lanes: the iterations that run; undefined when all do. Loads that vary are predicated
+  // by it. What does not vary is loaded as it was, so some iteration must run.
   const Expr& mask() const { return mask_; }
   void set_mask(const Expr& mask);
   // A predicate of N*L lanes: `predicate` (may be undefined) and the mask.
@@ -65,7 +72,8 @@ class Widener {
   const int iterations_;
   FreshNames& fresh_;
   Expr mask_;
-  bool may_run_nowhere_ = false;  // inside an arm of if_then_else: even what does not vary is loaded under the mask
+  bool may_run_nowhere_ =
+      false;  // inside an arm of if_then_else: even what does not vary is loaded under the mask
   struct Entry {
     Expr key, value;
   };

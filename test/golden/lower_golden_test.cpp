@@ -1,5 +1,6 @@
-// Every golden/lower/<pass>/<case>.in through its pass must give <case>.out. RETROGRADE_UPDATE_GOLDEN=1 writes the .out
-// files instead; read the difference before you commit it.
+// Every golden/lower/<pass>/<case>.in through its pass must give <case>.out.
+// RETROGRADE_UPDATE_GOLDEN=1 writes the .out files instead; read the difference before you commit
+// it.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -33,12 +34,14 @@ std::string read_file(const fs::path& path) {
 
 std::vector<GoldenCase> find_cases() {
   std::vector<GoldenCase> cases;
-  for (const auto& entry : fs::recursive_directory_iterator(fs::path(RETROGRADE_TEST_DIR) / "golden/lower")) {
+  for (const auto& entry :
+       fs::recursive_directory_iterator(fs::path(RETROGRADE_TEST_DIR) / "golden/lower")) {
     if (entry.path().extension() == ".in") {
       cases.push_back({entry.path().parent_path().filename().string(), entry.path()});
     }
   }
-  std::sort(cases.begin(), cases.end(), [](const GoldenCase& a, const GoldenCase& b) { return a.input < b.input; });
+  std::sort(cases.begin(), cases.end(),
+            [](const GoldenCase& a, const GoldenCase& b) { return a.input < b.input; });
   return cases;
 }
 
@@ -75,7 +78,8 @@ TEST_P(LowerGolden, TwiceGivesTheSameText) {
 
 INSTANTIATE_TEST_SUITE_P(Cases, LowerGolden, testing::ValuesIn(find_cases()), [](const auto& info) {
   std::string name = info.param.pass + "_" + info.param.input.stem().string();
-  std::replace_if(name.begin(), name.end(), [](unsigned char c) { return !std::isalnum(c); }, '_');
+  std::replace_if(
+      name.begin(), name.end(), [](unsigned char c) { return !std::isalnum(c); }, '_');
   return name;
 });
 

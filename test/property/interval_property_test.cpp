@@ -1,5 +1,5 @@
-// Random integer expressions over small boxes: every value that occurs lies in bounds_of, and a condition holds wherever
-// solve_for says so. The seed is printed with a failure.
+// Random integer expressions over small boxes: every value that occurs lies in bounds_of, and a
+// condition holds wherever solve_for says so. The seed is printed with a failure.
 #include <gtest/gtest.h>
 
 #include <random>
@@ -21,48 +21,78 @@ class RandomExpr {
   int number(int low, int high) { return std::uniform_int_distribution<int>(low, high)(random_); }
 
   Expr integer(int depth) {
-    if (depth == 0) return number(0, 3) == 0 ? Expr(number(-9, 9)) : variable(names[number(0, 2)], Int(32));
+    if (depth == 0)
+      return number(0, 3) == 0 ? Expr(number(-9, 9)) : variable(names[number(0, 2)], Int(32));
     Expr a = integer(depth - 1), b = number(0, 2) == 0 ? integer(depth - 1) : integer(0);
     Expr c = number(1, 6);
     switch (number(0, 15)) {
-      case 0: return a + b;
-      case 1: return a - b;
-      case 2: return a * number(-4, 4);
-      case 3: return a * b;
-      case 4: return a / c;
-      case 5: return a % c;
-      case 6: return a / -c;
-      case 7: return a / b;
-      case 8: return a % b;
-      case 9: return min(a, b);
-      case 10: return max(a, b);
-      case 11: return clamp(a, -3, 4);
-      case 12: return select(condition(depth - 1), a, b);
-      case 13: return cast(Int(32), cast(number(0, 1) ? UInt(8) : Int(8), a));
-      case 14: return cast(Int(32), call_op(Op::abs, UInt(32), {a}));
-      default: return bits(a, b);
+      case 0:
+        return a + b;
+      case 1:
+        return a - b;
+      case 2:
+        return a * number(-4, 4);
+      case 3:
+        return a * b;
+      case 4:
+        return a / c;
+      case 5:
+        return a % c;
+      case 6:
+        return a / -c;
+      case 7:
+        return a / b;
+      case 8:
+        return a % b;
+      case 9:
+        return min(a, b);
+      case 10:
+        return max(a, b);
+      case 11:
+        return clamp(a, -3, 4);
+      case 12:
+        return select(condition(depth - 1), a, b);
+      case 13:
+        return cast(Int(32), cast(number(0, 1) ? UInt(8) : Int(8), a));
+      case 14:
+        return cast(Int(32), call_op(Op::abs, UInt(32), {a}));
+      default:
+        return bits(a, b);
     }
   }
   Expr bits(const Expr& a, const Expr& b) {
     switch (number(0, 4)) {
-      case 0: return call_op(Op::bitwise_and, {a, Expr(number(0, 12))});
-      case 1: return call_op(Op::bitwise_or, {max(a, 0), max(b, 0)});
-      case 2: return call_op(Op::shift_right, {a, Expr(number(0, 3))});
-      case 3: return call_op(Op::shift_left, {a, Expr(number(0, 3))});
-      default: return cast(Int(32), call_op(Op::absd, UInt(32), {a, b}));
+      case 0:
+        return call_op(Op::bitwise_and, {a, Expr(number(0, 12))});
+      case 1:
+        return call_op(Op::bitwise_or, {max(a, 0), max(b, 0)});
+      case 2:
+        return call_op(Op::shift_right, {a, Expr(number(0, 3))});
+      case 3:
+        return call_op(Op::shift_left, {a, Expr(number(0, 3))});
+      default:
+        return cast(Int(32), call_op(Op::absd, UInt(32), {a, b}));
     }
   }
   Expr condition(int depth) {
     Expr a = integer(depth), b = integer(0);
     switch (number(0, 7)) {
-      case 0: return a < b;
-      case 1: return a <= b;
-      case 2: return a > b;
-      case 3: return a >= b;
-      case 4: return a == b;
-      case 5: return a != b;
-      case 6: return depth > 0 ? condition(depth - 1) && condition(depth - 1) : a < b;
-      default: return depth > 0 ? condition(depth - 1) || !condition(depth - 1) : a <= b;
+      case 0:
+        return a < b;
+      case 1:
+        return a <= b;
+      case 2:
+        return a > b;
+      case 3:
+        return a >= b;
+      case 4:
+        return a == b;
+      case 5:
+        return a != b;
+      case 6:
+        return depth > 0 ? condition(depth - 1) && condition(depth - 1) : a < b;
+      default:
+        return depth > 0 ? condition(depth - 1) || !condition(depth - 1) : a <= b;
     }
   }
 
@@ -117,8 +147,10 @@ TEST(IntervalProperty, SolutionsHold) {
     if (!solution) continue;
     if (solution->needed.defined() && value_at(solution->needed, point(0, 0, z)) == 0) continue;
     int64_t low = -12, high = 12;
-    if (solution->interval.min.defined()) low = std::max(low, value_at(solution->interval.min, point(0, 0, z)));
-    if (solution->interval.max.defined()) high = std::min(high, value_at(solution->interval.max, point(0, 0, z)));
+    if (solution->interval.min.defined())
+      low = std::max(low, value_at(solution->interval.min, point(0, 0, z)));
+    if (solution->interval.max.defined())
+      high = std::min(high, value_at(solution->interval.max, point(0, 0, z)));
     solved += low <= high;
     for (int64_t x = low; x <= high; ++x) {
       for (int y = y0; y <= y1; ++y) {

@@ -1,5 +1,5 @@
-// Random loop nests, run before and after the passes over loops and memory: the same buffers, the same prints. The seed
-// of a failure is in its message.
+// Random loop nests, run before and after the passes over loops and memory: the same buffers, the
+// same prints. The seed of a failure is in its message.
 #include <gtest/gtest.h>
 
 #include <random>
@@ -14,7 +14,8 @@
 namespace retrograde::ir {
 namespace {
 
-constexpr int width = 24, height = 6, margin = 40;  // of the image; the buffers have a margin on both sides
+constexpr int width = 24, height = 6,
+              margin = 40;  // of the image; the buffers have a margin on both sides
 
 // Programs whose iterations are independent, but for reductions.
 class RandomProgram {
@@ -35,10 +36,13 @@ class RandomProgram {
   int number(int low, int high) { return std::uniform_int_distribution<int>(low, high)(random_); }
   bool flip() { return number(0, 1) == 1; }
   std::string name(const char* base) { return std::string(base) + std::to_string(names_++); }
-  Expr any_coordinate() { return coordinates_[number(0, static_cast<int>(coordinates_.size()) - 1)]; }
+  Expr any_coordinate() {
+    return coordinates_[number(0, static_cast<int>(coordinates_.size()) - 1)];
+  }
 
   ForType loop_type() {
-    static constexpr ForType types[] = {ForType::Serial, ForType::Parallel, ForType::Vectorized, ForType::Unrolled};
+    static constexpr ForType types[] = {ForType::Serial, ForType::Parallel, ForType::Vectorized,
+                                        ForType::Unrolled};
     return types[number(0, 3)];
   }
 
@@ -55,7 +59,8 @@ class RandomProgram {
       ForType type = loop_type();
       bool needs_constant = type == ForType::Vectorized || type == ForType::Unrolled;
       Expr extent = needs_constant || flip() ? Expr(number(1, 9)) : variable("w");
-      Stmt loop = make_for(x_name, flip() ? Expr(0) : variable("x_min"), extent, type, body(x, y, 2));
+      Stmt loop =
+          make_for(x_name, flip() ? Expr(0) : variable("x_min"), extent, type, body(x, y, 2));
       return make_for(y_name, 0, number(1, height), y_type, loop);
     }
     Expr xi = variable(name("xi"));
@@ -97,8 +102,9 @@ class RandomProgram {
         Expr index = y + margin;
         Expr g = value(1), best = make_load(Int(32), "m", index);
         Expr t = variable(name("better"), Bool());
-        Stmt stores = make_block({make_store("m", make_select(t, g, best), index),
-                                  make_store("p", make_select(t, x, make_load(Int(32), "p", index)), index)});
+        Stmt stores =
+            make_block({make_store("m", make_select(t, g, best), index),
+                        make_store("p", make_select(t, x, make_load(Int(32), "p", index)), index)});
         return make_let(t.as<Variable>()->name, g > best, stores);
       }
       case 4: {
@@ -130,8 +136,9 @@ class RandomProgram {
         return make_for(r.as<Variable>()->name, number(-1, 1), extent, type, sum);
       }
       default:  // reads only where it may
-        return make_if(x >= 3 && x < 10, make_store("b", make_load(Int(32), "tight", x - 3) + value(1),
-                                                    x + y * width + margin));
+        return make_if(
+            x >= 3 && x < 10,
+            make_store("b", make_load(Int(32), "tight", x - 3) + value(1), x + y * width + margin));
     }
   }
 
@@ -140,12 +147,15 @@ class RandomProgram {
     std::string buffer = name("scratch");
     Expr k = variable(name("k"));
     coordinates_.push_back(k);
-    Stmt fill = make_for(k.as<Variable>()->name, 0, 3, flip() ? ForType::Serial : ForType::Vectorized,
-                         make_store(buffer, value(1), k));
+    Stmt fill =
+        make_for(k.as<Variable>()->name, 0, 3, flip() ? ForType::Serial : ForType::Vectorized,
+                 make_store(buffer, value(1), k));
     coordinates_.pop_back();
-    Stmt use = make_store("b", make_load(Int(32), buffer, 0) + make_load(Int(32), buffer, any_coordinate() % 3),
-                          x + y * width + margin);
-    return make_allocate(buffer, Int(32), MemoryType::Auto, make_const(Int(64), 3), make_block({fill, use}));
+    Stmt use = make_store(
+        "b", make_load(Int(32), buffer, 0) + make_load(Int(32), buffer, any_coordinate() % 3),
+        x + y * width + margin);
+    return make_allocate(buffer, Int(32), MemoryType::Auto, make_const(Int(64), 3),
+                         make_block({fill, use}));
   }
 
   Expr position() { return any_coordinate() + number(-4, 4); }
@@ -153,11 +163,16 @@ class RandomProgram {
   Expr condition() {
     Expr a = position();
     switch (number(0, 4)) {
-      case 0: return a < variable("w") - 2;
-      case 1: return a >= 2;
-      case 2: return a >= 1 && any_coordinate() < 4;
-      case 3: return value(0) % 2 == 0;
-      default: return a <= any_coordinate() + 1;
+      case 0:
+        return a < variable("w") - 2;
+      case 1:
+        return a >= 2;
+      case 2:
+        return a >= 1 && any_coordinate() < 4;
+      case 3:
+        return value(0) % 2 == 0;
+      default:
+        return a <= any_coordinate() + 1;
     }
   }
 
@@ -165,14 +180,17 @@ class RandomProgram {
     Expr at = position();
     Expr last = flip() ? Expr(width - 1) : variable("w") - 1;
     switch (number(0, 3)) {
-      case 0: return make_load(Int(32), "in", clamp(likely(at), 0, last));
-      case 1: return make_load(Int(32), "in", max(min(at, last), 0));
+      case 0:
+        return make_load(Int(32), "in", clamp(likely(at), 0, last));
+      case 1:
+        return make_load(Int(32), "in", max(min(at, last), 0));
       case 2: {
         Expr outside = at < 0 || at > last;
         Expr inside_value = make_load(Int(32), "in", clamp(at, 0, last));
         return make_select(outside, Expr(-1), likely(inside_value));
       }
-      default: return make_load(Int(32), "in", max(likely_if_innermost(at), 0) % width);
+      default:
+        return make_load(Int(32), "in", max(likely_if_innermost(at), 0) % width);
     }
   }
   static Expr likely_if_innermost(const Expr& e) { return call_op(Op::likely_if_innermost, {e}); }
@@ -181,22 +199,31 @@ class RandomProgram {
     if (depth == 0) return flip() ? read() : any_coordinate();
     Expr a = value(depth - 1), b = value(0);
     switch (number(0, 8)) {
-      case 0: return a + b;
-      case 1: return a - b * 2;
-      case 2: return min(a, b) % 64;
-      case 3: return make_select(a < b, b, a % 32);
-      case 4: return (a % 8) * (b % 8);
-      case 5: {  // the arm may be read only where the condition holds, although its address does not vary with x
+      case 0:
+        return a + b;
+      case 1:
+        return a - b * 2;
+      case 2:
+        return min(a, b) % 64;
+      case 3:
+        return make_select(a < b, b, a % 32);
+      case 4:
+        return (a % 8) * (b % 8);
+      case 5: {  // the arm may be read only where the condition holds, although its address does
+                 // not vary with x
         Expr low = coordinates_[0] % 2;
         Expr c = low == 0 && a < b;
-        return call_op(Op::if_then_else, Int(32), {c, make_load(Int(32), "tight", 6 + 5 * low) + read(), b});
+        return call_op(Op::if_then_else, Int(32),
+                       {c, make_load(Int(32), "tight", 6 + 5 * low) + read(), b});
       }
       case 6: {
         std::string t = name("e");
         return make_let(t, a, variable(t) + variable(t) % 4 - b);
       }
-      case 7: return call_extern("first_of", Int(32), {a, b});
-      default: return cast(Int(32), cast(UInt(8), a)) + b;
+      case 7:
+        return call_extern("first_of", Int(32), {a, b});
+      default:
+        return cast(Int(32), cast(UInt(8), a)) + b;
     }
   }
 };
@@ -212,7 +239,8 @@ Outcome run(const Stmt& s, int w, int x_min) {
   StatementEvaluator evaluator;
   auto fill = [&](const char* name, int size) {
     std::vector<Scalar>& buffer = evaluator.buffers[name];
-    for (int i = 0; i < size; ++i) buffer.push_back(Scalar::of_int(Int(32), (i * 37 + 11) % 101 - 40));
+    for (int i = 0; i < size; ++i)
+      buffer.push_back(Scalar::of_int(Int(32), (i * 37 + 11) % 101 - 40));
   };
   for (const char* name : {"a", "b", "s", "m", "p"}) fill(name, width * height + 2 * margin);
   fill("in", width);
@@ -229,19 +257,25 @@ Outcome run(const Stmt& s, int w, int x_min) {
     for (const Scalar& element : buffer) outcome.buffers[name].push_back(element.i);
   }
   outcome.printed = evaluator.printed;
-  std::sort(outcome.printed.begin(), outcome.printed.end());  // lanes of one statement run before the next statement
+  std::sort(outcome.printed.begin(),
+            outcome.printed.end());  // lanes of one statement run before the next statement
   return outcome;
 }
 
 const std::vector<std::string> free_names = {"w", "x_min"};
 
-void expect_same(const char* pass, unsigned seed, const Stmt& before, const Stmt& after, Phase phase) {
-  ASSERT_NO_THROW(validate(after, phase, pass, free_names)) << "seed " << seed << "\n" << before << "\n=>\n" << after;
+void expect_same(const char* pass, unsigned seed, const Stmt& before, const Stmt& after,
+                 Phase phase) {
+  ASSERT_NO_THROW(validate(after, phase, pass, free_names)) << "seed " << seed << "\n"
+                                                            << before << "\n=>\n"
+                                                            << after;
   for (auto [w, x_min] : {std::pair(17, 1), std::pair(6, -2), std::pair(width, 0)}) {
     Outcome expected = run(before, w, x_min), found = run(after, w, x_min);
     ASSERT_EQ(expected.error, "") << "seed " << seed << "\n" << before;
     ASSERT_EQ(found.error, "") << pass << ", seed " << seed << "\n" << before << "\n=>\n" << after;
-    ASSERT_TRUE(expected == found) << pass << ", seed " << seed << ", w " << w << "\n" << before << "\n=>\n" << after;
+    ASSERT_TRUE(expected == found) << pass << ", seed " << seed << ", w " << w << "\n"
+                                   << before << "\n=>\n"
+                                   << after;
   }
 }
 
@@ -251,7 +285,9 @@ TEST_P(LoopPasses, KeepWhatProgramsCompute) {
   constexpr unsigned count = 100;
   for (unsigned seed = GetParam() * count; seed < (GetParam() + 1) * count; ++seed) {
     Stmt program = RandomProgram(seed).make();
-    ASSERT_NO_THROW(validate(program, Phase::FlatStorage, "generator", free_names)) << "seed " << seed << "\n" << program;
+    ASSERT_NO_THROW(validate(program, Phase::FlatStorage, "generator", free_names))
+        << "seed " << seed << "\n"
+        << program;
     Stmt partitioned = partition_loops(program);
     expect_same("partition_loops", seed, program, partitioned, Phase::FlatStorage);
     Stmt unrolled = unroll_loops(partitioned);
@@ -259,7 +295,8 @@ TEST_P(LoopPasses, KeepWhatProgramsCompute) {
     Stmt vectorized = vectorize_loops(unrolled);
     expect_same("vectorize_loops", seed, program, vectorized, Phase::Vector);
     expect_same("free_early", seed, program, free_early(vectorized), Phase::Vector);
-    expect_same("vectorize_loops alone", seed, program, vectorize_loops(unroll_loops(program)), Phase::Vector);
+    expect_same("vectorize_loops alone", seed, program, vectorize_loops(unroll_loops(program)),
+                Phase::Vector);
     if (HasFatalFailure()) return;
   }
 }

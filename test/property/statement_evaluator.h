@@ -1,5 +1,6 @@
-// Runs a flat statement on small buffers, lane by lane, with the meaning of ir/scalar.h: what passes must preserve.
-// Reading or writing outside of a buffer, or of one that is freed, is an error (an exception with the access in it).
+// Runs a flat statement on small buffers, lane by lane, with the meaning of ir/scalar.h: what
+// passes must preserve. Reading or writing outside of a buffer, or of one that is freed, is an
+// error (an exception with the access in it).
 #pragma once
 
 #include <algorithm>
@@ -22,7 +23,9 @@ class StatementEvaluator {
   std::map<std::string, std::vector<Scalar>> buffers;
   std::vector<int64_t> printed;
 
-  void set(const std::string& name, int64_t value) { variables_[name] = {Scalar::of_int(Int(32), value)}; }
+  void set(const std::string& name, int64_t value) {
+    variables_[name] = {Scalar::of_int(Int(32), value)};
+  }
 
   void run(const Stmt& s) {
     if (!s.defined()) return;
@@ -42,7 +45,9 @@ class StatementEvaluator {
           if (!buffers.count(n.name)) fail("free", n.name, 0);
           buffers[n.name].clear();
         },
-        [&](const IfThenElse& n) { run(eval(n.condition)[0].as_bool() ? n.then_case : n.else_case); },
+        [&](const IfThenElse& n) {
+          run(eval(n.condition)[0].as_bool() ? n.then_case : n.else_case);
+        },
         [&](const Evaluate& n) { eval(n.value); }, [&](const ProducerConsumer& n) { run(n.body); },
         [&](const Block& n) {
           for (const Stmt& child : n.stmts) run(child);
@@ -54,12 +59,16 @@ class StatementEvaluator {
     if (auto constant = as_scalar(e)) return Value(e.type().lanes(), *constant);
     return match(
         e, [&](const Variable& n) { return variable_value(n.name); },
-        [&](const Cast& n) { return map(eval(n.value), [&](const Scalar& v) { return eval_cast(n.type.element_of(), v); }); },
+        [&](const Cast& n) {
+          return map(eval(n.value),
+                     [&](const Scalar& v) { return eval_cast(n.type.element_of(), v); });
+        },
         [&](const Binary& n) { return eval_lanes(n); },
         [&](const Not& n) { return map(eval(n.a), [](const Scalar& v) { return eval_not(v); }); },
         [&](const Select& n) {
           Value c = eval(n.condition), t = eval(n.true_value), f = eval(n.false_value), result;
-          for (size_t i = 0; i < t.size(); ++i) result.push_back(c[c.size() == 1 ? 0 : i].as_bool() ? t[i] : f[i]);
+          for (size_t i = 0; i < t.size(); ++i)
+            result.push_back(c[c.size() == 1 ? 0 : i].as_bool() ? t[i] : f[i]);
           return result;
         },
         [&](const Load& n) { return eval_load(n); },
@@ -91,14 +100,18 @@ class StatementEvaluator {
           return result;
         },
         [&](const VectorReduce& n) { return eval_reduce(n); },
-        [&](const ExprNode&) -> Value { throw std::runtime_error("expression not evaluated: " + print(e)); });
+        [&](const ExprNode&) -> Value {
+          throw std::runtime_error("expression not evaluated: " + print(e));
+        });
   }
 
  private:
   std::map<std::string, Value> variables_;
 
   // What nobody has stored: a value that changes the result when it is used.
-  static Scalar poison(Type type) { return type.is_float() ? Scalar::of_float(type, 777) : Scalar::of_int(type, 777); }
+  static Scalar poison(Type type) {
+    return type.is_float() ? Scalar::of_float(type, 777) : Scalar::of_int(type, 777);
+  }
 
   [[noreturn]] static void fail(const std::string& what, const std::string& name, int64_t index) {
     throw std::runtime_error(what + " outside of " + name + " at " + std::to_string(index));
@@ -124,7 +137,8 @@ class StatementEvaluator {
 
   Scalar& element(const std::string& what, const std::string& name, int64_t index) {
     auto it = buffers.find(name);
-    if (it == buffers.end() || index < 0 || index >= static_cast<int64_t>(it->second.size())) fail(what, name, index);
+    if (it == buffers.end() || index < 0 || index >= static_cast<int64_t>(it->second.size()))
+      fail(what, name, index);
     return it->second[index];
   }
 
@@ -162,12 +176,14 @@ class StatementEvaluator {
   }
 
   Value eval_reduce(const VectorReduce& n) {
-    static constexpr Kind kinds[] = {Kind::Add, Kind::Mul, Kind::Min, Kind::Max, Kind::And, Kind::Or};
+    static constexpr Kind kinds[] = {Kind::Add, Kind::Mul, Kind::Min,
+                                     Kind::Max, Kind::And, Kind::Or};
     Value all = eval(n.value), result;
     size_t group = all.size() / n.type.lanes();
     for (size_t start = 0; start < all.size(); start += group) {
       Scalar sum = all[start];
-      for (size_t i = 1; i < group; ++i) sum = eval_binary(kinds[static_cast<int>(n.op)], sum, all[start + i]);
+      for (size_t i = 1; i < group; ++i)
+        sum = eval_binary(kinds[static_cast<int>(n.op)], sum, all[start + i]);
       result.push_back(sum);
     }
     return result;

@@ -1,5 +1,5 @@
-// Tightness of interval arithmetic on the index expressions that pipelines are made of. Soundness: see
-// property/interval_property_test.cpp.
+// Tightness of interval arithmetic on the index expressions that pipelines are made of. Soundness:
+// see property/interval_property_test.cpp.
 #include "analysis/interval.h"
 
 #include <gtest/gtest.h>
@@ -26,7 +26,9 @@ class IntervalTest : public testing::Test {
     auto end = [](const Expr& x) { return x.defined() ? print(x) : std::string("?"); };
     return "[" + end(v.min) + ", " + end(v.max) + "]";
   }
-  static std::string interval(const Expr& min, const Expr& max) { return "[" + print(min) + ", " + print(max) + "]"; }
+  static std::string interval(const Expr& min, const Expr& max) {
+    return "[" + print(min) + ", " + print(max) + "]";
+  }
 
   Scope<Interval> scope;
   Expr x = var("x"), i = var("i"), s = var("s"), n = var("n"), anything = var("anything");
@@ -72,7 +74,8 @@ TEST_F(IntervalTest, ClampBoundsTheUnbounded) {
   Expr loaded = call_image("in", Float(32), {x}, {});
   EXPECT_EQ(bounds(clamp(cast(Int(32), loaded * 8.0f), 0, 7)), "[0, 7]");
   EXPECT_EQ(bounds(cast(Int(32), clamp(loaded, 0.0f, 1.0f) * 8.0f)), "[0, 8]");
-  EXPECT_EQ(bounds(cast(Int(32), call_op(Op::floor, {clamp(loaded, 0.0f, 1.0f) * 7.5f}))), "[0, 7]");
+  EXPECT_EQ(bounds(cast(Int(32), call_op(Op::floor, {clamp(loaded, 0.0f, 1.0f) * 7.5f}))),
+            "[0, 7]");
 }
 
 TEST_F(IntervalTest, AValueThatMayBeNaNHasNoBounds) {
@@ -106,8 +109,10 @@ TEST_F(IntervalTest, SelectNarrowsByItsCondition) {
 }
 
 TEST_F(IntervalTest, LetsAndPromisesAreFollowed) {
-  EXPECT_EQ(bounds(make_let("t", x + 1, variable("t", Int(32)) * 2)), interval(xmin * 2 + 2, xmax * 2 + 2));
-  EXPECT_EQ(bounds(call_op(Op::unsafe_promise_clamped, {anything, Expr(0), n - 1})), interval(Expr(0), max(n - 1, 0)));
+  EXPECT_EQ(bounds(make_let("t", x + 1, variable("t", Int(32)) * 2)),
+            interval(xmin * 2 + 2, xmax * 2 + 2));
+  EXPECT_EQ(bounds(call_op(Op::unsafe_promise_clamped, {anything, Expr(0), n - 1})),
+            interval(Expr(0), max(n - 1, 0)));
 }
 
 TEST_F(IntervalTest, ValuesOfFuncsComeFromTheCaller) {
@@ -118,7 +123,8 @@ TEST_F(IntervalTest, ValuesOfFuncsComeFromTheCaller) {
 }
 
 TEST_F(IntervalTest, FootprintIsTheHullOfAllReads) {
-  Expr f = call_func("f", Float(32), {x - 1, i}, 0, {}) + call_func("f", Float(32), {x + 2, i * 2}, 0, {});
+  Expr f = call_func("f", Float(32), {x - 1, i}, 0, {}) +
+           call_func("f", Float(32), {x + 2, i * 2}, 0, {});
   auto found = footprints(f, scope);
   ASSERT_EQ(found.size(), 1u);
   const Box& box = found["f"].box;

@@ -1,9 +1,9 @@
-// Schedules that exercise the passes over loops, end to end: the scheduled pipeline gives what the unscheduled one
-// gives, bit for bit. Sizes are odd, so that every split has a tail.
+// Schedules that exercise the passes over loops, end to end: the scheduled pipeline gives what the
+// unscheduled one gives, bit for bit. Sizes are odd, so that every split has a tail.
 #include <gtest/gtest.h>
 
-#include <functional>
 #include <retrograde/retrograde.h>
+#include <functional>
 
 namespace retrograde {
 namespace {
@@ -14,7 +14,8 @@ class LoopSchedules : public testing::Test {
  protected:
   LoopSchedules() : input(width, height) {
     for (int j = 0; j < height; ++j) {
-      for (int i = 0; i < width; ++i) input(i, j) = static_cast<float>((i * 37 + j * 11) % 53) * 0.25f - 3;
+      for (int i = 0; i < width; ++i)
+        input(i, j) = static_cast<float>((i * 37 + j * 11) % 53) * 0.25f - 3;
     }
   }
 
@@ -37,7 +38,8 @@ TEST_F(LoopSchedules, VectorsInTwoDimensions) {
   expect_same<float>([&](bool scheduled) {
     Func c = edge(), f("f");
     f(x, y) = c(x - 1, y) * 2.0f + c(x + 1, y + 1) * c(y, x);
-    if (scheduled) f.tile(x, y, xo, yo, xi, yi, 4, 2, TailStrategy::GuardWithIf).vectorize(xi).vectorize(yi);
+    if (scheduled)
+      f.tile(x, y, xo, yo, xi, yi, 4, 2, TailStrategy::GuardWithIf).vectorize(xi).vectorize(yi);
     return f;
   });
 }
@@ -66,7 +68,9 @@ TEST_F(LoopSchedules, TilesOfEveryBoundaryCondition) {
       g(x, y) = c(x - 2, y) + c(x + 3, y - 1);
       f(x, y) = g(x, y - 1) + g(x, y + 1) * 2.0f;
       if (scheduled) {
-        f.tile(x, y, xo, yo, xi, yi, 16, 8, TailStrategy::GuardWithIf).vectorize(xi, 8).parallel(yo);
+        f.tile(x, y, xo, yo, xi, yi, 16, 8, TailStrategy::GuardWithIf)
+            .vectorize(xi, 8)
+            .parallel(yo);
         g.compute_at(f, xo).vectorize(x, 8);
       }
       return f;
@@ -131,7 +135,8 @@ TEST_F(LoopSchedules, GathersFromATable) {
   expect_same<float>([&](bool scheduled) {
     Func c = edge(), table("table"), f("f");
     table(i) = cast<float>(i * i);
-    f(x, y) = table(clamp(cast<int>(c(x, y) * 4.0f), 0, 20)) + table(cast<int>(clamp(c(x, y), 0.0f, 1.0f) * 15.0f));
+    f(x, y) = table(clamp(cast<int>(c(x, y) * 4.0f), 0, 20)) +
+              table(cast<int>(clamp(c(x, y), 0.0f, 1.0f) * 15.0f));
     if (scheduled) {
       table.compute_root().vectorize(i, 8, TailStrategy::GuardWithIf);
       f.vectorize(x, 8).parallel(y);
