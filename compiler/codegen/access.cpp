@@ -78,6 +78,12 @@ static std::vector<Expr> pieces_of(const Expr &index) {
   return pieces;
 }
 
+// Addresses extend indices by their sign.
+Value *FunctionGenerator::index_vector(const Expr &index) {
+  const Type type = index.type();
+  return type.is_uint() ? convert(e_, Int(64, type.lanes()), type, value(index)) : value(index);
+}
+
 Value *FunctionGenerator::element_pointer(const Storage &from, Type type, Value *index) {
   return b_.CreateGEP(memory_type(e_, type), from.base, index);
 }
@@ -121,7 +127,7 @@ Value *FunctionGenerator::load_scalar(const Storage &from, Type type, Value *ind
 Value *FunctionGenerator::load_vector(const Storage &from, Type type, const Expr &index, Value *predicate) {
   if (const auto linear = as_linear(index)) return load_linear(from, type, *linear, predicate);
   const std::vector<Expr> pieces = pieces_of(index);
-  if (pieces.empty()) return gather(from, type, value(index), predicate);
+  if (pieces.empty()) return gather(from, type, index_vector(index), predicate);
   std::vector<Value *> parts;
   int start = 0;
   for (const Expr &piece : pieces) {
@@ -149,8 +155,13 @@ Value *FunctionGenerator::load_linear(const Storage &from, Type type, const Line
     return reverse(e_, upward);
   }
   if (predicate) {
-    Value *steps = b_.CreateMul(iota(e_, b_.getInt64Ty(), lanes), splat(e_, b_.getInt64(static_cast<uint64_t>(stride)), lanes));
-    return gather(from, type, b_.CreateAdd(splat(e_, first, lanes), steps), predicate);
+    // A scalar base and small constant distances: 32-bit lanes where they do, for the machine's wider gathers.
+    const bool is_short = std::abs(stride) < (INT32_MAX / lanes);
+    llvm::Type *distance = is_short ? b_.getInt32Ty() : b_.getInt64Ty();
+    Value *step = llvm::ConstantInt::get(distance, static_cast<uint64_t>(stride), true);
+    Storage shifted = from;
+    shifted.base = element_pointer(from, type, first);
+    return gather(shifted, type, b_.CreateMul(iota(e_, distance, lanes), splat(e_, step, lanes)), predicate);
   }
   return stride > 0 && stride <= 4 ? load_strided(from, type, first, stride) : load_apart(from, type, first, stride);
 }
@@ -258,7 +269,7 @@ void FunctionGenerator::store_vector(const Storage &to, Type type, const Expr &i
     start += part;
   }
   if (!pieces.empty()) return;
-  if (!linear) return scatter(to, type, value(index), stored, predicate);
+  if (!linear) return scatter(to, type, index_vector(index), stored, predicate);
   Value *first = index64(linear->base);  // apart: constant distances
   for (int i = 0; i < lanes; i++) {
     Value *at = b_.CreateAdd(first, b_.getInt64(static_cast<uint64_t>(i * linear->stride)));

@@ -135,6 +135,7 @@ class FunctionGenerator {
   };
   std::optional<LinearIndex> as_linear(const Expr &index);
   Storage &storage(const std::string &name);
+  Value *index_vector(const Expr &index);
   Value *element_pointer(const Storage &from, Type type, Value *index);
   Value *make(const ir::Load &e);
   Value *load_scalar(const Storage &from, Type type, Value *index, Value *predicate);

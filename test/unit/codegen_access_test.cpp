@@ -28,6 +28,8 @@ std::vector<Shape> shapes(int lanes, Expr base) {
                     [](int i) { return 3 * i; }});
   result.push_back({"arbitrary", binary(Kind::Mod, binary(Kind::Mul, ramp(1), make_broadcast(5, lanes)), make_broadcast(7, lanes)),
                     [](int i) { return (5 * i) % 7; }});
+  result.push_back({"unsigned", cast_to(UInt(32, lanes), binary(Kind::Mod, binary(Kind::Mul, ramp(1), make_broadcast(3, lanes)), make_broadcast(11, lanes))),
+                    [](int i) { return (3 * i) % 11; }});
   if (lanes % 2 == 0) {
     const int half = lanes / 2;
     const auto nested = [&](int inner, int outer) {
