@@ -2,8 +2,8 @@
 //
 // A pipeline asks for the same few large blocks on every call. The system would map and zero their
 // pages each time, which costs more than computing most stages. So released blocks stay in a list,
-// oldest first, and are given again to requests that they fit without much waste; the oldest go when
-// the list holds more than its limit.
+// oldest first, and are given again to requests that they fit without much waste; the oldest go
+// when the list holds more than its limit.
 #include <sys/mman.h>
 #include <unistd.h>
 
@@ -19,23 +19,25 @@ namespace retrograde::runtime {
 namespace {
 
 constexpr size_t alignment = retrograde_allocation_alignment;
-constexpr size_t small_bytes = size_t{64} << 10;       // below: the system's lists are fast
-constexpr size_t huge_page_bytes = size_t{2} << 20;    // x86-64 and AArch64 Linux
+constexpr size_t small_bytes = size_t{64} << 10;     // below: the system's lists are fast
+constexpr size_t huge_page_bytes = size_t{2} << 20;  // x86-64 and AArch64 Linux
 constexpr size_t page_bytes = 4096;
 constexpr size_t max_blocks = 256;
 
 // Stands in front of every block, one alignment unit long.
 struct Header {
   size_t capacity;   // bytes behind the header
-  void *allocation;  // what the system gave
+  void* allocation;  // what the system gave
 };
 static_assert(sizeof(Header) <= alignment);
 
-Header *header_of(void *block) {
-  return reinterpret_cast<Header *>(static_cast<char *>(block) - alignment);
+Header* header_of(void* block) {
+  return reinterpret_cast<Header*>(static_cast<char*>(block) - alignment);
 }
 
-size_t round_up(size_t bytes, size_t multiple) { return (bytes + multiple - 1) / multiple * multiple; }
+size_t round_up(size_t bytes, size_t multiple) {
+  return (bytes + multiple - 1) / multiple * multiple;
+}
 
 size_t capacity_for(size_t bytes) {
   return bytes < small_bytes ? round_up(std::max<size_t>(bytes, 1), alignment)
@@ -44,30 +46,32 @@ size_t capacity_for(size_t bytes) {
 
 size_t machine_bytes() {
   const long pages = sysconf(_SC_PHYS_PAGES), bytes = sysconf(_SC_PAGESIZE);
-  return pages > 0 && bytes > 0 ? static_cast<size_t>(pages) * static_cast<size_t>(bytes) : size_t{4} << 30;
+  return pages > 0 && bytes > 0 ? static_cast<size_t>(pages) * static_cast<size_t>(bytes)
+                                : size_t{4} << 30;
 }
 
-// Systems that overcommit would map a block larger than the machine's memory, and kill the process when it is filled.
-void *system_malloc(size_t capacity) {
+// Systems that overcommit would map a block larger than the machine's memory, and kill the process
+// when it is filled.
+void* system_malloc(size_t capacity) {
   const size_t bytes = capacity + alignment;
   if (bytes >= small_bytes && bytes > machine_bytes()) return nullptr;
   const bool huge = bytes >= 4 * huge_page_bytes;
-  void *allocation = nullptr;
+  void* allocation = nullptr;
   if (posix_memalign(&allocation, huge ? huge_page_bytes : alignment, bytes) != 0) return nullptr;
 #ifdef MADV_HUGEPAGE
   if (huge) madvise(allocation, bytes, MADV_HUGEPAGE);  // only advice: failure changes nothing
 #endif
-  void *block = static_cast<char *>(allocation) + alignment;
+  void* block = static_cast<char*>(allocation) + alignment;
   *header_of(block) = {capacity, allocation};
   return block;
 }
 
-void system_free(void *block) { std::free(header_of(block)->allocation); }
+void system_free(void* block) { std::free(header_of(block)->allocation); }
 
 class Pool {
  public:
   // A released block with room for `capacity`, at most a quarter larger; null when there is none.
-  void *take(size_t capacity) {
+  void* take(size_t capacity) {
     const std::lock_guard lock(mutex_);
     auto best = blocks_.end();
     for (auto it = blocks_.begin(); it != blocks_.end(); ++it) {
@@ -76,13 +80,13 @@ class Pool {
       if (best == blocks_.end() || has <= header_of(*best)->capacity) best = it;
     }
     if (best == blocks_.end()) return nullptr;
-    void *block = *best;
+    void* block = *best;
     held_ -= header_of(block)->capacity;
     blocks_.erase(best);
     return block;
   }
 
-  void give(void *block) {
+  void give(void* block) {
     const std::lock_guard lock(mutex_);
     const size_t capacity = header_of(block)->capacity;
     if (capacity > limit_ || !reserve()) return system_free(block);
@@ -110,7 +114,7 @@ class Pool {
     try {
       blocks_.reserve(max_blocks);
       return true;
-    } catch (const std::bad_alloc &) {
+    } catch (const std::bad_alloc&) {
       return false;
     }
   }
@@ -124,18 +128,18 @@ class Pool {
   }
 
   std::mutex mutex_;
-  std::vector<void *> blocks_;  // oldest first
+  std::vector<void*> blocks_;  // oldest first
   size_t held_ = 0;
   size_t limit_ = machine_bytes() / 4;
 };
 
-Pool &pool() {
-  static Pool &instance = *new Pool;  // never destroyed: other static objects may free at exit
+Pool& pool() {
+  static Pool& instance = *new Pool;  // never destroyed: other static objects may free at exit
   return instance;
 }
 
 // False when the request is negative or does not fit the address space.
-bool allocation_bytes(int64_t elements, int64_t element_bytes, size_t *bytes) {
+bool allocation_bytes(int64_t elements, int64_t element_bytes, size_t* bytes) {
   constexpr int64_t largest = INT64_MAX - 4 * static_cast<int64_t>(page_bytes);
   int64_t product = 0;
   if (elements < 0 || element_bytes < 0) return false;
@@ -149,17 +153,17 @@ bool allocation_bytes(int64_t elements, int64_t element_bytes, size_t *bytes) {
 
 namespace rt = retrograde::runtime;
 
-void *retrograde_pool_malloc(size_t bytes) {
+void* retrograde_pool_malloc(size_t bytes) {
   if (bytes > SIZE_MAX / 2) return nullptr;
   const size_t capacity = rt::capacity_for(bytes);
   if (capacity < rt::small_bytes - rt::alignment) return rt::system_malloc(capacity);
-  if (void *block = rt::pool().take(capacity)) return block;
-  if (void *block = rt::system_malloc(capacity)) return block;
+  if (void* block = rt::pool().take(capacity)) return block;
+  if (void* block = rt::system_malloc(capacity)) return block;
   rt::pool().release();  // what we hoard may be what is missing
   return rt::system_malloc(capacity);
 }
 
-void retrograde_pool_free(void *block) {
+void retrograde_pool_free(void* block) {
   if (!block) return;
   const bool small = rt::header_of(block)->capacity < rt::small_bytes - rt::alignment;
   small ? rt::system_free(block) : rt::pool().give(block);
@@ -169,40 +173,43 @@ void retrograde_pool_set_limit(size_t bytes) { rt::pool().set_limit(bytes); }
 size_t retrograde_pool_bytes(void) { return rt::pool().held(); }
 void retrograde_pool_release(void) { rt::pool().release(); }
 
-void *retrograde_allocate(retrograde_context *context, int64_t elements, int64_t element_bytes) {
+void* retrograde_allocate(retrograde_context* context, int64_t elements, int64_t element_bytes) {
   size_t bytes = 0;
   if (!rt::allocation_bytes(elements, element_bytes, &bytes)) return nullptr;
   return context && context->malloc_handler ? context->malloc_handler(context, bytes)
                                             : retrograde_pool_malloc(bytes);
 }
 
-int32_t retrograde_allocation_error(retrograde_context *context, const char *name, int64_t elements,
+int32_t retrograde_allocation_error(retrograde_context* context, const char* name, int64_t elements,
                                     int64_t element_bytes) {
   size_t bytes = 0;
   if (elements < 0) {
-    return retrograde_report_error(context, retrograde_error_extents_negative,
-                                   "cannot allocate \"%s\": its number of elements is negative; it is "
-                                   "%i. Check the extents of the buffers",
-                                   name, elements);
+    return retrograde_report_error(
+        context, retrograde_error_extents_negative,
+        "cannot allocate \"%s\": its number of elements is negative; it is "
+        "%i. Check the extents of the buffers",
+        name, elements);
   }
   if (!rt::allocation_bytes(elements, element_bytes, &bytes)) {
-    return retrograde_report_error(context, retrograde_error_allocation_too_large,
-                                   "cannot allocate \"%s\": its size does not fit 64 bits; it has %i "
-                                   "elements of %i bytes. Compute it in smaller parts",
-                                   name, elements, element_bytes);
+    return retrograde_report_error(
+        context, retrograde_error_allocation_too_large,
+        "cannot allocate \"%s\": its size does not fit 64 bits; it has %i "
+        "elements of %i bytes. Compute it in smaller parts",
+        name, elements, element_bytes);
   }
-  return retrograde_report_error(context, retrograde_error_out_of_memory,
-                                 "cannot allocate \"%s\": there is not enough memory; it needs %u bytes. "
-                                 "Compute it in smaller parts, for example with compute_at",
-                                 name, static_cast<uint64_t>(bytes));
+  return retrograde_report_error(
+      context, retrograde_error_out_of_memory,
+      "cannot allocate \"%s\": there is not enough memory; it needs %u bytes. "
+      "Compute it in smaller parts, for example with compute_at",
+      name, static_cast<uint64_t>(bytes));
 }
 
-void retrograde_free(retrograde_context *context, void *block) {
+void retrograde_free(retrograde_context* context, void* block) {
   if (!block) return;
   context && context->free_handler ? context->free_handler(context, block)
                                    : retrograde_pool_free(block);
 }
 
-void retrograde_free_all(retrograde_context *context, void **blocks, int64_t count) {
+void retrograde_free_all(retrograde_context* context, void** blocks, int64_t count) {
   while (count > 0) retrograde_free(context, blocks[--count]);
 }

@@ -12,13 +12,13 @@ namespace {
 // Appends to a fixed array and drops what does not fit.
 class Text {
  public:
-  Text(char *text, size_t size) : begin_(text), next_(text), last_(text + size - 1) {}
-  void append(const char *from, size_t length) {
+  Text(char* text, size_t size) : begin_(text), next_(text), last_(text + size - 1) {}
+  void append(const char* from, size_t length) {
     length = std::min(length, static_cast<size_t>(last_ - next_));
     std::memcpy(next_, from, length);
     next_ += length;
   }
-  void append(const char *from) { append(from, std::strlen(from)); }
+  void append(const char* from) { append(from, std::strlen(from)); }
   template <typename T, typename... Format>
   void append_number(T value, Format... format) {
     char digits[64];
@@ -35,30 +35,41 @@ class Text {
 };
 
 // One field of a format; false when the letter is unknown.
-bool append_field(Text &text, char field, va_list &args) {
+bool append_field(Text& text, char field, va_list& args) {
   switch (field) {
-    case 'i': text.append_number(va_arg(args, int64_t)); return true;
-    case 'u': text.append_number(va_arg(args, uint64_t)); return true;
-    case 'f': text.append_number(va_arg(args, double)); return true;
-    case 'g': text.append_number(static_cast<float>(va_arg(args, double))); return true;
-    case '%': text.append("%"); return true;
+    case 'i':
+      text.append_number(va_arg(args, int64_t));
+      return true;
+    case 'u':
+      text.append_number(va_arg(args, uint64_t));
+      return true;
+    case 'f':
+      text.append_number(va_arg(args, double));
+      return true;
+    case 'g':
+      text.append_number(static_cast<float>(va_arg(args, double)));
+      return true;
+    case '%':
+      text.append("%");
+      return true;
     case 's': {
-      const char *value = va_arg(args, const char *);
+      const char* value = va_arg(args, const char*);
       text.append(value ? value : "(null)");
       return true;
     }
     case 'p':
       text.append("0x");
-      text.append_number(reinterpret_cast<uintptr_t>(va_arg(args, const void *)), 16);
+      text.append_number(reinterpret_cast<uintptr_t>(va_arg(args, const void*)), 16);
       return true;
-    default: return false;
+    default:
+      return false;
   }
 }
 
-size_t format_message(char *out, size_t size, const char *format, va_list &args) {
+size_t format_message(char* out, size_t size, const char* format, va_list& args) {
   if (size == 0) return 0;
   Text text(out, size);
-  while (const char *percent = std::strchr(format, '%')) {
+  while (const char* percent = std::strchr(format, '%')) {
     text.append(format, static_cast<size_t>(percent - format));
     if (!append_field(text, percent[1], args)) break;
     format = percent + 2;
@@ -67,14 +78,16 @@ size_t format_message(char *out, size_t size, const char *format, va_list &args)
   return text.finish();
 }
 
-thread_local Failure *current_failure = nullptr;
+thread_local Failure* current_failure = nullptr;
 
 }  // namespace
 
-FailureScope::FailureScope(Failure *failure) : outer_(current_failure) { current_failure = failure; }
+FailureScope::FailureScope(Failure* failure) : outer_(current_failure) {
+  current_failure = failure;
+}
 FailureScope::~FailureScope() { current_failure = outer_; }
 
-void report(retrograde_context *context, int32_t code, const char *message) {
+void report(retrograde_context* context, int32_t code, const char* message) {
   if (current_failure) {
     current_failure->set(message);
   } else if (context && context->error_handler) {
@@ -82,7 +95,7 @@ void report(retrograde_context *context, int32_t code, const char *message) {
   }
 }
 
-void Failure::set(const char *text) {
+void Failure::set(const char* text) {
   const size_t length = std::min(std::strlen(text), sizeof message - 1);
   std::memcpy(message, text, length);
   message[length] = 0;
@@ -93,7 +106,7 @@ void Failure::set(const char *text) {
 using retrograde::runtime::format_message;
 using retrograde::runtime::max_message_bytes;
 
-size_t retrograde_format_message(char *text, size_t size, const char *format, ...) {
+size_t retrograde_format_message(char* text, size_t size, const char* format, ...) {
   va_list args;
   va_start(args, format);
   const size_t length = format_message(text, size, format, args);
@@ -101,7 +114,8 @@ size_t retrograde_format_message(char *text, size_t size, const char *format, ..
   return length;
 }
 
-int32_t retrograde_report_error(retrograde_context *context, int32_t code, const char *format, ...) {
+int32_t retrograde_report_error(retrograde_context* context, int32_t code, const char* format,
+                                ...) {
   char message[max_message_bytes];
   va_list args;
   va_start(args, format);
@@ -111,7 +125,7 @@ int32_t retrograde_report_error(retrograde_context *context, int32_t code, const
   return code;
 }
 
-void retrograde_print(retrograde_context *context, const char *format, ...) {
+void retrograde_print(retrograde_context* context, const char* format, ...) {
   if (!context || !context->print_handler) return;
   char message[max_message_bytes];
   va_list args;
@@ -121,31 +135,53 @@ void retrograde_print(retrograde_context *context, const char *format, ...) {
   context->print_handler(context, message);
 }
 
-const char *retrograde_error_name(int32_t code) {
+const char* retrograde_error_name(int32_t code) {
   switch (code) {
-    case retrograde_error_success: return "success";
-    case retrograde_error_generic: return "generic error";
-    case retrograde_error_explicit_bounds_too_small: return "explicit bounds too small";
-    case retrograde_error_bad_type: return "bad element type";
-    case retrograde_error_access_out_of_bounds: return "access out of bounds";
-    case retrograde_error_allocation_too_large: return "allocation too large";
-    case retrograde_error_extents_too_large: return "extents too large";
+    case retrograde_error_success:
+      return "success";
+    case retrograde_error_generic:
+      return "generic error";
+    case retrograde_error_explicit_bounds_too_small:
+      return "explicit bounds too small";
+    case retrograde_error_bad_type:
+      return "bad element type";
+    case retrograde_error_access_out_of_bounds:
+      return "access out of bounds";
+    case retrograde_error_allocation_too_large:
+      return "allocation too large";
+    case retrograde_error_extents_too_large:
+      return "extents too large";
     case retrograde_error_constraints_make_required_region_smaller:
       return "constraints make the required region smaller";
-    case retrograde_error_constraint_violated: return "constraint violated";
-    case retrograde_error_param_too_small: return "parameter too small";
-    case retrograde_error_param_too_large: return "parameter too large";
-    case retrograde_error_out_of_memory: return "out of memory";
-    case retrograde_error_buffer_argument_is_null: return "buffer argument is null";
-    case retrograde_error_internal: return "internal error";
-    case retrograde_error_unaligned_host_ptr: return "unaligned host pointer";
-    case retrograde_error_bad_fold: return "bad fold";
-    case retrograde_error_fold_factor_too_small: return "fold factor too small";
-    case retrograde_error_requirement_failed: return "requirement failed";
-    case retrograde_error_extents_negative: return "negative extent";
-    case retrograde_error_specialize_fail: return "no specialization fits";
-    case retrograde_error_host_is_null: return "host pointer is null";
-    case retrograde_error_bad_dimensions: return "wrong number of dimensions";
-    default: return "unknown error";
+    case retrograde_error_constraint_violated:
+      return "constraint violated";
+    case retrograde_error_param_too_small:
+      return "parameter too small";
+    case retrograde_error_param_too_large:
+      return "parameter too large";
+    case retrograde_error_out_of_memory:
+      return "out of memory";
+    case retrograde_error_buffer_argument_is_null:
+      return "buffer argument is null";
+    case retrograde_error_internal:
+      return "internal error";
+    case retrograde_error_unaligned_host_ptr:
+      return "unaligned host pointer";
+    case retrograde_error_bad_fold:
+      return "bad fold";
+    case retrograde_error_fold_factor_too_small:
+      return "fold factor too small";
+    case retrograde_error_requirement_failed:
+      return "requirement failed";
+    case retrograde_error_extents_negative:
+      return "negative extent";
+    case retrograde_error_specialize_fail:
+      return "no specialization fits";
+    case retrograde_error_host_is_null:
+      return "host pointer is null";
+    case retrograde_error_bad_dimensions:
+      return "wrong number of dimensions";
+    default:
+      return "unknown error";
   }
 }

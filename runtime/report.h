@@ -15,22 +15,22 @@ constexpr size_t max_message_bytes = 2048;
 struct Failure {
   Failure() { message[0] = 0; }  // the rest stays unset: one is made for every iteration
   char message[max_message_bytes];
-  void set(const char *text);
+  void set(const char* text);
 };
 
 // While it lives, errors reported on this thread go to `failure`. Scopes nest: a thread that waits
 // in an inner loop may run iterations of an outer one.
 class FailureScope {
  public:
-  explicit FailureScope(Failure *failure);
+  explicit FailureScope(Failure* failure);
   ~FailureScope();
-  FailureScope(const FailureScope &) = delete;
-  FailureScope &operator=(const FailureScope &) = delete;
+  FailureScope(const FailureScope&) = delete;
+  FailureScope& operator=(const FailureScope&) = delete;
 
  private:
-  Failure *outer_;
+  Failure* outer_;
 };
 
-void report(retrograde_context *context, int32_t code, const char *message);
+void report(retrograde_context* context, int32_t code, const char* message);
 
 }  // namespace retrograde::runtime

@@ -5,12 +5,12 @@
  *     int32_t name(retrograde_context *, <halide_buffer_t * or scalar>...);
  *     int32_t name_argv(retrograde_context *, void **args);
  *
- * where args[i] is the halide_buffer_t * itself, or points to the scalar. It returns 0 or a negative
- * code of retrograde_error_code. A null context stands for one whose fields are all zero.
+ * where args[i] is the halide_buffer_t * itself, or points to the scalar. It returns 0 or a
+ * negative code of retrograde_error_code. A null context stands for one whose fields are all zero.
  *
- * Nothing here prints, aborts, exits or throws. Every function may be called from several threads at
- * once. Beyond TBB's own threads, the only state of the process is the pool of free memory blocks
- * (retrograde_pool_*) and the arenas of thread limits. */
+ * Nothing here prints, aborts, exits or throws. Every function may be called from several threads
+ * at once. Beyond TBB's own threads, the only state of the process is the pool of free memory
+ * blocks (retrograde_pool_*) and the arenas of thread limits. */
 #ifndef RETROGRADE_RUNTIME_H
 #define RETROGRADE_RUNTIME_H
 
@@ -47,23 +47,23 @@ enum retrograde_error_code {
   retrograde_error_bad_dimensions = -43
 };
 
-/* What one call, or a family of calls, of generated code may use. A field that is null or zero means
- * the default. The handlers get the context that the generated function was called with. */
+/* What one call, or a family of calls, of generated code may use. A field that is null or zero
+ * means the default. The handlers get the context that the generated function was called with. */
 typedef struct retrograde_context {
   /* Told of every error, just before its code is returned; of several errors in one parallel loop
    * only the one with the lowest iteration is told, after the loop. Default: nobody is told. */
-  void (*error_handler)(struct retrograde_context *, int code, const char *message);
+  void (*error_handler)(struct retrograde_context*, int code, const char* message);
   /* Gets the text of print() and print_when(), a line at a time and from any thread. Default: the
    * text is thrown away. */
-  void (*print_handler)(struct retrograde_context *, const char *message);
+  void (*print_handler)(struct retrograde_context*, const char* message);
   /* Memory for intermediate results, aligned to retrograde_allocation_alignment; null when there is
    * none. Set both or neither. Default: the process's pool, see retrograde_pool_malloc. */
-  void *(*malloc_handler)(struct retrograde_context *, size_t bytes);
-  void (*free_handler)(struct retrograde_context *, void *block);
+  void* (*malloc_handler)(struct retrograde_context*, size_t bytes);
+  void (*free_handler)(struct retrograde_context*, void* block);
   /* Threads that parallel loops may use, the caller included. 0: as many as TBB has. */
   int32_t thread_limit;
   /* For the handlers; never looked at here. */
-  void *user_data;
+  void* user_data;
 } retrograde_context;
 
 /* ---- called by generated code ---- */
@@ -71,44 +71,44 @@ typedef struct retrograde_context {
 enum { retrograde_allocation_alignment = 128 };
 
 /* One iteration of a parallel loop. */
-typedef int32_t (*retrograde_task)(retrograde_context *, int32_t index, uint8_t *closure);
+typedef int32_t (*retrograde_task)(retrograde_context*, int32_t index, uint8_t* closure);
 
 /* Runs task for every index of [min, min + extent), in any order and in parallel. When iterations
  * fail, those above the lowest failing one may be skipped; its code is the result. */
-int32_t retrograde_parallel_for(retrograde_context *, retrograde_task task, int32_t min,
-                                int32_t extent, uint8_t *closure);
+int32_t retrograde_parallel_for(retrograde_context*, retrograde_task task, int32_t min,
+                                int32_t extent, uint8_t* closure);
 
-/* Room for `elements` of `element_bytes` each, plus retrograde_allocation_padding readable bytes; null when the
- * count is negative, the size overflows, or there is no memory. */
+/* Room for `elements` of `element_bytes` each, plus retrograde_allocation_padding readable bytes;
+ * null when the count is negative, the size overflows, or there is no memory. */
 enum { retrograde_allocation_padding = 64 };
-void *retrograde_allocate(retrograde_context *, int64_t elements, int64_t element_bytes);
+void* retrograde_allocate(retrograde_context*, int64_t elements, int64_t element_bytes);
 /* Tells the error handler why retrograde_allocate gave null, and returns the code for it. */
-int32_t retrograde_allocation_error(retrograde_context *, const char *name, int64_t elements,
+int32_t retrograde_allocation_error(retrograde_context*, const char* name, int64_t elements,
                                     int64_t element_bytes);
 /* Null is allowed. */
-void retrograde_free(retrograde_context *, void *block);
+void retrograde_free(retrograde_context*, void* block);
 /* Frees those of the blocks that are not null, the last first. */
-void retrograde_free_all(retrograde_context *, void **blocks, int64_t count);
+void retrograde_free_all(retrograde_context*, void** blocks, int64_t count);
 
 /* Reports an error and returns its code. The format is text with the fields of
  * retrograde_format_message. */
-int32_t retrograde_report_error(retrograde_context *, int32_t code, const char *format, ...);
-void retrograde_print(retrograde_context *, const char *format, ...);
+int32_t retrograde_report_error(retrograde_context*, int32_t code, const char* format, ...);
+void retrograde_print(retrograde_context*, const char* format, ...);
 
 /* ---- for hosts ---- */
 
 /* Writes at most `size` bytes, the final 0 included, and returns the length written. Fields:
  *   %i int64_t   %u uint64_t   %f double, as the shortest text that reads back the same
  *   %g the same for a float passed as double   %s const char *   %p const void *   %% a percent */
-size_t retrograde_format_message(char *text, size_t size, const char *format, ...);
+size_t retrograde_format_message(char* text, size_t size, const char* format, ...);
 
 /* Name of an error code, or "unknown error". */
-const char *retrograde_error_name(int32_t code);
+const char* retrograde_error_name(int32_t code);
 
 /* The default allocator. Large blocks are kept after their release, because mapping and zeroing
  * pages afresh costs more than most stages of a pipeline. */
-void *retrograde_pool_malloc(size_t bytes);
-void retrograde_pool_free(void *block);
+void* retrograde_pool_malloc(size_t bytes);
+void retrograde_pool_free(void* block);
 /* Bytes that released blocks may hold. Default: a quarter of the machine's memory. */
 void retrograde_pool_set_limit(size_t bytes);
 size_t retrograde_pool_bytes(void); /* held now */

@@ -19,16 +19,17 @@ namespace retrograde::codegen {
 
 using namespace ir;
 
-FunctionGenerator::Storage &FunctionGenerator::storage(const std::string &name) {
+FunctionGenerator::Storage& FunctionGenerator::storage(const std::string& name) {
   const auto found = frame_.storages.find(name);
-  RETROGRADE_ASSERT(found != frame_.storages.end(), "no memory named ", quoted(name), " in ", source_.name);
+  RETROGRADE_ASSERT(found != frame_.storages.end(), "no memory named ", quoted(name), " in ",
+                    source_.name);
   return found->second;
 }
 
 // ---- indices ----
 
-std::optional<FunctionGenerator::LinearIndex> FunctionGenerator::as_linear(const Expr &index) {
-  if (const auto *ramp = index.as<Ramp>()) {
+std::optional<FunctionGenerator::LinearIndex> FunctionGenerator::as_linear(const Expr& index) {
+  if (const auto* ramp = index.as<Ramp>()) {
     const auto stride = as_const_int(ramp->stride);
     if (!stride) return std::nullopt;
     if (ramp->base.type().is_scalar()) return LinearIndex{ramp->base, *stride};
@@ -37,17 +38,19 @@ std::optional<FunctionGenerator::LinearIndex> FunctionGenerator::as_linear(const
     const bool goes_on = inner && inner->stride * ramp->base.type().lanes() == *stride;
     return goes_on ? inner : std::nullopt;
   }
-  if (const auto *splat = index.as<Broadcast>()) {
+  if (const auto* splat = index.as<Broadcast>()) {
     if (splat->value.type().is_scalar()) return LinearIndex{splat->value, 0};
     return std::nullopt;
   }
-  if (const auto *call = index.as<Call>()) {
-    const bool is_marker = call->call_type == CallType::Operator && op_info(call->op).cls == OpClass::Marker;
+  if (const auto* call = index.as<Call>()) {
+    const bool is_marker =
+        call->call_type == CallType::Operator && op_info(call->op).cls == OpClass::Marker;
     return is_marker ? as_linear(call->args[0]) : std::nullopt;
   }
-  const bool is_ring = index.kind() == Kind::Add || index.kind() == Kind::Sub || index.kind() == Kind::Mul;
+  const bool is_ring =
+      index.kind() == Kind::Add || index.kind() == Kind::Sub || index.kind() == Kind::Mul;
   if (!is_ring) return std::nullopt;
-  const auto *node = index.as<Binary>();
+  const auto* node = index.as<Binary>();
   const auto a = as_linear(node->a), b = a ? as_linear(node->b) : std::nullopt;
   if (!b) return std::nullopt;
   const Expr base = binary(index.kind(), a->base, b->base);
@@ -60,14 +63,14 @@ std::optional<FunctionGenerator::LinearIndex> FunctionGenerator::as_linear(const
 }
 
 // The pieces of a ramp of vectors, as indices of their own; empty when `index` is none.
-static std::vector<Expr> pieces_of(const Expr &index) {
-  const auto *ramp = index.as<Ramp>();
+static std::vector<Expr> pieces_of(const Expr& index) {
+  const auto* ramp = index.as<Ramp>();
   if (!ramp || ramp->base.type().is_scalar()) return {};
   std::vector<Expr> pieces;
   for (int k = 0; k < ramp->lanes; k++) {
     const Expr offset = binary(Kind::Mul, ramp->stride, make_const(ramp->stride.type(), k));
     const auto constant = as_const_int(offset);
-    const auto *inner = ramp->base.as<Ramp>();
+    const auto* inner = ramp->base.as<Ramp>();
     if (constant && inner && inner->base.type().is_scalar()) {  // keeps the piece a ramp
       const Expr base = binary(Kind::Add, inner->base, make_const(inner->base.type(), *constant));
       pieces.push_back(make_ramp(base, inner->stride, inner->lanes));
@@ -79,110 +82,129 @@ static std::vector<Expr> pieces_of(const Expr &index) {
 }
 
 // Addresses extend indices by their sign.
-Value *FunctionGenerator::index_vector(const Expr &index) {
+Value* FunctionGenerator::index_vector(const Expr& index) {
   const Type type = index.type();
   return type.is_uint() ? convert(e_, Int(64, type.lanes()), type, value(index)) : value(index);
 }
 
-Value *FunctionGenerator::element_pointer(const Storage &from, Type type, Value *index) {
+Value* FunctionGenerator::element_pointer(const Storage& from, Type type, Value* index) {
   return b_.CreateGEP(memory_type(e_, type), from.base, index);
 }
 
-Value *FunctionGenerator::predicate_value(const Expr &predicate) {
+Value* FunctionGenerator::predicate_value(const Expr& predicate) {
   return !predicate.defined() || is_const_true(predicate) ? nullptr : value(predicate);
 }
 
-Value *FunctionGenerator::from_memory(Type type, Value *v) {
+Value* FunctionGenerator::from_memory(Type type, Value* v) {
   return type.is_bool() ? b_.CreateICmpNE(v, int_constant(v, 0)) : v;
 }
 
-Value *FunctionGenerator::to_memory(Type type, Value *v) {
+Value* FunctionGenerator::to_memory(Type type, Value* v) {
   return type.is_bool() ? b_.CreateZExt(v, with_lanes(b_.getInt8Ty(), lanes_of(v))) : v;
 }
 
-static llvm::Align alignment_of(Type type) { return llvm::Align(static_cast<uint64_t>(type.bytes())); }
+static llvm::Align alignment_of(Type type) {
+  return llvm::Align(static_cast<uint64_t>(type.bytes()));
+}
 
 // ---- loads ----
 
-Value *FunctionGenerator::make(const Load &e) {
-  const Storage &from = storage(e.name);
-  Value *predicate = predicate_value(e.predicate);
+Value* FunctionGenerator::make(const Load& e) {
+  const Storage& from = storage(e.name);
+  Value* predicate = predicate_value(e.predicate);
   if (e.type.is_scalar()) return load_scalar(from, e.type, index64(e.index), predicate);
   return load_vector(from, e.type, e.index, predicate);
 }
 
-Value *FunctionGenerator::load_scalar(const Storage &from, Type type, Value *index, Value *predicate) {
-  auto *memory = memory_type(e_, type);
-  Value *pointer = element_pointer(from, type, index);
-  if (!predicate) return from_memory(type, tagged(b_.CreateAlignedLoad(memory, pointer, alignment_of(type)), from));
-  llvm::BasicBlock *before = b_.GetInsertBlock();
-  Value *loaded = nullptr;
-  if_true(predicate, [&] { loaded = tagged(b_.CreateAlignedLoad(memory, pointer, alignment_of(type)), from); });
-  llvm::PHINode *result = b_.CreatePHI(memory, 2);
+Value* FunctionGenerator::load_scalar(const Storage& from, Type type, Value* index,
+                                      Value* predicate) {
+  auto* memory = memory_type(e_, type);
+  Value* pointer = element_pointer(from, type, index);
+  if (!predicate)
+    return from_memory(type,
+                       tagged(b_.CreateAlignedLoad(memory, pointer, alignment_of(type)), from));
+  llvm::BasicBlock* before = b_.GetInsertBlock();
+  Value* loaded = nullptr;
+  if_true(predicate, [&] {
+    loaded = tagged(b_.CreateAlignedLoad(memory, pointer, alignment_of(type)), from);
+  });
+  llvm::PHINode* result = b_.CreatePHI(memory, 2);
   result->addIncoming(loaded, llvm::cast<llvm::Instruction>(loaded)->getParent());
   result->addIncoming(llvm::Constant::getNullValue(memory), before);
   return from_memory(type, result);
 }
 
-Value *FunctionGenerator::load_vector(const Storage &from, Type type, const Expr &index, Value *predicate) {
+Value* FunctionGenerator::load_vector(const Storage& from, Type type, const Expr& index,
+                                      Value* predicate) {
   if (const auto linear = as_linear(index)) return load_linear(from, type, *linear, predicate);
   const std::vector<Expr> pieces = pieces_of(index);
   if (pieces.empty()) return gather(from, type, index_vector(index), predicate);
-  std::vector<Value *> parts;
+  std::vector<Value*> parts;
   int start = 0;
-  for (const Expr &piece : pieces) {
+  for (const Expr& piece : pieces) {
     const int lanes = piece.type().lanes();
-    Value *mask = predicate ? slice(e_, predicate, start, lanes) : nullptr;
+    Value* mask = predicate ? slice(e_, predicate, start, lanes) : nullptr;
     parts.push_back(load_vector(from, type.with_lanes(lanes), piece, mask));
     start += lanes;
   }
   return concat(e_, parts);
 }
 
-Value *FunctionGenerator::load_linear(const Storage &from, Type type, const LinearIndex &index, Value *predicate) {
-  Value *first = index64(index.base);
+Value* FunctionGenerator::load_linear(const Storage& from, Type type, const LinearIndex& index,
+                                      Value* predicate) {
+  Value* first = index64(index.base);
   const int lanes = type.lanes();
   const int64_t stride = index.stride, last = stride * (lanes - 1);
   if (stride == 0) {
-    Value *any = predicate ? b_.CreateOrReduce(predicate) : nullptr;
+    Value* any = predicate ? b_.CreateOrReduce(predicate) : nullptr;
     return splat(e_, load_scalar(from, type.element_of(), first, any), lanes);
   }
   if (stride == 1) return load_dense(from, type, first, predicate);
   if (stride < 0 && stride >= -4 && (!predicate || stride == -1)) {
-    Value *lowest = b_.CreateAdd(first, b_.getInt64(static_cast<uint64_t>(last)));
-    Value *upward = stride == -1 ? load_dense(from, type, lowest, predicate ? reverse(e_, predicate) : nullptr)
-                                 : load_strided(from, type, lowest, -stride);
+    Value* lowest = b_.CreateAdd(first, b_.getInt64(static_cast<uint64_t>(last)));
+    Value* upward =
+        stride == -1 ? load_dense(from, type, lowest, predicate ? reverse(e_, predicate) : nullptr)
+                     : load_strided(from, type, lowest, -stride);
     return reverse(e_, upward);
   }
   if (predicate) {
-    // A scalar base and small constant distances: 32-bit lanes where they do, for the machine's wider gathers.
+    // A scalar base and small constant distances: 32-bit lanes where they do, for the machine's
+    // wider gathers.
     const bool is_short = std::abs(stride) < (INT32_MAX / lanes);
-    llvm::Type *distance = is_short ? b_.getInt32Ty() : b_.getInt64Ty();
-    Value *step = llvm::ConstantInt::get(distance, static_cast<uint64_t>(stride), true);
+    llvm::Type* distance = is_short ? b_.getInt32Ty() : b_.getInt64Ty();
+    Value* step = llvm::ConstantInt::get(distance, static_cast<uint64_t>(stride), true);
     Storage shifted = from;
     shifted.base = element_pointer(from, type, first);
-    return gather(shifted, type, b_.CreateMul(iota(e_, distance, lanes), splat(e_, step, lanes)), predicate);
+    return gather(shifted, type, b_.CreateMul(iota(e_, distance, lanes), splat(e_, step, lanes)),
+                  predicate);
   }
-  return stride > 0 && stride <= 4 ? load_strided(from, type, first, stride) : load_apart(from, type, first, stride);
+  return stride > 0 && stride <= 4 ? load_strided(from, type, first, stride)
+                                   : load_apart(from, type, first, stride);
 }
 
-Value *FunctionGenerator::load_dense(const Storage &from, Type type, Value *first, Value *predicate) {
-  auto *vector = with_lanes(memory_type(e_, type), type.lanes());
-  Value *pointer = element_pointer(from, type, first);
-  if (!predicate) return from_memory(type, tagged(b_.CreateAlignedLoad(vector, pointer, alignment_of(type)), from));
-  Value *off = llvm::Constant::getNullValue(vector);
-  return from_memory(type, tagged(b_.CreateMaskedLoad(vector, pointer, alignment_of(type), predicate, off), from));
+Value* FunctionGenerator::load_dense(const Storage& from, Type type, Value* first,
+                                     Value* predicate) {
+  auto* vector = with_lanes(memory_type(e_, type), type.lanes());
+  Value* pointer = element_pointer(from, type, first);
+  if (!predicate)
+    return from_memory(type,
+                       tagged(b_.CreateAlignedLoad(vector, pointer, alignment_of(type)), from));
+  Value* off = llvm::Constant::getNullValue(vector);
+  return from_memory(
+      type, tagged(b_.CreateMaskedLoad(vector, pointer, alignment_of(type), predicate, off), from));
 }
 
-// n lanes at distance s: s dense loads of n, the last moved back to end with the last lane, and each lane picked from
-// the load that has it. The picks of later loads are put over those of earlier ones.
-Value *FunctionGenerator::load_strided(const Storage &from, Type type, Value *first, int64_t stride) {
+// n lanes at distance s: s dense loads of n, the last moved back to end with the last lane, and
+// each lane picked from the load that has it. The picks of later loads are put over those of
+// earlier ones.
+Value* FunctionGenerator::load_strided(const Storage& from, Type type, Value* first,
+                                       int64_t stride) {
   const int n = type.lanes(), s = static_cast<int>(stride), last_start = (n - 1) * s - (n - 1);
-  Value *result = nullptr;
+  Value* result = nullptr;
   for (int part = 0; part < s; part++) {
     const int start = std::min(part * n, last_start);
-    Value *index = b_.CreateAdd(first, b_.getInt64(static_cast<uint64_t>(start)));
-    Value *loaded = load_dense(from, type, index, nullptr);
+    Value* index = b_.CreateAdd(first, b_.getInt64(static_cast<uint64_t>(start)));
+    Value* loaded = load_dense(from, type, index, nullptr);
     std::vector<int> picks;
     for (int i = 0; i < n; i++) {
       const int offset = i * s - start;
@@ -194,31 +216,31 @@ Value *FunctionGenerator::load_strided(const Storage &from, Type type, Value *fi
   return result;
 }
 
-Value *FunctionGenerator::load_apart(const Storage &from, Type type, Value *first, int64_t stride) {
-  std::vector<Value *> lanes;
+Value* FunctionGenerator::load_apart(const Storage& from, Type type, Value* first, int64_t stride) {
+  std::vector<Value*> lanes;
   for (int i = 0; i < type.lanes(); i++) {
-    Value *index = b_.CreateAdd(first, b_.getInt64(static_cast<uint64_t>(i * stride)));
+    Value* index = b_.CreateAdd(first, b_.getInt64(static_cast<uint64_t>(i * stride)));
     lanes.push_back(load_scalar(from, type.element_of(), index, nullptr));
   }
   return from_lanes(e_, lanes);
 }
 
-static bool machine_gathers(const Machine &machine, Type type) {
+static bool machine_gathers(const Machine& machine, Type type) {
   return machine.has_gather() && (type.bits() == 32 || type.bits() == 64);
 }
 
-Value *FunctionGenerator::gather(const Storage &from, Type type, Value *indices, Value *predicate) {
+Value* FunctionGenerator::gather(const Storage& from, Type type, Value* indices, Value* predicate) {
   if (predicate || machine_gathers(e_.machine, type)) {
-    auto *vector = with_lanes(memory_type(e_, type), type.lanes());
-    Value *pointers = element_pointer(from, type, indices);
-    Value *off = llvm::Constant::getNullValue(vector);
-    Value *mask = predicate ? predicate : splat(e_, b_.getTrue(), type.lanes());
-    auto *gathered = b_.CreateMaskedGather(vector, pointers, alignment_of(type), mask, off);
+    auto* vector = with_lanes(memory_type(e_, type), type.lanes());
+    Value* pointers = element_pointer(from, type, indices);
+    Value* off = llvm::Constant::getNullValue(vector);
+    Value* mask = predicate ? predicate : splat(e_, b_.getTrue(), type.lanes());
+    auto* gathered = b_.CreateMaskedGather(vector, pointers, alignment_of(type), mask, off);
     return from_memory(type, tagged(gathered, from));
   }
-  std::vector<Value *> lanes;
+  std::vector<Value*> lanes;
   for (int i = 0; i < type.lanes(); i++) {
-    Value *index = b_.CreateSExt(lane(e_, indices, i), b_.getInt64Ty());
+    Value* index = b_.CreateSExt(lane(e_, indices, i), b_.getInt64Ty());
     lanes.push_back(load_scalar(from, type.element_of(), index, nullptr));
   }
   return from_lanes(e_, lanes);
@@ -226,23 +248,27 @@ Value *FunctionGenerator::gather(const Storage &from, Type type, Value *indices,
 
 // ---- stores ----
 
-void FunctionGenerator::make(const Store &s) {
+void FunctionGenerator::make(const Store& s) {
   const MemoScope scope(*this, false);
   const Type type = s.value.type();
-  Value *stored = value(s.value);
-  Value *predicate = predicate_value(s.predicate);
-  const Storage &to = storage(s.name);
+  Value* stored = value(s.value);
+  Value* predicate = predicate_value(s.predicate);
+  const Storage& to = storage(s.name);
   if (type.is_scalar()) return store_scalar(to, type, index64(s.index), stored, predicate);
   store_vector(to, type, s.index, stored, predicate);
 }
 
-void FunctionGenerator::store_scalar(const Storage &to, Type type, Value *index, Value *stored, Value *predicate) {
-  Value *pointer = element_pointer(to, type, index);
-  const auto store = [&] { tagged(b_.CreateAlignedStore(to_memory(type, stored), pointer, alignment_of(type)), to); };
+void FunctionGenerator::store_scalar(const Storage& to, Type type, Value* index, Value* stored,
+                                     Value* predicate) {
+  Value* pointer = element_pointer(to, type, index);
+  const auto store = [&] {
+    tagged(b_.CreateAlignedStore(to_memory(type, stored), pointer, alignment_of(type)), to);
+  };
   predicate ? if_true(predicate, store) : store();
 }
 
-void FunctionGenerator::store_dense(const Storage &to, Type type, Value *first, Value *stored, Value *predicate) {
+void FunctionGenerator::store_dense(const Storage& to, Type type, Value* first, Value* stored,
+                                    Value* predicate) {
   Value *pointer = element_pointer(to, type, first), *bytes = to_memory(type, stored);
   if (predicate) {
     tagged(b_.CreateMaskedStore(bytes, pointer, alignment_of(type), predicate), to);
@@ -251,43 +277,49 @@ void FunctionGenerator::store_dense(const Storage &to, Type type, Value *first, 
   }
 }
 
-void FunctionGenerator::store_vector(const Storage &to, Type type, const Expr &index, Value *stored,
-                                     Value *predicate) {
+void FunctionGenerator::store_vector(const Storage& to, Type type, const Expr& index, Value* stored,
+                                     Value* predicate) {
   const int lanes = type.lanes();
   const auto linear = as_linear(index);
-  if (linear && linear->stride == 1) return store_dense(to, type, index64(linear->base), stored, predicate);
+  if (linear && linear->stride == 1)
+    return store_dense(to, type, index64(linear->base), stored, predicate);
   if (linear && linear->stride == -1) {
-    Value *lowest = b_.CreateSub(index64(linear->base), b_.getInt64(static_cast<uint64_t>(lanes - 1)));
-    return store_dense(to, type, lowest, reverse(e_, stored), predicate ? reverse(e_, predicate) : nullptr);
+    Value* lowest =
+        b_.CreateSub(index64(linear->base), b_.getInt64(static_cast<uint64_t>(lanes - 1)));
+    return store_dense(to, type, lowest, reverse(e_, stored),
+                       predicate ? reverse(e_, predicate) : nullptr);
   }
   const std::vector<Expr> pieces = linear ? std::vector<Expr>{} : pieces_of(index);
   int start = 0;
-  for (const Expr &piece : pieces) {
+  for (const Expr& piece : pieces) {
     const int part = piece.type().lanes();
-    Value *mask = predicate ? slice(e_, predicate, start, part) : nullptr;
+    Value* mask = predicate ? slice(e_, predicate, start, part) : nullptr;
     store_vector(to, type.with_lanes(part), piece, slice(e_, stored, start, part), mask);
     start += part;
   }
   if (!pieces.empty()) return;
   if (!linear) return scatter(to, type, index_vector(index), stored, predicate);
-  Value *first = index64(linear->base);  // apart: constant distances
+  Value* first = index64(linear->base);  // apart: constant distances
   for (int i = 0; i < lanes; i++) {
-    Value *at = b_.CreateAdd(first, b_.getInt64(static_cast<uint64_t>(i * linear->stride)));
-    store_scalar(to, type.element_of(), at, lane(e_, stored, i), predicate ? lane(e_, predicate, i) : nullptr);
+    Value* at = b_.CreateAdd(first, b_.getInt64(static_cast<uint64_t>(i * linear->stride)));
+    store_scalar(to, type.element_of(), at, lane(e_, stored, i),
+                 predicate ? lane(e_, predicate, i) : nullptr);
   }
 }
 
 // In the order of the lanes, so that of equal indices the last lane stays.
-void FunctionGenerator::scatter(const Storage &to, Type type, Value *indices, Value *stored, Value *predicate) {
+void FunctionGenerator::scatter(const Storage& to, Type type, Value* indices, Value* stored,
+                                Value* predicate) {
   if (e_.machine.has_avx512() && machine_gathers(e_.machine, type)) {
-    Value *mask = predicate ? predicate : splat(e_, b_.getTrue(), type.lanes());
-    Value *pointers = element_pointer(to, type, indices);
+    Value* mask = predicate ? predicate : splat(e_, b_.getTrue(), type.lanes());
+    Value* pointers = element_pointer(to, type, indices);
     tagged(b_.CreateMaskedScatter(to_memory(type, stored), pointers, alignment_of(type), mask), to);
     return;
   }
   for (int i = 0; i < type.lanes(); i++) {
-    Value *index = b_.CreateSExt(lane(e_, indices, i), b_.getInt64Ty());
-    store_scalar(to, type.element_of(), index, lane(e_, stored, i), predicate ? lane(e_, predicate, i) : nullptr);
+    Value* index = b_.CreateSExt(lane(e_, indices, i), b_.getInt64Ty());
+    store_scalar(to, type.element_of(), index, lane(e_, stored, i),
+                 predicate ? lane(e_, predicate, i) : nullptr);
   }
 }
 

@@ -9,98 +9,133 @@ namespace {
 
 using ir::Kind;
 
-Value *float_mod(Emitter &e, Value *a, Value *b) {
+Value* float_mod(Emitter& e, Value* a, Value* b) {
   Contraction off(e, false);  // each step rounds
-  Value *whole = e.b.CreateUnaryIntrinsic(llvm::Intrinsic::floor, e.b.CreateFDiv(a, b));
+  Value* whole = e.b.CreateUnaryIntrinsic(llvm::Intrinsic::floor, e.b.CreateFDiv(a, b));
   return e.b.CreateFSub(a, e.b.CreateFMul(b, whole));
 }
 
-Value *float_binary(Emitter &e, Kind kind, Value *a, Value *b) {
+Value* float_binary(Emitter& e, Kind kind, Value* a, Value* b) {
   switch (kind) {
-    case Kind::Add: return e.b.CreateFAdd(a, b);
-    case Kind::Sub: return e.b.CreateFSub(a, b);
-    case Kind::Mul: return e.b.CreateFMul(a, b);
-    case Kind::Div: return e.b.CreateFDiv(a, b);
-    case Kind::Mod: return float_mod(e, a, b);
+    case Kind::Add:
+      return e.b.CreateFAdd(a, b);
+    case Kind::Sub:
+      return e.b.CreateFSub(a, b);
+    case Kind::Mul:
+      return e.b.CreateFMul(a, b);
+    case Kind::Div:
+      return e.b.CreateFDiv(a, b);
+    case Kind::Mod:
+      return float_mod(e, a, b);
     // The very form of x86's minps and maxps: the second operand where unordered or equal.
-    case Kind::Min: return e.b.CreateSelect(e.b.CreateFCmpOLT(a, b), a, b);
-    case Kind::Max: return e.b.CreateSelect(e.b.CreateFCmpOGT(a, b), a, b);
-    case Kind::EQ: return e.b.CreateFCmpOEQ(a, b);
-    case Kind::NE: return e.b.CreateFCmpUNE(a, b);
-    case Kind::LT: return e.b.CreateFCmpOLT(a, b);
-    case Kind::LE: return e.b.CreateFCmpOLE(a, b);
-    case Kind::GT: return e.b.CreateFCmpOGT(a, b);
-    case Kind::GE: return e.b.CreateFCmpOGE(a, b);
-    default: internal_error(text(ir::kind_name(kind), " of floats"));
+    case Kind::Min:
+      return e.b.CreateSelect(e.b.CreateFCmpOLT(a, b), a, b);
+    case Kind::Max:
+      return e.b.CreateSelect(e.b.CreateFCmpOGT(a, b), a, b);
+    case Kind::EQ:
+      return e.b.CreateFCmpOEQ(a, b);
+    case Kind::NE:
+      return e.b.CreateFCmpUNE(a, b);
+    case Kind::LT:
+      return e.b.CreateFCmpOLT(a, b);
+    case Kind::LE:
+      return e.b.CreateFCmpOLE(a, b);
+    case Kind::GT:
+      return e.b.CreateFCmpOGT(a, b);
+    case Kind::GE:
+      return e.b.CreateFCmpOGE(a, b);
+    default:
+      internal_error(text(ir::kind_name(kind), " of floats"));
   }
 }
 
-Value *int_compare(Emitter &e, Kind kind, bool is_signed, Value *a, Value *b) {
+Value* int_compare(Emitter& e, Kind kind, bool is_signed, Value* a, Value* b) {
   using P = llvm::CmpInst::Predicate;
   switch (kind) {
-    case Kind::EQ: return e.b.CreateICmpEQ(a, b);
-    case Kind::NE: return e.b.CreateICmpNE(a, b);
-    case Kind::LT: return e.b.CreateICmp(is_signed ? P::ICMP_SLT : P::ICMP_ULT, a, b);
-    case Kind::LE: return e.b.CreateICmp(is_signed ? P::ICMP_SLE : P::ICMP_ULE, a, b);
-    case Kind::GT: return e.b.CreateICmp(is_signed ? P::ICMP_SGT : P::ICMP_UGT, a, b);
-    case Kind::GE: return e.b.CreateICmp(is_signed ? P::ICMP_SGE : P::ICMP_UGE, a, b);
-    default: internal_error(text(ir::kind_name(kind), " of integers"));
+    case Kind::EQ:
+      return e.b.CreateICmpEQ(a, b);
+    case Kind::NE:
+      return e.b.CreateICmpNE(a, b);
+    case Kind::LT:
+      return e.b.CreateICmp(is_signed ? P::ICMP_SLT : P::ICMP_ULT, a, b);
+    case Kind::LE:
+      return e.b.CreateICmp(is_signed ? P::ICMP_SLE : P::ICMP_ULE, a, b);
+    case Kind::GT:
+      return e.b.CreateICmp(is_signed ? P::ICMP_SGT : P::ICMP_UGT, a, b);
+    case Kind::GE:
+      return e.b.CreateICmp(is_signed ? P::ICMP_SGE : P::ICMP_UGE, a, b);
+    default:
+      internal_error(text(ir::kind_name(kind), " of integers"));
   }
 }
 
-Value *int_binary(Emitter &e, Kind kind, Type type, Value *a, Value *b) {
+Value* int_binary(Emitter& e, Kind kind, Type type, Value* a, Value* b) {
   const bool is_signed = type.is_int();
   switch (kind) {
-    case Kind::Add: return e.b.CreateAdd(a, b);
-    case Kind::Sub: return e.b.CreateSub(a, b);
-    case Kind::Mul: return e.b.CreateMul(a, b);
-    case Kind::Div: return divide(e, type, a, b);
-    case Kind::Mod: return modulo(e, type, a, b);
-    case Kind::And: return e.b.CreateAnd(a, b);
-    case Kind::Or: return e.b.CreateOr(a, b);
+    case Kind::Add:
+      return e.b.CreateAdd(a, b);
+    case Kind::Sub:
+      return e.b.CreateSub(a, b);
+    case Kind::Mul:
+      return e.b.CreateMul(a, b);
+    case Kind::Div:
+      return divide(e, type, a, b);
+    case Kind::Mod:
+      return modulo(e, type, a, b);
+    case Kind::And:
+      return e.b.CreateAnd(a, b);
+    case Kind::Or:
+      return e.b.CreateOr(a, b);
     case Kind::Min:
-      return e.b.CreateBinaryIntrinsic(is_signed ? llvm::Intrinsic::smin : llvm::Intrinsic::umin, a, b);
+      return e.b.CreateBinaryIntrinsic(is_signed ? llvm::Intrinsic::smin : llvm::Intrinsic::umin, a,
+                                       b);
     case Kind::Max:
-      return e.b.CreateBinaryIntrinsic(is_signed ? llvm::Intrinsic::smax : llvm::Intrinsic::umax, a, b);
-    default: return int_compare(e, kind, is_signed, a, b);
+      return e.b.CreateBinaryIntrinsic(is_signed ? llvm::Intrinsic::smax : llvm::Intrinsic::umax, a,
+                                       b);
+    default:
+      return int_compare(e, kind, is_signed, a, b);
   }
 }
 
 // A multiplication rounded to half before the subtraction, as for the wider types.
-Value *half_mod(Emitter &e, Type type, Value *a, Value *b) {
-  const auto step = [&](Value *number) { return half_to_float(e, type, float_to_half(e, type, number)); };
+Value* half_mod(Emitter& e, Type type, Value* a, Value* b) {
+  const auto step = [&](Value* number) {
+    return half_to_float(e, type, float_to_half(e, type, number));
+  };
   Contraction off(e, false);
   Value *wide_a = half_to_float(e, type, a), *wide_b = half_to_float(e, type, b);
-  Value *floor = e.b.CreateUnaryIntrinsic(llvm::Intrinsic::floor, step(e.b.CreateFDiv(wide_a, wide_b)));
-  Value *whole = step(e.b.CreateFMul(wide_b, floor));
+  Value* floor =
+      e.b.CreateUnaryIntrinsic(llvm::Intrinsic::floor, step(e.b.CreateFDiv(wide_a, wide_b)));
+  Value* whole = step(e.b.CreateFMul(wide_b, floor));
   return float_to_half(e, type, e.b.CreateFSub(wide_a, whole));
 }
 
-Value *half_binary(Emitter &e, Kind kind, Type type, Value *a, Value *b) {
+Value* half_binary(Emitter& e, Kind kind, Type type, Value* a, Value* b) {
   if (kind == Kind::Mod) return half_mod(e, type, a, b);
   Value *wide_a = half_to_float(e, type, a), *wide_b = half_to_float(e, type, b);
   if (kind == Kind::Min) return e.b.CreateSelect(e.b.CreateFCmpOLT(wide_a, wide_b), a, b);
   if (kind == Kind::Max) return e.b.CreateSelect(e.b.CreateFCmpOGT(wide_a, wide_b), a, b);
-  Value *result = float_binary(e, kind, wide_a, wide_b);
+  Value* result = float_binary(e, kind, wide_a, wide_b);
   return kind >= Kind::EQ ? result : float_to_half(e, type, result);
 }
 
-Value *float_to_integer(Emitter &e, Type to, Value *number) {
-  // Out of range LLVM gives poison, which would spread to whatever depends on the lane; frozen, it is only a number.
+Value* float_to_integer(Emitter& e, Type to, Value* number) {
+  // Out of range LLVM gives poison, which would spread to whatever depends on the lane; frozen, it
+  // is only a number.
   const int bits = std::max(to.bits(), 32);
-  auto *wide = with_lanes(e.b.getIntNTy(static_cast<unsigned>(bits)), to.lanes());
+  auto* wide = with_lanes(e.b.getIntNTy(static_cast<unsigned>(bits)), to.lanes());
   const bool as_unsigned = to.is_uint() && to.bits() >= 32;
-  Value *integer = as_unsigned ? e.b.CreateFPToUI(number, wide) : e.b.CreateFPToSI(number, wide);
+  Value* integer = as_unsigned ? e.b.CreateFPToUI(number, wide) : e.b.CreateFPToSI(number, wide);
   return e.b.CreateTrunc(e.b.CreateFreeze(integer), llvm_type(e, to));
 }
 
-Value *integer_to_float(Emitter &e, Type to, Type from, Value *value) {
-  auto *type = llvm_type(e, to);
+Value* integer_to_float(Emitter& e, Type to, Type from, Value* value) {
+  auto* type = llvm_type(e, to);
   return from.is_int() ? e.b.CreateSIToFP(value, type) : e.b.CreateUIToFP(value, type);
 }
 
 // Through double, which holds every integer of up to 32 bits and rounds the others as the IR says.
-Value *convert_to_half(Emitter &e, Type to, Type from, Value *value) {
+Value* convert_to_half(Emitter& e, Type to, Type from, Value* value) {
   const Type wide = Float(64, to.lanes());
   if (from.is_float() && from.bits() == 64) return double_to_half(e, to, value);
   if (from.is_float() && from.bits() == 32) return float_to_half(e, to, value);
@@ -108,7 +143,7 @@ Value *convert_to_half(Emitter &e, Type to, Type from, Value *value) {
   return double_to_half(e, to, integer_to_float(e, wide, from, value));
 }
 
-Value *convert_from_float(Emitter &e, Type to, Value *number) {
+Value* convert_from_float(Emitter& e, Type to, Value* number) {
   if (to.is_bool()) return e.b.CreateFCmpUNE(number, float_constant(number, 0.0));
   if (!to.is_float()) return float_to_integer(e, to, number);
   return e.b.CreateFPCast(number, llvm_type(e, to));
@@ -116,14 +151,14 @@ Value *convert_from_float(Emitter &e, Type to, Value *number) {
 
 }  // namespace
 
-Value *binary(Emitter &e, Kind kind, Type type, Value *a, Value *b) {
+Value* binary(Emitter& e, Kind kind, Type type, Value* a, Value* b) {
   if (is_half(type)) return half_binary(e, kind, type, a, b);
   if (type.is_float()) return float_binary(e, kind, a, b);
   if (type.is_handle()) return int_compare(e, kind, false, a, b);
   return int_binary(e, kind, type, a, b);
 }
 
-Value *convert(Emitter &e, Type to, Type from, Value *value) {
+Value* convert(Emitter& e, Type to, Type from, Value* value) {
   if (to == from) return value;
   if (is_half(to)) return convert_to_half(e, to, from, value);
   if (is_half(from)) return convert_from_float(e, to, half_to_float(e, from, value));
@@ -133,31 +168,35 @@ Value *convert(Emitter &e, Type to, Type from, Value *value) {
   return e.b.CreateIntCast(value, llvm_type(e, to), from.is_int());
 }
 
-Value *reinterpret(Emitter &e, Type to, Type from, Value *value) {
-  auto *type = llvm_type(e, to);
+Value* reinterpret(Emitter& e, Type to, Type from, Value* value) {
+  auto* type = llvm_type(e, to);
   if (to.is_handle() == from.is_handle()) return e.b.CreateBitCast(value, type);
   return to.is_handle() ? e.b.CreateIntToPtr(value, type) : e.b.CreatePtrToInt(value, type);
 }
 
 // ---- saturating_cast ----
 
-static Value *largest_finite_for_infinity(Emitter &e, Type to, Type from, Value *value, Value *converted) {
-  Value *bits = is_half(to) ? converted : bits_as_integer(e, converted);
+static Value* largest_finite_for_infinity(Emitter& e, Type to, Type from, Value* value,
+                                          Value* converted) {
+  Value* bits = is_half(to) ? converted : bits_as_integer(e, converted);
   const int mantissa = to.bits() == 64 ? 52 : to.bits() == 32 ? 23 : to.is_bfloat() ? 7 : 10;
   const int64_t all = static_cast<int64_t>(~uint64_t{0} >> (65 - to.bits()));  // without the sign
   const int64_t infinity = all >> mantissa << mantissa;
-  Value *is_inf = e.b.CreateICmpEQ(e.b.CreateAnd(bits, int_constant(bits, all)), int_constant(bits, infinity));
+  Value* is_inf =
+      e.b.CreateICmpEQ(e.b.CreateAnd(bits, int_constant(bits, all)), int_constant(bits, infinity));
   if (from.is_float() && from.bits() == to.bits()) {
-    is_inf = e.b.CreateAnd(is_inf, e.b.CreateNot(simple_operator(e, ir::Op::is_inf, Bool(to.lanes()), {from}, {value})));
+    is_inf = e.b.CreateAnd(is_inf, e.b.CreateNot(simple_operator(
+                                       e, ir::Op::is_inf, Bool(to.lanes()), {from}, {value})));
   }
-  Value *result = e.b.CreateSelect(is_inf, e.b.CreateSub(bits, int_constant(bits, 1)), bits);
+  Value* result = e.b.CreateSelect(is_inf, e.b.CreateSub(bits, int_constant(bits, 1)), bits);
   return is_half(to) ? result : bits_as_float(e, result);
 }
 
-static Value *clamp_integer(Emitter &e, Type to, Type from, Value *value) {
+static Value* clamp_integer(Emitter& e, Type to, Type from, Value* value) {
   // A bound of the target type matters only where the source can pass it.
   if (from.is_int() && !to.can_represent(from.min_int())) {
-    value = e.b.CreateBinaryIntrinsic(llvm::Intrinsic::smax, value, int_constant(value, to.is_uint() ? 0 : to.min_int()));
+    value = e.b.CreateBinaryIntrinsic(llvm::Intrinsic::smax, value,
+                                      int_constant(value, to.is_uint() ? 0 : to.min_int()));
   }
   const uint64_t high = to.max_uint(), from_high = from.max_uint();
   if (from_high > high) {
@@ -167,7 +206,7 @@ static Value *clamp_integer(Emitter &e, Type to, Type from, Value *value) {
   return e.b.CreateIntCast(value, llvm_type(e, to), from.is_int());
 }
 
-Value *convert_saturating(Emitter &e, Type to, Type from, Value *value) {
+Value* convert_saturating(Emitter& e, Type to, Type from, Value* value) {
   if (to == from) return value;
   if (to.is_float()) {
     return largest_finite_for_infinity(e, to, from, value, convert(e, to, from, value));
@@ -179,7 +218,7 @@ Value *convert_saturating(Emitter &e, Type to, Type from, Value *value) {
                          : e.b.CreateICmpNE(value, int_constant(value, 0));
   }
   if (!from.is_float()) return clamp_integer(e, to, from, value);
-  Value *number = is_half(from) ? half_to_float(e, from, value) : value;
+  Value* number = is_half(from) ? half_to_float(e, from, value) : value;
   const auto id = to.is_int() ? llvm::Intrinsic::fptosi_sat : llvm::Intrinsic::fptoui_sat;
   return e.b.CreateIntrinsic(id, {llvm_type(e, to), number->getType()}, {number});
 }

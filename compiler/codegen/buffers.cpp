@@ -16,63 +16,69 @@ bool FunctionGenerator::is_buffer_operator(Op op) const {
 }
 
 // Pixels never overlap the descriptors, so their stores do not force these loads to be repeated.
-Value *FunctionGenerator::buffer_field(Value *buffer, llvm::Type *type, int64_t offset) {
-  Value *pointer = b_.CreateConstGEP1_64(b_.getInt8Ty(), buffer, static_cast<uint64_t>(offset));
-  auto *load = b_.CreateLoad(type, pointer);
+Value* FunctionGenerator::buffer_field(Value* buffer, llvm::Type* type, int64_t offset) {
+  Value* pointer = b_.CreateConstGEP1_64(b_.getInt8Ty(), buffer, static_cast<uint64_t>(offset));
+  auto* load = b_.CreateLoad(type, pointer);
   load->setMetadata(llvm::LLVMContext::MD_tbaa, alias_tag("buffer descriptors"));
   return load;
 }
 
-Value *FunctionGenerator::dimension_pointer(Value *buffer, Value *dimension, int64_t offset) {
-  Value *dims = buffer_field(buffer, b_.getPtrTy(), offsetof(halide_buffer_t, dim));
-  Value *index = b_.CreateIntCast(dimension, b_.getInt64Ty(), true);
-  Value *bytes = b_.CreateAdd(b_.CreateMul(index, b_.getInt64(sizeof(halide_dimension_t))),
+Value* FunctionGenerator::dimension_pointer(Value* buffer, Value* dimension, int64_t offset) {
+  Value* dims = buffer_field(buffer, b_.getPtrTy(), offsetof(halide_buffer_t, dim));
+  Value* index = b_.CreateIntCast(dimension, b_.getInt64Ty(), true);
+  Value* bytes = b_.CreateAdd(b_.CreateMul(index, b_.getInt64(sizeof(halide_dimension_t))),
                               b_.getInt64(static_cast<uint64_t>(offset)));
   return b_.CreateGEP(b_.getInt8Ty(), dims, bytes);
 }
 
 // Null for a null buffer, without a branch: the address that is read is then that of a constant.
-Value *FunctionGenerator::host_pointer(Value *buffer) {
-  auto *type = b_.getPtrTy();
-  Value *null = llvm::ConstantPointerNull::get(type);
-  auto *zero = e_.module.getGlobalVariable("no_host", true);
+Value* FunctionGenerator::host_pointer(Value* buffer) {
+  auto* type = b_.getPtrTy();
+  Value* null = llvm::ConstantPointerNull::get(type);
+  auto* zero = e_.module.getGlobalVariable("no_host", true);
   if (!zero) {
     zero = new llvm::GlobalVariable(e_.module, type, true, llvm::GlobalValue::PrivateLinkage,
                                     llvm::ConstantPointerNull::get(type), "no_host");
   }
-  Value *field = b_.CreateConstGEP1_64(b_.getInt8Ty(), buffer, offsetof(halide_buffer_t, host));
-  auto *load = b_.CreateLoad(type, b_.CreateSelect(b_.CreateICmpEQ(buffer, null), zero, field), "host");
+  Value* field = b_.CreateConstGEP1_64(b_.getInt8Ty(), buffer, offsetof(halide_buffer_t, host));
+  auto* load =
+      b_.CreateLoad(type, b_.CreateSelect(b_.CreateICmpEQ(buffer, null), zero, field), "host");
   load->setMetadata(llvm::LLVMContext::MD_tbaa, alias_tag("buffer descriptors"));
   return load;
 }
 
 // (buffer, dimension, min, extent). The stride becomes that of a dense buffer.
-Value *FunctionGenerator::set_bounds(const Call &e) {
+Value* FunctionGenerator::set_bounds(const Call& e) {
   Value *buffer = value(e.args[0]), *dimension = value(e.args[1]);
-  const auto store = [&](Value *v, int64_t offset) {
+  const auto store = [&](Value* v, int64_t offset) {
     b_.CreateStore(v, dimension_pointer(buffer, dimension, offset))
         ->setMetadata(llvm::LLVMContext::MD_tbaa, alias_tag("buffer descriptors"));
   };
-  store(convert(e_, Int(32), e.args[2].type(), value(e.args[2])), offsetof(halide_dimension_t, min));
-  store(convert(e_, Int(32), e.args[3].type(), value(e.args[3])), offsetof(halide_dimension_t, extent));
+  store(convert(e_, Int(32), e.args[2].type(), value(e.args[2])),
+        offsetof(halide_dimension_t, min));
+  store(convert(e_, Int(32), e.args[3].type(), value(e.args[3])),
+        offsetof(halide_dimension_t, extent));
   const auto field_below = [&](int64_t offset) {
-    Value *is_first = b_.CreateICmpEQ(dimension, int_constant(dimension, 0));
-    Value *below = b_.CreateSelect(is_first, dimension, b_.CreateSub(dimension, int_constant(dimension, 1)));
-    auto *load = b_.CreateLoad(b_.getInt32Ty(), dimension_pointer(buffer, below, offset));
+    Value* is_first = b_.CreateICmpEQ(dimension, int_constant(dimension, 0));
+    Value* below =
+        b_.CreateSelect(is_first, dimension, b_.CreateSub(dimension, int_constant(dimension, 1)));
+    auto* load = b_.CreateLoad(b_.getInt32Ty(), dimension_pointer(buffer, below, offset));
     load->setMetadata(llvm::LLVMContext::MD_tbaa, alias_tag("buffer descriptors"));
     return b_.CreateSelect(is_first, b_.getInt32(1), load);
   };
-  store(b_.CreateMul(field_below(offsetof(halide_dimension_t, extent)), field_below(offsetof(halide_dimension_t, stride))),
+  store(b_.CreateMul(field_below(offsetof(halide_dimension_t, extent)),
+                     field_below(offsetof(halide_dimension_t, stride))),
         offsetof(halide_dimension_t, stride));
   return llvm::Constant::getNullValue(llvm_type(e_, e.type));
 }
 
-Value *FunctionGenerator::buffer_operator(const Call &e) {
+Value* FunctionGenerator::buffer_operator(const Call& e) {
   if (e.op == Op::buffer_set_bounds) return set_bounds(e);
-  Value *buffer = value(e.args[0]);
-  Value *null = llvm::ConstantPointerNull::get(b_.getPtrTy());
-  const auto dimension_field = [&](int64_t offset) -> Value * {
-    auto *load = b_.CreateLoad(b_.getInt32Ty(), dimension_pointer(buffer, value(e.args[1]), offset));
+  Value* buffer = value(e.args[0]);
+  Value* null = llvm::ConstantPointerNull::get(b_.getPtrTy());
+  const auto dimension_field = [&](int64_t offset) -> Value* {
+    auto* load =
+        b_.CreateLoad(b_.getInt32Ty(), dimension_pointer(buffer, value(e.args[1]), offset));
     load->setMetadata(llvm::LLVMContext::MD_tbaa, alias_tag("buffer descriptors"));
     return convert(e_, e.type, Int(32), load);
   };
@@ -80,18 +86,27 @@ Value *FunctionGenerator::buffer_operator(const Call &e) {
     return convert(e_, e.type, UInt(32), buffer_field(buffer, b_.getInt32Ty(), offset));
   };
   switch (e.op) {
-    case Op::buffer_host: return host_pointer(buffer);
-    case Op::buffer_min: return dimension_field(offsetof(halide_dimension_t, min));
-    case Op::buffer_extent: return dimension_field(offsetof(halide_dimension_t, extent));
-    case Op::buffer_stride: return dimension_field(offsetof(halide_dimension_t, stride));
-    case Op::buffer_dimensions: return int_field(offsetof(halide_buffer_t, dimensions));
-    case Op::buffer_type: return int_field(offsetof(halide_buffer_t, type));
-    case Op::buffer_is_null: return b_.CreateICmpEQ(buffer, null);
+    case Op::buffer_host:
+      return host_pointer(buffer);
+    case Op::buffer_min:
+      return dimension_field(offsetof(halide_dimension_t, min));
+    case Op::buffer_extent:
+      return dimension_field(offsetof(halide_dimension_t, extent));
+    case Op::buffer_stride:
+      return dimension_field(offsetof(halide_dimension_t, stride));
+    case Op::buffer_dimensions:
+      return int_field(offsetof(halide_buffer_t, dimensions));
+    case Op::buffer_type:
+      return int_field(offsetof(halide_buffer_t, type));
+    case Op::buffer_is_null:
+      return b_.CreateICmpEQ(buffer, null);
     case Op::buffer_is_query: {
-      Value *device = buffer_field(buffer, b_.getInt64Ty(), offsetof(halide_buffer_t, device));
-      return b_.CreateAnd(b_.CreateICmpEQ(host_pointer(buffer), null), b_.CreateICmpEQ(device, b_.getInt64(0)));
+      Value* device = buffer_field(buffer, b_.getInt64Ty(), offsetof(halide_buffer_t, device));
+      return b_.CreateAnd(b_.CreateICmpEQ(host_pointer(buffer), null),
+                          b_.CreateICmpEQ(device, b_.getInt64(0)));
     }
-    default: internal_error("no such buffer operator");
+    default:
+      internal_error("no such buffer operator");
   }
 }
 

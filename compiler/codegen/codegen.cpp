@@ -32,7 +32,7 @@ class Stopwatch {
   std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
 };
 
-void verify(const llvm::Module &module) {
+void verify(const llvm::Module& module) {
   std::string problem;
   llvm::raw_string_ostream out(problem);
   if (!llvm::verifyModule(module, &out)) return;
@@ -46,7 +46,8 @@ void verify(const llvm::Module &module) {
 class Compilation {
  public:
   // Names of values cost time, and only people read them.
-  Compilation(const std::vector<ir::LoweredFunction> &functions, const Options &options, bool keep_names)
+  Compilation(const std::vector<ir::LoweredFunction>& functions, const Options& options,
+              bool keep_names)
       : machine_(machine_for(options.target, options.tune_for_host)),
         target_machine_(make_target_machine(machine_)),
         module_(functions.empty() ? "retrograde" : functions[0].name, context_) {
@@ -55,7 +56,8 @@ class Compilation {
     module_.setTargetTriple(machine_.triple);
     module_.setDataLayout(target_machine_->createDataLayout());
     Emitter emitter(module_, machine_);
-    for (const ir::LoweredFunction &function : functions) FunctionGenerator(emitter, function).generate();
+    for (const ir::LoweredFunction& function : functions)
+      FunctionGenerator(emitter, function).generate();
     verify(module_);
     times.generate_seconds = watch.lap();
     if (options.optimization_level > 0) optimize(module_, *target_machine_);
@@ -83,8 +85,9 @@ class Compilation {
 
   std::vector<std::string> externals() const {
     std::vector<std::string> names;
-    for (const llvm::Function &function : module_) {
-      if (function.isDeclaration() && !function.isIntrinsic()) names.push_back(function.getName().str());
+    for (const llvm::Function& function : module_) {
+      if (function.isDeclaration() && !function.isIntrinsic())
+        names.push_back(function.getName().str());
     }
     std::sort(names.begin(), names.end());
     return names;
@@ -103,9 +106,9 @@ class Compilation {
 
 // Compiles on a deep stack and gives what `use` makes of the compilation.
 template <typename Use>
-static auto compile(const std::vector<ir::LoweredFunction> &functions, const Options &options, bool keep_names,
-                    const Use &use) {
-  decltype(use(std::declval<Compilation &>())) result;
+static auto compile(const std::vector<ir::LoweredFunction>& functions, const Options& options,
+                    bool keep_names, const Use& use) {
+  decltype(use(std::declval<Compilation&>())) result;
   run_on_deep_stack([&] {
     Compilation compilation(functions, options, keep_names);
     result = use(compilation);
@@ -113,8 +116,8 @@ static auto compile(const std::vector<ir::LoweredFunction> &functions, const Opt
   return result;
 }
 
-Module compile_object(const std::vector<ir::LoweredFunction> &functions, const Options &options) {
-  return compile(functions, options, false, [](Compilation &compilation) {
+Module compile_object(const std::vector<ir::LoweredFunction>& functions, const Options& options) {
+  return compile(functions, options, false, [](Compilation& compilation) {
     Module result;
     result.externals = compilation.externals();
     const std::string bytes = compilation.emit(llvm::CodeGenFileType::ObjectFile);
@@ -124,17 +127,19 @@ Module compile_object(const std::vector<ir::LoweredFunction> &functions, const O
   });
 }
 
-Module compile_object(const ir::LoweredFunction &function, const Options &options) {
+Module compile_object(const ir::LoweredFunction& function, const Options& options) {
   return compile_object(std::vector<ir::LoweredFunction>{function}, options);
 }
 
-std::string compile_llvm_ir(const ir::LoweredFunction &function, const Options &options) {
-  return compile({function}, options, true, [](Compilation &compilation) { return compilation.print(); });
+std::string compile_llvm_ir(const ir::LoweredFunction& function, const Options& options) {
+  return compile({function}, options, true,
+                 [](Compilation& compilation) { return compilation.print(); });
 }
 
-std::string compile_assembly(const ir::LoweredFunction &function, const Options &options) {
-  return compile({function}, options, true,
-                 [](Compilation &compilation) { return compilation.emit(llvm::CodeGenFileType::AssemblyFile); });
+std::string compile_assembly(const ir::LoweredFunction& function, const Options& options) {
+  return compile({function}, options, true, [](Compilation& compilation) {
+    return compilation.emit(llvm::CodeGenFileType::AssemblyFile);
+  });
 }
 
 }  // namespace retrograde::codegen

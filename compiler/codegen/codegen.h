@@ -35,10 +35,10 @@ struct Module {
 
 // InternalError when the function is not what lowering promises; Unsupported for a target without a
 // code generator.
-Module compile_object(const std::vector<ir::LoweredFunction> &functions, const Options &options);
-Module compile_object(const ir::LoweredFunction &function, const Options &options);
+Module compile_object(const std::vector<ir::LoweredFunction>& functions, const Options& options);
+Module compile_object(const ir::LoweredFunction& function, const Options& options);
 
-std::string compile_llvm_ir(const ir::LoweredFunction &function, const Options &options);
-std::string compile_assembly(const ir::LoweredFunction &function, const Options &options);
+std::string compile_llvm_ir(const ir::LoweredFunction& function, const Options& options);
+std::string compile_assembly(const ir::LoweredFunction& function, const Options& options);
 
 }  // namespace retrograde::codegen

@@ -1,10 +1,13 @@
 // Division and modulus of integers, rounding so that the remainder is never negative.
 //
 // By a positive constant c, signed:  sign = a < 0 ? -1 : 0;  q = ((a ^ sign) /u c) ^ sign
-//   For a < 0, a ^ sign = -a - 1 >= 0 and  -1 - (-a - 1) / c = floor(a / c). LLVM turns the unsigned division into a
-//   multiplication, in vectors too. By a negative constant: q = -(a / |c|), since a = q c + r with the same r.
-// By a variable, vectors of up to 32 bits: in double, whose quotient truncates exactly: a / b differs from the next
-//   integer by at least 1 / |b|, and the rounding error of the quotient is at most |a / b| 2^-53 < 1 / |b|.
+//   For a < 0, a ^ sign = -a - 1 >= 0 and  -1 - (-a - 1) / c = floor(a / c). LLVM turns the
+//   unsigned division into a multiplication, in vectors too. By a negative constant: q = -(a /
+//   |c|), since a = q c + r with the same r.
+// By a variable, vectors of up to 32 bits: in double, whose quotient truncates exactly: a / b
+// differs from the next
+//   integer by at least 1 / |b|, and the rounding error of the quotient is at most |a / b| 2^-53 <
+//   1 / |b|.
 // By a variable otherwise: LLVM's division with the two cases that it leaves undefined taken out.
 #include <llvm/IR/Constants.h>
 
@@ -14,49 +17,53 @@ namespace retrograde::codegen {
 namespace {
 
 // The constant that all lanes of `value` hold, or null.
-const llvm::ConstantInt *uniform_constant(Value *value) {
-  if (auto *scalar = llvm::dyn_cast<llvm::ConstantInt>(value)) return scalar;
-  auto *vector = llvm::dyn_cast<llvm::Constant>(value);
+const llvm::ConstantInt* uniform_constant(Value* value) {
+  if (auto* scalar = llvm::dyn_cast<llvm::ConstantInt>(value)) return scalar;
+  auto* vector = llvm::dyn_cast<llvm::Constant>(value);
   if (!vector || !vector->getType()->isVectorTy()) return nullptr;
   return llvm::dyn_cast_or_null<llvm::ConstantInt>(vector->getSplatValue());
 }
 
-Value *sign_mask(Emitter &e, Type type, Value *a) { return e.b.CreateAShr(a, int_constant(a, type.bits() - 1)); }
+Value* sign_mask(Emitter& e, Type type, Value* a) {
+  return e.b.CreateAShr(a, int_constant(a, type.bits() - 1));
+}
 
-Value *divide_by_constant(Emitter &e, Type type, Value *a, const llvm::APInt &divisor) {
+Value* divide_by_constant(Emitter& e, Type type, Value* a, const llvm::APInt& divisor) {
   if (divisor.isZero()) return int_constant(a, 0);
   if (!type.is_int()) return e.b.CreateUDiv(a, llvm::ConstantInt::get(a->getType(), divisor));
   const llvm::APInt magnitude = divisor.abs();  // as unsigned, also for the most negative number
-  Value *quotient;
+  Value* quotient;
   if (magnitude.isPowerOf2() && !magnitude.isMinSignedValue()) {
     quotient = e.b.CreateAShr(a, int_constant(a, magnitude.logBase2()));
   } else {
-    Value *sign = sign_mask(e, type, a);
-    Value *positive = e.b.CreateXor(a, sign);
-    quotient = e.b.CreateXor(e.b.CreateUDiv(positive, llvm::ConstantInt::get(a->getType(), magnitude)), sign);
+    Value* sign = sign_mask(e, type, a);
+    Value* positive = e.b.CreateXor(a, sign);
+    quotient = e.b.CreateXor(
+        e.b.CreateUDiv(positive, llvm::ConstantInt::get(a->getType(), magnitude)), sign);
   }
   return divisor.isNegative() ? e.b.CreateNeg(quotient) : quotient;
 }
 
-Value *truncating_in_double(Emitter &e, Type type, Value *a, Value *b) {
-  auto *wide = with_lanes(e.b.getDoubleTy(), type.lanes());
+Value* truncating_in_double(Emitter& e, Type type, Value* a, Value* b) {
+  auto* wide = with_lanes(e.b.getDoubleTy(), type.lanes());
   // To 64 bits: the quotient of the most negative number and -1 does not fit 32.
-  auto *integer = with_lanes(e.b.getInt64Ty(), type.lanes());
+  auto* integer = with_lanes(e.b.getInt64Ty(), type.lanes());
   Contraction off(e, false);
   if (type.is_int()) {
-    Value *quotient = e.b.CreateFDiv(e.b.CreateSIToFP(a, wide), e.b.CreateSIToFP(b, wide));
+    Value* quotient = e.b.CreateFDiv(e.b.CreateSIToFP(a, wide), e.b.CreateSIToFP(b, wide));
     return e.b.CreateTrunc(e.b.CreateFPToSI(quotient, integer), a->getType());
   }
-  Value *quotient = e.b.CreateFDiv(e.b.CreateUIToFP(a, wide), e.b.CreateUIToFP(b, wide));
+  Value* quotient = e.b.CreateFDiv(e.b.CreateUIToFP(a, wide), e.b.CreateUIToFP(b, wide));
   return e.b.CreateTrunc(e.b.CreateFPToUI(quotient, integer), a->getType());
 }
 
 // Rounding toward zero; b is not 0.
-Value *truncating(Emitter &e, Type type, Value *a, Value *b) {
-  if (type.is_vector() && type.bits() >= 8 && type.bits() <= 32) return truncating_in_double(e, type, a, b);
+Value* truncating(Emitter& e, Type type, Value* a, Value* b) {
+  if (type.is_vector() && type.bits() >= 8 && type.bits() <= 32)
+    return truncating_in_double(e, type, a, b);
   if (!type.is_int()) return e.b.CreateUDiv(a, b);
-  Value *is_minus_one = e.b.CreateICmpEQ(b, int_constant(b, -1));
-  Value *quotient = e.b.CreateSDiv(a, e.b.CreateSelect(is_minus_one, int_constant(b, 1), b));
+  Value* is_minus_one = e.b.CreateICmpEQ(b, int_constant(b, -1));
+  Value* quotient = e.b.CreateSDiv(a, e.b.CreateSelect(is_minus_one, int_constant(b, 1), b));
   return e.b.CreateSelect(is_minus_one, e.b.CreateNeg(a), quotient);
 }
 
@@ -64,17 +71,17 @@ struct Parts {
   Value *quotient, *remainder;
 };
 
-Parts divide_by_variable(Emitter &e, Type type, Value *a, Value *b) {
+Parts divide_by_variable(Emitter& e, Type type, Value* a, Value* b) {
   Value *zero = int_constant(b, 0), *is_zero = e.b.CreateICmpEQ(b, zero);
-  Value *divisor = e.b.CreateSelect(is_zero, int_constant(b, 1), b);
-  Value *quotient = truncating(e, type, a, divisor);
-  Value *remainder = e.b.CreateSub(a, e.b.CreateMul(quotient, divisor));
+  Value* divisor = e.b.CreateSelect(is_zero, int_constant(b, 1), b);
+  Value* quotient = truncating(e, type, a, divisor);
+  Value* remainder = e.b.CreateSub(a, e.b.CreateMul(quotient, divisor));
   if (type.is_int()) {
     // A negative remainder moves up by |b|, and the quotient one step away from b's sign.
-    Value *is_low = sign_mask(e, type, remainder);
-    Value *b_sign = sign_mask(e, type, divisor);
-    Value *step = e.b.CreateOr(b_sign, int_constant(b, 1));  // -1 or 1
-    Value *magnitude = e.b.CreateSub(e.b.CreateXor(divisor, b_sign), b_sign);
+    Value* is_low = sign_mask(e, type, remainder);
+    Value* b_sign = sign_mask(e, type, divisor);
+    Value* step = e.b.CreateOr(b_sign, int_constant(b, 1));  // -1 or 1
+    Value* magnitude = e.b.CreateSub(e.b.CreateXor(divisor, b_sign), b_sign);
     quotient = e.b.CreateSub(quotient, e.b.CreateAnd(step, is_low));
     remainder = e.b.CreateAdd(remainder, e.b.CreateAnd(magnitude, is_low));
   }
@@ -83,19 +90,21 @@ Parts divide_by_variable(Emitter &e, Type type, Value *a, Value *b) {
 
 }  // namespace
 
-Value *divide(Emitter &e, Type type, Value *a, Value *b) {
-  if (const auto *constant = uniform_constant(b)) return divide_by_constant(e, type, a, constant->getValue());
+Value* divide(Emitter& e, Type type, Value* a, Value* b) {
+  if (const auto* constant = uniform_constant(b))
+    return divide_by_constant(e, type, a, constant->getValue());
   return divide_by_variable(e, type, a, b).quotient;
 }
 
-Value *modulo(Emitter &e, Type type, Value *a, Value *b) {
-  const auto *constant = uniform_constant(b);
+Value* modulo(Emitter& e, Type type, Value* a, Value* b) {
+  const auto* constant = uniform_constant(b);
   if (!constant) return divide_by_variable(e, type, a, b).remainder;
-  const llvm::APInt &divisor = constant->getValue();
+  const llvm::APInt& divisor = constant->getValue();
   if (divisor.isZero()) return int_constant(a, 0);
   const llvm::APInt magnitude = type.is_int() ? divisor.abs() : divisor;
-  if (magnitude.isPowerOf2()) return e.b.CreateAnd(a, llvm::ConstantInt::get(a->getType(), magnitude - 1));
-  Value *quotient = divide_by_constant(e, type, a, magnitude);
+  if (magnitude.isPowerOf2())
+    return e.b.CreateAnd(a, llvm::ConstantInt::get(a->getType(), magnitude - 1));
+  Value* quotient = divide_by_constant(e, type, a, magnitude);
   return e.b.CreateSub(a, e.b.CreateMul(quotient, llvm::ConstantInt::get(a->getType(), magnitude)));
 }
 

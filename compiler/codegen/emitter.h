@@ -21,17 +21,18 @@ namespace retrograde::codegen {
 using llvm::Value;
 
 struct Emitter {
-  llvm::Module &module;
-  const Machine &machine;
+  llvm::Module& module;
+  const Machine& machine;
   llvm::IRBuilder<> b;
-  Emitter(llvm::Module &module, const Machine &machine) : module(module), machine(machine), b(module.getContext()) {}
-  llvm::LLVMContext &context() { return module.getContext(); }
+  Emitter(llvm::Module& module, const Machine& machine)
+      : module(module), machine(machine), b(module.getContext()) {}
+  llvm::LLVMContext& context() { return module.getContext(); }
 };
 
 // While it lives, multiplications and additions may fuse to FMA, or may not.
 class Contraction {
  public:
-  Contraction(Emitter &e, bool allowed) : guard_(e.b) {
+  Contraction(Emitter& e, bool allowed) : guard_(e.b) {
     llvm::FastMathFlags flags;
     flags.setAllowContract(allowed);
     e.b.setFastMathFlags(flags);
@@ -42,55 +43,57 @@ class Contraction {
 };
 
 // ---- types.cpp ----
-llvm::Type *llvm_type(Emitter &e, Type type);
-llvm::Type *memory_type(Emitter &e, Type type);  // of a scalar: bool is a byte
-llvm::Type *with_lanes(llvm::Type *scalar, int lanes);
-int lanes_of(const Value *value);
-Value *int_constant(Value *like, int64_t value);    // of the (vector) integer type of `like`
-Value *float_constant(Value *like, double value);   // of the (vector) float type of `like`
-Value *float_constant(llvm::Type *type, double value);
-Value *bits_as_float(Emitter &e, Value *integer);   // i32 to float, i64 to double, lanes kept
-Value *bits_as_integer(Emitter &e, Value *number);
+llvm::Type* llvm_type(Emitter& e, Type type);
+llvm::Type* memory_type(Emitter& e, Type type);  // of a scalar: bool is a byte
+llvm::Type* with_lanes(llvm::Type* scalar, int lanes);
+int lanes_of(const Value* value);
+Value* int_constant(Value* like, int64_t value);   // of the (vector) integer type of `like`
+Value* float_constant(Value* like, double value);  // of the (vector) float type of `like`
+Value* float_constant(llvm::Type* type, double value);
+Value* bits_as_float(Emitter& e, Value* integer);  // i32 to float, i64 to double, lanes kept
+Value* bits_as_integer(Emitter& e, Value* number);
 bool is_half(Type type);  // float16 or bfloat16
 
 // ---- vectors.cpp ----
-Value *splat(Emitter &e, Value *scalar, int lanes);             // the scalar itself when lanes is 1
-Value *iota(Emitter &e, llvm::Type *scalar, int lanes);         // 0, 1, 2 ... of an integer or float type
-Value *slice(Emitter &e, Value *vector, int start, int lanes);  // past the end: any value
-Value *concat(Emitter &e, std::vector<Value *> parts);
-Value *repeat(Emitter &e, Value *vector, int times);
-Value *reverse(Emitter &e, Value *vector);
-Value *lane(Emitter &e, Value *vector, int index);              // a scalar
-Value *from_lanes(Emitter &e, const std::vector<Value *> &scalars);
-Value *shuffle(Emitter &e, Value *a, Value *b, const std::vector<int> &indices);
-using Combine = std::function<Value *(Value *, Value *)>;
-// Combines groups of neighbouring lanes until `lanes` are left; the order is fixed, not left to right.
-Value *reduce_groups(Emitter &e, Value *vector, int lanes, const Combine &combine);
+Value* splat(Emitter& e, Value* scalar, int lanes);      // the scalar itself when lanes is 1
+Value* iota(Emitter& e, llvm::Type* scalar, int lanes);  // 0, 1, 2 ... of an integer or float type
+Value* slice(Emitter& e, Value* vector, int start, int lanes);  // past the end: any value
+Value* concat(Emitter& e, std::vector<Value*> parts);
+Value* repeat(Emitter& e, Value* vector, int times);
+Value* reverse(Emitter& e, Value* vector);
+Value* lane(Emitter& e, Value* vector, int index);  // a scalar
+Value* from_lanes(Emitter& e, const std::vector<Value*>& scalars);
+Value* shuffle(Emitter& e, Value* a, Value* b, const std::vector<int>& indices);
+using Combine = std::function<Value*(Value*, Value*)>;
+// Combines groups of neighbouring lanes until `lanes` are left; the order is fixed, not left to
+// right.
+Value* reduce_groups(Emitter& e, Value* vector, int lanes, const Combine& combine);
 
-// ---- division.cpp: of integers, rounding so that the remainder is never negative; x / 0 == x % 0 == 0 ----
-Value *divide(Emitter &e, Type type, Value *a, Value *b);
-Value *modulo(Emitter &e, Type type, Value *a, Value *b);
+// ---- division.cpp: of integers, rounding so that the remainder is never negative; x / 0 == x % 0
+// == 0 ----
+Value* divide(Emitter& e, Type type, Value* a, Value* b);
+Value* modulo(Emitter& e, Type type, Value* a, Value* b);
 
 // ---- half.cpp ----
-Value *half_to_float(Emitter &e, Type half, Value *bits);
-Value *float_to_half(Emitter &e, Type half, Value *number);    // to nearest even; number: float
-Value *double_to_half(Emitter &e, Type half, Value *number);   // rounds once; number: double
+Value* half_to_float(Emitter& e, Type half, Value* bits);
+Value* float_to_half(Emitter& e, Type half, Value* number);   // to nearest even; number: float
+Value* double_to_half(Emitter& e, Type half, Value* number);  // rounds once; number: double
 
 // ---- arithmetic.cpp ----
 // Operands of `type`; comparisons give i1 lanes. Not for And and Or of anything but bool.
-Value *binary(Emitter &e, ir::Kind kind, Type type, Value *a, Value *b);
-Value *convert(Emitter &e, Type to, Type from, Value *value);             // Cast
-Value *convert_saturating(Emitter &e, Type to, Type from, Value *value);  // saturating_cast
-Value *reinterpret(Emitter &e, Type to, Type from, Value *value);
-// Op::floor, abs, shift_left ... : everything Pure that is no function of math_table.h. Null when `op` is none of them.
-// `types` and `args` have one entry for each argument.
-Value *simple_operator(Emitter &e, ir::Op op, Type result, const std::vector<Type> &types,
-                       const std::vector<Value *> &args);
+Value* binary(Emitter& e, ir::Kind kind, Type type, Value* a, Value* b);
+Value* convert(Emitter& e, Type to, Type from, Value* value);             // Cast
+Value* convert_saturating(Emitter& e, Type to, Type from, Value* value);  // saturating_cast
+Value* reinterpret(Emitter& e, Type to, Type from, Value* value);
+// Op::floor, abs, shift_left ... : everything Pure that is no function of math_table.h. Null when
+// `op` is none of them. `types` and `args` have one entry for each argument.
+Value* simple_operator(Emitter& e, ir::Op op, Type result, const std::vector<Type>& types,
+                       const std::vector<Value*>& args);
 
 // ---- math.cpp, fast_math.cpp ----
 bool is_math_operator(ir::Op op);
-Value *math_operator(Emitter &e, ir::Op op, Type type, const std::vector<Value *> &args);
+Value* math_operator(Emitter& e, ir::Op op, Type type, const std::vector<Value*>& args);
 bool is_fast_operator(ir::Op op);
-Value *fast_operator(Emitter &e, ir::Op op, Type type, const std::vector<Value *> &args);
+Value* fast_operator(Emitter& e, ir::Op op, Type type, const std::vector<Value*>& args);
 
 }  // namespace retrograde::codegen

@@ -9,73 +9,78 @@ namespace retrograde::codegen {
 
 using namespace ir;
 
-Value *FunctionGenerator::value(const Expr &e) {
-  auto &memo = frame_.memo;
+Value* FunctionGenerator::value(const Expr& e) {
+  auto& memo = frame_.memo;
   for (size_t i = memo.size(); i-- > 0;) {
     const auto found = memo[i].values.find(e.get());
     if (found != memo[i].values.end()) return found->second.value;
     if (!memo[i].sees_outer) break;
   }
-  Value *result = make_value(e);
+  Value* result = make_value(e);
   if (e.kind() != Kind::Variable) memo.back().values[e.get()] = {e, result};
   return result;
 }
 
-Value *FunctionGenerator::make_value(const Expr &e) {
+Value* FunctionGenerator::make_value(const Expr& e) {
   return match(
-      e, [&](const Variable &v) { return make(v); },
-      [&](const Cast &c) { return convert(e_, c.type, c.value.type(), value(c.value)); },
-      [&](const Reinterpret &r) { return reinterpret(e_, r.type, r.value.type(), value(r.value)); },
-      [&](const Binary &node) {
+      e, [&](const Variable& v) { return make(v); },
+      [&](const Cast& c) { return convert(e_, c.type, c.value.type(), value(c.value)); },
+      [&](const Reinterpret& r) { return reinterpret(e_, r.type, r.value.type(), value(r.value)); },
+      [&](const Binary& node) {
         Value *a = value(node.a), *b = value(node.b);
         return binary(e_, node.kind, node.a.type(), a, b);
       },
-      [&](const Not &n) { return b_.CreateNot(value(n.a)); },
-      [&](const Select &s) { return make(s); }, [&](const Load &l) { return make(l); },
-      [&](const Ramp &r) { return make(r); },
-      [&](const Broadcast &s) { return repeat(e_, value(s.value), s.lanes); },
-      [&](const Call &c) { return make(c); }, [&](const Let &l) { return make(l); },
-      [&](const Shuffle &s) { return make(s); }, [&](const VectorReduce &r) { return make(r); },
-      [&](const ExprNode &) { return make_immediate(e); });
+      [&](const Not& n) { return b_.CreateNot(value(n.a)); },
+      [&](const Select& s) { return make(s); }, [&](const Load& l) { return make(l); },
+      [&](const Ramp& r) { return make(r); },
+      [&](const Broadcast& s) { return repeat(e_, value(s.value), s.lanes); },
+      [&](const Call& c) { return make(c); }, [&](const Let& l) { return make(l); },
+      [&](const Shuffle& s) { return make(s); }, [&](const VectorReduce& r) { return make(r); },
+      [&](const ExprNode&) { return make_immediate(e); });
 }
 
-Value *FunctionGenerator::make_immediate(const Expr &e) {
-  llvm::Type *type = llvm_type(e_, e.type());
-  if (const auto *imm = e.as<IntImm>()) return llvm::ConstantInt::get(type, static_cast<uint64_t>(imm->value), true);
-  if (const auto *imm = e.as<UIntImm>()) return llvm::ConstantInt::get(type, imm->value);
-  if (const auto *imm = e.as<StringImm>()) return string_constant(imm->value);
-  const auto *imm = e.as<FloatImm>();
+Value* FunctionGenerator::make_immediate(const Expr& e) {
+  llvm::Type* type = llvm_type(e_, e.type());
+  if (const auto* imm = e.as<IntImm>())
+    return llvm::ConstantInt::get(type, static_cast<uint64_t>(imm->value), true);
+  if (const auto* imm = e.as<UIntImm>()) return llvm::ConstantInt::get(type, imm->value);
+  if (const auto* imm = e.as<StringImm>()) return string_constant(imm->value);
+  const auto* imm = e.as<FloatImm>();
   RETROGRADE_ASSERT(imm != nullptr, "no code for ", kind_name(e.kind()));
   if (!is_half(e.type())) return llvm::ConstantFP::get(type, imm->value);
-  const uint16_t bits = e.type().is_bfloat() ? bfloat16_t(imm->value).to_bits() : float16_t(imm->value).to_bits();
+  const uint16_t bits =
+      e.type().is_bfloat() ? bfloat16_t(imm->value).to_bits() : float16_t(imm->value).to_bits();
   return llvm::ConstantInt::get(type, bits);
 }
 
-Value *FunctionGenerator::string_constant(const std::string &text) {
-  Value *&constant = strings_[text];
+Value* FunctionGenerator::string_constant(const std::string& text) {
+  Value*& constant = strings_[text];
   if (!constant) constant = b_.CreateGlobalString(text, "text");
   return constant;
 }
 
-Value *FunctionGenerator::make(const Variable &e) {
+Value* FunctionGenerator::make(const Variable& e) {
   const auto found = frame_.variables.find(e.name);
-  RETROGRADE_ASSERT(found != frame_.variables.end(), "no value for variable ", quoted(e.name), " in ", source_.name);
+  RETROGRADE_ASSERT(found != frame_.variables.end(), "no value for variable ", quoted(e.name),
+                    " in ", source_.name);
   return found->second;
 }
 
-void FunctionGenerator::bind_let(const std::string &name, const Expr &bound) {
-  Value *v = value(bound);
-  const bool is_sum = bound.type() == Int(32) && (bound.as<Add>() || bound.as<Sub>() || bound.as<Mul>());
-  Value *wide = is_sum ? index64(bound) : nullptr;
+void FunctionGenerator::bind_let(const std::string& name, const Expr& bound) {
+  Value* v = value(bound);
+  const bool is_sum =
+      bound.type() == Int(32) && (bound.as<Add>() || bound.as<Sub>() || bound.as<Mul>());
+  Value* wide = is_sum ? index64(bound) : nullptr;
   if (v->getName().empty() && !llvm::isa<llvm::Constant>(v)) v->setName(name);
   frame_.variables[name] = v;
   frame_.indices.erase(name);
   if (wide) frame_.indices[name] = wide;
 }
 
-// The names of lets are unique, so a binding may stay when its body ends. Only copies of a let (unrolled code) bind a
-// name anew within a statement; nodes that the bodies share must then not be looked up.
-bool FunctionGenerator::rebinds(const std::string &name, const Expr &bound) const {
+// The names of lets are unique, so a binding may stay when its body ends. Only copies of a let
+// (unrolled code) bind a name anew within a statement; nodes that the bodies share must then not be
+// looked up.
+bool FunctionGenerator::rebinds(const std::string& name, const Expr& bound) const {
   for (size_t i = frame_.memo.size(); i-- > 0;) {
     const auto found = frame_.memo[i].lets.find(name);
     if (found != frame_.memo[i].lets.end()) return found->second != bound.get();
@@ -84,7 +89,7 @@ bool FunctionGenerator::rebinds(const std::string &name, const Expr &bound) cons
   return false;
 }
 
-Value *FunctionGenerator::make(const Let &e) {
+Value* FunctionGenerator::make(const Let& e) {
   const bool is_copy = rebinds(e.name, e.value);
   bind_let(e.name, e.value);
   if (!is_copy) {
@@ -97,88 +102,97 @@ Value *FunctionGenerator::make(const Let &e) {
   return value(e.body);
 }
 
-Value *FunctionGenerator::make(const Select &e) {
+Value* FunctionGenerator::make(const Select& e) {
   Value *condition = value(e.condition), *a = value(e.true_value), *b = value(e.false_value);
   return b_.CreateSelect(condition, a, b);
 }
 
 // base + stride * k for k in [0, lanes), each a vector when base is one.
-Value *FunctionGenerator::make(const Ramp &e) {
+Value* FunctionGenerator::make(const Ramp& e) {
   const Type element = e.base.type().element_of();
   const int inner = e.base.type().lanes();
-  Value *base = repeat(e_, value(e.base), e.lanes);
-  Value *stride = repeat(e_, value(e.stride), e.lanes);
-  Value *steps;
+  Value* base = repeat(e_, value(e.base), e.lanes);
+  Value* stride = repeat(e_, value(e.stride), e.lanes);
+  Value* steps;
   if (inner == 1) {
     steps = iota(e_, is_half(element) ? b_.getInt32Ty() : llvm_type(e_, element), e.lanes);
   } else {
-    std::vector<Value *> numbers;
+    std::vector<Value*> numbers;
     for (int k = 0; k < e.lanes; k++) {
       numbers.push_back(splat(e_, lane(e_, iota(e_, b_.getInt32Ty(), e.lanes), k), inner));
     }
-    steps = convert(e_, is_half(element) ? Int(32, e.type.lanes()) : element.with_lanes(e.type.lanes()),
-                    Int(32, e.type.lanes()), concat(e_, numbers));
+    steps =
+        convert(e_, is_half(element) ? Int(32, e.type.lanes()) : element.with_lanes(e.type.lanes()),
+                Int(32, e.type.lanes()), concat(e_, numbers));
   }
   if (is_half(element)) steps = convert(e_, e.type, Int(32, e.type.lanes()), steps);
   return binary(e_, Kind::Add, e.type, base, binary(e_, Kind::Mul, e.type, stride, steps));
 }
 
-Value *FunctionGenerator::make(const Shuffle &e) {
-  std::vector<Value *> vectors;
-  for (const Expr &vector : e.vectors) vectors.push_back(value(vector));
+Value* FunctionGenerator::make(const Shuffle& e) {
+  std::vector<Value*> vectors;
+  for (const Expr& vector : e.vectors) vectors.push_back(value(vector));
   // Two operands of one width are a shuffle of LLVM's; more are put together first.
   if (vectors.size() == 2 && e.vectors[0].type() == e.vectors[1].type()) {
     return shuffle(e_, vectors[0], vectors[1], e.indices);
   }
-  Value *all = concat(e_, vectors);
+  Value* all = concat(e_, vectors);
   return e.indices.size() == 1 ? lane(e_, all, e.indices[0]) : shuffle(e_, all, all, e.indices);
 }
 
 static Kind binary_kind(ReduceOp op) {
   switch (op) {
-    case ReduceOp::Add: return Kind::Add;
-    case ReduceOp::Mul: return Kind::Mul;
-    case ReduceOp::Min: return Kind::Min;
-    case ReduceOp::Max: return Kind::Max;
-    case ReduceOp::And: return Kind::And;
-    case ReduceOp::Or: return Kind::Or;
+    case ReduceOp::Add:
+      return Kind::Add;
+    case ReduceOp::Mul:
+      return Kind::Mul;
+    case ReduceOp::Min:
+      return Kind::Min;
+    case ReduceOp::Max:
+      return Kind::Max;
+    case ReduceOp::And:
+      return Kind::And;
+    case ReduceOp::Or:
+      return Kind::Or;
   }
   internal_error("unknown reduction");
 }
 
-Value *FunctionGenerator::make(const VectorReduce &e) {
+Value* FunctionGenerator::make(const VectorReduce& e) {
   const Type element = e.type.element_of();
-  return reduce_groups(e_, value(e.value), e.type.lanes(), [&](Value *a, Value *b) {
+  return reduce_groups(e_, value(e.value), e.type.lanes(), [&](Value* a, Value* b) {
     return binary(e_, binary_kind(e.op), element.with_lanes(lanes_of(a)), a, b);
   });
 }
 
 // ---- indices ----
 
-Value *FunctionGenerator::index64(const Expr &e) {
-  auto &memo = frame_.memo;
+Value* FunctionGenerator::index64(const Expr& e) {
+  auto& memo = frame_.memo;
   for (size_t i = memo.size(); i-- > 0;) {
     const auto found = memo[i].indices.find(e.get());
     if (found != memo[i].indices.end()) return found->second.value;
     if (!memo[i].sees_outer) break;
   }
-  Value *result = make_index64(e);
+  Value* result = make_index64(e);
   if (e.kind() != Kind::Variable) memo.back().indices[e.get()] = {e, result};
   return result;
 }
 
-Value *FunctionGenerator::make_index64(const Expr &e) {
+Value* FunctionGenerator::make_index64(const Expr& e) {
   const Type type = e.type();
   RETROGRADE_ASSERT(type.is_scalar() && type.is_int_or_uint(), "index of type ", to_string(type));
   if (type == Int(32)) {
-    if (const auto *variable = e.as<Variable>()) {
+    if (const auto* variable = e.as<Variable>()) {
       const auto found = frame_.indices.find(variable->name);
       if (found != frame_.indices.end()) return found->second;
     }
-    if (const auto *sum = e.as<Add>()) return b_.CreateAdd(index64(sum->a), index64(sum->b));
-    if (const auto *difference = e.as<Sub>()) return b_.CreateSub(index64(difference->a), index64(difference->b));
-    if (const auto *product = e.as<Mul>()) return b_.CreateMul(index64(product->a), index64(product->b));
-    const auto *call = e.as<Call>();
+    if (const auto* sum = e.as<Add>()) return b_.CreateAdd(index64(sum->a), index64(sum->b));
+    if (const auto* difference = e.as<Sub>())
+      return b_.CreateSub(index64(difference->a), index64(difference->b));
+    if (const auto* product = e.as<Mul>())
+      return b_.CreateMul(index64(product->a), index64(product->b));
+    const auto* call = e.as<Call>();
     if (call && call->call_type == CallType::Operator && op_info(call->op).cls == OpClass::Marker) {
       return index64(call->args[0]);
     }

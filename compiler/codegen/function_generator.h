@@ -22,173 +22,180 @@ namespace retrograde::codegen {
 
 class FunctionGenerator {
  public:
-  FunctionGenerator(Emitter &emitter, const ir::LoweredFunction &function);
+  FunctionGenerator(Emitter& emitter, const ir::LoweredFunction& function);
   // Adds `name` and `name_argv` to the module.
   void generate();
 
  private:
   // Memory that loads and stores name.
   struct Storage {
-    Value *base = nullptr;              // of element 0
-    Value *owned = nullptr;             // slot of a heap block to free, null once freed; null when not ours to free
-    llvm::MDNode *alias = nullptr;      // what else it may overlap: only memory of the same tag
+    Value* base = nullptr;  // of element 0
+    Value* owned =
+        nullptr;  // slot of a heap block to free, null once freed; null when not ours to free
+    llvm::MDNode* alias = nullptr;  // what else it may overlap: only memory of the same tag
   };
 
-  // Values of nodes, as far as they hold at the insertion point. The handle keeps the node's address its own.
+  // Values of nodes, as far as they hold at the insertion point. The handle keeps the node's
+  // address its own.
   struct MemoEntry {
     Expr key;
-    Value *value;
+    Value* value;
   };
-  using Memo = std::unordered_map<const ir::ExprNode *, MemoEntry>;
+  using Memo = std::unordered_map<const ir::ExprNode*, MemoEntry>;
   struct MemoFrame {
     Memo values, indices;  // indices: see index64
     bool sees_outer = false;
-    std::unordered_map<std::string, const ir::ExprNode *> lets = {};  // name to bound value
+    std::unordered_map<std::string, const ir::ExprNode*> lets = {};  // name to bound value
   };
-  // A region of code whose values end with it. A statement sees no values of the one before (stores may have changed
-  // what its nodes load); the arm of a branch sees those computed before the branch.
+  // A region of code whose values end with it. A statement sees no values of the one before (stores
+  // may have changed what its nodes load); the arm of a branch sees those computed before the
+  // branch.
   class MemoScope {
    public:
-    MemoScope(FunctionGenerator &generator, bool sees_outer) : generator_(generator) {
+    MemoScope(FunctionGenerator& generator, bool sees_outer) : generator_(generator) {
       generator_.frame_.memo.push_back({{}, {}, sees_outer});
     }
     ~MemoScope() { generator_.frame_.memo.pop_back(); }
 
    private:
-    FunctionGenerator &generator_;
+    FunctionGenerator& generator_;
   };
 
   // What belongs to one LLVM function: the lowered function itself or the body of a parallel loop.
   struct Frame {
-    llvm::Function *function = nullptr;
-    Value *context = nullptr;
-    llvm::BasicBlock *entry = nullptr;       // allocas go here
-    llvm::BasicBlock *error_exit = nullptr;  // frees what is owned, returns the code
-    llvm::PHINode *error_code = nullptr;
-    llvm::AllocaInst *owned_slots = nullptr;  // an array of pointers, as long as the function needs
+    llvm::Function* function = nullptr;
+    Value* context = nullptr;
+    llvm::BasicBlock* entry = nullptr;       // allocas go here
+    llvm::BasicBlock* error_exit = nullptr;  // frees what is owned, returns the code
+    llvm::PHINode* error_code = nullptr;
+    llvm::AllocaInst* owned_slots = nullptr;  // an array of pointers, as long as the function needs
     int64_t owned_count = 0;
     int64_t stack_bytes = 0;  // of allocations
     std::vector<MemoFrame> memo;
-    std::unordered_map<std::string, Value *> variables;
-    std::unordered_map<std::string, Value *> indices;  // int32 variables as 64-bit integers, see index64
+    std::unordered_map<std::string, Value*> variables;
+    std::unordered_map<std::string, Value*>
+        indices;  // int32 variables as 64-bit integers, see index64
     std::unordered_map<std::string, Storage> storages;
   };
 
   // statements.cpp
-  void begin_function(llvm::Function *function);
+  void begin_function(llvm::Function* function);
   void finish_function();
-  void fail(Value *code);  // leaves the function; the insertion point is a dead end afterwards
-  void fail_unless(Value *condition, const std::function<Value *()> &code);
-  llvm::AllocaInst *entry_alloca(llvm::Type *type, int64_t count, const std::string &name);
-  llvm::BasicBlock *new_block(const std::string &name);
-  void statement(const Stmt &s);
-  void make(const ir::LetStmt &s);
-  void make(const ir::Assert &s);
-  void make(const ir::For &s);
-  void make(const ir::Allocate &s);
-  void make(const ir::Free &s);
-  void make(const ir::IfThenElse &s);
-  void serial_loop(const ir::For &s);
-  bool fits_stack(const ir::Allocate &s, int64_t elements) const;
-  Storage allocate_on_stack(const ir::Allocate &s, int64_t elements);
-  Storage allocate_on_heap(const ir::Allocate &s);
-  Value *new_owned_slot();
-  void free_owned(Storage &storage);
+  void fail(Value* code);  // leaves the function; the insertion point is a dead end afterwards
+  void fail_unless(Value* condition, const std::function<Value*()>& code);
+  llvm::AllocaInst* entry_alloca(llvm::Type* type, int64_t count, const std::string& name);
+  llvm::BasicBlock* new_block(const std::string& name);
+  void statement(const Stmt& s);
+  void make(const ir::LetStmt& s);
+  void make(const ir::Assert& s);
+  void make(const ir::For& s);
+  void make(const ir::Allocate& s);
+  void make(const ir::Free& s);
+  void make(const ir::IfThenElse& s);
+  void serial_loop(const ir::For& s);
+  bool fits_stack(const ir::Allocate& s, int64_t elements) const;
+  Storage allocate_on_stack(const ir::Allocate& s, int64_t elements);
+  Storage allocate_on_heap(const ir::Allocate& s);
+  Value* new_owned_slot();
+  void free_owned(Storage& storage);
   void bind_arguments();
-  void make_argv_wrapper(llvm::Function *function);
-  llvm::MDNode *alias_tag(const std::string &name);
+  void make_argv_wrapper(llvm::Function* function);
+  llvm::MDNode* alias_tag(const std::string& name);
 
   // parallel.cpp
-  void parallel_loop(const ir::For &s);
+  void parallel_loop(const ir::For& s);
 
   // expressions.cpp
-  Value *value(const Expr &e);
-  // A scalar index as a 64-bit integer, computed in 64 bits as far as it is made of + - *: modulo 2^32 that is its
-  // int32 value, and an index that fits int32 is exactly it. Addresses then need no sign extension that hides their
-  // structure from LLVM, and large buffers work.
-  Value *index64(const Expr &e);
-  Value *make_index64(const Expr &e);
-  void bind_let(const std::string &name, const Expr &value);
-  bool rebinds(const std::string &name, const Expr &value) const;
-  Value *make(const ir::Let &e);
-  Value *make(const ir::Variable &e);
-  Value *make(const ir::Ramp &e);
-  Value *make(const ir::Shuffle &e);
-  Value *make(const ir::VectorReduce &e);
-  Value *make(const ir::Select &e);
-  Value *make_immediate(const Expr &e);
-  Value *make_value(const Expr &e);
-  Value *string_constant(const std::string &text);
+  Value* value(const Expr& e);
+  // A scalar index as a 64-bit integer, computed in 64 bits as far as it is made of + - *: modulo
+  // 2^32 that is its int32 value, and an index that fits int32 is exactly it. Addresses then need
+  // no sign extension that hides their structure from LLVM, and large buffers work.
+  Value* index64(const Expr& e);
+  Value* make_index64(const Expr& e);
+  void bind_let(const std::string& name, const Expr& value);
+  bool rebinds(const std::string& name, const Expr& value) const;
+  Value* make(const ir::Let& e);
+  Value* make(const ir::Variable& e);
+  Value* make(const ir::Ramp& e);
+  Value* make(const ir::Shuffle& e);
+  Value* make(const ir::VectorReduce& e);
+  Value* make(const ir::Select& e);
+  Value* make_immediate(const Expr& e);
+  Value* make_value(const Expr& e);
+  Value* string_constant(const std::string& text);
 
   // calls.cpp
-  Value *make(const ir::Call &e);
-  Value *operator_call(const ir::Call &e);
-  Value *extern_call(const ir::Call &e);
-  Value *branch_value(const Expr &condition, const Expr &then_value, const Expr &else_value);
-  Value *require(const ir::Call &e);
-  Value *random(const ir::Call &e);
+  Value* make(const ir::Call& e);
+  Value* operator_call(const ir::Call& e);
+  Value* extern_call(const ir::Call& e);
+  Value* branch_value(const Expr& condition, const Expr& then_value, const Expr& else_value);
+  Value* require(const ir::Call& e);
+  Value* random(const ir::Call& e);
 
   // access.cpp
   struct LinearIndex {  // lane i addresses base + i * stride
     Expr base;
     int64_t stride;
   };
-  std::optional<LinearIndex> as_linear(const Expr &index);
-  Storage &storage(const std::string &name);
-  Value *index_vector(const Expr &index);
-  Value *element_pointer(const Storage &from, Type type, Value *index);
-  Value *make(const ir::Load &e);
-  Value *load_scalar(const Storage &from, Type type, Value *index, Value *predicate);
-  Value *load_vector(const Storage &from, Type type, const Expr &index, Value *predicate);
-  Value *load_linear(const Storage &from, Type type, const LinearIndex &index, Value *predicate);
-  Value *load_dense(const Storage &from, Type type, Value *first, Value *predicate);
-  Value *load_strided(const Storage &from, Type type, Value *first, int64_t stride);
-  Value *load_apart(const Storage &from, Type type, Value *first, int64_t stride);
-  Value *gather(const Storage &from, Type type, Value *indices, Value *predicate);
-  void make(const ir::Store &s);
-  void store_scalar(const Storage &to, Type type, Value *index, Value *value, Value *predicate);
-  void store_vector(const Storage &to, Type type, const Expr &index, Value *value, Value *predicate);
-  void store_dense(const Storage &to, Type type, Value *first, Value *value, Value *predicate);
-  void scatter(const Storage &to, Type type, Value *indices, Value *value, Value *predicate);
-  Value *predicate_value(const Expr &predicate);  // null when always true
-  Value *from_memory(Type type, Value *value);
-  Value *to_memory(Type type, Value *value);
+  std::optional<LinearIndex> as_linear(const Expr& index);
+  Storage& storage(const std::string& name);
+  Value* index_vector(const Expr& index);
+  Value* element_pointer(const Storage& from, Type type, Value* index);
+  Value* make(const ir::Load& e);
+  Value* load_scalar(const Storage& from, Type type, Value* index, Value* predicate);
+  Value* load_vector(const Storage& from, Type type, const Expr& index, Value* predicate);
+  Value* load_linear(const Storage& from, Type type, const LinearIndex& index, Value* predicate);
+  Value* load_dense(const Storage& from, Type type, Value* first, Value* predicate);
+  Value* load_strided(const Storage& from, Type type, Value* first, int64_t stride);
+  Value* load_apart(const Storage& from, Type type, Value* first, int64_t stride);
+  Value* gather(const Storage& from, Type type, Value* indices, Value* predicate);
+  void make(const ir::Store& s);
+  void store_scalar(const Storage& to, Type type, Value* index, Value* value, Value* predicate);
+  void store_vector(const Storage& to, Type type, const Expr& index, Value* value,
+                    Value* predicate);
+  void store_dense(const Storage& to, Type type, Value* first, Value* value, Value* predicate);
+  void scatter(const Storage& to, Type type, Value* indices, Value* value, Value* predicate);
+  Value* predicate_value(const Expr& predicate);  // null when always true
+  Value* from_memory(Type type, Value* value);
+  Value* to_memory(Type type, Value* value);
   template <class Instruction>
-  Instruction *tagged(Instruction *instruction, const Storage &storage) {
+  Instruction* tagged(Instruction* instruction, const Storage& storage) {
     if (storage.alias) instruction->setMetadata(llvm::LLVMContext::MD_tbaa, storage.alias);
     return instruction;
   }
 
   // messages.cpp
   // `separator` stands between parts. `lane`: which lane of vectors to show.
-  Value *report_error(Value *code, const std::vector<Expr> &parts, size_t first, const std::string &separator);
-  void print(const std::vector<Expr> &parts, size_t first, int lane);
-  Value *print_call(const ir::Call &e);
+  Value* report_error(Value* code, const std::vector<Expr>& parts, size_t first,
+                      const std::string& separator);
+  void print(const std::vector<Expr>& parts, size_t first, int lane);
+  Value* print_call(const ir::Call& e);
   struct Format {
     std::string text;
-    std::vector<Value *> args;
+    std::vector<Value*> args;
   };
-  void add_part(Format &format, const Expr &part, int lane);
+  void add_part(Format& format, const Expr& part, int lane);
 
   // buffers.cpp
   bool is_buffer_operator(ir::Op op) const;
-  Value *buffer_operator(const ir::Call &e);
-  Value *host_pointer(Value *buffer);
-  Value *buffer_field(Value *buffer, llvm::Type *type, int64_t offset);
-  Value *dimension_pointer(Value *buffer, Value *dimension, int64_t offset);
-  Value *set_bounds(const ir::Call &e);
+  Value* buffer_operator(const ir::Call& e);
+  Value* host_pointer(Value* buffer);
+  Value* buffer_field(Value* buffer, llvm::Type* type, int64_t offset);
+  Value* dimension_pointer(Value* buffer, Value* dimension, int64_t offset);
+  Value* set_bounds(const ir::Call& e);
 
-  llvm::FunctionCallee runtime_function(const std::string &name, llvm::Type *result,
-                                        const std::vector<llvm::Type *> &params, bool variadic = false);
+  llvm::FunctionCallee runtime_function(const std::string& name, llvm::Type* result,
+                                        const std::vector<llvm::Type*>& params,
+                                        bool variadic = false);
 
   // Runs `body` only where the scalar condition holds.
-  void if_true(Value *condition, const std::function<void()> &body);
+  void if_true(Value* condition, const std::function<void()>& body);
 
-  Emitter &e_;
-  llvm::IRBuilder<> &b_;
-  const ir::LoweredFunction &source_;
+  Emitter& e_;
+  llvm::IRBuilder<>& b_;
+  const ir::LoweredFunction& source_;
   Frame frame_;
-  std::unordered_map<std::string, Value *> strings_;
+  std::unordered_map<std::string, Value*> strings_;
   int parallel_loops_ = 0;
 };
 

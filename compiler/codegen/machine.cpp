@@ -16,20 +16,20 @@ namespace {
 
 using F = Target::Feature;
 
-bool has_any(const Target &target, std::initializer_list<F> features) {
+bool has_any(const Target& target, std::initializer_list<F> features) {
   for (F feature : features) {
     if (target.has_feature(feature)) return true;
   }
   return false;
 }
 
-bool has_skylake(const Target &t) {
+bool has_skylake(const Target& t) {
   return has_any(t, {F::AVX512_Skylake, F::AVX512_Cannonlake, F::AVX512_SapphireRapids});
 }
 
-std::string x86_features(const Target &t) {
+std::string x86_features(const Target& t) {
   std::string text = "+sse2";
-  const auto add = [&](bool has, const char *names) {
+  const auto add = [&](bool has, const char* names) {
     if (has) text += std::string(",") + names;
   };
   const bool avx512 = has_any(t, {F::AVX512}) || has_skylake(t);
@@ -43,11 +43,12 @@ std::string x86_features(const Target &t) {
   add(avx512, "+avx512f,+avx512cd");
   add(has_skylake(t), "+avx512vl,+avx512bw,+avx512dq");
   add(has_any(t, {F::AVX512_Cannonlake, F::AVX512_SapphireRapids}), "+avx512ifma,+avx512vbmi");
-  add(t.has_feature(F::AVX512_SapphireRapids), "+avx512vnni,+avx512vbmi2,+avx512bitalg,+avx512vpopcntdq");
+  add(t.has_feature(F::AVX512_SapphireRapids),
+      "+avx512vnni,+avx512vbmi2,+avx512bitalg,+avx512vpopcntdq");
   return text;
 }
 
-int x86_vector_bits(const Machine &machine) {
+int x86_vector_bits(const Machine& machine) {
   if (machine.has_avx512()) return 512;
   return has_any(machine.target, {F::AVX, F::AVX2}) ? 256 : 128;
 }
@@ -67,18 +68,21 @@ void initialize_llvm() {
 }
 
 // The suffix of SLEEF's functions for `vector_bits`, 0 for scalars.
-std::string sleef_suffix(const Machine &machine, int vector_bits) {
-  const Target &t = machine.target;
+std::string sleef_suffix(const Machine& machine, int vector_bits) {
+  const Target& t = machine.target;
   if (vector_bits == 0) return machine.has_fma() ? "purecfma" : "purec";
   if (!machine.is_x86()) return "advsimd";
-  if (machine.has_fma()) return vector_bits == 128 ? "avx2128" : vector_bits == 256 ? "avx2" : "avx512f";
+  if (machine.has_fma())
+    return vector_bits == 128 ? "avx2128" : vector_bits == 256 ? "avx2" : "avx512f";
   if (vector_bits == 256) return "avx";
   return has_any(t, {F::SSE41, F::AVX, F::AVX2}) ? "sse4" : "sse2";
 }
 
 }  // namespace
 
-bool Machine::has_avx512() const { return is_x86() && (has_any(target, {F::AVX512}) || has_skylake(target)); }
+bool Machine::has_avx512() const {
+  return is_x86() && (has_any(target, {F::AVX512}) || has_skylake(target));
+}
 bool Machine::has_avx2() const { return has_avx512() || (is_x86() && target.has_feature(F::AVX2)); }
 bool Machine::has_fma() const {
   return !is_x86() || has_avx512() || (target.has_feature(F::FMA) && target.has_feature(F::AVX2));
@@ -88,15 +92,17 @@ bool Machine::has_f16c() const { return !is_x86() || has_avx512() || target.has_
 int Machine::max_math_lanes(int bits) const { return vector_bits / bits; }
 int Machine::min_math_lanes(int bits) const { return 128 / bits; }
 
-std::string Machine::math_symbol(const std::string &stem, const std::string &precision, int bits, int lanes) const {
+std::string Machine::math_symbol(const std::string& stem, const std::string& precision, int bits,
+                                 int lanes) const {
   // finz, cinz: SLEEF's functions whose results do not depend on the vector width.
   const std::string family = has_fma() ? "finz_" : "cinz_";
-  return "Sleef_" + family + stem + (bits == 32 ? "f" : "d") + std::to_string(lanes) + "_" + precision +
-         sleef_suffix(*this, lanes == 1 ? 0 : lanes * bits);
+  return "Sleef_" + family + stem + (bits == 32 ? "f" : "d") + std::to_string(lanes) + "_" +
+         precision + sleef_suffix(*this, lanes == 1 ? 0 : lanes * bits);
 }
 
-Machine machine_for(const Target &target, bool tune_for_host) {
-  const bool known = target.bits == 64 && (target.arch == Target::X86 || target.arch == Target::ARM);
+Machine machine_for(const Target& target, bool tune_for_host) {
+  const bool known =
+      target.bits == 64 && (target.arch == Target::X86 || target.arch == Target::ARM);
   if (!known || target.os != Target::Linux) {
     unsupported("generate code for target \"" + target.to_string() + "\"",
                 "code is generated for 64-bit x86 and ARM under Linux", "",
@@ -119,17 +125,17 @@ Machine machine_for(const Target &target, bool tune_for_host) {
   return machine;
 }
 
-std::unique_ptr<llvm::TargetMachine> make_target_machine(const Machine &machine) {
+std::unique_ptr<llvm::TargetMachine> make_target_machine(const Machine& machine) {
   initialize_llvm();
   std::string problem;
-  const llvm::Target *target = llvm::TargetRegistry::lookupTarget(machine.triple, problem);
+  const llvm::Target* target = llvm::TargetRegistry::lookupTarget(machine.triple, problem);
   RETROGRADE_ASSERT(target != nullptr, "LLVM has no target ", machine.triple, ": ", problem);
   llvm::TargetOptions options;
   options.AllowFPOpFusion = llvm::FPOpFusion::Standard;  // fuses what carries the contract flag
   options.TrapUnreachable = true;
-  return std::unique_ptr<llvm::TargetMachine>(
-      target->createTargetMachine(machine.triple, machine.cpu, machine.features, options,
-                                  llvm::Reloc::PIC_, llvm::CodeModel::Small, llvm::CodeGenOptLevel::Default));
+  return std::unique_ptr<llvm::TargetMachine>(target->createTargetMachine(
+      machine.triple, machine.cpu, machine.features, options, llvm::Reloc::PIC_,
+      llvm::CodeModel::Small, llvm::CodeGenOptLevel::Default));
 }
 
 }  // namespace retrograde::codegen

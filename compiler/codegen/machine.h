@@ -18,22 +18,24 @@ struct Machine {
   int vector_bits = 128;
 
   bool is_x86() const { return target.arch == Target::X86; }
-  bool has_avx512() const;   // F at least
+  bool has_avx512() const;  // F at least
   bool has_avx2() const;
-  bool has_fma() const;      // as the vector math sees it: FMA with AVX2, or AArch64
-  bool has_f16c() const;     // half to float conversion as an instruction
+  bool has_fma() const;   // as the vector math sees it: FMA with AVX2, or AArch64
+  bool has_f16c() const;  // half to float conversion as an instruction
   bool has_gather() const { return has_avx2(); }
 
   // Lanes of the widest vector math function for floats of `bits`.
   int max_math_lanes(int bits) const;
   int min_math_lanes(int bits) const;  // of the narrowest one that is a vector
-  // "Sleef_finz_expf8_u10avx2" for ("exp", "u10", 32, 8). `lanes` is 1 or a power of two between min_ and
-  // max_math_lanes. All widths on one machine, and all machines with FMA, give the same bits.
-  std::string math_symbol(const std::string &stem, const std::string &precision, int bits, int lanes) const;
+  // "Sleef_finz_expf8_u10avx2" for ("exp", "u10", 32, 8). `lanes` is 1 or a power of two between
+  // min_ and max_math_lanes. All widths on one machine, and all machines with FMA, give the same
+  // bits.
+  std::string math_symbol(const std::string& stem, const std::string& precision, int bits,
+                          int lanes) const;
 };
 
 // Unsupported for targets that no back end exists for.
-Machine machine_for(const Target &target, bool tune_for_host);
-std::unique_ptr<llvm::TargetMachine> make_target_machine(const Machine &machine);
+Machine machine_for(const Target& target, bool tune_for_host);
+std::unique_ptr<llvm::TargetMachine> make_target_machine(const Machine& machine);
 
 }  // namespace retrograde::codegen

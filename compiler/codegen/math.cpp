@@ -11,19 +11,21 @@ namespace retrograde::codegen {
 namespace {
 
 using ir::Op;
-using Args = std::vector<Value *>;
+using Args = std::vector<Value*>;
 
-const MathFunction *find_math_function(Op op) {
-  const auto *found = std::find_if(std::begin(math_functions), std::end(math_functions),
-                                   [&](const MathFunction &function) { return function.op == op; });
+const MathFunction* find_math_function(Op op) {
+  const auto* found = std::find_if(std::begin(math_functions), std::end(math_functions),
+                                   [&](const MathFunction& function) { return function.op == op; });
   return found == std::end(math_functions) ? nullptr : found;
 }
 
-// The declaration of a function that only reads its arguments, so that LLVM may move, merge and drop its calls.
-llvm::FunctionCallee declare_pure(Emitter &e, const std::string &name, llvm::Type *type, size_t arity) {
-  const std::vector<llvm::Type *> params(arity, type);
+// The declaration of a function that only reads its arguments, so that LLVM may move, merge and
+// drop its calls.
+llvm::FunctionCallee declare_pure(Emitter& e, const std::string& name, llvm::Type* type,
+                                  size_t arity) {
+  const std::vector<llvm::Type*> params(arity, type);
   auto callee = e.module.getOrInsertFunction(name, llvm::FunctionType::get(type, params, false));
-  auto *function = llvm::cast<llvm::Function>(callee.getCallee());
+  auto* function = llvm::cast<llvm::Function>(callee.getCallee());
   function->setDoesNotAccessMemory();
   function->setDoesNotThrow();
   function->setWillReturn();
@@ -31,67 +33,73 @@ llvm::FunctionCallee declare_pure(Emitter &e, const std::string &name, llvm::Typ
 }
 
 // The narrowest width that holds `lanes`, or the widest there is.
-int call_lanes(const Machine &machine, int bits, int lanes) {
+int call_lanes(const Machine& machine, int bits, int lanes) {
   if (lanes == 1) return 1;
   int width = machine.min_math_lanes(bits);
   while (width < lanes && width < machine.max_math_lanes(bits)) width *= 2;
   return width;
 }
 
-// `lanes` lanes from `start` on; lanes beyond the end repeat the first, so that they cost no slow path.
-Value *padded_slice(Emitter &e, Value *vector, int start, int lanes) {
+// `lanes` lanes from `start` on; lanes beyond the end repeat the first, so that they cost no slow
+// path.
+Value* padded_slice(Emitter& e, Value* vector, int start, int lanes) {
   const int has = lanes_of(vector);
-  if (start + lanes <= has || has == 1) return has == 1 ? splat(e, vector, lanes) : slice(e, vector, start, lanes);
+  if (start + lanes <= has || has == 1)
+    return has == 1 ? splat(e, vector, lanes) : slice(e, vector, start, lanes);
   std::vector<int> indices;
   for (int i = start; i < start + lanes; i++) indices.push_back(i < has ? i : start);
   return shuffle(e, vector, vector, indices);
 }
 
 // One function over all lanes of float or double vectors.
-Value *call_by_pieces(Emitter &e, const MathFunction &function, const Args &args) {
+Value* call_by_pieces(Emitter& e, const MathFunction& function, const Args& args) {
   const int total = lanes_of(args[0]);
-  auto *scalar = args[0]->getType()->getScalarType();
+  auto* scalar = args[0]->getType()->getScalarType();
   const int bits = static_cast<int>(scalar->getPrimitiveSizeInBits());
   Args pieces;
   for (int start = 0; start < total;) {
-    const int lanes = call_lanes(e.machine, bits, total - start), useful = std::min(lanes, total - start);
+    const int lanes = call_lanes(e.machine, bits, total - start),
+              useful = std::min(lanes, total - start);
     Args piece_args;
-    for (Value *arg : args) piece_args.push_back(padded_slice(e, arg, start, lanes));
+    for (Value* arg : args) piece_args.push_back(padded_slice(e, arg, start, lanes));
     const std::string name = e.machine.math_symbol(function.stem, function.precision, bits, lanes);
-    Value *piece = e.b.CreateCall(declare_pure(e, name, with_lanes(scalar, lanes), args.size()), piece_args);
+    Value* piece =
+        e.b.CreateCall(declare_pure(e, name, with_lanes(scalar, lanes), args.size()), piece_args);
     pieces.push_back(slice(e, piece, 0, useful));
     start += useful;
   }
   return concat(e, pieces);
 }
 
-Value *full_precision(Emitter &e, Op op, const Args &args) {
+Value* full_precision(Emitter& e, Op op, const Args& args) {
   return call_by_pieces(e, *find_math_function(op), args);
 }
 
-Value *copy_sign(Emitter &e, Value *size, Value *sign) {
+Value* copy_sign(Emitter& e, Value* size, Value* sign) {
   return e.b.CreateBinaryIntrinsic(llvm::Intrinsic::copysign, size, sign);
 }
 
 // sinh and cosh where exp(x) overflows but half of it need not.
-Value *near_overflow(Emitter &e, Op op, Value *x, Value *size) {
-  Value *root = full_precision(e, Op::exp, {e.b.CreateFMul(size, float_constant(x, 0.5))});
-  Value *result = e.b.CreateFMul(e.b.CreateFMul(root, float_constant(x, 0.5)), root);
+Value* near_overflow(Emitter& e, Op op, Value* x, Value* size) {
+  Value* root = full_precision(e, Op::exp, {e.b.CreateFMul(size, float_constant(x, 0.5))});
+  Value* result = e.b.CreateFMul(e.b.CreateFMul(root, float_constant(x, 0.5)), root);
   return op == Op::sinh ? copy_sign(e, result, x) : result;
 }
 
 // asinh and acosh where x * x overflows.
-Value *logarithmic(Emitter &e, Op op, Value *x, Value *size) {
-  Value *result = e.b.CreateFAdd(full_precision(e, Op::log, {size}), float_constant(x, 0.69314718055994530942));
+Value* logarithmic(Emitter& e, Op op, Value* x, Value* size) {
+  Value* result =
+      e.b.CreateFAdd(full_precision(e, Op::log, {size}), float_constant(x, 0.69314718055994530942));
   return op == Op::asinh ? copy_sign(e, result, x) : result;
 }
 
-Value *with_limit(Emitter &e, const MathFunction &function, Value *x, Value *inside, double limit) {
-  Value *size = e.b.CreateUnaryIntrinsic(llvm::Intrinsic::fabs, x);
+Value* with_limit(Emitter& e, const MathFunction& function, Value* x, Value* inside, double limit) {
+  Value* size = e.b.CreateUnaryIntrinsic(llvm::Intrinsic::fabs, x);
   const bool is_exponential = function.op == Op::sinh || function.op == Op::cosh;
   // acosh is not defined far below 0.
-  Value *is_far = e.b.CreateFCmpOGT(function.op == Op::acosh ? x : size, float_constant(x, limit));
-  Value *outside = is_exponential ? near_overflow(e, function.op, x, size) : logarithmic(e, function.op, x, size);
+  Value* is_far = e.b.CreateFCmpOGT(function.op == Op::acosh ? x : size, float_constant(x, limit));
+  Value* outside = is_exponential ? near_overflow(e, function.op, x, size)
+                                  : logarithmic(e, function.op, x, size);
   return e.b.CreateSelect(is_far, outside, inside);
 }
 
@@ -99,14 +107,14 @@ Value *with_limit(Emitter &e, const MathFunction &function, Value *x, Value *ins
 
 bool is_math_operator(Op op) { return find_math_function(op) != nullptr; }
 
-Value *math_operator(Emitter &e, Op op, Type type, const Args &args) {
+Value* math_operator(Emitter& e, Op op, Type type, const Args& args) {
   if (is_half(type)) {
     Args wide;
-    for (Value *arg : args) wide.push_back(half_to_float(e, type, arg));
+    for (Value* arg : args) wide.push_back(half_to_float(e, type, arg));
     return float_to_half(e, type, math_operator(e, op, Float(32, type.lanes()), wide));
   }
-  const MathFunction &function = *find_math_function(op);
-  Value *result = call_by_pieces(e, function, args);
+  const MathFunction& function = *find_math_function(op);
+  Value* result = call_by_pieces(e, function, args);
   const double limit = type.bits() == 32 ? function.float32_limit : function.float64_limit;
   return limit == 0 ? result : with_limit(e, function, args[0], result, limit);
 }

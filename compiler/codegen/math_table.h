@@ -1,7 +1,7 @@
-// The vector math functions: operator, SLEEF's name, and the largest error that we promise, in units
-// in the last place of the result, over the whole domain and for every width. The unit test holds
-// every row to its numbers. All come from SLEEF's families whose bits do not depend on the width, so
-// a scalar tail agrees with the vector body. Special values follow C99 Annex F.
+// The vector math functions: operator, SLEEF's name, and the largest error that we promise, in
+// units in the last place of the result, over the whole domain and for every width. The unit test
+// holds every row to its numbers. All come from SLEEF's families whose bits do not depend on the
+// width, so a scalar tail agrees with the vector body. Special values follow C99 Annex F.
 //
 // Half types compute in float32 and round once more.
 #pragma once
@@ -12,8 +12,8 @@ namespace retrograde::codegen {
 
 struct MathFunction {
   ir::Op op;
-  const char *stem;       // Sleef_<family>_<stem>f8_<precision>...
-  const char *precision;
+  const char* stem;  // Sleef_<family>_<stem>f8_<precision>...
+  const char* precision;
   double max_ulp_float32;
   double max_ulp_float64;
   // Beyond this magnitude SLEEF overflows early, and math.cpp uses another formula; 0: never.
@@ -46,13 +46,14 @@ inline constexpr MathFunction math_functions[] = {
 // The fast forms of float32, inlined. Doubles use the full functions (and 1 / x, 1 / sqrt(x)).
 struct FastFunction {
   ir::Op op;
-  double low, high;          // the domain in which the error holds
+  double low, high;  // the domain in which the error holds
   double max_relative_error;
   double max_absolute_error;  // the error is within one of the two
 };
 
 inline constexpr FastFunction fast_functions[] = {
-    // Saturates outside of the domain instead of overflowing to infinity or underflowing to 0. NaN stays NaN.
+    // Saturates outside of the domain instead of overflowing to infinity or underflowing to 0. NaN
+    // stays NaN.
     {ir::Op::fast_exp, -87.0, 88.0, 3e-7, 0},
     // Zero gives -infinity, infinity itself, negative numbers NaN; denormals count as zero.
     {ir::Op::fast_log, 0x1p-126, 0x1.fffffep127, 3e-7, 1e-7},

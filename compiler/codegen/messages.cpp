@@ -6,19 +6,19 @@ namespace retrograde::codegen {
 
 using namespace ir;
 
-static std::string escaped(const std::string &text) {
+static std::string escaped(const std::string& text) {
   std::string result;
   for (char c : text) result += c == '%' ? std::string("%%") : std::string(1, c);
   return result;
 }
 
-void FunctionGenerator::add_part(Format &format, const Expr &part, int which) {
-  if (const auto *literal = part.as<StringImm>()) {
+void FunctionGenerator::add_part(Format& format, const Expr& part, int which) {
+  if (const auto* literal = part.as<StringImm>()) {
     format.text += escaped(literal->value);
     return;
   }
   const Type type = part.type().element_of();
-  Value *v = lane(e_, value(part), part.type().lanes() == 1 ? 0 : which);
+  Value* v = lane(e_, value(part), part.type().lanes() == 1 ? 0 : which);
   if (type.is_handle()) {
     format.text += "%p";
   } else if (type.is_bool()) {
@@ -34,8 +34,8 @@ void FunctionGenerator::add_part(Format &format, const Expr &part, int which) {
   format.args.push_back(v);
 }
 
-Value *FunctionGenerator::report_error(Value *code, const std::vector<Expr> &parts, size_t first,
-                                       const std::string &separator) {
+Value* FunctionGenerator::report_error(Value* code, const std::vector<Expr>& parts, size_t first,
+                                       const std::string& separator) {
   Format format;
   for (size_t i = first; i < parts.size(); i++) {
     if (i > first) format.text += separator;
@@ -43,30 +43,31 @@ Value *FunctionGenerator::report_error(Value *code, const std::vector<Expr> &par
   }
   const auto report = runtime_function("retrograde_report_error", b_.getInt32Ty(),
                                        {b_.getPtrTy(), b_.getInt32Ty(), b_.getPtrTy()}, true);
-  std::vector<Value *> args = {frame_.context, code, string_constant(format.text)};
+  std::vector<Value*> args = {frame_.context, code, string_constant(format.text)};
   args.insert(args.end(), format.args.begin(), format.args.end());
   return b_.CreateCall(report, args);
 }
 
-void FunctionGenerator::print(const std::vector<Expr> &parts, size_t first, int which) {
+void FunctionGenerator::print(const std::vector<Expr>& parts, size_t first, int which) {
   Format format;
   for (size_t i = first; i < parts.size(); i++) {
     if (i > first) format.text += " ";
     add_part(format, parts[i], which);
   }
   format.text += "\n";
-  const auto print = runtime_function("retrograde_print", b_.getVoidTy(), {b_.getPtrTy(), b_.getPtrTy()}, true);
-  std::vector<Value *> args = {frame_.context, string_constant(format.text)};
+  const auto print =
+      runtime_function("retrograde_print", b_.getVoidTy(), {b_.getPtrTy(), b_.getPtrTy()}, true);
+  std::vector<Value*> args = {frame_.context, string_constant(format.text)};
   args.insert(args.end(), format.args.begin(), format.args.end());
   b_.CreateCall(print, args);
 }
 
 // print(value, parts...) or print_when(condition, value, parts...): a line for each lane.
-Value *FunctionGenerator::print_call(const Call &e) {
+Value* FunctionGenerator::print_call(const Call& e) {
   const size_t first = e.op == Op::print_when ? 1 : 0;
-  Value *condition = first ? value(e.args[0]) : nullptr;
+  Value* condition = first ? value(e.args[0]) : nullptr;
   int lanes = 1;
-  for (const Expr &arg : e.args) {
+  for (const Expr& arg : e.args) {
     value(arg);  // here, so that no value is first computed under a condition
     lanes = std::max(lanes, arg.type().lanes());
   }
@@ -74,7 +75,8 @@ Value *FunctionGenerator::print_call(const Call &e) {
     if (!condition) {
       print(e.args, first, i);
     } else {
-      if_true(lane(e_, condition, lanes_of(condition) == 1 ? 0 : i), [&] { print(e.args, first, i); });
+      if_true(lane(e_, condition, lanes_of(condition) == 1 ? 0 : i),
+              [&] { print(e.args, first, i); });
     }
   }
   return value(e.args[first]);

@@ -1,4 +1,5 @@
-// The Pure operators that are a few instructions: bits, shifts, absolute values, lerp, rounding, classification.
+// The Pure operators that are a few instructions: bits, shifts, absolute values, lerp, rounding,
+// classification.
 #include <llvm/IR/Intrinsics.h>
 
 #include "codegen/emitter.h"
@@ -13,15 +14,15 @@ using llvm::Intrinsic::ID;
 // ---- shifts ----
 
 // By an amount in [0, infinity), as an unsigned number of the value's type.
-Value *shift_by_unsigned(Emitter &e, Type type, Value *value, Value *amount, bool left) {
-  Value *limit = int_constant(amount, type.bits() - 1);
-  Value *safe = e.b.CreateBinaryIntrinsic(llvm::Intrinsic::umin, amount, limit);
+Value* shift_by_unsigned(Emitter& e, Type type, Value* value, Value* amount, bool left) {
+  Value* limit = int_constant(amount, type.bits() - 1);
+  Value* safe = e.b.CreateBinaryIntrinsic(llvm::Intrinsic::umin, amount, limit);
   if (!left && type.is_int()) return e.b.CreateAShr(value, safe);  // beyond the width: the sign
-  Value *shifted = left ? e.b.CreateShl(value, safe) : e.b.CreateLShr(value, safe);
+  Value* shifted = left ? e.b.CreateShl(value, safe) : e.b.CreateLShr(value, safe);
   return e.b.CreateSelect(e.b.CreateICmpUGT(amount, limit), int_constant(value, 0), shifted);
 }
 
-Value *shift(Emitter &e, Type type, Type amount_type, Value *value, Value *amount, bool left) {
+Value* shift(Emitter& e, Type type, Type amount_type, Value* value, Value* amount, bool left) {
   if (amount_type.bits() != type.bits()) {  // a wider amount must not lose its high bits
     const Type wide = amount_type.with_bits(std::max(amount_type.bits(), type.bits()));
     amount = convert(e, wide, amount_type, amount);
@@ -31,22 +32,22 @@ Value *shift(Emitter &e, Type type, Type amount_type, Value *value, Value *amoun
     }
   }
   if (amount_type.is_uint()) return shift_by_unsigned(e, type, value, amount, left);
-  Value *is_negative = e.b.CreateICmpSLT(amount, int_constant(amount, 0));
-  Value *forward = shift_by_unsigned(e, type, value, amount, left);
-  Value *backward = shift_by_unsigned(e, type, value, e.b.CreateNeg(amount), !left);
+  Value* is_negative = e.b.CreateICmpSLT(amount, int_constant(amount, 0));
+  Value* forward = shift_by_unsigned(e, type, value, amount, left);
+  Value* backward = shift_by_unsigned(e, type, value, e.b.CreateNeg(amount), !left);
   return e.b.CreateSelect(is_negative, backward, forward);
 }
 
 // ---- absolute values ----
 
-Value *absolute(Emitter &e, Type type, Value *value) {
+Value* absolute(Emitter& e, Type type, Value* value) {
   if (is_half(type)) return e.b.CreateAnd(value, int_constant(value, 0x7fff));
   if (type.is_float()) return e.b.CreateUnaryIntrinsic(llvm::Intrinsic::fabs, value);
   if (!type.is_int()) return value;
   return e.b.CreateBinaryIntrinsic(llvm::Intrinsic::abs, value, e.b.getFalse());
 }
 
-Value *absolute_difference(Emitter &e, Type type, Value *a, Value *b) {
+Value* absolute_difference(Emitter& e, Type type, Value* a, Value* b) {
   if (type.is_float()) return absolute(e, type, binary(e, ir::Kind::Sub, type, a, b));
   return e.b.CreateSub(binary(e, ir::Kind::Max, type, a, b), binary(e, ir::Kind::Min, type, a, b));
 }
@@ -54,43 +55,45 @@ Value *absolute_difference(Emitter &e, Type type, Value *a, Value *b) {
 // ---- lerp ----
 
 // The weight as a float of `type`: integers count their largest value as 1.
-Value *unit_weight(Emitter &e, Type type, Type weight_type, Value *weight) {
-  Value *number = convert(e, type, weight_type, weight);
+Value* unit_weight(Emitter& e, Type type, Type weight_type, Value* weight) {
+  Value* number = convert(e, type, weight_type, weight);
   if (weight_type.is_float()) return number;
-  return e.b.CreateFDiv(number, float_constant(number, static_cast<double>(weight_type.max_uint())));
+  return e.b.CreateFDiv(number,
+                        float_constant(number, static_cast<double>(weight_type.max_uint())));
 }
 
-Value *lerp_floats(Emitter &e, Type type, Type weight_type, Value *a, Value *b, Value *weight) {
+Value* lerp_floats(Emitter& e, Type type, Type weight_type, Value* a, Value* b, Value* weight) {
   const Type wide = is_half(type) ? Float(32, type.lanes()) : type;
-  Value *w = unit_weight(e, wide, weight_type, weight);
-  Value *rest = e.b.CreateFSub(float_constant(w, 1.0), w);
-  Value *sum = e.b.CreateFAdd(e.b.CreateFMul(convert(e, wide, type, a), rest),
+  Value* w = unit_weight(e, wide, weight_type, weight);
+  Value* rest = e.b.CreateFSub(float_constant(w, 1.0), w);
+  Value* sum = e.b.CreateFAdd(e.b.CreateFMul(convert(e, wide, type, a), rest),
                               e.b.CreateFMul(convert(e, wide, type, b), w));
   return convert(e, type, wide, sum);
 }
 
-Value *lerp_bools(Emitter &e, Type weight_type, Value *a, Value *b, Value *weight) {
-  Value *is_above;
+Value* lerp_bools(Emitter& e, Type weight_type, Value* a, Value* b, Value* weight) {
+  Value* is_above;
   if (weight_type.is_float()) {
-    Value *w = convert(e, Float(64, weight_type.lanes()), weight_type, weight);
+    Value* w = convert(e, Float(64, weight_type.lanes()), weight_type, weight);
     is_above = e.b.CreateFCmpOGT(w, float_constant(w, 0.5));
   } else {
-    is_above = e.b.CreateICmpUGT(weight, int_constant(weight, static_cast<int64_t>(weight_type.max_uint() / 2)));
+    is_above = e.b.CreateICmpUGT(
+        weight, int_constant(weight, static_cast<int64_t>(weight_type.max_uint() / 2)));
   }
   return e.b.CreateSelect(is_above, b, a);
 }
 
 // A float weight in fixed point of the values' width, rounding down.
-Value *fixed_point_weight(Emitter &e, Type fixed, Type weight_type, Value *weight) {
+Value* fixed_point_weight(Emitter& e, Type fixed, Type weight_type, Value* weight) {
   const Type wide = Float(64, fixed.lanes());
-  Value *w = convert(e, wide, weight_type, weight);
+  Value* w = convert(e, wide, weight_type, weight);
   w = e.b.CreateFMul(w, float_constant(w, static_cast<double>(fixed.max_uint())));
   return convert_saturating(e, fixed, wide, w);
 }
 
-// a +- round(|b - a| * w / max). The product fits the sum of both widths, its half of max included, and there are no
-// ties because max is odd.
-Value *lerp_integers(Emitter &e, Type type, Type weight_type, Value *a, Value *b, Value *weight) {
+// a +- round(|b - a| * w / max). The product fits the sum of both widths, its half of max included,
+// and there are no ties because max is odd.
+Value* lerp_integers(Emitter& e, Type type, Type weight_type, Value* a, Value* b, Value* weight) {
   if (weight_type.is_float()) {
     const Type fixed = UInt(type.bits(), type.lanes());
     weight = fixed_point_weight(e, fixed, weight_type, weight);
@@ -98,18 +101,20 @@ Value *lerp_integers(Emitter &e, Type type, Type weight_type, Value *a, Value *b
   }
   int bits = 16;
   while (bits < type.bits() + weight_type.bits()) bits *= 2;
-  RETROGRADE_ASSERT(bits <= 64, "lerp of ", to_string(type), " with a weight of ", to_string(weight_type));
-  auto *wide = llvm_type(e, UInt(bits, type.lanes()));
-  Value *distance = e.b.CreateZExt(absolute_difference(e, type, a, b), wide);
-  Value *product = e.b.CreateMul(distance, e.b.CreateZExt(weight, wide));
+  RETROGRADE_ASSERT(bits <= 64, "lerp of ", to_string(type), " with a weight of ",
+                    to_string(weight_type));
+  auto* wide = llvm_type(e, UInt(bits, type.lanes()));
+  Value* distance = e.b.CreateZExt(absolute_difference(e, type, a, b), wide);
+  Value* product = e.b.CreateMul(distance, e.b.CreateZExt(weight, wide));
   const auto max = static_cast<int64_t>(weight_type.max_uint());
-  Value *rounded = e.b.CreateUDiv(e.b.CreateAdd(product, int_constant(product, max / 2)), int_constant(product, max));
-  Value *step = e.b.CreateTrunc(rounded, a->getType());
-  Value *is_down = binary(e, ir::Kind::LT, type, b, a);
+  Value* rounded = e.b.CreateUDiv(e.b.CreateAdd(product, int_constant(product, max / 2)),
+                                  int_constant(product, max));
+  Value* step = e.b.CreateTrunc(rounded, a->getType());
+  Value* is_down = binary(e, ir::Kind::LT, type, b, a);
   return e.b.CreateSelect(is_down, e.b.CreateSub(a, step), e.b.CreateAdd(a, step));
 }
 
-Value *lerp(Emitter &e, Type type, Type weight_type, Value *a, Value *b, Value *weight) {
+Value* lerp(Emitter& e, Type type, Type weight_type, Value* a, Value* b, Value* weight) {
   if (type.is_float()) return lerp_floats(e, type, weight_type, a, b, weight);
   if (type.is_bool()) return lerp_bools(e, weight_type, a, b, weight);
   return lerp_integers(e, type, weight_type, a, b, weight);
@@ -117,58 +122,79 @@ Value *lerp(Emitter &e, Type type, Type weight_type, Value *a, Value *b, Value *
 
 // ---- rounding, classification, strong zero ----
 
-Value *by_intrinsic(Emitter &e, ID id, Type type, Value *value) {
+Value* by_intrinsic(Emitter& e, ID id, Type type, Value* value) {
   if (!is_half(type)) return e.b.CreateUnaryIntrinsic(id, value);
   return float_to_half(e, type, e.b.CreateUnaryIntrinsic(id, half_to_float(e, type, value)));
 }
 
-Value *classify(Emitter &e, Op op, Type type, Value *value) {
-  Value *number = is_half(type) ? half_to_float(e, type, value) : value;
+Value* classify(Emitter& e, Op op, Type type, Value* value) {
+  Value* number = is_half(type) ? half_to_float(e, type, value) : value;
   if (op == Op::is_nan) return e.b.CreateFCmpUNO(number, number);
-  Value *size = e.b.CreateUnaryIntrinsic(llvm::Intrinsic::fabs, number);
-  Value *infinity = llvm::ConstantFP::getInfinity(size->getType());
+  Value* size = e.b.CreateUnaryIntrinsic(llvm::Intrinsic::fabs, number);
+  Value* infinity = llvm::ConstantFP::getInfinity(size->getType());
   return op == Op::is_inf ? e.b.CreateFCmpOEQ(size, infinity) : e.b.CreateFCmpOLT(size, infinity);
 }
 
 // A select of zero is a masked multiplication in machine code.
-Value *strong_multiply(Emitter &e, Type type, Value *adjoint, Value *partial) {
+Value* strong_multiply(Emitter& e, Type type, Value* adjoint, Value* partial) {
   const Type wide = is_half(type) ? Float(32, type.lanes()) : type;
-  Value *a = convert(e, wide, type, adjoint);
-  Value *is_zero = e.b.CreateFCmpOEQ(a, float_constant(a, 0.0));
-  Value *product = e.b.CreateFMul(a, convert(e, wide, type, partial));
+  Value* a = convert(e, wide, type, adjoint);
+  Value* is_zero = e.b.CreateFCmpOEQ(a, float_constant(a, 0.0));
+  Value* product = e.b.CreateFMul(a, convert(e, wide, type, partial));
   return convert(e, type, wide, e.b.CreateSelect(is_zero, float_constant(a, 0.0), product));
 }
 
 }  // namespace
 
-Value *simple_operator(Emitter &e, Op op, Type result, const std::vector<Type> &types,
-                       const std::vector<Value *> &args) {
+Value* simple_operator(Emitter& e, Op op, Type result, const std::vector<Type>& types,
+                       const std::vector<Value*>& args) {
   const Type type = types.empty() ? result : types[0];
   const auto arg = [&](size_t i) { return args.at(i); };
   switch (op) {
-    case Op::bitwise_and: return e.b.CreateAnd(arg(0), arg(1));
-    case Op::bitwise_or: return e.b.CreateOr(arg(0), arg(1));
-    case Op::bitwise_xor: return e.b.CreateXor(arg(0), arg(1));
-    case Op::bitwise_not: return e.b.CreateNot(arg(0));
-    case Op::shift_left: return shift(e, type, types.at(1), arg(0), arg(1), true);
-    case Op::shift_right: return shift(e, type, types.at(1), arg(0), arg(1), false);
-    case Op::abs: return absolute(e, type, arg(0));
-    case Op::absd: return absolute_difference(e, type, arg(0), arg(1));
-    case Op::lerp: return lerp(e, type, types.at(2), arg(0), arg(1), arg(2));
-    case Op::floor: return by_intrinsic(e, llvm::Intrinsic::floor, type, arg(0));
-    case Op::ceil: return by_intrinsic(e, llvm::Intrinsic::ceil, type, arg(0));
-    case Op::round: return by_intrinsic(e, llvm::Intrinsic::roundeven, type, arg(0));
-    case Op::trunc: return by_intrinsic(e, llvm::Intrinsic::trunc, type, arg(0));
-    case Op::sqrt: return by_intrinsic(e, llvm::Intrinsic::sqrt, type, arg(0));
+    case Op::bitwise_and:
+      return e.b.CreateAnd(arg(0), arg(1));
+    case Op::bitwise_or:
+      return e.b.CreateOr(arg(0), arg(1));
+    case Op::bitwise_xor:
+      return e.b.CreateXor(arg(0), arg(1));
+    case Op::bitwise_not:
+      return e.b.CreateNot(arg(0));
+    case Op::shift_left:
+      return shift(e, type, types.at(1), arg(0), arg(1), true);
+    case Op::shift_right:
+      return shift(e, type, types.at(1), arg(0), arg(1), false);
+    case Op::abs:
+      return absolute(e, type, arg(0));
+    case Op::absd:
+      return absolute_difference(e, type, arg(0), arg(1));
+    case Op::lerp:
+      return lerp(e, type, types.at(2), arg(0), arg(1), arg(2));
+    case Op::floor:
+      return by_intrinsic(e, llvm::Intrinsic::floor, type, arg(0));
+    case Op::ceil:
+      return by_intrinsic(e, llvm::Intrinsic::ceil, type, arg(0));
+    case Op::round:
+      return by_intrinsic(e, llvm::Intrinsic::roundeven, type, arg(0));
+    case Op::trunc:
+      return by_intrinsic(e, llvm::Intrinsic::trunc, type, arg(0));
+    case Op::sqrt:
+      return by_intrinsic(e, llvm::Intrinsic::sqrt, type, arg(0));
     case Op::is_nan:
     case Op::is_inf:
-    case Op::is_finite: return classify(e, op, type, arg(0));
-    case Op::popcount: return e.b.CreateUnaryIntrinsic(llvm::Intrinsic::ctpop, arg(0));
-    case Op::count_leading_zeros: return e.b.CreateBinaryIntrinsic(llvm::Intrinsic::ctlz, arg(0), e.b.getFalse());
-    case Op::count_trailing_zeros: return e.b.CreateBinaryIntrinsic(llvm::Intrinsic::cttz, arg(0), e.b.getFalse());
-    case Op::saturating_cast: return convert_saturating(e, result, type, arg(0));
-    case Op::strong_mul: return strong_multiply(e, type, arg(0), arg(1));
-    default: return nullptr;
+    case Op::is_finite:
+      return classify(e, op, type, arg(0));
+    case Op::popcount:
+      return e.b.CreateUnaryIntrinsic(llvm::Intrinsic::ctpop, arg(0));
+    case Op::count_leading_zeros:
+      return e.b.CreateBinaryIntrinsic(llvm::Intrinsic::ctlz, arg(0), e.b.getFalse());
+    case Op::count_trailing_zeros:
+      return e.b.CreateBinaryIntrinsic(llvm::Intrinsic::cttz, arg(0), e.b.getFalse());
+    case Op::saturating_cast:
+      return convert_saturating(e, result, type, arg(0));
+    case Op::strong_mul:
+      return strong_multiply(e, type, arg(0), arg(1));
+    default:
+      return nullptr;
   }
 }
 

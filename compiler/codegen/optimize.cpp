@@ -1,16 +1,18 @@
-// A short pipeline, because the schedule has decided what LLVM's standard one would guess at: vector widths, unrolling
-// and inlining are done. What is left is scalar: per function, in this order,
+// A short pipeline, because the schedule has decided what LLVM's standard one would guess at:
+// vector widths, unrolling and inlining are done. What is left is scalar: per function, in this
+// order,
 //
 //   SROA           slots of owned blocks become registers
 //   EarlyCSE       the same subexpression in several statements; loads of closures and descriptors
 //   SimplifyCFG    blocks of asserts and scopes that turned out empty
 //   InstCombine    address arithmetic, comparisons with constants, shuffles of shuffles
-//   LICM           loop-invariant loads and address parts, with memory SSA to see past unrelated stores
-//   GVN            loads that an earlier iteration's tail or another block already did, where EarlyCSE is too local
-//   InstCombine, SimplifyCFG, ADCE to clean up
+//   LICM           loop-invariant loads and address parts, with memory SSA to see past unrelated
+//   stores GVN            loads that an earlier iteration's tail or another block already did,
+//   where EarlyCSE is too local InstCombine, SimplifyCFG, ADCE to clean up
 //
-// Left out: loop and SLP vectorization, unrolling, inlining, loop idioms (a memset call is slower on the short rows that
-// schedules produce). Strength reduction of addresses is part of LLVM's code generator.
+// Left out: loop and SLP vectorization, unrolling, inlining, loop idioms (a memset call is slower
+// on the short rows that schedules produce). Strength reduction of addresses is part of LLVM's code
+// generator.
 #include "codegen/optimize.h"
 
 #include <llvm/Analysis/TargetTransformInfo.h>
@@ -34,7 +36,8 @@ static llvm::FunctionPassManager pipeline() {
   passes.addPass(llvm::EarlyCSEPass(true));
   passes.addPass(llvm::SimplifyCFGPass());
   passes.addPass(llvm::InstCombinePass());
-  passes.addPass(llvm::createFunctionToLoopPassAdaptor(llvm::LICMPass(llvm::LICMOptions()), /*UseMemorySSA=*/true));
+  passes.addPass(llvm::createFunctionToLoopPassAdaptor(llvm::LICMPass(llvm::LICMOptions()),
+                                                       /*UseMemorySSA=*/true));
   passes.addPass(llvm::GVNPass());
   passes.addPass(llvm::InstCombinePass());
   passes.addPass(llvm::SimplifyCFGPass());
@@ -42,7 +45,7 @@ static llvm::FunctionPassManager pipeline() {
   return passes;
 }
 
-void optimize(llvm::Module &module, llvm::TargetMachine &machine) {
+void optimize(llvm::Module& module, llvm::TargetMachine& machine) {
   llvm::LoopAnalysisManager loops;
   llvm::FunctionAnalysisManager functions;
   llvm::CGSCCAnalysisManager call_graph;
@@ -54,7 +57,7 @@ void optimize(llvm::Module &module, llvm::TargetMachine &machine) {
   builder.registerLoopAnalyses(loops);
   builder.crossRegisterProxies(loops, functions, call_graph, modules);
   llvm::FunctionPassManager passes = pipeline();
-  for (llvm::Function &function : module) {
+  for (llvm::Function& function : module) {
     if (!function.isDeclaration()) passes.run(function, functions);
   }
 }

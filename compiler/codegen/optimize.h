@@ -7,5 +7,5 @@ class TargetMachine;
 }  // namespace llvm
 
 namespace retrograde::codegen {
-void optimize(llvm::Module &module, llvm::TargetMachine &machine);
+void optimize(llvm::Module& module, llvm::TargetMachine& machine);
 }

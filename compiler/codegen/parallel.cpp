@@ -1,9 +1,9 @@
-// A parallel loop: its body becomes a function of its own, which gets the values that it uses from around the loop in
-// a struct on the caller's stack.
+// A parallel loop: its body becomes a function of its own, which gets the values that it uses from
+// around the loop in a struct on the caller's stack.
 //
 //   parallel x in [min, extent): body    =>    closure = {a, b, &block}
-//                                              code = retrograde_parallel_for(context, task, min, extent, &closure)
-//                                              if (code) fail(code)
+//                                              code = retrograde_parallel_for(context, task, min,
+//                                              extent, &closure) if (code) fail(code)
 //   int32 task(context, x, closure): a = closure->a ...; body
 #include <set>
 
@@ -21,17 +21,17 @@ struct Uses {
 };
 
 // Every name that the statement mentions, its own bindings included.
-Uses names_in(const Stmt &s) {
+Uses names_in(const Stmt& s) {
   Uses uses;
   walk(
       s,
-      [&](const Expr &e) {
-        if (const auto *variable = e.as<Variable>()) uses.variables.insert(variable->name);
-        if (const auto *load = e.as<Load>()) uses.storages.insert(load->name);
+      [&](const Expr& e) {
+        if (const auto* variable = e.as<Variable>()) uses.variables.insert(variable->name);
+        if (const auto* load = e.as<Load>()) uses.storages.insert(load->name);
         return true;
       },
-      [&](const Stmt &part) {
-        if (const auto *store = part.as<Store>()) uses.storages.insert(store->name);
+      [&](const Stmt& part) {
+        if (const auto* store = part.as<Store>()) uses.storages.insert(store->name);
         return true;
       });
   return uses;
@@ -39,7 +39,7 @@ Uses names_in(const Stmt &s) {
 
 }  // namespace
 
-void FunctionGenerator::parallel_loop(const For &s) {
+void FunctionGenerator::parallel_loop(const For& s) {
   Value *min, *extent;
   {
     const MemoScope scope(*this, false);
@@ -48,32 +48,34 @@ void FunctionGenerator::parallel_loop(const For &s) {
   }
   const Uses uses = names_in(s.body);
   std::vector<std::string> variables, storages;
-  std::vector<Value *> captured;
-  for (const std::string &name : uses.variables) {
+  std::vector<Value*> captured;
+  for (const std::string& name : uses.variables) {
     const auto found = frame_.variables.find(name);
     if (found == frame_.variables.end() || name == s.name) continue;
     variables.push_back(name);
     captured.push_back(found->second);
   }
-  for (const std::string &name : uses.storages) {
+  for (const std::string& name : uses.storages) {
     const auto found = frame_.storages.find(name);
     if (found == frame_.storages.end()) continue;
     storages.push_back(name);
     captured.push_back(found->second.base);
   }
-  std::vector<llvm::Type *> fields;
-  for (Value *v : captured) fields.push_back(v->getType());
-  auto *closure_type = llvm::StructType::get(e_.context(), fields);
-  Value *closure = entry_alloca(closure_type, 1, s.name + ".closure");
+  std::vector<llvm::Type*> fields;
+  for (Value* v : captured) fields.push_back(v->getType());
+  auto* closure_type = llvm::StructType::get(e_.context(), fields);
+  Value* closure = entry_alloca(closure_type, 1, s.name + ".closure");
   for (unsigned i = 0; i < captured.size(); i++) {
     b_.CreateStore(captured[i], b_.CreateStructGEP(closure_type, closure, i));
   }
 
-  auto *pointer = b_.getPtrTy();
-  auto *int32 = b_.getInt32Ty();
-  auto *task_type = llvm::FunctionType::get(int32, {pointer, int32, pointer}, false);
-  const std::string task_name = source_.name + ".parallel" + std::to_string(parallel_loops_++) + "." + s.name;
-  auto *task = llvm::Function::Create(task_type, llvm::GlobalValue::InternalLinkage, task_name, e_.module);
+  auto* pointer = b_.getPtrTy();
+  auto* int32 = b_.getInt32Ty();
+  auto* task_type = llvm::FunctionType::get(int32, {pointer, int32, pointer}, false);
+  const std::string task_name =
+      source_.name + ".parallel" + std::to_string(parallel_loops_++) + "." + s.name;
+  auto* task =
+      llvm::Function::Create(task_type, llvm::GlobalValue::InternalLinkage, task_name, e_.module);
   {
     const llvm::IRBuilderBase::InsertPointGuard guard(b_);
     Frame outer = std::move(frame_);
@@ -81,17 +83,17 @@ void FunctionGenerator::parallel_loop(const For &s) {
     begin_function(task);
     frame_.memo.push_back({{}, {}, false});
     for (unsigned i = 0; i < captured.size(); i++) {
-      Value *field = b_.CreateStructGEP(closure_type, task->getArg(2), i);
-      auto *load = b_.CreateLoad(fields[i], field);
+      Value* field = b_.CreateStructGEP(closure_type, task->getArg(2), i);
+      auto* load = b_.CreateLoad(fields[i], field);
       load->setMetadata(llvm::LLVMContext::MD_invariant_load, llvm::MDNode::get(e_.context(), {}));
       if (i < variables.size()) {
         frame_.variables[variables[i]] = load;
       } else {
-        const std::string &name = storages[i - variables.size()];
+        const std::string& name = storages[i - variables.size()];
         frame_.storages[name] = {load, nullptr, outer.storages[name].alias};
       }
     }
-    Value *index = task->getArg(1);
+    Value* index = task->getArg(1);
     frame_.variables[s.name] = b_.CreateIntCast(index, llvm_type(e_, s.min.type()), true);
     statement(s.body);
     finish_function();
@@ -100,7 +102,7 @@ void FunctionGenerator::parallel_loop(const For &s) {
 
   const auto parallel_for =
       runtime_function("retrograde_parallel_for", int32, {pointer, pointer, int32, int32, pointer});
-  Value *code = b_.CreateCall(parallel_for, {frame_.context, task, min, extent, closure});
+  Value* code = b_.CreateCall(parallel_for, {frame_.context, task, min, extent, closure});
   fail_unless(b_.CreateICmpEQ(code, b_.getInt32(0)), [&] { return code; });
 }
 

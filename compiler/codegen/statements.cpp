@@ -1,9 +1,9 @@
 // Functions, loops, branches, allocations, assertions.
 //
-// Leaving early: every failure jumps to one block of its function, which frees the heap blocks that are still held and
-// returns the code. Each Allocate keeps its block in a slot of an array on the stack, null before and after. The array
-// is memory for good, because the runtime gets its address: in registers, n slots that are alive at n failures would
-// be n^2 copies.
+// Leaving early: every failure jumps to one block of its function, which frees the heap blocks that
+// are still held and returns the code. Each Allocate keeps its block in a slot of an array on the
+// stack, null before and after. The array is memory for good, because the runtime gets its address:
+// in registers, n slots that are alive at n failures would be n^2 copies.
 #include <llvm/IR/MDBuilder.h>
 
 #include "codegen/function_generator.h"
@@ -21,17 +21,17 @@ namespace {
 struct StackLimit {
   int64_t block_bytes, function_bytes;
 };
-constexpr StackLimit free_choice{16 << 10, 128 << 10};      // of allocations that may go anywhere
-constexpr StackLimit asked_for{256 << 10, 512 << 10};       // of those that ask for the stack
-constexpr int64_t stack_padding_bytes = 64;                 // readable past the end, as on the heap
+constexpr StackLimit free_choice{16 << 10, 128 << 10};  // of allocations that may go anywhere
+constexpr StackLimit asked_for{256 << 10, 512 << 10};   // of those that ask for the stack
+constexpr int64_t stack_padding_bytes = 64;             // readable past the end, as on the heap
 }  // namespace
 
-FunctionGenerator::FunctionGenerator(Emitter &emitter, const LoweredFunction &function)
+FunctionGenerator::FunctionGenerator(Emitter& emitter, const LoweredFunction& function)
     : e_(emitter), b_(emitter.b), source_(function) {}
 
 // ---- functions ----
 
-void FunctionGenerator::begin_function(llvm::Function *function) {
+void FunctionGenerator::begin_function(llvm::Function* function) {
   function->addFnAttr(llvm::Attribute::NoUnwind);
   function->addFnAttr("target-cpu", e_.machine.cpu);
   function->addFnAttr("target-features", e_.machine.features);
@@ -44,18 +44,18 @@ void FunctionGenerator::begin_function(llvm::Function *function) {
   frame_.context = function->getArg(0);
   frame_.context->setName("context");
   frame_.entry = llvm::BasicBlock::Create(e_.context(), "entry", function);
-  llvm::BasicBlock *body = new_block("body");
+  llvm::BasicBlock* body = new_block("body");
   b_.SetInsertPoint(body);
 }
 
 void FunctionGenerator::finish_function() {
   b_.CreateRet(b_.getInt32(0));
-  Value *count = b_.getInt64(static_cast<uint64_t>(frame_.owned_count));
+  Value* count = b_.getInt64(static_cast<uint64_t>(frame_.owned_count));
   if (frame_.error_exit) {
     b_.SetInsertPoint(frame_.error_exit);
     if (frame_.owned_slots) {
-      const auto free_all =
-          runtime_function("retrograde_free_all", b_.getVoidTy(), {b_.getPtrTy(), b_.getPtrTy(), b_.getInt64Ty()});
+      const auto free_all = runtime_function("retrograde_free_all", b_.getVoidTy(),
+                                             {b_.getPtrTy(), b_.getPtrTy(), b_.getInt64Ty()});
       b_.CreateCall(free_all, {frame_.context, frame_.owned_slots, count});
     }
     b_.CreateRet(frame_.error_code);
@@ -63,15 +63,16 @@ void FunctionGenerator::finish_function() {
   b_.SetInsertPoint(frame_.entry);
   if (frame_.owned_slots) {
     frame_.owned_slots->setOperand(0, count);
-    b_.CreateMemSet(frame_.owned_slots, b_.getInt8(0), static_cast<uint64_t>(8 * frame_.owned_count), llvm::Align(8));
+    b_.CreateMemSet(frame_.owned_slots, b_.getInt8(0),
+                    static_cast<uint64_t>(8 * frame_.owned_count), llvm::Align(8));
   }
   b_.CreateBr(&*std::next(frame_.function->begin()));
 }
 
 void FunctionGenerator::bind_arguments() {
   unsigned index = 1;
-  for (const LoweredArgument &arg : source_.args) {
-    Value *v = frame_.function->getArg(index++);
+  for (const LoweredArgument& arg : source_.args) {
+    Value* v = frame_.function->getArg(index++);
     v->setName(arg.name);
     if (arg.is_buffer()) {
       frame_.variables[arg.name + ".buffer"] = v;
@@ -84,12 +85,13 @@ void FunctionGenerator::bind_arguments() {
 }
 
 void FunctionGenerator::generate() {
-  std::vector<llvm::Type *> params = {b_.getPtrTy()};
-  for (const LoweredArgument &arg : source_.args) {
+  std::vector<llvm::Type*> params = {b_.getPtrTy()};
+  for (const LoweredArgument& arg : source_.args) {
     params.push_back(arg.is_buffer() ? b_.getPtrTy() : llvm_type(e_, arg.type));
   }
-  auto *type = llvm::FunctionType::get(b_.getInt32Ty(), params, false);
-  auto *function = llvm::Function::Create(type, llvm::GlobalValue::ExternalLinkage, source_.name, e_.module);
+  auto* type = llvm::FunctionType::get(b_.getInt32Ty(), params, false);
+  auto* function =
+      llvm::Function::Create(type, llvm::GlobalValue::ExternalLinkage, source_.name, e_.module);
   const Contraction contraction(e_, !e_.machine.target.has_feature(Target::StrictFloat));
   begin_function(function);
   frame_.memo.push_back({{}, {}, false});
@@ -100,17 +102,19 @@ void FunctionGenerator::generate() {
 }
 
 // args[i] is the buffer, or points to the scalar.
-void FunctionGenerator::make_argv_wrapper(llvm::Function *function) {
-  auto *type = llvm::FunctionType::get(b_.getInt32Ty(), {b_.getPtrTy(), b_.getPtrTy()}, false);
-  auto *wrapper =
-      llvm::Function::Create(type, llvm::GlobalValue::ExternalLinkage, source_.name + "_argv", e_.module);
+void FunctionGenerator::make_argv_wrapper(llvm::Function* function) {
+  auto* type = llvm::FunctionType::get(b_.getInt32Ty(), {b_.getPtrTy(), b_.getPtrTy()}, false);
+  auto* wrapper = llvm::Function::Create(type, llvm::GlobalValue::ExternalLinkage,
+                                         source_.name + "_argv", e_.module);
   frame_ = {};
   begin_function(wrapper);
-  std::vector<Value *> args = {wrapper->getArg(0)};
+  std::vector<Value*> args = {wrapper->getArg(0)};
   for (size_t i = 0; i < source_.args.size(); i++) {
-    const LoweredArgument &arg = source_.args[i];
-    Value *pointer = b_.CreateLoad(b_.getPtrTy(), b_.CreateConstGEP1_64(b_.getPtrTy(), wrapper->getArg(1), i));
-    if (!arg.is_buffer()) pointer = from_memory(arg.type, b_.CreateLoad(memory_type(e_, arg.type), pointer));
+    const LoweredArgument& arg = source_.args[i];
+    Value* pointer =
+        b_.CreateLoad(b_.getPtrTy(), b_.CreateConstGEP1_64(b_.getPtrTy(), wrapper->getArg(1), i));
+    if (!arg.is_buffer())
+      pointer = from_memory(arg.type, b_.CreateLoad(memory_type(e_, arg.type), pointer));
     args.push_back(pointer);
   }
   b_.CreateRet(b_.CreateCall(function, args));
@@ -118,35 +122,39 @@ void FunctionGenerator::make_argv_wrapper(llvm::Function *function) {
   b_.CreateBr(&*std::next(wrapper->begin()));
 }
 
-llvm::FunctionCallee FunctionGenerator::runtime_function(const std::string &name, llvm::Type *result,
-                                                         const std::vector<llvm::Type *> &params, bool variadic) {
-  auto callee = e_.module.getOrInsertFunction(name, llvm::FunctionType::get(result, params, variadic));
+llvm::FunctionCallee FunctionGenerator::runtime_function(const std::string& name,
+                                                         llvm::Type* result,
+                                                         const std::vector<llvm::Type*>& params,
+                                                         bool variadic) {
+  auto callee =
+      e_.module.getOrInsertFunction(name, llvm::FunctionType::get(result, params, variadic));
   llvm::cast<llvm::Function>(callee.getCallee())->setDoesNotThrow();
   return callee;
 }
 
-llvm::BasicBlock *FunctionGenerator::new_block(const std::string &name) {
+llvm::BasicBlock* FunctionGenerator::new_block(const std::string& name) {
   return llvm::BasicBlock::Create(e_.context(), name, frame_.function);
 }
 
-llvm::AllocaInst *FunctionGenerator::entry_alloca(llvm::Type *type, int64_t count, const std::string &name) {
+llvm::AllocaInst* FunctionGenerator::entry_alloca(llvm::Type* type, int64_t count,
+                                                  const std::string& name) {
   const llvm::IRBuilderBase::InsertPointGuard guard(b_);
   b_.SetInsertPoint(frame_.entry);
   return b_.CreateAlloca(type, b_.getInt64(static_cast<uint64_t>(count)), name);
 }
 
-// Tags are types of LLVM's type-based alias analysis: siblings in its tree never overlap. Allocations have names of
-// their own, so the tags hold across functions too.
-llvm::MDNode *FunctionGenerator::alias_tag(const std::string &name) {
+// Tags are types of LLVM's type-based alias analysis: siblings in its tree never overlap.
+// Allocations have names of their own, so the tags hold across functions too.
+llvm::MDNode* FunctionGenerator::alias_tag(const std::string& name) {
   llvm::MDBuilder md(e_.context());
-  llvm::MDNode *root = md.createTBAARoot("retrograde");
-  llvm::MDNode *type = md.createTBAAScalarTypeNode(name, root);
+  llvm::MDNode* root = md.createTBAARoot("retrograde");
+  llvm::MDNode* type = md.createTBAAScalarTypeNode(name, root);
   return md.createTBAAStructTagNode(type, type, 0);
 }
 
 // ---- failures and branches ----
 
-void FunctionGenerator::fail(Value *code) {
+void FunctionGenerator::fail(Value* code) {
   if (!frame_.error_exit) {
     const llvm::IRBuilderBase::InsertPointGuard guard(b_);
     frame_.error_exit = new_block("error_exit");
@@ -157,7 +165,7 @@ void FunctionGenerator::fail(Value *code) {
   b_.CreateBr(frame_.error_exit);
 }
 
-void FunctionGenerator::fail_unless(Value *condition, const std::function<Value *()> &code) {
+void FunctionGenerator::fail_unless(Value* condition, const std::function<Value*()>& code) {
   llvm::BasicBlock *bad = new_block("bad"), *good = new_block("good");
   b_.CreateCondBr(condition, good, bad, llvm::MDBuilder(e_.context()).createLikelyBranchWeights());
   b_.SetInsertPoint(bad);
@@ -168,7 +176,7 @@ void FunctionGenerator::fail_unless(Value *condition, const std::function<Value 
   b_.SetInsertPoint(good);
 }
 
-void FunctionGenerator::if_true(Value *condition, const std::function<void()> &body) {
+void FunctionGenerator::if_true(Value* condition, const std::function<void()>& body) {
   llvm::BasicBlock *then_block = new_block("if_true"), *after = new_block("after");
   b_.CreateCondBr(condition, then_block, after);
   b_.SetInsertPoint(then_block);
@@ -180,20 +188,20 @@ void FunctionGenerator::if_true(Value *condition, const std::function<void()> &b
   b_.SetInsertPoint(after);
 }
 
-void FunctionGenerator::make(const Assert &s) {
+void FunctionGenerator::make(const Assert& s) {
   const MemoScope scope(*this, false);
-  Value *condition = value(s.condition);
+  Value* condition = value(s.condition);
   fail_unless(condition, [&] { return value(s.error); });
 }
 
-void FunctionGenerator::make(const IfThenElse &s) {
-  Value *condition;
+void FunctionGenerator::make(const IfThenElse& s) {
+  Value* condition;
   {
     const MemoScope scope(*this, false);
     condition = value(s.condition);
   }
   llvm::BasicBlock *then_block = new_block("then"), *after = new_block("after");
-  llvm::BasicBlock *else_block = s.else_case.defined() ? new_block("else") : after;
+  llvm::BasicBlock* else_block = s.else_case.defined() ? new_block("else") : after;
   b_.CreateCondBr(condition, then_block, else_block);
   b_.SetInsertPoint(then_block);
   statement(s.then_case);
@@ -208,69 +216,74 @@ void FunctionGenerator::make(const IfThenElse &s) {
 
 // ---- statements ----
 
-void FunctionGenerator::statement(const Stmt &s) {
+void FunctionGenerator::statement(const Stmt& s) {
   match(
-      s, [&](const LetStmt &let) { make(let); }, [&](const Assert &a) { make(a); },
-      [&](const ProducerConsumer &p) { statement(p.body); }, [&](const For &f) { make(f); },
-      [&](const Store &store) { make(store); }, [&](const Allocate &a) { make(a); },
-      [&](const Free &f) { make(f); },
-      [&](const Block &block) {
-        for (const Stmt &part : block.stmts) statement(part);
+      s, [&](const LetStmt& let) { make(let); }, [&](const Assert& a) { make(a); },
+      [&](const ProducerConsumer& p) { statement(p.body); }, [&](const For& f) { make(f); },
+      [&](const Store& store) { make(store); }, [&](const Allocate& a) { make(a); },
+      [&](const Free& f) { make(f); },
+      [&](const Block& block) {
+        for (const Stmt& part : block.stmts) statement(part);
       },
-      [&](const IfThenElse &branch) { make(branch); },
-      [&](const Evaluate &e) {
+      [&](const IfThenElse& branch) { make(branch); },
+      [&](const Evaluate& e) {
         const MemoScope scope(*this, false);
         value(e.value);
       },
-      [&](const StmtNode &node) {
-        throw InternalError(text(kind_name(node.kind), " reached code generation: lowering replaces it"), "codegen",
-                            ir::print(s));
+      [&](const StmtNode& node) {
+        throw InternalError(
+            text(kind_name(node.kind), " reached code generation: lowering replaces it"), "codegen",
+            ir::print(s));
       });
 }
 
-void FunctionGenerator::make(const LetStmt &s) {
+void FunctionGenerator::make(const LetStmt& s) {
   // Chains of lets are long where bounds are computed: no recursion along them.
-  const LetStmt *let = &s;
+  const LetStmt* let = &s;
   for (;;) {
     {
       const MemoScope scope(*this, false);
       bind_let(let->name, let->value);
     }
-    const auto *next = let->body.as<LetStmt>();
+    const auto* next = let->body.as<LetStmt>();
     if (!next) break;
     let = next;
   }
   statement(let->body);
 }
 
-void FunctionGenerator::make(const For &s) {
+void FunctionGenerator::make(const For& s) {
   switch (s.for_type) {
-    case ForType::Serial: return serial_loop(s);
-    case ForType::Parallel: return parallel_loop(s);
+    case ForType::Serial:
+      return serial_loop(s);
+    case ForType::Parallel:
+      return parallel_loop(s);
     default:
-      throw InternalError("a vectorized or unrolled loop over " + quoted(s.name) + " reached code generation", "codegen",
-                          ir::print(Stmt(&s)));
+      throw InternalError(
+          "a vectorized or unrolled loop over " + quoted(s.name) + " reached code generation",
+          "codegen", ir::print(Stmt(&s)));
   }
 }
 
 // Counts in 64 bits, where nothing wraps; the body sees the variable in its own width.
-void FunctionGenerator::serial_loop(const For &s) {
+void FunctionGenerator::serial_loop(const For& s) {
   Value *min, *extent;
   {
     const MemoScope scope(*this, false);
     min = index64(s.min);
     extent = b_.CreateSExt(value(s.extent), b_.getInt64Ty());
   }
-  Value *end = b_.CreateNSWAdd(min, extent);
-  llvm::BasicBlock *before = b_.GetInsertBlock(), *body = new_block(s.name), *after = new_block("end " + s.name);
+  Value* end = b_.CreateNSWAdd(min, extent);
+  llvm::BasicBlock *before = b_.GetInsertBlock(), *body = new_block(s.name),
+                   *after = new_block("end " + s.name);
   b_.CreateCondBr(b_.CreateICmpSGT(extent, b_.getInt64(0)), body, after);
   b_.SetInsertPoint(body);
-  llvm::PHINode *counter = b_.CreatePHI(b_.getInt64Ty(), 2, s.name);
+  llvm::PHINode* counter = b_.CreatePHI(b_.getInt64Ty(), 2, s.name);
   counter->addIncoming(min, before);
   frame_.variables[s.name] = b_.CreateTrunc(counter, llvm_type(e_, s.min.type()));
   if (s.min.type() == Int(32)) frame_.indices[s.name] = counter;
   statement(s.body);
-  Value *next = b_.CreateNSWAdd(counter, b_.getInt64(1));
+  Value* next = b_.CreateNSWAdd(counter, b_.getInt64(1));
   counter->addIncoming(next, b_.GetInsertBlock());
   b_.CreateCondBr(b_.CreateICmpSLT(next, end), body, after);
   b_.SetInsertPoint(after);
@@ -279,66 +292,71 @@ void FunctionGenerator::serial_loop(const For &s) {
 
 // ---- allocations ----
 
-bool FunctionGenerator::fits_stack(const Allocate &s, int64_t elements) const {
+bool FunctionGenerator::fits_stack(const Allocate& s, int64_t elements) const {
   if (s.memory == MemoryType::Heap || elements < 0) return false;
-  const StackLimit &limit = s.memory == MemoryType::Stack ? asked_for : free_choice;
+  const StackLimit& limit = s.memory == MemoryType::Stack ? asked_for : free_choice;
   const int64_t element_bytes = s.type.bytes() * s.type.lanes();
   if (elements > limit.block_bytes / element_bytes) return false;
-  return frame_.stack_bytes + elements * element_bytes + stack_padding_bytes <= limit.function_bytes;
+  return frame_.stack_bytes + elements * element_bytes + stack_padding_bytes <=
+         limit.function_bytes;
 }
 
-FunctionGenerator::Storage FunctionGenerator::allocate_on_stack(const Allocate &s, int64_t elements) {
+FunctionGenerator::Storage FunctionGenerator::allocate_on_stack(const Allocate& s,
+                                                                int64_t elements) {
   const int64_t bytes = elements * s.type.bytes() * s.type.lanes() + stack_padding_bytes;
   frame_.stack_bytes += bytes;
-  llvm::AllocaInst *block = entry_alloca(b_.getInt8Ty(), bytes, s.name);
+  llvm::AllocaInst* block = entry_alloca(b_.getInt8Ty(), bytes, s.name);
   block->setAlignment(llvm::Align(64));
   return {block, nullptr, alias_tag(s.name)};
 }
 
-FunctionGenerator::Storage FunctionGenerator::allocate_on_heap(const Allocate &s) {
-  auto *pointer = b_.getPtrTy();
-  auto *int64 = b_.getInt64Ty();
-  Value *null = llvm::ConstantPointerNull::get(pointer);
+FunctionGenerator::Storage FunctionGenerator::allocate_on_heap(const Allocate& s) {
+  auto* pointer = b_.getPtrTy();
+  auto* int64 = b_.getInt64Ty();
+  Value* null = llvm::ConstantPointerNull::get(pointer);
   auto allocate = runtime_function("retrograde_allocate", pointer, {pointer, int64, int64});
   llvm::cast<llvm::Function>(allocate.getCallee())->setReturnDoesNotAlias();
-  Value *elements;
+  Value* elements;
   {
     const MemoScope scope(*this, false);
     elements = b_.CreateIntCast(value(s.elements), int64, s.elements.type().is_int());
   }
-  Value *element_bytes = b_.getInt64(static_cast<uint64_t>(s.type.bytes() * s.type.lanes()));
-  Value *block = b_.CreateCall(allocate, {frame_.context, elements, element_bytes}, s.name);
+  Value* element_bytes = b_.getInt64(static_cast<uint64_t>(s.type.bytes() * s.type.lanes()));
+  Value* block = b_.CreateCall(allocate, {frame_.context, elements, element_bytes}, s.name);
   fail_unless(b_.CreateICmpNE(block, null), [&] {
-    const auto error =
-        runtime_function("retrograde_allocation_error", b_.getInt32Ty(), {pointer, pointer, int64, int64});
+    const auto error = runtime_function("retrograde_allocation_error", b_.getInt32Ty(),
+                                        {pointer, pointer, int64, int64});
     return b_.CreateCall(error, {frame_.context, string_constant(s.name), elements, element_bytes});
   });
-  Value *slot = new_owned_slot();
+  Value* slot = new_owned_slot();
   b_.CreateStore(block, slot);
   return {block, slot, alias_tag(s.name)};
 }
 
-Value *FunctionGenerator::new_owned_slot() {
+Value* FunctionGenerator::new_owned_slot() {
   if (!frame_.owned_slots) frame_.owned_slots = entry_alloca(b_.getPtrTy(), 1, "owned");
-  return b_.CreateConstGEP1_64(b_.getPtrTy(), frame_.owned_slots, static_cast<uint64_t>(frame_.owned_count++));
+  return b_.CreateConstGEP1_64(b_.getPtrTy(), frame_.owned_slots,
+                               static_cast<uint64_t>(frame_.owned_count++));
 }
 
-void FunctionGenerator::free_owned(Storage &owned) {
+void FunctionGenerator::free_owned(Storage& owned) {
   if (!owned.owned) return;
-  const auto free = runtime_function("retrograde_free", b_.getVoidTy(), {b_.getPtrTy(), b_.getPtrTy()});
+  const auto free =
+      runtime_function("retrograde_free", b_.getVoidTy(), {b_.getPtrTy(), b_.getPtrTy()});
   b_.CreateCall(free, {frame_.context, b_.CreateLoad(b_.getPtrTy(), owned.owned)});
   b_.CreateStore(llvm::ConstantPointerNull::get(b_.getPtrTy()), owned.owned);
 }
 
-void FunctionGenerator::make(const Allocate &s) {
+void FunctionGenerator::make(const Allocate& s) {
   const auto elements = as_const_int(s.elements);
   const bool on_stack = elements && fits_stack(s, *elements);
   frame_.storages[s.name] = on_stack ? allocate_on_stack(s, *elements) : allocate_on_heap(s);
   statement(s.body);
-  free_owned(frame_.storages[s.name]);  // after a Free the slot is null, and freeing null does nothing
+  free_owned(
+      frame_.storages[s.name]);  // after a Free the slot is null, and freeing null does nothing
   frame_.storages.erase(s.name);
 }
 
-void FunctionGenerator::make(const Free &s) { free_owned(storage(s.name)); }
+void FunctionGenerator::make(const Free& s) { free_owned(storage(s.name)); }
 
 }  // namespace retrograde::codegen

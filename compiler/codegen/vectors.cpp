@@ -14,60 +14,62 @@ std::vector<int> sequence(int start, int count, int stride = 1) {
 }
 
 // A scalar as a vector of one lane; vectors stay.
-Value *as_vector(Emitter &e, Value *value) {
+Value* as_vector(Emitter& e, Value* value) {
   if (value->getType()->isVectorTy()) return value;
-  auto *type = llvm::FixedVectorType::get(value->getType(), 1);
+  auto* type = llvm::FixedVectorType::get(value->getType(), 1);
   return e.b.CreateInsertElement(llvm::PoisonValue::get(type), value, uint64_t{0});
 }
 
 // A vector of one lane as a scalar; others stay.
-Value *as_scalar_if_single(Emitter &e, Value *value) {
-  const auto *type = llvm::dyn_cast<llvm::FixedVectorType>(value->getType());
+Value* as_scalar_if_single(Emitter& e, Value* value) {
+  const auto* type = llvm::dyn_cast<llvm::FixedVectorType>(value->getType());
   return type && type->getNumElements() == 1 ? e.b.CreateExtractElement(value, uint64_t{0}) : value;
 }
 
 }  // namespace
 
-Value *splat(Emitter &e, Value *scalar, int lanes) {
+Value* splat(Emitter& e, Value* scalar, int lanes) {
   return lanes == 1 ? scalar : e.b.CreateVectorSplat(static_cast<unsigned>(lanes), scalar);
 }
 
-Value *iota(Emitter &e, llvm::Type *scalar, int lanes) {
-  std::vector<llvm::Constant *> values;
+Value* iota(Emitter& e, llvm::Type* scalar, int lanes) {
+  std::vector<llvm::Constant*> values;
   for (int i = 0; i < lanes; i++) {
-    values.push_back(scalar->isFloatingPointTy() ? llvm::ConstantFP::get(scalar, i)
-                                                 : llvm::ConstantInt::get(scalar, static_cast<uint64_t>(i)));
+    values.push_back(scalar->isFloatingPointTy()
+                         ? llvm::ConstantFP::get(scalar, i)
+                         : llvm::ConstantInt::get(scalar, static_cast<uint64_t>(i)));
   }
   (void)e;
   return lanes == 1 ? values[0] : llvm::ConstantVector::get(values);
 }
 
-Value *shuffle(Emitter &e, Value *a, Value *b, const std::vector<int> &indices) {
+Value* shuffle(Emitter& e, Value* a, Value* b, const std::vector<int>& indices) {
   return as_scalar_if_single(e, e.b.CreateShuffleVector(as_vector(e, a), as_vector(e, b), indices));
 }
 
-Value *slice(Emitter &e, Value *vector, int start, int lanes) {
+Value* slice(Emitter& e, Value* vector, int start, int lanes) {
   const int has = lanes_of(vector);
   if (start == 0 && lanes == has) return vector;
   if (lanes == 1) return lane(e, vector, start);
   std::vector<int> indices = sequence(start, lanes);
-  for (int &index : indices) {
+  for (int& index : indices) {
     if (index >= has) index = -1;
   }
   return e.b.CreateShuffleVector(as_vector(e, vector), indices);
 }
 
-Value *concat(Emitter &e, std::vector<Value *> parts) {
+Value* concat(Emitter& e, std::vector<Value*> parts) {
   RETROGRADE_ASSERT(!parts.empty(), "concatenation of nothing");
   // Pairwise, so that n parts take n - 1 shuffles of lengths that add up to n log n.
   while (parts.size() > 1) {
-    std::vector<Value *> joined;
+    std::vector<Value*> joined;
     for (size_t i = 0; i + 1 < parts.size(); i += 2) {
-      const int left = lanes_of(parts[i]), right = lanes_of(parts[i + 1]), wide = std::max(left, right);
+      const int left = lanes_of(parts[i]), right = lanes_of(parts[i + 1]),
+                wide = std::max(left, right);
       std::vector<int> indices = sequence(0, left);
       for (int k = 0; k < right; k++) indices.push_back(wide + k);
-      Value *a = left < wide ? slice(e, parts[i], 0, wide) : parts[i];
-      Value *b = right < wide ? slice(e, parts[i + 1], 0, wide) : parts[i + 1];
+      Value* a = left < wide ? slice(e, parts[i], 0, wide) : parts[i];
+      Value* b = right < wide ? slice(e, parts[i + 1], 0, wide) : parts[i + 1];
       joined.push_back(shuffle(e, a, b, indices));
     }
     if (parts.size() % 2) joined.push_back(parts.back());
@@ -76,7 +78,7 @@ Value *concat(Emitter &e, std::vector<Value *> parts) {
   return parts[0];
 }
 
-Value *repeat(Emitter &e, Value *vector, int times) {
+Value* repeat(Emitter& e, Value* vector, int times) {
   if (!vector->getType()->isVectorTy()) return splat(e, vector, times);
   std::vector<int> indices;
   for (int k = 0; k < times; k++) {
@@ -85,27 +87,29 @@ Value *repeat(Emitter &e, Value *vector, int times) {
   return e.b.CreateShuffleVector(vector, indices);
 }
 
-Value *reverse(Emitter &e, Value *vector) {
+Value* reverse(Emitter& e, Value* vector) {
   const int n = lanes_of(vector);
   return n == 1 ? vector : e.b.CreateShuffleVector(vector, sequence(n - 1, n, -1));
 }
 
-Value *lane(Emitter &e, Value *vector, int index) {
+Value* lane(Emitter& e, Value* vector, int index) {
   if (!vector->getType()->isVectorTy()) return vector;
   return e.b.CreateExtractElement(vector, static_cast<uint64_t>(index));
 }
 
-Value *from_lanes(Emitter &e, const std::vector<Value *> &scalars) {
+Value* from_lanes(Emitter& e, const std::vector<Value*>& scalars) {
   if (scalars.size() == 1) return scalars[0];
-  auto *type = llvm::FixedVectorType::get(scalars[0]->getType(), static_cast<unsigned>(scalars.size()));
-  Value *result = llvm::PoisonValue::get(type);
-  for (size_t i = 0; i < scalars.size(); i++) result = e.b.CreateInsertElement(result, scalars[i], i);
+  auto* type =
+      llvm::FixedVectorType::get(scalars[0]->getType(), static_cast<unsigned>(scalars.size()));
+  Value* result = llvm::PoisonValue::get(type);
+  for (size_t i = 0; i < scalars.size(); i++)
+    result = e.b.CreateInsertElement(result, scalars[i], i);
   return result;
 }
 
-// While a group has an even size, its lanes combine in pairs: to one group by halves of the vector, to several by
-// even and odd lanes. An odd rest combines lane by lane.
-Value *reduce_groups(Emitter &e, Value *vector, int lanes, const Combine &combine) {
+// While a group has an even size, its lanes combine in pairs: to one group by halves of the vector,
+// to several by even and odd lanes. An odd rest combines lane by lane.
+Value* reduce_groups(Emitter& e, Value* vector, int lanes, const Combine& combine) {
   int total = lanes_of(vector);
   RETROGRADE_ASSERT(lanes >= 1 && total % lanes == 0, "reduction of ", total, " lanes to ", lanes);
   while (total > lanes && (total / lanes) % 2 == 0) {
@@ -117,7 +121,7 @@ Value *reduce_groups(Emitter &e, Value *vector, int lanes, const Combine &combin
   }
   const int group = total / lanes;
   if (group == 1) return vector;
-  Value *result = shuffle(e, vector, vector, sequence(0, lanes, group));
+  Value* result = shuffle(e, vector, vector, sequence(0, lanes, group));
   for (int i = 1; i < group; i++) {
     result = combine(result, shuffle(e, vector, vector, sequence(i, lanes, group)));
   }

@@ -1,8 +1,8 @@
-// The counter-based random numbers of Op::random: a pure function of the seed words, the same in the
-// interpreter and in machine code, for every schedule and number of threads.
+// The counter-based random numbers of Op::random: a pure function of the seed words, the same in
+// the interpreter and in machine code, for every schedule and number of threads.
 //
-// Each word is mixed into a 32-bit state by xor and a bijective hash (xorshift, multiply, twice), so
-// words that differ in one bit give unrelated numbers.
+// Each word is mixed into a 32-bit state by xor and a bijective hash (xorshift, multiply, twice),
+// so words that differ in one bit give unrelated numbers.
 #pragma once
 
 #include <cstdint>
@@ -21,7 +21,7 @@ inline uint32_t random_mix(uint32_t state, uint32_t word) {
 }
 
 // Seeds are the low 32 bits of each integer argument.
-inline uint32_t random_bits(const uint32_t *words, int count) {
+inline uint32_t random_bits(const uint32_t* words, int count) {
   uint32_t state = random_seed;
   for (int i = 0; i < count; i++) state = random_mix(state, words[i]);
   return state;

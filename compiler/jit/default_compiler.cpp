@@ -1,4 +1,5 @@
-// default_compiler.cpp -- what the front end's realize() reaches: lowering, then machine code in this process.
+// default_compiler.cpp -- what the front end's realize() reaches: lowering, then machine code in
+// this process.
 #include "frontend/compiler_interface.h"
 #include "jit/jit.h"
 #include "lower/lower.h"
@@ -21,7 +22,9 @@ struct CallState {
 
 CallState& state_of(retrograde_context* context) { return *reinterpret_cast<CallState*>(context); }
 
-void keep_error(retrograde_context* context, int, const char* message) { state_of(context).caller->error = message; }
+void keep_error(retrograde_context* context, int, const char* message) {
+  state_of(context).caller->error = message;
+}
 
 void hand_on_print(retrograde_context* context, const char* message) {
   if (const auto& print = state_of(context).caller->print) print(message);
@@ -29,7 +32,8 @@ void hand_on_print(retrograde_context* context, const char* message) {
 
 class JitPipeline : public CompiledPipeline {
  public:
-  JitPipeline(std::vector<ir::LoweredArgument> arguments, std::shared_ptr<const jit::CompiledFunction> code)
+  JitPipeline(std::vector<ir::LoweredArgument> arguments,
+              std::shared_ptr<const jit::CompiledFunction> code)
       : arguments_(std::move(arguments)), code_(std::move(code)) {}
 
   const std::vector<ir::LoweredArgument>& arguments() const override { return arguments_; }
@@ -50,7 +54,8 @@ class JitPipeline : public CompiledPipeline {
 
 class JitCompiler : public Compiler {
  public:
-  std::shared_ptr<CompiledPipeline> compile(const PipelineSpec& pipeline, const Target& target) override {
+  std::shared_ptr<CompiledPipeline> compile(const PipelineSpec& pipeline,
+                                            const Target& target) override {
     ir::LowerOptions options;
     options.target = target;
     options.validate = validate_passes;
@@ -60,7 +65,9 @@ class JitCompiler : public Compiler {
     return std::make_shared<JitPipeline>(std::move(function.args), std::move(code));
   }
 
-  std::string loop_nest(const PipelineSpec& pipeline, const Target&) override { return ir::loop_nest_text(pipeline.outputs); }
+  std::string loop_nest(const PipelineSpec& pipeline, const Target&) override {
+    return ir::loop_nest_text(pipeline.outputs);
+  }
 };
 
 }  // namespace

@@ -1,6 +1,6 @@
-// The function as a stream of numbers: every expression node gets a number when its children have theirs, and is
-// written once as its kind, contents and the children's numbers, so shared nodes cost nothing. Names are numbered by
-// first appearance.
+// The function as a stream of numbers: every expression node gets a number when its children have
+// theirs, and is written once as its kind, contents and the children's numbers, so shared nodes
+// cost nothing. Names are numbered by first appearance.
 #include "jit/fingerprint.h"
 
 #include <bit>
@@ -29,9 +29,10 @@ namespace {
 
 class Writer {
  public:
-  explicit Writer(const LoweredFunction &function) {
-    for (const LoweredArgument &arg : function.args) {
-      add(static_cast<uint64_t>(arg.kind), arg.type.key(), static_cast<uint64_t>(arg.dimensions), name(arg.name));
+  explicit Writer(const LoweredFunction& function) {
+    for (const LoweredArgument& arg : function.args) {
+      add(static_cast<uint64_t>(arg.kind), arg.type.key(), static_cast<uint64_t>(arg.dimensions),
+          name(arg.name));
       if (arg.is_buffer()) add(name(arg.name + ".buffer"));
     }
     if (function.body.defined()) write(function.body);
@@ -44,67 +45,71 @@ class Writer {
     (result.add(static_cast<uint64_t>(words)), ...);
   }
 
-  uint64_t name(const std::string &text) { return names_.emplace(text, names_.size()).first->second; }
+  uint64_t name(const std::string& text) {
+    return names_.emplace(text, names_.size()).first->second;
+  }
 
-  uint64_t number(const Expr &e) {
+  uint64_t number(const Expr& e) {
     const auto found = numbers_.find(e.get());
     if (found != numbers_.end()) return found->second;
     std::vector<uint64_t> children;
-    for_each_child(e, [&](const Expr &child) { children.push_back(number(child)); });
+    for_each_child(e, [&](const Expr& child) { children.push_back(number(child)); });
     add(e.kind(), e.type().key());
     write_contents(e);
     for (uint64_t child : children) add(child);
     return numbers_.emplace(e.get(), numbers_.size()).first->second;
   }
 
-  void write_contents(const Expr &e) {
+  void write_contents(const Expr& e) {
     match(
-        e, [&](const IntImm &n) { add(n.value); }, [&](const UIntImm &n) { add(n.value); },
-        [&](const FloatImm &n) { add(std::bit_cast<uint64_t>(n.value)); },
-        [&](const StringImm &n) { result.add(n.value); }, [&](const Variable &n) { add(name(n.name)); },
-        [&](const Load &n) { add(name(n.name), n.predicate.defined()); }, [&](const Ramp &n) { add(n.lanes); },
-        [&](const Broadcast &n) { add(n.lanes); }, [&](const Let &n) { add(name(n.name)); },
-        [&](const VectorReduce &n) { add(n.op); },
-        [&](const Shuffle &n) {
+        e, [&](const IntImm& n) { add(n.value); }, [&](const UIntImm& n) { add(n.value); },
+        [&](const FloatImm& n) { add(std::bit_cast<uint64_t>(n.value)); },
+        [&](const StringImm& n) { result.add(n.value); },
+        [&](const Variable& n) { add(name(n.name)); },
+        [&](const Load& n) { add(name(n.name), n.predicate.defined()); },
+        [&](const Ramp& n) { add(n.lanes); }, [&](const Broadcast& n) { add(n.lanes); },
+        [&](const Let& n) { add(name(n.name)); }, [&](const VectorReduce& n) { add(n.op); },
+        [&](const Shuffle& n) {
           add(n.indices.size());
           for (int index : n.indices) add(index);
         },
-        [&](const Call &n) {
+        [&](const Call& n) {
           add(n.call_type, n.op, n.args.size(), n.value_index);
           result.add(n.call_type == CallType::Operator ? std::string() : n.name);
         },
-        [](const ExprNode &) {});
+        [](const ExprNode&) {});
   }
 
-  void write(const Stmt &s) {
+  void write(const Stmt& s) {
     std::vector<uint64_t> expressions;
     std::vector<Stmt> parts;
     for_each_child(
-        s, [&](const Expr &child) { expressions.push_back(number(child)); },
-        [&](const Stmt &part) { parts.push_back(part); });
+        s, [&](const Expr& child) { expressions.push_back(number(child)); },
+        [&](const Stmt& part) { parts.push_back(part); });
     add(s.kind(), expressions.size(), parts.size());
     write_contents(s);
     for (uint64_t expression : expressions) add(expression);
-    for (const Stmt &part : parts) write(part);
+    for (const Stmt& part : parts) write(part);
   }
 
-  void write_contents(const Stmt &s) {
+  void write_contents(const Stmt& s) {
     match(
-        s, [&](const LetStmt &n) { add(name(n.name)); }, [&](const For &n) { add(name(n.name), n.for_type); },
-        [&](const Store &n) { add(name(n.name), n.predicate.defined()); },
-        [&](const Allocate &n) {
+        s, [&](const LetStmt& n) { add(name(n.name)); },
+        [&](const For& n) { add(name(n.name), n.for_type); },
+        [&](const Store& n) { add(name(n.name), n.predicate.defined()); },
+        [&](const Allocate& n) {
           add(name(n.name), n.type.key(), n.memory);
           result.add(n.name.substr(0, n.name.find('$')));  // appears in error messages
         },
-        [&](const Free &n) { add(name(n.name)); }, [](const StmtNode &) {});
+        [&](const Free& n) { add(name(n.name)); }, [](const StmtNode&) {});
   }
 
   std::unordered_map<std::string, uint64_t> names_;
-  std::unordered_map<const ExprNode *, uint64_t> numbers_;
+  std::unordered_map<const ExprNode*, uint64_t> numbers_;
 };
 
 }  // namespace
 
-Fingerprint fingerprint(const LoweredFunction &function) { return Writer(function).result; }
+Fingerprint fingerprint(const LoweredFunction& function) { return Writer(function).result; }
 
 }  // namespace retrograde::jit

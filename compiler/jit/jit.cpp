@@ -18,37 +18,39 @@ namespace {
 
 class Compiled : public CompiledFunction {
  public:
-  Compiled(const ir::LoweredFunction &function, const codegen::Options &options) {
+  Compiled(const ir::LoweredFunction& function, const codegen::Options& options) {
     codegen::Module module = codegen::compile_object(function, options);
-    times_ = {module.times.generate_seconds, module.times.optimize_seconds, module.times.emit_seconds, 0};
+    times_ = {module.times.generate_seconds, module.times.optimize_seconds,
+              module.times.emit_seconds, 0};
     const auto start = std::chrono::steady_clock::now();
     object_ = link(module.object, function.name);
     address_ = object_->find(function.name);
-    argv_ = reinterpret_cast<Argv *>(object_->find(function.name + "_argv"));
-    times_.link_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    argv_ = reinterpret_cast<Argv*>(object_->find(function.name + "_argv"));
+    times_.link_seconds =
+        std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   }
-  int call(retrograde_context *context, void **args) const override { return argv_(context, args); }
-  void *address() const override { return address_; }
-  const CompileTimes &times() const override { return times_; }
+  int call(retrograde_context* context, void** args) const override { return argv_(context, args); }
+  void* address() const override { return address_; }
+  const CompileTimes& times() const override { return times_; }
 
  private:
-  using Argv = int32_t(retrograde_context *, void **);
+  using Argv = int32_t(retrograde_context*, void**);
   std::unique_ptr<LinkedObject> object_;
-  void *address_ = nullptr;
-  Argv *argv_ = nullptr;
+  void* address_ = nullptr;
+  Argv* argv_ = nullptr;
   CompileTimes times_;
 };
 
 using Handle = std::shared_ptr<const CompiledFunction>;
 
 struct KeyHash {
-  size_t operator()(const Fingerprint &key) const { return key.low; }
+  size_t operator()(const Fingerprint& key) const { return key.low; }
 };
 
 // The most recently used function stands first.
 class Cache {
  public:
-  Handle find(const Fingerprint &key) {
+  Handle find(const Fingerprint& key) {
     const std::lock_guard lock(mutex_);
     const auto found = index_.find(key);
     if (found == index_.end()) {
@@ -61,7 +63,7 @@ class Cache {
   }
 
   // The function that is kept: another thread may have been faster.
-  Handle insert(const Fingerprint &key, Handle function) {
+  Handle insert(const Fingerprint& key, Handle function) {
     const std::lock_guard lock(mutex_);
     const auto found = index_.find(key);
     if (found != index_.end()) return found->second->second;
@@ -93,19 +95,20 @@ class Cache {
   size_t hits_ = 0, misses_ = 0;
 };
 
-Cache &cache() {
-  static Cache &instance = *new Cache;  // never destroyed: code may run while the process exits
+Cache& cache() {
+  static Cache& instance = *new Cache;  // never destroyed: code may run while the process exits
   return instance;
 }
 
-void check_runs_here(const Target &target) {
+void check_runs_here(const Target& target) {
   const Target host = get_host_target();
   if (target.arch == host.arch && target.bits == host.bits && target.os == host.os) return;
-  unsupported("run code for target \"" + target.to_string() + "\"", "the JIT runs code on this machine",
-              "which is \"" + host.to_string() + "\"", "Compile for \"host\"");
+  unsupported("run code for target \"" + target.to_string() + "\"",
+              "the JIT runs code on this machine", "which is \"" + host.to_string() + "\"",
+              "Compile for \"host\"");
 }
 
-Fingerprint key_of(const ir::LoweredFunction &function, const codegen::Options &options) {
+Fingerprint key_of(const ir::LoweredFunction& function, const codegen::Options& options) {
   Fingerprint key;
   codegen::run_on_deep_stack([&] { key = fingerprint(function); });
   key.add(options.target.to_string());
@@ -116,23 +119,27 @@ Fingerprint key_of(const ir::LoweredFunction &function, const codegen::Options &
 // What one call reports, and where its prints go.
 struct CallState {
   std::string error;
-  const CallOptions &options;
+  const CallOptions& options;
   std::mutex mutex;
 };
 
-CallState &state_of(retrograde_context *context) { return *static_cast<CallState *>(context->user_data); }
+CallState& state_of(retrograde_context* context) {
+  return *static_cast<CallState*>(context->user_data);
+}
 
-void keep_error(retrograde_context *context, int, const char *message) { state_of(context).error = message; }
+void keep_error(retrograde_context* context, int, const char* message) {
+  state_of(context).error = message;
+}
 
-void pass_print(retrograde_context *context, const char *message) {
-  CallState &state = state_of(context);
+void pass_print(retrograde_context* context, const char* message) {
+  CallState& state = state_of(context);
   const std::lock_guard lock(state.mutex);
   state.options.on_print(message);
 }
 
 }  // namespace
 
-void CompiledFunction::run(void **args, const CallOptions &options) const {
+void CompiledFunction::run(void** args, const CallOptions& options) const {
   CallState state{{}, options, {}};
   retrograde_context context = {};
   context.error_handler = keep_error;
@@ -141,10 +148,11 @@ void CompiledFunction::run(void **args, const CallOptions &options) const {
   context.user_data = &state;
   const int code = call(&context, args);
   if (code == 0) return;
-  throw RuntimeError(state.error.empty() ? std::string(retrograde_error_name(code)) : state.error, code);
+  throw RuntimeError(state.error.empty() ? std::string(retrograde_error_name(code)) : state.error,
+                     code);
 }
 
-Handle compile(const ir::LoweredFunction &function, const Target &target, const Options &options) {
+Handle compile(const ir::LoweredFunction& function, const Target& target, const Options& options) {
   check_runs_here(target);
   codegen::Options code_options;
   code_options.target = target;

@@ -25,8 +25,9 @@ struct CompileTimes {
 };
 
 struct CallOptions {
-  int thread_limit = 0;                              // 0: all
-  std::function<void(const std::string &)> on_print;  // a line of print(), from any thread; none: thrown away
+  int thread_limit = 0;  // 0: all
+  std::function<void(const std::string&)>
+      on_print;  // a line of print(), from any thread; none: thrown away
 };
 
 class CompiledFunction {
@@ -34,13 +35,13 @@ class CompiledFunction {
   virtual ~CompiledFunction() = default;
   // args[i]: the halide_buffer_t *, or a pointer to the scalar. Gives the error code; errors go to
   // the context's handler.
-  virtual int call(retrograde_context *context, void **args) const = 0;
+  virtual int call(retrograde_context* context, void** args) const = 0;
   // The same; an error is thrown as RuntimeError with its code and the message of generated code.
-  void run(void **args, const CallOptions &options = {}) const;
+  void run(void** args, const CallOptions& options = {}) const;
   // int32 name(retrograde_context *, args...), as long as this object lives.
-  virtual void *address() const = 0;
+  virtual void* address() const = 0;
   // What compiling it took; a later hit in the cache costs nothing of it.
-  virtual const CompileTimes &times() const = 0;
+  virtual const CompileTimes& times() const = 0;
 };
 
 struct Options {
@@ -50,8 +51,8 @@ struct Options {
 
 // UserError when the function calls a C function that is neither in libm nor in this library;
 // Unsupported when the machine cannot run code for the target.
-std::shared_ptr<const CompiledFunction> compile(const ir::LoweredFunction &function, const Target &target,
-                                                const Options &options = {});
+std::shared_ptr<const CompiledFunction> compile(const ir::LoweredFunction& function,
+                                                const Target& target, const Options& options = {});
 
 // The cache of compile(): by what the function computes, not by its names. At most `cache_capacity`
 // functions, the least recently used go first.

@@ -1,5 +1,6 @@
-// One execution session an object: nothing is shared between functions, and destroying a function is destroying its
-// session. JITLink's memory manager maps pages for writing, then protects them; no page is ever both.
+// One execution session an object: nothing is shared between functions, and destroying a function
+// is destroying its session. JITLink's memory manager maps pages for writing, then protects them;
+// no page is ever both.
 #include "jit/linker.h"
 
 #include <llvm/ExecutionEngine/JITLink/JITLinkMemoryManager.h>
@@ -16,19 +17,20 @@ namespace retrograde::jit {
 namespace {
 
 template <typename T>
-T checked(llvm::Expected<T> value, const char *what) {
+T checked(llvm::Expected<T> value, const char* what) {
   if (!value) internal_error(std::string(what) + ": " + llvm::toString(value.takeError()));
   return std::move(*value);
 }
 
-void checked(llvm::Error error, const char *what) {
+void checked(llvm::Error error, const char* what) {
   if (error) internal_error(std::string(what) + ": " + llvm::toString(std::move(error)));
 }
 
 std::vector<std::string> undefined_symbols(llvm::MemoryBufferRef buffer) {
-  const auto object = checked(llvm::object::ObjectFile::createObjectFile(buffer), "reading an object file");
+  const auto object =
+      checked(llvm::object::ObjectFile::createObjectFile(buffer), "reading an object file");
   std::vector<std::string> names;
-  for (const llvm::object::SymbolRef &symbol : object->symbols()) {
+  for (const llvm::object::SymbolRef& symbol : object->symbols()) {
     const uint32_t flags = checked(symbol.getFlags(), "reading a symbol");
     if (!(flags & llvm::object::SymbolRef::SF_Undefined)) continue;
     const std::string name = checked(symbol.getName(), "reading a symbol").str();
@@ -37,23 +39,26 @@ std::vector<std::string> undefined_symbols(llvm::MemoryBufferRef buffer) {
   return names;
 }
 
-void *find_or_throw(const std::string &name, const std::string &function) {
-  void *address = find_symbol(name);
+void* find_or_throw(const std::string& name, const std::string& function) {
+  void* address = find_symbol(name);
   if (!address) {
-    user_error("compile \"" + function + "\"", "generated code may call libm's functions and nothing else of the process",
-               "it calls \"" + name + "\"", "Write it with the language's operators, or call a function of <math.h>");
+    user_error("compile \"" + function + "\"",
+               "generated code may call libm's functions and nothing else of the process",
+               "it calls \"" + name + "\"",
+               "Write it with the language's operators, or call a function of <math.h>");
   }
   return address;
 }
 
 class Linked : public LinkedObject {
  public:
-  Linked(const std::vector<uint8_t> &object, const std::string &name)
+  Linked(const std::vector<uint8_t>& object, const std::string& name)
       : session_(checked(llvm::orc::SelfExecutorProcessControl::Create(), "starting the linker")),
         memory_(llvm::jitlink::InProcessMemoryManager::Create()),
         layer_(session_, *checked_memory()),
         library_(session_.createBareJITDylib(name)) {
-    session_.setErrorReporter([this](llvm::Error error) { problem_ += llvm::toString(std::move(error)) + "; "; });
+    session_.setErrorReporter(
+        [this](llvm::Error error) { problem_ += llvm::toString(std::move(error)) + "; "; });
     try {
       add(object, name);
     } catch (...) {
@@ -63,29 +68,32 @@ class Linked : public LinkedObject {
   }
   ~Linked() override { close(); }
 
-  void *find(const std::string &name) const override {
+  void* find(const std::string& name) const override {
     auto symbol = session_.lookup({&library_}, session_.intern(name));
     if (!symbol) {
-      internal_error("linking " + name + ": " + llvm::toString(symbol.takeError()) + "; " + problem_);
+      internal_error("linking " + name + ": " + llvm::toString(symbol.takeError()) + "; " +
+                     problem_);
     }
-    return symbol->getAddress().toPtr<void *>();
+    return symbol->getAddress().toPtr<void*>();
   }
 
  private:
-  llvm::jitlink::JITLinkMemoryManager *checked_memory() {
+  llvm::jitlink::JITLinkMemoryManager* checked_memory() {
     if (!memory_) internal_error("mapping memory for code: " + llvm::toString(memory_.takeError()));
     return memory_->get();
   }
 
-  void add(const std::vector<uint8_t> &object, const std::string &name) {
-    const llvm::StringRef bytes(reinterpret_cast<const char *>(object.data()), object.size());
+  void add(const std::vector<uint8_t>& object, const std::string& name) {
+    const llvm::StringRef bytes(reinterpret_cast<const char*>(object.data()), object.size());
     auto buffer = llvm::MemoryBuffer::getMemBufferCopy(bytes, name);
     llvm::orc::SymbolMap symbols;
-    for (const std::string &symbol : undefined_symbols(buffer->getMemBufferRef())) {
-      symbols[session_.intern(symbol)] = {llvm::orc::ExecutorAddr::fromPtr(find_or_throw(symbol, name)),
-                                          llvm::JITSymbolFlags::Exported | llvm::JITSymbolFlags::Callable};
+    for (const std::string& symbol : undefined_symbols(buffer->getMemBufferRef())) {
+      symbols[session_.intern(symbol)] = {
+          llvm::orc::ExecutorAddr::fromPtr(find_or_throw(symbol, name)),
+          llvm::JITSymbolFlags::Exported | llvm::JITSymbolFlags::Callable};
     }
-    checked(library_.define(llvm::orc::absoluteSymbols(std::move(symbols))), "defining the runtime's symbols");
+    checked(library_.define(llvm::orc::absoluteSymbols(std::move(symbols))),
+            "defining the runtime's symbols");
     checked(layer_.add(library_, std::move(buffer)), "linking");
   }
 
@@ -94,13 +102,13 @@ class Linked : public LinkedObject {
   mutable llvm::orc::ExecutionSession session_;
   llvm::Expected<std::unique_ptr<llvm::jitlink::InProcessMemoryManager>> memory_;
   llvm::orc::ObjectLinkingLayer layer_;
-  llvm::orc::JITDylib &library_;
+  llvm::orc::JITDylib& library_;
   std::string problem_;
 };
 
 }  // namespace
 
-std::unique_ptr<LinkedObject> link(const std::vector<uint8_t> &object, const std::string &name) {
+std::unique_ptr<LinkedObject> link(const std::vector<uint8_t>& object, const std::string& name) {
   return std::make_unique<Linked>(object, name);
 }
 

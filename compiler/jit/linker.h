@@ -11,9 +11,9 @@ namespace retrograde::jit {
 class LinkedObject {
  public:
   virtual ~LinkedObject() = default;  // unmaps the code
-  virtual void *find(const std::string &name) const = 0;
+  virtual void* find(const std::string& name) const = 0;
 };
 
-std::unique_ptr<LinkedObject> link(const std::vector<uint8_t> &object, const std::string &name);
+std::unique_ptr<LinkedObject> link(const std::vector<uint8_t>& object, const std::string& name);
 
 }  // namespace retrograde::jit

@@ -15,13 +15,13 @@ namespace retrograde::jit {
 namespace {
 
 template <typename F>
-void *pointer(F *function) {
-  return reinterpret_cast<void *>(function);
+void* pointer(F* function) {
+  return reinterpret_cast<void*>(function);
 }
 
-using Table = std::map<std::string, void *>;
+using Table = std::map<std::string, void*>;
 
-void add_runtime(Table &table) {
+void add_runtime(Table& table) {
   table["retrograde_parallel_for"] = pointer(retrograde_parallel_for);
   table["retrograde_allocate"] = pointer(retrograde_allocate);
   table["retrograde_allocation_error"] = pointer(retrograde_allocation_error);
@@ -31,34 +31,38 @@ void add_runtime(Table &table) {
   table["retrograde_print"] = pointer(retrograde_print);
 }
 
-void add_libc(Table &table) {
-  table["memcpy"] = pointer<void *(void *, const void *, size_t)>(std::memcpy);
-  table["memmove"] = pointer<void *(void *, const void *, size_t)>(std::memmove);
-  table["memset"] = pointer<void *(void *, int, size_t)>(std::memset);
+void add_libc(Table& table) {
+  table["memcpy"] = pointer<void*(void*, const void*, size_t)>(std::memcpy);
+  table["memmove"] = pointer<void*(void*, const void*, size_t)>(std::memmove);
+  table["memset"] = pointer<void*(void*, int, size_t)>(std::memset);
 }
 
-void add_libm(Table &table) {
-#define RETROGRADE_UNARY(name)                            \
-  table[#name] = pointer<double(double)>(::name);         \
+void add_libm(Table& table) {
+#define RETROGRADE_UNARY(name)                    \
+  table[#name] = pointer<double(double)>(::name); \
   table[#name "f"] = pointer<float(float)>(::name##f);
-#define RETROGRADE_BINARY(name)                                   \
-  table[#name] = pointer<double(double, double)>(::name);         \
+#define RETROGRADE_BINARY(name)                           \
+  table[#name] = pointer<double(double, double)>(::name); \
   table[#name "f"] = pointer<float(float, float)>(::name##f);
-  RETROGRADE_UNARY(acos) RETROGRADE_UNARY(acosh) RETROGRADE_UNARY(asin) RETROGRADE_UNARY(asinh)
-  RETROGRADE_UNARY(atan) RETROGRADE_UNARY(atanh) RETROGRADE_UNARY(cbrt) RETROGRADE_UNARY(ceil)
-  RETROGRADE_UNARY(cos) RETROGRADE_UNARY(cosh) RETROGRADE_UNARY(erf) RETROGRADE_UNARY(erfc)
-  RETROGRADE_UNARY(exp) RETROGRADE_UNARY(exp2) RETROGRADE_UNARY(expm1) RETROGRADE_UNARY(fabs)
-  RETROGRADE_UNARY(floor) RETROGRADE_UNARY(lgamma) RETROGRADE_UNARY(log) RETROGRADE_UNARY(log10)
-  RETROGRADE_UNARY(log1p) RETROGRADE_UNARY(log2) RETROGRADE_UNARY(nearbyint) RETROGRADE_UNARY(rint)
-  RETROGRADE_UNARY(round) RETROGRADE_UNARY(roundeven) RETROGRADE_UNARY(sin) RETROGRADE_UNARY(sinh)
-  RETROGRADE_UNARY(sqrt) RETROGRADE_UNARY(tan) RETROGRADE_UNARY(tanh) RETROGRADE_UNARY(tgamma)
-  RETROGRADE_UNARY(trunc)
-  RETROGRADE_BINARY(atan2) RETROGRADE_BINARY(copysign) RETROGRADE_BINARY(fdim) RETROGRADE_BINARY(fmax)
-  RETROGRADE_BINARY(fmin) RETROGRADE_BINARY(fmod) RETROGRADE_BINARY(hypot) RETROGRADE_BINARY(nextafter)
-  RETROGRADE_BINARY(pow) RETROGRADE_BINARY(remainder)
+  RETROGRADE_UNARY(acos)
+  RETROGRADE_UNARY(acosh) RETROGRADE_UNARY(asin) RETROGRADE_UNARY(asinh) RETROGRADE_UNARY(
+      atan) RETROGRADE_UNARY(atanh) RETROGRADE_UNARY(cbrt) RETROGRADE_UNARY(ceil)
+      RETROGRADE_UNARY(cos) RETROGRADE_UNARY(cosh) RETROGRADE_UNARY(erf) RETROGRADE_UNARY(
+          erfc) RETROGRADE_UNARY(exp) RETROGRADE_UNARY(exp2) RETROGRADE_UNARY(expm1)
+          RETROGRADE_UNARY(fabs) RETROGRADE_UNARY(floor) RETROGRADE_UNARY(lgamma) RETROGRADE_UNARY(
+              log) RETROGRADE_UNARY(log10) RETROGRADE_UNARY(log1p) RETROGRADE_UNARY(log2)
+              RETROGRADE_UNARY(nearbyint) RETROGRADE_UNARY(rint) RETROGRADE_UNARY(round)
+                  RETROGRADE_UNARY(roundeven) RETROGRADE_UNARY(sin) RETROGRADE_UNARY(sinh)
+                      RETROGRADE_UNARY(sqrt) RETROGRADE_UNARY(tan) RETROGRADE_UNARY(tanh)
+                          RETROGRADE_UNARY(tgamma) RETROGRADE_UNARY(trunc) RETROGRADE_BINARY(atan2)
+                              RETROGRADE_BINARY(copysign) RETROGRADE_BINARY(fdim) RETROGRADE_BINARY(
+                                  fmax) RETROGRADE_BINARY(fmin) RETROGRADE_BINARY(fmod)
+                                  RETROGRADE_BINARY(hypot) RETROGRADE_BINARY(nextafter)
+                                      RETROGRADE_BINARY(pow) RETROGRADE_BINARY(remainder)
 #undef RETROGRADE_UNARY
 #undef RETROGRADE_BINARY
-  table["fma"] = pointer<double(double, double, double)>(::fma);
+                                          table["fma"] =
+                                              pointer<double(double, double, double)>(::fma);
   table["fmaf"] = pointer<float(float, float, float)>(::fmaf);
 }
 
@@ -70,10 +74,11 @@ Table make_table() {
   return table;
 }
 
-// By the file that holds a known function: the process may have loaded us and SLEEF privately, where a search of the
-// whole process does not look. (Where the address is that of a jump inside a program, that search does find it.)
-void *sleef_library() {
-  static void *const library = [] {
+// By the file that holds a known function: the process may have loaded us and SLEEF privately,
+// where a search of the whole process does not look. (Where the address is that of a jump inside a
+// program, that search does find it.)
+void* sleef_library() {
+  static void* const library = [] {
     Dl_info info;
     const bool found = dladdr(pointer(Sleef_expf_u10), &info) != 0 && info.dli_fname;
     return found ? dlopen(info.dli_fname, RTLD_LAZY | RTLD_NOLOAD) : nullptr;
@@ -81,14 +86,14 @@ void *sleef_library() {
   return library;
 }
 
-void *find_in_sleef(const char *name) {
+void* find_in_sleef(const char* name) {
   void *library = sleef_library(), *address = library ? dlsym(library, name) : nullptr;
   return address ? address : dlsym(RTLD_DEFAULT, name);
 }
 
 }  // namespace
 
-void *find_symbol(const std::string &name) {
+void* find_symbol(const std::string& name) {
   static const Table table = make_table();
   const auto found = table.find(name);
   if (found != table.end()) return found->second;

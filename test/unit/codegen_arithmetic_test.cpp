@@ -1,5 +1,5 @@
-// Machine code of arithmetic against the one definition of scalars, on random and extreme operands, in every type and
-// in widths that fit the machine's vectors and widths that do not.
+// Machine code of arithmetic against the one definition of scalars, on random and extreme operands,
+// in every type and in widths that fit the machine's vectors and widths that do not.
 #include "unit/codegen_testing.h"
 
 namespace retrograde::testing_codegen {
@@ -7,20 +7,21 @@ namespace {
 
 const int widths[] = {1, 2, 3, 4, 5, 8, 12, 16, 20};
 
-const Type number_types[] = {Int(8),    Int(16),   Int(32),   Int(64),   UInt(8),   UInt(16),
-                             UInt(32),  UInt(64),  Float(16), BFloat(16), Float(32), Float(64)};
+const Type number_types[] = {Int(8),   Int(16),  Int(32),   Int(64),    UInt(8),   UInt(16),
+                             UInt(32), UInt(64), Float(16), BFloat(16), Float(32), Float(64)};
 
 // Something to compute from the operands, in machine code and by the scalar definitions.
 struct Case {
   std::string name;
   Type result;
-  std::function<Expr(const std::vector<Expr> &)> make;
-  std::function<Scalar(const std::vector<Scalar> &)> oracle;
+  std::function<Expr(const std::vector<Expr>&)> make;
+  std::function<Scalar(const std::vector<Scalar>&)> oracle;
 };
 using Cases = std::vector<Case>;
 
 // out<k>[i] = cases[k](in0[i], in1[i] ...) for i in [0, count), `lanes` at a time.
-LoweredFunction elementwise(const std::vector<Type> &inputs, const Cases &cases, int lanes, int count) {
+LoweredFunction elementwise(const std::vector<Type>& inputs, const Cases& cases, int lanes,
+                            int count) {
   LoweredFunction function;
   function.name = "elementwise";
   const Expr index = lanes_at(variable("i") * lanes, lanes);
@@ -40,7 +41,8 @@ LoweredFunction elementwise(const std::vector<Type> &inputs, const Cases &cases,
   return function;
 }
 
-void check(const std::vector<Type> &inputs, int lanes, const Cases &cases, const Target &target = test_target()) {
+void check(const std::vector<Type>& inputs, int lanes, const Cases& cases,
+           const Target& target = test_target()) {
   const int count = 240;  // divisible by all widths
   RandomScalars random(static_cast<uint32_t>(lanes));
   std::vector<std::unique_ptr<Array>> arrays;
@@ -48,10 +50,11 @@ void check(const std::vector<Type> &inputs, int lanes, const Cases &cases, const
     arrays.push_back(std::make_unique<Array>(type, count));
     for (size_t i = 0; i < count; i++) arrays.back()->set(i, random(type));
   }
-  for (const Case &c : cases) arrays.push_back(std::make_unique<Array>(c.result, count));
-  std::vector<Array *> raw;
-  for (auto &array : arrays) raw.push_back(array.get());
-  ASSERT_EQ(call(elementwise(inputs, cases, lanes, count), raw, nullptr, target), 0) << cases[0].name;
+  for (const Case& c : cases) arrays.push_back(std::make_unique<Array>(c.result, count));
+  std::vector<Array*> raw;
+  for (auto& array : arrays) raw.push_back(array.get());
+  ASSERT_EQ(call(elementwise(inputs, cases, lanes, count), raw, nullptr, target), 0)
+      << cases[0].name;
   for (size_t i = 0; i < count; i++) {
     std::vector<Scalar> operands;
     std::string text;
@@ -61,8 +64,9 @@ void check(const std::vector<Type> &inputs, int lanes, const Cases &cases, const
     }
     for (size_t k = 0; k < cases.size(); k++) {
       const Scalar expected = cases[k].oracle(operands), got = arrays[inputs.size() + k]->get(i);
-      ASSERT_TRUE(same(expected, got)) << cases[k].name << " of" << text << " in " << lanes << " lanes: " << show(got)
-                                       << ", expected " << show(expected);
+      ASSERT_TRUE(same(expected, got))
+          << cases[k].name << " of" << text << " in " << lanes << " lanes: " << show(got)
+          << ", expected " << show(expected);
     }
   }
 }
@@ -70,13 +74,14 @@ void check(const std::vector<Type> &inputs, int lanes, const Cases &cases, const
 Case binary_case(Kind kind, Type type) {
   const bool compares = kind >= Kind::EQ && kind <= Kind::GE;
   return {kind_name(kind), compares ? Bool() : type,
-          [=](const auto &args) { return binary(kind, args[0], args[1]); },
-          [=](const auto &args) { return eval_binary(kind, args[0], args[1]); }};
+          [=](const auto& args) { return binary(kind, args[0], args[1]); },
+          [=](const auto& args) { return eval_binary(kind, args[0], args[1]); }};
 }
 
 Case operator_case(Op op, Type result, int lanes) {
-  return {op_info(op).name, result, [=](const auto &args) { return call_op(op, result.with_lanes(lanes), args); },
-          [=](const auto &args) { return *eval_operator(op, args, result); }};
+  return {op_info(op).name, result,
+          [=](const auto& args) { return call_op(op, result.with_lanes(lanes), args); },
+          [=](const auto& args) { return *eval_operator(op, args, result); }};
 }
 
 Cases all_binary_cases(Type type) {
@@ -98,7 +103,8 @@ std::vector<Target> older_targets() {
   std::vector<Target> targets;
   const Target host = get_host_target();
   if (host.arch != Target::X86) return targets;
-  for (const char *text : {"x86-64-linux", "x86-64-linux-sse41-avx", "x86-64-linux-sse41-avx-f16c-fma-avx2"}) {
+  for (const char* text :
+       {"x86-64-linux", "x86-64-linux-sse41-avx", "x86-64-linux-sse41-avx-f16c-fma-avx2"}) {
     const Target target(text);
     bool runs = true;
     for (int f = 0; f < Target::FeatureEnd; f++) {
@@ -111,7 +117,7 @@ std::vector<Target> older_targets() {
 }
 
 TEST(CodegenArithmetic, BinaryOperatorsOnOlderProcessors) {
-  for (const Target &target : older_targets()) {
+  for (const Target& target : older_targets()) {
     for (int lanes : {1, 12}) {
       for (Type type : number_types) check({type, type}, lanes, all_binary_cases(type), target);
     }
@@ -121,14 +127,17 @@ TEST(CodegenArithmetic, BinaryOperatorsOnOlderProcessors) {
 TEST(CodegenArithmetic, BooleansAndSelect) {
   for (int lanes : widths) {
     check({Bool(), Bool()}, lanes,
-          {binary_case(Kind::And, Bool()), binary_case(Kind::Or, Bool()), binary_case(Kind::EQ, Bool()),
+          {binary_case(Kind::And, Bool()),
+           binary_case(Kind::Or, Bool()),
+           binary_case(Kind::EQ, Bool()),
            binary_case(Kind::NE, Bool()),
-           {"not", Bool(), [](const auto &args) { return logical_not(args[0]); },
-            [](const auto &args) { return eval_not(args[0]); }}});
+           {"not", Bool(), [](const auto& args) { return logical_not(args[0]); },
+            [](const auto& args) { return eval_not(args[0]); }}});
     for (Type type : {Int(16), Float(16), Float(32), Bool()}) {
-      check({Bool(), type, type}, lanes,
-            {{"select", type, [](const auto &args) { return make_select(args[0], args[1], args[2]); },
-              [](const auto &args) { return args[0].as_bool() ? args[1] : args[2]; }}});
+      check(
+          {Bool(), type, type}, lanes,
+          {{"select", type, [](const auto& args) { return make_select(args[0], args[1], args[2]); },
+            [](const auto& args) { return args[0].as_bool() ? args[1] : args[2]; }}});
     }
   }
 }
@@ -147,8 +156,10 @@ TEST(CodegenArithmetic, DivisionByConstants) {
         const Scalar b = Scalar::of_int(type, divisor);
         for (Kind kind : {Kind::Div, Kind::Mod}) {
           cases.push_back({text(kind_name(kind), " by ", divisor), type,
-                           [=](const auto &args) { return binary(kind, args[0], make_broadcast(to_expr(b), lanes)); },
-                           [=](const auto &args) { return eval_binary(kind, args[0], b); }});
+                           [=](const auto& args) {
+                             return binary(kind, args[0], make_broadcast(to_expr(b), lanes));
+                           },
+                           [=](const auto& args) { return eval_binary(kind, args[0], b); }});
         }
       }
       check({type}, lanes, cases);
@@ -157,7 +168,7 @@ TEST(CodegenArithmetic, DivisionByConstants) {
 }
 
 // Out of range, and for NaN, the IR leaves the integer open.
-bool is_open(Type to, const Scalar &from) {
+bool is_open(Type to, const Scalar& from) {
   if (!from.type.is_float() || to.is_float() || to.is_bool()) return false;
   const double whole = std::trunc(from.f);
   return !(whole >= static_cast<double>(to.is_int() ? to.min_int() : 0) &&
@@ -165,7 +176,7 @@ bool is_open(Type to, const Scalar &from) {
 }
 
 // The cast, or zero where its result is open.
-Expr defined_cast(Type to, const Expr &value) {
+Expr defined_cast(Type to, const Expr& value) {
   const Type from = value.type();
   const int lanes = from.lanes();
   const Expr result = cast_to(to.with_lanes(lanes), value);
@@ -182,15 +193,17 @@ TEST(CodegenArithmetic, CastsBetweenAllTypes) {
   std::vector<Type> types(std::begin(number_types), std::end(number_types));
   types.push_back(Bool());
   std::vector<std::pair<Target, int>> setups = {{test_target(), 1}, {test_target(), 12}};
-  for (const Target &target : older_targets()) setups.push_back({target, 5});
-  for (const auto &[target, lanes_] : setups) {
+  for (const Target& target : older_targets()) setups.push_back({target, 5});
+  for (const auto& [target, lanes_] : setups) {
     const int lanes = lanes_;
     for (Type from : types) {
       Cases cases;
       for (Type to : types) {
-        cases.push_back({"cast to " + to_string(to), to, [=](const auto &args) { return defined_cast(to, args[0]); },
-                         [=](const auto &args) {
-                           return is_open(to, args[0]) ? Scalar::of_int(to, 0) : eval_cast(to, args[0]);
+        cases.push_back({"cast to " + to_string(to), to,
+                         [=](const auto& args) { return defined_cast(to, args[0]); },
+                         [=](const auto& args) {
+                           return is_open(to, args[0]) ? Scalar::of_int(to, 0)
+                                                       : eval_cast(to, args[0]);
                          }});
         cases.push_back(operator_case(Op::saturating_cast, to, lanes));
       }
@@ -205,21 +218,25 @@ TEST(CodegenArithmetic, IntegerOperators) {
       if (type.is_float()) continue;
       const Type magnitude = UInt(type.bits());
       Cases cases = {operator_case(Op::absd, magnitude, lanes)};
-      for (Op op : {Op::bitwise_and, Op::bitwise_or, Op::bitwise_xor, Op::shift_left, Op::shift_right}) {
+      for (Op op :
+           {Op::bitwise_and, Op::bitwise_or, Op::bitwise_xor, Op::shift_left, Op::shift_right}) {
         cases.push_back(operator_case(op, type, lanes));
       }
       check({type, type}, lanes, cases);
       cases = {operator_case(Op::abs, magnitude, lanes)};
-      for (Op op : {Op::bitwise_not, Op::popcount, Op::count_leading_zeros, Op::count_trailing_zeros}) {
+      for (Op op :
+           {Op::bitwise_not, Op::popcount, Op::count_leading_zeros, Op::count_trailing_zeros}) {
         cases.push_back(operator_case(op, type, lanes));
       }
       check({type}, lanes, cases);
       for (Type amount : {Int(type.bits()), UInt(8), Int(64)}) {
         check({type, amount}, lanes,
-              {operator_case(Op::shift_left, type, lanes), operator_case(Op::shift_right, type, lanes)});
+              {operator_case(Op::shift_left, type, lanes),
+               operator_case(Op::shift_right, type, lanes)});
       }
       if (type.bits() == 64) continue;
-      for (Type weight : {magnitude, UInt(8)}) check({type, type, weight}, lanes, {operator_case(Op::lerp, type, lanes)});
+      for (Type weight : {magnitude, UInt(8)})
+        check({type, type, weight}, lanes, {operator_case(Op::lerp, type, lanes)});
     }
   }
 }
@@ -227,16 +244,18 @@ TEST(CodegenArithmetic, IntegerOperators) {
 TEST(CodegenArithmetic, FloatOperators) {
   std::vector<Target> targets = older_targets();
   targets.push_back(test_target());
-  for (const Target &target : targets) {
+  for (const Target& target : targets) {
     for (int lanes : {1, 3, 16}) {
       for (Type type : {Float(16), BFloat(16), Float(32), Float(64)}) {
         Cases cases;
         for (Op op : {Op::abs, Op::floor, Op::ceil, Op::round, Op::trunc, Op::sqrt}) {
           cases.push_back(operator_case(op, type, lanes));
         }
-        for (Op op : {Op::is_nan, Op::is_inf, Op::is_finite}) cases.push_back(operator_case(op, Bool(), lanes));
+        for (Op op : {Op::is_nan, Op::is_inf, Op::is_finite})
+          cases.push_back(operator_case(op, Bool(), lanes));
         check({type}, lanes, cases, target);
-        check({type, type}, lanes, {operator_case(Op::absd, type, lanes), operator_case(Op::strong_mul, type, lanes)},
+        check({type, type}, lanes,
+              {operator_case(Op::absd, type, lanes), operator_case(Op::strong_mul, type, lanes)},
               target);
       }
     }
@@ -248,11 +267,14 @@ TEST(CodegenArithmetic, LerpWithFloatWeights) {
     Cases cases;
     for (int step = 0; step <= 8; step++) {
       const Scalar weight = Scalar::of_float(Float(32), step / 8.0);
-      cases.push_back({text("lerp by ", weight.f), type,
-                       [=](const auto &args) {
-                         return call_op(Op::lerp, {args[0], args[1], make_broadcast(to_expr(weight), 8)});
-                       },
-                       [=](const auto &args) { return *eval_operator(Op::lerp, {args[0], args[1], weight}, type); }});
+      cases.push_back(
+          {text("lerp by ", weight.f), type,
+           [=](const auto& args) {
+             return call_op(Op::lerp, {args[0], args[1], make_broadcast(to_expr(weight), 8)});
+           },
+           [=](const auto& args) {
+             return *eval_operator(Op::lerp, {args[0], args[1], weight}, type);
+           }});
     }
     check({type, type}, 8, cases);
   }
@@ -263,11 +285,13 @@ TEST(CodegenArithmetic, FloatLerpIsExactAtTheEnds) {
   Cases cases;
   for (double end : {0.0, 1.0}) {
     const Expr weight = make_broadcast(Expr(static_cast<float>(end)), 4);
-    cases.push_back({text("lerp by ", end), Float(32),
-                     [=](const auto &args) {
-                       return call_op(Op::lerp, {cast_to(Float(32, 4), args[0]), cast_to(Float(32, 4), args[1]), weight});
-                     },
-                     [=](const auto &args) { return eval_cast(Float(32), end == 0 ? args[0] : args[1]); }});
+    cases.push_back(
+        {text("lerp by ", end), Float(32),
+         [=](const auto& args) {
+           return call_op(Op::lerp,
+                          {cast_to(Float(32, 4), args[0]), cast_to(Float(32, 4), args[1]), weight});
+         },
+         [=](const auto& args) { return eval_cast(Float(32), end == 0 ? args[0] : args[1]); }});
   }
   check({UInt(16), UInt(16)}, 4, cases);
 }
@@ -297,11 +321,17 @@ TEST(CodegenArithmetic, ContractionHappensUnlessStrict) {
 
 TEST(CodegenArithmetic, ReinterpretKeepsBits) {
   for (int lanes : {1, 4, 5}) {
-    for (auto [from, to] : {std::pair{Float(32), UInt(32)}, {Int(32), Float(32)}, {Float(64), Int(64)},
-                            {Float(16), UInt(16)}, {UInt(16), BFloat(16)}}) {
+    for (auto [from, to] : {std::pair{Float(32), UInt(32)},
+                            {Int(32), Float(32)},
+                            {Float(64), Int(64)},
+                            {Float(16), UInt(16)},
+                            {UInt(16), BFloat(16)}}) {
       check({from}, lanes,
-            {{"reinterpret", to, [=, to = to](const auto &args) { return reinterpret_as(to.with_lanes(lanes), args[0]); },
-              [=, to = to](const auto &args) { return eval_reinterpret(to, args[0]); }}});
+            {{"reinterpret", to,
+              [=, to = to](const auto& args) {
+                return reinterpret_as(to.with_lanes(lanes), args[0]);
+              },
+              [=, to = to](const auto& args) { return eval_reinterpret(to, args[0]); }}});
     }
   }
 }

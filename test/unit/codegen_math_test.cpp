@@ -1,5 +1,6 @@
-// Vector math against the errors that math_table.h promises, in every width; and that a function's bits do not depend
-// on the width. float32 is judged in double, float64 in long double, which has at least 11 bits more.
+// Vector math against the errors that math_table.h promises, in every width; and that a function's
+// bits do not depend on the width. float32 is judged in double, float64 in long double, which has
+// at least 11 bits more.
 #include <algorithm>
 
 #include "codegen/math_table.h"
@@ -17,52 +18,83 @@ constexpr int count = 4096;
 template <typename Wide>
 Wide reference(Op op, Wide x, Wide y) {
   switch (op) {
-    case Op::exp: return std::exp(x);
-    case Op::log: return std::log(x);
-    case Op::pow: return std::pow(x, y);
-    case Op::hypot: return std::hypot(x, y);
-    case Op::sin: return std::sin(x);
-    case Op::cos: return std::cos(x);
-    case Op::tan: return std::tan(x);
-    case Op::asin: return std::asin(x);
-    case Op::acos: return std::acos(x);
-    case Op::atan: return std::atan(x);
-    case Op::atan2: return std::atan2(x, y);
-    case Op::sinh: return std::sinh(x);
-    case Op::cosh: return std::cosh(x);
-    case Op::tanh: return std::tanh(x);
-    case Op::asinh: return std::asinh(x);
-    case Op::acosh: return std::acosh(x);
-    case Op::atanh: return std::atanh(x);
-    case Op::erf: return std::erf(x);
-    case Op::fast_exp: return std::exp(x);
-    case Op::fast_log: return std::log(x);
-    case Op::fast_pow: return std::pow(x, y);
-    case Op::fast_sin: return std::sin(x);
-    case Op::fast_cos: return std::cos(x);
-    case Op::fast_inverse: return 1 / x;
-    case Op::fast_inverse_sqrt: return 1 / std::sqrt(x);
-    default: ADD_FAILURE() << "no reference for " << op_info(op).name; return 0;
+    case Op::exp:
+      return std::exp(x);
+    case Op::log:
+      return std::log(x);
+    case Op::pow:
+      return std::pow(x, y);
+    case Op::hypot:
+      return std::hypot(x, y);
+    case Op::sin:
+      return std::sin(x);
+    case Op::cos:
+      return std::cos(x);
+    case Op::tan:
+      return std::tan(x);
+    case Op::asin:
+      return std::asin(x);
+    case Op::acos:
+      return std::acos(x);
+    case Op::atan:
+      return std::atan(x);
+    case Op::atan2:
+      return std::atan2(x, y);
+    case Op::sinh:
+      return std::sinh(x);
+    case Op::cosh:
+      return std::cosh(x);
+    case Op::tanh:
+      return std::tanh(x);
+    case Op::asinh:
+      return std::asinh(x);
+    case Op::acosh:
+      return std::acosh(x);
+    case Op::atanh:
+      return std::atanh(x);
+    case Op::erf:
+      return std::erf(x);
+    case Op::fast_exp:
+      return std::exp(x);
+    case Op::fast_log:
+      return std::log(x);
+    case Op::fast_pow:
+      return std::pow(x, y);
+    case Op::fast_sin:
+      return std::sin(x);
+    case Op::fast_cos:
+      return std::cos(x);
+    case Op::fast_inverse:
+      return 1 / x;
+    case Op::fast_inverse_sqrt:
+      return 1 / std::sqrt(x);
+    default:
+      ADD_FAILURE() << "no reference for " << op_info(op).name;
+      return 0;
   }
 }
 
 template <typename Number>
 using WideOf = std::conditional_t<std::is_same_v<Number, float>, double, long double>;
 
-// Distance in units of the last place of the exact result. Results that should be infinite, NaN or beyond the largest
-// number must be just that; the largest number and infinity are neighbours.
+// Distance in units of the last place of the exact result. Results that should be infinite, NaN or
+// beyond the largest number must be just that; the largest number and infinity are neighbours.
 template <typename Number>
 double ulp_error(Number got, WideOf<Number> exact) {
   using Limits = std::numeric_limits<Number>;
-  if (std::isnan(exact) || std::isnan(got)) return std::isnan(exact) && std::isnan(got) ? 0 : INFINITY;
+  if (std::isnan(exact) || std::isnan(got))
+    return std::isnan(exact) && std::isnan(got) ? 0 : INFINITY;
   const auto largest = static_cast<WideOf<Number>>(Limits::max());
   if (std::isinf(exact) || std::fabs(exact) > largest) {
     const bool is_right = std::isinf(got) && std::signbit(got) == std::signbit(exact);
-    const bool is_close = std::fabs(exact) < largest * (1 + 4 * Limits::epsilon()) && std::fabs(got) == Limits::max();
+    const bool is_close =
+        std::fabs(exact) < largest * (1 + 4 * Limits::epsilon()) && std::fabs(got) == Limits::max();
     return is_right || is_close ? 0 : INFINITY;
   }
-  if (std::isinf(got)) return std::fabs(exact) >= largest * (1 - 4 * Limits::epsilon()) ? 1 : INFINITY;
-  const int exponent = std::max(exact == 0 ? Limits::min_exponent : std::ilogb(exact) + 1, Limits::min_exponent);
+  if (std::isinf(got))
+    return std::fabs(exact) >= largest * (1 - 4 * Limits::epsilon()) ? 1 : INFINITY;
+  const int exponent =
+      std::max(exact == 0 ? Limits::min_exponent : std::ilogb(exact) + 1, Limits::min_exponent);
   const auto unit = std::ldexp(static_cast<WideOf<Number>>(1), exponent - Limits::digits);
   return static_cast<double>(std::fabs(static_cast<WideOf<Number>>(got) - exact) / unit);
 }
@@ -75,19 +107,46 @@ std::vector<Number> samples(uint32_t seed) {
   using Limits = std::numeric_limits<Number>;
   std::mt19937_64 engine(seed);
   std::uniform_real_distribution<double> unit(-1, 1);
-  std::vector<Number> values = {0, -0.0, 1, -1, Limits::infinity(), -Limits::infinity(), Limits::quiet_NaN(),
-                                Limits::denorm_min(), Limits::min(), Limits::max(), -Limits::max(), 0.5, 2, 3, -2,
-                                Number(88.7), Number(89.3), Number(-89.3), Number(710), Number(-103.5), Number(0.999999)};
+  std::vector<Number> values = {0,
+                                -0.0,
+                                1,
+                                -1,
+                                Limits::infinity(),
+                                -Limits::infinity(),
+                                Limits::quiet_NaN(),
+                                Limits::denorm_min(),
+                                Limits::min(),
+                                Limits::max(),
+                                -Limits::max(),
+                                0.5,
+                                2,
+                                3,
+                                -2,
+                                Number(88.7),
+                                Number(89.3),
+                                Number(-89.3),
+                                Number(710),
+                                Number(-103.5),
+                                Number(0.999999)};
   while (values.size() < count) {
     const double u = unit(engine);
     switch (engine() % 5) {
-      case 0: values.push_back(static_cast<Number>(u)); break;
-      case 1: values.push_back(static_cast<Number>(1 + u * 0.01)); break;
-      case 2: values.push_back(static_cast<Number>(u * 100)); break;
-      case 3: values.push_back(static_cast<Number>(u * 1e5)); break;
+      case 0:
+        values.push_back(static_cast<Number>(u));
+        break;
+      case 1:
+        values.push_back(static_cast<Number>(1 + u * 0.01));
+        break;
+      case 2:
+        values.push_back(static_cast<Number>(u * 100));
+        break;
+      case 3:
+        values.push_back(static_cast<Number>(u * 1e5));
+        break;
       default:
-        values.push_back(static_cast<Number>(std::ldexp(u, static_cast<int>(engine() % 2000) % (Limits::max_exponent * 2) -
-                                                               Limits::max_exponent)));
+        values.push_back(static_cast<Number>(
+            std::ldexp(u, static_cast<int>(engine() % 2000) % (Limits::max_exponent * 2) -
+                              Limits::max_exponent)));
     }
   }
   return values;
@@ -111,32 +170,33 @@ LoweredFunction apply(Op op, Type type, int lanes) {
 }
 
 template <typename Number>
-std::vector<Number> run(Op op, int lanes, const std::vector<Number> &x, const std::vector<Number> &y,
-                        const Target &target = test_target()) {
+std::vector<Number> run(Op op, int lanes, const std::vector<Number>& x,
+                        const std::vector<Number>& y, const Target& target = test_target()) {
   const Type type = type_of<Number>();
   Array a(type, count), b(type, count), out(type, count);
   std::copy_n(x.begin(), count, a.data<Number>());
   std::copy_n(y.begin(), count, b.data<Number>());
-  std::vector<Array *> arrays = {&a, &b, &out};
+  std::vector<Array*> arrays = {&a, &b, &out};
   if (arity_of(op) == 1) arrays.erase(arrays.begin() + 1);
   EXPECT_EQ(call(apply(op, type, lanes), arrays, nullptr, target), 0);
   return {out.data<Number>(), out.data<Number>() + count};
 }
 
 template <typename Number>
-void check_errors(const MathFunction &function, double limit) {
+void check_errors(const MathFunction& function, double limit) {
   const auto x = samples<Number>(1), y = samples<Number>(2);
   const auto got = run(function.op, 1, x, y);
   for (size_t i = 0; i < count; i++) {
     using Wide = WideOf<Number>;
     const Wide exact = reference<Wide>(function.op, x[i], y[i]);
     ASSERT_LE(ulp_error<Number>(got[i], exact), limit)
-        << op_info(function.op).name << "(" << x[i] << ", " << y[i] << ") = " << got[i] << ", exactly " << exact;
+        << op_info(function.op).name << "(" << x[i] << ", " << y[i] << ") = " << got[i]
+        << ", exactly " << exact;
   }
 }
 
 template <typename Number>
-void check_widths(Op op, const std::vector<int> &widths, const Target &target) {
+void check_widths(Op op, const std::vector<int>& widths, const Target& target) {
   const auto x = samples<Number>(3), y = samples<Number>(4);
   const auto scalar = run(op, 1, x, y, target);
   for (int lanes : widths) {
@@ -144,46 +204,47 @@ void check_widths(Op op, const std::vector<int> &widths, const Target &target) {
     const int whole = count / lanes * lanes;
     for (int i = 0; i < whole; i++) {
       const auto at = static_cast<size_t>(i);
-      ASSERT_TRUE(same(Scalar::of_float(type_of<Number>(), scalar[at]), Scalar::of_float(type_of<Number>(), vector[at])))
-          << op_info(op).name << "(" << x[at] << ", " << y[at] << "): " << vector[at] << " in " << lanes
-          << " lanes, alone " << scalar[at];
+      ASSERT_TRUE(same(Scalar::of_float(type_of<Number>(), scalar[at]),
+                       Scalar::of_float(type_of<Number>(), vector[at])))
+          << op_info(op).name << "(" << x[at] << ", " << y[at] << "): " << vector[at] << " in "
+          << lanes << " lanes, alone " << scalar[at];
     }
   }
 }
 
 TEST(CodegenMath, ErrorsOfFloat32AreAsTheTableSays) {
-  for (const MathFunction &function : codegen::math_functions) {
+  for (const MathFunction& function : codegen::math_functions) {
     check_errors<float>(function, function.max_ulp_float32);
   }
 }
 
 TEST(CodegenMath, ErrorsOfFloat64AreAsTheTableSays) {
-  for (const MathFunction &function : codegen::math_functions) {
+  for (const MathFunction& function : codegen::math_functions) {
     check_errors<double>(function, function.max_ulp_float64);
   }
 }
 
 TEST(CodegenMath, BitsDoNotDependOnTheWidth) {
-  for (const MathFunction &function : codegen::math_functions) {
+  for (const MathFunction& function : codegen::math_functions) {
     check_widths<float>(function.op, {3, 4, 8, 16, 20}, test_target());
     check_widths<double>(function.op, {2, 5, 8}, test_target());
   }
   if (test_target().arch != Target::X86) return;
-  for (const MathFunction &function : codegen::math_functions) {
+  for (const MathFunction& function : codegen::math_functions) {
     check_widths<float>(function.op, {4, 6}, Target("x86-64-linux"));
     check_widths<float>(function.op, {8}, Target("x86-64-linux-sse41-avx"));
   }
 }
 
 TEST(CodegenMath, EveryOperatorHasCode) {
-  // Totality: what is neither a simple operator nor in a table would throw. Effects and internals have tests of
-  // their own.
+  // Totality: what is neither a simple operator nor in a table would throw. Effects and internals
+  // have tests of their own.
   for (int i = 0; i < op_count; i++) {
     const Op op = static_cast<Op>(i);
-    const OpInfo &info = op_info(op);
+    const OpInfo& info = op_info(op);
     if (info.cls != OpClass::Pure && info.cls != OpClass::Marker) continue;
-    const bool is_bitwise = op <= Op::shift_right || op == Op::popcount || op == Op::count_leading_zeros ||
-                            op == Op::count_trailing_zeros;
+    const bool is_bitwise = op <= Op::shift_right || op == Op::popcount ||
+                            op == Op::count_leading_zeros || op == Op::count_trailing_zeros;
     const Type type = is_bitwise ? Int(32) : Float(32);
     const bool is_test = op == Op::is_nan || op == Op::is_inf || op == Op::is_finite;
     LoweredFunction f;
@@ -197,14 +258,15 @@ TEST(CodegenMath, EveryOperatorHasCode) {
 }
 
 TEST(CodegenMath, FastFormsKeepTheirErrors) {
-  for (const auto &function : codegen::fast_functions) {
+  for (const auto& function : codegen::fast_functions) {
     std::mt19937 engine(5);
     std::vector<float> x(count), y(count);
     const bool is_logarithmic = function.low > 0;
     for (size_t i = 0; i < count; i++) {
       const double u = std::uniform_real_distribution<double>(0, 1)(engine);
-      x[i] = static_cast<float>(is_logarithmic ? function.low * std::pow(function.high / function.low, u)
-                                               : function.low + u * (function.high - function.low));
+      x[i] = static_cast<float>(is_logarithmic
+                                    ? function.low * std::pow(function.high / function.low, u)
+                                    : function.low + u * (function.high - function.low));
       if (i % 4 == 0 && is_logarithmic) x[i] = static_cast<float>(1 + (u - 0.5) * 0.2);
       const double v = std::uniform_real_distribution<double>(-8, 8)(engine);
       y[i] = static_cast<float>(v / std::max(1.0, std::fabs(std::log(static_cast<double>(x[i])))));
@@ -214,20 +276,22 @@ TEST(CodegenMath, FastFormsKeepTheirErrors) {
       for (size_t i = 0; i < count; i++) {
         const double exact = reference<double>(function.op, x[i], y[i]);
         const double error = std::fabs(got[i] - exact);
-        ASSERT_TRUE(error <= function.max_relative_error * std::fabs(exact) || error <= function.max_absolute_error)
-            << op_info(function.op).name << "(" << x[i] << ", " << y[i] << ") = " << got[i] << ", exactly " << exact
-            << ", relative error " << error / std::fabs(exact);
+        ASSERT_TRUE(error <= function.max_relative_error * std::fabs(exact) ||
+                    error <= function.max_absolute_error)
+            << op_info(function.op).name << "(" << x[i] << ", " << y[i] << ") = " << got[i]
+            << ", exactly " << exact << ", relative error " << error / std::fabs(exact);
       }
     }
   }
 }
 
 TEST(CodegenMath, FastFormsAtSpecialValues) {
-  const float infinity = std::numeric_limits<float>::infinity(), nan = std::numeric_limits<float>::quiet_NaN();
+  const float infinity = std::numeric_limits<float>::infinity(),
+              nan = std::numeric_limits<float>::quiet_NaN();
   const auto at = [&](Op op, float x, float y = 0) {
     return run(op, 8, std::vector<float>(count, x), std::vector<float>(count, y))[0];
   };
-  for (const auto &function : codegen::fast_functions) {
+  for (const auto& function : codegen::fast_functions) {
     if (function.op != Op::fast_pow) {
       EXPECT_TRUE(std::isnan(at(function.op, nan))) << op_info(function.op).name;
     }
@@ -253,8 +317,9 @@ TEST(CodegenMath, HalvesRoundTheFloat32Result) {
     f.name = "half_exp";
     f.args = {input("in", type), output("out", type)};
     const Expr index = make_ramp(variable("i") * 16, 1, 16);
-    f.body = make_for("i", 0, 4, ForType::Serial,
-                      make_store("out", call_op(Op::exp, {make_load(type.with_lanes(16), "in", index)}), index));
+    f.body = make_for(
+        "i", 0, 4, ForType::Serial,
+        make_store("out", call_op(Op::exp, {make_load(type.with_lanes(16), "in", index)}), index));
     ASSERT_EQ(call(f, {&in, &out}), 0);
     for (size_t i = 0; i < 64; i++) {
       const Scalar exact = *eval_operator(Op::exp, {in.get(i)}, type);

@@ -15,39 +15,39 @@ namespace {
 struct Host {
   Host() {
     context.user_data = this;
-    context.malloc_handler = [](retrograde_context *c, size_t bytes) -> void * {
-      Host &host = of(c);
+    context.malloc_handler = [](retrograde_context* c, size_t bytes) -> void* {
+      Host& host = of(c);
       if (host.requests++ >= host.allowed) return nullptr;
       const std::lock_guard lock(host.mutex);
-      void *block = std::aligned_alloc(128, (bytes + 127) / 128 * 128);
+      void* block = std::aligned_alloc(128, (bytes + 127) / 128 * 128);
       host.live.insert(block);
       return block;
     };
-    context.free_handler = [](retrograde_context *c, void *block) {
-      Host &host = of(c);
+    context.free_handler = [](retrograde_context* c, void* block) {
+      Host& host = of(c);
       const std::lock_guard lock(host.mutex);
       EXPECT_EQ(host.live.erase(block), 1u) << "freed twice or never allocated";
       std::free(block);
     };
-    context.error_handler = [](retrograde_context *c, int code, const char *message) {
+    context.error_handler = [](retrograde_context* c, int code, const char* message) {
       of(c).errors.push_back(std::to_string(code) + ": " + message);
     };
-    context.print_handler = [](retrograde_context *c, const char *message) {
+    context.print_handler = [](retrograde_context* c, const char* message) {
       const std::lock_guard lock(of(c).mutex);
       of(c).printed += message;
     };
   }
   ~Host() {
     EXPECT_TRUE(live.empty()) << live.size() << " blocks leaked";
-    for (void *block : live) std::free(block);
+    for (void* block : live) std::free(block);
   }
-  static Host &of(retrograde_context *c) { return *static_cast<Host *>(c->user_data); }
+  static Host& of(retrograde_context* c) { return *static_cast<Host*>(c->user_data); }
 
   retrograde_context context = {};
   std::atomic<int> requests{0};
   int allowed = 1 << 30;
   std::mutex mutex;
-  std::set<void *> live;
+  std::set<void*> live;
   std::vector<std::string> errors;
   std::string printed;
 };
@@ -57,11 +57,11 @@ Expr fail_with(int code, std::vector<Expr> parts) {
   return call_op(Op::error, Int(32), parts);
 }
 
-Stmt fail_if(Expr condition, int code, const std::string &message) {
+Stmt fail_if(Expr condition, int code, const std::string& message) {
   return make_assert(logical_not(condition), fail_with(code, {Expr(message)}));
 }
 
-int run(const LoweredFunction &f, std::vector<void *> args, Host &host) {
+int run(const LoweredFunction& f, std::vector<void*> args, Host& host) {
   return compile_test(f)->call(&host.context, args.data());
 }
 
@@ -70,11 +70,12 @@ TEST(CodegenStatement, NestedLoopsAndBranches) {
   f.name = "loops";
   f.args = {output("out", Int(32)), scalar_argument("n", Int(32))};
   const Expr x = variable("x"), y = variable("y"), n = variable("n");
-  const Stmt branch = make_if(x < y, make_store("out", x * 100 + y, y * n + x), make_store("out", -1, y * n + x));
+  const Stmt branch =
+      make_if(x < y, make_store("out", x * 100 + y, y * n + x), make_store("out", -1, y * n + x));
   f.body = make_for("y", 0, n, ForType::Serial, make_for("x", 0, n, ForType::Serial, branch));
   Array out(Int(32), 25);
   for (int32_t count : {0, -3, 5}) {
-    void *args[] = {out.raw(), &count};
+    void* args[] = {out.raw(), &count};
     ASSERT_EQ(compile_test(f)->call(nullptr, args), 0);
   }
   for (int j = 0; j < 5; j++) {
@@ -87,24 +88,26 @@ TEST(CodegenStatement, LoopsAtTheEndsOfInt32) {
   f.name = "ends";
   f.args = {output("out", Int(32)), scalar_argument("m", Int(32))};
   const Expr x = variable("x");
-  f.body = make_for("x", variable("m"), 3, ForType::Serial, make_store("out", x, binary(Kind::Sub, x, variable("m"))));
+  f.body = make_for("x", variable("m"), 3, ForType::Serial,
+                    make_store("out", x, binary(Kind::Sub, x, variable("m"))));
   for (int32_t min : {INT32_MAX - 2, INT32_MIN}) {
     Array out(Int(32), 3);
-    void *args[] = {out.raw(), &min};
+    void* args[] = {out.raw(), &min};
     ASSERT_EQ(compile_test(f)->call(nullptr, args), 0);
     for (int i = 0; i < 3; i++) EXPECT_EQ(out.data<int32_t>()[i], min + i);
   }
 }
 
 TEST(CodegenStatement, ScalarArgumentsOfEveryType) {
-  for (Type type : {Bool(), Int(8), UInt(16), Int(64), Float(16), BFloat(16), Float(32), Float(64)}) {
+  for (Type type :
+       {Bool(), Int(8), UInt(16), Int(64), Float(16), BFloat(16), Float(32), Float(64)}) {
     LoweredFunction f;
     f.name = "scalar";
     f.args = {scalar_argument("k", type), output("out", type)};
     f.body = make_store("out", variable("k", type), 0);
     Array in(type, 1), out(type, 1);
     in.set(0, type.is_float() ? Scalar::of_float(type, 1.25) : Scalar::of_uint(type, 1));
-    void *args[] = {in.data<void>(), out.raw()};
+    void* args[] = {in.data<void>(), out.raw()};
     ASSERT_EQ(compile_test(f)->call(nullptr, args), 0);
     EXPECT_TRUE(same(in.get(0), out.get(0))) << to_string(type);
   }
@@ -113,11 +116,13 @@ TEST(CodegenStatement, ScalarArgumentsOfEveryType) {
 TEST(CodegenStatement, TypedEntryPointTakesArgumentsByValue) {
   LoweredFunction f;
   f.name = "typed";
-  f.args = {scalar_argument("k", Int(32)), scalar_argument("s", Float(32)), output("out", Float(32))};
+  f.args = {scalar_argument("k", Int(32)), scalar_argument("s", Float(32)),
+            output("out", Float(32))};
   f.body = make_store("out", cast(Float(32), variable("k")) * variable("s", Float(32)), 0);
   Array out(Float(32), 1);
   const auto function = compile_test(f);
-  auto *typed = reinterpret_cast<int (*)(retrograde_context *, int32_t, float, halide_buffer_t *)>(function->address());
+  auto* typed = reinterpret_cast<int (*)(retrograde_context*, int32_t, float, halide_buffer_t*)>(
+      function->address());
   EXPECT_EQ(typed(nullptr, 6, 0.5f, out.raw()), 0);
   EXPECT_EQ(out.data<float>()[0], 3.0f);
 }
@@ -131,9 +136,12 @@ LoweredFunction through_memory(MemoryType memory, Expr elements, bool frees, int
   f.args = {output("out", Int(32)), scalar_argument("n", Int(64))};
   const Expr i = variable("i"), j = variable("j");
   std::vector<Stmt> body = {make_for("i", 0, 8, ForType::Serial, make_store("tmp", i * 2, i))};
-  body.push_back(make_for("j", 0, 8, ForType::Serial, make_store("out", make_load(Int(32), "tmp", j) + 1, j)));
+  body.push_back(
+      make_for("j", 0, 8, ForType::Serial, make_store("out", make_load(Int(32), "tmp", j) + 1, j)));
   if (frees) body.push_back(make_free("tmp"));
-  if (fail_code) body.push_back(fail_if(variable("n", Int(64)) > make_const(Int(64), 0), fail_code, "on purpose"));
+  if (fail_code)
+    body.push_back(
+        fail_if(variable("n", Int(64)) > make_const(Int(64), 0), fail_code, "on purpose"));
   f.body = make_allocate("tmp", Int(32), memory, elements, make_block(body));
   return f;
 }
@@ -141,9 +149,11 @@ LoweredFunction through_memory(MemoryType memory, Expr elements, bool frees, int
 TEST(CodegenStatement, AllocationsHoldValuesAndAreFreed) {
   const Expr n = variable("n", Int(64));
   for (bool frees : {false, true}) {
-    for (const auto &[memory, elements, requests] :
-         {std::tuple{MemoryType::Auto, make_const(Int(64), 8), 0}, {MemoryType::Heap, make_const(Int(64), 8), 1},
-          {MemoryType::Auto, n, 1}, {MemoryType::Stack, make_const(Int(64), 20000), 0},
+    for (const auto& [memory, elements, requests] :
+         {std::tuple{MemoryType::Auto, make_const(Int(64), 8), 0},
+          {MemoryType::Heap, make_const(Int(64), 8), 1},
+          {MemoryType::Auto, n, 1},
+          {MemoryType::Stack, make_const(Int(64), 20000), 0},
           {MemoryType::Auto, make_const(Int(64), 20000), 1}}) {
       Host host;
       Array out(Int(32), 8);
@@ -160,17 +170,20 @@ TEST(CodegenStatement, FailuresFreeWhatIsHeld) {
     Host host;
     Array out(Int(32), 8);
     int64_t count = 8;
-    EXPECT_EQ(run(through_memory(MemoryType::Heap, variable("n", Int(64)), frees, -27), {out.raw(), &count}, host), -27);
+    EXPECT_EQ(run(through_memory(MemoryType::Heap, variable("n", Int(64)), frees, -27),
+                  {out.raw(), &count}, host),
+              -27);
     EXPECT_EQ(host.errors, std::vector<std::string>{"-27: on purpose"});
   }
 }
 
 TEST(CodegenStatement, ImpossibleAllocationsAreErrors) {
-  const auto code_for = [](int64_t count, int allowed, std::string *message) {
+  const auto code_for = [](int64_t count, int allowed, std::string* message) {
     Host host;
     host.allowed = allowed;
     Array out(Int(32), 8);
-    const int code = run(through_memory(MemoryType::Heap, variable("n", Int(64)), false), {out.raw(), &count}, host);
+    const int code = run(through_memory(MemoryType::Heap, variable("n", Int(64)), false),
+                         {out.raw(), &count}, host);
     *message = host.errors.empty() ? "" : host.errors[0];
     return code;
   };
@@ -186,11 +199,12 @@ TEST(CodegenStatement, ImpossibleAllocationsAreErrors) {
 Stmt two_blocks(ForType type, Expr fail_at) {
   const Expr x = variable("x");
   const Expr n = make_const(Int(64), 100);
-  const Stmt inner = make_block({make_store("a", x, 0), make_store("b", make_load(Int(32), "a", 0) * 3, 0),
-                                 fail_if(fail_at, -4, "at some x"),
-                                 make_store("out", make_load(Int(32), "b", 0), x)});
+  const Stmt inner = make_block(
+      {make_store("a", x, 0), make_store("b", make_load(Int(32), "a", 0) * 3, 0),
+       fail_if(fail_at, -4, "at some x"), make_store("out", make_load(Int(32), "b", 0), x)});
   return make_for("x", 0, 50, type,
-                  make_allocate("a", Int(32), MemoryType::Heap, n, make_allocate("b", Int(32), MemoryType::Heap, n, inner)));
+                  make_allocate("a", Int(32), MemoryType::Heap, n,
+                                make_allocate("b", Int(32), MemoryType::Heap, n, inner)));
 }
 
 TEST(CodegenStatement, AllocationsInLoopsAreFreedOnEveryPath) {
@@ -233,7 +247,8 @@ LoweredFunction nested_allocations(int n, Expr elements) {
   Stmt body = make_store("out", make_load(Int(32), "a0", 0), 0);
   for (int k = n - 1; k >= 0; k--) {
     const std::string name = "a" + std::to_string(k), x = "x" + std::to_string(k);
-    const Stmt loop = make_for(x, 0, 4, ForType::Parallel, make_store(name, variable(x) + k, variable(x)));
+    const Stmt loop =
+        make_for(x, 0, 4, ForType::Parallel, make_store(name, variable(x) + k, variable(x)));
     body = make_allocate(name, Int(32), MemoryType::Auto, elements, make_block({loop, body}));
   }
   f.body = body;
@@ -266,18 +281,21 @@ TEST(CodegenStatement, ParallelBodiesSeeWhatIsAroundThem) {
   f.args = {input("in", Float(32)), output("out", Float(32)), scalar_argument("k", Float(32))};
   const Expr x = variable("x"), y = variable("y");
   const Expr wide = variable("wide", Float(32, 4));
-  const Stmt row = make_for("x", 0, 4, ForType::Serial,
-                            make_store("out", make_load(Float(32, 4), "in", make_ramp(y * 16 + x * 4, 1, 4)) * wide +
-                                                  make_load(Float(32, 4), "local", make_ramp(0, 1, 4)),
-                                       make_ramp(y * 16 + x * 4, 1, 4)));
+  const Stmt row =
+      make_for("x", 0, 4, ForType::Serial,
+               make_store("out",
+                          make_load(Float(32, 4), "in", make_ramp(y * 16 + x * 4, 1, 4)) * wide +
+                              make_load(Float(32, 4), "local", make_ramp(0, 1, 4)),
+                          make_ramp(y * 16 + x * 4, 1, 4)));
   Stmt body = make_for("y", 0, 32, ForType::Parallel, row);
-  body = make_block({make_store("local", make_ramp(Expr(0.0f), Expr(1.0f), 4), make_ramp(0, 1, 4)), body});
+  body = make_block(
+      {make_store("local", make_ramp(Expr(0.0f), Expr(1.0f), 4), make_ramp(0, 1, 4)), body});
   body = make_allocate("local", Float(32), MemoryType::Auto, make_const(Int(64), 4), body);
   f.body = make_let("wide", make_broadcast(variable("k", Float(32)), 4), body);
   Array in(Float(32), 512), out(Float(32), 512);
   for (int i = 0; i < 512; i++) in.data<float>()[i] = static_cast<float>(i);
   float k = 2;
-  void *args[] = {in.raw(), out.raw(), &k};
+  void* args[] = {in.raw(), out.raw(), &k};
   ASSERT_EQ(compile_test(f)->call(nullptr, args), 0);
   for (int i = 0; i < 512; i++) EXPECT_EQ(out.data<float>()[i], static_cast<float>(2 * i + i % 4));
 }
@@ -288,8 +306,9 @@ TEST(CodegenStatement, NestedParallelLoops) {
   f.args = {output("out", Int(32))};
   const Expr x = variable("x"), y = variable("y"), z = variable("z");
   const Stmt store = make_store("out", z * 10000 + y * 100 + x, (z * 10 + y) * 10 + x);
-  f.body = make_for("z", 0, 10, ForType::Parallel,
-                    make_for("y", 0, 10, ForType::Serial, make_for("x", 0, 10, ForType::Parallel, store)));
+  f.body = make_for(
+      "z", 0, 10, ForType::Parallel,
+      make_for("y", 0, 10, ForType::Serial, make_for("x", 0, 10, ForType::Parallel, store)));
   Array out(Int(32), 1000);
   ASSERT_EQ(call(f, {&out}), 0);
   for (int i = 0; i < 1000; i++) {
@@ -322,13 +341,16 @@ TEST(CodegenStatement, PrintsGoToTheHandler) {
   f.name = "prints";
   f.args = {output("out", Int(32))};
   const Expr x = variable("x");
-  const Expr shown = call_op(Op::print, Int(32), {x * 2, Expr("100% of"), Expr(0.1f), Expr(2.5), x == 1, Expr(uint8_t{200})});
+  const Expr shown =
+      call_op(Op::print, Int(32),
+              {x * 2, Expr("100% of"), Expr(0.1f), Expr(2.5), x == 1, Expr(uint8_t{200})});
   const Expr rare = call_op(Op::print_when, Int(32), {x == 1, shown, Expr("rare")});
   f.body = make_for("x", 0, 3, ForType::Serial, make_store("out", rare, x));
   Array out(Int(32), 3);
   ASSERT_EQ(run(f, {out.raw()}, host), 0);
   EXPECT_EQ(host.printed,
-            "0 100% of 0.1 2.5 false 200\n2 100% of 0.1 2.5 true 200\n2 rare\n4 100% of 0.1 2.5 false 200\n");
+            "0 100% of 0.1 2.5 false 200\n2 100% of 0.1 2.5 true 200\n2 rare\n4 100% of 0.1 2.5 "
+            "false 200\n");
   EXPECT_EQ(out.data<int32_t>()[2], 4);
   EXPECT_EQ(call(f, {&out}), 0) << "no handler, no output";
 }
@@ -338,7 +360,8 @@ TEST(CodegenStatement, VectorsPrintALineForEachLane) {
   LoweredFunction f;
   f.name = "vector_prints";
   f.args = {output("out", Int(32))};
-  f.body = make_store("out", call_op(Op::print, Int(32, 3), {make_ramp(5, 2, 3), Expr("!")}), make_ramp(0, 1, 3));
+  f.body = make_store("out", call_op(Op::print, Int(32, 3), {make_ramp(5, 2, 3), Expr("!")}),
+                      make_ramp(0, 1, 3));
   Array out(Int(32), 3);
   ASSERT_EQ(run(f, {out.raw()}, host), 0);
   EXPECT_EQ(host.printed, "5 !\n7 !\n9 !\n");
@@ -365,10 +388,13 @@ TEST(CodegenStatement, RandomNumbersAreThoseOfTheDefinition) {
   f.name = "random";
   f.args = {output("f32", Float(32)), output("u32", UInt(32)), output("i32", Int(32))};
   const Expr x = make_ramp(variable("x") * 8, 1, 8);
-  const auto numbers = [&](Type type) { return call_op(Op::random, type.with_lanes(8), {make_broadcast(Expr(7), 8), x}); };
-  f.body = make_for("x", 0, 8, ForType::Serial,
-                    make_block({make_store("f32", numbers(Float(32)), x), make_store("u32", numbers(UInt(32)), x),
-                                make_store("i32", numbers(Int(32)), x)}));
+  const auto numbers = [&](Type type) {
+    return call_op(Op::random, type.with_lanes(8), {make_broadcast(Expr(7), 8), x});
+  };
+  f.body = make_for(
+      "x", 0, 8, ForType::Serial,
+      make_block({make_store("f32", numbers(Float(32)), x), make_store("u32", numbers(UInt(32)), x),
+                  make_store("i32", numbers(Int(32)), x)}));
   Array f32(Float(32), 64), u32(UInt(32), 64), i32(Int(32), 64);
   ASSERT_EQ(call(f, {&f32, &u32, &i32}), 0);
   std::set<uint32_t> seen;
@@ -389,11 +415,12 @@ TEST(CodegenStatement, IfThenElseEvaluatesOneArm) {
   const Expr k = variable("k");
   // The load of element 2^30 would crash.
   const Expr far = make_load(Int(32), "in", 1 << 30);
-  f.body = make_store("out", call_op(Op::if_then_else, Int(32), {k < 0, far, make_load(Int(32), "in", 0)}), 0);
+  f.body = make_store(
+      "out", call_op(Op::if_then_else, Int(32), {k < 0, far, make_load(Int(32), "in", 0)}), 0);
   Array in(Int(32), 1), out(Int(32), 1);
   in.data<int32_t>()[0] = 9;
   int32_t k_value = 1;
-  void *args[] = {in.raw(), out.raw(), &k_value};
+  void* args[] = {in.raw(), out.raw(), &k_value};
   ASSERT_EQ(compile_test(f)->call(nullptr, args), 0);
   EXPECT_EQ(out.data<int32_t>()[0], 9);
 }
@@ -404,7 +431,8 @@ TEST(CodegenStatement, StatementsReloadWhatWasStored) {
   f.name = "reload";
   f.args = {output("out", Int(32))};
   const Expr load = make_load(Int(32), "out", 0);
-  f.body = make_block({make_store("out", load + 1, 0), make_store("out", load + 1, 0), make_store("out", load * 2, 1)});
+  f.body = make_block({make_store("out", load + 1, 0), make_store("out", load + 1, 0),
+                       make_store("out", load * 2, 1)});
   Array out(Int(32), 2);
   ASSERT_EQ(call(f, {&out}), 0);
   EXPECT_EQ(out.data<int32_t>()[0], 2);
@@ -416,7 +444,8 @@ TEST(CodegenStatement, InputAndOutputMayBeOneBuffer) {
   f.name = "aliased";
   f.args = {input("in", Int(32)), output("out", Int(32))};
   const Expr x = variable("x");
-  f.body = make_for("x", 0, 7, ForType::Serial, make_store("out", make_load(Int(32), "in", x) + 1, x + 1));
+  f.body = make_for("x", 0, 7, ForType::Serial,
+                    make_store("out", make_load(Int(32), "in", x) + 1, x + 1));
   Array both(Int(32), 8);
   ASSERT_EQ(call(f, {&both, &both}), 0);
   for (int i = 0; i < 8; i++) EXPECT_EQ(both.data<int32_t>()[i], i);
@@ -433,25 +462,33 @@ TEST(CodegenStatement, BufferFieldsAndQueries) {
     more.insert(more.begin(), in);
     return cast_to(Int(32), call_op(op, type, more));
   };
-  const Stmt answer = make_block({make_evaluate(call_op(Op::buffer_set_bounds, Int(32), {in, Expr(0), Expr(-4), Expr(20)})),
-                                  make_evaluate(call_op(Op::buffer_set_bounds, Int(32), {in, Expr(1), Expr(2), Expr(30)}))});
+  const Stmt answer = make_block(
+      {make_evaluate(call_op(Op::buffer_set_bounds, Int(32), {in, Expr(0), Expr(-4), Expr(20)})),
+       make_evaluate(call_op(Op::buffer_set_bounds, Int(32), {in, Expr(1), Expr(2), Expr(30)}))});
   std::vector<Stmt> stores;
-  const Expr fields[] = {field(Op::buffer_min, Int(32), {Expr(1)}), field(Op::buffer_extent, Int(32), {Expr(0)}),
-                         field(Op::buffer_stride, Int(32), {Expr(1)}), field(Op::buffer_dimensions, Int(32)),
-                         field(Op::buffer_type, UInt(32)), field(Op::buffer_is_query, Bool())};
+  const Expr fields[] = {field(Op::buffer_min, Int(32), {Expr(1)}),
+                         field(Op::buffer_extent, Int(32), {Expr(0)}),
+                         field(Op::buffer_stride, Int(32), {Expr(1)}),
+                         field(Op::buffer_dimensions, Int(32)),
+                         field(Op::buffer_type, UInt(32)),
+                         field(Op::buffer_is_query, Bool())};
   for (int i = 0; i < 6; i++) stores.push_back(make_store("out", fields[i], i));
-  f.body = make_block({make_assert(logical_not(call_op(Op::buffer_is_null, Bool(), {in})), fail_with(-12, {Expr("null")})),
-                       make_block(stores), make_if(call_op(Op::buffer_is_query, Bool(), {in}), answer)});
+  f.body =
+      make_block({make_assert(logical_not(call_op(Op::buffer_is_null, Bool(), {in})),
+                              fail_with(-12, {Expr("null")})),
+                  make_block(stores), make_if(call_op(Op::buffer_is_query, Bool(), {in}), answer)});
   halide_dimension_t dims[2] = {{1, 11, 1}, {5, 7, 16}};
   int16_t pixel = 0;
   halide_buffer_t buffer = {};
-  buffer.host = reinterpret_cast<uint8_t *>(&pixel);
+  buffer.host = reinterpret_cast<uint8_t*>(&pixel);
   buffer.type = halide_type_of<int16_t>();
   buffer.dimensions = 2;
   buffer.dim = dims;
   Array out(Int(32), 6);
-  const auto values = [&] { return std::vector<int32_t>(out.data<int32_t>(), out.data<int32_t>() + 6); };
-  void *args[] = {&buffer, out.raw()};
+  const auto values = [&] {
+    return std::vector<int32_t>(out.data<int32_t>(), out.data<int32_t>() + 6);
+  };
+  void* args[] = {&buffer, out.raw()};
   ASSERT_EQ(compile_test(f)->call(nullptr, args), 0);
   EXPECT_EQ(values(), (std::vector<int32_t>{5, 11, 16, 2, 0 | 16 << 8 | 1 << 16, 0}));
   buffer.host = nullptr;
@@ -483,7 +520,9 @@ TEST(CodegenStatement, ExternCallsReachLibm) {
   LoweredFunction f;
   f.name = "libm";
   f.args = {output("out", Float(64))};
-  f.body = make_store("out", call_extern("cbrt", Float(64, 3), {make_ramp(Expr(8.0), Expr(19.0), 3)}), make_ramp(0, 1, 3));
+  f.body =
+      make_store("out", call_extern("cbrt", Float(64, 3), {make_ramp(Expr(8.0), Expr(19.0), 3)}),
+                 make_ramp(0, 1, 3));
   Array out(Float(64), 3);
   ASSERT_EQ(call(f, {&out}), 0);
   EXPECT_DOUBLE_EQ(out.data<double>()[1], 3.0);
@@ -502,11 +541,12 @@ TEST(CodegenStatement, MarkersAndUndefAreTransparent) {
   for (Op op : {Op::promise_clamped, Op::unsafe_promise_clamped}) {
     stores.push_back(make_store("out", call_op(op, {k, Expr(0), Expr(9)}), at++));
   }
-  stores.push_back(make_store("out", binary(Kind::Mul, call_op(Op::undef, Int(32), {}), Expr(0)), at++));
+  stores.push_back(
+      make_store("out", binary(Kind::Mul, call_op(Op::undef, Int(32), {}), Expr(0)), at++));
   f.body = make_block(stores);
   Array out(Int(32), 6);
   int32_t value = 8;
-  void *args[] = {out.raw(), &value};
+  void* args[] = {out.raw(), &value};
   ASSERT_EQ(compile_test(f)->call(nullptr, args), 0);
   for (int i = 0; i < 6; i++) EXPECT_EQ(out.data<int32_t>()[i], i < 5 ? 8 : 0);
 }
@@ -523,7 +563,7 @@ TEST(CodegenStatement, SharedExpressionsStayShared) {
   f.body = make_store("out", e, 0);
   Array out(UInt(64), 1);
   uint64_t k = 3;
-  void *args[] = {&k, out.raw()};
+  void* args[] = {&k, out.raw()};
   ASSERT_EQ(compile_test(f)->call(nullptr, args), 0);
   EXPECT_EQ(out.data<uint64_t>()[0], uint64_t{3} << 60);
 }
@@ -542,7 +582,7 @@ TEST(CodegenStatement, LetsThatShareStayShared) {
   Array out(UInt(64), 2);
   uint64_t k = 1, expected = 1;
   for (int i = 0; i < 40; i++) expected *= 3;
-  void *args[] = {&k, out.raw()};
+  void* args[] = {&k, out.raw()};
   ASSERT_EQ(compile_test(f)->call(nullptr, args), 0);
   EXPECT_EQ(out.data<uint64_t>()[0], expected);
   EXPECT_EQ(out.data<uint64_t>()[1], expected);
@@ -557,7 +597,7 @@ TEST(CodegenStatement, CopiesOfALetKeepTheirOwnValues) {
   f.body = make_store("out", make_let("v", k + 1, shared) * 1000 + make_let("v", k + 2, shared), 0);
   Array out(Int(32), 1);
   int32_t value = 3;
-  void *args[] = {&value, out.raw()};
+  void* args[] = {&value, out.raw()};
   ASSERT_EQ(compile_test(f)->call(nullptr, args), 0);
   EXPECT_EQ(out.data<int32_t>()[0], 16 * 1000 + 25);
 }
@@ -579,7 +619,8 @@ TEST(CodegenStatement, WhatLoweringMustRemoveIsAnInternalError) {
   LoweredFunction f;
   f.name = "unlowered";
   f.args = {output("out", Int(32))};
-  f.body = make_for("x", 0, 4, ForType::Vectorized, make_store("out", variable("x"), variable("x")));
+  f.body =
+      make_for("x", 0, 4, ForType::Vectorized, make_store("out", variable("x"), variable("x")));
   EXPECT_THROW(compile_test(f), InternalError);
   f.body = make_for("x", 0, 4, ForType::Unrolled, make_store("out", variable("x"), variable("x")));
   EXPECT_THROW(compile_test(f), InternalError);

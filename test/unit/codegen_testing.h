@@ -1,5 +1,5 @@
-// Helpers of the code generator's tests: a function that stores expressions over its input buffers, called through
-// the JIT on plain arrays.
+// Helpers of the code generator's tests: a function that stores expressions over its input buffers,
+// called through the JIT on plain arrays.
 #pragma once
 
 #include <HalideRuntime.h>
@@ -22,46 +22,51 @@ namespace retrograde::testing_codegen {
 
 using namespace ir;
 
-// A one-dimensional buffer that lies directly before a page that cannot be touched, or directly behind one: an access
-// outside of it is a crash.
+// A one-dimensional buffer that lies directly before a page that cannot be touched, or directly
+// behind one: an access outside of it is a crash.
 class Array {
  public:
   enum class Guard { Above, Below };
   Array(Type type, size_t count, Guard guard = Guard::Above) : type_(type) {
     const auto page = static_cast<size_t>(sysconf(_SC_PAGESIZE));
-    const size_t bytes = count * static_cast<size_t>(type.bytes()), pages = (bytes + page - 1) / page * page;
+    const size_t bytes = count * static_cast<size_t>(type.bytes()),
+                 pages = (bytes + page - 1) / page * page;
     mapped_ = pages + page;
-    void *memory = mmap(nullptr, mapped_, PROT_NONE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+    void* memory = mmap(nullptr, mapped_, PROT_NONE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
     if (memory == MAP_FAILED) throw std::bad_alloc();
-    memory_ = static_cast<uint8_t *>(memory);
-    uint8_t *first = guard == Guard::Above ? memory_ : memory_ + page;
+    memory_ = static_cast<uint8_t*>(memory);
+    uint8_t* first = guard == Guard::Above ? memory_ : memory_ + page;
     mprotect(first, pages, PROT_READ | PROT_WRITE);
     bytes_ = guard == Guard::Above ? memory_ + pages - bytes : first;
     dimension_ = halide_dimension_t(0, static_cast<int32_t>(count), 1);
     buffer_.host = bytes_;
-    buffer_.type = halide_type_t(static_cast<halide_type_code_t>(type.code()), static_cast<uint8_t>(type.bits()));
+    buffer_.type = halide_type_t(static_cast<halide_type_code_t>(type.code()),
+                                 static_cast<uint8_t>(type.bits()));
     buffer_.dimensions = 1;
     buffer_.dim = &dimension_;
   }
   ~Array() { munmap(memory_, mapped_); }
-  Array(const Array &) = delete;
+  Array(const Array&) = delete;
   template <typename T>
-  T *data() {
-    return reinterpret_cast<T *>(bytes_);
+  T* data() {
+    return reinterpret_cast<T*>(bytes_);
   }
   size_t size() const { return static_cast<size_t>(dimension_.extent); }
   Type type() const { return type_; }
-  halide_buffer_t *raw() { return &buffer_; }
+  halide_buffer_t* raw() { return &buffer_; }
 
   Scalar get(size_t i) const {
     uint64_t pattern = 0;
-    std::memcpy(&pattern, bytes_ + i * static_cast<size_t>(type_.bytes()), static_cast<size_t>(type_.bytes()));
+    std::memcpy(&pattern, bytes_ + i * static_cast<size_t>(type_.bytes()),
+                static_cast<size_t>(type_.bytes()));
     const Scalar bits = Scalar::of_uint(UInt(8 * type_.bytes()), pattern);
     return type_.is_bool() ? Scalar::of_bool(pattern != 0) : eval_reinterpret(type_, bits);
   }
-  void set(size_t i, const Scalar &value) {
-    const uint64_t pattern = type_.is_bool() ? value.u : eval_reinterpret(UInt(8 * type_.bytes()), value).u;
-    std::memcpy(bytes_ + i * static_cast<size_t>(type_.bytes()), &pattern, static_cast<size_t>(type_.bytes()));
+  void set(size_t i, const Scalar& value) {
+    const uint64_t pattern =
+        type_.is_bool() ? value.u : eval_reinterpret(UInt(8 * type_.bytes()), value).u;
+    std::memcpy(bytes_ + i * static_cast<size_t>(type_.bytes()), &pattern,
+                static_cast<size_t>(type_.bytes()));
   }
 
  private:
@@ -72,28 +77,28 @@ class Array {
   halide_buffer_t buffer_ = {};
 };
 
-inline LoweredArgument input(const std::string &name, Type type) {
+inline LoweredArgument input(const std::string& name, Type type) {
   return {name, LoweredArgument::Kind::InputBuffer, type, 1, {}};
 }
-inline LoweredArgument output(const std::string &name, Type type) {
+inline LoweredArgument output(const std::string& name, Type type) {
   return {name, LoweredArgument::Kind::OutputBuffer, type, 1, {}};
 }
-inline LoweredArgument scalar_argument(const std::string &name, Type type) {
+inline LoweredArgument scalar_argument(const std::string& name, Type type) {
   return {name, LoweredArgument::Kind::Scalar, type, 0, {}};
 }
 
 inline Target test_target() { return get_host_target(); }
 
-inline std::shared_ptr<const jit::CompiledFunction> compile_test(const LoweredFunction &function,
-                                                                 const Target &target = test_target()) {
+inline std::shared_ptr<const jit::CompiledFunction> compile_test(
+    const LoweredFunction& function, const Target& target = test_target()) {
   return jit::compile(function, target);
 }
 
 // Calls with buffers only; gives the error code.
-inline int call(const LoweredFunction &function, std::vector<Array *> arrays, retrograde_context *context = nullptr,
-                const Target &target = test_target()) {
-  std::vector<void *> args;
-  for (Array *array : arrays) args.push_back(array->raw());
+inline int call(const LoweredFunction& function, std::vector<Array*> arrays,
+                retrograde_context* context = nullptr, const Target& target = test_target()) {
+  std::vector<void*> args;
+  for (Array* array : arrays) args.push_back(array->raw());
   return compile_test(function, target)->call(context, args.data());
 }
 
@@ -113,18 +118,26 @@ class RandomScalars {
  private:
   uint64_t bits(Type type) {
     switch (engine_() % 8) {
-      case 0: return static_cast<uint64_t>(type.is_int() ? type.min_int() : 0);
-      case 1: return type.is_int() ? static_cast<uint64_t>(type.max_int()) : type.max_uint();
-      case 2: return 0;
-      case 3: return ~uint64_t{0};
-      case 4: return engine_() % 16;
-      case 5: return static_cast<uint64_t>(-static_cast<int64_t>(engine_() % 16));
-      default: return engine_();
+      case 0:
+        return static_cast<uint64_t>(type.is_int() ? type.min_int() : 0);
+      case 1:
+        return type.is_int() ? static_cast<uint64_t>(type.max_int()) : type.max_uint();
+      case 2:
+        return 0;
+      case 3:
+        return ~uint64_t{0};
+      case 4:
+        return engine_() % 16;
+      case 5:
+        return static_cast<uint64_t>(-static_cast<int64_t>(engine_() % 16));
+      default:
+        return engine_();
     }
   }
   double number(Type type) {
     constexpr double infinity = std::numeric_limits<double>::infinity();
-    const double special[] = {0.0, -0.0, 1.0, -1.0, infinity, -infinity, std::nan(""), 0.5, 1e-40, 6e-8, 65504, 3e38};
+    const double special[] = {0.0,          -0.0, 1.0,   -1.0, infinity, -infinity,
+                              std::nan(""), 0.5,  1e-40, 6e-8, 65504,    3e38};
     if (engine_() % 4 == 0) return special[engine_() % std::size(special)];
     const double scale = type.bits() == 16 ? 100 : 1e4;
     return scale * std::uniform_real_distribution<double>(-1, 1)(engine_);
@@ -133,13 +146,13 @@ class RandomScalars {
 };
 
 // Equal bits; NaNs are all equal.
-inline bool same(const Scalar &a, const Scalar &b) {
+inline bool same(const Scalar& a, const Scalar& b) {
   if (!a.type.is_float()) return a.u == b.u;
   if (std::isnan(a.f) || std::isnan(b.f)) return std::isnan(a.f) && std::isnan(b.f);
   return std::bit_cast<uint64_t>(a.f) == std::bit_cast<uint64_t>(b.f);
 }
 
-inline std::string show(const Scalar &s) {
+inline std::string show(const Scalar& s) {
   if (s.type.is_float()) return to_string(s.type) + " " + std::to_string(s.f);
   return to_string(s.type) + " " + (s.type.is_int() ? std::to_string(s.i) : std::to_string(s.u));
 }

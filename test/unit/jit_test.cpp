@@ -1,4 +1,5 @@
-// The JIT around the code generator: cache, threads, targets, symbols, memory protection, objects for other machines.
+// The JIT around the code generator: cache, threads, targets, symbols, memory protection, objects
+// for other machines.
 #include "jit/jit.h"
 
 #include <fstream>
@@ -12,14 +13,15 @@ namespace retrograde::testing_codegen {
 namespace {
 
 // out[x] = x * factor, under chosen names.
-LoweredFunction scaled(int factor, const std::string &suffix = "", Type type = Int(32)) {
+LoweredFunction scaled(int factor, const std::string& suffix = "", Type type = Int(32)) {
   LoweredFunction f;
   f.name = "scaled" + suffix;
   f.args = {output("out" + suffix, type)};
   const Expr x = variable("x" + suffix);
   const Expr t = variable("t" + suffix);
-  f.body = make_for("x" + suffix, 0, 16, ForType::Serial,
-                    make_let("t" + suffix, x * factor, make_store("out" + suffix, cast_to(type, t), x)));
+  f.body =
+      make_for("x" + suffix, 0, 16, ForType::Serial,
+               make_let("t" + suffix, x * factor, make_store("out" + suffix, cast_to(type, t), x)));
   return f;
 }
 
@@ -55,11 +57,12 @@ TEST(JitCache, DifferentProgramsAreKeptApart) {
 TEST(JitCache, IsBoundedAndEvictedFunctionsLiveOn) {
   jit::clear_cache();
   const auto first = compile_test(scaled(0));
-  for (int factor = 1; factor <= static_cast<int>(jit::cache_capacity); factor++) compile_test(scaled(factor));
+  for (int factor = 1; factor <= static_cast<int>(jit::cache_capacity); factor++)
+    compile_test(scaled(factor));
   EXPECT_EQ(jit::cache_statistics().size, jit::cache_capacity);
   EXPECT_NE(compile_test(scaled(0)), first) << "the oldest should have gone";
   Array out(Int(32), 16);
-  void *args[] = {out.raw()};
+  void* args[] = {out.raw()};
   EXPECT_EQ(first->call(nullptr, args), 0);
   jit::clear_cache();
 }
@@ -73,13 +76,14 @@ TEST(Jit, CompilesOnManyThreads) {
       for (int i = 0; i < 12; i++) {
         const int factor = (i * 5 + t) % 16;
         Array out(Int(32), 16);
-        void *args[] = {out.raw()};
+        void* args[] = {out.raw()};
         compile_test(scaled(factor))->run(args);
-        for (int x = 0; x < 16; x++) wrong[static_cast<size_t>(t)] += out.data<int32_t>()[x] != x * factor;
+        for (int x = 0; x < 16; x++)
+          wrong[static_cast<size_t>(t)] += out.data<int32_t>()[x] != x * factor;
       }
     });
   }
-  for (std::thread &thread : threads) thread.join();
+  for (std::thread& thread : threads) thread.join();
   EXPECT_EQ(wrong, std::vector<int>(4, 0));
   EXPECT_EQ(jit::cache_statistics().size, 16u);
 }
@@ -88,13 +92,14 @@ TEST(Jit, RunThrowsWithCodeAndMessage) {
   LoweredFunction f;
   f.name = "fails";
   f.args = {scalar_argument("k", Int(32))};
-  f.body = make_assert(variable("k") > 0, call_op(Op::error, Int(32), {Expr(-9), Expr("k = "), variable("k")}));
+  f.body = make_assert(variable("k") > 0,
+                       call_op(Op::error, Int(32), {Expr(-9), Expr("k = "), variable("k")}));
   int32_t k = -2;
-  void *args[] = {&k};
+  void* args[] = {&k};
   try {
     compile_test(f)->run(args);
     FAIL() << "nothing was thrown";
-  } catch (const RuntimeError &error) {
+  } catch (const RuntimeError& error) {
     EXPECT_EQ(error.code(), -9);
     EXPECT_NE(std::string(error.what()).find("k = -2"), std::string::npos) << error.what();
   }
@@ -110,7 +115,7 @@ TEST(Jit, RunHandsPrintsOn) {
   int lines = 0;
   jit::CallOptions options;
   options.thread_limit = 2;
-  options.on_print = [&](const std::string &) { lines++; };
+  options.on_print = [&](const std::string&) { lines++; };
   compile_test(f)->run(nullptr, options);
   EXPECT_EQ(lines, 100);
 }
@@ -123,13 +128,13 @@ TEST(Jit, CallsOfUnknownFunctionsAreUserErrors) {
   try {
     compile_test(f);
     FAIL() << "nothing was thrown";
-  } catch (const UserError &error) {
+  } catch (const UserError& error) {
     EXPECT_NE(std::string(error.what()).find("\"getpid\""), std::string::npos) << error.what();
   }
 }
 
 TEST(Jit, ForeignTargetsAreRefused) {
-  const char *foreign = test_target().arch == Target::X86 ? "arm-64-linux" : "x86-64-linux";
+  const char* foreign = test_target().arch == Target::X86 ? "arm-64-linux" : "x86-64-linux";
   EXPECT_THROW(compile_test(scaled(1), Target(foreign)), Unsupported);
 }
 
@@ -161,24 +166,30 @@ LoweredFunction vector_sum() {
   f.args = {input("in", Float(32)), output("out", Float(32))};
   const Expr x = variable("x"), index = make_ramp(x * 4, 1, 4);
   const Expr in = make_load(Float(32, 4), "in", index);
-  f.body = make_for("x", 0, 64, ForType::Parallel, make_store("out", call_op(Op::exp, {in}) + in * in, index));
+  f.body = make_for("x", 0, 64, ForType::Parallel,
+                    make_store("out", call_op(Op::exp, {in}) + in * in, index));
   return f;
 }
 
-codegen::Options options_for(const std::string &target) {
+codegen::Options options_for(const std::string& target) {
   codegen::Options options;
   options.target = Target(target);
   return options;
 }
 
 TEST(Codegen, WritesObjectsForBothMachines) {
-  for (const auto &[target, machine] : {std::pair<std::string, int>{"x86-64-linux", 62}, {"arm-64-linux", 183}}) {
+  for (const auto& [target, machine] :
+       {std::pair<std::string, int>{"x86-64-linux", 62}, {"arm-64-linux", 183}}) {
     const codegen::Module module = codegen::compile_object(vector_sum(), options_for(target));
     ASSERT_GT(module.object.size(), 64u);
-    EXPECT_EQ(std::string(module.object.begin(), module.object.begin() + 4), "\x7f" "ELF") << target;
+    EXPECT_EQ(std::string(module.object.begin(), module.object.begin() + 4),
+              "\x7f"
+              "ELF")
+        << target;
     EXPECT_EQ(module.object[18] | module.object[19] << 8, machine) << target;  // e_machine
-    EXPECT_NE(std::find(module.externals.begin(), module.externals.end(), "retrograde_parallel_for"),
-              module.externals.end());
+    EXPECT_NE(
+        std::find(module.externals.begin(), module.externals.end(), "retrograde_parallel_for"),
+        module.externals.end());
   }
 }
 
@@ -193,7 +204,8 @@ TEST(Codegen, X86WidthFollowsTheTarget) {
   const Expr index = make_ramp(variable("x") * 16, 1, 16);
   const Expr in = make_load(Float(32, 16), "in", index);
   f.body = make_for("x", 0, 16, ForType::Serial, make_store("out", in * in + in, index));
-  const std::string avx512 = codegen::compile_assembly(f, options_for("x86-64-linux-avx512_skylake"));
+  const std::string avx512 =
+      codegen::compile_assembly(f, options_for("x86-64-linux-avx512_skylake"));
   EXPECT_NE(avx512.find("zmm"), std::string::npos) << avx512;
   EXPECT_NE(avx512.find("vfmadd"), std::string::npos) << avx512;
   const std::string avx2 = codegen::compile_assembly(f, options_for("x86-64-linux-sse41-avx-avx2"));
@@ -209,7 +221,8 @@ TEST(Codegen, StrictTargetsDoNotFuse) {
   f.body = make_store("out", in * in + in, 0);
   const std::string base = "x86-64-linux-sse41-avx-fma-avx2";
   EXPECT_NE(codegen::compile_assembly(f, options_for(base)).find("vfmadd"), std::string::npos);
-  EXPECT_EQ(codegen::compile_assembly(f, options_for(base + "-strict_float")).find("vfmadd"), std::string::npos);
+  EXPECT_EQ(codegen::compile_assembly(f, options_for(base + "-strict_float")).find("vfmadd"),
+            std::string::npos);
 }
 
 TEST(Codegen, StrongMultiplicationIsMasked) {
@@ -218,12 +231,15 @@ TEST(Codegen, StrongMultiplicationIsMasked) {
   const Expr in = make_load(Float(32, 16), "in", index);
   f.body = make_for("x", 0, 16, ForType::Serial,
                     make_store("out", call_op(Op::strong_mul, {in, in + 1.0f}), index));
-  const std::string assembly = codegen::compile_assembly(f, options_for("x86-64-linux-avx512_skylake"));
+  const std::string assembly =
+      codegen::compile_assembly(f, options_for("x86-64-linux-avx512_skylake"));
   EXPECT_NE(assembly.find("{z}"), std::string::npos) << assembly;
 }
 
 TEST(Codegen, OutputIsDeterministic) {
-  const auto object = [] { return codegen::compile_object(vector_sum(), options_for("x86-64-linux")).object; };
+  const auto object = [] {
+    return codegen::compile_object(vector_sum(), options_for("x86-64-linux")).object;
+  };
   EXPECT_EQ(object(), object());
 }
 

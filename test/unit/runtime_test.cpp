@@ -15,11 +15,11 @@ namespace {
 
 // A task from a callable with signature int(int).
 template <typename F>
-int parallel(retrograde_context *context, int min, int extent, F &body) {
-  const auto task = [](retrograde_context *, int32_t index, uint8_t *closure) -> int32_t {
-    return (*reinterpret_cast<F *>(closure))(index);
+int parallel(retrograde_context* context, int min, int extent, F& body) {
+  const auto task = [](retrograde_context*, int32_t index, uint8_t* closure) -> int32_t {
+    return (*reinterpret_cast<F*>(closure))(index);
   };
-  return retrograde_parallel_for(context, task, min, extent, reinterpret_cast<uint8_t *>(&body));
+  return retrograde_parallel_for(context, task, min, extent, reinterpret_cast<uint8_t*>(&body));
 }
 
 TEST(ParallelFor, RunsEveryIterationOnce) {
@@ -49,11 +49,11 @@ struct Report {
   std::string message;
 };
 
-retrograde_context reporting_to(std::vector<Report> *reports) {
+retrograde_context reporting_to(std::vector<Report>* reports) {
   retrograde_context context = {};
   context.user_data = reports;
-  context.error_handler = [](retrograde_context *c, int code, const char *message) {
-    static_cast<std::vector<Report> *>(c->user_data)->push_back({code, message});
+  context.error_handler = [](retrograde_context* c, int code, const char* message) {
+    static_cast<std::vector<Report>*>(c->user_data)->push_back({code, message});
   };
   return context;
 }
@@ -66,7 +66,8 @@ TEST(ParallelFor, TheLowestFailureWinsAndIsToldOnce) {
     auto body = [&](int index) -> int {
       if (index < 400) before++;
       if (index < 400 || index % 3 != 1) return 0;
-      return retrograde_report_error(&context, -100 - index, "iteration %i", static_cast<int64_t>(index));
+      return retrograde_report_error(&context, -100 - index, "iteration %i",
+                                     static_cast<int64_t>(index));
     };
     EXPECT_EQ(parallel(&context, 0, 1000, body), -500);
     EXPECT_EQ(before, 400) << "iterations below the failing one must run";
@@ -83,7 +84,8 @@ TEST(ParallelFor, FailuresOfInnerLoopsAreThoseOfTheirIteration) {
     auto outer = [&](int y) {
       auto inner = [&](int x) -> int {
         if (y * 20 + x < 137) return 0;
-        return retrograde_report_error(&context, -1, "(%i, %i)", static_cast<int64_t>(x), static_cast<int64_t>(y));
+        return retrograde_report_error(&context, -1, "(%i, %i)", static_cast<int64_t>(x),
+                                       static_cast<int64_t>(y));
       };
       return parallel(&context, 0, 20, inner);
     };
@@ -120,16 +122,17 @@ TEST(ParallelFor, CallersAreIndependent) {
       retrograde_context context = {};
       context.thread_limit = 1 + t % 3;
       auto body = [&](int index) { return t % 2 && index >= 10 * t ? -t : 0; };
-      for (int repeat = 0; repeat < 50; repeat++) codes[static_cast<size_t>(t)] = parallel(&context, 0, 100, body);
+      for (int repeat = 0; repeat < 50; repeat++)
+        codes[static_cast<size_t>(t)] = parallel(&context, 0, 100, body);
     });
   }
-  for (std::thread &thread : threads) thread.join();
+  for (std::thread& thread : threads) thread.join();
   EXPECT_EQ(codes, (std::vector<int>{0, -1, 0, -3}));
 }
 
 TEST(Memory, BlocksAreAlignedAndWritable) {
   for (int64_t bytes : {0, 1, 100, 70000, 20000000}) {
-    void *block = retrograde_allocate(nullptr, bytes, 1);
+    void* block = retrograde_allocate(nullptr, bytes, 1);
     ASSERT_NE(block, nullptr);
     EXPECT_EQ(reinterpret_cast<uintptr_t>(block) % retrograde_allocation_alignment, 0u);
     std::memset(block, 1, static_cast<size_t>(bytes) + retrograde_allocation_padding);
@@ -140,12 +143,12 @@ TEST(Memory, BlocksAreAlignedAndWritable) {
 
 TEST(Memory, LargeBlocksAreUsedAgain) {
   retrograde_pool_release();
-  void *first = retrograde_pool_malloc(1 << 20);
+  void* first = retrograde_pool_malloc(1 << 20);
   retrograde_pool_free(first);
   EXPECT_GE(retrograde_pool_bytes(), size_t{1} << 20);
-  void *other = retrograde_pool_malloc(4 << 20);  // too large for the block that is there
+  void* other = retrograde_pool_malloc(4 << 20);  // too large for the block that is there
   EXPECT_NE(other, first);
-  void *second = retrograde_pool_malloc(1000000);
+  void* second = retrograde_pool_malloc(1000000);
   EXPECT_EQ(second, first);
   EXPECT_EQ(retrograde_pool_bytes(), 0u);
   retrograde_pool_free(second);
@@ -157,9 +160,9 @@ TEST(Memory, LargeBlocksAreUsedAgain) {
 TEST(Memory, ThePoolStaysBelowItsLimit) {
   retrograde_pool_release();
   retrograde_pool_set_limit(3 << 20);
-  std::vector<void *> blocks;
+  std::vector<void*> blocks;
   for (int i = 0; i < 8; i++) blocks.push_back(retrograde_pool_malloc(1 << 20));
-  for (void *block : blocks) {
+  for (void* block : blocks) {
     retrograde_pool_free(block);
     EXPECT_LE(retrograde_pool_bytes(), size_t{3} << 20);
   }
@@ -175,7 +178,7 @@ TEST(Memory, ThreadsShareThePool) {
     threads.emplace_back([t] {
       for (int i = 0; i < 200; i++) {
         const size_t bytes = static_cast<size_t>(100000 + 1000 * ((i * 7 + t) % 50));
-        auto *block = static_cast<char *>(retrograde_pool_malloc(bytes));
+        auto* block = static_cast<char*>(retrograde_pool_malloc(bytes));
         block[0] = static_cast<char>(t);
         block[bytes - 1] = static_cast<char>(t);
         ASSERT_EQ(block[0], block[bytes - 1]);
@@ -183,7 +186,7 @@ TEST(Memory, ThreadsShareThePool) {
       }
     });
   }
-  for (std::thread &thread : threads) thread.join();
+  for (std::thread& thread : threads) thread.join();
   retrograde_pool_release();
 }
 
@@ -194,13 +197,15 @@ TEST(Memory, ImpossibleRequestsGiveNullAndAReason) {
   EXPECT_EQ(retrograde_allocate(&context, INT64_MAX, 4), nullptr);
   EXPECT_EQ(retrograde_allocate(&context, INT64_MAX / 8, 4), nullptr);
   EXPECT_EQ(retrograde_allocation_error(&context, "f", -1, 4), retrograde_error_extents_negative);
-  EXPECT_EQ(retrograde_allocation_error(&context, "f", INT64_MAX, 4), retrograde_error_allocation_too_large);
-  EXPECT_EQ(retrograde_allocation_error(&context, "f", INT64_MAX / 8, 4), retrograde_error_out_of_memory);
+  EXPECT_EQ(retrograde_allocation_error(&context, "f", INT64_MAX, 4),
+            retrograde_error_allocation_too_large);
+  EXPECT_EQ(retrograde_allocation_error(&context, "f", INT64_MAX / 8, 4),
+            retrograde_error_out_of_memory);
   EXPECT_EQ(reports.size(), 3u);
   EXPECT_NE(reports[0].message.find("\"f\""), std::string::npos);
 }
 
-std::string formatted(size_t size, const char *format, auto... args) {
+std::string formatted(size_t size, const char* format, auto... args) {
   std::vector<char> text(size + 1, '#');
   const size_t length = retrograde_format_message(text.data(), size, format, args...);
   EXPECT_EQ(text[length], 0);
@@ -211,8 +216,8 @@ std::string formatted(size_t size, const char *format, auto... args) {
 TEST(Messages, FieldsAreFormatted) {
   EXPECT_EQ(formatted(200, "%i %u", int64_t{-7}, ~uint64_t{0}), "-7 18446744073709551615");
   EXPECT_EQ(formatted(200, "%f %g %f", 0.1, static_cast<double>(0.1f), 1e300), "0.1 0.1 1e+300");
-  EXPECT_EQ(formatted(200, "%s%% %s", "ab", static_cast<const char *>(nullptr)), "ab% (null)");
-  EXPECT_EQ(formatted(200, "%p", reinterpret_cast<const void *>(0x1f)), "0x1f");
+  EXPECT_EQ(formatted(200, "%s%% %s", "ab", static_cast<const char*>(nullptr)), "ab% (null)");
+  EXPECT_EQ(formatted(200, "%p", reinterpret_cast<const void*>(0x1f)), "0x1f");
 }
 
 TEST(Messages, LongTextIsCut) {
