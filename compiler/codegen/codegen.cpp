@@ -10,7 +10,7 @@
 #include <chrono>
 #include <utility>
 
-#include "codegen/deep_stack.h"
+#include "diagnostics/large_stack.h"
 #include "codegen/function_generator.h"
 #include "codegen/optimize.h"
 #include "diagnostics/error.h"
@@ -109,7 +109,7 @@ template <typename Use>
 static auto compile(const std::vector<ir::LoweredFunction>& functions, const Options& options,
                     bool keep_names, const Use& use) {
   decltype(use(std::declval<Compilation&>())) result;
-  run_on_deep_stack([&] {
+  run_on_large_stack([&] {
     Compilation compilation(functions, options, keep_names);
     result = use(compilation);
   });

@@ -7,7 +7,7 @@
 #include <unordered_map>
 
 #include "codegen/codegen.h"
-#include "codegen/deep_stack.h"
+#include "diagnostics/large_stack.h"
 #include "diagnostics/error.h"
 #include "jit/fingerprint.h"
 #include "jit/linker.h"
@@ -110,7 +110,7 @@ void check_runs_here(const Target& target) {
 
 Fingerprint key_of(const ir::LoweredFunction& function, const codegen::Options& options) {
   Fingerprint key;
-  codegen::run_on_deep_stack([&] { key = fingerprint(function); });
+  run_on_large_stack([&] { key = fingerprint(function); });
   key.add(options.target.to_string());
   key.add(static_cast<uint64_t>(options.optimization_level));
   return key;

@@ -6,7 +6,7 @@
 #include "ir/visit.h"
 #include "lower/build_loop_nests.h"
 #include "lower/inline_functions.h"
-#include "lower/large_stack.h"
+#include "diagnostics/large_stack.h"
 #include "lower/lower.h"
 
 namespace retrograde::ir {

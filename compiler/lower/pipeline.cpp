@@ -10,7 +10,7 @@
 #include "lower/flatten_storage.h"
 #include "lower/free_early.h"
 #include "lower/inline_functions.h"
-#include "lower/large_stack.h"
+#include "diagnostics/large_stack.h"
 #include "lower/lower.h"
 #include "lower/partition_loops.h"
 #include "lower/unroll_loops.h"

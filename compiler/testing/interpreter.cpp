@@ -1,5 +1,5 @@
 // Evaluation by demand. Recursion goes from Func to Func, so it is as deep as the pipeline; it runs
-// on a stack of its own (deep_stack.h).
+// on a stack of its own (diagnostics/large_stack.h).
 #include "testing/interpreter.h"
 
 #include <HalideRuntime.h>
@@ -10,7 +10,7 @@
 
 #include "diagnostics/error.h"
 #include "ir/random.h"
-#include "testing/deep_stack.h"
+#include "diagnostics/large_stack.h"
 #include "testing/stage_program.h"
 
 namespace retrograde::oracle {
@@ -588,7 +588,7 @@ std::vector<Array> Interpreter::realize(const FuncPtr& func, const Region& regio
 std::vector<Array> Interpreter::realize(const std::vector<FuncPtr>& funcs,
                                         const std::vector<Region>& regions) {
   std::vector<Array> result;
-  on_deep_stack([&] { result = impl_->realize(funcs, regions); });
+  run_on_large_stack([&] { result = impl_->realize(funcs, regions); });
   return result;
 }
 

@@ -5,7 +5,7 @@
 #include "ir/equal.h"
 #include "ir/parse.h"
 #include "ir/print.h"
-#include "support/large_stack.h"
+#include "diagnostics/large_stack.h"
 #include "support/random_ir.h"
 
 namespace retrograde {
@@ -149,7 +149,7 @@ TEST(IrText, ErrorsSayWhere) {
   expect_error("a[1] = ~", "line 1, column 8");
   expect_error("evaluate #3", "shared node");
   expect_error("}", "a statement");
-  test::on_large_stack(
+  run_on_large_stack(
       [] { expect_error("evaluate " + std::string(100000, '('), "nests less deeply"); });
 }
 

@@ -8,7 +8,7 @@
 #include "ir/visit.h"
 #include "simplify/cse.h"
 #include "simplify/simplify.h"
-#include "support/large_stack.h"
+#include "diagnostics/large_stack.h"
 
 namespace retrograde {
 namespace {
@@ -236,7 +236,7 @@ TEST(SimplifyCost, SharedTowersOfEveryOperator) {
       const Expr y = variable("y" + std::to_string(i % 7));
       e = binary(kind, select(y < e, e, e + y), binary(Kind::Max, e - y, y * e)) + e;
     }
-    test::on_large_stack([&] { EXPECT_TRUE(simplify(e).defined()); });
+    run_on_large_stack([&] { EXPECT_TRUE(simplify(e).defined()); });
   }
 }
 
@@ -246,13 +246,13 @@ TEST(SimplifyCost, LongSumsAndLongChainsOfLets) {
     sum = sum + variable("x" + std::to_string(i)) * i;
     least = min(least, variable("x" + std::to_string(i)) + i);
   }
-  test::on_large_stack([&] { EXPECT_TRUE(simplify(sum < least).defined()); });
+  run_on_large_stack([&] { EXPECT_TRUE(simplify(sum < least).defined()); });
   Stmt s = make_store("a", variable("t0"), variable("t2999"));
   for (int i = 2999; i > 0; --i) {
     const Expr previous = variable("t" + std::to_string(i - 1));
     s = make_let("t" + std::to_string(i), min(previous * 3, previous + variable("n")) / 2, s);
   }
-  test::on_large_stack([&] { EXPECT_TRUE(simplify(s).defined()); });
+  run_on_large_stack([&] { EXPECT_TRUE(simplify(s).defined()); });
 }
 
 TEST(Cse, SharedPartsBecomeLets) {
@@ -293,11 +293,11 @@ TEST(Cse, IsLinearInTheNumberOfNodes) {
     copy = copy * copy + 1;
   }
   Expr lets;
-  test::on_large_stack([&] { lets = introduce_lets(e + copy); });
+  run_on_large_stack([&] { lets = introduce_lets(e + copy); });
   int count = 0;
   walk(lets, [&](const Expr& node) { return count += node.kind() == Kind::Let, true; });
   EXPECT_LE(count, 1001);
-  test::on_large_stack([&] { EXPECT_TRUE(equal(expand_lets(lets), e + copy)); });
+  run_on_large_stack([&] { EXPECT_TRUE(equal(expand_lets(lets), e + copy)); });
 }
 
 }  // namespace
