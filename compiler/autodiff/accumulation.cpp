@@ -15,19 +15,22 @@ namespace retrograde::ir {
 
 namespace {
 
-// Parts of a privatised accumulation: enough for the threads of today's machines, few enough to sum and to store.
+// Parts of a privatised accumulation: enough for the threads of today's machines, few enough to sum
+// and to store.
 constexpr int part_count = 32;
 // Elements of a part's vector: neighbouring iterations accumulate apart.
 constexpr int lane_count = 16;
-// Below so many elements, with so many iterations each, the pure dimensions alone do not fill a machine.
+// Below so many elements, with so many iterations each, the pure dimensions alone do not fill a
+// machine.
 constexpr double few_elements = 64, many_iterations = 4096, unknown_elements = 1e9;
 
 bool is_pointwise(const Gather& g) {
-  return !g.rdom && !g.scatters && std::all_of(g.pure.begin(), g.pure.end(), [](bool p) { return p; });
+  return !g.rdom && !g.scatters &&
+         std::all_of(g.pure.begin(), g.pure.end(), [](bool p) { return p; });
 }
 
-// In a dimension of few elements a fixed index becomes a condition: plane_adj(x, 0) and plane_adj(x, 1) in one pass,
-// and in the pure definition, rather than an update for each.
+// In a dimension of few elements a fixed index becomes a condition: plane_adj(x, 0) and
+// plane_adj(x, 1) in one pass, and in the pure definition, rather than an update for each.
 constexpr int64_t few = 8;
 Gather with_few_elements_pure(Gather g, const AdjointTarget& target) {
   if (g.rdom || g.scatters || target.region.size() != g.lhs.size()) return g;
@@ -51,8 +54,10 @@ bool is_range_condition(const Expr& e) {
   bool result = true;
   walk(e, [&](const Expr& node) {
     Kind k = node.kind();
-    bool ordered = k == Kind::LT || k == Kind::LE || k == Kind::GT || k == Kind::GE || k == Kind::And;
-    bool arithmetic = k == Kind::Add || k == Kind::Sub || k == Kind::Mul || k == Kind::Min || k == Kind::Max;
+    bool ordered =
+        k == Kind::LT || k == Kind::LE || k == Kind::GT || k == Kind::GE || k == Kind::And;
+    bool arithmetic =
+        k == Kind::Add || k == Kind::Sub || k == Kind::Mul || k == Kind::Min || k == Kind::Max;
     result &= ordered || arithmetic || k == Kind::Variable || k == Kind::IntImm;
     return result;
   });
@@ -95,7 +100,8 @@ Expr rename_rdom(const Expr& e, const Gather& from, const Gather& to) {
   return substitute(e, names);
 }
 
-std::vector<UpdateGroup> group_updates(const std::vector<Contribution>& contributions, size_t values) {
+std::vector<UpdateGroup> group_updates(const std::vector<Contribution>& contributions,
+                                       size_t values) {
   std::vector<UpdateGroup> groups;
   std::map<std::string, size_t> index;
   for (const Contribution& c : contributions) {
@@ -110,7 +116,9 @@ std::vector<UpdateGroup> group_updates(const std::vector<Contribution>& contribu
   return groups;
 }
 
-bool has_pure_dimension(const Gather& g) { return std::find(g.pure.begin(), g.pure.end(), true) != g.pure.end(); }
+bool has_pure_dimension(const Gather& g) {
+  return std::find(g.pure.begin(), g.pure.end(), true) != g.pure.end();
+}
 
 std::vector<ReductionVariable> rvars_of(const Gather& g) {
   return g.rdom ? g.rdom->vars : std::vector<ReductionVariable>{};
@@ -124,7 +132,8 @@ class Builder {
     for (const std::string& arg : target.args) args_.push_back(variable(arg));
   }
 
-  AdjointFunc build(const std::vector<Contribution>& contributions, const std::vector<Expr>& initial) {
+  AdjointFunc build(const std::vector<Contribution>& contributions,
+                    const std::vector<Expr>& initial) {
     define_pointwise(contributions, initial);
     for (const UpdateGroup& group : group_updates(contributions, target_.types.size())) {
       is_worth_splitting(group.gather) ? add_privatised(group) : add_update(group);
@@ -133,7 +142,8 @@ class Builder {
   }
 
  private:
-  void define_pointwise(const std::vector<Contribution>& contributions, const std::vector<Expr>& initial) {
+  void define_pointwise(const std::vector<Contribution>& contributions,
+                        const std::vector<Expr>& initial) {
     std::vector<Expr> values(target_.types.size());
     for (size_t k = 0; k < initial.size(); ++k) values[k] = initial[k];
     for (const Contribution& c : contributions) {
@@ -143,7 +153,8 @@ class Builder {
       value = value.defined() ? value + term : term;
     }
     for (size_t k = 0; k < values.size(); ++k) {
-      values[k] = values[k].defined() ? cast_to(target_.types[k], values[k]) : make_zero(target_.types[k]);
+      values[k] =
+          values[k].defined() ? cast_to(target_.types[k], values[k]) : make_zero(target_.types[k]);
     }
     define_pure(result_.func, args_, values);
     result_.stages.push_back(Accumulation::Pointwise);
@@ -162,7 +173,8 @@ class Builder {
     result_.stages.push_back(g.scatters ? Accumulation::Scatter : Accumulation::Gather);
   }
 
-  // Whether the elements alone give too little to do in parallel, and each sums over many iterations.
+  // Whether the elements alone give too little to do in parallel, and each sums over many
+  // iterations.
   bool is_worth_splitting(const Gather& g) const {
     if (!g.rdom || elements_of(g) > few_elements) return false;
     double iterations = 1;
@@ -179,7 +191,8 @@ class Builder {
       if (!g.pure[d]) continue;
       if (target_.region.size() != g.pure.size()) return unknown_elements;
       const LoopVariable& v = target_.region[d];
-      auto extent = v.min.defined() && v.max.defined() ? as_const_int(simplify(v.max - v.min + 1)) : std::nullopt;
+      auto extent = v.min.defined() && v.max.defined() ? as_const_int(simplify(v.max - v.min + 1))
+                                                       : std::nullopt;
       elements *= extent ? static_cast<double>(*extent) : unknown_elements;
     }
     return elements;
@@ -192,9 +205,10 @@ class Builder {
     std::vector<Expr> conditions;  // inside the domain
   };
 
-  // x = (part * chunk + rho) * lanes + lane for the outermost variable when it is the innermost too; else lanes split
-  // the innermost and parts the outermost variable. Without `lane` there are no lanes. Beyond the end the place is
-  // clamped: what it reads must exist even where the condition is false.
+  // x = (part * chunk + rho) * lanes + lane for the outermost variable when it is the innermost
+  // too; else lanes split the innermost and parts the outermost variable. Without `lane` there are
+  // no lanes. Beyond the end the place is clamped: what it reads must exist even where the
+  // condition is false.
   static Slice slice_of(const Gather& g, const Expr& lane, const Expr& part) {
     Slice slice;
     slice.rvars = rvars_of(g);
@@ -222,13 +236,15 @@ class Builder {
   }
   static Expr min_of(const Expr& a, const Expr& b) { return binary(Kind::Min, a, b); }
 
-  // parts(lane, y..., part) accumulates a slice of the reduction domain; then adj(y...) sums over lanes and parts.
-  // Elements fixed on the left-hand side need no y. A scatter has no lanes: its iterations may meet.
+  // parts(lane, y..., part) accumulates a slice of the reduction domain; then adj(y...) sums over
+  // lanes and parts. Elements fixed on the left-hand side need no y. A scatter has no lanes: its
+  // iterations may meet.
   void add_privatised(const UpdateGroup& group) {
     const Gather& g = group.gather;
     FuncPtr parts = std::make_shared<AdjointContents>();
     parts->name = claim_name(result_.func->name + "_parts");
-    Expr part = variable(unique_name("part")), lane = g.scatters ? Expr() : variable(unique_name("lane"));
+    Expr part = variable(unique_name("part")),
+         lane = g.scatters ? Expr() : variable(unique_name("lane"));
     std::vector<Expr> zeros;
     for (Type t : target_.types) zeros.push_back(make_zero(t));
     define_pure(parts, parts_point(g, args_, lane, part), zeros);
@@ -241,16 +257,18 @@ class Builder {
     for (size_t k = 0; k < target_.types.size(); ++k) {
       Expr self = call_value(parts, lhs, static_cast<int>(k));
       const Expr& term = group.sums[k];
-      values.push_back(term.defined() ? self + cast_to(self.type(), substitute(term, slice.place)) : self);
+      values.push_back(term.defined() ? self + cast_to(self.type(), substitute(term, slice.place))
+                                      : self);
     }
     append_update(parts, lhs, values, slice.rvars, conjunction(slice.conditions));
     result_.helpers.push_back(parts);
     sum_parts(g, parts, lane.defined());
   }
 
-  // Coordinates of `parts`: the lane, the elements that a scatter reaches or the pure ones, the part.
-  static std::vector<Expr> parts_point(const Gather& g, const std::vector<Expr>& element, const Expr& lane,
-                                       const Expr& part) {
+  // Coordinates of `parts`: the lane, the elements that a scatter reaches or the pure ones, the
+  // part.
+  static std::vector<Expr> parts_point(const Gather& g, const std::vector<Expr>& element,
+                                       const Expr& lane, const Expr& part) {
     std::vector<Expr> point;
     if (lane.defined()) point.push_back(lane);
     for (size_t d = 0; d < element.size(); ++d) {
@@ -262,15 +280,20 @@ class Builder {
 
   void sum_parts(const Gather& g, const FuncPtr& parts, bool has_lanes) {
     auto rdom = std::make_shared<ReductionDomainContents>();
-    if (has_lanes) rdom->vars.push_back({unique_name("lane"), make_zero(Int(32)), make_const(Int(32), lane_count)});
-    rdom->vars.push_back({unique_name("part"), make_zero(Int(32)), make_const(Int(32), part_count)});
+    if (has_lanes)
+      rdom->vars.push_back(
+          {unique_name("lane"), make_zero(Int(32)), make_const(Int(32), lane_count)});
+    rdom->vars.push_back(
+        {unique_name("part"), make_zero(Int(32)), make_const(Int(32), part_count)});
     rdom->frozen = true;
     auto rvar = [&](size_t i) { return variable(rdom->vars[i].var, Int(32), SymbolRef(rdom)); };
     const std::vector<Expr>& lhs = g.scatters ? args_ : g.lhs;
-    std::vector<Expr> point = parts_point(g, lhs, has_lanes ? rvar(0) : Expr(), rvar(rdom->vars.size() - 1));
+    std::vector<Expr> point =
+        parts_point(g, lhs, has_lanes ? rvar(0) : Expr(), rvar(rdom->vars.size() - 1));
     std::vector<Expr> values;
     for (size_t k = 0; k < target_.types.size(); ++k) {
-      values.push_back(call_value(result_.func, lhs, static_cast<int>(k)) + call_value(parts, point, static_cast<int>(k)));
+      values.push_back(call_value(result_.func, lhs, static_cast<int>(k)) +
+                       call_value(parts, point, static_cast<int>(k)));
     }
     append_update(result_.func, lhs, values, rdom->vars, {});
     result_.stages.push_back(Accumulation::Privatised);
@@ -296,9 +319,11 @@ void append_update(const FuncPtr& f, std::vector<Expr> args, std::vector<Expr> v
   update.rvars = rvars;
   if (predicate.defined() && !is_const_true(predicate)) update.predicate = predicate;
   update = map_exprs(update, [&](const Expr& e) { return redirect_calls(e, f, f, true); });
-  for (const ReductionVariable& r : rvars) update.schedule.dims.push_back({r.var, ForType::Serial, true});
+  for (const ReductionVariable& r : rvars)
+    update.schedule.dims.push_back({r.var, ForType::Serial, true});
   for (size_t d = 0; d < f->args.size(); ++d) {
-    if (is_pure_position(*f, update, d)) update.schedule.dims.push_back({f->args[d], ForType::Serial, false});
+    if (is_pure_position(*f, update, d))
+      update.schedule.dims.push_back({f->args[d], ForType::Serial, false});
   }
   f->updates.push_back(std::move(update));
   for (const FuncPtr& callee : direct_callees(*f)) callee->frozen = true;

@@ -1,12 +1,14 @@
 // From contributions to a Func: the adjoint of one target.
 //
-// Contributions that reach each element at most once make the pure definition, a sum. The others become update
-// definitions; those with the same left-hand side, reduction domain and predicate share one. Who owns an element:
-//   gather      each element is written by the iterations of its own pure variables only: race-free in parallel.
-//   scatter     an index depends on data: serial inside each element of the pure dimensions.
-//   privatised  few elements are left to run over in parallel: a fixed number of parts of the outermost reduction
-//               variable, and lanes of the innermost, accumulate apart in a Func of their own, and are then summed in
-//               order. The result does not depend on the number of threads.
+// Contributions that reach each element at most once make the pure definition, a sum. The others
+// become update definitions; those with the same left-hand side, reduction domain and predicate
+// share one. Who owns an element:
+//   gather      each element is written by the iterations of its own pure variables only: race-free
+//   in parallel. scatter     an index depends on data: serial inside each element of the pure
+//   dimensions. privatised  few elements are left to run over in parallel: a fixed number of parts
+//   of the outermost reduction
+//               variable, and lanes of the innermost, accumulate apart in a Func of their own, and
+//               are then summed in order. The result does not depend on the number of threads.
 #pragma once
 
 #include <string>
@@ -34,16 +36,17 @@ enum class Accumulation : uint8_t { Pointwise, Gather, Scatter, Privatised };
 
 struct AdjointFunc {
   FuncPtr func;
-  std::vector<FuncPtr> helpers;          // private parts
-  std::vector<Accumulation> stages;      // how each stage of func accumulates; the first is Pointwise
+  std::vector<FuncPtr> helpers;      // private parts
+  std::vector<Accumulation> stages;  // how each stage of func accumulates; the first is Pointwise
 };
 
 // `initial`: values that the pure definition starts from, empty for zeros.
 AdjointFunc make_adjoint(const AdjointTarget& target, const std::string& name,
-                         const std::vector<Contribution>& contributions, const std::vector<Expr>& initial = {});
+                         const std::vector<Contribution>& contributions,
+                         const std::vector<Expr>& initial = {});
 
-// f(args) <- values over the reduction variables, where predicate. As an update written by a user, but the domain need
-// not be mentioned. Calls of `f` in it become weak.
+// f(args) <- values over the reduction variables, where predicate. As an update written by a user,
+// but the domain need not be mentioned. Calls of `f` in it become weak.
 void append_update(const FuncPtr& f, std::vector<Expr> args, std::vector<Expr> values,
                    const std::vector<ReductionVariable>& rvars, Expr predicate);
 // A call of value `index` of f.

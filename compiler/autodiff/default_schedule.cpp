@@ -33,7 +33,8 @@ struct Use {
 
 class Chooser {
  public:
-  explicit Chooser(const std::vector<FuncPtr>& outputs) : outputs_(outputs), order_(topological_order(outputs)) {}
+  explicit Chooser(const std::vector<FuncPtr>& outputs)
+      : outputs_(outputs), order_(topological_order(outputs)) {}
 
   DefaultSchedules choose() {
     bool differentiated = std::any_of(order_.begin(), order_.end(), is_adjoint);
@@ -49,8 +50,12 @@ class Chooser {
   }
 
  private:
-  static bool is_adjoint(const FuncPtr& f) { return dynamic_cast<const AdjointContents*>(f.get()) != nullptr; }
-  bool is_output(const FuncPtr& f) const { return std::find(outputs_.begin(), outputs_.end(), f) != outputs_.end(); }
+  static bool is_adjoint(const FuncPtr& f) {
+    return dynamic_cast<const AdjointContents*>(f.get()) != nullptr;
+  }
+  bool is_output(const FuncPtr& f) const {
+    return std::find(outputs_.begin(), outputs_.end(), f) != outputs_.end();
+  }
   static bool is_worth_storing(const Use& use) { return use.reads > 1.5 && use.operations > cheap; }
 
   void count_reads(const FuncContents& f) {
@@ -84,7 +89,9 @@ class Chooser {
   }
   double cost_of(const Expr& e) const {
     const auto* call = e.as<Call>();
-    if (!call) return e.as<Binary>() || e.as<Select>() || e.as<Cast>() ? (e.type().is_float() ? 1 : 0.25) : 0;
+    if (!call)
+      return e.as<Binary>() || e.as<Select>() || e.as<Cast>() ? (e.type().is_float() ? 1 : 0.25)
+                                                              : 0;
     if (call->call_type != CallType::Func) return call->call_type == CallType::Operator ? 4 : 1;
     auto found = uses_.find(call->symbol.raw());
     auto callee = std::dynamic_pointer_cast<FuncContents>(call->symbol.lock());
@@ -134,6 +141,8 @@ class Chooser {
 
 }  // namespace
 
-DefaultSchedules default_schedules(const std::vector<FuncPtr>& outputs) { return Chooser(outputs).choose(); }
+DefaultSchedules default_schedules(const std::vector<FuncPtr>& outputs) {
+  return Chooser(outputs).choose();
+}
 
 }  // namespace retrograde::ir

@@ -13,12 +13,15 @@ namespace {
 std::string asked(const Func& output) { return "propagate adjoints from " + quoted(output.name()); }
 
 void check_output(const Func& output) {
-  if (!output.defined()) user_error(asked(output), "the output must be defined", "it has no definition", "Define it first");
+  if (!output.defined())
+    user_error(asked(output), "the output must be defined", "it has no definition",
+               "Define it first");
   for (Type t : output.types()) {
     if (t.is_float()) return;
   }
   user_error(asked(output), "only floating-point values have derivatives",
-             "its type is " + to_string(output.types()[0]), "Convert it to float where the gradient starts");
+             "its type is " + to_string(output.types()[0]),
+             "Convert it to float where the gradient starts");
 }
 
 ir::Box box_of(const Region& bounds) {
@@ -44,10 +47,12 @@ Expr seed_value(const Func& output, size_t k, const Expr& value) {
 }
 
 Derivative run(const ir::Seed& seed, const AdjointOptions& options) {
-  return Derivative(std::make_shared<ir::SynthesisResult>(ir::synthesize_adjoints(seed, to_synthesis(options))));
+  return Derivative(
+      std::make_shared<ir::SynthesisResult>(ir::synthesize_adjoints(seed, to_synthesis(options))));
 }
 
-void check_dimensions(const Func& output, size_t bounds, int adjoint, const std::string& adjoint_name) {
+void check_dimensions(const Func& output, size_t bounds, int adjoint,
+                      const std::string& adjoint_name) {
   if (static_cast<int>(bounds) != output.dimensions()) {
     user_error(asked(output), "the output needs bounds in each of its dimensions",
                text("it has ", output.dimensions(), " dimensions and ", bounds, " bounds"),
@@ -55,7 +60,8 @@ void check_dimensions(const Func& output, size_t bounds, int adjoint, const std:
   }
   if (adjoint != output.dimensions()) {
     user_error(asked(output), "an adjoint has the dimensions of its Func",
-               text(quoted(adjoint_name), " has ", adjoint, " and ", quoted(output.name()), " has ", output.dimensions()),
+               text(quoted(adjoint_name), " has ", adjoint, " and ", quoted(output.name()), " has ",
+                    output.dimensions()),
                "Define the adjoint over the same dimensions");
   }
 }
@@ -68,23 +74,34 @@ std::vector<Expr> variables_of(const Func& f) {
 
 }  // namespace
 
-Derivative::Derivative(std::shared_ptr<const ir::SynthesisResult> result) : result_(std::move(result)) {}
+Derivative::Derivative(std::shared_ptr<const ir::SynthesisResult> result)
+    : result_(std::move(result)) {}
 
 Func Derivative::operator()(const Func& func, int update_id) const {
   auto it = result_->after_stage.find({func.function().get(), update_id + 1});
-  return it == result_->after_stage.end() ? Func(std::make_shared<ir::FuncContents>()) : Func(it->second);
+  return it == result_->after_stage.end() ? Func(std::make_shared<ir::FuncContents>())
+                                          : Func(it->second);
 }
 
-Func Derivative::adjoint(const Func& func) const { return (*this)(func, func.num_update_definitions() - 1); }
+Func Derivative::adjoint(const Func& func) const {
+  return (*this)(func, func.num_update_definitions() - 1);
+}
 
 Func Derivative::of_parameter(const ir::ParameterContents& parameter) const {
   auto it = result_->parameters.find(&parameter);
-  return it == result_->parameters.end() ? Func(std::make_shared<ir::FuncContents>()) : Func(it->second);
+  return it == result_->parameters.end() ? Func(std::make_shared<ir::FuncContents>())
+                                         : Func(it->second);
 }
-Func Derivative::operator()(const Buffer<>& buffer) const { return of_parameter(*buffer.parameter()); }
-Func Derivative::operator()(const ImageParam& image) const { return of_parameter(*image.parameter()); }
+Func Derivative::operator()(const Buffer<>& buffer) const {
+  return of_parameter(*buffer.parameter());
+}
+Func Derivative::operator()(const ImageParam& image) const {
+  return of_parameter(*image.parameter());
+}
 
-std::vector<Func> Derivative::funcs() const { return {result_->funcs.begin(), result_->funcs.end()}; }
+std::vector<Func> Derivative::funcs() const {
+  return {result_->funcs.begin(), result_->funcs.end()};
+}
 
 const std::vector<Explanation>& Derivative::explanations() const { return result_->explanations; }
 
@@ -92,38 +109,39 @@ Derivative propagate_adjoints(const Func& output, const Func& adjoint, const Reg
                               const AdjointOptions& options) {
   check_output(output);
   if (!adjoint.defined()) {
-    user_error(asked(output), "the adjoint must be defined", quoted(adjoint.name()) + " has no definition");
+    user_error(asked(output), "the adjoint must be defined",
+               quoted(adjoint.name()) + " has no definition");
   }
   check_dimensions(output, output_bounds.size(), adjoint.dimensions(), adjoint.name());
   if (adjoint.outputs() != output.outputs()) {
     user_error(asked(output), "an adjoint has as many values as its Func",
-               text(quoted(adjoint.name()), " has ", adjoint.outputs(), " and ", quoted(output.name()), " has ",
-                    output.outputs()));
+               text(quoted(adjoint.name()), " has ", adjoint.outputs(), " and ",
+                    quoted(output.name()), " has ", output.outputs()));
   }
   ir::Seed seed{output.function(), box_of(output_bounds), {}};
   for (size_t k = 0; k < output.types().size(); ++k) {
-    seed.values.push_back(seed_value(output, k, adjoint(variables_of(output)).element(static_cast<int>(k))));
+    seed.values.push_back(
+        seed_value(output, k, adjoint(variables_of(output)).element(static_cast<int>(k))));
   }
   return run(seed, options);
 }
 
-Derivative propagate_adjoints(const Func& output, const Func& adjoint,
-                              const std::vector<std::pair<Expr, Expr>>& output_bounds, const AdjointOptions& options) {
-  Region region;
-  for (const auto& [min, extent] : output_bounds) region.push_back({min, extent});
-  return propagate_adjoints(output, adjoint, region, options);
-}
-
-Derivative propagate_adjoints(const Func& output, const Buffer<float>& adjoint, const AdjointOptions& options) {
+Derivative propagate_adjoints(const Func& output, const Buffer<float>& adjoint,
+                              const AdjointOptions& options) {
   check_output(output);
-  if (!adjoint.defined()) user_error(asked(output), "the adjoint must be a defined Buffer", "it has no memory");
-  check_dimensions(output, static_cast<size_t>(output.dimensions()), adjoint.dimensions(), adjoint.name());
+  if (!adjoint.defined())
+    user_error(asked(output), "the adjoint must be a defined Buffer", "it has no memory");
+  check_dimensions(output, static_cast<size_t>(output.dimensions()), adjoint.dimensions(),
+                   adjoint.name());
   Region region;
-  for (int d = 0; d < adjoint.dimensions(); ++d) region.push_back({Expr(adjoint.min(d)), Expr(adjoint.extent(d))});
+  for (int d = 0; d < adjoint.dimensions(); ++d)
+    region.push_back({Expr(adjoint.min(d)), Expr(adjoint.extent(d))});
   ir::Seed seed{output.function(), box_of(region), {}};
   auto parameter = adjoint.parameter();
-  Expr value = ir::call_image(parameter->name, parameter->type, variables_of(output), ir::SymbolRef(parameter));
-  for (size_t k = 0; k < output.types().size(); ++k) seed.values.push_back(seed_value(output, k, value));
+  Expr value = ir::call_image(parameter->name, parameter->type, variables_of(output),
+                              ir::SymbolRef(parameter));
+  for (size_t k = 0; k < output.types().size(); ++k)
+    seed.values.push_back(seed_value(output, k, value));
   return run(seed, options);
 }
 

@@ -2,10 +2,12 @@
 //
 // Func loss; RDom r(input); loss() += pow(model(r.x, r.y) - target(r.x, r.y), 2);
 // Derivative d = propagate_adjoints(loss);
-// Func grad = d(weights);            // weights: a Func, Buffer, ImageParam or Param; schedule it like any other
+// Func grad = d(weights);            // weights: a Func, Buffer, ImageParam or Param; schedule it
+// like any other
 //
-// The adjoint of a Func or image has its dimensions; that of a Param has none. It is 0 outside of the region that the
-// output depends on. Adjoints are ordinary Funcs without side effects: they can be differentiated again.
+// The adjoint of a Func or image has its dimensions; that of a Param has none. It is 0 outside of
+// the region that the output depends on. Adjoints are ordinary Funcs without side effects: they can
+// be differentiated again.
 #pragma once
 
 #include <map>
@@ -30,9 +32,10 @@ class Derivative {
  public:
   explicit Derivative(std::shared_ptr<const ir::SynthesisResult> result);
 
-  // The adjoint of `func` as it is after update definition `update_id`; -1: after its pure definition. For a Func that
-  // is only accumulated into, all of these are the same. An undefined Func when there is none: integers, and what was
-  // not requested. Zero everywhere when the output does not depend on it.
+  // The adjoint of `func` as it is after update definition `update_id`; -1: after its pure
+  // definition. For a Func that is only accumulated into, all of these are the same. An undefined
+  // Func when there is none: integers, and what was not requested. Zero everywhere when the output
+  // does not depend on it.
   Func operator()(const Func& func, int update_id = -1) const;
   Func operator()(const Buffer<>& buffer) const;
   Func operator()(const ImageParam& image) const;
@@ -80,15 +83,14 @@ struct AdjointOptions {
   std::vector<AdjointInput> wrt = {};  // only these gradients are wanted; empty: all
 };
 
-// The gradient of sum over output_bounds of adjoint * output with respect to everything that `output` depends on.
-// output_bounds: min and extent of each dimension of the output; `adjoint` is read there only.
+// The gradient of sum over output_bounds of adjoint * output with respect to everything that
+// `output` depends on. output_bounds: min and extent of each dimension of the output; `adjoint` is
+// read there only.
 Derivative propagate_adjoints(const Func& output, const Func& adjoint, const Region& output_bounds,
                               const AdjointOptions& options = {});
-Derivative propagate_adjoints(const Func& output, const Func& adjoint,
-                              const std::vector<std::pair<Expr, Expr>>& output_bounds,
-                              const AdjointOptions& options = {});
 // The same with an adjoint in memory, whose shape gives the bounds.
-Derivative propagate_adjoints(const Func& output, const Buffer<float>& adjoint, const AdjointOptions& options = {});
+Derivative propagate_adjoints(const Func& output, const Buffer<float>& adjoint,
+                              const AdjointOptions& options = {});
 // Of a scalar: a Func without dimensions, or its element at 0.
 Derivative propagate_adjoints(const Func& output, const AdjointOptions& options = {});
 

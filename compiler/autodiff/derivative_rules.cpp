@@ -1,5 +1,6 @@
-// One row an operator. Sources: [GW] Griewank & Walther, Evaluating Derivatives, 2nd ed., tables 2.1 and 14.1;
-// [DLMF] NIST Digital Library of Mathematical Functions. "definition": follows from the operator's definition here.
+// One row an operator. Sources: [GW] Griewank & Walther, Evaluating Derivatives, 2nd ed.,
+// tables 2.1 and 14.1; [DLMF] NIST Digital Library of Mathematical Functions. "definition": follows
+// from the operator's definition here.
 #include "autodiff/derivative_rules.h"
 
 #include <cmath>
@@ -20,7 +21,9 @@ Expr op1(Op op, const Expr& a) { return call_op(op, a.type(), {a}); }
 Expr square(const Expr& a) { return a * a; }
 Partial strong(Expr e) { return {std::move(e), Strength::Strong}; }
 Partial plain(Expr e) { return {std::move(e), Strength::Plain}; }
-Expr zero_where(const Expr& condition, const Expr& e) { return make_select(condition, make_zero(e.type()), e); }
+Expr zero_where(const Expr& condition, const Expr& e) {
+  return make_select(condition, make_zero(e.type()), e);
+}
 
 // d|u| = sign(u), and 0 at 0.
 Expr sign(const Expr& u) {
@@ -47,7 +50,9 @@ Partials power_partials(Args a, const Expr& v, Op power, Op logarithm) {
   return {strong(dx), strong(dp)};
 }
 Partials pow_partials(Args a, const Expr& v) { return power_partials(a, v, Op::pow, Op::log); }
-Partials fast_pow_partials(Args a, const Expr& v) { return power_partials(a, v, Op::fast_pow, Op::fast_log); }
+Partials fast_pow_partials(Args a, const Expr& v) {
+  return power_partials(a, v, Op::fast_pow, Op::fast_log);
+}
 Partials hypot_partials(Args a, const Expr& v) {
   Expr at_origin = v == num(v, 0);
   return {strong(zero_where(at_origin, a[0] / v)), strong(zero_where(at_origin, a[1] / v))};
@@ -63,7 +68,9 @@ Partials asin_partials(Args a, const Expr&) {
 Partials acos_partials(Args a, const Expr&) {
   return {strong(num(a[0], -1) / op1(Op::sqrt, one_minus_square(a[0])))};
 }
-Partials atan_partials(Args a, const Expr&) { return {strong(num(a[0], 1) / (num(a[0], 1) + square(a[0])))}; }
+Partials atan_partials(Args a, const Expr&) {
+  return {strong(num(a[0], 1) / (num(a[0], 1) + square(a[0])))};
+}
 // Scaled by the radius in two steps, so that neither overflow nor underflow of y^2 + x^2 shows.
 Partials atan2_partials(Args a, const Expr&) {
   const Expr &y = a[0], &x = a[1];
@@ -81,7 +88,9 @@ Partials acosh_partials(Args a, const Expr&) {
   const Expr& x = a[0];
   return {strong(num(x, 1) / (op1(Op::sqrt, x - num(x, 1)) * op1(Op::sqrt, x + num(x, 1))))};
 }
-Partials atanh_partials(Args a, const Expr&) { return {strong(num(a[0], 1) / one_minus_square(a[0]))}; }
+Partials atanh_partials(Args a, const Expr&) {
+  return {strong(num(a[0], 1) / one_minus_square(a[0]))};
+}
 Partials erf_partials(Args a, const Expr&) {
   return {strong(num(a[0], 2 * std::numbers::inv_sqrtpi) * op1(Op::exp, -square(a[0])))};
 }
@@ -89,7 +98,9 @@ Partials fast_log_partials(Args a, const Expr&) { return {strong(num(a[0], 1) / 
 Partials fast_sin_partials(Args a, const Expr&) { return {strong(op1(Op::fast_cos, a[0]))}; }
 Partials fast_cos_partials(Args a, const Expr&) { return {strong(-op1(Op::fast_sin, a[0]))}; }
 Partials fast_inverse_partials(Args, const Expr& v) { return {strong(-square(v))}; }
-Partials fast_inverse_sqrt_partials(Args, const Expr& v) { return {strong(num(v, -0.5) * v * square(v))}; }
+Partials fast_inverse_sqrt_partials(Args, const Expr& v) {
+  return {strong(num(v, -0.5) * v * square(v))};
+}
 Partials saturating_cast_partials(Args a, const Expr& v) {
   Expr inside = cast_to(a[0].type(), v) == a[0];
   if (v.type().can_represent(a[0].type())) return {plain(make_one(v.type()))};
@@ -98,8 +109,12 @@ Partials saturating_cast_partials(Args a, const Expr& v) {
 }
 Partials strong_mul_partials(Args a, const Expr&) { return {strong(a[1]), strong(a[0])}; }
 
-Partials add_partials(Args a, const Expr&) { return {plain(make_one(a[0].type())), plain(make_one(a[0].type()))}; }
-Partials sub_partials(Args a, const Expr&) { return {plain(make_one(a[0].type())), plain(num(a[0], -1))}; }
+Partials add_partials(Args a, const Expr&) {
+  return {plain(make_one(a[0].type())), plain(make_one(a[0].type()))};
+}
+Partials sub_partials(Args a, const Expr&) {
+  return {plain(make_one(a[0].type())), plain(num(a[0], -1))};
+}
 Partials mul_partials(Args a, const Expr&) { return {plain(a[1]), plain(a[0])}; }
 Partials div_partials(Args a, const Expr& v) {
   if (is_const(a[1]) && !is_zero(a[1])) return {plain(num(a[0], 1) / a[1]), Partial{}};
@@ -109,11 +124,12 @@ Partials mod_partials(Args a, const Expr&) {
   return {plain(make_one(a[0].type())), strong(-op1(Op::floor, a[0] / a[1]))};
 }
 DerivativeRule smooth(PartialsFn partials, const char* domain, const char* convention,
-                            const char* source = "[GW] table 2.1") {
+                      const char* source = "[GW] table 2.1") {
   return {RuleClass::Smooth, partials, -1, domain, convention, source};
 }
 DerivativeRule constant(const char* convention) {
-  return {RuleClass::Constant, nullptr, -1, "everywhere but at the steps", convention, "definition"};
+  return {RuleClass::Constant,           nullptr,    -1,
+          "everywhere but at the steps", convention, "definition"};
 }
 DerivativeRule transparent(int arg, const char* convention = "the value is the argument's") {
   return {RuleClass::Transparent, nullptr, arg, "everywhere", convention, "definition"};
@@ -128,29 +144,34 @@ OpTable make_op_table() {
   const char* test = "a truth value: derivative 0";
   const char* lowering = "made by lowering only, after differentiation";
   OpTable t;
-  for (Op op : {Op::bitwise_and, Op::bitwise_or, Op::bitwise_xor, Op::bitwise_not, Op::shift_left, Op::shift_right,
-                Op::popcount, Op::count_leading_zeros, Op::count_trailing_zeros}) {
+  for (Op op : {Op::bitwise_and, Op::bitwise_or, Op::bitwise_xor, Op::bitwise_not, Op::shift_left,
+                Op::shift_right, Op::popcount, Op::count_leading_zeros, Op::count_trailing_zeros}) {
     t.emplace(op, constant(bits));
   }
   for (Op op : {Op::is_nan, Op::is_inf, Op::is_finite}) t.emplace(op, constant(test));
-  for (Op op : {Op::floor, Op::ceil, Op::round, Op::trunc}) t.emplace(op, constant("0 everywhere, at the steps too"));
+  for (Op op : {Op::floor, Op::ceil, Op::round, Op::trunc})
+    t.emplace(op, constant("0 everywhere, at the steps too"));
   t.emplace(Op::abs, smooth(abs_partials, "x != 0", "0 at 0"));
   t.emplace(Op::absd, smooth(absd_partials, "a != b", "0 where a == b"));
-  t.emplace(Op::lerp, smooth(lerp_partials, "everywhere", "floating weights; integer weights are constants",
-                             "definition"));
-  t.emplace(Op::sqrt, smooth(sqrt_partials, "x > 0", "+inf at 0, times a strong zero; NaN below 0"));
+  t.emplace(Op::lerp, smooth(lerp_partials, "everywhere",
+                             "floating weights; integer weights are constants", "definition"));
+  t.emplace(Op::sqrt,
+            smooth(sqrt_partials, "x > 0", "+inf at 0, times a strong zero; NaN below 0"));
   t.emplace(Op::exp, smooth(exp_partials, "everywhere", "inf where exp overflows"));
-  t.emplace(Op::log, smooth(log_partials, "x > 0", "inf at 0, 1/x below 0 where the primal is NaN"));
+  t.emplace(Op::log,
+            smooth(log_partials, "x > 0", "inf at 0, 1/x below 0 where the primal is NaN"));
   t.emplace(Op::pow, smooth(pow_partials, "x > 0, or integer p",
                             "dx is 0 where p == 0; dp is 0 where x == 0 and NaN where x < 0"));
-  t.emplace(Op::hypot, smooth(hypot_partials, "(x, y) != (0, 0)", "0 at the origin: the smallest subgradient"));
+  t.emplace(Op::hypot, smooth(hypot_partials, "(x, y) != (0, 0)",
+                              "0 at the origin: the smallest subgradient"));
   t.emplace(Op::sin, smooth(sin_partials, "everywhere", "NaN at infinities"));
   t.emplace(Op::cos, smooth(cos_partials, "everywhere", "NaN at infinities"));
   t.emplace(Op::tan, smooth(tan_partials, "x != pi/2 + k pi", "1 + tan^2, huge near the poles"));
   t.emplace(Op::asin, smooth(asin_partials, "|x| < 1", "inf at -1 and 1, NaN outside"));
   t.emplace(Op::acos, smooth(acos_partials, "|x| < 1", "-inf at -1 and 1, NaN outside"));
   t.emplace(Op::atan, smooth(atan_partials, "everywhere", "0 at infinities"));
-  t.emplace(Op::atan2, smooth(atan2_partials, "(y, x) != (0, 0)", "0 at the origin", "[DLMF] 4.24"));
+  t.emplace(Op::atan2,
+            smooth(atan2_partials, "(y, x) != (0, 0)", "0 at the origin", "[DLMF] 4.24"));
   t.emplace(Op::sinh, smooth(sinh_partials, "everywhere", "inf where cosh overflows"));
   t.emplace(Op::cosh, smooth(cosh_partials, "everywhere", "inf where sinh overflows"));
   t.emplace(Op::tanh, smooth(tanh_partials, "everywhere", "0 at infinities"));
@@ -166,10 +187,11 @@ OpTable make_op_table() {
   t.emplace(Op::fast_cos, smooth(fast_cos_partials, "everywhere", approximated));
   t.emplace(Op::fast_inverse, smooth(fast_inverse_partials, "x != 0", approximated));
   t.emplace(Op::fast_inverse_sqrt, smooth(fast_inverse_sqrt_partials, "x > 0", approximated));
-  t.emplace(Op::saturating_cast, smooth(saturating_cast_partials, "inside the type's range",
-                                        "0 where the value saturates; to integers: 0", "definition"));
-  t.emplace(Op::strong_mul, smooth(strong_mul_partials, "everywhere", "as a product, with strong zeros",
-                                   "definition"));
+  t.emplace(Op::saturating_cast,
+            smooth(saturating_cast_partials, "inside the type's range",
+                   "0 where the value saturates; to integers: 0", "definition"));
+  t.emplace(Op::strong_mul, smooth(strong_mul_partials, "everywhere",
+                                   "as a product, with strong zeros", "definition"));
   t.emplace(Op::likely, transparent(0));
   t.emplace(Op::likely_if_innermost, transparent(0));
   t.emplace(Op::promise_clamped, transparent(0, "the bounds are promises, not values"));
@@ -182,15 +204,16 @@ OpTable make_op_table() {
   t.emplace(Op::print_when, transparent(1));
   t.emplace(Op::require, transparent(1));
   t.emplace(Op::random, constant("depends on its seeds only"));
-  for (Op op : {Op::buffer_host, Op::buffer_min, Op::buffer_extent, Op::buffer_stride, Op::buffer_dimensions,
-                Op::buffer_type, Op::buffer_is_null, Op::buffer_is_query, Op::buffer_set_bounds, Op::address_of,
-                Op::if_then_else, Op::error}) {
+  for (Op op : {Op::buffer_host, Op::buffer_min, Op::buffer_extent, Op::buffer_stride,
+                Op::buffer_dimensions, Op::buffer_type, Op::buffer_is_null, Op::buffer_is_query,
+                Op::buffer_set_bounds, Op::address_of, Op::if_then_else, Op::error}) {
     t.emplace(op, no_rule(lowering));
   }
   return t;
 }
 
-// d min(a, b): the operand that the primal takes gets all. At a tie that is one of them: the two sum to 1.
+// d min(a, b): the operand that the primal takes gets all. At a tie that is one of them: the two
+// sum to 1.
 Partials taken_partials(Args a, const Expr& first_taken) {
   Type type = a[0].type();
   return {plain(make_select(first_taken, make_one(type), make_zero(type))),
@@ -204,19 +227,27 @@ KindTable make_kind_table() {
   KindTable t;
   t.emplace(Kind::Add, smooth(add_partials, "everywhere", "none needed"));
   t.emplace(Kind::Sub, smooth(sub_partials, "everywhere", "none needed"));
-  t.emplace(Kind::Mul, smooth(mul_partials, "everywhere", "strong zero where a factor may be infinite or NaN"));
-  t.emplace(Kind::Div, smooth(div_partials, "b != 0", "infinite at b == 0, times a strong zero; integers: 0"));
-  t.emplace(Kind::Mod, smooth(mod_partials, "a / b not an integer",
-                              "da is 1 and db -floor(a / b) at the steps too; integers: 0", "definition"));
-  t.emplace(Kind::Min, smooth(min_partials, "a != b", "the operand taken gets 1; at a tie that is b", "definition"));
-  t.emplace(Kind::Max, smooth(max_partials, "a != b", "the operand taken gets 1; at a tie that is b", "definition"));
-  for (Kind k : {Kind::EQ, Kind::NE, Kind::LT, Kind::LE, Kind::GT, Kind::GE, Kind::And, Kind::Or, Kind::Not}) {
+  t.emplace(Kind::Mul, smooth(mul_partials, "everywhere",
+                              "strong zero where a factor may be infinite or NaN"));
+  t.emplace(Kind::Div,
+            smooth(div_partials, "b != 0", "infinite at b == 0, times a strong zero; integers: 0"));
+  t.emplace(Kind::Mod,
+            smooth(mod_partials, "a / b not an integer",
+                   "da is 1 and db -floor(a / b) at the steps too; integers: 0", "definition"));
+  t.emplace(Kind::Min, smooth(min_partials, "a != b",
+                              "the operand taken gets 1; at a tie that is b", "definition"));
+  t.emplace(Kind::Max, smooth(max_partials, "a != b",
+                              "the operand taken gets 1; at a tie that is b", "definition"));
+  for (Kind k : {Kind::EQ, Kind::NE, Kind::LT, Kind::LE, Kind::GT, Kind::GE, Kind::And, Kind::Or,
+                 Kind::Not}) {
     t.emplace(k, constant("a truth value: derivative 0"));
   }
-  t.emplace(Kind::Cast, transparent(0, "between floats: the adjoint is converted; to or from integers: 0"));
+  t.emplace(Kind::Cast,
+            transparent(0, "between floats: the adjoint is converted; to or from integers: 0"));
   t.emplace(Kind::Reinterpret, no_rule("the bits of a value are no differentiable function of it"));
-  t.emplace(Kind::Select, DerivativeRule{RuleClass::Smooth, nullptr, -1, "where the condition does not change",
-                                         "the chosen arm gets all, the other exactly 0", "definition"});
+  t.emplace(Kind::Select,
+            DerivativeRule{RuleClass::Smooth, nullptr, -1, "where the condition does not change",
+                           "the chosen arm gets all, the other exactly 0", "definition"});
   return t;
 }
 
@@ -253,7 +284,8 @@ Expr times_partial(const Expr& adjoint, const Partial& partial) {
   if (is_zero(partial.factor)) return make_zero(adjoint.type());
   // A choice stays a choice: inf * 0 must not make a NaN of the operand that was not taken.
   if (const auto* choice = partial.factor.as<Select>()) {
-    return make_select(choice->condition, times_partial(adjoint, {choice->true_value, partial.strength}),
+    return make_select(choice->condition,
+                       times_partial(adjoint, {choice->true_value, partial.strength}),
                        times_partial(adjoint, {choice->false_value, partial.strength}));
   }
   Expr factor = cast_to(adjoint.type(), partial.factor);

@@ -1,5 +1,6 @@
-// The scalar derivative rules: one table over all operators and binary kinds, with domains, conventions and sources.
-// Structural rules (select, calls of Funcs, updates) stand in reverse_sweep.h and synthesis.h.
+// The scalar derivative rules: one table over all operators and binary kinds, with domains,
+// conventions and sources. Structural rules (select, calls of Funcs, updates) stand in
+// reverse_sweep.h and synthesis.h.
 #pragma once
 
 #include <vector>
@@ -9,8 +10,8 @@
 namespace retrograde::ir {
 
 enum class RuleClass : uint8_t {
-  Smooth,       // has partials
-  Constant,     // piecewise constant: derivative 0 wherever it exists, and 0 by convention elsewhere
+  Smooth,    // has partials
+  Constant,  // piecewise constant: derivative 0 wherever it exists, and 0 by convention elsewhere
   Transparent,  // the value of one argument: its adjoint is the call's
   Blocked,      // 0 because the user says so
   NoRule,       // no derivative; `convention` says why. Reaching one with an adjoint is an error.
@@ -44,7 +45,8 @@ const DerivativeRule& derivative_rule(Op op);
 const DerivativeRule& derivative_rule(Kind kind);
 bool has_derivative_rule(Kind kind);  // whether the table has a row for the kind
 
-// The type in which the adjoint of a value of floating `type` is accumulated: float32 for the 16-bit floats.
+// The type in which the adjoint of a value of floating `type` is accumulated: float32 for the
+// 16-bit floats.
 Type adjoint_type(Type type);
 // adjoint * partial, by the partial's strength; `adjoint` and the result are of the adjoint type.
 Expr times_partial(const Expr& adjoint, const Partial& partial);

@@ -26,7 +26,8 @@ const char* to_string(Explanation::Kind kind) {
 
 std::string to_string(const std::vector<Explanation>& explanations) {
   std::string out;
-  for (const Explanation& e : explanations) out += text(to_string(e.kind), " ", quoted(e.subject), ": ", e.detail, "\n");
+  for (const Explanation& e : explanations)
+    out += text(to_string(e.kind), " ", quoted(e.subject), ": ", e.detail, "\n");
   return out;
 }
 

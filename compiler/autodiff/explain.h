@@ -9,13 +9,13 @@ namespace retrograde {
 // One fact. `subject` is the user's name of the Func, image or parameter that it is about.
 struct Explanation {
   enum class Kind {
-    Built,        // an adjoint was built; detail says how it accumulates
-    Scattered,    // an index depends on data
-    Privatised,   // accumulated in parts, then summed in order
-    Zero,         // the gradient is identically zero, and why
-    NotRequested, // left out: nothing that was asked for needs it
-    Version,      // an update needed the adjoint or the value of an earlier version
-    Performance,  // legal, but slow
+    Built,         // an adjoint was built; detail says how it accumulates
+    Scattered,     // an index depends on data
+    Privatised,    // accumulated in parts, then summed in order
+    Zero,          // the gradient is identically zero, and why
+    NotRequested,  // left out: nothing that was asked for needs it
+    Version,       // an update needed the adjoint or the value of an earlier version
+    Performance,   // legal, but slow
   };
   Kind kind;
   std::string subject;

@@ -23,14 +23,16 @@ IslContext::IslContext() : ctx(isl_ctx_alloc()) {
 }
 IslContext::~IslContext() { isl_ctx_free(ctx); }
 
-IslBridge::IslBridge(IslContext& context, std::vector<std::string> dims) : ctx_(context.ctx), dims_(std::move(dims)) {
+IslBridge::IslBridge(IslContext& context, std::vector<std::string> dims)
+    : ctx_(context.ctx), dims_(std::move(dims)) {
   isl_space* space = isl_space_set_alloc(ctx_, 0, static_cast<unsigned>(dims_.size()));
   universe_ = isl::manage(isl_set_universe(space));
 }
 
 IslBridge IslBridge::with_dims(std::vector<std::string> dims) const {
   IslBridge result = *this;
-  result.universe_ = isl::manage(isl_set_universe(isl_space_set_alloc(ctx_, 0, static_cast<unsigned>(dims.size()))));
+  result.universe_ = isl::manage(
+      isl_set_universe(isl_space_set_alloc(ctx_, 0, static_cast<unsigned>(dims.size()))));
   result.dims_ = std::move(dims);
   return result;
 }
@@ -45,7 +47,8 @@ isl::pw_aff IslBridge::dim(int position) const {
 }
 
 isl::pw_aff IslBridge::parameter(const Expr& e) {
-  auto [it, is_new] = parameter_names_.try_emplace(e, "p" + std::to_string(parameter_names_.size()));
+  auto [it, is_new] =
+      parameter_names_.try_emplace(e, "p" + std::to_string(parameter_names_.size()));
   if (is_new) parameters_[it->second] = e;
   isl_id* id = isl_id_alloc(ctx_, it->second.c_str(), nullptr);
   return isl::manage(isl_pw_aff_param_on_domain_id(universe_.copy(), id));
@@ -81,7 +84,8 @@ std::optional<isl::pw_aff> IslBridge::binary(const Binary& b, const Expr& e) {
     if (!a) return std::nullopt;
     isl::val magnitude = isl::manage(isl_val_int_from_si(ctx_, std::abs(*divisor)));
     if (b.kind == Kind::Mod) return a->mod(magnitude);
-    isl::pw_aff quotient = isl::manage(isl_pw_aff_scale_down_val(a->copy(), magnitude.copy())).floor();
+    isl::pw_aff quotient =
+        isl::manage(isl_pw_aff_scale_down_val(a->copy(), magnitude.copy())).floor();
     return *divisor > 0 ? quotient : quotient.neg();
   }
   auto a = affine(b.a), c = affine(b.b);
@@ -120,7 +124,8 @@ std::optional<isl::pw_aff> IslBridge::affine(const Expr& e) {
         return t->intersect_domain(*c).union_add(f->intersect_domain(otherwise)).coalesce();
       },
       [&](const Cast& c) -> std::optional<isl::pw_aff> {
-        bool exact = c.value.type().is_int() && c.type.is_int() && c.value.type().bits() >= 32 && c.type.bits() >= 32;
+        bool exact = c.value.type().is_int() && c.type.is_int() && c.value.type().bits() >= 32 &&
+                     c.type.bits() >= 32;
         return exact ? affine(c.value) : obstacle(e);
       },
       [&](const Call& c) -> std::optional<isl::pw_aff> {
@@ -194,7 +199,8 @@ class SumBuilder {
  public:
   void add(const Expr& term, int64_t coefficient) {
     if (coefficient == 0) return;
-    Expr scaled = std::abs(coefficient) == 1 ? term : term * make_const(Int(32), std::abs(coefficient));
+    Expr scaled =
+        std::abs(coefficient) == 1 ? term : term * make_const(Int(32), std::abs(coefficient));
     Expr& side = coefficient > 0 ? plus_ : minus_;
     side = side.defined() ? side + scaled : scaled;
   }
@@ -205,7 +211,8 @@ class SumBuilder {
     }
     Expr result = minus_.defined() ? plus_ - minus_ : plus_;
     if (constant == 0) return result;
-    return constant > 0 ? result + make_const(Int(32), constant) : result - make_const(Int(32), -constant);
+    return constant > 0 ? result + make_const(Int(32), constant)
+                        : result - make_const(Int(32), -constant);
   }
 
  private:
@@ -216,11 +223,13 @@ class SumBuilder {
 
 class IslToExpr {
  public:
-  IslToExpr(const IslBridge& bridge, const std::vector<Expr>& names) : bridge_(bridge), names_(names) {}
+  IslToExpr(const IslBridge& bridge, const std::vector<Expr>& names)
+      : bridge_(bridge), names_(names) {}
 
   Expr aff(__isl_keep isl_aff* a) const {
     int64_t denominator = to_int(isl_aff_get_denominator_val(a));
-    isl_aff* scaled = isl_aff_scale_val(isl_aff_copy(a), isl_val_int_from_si(bridge_.ctx_, denominator));
+    isl_aff* scaled =
+        isl_aff_scale_val(isl_aff_copy(a), isl_val_int_from_si(bridge_.ctx_, denominator));
     Expr result = integral(scaled);
     isl_aff_free(scaled);
     return denominator == 1 ? result : result / make_const(Int(32), denominator);
@@ -245,7 +254,8 @@ class IslToExpr {
         &collect);
     if (list.empty()) return make_zero(Int(32));
     Expr result = list.back().value;
-    for (size_t i = list.size() - 1; i-- > 0;) result = make_select(list[i].condition, list[i].value, result);
+    for (size_t i = list.size() - 1; i-- > 0;)
+      result = make_select(list[i].condition, list[i].value, result);
     return result;
   }
 
@@ -292,7 +302,8 @@ class IslToExpr {
 
   Expr name(__isl_keep isl_aff* a, isl_dim_type type, int i) const {
     if (type == isl_dim_in) return names_.at(static_cast<size_t>(i));
-    return cast_to(Int(32), bridge_.parameters_.at(isl_aff_get_dim_name(a, isl_dim_param, static_cast<unsigned>(i))));
+    return cast_to(Int(32), bridge_.parameters_.at(
+                                isl_aff_get_dim_name(a, isl_dim_param, static_cast<unsigned>(i))));
   }
 
   Expr basic_set(__isl_keep isl_basic_set* b) const {

@@ -1,7 +1,8 @@
 // Expressions to isl and back.
 //
-// A space is a tuple of named integer dimensions (loop variables) and parameters. Sub-expressions that isl cannot
-// follow and that mention no dimension become parameters: they are the same for every point of the set.
+// A space is a tuple of named integer dimensions (loop variables) and parameters. Sub-expressions
+// that isl cannot follow and that mention no dimension become parameters: they are the same for
+// every point of the set.
 #pragma once
 
 #include <isl/cpp.h>
@@ -50,13 +51,16 @@ class IslBridge {
   const std::set<Expr, StructuralLess>& obstacles() const { return obstacles_; }
   void clear_obstacles() { obstacles_.clear(); }
 
-  // Back. `names` gives an expression for each dimension of the space at hand (sets and domains of pw_affs).
+  // Back. `names` gives an expression for each dimension of the space at hand (sets and domains of
+  // pw_affs).
   Expr to_expr(const isl::pw_aff& e, const std::vector<Expr>& names) const;
   Expr to_expr(const isl::set& s, const std::vector<Expr>& names) const;  // true for the universe
   // An expression over the parameters only (a pw_aff without dimensions).
   Expr to_expr(const isl::pw_aff& e) const { return to_expr(e, {}); }
   // Replaces a fixed sub-expression by its value at the point that the caller has found.
-  void set_parameter_value(const std::string& name, const Expr& value) { parameters_[name] = value; }
+  void set_parameter_value(const std::string& name, const Expr& value) {
+    parameters_[name] = value;
+  }
   const std::map<std::string, Expr>& parameters() const { return parameters_; }
 
  private:

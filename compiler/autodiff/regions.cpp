@@ -16,7 +16,8 @@ Scope<Interval> scope_of(const FuncContents& f, const Definition& definition, co
   for (size_t d = 0; d < f.args.size(); ++d) {
     if (is_pure_position(f, definition, d)) scope.push(f.args[d], box.at(d));
   }
-  for (const ReductionVariable& r : definition.rvars) scope.push(r.var, {r.min, simplify(r.min + r.extent - 1)});
+  for (const ReductionVariable& r : definition.rvars)
+    scope.push(r.var, {r.min, simplify(r.min + r.extent - 1)});
   return scope;
 }
 
@@ -59,23 +60,28 @@ void Regions::grow(const Symbol* symbol, const Box& box) {
 
 void Regions::add_func(const FuncPtr& f) {
   auto found = boxes_.find(f.get());
-  if (found == boxes_.end() || (found->second.empty() && !f->args.empty())) return;  // nothing of it is read
+  if (found == boxes_.end() || (found->second.empty() && !f->args.empty()))
+    return;  // nothing of it is read
   std::map<const Symbol*, Box> callees;
-  // From the last stage back: what an update reads of the Func itself, the stages before it must hold.
+  // From the last stage back: what an update reads of the Func itself, the stages before it must
+  // hold.
   for (int s = f->stage_count() - 1; s >= 0; --s) {
     const Definition& definition = f->stage(s);
     Scope<Interval> scope = scope_of(*f, definition, boxes_[f.get()]);
     Box written;
     for (size_t d = 0; d < f->args.size(); ++d) {
       const Interval mine = boxes_[f.get()][d];
-      written.push_back(is_pure_position(*f, definition, d) ? mine : bounds_of(definition.args[d], scope));
+      written.push_back(is_pure_position(*f, definition, d) ? mine
+                                                            : bounds_of(definition.args[d], scope));
     }
     if (s > 0) grow(f.get(), or_else(written, boxes_[f.get()]));
     for_each_expr(definition, [&](const Expr& e) {
       for (const auto& [name, footprint] : footprints(without_lets(e), scope)) {
         Symbol* symbol = footprint.symbol.raw();
-        if (symbol == f.get()) grow(f.get(), or_else(footprint.box, boxes_[f.get()]));
-        else callees[symbol] = hull(callees[symbol], footprint.box);
+        if (symbol == f.get())
+          grow(f.get(), or_else(footprint.box, boxes_[f.get()]));
+        else
+          callees[symbol] = hull(callees[symbol], footprint.box);
       }
     });
   }
@@ -88,7 +94,8 @@ const Box& Regions::of(const Symbol* symbol) const {
   return found == boxes_.end() ? nothing : found->second;
 }
 
-std::vector<LoopVariable> Regions::loop_variables(const Symbol* symbol, const std::vector<std::string>& names) const {
+std::vector<LoopVariable> Regions::loop_variables(const Symbol* symbol,
+                                                  const std::vector<std::string>& names) const {
   const Box& box = of(symbol);
   std::vector<LoopVariable> result;
   for (size_t d = 0; d < names.size() && d < box.size(); ++d) {
@@ -102,7 +109,8 @@ IterationDomain Regions::domain(const FuncContents& f, int stage) const {
   const Box& box = of(&f);
   IterationDomain result;
   for (size_t d = 0; d < f.args.size(); ++d) {
-    if (is_pure_position(f, definition, d)) result.vars.push_back({f.args[d], box.at(d).min, box.at(d).max, false});
+    if (is_pure_position(f, definition, d))
+      result.vars.push_back({f.args[d], box.at(d).min, box.at(d).max, false});
   }
   for (const ReductionVariable& r : definition.rvars) {
     result.vars.push_back({r.var, r.min, simplify(r.min + r.extent - 1), true});

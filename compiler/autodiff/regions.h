@@ -17,11 +17,14 @@ class Regions {
 
   // One more Func and its region, and what it reads.
   void add(const FuncPtr& f, const Box& box);
-  // Elements of a Func or image that are read or computed; undefined ends are unbounded. Empty: never read.
+  // Elements of a Func or image that are read or computed; undefined ends are unbounded. Empty:
+  // never read.
   const Box& of(const Symbol* symbol) const;
-  // The variables of a stage with their ranges: pure variables, then reduction variables, innermost first.
+  // The variables of a stage with their ranges: pure variables, then reduction variables, innermost
+  // first.
   IterationDomain domain(const FuncContents& f, int stage) const;
-  std::vector<LoopVariable> loop_variables(const Symbol* symbol, const std::vector<std::string>& names) const;
+  std::vector<LoopVariable> loop_variables(const Symbol* symbol,
+                                           const std::vector<std::string>& names) const;
 
  private:
   void add_func(const FuncPtr& f);

@@ -34,15 +34,30 @@ std::vector<Expr> post_order(const std::vector<Expr>& roots) {
 
 bool is_leaf(const Expr& e) {
   const auto* call = e.as<Call>();
-  return e.as<Variable>() || (call && (call->call_type == CallType::Func || call->call_type == CallType::Image));
+  return e.as<Variable>() ||
+         (call && (call->call_type == CallType::Func || call->call_type == CallType::Image));
 }
 
 // Operators whose value may be infinite or NaN at finite operands.
 bool is_risky_op(Op op) {
   switch (op) {
-    case Op::sqrt: case Op::exp: case Op::log: case Op::pow: case Op::tan: case Op::asin: case Op::acos:
-    case Op::sinh: case Op::cosh: case Op::acosh: case Op::atanh: case Op::fast_exp: case Op::fast_log:
-    case Op::fast_pow: case Op::fast_inverse: case Op::fast_inverse_sqrt: case Op::strong_mul:
+    case Op::sqrt:
+    case Op::exp:
+    case Op::log:
+    case Op::pow:
+    case Op::tan:
+    case Op::asin:
+    case Op::acos:
+    case Op::sinh:
+    case Op::cosh:
+    case Op::acosh:
+    case Op::atanh:
+    case Op::fast_exp:
+    case Op::fast_log:
+    case Op::fast_pow:
+    case Op::fast_inverse:
+    case Op::fast_inverse_sqrt:
+    case Op::strong_mul:
       return true;
     default:
       return false;
@@ -51,7 +66,8 @@ bool is_risky_op(Op op) {
 
 class Sweep {
  public:
-  Sweep(const std::vector<Expr>& values, const std::vector<Expr>& seeds, FunctionRef<bool(const Expr&)> is_wanted)
+  Sweep(const std::vector<Expr>& values, const std::vector<Expr>& seeds,
+        FunctionRef<bool(const Expr&)> is_wanted)
       : order_(post_order(values)) {
     for (const Expr& e : order_) classify(e, is_wanted);
     for (size_t i = 0; i < values.size(); ++i) {
@@ -93,7 +109,8 @@ class Sweep {
       const auto* call = e.as<Call>();
       risky |= call && (call->call_type == CallType::Extern || is_risky_op(call->op));
     }
-    if (const auto* div = e.as<Div>(); div && is_const(div->b) && !risky_.contains(div->a.get())) risky = false;
+    if (const auto* div = e.as<Div>(); div && is_const(div->b) && !risky_.contains(div->a.get()))
+      risky = false;
     if (active) active_.insert(e.get());
     if (risky) risky_.insert(e.get());
     if (is_leaf(e) && !e.as<Variable>()) loads_.insert(e.get());
@@ -104,7 +121,8 @@ class Sweep {
 
   void note_if_lost(const Expr& e, bool active) {
     if (!active) return;
-    if (e.as<Cast>()) result_.notes.insert("a cast to " + to_string(e.type()) + " has derivative 0");
+    if (e.as<Cast>())
+      result_.notes.insert("a cast to " + to_string(e.type()) + " has derivative 0");
   }
 
   void add(const Expr& e, const Expr& adjoint, bool masked) {
@@ -115,14 +133,17 @@ class Sweep {
     state.masked |= masked;
   }
 
-  void add_partials(const std::vector<Expr>& operands, const std::vector<Partial>& partials, const State& state) {
+  void add_partials(const std::vector<Expr>& operands, const std::vector<Partial>& partials,
+                    const State& state) {
     bool risky_operand = false, reads = false;
     for (const Expr& operand : operands) {
       risky_operand |= risky_.contains(operand.get());
       reads |= loads_.contains(operand.get());
     }
     for (size_t i = 0; i < operands.size(); ++i) {
-      if (i >= partials.size() || !partials[i].factor.defined() || !active_.contains(operands[i].get())) continue;
+      if (i >= partials.size() || !partials[i].factor.defined() ||
+          !active_.contains(operands[i].get()))
+        continue;
       Partial partial = partials[i];
       if (risky_operand || (state.masked && reads)) partial.strength = Strength::Strong;
       bool masks = partial.factor.as<Select>() != nullptr;
@@ -140,20 +161,28 @@ class Sweep {
           add(s.false_value, make_select(s.condition, zero, state.sum), true);
         },
         [&](const Cast& c) { add(c.value, state.sum, state.masked); },
-        [&](const Broadcast&) { internal_error("vectors have no place in the definition of a Func"); },
-        [&](const Binary& b) { add_partials({b.a, b.b}, derivative_rule(e.kind()).partials({b.a, b.b}, e), state); },
+        [&](const Broadcast&) {
+          internal_error("vectors have no place in the definition of a Func");
+        },
+        [&](const Binary& b) {
+          add_partials({b.a, b.b}, derivative_rule(e.kind()).partials({b.a, b.b}, e), state);
+        },
         [&](const Call& call) { propagate_call(e, call, state); },
         [&](const ExprNode& node) {
-          if (!has_derivative_rule(node.kind)) internal_error(text("no derivative of a ", kind_name(node.kind)));
-          unsupported(text("differentiate ", kind_name(node.kind)), derivative_rule(node.kind).convention);
+          if (!has_derivative_rule(node.kind))
+            internal_error(text("no derivative of a ", kind_name(node.kind)));
+          unsupported(text("differentiate ", kind_name(node.kind)),
+                      derivative_rule(node.kind).convention);
         });
   }
 
   void propagate_call(const Expr& e, const Call& call, const State& state) {
     if (call.call_type == CallType::Extern) {
       unsupported(text("differentiate the call of the C function ", quoted(call.name)),
-                  "a C function has no known derivative", "the gradient of one of its arguments is wanted",
-                  text("wrap the argument in stop_gradient, or write ", quoted(call.name), " in the language"));
+                  "a C function has no known derivative",
+                  "the gradient of one of its arguments is wanted",
+                  text("wrap the argument in stop_gradient, or write ", quoted(call.name),
+                       " in the language"));
     }
     const DerivativeRule& rule = derivative_rule(call.op);
     const char* name = op_info(call.op).name;

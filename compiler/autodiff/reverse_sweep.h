@@ -4,7 +4,8 @@
 // Linearised:  dv_k = sum_i (d phi_k / d operand_i) d operand_i
 // Transposed:  adj(operand_i) += adj(v_k) * d phi_k / d operand_i, in the opposite order
 //
-// Every node is visited once, whatever its number of uses, so the cost is linear in the size of the DAG.
+// Every node is visited once, whatever its number of uses, so the cost is linear in the size of the
+// DAG.
 #pragma once
 
 #include <set>

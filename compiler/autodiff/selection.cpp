@@ -43,8 +43,8 @@ class Finder {
 
   bool is_self(const Expr& e, int k) const {
     const auto* call = e.as<Call>();
-    return call && call->call_type == CallType::Func && call->symbol.raw() == f_.get() && call->value_index == k &&
-           at_write(*call);
+    return call && call->call_type == CallType::Func && call->symbol.raw() == f_.get() &&
+           call->value_index == k && at_write(*call);
   }
   bool at_write(const Call& call) const {
     return std::equal(call.args.begin(), call.args.end(), definition_.args.begin(),
@@ -63,7 +63,8 @@ class Finder {
     bool own = true;
     walk(e, [&](const Expr& node) {
       const auto* call = node.as<Call>();
-      if (call && call->call_type == CallType::Func && call->symbol.raw() == f_.get()) own &= at_write(*call);
+      if (call && call->call_type == CallType::Func && call->symbol.raw() == f_.get())
+        own &= at_write(*call);
       return own;
     });
     return own;
@@ -89,15 +90,18 @@ class Finder {
     for (const std::string& arg : f_->args) args.push_back(variable(arg));
     FuncPtr before = stage_ > 1 ? clone_prefix(f_, stage_) : nullptr;
     for (size_t k = 0; k < f_->types.size(); ++k) {
-      initial.push_back(before ? call_value(before, args, static_cast<int>(k)) : f_->pure->values[k]);
+      initial.push_back(before ? call_value(before, args, static_cast<int>(k))
+                               : f_->pure->values[k]);
     }
     initial.push_back(make_const(Int(32), -1));
     define_pure(w, args, initial);
     std::vector<Expr> values;
-    for (size_t k = 0; k < f_->types.size(); ++k) values.push_back(call_instead(without_lets(definition_.values[k]), f_, w));
+    for (size_t k = 0; k < f_->types.size(); ++k)
+      values.push_back(call_instead(without_lets(definition_.values[k]), f_, w));
     int index = static_cast<int>(f_->types.size());
     Expr old = call_value(w, definition_.args, index);
-    values.push_back(make_select(call_instead(condition, f_, w), iteration_number(definition_.rvars), old));
+    values.push_back(
+        make_select(call_instead(condition, f_, w), iteration_number(definition_.rvars), old));
     append_update(w, definition_.args, values, definition_.rvars, definition_.predicate);
     return w;
   }
@@ -109,6 +113,8 @@ class Finder {
 
 }  // namespace
 
-std::optional<Selection> find_selection(const FuncPtr& f, int stage) { return Finder(f, stage).find(); }
+std::optional<Selection> find_selection(const FuncPtr& f, int stage) {
+  return Finder(f, stage).find();
+}
 
 }  // namespace retrograde::ir

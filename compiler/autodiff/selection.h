@@ -1,4 +1,5 @@
-// Updates that keep either the old value or a new one: max, min, argmax, argmin, and selects like them.
+// Updates that keep either the old value or a new one: max, min, argmax, argmin, and selects like
+// them.
 #pragma once
 
 #include <optional>
@@ -8,7 +9,8 @@
 
 namespace retrograde::ir {
 
-// winner runs the update again and remembers the number of the iteration that wrote each element last, -1: none.
+// winner runs the update again and remembers the number of the iteration that wrote each element
+// last, -1: none.
 struct Selection {
   FuncPtr winner;
   int index_value;          // which value of `winner` is that number

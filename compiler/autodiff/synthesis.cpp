@@ -15,13 +15,17 @@ namespace retrograde::ir {
 
 namespace {
 
-const ParameterContents* as_parameter(const Symbol* symbol) { return dynamic_cast<const ParameterContents*>(symbol); }
+const ParameterContents* as_parameter(const Symbol* symbol) {
+  return dynamic_cast<const ParameterContents*>(symbol);
+}
 
 // What a wanted leaf refers to; null for variables that are no parameter.
 Symbol* symbol_of(const Expr& leaf) {
   if (const auto* call = leaf.as<Call>()) return call->symbol.raw();
   const auto* v = leaf.as<Variable>();
-  return v && as_parameter(v->symbol.raw()) && !as_parameter(v->symbol.raw())->is_buffer ? v->symbol.raw() : nullptr;
+  return v && as_parameter(v->symbol.raw()) && !as_parameter(v->symbol.raw())->is_buffer
+             ? v->symbol.raw()
+             : nullptr;
 }
 
 std::vector<std::string> implicit_args(int n) {
@@ -55,16 +59,20 @@ class Synthesis {
  private:
   // ---- which symbols lie between the requested inputs and the output ----
 
-  bool is_requested(const Symbol* symbol) const { return !options_.only_requested || options_.requested.contains(symbol); }
+  bool is_requested(const Symbol* symbol) const {
+    return !options_.only_requested || options_.requested.contains(symbol);
+  }
 
   void find_active() {
     for (const auto& parameter : parameters_of({seed_.output})) {
-      if (parameter->type.is_float() && is_requested(parameter.get())) active_.insert(parameter.get());
+      if (parameter->type.is_float() && is_requested(parameter.get()))
+        active_.insert(parameter.get());
     }
     for (const FuncPtr& f : order_) {
       bool active = is_requested(f.get());
       for (int s = 0; s < f->stage_count() && !active; ++s) active = reads_active(f->stage(s));
-      bool floating = std::any_of(f->types.begin(), f->types.end(), [](Type t) { return t.is_float(); });
+      bool floating =
+          std::any_of(f->types.begin(), f->types.end(), [](Type t) { return t.is_float(); });
       if (active && floating) active_.insert(f.get());
     }
   }
@@ -90,7 +98,8 @@ class Synthesis {
     for (size_t k = 0; k < seed_.values.size(); ++k) {
       if (!seed_.values[k].defined()) continue;
       for (const Gather& g : inversion.gathers) {
-        pending_[f.get()].push_back({static_cast<int>(k), g, substitute(seed_.values[k], g.iteration)});
+        pending_[f.get()].push_back(
+            {static_cast<int>(k), g, substitute(seed_.values[k], g.iteration)});
       }
     }
   }
@@ -101,7 +110,8 @@ class Synthesis {
     return target;
   }
   AdjointTarget target_of(const ParameterContents& p) const {
-    AdjointTarget target{p.name, implicit_args(p.is_buffer ? p.dimensions : 0), {adjoint_type(p.type)}, {}};
+    AdjointTarget target{
+        p.name, implicit_args(p.is_buffer ? p.dimensions : 0), {adjoint_type(p.type)}, {}};
     target.region = regions_.loop_variables(&p, target.args);
     return target;
   }
@@ -115,8 +125,9 @@ class Synthesis {
     record(*f, f->stage_count() - 1, adjoint);
     register_func(adjoint, f->name);
     for (int s = f->stage_count() - 1; s >= 1; --s) {
-      UpdateAdjoint update = differentiate_update({f, s, regions_, target, adjoint, extendable, options_.store_overwritten,
-                                                   [&](const Expr& leaf) { return is_wanted(leaf); }});
+      UpdateAdjoint update = differentiate_update(
+          {f, s, regions_, target, adjoint, extendable, options_.store_overwritten,
+           [&](const Expr& leaf) { return is_wanted(leaf); }});
       for (size_t v = 0; v < update.versions.size(); ++v) {
         regions_.add(update.versions[v], update.version_regions[v]);
         active_.insert(update.versions[v].get());
@@ -136,7 +147,9 @@ class Synthesis {
     pending_.erase(f.get());
   }
 
-  void record(const FuncContents& f, int stage, const AdjointFunc& adjoint) { result_.after_stage[{&f, stage}] = adjoint.func; }
+  void record(const FuncContents& f, int stage, const AdjointFunc& adjoint) {
+    result_.after_stage[{&f, stage}] = adjoint.func;
+  }
 
   bool is_wanted(const Expr& leaf) const {
     Symbol* symbol = symbol_of(leaf);
@@ -149,11 +162,13 @@ class Synthesis {
     contribute_stage(f, 0, values, regions_.domain(*f, 0), adjoint, {});
   }
 
-  void contribute_stage(const FuncPtr& f, int stage, const std::vector<Expr>& values, const IterationDomain& domain,
-                        const FuncPtr& adjoint, const SelfValues& self_values) {
+  void contribute_stage(const FuncPtr& f, int stage, const std::vector<Expr>& values,
+                        const IterationDomain& domain, const FuncPtr& adjoint,
+                        const SelfValues& self_values) {
     std::vector<Expr> seeds;
     for (size_t k = 0; k < values.size(); ++k) {
-      seeds.push_back(f->types[k].is_float() ? adjoint_at(*f, stage, adjoint, static_cast<int>(k)) : Expr());
+      seeds.push_back(f->types[k].is_float() ? adjoint_at(*f, stage, adjoint, static_cast<int>(k))
+                                             : Expr());
     }
     SweepResult sweep = sweep_reverse(values, seeds, [&](const Expr& leaf) {
       return is_wanted(leaf) && symbol_of(leaf) != f.get();
@@ -168,10 +183,12 @@ class Synthesis {
     Scope<Interval> scope;
     for (const LoopVariable& v : regions_.domain(f, stage).vars) scope.push(v.name, {v.min, v.max});
     Interval found = bounds_of(index, scope);
-    return found.is_bounded() && can_prove(found.min >= range.min) && can_prove(found.max <= range.max);
+    return found.is_bounded() && can_prove(found.min >= range.min) &&
+           can_prove(found.max <= range.max);
   }
 
-  // The adjoint where the stage writes. A place that depends on data may lie outside of all that is read: 0 there.
+  // The adjoint where the stage writes. A place that depends on data may lie outside of all that is
+  // read: 0 there.
   Expr adjoint_at(const FuncContents& f, int stage, const FuncPtr& adjoint, int k) const {
     std::vector<Expr> place;
     Expr inside = const_true();
@@ -196,12 +213,16 @@ class Synthesis {
   void add_contribution(const FuncPtr& f, const LeafAdjoint& leaf, const IterationDomain& domain) {
     Symbol* symbol = symbol_of(leaf.leaf);
     const auto* call = leaf.leaf.as<Call>();
-    AdjointTarget target = as_parameter(symbol) ? target_of(*as_parameter(symbol)) : target_of(*func_of(*call));
+    AdjointTarget target =
+        as_parameter(symbol) ? target_of(*as_parameter(symbol)) : target_of(*func_of(*call));
     AccessQuery query{domain, call ? call->args : std::vector<Expr>{}, target.args, target.region};
     const Inversion& inversion = invert_cached(f, symbol, query);
-    if (!inversion.note.empty()) explain(Explanation::Kind::Scattered, target.name, text("read by ", quoted(f->name), ": ", inversion.note));
+    if (!inversion.note.empty())
+      explain(Explanation::Kind::Scattered, target.name,
+              text("read by ", quoted(f->name), ": ", inversion.note));
     for (const Gather& g : inversion.gathers) {
-      pending_[symbol].push_back({call ? call->value_index : 0, g, substitute(leaf.adjoint, g.iteration)});
+      pending_[symbol].push_back(
+          {call ? call->value_index : 0, g, substitute(leaf.adjoint, g.iteration)});
     }
   }
 
@@ -217,13 +238,15 @@ class Synthesis {
     return it->second;
   }
 
-  // Calls of the Func by itself: kept versions where the final value is another; strong, since the adjoint owns it.
+  // Calls of the Func by itself: kept versions where the final value is another; strong, since the
+  // adjoint owns it.
   static Expr with_values(const FuncPtr& f, const Expr& e, const SelfValues& self_values) {
     if (f->updates.empty()) return e;
-    Expr replaced = self_values.empty() ? e : rewrite(e, [&](const Expr& node, const auto& recurse) {
-      auto it = self_values.find(node);
-      return it != self_values.end() ? it->second : map_children(node, recurse);
-    });
+    Expr replaced =
+        self_values.empty() ? e : rewrite(e, [&](const Expr& node, const auto& recurse) {
+          auto it = self_values.find(node);
+          return it != self_values.end() ? it->second : map_children(node, recurse);
+        });
     return redirect_calls(replaced, f, f, false);
   }
 
@@ -247,15 +270,17 @@ class Synthesis {
       privatised += a == Accumulation::Privatised;
     }
     explain(Explanation::Kind::Built, primal,
-            text(quoted(adjoint.func->name), ", ", gathers, " gathers over reduction domains, ", scatters,
-                 " scatters inside pure dimensions, ", privatised, " privatised sums"));
+            text(quoted(adjoint.func->name), ", ", gathers, " gathers over reduction domains, ",
+                 scatters, " scatters inside pure dimensions, ", privatised, " privatised sums"));
     if (gathers + scatters + privatised > 0) {
       explain(Explanation::Kind::Performance, primal,
               text("unless a directive schedules ", quoted(adjoint.func->name),
-                   ", it is computed at root, in parallel over its outermost dimension, in vectors along its first"));
+                   ", it is computed at root, in parallel over its outermost dimension, in vectors "
+                   "along its first"));
     }
     if (privatised > 0) {
-      explain(Explanation::Kind::Privatised, primal, "accumulated in a fixed number of parts, which are summed in order");
+      explain(Explanation::Kind::Privatised, primal,
+              "accumulated in a fixed number of parts, which are summed in order");
     }
   }
 
@@ -269,24 +294,31 @@ class Synthesis {
   // What was asked for and got no contribution is zero, and says why.
   void explain_absent() {
     for (const FuncPtr& f : order_) {
-      bool floating = std::any_of(f->types.begin(), f->types.end(), [](Type t) { return t.is_float(); });
-      if (result_.after_stage.contains({f.get(), 0}) || !explain_absent(f.get(), f->name, floating, f->types[0])) continue;
+      bool floating =
+          std::any_of(f->types.begin(), f->types.end(), [](Type t) { return t.is_float(); });
+      if (result_.after_stage.contains({f.get(), 0}) ||
+          !explain_absent(f.get(), f->name, floating, f->types[0]))
+        continue;
       AdjointFunc zero = make_adjoint(target_of(*f), f->name + "_adj", {});
       for (int s = 0; s < f->stage_count(); ++s) record(*f, s, zero);
     }
     for (const auto& p : parameters_of({seed_.output})) {
-      if (result_.parameters.contains(p.get()) || !explain_absent(p.get(), p->name, p->type.is_float(), p->type)) continue;
+      if (result_.parameters.contains(p.get()) ||
+          !explain_absent(p.get(), p->name, p->type.is_float(), p->type))
+        continue;
       result_.parameters[p.get()] = make_adjoint(target_of(*p), p->name + "_adj", {}).func;
     }
   }
   // Whether its gradient is a zero that somebody may ask for.
   bool explain_absent(const Symbol* symbol, const std::string& name, bool floating, Type type) {
     if (!floating) {
-      explain(Explanation::Kind::Zero, name, "its type is " + to_string(type) + ": integers have no derivative");
+      explain(Explanation::Kind::Zero, name,
+              "its type is " + to_string(type) + ": integers have no derivative");
     } else if (!active_.contains(symbol)) {
       explain(Explanation::Kind::NotRequested, name, "nothing that was requested depends on it");
     } else {
-      explain(Explanation::Kind::Zero, name, "the output does not depend on its value by a differentiable path");
+      explain(Explanation::Kind::Zero, name,
+              "the output does not depend on its value by a differentiable path");
       return true;
     }
     return false;

@@ -35,9 +35,9 @@ bool calls(const Expr& e, const FuncContents* f) {
 }
 
 bool same_args(const std::vector<Expr>& a, const std::vector<Expr>& b) {
-  return a.size() == b.size() && std::equal(a.begin(), a.end(), b.begin(), [](const Expr& x, const Expr& y) {
-           return equal(x, y);
-         });
+  return a.size() == b.size() &&
+         std::equal(a.begin(), a.end(), b.begin(),
+                    [](const Expr& x, const Expr& y) { return equal(x, y); });
 }
 
 std::string point_text(const std::string& name, const std::vector<Expr>& args) {
@@ -49,10 +49,14 @@ std::string point_text(const std::string& name, const std::vector<Expr>& args) {
 class UpdateDifferentiation {
  public:
   explicit UpdateDifferentiation(const UpdateQuery& q)
-      : q_(q), f_(q.f.get()), definition_(q.f->stage(q.stage)), domain_(q.regions.domain(*q.f, q.stage)) {
+      : q_(q),
+        f_(q.f.get()),
+        definition_(q.f->stage(q.stage)),
+        domain_(q.regions.domain(*q.f, q.stage)) {
     for (const Expr& v : definition_.values) values_.push_back(without_lets(v));
     for (const Expr& a : definition_.args) write_.push_back(without_lets(a));
-    for (size_t d = 0; d < f_->args.size(); ++d) pure_.push_back(is_pure_position(*f_, definition_, d));
+    for (size_t d = 0; d < f_->args.size(); ++d)
+      pure_.push_back(is_pure_position(*f_, definition_, d));
     for (const std::string& arg : f_->args) point_.push_back(variable(arg));
     result_.current = q.adjoint;
   }
@@ -66,7 +70,9 @@ class UpdateDifferentiation {
   }
 
  private:
-  std::string asked() const { return "differentiate the update " + point_text(f_->name, write_) + " = " + short_values(); }
+  std::string asked() const {
+    return "differentiate the update " + point_text(f_->name, write_) + " = " + short_values();
+  }
   std::string short_values() const {
     std::string out;
     for (const Expr& v : definition_.values) out += (out.empty() ? "" : ", ") + print(v);
@@ -75,16 +81,19 @@ class UpdateDifferentiation {
 
   // Where it writes and whether it writes must not depend on what it computes.
   void check_places() const {
-    bool place = std::any_of(write_.begin(), write_.end(), [&](const Expr& e) { return calls(e, f_); });
+    bool place =
+        std::any_of(write_.begin(), write_.end(), [&](const Expr& e) { return calls(e, f_); });
     if (!place && !calls(domain_.predicate, f_)) return;
-    user_error(asked(), "where an update writes may not depend on the values of the Func that it updates",
+    user_error(asked(),
+               "where an update writes may not depend on the values of the Func that it updates",
                text(quoted(f_->name), " is read on the left-hand side or in the predicate"),
                "Compute the place in a Func of its own");
   }
 
   // ---- accumulation ----
 
-  // The part of `e` that is added to the call `self`, when e is self + part: E of the header; undefined when it is not.
+  // The part of `e` that is added to the call `self`, when e is self + part: E of the header;
+  // undefined when it is not.
   Expr added_to(const Expr& e, int k) const {
     if (!calls(e, f_)) return {};
     if (const Call* call = as_call_of(e, f_)) {
@@ -119,7 +128,8 @@ class UpdateDifferentiation {
     for (size_t k = 0; k < values_.size(); ++k) {
       added.push_back(added_to(values_[k], static_cast<int>(k)));
       if (!added.back().defined() && f_->types[k].is_float()) return false;
-      // Integers carry no adjoint, but must not steer the floating values; they cannot: those are free of f.
+      // Integers carry no adjoint, but must not steer the floating values; they cannot: those are
+      // free of f.
     }
     result_.values = added;
     result_.domains = {domain_};
@@ -138,18 +148,21 @@ class UpdateDifferentiation {
     for (size_t k = 0; k < values_.size(); ++k) {
       const Expr& taken = selection->taken[k];
       Expr is_winner = call_value(winner, write_, index) == mine;
-      result_.values.push_back(taken.defined() ? make_select(is_winner, taken, make_zero(taken.type())) : Expr());
+      result_.values.push_back(
+          taken.defined() ? make_select(is_winner, taken, make_zero(taken.type())) : Expr());
     }
     result_.domains = {domain_};
     std::vector<Expr> initial;
     Expr untouched = call_value(winner, point_, index) < 0;
     for (size_t k = 0; k < values_.size(); ++k) {
       Expr a = current_at(point_, static_cast<int>(k));
-      initial.push_back(selection->taken[k].defined() ? make_select(untouched, a, make_zero(a.type())) : a);
+      initial.push_back(
+          selection->taken[k].defined() ? make_select(untouched, a, make_zero(a.type())) : a);
     }
     result_.previous = make_adjoint(q_.target, previous_name(), {}, initial);
-    explain(Explanation::Kind::Version, text("update ", q_.stage - 1, " selects: ", quoted(winner->name),
-                                             " computes again which iteration wrote each element last"));
+    explain(Explanation::Kind::Version,
+            text("update ", q_.stage - 1, " selects: ", quoted(winner->name),
+                 " computes again which iteration wrote each element last"));
     return true;
   }
 
@@ -195,7 +208,8 @@ class UpdateDifferentiation {
 
   // Elements that several iterations write.
   void rewritten_elements(const UpdateRelations& relations) {
-    bool reads_self = std::any_of(values_.begin(), values_.end(), [&](const Expr& e) { return calls(e, f_); });
+    bool reads_self =
+        std::any_of(values_.begin(), values_.end(), [&](const Expr& e) { return calls(e, f_); });
     if (!reads_self && relations.predicate_is_affine()) {
       IterationDomain last = domain_;
       Expr condition = relations.last_writers();
@@ -223,17 +237,22 @@ class UpdateDifferentiation {
 
   [[noreturn]] void refuse_overwritten(const Expr& read) const {
     const auto* call = read.as<Call>();
-    user_error(asked(), "a partial derivative may need only values that are still there when the Func is complete",
-               text("it needs ", point_text(f_->name, call->args), " as it was before an update overwrote it"),
-               text("Give ", quoted(f_->name), " one more dimension that keeps the versions, or pass "
-                    "AdjointOptions{.overwritten = Overwritten::Store} to let the compiler keep them"));
+    user_error(
+        asked(),
+        "a partial derivative may need only values that are still there when the Func is complete",
+        text("it needs ", point_text(f_->name, call->args),
+             " as it was before an update overwrote it"),
+        text("Give ", quoted(f_->name),
+             " one more dimension that keeps the versions, or pass "
+             "AdjointOptions{.overwritten = Overwritten::Store} to let the compiler keep them"));
   }
 
   void keep_all_versions() {
     FuncPtr before = clone_prefix(q_.f, q_.stage);
     auto versions = keep_versions(q_.f, q_.stage, before, q_.regions.of(f_));
     if (!versions) {
-      unsupported(asked(), "versions are kept of updates that read and write at their pure variables only",
+      unsupported(asked(),
+                  "versions are kept of updates that read and write at their pure variables only",
                   text("it reads ", print(first_self_call())),
                   text("Give ", quoted(f_->name), " one more dimension that keeps the versions"));
     }
@@ -252,8 +271,9 @@ class UpdateDifferentiation {
     result_.previous = make_adjoint(q_.target, previous_name(), {}, initial);
     result_.versions = {versions->func, before};
     result_.version_regions = {versions->region, q_.regions.of(f_)};
-    explain(Explanation::Kind::Version, text("update ", q_.stage - 1, " overwrites values that its partials need: ",
-                                             quoted(versions->func->name), " keeps them all"));
+    explain(Explanation::Kind::Version,
+            text("update ", q_.stage - 1, " overwrites values that its partials need: ",
+                 quoted(versions->func->name), " keeps them all"));
   }
 
   std::vector<SelfRead> self_reads(UpdateRelations& relations) const {
@@ -281,7 +301,9 @@ class UpdateDifferentiation {
     for (size_t k = 0; k < values_.size(); ++k) {
       seeds.push_back(f_->types[k].is_float() ? current_at(write_, static_cast<int>(k)) : Expr());
     }
-    return sweep_reverse(values_, seeds, [&](const Expr& leaf) { return as_call_of(leaf, f_) || q_.is_wanted(leaf); });
+    return sweep_reverse(values_, seeds, [&](const Expr& leaf) {
+      return as_call_of(leaf, f_) || q_.is_wanted(leaf);
+    });
   }
 
   void mark(std::vector<SelfRead>& reads, const SweepResult& sweep) const {
@@ -315,11 +337,13 @@ class UpdateDifferentiation {
                          : call_value(q_.f, call->args, call->value_index);
       Expr before = call_value(prefix(q_.stage), call->args, call->value_index);
       Expr value = r.relation.never_new ? before
-                   : r.relation.always_new ? after
-                                           : make_select(r.relation.sees_new_condition, after, before);
+                   : r.relation.always_new
+                       ? after
+                       : make_select(r.relation.sees_new_condition, after, before);
       result_.self_values[r.call] = value;
-      explain(Explanation::Kind::Version, text("update ", q_.stage - 1, ": the value of ",
-                                               point_text(f_->name, call->args), " is kept in a copy"));
+      explain(Explanation::Kind::Version,
+              text("update ", q_.stage - 1, ": the value of ", point_text(f_->name, call->args),
+                   " is kept in a copy"));
     }
   }
   const FuncPtr& prefix(int stages) {
@@ -329,21 +353,27 @@ class UpdateDifferentiation {
   }
 
   Expr with_values(const Expr& e) const {
-    Expr replaced = rewrite(e, [&](const Expr& node, const std::function<Expr(const Expr&)>& recurse) {
-      auto it = result_.self_values.find(node);
-      return it != result_.self_values.end() ? it->second : map_children(node, recurse);
-    });
+    Expr replaced =
+        rewrite(e, [&](const Expr& node, const std::function<Expr(const Expr&)>& recurse) {
+          auto it = result_.self_values.find(node);
+          return it != result_.self_values.end() ? it->second : map_children(node, recurse);
+        });
     return redirect_calls(replaced, q_.f, q_.f, false);
   }
 
-  Expr current_at(const std::vector<Expr>& point, int k) const { return call_value(result_.current.func, point, k); }
+  Expr current_at(const std::vector<Expr>& point, int k) const {
+    return call_value(result_.current.func, point, k);
+  }
 
-  // The recurrence writes into the adjoint after the stage: a copy, when somebody reads that one already.
+  // The recurrence writes into the adjoint after the stage: a copy, when somebody reads that one
+  // already.
   void own_current() {
     if (q_.extendable) return;
     std::vector<Expr> initial;
-    for (size_t k = 0; k < values_.size(); ++k) initial.push_back(current_at(point_, static_cast<int>(k)));
-    result_.current = make_adjoint(q_.target, f_->name + "_adj_update" + std::to_string(q_.stage - 1), {}, initial);
+    for (size_t k = 0; k < values_.size(); ++k)
+      initial.push_back(current_at(point_, static_cast<int>(k)));
+    result_.current = make_adjoint(
+        q_.target, f_->name + "_adj_update" + std::to_string(q_.stage - 1), {}, initial);
   }
 
   static IterationDomain restricted(IterationDomain domain, const Expr& condition) {
@@ -353,42 +383,53 @@ class UpdateDifferentiation {
   }
 
   // Contributions of self reads: to newer values (`to_new`) or to those before the stage.
-  std::vector<Contribution> self_contributions(const std::vector<SelfRead>& reads, const SweepResult& sweep, bool to_new) {
+  std::vector<Contribution> self_contributions(const std::vector<SelfRead>& reads,
+                                               const SweepResult& sweep, bool to_new) {
     std::vector<Contribution> result;
     for (const LeafAdjoint& leaf : sweep.leaves) {
       const Call* call = as_call_of(leaf.leaf, f_);
       if (!call) continue;
-      auto read = std::find_if(reads.begin(), reads.end(), [&](const SelfRead& r) { return equal(r.call, leaf.leaf); });
+      auto read = std::find_if(reads.begin(), reads.end(),
+                               [&](const SelfRead& r) { return equal(r.call, leaf.leaf); });
       const UpdateRelations::Read& relation = read->relation;
       if (to_new ? relation.never_new : relation.always_new) continue;
-      Expr condition = to_new ? relation.sees_new_condition : logical_not(relation.sees_new_condition);
+      Expr condition =
+          to_new ? relation.sees_new_condition : logical_not(relation.sees_new_condition);
       if (to_new ? relation.always_new : relation.never_new) condition = const_true();
-      AccessQuery query{restricted(domain_, condition), call->args, q_.target.args, q_.target.region};
+      AccessQuery query{restricted(domain_, condition), call->args, q_.target.args,
+                        q_.target.region};
       for (const Gather& g : invert_access(query).gathers) {
-        result.push_back({call->value_index, g, substitute(with_values(leaf.adjoint), g.iteration)});
+        result.push_back(
+            {call->value_index, g, substitute(with_values(leaf.adjoint), g.iteration)});
       }
     }
     return result;
   }
 
   // A(p) += sum over reads of A(W(i)) dV/df, p running against the order in which it was written.
-  void add_recurrence(const UpdateRelations& relations, const std::vector<SelfRead>& reads, const SweepResult& sweep) {
+  void add_recurrence(const UpdateRelations& relations, const std::vector<SelfRead>& reads,
+                      const SweepResult& sweep) {
     std::vector<UpdateRelations::Read> relevant;
     for (const SelfRead& r : reads) {
       if (r.carries_adjoint && !r.relation.never_new) relevant.push_back(r.relation);
     }
     auto order = relations.reverse_order(relevant);
     if (!order) {
-      unsupported(asked(), "a recurrence needs an order in which it can be run backward, dimension by dimension",
-                  text("no order of the dimensions of ", quoted(f_->name), " visits readers before what they read"),
-                  "Write the recurrence along one dimension at a time");
+      unsupported(
+          asked(),
+          "a recurrence needs an order in which it can be run backward, dimension by dimension",
+          text("no order of the dimensions of ", quoted(f_->name),
+               " visits readers before what they read"),
+          "Write the recurrence along one dimension at a time");
     }
     std::vector<Contribution> contributions = self_contributions(reads, sweep, true);
     append_reverse_loop(*order, contributions);
-    explain(Explanation::Kind::Version, text("update ", q_.stage - 1, " is a recurrence: its adjoint runs backward"));
+    explain(Explanation::Kind::Version,
+            text("update ", q_.stage - 1, " is a recurrence: its adjoint runs backward"));
   }
 
-  void append_reverse_loop(const std::vector<ReverseLoop>& order, const std::vector<Contribution>& contributions) {
+  void append_reverse_loop(const std::vector<ReverseLoop>& order,
+                           const std::vector<Contribution>& contributions) {
     auto rdom = std::make_shared<ReductionDomainContents>();
     rdom->frozen = true;
     Substitution place;
@@ -415,7 +456,8 @@ class UpdateDifferentiation {
       Expr extent = simplify(range.max - range.min + 1);
       rdom->vars.push_back({unique_name("reverse"), make_zero(Int(32)), extent});
       Expr v = variable(rdom->vars.back().var, Int(32), SymbolRef(rdom));
-      lhs[static_cast<size_t>(loop.dim)] = simplify(loop.descending ? range.max - v : range.min + v);
+      lhs[static_cast<size_t>(loop.dim)] =
+          simplify(loop.descending ? range.max - v : range.min + v);
       place[f_->args[static_cast<size_t>(loop.dim)]] = lhs[static_cast<size_t>(loop.dim)];
     }
     std::vector<Expr> sums(values_.size());
@@ -452,15 +494,19 @@ class UpdateDifferentiation {
     return condition;
   }
 
-  std::string previous_name() const { return f_->name + "_adj_before_update" + std::to_string(q_.stage - 1); }
+  std::string previous_name() const {
+    return f_->name + "_adj_before_update" + std::to_string(q_.stage - 1);
+  }
 
-  void make_previous(const UpdateRelations& relations, const std::vector<SelfRead>& reads, const SweepResult& sweep) {
-    Expr written = relations.predicate_is_affine() ? relations.written(point_) : written_by_inversion();
+  void make_previous(const UpdateRelations& relations, const std::vector<SelfRead>& reads,
+                     const SweepResult& sweep) {
+    Expr written =
+        relations.predicate_is_affine() ? relations.written(point_) : written_by_inversion();
     start_previous(written, self_contributions(reads, sweep, false));
   }
 
-  // The adjoint before the stage: 0 where the stage writes, plus what the stage read of older values. Values of a
-  // Tuple that the stage leaves alone keep their adjoint.
+  // The adjoint before the stage: 0 where the stage writes, plus what the stage read of older
+  // values. Values of a Tuple that the stage leaves alone keep their adjoint.
   void start_previous(const Expr& written, std::vector<Contribution> contributions) {
     std::vector<Expr> initial;
     for (size_t k = 0; k < values_.size(); ++k) {
@@ -470,10 +516,12 @@ class UpdateDifferentiation {
     result_.previous = make_adjoint(q_.target, previous_name(), contributions, initial);
   }
 
-  // With a predicate on data: the element is written where the predicate holds for the only iteration that may.
+  // With a predicate on data: the element is written where the predicate holds for the only
+  // iteration that may.
   Expr written_by_inversion() const {
     Expr written = const_false();
-    for (const Gather& g : invert_access({domain_, write_, q_.target.args, q_.target.region}).gathers) {
+    for (const Gather& g :
+         invert_access({domain_, write_, q_.target.args, q_.target.region}).gathers) {
       Expr condition = element_condition(g);
       if (g.predicate.defined()) condition = condition && g.predicate;
       written = written || condition;
@@ -481,7 +529,9 @@ class UpdateDifferentiation {
     return written;
   }
 
-  void explain(Explanation::Kind kind, const std::string& detail) { result_.explanations.push_back({kind, f_->name, detail}); }
+  void explain(Explanation::Kind kind, const std::string& detail) {
+    result_.explanations.push_back({kind, f_->name, detail});
+  }
 
   const UpdateQuery& q_;
   FuncContents* f_;
@@ -495,6 +545,15 @@ class UpdateDifferentiation {
 
 }  // namespace
 
-UpdateAdjoint differentiate_update(const UpdateQuery& query) { return UpdateDifferentiation(query).run(); }
+UpdateAdjoint differentiate_update(const UpdateQuery& query) {
+  try {
+    return UpdateDifferentiation(query).run();
+  } catch (const isl::exception& e) {
+    unsupported(
+        text("differentiate update ", query.stage - 1, " of ", quoted(query.f->name)),
+        "its index sets must be small enough to analyse", text("isl gave up: ", e.what()),
+        "Write the update with simpler indices, or over fewer reduction variables at a time");
+  }
+}
 
 }  // namespace retrograde::ir

@@ -21,19 +21,25 @@ std::vector<Expr> variables_of(const std::vector<LoopVariable>& vars) {
   return result;
 }
 
-isl::map empty_like(const isl::map& m) { return isl::manage(isl_map_empty(isl_map_get_space(m.get()))); }
+isl::map empty_like(const isl::map& m) {
+  return isl::manage(isl_map_empty(isl_map_get_space(m.get())));
+}
 
 }  // namespace
 
 UpdateRelations::UpdateRelations(const IterationDomain& domain, const std::vector<Expr>& write,
                                  const std::vector<bool>& pure)
-    : domain_expr_(domain), write_indices_(write), pure_(pure), bridge_(context_, names_of(domain.vars)) {
+    : domain_expr_(domain),
+      write_indices_(write),
+      pure_(pure),
+      bridge_(context_, names_of(domain.vars)) {
   domain_ = domain_set(bridge_, domain, predicate_is_affine_);
   write_ = access(bridge_, write);
   if (write_) write_ = write_->intersect_domain(domain_);
 }
 
-isl::set UpdateRelations::domain_set(IslBridge& bridge, const IterationDomain& domain, bool& exact) const {
+isl::set UpdateRelations::domain_set(IslBridge& bridge, const IterationDomain& domain,
+                                     bool& exact) const {
   isl::set result = bridge.universe();
   for (int i = 0; i < bridge.rank(); ++i) {
     const LoopVariable& v = domain.vars[static_cast<size_t>(i)];
@@ -57,9 +63,11 @@ isl::set UpdateRelations::domain_set(IslBridge& bridge, const IterationDomain& d
   return result.coalesce();
 }
 
-std::optional<isl::map> UpdateRelations::access(IslBridge& bridge, const std::vector<Expr>& indices) const {
-  isl::map result = isl::manage(isl_map_universe(isl_space_alloc(
-      bridge.ctx(), 0, static_cast<unsigned>(bridge.rank()), static_cast<unsigned>(indices.size()))));
+std::optional<isl::map> UpdateRelations::access(IslBridge& bridge,
+                                                const std::vector<Expr>& indices) const {
+  isl::map result = isl::manage(
+      isl_map_universe(isl_space_alloc(bridge.ctx(), 0, static_cast<unsigned>(bridge.rank()),
+                                       static_cast<unsigned>(indices.size()))));
   for (size_t d = 0; d < indices.size(); ++d) {
     auto e = bridge.affine(indices[d]);
     if (!e) return std::nullopt;
@@ -71,21 +79,27 @@ std::optional<isl::map> UpdateRelations::access(IslBridge& bridge, const std::ve
   return result;
 }
 
-bool UpdateRelations::write_is_injective() const { return isl_map_is_injective(write_->get()) == isl_bool_true; }
+bool UpdateRelations::write_is_injective() const {
+  return isl_map_is_injective(write_->get()) == isl_bool_true;
+}
 
 Expr UpdateRelations::written(const std::vector<Expr>& names) const {
   return bridge_.to_expr(write_->range().coalesce(), names);
 }
 
-// Reduction variables are ordered, the last one outermost; points that differ in pure variables never meet.
+// Reduction variables are ordered, the last one outermost; points that differ in pure variables
+// never meet.
 isl::map UpdateRelations::earlier() const {
-  isl::map same = isl::manage(isl_map_universe(isl_space_map_from_set(isl_set_get_space(bridge_.universe().get()))));
+  isl::map same = isl::manage(
+      isl_map_universe(isl_space_map_from_set(isl_set_get_space(bridge_.universe().get()))));
   isl::map result = empty_like(same);
   for (int l = bridge_.rank() - 1; l >= 0; --l) {
     if (!domain_expr_.vars[static_cast<size_t>(l)].is_reduction) continue;
     unsigned at = static_cast<unsigned>(l);
-    result = result.unite(isl::manage(isl_map_order_gt(same.copy(), isl_dim_in, l, isl_dim_out, l)));
-    same = isl::manage(isl_map_equate(same.copy(), isl_dim_in, static_cast<int>(at), isl_dim_out, static_cast<int>(at)));
+    result =
+        result.unite(isl::manage(isl_map_order_gt(same.copy(), isl_dim_in, l, isl_dim_out, l)));
+    same = isl::manage(isl_map_equate(same.copy(), isl_dim_in, static_cast<int>(at), isl_dim_out,
+                                      static_cast<int>(at)));
   }
   return result;
 }
@@ -127,7 +141,8 @@ std::vector<ReverseLoop> UpdateRelations::first_guess() const {
   std::vector<bool> done(write_indices_.size());
   for (const LoopVariable& v : domain_expr_.vars) {
     for (size_t d = 0; d < write_indices_.size(); ++d) {
-      if (pure_[d] || done[d] || !v.is_reduction || !uses_variable(write_indices_[d], v.name)) continue;
+      if (pure_[d] || done[d] || !v.is_reduction || !uses_variable(write_indices_[d], v.name))
+        continue;
       done[d] = true;
       // Descending where the index grows with the variable.
       Expr step = substitute(write_indices_[d], v.name, make_const(Int(32), 1)) -
@@ -142,14 +157,16 @@ std::vector<ReverseLoop> UpdateRelations::first_guess() const {
   return loops;
 }
 
-bool UpdateRelations::is_valid_order(const std::vector<ReverseLoop>& loops, const std::vector<Read>& reads) const {
+bool UpdateRelations::is_valid_order(const std::vector<ReverseLoop>& loops,
+                                     const std::vector<Read>& reads) const {
   int n = static_cast<int>(write_indices_.size());
-  isl::map same = isl::manage(isl_map_universe(isl_space_alloc(bridge_.ctx(), 0, static_cast<unsigned>(n),
-                                                               static_cast<unsigned>(n))));
+  isl::map same = isl::manage(isl_map_universe(
+      isl_space_alloc(bridge_.ctx(), 0, static_cast<unsigned>(n), static_cast<unsigned>(n))));
   isl::map order = empty_like(same);  // {element read -> element written, which is visited earlier}
   for (auto l = loops.rbegin(); l != loops.rend(); ++l) {
-    isl_map* step = l->descending ? isl_map_order_lt(same.copy(), isl_dim_in, l->dim, isl_dim_out, l->dim)
-                                  : isl_map_order_gt(same.copy(), isl_dim_in, l->dim, isl_dim_out, l->dim);
+    isl_map* step = l->descending
+                        ? isl_map_order_lt(same.copy(), isl_dim_in, l->dim, isl_dim_out, l->dim)
+                        : isl_map_order_gt(same.copy(), isl_dim_in, l->dim, isl_dim_out, l->dim);
     order = order.unite(isl::manage(step));
     same = isl::manage(isl_map_equate(same.copy(), isl_dim_in, l->dim, isl_dim_out, l->dim));
   }
@@ -160,7 +177,8 @@ bool UpdateRelations::is_valid_order(const std::vector<ReverseLoop>& loops, cons
   return true;
 }
 
-std::optional<std::vector<ReverseLoop>> UpdateRelations::reverse_order(const std::vector<Read>& reads) const {
+std::optional<std::vector<ReverseLoop>> UpdateRelations::reverse_order(
+    const std::vector<Read>& reads) const {
   std::vector<ReverseLoop> guess = first_guess();
   for (unsigned flips = 0; flips < (1u << guess.size()); ++flips) {
     std::vector<ReverseLoop> loops = guess;

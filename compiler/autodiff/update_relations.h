@@ -19,7 +19,8 @@ struct ReverseLoop {
 class UpdateRelations {
  public:
   // `write`: left-hand side; `pure`: which of its dimensions are pure variables.
-  UpdateRelations(const IterationDomain& domain, const std::vector<Expr>& write, const std::vector<bool>& pure);
+  UpdateRelations(const IterationDomain& domain, const std::vector<Expr>& write,
+                  const std::vector<bool>& pure);
 
   bool write_is_affine() const { return write_.has_value(); }
   bool predicate_is_affine() const { return predicate_is_affine_; }
@@ -31,17 +32,20 @@ class UpdateRelations {
 
   // Of a read at `indices` (nullopt: not affine).
   struct Read {
-    isl::map map;        // iteration -> element
-    isl::set sees_new;   // iterations that read what an earlier iteration wrote
+    isl::map map;       // iteration -> element
+    isl::set sees_new;  // iterations that read what an earlier iteration wrote
     bool always_new, never_new;
-    bool overwritten;    // an iteration at or after the read writes the element
+    bool overwritten;  // an iteration at or after the read writes the element
     Expr sees_new_condition;
   };
   std::optional<Read> read(const std::vector<Expr>& indices);
-  // Whether one of the elements read may be written by another stage, given its domain and left-hand side.
-  bool may_write(const Read& read, const IterationDomain& other, const std::vector<Expr>& other_write) const;
+  // Whether one of the elements read may be written by another stage, given its domain and
+  // left-hand side.
+  bool may_write(const Read& read, const IterationDomain& other,
+                 const std::vector<Expr>& other_write) const;
 
-  // An order of elements in which every reader's element comes before the elements that it read; nullopt: none found.
+  // An order of elements in which every reader's element comes before the elements that it read;
+  // nullopt: none found.
   std::optional<std::vector<ReverseLoop>> reverse_order(const std::vector<Read>& reads) const;
 
  private:

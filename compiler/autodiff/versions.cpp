@@ -18,16 +18,19 @@ FuncPtr clone_prefix(const FuncPtr& f, int stages) {
   for (const std::string& arg : f->args) args.push_back(variable(arg));
   define_pure(g, args, f->pure->values);
   for (int s = 1; s < stages; ++s) {
-    Definition copy = map_exprs(f->stage(s), [&](const Expr& e) { return redirect_calls(e, f, g, false); });
+    Definition copy =
+        map_exprs(f->stage(s), [&](const Expr& e) { return redirect_calls(e, f, g, false); });
     append_update(g, copy.args, copy.values, copy.rvars, copy.predicate);
   }
   return g;
 }
 
-Expr call_instead(const Expr& e, const FuncPtr& f, const FuncPtr& g, const std::vector<Expr>& extra) {
+Expr call_instead(const Expr& e, const FuncPtr& f, const FuncPtr& g,
+                  const std::vector<Expr>& extra) {
   return rewrite(e, [&](const Expr& part, const std::function<Expr(const Expr&)>& recurse) {
     const auto* call = part.as<Call>();
-    if (!call || call->call_type != CallType::Func || call->symbol.raw() != f.get()) return map_children(part, recurse);
+    if (!call || call->call_type != CallType::Func || call->symbol.raw() != f.get())
+      return map_children(part, recurse);
     std::vector<Expr> args;
     for (const Expr& arg : call->args) args.push_back(recurse(arg));
     args.insert(args.end(), extra.begin(), extra.end());
@@ -74,7 +77,8 @@ bool reads_at_pure_point_only(const FuncPtr& f, const Definition& definition) {
 
 }  // namespace
 
-std::optional<Versions> keep_versions(const FuncPtr& f, int stage, const FuncPtr& before, const Box& region) {
+std::optional<Versions> keep_versions(const FuncPtr& f, int stage, const FuncPtr& before,
+                                      const Box& region) {
   const Definition& definition = f->stage(stage);
   if (definition.rvars.empty() || !reads_at_pure_point_only(f, definition)) return std::nullopt;
   FuncPtr g = std::make_shared<AdjointContents>();
@@ -84,7 +88,8 @@ std::optional<Versions> keep_versions(const FuncPtr& f, int stage, const FuncPtr
   std::vector<Expr> point = args;
   point.push_back(variable(unique_name("version")));
   std::vector<Expr> initial;
-  for (size_t k = 0; k < f->types.size(); ++k) initial.push_back(call_value(before, args, static_cast<int>(k)));
+  for (size_t k = 0; k < f->types.size(); ++k)
+    initial.push_back(call_value(before, args, static_cast<int>(k)));
   define_pure(g, point, initial);
 
   Expr t = iteration_number(definition.rvars);
@@ -94,7 +99,8 @@ std::optional<Versions> keep_versions(const FuncPtr& f, int stage, const FuncPtr
   for (size_t k = 0; k < f->types.size(); ++k) {
     Expr value = call_instead(without_lets(definition.values[k]), f, g, {t});
     if (definition.predicate.defined()) {
-      value = make_select(without_lets(definition.predicate), value, call_value(g, old, static_cast<int>(k)));
+      value = make_select(without_lets(definition.predicate), value,
+                          call_value(g, old, static_cast<int>(k)));
     }
     values.push_back(value);
   }

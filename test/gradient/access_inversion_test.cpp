@@ -1,5 +1,6 @@
-// Every gather found for an access is checked by enumeration: over small domains each point of the stage must be
-// visited exactly once, at the element that it reads. Beside that, the shape: how many gathers, how many iterations.
+// Every gather found for an access is checked by enumeration: over small domains each point of the
+// stage must be visited exactly once, at the element that it reads. Beside that, the shape: how
+// many gathers, how many iterations.
 #include "autodiff/access_inversion.h"
 
 #include <gtest/gtest.h>
@@ -28,15 +29,20 @@ int64_t table(const std::vector<int64_t>& args) {
 int64_t eval(const Expr& e, const Env& env) {
   if (auto value = as_const_int(e)) return *value;
   return match(
-      e, [&](const Variable& v) { return env.at(v.name); }, [&](const Cast& c) { return eval(c.value, env); },
+      e, [&](const Variable& v) { return env.at(v.name); },
+      [&](const Cast& c) { return eval(c.value, env); },
       [&](const Binary& b) -> int64_t {
         Type type = b.a.type().is_bool() ? Bool() : Int(64);
-        auto scalar = [&](int64_t v) { return type.is_bool() ? Scalar::of_bool(v != 0) : Scalar::of_int(type, v); };
+        auto scalar = [&](int64_t v) {
+          return type.is_bool() ? Scalar::of_bool(v != 0) : Scalar::of_int(type, v);
+        };
         Scalar r = eval_binary(b.kind, scalar(eval(b.a, env)), scalar(eval(b.b, env)));
         return r.type.is_bool() ? r.as_bool() : r.i;
       },
       [&](const Not& n) -> int64_t { return eval(n.a, env) == 0; },
-      [&](const Select& s) { return eval(s.condition, env) ? eval(s.true_value, env) : eval(s.false_value, env); },
+      [&](const Select& s) {
+        return eval(s.condition, env) ? eval(s.true_value, env) : eval(s.false_value, env);
+      },
       [&](const Call& c) -> int64_t {
         if (c.call_type == CallType::Operator) return eval(c.args[0], env);
         std::vector<int64_t> args;
@@ -49,7 +55,8 @@ int64_t eval(const Expr& e, const Env& env) {
       });
 }
 
-void for_box(const std::vector<std::pair<int64_t, int64_t>>& box, const std::function<void(const std::vector<int64_t>&)>& f) {
+void for_box(const std::vector<std::pair<int64_t, int64_t>>& box,
+             const std::function<void(const std::vector<int64_t>&)>& f) {
   std::vector<int64_t> point;
   std::function<void(size_t)> go = [&](size_t d) {
     if (d == box.size()) return f(point);
@@ -72,7 +79,8 @@ using Point = std::pair<std::vector<int64_t>, std::vector<int64_t>>;  // element
 std::map<Point, int> visits_of_stage(const Case& c) {
   std::map<Point, int> visits;
   std::vector<std::pair<int64_t, int64_t>> box;
-  for (const LoopVariable& v : c.query.domain.vars) box.emplace_back(eval(v.min, c.params), eval(v.max, c.params));
+  for (const LoopVariable& v : c.query.domain.vars)
+    box.emplace_back(eval(v.min, c.params), eval(v.max, c.params));
   for_box(box, [&](const std::vector<int64_t>& point) {
     Env env = c.params;
     for (size_t i = 0; i < point.size(); ++i) env[c.query.domain.vars[i].name] = point[i];
@@ -108,7 +116,8 @@ std::map<Point, int> visits_of_gathers(const Case& c, const Inversion& inversion
       if (g.predicate.defined() && !eval(g.predicate, env)) return;
       std::vector<int64_t> element, iteration;
       for (const Expr& e : g.lhs) element.push_back(eval(e, env));
-      for (const LoopVariable& v : c.query.domain.vars) iteration.push_back(eval(g.iteration.at(v.name), env));
+      for (const LoopVariable& v : c.query.domain.vars)
+        iteration.push_back(eval(g.iteration.at(v.name), env));
       ++visits[{element, iteration}];
     });
   }
@@ -142,7 +151,8 @@ Case make_case(std::vector<LoopVariable> vars, std::vector<Expr> indices, Env pa
   Case result;
   result.query.domain.vars = std::move(vars);
   result.query.indices = std::move(indices);
-  for (size_t d = 0; d < result.query.indices.size(); ++d) result.query.target_args.push_back("y" + std::to_string(d));
+  for (size_t d = 0; d < result.query.indices.size(); ++d)
+    result.query.target_args.push_back("y" + std::to_string(d));
   result.params = std::move(params);
   return result;
 }
@@ -187,7 +197,9 @@ const LoopVariable x10 = loop("x", 0, 9), y8 = loop("y", 0, 7), r3 = loop("r", 0
 
 TEST(AccessInversion, PointwiseNeedsNoReduction) { expect_gathers(make_case({x10}, {x}), {1}); }
 TEST(AccessInversion, ShiftIsUndone) { expect_gathers(make_case({x10}, {x - 3}), {1}); }
-TEST(AccessInversion, ConvolutionKeepsItsTaps) { expect_gathers(make_case({x10, r3}, {x - r}), {3}); }
+TEST(AccessInversion, ConvolutionKeepsItsTaps) {
+  expect_gathers(make_case({x10, r3}, {x - r}), {3});
+}
 TEST(AccessInversion, UpsamplingGathersFour) { expect_gathers(make_case({x10}, {x / 4}), {4}); }
 TEST(AccessInversion, StridedConvolutionReducesOverTapsOfOneParity) {
   expect_gathers(make_case({x10, r3}, {2 * x + r}), {2});
@@ -211,7 +223,9 @@ TEST(AccessInversion, Shear) { expect_gathers(make_case({x10, y8, r3}, {x + r, y
 TEST(AccessInversion, Diagonal) { expect_gathers(make_case({x10}, {x, x}), {1}); }
 TEST(AccessInversion, SumOfAllRows) { expect_gathers(make_case({x10, y8}, {x}), {8}); }
 TEST(AccessInversion, Transposed) { expect_gathers(make_case({x10, y8}, {y, x}), {1}); }
-TEST(AccessInversion, SumOfVariables) { expect_gathers(make_case({x10, loop("y", 0, 3)}, {x + y}), {4}); }
+TEST(AccessInversion, SumOfVariables) {
+  expect_gathers(make_case({x10, loop("y", 0, 3)}, {x + y}), {4});
+}
 TEST(AccessInversion, Modulus) { expect_gathers(make_case({loop("x", 0, 11)}, {x % 4}), {3}); }
 TEST(AccessInversion, SelectBetweenAffineIndices) {
   Inversion inversion = check(make_case({x10}, {select(x < 5, x + 10, 5 - x)}));
@@ -261,7 +275,8 @@ TEST(AccessInversion, DataOnDeterminedVariablesIsAParameter) {
 TEST(AccessInversion, DataInOneDimensionScattersThereOnly) {
   Inversion inversion = check(make_case({x10, y8, loop("c", 0, 3)}, {c, x, data({x, y})}));
   ASSERT_EQ(inversion.gathers.size(), 1u);
-  EXPECT_EQ(inversion.gathers[0].pure, (std::vector<bool>{true, true, false})) << describe(inversion);
+  EXPECT_EQ(inversion.gathers[0].pure, (std::vector<bool>{true, true, false}))
+      << describe(inversion);
   EXPECT_EQ(iterations(inversion, {}), std::vector<int64_t>{8});
 }
 TEST(AccessInversion, DataEverywhereScatters) {
@@ -279,10 +294,13 @@ TEST(AccessInversion, TriangularPredicate) {
   EXPECT_TRUE(all_gather(check(c)));
 }
 
-// Bilateral slicing: the cell of the grid is an affine function of the pixel, clamped at the border; depth is data.
+// Bilateral slicing: the cell of the grid is an affine function of the pixel, clamped at the
+// border; depth is data.
 TEST(AccessInversion, SlicedGridGathersPixelsOfACell) {
   const int size = 8, cells = 4;
-  auto cell = [&](const Expr& v) { return min(max((2 * v + 1 - size) / (2 * size), 0), cells - 1); };
+  auto cell = [&](const Expr& v) {
+    return min(max((2 * v + 1 - size) / (2 * size), 0), cells - 1);
+  };
   for (int dx : {0, 1}) {
     Case k = make_case({loop("c", 0, 2), loop("x", 0, 31), loop("y", 0, 31)},
                        {c, min(cell(x) + dx, cells - 1), cell(y), data({x, y}) + dx});
@@ -300,7 +318,8 @@ class RandomAccess {
  public:
   explicit RandomAccess(unsigned seed) : random_(seed) {}
   Case next() {
-    std::vector<LoopVariable> vars{loop("x", pick(-3, 0), pick(4, 8)), loop("y", pick(-2, 1), pick(2, 5)),
+    std::vector<LoopVariable> vars{loop("x", pick(-3, 0), pick(4, 8)),
+                                   loop("y", pick(-2, 1), pick(2, 5)),
                                    loop("r", 0, pick(0, 3), true)};
     vars.resize(static_cast<size_t>(pick(1, 3)));
     names_.clear();
@@ -314,19 +333,33 @@ class RandomAccess {
 
  private:
   int pick(int low, int high) { return std::uniform_int_distribution<int>(low, high)(random_); }
-  Expr leaf() { return pick(0, 4) == 0 ? Expr(pick(-4, 4)) : var(names_[static_cast<size_t>(pick(0, static_cast<int>(names_.size()) - 1))]); }
+  Expr leaf() {
+    return pick(0, 4) == 0
+               ? Expr(pick(-4, 4))
+               : var(names_[static_cast<size_t>(pick(0, static_cast<int>(names_.size()) - 1))]);
+  }
   Expr index(int depth) {
     if (depth == 0) return leaf();
     switch (pick(0, 9)) {
-      case 0: case 1: return index(depth - 1) + index(depth - 1);
-      case 2: return index(depth - 1) - index(depth - 1);
-      case 3: return index(depth - 1) * pick(-2, 3);
-      case 4: return index(depth - 1) / pick(2, 4);
-      case 5: return index(depth - 1) % pick(2, 4);
-      case 6: return min(index(depth - 1), index(depth - 1));
-      case 7: return max(index(depth - 1), pick(-3, 3));
-      case 8: return select(index(depth - 1) < index(depth - 1), index(depth - 1), index(depth - 1));
-      default: return leaf();
+      case 0:
+      case 1:
+        return index(depth - 1) + index(depth - 1);
+      case 2:
+        return index(depth - 1) - index(depth - 1);
+      case 3:
+        return index(depth - 1) * pick(-2, 3);
+      case 4:
+        return index(depth - 1) / pick(2, 4);
+      case 5:
+        return index(depth - 1) % pick(2, 4);
+      case 6:
+        return min(index(depth - 1), index(depth - 1));
+      case 7:
+        return max(index(depth - 1), pick(-3, 3));
+      case 8:
+        return select(index(depth - 1) < index(depth - 1), index(depth - 1), index(depth - 1));
+      default:
+        return leaf();
     }
   }
   std::mt19937 random_;

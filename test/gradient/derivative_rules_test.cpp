@@ -1,4 +1,5 @@
-// The rule table: total, right against central differences in double, and as conventional at kinks and poles as it says.
+// The rule table: total, right against central differences in double, and as conventional at kinks
+// and poles as it says.
 #include "autodiff/derivative_rules.h"
 
 #include <gtest/gtest.h>
@@ -28,7 +29,10 @@ Scalar eval(const Expr& e, const Env& env) {
       [&](const Cast& c) { return eval_cast(c.type, eval(c.value, env)); },
       [&](const Binary& b) { return eval_binary(b.kind, eval(b.a, env), eval(b.b, env)); },
       [&](const Not& n) { return eval_not(eval(n.a, env)); },
-      [&](const Select& s) { return eval(s.condition, env).as_bool() ? eval(s.true_value, env) : eval(s.false_value, env); },
+      [&](const Select& s) {
+        return eval(s.condition, env).as_bool() ? eval(s.true_value, env)
+                                                : eval(s.false_value, env);
+      },
       [&](const Call& c) {
         std::vector<Scalar> args;
         for (const Expr& a : c.args) args.push_back(eval(a, env));
@@ -44,9 +48,9 @@ Scalar eval(const Expr& e, const Env& env) {
 
 // Leaves are Variables that count as reads of images: every one is wanted.
 Env gradient(const Expr& e, const Env& env, double seed = 1) {
-  SweepResult sweep = sweep_reverse({e}, {make_const(adjoint_type(e.type()), seed)}, [](const Expr& leaf) {
-    return leaf.as<Variable>() != nullptr;
-  });
+  SweepResult sweep =
+      sweep_reverse({e}, {make_const(adjoint_type(e.type()), seed)},
+                    [](const Expr& leaf) { return leaf.as<Variable>() != nullptr; });
   Env result;
   for (const auto& [name, value] : env) result[name] = 0;
   for (const LeafAdjoint& leaf : sweep.leaves) {
@@ -66,7 +70,8 @@ void expect_central_differences(const Expr& e, const Env& env) {
     };
     double h = 1e-3 * (1 + std::abs(value));
     double expected = (4 * slope(h / 2) - slope(h)) / 3;
-    EXPECT_NEAR(found[name], expected, 1e-6 * (1 + std::abs(expected))) << "d/d" << name << " of " << e;
+    EXPECT_NEAR(found[name], expected, 1e-6 * (1 + std::abs(expected)))
+        << "d/d" << name << " of " << e;
   }
 }
 
@@ -82,11 +87,13 @@ TEST(DerivativeRules, EveryOperatorHasARuleOrAReason) {
     EXPECT_STRNE(rule.convention, "") << op_info(o).name;
     EXPECT_STRNE(rule.source, "") << op_info(o).name;
     EXPECT_EQ(rule.cls == RuleClass::Smooth, rule.partials != nullptr) << op_info(o).name;
-    EXPECT_TRUE(rule.cls != RuleClass::NoRule || op_info(o).cls == OpClass::Internal) << op_info(o).name;
+    EXPECT_TRUE(rule.cls != RuleClass::NoRule || op_info(o).cls == OpClass::Internal)
+        << op_info(o).name;
   }
 #define RETROGRADE_BINARY(K) EXPECT_TRUE(has_derivative_rule(Kind::K)) << #K;
 #include "ir/kinds.def"
-  for (Kind k : {Kind::Cast, Kind::Select, Kind::Not, Kind::Reinterpret}) EXPECT_TRUE(has_derivative_rule(k));
+  for (Kind k : {Kind::Cast, Kind::Select, Kind::Not, Kind::Reinterpret})
+    EXPECT_TRUE(has_derivative_rule(k));
 }
 
 // Points inside each operator's domain; every smooth operator must be listed.
@@ -137,8 +144,9 @@ TEST(DerivativeRules, SmoothOperatorsAgreeWithCentralDifferences) {
 
 TEST(DerivativeRules, ArithmeticAgreesWithCentralDifferences) {
   const Env env{{"x", 1.75}, {"y", -0.6}};
-  for (const Expr& e : {x + y, x - y, x * y, x / y, x % num(0.5), min(x, y), max(x, y), select(x > y, x * x, y),
-                        x / num(3), clamp(x, num(0), num(1)), clamp(x, num(0), num(5))}) {
+  for (const Expr& e :
+       {x + y, x - y, x * y, x / y, x % num(0.5), min(x, y), max(x, y), select(x > y, x * x, y),
+        x / num(3), clamp(x, num(0), num(1)), clamp(x, num(0), num(5))}) {
     expect_central_differences(e, env);
   }
   expect_central_differences(x % y, {{"x", 7.3}, {"y", 2.1}});
@@ -180,12 +188,14 @@ TEST(DerivativeRules, KinksGiveZeroWhereTheConventionSaysSo) {
 }
 
 TEST(DerivativeRules, PolesAreInfiniteForANonzeroAdjointOnly) {
-  const std::map<Op, double> poles = {{Op::sqrt, 0}, {Op::log, 0}, {Op::asin, 1}, {Op::acos, 1}, {Op::acosh, 1}, {Op::atanh, 1}};
+  const std::map<Op, double> poles = {{Op::sqrt, 0}, {Op::log, 0},   {Op::asin, 1},
+                                      {Op::acos, 1}, {Op::acosh, 1}, {Op::atanh, 1}};
   for (const auto& [o, at] : poles) {
     EXPECT_TRUE(std::isinf(gradient(op(o, {x}), {{"x", at}})["x"])) << op_info(o).name;
     // The branch not taken passes exactly zero, not inf * 0.
     Expr guarded = select(x > num(at), op(o, {x}), x * num(2));
-    if (o == Op::asin || o == Op::acos || o == Op::atanh) guarded = select(x < num(at), op(o, {x}), x * num(2));
+    if (o == Op::asin || o == Op::acos || o == Op::atanh)
+      guarded = select(x < num(at), op(o, {x}), x * num(2));
     EXPECT_EQ(gradient(guarded, {{"x", at}})["x"], 2) << op_info(o).name;
   }
 }

@@ -1,4 +1,5 @@
-// Gradients of small programs against central differences in double, element by element, in the interpreter.
+// Gradients of small programs against central differences in double, element by element, in the
+// interpreter.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -16,13 +17,16 @@
 
 namespace retrograde::gradient {
 
-// Values that are exact in float32, far from each other's kinks: odd multiples of 2^-7 in (low, high).
-inline Buffer<float> random_image(const std::vector<int>& sizes, double low, double high, unsigned seed) {
+// Values that are exact in float32, far from each other's kinks: odd multiples of 2^-7 in (low,
+// high).
+inline Buffer<float> random_image(const std::vector<int>& sizes, double low, double high,
+                                  unsigned seed) {
   Buffer<float> result(sizes);
   std::mt19937 random(seed);
   int steps = static_cast<int>((high - low) * 64);
   std::uniform_int_distribution<int> pick(0, steps - 1);
-  result.get()->for_each_value([&](float& v) { v = static_cast<float>(low + (2 * pick(random) + 1) / 128.0); });
+  result.get()->for_each_value(
+      [&](float& v) { v = static_cast<float>(low + (2 * pick(random) + 1) / 128.0); });
   return result;
 }
 
@@ -55,7 +59,8 @@ inline double difference(const Func& loss, Buffer<float>& image, const std::vect
   return (4 * fine - coarse) / 3;
 }
 
-// The gradient as machine code, under its default schedule, in float32; the same bits again on a second run.
+// The gradient as machine code, under its default schedule, in float32; the same bits again on a
+// second run.
 inline void expect_machine_code_agrees(Func gradient, const oracle::Region& region) {
   oracle::Array expected = evaluate(gradient, region);
   Buffer<float> first(region.extents), second(region.extents);
@@ -64,7 +69,8 @@ inline void expect_machine_code_agrees(Func gradient, const oracle::Region& regi
   gradient.realize(first);
   gradient.realize(second);
   double scale = 1;
-  for (const oracle::Value& v : expected.values) scale = std::max(scale, std::abs(v.scalar.as_double()));
+  for (const oracle::Value& v : expected.values)
+    scale = std::max(scale, std::abs(v.scalar.as_double()));
   region.for_each([&](const std::vector<int>& point) {
     float found = first.get()->operator()(point.data());
     EXPECT_NEAR(found, expected.at(point).scalar.as_double(), 1e-4 * scale);
@@ -73,7 +79,8 @@ inline void expect_machine_code_agrees(Func gradient, const oracle::Region& regi
 }
 
 // Checks d(image) on all of the image, and that it is 0 in a ring around it.
-inline void expect_gradient(const Func& loss, const Derivative& d, Buffer<float>& image, double tolerance = 1e-5) {
+inline void expect_gradient(const Func& loss, const Derivative& d, Buffer<float>& image,
+                            double tolerance = 1e-5) {
   Func gradient = d(image);
   ASSERT_TRUE(gradient.defined()) << d.explain();
   oracle::Region region = oracle::region_of(*image.raw_buffer()), around = region;
@@ -84,7 +91,8 @@ inline void expect_gradient(const Func& loss, const Derivative& d, Buffer<float>
     double expected = difference(loss, image, point), actual = found.at(point).scalar.as_double();
     std::string where;
     for (int p : point) where += std::to_string(p) + " ";
-    EXPECT_NEAR(expected, actual, tolerance * (1 + std::abs(expected))) << "at " << where << "\n" << d.explain();
+    EXPECT_NEAR(expected, actual, tolerance * (1 + std::abs(expected))) << "at " << where << "\n"
+                                                                        << d.explain();
   });
   if (::testing::Test::HasFailure()) return;
   expect_machine_code_agrees(gradient, region);
@@ -100,7 +108,8 @@ inline void expect_gradient(const Func& loss, const Derivative& d, Buffer<float>
   });
 }
 
-inline void expect_gradient(const Func& loss, Buffer<float>& image, const AdjointOptions& options = {}) {
+inline void expect_gradient(const Func& loss, Buffer<float>& image,
+                            const AdjointOptions& options = {}) {
   Derivative d = propagate_adjoints(loss, options);
   expect_gradient(loss, d, image);
 }

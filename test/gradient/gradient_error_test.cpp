@@ -1,4 +1,5 @@
-// What cannot be differentiated as written: each error has its kind, its four parts and the names in it.
+// What cannot be differentiated as written: each error has its kind, its four parts and the names
+// in it.
 #include <gtest/gtest.h>
 
 #include "autodiff/derivative.h"
@@ -16,7 +17,8 @@ void expect_error(Action action, const std::vector<std::string>& phrases) {
     action();
   } catch (const Kind& e) {
     for (const std::string& phrase : phrases) {
-      EXPECT_NE(std::string(e.what()).find(phrase), std::string::npos) << phrase << " is not in: " << e.what();
+      EXPECT_NE(std::string(e.what()).find(phrase), std::string::npos)
+          << phrase << " is not in: " << e.what();
     }
     EXPECT_FALSE(e.message().asked.empty());
     EXPECT_FALSE(e.message().rule.empty());
@@ -43,7 +45,8 @@ TEST_F(Gradients, OverwrittenValueThatAPartialNeeds) {
   f(x) = a(x);
   f(x) = f(x) * f(x);
   sum_up();
-  expect_error<UserError>([&] { propagate_adjoints(loss); }, {"differentiate the update \"f", "Overwritten::Store"});
+  expect_error<UserError>([&] { propagate_adjoints(loss); },
+                          {"differentiate the update \"f", "Overwritten::Store"});
 }
 
 TEST_F(Gradients, ProductInPlace) {
@@ -93,7 +96,11 @@ TEST_F(Gradients, BoundsOfWrongRank) {
   f(x) = a(x);
   Func seed("seed");
   seed(x) = 1.0f;
-  expect_error<UserError>([&] { propagate_adjoints(f, seed, Region{{0, 8}, {0, 8}}); }, {"1 dimensions", "2 bounds"});
+  expect_error<UserError>(
+      [&] {
+        propagate_adjoints(f, seed, Region{{0, 8}, {0, 8}});
+      },
+      {"1 dimensions", "2 bounds"});
 }
 
 TEST_F(Gradients, AdjointOfWrongRank) {

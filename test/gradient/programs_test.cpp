@@ -16,7 +16,8 @@ Func weighted_sum(const Func& f, const std::vector<int>& sizes) {
   Expr weight = 1.0f;
   for (size_t d = 0; d < sizes.size(); ++d) {
     at.push_back(r[static_cast<int>(d)]);
-    weight = weight + cast<float>(r[static_cast<int>(d)] + 1) * (0.25f + 0.125f * static_cast<float>(d));
+    weight =
+        weight + cast<float>(r[static_cast<int>(d)] + 1) * (0.25f + 0.125f * static_cast<float>(d));
   }
   loss() = 0.0f;
   loss() += f(at) * weight + 0.5f * f(at) * f(at);
@@ -94,7 +95,8 @@ TEST_F(Programs, RotationDiagonalAndTranspose) {
 
 TEST_F(Programs, SelectAndMinMax) {
   Func f("f");
-  f(x) = select(a(x) > 1.0f, a(x) * 3.0f, a(x) * a(x)) + max(a(x), 1.25f * a(x + 1)) + clamp(a(x), 0.5f, 1.5f);
+  f(x) = select(a(x) > 1.0f, a(x) * 3.0f, a(x) * a(x)) + max(a(x), 1.25f * a(x + 1)) +
+         clamp(a(x), 0.5f, 1.5f);
   Func loss = weighted_sum(f, {8});
   expect_gradient(loss, a);
 }
@@ -169,7 +171,8 @@ TEST_F(Programs, BilateralSlice) {
   Func adjoint = d(grid);
   for (int i = 0; i < adjoint.num_update_definitions(); ++i) {
     std::vector<Expr> lhs = adjoint.update_args(i);
-    for (int k = 0; k < 3; ++k) EXPECT_TRUE(lhs[static_cast<size_t>(k)].as<ir::Variable>()) << "race-free in all but depth";
+    for (int k = 0; k < 3; ++k)
+      EXPECT_TRUE(lhs[static_cast<size_t>(k)].as<ir::Variable>()) << "race-free in all but depth";
   }
 }
 
@@ -347,7 +350,8 @@ TEST_F(Programs, ScalarParameterSumsInParts) {
 }
 
 TEST_F(Programs, PrivatisedScatterIsTheSameForEveryNumberOfThreads) {
-  Buffer<float> table = random_image({16}, 0.25, 2, 3), big = random_image({200, 100}, 0.05, 3.9, 4);
+  Buffer<float> table = random_image({16}, 0.25, 2, 3),
+                big = random_image({200, 100}, 0.05, 3.9, 4);
   Func f("f"), loss("loss");
   RDom r(0, 200, 0, 100);
   f(x, y) = table(clamp(cast<int>(big(x, y) * 4.0f), 0, 15)) * big(x, y);
@@ -422,7 +426,7 @@ TEST_F(Programs, SeedFromBufferAndFromFunc) {
   loss() += f(r) * seed(r);
   Derivative by_buffer = propagate_adjoints(f, seed);
   expect_gradient(loss, by_buffer, a);
-  Derivative by_func = propagate_adjoints(f, weight, std::vector<std::pair<Expr, Expr>>{{2, 5}});
+  Derivative by_func = propagate_adjoints(f, weight, {{2, 5}});
   expect_gradient(loss, by_func, a);
 }
 

@@ -1,5 +1,6 @@
-// Random programs of smooth operations, quasi-affine accesses and updates: the gradient against central differences
-// along a random direction, in double. The seed of a failure is printed and replays it.
+// Random programs of smooth operations, quasi-affine accesses and updates: the gradient against
+// central differences along a random direction, in double. The seed of a failure is printed and
+// replays it.
 #include "gradient/gradient_check.h"
 
 namespace retrograde::gradient {
@@ -9,14 +10,16 @@ constexpr int size = 5;
 
 class RandomProgram {
  public:
-  explicit RandomProgram(unsigned seed) : random_(seed), image(random_image({size, size}, 0.25, 1.25, seed + 100)) {
+  explicit RandomProgram(unsigned seed)
+      : random_(seed), image(random_image({size, size}, 0.25, 1.25, seed + 100)) {
     Func base("base");
     base(x, y) = image(clamp(x, 0, size - 1), clamp(y, 0, size - 1));
     funcs_.push_back(base);
     for (int i = pick(2, 4); i > 0; --i) add_func();
     RDom r(0, size, 0, size);
     loss() = 0.0f;
-    loss() += funcs_.back()(r.x, r.y) * (1.0f + 0.25f * cast<float>(r.x) - 0.125f * cast<float>(r.y));
+    loss() +=
+        funcs_.back()(r.x, r.y) * (1.0f + 0.25f * cast<float>(r.x) - 0.125f * cast<float>(r.y));
   }
 
  private:
@@ -35,16 +38,26 @@ class RandomProgram {
   // Index expressions stay in a small range, so that demand does not explode.
   Expr index(const Expr& u, const Expr& v) {
     switch (pick(0, 9)) {
-      case 0: return u + pick(-2, 2);
-      case 1: return u / 2 + pick(0, 1);
-      case 2: return clamp(2 * u - pick(0, 2), 0, size - 1);
-      case 3: return clamp(u + pick(-2, 2), 0, size - 1);
-      case 4: return (u + pick(0, 3)) % 4;
-      case 5: return size - 1 - u;
-      case 6: return select(u < pick(1, 3), u + 1, u - 1);
-      case 7: return v;
-      case 8: return clamp(u + v, 0, size - 1);
-      default: return u;
+      case 0:
+        return u + pick(-2, 2);
+      case 1:
+        return u / 2 + pick(0, 1);
+      case 2:
+        return clamp(2 * u - pick(0, 2), 0, size - 1);
+      case 3:
+        return clamp(u + pick(-2, 2), 0, size - 1);
+      case 4:
+        return (u + pick(0, 3)) % 4;
+      case 5:
+        return size - 1 - u;
+      case 6:
+        return select(u < pick(1, 3), u + 1, u - 1);
+      case 7:
+        return v;
+      case 8:
+        return clamp(u + v, 0, size - 1);
+      default:
+        return u;
     }
   }
   Expr access(const Expr& u, const Expr& v) {
@@ -54,13 +67,21 @@ class RandomProgram {
   Expr value(const Expr& u, const Expr& v, int depth = 2) {
     if (depth == 0) return access(u, v);
     switch (pick(0, 6)) {
-      case 0: return value(u, v, depth - 1) * value(u, v, depth - 1);
-      case 1: return sin(value(u, v, depth - 1));
-      case 2: return value(u, v, depth - 1) * weight() + 0.5f;
-      case 3: return select(u + v < pick(2, 6), value(u, v, depth - 1), value(u, v, depth - 1) * weight());
-      case 4: return value(u, v, depth - 1) / (2.0f + cos(access(u, v)));
-      case 5: return value(u, v, depth - 1) + cast<float>(u) * 0.125f;
-      default: return value(u, v, depth - 1) + value(u, v, depth - 1);
+      case 0:
+        return value(u, v, depth - 1) * value(u, v, depth - 1);
+      case 1:
+        return sin(value(u, v, depth - 1));
+      case 2:
+        return value(u, v, depth - 1) * weight() + 0.5f;
+      case 3:
+        return select(u + v < pick(2, 6), value(u, v, depth - 1),
+                      value(u, v, depth - 1) * weight());
+      case 4:
+        return value(u, v, depth - 1) / (2.0f + cos(access(u, v)));
+      case 5:
+        return value(u, v, depth - 1) + cast<float>(u) * 0.125f;
+      default:
+        return value(u, v, depth - 1) + value(u, v, depth - 1);
     }
   }
 
@@ -72,9 +93,15 @@ class RandomProgram {
   }
   void add_update(Func& f) {
     switch (pick(0, 9)) {
-      case 0: f(x, y) += value(x, y); break;
-      case 1: f(pick(0, 4), y) = value(pick(0, 3), y); break;
-      case 2: f(x, pick(0, 4)) += value(x, pick(0, 4)); break;
+      case 0:
+        f(x, y) += value(x, y);
+        break;
+      case 1:
+        f(pick(0, 4), y) = value(pick(0, 3), y);
+        break;
+      case 2:
+        f(x, pick(0, 4)) += value(x, pick(0, 4));
+        break;
       case 3: {
         RDom r(0, size, 0, 3);
         f(r.x, r.y + 1) += value(r.x, r.y);
@@ -106,7 +133,9 @@ class RandomProgram {
         f(2, y) = value(r, y);
         break;
       }
-      default: f(x, y) = f(x, y) * weight() + value(x, y); break;
+      default:
+        f(x, y) = f(x, y) * weight() + value(x, y);
+        break;
     }
   }
 };
@@ -131,7 +160,8 @@ TEST(RandomGradients, AgreeWithCentralDifferences) {
     RandomProgram p(seed);
     std::vector<float> direction;
     std::mt19937 random(seed);
-    p.image.get()->for_each_value([&](float&) { direction.push_back(static_cast<float>(random() % 3) - 1.0f); });
+    p.image.get()->for_each_value(
+        [&](float&) { direction.push_back(static_cast<float>(random() % 3) - 1.0f); });
     Func gradient;
     try {
       gradient = propagate_adjoints(p.loss, {.overwritten = Overwritten::Store})(p.image);
