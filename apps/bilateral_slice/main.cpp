@@ -84,9 +84,20 @@ void require_same_size(const Options& options, const apps::Image& a, const apps:
       "Resize or crop one of them");
 }
 
+apps::Image read_photo(const std::filesystem::path& path) {
+  apps::Image image = apps::read_image(path);
+  if (image.width < 4 || image.height < 4) {
+    retrograde::call_error(
+        text("learn a look from ", quoted(path.string())),
+        "a grid is interpolated along both axes: a photo has at least 4 x 4 pixels",
+        text("it has ", image.width, " x ", image.height), "Give a larger photo");
+  }
+  return image;
+}
+
 Pair read_pair(const Options& options) {
   Pair pair;
-  const apps::Image input = apps::read_image(options.input);
+  const apps::Image input = read_photo(options.input);
   pair.shape = {.width = input.width, .height = input.height};
   pair.bits = input.bits;
   if (options.target.empty()) {

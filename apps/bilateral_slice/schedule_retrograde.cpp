@@ -8,6 +8,7 @@
 //   vector
 //               along x would come from different layers
 //   along k     the curve's knots
+#include <algorithm>
 #include <vector>
 
 #include "training_pipeline.h"
@@ -22,6 +23,13 @@ using lang::VarOrRVar;
 namespace {
 
 constexpr int lanes = 16;
+constexpr auto guarded = lang::TailStrategy::GuardWithIf;  // never reads beside the photo
+constexpr int short_loop = 4;                              // up to so many iterations are unrolled
+
+bool is_short(const lang::RVar& r) {
+  const auto extent = lang::ir::as_const_int(r.extent());
+  return extent && *extent <= short_loop;
+}
 
 // The loops of update `u` innermost first: its reduction variables, last declared innermost, then
 // these.
@@ -34,8 +42,8 @@ std::vector<VarOrRVar> reductions_inside(const Func& f, int u, const std::vector
 
 // Vectors along `inner`, all definitions alike.
 void vectorize_all(Func f, const Var& inner) {
-  f.vectorize(inner, lanes);
-  for (int u = 0; u < f.num_update_definitions(); ++u) f.update(u).vectorize(inner, lanes);
+  f.vectorize(inner, lanes, guarded);
+  for (int u = 0; u < f.num_update_definitions(); ++u) f.update(u).vectorize(inner, lanes, guarded);
 }
 
 void parallelize_all(Func f, const Var& outer) {
@@ -64,9 +72,9 @@ void schedule_forward(Model& m) {
   store_rows(m.layer, m.x, m.y);
 
   const Var tile("tile"), pixel("pixel");
-  m.plane.compute_root().vectorize(m.x, lanes).parallel(m.y);
+  m.plane.compute_root().vectorize(m.x, lanes, guarded).parallel(m.y);
   m.plane.update()
-      .split(m.x, tile, pixel, lanes)
+      .split(m.x, tile, pixel, lanes, guarded)
       .reorder(m.plane.rvars(0)[0], pixel, m.o, m.k, tile, m.y)
       .unroll(m.plane.rvars(0)[0])
       .vectorize(pixel)
@@ -85,18 +93,20 @@ void schedule_forward(Model& m) {
   m.row_loss.compute_root().update().parallel(m.y);
 }
 
-// A pixel adds to four transforms: layers k = 0, 1 of the nodes before and after it. The reduction
-// is over the cell's pixels, k and the node, in this order.
+// A pixel adds to four transforms: layers k = 0, 1 of the nodes before and after it. These short
+// loops are unrolled around the vector, and the loop over the pixels of a cell runs around them.
 void schedule_row_gradient(const Model& m, Func rows) {
   rows.compute_root().bound(m.i, 0, 4).bound(m.o, 0, 3).vectorize(m.i).unroll(m.o).parallel(m.y);
-  const auto r = rows.rvars(0);
-  rows.update()
-      .reorder(m.i, m.o, r[1], r[2], r[0], m.gx, m.y)
-      .vectorize(m.i)
-      .unroll(m.o)
-      .unroll(r[1])
-      .unroll(r[2])
-      .parallel(m.y);
+  for (int u = 0; u < rows.num_update_definitions(); ++u) {
+    auto r = rows.rvars(u);
+    const auto long_ones = std::stable_partition(r.begin(), r.end(), is_short);
+    std::vector<VarOrRVar> order{m.i, m.o};
+    order.insert(order.end(), r.begin(), r.end());
+    order.insert(order.end(), {m.gx, m.y});
+    Stage update = rows.update(u);
+    update.reorder(order).vectorize(m.i).unroll(m.o).parallel(m.y);
+    for (auto it = r.begin(); it != long_ones; ++it) update.unroll(*it);
+  }
 }
 
 void schedule_grid_gradient(const Model& m, Func grid) {

@@ -1,10 +1,12 @@
 // shape.h -- the sizes that a model is compiled for.
 #pragma once
 
+#include <algorithm>
+
 namespace bilateral_slice {
 
 // The grid's nodes stand `cell_width` by `cell_height` pixels apart, the first on pixel (0, 0); the
-// cells are the smallest that let the nodes reach over the photo.
+// cells are the smallest that let the nodes reach over the photo, but no smaller than two pixels.
 struct Shape {
   int width = 0;
   int height = 0;
@@ -13,8 +15,8 @@ struct Shape {
   int grid_z = 8;
   int knots = 16;  // of the guide curve
 
-  int cell_width() const { return (width - 1) / (grid_x - 1) + 1; }
-  int cell_height() const { return (height - 1) / (grid_y - 1) + 1; }
+  int cell_width() const { return std::max((width - 1) / (grid_x - 1) + 1, 2); }
+  int cell_height() const { return std::max((height - 1) / (grid_y - 1) + 1, 2); }
   long pixels() const { return static_cast<long>(width) * height; }
   long grid_elems() const { return 12L * grid_z * grid_x * grid_y; }
 };

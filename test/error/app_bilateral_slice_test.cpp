@@ -121,6 +121,12 @@ TEST_F(BilateralSliceErrors, ATruncatedImageIsRefused) {
   expect_no_results();
 }
 
+TEST_F(BilateralSliceErrors, ALineOfPixelsIsNoPhoto) {
+  run_on(write_photo("line.png", 9, 1));
+  expect_refused({"line.png", "at least 4 x 4 pixels", "it has 9 x 1", "Give a larger photo"});
+  expect_no_results();
+}
+
 TEST_F(BilateralSliceErrors, SizesMustAgree) {
   const fs::path other = write_photo("other.png", 12, 11);
   run_on(photo_, "--target " + other.string());
