@@ -263,9 +263,102 @@ Gather scatter_access(const AccessQuery& query) {
   return g;
 }
 
+namespace {
+
+Expr negation(const Expr& e) {
+  if (const auto* n = e.as<Or>()) return negation(n->a) && negation(n->b);
+  if (const auto* n = e.as<And>()) return negation(n->a) || negation(n->b);
+  if (const auto* n = e.as<Not>()) return n->a;
+  const auto* b = e.as<Binary>();
+  if (!b || b->a.type().is_float()) return logical_not(e);
+  switch (b->kind) {
+    case Kind::LT:
+      return b->a >= b->b;
+    case Kind::LE:
+      return b->a > b->b;
+    case Kind::GT:
+      return b->a <= b->b;
+    case Kind::GE:
+      return b->a < b->b;
+    default:
+      return logical_not(e);
+  }
+}
+
+AccessQuery restricted(AccessQuery query, size_t d, const Expr& index, const Expr& condition) {
+  Expr& predicate = query.domain.predicate;
+  predicate = predicate.defined() ? predicate && condition : condition;
+  query.indices[d] = index;
+  return query;
+}
+
+// select(inside, x, something that isl cannot follow): the part where it can becomes a query of its
+// own, so that the border of a boundary condition with parametric size does not make a scatter of
+// the interior. Empty: nothing to split.
+std::vector<AccessQuery> split_at_select(const AccessQuery& query) {
+  IslContext context;
+  std::vector<std::string> names;
+  for (const LoopVariable& v : query.domain.vars) names.push_back(v.name);
+  IslBridge bridge(context, names);
+  for (size_t d = 0; d < query.indices.size(); ++d) {
+    const auto* s = query.indices[d].as<Select>();
+    if (!s || bridge.affine(query.indices[d]) || !bridge.condition(s->condition)) continue;
+    if (!bridge.affine(s->true_value) && !bridge.affine(s->false_value)) continue;
+    std::vector<AccessQuery> parts{restricted(query, d, s->false_value, negation(s->condition))};
+    // A disjunction is cut into disjoint parts, whose domains are boxes again.
+    Expr before = const_true(), rest = s->condition;
+    for (const auto* either = rest.as<Or>(); either; either = rest.as<Or>()) {
+      parts.push_back(restricted(query, d, s->true_value, before && either->a));
+      before = before && negation(either->a);
+      rest = either->b;
+    }
+    parts.push_back(restricted(query, d, s->true_value, before && rest));
+    return parts;
+  }
+  return {};
+}
+
+// Bounds of variables follow conjuncts like x < 5, so that reduction domains made of them are
+// short.
+void tighten(IterationDomain& domain, const Expr& conjunct) {
+  if (const auto* both = conjunct.as<And>()) {
+    tighten(domain, both->a);
+    tighten(domain, both->b);
+    return;
+  }
+  const auto* c = conjunct.as<Binary>();
+  if (!c || c->kind < Kind::LT || c->kind > Kind::GE || !c->a.type().is_int()) return;
+  bool less = c->kind == Kind::LT || c->kind == Kind::LE,
+       strict = c->kind == Kind::LT || c->kind == Kind::GT;
+  auto apply = [&](const Expr& name, Expr bound, bool upper) {
+    const auto* v = name.as<Variable>();
+    for (const LoopVariable& other : domain.vars) {
+      if (uses_variable(bound, other.name)) return;
+    }
+    for (LoopVariable& mine : domain.vars) {
+      if (!v || mine.name != v->name || !mine.min.defined() || !mine.max.defined()) continue;
+      if (strict) bound = upper ? bound - 1 : bound + 1;
+      (upper ? mine.max : mine.min) = simplify(upper ? min(mine.max, bound) : max(mine.min, bound));
+    }
+  };
+  apply(c->a, c->b, less);
+  apply(c->b, c->a, !less);
+}
+
+}  // namespace
+
 Inversion invert_access(const AccessQuery& query) {
   try {
-    return Inverter(query).run();
+    std::vector<AccessQuery> parts = split_at_select(query);
+    if (parts.empty()) return Inverter(query).run();
+    Inversion result;
+    for (AccessQuery& part : parts) {
+      tighten(part.domain, part.domain.predicate);
+      Inversion one = invert_access(part);
+      result.gathers.insert(result.gathers.end(), one.gathers.begin(), one.gathers.end());
+      if (!one.note.empty()) result.note = one.note;
+    }
+    return result;
   } catch (const isl::exception& e) {
     return {{scatter_access(query)}, text("isl gave up: ", e.what())};
   }

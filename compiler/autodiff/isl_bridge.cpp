@@ -104,6 +104,22 @@ std::optional<isl::pw_aff> IslBridge::binary(const Binary& b, const Expr& e) {
   }
 }
 
+// int(abs(a)) and int(absd(a, b)): the unsigned value in between is converted back.
+std::optional<isl::pw_aff> IslBridge::absolute(const Cast& c) {
+  const auto* call = c.value.as<Call>();
+  if (!call || !(call->is_op(Op::abs) || call->is_op(Op::absd))) return std::nullopt;
+  if (!call->args[0].type().is_int() || call->args[0].type().bits() < 32 || !c.type.is_int())
+    return std::nullopt;
+  auto a = affine(call->args[0]);
+  if (a && call->is_op(Op::absd)) {
+    auto b = affine(call->args[1]);
+    if (!b) return std::nullopt;
+    a = a->sub(*b);
+  }
+  if (!a) return std::nullopt;
+  return a->max(a->neg()).coalesce();
+}
+
 std::optional<isl::pw_aff> IslBridge::affine(const Expr& e) {
   if (fixed_.contains(e)) return parameter(e);
   if (auto value = as_const_int(e)) return constant(*value);
@@ -124,6 +140,7 @@ std::optional<isl::pw_aff> IslBridge::affine(const Expr& e) {
         return t->intersect_domain(*c).union_add(f->intersect_domain(otherwise)).coalesce();
       },
       [&](const Cast& c) -> std::optional<isl::pw_aff> {
+        if (auto magnitude = absolute(c)) return magnitude;
         bool exact = c.value.type().is_int() && c.type.is_int() && c.value.type().bits() >= 32 &&
                      c.type.bits() >= 32;
         return exact ? affine(c.value) : obstacle(e);

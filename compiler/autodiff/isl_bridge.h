@@ -70,6 +70,7 @@ class IslBridge {
   bool mentions_dim(const Expr& e) const;
   std::optional<isl::pw_aff> obstacle(const Expr& e);
   std::optional<isl::pw_aff> binary(const Binary& b, const Expr& e);
+  std::optional<isl::pw_aff> absolute(const Cast& c);
   std::optional<isl::set> comparison(const Binary& b);
 
   isl_ctx* ctx_;

@@ -44,6 +44,7 @@ int64_t eval(const Expr& e, const Env& env) {
         return eval(s.condition, env) ? eval(s.true_value, env) : eval(s.false_value, env);
       },
       [&](const Call& c) -> int64_t {
+        if (c.is_op(Op::absd)) return std::abs(eval(c.args[0], env) - eval(c.args[1], env));
         if (c.call_type == CallType::Operator) return eval(c.args[0], env);
         std::vector<int64_t> args;
         for (const Expr& a : c.args) args.push_back(eval(a, env));
@@ -240,6 +241,22 @@ TEST(AccessInversion, MirrorBorder) {
 TEST(AccessInversion, RepeatImageBorder) {
   Inversion inversion = check(make_case({loop("x", -4, 13)}, {x % 10}));
   EXPECT_TRUE(all_gather(inversion));
+}
+TEST(AccessInversion, BorderOfParametricSizeLeavesTheInteriorAGather) {
+  Expr n = var("n");
+  Case k = make_case({loop("x", -3, n + 2)},
+                     {select(x < 0 || x > n - 1, x % n, clamp(x, 0, n - 1))}, {{"n", 7}});
+  Inversion inversion = check(k);
+  int interior = 0;
+  for (const Gather& g : inversion.gathers) interior += !g.scatters && !g.rdom && g.pure[0];
+  EXPECT_EQ(interior, 1) << describe(inversion);
+  for (int64_t iterations : iterations(inversion, k.params))
+    EXPECT_LE(iterations, 3) << describe(inversion);
+}
+TEST(AccessInversion, AbsoluteDifference) {
+  Expr last = Expr(9);
+  Expr index = last - cast(Int(32), call_op(Op::absd, UInt(32), {last, x % 18}));
+  EXPECT_TRUE(all_gather(check(make_case({loop("x", -4, 13)}, {index}))));
 }
 TEST(AccessInversion, ParametricExtent) {
   Expr n = var("n");

@@ -85,6 +85,31 @@ TEST_F(Programs, BoundaryConditions) {
   }
 }
 
+TEST_F(Programs, BoundaryConditionsOfParametricSize) {
+  for (int which = 0; which < 5; ++which) {
+    SCOPED_TRACE(which);
+    ImageParam in(Float(32), 2, "in");
+    in.set(image);
+    Func bounded;
+    if (which == 0) bounded = BoundaryConditions::repeat_edge(in);
+    if (which == 1) bounded = BoundaryConditions::constant_exterior(in, 0.5f);
+    if (which == 2) bounded = BoundaryConditions::repeat_image(in);
+    if (which == 3) bounded = BoundaryConditions::mirror_image(in);
+    if (which == 4) bounded = BoundaryConditions::mirror_interior(in);
+    Func blur("blur");
+    blur(x, y) = bounded(x - 2, y) * 0.5f + bounded(x + 1, y - 1) * bounded(x, y + 2);
+    Func loss = weighted_sum(blur, {7, 6});
+    Func gradient = propagate_adjoints(loss)(in);
+    oracle::Region region{{0, 0}, {7, 6}};
+    oracle::Array found = evaluate(gradient, region);
+    region.for_each([&](const std::vector<int>& point) {
+      double expected = difference(loss, image, point);
+      EXPECT_NEAR(found.at(point).scalar.as_double(), expected, 1e-5 * (1 + std::abs(expected)));
+    });
+    expect_machine_code_agrees(gradient, region);
+  }
+}
+
 TEST_F(Programs, RotationDiagonalAndTranspose) {
   Func f("f"), g("g");
   f(x, y) = image(y, 5 - x) * image(x, y);
