@@ -15,6 +15,8 @@ namespace {
 constexpr int lanes = 16;
 // Operations up to which a value is computed again rather than stored.
 constexpr double cheap = 6;
+// And in a Func that the user left alone in a schedule by hand.
+constexpr double explosion = 500;
 // One read inside a reduction counts as this many.
 constexpr double reads_of_a_reduction = 8;
 
@@ -40,10 +42,16 @@ class Chooser {
     bool differentiated = std::any_of(order_.begin(), order_.end(), is_adjoint);
     if (!differentiated) return {};
     for (const FuncPtr& f : order_) count_reads(*f);
+    bool by_hand = std::any_of(order_.begin(), order_.end(),
+                               [](const FuncPtr& f) { return !is_adjoint(f) && is_touched(*f); });
     for (const FuncPtr& f : order_) {  // producers first: the cost of what is inlined is known
       uses_[f.get()].operations = operations(*f);
       if (is_touched(*f)) continue;
-      bool stored = is_output(f) || !f->is_pure() || is_worth_storing(uses_[f.get()]);
+      // Who schedules the primal means an untouched primal Func to be inlined, unless that
+      // explodes.
+      bool left_inline = by_hand && !is_adjoint(f);
+      bool stored = is_worth_storing(uses_[f.get()], left_inline ? explosion : cheap);
+      if (!left_inline) stored |= is_output(f) || !f->is_pure();
       if (stored) result_[f.get()] = stored_schedule(*f);
     }
     return std::move(result_);
@@ -56,7 +64,9 @@ class Chooser {
   bool is_output(const FuncPtr& f) const {
     return std::find(outputs_.begin(), outputs_.end(), f) != outputs_.end();
   }
-  static bool is_worth_storing(const Use& use) { return use.reads > 1.5 && use.operations > cheap; }
+  static bool is_worth_storing(const Use& use, double free_operations) {
+    return use.reads > 1.5 && use.operations > free_operations;
+  }
 
   void count_reads(const FuncContents& f) {
     for (int s = 0; s < f.stage_count(); ++s) {
@@ -87,12 +97,15 @@ class Chooser {
     }
     return total;
   }
+  // Integers are indices and borders: mostly simplified away.
   double cost_of(const Expr& e) const {
     const auto* call = e.as<Call>();
     if (!call)
-      return e.as<Binary>() || e.as<Select>() || e.as<Cast>() ? (e.type().is_float() ? 1 : 0.25)
-                                                              : 0;
-    if (call->call_type != CallType::Func) return call->call_type == CallType::Operator ? 4 : 1;
+      return e.type().is_float() && (e.as<Binary>() || e.as<Select>() || e.as<Cast>()) ? 1 : 0;
+    if (call->call_type == CallType::Operator) {
+      return op_info(call->op).cls == OpClass::Marker ? 0 : call->op == Op::strong_mul ? 1 : 4;
+    }
+    if (call->call_type != CallType::Func) return 1;
     auto found = uses_.find(call->symbol.raw());
     auto callee = std::dynamic_pointer_cast<FuncContents>(call->symbol.lock());
     bool stored = !callee || !callee->is_pure() || result_.contains(callee.get()) ||
