@@ -27,9 +27,10 @@ ir::Scalar noise(Type type, uint32_t h) {
     return ir::Scalar::of_float(type, (static_cast<int>(h >> 12) - (1 << 19)) / double(1 << 17));
   }
   if (type.bits() >= 32) h %= wide_noise_range;
-  return type.is_int() ? ir::Scalar::of_int(type, static_cast<int64_t>(h) -
-                                                      (type.bits() >= 32 ? wide_noise_range / 2 : 0))
-                       : ir::Scalar::of_uint(type, h);
+  return type.is_int()
+             ? ir::Scalar::of_int(
+                   type, static_cast<int64_t>(h) - (type.bits() >= 32 ? wide_noise_range / 2 : 0))
+             : ir::Scalar::of_uint(type, h);
 }
 
 Buffer<> make_image(const ImageSpec& spec, const std::string& name) {
@@ -276,7 +277,7 @@ class Builder {
   BuiltPipeline built_;
   std::vector<Func> bounded_images_;  // undefined where indices are clamped instead
   std::vector<Expr> parameters_;
-  std::vector<Expr> variables_;       // of the definition being built
+  std::vector<Expr> variables_;  // of the definition being built
   Func* self_ = nullptr;
 };
 

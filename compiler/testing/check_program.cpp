@@ -13,6 +13,7 @@ namespace {
 
 constexpr int margin = 3;  // elements around the output in every dimension
 constexpr uint8_t canary = 0xa5;
+constexpr size_t longest_detail = 400;  // internal errors carry whole programs
 
 struct GuardedOutput {
   Runtime::Buffer<> whole, inner;  // of the same memory
@@ -121,7 +122,7 @@ Outcome check_program(const PipelineSpec& pipeline, const ScheduleSpec& schedule
   } catch (const Unsupported& error) {
     outcome = {Verdict::Refused, error.what()};
   } catch (const std::exception& error) {
-    outcome = {Verdict::Broken, error.what()};
+    outcome = {Verdict::Broken, std::string(error.what()).substr(0, longest_detail)};
   }
   return outcome;
 }

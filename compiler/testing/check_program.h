@@ -9,9 +9,9 @@ namespace retrograde::fuzz {
 
 enum class Verdict : uint8_t {
   Agrees,
-  Differs,   // wrong results
-  Refused,   // UserError or Unsupported: the generator or the compiler is wrong about what is legal
-  Broken,    // InternalError, or any other exception
+  Differs,  // wrong results
+  Refused,  // UserError or Unsupported: the generator or the compiler is wrong about what is legal
+  Broken,   // InternalError, or any other exception
 };
 
 struct Outcome {

@@ -9,8 +9,8 @@
 #include <unordered_map>
 
 #include "diagnostics/error.h"
-#include "ir/random.h"
 #include "diagnostics/large_stack.h"
+#include "ir/random.h"
 #include "testing/stage_program.h"
 
 namespace retrograde::oracle {
@@ -92,16 +92,16 @@ struct Island {
   Region box;
   std::vector<Value> cells;  // point-major, one per Tuple element
   std::vector<bool> written;
-  Hull reached;              // outside of the box included
+  Hull reached;  // outside of the box included
   bool grows_on_store = true;
-  bool poisoned = false;     // a store went to an unstable place
+  bool poisoned = false;  // a store went to an unstable place
 };
 
 struct FuncState {
   const FuncContents* func = nullptr;
   std::vector<Frame> stages;
   std::vector<int> pure_dims, scattered_dims;
-  std::unordered_map<Point, std::vector<Value>, PointHash> memo;          // pure Funcs
+  std::unordered_map<Point, std::vector<Value>, PointHash> memo;  // pure Funcs
   std::unordered_map<Point, std::vector<std::unique_ptr<Island>>, PointHash> slices;
   Island* active = nullptr;  // being computed
   Point active_slice;
@@ -227,7 +227,8 @@ class Interpreter::Impl {
 
   void check_size(const FuncState& f, size_t points) const {
     if (points >= options_.max_points) {
-      call_error("interpret " + quoted(f.func->name), "a Func is evaluated at a bounded number of points",
+      call_error("interpret " + quoted(f.func->name),
+                 "a Func is evaluated at a bounded number of points",
                  text("more than ", options_.max_points), "Raise InterpreterOptions::max_points.");
     }
   }
@@ -347,8 +348,8 @@ class Interpreter::Impl {
 
   void store(FuncState& f, Island& island, const Point& point, const std::vector<Value>& values,
              bool unsure) {
-    const bool nothing = std::all_of(values.begin(), values.end(),
-                                     [](const Value& v) { return v.is_undef(); });
+    const bool nothing =
+        std::all_of(values.begin(), values.end(), [](const Value& v) { return v.is_undef(); });
     if (nothing) return;
     const Point place = pick(point, f.scattered_dims);
     if (island.grows_on_store) island.reached.include(place);

@@ -26,9 +26,9 @@
 namespace retrograde::oracle {
 
 struct InterpreterOptions {
-  bool widen = false;                     // every float type becomes float64
-  Rounding rounding = Rounding::Strict;   // freedom to account for in Value::error
-  size_t max_points = size_t{1} << 24;    // of one Func; more is a UserError, not a hang
+  bool widen = false;                    // every float type becomes float64
+  Rounding rounding = Rounding::Strict;  // freedom to account for in Value::error
+  size_t max_points = size_t{1} << 24;   // of one Func; more is a UserError, not a hang
 };
 
 class Interpreter {

@@ -49,16 +49,17 @@ class Printer {
 
  private:
   void print_image(size_t i) {
-    static const char* const boundaries[] = {nullptr,        "constant_exterior", "repeat_edge",
-                                             "repeat_image", "mirror_image",      "mirror_interior"};
+    static const char* const boundaries[] = {nullptr,        "constant_exterior",
+                                             "repeat_edge",  "repeat_image",
+                                             "mirror_image", "mirror_interior"};
     const ImageSpec& image = spec_.images[i];
     const std::string name = "image" + std::to_string(i);
-    out_ << "Buffer<" << cpp_type(image.type) << "> " << name << "(" << "std::vector<int>"
-         << list(image.extents) << "); " << name << ".set_min(" << list(image.mins)
-         << ");  // noise, seed " << image.seed << "\n";
+    out_ << "Buffer<" << cpp_type(image.type) << "> " << name << "("
+         << "std::vector<int>" << list(image.extents) << "); " << name << ".set_min("
+         << list(image.mins) << ");  // noise, seed " << image.seed << "\n";
     if (image.boundary == Boundary::Clamp) return;
-    out_ << "Func bounded" << i << " = BoundaryConditions::"
-         << boundaries[static_cast<int>(image.boundary)] << "(" << name
+    out_ << "Func bounded" << i
+         << " = BoundaryConditions::" << boundaries[static_cast<int>(image.boundary)] << "(" << name
          << (image.boundary == Boundary::Constant ? ", cast<" + cpp_type(image.type) + ">(7)" : "")
          << ");\n";
   }
@@ -114,7 +115,8 @@ class Printer {
       e = variables_[index.variable];
       if (index.scale != 1) e += text(" * ", index.scale);
       if (index.divisor != 1) e += text(" / ", index.divisor);
-      if (index.offset != 0) e += index.offset < 0 ? text(" - ", -index.offset) : text(" + ", index.offset);
+      if (index.offset != 0)
+        e += index.offset < 0 ? text(" - ", -index.offset) : text(" + ", index.offset);
     }
     return index.clamped ? text("clamp(", e, ", ", index.low, ", ", index.high, ")") : e;
   }
@@ -168,10 +170,21 @@ class Printer {
   }
 
   std::string operation(const Term& term) {
-    static const std::vector<std::string> names = {
-        "cast", "saturating_cast", "!",  "-",  "abs", "floor", "sqrt", "exp", "sin", "+",
-        "-",    "*",               "/",  "%",  "min", "max",   "absd", "&",   "|",   "^",
-        "<<",   ">>",              "<",  "<=", "==",  "&&",    "||",   "select", "clamp", "lerp"};
+    static const std::vector<std::string> names = {"cast",  "saturating_cast",
+                                                   "!",     "-",
+                                                   "abs",   "floor",
+                                                   "sqrt",  "exp",
+                                                   "sin",   "+",
+                                                   "-",     "*",
+                                                   "/",     "%",
+                                                   "min",   "max",
+                                                   "absd",  "&",
+                                                   "|",     "^",
+                                                   "<<",    ">>",
+                                                   "<",     "<=",
+                                                   "==",    "&&",
+                                                   "||",    "select",
+                                                   "clamp", "lerp"};
     std::string name = names[static_cast<int>(term.action) - static_cast<int>(Action::Cast)];
     std::vector<std::string> e;
     for (const Term& operand : term.operands) e.push_back(expr(operand));
@@ -218,8 +231,8 @@ class SchedulePrinter {
     for (const OutputSpec& output : pipeline_.outputs) {
       if (!spec.bounded || output.func != f) continue;
       for (size_t d = 0; d < output.mins.size(); ++d) {
-        out_ << "f" << f << ".bound(" << "xyz"[d] << ", " << output.mins[d] << ", "
-             << output.extents[d] << ");\n";
+        out_ << "f" << f << ".bound("
+             << "xyz"[d] << ", " << output.mins[d] << ", " << output.extents[d] << ");\n";
       }
     }
   }
@@ -230,7 +243,8 @@ class SchedulePrinter {
   }
 
   void print_directive(const Directive& directive, int f, int stage) {
-    static const char* const verbs[] = {"split", "fuse", "reorder", "vectorize", "unroll", "parallel"};
+    static const char* const verbs[] = {"split",     "fuse",   "reorder",
+                                        "vectorize", "unroll", "parallel"};
     std::vector<std::string> arguments;
     for (const std::string& name : directive.loops) arguments.push_back(loop(name, f, stage));
     if (directive.kind == Kind::Split) {
@@ -244,7 +258,8 @@ class SchedulePrinter {
   }
 
   void declare(const std::string& name) {
-    declarations_ << (is_reduction_loop(name) ? "RVar " : "Var ") << name << "(\"" << name << "\");\n";
+    declarations_ << (is_reduction_loop(name) ? "RVar " : "Var ") << name << "(\"" << name
+                  << "\");\n";
   }
 
   void print_placement(int f) {

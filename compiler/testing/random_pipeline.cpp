@@ -53,8 +53,8 @@ class Generator {
 
   Type random_type() {
     static const std::vector<Type> types = {
-        UInt(8),   UInt(8),   Int(8),    UInt(16),  Int(16),   Int(32),  Int(32), Int(32),
-        UInt(32),  Int(64),   UInt(64),  Float(32), Float(32), Float(32), Float(64), Bool()};
+        UInt(8),  UInt(8), Int(8),   UInt(16),  Int(16),   Int(32),   Int(32),   Int(32),
+        UInt(32), Int(64), UInt(64), Float(32), Float(32), Float(32), Float(64), Bool()};
     return random_.pick(types);
   }
 
@@ -87,7 +87,8 @@ class Generator {
 
   void make_func(bool is_last) {
     FuncSpec func;
-    func.dimensions = is_last ? random_.between(1, 3) : random_.pick(std::vector<int>{0, 1, 1, 2, 2, 2, 3});
+    func.dimensions =
+        is_last ? random_.between(1, 3) : random_.pick(std::vector<int>{0, 1, 1, 2, 2, 2, 3});
     const int values = random_.chance(15) ? 2 : 1;
     const Context context{func.dimensions, {}, true};
     reads_ = 0;
@@ -132,7 +133,8 @@ class Generator {
         Action::Add, Action::Add, Action::Max, Action::Min, Action::Select, Action::Constant});
     for (size_t v = 0; v < func.values.size(); ++v) {
       const Type type = func.values[v].type;
-      update.values.push_back(update_value(type, static_cast<int>(v), update, combine, scan, context));
+      update.values.push_back(
+          update_value(type, static_cast<int>(v), update, combine, scan, context));
     }
     if (rank > 0 && random_.chance(35)) {
       update.predicate.push_back(term(Bool(), random_.between(1, 2), context));
@@ -218,7 +220,26 @@ class Generator {
   void make_outputs() {
     const int last = static_cast<int>(spec_.funcs.size()) - 1;
     spec_.outputs.push_back(output(last));
-    if (last > 0 && random_.chance(25)) spec_.outputs.push_back(output(random_.below(last)));
+    if (last > 0 && random_.chance(25))
+      spec_.outputs.push_back(output(copy_of(random_.below(last))));
+  }
+
+  // A Func that the other output reads over a larger region cannot be an output itself.
+  int copy_of(int source) {
+    FuncSpec copy;
+    copy.dimensions = spec_.funcs[source].dimensions;
+    Term read;
+    read.action = Action::Func;
+    read.source = source;
+    read.type = spec_.funcs[source].values[0].type;
+    for (int d = 0; d < copy.dimensions; ++d) {
+      Index index;
+      index.variable = d;
+      read.indices.push_back(index);
+    }
+    copy.values.push_back(std::move(read));
+    spec_.funcs.push_back(std::move(copy));
+    return static_cast<int>(spec_.funcs.size()) - 1;
   }
 
   OutputSpec output(int func) {
@@ -288,16 +309,32 @@ class Generator {
   }
 
   Term integer_term(Type type, int depth, const Context& context) {
-    static const std::vector<Action> actions = {
-        Action::Add,    Action::Add,    Action::Add,   Action::Sub,       Action::Sub,
-        Action::Mul,    Action::Mul,    Action::Div,   Action::Mod,       Action::Min,
-        Action::Max,    Action::Absd,   Action::BitAnd, Action::BitOr,    Action::BitXor,
-        Action::ShiftLeft, Action::ShiftRight, Action::Abs, Action::SaturatingCast, Action::Lerp};
+    static const std::vector<Action> actions = {Action::Add,
+                                                Action::Add,
+                                                Action::Add,
+                                                Action::Sub,
+                                                Action::Sub,
+                                                Action::Mul,
+                                                Action::Mul,
+                                                Action::Div,
+                                                Action::Mod,
+                                                Action::Min,
+                                                Action::Max,
+                                                Action::Absd,
+                                                Action::BitAnd,
+                                                Action::BitOr,
+                                                Action::BitXor,
+                                                Action::ShiftLeft,
+                                                Action::ShiftRight,
+                                                Action::Abs,
+                                                Action::SaturatingCast,
+                                                Action::Lerp};
     Action action = random_.pick(actions);
     const auto operand = [&] { return term(type, depth - 1, context); };
     switch (action) {
       case Action::Mul:
-        return make(action, type, {factor(type, depth - 1, context), factor(type, depth - 1, context)});
+        return make(action, type,
+                    {factor(type, depth - 1, context), factor(type, depth - 1, context)});
       case Action::Sub:
         // Unsigned and wide: no wrap-around through zero.
         if (type.is_uint() && is_wide(type)) action = Action::Max;
@@ -350,12 +387,10 @@ class Generator {
   }
 
   Term float_term(Type type, int depth, const Context& context) {
-    static const std::vector<Action> actions = {Action::Add,   Action::Add,  Action::Add,
-                                                Action::Sub,   Action::Sub,  Action::Mul,
-                                                Action::Mul,   Action::Mul,  Action::Div,
-                                                Action::Min,   Action::Max,  Action::Negate,
-                                                Action::Abs,   Action::Floor, Action::Sqrt,
-                                                Action::Exp,   Action::Sin,  Action::Absd};
+    static const std::vector<Action> actions = {
+        Action::Add, Action::Add,   Action::Add,  Action::Sub, Action::Sub, Action::Mul,
+        Action::Mul, Action::Mul,   Action::Div,  Action::Min, Action::Max, Action::Negate,
+        Action::Abs, Action::Floor, Action::Sqrt, Action::Exp, Action::Sin, Action::Absd};
     const Action action = random_.pick(actions);
     Term a = term(type, depth - 1, context);
     switch (action) {
@@ -366,13 +401,15 @@ class Generator {
       case Action::Sqrt:
         return make(action, type, {make(Action::Abs, type, {a})});
       case Action::Exp:
-        return make(action, type, {make(Action::Clamp, type, {a, constant(type, -16), constant(type, 16)})});
+        return make(action, type,
+                    {make(Action::Clamp, type, {a, constant(type, -16), constant(type, 16)})});
       case Action::Negate:
       case Action::Abs:
       case Action::Floor:
         return make(action, type, {a});
       case Action::Sin:
-        return make(action, type, {make(Action::Clamp, type, {a, constant(type, -80), constant(type, 80)})});
+        return make(action, type,
+                    {make(Action::Clamp, type, {a, constant(type, -80), constant(type, 80)})});
       default:
         return make(action, type, {a, term(type, depth - 1, context)});
     }
@@ -490,8 +527,8 @@ class Generator {
   Index access_index(int d, const Context& context) {
     if (random_.chance(6) && context.may_reduce) return data_index(context);
     Index index;
-    const bool same = d < context.dimensions && random_.chance(70) &&
-                      (usable_.empty() || usable_[d]);
+    const bool same =
+        d < context.dimensions && random_.chance(70) && (usable_.empty() || usable_[d]);
     index.variable = same ? d : random_variable(context);
     if (index.variable < 0 || random_.chance(5)) {
       index.variable = -1;
@@ -524,7 +561,7 @@ class Generator {
   std::vector<int> inlined_reads_;  // of each Func: leaves when everything is inlined into it
   int reads_ = 0;
   int strided_ = 0;
-  std::vector<bool> usable_;        // variables of the update being made; empty: all
+  std::vector<bool> usable_;  // variables of the update being made; empty: all
 };
 
 }  // namespace

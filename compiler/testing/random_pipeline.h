@@ -1,10 +1,10 @@
 // Random pipelines as plain data, so that a failing one can be printed and cut down.
 //
-// A PipelineSpec is built into Funcs by build_pipeline.h, scheduled by random_schedule.h, printed as
-// C++ by print_program.h and shrunk by reducer.h. Every pipeline that the generator makes is legal
-// and defined: indices that depend on data are clamped, images are read through boundary conditions
-// or clamps, integers of 32 and 64 bits stay far from overflow, floats are clamped before they are
-// converted to integers.
+// A PipelineSpec is built into Funcs by build_pipeline.h, scheduled by random_schedule.h, printed
+// as C++ by print_program.h and shrunk by reducer.h. Every pipeline that the generator makes is
+// legal and defined: indices that depend on data are clamped, images are read through boundary
+// conditions or clamps, integers of 32 and 64 bits stay far from overflow, floats are clamped
+// before they are converted to integers.
 #pragma once
 
 #include <cstdint>
@@ -95,7 +95,7 @@ struct Term {
 
 // One coordinate of an access: scale * variable / divisor + offset, or data; then clamped.
 struct Index {
-  int variable = -1;       // -1: no variable
+  int variable = -1;  // -1: no variable
   int scale = 1, divisor = 1, offset = 0;
   bool clamped = false;
   int low = 0, high = 0;
@@ -117,7 +117,14 @@ struct FuncSpec {
   std::vector<UpdateSpec> updates;
 };
 
-enum class Boundary : uint8_t { Clamp, Constant, RepeatEdge, RepeatImage, MirrorImage, MirrorInterior };
+enum class Boundary : uint8_t {
+  Clamp,
+  Constant,
+  RepeatEdge,
+  RepeatImage,
+  MirrorImage,
+  MirrorInterior
+};
 
 struct ImageSpec {
   Type type;

@@ -37,7 +37,8 @@ struct StageLoops {
 
 class Scheduler {
  public:
-  Scheduler(const PipelineSpec& pipeline, uint64_t seed) : pipeline_(pipeline), random_(seed + 77) {}
+  Scheduler(const PipelineSpec& pipeline, uint64_t seed)
+      : pipeline_(pipeline), random_(seed + 77) {}
 
   ScheduleSpec run() {
     const int count = static_cast<int>(pipeline_.funcs.size());
@@ -272,8 +273,8 @@ class Scheduler {
     Loop fused = inner;
     fused.is_original = false;
     fused.name = (fused.is_reduction ? "r" : "") + fresh("t");
-    fused.extent = inner.extent == unknown || outer.extent == unknown ? unknown
-                                                                      : inner.extent * outer.extent;
+    fused.extent =
+        inner.extent == unknown || outer.extent == unknown ? unknown : inner.extent * outer.extent;
     add(f, stage, {Kind::Fuse, {inner.name, outer.name, fused.name}});
     loops[at] = fused;
     loops.erase(loops.begin() + at + 1);
@@ -303,7 +304,8 @@ class Scheduler {
     std::vector<Loop>& loops = loops_[f][stage].loops;
     std::vector<int> candidates;
     for (size_t i = 0; i < loops.size(); ++i) {
-      const bool fits = loops[i].extent == unknown || (loops[i].extent > 1 && loops[i].extent <= 16);
+      const bool fits =
+          loops[i].extent == unknown || (loops[i].extent > 1 && loops[i].extent <= 16);
       if (!loops[i].is_reduction && fits) candidates.push_back(static_cast<int>(i));
     }
     if (candidates.empty()) return;
@@ -329,7 +331,8 @@ class Scheduler {
 
   void parallelize(int f, int stage) {
     std::vector<Loop>& loops = loops_[f][stage].loops;
-    Loop& loop = random_.chance(70) ? loops.back() : loops[random_.below(static_cast<int>(loops.size()))];
+    Loop& loop =
+        random_.chance(70) ? loops.back() : loops[random_.below(static_cast<int>(loops.size()))];
     if (loop.type != ForType::Serial || loop.is_reduction) return;
     loop.type = ForType::Parallel;
     add(f, stage, {Kind::Parallel, {loop.name}});
@@ -380,7 +383,8 @@ void apply_directive(const Directive& directive, Stage stage, const RDom& domain
   }
 }
 
-LoopLevel level_at(const Placement& placement, const std::string& loop, const BuiltPipeline& built) {
+LoopLevel level_at(const Placement& placement, const std::string& loop,
+                   const BuiltPipeline& built) {
   if (loop == "root") return LoopLevel::root();
   const Func& consumer = built.funcs[placement.consumer];
   const RDom domain =

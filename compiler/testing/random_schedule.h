@@ -27,8 +27,8 @@ struct Placement {
   enum class Where : uint8_t { Default, Inline, Root, At };
   Where where = Where::Default;
   int consumer = -1, stage = 0;  // At: whose loops
-  std::string compute_loop;     // At
-  std::string store_loop;       // At: a loop of the consumer, "root", or empty for the compute loop
+  std::string compute_loop;      // At
+  std::string store_loop;  // At: a loop of the consumer, "root", or empty for the compute loop
 };
 
 struct FuncScheduleSpec {

@@ -63,7 +63,8 @@ class Shrinker {
           for (StageSpec& stage : p.schedule.funcs[f].stages) stage.directives.clear();
         });
       }
-      if (schedule.bounded) progress |= attempt([&](Program& p) { p.schedule.funcs[f].bounded = false; });
+      if (schedule.bounded)
+        progress |= attempt([&](Program& p) { p.schedule.funcs[f].bounded = false; });
       progress |= simplify_placement(f);
     }
     return progress;
@@ -139,7 +140,8 @@ class Shrinker {
     for (int f = 0; f < func_count(); ++f) {
       for (size_t s = 0; s < best_.schedule.funcs[f].stages.size(); ++s) {
         for (size_t d = best_.schedule.funcs[f].stages[s].directives.size(); d-- > 0;) {
-          progress |= attempt([&](Program& p) { erase_directive(p.schedule.funcs[f].stages[s], d); });
+          progress |=
+              attempt([&](Program& p) { erase_directive(p.schedule.funcs[f].stages[s], d); });
         }
       }
     }
@@ -241,7 +243,8 @@ class Shrinker {
       for (size_t u = 0; u < best_.pipeline.funcs[f].updates.size(); ++u) {
         for (size_t k = 0; k < best_.pipeline.funcs[f].updates[u].domain.size(); ++k) {
           if (best_.pipeline.funcs[f].updates[u].domain[k].extent <= 1) continue;
-          progress |= attempt([&](Program& p) { --p.pipeline.funcs[f].updates[u].domain[k].extent; });
+          progress |=
+              attempt([&](Program& p) { --p.pipeline.funcs[f].updates[u].domain[k].extent; });
         }
       }
     }

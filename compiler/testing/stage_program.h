@@ -17,9 +17,9 @@ namespace retrograde::oracle {
 struct Step {
   enum class Code : uint8_t {
     Constant,
-    Coordinate,   // index: which variable of the stage's point
-    Parameter,    // a scalar parameter
-    BufferFact,   // "in.min.0"
+    Coordinate,  // index: which variable of the stage's point
+    Parameter,   // a scalar parameter
+    BufferFact,  // "in.min.0"
     Cast,
     Reinterpret,
     Binary,
@@ -28,12 +28,12 @@ struct Step {
     Operator,
     Random,
     Require,
-    Print,        // children[index] is the value
+    Print,  // children[index] is the value
     Undef,
     FuncCall,
     ImageCall,
     ExternCall,
-    Text,         // a string, part of a message
+    Text,  // a string, part of a message
   };
   Code code = Code::Constant;
   ir::Kind kind = ir::Kind::Add;
@@ -49,13 +49,13 @@ struct Step {
 
 struct StageProgram {
   std::vector<Step> steps;
-  std::vector<int> args, values;      // roots
+  std::vector<int> args, values;  // roots
   int predicate = -1;
   struct Bounds {
     int min, extent;  // roots
   };
-  std::vector<Bounds> rvars;          // innermost first
-  std::vector<bool> is_pure_arg;      // args[d] is the pure variable d itself
+  std::vector<Bounds> rvars;      // innermost first
+  std::vector<bool> is_pure_arg;  // args[d] is the pure variable d itself
 };
 
 // Variables of a stage's point: the Func's pure args, then its rvars. `widen`: float types become

@@ -74,7 +74,8 @@ Value float_mod(const Value& a, const Value& b, const Scalar& result) {
   if (a.error == 0 && b.error == 0) return {result, ulp(result.type, a.scalar.f)};
   const double quotient = a.scalar.f / b.scalar.f;
   const double doubt = propagated(Kind::Div, a, b, quotient) + ulp(result.type, quotient);
-  if (!(std::floor(quotient - doubt) == std::floor(quotient + doubt))) return Value::unstable(result);
+  if (!(std::floor(quotient - doubt) == std::floor(quotient + doubt)))
+    return Value::unstable(result);
   const double error = a.error + std::fabs(quotient) * b.error + ulp(result.type, a.scalar.f);
   return {result, error};
 }
@@ -96,8 +97,11 @@ Value float_binary(Rounding rounding, Kind kind, const Value& a, const Value& b,
   return {result, error};
 }
 
-Value shifted(const Value& value, double by) {
-  return {Scalar::of_float(value.scalar.type, value.scalar.f + by)};
+// Not rounded to the type: errors are often smaller than its ULP.
+Scalar shifted(const Value& value, double by) {
+  Scalar result = value.scalar;
+  result.f += by;
+  return result;
 }
 
 bool same_value(const Scalar& a, const Scalar& b) {
@@ -120,7 +124,7 @@ double sensitivity(Op op, const std::vector<Value>& args, Type type, const Scala
     if (!args[i].scalar.type.is_float() || !args[i].is_stable()) return infinity;
     double worst = 0;
     for (const double sign : {-1.0, 1.0}) {
-      moved[i] = shifted(args[i], sign * args[i].error).scalar;
+      moved[i] = shifted(args[i], sign * args[i].error);
       const Scalar other = *ir::eval_operator(op, moved, type);
       if (same_value(other, result)) continue;
       if (!type.is_float()) return infinity;
@@ -131,6 +135,15 @@ double sensitivity(Op op, const std::vector<Value>& args, Type type, const Scala
     error += worst;
   }
   return error;
+}
+
+bool has_error(const std::vector<Value>& args) {
+  return std::any_of(args.begin(), args.end(), [](const Value& v) { return v.error > 0; });
+}
+
+// Floats that stay the same until an operand crosses a threshold.
+bool is_discrete(Op op) {
+  return op == Op::floor || op == Op::ceil || op == Op::round || op == Op::trunc;
 }
 
 constexpr int fast_bits = 11;
@@ -225,7 +238,7 @@ Value apply_cast(Type type, const Value& a) {
   if (!a.is_stable() || !a.scalar.type.is_float()) return Value::unstable(result);
   if (type.is_float()) return {result, a.error + ulp(type, result.f)};
   for (const double sign : {-1.0, 1.0}) {
-    const Scalar other = ir::eval_cast(type, shifted(a, sign * a.error).scalar);
+    const Scalar other = ir::eval_cast(type, shifted(a, sign * a.error));
     if (!same_value(other, result)) return Value::unstable(result);
   }
   return {result};
@@ -246,7 +259,7 @@ Value apply_operator(Rounding rounding, Op op, const std::vector<Value>& args, T
   if (op == Op::strong_mul && args[0].error == 0 && args[0].scalar.f == 0) return {*result};
   double error = sensitivity(op, args, type, *result);
   if (type.is_float()) {
-    if (error > 0) error += ulp(type, result->f);
+    if (has_error(args) && !is_discrete(op)) error += ulp(type, result->f);
     error += own_error(op, rounding, args, *result);
   }
   return {*result, error};

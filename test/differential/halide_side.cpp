@@ -15,8 +15,8 @@ static Target jit_target() {
   return get_jit_target_from_environment().without_feature(Target::AVX512_SapphireRapids);
 }
 
-#include "differential/pipelines/common.h"
 #include "differential/pipelines/arithmetic.h"
+#include "differential/pipelines/common.h"
 #include "differential/pipelines/functions.h"
 #include "differential/pipelines/images.h"
 #include "differential/pipelines/reductions.h"

@@ -8,7 +8,8 @@ inline const Case& find_case(const std::string& name) {
 }
 
 inline std::vector<int> mins_of(const Built& built, size_t output) {
-  return built.mins.empty() ? std::vector<int>(built.extents[output].size(), 0) : built.mins[output];
+  return built.mins.empty() ? std::vector<int>(built.extents[output].size(), 0)
+                            : built.mins[output];
 }
 
 inline std::vector<HostBuffer> realize_built(const Built& built) {

@@ -11,8 +11,8 @@ namespace in_retrograde {
 using namespace retrograde;
 static Target jit_target() { return get_jit_target_from_environment(); }
 
-#include "differential/pipelines/common.h"
 #include "differential/pipelines/arithmetic.h"
+#include "differential/pipelines/common.h"
 #include "differential/pipelines/functions.h"
 #include "differential/pipelines/images.h"
 #include "differential/pipelines/reductions.h"

@@ -61,7 +61,7 @@ Options parse(int argc, char** argv) {
 }
 
 struct Finding {
-  int code = 0;        // a Verdict, or `crashed` + signal
+  int code = 0;  // a Verdict, or `crashed` + signal
   std::string detail;
 };
 
@@ -115,7 +115,8 @@ void report(uint64_t seed, const Program& program, const Finding& finding, bool 
   std::fflush(stdout);
   if (!may_shrink) return;
   const std::string kind = kind_of(finding);
-  const Program small = shrink(program, [&](const Program& p) { return kind_of(run_apart(p)) == kind; });
+  const Program small =
+      shrink(program, [&](const Program& p) { return kind_of(run_apart(p)) == kind; });
   std::printf("shrunk, it %s\n%s\n", describe(run_apart(small)).c_str(),
               to_cpp(small.pipeline, small.schedule).c_str());
   std::fflush(stdout);

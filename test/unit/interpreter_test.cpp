@@ -149,6 +149,16 @@ TEST(TrackedValue, BoundCoversContraction) {
   EXPECT_LT(value.error, 1e-6);
 }
 
+TEST(TrackedValue, BoundCoversContractionIntoAnOperator) {
+  Func product, f;
+  product(x) = cast<float>(x) * 1.1f;
+  f(x) = absd(product(x), 0.25f);
+  const Value value = value_at(f, 3, Rounding::Contraction);
+  const float contracted = std::fabs(std::fma(3.0f, 1.1f, -0.25f));
+  EXPECT_GT(value.error, 0);
+  EXPECT_LE(std::fabs(contracted - value.scalar.f), value.error);
+}
+
 TEST(TrackedValue, DecisionWithinTheErrorIsUnstable) {
   Func third, f;
   third(x) = cast<float>(x) * 0.1f;
