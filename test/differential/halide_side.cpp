@@ -15,13 +15,7 @@ static Target jit_target() {
   return get_jit_target_from_environment().without_feature(Target::AVX512_SapphireRapids);
 }
 
-#include "differential/pipelines/arithmetic.h"
-#include "differential/pipelines/common.h"
-#include "differential/pipelines/functions.h"
-#include "differential/pipelines/images.h"
-#include "differential/pipelines/reductions.h"
-#include "differential/pipelines/schedules.h"
-#include "differential/realize.h"
+#include "differential/pipelines/all.h"
 }  // namespace in_halide
 
 std::vector<std::string> case_names() {

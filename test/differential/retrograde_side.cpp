@@ -11,13 +11,7 @@ namespace in_retrograde {
 using namespace retrograde;
 static Target jit_target() { return get_jit_target_from_environment(); }
 
-#include "differential/pipelines/arithmetic.h"
-#include "differential/pipelines/common.h"
-#include "differential/pipelines/functions.h"
-#include "differential/pipelines/images.h"
-#include "differential/pipelines/reductions.h"
-#include "differential/pipelines/schedules.h"
-#include "differential/realize.h"
+#include "differential/pipelines/all.h"
 }  // namespace in_retrograde
 
 std::vector<HostBuffer> run_in_retrograde(const std::string& name, bool scheduled) {
