@@ -23,7 +23,6 @@
 
 namespace bilateral_slice {
 
-using retrograde::quoted;
 using retrograde::text;
 
 namespace {
@@ -77,8 +76,8 @@ struct Pair {
 void require_same_size(const Options& options, const apps::Image& a, const apps::Image& b) {
   if (a.width == b.width && a.height == b.height) return;
   retrograde::call_error(
-      text("learn how ", quoted(options.input.string()), " becomes ",
-           quoted(options.target.string())),
+      text("learn how ", retrograde::quoted(options.input.string()), " becomes ",
+           retrograde::quoted(options.target.string())),
       "input and target must have the same size",
       text("they have ", a.width, " x ", a.height, " and ", b.width, " x ", b.height, " pixels"),
       "Resize or crop one of them");
@@ -88,7 +87,7 @@ apps::Image read_photo(const std::filesystem::path& path) {
   apps::Image image = apps::read_image(path);
   if (image.width < 4 || image.height < 4) {
     retrograde::call_error(
-        text("learn a look from ", quoted(path.string())),
+        text("learn a look from ", retrograde::quoted(path.string())),
         "a grid is interpolated along both axes: a photo has at least 4 x 4 pixels",
         text("it has ", image.width, " x ", image.height), "Give a larger photo");
   }

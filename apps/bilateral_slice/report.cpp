@@ -13,7 +13,6 @@
 namespace bilateral_slice {
 
 using nlohmann::json;
-using retrograde::quoted;
 using retrograde::text;
 
 namespace {
@@ -93,7 +92,8 @@ void draw_plot(const std::filesystem::path& report, const std::filesystem::path&
       apps::run_program({find_python(), script, report.string(), plot.string()});
   if (outcome.started && outcome.status == 0) return;
   retrograde::call_error(
-      text("draw ", quoted(plot.string())), "the plot is drawn by Python with matplotlib",
+      text("draw ", retrograde::quoted(plot.string())),
+      "the plot is drawn by Python with matplotlib",
       outcome.started ? text(script_name, " ended with status ", outcome.status, ", saying \"",
                              last_line(outcome.output), "\"")
                       : text(find_python(), " did not start"),

@@ -9,6 +9,7 @@
 //               along x would come from different layers
 //   along k     the curve's knots
 #include <algorithm>
+#include <iterator>
 #include <vector>
 
 #include "training_pipeline.h"
@@ -98,14 +99,17 @@ void schedule_forward(Model& m) {
 void schedule_row_gradient(const Model& m, Func rows) {
   rows.compute_root().bound(m.i, 0, 4).bound(m.o, 0, 3).vectorize(m.i).unroll(m.o).parallel(m.y);
   for (int u = 0; u < rows.num_update_definitions(); ++u) {
-    auto r = rows.rvars(u);
-    const auto long_ones = std::stable_partition(r.begin(), r.end(), is_short);
+    const std::vector<lang::RVar> all = rows.rvars(u);
+    std::vector<lang::RVar> inner, outer;
+    std::partition_copy(all.begin(), all.end(), std::back_inserter(inner),
+                        std::back_inserter(outer), is_short);
     std::vector<VarOrRVar> order{m.i, m.o};
-    order.insert(order.end(), r.begin(), r.end());
+    order.insert(order.end(), inner.begin(), inner.end());
+    order.insert(order.end(), outer.begin(), outer.end());
     order.insert(order.end(), {m.gx, m.y});
     Stage update = rows.update(u);
     update.reorder(order).vectorize(m.i).unroll(m.o).parallel(m.y);
-    for (auto it = r.begin(); it != long_ones; ++it) update.unroll(*it);
+    for (const lang::RVar& r : inner) update.unroll(r);
   }
 }
 

@@ -14,14 +14,13 @@
 
 namespace apps {
 
-using retrograde::quoted;
 using retrograde::text;
 
 namespace {
 
 [[noreturn]] void refuse_write(const std::filesystem::path& path, const char* call, int error) {
   const bool full = error == ENOSPC || error == EFBIG || error == EDQUOT;
-  retrograde::call_error(text("write ", quoted(path.string())),
+  retrograde::call_error(text("write ", retrograde::quoted(path.string())),
                          "a result is stored whole or not at all",
                          text(call, " says: ", std::strerror(error)),
                          full ? "Free some space on that disk, or give another --output"
@@ -81,7 +80,7 @@ void require_writable_folder(const std::filesystem::path& folder) {
   std::error_code failed;
   std::filesystem::create_directories(folder, failed);
   if (!std::filesystem::is_directory(folder)) {
-    retrograde::call_error(text("use ", quoted(folder.string()), " for the results"),
+    retrograde::call_error(text("use ", retrograde::quoted(folder.string()), " for the results"),
                            "it must be a folder, or a name where one can be made",
                            failed ? failed.message() : "something else has that name",
                            "Give another --output");

@@ -16,7 +16,6 @@
 
 namespace apps {
 
-using retrograde::quoted;
 using retrograde::text;
 
 namespace {
@@ -27,7 +26,7 @@ namespace {
   std::replace(evidence.begin(), evidence.end(), '\n', ' ');
   while (!evidence.empty() && (evidence.back() == ' ' || evidence.back() == '.'))
     evidence.pop_back();
-  retrograde::call_error(text("read ", quoted(path.string())), rule, evidence, instead);
+  retrograde::call_error(text("read ", retrograde::quoted(path.string())), rule, evidence, instead);
 }
 
 // Decoders' libraries print to standard error what they also report: silent while this lives.
@@ -131,7 +130,7 @@ void write_png(const std::filesystem::path& path, const Image& image) {
   if (!output || !output->set_ioproxy(&memory) || !output->open(path.filename().string(), spec) ||
       !output->write_image(OIIO::TypeDesc::FLOAT, image.pixels.data()) || !output->close()) {
     retrograde::call_error(
-        text("write ", quoted(path.string())), "OpenImageIO must be able to encode PNG",
+        text("write ", retrograde::quoted(path.string())), "OpenImageIO must be able to encode PNG",
         output ? output->geterror() : OIIO::geterror(), "Install OpenImageIO with its PNG plugin");
   }
   output.reset();

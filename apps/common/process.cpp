@@ -6,6 +6,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <csignal>
@@ -16,7 +17,6 @@
 
 namespace apps {
 
-using retrograde::quoted;
 using retrograde::text;
 
 namespace {
@@ -30,8 +30,9 @@ struct Pipe {
 Pipe make_pipe(const std::string& purpose) {
   int ends[2];
   if (::pipe2(ends, O_CLOEXEC) != 0) {
-    retrograde::call_error(text("start ", quoted(purpose)), "a program is reached through pipes",
-                           std::strerror(errno), "Raise the limit of open files");
+    retrograde::call_error(text("start ", retrograde::quoted(purpose)),
+                           "a program is reached through pipes", std::strerror(errno),
+                           "Raise the limit of open files");
   }
   return {ends[0], ends[1]};
 }
@@ -54,12 +55,13 @@ std::vector<std::string> with_environment(
     const std::vector<std::pair<std::string, std::string>>& more) {
   std::vector<std::string> out;
   for (char** entry = environ; *entry; ++entry) {
-    const std::string text = *entry;
-    bool replaced = false;
-    for (const auto& [name, value] : more) replaced |= text.starts_with(name + "=");
-    if (!replaced) out.push_back(text);
+    const std::string variable = *entry;
+    const bool replaced = std::any_of(more.begin(), more.end(), [&](const auto& pair) {
+      return variable.starts_with(pair.first + "=");
+    });
+    if (!replaced) out.push_back(variable);
   }
-  for (const auto& [name, value] : more) out.push_back(name + "=" + value);
+  for (const auto& [name, value] : more) out.push_back(text(name, "=", value));
   return out;
 }
 
@@ -75,8 +77,9 @@ int exit_status(pid_t id) {
 Child::Child(const std::filesystem::path& program, const std::vector<std::string>& arguments,
              const std::vector<std::pair<std::string, std::string>>& environment) {
   if (::access(program.c_str(), X_OK) != 0) {
-    retrograde::call_error(text("start ", quoted(program.string())), "it must be a program",
-                           std::strerror(errno), "Install it beside this one");
+    retrograde::call_error(text("start ", retrograde::quoted(program.string())),
+                           "it must be a program", std::strerror(errno),
+                           "Install it beside this one");
   }
   std::vector<std::string> words{program.string()};
   words.insert(words.end(), arguments.begin(), arguments.end());
@@ -97,7 +100,7 @@ Child::Child(const std::filesystem::path& program, const std::vector<std::string
     const int error = errno;
     ::close(to_);
     ::close(from_);
-    retrograde::call_error(text("start ", quoted(program.string())),
+    retrograde::call_error(text("start ", retrograde::quoted(program.string())),
                            "it needs a process of its own", std::strerror(error),
                            "Raise the limit of processes");
   }
