@@ -103,11 +103,11 @@ std::string describe(const Finding& finding) {
   return std::string(verdict_name(static_cast<Verdict>(finding.code))) + ": " + finding.detail;
 }
 
-// A refusal is the same finding only with the same kind of message: its first words.
+// A refusal is the same finding only with the same kind of message: how it begins.
 std::string kind_of(const Finding& finding) {
   const bool by_text = finding.code == static_cast<int>(Verdict::Refused) ||
                        finding.code == static_cast<int>(Verdict::Broken);
-  return std::to_string(finding.code) + (by_text ? finding.detail.substr(0, 14) : "");
+  return std::to_string(finding.code) + (by_text ? finding.detail.substr(0, 24) : "");
 }
 
 void report(uint64_t seed, const Program& program, const Finding& finding, bool may_shrink) {
