@@ -12,6 +12,7 @@
 #include "lower/inline_functions.h"
 #include "diagnostics/large_stack.h"
 #include "lower/lower.h"
+#include "lower/make_names_unique.h"
 #include "lower/partition_loops.h"
 #include "lower/unroll_loops.h"
 #include "lower/vectorize_loops.h"
@@ -24,6 +25,7 @@ struct Lowering {
   const std::vector<FuncPtr>& outputs;
   const std::vector<LoweredArgument>& args;
   Program program;
+  std::map<std::string, std::string> renamed_funcs;  // new name -> name in the program
 };
 
 struct Pass {
@@ -32,20 +34,26 @@ struct Pass {
   Stmt (*run)(Lowering&, const Stmt&);
 };
 
-StorageOrder storage_order(const Program& program) {
+StorageOrder storage_order(const Lowering& lowering) {
   StorageOrder order;
-  for (const LoopedFunc& f : program.funcs) {
+  for (const LoopedFunc& f : lowering.program.funcs) {
     if (f.schedule.storage_dims.empty() || f.schedule.storage_dims == f.func->args) continue;
     std::vector<int>& dims = order[f.name()];
     for (const std::string& var : f.schedule.storage_dims)
       dims.push_back(static_cast<int>(std::find(f.func->args.begin(), f.func->args.end(), var) - f.func->args.begin()));
+  }
+  for (const auto& [name, original] : lowering.renamed_funcs) {
+    if (auto it = order.find(original); it != order.end()) order[name] = it->second;
   }
   return order;
 }
 
 Stmt nest_loops(Lowering& lowering, const Stmt&) {
   lowering.program = inline_functions(lowering.outputs);
-  return add_argument_checks(build_loop_nests(lowering.program), lowering.args, lowering.program);
+  Stmt nests = add_argument_checks(build_loop_nests(lowering.program), lowering.args, lowering.program);
+  UniqueNames unique = make_names_unique(nests);
+  lowering.renamed_funcs = std::move(unique.original);
+  return unique.stmt;
 }
 
 Stmt run_simplify(Lowering&, const Stmt& s) { return simplify(s); }
@@ -53,7 +61,7 @@ Stmt run_simplify(Lowering&, const Stmt& s) { return simplify(s); }
 constexpr Pass passes[] = {
     {"build_loop_nests", Phase::Loops, nest_loops},
     {"flatten_storage", Phase::FlatStorage,
-     [](Lowering& lowering, const Stmt& s) { return flatten_storage(s, storage_order(lowering.program)); }},
+     [](Lowering& lowering, const Stmt& s) { return flatten_storage(s, storage_order(lowering)); }},
     {"simplify_storage", Phase::FlatStorage, run_simplify},
     {"partition_loops", Phase::FlatStorage, [](Lowering&, const Stmt& s) { return partition_loops(s); }},
     {"unroll_loops", Phase::FlatStorage, [](Lowering&, const Stmt& s) { return unroll_loops(s); }},
@@ -102,7 +110,7 @@ LoweredFunction lower(const std::string& name, const std::vector<FuncPtr>& outpu
   LoweredFunction function{name, inputs, {}};
   run_on_large_stack([&] {
     append_outputs(outputs, function.args);
-    Lowering lowering{outputs, function.args, {}};
+    Lowering lowering{outputs, function.args, {}, {}};
     function.body = run_passes(lowering, options);
   });
   return function;

@@ -1,0 +1,48 @@
+// Funcs that are computed at several places keep their names apart.
+#include <gtest/gtest.h>
+
+#include "ir/parse.h"
+#include "ir/print.h"
+#include "lower/make_names_unique.h"
+#include "retrograde/retrograde.h"
+
+namespace retrograde {
+namespace {
+
+TEST(MakeNamesUnique, RenamesAllButTheFirstBinding) {
+  Stmt s = ir::parse_stmt(
+      "for (x, 0, 4) { out(x) = {x} } "
+      "realize f(int32) auto [0, 4] { for (x, 0, 4) { f(x) = {x} } "
+      "realize f(int32) auto [0, 2] { f(1) = {3} out(0) = {f(1).0:int32} } out(1) = {f(2).0:int32} }");
+  ir::UniqueNames unique = ir::make_names_unique(s);
+  std::string text = ir::print(unique.stmt);
+  EXPECT_NE(text.find("for (x.$1, 0, 4)"), std::string::npos) << text;
+  EXPECT_NE(text.find("f(x.$1) = {x.$1}"), std::string::npos) << text;
+  EXPECT_NE(text.find("f.$1(1) = {3}"), std::string::npos) << text;
+  EXPECT_NE(text.find("out(0) = {f.$1(1)"), std::string::npos) << text;
+  EXPECT_NE(text.find("out(1) = {f(2)"), std::string::npos) << text;
+  ASSERT_EQ(unique.original.size(), 1u);
+  EXPECT_EQ(unique.original.at("f.$1"), "f");
+}
+
+// Reduced by the fuzzer: f is computed innermost both in g and in the sum that g reads.
+TEST(MakeNamesUnique, AnUpdateThatIsComputedInTwoStagesAtOnce) {
+  Var x("x"), y("y");
+  Func f("f"), g("g");
+  RDom r(0, 3);
+  f(x, y) = 1;
+  f(x, 5) = 2;
+  g(x, y) = Tuple(cast<float>(f(x, y)), sum(f(x, y + r)));
+  Realization result = g.realize({4, 8});
+  Buffer<float> first = result[0];
+  Buffer<int> second = result[1];
+  for (int j = 0; j < 8; j++) {
+    for (int i = 0; i < 4; i++) {
+      EXPECT_EQ(first(i, j), j == 5 ? 2.0f : 1.0f);
+      EXPECT_EQ(second(i, j), j >= 3 && j <= 5 ? 4 : 3);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace retrograde
