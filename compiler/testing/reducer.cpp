@@ -55,15 +55,15 @@ class Shrinker {
   bool simplify_schedules() {
     bool progress = false;
     for (int f = 0; f < func_count(); ++f) {
-      const FuncScheduleSpec& schedule = best_.schedule.funcs[f];
-      const bool has_loops = std::any_of(schedule.stages.begin(), schedule.stages.end(),
+      const std::vector<StageSpec>& stages = best_.schedule.funcs[f].stages;
+      const bool has_loops = std::any_of(stages.begin(), stages.end(),
                                          [](const StageSpec& s) { return !s.directives.empty(); });
       if (has_loops) {
         progress |= attempt([&](Program& p) {
           for (StageSpec& stage : p.schedule.funcs[f].stages) stage.directives.clear();
         });
       }
-      if (schedule.bounded)
+      if (best_.schedule.funcs[f].bounded)  // read anew: an attempt replaces best_
         progress |= attempt([&](Program& p) { p.schedule.funcs[f].bounded = false; });
       progress |= simplify_placement(f);
     }
