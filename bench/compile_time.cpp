@@ -1,5 +1,6 @@
-// How the time to compile grows with the length of a pipeline, from the Func graph to callable machine code. The fitted
-// complexity is printed last and should be N. Halide 14 compiles the shorter chains in the same run.
+// How the time to compile grows with the length of a pipeline, from the Func graph to callable
+// machine code. The fitted complexity is printed last and should be N. Halide 14 compiles the
+// shorter chains in the same run.
 #include <benchmark/benchmark.h>
 
 #include "retrograde/retrograde.h"
@@ -19,9 +20,15 @@ void compile_stencil_chain(benchmark::State& state) {
   state.SetComplexityN(stages);
 }
 BENCHMARK(compile_stencil_chain)
-    ->Arg(16)->Arg(32)->Arg(64)->Arg(125)->Arg(250)->Arg(500)
+    ->Arg(16)
+    ->Arg(32)
+    ->Arg(64)
+    ->Arg(125)
+    ->Arg(250)
+    ->Arg(500)
     ->Unit(benchmark::kMillisecond)
-    ->Iterations(1)  // the compile cache knows functions by what they compute: a second time is free
+    ->Iterations(
+        1)  // the compile cache knows functions by what they compute: a second time is free
     ->Complexity(benchmark::oN);
 
 }  // namespace

@@ -1,4 +1,5 @@
-// The same chains compiled by Halide 14. Its machine code is never run, so any target of this processor will do.
+// The same chains compiled by Halide 14. Its machine code is never run, so any target of this
+// processor will do.
 #include <Halide.h>
 #include <benchmark/benchmark.h>
 
@@ -17,7 +18,10 @@ void halide_14_compiles_stencil_chain(benchmark::State& state) {
   state.SetComplexityN(stages);
 }
 BENCHMARK(halide_14_compiles_stencil_chain)
-    ->Arg(16)->Arg(32)->Arg(64)->Arg(125)
+    ->Arg(16)
+    ->Arg(32)
+    ->Arg(64)
+    ->Arg(125)
     ->Unit(benchmark::kMillisecond)
     ->Iterations(1)
     ->Complexity();

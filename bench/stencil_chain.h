@@ -1,5 +1,5 @@
-// stencil_chain.h -- a chain of stencils, every stage at root, vectorized and parallel; the same text for both languages.
-// Define BENCH_LANGUAGE as the namespace before including.
+// stencil_chain.h -- a chain of stencils, every stage at root, vectorized and parallel; the same
+// text for both languages. Define BENCH_LANGUAGE as the namespace before including.
 #pragma once
 
 #include <string>
@@ -12,7 +12,9 @@ static BENCH_LANGUAGE::Func stencil_chain(int stages) {
   previous.compute_root().vectorize(x, 8).parallel(y, 16);
   for (int i = 1; i < stages; i++) {
     Func next("stage_" + std::to_string(i));
-    next(x, y) = (previous(x - 1, y) + previous(x, y) * 2.0f + previous(x + 1, y) + previous(x, y + 1)) * 0.2f;
+    next(x, y) =
+        (previous(x - 1, y) + previous(x, y) * 2.0f + previous(x + 1, y) + previous(x, y + 1)) *
+        0.2f;
     next.compute_root().vectorize(x, 8).parallel(y, 16);
     previous = next;
   }

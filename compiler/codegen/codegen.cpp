@@ -10,10 +10,10 @@
 #include <chrono>
 #include <utility>
 
-#include "diagnostics/large_stack.h"
 #include "codegen/function_generator.h"
 #include "codegen/optimize.h"
 #include "diagnostics/error.h"
+#include "diagnostics/large_stack.h"
 
 namespace retrograde::codegen {
 namespace {

@@ -125,7 +125,8 @@ class Param {
   void check_type(Type other) const {
     if constexpr (has_static_type) {
       if (other == type_of<T>()) return;
-      user_error("use the Param " + retrograde::quoted(name()) + " as a Param of " + to_string(type_of<T>()),
+      user_error("use the Param " + retrograde::quoted(name()) + " as a Param of " +
+                     to_string(type_of<T>()),
                  "the types must agree", "it is of type " + to_string(other));
     }
   }

@@ -1,5 +1,6 @@
-// Building IR: checks types, folds constants and the few identities that always hold, and nothing else.
-// Also the C++ operators on Expr with Halide's promotion rules (operators between namespaces' users and passes alike).
+// Building IR: checks types, folds constants and the few identities that always hold, and nothing
+// else. Also the C++ operators on Expr with Halide's promotion rules (operators between namespaces'
+// users and passes alike).
 #pragma once
 
 #include <initializer_list>
@@ -12,16 +13,19 @@ namespace retrograde {
 
 namespace ir {
 
-Expr make_const(Type type, int64_t value);   // broadcast when the type has lanes
+Expr make_const(Type type, int64_t value);  // broadcast when the type has lanes
 Expr make_const(Type type, double value);
-inline Expr make_const(Type type, int value) { return make_const(type, static_cast<int64_t>(value)); }
+inline Expr make_const(Type type, int value) {
+  return make_const(type, static_cast<int64_t>(value));
+}
 Expr make_uint_const(Type type, uint64_t value);
 Expr make_zero(Type type);
 Expr make_one(Type type);
 Expr const_true(int lanes = 1);
 Expr const_false(int lanes = 1);
 
-std::optional<int64_t> as_const_int(const Expr& e);  // Int or UInt immediate (or broadcast) that fits int64
+std::optional<int64_t> as_const_int(
+    const Expr& e);  // Int or UInt immediate (or broadcast) that fits int64
 std::optional<double> as_const_float(const Expr& e);
 bool is_const(const Expr& e);
 bool is_zero(const Expr& e);  // +0.0 and -0.0 both
@@ -34,10 +38,12 @@ Expr variable(const std::string& name, Type type = Int(32), SymbolRef symbol = {
 // `a` and `b` already of one type (lanes too, but a scalar is broadcast).
 Expr binary(Kind kind, Expr a, Expr b);
 Expr logical_not(Expr a);
-Expr cast_to(Type type, Expr value);  // keeps or broadcasts lanes; folds; nothing when already of the type
+Expr cast_to(Type type,
+             Expr value);  // keeps or broadcasts lanes; folds; nothing when already of the type
 Expr reinterpret_as(Type type, Expr value);
 Expr make_select(Expr condition, Expr true_value, Expr false_value);  // arms of one type
-Expr make_load(Type type, const std::string& name, Expr index, Expr predicate = {}, SymbolRef symbol = {});
+Expr make_load(Type type, const std::string& name, Expr index, Expr predicate = {},
+               SymbolRef symbol = {});
 Expr make_ramp(Expr base, Expr stride, int lanes);
 Expr make_broadcast(Expr value, int lanes);
 Expr make_let(const std::string& name, Expr value, Expr body);
@@ -47,7 +53,8 @@ Expr make_vector_reduce(ReduceOp op, Expr value, int result_lanes);
 Expr call_op(Op op, Type type, std::vector<Expr> args);
 Expr call_op(Op op, std::vector<Expr> args);
 Expr call_extern(const std::string& name, Type type, std::vector<Expr> args);
-Expr call_func(const std::string& name, Type type, std::vector<Expr> args, int value_index, SymbolRef symbol);
+Expr call_func(const std::string& name, Type type, std::vector<Expr> args, int value_index,
+               SymbolRef symbol);
 Expr call_image(const std::string& name, Type type, std::vector<Expr> args, SymbolRef symbol);
 Expr likely(Expr e);
 Expr conjunction(const std::vector<Expr>& terms);  // true when empty
@@ -56,18 +63,21 @@ Stmt make_let(const std::string& name, Expr value, Stmt body);
 Stmt make_assert(Expr condition, Expr error);
 Stmt make_producer_consumer(const std::string& name, bool is_producer, Stmt body);
 Stmt make_for(const std::string& name, Expr min, Expr extent, ForType type, Stmt body);
-Stmt make_store(const std::string& name, Expr value, Expr index, Expr predicate = {}, SymbolRef symbol = {});
-Stmt make_provide(const std::string& name, std::vector<Expr> values, std::vector<Expr> args, Expr predicate = {});
-Stmt make_realize(const std::string& name, std::vector<Type> types, MemoryType memory, std::vector<Range> bounds,
-                  Stmt body);
+Stmt make_store(const std::string& name, Expr value, Expr index, Expr predicate = {},
+                SymbolRef symbol = {});
+Stmt make_provide(const std::string& name, std::vector<Expr> values, std::vector<Expr> args,
+                  Expr predicate = {});
+Stmt make_realize(const std::string& name, std::vector<Type> types, MemoryType memory,
+                  std::vector<Range> bounds, Stmt body);
 Stmt make_allocate(const std::string& name, Type type, MemoryType memory, Expr elements, Stmt body);
 Stmt make_free(const std::string& name);
-Stmt make_block(std::vector<Stmt> stmts);  // flattens, drops undefined; undefined when empty; the one when single
+Stmt make_block(std::vector<Stmt>
+                    stmts);  // flattens, drops undefined; undefined when empty; the one when single
 Stmt make_if(Expr condition, Stmt then_case, Stmt else_case = {});
 Stmt make_evaluate(Expr value);
 
-// Halide's promotion: to floats over integers, to the wider, to signed when signs mix; scalars to vectors.
-// Throws UserError naming `what` (the operation) when there is no common type.
+// Halide's promotion: to floats over integers, to the wider, to signed when signs mix; scalars to
+// vectors. Throws UserError naming `what` (the operation) when there is no common type.
 void match_types(Expr& a, Expr& b, const char* what);
 // Constant `value` in `type`, or UserError when it does not fit.
 Expr constant_like(const Expr& other, int64_t value, const char* what);
@@ -76,8 +86,9 @@ Expr constant_like(const Expr& other, int64_t value, const char* what);
 
 // ---- C++ operators on Expr ----
 
-// A C++ integer beside an Expr takes the Expr's type, and must fit it (UserError). A template, because a plain `int`
-// parameter would also swallow `e + 0.5f`. C++ floats become Exprs of their own type.
+// A C++ integer beside an Expr takes the Expr's type, and must fit it (UserError). A template,
+// because a plain `int` parameter would also swallow `e + 0.5f`. C++ floats become Exprs of their
+// own type.
 template <class T>
 concept IntegerConstant = std::is_integral_v<T> && !std::is_same_v<T, bool>;
 
@@ -91,17 +102,17 @@ Expr constant_for(const Expr& other, T value, const char* what) {
 }
 }  // namespace ir
 
-#define RETROGRADE_DECLARE_OPERATOR(name)                              \
-  Expr name(Expr a, Expr b);                                           \
-  template <IntegerConstant T>                                         \
-  Expr name(Expr a, T b) {                                             \
-    Expr constant = ir::constant_for(a, b, #name);                     \
-    return name(std::move(a), std::move(constant));                    \
-  }                                                                    \
-  template <IntegerConstant T>                                         \
-  Expr name(T a, Expr b) {                                             \
-    Expr constant = ir::constant_for(b, a, #name);                     \
-    return name(std::move(constant), std::move(b));                    \
+#define RETROGRADE_DECLARE_OPERATOR(name)           \
+  Expr name(Expr a, Expr b);                        \
+  template <IntegerConstant T>                      \
+  Expr name(Expr a, T b) {                          \
+    Expr constant = ir::constant_for(a, b, #name);  \
+    return name(std::move(a), std::move(constant)); \
+  }                                                 \
+  template <IntegerConstant T>                      \
+  Expr name(T a, Expr b) {                          \
+    Expr constant = ir::constant_for(b, a, #name);  \
+    return name(std::move(constant), std::move(b)); \
   }
 RETROGRADE_DECLARE_OPERATOR(operator+)
 RETROGRADE_DECLARE_OPERATOR(operator-)
@@ -125,7 +136,7 @@ Expr& operator+=(Expr& a, Expr b);
 Expr& operator-=(Expr& a, Expr b);
 Expr& operator*=(Expr& a, Expr b);
 Expr& operator/=(Expr& a, Expr b);
-Expr cast(Type type, Expr value);  // UserError for handles
+Expr cast(Type type, Expr value);                                // UserError for handles
 Expr select(Expr condition, Expr true_value, Expr false_value);  // promotes the arms
 Expr clamp(Expr value, Expr low, Expr high);                     // low and high take value's type
 

@@ -1,4 +1,5 @@
-// Structural equality, order and hash. DAG-aware: shared nodes are compared once. Symbols compare by name.
+// Structural equality, order and hash. DAG-aware: shared nodes are compared once. Symbols compare
+// by name.
 #pragma once
 
 #include <cstddef>

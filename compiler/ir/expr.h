@@ -1,6 +1,7 @@
 // Expr and Stmt: handles to immutable, reference-counted nodes; and the node types themselves.
-// Kinds are listed in kinds.def, operators in operators.def. Nodes are built by the functions of build.h, which check
-// types; a node's children never change. Two handles to one node share it: expressions are DAGs.
+// Kinds are listed in kinds.def, operators in operators.def. Nodes are built by the functions of
+// build.h, which check types; a node's children never change. Two handles to one node share it:
+// expressions are DAGs.
 #pragma once
 
 #include <atomic>
@@ -82,7 +83,8 @@ class Ref {
   // The node as a concrete type (ir::Select, ...), or null when it is of another kind.
   template <class N>
   const N* as() const {
-    return node_ && N::is_kind(node_->kind) ? static_cast<const N*>(static_cast<const Node*>(node_)) : nullptr;
+    return node_ && N::is_kind(node_->kind) ? static_cast<const N*>(static_cast<const Node*>(node_))
+                                            : nullptr;
   }
 
  private:
@@ -94,7 +96,8 @@ class Ref {
 
 }  // namespace ir
 
-// A scalar or vector expression. Constructing one from a C++ constant gives an immediate of that type.
+// A scalar or vector expression. Constructing one from a C++ constant gives an immediate of that
+// type.
 class Expr : public ir::Ref<ir::ExprNode> {
  public:
   using Ref::Ref;
@@ -138,13 +141,14 @@ enum class MemoryType : uint8_t { Auto, Heap, Stack };
 
 namespace ir {
 
-// What a name in the IR stands for when it is more than a name: a Func, a parameter, a buffer, a reduction domain.
-// Layers above derive their contents from it; the IR only carries it along.
+// What a name in the IR stands for when it is more than a name: a Func, a parameter, a buffer, a
+// reduction domain. Layers above derive their contents from it; the IR only carries it along.
 struct Symbol {
   virtual ~Symbol() = default;
 };
 
-// A reference to a Symbol. A Func's own update definitions refer to it weakly, so that no cycle owns itself.
+// A reference to a Symbol. A Func's own update definitions refer to it weakly, so that no cycle
+// owns itself.
 class SymbolRef {
  public:
   SymbolRef() = default;
@@ -188,10 +192,12 @@ struct FloatImm : ExprNode {  // value already rounded to the type
 };
 struct StringImm : ExprNode {
   RETROGRADE_NODE(StringImm)
-  explicit StringImm(std::string value) : ExprNode(Kind::StringImm, Handle()), value(std::move(value)) {}
+  explicit StringImm(std::string value)
+      : ExprNode(Kind::StringImm, Handle()), value(std::move(value)) {}
   const std::string value;
 };
-// A pure variable, loop variable, let-bound name, scalar parameter, reduction variable, or a fact of a buffer
+// A pure variable, loop variable, let-bound name, scalar parameter, reduction variable, or a fact
+// of a buffer
 // ("input.min.0", "input.extent.1", "input.stride.0").
 struct Variable : ExprNode {
   RETROGRADE_NODE(Variable)
@@ -200,7 +206,8 @@ struct Variable : ExprNode {
   const std::string name;
   const SymbolRef symbol;
 };
-struct Cast : ExprNode {  // integers wrap; float to integer truncates toward zero; to bool means != 0
+struct Cast
+    : ExprNode {  // integers wrap; float to integer truncates toward zero; to bool means != 0
   RETROGRADE_NODE(Cast)
   Cast(Type type, Expr value) : ExprNode(Kind::Cast, type), value(std::move(value)) {}
   const Expr value;
@@ -215,7 +222,8 @@ struct Binary : ExprNode {
   const Expr a, b;
 
  protected:
-  Binary(Kind kind, Type type, Expr a, Expr b) : ExprNode(kind, type), a(std::move(a)), b(std::move(b)) {}
+  Binary(Kind kind, Type type, Expr a, Expr b)
+      : ExprNode(kind, type), a(std::move(a)), b(std::move(b)) {}
 };
 // Binary nodes of one kind, for as<>(): e.as<Add>()->a
 template <Kind K>
@@ -250,10 +258,12 @@ struct Load : ExprNode {
         predicate(std::move(predicate)),
         symbol(std::move(symbol)) {}
   const std::string name;
-  const Expr index, predicate;  // predicate: bool with the load's lanes; lanes that are off give any value
-  const SymbolRef symbol;       // the parameter or buffer, undefined for internal allocations
+  const Expr index,
+      predicate;  // predicate: bool with the load's lanes; lanes that are off give any value
+  const SymbolRef symbol;  // the parameter or buffer, undefined for internal allocations
 };
-struct Ramp : ExprNode {  // base, base + stride, ...; base may be a vector: then lanes are base-major
+struct Ramp
+    : ExprNode {  // base, base + stride, ...; base may be a vector: then lanes are base-major
   RETROGRADE_NODE(Ramp)
   Ramp(Expr base, Expr stride, int lanes)
       : ExprNode(Kind::Ramp, base.type().with_lanes(base.type().lanes() * lanes)),
@@ -280,8 +290,8 @@ enum class CallType : uint8_t {
 };
 struct Call : ExprNode {
   RETROGRADE_NODE(Call)
-  Call(Type type, CallType call_type, Op op, std::string name, std::vector<Expr> args, int value_index,
-       SymbolRef symbol)
+  Call(Type type, CallType call_type, Op op, std::string name, std::vector<Expr> args,
+       int value_index, SymbolRef symbol)
       : ExprNode(Kind::Call, type),
         call_type(call_type),
         op(op),
@@ -291,7 +301,7 @@ struct Call : ExprNode {
         symbol(std::move(symbol)) {}
   bool is_op(Op which) const { return call_type == CallType::Operator && op == which; }
   const CallType call_type;
-  const Op op;            // Op::none unless Operator
+  const Op op;             // Op::none unless Operator
   const std::string name;  // of the Func, image or C function; the operator's name for operators
   const std::vector<Expr> args;
   const int value_index;  // which value of a Tuple-valued Func
@@ -300,7 +310,10 @@ struct Call : ExprNode {
 struct Let : ExprNode {
   RETROGRADE_NODE(Let)
   Let(std::string name, Expr value, Expr body)
-      : ExprNode(Kind::Let, body.type()), name(std::move(name)), value(std::move(value)), body(std::move(body)) {}
+      : ExprNode(Kind::Let, body.type()),
+        name(std::move(name)),
+        value(std::move(value)),
+        body(std::move(body)) {}
   const std::string name;
   const Expr value, body;
 };
@@ -325,12 +338,16 @@ struct VectorReduce : ExprNode {  // groups of neighbouring lanes combined, to t
 struct LetStmt : StmtNode {
   RETROGRADE_NODE(LetStmt)
   LetStmt(std::string name, Expr value, Stmt body)
-      : StmtNode(Kind::LetStmt), name(std::move(name)), value(std::move(value)), body(std::move(body)) {}
+      : StmtNode(Kind::LetStmt),
+        name(std::move(name)),
+        value(std::move(value)),
+        body(std::move(body)) {}
   const std::string name;
   const Expr value;
   const Stmt body;
 };
-struct Assert : StmtNode {  // when the condition is false the function returns `error` (an int32, see Op::error)
+struct Assert : StmtNode {  // when the condition is false the function returns `error` (an int32,
+                            // see Op::error)
   RETROGRADE_NODE(Assert)
   Assert(Expr condition, Expr error)
       : StmtNode(Kind::Assert), condition(std::move(condition)), error(std::move(error)) {}
@@ -339,7 +356,10 @@ struct Assert : StmtNode {  // when the condition is false the function returns 
 struct ProducerConsumer : StmtNode {
   RETROGRADE_NODE(ProducerConsumer)
   ProducerConsumer(std::string name, bool is_producer, Stmt body)
-      : StmtNode(Kind::ProducerConsumer), name(std::move(name)), is_producer(is_producer), body(std::move(body)) {}
+      : StmtNode(Kind::ProducerConsumer),
+        name(std::move(name)),
+        is_producer(is_producer),
+        body(std::move(body)) {}
   const std::string name;
   const bool is_producer;
   const Stmt body;
@@ -371,7 +391,8 @@ struct Store : StmtNode {
   const Expr value, index, predicate;
   const SymbolRef symbol;
 };
-struct Provide : StmtNode {  // Loops phase: store to a point of a Func; one value per Tuple element, stored together
+struct Provide : StmtNode {  // Loops phase: store to a point of a Func; one value per Tuple
+                             // element, stored together
   RETROGRADE_NODE(Provide)
   Provide(std::string name, std::vector<Expr> values, std::vector<Expr> args, Expr predicate)
       : StmtNode(Kind::Provide),
@@ -385,7 +406,8 @@ struct Provide : StmtNode {  // Loops phase: store to a point of a Func; one val
 };
 struct Realize : StmtNode {  // Loops phase: storage for a Func over a box, alive during body
   RETROGRADE_NODE(Realize)
-  Realize(std::string name, std::vector<Type> types, MemoryType memory, std::vector<Range> bounds, Stmt body)
+  Realize(std::string name, std::vector<Type> types, MemoryType memory, std::vector<Range> bounds,
+          Stmt body)
       : StmtNode(Kind::Realize),
         name(std::move(name)),
         types(std::move(types)),
@@ -398,7 +420,8 @@ struct Realize : StmtNode {  // Loops phase: storage for a Func over a box, aliv
   const std::vector<Range> bounds;
   const Stmt body;
 };
-struct Allocate : StmtNode {  // FlatStorage phase: `elements` (int64) elements of `type`, alive during body
+struct Allocate
+    : StmtNode {  // FlatStorage phase: `elements` (int64) elements of `type`, alive during body
   RETROGRADE_NODE(Allocate)
   Allocate(std::string name, Type type, MemoryType memory, Expr elements, Stmt body)
       : StmtNode(Kind::Allocate),
@@ -413,7 +436,8 @@ struct Allocate : StmtNode {  // FlatStorage phase: `elements` (int64) elements 
   const Expr elements;
   const Stmt body;
 };
-struct Free : StmtNode {  // no use of the allocation follows; at most one on every path of its Allocate's body
+struct Free : StmtNode {  // no use of the allocation follows; at most one on every path of its
+                          // Allocate's body
   RETROGRADE_NODE(Free)
   explicit Free(std::string name) : StmtNode(Kind::Free), name(std::move(name)) {}
   const std::string name;

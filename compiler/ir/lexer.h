@@ -26,7 +26,9 @@ class Lexer {
     ++column_;
     if (text_[at_++] == '\n') ++line_, column_ = 1;
   }
-  char peek(size_t ahead = 0) const { return at_ + ahead < text_.size() ? text_[at_ + ahead] : '\0'; }
+  char peek(size_t ahead = 0) const {
+    return at_ + ahead < text_.size() ? text_[at_ + ahead] : '\0';
+  }
   void read_name(Token& token);
   void read_quoted_name(Token& token);
   void read_number(Token& token);

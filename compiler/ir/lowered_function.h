@@ -12,18 +12,22 @@ struct LoweredArgument {
   enum class Kind : uint8_t { Scalar, InputBuffer, OutputBuffer };
   std::string name;
   Kind kind = Kind::Scalar;
-  Type type;            // of the scalar, or of the buffer's elements
-  int dimensions = 0;   // of the buffer
-  SymbolRef symbol;     // the parameter or buffer behind it, for binding at a JIT call; may be undefined
+  Type type;           // of the scalar, or of the buffer's elements
+  int dimensions = 0;  // of the buffer
+  SymbolRef
+      symbol;  // the parameter or buffer behind it, for binding at a JIT call; may be undefined
   bool is_buffer() const { return kind != Kind::Scalar; }
 };
 
 // Names inside the body:
 //   scalar argument "k"   Variable "k"
-//   buffer argument "in"  Variable "in.buffer" (Handle: halide_buffer_t*), used by the buffer_* operators;
-//                         Load/Store with name "in" address element `index` from its host pointer. The host pointer
-//                         may be null in a bounds query; then no Load or Store is reached.
-// The body binds everything else itself. It ends normally (the function returns 0) or through an Assert (the code).
+//   buffer argument "in"  Variable "in.buffer" (Handle: halide_buffer_t*), used by the buffer_*
+//   operators;
+//                         Load/Store with name "in" address element `index` from its host pointer.
+//                         The host pointer may be null in a bounds query; then no Load or Store is
+//                         reached.
+// The body binds everything else itself. It ends normally (the function returns 0) or through an
+// Assert (the code).
 struct LoweredFunction {
   std::string name;
   std::vector<LoweredArgument> args;

@@ -52,12 +52,13 @@ double unit_weight(const Scalar& weight) {
   return static_cast<double>(weight.u) / static_cast<double>(weight.type.max_uint());
 }
 
-// A weight is first brought to the width of the values, rounding down: 0.5 of 8 bits is 127 / 255. (A narrower one
-// is the same fraction of its own range and can stay.)
+// A weight is first brought to the width of the values, rounding down: 0.5 of 8 bits is 127 / 255.
+// (A narrower one is the same fraction of its own range and can stay.)
 Scalar fixed_point_weight(const Scalar& weight, Type values) {
   const Type fixed = UInt(values.bits());
   if (weight.type.is_float()) {
-    return eval_cast(fixed, Scalar::of_float(Float(64), weight.f * static_cast<double>(fixed.max_uint())));
+    return eval_cast(fixed,
+                     Scalar::of_float(Float(64), weight.f * static_cast<double>(fixed.max_uint())));
   }
   if (weight.type.bits() <= values.bits()) return weight;
   return Scalar::of_uint(fixed, weight.u / (weight.type.max_uint() / fixed.max_uint()));

@@ -1,4 +1,5 @@
-// Reads IR text back. Symbols are not text: parsed Funcs, images and parameters are known by name only.
+// Reads IR text back. Symbols are not text: parsed Funcs, images and parameters are known by name
+// only.
 #pragma once
 
 #include <string>

@@ -1,5 +1,5 @@
-// Scalar values and the one definition of what every operation does to them. The constant folder, the interpreter and
-// the tests of the code generator all stand on this.
+// Scalar values and the one definition of what every operation does to them. The constant folder,
+// the interpreter and the tests of the code generator all stand on this.
 #pragma once
 
 #include <optional>
@@ -21,7 +21,9 @@ struct Scalar {
   static Scalar of_float(Type type, double value);   // rounds to the type
   static Scalar of_bool(bool value) { return of_uint(Bool(), value); }
   bool as_bool() const { return u != 0; }
-  double as_double() const { return type.is_float() ? f : type.is_int() ? static_cast<double>(i) : static_cast<double>(u); }
+  double as_double() const {
+    return type.is_float() ? f : type.is_int() ? static_cast<double>(i) : static_cast<double>(u);
+  }
 };
 
 double round_to_type(Type type, double value);
@@ -31,11 +33,12 @@ Scalar eval_binary(Kind kind, const Scalar& a, const Scalar& b);
 Scalar eval_not(const Scalar& a);
 Scalar eval_cast(Type type, const Scalar& value);
 Scalar eval_reinterpret(Type type, const Scalar& value);
-// Pure and Marker operators (operators.def). `type` is the call's type. nullopt for Effect and Internal ones.
-// Floats narrower than 64 bits are computed in double and rounded once.
+// Pure and Marker operators (operators.def). `type` is the call's type. nullopt for Effect and
+// Internal ones. Floats narrower than 64 bits are computed in double and rounded once.
 std::optional<Scalar> eval_operator(Op op, const std::vector<Scalar>& args, Type type);
 
-std::optional<Scalar> as_scalar(const Expr& e);  // of an immediate (or a Broadcast of one: its lane)
+std::optional<Scalar> as_scalar(
+    const Expr& e);  // of an immediate (or a Broadcast of one: its lane)
 Expr to_expr(const Scalar& value);
 
 }  // namespace retrograde::ir

@@ -1,4 +1,5 @@
-// What machine code is generated for: operating system, architecture, width, and features by Halide's names.
+// What machine code is generated for: operating system, architecture, width, and features by
+// Halide's names.
 #pragma once
 
 #include <bitset>
@@ -23,8 +24,8 @@ struct Target {
     F16C,
     FMA,
     AVX2,
-    AVX512,           // F and CD
-    AVX512_Skylake,   // + VL, BW, DQ
+    AVX512,          // F and CD
+    AVX512_Skylake,  // + VL, BW, DQ
     AVX512_Cannonlake,
     AVX512_SapphireRapids,
     UserContext,
@@ -68,8 +69,8 @@ struct Target {
   std::bitset<FeatureEnd> features_;
 };
 
-Target get_host_target();                 // this machine, by cpuid
-Target get_target_from_environment();     // RG_TARGET or HL_TARGET, else host
-Target get_jit_target_from_environment(); // RG_JIT_TARGET or HL_JIT_TARGET, else host, plus JIT
+Target get_host_target();                  // this machine, by cpuid
+Target get_target_from_environment();      // RG_TARGET or HL_TARGET, else host
+Target get_jit_target_from_environment();  // RG_JIT_TARGET or HL_JIT_TARGET, else host, plus JIT
 
 }  // namespace retrograde

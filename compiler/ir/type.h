@@ -8,6 +8,8 @@
 
 namespace retrograde {
 
+class Expr;
+
 enum class TypeCode : uint8_t { Int, UInt, Float, BFloat, Handle };
 
 // A 16-bit IEEE half; arithmetic happens in float32 and rounds to nearest even at each operation.
@@ -74,16 +76,19 @@ class Type {
   int64_t min_int() const;
   int64_t max_int() const;
   uint64_t max_uint() const;
-  // Whether the value survives conversion to this type unchanged (floats: up to rounding, within range).
+  // Whether the value survives conversion to this type unchanged (floats: up to rounding, within
+  // range).
   bool can_represent(int64_t value) const;
   bool can_represent(uint64_t value) const;
   bool can_represent(double value) const;
   bool can_represent(Type other) const;  // every value of `other`
 
+  // The largest and smallest value as expressions; infinities for floats.
+  Expr max() const;
+  Expr min() const;
+
   friend constexpr bool operator==(const Type& a, const Type& b) = default;
-  friend constexpr bool operator<(const Type& a, const Type& b) {
-    return a.key() < b.key();
-  }
+  friend constexpr bool operator<(const Type& a, const Type& b) { return a.key() < b.key(); }
   constexpr uint32_t key() const {
     return static_cast<uint32_t>(code_) | static_cast<uint32_t>(bits_) << 8 |
            static_cast<uint32_t>(lanes_) << 16;

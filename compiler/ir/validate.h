@@ -12,9 +12,11 @@ enum class Phase : uint8_t {
   FlatStorage,  // Allocate, Store, Load; no calls to Funcs or images
   Vector,       // as FlatStorage, and no Vectorized or Unrolled loops are left
 };
-// Throws InternalError that names the pass, the rule, the node and the IR around it. `free_names`: names bound outside
-// (arguments of the lowered function). Checks: types of operands agree, every variable is bound once and before use, names are unique,
-// every allocation's loads and stores lie inside its Allocate and before its Free, kinds belong to the phase,
-// predicates are bool with matching lanes, operator arities.
-void validate(const Stmt& s, Phase phase, const std::string& after_pass, const std::vector<std::string>& free_names = {});
+// Throws InternalError that names the pass, the rule, the node and the IR around it. `free_names`:
+// names bound outside (arguments of the lowered function). Checks: types of operands agree, every
+// variable is bound once and before use, names are unique, every allocation's loads and stores lie
+// inside its Allocate and before its Free, kinds belong to the phase, predicates are bool with
+// matching lanes, operator arities.
+void validate(const Stmt& s, Phase phase, const std::string& after_pass,
+              const std::vector<std::string>& free_names = {});
 }  // namespace retrograde::ir

@@ -1,9 +1,11 @@
 // Walking and rewriting the IR with lambdas.
 //
-//   match(e, [&](const ir::Select& s) {...}, [&](const ir::Binary& b) {...}, [&](const ir::ExprNode& n) {default});
+//   match(e, [&](const ir::Select& s) {...}, [&](const ir::Binary& b) {...}, [&](const
+//   ir::ExprNode& n) {default});
 //
-// calls the lambda of the node's type, else the default, which every match states. Expressions are DAGs: `walk` and
-// `Rewriter` visit a shared node once. A hand-written recursion must do the same or take exponential time.
+// calls the lambda of the node's type, else the default, which every match states. Expressions are
+// DAGs: `walk` and `Rewriter` visit a shared node once. A hand-written recursion must do the same
+// or take exponential time.
 #pragma once
 
 #include <functional>
@@ -23,9 +25,9 @@ template <class R, class... Args>
 class FunctionRef<R(Args...)> {
  public:
   template <class F>
-    requires(!std::is_same_v<std::remove_cvref_t<F>, FunctionRef>)
-  FunctionRef(F&& f)
-      : object_(const_cast<void*>(static_cast<const void*>(std::addressof(f)))), call_([](void* object, Args... args) -> R {
+  requires(!std::is_same_v<std::remove_cvref_t<F>, FunctionRef>) FunctionRef(F&& f)
+      : object_(const_cast<void*>(static_cast<const void*>(std::addressof(f)))),
+        call_([](void* object, Args... args) -> R {
           return (*static_cast<std::remove_reference_t<F>*>(object))(std::forward<Args>(args)...);
         }) {}
   R operator()(Args... args) const { return call_(object_, std::forward<Args>(args)...); }
@@ -88,10 +90,11 @@ Stmt map_children(const Stmt& s, ExprMap map, StmtMap map_stmt);
 
 // Visits every node once, parents before children; descends where the lambda returns true.
 void walk(const Expr& e, FunctionRef<bool(const Expr&)> enter);
-void walk(const Stmt& s, FunctionRef<bool(const Expr&)> enter_expr, FunctionRef<bool(const Stmt&)> enter_stmt);
+void walk(const Stmt& s, FunctionRef<bool(const Expr&)> enter_expr,
+          FunctionRef<bool(const Stmt&)> enter_stmt);
 
-// A context-free rewriting, memoised by node identity. Derive, and override `rewrite` for the kinds of interest,
-// ending in `return children(e)`. Call the object on children to recurse.
+// A context-free rewriting, memoised by node identity. Derive, and override `rewrite` for the kinds
+// of interest, ending in `return children(e)`. Call the object on children to recurse.
 class Rewriter {
  public:
   virtual ~Rewriter() = default;
@@ -115,7 +118,8 @@ class Rewriter {
 
 // Rewriting with a lambda: f(e, recurse) gives the new node; `recurse` rewrites a child, so that
 // `map_children(e, recurse)` is e with all children rewritten.
-using RewriteStep = std::function<Expr(const Expr&, const std::function<Expr(const Expr&)>& recurse)>;
+using RewriteStep =
+    std::function<Expr(const Expr&, const std::function<Expr(const Expr&)>& recurse)>;
 Expr rewrite(const Expr& e, const RewriteStep& step);
 
 // Names are unique: a let or loop inside `e` never rebinds a name of the map.

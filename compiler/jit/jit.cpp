@@ -7,8 +7,8 @@
 #include <unordered_map>
 
 #include "codegen/codegen.h"
-#include "diagnostics/large_stack.h"
 #include "diagnostics/error.h"
+#include "diagnostics/large_stack.h"
 #include "jit/fingerprint.h"
 #include "jit/linker.h"
 #include "retrograde_runtime.h"

@@ -18,11 +18,14 @@ std::string fact(const std::string& buffer, const char* what, int d) {
 
 template <class... Parts>
 Stmt check(Expr holds, int code, Parts&&... message) {
-  return make_assert(std::move(holds), call_op(Op::error, Int(32), {Expr(int32_t{code}), Expr(std::forward<Parts>(message))...}));
+  return make_assert(
+      std::move(holds),
+      call_op(Op::error, Int(32), {Expr(int32_t{code}), Expr(std::forward<Parts>(message))...}));
 }
 
 uint32_t type_word(Type type) {
-  return static_cast<uint32_t>(type.code() == TypeCode::BFloat ? 4 : static_cast<int>(type.code())) |
+  return static_cast<uint32_t>(type.code() == TypeCode::BFloat ? 4
+                                                               : static_cast<int>(type.code())) |
          static_cast<uint32_t>(type.bits()) << 8 | 1u << 16;
 }
 
@@ -59,11 +62,13 @@ class Checks {
   using Bindings = std::vector<std::pair<std::string, Expr>>;
 
   static Stmt bind(const Bindings& bindings, Stmt body) {
-    for (auto it = bindings.rbegin(); it != bindings.rend(); ++it) body = make_let(it->first, it->second, body);
+    for (auto it = bindings.rbegin(); it != bindings.rend(); ++it)
+      body = make_let(it->first, it->second, body);
     return body;
   }
 
-  // Where a fact was promised, the code below uses the promise, and the check compares it with the ".actual" fact.
+  // Where a fact was promised, the code below uses the promise, and the check compares it with the
+  // ".actual" fact.
   Bindings buffer_facts() const {
     Bindings facts, promises;
     for (const LoweredArgument& arg : args_) {
@@ -79,16 +84,16 @@ class Checks {
     return facts;
   }
 
-  static void add_fact(const LoweredArgument& arg, const char* what, Op op, int d, const Expr& promised, Bindings& facts,
-                       Bindings& promises) {
+  static void add_fact(const LoweredArgument& arg, const char* what, Op op, int d,
+                       const Expr& promised, Bindings& facts, Bindings& promises) {
     std::string name = fact(arg.name, what, d);
     Expr actual = call_op(op, Int(32), {handle_of(arg.name), d});
     facts.emplace_back(promised.defined() ? name + ".actual" : name, actual);
     if (promised.defined()) promises.emplace_back(name, promised);
   }
 
-  // What the user promised; of a buffer that is named in the program: what it is. Dimension 0 is dense unless the user
-  // says otherwise.
+  // What the user promised; of a buffer that is named in the program: what it is. Dimension 0 is
+  // dense unless the user says otherwise.
   static BufferConstraint constraint_of(const LoweredArgument& arg, int d) {
     auto param = std::dynamic_pointer_cast<ParameterContents>(arg.symbol.lock());
     BufferConstraint promised;
@@ -106,17 +111,22 @@ class Checks {
   static void add_shape_checks(const LoweredArgument& arg, std::vector<Stmt>& checks) {
     Expr handle = handle_of(arg.name);
     std::string name = quoted(arg.name);
-    checks.push_back(check(!call_op(Op::buffer_is_null, Bool(), {handle}), retrograde_error_buffer_argument_is_null,
-                           text("cannot run: the buffer argument ", name, " is null. Pass a halide_buffer_t (with a null host to ask for bounds).")));
+    checks.push_back(check(
+        !call_op(Op::buffer_is_null, Bool(), {handle}), retrograde_error_buffer_argument_is_null,
+        text("cannot run: the buffer argument ", name,
+             " is null. Pass a halide_buffer_t (with a null host to ask for bounds).")));
     Expr type = call_op(Op::buffer_type, UInt(32), {handle});
-    checks.push_back(check(type == make_uint_const(UInt(32), type_word(arg.type)), retrograde_error_bad_type,
-                           text("cannot run: the buffer ", name, " must have elements of type ", to_string(arg.type),
-                                ", but its type word (code | bits << 8 | lanes << 16) is "),
-                           type, text(". Pass a buffer of ", to_string(arg.type), ".")));
+    checks.push_back(
+        check(type == make_uint_const(UInt(32), type_word(arg.type)), retrograde_error_bad_type,
+              text("cannot run: the buffer ", name, " must have elements of type ",
+                   to_string(arg.type), ", but its type word (code | bits << 8 | lanes << 16) is "),
+              type, text(". Pass a buffer of ", to_string(arg.type), ".")));
     Expr dimensions = call_op(Op::buffer_dimensions, Int(32), {handle});
     checks.push_back(check(dimensions == arg.dimensions, retrograde_error_bad_dimensions,
-                           text("cannot run: the buffer ", name, " must have ", arg.dimensions, " dimensions, but it has "),
-                           dimensions, Expr(". Pass a buffer with as many dimensions as the pipeline uses.")));
+                           text("cannot run: the buffer ", name, " must have ", arg.dimensions,
+                                " dimensions, but it has "),
+                           dimensions,
+                           Expr(". Pass a buffer with as many dimensions as the pipeline uses.")));
   }
 
   // Index arithmetic is 32 bits: a buffer's elements must be addressable in it.
@@ -125,13 +135,15 @@ class Checks {
     for (int d = 0; d < arg.dimensions; d++) {
       Expr extent = call_op(Op::buffer_extent, Int(32), {handle_of(arg.name), d});
       checks.push_back(check(extent >= 0, retrograde_error_extents_negative,
-                             text("cannot run: extents must not be negative; dimension ", d, " of the buffer ", quoted(arg.name), " has extent "), extent,
-                             Expr(". Pass the extent that the data has.")));
+                             text("cannot run: extents must not be negative; dimension ", d,
+                                  " of the buffer ", quoted(arg.name), " has extent "),
+                             extent, Expr(". Pass the extent that the data has.")));
       elements = elements * cast(Int(64), extent);
       Expr fits = elements <= make_const(Int(64), int64_t{0x7fffffff});
       checks.push_back(check(fits, retrograde_error_extents_too_large,
-                             text("cannot run: a buffer may have at most 2147483647 elements; ", quoted(arg.name), " has at least "), elements,
-                             Expr(". Process it in tiles.")));
+                             text("cannot run: a buffer may have at most 2147483647 elements; ",
+                                  quoted(arg.name), " has at least "),
+                             elements, Expr(". Process it in tiles.")));
     }
   }
 
@@ -141,12 +153,14 @@ class Checks {
     Expr value = variable(arg.name, arg.type);
     if (param->min_value.defined()) {
       checks.push_back(check(value >= param->min_value, retrograde_error_param_too_small,
-                             text("cannot run: the parameter ", quoted(arg.name), " is "), value, Expr(", below its minimum "), param->min_value,
+                             text("cannot run: the parameter ", quoted(arg.name), " is "), value,
+                             Expr(", below its minimum "), param->min_value,
                              Expr(". Pass a value in its range.")));
     }
     if (param->max_value.defined()) {
       checks.push_back(check(value <= param->max_value, retrograde_error_param_too_large,
-                             text("cannot run: the parameter ", quoted(arg.name), " is "), value, Expr(", above its maximum "), param->max_value,
+                             text("cannot run: the parameter ", quoted(arg.name), " is "), value,
+                             Expr(", above its maximum "), param->max_value,
                              Expr(". Pass a value in its range.")));
     }
   }
@@ -156,7 +170,8 @@ class Checks {
     if (arg.kind == LoweredArgument::Kind::OutputBuffer) {
       for (const LoopedFunc& f : program_.funcs) {
         for (size_t i = 0; i < f.func->types.size(); i++) {
-          if (f.is_output && value_buffer_name(*f.func, static_cast<int>(i)) == arg.name) return nests_.outputs.at(f.name());
+          if (f.is_output && value_buffer_name(*f.func, static_cast<int>(i)) == arg.name)
+            return nests_.outputs.at(f.name());
         }
       }
     }
@@ -167,9 +182,12 @@ class Checks {
   void check_bounded(const LoweredArgument& arg, const Box& box) const {
     for (size_t d = 0; d < box.size(); d++) {
       if (box[d].is_bounded()) continue;
-      user_error(text("read ", quoted(arg.name)), "the region that a pipeline reads of its input must be bounded",
-                 text("dimension ", d, " is read without a ", box[d].has_lower_bound() ? "upper" : "lower", " bound"),
-                 "Clamp the index that depends on data, as in clamp(index, 0, extent - 1), or promise its range with unsafe_promise_clamped");
+      user_error(text("read ", quoted(arg.name)),
+                 "the region that a pipeline reads of its input must be bounded",
+                 text("dimension ", d, " is read without a ",
+                      box[d].has_lower_bound() ? "upper" : "lower", " bound"),
+                 "Clamp the index that depends on data, as in clamp(index, 0, extent - 1), or "
+                 "promise its range with unsafe_promise_clamped");
     }
   }
 
@@ -194,22 +212,30 @@ class Checks {
     std::vector<Stmt> sets;
     for (size_t d = 0; d < box.size(); d++) {
       Expr extent = simplify(box[d].max - box[d].min + 1);
-      sets.push_back(make_evaluate(call_op(Op::buffer_set_bounds, Int(32), {handle_of(arg.name), static_cast<int>(d), box[d].min, extent})));
+      sets.push_back(
+          make_evaluate(call_op(Op::buffer_set_bounds, Int(32),
+                                {handle_of(arg.name), static_cast<int>(d), box[d].min, extent})));
     }
     return sets.empty() ? make_evaluate(0) : make_block(sets);
   }
 
-  // Nothing is read when another extent is empty, so an empty buffer fits an empty requirement only by the numbers.
-  static void add_box_checks(const LoweredArgument& arg, const Box& box, std::vector<Stmt>& checks) {
+  // Nothing is read when another extent is empty, so an empty buffer fits an empty requirement only
+  // by the numbers.
+  static void add_box_checks(const LoweredArgument& arg, const Box& box,
+                             std::vector<Stmt>& checks) {
     const char* verb = arg.kind == LoweredArgument::Kind::OutputBuffer ? "written" : "read";
     for (size_t d = 0; d < box.size(); d++) {
       Expr min = variable(fact(arg.name, "min", d)), extent = variable(fact(arg.name, "extent", d));
       Expr inside = simplify(min <= box[d].min && box[d].max <= min + extent - 1);
       if (is_const_true(inside)) continue;
-      checks.push_back(check(inside, retrograde_error_access_out_of_bounds,
-                             text("cannot run: every access must lie inside its buffer; ", quoted(arg.name), " is ", verb, " over ["), box[d].min, Expr(", "),
-                             box[d].max, text("] in dimension ", d, ", but the buffer covers ["), min, Expr(", "), min + extent - 1,
-                             Expr("]. Pass a larger buffer, clamp the access, or use a boundary condition.")));
+      checks.push_back(
+          check(inside, retrograde_error_access_out_of_bounds,
+                text("cannot run: every access must lie inside its buffer; ", quoted(arg.name),
+                     " is ", verb, " over ["),
+                box[d].min, Expr(", "), box[d].max,
+                text("] in dimension ", d, ", but the buffer covers ["), min, Expr(", "),
+                min + extent - 1,
+                Expr("]. Pass a larger buffer, clamp the access, or use a boundary condition.")));
     }
   }
 
@@ -222,20 +248,23 @@ class Checks {
     }
   }
 
-  static void add_constraint_check(const LoweredArgument& arg, const char* what, int d, const Expr& promised,
-                                   std::vector<Stmt>& checks) {
+  static void add_constraint_check(const LoweredArgument& arg, const char* what, int d,
+                                   const Expr& promised, std::vector<Stmt>& checks) {
     if (!promised.defined()) return;
     Expr actual = variable(fact(arg.name, what, d) + ".actual");
     checks.push_back(check(actual == promised, retrograde_error_constraint_violated,
-                           text("cannot run: the ", what, " of dimension ", d, " of ", quoted(arg.name), " was promised to be "),
+                           text("cannot run: the ", what, " of dimension ", d, " of ",
+                                quoted(arg.name), " was promised to be "),
                            promised, Expr(", but it is "), actual,
-                           text(". Pass such a buffer, or lift the promise with dim(", d, ").set_", what, "(Expr()).")));
+                           text(". Pass such a buffer, or lift the promise with dim(", d, ").set_",
+                                what, "(Expr()).")));
   }
 };
 
 }  // namespace
 
-Stmt add_argument_checks(const LoopNests& nests, const std::vector<LoweredArgument>& args, const Program& program) {
+Stmt add_argument_checks(const LoopNests& nests, const std::vector<LoweredArgument>& args,
+                         const Program& program) {
   return Checks(nests, args, program).build();
 }
 

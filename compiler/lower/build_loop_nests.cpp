@@ -27,8 +27,8 @@ namespace {
 
 using Bindings = std::vector<std::pair<std::string, Expr>>;
 
-// A statement with what it needs from outside of it. All boxes speak of names that are bound outside the statement,
-// except for `unranged` loops, over which they are still to be extended.
+// A statement with what it needs from outside of it. All boxes speak of names that are bound
+// outside the statement, except for `unranged` loops, over which they are still to be extended.
 struct Emitted {
   Stmt stmt;
   Requirements uses;
@@ -90,7 +90,8 @@ class NestEmitter {
     LoopNests nests;
     Emitted nothing;
     Emitted all = emit_site(root_, nothing, nests.bounds);
-    all.stmt = realize_stored(all, [](const LoopLevel& level) { return level.kind == LoopLevel::Kind::Root; });
+    all.stmt = realize_stored(
+        all, [](const LoopLevel& level) { return level.kind == LoopLevel::Kind::Root; });
     check_everything_found_its_place(all);
     for (auto& [name, use] : all.uses)
       if (use.is_image) nests.images[name] = use;
@@ -102,8 +103,9 @@ class NestEmitter {
  private:
   const Program& program_;
   std::vector<int> root_, innermost_;  // indices into program_.funcs, producers first
-  std::map<std::pair<std::string, std::string>, std::vector<int>> at_;  // (consumer, loop) -> Funcs computed there
-  std::set<std::string> storage_sites_;                                 // "consumer.loop" that store something
+  std::map<std::pair<std::string, std::string>, std::vector<int>>
+      at_;                               // (consumer, loop) -> Funcs computed there
+  std::set<std::string> storage_sites_;  // "consumer.loop" that store something
   std::map<std::string, Box> outputs_;
   std::set<std::string> computed_;
 
@@ -153,12 +155,14 @@ class NestEmitter {
     merge_footprints(result.uses, inner.uses);
     merge_storage(result.storage, inner.storage);
     Stmt produce = make_producer_consumer(f.name(), true, result.stmt);
-    Stmt consume = inner.stmt.defined() ? make_producer_consumer(f.name(), false, inner.stmt) : inner.stmt;
+    Stmt consume =
+        inner.stmt.defined() ? make_producer_consumer(f.name(), false, inner.stmt) : inner.stmt;
     result.stmt = make_block({produce, consume});
     if (f.is_output) {
       outputs_[f.name()] = allocated;
     } else if (is_stored_where_computed(f)) {
-      result.stmt = make_realize(f.name(), f.func->types, f.schedule.memory, ranges_of(allocated), result.stmt);
+      result.stmt = make_realize(f.name(), f.func->types, f.schedule.memory, ranges_of(allocated),
+                                 result.stmt);
     } else {
       result.storage[f.name()] = allocated;
     }
@@ -200,10 +204,12 @@ class NestEmitter {
   void check_bounded(const LoopedFunc& f, const Box& box) const {
     for (size_t d = 0; d < box.size(); d++) {
       if (box[d].is_bounded()) continue;
-      user_error(text("compute ", quoted(f.name())), "the region of a Func that its consumers read must be bounded",
+      user_error(text("compute ", quoted(f.name())),
+                 "the region of a Func that its consumers read must be bounded",
                  text("dimension ", d, " (", quoted(f.func->args[d]), ") is read without a ",
                       box[d].has_lower_bound() ? "upper" : "lower", " bound by ", consumers_of(f)),
-                 "Clamp the index that depends on data, as in clamp(index, 0, extent - 1), or promise its range with "
+                 "Clamp the index that depends on data, as in clamp(index, 0, extent - 1), or "
+                 "promise its range with "
                  "unsafe_promise_clamped");
     }
   }
@@ -221,7 +227,8 @@ class NestEmitter {
   // Func::bound: the loops cover exactly what was promised; a check makes sure that it is enough.
   void apply_promised_bounds(const LoopedFunc& f, Box& box, std::vector<Stmt>& checks) const {
     for (const Bound& bound : f.schedule.bounds) {
-      size_t d = std::find(f.func->args.begin(), f.func->args.end(), bound.var) - f.func->args.begin();
+      size_t d =
+          std::find(f.func->args.begin(), f.func->args.end(), bound.var) - f.func->args.begin();
       RETROGRADE_ASSERT(d < box.size(), "bound on an unknown dimension");
       Interval promised;
       promised.min = bound.min.defined() ? bound.min : box[d].min;
@@ -231,13 +238,20 @@ class NestEmitter {
     }
   }
 
-  static Stmt bound_check(const LoopedFunc& f, int d, const Interval& required, const Interval& promised) {
+  static Stmt bound_check(const LoopedFunc& f, int d, const Interval& required,
+                          const Interval& promised) {
     Expr holds = simplify(promised.min <= required.min && required.max <= promised.max);
     std::vector<Expr> error = {Expr(int32_t{retrograde_error_explicit_bounds_too_small}),
-                               Expr(text("cannot compute ", quoted(f.name()), ": its dimension ", d, " (",
-                                         quoted(f.func->args[d]), ") was bounded to [")),
-                               promised.min, Expr(", "), promised.max, Expr("], but its consumers need ["),
-                               required.min, Expr(", "), required.max, Expr("]. Bound it to what they read.")};
+                               Expr(text("cannot compute ", quoted(f.name()), ": its dimension ", d,
+                                         " (", quoted(f.func->args[d]), ") was bounded to [")),
+                               promised.min,
+                               Expr(", "),
+                               promised.max,
+                               Expr("], but its consumers need ["),
+                               required.min,
+                               Expr(", "),
+                               required.max,
+                               Expr("]. Bound it to what they read.")};
     return make_assert(holds, call_op(Op::error, Int(32), error));
   }
 
@@ -247,7 +261,8 @@ class NestEmitter {
   Domain bind_domain(const LoopedFunc& f, int s, Box& need, Bindings& bindings) const {
     Domain domain;
     const std::string prefix = stage_prefix(f.name(), s);
-    for (size_t d = 0; d < need.size(); d++) domain[f.func->args[d]] = bind(prefix + f.func->args[d], need[d], bindings);
+    for (size_t d = 0; d < need.size(); d++)
+      domain[f.func->args[d]] = bind(prefix + f.func->args[d], need[d], bindings);
     for (const ReductionVariable& r : f.stages[s].rvars) {
       Expr min = cast(Int(32), r.min), extent = cast(Int(32), r.extent);
       Interval range{min, simplify(min + extent - 1)};
@@ -309,7 +324,8 @@ class NestEmitter {
     return children;
   }
 
-  // Funcs computed just outside `code` and inside the next loop; their bounds are bound around them.
+  // Funcs computed just outside `code` and inside the next loop; their bounds are bound around
+  // them.
   Emitted emit_children(const std::vector<int>& children, Emitted code) {
     bool any = std::any_of(children.begin(), children.end(),
                            [&](int i) { return code.uses.count(program_.funcs[i].name()); });
@@ -339,7 +355,8 @@ class NestEmitter {
     for (auto it = code.storage.begin(); it != code.storage.end();) {
       const LoopedFunc& f = *program_.find(it->first);
       if (is_here(f.schedule.store_level)) {
-        stmt = make_realize(f.name(), f.func->types, f.schedule.memory, ranges_of(it->second), stmt);
+        stmt =
+            make_realize(f.name(), f.func->types, f.schedule.memory, ranges_of(it->second), stmt);
         it = code.storage.erase(it);
       } else {
         ++it;
@@ -351,10 +368,13 @@ class NestEmitter {
   void check_no_shared_storage(const LoopedFunc& f, const Loop& loop, const Emitted& code) const {
     if (loop.for_type != ForType::Parallel || code.storage.empty()) return;
     const std::string& g = code.storage.begin()->first;
-    user_error(text("store ", quoted(g), " outside of the parallel loop over ", quoted(loop.var), " of ", quoted(f.name())),
-               "iterations of a parallel loop must not share the storage of what each of them computes",
-               text(quoted(g), " is computed inside that loop"),
-               text("Store ", quoted(g), " at ", quoted(loop.var), " or deeper, or compute it outside of the loop"));
+    user_error(
+        text("store ", quoted(g), " outside of the parallel loop over ", quoted(loop.var), " of ",
+             quoted(f.name())),
+        "iterations of a parallel loop must not share the storage of what each of them computes",
+        text(quoted(g), " is computed inside that loop"),
+        text("Store ", quoted(g), " at ", quoted(loop.var),
+             " or deeper, or compute it outside of the loop"));
   }
 
   // ---- what is left at root ----
@@ -364,7 +384,8 @@ class NestEmitter {
     if (!f) return text(quoted(func), " has no loops: it is inlined or not part of this pipeline");
     std::string names;
     for (size_t s = 0; s < f->stages.size(); s++) {
-      for (const Dim& dim : f->stages[s].schedule.dims) names += (names.empty() ? "" : ", ") + quoted(dim.var);
+      for (const Dim& dim : f->stages[s].schedule.dims)
+        names += (names.empty() ? "" : ", ") + quoted(dim.var);
     }
     return text("the loops of ", quoted(func), " are ", names.empty() ? "none" : names);
   }
@@ -376,11 +397,14 @@ class NestEmitter {
       if (!is_left) continue;
       bool is_stored = all.storage.count(f.name());
       const LoopLevel& asked = is_stored ? f.schedule.store_level : level;
-      user_error(text(is_stored ? "store " : "compute ", quoted(f.name()), " at ", quoted(asked.var), " of ", quoted(asked.func)),
-                 text("a Func must be ", is_stored ? "stored" : "computed", " at a loop that encloses every use of it",
-                      is_stored ? " and its compute level" : ""),
-                 text(loops_of(asked.func), ", and ", quoted(f.name()), " is used by ", consumers_of(f)),
-                 "Name a loop that encloses all of these uses, or call compute_root()");
+      user_error(
+          text(is_stored ? "store " : "compute ", quoted(f.name()), " at ", quoted(asked.var),
+               " of ", quoted(asked.func)),
+          text("a Func must be ", is_stored ? "stored" : "computed",
+               " at a loop that encloses every use of it",
+               is_stored ? " and its compute level" : ""),
+          text(loops_of(asked.func), ", and ", quoted(f.name()), " is used by ", consumers_of(f)),
+          "Name a loop that encloses all of these uses, or call compute_root()");
     }
   }
 };

@@ -1,22 +1,25 @@
 // build_loop_nests -- from Funcs and schedules to loops, with every region inferred on the way.
 //
 // In:  a Program (definitions as DAGs, nothing inlined left).
-// Out: Loops phase. One statement for all outputs; each Func is realised at its storage level and produced at its
+// Out: Loops phase. One statement for all outputs; each Func is realised at its storage level and
+// produced at its
 //      compute level over exactly the box that the code below reads; the boxes are bound to names
 //      "f.s0.x.min" / "f.s0.x.max" just outside.
 //
 //   out(x) = f(x - 1) + f(x + 1), f at out's y         for out.s0.y:
 //                                                        let f.s0.x.max = out.s0.x.max + 1 ...
-//                                                 =>     realize f [..]: produce f: for f.s0.x: f(..) = ..
+//                                                 =>     realize f [..]: produce f: for f.s0.x:
+//                                                 f(..) = ..
 //                                                          for out.s0.x: out(..) = f(..) + f(..)
 //
-// Method: one walk over the tree of loops, consumers before producers. Going up from an innermost body, `uses` holds the
-// box that everything below reads of each Func, in terms of the loop variables above. At a loop where a Func is to be
-// computed its box is final: its loops are emitted there, and what it reads joins `uses`. Each Func is visited once per
-// place it is computed and each box is bound to a name at its site, so time and code grow linearly with the pipeline.
-// Not done: sliding windows and storage folding (a Func stored outside of where it is computed is computed whole each time).
-// Source: the scheduling model of Ragan-Kelley et al., PLDI 2013, section 4.2; the single bottom-up walk is ours.
-// Tests: test/unit/lower_*_test.cpp, test/property.
+// Method: one walk over the tree of loops, consumers before producers. Going up from an innermost
+// body, `uses` holds the box that everything below reads of each Func, in terms of the loop
+// variables above. At a loop where a Func is to be computed its box is final: its loops are emitted
+// there, and what it reads joins `uses`. Each Func is visited once per place it is computed and
+// each box is bound to a name at its site, so time and code grow linearly with the pipeline. Not
+// done: sliding windows and storage folding (a Func stored outside of where it is computed is
+// computed whole each time). Source: the scheduling model of Ragan-Kelley et al., PLDI 2013,
+// section 4.2; the single bottom-up walk is ours. Tests: test/unit/lower_*_test.cpp, test/property.
 #pragma once
 
 #include <string>
@@ -31,14 +34,15 @@ namespace retrograde::ir {
 using Requirements = std::map<std::string, Footprint>;  // box read of each Func and image
 
 struct LoopNests {
-  std::vector<std::pair<std::string, Expr>> bounds;  // names of the regions at root, each may use those before it
+  std::vector<std::pair<std::string, Expr>>
+      bounds;  // names of the regions at root, each may use those before it
   Stmt body;
-  Requirements images;                // what is read of each input
+  Requirements images;                 // what is read of each input
   std::map<std::string, Box> outputs;  // what is written or read of each output Func
 };
 
-// UserError: a compute or storage level that is no loop around every use, an unbounded region, a Func stored outside
-// of a parallel loop in which it is computed.
+// UserError: a compute or storage level that is no loop around every use, an unbounded region, a
+// Func stored outside of a parallel loop in which it is computed.
 LoopNests build_loop_nests(const Program& program);
 
 // "out" -> [out.min.d, out.min.d + out.extent.d - 1] in every dimension

@@ -60,11 +60,13 @@ Program inline_functions(const std::vector<FuncPtr>& outputs) {
   Program program;
   InlinedFuncs inlined;
   Inliner inliner(inlined);
-  const DefaultSchedules defaults = default_schedules(outputs);  // of adjoints that nobody scheduled
+  const DefaultSchedules defaults =
+      default_schedules(outputs);  // of adjoints that nobody scheduled
   for (const FuncPtr& f : topological_order(outputs)) {
     bool is_output = std::find(outputs.begin(), outputs.end(), f) != outputs.end();
     std::vector<Definition> stages;
-    for (int i = 0; i < f->stage_count(); i++) stages.push_back(map_exprs(f->stage(i), std::ref(inliner)));
+    for (int i = 0; i < f->stage_count(); i++)
+      stages.push_back(map_exprs(f->stage(i), std::ref(inliner)));
     const auto chosen = defaults.find(f.get());
     const FuncSchedule& schedule = chosen == defaults.end() ? f->schedule : chosen->second.func;
     if (is_inlined(*f, schedule, is_output)) {

@@ -3,10 +3,10 @@
 //   f(x) = x + 1 (inline)          g(x) = ((x - 1) + 1) * ((x + 1) + 1)
 //   g(x) = f(x - 1) * f(x + 1)  =>
 //
-// Method: producers first, so that what is substituted has no inlined call left; memoised by node identity, so a
-// definition stays a DAG of linear size however often an argument is used.
-// Not done: Funcs with updates (see LoopedFunc::is_computed_innermost) and outputs.
-// Source: folklore. Tests: test/unit/lower_inline_test.cpp.
+// Method: producers first, so that what is substituted has no inlined call left; memoised by node
+// identity, so a definition stays a DAG of linear size however often an argument is used. Not done:
+// Funcs with updates (see LoopedFunc::is_computed_innermost) and outputs. Source: folklore. Tests:
+// test/unit/lower_inline_test.cpp.
 #pragma once
 
 #include "lower/program.h"

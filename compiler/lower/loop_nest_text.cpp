@@ -2,11 +2,11 @@
 #include <sstream>
 
 #include "diagnostics/error.h"
+#include "diagnostics/large_stack.h"
 #include "ir/build.h"
 #include "ir/visit.h"
 #include "lower/build_loop_nests.h"
 #include "lower/inline_functions.h"
-#include "diagnostics/large_stack.h"
 #include "lower/lower.h"
 
 namespace retrograde::ir {
@@ -66,7 +66,10 @@ class LoopNestPrinter {
         },
         [&](const Provide& p) { line() << p.name << "(...) = ...\n"; },
         [&](const Realize& r) { visit(r.body); },
-        [&](const StmtNode&) { for_each_child(s, [](const Expr&) {}, [&](const Stmt& child) { visit(child); }); });
+        [&](const StmtNode&) {
+          for_each_child(
+              s, [](const Expr&) {}, [&](const Stmt& child) { visit(child); });
+        });
   }
 };
 

@@ -19,11 +19,11 @@ struct LowerOptions {
   std::string stop_after;  // name of a pass; empty: all of them
 };
 
-// `inputs`: scalars and input buffers in the order the caller wants; outputs are appended as the last arguments, one for
-// each value of each output Func.
-// Errors: UserError for illegal schedules, unbounded regions, recursion; see the passes.
-LoweredFunction lower(const std::string& name, const std::vector<FuncPtr>& outputs, const std::vector<LoweredArgument>& inputs,
-                      const LowerOptions& options);
+// `inputs`: scalars and input buffers in the order the caller wants; outputs are appended as the
+// last arguments, one for each value of each output Func. Errors: UserError for illegal schedules,
+// unbounded regions, recursion; see the passes.
+LoweredFunction lower(const std::string& name, const std::vector<FuncPtr>& outputs,
+                      const std::vector<LoweredArgument>& inputs, const LowerOptions& options);
 
 // The inputs that `outputs` need, in first-use order.
 std::vector<LoweredArgument> infer_arguments(const std::vector<FuncPtr>& outputs);

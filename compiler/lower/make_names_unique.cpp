@@ -30,7 +30,8 @@ class UseRenamer : public Rewriter {
     Expr result = children(e);
     const Call* call = result.as<Call>();
     if (!call || call->call_type != CallType::Func || !renamings_.count(call->name)) return result;
-    return call_func(renamings_.at(call->name), call->type, call->args, call->value_index, call->symbol);
+    return call_func(renamings_.at(call->name), call->type, call->args, call->value_index,
+                     call->symbol);
   }
 
  private:
@@ -56,20 +57,25 @@ class Uniquifier {
         },
         [&](const Realize& realize) {
           std::vector<Range> bounds;
-          for (const Range& range : realize.bounds) bounds.push_back({rename(range.min), rename(range.extent)});
+          for (const Range& range : realize.bounds)
+            bounds.push_back({rename(range.min), rename(range.extent)});
           Binding name(*this, realize.name);
           if (name.unique != realize.name) original[name.unique] = realize.name;
-          return make_realize(name.unique, realize.types, realize.memory, bounds, rename(realize.body));
+          return make_realize(name.unique, realize.types, realize.memory, bounds,
+                              rename(realize.body));
         },
         [&](const ProducerConsumer& part) {
-          return make_producer_consumer(current(renamings_, part.name), part.is_producer, rename(part.body));
+          return make_producer_consumer(current(renamings_, part.name), part.is_producer,
+                                        rename(part.body));
         },
         [&](const Provide& provide) {
-          return make_provide(current(renamings_, provide.name), rename(provide.values), rename(provide.args),
-                              rename(provide.predicate));
+          return make_provide(current(renamings_, provide.name), rename(provide.values),
+                              rename(provide.args), rename(provide.predicate));
         },
         [&](const StmtNode&) {
-          return map_children(s, [&](const Expr& e) { return rename(e); }, [&](const Stmt& child) { return rename(child); });
+          return map_children(
+              s, [&](const Expr& e) { return rename(e); },
+              [&](const Stmt& child) { return rename(child); });
         });
   }
 

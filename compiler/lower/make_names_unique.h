@@ -1,6 +1,7 @@
 // make_names_unique -- give every binding a name of its own.
 //
-// In:  Loops, as build_loop_nests makes it: a Func that is computed at several places binds its names at each of them, nested
+// In:  Loops, as build_loop_nests makes it: a Func that is computed at several places binds its
+// names at each of them, nested
 //      places included. Names mean the innermost binding around them.
 // Out: the same program; every name is bound once. First bindings keep their names.
 //

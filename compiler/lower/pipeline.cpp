@@ -3,6 +3,7 @@
 #include <chrono>
 
 #include "diagnostics/error.h"
+#include "diagnostics/large_stack.h"
 #include "ir/build.h"
 #include "ir/validate.h"
 #include "lower/argument_checks.h"
@@ -10,7 +11,6 @@
 #include "lower/flatten_storage.h"
 #include "lower/free_early.h"
 #include "lower/inline_functions.h"
-#include "diagnostics/large_stack.h"
 #include "lower/lower.h"
 #include "lower/make_names_unique.h"
 #include "lower/partition_loops.h"
@@ -40,7 +40,8 @@ StorageOrder storage_order(const Lowering& lowering) {
     if (f.schedule.storage_dims.empty() || f.schedule.storage_dims == f.func->args) continue;
     std::vector<int>& dims = order[f.name()];
     for (const std::string& var : f.schedule.storage_dims)
-      dims.push_back(static_cast<int>(std::find(f.func->args.begin(), f.func->args.end(), var) - f.func->args.begin()));
+      dims.push_back(static_cast<int>(std::find(f.func->args.begin(), f.func->args.end(), var) -
+                                      f.func->args.begin()));
   }
   for (const auto& [name, original] : lowering.renamed_funcs) {
     if (auto it = order.find(original); it != order.end()) order[name] = it->second;
@@ -50,7 +51,8 @@ StorageOrder storage_order(const Lowering& lowering) {
 
 Stmt nest_loops(Lowering& lowering, const Stmt&) {
   lowering.program = inline_functions(lowering.outputs);
-  Stmt nests = add_argument_checks(build_loop_nests(lowering.program), lowering.args, lowering.program);
+  Stmt nests =
+      add_argument_checks(build_loop_nests(lowering.program), lowering.args, lowering.program);
   UniqueNames unique = make_names_unique(nests);
   lowering.renamed_funcs = std::move(unique.original);
   return unique.stmt;
@@ -63,7 +65,8 @@ constexpr Pass passes[] = {
     {"flatten_storage", Phase::FlatStorage,
      [](Lowering& lowering, const Stmt& s) { return flatten_storage(s, storage_order(lowering)); }},
     {"simplify_storage", Phase::FlatStorage, run_simplify},
-    {"partition_loops", Phase::FlatStorage, [](Lowering&, const Stmt& s) { return partition_loops(s); }},
+    {"partition_loops", Phase::FlatStorage,
+     [](Lowering&, const Stmt& s) { return partition_loops(s); }},
     {"unroll_loops", Phase::FlatStorage, [](Lowering&, const Stmt& s) { return unroll_loops(s); }},
     {"vectorize_loops", Phase::Vector, [](Lowering&, const Stmt& s) { return vectorize_loops(s); }},
     {"simplify_vectors", Phase::Vector, run_simplify},
@@ -72,7 +75,8 @@ constexpr Pass passes[] = {
 
 std::vector<std::string> names_of(const std::vector<LoweredArgument>& args) {
   std::vector<std::string> names;
-  for (const LoweredArgument& arg : args) names.push_back(arg.is_buffer() ? arg.name + ".buffer" : arg.name);
+  for (const LoweredArgument& arg : args)
+    names.push_back(arg.is_buffer() ? arg.name + ".buffer" : arg.name);
   return names;
 }
 
@@ -105,8 +109,8 @@ Stmt run_passes(Lowering& lowering, const LowerOptions& options) {
 
 }  // namespace
 
-LoweredFunction lower(const std::string& name, const std::vector<FuncPtr>& outputs, const std::vector<LoweredArgument>& inputs,
-                      const LowerOptions& options) {
+LoweredFunction lower(const std::string& name, const std::vector<FuncPtr>& outputs,
+                      const std::vector<LoweredArgument>& inputs, const LowerOptions& options) {
   LoweredFunction function{name, inputs, {}};
   run_on_large_stack([&] {
     append_outputs(outputs, function.args);
@@ -121,7 +125,8 @@ std::vector<LoweredArgument> infer_arguments(const std::vector<FuncPtr>& outputs
   for (const std::shared_ptr<ParameterContents>& param : parameters_of(outputs)) {
     LoweredArgument arg;
     arg.name = param->name;
-    arg.kind = param->is_buffer ? LoweredArgument::Kind::InputBuffer : LoweredArgument::Kind::Scalar;
+    arg.kind =
+        param->is_buffer ? LoweredArgument::Kind::InputBuffer : LoweredArgument::Kind::Scalar;
     arg.type = param->type;
     arg.dimensions = param->dimensions;
     arg.symbol = SymbolRef(param);

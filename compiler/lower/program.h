@@ -1,7 +1,7 @@
 // program.h -- the working copy of a pipeline that lowering starts from.
 //
-// Users' Funcs are never changed by compiling them: lowering copies definitions and schedules here, inlines what is
-// scheduled inline, and builds loops from what is left.
+// Users' Funcs are never changed by compiling them: lowering copies definitions and schedules here,
+// inlines what is scheduled inline, and builds loops from what is left.
 #pragma once
 
 #include <string>
@@ -12,8 +12,8 @@
 
 namespace retrograde::ir {
 
-// A Func that gets loops of its own. Expressions are DAGs over the names that the user wrote: pure variables, reduction
-// variables, parameters.
+// A Func that gets loops of its own. Expressions are DAGs over the names that the user wrote: pure
+// variables, reduction variables, parameters.
 struct LoopedFunc {
   FuncPtr func;
   FuncSchedule schedule;
@@ -21,9 +21,11 @@ struct LoopedFunc {
   bool is_output = false;
 
   const std::string& name() const { return func->name; }
-  // A Func with updates whose schedule says inline: it has no single value to substitute, so it is computed in the
-  // innermost loop of every stage that uses it.
-  bool is_computed_innermost() const { return schedule.compute_level.kind == LoopLevel::Kind::Inlined; }
+  // A Func with updates whose schedule says inline: it has no single value to substitute, so it is
+  // computed in the innermost loop of every stage that uses it.
+  bool is_computed_innermost() const {
+    return schedule.compute_level.kind == LoopLevel::Kind::Inlined;
+  }
 };
 
 struct Program {

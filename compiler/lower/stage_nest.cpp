@@ -12,10 +12,10 @@ Interval Loop::range() const { return {min, simplify(min + extent - 1)}; }
 
 namespace {
 
-// How the value of a variable that was split or fused away follows from those that replaced it. One of these may have its
-// name: vectorize(x, 8) replaces x by an outer x and an inner loop.
+// How the value of a variable that was split or fused away follows from those that replaced it. One
+// of these may have its name: vectorize(x, 8) replaces x by an outer x and an inner loop.
 struct Fused {
-  std::string fused;   // the variable that took the place of outer and inner
+  std::string fused;  // the variable that took the place of outer and inner
   Range outer, inner;
   bool is_outer = false;  // which of the two this is about
 };
@@ -71,7 +71,9 @@ class NestBuilder {
     }
   }
 
-  void derive(const std::string& var, const Expr& value) { derived_.push_back({var, value, value, {}, {}}); }
+  void derive(const std::string& var, const Expr& value) {
+    derived_.push_back({var, value, value, {}, {}});
+  }
 
   TailStrategy tail_of(const Split& split, const Expr& extent) const {
     if (is_zero(simplify(extent % split.factor))) return TailStrategy::RoundUp;  // there is no tail
@@ -94,8 +96,11 @@ class NestBuilder {
         base = min(likely(base), old.extent - factor);
         return derive(split.old_var, base + inner + old.min);
       default:  // GuardWithIf and its predicated forms
-        derived_.push_back({split.old_var, base + inner + old.min, min(base + inner, old.extent - 1) + old.min,
-                            likely(base + inner < old.extent), {}});
+        derived_.push_back({split.old_var,
+                            base + inner + old.min,
+                            min(base + inner, old.extent - 1) + old.min,
+                            likely(base + inner < old.extent),
+                            {}});
     }
   }
 
@@ -104,35 +109,42 @@ class NestBuilder {
     const Range outer = ranges_.at(split.outer), inner = ranges_.at(split.inner);
     ranges_[split.old_var] = {0, simplify(outer.extent * inner.extent)};
     Expr fused = loop_variable(split.old_var);
-    Expr inner_value = fused % inner.extent + inner.min, outer_value = fused / inner.extent + outer.min;
-    derived_.push_back({split.inner, inner_value, inner_value, {}, Fused{split.old_var, outer, inner, false}});
-    derived_.push_back({split.outer, outer_value, outer_value, {}, Fused{split.old_var, outer, inner, true}});
+    Expr inner_value = fused % inner.extent + inner.min,
+         outer_value = fused / inner.extent + outer.min;
+    derived_.push_back(
+        {split.inner, inner_value, inner_value, {}, Fused{split.old_var, outer, inner, false}});
+    derived_.push_back(
+        {split.outer, outer_value, outer_value, {}, Fused{split.old_var, outer, inner, true}});
   }
 
-  // Interval arithmetic cannot divide by an extent that is a symbol. But a fused variable that stays inside its range
-  // recovers variables that stay inside theirs; one that a tail takes outside does so in proportion.
+  // Interval arithmetic cannot divide by an extent that is a symbol. But a fused variable that
+  // stays inside its range recovers variables that stay inside theirs; one that a tail takes
+  // outside does so in proportion.
   Expr within_fused_range(const Fused& from, const Expr& value, const Substitution& guarded) const {
     Scope<Interval> loops;
-    for (const Dim& dim : definition_.schedule.dims) loops.push(prefix_ + dim.var, loop_of(dim).range());
+    for (const Dim& dim : definition_.schedule.dims)
+      loops.push(prefix_ + dim.var, loop_of(dim).range());
     Interval fused = bounds_of(substitute(loop_variable(from.fused), guarded), loops);
     const Range& own = from.is_outer ? from.outer : from.inner;
     Expr first = own.min, last = own.min + own.extent - 1;
     if (from.is_outer && fused.is_bounded()) {
       if (!can_prove(fused.min >= 0)) first = own.min + fused.min / from.inner.extent;
-      if (!can_prove(fused.max < from.outer.extent * from.inner.extent)) last = own.min + fused.max / from.inner.extent;
+      if (!can_prove(fused.max < from.outer.extent * from.inner.extent))
+        last = own.min + fused.max / from.inner.extent;
     }
     return call_op(Op::promise_clamped, Int(32), {value, simplify(first), simplify(last)});
   }
 
-  // Later derivations replace variables that earlier ones introduced: resolve from the last to the first. At each step
-  // `values` holds what the variables stand for that exist after that split.
+  // Later derivations replace variables that earlier ones introduced: resolve from the last to the
+  // first. At each step `values` holds what the variables stand for that exist after that split.
   void resolve(StageNest& nest) {
     Substitution values, guarded;
     for (auto it = derived_.rbegin(); it != derived_.rend(); ++it) {
       if (it->guard.defined()) nest.guards.push_back(simplify(substitute(it->guard, values)));
       values[prefix_ + it->var] = simplify(substitute(it->value, values));
       Expr value = simplify(substitute(it->guarded_value, guarded));
-      guarded[prefix_ + it->var] = it->fused ? within_fused_range(*it->fused, value, guarded) : value;
+      guarded[prefix_ + it->var] =
+          it->fused ? within_fused_range(*it->fused, value, guarded) : value;
     }
     auto value_in = [&](const Substitution& map, const std::string& var) {
       auto it = map.find(prefix_ + var);

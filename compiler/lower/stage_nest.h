@@ -1,8 +1,10 @@
-// stage_nest.h -- the loops of one stage: its splits, fuses and reorders turned into loop variables.
+// stage_nest.h -- the loops of one stage: its splits, fuses and reorders turned into loop
+// variables.
 //
 //   f(x) = ...; f.split(x, xo, xi, 8)       for f.s0.xo in [0, ceil(extent / 8)):
 //                                      =>     for f.s0.xi in [0, 8):
-//                                               x == min(f.s0.xo * 8, extent - 8) + f.s0.xi + f.s0.x.min
+//                                               x == min(f.s0.xo * 8, extent - 8) + f.s0.xi +
+//                                               f.s0.x.min
 #pragma once
 
 #include <string>

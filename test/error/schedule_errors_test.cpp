@@ -17,7 +17,8 @@ std::string error_of(Action&& action) {
 }
 
 void expect_mentions(const std::string& message, std::initializer_list<const char*> phrases) {
-  for (const char* phrase : phrases) EXPECT_NE(message.find(phrase), std::string::npos) << "no '" << phrase << "' in: " << message;
+  for (const char* phrase : phrases)
+    EXPECT_NE(message.find(phrase), std::string::npos) << "no '" << phrase << "' in: " << message;
 }
 
 struct ScheduleErrors : testing::Test {
@@ -34,7 +35,8 @@ struct ScheduleErrors : testing::Test {
 
 TEST_F(ScheduleErrors, compute_level_that_is_no_loop) {
   f.compute_at(g, Var("nowhere"));
-  expect_mentions(message(), {"compute \"producer", "\"nowhere\"", "encloses every use", "\"x\", \"y\"", "compute_root()"});
+  expect_mentions(message(), {"compute \"producer", "\"nowhere\"", "encloses every use",
+                              "\"x\", \"y\"", "compute_root()"});
 }
 
 TEST_F(ScheduleErrors, compute_level_that_does_not_enclose_every_use) {
@@ -42,7 +44,10 @@ TEST_F(ScheduleErrors, compute_level_that_does_not_enclose_every_use) {
   h(x, y) = f(x, y) + g(x, y);
   f.compute_at(g, y);
   g.compute_root();
-  expect_mentions(error_of([&] { h.realize({8, 8}); }), {"encloses every use", "\"second_consumer"});
+  expect_mentions(error_of([&] {
+                    h.realize({8, 8});
+                  }),
+                  {"encloses every use", "\"second_consumer"});
 }
 
 TEST_F(ScheduleErrors, compute_level_in_an_inlined_func) {

@@ -35,8 +35,8 @@ struct FakeCompiler : Compiler {
     auto result = std::make_shared<FakePipeline>();
     for (const auto& p : ir::parameters_of(pipeline.outputs)) {
       using Kind = ir::LoweredArgument::Kind;
-      result->args.push_back(
-          {p->name, p->is_buffer ? Kind::InputBuffer : Kind::Scalar, p->type, p->dimensions, ir::SymbolRef(p)});
+      result->args.push_back({p->name, p->is_buffer ? Kind::InputBuffer : Kind::Scalar, p->type,
+                              p->dimensions, ir::SymbolRef(p)});
     }
     for (const auto& f : pipeline.outputs) {
       for (const auto& value : f->outputs) {

@@ -1,11 +1,11 @@
 // parse(print(x)) equals x; bad text is a UserError with its place.
 #include <gtest/gtest.h>
 
+#include "diagnostics/large_stack.h"
 #include "ir/build.h"
 #include "ir/equal.h"
 #include "ir/parse.h"
 #include "ir/print.h"
-#include "diagnostics/large_stack.h"
 #include "support/random_ir.h"
 
 namespace retrograde {

@@ -13,7 +13,8 @@ TEST(MakeNamesUnique, RenamesAllButTheFirstBinding) {
   Stmt s = ir::parse_stmt(
       "for (x, 0, 4) { out(x) = {x} } "
       "realize f(int32) auto [0, 4] { for (x, 0, 4) { f(x) = {x} } "
-      "realize f(int32) auto [0, 2] { f(1) = {3} out(0) = {f(1).0:int32} } out(1) = {f(2).0:int32} }");
+      "realize f(int32) auto [0, 2] { f(1) = {3} out(0) = {f(1).0:int32} } out(1) = {f(2).0:int32} "
+      "}");
   ir::UniqueNames unique = ir::make_names_unique(s);
   std::string text = ir::print(unique.stmt);
   EXPECT_NE(text.find("for (x.$1, 0, 4)"), std::string::npos) << text;

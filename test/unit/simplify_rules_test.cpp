@@ -1,6 +1,7 @@
 // Each rule of the simplifier once, as IR text before and after.
 #include <gtest/gtest.h>
 
+#include "diagnostics/large_stack.h"
 #include "ir/build.h"
 #include "ir/equal.h"
 #include "ir/parse.h"
@@ -8,7 +9,6 @@
 #include "ir/visit.h"
 #include "simplify/cse.h"
 #include "simplify/simplify.h"
-#include "diagnostics/large_stack.h"
 
 namespace retrograde {
 namespace {

@@ -22,8 +22,8 @@ Built float_arithmetic() {
   Buffer<T> a = noise<T>({61, 7}, 1), b = noise<T>({61, 7}, 2);
   Expr p = a(x, y), q = b(x, y);
   Func f("f");
-  f(x, y) = Tuple(p + q, p - q, p * q, p / q, min(p, q), max(p, q), -p, abs(p), p * q + p,
-                   p * p - q * q);
+  f(x, y) =
+      Tuple(p + q, p - q, p * q, p / q, min(p, q), max(p, q), -p, abs(p), p * q + p, p * p - q * q);
   return {{f}, {{61, 7}}, {}};
 }
 PIPELINE(arithmetic_float32) { return float_arithmetic<float>(); }
@@ -34,7 +34,7 @@ PIPELINE(arithmetic_float16) {
   Expr p = cast<float16_t>(a(x)), q = cast<float16_t>(b(x));
   Func f("f");
   f(x) = Tuple(p + q, p - q, p * q, p / q, min(p, q), cast<float>(p), p < q, cast<int32_t>(p),
-                select(p > q, p, q));
+               select(p > q, p, q));
   return {{f}, {{61}}, {}};
 }
 
@@ -52,7 +52,7 @@ PIPELINE(division_by_constants) {
   Buffer<int32_t> w = edges<int32_t>({256}, 5);
   Func f("f");
   f(x) = Tuple(a(x) / 3, a(x) % 3, a(x) / -5, a(x) % -5, b(x) / 7, b(x) % 7, b(x) / 641, w(x) / 2,
-                w(x) % 2, w(x) / -4, w(x) % -4, w(x) / 1000, w(x) % 10, 100 / w(x), 100 % w(x));
+               w(x) % 2, w(x) / -4, w(x) % -4, w(x) / 1000, w(x) % 10, 100 / w(x), 100 % w(x));
   return {{f}, {{256}}, {}};
 }
 
@@ -61,8 +61,8 @@ Built comparisons() {
   Buffer<T> a = edges<T>({61, 7}, 1), b = edges<T>({61, 7}, 2);
   Expr p = a(x, y), q = b(x, y);
   Func f("f");
-  f(x, y) = Tuple(p == q, p != q, p < q, p <= q, p > q, p >= q, (p < q) && (p != 0),
-                   (p < q) || !(q == 1), select(p < q, p, q));
+  f(x, y) = Tuple(p == q, p != q, p<q, p <= q, p> q, p >= q, (p < q) && (p != 0),
+                  (p < q) || !(q == 1), select(p < q, p, q));
   return {{f}, {{61, 7}}, {}};
 }
 PIPELINE(comparisons_int8) { return comparisons<int8_t>(); }
@@ -77,8 +77,8 @@ Built shifts() {
   Expr p = a(x, y), amount = cast<T>(x % bits), either = cast<int8_t>(x % bits - y % 3);
   Func f("f");
   f(x, y) = Tuple(p << amount, p >> amount, p << cast<uint8_t>(x % bits), p >> 3, p << 2,
-                   p << clamp(either, cast<int8_t>(1 - bits), cast<int8_t>(bits - 1)),
-                   p >> clamp(either, cast<int8_t>(1 - bits), cast<int8_t>(bits - 1)));
+                  p << clamp(either, cast<int8_t>(1 - bits), cast<int8_t>(bits - 1)),
+                  p >> clamp(either, cast<int8_t>(1 - bits), cast<int8_t>(bits - 1)));
   return {{f}, {{64, 8}}, {}};
 }
 PIPELINE(shifts_uint8) { return shifts<uint8_t>(); }
@@ -111,9 +111,9 @@ PIPELINE(promotion) {
   Buffer<double> f64 = noise<double>({64}, 8);
   Func f("f");
   f(x) = Tuple(u8(x) + i8(x), u8(x) + u16(x), i8(x) * u16(x), i16(x) - u8(x), u8(x) + 1,
-                i8(x) + 100, u16(x) * x, u32(x) - i8(x), i32(x) + u32(x), u8(x) * 0.5f,
-                i32(x) + f32(x), f32(x) * 2, f32(x) * f64(x), u8(x) < i8(x), 1 - u8(x),
-                select(x > 3, u8(x), 7), min(u8(x), i32(x)), u16(x) & 255, i8(x) / u8(x));
+               i8(x) + 100, u16(x) * x, u32(x) - i8(x), i32(x) + u32(x), u8(x) * 0.5f,
+               i32(x) + f32(x), f32(x) * 2, f32(x) * f64(x), u8(x) < i8(x), 1 - u8(x),
+               select(x > 3, u8(x), 7), min(u8(x), i32(x)), u16(x) & 255, i8(x) / u8(x));
   return {{f}, {{64}}, {}};
 }
 
@@ -123,9 +123,9 @@ PIPELINE(integer_casts) {
   Buffer<int64_t> w = noise<int64_t>({128}, 3);
   Func f("f");
   f(x) = Tuple(cast<int8_t>(a(x)), cast<uint8_t>(a(x)), cast<uint16_t>(a(x)), cast<int32_t>(a(x)),
-                cast<uint32_t>(a(x)), cast<uint64_t>(a(x)), cast<int8_t>(b(x)), cast<int16_t>(w(x)),
-                cast<uint8_t>(w(x)), cast<bool>(a(x) & 1), cast<int32_t>(a(x) > 0),
-                cast<float>(a(x)), cast<double>(w(x)), cast<float>(b(x)));
+               cast<uint32_t>(a(x)), cast<uint64_t>(a(x)), cast<int8_t>(b(x)), cast<int16_t>(w(x)),
+               cast<uint8_t>(w(x)), cast<bool>(a(x) & 1), cast<int32_t>(a(x) > 0),
+               cast<float>(a(x)), cast<double>(w(x)), cast<float>(b(x)));
   return {{f}, {{128}}, {}};
 }
 
@@ -134,8 +134,8 @@ PIPELINE(float_to_integer_casts) {
   Expr scaled = a(x) * 25.25f;
   Func f("f");
   f(x) = Tuple(cast<int8_t>(scaled), cast<uint8_t>(abs(scaled)), cast<int16_t>(a(x) * 1000.5f),
-                cast<int32_t>(a(x) * 1e6f), cast<uint32_t>(abs(a(x)) * 1e6f),
-                cast<int64_t>(a(x) * 1e9f), cast<double>(a(x)), cast<float>(cast<double>(a(x)) / 3));
+               cast<int32_t>(a(x) * 1e6f), cast<uint32_t>(abs(a(x)) * 1e6f),
+               cast<int64_t>(a(x) * 1e9f), cast<double>(a(x)), cast<float>(cast<double>(a(x)) / 3));
   return {{f}, {{128}}, {}};
 }
 
@@ -145,10 +145,10 @@ PIPELINE(saturating_casts) {
   Buffer<uint32_t> w = noise<uint32_t>({128}, 3);
   Func f("f");
   f(x) = Tuple(saturating_cast<uint8_t>(a(x)), saturating_cast<int8_t>(a(x)),
-                saturating_cast<uint16_t>(a(x)), saturating_cast<int32_t>(a(x)),
-                saturating_cast<uint8_t>(b(x) * 100.f), saturating_cast<int8_t>(b(x) * 100.f),
-                saturating_cast<int16_t>(b(x) * 1e5f), saturating_cast<int8_t>(w(x)),
-                saturating_cast<uint8_t>(w(x)), saturating_cast<uint64_t>(a(x)));
+               saturating_cast<uint16_t>(a(x)), saturating_cast<int32_t>(a(x)),
+               saturating_cast<uint8_t>(b(x) * 100.f), saturating_cast<int8_t>(b(x) * 100.f),
+               saturating_cast<int16_t>(b(x) * 1e5f), saturating_cast<int8_t>(w(x)),
+               saturating_cast<uint8_t>(w(x)), saturating_cast<uint64_t>(a(x)));
   return {{f}, {{128}}, {}};
 }
 
@@ -170,8 +170,7 @@ PIPELINE(lerp_integers) {
   Buffer<int8_t> m = edges<int8_t>({128}, 7), n = edges<int8_t>({128}, 8);
   Func f("f");
   f(x) = Tuple(lerp(a(x), b(x), w(x)), lerp(p(x), q(x), v(x)), lerp(p(x), q(x), w(x)),
-                lerp(m(x), n(x), w(x)),
-                lerp(a(x), b(x), cast<float>(w(x)) / 256.0f));
+               lerp(m(x), n(x), w(x)), lerp(a(x), b(x), cast<float>(w(x)) / 256.0f));
   return {{f}, {{128}}, {}};
 }
 
@@ -180,7 +179,7 @@ PIPELINE(lerp_floats) {
   Func f("f");
   Expr weight = x / 127.0f;
   f(x) = Tuple(lerp(a(x), b(x), weight), lerp(cast<double>(a(x)), cast<double>(b(x)), weight),
-                lerp(a(x), b(x), cast<uint8_t>(x)));
+               lerp(a(x), b(x), cast<uint8_t>(x)));
   return {{f}, {{128}}, {}};
 }
 
@@ -189,7 +188,7 @@ PIPELINE(reinterpretation) {
   Buffer<int16_t> b = edges<int16_t>({64}, 2);
   Func f("f");
   f(x) = Tuple(reinterpret<uint32_t>(a(x)), reinterpret<int32_t>(a(x)), reinterpret<uint16_t>(b(x)),
-                reinterpret<float>(reinterpret<uint32_t>(a(x)) ^ 0x00400000u));
+               reinterpret<float>(reinterpret<uint32_t>(a(x)) ^ 0x00400000u));
   return {{f}, {{64}}, {}};
 }
 
@@ -198,8 +197,8 @@ PIPELINE(clamps_and_selects) {
   Expr p = a(x);
   Func f("f");
   f(x) = Tuple(clamp(p, -100, 100), clamp(p, cast<int16_t>(x), cast<int16_t>(x + 50)),
-                min(p, 3, cast<int16_t>(x)), max(p, 3, cast<int16_t>(x)),
-                select(p < -1000, 1, p < 0, 2, p < 1000, 3, 4), mux(x % 4, {p, p + 1, p * 2, -p}),
-                likely(p) + 1, unsafe_promise_clamped(x, 0, 63));
+               min(p, 3, cast<int16_t>(x)), max(p, 3, cast<int16_t>(x)),
+               select(p < -1000, 1, p < 0, 2, p < 1000, 3, 4), mux(x % 4, {p, p + 1, p * 2, -p}),
+               likely(p) + 1, unsafe_promise_clamped(x, 0, 63));
   return {{f}, {{64}}, {}};
 }

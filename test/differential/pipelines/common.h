@@ -23,9 +23,9 @@ struct Registered {
 };
 
 // PIPELINE(name) { ... return Built{...}; }   `scheduled`: apply the schedule, too.
-#define PIPELINE(name)                                        \
-  static Built name(bool scheduled);                          \
-  static const Registered registered_##name(#name, name);     \
+#define PIPELINE(name)                                    \
+  static Built name(bool scheduled);                      \
+  static const Registered registered_##name(#name, name); \
   static Built name([[maybe_unused]] bool scheduled)
 
 inline uint32_t hash_of(uint32_t a, uint32_t b, uint32_t c, uint32_t seed) {
@@ -57,19 +57,32 @@ T noise_value(uint32_t h) {
 template <typename T>
 T edgy_value(uint32_t h) {
   if constexpr (std::is_integral_v<T> && sizeof(T) < 4 && !std::is_same_v<T, bool>) {
-    const T edges[] = {std::numeric_limits<T>::min(), std::numeric_limits<T>::max(), T(0), T(1),
-                       T(-1), T(2), T(-3), T(7)};
+    const T edges[] = {std::numeric_limits<T>::min(),
+                       std::numeric_limits<T>::max(),
+                       T(0),
+                       T(1),
+                       T(-1),
+                       T(2),
+                       T(-3),
+                       T(7)};
     if (h & 1) return edges[(h >> 1) & 7];
   } else if constexpr (std::is_integral_v<T> && !std::is_same_v<T, bool>) {
-    const T edges[] = {T(0), T(1), T(2), std::is_signed_v<T> ? T(-1) : T(3),
-                       std::is_signed_v<T> ? T(-7) : T(7), T(10), T(255), T(256)};
+    const T edges[] = {T(0),
+                       T(1),
+                       T(2),
+                       std::is_signed_v<T> ? T(-1) : T(3),
+                       std::is_signed_v<T> ? T(-7) : T(7),
+                       T(10),
+                       T(255),
+                       T(256)};
     if (h & 1) return edges[(h >> 1) & 7];
   }
   return noise_value<T>(h >> 4);
 }
 
 template <typename T>
-Buffer<T> noise(std::vector<int> extents, uint32_t seed = 1, T (*value)(uint32_t) = noise_value<T>) {
+Buffer<T> noise(std::vector<int> extents, uint32_t seed = 1,
+                T (*value)(uint32_t) = noise_value<T>) {
   Buffer<T> image(extents);
   const int w = extents[0];
   const int h = extents.size() > 1 ? extents[1] : 1;

@@ -52,11 +52,12 @@ PIPELINE(boundary_mirror_interior) { return boundary(4, scheduled); }
 
 PIPELINE(pyramid) {
   Buffer<float> in = noise<float>({64, 64}, 1);
-  Func base = BoundaryConditions::repeat_edge(in), down("down"), down2("down2"), up("up"), out("out");
-  down(x, y) = (base(2 * x - 1, y) + 3 * base(2 * x, y) + 3 * base(2 * x + 1, y) +
-                base(2 * x + 2, y)) / 8;
-  down2(x, y) = (down(x, 2 * y - 1) + 3 * down(x, 2 * y) + 3 * down(x, 2 * y + 1) +
-                 down(x, 2 * y + 2)) / 8;
+  Func base = BoundaryConditions::repeat_edge(in), down("down"), down2("down2"), up("up"),
+       out("out");
+  down(x, y) =
+      (base(2 * x - 1, y) + 3 * base(2 * x, y) + 3 * base(2 * x + 1, y) + base(2 * x + 2, y)) / 8;
+  down2(x, y) =
+      (down(x, 2 * y - 1) + 3 * down(x, 2 * y) + 3 * down(x, 2 * y + 1) + down(x, 2 * y + 2)) / 8;
   up(x, y) = 0.75f * down2(x / 2, y / 2) + 0.25f * down2(x / 2 - 1 + 2 * (x % 2), y / 2);
   out(x, y) = in(x, y) - up(x, y);
   if (scheduled) {
@@ -157,7 +158,8 @@ PIPELINE(demosaic) {
   Buffer<uint16_t> raw = noise<uint16_t>({48, 32}, 1);
   Func m = BoundaryConditions::mirror_interior(raw), g("g"), out("out");
   auto at = [&](int dx, int dy) { return cast<int32_t>(m(x + dx, y + dy)); };
-  g(x, y) = select((x + y) % 2 == 0, at(0, 0), (at(-1, 0) + at(1, 0) + at(0, -1) + at(0, 1) + 2) / 4);
+  g(x, y) =
+      select((x + y) % 2 == 0, at(0, 0), (at(-1, 0) + at(1, 0) + at(0, -1) + at(0, 1) + 2) / 4);
   Expr red = select(x % 2 == 1 && y % 2 == 0, at(0, 0), g(x, y) + (at(1, 0) - at(-1, 0)) / 2);
   Expr blue = select(x % 2 == 0 && y % 2 == 1, at(0, 0), g(x, y) + (at(0, 1) - at(0, -1)) / 2);
   out(x, y, c) = saturating_cast<uint16_t>(mux(c, {red, g(x, y), blue}));

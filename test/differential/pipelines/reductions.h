@@ -5,7 +5,7 @@ PIPELINE(inline_reductions) {
   RDom r(0, 5);
   Func f("f");
   f(x, y) = Tuple(sum(in(x + r, y)), maximum(in(x + r, y)), minimum(in(x + r, y)),
-                   product(in(x + r, y) % 5 + 1));
+                  product(in(x + r, y) % 5 + 1));
   return {{f}, {{36, 12}}, {}};
 }
 
@@ -140,8 +140,8 @@ PIPELINE(mandelbrot) {
   z(x, y, t) = Tuple(0.0f, 0.0f);
   Expr re = z(x, y, r - 1)[0], im = z(x, y, r - 1)[1];
   Expr small = re * re + im * im < 4.0f;
-  z(x, y, r) = Tuple(select(small, re * re - im * im + cr, re),
-                     select(small, 2.0f * re * im + ci, im));
+  z(x, y, r) =
+      Tuple(select(small, re * re - im * im + cr, re), select(small, 2.0f * re * im + ci, im));
   RDom q(0, 13);
   count(x, y) = argmin(z(x, y, q)[0] * z(x, y, q)[0] + z(x, y, q)[1] * z(x, y, q)[1] < 4.0f)[0];
   z.compute_root();
@@ -196,7 +196,8 @@ PIPELINE(game_of_life) {
   Func cells("cells"), next("next"), next2("next2");
   cells(x, y) = in(x, y) % 2;
   auto step = [&](Func& to, Func from) {
-    Func wrapped = BoundaryConditions::repeat_image(from, {{Expr(0), Expr(32)}, {Expr(0), Expr(32)}});
+    Func wrapped =
+        BoundaryConditions::repeat_image(from, {{Expr(0), Expr(32)}, {Expr(0), Expr(32)}});
     RDom n(-1, 3, -1, 3);
     Expr alive = sum(cast<uint8_t>(wrapped(x + n.x, y + n.y))) - wrapped(x, y);
     to(x, y) = cast<uint8_t>(alive == 3 || (alive == 2 && wrapped(x, y) == 1));

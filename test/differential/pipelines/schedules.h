@@ -8,7 +8,10 @@ static Func stencil_source(const Buffer<int32_t>& in, const char* name) {
 
 PIPELINE(tail_guard_with_if) {
   Func f = stencil_source(noise<int32_t>({40, 30}, 1), "f");
-  if (scheduled) f.split(x, xo, xi, 8, TailStrategy::GuardWithIf).vectorize(xi).unroll(y, 3, TailStrategy::GuardWithIf);
+  if (scheduled)
+    f.split(x, xo, xi, 8, TailStrategy::GuardWithIf)
+        .vectorize(xi)
+        .unroll(y, 3, TailStrategy::GuardWithIf);
   return {{f}, {{37, 29}}, {}};
 }
 
