@@ -205,5 +205,14 @@ TEST(Target, RoundTripsThroughText) {
   EXPECT_EQ(Target("arm-64-linux").natural_vector_size<int16_t>(), 8);
 }
 
+TEST(TypeLimits, AreExpressionsOfTheType) {
+  EXPECT_EQ(as_const_int(Int(8).min()), -128);
+  EXPECT_EQ(as_const_int(UInt(16).max()), 65535);
+  EXPECT_EQ(as_const_int(UInt(16).min()), 0);
+  EXPECT_EQ(as_const_float(Float(32).max()), std::numeric_limits<double>::infinity());
+  EXPECT_EQ(Float(16).min().type(), Float(16));
+  EXPECT_THROW(Handle().max(), UserError);
+}
+
 }  // namespace
 }  // namespace retrograde
