@@ -8,6 +8,7 @@
 #include "ir/visit.h"
 #include "lower/emit_definition.h"
 #include "lower/stage_nest.h"
+#include "lower/value_bounds.h"
 #include "retrograde_runtime.h"
 #include "simplify/simplify.h"
 
@@ -82,7 +83,7 @@ std::vector<Range> ranges_of(const Box& box) {
 
 class NestEmitter {
  public:
-  explicit NestEmitter(const Program& program) : program_(program) {
+  explicit NestEmitter(const Program& program) : program_(program), values_(value_bounds(program)) {
     for (size_t i = 0; i < program.funcs.size(); i++) note_site(static_cast<int>(i));
   }
 
@@ -102,6 +103,7 @@ class NestEmitter {
 
  private:
   const Program& program_;
+  const ValueBounds values_;
   std::vector<int> root_, innermost_;  // indices into program_.funcs, producers first
   std::map<std::pair<std::string, std::string>, std::vector<int>>
       at_;                               // (consumer, loop) -> Funcs computed there
@@ -293,7 +295,7 @@ class NestEmitter {
     StageNest nest = build_stage_nest(f, s, domain);
     Emitted code;
     code.stmt = emit_definition(f, s, nest);
-    code.uses = requirements_of(f, s, nest);
+    code.uses = requirements_of(f, s, nest, values_);
     code = emit_children(computed_innermost_in(f), std::move(code));
     for (const Loop& loop : nest.loops) {
       code = emit_children(children_at(f, s, loop), std::move(code));

@@ -37,12 +37,12 @@ Stmt emit_definition(const LoopedFunc& f, int stage, const StageNest& nest) {
   return is_const_true(inside) ? stmt : make_if(inside, stmt);
 }
 
-Requirements requirements_of(const LoopedFunc& f, int stage, const StageNest& nest) {
+Requirements requirements_of(const LoopedFunc& f, int stage, const StageNest& nest, const ValueBounds& values) {
   const Definition& definition = f.stages[stage];
   Scope<Interval> point;
   for (const auto& [var, value] : nest.guarded_coordinate) point.push(var, Interval::point(value));
   Requirements uses;
-  auto add = [&](const Expr& e) { merge_footprints(uses, footprints(e, point)); };
+  auto add = [&](const Expr& e) { merge_footprints(uses, footprints(e, point, &values)); };
   for (const Expr& value : definition.values) {
     // Where the predicate is false nothing is read.
     bool guarded = definition.predicate.defined() && !value.type().is_handle() && !is_undef(value);
@@ -51,7 +51,7 @@ Requirements requirements_of(const LoopedFunc& f, int stage, const StageNest& ne
   Footprint written;
   for (const Expr& arg : definition.args) {
     add(arg);
-    written.box.push_back(bounds_of(arg, point));
+    written.box.push_back(bounds_of(arg, point, &values));
   }
   if (definition.predicate.defined()) add(definition.predicate);
   written.symbol = SymbolRef(f.func);

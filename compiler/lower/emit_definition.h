@@ -15,6 +15,7 @@ namespace retrograde::ir {
 Stmt emit_definition(const LoopedFunc& f, int stage, const StageNest& nest);
 
 // Boxes that one point of the loops reads of other Funcs, images and (in updates) of f, and that it writes of f.
-Requirements requirements_of(const LoopedFunc& f, int stage, const StageNest& nest);
+// `values`: between what values Funcs lie, for those that are coordinates here.
+Requirements requirements_of(const LoopedFunc& f, int stage, const StageNest& nest, const ValueBounds& values);
 
 }  // namespace retrograde::ir
