@@ -57,7 +57,16 @@ Interval BoundsEngine::compute(const Expr& e) {
   if (!has_linear_form(e.type())) return atom_bounds(e);
   LinearForm form = with_remainders(linear_form(e));
   bool is_atom = form.terms.size() == 1 && form.terms[0].atom.same_as(e);
-  return is_atom ? atom_bounds(e) : sum_bounds(form);
+  return is_atom ? bounds_of_atom(e) : sum_bounds(form);
+}
+
+// What linear_form called an atom is never taken apart again, so the recursion always descends.
+Interval BoundsEngine::bounds_of_atom(const Expr& atom) {
+  auto it = atoms_.find(atom.get());
+  if (it != atoms_.end()) return it->second.value;
+  Interval result = atom_bounds(atom);
+  atoms_.emplace(atom.get(), Entry{atom, result});
+  return result;
 }
 
 Interval BoundsEngine::ramp_bounds(const Ramp& ramp) {
@@ -74,7 +83,7 @@ Interval BoundsEngine::sum_bounds(const LinearForm& form) {
   std::vector<std::pair<Interval, int64_t>> varying;
   for (const LinearTerm& term : form.terms) {
     if (varies(term.atom)) {
-      varying.emplace_back(bounds(term.atom), term.coefficient);
+      varying.emplace_back(bounds_of_atom(term.atom), term.coefficient);
     } else {
       fixed = plus(fixed, linear_form(term.atom), term.coefficient);
     }

@@ -48,6 +48,7 @@ class BoundsEngine {
   Interval compute(const Expr& e);
   Interval sum_bounds(const LinearForm& form);
   LinearForm with_remainders(LinearForm form);
+  Interval bounds_of_atom(const Expr& atom);
   Interval atom_bounds(const Expr& e);
   Interval cast_bounds(Type type, const Expr& value);
   Interval ramp_bounds(const Ramp& ramp);
@@ -69,6 +70,7 @@ class BoundsEngine {
     Interval value;
   };
   std::unordered_map<const ExprNode*, Entry> memo_;
+  std::unordered_map<const ExprNode*, Entry> atoms_;  // the same for what is no sum
   struct Flag {
     Expr key;
     bool value;

@@ -141,6 +141,8 @@ class Collector {
     Type from = cast.value.type();
     if (!has_linear_form(from) || from.bits() > e.type().bits()) return atom_form(e);
     LinearForm inner = form(cast.value), sum = constant_form(e.type(), inner.constant);
+    bool is_atom = inner.terms.size() == 1 && inner.terms[0].atom.same_as(cast.value);
+    if (is_atom) return atom_form(e);
     for (const LinearTerm& term : inner.terms) {
       sum = plus(sum, atom_form(cast_to(e.type(), term.atom)), term.coefficient);
     }

@@ -96,6 +96,13 @@ TEST_F(IntervalTest, NarrowTypesHaveTheirRange) {
   EXPECT_EQ(bounds(call_op(Op::shift_right, {cast(Int(32), a), Expr(4)})), "[0, 15]");
 }
 
+TEST_F(IntervalTest, WideningIsFollowedIntoTheNarrowerSum) {
+  EXPECT_EQ(bounds(cast_to(Int(64), i)), "[(int64)0, (int64)7]");
+  EXPECT_EQ(bounds(cast_to(Int(64), i * 2 + 1)), "[(int64)1, (int64)15]");
+  Expr widened = cast_to(Int(64), x);
+  EXPECT_TRUE(canonical(widened).same_as(widened));
+}
+
 TEST_F(IntervalTest, MinAndMaxOfShiftedTermsAreDecided) {
   EXPECT_EQ(bounds(min(x + 1, x + 3)), interval(xmin + 1, xmax + 1));
   EXPECT_EQ(print(hull({xmin - 1, xmax - 1}, {xmin + 1, xmax + 1}).min), print(xmin - 1));
