@@ -17,9 +17,8 @@ namespace retrograde::ir {
 Box buffer_box(const std::string& buffer, int dimensions) {
   Box box;
   for (int d = 0; d < dimensions; d++) {
-    std::string suffix = "." + std::to_string(d);
-    Expr min = variable(buffer + ".min" + suffix);
-    box.push_back({min, min + variable(buffer + ".extent" + suffix) - 1});
+    Expr min = variable(text(buffer, ".min.", d));
+    box.push_back({min, min + variable(text(buffer, ".extent.", d)) - 1});
   }
   return box;
 }
