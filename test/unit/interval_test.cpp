@@ -97,8 +97,8 @@ TEST_F(IntervalTest, NarrowTypesHaveTheirRange) {
 }
 
 TEST_F(IntervalTest, WideningIsFollowedIntoTheNarrowerSum) {
-  EXPECT_EQ(bounds(cast_to(Int(64), i)), "[(int64)0, (int64)7]");
-  EXPECT_EQ(bounds(cast_to(Int(64), i * 2 + 1)), "[(int64)1, (int64)15]");
+  EXPECT_EQ(bounds(cast_to(Int(64), i)), "[0_i64, 7_i64]");
+  EXPECT_EQ(bounds(cast_to(Int(64), i * 2 + 1)), "[1_i64, 15_i64]");
   Expr widened = cast_to(Int(64), x);
   EXPECT_TRUE(canonical(widened).same_as(widened));
 }
