@@ -43,19 +43,15 @@ Requirements requirements_of(const LoopedFunc& f, int stage, const StageNest& ne
   for (const auto& [var, value] : nest.guarded_coordinate) point.push(var, Interval::point(value));
   Requirements uses;
   auto add = [&](const Expr& e) { merge_footprints(uses, footprints(e, point, &values)); };
-  for (const Expr& value : definition.values) {
-    // Where the predicate is false nothing is read.
-    bool guarded = definition.predicate.defined() && !value.type().is_handle() && !is_undef(value);
-    add(guarded ? call_op(Op::if_then_else, value.type(), {definition.predicate, value, make_zero(value.type())}) : value);
-  }
-  Footprint written;
-  for (const Expr& arg : definition.args) {
-    add(arg);
-    written.box.push_back(bounds_of(arg, point, &values));
-  }
+  // Where the predicate is false nothing is read or written.
+  auto add_guarded = [&](const Expr& e) {
+    bool guarded = definition.predicate.defined() && !e.type().is_handle() && !is_undef(e);
+    add(guarded ? call_op(Op::if_then_else, e.type(), {definition.predicate, e, make_zero(e.type())}) : e);
+  };
+  for (const Expr& value : definition.values) add_guarded(value);
+  // What is written is a box like what is read; the type is of no matter.
+  add_guarded(call_func(f.name(), Int(32), definition.args, 0, SymbolRef(f.func)));
   if (definition.predicate.defined()) add(definition.predicate);
-  written.symbol = SymbolRef(f.func);
-  merge_footprints(uses, {{f.name(), written}});
   return uses;
 }
 

@@ -6,6 +6,7 @@
 #include "autodiff/default_schedule.h"
 #include "diagnostics/error.h"
 #include "ir/visit.h"
+#include "lower/resolve_undef.h"
 
 namespace retrograde::ir {
 
@@ -79,6 +80,7 @@ Program inline_functions(const std::vector<FuncPtr>& outputs) {
     }
     program.funcs.push_back({f, schedule, std::move(stages), is_output});
   }
+  resolve_undef(program);
   return program;
 }
 

@@ -19,6 +19,8 @@ std::unordered_set<std::string> coordinates_of(const LoopedFunc& f) {
 Interval bounds_of_value(const LoopedFunc& f, size_t value,
                          const std::unordered_set<std::string>& coordinates,
                          const ValueBounds& known) {
+  // What the pure definition stores only in some places may hold anything elsewhere.
+  if (f.stages[0].predicate.defined()) return Interval::everything();
   Scope<Interval> anywhere;
   for (const std::string& name : coordinates) anywhere.push(name, Interval::everything());
   Interval result = bounds_of(f.stages[0].values[value], anywhere, &known);
