@@ -271,8 +271,7 @@ void BoundsEngine::narrow(const Expr& condition, bool is_true, Narrowed& narrowe
     if (call->is_op(Op::likely) || call->is_op(Op::likely_if_innermost))
       narrow(call->args[0], is_true, narrowed);
     bool is_lazy_and = call->is_op(Op::if_then_else) && is_const_false(call->args[2]);
-    for (int i = 0; is_lazy_and && is_true && i < 2; ++i)
-      narrow(call->args[i], true, narrowed);
+    for (int i = 0; is_lazy_and && is_true && i < 2; ++i) narrow(call->args[i], true, narrowed);
     return;
   }
   const Binary* op = condition.as<Binary>();

@@ -116,6 +116,22 @@ class Synthesis {
     return target;
   }
 
+  // Where an update chooses undef the old value stays, and so must its adjoint: that needs the
+  // choice as a predicate, which undef hides inside a value.
+  static void reject_undef(const FuncContents& f, int stage) {
+    for (const Expr& value : f.stage(stage).values) {
+      walk(value, [&](const Expr& e) {
+        const Call* call = e.as<Call>();
+        if (!call || !call->is_op(Op::undef)) return true;
+        unsupported(text("differentiate update ", stage - 1, " of ", quoted(f.name)),
+                    "an update whose value is undef in places has no derivative rule yet",
+                    "its value contains undef, so it keeps what was stored there before",
+                    "Say where it stores with RDom::where, or select the old value instead of "
+                    "undef");
+      });
+    }
+  }
+
   void differentiate(const FuncPtr& f) {
     auto found = pending_.find(f.get());
     if (found == pending_.end() || found->second.empty()) return;
@@ -125,6 +141,7 @@ class Synthesis {
     record(*f, f->stage_count() - 1, adjoint);
     register_func(adjoint, f->name);
     for (int s = f->stage_count() - 1; s >= 1; --s) {
+      reject_undef(*f, s);
       UpdateAdjoint update = differentiate_update(
           {f, s, regions_, target, adjoint, extendable, options_.store_overwritten,
            [&](const Expr& leaf) { return is_wanted(leaf); }});

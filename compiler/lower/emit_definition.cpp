@@ -28,8 +28,10 @@ Stmt emit_definition(const LoopedFunc& f, int stage, const StageNest& nest) {
 
   SharedLets shared = introduce_lets(exprs);
   auto args_begin = shared.values.begin() + definition.values.size();
-  Stmt stmt = make_provide(f.name(), {shared.values.begin(), args_begin}, {args_begin, shared.values.end()});
-  for (auto it = shared.lets.rbegin(); it != shared.lets.rend(); ++it) stmt = make_let(it->first, it->second, stmt);
+  Stmt stmt = make_provide(f.name(), {shared.values.begin(), args_begin},
+                           {args_begin, shared.values.end()});
+  for (auto it = shared.lets.rbegin(); it != shared.lets.rend(); ++it)
+    stmt = make_let(it->first, it->second, stmt);
 
   if (definition.predicate.defined())
     stmt = make_if(introduce_lets(substitute(definition.predicate, nest.coordinate)), stmt);
@@ -37,7 +39,8 @@ Stmt emit_definition(const LoopedFunc& f, int stage, const StageNest& nest) {
   return is_const_true(inside) ? stmt : make_if(inside, stmt);
 }
 
-Requirements requirements_of(const LoopedFunc& f, int stage, const StageNest& nest, const ValueBounds& values) {
+Requirements requirements_of(const LoopedFunc& f, int stage, const StageNest& nest,
+                             const ValueBounds& values) {
   const Definition& definition = f.stages[stage];
   Scope<Interval> point;
   for (const auto& [var, value] : nest.guarded_coordinate) point.push(var, Interval::point(value));
@@ -46,7 +49,9 @@ Requirements requirements_of(const LoopedFunc& f, int stage, const StageNest& ne
   // Where the predicate is false nothing is read or written.
   auto add_guarded = [&](const Expr& e) {
     bool guarded = definition.predicate.defined() && !e.type().is_handle() && !is_undef(e);
-    add(guarded ? call_op(Op::if_then_else, e.type(), {definition.predicate, e, make_zero(e.type())}) : e);
+    add(guarded
+            ? call_op(Op::if_then_else, e.type(), {definition.predicate, e, make_zero(e.type())})
+            : e);
   };
   for (const Expr& value : definition.values) add_guarded(value);
   // What is written is a box like what is read; the type is of no matter.

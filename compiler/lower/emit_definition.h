@@ -3,7 +3,8 @@
 //   f(x) = select(p, a * a, 0), a = g(x) + 1      let t = g(f.s0.x) + 1
 //                                            =>   f(f.s0.x) = select(p, t * t, 0)
 //
-// Shared sub-expressions become lets, so that from here on expressions are trees whose size is that of the DAG.
+// Shared sub-expressions become lets, so that from here on expressions are trees whose size is that
+// of the DAG.
 #pragma once
 
 #include "lower/build_loop_nests.h"
@@ -14,8 +15,9 @@ namespace retrograde::ir {
 // if (guards && predicate) { lets; Provide }
 Stmt emit_definition(const LoopedFunc& f, int stage, const StageNest& nest);
 
-// Boxes that one point of the loops reads of other Funcs, images and (in updates) of f, and that it writes of f.
-// `values`: between what values Funcs lie, for those that are coordinates here.
-Requirements requirements_of(const LoopedFunc& f, int stage, const StageNest& nest, const ValueBounds& values);
+// Boxes that one point of the loops reads of other Funcs, images and (in updates) of f, and that it
+// writes of f. `values`: between what values Funcs lie, for those that are coordinates here.
+Requirements requirements_of(const LoopedFunc& f, int stage, const StageNest& nest,
+                             const ValueBounds& values);
 
 }  // namespace retrograde::ir

@@ -83,6 +83,15 @@ TEST_F(Gradients, PlaceThatDependsOnTheFuncItself) {
   expect_error<UserError>([&] { propagate_adjoints(loss); }, {"where an update writes"});
 }
 
+TEST_F(Gradients, UpdateThatKeepsOldValuesByUndef) {
+  f(x) = a(x);
+  RDom r(0, 8);
+  f(r) = select(r > 3, 2.0f * a(r), undef<float>());
+  sum_up();
+  expect_error<Unsupported>([&] { propagate_adjoints(loss); },
+                            {"update 0 of \"f", "undef", "RDom::where"});
+}
+
 TEST_F(Gradients, IntegerOutput) {
   f(x) = cast<int>(a(x));
   expect_error<UserError>([&] { propagate_adjoints(f); }, {"\"f", "int32", "float"});

@@ -133,9 +133,10 @@ PIPELINE(float_to_integer_casts) {
   Buffer<float> a = noise<float>({128}, 1);
   Expr scaled = a(x) * 25.25f;
   Func f("f");
-  f(x) = Tuple(cast<int8_t>(scaled), cast<uint8_t>(abs(scaled)), cast<int16_t>(a(x) * 1000.5f),
-               cast<int32_t>(a(x) * 1e6f), cast<uint32_t>(abs(a(x)) * 1e6f),
-               cast<int64_t>(a(x) * 1e9f), cast<double>(a(x)), cast<float>(cast<double>(a(x)) / 3));
+  f(x) =
+      Tuple(cast<int8_t>(scaled), cast<uint8_t>(abs(scaled)), cast<int16_t>(a(x) * 1000.5f),
+            cast<int32_t>(a(x) * 0x1p20f), cast<uint32_t>(abs(a(x)) * 0x1p20f),
+            cast<int64_t>(a(x) * 0x1p30f), cast<double>(a(x)), cast<float>(cast<double>(a(x)) / 3));
   return {{f}, {{128}}, {}};
 }
 
