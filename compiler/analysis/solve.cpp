@@ -34,7 +34,7 @@ LinearForm with_replaced(const LinearForm& form, const LinearTerm& term, const E
 class Solver {
  public:
   Solver(const std::string& variable, const Scope<Interval>& inner)
-      : variable_(variable), inner_(inner), engine_(inner, nullptr) {}
+      : variable_(variable), engine_(inner, nullptr) {}
 
   std::optional<Solution> solve(const Expr& condition, bool is_true) {
     if (is_const_true(condition)) return is_true ? anywhere() : std::nullopt;
@@ -190,7 +190,6 @@ class Solver {
   }
 
   const std::string& variable_;
-  const Scope<Interval>& inner_;
   BoundsEngine engine_;
 };
 
