@@ -321,7 +321,7 @@ FunctionGenerator::Storage FunctionGenerator::allocate_on_heap(const Allocate& s
     const MemoScope scope(*this, false);
     elements = b_.CreateIntCast(value(s.elements), int64, s.elements.type().is_int());
   }
-  Value* element_bytes = b_.getInt64(static_cast<uint64_t>(s.type.bytes() * s.type.lanes()));
+  Value* element_bytes = b_.getInt64(static_cast<uint64_t>(s.type.bytes()) * s.type.lanes());
   Value* block = b_.CreateCall(allocate, {frame_.context, elements, element_bytes}, s.name);
   fail_unless(b_.CreateICmpNE(block, null), [&] {
     const auto error = runtime_function("retrograde_allocation_error", b_.getInt32Ty(),

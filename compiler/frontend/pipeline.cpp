@@ -246,7 +246,7 @@ std::vector<Buffer<>> Pipeline::make_outputs(const std::vector<int32_t>& sizes,
       ir::check_sizes(to_halide_type(type), sizes, asked);
       Runtime::Buffer<> buffer(to_halide_type(type), nullptr, sizes);
       if (with_memory) ir::allocate_host(buffer);
-      result.push_back(Buffer<>(std::move(buffer)));
+      result.push_back(Buffer<>(buffer));
     }
   }
   return result;
@@ -407,7 +407,7 @@ void Pipeline::infer(const std::vector<halide_buffer_t*>& outputs, const Target&
     for (int d = 0; d < buffer.dimensions(); d++) extents.push_back(buffer.dim(d).extent());
     ir::check_sizes(buffer.type(), extents, asked);
     ir::allocate_host(buffer);
-    ImageParam(parameter).set(Buffer<>(std::move(buffer)));
+    ImageParam(parameter).set(Buffer<>(buffer));
   }
 }
 
