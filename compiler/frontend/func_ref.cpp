@@ -115,6 +115,7 @@ Stage FuncRef::update(const std::vector<Expr>& values, int initial, Combine comb
 
 Stage FuncRef::operator=(const Expr& value) { return define({value}); }
 Stage FuncRef::operator=(const Tuple& values) { return define(values.as_vector()); }
+// NOLINTNEXTLINE(bugprone-unhandled-self-assignment): a definition, not an assignment
 Stage FuncRef::operator=(const FuncRef& value) { return define(Tuple(value).as_vector()); }
 
 #define RETROGRADE_DEFINE_UPDATE(op, initial, combine)                                            \
@@ -159,8 +160,7 @@ size_t FuncRef::size() const {
   return func_->types.size();
 }
 
-FuncTupleElementRef::FuncTupleElementRef(FuncRef ref, int index)
-    : ref_(std::move(ref)), index_(index) {
+FuncTupleElementRef::FuncTupleElementRef(FuncRef ref, int index) : ref_(ref), index_(index) {
   ref_.element(index);  // checks that the Func is defined and has this value
 }
 

@@ -26,7 +26,7 @@ const std::string& checked_name(const std::string& name) {
                "the name of a Var is an identifier: letters, digits, _ and $", "",
                "Choose a name such as \"x\" or \"x_outer\"");
   }
-  return name;
+  return name;  // NOLINT(bugprone-return-const-ref-from-parameter): used within the full expression
 }
 
 }  // namespace

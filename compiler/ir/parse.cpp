@@ -328,7 +328,8 @@ Expr Parser::load(const std::string& name) {
 }
 
 Expr Parser::keyword_call(const Token& keyword) {
-  const Token at = keyword;
+  // A copy: the current token, which `keyword` may refer to, moves on.
+  const Token at = keyword;  // NOLINT(performance-unnecessary-copy-initialization)
   Type type_name;
   if (read_type(at.text, type_name)) {
     take();
