@@ -206,7 +206,8 @@ OpTable make_op_table() {
   t.emplace(Op::random, constant("depends on its seeds only"));
   for (Op op : {Op::buffer_host, Op::buffer_min, Op::buffer_extent, Op::buffer_stride,
                 Op::buffer_dimensions, Op::buffer_type, Op::buffer_is_null, Op::buffer_is_query,
-                Op::buffer_set_bounds, Op::address_of, Op::if_then_else, Op::error}) {
+                Op::buffer_set_bounds, Op::address_of, Op::if_then_else, Op::prefetch,
+                Op::runtime_call, Op::error}) {
     t.emplace(op, no_rule(lowering));
   }
   return t;

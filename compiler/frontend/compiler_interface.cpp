@@ -5,10 +5,17 @@
 
 namespace retrograde {
 
-// Weak: compiler/jit's definition wins wherever it is linked in.
-__attribute__((weak)) Compiler& default_compiler() {
+[[noreturn]] static void no_compiler() {
   unsupported("compile a pipeline", "this program must be linked with the compiler",
               "it is linked with the front end alone", "Link libretrograde");
+}
+
+// Weak: the definitions of compiler/jit and compiler/aot win wherever they are linked in.
+__attribute__((weak)) Compiler& default_compiler() {
+  no_compiler();
+}
+__attribute__((weak)) ModuleCompiler& module_compiler() {
+  no_compiler();
 }
 
 }  // namespace retrograde

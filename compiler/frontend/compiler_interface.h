@@ -5,6 +5,7 @@
 #pragma once
 
 #include <functional>
+#include <map>
 #include <memory>
 #include <string>
 #include <vector>
@@ -51,5 +52,32 @@ class Compiler {
 };
 
 Compiler& default_compiler();  // defined by compiler/jit
+
+class Module;
+enum class OutputFileType;
+
+// Ahead of time: everything below a Module. Compilations may run on several threads at once.
+class ModuleCompiler {
+ public:
+  virtual ~ModuleCompiler() = default;
+  // `inputs` in the caller's order; the outputs are appended as the last arguments.
+  virtual ir::LoweredFunction lower(const PipelineSpec& pipeline,
+                                    const std::vector<ir::LoweredArgument>& inputs,
+                                    const Target& target) = 0;
+  virtual std::string loop_nest(const PipelineSpec& pipeline) = 0;
+  virtual std::vector<uint8_t> object(const Module& module) = 0;
+  virtual void write(const Module& module,
+                     const std::map<OutputFileType, std::string>& output_files) = 0;
+  // modules[i] is for targets[i] and its function has a name of its own; the wrapper has
+  // `function_name`. `suffixes`: one for each target.
+  virtual void write_multitarget(const std::string& function_name,
+                                 const std::vector<Module>& modules,
+                                 const std::vector<std::string>& suffixes,
+                                 const std::map<OutputFileType, std::string>& output_files) = 0;
+  virtual void write_runtime(const std::map<OutputFileType, std::string>& output_files,
+                             const Target& target) = 0;
+};
+
+ModuleCompiler& module_compiler();  // defined by compiler/aot
 
 }  // namespace retrograde

@@ -307,7 +307,7 @@ void Func::add_bound(std::vector<ir::Bound>& bounds, const std::string& asked, c
   if (constant && *constant < 0)
     user_error(asked, "an extent is not negative", text("it is ", *constant));
   std::erase_if(bounds, [&](const ir::Bound& bound) { return bound.var == var.name(); });
-  bounds.push_back({var.name(), std::move(min), std::move(extent)});
+  bounds.push_back({var.name(), std::move(min), std::move(extent), {}, {}});
   func_->version++;
 }
 

@@ -92,6 +92,56 @@ class Func {
   OutputImageParam output_buffer() const;
   std::vector<OutputImageParam> output_buffers() const;
 
+  // ---- ahead of time: see pipeline.h. An empty function name stands for the Func's own ----
+  Module compile_to_module(const std::vector<Argument>& args, const std::string& function_name = "",
+                           const Target& target = get_target_from_environment());
+  void compile_to(const std::map<OutputFileType, std::string>& output_files,
+                  const std::vector<Argument>& args, const std::string& function_name,
+                  const Target& target = get_target_from_environment());
+  void compile_to_object(const std::string& filename, const std::vector<Argument>& args,
+                         const std::string& function_name,
+                         const Target& target = get_target_from_environment());
+  void compile_to_object(const std::string& filename, const std::vector<Argument>& args,
+                         const Target& target = get_target_from_environment());
+  void compile_to_bitcode(const std::string& filename, const std::vector<Argument>& args,
+                          const std::string& function_name,
+                          const Target& target = get_target_from_environment());
+  void compile_to_bitcode(const std::string& filename, const std::vector<Argument>& args,
+                          const Target& target = get_target_from_environment());
+  void compile_to_llvm_assembly(const std::string& filename, const std::vector<Argument>& args,
+                                const std::string& function_name,
+                                const Target& target = get_target_from_environment());
+  void compile_to_llvm_assembly(const std::string& filename, const std::vector<Argument>& args,
+                                const Target& target = get_target_from_environment());
+  void compile_to_assembly(const std::string& filename, const std::vector<Argument>& args,
+                           const std::string& function_name,
+                           const Target& target = get_target_from_environment());
+  void compile_to_assembly(const std::string& filename, const std::vector<Argument>& args,
+                           const Target& target = get_target_from_environment());
+  void compile_to_header(const std::string& filename, const std::vector<Argument>& args,
+                         const std::string& function_name = "",
+                         const Target& target = get_target_from_environment());
+  void compile_to_c(const std::string& filename, const std::vector<Argument>& args,
+                    const std::string& function_name = "",
+                    const Target& target = get_target_from_environment());
+  void compile_to_lowered_stmt(const std::string& filename, const std::vector<Argument>& args,
+                               StmtOutputFormat format = Text,
+                               const Target& target = get_target_from_environment());
+  void compile_to_file(const std::string& filename_prefix, const std::vector<Argument>& args,
+                       const std::string& function_name = "",
+                       const Target& target = get_target_from_environment());
+  void compile_to_static_library(const std::string& filename_prefix,
+                                 const std::vector<Argument>& args,
+                                 const std::string& function_name = "",
+                                 const Target& target = get_target_from_environment());
+  void compile_to_multitarget_static_library(const std::string& filename_prefix,
+                                             const std::vector<Argument>& args,
+                                             const std::vector<Target>& targets);
+  void compile_to_multitarget_object_files(const std::string& filename_prefix,
+                                           const std::vector<Argument>& args,
+                                           const std::vector<Target>& targets,
+                                           const std::vector<std::string>& suffixes);
+
   // ---- where it is computed and stored ----
   // Substituted into its users (the default). Of a Func with updates: computed in the innermost
   // loop of each user.

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <functional>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -27,6 +28,12 @@ enum class TailStrategy : uint8_t {
   Auto,  // ShiftInwards for pure definitions, GuardWithIf for updates; RoundUp inside storage we
          // size ourselves
 };
+
+// How two loops line up that compute_with runs as one, when their ranges differ.
+enum class LoopAlignStrategy : uint8_t { AlignStart, AlignEnd, NoAlign, Auto };
+
+// What prefetch does with the part of its region that lies outside of the data.
+enum class PrefetchBoundStrategy : uint8_t { Clamp, GuardWithIf, NonFaulting };
 
 namespace ir {
 
@@ -62,12 +69,6 @@ struct Dim {
       false;  // derives from a reduction variable: order matters unless proven otherwise
 };
 
-struct StageSchedule {
-  std::vector<Split> splits;  // in the order given
-  std::vector<Dim> dims;      // loops innermost first
-  bool touched = false;       // a directive was given for this stage
-};
-
 // Where a Func is computed or stored.
 struct LoopLevel {
   enum class Kind : uint8_t { Inlined, Root, At };
@@ -77,17 +78,68 @@ struct LoopLevel {
   int stage = -1;    // At: which of its stages; -1: any
 };
 
-struct Bound {  // a user's promise (bound) or guess (set_estimate) about one pure dimension
+// Fetch into the cache what iteration `from + offset` will read of `name`, at each iteration of
+// `at`.
+struct PrefetchDirective {
+  std::string name;  // of a Func or an image
+  SymbolRef symbol;  // its contents
+  std::string at, from;
+  Expr offset;
+  PrefetchBoundStrategy strategy = PrefetchBoundStrategy::GuardWithIf;
+};
+
+struct StageSchedule {
+  std::vector<Split> splits;  // in the order given
+  std::vector<Dim> dims;      // loops innermost first
+  bool touched = false;       // a directive was given for this stage
+  bool atomic = false;        // updates of one element may come from several iterations at once
+  bool override_associativity = false;  // atomic(true): the user vouches for it
+  bool allow_races = false;
+  std::vector<PrefetchDirective> prefetches;
+  // compute_with: this stage runs inside the loops of another Func's stage, down to this loop.
+  LoopLevel fuse_level;  // kind At, or Inlined when there is none
+  std::map<std::string, LoopAlignStrategy> fuse_alignment;  // by loop
+  // Func::specialize: the first whose condition holds replaces this schedule; tried in order. A
+  // specialization starts as a copy of the schedule at that time and may be specialized itself.
+  std::vector<StageSchedule> specializations;
+  Expr condition;       // of a specialization: over parameters only; undefined in specialize_fail
+  std::string failure;  // specialize_fail: what the call reports when it gets here; empty otherwise
+};
+
+// What is known or wanted of one pure dimension: a user's promise (bound), guess (set_estimate),
+// or an alignment.
+struct Bound {
   std::string var;
-  Expr min, extent;  // min may be undefined
+  Expr min, extent;         // may be undefined
+  Expr modulus, remainder;  // align_bounds: min % modulus == remainder; extent a multiple too
+};
+
+// Layout of one dimension of a Func's storage.
+struct StorageRule {
+  std::string var;
+  Expr alignment;  // align_storage: the extent grows to a multiple; undefined: none
+  Expr bound;      // bound_storage: at least what is needed at run time, checked; undefined: none
+  Expr fold;       // fold_storage: coordinates modulo this; undefined: the compiler's choice
+  bool fold_forward = true;  // the coordinate grows from one iteration to the next
 };
 
 struct FuncSchedule {
   LoopLevel compute_level, store_level;
+  LoopLevel hoist_level;  // hoist_storage: where memory is allocated; Inlined: at the store level
   std::vector<Bound> bounds, estimates;
-  std::vector<std::string> storage_dims;  // innermost first; the pure args unless reordered
+  std::vector<std::string> storage_dims;   // innermost first; the pure args unless reordered
+  std::vector<StorageRule> storage_rules;  // of dimensions that have any
   MemoryType memory = MemoryType::Auto;
+  bool memoized = false;
+  Expr eviction_key;  // memoize: undefined when none
+  bool async = false;
   bool touched = false;  // compute_*/store_* was called
+};
+
+// Events that generated code reports.
+struct TraceSchedule {
+  bool loads = false, stores = false, realizations = false;
+  std::vector<std::string> tags;
 };
 
 struct SourceLocation {
@@ -126,6 +178,23 @@ struct ParameterContents : Symbol {
   halide_buffer_t* buffer = nullptr;   // currently bound; null when unset
   bool is_literal = false;             // a Buffer named in the program, not an ImageParam
   uint64_t version = 0;  // grows when anything but the value or the bound buffer changes
+  TraceSchedule trace;
+};
+
+struct FuncContents;
+
+// Func::define_extern: computed by a C function on buffers.
+struct ExternArgument {
+  enum class Kind : uint8_t { Func, Buffer, Expr };
+  Kind kind = Kind::Expr;
+  std::shared_ptr<FuncContents> func;
+  std::shared_ptr<ParameterContents> buffer;
+  Expr expr;
+};
+struct ExternDefinition {
+  std::string function;  // the symbol
+  std::vector<ExternArgument> args;
+  bool c_plus_plus = false;  // the symbol is mangled as C++ does
 };
 
 // The contents of a Func. Symbol behind each Call to it.
@@ -141,7 +210,11 @@ struct FuncContents : Symbol, std::enable_shared_from_this<FuncContents> {
   bool frozen = false;  // used by another Func: no more updates
   uint64_t version =
       0;  // grows with every definition and directive: compiled code of an older one is stale
-  bool debug_trace = false;
+  TraceSchedule trace;
+  std::string debug_file;  // debug_to_file: written after it is computed; empty: not
+  std::optional<ExternDefinition> extern_definition;
+  // Func::in and clone_in: consumers named here read the wrapper instead; "" stands for all others.
+  std::map<std::string, std::shared_ptr<FuncContents>> wrappers;
   // Type the user asked for in the declaration (Func f(type, dims)), empty when none
   std::vector<Type> required_types;
   int required_dimensions = -1;

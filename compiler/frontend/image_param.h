@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "frontend/argument.h"
 #include "frontend/buffer.h"
 #include "frontend/rdom.h"
 
@@ -61,6 +62,7 @@ class OutputImageParam {
   Expr height() const { return dim(1).extent(); }
   Expr channels() const { return dim(2).extent(); }
   OutputImageParam& set_estimates(const Region& estimates);
+  operator Argument() const { return ir::argument_of(checked()); }
   const std::shared_ptr<ir::ParameterContents>& parameter() const { return parameter_; }
 
  protected:

@@ -8,6 +8,7 @@
 #include <string>
 #include <type_traits>
 
+#include "frontend/argument.h"
 #include "frontend/function.h"
 #include "frontend/var.h"
 
@@ -119,6 +120,7 @@ class Param {
     ir::set_limit(*parameter_, &ir::ParameterContents::estimate, Expr(value));
   }
   operator Expr() const { return ir::variable(name(), type(), ir::SymbolRef(parameter_)); }
+  operator Argument() const { return ir::argument_of(*parameter_); }
   const std::shared_ptr<ir::ParameterContents>& parameter() const { return parameter_; }
 
  private:

@@ -186,8 +186,7 @@ std::vector<Argument> Pipeline::infer_arguments() const {
   std::vector<Argument> result;
   for (const ParameterPtr& p : ir::parameters_of(checked().outputs)) {
     if (p->is_literal) continue;  // part of the program, not of its interface
-    result.push_back({p->name, p->is_buffer ? Argument::InputBuffer : Argument::InputScalar,
-                      p->type, p->dimensions});
+    result.push_back(ir::argument_of(*p));
   }
   return result;
 }

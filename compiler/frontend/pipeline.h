@@ -6,24 +6,14 @@
 #include <string>
 #include <vector>
 
+#include "frontend/argument.h"
 #include "frontend/compiler_interface.h"
+#include "frontend/module.h"
 #include "frontend/realization.h"
 
 namespace retrograde {
 
 class Func;
-
-struct Argument {
-  enum Kind { InputScalar, InputBuffer, OutputBuffer };
-  std::string name;
-  Kind kind = InputScalar;
-  Type type;
-  int dimensions = 0;
-  bool is_buffer() const { return kind != InputScalar; }
-  bool is_scalar() const { return kind == InputScalar; }
-  bool is_input() const { return kind != OutputBuffer; }
-  bool is_output() const { return kind == OutputBuffer; }
-};
 
 // What compiled code may call back.
 struct JITHandlers {
@@ -82,6 +72,55 @@ class Pipeline {
   void print_loop_nest() const;  // to the standard error stream
   std::vector<Argument> infer_arguments() const;
   JITHandlers& jit_handlers();
+
+  // ---- ahead of time ----
+  // What the function takes is `args`, in their order, then the output buffers. CompileError when
+  // the outputs need a Param or ImageParam that is not among them.
+  Module compile_to_module(const std::vector<Argument>& args, const std::string& function_name,
+                           const Target& target = get_target_from_environment(),
+                           LinkageType linkage = LinkageType::ExternalPlusMetadata);
+  void compile_to(const std::map<OutputFileType, std::string>& output_files,
+                  const std::vector<Argument>& args, const std::string& function_name,
+                  const Target& target);
+  void compile_to_object(const std::string& filename, const std::vector<Argument>& args,
+                         const std::string& function_name,
+                         const Target& target = get_target_from_environment());
+  void compile_to_bitcode(const std::string& filename, const std::vector<Argument>& args,
+                          const std::string& function_name,
+                          const Target& target = get_target_from_environment());
+  void compile_to_llvm_assembly(const std::string& filename, const std::vector<Argument>& args,
+                                const std::string& function_name,
+                                const Target& target = get_target_from_environment());
+  void compile_to_assembly(const std::string& filename, const std::vector<Argument>& args,
+                           const std::string& function_name,
+                           const Target& target = get_target_from_environment());
+  void compile_to_header(const std::string& filename, const std::vector<Argument>& args,
+                         const std::string& function_name,
+                         const Target& target = get_target_from_environment());
+  void compile_to_c(const std::string& filename, const std::vector<Argument>& args,
+                    const std::string& function_name,
+                    const Target& target = get_target_from_environment());  // Unsupported
+  // HTML: schedule, loops and machine code side by side.
+  void compile_to_lowered_stmt(const std::string& filename, const std::vector<Argument>& args,
+                               StmtOutputFormat format = Text,
+                               const Target& target = get_target_from_environment());
+  // prefix.o and prefix.h
+  void compile_to_file(const std::string& filename_prefix, const std::vector<Argument>& args,
+                       const std::string& function_name,
+                       const Target& target = get_target_from_environment());
+  // prefix.a, with the runtime unless the target says no_runtime, and prefix.h
+  void compile_to_static_library(const std::string& filename_prefix,
+                                 const std::vector<Argument>& args,
+                                 const std::string& function_name,
+                                 const Target& target = get_target_from_environment());
+  // The first target that the machine can run decides at run time; see compile_multitarget.
+  void compile_to_multitarget_static_library(const std::string& filename_prefix,
+                                             const std::vector<Argument>& args,
+                                             const std::vector<Target>& targets);
+  void compile_to_multitarget_object_files(const std::string& filename_prefix,
+                                           const std::vector<Argument>& args,
+                                           const std::vector<Target>& targets,
+                                           const std::vector<std::string>& suffixes);
 
   PipelineSpec spec() const;
 

@@ -472,4 +472,18 @@ Stmt make_if(Expr condition, Stmt then_case, Stmt else_case) {
 
 Stmt make_evaluate(Expr value) { return new Evaluate(std::move(value)); }
 
+Stmt make_atomic(const std::string& name, Stmt body) {
+  return body.defined() ? Stmt(new Atomic(name, std::move(body))) : Stmt();
+}
+
+Stmt make_fork(Stmt first, Stmt rest) {
+  if (!first.defined()) return rest;
+  return rest.defined() ? Stmt(new Fork(std::move(first), std::move(rest))) : first;
+}
+
+Stmt make_prefetch(const std::string& name, Type type, std::vector<Range> bounds,
+                   SymbolRef symbol) {
+  return new Prefetch(name, type, std::move(bounds), std::move(symbol));
+}
+
 }  // namespace retrograde::ir

@@ -75,6 +75,10 @@ Stmt make_block(std::vector<Stmt>
                     stmts);  // flattens, drops undefined; undefined when empty; the one when single
 Stmt make_if(Expr condition, Stmt then_case, Stmt else_case = {});
 Stmt make_evaluate(Expr value);
+Stmt make_atomic(const std::string& name, Stmt body);
+Stmt make_fork(Stmt first, Stmt rest);
+Stmt make_prefetch(const std::string& name, Type type, std::vector<Range> bounds,
+                   SymbolRef symbol = {});
 
 // Halide's promotion: to floats over integers, to the wider, to signed when signs mix; scalars to
 // vectors. Throws UserError naming `what` (the operation) when there is no common type.

@@ -211,6 +211,21 @@ int Comparer::compare_nodes(const Stmt& a, const Stmt& b) {
                      [&] { return compare(n.else_case, m.else_case); });
       },
       [&](const Evaluate& n) { return compare(n.value, same_kind(n).value); },
+      [&](const Atomic& n) {
+        const Atomic& m = same_kind(n);
+        return first([&] { return order(n.name, m.name); },
+                     [&] { return compare(n.body, m.body); });
+      },
+      [&](const Fork& n) {
+        const Fork& m = same_kind(n);
+        return first([&] { return compare(n.first, m.first); },
+                     [&] { return compare(n.rest, m.rest); });
+      },
+      [&](const Prefetch& n) {
+        const Prefetch& m = same_kind(n);
+        return first([&] { return order(n.name, m.name); }, [&] { return order(n.type, m.type); },
+                     [&] { return compare_all(n.bounds, m.bounds); });
+      },
       [](const StmtNode&) { return 0; });
 }
 

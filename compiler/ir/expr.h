@@ -137,7 +137,18 @@ struct Range {
 };
 
 enum class ForType : uint8_t { Serial, Parallel, Vectorized, Unrolled };
-enum class MemoryType : uint8_t { Auto, Heap, Stack };
+// GPU and accelerator memories parse and are refused where code is made for a CPU.
+enum class MemoryType : uint8_t {
+  Auto,
+  Heap,
+  Stack,
+  Register,
+  GPUShared,
+  GPUTexture,
+  LockedCache,
+  VTCM,
+  AMXTile
+};
 
 namespace ir {
 
@@ -461,6 +472,33 @@ struct Evaluate : StmtNode {
   RETROGRADE_NODE(Evaluate)
   explicit Evaluate(Expr value) : StmtNode(Kind::Evaluate), value(std::move(value)) {}
   const Expr value;
+};
+
+struct Atomic : StmtNode {  // what body reads and writes of one element of `name` is indivisible
+  RETROGRADE_NODE(Atomic)
+  Atomic(std::string name, Stmt body)
+      : StmtNode(Kind::Atomic), name(std::move(name)), body(std::move(body)) {}
+  const std::string name;
+  const Stmt body;
+};
+struct Fork : StmtNode {  // both may run at once; ends when both have ended
+  RETROGRADE_NODE(Fork)
+  Fork(Stmt first, Stmt rest)
+      : StmtNode(Kind::Fork), first(std::move(first)), rest(std::move(rest)) {}
+  const Stmt first, rest;
+};
+struct Prefetch : StmtNode {  // Loops phase: fetch a box of a Func or image into the cache
+  RETROGRADE_NODE(Prefetch)
+  Prefetch(std::string name, Type type, std::vector<Range> bounds, SymbolRef symbol)
+      : StmtNode(Kind::Prefetch),
+        name(std::move(name)),
+        type(type),
+        bounds(std::move(bounds)),
+        symbol(std::move(symbol)) {}
+  const std::string name;
+  const Type type;
+  const std::vector<Range> bounds;
+  const SymbolRef symbol;  // the image; undefined for a Func
 };
 
 #undef RETROGRADE_NODE

@@ -144,6 +144,8 @@ class Parser {
   Stmt stmt();
   Stmt loop(ForType for_type);
   Stmt realize();
+  Stmt prefetch();
+  std::vector<Range> ranges();
   Stmt allocate();
   Stmt if_stmt();
   Stmt store_or_provide();
@@ -465,6 +467,16 @@ Stmt Parser::stmt() {
   if (accept("free")) return make_free(name());
   if (accept("if")) return if_stmt();
   if (accept("evaluate")) return make_evaluate(expr());
+  if (accept("atomic")) {
+    const std::string target = name();
+    return make_atomic(target, block());
+  }
+  if (accept("fork")) {
+    Stmt first = block();
+    expect("and");
+    return make_fork(first, block());
+  }
+  if (accept("prefetch")) return prefetch();
   return store_or_provide();
 }
 
@@ -481,20 +493,14 @@ Stmt Parser::loop(ForType for_type) {
 }
 
 MemoryType Parser::memory() {
-  for (MemoryType type : {MemoryType::Auto, MemoryType::Heap, MemoryType::Stack}) {
+  for (int i = 0; i <= static_cast<int>(MemoryType::AMXTile); ++i) {
+    const auto type = static_cast<MemoryType>(i);
     if (accept(memory_name(type))) return type;
   }
-  fail("auto, heap or stack");
+  fail("auto, heap, stack or another memory type");
 }
 
-Stmt Parser::realize() {
-  const std::string func = name();
-  expect("(");
-  std::vector<Type> types;
-  do types.push_back(type());
-  while (accept(","));
-  expect(")");
-  const MemoryType where = memory();
+std::vector<Range> Parser::ranges() {
   std::vector<Range> bounds;
   while (is("[")) {
     take();
@@ -505,6 +511,26 @@ Stmt Parser::realize() {
     bounds.push_back({min, extent});
     if (!accept(",")) break;
   }
+  return bounds;
+}
+
+Stmt Parser::prefetch() {
+  const std::string target = name();
+  expect("(");
+  const Type element = type();
+  expect(")");
+  return make_prefetch(target, element, ranges());
+}
+
+Stmt Parser::realize() {
+  const std::string func = name();
+  expect("(");
+  std::vector<Type> types;
+  do types.push_back(type());
+  while (accept(","));
+  expect(")");
+  const MemoryType where = memory();
+  std::vector<Range> bounds = ranges();
   return make_realize(func, std::move(types), where, std::move(bounds), block());
 }
 

@@ -208,6 +208,7 @@ class Printer {
   }
   void print_block(const Block& n);
   void print_realize(const Realize& n);
+  void print_bounds(const std::vector<Range>& bounds);
   void print_if(const IfThenElse& n);
 
   std::string& out_;
@@ -324,14 +325,18 @@ void Printer::print_realize(const Realize& n) {
   out_ += "realize " + quote_name(n.name) + '(';
   for (size_t i = 0; i < n.types.size(); ++i) out_ += (i ? ", " : "") + to_string(n.types[i]);
   out_ += std::string(") ") + memory_name(n.memory);
-  for (size_t i = 0; i < n.bounds.size(); ++i) {
+  print_bounds(n.bounds);
+  body(n.body);
+}
+
+void Printer::print_bounds(const std::vector<Range>& bounds) {
+  for (size_t i = 0; i < bounds.size(); ++i) {
     out_ += i ? ", [" : " [";
-    print_root(n.bounds[i].min);
+    print_root(bounds[i].min);
     out_ += ", ";
-    print_root(n.bounds[i].extent);
+    print_root(bounds[i].extent);
     out_ += ']';
   }
-  body(n.body);
 }
 
 void Printer::print_if(const IfThenElse& n) {
@@ -398,6 +403,20 @@ void Printer::print(const Stmt& s) {
       [&](const Evaluate& n) {
         out_ += "evaluate ";
         print_root(n.value);
+      },
+      [&](const Atomic& n) {
+        out_ += "atomic " + quote_name(n.name);
+        body(n.body);
+      },
+      [&](const Fork& n) {
+        out_ += "fork";
+        body(n.first);
+        out_ += " and";
+        body(n.rest);
+      },
+      [&](const Prefetch& n) {
+        out_ += "prefetch " + quote_name(n.name) + '(' + to_string(n.type) + ')';
+        print_bounds(n.bounds);
       },
       [&](const StmtNode& n) { out_ += kind_name(n.kind); });
   if (s.kind() != Kind::LetStmt) out_ += '\n';

@@ -12,7 +12,9 @@ const char* for_name(ForType type) {
 }
 
 const char* memory_name(MemoryType memory) {
-  static constexpr const char* names[] = {"auto", "heap", "stack"};
+  static constexpr const char* names[] = {"auto",         "heap",       "stack",
+                                          "register",     "gpu_shared", "gpu_texture",
+                                          "locked_cache", "vtcm",       "amx_tile"};
   return names[static_cast<int>(memory)];
 }
 
@@ -70,7 +72,8 @@ bool is_reserved(const std::string& word) {
       "true",      "false",    "min",        "max",      "select",  "reinterpret", "ramp",
       "broadcast", "shuffle",  "reduce",     "image",    "extern",  "let",         "if",
       "else",      "assert",   "free",       "evaluate", "produce", "consume",     "for",
-      "serial",    "parallel", "vectorized", "unrolled", "realize", "allocate"};
+      "serial",    "parallel", "vectorized", "unrolled", "realize", "allocate",    "atomic",
+      "fork",      "prefetch", "and"};
   Type type;
   return keywords.count(word) || op_from_name(word) != Op::none || read_type(word, type) ||
          word.rfind("nan_", 0) == 0 || word.rfind("inf_", 0) == 0;

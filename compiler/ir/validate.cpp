@@ -91,6 +91,7 @@ class Validator {
   void check_realize(const Stmt& s, const Realize& n);
   void check_allocate(const Stmt& s, const Allocate& n);
   void check_free(const Stmt& s, const Free& n);
+  void check_bounds(const Stmt& s, const std::vector<Range>& bounds);
   void check_branches(const IfThenElse& n);
   void check_scalar_bool(const Expr& condition, const Stmt& s) {
     check(condition);
@@ -237,7 +238,16 @@ void Validator::check(const Stmt& s) {
         check_scalar_bool(n.condition, s);
         check_branches(n);
       },
-      [&](const Evaluate& n) { check(n.value); }, [](const StmtNode&) {});
+      [&](const Evaluate& n) { check(n.value); }, [&](const Atomic& n) { check(n.body); },
+      [&](const Fork& n) {
+        check(n.first);
+        check(n.rest);
+      },
+      [&](const Prefetch& n) {
+        only_in_loops(s);
+        check_bounds(s, n.bounds);
+      },
+      [](const StmtNode&) {});
 }
 
 void Validator::check_for(const Stmt& s, const For& n) {
@@ -281,13 +291,17 @@ void Validator::check_provide(const Stmt& s, const Provide& n) {
 void Validator::check_realize(const Stmt& s, const Realize& n) {
   only_in_loops(s);
   require(!n.types.empty(), s, "a Realize has types");
-  for (const Range& r : n.bounds) {
+  check_bounds(s, n.bounds);
+  check(n.body);
+}
+
+void Validator::check_bounds(const Stmt& s, const std::vector<Range>& bounds) {
+  for (const Range& r : bounds) {
     check(r.min);
     check(r.extent);
     require(r.min.type() == Int(32) && r.extent.type() == Int(32), s,
             "bounds of a Realize are int32");
   }
-  check(n.body);
 }
 
 void Validator::check_allocate(const Stmt& s, const Allocate& n) {

@@ -72,6 +72,11 @@ void for_each_child(const Stmt& s, ExprVisit on, StmtVisit on_stmt) {
       [&](const Block& n) {
         for (const Stmt& child : n.stmts) maybe_stmt(child);
       },
+      [&](const Atomic& n) { maybe_stmt(n.body); },
+      [&](const Fork& n) { maybe_stmt(n.first), maybe_stmt(n.rest); },
+      [&](const Prefetch& n) {
+        for (const Range& r : n.bounds) on(r.min), on(r.extent);
+      },
       [&](const IfThenElse& n) {
         on(n.condition), maybe_stmt(n.then_case), maybe_stmt(n.else_case);
       },
@@ -147,13 +152,18 @@ Expr map_children(const Expr& e, ExprMap map) {
 
 namespace {
 
+std::vector<Range> map_ranges(const std::vector<Range>& ranges, ExprMap map, bool& changed) {
+  std::vector<Range> result;
+  for (const Range& r : ranges) {
+    result.push_back({map(r.min), map(r.extent)});
+    changed |= !result.back().min.same_as(r.min) || !result.back().extent.same_as(r.extent);
+  }
+  return result;
+}
+
 Stmt map_realize(const Stmt& s, const Realize& n, ExprMap map, StmtMap map_stmt) {
   bool changed = false;
-  std::vector<Range> bounds;
-  for (const Range& r : n.bounds) {
-    bounds.push_back({map(r.min), map(r.extent)});
-    changed |= !bounds.back().min.same_as(r.min) || !bounds.back().extent.same_as(r.extent);
-  }
+  std::vector<Range> bounds = map_ranges(n.bounds, map, changed);
   Stmt body = map_optional(n.body, map_stmt);
   if (!changed && body.same_as(n.body)) return s;
   return make_realize(n.name, n.types, n.memory, std::move(bounds), std::move(body));
@@ -235,6 +245,20 @@ Stmt map_children(const Stmt& s, ExprMap map, StmtMap map_stmt) {
       [&](const Evaluate& n) {
         Expr value = map(n.value);
         return value.same_as(n.value) ? s : make_evaluate(std::move(value));
+      },
+      [&](const Atomic& n) {
+        Stmt body = map_optional(n.body, map_stmt);
+        return body.same_as(n.body) ? s : make_atomic(n.name, std::move(body));
+      },
+      [&](const Fork& n) {
+        Stmt first = map_optional(n.first, map_stmt), rest = map_optional(n.rest, map_stmt);
+        if (first.same_as(n.first) && rest.same_as(n.rest)) return s;
+        return make_fork(std::move(first), std::move(rest));
+      },
+      [&](const Prefetch& n) {
+        bool changed = false;
+        std::vector<Range> bounds = map_ranges(n.bounds, map, changed);
+        return !changed ? s : make_prefetch(n.name, n.type, std::move(bounds), n.symbol);
       },
       [&](const StmtNode&) { return s; });
 }

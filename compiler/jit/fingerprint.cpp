@@ -101,7 +101,8 @@ class Writer {
           add(name(n.name), n.type.key(), n.memory);
           result.add(n.name.substr(0, n.name.find('$')));  // appears in error messages
         },
-        [&](const Free& n) { add(name(n.name)); }, [](const StmtNode&) {});
+        [&](const Free& n) { add(name(n.name)); }, [&](const Atomic& n) { add(name(n.name)); },
+        [](const StmtNode&) {});
   }
 
   std::unordered_map<std::string, uint64_t> names_;

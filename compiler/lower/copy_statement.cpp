@@ -102,6 +102,10 @@ class Copier : public Rewriter {
                                     : copy;
         },
         [&](const Free& n) { return is_renamed(n.name) ? make_free(name_of(n.name)) : copy; },
+        [&](const Atomic& n) { return make_atomic(name_of(n.name), n.body); },
+        [&](const Prefetch& n) {
+          return make_prefetch(name_of(n.name), n.type, n.bounds, n.symbol);
+        },
         [&](const StmtNode&) { return copy; });
   }
 

@@ -68,6 +68,16 @@ class Uniquifier {
           return make_producer_consumer(current(renamings_, part.name), part.is_producer,
                                         rename(part.body));
         },
+        [&](const Atomic& atomic) {
+          return make_atomic(current(renamings_, atomic.name), rename(atomic.body));
+        },
+        [&](const Prefetch& prefetch) {
+          std::vector<Range> bounds;
+          for (const Range& range : prefetch.bounds)
+            bounds.push_back({rename(range.min), rename(range.extent)});
+          return make_prefetch(current(renamings_, prefetch.name), prefetch.type, bounds,
+                               prefetch.symbol);
+        },
         [&](const Provide& provide) {
           return make_provide(current(renamings_, provide.name), rename(provide.values),
                               rename(provide.args), rename(provide.predicate));

@@ -34,7 +34,8 @@ class HashCons : public Rewriter {
 // Reporting an error is no value, and undef is any value.
 bool must_stay(const Expr& e) {
   const auto* call = e.as<Call>();
-  return call && (call->is_op(Op::error) || call->is_op(Op::undef) || call->is_op(Op::address_of));
+  return call && (call->is_op(Op::error) || call->is_op(Op::runtime_call) ||
+                  call->is_op(Op::undef) || call->is_op(Op::address_of));
 }
 
 // Cheaper to repeat than to name: leaves, and what costs no instruction on a leaf.

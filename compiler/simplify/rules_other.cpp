@@ -186,7 +186,8 @@ bool has_effect(const Expr& e) {
     const auto* call = node.as<Call>();
     if (call && call->call_type == CallType::Operator) {
       found |= call->is_op(Op::print) || call->is_op(Op::print_when) || call->is_op(Op::require) ||
-               call->is_op(Op::buffer_set_bounds) || call->is_op(Op::error);
+               call->is_op(Op::buffer_set_bounds) || call->is_op(Op::error) ||
+               call->is_op(Op::prefetch) || call->is_op(Op::runtime_call);
     }
     found |= call && call->call_type == CallType::Extern;
     return !found;

@@ -37,7 +37,7 @@ Stmt random_stmt(test::RandomIr& random, int depth) {
   const std::string name = "n" + std::to_string(random.below(1000));
   if (depth <= 0)
     return make_store(name, e(Float(32)), e(), random.chance(30) ? e(Bool()) : Expr());
-  switch (random.below(13)) {
+  switch (random.below(16)) {
     case 0:
       return ir::make_let(name, e(), inner());
     case 1:
@@ -66,6 +66,12 @@ Stmt random_stmt(test::RandomIr& random, int depth) {
       return make_evaluate(e(Float(64)));
     case 11:
       return make_realize(name, {Int(32)}, MemoryType::Auto, {}, inner());
+    case 12:
+      return make_atomic(name, inner());
+    case 13:
+      return make_fork(inner(), inner());
+    case 14:
+      return make_prefetch(name, Float(32), {{e(), e()}});
     default:
       return make_block({inner(), inner(), inner()});
   }

@@ -10,6 +10,7 @@
 #include "frontend/image_param.h"
 #include "frontend/inline_reductions.h"
 #include "frontend/lambda.h"
+#include "frontend/module.h"
 #include "frontend/param.h"
 #include "frontend/pipeline.h"
 #include "frontend/rdom.h"
