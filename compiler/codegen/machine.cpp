@@ -101,11 +101,10 @@ std::string Machine::math_symbol(const std::string& stem, const std::string& pre
 }
 
 Machine machine_for(const Target& target, bool tune_for_host) {
-  const bool known =
-      target.bits == 64 && (target.arch == Target::X86 || target.arch == Target::ARM);
-  if (!known || target.os != Target::Linux) {
+  if (const std::string part = target.unsupported_part(); !part.empty()) {
     unsupported("generate code for target \"" + target.to_string() + "\"",
-                "code is generated for 64-bit x86 and ARM under Linux", "",
+                "code is generated for 64-bit x86 and ARM under Linux",
+                "no code can be generated for " + quoted(part),
                 "Use \"host\", \"x86-64-linux\" or \"arm-64-linux\"");
   }
   Machine machine;

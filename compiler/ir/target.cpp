@@ -1,7 +1,9 @@
 // Targets as text, and the target of this machine.
 #include "ir/target.h"
 
+#include <algorithm>
 #include <cstdlib>
+#include <utility>
 
 #include "diagnostics/error.h"
 
@@ -19,33 +21,30 @@ constexpr Named<Target::OS> os_names[] = {{"os_unknown", Target::OSUnknown},
                                           {"linux", Target::Linux},
                                           {"windows", Target::Windows},
                                           {"osx", Target::OSX},
-                                          {"noos", Target::NoOS}};
-constexpr Named<Target::Arch> arch_names[] = {
-    {"arch_unknown", Target::ArchUnknown}, {"x86", Target::X86}, {"arm", Target::ARM}};
+                                          {"android", Target::Android},
+                                          {"ios", Target::IOS},
+                                          {"qurt", Target::QuRT},
+                                          {"noos", Target::NoOS},
+                                          {"fuchsia", Target::Fuchsia},
+                                          {"wasmrt", Target::WebAssemblyRuntime}};
+constexpr Named<Target::Arch> arch_names[] = {{"arch_unknown", Target::ArchUnknown},
+                                              {"x86", Target::X86},
+                                              {"arm", Target::ARM},
+                                              {"mips", Target::MIPS},
+                                              {"hexagon", Target::Hexagon},
+                                              {"powerpc", Target::POWERPC},
+                                              {"wasm", Target::WebAssembly},
+                                              {"riscv", Target::RISCV}};
 constexpr Named<Target::Feature> feature_names[] = {
-    {"jit", Target::JIT},
-    {"debug", Target::Debug},
-    {"no_asserts", Target::NoAsserts},
-    {"no_bounds_query", Target::NoBoundsQuery},
-    {"sse41", Target::SSE41},
-    {"avx", Target::AVX},
-    {"f16c", Target::F16C},
-    {"fma", Target::FMA},
-    {"avx2", Target::AVX2},
-    {"avx512", Target::AVX512},
-    {"avx512_skylake", Target::AVX512_Skylake},
-    {"avx512_cannonlake", Target::AVX512_Cannonlake},
-    {"avx512_sapphirerapids", Target::AVX512_SapphireRapids},
-    {"user_context", Target::UserContext},
-    {"no_runtime", Target::NoRuntime},
-    {"profile", Target::Profile},
-    {"trace_loads", Target::TraceLoads},
-    {"trace_stores", Target::TraceStores},
-    {"trace_realizations", Target::TraceRealizations},
-    {"strict_float", Target::StrictFloat},
-    {"large_buffers", Target::LargeBuffers},
+#define RETROGRADE_FEATURE(enumerator, name, generated) {name, Target::enumerator},
+#include "ir/target_features.def"
+#undef RETROGRADE_FEATURE
 };
-static_assert(std::size(feature_names) == Target::FeatureEnd, "every feature has a name");
+constexpr bool is_generated[] = {
+#define RETROGRADE_FEATURE(enumerator, name, generated) generated,
+#include "ir/target_features.def"
+#undef RETROGRADE_FEATURE
+};
 
 template <class T, size_t N>
 const char* name_of(const Named<T> (&table)[N], T value) {
@@ -77,18 +76,49 @@ std::vector<std::string> split_at_dashes(const std::string& text) {
   return words;
 }
 
-// Reads one word into the target. `bits_unknown` is the third of the words that name a platform.
-bool read_word(const std::string& word, Target& target) {
-  Target::Feature feature;
-  if (find_name(feature_names, word, feature)) {
-    target.set_feature(feature);
+// Which of the three parts every target needs have been read.
+struct Parts {
+  bool arch = false, bits = false, os = false;
+  bool all() const { return arch && bits && os; }
+};
+
+bool read_bits(const std::string& word, int& bits) {
+  if (word != "32" && word != "64" && word != "bits_unknown" && word != "0") return false;
+  bits = word == "32" ? 32 : word == "64" ? 64 : 0;
+  return true;
+}
+
+bool read_feature(const std::string& word, Target& target) {
+  if (word == "trace_all") {
+    target.set_features({Target::TraceLoads, Target::TraceStores, Target::TraceRealizations});
     return true;
   }
-  if (word == "32" || word == "64" || word == "bits_unknown" || word == "0") {
-    target.bits = word == "32" ? 32 : word == "64" ? 64 : 0;
-    return true;
+  const Target::Feature feature = Target::feature_from_name(word);
+  target.set_feature(feature);
+  return feature != Target::FeatureEnd;
+}
+
+bool read_word(const std::string& word, Target& target, Parts& parts) {
+  if (read_bits(word, target.bits)) return !std::exchange(parts.bits, true);
+  if (find_name(arch_names, word, target.arch)) return !std::exchange(parts.arch, true);
+  if (find_name(os_names, word, target.os)) return !std::exchange(parts.os, true);
+  return read_feature(word, target);
+}
+
+// The first word that is out of place; "" also when a part is missing, see `parts`.
+std::string read_words(const std::string& text, Target& target, Parts& parts) {
+  bool first = true;
+  for (const std::string& word : split_at_dashes(text)) {
+    if (first && word == "host") {
+      target = get_host_target();
+      parts = {};
+    } else if (!read_word(word, target, parts)) {
+      return word.empty() ? "-" : word;
+    }
+    first = false;
   }
-  return find_name(arch_names, word, target.arch) || find_name(os_names, word, target.os);
+  if (text.rfind("host", 0) == 0) parts = {true, true, true};
+  return "";
 }
 
 #if defined(__x86_64__)
@@ -134,18 +164,29 @@ Target::Target(OS os, Arch arch, int bits, const std::vector<Feature>& features)
 }
 
 Target::Target(const std::string& text) {
-  bool first = true;
-  for (const std::string& word : split_at_dashes(text)) {
-    if (first && word == "host") {
-      *this = get_host_target();
-    } else if (!read_word(word, *this)) {
-      user_error("read the target " + quoted(text),
-                 "a target is arch-bits-os or host, then features, joined by dashes",
-                 quoted(word) + " is none of them",
-                 "Write for example \"host\" or \"x86-64-linux-avx2-fma\"");
-    }
-    first = false;
+  if (text.empty()) {
+    *this = get_host_target();
+    return;
   }
+  Parts parts;
+  const std::string wrong = read_words(text, *this, parts);
+  if (wrong.empty() && parts.all()) return;
+  std::string evidence = quoted(wrong) + " is none of them, or comes twice";
+  if (wrong.empty()) {
+    evidence = std::string(!parts.arch   ? "an architecture"
+                           : !parts.bits ? "32 or 64"
+                                         : "a system") +
+               " is missing";
+  }
+  user_error("read the target " + quoted(text),
+             "a target is arch-bits-os or host, then features, joined by dashes", evidence,
+             "Write for example \"host\" or \"x86-64-linux-avx2-fma\"");
+}
+
+bool Target::validate_target_string(const std::string& text) {
+  Target target;
+  Parts parts;
+  return read_words(text, target, parts).empty() && parts.all();
 }
 
 Target Target::with_feature(Feature feature) const {
@@ -183,13 +224,80 @@ int Target::natural_vector_size(Type type) const {
 
 std::string Target::to_string() const {
   std::string result = name_of(arch_names, arch);
-  result += bits ? "-" + std::to_string(bits) : "-bits_unknown";
-  result += std::string("-") + name_of(os_names, os);
+  result += "-" + std::to_string(bits) + "-" + name_of(os_names, os);
+  std::vector<std::string> features;
   for (const auto& entry : feature_names) {
-    if (has_feature(entry.value)) result += std::string("-") + entry.name;
+    if (has_feature(entry.value)) features.push_back(entry.name);
   }
+  std::sort(features.begin(), features.end());
+  for (const std::string& feature : features) result += "-" + feature;
   return result;
 }
+
+std::string Target::feature_to_name(Feature feature) { return name_of(feature_names, feature); }
+
+Target::Feature Target::feature_from_name(const std::string& name) {
+  Feature feature = FeatureEnd;
+  if (name == "hvx_128") return HVX_128;
+  find_name(feature_names, name, feature);
+  return feature;
+}
+
+std::string Target::unsupported_part() const {
+  if (os != Linux) return name_of(os_names, os);
+  if (arch != X86 && arch != ARM) return name_of(arch_names, arch);
+  if (bits != 64) return std::to_string(bits);
+  for (int i = 0; i < FeatureEnd; i++) {
+    if (features_.test(i) && !is_generated[i]) return feature_names[i].name;
+  }
+  return "";
+}
+
+bool Target::supports_device_api(DeviceAPI device) const {
+  if (device == DeviceAPI::None || device == DeviceAPI::Host) return true;
+  if (device == DeviceAPI::Default_GPU) return has_gpu_feature();
+  return has_feature(target_feature_for_device_api(device));
+}
+
+bool Target::get_runtime_compatible_target(const Target& other, Target& result) const {
+  if (arch != other.arch || os != other.os || bits != other.bits) return false;
+  // What changes the functions that a runtime offers. The rest is code that the runtime never sees.
+  const std::vector<Feature> either = {CUDA, OpenCL, Metal, D3D12Compute, OpenGLCompute, HVX_128};
+  const std::vector<Feature> same = {Debug, SoftFloatABI, MSAN, TSAN, ASAN};
+  Target common(os, arch, bits);
+  for (Feature feature : either) {
+    common.set_feature(feature, has_feature(feature) || other.has_feature(feature));
+  }
+  for (Feature feature : same) {
+    if (has_feature(feature) != other.has_feature(feature)) return false;
+    common.set_feature(feature, has_feature(feature));
+  }
+  result = common;
+  return true;
+}
+
+Target::Feature target_feature_for_device_api(DeviceAPI device) {
+  switch (device) {
+    case DeviceAPI::CUDA:
+      return Target::CUDA;
+    case DeviceAPI::OpenCL:
+      return Target::OpenCL;
+    case DeviceAPI::OpenGLCompute:
+      return Target::OpenGLCompute;
+    case DeviceAPI::Metal:
+      return Target::Metal;
+    case DeviceAPI::Hexagon:
+      return Target::HVX_128;
+    case DeviceAPI::HexagonDma:
+      return Target::HexagonDma;
+    case DeviceAPI::D3D12Compute:
+      return Target::D3D12Compute;
+    default:
+      return Target::FeatureEnd;
+  }
+}
+
+bool host_supports_target_device(const Target& target) { return !target.has_gpu_feature(); }
 
 Target get_host_target() {
   Target target(Target::Linux, host_arch, 64);
@@ -200,7 +308,15 @@ Target get_host_target() {
 Target get_target_from_environment() { return from_environment("RG_TARGET", "HL_TARGET"); }
 
 Target get_jit_target_from_environment() {
-  return from_environment("RG_JIT_TARGET", "HL_JIT_TARGET").with_feature(Target::JIT);
+  const Target target = from_environment("RG_JIT_TARGET", "HL_JIT_TARGET"),
+               host = get_host_target();
+  if (target.os != host.os || target.arch != host.arch || target.bits != host.bits) {
+    user_error("compile in this process for " + quoted(target.to_string()),
+               "the target of HL_JIT_TARGET is one that this machine can run",
+               "this machine is " + quoted(host.to_string()),
+               "Change features only, or compile ahead of time");
+  }
+  return target.with_feature(Target::JIT);
 }
 
 }  // namespace retrograde

@@ -10,45 +10,75 @@
 
 namespace retrograde {
 
+enum class DeviceAPI {
+  None,
+  Host,
+  Default_GPU,
+  CUDA,
+  OpenCL,
+  OpenGLCompute,
+  Metal,
+  Hexagon,
+  HexagonDma,
+  D3D12Compute,
+};
+
+// A feature, architecture or system that no code is generated for has a name all the same: programs
+// ask for it, and compiling for it is an error that says so.
 struct Target {
-  enum OS { OSUnknown = 0, Linux, Windows, OSX, NoOS } os = OSUnknown;
-  enum Arch { ArchUnknown = 0, X86, ARM } arch = ArchUnknown;
+  enum OS {
+    OSUnknown = 0,
+    Linux,
+    Windows,
+    OSX,
+    Android,
+    IOS,
+    QuRT,
+    NoOS,
+    Fuchsia,
+    WebAssemblyRuntime
+  } os = OSUnknown;
+  enum Arch {
+    ArchUnknown = 0,
+    X86,
+    ARM,
+    MIPS,
+    Hexagon,
+    POWERPC,
+    WebAssembly,
+    RISCV
+  } arch = ArchUnknown;
   int bits = 0;
+  // The first ones have the positions of halide_target_feature_t. AVX512 is F and CD;
+  // AVX512_Skylake adds VL, BW, DQ.
   enum Feature {
-    JIT,
-    Debug,
-    NoAsserts,
-    NoBoundsQuery,
-    SSE41,
-    AVX,
-    F16C,
-    FMA,
-    AVX2,
-    AVX512,          // F and CD
-    AVX512_Skylake,  // + VL, BW, DQ
-    AVX512_Cannonlake,
-    AVX512_SapphireRapids,
-    UserContext,
-    NoRuntime,
-    Profile,
-    TraceLoads,
-    TraceStores,
-    TraceRealizations,
-    StrictFloat,
-    LargeBuffers,
-    FeatureEnd
+#define RETROGRADE_FEATURE(enumerator, name, generated) enumerator,
+#include "ir/target_features.def"
+#undef RETROGRADE_FEATURE
+    FeatureEnd,
+    HVX = HVX_128
   };
 
   Target() = default;
   Target(OS os, Arch arch, int bits, const std::vector<Feature>& features = {});
-  // "host", "x86-64-linux-avx2-fma", "arm-64-linux", "host-no_asserts". UserError on anything else.
+  // "host", "x86-64-linux-avx2-fma", "arm-64-linux", "host-no_asserts"; "" is the host. UserError
+  // on anything else.
   explicit Target(const std::string& text);
   explicit Target(const char* text) : Target(std::string(text)) {}
+  static bool validate_target_string(const std::string& text);
 
-  bool has_feature(Feature feature) const { return features_.test(feature); }
+  // Every target has FeatureEnd.
+  bool has_feature(Feature feature) const {
+    return feature == FeatureEnd || features_.test(feature);
+  }
   Target with_feature(Feature feature) const;
   Target without_feature(Feature feature) const;
-  void set_feature(Feature feature, bool value = true) { features_.set(feature, value); }
+  void set_feature(Feature feature, bool value = true) {
+    if (feature != FeatureEnd) features_.set(feature, value);
+  }
+  void set_features(const std::vector<Feature>& features, bool value = true) {
+    for (Feature feature : features) set_feature(feature, value);
+  }
   bool features_any_of(const std::vector<Feature>& features) const;
   bool features_all_of(const std::vector<Feature>& features) const;
 
@@ -59,8 +89,28 @@ struct Target {
     return natural_vector_size(type_of<T>());
   }
   bool has_unknowns() const { return os == OSUnknown || arch == ArchUnknown || bits == 0; }
-  bool has_gpu_feature() const { return false; }
-  std::string to_string() const;  // round-trips through the constructor
+  bool has_gpu_feature() const {
+    return features_any_of({CUDA, OpenCL, Metal, D3D12Compute, Vulkan, WebGPU});
+  }
+  bool has_large_buffers() const { return bits == 64 && has_feature(LargeBuffers); }
+  int64_t maximum_buffer_size() const {
+    return has_large_buffers() ? INT64_MAX : static_cast<int64_t>(INT32_MAX);
+  }
+  bool supports_type(const Type& type) const { return type.bits() > 0; }
+  bool supports_type(const Type& type, DeviceAPI device) const {
+    return supports_type(type) && supports_device_api(device);
+  }
+  bool supports_device_api(DeviceAPI device) const;
+  // The first part that no code can be generated for, such as "cuda"; empty when there is none.
+  std::string unsupported_part() const;
+  bool supported() const { return unsupported_part().empty(); }
+  // Whether one runtime serves code for both; `result` is then its target.
+  bool get_runtime_compatible_target(const Target& other, Target& result) const;
+  // arch-bits-os, then features by name; round-trips through the constructor
+  std::string to_string() const;
+  const std::bitset<FeatureEnd>& get_features_bitset() const { return features_; }
+  static std::string feature_to_name(Feature feature);
+  static Feature feature_from_name(const std::string& name);  // FeatureEnd: there is none
   friend bool operator==(const Target& a, const Target& b) {
     return a.os == b.os && a.arch == b.arch && a.bits == b.bits && a.features_ == b.features_;
   }
@@ -69,8 +119,11 @@ struct Target {
   std::bitset<FeatureEnd> features_;
 };
 
-Target get_host_target();                  // this machine, by cpuid
-Target get_target_from_environment();      // RG_TARGET or HL_TARGET, else host
-Target get_jit_target_from_environment();  // RG_JIT_TARGET or HL_JIT_TARGET, else host, plus JIT
+Target get_host_target();              // this machine, by cpuid
+Target get_target_from_environment();  // RG_TARGET or HL_TARGET, else host
+// RG_JIT_TARGET or HL_JIT_TARGET, else host, plus JIT. UserError when this machine cannot run it.
+Target get_jit_target_from_environment();
+Target::Feature target_feature_for_device_api(DeviceAPI device);  // FeatureEnd: no single one
+bool host_supports_target_device(const Target& target);
 
 }  // namespace retrograde

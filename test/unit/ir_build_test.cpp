@@ -193,16 +193,45 @@ TEST(Visit, UniqueNamesDiffer) { EXPECT_NE(unique_name("x"), unique_name("x")); 
 
 TEST(Target, RoundTripsThroughText) {
   for (const char* text :
-       {"x86-64-linux", "x86-64-linux-avx-f16c-fma-avx2", "arm-64-linux-no_asserts"}) {
+       {"x86-64-linux", "x86-64-linux-avx-avx2-f16c-fma", "arm-64-linux-no_asserts",
+        "arch_unknown-0-os_unknown", "riscv-64-noos-rvv"}) {
     EXPECT_EQ(Target(text).to_string(), std::string(text));
   }
   EXPECT_EQ(Target(get_host_target().to_string()), get_host_target());
   EXPECT_TRUE(Target("host-no_asserts").has_feature(Target::NoAsserts));
   EXPECT_THROW(Target("x86-64-linux-avx3"), UserError);
-  EXPECT_THROW(Target(""), UserError);
+  EXPECT_THROW(Target("x86-64"), UserError);
+  EXPECT_THROW(Target("x86-64-linux-arm"), UserError);
+  EXPECT_THROW(Target("x86-64-linux-"), UserError);
+  EXPECT_FALSE(Target::validate_target_string("linux"));
+  EXPECT_EQ(Target(""), get_host_target());
   EXPECT_EQ(Target("x86-64-linux-avx2").natural_vector_size<float>(), 8);
   EXPECT_EQ(Target("x86-64-linux-avx512_skylake").natural_vector_size<uint8_t>(), 64);
   EXPECT_EQ(Target("arm-64-linux").natural_vector_size<int16_t>(), 8);
+}
+
+TEST(Target, EveryFeatureHasANameOfItsOwn) {
+  for (int i = 0; i < Target::FeatureEnd; i++) {
+    const auto feature = static_cast<Target::Feature>(i);
+    EXPECT_EQ(Target::feature_from_name(Target::feature_to_name(feature)), feature) << i;
+  }
+  EXPECT_EQ(Target::feature_from_name("avx3"), Target::FeatureEnd);
+}
+
+TEST(Target, SaysWhatNoCodeIsGeneratedFor) {
+  EXPECT_TRUE(get_host_target().supported());
+  EXPECT_EQ(Target("x86-64-linux-cuda").unsupported_part(), "cuda");
+  EXPECT_TRUE(Target("x86-64-linux-cuda").has_gpu_feature());
+  EXPECT_EQ(Target("x86-64-windows").unsupported_part(), "windows");
+  EXPECT_EQ(Target("hexagon-32-qurt-hvx").unsupported_part(), "qurt");
+}
+
+TEST(Target, OneRuntimeServesFeaturesThatItDoesNotSee) {
+  Target common;
+  const Target avx("x86-64-linux-avx2-fma-no_asserts"), wide("x86-64-linux-avx512-user_context");
+  EXPECT_TRUE(avx.get_runtime_compatible_target(wide, common));
+  EXPECT_EQ(common, Target("x86-64-linux"));
+  EXPECT_FALSE(avx.get_runtime_compatible_target(Target("arm-64-linux"), common));
 }
 
 TEST(TypeLimits, AreExpressionsOfTheType) {
