@@ -1,0 +1,69 @@
+// kernel.h -- what one benchmark kernel is, in the dialect that Halide 14 and Retrograde share.
+//
+// Every kernel is one source file: algorithm and schedule, written once, compiled once against
+// Halide's header and once against ours. list.def names them all. Inputs are made by a generator
+// that depends on nothing but the point, so both sides compute from the same numbers.
+#pragma once
+
+#include <Halide.h>
+
+#include <cstdint>
+#include <vector>
+
+namespace kernels {
+
+struct Setup {
+  Halide::Target target;
+  bool small = false;  // sizes for a check of the results: odd, and quick
+
+  // Lanes of a full vector register.
+  template <typename T>
+  int lanes() const {
+    return target.natural_vector_size<T>();
+  }
+  int size(int full, int quick) const { return small ? quick : full; }
+};
+
+// Ready to be compiled: the kernel has bound its inputs. The buffers count as the bytes that must
+// move; `operations` are those that the algorithm cannot do without, a multiply-add being two.
+struct Kernel {
+  Halide::Pipeline pipeline;
+  std::vector<Halide::Buffer<>> inputs, outputs;
+  double operations = 0;
+};
+
+#define KERNEL(name) Kernel name(const Setup& setup);
+#include "list.def"
+#undef KERNEL
+
+// ---- inputs ----
+
+inline uint32_t scrambled(uint32_t n) {
+  n = (n ^ (n >> 16)) * 0x7feb352du;
+  n = (n ^ (n >> 15)) * 0x846ca68bu;
+  return n ^ (n >> 16);
+}
+
+// Slopes and edges of several sizes, and a little noise: 0 <= value < 1.
+inline double picture(int x, int y, int c) {
+  const uint32_t ramp = static_cast<uint32_t>(x * 5 + y * 3 + c * 91) % 1024;
+  const uint32_t wave = ramp < 512 ? ramp : 1023 - ramp;
+  const uint32_t block = scrambled(static_cast<uint32_t>(x / 57 + y / 43 * 1031)) & 511;
+  const uint32_t noise = scrambled(static_cast<uint32_t>(x + y * 8191 + c * 67108859)) & 255;
+  return (wave + block + 0.25 * noise) / 1088.0;
+}
+
+// Values from 0 to just below `limit`.
+template <typename T>
+Halide::Buffer<T> make_image(const std::vector<int>& sizes, double limit = 1) {
+  Halide::Buffer<T> image(sizes);
+  const int width = sizes[0], height = sizes.size() > 1 ? sizes[1] : 1;
+  T* at = image.data();
+  for (size_t i = 0; i < image.number_of_elements(); i++) {
+    const int x = static_cast<int>(i % width), rest = static_cast<int>(i / width);
+    at[i] = static_cast<T>(limit * picture(x, rest % height, rest / height));
+  }
+  return image;
+}
+
+}  // namespace kernels

@@ -1,0 +1,67 @@
+// Each kernel at a small size computes the same on both sides.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+#include <limits>
+
+#include "pairs/options.h"
+#include "pairs/pair.h"
+
+namespace bench {
+
+namespace {
+
+class Kernel : public testing::TestWithParam<std::string> {};
+
+TEST_P(Kernel, GivesWhatHalideGives) {
+  const std::filesystem::path scratch =
+      std::filesystem::path(testing::TempDir()) / ("kernel_" + GetParam());
+  std::filesystem::create_directories(scratch);
+  Pair pair({GetParam(), true, 2}, BENCH_PROGRAMS);
+  pair.run();
+  const PairResult result = pair.result(scratch);
+  std::filesystem::remove_all(scratch);
+  EXPECT_LE(result.max_relative_error, tolerance(result));
+  EXPECT_GT(result.operations, 0);
+}
+
+INSTANTIATE_TEST_SUITE_P(All, Kernel, testing::ValuesIn(kernel_names()),
+                         [](const auto& test) { return test.param; });
+
+TEST(MaxRelativeError, IsRelativeToTheLargerOfElementAndScale) {
+  // scale: sqrt((100 + 0) / 2)
+  EXPECT_NEAR(max_relative_error({{false, {10, 0.5}}}, {{false, {10, 0}}}), 0.5 / std::sqrt(50.0),
+              1e-12);
+  EXPECT_NEAR(max_relative_error({{false, {11, 0}}}, {{false, {10, 0}}}), 0.1, 1e-12);
+  EXPECT_EQ(max_relative_error({{false, {1, 2}}}, {{false, {1, 2}}}), 0);
+}
+
+TEST(MaxRelativeError, NoticesWhatIsNotANumberOrMissing) {
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_TRUE(std::isinf(max_relative_error({{false, {nan}}}, {{false, {1}}})));
+  EXPECT_TRUE(std::isinf(max_relative_error({{false, {1}}}, {{false, {nan}}})));
+  EXPECT_EQ(max_relative_error({{false, {nan}}}, {{false, {nan}}}), 0);
+  EXPECT_TRUE(std::isinf(max_relative_error({{false, {1}}}, {{false, {1, 2}}})));
+  EXPECT_TRUE(std::isinf(max_relative_error({{false, {}}}, {{false, {}}})));
+}
+
+TEST(Worker, SaysThatAKernelIsUnknown) {
+  try {
+    Worker worker(Side::Retrograde, {"no_such_kernel", true, 1}, BENCH_PROGRAMS);
+    FAIL();
+  } catch (const WorkerError& error) {
+    EXPECT_NE(std::string(error.what()).find("no_such_kernel"), std::string::npos);
+  }
+}
+
+TEST(Timing, IsMedianLeastAndMiddleHalf) {
+  const Timing timing = timing_of({5, 1, 3, 2, 4});
+  EXPECT_EQ(timing.median, 3);
+  EXPECT_EQ(timing.least, 1);
+  EXPECT_EQ(timing.spread, 2);
+}
+
+}  // namespace
+
+}  // namespace bench

@@ -1,0 +1,61 @@
+// options.cpp -- see options.h.
+#include "options.h"
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cstdio>
+
+#include "diagnostics/error.h"
+
+namespace bench {
+
+using retrograde::text;
+
+namespace {
+
+void check_kernels(const std::vector<std::string>& asked) {
+  std::string known;
+  for (const std::string& name : kernel_names()) known += (known.empty() ? "" : ", ") + name;
+  for (const std::string& name : asked) {
+    if (std::count(kernel_names().begin(), kernel_names().end(), name)) continue;
+    retrograde::call_error(text("run the kernel ", retrograde::quoted(name)),
+                           "it must be one of the benchmark's", text("they are ", known),
+                           "Give --kernel one of these names");
+  }
+}
+
+}  // namespace
+
+const std::vector<std::string>& kernel_names() {
+  static const std::vector<std::string> names{
+#define KERNEL(name) #name,
+#include "../kernels/list.def"
+#undef KERNEL
+  };
+  return names;
+}
+
+std::optional<Options> read_options(int argc, char** argv) {
+  Options options;
+  CLI::App app("Forward pipelines with one schedule, compiled by Halide 14 and by Retrograde.");
+  app.add_option("--kernel", options.kernels, "run this kernel; may be given several times");
+  app.add_flag("--quick", options.quick, "few runs of each: numbers for guidance only");
+  auto* rounds = app.add_option("--rounds", options.rounds, "timed runs of each side")
+                     ->check(CLI::Range(1, 100000))
+                     ->capture_default_str();
+  app.add_option("--output", options.output, "the report, as JSON")->capture_default_str();
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::CallForHelp&) {
+    std::fputs(app.help().c_str(), stdout);
+    return std::nullopt;
+  } catch (const CLI::ParseError& error) {
+    retrograde::call_error("understand the command line", "each option takes one value",
+                           error.what(), "Run with --help for the options");
+  }
+  if (options.quick && rounds->count() == 0) options.rounds = 7;
+  check_kernels(options.kernels);
+  return options;
+}
+
+}  // namespace bench

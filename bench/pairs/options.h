@@ -1,0 +1,23 @@
+// options.h -- the command line of bench_kernels.
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace bench {
+
+struct Options {
+  std::vector<std::string> kernels;  // to run; all when empty
+  bool quick = false;                // few runs of each: numbers for guidance only
+  int rounds = 31;
+  std::filesystem::path output = "kernels.json";
+};
+
+const std::vector<std::string>& kernel_names();
+
+// Nothing when only help was asked for. Throws retrograde::UserError.
+std::optional<Options> read_options(int argc, char** argv);
+
+}  // namespace bench

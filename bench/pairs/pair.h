@@ -1,0 +1,52 @@
+// pair.h -- one kernel on both sides: compiled, compared, and timed run by run in turn.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "worker.h"
+
+namespace bench {
+
+// Of one side, in milliseconds. The spread is that of the middle half of the runs.
+struct Timing {
+  double median = 0, least = 0, spread = 0;
+};
+Timing timing_of(std::vector<double> milliseconds);
+
+struct PairResult {
+  std::string kernel;
+  int threads = 1;
+  std::string failure;  // empty: all that follows is there
+  Timing retrograde, halide;
+  double retrograde_compile_ms = 0, halide_compile_ms = 0;
+  Worker::Memory retrograde_memory{}, halide_memory{};
+  double max_relative_error = 0;
+  bool integers = false;  // all outputs are
+  double bytes = 0, operations = 0;
+};
+
+// The largest |a - b| / max(|b|, scale) over all elements, where scale is the root mean square of
+// b's output: a small difference of large numbers counts by what it was made from. Infinite when
+// shapes differ or a NaN stands on one side alone.
+double max_relative_error(const std::vector<Values>& a, const std::vector<Values>& b);
+// The largest max_relative_error for which both sides have computed the same.
+double tolerance(const PairResult& result);
+
+// The two workers of one kernel.
+class Pair {
+ public:
+  Pair(const Job& job, const std::filesystem::path& programs);
+
+  // One run of each, the one that goes first changing from time to time. Milliseconds of ours.
+  double run();
+  PairResult result(const std::filesystem::path& scratch);
+
+ private:
+  Job job_;
+  Worker retrograde_, halide_;
+  std::vector<double> retrograde_ms_, halide_ms_;
+};
+
+}  // namespace bench

@@ -1,0 +1,153 @@
+// worker_main.cpp -- compiles one kernel and runs it on request. Built twice from the same text:
+// with Halide 14, and with Retrograde (BENCH_RETROGRADE). See worker_protocol.h.
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+#include <exception>
+#include <fstream>
+#include <iostream>
+#include <sstream>
+#include <stdexcept>
+#include <string>
+
+#include "../kernels/kernel.h"
+#include "worker_protocol.h"
+
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+double seconds_since(Clock::time_point start) {
+  return std::chrono::duration<double>(Clock::now() - start).count();
+}
+
+kernels::Kernel make_kernel(const std::string& name, const kernels::Setup& setup) {
+#define KERNEL(known) \
+  if (name == #known) return kernels::known(setup);
+#include "../kernels/list.def"
+#undef KERNEL
+  throw std::runtime_error("there is no kernel \"" + name + "\"");
+}
+
+// Halide 14 takes recent AMD processors for ones with AMX; its code would not run. So that both
+// sides see the same machine, ours goes without as well.
+Halide::Target target() {
+  return Halide::get_jit_target_from_environment().without_feature(
+      Halide::Target::AVX512_SapphireRapids);
+}
+
+// A few KiB of "/proc/self/status".
+double status_mb(const std::string& field) {
+  std::ifstream status("/proc/self/status");
+  for (std::string line; std::getline(status, line);) {
+    if (line.rfind(field + ":", 0) == 0) return std::stod(line.substr(field.size() + 1)) / 1024;
+  }
+  return 0;
+}
+// The peak from now on (Linux 4.0); where that is not allowed, RUN_MB counts from the old peak.
+void forget_peak() { std::ofstream("/proc/self/clear_refs") << "5"; }
+
+class Worker {
+ public:
+  Worker(const std::string& name, bool small, int threads) : threads_(threads) {
+    const Clock::time_point start = Clock::now();
+    Halide::Func first("first");
+    Halide::Var x("x");
+    first(x) = x;
+    Halide::Buffer<int> values(16);
+    first.realize(values, target_);
+    start_seconds_ = seconds_since(start);
+    kernel_ = make_kernel(name, {target_, small});
+  }
+
+  void compile() {
+#ifdef BENCH_RETROGRADE
+    kernel_.pipeline.jit_handlers().thread_limit = threads_;  // Halide 14 reads HL_NUM_THREADS
+#endif
+    const Clock::time_point start = Clock::now();
+    kernel_.pipeline.compile_jit(target_);
+    const double seconds = seconds_since(start);
+    std::cout << "ready " << seconds << " " << start_seconds_ << " " << bytes() << " "
+              << kernel_.operations << std::endl;
+    compile_peak_mb_ = status_mb("VmHWM");
+    forget_peak();
+    resident_mb_ = status_mb("VmRSS");
+  }
+
+  void run() {
+    Halide::Realization outputs(kernel_.outputs);
+    const Clock::time_point start = Clock::now();
+    kernel_.pipeline.realize(outputs, target_);
+    std::cout << "ran " << seconds_since(start) << std::endl;
+  }
+
+  void save(const std::string& path) const {
+    std::ofstream file(path, std::ios::binary);
+    for (const auto& output : kernel_.outputs) {
+      const auto& raw = *output.raw_buffer();
+      const bench::OutputHeader header{raw.type.code, raw.type.bits,
+                                       static_cast<int64_t>(output.number_of_elements())};
+      file.write(reinterpret_cast<const char*>(&header), sizeof header);
+      file.write(reinterpret_cast<const char*>(raw.host),
+                 static_cast<std::streamsize>(header.count * raw.type.bytes()));
+    }
+    if (!file.flush()) throw std::runtime_error("cannot write \"" + path + "\"");
+    std::cout << "saved" << std::endl;
+  }
+
+  void tell_memory() const {
+    const double run_peak = status_mb("VmHWM");
+    std::cout << "memory " << std::max(compile_peak_mb_, run_peak) << " "
+              << std::max(0.0, run_peak - resident_mb_) << std::endl;
+  }
+
+ private:
+  double bytes() const {
+    double sum = 0;
+    for (const auto& buffer : kernel_.inputs) sum += static_cast<double>(buffer.size_in_bytes());
+    for (const auto& buffer : kernel_.outputs) sum += static_cast<double>(buffer.size_in_bytes());
+    return sum;
+  }
+
+  Halide::Target target_ = target();
+  int threads_;
+  kernels::Kernel kernel_;
+  double start_seconds_ = 0, compile_peak_mb_ = 0, resident_mb_ = 0;
+};
+
+void serve(Worker& worker) {
+  for (std::string line; std::getline(std::cin, line);) {
+    std::istringstream words(line);
+    std::string order, path;
+    words >> order >> path;
+    if (order == "run") worker.run();
+    if (order == "save") worker.save(path);
+    if (order == "memory") worker.tell_memory();
+  }
+}
+
+std::string one_line(std::string text) {
+  std::replace(text.begin(), text.end(), '\n', ' ');
+  return text;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  if (argc != 4) {
+    std::fprintf(stderr, "usage: %s KERNEL small|full THREADS\n", argv[0]);
+    return 2;
+  }
+  ::alarm(bench::worker_deadline_seconds);
+  std::cout.precision(9);
+  try {
+    Worker worker(argv[1], argv[2] == std::string("small"), std::stoi(argv[3]));
+    worker.compile();
+    serve(worker);
+  } catch (const std::exception& error) {
+    std::cout << "failed " << one_line(error.what()) << std::endl;
+    return 1;
+  }
+}
