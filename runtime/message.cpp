@@ -87,12 +87,14 @@ FailureScope::FailureScope(Failure* failure) : outer_(current_failure) {
 }
 FailureScope::~FailureScope() { current_failure = outer_; }
 
+bool keep_for_loop(const char* message) {
+  if (current_failure) current_failure->set(message);
+  return current_failure != nullptr;
+}
+
 void report(retrograde_context* context, int32_t code, const char* message) {
-  if (current_failure) {
-    current_failure->set(message);
-  } else if (context && context->error_handler) {
-    context->error_handler(context, code, message);
-  }
+  if (keep_for_loop(message)) return;
+  if (context && context->error_handler) context->error_handler(context, code, message);
 }
 
 void Failure::set(const char* text) {

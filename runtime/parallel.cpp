@@ -1,10 +1,11 @@
-// Parallel loops on oneTBB. The result is deterministic: the code of the lowest failing iteration.
+// Parallel loops. The result is deterministic: the code of the lowest failing iteration.
 //
 // Why every lower iteration runs: an iteration is skipped only when one below it has failed, so the
 // lowest of all failing iterations is never skipped, and no other can take its place.
 #include <atomic>
 #include <mutex>
 
+#include "parallel.h"
 #include "report.h"
 #include "threads.h"
 
@@ -24,10 +25,10 @@ class LowestFailure {
     code_ = code;
     failure_ = failure;
   }
-  // After the loop: tells the handler, or the loop around this one.
-  int32_t report_to(retrograde_context* context) {
+  // After the loop.
+  int32_t report_to(const ParallelLoop& loop) {
     const std::lock_guard lock(mutex_);
-    if (code_ != 0 && failure_.message[0]) report(context, code_, failure_.message);
+    if (code_ != 0 && failure_.message[0]) loop.report(loop.data, code_, failure_.message);
     return code_;
   }
 
@@ -38,59 +39,84 @@ class LowestFailure {
   Failure failure_;
 };
 
-struct Loop {
-  retrograde_context* context;
-  retrograde_task task;
-  int32_t min, extent;
-  uint8_t* closure;
-  LowestFailure failures;
-  // What the caller wrote before the loop is seen by the iterations, and what they wrote is seen
-  // after it. TBB orders them as well; here it stands where a race detector can see it.
-  std::atomic<int> fence{0};
+class Run {
+ public:
+  explicit Run(const ParallelLoop& loop) : loop_(loop) {}
 
-  void run(int64_t iteration) {
-    if (failures.skips(iteration)) return;
+  int32_t all() {
+    fence_.store(1, std::memory_order_release);
+    const auto run_part = [](void* run, int64_t begin, int64_t end) {
+      static_cast<Run*>(run)->range(begin, end);
+    };
+    run_on_threads(loop_.extent, loop_.thread_limit, run_part, this);
+    fence_.load(std::memory_order_acquire);
+    return failures_.report_to(loop_);
+  }
+
+ private:
+  const ParallelLoop& loop_;
+  LowestFailure failures_;
+  // What the caller wrote before the loop is seen by the iterations, and what they wrote is seen
+  // after it. The threads below order them as well; here it stands where a race detector can see
+  // it.
+  std::atomic<int> fence_{0};
+
+  void one(int64_t iteration) {
+    if (failures_.skips(iteration)) return;
     Failure failure;
     int32_t code = 0;
     {
       const FailureScope scope(&failure);
-      code = task(context, static_cast<int32_t>(min + iteration), closure);
+      code = loop_.run(loop_.data, static_cast<int32_t>(loop_.min + iteration));
     }
-    if (code != 0) failures.add(iteration, code, failure);
+    if (code != 0) failures_.add(iteration, code, failure);
   }
 
-  void run_range(int64_t begin, int64_t end) {
-    fence.load(std::memory_order_acquire);
-    for (int64_t i = begin; i < end; i++) run(i);
-    fence.fetch_add(1, std::memory_order_release);
-  }
-
-  int32_t run_all() {
-    fence.store(1, std::memory_order_release);
-    const auto run_part = [](void* loop, int64_t begin, int64_t end) {
-      static_cast<Loop*>(loop)->run_range(begin, end);
-    };
-    run_on_threads(extent, context ? context->thread_limit : 0, run_part, this);
-    fence.load(std::memory_order_acquire);
-    return failures.report_to(context);
+  void range(int64_t begin, int64_t end) {
+    fence_.load(std::memory_order_acquire);
+    for (int64_t i = begin; i < end; i++) one(i);
+    fence_.fetch_add(1, std::memory_order_release);
   }
 };
 
+// The loop of one call of retrograde_parallel_for.
+struct Tasks {
+  retrograde_context* context;
+  retrograde_task task;
+  uint8_t* closure;
+};
+
 }  // namespace
+
+int32_t run_parallel_loop(const ParallelLoop& loop) {
+  if (loop.extent <= 0) return 0;
+  try {
+    return Run(loop).all();
+  } catch (...) {  // the thread pool could not start: no memory or no threads
+    char message[max_message_bytes];
+    retrograde_format_message(message, sizeof message,
+                              "cannot run a parallel loop of %i iterations: the thread pool has "
+                              "no memory or threads left",
+                              static_cast<int64_t>(loop.extent));
+    loop.report(loop.data, retrograde_error_out_of_memory, message);
+    return retrograde_error_out_of_memory;
+  }
+}
+
 }  // namespace retrograde::runtime
 
 int32_t retrograde_parallel_for(retrograde_context* context, retrograde_task task, int32_t min,
                                 int32_t extent, uint8_t* closure) {
-  using retrograde::runtime::Loop;
-  if (extent <= 0) return 0;
-  try {
-    Loop loop{context, task, min, extent, closure, {}, {}};
-    return loop.run_all();
-  } catch (...) {  // TBB could not start: no memory or no threads
-    return retrograde_report_error(
-        context, retrograde_error_out_of_memory,
-        "cannot run a parallel loop of %i iterations: the thread pool has "
-        "no memory or threads left",
-        static_cast<int64_t>(extent));
-  }
+  using namespace retrograde::runtime;
+  if (context && context->parallel_handler)
+    return context->parallel_handler(context, task, min, extent, closure);
+  Tasks tasks{context, task, closure};
+  const auto run = [](void* data, int32_t index) {
+    const Tasks& tasks = *static_cast<Tasks*>(data);
+    return tasks.task(tasks.context, index, tasks.closure);
+  };
+  const auto tell = [](void* data, int32_t code, const char* message) {
+    report(static_cast<Tasks*>(data)->context, code, message);
+  };
+  return run_parallel_loop({min, extent, context ? context->thread_limit : 0, &tasks, run, tell});
 }

@@ -31,6 +31,8 @@ class FailureScope {
   Failure* outer_;
 };
 
+// True when the message belongs to an iteration of a parallel loop, which keeps it until its end.
+bool keep_for_loop(const char* message);
 void report(retrograde_context* context, int32_t code, const char* message);
 
 }  // namespace retrograde::runtime

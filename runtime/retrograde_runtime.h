@@ -9,7 +9,7 @@
  * negative code of retrograde_error_code. A null context stands for one whose fields are all zero.
  *
  * Nothing here prints, aborts, exits or throws. Every function may be called from several threads
- * at once. Beyond TBB's own threads, the only state of the process is the pool of free memory
+ * at once. Beyond the threads of the pool, the only state of the process is the pool of free memory
  * blocks (retrograde_pool_*) and the arenas of thread limits. */
 #ifndef RETROGRADE_RUNTIME_H
 #define RETROGRADE_RUNTIME_H
@@ -47,6 +47,11 @@ enum retrograde_error_code {
   retrograde_error_bad_dimensions = -43
 };
 
+struct retrograde_context;
+
+/* One iteration of a parallel loop. */
+typedef int32_t (*retrograde_task)(struct retrograde_context*, int32_t index, uint8_t* closure);
+
 /* What one call, or a family of calls, of generated code may use. A field that is null or zero
  * means the default. The handlers get the context that the generated function was called with. */
 typedef struct retrograde_context {
@@ -60,18 +65,19 @@ typedef struct retrograde_context {
    * none. Set both or neither. Default: the process's pool, see retrograde_pool_malloc. */
   void* (*malloc_handler)(struct retrograde_context*, size_t bytes);
   void (*free_handler)(struct retrograde_context*, void* block);
-  /* Threads that parallel loops may use, the caller included. 0: as many as TBB has. */
+  /* Threads that parallel loops may use, the caller included. 0: as many as the pool has. */
   int32_t thread_limit;
   /* For the handlers; never looked at here. */
   void* user_data;
+  /* Runs a parallel loop in place of the thread pool: calls the task for every index of
+   * [min, min + extent) and gives 0, or the code of an iteration that failed. */
+  int32_t (*parallel_handler)(struct retrograde_context*, retrograde_task, int32_t min,
+                              int32_t extent, uint8_t* closure);
 } retrograde_context;
 
 /* ---- called by generated code ---- */
 
 enum { retrograde_allocation_alignment = 128 };
-
-/* One iteration of a parallel loop. */
-typedef int32_t (*retrograde_task)(retrograde_context*, int32_t index, uint8_t* closure);
 
 /* Runs task for every index of [min, min + extent), in any order and in parallel. When iterations
  * fail, those above the lowest failing one may be skipped; its code is the result. */
@@ -94,6 +100,12 @@ void retrograde_free_all(retrograde_context*, void** blocks, int64_t count);
  * retrograde_format_message. */
 int32_t retrograde_report_error(retrograde_context*, int32_t code, const char* format, ...);
 void retrograde_print(retrograde_context*, const char* format, ...);
+
+/* ---- in the static runtime alone ---- */
+
+/* Fills in the context of one call of a function that was compiled ahead of time: its handlers call
+ * the functions of HalideRuntime.h with `user_context`. */
+void retrograde_begin_call(retrograde_context*, void* user_context);
 
 /* ---- for hosts ---- */
 
