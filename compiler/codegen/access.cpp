@@ -2,7 +2,7 @@
 //
 //   dense       base + i                  a vector load or store; base - i: the same, reversed
 //   strided     base + s i, 2 <= |s| <= 4 loads: the vectors that cover the lanes, and shuffles
-//   apart       base + s i                scalars at constant distances
+//   apart       base + s i                scalars at equal distances, s any scalar
 //   pieces      a ramp of vectors         each piece on its own
 //   broadcast   base                      one scalar
 //   arbitrary                             gather or scatter where the machine has it, else scalars
@@ -60,6 +60,11 @@ std::optional<FunctionGenerator::LinearIndex> FunctionGenerator::as_linear(const
   if (a->stride == 0 && b->stride == 0) return LinearIndex{base, 0};
   if (!factor || (a->stride != 0 && b->stride != 0)) return std::nullopt;
   return LinearIndex{base, *factor * (a->stride == 0 ? b->stride : a->stride)};
+}
+
+static const Ramp* as_scalar_ramp(const Expr& index) {
+  const auto* ramp = index.as<Ramp>();
+  return ramp && ramp->base.type().is_scalar() ? ramp : nullptr;
 }
 
 // The pieces of a ramp of vectors, as indices of their own; empty when `index` is none.
@@ -137,6 +142,8 @@ Value* FunctionGenerator::load_scalar(const Storage& from, Type type, Value* ind
 Value* FunctionGenerator::load_vector(const Storage& from, Type type, const Expr& index,
                                       Value* predicate) {
   if (const auto linear = as_linear(index)) return load_linear(from, type, *linear, predicate);
+  if (const auto* ramp = as_scalar_ramp(index); ramp && !predicate)
+    return load_apart(from, type, index64(ramp->base), index64(ramp->stride));
   const std::vector<Expr> pieces = pieces_of(index);
   if (pieces.empty()) return gather(from, type, index_vector(index), predicate);
   std::vector<Value*> parts;
@@ -178,8 +185,9 @@ Value* FunctionGenerator::load_linear(const Storage& from, Type type, const Line
     return gather(shifted, type, b_.CreateMul(iota(e_, distance, lanes), splat(e_, step, lanes)),
                   predicate);
   }
-  return stride > 0 && stride <= 4 ? load_strided(from, type, first, stride)
-                                   : load_apart(from, type, first, stride);
+  return stride > 0 && stride <= 4
+             ? load_strided(from, type, first, stride)
+             : load_apart(from, type, first, b_.getInt64(static_cast<uint64_t>(stride)));
 }
 
 Value* FunctionGenerator::load_dense(const Storage& from, Type type, Value* first,
@@ -216,10 +224,15 @@ Value* FunctionGenerator::load_strided(const Storage& from, Type type, Value* fi
   return result;
 }
 
-Value* FunctionGenerator::load_apart(const Storage& from, Type type, Value* first, int64_t stride) {
+Value* FunctionGenerator::lane_index(Value* first, Value* stride, int lane) {
+  Value* number = b_.getInt64(static_cast<uint64_t>(lane));
+  return b_.CreateAdd(first, b_.CreateMul(stride, number));
+}
+
+Value* FunctionGenerator::load_apart(const Storage& from, Type type, Value* first, Value* stride) {
   std::vector<Value*> lanes;
   for (int i = 0; i < type.lanes(); i++) {
-    Value* index = b_.CreateAdd(first, b_.getInt64(static_cast<uint64_t>(i * stride)));
+    Value* index = lane_index(first, stride, i);
     lanes.push_back(load_scalar(from, type.element_of(), index, nullptr));
   }
   return from_lanes(e_, lanes);
@@ -298,11 +311,14 @@ void FunctionGenerator::store_vector(const Storage& to, Type type, const Expr& i
     start += part;
   }
   if (!pieces.empty()) return;
-  if (!linear) return scatter(to, type, index_vector(index), stored, predicate);
-  Value* first = index64(linear->base);  // apart: constant distances
+  const auto* ramp = as_scalar_ramp(index);
+  if (!linear && (!ramp || predicate))
+    return scatter(to, type, index_vector(index), stored, predicate);
+  Value* first = index64(linear ? linear->base : ramp->base);
+  Value* stride =
+      linear ? b_.getInt64(static_cast<uint64_t>(linear->stride)) : index64(ramp->stride);
   for (int i = 0; i < lanes; i++) {
-    Value* at = b_.CreateAdd(first, b_.getInt64(static_cast<uint64_t>(i * linear->stride)));
-    store_scalar(to, type.element_of(), at, lane(e_, stored, i),
+    store_scalar(to, type.element_of(), lane_index(first, stride, i), lane(e_, stored, i),
                  predicate ? lane(e_, predicate, i) : nullptr);
   }
 }

@@ -59,6 +59,7 @@ Value* splat(Emitter& e, Value* scalar, int lanes);      // the scalar itself wh
 Value* iota(Emitter& e, llvm::Type* scalar, int lanes);  // 0, 1, 2 ... of an integer or float type
 Value* slice(Emitter& e, Value* vector, int start, int lanes);  // past the end: any value
 Value* concat(Emitter& e, std::vector<Value*> parts);
+Value* interleave(Emitter& e, const std::vector<Value*>& vectors);  // a0 b0 ... a1 b1 ...
 Value* repeat(Emitter& e, Value* vector, int times);
 Value* reverse(Emitter& e, Value* vector);
 Value* lane(Emitter& e, Value* vector, int index);  // a scalar

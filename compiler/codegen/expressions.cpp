@@ -129,9 +129,23 @@ Value* FunctionGenerator::make(const Ramp& e) {
   return binary(e_, Kind::Add, e.type, base, binary(e_, Kind::Mul, e.type, stride, steps));
 }
 
+// Lane i of the result is lane i / k of the i % k-th of k vectors.
+static bool is_interleave(const Shuffle& e) {
+  const int count = static_cast<int>(e.vectors.size()), lanes = e.vectors[0].type().lanes();
+  if (count < 2 || static_cast<int>(e.indices.size()) != count * lanes) return false;
+  for (const Expr& vector : e.vectors) {
+    if (vector.type().lanes() != lanes) return false;
+  }
+  for (int i = 0; i < count * lanes; i++) {
+    if (e.indices[static_cast<size_t>(i)] != i % count * lanes + i / count) return false;
+  }
+  return true;
+}
+
 Value* FunctionGenerator::make(const Shuffle& e) {
   std::vector<Value*> vectors;
   for (const Expr& vector : e.vectors) vectors.push_back(value(vector));
+  if (is_interleave(e)) return interleave(e_, vectors);
   // Two operands of one width are a shuffle of LLVM's; more are put together first.
   if (vectors.size() == 2 && e.vectors[0].type() == e.vectors[1].type()) {
     return shuffle(e_, vectors[0], vectors[1], e.indices);

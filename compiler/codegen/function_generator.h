@@ -147,7 +147,8 @@ class FunctionGenerator {
   Value* load_linear(const Storage& from, Type type, const LinearIndex& index, Value* predicate);
   Value* load_dense(const Storage& from, Type type, Value* first, Value* predicate);
   Value* load_strided(const Storage& from, Type type, Value* first, int64_t stride);
-  Value* load_apart(const Storage& from, Type type, Value* first, int64_t stride);
+  Value* lane_index(Value* first, Value* stride, int lane);
+  Value* load_apart(const Storage& from, Type type, Value* first, Value* stride);
   Value* gather(const Storage& from, Type type, Value* indices, Value* predicate);
   void make(const ir::Store& s);
   void store_scalar(const Storage& to, Type type, Value* index, Value* value, Value* predicate);

@@ -78,6 +78,22 @@ Value* concat(Emitter& e, std::vector<Value*> parts) {
   return parts[0];
 }
 
+// By halves while their number is even: unpack instructions do pairs, and nothing does more.
+Value* interleave(Emitter& e, const std::vector<Value*>& vectors) {
+  const int count = static_cast<int>(vectors.size()), lanes = lanes_of(vectors[0]);
+  if (count == 1) return vectors[0];
+  std::vector<int> indices;
+  for (int i = 0; i < count * lanes; i++) indices.push_back(i % count * lanes + i / count);
+  if (count == 2) return shuffle(e, vectors[0], vectors[1], indices);
+  if (count % 2 == 0) {
+    std::vector<Value*> even, odd;
+    for (size_t i = 0; i < vectors.size(); i++) (i % 2 ? odd : even).push_back(vectors[i]);
+    return interleave(e, {interleave(e, even), interleave(e, odd)});
+  }
+  Value* all = concat(e, vectors);
+  return shuffle(e, all, all, indices);
+}
+
 Value* repeat(Emitter& e, Value* vector, int times) {
   if (!vector->getType()->isVectorTy()) return splat(e, vector, times);
   std::vector<int> indices;

@@ -2,6 +2,8 @@
 
 #include "lower/flatten_storage.h"
 #include "lower/free_early.h"
+#include "lower/interleave_vectors.h"
+#include "lower/lower_atomics.h"
 #include "lower/partition_loops.h"
 #include "lower/unroll_loops.h"
 #include "lower/vectorize_loops.h"
@@ -18,6 +20,7 @@ const std::vector<StatementPass>& statement_passes() {
       {"unroll_loops", unroll_loops},
       {"vectorize_loops", vectorize_loops},
   };
+      {"interleave_vectors", interleave_vectors},
   return passes;
 }
 

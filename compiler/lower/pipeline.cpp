@@ -11,6 +11,7 @@
 #include "lower/flatten_storage.h"
 #include "lower/free_early.h"
 #include "lower/inline_functions.h"
+#include "lower/interleave_vectors.h"
 #include "lower/lower.h"
 #include "lower/make_names_unique.h"
 #include "lower/partition_loops.h"
@@ -71,6 +72,8 @@ constexpr Pass passes[] = {
     {"vectorize_loops", Phase::Vector, [](Lowering&, const Stmt& s) { return vectorize_loops(s); }},
     {"simplify_vectors", Phase::Vector, run_simplify},
     {"free_early", Phase::Vector, [](Lowering&, const Stmt& s) { return free_early(s); }},
+    {"interleave_vectors", Phase::Vector,
+     [](Lowering&, const Stmt& s) { return interleave_vectors(s); }},
 };
 
 std::vector<std::string> names_of(const std::vector<LoweredArgument>& args) {

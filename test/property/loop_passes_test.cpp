@@ -6,6 +6,7 @@
 
 #include "ir/validate.h"
 #include "lower/free_early.h"
+#include "lower/interleave_vectors.h"
 #include "lower/partition_loops.h"
 #include "lower/unroll_loops.h"
 #include "lower/vectorize_loops.h"
@@ -87,7 +88,7 @@ class RandomProgram {
   }
 
   Stmt statement(const Expr& x, const Expr& y, int depth) {
-    switch (depth == 0 ? number(0, 1) : number(0, 9)) {
+    switch (depth == 0 ? number(0, 1) : number(0, 10)) {
       case 0:
       case 1:
         return make_store(flip() ? "a" : "b", value(2), x + y * width + margin);
@@ -122,6 +123,10 @@ class RandomProgram {
       }
       case 6:
         return scratch(x, y);
+      case 9: {  // neighbours in memory
+        Expr index = (x + y * width) * 2 + margin;
+        return make_block({make_store("d", value(2), index + 1), make_store("d", value(1), index)});
+      }
       case 7:
         return make_evaluate(call_op(Op::print, {value(1)}));
       case 8: {  // extent may vary
@@ -179,7 +184,9 @@ class RandomProgram {
   Expr read() {
     Expr at = position();
     Expr last = flip() ? Expr(width - 1) : variable("w") - 1;
-    switch (number(0, 3)) {
+    switch (number(0, 4)) {
+      case 4:  // alternates between neighbours
+        return make_load(Int(32), "in", (any_coordinate() + number(0, 1)) / number(2, 3) % width);
       case 0:
         return make_load(Int(32), "in", clamp(likely(at), 0, last));
       case 1:
@@ -244,6 +251,7 @@ Outcome run(const Stmt& s, int w, int x_min) {
   };
   for (const char* name : {"a", "b", "s", "m", "p"}) fill(name, width * height + 2 * margin);
   fill("in", width);
+  fill("d", 2 * width * height + 2 * margin);
   fill("tight", 7);
   evaluator.set("w", w);
   evaluator.set("x_min", x_min);
@@ -294,6 +302,7 @@ TEST_P(LoopPasses, KeepWhatProgramsCompute) {
     expect_same("unroll_loops", seed, program, unrolled, Phase::FlatStorage);
     Stmt vectorized = vectorize_loops(unrolled);
     expect_same("vectorize_loops", seed, program, vectorized, Phase::Vector);
+    expect_same("interleave_vectors", seed, program, interleave_vectors(vectorized), Phase::Vector);
     expect_same("free_early", seed, program, free_early(vectorized), Phase::Vector);
     expect_same("vectorize_loops alone", seed, program, vectorize_loops(unroll_loops(program)),
                 Phase::Vector);
