@@ -3,7 +3,6 @@
 #include "lower/flatten_storage.h"
 #include "lower/free_early.h"
 #include "lower/interleave_vectors.h"
-#include "lower/lower_atomics.h"
 #include "lower/partition_loops.h"
 #include "lower/unroll_loops.h"
 #include "lower/vectorize_loops.h"
