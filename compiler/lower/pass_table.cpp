@@ -14,12 +14,12 @@ const std::vector<StatementPass>& statement_passes() {
   static const std::vector<StatementPass> passes = {
       {"flatten_storage", [](const Stmt& s) { return flatten_storage(s); }},
       {"free_early", free_early},
+      {"interleave_vectors", interleave_vectors},
       {"partition_loops", partition_loops},
       {"simplify", [](const Stmt& s) { return simplify(s); }},
       {"unroll_loops", unroll_loops},
       {"vectorize_loops", vectorize_loops},
   };
-      {"interleave_vectors", interleave_vectors},
   return passes;
 }
 

@@ -70,10 +70,10 @@ constexpr Pass passes[] = {
      [](Lowering&, const Stmt& s) { return partition_loops(s); }},
     {"unroll_loops", Phase::FlatStorage, [](Lowering&, const Stmt& s) { return unroll_loops(s); }},
     {"vectorize_loops", Phase::Vector, [](Lowering&, const Stmt& s) { return vectorize_loops(s); }},
-    {"simplify_vectors", Phase::Vector, run_simplify},
-    {"free_early", Phase::Vector, [](Lowering&, const Stmt& s) { return free_early(s); }},
     {"interleave_vectors", Phase::Vector,
      [](Lowering&, const Stmt& s) { return interleave_vectors(s); }},
+    {"simplify_vectors", Phase::Vector, run_simplify},
+    {"free_early", Phase::Vector, [](Lowering&, const Stmt& s) { return free_early(s); }},
 };
 
 std::vector<std::string> names_of(const std::vector<LoweredArgument>& args) {
