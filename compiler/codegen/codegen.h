@@ -5,9 +5,11 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <string>
 #include <vector>
 
+#include "codegen/exports.h"
 #include "ir/lowered_function.h"
 #include "ir/target.h"
 
@@ -37,6 +39,16 @@ struct Module {
 // code generator.
 Module compile_object(const std::vector<ir::LoweredFunction>& functions, const Options& options);
 Module compile_object(const ir::LoweredFunction& function, const Options& options);
+
+// Ahead of time: functions that the exports refer to are reached through these alone.
+struct Program {
+  std::vector<ir::LoweredFunction> functions;
+  std::vector<Export> exports;
+  std::vector<Dispatch> dispatches;
+};
+enum class Format { Object, Assembly, LlvmIr, Bitcode };
+std::map<Format, std::string> compile_program(const Program& program, const Options& options,
+                                              const std::vector<Format>& formats);
 
 std::string compile_llvm_ir(const ir::LoweredFunction& function, const Options& options);
 std::string compile_assembly(const ir::LoweredFunction& function, const Options& options);

@@ -1,0 +1,23 @@
+// The header of compiled functions, for C and C++, and code that registers them.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "codegen/exports.h"
+#include "frontend/module.h"
+
+namespace retrograde::aot {
+
+struct DeclaredFunction {
+  std::string name;  // with its namespaces
+  codegen::Signature signature;
+};
+
+std::string header_text(const std::string& module_name, const Target& target,
+                        const std::vector<DeclaredFunction>& functions);
+// C++ that tells halide_register_argv_and_metadata, which the program defines, of each function as
+// soon as the program starts.
+std::string registration_text(const std::vector<DeclaredFunction>& functions, const Target& target);
+
+}  // namespace retrograde::aot

@@ -1,0 +1,296 @@
+// module_compiler.cpp -- what the front end's Modules reach. Everything that is to be written is
+// made first; then all files are written at once.
+#include <algorithm>
+#include <optional>
+#include <sstream>
+
+#include "aot/archive.h"
+#include "aot/files.h"
+#include "aot/header.h"
+#include "aot/html.h"
+#include "aot/mangle.h"
+#include "aot/program.h"
+#include "aot/runtime_object.h"
+#include "codegen/machine.h"
+#include "diagnostics/error.h"
+#include "diagnostics/large_stack.h"
+#include "frontend/compiler_interface.h"
+#include "frontend/module.h"
+#include "ir/print.h"
+#include "lower/lower.h"
+
+namespace retrograde {
+namespace {
+
+using codegen::Format;
+using Files = std::map<OutputFileType, std::string>;
+
+#ifdef RETROGRADE_VALIDATE
+constexpr bool validate_passes = true;
+#else
+constexpr bool validate_passes = false;
+#endif
+
+codegen::Options options_for(const Target& target) {
+  codegen::Options options;
+  options.target = target;
+  options.tune_for_host = false;  // the code runs elsewhere
+  return options;
+}
+
+void check_type(OutputFileType type, const std::string& module) {
+  const std::string asked = "write " + quoted(Internal::get_output_info({}).at(type).name) +
+                            " of the module " + quoted(module);
+  switch (type) {
+    case OutputFileType::c_source:
+    case OutputFileType::python_extension:
+    case OutputFileType::pytorch_wrapper:
+    case OutputFileType::featurization:
+    case OutputFileType::compiler_log:
+      unsupported(asked,
+                  "a module is compiled to machine code, LLVM's formats, statements and "
+                  "headers",
+                  "there is no writer for this kind of output",
+                  "Write an object or a static library, and a header");
+    case OutputFileType::cpp_stub:
+    case OutputFileType::schedule:
+      unsupported(asked, "only generators have stubs and schedules",
+                  "a module does not know where it came from", "Ask the generator for it");
+    default:
+      return;
+  }
+}
+
+std::string statement_text(const Module& module) {
+  std::ostringstream out;
+  run_on_large_stack([&] {
+    for (const Internal::LoweredFunc& function : aot::exported_functions(module)) {
+      out << "// " << function.name << " for " << module.target().to_string() << "\n"
+          << function.lowered.body << "\n";
+    }
+  });
+  return out.str();
+}
+
+std::vector<aot::DeclaredFunction> declared_functions(const Module& module) {
+  std::vector<aot::DeclaredFunction> result;
+  for (const Internal::LoweredFunc& function : aot::exported_functions(module))
+    result.push_back({function.name, aot::signature_of(function, module)});
+  return result;
+}
+
+std::string page_text(const Module& module, const std::string& assembly) {
+  std::vector<aot::PageFunction> functions;
+  run_on_large_stack([&] {
+    for (const Internal::LoweredFunc& function : aot::exported_functions(module)) {
+      std::ostringstream statement;
+      statement << function.lowered.body;
+      functions.push_back({function.name, function.loop_nest, statement.str()});
+    }
+  });
+  return aot::html_page(module.name() + " for " + module.target().to_string(), functions, assembly);
+}
+
+// The texts and bytes of one module, machine code as far as some output needs it.
+class Outputs {
+ public:
+  Outputs(const Module& module, const Files& wanted) : module_(module) {
+    std::vector<Format> formats;
+    const auto need = [&](OutputFileType type, Format format) {
+      const bool is_new = std::find(formats.begin(), formats.end(), format) == formats.end();
+      if (wanted.count(type) && is_new) formats.push_back(format);
+    };
+    need(OutputFileType::object, Format::Object);
+    need(OutputFileType::static_library, Format::Object);
+    need(OutputFileType::assembly, Format::Assembly);
+    need(OutputFileType::stmt_html, Format::Assembly);
+    need(OutputFileType::llvm_assembly, Format::LlvmIr);
+    need(OutputFileType::bitcode, Format::Bitcode);
+    if (formats.empty()) return;
+    code_ =
+        codegen::compile_program(aot::program_of(module), options_for(module.target()), formats);
+  }
+
+  std::string object() const { return code_.at(Format::Object); }
+
+  std::string contents(OutputFileType type) const {
+    switch (type) {
+      case OutputFileType::object:
+        return object();
+      case OutputFileType::static_library:
+        return library();
+      case OutputFileType::assembly:
+        return code_.at(Format::Assembly);
+      case OutputFileType::llvm_assembly:
+        return code_.at(Format::LlvmIr);
+      case OutputFileType::bitcode:
+        return code_.at(Format::Bitcode);
+      case OutputFileType::stmt:
+        return statement_text(module_);
+      case OutputFileType::stmt_html:
+        return page_text(module_, code_.at(Format::Assembly));
+      case OutputFileType::c_header:
+        return aot::header_text(module_.name(), module_.target(), declared_functions(module_));
+      case OutputFileType::registration:
+        return aot::registration_text(declared_functions(module_), module_.target());
+      default:
+        internal_error("no writer for an output that was checked");
+    }
+  }
+
+ private:
+  const Module module_;
+  std::map<Format, std::string> code_;
+
+  std::string library() const {
+    std::vector<aot::Member> members = {{aot::name_parts(module_.name()).back() + ".o", object()}};
+    if (!module_.target().has_feature(Target::NoRuntime))
+      members.push_back({"retrograde_runtime.o", aot::runtime_object(module_.target())});
+    return aot::archive(members);
+  }
+};
+
+// dir/name.ext => dir/name<suffix>.ext
+std::string with_suffix(const std::string& path, const std::string& suffix,
+                        const std::string& extension) {
+  const bool ends = path.size() > extension.size() &&
+                    path.compare(path.size() - extension.size(), extension.size(), extension) == 0;
+  const std::string stem = ends ? path.substr(0, path.size() - extension.size()) : path;
+  return stem + suffix + (ends ? extension : "");
+}
+
+// Several targets: variants, the function that chooses, and the runtime.
+class MultitargetOutputs {
+ public:
+  MultitargetOutputs(const std::string& function_name, const std::vector<Module>& modules,
+                     const std::vector<std::string>& suffixes)
+      : name_(function_name), modules_(modules), suffixes_(suffixes) {}
+
+  std::vector<aot::File> files(const Files& wanted) {
+    std::vector<aot::File> result;
+    const auto info = Internal::get_output_info(baseline().target());
+    Files multi;
+    for (const auto& [type, path] : wanted) {
+      if (info.at(type).is_multi) multi[type] = path;
+    }
+    add_variants(multi, info, wanted.count(OutputFileType::static_library) != 0, result);
+    for (const auto& [type, path] : wanted) {
+      if (!info.at(type).is_multi) result.push_back({path, shared(type)});
+    }
+    if (const auto object = wanted.find(OutputFileType::object); object != wanted.end())
+      add_objects(object->second, info.at(OutputFileType::object).extension, result);
+    return result;
+  }
+
+ private:
+  const std::string& name_;
+  const std::vector<Module>& modules_;
+  const std::vector<std::string>& suffixes_;
+  std::vector<aot::Member> members_;
+
+  const Module& baseline() const { return modules_.back(); }
+  bool has_runtime() const { return !baseline().target().has_feature(Target::NoRuntime); }
+
+  void add_variants(const Files& multi,
+                    const std::map<OutputFileType, const Internal::OutputInfo>& info,
+                    bool wants_library, std::vector<aot::File>& result) {
+    for (size_t i = 0; i < modules_.size(); i++) {
+      Files wanted = multi;
+      if (wants_library) wanted[OutputFileType::object];
+      const Outputs outputs(modules_[i], wanted);
+      for (const auto& [type, path] : multi) {
+        const std::string place = with_suffix(path, suffixes_[i], info.at(type).extension);
+        result.push_back({place, outputs.contents(type)});
+      }
+      if (wants_library)
+        members_.push_back({modules_[i].functions()[0].name + ".o", outputs.object()});
+    }
+  }
+
+  std::string wrapper_object() const {
+    return codegen::compile_program(aot::dispatcher(name_, modules_),
+                                    options_for(baseline().target()), {Format::Object})
+        .at(Format::Object);
+  }
+
+  void add_objects(const std::string& path, const std::string& extension,
+                   std::vector<aot::File>& result) {
+    result.push_back({with_suffix(path, "_wrapper", extension), wrapper_object()});
+    if (has_runtime()) {
+      result.push_back(
+          {with_suffix(path, "_runtime", extension), aot::runtime_object(baseline().target())});
+    }
+  }
+
+  std::string shared(OutputFileType type) {
+    const std::vector<aot::DeclaredFunction> functions = {
+        {name_, aot::dispatcher_signature(name_, baseline())}};
+    if (type == OutputFileType::c_header)
+      return aot::header_text(name_, baseline().target(), functions);
+    if (type == OutputFileType::registration)
+      return aot::registration_text(functions, baseline().target());
+    RETROGRADE_ASSERT(type == OutputFileType::static_library, "an output without a writer");
+    std::vector<aot::Member> members = members_;
+    members.push_back({aot::name_parts(name_).back() + "_wrapper.o", wrapper_object()});
+    if (has_runtime())
+      members.push_back({"retrograde_runtime.o", aot::runtime_object(baseline().target())});
+    return aot::archive(members);
+  }
+};
+
+class AheadOfTime : public ModuleCompiler {
+ public:
+  ir::LoweredFunction lower(const PipelineSpec& pipeline,
+                            const std::vector<ir::LoweredArgument>& inputs,
+                            const Target& target) override {
+    codegen::machine_for(target, false);  // says what cannot be compiled for before any work
+    ir::LowerOptions options;
+    options.target = target;
+    options.validate = validate_passes;
+    return ir::lower(pipeline.name, pipeline.outputs, inputs, options);
+  }
+
+  std::string loop_nest(const PipelineSpec& pipeline) override {
+    return ir::loop_nest_text(pipeline.outputs);
+  }
+
+  std::vector<uint8_t> object(const Module& module) override {
+    const std::string bytes = Outputs(module, {{OutputFileType::object, ""}}).object();
+    return {bytes.begin(), bytes.end()};
+  }
+
+  void write(const Module& module, const Files& output_files) override {
+    for (const auto& [type, path] : output_files) check_type(type, module.name());
+    const Outputs outputs(module, output_files);
+    std::vector<aot::File> files;
+    for (const auto& [type, path] : output_files) files.push_back({path, outputs.contents(type)});
+    aot::write_files(files);
+  }
+
+  void write_multitarget(const std::string& function_name, const std::vector<Module>& modules,
+                         const std::vector<std::string>& suffixes,
+                         const Files& output_files) override {
+    for (const auto& [type, path] : output_files) check_type(type, function_name);
+    aot::write_files(MultitargetOutputs(function_name, modules, suffixes).files(output_files));
+  }
+
+  void write_runtime(const Files& output_files, const Target& target) override {
+    const std::string object = aot::runtime_object(target);
+    std::vector<aot::File> files;
+    for (const auto& [type, path] : output_files) {
+      const bool is_library = type == OutputFileType::static_library;
+      files.push_back(
+          {path, is_library ? aot::archive({{"retrograde_runtime.o", object}}) : object});
+    }
+    aot::write_files(files);
+  }
+};
+
+}  // namespace
+
+ModuleCompiler& module_compiler() {
+  static AheadOfTime compiler;
+  return compiler;
+}
+
+}  // namespace retrograde

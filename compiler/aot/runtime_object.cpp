@@ -1,0 +1,36 @@
+// The linker's input is embedded by the assembler, so that the compiler needs no file at run time.
+#include "aot/runtime_object.h"
+
+#include "diagnostics/error.h"
+
+#define RETROGRADE_EMBED(symbol, path)                                                 \
+  __asm__(".section .rodata\n.balign 16\n" #symbol ":\n.incbin \"" path "\"\n" #symbol \
+          "_end:\n"                                                                    \
+          ".byte 0\n.previous\n");                                                     \
+  extern "C" __attribute__((visibility("hidden"))) const char symbol[], symbol##_end[];
+
+RETROGRADE_EMBED(retrograde_embedded_runtime, RETROGRADE_RUNTIME_OBJECT)
+#ifdef RETROGRADE_ARM_RUNTIME_OBJECT
+RETROGRADE_EMBED(retrograde_embedded_arm_runtime, RETROGRADE_ARM_RUNTIME_OBJECT)
+#endif
+
+namespace retrograde::aot {
+
+std::string runtime_object(const Target& target) {
+  const Target host = get_host_target();
+  if (target.os == host.os && target.bits == host.bits) {
+    if (target.arch == host.arch)
+      return {retrograde_embedded_runtime, retrograde_embedded_runtime_end};
+#ifdef RETROGRADE_ARM_RUNTIME_OBJECT
+    if (target.arch == Target::ARM)
+      return {retrograde_embedded_arm_runtime, retrograde_embedded_arm_runtime_end};
+#endif
+  }
+  unsupported("add the runtime for target " + quoted(target.to_string()),
+              "a runtime is there for this machine and for those that a cross compiler was found "
+              "for when the compiler was built",
+              "there is none for this target",
+              "Add \"no_runtime\" to the target, compile the folder runtime for it and link that");
+}
+
+}  // namespace retrograde::aot

@@ -1,0 +1,10 @@
+// Emits what exports.h describes.
+#pragma once
+
+#include "codegen/emitter.h"
+#include "codegen/exports.h"
+
+namespace retrograde::codegen {
+void make_export(Emitter& emitter, const Export& e, llvm::Function* body);
+void make_dispatch(Emitter& emitter, const Dispatch& dispatch);
+}  // namespace retrograde::codegen
