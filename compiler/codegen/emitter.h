@@ -60,6 +60,8 @@ Value* iota(Emitter& e, llvm::Type* scalar, int lanes);  // 0, 1, 2 ... of an in
 Value* slice(Emitter& e, Value* vector, int start, int lanes);  // past the end: any value
 Value* concat(Emitter& e, std::vector<Value*> parts);
 Value* interleave(Emitter& e, const std::vector<Value*>& vectors);  // a0 b0 ... a1 b1 ...
+// Lanes of the concatenation of two vectors of one width, or of more when the result is as wide.
+Value* pick_lanes(Emitter& e, const std::vector<Value*>& vectors, const std::vector<int>& indices);
 Value* repeat(Emitter& e, Value* vector, int times);
 Value* reverse(Emitter& e, Value* vector);
 Value* lane(Emitter& e, Value* vector, int index);  // a scalar

@@ -1,4 +1,6 @@
 // Every expression kind. A node that several expressions share gets one value.
+#include <algorithm>
+
 #include "codegen/function_generator.h"
 #include "diagnostics/error.h"
 #include "ir/build.h"
@@ -146,10 +148,13 @@ Value* FunctionGenerator::make(const Shuffle& e) {
   std::vector<Value*> vectors;
   for (const Expr& vector : e.vectors) vectors.push_back(value(vector));
   if (is_interleave(e)) return interleave(e_, vectors);
-  // Two operands of one width are a shuffle of LLVM's; more are put together first.
-  if (vectors.size() == 2 && e.vectors[0].type() == e.vectors[1].type()) {
-    return shuffle(e_, vectors[0], vectors[1], e.indices);
-  }
+  // Vectors of one width give a shuffle of LLVM's each, put over those before; others are put
+  // together first.
+  const bool is_uniform = std::all_of(e.vectors.begin(), e.vectors.end(), [&](const Expr& vector) {
+    return vector.type() == e.vectors[0].type();
+  });
+  if (is_uniform && (vectors.size() == 2 || e.type.lanes() == e.vectors[0].type().lanes()))
+    return pick_lanes(e_, vectors, e.indices);
   Value* all = concat(e_, vectors);
   return e.indices.size() == 1 ? lane(e_, all, e.indices[0]) : shuffle(e_, all, all, e.indices);
 }

@@ -76,8 +76,7 @@ void FunctionGenerator::bind_arguments() {
     v->setName(arg.name);
     if (arg.is_buffer()) {
       frame_.variables[arg.name + ".buffer"] = v;
-      // Inputs and outputs may be one buffer: they share a tag.
-      frame_.storages[arg.name] = {host_pointer(v), nullptr, alias_tag("arguments")};
+      frame_.storages[arg.name] = {host_pointer(v), nullptr, alias_tag(arg.name)};
     } else {
       frame_.variables[arg.name] = v;
     }

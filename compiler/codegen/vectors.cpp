@@ -1,4 +1,5 @@
 // Vectors of any number of lanes: slices, concatenations, shuffles, reductions.
+#include <algorithm>
 #include <numeric>
 
 #include "codegen/emitter.h"
@@ -76,6 +77,31 @@ Value* concat(Emitter& e, std::vector<Value*> parts) {
     parts = std::move(joined);
   }
   return parts[0];
+}
+
+Value* pick_lanes(Emitter& e, const std::vector<Value*>& vectors, const std::vector<int>& indices) {
+  const int lanes = lanes_of(vectors[0]);
+  std::vector<int> used;
+  for (int index : indices) {
+    if (std::find(used.begin(), used.end(), index / lanes) == used.end())
+      used.push_back(index / lanes);
+  }
+  const auto vector = [&](size_t i) { return vectors[static_cast<size_t>(used[i])]; };
+  Value* second = used.size() > 1 ? vector(1) : vector(0);
+  std::vector<int> picks(indices.size(), -1);
+  for (size_t i = 0; i < indices.size(); i++) {
+    if (indices[i] / lanes == used[0]) picks[i] = indices[i] % lanes;
+    if (used.size() > 1 && indices[i] / lanes == used[1]) picks[i] = lanes + indices[i] % lanes;
+  }
+  Value* result = shuffle(e, vector(0), second, picks);
+  for (size_t source = 2; source < used.size(); source++) {
+    for (size_t i = 0; i < indices.size(); i++) {
+      const bool is_here = indices[i] / lanes == used[source];
+      picks[i] = is_here ? lanes + indices[i] % lanes : static_cast<int>(i);
+    }
+    result = shuffle(e, result, vector(source), picks);
+  }
+  return result;
 }
 
 // By halves while their number is even: unpack instructions do pairs, and nothing does more.

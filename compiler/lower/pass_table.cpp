@@ -1,5 +1,6 @@
 #include "lower/pass_table.h"
 
+#include "lower/deinterleave_loads.h"
 #include "lower/flatten_storage.h"
 #include "lower/free_early.h"
 #include "lower/interleave_vectors.h"
@@ -12,6 +13,7 @@ namespace retrograde::ir {
 
 const std::vector<StatementPass>& statement_passes() {
   static const std::vector<StatementPass> passes = {
+      {"deinterleave_loads", deinterleave_loads},
       {"flatten_storage", [](const Stmt& s) { return flatten_storage(s); }},
       {"free_early", free_early},
       {"interleave_vectors", interleave_vectors},

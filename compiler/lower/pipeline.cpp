@@ -8,6 +8,7 @@
 #include "ir/validate.h"
 #include "lower/argument_checks.h"
 #include "lower/build_loop_nests.h"
+#include "lower/deinterleave_loads.h"
 #include "lower/flatten_storage.h"
 #include "lower/free_early.h"
 #include "lower/inline_functions.h"
@@ -72,6 +73,8 @@ constexpr Pass passes[] = {
     {"vectorize_loops", Phase::Vector, [](Lowering&, const Stmt& s) { return vectorize_loops(s); }},
     {"interleave_vectors", Phase::Vector,
      [](Lowering&, const Stmt& s) { return interleave_vectors(s); }},
+    {"deinterleave_loads", Phase::Vector,
+     [](Lowering&, const Stmt& s) { return deinterleave_loads(s); }},
     {"simplify_vectors", Phase::Vector, run_simplify},
     {"free_early", Phase::Vector, [](Lowering&, const Stmt& s) { return free_early(s); }},
 };

@@ -5,6 +5,7 @@
 #include <random>
 
 #include "ir/validate.h"
+#include "lower/deinterleave_loads.h"
 #include "lower/free_early.h"
 #include "lower/interleave_vectors.h"
 #include "lower/partition_loops.h"
@@ -184,9 +185,13 @@ class RandomProgram {
   Expr read() {
     Expr at = position();
     Expr last = flip() ? Expr(width - 1) : variable("w") - 1;
-    switch (number(0, 4)) {
+    switch (number(0, 5)) {
       case 4:  // alternates between neighbours
         return make_load(Int(32), "in", (any_coordinate() + number(0, 1)) / number(2, 3) % width);
+      case 5: {  // beside each other
+        Expr even = clamp(likely(position()), 0, width / 2 - 1) * 2;
+        return make_load(Int(32), "in", even) - make_load(Int(32), "in", even + 1) * 2;
+      }
       case 0:
         return make_load(Int(32), "in", clamp(likely(at), 0, last));
       case 1:
@@ -303,6 +308,7 @@ TEST_P(LoopPasses, KeepWhatProgramsCompute) {
     Stmt vectorized = vectorize_loops(unrolled);
     expect_same("vectorize_loops", seed, program, vectorized, Phase::Vector);
     expect_same("interleave_vectors", seed, program, interleave_vectors(vectorized), Phase::Vector);
+    expect_same("deinterleave_loads", seed, program, deinterleave_loads(vectorized), Phase::Vector);
     expect_same("free_early", seed, program, free_early(vectorized), Phase::Vector);
     expect_same("vectorize_loops alone", seed, program, vectorize_loops(unroll_loops(program)),
                 Phase::Vector);
