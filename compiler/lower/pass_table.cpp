@@ -1,6 +1,7 @@
 #include "lower/pass_table.h"
 
 #include "lower/deinterleave_loads.h"
+#include "lower/drop_checks.h"
 #include "lower/flatten_storage.h"
 #include "lower/free_early.h"
 #include "lower/interleave_vectors.h"
@@ -14,6 +15,8 @@ namespace retrograde::ir {
 const std::vector<StatementPass>& statement_passes() {
   static const std::vector<StatementPass> passes = {
       {"deinterleave_loads", deinterleave_loads},
+      {"drop_asserts", drop_asserts},
+      {"drop_bounds_query", drop_bounds_query},
       {"flatten_storage", [](const Stmt& s) { return flatten_storage(s); }},
       {"free_early", free_early},
       {"interleave_vectors", interleave_vectors},

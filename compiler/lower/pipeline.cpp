@@ -9,6 +9,7 @@
 #include "lower/argument_checks.h"
 #include "lower/build_loop_nests.h"
 #include "lower/deinterleave_loads.h"
+#include "lower/drop_checks.h"
 #include "lower/flatten_storage.h"
 #include "lower/free_early.h"
 #include "lower/inline_functions.h"
@@ -28,6 +29,7 @@ struct Lowering {
   const std::vector<LoweredArgument>& args;
   Program program;
   std::map<std::string, std::string> renamed_funcs;  // new name -> name in the program
+  const LowerOptions& options;
 };
 
 struct Pass {
@@ -64,6 +66,11 @@ Stmt run_simplify(Lowering&, const Stmt& s) { return simplify(s); }
 
 constexpr Pass passes[] = {
     {"build_loop_nests", Phase::Loops, nest_loops},
+    {"drop_bounds_query", Phase::Loops,
+     [](Lowering& lowering, const Stmt& s) {
+       const bool drops = lowering.options.target.has_feature(Target::NoBoundsQuery);
+       return drops ? drop_bounds_query(s) : s;
+     }},
     {"flatten_storage", Phase::FlatStorage,
      [](Lowering& lowering, const Stmt& s) { return flatten_storage(s, storage_order(lowering)); }},
     {"simplify_storage", Phase::FlatStorage, run_simplify},
@@ -77,6 +84,11 @@ constexpr Pass passes[] = {
      [](Lowering&, const Stmt& s) { return deinterleave_loads(s); }},
     {"simplify_vectors", Phase::Vector, run_simplify},
     {"free_early", Phase::Vector, [](Lowering&, const Stmt& s) { return free_early(s); }},
+    {"drop_asserts", Phase::Vector,
+     [](Lowering& lowering, const Stmt& s) {
+       const bool drops = lowering.options.target.has_feature(Target::NoAsserts);
+       return drops ? drop_asserts(s) : s;
+     }},
 };
 
 std::vector<std::string> names_of(const std::vector<LoweredArgument>& args) {
@@ -120,7 +132,7 @@ LoweredFunction lower(const std::string& name, const std::vector<FuncPtr>& outpu
   LoweredFunction function{name, inputs, {}};
   run_on_large_stack([&] {
     append_outputs(outputs, function.args);
-    Lowering lowering{outputs, function.args, {}, {}};
+    Lowering lowering{outputs, function.args, {}, {}, options};
     function.body = run_passes(lowering, options);
   });
   return function;
