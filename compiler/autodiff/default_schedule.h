@@ -16,7 +16,9 @@
 namespace retrograde::ir {
 
 // A Func made by differentiation.
-struct AdjointContents : FuncContents {};
+struct AdjointContents : FuncContents {
+  FuncPtr copy() const override { return std::make_shared<AdjointContents>(*this); }
+};
 
 struct ChosenSchedule {
   FuncSchedule func;

@@ -226,18 +226,6 @@ void check_declared(const Site& site, size_t dimensions, const std::vector<Expr>
   if (!f.required_types.empty()) check_types(site, values, f.required_types, "the declaration");
 }
 
-void make_outputs(FuncContents& f) {
-  for (size_t i = 0; i < f.types.size(); i++) {
-    auto output = std::make_shared<ParameterContents>();
-    output->name = f.types.size() == 1 ? f.name : f.name + "." + std::to_string(i);
-    output->type = f.types[i];
-    output->is_buffer = true;
-    output->dimensions = f.dimensions();
-    output->constraints.resize(f.args.size());
-    f.outputs.push_back(std::move(output));
-  }
-}
-
 std::vector<Expr> with(std::vector<Expr> all, const std::vector<Expr>& more) {
   all.insert(all.end(), more.begin(), more.end());
   return all;
@@ -316,6 +304,22 @@ void add_loops(Definition& definition, const std::vector<std::string>& pure) {
 }
 
 }  // namespace
+
+void make_outputs(FuncContents& f) {
+  for (size_t i = 0; i < f.types.size(); i++) {
+    auto output = std::make_shared<ParameterContents>();
+    output->name = f.types.size() == 1 ? f.name : f.name + "." + std::to_string(i);
+    output->type = f.types[i];
+    output->is_buffer = true;
+    output->dimensions = f.dimensions();
+    output->constraints.resize(f.args.size());
+    f.outputs.push_back(std::move(output));
+  }
+}
+
+std::string source_location_of(const FuncContents& f) {
+  return f.declared_at.file.empty() ? "" : text(f.declared_at.file, ":", f.declared_at.line);
+}
 
 std::string stage_name(const FuncContents& f, int stage) {
   return stage == 0 ? f.name : text(f.name, ".update(", stage - 1, ")");

@@ -14,6 +14,19 @@ void define_pure(const FuncPtr& f, const std::vector<Expr>& args, const std::vec
 void define_update(const FuncPtr& f, const std::vector<Expr>& args,
                    const std::vector<Expr>& values);
 
+// f's values come from a C function; `asked` for messages.
+void define_extern(const FuncPtr& f, ExternDefinition definition, const std::vector<Type>& types,
+                   const std::vector<std::string>& variables, const std::string& asked);
+// The buffers that stand for f when it is an output; once its args and types are known.
+void make_outputs(FuncContents& f);
+
+// CompileError unless `e` has one value in a call: made of parameters, facts of buffers, constants
+// and operators.  `what` names it in the message: "the condition".
+void check_over_parameters(const Expr& e, const char* what, const std::string& asked);
+
+// "blur.cpp:12"
+std::string source_location_of(const FuncContents& f);
+
 // The Funcs named in messages: "blur", "blur.update(0)".
 std::string stage_name(const FuncContents& f, int stage);
 

@@ -12,53 +12,21 @@ namespace retrograde {
 
 namespace {
 
-ir::FuncPtr make_func(const std::string& unique_name) {
+ir::FuncPtr make_func(const std::string& unique_name, std::source_location where = {}) {
   auto contents = std::make_shared<ir::FuncContents>();
   contents->name = unique_name;
+  contents->declared_at = {where.file_name(), static_cast<int>(where.line())};
   return contents;
 }
 
 }  // namespace
 
-// ---- loop levels ----
-
-LoopLevel::LoopLevel(const Func& f, const VarOrRVar& var, int stage_index) {
-  // Outside of all loops of f. Computing it at root gives the same values and is always legal;
-  // storage lives longer only where f itself is computed inside another Func.
-  if (var.name() == Var::outermost().name()) {
-    level_.kind = ir::LoopLevel::Kind::Root;
-    return;
-  }
-  level_.kind = ir::LoopLevel::Kind::At;
-  level_.func = f.name();
-  level_.var = var.name();
-  level_.stage = stage_index;
-}
-
-LoopLevel LoopLevel::root() {
-  LoopLevel result;
-  result.level_.kind = ir::LoopLevel::Kind::Root;
-  return result;
-}
-
-std::string LoopLevel::to_string() const {
-  switch (level_.kind) {
-    case ir::LoopLevel::Kind::Inlined:
-      return "inlined";
-    case ir::LoopLevel::Kind::Root:
-      return "root";
-    case ir::LoopLevel::Kind::At:
-      return level_.func + "." + level_.var;
-  }
-  internal_error("a loop level of unknown kind");
-}
-
 // ---- construction ----
 
-Func::Func() : func_(make_func(ir::unique_name("f"))) {}
+Func::Func(std::source_location where) : func_(make_func(ir::unique_name("f"), where)) {}
 
-Func::Func(const std::string& name)
-    : func_(make_func(name.empty() ? ir::unique_name("f") : ir::claim_name(name))) {}
+Func::Func(const std::string& name, std::source_location where)
+    : func_(make_func(name.empty() ? ir::unique_name("f") : ir::claim_name(name), where)) {}
 
 Func::Func(Type required_type, int required_dimensions, const std::string& name)
     : Func(std::vector<Type>{required_type}, required_dimensions, name) {}
@@ -102,6 +70,8 @@ const Type& Func::type() const {
   check_defined("take the type of " + quoted(name()));
   return func_->types[0];
 }
+
+std::string Func::source_location() const { return ir::source_location_of(*func_); }
 
 const ir::Definition& Func::checked_update(int index, const char* asked) const {
   if (index >= 0 && index < num_update_definitions()) return func_->updates[index];
@@ -200,10 +170,6 @@ std::vector<Argument> Func::infer_arguments() const {
 
 JITHandlers& Func::jit_handlers() { return pipeline().jit_handlers(); }
 
-void Func::set_custom_print(void (*handler)(void*, const char*)) {
-  jit_handlers().print = [handler](const char* message) { handler(nullptr, message); };
-}
-
 OutputImageParam Func::output_buffer() const {
   check_defined("use the output buffer of " + quoted(name()));
   if (outputs() != 1) {
@@ -230,111 +196,6 @@ Stage Func::pure_stage() const {
 Stage Func::update(int index) {
   checked_update(index, "schedule update");
   return Stage(func_, index + 1);
-}
-
-ir::FuncSchedule& Func::touch() {
-  func_->version++;
-  func_->schedule.touched = true;
-  return func_->schedule;
-}
-
-Func& Func::compute_inline() { return compute_at(LoopLevel::inlined()); }
-Func& Func::compute_root() { return compute_at(LoopLevel::root()); }
-Func& Func::store_root() { return store_at(LoopLevel::root()); }
-
-// Storing follows computing, unless it was asked for elsewhere.
-Func& Func::compute_at(const LoopLevel& level) {
-  ir::FuncSchedule& schedule = touch();
-  const auto same = [](const ir::LoopLevel& a, const ir::LoopLevel& b) {
-    return a.kind == b.kind && a.func == b.func && a.var == b.var && a.stage == b.stage;
-  };
-  const bool follows = schedule.store_level.kind == ir::LoopLevel::Kind::Inlined ||
-                       same(schedule.store_level, schedule.compute_level);
-  schedule.compute_level = level.contents();
-  if (follows) schedule.store_level = level.contents();
-  return *this;
-}
-
-Func& Func::store_at(const LoopLevel& level) {
-  touch().store_level = level.contents();
-  return *this;
-}
-
-Func& Func::store_in(MemoryType memory) {
-  touch().memory = memory;
-  return *this;
-}
-
-Func& Func::reorder_storage(const std::vector<Var>& dims) {
-  check_defined("reorder the storage of " + quoted(name()));
-  const std::string asked = "reorder the storage of " + quoted(name());
-  std::vector<std::string>& storage = touch().storage_dims;
-  std::vector<size_t> places;
-  for (const Var& dim : dims) {
-    const auto it = std::find(storage.begin(), storage.end(), dim.name());
-    if (it == storage.end())
-      user_error(asked, quoted(dim.name()) + " must be one of its dimensions", "it is not");
-    const size_t place = static_cast<size_t>(it - storage.begin());
-    if (std::find(places.begin(), places.end(), place) != places.end()) {
-      user_error(asked, "each dimension is named once", quoted(dim.name()) + " is named twice");
-    }
-    places.push_back(place);
-  }
-  std::sort(places.begin(), places.end());
-  for (size_t i = 0; i < dims.size(); i++) storage[places[i]] = dims[i].name();
-  return *this;
-}
-
-void Func::add_bound(std::vector<ir::Bound>& bounds, const std::string& asked, const Var& var,
-                     Expr min, Expr extent) {
-  check_defined(asked);
-  if (std::find(func_->args.begin(), func_->args.end(), var.name()) == func_->args.end()) {
-    std::string args;
-    for (const std::string& arg : func_->args) args += (args.empty() ? "" : ", ") + quoted(arg);
-    user_error(asked, quoted(var.name()) + " must be a pure variable of the first definition",
-               args.empty() ? "it has no dimensions" : "its variables are " + args,
-               "Name one of them");
-  }
-  if (!extent.defined()) user_error(asked, "the extent must be a defined expression");
-  for (Expr* e : {&min, &extent}) {
-    if (!e->defined()) continue;
-    if (!e->type().is_int_or_uint() || !e->type().is_scalar()) {
-      user_error(asked, "bounds are integers", text(*e, " has type ", to_string(e->type())));
-    }
-    *e = ir::cast_to(Int(32), *e);
-  }
-  auto constant = ir::as_const_int(extent);
-  if (constant && *constant < 0)
-    user_error(asked, "an extent is not negative", text("it is ", *constant));
-  std::erase_if(bounds, [&](const ir::Bound& bound) { return bound.var == var.name(); });
-  bounds.push_back({var.name(), std::move(min), std::move(extent), {}, {}});
-  func_->version++;
-}
-
-Func& Func::bound(const Var& var, Expr min, Expr extent) {
-  add_bound(func_->schedule.bounds, text("bound ", quoted(var.name()), " of ", quoted(name())), var,
-            std::move(min), std::move(extent));
-  return *this;
-}
-
-Func& Func::bound_extent(const Var& var, Expr extent) { return bound(var, {}, std::move(extent)); }
-
-Func& Func::set_estimate(const Var& var, const Expr& min, const Expr& extent) {
-  add_bound(func_->schedule.estimates,
-            text("estimate ", quoted(var.name()), " of ", quoted(name())), var, min, extent);
-  return *this;
-}
-
-Func& Func::set_estimates(const Region& estimates) {
-  if (static_cast<int>(estimates.size()) != dimensions()) {
-    user_error("set estimates of " + quoted(name()), "there is one for each dimension",
-               text("it has ", dimensions(), " dimensions and was given ", estimates.size(),
-                    " estimates"));
-  }
-  const std::vector<Var> variables = args();
-  for (int d = 0; d < dimensions(); d++)
-    set_estimate(variables[d], estimates[d].min, estimates[d].extent);
-  return *this;
 }
 
 }  // namespace retrograde

@@ -6,10 +6,12 @@
 // they chain.
 #pragma once
 
+#include <source_location>
 #include <string>
 #include <type_traits>
 #include <vector>
 
+#include "frontend/extern_argument.h"
 #include "frontend/func_ref.h"
 #include "frontend/image_param.h"
 #include "frontend/pipeline.h"
@@ -17,25 +19,23 @@
 
 namespace retrograde {
 
-// A loop of a Func, or root, or inline: where another Func is computed or stored.
-class LoopLevel {
+// memoize: what callers name to drop results from the cache; an expression over parameters.
+class EvictionKey {
  public:
-  LoopLevel() = default;  // inlined
-  LoopLevel(const Func& f, const VarOrRVar& var, int stage_index = -1);
-  static LoopLevel inlined() { return {}; }
-  static LoopLevel root();
-  std::string to_string() const;
-  const ir::LoopLevel& contents() const { return level_; }
+  explicit EvictionKey(Expr key = {}) : key_(std::move(key)) {}
+  const Expr& key() const { return key_; }
 
  private:
-  ir::LoopLevel level_;
+  Expr key_;
 };
 
 class Func {
  public:
-  Func();
-  explicit Func(const std::string& name);
-  explicit Func(const char* name) : Func(std::string(name)) {}
+  Func(std::source_location where = std::source_location::current());
+  explicit Func(const std::string& name,
+                std::source_location where = std::source_location::current());
+  explicit Func(const char* name, std::source_location where = std::source_location::current())
+      : Func(std::string(name), where) {}
   // Definitions must have these types and dimensions.
   Func(Type required_type, int required_dimensions, const std::string& name = "");
   Func(const std::vector<Type>& required_types, int required_dimensions,
@@ -73,13 +73,19 @@ class Func {
   Expr update_value(int index = 0) const;
   Tuple update_values(int index = 0) const;
   std::vector<RVar> rvars(int index = 0) const;
-  bool is_extern() const { return false; }
+  bool is_extern() const { return func_->is_extern(); }
+  const std::string& extern_function_name() const;  // CompileError when it is not
+  std::string source_location() const;              // of its declaration: "blur.cpp:12"
   const ir::FuncPtr& function() const { return func_; }
   bool same_as(const Func& other) const { return func_ == other.func_; }
 
   // ---- running it ----
   Realization realize(const std::vector<int32_t>& sizes = {}, const Target& target = Target());
   void realize(Pipeline::RealizationArg outputs, const Target& target = Target());
+  Realization realize(JITUserContext* context, const std::vector<int32_t>& sizes = {},
+                      const Target& target = Target());
+  void realize(JITUserContext* context, Pipeline::RealizationArg outputs,
+               const Target& target = Target());
   void infer_input_bounds(const std::vector<int32_t>& sizes, const Target& target = Target());
   void infer_input_bounds(Pipeline::RealizationArg outputs, const Target& target = Target());
   void compile_jit(const Target& target = Target());
@@ -87,7 +93,16 @@ class Func {
   void print_loop_nest();
   std::vector<Argument> infer_arguments() const;
   JITHandlers& jit_handlers();
+  // See pipeline.h.
+  void set_error_handler(void (*handler)(void*, const char*));
+  void set_custom_allocator(void* (*malloc)(void*, size_t), void (*free)(void*, void*));
+  void set_custom_do_task(int (*handler)(void*, int (*)(void*, int, uint8_t*), int, uint8_t*));
+  void set_custom_do_par_for(int (*handler)(void*, int (*)(void*, int, uint8_t*), int, int,
+                                            uint8_t*));
+  void set_custom_trace(int (*handler)(void*, const halide_trace_event_t*));
   void set_custom_print(void (*handler)(void*, const char*));
+  void set_jit_externs(const std::map<std::string, JITExtern>& externs);
+  const std::map<std::string, JITExtern>& get_jit_externs();
   // Promises about the buffer that this Func is realized into.
   OutputImageParam output_buffer() const;
   std::vector<OutputImageParam> output_buffers() const;
@@ -142,36 +157,147 @@ class Func {
                                            const std::vector<Target>& targets,
                                            const std::vector<std::string>& suffixes);
 
+  // ---- computed outside ----
+
+  // The values come from the C function `function_name`, which is called as
+  //   int function_name(args..., halide_buffer_t* outputs...)
+  // once with buffers whose host is null, to ask which regions of its inputs it needs for the
+  // outputs' shapes, and then to compute. Funcs and images are passed as halide_buffer_t*, Exprs as
+  // scalars; it returns 0 or an error code.
+  void define_extern(const std::string& function_name, const std::vector<ExternFuncArgument>& args,
+                     const std::vector<Type>& types, const std::vector<Var>& arguments,
+                     NameMangling mangling = NameMangling::Default,
+                     DeviceAPI device = DeviceAPI::Host);
+  void define_extern(const std::string& function_name, const std::vector<ExternFuncArgument>& args,
+                     Type type, const std::vector<Var>& arguments,
+                     NameMangling mangling = NameMangling::Default,
+                     DeviceAPI device = DeviceAPI::Host) {
+    define_extern(function_name, args, std::vector<Type>{type}, arguments, mangling, device);
+  }
+  void define_extern(const std::string& function_name, const std::vector<ExternFuncArgument>& args,
+                     const std::vector<Type>& types, int dimensionality,
+                     NameMangling mangling = NameMangling::Default,
+                     DeviceAPI device = DeviceAPI::Host);
+  void define_extern(const std::string& function_name, const std::vector<ExternFuncArgument>& args,
+                     Type type, int dimensionality, NameMangling mangling = NameMangling::Default,
+                     DeviceAPI device = DeviceAPI::Host) {
+    define_extern(function_name, args, std::vector<Type>{type}, dimensionality, mangling, device);
+  }
+  operator ExternFuncArgument() const { return ExternFuncArgument(func_); }
+
+  // ---- wrappers ----
+
+  // A new Func between this one and its users, to be scheduled on its own: g.in(f) for f alone,
+  // g.in({f, h}) one for both, g.in() for all that have none of their own.
+  //   g(x) = ...                        g(x) = ...
+  //   f(x) = g(x) + g(x + 1)      =>    g_in_f(x) = g(x)
+  //                                     f(x) = g_in_f(x) + g_in_f(x + 1)
+  // Asked for again it is the same Func. It is inlined like any other Func unless scheduled, and
+  // has wrappers itself: g.in(f).in(f). Compiling applies them; f's definition stays as it is.
+  Func in(const Func& f);
+  Func in(const std::vector<Func>& fs);
+  Func in();
+  // The same with a copy of this Func instead of one that reads it: it starts with the schedule
+  // given so far, and its values are computed again for those users.
+  //   g(x) = e(x)                       g(x) = e(x)
+  //   f(x) = g(x)                 =>    g_clone_in_f(x) = e(x)
+  //   h(x) = g(x)                       f(x) = g_clone_in_f(x);  h(x) = g(x)
+  Func clone_in(const Func& f);
+  Func clone_in(const std::vector<Func>& fs);
+  Func copy_to_device(DeviceAPI device = DeviceAPI::Default_GPU);  // Unsupported
+  Func copy_to_host();                                             // Unsupported
+
   // ---- where it is computed and stored ----
+
   // Substituted into its users (the default). Of a Func with updates: computed in the innermost
   // loop of each user.
+  //   for x: f(x) = g(x) + 1    =>    for x: f(x) = (x * x) + 1
   Func& compute_inline();
   // All of it, before anything that uses it.
+  //   for x: f(x) = g(x) + g(x + 1)    =>    for x in [0, n + 1): g(x) = ...
+  //                                          for x in [0, n): f(x) = g(x) + g(x + 1)
   Func& compute_root();
-  // What one iteration of the loop `var` of `f` needs of it, inside that loop.
+  // What one iteration of the loop `var` of `f` needs of it, inside that loop. g.compute_at(f, y):
+  //   for y:                       for y:
+  //     for x:                =>     for x in [0, n + 1): g(x, y) = ...
+  //       f(x, y) = ...              for x in [0, n): f(x, y) = g(x, y) + g(x + 1, y)
   Func& compute_at(const Func& f, const Var& var) { return compute_at(LoopLevel(f, var)); }
   Func& compute_at(const Func& f, const RVar& var) { return compute_at(LoopLevel(f, var)); }
   Func& compute_at(const LoopLevel& level);
-  // Its storage lives for the whole of that loop; what is there is not computed again.
+  // Its storage lives for the whole of that loop, which is around the compute level; what is there
+  // already is not computed again, and storage is folded where that suffices.
+  // g.store_root().compute_at(f, y), with f(x, y) = g(x, y) + g(x, y + 1):
+  //   realize g over all rows (folded: two rows)
+  //     for y:
+  //       for x: g(x, y + 1) = ...     (and row 0 when y == 0)
+  //       for x: f(x, y) = g(x, y) + g(x, y + 1)
   Func& store_root();
   Func& store_at(const Func& f, const Var& var) { return store_at(LoopLevel(f, var)); }
   Func& store_at(const Func& f, const RVar& var) { return store_at(LoopLevel(f, var)); }
   Func& store_at(const LoopLevel& level);
+  // Where its memory is allocated: at this level, around the store level, once for all iterations
+  // in between. What is computed does not change.
+  //   for y:                            allocate g
+  //     allocate g                =>    for y:
+  //       g(...) = ...                    g(...) = ...
+  Func& hoist_storage(const Func& f, const Var& var) { return hoist_storage(LoopLevel(f, var)); }
+  Func& hoist_storage(const Func& f, const RVar& var) { return hoist_storage(LoopLevel(f, var)); }
+  Func& hoist_storage(const LoopLevel& level);
+  Func& hoist_storage_root();
+  // In which memory. Unsupported for memory that only GPUs and accelerators have.
   Func& store_in(MemoryType memory);
-  // Dimensions innermost in memory first.
+  // Dimensions innermost in memory first. reorder_storage(c, x, y):
+  //   g[x + w * y + w * h * c]    =>    g[c + 3 * x + 3 * w * y]
   Func& reorder_storage(const std::vector<Var>& dims);
   template <typename... Rest>
   requires((std::is_convertible_v<Rest, Var> &&
             ...)) Func& reorder_storage(const Var& x, const Var& y, Rest&&... rest) {
     return reorder_storage(std::vector<Var>{x, y, Var(std::forward<Rest>(rest))...});
   }
+  // The extent of this dimension in storage grows to a multiple of `alignment`, so that every line
+  // begins aligned.  align_storage(x, 8):   allocate g[w * h]  =>  allocate g[(w + 7) / 8 * 8 * h]
+  Func& align_storage(const Var& dim, const Expr& alignment);
+  // Storage of this extent, coordinates taken modulo it: right when no more is alive at a time,
+  // which is checked. fold_storage(y, 2):   g[x, y]  =>  g[x, y % 2]
+  // `fold_forward`: the coordinate grows from iteration to iteration; false: it falls.
+  Func& fold_storage(const Var& dim, const Expr& extent, bool fold_forward = true);
+  // Storage of this extent whatever the bounds say; a call that needs more fails.
+  //   allocate g[n']   =>   assert(n' <= bound); allocate g[bound]
+  Func& bound_storage(const Var& dim, const Expr& bound);
+  // Keeps results in the runtime's cache, under the values of all parameters it depends on.
+  //   produce g   =>   if not in cache: produce g, put it in
+  Func& memoize(const EvictionKey& eviction_key = EvictionKey());
+  // Computed by a thread of its own, at most as far ahead of its users as storage allows.
+  //   produce g; consume g   =>   fork { produce g, signal } and { wait, consume g }
+  Func& async();
 
   // ---- what is known of its size ----
-  Func& bound(const Var& var, Expr min, Expr extent);  // a promise: exactly this is computed
-  Func& bound_extent(const Var& var, Expr extent);     // a promise about the extent only
-  Func& set_estimate(const Var& var, const Expr& min,
-                     const Expr& extent);  // a guess, for schedulers
+
+  // A promise: exactly this is computed. A call that needs more fails.
+  //   for x in [x0, x0 + n): ...   =>   assert(range is within [min, min + extent))
+  //                                     for x in [min, min + extent): ...
+  Func& bound(const Var& var, Expr min, Expr extent);
+  // A promise about the extent only: loops are of this constant extent.
+  Func& bound_extent(const Var& var, Expr extent);
+  // Computes more than is needed, so that min % modulus == remainder and the extent is a multiple.
+  //   for x in [x0, x1): ...   =>   for x in [x0 rounded down, x1 rounded up): ...
+  Func& align_bounds(const Var& var, Expr modulus, Expr remainder = 0);
+  // The same for the extent only: the min stays.
+  Func& align_extent(const Var& var, Expr modulus);
+  // A guess, for schedulers.
+  Func& set_estimate(const Var& var, const Expr& min, const Expr& extent);
   Func& set_estimates(const Region& estimates);
+
+  // ---- watching it ----
+
+  // Reports to the trace handler: each load of a value, each store, and when it begins and ends to
+  // be produced and consumed. Tags come with each report.
+  Func& trace_loads();
+  Func& trace_stores();
+  Func& trace_realizations();
+  Func& add_trace_tag(const std::string& tag);
+  // Writes what was computed to a file: a TIFF (.tif, .tiff), a MATLAB file (.mat), otherwise raw.
+  void debug_to_file(const std::string& filename);
 
   // ---- loops: of the first definition here, of updates through update(i); see stage.h ----
   Stage update(int index = 0);
@@ -231,6 +357,88 @@ class Func {
              const std::vector<Expr>& factors, TailStrategy tail = TailStrategy::Auto) {
     return with(pure_stage().tile(previous, inners, factors, tail));
   }
+  Func& partition(const VarOrRVar& var, Partition partition) {
+    return with(pure_stage().partition(var, partition));
+  }
+  Func& never_partition(const std::vector<VarOrRVar>& vars) {
+    return with(pure_stage().never_partition(vars));
+  }
+  Func& always_partition(const std::vector<VarOrRVar>& vars) {
+    return with(pure_stage().always_partition(vars));
+  }
+  template <typename... Rest>
+  requires((std::is_convertible_v<Rest, VarOrRVar> &&
+            ...)) Func& never_partition(const VarOrRVar& x, Rest&&... rest) {
+    return never_partition(std::vector<VarOrRVar>{x, VarOrRVar(std::forward<Rest>(rest))...});
+  }
+  template <typename... Rest>
+  requires((std::is_convertible_v<Rest, VarOrRVar> &&
+            ...)) Func& always_partition(const VarOrRVar& x, Rest&&... rest) {
+    return always_partition(std::vector<VarOrRVar>{x, VarOrRVar(std::forward<Rest>(rest))...});
+  }
+  Func& never_partition_all() { return with(pure_stage().never_partition_all()); }
+  Func& always_partition_all() { return with(pure_stage().always_partition_all()); }
+  Func& atomic(bool override_associativity_test = false) {
+    return with(pure_stage().atomic(override_associativity_test));
+  }
+  Func& allow_race_conditions() { return with(pure_stage().allow_race_conditions()); }
+  Func& compute_with(const LoopLevel& level,
+                     const std::vector<std::pair<VarOrRVar, LoopAlignStrategy>>& align) {
+    return with(pure_stage().compute_with(level, align));
+  }
+  Func& compute_with(const LoopLevel& level, LoopAlignStrategy align = LoopAlignStrategy::Auto) {
+    return with(pure_stage().compute_with(level, align));
+  }
+  Func& compute_with(const Stage& stage, const VarOrRVar& var,
+                     const std::vector<std::pair<VarOrRVar, LoopAlignStrategy>>& align) {
+    return with(pure_stage().compute_with(stage, var, align));
+  }
+  Func& compute_with(const Stage& stage, const VarOrRVar& var,
+                     LoopAlignStrategy align = LoopAlignStrategy::Auto) {
+    return with(pure_stage().compute_with(stage, var, align));
+  }
+  Stage specialize(const Expr& condition) { return pure_stage().specialize(condition); }
+  void specialize_fail(const std::string& message) { pure_stage().specialize_fail(message); }
+  Func& prefetch(const Func& f, const VarOrRVar& at, const VarOrRVar& from, Expr offset = 1,
+                 PrefetchBoundStrategy strategy = PrefetchBoundStrategy::GuardWithIf) {
+    return with(pure_stage().prefetch(f, at, from, std::move(offset), strategy));
+  }
+  Func& prefetch(const std::shared_ptr<ir::ParameterContents>& image, const VarOrRVar& at,
+                 const VarOrRVar& from, Expr offset = 1,
+                 PrefetchBoundStrategy strategy = PrefetchBoundStrategy::GuardWithIf) {
+    return with(pure_stage().prefetch(image, at, from, std::move(offset), strategy));
+  }
+  template <typename T>
+  requires requires(const T& image) { image.parameter(); }
+  Func& prefetch(const T& image, const VarOrRVar& at, const VarOrRVar& from, Expr offset = 1,
+                 PrefetchBoundStrategy strategy = PrefetchBoundStrategy::GuardWithIf) {
+    return with(pure_stage().prefetch(image, at, from, std::move(offset), strategy));
+  }
+  template <typename T>
+  Func& prefetch(const T& source, const VarOrRVar& var, int offset = 1,
+                 PrefetchBoundStrategy strategy = PrefetchBoundStrategy::GuardWithIf) {
+    return with(pure_stage().prefetch(source, var, var, Expr(offset), strategy));
+  }
+  // GPUs and accelerators, as Stage has them: Unsupported.
+  template <typename... Args>
+  requires requires(Stage stage, Args&&... args) { stage.gpu_threads(args...); }
+  Func& gpu_threads(Args&&... args) { return with(pure_stage().gpu_threads(args...)); }
+  template <typename... Args>
+  requires requires(Stage stage, Args&&... args) { stage.gpu_lanes(args...); }
+  Func& gpu_lanes(Args&&... args) { return with(pure_stage().gpu_lanes(args...)); }
+  template <typename... Args>
+  requires requires(Stage stage, Args&&... args) { stage.gpu_blocks(args...); }
+  Func& gpu_blocks(Args&&... args) { return with(pure_stage().gpu_blocks(args...)); }
+  template <typename... Args>
+  requires requires(Stage stage, Args&&... args) { stage.gpu(args...); }
+  Func& gpu(Args&&... args) { return with(pure_stage().gpu(args...)); }
+  template <typename... Args>
+  requires requires(Stage stage, Args&&... args) { stage.gpu_tile(args...); }
+  Func& gpu_tile(Args&&... args) { return with(pure_stage().gpu_tile(args...)); }
+  Func& gpu_single_thread(DeviceAPI device = DeviceAPI::Default_GPU) {
+    return with(pure_stage().gpu_single_thread(device));
+  }
+  Func& hexagon(const VarOrRVar& x = Var::outermost()) { return with(pure_stage().hexagon(x)); }
   const ir::StageSchedule& get_schedule() const { return pure_stage().get_schedule(); }
 
  private:
@@ -244,6 +452,10 @@ class Func {
   const ir::Definition& checked_update(int index, const char* asked) const;
   void add_bound(std::vector<ir::Bound>& bounds, const std::string& asked, const Var& var, Expr min,
                  Expr extent);
+  Expr checked_size(Expr e, const char* what, const std::string& asked) const;
+  ir::StorageRule& storage_rule(const Var& dim, const std::string& asked);
+  void check_is_dimension(const Var& var, const std::string& asked) const;
+  Func wrap(const std::vector<Func>& users, const std::string& name, bool clone) const;
   Pipeline& pipeline();
 };
 

@@ -5,6 +5,7 @@
 #include <unordered_set>
 
 #include "diagnostics/error.h"
+#include "frontend/wrappers.h"
 #include "ir/print.h"
 #include "ir/visit.h"
 
@@ -119,6 +120,12 @@ std::vector<FuncPtr> direct_callees(const FuncContents& f) {
   std::vector<FuncPtr> callees;
   std::unordered_set<const Symbol*> seen;
   for (int i = 0; i < f.stage_count(); i++) add_callees(f.stage(i), &f, callees, seen);
+  if (f.extern_definition) {
+    for (const ExternArgument& arg : f.extern_definition->args) {
+      if (arg.kind == ExternArgument::Kind::Func && seen.insert(arg.func.get()).second)
+        callees.push_back(arg.func);
+    }
+  }
   return callees;
 }
 
@@ -170,11 +177,18 @@ class ParameterCollector {
   // Schedules and promises about sizes may mention parameters too.
   void add_schedule(const FuncContents& f) {
     for (const Bound& bound : f.schedule.bounds) {
-      add_expr(bound.min);
-      add_expr(bound.extent);
+      for (const Expr& e : {bound.min, bound.extent, bound.modulus, bound.remainder}) add_expr(e);
     }
-    for (int i = 0; i < f.stage_count(); i++) {
-      for (const Split& split : f.stage(i).schedule.splits) add_expr(split.factor);
+    for (const StorageRule& rule : f.schedule.storage_rules) {
+      for (const Expr& e : {rule.alignment, rule.bound, rule.fold}) add_expr(e);
+    }
+    add_expr(f.schedule.eviction_key);
+    for (int i = 0; i < f.stage_count(); i++) add_stage(f.stage(i).schedule);
+    if (f.extern_definition) {
+      for (const ExternArgument& arg : f.extern_definition->args) {
+        add_expr(arg.expr);
+        if (arg.buffer) add_symbol(SymbolRef(arg.buffer));
+      }
     }
     for (const ParameterPtr& output : f.outputs) add_constraints(*output);
   }
@@ -186,6 +200,15 @@ class ParameterCollector {
   std::vector<ParameterPtr> found_;
   std::unordered_set<const Symbol*> seen_, excluded_;
   std::unordered_set<const ExprNode*> seen_exprs_;
+
+  void add_stage(const StageSchedule& schedule) {
+    for (const Split& split : schedule.splits) add_expr(split.factor);
+    for (const PrefetchDirective& prefetch : schedule.prefetches) add_expr(prefetch.offset);
+    for (const StageSchedule& special : schedule.specializations) {
+      add_expr(special.condition);
+      add_stage(special);
+    }
+  }
 
   void add_symbol(const SymbolRef& symbol) {
     if (!symbol.defined() || excluded_.count(symbol.raw())) return;
@@ -224,11 +247,17 @@ std::vector<ParameterPtr> parameters_of(const std::vector<FuncPtr>& outputs) {
   for (const FuncPtr& output : outputs) {
     for (const ParameterPtr& parameter : output->outputs) collector.exclude(parameter);
   }
-  for (const FuncPtr& f : topological_order(outputs)) {
+  for (const FuncPtr& f : functions_of(outputs)) {
     for (int i = 0; i < f->stage_count(); i++) {
       for_each_expr(f->stage(i), [&](const Expr& e) { collector.add_expr(e); });
     }
     collector.add_schedule(*f);
+  }
+  for (const FuncPtr& output : outputs) {
+    for (const Requirement& requirement : output->requirements) {
+      collector.add_expr(requirement.condition);
+      for (const Expr& part : requirement.message) collector.add_expr(part);
+    }
   }
   std::vector<ParameterPtr> parameters = collector.take();
   check_names(parameters);

@@ -35,6 +35,10 @@ enum class LoopAlignStrategy : uint8_t { AlignStart, AlignEnd, NoAlign, Auto };
 // What prefetch does with the part of its region that lies outside of the data.
 enum class PrefetchBoundStrategy : uint8_t { Clamp, GuardWithIf, NonFaulting };
 
+// How the symbol of an extern stage is named. Default: as the target says (C, unless it has
+// c_plus_plus_name_mangling).
+enum class NameMangling : uint8_t { Default, C, CPlusPlus };
+
 namespace ir {
 
 // Reduction variables innermost first, as listed in the RDom.
@@ -67,6 +71,7 @@ struct Dim {
   ForType for_type = ForType::Serial;
   bool is_reduction =
       false;  // derives from a reduction variable: order matters unless proven otherwise
+  Partition partition = Partition::Auto;
 };
 
 // Where a Func is computed or stored.
@@ -76,6 +81,16 @@ struct LoopLevel {
   std::string func;  // At: name of the consumer
   std::string var;   // At: its loop
   int stage = -1;    // At: which of its stages; -1: any
+};
+bool operator==(const LoopLevel& a, const LoopLevel& b);
+
+// Behind a user's LoopLevel object, which may be set after it was given to compute_at and its like:
+// what it says then goes to every schedule that uses it.
+struct LoopLevelContents {
+  LoopLevel level;
+  bool defined = false;
+  bool locked = false;
+  std::vector<std::function<void(const LoopLevel&)>> followers;
 };
 
 // Fetch into the cache what iteration `from + offset` will read of `name`, at each iteration of
@@ -107,11 +122,13 @@ struct StageSchedule {
 };
 
 // What is known or wanted of one pure dimension: a user's promise (bound), guess (set_estimate),
-// or an alignment.
+// or an alignment. One entry for a variable.
 struct Bound {
   std::string var;
-  Expr min, extent;         // may be undefined
-  Expr modulus, remainder;  // align_bounds: min % modulus == remainder; extent a multiple too
+  Expr min, extent;  // may be undefined
+  // align_bounds: min % modulus == remainder, and the extent is a multiple of the modulus; both
+  // undefined without. align_extent: the remainder is undefined, and the min stays.
+  Expr modulus, remainder;
 };
 
 // Layout of one dimension of a Func's storage.
@@ -126,6 +143,8 @@ struct StorageRule {
 struct FuncSchedule {
   LoopLevel compute_level, store_level;
   LoopLevel hoist_level;  // hoist_storage: where memory is allocated; Inlined: at the store level
+  // The objects that said so; null where the level can't change any more.
+  std::shared_ptr<LoopLevelContents> compute_from, store_from, hoist_from;
   std::vector<Bound> bounds, estimates;
   std::vector<std::string> storage_dims;   // innermost first; the pure args unless reordered
   std::vector<StorageRule> storage_rules;  // of dimensions that have any
@@ -164,6 +183,7 @@ struct BufferConstraint {
   Expr min_estimate, extent_estimate;
   bool any_stride = false;  // set_stride(Expr()): lifts the promise that dimension 0 is dense
 };
+struct FuncContents;
 struct ParameterContents : Symbol {
   std::string name;
   Type type;
@@ -177,11 +197,14 @@ struct ParameterContents : Symbol {
   std::shared_ptr<void> buffer_owner;  // keeps `buffer` alive
   halide_buffer_t* buffer = nullptr;   // currently bound; null when unset
   bool is_literal = false;             // a Buffer named in the program, not an ImageParam
+  int host_alignment =
+      0;                 // promise, in bytes, about the address of element min; 0: the type's size
   uint64_t version = 0;  // grows when anything but the value or the bound buffer changes
   TraceSchedule trace;
+  // The Func that an ImageParam converts to: what reads the image reads it instead. Null when
+  // nobody asked for it.
+  std::shared_ptr<FuncContents> func;
 };
-
-struct FuncContents;
 
 // Func::define_extern: computed by a C function on buffers.
 struct ExternArgument {
@@ -194,24 +217,33 @@ struct ExternArgument {
 struct ExternDefinition {
   std::string function;  // the symbol
   std::vector<ExternArgument> args;
-  bool c_plus_plus = false;  // the symbol is mangled as C++ does
+  NameMangling mangling = NameMangling::Default;
+};
+
+// Pipeline::add_requirement: calls fail with the message unless it holds.
+struct Requirement {
+  Expr condition;             // of parameters only
+  std::vector<Expr> message;  // put together
 };
 
 // The contents of a Func. Symbol behind each Call to it.
 struct FuncContents : Symbol, std::enable_shared_from_this<FuncContents> {
   std::string name;                // unique in the process
+  SourceLocation declared_at;      // of the handle that made it
   std::vector<std::string> args;   // pure variables, dimension 0 first
   std::vector<Type> types;         // of the values
   std::optional<Definition> pure;  // empty until defined
   std::vector<Definition> updates;
   FuncSchedule schedule;
   std::vector<std::shared_ptr<ParameterContents>>
-      outputs;          // constraints on the buffers when it is an output
-  bool frozen = false;  // used by another Func: no more updates
+      outputs;                            // constraints on the buffers when it is an output
+  std::vector<Requirement> requirements;  // of calls, when it is an output
+  bool frozen = false;                    // used by another Func: no more updates
   uint64_t version =
       0;  // grows with every definition and directive: compiled code of an older one is stale
   TraceSchedule trace;
   std::string debug_file;  // debug_to_file: written after it is computed; empty: not
+  // When set, `pure` has args but no values and no loops, and there are no updates.
   std::optional<ExternDefinition> extern_definition;
   // Func::in and clone_in: consumers named here read the wrapper instead; "" stands for all others.
   std::map<std::string, std::shared_ptr<FuncContents>> wrappers;
@@ -224,7 +256,12 @@ struct FuncContents : Symbol, std::enable_shared_from_this<FuncContents> {
   int stage_count() const { return pure ? 1 + static_cast<int>(updates.size()) : 0; }
   const Definition& stage(int index) const { return index == 0 ? *pure : updates[index - 1]; }
   Definition& stage(int index) { return index == 0 ? *pure : updates[index - 1]; }
-  bool is_pure() const { return updates.empty(); }
+  bool is_extern() const { return extern_definition.has_value(); }
+  bool is_pure() const { return updates.empty() && !is_extern(); }
+  // The same Func in another place, for graphs that are rewritten whole.
+  virtual std::shared_ptr<FuncContents> copy() const {
+    return std::make_shared<FuncContents>(*this);
+  }
 };
 using FuncPtr = std::shared_ptr<FuncContents>;
 

@@ -1,7 +1,10 @@
 // image_param.cpp -- ImageParam, and the facts and promises about the shapes of buffers.
 #include "frontend/image_param.h"
 
+#include <algorithm>
+
 #include "frontend/func.h"
+#include "frontend/wrappers.h"
 #include "ir/print.h"
 #include "ir/visit.h"
 
@@ -124,6 +127,32 @@ OutputImageParam& OutputImageParam::set_estimates(const Region& estimates) {
   return *this;
 }
 
+OutputImageParam& OutputImageParam::set_host_alignment(int bytes) {
+  const int element = checked().type.bytes();
+  const bool power = bytes > 0 && (bytes & (bytes - 1)) == 0;
+  if (!power || bytes < element) {
+    user_error("promise the alignment of " + quoted(name()),
+               text("it is a power of two of at least ", element, " bytes"), text("it is ", bytes),
+               "Give 16, 32 or 64");
+  }
+  checked().host_alignment = bytes;
+  checked().version++;
+  return *this;
+}
+
+int OutputImageParam::host_alignment() const {
+  return std::max(checked().host_alignment, checked().type.bytes());
+}
+
+OutputImageParam& OutputImageParam::store_in(MemoryType memory) {
+  if (memory != MemoryType::Auto && memory != MemoryType::Heap) {
+    unsupported("store the buffer " + quoted(name()) + " in another memory",
+                "buffers of arguments are memory of the CPU", "that memory belongs to a device",
+                "Leave it out");
+  }
+  return *this;
+}
+
 ImageParam::ImageParam(Type type, int dimensions) : ImageParam(type, dimensions, "") {}
 
 ImageParam::ImageParam(Type type, int dimensions, const std::string& name)
@@ -169,9 +198,23 @@ Expr ImageParam::access(const std::vector<Expr>& args) const {
 }
 
 ImageParam::operator Func() const {
-  Func f(name() + "_im");
-  f(_) = (*this)(_);
-  return f;
+  checked();
+  return Func(ir::func_of_image(parameter_));
+}
+
+Func ImageParam::in(const Func& f) { return Func(*this).in(f); }
+Func ImageParam::in(const std::vector<Func>& fs) { return Func(*this).in(fs); }
+Func ImageParam::in() { return Func(*this).in(); }
+
+void ImageParam::trace_loads() {
+  checked().trace.loads = true;
+  checked().version++;
+}
+
+ImageParam& ImageParam::add_trace_tag(const std::string& tag) {
+  checked().trace.tags.push_back(tag);
+  checked().version++;
+  return *this;
 }
 
 }  // namespace retrograde

@@ -62,6 +62,11 @@ class OutputImageParam {
   Expr height() const { return dim(1).extent(); }
   Expr channels() const { return dim(2).extent(); }
   OutputImageParam& set_estimates(const Region& estimates);
+  // A promise about the address of the buffer, in bytes: a power of two, at least the elements'
+  // size.
+  OutputImageParam& set_host_alignment(int bytes);
+  int host_alignment() const;
+  OutputImageParam& store_in(MemoryType memory);  // Unsupported but for memory of the CPU
   operator Argument() const { return ir::argument_of(checked()); }
   const std::shared_ptr<ir::ParameterContents>& parameter() const { return parameter_; }
 
@@ -92,8 +97,18 @@ class ImageParam : public OutputImageParam {
   Expr operator()(const std::vector<Var>& args) const {
     return access(std::vector<Expr>(args.begin(), args.end()));
   }
-  // A Func that reads this image point by point.
+  // The Func that reads this image point by point: the same each time. What is said of it, such as
+  // compute_root, holds for every access to the image.
   operator Func() const;
+  // Wrappers of that Func: see Func::in.
+  //   f(x) = im(x) + im(x + 1)    =>    im_im_in_f(x) = im(x)
+  //                                     f(x) = im_im_in_f(x) + im_im_in_f(x + 1)
+  Func in(const Func& f);
+  Func in(const std::vector<Func>& fs);
+  Func in();
+  // Each load is reported to the trace handler, with these tags.
+  void trace_loads();
+  ImageParam& add_trace_tag(const std::string& tag);
 
  private:
   Expr access(const std::vector<Expr>& args) const;

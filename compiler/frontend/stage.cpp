@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <unordered_set>
 
+#include "frontend/associative_update.h"
 #include "frontend/define.h"
 #include "frontend/race.h"
 #include "ir/print.h"
@@ -42,9 +43,10 @@ std::string fate_of(const ir::StageSchedule& schedule, const std::string& var) {
 
 // The reduction variables that a loop was made of.
 std::unordered_set<std::string> reduction_roots(const ir::Definition& definition,
+                                                const ir::StageSchedule& schedule,
                                                 const std::string& loop) {
   std::unordered_set<std::string> names{loop};
-  const auto& splits = definition.schedule.splits;
+  const auto& splits = schedule.splits;
   for (auto split = splits.rbegin(); split != splits.rend(); ++split) {
     if (split->kind == ir::Split::Kind::Fuse) {
       if (names.erase(split->old_var)) names.insert({split->outer, split->inner});
@@ -98,7 +100,7 @@ std::string names_of(const std::vector<VarOrRVar>& vars) {
 
 std::string Stage::name() const { return ir::stage_name(*func_, index_); }
 
-const ir::StageSchedule& Stage::get_schedule() const { return definition().schedule; }
+std::string Stage::source_location() const { return ir::source_location_of(*func_); }
 
 std::string Stage::dump_argument_list() const {
   std::string out;
@@ -106,43 +108,47 @@ std::string Stage::dump_argument_list() const {
   return out;
 }
 
-ir::StageSchedule& Stage::touch() const {
-  func_->version++;
-  definition().schedule.touched = true;
-  return definition().schedule;
-}
-
 size_t Stage::loop_index(const VarOrRVar& var, const std::string& asked) const {
-  const ir::StageSchedule& schedule = get_schedule();
-  for (size_t i = 0; i < schedule.dims.size(); i++) {
-    if (schedule.dims[i].var == var.name()) return i;
+  const ir::StageSchedule& now = schedule();
+  for (size_t i = 0; i < now.dims.size(); i++) {
+    if (now.dims[i].var == var.name()) return i;
   }
-  const std::string fate = fate_of(schedule, var.name());
+  const std::string fate = fate_of(now, var.name());
   user_error(asked, text(quoted(var.name()), " must be a loop of this stage"),
-             fate.empty() ? loops_of(schedule) : fate + "; " + loops_of(schedule),
-             "Name one of its loops");
+             fate.empty() ? loops_of(now) : fate + "; " + loops_of(now), "Name one of its loops");
 }
 
 void Stage::check_new_name(const VarOrRVar& var, const std::string& replaced,
                            const std::string& asked) const {
   const std::string& name = var.name();
   if (name == replaced) return;
-  const ir::StageSchedule& schedule = get_schedule();
-  const bool is_loop = std::any_of(schedule.dims.begin(), schedule.dims.end(),
+  const ir::StageSchedule& now = schedule();
+  const bool is_loop = std::any_of(now.dims.begin(), now.dims.end(),
                                    [&](const ir::Dim& dim) { return dim.var == name; });
-  const std::string fate = fate_of(schedule, name);
+  const std::string fate = fate_of(now, name);
   if (!is_loop && fate.empty()) return;
   user_error(asked, "a new loop needs a name that this stage has not used yet",
-             is_loop ? text(quoted(name), " is a loop already; ", loops_of(schedule)) : fate,
+             is_loop ? text(quoted(name), " is a loop already; ", loops_of(now)) : fate,
              "Use a new Var");
 }
 
+// Iterations that may touch the same element need atomic() of an update that is proven associative
+// and commutative, atomic(true), or allow_race_conditions().
 void Stage::check_race_free(const VarOrRVar& var, const std::string& asked) const {
   const ir::Definition& stage = definition();
-  for (const std::string& root : reduction_roots(stage, var.name())) {
+  const ir::StageSchedule& now = schedule();
+  if (now.allow_races || (now.atomic && now.override_associativity)) return;
+  for (const std::string& root : reduction_roots(stage, now, var.name())) {
     if (ir::can_prove_race_free(*func_, stage, root)) continue;
+    if (now.atomic) {
+      const ir::AssociativityProof update = ir::prove_associative(*func_, stage);
+      if (update.op && update.op->commutative) return;
+      user_error(asked, "an atomic update is associative and commutative",
+                 update.op ? update.why_not_commutative : update.why_not,
+                 "Give atomic(true) if its order does not matter, or keep the loop serial");
+    }
     std::string pure;
-    for (const ir::Dim& dim : stage.schedule.dims) {
+    for (const ir::Dim& dim : now.dims) {
       if (!dim.is_reduction) pure += (pure.empty() ? "" : " or ") + quoted(dim.var);
     }
     user_error(
@@ -150,9 +156,22 @@ void Stage::check_race_free(const VarOrRVar& var, const std::string& asked) cons
         text(quoted(root),
              " is a reduction variable, and its iterations may read or write one element of ",
              quoted(func_->name)),
-        pure.empty() ? "Keep the loop serial, or reduce into more elements first"
-                     : "Use " + pure + " instead: its iterations are independent");
+        text(pure.empty() ? "Reduce into more elements first, with rfactor"
+                          : "Use " + pure + " instead: its iterations are independent",
+             "; or make the update atomic(), or allow_race_conditions()"));
   }
+}
+
+Stage& Stage::atomic(bool override_associativity_test) {
+  ir::StageSchedule& now = touch();
+  now.atomic = true;
+  now.override_associativity = override_associativity_test;
+  return *this;
+}
+
+Stage& Stage::allow_race_conditions() {
+  touch().allow_races = true;
+  return *this;
 }
 
 Stage& Stage::split(const VarOrRVar& old, const VarOrRVar& outer, const VarOrRVar& inner,
@@ -169,7 +188,7 @@ Stage& Stage::split(const VarOrRVar& old, const VarOrRVar& outer, const VarOrRVa
   check_new_name(outer, old.name(), asked);
   check_new_name(inner, old.name(), asked);
   check_factor(factor, asked);
-  const bool is_reduction = get_schedule().dims[at].is_reduction;
+  const bool is_reduction = schedule().dims[at].is_reduction;
   check_tail(tail, index_ > 0, is_reduction, asked);
 
   ir::StageSchedule& schedule = touch();
@@ -200,8 +219,8 @@ Stage& Stage::fuse(const VarOrRVar& inner, const VarOrRVar& outer, const VarOrRV
     user_error(asked, "it takes two loops", "both are " + quoted(inner.name()));
   if (fused.name() != outer.name()) check_new_name(fused, inner.name(), asked);
   if (outer_at != inner_at + 1) {
-    user_error(asked, "the outer loop must be directly around the inner one",
-               loops_of(get_schedule()), "Reorder the loops first");
+    user_error(asked, "the outer loop must be directly around the inner one", loops_of(schedule()),
+               "Reorder the loops first");
   }
   ir::StageSchedule& schedule = touch();
   const ir::Dim inner_dim = schedule.dims[inner_at], outer_dim = schedule.dims[outer_at];
@@ -211,7 +230,7 @@ Stage& Stage::fuse(const VarOrRVar& inner, const VarOrRVar& outer, const VarOrRV
   split.outer = outer.name();
   split.inner = inner.name();
   split.exact = inner_dim.is_reduction || outer_dim.is_reduction;
-  schedule.dims[inner_at] = {fused.name(), outer_dim.for_type, split.exact};
+  schedule.dims[inner_at] = {fused.name(), outer_dim.for_type, split.exact, outer_dim.partition};
   schedule.dims.erase(schedule.dims.begin() + outer_at);
   schedule.splits.push_back(std::move(split));
   return *this;
@@ -248,8 +267,8 @@ Stage& Stage::reorder(const std::vector<VarOrRVar>& vars) {
                  "Drop one of them");
     }
   }
-  std::vector<ir::Dim> dims = get_schedule().dims;
-  for (size_t i = 0; i < sorted.size(); i++) dims[sorted[i]] = get_schedule().dims[places[i]];
+  std::vector<ir::Dim> dims = schedule().dims;
+  for (size_t i = 0; i < sorted.size(); i++) dims[sorted[i]] = schedule().dims[places[i]];
 
   const auto reduction_order = [](const std::vector<ir::Dim>& all) {
     std::vector<std::string> order;
@@ -258,10 +277,10 @@ Stage& Stage::reorder(const std::vector<VarOrRVar>& vars) {
     }
     return order;
   };
-  if (reduction_order(dims) != reduction_order(get_schedule().dims) &&
+  if (reduction_order(dims) != reduction_order(schedule().dims) &&
       !ir::can_prove_commutative(*func_, definition())) {
     for (const VarOrRVar& var : vars) {
-      for (const std::string& root : reduction_roots(definition(), var.name())) {
+      for (const std::string& root : reduction_roots(definition(), schedule(), var.name())) {
         if (ir::can_prove_race_free(*func_, definition(), root)) continue;
         user_error(asked, "the order of reduction loops may change only where it changes no result",
                    text("the update of ", quoted(func_->name), " over ", quoted(root),
@@ -294,6 +313,37 @@ Stage& Stage::vectorize(const VarOrRVar& var) {
 Stage& Stage::unroll(const VarOrRVar& var) {
   return set_for_type(var, ForType::Unrolled, "unroll");
 }
+
+// ---- partition control ----
+
+Stage& Stage::partition(const VarOrRVar& var, Partition partition) {
+  const size_t at = loop_index(
+      var, text("choose how to partition the loop ", quoted(var.name()), " of ", quoted(name())));
+  touch().dims[at].partition = partition;
+  return *this;
+}
+
+Stage& Stage::never_partition(const std::vector<VarOrRVar>& vars) {
+  for (const VarOrRVar& var : vars) partition(var, Partition::Never);
+  return *this;
+}
+
+Stage& Stage::always_partition(const std::vector<VarOrRVar>& vars) {
+  for (const VarOrRVar& var : vars) partition(var, Partition::Always);
+  return *this;
+}
+
+Stage& Stage::never_partition_all() {
+  for (ir::Dim& dim : touch().dims) dim.partition = Partition::Never;
+  return *this;
+}
+
+Stage& Stage::always_partition_all() {
+  for (ir::Dim& dim : touch().dims) dim.partition = Partition::Always;
+  return *this;
+}
+
+// ---- split and run ----
 
 namespace {
 VarOrRVar fresh_like(const VarOrRVar& var) {

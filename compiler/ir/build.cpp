@@ -414,9 +414,10 @@ Stmt make_producer_consumer(const std::string& name, bool is_producer, Stmt body
   return body.defined() ? Stmt(new ProducerConsumer(name, is_producer, std::move(body))) : Stmt();
 }
 
-Stmt make_for(const std::string& name, Expr min, Expr extent, ForType type, Stmt body) {
+Stmt make_for(const std::string& name, Expr min, Expr extent, ForType type, Stmt body,
+              Partition partition) {
   if (!body.defined()) return {};
-  return new For(name, std::move(min), std::move(extent), type, std::move(body));
+  return new For(name, std::move(min), std::move(extent), type, std::move(body), partition);
 }
 
 Stmt make_store(const std::string& name, Expr value, Expr index, Expr predicate, SymbolRef symbol) {

@@ -62,7 +62,8 @@ Expr conjunction(const std::vector<Expr>& terms);  // true when empty
 Stmt make_let(const std::string& name, Expr value, Stmt body);
 Stmt make_assert(Expr condition, Expr error);
 Stmt make_producer_consumer(const std::string& name, bool is_producer, Stmt body);
-Stmt make_for(const std::string& name, Expr min, Expr extent, ForType type, Stmt body);
+Stmt make_for(const std::string& name, Expr min, Expr extent, ForType type, Stmt body,
+              Partition partition = Partition::Auto);
 Stmt make_store(const std::string& name, Expr value, Expr index, Expr predicate = {},
                 SymbolRef symbol = {});
 Stmt make_provide(const std::string& name, std::vector<Expr> values, std::vector<Expr> args,

@@ -170,6 +170,7 @@ int Comparer::compare_nodes(const Stmt& a, const Stmt& b) {
         const For& m = same_kind(n);
         return first(
             [&] { return order(n.name, m.name); }, [&] { return order(n.for_type, m.for_type); },
+            [&] { return order(n.partition, m.partition); },
             [&] { return compare(n.min, m.min); }, [&] { return compare(n.extent, m.extent); },
             [&] { return compare(n.body, m.body); });
       },

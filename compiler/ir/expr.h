@@ -137,6 +137,8 @@ struct Range {
 };
 
 enum class ForType : uint8_t { Serial, Parallel, Vectorized, Unrolled };
+// Whether a loop is cut into a steady state without boundary tests and the parts around it.
+enum class Partition : uint8_t { Auto, Never, Always };
 // GPU and accelerator memories parse and are refused where code is made for a CPU.
 enum class MemoryType : uint8_t {
   Auto,
@@ -377,17 +379,20 @@ struct ProducerConsumer : StmtNode {
 };
 struct For : StmtNode {  // name in [min, min + extent)
   RETROGRADE_NODE(For)
-  For(std::string name, Expr min, Expr extent, ForType for_type, Stmt body)
+  For(std::string name, Expr min, Expr extent, ForType for_type, Stmt body,
+      Partition partition = Partition::Auto)
       : StmtNode(Kind::For),
         name(std::move(name)),
         min(std::move(min)),
         extent(std::move(extent)),
         for_type(for_type),
-        body(std::move(body)) {}
+        body(std::move(body)),
+        partition(partition) {}
   const std::string name;
   const Expr min, extent;
   const ForType for_type;
   const Stmt body;
+  const Partition partition;
 };
 struct Store : StmtNode {
   RETROGRADE_NODE(Store)

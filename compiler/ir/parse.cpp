@@ -19,6 +19,9 @@ namespace {
 // The C++ stack bounds how deep a text may nest.
 constexpr int max_depth = 2000;
 
+constexpr ForType for_types[] = {ForType::Serial, ForType::Parallel, ForType::Vectorized,
+                                 ForType::Unrolled};
+
 class Parser {
  public:
   explicit Parser(const std::string& text)
@@ -142,7 +145,8 @@ class Parser {
     return s;
   }
   Stmt stmt();
-  Stmt loop(ForType for_type);
+  bool is_loop() const;
+  Stmt loop();
   Stmt realize();
   Stmt prefetch();
   std::vector<Range> ranges();
@@ -455,13 +459,7 @@ Stmt Parser::stmt() {
     const std::string func = name();
     return make_producer_consumer(func, is_producer, block());
   }
-  for (ForType type :
-       {ForType::Serial, ForType::Parallel, ForType::Vectorized, ForType::Unrolled}) {
-    if (!is(for_name(type))) continue;
-    take();
-    return loop(type);
-  }
-  if (is("for")) return loop(ForType::Serial);
+  if (is_loop()) return loop();
   if (accept("realize")) return realize();
   if (accept("allocate")) return allocate();
   if (accept("free")) return make_free(name());
@@ -480,7 +478,26 @@ Stmt Parser::stmt() {
   return store_or_provide();
 }
 
-Stmt Parser::loop(ForType for_type) {
+bool Parser::is_loop() const {
+  if (is("for")) return true;
+  for (Partition partition : {Partition::Never, Partition::Always}) {
+    if (is(partition_name(partition))) return true;
+  }
+  for (ForType type : for_types) {
+    if (is(for_name(type))) return true;
+  }
+  return false;
+}
+
+Stmt Parser::loop() {
+  Partition partition = Partition::Auto;
+  for (Partition wanted : {Partition::Never, Partition::Always}) {
+    if (accept(partition_name(wanted))) partition = wanted;
+  }
+  ForType for_type = ForType::Serial;
+  for (ForType wanted : for_types) {
+    if (accept(for_name(wanted))) for_type = wanted;
+  }
   expect("for");
   expect("(");
   const std::string variable = name();
@@ -489,7 +506,7 @@ Stmt Parser::loop(ForType for_type) {
   expect(",");
   Expr extent = expr();
   expect(")");
-  return make_for(variable, min, extent, for_type, block());
+  return make_for(variable, min, extent, for_type, block(), partition);
 }
 
 MemoryType Parser::memory() {

@@ -370,6 +370,8 @@ void Printer::print(const Stmt& s) {
         body(n.body);
       },
       [&](const For& n) {
+        if (n.partition != Partition::Auto)
+          out_ += std::string(partition_name(n.partition)) + ' ';
         if (n.for_type != ForType::Serial) out_ += std::string(for_name(n.for_type)) + ' ';
         out_ += "for (" + quote_name(n.name) + ", ";
         root_list({n.min, n.extent});

@@ -11,6 +11,11 @@ const char* for_name(ForType type) {
   return names[static_cast<int>(type)];
 }
 
+const char* partition_name(Partition partition) {
+  static constexpr const char* names[] = {"auto_partition", "never_partition", "always_partition"};
+  return names[static_cast<int>(partition)];
+}
+
 const char* memory_name(MemoryType memory) {
   static constexpr const char* names[] = {"auto",         "heap",       "stack",
                                           "register",     "gpu_shared", "gpu_texture",
@@ -68,12 +73,39 @@ bool read_type(const std::string& word, Type& type) {
 }
 
 bool is_reserved(const std::string& word) {
-  static const std::unordered_set<std::string> keywords = {
-      "true",      "false",    "min",        "max",      "select",  "reinterpret", "ramp",
-      "broadcast", "shuffle",  "reduce",     "image",    "extern",  "let",         "if",
-      "else",      "assert",   "free",       "evaluate", "produce", "consume",     "for",
-      "serial",    "parallel", "vectorized", "unrolled", "realize", "allocate",    "atomic",
-      "fork",      "prefetch", "and"};
+  static const std::unordered_set<std::string> keywords = {"true",
+                                                           "false",
+                                                           "min",
+                                                           "max",
+                                                           "select",
+                                                           "reinterpret",
+                                                           "ramp",
+                                                           "broadcast",
+                                                           "shuffle",
+                                                           "reduce",
+                                                           "image",
+                                                           "extern",
+                                                           "let",
+                                                           "if",
+                                                           "else",
+                                                           "assert",
+                                                           "free",
+                                                           "evaluate",
+                                                           "produce",
+                                                           "consume",
+                                                           "for",
+                                                           "serial",
+                                                           "parallel",
+                                                           "vectorized",
+                                                           "unrolled",
+                                                           "realize",
+                                                           "allocate",
+                                                           "atomic",
+                                                           "fork",
+                                                           "prefetch",
+                                                           "and",
+                                                           "never_partition",
+                                                           "always_partition"};
   Type type;
   return keywords.count(word) || op_from_name(word) != Op::none || read_type(word, type) ||
          word.rfind("nan_", 0) == 0 || word.rfind("inf_", 0) == 0;

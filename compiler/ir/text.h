@@ -8,6 +8,7 @@
 namespace retrograde::ir {
 
 const char* for_name(ForType type);
+const char* partition_name(Partition partition);
 const char* memory_name(MemoryType memory);
 const char* reduce_name(ReduceOp op);
 bool is_reserved(const std::string& word);  // a keyword, a type or an operator

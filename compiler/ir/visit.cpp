@@ -214,7 +214,8 @@ Stmt map_children(const Stmt& s, ExprMap map, StmtMap map_stmt) {
         Expr min = map(n.min), extent = map(n.extent);
         Stmt body = map_optional(n.body, map_stmt);
         if (min.same_as(n.min) && extent.same_as(n.extent) && body.same_as(n.body)) return s;
-        return make_for(n.name, std::move(min), std::move(extent), n.for_type, std::move(body));
+        return make_for(n.name, std::move(min), std::move(extent), n.for_type, std::move(body),
+                        n.partition);
       },
       [&](const Store& n) {
         Expr value = map(n.value), index = map(n.index), predicate = map_optional(n.predicate, map);

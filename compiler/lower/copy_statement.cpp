@@ -84,7 +84,7 @@ class Copier : public Rewriter {
     return match(
         copy, [&](const LetStmt& n) { return make_let(name_of(n.name), n.value, n.body); },
         [&](const For& n) {
-          return make_for(name_of(n.name), n.min, n.extent, n.for_type, n.body);
+          return make_for(name_of(n.name), n.min, n.extent, n.for_type, n.body, n.partition);
         },
         [&](const Allocate& n) {
           return make_allocate(name_of(n.name), n.type, n.memory, n.elements, n.body);

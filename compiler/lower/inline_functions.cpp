@@ -5,7 +5,9 @@
 
 #include "autodiff/default_schedule.h"
 #include "diagnostics/error.h"
+#include "frontend/wrappers.h"
 #include "ir/visit.h"
+#include "lower/refuse_unsupported.h"
 #include "lower/resolve_undef.h"
 
 namespace retrograde::ir {
@@ -57,7 +59,8 @@ bool is_inlined(const FuncContents& f, const FuncSchedule& schedule, bool is_out
 
 }  // namespace
 
-Program inline_functions(const std::vector<FuncPtr>& outputs) {
+Program inline_functions(const std::vector<FuncPtr>& unwrapped) {
+  const std::vector<FuncPtr> outputs = apply_wrappers(unwrapped);
   Program program;
   InlinedFuncs inlined;
   Inliner inliner(inlined);
@@ -80,6 +83,8 @@ Program inline_functions(const std::vector<FuncPtr>& outputs) {
     }
     program.funcs.push_back({f, schedule, std::move(stages), is_output});
   }
+  resolve_outermost_levels(program);
+  refuse_unsupported(program);
   resolve_undef(program);
   return program;
 }

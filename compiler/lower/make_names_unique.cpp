@@ -53,7 +53,8 @@ class Uniquifier {
         [&](const For& loop) {
           Expr min = rename(loop.min), extent = rename(loop.extent);
           Binding name(*this, loop.name);
-          return make_for(name.unique, min, extent, loop.for_type, rename(loop.body));
+          return make_for(name.unique, min, extent, loop.for_type, rename(loop.body),
+                          loop.partition);
         },
         [&](const Realize& realize) {
           std::vector<Range> bounds;

@@ -59,7 +59,7 @@ Stmt Simplifier::loop(const Stmt& s, const For& n) {
     body = (*this)(n.body);
   }
   if (min.same_as(n.min) && extent.same_as(n.extent) && body.same_as(n.body)) return s;
-  return make_for(n.name, min, extent, n.for_type, std::move(body));
+  return make_for(n.name, min, extent, n.for_type, std::move(body), n.partition);
 }
 
 // What follows an assert may rely on it, to the end of the block.

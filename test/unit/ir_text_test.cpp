@@ -46,7 +46,8 @@ Stmt random_stmt(test::RandomIr& random, int depth) {
     case 2:
       return make_producer_consumer(name, random.chance(50), inner());
     case 3:
-      return make_for(name, e(), e(), static_cast<ForType>(random.below(4)), inner());
+      return make_for(name, e(), e(), static_cast<ForType>(random.below(4)), inner(),
+                      static_cast<Partition>(random.below(3)));
     case 4:
       return make_store(name, e(Int(32, 4)), e(Int(32, 4)),
                         random.chance(50) ? e(Bool(4)) : Expr());

@@ -1,0 +1,364 @@
+#include "frontend/wrappers.h"
+
+#include <algorithm>
+#include <set>
+#include <unordered_map>
+#include <unordered_set>
+
+#include "frontend/define.h"
+#include "frontend/func.h"
+#include "ir/print.h"
+#include "ir/visit.h"
+
+namespace retrograde {
+
+namespace ir {
+
+namespace {
+
+bool is_wrapper_of(const FuncContents* candidate, const FuncContents& f) {
+  return std::any_of(f.wrappers.begin(), f.wrappers.end(),
+                     [&](const auto& entry) { return entry.second.get() == candidate; });
+}
+
+// What `user` reads where it is written as f: follows wrappers of wrappers. `visit` is told each
+// step. Wrappers of f read f itself.
+const FuncContents* resolve(const FuncContents* f, const FuncContents& user,
+                            FunctionRef<void(const FuncContents&)> visit) {
+  while (f != &user && !is_wrapper_of(&user, *f)) {
+    auto found = f->wrappers.find(user.name);
+    if (found == f->wrappers.end()) found = f->wrappers.find("");
+    if (found == f->wrappers.end()) break;
+    visit(*f);
+    f = found->second.get();
+  }
+  return f;
+}
+
+// The Func that stands for an image in what `user` reads; null when it reads the image itself.
+const FuncContents* reader_of_image(const Call& call, const FuncContents& user) {
+  const auto* image = static_cast<const ParameterContents*>(call.symbol.raw());
+  return image->func.get() == &user ? nullptr : image->func.get();
+}
+
+class Wrapping {
+ public:
+  std::vector<FuncPtr> apply(const std::vector<FuncPtr>& outputs) {
+    std::vector<FuncPtr> result;
+    for (const FuncPtr& output : outputs) result.push_back(copy_of(output.get()));
+    for (size_t i = 0; i < queue_.size(); i++) redirect(*queue_[i]);
+    check_used();
+    for (const FuncContents* f : queue_) copies_[f]->wrappers.clear();
+    for (const FuncContents* f : queue_) redirect_prefetches(*copies_[f]);
+    return result;
+  }
+
+ private:
+  std::unordered_map<const Symbol*, FuncPtr> copies_;
+  std::vector<const FuncContents*> queue_;
+  std::set<std::pair<const FuncContents*, std::string>>
+      used_;  // Func and the user it is wrapped in
+
+  const FuncPtr& copy_of(const FuncContents* f) {
+    FuncPtr& copy = copies_[f];
+    if (!copy) {
+      copy = f->copy();
+      queue_.push_back(f);
+    }
+    return copy;
+  }
+
+  FuncPtr read_by(const FuncContents* f, const FuncContents& user) {
+    return copy_of(resolve(f, user, [&](const FuncContents& step) {
+      used_.insert({&step, user.name});
+    }));
+  }
+
+  void redirect(const FuncContents& f) {
+    const FuncPtr copy = copies_[&f];
+    for (int s = 0; s < f.stage_count(); s++) {
+      Definition changed = map_exprs(f.stage(s), [&](const Expr& e) { return redirect(e, f); });
+      copy->stage(s) = std::move(changed);
+    }
+    if (!f.extern_definition) return;
+    for (ExternArgument& arg : copy->extern_definition->args) {
+      if (arg.kind == ExternArgument::Kind::Func) arg.func = read_by(arg.func.get(), f);
+    }
+  }
+
+  Expr redirect(const Expr& root, const FuncContents& f) {
+    return rewrite(root, [&](const Expr& e, const std::function<Expr(const Expr&)>& recurse) {
+      const Expr mapped = map_children(e, recurse);
+      const Call* call = mapped.as<Call>();
+      if (!call) return mapped;
+      const FuncContents* target = nullptr;
+      if (call->call_type == CallType::Func)
+        target = static_cast<const FuncContents*>(call->symbol.raw());
+      if (call->call_type == CallType::Image) target = reader_of_image(*call, f);
+      if (!target) return mapped;
+      const FuncPtr callee = read_by(target, f);
+      const bool self = target == &f;
+      return call_func(callee->name, call->type, call->args, call->value_index,
+                       self ? SymbolRef::weak(callee) : SymbolRef(callee));
+    });
+  }
+
+  void redirect_prefetches(FuncContents& f) {
+    for (int s = 0; s < f.stage_count(); s++) {
+      for (PrefetchDirective& prefetch : f.stage(s).schedule.prefetches) {
+        const auto copy = copies_.find(prefetch.symbol.raw());
+        if (copy != copies_.end()) prefetch.symbol = SymbolRef::weak(copy->second);
+      }
+    }
+  }
+
+  void check_used() const {
+    std::unordered_set<std::string> names;
+    for (const FuncContents* f : queue_) names.insert(f->name);
+    for (const FuncContents* f : queue_) {
+      for (const auto& [user, wrapper] : f->wrappers) {
+        if (user.empty() || !names.count(user) || used_.count({f, user})) continue;
+        user_error(text("wrap ", quoted(f->name), " in ", quoted(user)),
+                   text(quoted(user), " reads ", quoted(f->name)), "it does not",
+                   "Name a Func that reads it, or leave the wrapper out");
+      }
+    }
+  }
+};
+
+// The Funcs that stand for images which f reads.
+std::vector<FuncPtr> image_readers(const FuncContents& f) {
+  std::vector<FuncPtr> readers;
+  std::unordered_set<const ExprNode*> seen;
+  for (int s = 0; s < f.stage_count(); s++) {
+    for_each_expr(f.stage(s), [&](const Expr& root) {
+      walk(root, [&](const Expr& e) {
+        if (!seen.insert(e.get()).second) return false;
+        const Call* call = e.as<Call>();
+        if (!call || call->call_type != CallType::Image || !reader_of_image(*call, f)) return true;
+        const auto& reader = static_cast<const ParameterContents*>(call->symbol.raw())->func;
+        if (std::find(readers.begin(), readers.end(), reader) == readers.end())
+          readers.push_back(reader);
+        return true;
+      });
+    });
+  }
+  return readers;
+}
+
+bool is_scheduled(const FuncContents& reader) {
+  return reader.schedule.touched || !reader.wrappers.empty() || reader.pure->schedule.touched;
+}
+
+}  // namespace
+
+std::vector<FuncPtr> apply_wrappers(const std::vector<FuncPtr>& outputs) {
+  for (const FuncPtr& f : topological_order(outputs)) {
+    const auto readers = image_readers(*f);
+    if (!f->wrappers.empty() || std::any_of(readers.begin(), readers.end(),
+                                            [](const FuncPtr& r) { return is_scheduled(*r); })) {
+      return Wrapping().apply(outputs);
+    }
+  }
+  return outputs;
+}
+
+std::vector<FuncPtr> functions_of(const std::vector<FuncPtr>& outputs) {
+  std::vector<FuncPtr> found = topological_order(outputs);
+  std::unordered_set<const FuncContents*> seen;
+  for (const FuncPtr& f : found) seen.insert(f.get());
+  const auto add = [&](const FuncPtr& root) {
+    if (seen.count(root.get())) return;
+    for (const FuncPtr& f : topological_order({root})) {
+      if (seen.insert(f.get()).second) found.push_back(f);
+    }
+  };
+  for (size_t i = 0; i < found.size(); i++) {
+    const FuncPtr f = found[i];
+    for (const auto& entry : f->wrappers) add(entry.second);
+    for (const FuncPtr& reader : image_readers(*f)) add(reader);
+  }
+  return found;
+}
+
+namespace {
+
+// A handle that keeps `owner` alive as long as `f` is used.
+template <typename Owner>
+FuncPtr owning(std::shared_ptr<Owner> owner, FuncPtr f) {
+  struct Both {
+    std::shared_ptr<Owner> owner;
+    FuncPtr func;
+  };
+  FuncContents* contents = f.get();
+  return FuncPtr(std::make_shared<Both>(Both{std::move(owner), std::move(f)}), contents);
+}
+
+// w(args) = f(args)
+FuncPtr identity_of(const FuncPtr& f, const std::string& name) {
+  auto wrapper = std::make_shared<FuncContents>();
+  wrapper->name = claim_name(name);
+  std::vector<Expr> args, values;
+  for (const std::string& arg : f->args) args.push_back(variable(arg));
+  for (size_t i = 0; i < f->types.size(); i++) {
+    values.push_back(
+        call_func(f->name, f->types[i], args, static_cast<int>(i), SymbolRef::weak(f)));
+  }
+  define_pure(wrapper, args, values);
+  return wrapper;
+}
+
+// The same definitions and schedule under another name.
+FuncPtr clone_of(const FuncPtr& f, const std::string& name) {
+  FuncPtr clone = f->copy();
+  clone->name = claim_name(name);
+  clone->wrappers.clear();
+  clone->outputs.clear();
+  make_outputs(*clone);
+  for (int s = 1; s < f->stage_count(); s++) {
+    clone->stage(s) =
+        map_exprs(f->stage(s), [&](const Expr& e) { return redirect_calls(e, f, clone, true); });
+  }
+  return clone;
+}
+
+bool is_identity(const FuncContents& wrapper, const FuncContents& f) {
+  const Call* call = wrapper.is_extern() ? nullptr : wrapper.pure->values[0].as<Call>();
+  return wrapper.updates.empty() && call && call->symbol.raw() == &f;
+}
+
+std::string names_of(const std::vector<std::string>& users) {
+  std::string out;
+  for (const std::string& user : users) out += (out.empty() ? "" : ", ") + quoted(user);
+  return out;
+}
+
+bool reads(const FuncContents& user, const FuncContents& f) {
+  bool found = false;
+  for (const FuncPtr& callee : direct_callees(user)) {
+    const auto visit = [&](const FuncContents& step) { found = found || &step == &f; };
+    found = found || resolve(callee.get(), user, visit) == &f;
+  }
+  for (const FuncPtr& reader : image_readers(user)) {
+    const auto visit = [&](const FuncContents& step) { found = found || &step == &f; };
+    found = found || resolve(reader.get(), user, visit) == &f;
+  }
+  return found;
+}
+
+// 1. f has a definition. 2. It is not wrapped in itself. 3. A user that is complete reads it.
+void check_users(const FuncPtr& f, const std::vector<FuncPtr>& users, const std::string& asked) {
+  if (!f->is_defined())
+    user_error(asked, quoted(f->name) + " needs a definition first", "it has none", "Define it");
+  for (const FuncPtr& user : users) {
+    if (user.get() == f.get()) {
+      user_error(asked, "a Func is wrapped in the Funcs that read it",
+                 quoted(f->name) + " is wrapped in itself", "Name one of its users");
+    }
+    if (!user->frozen || reads(*user, *f)) continue;
+    user_error(asked, text(quoted(user->name), " reads ", quoted(f->name)), "it does not",
+               "Name a Func that reads it");
+  }
+}
+
+// All of `users` have this wrapper, and nobody else.
+void check_shared(const FuncContents& f, const FuncPtr& wrapper,
+                  const std::vector<std::string>& users, const std::string& asked) {
+  std::vector<std::string> sharing;
+  for (const auto& [user, other] : f.wrappers) {
+    if (other == wrapper) sharing.push_back(user);
+  }
+  std::vector<std::string> wanted = users;
+  std::sort(wanted.begin(), wanted.end());
+  if (wanted == sharing) return;
+  user_error(asked, "Funcs that share a wrapper share it in every request",
+             text(quoted(wrapper->name), " is the wrapper in ", names_of(sharing)),
+             "Name these together, or use Funcs that have no wrapper yet");
+}
+
+}  // namespace
+
+FuncPtr wrapper_of(const FuncPtr& handle, const std::vector<FuncPtr>& users,
+                   const std::string& name, bool clone) {
+  const FuncPtr f = handle->shared_from_this();
+  std::vector<std::string> keys;
+  for (const FuncPtr& user : users) keys.push_back(user->name);
+  if (users.empty()) keys.push_back("");
+  const std::string asked =
+      text(clone ? "clone " : "wrap ", quoted(f->name),
+           users.empty() ? std::string(" for all its users") : " in " + names_of(keys));
+  check_users(f, users, asked);
+  const auto existing = f->wrappers.find(keys[0]);
+  if (existing != f->wrappers.end()) {
+    check_shared(*f, existing->second, keys, asked);
+    if (clone == is_identity(*existing->second, *f)) {
+      user_error(asked, "a user has either a wrapper or a clone",
+                 text(quoted(existing->second->name), " is there already"), "Keep that one");
+    }
+    return owning(handle, existing->second);
+  }
+  for (const std::string& key : keys) {
+    if (!f->wrappers.count(key)) continue;
+    user_error(asked, "Funcs that share a wrapper share it in every request",
+               text(quoted(key), " has the wrapper ", quoted(f->wrappers[key]->name), " and ",
+                    quoted(keys[0]), " has none"),
+               "Give each its own");
+  }
+  FuncPtr wrapper = clone ? clone_of(f, name) : identity_of(f, name);
+  f->frozen = wrapper->frozen = true;  // wrappers change no values, now or later
+  for (const std::string& key : keys) f->wrappers[key] = wrapper;
+  f->version++;
+  return owning(handle, wrapper);
+}
+
+FuncPtr func_of_image(const std::shared_ptr<ParameterContents>& image) {
+  if (!image->func) {
+    auto reader = std::make_shared<FuncContents>();
+    reader->name = claim_name(image->name + "_im");
+    std::vector<Expr> args;
+    for (int d = 0; d < image->dimensions; d++) args.push_back(Var::implicit(d));
+    define_pure(reader, args, {call_image(image->name, image->type, args, SymbolRef::weak(image))});
+    reader->frozen = true;
+    image->func = reader;
+    image->version++;
+  }
+  return owning(image, image->func);
+}
+
+}  // namespace ir
+
+Func Func::wrap(const std::vector<Func>& users, const std::string& name, bool clone) const {
+  std::vector<ir::FuncPtr> contents;
+  for (const Func& user : users) contents.push_back(user.function());
+  return Func(ir::wrapper_of(func_, contents, name, clone));
+}
+
+Func Func::in(const Func& f) { return wrap({f}, name() + "_in_" + f.name(), false); }
+Func Func::in() { return wrap({}, name() + "_global_wrapper", false); }
+Func Func::clone_in(const Func& f) { return wrap({f}, name() + "_clone_in_" + f.name(), true); }
+
+Func Func::in(const std::vector<Func>& fs) {
+  if (fs.empty()) {
+    user_error("wrap " + quoted(name()), "at least one user is named", "the list is empty",
+               "Call in() for all users");
+  }
+  return wrap(fs, name() + "_wrapper", false);
+}
+
+Func Func::clone_in(const std::vector<Func>& fs) {
+  if (fs.empty())
+    user_error("clone " + quoted(name()), "at least one user is named", "the list is empty");
+  return wrap(fs, name() + "_clone", true);
+}
+
+Func Func::copy_to_device(DeviceAPI) {
+  unsupported("copy " + quoted(name()) + " to a device", "storage lies in the memory of the CPU",
+              "no code is generated for devices", "Leave it out");
+}
+
+Func Func::copy_to_host() {
+  unsupported("copy " + quoted(name()) + " from a device", "storage lies in the memory of the CPU",
+              "no code is generated for devices", "Leave it out");
+}
+
+}  // namespace retrograde

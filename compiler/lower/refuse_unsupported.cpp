@@ -1,0 +1,127 @@
+#include "lower/refuse_unsupported.h"
+
+#include "diagnostics/error.h"
+#include "frontend/define.h"
+#include "frontend/var.h"
+
+namespace retrograde::ir {
+
+namespace {
+
+// ---- directives that are not carried out yet ----
+
+bool any_stage(const LoopedFunc& f, bool (*has)(const StageSchedule&)) {
+  for (const Definition& stage : f.stages) {
+    if (has(stage.schedule)) return true;
+  }
+  return false;
+}
+
+struct Directive {
+  const char* name;
+  bool (*given)(const LoopedFunc&);
+};
+
+constexpr Directive not_yet[] = {
+    {"specialize",
+     [](const LoopedFunc& f) {
+       return any_stage(f, [](const StageSchedule& s) { return !s.specializations.empty(); });
+     }},
+    {"compute_with",
+     [](const LoopedFunc& f) {
+       return any_stage(
+           f, [](const StageSchedule& s) { return s.fuse_level.kind == LoopLevel::Kind::At; });
+     }},
+    {"prefetch",
+     [](const LoopedFunc& f) {
+       return any_stage(f, [](const StageSchedule& s) { return !s.prefetches.empty(); });
+     }},
+    {"hoist_storage",
+     [](const LoopedFunc& f) { return f.schedule.hoist_level.kind != LoopLevel::Kind::Inlined; }},
+    {"async", [](const LoopedFunc& f) { return f.schedule.async; }},
+    {"trace_loads", [](const LoopedFunc& f) { return f.func->trace.loads; }},
+    {"trace_stores", [](const LoopedFunc& f) { return f.func->trace.stores; }},
+    {"trace_realizations", [](const LoopedFunc& f) { return f.func->trace.realizations; }},
+    {"debug_to_file", [](const LoopedFunc& f) { return !f.func->debug_file.empty(); }},
+};
+
+bool is_memory_of_device(MemoryType memory) {
+  return memory == MemoryType::GPUShared || memory == MemoryType::GPUTexture ||
+         memory == MemoryType::LockedCache || memory == MemoryType::VTCM ||
+         memory == MemoryType::AMXTile;
+}
+
+void refuse_directives(const LoopedFunc& f) {
+  for (const Directive& directive : not_yet) {
+    if (!directive.given(f)) continue;
+    unsupported(text("compile ", quoted(f.name()), " with ", directive.name),
+                "every directive of its schedule is carried out",
+                text(directive.name, " is not carried out yet"), "Leave it out");
+  }
+  if (is_memory_of_device(f.schedule.memory)) {
+    unsupported(text("store ", quoted(f.name()), " in memory of a device"),
+                "storage lies in memory that the CPU has",
+                "store_in named memory of GPUs or accelerators, and code is made for a CPU",
+                "Use MemoryType::Auto, Heap or Stack");
+  }
+}
+
+// ---- schedules that contradict themselves ----
+
+void check_level_is_set(const LoopedFunc& f, const std::shared_ptr<LoopLevelContents>& from,
+                        const char* verb) {
+  if (!from || from->defined) return;
+  user_error(text(verb, " ", quoted(f.name()), " at a loop level"),
+             "the level is set before the pipeline is compiled", "it never was",
+             "Set it: level.set(LoopLevel(f, x))");
+}
+
+void check_loops(const LoopedFunc& f, int stage, const StageSchedule& schedule) {
+  const Dim* parallel = nullptr;
+  for (const Dim& dim : schedule.dims) {  // innermost first
+    if (dim.for_type == ForType::Parallel) parallel = &dim;
+    if (dim.for_type != ForType::Vectorized || !parallel) continue;
+    user_error(
+        text("parallelize ", quoted(stage_name(*f.func, stage)), " over ", quoted(parallel->var)),
+        "a parallel loop is not inside of a vectorized one",
+        text("it is inside of the vectorized loop ", quoted(dim.var)),
+        text("Reorder ", quoted(dim.var), " inwards, or keep one of the loops serial"));
+  }
+  for (const StageSchedule& special : schedule.specializations) check_loops(f, stage, special);
+}
+
+}  // namespace
+
+void refuse_unsupported(const Program& program) {
+  for (const LoopedFunc& f : program.funcs) {
+    check_level_is_set(f, f.schedule.compute_from, "compute");
+    check_level_is_set(f, f.schedule.store_from, "store");
+    check_level_is_set(f, f.schedule.hoist_from, "hoist the storage of");
+    for (size_t s = 0; s < f.stages.size(); s++)
+      check_loops(f, static_cast<int>(s), f.stages[s].schedule);
+    refuse_directives(f);
+  }
+}
+
+namespace {
+
+void resolve(const Program& program, LoopLevel& level) {
+  if (level.kind != LoopLevel::Kind::At || level.var != Var::outermost().name()) return;
+  const LoopedFunc* consumer = program.find(level.func);
+  if (!consumer) return;  // refused where every level finds its place
+  level = consumer->is_output ? LoopLevel{LoopLevel::Kind::Root, "", "", -1}
+                              : consumer->schedule.compute_level;
+}
+
+}  // namespace
+
+void resolve_outermost_levels(Program& program) {
+  // Consumers come last, and their own levels are resolved first.
+  for (auto f = program.funcs.rbegin(); f != program.funcs.rend(); ++f) {
+    resolve(program, f->schedule.compute_level);
+    resolve(program, f->schedule.store_level);
+    resolve(program, f->schedule.hoist_level);
+  }
+}
+
+}  // namespace retrograde::ir

@@ -1,0 +1,16 @@
+// refuse_unsupported -- what no single directive could know when it was given, and what is not
+// built yet.
+#pragma once
+
+#include "lower/program.h"
+
+namespace retrograde::ir {
+
+// CompileError for schedules that contradict themselves; Unsupported for directives that lowering
+// does not carry out: a line in the table of refuse_unsupported.cpp each, until it does.
+void refuse_unsupported(const Program& program);
+
+// Var::outermost() as a level means outside of all loops of the Func: where that one is computed.
+void resolve_outermost_levels(Program& program);
+
+}  // namespace retrograde::ir
