@@ -83,11 +83,28 @@ class StatementColumn {
   }
 };
 
-// The block's name in ".LBB0_3:    # %f.s0.x"; empty for lines that are no label.
+// The body of a parallel loop is a function "f.pipeline.parallel0.f.s0.y".
+std::string parallel_loop_of(const std::string& function) {
+  const std::string mark = ".parallel";
+  const size_t begin = function.find(mark);
+  if (begin == std::string::npos) return "";
+  const size_t dot = function.find('.', begin + mark.size());
+  return dot == std::string::npos ? "" : function.substr(dot + 1);
+}
+
+// The loop that a label begins: .LBB0_3:   # %f.s0.x   or   # %"f.s0.x.$1"; empty for others.
 std::string block_of(const std::string& line) {
-  if (line.empty() || line[0] != '.' || line.find(':') == std::string::npos) return "";
+  const size_t colon = line.find(':');
+  if (colon == std::string::npos) return "";
+  if (line[0] != '.') {
+    const size_t quote = line[0] == '"' ? 1 : 0;
+    return parallel_loop_of(line.substr(quote, colon - 2 * quote));
+  }
   const size_t percent = line.find('%');
-  return percent == std::string::npos ? "" : line.substr(percent + 1);
+  if (percent == std::string::npos) return "";
+  std::string name = line.substr(percent + 1);
+  if (name.size() > 1 && name[0] == '"') name = name.substr(1, name.size() - 2);
+  return name;
 }
 
 // LLVM numbers blocks whose name is taken: "f.s0.x12" is a copy of "f.s0.x".

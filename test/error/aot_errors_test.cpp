@@ -1,0 +1,241 @@
+// What compiling to files refuses, and that it leaves nothing behind.
+#include <gtest/gtest.h>
+#include <retrograde/retrograde.h>
+
+#include <filesystem>
+#include <fstream>
+
+namespace retrograde {
+namespace {
+
+namespace fs = std::filesystem;
+
+class AotErrors : public testing::Test {
+ protected:
+  AotErrors() : in(Float(32), 1, "in"), gain("gain"), x("x"), f("f") {
+    char name[] = "/tmp/retrograde_aot_XXXXXX";
+    folder = mkdtemp(name);
+    f(x) = in(x)*gain;
+  }
+  ~AotErrors() override { fs::remove_all(folder); }
+  std::string path(const std::string& name) const { return folder / name; }
+  bool is_empty() const { return fs::is_empty(folder); }
+
+  fs::path folder;
+  ImageParam in;
+  Param<float> gain;
+  Var x;
+  Func f;
+};
+
+template <typename Kind = CompileError>
+void expect_error(const std::function<void()>& action, const std::vector<std::string>& phrases) {
+  try {
+    action();
+    FAIL() << "nothing was thrown";
+  } catch (const Kind& e) {
+    for (const std::string& phrase : phrases)
+      EXPECT_NE(std::string(e.what()).find(phrase), std::string::npos) << e.what();
+  }
+}
+
+const Target host("host");
+
+TEST_F(AotErrors, ParamThatIsNotListed) {
+  expect_error([&] { f.compile_to_file(path("a"), {in}, "a", host); },
+               {"\"a\"", "it uses the Param \"gain\", which is not listed", "Add \"gain\""});
+  EXPECT_TRUE(is_empty());
+}
+
+TEST_F(AotErrors, ImageParamThatIsNotListed) {
+  expect_error([&] { f.compile_to_file(path("a"), {gain}, "a", host); },
+               {"it uses the ImageParam \"in\", which is not listed"});
+}
+
+TEST_F(AotErrors, ArgumentListedTwice) {
+  expect_error(
+      [&] {
+        f.compile_to_file(path("a"), {in, gain, in}, "a", host);
+      },
+      {"\"in\" is listed twice"});
+}
+
+TEST_F(AotErrors, ArgumentOfAnotherType) {
+  const Argument wrong("gain", Argument::InputScalar, Float(64), 0);
+  expect_error(
+      [&] {
+        f.compile_to_file(path("a"), {in, wrong}, "a", host);
+      },
+      {"\"gain\" differs in kind, type or dimensions"});
+}
+
+TEST_F(AotErrors, OutputAmongTheArguments) {
+  const Argument output("f", Argument::OutputBuffer, Float(32), 1);
+  expect_error(
+      [&] {
+        f.compile_to_file(path("a"), {in, gain, output}, "a", host);
+      },
+      {"\"f\" is an output"});
+}
+
+TEST_F(AotErrors, ScalarWithDimensions) {
+  expect_error([] { Argument("a", Argument::InputScalar, Float(32), 2); }, {"a scalar has none"});
+}
+
+TEST_F(AotErrors, FolderThatIsNotThere) {
+  expect_error(
+      [&] {
+        f.compile_to_file(path("no/such/a"), {in, gain}, "a", host);
+      },
+      {"cannot write", "no/such/a", "No such file or directory"});
+}
+
+TEST_F(AotErrors, PathThatIsAFolder) {
+  fs::create_directory(path("a.h"));
+  expect_error(
+      [&] {
+        f.compile_to_file(path("a"), {in, gain}, "a", host);
+      },
+      {"a.h\"", "Is a directory"});
+  EXPECT_FALSE(fs::exists(path("a.o")));  // nothing of a call that fails is written
+}
+
+TEST_F(AotErrors, AFileThatCannotBeWrittenLeavesTheOthersAsTheyWere) {
+  std::ofstream(path("a.o")) << "old";
+  expect_error(
+      [&] {
+        f.compile_to(
+            {{OutputFileType::object, path("a.o")}, {OutputFileType::c_header, path("no/a.h")}},
+            {in, gain}, "a", host);
+      },
+      {"no/a.h"});
+  std::string kept;
+  std::ifstream(path("a.o")) >> kept;
+  EXPECT_EQ(kept, "old");
+  EXPECT_EQ(std::distance(fs::directory_iterator(folder), {}), 1);
+}
+
+TEST_F(AotErrors, NameThatIsNoIdentifier) {
+  for (const char* name : {"1st", "a-b", "a b", "::a", "a::"}) {
+    expect_error(
+        [&] {
+          f.compile_to_file(path("a"), {in, gain}, name, host);
+        },
+        {"a function's name is an identifier"});
+  }
+}
+
+TEST_F(AotErrors, NamespaceInAFunctionOfC) {
+  expect_error(
+      [&] {
+        f.compile_to_file(path("a"), {in, gain}, "n::a", host);
+      },
+      {"C functions have no namespace", "c_plus_plus_mangling"});
+}
+
+TEST_F(AotErrors, BufferWithoutData) {
+  Buffer<float> shape(nullptr, 8);
+  Func g("g");
+  g(x) = shape(x);
+  expect_error([&] { g.compile_to_file(path("a"), {}, "a", host); }, {"is embedded with its data"});
+}
+
+// ---- what cannot be compiled to, or for ----
+
+TEST_F(AotErrors, SourceCodeInC) {
+  expect_error<Unsupported>(
+      [&] {
+        f.compile_to_c(path("a.cpp"), {in, gain}, "a", host);
+      },
+      {"c_source", "there is no writer", "Write an object"});
+  EXPECT_TRUE(is_empty());
+}
+
+TEST_F(AotErrors, OutputsThatOnlyGeneratorsHave) {
+  expect_error<Unsupported>(
+      [&] {
+        f.compile_to({{OutputFileType::cpp_stub, path("a")}}, {in, gain}, "a", host);
+      },
+      {"cpp_stub", "only generators"});
+}
+
+TEST_F(AotErrors, TargetsWithoutACodeGenerator) {
+  for (const char* name : {"riscv-64-linux", "x86-64-windows", "arm-32-linux", "mips-32-linux",
+                           "wasm-32-wasmrt", "x86-64-linux-cuda", "arm-64-linux-sve2"}) {
+    expect_error<Unsupported>(
+        [&] {
+          f.compile_to_file(path("a"), {in, gain}, "a", Target(name));
+        },
+        {name, "\""});
+  }
+  EXPECT_TRUE(is_empty());
+}
+
+TEST_F(AotErrors, RuntimeForAMachineThatThereIsNoneFor) {
+  expect_error<Unsupported>(
+      [&] { compile_standalone_runtime(path("a.o"), Target("mips-32-linux")); },
+      {"add the runtime for target \"mips-32-linux\"", "no_runtime"});
+  EXPECT_TRUE(is_empty());
+}
+
+TEST_F(AotErrors, TargetsOfDifferentPlatforms) {
+  expect_error(
+      [&] {
+        f.compile_to_multitarget_static_library(path("a"), {in, gain},
+                                                {Target("arm-64-linux"), Target("x86-64-linux")});
+      },
+      {"all targets have the same architecture"});
+}
+
+TEST_F(AotErrors, TargetsThatAreCalledDifferently) {
+  expect_error(
+      [&] {
+        f.compile_to_multitarget_static_library(
+            path("a"), {in, gain},
+            {Target("x86-64-linux-avx2-user_context"), Target("x86-64-linux")});
+      },
+      {"\"user_context\" is in some of them"});
+}
+
+TEST_F(AotErrors, NoTargets) {
+  expect_error(
+      [&] {
+        f.compile_to_multitarget_static_library(path("a"), {in, gain}, {});
+      },
+      {"there must be at least one target"});
+}
+
+TEST_F(AotErrors, SuffixesThatDoNotFit) {
+  expect_error(
+      [&] {
+        f.compile_to_multitarget_object_files(path("a"), {in, gain}, {Target("x86-64-linux")},
+                                              {"one", "two"});
+      },
+      {"1 targets and 2 suffixes"});
+}
+
+// ---- modules ----
+
+TEST_F(AotErrors, FunctionThatIsNotInTheModule) {
+  const Module module = f.compile_to_module({in, gain}, "f", host);
+  expect_error([&] { module.get_function_by_name("g"); }, {"\"g\"", "it has \"f\""});
+}
+
+TEST_F(AotErrors, TwoFunctionsOfOneName) {
+  Module module = f.compile_to_module({in, gain}, "f", host);
+  const Internal::LoweredFunc function = module.functions()[0];
+  expect_error([&] { module.append(function); }, {"\"f\"", "have different names"});
+}
+
+TEST_F(AotErrors, LinkedModulesForDifferentTargets) {
+  const Module a = f.compile_to_module({in, gain}, "a", Target("x86-64-linux"));
+  const Module b = f.compile_to_module({in, gain}, "b", Target("x86-64-linux-avx2"));
+  expect_error([&] { link_modules("both", {a, b}); }, {"all must be made for one target"});
+}
+
+TEST_F(AotErrors, NothingToLink) {
+  expect_error([&] { link_modules("none", {}); }, {"there must be at least one"});
+}
+
+}  // namespace
+}  // namespace retrograde

@@ -1,0 +1,265 @@
+// Modules and the files that they become. (What callers meet: aot_call_test.)
+#include <gtest/gtest.h>
+#include <retrograde/retrograde.h>
+
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+
+namespace retrograde {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string read_file(const fs::path& path) {
+  std::ifstream in(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(in), {}};
+}
+
+bool has(const std::string& text, const std::string& part) {
+  return text.find(part) != std::string::npos;
+}
+
+// A folder that goes with the test, and a pipeline.
+class AotFiles : public testing::Test {
+ protected:
+  AotFiles() : in(UInt(8), 2, "in"), gain("gain", 2.0f), x("x"), y("y"), out("brighter") {
+    char name[] = "/tmp/retrograde_aot_XXXXXX";
+    folder = mkdtemp(name);
+    out(x, y) = cast<uint8_t>(min(in(x, y) * gain, 255.0f));
+    out.vectorize(x, 8).parallel(y);
+  }
+  ~AotFiles() override { fs::remove_all(folder); }
+  std::string path(const std::string& name) const { return folder / name; }
+  std::vector<std::string> files() const {
+    std::vector<std::string> names;
+    for (const auto& entry : fs::directory_iterator(folder))
+      names.push_back(entry.path().filename());
+    std::sort(names.begin(), names.end());
+    return names;
+  }
+  int shell(const std::string& command) const {
+    return std::system((command + " >" + path("log") + " 2>&1").c_str());
+  }
+
+  fs::path folder;
+  ImageParam in;
+  Param<float> gain;
+  Var x, y;
+  Func out;
+};
+
+TEST_F(AotFiles, EveryKindOfFileInOneCall) {
+  out.compile_to({{OutputFileType::object, path("a.o")},
+                  {OutputFileType::static_library, path("a.a")},
+                  {OutputFileType::c_header, path("a.h")},
+                  {OutputFileType::assembly, path("a.s")},
+                  {OutputFileType::bitcode, path("a.bc")},
+                  {OutputFileType::llvm_assembly, path("a.ll")},
+                  {OutputFileType::stmt, path("a.stmt")},
+                  {OutputFileType::stmt_html, path("a.html")},
+                  {OutputFileType::registration, path("a.cpp")}},
+                 {in, gain}, "brighten", Target("host"));
+  EXPECT_EQ(read_file(path("a.o")).substr(0, 4), "\177ELF");
+  EXPECT_EQ(read_file(path("a.a")).substr(0, 8), "!<arch>\n");
+  EXPECT_EQ(read_file(path("a.bc")).substr(0, 2), "BC");
+  EXPECT_TRUE(has(read_file(path("a.h")),
+                  "int brighten(struct halide_buffer_t *_in_buffer, float _gain, struct "
+                  "halide_buffer_t *_brighter"));
+  EXPECT_TRUE(has(read_file(path("a.s")), "brighten_argv:"));
+  EXPECT_TRUE(has(read_file(path("a.ll")), "define i32 @brighten("));
+  EXPECT_TRUE(has(read_file(path("a.stmt")), "parallel for ("));
+  EXPECT_TRUE(has(read_file(path("a.cpp")), "halide_register_argv_and_metadata(brighten_argv"));
+  EXPECT_EQ(files().size(), 9u);
+}
+
+TEST_F(AotFiles, OneFunctionForEachFile) {
+  const Target target("host");
+  out.compile_to_object(path("b.o"), {in, gain}, "b", target);
+  out.compile_to_object(path("b2.o"), {in, gain}, target);
+  out.compile_to_header(path("b.h"), {in, gain}, "b", target);
+  out.compile_to_assembly(path("b.s"), {in, gain}, "b", target);
+  out.compile_to_bitcode(path("b.bc"), {in, gain}, "b", target);
+  out.compile_to_llvm_assembly(path("b.ll"), {in, gain}, "b", target);
+  out.compile_to_lowered_stmt(path("b.stmt"), {in, gain}, Text, target);
+  out.compile_to_lowered_stmt(path("b.html"), {in, gain}, HTML, target);
+  EXPECT_EQ(files(), (std::vector<std::string>{"b.bc", "b.h", "b.html", "b.ll", "b.o", "b.s",
+                                               "b.stmt", "b2.o"}));
+  out.compile_to_file(path("c"), {in, gain}, "c", target);
+  out.compile_to_static_library(path("d"), {in, gain}, "d", target);
+  for (const char* name : {"c.o", "c.h", "d.a", "d.h"}) EXPECT_TRUE(fs::exists(path(name))) << name;
+}
+
+TEST_F(AotFiles, SameProgramSameBytes) {
+  out.compile_to_static_library(path("a"), {in, gain}, "same", Target("host"));
+  out.compile_to_static_library(path("b"), {in, gain}, "same", Target("host"));
+  EXPECT_EQ(read_file(path("a.a")), read_file(path("b.a")));
+  EXPECT_EQ(read_file(path("a.h")), read_file(path("b.h")));
+}
+
+TEST_F(AotFiles, FilesHaveTheUsualPermissions) {
+  out.compile_to_header(path("a.h"), {in, gain}, "a", Target("host"));
+  std::ofstream(path("plain")) << "x";
+  EXPECT_EQ(fs::status(path("a.h")).permissions(), fs::status(path("plain")).permissions());
+}
+
+TEST_F(AotFiles, PageShowsScheduleStatementAndAssembly) {
+  out.compile_to_lowered_stmt(path("a.html"), {in, gain}, HTML, Target("host"));
+  const std::string page = read_file(path("a.html"));
+  const size_t schedule = page.find("<section id=\"schedule\">"),
+               statement = page.find("<section id=\"statement\">"),
+               assembly = page.find("<section id=\"assembly\">");
+  ASSERT_TRUE(schedule < statement && statement < assembly && assembly != std::string::npos);
+  EXPECT_TRUE(has(page.substr(schedule, statement - schedule), "brighter"));
+  EXPECT_TRUE(has(page, "data-loop=\"" + out.name() + ".s0."));  // a loop of the statement ...
+  EXPECT_TRUE(has(page, "data-stem=\"" + out.name() + ".s0."));  // ... and its block of machine code
+  EXPECT_TRUE(has(page.substr(assembly), "_argv:"));
+  EXPECT_FALSE(has(page, "http://") || has(page, "https://"));
+}
+
+TEST_F(AotFiles, HeaderIsReadByCAndByCpp) {
+  out.compile_to_header(path("a.h"), {in, gain}, "a", Target("host"));
+  std::ofstream(path("c.c")) << "#include \"a.h\"\nint main(void) { return a(0, 1, 0); }\n";
+  fs::copy_file(path("c.c"), path("cpp.cpp"));
+  EXPECT_EQ(shell("cc -std=c99 -Wall -Werror -fsyntax-only " + path("c.c")), 0)
+      << read_file(path("log"));
+  EXPECT_EQ(shell("c++ -std=c++17 -Wall -Werror -fsyntax-only " + path("cpp.cpp")), 0)
+      << read_file(path("log"));
+}
+
+TEST_F(AotFiles, SeveralTargetsAsObjects) {
+  const Target base("x86-64-linux-no_runtime");
+  out.compile_to_multitarget_object_files(
+      path("many"), {in, gain}, {base.with_feature(Target::AVX2), base}, {"fast", "base"});
+  EXPECT_EQ(files(),
+            (std::vector<std::string>{"many-base.o", "many-fast.o", "many.h", "many_wrapper.o"}));
+  out.compile_to_multitarget_object_files(path("one"), {in, gain}, {base}, {});
+  EXPECT_TRUE(fs::exists(path("one.o")));
+}
+
+TEST_F(AotFiles, SeveralTargetsInALibrary) {
+  const Target base("x86-64-linux");
+  out.compile_to_multitarget_static_library(path("many"), {in, gain},
+                                            {base.with_feature(Target::AVX2), base});
+  const std::string library = read_file(path("many.a"));
+  EXPECT_TRUE(has(library, "retrograde_runtime.o"));
+  EXPECT_TRUE(has(library, "many_x86_64_linux_avx2"));
+  EXPECT_TRUE(has(library, "halide_can_use_target_features"));
+  EXPECT_TRUE(has(read_file(path("many.h")), "int many("));
+}
+
+TEST_F(AotFiles, RuntimeByItself) {
+  compile_standalone_runtime(path("runtime.o"), Target("host"));
+  EXPECT_TRUE(has(read_file(path("runtime.o")), "halide_set_error_handler"));
+  const auto written =
+      compile_standalone_runtime({{OutputFileType::static_library, path("runtime.a")},
+                                  {OutputFileType::c_header, path("runtime.h")}},
+                                 Target("host"));
+  EXPECT_EQ(written.size(), 1u);
+  EXPECT_TRUE(fs::exists(path("runtime.a")));
+  EXPECT_FALSE(fs::exists(path("runtime.h")));
+}
+
+// The way of Halide's build files: the caller knows the library, the system's libraries, no more.
+TEST_F(AotFiles, LibraryLinksWithNothingElse) {
+  out.compile_to_static_library(path("a"), {in, gain}, "a", Target("host"));
+  std::ofstream(path("main.cpp"))
+      << "#include \"a.h\"\n#include <HalideBuffer.h>\n"
+         "extern \"C\" void halide_error(void*, const char*) { std::exit(7); }\n"
+         "int main(int argc, char**) {\n"
+         "  Halide::Runtime::Buffer<uint8_t> in(64, 16), out(64, 16);\n"
+         "  in.fill(50);\n"
+         "  if (argc > 1) return a(nullptr, 3.0f, out);\n"
+         "  return a(in, 3.0f, out) == 0 && out(63, 15) == 150 ? 0 : 1;\n}\n";
+  ASSERT_EQ(shell("c++ -std=c++17 " RETROGRADE_TEST_COMPILE_FLAGS " -I" + folder.string() + " " +
+                  path("main.cpp") + " " + path("a.a") + " -o " + path("main") + " -lpthread -ldl"),
+            0)
+      << read_file(path("log"));
+  EXPECT_EQ(shell(path("main")), 0);
+  // A program's own halide_error is called in place of the library's.
+  EXPECT_EQ(WEXITSTATUS(shell(path("main") + " null")), 7);
+}
+
+// ---- modules ----
+
+TEST_F(AotFiles, ModuleHoldsItsFunction) {
+  const Module module = out.compile_to_module({in, gain}, "f", Target("host"));
+  EXPECT_EQ(module.name(), "f");
+  ASSERT_EQ(module.functions().size(), 1u);
+  const Internal::LoweredFunc f = module.get_function_by_name("f");
+  ASSERT_EQ(f.args.size(), 3u);
+  EXPECT_EQ(f.args[0].name, "in");
+  EXPECT_TRUE(f.args[2].is_output());
+  EXPECT_EQ(f.linkage, LinkageType::ExternalPlusMetadata);
+  Buffer<uint8_t> object = module.compile_to_buffer();
+  EXPECT_EQ(object(1), 'E');
+}
+
+TEST_F(AotFiles, ModuleOutlivesItsPipeline) {
+  Module module("", Target("host"));
+  {
+    Buffer<float> table({4}, "table");
+    table.fill(1.0f);
+    Func f("f");
+    f(x) = table(x);
+    module = f.compile_to_module({}, "f", Target("host"));
+  }
+  EXPECT_GT(module.compile_to_buffer().width(), 100);
+}
+
+TEST_F(AotFiles, LinkedModulesAreOneObject) {
+  Func other("other");
+  other(x) = gain * x;
+  const Target target("host-no_runtime");
+  const Module both = link_modules("both", {out.compile_to_module({in, gain}, "f", target),
+                                            other.compile_to_module({gain}, "g", target)});
+  both.compile(
+      {{OutputFileType::assembly, path("both.s")}, {OutputFileType::c_header, path("both.h")}});
+  EXPECT_TRUE(has(read_file(path("both.s")), "\nf:") && has(read_file(path("both.s")), "\ng:"));
+  EXPECT_TRUE(has(read_file(path("both.h")), "int f(") && has(read_file(path("both.h")), "int g("));
+}
+
+TEST_F(AotFiles, MetadataNamesCanBeChanged) {
+  const Module module = out.compile_to_module({in, gain}, "f", Target("host"));
+  module.remap_metadata_name(out.name(), "result");
+  EXPECT_EQ(module.get_metadata_name_map().at(out.name()), "result");
+  module.compile({{OutputFileType::llvm_assembly, path("f.ll")}});
+  EXPECT_TRUE(has(read_file(path("f.ll")), "c\"result\\00\""));
+}
+
+TEST_F(AotFiles, LinkageDecidesWhatIsSeen) {
+  Pipeline pipeline(out);
+  const auto assembly = [&](LinkageType linkage) {
+    pipeline.compile_to_module({in, gain}, "f", Target("host"), linkage)
+        .compile({{OutputFileType::assembly, path("f.s")}});
+    return read_file(path("f.s"));
+  };
+  EXPECT_FALSE(has(assembly(LinkageType::External), "f_argv"));
+  const std::string argv = assembly(LinkageType::ExternalPlusArgv);
+  EXPECT_TRUE(has(argv, "f_argv") && !has(argv, "f_metadata"));
+  EXPECT_TRUE(has(assembly(LinkageType::ExternalPlusMetadata), "f_metadata"));
+}
+
+TEST_F(AotFiles, ParametersBecomeArguments) {
+  gain.set_range(0.5f, 4.0f);
+  gain.set_estimate(1.5f);
+  const Argument a = gain, b = in;
+  EXPECT_EQ(a.name, "gain");
+  EXPECT_TRUE(a.is_scalar());
+  EXPECT_EQ(a.argument_estimates.scalar_def.type(), Float(32));
+  EXPECT_TRUE(a.argument_estimates.scalar_max.defined());
+  EXPECT_TRUE(b.is_buffer() && b.is_input());
+  EXPECT_EQ(b.dimensions, 2);
+  EXPECT_EQ(a, Argument(gain));
+  EXPECT_FALSE(a == b);
+}
+
+TEST_F(AotFiles, CodeForOtherMachines) {
+  out.compile_to_file(path("arm"), {in, gain}, "f", Target("arm-64-linux-no_runtime"));
+  const std::string object = read_file(path("arm.o"));
+  EXPECT_EQ(object[18], static_cast<char>(183));  // e_machine: EM_AARCH64
+}
+
+}  // namespace
+}  // namespace retrograde
