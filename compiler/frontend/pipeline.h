@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "frontend/argument.h"
+#include "frontend/autoscheduler.h"
 #include "frontend/compiler_interface.h"
 #include "frontend/module.h"
 #include "frontend/realization.h"
@@ -121,6 +122,27 @@ class Pipeline {
                                            const std::vector<Argument>& args,
                                            const std::vector<Target>& targets,
                                            const std::vector<std::string>& suffixes);
+
+  // Calls fail with the message, whose parts may be Exprs, unless the condition holds. It may use
+  // Params and sizes of images, but no Func and no Var; it holds for every pipeline that has the
+  // first output among its outputs.
+  void add_requirement(const Expr& condition, const std::vector<Expr>& message);
+  template <typename... Parts>
+  requires((std::is_convertible_v<Parts, Expr> &&
+            ...)) void add_requirement(const Expr& condition, Parts&&... message) {
+    add_requirement(condition, std::vector<Expr>{Expr(std::forward<Parts>(message))...});
+  }
+
+  // ---- automatic schedules; see autoscheduler.h ----
+  AutoSchedulerResults auto_schedule(const std::string& name, const Target& target,
+                                     const MachineParams& machine = {}) const;
+  AutoSchedulerResults auto_schedule(const Target& target, const MachineParams& machine = {}) const;
+  static void add_autoscheduler(const std::string& name, const AutoSchedulerFn& scheduler) {
+    retrograde::add_autoscheduler(name, scheduler);
+  }
+  static void set_default_autoscheduler_name(const std::string& name) {
+    retrograde::set_default_autoscheduler_name(name);
+  }
 
   PipelineSpec spec() const;
 

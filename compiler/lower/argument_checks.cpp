@@ -204,8 +204,20 @@ class Checks {
       add_box_checks(arg, box, run);
       add_constraint_checks(arg, run);
     }
+    add_requirements(run);
     run.push_back(nests_.body);
     return make_if(any_query, make_block(answers), make_block(run));
+  }
+
+  void add_requirements(std::vector<Stmt>& checks) const {
+    for (const LoopedFunc& f : program_.funcs) {
+      if (!f.is_output) continue;
+      for (const Requirement& r : f.func->requirements) {
+        std::vector<Expr> parts{Expr(int32_t{retrograde_error_requirement_failed})};
+        parts.insert(parts.end(), r.message.begin(), r.message.end());
+        checks.push_back(make_assert(r.condition, call_op(Op::error, Int(32), std::move(parts))));
+      }
+    }
   }
 
   static Stmt answer(const LoweredArgument& arg, const Box& box) {

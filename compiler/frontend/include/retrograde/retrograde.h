@@ -15,5 +15,6 @@
 #include "frontend/pipeline.h"
 #include "frontend/rdom.h"
 #include "frontend/var.h"
+#include "generator/generator.h"
 #include "ir/print.h"
 #include "ir/target.h"

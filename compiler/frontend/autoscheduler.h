@@ -1,0 +1,55 @@
+// autoscheduler.h -- functions that schedule a whole pipeline, by name.
+//
+// A scheduler lives in a library of its own, a plugin, which registers it when it is loaded:
+// load_plugin("libgreedy.so"); pipeline.auto_schedule("Greedy", target).
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "ir/target.h"
+
+namespace retrograde {
+
+class Pipeline;
+
+// The machine that a schedule is made for. As text: "parallelism,last_level_cache_size,balance".
+struct MachineParams {
+  int parallelism = 16;
+  uint64_t last_level_cache_size = 16 * 1024 * 1024;
+  float balance = 40;  // cost of a load from the last-level cache, in operations
+
+  MachineParams() = default;
+  MachineParams(int parallelism, uint64_t last_level_cache_size, float balance)
+      : parallelism(parallelism), last_level_cache_size(last_level_cache_size), balance(balance) {}
+  explicit MachineParams(const std::string& text);  // CompileError when it cannot be read
+  static MachineParams generic() { return {}; }
+  std::string to_string() const;
+};
+
+struct AutoSchedulerResults {
+  Target target;
+  std::string machine_params_string;
+  std::string schedule_source;  // the schedule as C++
+  std::vector<uint8_t> featurization;
+};
+
+using AutoSchedulerFn =
+    std::function<void(const Pipeline& pipeline, const Target& target, const MachineParams& machine,
+                       AutoSchedulerResults* results)>;
+
+void add_autoscheduler(const std::string& name, const AutoSchedulerFn& scheduler);
+// Names of all that are loaded.
+std::vector<std::string> autoscheduler_names();
+// The one that auto_schedule() without a name means; "" when none was set.
+void set_default_autoscheduler_name(const std::string& name);
+std::string default_autoscheduler_name();
+// CompileError when there is none of the name; it lists those that are there.
+AutoSchedulerFn find_autoscheduler(const std::string& name);
+// Opens a shared library; its static initialisers register what it holds. CompileError when it
+// cannot be opened.
+void load_plugin(const std::string& library);
+
+}  // namespace retrograde

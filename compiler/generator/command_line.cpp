@@ -1,0 +1,267 @@
+// From a command line to files.
+#include "generator/command_line.h"
+
+#include <iostream>
+#include <set>
+
+#include "diagnostics/error.h"
+#include "frontend/autoscheduler.h"
+#include "generator/generator_base.h"
+#include "generator/registry.h"
+
+namespace retrograde::Internal {
+
+namespace {
+
+constexpr char asked[] = "run a generator";
+
+std::vector<std::string> split_at_commas(const std::string& text) {
+  std::vector<std::string> words;
+  for (size_t begin = 0; begin <= text.size();) {
+    const size_t end = std::min(text.find(',', begin), text.size());
+    if (end > begin) words.push_back(text.substr(begin, end - begin));
+    begin = end + 1;
+  }
+  return words;
+}
+
+std::string names_of(const std::vector<std::string>& names) {
+  std::string list;
+  for (const std::string& name : names) list += (list.empty() ? "" : ", ") + quoted(name);
+  return list;
+}
+
+std::vector<std::string> emit_names() {
+  std::vector<std::string> names;
+  for (const auto& [type, info] : get_output_info(get_host_target())) names.push_back(info.name);
+  return names;
+}
+
+OutputFileType read_emit_type(const std::string& word) {
+  for (const auto& [type, info] : get_output_info(get_host_target())) {
+    if (info.name == word) return type;
+  }
+  user_error("emit a file of type " + quoted(word), "the types of -e are " + names_of(emit_names()),
+             quoted(word) + " is none of them", "Name one or more of these, with commas between");
+}
+
+bool read_gradient(const std::string& text) {
+  if (text != "0" && text != "1") {
+    user_error(std::string(asked) + " with -d " + text, "-d takes 1, the gradient, or 0",
+               quoted(text) + " is neither", "Write -d 1 or leave it out");
+  }
+  return text == "1";
+}
+
+int read_seconds(const std::string& text) {
+  const std::optional<int> seconds = read_number<int>(text);
+  if (!seconds || *seconds < 0) {
+    user_error(std::string(asked) + " with -t " + text,
+               "-t takes a number of seconds, 0 for no limit", quoted(text) + " is none",
+               "Write for example -t 60");
+  }
+  return *seconds;
+}
+
+void read_targets(const std::string& text, CommandLine& command) {
+  command.suffixes = split_at_commas(text);
+  command.targets.clear();
+  for (const std::string& word : command.suffixes) command.targets.push_back(Target(word));
+}
+
+void set_flag(char flag, const std::string& value, CommandLine& command) {
+  switch (flag) {
+    case 'g':
+      command.generator = value;
+      return;
+    case 'f':
+      command.function = value;
+      return;
+    case 'o':
+      command.folder = value;
+      return;
+    case 'n':
+      command.file_base = value;
+      return;
+    case 'r':
+      command.runtime = value;
+      return;
+    case 's':
+      command.scheduler = value;
+      return;
+    case 'd':
+      command.gradient = read_gradient(value);
+      return;
+    case 't':
+      command.timeout_seconds = read_seconds(value);
+      return;
+    case 'p':
+      command.plugins = split_at_commas(value);
+      return;
+    case 'e':
+      for (const std::string& word : split_at_commas(value))
+        command.emit.push_back(read_emit_type(word));
+      return;
+  }
+}
+
+// What a run cannot do without.
+void check_complete(const CommandLine& command) {
+  if (command.generator.empty() && command.runtime.empty()) {
+    const std::vector<std::string> names = GeneratorRegistry::enumerate();
+    user_error(asked, "-g names the generator, or -r a runtime", "neither is given",
+               names.empty() ? "No generator is linked into this program"
+                             : "Name one of " + names_of(names));
+  }
+  if (command.folder.empty()) {
+    user_error(asked, "-o names the folder of its files", "it is missing", "Add -o .");
+  }
+  if (command.targets.empty()) {
+    user_error(asked, "target= names what to compile for", "it is missing",
+               "Add target=host, or for example target=x86-64-linux-avx2");
+  }
+}
+
+// "ns::blur" => "blur"
+std::string base_name(const std::string& function) {
+  const size_t colons = function.rfind("::");
+  return colons == std::string::npos ? function : function.substr(colons + 2);
+}
+
+std::unique_ptr<GeneratorBase> make_generator(const CommandLine& command, const Target& target) {
+  auto generator = GeneratorRegistry::create(command.generator, GeneratorContext(target));
+  generator->set_generator_param_values(command.params);
+  return generator;
+}
+
+std::map<OutputFileType, std::string> files_of(const CommandLine& command,
+                                               const std::string& base) {
+  std::vector<OutputFileType> emit = command.emit;
+  if (emit.empty()) {
+    emit = {OutputFileType::static_library};
+    if (command.runtime.empty()) {
+      emit.push_back(OutputFileType::c_header);
+      emit.push_back(OutputFileType::registration);
+    }
+  }
+  const auto info = get_output_info(command.targets[0]);
+  std::map<OutputFileType, std::string> files;
+  for (OutputFileType type : emit)
+    files[type] = command.folder + "/" + base + info.at(type).extension;
+  return files;
+}
+
+void run_runtime(const CommandLine& command) {
+  Target common = command.targets[0];
+  for (const Target& target : command.targets) {
+    if (target.get_runtime_compatible_target(common, common)) continue;
+    user_error("make the runtime " + quoted(command.runtime), "one runtime serves all targets",
+               quoted(target.to_string()) + " and " + quoted(command.targets[0].to_string()) +
+                   " need different ones",
+               "Make one for each");
+  }
+  compile_standalone_runtime(files_of(command, command.runtime), common);
+}
+
+void run_generator(const CommandLine& command) {
+  const std::string function = command.function.empty() ? command.generator : command.function;
+  const std::string base = command.file_base.empty() ? base_name(function) : command.file_base;
+  const auto build = [&](const std::string& name, const Target& target) {
+    const auto generator = make_generator(command, target);
+    return command.gradient ? generator->build_gradient_module(name)
+                            : generator->build_module(name);
+  };
+  const auto files = files_of(command, base);
+  if (command.targets.size() == 1)
+    build(function, command.targets[0]).compile(files);
+  else
+    compile_multitarget(function, files, command.targets, command.suffixes, build);
+}
+
+// Everything that the command line alone decides.
+CommandLine prepare(int argc, const char* const* argv) {
+  CommandLine command = read_command_line(argc, argv);
+  for (const std::string& plugin : command.plugins) load_plugin(plugin);
+  if (!command.scheduler.empty()) {
+    find_autoscheduler(command.scheduler);
+    set_default_autoscheduler_name(command.scheduler);
+  }
+  if (!command.generator.empty()) make_generator(command, command.targets[0]);
+  return command;
+}
+
+}  // namespace
+
+CommandLine read_command_line(int argc, const char* const* argv) {
+  CommandLine command;
+  const std::string flags = "gfonrsdtpe";
+  for (int i = 1; i < argc; i++) {
+    const std::string word = argv[i];
+    const size_t equals = word.find('=');
+    if (word[0] != '-' && equals != std::string::npos) {
+      const std::string key = word.substr(0, equals), value = word.substr(equals + 1);
+      if (key == "target")
+        read_targets(value, command);
+      else
+        command.params[key] = value;
+      continue;
+    }
+    if (word.size() != 2 || word[0] != '-' || flags.find(word[1]) == std::string::npos) {
+      user_error(asked, "its arguments are flags of one letter and param=value",
+                 quoted(word) + " is neither", "See the usage");
+    }
+    if (i + 1 == argc)
+      user_error(asked, "every flag has a value", word + " has none", "Put it behind the flag");
+    set_flag(word[1], argv[++i], command);
+  }
+  check_complete(command);
+  return command;
+}
+
+void run(const CommandLine& command) {
+  if (!command.runtime.empty()) run_runtime(command);
+  if (!command.generator.empty()) run_generator(command);
+}
+
+std::string usage() {
+  return "usage: [-g GENERATOR] [-f FUNCTION] -o FOLDER [-n FILE_BASE] [-e TYPE,...] [-d 0|1]\n"
+         "       [-p PLUGIN,...] [-s SCHEDULER] [-r RUNTIME] [-t SECONDS]\n"
+         "       target=TARGET[,TARGET...] [param=value ...]\n"
+         "  -g  the generator to run: " +
+         names_of(GeneratorRegistry::enumerate()) +
+         "\n"
+         "  -f  name of the function; by default that of the generator\n"
+         "  -n  name of its files without extension; by default that of the function\n"
+         "  -e  files to write: " +
+         names_of(emit_names()) +
+         "\n"
+         "      by default c_header, static_library and registration\n"
+         "  -d  1: the gradient of the generator's outputs with respect to its images\n"
+         "  -p  shared libraries to load, with autoschedulers\n"
+         "  -s  the scheduler that auto_schedule=true means\n"
+         "  -r  write a runtime of this name\n"
+         "  -t  give up after so many seconds; 0: never; by default 900\n";
+}
+
+int generate_filter_main(int argc, char** argv, std::ostream& errors) {
+  try {
+    CommandLine command;
+    try {
+      command = prepare(argc, argv);
+    } catch (const Error& error) {
+      errors << "Error: " << error.what() << "\n" << usage();
+      return 1;
+    }
+    run(command);
+    return 0;
+  } catch (const std::exception& error) {
+    errors << "Error: " << error.what() << "\n";
+    return 1;
+  }
+}
+
+int generate_filter_main(int argc, char** argv) {
+  return generate_filter_main(argc, argv, std::cerr);
+}
+
+}  // namespace retrograde::Internal

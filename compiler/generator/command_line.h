@@ -1,0 +1,39 @@
+// command_line.h -- the program that build files call to run a generator, with the command line of
+// Halide's:
+//
+//   -g NAME  -f FUNCTION  -o FOLDER  -n FILE_BASE  -e object,c_header,...  -d 1 (the gradient)
+//   -p PLUGINS  -s SCHEDULER  -r RUNTIME  -t SECONDS  target=TARGET,...  param=value ...
+#pragma once
+
+#include <iosfwd>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "frontend/module.h"
+
+namespace retrograde::Internal {
+
+struct CommandLine {
+  std::string generator, function, folder, file_base, runtime, scheduler;
+  std::vector<std::string> plugins;
+  std::vector<OutputFileType> emit;  // empty: c_header, static_library, registration
+  std::vector<Target> targets;
+  std::vector<std::string> suffixes;  // of the targets: their text
+  std::map<std::string, std::string> params;
+  bool gradient = false;
+  int timeout_seconds = 900;  // 0: none
+};
+
+// CompileError for what cannot be read, and where something that must be said is missing.
+CommandLine read_command_line(int argc, const char* const* argv);
+// Writes the files.
+void run(const CommandLine& command);
+std::string usage();
+
+// All of it: what goes wrong is written to `errors`, with the usage where the command line is to
+// blame. The program's exit status: 0, or 1.
+int generate_filter_main(int argc, char** argv, std::ostream& errors);
+int generate_filter_main(int argc, char** argv);  // errors to the standard error stream
+
+}  // namespace retrograde::Internal

@@ -1,0 +1,303 @@
+// The life of a generator.
+#include "generator/generator_base.h"
+
+#include <algorithm>
+#include <cctype>
+#include <set>
+
+#include "generator/registry.h"
+#include "ir/equal.h"
+#include "ir/scalar.h"
+
+namespace retrograde::Internal {
+
+namespace {
+
+bool is_valid_name(const std::string& name) {
+  if (name.empty() || !std::isalpha(static_cast<unsigned char>(name[0]))) return false;
+  return std::all_of(name.begin(), name.end(),
+                     [](unsigned char c) { return std::isalnum(c) || c == '_'; });
+}
+
+std::vector<std::string> split_at_commas(const std::string& text) {
+  std::vector<std::string> words(1);
+  for (char c : text) {
+    if (c == ',')
+      words.emplace_back();
+    else
+      words.back() += c;
+  }
+  return words;
+}
+
+}  // namespace
+
+// ---- params ----
+
+void AutoScheduleParam::set_from_string(const std::string& text) {
+  check_writable();
+  const std::optional<bool> on = read_bool(text);
+  if (on && !*on) {
+    scheduler_.clear();
+    return;
+  }
+  const std::string scheduler = on ? default_autoscheduler_name() : text;
+  if (scheduler.empty()) {
+    refuse(text, "a scheduler was named as the default", "none was",
+           "Name one here: auto_schedule=<name>, or with -s");
+  }
+  find_autoscheduler(scheduler);
+  scheduler_ = scheduler;
+}
+
+void GeneratorBase::init_from_context(const GeneratorContext& context) {
+  target.set(context.get_target());
+  if (context.get_auto_schedule()) auto_schedule.set(true);
+  machine_params.set(context.get_machine_params());
+}
+
+GeneratorContext GeneratorBase::context() const {
+  return GeneratorContext(get_target(), get_auto_schedule(), get_machine_params());
+}
+
+void GeneratorBase::set_generator_param_values(const GeneratorParamsMap& values) {
+  check_names();
+  for (const auto& [key, text] : values) {
+    const auto param = std::find_if(members_.params.begin(), members_.params.end(),
+                                    [&](const GeneratorParamBase* p) { return p->name() == key; });
+    if (param != members_.params.end())
+      (*param)->set_from_string(text);
+    else if (!set_open_part(key, text))
+      unknown_param(key);
+  }
+}
+
+GIOBase* GeneratorBase::find_io(const std::string& name) const {
+  for (GIOBase* input : members_.inputs) {
+    if (input->name() == name) return input;
+  }
+  for (GIOBase* output : members_.outputs) {
+    if (output->name() == name) return output;
+  }
+  return nullptr;
+}
+
+// in.type=float32, in.dim=2, in.size=3
+bool GeneratorBase::set_open_part(const std::string& key, const std::string& text) {
+  const size_t dot = key.find('.');
+  if (dot == std::string::npos) return false;
+  GIOBase* io = find_io(key.substr(0, dot));
+  const std::string part = key.substr(dot + 1);
+  if (!io || (part != "type" && part != "dim" && part != "size")) return false;
+  if (part == "type") {
+    std::vector<Type> types;
+    for (const std::string& word : split_at_commas(text)) {
+      const std::optional<Type> type = read_type(word);
+      if (!type) {
+        user_error("set " + key + " of the generator " + quoted(name_) + " to " + quoted(text),
+                   "types are " + type_choices(), quoted(word) + " is none of them",
+                   "Give one of these, or several with commas for a Tuple");
+      }
+      types.push_back(*type);
+    }
+    io->set_types(types);
+    return true;
+  }
+  const std::optional<int> number = read_number<int>(text);
+  if (!number || *number < 0) {
+    user_error("set " + key + " of the generator " + quoted(name_) + " to " + quoted(text),
+               "it is a whole number of at least 0", quoted(text) + " is not",
+               "Give such a number");
+  }
+  if (part == "dim")
+    io->set_dimensions(*number);
+  else
+    io->set_array_size(*number);
+  return true;
+}
+
+void GeneratorBase::unknown_param(const std::string& key) const {
+  std::set<std::string> known;
+  for (const GeneratorParamBase* param : members_.params) known.insert(param->name());
+  const auto add_open_parts = [&](const GIOBase* io) {
+    if (!io->types_defined()) known.insert(io->name() + ".type");
+    if (!io->dims_defined()) known.insert(io->name() + ".dim");
+    if (!io->array_size_defined()) known.insert(io->name() + ".size");
+  };
+  for (const GIOBase* input : members_.inputs) add_open_parts(input);
+  for (const GIOBase* output : members_.outputs) add_open_parts(output);
+  std::string list;
+  for (const std::string& name : known) list += (list.empty() ? "" : ", ") + quoted(name);
+  user_error("set the GeneratorParam " + quoted(key) + " of the generator " + quoted(name_),
+             "the generator declares it", "it has " + list, "Name one of these");
+}
+
+void GeneratorBase::check_names() const {
+  std::set<std::string> seen;
+  const auto check = [&](const std::string& name, const std::string& what) {
+    const std::string asked = "use the generator " + quoted(name_);
+    if (!is_valid_name(name)) {
+      user_error(asked, "names are letters, digits and underscores, a letter first",
+                 "it has the " + what + " " + quoted(name), "Rename it");
+    }
+    if (!seen.insert(name).second) {
+      user_error(asked, "its params, inputs and outputs have different names",
+                 "two are called " + quoted(name), "Rename one of them");
+    }
+  };
+  for (const GeneratorParamBase* param : members_.params) check(param->name(), "param");
+  for (const GIOBase* input : members_.inputs) check(input->name(), "input");
+  for (const GIOBase* output : members_.outputs) check(output->name(), "output");
+  for (const GIOBase* input : members_.inputs) input->check_declaration();
+  for (const GIOBase* output : members_.outputs) output->check_declaration();
+}
+
+// ---- phases ----
+
+void GeneratorBase::configure_once() {
+  if (phase_ != Phase::Created) return;
+  phase_ = Phase::Configuring;
+  call_configure();
+  check_names();
+  if (members_.outputs.empty()) {
+    user_error("use the generator " + quoted(name_), "it declares at least one Output",
+               "it has none", "Add Output<Buffer<>> out{\"out\"}");
+  }
+  phase_ = Phase::Configured;
+}
+
+void GeneratorBase::generate_all() {
+  configure_once();
+  if (is_generated()) return;
+  for (GeneratorInputBase* input : members_.inputs) {
+    if (input->values().empty()) input->make_parameters();
+  }
+  for (GeneratorOutputBase* output : members_.outputs) output->make_funcs();
+  call_generate();
+  for (GeneratorOutputBase* output : members_.outputs) output->check_defined();
+  phase_ = Phase::Generated;
+}
+
+void GeneratorBase::schedule_all() {
+  generate_all();
+  if (phase_ == Phase::Scheduled) return;
+  call_schedule();
+  phase_ = Phase::Scheduled;
+}
+
+void GeneratorBase::check_input_count(size_t given) {
+  configure_once();
+  if (given == members_.inputs.size()) return;
+  user_error("set the inputs of the generator " + quoted(name_), "all are given, in their order",
+             text("it has ", members_.inputs.size(), " and was given ", given),
+             "Give that many; a std::vector for an array");
+}
+
+void GeneratorBase::set_input_values(size_t i, std::vector<InputValue> values) {
+  members_.inputs[i]->set_values(std::move(values));
+}
+
+void GeneratorBase::check_configuring(const char* role, const std::string& name) const {
+  if (phase_ == Phase::Configuring) return;
+  user_error(
+      "add the " + std::string(role) + " " + quoted(name) + " to the generator " + quoted(name_),
+      "inputs and outputs are added in configure()", "this is elsewhere", "Do it there");
+}
+
+Expr constant_for_input(const Expr& value, const GIOBase& input) {
+  if (!input.types_defined() || value.type() == input.type()) return value;
+  const std::optional<ir::Scalar> constant = ir::as_scalar(value);
+  const ir::Scalar converted = ir::eval_cast(input.type(), *constant);
+  if (converted.as_double() != constant->as_double() && !input.type().is_float()) {
+    user_error("set the input " + quoted(input.name()) + text(" to ", constant->as_double()),
+               "the value fits the input's type", "its type is " + to_string(input.type()),
+               "Give a value of that type");
+  }
+  return ir::to_expr(converted);
+}
+
+// ---- what it makes ----
+
+Pipeline GeneratorBase::get_pipeline() {
+  if (!is_generated()) {
+    user_error("take the Pipeline of the generator " + quoted(name_),
+               "it is there once generate() has run", "it has not",
+               "Call it in schedule(), or after apply()");
+  }
+  if (!pipeline_.defined()) {
+    std::vector<Func> funcs;
+    for (const GeneratorOutputBase* output : members_.outputs) {
+      for (const Func& f : output->funcs()) funcs.push_back(f);
+    }
+    pipeline_ = Pipeline(funcs);
+    add_requirements(pipeline_);
+  }
+  return pipeline_;
+}
+
+void GeneratorBase::add_requirements(Pipeline& pipeline) const {
+  for (const Requirement& r : requirements_) pipeline.add_requirement(r.condition, r.message);
+}
+
+std::vector<Argument> GeneratorBase::input_arguments() const {
+  std::vector<Argument> arguments;
+  for (const GeneratorInputBase* input : members_.inputs) {
+    for (const InputValue& value : input->values()) {
+      if (!value.parameter) {
+        user_error("compile the generator " + quoted(name_) + " ahead of time",
+                   "its inputs are those of the compiled function",
+                   quoted(input->name()) + " was given a value from C++",
+                   "Take build_module() of a generator without inputs set");
+      }
+      arguments.push_back(ir::argument_of(*value.parameter));
+    }
+  }
+  return arguments;
+}
+
+void GeneratorBase::auto_schedule_pipeline(const Pipeline& pipeline) const {
+  if (auto_schedule)
+    pipeline.auto_schedule(auto_schedule.scheduler(), get_target(), get_machine_params());
+}
+
+// Parameters and Funcs may have had to take other names than those that were declared.
+Module GeneratorBase::to_module(Pipeline& pipeline, const std::vector<Argument>& inputs,
+                                const std::vector<std::string>& declared_names,
+                                const std::string& function_name, LinkageType linkage) {
+  const std::string function = function_name.empty() ? name_ : function_name;
+  Module module = pipeline.compile_to_module(inputs, function, get_target(), linkage);
+  const std::vector<Argument>& made = module.functions().back().args;
+  const size_t first = made.size() - declared_names.size();
+  for (size_t i = 0; i < declared_names.size(); i++) {
+    if (made[first + i].name != declared_names[i])
+      module.remap_metadata_name(made[first + i].name, declared_names[i]);
+  }
+  return module;
+}
+
+std::vector<std::string> GeneratorBase::input_names() const {
+  std::vector<std::string> names;
+  for (const GeneratorInputBase* input : members_.inputs) {
+    for (size_t i = 0; i < input->values().size(); i++) names.push_back(input->element_name(i));
+  }
+  return names;
+}
+
+Module GeneratorBase::build_module(const std::string& function_name, LinkageType linkage) {
+  schedule_all();
+  Pipeline pipeline = get_pipeline();
+  auto_schedule_pipeline(pipeline);
+  std::vector<std::string> names = input_names();
+  for (const GeneratorOutputBase* output : members_.outputs) {
+    const std::vector<Func> funcs = output->funcs();
+    for (size_t i = 0; i < funcs.size(); i++) {
+      const std::string name = output->element_name(i);
+      if (funcs[i].outputs() == 1) names.push_back(name);
+      for (int k = 0; funcs[i].outputs() > 1 && k < funcs[i].outputs(); k++)
+        names.push_back(name + "." + std::to_string(k));
+    }
+  }
+  return to_module(pipeline, input_arguments(), names, function_name, linkage);
+}
+
+}  // namespace retrograde::Internal

@@ -1,0 +1,230 @@
+// generator_base.h -- the life of a generator: its params are set, configure() may add inputs and
+// outputs, generate() defines the outputs, schedule() schedules them; then it is a Pipeline, a
+// Module, or the Module of its gradient.
+#pragma once
+
+#include <map>
+#include <memory>
+#include <string>
+#include <type_traits>
+#include <utility>
+#include <vector>
+
+#include "frontend/lambda.h"
+#include "frontend/module.h"
+#include "generator/generator_context.h"
+#include "generator/generator_input.h"
+#include "generator/generator_output.h"
+#include "generator/generator_param.h"
+#include "generator/members.h"
+
+namespace retrograde {
+namespace Internal {
+
+using GeneratorParamsMap = std::map<std::string, std::string>;
+
+// auto_schedule=false, =true (the default scheduler) or =<name of a scheduler>.
+class AutoScheduleParam : public GeneratorParamBase {
+ public:
+  AutoScheduleParam() : GeneratorParamBase("auto_schedule") {}
+  bool value() const { return !scheduler_.empty(); }
+  operator bool() const { return value(); }
+  const std::string& scheduler() const { return scheduler_; }
+  void set(bool on) { set_from_string(on ? "true" : "false"); }
+  void set(const std::string& text) { set_from_string(text); }
+  void set(const char* text) { set_from_string(text); }
+  // CompileError when there is no such scheduler.
+  void set_from_string(const std::string& text) override;
+  std::string to_string() const override { return value() ? scheduler_ : "false"; }
+
+ private:
+  std::string scheduler_;
+};
+
+class GeneratorBase : public NamesInterface {
+ public:
+  virtual ~GeneratorBase() = default;
+  GeneratorBase(const GeneratorBase&) = delete;
+  GeneratorBase& operator=(const GeneratorBase&) = delete;
+
+  const std::string& name() const { return name_; }
+  void set_name(const std::string& name) { name_ = name; }
+  void init_from_context(const GeneratorContext& context);
+  GeneratorContext context() const;
+  Target get_target() const { return target; }
+  bool get_auto_schedule() const { return auto_schedule; }
+  bool using_autoscheduler() const { return auto_schedule; }
+  MachineParams get_machine_params() const { return machine_params; }
+  int natural_vector_size(const Type& type) const { return get_target().natural_vector_size(type); }
+  template <typename T>
+  int natural_vector_size() const {
+    return get_target().natural_vector_size<T>();
+  }
+
+  // By name: GeneratorParams, and what declarations leave open: in.type=float32, in.dim=2,
+  // in.size=3. CompileError for a name that the generator does not have, and for a bad value.
+  void set_generator_param_values(const GeneratorParamsMap& values);
+
+  // Values for all inputs, in their order; a std::vector for an array.
+  template <typename... Args>
+  void set_inputs(const Args&... args) {
+    check_input_count(sizeof...(args));
+    size_t i = 0;
+    (set_input(i++, args), ...);
+  }
+
+  bool is_generated() const { return phase_ >= Phase::Generated; }
+  // Runs what has not run yet of configure(), generate() and schedule().
+  void generate_all();
+  void schedule_all();
+  // All outputs together; after generate().
+  Pipeline get_pipeline();
+  template <typename... Args>
+  decltype(auto) realize(Args&&... args) {
+    schedule_all();
+    return get_pipeline().realize(std::forward<Args>(args)..., get_target());
+  }
+  Realization realize(std::vector<int32_t> sizes) {
+    schedule_all();
+    return get_pipeline().realize(sizes, get_target());
+  }
+
+  // The function takes the inputs, then the outputs. Its name defaults to the generator's.
+  Module build_module(const std::string& function_name = "",
+                      LinkageType linkage = LinkageType::ExternalPlusMetadata);
+  // The gradient of every output with respect to every image: the function takes the same inputs,
+  // then for each output _grad_loss_for_<output>, then for each output and each image input
+  // _grad_loss_<output>_wrt_<input>, all of the shape of what they belong to. schedule() is not
+  // called: it speaks of another pipeline. Funcs that generate() has not scheduled get the default
+  // schedule of gradients.
+  Module build_gradient_module(const std::string& function_name = "");
+
+  // ---- in configure() ----
+  template <typename T, typename... Args>
+  GeneratorInput<T>* add_input(const std::string& name, const Args&... args) {
+    check_configuring("input", name);
+    auto input = std::make_unique<GeneratorInput<T>>(name, args...);
+    GeneratorInput<T>* result = input.get();
+    adopt(result);
+    extras_.push_back(std::move(input));
+    members_.inputs.push_back(result);
+    return result;
+  }
+  template <typename T, typename... Args>
+  GeneratorOutput<T>* add_output(const std::string& name, const Args&... args) {
+    check_configuring("output", name);
+    auto output = std::make_unique<GeneratorOutput<T>>(name, args...);
+    GeneratorOutput<T>* result = output.get();
+    adopt(result);
+    extras_.push_back(std::move(output));
+    members_.outputs.push_back(result);
+    return result;
+  }
+
+  // ---- in generate() ----
+  // Every call of the compiled function fails unless the condition, which may use inputs only,
+  // holds; the rest is the message.
+  template <typename... Args>
+  void add_requirement(const Expr& condition, Args&&... message) {
+    std::vector<Expr> parts;
+    (parts.push_back(Expr(std::forward<Args>(message))), ...);
+    requirements_.push_back({condition, std::move(parts)});
+  }
+
+ protected:
+  explicit GeneratorBase(size_t bytes) : members_(this, bytes) {}
+  virtual void call_configure() = 0;
+  virtual void call_generate() = 0;
+  virtual void call_schedule() = 0;
+
+ private:
+  // First: params, inputs and outputs below and in derived classes register there.
+  GeneratorMembers members_;
+
+ protected:
+  GeneratorParam<Target> target{"target", Target()};
+  AutoScheduleParam auto_schedule;
+  GeneratorParam<MachineParams> machine_params{"machine_params", MachineParams::generic()};
+
+ private:
+  enum class Phase { Created, Configuring, Configured, Generated, Scheduled };
+  struct Requirement {
+    Expr condition;
+    std::vector<Expr> message;
+  };
+
+  void configure_once();
+  void check_names() const;
+  void check_input_count(size_t given);
+  void check_configuring(const char* role, const std::string& name) const;
+  void adopt(GIOBase* extra) { extra->generator_ = this; }
+  void add_requirements(Pipeline& pipeline) const;
+  void auto_schedule_pipeline(const Pipeline& pipeline) const;
+  std::vector<Argument> input_arguments() const;
+  std::vector<std::string> input_names() const;
+  std::vector<ImageParam> image_inputs(std::vector<std::string>& names) const;
+  Module to_module(Pipeline& pipeline, const std::vector<Argument>& inputs,
+                   const std::vector<std::string>& declared_names, const std::string& function_name,
+                   LinkageType linkage);
+  bool set_open_part(const std::string& key, const std::string& text);
+  [[noreturn]] void unknown_param(const std::string& key) const;
+  GIOBase* find_io(const std::string& name) const;
+
+  template <typename A>
+  void set_input(size_t i, const A& arg);
+  template <typename A>
+  void set_input(size_t i, const std::vector<A>& args);
+  GIOBase* find_input(size_t i) const { return members_.inputs[i]; }
+  void set_input_values(size_t i, std::vector<InputValue> values);
+
+  std::string name_ = "generator";
+  Phase phase_ = Phase::Created;
+  std::vector<std::unique_ptr<GIOBase>> extras_;
+  std::vector<Requirement> requirements_;
+  Pipeline pipeline_;
+};
+
+// ---- values from C++ ----
+
+// A C++ number for an input of type `type` (undefined: not said yet). CompileError when it does not
+// fit.
+Expr constant_for_input(const Expr& value, const GIOBase& input);
+
+template <typename A>
+InputValue input_value(const GIOBase& input, const A& arg) {
+  const bool wants_func = input.kind() == IOKind::Function;
+  if constexpr (std::is_base_of_v<GeneratorInputBase, A>) {
+    const InputValue value = arg.values().at(0);
+    if (wants_func && value.kind == IOKind::Buffer)
+      return InputValue::of_func(ImageParam(value.parameter));
+    return value;
+  } else if constexpr (ElementTraits<A>::kind == IOKind::Buffer) {
+    return wants_func ? InputValue::of_func(Func(arg)) : InputValue::of_image(arg.parameter());
+  } else if constexpr (std::is_base_of_v<ImageParam, A>) {
+    return wants_func ? InputValue::of_func(arg) : InputValue::of_image(arg.parameter());
+  } else if constexpr (std::is_convertible_v<A, Func>) {
+    return InputValue::of_func(arg);
+  } else if constexpr (std::is_arithmetic_v<A>) {
+    return InputValue::of_expr(constant_for_input(Expr(arg), input));
+  } else {
+    return InputValue::of_expr(arg);
+  }
+}
+
+template <typename A>
+void GeneratorBase::set_input(size_t i, const A& arg) {
+  if constexpr (std::is_base_of_v<GeneratorInputBase, A>) {
+    if (arg.is_array()) return set_input_values(i, arg.values());
+  }
+  set_input_values(i, {input_value(*find_input(i), arg)});
+}
+
+template <typename A>
+void GeneratorBase::set_input(size_t i, const std::vector<A>& args) {
+  std::vector<InputValue> values;
+  for (const A& arg : args) values.push_back(input_value(*find_input(i), arg));
+  set_input_values(i, std::move(values));
+}
+
+}  // namespace Internal
+}  // namespace retrograde

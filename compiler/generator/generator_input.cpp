@@ -1,0 +1,84 @@
+// Inputs: parameters of a compiled function, or values from C++.
+#include "generator/generator_input.h"
+
+#include "generator/generator_base.h"
+
+namespace retrograde::Internal {
+
+InputValue InputValue::of_func(const Func& f) {
+  InputValue value;
+  value.kind = IOKind::Function;
+  value.func = f;
+  return value;
+}
+
+InputValue InputValue::of_expr(const Expr& e) {
+  InputValue value;
+  value.expr = e;
+  return value;
+}
+
+InputValue InputValue::of_image(std::shared_ptr<ir::ParameterContents> image) {
+  InputValue value;
+  value.kind = IOKind::Buffer;
+  value.parameter = std::move(image);
+  return value;
+}
+
+std::vector<Type> InputValue::types() const {
+  if (parameter) return {parameter->type};
+  return kind == IOKind::Function ? func.types() : std::vector{expr.type()};
+}
+
+int InputValue::dims() const {
+  if (parameter) return parameter->dimensions;
+  return kind == IOKind::Function ? func.dimensions() : 0;
+}
+
+GeneratorInputBase::GeneratorInputBase(Declared declared, IOKind kind, Declared said, bool is_array)
+    : GIOBase(std::move(declared), kind, std::move(said), is_array, false) {
+  if (GeneratorMembers* members = GeneratorMembers::around(this)) members->inputs.push_back(this);
+}
+
+void GeneratorInputBase::make_parameters() {
+  std::vector<InputValue> values;
+  for (size_t i = 0; i < array_size(); i++) {
+    InputValue value;
+    value.kind = kind();
+    if (kind() == IOKind::Scalar) {
+      value.parameter = ir::make_scalar_parameter(type(), element_name(i));
+      value.expr = ir::variable(value.parameter->name, type(), ir::SymbolRef(value.parameter));
+      describe(*value.parameter);
+    } else {
+      const ImageParam image(type(), dims(), element_name(i));
+      value.parameter = image.parameter();
+      if (kind() == IOKind::Function) value.func = image;
+    }
+    values.push_back(std::move(value));
+  }
+  set_values(std::move(values));
+}
+
+void GeneratorInputBase::set_values(std::vector<InputValue> values) {
+  agree_on_size(values.size());
+  for (const InputValue& value : values) {
+    if (value.kind != kind()) {
+      const char* names[] = {"a scalar", "a Func", "an image"};
+      refuse("set", "the value is what the input declares",
+             std::string("it declares ") + names[static_cast<int>(kind())] + " and was given " +
+                 names[static_cast<int>(value.kind)],
+             "Give a value of that kind");
+    }
+    agree_on(value.types(), value.dims());
+  }
+  values_ = std::move(values);
+  values_changed();
+}
+
+void GeneratorInputBase::check_ready() const {
+  if (!values_.empty() || (array_size_defined() && array_size() == 0)) return;
+  refuse("use", "inputs have values in generate() and schedule()", "it has none yet",
+         "Use it there, and in configure() its declaration only");
+}
+
+}  // namespace retrograde::Internal

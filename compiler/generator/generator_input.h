@@ -1,0 +1,222 @@
+// generator_input.h -- Input<T>: an argument of the function that a generator makes.
+//
+//   Input<Buffer<float, 2>> in{"in"};       an image, used like an ImageParam
+//   Input<Func> f{"f", Float(32), 2};       ahead of time an image; from C++ any Func
+//   Input<float> gain{"gain", 1.0f, 0, 10}; a scalar with default and limits
+//   Input<Expr> e{"e"};                     a scalar whose type configure() sets
+//   Input<Buffer<float>[]> many{"many", 2}; an array of them, sized by many.size=3
+#pragma once
+
+#include <memory>
+#include <string>
+#include <type_traits>
+#include <utility>
+#include <vector>
+
+#include "generator/generator_io.h"
+
+namespace retrograde {
+namespace Internal {
+
+// One element of an input: a parameter of the compiled function, or a value given from C++.
+struct InputValue {
+  IOKind kind = IOKind::Scalar;
+  std::shared_ptr<ir::ParameterContents> parameter;  // null for a Func or Expr given from C++
+  Func func;                                         // of a Function
+  Expr expr;                                         // of a Scalar
+
+  static InputValue of_func(const Func& f);
+  static InputValue of_expr(const Expr& e);
+  static InputValue of_image(std::shared_ptr<ir::ParameterContents> image);
+  std::vector<Type> types() const;
+  int dims() const;
+};
+
+class GeneratorInputBase : public GIOBase {
+ public:
+  ~GeneratorInputBase() override = default;
+  const std::vector<InputValue>& values() const { return values_; }
+  // Makes parameters of the compiled function. CompileError when types, dimensions or array size
+  // are still open.
+  void make_parameters();
+  // Values from C++; CompileError when they do not fit the declaration.
+  void set_values(std::vector<InputValue> values);
+
+ protected:
+  GeneratorInputBase(Declared declared, IOKind kind, Declared said, bool is_array);
+  virtual void values_changed() = 0;
+  // Default, limits and estimate of a scalar's parameter.
+  virtual void describe(ir::ParameterContents&) const {}
+  void check_ready() const;  // CompileError before generate()
+
+ private:
+  std::vector<InputValue> values_;
+};
+
+template <typename Handle>
+Handle handle_of(const InputValue& value) {
+  if constexpr (std::is_same_v<Handle, ImageParam>)
+    return ImageParam(value.parameter);
+  else if constexpr (std::is_same_v<Handle, Func>)
+    return value.func;
+  else
+    return value.expr;
+}
+
+template <typename T>
+class InputElements : public GeneratorInputBase {
+ protected:
+  using Traits = ElementTraits<ElementOf<T>>;
+  using Handle = typename Traits::Handle;
+  explicit InputElements(Declared declared)
+      : GeneratorInputBase(
+            std::move(declared), Traits::kind,
+            Declared(static_cast<size_t>(ArrayTraits<T>::size), "", Traits::types(), Traits::dims),
+            IsArrayIO<T>) {}
+  void values_changed() override {
+    handles_.clear();
+    for (const InputValue& value : values()) handles_.push_back(handle_of<Handle>(value));
+  }
+  const std::vector<Handle>& handles() const {
+    check_ready();
+    return handles_;
+  }
+  void set_estimate_of(size_t i, const Expr& value) {
+    check_ready();
+    check_index(i);
+    if (const auto& p = values()[i].parameter)
+      ir::set_limit(*p, &ir::ParameterContents::estimate, value);
+  }
+
+ private:
+  std::vector<Handle> handles_;
+};
+
+// Scalars may have a default value and limits.
+template <typename T>
+class ScalarElements : public InputElements<T> {
+ protected:
+  using E = ElementOf<T>;
+  using Value = std::conditional_t<std::is_same_v<E, Expr>, int, E>;
+  explicit ScalarElements(Declared declared) : InputElements<T>(std::move(declared)) {}
+  ScalarElements(Declared declared, const Value& value)
+      : InputElements<T>(std::move(declared)), default_(value), has_default_(true) {}
+  ScalarElements(Declared declared, const Value& value, const Value& min, const Value& max)
+      : ScalarElements(std::move(declared), value) {
+    min_ = min;
+    max_ = max;
+    has_limits_ = true;
+  }
+  void describe(ir::ParameterContents& parameter) const override {
+    if (has_default_) ir::set_scalar(parameter, ir::to_scalar(default_));
+    if constexpr (std::is_arithmetic_v<Value>) {
+      if (!has_limits_) return;
+      ir::set_limit(parameter, &ir::ParameterContents::min_value, Expr(min_));
+      ir::set_limit(parameter, &ir::ParameterContents::max_value, Expr(max_));
+    }
+  }
+
+ private:
+  Value default_ = {}, min_ = {}, max_ = {};
+  bool has_default_ = false, has_limits_ = false;
+};
+
+}  // namespace Internal
+
+// One image or Func: it is its handle.
+template <typename T>
+class GeneratorInput : public Internal::InputElements<T>,
+                       public Internal::ElementTraits<T>::Handle {
+  using Base = Internal::InputElements<T>;
+  using Handle = typename Internal::ElementTraits<T>::Handle;
+
+ public:
+  template <typename... Args>
+  requires std::is_constructible_v<Internal::Declared, Args...>
+  explicit GeneratorInput(Args&&... args) : Base(Internal::Declared(std::forward<Args>(args)...)) {}
+  using Base::name;
+  using Base::type;
+  using Base::types;
+  int dimensions() const { return Base::dims(); }
+  Handle& handle() { return *this; }
+
+  // Guesses of its size, for schedulers.
+  GeneratorInput& set_estimates(const Region& estimates) {
+    if (const auto& image = Base::values().at(0).parameter) {
+      ImageParam(image).set_estimates(estimates);
+    }
+    return *this;
+  }
+
+ protected:
+  void values_changed() override {
+    Base::values_changed();
+    static_cast<Handle&>(*this) = Base::handles()[0];
+  }
+};
+
+// One scalar.
+template <typename T>
+requires(Internal::IsScalarIO<T> && !Internal::IsArrayIO<T>) class GeneratorInput<T>
+    : public Internal::ScalarElements<T> {
+  using Base = Internal::ScalarElements<T>;
+  using Value = typename Base::Value;
+  using Declared = Internal::Declared;
+
+ public:
+  explicit GeneratorInput(const std::string& name) : Base(Declared(name)) {}
+  GeneratorInput(const std::string& name, const Value& value) : Base(Declared(name), value) {}
+  GeneratorInput(const std::string& name, const Value& value, const Value& min, const Value& max)
+      : Base(Declared(name), value, min, max) {}
+  operator Expr() const { return Base::handles()[0]; }
+  void set_estimate(const Expr& value) { Base::set_estimate_of(0, value); }
+};
+
+// An array.
+template <typename T>
+requires Internal::IsArrayIO<T>
+class GeneratorInput<T>
+    : public std::conditional_t<Internal::IsScalarIO<T>, Internal::ScalarElements<T>,
+                                Internal::InputElements<T>> {
+  using Base = std::conditional_t<Internal::IsScalarIO<T>, Internal::ScalarElements<T>,
+                                  Internal::InputElements<T>>;
+  using Declared = Internal::Declared;
+  static constexpr bool is_scalar = Internal::IsScalarIO<T>;
+
+ public:
+  explicit GeneratorInput(const std::string& name) : Base(Declared(name)) {}
+  GeneratorInput(size_t size, const std::string& name) : Base(Declared(size, name)) {}
+  template <typename... Args>
+  requires(!is_scalar && sizeof...(Args) >= 2 &&
+           std::is_constructible_v<Declared, Args...>) explicit GeneratorInput(Args&&... args)
+      : Base(Declared(std::forward<Args>(args)...)) {}
+  // Scalars: a default for all, and limits.
+  template <typename V>
+  requires is_scalar GeneratorInput(const std::string& name, const V& value)
+      : Base(Declared(name), value) {}
+  template <typename V>
+  requires is_scalar GeneratorInput(const std::string& name, const V& value, const V& min,
+                                    const V& max)
+      : Base(Declared(name), value, min, max) {}
+  template <typename V>
+  requires is_scalar GeneratorInput(size_t size, const std::string& name, const V& value)
+      : Base(Declared(size, name), value) {}
+  template <typename V>
+  requires is_scalar GeneratorInput(size_t size, const std::string& name, const V& value,
+                                    const V& min, const V& max)
+      : Base(Declared(size, name), value, min, max) {}
+
+  size_t size() const { return Base::handles().size(); }
+  const auto& operator[](size_t i) const {
+    this->check_index(i);
+    return Base::handles()[i];
+  }
+  const auto& at(size_t i) const { return (*this)[i]; }
+  auto begin() const { return Base::handles().begin(); }
+  auto end() const { return Base::handles().end(); }
+  void set_estimate(size_t i, const Expr& value) requires is_scalar {
+    Base::set_estimate_of(i, value);
+  }
+};
+
+}  // namespace retrograde

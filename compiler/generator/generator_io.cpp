@@ -1,0 +1,135 @@
+// Declarations of inputs and outputs: completed from several places, in agreement.
+#include "generator/generator_io.h"
+
+#include "generator/generator_base.h"
+#include "ir/print.h"
+
+namespace retrograde::Internal {
+
+namespace {
+
+std::string list_of(const std::vector<Type>& types) {
+  std::string list;
+  for (const Type& type : types) list += (list.empty() ? "" : ", ") + to_string(type);
+  return list;
+}
+
+}  // namespace
+
+GIOBase::GIOBase(Declared declared, IOKind kind, Declared said, bool is_array, bool is_output)
+    : name_(std::move(declared.name)),
+      kind_(kind),
+      types_(std::move(said.types)),
+      dims_(said.dims),
+      is_array_(is_array),
+      array_size_(said.size),
+      is_output_(is_output) {
+  if (const GeneratorMembers* members = GeneratorMembers::around(this))
+    generator_ = members->owner();
+  try {
+    if (!declared.types.empty() || declared.dims != any_size) {
+      agree_on(declared.types, declared.dims);
+    }
+    if (declared.size != any_size) agree_on_size(static_cast<size_t>(declared.size));
+  } catch (const CompileError& error) {
+    contradiction_ = error.message();
+  }
+}
+
+void GIOBase::check_declaration() const {
+  if (!contradiction_.asked.empty()) throw CompileError(contradiction_);
+}
+
+void GIOBase::refuse(const std::string& asked, const std::string& rule, const std::string& evidence,
+                     const std::string& instead) const {
+  std::string whose = generator_ ? " of the generator " + quoted(generator_->name()) : "";
+  user_error(asked + " the " + role_name() + " " + quoted(name_) + whose, rule, evidence, instead);
+}
+
+const std::vector<Type>& GIOBase::types() const {
+  if (!types_defined()) {
+    refuse("take the type of", "it is known once it is declared, set or given",
+           "nothing has said it yet",
+           "Call set_type() in configure(), or give " + name_ + ".type=");
+  }
+  return types_;
+}
+
+Type GIOBase::type() const {
+  if (types().size() != 1) {
+    refuse("take the type of", "it has one value", text("it has ", types_.size()), "Use types()");
+  }
+  return types_[0];
+}
+
+int GIOBase::dims() const {
+  if (!dims_defined()) {
+    refuse("take the dimensions of", "they are known once they are declared, set or given",
+           "nothing has said them yet",
+           "Call set_dimensions() in configure(), or give " + name_ + ".dim=");
+  }
+  return dims_;
+}
+
+size_t GIOBase::array_size() const {
+  if (!array_size_defined()) {
+    refuse("take the array size of", "it is known once it is declared, set or given",
+           "nothing has said it yet",
+           "Call set_array_size() in configure(), resize() an output, or give " + name_ + ".size=");
+  }
+  return static_cast<size_t>(array_size_);
+}
+
+void GIOBase::set_types(const std::vector<Type>& types) {
+  check_not_generated("set the type of");
+  agree_on(types, any_size);
+}
+
+void GIOBase::set_dimensions(int dims) {
+  check_not_generated("set the dimensions of");
+  agree_on({}, dims);
+}
+
+void GIOBase::set_array_size(int size) {
+  check_not_generated("set the array size of");
+  agree_on_size(static_cast<size_t>(size));
+}
+
+std::string GIOBase::element_name(size_t i) const {
+  return is_array_ ? name_ + "_" + std::to_string(i) : name_;
+}
+
+void GIOBase::agree_on(const std::vector<Type>& types, int dims) {
+  if (!types.empty() && !types_.empty() && types != types_) {
+    refuse("use " + list_of(types) + " as the type of", "its type is declared once",
+           "it is declared as " + list_of(types_), "Leave one of them open, or convert the value");
+  }
+  if (dims != any_size && dims_ != any_size && dims != dims_) {
+    refuse(text("use ", dims, " as the dimensions of"), "its dimensions are declared once",
+           text("it is declared with ", dims_), "Leave one of them open, or give another value");
+  }
+  if (!types.empty()) types_ = types;
+  if (dims != any_size) dims_ = dims;
+}
+
+void GIOBase::agree_on_size(size_t size) {
+  const int wanted = static_cast<int>(size);
+  if (wanted < 0 || (array_size_defined() && wanted != array_size_)) {
+    refuse(text("use ", wanted, " as the array size of"), "its size is said once, and not negative",
+           array_size_defined() ? text("it is ", array_size_) : "it is open",
+           "Give that many elements");
+  }
+  array_size_ = wanted;
+}
+
+void GIOBase::check_not_generated(const char* asked) const {
+  if (!generator_ || !generator_->is_generated()) return;
+  refuse(asked, "configure() is the place for that", "generate() has run", "Do it in configure()");
+}
+
+void GIOBase::check_index(size_t i) const {
+  if (i < array_size()) return;
+  refuse(text("take element ", i, " of"), text("it has ", array_size(), " elements"), "", "");
+}
+
+}  // namespace retrograde::Internal

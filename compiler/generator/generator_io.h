@@ -1,0 +1,166 @@
+// What inputs and outputs of a generator have in common: name, types, dimensions, array size, each
+// of which may stay open until configure(), a generator param (in.type=float32, in.dim=3,
+// in.size=2) or the value itself says it.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "frontend/func.h"
+#include "frontend/param.h"
+#include "generator/members.h"
+
+namespace retrograde {
+namespace Internal {
+
+enum class IOKind { Scalar, Function, Buffer };
+
+constexpr int any_size = -1;  // of an array, or the dimensions of a Func: not said yet
+
+// The arguments of a declaration: a name, then types, dimensions or both; in front of it the size
+// of an array.
+struct Declared {
+  explicit Declared(std::string name) : name(std::move(name)) {}
+  Declared(std::string name, const Type& type) : Declared(std::move(name), std::vector{type}) {}
+  Declared(std::string name, std::vector<Type> types)
+      : name(std::move(name)), types(std::move(types)) {}
+  Declared(std::string name, int dims) : name(std::move(name)), dims(dims) {}
+  Declared(std::string name, const Type& type, int dims)
+      : Declared(std::move(name), std::vector{type}, dims) {}
+  Declared(std::string name, std::vector<Type> types, int dims)
+      : name(std::move(name)), types(std::move(types)), dims(dims) {}
+  template <typename... Rest>
+  requires std::is_constructible_v<Declared, Rest...>
+  explicit Declared(size_t array_size, Rest&&... rest) : Declared(std::forward<Rest>(rest)...) {
+    size = static_cast<int>(array_size);
+  }
+
+  std::string name;
+  std::vector<Type> types;
+  int dims = any_size;
+  int size = any_size;
+};
+
+class GIOBase {
+ public:
+  virtual ~GIOBase() = default;
+  GIOBase(const GIOBase&) = delete;
+  GIOBase& operator=(const GIOBase&) = delete;
+
+  const std::string& name() const { return name_; }
+  IOKind kind() const { return kind_; }
+  bool is_array() const { return is_array_; }
+
+  // CompileError where it is not known yet.
+  bool types_defined() const { return !types_.empty(); }
+  const std::vector<Type>& types() const;
+  Type type() const;
+  bool dims_defined() const { return dims_ != any_size; }
+  int dims() const;
+  bool array_size_defined() const { return array_size_ != any_size; }
+  size_t array_size() const;
+
+  // In configure() only, for what the declaration leaves open; CompileError otherwise.
+  void set_type(const Type& type) { set_types({type}); }
+  void set_types(const std::vector<Type>& types);
+  void set_dimensions(int dims);
+  void set_array_size(int size);
+
+  // CompileError when the constructor's arguments contradict the C++ type. Not thrown by the
+  // constructor: generators are also made where nobody catches, to be asked for their names.
+  void check_declaration() const;
+  std::string role_name() const { return is_output_ ? "output" : "input"; }
+  // The name of an element: "pyramid_2".
+  std::string element_name(size_t i) const;
+  GeneratorBase* generator() const { return generator_; }
+
+ protected:
+  // `declared` holds what its constructor was given, `said` what its C++ type says. CompileError
+  // when they contradict each other.
+  GIOBase(Declared declared, IOKind kind, Declared said, bool is_array, bool is_output);
+
+  [[noreturn]] void refuse(const std::string& asked, const std::string& rule,
+                           const std::string& evidence, const std::string& instead) const;
+  // CompileError unless they agree with the declaration; what was open is known from now on.
+  void agree_on(const std::vector<Type>& types, int dims);
+  void agree_on_size(size_t size);
+  void check_not_generated(const char* asked) const;
+  void check_index(size_t i) const;
+
+ private:
+  friend class GeneratorBase;
+  GeneratorBase* generator_ = nullptr;
+  std::string name_;
+  IOKind kind_;
+  std::vector<Type> types_;
+  int dims_;
+  bool is_array_;
+  int array_size_;
+  bool is_output_;
+  Message contradiction_;
+};
+
+// What the T of Input<T> and Output<T> says about it. T[] and T[n] are arrays.
+template <typename T>
+struct ArrayTraits {
+  using Element = T;
+  static constexpr bool is_array = false;
+  static constexpr int size = 1;
+};
+template <typename T>
+struct ArrayTraits<T[]> {
+  using Element = T;
+  static constexpr bool is_array = true;
+  static constexpr int size = any_size;
+};
+template <typename T, size_t N>
+struct ArrayTraits<T[N]> {
+  using Element = T;
+  static constexpr bool is_array = true;
+  static constexpr int size = static_cast<int>(N);
+};
+template <typename T>
+using ElementOf = typename ArrayTraits<T>::Element;
+
+// Scalars: arithmetic types and pointers. Handle is what a user holds of one element.
+template <typename E>
+struct ElementTraits {
+  using Handle = Expr;
+  static constexpr IOKind kind = IOKind::Scalar;
+  static constexpr int dims = 0;
+  static std::vector<Type> types() { return {type_of<E>()}; }
+};
+template <>
+struct ElementTraits<Expr> {
+  using Handle = Expr;
+  static constexpr IOKind kind = IOKind::Scalar;
+  static constexpr int dims = 0;
+  static std::vector<Type> types() { return {}; }
+};
+template <>
+struct ElementTraits<Func> {
+  using Handle = Func;
+  static constexpr IOKind kind = IOKind::Function;
+  static constexpr int dims = any_size;
+  static std::vector<Type> types() { return {}; }
+};
+template <typename T, int Dims>
+struct ElementTraits<Buffer<T, Dims>> {
+  using Handle = ImageParam;
+  static constexpr IOKind kind = IOKind::Buffer;
+  static constexpr int dims = Dims;
+  static std::vector<Type> types() {
+    if constexpr (std::is_void_v<std::remove_const_t<T>>)
+      return {};
+    else
+      return {type_of<std::remove_const_t<T>>()};
+  }
+};
+template <typename T>
+concept IsScalarIO = ElementTraits<ElementOf<T>>::kind == IOKind::Scalar;
+template <typename T>
+concept IsArrayIO = ArrayTraits<T>::is_array;
+
+}  // namespace Internal
+}  // namespace retrograde

@@ -1,0 +1,24 @@
+// main() of the programs that build files call: linked behind the generators of a user.
+#include <unistd.h>
+
+#include <iostream>
+
+#include "generator/command_line.h"
+
+namespace {
+
+// A build must not hang: SIGALRM ends the program.
+void limit_time(int argc, char** argv) {
+  try {
+    alarm(
+        static_cast<unsigned>(retrograde::Internal::read_command_line(argc, argv).timeout_seconds));
+  } catch (const std::exception&) {  // generate_filter_main reports it
+  }
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  limit_time(argc, argv);
+  return retrograde::Internal::generate_filter_main(argc, argv, std::cerr);
+}

@@ -1,0 +1,38 @@
+// Outputs: Funcs that generate() defines as they are declared.
+#include "generator/generator_output.h"
+
+#include "generator/generator_base.h"
+
+namespace retrograde::Internal {
+
+GeneratorOutputBase::GeneratorOutputBase(Declared declared, IOKind kind, Declared said,
+                                         bool is_array)
+    : GIOBase(std::move(declared), kind, std::move(said), is_array, true) {
+  if (GeneratorMembers* members = GeneratorMembers::around(this)) members->outputs.push_back(this);
+}
+
+Func GeneratorOutputBase::make_func(size_t i) const {
+  if (types_defined() && dims_defined()) return Func(types(), dims(), element_name(i));
+  return Func(element_name(i));
+}
+
+void GeneratorOutputBase::check_assignable(const Func& f) const {
+  if (is_array() || f.defined()) return;
+  refuse("assign " + quoted(f.name()) + " to", "the Func has a definition", "it has none",
+         "Define it first");
+}
+
+void GeneratorOutputBase::check_defined() {
+  const std::vector<Func> all = funcs();
+  agree_on_size(all.size());
+  for (size_t i = 0; i < all.size(); i++) {
+    if (!all[i].defined()) {
+      refuse("generate", "generate() defines every output",
+             quoted(element_name(i)) + " has no definition",
+             "Define it: " + element_name(i) + "(x, y) = ...");
+    }
+    agree_on(all[i].types(), all[i].dimensions());
+  }
+}
+
+}  // namespace retrograde::Internal

@@ -1,0 +1,153 @@
+// generator_output.h -- Output<T>: what generate() defines.
+//
+//   Output<Buffer<float, 2>> out{"out"};     out(x, y) = ...; or out = some_func;
+//   Output<Func> out{"out", {Float(32), UInt(8)}, 2};   a Tuple
+//   Output<float> sum{"sum"};                sum() = ...
+//   Output<Func[]> levels{"levels", Float(32), 2};      levels.resize(n); levels[0](x, y) = ...
+//
+// An output is a Func: defined, updated and scheduled like any other.
+#pragma once
+
+#include <string>
+#include <type_traits>
+#include <utility>
+#include <vector>
+
+#include "generator/generator_io.h"
+
+namespace retrograde {
+namespace Internal {
+
+class GeneratorOutputBase : public GIOBase {
+ public:
+  ~GeneratorOutputBase() override = default;
+  virtual std::vector<Func> funcs() const = 0;
+  // Makes Funcs without definitions, for generate() to define.
+  virtual void make_funcs() = 0;
+  // CompileError unless every Func is defined with the declared types and dimensions.
+  void check_defined();
+
+ protected:
+  GeneratorOutputBase(Declared declared, IOKind kind, Declared said, bool is_array);
+  Func make_func(size_t i) const;
+  void check_assignable(const Func& f) const;
+};
+
+template <typename T>
+class OutputElements : public GeneratorOutputBase {
+ protected:
+  using Traits = ElementTraits<ElementOf<T>>;
+  explicit OutputElements(Declared declared)
+      : GeneratorOutputBase(
+            std::move(declared), Traits::kind,
+            Declared(static_cast<size_t>(ArrayTraits<T>::size), "", Traits::types(), Traits::dims),
+            IsArrayIO<T>) {}
+};
+
+}  // namespace Internal
+
+// One output: it is a Func.
+template <typename T>
+class GeneratorOutput : public Internal::OutputElements<T>, public Func {
+  using Base = Internal::OutputElements<T>;
+  using Declared = Internal::Declared;
+  static constexpr bool is_image = Internal::ElementTraits<T>::kind == Internal::IOKind::Buffer;
+
+ public:
+  template <typename... Args>
+  requires std::is_constructible_v<Declared, Args...>
+  explicit GeneratorOutput(Args&&... args) : Base(Declared(std::forward<Args>(args)...)) {}
+  GeneratorOutput(const std::string& name, const std::vector<Type>& types)
+      : Base(Declared(name, types)) {}
+  GeneratorOutput(const std::string& name, const std::vector<Type>& types, int dims)
+      : Base(Declared(name, types, dims)) {}
+  using Base::name;
+  using Base::type;
+  using Base::types;
+  int dimensions() const { return Base::dims(); }
+  Func& handle() { return *this; }
+
+  // This Func becomes the output.
+  GeneratorOutput& operator=(const Func& f) {
+    Base::check_assignable(f);
+    static_cast<Func&>(*this) = f;
+    return *this;
+  }
+  template <typename B, int Dims>
+  GeneratorOutput& operator=(const Buffer<B, Dims>& buffer) {
+    return *this = Func(buffer);
+  }
+  GeneratorOutput(const GeneratorOutput&) = delete;
+  GeneratorOutput& operator=(const GeneratorOutput& other) {
+    return *this = static_cast<const Func&>(other);
+  }
+
+  // Promises about the buffer it is written to, and its shape as Exprs.
+  Dimension dim(int d) const requires is_image { return output_buffer().dim(d); }
+  operator OutputImageParam() const requires is_image { return output_buffer(); }
+  Expr width() const requires is_image { return output_buffer().width(); }
+  Expr height() const requires is_image { return output_buffer().height(); }
+  Expr channels() const requires is_image { return output_buffer().channels(); }
+  Expr left() const requires is_image { return output_buffer().left(); }
+  Expr right() const requires is_image { return output_buffer().right(); }
+  Expr top() const requires is_image { return output_buffer().top(); }
+  Expr bottom() const requires is_image { return output_buffer().bottom(); }
+
+  std::vector<Func> funcs() const override { return {*this}; }
+  void make_funcs() override { static_cast<Func&>(*this) = Base::make_func(0); }
+};
+
+// An array of outputs.
+template <typename T>
+requires Internal::IsArrayIO<T>
+class GeneratorOutput<T> : public Internal::OutputElements<T> {
+  using Base = Internal::OutputElements<T>;
+  using Declared = Internal::Declared;
+
+ public:
+  template <typename... Args>
+  requires std::is_constructible_v<Declared, Args...>
+  explicit GeneratorOutput(Args&&... args) : Base(Declared(std::forward<Args>(args)...)) {}
+  GeneratorOutput(const std::string& name, const std::vector<Type>& types)
+      : Base(Declared(name, types)) {}
+  GeneratorOutput(const std::string& name, const std::vector<Type>& types, int dims)
+      : Base(Declared(name, types, dims)) {}
+
+  size_t size() const { return Base::array_size(); }
+  // Of an array declared without a size, in generate().
+  void resize(size_t size) {
+    Base::agree_on_size(size);
+    make_funcs();
+  }
+  Func& operator[](size_t i) {
+    Base::check_index(i);
+    return funcs_[i];
+  }
+  const Func& operator[](size_t i) const {
+    Base::check_index(i);
+    return funcs_[i];
+  }
+  Func& at(size_t i) { return (*this)[i]; }
+  const Func& at(size_t i) const { return (*this)[i]; }
+  auto begin() { return funcs_.begin(); }
+  auto end() { return funcs_.end(); }
+  auto begin() const { return funcs_.begin(); }
+  auto end() const { return funcs_.end(); }
+  // Of every element.
+  GeneratorOutput& set_estimates(const Region& estimates) {
+    for (Func& f : funcs_) f.set_estimates(estimates);
+    return *this;
+  }
+
+  std::vector<Func> funcs() const override { return funcs_; }
+  void make_funcs() override {
+    if (!Base::array_size_defined()) return;  // resize() says it
+    funcs_.clear();
+    for (size_t i = 0; i < size(); i++) funcs_.push_back(Base::make_func(i));
+  }
+
+ private:
+  std::vector<Func> funcs_;
+};
+
+}  // namespace retrograde

@@ -1,0 +1,59 @@
+// Values of generator params as text.
+#include "generator/generator_param.h"
+
+#include <array>
+
+#include "generator/generator_base.h"
+#include "generator/members.h"
+
+namespace retrograde::Internal {
+
+GeneratorParamBase::GeneratorParamBase(const std::string& name) : name_(name) {
+  if (GeneratorMembers* members = GeneratorMembers::around(this)) members->params.push_back(this);
+}
+
+void GeneratorParamBase::check_writable() const {
+  const GeneratorMembers* members = GeneratorMembers::around(this);
+  if (!members || !members->owner()->is_generated()) return;
+  user_error("set the GeneratorParam " + quoted(name_), "its value is read by generate()",
+             "generate() has run", "Set it before apply() or build_module()");
+}
+
+void GeneratorParamBase::refuse(const std::string& value, const std::string& rule,
+                                const std::string& evidence, const std::string& instead) const {
+  user_error("set the GeneratorParam " + quoted(name_) + " to " + quoted(value), rule, evidence,
+             instead);
+}
+
+std::optional<bool> read_bool(const std::string& text) {
+  if (text == "true" || text == "True") return true;
+  if (text == "false" || text == "False") return false;
+  return std::nullopt;
+}
+
+namespace {
+constexpr std::array param_types = {Bool(),     Int(8),    Int(16),   Int(32),  Int(64),
+                                    UInt(8),    UInt(16),  UInt(32),  UInt(64), Float(16),
+                                    BFloat(16), Float(32), Float(64), Handle()};
+}  // namespace
+
+std::optional<Type> read_type(const std::string& text) {
+  for (const Type& type : param_types) {
+    if (to_string(type) == text) return type;
+  }
+  return std::nullopt;
+}
+
+std::string type_choices() {
+  std::string list;
+  for (const Type& type : param_types) list += (list.empty() ? "" : ", ") + to_string(type);
+  return list;
+}
+
+std::optional<LoopLevel> read_loop_level(const std::string& text) {
+  if (text == "root") return LoopLevel::root();
+  if (text == "inlined") return LoopLevel::inlined();
+  return std::nullopt;
+}
+
+}  // namespace retrograde::Internal

@@ -1,0 +1,92 @@
+// The module of a generator's gradient.
+//
+//   y = f(a, w)   =>   (a, w, L_y) -> (L_a, L_w)     L_v: the derivative of a loss L with respect
+//   to v
+//
+// L is never named: whoever trains gives L_y, its gradient at the output. For several outputs the
+// gradients are kept apart, one for each pair of output and input; the caller sums what it needs.
+// Names, order and types of the arguments are those of Halide 14's gradient modules: images only,
+// an image of integers gets a gradient of zeros.
+#include <set>
+
+#include "autodiff/derivative.h"
+#include "generator/generator_base.h"
+
+namespace retrograde::Internal {
+
+namespace {
+
+Region region_of(const ImageParam& image) {
+  Region region;
+  for (int d = 0; d < image.dimensions(); d++)
+    region.push_back({image.dim(d).min(), image.dim(d).extent()});
+  return region;
+}
+
+void check_differentiable(const Func& f, const std::string& generator) {
+  if (f.outputs() == 1 && f.type().is_float()) return;
+  user_error("build the gradient of the generator " + quoted(generator),
+             "gradients are of outputs with one floating-point value",
+             f.outputs() == 1 ? quoted(f.name()) + " holds " + to_string(f.type())
+                              : quoted(f.name()) + text(" has ", f.outputs(), " values"),
+             "Make it an output of floats, or split the Tuple into outputs");
+}
+
+Func zeros(const ImageParam& image) {
+  std::vector<Var> at;
+  for (int d = 0; d < image.dimensions(); d++) at.push_back(Var::implicit(d));
+  Func f("zeros");
+  f(at) = cast(image.type(), 0);
+  return f;
+}
+
+}  // namespace
+
+std::vector<ImageParam> GeneratorBase::image_inputs(std::vector<std::string>& names) const {
+  std::vector<ImageParam> images;
+  for (const GeneratorInputBase* input : members_.inputs) {
+    if (input->kind() == IOKind::Scalar) continue;
+    for (size_t i = 0; i < input->values().size(); i++) {
+      images.push_back(ImageParam(input->values()[i].parameter));
+      names.push_back(input->element_name(i));
+    }
+  }
+  return images;
+}
+
+Module GeneratorBase::build_gradient_module(const std::string& function_name) {
+  generate_all();
+  std::vector<Argument> arguments = input_arguments();
+  std::vector<std::string> names = input_names(), gradient_names, image_names;
+  const std::vector<ImageParam> images = image_inputs(image_names);
+  AdjointOptions options;
+  for (const ImageParam& image : images) options.wrt.push_back(image);
+
+  std::vector<Func> gradients;
+  std::set<const ir::FuncContents*> seen;
+  for (const GeneratorOutputBase* output : members_.outputs) {
+    const std::vector<Func> funcs = output->funcs();
+    for (size_t i = 0; i < funcs.size(); i++) {
+      const std::string of = output->element_name(i);
+      check_differentiable(funcs[i], name_);
+      const ImageParam seed(funcs[i].type(), funcs[i].dimensions(), "_grad_loss_for_" + of);
+      arguments.push_back(ir::argument_of(*seed.parameter()));
+      names.push_back("_grad_loss_for_" + of);
+      const Derivative derivative = propagate_adjoints(funcs[i], seed, region_of(seed), options);
+      for (size_t k = 0; k < images.size(); k++) {
+        Func gradient = derivative(images[k]);
+        if (!gradient.defined()) gradient = zeros(images[k]);
+        if (!seen.insert(gradient.function().get()).second) gradient = lambda(gradient(_));
+        gradients.push_back(gradient);
+        gradient_names.push_back("_grad_loss_" + of + "_wrt_" + image_names[k]);
+      }
+    }
+  }
+  names.insert(names.end(), gradient_names.begin(), gradient_names.end());
+  Pipeline pipeline(gradients);
+  add_requirements(pipeline);
+  auto_schedule_pipeline(pipeline);
+  return to_module(pipeline, arguments, names, function_name, LinkageType::ExternalPlusMetadata);
+}
+
+}  // namespace retrograde::Internal

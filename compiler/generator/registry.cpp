@@ -1,0 +1,83 @@
+// The generators that are linked into this program.
+#include "generator/registry.h"
+
+#include <mutex>
+#include <set>
+
+#include "diagnostics/error.h"
+#include "generator/generator_base.h"
+
+namespace retrograde::Internal {
+
+namespace {
+
+struct Registered {
+  std::mutex mutex;
+  std::map<std::string, GeneratorFactory> factories;
+  std::set<std::string> claimed_twice;
+};
+Registered& registered() {
+  static Registered result;
+  return result;
+}
+
+std::string list_of_names() {
+  std::string list;
+  for (const std::string& name : GeneratorRegistry::enumerate())
+    list += (list.empty() ? "" : ", ") + quoted(name);
+  return list.empty() ? "none is linked into this program" : "there are " + list;
+}
+
+}  // namespace
+
+void GeneratorRegistry::register_factory(const std::string& name, GeneratorFactory factory) {
+  std::lock_guard lock(registered().mutex);
+  if (!registered().factories.emplace(name, std::move(factory)).second)
+    registered().claimed_twice.insert(name);
+}
+
+void GeneratorRegistry::unregister_factory(const std::string& name) {
+  std::lock_guard lock(registered().mutex);
+  registered().factories.erase(name);
+  registered().claimed_twice.erase(name);
+}
+
+std::vector<std::string> GeneratorRegistry::enumerate() {
+  std::lock_guard lock(registered().mutex);
+  std::vector<std::string> names;
+  for (const auto& [name, factory] : registered().factories) names.push_back(name);
+  return names;
+}
+
+std::unique_ptr<GeneratorBase> GeneratorRegistry::create(const std::string& name,
+                                                         const GeneratorContext& context) {
+  GeneratorFactory factory;
+  bool twice = false;
+  {
+    std::lock_guard lock(registered().mutex);
+    if (auto found = registered().factories.find(name); found != registered().factories.end())
+      factory = found->second;
+    twice = registered().claimed_twice.count(name) > 0;
+  }
+  if (!factory) {
+    user_error("create the generator " + quoted(name), "it is registered in this program",
+               list_of_names(),
+               "Name one of these, or register it with RETROGRADE_REGISTER_GENERATOR");
+  }
+  if (twice) {
+    user_error("create the generator " + quoted(name), "a name is registered once",
+               "two generators have it", "Rename one of them");
+  }
+  return factory(context);
+}
+
+std::unique_ptr<GeneratorBase> create_alias(const std::string& name, const std::string& original,
+                                            const std::map<std::string, std::string>& params,
+                                            const GeneratorContext& context) {
+  std::unique_ptr<GeneratorBase> generator = GeneratorRegistry::create(original, context);
+  generator->set_name(name);
+  generator->set_generator_param_values(params);
+  return generator;
+}
+
+}  // namespace retrograde::Internal

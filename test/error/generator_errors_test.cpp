@@ -1,0 +1,264 @@
+// What a generator's author or a build file can do wrong.
+#include <gtest/gtest.h>
+
+#include <sstream>
+
+#include "generator/command_line.h"
+#include "retrograde/retrograde.h"
+
+using namespace retrograde;
+
+namespace {
+
+enum class Mode { Fast, Exact };
+
+class Simple : public Generator<Simple> {
+ public:
+  GeneratorParam<int> count{"count", 3, 0, 10};
+  GeneratorParam<uint8_t> small{"small", 3};
+  GeneratorParam<float> weight{"weight", 1.0f};
+  GeneratorParam<bool> flag{"flag", false};
+  GeneratorParam<Mode> mode{"mode", Mode::Fast, {{"fast", Mode::Fast}, {"exact", Mode::Exact}}};
+  GeneratorParam<Type> kind{"kind", Float(32)};
+  GeneratorParam<LoopLevel> level{"level", LoopLevel::root()};
+  Input<Buffer<>> in{"in", 1};
+  Output<Buffer<float, 1>> out{"out"};
+  void generate() { out(x) = cast<float>(in(x)); }
+
+ private:
+  Var x{"x"};
+};
+
+using Params = std::map<std::string, std::string>;
+
+// The message of the error that `run` throws, all four parts.
+template <typename Run>
+std::string message_of(Run&& run) {
+  try {
+    run();
+  } catch (const CompileError& error) {
+    const Message& m = error.message();
+    EXPECT_FALSE(m.asked.empty() || m.rule.empty() || m.evidence.empty() || m.instead.empty())
+        << error.what();
+    return error.what();
+  }
+  ADD_FAILURE() << "nothing was thrown";
+  return "";
+}
+
+#define EXPECT_SAYS(text, phrase) EXPECT_NE((text).find(phrase), std::string::npos) << (text)
+
+std::string refusal(const std::string& key, const std::string& value) {
+  return message_of([&] {
+    GeneratorContext(get_host_target())
+        .create<Simple>()
+        ->set_generator_param_values({{key, value}});
+  });
+}
+
+TEST(GeneratorErrors, UnknownParamListsThoseThereAre) {
+  const std::string text = refusal("cuont", "3");
+  EXPECT_SAYS(text, "\"cuont\"");
+  EXPECT_SAYS(text, "\"count\", \"flag\", \"in.type\", \"kind\"");
+}
+
+TEST(GeneratorErrors, ValuesParseToTheirLastCharacter) {
+  for (const char* value : {"", "3x", "3.0", " 3", "+3", "0x3", "three"})
+    EXPECT_SAYS(refusal("count", value), "whole numbers from 0 to 10");
+  EXPECT_SAYS(refusal("weight", "1.5f"), "numbers of type float32");
+  EXPECT_SAYS(refusal("flag", "yes"), "\"true\" and \"false\"");
+}
+
+TEST(GeneratorErrors, ValuesAreInRange) {
+  EXPECT_SAYS(refusal("count", "11"), "out of range");
+  EXPECT_SAYS(refusal("small", "256"), "whole numbers of type uint8");
+  EXPECT_SAYS(refusal("small", "-1"), "whole numbers of type uint8");
+  const GeneratorContext context(get_host_target());
+  EXPECT_SAYS(message_of([&] { context.create<Simple>()->small.set(300); }), "does not fit");
+  EXPECT_SAYS(message_of([&] { context.create<Simple>()->count.set(2.5); }), "does not fit");
+}
+
+TEST(GeneratorErrors, EnumerationsListTheirChoices) {
+  EXPECT_SAYS(refusal("mode", "slow"), "\"exact\", \"fast\"");
+  EXPECT_SAYS(refusal("kind", "float"), "float32, float64");
+  EXPECT_SAYS(refusal("level", "out.x"), "\"root\" and \"inlined\"");
+  EXPECT_SAYS(refusal("in.type", "uint9"), "uint8, uint16");
+  EXPECT_SAYS(refusal("target", "x87-64-linux"), "\"x87\"");
+  EXPECT_SAYS(refusal("machine_params", "16,huge"), "three numbers");
+}
+
+TEST(GeneratorErrors, AutoschedulersMustBeLoaded) {
+  EXPECT_SAYS(refusal("auto_schedule", "Adams2019"), "\"Adams2019\"");
+  EXPECT_SAYS(refusal("auto_schedule", "true"), "none was");
+}
+
+TEST(GeneratorErrors, DeclarationsAreNotContradicted) {
+  EXPECT_SAYS(refusal("in.dim", "2"), "it is declared with 1");
+  EXPECT_SAYS(refusal("out.type", "uint8"), "it is declared as float32");
+}
+
+TEST(GeneratorErrors, OpenTypesMustBeSaidForAModule) {
+  EXPECT_SAYS(
+      message_of([] { GeneratorContext(get_host_target()).create<Simple>()->build_module(); }),
+      "in.type=");
+}
+
+TEST(GeneratorErrors, ParamsAreSetBeforeGenerate) {
+  auto simple = GeneratorContext(get_host_target()).create<Simple>();
+  simple->apply(Buffer<float>(4));
+  EXPECT_SAYS(message_of([&] { simple->count.set(2); }), "generate() has run");
+}
+
+TEST(GeneratorErrors, InputsFitTheirDeclaration) {
+  const GeneratorContext context(get_host_target());
+  EXPECT_SAYS(message_of([&] { context.apply<Simple>(); }), "it has 1 and was given 0");
+  EXPECT_SAYS(message_of([&] { context.apply<Simple>(Buffer<float>(4, 4)); }), "declared with 1");
+  Func f("f");
+  Var x;
+  f(x) = 1.0f;
+  EXPECT_SAYS(message_of([&] { context.apply<Simple>(f); }), "given a Func");
+}
+
+class Forgetful : public Generator<Forgetful> {
+ public:
+  Input<Buffer<float, 1>> in{"in"};
+  Output<Buffer<float, 1>> out{"out"};
+  void generate() {}
+};
+class Clashing : public Generator<Clashing> {
+ public:
+  Input<Buffer<float, 1>> in{"same"};
+  Output<Buffer<float, 1>> out{"same"};
+  void generate() {}
+};
+class WrongType : public Generator<WrongType> {
+ public:
+  Input<Buffer<float, 1>> in{"in"};
+  Output<Buffer<float, 1>> out{"out"};
+  void generate() {
+    Func f("f");
+    Var x;
+    f(x) = cast<uint8_t>(in(x));
+    out = f;
+  }
+};
+class Contradicting : public Generator<Contradicting> {
+ public:
+  Input<Buffer<float, 1>> in{"in", 2};
+  Output<Buffer<float, 1>> out{"out"};
+  void generate() {}
+};
+
+template <typename G>
+std::string refusal_of() {
+  return message_of([] { GeneratorContext(get_host_target()).create<G>()->build_module(); });
+}
+
+TEST(GeneratorErrors, GenerateDefinesWhatIsDeclared) {
+  EXPECT_SAYS(refusal_of<Forgetful>(), "\"out\" has no definition");
+  EXPECT_SAYS(refusal_of<Clashing>(), "two are called \"same\"");
+  EXPECT_SAYS(refusal_of<WrongType>(), "use uint8 as the type of the output \"out\"");
+  EXPECT_SAYS(refusal_of<Contradicting>(), "2 as the dimensions of the input \"in\"");
+}
+
+TEST(GeneratorErrors, GradientsAreOfFloats) {
+  class Whole : public Generator<Whole> {
+   public:
+    Input<Buffer<float, 1>> in{"in"};
+    Output<Buffer<uint8_t, 1>> out{"out"};
+    void generate() {
+      Var x;
+      out(x) = cast<uint8_t>(in(x));
+    }
+  };
+  auto whole = GeneratorContext(get_host_target()).create<Whole>();
+  EXPECT_SAYS(message_of([&] { whole->build_gradient_module(); }), "holds uint8");
+}
+
+// ---- the program ----
+
+struct Outcome {
+  int status;
+  std::string errors;
+};
+
+Outcome run(std::vector<std::string> words) {
+  words.insert(words.begin(), "program");
+  std::vector<char*> argv;
+  for (std::string& word : words) argv.push_back(word.data());
+  std::ostringstream errors;
+  const int status =
+      Internal::generate_filter_main(static_cast<int>(argv.size()), argv.data(), errors);
+  return {status, errors.str()};
+}
+
+void expect_usage(const Outcome& result, const std::string& phrase) {
+  EXPECT_EQ(result.status, 1);
+  EXPECT_SAYS(result.errors, "Error: cannot ");
+  EXPECT_SAYS(result.errors, phrase);
+  EXPECT_SAYS(result.errors, "usage: ");
+}
+
+TEST(GeneratorProgram, NeedsAGeneratorAFolderAndATarget) {
+  expect_usage(run({}), "-g names the generator");
+  expect_usage(run({"-g", "simple_for_errors", "target=host"}), "-o names the folder");
+  expect_usage(run({"-g", "simple_for_errors", "-o", "."}), "target= names what to compile for");
+}
+
+TEST(GeneratorProgram, RefusesUnknownGenerators) {
+  const Outcome result = run({"-g", "complex", "-o", ".", "target=host"});
+  expect_usage(result, "\"complex\"");
+  EXPECT_SAYS(result.errors, "\"simple_for_errors\"");
+}
+
+TEST(GeneratorProgram, RefusesUnknownFileTypes) {
+  const Outcome result =
+      run({"-g", "simple_for_errors", "-o", ".", "-e", "object,exe", "target=host"});
+  expect_usage(result, "\"exe\"");
+  EXPECT_SAYS(result.errors, "\"static_library\"");
+}
+
+TEST(GeneratorProgram, RefusesBadParams) {
+  expect_usage(run({"-g", "simple_for_errors", "-o", ".", "target=host", "cuont=1"}), "\"cuont\"");
+  expect_usage(run({"-g", "simple_for_errors", "-o", ".", "target=host", "count=1.5"}), "\"1.5\"");
+  expect_usage(run({"-g", "simple_for_errors", "-o", ".", "target=host", "auto_schedule=Best"}),
+               "\"Best\"");
+}
+
+TEST(GeneratorProgram, RefusesBadTargets) {
+  expect_usage(run({"-g", "simple_for_errors", "-o", ".", "target=x86-64"}), "\"x86-64\"");
+}
+
+TEST(GeneratorProgram, RefusesWhatIsNoFlag) {
+  expect_usage(run({"--help"}), "\"--help\"");
+  expect_usage(run({"-x", "1"}), "\"-x\"");
+  expect_usage(run({"-g"}), "-g has none");
+  expect_usage(run({"-g", "simple_for_errors", "-d", "2", "-o", ".", "target=host"}), "-d takes 1");
+  expect_usage(run({"-t", "soon"}), "-t takes a number");
+}
+
+TEST(GeneratorProgram, RefusesPluginsAndSchedulersThatAreNotThere) {
+  expect_usage(run({"-g", "simple_for_errors", "-o", ".", "target=host", "-p", "no_such_plugin"}),
+               "\"no_such_plugin\"");
+  expect_usage(run({"-g", "simple_for_errors", "-o", ".", "target=host", "-s", "Li2018"}),
+               "\"Li2018\"");
+}
+
+// What the generator itself does wrong is no fault of the command line.
+TEST(GeneratorProgram, ReportsAGeneratorsErrorsWithoutUsage) {
+  const Outcome result = run({"-g", "simple_for_errors", "-o", ".", "target=host"});
+  EXPECT_EQ(result.status, 1);
+  EXPECT_SAYS(result.errors, "in.type=");
+  EXPECT_EQ(result.errors.find("usage"), std::string::npos);
+}
+
+TEST(GeneratorProgram, ReportsAFolderThatCannotBeWritten) {
+  const Outcome result = run({"-g", "simple_for_errors", "-o", "no/such/folder", "target=host",
+                              "in.type=float32", "-e", "c_header"});
+  EXPECT_EQ(result.status, 1);
+  EXPECT_SAYS(result.errors, "no/such/folder");
+}
+
+}  // namespace
+
+RETROGRADE_REGISTER_GENERATOR(Simple, simple_for_errors)

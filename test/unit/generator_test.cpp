@@ -1,0 +1,303 @@
+// Generators used from C++ and as modules.
+#include "generator/generator.h"
+
+#include <gtest/gtest.h>
+
+#include "retrograde/retrograde.h"
+
+using namespace retrograde;
+
+namespace {
+
+enum class Edge { Clamp, Zero };
+
+class BoxBlur : public Generator<BoxBlur> {
+ public:
+  GeneratorParam<int> radius{"radius", 1, 0, 8};
+  GeneratorParam<float> weight{"weight", 1.0f};
+  GeneratorParam<Edge> edge{"edge", Edge::Clamp, {{"clamp", Edge::Clamp}, {"zero", Edge::Zero}}};
+  GeneratorParam<bool> vectorize{"vectorize", true};
+  Input<Buffer<float, 1>> in{"in"};
+  Input<float> gain{"gain", 1.0f, 0.0f, 100.0f};
+  Output<Buffer<float, 1>> out{"out"};
+
+  void generate() {
+    Func source = edge == Edge::Clamp ? BoundaryConditions::repeat_edge(in)
+                                      : BoundaryConditions::constant_exterior(in, 0.0f);
+    RDom r(-radius, 2 * radius + 1);
+    out(x) = 0.0f;
+    out(x) += source(x + r) * gain * weight;
+  }
+  void schedule() {
+    if (vectorize) out.vectorize(x, natural_vector_size<float>());
+  }
+
+ private:
+  Var x{"x"};
+};
+
+Buffer<float> ramp(int n) {
+  Buffer<float> result(n);
+  for (int i = 0; i < n; i++) result(i) = static_cast<float>(i * i % 7);
+  return result;
+}
+
+float at(const Buffer<float>& in, int i) { return in(std::min(std::max(i, 0), in.width() - 1)); }
+
+TEST(Generator, RunsFromCpp) {
+  const GeneratorContext context(get_jit_target_from_environment());
+  auto blur = context.create<BoxBlur>();
+  blur->radius.set(2);
+  blur->weight.set(0.5f);
+  const Buffer<float> in = ramp(50);
+  blur->apply(in, 3.0f);
+  const Buffer<float> out = blur->realize({50});
+  for (int i = 0; i < 50; i++) {
+    float sum = 0.0f;
+    for (int r = -2; r <= 2; r++) sum += at(in, i + r) * 3.0f * 0.5f;
+    ASSERT_EQ(out(i), sum) << i;
+  }
+  // The output is a Func like any other.
+  Func doubled("doubled");
+  Var x;
+  doubled(x) = 2.0f * blur->out(x);
+  const Buffer<float> twice = doubled.realize({50});
+  EXPECT_EQ(twice(20), 2.0f * out(20));
+}
+
+TEST(Generator, ParamsComeAsText) {
+  const GeneratorContext context(get_jit_target_from_environment());
+  auto blur = context.create<BoxBlur>();
+  blur->set_generator_param_values(
+      {{"radius", "0"}, {"weight", "0.25"}, {"edge", "zero"}, {"vectorize", "false"}});
+  EXPECT_EQ(blur->radius, 0);
+  EXPECT_EQ(blur->weight, 0.25f);
+  EXPECT_EQ(blur->edge, Edge::Zero);
+  EXPECT_EQ(blur->edge.to_string(), "zero");
+  EXPECT_FALSE(blur->vectorize);
+  blur->apply(ramp(9), 4.0f);
+  const Buffer<float> out = blur->out.realize({9});
+  for (int i = 0; i < 9; i++) EXPECT_EQ(out(i), ramp(9)(i));
+}
+
+TEST(Generator, ParamsStandForTheirValuesInArithmetic) {
+  GeneratorParam<int> a{"a", 7}, b{"b", 2};
+  GeneratorParam<float> f{"f", 0.5f};
+  EXPECT_EQ(a + 1, 8);
+  EXPECT_EQ(1 - a, -6);
+  EXPECT_EQ(a * b, 14);
+  EXPECT_EQ(-a, -7);
+  EXPECT_TRUE(a > b && a != 3 && !(a < 3));
+  EXPECT_EQ(min(a, 3), 3);
+  EXPECT_EQ(max(a, b), 7);
+  EXPECT_EQ(f * 3, 1.5f);
+  Func g("g");
+  Var x;
+  g(x) = x * a + cast<int>(f * 2.0f) + Expr(b);
+  const Buffer<int> out = g.realize({4});
+  EXPECT_EQ(out(3), 3 * 7 + 1 + 2);
+  EXPECT_EQ(evaluate<int>(lambda(x, x + 1)(a)), 8);
+}
+
+// Arrays, scalars of open type, images of open type and dimensions, a Tuple output, an output with
+// no dimensions.
+class Mixed : public Generator<Mixed> {
+ public:
+  Input<Buffer<int32_t>[3]> images { "images", 1 };
+  Input<Func[]> funcs{"funcs", Int(32), 1};
+  Input<int32_t[2]> factors{"factors", 1};
+  Input<Expr> offset{"offset"};
+  Output<Func> sums{"sums", {Int(32), Int(64)}, 1};
+  Output<int32_t> count{"count"};
+  Output<Func[]> copies{"copies", 1};
+
+  void configure() { offset.set_type(Int(16)); }
+  void generate() {
+    Expr sum = cast<int32_t>(offset);
+    for (const ImageParam& image : images) sum += image(x) * factors[0];
+    for (size_t i = 0; i < funcs.size(); i++) sum += funcs[i](x) * factors[1];
+    sums(x) = Tuple(sum, cast<int64_t>(sum) * 2);
+    count() = static_cast<int32_t>(funcs.size());
+    copies.resize(2);
+    for (size_t i = 0; i < copies.size(); i++) copies[i](x) = images[i](x) + 1;
+  }
+
+ private:
+  Var x{"x"};
+};
+
+TEST(Generator, TakesArraysFuncsAndOpenTypes) {
+  const GeneratorContext context(get_jit_target_from_environment());
+  Buffer<int32_t> a(5), b(5), c(5);
+  for (int i = 0; i < 5; i++) a(i) = i, b(i) = 10 * i, c(i) = 100 * i;
+  Var x;
+  const auto mixed = context.apply<Mixed>(std::vector<Buffer<int32_t>>{a, b, c},
+                                          std::vector<Func>{lambda(x, x), lambda(x, x * x)},
+                                          std::vector<int>{2, 3}, cast<int16_t>(7));
+  const Realization sums = mixed->sums.realize({5});
+  const Buffer<int32_t> first = sums[0].as<int32_t>();
+  const Buffer<int64_t> second = sums[1].as<int64_t>();
+  for (int i = 0; i < 5; i++) {
+    EXPECT_EQ(first(i), 7 + 111 * i * 2 + (i + i * i) * 3);
+    EXPECT_EQ(second(i), 2 * first(i));
+  }
+  const Buffer<int32_t> count = mixed->count.realize();
+  EXPECT_EQ(count(), 2);
+  const Buffer<int32_t> copied = mixed->copies[1].realize({5});
+  EXPECT_EQ(copied(4), 41);
+}
+
+class Sum : public Generator<Sum> {
+ public:
+  GeneratorParam<int> inputs{"inputs", 2, 1, 9};
+  Output<Buffer<float, 1>> out{"out"};
+  void configure() {
+    for (int i = 0; i < inputs; i++)
+      extra_.push_back(add_input<Buffer<float>>("in_" + std::to_string(i), 1));
+    scale_ = add_input<float>("scale");
+    largest_ = add_output<Buffer<float>>("largest", Float(32), 1);
+  }
+  void generate() {
+    Expr sum = 0.0f, most = (*extra_[0])(x);
+    for (auto* in : extra_) sum += (*in)(x), most = max(most, (*in)(x));
+    out(x) = sum * *scale_;
+    (*largest_)(x) = most;
+  }
+
+ private:
+  Var x{"x"};
+  std::vector<GeneratorInput<Buffer<float>>*> extra_;
+  GeneratorInput<float>* scale_ = nullptr;
+  GeneratorOutput<Buffer<float>>* largest_ = nullptr;
+};
+
+TEST(Generator, ConfigureAddsInputsAndOutputs) {
+  auto sum = GeneratorContext(get_jit_target_from_environment()).create<Sum>();
+  sum->inputs.set(3);
+  sum->apply(ramp(6), ramp(6), ramp(6), 2.0f);
+  const Realization both = sum->realize({6});
+  ASSERT_EQ(both.size(), 2u);
+  EXPECT_EQ(both[0].as<float>()(5), 6.0f * ramp(6)(5));
+  EXPECT_EQ(both[1].as<float>()(5), ramp(6)(5));
+}
+
+// A generator that uses another one.
+class Twice : public Generator<Twice> {
+ public:
+  Input<Buffer<float, 1>> in{"in"};
+  Output<Buffer<float, 1>> out{"out"};
+  void generate() {
+    auto blur = create<BoxBlur>();
+    blur->radius.set(1);
+    blur->apply(in, 1.0f);
+    Var x;
+    Func twice("twice");
+    twice(x) = 2.0f * blur->out(x);
+    out = twice;
+  }
+};
+
+TEST(Generator, UsesAnother) {
+  auto twice = GeneratorContext(get_jit_target_from_environment()).create<Twice>();
+  const Buffer<float> in = ramp(20);
+  twice->apply(in);
+  const Buffer<float> out = twice->realize({20});
+  EXPECT_EQ(out(5), 2.0f * (in(4) + in(5) + in(6)));
+}
+
+std::vector<std::string> argument_names(const Module& module) {
+  std::vector<std::string> names;
+  const auto declared = module.get_metadata_name_map();
+  for (const Argument& argument : module.functions().back().args) {
+    const auto found = declared.find(argument.name);
+    names.push_back(found == declared.end() ? argument.name : found->second);
+  }
+  return names;
+}
+
+using Names = std::vector<std::string>;
+
+TEST(Generator, ModulesTakeInputsAndThenOutputs) {
+  const GeneratorContext context(Target("x86-64-linux"));
+  EXPECT_EQ(argument_names(context.create<BoxBlur>()->build_module("blur")),
+            (Names{"in", "gain", "out"}));
+  // Another one in this process has the same names.
+  EXPECT_EQ(argument_names(context.create<BoxBlur>()->build_module("blur")),
+            (Names{"in", "gain", "out"}));
+  auto mixed = context.create<Mixed>();
+  mixed->set_generator_param_values({{"funcs.size", "1"}});
+  EXPECT_EQ(argument_names(mixed->build_module("mixed")),
+            (Names{"images_0", "images_1", "images_2", "funcs_0", "factors_0", "factors_1",
+                   "offset", "sums.0", "sums.1", "count", "copies_0", "copies_1"}));
+}
+
+// out = in * in * w + table: every image gets a gradient, scalars none.
+class Square : public Generator<Square> {
+ public:
+  Input<Buffer<float, 1>> in{"in"};
+  Input<Buffer<uint8_t, 1>> table{"table"};
+  Input<Buffer<double, 2>> unused{"unused"};
+  Input<float> w{"w"};
+  Output<Buffer<float, 1>> out{"out"};
+  void generate() { out(x) = in(x)*in(x)*w + table(x); }
+  void schedule() { scheduled = true; }
+  bool scheduled = false;
+
+ private:
+  Var x{"x"};
+};
+
+TEST(Generator, GradientModuleHasHalidesArguments) {
+  auto square = GeneratorContext(Target("x86-64-linux")).create<Square>();
+  const Module module = square->build_gradient_module("square_grad");
+  EXPECT_EQ(argument_names(module),
+            (Names{"in", "table", "unused", "w", "_grad_loss_for_out", "_grad_loss_out_wrt_in",
+                   "_grad_loss_out_wrt_table", "_grad_loss_out_wrt_unused"}));
+  const std::vector<Argument>& args = module.functions().back().args;
+  EXPECT_EQ(args[5].type, Float(32));
+  EXPECT_EQ(args[6].type, UInt(8));
+  EXPECT_EQ(args[7].type, Float(64));
+  EXPECT_EQ(args[7].dimensions, 2);
+  EXPECT_FALSE(square->scheduled);
+}
+
+class Guarded : public Generator<Guarded> {
+ public:
+  Input<Buffer<float, 1>> in{"in"};
+  Input<int> limit{"limit"};
+  Output<Buffer<float, 1>> out{"out"};
+  void generate() {
+    add_requirement(limit > 3, "limit must exceed 3, it is ", limit);
+    out(x) = in(x);
+  }
+
+ private:
+  Var x{"x"};
+};
+
+TEST(Generator, RequirementsAreCheckedInEveryCall) {
+  const GeneratorContext context(get_jit_target_from_environment());
+  auto good = context.apply<Guarded>(ramp(4), 5);
+  EXPECT_NO_THROW(good->realize({4}));
+  auto bad = context.apply<Guarded>(ramp(4), 2);
+  try {
+    bad->realize({4});
+    FAIL();
+  } catch (const RuntimeError& error) {
+    EXPECT_NE(std::string(error.what()).find("limit must exceed 3, it is 2"), std::string::npos)
+        << error.what();
+  }
+}
+
+}  // namespace
+
+RETROGRADE_REGISTER_GENERATOR(BoxBlur, test_box_blur)
+RETROGRADE_REGISTER_GENERATOR_ALIAS(test_wide_blur, test_box_blur, {{"radius", "4"}})
+
+TEST(GeneratorRegistry, MakesGeneratorsByName) {
+  const GeneratorContext context(get_jit_target_from_environment());
+  auto blur = Internal::GeneratorRegistry::create("test_box_blur", context);
+  EXPECT_EQ(blur->name(), "test_box_blur");
+  auto wide = Internal::GeneratorRegistry::create("test_wide_blur", context);
+  EXPECT_EQ(dynamic_cast<BoxBlur&>(*wide).radius, 4);
+}
