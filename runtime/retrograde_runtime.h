@@ -44,7 +44,8 @@ enum retrograde_error_code {
   retrograde_error_extents_negative = -28,
   retrograde_error_specialize_fail = -31,
   retrograde_error_host_is_null = -34,
-  retrograde_error_bad_dimensions = -43
+  retrograde_error_bad_dimensions = -43,
+  retrograde_error_storage_bound_too_small = -45
 };
 
 struct retrograde_context;

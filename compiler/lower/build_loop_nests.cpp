@@ -1,15 +1,19 @@
 #include "lower/build_loop_nests.h"
 
 #include <algorithm>
+#include <functional>
+#include <optional>
 #include <set>
 
 #include "diagnostics/error.h"
 #include "ir/build.h"
 #include "ir/visit.h"
 #include "lower/emit_definition.h"
+#include "lower/nest_checks.h"
+#include "lower/site.h"
 #include "lower/stage_nest.h"
+#include "lower/storage_folding.h"
 #include "lower/value_bounds.h"
-#include "retrograde_runtime.h"
 #include "simplify/simplify.h"
 
 namespace retrograde::ir {
@@ -25,8 +29,6 @@ Box buffer_box(const std::string& buffer, int dimensions) {
 
 namespace {
 
-using Bindings = std::vector<std::pair<std::string, Expr>>;
-
 // A statement with what it needs from outside of it. All boxes speak of names that are bound
 // outside the statement, except for `unranged` loops, over which they are still to be extended.
 struct Emitted {
@@ -34,62 +36,58 @@ struct Emitted {
   Requirements uses;
   std::map<std::string, Box> storage;  // Funcs computed inside but stored further out
   std::vector<Loop> unranged;
+  int lead = 0;            // iterations of the loop around that run before its first
+  bool has_loops = false;  // that stay loops
+  bool has_vectors = false;
 };
 
-bool is_trivial(const Expr& e) { return is_const(e) || e.as<Variable>(); }
+void map_boxes(Emitted& code, const std::function<Box(const Box&)>& map) {
+  for (auto& [name, use] : code.uses) use.box = map(use.box);
+  for (auto& [name, box] : code.storage) box = map(box);
+}
 
-void map_boxes(Emitted& code, const std::function<void(Box&)>& map) {
-  for (auto& [name, use] : code.uses) map(use.box);
-  for (auto& [name, box] : code.storage) map(box);
+Box ranged_over(const std::vector<Loop>& loops, Box box) {
+  if (loops.empty()) return box;
+  Scope<Interval> ranges;
+  for (const Loop& loop : loops) ranges.push(loop.name, loop.range());
+  for (Interval& side : box) {
+    if (side.min.defined()) side.min = bounds_of(side.min, ranges).min;
+    if (side.max.defined()) side.max = bounds_of(side.max, ranges).max;
+  }
+  return box;
 }
 
 // Extends every box over the loops that were wrapped around the statement since the last call.
 void range_over_loops(Emitted& code) {
   if (code.unranged.empty()) return;
-  Scope<Interval> loops;
-  for (const Loop& loop : code.unranged) loops.push(loop.name, loop.range());
-  map_boxes(code, [&](Box& box) {
-    for (Interval& side : box) {
-      if (side.min.defined()) side.min = bounds_of(side.min, loops).min;
-      if (side.max.defined()) side.max = bounds_of(side.max, loops).max;
-    }
-  });
+  map_boxes(code, [&](const Box& box) { return ranged_over(code.unranged, box); });
   code.unranged.clear();
-}
-
-// Boxes in terms of `bindings` become boxes in terms of what the bindings are made of.
-void expand_bindings(Emitted& code, const Bindings& bindings) {
-  if (bindings.empty()) return;
-  Substitution values;
-  for (const auto& [name, value] : bindings) values[name] = substitute(value, values);
-  map_boxes(code, [&](Box& box) {
-    for (Interval& side : box) {
-      if (side.min.defined()) side.min = simplify(substitute(side.min, values));
-      if (side.max.defined()) side.max = simplify(substitute(side.max, values));
-    }
-  });
 }
 
 void merge_storage(std::map<std::string, Box>& into, const std::map<std::string, Box>& from) {
   for (const auto& [name, box] : from) into[name] = hull(into[name], box);
 }
 
-std::vector<Range> ranges_of(const Box& box) {
-  std::vector<Range> ranges;
-  for (const Interval& side : box) ranges.push_back({side.min, simplify(side.max - side.min + 1)});
-  return ranges;
+Box simplified(Box box) {
+  for (Interval& side : box) {
+    if (side.min.defined()) side.min = simplify(side.min);
+    if (side.max.defined()) side.max = simplify(side.max);
+  }
+  return box;
 }
 
 class NestEmitter {
  public:
-  explicit NestEmitter(const Program& program) : program_(program), values_(value_bounds(program)) {
+  NestEmitter(const Program& program, const LoopNestOptions& options)
+      : program_(program), options_(options), values_(value_bounds(program)) {
     for (size_t i = 0; i < program.funcs.size(); i++) note_site(static_cast<int>(i));
   }
 
   LoopNests emit() {
     LoopNests nests;
-    Emitted nothing;
-    Emitted all = emit_site(root_, nothing, nests.bounds);
+    Site root({});
+    Emitted all = emit_site(root_, Emitted(), root);
+    nests.bounds = std::move(root.bindings);
     all.stmt = realize_stored(
         all, [](const LoopLevel& level) { return level.kind == LoopLevel::Kind::Root; });
     check_everything_found_its_place(all);
@@ -97,18 +95,22 @@ class NestEmitter {
       if (use.is_image) nests.images[name] = use;
     nests.body = all.stmt;
     nests.outputs = std::move(outputs_);
+    for (const auto& [name, folds] : folds_) {
+      for (const Fold& fold : folds) nests.folds[name].push_back(fold.factor);
+    }
     return nests;
   }
 
  private:
   const Program& program_;
+  const LoopNestOptions options_;
   const ValueBounds values_;
   std::vector<int> root_, innermost_;  // indices into program_.funcs, producers first
   std::map<std::pair<std::string, std::string>, std::vector<int>>
       at_;                               // (consumer, loop) -> Funcs computed there
   std::set<std::string> storage_sites_;  // "consumer.loop" that store something
   std::map<std::string, Box> outputs_;
-  std::set<std::string> computed_;
+  std::map<std::string, std::vector<Fold>> folds_;
 
   void note_site(int index) {
     const LoopedFunc& f = program_.funcs[index];
@@ -133,161 +135,229 @@ class NestEmitter {
 
   // ---- one site: Funcs that are computed together, just outside `inner` ----
 
-  Emitted emit_site(const std::vector<int>& children, Emitted inner, Bindings& bindings) {
+  // A Func's part of the site: realize { if (lead) produce f; consume f { what came before } }
+  struct Piece {
+    const LoopedFunc* f;
+    Stmt produce;
+    int lead = 0;
+    std::optional<Box> realized;
+  };
+
+  // From how many iterations before the loop's first on a Func is wanted: by the first and by the
+  // last of its consumers.
+  struct Wanted {
+    int first = 0, last = 0;
+  };
+
+  Emitted emit_site(const std::vector<int>& children, Emitted code, Site& site) {
+    std::vector<Piece> pieces;
+    std::map<std::string, Wanted> wanted;
+    Stmt inner = code.stmt;
+    for (const auto& [name, use] : code.uses) wanted[name] = {};
     for (auto it = children.rbegin(); it != children.rend(); ++it) {
       const LoopedFunc& f = program_.funcs[*it];
-      if (!f.is_output && !inner.uses.count(f.name())) continue;  // not needed at this site
-      inner = emit_func_around(f, std::move(inner), bindings);
+      if (!f.is_output && !code.uses.count(f.name())) continue;  // not needed at this site
+      pieces.push_back(emit_piece(f, code, wanted, site));
     }
-    return inner;
+    for (const Piece& piece : pieces) code.lead = std::max(code.lead, piece.lead);
+    code.stmt = assemble(pieces, inner, code, site);
+    return code;
   }
 
-  // produce f; consume f { inner }
-  Emitted emit_func_around(const LoopedFunc& f, Emitted inner, Bindings& bindings) {
-    Box required;
-    if (auto use = inner.uses.find(f.name()); use != inner.uses.end()) {
-      required = use->second.box;
-      inner.uses.erase(use);
+  Stmt assemble(const std::vector<Piece>& pieces, Stmt stmt, const Emitted& code,
+                const Site& site) {
+    stmt = running_from(0, stmt, code, site);
+    for (const Piece& piece : pieces) {
+      const std::string& name = piece.f->name();
+      Stmt produce = make_producer_consumer(name, true, piece.produce);
+      Stmt consume = stmt.defined() ? make_producer_consumer(name, false, stmt) : stmt;
+      stmt = make_block({running_from(piece.lead, produce, code, site), consume});
+      if (piece.realized) stmt = realize(*piece.f, *piece.realized, stmt);
     }
-    computed_.insert(f.name());
-    Emitted result = emit_func(f, required, bindings);
-    Box allocated = std::move(result.storage[f.name()]);
-    result.storage.erase(f.name());
-    merge_footprints(result.uses, inner.uses);
-    merge_storage(result.storage, inner.storage);
-    Stmt produce = make_producer_consumer(f.name(), true, result.stmt);
-    Stmt consume =
-        inner.stmt.defined() ? make_producer_consumer(f.name(), false, inner.stmt) : inner.stmt;
-    result.stmt = make_block({produce, consume});
+    return stmt;
+  }
+
+  // What starts later than the loop around does.
+  static Stmt running_from(int lead, const Stmt& stmt, const Emitted& code, const Site& site) {
+    if (lead == code.lead || !stmt.defined()) return stmt;
+    const Loop& loop = site.around[0];
+    Expr runs = variable(loop.name) >= simplify(loop.min - lead);
+    return make_if(code.has_loops ? runs : likely(runs), stmt);
+  }
+
+  // Computes f: takes it out of what `code` uses, and adds what f itself needs.
+  Piece emit_piece(const LoopedFunc& f, Emitted& code, std::map<std::string, Wanted>& wanted,
+                   Site& site) {
+    Box required;
+    if (auto use = code.uses.find(f.name()); use != code.uses.end()) {
+      required = use->second.box;
+      code.uses.erase(use);
+    }
+    if (f.is_output) required = output_box(f, required);
+    check_bounded(program_, f, required);
+    const Wanted want = wanted[f.name()];
+    const std::vector<Loop> loops = loops_to_storage(f, site);
+    std::vector<Slide> slides;
+    if (options_.slide && !loops.empty())
+      slides = slides_of(f, site.whole(required), loops, site.around, want.first);
+    if (want.first != want.last) clamp_to_needed(required, slides, site);
+
+    Piece piece{&f, {}, slide_lead(slides, want.first, site), {}};
+    Emitted made = emit_func(f, required, slides, site);
+    Box allocated = std::move(made.storage[f.name()]);
+    made.storage.erase(f.name());
+    for (const auto& [name, use] : made.uses) note_use(wanted, code, name, piece.lead);
+    merge_footprints(code.uses, made.uses);
+    merge_storage(code.storage, made.storage);
+    code.has_loops |= made.has_loops;
+    code.has_vectors |= made.has_vectors;
     if (f.is_output) {
       outputs_[f.name()] = allocated;
-    } else if (is_stored_where_computed(f)) {
-      result.stmt = make_realize(f.name(), f.func->types, f.schedule.memory, ranges_of(allocated),
-                                 result.stmt);
     } else {
-      result.storage[f.name()] = allocated;
+      Box touched = hull(required, allocated);
+      made.stmt = fold_storage(f, touched, loops, slides, code.has_vectors, site, made.stmt);
+      if (is_stored_where_computed(f)) {
+        piece.realized = allocated;
+      } else {
+        code.storage[f.name()] = hull(code.storage[f.name()], allocated);
+      }
     }
-    return result;
+    piece.produce = made.stmt;
+    return piece;
   }
 
-  // All stages of f over `required`. The box that its storage must have comes back in storage[f].
-  Emitted emit_func(const LoopedFunc& f, Box required, Bindings& bindings) {
-    std::vector<Stmt> stmts;
-    if (f.is_output) {
-      Box buffer = buffer_box(value_buffer_name(*f.func, 0), f.func->dimensions());
-      outputs_[f.name()] = required;  // what others read of it must lie inside, too
-      required = buffer;
+  static void note_use(std::map<std::string, Wanted>& wanted, const Emitted& code,
+                       const std::string& name, int lead) {
+    auto [it, is_first] = wanted.emplace(name, Wanted{lead, lead});
+    if (is_first || !code.uses.count(name)) it->second = {lead, lead};
+    it->second.first = std::max(it->second.first, lead);
+    it->second.last = std::min(it->second.last, lead);
+  }
+
+  static int slide_lead(const std::vector<Slide>& slides, int lead, const Site& site) {
+    for (const Slide& slide : slides) {
+      if (slide.loop.name == site.around[0].name) return slide.lead;
     }
-    check_bounded(f, required);
+    return lead;
+  }
+
+  // Iterations before the first of a loop run for some consumers only; what the others would read
+  // in them may lie outside of all that is ever needed. (A part that slides begins where it must.)
+  static void clamp_to_needed(Box& required, const std::vector<Slide>& slides, Site& site) {
+    const std::string& loop = site.around[0].name;
+    const Box whole = site.whole(required), ever = ranged_over({site.around[0]}, whole);
+    for (size_t d = 0; d < required.size(); d++) {
+      bool slid = std::any_of(slides.begin(), slides.end(), [&](const Slide& slide) {
+        return slide.dimension == static_cast<int>(d) && slide.loop.name == loop;
+      });
+      if (slid) continue;
+      if (uses_variable(whole[d].min, loop)) required[d].min = max(required[d].min, ever[d].min);
+      if (uses_variable(whole[d].max, loop)) required[d].max = min(required[d].max, ever[d].max);
+    }
+  }
+
+  // Loops between the site and the storage of f, innermost first.
+  static std::vector<Loop> loops_to_storage(const LoopedFunc& f, const Site& site) {
+    std::vector<Loop> loops;
+    if (is_stored_where_computed(f) || f.is_output) return loops;
+    const LoopLevel& store = f.schedule.store_level;
+    for (const Loop& loop : site.around) {
+      if (store.kind == LoopLevel::Kind::At &&
+          loop.name.compare(0, store.func.size() + 2, store.func + ".s") == 0 &&
+          store.var == loop.var)
+        break;
+      loops.push_back(loop);
+    }
+    return loops;
+  }
+
+  Box output_box(const LoopedFunc& f, const Box& read) {
+    check_storage_of_output(f);
+    outputs_[f.name()] = read;  // what others read of it must lie inside, too
+    return buffer_box(value_buffer_name(*f.func, 0), f.func->dimensions());
+  }
+
+  // All stages of f over `required`, or the parts of it that slides leave. The box that its storage
+  // must have comes back in storage[f].
+  Emitted emit_func(const LoopedFunc& f, Box required, const std::vector<Slide>& slides,
+                    Site& site) {
+    std::vector<Stmt> stmts;
     apply_promised_bounds(f, required, stmts);
     Emitted result;
     std::vector<Stmt> stages(f.stages.size());
     Box need = required;
     for (int s = static_cast<int>(f.stages.size()) - 1; s >= 0; s--) {
-      Emitted stage = emit_stage(f, s, bind_domain(f, s, need, bindings));
+      bool is_last = s == static_cast<int>(f.stages.size()) - 1;
+      Domain domain = bind_domain(f, s, need, is_last ? slides : std::vector<Slide>(), site);
+      Emitted stage = emit_stage(f, s, domain);
       if (auto self = stage.uses.find(f.name()); self != stage.uses.end()) {
         need = hull(need, self->second.box);
-        check_bounded(f, need);
+        check_bounded(program_, f, need);
         stage.uses.erase(self);
       }
       stages[s] = stage.stmt;
       merge_footprints(result.uses, stage.uses);
       merge_storage(result.storage, stage.storage);
+      result.has_loops |= stage.has_loops;
+      result.has_vectors |= stage.has_vectors;
     }
     stmts.insert(stmts.end(), stages.begin(), stages.end());
     result.stmt = make_block(std::move(stmts));
-    for (Interval& side : need) side = {simplify(side.min), simplify(side.max)};
+    need = simplified(std::move(need));
     if (f.is_output) need = hull(need, outputs_[f.name()]);
     result.storage[f.name()] = std::move(need);
     return result;
   }
 
-  void check_bounded(const LoopedFunc& f, const Box& box) const {
-    for (size_t d = 0; d < box.size(); d++) {
-      if (box[d].is_bounded()) continue;
-      user_error(text("compute ", quoted(f.name())),
-                 "the region of a Func that its consumers read must be bounded",
-                 text("dimension ", d, " (", quoted(f.func->args[d]), ") is read without a ",
-                      box[d].has_lower_bound() ? "upper" : "lower", " bound by ", consumers_of(f)),
-                 "Clamp the index that depends on data, as in clamp(index, 0, extent - 1), or "
-                 "promise its range with "
-                 "unsafe_promise_clamped");
-    }
-  }
-
-  std::string consumers_of(const LoopedFunc& f) const {
-    std::string names;
-    for (const LoopedFunc& other : program_.funcs) {
-      for (const FuncPtr& callee : direct_callees(*other.func)) {
-        if (callee == f.func) names += (names.empty() ? "" : ", ") + quoted(other.name());
-      }
-    }
-    return names.empty() ? quoted(f.name()) : names;
-  }
+  // ---- what users promise or want of bounds ----
 
   // Func::bound: the loops cover exactly what was promised; a check makes sure that it is enough.
+  // Func::align_bounds and align_extent: they cover more.
   void apply_promised_bounds(const LoopedFunc& f, Box& box, std::vector<Stmt>& checks) const {
     for (const Bound& bound : f.schedule.bounds) {
       size_t d =
           std::find(f.func->args.begin(), f.func->args.end(), bound.var) - f.func->args.begin();
       RETROGRADE_ASSERT(d < box.size(), "bound on an unknown dimension");
-      Interval promised;
-      promised.min = bound.min.defined() ? bound.min : box[d].min;
-      promised.max = simplify(promised.min + bound.extent - 1);
-      checks.push_back(bound_check(f, static_cast<int>(d), box[d], promised));
-      box[d] = promised;
+      if (bound.extent.defined()) {
+        Interval promised;
+        promised.min = bound.min.defined() ? bound.min : box[d].min;
+        promised.max = simplify(promised.min + bound.extent - 1);
+        checks.push_back(bound_check(f, static_cast<int>(d), box[d], promised));
+        box[d] = promised;
+      }
+      if (bound.modulus.defined()) box[d] = aligned(box[d], bound);
     }
   }
 
-  static Stmt bound_check(const LoopedFunc& f, int d, const Interval& required,
-                          const Interval& promised) {
-    Expr holds = simplify(promised.min <= required.min && required.max <= promised.max);
-    std::vector<Expr> error = {Expr(int32_t{retrograde_error_explicit_bounds_too_small}),
-                               Expr(text("cannot compute ", quoted(f.name()), ": its dimension ", d,
-                                         " (", quoted(f.func->args[d]), ") was bounded to [")),
-                               promised.min,
-                               Expr(", "),
-                               promised.max,
-                               Expr("], but its consumers need ["),
-                               required.min,
-                               Expr(", "),
-                               required.max,
-                               Expr("]. Bound it to what they read.")};
-    return make_assert(holds, call_op(Op::error, Int(32), error));
+  static Interval aligned(Interval range, const Bound& bound) {
+    const Expr &m = bound.modulus, &r = bound.remainder;
+    if (r.defined()) range.min = simplify((range.min - r) / m * m + r);
+    Expr extent = range.max - range.min + 1;
+    range.max = simplify(range.min + (extent + m - 1) / m * m - 1);
+    return range;
   }
 
   // ---- one stage ----
 
   // Names the region of a stage, and gives it in terms of the names. `need` becomes the same.
-  Domain bind_domain(const LoopedFunc& f, int s, Box& need, Bindings& bindings) const {
+  static Domain bind_domain(const LoopedFunc& f, int s, Box& need, const std::vector<Slide>& slides,
+                            Site& site) {
     Domain domain;
     const std::string prefix = stage_prefix(f.name(), s);
-    for (size_t d = 0; d < need.size(); d++)
-      domain[f.func->args[d]] = bind(prefix + f.func->args[d], need[d], bindings);
+    for (size_t d = 0; d < need.size(); d++) {
+      auto slide = std::find_if(slides.begin(), slides.end(), [&](const Slide& candidate) {
+        return candidate.dimension == static_cast<int>(d);
+      });
+      const std::string& arg = f.func->args[d];
+      domain[arg] = slide == slides.end() ? site.bind(prefix + arg, need[d])
+                                          : site.bind_part(prefix + arg, *slide, need[d]);
+    }
     for (const ReductionVariable& r : f.stages[s].rvars) {
       Expr min = cast(Int(32), r.min), extent = cast(Int(32), r.extent);
       Interval range{min, simplify(min + extent - 1)};
-      domain[r.var] = bind(prefix + r.var, range, bindings);
+      domain[r.var] = site.bind(prefix + r.var, range);
     }
     return domain;
-  }
-
-  static Range bind(const std::string& name, Interval& range, Bindings& bindings) {
-    Expr extent = simplify(range.max - range.min + 1);
-    range.min = bind(name + ".min", simplify(range.min), bindings);
-    if (is_const(extent)) {
-      range.max = simplify(range.min + extent - 1);
-    } else {
-      range.max = bind(name + ".max", simplify(range.max), bindings);
-      extent = simplify(range.max - range.min + 1);
-    }
-    return {range.min, extent};
-  }
-
-  static Expr bind(const std::string& name, const Expr& value, Bindings& bindings) {
-    if (is_trivial(value)) return value;
-    bindings.emplace_back(name, value);
-    return variable(name);
   }
 
   Emitted emit_stage(const LoopedFunc& f, int s, const Domain& domain) {
@@ -295,16 +365,28 @@ class NestEmitter {
     Emitted code;
     code.stmt = emit_definition(f, s, nest);
     code.uses = requirements_of(f, s, nest, values_);
-    code = emit_children(computed_innermost_in(f), std::move(code));
-    for (const Loop& loop : nest.loops) {
-      code = emit_children(children_at(f, s, loop), std::move(code));
+    code = emit_children(computed_innermost_in(f), std::move(code), nest.loops, 0);
+    for (size_t i = 0; i < nest.loops.size(); i++) {
+      const Loop& loop = nest.loops[i];
+      code = emit_children(children_at(f, s, loop), std::move(code), nest.loops, i);
       code = store_here(f, s, loop, std::move(code));
-      check_no_shared_storage(f, loop, code);
-      code.stmt = make_for(loop.name, loop.min, loop.extent, loop.for_type, code.stmt);
-      code.unranged.push_back(loop);
+      if (loop.for_type == ForType::Parallel && !code.storage.empty())
+        check_no_shared_storage(f, loop, code.storage.begin()->first);
+      wrap(loop, code);
     }
     range_over_loops(code);
     return code;
+  }
+
+  static void wrap(const Loop& loop, Emitted& code) {
+    Expr min = code.lead > 0 ? simplify(loop.min - code.lead) : loop.min;
+    Expr extent = code.lead > 0 ? simplify(loop.extent + code.lead) : loop.extent;
+    code.stmt = make_for(loop.name, min, extent, loop.for_type, code.stmt);
+    code.lead = 0;
+    code.unranged.push_back(loop);
+    code.has_loops |= loop.for_type == ForType::Parallel ||
+                      (loop.for_type == ForType::Serial && !is_one(loop.extent));
+    code.has_vectors |= loop.for_type == ForType::Vectorized;
   }
 
   // An update that reads its own Func does not compute it again.
@@ -325,19 +407,94 @@ class NestEmitter {
     return children;
   }
 
-  // Funcs computed just outside `code` and inside the next loop; their bounds are bound around
-  // them.
-  Emitted emit_children(const std::vector<int>& children, Emitted code) {
+  // Funcs computed just outside `code` and inside loops[i]; their bounds are bound around them.
+  Emitted emit_children(const std::vector<int>& children, Emitted code,
+                        const std::vector<Loop>& loops, size_t i) {
     bool any = std::any_of(children.begin(), children.end(),
-                           [&](int i) { return code.uses.count(program_.funcs[i].name()); });
+                           [&](int c) { return code.uses.count(program_.funcs[c].name()); });
     if (!any) return code;
     range_over_loops(code);
-    Bindings bindings;
-    code = emit_site(children, std::move(code), bindings);
-    for (auto it = bindings.rbegin(); it != bindings.rend(); ++it)
+    Site site({loops.begin() + i, loops.end()});
+    code = emit_site(children, std::move(code), site);
+    for (auto it = site.bindings.rbegin(); it != site.bindings.rend(); ++it)
       code.stmt = make_let(it->first, it->second, code.stmt);
-    expand_bindings(code, bindings);
+    if (site.has_names()) map_boxes(code, [&](const Box& box) { return site.whole(box); });
     return code;
+  }
+
+  // ---- storage ----
+
+  // `touched`: by the code of the site, in terms of its names.
+  Stmt fold_storage(const LoopedFunc& f, const Box& touched, const std::vector<Loop>& loops,
+                    const std::vector<Slide>& slides, bool is_vectorized, Site& site, Stmt stmt) {
+    std::vector<FoldingLoop> windows;
+    if (options_.slide && !loops.empty()) {
+      windows.push_back({loops[0], site.touched(touched)});
+      Box whole = site.whole(touched);
+      for (size_t i = 1; i < loops.size(); i++) {
+        whole = ranged_over({loops[i - 1]}, std::move(whole));
+        windows.push_back({loops[i], whole});
+      }
+    }
+    std::vector<Fold> folds = folds_of(f, windows, slides, site.around, is_vectorized);
+    for (size_t d = 0; d < folds.size(); d++) {
+      if (folds[d].touched.defined())
+        stmt = make_block(
+            {fold_check(f, static_cast<int>(d), folds[d].touched, folds[d].factor), stmt});
+    }
+    note_folds(f, std::move(folds));
+    return stmt;
+  }
+
+  // A Func that is computed at several places folds where all of them allow it.
+  void note_folds(const LoopedFunc& f, std::vector<Fold> folds) {
+    auto [it, is_first] = folds_.emplace(f.name(), folds);
+    for (size_t d = 0; d < folds.size() && !is_first; d++) {
+      Expr& factor = it->second[d].factor;
+      if (factor.defined() && folds[d].factor.defined()) {
+        factor = simplify(max(factor, folds[d].factor));
+      } else {
+        factor = Expr();
+      }
+    }
+  }
+
+  static const StorageRule* rule_of(const LoopedFunc& f, size_t d) {
+    for (const StorageRule& rule : f.schedule.storage_rules) {
+      if (rule.var == f.func->args[d]) return &rule;
+    }
+    return nullptr;
+  }
+
+  Stmt realize(const LoopedFunc& f, const Box& box, Stmt stmt) {
+    std::vector<Range> ranges;
+    std::vector<Stmt> checks;
+    for (size_t d = 0; d < box.size(); d++) {
+      Range range{box[d].min, simplify(box[d].max - box[d].min + 1)};
+      Expr& factor = folds_.at(f.name())[d].factor;
+      auto extent = as_const_int(range.extent), fold = as_const_int(factor.defined() ? factor : 0);
+      if (extent && fold && *extent <= *fold) factor = Expr();  // nothing to gain
+      if (const StorageRule* rule = rule_of(f, d)) apply(*rule, f, d, range, factor, checks);
+      ranges.push_back(range);
+    }
+    checks.push_back(make_realize(f.name(), f.func->types, f.schedule.memory, ranges, stmt));
+    return make_block(checks);
+  }
+
+  static void apply(const StorageRule& rule, const LoopedFunc& f, size_t d, Range& range,
+                    Expr& factor, std::vector<Stmt>& checks) {
+    const int dimension = static_cast<int>(d);
+    if (rule.fold.defined() && !factor.defined()) {  // no loop hands it on: it must hold all
+      checks.push_back(fold_check(f, dimension, range.extent, rule.fold));
+      factor = rule.fold;
+    }
+    if (rule.bound.defined()) {
+      checks.push_back(storage_check(f, dimension, range.extent, rule.bound));
+      range.extent = rule.bound;
+    }
+    if (rule.alignment.defined())
+      range.extent =
+          simplify((range.extent + rule.alignment - 1) / rule.alignment * rule.alignment);
   }
 
   Emitted store_here(const LoopedFunc& f, int s, const Loop& loop, Emitted code) {
@@ -356,8 +513,7 @@ class NestEmitter {
     for (auto it = code.storage.begin(); it != code.storage.end();) {
       const LoopedFunc& f = *program_.find(it->first);
       if (is_here(f.schedule.store_level)) {
-        stmt =
-            make_realize(f.name(), f.func->types, f.schedule.memory, ranges_of(it->second), stmt);
+        stmt = realize(f, simplified(it->second), stmt);
         it = code.storage.erase(it);
       } else {
         ++it;
@@ -366,52 +522,20 @@ class NestEmitter {
     return stmt;
   }
 
-  void check_no_shared_storage(const LoopedFunc& f, const Loop& loop, const Emitted& code) const {
-    if (loop.for_type != ForType::Parallel || code.storage.empty()) return;
-    const std::string& g = code.storage.begin()->first;
-    user_error(
-        text("store ", quoted(g), " outside of the parallel loop over ", quoted(loop.var), " of ",
-             quoted(f.name())),
-        "iterations of a parallel loop must not share the storage of what each of them computes",
-        text(quoted(g), " is computed inside that loop"),
-        text("Store ", quoted(g), " at ", quoted(loop.var),
-             " or deeper, or compute it outside of the loop"));
-  }
-
   // ---- what is left at root ----
-
-  std::string loops_of(const std::string& func) const {
-    const LoopedFunc* f = program_.find(func);
-    if (!f) return text(quoted(func), " has no loops: it is inlined or not part of this pipeline");
-    std::string names;
-    for (size_t s = 0; s < f->stages.size(); s++) {
-      for (const Dim& dim : f->stages[s].schedule.dims)
-        names += (names.empty() ? "" : ", ") + quoted(dim.var);
-    }
-    return text("the loops of ", quoted(func), " are ", names.empty() ? "none" : names);
-  }
 
   void check_everything_found_its_place(const Emitted& all) const {
     for (const LoopedFunc& f : program_.funcs) {
-      const LoopLevel& level = f.schedule.compute_level;
-      bool is_left = all.uses.count(f.name()) || all.storage.count(f.name());
-      if (!is_left) continue;
       bool is_stored = all.storage.count(f.name());
-      const LoopLevel& asked = is_stored ? f.schedule.store_level : level;
-      user_error(
-          text(is_stored ? "store " : "compute ", quoted(f.name()), " at ", quoted(asked.var),
-               " of ", quoted(asked.func)),
-          text("a Func must be ", is_stored ? "stored" : "computed",
-               " at a loop that encloses every use of it",
-               is_stored ? " and its compute level" : ""),
-          text(loops_of(asked.func), ", and ", quoted(f.name()), " is used by ", consumers_of(f)),
-          "Name a loop that encloses all of these uses, or call compute_root()");
+      if (is_stored || all.uses.count(f.name())) check_found_its_place(program_, f, is_stored);
     }
   }
 };
 
 }  // namespace
 
-LoopNests build_loop_nests(const Program& program) { return NestEmitter(program).emit(); }
+LoopNests build_loop_nests(const Program& program, const LoopNestOptions& options) {
+  return NestEmitter(program, options).emit();
+}
 
 }  // namespace retrograde::ir

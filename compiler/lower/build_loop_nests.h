@@ -16,10 +16,10 @@
 // body, `uses` holds the box that everything below reads of each Func, in terms of the loop
 // variables above. At a loop where a Func is to be computed its box is final: its loops are emitted
 // there, and what it reads joins `uses`. Each Func is visited once per place it is computed and
-// each box is bound to a name at its site, so time and code grow linearly with the pipeline. Not
-// done: sliding windows and storage folding (a Func stored outside of where it is computed is
-// computed whole each time). Source: the scheduling model of Ragan-Kelley et al., PLDI 2013,
-// section 4.2; the single bottom-up walk is ours. Tests: test/unit/lower_*_test.cpp, test/property.
+// each box is bound to a name at its site, so time and code grow linearly with the pipeline. A Func
+// stored further out than it is computed slides (sliding_window.h) and folds (storage_folding.h).
+// Source: the scheduling model of Ragan-Kelley et al., PLDI 2013, section 4.2; the single bottom-up
+// walk is ours. Tests: test/unit/loop_nest_test.cpp, sliding_window_test.cpp, test/property.
 #pragma once
 
 #include <string>
@@ -39,11 +39,17 @@ struct LoopNests {
   Stmt body;
   Requirements images;                 // what is read of each input
   std::map<std::string, Box> outputs;  // what is written or read of each output Func
+  std::map<std::string, std::vector<Expr>>
+      folds;  // of Funcs: after how many coordinates each dimension wraps around, or undefined
+};
+
+struct LoopNestOptions {
+  bool slide = true;  // false: each Func computed whole wherever it is computed, as users wrote it
 };
 
 // UserError: a compute or storage level that is no loop around every use, an unbounded region, a
 // Func stored outside of a parallel loop in which it is computed.
-LoopNests build_loop_nests(const Program& program);
+LoopNests build_loop_nests(const Program& program, const LoopNestOptions& options = {});
 
 // "out" -> [out.min.d, out.min.d + out.extent.d - 1] in every dimension
 Box buffer_box(const std::string& buffer, int dimensions);

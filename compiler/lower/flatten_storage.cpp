@@ -13,7 +13,7 @@
 // Method: one rewriting walk; each Realize puts its strides in scope. Constant minima and strides
 //         are substituted right away, so that indices of Funcs with constant bounds are free of
 //         them.
-// Not done: padding of strides, folding of dimensions.
+// A dimension that folds is addressed modulo its factor, from 0 on, and as large.
 // Source: folklore. Tests: test/golden/lower/flatten_storage/.
 #include "lower/flatten_storage.h"
 
@@ -45,7 +45,7 @@ bool is_undef(const Expr& e) {
 
 // What addressing needs to know of a buffer: an Expr per dimension.
 struct Layout {
-  std::vector<Expr> mins, strides;
+  std::vector<Expr> mins, strides, folds;
 };
 
 // What the whole statement says about names, found before any rewriting.
@@ -72,8 +72,8 @@ Usage find_usage(const Stmt& s) {
 
 class Flattener : public Rewriter {
  public:
-  Flattener(const Stmt& s, const StorageOrder& order)
-      : order_(order), usage_(find_usage(s)), fresh_(s) {}
+  Flattener(const Stmt& s, const StorageLayouts& layouts)
+      : asked_(layouts), usage_(find_usage(s)), fresh_(s) {}
 
  protected:
   Expr rewrite(const Expr& e) override {
@@ -113,6 +113,8 @@ class Flattener : public Rewriter {
       Expr min = known ? realized->second.mins[d] : variable(fact(buffer, "min", d));
       Expr stride = known ? realized->second.strides[d] : variable(fact(buffer, "stride", d));
       Expr offset = binary(Kind::Sub, cast_to(Int(32), args[d]), min);
+      if (known && realized->second.folds[d].defined())
+        offset = binary(Kind::Mod, offset, realized->second.folds[d]);
       index = binary(Kind::Add, index, binary(Kind::Mul, offset, stride));
     }
     return index;
@@ -121,15 +123,23 @@ class Flattener : public Rewriter {
   // ---- Realize ----
 
   std::vector<int> storage_order(const std::string& func, size_t dimensions) const {
-    auto it = order_.find(func);
-    if (it != order_.end()) {
-      RETROGRADE_ASSERT(it->second.size() == dimensions, "storage order of ", func, " has ",
-                        it->second.size(), " of ", dimensions, " dimensions");
-      return it->second;
+    auto it = asked_.find(func);
+    if (it != asked_.end() && !it->second.order.empty()) {
+      RETROGRADE_ASSERT(it->second.order.size() == dimensions, "storage order of ", func, " has ",
+                        it->second.order.size(), " of ", dimensions, " dimensions");
+      return it->second.order;
     }
     std::vector<int> order(dimensions);
     std::iota(order.begin(), order.end(), 0);
     return order;
+  }
+
+  std::vector<Expr> folds_of(const std::string& func, size_t dimensions) const {
+    auto it = asked_.find(func);
+    std::vector<Expr> folds;
+    if (it != asked_.end()) folds = it->second.folds;
+    folds.resize(dimensions);
+    return folds;
   }
 
   struct Binding {
@@ -148,9 +158,12 @@ class Flattener : public Rewriter {
     Layout layout;
     layout.strides.resize(n.bounds.size());
     std::vector<Expr> extents;
+    layout.folds = folds_of(n.name, n.bounds.size());
     for (size_t d = 0; d < n.bounds.size(); ++d) {
-      layout.mins.push_back(bind(fact(n.name, "min", d), (*this)(n.bounds[d].min), bindings));
-      Expr extent = (*this)(n.bounds[d].extent);
+      const Expr& fold = layout.folds[d];
+      Expr min = fold.defined() ? Expr(0) : (*this)(n.bounds[d].min);
+      layout.mins.push_back(bind(fact(n.name, "min", d), min, bindings));
+      Expr extent = fold.defined() ? fold : (*this)(n.bounds[d].extent);
       bool is_named = usage_.variables.count(fact(n.name, "extent", d)) > 0;
       extents.push_back(is_named ? bind(fact(n.name, "extent", d), extent, bindings) : extent);
     }
@@ -217,7 +230,7 @@ class Flattener : public Rewriter {
     return found;
   }
 
-  const StorageOrder& order_;
+  const StorageLayouts& asked_;
   const Usage usage_;
   FreshNames fresh_;
   std::unordered_map<std::string, Layout> layouts_;
@@ -225,6 +238,8 @@ class Flattener : public Rewriter {
 
 }  // namespace
 
-Stmt flatten_storage(const Stmt& s, const StorageOrder& order) { return Flattener(s, order)(s); }
+Stmt flatten_storage(const Stmt& s, const StorageLayouts& layouts) {
+  return Flattener(s, layouts)(s);
+}
 
 }  // namespace retrograde::ir

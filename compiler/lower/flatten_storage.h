@@ -10,9 +10,12 @@
 
 namespace retrograde::ir {
 
-// Func name -> its dimensions in storage order, innermost first. A Func that is missing is stored
-// with dimension 0 innermost.
-using StorageOrder = std::map<std::string, std::vector<int>>;
+// How the storage of a Func is laid out. Empty vectors: dimension 0 innermost, nothing wraps around.
+struct StorageLayout {
+  std::vector<int> order;   // dimensions, innermost first
+  std::vector<Expr> folds;  // per dimension: coordinates modulo this; undefined: as they are
+};
+using StorageLayouts = std::map<std::string, StorageLayout>;  // by Func; a missing one is plain
 
 // Loops -> FlatStorage. Names afterwards:
 //   Realize of "f"           Allocate "f". "f.min.d" and, for all but the innermost dimension,
@@ -22,6 +25,6 @@ using StorageOrder = std::map<std::string, std::vector<int>>;
 //   Func without a Realize   an output: buffer "f" ("f.0", ... when it has several values), whose
 //                            facts "<buffer>.min.d" and "<buffer>.stride.d" the caller binds
 //   image "in"               the same: buffer "in"
-Stmt flatten_storage(const Stmt& s, const StorageOrder& order = {});
+Stmt flatten_storage(const Stmt& s, const StorageLayouts& layouts = {});
 
 }  // namespace retrograde::ir

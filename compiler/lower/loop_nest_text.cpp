@@ -79,7 +79,7 @@ std::string loop_nest_text(const std::vector<FuncPtr>& outputs) {
   std::string result;
   run_on_large_stack([&] {
     Program program = inline_functions(outputs);
-    result = LoopNestPrinter().print(build_loop_nests(program).body);
+    result = LoopNestPrinter().print(build_loop_nests(program, {.slide = false}).body);
   });
   return result;
 }

@@ -29,6 +29,7 @@ struct Lowering {
   const std::vector<LoweredArgument>& args;
   Program program;
   std::map<std::string, std::string> renamed_funcs;  // new name -> name in the program
+  std::map<std::string, std::vector<Expr>> folds;    // see LoopNests
   const LowerOptions& options;
 };
 
@@ -38,26 +39,27 @@ struct Pass {
   Stmt (*run)(Lowering&, const Stmt&);
 };
 
-StorageOrder storage_order(const Lowering& lowering) {
-  StorageOrder order;
+StorageLayouts storage_layouts(const Lowering& lowering) {
+  StorageLayouts layouts;
   for (const LoopedFunc& f : lowering.program.funcs) {
-    if (f.schedule.storage_dims.empty() || f.schedule.storage_dims == f.func->args) continue;
-    std::vector<int>& dims = order[f.name()];
+    StorageLayout& layout = layouts[f.name()];
+    if (auto it = lowering.folds.find(f.name()); it != lowering.folds.end())
+      layout.folds = it->second;
     for (const std::string& var : f.schedule.storage_dims)
-      dims.push_back(static_cast<int>(std::find(f.func->args.begin(), f.func->args.end(), var) -
-                                      f.func->args.begin()));
+      layout.order.push_back(
+          static_cast<int>(std::find(f.func->args.begin(), f.func->args.end(), var) -
+                           f.func->args.begin()));
   }
-  for (const auto& [name, original] : lowering.renamed_funcs) {
-    if (auto it = order.find(original); it != order.end()) order[name] = it->second;
-  }
-  return order;
+  for (const auto& [name, original] : lowering.renamed_funcs) layouts[name] = layouts[original];
+  return layouts;
 }
 
 Stmt nest_loops(Lowering& lowering, const Stmt&) {
   lowering.program = inline_functions(lowering.outputs);
-  Stmt nests =
-      add_argument_checks(build_loop_nests(lowering.program), lowering.args, lowering.program);
-  UniqueNames unique = make_names_unique(nests);
+  LoopNests nests = build_loop_nests(lowering.program);
+  lowering.folds = nests.folds;
+  UniqueNames unique =
+      make_names_unique(add_argument_checks(nests, lowering.args, lowering.program));
   lowering.renamed_funcs = std::move(unique.original);
   return unique.stmt;
 }
@@ -72,7 +74,7 @@ constexpr Pass passes[] = {
        return drops ? drop_bounds_query(s) : s;
      }},
     {"flatten_storage", Phase::FlatStorage,
-     [](Lowering& lowering, const Stmt& s) { return flatten_storage(s, storage_order(lowering)); }},
+     [](Lowering& lowering, const Stmt& s) { return flatten_storage(s, storage_layouts(lowering)); }},
     {"simplify_storage", Phase::FlatStorage, run_simplify},
     {"partition_loops", Phase::FlatStorage,
      [](Lowering&, const Stmt& s) { return partition_loops(s); }},
@@ -132,7 +134,7 @@ LoweredFunction lower(const std::string& name, const std::vector<FuncPtr>& outpu
   LoweredFunction function{name, inputs, {}};
   run_on_large_stack([&] {
     append_outputs(outputs, function.args);
-    Lowering lowering{outputs, function.args, {}, {}, options};
+    Lowering lowering{outputs, function.args, {}, {}, {}, options};
     function.body = run_passes(lowering, options);
   });
   return function;

@@ -163,4 +163,22 @@ StageNest build_stage_nest(const LoopedFunc& f, int stage, const Domain& domain)
   return NestBuilder(f, stage, domain).build();
 }
 
+bool covers_exactly(const LoopedFunc& f, int stage, const std::string& var, const Expr& extent) {
+  Domain domain;
+  for (const std::string& arg : f.func->args)
+    domain[arg] = {variable(arg + ".first"), variable(arg + ".extent")};
+  for (const ReductionVariable& r : f.stages[stage].rvars)
+    domain[r.var] = {cast(Int(32), r.min), cast(Int(32), r.extent)};
+  const Expr first = domain[var].min;
+  domain[var].extent = extent;
+  StageNest nest = build_stage_nest(f, stage, domain);
+  Scope<Interval> loops;
+  for (const Loop& loop : nest.loops) loops.push(loop.name, loop.range());
+  Interval reached = bounds_of(nest.guarded_coordinate.at(var), loops);
+  BoundsMap facts;
+  if (const Variable* name = extent.as<Variable>()) facts[name->name] = {1, {}};
+  return reached.is_bounded() && can_prove(reached.min >= first, facts) &&
+         can_prove(reached.max < first + extent, facts);
+}
+
 }  // namespace retrograde::ir

@@ -1,0 +1,121 @@
+// Sums in linear form first, so that a variable that cancels is gone; then a rule for each atom.
+#include "analysis/monotonic.h"
+
+#include <unordered_map>
+
+#include "analysis/linear.h"
+#include "ir/build.h"
+#include "ir/visit.h"
+
+namespace retrograde::ir {
+namespace {
+
+Monotonic reversed(Monotonic m) {
+  if (m == Monotonic::Increasing) return Monotonic::Decreasing;
+  return m == Monotonic::Decreasing ? Monotonic::Increasing : m;
+}
+
+// Of an operation that increases in both operands.
+Monotonic both(Monotonic a, Monotonic b) {
+  if (a == Monotonic::Constant) return b;
+  return b == Monotonic::Constant || a == b ? a : Monotonic::Unknown;
+}
+
+class Direction {
+ public:
+  explicit Direction(const std::string& variable) : variable_(variable) {}
+
+  Monotonic of(const Expr& e) {
+    auto it = memo_.find(e.get());
+    if (it != memo_.end()) return it->second;
+    Monotonic result = has_linear_form(e.type()) ? of_sum(e) : of_atom(e);
+    return memo_[e.get()] = result;
+  }
+
+ private:
+  const std::string& variable_;
+  std::unordered_map<const ExprNode*, Monotonic> memo_;
+  std::vector<Expr> alive_;  // keys of memo_ that were made here
+
+  Monotonic of_sum(const Expr& e) {
+    const LinearForm form = linear_form(e);
+    Monotonic result = Monotonic::Constant;
+    for (const LinearTerm& term : form.terms) {
+      alive_.push_back(term.atom);
+      Monotonic part = term.atom.same_as(e) ? of_atom(e) : of_term(term.atom);
+      result = both(result, term.coefficient < 0 ? reversed(part) : part);
+    }
+    return result;
+  }
+
+  // What linear_form called an atom is not taken apart again.
+  Monotonic of_term(const Expr& atom) {
+    auto it = memo_.find(atom.get());
+    return it != memo_.end() ? it->second : memo_[atom.get()] = of_atom(atom);
+  }
+
+  Monotonic of_atom(const Expr& e) {
+    return match(
+        e,
+        [&](const Variable& v) {
+          return v.name == variable_ ? Monotonic::Increasing : Monotonic::Constant;
+        },
+        [&](const Cast& n) { return of_cast(n); },
+        [&](const Binary& n) { return of_binary(e.kind(), n); },
+        [&](const Select& n) {
+          Monotonic arms = both(of(n.true_value), of(n.false_value));
+          return of(n.condition) == Monotonic::Constant ? arms : Monotonic::Unknown;
+        },
+        [&](const Call& n) { return of_call(e, n); },
+        [&](const ExprNode&) { return constant_or_unknown(e); });
+  }
+
+  Monotonic constant_or_unknown(const Expr& e) const {
+    bool reads = false;  // what a Func holds may change from one iteration to the next
+    walk(e, [&](const Expr& node) {
+      const Call* call = node.as<Call>();
+      reads |= (call && call->call_type == CallType::Func) || node.kind() == Kind::Load;
+      return !reads;
+    });
+    bool is_constant = !reads && !uses_variable(e, variable_);
+    return is_constant ? Monotonic::Constant : Monotonic::Unknown;
+  }
+
+  Monotonic of_cast(const Cast& n) {
+    Monotonic value = of(n.value);
+    bool keeps_order = n.type.can_represent(n.value.type());
+    return keeps_order || value == Monotonic::Constant ? value : Monotonic::Unknown;
+  }
+
+  Monotonic of_binary(Kind kind, const Binary& n) {
+    Monotonic a = of(n.a), b = of(n.b);
+    if (a == Monotonic::Constant && b == Monotonic::Constant) return a;
+    auto sign = as_const_int(n.b);
+    switch (kind) {
+      case Kind::Min:
+      case Kind::Max:
+        return both(a, b);
+      case Kind::Mul:
+      case Kind::Div:
+        if (!sign || *sign == 0 || !has_linear_form(n.type)) return Monotonic::Unknown;
+        return *sign > 0 ? a : reversed(a);
+      default:
+        return Monotonic::Unknown;
+    }
+  }
+
+  Monotonic of_call(const Expr& e, const Call& n) {
+    if (n.is_op(Op::likely) || n.is_op(Op::likely_if_innermost)) return of(n.args[0]);
+    if (n.is_op(Op::promise_clamped) || n.is_op(Op::unsafe_promise_clamped))
+      return both(of(n.args[0]), both(of(n.args[1]), of(n.args[2])));
+    return constant_or_unknown(e);
+  }
+};
+
+}  // namespace
+
+Monotonic monotonic(const Expr& e, const std::string& variable) {
+  return Direction(variable).of(e);
+}
+
+}  // namespace retrograde::ir

@@ -1,0 +1,305 @@
+// Funcs that are stored further out than they are computed: every point is computed once, storage
+// wraps around, and results are those of the unscheduled pipeline.
+#include <gtest/gtest.h>
+
+#include <functional>
+#include <map>
+#include <mutex>
+#include <string>
+
+#include "ir/build.h"
+#include "ir/visit.h"
+#include "lower/lower.h"
+#include "retrograde/retrograde.h"
+
+namespace retrograde {
+namespace {
+
+// Points computed, by Func: each definition under test prints its name.
+std::map<std::string, int> computed;
+std::mutex lock;
+void count_line(void*, const char* text) {
+  std::lock_guard<std::mutex> guard(lock);
+  std::string line(text);  // "<value> <name>\n"
+  line.erase(line.find_last_not_of('\n') + 1);
+  computed[line.substr(line.rfind(' ') + 1)]++;
+}
+
+// Elements allocated for a Func, when that is a constant.
+int64_t stored_elements(const Func& output, const std::string& name) {
+  int64_t elements = -1;
+  ir::LowerOptions options;
+  options.stop_after = "simplify_storage";
+  ir::LoweredFunction lowered =
+      ir::lower("test", {output.function()}, ir::infer_arguments({output.function()}), options);
+  ir::walk(
+      lowered.body, [](const Expr&) { return false; },
+      [&](const Stmt& s) {
+        const ir::Allocate* n = s.as<ir::Allocate>();
+        if (n && n->name.substr(0, n->name.find('$')) == name)
+          elements = ir::as_const_int(n->elements).value_or(-1);
+        return true;
+      });
+  return elements;
+}
+
+Expr counted(const char* name, const Expr& e) { return print(e, name); }
+
+constexpr int width = 24, height = 17;
+
+class SlidingWindow : public testing::Test {
+ protected:
+  void SetUp() override { computed.clear(); }
+
+  // `make(false)` is the program without a schedule.
+  // Gives the scheduled program.
+  static Func expect_same(const std::function<Func(bool)>& make, int w = width, int h = height) {
+    Buffer<int> expected = make(false).realize({w, h});
+    Func scheduled = make(true);
+    scheduled.set_custom_print(count_line);
+    computed.clear();
+    Buffer<int> found = scheduled.realize({w, h});
+    for (int j = 0; j < h; ++j) {
+      for (int i = 0; i < w; ++i) EXPECT_EQ(expected(i, j), found(i, j)) << "at " << i << ", " << j;
+    }
+    return scheduled;
+  }
+
+  Var x{"x"}, y{"y"}, xi{"xi"}, yi{"yi"}, xo{"xo"}, yo{"yo"};
+};
+
+TEST_F(SlidingWindow, ComputesEachRowOnce) {
+  Func g = expect_same([&](bool scheduled) {
+    Func f("f"), g("g");
+    f(x, y) = counted("f", x * 3 + y * y);
+    g(x, y) = f(x, y - 1) + f(x, y + 1) * 2;
+    g.bound(x, 0, width);
+    if (scheduled) f.store_root().compute_at(g, y);
+    return g;
+  });
+  EXPECT_EQ(computed["f"], width * (height + 2));
+  EXPECT_EQ(stored_elements(g, "f"), width * 4);  // three rows are alive
+}
+
+TEST_F(SlidingWindow, SlidesInBothDimensions) {
+  expect_same([&](bool scheduled) {
+    Func f("f"), g("g");
+    f(x, y) = counted("f", x * 3 + y * y);
+    g(x, y) = f(x - 1, y - 1) + f(x + 1, y + 1) * 2;
+    if (scheduled) f.store_root().compute_at(g, x);
+    return g;
+  });
+  EXPECT_EQ(computed["f"], (width + 2) * (height + 2));
+}
+
+TEST_F(SlidingWindow, ChainsSlideTogether) {
+  expect_same([&](bool scheduled) {
+    Func f("f"), g("g"), h("h"), out("out");
+    f(x, y) = counted("f", x * 3 + y * y);
+    g(x, y) = counted("g", f(x, y - 1) + f(x, y + 1) * 2);
+    h(x, y) = counted("h", g(x, y - 2) + g(x, y) + f(x, y + 3));
+    out(x, y) = h(x, y) - h(x, y + 1);
+    if (scheduled) {
+      for (Func* stage : {&f, &g, &h}) stage->store_root().compute_at(out, y);
+    }
+    return out;
+  });
+  EXPECT_EQ(computed["h"], width * (height + 1));
+  EXPECT_EQ(computed["g"], width * (height + 3));
+  EXPECT_EQ(computed["f"], width * (height + 1 + 6));  // from y - 3 to y + 4
+}
+
+TEST_F(SlidingWindow, InsideAStrip) {
+  for (TailStrategy tail : {TailStrategy::ShiftInwards, TailStrategy::GuardWithIf}) {
+    Func g = expect_same([&](bool scheduled) {
+      Func f("f"), g("g");
+      f(x, y) = counted("f", x * 3 + y * y);
+      g(x, y) = f(x, y - 1) + f(x, y + 1) * 2;
+      g.bound(x, 0, width);
+      if (scheduled) {
+        g.split(y, yo, yi, 8, tail).parallel(yo);
+        f.store_at(g, yo).compute_at(g, yi);
+      }
+      return g;
+    });
+    int strips = (height + 7) / 8;
+    EXPECT_EQ(computed["f"],
+              width * (tail == TailStrategy::ShiftInwards ? strips * 10 : height + 2 * strips));
+    EXPECT_EQ(stored_elements(g, "f"), width * 4);
+  }
+}
+
+TEST_F(SlidingWindow, FromStripToStrip) {
+  expect_same([&](bool scheduled) {
+    Func f("f"), g("g");
+    f(x, y) = counted("f", x * 3 + y * y);
+    g(x, y) = f(x, y - 1) + f(x, y + 1) * 2;
+    if (scheduled) {
+      g.split(y, yo, yi, 4, TailStrategy::GuardWithIf);
+      f.store_root().compute_at(g, yo);
+    }
+    return g;
+  });
+  EXPECT_EQ(computed["f"], width * (height + 2));
+}
+
+TEST_F(SlidingWindow, Upsampling) {
+  expect_same([&](bool scheduled) {
+    Func f("f"), g("g");
+    f(x, y) = counted("f", x * 3 + y * y);
+    g(x, y) = f(x, y / 2) + f(x, y / 2 + 1) * 2;
+    if (scheduled) f.store_root().compute_at(g, y);
+    return g;
+  });
+  EXPECT_EQ(computed["f"], width * ((height - 1) / 2 + 2));
+}
+
+TEST_F(SlidingWindow, Downsampling) {
+  expect_same([&](bool scheduled) {
+    Func f("f"), g("g");
+    f(x, y) = counted("f", x * 3 + y * y);
+    g(x, y) = f(x, 2 * y) + f(x, 2 * y + 3) * 2;
+    if (scheduled) f.store_root().compute_at(g, y);
+    return g;
+  });
+  EXPECT_EQ(computed["f"], width * (2 * height + 2));
+}
+
+TEST_F(SlidingWindow, GapsAreNotComputed) {
+  expect_same([&](bool scheduled) {
+    Func f("f"), g("g");
+    f(x, y) = counted("f", x * 3 + y * y);
+    g(x, y) = f(x, 4 * y) + f(x, 4 * y + 1) * 2;
+    if (scheduled) f.store_root().compute_at(g, y);
+    return g;
+  });
+  EXPECT_EQ(computed["f"], width * 2 * height);
+}
+
+TEST_F(SlidingWindow, Downwards) {
+  Func g = expect_same([&](bool scheduled) {
+    Func f("f"), g("g");
+    f(x, y) = counted("f", x * 3 + y * y);
+    g(x, y) = f(x, 100 - y) + f(x, 102 - y) * 2;
+    g.bound(x, 0, width);
+    if (scheduled) f.store_root().compute_at(g, y);
+    return g;
+  });
+  EXPECT_EQ(computed["f"], width * (height + 2));
+  EXPECT_EQ(stored_elements(g, "f"), width * 4);
+}
+
+TEST_F(SlidingWindow, ClampedCoordinates) {
+  expect_same([&](bool scheduled) {
+    Func f("f"), g("g");
+    f(x, y) = counted("f", x * 3 + y * y);
+    g(x, y) = f(x, clamp(y - 1, 0, height - 1)) + f(x, clamp(y + 1, 0, height - 1)) * 2;
+    if (scheduled) f.store_root().compute_at(g, y);
+    return g;
+  });
+  EXPECT_EQ(computed["f"], width * height);
+}
+
+TEST_F(SlidingWindow, UpdatesThatStayInTheirRow) {
+  expect_same([&](bool scheduled) {
+    Func f("f"), g("g");
+    RDom r(0, 5);
+    f(x, y) = counted("f", x * 3 + y * y);
+    f(x, y) += counted("u", r.x * x);
+    g(x, y) = f(x, y - 1) + f(x, y + 1) * 2;
+    if (scheduled) f.store_root().compute_at(g, y);
+    return g;
+  });
+  EXPECT_EQ(computed["f"], width * (height + 2));
+  EXPECT_EQ(computed["u"], width * (height + 2) * 5);
+}
+
+TEST_F(SlidingWindow, UpdatesAcrossRowsAreComputedAgain) {
+  expect_same([&](bool scheduled) {
+    Func f("f"), g("g");
+    RDom r(0, 2);
+    f(x, y) = counted("f", x * 3 + y * y);
+    f(x, 3 + r) = f(x, 2 + r) + 1;
+    g(x, y) = f(x, y - 1) + f(x, y + 1) * 2;
+    if (scheduled) f.store_root().compute_at(g, y);
+    return g;
+  });
+  EXPECT_GE(computed["f"], width * height * 3);
+}
+
+TEST_F(SlidingWindow, SharedByConsumersThatStartAtDifferentTimes) {
+  expect_same([&](bool scheduled) {
+    Func f("f"), g("g"), h("h"), out("out");
+    f(x, y) = counted("f", x * 3 + y * y);
+    g(x, y) = counted("g", f(x, y) * 2 + f(x, y - 5));
+    h(x, y) = counted("h", f(x, y) + f(x, y + 2));  // wanted only by the current row
+    out(x, y) = g(x, y) + g(x, y - 4) + h(x, y);
+    if (scheduled) {
+      g.store_root().compute_at(out, y);
+      h.compute_at(out, y);
+      f.compute_at(out, y);
+    }
+    return out;
+  });
+  EXPECT_EQ(computed["g"], width * (height + 4));
+}
+
+TEST_F(SlidingWindow, VectorsAndUnrolledRows) {
+  expect_same([&](bool scheduled) {
+    Func f("f"), g("g"), out("out");
+    f(x, y) = x * 3 + y * y;
+    g(x, y) = f(x - 1, y) + f(x, y + 1) * 2 + f(x + 1, y - 1);
+    out(x, y) = g(x, y - 1) + g(x + 1, y + 1);
+    if (scheduled) {
+      out.split(y, yo, yi, 4).unroll(yi).vectorize(x, 8);
+      g.store_at(out, yo).compute_at(out, yi).vectorize(x, 8);
+      f.store_at(out, yo).compute_at(out, yi).vectorize(x, 8);
+    }
+    return out;
+  });
+}
+
+TEST_F(SlidingWindow, TilesThatKeepRows) {
+  expect_same([&](bool scheduled) {
+    Func f("f"), g("g"), out("out");
+    f(x, y) = x * 3 + y * y;
+    g(x, y) = f(x - 1, y) + f(x, y + 1) * 2 + f(x + 1, y - 1);
+    out(x, y) = g(x, y - 1) + g(x + 1, y + 1);
+    if (scheduled) {
+      out.tile(x, y, xo, yo, xi, yi, 8, 4).parallel(yo).vectorize(xi, 4);
+      g.store_at(out, xo).compute_at(out, yi).vectorize(x, 4);
+      f.store_at(out, yo).compute_at(out, yi).vectorize(x, 4);
+    }
+    return out;
+  });
+}
+
+TEST_F(SlidingWindow, FoldsOfConsumersInsideProducers) {
+  expect_same([&](bool scheduled) {
+    Func f("f"), g("g"), out("out");
+    f(x, y) = counted("f", x * 3 + y * y);
+    g(x, y) = f(x - 1, y) + f(x, y + 1) * 2 + f(x + 1, y - 1);
+    out(x, y) = g(x, y - 1) + g(x + 1, y + 1);
+    if (scheduled) {
+      g.store_root().compute_at(out, y);
+      f.store_root().compute_at(g, y);
+    }
+    return out;
+  });
+}
+
+TEST_F(SlidingWindow, FoldsBesideVectorsButNotAlongThem) {
+  expect_same([&](bool scheduled) {
+    Func f("f"), g("g");
+    f(x, y) = x * 3 + y * y;
+    g(x, y) = f(x - 1, y) + f(x, y) * 2 + f(x + 1, y);
+    if (scheduled) {
+      g.split(x, xo, xi, 8).vectorize(xi);
+      f.store_at(g, y).compute_at(g, xo).vectorize(x, 8);
+    }
+    return g;
+  });
+}
+
+}  // namespace
+}  // namespace retrograde
