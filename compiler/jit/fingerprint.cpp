@@ -27,6 +27,17 @@ void Fingerprint::add(std::string_view text) {
 
 namespace {
 
+struct Words {
+  std::string bytes;
+  void add(uint64_t word) { bytes.append(reinterpret_cast<const char*>(&word), sizeof word); }
+  void add(std::string_view text) {
+    add(text.size());
+    bytes += text;
+  }
+};
+
+// Into a Fingerprint or into Words.
+template <typename Result>
 class Writer {
  public:
   explicit Writer(const LoweredFunction& function) {
@@ -37,7 +48,7 @@ class Writer {
     }
     if (function.body.defined()) write(function.body);
   }
-  Fingerprint result;
+  Result result;
 
  private:
   template <typename... Words>
@@ -111,6 +122,12 @@ class Writer {
 
 }  // namespace
 
-Fingerprint fingerprint(const LoweredFunction& function) { return Writer(function).result; }
+Fingerprint fingerprint(const LoweredFunction& function) {
+  return Writer<Fingerprint>(function).result;
+}
+
+std::string fingerprint_text(const LoweredFunction& function) {
+  return std::move(Writer<Words>(function).result.bytes);
+}
 
 }  // namespace retrograde::jit

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <string>
 #include <string_view>
 
 #include "ir/lowered_function.h"
@@ -17,5 +18,7 @@ struct Fingerprint {
 };
 
 Fingerprint fingerprint(const ir::LoweredFunction& function);
+// All that the fingerprint is made of, for a stronger hash.
+std::string fingerprint_text(const ir::LoweredFunction& function);
 
 }  // namespace retrograde::jit

@@ -9,6 +9,7 @@
 #include "codegen/codegen.h"
 #include "diagnostics/error.h"
 #include "diagnostics/large_stack.h"
+#include "jit/disk_cache.h"
 #include "jit/fingerprint.h"
 #include "jit/linker.h"
 #include "retrograde_runtime.h"
@@ -19,13 +20,11 @@ namespace {
 class Compiled : public CompiledFunction {
  public:
   Compiled(const ir::LoweredFunction& function, const codegen::Options& options) {
-    codegen::Module module = codegen::compile_object(function, options);
-    times_ = {module.times.generate_seconds, module.times.optimize_seconds,
-              module.times.emit_seconds, 0};
+    const CachedObject code = load_or_generate(function, options);
     const auto start = std::chrono::steady_clock::now();
-    object_ = link(module.object, function.name);
-    address_ = object_->find(function.name);
-    argv_ = reinterpret_cast<Argv*>(object_->find(function.name + "_argv"));
+    object_ = link(code.object, code.function);
+    address_ = object_->find(code.function);
+    argv_ = reinterpret_cast<Argv*>(object_->find(code.function + "_argv"));
     times_.link_seconds =
         std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   }
@@ -35,6 +34,25 @@ class Compiled : public CompiledFunction {
 
  private:
   using Argv = int32_t(retrograde_context*, void**);
+
+  CachedObject load_or_generate(const ir::LoweredFunction& function,
+                                const codegen::Options& options) {
+    const std::shared_ptr<DiskCache> disk = disk_cache();
+    if (!disk) return generate(function, options);
+    const std::string key = disk_cache_key(function, options);
+    if (std::optional<CachedObject> found = disk->find(key)) return std::move(*found);
+    CachedObject code = generate(function, options);
+    disk->insert(key, code);
+    return code;
+  }
+
+  CachedObject generate(const ir::LoweredFunction& function, const codegen::Options& options) {
+    codegen::Module module = codegen::compile_object(function, options);
+    times_ = {module.times.generate_seconds, module.times.optimize_seconds,
+              module.times.emit_seconds, 0};
+    return {function.name, std::move(module.object)};
+  }
+
   std::unique_ptr<LinkedObject> object_;
   void* address_ = nullptr;
   Argv* argv_ = nullptr;

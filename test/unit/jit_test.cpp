@@ -2,6 +2,7 @@
 // for other machines.
 #include "jit/jit.h"
 
+#include <atomic>
 #include <fstream>
 #include <sstream>
 #include <thread>
@@ -145,6 +146,27 @@ TEST(Jit, NoPageIsWritableAndExecutable) {
   for (std::string line; std::getline(maps, line);) {
     EXPECT_EQ(line.find("rwx"), std::string::npos) << line;
   }
+}
+
+TEST(JitMemory, IsNeverWritableAndExecutableWhileItIsWritten) {
+  std::atomic<bool> done{false};
+  std::thread compiling([&] {
+    jit::Options fresh;
+    fresh.use_cache = false;
+    for (int factor = 0; factor < 12; factor++) jit::compile(scaled(factor), test_target(), fresh);
+    done = true;
+  });
+  int looks = 0;
+  std::string bad;
+  while (!done || looks == 0) {
+    std::ifstream maps("/proc/self/maps");
+    for (std::string line; std::getline(maps, line);) {
+      if (line.find("rwx") != std::string::npos) bad = line;
+    }
+    looks++;
+  }
+  compiling.join();
+  EXPECT_EQ(bad, "");
 }
 
 TEST(Jit, TimesAreMeasured) {

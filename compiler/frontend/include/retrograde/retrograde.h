@@ -5,6 +5,7 @@
 #include "diagnostics/error.h"
 #include "frontend/boundary_conditions.h"
 #include "frontend/buffer.h"
+#include "frontend/compile_cache.h"
 #include "frontend/expr_ops.h"
 #include "frontend/func.h"
 #include "frontend/image_param.h"
