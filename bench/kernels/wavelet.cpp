@@ -32,7 +32,7 @@ Kernel wavelet(const Setup& setup) {
   const float threshold = 0.08f;
   const float* h = coefficient;
   ImageParam input(Float(32), 2, "input");
-  Var x("x"), y("y"), b("b"), yi("yi"), xi("xi");
+  Var x("x"), y("y"), b("b"), yi("yi"), yii("yii"), xi("xi");
   const int lanes = setup.lanes<float>();
 
   // bands[j](x, y, b): averages; details along x; along y; along both.
@@ -85,10 +85,12 @@ Kernel wavelet(const Setup& setup) {
     columns(x, y, b) = mux(b, {column(0), column(1)});
     level_out(x, y) = inverse([&](const Expr& p) { return Expr(columns(p, y, 0)); },
                               [&](const Expr& p) { return Expr(columns(p, y, 1)); }, x / 2, x % 2);
-    level_out.compute_root().split(y, y, yi, 16).split(x, x, xi, 2).reorder(xi, x, yi, y);
-    level_out.unroll(xi).vectorize(x, lanes).parallel(y);
-    columns.compute_at(level_out, yi).bound(b, 0, 2).reorder(b, x, y).unroll(b);
-    columns.vectorize(x, lanes);
+    // Even and odd points beside each other.
+    level_out.compute_root().align_bounds(x, 2).align_bounds(y, 2);
+    level_out.split(y, y, yi, 16).split(yi, yi, yii, 2).split(x, x, xi, 2);
+    level_out.reorder(xi, x, yii, yi, y).unroll(xi).vectorize(x, lanes).parallel(y);
+    columns.compute_at(level_out, yi).align_bounds(y, 2).bound(b, 0, 2).reorder(y, b, x);
+    columns.unroll(y, 2).unroll(b).vectorize(x, lanes);
     better = level_out;
   }
 
