@@ -1,7 +1,7 @@
 // module_compiler.cpp -- what the front end's Modules reach. Everything that is to be written is
 // made first; then all files are written at once.
 #include <algorithm>
-#include <optional>
+#include <chrono>
 #include <sstream>
 
 #include "aot/archive.h"
@@ -16,6 +16,7 @@
 #include "diagnostics/large_stack.h"
 #include "frontend/compiler_interface.h"
 #include "frontend/module.h"
+#include "frontend/pass_observer.h"
 #include "ir/print.h"
 #include "lower/lower.h"
 
@@ -107,8 +108,11 @@ class Outputs {
     need(OutputFileType::llvm_assembly, Format::LlvmIr);
     need(OutputFileType::bitcode, Format::Bitcode);
     if (formats.empty()) return;
+    const auto start = std::chrono::steady_clock::now();
     code_ =
         codegen::compile_program(aot::program_of(module), options_for(module.target()), formats);
+    const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - start;
+    tell_pass_observers({module.name(), "llvm", seconds.count(), {}});
   }
 
   std::string object() const { return code_.at(Format::Object); }

@@ -9,6 +9,7 @@
 #include "codegen/codegen.h"
 #include "diagnostics/error.h"
 #include "diagnostics/large_stack.h"
+#include "frontend/pass_observer.h"
 #include "jit/disk_cache.h"
 #include "jit/fingerprint.h"
 #include "jit/linker.h"
@@ -27,6 +28,7 @@ class Compiled : public CompiledFunction {
     argv_ = reinterpret_cast<Argv*>(object_->find(code.function + "_argv"));
     times_.link_seconds =
         std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    tell_pass_observers({function.name, "link", times_.link_seconds, {}});
   }
   int call(retrograde_context* context, void** args) const override { return argv_(context, args); }
   void* address() const override { return address_; }
@@ -50,6 +52,9 @@ class Compiled : public CompiledFunction {
     codegen::Module module = codegen::compile_object(function, options);
     times_ = {module.times.generate_seconds, module.times.optimize_seconds,
               module.times.emit_seconds, 0};
+    tell_pass_observers({function.name, "llvm_generate", times_.generate_seconds, {}});
+    tell_pass_observers({function.name, "llvm_optimize", times_.optimize_seconds, {}});
+    tell_pass_observers({function.name, "llvm_emit", times_.emit_seconds, {}});
     return {function.name, std::move(module.object)};
   }
 

@@ -4,7 +4,9 @@
 
 #include "diagnostics/error.h"
 #include "diagnostics/large_stack.h"
+#include "frontend/pass_observer.h"
 #include "ir/build.h"
+#include "ir/print.h"
 #include "ir/validate.h"
 #include "lower/argument_checks.h"
 #include "lower/build_loop_nests.h"
@@ -114,7 +116,7 @@ void append_outputs(const std::vector<FuncPtr>& outputs, std::vector<LoweredArgu
   }
 }
 
-Stmt run_passes(Lowering& lowering, const LowerOptions& options) {
+Stmt run_passes(Lowering& lowering, const std::string& name, const LowerOptions& options) {
   Stmt stmt;
   for (const Pass& pass : passes) {
     auto start = std::chrono::steady_clock::now();
@@ -122,6 +124,7 @@ Stmt run_passes(Lowering& lowering, const LowerOptions& options) {
     std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - start;
     if (options.validate) validate(stmt, pass.phase, pass.name, names_of(lowering.args));
     if (options.observe) options.observe(pass.name, seconds.count(), stmt);
+    tell_pass_observers({name, pass.name, seconds.count(), [&] { return print(stmt); }});
     if (options.stop_after == pass.name) break;
   }
   return stmt;
@@ -135,7 +138,7 @@ LoweredFunction lower(const std::string& name, const std::vector<FuncPtr>& outpu
   run_on_large_stack([&] {
     append_outputs(outputs, function.args);
     Lowering lowering{outputs, function.args, {}, {}, {}, options};
-    function.body = run_passes(lowering, options);
+    function.body = run_passes(lowering, name, options);
   });
   return function;
 }

@@ -13,6 +13,7 @@
 #include "frontend/lambda.h"
 #include "frontend/module.h"
 #include "frontend/param.h"
+#include "frontend/pass_observer.h"
 #include "frontend/pipeline.h"
 #include "frontend/rdom.h"
 #include "frontend/var.h"
