@@ -113,7 +113,10 @@ int32_t retrograde_parallel_for(retrograde_context* context, retrograde_task tas
   Tasks tasks{context, task, closure};
   const auto run = [](void* data, int32_t index) {
     const Tasks& tasks = *static_cast<Tasks*>(data);
-    return tasks.task(tasks.context, index, tasks.closure);
+    retrograde_context* context = tasks.context;
+    return context && context->task_handler
+               ? context->task_handler(context, tasks.task, index, tasks.closure)
+               : tasks.task(context, index, tasks.closure);
   };
   const auto tell = [](void* data, int32_t code, const char* message) {
     report(static_cast<Tasks*>(data)->context, code, message);

@@ -10,7 +10,8 @@
  *
  * Nothing here prints, aborts, exits or throws. Every function may be called from several threads
  * at once. Beyond the threads of the pool, the only state of the process is the pool of free memory
- * blocks (retrograde_pool_*) and the arenas of thread limits. */
+ * blocks (retrograde_pool_*), the cache of memoized results (retrograde_memoization_*), what the
+ * profiler gathered (retrograde_profiler_*), and the arenas of thread limits. */
 #ifndef RETROGRADE_RUNTIME_H
 #define RETROGRADE_RUNTIME_H
 
@@ -49,6 +50,7 @@ enum retrograde_error_code {
 };
 
 struct retrograde_context;
+struct halide_trace_event_t; /* of HalideRuntime.h */
 
 /* One iteration of a parallel loop. */
 typedef int32_t (*retrograde_task)(struct retrograde_context*, int32_t index, uint8_t* closure);
@@ -74,6 +76,12 @@ typedef struct retrograde_context {
    * [min, min + extent) and gives 0, or the code of an iteration that failed. */
   int32_t (*parallel_handler)(struct retrograde_context*, retrograde_task, int32_t min,
                               int32_t extent, uint8_t* closure);
+  /* Runs one iteration of a parallel loop: calls the task and gives its code. Default: just that. */
+  int32_t (*task_handler)(struct retrograde_context*, retrograde_task, int32_t index,
+                          uint8_t* closure);
+  /* Told of every event of a traced pipeline, from any thread; gives the event's number, which
+   * later events name as their parent. Default: retrograde_default_trace. */
+  int32_t (*trace_handler)(struct retrograde_context*, const struct halide_trace_event_t*);
 } retrograde_context;
 
 /* ---- called by generated code ---- */
@@ -84,6 +92,23 @@ enum { retrograde_allocation_alignment = 128 };
  * fail, those above the lowest failing one may be skipped; its code is the result. */
 int32_t retrograde_parallel_for(retrograde_context*, retrograde_task task, int32_t min,
                                 int32_t extent, uint8_t* closure);
+
+/* While an element is locked nobody else has it locked. Its holder must not wait for anything. */
+void retrograde_lock_element(retrograde_context*, const void* element);
+void retrograde_unlock_element(retrograde_context*, const void* element);
+
+/* Runs both tasks with index 0: `first` on a thread of its own, which no thread limit counts. When
+ * one fails, the semaphores are closed; the code is that of a task that failed by itself, the
+ * first's if both did. */
+int32_t retrograde_fork(retrograde_context*, retrograde_task first, uint8_t* first_closure,
+                        retrograde_task rest, uint8_t* rest_closure, void** semaphores,
+                        int32_t semaphore_count);
+/* Counting semaphores in memory of the caller's, aligned to 8 bytes. Acquiring waits until the count
+ * is at least `count` and takes it off; it gives 0, or an error code once the semaphore is closed. */
+enum { retrograde_semaphore_bytes = 8 };
+int32_t retrograde_semaphore_init(retrograde_context*, void* semaphore, int32_t count);
+int32_t retrograde_semaphore_acquire(retrograde_context*, void* semaphore, int32_t count);
+int32_t retrograde_semaphore_release(retrograde_context*, void* semaphore, int32_t count);
 
 /* Room for `elements` of `element_bytes` each, plus retrograde_allocation_padding readable bytes;
  * null when the count is negative, the size overflows, or there is no memory. */
@@ -96,6 +121,27 @@ int32_t retrograde_allocation_error(retrograde_context*, const char* name, int64
 void retrograde_free(retrograde_context*, void* block);
 /* Frees those of the blocks that are not null, the last first. */
 void retrograde_free_all(retrograde_context*, void** blocks, int64_t count);
+
+/* Tells of an event and gives its number. Numbers are unique in the process. */
+int32_t retrograde_trace(retrograde_context*, const struct halide_trace_event_t* event);
+/* The same from its parts: `event` is a halide_trace_event_code_t, `tag` may be null. */
+int32_t retrograde_trace_region(retrograde_context*, const char* func, int32_t event,
+                                int32_t parent, int32_t* coordinates, int32_t count,
+                                const char* tag);
+/* A tag whose text is `type` and the numbers of the region. */
+int32_t retrograde_trace_type(retrograde_context*, const char* func, int32_t parent,
+                              const char* type, const int32_t* region, int32_t count);
+/* What retrograde_trace does without a handler: a line of text to the print handler; with
+ * HL_TRACE_FILE in the environment, a halide_trace_packet_t to that file. */
+int32_t retrograde_default_trace(retrograde_context*, const struct halide_trace_event_t* event);
+
+/* The cache of memoized Funcs. Looking up copies `count` values to `blocks` of the given sizes and
+ * gives 0, or 1 when the cache has none such. Storing copies them; it may also store nothing. */
+int32_t retrograde_memoization_lookup(retrograde_context*, const uint8_t* key, int32_t key_bytes,
+                                      int32_t count, void** blocks, const int64_t* bytes);
+int32_t retrograde_memoization_store(retrograde_context*, const uint8_t* key, int32_t key_bytes,
+                                     int32_t count, void* const* blocks, const int64_t* bytes,
+                                     int32_t has_eviction_key, uint64_t eviction_key);
 
 /* Reports an error and returns its code. The format is text with the fields of
  * retrograde_format_message. */
@@ -128,6 +174,13 @@ size_t retrograde_pool_bytes(void); /* held now */
 void retrograde_pool_release(void); /* gives all of them back to the system */
 
 #ifdef __cplusplus
+/* Bytes that the results of memoized Funcs may hold; 0: the default, 1 MiB. */
+void retrograde_memoization_set_size(int64_t bytes);
+int64_t retrograde_memoization_bytes(void); /* held now */
+/* Forgets what was stored with this eviction key. */
+void retrograde_memoization_evict(uint64_t eviction_key);
+void retrograde_memoization_cleanup(void); /* forgets everything */
+
 }
 #endif
 

@@ -378,6 +378,7 @@ Interval BoundsEngine::operator_bounds(const Call& call) {
     case Op::likely_if_innermost:
     case Op::strict_float:
     case Op::stop_gradient:
+    case Op::memoize_tag:
     case Op::print:
       return arg(0);
     case Op::print_when:

@@ -197,6 +197,7 @@ OpTable make_op_table() {
   t.emplace(Op::promise_clamped, transparent(0, "the bounds are promises, not values"));
   t.emplace(Op::unsafe_promise_clamped, transparent(0, "the bounds are promises, not values"));
   t.emplace(Op::strict_float, transparent(0));
+  t.emplace(Op::memoize_tag, transparent(0));
   t.emplace(Op::stop_gradient, DerivativeRule{RuleClass::Blocked, nullptr, -1, "everywhere",
                                               "0: the program says so", "definition"});
   t.emplace(Op::undef, constant("any value: derivative 0"));
@@ -207,7 +208,7 @@ OpTable make_op_table() {
   for (Op op : {Op::buffer_host, Op::buffer_min, Op::buffer_extent, Op::buffer_stride,
                 Op::buffer_dimensions, Op::buffer_type, Op::buffer_is_null, Op::buffer_is_query,
                 Op::buffer_set_bounds, Op::address_of, Op::if_then_else, Op::prefetch,
-                Op::runtime_call, Op::error}) {
+                Op::runtime_call, Op::pack, Op::trace, Op::error}) {
     t.emplace(op, no_rule(lowering));
   }
   return t;

@@ -34,6 +34,7 @@ Value* FunctionGenerator::operator_call(const Call& e) {
     case Op::promise_clamped:
     case Op::unsafe_promise_clamped:
     case Op::stop_gradient:
+    case Op::memoize_tag:
       return value(e.args[0]);
     case Op::strict_float: {
       const Contraction off(e_, false);
@@ -53,6 +54,14 @@ Value* FunctionGenerator::operator_call(const Call& e) {
       return branch_value(e.args[0], e.args[1], e.args[2]);
     case Op::error:
       return report_error(value(e.args[0]), e.args, 1, "");
+    case Op::runtime_call:
+      return runtime_call(e);
+    case Op::pack:
+      return pack(e.args);
+    case Op::prefetch:
+      return prefetch(e);
+    case Op::trace:
+      return trace(e);
     case Op::address_of: {
       const auto* load = e.args[0].as<Load>();
       RETROGRADE_ASSERT(load != nullptr, "address of something that is no load");
@@ -122,6 +131,8 @@ Value* FunctionGenerator::require(const Call& e) {
   Value* condition = value(e.args[0]);
   if (condition->getType()->isVectorTy()) condition = b_.CreateAndReduce(condition);
   fail_unless(condition, [&] {
+    const auto* error = e.args.size() == 3 ? e.args[2].as<Call>() : nullptr;
+    if (error && error->is_op(Op::error)) return value(e.args[2]);  // lowering's, with its own code
     return report_error(b_.getInt32(static_cast<uint32_t>(retrograde_error_requirement_failed)),
                         e.args, 2, " ");
   });

@@ -5,6 +5,9 @@
 //   access.cpp        loads and stores: which vectors of addresses are dense, strided, or neither
 //   statements.cpp    loops, branches, allocations, assertions
 //   parallel.cpp      bodies of parallel loops as functions of their own
+//   fork.cpp          statements that run at the same time
+//   atomics.cpp       updates of one element from several iterations at once
+//   runtime_calls.cpp what lowering asks of the runtime
 //   messages.cpp      errors and prints
 //   buffers.cpp       halide_buffer_t
 #pragma once
@@ -103,7 +106,36 @@ class FunctionGenerator {
   llvm::MDNode* alias_tag(const std::string& name);
 
   // parallel.cpp
+  struct Task {
+    llvm::Function* function;
+    Value* closure;
+  };
+  // The statement as a function; `index` names its number, when it has one.
+  Task outline(const Stmt& body, const std::string& name, const std::string& index = "",
+               Type index_type = Int(32));
   void parallel_loop(const ir::For& s);
+
+  // fork.cpp
+  void make(const ir::Fork& s);
+
+  // atomics.cpp
+  void make(const ir::Atomic& s);
+  void atomic_store(const ir::Store& s);
+  struct AtomicLane {  // one element, and what its update needs
+    llvm::AtomicRMWInst::BinOp op;
+    Value *pointer, *operand;
+  };
+  void atomic_instruction(const AtomicLane& lane, const Storage& storage);
+  void compare_and_swap(Type type, Value* pointer, const Storage& storage,
+                        const std::function<Value*(Value*)>& updated);
+  void compare_and_swap(const ir::Store& s);
+  void locked(const ir::Atomic& s, const ir::Store& first);
+
+  // runtime_calls.cpp
+  Value* runtime_call(const ir::Call& e);
+  Value* pack(const std::vector<Expr>& parts);
+  Value* prefetch(const ir::Call& e);
+  Value* trace(const ir::Call& e);
 
   // expressions.cpp
   Value* value(const Expr& e);

@@ -39,32 +39,27 @@ Uses names_in(const Stmt& s) {
 
 }  // namespace
 
-void FunctionGenerator::parallel_loop(const For& s) {
-  Value *min, *extent;
-  {
-    const MemoScope scope(*this, false);
-    min = b_.CreateIntCast(value(s.min), b_.getInt32Ty(), true);
-    extent = b_.CreateIntCast(value(s.extent), b_.getInt32Ty(), true);
-  }
-  const Uses uses = names_in(s.body);
+FunctionGenerator::Task FunctionGenerator::outline(const Stmt& body, const std::string& name,
+                                                   const std::string& index, Type index_type) {
+  const Uses uses = names_in(body);
   std::vector<std::string> variables, storages;
   std::vector<Value*> captured;
-  for (const std::string& name : uses.variables) {
-    const auto found = frame_.variables.find(name);
-    if (found == frame_.variables.end() || name == s.name) continue;
-    variables.push_back(name);
+  for (const std::string& variable : uses.variables) {
+    const auto found = frame_.variables.find(variable);
+    if (found == frame_.variables.end() || variable == index) continue;
+    variables.push_back(variable);
     captured.push_back(found->second);
   }
-  for (const std::string& name : uses.storages) {
-    const auto found = frame_.storages.find(name);
+  for (const std::string& storage : uses.storages) {
+    const auto found = frame_.storages.find(storage);
     if (found == frame_.storages.end()) continue;
-    storages.push_back(name);
+    storages.push_back(storage);
     captured.push_back(found->second.base);
   }
   std::vector<llvm::Type*> fields;
   for (Value* v : captured) fields.push_back(v->getType());
   auto* closure_type = llvm::StructType::get(e_.context(), fields);
-  Value* closure = entry_alloca(closure_type, 1, s.name + ".closure");
+  Value* closure = entry_alloca(closure_type, 1, name + ".closure");
   for (unsigned i = 0; i < captured.size(); i++) {
     b_.CreateStore(captured[i], b_.CreateStructGEP(closure_type, closure, i));
   }
@@ -73,36 +68,47 @@ void FunctionGenerator::parallel_loop(const For& s) {
   auto* int32 = b_.getInt32Ty();
   auto* task_type = llvm::FunctionType::get(int32, {pointer, int32, pointer}, false);
   const std::string task_name =
-      source_.name + ".parallel" + std::to_string(parallel_loops_++) + "." + s.name;
+      source_.name + ".parallel" + std::to_string(parallel_loops_++) + "." + name;
   auto* task =
       llvm::Function::Create(task_type, llvm::GlobalValue::InternalLinkage, task_name, e_.module);
-  {
-    const llvm::IRBuilderBase::InsertPointGuard guard(b_);
-    Frame outer = std::move(frame_);
-    frame_ = {};
-    begin_function(task);
-    frame_.memo.push_back({{}, {}, false});
-    for (unsigned i = 0; i < captured.size(); i++) {
-      Value* field = b_.CreateStructGEP(closure_type, task->getArg(2), i);
-      auto* load = b_.CreateLoad(fields[i], field);
-      load->setMetadata(llvm::LLVMContext::MD_invariant_load, llvm::MDNode::get(e_.context(), {}));
-      if (i < variables.size()) {
-        frame_.variables[variables[i]] = load;
-      } else {
-        const std::string& name = storages[i - variables.size()];
-        frame_.storages[name] = {load, nullptr, outer.storages[name].alias};
-      }
+  const llvm::IRBuilderBase::InsertPointGuard guard(b_);
+  Frame outer = std::move(frame_);
+  frame_ = {};
+  begin_function(task);
+  frame_.memo.push_back({{}, {}, false});
+  for (unsigned i = 0; i < captured.size(); i++) {
+    Value* field = b_.CreateStructGEP(closure_type, task->getArg(2), i);
+    auto* load = b_.CreateLoad(fields[i], field);
+    load->setMetadata(llvm::LLVMContext::MD_invariant_load, llvm::MDNode::get(e_.context(), {}));
+    if (i < variables.size()) {
+      frame_.variables[variables[i]] = load;
+    } else {
+      const std::string& storage = storages[i - variables.size()];
+      frame_.storages[storage] = {load, nullptr, outer.storages[storage].alias};
     }
-    Value* index = task->getArg(1);
-    frame_.variables[s.name] = b_.CreateIntCast(index, llvm_type(e_, s.min.type()), true);
-    statement(s.body);
-    finish_function();
-    frame_ = std::move(outer);
   }
+  if (!index.empty())
+    frame_.variables[index] = b_.CreateIntCast(task->getArg(1), llvm_type(e_, index_type), true);
+  statement(body);
+  finish_function();
+  frame_ = std::move(outer);
+  return {task, closure};
+}
 
+void FunctionGenerator::parallel_loop(const For& s) {
+  Value *min, *extent;
+  {
+    const MemoScope scope(*this, false);
+    min = b_.CreateIntCast(value(s.min), b_.getInt32Ty(), true);
+    extent = b_.CreateIntCast(value(s.extent), b_.getInt32Ty(), true);
+  }
+  const Task task = outline(s.body, s.name, s.name, s.min.type());
+  auto* pointer = b_.getPtrTy();
+  auto* int32 = b_.getInt32Ty();
   const auto parallel_for =
       runtime_function("retrograde_parallel_for", int32, {pointer, pointer, int32, int32, pointer});
-  Value* code = b_.CreateCall(parallel_for, {frame_.context, task, min, extent, closure});
+  Value* code =
+      b_.CreateCall(parallel_for, {frame_.context, task.function, min, extent, task.closure});
   fail_unless(b_.CreateICmpEQ(code, b_.getInt32(0)), [&] { return code; });
 }
 

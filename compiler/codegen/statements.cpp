@@ -224,7 +224,8 @@ void FunctionGenerator::statement(const Stmt& s) {
       [&](const Block& block) {
         for (const Stmt& part : block.stmts) statement(part);
       },
-      [&](const IfThenElse& branch) { make(branch); },
+      [&](const IfThenElse& branch) { make(branch); }, [&](const Fork& f) { make(f); },
+      [&](const Atomic& a) { make(a); },
       [&](const Evaluate& e) {
         const MemoScope scope(*this, false);
         value(e.value);

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "frontend/function.h"
+#include "frontend/jit_handlers.h"
 #include "ir/lowered_function.h"
 #include "ir/target.h"
 
@@ -19,12 +20,15 @@ namespace retrograde {
 struct PipelineSpec {
   std::string name;
   std::vector<ir::FuncPtr> outputs;
+  std::map<std::string, void*> externs = {};  // C functions by name, before those of the process
 };
 
 // One call. Handlers may be called from several threads at once.
 struct CallContext {
   std::function<void(const char*)> print;  // text of print() and print_when(); empty: thrown away
   int thread_limit = 0;                    // 0: as many as there are
+  JITHandlers handlers;  // those that are set replace what the runtime does
+  JITUserContext* user_context = nullptr;  // for the handlers; not null when one is set
   std::string error;                       // out: the message of the error code that run() returned
 };
 

@@ -338,6 +338,17 @@ Expr strict_float(Expr e) {
   return call_op(Op::strict_float, {e});
 }
 
+Expr memoize_tag(Expr value, const std::vector<Expr>& key) {
+  check_defined(value, "memoize_tag");
+  std::vector<Expr> args = {std::move(value)};
+  for (const Expr& part : key) {
+    check_defined(part, "memoize_tag");
+    args.push_back(part);
+  }
+  const Type type = args[0].type();
+  return call_op(Op::memoize_tag, type, std::move(args));
+}
+
 Expr stop_gradient(Expr e) {
   check_defined(e, "stop_gradient");
   return call_op(Op::stop_gradient, {e});

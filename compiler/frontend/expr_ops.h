@@ -167,6 +167,13 @@ Expr likely_if_innermost(Expr e);  // only worth it in an innermost loop
 Expr unsafe_promise_clamped(const Expr& value, const Expr& min,
                             const Expr& max);  // an undefined end: unlimited
 Expr strict_float(Expr e);                     // no contraction to FMA inside
+// The value, which a memoized Func's cache knows by `key`: what an image holds is no part of the
+// cache's key by itself. Keys are made of Params and constants.
+Expr memoize_tag(Expr value, const std::vector<Expr>& key);
+template <typename... Rest>
+Expr memoize_tag(Expr value, Expr key, Rest&&... rest) {
+  return memoize_tag(std::move(value), std::vector<Expr>{std::move(key), std::forward<Rest>(rest)...});
+}
 Expr stop_gradient(Expr e);                    // a constant as far as derivatives go
 
 // Any value: a definition whose value is undef stores nothing there.

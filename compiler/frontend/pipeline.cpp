@@ -2,12 +2,14 @@
 // them, reporting errors.
 #include "frontend/pipeline.h"
 
+#include <cstdio>
 #include <cstring>
 #include <iostream>
 #include <mutex>
 #include <unordered_set>
 
 #include "frontend/func.h"
+#include "frontend/wrappers.h"
 
 namespace retrograde {
 
@@ -22,7 +24,7 @@ struct Stamp {
 
   static Stamp of(const std::vector<ir::FuncPtr>& outputs) {
     Stamp result;
-    for (const ir::FuncPtr& f : ir::topological_order(outputs))
+    for (const ir::FuncPtr& f : ir::functions_of(outputs))
       result.funcs.emplace_back(f, f->version);
     for (const ParameterPtr& p : ir::parameters_of(outputs))
       result.parameters.emplace_back(p, p->version);
@@ -110,13 +112,18 @@ bool same_shape(const halide_buffer_t& a, const std::vector<halide_dimension_t>&
   return true;
 }
 
-void default_print(const char* message) { std::cerr << message << std::flush; }
+// Beside what the program itself prints.
+void default_print(const char* message) {
+  std::fputs(message, stdout);
+  std::fflush(stdout);
+}
 
 }  // namespace
 
 struct Pipeline::Contents {
   std::vector<ir::FuncPtr> outputs;
   JITHandlers handlers;
+  std::map<std::string, JITExtern> externs;
   std::mutex mutex;
   // The latest compilation.
   std::shared_ptr<CompiledPipeline> compiled;
@@ -163,7 +170,12 @@ Pipeline::Contents& Pipeline::checked() const {
   return *contents_;
 }
 
-PipelineSpec Pipeline::spec() const { return {checked().outputs[0]->name, checked().outputs}; }
+PipelineSpec Pipeline::spec() const {
+  PipelineSpec result{checked().outputs[0]->name, contents_->outputs};
+  for (const auto& [name, function] : contents_->externs)
+    result.externs[name] = function.extern_c_function().address();
+  return result;
+}
 
 std::vector<Func> Pipeline::outputs() const {
   std::vector<Func> result;
@@ -181,6 +193,14 @@ Func Pipeline::get_func(size_t index) const {
 }
 
 JITHandlers& Pipeline::jit_handlers() { return checked().handlers; }
+
+void Pipeline::set_jit_externs(const std::map<std::string, JITExtern>& externs) {
+  std::lock_guard lock(checked().mutex);
+  contents_->externs = externs;
+  contents_->compiled.reset();
+}
+
+const std::map<std::string, JITExtern>& Pipeline::get_jit_externs() { return checked().externs; }
 
 std::vector<Argument> Pipeline::infer_arguments() const {
   std::vector<Argument> result;
@@ -342,13 +362,52 @@ class Arguments {
   }
 };
 
-void call(const CompiledPipeline& code, const JITHandlers& handlers, void* const* argv,
-          const std::string& asked) {
+// The Pipeline's handlers with those of the call's context in front.
+JITHandlers merged(JITHandlers handlers, const JITUserContext* context) {
+  if (!context) return handlers;
+  const JITHandlers& first = context->handlers;
+  const auto take = [](auto& to, const auto& from) {
+    if (from) to = from;
+  };
+  take(handlers.custom_print, first.custom_print);
+  take(handlers.custom_malloc, first.custom_malloc);
+  take(handlers.custom_free, first.custom_free);
+  take(handlers.custom_do_task, first.custom_do_task);
+  take(handlers.custom_do_par_for, first.custom_do_par_for);
+  take(handlers.custom_error, first.custom_error);
+  take(handlers.custom_trace, first.custom_trace);
+  take(handlers.print, first.print);
+  if (first.thread_limit > 0) handlers.thread_limit = first.thread_limit;
+  return handlers;
+}
+
+void check_handlers(const JITHandlers& handlers, const std::string& asked) {
+  if (!handlers.custom_malloc != !handlers.custom_free) {
+    user_error(asked, "custom_malloc and custom_free come together",
+               handlers.custom_malloc ? "only custom_malloc is set" : "only custom_free is set",
+               "Set both, or neither");
+  }
+}
+
+void call(const CompiledPipeline& code, const JITHandlers& own, void* const* argv,
+          const std::string& asked, JITUserContext* user = nullptr) {
+  JITUserContext nobody;
   CallContext context;
-  context.print = handlers.print ? handlers.print : default_print;
-  context.thread_limit = handlers.thread_limit;
+  context.handlers = merged(own, user);
+  context.user_context = user ? user : &nobody;
+  check_handlers(context.handlers, asked);
+  context.print = context.handlers.print ? context.handlers.print : default_print;
+  if (const auto custom = context.handlers.custom_print) {
+    context.print = [custom, to = context.user_context](const char* text) { custom(to, text); };
+  }
+  context.thread_limit = context.handlers.thread_limit;
   const int code_returned = code.run(argv, context);
   if (code_returned == 0) return;
+  if (const auto custom = context.handlers.custom_error) {
+    const std::string unnamed = text("cannot ", asked, ": error code ", code_returned);
+    custom(context.user_context, context.error.empty() ? unnamed.c_str() : context.error.c_str());
+    return;
+  }
   if (!context.error.empty()) throw RuntimeError(context.error, code_returned);
   call_error(asked, "the compiled code must succeed",
              text("it returned the error code ", code_returned), "", code_returned);
@@ -356,22 +415,32 @@ void call(const CompiledPipeline& code, const JITHandlers& handlers, void* const
 
 }  // namespace
 
-void Pipeline::run(const std::vector<halide_buffer_t*>& outputs, const Target& target) const {
+void Pipeline::run(const std::vector<halide_buffer_t*>& outputs, const Target& target,
+                   JITUserContext* context) const {
   const auto code = compiled(target);
   const std::string asked = "realize " + names_of(contents_->outputs);
   Arguments arguments(*code, outputs, false, asked);
-  call(*code, contents_->handlers, arguments.argv(), asked);
+  call(*code, contents_->handlers, arguments.argv(), asked, context);
 }
 
 Realization Pipeline::realize(const std::vector<int32_t>& sizes, const Target& target) {
-  std::vector<Buffer<>> buffers = make_outputs(sizes, true);
-  RealizationArg outputs(buffers);
-  run(outputs.buffers(), target);
-  return Realization(std::move(buffers));
+  return realize(nullptr, sizes, target);
 }
 
 void Pipeline::realize(RealizationArg outputs, const Target& target) {
-  run(checked_outputs(outputs, true), target);
+  realize(nullptr, std::move(outputs), target);
+}
+
+Realization Pipeline::realize(JITUserContext* context, const std::vector<int32_t>& sizes,
+                              const Target& target) {
+  std::vector<Buffer<>> buffers = make_outputs(sizes, true);
+  RealizationArg outputs(buffers);
+  run(outputs.buffers(), target, context);
+  return Realization(std::move(buffers));
+}
+
+void Pipeline::realize(JITUserContext* context, RealizationArg outputs, const Target& target) {
+  run(checked_outputs(outputs, true), target, context);
 }
 
 // Asks the code for the regions again until they agree: a region may depend on the shape of another

@@ -9,6 +9,7 @@
 #include "frontend/argument.h"
 #include "frontend/autoscheduler.h"
 #include "frontend/compiler_interface.h"
+#include "frontend/jit_handlers.h"
 #include "frontend/module.h"
 #include "frontend/realization.h"
 
@@ -16,11 +17,7 @@ namespace retrograde {
 
 class Func;
 
-// What compiled code may call back.
-struct JITHandlers {
-  std::function<void(const char*)> print;  // text of print(); default: the standard error stream
-  int thread_limit = 0;                    // threads of parallel loops; 0: as many as there are
-};
+struct JITExtern;
 
 class Pipeline {
  public:
@@ -63,6 +60,10 @@ class Pipeline {
   // Computes all outputs over the given buffers. RuntimeError when a buffer or parameter does not
   // fit.
   void realize(RealizationArg outputs, const Target& target = Target());
+  // The same; the handlers of `context` go before those of jit_handlers().
+  Realization realize(JITUserContext* context, const std::vector<int32_t>& sizes = {},
+                      const Target& target = Target());
+  void realize(JITUserContext* context, RealizationArg outputs, const Target& target = Target());
   // Gives every ImageParam without a buffer one of exactly the region that the outputs need.
   void infer_input_bounds(const std::vector<int32_t>& sizes, const Target& target = Target());
   void infer_input_bounds(RealizationArg outputs, const Target& target = Target());
@@ -73,6 +74,16 @@ class Pipeline {
   void print_loop_nest() const;  // to the standard error stream
   std::vector<Argument> infer_arguments() const;
   JITHandlers& jit_handlers();
+  void set_error_handler(void (*handler)(void*, const char*));
+  void set_custom_allocator(void* (*malloc)(void*, size_t), void (*free)(void*, void*));
+  void set_custom_do_task(int (*handler)(void*, int (*)(void*, int, uint8_t*), int, uint8_t*));
+  void set_custom_do_par_for(int (*handler)(void*, int (*)(void*, int, uint8_t*), int, int,
+                                            uint8_t*));
+  void set_custom_trace(int (*handler)(void*, const halide_trace_event_t*));
+  void set_custom_print(void (*handler)(void*, const char*));
+  // What the C functions that the pipeline calls by name are; others are looked up in the process.
+  void set_jit_externs(const std::map<std::string, JITExtern>& externs);
+  const std::map<std::string, JITExtern>& get_jit_externs();
 
   // ---- ahead of time ----
   // What the function takes is `args`, in their order, then the output buffers. CompileError when
@@ -153,10 +164,26 @@ class Pipeline {
   std::vector<Buffer<>> make_outputs(const std::vector<int32_t>& sizes, bool with_memory) const;
   std::vector<halide_buffer_t*> checked_outputs(const RealizationArg& outputs,
                                                 bool with_memory) const;
-  void run(const std::vector<halide_buffer_t*>& outputs, const Target& target) const;
+  void run(const std::vector<halide_buffer_t*>& outputs, const Target& target,
+           JITUserContext* context = nullptr) const;
   void infer(const std::vector<halide_buffer_t*>& outputs, const Target& target) const;
 
   std::shared_ptr<Contents> contents_;
+};
+
+// A C function behind a name that a pipeline calls.
+struct JITExtern {
+  explicit JITExtern(Pipeline pipeline);
+  explicit JITExtern(const Func& func);
+  explicit JITExtern(ExternCFunction function) : function_(std::move(function)) {}
+  template <typename R, typename... Args>
+  explicit JITExtern(R (*f)(Args...)) : JITExtern(ExternCFunction(f)) {}
+  const Pipeline& pipeline() const { return pipeline_; }
+  const ExternCFunction& extern_c_function() const { return function_; }
+
+ private:
+  Pipeline pipeline_;
+  ExternCFunction function_;
 };
 
 }  // namespace retrograde

@@ -292,7 +292,16 @@ void Validator::check_realize(const Stmt& s, const Realize& n) {
   only_in_loops(s);
   require(!n.types.empty(), s, "a Realize has types");
   check_bounds(s, n.bounds);
+  // Facts of the storage, which flattening gives values.
+  std::vector<std::string> facts;
+  for (size_t d = 0; d < n.bounds.size(); d++) {
+    for (const char* what : {".min.", ".extent.", ".stride."})
+      facts.push_back(n.name + what + std::to_string(d));
+  }
+  visible_.insert(facts.begin(), facts.end());
   check(n.body);
+  for (const std::string& fact : facts) visible_.erase(fact);
+  checked_.clear();
 }
 
 void Validator::check_bounds(const Stmt& s, const std::vector<Range>& bounds) {

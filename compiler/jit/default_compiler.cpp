@@ -21,13 +21,70 @@ struct CallState {
 };
 
 CallState& state_of(retrograde_context* context) { return *reinterpret_cast<CallState*>(context); }
+CallContext& caller_of(retrograde_context* context) { return *state_of(context).caller; }
 
 void keep_error(retrograde_context* context, int, const char* message) {
-  state_of(context).caller->error = message;
+  caller_of(context).error = message;
 }
 
 void hand_on_print(retrograde_context* context, const char* message) {
-  if (const auto& print = state_of(context).caller->print) print(message);
+  if (const auto& print = caller_of(context).print) print(message);
+}
+
+void* hand_on_malloc(retrograde_context* context, size_t bytes) {
+  CallContext& caller = caller_of(context);
+  return caller.handlers.custom_malloc(caller.user_context, bytes);
+}
+
+void hand_on_free(retrograde_context* context, void* block) {
+  CallContext& caller = caller_of(context);
+  caller.handlers.custom_free(caller.user_context, block);
+}
+
+int32_t hand_on_trace(retrograde_context* context, const halide_trace_event_t* event) {
+  CallContext& caller = caller_of(context);
+  return caller.handlers.custom_trace(caller.user_context, event);
+}
+
+// A task of the runtime's in the form of a handler's: what it needs stands in its closure.
+struct WrappedTask {
+  retrograde_context* context;
+  retrograde_task task;
+  uint8_t* closure;
+  static int run(JITUserContext*, int index, uint8_t* closure) {
+    const auto& self = *reinterpret_cast<WrappedTask*>(closure);
+    return self.task(self.context, index, self.closure);
+  }
+};
+
+int32_t hand_on_task(retrograde_context* context, retrograde_task task, int32_t index,
+                     uint8_t* closure) {
+  CallContext& caller = caller_of(context);
+  WrappedTask wrapped{context, task, closure};
+  return caller.handlers.custom_do_task(caller.user_context, WrappedTask::run, index,
+                                        reinterpret_cast<uint8_t*>(&wrapped));
+}
+
+int32_t hand_on_loop(retrograde_context* context, retrograde_task task, int32_t min, int32_t extent,
+                     uint8_t* closure) {
+  CallContext& caller = caller_of(context);
+  WrappedTask wrapped{context, task, closure};
+  return caller.handlers.custom_do_par_for(caller.user_context, WrappedTask::run, min, extent,
+                                           reinterpret_cast<uint8_t*>(&wrapped));
+}
+
+retrograde_context context_for(const CallContext& caller) {
+  const JITHandlers& handlers = caller.handlers;
+  retrograde_context context = {};
+  context.error_handler = keep_error;
+  context.print_handler = hand_on_print;
+  context.thread_limit = caller.thread_limit;
+  if (handlers.custom_malloc) context.malloc_handler = hand_on_malloc;
+  if (handlers.custom_free) context.free_handler = hand_on_free;
+  if (handlers.custom_trace) context.trace_handler = hand_on_trace;
+  if (handlers.custom_do_task) context.task_handler = hand_on_task;
+  if (handlers.custom_do_par_for) context.parallel_handler = hand_on_loop;
+  return context;
 }
 
 class JitPipeline : public CompiledPipeline {
@@ -39,11 +96,7 @@ class JitPipeline : public CompiledPipeline {
   const std::vector<ir::LoweredArgument>& arguments() const override { return arguments_; }
 
   int run(void* const* argv, CallContext& caller) const override {
-    CallState state;
-    state.caller = &caller;
-    state.context.error_handler = keep_error;
-    state.context.print_handler = hand_on_print;
-    state.context.thread_limit = caller.thread_limit;
+    CallState state{context_for(caller), &caller};
     return code_->call(&state.context, const_cast<void**>(argv));
   }
 
@@ -61,7 +114,9 @@ class JitCompiler : public Compiler {
     options.validate = validate_passes;
     ir::LoweredFunction function =
         ir::lower(pipeline.name, pipeline.outputs, ir::infer_arguments(pipeline.outputs), options);
-    auto code = jit::compile(function, target);
+    jit::Options code_options;
+    code_options.externs = pipeline.externs;
+    auto code = jit::compile(function, target, code_options);
     return std::make_shared<JitPipeline>(std::move(function.args), std::move(code));
   }
 

@@ -20,10 +20,11 @@ namespace {
 
 class Compiled : public CompiledFunction {
  public:
-  Compiled(const ir::LoweredFunction& function, const codegen::Options& options) {
+  Compiled(const ir::LoweredFunction& function, const codegen::Options& options,
+           const Externs& externs) {
     const CachedObject code = load_or_generate(function, options);
     const auto start = std::chrono::steady_clock::now();
-    object_ = link(code.object, code.function);
+    object_ = link(code.object, code.function, externs);
     address_ = object_->find(code.function);
     argv_ = reinterpret_cast<Argv*>(object_->find(code.function + "_argv"));
     times_.link_seconds =
@@ -131,11 +132,16 @@ void check_runs_here(const Target& target) {
               "Compile for \"host\"");
 }
 
-Fingerprint key_of(const ir::LoweredFunction& function, const codegen::Options& options) {
+Fingerprint key_of(const ir::LoweredFunction& function, const codegen::Options& options,
+                   const Externs& externs) {
   Fingerprint key;
   run_on_large_stack([&] { key = fingerprint(function); });
   key.add(options.target.to_string());
   key.add(static_cast<uint64_t>(options.optimization_level));
+  for (const auto& [name, address] : externs) {
+    key.add(name);
+    key.add(reinterpret_cast<uint64_t>(address));
+  }
   return key;
 }
 
@@ -180,10 +186,10 @@ Handle compile(const ir::LoweredFunction& function, const Target& target, const 
   codegen::Options code_options;
   code_options.target = target;
   code_options.optimization_level = options.optimization_level;
-  if (!options.use_cache) return std::make_shared<Compiled>(function, code_options);
-  const Fingerprint key = key_of(function, code_options);
+  if (!options.use_cache) return std::make_shared<Compiled>(function, code_options, options.externs);
+  const Fingerprint key = key_of(function, code_options, options.externs);
   if (Handle found = cache().find(key)) return found;
-  return cache().insert(key, std::make_shared<Compiled>(function, code_options));
+  return cache().insert(key, std::make_shared<Compiled>(function, code_options, options.externs));
 }
 
 CacheStatistics cache_statistics() { return cache().statistics(); }

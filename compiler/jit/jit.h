@@ -6,6 +6,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <memory>
 #include <string>
 
@@ -47,9 +48,11 @@ class CompiledFunction {
 struct Options {
   bool use_cache = true;
   int optimization_level = 1;
+  // C functions that the code calls by name, before those of the runtime and the process.
+  std::map<std::string, void*> externs = {};
 };
 
-// UserError when the function calls a C function that is neither in libm nor in this library;
+// UserError when the function calls a C function that is nowhere in the process;
 // Unsupported when the machine cannot run code for the target.
 std::shared_ptr<const CompiledFunction> compile(const ir::LoweredFunction& function,
                                                 const Target& target, const Options& options = {});

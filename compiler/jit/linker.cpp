@@ -39,20 +39,21 @@ std::vector<std::string> undefined_symbols(llvm::MemoryBufferRef buffer) {
   return names;
 }
 
-void* find_or_throw(const std::string& name, const std::string& function) {
-  void* address = find_symbol(name);
+void* find_or_throw(const std::string& name, const std::string& function, const Externs& externs) {
+  const auto given = externs.find(name);
+  void* address = given == externs.end() ? find_symbol(name) : given->second;
   if (!address) {
     user_error("compile \"" + function + "\"",
-               "generated code may call libm's functions and nothing else of the process",
+               "a C function that it calls must be in this process, or among its JIT externs",
                "it calls \"" + name + "\"",
-               "Write it with the language's operators, or call a function of <math.h>");
+               "Export the function (HALIDE_EXPORT_SYMBOL), or name it in set_jit_externs");
   }
   return address;
 }
 
 class Linked : public LinkedObject {
  public:
-  Linked(const std::vector<uint8_t>& object, const std::string& name)
+  Linked(const std::vector<uint8_t>& object, const std::string& name, const Externs& externs)
       : session_(checked(llvm::orc::SelfExecutorProcessControl::Create(), "starting the linker")),
         memory_(llvm::jitlink::InProcessMemoryManager::Create()),
         layer_(session_, *checked_memory()),
@@ -60,7 +61,7 @@ class Linked : public LinkedObject {
     session_.setErrorReporter(
         [this](llvm::Error error) { problem_ += llvm::toString(std::move(error)) + "; "; });
     try {
-      add(object, name);
+      add(object, name, externs);
     } catch (...) {
       close();
       throw;
@@ -83,13 +84,13 @@ class Linked : public LinkedObject {
     return memory_->get();
   }
 
-  void add(const std::vector<uint8_t>& object, const std::string& name) {
+  void add(const std::vector<uint8_t>& object, const std::string& name, const Externs& externs) {
     const llvm::StringRef bytes(reinterpret_cast<const char*>(object.data()), object.size());
     auto buffer = llvm::MemoryBuffer::getMemBufferCopy(bytes, name);
     llvm::orc::SymbolMap symbols;
     for (const std::string& symbol : undefined_symbols(buffer->getMemBufferRef())) {
       symbols[session_.intern(symbol)] = {
-          llvm::orc::ExecutorAddr::fromPtr(find_or_throw(symbol, name)),
+          llvm::orc::ExecutorAddr::fromPtr(find_or_throw(symbol, name, externs)),
           llvm::JITSymbolFlags::Exported | llvm::JITSymbolFlags::Callable};
     }
     checked(library_.define(llvm::orc::absoluteSymbols(std::move(symbols))),
@@ -108,8 +109,9 @@ class Linked : public LinkedObject {
 
 }  // namespace
 
-std::unique_ptr<LinkedObject> link(const std::vector<uint8_t>& object, const std::string& name) {
-  return std::make_unique<Linked>(object, name);
+std::unique_ptr<LinkedObject> link(const std::vector<uint8_t>& object, const std::string& name,
+                                   const Externs& externs) {
+  return std::make_unique<Linked>(object, name, externs);
 }
 
 }  // namespace retrograde::jit

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <memory>
 #include <string>
 #include <vector>
@@ -14,6 +15,8 @@ class LinkedObject {
   virtual void* find(const std::string& name) const = 0;
 };
 
-std::unique_ptr<LinkedObject> link(const std::vector<uint8_t>& object, const std::string& name);
+using Externs = std::map<std::string, void*>;
+std::unique_ptr<LinkedObject> link(const std::vector<uint8_t>& object, const std::string& name,
+                                   const Externs& externs = {});
 
 }  // namespace retrograde::jit

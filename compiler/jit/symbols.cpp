@@ -29,6 +29,17 @@ void add_runtime(Table& table) {
   table["retrograde_free_all"] = pointer(retrograde_free_all);
   table["retrograde_report_error"] = pointer(retrograde_report_error);
   table["retrograde_print"] = pointer(retrograde_print);
+  table["retrograde_lock_element"] = pointer(retrograde_lock_element);
+  table["retrograde_unlock_element"] = pointer(retrograde_unlock_element);
+  table["retrograde_trace"] = pointer(retrograde_trace);
+  table["retrograde_trace_region"] = pointer(retrograde_trace_region);
+  table["retrograde_trace_type"] = pointer(retrograde_trace_type);
+  table["retrograde_memoization_lookup"] = pointer(retrograde_memoization_lookup);
+  table["retrograde_memoization_store"] = pointer(retrograde_memoization_store);
+  table["retrograde_fork"] = pointer(retrograde_fork);
+  table["retrograde_semaphore_init"] = pointer(retrograde_semaphore_init);
+  table["retrograde_semaphore_acquire"] = pointer(retrograde_semaphore_acquire);
+  table["retrograde_semaphore_release"] = pointer(retrograde_semaphore_release);
 }
 
 void add_libc(Table& table) {
@@ -98,7 +109,8 @@ void* find_symbol(const std::string& name) {
   static const Table table = make_table();
   const auto found = table.find(name);
   if (found != table.end()) return found->second;
-  return name.rfind("Sleef_", 0) == 0 ? find_in_sleef(name.c_str()) : nullptr;
+  if (name.rfind("Sleef_", 0) == 0) return find_in_sleef(name.c_str());
+  return dlsym(RTLD_DEFAULT, name.c_str());
 }
 
 }  // namespace retrograde::jit

@@ -1,5 +1,5 @@
-// The functions that generated code may call: the runtime, libm, SLEEF; nothing else of the
-// process.
+// The functions that generated code may call: the runtime, libm, SLEEF, and those that the program
+// names itself, wherever in the process they are.
 #pragma once
 
 #include <string>

@@ -9,6 +9,7 @@
 #include "ir/build.h"
 #include "ir/visit.h"
 #include "lower/emit_definition.h"
+#include "lower/extern_stage.h"
 #include "lower/nest_checks.h"
 #include "lower/site.h"
 #include "lower/stage_nest.h"
@@ -96,6 +97,7 @@ class NestEmitter {
     nests.body = all.stmt;
     nests.outputs = std::move(outputs_);
     for (const auto& [name, folds] : folds_) {
+    nests.async_room = std::move(async_room_);
       for (const Fold& fold : folds) nests.folds[name].push_back(fold.factor);
     }
     return nests;
@@ -112,6 +114,7 @@ class NestEmitter {
   std::map<std::string, Box> outputs_;
   std::map<std::string, std::vector<Fold>> folds_;
 
+  std::map<std::string, int> async_room_;
   void note_site(int index) {
     const LoopedFunc& f = program_.funcs[index];
     const LoopLevel& level = f.schedule.compute_level;
@@ -214,6 +217,7 @@ class NestEmitter {
     if (f.is_output) {
       outputs_[f.name()] = allocated;
     } else {
+      if (f.schedule.async && !loops.empty()) note_async_room(f, slides, site.touched(touched));
       Box touched = hull(required, allocated);
       made.stmt = fold_storage(f, touched, loops, slides, code.has_vectors, site, made.stmt);
       if (is_stored_where_computed(f)) {
@@ -289,7 +293,7 @@ class NestEmitter {
     for (int s = static_cast<int>(f.stages.size()) - 1; s >= 0; s--) {
       bool is_last = s == static_cast<int>(f.stages.size()) - 1;
       Domain domain = bind_domain(f, s, need, is_last ? slides : std::vector<Slide>(), site);
-      Emitted stage = emit_stage(f, s, domain);
+      Emitted stage = f.func->is_extern() ? emit_extern(f, domain, site) : emit_stage(f, s, domain);
       if (auto self = stage.uses.find(f.name()); self != stage.uses.end()) {
         need = hull(need, self->second.box);
         check_bounded(program_, f, need);
@@ -355,6 +359,16 @@ class NestEmitter {
     for (const ReductionVariable& r : f.stages[s].rvars) {
       Expr min = cast(Int(32), r.min), extent = cast(Int(32), r.extent);
       Interval range{min, simplify(min + extent - 1)};
+  Emitted emit_extern(const LoopedFunc& f, const Domain& domain, Site& site) const {
+    ExternStage stage = emit_extern_stage(program_, f, domain);
+    for (auto& binding : stage.bindings) site.bindings.push_back(std::move(binding));
+    Emitted code;
+    code.stmt = stage.call;
+    code.uses = std::move(stage.uses);
+    code.has_loops = true;
+    return code;
+  }
+
       domain[r.var] = site.bind(prefix + r.var, range);
     }
     return domain;
@@ -468,6 +482,30 @@ class NestEmitter {
 
   Stmt realize(const LoopedFunc& f, const Box& box, Stmt stmt) {
     std::vector<Range> ranges;
+  // Values that are each computed once, into a place of their own, can be computed at any time. In
+  // folded storage of F coordinates, of which an iteration touches W and computes S, there is room
+  // for (F - W) / S more.
+  void note_async_room(const LoopedFunc& f, const std::vector<Slide>& slides, const Box& touched) {
+    const std::vector<Fold>& folds = folds_.at(f.name());
+    int room = slides.empty() ? 1 : 0;
+    for (size_t d = 0; d < folds.size(); d++) {
+      if (!folds[d].factor.defined()) continue;
+      auto slide = std::find_if(slides.begin(), slides.end(), [&](const Slide& candidate) {
+        return candidate.dimension == static_cast<int>(d);
+      });
+      const auto extent = [](const Interval& side) {
+        return as_const_int(simplify(without_markers(side.max - side.min + 1)));
+      };
+      const auto fold = as_const_int(folds[d].factor), window = extent(touched[d]);
+      const auto step = slide == slides.end() ? window : extent(slide->part);
+      const bool known = fold && window && step && *step > 0 && *fold >= *window;
+      const int here = known ? static_cast<int>((*fold - *window) / *step) + 1 : 1;
+      room = room == 0 ? here : std::min(room, here);
+    }
+    auto [it, is_first] = async_room_.emplace(f.name(), room);
+    if (!is_first && (it->second == 0 || (room != 0 && room < it->second))) it->second = room;
+  }
+
     std::vector<Stmt> checks;
     for (size_t d = 0; d < box.size(); d++) {
       Range range{box[d].min, simplify(box[d].max - box[d].min + 1)};

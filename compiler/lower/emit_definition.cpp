@@ -32,6 +32,7 @@ Stmt emit_definition(const LoopedFunc& f, int stage, const StageNest& nest) {
                            {args_begin, shared.values.end()});
   for (auto it = shared.lets.rbegin(); it != shared.lets.rend(); ++it)
     stmt = make_let(it->first, it->second, stmt);
+  if (definition.schedule.atomic) stmt = make_atomic(f.name(), stmt);
 
   if (definition.predicate.defined())
     stmt = make_if(introduce_lets(substitute(definition.predicate, nest.coordinate)), stmt);

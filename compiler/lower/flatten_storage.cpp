@@ -22,6 +22,7 @@
 #include <unordered_set>
 
 #include "diagnostics/error.h"
+#include "frontend/function.h"
 #include "ir/build.h"
 #include "ir/visit.h"
 #include "lower/copy_statement.h"
@@ -60,6 +61,11 @@ Usage find_usage(const Stmt& s) {
       s,
       [&](const Expr& e) {
         if (const Variable* v = e.as<Variable>()) usage.variables.insert(v->name);
+        const Call* call = e.as<Call>();  // an output that a C function fills: no Provide names it
+        if (call && call->call_type == CallType::Func && call->symbol.defined()) {
+          const auto f = std::dynamic_pointer_cast<FuncContents>(call->symbol.lock());
+          if (f && f->is_extern()) usage.value_counts.emplace(call->name, f->types.size());
+        }
         return true;
       },
       [&](const Stmt& node) {

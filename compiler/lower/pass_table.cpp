@@ -5,6 +5,7 @@
 #include "lower/flatten_storage.h"
 #include "lower/free_early.h"
 #include "lower/interleave_vectors.h"
+#include "lower/lower_atomics.h"
 #include "lower/partition_loops.h"
 #include "lower/unroll_loops.h"
 #include "lower/vectorize_loops.h"
@@ -19,7 +20,7 @@ const std::vector<StatementPass>& statement_passes() {
       {"drop_bounds_query", drop_bounds_query},
       {"flatten_storage", [](const Stmt& s) { return flatten_storage(s); }},
       {"free_early", free_early},
-      {"interleave_vectors", interleave_vectors},
+      {"lower_atomics", lower_atomics},
       {"partition_loops", partition_loops},
       {"simplify", [](const Stmt& s) { return simplify(s); }},
       {"unroll_loops", unroll_loops},

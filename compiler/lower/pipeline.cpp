@@ -13,11 +13,15 @@
 #include "lower/deinterleave_loads.h"
 #include "lower/drop_checks.h"
 #include "lower/flatten_storage.h"
+#include "lower/fork_async.h"
 #include "lower/free_early.h"
+#include "lower/inject_tracing.h"
 #include "lower/inline_functions.h"
 #include "lower/interleave_vectors.h"
 #include "lower/lower.h"
+#include "lower/lower_atomics.h"
 #include "lower/make_names_unique.h"
+#include "lower/memoize.h"
 #include "lower/partition_loops.h"
 #include "lower/unroll_loops.h"
 #include "lower/vectorize_loops.h"
@@ -32,6 +36,8 @@ struct Lowering {
   Program program;
   std::map<std::string, std::string> renamed_funcs;  // new name -> name in the program
   std::map<std::string, std::vector<Expr>> folds;    // see LoopNests
+  AsyncRoom async_room;
+  const std::string& name;
   const LowerOptions& options;
 };
 
@@ -60,6 +66,8 @@ Stmt nest_loops(Lowering& lowering, const Stmt&) {
   lowering.program = inline_functions(lowering.outputs);
   LoopNests nests = build_loop_nests(lowering.program);
   lowering.folds = nests.folds;
+  lowering.async_room = nests.async_room;
+  inject_tracing(nests, lowering.program, lowering.name, lowering.options.target);
   UniqueNames unique =
       make_names_unique(add_argument_checks(nests, lowering.args, lowering.program));
   lowering.renamed_funcs = std::move(unique.original);
@@ -75,9 +83,23 @@ constexpr Pass passes[] = {
        const bool drops = lowering.options.target.has_feature(Target::NoBoundsQuery);
        return drops ? drop_bounds_query(s) : s;
      }},
+    {"fork_async", Phase::Loops,
+     [](Lowering& lowering, const Stmt& s) {
+       return fork_async(s, lowering.program, lowering.renamed_funcs, lowering.async_room);
+     }},
+    {"add_memoization_keys", Phase::Loops,
+     [](Lowering& lowering, const Stmt& s) {
+       return add_memoization_keys(s, lowering.program, lowering.renamed_funcs, lowering.name,
+                                   lowering.options.target);
+     }},
     {"flatten_storage", Phase::FlatStorage,
      [](Lowering& lowering, const Stmt& s) { return flatten_storage(s, storage_layouts(lowering)); }},
+    {"add_memoization_lookups", Phase::FlatStorage,
+     [](Lowering& lowering, const Stmt& s) {
+       return add_memoization_lookups(s, lowering.program, lowering.renamed_funcs);
+     }},
     {"simplify_storage", Phase::FlatStorage, run_simplify},
+    {"lower_atomics", Phase::FlatStorage, [](Lowering&, const Stmt& s) { return lower_atomics(s); }},
     {"partition_loops", Phase::FlatStorage,
      [](Lowering&, const Stmt& s) { return partition_loops(s); }},
     {"unroll_loops", Phase::FlatStorage, [](Lowering&, const Stmt& s) { return unroll_loops(s); }},
@@ -116,7 +138,7 @@ void append_outputs(const std::vector<FuncPtr>& outputs, std::vector<LoweredArgu
   }
 }
 
-Stmt run_passes(Lowering& lowering, const std::string& name, const LowerOptions& options) {
+Stmt run_passes(Lowering& lowering, const LowerOptions& options) {
   Stmt stmt;
   for (const Pass& pass : passes) {
     auto start = std::chrono::steady_clock::now();
@@ -124,7 +146,7 @@ Stmt run_passes(Lowering& lowering, const std::string& name, const LowerOptions&
     std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - start;
     if (options.validate) validate(stmt, pass.phase, pass.name, names_of(lowering.args));
     if (options.observe) options.observe(pass.name, seconds.count(), stmt);
-    tell_pass_observers({name, pass.name, seconds.count(), [&] { return print(stmt); }});
+    tell_pass_observers({lowering.name, pass.name, seconds.count(), [&] { return print(stmt); }});
     if (options.stop_after == pass.name) break;
   }
   return stmt;
@@ -137,8 +159,8 @@ LoweredFunction lower(const std::string& name, const std::vector<FuncPtr>& outpu
   LoweredFunction function{name, inputs, {}};
   run_on_large_stack([&] {
     append_outputs(outputs, function.args);
-    Lowering lowering{outputs, function.args, {}, {}, {}, options};
-    function.body = run_passes(lowering, name, options);
+    Lowering lowering{outputs, function.args, {}, {}, {}, {}, name, options};
+    function.body = run_passes(lowering, options);
   });
   return function;
 }

@@ -38,10 +38,6 @@ constexpr Directive not_yet[] = {
      }},
     {"hoist_storage",
      [](const LoopedFunc& f) { return f.schedule.hoist_level.kind != LoopLevel::Kind::Inlined; }},
-    {"async", [](const LoopedFunc& f) { return f.schedule.async; }},
-    {"trace_loads", [](const LoopedFunc& f) { return f.func->trace.loads; }},
-    {"trace_stores", [](const LoopedFunc& f) { return f.func->trace.stores; }},
-    {"trace_realizations", [](const LoopedFunc& f) { return f.func->trace.realizations; }},
     {"debug_to_file", [](const LoopedFunc& f) { return !f.func->debug_file.empty(); }},
 };
 
@@ -99,6 +95,37 @@ void refuse_unsupported(const Program& program) {
     check_level_is_set(f, f.schedule.hoist_from, "hoist the storage of");
     for (size_t s = 0; s < f.stages.size(); s++)
       check_loops(f, static_cast<int>(s), f.stages[s].schedule);
+void check_inlined(const FuncContents& f, const FuncSchedule& schedule) {
+  const auto refuse = [&](const std::string& asked, const std::string& evidence) {
+    user_error(asked, "only what is computed somewhere has storage of its own", evidence,
+               text("Compute ", quoted(f.name), " at a loop or at root, or drop the directive"));
+  };
+  if (schedule.compute_from && !schedule.compute_from->defined) {
+    user_error(text("compute ", quoted(f.name), " at a loop level"),
+               "the level is set before the pipeline is compiled", "it never was",
+               "Set it: level.set(LoopLevel(f, x))");
+  }
+  const std::string inlined = text(quoted(f.name), " is inlined into its users");
+  if (schedule.memoized) refuse("memoize " + quoted(f.name), inlined);
+  if (schedule.async) refuse("compute " + quoted(f.name) + " asynchronously", inlined);
+  if (schedule.store_level.kind != LoopLevel::Kind::Inlined)
+    refuse("store " + quoted(f.name) + " at a level", inlined);
+  if (schedule.hoist_level.kind != LoopLevel::Kind::Inlined)
+    refuse("hoist the storage of " + quoted(f.name), inlined);
+  for (const StorageRule& rule : schedule.storage_rules) {
+    refuse(text("lay out the storage of ", quoted(f.name), " in ", quoted(rule.var)), inlined);
+  }
+  for (const Dim& dim : f.pure->schedule.dims) {
+    if (dim.for_type == ForType::Serial) continue;
+    const char* verb = dim.for_type == ForType::Parallel     ? "parallelize "
+                       : dim.for_type == ForType::Vectorized ? "vectorize "
+                                                             : "unroll ";
+    user_error(text(verb, quoted(f.name), " over ", quoted(dim.var)),
+               "only what is computed somewhere has loops", inlined,
+               text("Compute ", quoted(f.name), " at a loop or at root, or drop the directive"));
+  }
+}
+
     refuse_directives(f);
   }
 }

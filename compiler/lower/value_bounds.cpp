@@ -19,6 +19,7 @@ std::unordered_set<std::string> coordinates_of(const LoopedFunc& f) {
 Interval bounds_of_value(const LoopedFunc& f, size_t value,
                          const std::unordered_set<std::string>& coordinates,
                          const ValueBounds& known) {
+  if (f.func->is_extern()) return Interval::everything();
   // What the pure definition stores only in some places may hold anything elsewhere.
   if (f.stages[0].predicate.defined()) return Interval::everything();
   Scope<Interval> anywhere;

@@ -31,6 +31,7 @@
 #include <unordered_set>
 
 #include "diagnostics/error.h"
+#include "ir/atomic_update.h"
 #include "ir/build.h"
 #include "ir/equal.h"
 #include "ir/print.h"
@@ -95,16 +96,6 @@ struct Reduction {
   };
   std::vector<Term> terms;
 };
-
-bool loads_from(const Expr& e, const std::string& buffer) {
-  bool found = false;
-  walk(e, [&](const Expr& node) {
-    const Load* load = node.as<Load>();
-    found |= load && load->name == buffer;
-    return !found;
-  });
-  return found;
-}
 
 bool has_load(const Expr& e) {
   bool found = false;
@@ -216,6 +207,7 @@ class LoopVectorizer {
         [&](const IfThenElse& n) { return visit_if(s, n); },
         [&](const Allocate& n) { return visit_allocate(s, n); },
         [&](const Store& n) { return visit_store(s, n); },
+        [&](const Atomic& n) { return visit_atomic(s, n); },
         [&](const Assert& n) {
           return varies(n.condition) || varies(n.error) || widen_.mask().defined() ? lane_by_lane(s)
                                                                                    : s;
@@ -237,7 +229,7 @@ class LoopVectorizer {
   };
 
   Stmt visit_let(const Stmt& s, const LetStmt& n) {
-    if (has_effects(n.value)) return lane_by_lane(s);
+    if (has_effects(n.value) || tells_of_some_lanes(n.value)) return lane_by_lane(s);
     Expr value = widen_(n.value);
     if (value.same_as(n.value)) return make_let(n.name, n.value, visit(n.body));
     lets_.push_back({n.name, n.value});
@@ -332,10 +324,22 @@ class LoopVectorizer {
     return make_allocate(n.name, n.type, n.memory, elements, visit(n.body));
   }
 
+  // An event has no mask.
+  bool tells_of_some_lanes(const Expr& e) {
+    bool found = false;
+    walk(e, [&](const Expr& node) {
+      const Call* call = node.as<Call>();
+      found |= call && call->is_op(Op::trace);
+      return !found;
+    });
+    return found && widen_.mask().defined();
+  }
+
   // ---- stores ----
 
   Stmt visit_store(const Stmt& s, const Store& n) {
-    if (has_effects(n.value) || has_effects(n.index)) return lane_by_lane(s);
+    if (has_effects(n.value) || has_effects(n.index) || tells_of_some_lanes(n.value))
+      return lane_by_lane(s);
     int lanes = n.index.type().lanes();
     if (widen_.is_wide_allocation(n.name)) {
       return make_store(n.name, widen_.spread(n.value), widen_.index_in_wide_allocation(n.index),
@@ -351,6 +355,23 @@ class LoopVectorizer {
     require_no_load(n.name, 0);
     bool is_same = !varies(n.value) && !varies(n.predicate);
     return is_same ? s : lane_by_lane(s);  // the last lane wins
+  }
+
+  // One operation on the element stays a vector, whose lanes may hit one element: it is stored lane
+  // by lane. Anything else runs lane by lane altogether.
+  Stmt visit_atomic(const Stmt& s, const Atomic& n) {
+    const Store* store = n.body.as<Store>();
+    if (store && widen_.is_wide_allocation(store->name)) return visit_store(n.body, *store);
+    if (!store || !find_atomic_update(*store) || has_effects(store->value)) return lane_by_lane(s);
+    if (!varies(store->index)) return make_atomic(n.name, visit_store(n.body, *store));
+    std::unordered_map<std::string, int> own;
+    count_loads(store->value, own);
+    count_loads(store->index, own);
+    require_no_load(store->name, own[store->name]);
+    const int lanes = store->index.type().lanes();
+    return make_atomic(n.name,
+                       make_store(store->name, widen_.spread(store->value), widen_(store->index),
+                                  widen_.masked(store->predicate, lanes), store->symbol));
   }
 
   // A buffer that several lanes store to may be read by nothing but the `own` loads of the store

@@ -106,7 +106,8 @@ bool has_effects(const Expr& e) {
     if (call && call->call_type == CallType::Operator) {
       OpClass cls = op_info(call->op).cls;
       bool is_value =
-          call->op == Op::random || call->op == Op::undef || call->op == Op::if_then_else;
+          call->op == Op::random || call->op == Op::undef || call->op == Op::if_then_else ||
+                      call->op == Op::trace;  // its event can be that of a vector
       bool is_fact = call->op >= Op::buffer_host && call->op <= Op::buffer_is_query;
       found |= (cls == OpClass::Effect || cls == OpClass::Internal) && !is_value && !is_fact;
     }

@@ -35,7 +35,8 @@ class HashCons : public Rewriter {
 bool must_stay(const Expr& e) {
   const auto* call = e.as<Call>();
   return call && (call->is_op(Op::error) || call->is_op(Op::runtime_call) ||
-                  call->is_op(Op::undef) || call->is_op(Op::address_of));
+                  call->is_op(Op::undef) || call->is_op(Op::address_of) ||
+                  call->is_op(Op::pack) || call->is_op(Op::trace));
 }
 
 // Cheaper to repeat than to name: leaves, and what costs no instruction on a leaf.

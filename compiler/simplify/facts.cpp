@@ -195,6 +195,7 @@ ConstantRange Facts::range_of_call(const Call& n) {
     case Op::likely_if_innermost:
     case Op::strict_float:
     case Op::stop_gradient:
+    case Op::memoize_tag:
       return range(n.args[0]);
     case Op::promise_clamped:
     case Op::unsafe_promise_clamped:

@@ -187,7 +187,8 @@ bool has_effect(const Expr& e) {
     if (call && call->call_type == CallType::Operator) {
       found |= call->is_op(Op::print) || call->is_op(Op::print_when) || call->is_op(Op::require) ||
                call->is_op(Op::buffer_set_bounds) || call->is_op(Op::error) ||
-               call->is_op(Op::prefetch) || call->is_op(Op::runtime_call);
+               call->is_op(Op::prefetch) || call->is_op(Op::runtime_call) ||
+               call->is_op(Op::trace);
     }
     found |= call && call->call_type == CallType::Extern;
     return !found;

@@ -1,0 +1,70 @@
+// Fork: both statements become tasks, as bodies of parallel loops do; the runtime runs the first on
+// a thread of its own.
+//
+//   fork { first } { rest }  =>  code = retrograde_fork(context, task1, &closure1, task2, &closure2,
+//                                                       semaphores, count)
+//                                if (code) fail(code)
+//
+// The semaphores are those that the two statements name and that live around the Fork: when a
+// statement fails, the runtime closes them, so that the other one does not wait for ever.
+#include <set>
+
+#include "codegen/function_generator.h"
+#include "ir/build.h"
+#include "ir/visit.h"
+
+namespace retrograde::codegen {
+
+using namespace ir;
+
+namespace {
+
+// Addresses that are handed to retrograde_semaphore_acquire, without repetition.
+std::vector<const Load*> semaphores_in(const Fork& s) {
+  std::vector<const Load*> found;
+  std::set<std::pair<std::string, int64_t>> seen;
+  const auto visit = [&](const Expr& e) {
+    const auto* call = e.as<Call>();
+    if (!call || !call->is_op(Op::runtime_call)) return true;
+    const auto* name = call->args[0].as<StringImm>();
+    if (!name || name->value != "retrograde_semaphore_acquire") return true;
+    const auto* address = call->args[1].as<Call>();
+    const auto* load = address && address->is_op(Op::address_of) ? address->args[0].as<Load>()
+                                                                : nullptr;
+    const auto index = load ? as_const_int(load->index) : std::nullopt;
+    if (index && seen.emplace(load->name, *index).second) found.push_back(load);
+    return true;
+  };
+  const auto all = [](const Stmt&) { return true; };
+  walk(s.first, visit, all);
+  walk(s.rest, visit, all);
+  return found;
+}
+
+}  // namespace
+
+void FunctionGenerator::make(const Fork& s) {
+  auto* pointer = b_.getPtrTy();
+  auto* int32 = b_.getInt32Ty();
+  std::vector<Value*> semaphores;
+  {
+    const MemoScope scope(*this, false);
+    for (const Load* load : semaphores_in(s)) {
+      const auto found = frame_.storages.find(load->name);
+      if (found == frame_.storages.end()) continue;  // lives inside of a branch
+      semaphores.push_back(element_pointer(found->second, load->type, index64(load->index)));
+    }
+  }
+  const auto count = static_cast<int64_t>(semaphores.size());
+  Value* list = entry_alloca(pointer, std::max<int64_t>(count, 1), "semaphores");
+  for (unsigned i = 0; i < semaphores.size(); i++)
+    b_.CreateStore(semaphores[i], b_.CreateConstGEP1_64(pointer, list, i));
+  const Task first = outline(s.first, "fork"), rest = outline(s.rest, "join");
+  const auto fork = runtime_function(
+      "retrograde_fork", int32, {pointer, pointer, pointer, pointer, pointer, pointer, int32});
+  Value* code = b_.CreateCall(fork, {frame_.context, first.function, first.closure, rest.function,
+                                     rest.closure, list, b_.getInt32(semaphores.size())});
+  fail_unless(b_.CreateICmpEQ(code, b_.getInt32(0)), [&] { return code; });
+}
+
+}  // namespace retrograde::codegen

@@ -1,0 +1,91 @@
+// Calls of the runtime that lowering puts in: functions by name, values packed into memory, events.
+#include <HalideRuntime.h>
+
+#include "codegen/function_generator.h"
+#include "diagnostics/error.h"
+#include "ir/build.h"
+
+namespace retrograde::codegen {
+
+using namespace ir;
+
+// (function, args...): function(context, args...).
+Value* FunctionGenerator::runtime_call(const Call& e) {
+  const auto* name = e.args[0].as<StringImm>();
+  RETROGRADE_ASSERT(name != nullptr, "a runtime call of no name");
+  std::vector<Value*> args = {frame_.context};
+  std::vector<llvm::Type*> params = {b_.getPtrTy()};
+  for (size_t i = 1; i < e.args.size(); i++) {
+    RETROGRADE_ASSERT(e.args[i].type().is_scalar(), "a vector goes to ", name->value);
+    args.push_back(value(e.args[i]));
+    params.push_back(args.back()->getType());
+  }
+  return b_.CreateCall(runtime_function(name->value, llvm_type(e_, e.type), params), args);
+}
+
+// The bytes of the values as they lie in memory, without gaps.
+Value* FunctionGenerator::pack(const std::vector<Expr>& parts) {
+  int64_t bytes = 0;
+  for (const Expr& part : parts) bytes += int64_t{part.type().bytes()} * part.type().lanes();
+  llvm::AllocaInst* block = entry_alloca(b_.getInt8Ty(), std::max<int64_t>(bytes, 1), "packed");
+  block->setAlignment(llvm::Align(16));
+  uint64_t offset = 0;
+  for (const Expr& part : parts) {
+    const Type type = part.type();
+    Value* at = b_.CreateConstGEP1_64(b_.getInt8Ty(), block, offset);
+    b_.CreateAlignedStore(to_memory(type, value(part)), at, llvm::Align(1));
+    offset += static_cast<uint64_t>(type.bytes()) * static_cast<uint64_t>(type.lanes());
+  }
+  return block;
+}
+
+// (address): a hint, and no access: the address may be anything.
+Value* FunctionGenerator::prefetch(const Call& e) {
+  b_.CreateIntrinsic(llvm::Intrinsic::prefetch, {b_.getPtrTy()},
+                     {value(e.args[0]), b_.getInt32(0), b_.getInt32(3), b_.getInt32(1)});
+  return b_.getInt32(0);
+}
+
+static uint32_t type_word(Type type) {
+  const int code = type.code() == TypeCode::BFloat ? 4 : static_cast<int>(type.code());
+  return static_cast<uint32_t>(code) | static_cast<uint32_t>(type.bits()) << 8 |
+         static_cast<uint32_t>(type.lanes()) << 16;
+}
+
+// (value, event, func, value index, parent, coordinates...): a halide_trace_event_t on the stack.
+Value* FunctionGenerator::trace(const Call& e) {
+  constexpr size_t first_coordinate = 5;
+  const auto scalar = [&](const Expr& arg) { return lane(e_, value(arg), 0); };
+  const auto constant = [&](const Expr& arg) {
+    const Expr element = arg.as<Broadcast>() ? arg.as<Broadcast>()->value : arg;
+    return static_cast<uint32_t>(as_const_int(element).value_or(0));
+  };
+  const auto text_of = [&](const Expr& arg) {
+    return value(arg.as<Broadcast>() ? arg.as<Broadcast>()->value : arg);
+  };
+  const std::vector<Expr> coordinates(e.args.begin() + first_coordinate, e.args.end());
+  uint32_t dimensions = 0;
+  for (const Expr& coordinate : coordinates)
+    dimensions += static_cast<uint32_t>(coordinate.type().lanes());
+  llvm::AllocaInst* event =
+      entry_alloca(b_.getInt8Ty(), sizeof(halide_trace_event_t), "trace_event");
+  event->setAlignment(llvm::Align(16));
+  const auto set = [&](size_t offset, Value* field) {
+    b_.CreateStore(field, b_.CreateConstGEP1_64(b_.getInt8Ty(), event, offset));
+  };
+  set(offsetof(halide_trace_event_t, func), text_of(e.args[2]));
+  set(offsetof(halide_trace_event_t, value), pack({e.args[0]}));
+  set(offsetof(halide_trace_event_t, coordinates), pack(coordinates));
+  set(offsetof(halide_trace_event_t, trace_tag), llvm::ConstantPointerNull::get(b_.getPtrTy()));
+  set(offsetof(halide_trace_event_t, type), b_.getInt32(type_word(e.type)));
+  set(offsetof(halide_trace_event_t, event), b_.getInt32(constant(e.args[1])));
+  set(offsetof(halide_trace_event_t, parent_id), scalar(e.args[4]));
+  set(offsetof(halide_trace_event_t, value_index), b_.getInt32(constant(e.args[3])));
+  set(offsetof(halide_trace_event_t, dimensions), b_.getInt32(dimensions));
+  const auto tell =
+      runtime_function("retrograde_trace", b_.getInt32Ty(), {b_.getPtrTy(), b_.getPtrTy()});
+  b_.CreateCall(tell, {frame_.context, event});
+  return value(e.args[0]);
+}
+
+}  // namespace retrograde::codegen

@@ -1,0 +1,28 @@
+// atomic_update.h -- the form of a store that changes an element by one operation: what lowering
+// keeps as a vector, and code generation makes an instruction of.
+#pragma once
+
+#include <optional>
+
+#include "ir/expr.h"
+
+namespace retrograde::ir {
+
+// f[i] = f[i] op operand
+struct AtomicUpdate {
+  Kind kind;         // Add, Mul, Min, Max, And, Or; Call for a bitwise operator
+  Op op = Op::none;  // bitwise_and, bitwise_or, bitwise_xor
+  Expr operand;      // reads nothing of f
+  bool is_negated = false;  // f[i] - operand
+};
+
+// Of integers also a chain of one associative operation: the operands are put together. None when
+// the store has another form.
+std::optional<AtomicUpdate> find_atomic_update(const Store& store);
+
+// Whether one instruction can exchange a value of the type.
+bool is_one_word(Type type);
+
+bool loads_from(const Expr& e, const std::string& buffer);
+
+}  // namespace retrograde::ir

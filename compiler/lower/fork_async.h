@@ -1,0 +1,19 @@
+// fork_async -- producers that run at the same time as their consumers.
+#pragma once
+
+#include <map>
+#include <string>
+
+#include "lower/memoize.h"
+#include "lower/program.h"
+
+namespace retrograde::ir {
+
+// By Func: how many iterations its producer may be ahead of its consumer; 0: any number. Only of
+// async Funcs that are stored outside of where they are computed.
+using AsyncRoom = std::map<std::string, int>;
+
+Stmt fork_async(const Stmt& s, const Program& program, const RenamedFuncs& renamed,
+                const AsyncRoom& room);
+
+}  // namespace retrograde::ir

@@ -1,0 +1,104 @@
+// Two statements at the same time, and the semaphores between them.
+//
+// The first runs on a thread of its own, the rest on the caller's. A pool's thread would do as long
+// as one is free; but the two may wait for each other many times, and a pool whose threads all wait
+// runs nobody's loops. With a thread for each there is always one that can go on.
+//
+// When one of the two fails it closes the semaphores, so that the other finds out at its next wait,
+// leaves too, and the error of the one that failed by itself is what the call gives.
+#include <atomic>
+#include <new>
+#include <thread>
+
+#include "report.h"
+
+namespace retrograde::runtime {
+namespace {
+
+constexpr int32_t closed = INT32_MIN;
+// What a wait for a closed semaphore gives: told to nobody, and replaced by the error behind it.
+constexpr int32_t cancelled = -1000;
+
+using Count = std::atomic<int32_t>;
+static_assert(sizeof(Count) <= retrograde_semaphore_bytes);
+
+Count& count_of(void* semaphore) { return *static_cast<Count*>(semaphore); }
+
+void close(void* semaphore) {
+  count_of(semaphore).store(closed, std::memory_order_release);
+  count_of(semaphore).notify_all();
+}
+
+struct Branch {
+  retrograde_context* context;
+  retrograde_task task;
+  uint8_t* closure;
+  void** semaphores;
+  int32_t semaphore_count;
+  int32_t code = 0;
+  Failure failure = {};
+
+  void run() {
+    const FailureScope scope(&failure);
+    code = task(context, 0, closure);
+    for (int32_t i = 0; code != 0 && i < semaphore_count; i++) close(semaphores[i]);
+  }
+};
+
+int32_t outcome(retrograde_context* context, const Branch& first, const Branch& rest) {
+  const bool take_rest = first.code == 0 || (first.code == cancelled && rest.code != 0);
+  const Branch& failed = take_rest ? rest : first;
+  if (failed.code != 0 && failed.failure.message[0])
+    report(context, failed.code, failed.failure.message);
+  return failed.code;
+}
+
+}  // namespace
+}  // namespace retrograde::runtime
+
+namespace rt = retrograde::runtime;
+
+int32_t retrograde_semaphore_init(retrograde_context*, void* semaphore, int32_t count) {
+  new (semaphore) rt::Count(count);
+  return 0;
+}
+
+int32_t retrograde_semaphore_release(retrograde_context*, void* semaphore, int32_t count) {
+  rt::Count& has = rt::count_of(semaphore);
+  int32_t now = has.load(std::memory_order_relaxed);
+  do {
+    if (now == rt::closed) return 0;
+  } while (!has.compare_exchange_weak(now, now + count, std::memory_order_acq_rel));
+  has.notify_all();
+  return 0;
+}
+
+int32_t retrograde_semaphore_acquire(retrograde_context*, void* semaphore, int32_t count) {
+  rt::Count& has = rt::count_of(semaphore);
+  int32_t now = has.load(std::memory_order_acquire);
+  while (now != rt::closed) {
+    if (now < count) {
+      has.wait(now, std::memory_order_acquire);
+      now = has.load(std::memory_order_acquire);
+    } else if (has.compare_exchange_weak(now, now - count, std::memory_order_acq_rel)) {
+      return 0;
+    }
+  }
+  return rt::cancelled;
+}
+
+int32_t retrograde_fork(retrograde_context* context, retrograde_task first, uint8_t* first_closure,
+                        retrograde_task rest, uint8_t* rest_closure, void** semaphores,
+                        int32_t semaphore_count) {
+  rt::Branch a{context, first, first_closure, semaphores, semaphore_count};
+  rt::Branch b{context, rest, rest_closure, semaphores, semaphore_count};
+  try {
+    std::thread thread([&a] { a.run(); });
+    b.run();
+    thread.join();
+  } catch (...) {
+    return retrograde_report_error(context, retrograde_error_out_of_memory,
+                                   "cannot run an async producer: the system has no thread left");
+  }
+  return rt::outcome(context, a, b);
+}

@@ -1,0 +1,279 @@
+// async(): a producer on a thread of its own, with every way in which it can be stored.
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <chrono>
+#include <mutex>
+#include <set>
+#include <thread>
+
+#include "frontend/include/retrograde/retrograde.h"
+#include "lower/lower.h"
+#include "ir/print.h"
+#include "retrograde_runtime.h"
+
+namespace {
+std::mutex threads_mutex;
+std::set<std::thread::id> threads_seen[2];
+std::atomic<int> rows_made{0}, largest_lead{0};
+}  // namespace
+
+extern "C" __attribute__((visibility("default"))) int async_test_note(int who, int value) {
+  const std::lock_guard lock(threads_mutex);
+  threads_seen[who].insert(std::this_thread::get_id());
+  return value;
+}
+
+namespace retrograde {
+namespace {
+
+Expr noted(int who, Expr value) {
+  return ir::call_extern("async_test_note", Int(32), {Expr(who), std::move(value)});
+}
+
+void async(Func& f) {
+  f.function()->schedule.async = true;
+  f.function()->version++;
+}
+
+class Async : public testing::TestWithParam<int> {
+ protected:
+  void SetUp() override {
+    for (auto& seen : threads_seen) seen.clear();
+  }
+  void limit(Func& f) { f.jit_handlers().thread_limit = GetParam(); }
+};
+INSTANTIATE_TEST_SUITE_P(Threads, Async, testing::Values(1, 2, 8));
+
+TEST_P(Async, AProducerAtRootRunsOnAnotherThread) {
+  Var x("x");
+  Func f("f"), g("g"), out("out");
+  f(x) = noted(0, x * 2);
+  g(x) = noted(1, x + 1);
+  out(x) = f(x) + g(x);
+  f.compute_root();
+  g.compute_root();
+  async(f);
+  limit(out);
+  Buffer<int> result = out.realize({100});
+  for (int i = 0; i < 100; i++) ASSERT_EQ(result(i), 3 * i + 1);
+  ASSERT_EQ(threads_seen[0].size(), 1u);
+  ASSERT_EQ(threads_seen[1].size(), 1u);
+  EXPECT_NE(*threads_seen[0].begin(), *threads_seen[1].begin());
+}
+
+TEST_P(Async, ParallelLoopsRunInBothBranches) {
+  Var x("x"), y("y");
+  Func f("f"), g("g"), out("out");
+  f(x, y) = x + y;
+  g(x, y) = x * y;
+  out(x, y) = f(x, y) + g(x, y);
+  f.compute_root().parallel(y);
+  g.compute_root().parallel(y);
+  out.parallel(y);
+  async(f);
+  async(g);
+  limit(out);
+  for (int round = 0; round < 20; round++) {
+    Buffer<int> result = out.realize({16, 32});
+    for (int j = 0; j < 32; j++) {
+      for (int i = 0; i < 16; i++) ASSERT_EQ(result(i, j), i + j + i * j);
+    }
+  }
+}
+
+TEST_P(Async, InsideAParallelLoop) {
+  Var x("x"), y("y");
+  Func f("f"), out("out");
+  f(x, y) = x + y;
+  out(x, y) = f(x, y) + f(x + 1, y);
+  f.compute_at(out, y);
+  out.parallel(y);
+  async(f);
+  limit(out);
+  Buffer<int> result = out.realize({16, 64});
+  for (int j = 0; j < 64; j++) {
+    for (int i = 0; i < 16; i++) ASSERT_EQ(result(i, j), 2 * (i + j) + 1);
+  }
+}
+
+struct Stencil {
+  Var x{"x"}, y{"y"};
+  Func f{"f"}, out{"out"};
+  Stencil() {
+    f(x, y) = noted(0, x * 3 + y * 5);
+    out(x, y) = f(x, y - 1) + f(x, y) + f(x + 1, y + 1) + noted(1, 0);
+    f.store_root().compute_at(out, y);
+    async(f);
+  }
+  void expect(int width, int height) {
+    Buffer<int> result = out.realize({width, height});
+    for (int j = 0; j < height; j++) {
+      for (int i = 0; i < width; i++) ASSERT_EQ(result(i, j), 9 * i + 15 * j + 3) << i << " " << j;
+    }
+  }
+};
+
+TEST_P(Async, ASlidingWindowIsHandedOverRowByRow) {
+  Stencil program;
+  limit(program.out);
+  for (int height : {1, 2, 3, 57}) program.expect(33, height);
+  EXPECT_FALSE(threads_seen[0].count(*threads_seen[1].begin()) &&
+               threads_seen[1].count(*threads_seen[0].begin()));
+}
+
+TEST_P(Async, FoldedStorageIsARingBuffer) {
+  for (int rows : {3, 4, 5, 8, 16}) {
+    Stencil program;
+    ir::StorageRule rule;
+    rule.var = program.f.function()->args[1];
+    rule.fold = rows;
+    program.f.function()->schedule.storage_rules.push_back(rule);
+    limit(program.out);
+    for (int round = 0; round < 3; round++) program.expect(33, 61);
+  }
+}
+
+TEST_P(Async, AChainOfThreeAsyncFuncs) {
+  Var x("x"), y("y");
+  Func f("f"), g("g"), h("h"), out("out");
+  f(x, y) = x + y;
+  g(x, y) = f(x, y - 1) + f(x, y + 1);
+  h(x, y) = g(x, y) * 2;
+  out(x, y) = h(x, y - 1) + h(x, y + 1);
+  for (Func* func : {&f, &g, &h}) {
+    func->store_root().compute_at(out, y);
+    async(*func);
+  }
+  limit(out);
+  Buffer<int> result = out.realize({20, 40});
+  for (int j = 0; j < 40; j++) {
+    for (int i = 0; i < 20; i++) ASSERT_EQ(result(i, j), 8 * (i + j));
+  }
+}
+
+TEST_P(Async, AnAsyncFuncThatReadsAnotherOfTheSameLoopsInOrder) {
+  Var x("x"), y("y");
+  Func f("f"), out("out");
+  RDom r(0, 3);
+  f(x, y) = 1;
+  f(x, y) += r * x + y;
+  out(x, y) = f(x, y) + f(x, y + 2);
+  f.store_root().compute_at(out, y);
+  async(f);
+  limit(out);
+  Buffer<int> result = out.realize({9, 30});
+  for (int j = 0; j < 30; j++) {
+    for (int i = 0; i < 9; i++) ASSERT_EQ(result(i, j), 2 + 6 * i + 6 * j + 6);
+  }
+}
+
+// ---- failures ----
+
+TEST_P(Async, AnErrorOfTheProducerReleasesTheConsumer) {
+  Var x("x"), y("y");
+  for (bool folded : {false, true}) {
+    Param<int> bad("bad");
+    Func f("f"), out("out");
+    f(x, y) = require(y != bad, x + y, "row", y, "is broken");
+    out(x, y) = f(x, y) + f(x, y + 1);
+    f.store_root().compute_at(out, y);
+    if (folded) {
+      ir::StorageRule rule;
+      rule.var = f.function()->args[1];
+      rule.fold = 2;
+      f.function()->schedule.storage_rules.push_back(rule);
+    }
+    async(f);
+    limit(out);
+    bad.set(17);
+    try {
+      out.realize({8, 40});
+      FAIL() << "no error";
+    } catch (const RuntimeError& error) {
+      EXPECT_NE(std::string(error.what()).find("row 17 is broken"), std::string::npos)
+          << error.what();
+    }
+  }
+}
+
+TEST_P(Async, AnErrorOfTheConsumerReleasesTheProducer) {
+  Var x("x"), y("y");
+  Func f("f"), out("out");
+  f(x, y) = x + y;
+  out(x, y) = require(f(x, y) + f(x, y + 1) < 50, f(x, y), "too large");
+  f.store_root().compute_at(out, y);
+  ir::StorageRule rule;
+  rule.var = f.function()->args[1];
+  rule.fold = 2;
+  f.function()->schedule.storage_rules.push_back(rule);
+  async(f);
+  limit(out);
+  try {
+    out.realize({8, 400});
+    FAIL() << "no error";
+  } catch (const RuntimeError& error) {
+    EXPECT_NE(std::string(error.what()).find("too large"), std::string::npos) << error.what();
+  }
+}
+
+// ---- the runtime alone ----
+
+struct Handshake {
+  uint64_t ready = 0, space = 0;
+  int rounds = 0, value = 0, sum = 0;
+  int fail_at = -1;
+};
+
+int32_t produce(retrograde_context* context, int32_t, uint8_t* closure) {
+  auto& h = *reinterpret_cast<Handshake*>(closure);
+  for (int i = 0; i < h.rounds; i++) {
+    if (int32_t code = retrograde_semaphore_acquire(context, &h.space, 1)) return code;
+    if (i == h.fail_at) return retrograde_report_error(context, -27, "broken at %i", int64_t{i});
+    h.value = i;
+    retrograde_semaphore_release(context, &h.ready, 1);
+  }
+  return 0;
+}
+
+int32_t consume(retrograde_context* context, int32_t, uint8_t* closure) {
+  auto& h = *reinterpret_cast<Handshake*>(closure);
+  for (int i = 0; i < h.rounds; i++) {
+    if (int32_t code = retrograde_semaphore_acquire(context, &h.ready, 1)) return code;
+    h.sum += h.value;
+    retrograde_semaphore_release(context, &h.space, 1);
+  }
+  return 0;
+}
+
+int32_t run(retrograde_context* context, Handshake& h) {
+  retrograde_semaphore_init(context, &h.ready, 0);
+  retrograde_semaphore_init(context, &h.space, 1);
+  void* semaphores[] = {&h.ready, &h.space};
+  auto* closure = reinterpret_cast<uint8_t*>(&h);
+  return retrograde_fork(context, produce, closure, consume, closure, semaphores, 2);
+}
+
+TEST(Fork, SemaphoresOrderWhatTheBranchesWrite) {
+  Handshake h;
+  h.rounds = 20000;
+  EXPECT_EQ(run(nullptr, h), 0);
+  EXPECT_EQ(h.sum, 20000 / 2 * 19999);
+}
+
+TEST(Fork, TheErrorThatIsToldIsTheOneBehindTheOthers) {
+  std::string told;
+  retrograde_context context = {};
+  context.user_data = &told;
+  context.error_handler = [](retrograde_context* c, int, const char* message) {
+    *static_cast<std::string*>(c->user_data) += message;
+  };
+  Handshake h;
+  h.rounds = 100;
+  h.fail_at = 57;
+  EXPECT_EQ(run(&context, h), -27);
+  EXPECT_EQ(told, "broken at 57");
+}
+
+}  // namespace
+}  // namespace retrograde
