@@ -223,7 +223,9 @@ void Facts::bind(const std::string& name, Expr min, Expr max) {
   ConstantRange range;
   if (min.defined()) range.min = this->range(min).min;
   if (max.defined()) range.max = this->range(max).max;
-  variables_[name] = Bounds{std::move(min), std::move(max), range, next_order_++};
+  Congruence congruence;
+  if (min.defined() && min.same_as(max)) congruence = this->congruence(min);
+  variables_[name] = Bounds{std::move(min), std::move(max), range, congruence, next_order_++};
 }
 
 void Facts::unbind(const std::string& name) { variables_.erase(name); }
@@ -401,7 +403,11 @@ int64_t Facts::eliminate_division(const Sum& sum, const Term& term, const Div& n
   Sum replaced = sum;
   replaced.add(term.atom, -term.factor);
   replaced.add(sum_of(n.a), factor);
-  if (factor < 0) replaced.add_constant(saturate(-__int128{factor} * (*divisor - 1)));
+  if (const std::optional<int64_t> remainder = congruence(n.a).modulo(*divisor)) {
+    replaced.add_constant(saturate(-__int128{factor} * *remainder));
+  } else if (factor < 0) {
+    replaced.add_constant(saturate(-__int128{factor} * (*divisor - 1)));
+  }
   return replaced.valid ? search(replaced, budget) : infinity;
 }
 

@@ -25,6 +25,14 @@ ConstantRange intersection(const ConstantRange& a, const ConstantRange& b);
 ConstantRange operator+(const ConstantRange& a, const ConstantRange& b);
 ConstantRange operator*(const ConstantRange& a, int64_t factor);
 
+// Of an integer: modulus * k + remainder, for some k; modulus 0 makes it that number, modulus 1
+// says nothing.
+struct Congruence {
+  int64_t modulus = 1, remainder = 0;
+  // The value modulo a positive divisor, when all that it may be agree on that.
+  std::optional<int64_t> modulo(int64_t divisor) const;
+};
+
 class Facts {
  public:
   // Simplified ends; undefined: unknown. Later variables may mention earlier ones in their bounds,
@@ -50,17 +58,24 @@ class Facts {
   std::optional<bool> decided(const Expr& condition) const;
 
   ConstantRange range(const Expr& e);
+  // See congruence.cpp.
+  Congruence congruence(const Expr& e);
+  Congruence congruence(const Sum& sum);
   // The tightest constants found around a sum of an index type.
   int64_t upper_bound(const Sum& sum);
   int64_t lower_bound(const Sum& sum);
   // Ranges of expressions are remembered; to be called when variables or conditions change.
-  void forget() { ranges_.clear(); }
+  void forget() {
+    ranges_.clear();
+    congruences_.clear();
+  }
 
  private:
   struct Bounds {
     Expr min, max;
     ConstantRange range;
-    int order;  // of binding: inner variables are eliminated first
+    Congruence congruence;  // of a variable with one value
+    int order;              // of binding: inner variables are eliminated first
   };
   // A fact is a sum that is at most `bound`, or a condition known to be true or false.
   struct Known {
@@ -72,6 +87,10 @@ class Facts {
   struct Remembered {
     Expr key;
     ConstantRange range;
+  };
+  struct RememberedCongruence {
+    Expr key;
+    Congruence value;
   };
 
   void assume(const Expr& condition, bool value);
@@ -85,6 +104,7 @@ class Facts {
   ConstantRange range_of_variable(const Expr& e, const Variable& n);
   ConstantRange range_of_binary(const Binary& n);
   ConstantRange range_of_call(const Call& n);
+  Congruence congruence_of_node(const Expr& e);
 
   int64_t search(const Sum& sum, int& budget);
   int64_t bound_by_ranges(const Sum& sum);
@@ -98,6 +118,7 @@ class Facts {
   std::unordered_multimap<uint64_t, size_t>
       index_;  // hash of the terms or condition -> position in known_
   std::unordered_map<const ExprNode*, Remembered> ranges_;
+  std::unordered_map<const ExprNode*, RememberedCongruence> congruences_;
   int next_order_ = 0;
 };
 

@@ -64,8 +64,15 @@ Expr Simplifier::div_by(const Expr& a, int64_t c) {
   if (const auto* line = a.as<Ramp>()) {
     if (Expr result = div_vector(*line, c); result.defined()) return result;
   }
-  const Split split = split_by(sum_of(a), c);
+  Split split = split_by(sum_of(a), c);
   if (!split.quotient.valid || !split.rest.valid) return binary(Kind::Div, a, constant(a, c));
+  // (x + k) / c => x / c + (r + k) / c, when x is congruent to r
+  Sum terms = split.rest;
+  terms.constant = 0;
+  if (const std::optional<int64_t> r = facts_.congruence(terms).modulo(c)) {
+    split.quotient.add_constant(floor_div(*r + split.rest.constant, c));
+    split.rest.constant = 0;
+  }
   const Sum rest = sum_of(div_atom(split.rest, c));
   return rebuild(plus(split.quotient, rest), Kind::Div, a, constant(a, c));
 }
@@ -120,6 +127,8 @@ Expr Simplifier::mod_by(const Expr& a, int64_t c) {
   }
   Sum rest = split_by(sum_of(a), c).rest;
   if (!rest.valid) return binary(Kind::Mod, a, constant(a, c));
+  if (const std::optional<int64_t> known = facts_.congruence(rest).modulo(c))
+    return constant(a, *known);
   // f * (x % m) => f * x, when c divides f * m
   for (const Term& term : Sum(rest).terms) {
     const auto* inner = term.atom.as<Mod>();

@@ -84,13 +84,22 @@ Expr Simplifier::rebuild(Sum sum) {
 }
 
 // n * c * (x / c) + n * (x % c) => n * x, and n * x - n * c * (x / c) => n * (x % c). Both follow
-// from x == x / c * c + x % c.
+// from x == x / c * c + x % c. A remainder that is known: n * c * (x / c) => n * x - n * remainder.
 bool Simplifier::join_divisions(Sum& sum) {
   for (const Term& quotient : sum.terms) {
     const std::optional<int64_t> c = constant_divisor(quotient.atom, Kind::Div);
     if (!c || quotient.factor % *c != 0) continue;
     const int64_t n = quotient.factor / *c;
     const auto* division = quotient.atom.as<Binary>();
+    if (const std::optional<int64_t> known = facts_.congruence(division->a).modulo(*c)) {
+      Sum exact = sum;
+      exact.add(quotient.atom, -quotient.factor);
+      exact.add(sum_of(division->a), n);
+      exact.add(constant_sum(sum.type, *known), -n);
+      if (!exact.valid) continue;
+      sum = std::move(exact);
+      return true;
+    }
     const Expr remainder = binary(Kind::Mod, division->a, division->b);
     const Sum x = sum_of(division->a);
     const Term* found = sum.find(remainder);

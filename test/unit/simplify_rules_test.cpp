@@ -208,6 +208,23 @@ TEST(SimplifyStmt, Lets) {
   check_stmt("let x = print(n)\na[0] = 1", "let x = print(n)\na[0] = 1");
 }
 
+TEST(SimplifyStmt, KnowsLetsModuloConstants) {
+  const std::string even = "let e = (n + 1)/2*2 - 2\n", odd = "let o = m*4 + 1\n";
+  check_stmt(even + "a[e] = e % 2", even + "a[e] = 0");
+  check_stmt(even + "a[e] = (e + 1) % 2", even + "a[e] = 1");
+  check_stmt(even + "a[e] = (e + 3)/2", even + "a[e] = e/2 + 1");
+  check_stmt(even + "a[e] = e/2*2", even + "a[e] = e");
+  check_stmt(even + "a[e] = (e + x*6 + 5) % 2", even + "a[e] = 1");
+  check_stmt(even + "a[e] = (e*3) % 4", even + "a[e] = e*3 % 4");
+  check_stmt(odd + "a[o] = (o*o + 6) % 4", odd + "a[o] = 3");
+  check_stmt(odd + "a[o] = o % 8", odd + "a[o] = o % 8");
+  check_stmt(even + odd + "for (x, 0, (o - e + 1)/2) { a[min(x*2, o - e - 1)] = 1 }",
+             even + odd + "for (x, 0, (o - e)/2 + 1) { a[x*2] = 1 }");
+  check_stmt(even + odd + "a[e + o] = min(e, o) % 2", even + odd + "a[e + o] = min(e, o) % 2");
+  check_stmt("let e = select(c:bool, k*6, k*10 + 4)\na[e] = e % 2",
+             "let e = select(c:bool, k*6, k*10 + 4)\na[e] = 0");
+}
+
 TEST(SimplifyStmt, UsesLoopBoundsConditionsAndAsserts) {
   check_stmt("for (x, 0, n) { if (x < n) { a[max(x, 0)] = 1 } }", "for (x, 0, n) { a[x] = 1 }");
   check_stmt("for (x, 0, (n + 7)/8) { for (y, 0, 8) { if (x*8 + y < n + 7) { a[x*8 + y] = 1 } } }",

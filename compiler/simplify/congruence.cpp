@@ -1,0 +1,102 @@
+// Congruences: what is known of an index expression modulo a constant. Lets carry them to their
+// names, so that what align_bounds promises survives in loops far below.
+//
+// Set in which x lies => set of the result, m * Z + r being {m, r} and a constant {0, value}:
+//   {m, r} + {n, s}  {gcd(m, n), r + s}
+//   {m, r} * {n, s}  {gcd(m n, m s, n r), r s}
+//   {m, r} / c       {m / c, floor(r / c)}, when c divides m
+//   either of two    {gcd(m, n, r - s), r}
+// Products beyond int64 make it unknown, {1, 0}.
+#include <numeric>
+
+#include "ir/build.h"
+#include "ir/scalar.h"
+#include "ir/visit.h"
+#include "simplify/facts.h"
+
+namespace retrograde::ir {
+
+namespace {
+
+constexpr Congruence unknown{1, 0};
+constexpr int64_t limit = int64_t{1} << 31;  // products of two stay inside int64
+
+Congruence reduced(int64_t modulus, int64_t remainder) {
+  if (modulus < 0) modulus = -modulus;
+  if (modulus >= limit || remainder >= limit || remainder <= -limit) return unknown;
+  return {modulus, modulus == 0 ? remainder : floor_mod(remainder, modulus)};
+}
+
+Congruence plus(const Congruence& a, const Congruence& b) {
+  return reduced(std::gcd(a.modulus, b.modulus), a.remainder + b.remainder);
+}
+
+Congruence product(const Congruence& a, const Congruence& b) {
+  const int64_t modulus =
+      std::gcd(std::gcd(a.modulus * b.modulus, a.modulus * b.remainder), b.modulus * a.remainder);
+  return reduced(modulus, a.remainder * b.remainder);
+}
+
+Congruence quotient(const Congruence& a, int64_t divisor) {
+  if (a.modulus % divisor != 0) return unknown;
+  return reduced(a.modulus / divisor, floor_div(a.remainder, divisor));
+}
+
+Congruence either(const Congruence& a, const Congruence& b) {
+  const int64_t modulus = std::gcd(std::gcd(a.modulus, b.modulus), a.remainder - b.remainder);
+  return reduced(modulus, a.remainder);
+}
+
+}  // namespace
+
+std::optional<int64_t> Congruence::modulo(int64_t divisor) const {
+  if (modulus % divisor != 0) return std::nullopt;
+  return floor_mod(remainder, divisor);
+}
+
+Congruence Facts::congruence(const Expr& e) {
+  if (const std::optional<int64_t> value = as_const_int(e)) return reduced(0, *value);
+  if (!is_index_type(e.type())) return unknown;
+  if (const auto found = congruences_.find(e.get()); found != congruences_.end())
+    return found->second.value;
+  const Congruence result = congruence_of_node(e);
+  congruences_.emplace(e.get(), RememberedCongruence{e, result});
+  return result;
+}
+
+Congruence Facts::congruence(const Sum& sum) {
+  Congruence result = reduced(0, sum.constant);
+  for (const Term& term : sum.terms)
+    result = plus(result, product(reduced(0, term.factor), congruence(term.atom)));
+  return result;
+}
+
+Congruence Facts::congruence_of_node(const Expr& e) {
+  if (const auto* n = e.as<Variable>()) {
+    const auto found = variables_.find(n->name);
+    return found == variables_.end() ? unknown : found->second.congruence;
+  }
+  if (const auto* n = e.as<Select>()) {
+    return either(congruence(n->true_value), congruence(n->false_value));
+  }
+  const auto* n = e.as<Binary>();
+  if (!n) return unknown;
+  const std::optional<int64_t> divisor = as_const_int(n->b);
+  switch (n->kind) {
+    case Kind::Add:
+      return plus(congruence(n->a), congruence(n->b));
+    case Kind::Sub:
+      return plus(congruence(n->a), product({0, -1}, congruence(n->b)));
+    case Kind::Mul:
+      return product(congruence(n->a), congruence(n->b));
+    case Kind::Min:
+    case Kind::Max:
+      return either(congruence(n->a), congruence(n->b));
+    case Kind::Div:
+      return divisor && *divisor > 0 ? quotient(congruence(n->a), *divisor) : unknown;
+    default:
+      return unknown;
+  }
+}
+
+}  // namespace retrograde::ir
