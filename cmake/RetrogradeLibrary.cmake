@@ -38,7 +38,8 @@ target_link_libraries(retrograde_halide_compat INTERFACE retrograde)
 
 include(CMakePackageConfigHelpers)
 set(package_dir ${CMAKE_INSTALL_LIBDIR}/cmake/retrograde)
-install(TARGETS retrograde retrograde_halide_compat EXPORT retrogradeTargets)
+install(TARGETS retrograde retrograde_halide_compat retrograde_static_runtime
+  EXPORT retrogradeTargets)
 install(EXPORT retrogradeTargets NAMESPACE retrograde:: DESTINATION ${package_dir})
 configure_package_config_file(${PROJECT_SOURCE_DIR}/cmake/retrogradeConfig.cmake.in
   ${CMAKE_BINARY_DIR}/retrogradeConfig.cmake INSTALL_DESTINATION ${package_dir})
@@ -46,11 +47,19 @@ write_basic_package_version_file(${CMAKE_BINARY_DIR}/retrogradeConfigVersion.cma
   COMPATIBILITY SameMinorVersion)
 install(FILES ${CMAKE_BINARY_DIR}/retrogradeConfig.cmake
   ${CMAKE_BINARY_DIR}/retrogradeConfigVersion.cmake DESTINATION ${package_dir})
+# The same for find_package(Retrograde).
+install(FILES ${CMAKE_BINARY_DIR}/retrogradeConfig.cmake DESTINATION ${package_dir}
+  RENAME retrograde-config.cmake)
+install(FILES ${CMAKE_BINARY_DIR}/retrogradeConfigVersion.cmake DESTINATION ${package_dir}
+  RENAME retrograde-config-version.cmake)
 
 configure_file(${PROJECT_SOURCE_DIR}/cmake/retrograde.pc.in ${CMAKE_BINARY_DIR}/retrograde.pc @ONLY)
 configure_file(${PROJECT_SOURCE_DIR}/cmake/retrograde-halide.pc.in
   ${CMAKE_BINARY_DIR}/retrograde-halide.pc @ONLY)
+configure_file(${PROJECT_SOURCE_DIR}/cmake/retrograde-runtime.pc.in
+  ${CMAKE_BINARY_DIR}/retrograde-runtime.pc @ONLY)
 install(FILES ${CMAKE_BINARY_DIR}/retrograde.pc ${CMAKE_BINARY_DIR}/retrograde-halide.pc
+  ${CMAKE_BINARY_DIR}/retrograde-runtime.pc
   DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig)
 install(DIRECTORY ${PROJECT_SOURCE_DIR}/compiler/frontend/include/
   DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} FILES_MATCHING PATTERN "*.h")
