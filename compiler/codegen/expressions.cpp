@@ -74,6 +74,9 @@ void FunctionGenerator::bind_let(const std::string& name, const Expr& bound) {
       bound.type() == Int(32) && (bound.as<Add>() || bound.as<Sub>() || bound.as<Mul>());
   Value* wide = is_sum ? index64(bound) : nullptr;
   if (v->getName().empty() && !llvm::isa<llvm::Constant>(v)) v->setName(name);
+  if (bound.type().is_vector() && bound.type().is_int()) {
+    if (const Coordinate at = coordinate(bound); at.is_plain) frame_.coordinates[name] = at;
+  }
   frame_.variables[name] = v;
   frame_.indices.erase(name);
   if (wide) frame_.indices[name] = wide;

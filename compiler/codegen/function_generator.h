@@ -12,6 +12,7 @@
 //   buffers.cpp       halide_buffer_t
 #pragma once
 
+#include <array>
 #include <map>
 #include <optional>
 #include <string>
@@ -64,6 +65,11 @@ class FunctionGenerator {
     FunctionGenerator& generator_;
   };
 
+  // What an index vector is made of: only sums, minima and maxima of ramps; some held by a bound.
+  struct Coordinate {
+    bool is_plain, is_held;
+  };
+
   // What belongs to one LLVM function: the lowered function itself or the body of a parallel loop.
   struct Frame {
     llvm::Function* function = nullptr;
@@ -74,11 +80,13 @@ class FunctionGenerator {
     llvm::AllocaInst* owned_slots = nullptr;  // an array of pointers, as long as the function needs
     int64_t owned_count = 0;
     int64_t stack_bytes = 0;  // of allocations
+    std::array<llvm::AllocaInst*, 2> scratch = {};
     std::vector<MemoFrame> memo;
     std::unordered_map<std::string, Value*> variables;
     std::unordered_map<std::string, Value*>
         indices;  // int32 variables as 64-bit integers, see index64
     std::unordered_map<std::string, Storage> storages;
+    std::unordered_map<std::string, Coordinate> coordinates;  // names of plain ones
   };
 
   // statements.cpp
@@ -182,6 +190,9 @@ class FunctionGenerator {
   Value* lane_index(Value* first, Value* stride, int lane);
   Value* load_apart(const Storage& from, Type type, Value* first, Value* stride);
   Value* gather(const Storage& from, Type type, Value* indices, Value* predicate);
+  Coordinate coordinate(const Expr& index) const;
+  Value* gather_in_loop(const Storage& from, Type type, Value* indices);
+  Value* scratch(size_t slot, llvm::Type* type);
   void make(const ir::Store& s);
   void store_scalar(const Storage& to, Type type, Value* index, Value* value, Value* predicate);
   void store_vector(const Storage& to, Type type, const Expr& index, Value* value,
