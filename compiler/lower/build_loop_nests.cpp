@@ -12,6 +12,7 @@
 #include "lower/extern_stage.h"
 #include "lower/nest_checks.h"
 #include "lower/site.h"
+#include "lower/specialize.h"
 #include "lower/stage_nest.h"
 #include "lower/storage_folding.h"
 #include "lower/value_bounds.h"
@@ -96,8 +97,8 @@ class NestEmitter {
       if (use.is_image) nests.images[name] = use;
     nests.body = all.stmt;
     nests.outputs = std::move(outputs_);
-    for (const auto& [name, folds] : folds_) {
     nests.async_room = std::move(async_room_);
+    for (const auto& [name, folds] : folds_) {
       for (const Fold& fold : folds) nests.folds[name].push_back(fold.factor);
     }
     return nests;
@@ -113,8 +114,8 @@ class NestEmitter {
   std::set<std::string> storage_sites_;  // "consumer.loop" that store something
   std::map<std::string, Box> outputs_;
   std::map<std::string, std::vector<Fold>> folds_;
-
   std::map<std::string, int> async_room_;
+
   void note_site(int index) {
     const LoopedFunc& f = program_.funcs[index];
     const LoopLevel& level = f.schedule.compute_level;
@@ -198,6 +199,8 @@ class NestEmitter {
     }
     if (f.is_output) required = output_box(f, required);
     check_bounded(program_, f, required);
+    std::vector<Stmt> checks;
+    apply_promised_bounds(f, required, checks);
     const Wanted want = wanted[f.name()];
     const std::vector<Loop> loops = loops_to_storage(f, site);
     std::vector<Slide> slides;
@@ -206,20 +209,17 @@ class NestEmitter {
     if (want.first != want.last) clamp_to_needed(required, slides, site);
 
     Piece piece{&f, {}, slide_lead(slides, want.first, site), {}};
-    Emitted made = emit_func(f, required, slides, site);
+    Emitted made = emit_func(f, required, slides, site, std::move(checks));
     Box allocated = std::move(made.storage[f.name()]);
     made.storage.erase(f.name());
     for (const auto& [name, use] : made.uses) note_use(wanted, code, name, piece.lead);
-    merge_footprints(code.uses, made.uses);
-    merge_storage(code.storage, made.storage);
-    code.has_loops |= made.has_loops;
-    code.has_vectors |= made.has_vectors;
+    merge_code(code, made);
     if (f.is_output) {
       outputs_[f.name()] = allocated;
     } else {
-      if (f.schedule.async && !loops.empty()) note_async_room(f, slides, site.touched(touched));
       Box touched = hull(required, allocated);
       made.stmt = fold_storage(f, touched, loops, slides, code.has_vectors, site, made.stmt);
+      if (f.schedule.async && !loops.empty()) note_async_room(f, slides, site.touched(touched));
       if (is_stored_where_computed(f)) {
         piece.realized = allocated;
       } else {
@@ -283,27 +283,23 @@ class NestEmitter {
 
   // All stages of f over `required`, or the parts of it that slides leave. The box that its storage
   // must have comes back in storage[f].
-  Emitted emit_func(const LoopedFunc& f, Box required, const std::vector<Slide>& slides,
-                    Site& site) {
-    std::vector<Stmt> stmts;
-    apply_promised_bounds(f, required, stmts);
+  Emitted emit_func(const LoopedFunc& f, const Box& required, const std::vector<Slide>& slides,
+                    Site& site, std::vector<Stmt> stmts) {
     Emitted result;
     std::vector<Stmt> stages(f.stages.size());
     Box need = required;
     for (int s = static_cast<int>(f.stages.size()) - 1; s >= 0; s--) {
       bool is_last = s == static_cast<int>(f.stages.size()) - 1;
       Domain domain = bind_domain(f, s, need, is_last ? slides : std::vector<Slide>(), site);
-      Emitted stage = f.func->is_extern() ? emit_extern(f, domain, site) : emit_stage(f, s, domain);
+      Emitted stage =
+          f.func->is_extern() ? emit_extern(f, domain, site) : emit_variants(f, s, domain);
       if (auto self = stage.uses.find(f.name()); self != stage.uses.end()) {
         need = hull(need, self->second.box);
         check_bounded(program_, f, need);
         stage.uses.erase(self);
       }
       stages[s] = stage.stmt;
-      merge_footprints(result.uses, stage.uses);
-      merge_storage(result.storage, stage.storage);
-      result.has_loops |= stage.has_loops;
-      result.has_vectors |= stage.has_vectors;
+      merge_code(result, stage);
     }
     stmts.insert(stmts.end(), stages.begin(), stages.end());
     result.stmt = make_block(std::move(stmts));
@@ -359,6 +355,11 @@ class NestEmitter {
     for (const ReductionVariable& r : f.stages[s].rvars) {
       Expr min = cast(Int(32), r.min), extent = cast(Int(32), r.extent);
       Interval range{min, simplify(min + extent - 1)};
+      domain[r.var] = site.bind(prefix + r.var, range);
+    }
+    return domain;
+  }
+
   Emitted emit_extern(const LoopedFunc& f, const Domain& domain, Site& site) const {
     ExternStage stage = emit_extern_stage(program_, f, domain);
     for (auto& binding : stage.bindings) site.bindings.push_back(std::move(binding));
@@ -367,11 +368,6 @@ class NestEmitter {
     code.uses = std::move(stage.uses);
     code.has_loops = true;
     return code;
-  }
-
-      domain[r.var] = site.bind(prefix + r.var, range);
-    }
-    return domain;
   }
 
   Emitted emit_stage(const LoopedFunc& f, int s, const Domain& domain) {
@@ -392,10 +388,54 @@ class NestEmitter {
     return code;
   }
 
+  // The stage as each specialization has it: if (condition) this one else the next.
+  Emitted emit_variants(const LoopedFunc& f, int s, const Domain& domain) {
+    if (f.stages[s].schedule.specializations.empty()) return emit_stage(f, s, domain);
+    const std::vector<Variant> variants = variants_of(f, s);
+    Emitted result;
+    for (auto it = variants.rbegin(); it != variants.rend(); ++it) {
+      Emitted code;
+      if (it->failure.empty()) {
+        code = emit_variants(it->func, s, domain);
+      } else {
+        code.stmt = fail_specialized(f, it->failure);
+      }
+      if (!it->condition.defined()) {
+        result = std::move(code);
+        continue;
+      }
+      code.stmt = make_if(it->condition, code.stmt, result.stmt);
+      for (auto& [name, use] : result.uses) choose_box(it->condition, code.uses[name].box, use.box);
+      for (auto& [name, box] : result.storage) choose_box(it->condition, code.storage[name], box);
+      merge_code(code, result);
+      result = std::move(code);
+    }
+    return result;
+  }
+
+  // Where a condition over parameters chooses between two boxes, so does what needs to be there.
+  static void choose_box(const Expr& condition, Box& chosen, Box& other) {
+    for (size_t d = 0; d < std::min(chosen.size(), other.size()); d++) {
+      for (auto end : {&Interval::min, &Interval::max}) {
+        Expr &a = chosen[d].*end, &b = other[d].*end;
+        if (!a.defined() || !b.defined() || is_zero(simplify(a - b))) continue;
+        a = b = select(condition, a, b);
+      }
+    }
+  }
+
+  // All that `from` needs; the statement stays.
+  static void merge_code(Emitted& into, const Emitted& from) {
+    merge_footprints(into.uses, from.uses);
+    merge_storage(into.storage, from.storage);
+    into.has_loops |= from.has_loops;
+    into.has_vectors |= from.has_vectors;
+  }
+
   static void wrap(const Loop& loop, Emitted& code) {
     Expr min = code.lead > 0 ? simplify(loop.min - code.lead) : loop.min;
     Expr extent = code.lead > 0 ? simplify(loop.extent + code.lead) : loop.extent;
-    code.stmt = make_for(loop.name, min, extent, loop.for_type, code.stmt);
+    code.stmt = make_for(loop.name, min, extent, loop.for_type, code.stmt, loop.partition);
     code.lead = 0;
     code.unranged.push_back(loop);
     code.has_loops |= loop.for_type == ForType::Parallel ||
@@ -460,28 +500,6 @@ class NestEmitter {
     return stmt;
   }
 
-  // A Func that is computed at several places folds where all of them allow it.
-  void note_folds(const LoopedFunc& f, std::vector<Fold> folds) {
-    auto [it, is_first] = folds_.emplace(f.name(), folds);
-    for (size_t d = 0; d < folds.size() && !is_first; d++) {
-      Expr& factor = it->second[d].factor;
-      if (factor.defined() && folds[d].factor.defined()) {
-        factor = simplify(max(factor, folds[d].factor));
-      } else {
-        factor = Expr();
-      }
-    }
-  }
-
-  static const StorageRule* rule_of(const LoopedFunc& f, size_t d) {
-    for (const StorageRule& rule : f.schedule.storage_rules) {
-      if (rule.var == f.func->args[d]) return &rule;
-    }
-    return nullptr;
-  }
-
-  Stmt realize(const LoopedFunc& f, const Box& box, Stmt stmt) {
-    std::vector<Range> ranges;
   // Values that are each computed once, into a place of their own, can be computed at any time. In
   // folded storage of F coordinates, of which an iteration touches W and computes S, there is room
   // for (F - W) / S more.
@@ -506,6 +524,28 @@ class NestEmitter {
     if (!is_first && (it->second == 0 || (room != 0 && room < it->second))) it->second = room;
   }
 
+  // A Func that is computed at several places folds where all of them allow it.
+  void note_folds(const LoopedFunc& f, std::vector<Fold> folds) {
+    auto [it, is_first] = folds_.emplace(f.name(), folds);
+    for (size_t d = 0; d < folds.size() && !is_first; d++) {
+      Expr& factor = it->second[d].factor;
+      if (factor.defined() && folds[d].factor.defined()) {
+        factor = simplify(max(factor, folds[d].factor));
+      } else {
+        factor = Expr();
+      }
+    }
+  }
+
+  static const StorageRule* rule_of(const LoopedFunc& f, size_t d) {
+    for (const StorageRule& rule : f.schedule.storage_rules) {
+      if (rule.var == f.func->args[d]) return &rule;
+    }
+    return nullptr;
+  }
+
+  Stmt realize(const LoopedFunc& f, const Box& box, Stmt stmt) {
+    std::vector<Range> ranges;
     std::vector<Stmt> checks;
     for (size_t d = 0; d < box.size(); d++) {
       Range range{box[d].min, simplify(box[d].max - box[d].min + 1)};

@@ -23,10 +23,6 @@ struct Directive {
 };
 
 constexpr Directive not_yet[] = {
-    {"specialize",
-     [](const LoopedFunc& f) {
-       return any_stage(f, [](const StageSchedule& s) { return !s.specializations.empty(); });
-     }},
     {"compute_with",
      [](const LoopedFunc& f) {
        return any_stage(

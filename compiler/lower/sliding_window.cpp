@@ -1,6 +1,5 @@
 #include "lower/sliding_window.h"
 
-#include <algorithm>
 #include <optional>
 
 #include "analysis/linear.h"
@@ -56,11 +55,6 @@ bool is_pure_in(const LoopedFunc& f, int d) {
   return pure;
 }
 
-bool has_promised_bounds(const LoopedFunc& f, int d) {
-  return std::any_of(f.schedule.bounds.begin(), f.schedule.bounds.end(),
-                     [&](const Bound& b) { return b.var == f.func->args[d]; });
-}
-
 class Slider {
  public:
   Slider(const LoopedFunc& f, const Box& box, const std::vector<Loop>& around)
@@ -68,7 +62,7 @@ class Slider {
 
   std::optional<Slide> over(const Loop& loop, bool is_directly_around, int lead) {
     int d = only_moving_dimension(loop.name);
-    if (d < 0 || slid_[d] || !is_pure_in(f_, d) || has_promised_bounds(f_, d)) return {};
+    if (d < 0 || slid_[d] || !is_pure_in(f_, d)) return {};
     Slide slide{d, loop, 0, false, box_[d], {}};
     if (!moves_one_way(slide)) return {};
     if (!(is_directly_around && start_early(slide, lead)) && !start_whole(slide, lead)) return {};
@@ -177,11 +171,19 @@ class Slider {
     return true;
   }
 
+  Expr alignment(int d) const {  // of align_bounds, which parts have, too
+    for (const Bound& bound : f_.schedule.bounds) {
+      if (bound.var == f_.func->args[d] && bound.modulus.defined() && bound.remainder.defined())
+        return bound.modulus;
+    }
+    return 1;
+  }
+
   // The loops of every stage, over a part like this one, write nothing outside of it.
   bool stays_inside(const Slide& slide) const {
     Expr extent = simplify(slide.part.max - slide.part.min + 1);
     for (size_t s = 0; s < f_.stages.size(); s++) {
-      Expr known = is_const(extent) ? extent : variable("part.extent");
+      Expr known = is_const(extent) ? extent : variable("part.extent") * alignment(slide.dimension);
       if (!covers_exactly(f_, static_cast<int>(s), f_.func->args[slide.dimension], known))
         return false;
     }

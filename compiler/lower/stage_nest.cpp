@@ -56,7 +56,8 @@ class NestBuilder {
   Loop loop_of(const Dim& dim) const {
     auto it = ranges_.find(dim.var);
     RETROGRADE_ASSERT(it != ranges_.end(), "loop over a variable that does not exist: " + dim.var);
-    return {dim.var, prefix_ + dim.var, it->second.min, it->second.extent, dim.for_type};
+    return {dim.var,           prefix_ + dim.var, it->second.min,
+            it->second.extent, dim.for_type,      dim.partition};
   }
 
   void apply(const Split& split) {
@@ -164,6 +165,11 @@ StageNest build_stage_nest(const LoopedFunc& f, int stage, const Domain& domain)
 }
 
 bool covers_exactly(const LoopedFunc& f, int stage, const std::string& var, const Expr& extent) {
+  for (const StageSchedule& special : f.stages[stage].schedule.specializations) {
+    LoopedFunc variant = f;
+    variant.stages[stage].schedule = special;
+    if (!covers_exactly(variant, stage, var, extent)) return false;
+  }
   Domain domain;
   for (const std::string& arg : f.func->args)
     domain[arg] = {variable(arg + ".first"), variable(arg + ".extent")};
@@ -176,7 +182,10 @@ bool covers_exactly(const LoopedFunc& f, int stage, const std::string& var, cons
   for (const Loop& loop : nest.loops) loops.push(loop.name, loop.range());
   Interval reached = bounds_of(nest.guarded_coordinate.at(var), loops);
   BoundsMap facts;
-  if (const Variable* name = extent.as<Variable>()) facts[name->name] = {1, {}};
+  walk(extent, [&](const Expr& e) {
+    if (const Variable* name = e.as<Variable>()) facts[name->name] = {1, {}};
+    return true;
+  });
   return reached.is_bounded() && can_prove(reached.min >= first, facts) &&
          can_prove(reached.max < first + extent, facts);
 }

@@ -22,6 +22,7 @@ struct Loop {
   std::string name;  // in the IR: "f.s0.xo"
   Expr min, extent;
   ForType for_type = ForType::Serial;
+  Partition partition = Partition::Auto;
   Interval range() const;
 };
 
@@ -37,7 +38,8 @@ struct StageNest {
 using Domain = std::map<std::string, Range>;
 StageNest build_stage_nest(const LoopedFunc& f, int stage, const Domain& domain);
 
-// Whether the loops of a stage, over `extent` (> 0) coordinates of a pure variable, reach none beyond.
+// Whether the loops of a stage, over `extent` (> 0) coordinates of a pure variable, reach none
+// beyond.
 bool covers_exactly(const LoopedFunc& f, int stage, const std::string& var, const Expr& extent);
 
 }  // namespace retrograde::ir

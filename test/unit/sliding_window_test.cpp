@@ -189,6 +189,24 @@ TEST_F(SlidingWindow, Downwards) {
   EXPECT_EQ(stored_elements(g, "f"), width * 4);
 }
 
+TEST_F(SlidingWindow, AlignedPairsOfRows) {
+  Func g = expect_same(
+      [&](bool scheduled) {
+        Func f("f"), g("g");
+        f(x, y) = counted("f", x * 3 + y * y);
+        g(x, y) = f(x, y - 1) + f(x, y + 1) * 2;
+        g.bound(x, 0, width);
+        if (scheduled) {
+          g.split(y, yo, yi, 2, TailStrategy::RoundUp);
+          f.store_root().compute_at(g, yo).align_bounds(y, 2).unroll(y, 2);
+        }
+        return g;
+      },
+      width, 16);
+  EXPECT_EQ(computed["f"], width * (16 + 4));
+  EXPECT_EQ(stored_elements(g, "f"), width * 8);  // rows -2 to 3 at once
+}
+
 TEST_F(SlidingWindow, ClampedCoordinates) {
   expect_same([&](bool scheduled) {
     Func f("f"), g("g");

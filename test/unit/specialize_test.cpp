@@ -1,0 +1,130 @@
+// Specializations: each branch runs its own loops over its own definition, and all give the same.
+#include <gtest/gtest.h>
+
+#include "retrograde/retrograde.h"
+
+namespace retrograde {
+namespace {
+
+void expect_values(const Buffer<int>& found, int (*value)(int, int)) {
+  for (int j = 0; j < found.height(); ++j) {
+    for (int i = 0; i < found.width(); ++i)
+      ASSERT_EQ(found(i, j), value(i, j)) << "at " << i << ", " << j;
+  }
+}
+
+class Specialize : public testing::Test {
+ protected:
+  Var x{"x"}, y{"y"}, xo{"xo"}, xi{"xi"};
+};
+
+TEST_F(Specialize, RunsTheBranchThatFits) {
+  Param<bool> doubled("doubled");
+  Func f("f");
+  f(x, y) = select(doubled, 2 * x + y, x + y);
+  f.specialize(doubled).split(x, xo, xi, 4, TailStrategy::GuardWithIf).vectorize(xi);
+  doubled.set(true);
+  expect_values(f.realize({13, 5}), [](int i, int j) { return 2 * i + j; });
+  doubled.set(false);
+  expect_values(f.realize({13, 5}), [](int i, int j) { return i + j; });
+}
+
+TEST_F(Specialize, ComputesOnlyWhatItsBranchReads) {
+  Param<int> which("which");
+  Func f("f"), g("g"), h("h");
+  g(x, y) = x + y;
+  h(x, y) = x * y;
+  f(x, y) = select(which == 1, Expr(g(x, y)), Expr(h(x, y)));
+  g.compute_root();
+  h.compute_root();
+  f.specialize(which == 1);
+  f.specialize(which == 2);
+  const std::string nest = f.loop_nest();
+  EXPECT_NE(nest.find("g"), std::string::npos);
+  for (int value : {1, 2, 3}) {
+    which.set(value);
+    if (value == 1) expect_values(f.realize({9, 4}), [](int i, int j) { return i + j; });
+    if (value != 1) expect_values(f.realize({9, 4}), [](int i, int j) { return i * j; });
+  }
+}
+
+TEST_F(Specialize, ProducersAreComputedInEveryBranch) {
+  Param<int> n("n");
+  Func f("f"), g("g");
+  g(x, y) = x + 3 * y;
+  f(x, y) = g(x, y) + g(x, y + 1) * n;
+  g.compute_at(f, y);
+  f.specialize(n > 5).vectorize(x, 8);
+  f.specialize(n > 2).parallel(y);
+  for (int value : {1, 4, 9}) {
+    n.set(value);
+    Buffer<int> found = f.realize({19, 6});
+    for (int j = 0; j < 6; ++j) {
+      for (int i = 0; i < 19; ++i)
+        ASSERT_EQ(found(i, j), i + 3 * j + (i + 3 * (j + 1)) * value) << value;
+    }
+  }
+}
+
+TEST_F(Specialize, SlidesInEveryBranch) {
+  Param<bool> wide("wide");
+  Func f("f"), g("g");
+  g(x, y) = x + 3 * y;
+  f(x, y) = g(x, y - 1) + g(x, y + 1);
+  g.store_root().compute_at(f, y);
+  f.specialize(wide).vectorize(x, 8);
+  for (bool value : {false, true}) {
+    wide.set(value);
+    expect_values(f.realize({19, 6}), [](int i, int j) { return 2 * i + 6 * j; });
+  }
+}
+
+TEST_F(Specialize, UpdatesAndNestedConditions) {
+  Param<int> n("n");
+  Param<bool> p("p");
+  Func f("f");
+  RDom r(0, 6);
+  f(x, y) = x;
+  f(x, y) += select(p, r.x, 2 * r.x) + n;
+  Stage big = f.update().specialize(n > 3);
+  big.parallel(y);
+  big.specialize(p).vectorize(x, 4);
+  f.update().specialize(n == 2).reorder(x, r.x);
+  for (int value : {1, 2, 5}) {
+    for (bool flag : {false, true}) {
+      n.set(value);
+      p.set(flag);
+      Buffer<int> found = f.realize({10, 3});
+      for (int i = 0; i < 10; ++i) ASSERT_EQ(found(i, 2), i + (flag ? 15 : 30) + 6 * value);
+    }
+  }
+}
+
+TEST_F(Specialize, OnTheSizeOfTheOutput) {
+  Func f("f");
+  f(x, y) = x - y;
+  f.specialize(f.output_buffer().width() >= 16).split(x, xo, xi, 16).vectorize(xi);
+  expect_values(f.realize({5, 2}), [](int i, int j) { return i - j; });
+  expect_values(f.realize({37, 2}), [](int i, int j) { return i - j; });
+}
+
+TEST_F(Specialize, FailsWhenNoneFits) {
+  Param<int> n("n");
+  Func f("f");
+  f(x, y) = x + n;
+  f.specialize(n == 1);
+  f.specialize_fail("n must be 1");
+  n.set(1);
+  expect_values(f.realize({5, 2}), [](int i, int) { return i + 1; });
+  n.set(2);
+  try {
+    f.realize({5, 2});
+    FAIL() << "nothing was thrown";
+  } catch (const RuntimeError& e) {
+    EXPECT_NE(std::string(e.what()).find("n must be 1"), std::string::npos) << e.what();
+    EXPECT_NE(std::string(e.what()).find("specialization"), std::string::npos) << e.what();
+  }
+}
+
+}  // namespace
+}  // namespace retrograde
