@@ -1,10 +1,457 @@
+// rfactor.cpp -- cutting an associative update into partial results and their combination.
+//
+//   f(x) = init                           f_intm(x, u) = identity
+//   f(args(r, s)) = op(f(args), e(r, s))  f_intm(args(r, u), u) = op(f_intm(args, u), e(r, u))
+//                                    =>   f(x) = init
+//                                         f(x) = op(f(x), f_intm(x, s))
+//
+// Method: splits of reduction variables are carried out on the definition first, so that each
+// reduction loop is a variable of its own ("leaf"); those that are kept become pure variables of
+// the new Func and the domain of what is left of the update. Loops keep their names: a domain's
+// variables have fresh names, and a rename in the schedule gives the loop the user's.
+//
+// The left-hand side of the combination keeps the coordinates that depend on kept variables only;
+// the others (a histogram's bin) become the pure variables: all elements are combined.
+#include <algorithm>
+#include <functional>
+#include <map>
+#include <unordered_set>
+
+#include "frontend/associative_update.h"
+#include "frontend/define.h"
 #include "frontend/func.h"
+#include "ir/build.h"
+#include "ir/print.h"
+#include "ir/visit.h"
 
 namespace retrograde {
 
-Func Stage::rfactor(const std::vector<std::pair<RVar, Var>>&) {
-  unsupported("factor the reduction of " + quoted(name()), "rfactor is being built");
+namespace {
+
+using ir::Definition;
+using ir::FuncPtr;
+
+// A reduction loop as a variable.
+struct Leaf {
+  std::string loop;  // its name in the schedule
+  std::string name;  // in expressions; fresh
+  Expr min, extent;
+  Expr value() const { return ir::variable(name); }
+};
+
+// The reduction variables of an update after its splits.
+struct Leaves {
+  std::vector<Leaf> all;
+  ir::Substitution values;        // original variable -> over leaves
+  std::vector<Expr> tails;        // that splits do not run over the end
+  std::vector<ir::Split> others;  // splits of pure variables, left as they are
+};
+
+class LeafFinder {
+ public:
+  LeafFinder(const Definition& update, const ir::StageSchedule& schedule, std::string asked)
+      : asked_(std::move(asked)) {
+    for (const ir::ReductionVariable& rvar : update.rvars) {
+      leaves_.all.push_back({rvar.var, ir::unique_name("leaf"), rvar.min, rvar.extent});
+      leaves_.values[rvar.var] = leaves_.all.back().value();
+    }
+    for (const ir::Split& split : schedule.splits) apply(split);
+  }
+  Leaves take() { return std::move(leaves_); }
+
+ private:
+  const std::string asked_;
+  Leaves leaves_;
+
+  Leaf* find(const std::string& loop) {
+    for (Leaf& leaf : leaves_.all) {
+      if (leaf.loop == loop) return &leaf;
+    }
+    return nullptr;
+  }
+
+  void apply(const ir::Split& split) {
+    if (split.kind == ir::Split::Kind::Fuse) return fuse(split);
+    Leaf* leaf = find(split.old_var);
+    if (!leaf) {
+      leaves_.others.push_back(split);
+    } else if (split.kind == ir::Split::Kind::Rename) {
+      leaf->loop = split.outer;
+    } else {
+      cut(*leaf, split);
+    }
+  }
+
+  // old == min + outer * factor + inner
+  void cut(Leaf& leaf, const ir::Split& split) {
+    const Expr factor = split.factor;
+    Leaf outer{split.outer, ir::unique_name("leaf"), 0, (leaf.extent + factor - 1) / factor};
+    Leaf inner{split.inner, ir::unique_name("leaf"), 0, factor};
+    const Expr offset = outer.value() * factor + inner.value();
+    const auto extent = ir::as_const_int(leaf.extent), step = ir::as_const_int(factor);
+    const bool divides = extent && step && *extent % *step == 0;
+    if (!divides) leaves_.tails.push_back(offset < leaf.extent);
+    // The tail's condition holds wherever the variable is used.
+    const Expr inside =
+        divides ? offset
+                : ir::call_op(ir::Op::promise_clamped, Int(32), {offset, 0, leaf.extent - 1});
+    replace(leaf.name, leaf.min + inside);
+    leaf = std::move(inner);
+    leaves_.all.push_back(std::move(outer));
+  }
+
+  void fuse(const ir::Split& split) {
+    const Leaf* inner = find(split.inner);
+    const Leaf* outer = find(split.outer);
+    if (!inner && !outer) return leaves_.others.push_back(split);
+    if (!inner || !outer) {
+      user_error(asked_, "reduction variables are fused with each other only",
+                 text(quoted(split.inner), " and ", quoted(split.outer),
+                      " were fused, and one of them is a pure variable"),
+                 "Call rfactor before that fuse");
+    }
+    Leaf fused{split.old_var, ir::unique_name("leaf"), 0, inner->extent * outer->extent};
+    const std::string inner_loop = inner->loop, outer_loop = outer->loop;
+    const Expr low = inner->min + fused.value() % inner->extent;
+    const Expr high = outer->min + fused.value() / inner->extent;
+    replace(inner->name, low);
+    replace(outer->name, high);
+    std::erase_if(leaves_.all, [&](const Leaf& leaf) {
+      return leaf.loop == inner_loop || leaf.loop == outer_loop;
+    });
+    leaves_.all.push_back(std::move(fused));
+  }
+
+  void replace(const std::string& name, const Expr& value) {
+    for (auto& entry : leaves_.values) entry.second = ir::substitute(entry.second, name, value);
+    for (Expr& tail : leaves_.tails) tail = ir::substitute(tail, name, value);
+  }
+};
+
+void add_conjuncts(const Expr& e, std::vector<Expr>& conjuncts) {
+  if (!e.defined()) return;
+  if (const ir::And* both = e.as<ir::And>()) {
+    add_conjuncts(both->a, conjuncts);
+    add_conjuncts(both->b, conjuncts);
+  } else {
+    conjuncts.push_back(e);
+  }
 }
-Func Stage::rfactor(const RVar& r, const Var& v) { return rfactor({{r, v}}); }
+
+bool has_load(const Expr& root) {
+  bool found = false;
+  ir::walk(root, [&](const Expr& e) {
+    const ir::Call* call = e.as<ir::Call>();
+    found = found || (call && call->call_type != ir::CallType::Operator);
+    return !found;
+  });
+  return found;
+}
+
+class Factoring {
+ public:
+  Factoring(const FuncPtr& f, int stage, const std::vector<std::pair<RVar, Var>>& preserved,
+            ir::AssociativeOp op, Leaves leaves)
+      : f_(f->shared_from_this()),
+        update_(f->stage(stage)),
+        stage_(stage),
+        op_(std::move(op)),
+        leaves_(std::move(leaves)) {
+    for (const auto& [rvar, var] : preserved) kept_[rvar.name()] = var.name();
+    for (const ir::Dim& dim : update_.schedule.dims) {
+      if (!dim.is_reduction) continue;
+      const auto leaf = std::find_if(leaves_.all.begin(), leaves_.all.end(),
+                                     [&](const Leaf& l) { return l.loop == dim.var; });
+      RETROGRADE_ASSERT(leaf != leaves_.all.end(), "a reduction loop without a variable");
+      (kept_.count(dim.var) ? kept_leaves_ : removed_leaves_).push_back(*leaf);
+    }
+    for (const Leaf& leaf : removed_leaves_) removed_names_.insert(leaf.name);
+    for (const Leaf& leaf : kept_leaves_) kept_vars_.push_back(ir::variable(kept_.at(leaf.loop)));
+    over_leaves_ =
+        ir::map_exprs(update_, [&](const Expr& e) { return ir::substitute(e, leaves_.values); });
+    add_conjuncts(over_leaves_.predicate, conjuncts_);
+  }
+
+  FuncPtr run() {
+    make_intermediate();
+    Definition merge = merged();
+    Definition partial = partial_update();
+    intermediate_->updates.push_back(std::move(partial));
+    intermediate_->frozen = true;
+    f_->stage(stage_) = std::move(merge);
+    f_->version++;
+    return intermediate_;
+  }
+
+ private:
+  using Domain = std::shared_ptr<ir::ReductionDomainContents>;
+
+  const FuncPtr f_;
+  const Definition update_;  // as it was
+  const int stage_;
+  const ir::AssociativeOp op_;
+  const Leaves leaves_;
+  std::map<std::string, std::string> kept_;  // loop -> pure variable of the intermediate Func
+  std::vector<Leaf> kept_leaves_, removed_leaves_;
+  std::unordered_set<std::string> removed_names_;
+  std::vector<Expr> kept_vars_;  // of kept_leaves_
+  Definition over_leaves_;       // the update with leaves in the place of reduction variables
+  std::vector<Expr> conjuncts_;  // of its predicate
+  FuncPtr intermediate_;
+
+  // ---- the intermediate Func ----
+
+  Expr identity(size_t i) const {
+    if (op_.identity[i].defined()) return op_.identity[i];
+    const Expr& init = f_->pure->values[i];  // any value does; this one keeps ties as they were
+    return ir::is_const(init) ? init : ir::make_zero(f_->types[i]);
+  }
+
+  void make_intermediate() {
+    intermediate_ = std::make_shared<ir::FuncContents>();
+    intermediate_->name = ir::claim_name(f_->name + "_intm");
+    intermediate_->declared_at = f_->declared_at;
+    std::vector<Expr> args, values;
+    for (const std::string& arg : f_->args) args.push_back(ir::variable(arg));
+    args.insert(args.end(), kept_vars_.begin(), kept_vars_.end());
+    for (size_t i = 0; i < f_->types.size(); i++) values.push_back(identity(i));
+    ir::define_pure(intermediate_, args, values);
+    std::vector<std::string>& storage = intermediate_->schedule.storage_dims;
+    storage = f_->schedule.storage_dims;
+    for (const Expr& var : kept_vars_) storage.push_back(var.as<ir::Variable>()->name);
+  }
+
+  // A domain of these leaves, whose loops keep their names.
+  static Domain domain_of(const std::vector<Leaf>& leaves, ir::Substitution& places,
+                          std::vector<ir::Split>& renames) {
+    if (leaves.empty()) return nullptr;
+    auto domain = std::make_shared<ir::ReductionDomainContents>();
+    domain->frozen = true;
+    const std::string prefix = ir::unique_name("r") + ".";
+    for (const Leaf& leaf : leaves) {
+      const std::string name = prefix + leaf.loop.substr(leaf.loop.rfind('.') + 1);
+      domain->vars.push_back({name, leaf.min, leaf.extent});
+      places[leaf.name] = ir::variable(name, Int(32), ir::SymbolRef(domain));
+      ir::Split rename;
+      rename.kind = ir::Split::Kind::Rename;
+      rename.old_var = name;
+      rename.outer = leaf.loop;
+      rename.exact = true;
+      renames.push_back(std::move(rename));
+    }
+    return domain;
+  }
+
+  static void set_domain(Definition& definition, const Domain& domain) {
+    definition.rvars = domain ? domain->vars : std::vector<ir::ReductionVariable>{};
+    if (domain && definition.predicate.defined())
+      domain->predicate = ir::rebind_symbol(definition.predicate, ir::SymbolRef::weak(domain));
+  }
+
+  // What the original's schedule says that does not depend on which loops there are.
+  ir::StageSchedule schedule_with(const std::vector<ir::Split>& renames) const {
+    ir::StageSchedule schedule = update_.schedule;
+    schedule.splits = leaves_.others;
+    schedule.splits.insert(schedule.splits.end(), renames.begin(), renames.end());
+    schedule.dims.clear();
+    schedule.prefetches.clear();
+    return schedule;
+  }
+
+  void take_prefetches(ir::StageSchedule& schedule) const {
+    const auto has = [&](const std::string& loop) {
+      return std::any_of(schedule.dims.begin(), schedule.dims.end(),
+                         [&](const ir::Dim& dim) { return dim.var == loop; });
+    };
+    for (ir::PrefetchDirective prefetch : update_.schedule.prefetches) {
+      for (std::string* loop : {&prefetch.at, &prefetch.from}) {
+        if (kept_.count(*loop)) *loop = kept_.at(*loop);
+      }
+      if (has(prefetch.at) && has(prefetch.from)) schedule.prefetches.push_back(prefetch);
+    }
+  }
+
+  Definition partial_update() const {
+    ir::Substitution places;
+    std::vector<ir::Split> renames;
+    const Domain domain = domain_of(removed_leaves_, places, renames);
+    for (size_t i = 0; i < kept_leaves_.size(); i++) places[kept_leaves_[i].name] = kept_vars_[i];
+    const auto place = [&](const Expr& e) { return ir::substitute(e, places); };
+
+    Definition partial;
+    for (const Expr& arg : over_leaves_.args) partial.args.push_back(place(arg));
+    partial.args.insert(partial.args.end(), kept_vars_.begin(), kept_vars_.end());
+    for (const Expr& value : over_leaves_.values)
+      partial.values.push_back(place(with_self_at(value, partial.args)));
+    std::vector<Expr> conditions;
+    for (const Expr& e : leaves_.tails) conditions.push_back(place(e));
+    for (const Expr& e : conjuncts_) conditions.push_back(place(e));
+    if (!conditions.empty()) partial.predicate = ir::conjunction(conditions);
+    set_domain(partial, domain);
+    partial.schedule = schedule_with(renames);
+    for (ir::Dim dim : update_.schedule.dims) {
+      const auto kept = kept_.find(dim.var);
+      if (dim.is_reduction && kept != kept_.end()) {
+        dim.var = kept->second;
+        dim.is_reduction = false;
+      }
+      partial.schedule.dims.push_back(std::move(dim));
+    }
+    take_prefetches(partial.schedule);
+    return partial;
+  }
+
+  // References to f become references to the intermediate Func at `args`.
+  Expr with_self_at(const Expr& value, const std::vector<Expr>& args) const {
+    return ir::rewrite(value, [&](const Expr& e, const std::function<Expr(const Expr&)>& recurse) {
+      const ir::Call* call = e.as<ir::Call>();
+      if (!call || call->call_type != ir::CallType::Func || call->symbol.raw() != f_.get())
+        return ir::map_children(e, recurse);
+      return ir::call_func(intermediate_->name, call->type, args, call->value_index,
+                           ir::SymbolRef::weak(intermediate_));
+    });
+  }
+
+  // ---- the combination ----
+
+  bool uses_removed(const Expr& e) const { return ir::uses_any_variable(e, removed_names_); }
+
+  // Conditions that hold for a whole partial result.
+  std::vector<Expr> common_conditions() const {
+    std::vector<Expr> result;
+    for (const Expr& e : conjuncts_) {
+      if (!uses_removed(e) && !has_load(e)) result.push_back(e);
+    }
+    return result;
+  }
+
+  // A coordinate may stand as it is when every value of the kept variables that passes the
+  // conditions has a partial result there.
+  bool keeps_coordinate(const Expr& arg, bool all_conditions_common) const {
+    return all_conditions_common && !uses_removed(arg) && !has_load(arg);
+  }
+
+  Definition merged() const {
+    ir::Substitution places;
+    std::vector<ir::Split> renames;
+    const Domain domain = domain_of(kept_leaves_, places, renames);
+    const auto place = [&](const Expr& e) { return ir::substitute(e, places); };
+
+    Definition merge;
+    const std::vector<Expr> conditions = common_conditions();
+    std::vector<std::string> new_loops;
+    for (size_t d = 0; d < f_->args.size(); d++) {
+      const Expr& arg = over_leaves_.args[d];
+      const ir::Variable* v = arg.as<ir::Variable>();
+      const bool is_pure = v && !v->symbol.defined() && v->name == f_->args[d];
+      if (is_pure || keeps_coordinate(arg, conditions.size() == conjuncts_.size())) {
+        merge.args.push_back(place(arg));
+      } else {
+        merge.args.push_back(ir::variable(f_->args[d]));
+        new_loops.push_back(f_->args[d]);
+      }
+    }
+    std::vector<Expr> read_at = merge.args;
+    for (const Leaf& leaf : kept_leaves_) read_at.push_back(places.at(leaf.name));
+    ir::Substitution operands;
+    for (size_t i = 0; i < f_->types.size(); i++) {
+      operands[op_.xs[i]] = ir::call_func(f_->name, f_->types[i], merge.args, static_cast<int>(i),
+                                          ir::SymbolRef::weak(f_));
+      operands[op_.ys[i]] = ir::call_func(intermediate_->name, f_->types[i], read_at,
+                                          static_cast<int>(i), ir::SymbolRef(intermediate_));
+    }
+    for (const Expr& value : op_.values) merge.values.push_back(ir::substitute(value, operands));
+    if (!conditions.empty()) merge.predicate = place(ir::conjunction(conditions));
+    set_domain(merge, domain);
+    merge.schedule = schedule_with(renames);
+    for (const ir::Dim& dim : update_.schedule.dims) {
+      if (!dim.is_reduction || kept_.count(dim.var)) merge.schedule.dims.push_back(dim);
+    }
+    for (const std::string& loop : new_loops) {
+      ir::Dim dim;
+      dim.var = loop;
+      merge.schedule.dims.push_back(std::move(dim));
+    }
+    return merge;
+  }
+};
+
+// Whether the loops are the outermost among the reduction loops.
+bool are_outermost(const ir::StageSchedule& schedule,
+                   const std::vector<std::pair<RVar, Var>>& preserved) {
+  std::vector<std::string> order;  // innermost first
+  for (const ir::Dim& dim : schedule.dims) {
+    if (dim.is_reduction) order.push_back(dim.var);
+  }
+  for (size_t i = order.size() - preserved.size(); i < order.size(); i++) {
+    if (std::none_of(preserved.begin(), preserved.end(),
+                     [&](const auto& pair) { return pair.first.name() == order[i]; }))
+      return false;
+  }
+  return true;
+}
+
+std::string list(const std::vector<std::pair<RVar, Var>>& preserved) {
+  std::string out;
+  for (const auto& [rvar, var] : preserved)
+    out += text(out.empty() ? "" : ", ", quoted(rvar.name()), " as ", quoted(var.name()));
+  return out;
+}
+
+}  // namespace
+
+Func Stage::rfactor(const RVar& r, const Var& v) {
+  return rfactor(std::vector<std::pair<RVar, Var>>{{r, v}});
+}
+
+// 1. It is an update, not specialized and in no other's loops. 2. Every RVar is a reduction loop,
+// named once. 3. Every Var is new, named once. 4. The update is associative, with an identity. 5.
+// It commutes, unless the loops are the outermost ones.
+Func Stage::rfactor(const std::vector<std::pair<RVar, Var>>& preserved) {
+  const std::string asked = text("factor ", list(preserved), " out of ", quoted(name()));
+  if (index_ == 0) {
+    user_error(asked, "it is an update that reduces", quoted(name()) + " is a first definition",
+               "Call it on update(): f.update().rfactor(r, u)");
+  }
+  if (!specialization_.empty() || !schedule().specializations.empty()) {
+    user_error(asked, "a specialized stage keeps its definition",
+               quoted(name()) + " has specializations", "Call rfactor before specialize");
+  }
+  if (schedule().fuse_level.kind == ir::LoopLevel::Kind::At) {
+    user_error(asked, "a stage in the loops of another one keeps its own",
+               text("compute_with put it into the loops of ", quoted(schedule().fuse_level.func)),
+               "Call rfactor before compute_with");
+  }
+  std::unordered_set<std::string> loops, variables;
+  for (const auto& [rvar, var] : preserved) {
+    const size_t at = loop_index(VarOrRVar(rvar), asked);
+    if (!schedule().dims[at].is_reduction) {
+      user_error(asked, "only reduction loops are factored", quoted(rvar.name()) + " is pure",
+                 "Name a variable of its RDom, or one that comes from it");
+    }
+    if (!loops.insert(rvar.name()).second)
+      user_error(asked, "each loop is named once", quoted(rvar.name()) + " is named twice");
+    check_new_name(VarOrRVar(var), rvar.name(), asked);
+    const auto& args = func_->args;
+    if (!variables.insert(var.name()).second ||
+        std::find(args.begin(), args.end(), var.name()) != args.end()) {
+      user_error(asked, "the new variables differ from each other and from the Func's",
+                 quoted(var.name()) + " is there already", "Use a new Var");
+    }
+  }
+  const ir::AssociativityProof proof = ir::prove_associative(*func_, definition());
+  if (!proof.op) {
+    user_error(asked, "partial results can be combined only of an associative update",
+               proof.why_not,
+               "Write it as f(x) = op(f(x), e) with an associative op, or keep its loops");
+  }
+  if (!proof.op->commutative && !are_outermost(schedule(), preserved)) {
+    user_error(asked, "partial results over inner loops change the order of the reduction",
+               proof.why_not_commutative,
+               "Factor the outermost reduction loops: reorder is legal only if it commutes");
+  }
+  Leaves leaves = LeafFinder(definition(), schedule(), asked).take();
+  return Func(Factoring(func_, index_, preserved, *proof.op, std::move(leaves)).run());
+}
 
 }  // namespace retrograde

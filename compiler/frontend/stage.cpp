@@ -78,7 +78,9 @@ void check_factor(const Expr& factor, const std::string& asked) {
 }
 
 void check_tail(TailStrategy tail, bool is_update, bool is_reduction, const std::string& asked) {
-  if (is_reduction && (tail == TailStrategy::RoundUp || tail == TailStrategy::ShiftInwards)) {
+  const bool exact = tail == TailStrategy::Auto || tail == TailStrategy::GuardWithIf ||
+                     tail == TailStrategy::Predicate;
+  if (is_reduction && !exact) {
     user_error(asked, "a loop over a reduction variable runs exactly over its domain",
                "this tail strategy would run points twice or beyond it",
                "Use TailStrategy::GuardWithIf or TailStrategy::Auto");

@@ -235,14 +235,12 @@ std::string names_of(const std::vector<std::string>& users) {
 
 bool reads(const FuncContents& user, const FuncContents& f) {
   bool found = false;
-  for (const FuncPtr& callee : direct_callees(user)) {
-    const auto visit = [&](const FuncContents& step) { found = found || &step == &f; };
-    found = found || resolve(callee.get(), user, visit) == &f;
-  }
-  for (const FuncPtr& reader : image_readers(user)) {
-    const auto visit = [&](const FuncContents& step) { found = found || &step == &f; };
-    found = found || resolve(reader.get(), user, visit) == &f;
-  }
+  const auto visit = [&](const FuncContents& step) { found = found || &step == &f; };
+  const auto follow = [&](const FuncContents& callee) {
+    if (resolve(&callee, user, visit) == &f) found = true;
+  };
+  for (const FuncPtr& callee : direct_callees(user)) follow(*callee);
+  for (const FuncPtr& reader : image_readers(user)) follow(*reader);
   return found;
 }
 

@@ -74,6 +74,7 @@ Program inline_functions(const std::vector<FuncPtr>& unwrapped) {
     const auto chosen = defaults.find(f.get());
     const FuncSchedule& schedule = chosen == defaults.end() ? f->schedule : chosen->second.func;
     if (is_inlined(*f, schedule, is_output)) {
+      check_inlined(*f, schedule);
       inlined[f.get()] = {f->args, stages[0].values};
       continue;
     }

@@ -28,10 +28,6 @@ constexpr Directive not_yet[] = {
        return any_stage(
            f, [](const StageSchedule& s) { return s.fuse_level.kind == LoopLevel::Kind::At; });
      }},
-    {"prefetch",
-     [](const LoopedFunc& f) {
-       return any_stage(f, [](const StageSchedule& s) { return !s.prefetches.empty(); });
-     }},
     {"hoist_storage",
      [](const LoopedFunc& f) { return f.schedule.hoist_level.kind != LoopLevel::Kind::Inlined; }},
     {"debug_to_file", [](const LoopedFunc& f) { return !f.func->debug_file.empty(); }},
@@ -91,6 +87,10 @@ void refuse_unsupported(const Program& program) {
     check_level_is_set(f, f.schedule.hoist_from, "hoist the storage of");
     for (size_t s = 0; s < f.stages.size(); s++)
       check_loops(f, static_cast<int>(s), f.stages[s].schedule);
+    refuse_directives(f);
+  }
+}
+
 void check_inlined(const FuncContents& f, const FuncSchedule& schedule) {
   const auto refuse = [&](const std::string& asked, const std::string& evidence) {
     user_error(asked, "only what is computed somewhere has storage of its own", evidence,
@@ -119,10 +119,6 @@ void check_inlined(const FuncContents& f, const FuncSchedule& schedule) {
     user_error(text(verb, quoted(f.name), " over ", quoted(dim.var)),
                "only what is computed somewhere has loops", inlined,
                text("Compute ", quoted(f.name), " at a loop or at root, or drop the directive"));
-  }
-}
-
-    refuse_directives(f);
   }
 }
 

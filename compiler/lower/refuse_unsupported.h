@@ -10,6 +10,10 @@ namespace retrograde::ir {
 // does not carry out: a line in the table of refuse_unsupported.cpp each, until it does.
 void refuse_unsupported(const Program& program);
 
+// CompileError for a Func that is substituted into its users and has a schedule that needs storage
+// or a computation of its own.
+void check_inlined(const FuncContents& f, const FuncSchedule& schedule);
+
 // Var::outermost() as a level means outside of all loops of the Func: where that one is computed.
 void resolve_outermost_levels(Program& program);
 
