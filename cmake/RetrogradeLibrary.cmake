@@ -53,6 +53,17 @@ install(FILES ${CMAKE_BINARY_DIR}/retrogradeConfig.cmake DESTINATION ${package_d
 install(FILES ${CMAKE_BINARY_DIR}/retrogradeConfigVersion.cmake DESTINATION ${package_dir}
   RENAME retrograde-config-version.cmake)
 
+install(FILES ${PROJECT_SOURCE_DIR}/cmake/RetrogradeGenerators.cmake DESTINATION ${package_dir})
+
+# find_package(Halide) for projects written for Halide 14.
+set(halide_package_dir ${CMAKE_INSTALL_LIBDIR}/cmake/Halide)
+configure_package_config_file(${PROJECT_SOURCE_DIR}/cmake/halide/HalideConfig.cmake.in
+  ${CMAKE_BINARY_DIR}/HalideConfig.cmake INSTALL_DESTINATION ${halide_package_dir})
+write_basic_package_version_file(${CMAKE_BINARY_DIR}/HalideConfigVersion.cmake
+  VERSION 14.0.0 COMPATIBILITY SameMajorVersion)
+install(FILES ${CMAKE_BINARY_DIR}/HalideConfig.cmake ${CMAKE_BINARY_DIR}/HalideConfigVersion.cmake
+  DESTINATION ${halide_package_dir})
+
 configure_file(${PROJECT_SOURCE_DIR}/cmake/retrograde.pc.in ${CMAKE_BINARY_DIR}/retrograde.pc @ONLY)
 configure_file(${PROJECT_SOURCE_DIR}/cmake/retrograde-halide.pc.in
   ${CMAKE_BINARY_DIR}/retrograde-halide.pc @ONLY)

@@ -49,6 +49,12 @@ bool append_field(Text& text, char field, va_list& args) {
     case 'g':
       text.append_number(static_cast<float>(va_arg(args, double)));
       return true;
+    case 'F':
+      text.append_number(static_cast<float>(va_arg(args, double)), std::chars_format::fixed, 6);
+      return true;
+    case 'E':
+      text.append_number(va_arg(args, double), std::chars_format::scientific, 6);
+      return true;
     case '%':
       text.append("%");
       return true;

@@ -158,7 +158,8 @@ void retrograde_begin_call(retrograde_context*, void* user_context);
 
 /* Writes at most `size` bytes, the final 0 included, and returns the length written. Fields:
  *   %i int64_t   %u uint64_t   %f double, as the shortest text that reads back the same
- *   %g the same for a float passed as double   %s const char *   %p const void *   %% a percent */
+ *   %F a float passed as double, with six decimals   %E double, scientific with six decimals
+ *   %g as %f, for a float passed as double   %s const char *   %p const void *   %% a percent */
 size_t retrograde_format_message(char* text, size_t size, const char* format, ...);
 
 /* Name of an error code, or "unknown error". */

@@ -218,7 +218,7 @@ class FunctionGenerator {
     std::string text;
     std::vector<Value*> args;
   };
-  void add_part(Format& format, const Expr& part, int lane);
+  void add_part(Format& format, const Expr& part, int lane, bool printed);
 
   // buffers.cpp
   bool is_buffer_operator(ir::Op op) const;

@@ -12,7 +12,7 @@ static std::string escaped(const std::string& text) {
   return result;
 }
 
-void FunctionGenerator::add_part(Format& format, const Expr& part, int which) {
+void FunctionGenerator::add_part(Format& format, const Expr& part, int which, bool printed) {
   if (const auto* literal = part.as<StringImm>()) {
     format.text += escaped(literal->value);
     return;
@@ -25,7 +25,11 @@ void FunctionGenerator::add_part(Format& format, const Expr& part, int which) {
     format.text += "%s";
     v = b_.CreateSelect(v, string_constant("true"), string_constant("false"));
   } else if (type.is_float()) {
-    format.text += type.bits() == 64 ? "%f" : "%g";
+    // Printed as Halide prints them; in errors as short as they can be.
+    if (printed)
+      format.text += type.bits() == 64 ? "%E" : "%F";
+    else
+      format.text += type.bits() == 64 ? "%f" : "%g";
     v = convert(e_, Float(64), type, v);
   } else {
     format.text += type.is_int() ? "%i" : "%u";
@@ -39,7 +43,7 @@ Value* FunctionGenerator::report_error(Value* code, const std::vector<Expr>& par
   Format format;
   for (size_t i = first; i < parts.size(); i++) {
     if (i > first) format.text += separator;
-    add_part(format, parts[i], 0);
+    add_part(format, parts[i], 0, false);
   }
   const auto report = runtime_function("retrograde_report_error", b_.getInt32Ty(),
                                        {b_.getPtrTy(), b_.getInt32Ty(), b_.getPtrTy()}, true);
@@ -52,7 +56,7 @@ void FunctionGenerator::print(const std::vector<Expr>& parts, size_t first, int 
   Format format;
   for (size_t i = first; i < parts.size(); i++) {
     if (i > first) format.text += " ";
-    add_part(format, parts[i], which);
+    add_part(format, parts[i], which, true);
   }
   format.text += "\n";
   const auto print =

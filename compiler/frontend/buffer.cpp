@@ -28,6 +28,9 @@ halide_type_t to_halide_type(Type type) {
                        static_cast<uint16_t>(type.lanes()));
 }
 
+Type::Type(const halide_type_t& type) : Type(from_halide_type(type)) {}
+Type::operator halide_type_t() const { return to_halide_type(*this); }
+
 Type from_halide_type(halide_type_t type) {
   switch (type.code) {
     case halide_type_int:

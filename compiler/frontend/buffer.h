@@ -36,6 +36,7 @@ namespace retrograde {
 
 namespace Runtime = ::Halide::Runtime;
 
+inline bool operator==(const Type& a, const halide_type_t& b) { return a == Type(b); }
 halide_type_t to_halide_type(Type type);
 Type from_halide_type(halide_type_t type);
 

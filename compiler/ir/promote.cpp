@@ -149,17 +149,20 @@ Expr cast(Type type, Expr value) {
 
 namespace {
 
+bool is_int_literal(const Expr& e) {
+  return e.type() == Int(32) && ir::as_const_int(e).has_value();
+}
+
 // An integer literal beside another value is of that value's type: select(c, f(x), 0).
 void match_literals(Expr& a, Expr& b, const char* what) {
   ir::check_operand(a, what);
   ir::check_operand(b, what);
-  const auto adopt = [](Expr& literal, const Expr& other) {
-    const std::optional<int64_t> value = ir::as_const_int(literal);
-    if (value && literal.type() == Int(32) && other.type().element_of().can_represent(*value)) {
-      literal = ir::make_const(other.type(), *value);
-    }
-  };
-  if (ir::is_const(a) != ir::is_const(b)) ir::is_const(a) ? adopt(a, b) : adopt(b, a);
+  if (is_int_literal(a) != is_int_literal(b)) {
+    Expr& literal = is_int_literal(a) ? a : b;
+    const Type other = is_int_literal(a) ? b.type() : a.type();
+    const int64_t value = *ir::as_const_int(literal);
+    if (other.element_of().can_represent(value)) literal = ir::make_const(other, value);
+  }
   ir::match_types(a, b, what);
 }
 

@@ -1,10 +1,13 @@
 // Types of expressions: a scalar code and width, times a number of lanes.
 #pragma once
 
+#include <compare>
 #include <cstdint>
 #include <limits>
 #include <string>
 #include <type_traits>
+
+struct halide_type_t;
 
 namespace retrograde {
 
@@ -20,13 +23,23 @@ struct float16_t {
   explicit float16_t(double value);
   explicit float16_t(int value) : float16_t(static_cast<float>(value)) {}
   explicit operator float() const;
+  explicit operator int() const { return static_cast<int>(static_cast<float>(*this)); }
   explicit operator double() const { return static_cast<double>(static_cast<float>(*this)); }
   static float16_t make_from_bits(uint16_t bits) {
     float16_t result;
     result.bits = bits;
     return result;
   }
+  static float16_t make_zero() { return make_from_bits(0); }
+  static float16_t make_negative_zero() { return make_from_bits(0x8000); }
+  static float16_t make_infinity() { return make_from_bits(0x7c00); }
+  static float16_t make_negative_infinity() { return make_from_bits(0x8000 | 0x7c00); }
+  static float16_t make_nan() { return make_from_bits(0x7e00); }
   uint16_t to_bits() const { return bits; }
+  bool is_nan() const { return (bits & 0x7fff) > 0x7c00; }
+  bool is_infinity() const { return (bits & 0x7fff) == 0x7c00; }
+  bool is_negative() const { return (bits & 0x8000) != 0; }
+  bool is_zero() const { return (bits & 0x7fff) == 0; }
 };
 
 // The upper half of a float32, rounded to nearest even.
@@ -37,18 +50,61 @@ struct bfloat16_t {
   explicit bfloat16_t(double value);
   explicit bfloat16_t(int value) : bfloat16_t(static_cast<float>(value)) {}
   explicit operator float() const;
+  explicit operator int() const { return static_cast<int>(static_cast<float>(*this)); }
   explicit operator double() const { return static_cast<double>(static_cast<float>(*this)); }
   static bfloat16_t make_from_bits(uint16_t bits) {
     bfloat16_t result;
     result.bits = bits;
     return result;
   }
+  static bfloat16_t make_zero() { return make_from_bits(0); }
+  static bfloat16_t make_negative_zero() { return make_from_bits(0x8000); }
+  static bfloat16_t make_infinity() { return make_from_bits(0x7f80); }
+  static bfloat16_t make_negative_infinity() { return make_from_bits(0x8000 | 0x7f80); }
+  static bfloat16_t make_nan() { return make_from_bits(0x7fc0); }
   uint16_t to_bits() const { return bits; }
+  bool is_nan() const { return (bits & 0x7fff) > 0x7f80; }
+  bool is_infinity() const { return (bits & 0x7fff) == 0x7f80; }
+  bool is_negative() const { return (bits & 0x8000) != 0; }
+  bool is_zero() const { return (bits & 0x7fff) == 0; }
 };
+
+// Arithmetic on the 16-bit floats: in float32, rounded after each operation.
+template <typename T>
+concept SmallFloatType = std::is_same_v<T, float16_t> || std::is_same_v<T, bfloat16_t>;
+#define RETROGRADE_SMALL_FLOAT_OPERATOR(op)                   \
+  template <SmallFloatType T>                                 \
+  T operator op(T a, T b) {                                   \
+    return T(static_cast<float>(a) op static_cast<float>(b)); \
+  }                                                           \
+  template <SmallFloatType T>                                 \
+  T& operator op##=(T& a, T b) {                              \
+    return a = a op b;                                        \
+  }
+RETROGRADE_SMALL_FLOAT_OPERATOR(+)
+RETROGRADE_SMALL_FLOAT_OPERATOR(-)
+RETROGRADE_SMALL_FLOAT_OPERATOR(*)
+RETROGRADE_SMALL_FLOAT_OPERATOR(/)
+#undef RETROGRADE_SMALL_FLOAT_OPERATOR
+template <SmallFloatType T>
+T operator-(T a) {
+  return T::make_from_bits(a.bits ^ 0x8000);
+}
+template <SmallFloatType T>
+bool operator==(T a, T b) {
+  return static_cast<float>(a) == static_cast<float>(b);
+}
+template <SmallFloatType T>
+auto operator<=>(T a, T b) {
+  return static_cast<float>(a) <=> static_cast<float>(b);
+}
 
 class Type {
  public:
   constexpr Type() = default;
+  // The types of the runtime's buffers; defined by frontend/buffer.cpp, which knows them.
+  Type(const halide_type_t& type);
+  operator halide_type_t() const;
   constexpr Type(TypeCode code, int bits, int lanes = 1)
       : code_(code), bits_(static_cast<uint8_t>(bits)), lanes_(static_cast<uint16_t>(lanes)) {}
 

@@ -234,6 +234,25 @@ TEST(Target, OneRuntimeServesFeaturesThatItDoesNotSee) {
   EXPECT_FALSE(avx.get_runtime_compatible_target(Target("arm-64-linux"), common));
 }
 
+TEST(Select, LiteralsTakeTheTypeOfTheOtherArm) {
+  const Expr c = variable("c", Bool());
+  EXPECT_EQ(select(c, cast(UInt(8), 255), 0).type(), UInt(8));
+  EXPECT_EQ(select(c, 0, variable("x", UInt(16))).type(), UInt(16));
+  EXPECT_EQ(select(c, 1, 2).type(), Int(32));
+  EXPECT_EQ(select(c, 300, variable("x", UInt(8))).type(), Int(32));  // it would not fit
+}
+
+TEST(SmallFloats, RoundAfterEachOperation) {
+  const float16_t a(1.5f), b(0.25f);
+  EXPECT_EQ(static_cast<float>(a + b), 1.75f);
+  EXPECT_EQ(static_cast<float>(a / b), 6.0f);
+  EXPECT_TRUE(b < a && a == float16_t(1.5f) && -a < b);
+  EXPECT_EQ(static_cast<float>(float16_t(2048.0f) + float16_t(1.0f)), 2048.0f);
+  EXPECT_TRUE((float16_t::make_infinity() - float16_t::make_infinity()).is_nan());
+  EXPECT_TRUE((bfloat16_t(1.0f) / bfloat16_t::make_zero()).is_infinity());
+  EXPECT_TRUE(bfloat16_t::make_negative_zero().is_negative());
+}
+
 TEST(TypeLimits, AreExpressionsOfTheType) {
   EXPECT_EQ(as_const_int(Int(8).min()), -128);
   EXPECT_EQ(as_const_int(UInt(16).max()), 65535);
