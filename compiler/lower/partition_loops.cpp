@@ -14,7 +14,9 @@
 //                    min(likely(a), b), max        the marked operand is the result
 //                    select(c, likely(a), b)       the marked arm is the result
 // A marked value stays marked through lets, arithmetic, min, max and select, so that
-// max(min(likely(x), hi), lo) is x.
+// max(min(likely(x), hi), lo) is x. Once a min, max or select was decided by a mark, arithmetic
+// ends it: that a split's min(likely(xo*8), n - 8) is xo*8 says nothing of what is computed from
+// there.
 //
 // Method: outermost loop first. One walk over the body of a loop rewrites it as if its likely
 //         conditions held, and asks analysis/linear.h where each of them holds: an interval of the
@@ -188,7 +190,7 @@ class SteadyRewriter : public Rewriter {
   Expr bind(const std::string& name, const Expr& original) {
     Expr value = (*this)(original);
     context_.add_let(name, value);
-    if (is_marked(original)) marked_lets_.insert(name);
+    marked_lets_[name] = mark(original);
     if (is_const(value) && !value.same_as(original)) decided_lets_[name] = value;
     return value;
   }
@@ -210,43 +212,55 @@ class SteadyRewriter : public Rewriter {
 
   Expr rewrite_extreme(const Binary& n, const Expr& copy) {
     const Binary* op = copy.as<Binary>();
-    bool a_marked = is_marked(n.a), b_marked = is_marked(n.b);
-    if (a_marked == b_marked || !op || copy.kind() != n.kind) return copy;
-    const Expr& kept = a_marked ? op->a : op->b;
-    const Expr& other = a_marked ? op->b : op->a;
+    const Mark a_mark = mark(n.a), b_mark = mark(n.b);
+    if (a_mark == b_mark || !op || copy.kind() != n.kind) return copy;
+    const Expr& kept = a_mark > b_mark ? op->a : op->b;
+    const Expr& other = a_mark > b_mark ? op->b : op->a;
     bool decided = holds(binary(n.kind == Kind::Min ? Kind::LE : Kind::GE, kept, other), true);
     return decided ? kept : copy;
   }
 
   Expr rewrite_select(const Select& n, const Expr& copy) {
     const Select* op = copy.as<Select>();
-    bool t_marked = is_marked(n.true_value), f_marked = is_marked(n.false_value);
-    if (t_marked == f_marked || !op) return copy;
-    if (!holds(op->condition, t_marked)) return copy;
-    return t_marked ? op->true_value : op->false_value;
+    const Mark t_mark = mark(n.true_value), f_mark = mark(n.false_value);
+    if (t_mark == f_mark || !op) return copy;
+    if (!holds(op->condition, t_mark > f_mark)) return copy;
+    return t_mark > f_mark ? op->true_value : op->false_value;
   }
 
   // ---- marks ----
 
   bool is_mark(const Call& call) const { return call.is_op(Op::likely) || inner_serial_.empty(); }
 
+  // In the order of what wins.
+  enum class Mark : uint8_t { None, Decided, Likely };
+
   // Whether e is computed from something marked, not counting what it loads.
-  bool is_marked(const Expr& e) {
-    auto it = marked_.find(e.get());
-    if (it != marked_.end()) return it->second;
-    bool result = match(
-        e, [&](const Variable& n) { return marked_lets_.count(n.name) > 0; },
-        [&](const Call& n) {
-          if (is_likely(&n)) return is_mark(n) || is_marked(n.args[0]);
-          bool is_promise = n.is_op(Op::promise_clamped) || n.is_op(Op::unsafe_promise_clamped);
-          return is_promise && is_marked(n.args[0]);
+  Mark mark(const Expr& e) {
+    if (auto it = marks_.find(e.get()); it != marks_.end()) return it->second;
+    const auto decided = [&](const Expr& a, const Expr& b) {
+      return std::max(mark(a), mark(b)) == Mark::None ? Mark::None : Mark::Decided;
+    };
+    const auto arithmetic = [&](const Binary& n) {
+      if (n.type.is_bool()) return Mark::None;
+      if (n.kind == Kind::Min || n.kind == Kind::Max) return decided(n.a, n.b);
+      return std::max(mark(n.a), mark(n.b)) == Mark::Likely ? Mark::Likely : Mark::None;
+    };
+    const Mark result = match(
+        e,
+        [&](const Variable& n) {
+          auto it = marked_lets_.find(n.name);
+          return it == marked_lets_.end() ? Mark::None : it->second;
         },
-        [&](const Cast& n) { return is_marked(n.value); },
-        [&](const Let& n) { return is_marked(n.body); },
-        [&](const Select& n) { return is_marked(n.true_value) || is_marked(n.false_value); },
-        [&](const Binary& n) { return !n.type.is_bool() && (is_marked(n.a) || is_marked(n.b)); },
-        [&](const ExprNode&) { return false; });
-    marked_.emplace(e.get(), result);
+        [&](const Call& n) {
+          if (is_likely(&n)) return is_mark(n) ? Mark::Likely : mark(n.args[0]);
+          bool is_promise = n.is_op(Op::promise_clamped) || n.is_op(Op::unsafe_promise_clamped);
+          return is_promise ? mark(n.args[0]) : Mark::None;
+        },
+        [&](const Cast& n) { return mark(n.value); }, [&](const Let& n) { return mark(n.body); },
+        [&](const Select& n) { return decided(n.true_value, n.false_value); }, arithmetic,
+        [&](const ExprNode&) { return Mark::None; });
+    marks_.emplace(e.get(), result);
     return result;
   }
 
@@ -292,9 +306,9 @@ class SteadyRewriter : public Rewriter {
       dependent_;  // the loop's variable, and those of inner loops that start from it
   std::unordered_set<std::string> inner_serial_;
   std::unordered_map<std::string, int64_t> inner_extents_;  // constant ones
-  std::unordered_set<std::string> marked_lets_;
+  std::unordered_map<std::string, Mark> marked_lets_;
   std::unordered_map<std::string, Expr> decided_lets_;
-  std::unordered_map<const ExprNode*, bool> marked_;  // of nodes of the body, which outlives this
+  std::unordered_map<const ExprNode*, Mark> marks_;  // of nodes of the body, which outlives this
 };
 
 class Partitioner : public Rewriter {
