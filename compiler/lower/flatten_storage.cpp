@@ -177,7 +177,9 @@ class Flattener : public Rewriter {
     for (int d : storage_order(n.name, n.bounds.size())) {
       layout.strides[d] = stride = bind(fact(n.name, "stride", d), stride, bindings);
       stride = binary(Kind::Mul, stride, extents[d]);
-      elements = binary(Kind::Mul, elements, cast_to(Int(64), extents[d]));
+      // What a predicate leaves nothing of has a negative extent: no element at all.
+      const Expr count = is_const(extents[d]) ? extents[d] : binary(Kind::Max, extents[d], Expr(0));
+      elements = binary(Kind::Mul, elements, cast_to(Int(64), count));
     }
     layouts_[n.name] = std::move(layout);
     Stmt body = (*this)(n.body);

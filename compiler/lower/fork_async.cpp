@@ -230,9 +230,15 @@ class AsyncForker : public Rewriter {
         make_fork(make_block({(*this)(producer), release(n.name, Ready)}), (*this)(consumer)));
   }
 
+  // A producer that does not run when its result is in the cache.
+  bool may_be_skipped(const ProducerConsumer& n) const {
+    const LoopedFunc* f = program_.find(original(n.name));
+    return n.is_producer && f && f->schedule.memoized;
+  }
+
   // Waits as late as possible: what does not need the Func runs before.
   Stmt acquired_late(const Stmt& s, const std::string& func) {
-    if (const ProducerConsumer* n = s.as<ProducerConsumer>())
+    if (const ProducerConsumer* n = s.as<ProducerConsumer>(); n && !may_be_skipped(*n))
       return make_producer_consumer(n->name, n->is_producer, acquired_late(n->body, func));
     if (const LetStmt* n = s.as<LetStmt>(); n && !uses_func(n->value, func))
       return make_let(n->name, n->value, acquired_late(n->body, func));

@@ -170,6 +170,24 @@ TEST_P(Async, AnAsyncFuncThatReadsAnotherOfTheSameLoopsInOrder) {
 
 // ---- failures ----
 
+// The first reader is not computed when its result is in the cache; the second one waits all the same.
+TEST_P(Async, WhatAMemoizedFuncReadsIsWaitedForWithoutIt) {
+  Var x("x");
+  Func f("f"), g("g"), out("out");
+  f(x) = x * 2;
+  g(x) = f(x) + 1;
+  out(x) = g(3) + f(x);
+  f.compute_root().async();
+  g.compute_root().memoize();
+  limit(out);
+  for (const int min : {0, 7, 14}) {
+    Buffer<int> result(std::vector<int>{1000});
+    result.set_min({min});
+    out.realize(result);
+    for (int i = min; i < min + 1000; i++) ASSERT_EQ(result(i), 7 + 2 * i);
+  }
+}
+
 TEST_P(Async, AnErrorOfTheProducerReleasesTheConsumer) {
   Var x("x"), y("y");
   for (bool folded : {false, true}) {
