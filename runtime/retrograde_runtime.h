@@ -135,6 +135,14 @@ int32_t retrograde_trace_type(retrograde_context*, const char* func, int32_t par
  * HL_TRACE_FILE in the environment, a halide_trace_packet_t to that file. */
 int32_t retrograde_default_trace(retrograde_context*, const struct halide_trace_event_t* event);
 
+/* The profiler. A run begins with the names of Funcs, one a line; afterwards they are numbers. Null
+ * stands for a run that is not profiled. */
+void* retrograde_profiler_begin(retrograde_context*, const char* pipeline, const char* funcs);
+int32_t retrograde_profiler_enter(retrograde_context*, void* run, int32_t func);
+int32_t retrograde_profiler_thread(retrograde_context*, void* run, int32_t change);
+int32_t retrograde_profiler_memory(retrograde_context*, void* run, int32_t func, int64_t change);
+int32_t retrograde_profiler_end(retrograde_context*, void* run);
+
 /* The cache of memoized Funcs. Looking up copies `count` values to `blocks` of the given sizes and
  * gives 0, or 1 when the cache has none such. Storing copies them; it may also store nothing. */
 int32_t retrograde_memoization_lookup(retrograde_context*, const uint8_t* key, int32_t key_bytes,
@@ -174,7 +182,6 @@ void retrograde_pool_set_limit(size_t bytes);
 size_t retrograde_pool_bytes(void); /* held now */
 void retrograde_pool_release(void); /* gives all of them back to the system */
 
-#ifdef __cplusplus
 /* Bytes that the results of memoized Funcs may hold; 0: the default, 1 MiB. */
 void retrograde_memoization_set_size(int64_t bytes);
 int64_t retrograde_memoization_bytes(void); /* held now */
@@ -182,6 +189,13 @@ int64_t retrograde_memoization_bytes(void); /* held now */
 void retrograde_memoization_evict(uint64_t eviction_key);
 void retrograde_memoization_cleanup(void); /* forgets everything */
 
+/* A table of all profiled pipelines for the print handler: time, threads and peak memory by Func. */
+void retrograde_profiler_report(retrograde_context*);
+/* The same as numbers, or null. Not to be read while the pipeline runs. */
+struct halide_profiler_pipeline_stats* retrograde_profiler_pipeline(const char* name);
+void retrograde_profiler_reset(void); /* forgets all times and sizes */
+
+#ifdef __cplusplus
 }
 #endif
 

@@ -79,6 +79,7 @@ class FunctionGenerator {
     llvm::PHINode* error_code = nullptr;
     llvm::AllocaInst* owned_slots = nullptr;  // an array of pointers, as long as the function needs
     int64_t owned_count = 0;
+    llvm::AllocaInst* profiler_slot = nullptr;  // a run to end when the function leaves early
     int64_t stack_bytes = 0;  // of allocations
     std::array<llvm::AllocaInst*, 2> scratch = {};
     std::vector<MemoFrame> memo;

@@ -20,7 +20,14 @@ Value* FunctionGenerator::runtime_call(const Call& e) {
     args.push_back(value(e.args[i]));
     params.push_back(args.back()->getType());
   }
-  return b_.CreateCall(runtime_function(name->value, llvm_type(e_, e.type), params), args);
+  Value* result = b_.CreateCall(runtime_function(name->value, llvm_type(e_, e.type), params), args);
+  if (name->value == "retrograde_profiler_begin") {
+    frame_.profiler_slot = entry_alloca(b_.getPtrTy(), 1, "profiled");
+    b_.CreateStore(result, frame_.profiler_slot);
+  } else if (name->value == "retrograde_profiler_end" && frame_.profiler_slot) {
+    b_.CreateStore(llvm::ConstantPointerNull::get(b_.getPtrTy()), frame_.profiler_slot);
+  }
+  return result;
 }
 
 // The bytes of the values as they lie in memory, without gaps.

@@ -53,6 +53,12 @@ void FunctionGenerator::finish_function() {
   Value* count = b_.getInt64(static_cast<uint64_t>(frame_.owned_count));
   if (frame_.error_exit) {
     b_.SetInsertPoint(frame_.error_exit);
+    if (frame_.profiler_slot) {
+      const auto end = runtime_function("retrograde_profiler_end", b_.getInt32Ty(),
+                                        {b_.getPtrTy(), b_.getPtrTy()});
+      b_.CreateCall(end,
+                    {frame_.context, b_.CreateLoad(b_.getPtrTy(), frame_.profiler_slot)});
+    }
     if (frame_.owned_slots) {
       const auto free_all = runtime_function("retrograde_free_all", b_.getVoidTy(),
                                              {b_.getPtrTy(), b_.getPtrTy(), b_.getInt64Ty()});
@@ -66,6 +72,8 @@ void FunctionGenerator::finish_function() {
     b_.CreateMemSet(frame_.owned_slots, b_.getInt8(0),
                     static_cast<uint64_t>(8 * frame_.owned_count), llvm::Align(8));
   }
+  if (frame_.profiler_slot)
+    b_.CreateStore(llvm::ConstantPointerNull::get(b_.getPtrTy()), frame_.profiler_slot);
   b_.CreateBr(&*std::next(frame_.function->begin()));
 }
 

@@ -90,19 +90,25 @@ retrograde_context context_for(const CallContext& caller) {
 class JitPipeline : public CompiledPipeline {
  public:
   JitPipeline(std::vector<ir::LoweredArgument> arguments,
-              std::shared_ptr<const jit::CompiledFunction> code)
-      : arguments_(std::move(arguments)), code_(std::move(code)) {}
+              std::shared_ptr<const jit::CompiledFunction> code, bool is_profiled)
+      : arguments_(std::move(arguments)), code_(std::move(code)), is_profiled_(is_profiled) {}
 
   const std::vector<ir::LoweredArgument>& arguments() const override { return arguments_; }
 
   int run(void* const* argv, CallContext& caller) const override {
     CallState state{context_for(caller), &caller};
-    return code_->call(&state.context, const_cast<void**>(argv));
+    const int code = code_->call(&state.context, const_cast<void**>(argv));
+    if (is_profiled_) {
+      retrograde_profiler_report(&state.context);
+      retrograde_profiler_reset();
+    }
+    return code;
   }
 
  private:
   const std::vector<ir::LoweredArgument> arguments_;
   const std::shared_ptr<const jit::CompiledFunction> code_;
+  const bool is_profiled_;  // then every call tells of its profile
 };
 
 class JitCompiler : public Compiler {
@@ -117,7 +123,8 @@ class JitCompiler : public Compiler {
     jit::Options code_options;
     code_options.externs = pipeline.externs;
     auto code = jit::compile(function, target, code_options);
-    return std::make_shared<JitPipeline>(std::move(function.args), std::move(code));
+    return std::make_shared<JitPipeline>(std::move(function.args), std::move(code),
+                                         target.has_feature(Target::Profile));
   }
 
   std::string loop_nest(const PipelineSpec& pipeline, const Target&) override {

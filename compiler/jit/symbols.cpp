@@ -31,6 +31,11 @@ void add_runtime(Table& table) {
   table["retrograde_print"] = pointer(retrograde_print);
   table["retrograde_lock_element"] = pointer(retrograde_lock_element);
   table["retrograde_unlock_element"] = pointer(retrograde_unlock_element);
+  table["retrograde_profiler_begin"] = pointer(retrograde_profiler_begin);
+  table["retrograde_profiler_enter"] = pointer(retrograde_profiler_enter);
+  table["retrograde_profiler_thread"] = pointer(retrograde_profiler_thread);
+  table["retrograde_profiler_memory"] = pointer(retrograde_profiler_memory);
+  table["retrograde_profiler_end"] = pointer(retrograde_profiler_end);
   table["retrograde_trace"] = pointer(retrograde_trace);
   table["retrograde_trace_region"] = pointer(retrograde_trace_region);
   table["retrograde_trace_type"] = pointer(retrograde_trace_type);

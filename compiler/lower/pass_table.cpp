@@ -25,6 +25,7 @@ const std::vector<StatementPass>& statement_passes() {
       {"simplify", [](const Stmt& s) { return simplify(s); }},
       {"unroll_loops", unroll_loops},
       {"vectorize_loops", vectorize_loops},
+      {"interleave_vectors", interleave_vectors},
   };
   return passes;
 }

@@ -10,13 +10,15 @@
 #include "ir/validate.h"
 #include "lower/argument_checks.h"
 #include "lower/build_loop_nests.h"
-#include "lower/deinterleave_loads.h"
 #include "lower/drop_checks.h"
+#include "lower/deinterleave_loads.h"
 #include "lower/flatten_storage.h"
 #include "lower/fork_async.h"
 #include "lower/free_early.h"
+#include "lower/inject_profiling.h"
 #include "lower/inject_tracing.h"
 #include "lower/inline_functions.h"
+#include "lower/insert_prefetches.h"
 #include "lower/interleave_vectors.h"
 #include "lower/lower.h"
 #include "lower/lower_atomics.h"
@@ -83,6 +85,14 @@ constexpr Pass passes[] = {
        const bool drops = lowering.options.target.has_feature(Target::NoBoundsQuery);
        return drops ? drop_bounds_query(s) : s;
      }},
+    {"insert_prefetches", Phase::Loops,
+     [](Lowering& lowering, const Stmt& s) {
+       return insert_prefetches(s, lowering.program, lowering.renamed_funcs);
+     }},
+    {"lower_prefetches", Phase::Loops,
+     [](Lowering& lowering, const Stmt& s) {
+       return lower_prefetches(s, lowering.program, lowering.renamed_funcs);
+     }},
     {"fork_async", Phase::Loops,
      [](Lowering& lowering, const Stmt& s) {
        return fork_async(s, lowering.program, lowering.renamed_funcs, lowering.async_room);
@@ -109,6 +119,11 @@ constexpr Pass passes[] = {
     {"deinterleave_loads", Phase::Vector,
      [](Lowering&, const Stmt& s) { return deinterleave_loads(s); }},
     {"simplify_vectors", Phase::Vector, run_simplify},
+    {"inject_profiling", Phase::Vector,
+     [](Lowering& lowering, const Stmt& s) {
+       if (!lowering.options.target.has_feature(Target::Profile)) return s;
+       return inject_profiling(s, lowering.program, lowering.renamed_funcs, lowering.name);
+     }},
     {"free_early", Phase::Vector, [](Lowering&, const Stmt& s) { return free_early(s); }},
     {"drop_asserts", Phase::Vector,
      [](Lowering& lowering, const Stmt& s) {

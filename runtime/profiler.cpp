@@ -1,0 +1,309 @@
+// A sampling profiler: what Func each running pipeline is in, looked at every millisecond.
+//
+// Running code only stores a number, so that it is hardly slower. One thread looks at all runs; it
+// starts with the first and ends with the last, so that nothing runs while nobody is profiled. What
+// was found is kept by pipeline, in the structs of HalideRuntime.h.
+#include <HalideRuntime.h>
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <condition_variable>
+#include <cstring>
+#include <memory>
+#include <mutex>
+#include <new>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "report.h"
+
+namespace retrograde::runtime {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+uint64_t nanoseconds(Clock::duration d) {
+  return static_cast<uint64_t>(std::chrono::duration_cast<std::chrono::nanoseconds>(d).count());
+}
+
+// What is known of one pipeline, over all of its runs.
+struct Pipeline {
+  std::string name;
+  std::vector<std::string> func_names;
+  std::vector<halide_profiler_func_stats> funcs;
+  halide_profiler_pipeline_stats stats = {};
+
+  void link(Pipeline* next) {
+    for (size_t i = 0; i < funcs.size(); i++) funcs[i].name = func_names[i].c_str();
+    stats.name = name.c_str();
+    stats.funcs = funcs.data();
+    stats.num_funcs = static_cast<int>(funcs.size());
+    stats.next = next ? &next->stats : nullptr;
+  }
+};
+
+struct Memory {
+  std::atomic<int64_t> current{0}, peak{0}, total{0};
+  std::atomic<int32_t> allocations{0};
+
+  void change(int64_t bytes) {
+    const int64_t now = current.fetch_add(bytes, std::memory_order_relaxed) + bytes;
+    if (bytes <= 0) return;
+    total.fetch_add(bytes, std::memory_order_relaxed);
+    allocations.fetch_add(1, std::memory_order_relaxed);
+    int64_t highest = peak.load(std::memory_order_relaxed);
+    while (now > highest && !peak.compare_exchange_weak(highest, now, std::memory_order_relaxed)) {
+    }
+  }
+};
+
+// One call.
+struct Run {
+  Run(Pipeline& pipeline, size_t count) : pipeline(pipeline), memory(count) {}
+  Pipeline& pipeline;
+  std::atomic<int32_t> current{0}, threads{1};
+  std::vector<Memory> memory;  // by Func
+  Memory all;
+  Clock::time_point begin = Clock::now(), sampled = begin;
+};
+
+class Profiler {
+ public:
+  Run* begin(const char* name, const char* funcs) {
+    const std::lock_guard lock(mutex_);
+    Pipeline& pipeline = find(name, funcs);
+    runs_.push_back(std::make_unique<Run>(pipeline, pipeline.funcs.size()));
+    if (runs_.size() == 1) start();
+    return runs_.back().get();
+  }
+
+  void end(Run* run) {
+    std::thread finished;
+    {
+      const std::lock_guard lock(mutex_);
+      const auto now = Clock::now();
+      sample(*run, now, false);
+      keep(*run, now);
+      std::erase_if(runs_, [&](const auto& other) { return other.get() == run; });
+      if (runs_.empty()) finished = stop();
+    }
+    if (finished.joinable()) finished.join();
+  }
+
+  void reset() {
+    const std::lock_guard lock(mutex_);
+    for (auto& pipeline : pipelines_) {
+      for (size_t i = 0; i < pipeline->funcs.size(); i++) pipeline->funcs[i] = {};
+      pipeline->stats = {};
+    }
+    link();
+  }
+
+  std::string report() {
+    const std::lock_guard lock(mutex_);
+    std::string text;
+    for (const auto& pipeline : pipelines_) {
+      if (pipeline->stats.runs > 0) text += report_of(*pipeline);
+    }
+    return text;
+  }
+
+  halide_profiler_pipeline_stats* find(const char* name) {
+    const std::lock_guard lock(mutex_);
+    for (auto& pipeline : pipelines_) {
+      if (pipeline->name == name) return &pipeline->stats;
+    }
+    return nullptr;
+  }
+
+ private:
+  static constexpr auto period = std::chrono::milliseconds(1);
+  std::mutex mutex_;
+  std::condition_variable wake_;
+  std::vector<std::unique_ptr<Pipeline>> pipelines_;  // the latest first
+  std::vector<std::unique_ptr<Run>> runs_;
+  std::thread thread_;
+  uint64_t generation_ = 0;  // of the sampling thread
+
+  Pipeline& find(const char* name, const char* funcs) {
+    std::vector<std::string> names;
+    for (const char* at = funcs; at;) {
+      const char* end = std::strchr(at, '\n');
+      names.emplace_back(at, end ? static_cast<size_t>(end - at) : std::strlen(at));
+      at = end ? end + 1 : nullptr;
+    }
+    for (auto& pipeline : pipelines_) {
+      if (pipeline->name == name && pipeline->func_names == names) return *pipeline;
+    }
+    auto pipeline = std::make_unique<Pipeline>();
+    pipeline->name = name;
+    pipeline->func_names = std::move(names);
+    pipeline->funcs.resize(pipeline->func_names.size());
+    pipelines_.insert(pipelines_.begin(), std::move(pipeline));
+    link();
+    return *pipelines_.front();
+  }
+
+  void link() {
+    for (size_t i = pipelines_.size(); i-- > 0;)
+      pipelines_[i]->link(i + 1 < pipelines_.size() ? pipelines_[i + 1].get() : nullptr);
+  }
+
+  void start() {
+    try {
+      thread_ = std::thread([this, generation = ++generation_] { look(generation); });
+    } catch (...) {  // no thread: the times of whole runs are still right
+    }
+  }
+
+  std::thread stop() {
+    generation_++;
+    wake_.notify_all();
+    return std::move(thread_);
+  }
+
+  void look(uint64_t generation) {
+    std::unique_lock lock(mutex_);
+    while (generation == generation_) {
+      wake_.wait_for(lock, period);
+      const auto now = Clock::now();
+      for (auto& run : runs_) sample(*run, now, true);
+    }
+  }
+
+  // The time since the last look went to the Func that is seen now.
+  static void sample(Run& run, Clock::time_point now, bool is_look) {
+    const uint64_t elapsed = nanoseconds(now - run.sampled);
+    run.sampled = now;
+    const auto threads = static_cast<uint64_t>(
+        std::max(1, run.threads.load(std::memory_order_relaxed)));
+    auto& stats = run.pipeline.stats;
+    auto& func = run.pipeline.funcs[static_cast<size_t>(run.current.load(std::memory_order_relaxed))];
+    func.time += elapsed;
+    if (!is_look) return;
+    func.active_threads_numerator += threads;
+    func.active_threads_denominator++;
+    stats.active_threads_numerator += threads;
+    stats.active_threads_denominator++;
+    stats.samples++;
+  }
+
+  static void keep(const Run& run, Clock::time_point now) {
+    auto& stats = run.pipeline.stats;
+    stats.time += nanoseconds(now - run.begin);
+    stats.runs++;
+    const auto add = [](auto& to, const Memory& from) {
+      to.memory_peak =
+          std::max(to.memory_peak, static_cast<uint64_t>(std::max<int64_t>(0, from.peak)));
+      to.memory_total += static_cast<uint64_t>(from.total.load());
+      to.num_allocs += from.allocations.load();
+    };
+    for (size_t i = 0; i < run.memory.size(); i++) add(run.pipeline.funcs[i], run.memory[i]);
+    add(stats, run.all);
+  }
+
+  // ---- the table ----
+
+  template <typename... Args>
+  static std::string line(const char* format, Args... args) {
+    char text[max_message_bytes];
+    return std::string(text, retrograde_format_message(text, sizeof text, format, args...));
+  }
+  static double milliseconds(uint64_t time) {
+    return static_cast<double>(time / 1000) / 1000.0;  // whole microseconds
+  }
+  static double threads(uint64_t numerator, uint64_t denominator) {
+    if (denominator == 0) return 1.0;
+    return static_cast<double>(10 * numerator / denominator) / 10.0;
+  }
+  static std::string padded(std::string text, size_t width) {
+    if (text.size() < width) text.resize(width, ' ');
+    return text;
+  }
+
+  static std::string report_of(const Pipeline& p) {
+    const auto& s = p.stats;
+    const auto runs = static_cast<uint64_t>(s.runs);
+    std::string text = line("%s\n", p.name.c_str());
+    text += line(" total time: %f ms  samples: %i  runs: %i  time/run: %f ms\n",
+                 milliseconds(s.time), static_cast<int64_t>(s.samples), static_cast<int64_t>(s.runs),
+                 milliseconds(s.time / std::max<uint64_t>(1, runs)));
+    text += line(" average threads used: %f\n",
+                 threads(s.active_threads_numerator, s.active_threads_denominator));
+    text += line(" allocations: %i  peak memory: %u bytes\n", static_cast<int64_t>(s.num_allocs),
+                 s.memory_peak);
+    size_t width = 0;
+    for (const std::string& name : p.func_names) width = std::max(width, name.size());
+    for (const auto& f : p.funcs) {
+      if (f.time == 0 && f.num_allocs == 0) continue;
+      const uint64_t percent = s.time ? 100 * f.time / s.time : 0;
+      const std::string time =
+          line("%f ms (%u%%)", milliseconds(f.time / std::max<uint64_t>(1, runs)), percent);
+      text += "  " + padded(std::string(f.name) + ":", width + 2) + padded(time, 22);
+      text += line("threads: %f", threads(f.active_threads_numerator, f.active_threads_denominator));
+      if (f.num_allocs > 0)
+        text += line("  peak: %u bytes  allocations: %i", f.memory_peak,
+                     static_cast<int64_t>(f.num_allocs));
+      text += "\n";
+    }
+    return text;
+  }
+};
+
+Profiler& profiler() {
+  static Profiler& instance = *new Profiler;  // never destroyed: runs may end while the process does
+  return instance;
+}
+
+}  // namespace
+}  // namespace retrograde::runtime
+
+namespace rt = retrograde::runtime;
+
+void* retrograde_profiler_begin(retrograde_context*, const char* pipeline, const char* funcs) {
+  try {
+    return rt::profiler().begin(pipeline, funcs);
+  } catch (const std::bad_alloc&) {  // then this run is not profiled
+    return nullptr;
+  }
+}
+
+int32_t retrograde_profiler_enter(retrograde_context*, void* run, int32_t func) {
+  if (run) static_cast<rt::Run*>(run)->current.store(func, std::memory_order_relaxed);
+  return 0;
+}
+
+int32_t retrograde_profiler_thread(retrograde_context*, void* run, int32_t change) {
+  if (run) static_cast<rt::Run*>(run)->threads.fetch_add(change, std::memory_order_relaxed);
+  return 0;
+}
+
+int32_t retrograde_profiler_memory(retrograde_context*, void* run, int32_t func, int64_t change) {
+  if (!run) return 0;
+  auto& r = *static_cast<rt::Run*>(run);
+  r.memory[static_cast<size_t>(func)].change(change);
+  r.all.change(change);
+  return 0;
+}
+
+int32_t retrograde_profiler_end(retrograde_context*, void* run) {
+  if (run) rt::profiler().end(static_cast<rt::Run*>(run));
+  return 0;
+}
+
+void retrograde_profiler_reset(void) { rt::profiler().reset(); }
+
+void retrograde_profiler_report(retrograde_context* context) {
+  if (!context || !context->print_handler) return;
+  try {
+    const std::string text = rt::profiler().report();
+    if (!text.empty()) context->print_handler(context, text.c_str());
+  } catch (const std::bad_alloc&) {
+  }
+}
+
+struct halide_profiler_pipeline_stats* retrograde_profiler_pipeline(const char* name) {
+  return rt::profiler().find(name);
+}

@@ -1,0 +1,96 @@
+// prefetch: what is asked for in advance, and that results do not change.
+#include <gtest/gtest.h>
+
+#include "frontend/include/retrograde/retrograde.h"
+#include "ir/print.h"
+#include "lower/lower.h"
+
+namespace retrograde {
+namespace {
+
+std::string lowered(const Func& f, const std::string& pass) {
+  ir::LowerOptions options;
+  options.target = get_jit_target_from_environment();
+  options.validate = true;
+  std::string result;
+  options.observe = [&](const std::string& name, double, const Stmt& s) {
+    if (name == pass) result = ir::print(s);
+  };
+  const std::vector<ir::FuncPtr> outputs = {f.function()};
+  ir::lower("f", outputs, ir::infer_arguments(outputs), options);
+  return result;
+}
+
+struct Blur {
+  Var x{"x"}, y{"y"};
+  ImageParam in{Float(32), 2, "in"};
+  Func out{"out"};
+  Blur() { out(x, y) = in(x, y) + in(x + 1, y + 1); }
+  void expect_right() {
+    Buffer<float> data(65, 33);
+    for (int j = 0; j < 33; j++) {
+      for (int i = 0; i < 65; i++) data(i, j) = static_cast<float>(i + 100 * j);
+    }
+    in.set(data);
+    Buffer<float> result = out.realize({64, 32});
+    for (int j = 0; j < 32; j++) {
+      for (int i = 0; i < 64; i++) ASSERT_EQ(result(i, j), static_cast<float>(2 * i + 200 * j + 101));
+    }
+  }
+};
+
+TEST(Prefetch, TheBoxOfALaterIterationIsAskedFor) {
+  Blur blur;
+  blur.out.prefetch(blur.in, blur.y, blur.y, 2, PrefetchBoundStrategy::NonFaulting);
+  const std::string text = lowered(blur.out, "insert_prefetches");
+  const size_t at = text.find("prefetch in");
+  ASSERT_NE(at, std::string::npos) << text;
+  const std::string line = text.substr(at, text.find('\n', at) - at);
+  EXPECT_NE(line.find(".s0.y + 2), 2]"), std::string::npos) << line;
+  blur.expect_right();
+}
+
+TEST(Prefetch, EveryBoundStrategyKeepsTheResult) {
+  for (auto strategy : {PrefetchBoundStrategy::Clamp, PrefetchBoundStrategy::GuardWithIf,
+                        PrefetchBoundStrategy::NonFaulting}) {
+    Blur blur;
+    blur.out.prefetch(blur.in, blur.y, blur.y, 3, strategy).vectorize(blur.x, 8);
+    const std::string text = lowered(blur.out, "insert_prefetches");
+    const size_t at = text.find("prefetch in"), loop = text.rfind("for ", at);
+    ASSERT_NE(at, std::string::npos) << text;
+    const std::string before = text.substr(loop, at - loop);
+    const std::string line = text.substr(at, text.find('\n', at) - at);
+    EXPECT_EQ(before.find("if ") != std::string::npos,
+              strategy == PrefetchBoundStrategy::GuardWithIf)
+        << before;
+    EXPECT_EQ(line.find("in.extent.1") != std::string::npos, strategy == PrefetchBoundStrategy::Clamp)
+        << line;
+    blur.expect_right();
+  }
+}
+
+TEST(Prefetch, OneRequestForEachCacheLine) {
+  Blur blur;
+  blur.out.prefetch(blur.in, blur.y, blur.y, 1, PrefetchBoundStrategy::NonFaulting);
+  const std::string text = lowered(blur.out, "lower_prefetches");
+  EXPECT_NE(text.find("prefetch<int32>(address_of"), std::string::npos) << text;
+  EXPECT_NE(text.find("*16"), std::string::npos) << "16 floats a line:\n" << text;
+}
+
+TEST(Prefetch, AFuncAndInsideOfATile) {
+  Var x("x"), y("y"), xo("xo"), yo("yo"), xi("xi"), yi("yi");
+  Func f("f"), out("out");
+  f(x, y) = Tuple(x + y, cast<uint8_t>(x));
+  out(x, y) = f(x, y)[0] + cast<int>(f(x, y + 1)[1]);
+  f.compute_root();
+  out.tile(x, y, xo, yo, xi, yi, 16, 8).parallel(yo);
+  out.prefetch(f, xo, yo, 1);
+  EXPECT_NE(lowered(out, "insert_prefetches").find("prefetch f"), std::string::npos);
+  Buffer<int> result = out.realize({100, 50});
+  for (int j = 0; j < 50; j++) {
+    for (int i = 0; i < 100; i++) ASSERT_EQ(result(i, j), 2 * i + j);
+  }
+}
+
+}  // namespace
+}  // namespace retrograde
