@@ -9,20 +9,17 @@ namespace kernels {
 using namespace Halide;
 
 Kernel histogram_equalisation(const Setup& setup) {
-  const int width = setup.size(2304, 223), strips = setup.size(48, 7), rows = 32;
-  const int height = strips * rows;
+  const int width = setup.size(2304, 223), height = setup.size(1536, 230), rows = 32;
   ImageParam input(UInt(8), 3, "input");
   Var x("x"), y("y"), c("c"), i("i"), s("s"), yi("yi");
 
-  Func luminance("luminance"), partial("partial"), histogram("histogram"), sum("sum");
+  Func luminance("luminance"), histogram("histogram"), sum("sum");
   Func curve("curve"), result("result");
   auto wide = [&](int colour) { return cast<uint16_t>(input(x, y, colour)); };
   luminance(x, y) = cast<uint8_t>((77 * wide(0) + 150 * wide(1) + 29 * wide(2)) >> 8);
-  RDom r(0, width, 0, rows), t(0, strips), up(1, 255);
-  partial(i, s) = cast<uint32_t>(0);
-  partial(cast<int>(luminance(r.x, s * rows + r.y)), s) += cast<uint32_t>(1);
+  RDom r(0, width, 0, height), up(1, 255);
   histogram(i) = cast<uint32_t>(0);
-  histogram(i) += partial(i, t);
+  histogram(cast<int>(luminance(r.x, r.y))) += cast<uint32_t>(1);
   sum(i) = histogram(i);
   sum(up) = sum(up - 1) + histogram(up);
   curve(i) = cast<int16_t>((sum(i) * 255) / cast<uint32_t>(width * height)) - cast<int16_t>(i);
@@ -31,8 +28,11 @@ Kernel histogram_equalisation(const Setup& setup) {
 
   const int lanes = setup.lanes<uint8_t>();
   luminance.compute_root().parallel(y, rows).vectorize(x, lanes);
+  RVar ro("ro"), ri("ri");
+  histogram.compute_root().vectorize(i, 16);
+  Func partial = histogram.update().split(r.y, ro, ri, rows).rfactor(ro, s);
   partial.compute_root().vectorize(i, 16).update().parallel(s);
-  histogram.compute_root().vectorize(i, 16).update().reorder(i, t).vectorize(i, 16);
+  histogram.update().reorder(i, ro).vectorize(i, 16);
   sum.compute_root();
   curve.compute_root().vectorize(i, 16);
   result.bound(c, 0, 3).split(y, y, yi, rows).reorder(c, x, yi, y).unroll(c);
