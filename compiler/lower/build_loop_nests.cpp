@@ -294,7 +294,11 @@ class NestEmitter {
       Emitted stage =
           f.func->is_extern() ? emit_extern(f, domain, site) : emit_variants(f, s, domain);
       if (auto self = stage.uses.find(f.name()); self != stage.uses.end()) {
-        need = hull(need, self->second.box);
+        Box wider = hull(need, self->second.box);
+        // Along a slide every stage stays inside of the part, and must: of a part that is empty a
+        // hull would have one end, where an earlier stage alone would run again.
+        for (const Slide& slide : slides) wider[slide.dimension] = need[slide.dimension];
+        need = std::move(wider);
         check_bounded(program_, f, need);
         stage.uses.erase(self);
       }

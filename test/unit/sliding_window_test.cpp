@@ -232,6 +232,25 @@ TEST_F(SlidingWindow, UpdatesThatStayInTheirRow) {
   EXPECT_EQ(computed["u"], width * (height + 2) * 5);
 }
 
+// Where the part of a row is empty, no stage may run: the first one would undo the update.
+TEST_F(SlidingWindow, PartsThatAreEmptyForUpdatesAreEmptyForAllStages) {
+  expect_same([&](bool scheduled) {
+    Var z("z"), zo("zo"), zi("zi");
+    Func f("f"), out("out");
+    f(x, y, z) = 93;
+    f(x, y, z) = 1;
+    out(x, y) = f(0, x, x) + 1000 * f(x, x, y);
+    if (!scheduled) {
+      f.compute_root();
+      return out;
+    }
+    f.update(0).split(z, zo, zi, 8, TailStrategy::GuardWithIf);
+    out.split(x, xo, xi, 5, TailStrategy::GuardWithIf);
+    f.store_root().compute_at(out, xo);
+    return out;
+  });
+}
+
 TEST_F(SlidingWindow, UpdatesAcrossRowsAreComputedAgain) {
   expect_same([&](bool scheduled) {
     Func f("f"), g("g");
