@@ -244,7 +244,8 @@ class SteadyRewriter : public Rewriter {
     const auto arithmetic = [&](const Binary& n) {
       if (n.type.is_bool()) return Mark::None;
       if (n.kind == Kind::Min || n.kind == Kind::Max) return decided(n.a, n.b);
-      return std::max(mark(n.a), mark(n.b)) == Mark::Likely ? Mark::Likely : Mark::None;
+      const Mark strongest = std::max(mark(n.a), mark(n.b));
+      return n.kind == Kind::Mod && strongest == Mark::Decided ? Mark::None : strongest;
     };
     const Mark result = match(
         e,
