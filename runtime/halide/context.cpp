@@ -36,6 +36,10 @@ void release(retrograde_context* context, void* block) {
   halide_free(context->user_data, given);
 }
 
+int32_t trace(retrograde_context* context, const halide_trace_event_t* event) {
+  return halide_trace(context->user_data, event);
+}
+
 struct Tasks {
   retrograde_context* context;
   retrograde_task task;
@@ -64,5 +68,6 @@ void retrograde_begin_call(retrograde_context* context, void* user_context) {
   context->malloc_handler = allocate;
   context->free_handler = release;
   context->parallel_handler = run_parallel;
+  context->trace_handler = trace;
   context->user_data = user_context;
 }

@@ -139,6 +139,20 @@ void write_talker() {
   write(out, {limit}, "aot_talker", target);
 }
 
+// What the runtime does besides: traces, remembered results, two stages at once.
+void write_services() {
+  Param<int> start("start");
+  Var x("x");
+  Func source("source"), middle("middle"), out("services");
+  source(x) = x * x + start;
+  middle(x) = source(x) + source(x + 1);
+  out(x) = middle(x) * 2;
+  source.compute_root().memoize();
+  middle.compute_root().async();
+  out.trace_stores();
+  write(out, {start}, "aot_services", target);
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -152,6 +166,7 @@ int main(int argc, char** argv) {
     write_table();
     write_variants();
     write_talker();
+    write_services();
   } catch (const std::exception& e) {
     std::fprintf(stderr, "aot_pipelines: %s\n", e.what());
     return 1;

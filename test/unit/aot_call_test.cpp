@@ -20,6 +20,7 @@
 #include "aot_blur_swapped.h"
 #include "aot_blur_unchecked.h"
 #include "aot_scalars.h"
+#include "aot_services.h"
 #include "aot_table.h"
 #include "aot_table_given.h"
 #include "aot_talker.h"
@@ -469,6 +470,26 @@ TEST_F(Aot, RegistrationTellsTheProgram) {
 }
 
 // ---- the rest of the runtime ----
+
+static std::atomic<int> traced_stores{0};
+
+TEST_F(Aot, TracesMemoizedAndAsynchronousStages) {
+  Buffer<int32_t, 1> out(8);
+  halide_memoization_cache_set_size(1 << 20);
+  halide_set_custom_trace([](void*, const halide_trace_event_t* event) {
+    if (event->event == halide_trace_store) traced_stores++;
+    return 1;
+  });
+  for (int call = 1; call <= 2; call++) {
+    ASSERT_EQ(aot_services(1, out), 0);
+    for (int i = 0; i < 8; i++) EXPECT_EQ(out(i), 2 * (i * i + (i + 1) * (i + 1) + 2));
+    EXPECT_EQ(traced_stores, 8 * call);
+  }
+  halide_set_custom_trace(nullptr);
+  ASSERT_EQ(aot_services(1, out), 0);
+  EXPECT_FALSE(prints.empty());  // the default trace is text
+  halide_memoization_cache_cleanup();
+}
 
 TEST_F(Aot, HalideMutexesExclude) {
   static halide_mutex lock = {};
