@@ -178,7 +178,18 @@ class Builder {
     for (int k = 0; k < domain.dimensions(); ++k) variables_.push_back(domain[k]);
     const Expr operand = expr(term.operands[0]);
     variables_.resize(outer);
-    return term.action == Action::Sum ? sum(domain, operand) : maximum(domain, operand);
+    switch (term.action) {
+      case Action::Sum:
+        return sum(domain, operand);
+      case Action::Product:
+        return product(domain, operand);
+      case Action::Maximum:
+        return maximum(domain, operand);
+      case Action::Minimum:
+        return minimum(domain, operand);
+      default:
+        return argmax(domain, operand)[term.element];
+    }
   }
 
   Expr expr(const Term& term) {
@@ -195,12 +206,10 @@ class Builder {
         return access(built_.funcs[term.source], coordinates(term), term.element);
       case Action::Self:
         return access(*self_, coordinates(term), term.element);
-      case Action::Sum:
-      case Action::Maximum:
-        return reduction(term);
       default:
         break;
     }
+    if (is_inline_reduction(term.action)) return reduction(term);
     std::vector<Expr> e;
     for (const Term& operand : term.operands) e.push_back(expr(operand));
     return operation(term, e);
@@ -285,11 +294,11 @@ class Builder {
 
 BuiltPipeline build(const PipelineSpec& pipeline) { return Builder(pipeline).run(); }
 
-std::vector<oracle::Array> interpret(const PipelineSpec& pipeline, const BuiltPipeline& built,
-                                     oracle::Rounding rounding) {
+std::vector<oracle::Array> interpret(const std::vector<OutputSpec>& outputs,
+                                     const BuiltPipeline& built, oracle::Rounding rounding) {
   std::vector<ir::FuncPtr> funcs;
   std::vector<oracle::Region> regions;
-  for (const OutputSpec& output : pipeline.outputs) {
+  for (const OutputSpec& output : outputs) {
     funcs.push_back(built.funcs[output.func].function());
     regions.push_back({output.mins, output.extents});
   }

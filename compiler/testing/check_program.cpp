@@ -6,6 +6,8 @@
 
 #include "diagnostics/error.h"
 #include "frontend/pipeline.h"
+#include "testing/apply_schedule.h"
+#include "testing/build_pipeline.h"
 
 namespace retrograde::fuzz {
 
@@ -55,32 +57,38 @@ bool is_intact(const GuardedOutput& output, const OutputSpec& spec) {
 }
 
 // One for each value of each output.
-std::vector<GuardedOutput> run(const PipelineSpec& pipeline, const BuiltPipeline& built,
-                               const Target& target) {
+std::vector<GuardedOutput> run(Pipeline& compiled, const std::vector<OutputSpec>& regions,
+                               const BuiltPipeline& built, const Target& target) {
   std::vector<GuardedOutput> outputs;
-  std::vector<Func> funcs;
   std::vector<Buffer<>> buffers;
-  for (const OutputSpec& output : pipeline.outputs) {
-    funcs.push_back(built.funcs[output.func]);
-    for (const Type& type : funcs.back().output_types()) {
+  for (const OutputSpec& output : regions) {
+    for (const Type& type : built.funcs[output.func].output_types()) {
       outputs.push_back(make_output(type, output));
       buffers.push_back(Buffer<>(outputs.back().inner));
     }
   }
-  Pipeline(funcs).realize(buffers, target);
+  compiled.realize(buffers, target);
   return outputs;
 }
 
-void compare_outputs(const PipelineSpec& pipeline, const BuiltPipeline& built,
+std::string describe(const OutputSpec& output, int value) {
+  std::string region;
+  for (size_t d = 0; d < output.mins.size(); ++d) {
+    region += text(d ? ", " : "", "[", output.mins[d], " + ", output.extents[d], "]");
+  }
+  return text("f", output.func, "[", value, "] over ", region);
+}
+
+void compare_outputs(const std::vector<OutputSpec>& regions, const BuiltPipeline& built,
                      const std::vector<GuardedOutput>& actual, Outcome& outcome) {
-  const auto expected = interpret(pipeline, built, oracle::Rounding::Contraction);
+  const auto expected = interpret(regions, built, oracle::Rounding::Contraction);
   size_t value = 0;
-  for (const OutputSpec& output : pipeline.outputs) {
+  for (const OutputSpec& output : regions) {
     for (int v = 0; v < built.funcs[output.func].outputs(); ++v, ++value) {
       const auto comparison = oracle::compare(expected[value], *actual[value].inner.raw_buffer());
       outcome.compared += comparison.compared;
       outcome.unstable += comparison.unstable;
-      const std::string where = text("f", output.func, "[", v, "]");
+      const std::string where = describe(output, v);
       if (!comparison.agrees()) {
         outcome.verdict = Verdict::Differs;
         outcome.detail += text(where, ": ", comparison.mismatches, " of ", comparison.compared,
@@ -93,6 +101,14 @@ void compare_outputs(const PipelineSpec& pipeline, const BuiltPipeline& built,
     }
   }
 }
+
+Pipeline outputs_of(const PipelineSpec& pipeline, const BuiltPipeline& built) {
+  std::vector<Func> funcs;
+  for (const OutputSpec& output : pipeline.outputs) funcs.push_back(built.funcs[output.func]);
+  return Pipeline(funcs);
+}
+
+int ignore_event(void*, const halide_trace_event_t*) { return 0; }
 
 }  // namespace
 
@@ -115,8 +131,12 @@ Outcome check_program(const PipelineSpec& pipeline, const ScheduleSpec& schedule
   Outcome outcome;
   try {
     BuiltPipeline built = build(pipeline);
-    apply(schedule, pipeline, built);
-    compare_outputs(pipeline, built, run(pipeline, built, target), outcome);
+    apply(schedule, built);
+    Pipeline compiled = outputs_of(pipeline, built);
+    compiled.set_custom_trace(ignore_event);
+    for (const std::vector<OutputSpec>& regions : all_runs(pipeline)) {
+      compare_outputs(regions, built, run(compiled, regions, built, target), outcome);
+    }
   } catch (const UserError& error) {
     outcome = {Verdict::Refused, error.what()};
   } catch (const Unsupported& error) {

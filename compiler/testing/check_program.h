@@ -3,6 +3,7 @@
 
 #include <string>
 
+#include "ir/target.h"
 #include "testing/random_schedule.h"
 
 namespace retrograde::fuzz {
@@ -10,7 +11,7 @@ namespace retrograde::fuzz {
 enum class Verdict : uint8_t {
   Agrees,
   Differs,  // wrong results
-  Refused,  // UserError or Unsupported: the generator or the compiler is wrong about what is legal
+  Refused,  // UserError or Unsupported: the generator does not know all rules of legality
   Broken,   // InternalError, or any other exception
 };
 

@@ -1,4 +1,4 @@
-// Text follows build_pipeline.cpp and random_schedule.cpp case by case.
+// Text follows build_pipeline.cpp case by case.
 #include "testing/print_program.h"
 
 #include <sstream>
@@ -9,9 +9,6 @@
 namespace retrograde::fuzz {
 
 namespace {
-
-using Kind = Directive::Kind;
-using Where = Placement::Where;
 
 std::string cpp_type(Type type) {
   if (type.is_bool()) return "bool";
@@ -135,7 +132,11 @@ class Printer {
     add_variables(name, term.domain);
     const std::string operand = expr(term.operands[0]);
     variables_.resize(outer);
-    return (term.action == Action::Sum ? "sum(" : "maximum(") + name + ", " + operand + ")";
+    static const char* const names[] = {"sum", "product", "maximum", "minimum", "argmax"};
+    const int which = static_cast<int>(term.action) - static_cast<int>(Action::Sum);
+    const std::string element =
+        term.action == Action::ArgMax ? text("[", term.element, "]") : std::string();
+    return text(names[which], "(", name, ", ", operand, ")", element);
   }
 
   std::string constant(const Term& term) {
@@ -161,11 +162,8 @@ class Printer {
                       static_cast<int>(spec_.funcs[term.source].values.size()));
       case Action::Self:
         return access(self_, term, static_cast<int>(spec_.funcs[self_[1] - '0'].values.size()));
-      case Action::Sum:
-      case Action::Maximum:
-        return reduction(term);
       default:
-        return operation(term);
+        return is_inline_reduction(term.action) ? reduction(term) : operation(term);
     }
   }
 
@@ -204,101 +202,19 @@ class Printer {
   int reductions_ = 0;
 };
 
-// ---- schedules ----
-
-class SchedulePrinter {
- public:
-  SchedulePrinter(const PipelineSpec& pipeline, const ScheduleSpec& schedule)
-      : pipeline_(pipeline), schedule_(schedule) {}
-
-  std::string run() {
-    for (size_t f = 0; f < schedule_.funcs.size(); ++f) print_func(static_cast<int>(f));
-    for (size_t f = 0; f < schedule_.funcs.size(); ++f) print_placement(static_cast<int>(f));
-    return declarations_.str() + out_.str();
-  }
-
- private:
-  void print_func(int f) {
-    const FuncScheduleSpec& spec = schedule_.funcs[f];
-    for (size_t s = 0; s < spec.stages.size(); ++s) {
-      if (spec.stages[s].directives.empty()) continue;
-      out_ << "f" << f << (s ? text(".update(", s - 1, ")") : "");
-      for (const Directive& directive : spec.stages[s].directives) {
-        print_directive(directive, f, static_cast<int>(s));
-      }
-      out_ << ";\n";
-    }
-    for (const OutputSpec& output : pipeline_.outputs) {
-      if (!spec.bounded || output.func != f) continue;
-      for (size_t d = 0; d < output.mins.size(); ++d) {
-        out_ << "f" << f << ".bound("
-             << "xyz"[d] << ", " << output.mins[d] << ", " << output.extents[d] << ");\n";
-      }
-    }
-  }
-
-  std::string loop(const std::string& name, int f, int stage) const {
-    const bool original = is_reduction_loop(name) && name.size() == 2;
-    return original ? text("r", f, "_", stage - 1, "[", name[1], "]") : name;
-  }
-
-  void print_directive(const Directive& directive, int f, int stage) {
-    static const char* const verbs[] = {"split",     "fuse",   "reorder",
-                                        "vectorize", "unroll", "parallel"};
-    std::vector<std::string> arguments;
-    for (const std::string& name : directive.loops) arguments.push_back(loop(name, f, stage));
-    if (directive.kind == Kind::Split) {
-      declare(directive.loops[1]);
-      declare(directive.loops[2]);
-      arguments.push_back(std::to_string(directive.factor));
-      arguments.push_back(std::string("TailStrategy::") + tail_name(directive.tail));
-    }
-    if (directive.kind == Kind::Fuse) declare(directive.loops[2]);
-    out_ << "\n    ." << verbs[static_cast<int>(directive.kind)] << "(" << join(arguments) << ")";
-  }
-
-  void declare(const std::string& name) {
-    declarations_ << (is_reduction_loop(name) ? "RVar " : "Var ") << name << "(\"" << name
-                  << "\");\n";
-  }
-
-  void print_placement(int f) {
-    const Placement& placement = schedule_.funcs[f].placement;
-    const auto level = [&](const std::string& name) {
-      return text("f", placement.consumer, ", ", loop(name, placement.consumer, placement.stage));
-    };
-    switch (placement.where) {
-      case Where::Default:
-        return;
-      case Where::Inline:
-        out_ << "f" << f << ".compute_inline();\n";
-        return;
-      case Where::Root:
-        out_ << "f" << f << ".compute_root();\n";
-        return;
-      case Where::At:
-        out_ << "f" << f;
-        if (placement.store_loop == "root") {
-          out_ << ".store_root()";
-        } else if (!placement.store_loop.empty()) {
-          out_ << ".store_at(" << level(placement.store_loop) << ")";
-        }
-        out_ << ".compute_at(" << level(placement.compute_loop) << ");\n";
-    }
-  }
-
-  const PipelineSpec& pipeline_;
-  const ScheduleSpec& schedule_;
-  std::ostringstream declarations_, out_;
-};
-
 }  // namespace
 
 std::string to_cpp(const PipelineSpec& pipeline, const ScheduleSpec& schedule) {
-  std::string result = Printer(pipeline).definitions() + SchedulePrinter(pipeline, schedule).run();
+  std::string result = Printer(pipeline).definitions() + to_cpp(schedule);
   for (const OutputSpec& output : pipeline.outputs) {
     result += text("// output f", output.func, " over mins ", list(output.mins), ", extents ",
                    list(output.extents), "\n");
+  }
+  for (const auto& regions : pipeline.sweep) {
+    for (const RegionSpec& region : regions) {
+      result +=
+          text("// then over mins ", list(region.mins), ", extents ", list(region.extents), "\n");
+    }
   }
   return result;
 }

@@ -9,5 +9,7 @@ namespace retrograde::fuzz {
 
 // The definitions, the schedule, and the realization of every output.
 std::string to_cpp(const PipelineSpec& pipeline, const ScheduleSpec& schedule);
+// The schedule alone.
+std::string to_cpp(const ScheduleSpec& schedule);
 
 }  // namespace retrograde::fuzz

@@ -4,6 +4,8 @@
 
 #include <algorithm>
 
+#include "testing/build_pipeline.h"
+
 namespace retrograde::fuzz {
 
 namespace {
@@ -35,9 +37,14 @@ class Generator {
 
   PipelineSpec pipeline() {
     make_inputs();
-    const int count = random_.between(2, 6);
-    for (int i = 0; i < count; ++i) make_func(i == count - 1);
+    if (random_.chance(20)) {
+      make_chain();
+    } else {
+      const int count = random_.between(2, 6);
+      for (int i = 0; i < count; ++i) make_func(i == count - 1);
+    }
     make_outputs();
+    make_sweep();
     return std::move(spec_);
   }
 
@@ -53,8 +60,8 @@ class Generator {
 
   Type random_type() {
     static const std::vector<Type> types = {
-        UInt(8),  UInt(8), Int(8),   UInt(16),  Int(16),   Int(32),   Int(32),   Int(32),
-        UInt(32), Int(64), UInt(64), Float(32), Float(32), Float(32), Float(64), Bool()};
+        UInt(8), UInt(8),  Int(8),  UInt(16), UInt(16),  Int(16),   Int(16),   Int(32),   Int(32),
+        Int(32), UInt(32), Int(64), UInt(64), Float(32), Float(32), Float(32), Float(64), Bool()};
     return random_.pick(types);
   }
 
@@ -89,16 +96,66 @@ class Generator {
     FuncSpec func;
     func.dimensions =
         is_last ? random_.between(1, 3) : random_.pick(std::vector<int>{0, 1, 1, 2, 2, 2, 3});
-    const int values = random_.chance(15) ? 2 : 1;
+    const int values = random_.chance(20) ? 2 : 1;
     const Context context{func.dimensions, {}, true};
     reads_ = 0;
-    for (int v = 0; v < values; ++v) func.values.push_back(definition(random_type(), context));
+    const Type first = random_type();
+    for (int v = 0; v < values; ++v) {
+      const Type type = v == 0 || random_.chance(40) ? first : random_type();
+      func.values.push_back(definition(type, context));
+    }
     if (random_.chance(40)) {
       const int updates = random_.between(1, 2);
       for (int u = 0; u < updates; ++u) func.updates.push_back(update(func));
     }
     inlined_reads_.push_back(1 + reads_);
     spec_.funcs.push_back(std::move(func));
+  }
+
+  // A few stencils, each of the one before; some at half or at twice the resolution.
+  void make_chain() {
+    const int dimensions = random_.between(1, 2), count = random_.between(3, 7);
+    const Type type = random_.pick(
+        std::vector<Type>{UInt(8), UInt(16), UInt(16), Int(16), Int(32), Float(32), Float(32)});
+    const Context context{dimensions, {}, false};
+    for (int f = 0; f < count; ++f) {
+      FuncSpec func;
+      func.dimensions = dimensions;
+      func.values = {f == 0 ? bounded(converted(image_leaf(context), type), wide_modulus)
+                            : stencil(f - 1, type, dimensions)};
+      inlined_reads_.push_back(std::min(max_inlined_reads, 1 << (2 * f)));
+      spec_.funcs.push_back(std::move(func));
+    }
+  }
+
+  Term stencil(int source, Type type, int dimensions) {
+    const int reads = random_.between(2, 3), along = random_.below(dimensions);
+    const int step = strided_ < 2 && random_.chance(20) ? 2 : 1;
+    const int divisor = step == 1 && random_.chance(15) ? 2 : 1;
+    strided_ += step == 2 ? 1 : 0;
+    Term result;
+    for (int i = 0; i < reads; ++i) {
+      Term read;
+      read.action = Action::Func;
+      read.source = source;
+      read.type = type;
+      for (int d = 0; d < dimensions; ++d) {
+        Index index;
+        index.variable = d;
+        if (d == along || random_.chance(20)) {
+          index.scale = step;
+          index.divisor = divisor;
+          index.offset = i - random_.below(2);
+        }
+        read.indices.push_back(index);
+      }
+      result = i == 0 ? read
+                      : make(random_.chance(75) ? Action::Add : Action::Max, type,
+                             {std::move(result), std::move(read)});
+    }
+    if (random_.chance(50))
+      result = make(Action::Div, type, {std::move(result), constant(type, reads)});
+    return bounded(std::move(result), wide_modulus);
   }
 
   Term definition(Type type, const Context& context) {
@@ -128,38 +185,23 @@ class Generator {
     // A pure variable may be used only where its dimension stays pure.
     usable_.assign(context.variables(), true);
     for (int d = 0; d < func.dimensions; ++d) usable_[d] = is_pure(update.left[d], d);
-    const bool scan = random_.chance(25);
-    const Action combine = random_.pick(std::vector<Action>{
-        Action::Add, Action::Add, Action::Max, Action::Min, Action::Select, Action::Constant});
-    for (size_t v = 0; v < func.values.size(); ++v) {
-      const Type type = func.values[v].type;
-      update.values.push_back(
-          update_value(type, static_cast<int>(v), update, combine, scan, context));
+    if (func.values.size() == 2 && random_.chance(50)) {
+      update.values = joint_update(func, update, context);
+    } else {
+      const bool scan = random_.chance(25);
+      const Action combine = random_.pick(std::vector<Action>{
+          Action::Add, Action::Add, Action::Max, Action::Min, Action::Select, Action::Constant});
+      for (size_t v = 0; v < func.values.size(); ++v) {
+        const Type type = func.values[v].type;
+        update.values.push_back(
+            update_value(type, static_cast<int>(v), update, combine, scan, context));
+      }
     }
     if (rank > 0 && random_.chance(35)) {
       update.predicate.push_back(term(Bool(), random_.between(1, 2), context));
     }
     usable_.clear();
-    drop_unused_domain(update, func.dimensions);
     return update;
-  }
-
-  // The language knows a reduction domain by its use: an update that never mentions it has none.
-  static void drop_unused_domain(UpdateSpec& update, int dimensions) {
-    bool used = false;
-    const auto look = [&](const Index& index) { used |= index.variable >= dimensions; };
-    const auto look_in = [&](const Term& term) {
-      used |= term.action == Action::Variable && term.source >= dimensions;
-      for (const Index& index : term.indices) look(index);
-    };
-    for (const Index& index : update.left) {
-      look(index);
-      for (const Term& data : index.data) for_each_term(data, look_in);
-    }
-    for (const Term& value : update.values) for_each_term(value, look_in);
-    if (used) return;
-    update.domain.clear();
-    update.predicate.clear();
   }
 
   static bool is_pure(const Index& index, int d) {
@@ -207,6 +249,37 @@ class Generator {
     return make(Action::Add, type, {self, fresh});
   }
 
+  static Term self_of(const FuncSpec& func, const UpdateSpec& update, int element) {
+    Term self;
+    self.action = Action::Self;
+    self.type = func.values[element].type;
+    self.element = element;
+    self.indices = update.left;
+    return self;
+  }
+
+  // Two values that need each other: the product of complex numbers, or the largest value so far
+  // and something that belongs to it.
+  std::vector<Term> joint_update(const FuncSpec& func, const UpdateSpec& update,
+                                 const Context& context) {
+    const Type type = func.values[0].type, other = func.values[1].type;
+    const Term a = self_of(func, update, 0), b = self_of(func, update, 1);
+    const Term c = bounded(term(type, random_.between(0, 2), context), 64);
+    const Term d = bounded(term(other, random_.between(0, 1), context), 64);
+    const bool wraps = type.is_int_or_uint() && type.bits() > 1 && type.bits() <= 16;
+    if (type == other && wraps && random_.chance(50)) {
+      const auto times = [&](const Term& x, const Term& y) {
+        return make(Action::Mul, type, {x, y});
+      };
+      return {make(Action::Sub, type, {times(a, c), times(b, d)}),
+              make(Action::Add, type, {times(a, d), times(b, c)})};
+    }
+    if (type.is_bool()) return {make(Action::Or, type, {a, c}), d};
+    const Term better = make(Action::Less, Bool(), {a, c});
+    return {make(Action::Select, type, {better, c, a}),
+            make(Action::Select, other, {better, d, b})};
+  }
+
   // f(r, y) reads f(r - 1, y).
   static void step_back(Term& self, const Context& context) {
     for (Index& index : self.indices) {
@@ -240,6 +313,26 @@ class Generator {
     copy.values.push_back(std::move(read));
     spec_.funcs.push_back(std::move(copy));
     return static_cast<int>(spec_.funcs.size()) - 1;
+  }
+
+  // Runs over tiny and odd regions, somewhere else. Often: such sizes decide which schedules are
+  // legal, so one program has few of them.
+  void make_sweep() {
+    if (!random_.chance(60)) return;
+    const int runs = random_.between(1, 2);
+    for (int i = 0; i < runs; ++i) {
+      std::vector<RegionSpec> regions;
+      for (const OutputSpec& main : spec_.outputs) {
+        OutputSpec small = main;
+        for (int& extent : small.extents) {
+          extent = random_.pick(std::vector<int>{1, 1, 2, 3, 5, 7, 13});
+        }
+        for (int& min : small.mins) min = random_.chance(30) ? 0 : random_.between(-9, 9);
+        for (const UpdateSpec& update : spec_.funcs[small.func].updates) cover(update, small);
+        regions.push_back({small.mins, small.extents});
+      }
+      spec_.sweep.push_back(std::move(regions));
+    }
   }
 
   OutputSpec output(int func) {
@@ -425,10 +518,15 @@ class Generator {
       inner.rvars.push_back(domain.back());
     }
     Term operand = bounded(term(type, 1, inner), 64);
-    const Action action = random_.chance(60) ? Action::Sum : Action::Maximum;
-    Term result = make(action, type, {std::move(operand)});
+    std::vector<Action> actions = {Action::Sum, Action::Sum, Action::Maximum, Action::Minimum};
+    if (type.is_int_or_uint() && !is_wide(type)) actions.push_back(Action::Product);
+    if (!type.is_bool()) actions.push_back(Action::ArgMax);
+    Term result = make(random_.pick(actions), type, {std::move(operand)});
     result.domain = std::move(domain);
-    return result;
+    if (result.action != Action::ArgMax) return result;
+    result.element = random_.below(rank + 1);
+    if (result.element < rank) result.type = Int(32);
+    return converted(std::move(result), type);
   }
 
   // ---- conversions ----
@@ -564,19 +662,53 @@ class Generator {
   std::vector<bool> usable_;  // variables of the update being made; empty: all
 };
 
+// The language knows a reduction domain by its use: an update that does not mention it has none.
+// Only the Funcs themselves tell, because constants fold when terms become expressions.
+void drop_unused_domains(PipelineSpec& pipeline) {
+  const BuiltPipeline built = build(pipeline);
+  for (size_t f = 0; f < pipeline.funcs.size(); ++f) {
+    for (size_t u = 0; u < pipeline.funcs[f].updates.size(); ++u) {
+      if (!built.funcs[f].rvars(static_cast<int>(u)).empty()) continue;
+      pipeline.funcs[f].updates[u].domain.clear();
+      pipeline.funcs[f].updates[u].predicate.clear();
+    }
+  }
+}
+
 }  // namespace
 
-PipelineSpec random_pipeline(uint64_t seed) { return Generator(seed).pipeline(); }
+PipelineSpec random_pipeline(uint64_t seed) {
+  PipelineSpec pipeline = Generator(seed).pipeline();
+  drop_unused_domains(pipeline);
+  return pipeline;
+}
+
+std::vector<std::vector<OutputSpec>> all_runs(const PipelineSpec& pipeline) {
+  std::vector<std::vector<OutputSpec>> runs = {pipeline.outputs};
+  for (const std::vector<RegionSpec>& regions : pipeline.sweep) {
+    runs.push_back(pipeline.outputs);
+    for (size_t o = 0; o < regions.size(); ++o) {
+      runs.back()[o].mins = regions[o].mins;
+      runs.back()[o].extents = regions[o].extents;
+    }
+  }
+  return runs;
+}
 
 std::vector<bool> reachable_funcs(const PipelineSpec& pipeline) {
   std::vector<bool> reachable(pipeline.funcs.size(), false);
-  for (const OutputSpec& output : pipeline.outputs) reachable[output.func] = true;
-  for (int f = static_cast<int>(pipeline.funcs.size()) - 1; f >= 0; --f) {
-    if (!reachable[f]) continue;
-    const FuncSpec& func = pipeline.funcs[f];
+  std::vector<int> todo;
+  const auto reach = [&](int f) {
+    reachable[f] = true;
+    todo.push_back(f);
+  };
+  for (const OutputSpec& output : pipeline.outputs) reach(output.func);
+  while (!todo.empty()) {
+    const FuncSpec& func = pipeline.funcs[todo.back()];
+    todo.pop_back();
     for (size_t s = 0; s <= func.updates.size(); ++s) {
       for_each_term_of_stage(func, static_cast<int>(s), [&](const Term& term) {
-        if (term.action == Action::Func) reachable[term.source] = true;
+        if (term.action == Action::Func && !reachable[term.source]) reach(term.source);
       });
     }
   }

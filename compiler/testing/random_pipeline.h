@@ -74,8 +74,13 @@ enum class Action : uint8_t {
   Lerp,
   // over a reduction domain of its own: one operand
   Sum,
+  Product,
   Maximum,
+  Minimum,
+  ArgMax,  // `element`: which coordinate of the place, or, past these, the value there
 };
+
+inline bool is_inline_reduction(Action action) { return action >= Action::Sum; }
 
 struct Index;
 
@@ -90,7 +95,7 @@ struct Term {
   int source = 0, element = 0;
   std::vector<Index> indices;
   std::vector<Term> operands;
-  std::vector<ReductionRange> domain;  // Sum, Maximum
+  std::vector<ReductionRange> domain;  // of an inline reduction
 };
 
 // One coordinate of an access: scale * variable / divisor + offset, or data; then clamped.
@@ -143,11 +148,18 @@ struct OutputSpec {
   std::vector<int> mins, extents;
 };
 
+// One output's part of another run.
+struct RegionSpec {
+  std::vector<int> mins, extents;
+};
+
 struct PipelineSpec {
   std::vector<ImageSpec> images;
   std::vector<ParameterSpec> parameters;
   std::vector<FuncSpec> funcs;  // producers first
   std::vector<OutputSpec> outputs;
+  // More regions to run over, each a list with one for each output: tiny, odd, elsewhere.
+  std::vector<std::vector<RegionSpec>> sweep;
 };
 
 PipelineSpec random_pipeline(uint64_t seed);
@@ -175,6 +187,9 @@ void for_each_term_of_stage(Spec& func, int stage, const F& f) {
     for (auto& data : index.data) for_each_term(data, f);
   }
 }
+
+// The regions of every run, the main one first.
+std::vector<std::vector<OutputSpec>> all_runs(const PipelineSpec& pipeline);
 
 // Funcs that the outputs need.
 std::vector<bool> reachable_funcs(const PipelineSpec& pipeline);

@@ -17,11 +17,15 @@ class Shrinker {
     bool progress = true;
     while (progress && trials_left_ > 0) {
       progress = false;
+      progress |= drop_runs();
       progress |= drop_outputs();
+      progress |= drop_derived_funcs();
+      progress |= drop_companions();
       progress |= simplify_schedules();
       progress |= drop_updates();
       progress |= drop_values();
       progress |= drop_directives();
+      progress |= simplify_specializations();
       progress |= simplify_terms();
       progress |= simplify_indices();
       progress |= shrink_regions();
@@ -42,11 +46,27 @@ class Shrinker {
 
   int func_count() const { return static_cast<int>(best_.pipeline.funcs.size()); }
 
+  // Either one of the other runs alone fails, or they are not needed.
+  bool drop_runs() {
+    if (best_.pipeline.sweep.empty()) return false;
+    if (attempt([&](Program& p) { p.pipeline.sweep.clear(); })) return true;
+    for (size_t run = 0; run < best_.pipeline.sweep.size(); ++run) {
+      const bool alone = attempt([&](Program& p) {
+        p.pipeline.outputs = all_runs(p.pipeline)[run + 1];
+        p.pipeline.sweep.clear();
+      });
+      if (alone) return true;
+    }
+    return false;
+  }
+
   bool drop_outputs() {
     bool progress = false;
     for (size_t i = best_.pipeline.outputs.size(); i-- > 0 && best_.pipeline.outputs.size() > 1;) {
       progress |= attempt([&](Program& p) {
-        p.pipeline.outputs.erase(p.pipeline.outputs.begin() + static_cast<long>(i));
+        const auto at = static_cast<long>(i);
+        p.pipeline.outputs.erase(p.pipeline.outputs.begin() + at);
+        for (auto& regions : p.pipeline.sweep) regions.erase(regions.begin() + at);
       });
     }
     return progress;
@@ -54,7 +74,7 @@ class Shrinker {
 
   bool simplify_schedules() {
     bool progress = false;
-    for (int f = 0; f < func_count(); ++f) {
+    for (int f = 0; f < static_cast<int>(best_.schedule.funcs.size()); ++f) {
       const std::vector<StageSpec>& stages = best_.schedule.funcs[f].stages;
       const bool has_loops = std::any_of(stages.begin(), stages.end(),
                                          [](const StageSpec& s) { return !s.directives.empty(); });
@@ -63,9 +83,43 @@ class Shrinker {
           for (StageSpec& stage : p.schedule.funcs[f].stages) stage.directives.clear();
         });
       }
-      if (best_.schedule.funcs[f].bounded)  // read anew: an attempt replaces best_
-        progress |= attempt([&](Program& p) { p.schedule.funcs[f].bounded = false; });
+      progress |= simplify_storage(f);
       progress |= simplify_placement(f);
+    }
+    return progress;
+  }
+
+  bool simplify_storage(int f) {
+    const auto spec = [f](Program& p) -> FuncScheduleSpec& { return p.schedule.funcs[f]; };
+    bool progress = false;
+    for (size_t r = spec(best_).rules.size(); r-- > 0;) {
+      progress |= attempt(
+          [&](Program& p) { spec(p).rules.erase(spec(p).rules.begin() + static_cast<long>(r)); });
+    }
+    if (!spec(best_).storage_order.empty()) {
+      progress |= attempt([&](Program& p) { spec(p).storage_order.clear(); });
+    }
+    if (spec(best_).memory != MemoryType::Auto) {
+      progress |= attempt([&](Program& p) { spec(p).memory = MemoryType::Auto; });
+    }
+    for (bool FuncScheduleSpec::*flag :
+         {&FuncScheduleSpec::memoized, &FuncScheduleSpec::async, &FuncScheduleSpec::traced}) {
+      if (!(spec(best_).*flag)) continue;
+      progress |= attempt([&](Program& p) { spec(p).*flag = false; });
+    }
+    return progress;
+  }
+
+  bool drop_companions() {
+    if (best_.schedule.companions.empty()) return false;
+    return attempt([](Program& p) { p.schedule.companions.clear(); });
+  }
+
+  bool drop_derived_funcs() {
+    bool progress = false;
+    for (size_t i = 0; i < best_.schedule.derived.size(); ++i) {
+      if (best_.schedule.derived[i].kind == DerivedFunc::Kind::None) continue;
+      progress |= attempt([&](Program& p) { drop_derived(p.schedule, static_cast<int>(i)); });
     }
     return progress;
   }
@@ -78,11 +132,13 @@ class Shrinker {
       return attempt([&](Program& p) { p.schedule.funcs[f].placement = with; });
     };
     if (replace({})) return true;
-    if (placement.where == Where::At && replace({Where::Root, -1, 0, "", ""})) return true;
+    if (placement.where == Where::At && replace(at_root())) return true;
     if (placement.store_loop.empty()) return false;
-    Placement stored_inside = placement;
-    stored_inside.store_loop.clear();
-    return replace(stored_inside);
+    Placement simpler = placement;
+    simpler.hoist_loop.clear();
+    if (!placement.hoist_loop.empty() && replace(simpler)) return true;
+    simpler.store_loop.clear();
+    return replace(simpler);
   }
 
   bool drop_updates() {
@@ -137,11 +193,29 @@ class Shrinker {
 
   bool drop_directives() {
     bool progress = false;
-    for (int f = 0; f < func_count(); ++f) {
+    for (size_t f = 0; f < best_.schedule.funcs.size(); ++f) {
       for (size_t s = 0; s < best_.schedule.funcs[f].stages.size(); ++s) {
         for (size_t d = best_.schedule.funcs[f].stages[s].directives.size(); d-- > 0;) {
-          progress |=
-              attempt([&](Program& p) { erase_directive(p.schedule.funcs[f].stages[s], d); });
+          progress |= attempt(
+              [&](Program& p) { erase_directive(p.schedule.funcs[f].stages[s].directives, d); });
+        }
+      }
+    }
+    return progress;
+  }
+
+  // A specialization also goes on without some of its own directives.
+  bool simplify_specializations() {
+    bool progress = false;
+    for (size_t f = 0; f < best_.schedule.funcs.size(); ++f) {
+      for (size_t s = 0; s < best_.schedule.funcs[f].stages.size(); ++s) {
+        for (size_t d = 0; d < best_.schedule.funcs[f].stages[s].directives.size(); ++d) {
+          const auto nested = [=](Program& p) -> std::vector<Directive>& {
+            return p.schedule.funcs[f].stages[s].directives[d].nested;
+          };
+          for (size_t n = nested(best_).size(); n-- > 0;) {
+            progress |= attempt([&](Program& p) { erase_directive(nested(p), n); });
+          }
         }
       }
     }
@@ -149,15 +223,42 @@ class Shrinker {
   }
 
   // Later directives that name the loops which a dropped split or fuse made name what it replaced.
-  static void erase_directive(StageSpec& stage, size_t d) {
-    const Directive dropped = stage.directives[d];
-    stage.directives.erase(stage.directives.begin() + static_cast<long>(d));
-    if (dropped.kind != Directive::Kind::Split) return;
-    for (size_t i = d; i < stage.directives.size(); ++i) {
-      auto& loops = stage.directives[i].loops;
-      loops.erase(std::remove(loops.begin(), loops.end(), dropped.loops[2]), loops.end());
-      std::replace(loops.begin(), loops.end(), dropped.loops[1], dropped.loops[0]);
+  static void erase_directive(std::vector<Directive>& directives, size_t d) {
+    const Directive dropped = directives[d];
+    directives.erase(directives.begin() + static_cast<long>(d));
+    using Kind = Directive::Kind;
+    if (dropped.kind == Kind::Split) {
+      forget_split(directives, d, dropped);
+    } else if (dropped.kind == Kind::Rename) {
+      for (size_t i = d; i < directives.size(); ++i) {
+        replace_loop(directives[i], dropped.loops[1], dropped.loops[0]);
+      }
     }
+  }
+
+  static void forget_split(std::vector<Directive>& directives, size_t from,
+                           const Directive& split) {
+    for (size_t i = from; i < directives.size(); ++i) {
+      auto& loops = directives[i].loops;
+      loops.erase(std::remove(loops.begin(), loops.end(), split.loops[2]), loops.end());
+      replace_loop(directives[i], split.loops[1], split.loops[0]);
+      forget_split(directives[i].nested, 0, split);
+    }
+    const auto names_nothing = [](const Directive& directive) {
+      using Kind = Directive::Kind;
+      const bool needs_none = directive.kind == Kind::Specialize ||
+                              directive.kind == Kind::SpecializeFail ||
+                              directive.kind == Kind::Atomic || directive.kind == Kind::AllowRaces;
+      return directive.loops.empty() && !needs_none;
+    };
+    directives.erase(std::remove_if(directives.begin() + static_cast<long>(from), directives.end(),
+                                    names_nothing),
+                     directives.end());
+  }
+
+  static void replace_loop(Directive& directive, const std::string& old, const std::string& with) {
+    std::replace(directive.loops.begin(), directive.loops.end(), old, with);
+    for (Directive& nested : directive.nested) replace_loop(nested, old, with);
   }
 
   // Term number `at` of the program in walking order, or null.

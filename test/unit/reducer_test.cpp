@@ -62,7 +62,7 @@ TEST(RandomPrograms, AreReproducible) {
 // Over many seeds every construct occurs: a generator that silently stopped making one would leave
 // it untested.
 TEST(RandomPrograms, CoverEveryAction) {
-  std::vector<int> seen(static_cast<int>(Action::Maximum) + 1);
+  std::vector<int> seen(static_cast<int>(Action::ArgMax) + 1);
   for (int seed = 0; seed < 400; ++seed) {
     const Program program{random_pipeline(seed), {}};
     for (size_t a = 0; a < seen.size(); ++a) {
@@ -72,19 +72,49 @@ TEST(RandomPrograms, CoverEveryAction) {
   for (size_t a = 0; a < seen.size(); ++a) EXPECT_GT(seen[a], 0) << "action " << a;
 }
 
-TEST(RandomPrograms, CoverEveryDirectiveAndPlacement) {
-  std::vector<int> directives(6), placements(4);
-  for (int seed = 0; seed < 200; ++seed) {
-    const PipelineSpec pipeline = random_pipeline(seed);
-    for (const FuncScheduleSpec& func : random_schedule(pipeline, seed).funcs) {
-      ++placements[static_cast<int>(func.placement.where)];
-      for (const StageSpec& stage : func.stages) {
-        for (const Directive& d : stage.directives) ++directives[static_cast<int>(d.kind)];
-      }
+struct Census {
+  std::vector<int> directives = std::vector<int>(Directive::kinds);
+  std::vector<int> placements = std::vector<int>(4), derived = std::vector<int>(4);
+  std::vector<int> rules = std::vector<int>(DimensionRule::kinds);
+  int stored_outside = 0, hoisted = 0, memoized = 0, async = 0, traced = 0, reordered = 0, heap = 0;
+  int companions = 0;
+
+  void count(const std::vector<Directive>& list) {
+    for (const Directive& d : list) {
+      ++directives[static_cast<int>(d.kind)];
+      count(d.nested);
     }
   }
-  for (const int count : directives) EXPECT_GT(count, 10);
-  for (const int count : placements) EXPECT_GT(count, 10);
+  void count(const FuncScheduleSpec& func) {
+    ++placements[static_cast<int>(func.placement.where)];
+    for (const StageSpec& stage : func.stages) count(stage.directives);
+    for (const DimensionRule& rule : func.rules) ++rules[static_cast<int>(rule.kind)];
+    stored_outside += !func.placement.store_loop.empty();
+    hoisted += !func.placement.hoist_loop.empty();
+    memoized += func.memoized;
+    async += func.async;
+    traced += func.traced;
+    reordered += !func.storage_order.empty();
+    heap += func.memory == MemoryType::Heap;
+  }
+};
+
+TEST(RandomPrograms, CoverEveryDirectiveAndPlacement) {
+  Census census;
+  for (int seed = 0; seed < 400; ++seed) {
+    const ScheduleSpec schedule = random_schedule(random_pipeline(seed), seed);
+    for (const FuncScheduleSpec& func : schedule.funcs) census.count(func);
+    for (const DerivedFunc& d : schedule.derived) ++census.derived[static_cast<int>(d.kind)];
+    census.companions += static_cast<int>(schedule.companions.size());
+  }
+  for (const auto* counts : {&census.directives, &census.placements, &census.rules}) {
+    for (size_t i = 0; i < counts->size(); ++i) EXPECT_GT((*counts)[i], 5) << i;
+  }
+  for (size_t i = 1; i < census.derived.size(); ++i) EXPECT_GT(census.derived[i], 5) << i;
+  for (const int count : {census.stored_outside, census.hoisted, census.memoized, census.async,
+                          census.traced, census.reordered, census.heap, census.companions}) {
+    EXPECT_GT(count, 5);
+  }
 }
 
 }  // namespace
