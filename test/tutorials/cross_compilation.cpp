@@ -1,0 +1,48 @@
+// Machine code for other machines, from this one.
+#include "Halide.h"
+
+#include <cstdio>
+#include <string>
+
+using namespace Halide;
+
+int main(int argc, char** argv) {
+  const std::string folder = argc > 1 ? argv[1] : ".";
+  Var x("x"), y("y");
+  ImageParam input(UInt(8), 2, "input");
+  Param<uint8_t> offset("offset");
+  Func brighter("brighter");
+  brighter(x, y) = input(x, y) + offset;
+  brighter.vectorize(x, 16).parallel(y);
+  const std::vector<Argument> args = {input, offset};
+
+  for (const char* name : {"x86-64-linux-sse41", "x86-64-linux-avx-avx2-fma", "arm-64-linux",
+                           "x86-64-linux-no_asserts-no_bounds_query"}) {
+    Target target(name);
+    const std::string file = folder + "/brighter_" + name;
+    brighter.compile_to_file(file, args, "brighter", target);
+
+    // The object says which machine it is for: bytes 18 and 19 of an ELF file.
+    unsigned char header[32] = {};
+    FILE* object = fopen((file + ".o").c_str(), "rb");
+    size_t size = object ? fread(header, 1, sizeof header, object) : 0;
+    if (object) fclose(object);
+    printf("%-42s %zu bytes read, '%c%c%c', %d bits, machine %d, text \"%s\"\n", name, size,
+           header[1], header[2], header[3], header[4] * 32, header[18] + 256 * header[19],
+           target.to_string().c_str());
+  }
+
+  // Targets are values: features can be asked for and set.
+  Target t;
+  t.os = Target::Linux;
+  t.arch = Target::ARM;
+  t.bits = 64;
+  t.set_feature(Target::NoAsserts);
+  printf("%s: %d %d %d\n", t.to_string().c_str(), (int)t.has_feature(Target::NoAsserts),
+         (int)t.has_feature(Target::AVX2), (int)t.has_gpu_feature());
+  printf("lanes of float: %d and %d\n", Target("arm-64-linux").natural_vector_size<float>(),
+         Target("x86-64-linux-avx-avx2").natural_vector_size<float>());
+  printf("valid: %d %d\n", (int)Target::validate_target_string("x86-64-linux-avx2"),
+         (int)Target::validate_target_string("x86-64-linux-avx9"));
+  return 0;
+}
