@@ -1,4 +1,4 @@
-// Traces and the cache of memoized results by HalideRuntime.h.
+// Traces, the profiler and the cache of memoized results by HalideRuntime.h.
 #include <atomic>
 
 #include "halide/weak.h"
@@ -29,3 +29,14 @@ RETROGRADE_WEAK void halide_memoization_cache_evict(void*, uint64_t eviction_key
   retrograde_memoization_evict(eviction_key);
 }
 RETROGRADE_WEAK void halide_memoization_cache_cleanup() { retrograde_memoization_cleanup(); }
+
+RETROGRADE_WEAK void halide_profiler_report(void* user_context) {
+  retrograde_context context;
+  retrograde_begin_call(&context, user_context);
+  retrograde_profiler_report(&context);
+}
+RETROGRADE_WEAK void halide_profiler_reset() { retrograde_profiler_reset(); }
+RETROGRADE_WEAK halide_profiler_pipeline_stats* halide_profiler_get_pipeline_state(
+    const char* pipeline_name) {
+  return retrograde_profiler_pipeline(pipeline_name);
+}
