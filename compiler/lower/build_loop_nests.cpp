@@ -128,6 +128,9 @@ class NestEmitter {
     }
     const LoopLevel& store = f.schedule.store_level;
     if (store.kind == LoopLevel::Kind::At) storage_sites_.insert(store.func + "\n" + store.var);
+    const LoopLevel& hoist = f.schedule.hoist_level;
+    if (is_hoisted(f) && hoist.kind == LoopLevel::Kind::At)
+      storage_sites_.insert(hoist.func + "\n" + hoist.var);
   }
 
   static bool is_stored_where_computed(const LoopedFunc& f) {
@@ -222,6 +225,7 @@ class NestEmitter {
       if (f.schedule.async && !loops.empty()) note_async_room(f, slides, site.touched(touched));
       if (is_stored_where_computed(f)) {
         piece.realized = allocated;
+        note_place(f, allocated, code.storage);
       } else {
         code.storage[f.name()] = hull(code.storage[f.name()], allocated);
       }
@@ -385,7 +389,7 @@ class NestEmitter {
       code = emit_children(children_at(f, s, loop), std::move(code), nest.loops, i);
       code = store_here(f, s, loop, std::move(code));
       if (loop.for_type == ForType::Parallel && !code.storage.empty())
-        check_no_shared_storage(f, loop, code.storage.begin()->first);
+        check_no_shared_storage(f, loop, stored_func(code.storage.begin()->first)->name());
       wrap(loop, code);
     }
     range_over_loops(code);
@@ -579,6 +583,37 @@ class NestEmitter {
           simplify((range.extent + rule.alignment - 1) / rule.alignment * rule.alignment);
   }
 
+  // Storage that lies in a place further out: room for the largest that it is at any time.
+  void note_place(const LoopedFunc& f, const Box& box, std::map<std::string, Box>& storage) const {
+    if (!is_hoisted(f)) return;
+    Box room;
+    for (size_t d = 0; d < box.size(); d++) {
+      Expr extent = box[d].max - box[d].min + 1;
+      if (const StorageRule* rule = rule_of(f, d)) {
+        if (rule->bound.defined()) extent = rule->bound;
+        if (rule->alignment.defined())
+          extent = (extent + rule->alignment - 1) / rule->alignment * rule->alignment;
+        if (rule->fold.defined()) extent = max(extent, rule->fold);
+      }
+      room.push_back({0, simplify(extent - 1)});
+    }
+    Box& place = storage[place_name(f.name())];
+    place = hull(place, room);
+  }
+
+  // The Func whose storage an entry of Emitted::storage is, or is the place of.
+  const LoopedFunc* stored_func(const std::string& name) const {
+    const LoopedFunc* f = program_.find(name);
+    return f ? f : program_.find(name.substr(0, name.rfind('.')));
+  }
+
+  Stmt realize_place(const LoopedFunc& f, const Box& room, const Stmt& stmt) const {
+    check_room(f, room);
+    std::vector<Range> ranges;
+    for (const Interval& side : room) ranges.push_back({0, simplify(side.max + 1)});
+    return make_realize(place_name(f.name()), f.func->types, f.schedule.memory, ranges, stmt);
+  }
+
   Emitted store_here(const LoopedFunc& f, int s, const Loop& loop, Emitted code) {
     if (code.storage.empty() || !storage_sites_.count(f.name() + "\n" + loop.var)) return code;
     range_over_loops(code);
@@ -593,9 +628,12 @@ class NestEmitter {
   Stmt realize_stored(Emitted& code, IsHere&& is_here) {
     Stmt stmt = code.stmt;
     for (auto it = code.storage.begin(); it != code.storage.end();) {
-      const LoopedFunc& f = *program_.find(it->first);
-      if (is_here(f.schedule.store_level)) {
-        stmt = realize(f, simplified(it->second), stmt);
+      const LoopedFunc& f = *stored_func(it->first);
+      const bool is_place = f.name() != it->first;
+      if (is_here(is_place ? f.schedule.hoist_level : f.schedule.store_level)) {
+        if (!is_place) note_place(f, it->second, code.storage);
+        Box box = simplified(it->second);
+        stmt = is_place ? realize_place(f, box, stmt) : realize(f, box, stmt);
         it = code.storage.erase(it);
       } else {
         ++it;
@@ -608,6 +646,7 @@ class NestEmitter {
 
   void check_everything_found_its_place(const Emitted& all) const {
     for (const LoopedFunc& f : program_.funcs) {
+      if (all.storage.count(place_name(f.name()))) check_place_found(program_, f);
       bool is_stored = all.storage.count(f.name());
       if (is_stored || all.uses.count(f.name())) check_found_its_place(program_, f, is_stored);
     }

@@ -107,7 +107,9 @@ class Flattener : public Rewriter {
 
   std::string element_of(const std::string& func, int value_index) const {
     auto it = usage_.value_counts.find(func);
-    return element_name(func, it == usage_.value_counts.end() ? 1 : it->second, value_index);
+    auto place = memory_of_.find(func);
+    return element_name(place == memory_of_.end() ? func : place->second,
+                        it == usage_.value_counts.end() ? 1 : it->second, value_index);
   }
 
   // `func` is empty for images.
@@ -182,14 +184,25 @@ class Flattener : public Rewriter {
       elements = binary(Kind::Mul, elements, cast_to(Int(64), count));
     }
     layouts_[n.name] = std::move(layout);
+    const bool has_memory = !find_place(n.name);
     Stmt body = (*this)(n.body);
-    for (size_t i = n.types.size(); i-- > 0;) {
+    for (size_t i = n.types.size(); has_memory && i-- > 0;) {
       body = make_allocate(element_name(n.name, n.types.size(), i), n.types[i], n.memory, elements,
                            body);
     }
     for (size_t i = bindings.size(); i-- > 0;)
       body = make_let(bindings[i].name, bindings[i].value, body);
     return body;
+  }
+
+  // Notes a place that begins here, or where in one the Func lies.
+  bool find_place(const std::string& name) {
+    auto it = asked_.find(name);
+    if (it == asked_.end()) return false;
+    if (!it->second.is_place.empty()) places_[it->second.is_place] = name;
+    if (it->second.lies_in.empty()) return false;
+    memory_of_[name] = places_.at(it->second.lies_in);
+    return true;
   }
 
   // ---- Provide ----
@@ -203,7 +216,7 @@ class Flattener : public Rewriter {
     std::vector<Stmt> stores;
     for (size_t i = 0; i < values.size(); ++i) {
       if (is_undef(values[i])) continue;
-      std::string buffer = element_name(n.name, count, i);
+      std::string buffer = element_of(n.name, static_cast<int>(i));
       stores.push_back(make_store(buffer, values[i], index_of(n.name, buffer, args), predicate));
     }
     Stmt result = make_block(std::move(stores));
@@ -242,6 +255,8 @@ class Flattener : public Rewriter {
   const Usage usage_;
   FreshNames fresh_;
   std::unordered_map<std::string, Layout> layouts_;
+  std::unordered_map<std::string, std::string> places_;  // by name before renaming, the innermost
+  std::unordered_map<std::string, std::string> memory_of_;  // Func -> place
 };
 
 }  // namespace

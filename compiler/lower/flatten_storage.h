@@ -10,10 +10,13 @@
 
 namespace retrograde::ir {
 
-// How the storage of a Func is laid out. Empty vectors: dimension 0 innermost, nothing wraps around.
+// How the storage of a Func is laid out. Empty vectors: dimension 0 innermost, nothing wraps
+// around.
 struct StorageLayout {
   std::vector<int> order;   // dimensions, innermost first
   std::vector<Expr> folds;  // per dimension: coordinates modulo this; undefined: as they are
+  std::string lies_in;   // the place around, by its name before renaming; empty: memory of its own
+  std::string is_place;  // of a place: its name before renaming
 };
 using StorageLayouts = std::map<std::string, StorageLayout>;  // by Func; a missing one is plain
 

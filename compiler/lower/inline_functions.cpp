@@ -16,6 +16,17 @@ std::string value_buffer_name(const FuncContents& f, int index) {
   return f.types.size() == 1 ? f.name : f.name + "." + std::to_string(index);
 }
 
+bool is_hoisted(const LoopedFunc& f) {
+  const LoopLevel& hoist = f.schedule.hoist_level;
+  const LoopLevel& store = f.schedule.store_level.kind == LoopLevel::Kind::Inlined
+                               ? f.schedule.compute_level
+                               : f.schedule.store_level;
+  if (f.is_output || hoist.kind == LoopLevel::Kind::Inlined) return false;
+  return hoist.kind != store.kind || hoist.func != store.func || hoist.var != store.var;
+}
+
+std::string place_name(const std::string& func) { return func + ".place"; }
+
 std::string stage_prefix(const std::string& func, int stage) {
   return func + ".s" + std::to_string(stage) + ".";
 }

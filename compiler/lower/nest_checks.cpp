@@ -72,6 +72,25 @@ void check_found_its_place(const Program& program, const LoopedFunc& f, bool is_
       "Name a loop that encloses all of these uses, or call compute_root()");
 }
 
+void check_place_found(const Program& program, const LoopedFunc& f) {
+  const LoopLevel& asked = f.schedule.hoist_level;
+  user_error(
+      text("hoist the storage of ", quoted(f.name()), " to ", quoted(asked.var), " of ",
+           quoted(asked.func)),
+      "storage is hoisted to a loop that encloses its store level", loops_of(program, asked.func),
+      text("Name a loop around the store level of ", quoted(f.name()), ", or drop hoist_storage"));
+}
+
+void check_room(const LoopedFunc& f, const Box& room) {
+  for (size_t d = 0; d < room.size(); d++) {
+    if (room[d].max.defined()) continue;
+    user_error(text("hoist the storage of ", quoted(f.name())),
+               "the size of hoisted storage is known outside of the loops it is hoisted over",
+               text("the extent of its ", dimension_of(f, static_cast<int>(d)), " is not"),
+               "Give it with bound_storage, or hoist it less far");
+  }
+}
+
 void check_storage_of_output(const LoopedFunc& f) {
   for (const StorageRule& rule : f.schedule.storage_rules) {
     if (!rule.fold.defined() && !rule.bound.defined()) continue;

@@ -15,6 +15,9 @@ void check_bounded(const Program& program, const LoopedFunc& f, const Box& box);
 void check_no_shared_storage(const LoopedFunc& f, const Loop& loop, const std::string& stored);
 // What was neither computed nor stored when the walk came to the root.
 void check_found_its_place(const Program& program, const LoopedFunc& f, bool is_stored);
+// A place for hoisted storage that no loop gave, and one that nothing bounds.
+void check_place_found(const Program& program, const LoopedFunc& f);
+void check_room(const LoopedFunc& f, const Box& room);
 void check_storage_of_output(const LoopedFunc& f);
 
 // Checks at run time.

@@ -59,6 +59,9 @@ StorageLayouts storage_layouts(const Lowering& lowering) {
       layout.order.push_back(
           static_cast<int>(std::find(f.func->args.begin(), f.func->args.end(), var) -
                            f.func->args.begin()));
+    if (!is_hoisted(f)) continue;
+    layout.lies_in = place_name(f.name());
+    layouts[layout.lies_in].is_place = layout.lies_in;
   }
   for (const auto& [name, original] : lowering.renamed_funcs) layouts[name] = layouts[original];
   return layouts;

@@ -28,8 +28,10 @@ constexpr Directive not_yet[] = {
        return any_stage(
            f, [](const StageSchedule& s) { return s.fuse_level.kind == LoopLevel::Kind::At; });
      }},
-    {"hoist_storage",
-     [](const LoopedFunc& f) { return f.schedule.hoist_level.kind != LoopLevel::Kind::Inlined; }},
+    {"hoist_storage together with async or memoize",
+     [](const LoopedFunc& f) {
+       return is_hoisted(f) && (f.schedule.async || f.schedule.memoized);
+     }},
     {"debug_to_file", [](const LoopedFunc& f) { return !f.func->debug_file.empty(); }},
 };
 
