@@ -14,6 +14,10 @@ namespace {
 
 using namespace ir;
 
+// Of the context on the caller's stack: more than today's, so that a later runtime's fits too.
+constexpr uint64_t context_bytes = 256;
+static_assert(sizeof(retrograde_context) <= context_bytes);
+
 uint32_t type_word(Type type) {
   return halide_type_t(type.code() == TypeCode::BFloat
                            ? halide_type_bfloat
@@ -33,7 +37,7 @@ class Exporter {
   void add(const Export& e, llvm::Function* body) {
     body->setLinkage(llvm::GlobalValue::InternalLinkage);
     llvm::Function* function = begin(e.signature);
-    Value* context = b_.CreateAlloca(b_.getInt8Ty(), b_.getInt64(sizeof(retrograde_context)));
+    Value* context = b_.CreateAlloca(b_.getInt8Ty(), b_.getInt64(context_bytes));
     llvm::cast<llvm::AllocaInst>(context)->setAlignment(llvm::Align(16));
     Value* user_context = e.signature.user_context ? static_cast<Value*>(function->getArg(0))
                                                    : llvm::ConstantPointerNull::get(b_.getPtrTy());
