@@ -171,6 +171,8 @@ const char* retrograde_error_name(int32_t code) {
       return "out of memory";
     case retrograde_error_buffer_argument_is_null:
       return "buffer argument is null";
+    case retrograde_error_debug_to_file_failed:
+      return "a file cannot be written";
     case retrograde_error_internal:
       return "internal error";
     case retrograde_error_unaligned_host_ptr:

@@ -177,10 +177,11 @@ class Profiler {
   static void sample(Run& run, Clock::time_point now, bool is_look) {
     const uint64_t elapsed = nanoseconds(now - run.sampled);
     run.sampled = now;
-    const auto threads = static_cast<uint64_t>(
-        std::max(1, run.threads.load(std::memory_order_relaxed)));
+    const auto threads =
+        static_cast<uint64_t>(std::max(1, run.threads.load(std::memory_order_relaxed)));
     auto& stats = run.pipeline.stats;
-    auto& func = run.pipeline.funcs[static_cast<size_t>(run.current.load(std::memory_order_relaxed))];
+    auto& func =
+        run.pipeline.funcs[static_cast<size_t>(run.current.load(std::memory_order_relaxed))];
     func.time += elapsed;
     if (!is_look) return;
     func.active_threads_numerator += threads;
@@ -228,8 +229,8 @@ class Profiler {
     const auto runs = static_cast<uint64_t>(s.runs);
     std::string text = line("%s\n", p.name.c_str());
     text += line(" total time: %f ms  samples: %i  runs: %i  time/run: %f ms\n",
-                 milliseconds(s.time), static_cast<int64_t>(s.samples), static_cast<int64_t>(s.runs),
-                 milliseconds(s.time / std::max<uint64_t>(1, runs)));
+                 milliseconds(s.time), static_cast<int64_t>(s.samples),
+                 static_cast<int64_t>(s.runs), milliseconds(s.time / std::max<uint64_t>(1, runs)));
     text += line(" average threads used: %f\n",
                  threads(s.active_threads_numerator, s.active_threads_denominator));
     text += line(" allocations: %i  peak memory: %u bytes\n", static_cast<int64_t>(s.num_allocs),
@@ -242,7 +243,8 @@ class Profiler {
       const std::string time =
           line("%f ms (%u%%)", milliseconds(f.time / std::max<uint64_t>(1, runs)), percent);
       text += "  " + padded(std::string(f.name) + ":", width + 2) + padded(time, 22);
-      text += line("threads: %f", threads(f.active_threads_numerator, f.active_threads_denominator));
+      text +=
+          line("threads: %f", threads(f.active_threads_numerator, f.active_threads_denominator));
       if (f.num_allocs > 0)
         text += line("  peak: %u bytes  allocations: %i", f.memory_peak,
                      static_cast<int64_t>(f.num_allocs));
@@ -253,7 +255,8 @@ class Profiler {
 };
 
 Profiler& profiler() {
-  static Profiler& instance = *new Profiler;  // never destroyed: runs may end while the process does
+  static Profiler& instance =
+      *new Profiler;  // never destroyed: runs may end while the process does
   return instance;
 }
 

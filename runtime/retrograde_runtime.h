@@ -37,6 +37,7 @@ enum retrograde_error_code {
   retrograde_error_param_too_large = -10,
   retrograde_error_out_of_memory = -11,
   retrograde_error_buffer_argument_is_null = -12,
+  retrograde_error_debug_to_file_failed = -13,
   retrograde_error_internal = -22,
   retrograde_error_unaligned_host_ptr = -24,
   retrograde_error_bad_fold = -25,
@@ -134,6 +135,10 @@ int32_t retrograde_trace_type(retrograde_context*, const char* func, int32_t par
 /* What retrograde_trace does without a handler: a line of text to the print handler; with
  * HL_TRACE_FILE in the environment, a halide_trace_packet_t to that file. */
 int32_t retrograde_default_trace(retrograde_context*, const struct halide_trace_event_t* event);
+
+/* Writes a buffer to a .npy or .tmp file; see Func::debug_to_file. */
+int32_t retrograde_debug_to_file(retrograde_context*, const char* path,
+                                 const struct halide_buffer_t* buffer);
 
 /* The profiler. A run begins with the names of Funcs, one a line; afterwards they are numbers. Null
  * stands for a run that is not profiled. */

@@ -22,17 +22,9 @@ std::atomic<int32_t> next_id{1};
 
 // ---- text ----
 
-const char* const event_names[] = {"Load",
-                                   "Store",
-                                   "Begin realization",
-                                   "End realization",
-                                   "Produce",
-                                   "End produce",
-                                   "Consume",
-                                   "End consume",
-                                   "Begin pipeline",
-                                   "End pipeline",
-                                   "Tag"};
+const char* const event_names[] = {
+    "Load",    "Store",       "Begin realization", "End realization", "Produce", "End produce",
+    "Consume", "End consume", "Begin pipeline",    "End pipeline",    "Tag"};
 
 template <typename T, typename... Format>
 void append(std::string& text, T value, Format... format) {
@@ -88,7 +80,8 @@ void append_value(std::string& text, halide_type_t type, const void* values, int
     text += "0x";
     append(text, element<uint64_t>(values, lane), 16);
   } else if (type.code == halide_type_bfloat) {
-    append(text, bfloat_to_float(element<uint16_t>(values, lane)), std::chars_format::fixed, digits);
+    append(text, bfloat_to_float(element<uint16_t>(values, lane)), std::chars_format::fixed,
+           digits);
   } else if (type.code != halide_type_float) {
     append_integer(text, type, values, lane);
   } else if (type.bits == 16) {
@@ -158,8 +151,8 @@ class TraceFile {
     const size_t coordinate_bytes = sizeof(int32_t) * static_cast<size_t>(e.dimensions);
     const char* tag = e.trace_tag ? e.trace_tag : "";
     const size_t func_bytes = std::strlen(e.func) + 1, tag_bytes = std::strlen(tag) + 1;
-    const size_t used = sizeof(halide_trace_packet_t) + coordinate_bytes + value_bytes + func_bytes +
-                        tag_bytes;
+    const size_t used =
+        sizeof(halide_trace_packet_t) + coordinate_bytes + value_bytes + func_bytes + tag_bytes;
     std::vector<char> packet((used + 3) / 4 * 4);
     halide_trace_packet_t header = {};
     header.size = static_cast<uint32_t>(packet.size());
@@ -211,7 +204,8 @@ int32_t retrograde_default_trace(retrograde_context* context, const halide_trace
     if (!rt::trace_file().is_wanted()) {
       rt::print(context, rt::text_of(*event).c_str());
     } else if (!rt::trace_file().write(*event, id)) {
-      rt::print(context, "cannot write the trace: HL_TRACE_FILE names no file that can be written\n");
+      rt::print(context,
+                "cannot write the trace: HL_TRACE_FILE names no file that can be written\n");
     }
   } catch (const std::bad_alloc&) {  // then this event goes untold
   }

@@ -1,7 +1,8 @@
 // Fork: both statements become tasks, as bodies of parallel loops do; the runtime runs the first on
 // a thread of its own.
 //
-//   fork { first } { rest }  =>  code = retrograde_fork(context, task1, &closure1, task2, &closure2,
+//   fork { first } { rest }  =>  code = retrograde_fork(context, task1, &closure1, task2,
+//   &closure2,
 //                                                       semaphores, count)
 //                                if (code) fail(code)
 //
@@ -29,8 +30,8 @@ std::vector<const Load*> semaphores_in(const Fork& s) {
     const auto* name = call->args[0].as<StringImm>();
     if (!name || name->value != "retrograde_semaphore_acquire") return true;
     const auto* address = call->args[1].as<Call>();
-    const auto* load = address && address->is_op(Op::address_of) ? address->args[0].as<Load>()
-                                                                : nullptr;
+    const auto* load =
+        address && address->is_op(Op::address_of) ? address->args[0].as<Load>() : nullptr;
     const auto index = load ? as_const_int(load->index) : std::nullopt;
     if (index && seen.emplace(load->name, *index).second) found.push_back(load);
     return true;
@@ -60,8 +61,8 @@ void FunctionGenerator::make(const Fork& s) {
   for (unsigned i = 0; i < semaphores.size(); i++)
     b_.CreateStore(semaphores[i], b_.CreateConstGEP1_64(pointer, list, i));
   const Task first = outline(s.first, "fork"), rest = outline(s.rest, "join");
-  const auto fork = runtime_function(
-      "retrograde_fork", int32, {pointer, pointer, pointer, pointer, pointer, pointer, int32});
+  const auto fork = runtime_function("retrograde_fork", int32,
+                                     {pointer, pointer, pointer, pointer, pointer, pointer, int32});
   Value* code = b_.CreateCall(fork, {frame_.context, first.function, first.closure, rest.function,
                                      rest.closure, list, b_.getInt32(semaphores.size())});
   fail_unless(b_.CreateICmpEQ(code, b_.getInt32(0)), [&] { return code; });

@@ -1,9 +1,11 @@
-// jit_handlers.cpp -- setting handlers one by one, as Halide's older interface does, and C functions
-// by name.
+// jit_handlers.cpp -- setting handlers one by one, as Halide's older interface does, and C
+// functions by name.
 #include "frontend/jit_handlers.h"
 
 #include "diagnostics/error.h"
+#include "frontend/extern_function.h"
 #include "frontend/func.h"
+#include "ir/build.h"
 
 namespace retrograde {
 
@@ -59,6 +61,20 @@ static Pipeline supported_extern(Pipeline pipeline) {
 
 JITExtern::JITExtern(Pipeline pipeline) : pipeline_(supported_extern(std::move(pipeline))) {}
 JITExtern::JITExtern(const Func& func) : JITExtern(Pipeline(func)) {}
+
+Expr ir::checked_extern_call(const std::string& function, Type result,
+                             const std::vector<Type>& types, const std::vector<Expr>& args) {
+  const std::string asked = "call the C function " + quoted(function);
+  for (size_t i = 0; i < args.size(); i++) {
+    if (!args[i].defined()) user_error(asked, "every argument is a defined expression");
+    if (args[i].type() == types[i]) continue;
+    user_error(asked, "its arguments have the types that it was declared with",
+               text("argument ", i + 1, " is of type ", to_string(args[i].type()), ", not ",
+                    to_string(types[i])),
+               "Cast it");
+  }
+  return call_extern(function, result, args);
+}
 
 // ---- the same of a Func ----
 

@@ -34,8 +34,8 @@ struct Operation {
 };
 std::optional<Operation> operation(const Expr& e) {
   if (const auto* call = e.as<Call>()) {
-    const bool is_bitwise = call->is_op(Op::bitwise_and) || call->is_op(Op::bitwise_or) ||
-                            call->is_op(Op::bitwise_xor);
+    const bool is_bitwise =
+        call->is_op(Op::bitwise_and) || call->is_op(Op::bitwise_or) || call->is_op(Op::bitwise_xor);
     if (!is_bitwise) return std::nullopt;
     return Operation{Kind::Call, call->op, call->args[0], call->args[1]};
   }

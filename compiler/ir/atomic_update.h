@@ -10,9 +10,9 @@ namespace retrograde::ir {
 
 // f[i] = f[i] op operand
 struct AtomicUpdate {
-  Kind kind;         // Add, Mul, Min, Max, And, Or; Call for a bitwise operator
-  Op op = Op::none;  // bitwise_and, bitwise_or, bitwise_xor
-  Expr operand;      // reads nothing of f
+  Kind kind;                // Add, Mul, Min, Max, And, Or; Call for a bitwise operator
+  Op op = Op::none;         // bitwise_and, bitwise_or, bitwise_xor
+  Expr operand;             // reads nothing of f
   bool is_negated = false;  // f[i] - operand
 };
 

@@ -36,6 +36,7 @@ void add_runtime(Table& table) {
   table["retrograde_profiler_thread"] = pointer(retrograde_profiler_thread);
   table["retrograde_profiler_memory"] = pointer(retrograde_profiler_memory);
   table["retrograde_profiler_end"] = pointer(retrograde_profiler_end);
+  table["retrograde_debug_to_file"] = pointer(retrograde_debug_to_file);
   table["retrograde_trace"] = pointer(retrograde_trace);
   table["retrograde_trace_region"] = pointer(retrograde_trace_region);
   table["retrograde_trace_type"] = pointer(retrograde_trace_type);

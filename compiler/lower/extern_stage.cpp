@@ -76,9 +76,7 @@ class Emitter {
   std::string prefix_;
   ExternStage stage_;
 
-  static bool is_func(const ExternArgument& arg) {
-    return arg.kind == ExternArgument::Kind::Func;
-  }
+  static bool is_func(const ExternArgument& arg) { return arg.kind == ExternArgument::Kind::Func; }
 
   bool has_funcs() const {
     return std::any_of(definition_.args.begin(), definition_.args.end(), is_func);
@@ -127,8 +125,8 @@ class Emitter {
 
   // ---- the query ----
 
-  // One buffer without memory for each value of each Func; what the function wrote into them is read
-  // back through the call itself.
+  // One buffer without memory for each value of each Func; what the function wrote into them is
+  // read back through the call itself.
   void query() {
     std::vector<Expr> args;
     struct Asked {
@@ -143,8 +141,7 @@ class Emitter {
       }
       for (size_t i = 0; i < arg.func->types.size(); i++) {
         const std::vector<Range> nothing(arg.func->args.size(), Range{0, 0});
-        const Descriptor empty{null_handle(), arg.func->types[i], nothing,
-                               dense_strides(nothing)};
+        const Descriptor empty{null_handle(), arg.func->types[i], nothing, dense_strides(nothing)};
         const Expr buffer = bind(text("query.", args.size()), packed(empty));
         args.push_back(buffer);
         asked.push_back({arg.func.get(), buffer});
@@ -175,8 +172,9 @@ class Emitter {
 
   Expr failed(const Expr& code) const {
     return call_op(Op::error, Int(32),
-                   {code, Expr(text("cannot compute ", quoted(f_.name()), ": the C function ",
-                                    quoted(definition_.function), " returned the error code ")),
+                   {code,
+                    Expr(text("cannot compute ", quoted(f_.name()), ": the C function ",
+                              quoted(definition_.function), " returned the error code ")),
                     code, Expr(". Look up what the function means by it.")});
   }
 
@@ -224,6 +222,11 @@ class Emitter {
 };
 
 }  // namespace
+
+Expr packed_buffer(Type type, const Expr& host, const std::vector<Range>& region,
+                   const std::vector<Expr>& strides) {
+  return packed({host, type, region, strides});
+}
 
 ExternStage emit_extern_stage(const Program& program, const LoopedFunc& f, const Domain& region) {
   return Emitter(program, f, region).emit();

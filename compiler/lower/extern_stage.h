@@ -6,9 +6,9 @@
 //                                                        assert(fill(&g_buffer, k, &f_buffer) == 0)
 //                                                      } }
 //
-// The function is called twice: first with buffers without memory, when bounds are inferred; it then
-// writes into those of its inputs what it needs of them to fill the output's region. Images are
-// handed over as they are, also while the caller itself asks for bounds.
+// The function is called twice: first with buffers without memory, when bounds are inferred; it
+// then writes into those of its inputs what it needs of them to fill the output's region. Images
+// are handed over as they are, also while the caller itself asks for bounds.
 //
 // Method: descriptors are packed values (Op::pack) in the layout of halide_buffer_t. What was asked
 //         for is an expression that contains the call, so that it can stand wherever a bound does.
@@ -27,6 +27,10 @@ struct ExternStage {
   std::vector<std::pair<std::string, Expr>> bindings;  // to be bound around it, in this order
   Requirements uses;                                   // in terms of the bindings
 };
+
+// A halide_buffer_t on the stack. `host`: of the element at the region's minima.
+Expr packed_buffer(Type type, const Expr& host, const std::vector<Range>& region,
+                   const std::vector<Expr>& strides);
 
 // `region`: what is to be computed, by the Func's args.
 ExternStage emit_extern_stage(const Program& program, const LoopedFunc& f, const Domain& region);

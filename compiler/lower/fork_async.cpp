@@ -14,9 +14,10 @@
 //
 // Method: in the second form both branches keep the loops between the storage and the computation,
 //         each without the other's work; `space` starts with the number of iterations that the
-//         producer may be ahead, which build_loop_nests knows from the folding, or is left out where
-//         nothing that is still read is ever overwritten. Storage of several async Funcs nests, and
-//         so do the Forks: outermost first, each next one splits the branch that consumes.
+//         producer may be ahead, which build_loop_nests knows from the folding, or is left out
+//         where nothing that is still read is ever overwritten. Storage of several async Funcs
+//         nests, and so do the Forks: outermost first, each next one splits the branch that
+//         consumes.
 // Errors: a producer that shares the inner loops with another that it reads and that is not async;
 //         two branches that both read a third async Func.
 // Source: Halide's documentation of async; the handshake is a bounded buffer's (Dijkstra 1965).
@@ -161,13 +162,12 @@ class AsyncForker : public Rewriter {
       const auto it = program_.index_of.find(original(n->name));
       return it == program_.index_of.end() ? -1 : it->second;
     };
-    std::stable_sort(chain.begin(), chain.end(), [&](const Realize* a, const Realize* b) {
-      return position(a) < position(b);
-    });
+    std::stable_sort(chain.begin(), chain.end(),
+                     [&](const Realize* a, const Realize* b) { return position(a) < position(b); });
     Stmt result = body;
     for (size_t i = chain.size(); i-- > 0;)
-      result = make_realize(chain[i]->name, chain[i]->types, chain[i]->memory, chain[i]->bounds,
-                            result);
+      result =
+          make_realize(chain[i]->name, chain[i]->types, chain[i]->memory, chain[i]->bounds, result);
     return result;
   }
 
@@ -183,8 +183,8 @@ class AsyncForker : public Rewriter {
           unsupported(text("compute ", quoted(n.name), " async"),
                       "what an async Func reads is computed outside of the loops that it shares "
                       "with its consumer, inside its own, or async itself",
-                      text(quoted(other->name), " is computed in these loops, and ",
-                           quoted(n.name), " reads it"),
+                      text(quoted(other->name), " is computed in these loops, and ", quoted(n.name),
+                           " reads it"),
                       text("Compute ", quoted(other->name), " at root or at a loop of ",
                            quoted(n.name), ", or call async() on it"));
           return false;
@@ -211,9 +211,9 @@ class AsyncForker : public Rewriter {
   }
 
   static Stmt with_semaphores(const std::string& func, int room, const Stmt& fork) {
-    const Stmt start = make_block(
-        {make_evaluate(call("retrograde_semaphore_init", func, Ready, 0)),
-         make_evaluate(call("retrograde_semaphore_init", func, Space, room)), fork});
+    const Stmt start =
+        make_block({make_evaluate(call("retrograde_semaphore_init", func, Ready, 0)),
+                    make_evaluate(call("retrograde_semaphore_init", func, Space, room)), fork});
     return make_realize(semaphores_of(func), {UInt(64)}, MemoryType::Stack, {Range{0, 2}}, start);
   }
 

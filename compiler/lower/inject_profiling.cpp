@@ -70,7 +70,8 @@ class Profiling : public Rewriter {
     const auto it = numbers_.find(f.name());
     const int number = it == numbers_.end() ? next_++ : it->second;
     numbers_[name] = number;
-    for (size_t i = 0; i < f.func->types.size(); i++) numbers_[name + "." + std::to_string(i)] = number;
+    for (size_t i = 0; i < f.func->types.size(); i++)
+      numbers_[name + "." + std::to_string(i)] = number;
   }
   int next_ = 1;
 
@@ -153,11 +154,11 @@ Stmt inject_profiling(const Stmt& s, const Program& program, const RenamedFuncs&
                       const std::string& pipeline) {
   Profiling profiling(program, renamed);
   const auto wrap = [&](const Stmt& work) {
-    const Expr begin = call("retrograde_profiler_begin", {Expr(pipeline), Expr(profiling.names)},
-                            Handle());
-    return make_let(run_name, begin,
-                    make_block({profiling(work),
-                                make_evaluate(call("retrograde_profiler_end", {run()}))}));
+    const Expr begin =
+        call("retrograde_profiler_begin", {Expr(pipeline), Expr(profiling.names)}, Handle());
+    return make_let(
+        run_name, begin,
+        make_block({profiling(work), make_evaluate(call("retrograde_profiler_end", {run()}))}));
   };
   return wrap_work(s, wrap);
 }

@@ -40,7 +40,9 @@ TraceSchedule asked_of(TraceSchedule trace, const Target& target) {
   trace.realizations |= target.has_feature(Target::TraceRealizations);
   return trace;
 }
-bool is_any(const TraceSchedule& trace) { return trace.loads || trace.stores || trace.realizations; }
+bool is_any(const TraceSchedule& trace) {
+  return trace.loads || trace.stores || trace.realizations;
+}
 
 Expr region_event(const std::string& func, int event, const Expr& parent,
                   const std::vector<Range>& region, const Expr& tag = {}) {
@@ -50,11 +52,10 @@ Expr region_event(const std::string& func, int event, const Expr& parent,
     coordinates.push_back(cast(Int(32), range.extent));
   }
   const Expr none = reinterpret_as(Handle(), make_uint_const(UInt(64), 0));
-  return call_op(
-      Op::runtime_call, Int(32),
-      {Expr("retrograde_trace_region"), Expr(func), Expr(event), parent,
-       coordinates.empty() ? none : call_op(Op::pack, Handle(), coordinates),
-       Expr(static_cast<int32_t>(coordinates.size())), tag.defined() ? tag : none});
+  return call_op(Op::runtime_call, Int(32),
+                 {Expr("retrograde_trace_region"), Expr(func), Expr(event), parent,
+                  coordinates.empty() ? none : call_op(Op::pack, Handle(), coordinates),
+                  Expr(static_cast<int32_t>(coordinates.size())), tag.defined() ? tag : none});
 }
 
 // The box of all points of a Func that a statement stores to.
@@ -211,7 +212,8 @@ class Tracer : public Rewriter {
   Stmt produce_or_consume(const ProducerConsumer& n) {
     if (n.is_producer) produced_[n.name] = region_of(n);
     const auto found = produced_.find(n.name);
-    const std::vector<Range> region = found == produced_.end() ? std::vector<Range>{} : found->second;
+    const std::vector<Range> region =
+        found == produced_.end() ? std::vector<Range>{} : found->second;
     const bool had_id = with_id_.count(n.name) > 0;
     const Stmt body = within(n.name, [&] { return (*this)(n.body); });
     RETROGRADE_ASSERT(had_id, "a region of ", n.name, " outside of its realization");
@@ -277,11 +279,11 @@ Stmt type_tag(const LoopedFunc& f, const Box& box) {
     numbers.push_back(cast(Int(32), range.extent));
   }
   const Expr none = reinterpret_as(Handle(), make_uint_const(UInt(64), 0));
-  return make_evaluate(call_op(
-      Op::runtime_call, Int(32),
-      {Expr("retrograde_trace_type"), Expr(f.name()), variable(pipeline_id), Expr(text),
-       numbers.empty() ? none : call_op(Op::pack, Handle(), numbers),
-       Expr(static_cast<int32_t>(numbers.size()))}));
+  return make_evaluate(
+      call_op(Op::runtime_call, Int(32),
+              {Expr("retrograde_trace_type"), Expr(f.name()), variable(pipeline_id), Expr(text),
+               numbers.empty() ? none : call_op(Op::pack, Handle(), numbers),
+               Expr(static_cast<int32_t>(numbers.size()))}));
 }
 
 // Regions of all Funcs at root, where they are known there.
@@ -291,15 +293,15 @@ std::map<std::string, Box> regions_at_root(const Stmt& s) {
   const std::function<void(const Stmt&)> visit = [&](const Stmt& part) {
     if (!part.defined()) return;
     if (const For* n = part.as<For>()) {
-      scope.push(n->name, {bounds_of(n->min, scope).min,
-                           bounds_of(n->min + n->extent - 1, scope).max});
+      scope.push(n->name,
+                 {bounds_of(n->min, scope).min, bounds_of(n->min + n->extent - 1, scope).max});
       visit(n->body);
       scope.pop(n->name);
       return;
     }
     if (const LetStmt* n = part.as<LetStmt>()) {
-      scope.push(n->name, n->value.type() == Int(32) ? bounds_of(n->value, scope)
-                                                     : Interval::everything());
+      scope.push(n->name,
+                 n->value.type() == Int(32) ? bounds_of(n->value, scope) : Interval::everything());
       visit(n->body);
       scope.pop(n->name);
       return;
@@ -307,8 +309,8 @@ std::map<std::string, Box> regions_at_root(const Stmt& s) {
     if (const Realize* n = part.as<Realize>()) {
       Box box;
       for (const Range& range : n->bounds)
-        box.push_back({bounds_of(range.min, scope).min,
-                       bounds_of(range.min + range.extent - 1, scope).max});
+        box.push_back(
+            {bounds_of(range.min, scope).min, bounds_of(range.min + range.extent - 1, scope).max});
       for (Interval& side : box) {
         if (side.is_bounded()) side = {simplify(side.min), simplify(side.max)};
       }
@@ -345,17 +347,17 @@ void inject_tracing(LoopNests& nests, const Program& program, const std::string&
                                              : known->second;
     types.push_back(type_tag(f, box));
     for (const std::string& tag : f.func->trace.tags)
-      tags.push_back(make_evaluate(region_event(f.name(), halide_trace_tag, variable(pipeline_id),
-                                                {}, Expr(tag))));
+      tags.push_back(make_evaluate(
+          region_event(f.name(), halide_trace_tag, variable(pipeline_id), {}, Expr(tag))));
   }
   std::vector<Stmt> all = types;
   all.insert(all.end(), tags.begin(), tags.end());
   all.push_back(traced);
-  all.push_back(make_evaluate(
-      region_event(pipeline, halide_trace_end_pipeline, variable(pipeline_id), {})));
-  nests.body = make_let(pipeline_id,
-                        region_event(pipeline, halide_trace_begin_pipeline, Expr(0), {}),
-                        make_block(std::move(all)));
+  all.push_back(
+      make_evaluate(region_event(pipeline, halide_trace_end_pipeline, variable(pipeline_id), {})));
+  nests.body =
+      make_let(pipeline_id, region_event(pipeline, halide_trace_begin_pipeline, Expr(0), {}),
+               make_block(std::move(all)));
 }
 
 }  // namespace retrograde::ir

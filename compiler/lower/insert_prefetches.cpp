@@ -3,12 +3,13 @@
 // Out: Loops; the same stores.
 //
 //   for y { out(x, y) = in(x, y) ... }   =>   for y { prefetch in [.., ..], [y + 2, 1]; out ... }
-//                                        =>   for y { for line { prefetch(&in(16 line, y + 2)) } ... }
+//                                        =>   for y { for line { prefetch(&in(16 line, y + 2)) }
+//                                        ... }
 //
 // Method: the box that one iteration of the loop `at` reads, with the loop variable `from` moved by
-//         the offset; lets between the two loops are written out first. What the bound strategy says
-//         about data that does not exist: the box is clamped to it, or fetched only when it lies
-//         inside, or fetched regardless, which no machine faults for.
+//         the offset; lets between the two loops are written out first. What the bound strategy
+//         says about data that does not exist: the box is clamped to it, or fetched only when it
+//         lies inside, or fetched regardless, which no machine faults for.
 // Not done: boxes larger than a cache are fetched whole.
 // Source: Halide's documentation of prefetch. Tests: test/unit/prefetch_test.cpp.
 #include "lower/insert_prefetches.h"
@@ -133,8 +134,9 @@ class Inserter : public Rewriter {
   Stmt prefetch(const PrefetchDirective& directive, const LoopName& at, const Stmt& body) {
     const auto image = std::dynamic_pointer_cast<ParameterContents>(directive.symbol.lock());
     const auto found = realized_.find(directive.name);
-    const std::string name =
-        image ? image->name : found == realized_.end() ? directive.name : found->second;
+    const std::string name = image                      ? image->name
+                             : found == realized_.end() ? directive.name
+                                                        : found->second;
     Box box = ReadRegion(name).of(body);
     const OuterLoop* from = find_loop(directive.from, at);
     if (box.empty() || !from) return {};

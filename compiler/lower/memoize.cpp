@@ -129,9 +129,9 @@ std::vector<Expr> bytes_of(const std::string& text) {
 
 void check_schedule(const LoopedFunc& f) {
   const LoopLevel &compute = f.schedule.compute_level, &store = f.schedule.store_level;
-  const bool together = store.kind == LoopLevel::Kind::Inlined ||
-                        (store.kind == compute.kind && store.func == compute.func &&
-                         store.var == compute.var);
+  const bool together =
+      store.kind == LoopLevel::Kind::Inlined ||
+      (store.kind == compute.kind && store.func == compute.func && store.var == compute.var);
   if (f.is_output) {
     user_error(text("memoize ", quoted(f.name())), "an output is computed by every call",
                "it is an output of the pipeline", "Memoize a Func that the output reads");
@@ -216,15 +216,14 @@ class LookupInserter : public Rewriter {
     std::vector<Expr> blocks, sizes;
     const size_t count = f.func->types.size();
     for (size_t i = 0; i < count; i++) {
-      const std::string name =
-          count == 1 ? producer.name : producer.name + "." + std::to_string(i);
+      const std::string name = count == 1 ? producer.name : producer.name + "." + std::to_string(i);
       const Memory& memory = allocated_.at(name);
       blocks.push_back(call_op(Op::address_of, Handle(), {make_load(memory.type, name, Expr(0))}));
-      sizes.push_back(binary(Kind::Mul, memory.elements,
-                             make_const(Int(64), memory.type.bytes())));
+      sizes.push_back(binary(Kind::Mul, memory.elements, make_const(Int(64), memory.type.bytes())));
     }
     const std::string name = producer.name + ".memoization";
-    const Expr places = variable(name + "_blocks", Handle()), bytes = variable(name + "_bytes", Handle());
+    const Expr places = variable(name + "_blocks", Handle()),
+               bytes = variable(name + "_bytes", Handle());
     const std::vector<Expr> what = {variable(let.name, Handle()), Expr(key_bytes(let.value)),
                                     Expr(static_cast<int32_t>(count)), places, bytes};
     const Expr missing = variable(name + "_missing");

@@ -25,8 +25,10 @@
 #include "lower/make_names_unique.h"
 #include "lower/memoize.h"
 #include "lower/partition_loops.h"
+#include "lower/transpose_loads.h"
 #include "lower/unroll_loops.h"
 #include "lower/vectorize_loops.h"
+#include "lower/write_debug_files.h"
 #include "simplify/simplify.h"
 
 namespace retrograde::ir {
@@ -88,6 +90,10 @@ constexpr Pass passes[] = {
        const bool drops = lowering.options.target.has_feature(Target::NoBoundsQuery);
        return drops ? drop_bounds_query(s) : s;
      }},
+    {"write_debug_files", Phase::Loops,
+     [](Lowering& lowering, const Stmt& s) {
+       return write_debug_files(s, lowering.program, lowering.renamed_funcs);
+     }},
     {"insert_prefetches", Phase::Loops,
      [](Lowering& lowering, const Stmt& s) {
        return insert_prefetches(s, lowering.program, lowering.renamed_funcs);
@@ -119,6 +125,7 @@ constexpr Pass passes[] = {
     {"vectorize_loops", Phase::Vector, [](Lowering&, const Stmt& s) { return vectorize_loops(s); }},
     {"interleave_vectors", Phase::Vector,
      [](Lowering&, const Stmt& s) { return interleave_vectors(s); }},
+    {"transpose_loads", Phase::Vector, [](Lowering&, const Stmt& s) { return transpose_loads(s); }},
     {"deinterleave_loads", Phase::Vector,
      [](Lowering&, const Stmt& s) { return deinterleave_loads(s); }},
     {"simplify_vectors", Phase::Vector, run_simplify},

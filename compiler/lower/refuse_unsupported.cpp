@@ -32,7 +32,6 @@ constexpr Directive not_yet[] = {
      [](const LoopedFunc& f) {
        return is_hoisted(f) && (f.schedule.async || f.schedule.memoized);
      }},
-    {"debug_to_file", [](const LoopedFunc& f) { return !f.func->debug_file.empty(); }},
 };
 
 bool is_memory_of_device(MemoryType memory) {

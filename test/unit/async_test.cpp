@@ -8,8 +8,8 @@
 #include <thread>
 
 #include "frontend/include/retrograde/retrograde.h"
-#include "lower/lower.h"
 #include "ir/print.h"
+#include "lower/lower.h"
 #include "retrograde_runtime.h"
 
 namespace {
@@ -170,7 +170,8 @@ TEST_P(Async, AnAsyncFuncThatReadsAnotherOfTheSameLoopsInOrder) {
 
 // ---- failures ----
 
-// The first reader is not computed when its result is in the cache; the second one waits all the same.
+// The first reader is not computed when its result is in the cache; the second one waits all the
+// same.
 TEST_P(Async, WhatAMemoizedFuncReadsIsWaitedForWithoutIt) {
   Var x("x");
   Func f("f"), g("g"), out("out");

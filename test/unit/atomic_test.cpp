@@ -6,9 +6,9 @@
 
 #include "frontend/func.h"
 #include "frontend/include/retrograde/retrograde.h"
-#include "lower/lower_atomics.h"
 #include "ir/parse.h"
 #include "ir/print.h"
+#include "lower/lower_atomics.h"
 
 namespace retrograde {
 namespace {
@@ -67,8 +67,10 @@ TEST(Atomic, DifferencesMinimaAndMaximaAreExact) {
   const std::function<Expr(Expr, Expr)> least = [](Expr a, Expr b) { return min(a, b - 50); };
   const std::function<Expr(Expr, Expr)> largest = [](Expr a, Expr b) { return max(b, a); };
   expect_exact_histogram<int32_t>(difference, 5, [](int32_t a, int32_t b) { return a - b; });
-  expect_exact_histogram<int32_t>(least, 5, [](int32_t a, int32_t b) { return std::min(a, b - 50); });
-  expect_exact_histogram<uint32_t>(largest, 5, [](uint32_t a, uint32_t b) { return std::max(a, b); });
+  expect_exact_histogram<int32_t>(least, 5,
+                                  [](int32_t a, int32_t b) { return std::min(a, b - 50); });
+  expect_exact_histogram<uint32_t>(largest, 5,
+                                   [](uint32_t a, uint32_t b) { return std::max(a, b); });
 }
 
 TEST(Atomic, BitwiseOperatorsAreExact) {
@@ -82,9 +84,8 @@ TEST(Atomic, BitwiseOperatorsAreExact) {
 
 TEST(Atomic, OperationsWithoutAnInstructionAreExact) {
   expect_exact_histogram<uint32_t>(product, 1u, [](uint32_t a, uint32_t b) { return a * (b + 1); });
-  expect_exact_histogram<int64_t>(
-      [](Expr a, Expr b) { return (a + b) % 1000003; }, int64_t{3},
-      [](int64_t a, int64_t b) { return (a + b) % 1000003; });
+  expect_exact_histogram<int64_t>([](Expr a, Expr b) { return (a + b) % 1000003; }, int64_t{3},
+                                  [](int64_t a, int64_t b) { return (a + b) % 1000003; });
   expect_exact_histogram<bool>([](Expr a, Expr b) { return a || b; }, false,
                                [](bool a, bool b) { return a || b; });
   // Sums of small integers in floating point do not depend on the order.
@@ -141,6 +142,23 @@ TEST(Atomic, VectorizedUpdatesWithConflictingLanesAreExact) {
   for (int i = 0; i < bins; i++) EXPECT_EQ(out(i), expected[i]) << i;
 }
 
+// All lanes go to one element: they are added up first.
+TEST(Atomic, OneElementTakesVectorsFromAllThreads) {
+  for (int threads : {1, 2, 8}) {
+    RVar ro("ro"), ri("ri");
+    RDom r(0, 1000);
+    Func f("f");
+    f() = cast<int64_t>(3);
+    f() += cast<int64_t>(r * r);
+    f.update().split(r, ro, ri, 8);
+    atomic(f, ForType::Vectorized, 0);
+    atomic(f, ForType::Parallel, 1);
+    f.jit_handlers().thread_limit = threads;
+    Buffer<int64_t> out = f.realize();
+    EXPECT_EQ(out(), 3 + int64_t{999} * 1000 * 1999 / 6);
+  }
+}
+
 TEST(Atomic, VectorizedOverPointsAndParallelOverTheReduction) {
   constexpr int width = 37, rows = 50;
   Var x("x");
@@ -172,7 +190,8 @@ TEST(Atomic, AllocationsInsideTheLoopNeedNoAtomic) {
     return ir::print(ir::lower_atomics(ir::parse_stmt(text)));
   };
   const std::string own = lowered(
-      "parallel for (i, 0, 8) { allocate f[int64(4)]:int32 auto { atomic f { f[0] = f[0] + i } } }");
+      "parallel for (i, 0, 8) { allocate f[int64(4)]:int32 auto { atomic f { f[0] = f[0] + i } } "
+      "}");
   EXPECT_EQ(own.find("atomic"), std::string::npos) << own;
   const std::string shared = lowered(
       "allocate f[int64(4)]:int32 auto { parallel for (i, 0, 8) { "

@@ -214,6 +214,17 @@ TEST(ExternFunction, IsFoundInTheProcessOrAmongTheExterns) {
   EXPECT_EQ(again(4), 8);
 }
 
+TEST(ExternFunction, ArgumentsHaveTheDeclaredTypes) {
+  Var x("x");
+  Func f("f");
+  f(x) = call_c_function<int, int>("extern_test_twice", x + 1);
+  f.vectorize(x, 4, TailStrategy::GuardWithIf);
+  Buffer<int> result = f.realize({7});
+  EXPECT_EQ(result(6), 14);
+  const auto wrong = [&] { return call_c_function<int, int>("extern_test_twice", cast<float>(x)); };
+  EXPECT_THROW(wrong(), UserError);
+}
+
 TEST(ExternFunction, AnUnknownOneIsAnError) {
   Var x("x");
   Func f("f");

@@ -26,7 +26,9 @@ void memoize(Func& f) {
   f.function()->version++;
 }
 
-Expr counted(Expr value) { return ir::call_extern("count_memoize_calls", Int(32), {std::move(value)}); }
+Expr counted(Expr value) {
+  return ir::call_extern("count_memoize_calls", Int(32), {std::move(value)});
+}
 
 class Memoize : public testing::Test {
  protected:

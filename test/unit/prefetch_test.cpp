@@ -34,7 +34,8 @@ struct Blur {
     in.set(data);
     Buffer<float> result = out.realize({64, 32});
     for (int j = 0; j < 32; j++) {
-      for (int i = 0; i < 64; i++) ASSERT_EQ(result(i, j), static_cast<float>(2 * i + 200 * j + 101));
+      for (int i = 0; i < 64; i++)
+        ASSERT_EQ(result(i, j), static_cast<float>(2 * i + 200 * j + 101));
     }
   }
 };
@@ -63,7 +64,8 @@ TEST(Prefetch, EveryBoundStrategyKeepsTheResult) {
     EXPECT_EQ(before.find("if ") != std::string::npos,
               strategy == PrefetchBoundStrategy::GuardWithIf)
         << before;
-    EXPECT_EQ(line.find("in.extent.1") != std::string::npos, strategy == PrefetchBoundStrategy::Clamp)
+    EXPECT_EQ(line.find("in.extent.1") != std::string::npos,
+              strategy == PrefetchBoundStrategy::Clamp)
         << line;
     blur.expect_right();
   }
@@ -74,7 +76,7 @@ TEST(Prefetch, OneRequestForEachCacheLine) {
   blur.out.prefetch(blur.in, blur.y, blur.y, 1, PrefetchBoundStrategy::NonFaulting);
   const std::string text = lowered(blur.out, "lower_prefetches");
   EXPECT_NE(text.find("prefetch<int32>(address_of"), std::string::npos) << text;
-  EXPECT_NE(text.find("*16"), std::string::npos) << "16 floats a line:\n" << text;
+  EXPECT_NE(text.find("* 16"), std::string::npos) << "16 floats a line:\n" << text;
 }
 
 TEST(Prefetch, AFuncAndInsideOfATile) {

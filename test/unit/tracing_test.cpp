@@ -203,7 +203,8 @@ TEST(Tracing, ParentsFormTheHierarchyInParallelLoopsToo) {
     if (event.kind == halide_trace_store || event.kind == halide_trace_load) {
       const bool is_store = event.kind == halide_trace_store;
       (is_store ? stores : loads)++;
-      EXPECT_EQ(by_id.at(event.parent).kind, is_store ? halide_trace_produce : halide_trace_consume);
+      EXPECT_EQ(by_id.at(event.parent).kind,
+                is_store ? halide_trace_produce : halide_trace_consume);
       EXPECT_EQ(by_id.at(event.parent).func, event.func);
     } else if (event.kind == halide_trace_begin_realization) {
       EXPECT_EQ(by_id.at(event.parent).kind, halide_trace_begin_pipeline);

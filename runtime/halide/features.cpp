@@ -1,0 +1,55 @@
+// Traces, the cache of memoized Funcs and the profiler by their names in HalideRuntime.h.
+#include <cstdint>
+
+#include "halide/weak.h"
+#include "retrograde_runtime.h"
+
+namespace {
+
+retrograde_context context_of(void* user_context) {
+  retrograde_context context;
+  retrograde_begin_call(&context, user_context);
+  return context;
+}
+
+halide_trace_t custom_trace = nullptr;
+
+}  // namespace
+
+RETROGRADE_WEAK int32_t halide_default_trace(void* user_context,
+                                             const halide_trace_event_t* event) {
+  retrograde_context context = context_of(user_context);
+  return retrograde_default_trace(&context, event);
+}
+
+RETROGRADE_WEAK int32_t halide_trace(void* user_context, const halide_trace_event_t* event) {
+  const halide_trace_t handler = __atomic_load_n(&custom_trace, __ATOMIC_ACQUIRE);
+  return handler ? handler(user_context, event) : halide_default_trace(user_context, event);
+}
+
+RETROGRADE_WEAK halide_trace_t halide_set_custom_trace(halide_trace_t trace) {
+  const halide_trace_t before = __atomic_exchange_n(&custom_trace, trace, __ATOMIC_ACQ_REL);
+  return before ? before : halide_default_trace;
+}
+
+// Every packet is written when it happens: there is nothing to shut down.
+RETROGRADE_WEAK int halide_shutdown_trace() { return 0; }
+
+RETROGRADE_WEAK void halide_memoization_cache_set_size(int64_t size) {
+  retrograde_memoization_set_size(size);
+}
+RETROGRADE_WEAK void halide_memoization_cache_evict(void*, uint64_t eviction_key) {
+  retrograde_memoization_evict(eviction_key);
+}
+RETROGRADE_WEAK void halide_memoization_cache_cleanup() { retrograde_memoization_cleanup(); }
+
+RETROGRADE_WEAK halide_profiler_pipeline_stats* halide_profiler_get_pipeline_state(
+    const char* pipeline_name) {
+  return retrograde_profiler_pipeline(pipeline_name);
+}
+RETROGRADE_WEAK void halide_profiler_report(void* user_context) {
+  retrograde_context context = context_of(user_context);
+  retrograde_profiler_report(&context);
+}
+RETROGRADE_WEAK void halide_profiler_reset() { retrograde_profiler_reset(); }
+RETROGRADE_WEAK void halide_profiler_shutdown() { retrograde_profiler_reset(); }
