@@ -278,4 +278,40 @@ TEST(HalideCompat, ImplicitVariables) {
   EXPECT_EQ(result(1, 2, 3), 2 + 30 + 100 + 1);
 }
 
+TEST(HalideCompat, IntegerArithmeticWithItsWidthSaid) {
+  Var x("x");
+  Func f("f");
+  const Expr divisor = cast<uint8_t>(x % 5 + 1);
+  f(x) = Tuple(fast_integer_divide(x - 7, divisor), fast_integer_modulo(x - 7, divisor),
+               widening_mul(cast<uint8_t>(x + 250), cast<uint8_t>(200)));
+  Realization r = f.realize({12});
+  Buffer<int> quotient = r[0], remainder = r[1];
+  Buffer<uint16_t> product = r[2];
+  for (int i = 0; i < 12; i++) {
+    const int d = i % 5 + 1, n = i - 7, floor = n >= 0 ? n / d : -((-n + d - 1) / d);
+    EXPECT_EQ(quotient(i), floor);
+    EXPECT_EQ(remainder(i), n - floor * d);
+    EXPECT_EQ(product(i), ((i + 250) & 255) * 200);
+  }
+  EXPECT_THROW(gather(x, 1), Unsupported);
+}
+
+// Names of targets that no code is generated for compile, and say so when they are used.
+TEST(HalideCompat, WhatIsNotGeneratedSaysSo) {
+  Var x("x"), y("y");
+  Func f("f");
+  f(x, y) = x + y;
+  const Target target = get_host_target().with_feature(Target::CUDA);
+  if (target.has_gpu_feature()) {
+    EXPECT_THROW(Func(f).gpu_tile(x, y, Var("bx"), Var("by"), 8, 8), Unsupported);
+  }
+  try {
+    Module(f.compile_to_module({}, "f", target)).compile_to_buffer();
+    FAIL();
+  } catch (const Unsupported& error) {
+    EXPECT_NE(std::string(error.what()).find("\"cuda\""), std::string::npos) << error.what();
+  }
+  EXPECT_EQ(HALIDE_VERSION_MAJOR, 14);
+}
+
 }  // namespace
