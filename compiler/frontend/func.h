@@ -296,7 +296,7 @@ class Func {
   Func& trace_stores();
   Func& trace_realizations();
   Func& add_trace_tag(const std::string& tag);
-  // Writes what was computed to a file: a TIFF (.tif, .tiff), a MATLAB file (.mat), otherwise raw.
+  // Writes what was computed to a file, in NumPy's format (.npy) or raw (.tmp).
   void debug_to_file(const std::string& filename);
 
   // ---- loops: of the first definition here, of updates through update(i); see stage.h ----

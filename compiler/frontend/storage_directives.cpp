@@ -328,7 +328,7 @@ Func& Func::add_trace_tag(const std::string& tag) {
 void Func::debug_to_file(const std::string& filename) {
   if (filename.empty()) {
     user_error("write " + quoted(name()) + " to a file", "the file has a name", "it is empty",
-               "Give a name that ends in .tiff, .mat or .tmp");
+               "Give a name that ends in .npy or .tmp");
   }
   func_->debug_file = filename;
   func_->version++;
