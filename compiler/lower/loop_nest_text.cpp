@@ -35,14 +35,22 @@ std::string user_name(const std::string& loop) {
 
 class LoopNestPrinter {
  public:
+  explicit LoopNestPrinter(const Program& program) : program_(program) {}
   std::string print(const Stmt& s) {
     visit(s);
     return out_.str();
   }
 
  private:
+  const Program& program_;
   std::ostringstream out_;
   int depth_ = 0;
+
+  bool is_stored_further_out(const std::string& name) const {
+    const LoopedFunc* f = program_.find(name);
+    return f && f->schedule.store_level.kind != LoopLevel::Kind::Inlined &&
+           !(f->schedule.store_level == f->schedule.compute_level);
+  }
 
   std::ostream& line() { return out_ << std::string(2 * depth_, ' '); }
   void nested(const Stmt& s) {
@@ -65,7 +73,11 @@ class LoopNestPrinter {
           nested(loop.body);
         },
         [&](const Provide& p) { line() << p.name << "(...) = ...\n"; },
-        [&](const Realize& r) { visit(r.body); },
+        [&](const Realize& r) {
+          if (!is_stored_further_out(r.name)) return visit(r.body);
+          line() << "store " << r.name << ":\n";
+          nested(r.body);
+        },
         [&](const StmtNode&) {
           for_each_child(
               s, [](const Expr&) {}, [&](const Stmt& child) { visit(child); });
@@ -79,7 +91,7 @@ std::string loop_nest_text(const std::vector<FuncPtr>& outputs) {
   std::string result;
   run_on_large_stack([&] {
     Program program = inline_functions(outputs);
-    result = LoopNestPrinter().print(build_loop_nests(program, {.slide = false}).body);
+    result = LoopNestPrinter(program).print(build_loop_nests(program, {.slide = false}).body);
   });
   return result;
 }

@@ -68,6 +68,25 @@ TEST(LoopNest, computes_inside_a_loop_of_the_consumer) {
             "        g(...) = ...\n");
 }
 
+TEST(LoopNest, says_where_a_func_is_stored) {
+  Func f("f"), g("g");
+  Var x("x"), y("y");
+  f(x, y) = x + y;
+  g(x, y) = f(x, y - 1) + f(x, y);
+  f.store_root().compute_at(g, y);
+  EXPECT_EQ(without_numbers(nest_of(g)),
+            "store f:\n"
+            "  produce g:\n"
+            "    for y:\n"
+            "      produce f:\n"
+            "        for y:\n"
+            "          for x:\n"
+            "            f(...) = ...\n"
+            "      consume f:\n"
+            "        for x:\n"
+            "          g(...) = ...\n");
+}
+
 TEST(LoopNest, shows_splits_and_loop_types) {
   Func f("f");
   Var x("x"), y("y"), xo("xo"), xi("xi");

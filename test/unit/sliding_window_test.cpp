@@ -338,5 +338,72 @@ TEST_F(SlidingWindow, FoldsBesideVectorsButNotAlongThem) {
   });
 }
 
+// ---- what users say of storage ----
+
+class StorageDirectives : public SlidingWindow {
+ protected:
+  // f is read at y - 1 .. y + 1 by one row of g.
+  Func rows(const std::function<void(Func&, Func&)>& schedule) {
+    Func f("f"), g("g");
+    f(x, y) = x * 3 + y * y;
+    g(x, y) = f(x, y - 1) + f(x, y + 1) * 2;
+    g.bound(x, 0, width);
+    schedule(f, g);
+    return g;
+  }
+
+  static void expect_values(Func g) {
+    Buffer<int> found = g.realize({width, height});
+    for (int j = 0; j < height; ++j) {
+      for (int i = 0; i < width; ++i)
+        ASSERT_EQ(found(i, j), i * 9 + (j - 1) * (j - 1) + 2 * (j + 1) * (j + 1));
+    }
+  }
+
+  static void expect_error(Func g, const std::string& phrase) {
+    try {
+      g.realize({width, height});
+      FAIL() << "nothing was thrown";
+    } catch (const Error& e) {
+      EXPECT_NE(std::string(e.what()).find(phrase), std::string::npos) << e.what();
+    }
+  }
+};
+
+TEST_F(StorageDirectives, FoldsAsAsked) {
+  Func g = rows([&](Func& f, Func& g) { f.store_root().compute_at(g, y).fold_storage(y, 3); });
+  EXPECT_EQ(stored_elements(g, "f"), width * 3);
+  expect_values(g);
+}
+
+TEST_F(StorageDirectives, AFoldThatIsTooSmallIsReported) {
+  expect_error(rows([&](Func& f, Func& g) { f.store_root().compute_at(g, y).fold_storage(y, 2); }),
+               "cannot fold the storage");
+}
+
+TEST_F(StorageDirectives, AFoldThatNoLoopCarriesMustHoldAll) {
+  expect_values(rows([&](Func& f, Func& g) { f.compute_at(g, y).fold_storage(y, 4); }));
+  expect_error(rows([&](Func& f, Func&) { f.compute_root().fold_storage(y, 4); }),
+               "cannot fold the storage");
+}
+
+TEST_F(StorageDirectives, OutputsAreNotFolded) {
+  expect_error(rows([&](Func&, Func& g) { g.fold_storage(y, 4); }), "is an output");
+}
+
+TEST_F(StorageDirectives, BoundsTheStorage) {
+  Func g = rows([&](Func& f, Func&) { f.compute_root().bound_storage(y, height + 10); });
+  EXPECT_EQ(stored_elements(g, "f"), width * (height + 10));
+  expect_values(g);
+  expect_error(rows([&](Func& f, Func&) { f.compute_root().bound_storage(y, height); }),
+               "bounded to");
+}
+
+TEST_F(StorageDirectives, AlignsTheStorage) {
+  Func g = rows([&](Func& f, Func& g) { f.compute_at(g, y).align_storage(x, 16); });
+  EXPECT_EQ(stored_elements(g, "f"), 32 * 3);
+  expect_values(g);
+}
+
 }  // namespace
 }  // namespace retrograde
