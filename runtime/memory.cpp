@@ -8,6 +8,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cstdint>
 #include <cstdlib>
 #include <mutex>
 #include <new>
@@ -24,7 +25,7 @@ constexpr size_t huge_page_bytes = size_t{2} << 20;  // x86-64 and AArch64 Linux
 constexpr size_t page_bytes = 4096;
 constexpr size_t max_blocks = 256;
 
-// Stands in front of every block, one alignment unit long.
+// Stands in front of every block.
 struct Header {
   size_t capacity;   // bytes behind the header
   void* allocation;  // what the system gave
@@ -32,7 +33,7 @@ struct Header {
 static_assert(sizeof(Header) <= alignment);
 
 Header* header_of(void* block) {
-  return reinterpret_cast<Header*>(static_cast<char*>(block) - alignment);
+  return reinterpret_cast<Header*>(static_cast<char*>(block) - sizeof(Header));
 }
 
 size_t round_up(size_t bytes, size_t multiple) {
@@ -50,20 +51,35 @@ size_t machine_bytes() {
                                 : size_t{4} << 30;
 }
 
+void* with_header(void* allocation, void* block, size_t capacity) {
+  *header_of(block) = {capacity, allocation};
+  return block;
+}
+
+// malloc and room to align by hand: posix_memalign would cut a piece off the front each time, and
+// free would join it again, which takes longer than a stage computes a row.
+void* small_malloc(size_t capacity) {
+  void* allocation = std::malloc(capacity + 2 * alignment);
+  if (!allocation) return nullptr;
+  const uintptr_t behind = reinterpret_cast<uintptr_t>(allocation) + sizeof(Header);
+  const size_t skipped = round_up(behind, alignment) - behind;
+  return with_header(allocation, static_cast<char*>(allocation) + sizeof(Header) + skipped,
+                     capacity);
+}
+
 // Systems that overcommit would map a block larger than the machine's memory, and kill the process
 // when it is filled.
 void* system_malloc(size_t capacity) {
   const size_t bytes = capacity + alignment;
-  if (bytes >= small_bytes && bytes > machine_bytes()) return nullptr;
+  if (bytes < small_bytes) return small_malloc(capacity);
+  if (bytes > machine_bytes()) return nullptr;
   const bool huge = bytes >= 4 * huge_page_bytes;
   void* allocation = nullptr;
   if (posix_memalign(&allocation, huge ? huge_page_bytes : alignment, bytes) != 0) return nullptr;
 #ifdef MADV_HUGEPAGE
   if (huge) madvise(allocation, bytes, MADV_HUGEPAGE);  // only advice: failure changes nothing
 #endif
-  void* block = static_cast<char*>(allocation) + alignment;
-  *header_of(block) = {capacity, allocation};
-  return block;
+  return with_header(allocation, static_cast<char*>(allocation) + alignment, capacity);
 }
 
 void system_free(void* block) { std::free(header_of(block)->allocation); }
