@@ -7,6 +7,7 @@
 #include "lower/interleave_vectors.h"
 #include "lower/lower_atomics.h"
 #include "lower/partition_loops.h"
+#include "lower/transpose_loads.h"
 #include "lower/unroll_loops.h"
 #include "lower/vectorize_loops.h"
 #include "simplify/simplify.h"
@@ -23,6 +24,7 @@ const std::vector<StatementPass>& statement_passes() {
       {"lower_atomics", lower_atomics},
       {"partition_loops", partition_loops},
       {"simplify", [](const Stmt& s) { return simplify(s); }},
+      {"transpose_loads", transpose_loads},
       {"unroll_loops", unroll_loops},
       {"vectorize_loops", vectorize_loops},
       {"interleave_vectors", interleave_vectors},

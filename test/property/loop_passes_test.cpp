@@ -9,6 +9,7 @@
 #include "lower/free_early.h"
 #include "lower/interleave_vectors.h"
 #include "lower/partition_loops.h"
+#include "lower/transpose_loads.h"
 #include "lower/unroll_loops.h"
 #include "lower/vectorize_loops.h"
 #include "property/statement_evaluator.h"
@@ -309,6 +310,7 @@ TEST_P(LoopPasses, KeepWhatProgramsCompute) {
     expect_same("vectorize_loops", seed, program, vectorized, Phase::Vector);
     expect_same("interleave_vectors", seed, program, interleave_vectors(vectorized), Phase::Vector);
     expect_same("deinterleave_loads", seed, program, deinterleave_loads(vectorized), Phase::Vector);
+    expect_same("transpose_loads", seed, program, transpose_loads(vectorized), Phase::Vector);
     expect_same("free_early", seed, program, free_early(vectorized), Phase::Vector);
     expect_same("vectorize_loops alone", seed, program, vectorize_loops(unroll_loops(program)),
                 Phase::Vector);
