@@ -434,6 +434,7 @@ void add_all_identities(const Component& c, std::vector<Candidate>& candidates) 
 struct Accepted {
   Candidate candidate;
   bool commutative = false;
+  bool breaks_ties = false;
 };
 
 // Ties: of equal extremes another may win than in the order of the update; values stay the same.
@@ -442,7 +443,8 @@ std::optional<Accepted> prove(const Component& c, const Candidate& candidate) {
   const bool exact = laws.has_identity(false);
   if (!exact && !laws.has_identity(true)) return {};
   if (!laws.represents_update(!exact) || !laws.is_associative()) return {};
-  return Accepted{candidate, laws.is_commutative(false) || laws.is_commutative(true)};
+  const bool in_all_cases = laws.is_commutative(false);
+  return Accepted{candidate, in_all_cases || laws.is_commutative(true), !exact || !in_all_cases};
 }
 
 std::optional<Accepted> prove(const Component& c) {
@@ -598,6 +600,7 @@ class Prover {
           identity_value(accepted->candidate.identity[k], values_[group[k]].type(),
                          group.size() == 1 && value.as<Add>());
     }
+    op_.breaks_ties = op_.breaks_ties || accepted->breaks_ties;
     if (!accepted->commutative) {
       op_.commutative = false;
       proof_.why_not_commutative = "its operator depends on the order of its operands";

@@ -31,6 +31,8 @@ struct AssociativeOp {
   std::vector<Expr> identity;       // constants; undefined: any value does
   // op(x, y) == op(y, x), except that which of several equal extremes wins (argmin) may change.
   bool commutative = false;
+  // Of equal extremes another may win when the order changes; otherwise nothing changes at all.
+  bool breaks_ties = false;
 };
 
 struct AssociativityProof {

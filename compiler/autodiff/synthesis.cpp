@@ -43,6 +43,7 @@ class Synthesis {
         options_(options),
         order_(topological_order({seed.output})),
         regions_(order_, seed.region) {
+    for (const FuncPtr& f : order_) refuse_extern(*f);
     find_active();
   }
 
@@ -57,6 +58,15 @@ class Synthesis {
   }
 
  private:
+  void refuse_extern(const FuncContents& f) const {
+    if (!f.is_extern()) return;
+    unsupported(text("differentiate ", quoted(seed_.output->name)),
+                "derivatives come from definitions",
+                text("it depends on ", quoted(f.name), ", which the C function ",
+                     quoted(f.extern_definition->function), " computes"),
+                "Differentiate what comes after it, with its values in an ImageParam");
+  }
+
   // ---- which symbols lie between the requested inputs and the output ----
 
   bool is_requested(const Symbol* symbol) const {

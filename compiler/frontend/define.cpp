@@ -371,6 +371,11 @@ void define_update(const FuncPtr& f, const std::vector<Expr>& raw_args,
   const Site site = site_of(*f, raw_args, true);
   if (!f->is_defined())
     user_error(site.asked, "a Func is updated after its first definition", "it has none", "");
+  if (f->is_extern()) {
+    user_error(site.asked, "a Func that a C function computes has no updates",
+               text("it is defined by ", quoted(f->extern_definition->function)),
+               "Update a Func that reads it");
+  }
   if (f->frozen) {
     user_error(site.asked, "a Func is complete when another Func uses it",
                "another Func uses it already",

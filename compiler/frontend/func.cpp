@@ -19,6 +19,12 @@ ir::FuncPtr make_func(const std::string& unique_name, std::source_location where
   return contents;
 }
 
+void check_not_extern(const ir::FuncContents& f, const std::string& asked) {
+  if (!f.is_extern()) return;
+  user_error(asked, "its values are expressions",
+             "the C function " + quoted(f.extern_definition->function) + " computes them");
+}
+
 }  // namespace
 
 // ---- construction ----
@@ -54,6 +60,7 @@ std::vector<Var> Func::args() const {
 
 Expr Func::value() const {
   check_defined("take the value of " + quoted(name()));
+  check_not_extern(*func_, "take the value of " + quoted(name()));
   if (outputs() != 1) {
     user_error("take the value of " + quoted(name()), "it has one value only if it is no Tuple",
                text("it has ", outputs()), "Use values()");
@@ -63,6 +70,7 @@ Expr Func::value() const {
 
 Tuple Func::values() const {
   check_defined("take the values of " + quoted(name()));
+  check_not_extern(*func_, "take the values of " + quoted(name()));
   return Tuple(func_->pure->values);
 }
 

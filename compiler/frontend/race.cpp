@@ -2,6 +2,7 @@
 
 #include <unordered_set>
 
+#include "frontend/associative_update.h"
 #include "ir/build.h"
 #include "ir/equal.h"
 #include "ir/visit.h"
@@ -48,57 +49,6 @@ bool reads_only_at(const FuncContents& f, const Definition& update, size_t dimen
   return result;
 }
 
-bool calls_self(const Expr& root, const FuncContents& f) {
-  bool found = false;
-  if (!root.defined()) return false;
-  walk(root, [&](const Expr& e) {
-    const Call* call = e.as<Call>();
-    found = found || (call && call->call_type == CallType::Func && call->symbol.raw() == &f);
-    return !found;
-  });
-  return found;
-}
-
-bool is_self_at_same_point(const Expr& e, const FuncContents& f, const Definition& update,
-                           int value_index) {
-  const Call* call = e.as<Call>();
-  if (!call || call->call_type != CallType::Func || call->symbol.raw() != &f) return false;
-  if (call->value_index != value_index) return false;
-  for (size_t d = 0; d < update.args.size(); d++) {
-    if (!equal(call->args[d], update.args[d])) return false;
-  }
-  return true;
-}
-
-bool is_associative(Kind kind) {
-  return kind == Kind::Add || kind == Kind::Mul || kind == Kind::Min || kind == Kind::Max ||
-         kind == Kind::And || kind == Kind::Or;
-}
-
-bool is_associative(Op op) {
-  return op == Op::bitwise_and || op == Op::bitwise_or || op == Op::bitwise_xor;
-}
-
-bool accumulates(const Expr& a, const Expr& b, const FuncContents& f, const Definition& update,
-                 int i) {
-  return (is_self_at_same_point(a, f, update, i) && !calls_self(b, f)) ||
-         (is_self_at_same_point(b, f, update, i) && !calls_self(a, f));
-}
-
-bool is_accumulation(const Expr& value, const FuncContents& f, const Definition& update, int i) {
-  if (is_self_at_same_point(value, f, update, i)) return true;
-  if (const Sub* sub = value.as<Sub>())
-    return is_self_at_same_point(sub->a, f, update, i) && !calls_self(sub->b, f);
-  if (const Binary* binary = value.as<Binary>(); binary && is_associative(binary->kind)) {
-    return accumulates(binary->a, binary->b, f, update, i);
-  }
-  const Call* call = value.as<Call>();
-  if (call && call->call_type == CallType::Operator && is_associative(call->op)) {
-    return accumulates(call->args[0], call->args[1], f, update, i);
-  }
-  return false;
-}
-
 }  // namespace
 
 bool can_prove_race_free(const FuncContents& f, const Definition& update, const std::string& rvar) {
@@ -111,14 +61,8 @@ bool can_prove_race_free(const FuncContents& f, const Definition& update, const 
 }
 
 bool can_prove_commutative(const FuncContents& f, const Definition& update) {
-  for (const Expr& arg : update.args) {
-    if (calls_self(arg, f)) return false;
-  }
-  if (calls_self(update.predicate, f)) return false;
-  for (size_t i = 0; i < update.values.size(); i++) {
-    if (!is_accumulation(update.values[i], f, update, static_cast<int>(i))) return false;
-  }
-  return true;
+  const AssociativityProof proof = prove_associative(f, update);
+  return proof.op && proof.op->commutative && !proof.op->breaks_ties;
 }
 
 }  // namespace retrograde::ir

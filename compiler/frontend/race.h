@@ -12,9 +12,9 @@ namespace retrograde::ir {
 // Func by itself has that very coordinate. Then they may run at the same time. False means unknown.
 bool can_prove_race_free(const FuncContents& f, const Definition& update, const std::string& rvar);
 
-// Whether all points of the update commute: each value is `f(same point) op e`, with one
-// associative and commutative op and e free of f. Floats count: their sums change by rounding only.
-// False means unknown.
+// Whether all points of the update commute: it is f(same point) op e with an operator that is
+// proven associative and commutative, for ties too. Floats count: their sums change by rounding
+// only. False means unknown.
 bool can_prove_commutative(const FuncContents& f, const Definition& update);
 
 }  // namespace retrograde::ir

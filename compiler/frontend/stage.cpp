@@ -92,6 +92,39 @@ void check_tail(TailStrategy tail, bool is_update, bool is_reduction, const std:
   }
 }
 
+// The variable that makes a loop's iterations depend on each other; empty when none does.
+std::string dependent_root(const ir::FuncContents& f, const ir::Definition& definition,
+                           const ir::StageSchedule& schedule, const std::string& loop) {
+  for (const std::string& root : reduction_roots(definition, schedule, loop)) {
+    if (!ir::can_prove_race_free(f, definition, root)) return root;
+  }
+  return "";
+}
+
+// Reduction loops keep their order, unless it does not matter: the update is proven to commute. A
+// loop whose iterations touch different elements may go anywhere.
+void check_reduction_order(const ir::FuncContents& f, const ir::Definition& definition,
+                           const ir::StageSchedule& now, const std::vector<ir::Dim>& dims,
+                           const std::string& asked) {
+  const auto dependent_loops = [&](const std::vector<ir::Dim>& all) {
+    std::vector<std::string> order;
+    for (const ir::Dim& dim : all) {
+      if (dim.is_reduction && !dependent_root(f, definition, now, dim.var).empty())
+        order.push_back(dim.var);
+    }
+    return order;
+  };
+  const std::vector<std::string> before = dependent_loops(now.dims), after = dependent_loops(dims);
+  if (before == after || ir::can_prove_commutative(f, definition)) return;
+  size_t i = 0;
+  while (before[i] == after[i]) i++;
+  user_error(asked, "the order of reduction loops may change only where it changes no result",
+             text("the update of ", quoted(f.name), " over ",
+                  quoted(dependent_root(f, definition, now, after[i])),
+                  " is neither an accumulation nor independent from point to point"),
+             "Keep the reduction loops in their order; pure loops may go anywhere");
+}
+
 std::string names_of(const std::vector<VarOrRVar>& vars) {
   std::string out;
   for (const VarOrRVar& var : vars) out += (out.empty() ? "" : ", ") + quoted(var.name());
@@ -214,15 +247,21 @@ Stage& Stage::split(const VarOrRVar& old, const VarOrRVar& outer, const VarOrRVa
 Stage& Stage::fuse(const VarOrRVar& inner, const VarOrRVar& outer, const VarOrRVar& fused) {
   const std::string asked =
       text("fuse ", quoted(inner.name()), " and ", quoted(outer.name()), " of ", quoted(name()));
-  // 1. Both loops exist and differ. 2. The fused name is new. 3. They are neighbours. 4. Both of
-  // one kind.
-  const size_t inner_at = loop_index(inner, asked), outer_at = loop_index(outer, asked);
+  // 1. Both loops exist and differ. 2. The fused name is new. 3. The outer loop may stand directly
+  // around the inner one.
+  size_t inner_at = loop_index(inner, asked), outer_at = loop_index(outer, asked);
   if (inner_at == outer_at)
     user_error(asked, "it takes two loops", "both are " + quoted(inner.name()));
   if (fused.name() != outer.name()) check_new_name(fused, inner.name(), asked);
   if (outer_at != inner_at + 1) {
-    user_error(asked, "the outer loop must be directly around the inner one", loops_of(schedule()),
-               "Reorder the loops first");
+    std::vector<ir::Dim> dims = schedule().dims;
+    const ir::Dim moved = dims[outer_at];
+    dims.erase(dims.begin() + outer_at);
+    if (outer_at < inner_at) inner_at--;
+    outer_at = inner_at + 1;
+    dims.insert(dims.begin() + outer_at, moved);
+    check_reduction_order(*func_, definition(), schedule(), dims, asked);
+    touch().dims = std::move(dims);
   }
   ir::StageSchedule& schedule = touch();
   const ir::Dim inner_dim = schedule.dims[inner_at], outer_dim = schedule.dims[outer_at];
@@ -272,25 +311,7 @@ Stage& Stage::reorder(const std::vector<VarOrRVar>& vars) {
   std::vector<ir::Dim> dims = schedule().dims;
   for (size_t i = 0; i < sorted.size(); i++) dims[sorted[i]] = schedule().dims[places[i]];
 
-  const auto reduction_order = [](const std::vector<ir::Dim>& all) {
-    std::vector<std::string> order;
-    for (const ir::Dim& dim : all) {
-      if (dim.is_reduction) order.push_back(dim.var);
-    }
-    return order;
-  };
-  if (reduction_order(dims) != reduction_order(schedule().dims) &&
-      !ir::can_prove_commutative(*func_, definition())) {
-    for (const VarOrRVar& var : vars) {
-      for (const std::string& root : reduction_roots(definition(), schedule(), var.name())) {
-        if (ir::can_prove_race_free(*func_, definition(), root)) continue;
-        user_error(asked, "the order of reduction loops may change only where it changes no result",
-                   text("the update of ", quoted(func_->name), " over ", quoted(root),
-                        " is neither an accumulation nor independent from point to point"),
-                   "Keep the reduction loops in their order; pure loops may go anywhere");
-      }
-    }
-  }
+  check_reduction_order(*func_, definition(), schedule(), dims, asked);
   touch().dims = std::move(dims);
   return *this;
 }

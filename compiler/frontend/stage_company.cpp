@@ -37,11 +37,11 @@ Stage& Stage::compute_with(const LoopLevel& level,
 }
 
 Stage& Stage::compute_with(const LoopLevel& level, LoopAlignStrategy align) {
-  std::vector<std::pair<VarOrRVar, LoopAlignStrategy>> all;
-  if (align != LoopAlignStrategy::Auto) {
-    for (const ir::Dim& dim : schedule().dims) all.emplace_back(VarOrRVar(dim.var, false), align);
-  }
-  return compute_with(level, all);
+  compute_with(level, std::vector<std::pair<VarOrRVar, LoopAlignStrategy>>{});
+  if (align == LoopAlignStrategy::Auto) return *this;
+  ir::StageSchedule& now = touch();
+  for (const ir::Dim& dim : now.dims) now.fuse_alignment[dim.var] = align;
+  return *this;
 }
 
 namespace {

@@ -178,6 +178,11 @@ class Interpreter::Impl {
   }
 
   std::unique_ptr<FuncState> make_state(const FuncContents& func) const {
+    if (func.is_extern()) {
+      unsupported("interpret " + quoted(func.name), "a Func is evaluated by its definitions",
+                  "the C function " + quoted(func.extern_definition->function) + " computes it",
+                  "Interpret a Func that does not depend on it");
+    }
     auto state = std::make_unique<FuncState>();
     state->func = &func;
     for (int s = 0; s < func.stage_count(); ++s) {

@@ -492,8 +492,14 @@ TEST(ScheduleErrors, FuseOfLoopsThatAreNotNeighbours) {
   Var x("x"), y("y"), z("z"), t("t");
   Func g;
   g(x, y, z) = x;
-  expect_compile_error([&] { g.fuse(x, z, t); }, {"directly around"});
   expect_compile_error([&] { g.fuse(x, x, t); }, {"two loops"});
+  g.fuse(x, z, t);
+  EXPECT_EQ(g.get_schedule().dims[0].var, "t");
+  EXPECT_EQ(g.get_schedule().dims[1].var, "y");
+  RDom r(0, 4, 0, 4, 0, 4);
+  g(x, y, z) = g(x, y, z) * 2 + r.x + r.y + r.z;
+  expect_compile_error([&] { g.update().fuse(r.x, r.z, RVar("rt")); },
+                       {"fuse", "order of reduction loops"});
 }
 
 TEST(ScheduleErrors, TileWithListsOfDifferentLengths) {

@@ -363,6 +363,37 @@ TEST_F(Directives, FuncsKnowWhereTheyWereDeclared) {
   EXPECT_NE(here.source_location().find("schedule_directives_test.cpp:"), std::string::npos);
 }
 
+TEST_F(Directives, ExternStagesHaveNoExpressions) {
+  Func h("h");
+  h.define_extern("compute_it", {}, Int(32), 1);
+  expect_refused([&] { h.value(); }, {"compute_it"});
+  expect_refused([&] { h(x) += 1; }, {"no updates", "compute_it"});
+  expect_refused([&] { h.parallel(x); }, {"no loops"});
+}
+
+// ---- orders of reductions ----
+
+TEST_F(Directives, ReductionLoopsThatCommuteMayBeReordered) {
+  Func h("h"), m("m");
+  h(x) = Tuple(Expr(1), Expr(0));
+  h(x) = Tuple(h(x)[0] * r.x - h(x)[1] * r.y, h(x)[0] * r.y + h(x)[1] * r.x);
+  h.update().reorder(r.y, r.x);
+  m(x) = Tuple(Expr(1), Expr(0));
+  const Expr better = r.x * r.y < m(x)[0];
+  m(x) = Tuple(select(better, r.x * r.y, m(x)[0]), select(better, r.x, m(x)[1]));
+  expect_refused([&] { m.update().reorder(r.y, r.x); }, {"changes no result"});
+}
+
+TEST_F(Directives, IndependentReductionLoopsGoAnywhere) {
+  Func h("h");
+  h(x) = 0;
+  h(r.y) = h(r.y) * 2 + r.x;
+  h.update().reorder(r.y, r.x);
+  h.compute_root();
+  const Buffer<int> result = h.realize({8});
+  for (int i = 0; i < 8; i++) EXPECT_EQ(result(i), 247);
+}
+
 // ---- splits of updates ----
 
 TEST_F(Directives, TailsOfUpdatesRunNoPointTwice) {
