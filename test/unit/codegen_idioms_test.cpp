@@ -1,0 +1,128 @@
+// What machine code looks like where its speed depends on it: shuffles instead of gathers,
+// accumulators in registers. Each test compiles for AVX2 or AVX-512, whatever it runs on, and looks
+// at the assembly; what the code computes is tested elsewhere.
+#include <gtest/gtest.h>
+
+#include <retrograde/retrograde.h>
+#include <algorithm>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "codegen/codegen.h"
+#include "lower/lower.h"
+
+namespace retrograde {
+namespace {
+
+std::vector<std::string> assembly(const Func& f, const std::string& target) {
+  const std::vector<ir::FuncPtr> outputs{f.function()};
+  ir::LowerOptions lowering;
+  lowering.target = Target(target);
+  codegen::Options options;
+  options.target = Target(target);
+  options.tune_for_host = false;
+  const ir::LoweredFunction lowered =
+      ir::lower("f", outputs, ir::infer_arguments(outputs), lowering);
+  std::istringstream text(codegen::compile_assembly(lowered, options));
+  std::vector<std::string> lines;
+  for (std::string line; std::getline(text, line);) lines.push_back(line);
+  return lines;
+}
+
+size_t count(const std::vector<std::string>& lines, const std::string& what) {
+  return static_cast<size_t>(std::count_if(lines.begin(), lines.end(), [&](const std::string& s) {
+    return s.find(what) != std::string::npos;
+  }));
+}
+
+// The lines between labels with the most of `what`: the hottest block.
+std::vector<std::string> block_with_most(const std::vector<std::string>& lines,
+                                         const std::string& what) {
+  std::vector<std::string> best, block;
+  for (const std::string& line : lines) {
+    if (!line.empty() && line[0] != '\t' && line[0] != ' ') block.clear();
+    block.push_back(line);
+    if (count(block, what) > count(best, what)) best = block;
+  }
+  return best;
+}
+
+const char* const avx2 = "x86-64-linux-sse41-avx-avx2-f16c-fma";
+const char* const avx512 = "x86-64-linux-sse41-avx-avx2-f16c-fma-avx512-avx512_skylake";
+
+TEST(CodegenIdioms, NeighbouringStridedLoadsAreShuffles) {
+  ImageParam in(Float(32), 1, "in");
+  Var x("x");
+  Func f("f");
+  f(x) = in(2 * x) * 0.5f + in(2 * x + 1) * 0.25f;
+  f.vectorize(x, 8);
+  const auto code = assembly(f, avx2);
+  EXPECT_EQ(count(code, "gather"), 0u);
+  EXPECT_EQ(count(code, "vinsertps"), 0u);
+  EXPECT_GE(count(code, "vshufps"), 2u);
+}
+
+TEST(CodegenIdioms, AlternatingArmsAreInterleaved) {
+  ImageParam a(Float(32), 1, "a"), b(Float(32), 1, "b");
+  Var x("x");
+  Func f("f");
+  f(x) = select(x % 2 == 0, Expr(a(x / 2)), Expr(b(x / 2)));
+  f.vectorize(x, 32);
+  const auto code = assembly(f, avx512);
+  EXPECT_EQ(count(code, "gather"), 0u);
+  EXPECT_GE(count(code, "vperm") + count(code, "vunpck"), 2u);
+}
+
+TEST(CodegenIdioms, UnrolledChannelsAreStoredTogether) {
+  ImageParam a(UInt(8), 2, "a");
+  Var x("x"), c("c");
+  Func f("f");
+  f(c, x) = a(x, c);
+  f.bound(c, 0, 4).unroll(c).vectorize(x, 16);
+  f.output_buffer().dim(1).set_stride(4);
+  const auto code = assembly(f, avx2);
+  EXPECT_EQ(count(code, "vpextrb"), 0u);
+  EXPECT_GE(count(code, "vpunpck"), 4u);
+}
+
+TEST(CodegenIdioms, BlocksAreTransposedInRegisters) {
+  ImageParam in(Float(32), 2, "in");
+  in.dim(1).set_stride(64);
+  Var x("x"), y("y"), xi("xi"), yi("yi");
+  Func f("f");
+  f(x, y) = in(y, x);
+  f.tile(x, y, xi, yi, 8, 8).vectorize(xi).unroll(yi);
+  const auto code = assembly(f, avx2);
+  EXPECT_EQ(count(code, "vinsertps"), 0u);
+  EXPECT_EQ(count(code, "gather"), 0u);
+}
+
+TEST(CodegenIdioms, AccumulatorsOfAMatrixProductStayInRegisters) {
+  ImageParam a(Float(32), 2, "a"), b(Float(32), 2, "b");
+  Var x("x"), y("y"), xi("xi"), yi("yi");
+  RDom k(0, 64, "k");
+  Func product("product"), f("f");
+  product(x, y) = 0.0f;
+  product(x, y) += a(k, y) * b(x, k);
+  f(x, y) = product(x, y);
+  f.bound(x, 0, 64).bound(y, 0, 64).tile(x, y, xi, yi, 16, 4).vectorize(xi, 8).unroll(xi);
+  f.unroll(yi);
+  product.compute_at(f, x).vectorize(x, 8).unroll(x).unroll(y);
+  product.update().reorder(x, y, k).vectorize(x, 8).unroll(x).unroll(y);
+  const auto inner = block_with_most(assembly(f, avx2), "vfmadd");
+  EXPECT_EQ(count(inner, "vfmadd"), 8u);
+  EXPECT_EQ(count(inner, "(%rsp"), 0u) << "a spilled accumulator";
+}
+
+TEST(CodegenIdioms, BordersOfBytesAreCompact) {
+  ImageParam in(UInt(8), 1, "in");
+  Var x("x");
+  Func f("f"), edge = BoundaryConditions::repeat_edge(in);
+  f(x) = edge(x - 1) / 2 + edge(x + 1) / 2;
+  f.vectorize(x, 32);
+  EXPECT_EQ(count(assembly(f, avx2), "vpinsrb"), 0u);
+}
+
+}  // namespace
+}  // namespace retrograde
