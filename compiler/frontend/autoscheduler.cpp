@@ -59,7 +59,10 @@ std::string MachineParams::to_string() const {
 
 void add_autoscheduler(const std::string& name, const AutoSchedulerFn& scheduler) {
   std::lock_guard lock(loaded().mutex);
-  loaded().by_name[name] = scheduler;
+  if (scheduler)
+    loaded().by_name[name] = scheduler;
+  else
+    loaded().by_name.erase(name);
 }
 
 std::vector<std::string> autoscheduler_names() {

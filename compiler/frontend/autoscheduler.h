@@ -40,6 +40,7 @@ using AutoSchedulerFn =
     std::function<void(const Pipeline& pipeline, const Target& target, const MachineParams& machine,
                        AutoSchedulerResults* results)>;
 
+// A null function takes the name away.
 void add_autoscheduler(const std::string& name, const AutoSchedulerFn& scheduler);
 // Names of all that are loaded.
 std::vector<std::string> autoscheduler_names();

@@ -175,6 +175,23 @@ TEST(GeneratorErrors, GradientsAreOfFloats) {
   EXPECT_SAYS(message_of([&] { whole->build_gradient_module(); }), "holds uint8");
 }
 
+TEST(GeneratorErrors, RequirementsAreConditionsOnParameters) {
+  Var x("x");
+  Func f("f"), g("g");
+  f(x) = x;
+  g(x) = f(x) + 1;
+  Pipeline pipeline(g);
+  EXPECT_SAYS(message_of([&] { pipeline.add_requirement(x > 3, "x"); }), "uses the Var \"x\"");
+  EXPECT_SAYS(message_of([&] { pipeline.add_requirement(f(0) > 3, "f"); }), "it reads \"f");
+  Param<int> p("p");
+  try {
+    pipeline.add_requirement(p + 1, "p");
+    FAIL();
+  } catch (const CompileError& error) {
+    EXPECT_SAYS(std::string(error.what()), "it is a condition; it is of type int32");
+  }
+}
+
 // ---- the program ----
 
 struct Outcome {

@@ -261,6 +261,25 @@ TEST(Generator, GradientModuleHasHalidesArguments) {
   EXPECT_FALSE(square->scheduled);
 }
 
+TEST(Generator, AutoScheduleRunsTheSchedulerItNames) {
+  std::vector<std::string> scheduled;
+  Pipeline::add_autoscheduler(
+      "ByRows", [&](const Pipeline& pipeline, const Target&, const MachineParams& machine,
+                    AutoSchedulerResults* results) {
+        for (Func& output : pipeline.outputs()) scheduled.push_back(output.name());
+        results->schedule_source = "rows";
+        EXPECT_EQ(machine.parallelism, 2);
+      });
+  const GeneratorContext context(Target("x86-64-linux"));
+  auto sum = context.create<Sum>();
+  sum->set_generator_param_values(
+      {{"auto_schedule", "ByRows"}, {"machine_params", "2,1000000,20"}});
+  EXPECT_TRUE(sum->using_autoscheduler());
+  sum->build_module("sum");
+  EXPECT_EQ(scheduled.size(), 2u);
+  Pipeline::add_autoscheduler("ByRows", nullptr);
+}
+
 class Guarded : public Generator<Guarded> {
  public:
   Input<Buffer<float, 1>> in{"in"};
