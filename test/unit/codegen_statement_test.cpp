@@ -349,7 +349,8 @@ TEST(CodegenStatement, PrintsGoToTheHandler) {
   Array out(Int(32), 3);
   ASSERT_EQ(run(f, {out.raw()}, host), 0);
   EXPECT_EQ(host.printed,
-            "0 100% of 0.1 2.5 false 200\n2 100% of 0.1 2.5 true 200\n2 rare\n4 100% of 0.1 2.5 "
+            "0 100% of 0.100000 2.500000e+00 false 200\n2 100% of 0.100000 2.500000e+00 true 200\n"
+            "2 rare\n4 100% of 0.100000 2.500000e+00 "
             "false 200\n");
   EXPECT_EQ(out.data<int32_t>()[2], 4);
   EXPECT_EQ(call(f, {&out}), 0) << "no handler, no output";
