@@ -128,6 +128,13 @@ std::vector<Expr> bytes_of(const std::string& text) {
 }
 
 void check_schedule(const LoopedFunc& f) {
+  for (const StorageRule& rule : f.schedule.storage_rules) {
+    if (!rule.alignment.defined() && !rule.bound.defined()) continue;
+    unsupported("memoize " + quoted(f.name()),
+                "the storage of a memoized Func has the extents that are computed",
+                "align_storage or bound_storage of " + quoted(rule.var) + " makes it larger",
+                "Leave out that directive, or memoize");
+  }
   const LoopLevel &compute = f.schedule.compute_level, &store = f.schedule.store_level;
   const bool together =
       store.kind == LoopLevel::Kind::Inlined ||

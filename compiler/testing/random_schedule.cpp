@@ -439,8 +439,9 @@ class Scheduler {
     const auto add = [&](Rule kind, int a, int b = 0) {
       spec.rules.push_back({kind, random_dimension(f), a, b});
     };
-    if (random_.chance(12)) add(Rule::AlignStorage, random_.pick(std::vector<int>{2, 4, 16, 5}));
-    if (random_.chance(4)) add(Rule::BoundStorage, ample_storage);
+    if (!spec.memoized && random_.chance(12))
+      add(Rule::AlignStorage, random_.pick(std::vector<int>{2, 4, 16, 5}));
+    if (!spec.memoized && random_.chance(4)) add(Rule::BoundStorage, ample_storage);
     if (stored_outside && random_.chance(20)) {
       add(Rule::FoldStorage, random_.pick(std::vector<int>{64, 128, 256}), 1);
     }

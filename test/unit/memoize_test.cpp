@@ -241,5 +241,27 @@ TEST_F(Memoize, AnOutputCannotBeMemoized) {
   EXPECT_NE(error_of(f).find("an output is computed by every call"), std::string::npos);
 }
 
+// Its entry would be found again for a larger region that needs the same storage.
+TEST(MemoizeErrors, StorageLargerThanWhatIsComputed) {
+  for (const bool aligned : {true, false}) {
+    Var x("x");
+    Func f("f"), g("g");
+    f(x) = x * 2;
+    g(x) = f(x) + 1;
+    f.compute_root().memoize();
+    if (aligned) {
+      f.align_storage(x, 16);
+    } else {
+      f.bound_storage(x, 64);
+    }
+    try {
+      g.realize({10});
+      FAIL() << "nothing was thrown";
+    } catch (const Unsupported& error) {
+      EXPECT_NE(std::string(error.what()).find("makes it larger"), std::string::npos);
+    }
+  }
+}
+
 }  // namespace
 }  // namespace retrograde
