@@ -90,7 +90,8 @@ class LeafFinder {
     const Expr offset = outer.value() * factor + inner.value();
     const auto extent = ir::as_const_int(leaf.extent), step = ir::as_const_int(factor);
     const bool divides = extent && step && *extent % *step == 0;
-    if (!divides) leaves_.tails.push_back(offset < leaf.extent);
+    // Where the outer variable becomes a pure one its schedule may run it past both ends.
+    if (!divides) leaves_.tails.push_back(offset >= 0 && offset < leaf.extent);
     // The tail's condition holds wherever the variable is used.
     const Expr inside =
         divides ? offset

@@ -14,4 +14,11 @@ size_t hash(const Expr& e);
 struct StructuralLess {
   bool operator()(const Expr& a, const Expr& b) const { return compare(a, b) < 0; }
 };
+// For unordered containers keyed by value.
+struct StructuralHash {
+  size_t operator()(const Expr& e) const { return hash(e); }
+};
+struct StructuralEqual {
+  bool operator()(const Expr& a, const Expr& b) const { return equal(a, b); }
+};
 }  // namespace retrograde::ir

@@ -6,6 +6,7 @@
 
 #include "diagnostics/error.h"
 #include "ir/build.h"
+#include "ir/equal.h"
 #include "ir/print.h"
 #include "ir/visit.h"
 
@@ -119,7 +120,8 @@ class Validator {
   const Phase phase_;
   const std::string pass_;
   std::unordered_set<std::string> visible_, bound_;
-  std::unordered_set<const ExprNode*> checked_, lets_;
+  std::unordered_set<const ExprNode*> checked_;
+  std::unordered_set<Expr, StructuralHash, StructuralEqual> lets_;
   std::unordered_set<std::string> allocated_,
       live_;  // names of all allocations so far; those alive here
 };
@@ -139,7 +141,7 @@ void Validator::check_node(const Expr& e) {
           fail(e, "every variable is bound before use: " + quoted(n.name) + " is not");
       },
       [&](const Let& n) {
-        if (!lets_.insert(e.get()).second) return;  // a shared node binds its name once
+        if (!lets_.insert(e).second) return;  // equal nodes bind their name once
         check(n.value);
         const Binding binding(*this, n.name, e);
         check(n.body);

@@ -4,6 +4,7 @@
 #include "diagnostics/error.h"
 #include "diagnostics/large_stack.h"
 #include "ir/build.h"
+#include "ir/print.h"
 #include "ir/visit.h"
 #include "lower/build_loop_nests.h"
 #include "lower/inline_functions.h"
@@ -33,6 +34,18 @@ std::string user_name(const std::string& loop) {
   return dot == std::string::npos ? loop : loop.substr(dot + 1);
 }
 
+bool is_over_parameters(const Expr& condition) {
+  bool result = true, any = false;
+  walk(condition, [&](const Expr& e) {
+    const Variable* v = e.as<Variable>();
+    if (!v) return true;
+    any = true;
+    result &= dynamic_cast<const ParameterContents*>(v->symbol.raw()) != nullptr;
+    return true;
+  });
+  return any && result;
+}
+
 class LoopNestPrinter {
  public:
   explicit LoopNestPrinter(const Program& program) : program_(program) {}
@@ -58,6 +71,19 @@ class LoopNestPrinter {
     visit(s);
     depth_--;
   }
+  // Conditions of specialize are shown; those of tails and of where() belong to the body.
+  void visit_branch(const IfThenElse& branch) {
+    if (!is_over_parameters(branch.condition)) {
+      visit(branch.then_case);
+      if (branch.else_case.defined()) visit(branch.else_case);
+      return;
+    }
+    line() << "if " << branch.condition << ":\n";
+    nested(branch.then_case);
+    if (!branch.else_case.defined()) return;
+    line() << "else:\n";
+    nested(branch.else_case);
+  }
   void visit(const Stmt& s) {
     match(
         s,
@@ -77,6 +103,10 @@ class LoopNestPrinter {
           if (!is_stored_further_out(r.name)) return visit(r.body);
           line() << "store " << r.name << ":\n";
           nested(r.body);
+        },
+        [&](const IfThenElse& branch) { visit_branch(branch); },
+        [&](const Assert& a) {
+          if (is_const_false(a.condition)) line() << "fail\n";
         },
         [&](const StmtNode&) {
           for_each_child(

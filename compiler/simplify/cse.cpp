@@ -13,13 +13,6 @@ namespace retrograde::ir {
 
 namespace {
 
-struct StructuralHash {
-  size_t operator()(const Expr& e) const { return hash(e); }
-};
-struct StructuralEqual {
-  bool operator()(const Expr& a, const Expr& b) const { return equal(a, b); }
-};
-
 // Makes structurally equal nodes identical. Children are unique before their parent is looked up,
 // so that each comparison stops one level down.
 class HashCons : public Rewriter {
@@ -34,9 +27,9 @@ class HashCons : public Rewriter {
 // Reporting an error is no value, and undef is any value.
 bool must_stay(const Expr& e) {
   const auto* call = e.as<Call>();
-  return call && (call->is_op(Op::error) || call->is_op(Op::runtime_call) ||
-                  call->is_op(Op::undef) || call->is_op(Op::address_of) ||
-                  call->is_op(Op::pack) || call->is_op(Op::trace));
+  return call &&
+         (call->is_op(Op::error) || call->is_op(Op::runtime_call) || call->is_op(Op::undef) ||
+          call->is_op(Op::address_of) || call->is_op(Op::pack) || call->is_op(Op::trace));
 }
 
 // Cheaper to repeat than to name: leaves, and what costs no instruction on a leaf.

@@ -94,6 +94,25 @@ TEST_F(Rfactor, SplitsWithTails) {
   }
 }
 
+// The variables behind the tail's condition are promised to lie in their domain: at points of the
+// pure variable that no iteration had, nothing may be read or written.
+TEST_F(Rfactor, ThePreservedLoopMayRunPastItsEnds) {
+  expect_same(
+      [&](bool scheduled) {
+        Func f("f");
+        RDom r(0, 4);
+        f(x) = 1;
+        f(r) += 1;
+        if (scheduled) {
+          f.update().split(r, rxo, rxi, 3);
+          Func partial = f.update().rfactor(rxo, u);
+          partial.compute_root().align_bounds(u, 5, 2);
+        }
+        return f;
+      },
+      {6});
+}
+
 TEST_F(Rfactor, TwiceMakesATree) {
   expect_same(
       [&](bool scheduled) {

@@ -1,0 +1,227 @@
+// docs/scheduling.md is written here: every directive with the code that gives it, and the loops
+// before and after as the compiler prints them. So the page cannot say what the compiler does not
+// do. RETROGRADE_UPDATE_GOLDEN=1 writes the page; read the difference before you commit it.
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <fstream>
+#include <functional>
+#include <iterator>
+#include <regex>
+#include <sstream>
+
+#include "frontend/func.h"
+#include "ir/print.h"
+#include "lower/lower.h"
+#include "retrograde/retrograde.h"
+
+namespace retrograde {
+namespace {
+
+enum class View {
+  Loops,    // what Func::print_loop_nest shows
+  Storage,  // the statement in which storage has its layout
+};
+
+struct Directive {
+  const char* name;
+  const char* meaning;
+  View view;
+  const char *algorithm, *schedule;  // as C++
+  std::function<void(std::vector<Func>&, bool is_scheduled)> build;
+};
+
+#define PLAIN(...) __VA_ARGS__
+#define AS_TEXT(...) #__VA_ARGS__
+// The algorithm defines the Funcs and adds the outputs to `outputs`; both parts in parentheses.
+#define DIRECTIVE(name, meaning, view, algorithm, schedule)                           \
+  {                                                                                   \
+    name, meaning, View::view, AS_TEXT algorithm, AS_TEXT schedule,                   \
+        [](std::vector<Func>&outputs, bool is_scheduled) {                            \
+          Var x("x"), y("y"), xo("xo"), yo("yo"), xi("xi"), yi("yi"), t("t"), u("u"); \
+          PLAIN algorithm;                                                            \
+          if (is_scheduled) {                                                         \
+            PLAIN schedule;                                                           \
+          }                                                                           \
+          outputs = {f};                                                              \
+        }                                                                             \
+  }
+
+#define ONE_FUNC (Func f("f"); f(x, y) = x + y)
+#define TWO_FUNCS (Func f("f"), g("g"); g(x, y) = x * y; f(x, y) = g(x, y) + g(x, y + 1))
+#define SUM (Func f("f"), g("g"); RDom r(0, 64, "r"); g(x) = x * x; f() = 0; f() += g(r))
+
+const std::vector<Directive>& loop_directives() {
+  static const std::vector<Directive> directives = {
+    DIRECTIVE("split",
+              "One loop becomes two. The tail strategy says what happens where the factor does not "
+              "divide the extent.",
+              Loops, ONE_FUNC, (f.split(x, xo, xi, 8))),
+    DIRECTIVE("fuse", "Two loops become one.", Loops, ONE_FUNC, (f.fuse(x, y, t))),
+    DIRECTIVE("rename", "A loop gets another name.", Loops, ONE_FUNC, (f.rename(x, t))),
+    DIRECTIVE("reorder", "Loops change places; innermost first.", Loops, ONE_FUNC,
+              (f.reorder(y, x))),
+    DIRECTIVE("tile", "Two splits and a reorder.", Loops, ONE_FUNC,
+              (f.tile(x, y, xo, yo, xi, yi, 8, 4))),
+    DIRECTIVE("parallel", "Iterations are shared out to threads; with a task size, blocks of them.",
+              Loops, ONE_FUNC, (f.parallel(y, 4))),
+    DIRECTIVE("vectorize", "The iterations of a loop of constant extent become lanes.", Loops,
+              ONE_FUNC, (f.vectorize(x, 8))),
+    DIRECTIVE("unroll", "The iterations of a loop of constant extent become a sequence.", Loops,
+              ONE_FUNC, (f.unroll(x, 2))),
+    DIRECTIVE("specialize", "Another schedule where a condition over parameters holds.", Loops,
+              (Func f("f"); Param<bool> wide("wide"); f(x, y) = x + y),
+              (f.specialize(wide).vectorize(x, 8))),
+    DIRECTIVE("specialize_fail", "None of the conditions held: the call fails with a message.",
+              Loops, (Func f("f"); Param<bool> wide("wide"); f(x, y) = x + y),
+              (f.specialize(wide).vectorize(x, 8); f.specialize_fail("f wants wide images"))),
+    DIRECTIVE("atomic",
+              "Updates of one element are indivisible, so that a reduction may run in parallel or "
+              "in lanes.",
+              Loops, SUM, (f.update().atomic().vectorize(r, 8))),
+    DIRECTIVE("rfactor",
+              "An associative update is cut in two; the first half reduces separately for each "
+              "value of a new pure variable.",
+              Loops,
+              (Func f("f"), g("g"); RDom r(0, 64, 0, 64, "r"); g(x, y) = x * y; f() = 0;
+               f() += g(r.x, r.y)),
+              (f.update().rfactor(r.y, u).compute_root().update().parallel(u))),
+  };
+  return directives;
+}
+
+const std::vector<Directive>& place_directives() {
+  static const std::vector<Directive> directives = {
+    DIRECTIVE("compute_root", "All of it before anything that uses it.", Loops, TWO_FUNCS,
+              (g.compute_root())),
+    DIRECTIVE("compute_at", "What one iteration of a loop needs, inside that loop.", Loops,
+              TWO_FUNCS, (g.compute_at(f, y))),
+    DIRECTIVE("store_root, store_at",
+              "Storage outside of the loop at which it is computed: each iteration computes only "
+              "what is new, and storage is folded to what is alive.",
+              Loops, TWO_FUNCS, (g.store_root().compute_at(f, y))),
+    DIRECTIVE("in", "A Func between another and its users, to be scheduled on its own.", Loops,
+              TWO_FUNCS, (g.compute_root(); g.in(f).compute_at(f, y))),
+    DIRECTIVE("clone_in", "A copy of a Func for some of its users.", Loops, TWO_FUNCS,
+              (g.clone_in(f).compute_root())),
+    DIRECTIVE("bound", "A promise of what is computed; a call that needs more fails.", Loops,
+              ONE_FUNC, (f.bound(x, 0, 64))),
+    DIRECTIVE("align_bounds", "Computes more, so that the min and the extent are multiples.", Loops,
+              TWO_FUNCS, (g.compute_at(f, y).align_bounds(x, 8).vectorize(x, 8))),
+  };
+  return directives;
+}
+
+const std::vector<Directive>& storage_directives() {
+  static const std::vector<Directive> directives = {
+    DIRECTIVE("reorder_storage", "Another dimension innermost in memory.", Storage,
+              (Func f("f"), g("g"); g(x, y) = x * y; g.compute_root(); f(x, y) = g(x, y)),
+              (g.reorder_storage(y, x))),
+    DIRECTIVE("align_storage", "The extent in memory grows to a multiple.", Storage,
+              (Func f("f"), g("g"); g(x, y) = x * y; g.compute_root(); f(x, y) = g(x, y)),
+              (g.align_storage(x, 16))),
+    DIRECTIVE("fold_storage", "Coordinates are taken modulo an extent.", Storage,
+              (Func f("f"), g("g"); g(x, y) = x * y; g.store_root().compute_at(f, y);
+               f(x, y) = g(x, y) + g(x, y + 1)),
+              (g.fold_storage(y, 4))),
+    DIRECTIVE("store_in", "The kind of memory.", Storage,
+              (Func f("f"), g("g"); g(x, y) = x * y; g.compute_at(f, y).bound_extent(x, 64);
+               f(x, y) = g(x, y)),
+              (g.store_in(MemoryType::Stack))),
+    DIRECTIVE("prefetch", "What a later iteration reads is fetched into the cache.", Storage,
+              (Func f("f"), g("g"); g(x, y) = x * y; g.compute_root(); f(x, y) = g(x, y)),
+              (f.prefetch(g, y, y, 2))),
+  };
+  return directives;
+}
+
+std::string replaced(const std::string& text, const char* pattern, const char* by) {
+  return std::regex_replace(text, std::regex(pattern), by);
+}
+
+// "a; b" on two lines, without the blanks that stringification leaves.
+std::string as_code(const char* text) {
+  return replaced(replaced(text, ";\\s*$", ""), ";\\s*", ";\n") + ";\n";
+}
+
+std::string statement_text(const std::vector<Func>& outputs) {
+  std::vector<ir::FuncPtr> funcs;
+  for (const Func& f : outputs) funcs.push_back(f.function());
+  std::string result;
+  ir::LowerOptions options;
+  options.stop_after = "simplify_storage";
+  options.target = get_host_target();
+  ir::LoweredFunction lowered = ir::lower("f", funcs, ir::infer_arguments(funcs), options);
+  return ir::print(lowered.body);
+}
+
+// The first allocation with its body: what is around it are checks of the arguments, the same for
+// every pipeline.
+std::string first_allocation(const std::string& text) {
+  std::istringstream lines(text);
+  std::string result, line;
+  size_t indent = std::string::npos;
+  while (std::getline(lines, line)) {
+    const size_t first = line.find_first_not_of(' ');
+    if (indent == std::string::npos && line.find("allocate") == first) indent = first;
+    if (indent == std::string::npos) continue;
+    if (first < indent) break;
+    result += line.substr(indent) + "\n";
+  }
+  return result;
+}
+
+std::string view_of(const Directive& directive, bool is_scheduled) {
+  std::vector<Func> outputs;
+  directive.build(outputs, is_scheduled);
+  const std::string text = directive.view == View::Loops
+                               ? Pipeline(outputs).loop_nest()
+                               : first_allocation(statement_text(outputs));
+  return replaced(text, "\\$\\d+", "");  // names count up within a process
+}
+
+std::string section(const Directive& d) {
+  std::ostringstream out;
+  out << "### " << d.name << "\n\n"
+      << d.meaning << "\n\n```c++\n"
+      << as_code(d.algorithm) << "// " << d.name << "\n"
+      << as_code(d.schedule) << "```\n\n"
+      << "Before:\n```text\n"
+      << view_of(d, false) << "```\nAfter:\n```text\n"
+      << view_of(d, true) << "```\n\n";
+  return out.str();
+}
+
+std::string page() {
+  std::string text =
+      "# Scheduling\n\n"
+      "A schedule says in which order and where the points of a Func are computed; it never "
+      "changes "
+      "what is\ncomputed. This page shows every directive by the loops before and after it, as "
+      "`print_loop_nest` gives\nthem, or by the statement with its storage. The headers "
+      "`frontend/stage.h` and `frontend/func.h` hold the\nrules. The page is written by "
+      "`test/golden/scheduling_page_test.cpp`: what it shows is what the compiler\ndoes.\n\n";
+  const std::pair<const char*, const std::vector<Directive>*> chapters[] = {
+      {"Loops of one stage", &loop_directives()},
+      {"Where a Func is computed", &place_directives()},
+      {"How it is stored", &storage_directives()}};
+  for (const auto& [title, directives] : chapters) {
+    text += std::string("## ") + title + "\n\n";
+    for (const Directive& d : *directives) text += section(d);
+  }
+  return text;
+}
+
+TEST(SchedulingPage, ShowsWhatTheCompilerDoes) {
+  const std::string file = RETROGRADE_TEST_DIR "/../docs/scheduling.md";
+  const std::string text = page();
+  if (std::getenv("RETROGRADE_UPDATE_GOLDEN")) {
+    std::ofstream(file) << text;
+    return;
+  }
+  std::ifstream in(file);
+  EXPECT_EQ(text, std::string(std::istreambuf_iterator<char>(in), {}));
+}
+
+}  // namespace
+}  // namespace retrograde
