@@ -428,7 +428,8 @@ class AsyncForker : public Rewriter {
         },
         [&](const Realize& n) {
           Stmt body = without_producer(n.body, func, loops, room);
-          return body.defined() ? make_realize(n.name, n.types, n.memory, n.bounds, body) : body;
+          if (!body.defined() || !uses_func(body, n.name)) return body;
+          return make_realize(n.name, n.types, n.memory, n.bounds, body);
         },
         [&](const StmtNode&) { return s; });
   }

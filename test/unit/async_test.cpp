@@ -152,6 +152,24 @@ TEST_P(Async, AChainOfThreeAsyncFuncs) {
   }
 }
 
+// The storage of f lies in the loops that both branches keep; only the branch of g needs it.
+TEST_P(Async, StorageThatOnlyTheProducerNeedsIsAllocatedThereAlone) {
+  Var x("x"), y("y"), xo("xo"), xi("xi");
+  Func f("f"), g("g"), out("out");
+  f(x, y) = x + y;
+  g(x, y) = f(x, y) + 1;
+  out(x, y) = g(x, y) * 2;
+  out.split(x, xo, xi, 8);
+  f.store_at(out, xo).compute_at(g, x);
+  g.store_at(out, y).compute_at(out, xo);
+  async(g);
+  limit(out);
+  Buffer<int> result = out.realize({20, 40});
+  for (int j = 0; j < 40; j++) {
+    for (int i = 0; i < 20; i++) ASSERT_EQ(result(i, j), 2 * (i + j + 1));
+  }
+}
+
 TEST_P(Async, AnAsyncFuncThatReadsAnotherOfTheSameLoopsInOrder) {
   Var x("x"), y("y");
   Func f("f"), out("out");
