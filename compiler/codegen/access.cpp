@@ -9,6 +9,7 @@
 //
 // No access touches memory outside of the span from its lowest to its highest lane, and lanes whose
 // predicate is off touch none.
+#include <bit>
 #include <cstdlib>
 
 #include "codegen/function_generator.h"
@@ -272,8 +273,29 @@ Value* FunctionGenerator::load_apart(const Storage& from, Type type, Value* firs
   return from_lanes(e_, lanes);
 }
 
+// LLVM fills up a gather of an odd width with undefined indices, and may then give them the
+// register of the result, which the machine forbids. Here the lanes that fill it up are off and
+// have the index of the first.
+Value* FunctionGenerator::gather_filled_up(const Storage& from, Type type, Value* indices,
+                                           Value* mask) {
+  const int lanes = type.lanes(), full = static_cast<int>(std::bit_ceil(unsigned(lanes)));
+  std::vector<int> index_picks, mask_picks;
+  for (int i = 0; i < full; i++) {
+    index_picks.push_back(i < lanes ? i : 0);
+    mask_picks.push_back(i < lanes ? i : lanes);
+  }
+  Value* none = llvm::Constant::getNullValue(mask->getType());
+  Value* gathered = gather(from, type.with_lanes(full), shuffle(e_, indices, indices, index_picks),
+                           shuffle(e_, mask, none, mask_picks));
+  return slice(e_, gathered, 0, lanes);
+}
+
 Value* FunctionGenerator::gather(const Storage& from, Type type, Value* indices, Value* predicate) {
   if (predicate || machine_gathers(e_.machine, type)) {
+    if (!std::has_single_bit(unsigned(type.lanes()))) {
+      Value* all = splat(e_, b_.getTrue(), type.lanes());
+      return gather_filled_up(from, type, indices, predicate ? predicate : all);
+    }
     auto* vector = with_lanes(memory_type(e_, type), type.lanes());
     Value* pointers = element_pointer(from, type, indices);
     Value* off = llvm::Constant::getNullValue(vector);

@@ -80,7 +80,7 @@ class FunctionGenerator {
     llvm::AllocaInst* owned_slots = nullptr;  // an array of pointers, as long as the function needs
     int64_t owned_count = 0;
     llvm::AllocaInst* profiler_slot = nullptr;  // a run to end when the function leaves early
-    int64_t stack_bytes = 0;  // of allocations
+    int64_t stack_bytes = 0;                    // of allocations
     std::array<llvm::AllocaInst*, 2> scratch = {};
     std::vector<MemoFrame> memo;
     std::unordered_map<std::string, Value*> variables;
@@ -191,6 +191,7 @@ class FunctionGenerator {
   Value* lane_index(Value* first, Value* stride, int lane);
   Value* load_apart(const Storage& from, Type type, Value* first, Value* stride);
   Value* gather(const Storage& from, Type type, Value* indices, Value* predicate);
+  Value* gather_filled_up(const Storage& from, Type type, Value* indices, Value* mask);
   Coordinate coordinate(const Expr& index) const;
   Value* gather_in_loop(const Storage& from, Type type, Value* indices);
   Value* scratch(size_t slot, llvm::Type* type);

@@ -169,5 +169,24 @@ TEST_F(LoopSchedules, NarrowTypesWrapTheSame) {
   });
 }
 
+// 24 lanes behind a predicate: the machine's gathers are of 8 or 16.
+TEST_F(LoopSchedules, GathersOfOddWidth) {
+  Func values("values"), squares("squares"), f("f");
+  Var z("z"), yo("yo"), yi("yi"), yoo("yoo"), yoi("yoi");
+  RDom r(4, 2, 3, 2);
+  values(x) = 0.125f;
+  values(r[1]) = 3.0f;
+  squares(x, y) = 1;
+  squares(x, y) = cast<int>(values(x)) * cast<int>(values(x));
+  f(x, y, z) = cast<float>(squares(y, y));
+  squares.update(0)
+      .split(y, yo, yi, 8, TailStrategy::PredicateStores)
+      .split(yo, yoo, yoi, 8, TailStrategy::GuardWithIf)
+      .vectorize(yoo, 3, TailStrategy::GuardWithIf)
+      .vectorize(yi);
+  Buffer<float> result = f.realize({1, 5, 1});
+  for (int i = 0; i < 5; i++) EXPECT_EQ(result(0, i, 0), i == 3 || i == 4 ? 9.0f : 0.0f) << i;
+}
+
 }  // namespace
 }  // namespace retrograde
