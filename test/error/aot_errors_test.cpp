@@ -5,6 +5,8 @@
 #include <filesystem>
 #include <fstream>
 
+#include "support/temporary_folder.h"
+
 namespace retrograde {
 namespace {
 
@@ -12,16 +14,12 @@ namespace fs = std::filesystem;
 
 class AotErrors : public testing::Test {
  protected:
-  AotErrors() : in(Float(32), 1, "in"), gain("gain"), x("x"), f("f") {
-    char name[] = "/tmp/retrograde_aot_XXXXXX";
-    folder = mkdtemp(name);
-    f(x) = in(x)*gain;
-  }
-  ~AotErrors() override { fs::remove_all(folder); }
+  AotErrors() : in(Float(32), 1, "in"), gain("gain"), x("x"), f("f") { f(x) = in(x)*gain; }
   std::string path(const std::string& name) const { return folder / name; }
   bool is_empty() const { return fs::is_empty(folder); }
 
-  fs::path folder;
+  const TemporaryFolder temporary;
+  const fs::path& folder = temporary.path();
   ImageParam in;
   Param<float> gain;
   Var x;

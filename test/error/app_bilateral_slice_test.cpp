@@ -10,6 +10,7 @@
 #include <sstream>
 
 #include "common/images.h"
+#include "support/temporary_folder.h"
 
 namespace {
 
@@ -24,13 +25,7 @@ std::string contents(const fs::path& path) {
 
 class BilateralSliceErrors : public testing::Test {
  protected:
-  void SetUp() override {
-    std::string name = (fs::temp_directory_path() / "bilateral_slice_errors.XXXXXX").string();
-    ASSERT_NE(mkdtemp(name.data()), nullptr);
-    folder_ = name;
-    photo_ = write_photo("photo.png", 12, 10);
-  }
-  void TearDown() override { fs::remove_all(folder_); }
+  void SetUp() override { photo_ = write_photo("photo.png", 12, 10); }
 
   fs::path write_photo(const std::string& name, int width, int height) {
     apps::Image image{width, height, 8, {}};
@@ -83,7 +78,9 @@ class BilateralSliceErrors : public testing::Test {
 
   fs::path out() const { return folder_ / "out"; }
 
-  fs::path folder_, photo_;
+  const TemporaryFolder temporary_;
+  const fs::path& folder_ = temporary_.path();
+  fs::path photo_;
   int status_ = 0;
   std::string message_;
 };

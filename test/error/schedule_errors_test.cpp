@@ -2,24 +2,10 @@
 #include <gtest/gtest.h>
 
 #include "retrograde/retrograde.h"
+#include "support/errors.h"
 
 namespace retrograde {
 namespace {
-
-template <class Action>
-std::string error_of(Action&& action) {
-  try {
-    action();
-  } catch (const UserError& error) {
-    return error.what();
-  }
-  return "no error";
-}
-
-void expect_mentions(const std::string& message, std::initializer_list<const char*> phrases) {
-  for (const char* phrase : phrases)
-    EXPECT_NE(message.find(phrase), std::string::npos) << "no '" << phrase << "' in: " << message;
-}
 
 struct ScheduleErrors : testing::Test {
   Func f{"producer"}, g{"consumer"};

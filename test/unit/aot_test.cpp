@@ -7,6 +7,8 @@
 #include <fstream>
 #include <iterator>
 
+#include "support/temporary_folder.h"
+
 namespace retrograde {
 namespace {
 
@@ -25,12 +27,9 @@ bool has(const std::string& text, const std::string& part) {
 class AotFiles : public testing::Test {
  protected:
   AotFiles() : in(UInt(8), 2, "in"), gain("gain", 2.0f), x("x"), y("y"), out("brighter") {
-    char name[] = "/tmp/retrograde_aot_XXXXXX";
-    folder = mkdtemp(name);
     out(x, y) = cast<uint8_t>(min(in(x, y) * gain, 255.0f));
     out.vectorize(x, 8).parallel(y);
   }
-  ~AotFiles() override { fs::remove_all(folder); }
   std::string path(const std::string& name) const { return folder / name; }
   std::vector<std::string> files() const {
     std::vector<std::string> names;
@@ -43,7 +42,8 @@ class AotFiles : public testing::Test {
     return std::system((command + " >" + path("log") + " 2>&1").c_str());
   }
 
-  fs::path folder;
+  const TemporaryFolder temporary;
+  const fs::path& folder = temporary.path();
   ImageParam in;
   Param<float> gain;
   Var x, y;
@@ -113,7 +113,8 @@ TEST_F(AotFiles, PageShowsScheduleStatementAndAssembly) {
   ASSERT_TRUE(schedule < statement && statement < assembly && assembly != std::string::npos);
   EXPECT_TRUE(has(page.substr(schedule, statement - schedule), "brighter"));
   EXPECT_TRUE(has(page, "data-loop=\"" + out.name() + ".s0."));  // a loop of the statement ...
-  EXPECT_TRUE(has(page, "data-stem=\"" + out.name() + ".s0."));  // ... and its block of machine code
+  EXPECT_TRUE(
+      has(page, "data-stem=\"" + out.name() + ".s0."));  // ... and its block of machine code
   EXPECT_TRUE(has(page.substr(assembly), "_argv:"));
   EXPECT_FALSE(has(page, "http://") || has(page, "https://"));
 }

@@ -9,6 +9,7 @@
 
 #include "common/images.h"
 #include "common/process.h"
+#include "support/temporary_folder.h"
 
 namespace {
 
@@ -16,13 +17,6 @@ namespace fs = std::filesystem;
 
 class BilateralSlice : public testing::Test {
  protected:
-  void SetUp() override {
-    std::string name = (fs::temp_directory_path() / "bilateral_slice.XXXXXX").string();
-    ASSERT_NE(mkdtemp(name.data()), nullptr);
-    folder_ = name;
-  }
-  void TearDown() override { fs::remove_all(folder_); }
-
   fs::path write_photo(const std::string& name, int width, int height, float power = 1) {
     apps::Image image{width, height, 8, {}};
     for (int y = 0; y < height; ++y) {
@@ -50,7 +44,8 @@ class BilateralSlice : public testing::Test {
     return nlohmann::json::parse(file);
   }
 
-  fs::path folder_;
+  const TemporaryFolder temporary_;
+  const fs::path& folder_ = temporary_.path();
 };
 
 TEST_F(BilateralSlice, LearnsACurveAndReportsIt) {

@@ -9,6 +9,7 @@
 #include "common/files.h"
 #include "common/images.h"
 #include "diagnostics/error.h"
+#include "support/temporary_folder.h"
 
 namespace {
 
@@ -21,13 +22,6 @@ void expect_pixels(const apps::Image& image, const std::vector<float>& expected)
 
 class AppImages : public testing::Test {
  protected:
-  void SetUp() override {
-    std::string name = (fs::temp_directory_path() / "app_images.XXXXXX").string();
-    ASSERT_NE(mkdtemp(name.data()), nullptr);
-    folder_ = name;
-  }
-  void TearDown() override { fs::remove_all(folder_); }
-
   // Sample n of the file is values[n].
   fs::path store(const std::string& name, int width, int height, int channels, OIIO::TypeDesc type,
                  const std::vector<float>& values) {
@@ -40,7 +34,8 @@ class AppImages : public testing::Test {
     return path;
   }
 
-  fs::path folder_;
+  const TemporaryFolder temporary_;
+  const fs::path& folder_ = temporary_.path();
 };
 
 TEST_F(AppImages, EightBitsSurviveARoundTrip) {

@@ -12,6 +12,7 @@
 
 #include "diagnostics/error.h"
 #include "frontend/compile_cache.h"
+#include "support/temporary_folder.h"
 #include "unit/codegen_testing.h"
 
 namespace retrograde::testing_codegen {
@@ -31,14 +32,7 @@ LoweredFunction scaled(int factor, const std::string& suffix = "") {
 
 class DiskCache : public testing::Test {
  protected:
-  DiskCache() {
-    char name[] = "/tmp/retrograde_cache_XXXXXX";
-    root = mkdtemp(name);
-  }
-  ~DiskCache() override {
-    set_compile_cache_directory("");
-    fs::remove_all(root);
-  }
+  ~DiskCache() override { set_compile_cache_directory(""); }
   std::string folder(const std::string& name = "cache") const { return root / name; }
 
   // As a later run of the program does: nothing is remembered but what is on disk.
@@ -90,7 +84,8 @@ class DiskCache : public testing::Test {
     expect_runs(scaled(3), 3);
   }
 
-  fs::path root;
+  const TemporaryFolder temporary;
+  const fs::path& root = temporary.path();
 };
 
 // First in this file: the environment is looked at once.

@@ -9,6 +9,7 @@
 #include <set>
 
 #include "lower/lower.h"
+#include "support/temporary_folder.h"
 
 namespace retrograde {
 namespace {
@@ -68,11 +69,6 @@ TEST(PassObserver, SeesAheadOfTimeCompilationToo) {
 
 class Opt : public testing::Test {
  protected:
-  Opt() {
-    char name[] = "/tmp/retrograde_opt_test_XXXXXX";
-    folder = mkdtemp(name);
-  }
-  ~Opt() override { fs::remove_all(folder); }
   // Standard output and error together.
   std::string opt(const std::string& arguments, int wanted_status = 0) {
     const fs::path out = folder / "out";
@@ -86,7 +82,8 @@ class Opt : public testing::Test {
     std::ofstream(folder / "p.ir") << "unrolled for (f.s0.x, 0, 2) {\n  f[f.s0.x] = 1f + 2f\n}\n";
     return (folder / "p.ir").string();
   }
-  fs::path folder;
+  const TemporaryFolder temporary;
+  const fs::path& folder = temporary.path();
 };
 
 TEST_F(Opt, RunsPassesInTheGivenOrder) {

@@ -5,25 +5,11 @@
 #include <retrograde/retrograde.h>
 #include <functional>
 
+#include "support/errors.h"
 #include "testing/interpreter.h"
 
 namespace retrograde {
 namespace {
-
-template <class Action>
-std::string error_of(Action&& action) {
-  try {
-    action();
-  } catch (const UserError& error) {
-    return error.what();
-  }
-  return "no error";
-}
-
-void expect_mentions(const std::string& message, std::initializer_list<const char*> phrases) {
-  for (const char* phrase : phrases)
-    EXPECT_NE(message.find(phrase), std::string::npos) << "no '" << phrase << "' in: " << message;
-}
 
 class Rfactor : public testing::Test {
  protected:

@@ -3,24 +3,14 @@
 
 #include <retrograde/retrograde.h>
 
+#include "support/errors.h"
+
 namespace retrograde {
 namespace {
 
 template <class Action>
-std::string error_of(Action&& action) {
-  try {
-    action();
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "no error";
-}
-
-template <class Action>
 void expect_refused(Action&& action, std::initializer_list<const char*> phrases) {
-  const std::string message = error_of(action);
-  for (const char* phrase : phrases)
-    EXPECT_NE(message.find(phrase), std::string::npos) << "no '" << phrase << "' in: " << message;
+  expect_mentions(error_of<Error>(action), phrases);
 }
 
 struct Directives : testing::Test {
@@ -141,7 +131,7 @@ TEST_F(Directives, InlinedFuncsHaveNoStorageOrLoops) {
     a(x) = x;
     b(x) = a(x);
     give(a, *this);
-    return error_of([&] { b.realize({4}); });
+    return error_of<Error>([&] { b.realize({4}); });
   };
   EXPECT_NE(refused([](Func& a, Directives&) { a.memoize(); }).find("memoize"), std::string::npos);
   EXPECT_NE(refused([](Func& a, Directives&) { a.async(); }).find("inlined"), std::string::npos);

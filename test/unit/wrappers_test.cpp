@@ -5,24 +5,10 @@
 #include <algorithm>
 
 #include "frontend/wrappers.h"
+#include "support/errors.h"
 
 namespace retrograde {
 namespace {
-
-template <class Action>
-std::string error_of(Action&& action) {
-  try {
-    action();
-  } catch (const UserError& error) {
-    return error.what();
-  }
-  return "no error";
-}
-
-void expect_mentions(const std::string& message, std::initializer_list<const char*> phrases) {
-  for (const char* phrase : phrases)
-    EXPECT_NE(message.find(phrase), std::string::npos) << "no '" << phrase << "' in: " << message;
-}
 
 // The names of what `reader` reads in the graph that is compiled for `output`.
 std::vector<std::string> read_by(const Func& output, const std::string& reader) {
