@@ -47,6 +47,10 @@ std::optional<FunctionGenerator::LinearIndex> FunctionGenerator::as_linear(const
     if (splat->value.type().is_scalar()) return LinearIndex{splat->value, 0};
     return std::nullopt;
   }
+  if (const auto* name = index.as<Variable>()) {
+    const auto found = frame_.ramps.find(name->name);
+    return found == frame_.ramps.end() ? std::nullopt : std::optional(found->second);
+  }
   if (const auto* call = index.as<Call>()) {
     const bool is_marker =
         call->call_type == CallType::Operator && op_info(call->op).cls == OpClass::Marker;

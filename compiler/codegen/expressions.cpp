@@ -76,10 +76,21 @@ void FunctionGenerator::bind_let(const std::string& name, const Expr& bound) {
   if (v->getName().empty() && !llvm::isa<llvm::Constant>(v)) v->setName(name);
   if (bound.type().is_vector() && bound.type().is_int()) {
     if (const Coordinate at = coordinate(bound); at.is_plain) frame_.coordinates[name] = at;
+    bind_ramp(name, bound);
   }
   frame_.variables[name] = v;
   frame_.indices.erase(name);
   if (wide) frame_.indices[name] = wide;
+}
+
+// Accesses see through the name.
+void FunctionGenerator::bind_ramp(const std::string& name, const Expr& bound) {
+  frame_.ramps.erase(name);
+  const auto linear = as_linear(bound);
+  if (!linear) return;
+  const std::string first = name + ".lane0";
+  bind_let(first, linear->base);
+  frame_.ramps[name] = {variable(first, linear->base.type()), linear->stride};
 }
 
 // The names of lets are unique, so a binding may stay when its body ends. Only copies of a let

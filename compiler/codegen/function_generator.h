@@ -70,6 +70,11 @@ class FunctionGenerator {
     bool is_plain, is_held;
   };
 
+  struct LinearIndex {  // lane i is base + i * stride, the base a scalar
+    Expr base;
+    int64_t stride;
+  };
+
   // What belongs to one LLVM function: the lowered function itself or the body of a parallel loop.
   struct Frame {
     llvm::Function* function = nullptr;
@@ -88,6 +93,7 @@ class FunctionGenerator {
         indices;  // int32 variables as 64-bit integers, see index64
     std::unordered_map<std::string, Storage> storages;
     std::unordered_map<std::string, Coordinate> coordinates;  // names of plain ones
+    std::unordered_map<std::string, LinearIndex> ramps;       // names of vectors that are linear
   };
 
   // statements.cpp
@@ -154,6 +160,7 @@ class FunctionGenerator {
   Value* index64(const Expr& e);
   Value* make_index64(const Expr& e);
   void bind_let(const std::string& name, const Expr& value);
+  void bind_ramp(const std::string& name, const Expr& bound);
   bool rebinds(const std::string& name, const Expr& value) const;
   Value* make(const ir::Let& e);
   Value* make(const ir::Variable& e);
@@ -174,10 +181,6 @@ class FunctionGenerator {
   Value* random(const ir::Call& e);
 
   // access.cpp
-  struct LinearIndex {  // lane i addresses base + i * stride
-    Expr base;
-    int64_t stride;
-  };
   std::optional<LinearIndex> as_linear(const Expr& index);
   Storage& storage(const std::string& name);
   Value* index_vector(const Expr& index);

@@ -47,13 +47,27 @@ Expr combine_ramps(Kind kind, const Expr& a, const Expr& b) {
   return make_ramp(binary(Kind::Sub, part, rb->base), falling, rb->lanes);
 }
 
+// (base + s i) / c = base / c + (s / c) i and (base + s i) % c = base % c where c divides s,
+// whatever base is; undefined otherwise.
+Expr divide_ramp(Kind kind, const Expr& a, const Expr& b) {
+  const Ramp* ramp = a.as<Ramp>();
+  const Type type = a.type().element_of();
+  if (!ramp || !ramp->base.type().is_scalar() || !type.is_int() || type.bits() < 32) return {};
+  const auto stride = as_const_int(ramp->stride), divisor = as_const_int(b);
+  if (!stride || !divisor || *divisor <= 0 || *stride % *divisor != 0) return {};
+  const Expr first = binary(kind, ramp->base, make_const(type, *divisor));
+  return kind == Kind::Mod ? make_broadcast(first, ramp->lanes)
+                           : make_ramp(first, make_const(type, *stride / *divisor), ramp->lanes);
+}
+
 Expr combine(Kind kind, const Expr& a, const Expr& b) {
   const Broadcast* x = a.as<Broadcast>();
   const Broadcast* y = b.as<Broadcast>();
   if (x && y && x->lanes == y->lanes)
     return make_broadcast(binary(kind, x->value, y->value), x->lanes);
   if (a.type().is_int_or_uint()) {
-    Expr ramp = combine_ramps(kind, a, b);
+    const bool divides = kind == Kind::Div || kind == Kind::Mod;
+    Expr ramp = divides ? divide_ramp(kind, a, b) : combine_ramps(kind, a, b);
     if (ramp.defined()) return ramp;
   }
   return binary(kind, a, b);
@@ -105,8 +119,8 @@ bool has_effects(const Expr& e) {
     const Call* call = node.as<Call>();
     if (call && call->call_type == CallType::Operator) {
       OpClass cls = op_info(call->op).cls;
-      bool is_value =
-          call->op == Op::random || call->op == Op::undef || call->op == Op::if_then_else ||
+      bool is_value = call->op == Op::random || call->op == Op::undef ||
+                      call->op == Op::if_then_else ||
                       call->op == Op::trace;  // its event can be that of a vector
       bool is_fact = call->op >= Op::buffer_host && call->op <= Op::buffer_is_query;
       found |= (cls == OpClass::Effect || cls == OpClass::Internal) && !is_value && !is_fact;

@@ -185,6 +185,26 @@ TEST(CodegenAccess, ScalarPredicates) {
   for (int k = 0; k < 4; k++) EXPECT_EQ(out.data<int32_t>()[k], 10 * k + 1);
 }
 
+// A let hides that an index is dense: the elements are read and written all the same as by its
+// name.
+TEST(CodegenAccess, NamedRamps) {
+  LoweredFunction f;
+  f.name = "named_ramps";
+  f.args = {input("in", Int(32)), output("out", Int(32)), scalar_argument("b", Int(32))};
+  const int lanes = 8;
+  const Expr t = variable("t", Int(32, lanes)), u = variable("u", Int(32, lanes));
+  const Expr load = make_load(Int(32, lanes), "in", binary(Kind::Add, u, make_broadcast(1, lanes)));
+  f.body = make_let("u", binary(Kind::Add, t, make_broadcast(variable("b"), lanes)),
+                    make_store("out", load, t));
+  f.body = make_let("t", make_ramp(variable("b"), 2, lanes), f.body);
+  Array in(Int(32), 20), out(Int(32), 17);
+  for (int k = 0; k < 20; k++) in.data<int32_t>()[k] = 10 * k;
+  int32_t b = 2;
+  void* args[] = {in.raw(), out.raw(), &b};
+  ASSERT_EQ(compile_test(f)->call(nullptr, args), 0);
+  for (int k = 0; k < lanes; k++) EXPECT_EQ(out.data<int32_t>()[2 + 2 * k], 10 * (5 + 2 * k));
+}
+
 // The intermediate sums pass 2^31; the index itself does not.
 TEST(CodegenAccess, IndicesMayOverflowOnTheWay) {
   LoweredFunction f;

@@ -74,6 +74,20 @@ TEST(CodegenIdioms, AlternatingArmsAreInterleaved) {
   EXPECT_GE(count(code, "vperm") + count(code, "vunpck"), 2u);
 }
 
+// Both phases of a stretched signal, made beside each other: (2 x) / 2 and (2 x + 1) / 2 are ramps
+// whatever is known of the ends of x.
+TEST(CodegenIdioms, DividedRampsAreDense) {
+  ImageParam a(Float(32), 1, "a");
+  Var x("x"), xi("xi");
+  Func f("f");
+  const Expr p = x / 2;
+  f(x) = select(x % 2 == 0, a(p - 1) * 3.0f + a(p), a(p - 1) + a(p) * 5.0f);
+  f.align_bounds(x, 2).split(x, x, xi, 2).reorder(xi, x).unroll(xi).vectorize(x, 16);
+  const auto code = assembly(f, avx512);
+  EXPECT_EQ(count(code, "gather"), 0u);
+  EXPECT_GE(count(block_with_most(code, "vfmadd"), "(%r"), 2u) << "dense loads";
+}
+
 TEST(CodegenIdioms, UnrolledChannelsAreStoredTogether) {
   ImageParam a(UInt(8), 2, "a");
   Var x("x"), c("c");
