@@ -12,6 +12,7 @@
 #include <string>
 #include <vector>
 
+#include "autodiff/local_derivative.h"
 #include "ir/expr.h"
 #include "ir/visit.h"
 
@@ -32,8 +33,5 @@ struct SweepResult {
 // Throws Unsupported on an operator without a rule between a value and a wanted leaf.
 SweepResult sweep_reverse(const std::vector<Expr>& values, const std::vector<Expr>& seeds,
                           FunctionRef<bool(const Expr&)> is_wanted);
-
-// The expression with its lets substituted: a DAG without names.
-Expr without_lets(const Expr& e);
 
 }  // namespace retrograde::ir

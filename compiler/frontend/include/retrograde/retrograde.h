@@ -2,6 +2,7 @@
 #pragma once
 
 #include "autodiff/derivative.h"
+#include "autodiff/tangents.h"
 #include "diagnostics/error.h"
 #include "frontend/boundary_conditions.h"
 #include "frontend/buffer.h"

@@ -1,0 +1,116 @@
+#include "autodiff/forward_sweep.h"
+
+#include <unordered_map>
+
+#include "diagnostics/error.h"
+#include "ir/build.h"
+
+namespace retrograde::ir {
+
+namespace {
+
+bool is_undef(const Expr& e) {
+  const auto* call = e.as<Call>();
+  return call && call->is_op(Op::undef);
+}
+
+class Sweep {
+ public:
+  Sweep(const std::vector<Expr>& values, FunctionRef<Expr(const Expr&)> tangent_of,
+        FunctionRef<bool(const Expr&)> is_risky_leaf)
+      : order_(post_order(values)),
+        tangent_of_(tangent_of),
+        facts_(
+            order_, [&](const Expr& leaf) { return tangent_of(leaf).defined(); }, is_risky_leaf) {
+    result_.notes = facts_.notes();
+  }
+
+  ForwardResult run(const std::vector<Expr>& values) {
+    for (const Expr& e : order_) visit(e);
+    for (const Expr& value : values) {
+      result_.tangents.push_back(value.defined() ? tangent(value) : Expr());
+      result_.moves |= result_.tangents.back().defined() && facts_.is_active(value);
+    }
+    return std::move(result_);
+  }
+
+ private:
+  Expr tangent(const Expr& e) const {
+    auto found = tangents_.find(e.get());
+    return found == tangents_.end() ? Expr() : found->second;
+  }
+
+  void visit(const Expr& e) {
+    if (is_undef(e)) {
+      if (e.type().is_float()) tangents_[e.get()] = call_op(Op::undef, adjoint_type(e.type()), {});
+      undefs_.insert(e.get());
+      return;
+    }
+    note_undef(e);
+    if (is_leaf(e)) {
+      if (facts_.is_active(e)) tangents_[e.get()] = cast_to(adjoint_type(e.type()), tangent_of_(e));
+    } else if (e.type().is_float() && (facts_.is_active(e) || undefs_.contains(e.get()))) {
+      Expr t = combine(e, local_derivative(e, facts_));
+      if (t.defined()) tangents_[e.get()] = t;
+    }
+  }
+
+  // What keeps the old value has to keep the old tangent: that is known for choices only.
+  void note_undef(const Expr& e) {
+    bool below = false;
+    for_each_child(e, [&](const Expr& child) { below |= undefs_.contains(child.get()); });
+    if (!below) return;
+    undefs_.insert(e.get());
+    const auto* choice = e.as<Select>();
+    if (choice && !undefs_.contains(choice->condition.get())) return;
+    unsupported("differentiate a value that is undef in places",
+                "the tangent of undef is known where a select chooses it and nothing else is done "
+                "with it",
+                "an operator takes a value that may be undef",
+                "Make the select with undef the outermost operation of the definition, or say "
+                "where it stores with RDom::where");
+  }
+
+  Expr combine(const Expr& e, const LocalDerivative& local) {
+    Type type = adjoint_type(e.type());
+    switch (local.kind) {
+      case LocalDerivative::Kind::Zero:
+        result_.notes.insert(local.note);
+        return {};
+      case LocalDerivative::Kind::Choice: {
+        Expr a = tangent(local.operands[0]), b = tangent(local.operands[1]);
+        if (!a.defined() && !b.defined()) return {};
+        return make_select(local.condition, a.defined() ? a : make_zero(type),
+                           b.defined() ? b : make_zero(type));
+      }
+      case LocalDerivative::Kind::Sum:
+        break;
+    }
+    Expr sum;
+    for (size_t i = 0; i < local.operands.size(); ++i) {
+      Expr t = tangent(local.operands[i]);
+      if (!t.defined() || !local.partials[i].factor.defined()) continue;
+      Expr term = cast_to(type, times_partial(t, local.partials[i]));
+      if (is_zero(term)) continue;
+      sum = sum.defined() ? sum + term : term;
+    }
+    return sum;
+  }
+
+  std::vector<Expr> order_;
+  FunctionRef<Expr(const Expr&)> tangent_of_;
+  ExprFacts facts_;
+  std::unordered_set<const ExprNode*> undefs_;
+  std::unordered_map<const ExprNode*, Expr> tangents_;
+  ForwardResult result_;
+};
+
+}  // namespace
+
+ForwardResult sweep_forward(const std::vector<Expr>& values,
+                            FunctionRef<Expr(const Expr&)> tangent_of,
+                            FunctionRef<bool(const Expr&)> is_risky_leaf) {
+  return Sweep(values, tangent_of, is_risky_leaf).run(values);
+}
+
+}  // namespace retrograde::ir

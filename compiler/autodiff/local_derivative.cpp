@@ -1,0 +1,182 @@
+#include "autodiff/local_derivative.h"
+
+#include "diagnostics/error.h"
+#include "ir/build.h"
+
+namespace retrograde::ir {
+
+namespace {
+
+// Operators whose value may be infinite or NaN at finite operands.
+bool is_risky_op(Op op) {
+  switch (op) {
+    case Op::sqrt:
+    case Op::exp:
+    case Op::log:
+    case Op::pow:
+    case Op::tan:
+    case Op::asin:
+    case Op::acos:
+    case Op::sinh:
+    case Op::cosh:
+    case Op::acosh:
+    case Op::atanh:
+    case Op::fast_exp:
+    case Op::fast_log:
+    case Op::fast_pow:
+    case Op::fast_inverse:
+    case Op::fast_inverse_sqrt:
+    case Op::strong_mul:
+      return true;
+    default:
+      return false;
+  }
+}
+
+bool makes_risky(const Expr& e) {
+  const auto* call = e.as<Call>();
+  return (e.kind() == Kind::Div && e.type().is_float()) ||
+         (call && (call->call_type == CallType::Extern ||
+                   (call->call_type == CallType::Operator && is_risky_op(call->op))));
+}
+
+// The value of the operand, whatever the types.
+LocalDerivative same_as(const Expr& e, const Expr& operand) {
+  LocalDerivative result{LocalDerivative::Kind::Sum, {operand}, {}, {}, {}};
+  result.partials.push_back({make_one(adjoint_type(e.type())), Strength::Plain});
+  return result;
+}
+
+LocalDerivative sum_of(const std::vector<Expr>& operands, std::vector<Partial> partials,
+                       const ExprFacts& facts) {
+  LocalDerivative result{LocalDerivative::Kind::Sum, operands, std::move(partials), {}, {}};
+  result.partials.resize(operands.size());
+  for (const Expr& operand : operands) {
+    result.risky_operand |= facts.is_risky(operand);
+    result.reads |= facts.reads(operand);
+  }
+  if (result.risky_operand) {
+    for (Partial& p : result.partials) p.strength = Strength::Strong;
+  }
+  return result;
+}
+
+LocalDerivative of_call(const Expr& e, const Call& call, const ExprFacts& facts) {
+  if (call.call_type == CallType::Extern) {
+    unsupported(text("differentiate the call of the C function ", quoted(call.name)),
+                "a C function has no known derivative",
+                "the gradient of one of its arguments is wanted",
+                text("wrap the argument in stop_gradient, or write ", quoted(call.name),
+                     " in the language"));
+  }
+  const DerivativeRule& rule = derivative_rule(call.op);
+  const char* name = op_info(call.op).name;
+  LocalDerivative zero;
+  switch (rule.cls) {
+    case RuleClass::Smooth:
+      return sum_of(call.args, rule.partials(call.args, e), facts);
+    case RuleClass::Transparent:
+      return same_as(e, call.args[static_cast<size_t>(rule.transparent_arg)]);
+    case RuleClass::Constant:
+    case RuleClass::Blocked:
+      zero.note = text(name, " has derivative 0 (", rule.convention, ")");
+      return zero;
+    case RuleClass::NoRule:
+      break;
+  }
+  unsupported(text("differentiate ", name), rule.convention);
+}
+
+}  // namespace
+
+std::vector<Expr> post_order(const std::vector<Expr>& roots) {
+  std::vector<Expr> order;
+  std::unordered_set<const ExprNode*> seen;
+  std::vector<std::pair<Expr, bool>> stack;  // explicit, since user-made DAGs can be deep
+  for (auto root = roots.rbegin(); root != roots.rend(); ++root) {
+    if (root->defined()) stack.emplace_back(*root, false);
+  }
+  while (!stack.empty()) {
+    auto [e, children_done] = stack.back();
+    stack.pop_back();
+    if (children_done) {
+      order.push_back(e);
+    } else if (seen.insert(e.get()).second) {
+      stack.emplace_back(e, true);
+      for_each_child(e, [&](const Expr& child) { stack.emplace_back(child, false); });
+    }
+  }
+  return order;
+}
+
+bool is_leaf(const Expr& e) {
+  const auto* call = e.as<Call>();
+  return e.as<Variable>() ||
+         (call && (call->call_type == CallType::Func || call->call_type == CallType::Image));
+}
+
+ExprFacts::ExprFacts(const std::vector<Expr>& order, FunctionRef<bool(const Expr&)> is_wanted,
+                     FunctionRef<bool(const Expr&)> is_risky_leaf) {
+  for (const Expr& e : order) classify(e, is_wanted, is_risky_leaf);
+}
+
+void ExprFacts::classify(const Expr& e, FunctionRef<bool(const Expr&)> is_wanted,
+                         FunctionRef<bool(const Expr&)> is_risky_leaf) {
+  bool active = false, risky = makes_risky(e), loads = is_leaf(e) && !e.as<Variable>();
+  for_each_child(e, [&](const Expr& child) { loads |= reads(child); });
+  if (is_leaf(e)) {
+    active = e.type().is_float() && is_wanted(e);
+    risky = e.type().is_float() && is_risky_leaf(e);
+  } else {
+    for_each_child(e, [&](const Expr& child) {
+      active |= is_active(child);
+      risky |= is_risky(child);
+    });
+    if (active && !e.type().is_float()) {  // derivatives pass through floating values only
+      if (e.as<Cast>()) notes_.insert("a cast to " + to_string(e.type()) + " has derivative 0");
+      active = false;
+    }
+  }
+  if (const auto* div = e.as<Div>(); div && is_const(div->b) && !is_risky(div->a)) risky = false;
+  if (active) active_.insert(e.get());
+  if (risky) risky_.insert(e.get());
+  if (loads) loads_.insert(e.get());
+}
+
+LocalDerivative local_derivative(const Expr& e, const ExprFacts& facts) {
+  return match(
+      e,
+      [&](const Select& s) {
+        return LocalDerivative{
+            LocalDerivative::Kind::Choice, {s.true_value, s.false_value}, {}, s.condition, {}};
+      },
+      [&](const Cast& c) { return same_as(e, c.value); },
+      [&](const Broadcast&) -> LocalDerivative {
+        internal_error("vectors have no place in the definition of a Func");
+      },
+      [&](const Binary& b) {
+        return sum_of({b.a, b.b}, derivative_rule(e.kind()).partials({b.a, b.b}, e), facts);
+      },
+      [&](const Call& call) { return of_call(e, call, facts); },
+      [&](const ExprNode& node) -> LocalDerivative {
+        if (!has_derivative_rule(node.kind))
+          internal_error(text("no derivative of a ", kind_name(node.kind)));
+        unsupported(text("differentiate ", kind_name(node.kind)),
+                    derivative_rule(node.kind).convention);
+      });
+}
+
+namespace {
+class LetRemover : public Rewriter {
+ protected:
+  using Rewriter::rewrite;
+  Expr rewrite(const Expr& e) override {
+    const auto* let = e.as<Let>();
+    return let ? (*this)(substitute(let->body, let->name, let->value)) : children(e);
+  }
+};
+}  // namespace
+
+Expr without_lets(const Expr& e) { return LetRemover()(e); }
+
+}  // namespace retrograde::ir

@@ -1,0 +1,69 @@
+// tangents.h -- forward mode: propagate_tangents and what it gives.
+//
+// Func v; v(x, y) = ...;                                  // how the input moves: its direction
+// Tangents t = propagate_tangents(model, {{image, v}});   // Funcs in, Funcs out
+// Func model_tan = t(model);                              // the derivative of model along v
+//
+// One propagation gives the derivative of every element of every Func along one direction of the
+// inputs: J v, where propagate_adjoints gives w^T J. Nothing is inverted, and every update of the
+// language has a tangent: where updates overwrite what their own partials read, the primal is
+// computed once more in step with its tangent. Tangents are ordinary Funcs: they can be scheduled,
+// and differentiated again, by either mode; tangents of adjoints are Hessian-vector products.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "autodiff/derivative.h"
+
+namespace retrograde {
+
+namespace ir {
+struct TangentResult;
+}
+
+// One input and how it moves.
+//   input    an ImageParam or Buffer, a Param (a direction without dimensions), or a Func, to whose
+//            values the direction is added after its last definition
+//   tangent  a Func or Buffer with the dimensions of the input and as many values; floats. It is
+//            read where the input is read
+struct Direction {
+  Direction(AdjointInput input, const Func& tangent);
+  template <typename T, int Dims>
+  Direction(AdjointInput input, const Buffer<T, Dims>& tangent)
+      : Direction(std::move(input), as_func(Buffer<>(tangent))) {}
+
+  AdjointInput input;
+  Func tangent;
+
+ private:
+  static Func as_func(const Buffer<>& buffer);
+};
+
+class Tangents {
+ public:
+  explicit Tangents(std::shared_ptr<const ir::TangentResult> result);
+
+  // The derivative of `func` along the directions: its dimensions; a value for each of its values,
+  // float32 where that is narrower or an integer (whose tangent is 0). Zero everywhere when nothing
+  // that moves reaches it; an undefined Func when the output does not depend on it.
+  Func operator()(const Func& func) const;
+
+  // Everything that was made, producers before consumers.
+  std::vector<Func> funcs() const;
+  // What was built, what is zero and why, what had to be computed again.
+  const std::vector<Explanation>& explanations() const;
+  std::string explain() const { return to_string(explanations()); }
+
+ private:
+  std::shared_ptr<const ir::TangentResult> result_;
+};
+
+// The tangents of `output` and of everything between it and the directions.
+// CompileError: the output is undefined or an integer; no direction; two for one input; a direction
+// of another shape; an integer input. Unsupported: an operator without a derivative, an extern
+// stage, or undef inside an operation, on a path from an input that moves.
+Tangents propagate_tangents(const Func& output, const std::vector<Direction>& directions);
+
+}  // namespace retrograde
