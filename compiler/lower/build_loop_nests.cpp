@@ -1,20 +1,20 @@
 #include "lower/build_loop_nests.h"
 
 #include <algorithm>
-#include <functional>
 #include <optional>
-#include <set>
 
 #include "diagnostics/error.h"
 #include "ir/build.h"
 #include "ir/visit.h"
 #include "lower/emit_definition.h"
+#include "lower/emitted.h"
 #include "lower/extern_stage.h"
 #include "lower/nest_checks.h"
+#include "lower/nest_storage.h"
+#include "lower/promised_bounds.h"
 #include "lower/site.h"
 #include "lower/specialize.h"
 #include "lower/stage_nest.h"
-#include "lower/storage_folding.h"
 #include "lower/value_bounds.h"
 #include "simplify/simplify.h"
 
@@ -31,57 +31,13 @@ Box buffer_box(const std::string& buffer, int dimensions) {
 
 namespace {
 
-// A statement with what it needs from outside of it. All boxes speak of names that are bound
-// outside the statement, except for `unranged` loops, over which they are still to be extended.
-struct Emitted {
-  Stmt stmt;
-  Requirements uses;
-  std::map<std::string, Box> storage;  // Funcs computed inside but stored further out
-  std::vector<Loop> unranged;
-  int lead = 0;            // iterations of the loop around that run before its first
-  bool has_loops = false;  // that stay loops
-  bool has_vectors = false;
-};
-
-void map_boxes(Emitted& code, const std::function<Box(const Box&)>& map) {
-  for (auto& [name, use] : code.uses) use.box = map(use.box);
-  for (auto& [name, box] : code.storage) box = map(box);
-}
-
-Box ranged_over(const std::vector<Loop>& loops, Box box) {
-  if (loops.empty()) return box;
-  Scope<Interval> ranges;
-  for (const Loop& loop : loops) ranges.push(loop.name, loop.range());
-  for (Interval& side : box) {
-    if (side.min.defined()) side.min = bounds_of(side.min, ranges).min;
-    if (side.max.defined()) side.max = bounds_of(side.max, ranges).max;
-  }
-  return box;
-}
-
-// Extends every box over the loops that were wrapped around the statement since the last call.
-void range_over_loops(Emitted& code) {
-  if (code.unranged.empty()) return;
-  map_boxes(code, [&](const Box& box) { return ranged_over(code.unranged, box); });
-  code.unranged.clear();
-}
-
-void merge_storage(std::map<std::string, Box>& into, const std::map<std::string, Box>& from) {
-  for (const auto& [name, box] : from) into[name] = hull(into[name], box);
-}
-
-Box simplified(Box box) {
-  for (Interval& side : box) {
-    if (side.min.defined()) side.min = simplify(side.min);
-    if (side.max.defined()) side.max = simplify(side.max);
-  }
-  return box;
-}
-
 class NestEmitter {
  public:
   NestEmitter(const Program& program, const LoopNestOptions& options)
-      : program_(program), options_(options), values_(value_bounds(program)) {
+      : program_(program),
+        options_(options),
+        values_(value_bounds(program)),
+        storage_(program, options.slide) {
     for (size_t i = 0; i < program.funcs.size(); i++) note_site(static_cast<int>(i));
   }
 
@@ -90,17 +46,14 @@ class NestEmitter {
     Site root({});
     Emitted all = emit_site(root_, Emitted(), root);
     nests.bounds = std::move(root.bindings);
-    all.stmt = realize_stored(
+    all.stmt = storage_.realize_stored(
         all, [](const LoopLevel& level) { return level.kind == LoopLevel::Kind::Root; });
     check_everything_found_its_place(all);
     for (auto& [name, use] : all.uses)
       if (use.is_image) nests.images[name] = use;
     nests.body = all.stmt;
     nests.outputs = std::move(outputs_);
-    nests.async_room = std::move(async_room_);
-    for (const auto& [name, folds] : folds_) {
-      for (const Fold& fold : folds) nests.folds[name].push_back(fold.factor);
-    }
+    storage_.report(nests);
     return nests;
   }
 
@@ -108,13 +61,11 @@ class NestEmitter {
   const Program& program_;
   const LoopNestOptions options_;
   const ValueBounds values_;
+  NestStorage storage_;
   std::vector<int> root_, innermost_;  // indices into program_.funcs, producers first
   std::map<std::pair<std::string, std::string>, std::vector<int>>
-      at_;                               // (consumer, loop) -> Funcs computed there
-  std::set<std::string> storage_sites_;  // "consumer.loop" that store something
+      at_;  // (consumer, loop) -> Funcs computed there
   std::map<std::string, Box> outputs_;
-  std::map<std::string, std::vector<Fold>> folds_;
-  std::map<std::string, int> async_room_;
 
   void note_site(int index) {
     const LoopedFunc& f = program_.funcs[index];
@@ -126,18 +77,6 @@ class NestEmitter {
     } else {
       at_[{level.func, level.var}].push_back(index);
     }
-    const LoopLevel& store = f.schedule.store_level;
-    if (store.kind == LoopLevel::Kind::At) storage_sites_.insert(store.func + "\n" + store.var);
-    const LoopLevel& hoist = f.schedule.hoist_level;
-    if (is_hoisted(f) && hoist.kind == LoopLevel::Kind::At)
-      storage_sites_.insert(hoist.func + "\n" + hoist.var);
-  }
-
-  static bool is_stored_where_computed(const LoopedFunc& f) {
-    const LoopLevel& compute = f.schedule.compute_level;
-    const LoopLevel& store = f.schedule.store_level;
-    if (store.kind == LoopLevel::Kind::Inlined) return true;
-    return store.kind == compute.kind && store.func == compute.func && store.var == compute.var;
   }
 
   // ---- one site: Funcs that are computed together, just outside `inner` ----
@@ -179,7 +118,7 @@ class NestEmitter {
       Stmt produce = make_producer_consumer(name, true, piece.produce);
       Stmt consume = stmt.defined() ? make_producer_consumer(name, false, stmt) : stmt;
       stmt = make_block({running_from(piece.lead, produce, code, site), consume});
-      if (piece.realized) stmt = realize(*piece.f, *piece.realized, stmt);
+      if (piece.realized) stmt = storage_.realize(*piece.f, *piece.realized, stmt);
     }
     return stmt;
   }
@@ -221,11 +160,12 @@ class NestEmitter {
       outputs_[f.name()] = allocated;
     } else {
       Box touched = hull(required, allocated);
-      made.stmt = fold_storage(f, touched, loops, slides, code.has_vectors, site, made.stmt);
-      if (f.schedule.async && !loops.empty()) note_async_room(f, slides, site.touched(touched));
+      made.stmt = storage_.fold(f, touched, loops, slides, code.has_vectors, site, made.stmt);
+      if (f.schedule.async && !loops.empty())
+        storage_.note_async_room(f, slides, site.touched(touched));
       if (is_stored_where_computed(f)) {
         piece.realized = allocated;
-        note_place(f, allocated, code.storage);
+        storage_.note_place(f, allocated, code.storage);
       } else {
         code.storage[f.name()] = hull(code.storage[f.name()], allocated);
       }
@@ -264,21 +204,6 @@ class NestEmitter {
     }
   }
 
-  // Loops between the site and the storage of f, innermost first.
-  static std::vector<Loop> loops_to_storage(const LoopedFunc& f, const Site& site) {
-    std::vector<Loop> loops;
-    if (is_stored_where_computed(f) || f.is_output) return loops;
-    const LoopLevel& store = f.schedule.store_level;
-    for (const Loop& loop : site.around) {
-      if (store.kind == LoopLevel::Kind::At &&
-          loop.name.compare(0, store.func.size() + 2, store.func + ".s") == 0 &&
-          store.var == loop.var)
-        break;
-      loops.push_back(loop);
-    }
-    return loops;
-  }
-
   Box output_box(const LoopedFunc& f, const Box& read) {
     check_storage_of_output(f);
     outputs_[f.name()] = read;  // what others read of it must lie inside, too
@@ -315,34 +240,6 @@ class NestEmitter {
     if (f.is_output) need = hull(need, outputs_[f.name()]);
     result.storage[f.name()] = std::move(need);
     return result;
-  }
-
-  // ---- what users promise or want of bounds ----
-
-  // Func::bound: the loops cover exactly what was promised; a check makes sure that it is enough.
-  // Func::align_bounds and align_extent: they cover more.
-  void apply_promised_bounds(const LoopedFunc& f, Box& box, std::vector<Stmt>& checks) const {
-    for (const Bound& bound : f.schedule.bounds) {
-      size_t d =
-          std::find(f.func->args.begin(), f.func->args.end(), bound.var) - f.func->args.begin();
-      RETROGRADE_ASSERT(d < box.size(), "bound on an unknown dimension");
-      if (bound.extent.defined()) {
-        Interval promised;
-        promised.min = bound.min.defined() ? bound.min : box[d].min;
-        promised.max = simplify(promised.min + bound.extent - 1);
-        checks.push_back(bound_check(f, static_cast<int>(d), box[d], promised));
-        box[d] = promised;
-      }
-      if (bound.modulus.defined()) box[d] = aligned(box[d], bound);
-    }
-  }
-
-  static Interval aligned(Interval range, const Bound& bound) {
-    const Expr &m = bound.modulus, &r = bound.remainder;
-    if (r.defined()) range.min = simplify((range.min - r) / m * m + r);
-    Expr extent = range.max - range.min + 1;
-    range.max = simplify(range.min + (extent + m - 1) / m * m - 1);
-    return range;
   }
 
   // ---- one stage ----
@@ -389,7 +286,7 @@ class NestEmitter {
       code = emit_children(children_at(f, s, loop), std::move(code), nest.loops, i);
       code = store_here(f, s, loop, std::move(code));
       if (loop.for_type == ForType::Parallel && !code.storage.empty())
-        check_no_shared_storage(f, loop, stored_func(code.storage.begin()->first)->name());
+        check_no_shared_storage(f, loop, storage_.stored_func(code.storage.begin()->first)->name());
       wrap(loop, code);
     }
     range_over_loops(code);
@@ -432,25 +329,6 @@ class NestEmitter {
     }
   }
 
-  // All that `from` needs; the statement stays.
-  static void merge_code(Emitted& into, const Emitted& from) {
-    merge_footprints(into.uses, from.uses);
-    merge_storage(into.storage, from.storage);
-    into.has_loops |= from.has_loops;
-    into.has_vectors |= from.has_vectors;
-  }
-
-  static void wrap(const Loop& loop, Emitted& code) {
-    Expr min = code.lead > 0 ? simplify(loop.min - code.lead) : loop.min;
-    Expr extent = code.lead > 0 ? simplify(loop.extent + code.lead) : loop.extent;
-    code.stmt = make_for(loop.name, min, extent, loop.for_type, code.stmt, loop.partition);
-    code.lead = 0;
-    code.unranged.push_back(loop);
-    code.has_loops |= loop.for_type == ForType::Parallel ||
-                      (loop.for_type == ForType::Serial && !is_one(loop.extent));
-    code.has_vectors |= loop.for_type == ForType::Vectorized;
-  }
-
   // An update that reads its own Func does not compute it again.
   std::vector<int> computed_innermost_in(const LoopedFunc& f) const {
     std::vector<int> children = innermost_;
@@ -484,162 +362,14 @@ class NestEmitter {
     return code;
   }
 
-  // ---- storage ----
-
-  // `touched`: by the code of the site, in terms of its names.
-  Stmt fold_storage(const LoopedFunc& f, const Box& touched, const std::vector<Loop>& loops,
-                    const std::vector<Slide>& slides, bool is_vectorized, Site& site, Stmt stmt) {
-    std::vector<FoldingLoop> windows;
-    if (options_.slide && !loops.empty()) {
-      windows.push_back({loops[0], site.touched(touched)});
-      Box whole = site.whole(touched);
-      for (size_t i = 1; i < loops.size(); i++) {
-        whole = ranged_over({loops[i - 1]}, std::move(whole));
-        windows.push_back({loops[i], whole});
-      }
-    }
-    std::vector<Fold> folds = folds_of(f, windows, slides, site.around, is_vectorized);
-    for (size_t d = 0; d < folds.size(); d++) {
-      if (folds[d].touched.defined())
-        stmt = make_block(
-            {fold_check(f, static_cast<int>(d), folds[d].touched, folds[d].factor), stmt});
-    }
-    note_folds(f, std::move(folds));
-    return stmt;
-  }
-
-  // Values that are each computed once, into a place of their own, can be computed at any time. In
-  // folded storage of F coordinates, of which an iteration touches W and computes S, there is room
-  // for (F - W) / S more.
-  void note_async_room(const LoopedFunc& f, const std::vector<Slide>& slides, const Box& touched) {
-    const std::vector<Fold>& folds = folds_.at(f.name());
-    int room = slides.empty() ? 1 : 0;
-    for (size_t d = 0; d < folds.size(); d++) {
-      if (!folds[d].factor.defined()) continue;
-      auto slide = std::find_if(slides.begin(), slides.end(), [&](const Slide& candidate) {
-        return candidate.dimension == static_cast<int>(d);
-      });
-      const auto extent = [](const Interval& side) {
-        return as_const_int(simplify(without_markers(side.max - side.min + 1)));
-      };
-      const auto fold = as_const_int(folds[d].factor), window = extent(touched[d]);
-      const auto step = slide == slides.end() ? window : extent(slide->part);
-      const bool known = fold && window && step && *step > 0 && *fold >= *window;
-      const int here = known ? static_cast<int>((*fold - *window) / *step) + 1 : 1;
-      room = room == 0 ? here : std::min(room, here);
-    }
-    auto [it, is_first] = async_room_.emplace(f.name(), room);
-    if (!is_first && (it->second == 0 || (room != 0 && room < it->second))) it->second = room;
-  }
-
-  // A Func that is computed at several places folds where all of them allow it.
-  void note_folds(const LoopedFunc& f, std::vector<Fold> folds) {
-    auto [it, is_first] = folds_.emplace(f.name(), folds);
-    for (size_t d = 0; d < folds.size() && !is_first; d++) {
-      Expr& factor = it->second[d].factor;
-      if (factor.defined() && folds[d].factor.defined()) {
-        factor = simplify(max(factor, folds[d].factor));
-      } else {
-        factor = Expr();
-      }
-    }
-  }
-
-  static const StorageRule* rule_of(const LoopedFunc& f, size_t d) {
-    for (const StorageRule& rule : f.schedule.storage_rules) {
-      if (rule.var == f.func->args[d]) return &rule;
-    }
-    return nullptr;
-  }
-
-  Stmt realize(const LoopedFunc& f, const Box& box, Stmt stmt) {
-    std::vector<Range> ranges;
-    std::vector<Stmt> checks;
-    for (size_t d = 0; d < box.size(); d++) {
-      Range range{box[d].min, simplify(box[d].max - box[d].min + 1)};
-      Expr& factor = folds_.at(f.name())[d].factor;
-      auto extent = as_const_int(range.extent), fold = as_const_int(factor.defined() ? factor : 0);
-      if (extent && fold && *extent <= *fold) factor = Expr();  // nothing to gain
-      if (const StorageRule* rule = rule_of(f, d)) apply(*rule, f, d, range, factor, checks);
-      ranges.push_back(range);
-    }
-    checks.push_back(make_realize(f.name(), f.func->types, f.schedule.memory, ranges, stmt));
-    return make_block(checks);
-  }
-
-  static void apply(const StorageRule& rule, const LoopedFunc& f, size_t d, Range& range,
-                    Expr& factor, std::vector<Stmt>& checks) {
-    const int dimension = static_cast<int>(d);
-    if (rule.fold.defined() && !factor.defined()) {  // no loop hands it on: it must hold all
-      checks.push_back(fold_check(f, dimension, range.extent, rule.fold));
-      factor = rule.fold;
-    }
-    if (rule.bound.defined()) {
-      checks.push_back(storage_check(f, dimension, range.extent, rule.bound));
-      range.extent = rule.bound;
-    }
-    if (rule.alignment.defined())
-      range.extent =
-          simplify((range.extent + rule.alignment - 1) / rule.alignment * rule.alignment);
-  }
-
-  // Storage that lies in a place further out: room for the largest that it is at any time.
-  void note_place(const LoopedFunc& f, const Box& box, std::map<std::string, Box>& storage) const {
-    if (!is_hoisted(f)) return;
-    Box room;
-    for (size_t d = 0; d < box.size(); d++) {
-      Expr extent = box[d].max - box[d].min + 1;
-      if (const StorageRule* rule = rule_of(f, d)) {
-        if (rule->bound.defined()) extent = rule->bound;
-        if (rule->alignment.defined())
-          extent = (extent + rule->alignment - 1) / rule->alignment * rule->alignment;
-        if (rule->fold.defined()) extent = max(extent, rule->fold);
-      }
-      room.push_back({0, simplify(extent - 1)});
-    }
-    Box& place = storage[place_name(f.name())];
-    place = hull(place, room);
-  }
-
-  // The Func whose storage an entry of Emitted::storage is, or is the place of.
-  const LoopedFunc* stored_func(const std::string& name) const {
-    const LoopedFunc* f = program_.find(name);
-    return f ? f : program_.find(name.substr(0, name.rfind('.')));
-  }
-
-  Stmt realize_place(const LoopedFunc& f, const Box& room, const Stmt& stmt) const {
-    check_room(f, room);
-    std::vector<Range> ranges;
-    for (const Interval& side : room) ranges.push_back({0, simplify(side.max + 1)});
-    return make_realize(place_name(f.name()), f.func->types, f.schedule.memory, ranges, stmt);
-  }
-
   Emitted store_here(const LoopedFunc& f, int s, const Loop& loop, Emitted code) {
-    if (code.storage.empty() || !storage_sites_.count(f.name() + "\n" + loop.var)) return code;
+    if (code.storage.empty() || !storage_.is_site(f, loop)) return code;
     range_over_loops(code);
-    code.stmt = realize_stored(code, [&](const LoopLevel& level) {
+    code.stmt = storage_.realize_stored(code, [&](const LoopLevel& level) {
       return level.kind == LoopLevel::Kind::At && level.func == f.name() && level.var == loop.var &&
              (level.stage < 0 || level.stage == s);
     });
     return code;
-  }
-
-  template <class IsHere>
-  Stmt realize_stored(Emitted& code, IsHere&& is_here) {
-    Stmt stmt = code.stmt;
-    for (auto it = code.storage.begin(); it != code.storage.end();) {
-      const LoopedFunc& f = *stored_func(it->first);
-      const bool is_place = f.name() != it->first;
-      if (is_here(is_place ? f.schedule.hoist_level : f.schedule.store_level)) {
-        if (!is_place) note_place(f, it->second, code.storage);
-        Box box = simplified(it->second);
-        stmt = is_place ? realize_place(f, box, stmt) : realize(f, box, stmt);
-        it = code.storage.erase(it);
-      } else {
-        ++it;
-      }
-    }
-    return stmt;
   }
 
   // ---- what is left at root ----
