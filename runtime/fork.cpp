@@ -1,16 +1,17 @@
 // Two statements at the same time, and the semaphores between them.
 //
-// The first runs on a thread of its own, the rest on the caller's. A pool's thread would do as long
-// as one is free; but the two may wait for each other many times, and a pool whose threads all wait
-// runs nobody's loops. With a thread for each there is always one that can go on.
+// The first runs on a thread of its own, the rest on the caller's. A thread of the parallel loops'
+// pool would do as long as one is free; but the two may wait for each other many times, and a pool
+// whose threads all wait runs nobody's loops. With a thread for each there is always one that can
+// go on.
 //
 // When one of the two fails it closes the semaphores, so that the other finds out at its next wait,
 // leaves too, and the error of the one that failed by itself is what the call gives.
 #include <atomic>
 #include <new>
-#include <thread>
 
 #include "report.h"
+#include "spare_threads.h"
 
 namespace retrograde::runtime {
 namespace {
@@ -92,13 +93,13 @@ int32_t retrograde_fork(retrograde_context* context, retrograde_task first, uint
                         int32_t semaphore_count) {
   rt::Branch a{context, first, first_closure, semaphores, semaphore_count};
   rt::Branch b{context, rest, rest_closure, semaphores, semaphore_count};
-  try {
-    std::thread thread([&a] { a.run(); });
-    b.run();
-    thread.join();
-  } catch (...) {
+  rt::SpareThread* const thread =
+      rt::begin_on_spare_thread([](void* branch) { static_cast<rt::Branch*>(branch)->run(); }, &a);
+  if (!thread) {
     return retrograde_report_error(context, retrograde_error_out_of_memory,
                                    "cannot run an async producer: the system has no thread left");
   }
+  b.run();
+  rt::finish_on(thread);
   return rt::outcome(context, a, b);
 }

@@ -7,6 +7,7 @@
 #include "halide/weak.h"
 #include "parallel.h"
 #include "report.h"
+#include "spare_threads.h"
 #include "thread_pool.h"
 
 namespace {
@@ -69,7 +70,10 @@ RETROGRADE_WEAK int halide_set_num_threads(int count) {
   }
   return retrograde::runtime::set_thread_count(count);
 }
-RETROGRADE_WEAK void halide_shutdown_thread_pool() { retrograde::runtime::shut_down_threads(); }
+RETROGRADE_WEAK void halide_shutdown_thread_pool() {
+  retrograde::runtime::shut_down_threads();
+  retrograde::runtime::end_spare_threads();
+}
 
 struct halide_thread {
   pthread_t handle;

@@ -7,6 +7,7 @@
 // A finding is shrunk and printed as C++. A program that is refused with an error for its author is
 // counted, and is a finding only when refusals are asked for or make up more than a tenth of all.
 // Exit code: 0 nothing found, 1 something found.
+#include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -28,7 +29,8 @@ namespace {
 using namespace retrograde;
 using namespace retrograde::fuzz;
 
-constexpr unsigned seconds_per_program = 60;
+// A program that computes for longer, or that stands still for longer, on a machine however busy.
+constexpr unsigned max_cpu_seconds = 60, max_seconds = 240;
 constexpr double max_refused_fraction = 0.1;
 constexpr int crashed = 100;  // exit codes of a child: a Verdict, or this plus the signal
 
@@ -84,7 +86,9 @@ std::string read_all(int descriptor) {
 }
 
 [[noreturn]] void run_child(const Program& program, int descriptor) {
-  alarm(seconds_per_program);
+  const rlimit cpu = {max_cpu_seconds, max_cpu_seconds + 1};
+  setrlimit(RLIMIT_CPU, &cpu);
+  alarm(max_seconds);
   const Outcome outcome =
       check_program(program.pipeline, program.schedule, get_jit_target_from_environment());
   const ssize_t written = write(descriptor, outcome.detail.data(), outcome.detail.size());
