@@ -4,6 +4,7 @@
 #include <map>
 
 #include "autodiff/default_schedule.h"
+#include "autodiff/local_derivative.h"
 #include "autodiff/regions.h"
 #include "frontend/define.h"
 #include "frontend/var.h"
@@ -76,6 +77,21 @@ struct UpdateGroup {
   std::vector<Expr> sums;  // one a value; undefined: nothing is added
 };
 
+// Whether elements that it reaches, or between them, may be exactly 0 for a reason.
+bool leaves_zeros(const Contribution& c) {
+  bool everywhere =
+      std::all_of(c.gather.pure.begin(), c.gather.pure.end(), [](bool p) { return p; });
+  return may_be_masked(c.adjoint) || !everywhere ||
+         (c.gather.predicate.defined() && !is_range_condition(c.gather.predicate));
+}
+
+void note_masks(const FuncPtr& f, const std::vector<Expr>& adjoints, bool masks) {
+  auto* adjoint = dynamic_cast<AdjointContents*>(f.get());
+  if (!adjoint) return;
+  for (const Expr& e : adjoints) masks |= e.defined() && may_be_masked(e);
+  adjoint->masked |= masks;
+}
+
 // What two gathers must agree on, with the reduction variables numbered.
 std::string shape_of(const Gather& g) {
   Substitution canonical;
@@ -135,6 +151,8 @@ class Builder {
   AdjointFunc build(const std::vector<Contribution>& contributions,
                     const std::vector<Expr>& initial) {
     define_pointwise(contributions, initial);
+    bool masks = std::any_of(contributions.begin(), contributions.end(), leaves_zeros);
+    note_masks(result_.func, initial, masks);
     for (const UpdateGroup& group : group_updates(contributions, target_.types.size())) {
       is_worth_splitting(group.gather) ? add_privatised(group) : add_update(group);
     }
@@ -313,6 +331,7 @@ Expr call_value(const FuncPtr& f, const std::vector<Expr>& args, int index) {
 void append_update(const FuncPtr& f, std::vector<Expr> args, std::vector<Expr> values,
                    const std::vector<ReductionVariable>& rvars, Expr predicate) {
   Definition update;
+  note_masks(f, values, false);
   for (Expr& e : args) e = cast_to(Int(32), e);
   update.args = std::move(args);
   update.values = std::move(values);

@@ -17,6 +17,9 @@ namespace retrograde::ir {
 
 // A Func made by differentiation.
 struct AdjointContents : FuncContents {
+  // Exactly 0 where a consumer chose another branch or reads nothing: what multiplies it there may
+  // be infinite or NaN, so the product takes a strong zero.
+  bool masked = false;
   FuncPtr copy() const override { return std::make_shared<AdjointContents>(*this); }
 };
 

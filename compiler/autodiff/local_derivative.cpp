@@ -1,5 +1,6 @@
 #include "autodiff/local_derivative.h"
 
+#include "autodiff/default_schedule.h"
 #include "diagnostics/error.h"
 #include "ir/build.h"
 
@@ -164,6 +165,22 @@ LocalDerivative local_derivative(const Expr& e, const ExprFacts& facts) {
         unsupported(text("differentiate ", kind_name(node.kind)),
                     derivative_rule(node.kind).convention);
       });
+}
+
+bool may_be_masked(const Expr& adjoint) {
+  Expr top = adjoint;
+  while (const auto* cast = top.as<Cast>()) top = cast->value;
+  bool found = false, is_bare = is_leaf(top) && top.as<Call>();
+  walk(adjoint, [&](const Expr& e) {
+    if (e.type().is_float() && e.as<Select>()) found = true;
+    const auto* call = e.as<Call>();
+    if (!call || call->call_type != CallType::Func) return !found;
+    const auto* f = dynamic_cast<const AdjointContents*>(call->symbol.raw());
+    if (e.same_as(top) && f) is_bare = false;
+    found |= f && f->masked;
+    return !found;
+  });
+  return found || is_bare;
 }
 
 namespace {

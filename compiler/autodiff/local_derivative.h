@@ -64,6 +64,10 @@ struct LocalDerivative {
 // Unsupported where there is no rule.
 LocalDerivative local_derivative(const Expr& e, const ExprFacts& facts);
 
+// Whether an adjoint may be exactly 0 because a branch was not taken, here or in a Func between
+// here and the output. A seed that the user gives counts as one.
+bool may_be_masked(const Expr& adjoint);
+
 // The expression with its lets substituted: a DAG without names.
 Expr without_lets(const Expr& e);
 

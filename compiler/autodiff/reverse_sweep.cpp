@@ -17,7 +17,8 @@ class Sweep {
       : order_(post_order(values)), facts_(order_, is_wanted, [](const Expr&) { return false; }) {
     result_.notes = facts_.notes();
     for (size_t i = 0; i < values.size(); ++i) {
-      if (values[i].defined() && seeds[i].defined()) add(values[i], seeds[i], false);
+      if (values[i].defined() && seeds[i].defined())
+        add(values[i], seeds[i], may_be_masked(seeds[i]));
     }
   }
 

@@ -1,0 +1,116 @@
+// Strong zeros across Funcs: where the true derivative is finite, infinite or NaN values that the
+// output does not use leave no trace in the gradient. The expected values are worked out by hand.
+#include <limits>
+
+#include "autodiff/tangents.h"
+#include "gradient/gradient_check.h"
+
+namespace retrograde::gradient {
+namespace {
+
+constexpr float inf = std::numeric_limits<float>::infinity();
+const float nan = std::nanf("");
+
+class StrongZeros : public ::testing::Test {
+ protected:
+  Var x{"x"};
+  Buffer<float> a = Buffer<float>(4), b = Buffer<float>(4);
+
+  void set(Buffer<float>& buffer, const std::vector<float>& values) {
+    for (int i = 0; i < 4; ++i) buffer(i) = values[static_cast<size_t>(i)];
+  }
+  static Func sum_of(const Func& f) {
+    Func loss("loss");
+    RDom r(0, 4);
+    loss() += f(r);
+    return loss;
+  }
+  // By the interpreter, as machine code, and by one tangent for each element.
+  void expect(const Func& f, Buffer<float>& wrt, const std::vector<float>& expected) {
+    Func loss = sum_of(f);
+    Func gradient = propagate_adjoints(loss)(wrt);
+    oracle::Array interpreted = evaluate(gradient, {{0}, {4}});
+    Buffer<float> compiled = gradient.realize({4});
+    for (int i = 0; i < 4; ++i) {
+      const float e = expected[static_cast<size_t>(i)];
+      EXPECT_NEAR(interpreted.at({i}).scalar.as_double(), e, 1e-5) << "element " << i;
+      EXPECT_NEAR(compiled(i), e, 1e-5) << "element " << i;
+      Buffer<float> unit(4);
+      unit.fill(0);
+      unit(i) = 1;
+      EXPECT_NEAR(evaluate_scalar(propagate_tangents(loss, {{wrt, unit}})(loss)), e, 1e-5);
+    }
+  }
+};
+
+TEST_F(StrongZeros, ASelectInTheConsumerGuardsAChainOfFuncs) {
+  set(a, {0, 1, 4, -1});
+  Func logarithm("logarithm"), root("root"), product("product"), f("f");
+  logarithm(x) = log(a(x));  // -inf at 0, NaN at -1
+  root(x) = sqrt(a(x));
+  product(x) = logarithm(x) * root(x);
+  f(x) = select(a(x) > 0, product(x), 3.0f * a(x));
+  expect(f, a, {3, 1, std::log(4.0f) / 4 + 0.5f, 3});
+}
+
+TEST_F(StrongZeros, InfiniteAndNaNInputsOfAnUnselectedFunc) {
+  set(a, {inf, nan, 2, -inf});
+  Func square("square"), f("f");
+  square(x) = a(x) * a(x);
+  f(x) = select(is_finite(a(x)), square(x), 0.0f);
+  Func gradient = propagate_adjoints(sum_of(f))(a);
+  Buffer<float> found = gradient.realize({4});
+  for (int i = 0; i < 4; ++i) EXPECT_EQ(found(i), i == 2 ? 4.0f : 0.0f) << i;
+}
+
+TEST_F(StrongZeros, OverflowOfAProductInAnUnselectedFunc) {
+  set(a, {1e30f, 2, 1e25f, 3});
+  Func square("square"), fourth("fourth"), f("f");
+  square(x) = a(x) * a(x);
+  fourth(x) = square(x) * square(x);
+  f(x) = select(a(x) > 100.0f, a(x), fourth(x));
+  expect(f, a, {1, 32, 1, 108});
+}
+
+TEST_F(StrongZeros, SaturatedByClampAndMaximum) {
+  set(a, {1e30f, 2, 0.5f, 1e20f});
+  set(b, {1e30f, 0.25f, 0.5f, 1e30f});
+  Func product("product"), f("f");
+  product(x) = a(x) * b(x);
+  f(x) = min(clamp(product(x), 0.0f, 1.0f), 0.75f);
+  expect(f, a, {0, 0.25f, 0.5f, 0});
+}
+
+TEST_F(StrongZeros, ElementsThatNobodyReads) {
+  set(a, {2, 1, 3, 1});
+  set(b, {4, 0, 5, 0});
+  Func inverse("inverse"), product("product"), f("f");
+  inverse(x) = 1.0f / b(x);
+  product(x) = a(x) * inverse(x);
+  f(x) = product(x / 2 * 2);  // each even element twice
+  expect(f, a, {0.5f, 0, 0.4f, 0});
+}
+
+TEST_F(StrongZeros, SeedsOfZero) {
+  set(a, {2, 0, 3, 0});
+  set(b, {1, 0, 1, 0});
+  Func inverse("inverse"), product("product");
+  inverse(x) = 1.0f / a(x);
+  product(x) = inverse(x) * a(x) * a(x);
+  Buffer<float> found = propagate_adjoints(product, b)(a).realize({4});
+  for (int i = 0; i < 4; ++i) EXPECT_NEAR(found(i), i % 2 ? 0.0f : 1.0f, 1e-6) << i;
+}
+
+TEST_F(StrongZeros, NaNsThatTheOutputUsesStay) {
+  set(a, {-1, 4, 1, 1});
+  set(b, {2, 2, 2, 2});
+  Func root("root"), f("f");
+  root(x) = sqrt(a(x));
+  f(x) = select(b(x) > 1, root(x) * b(x), 0.0f);
+  Buffer<float> found = propagate_adjoints(sum_of(f))(a).realize({4});
+  EXPECT_TRUE(std::isnan(found(0)));
+  EXPECT_NEAR(found(1), 0.5f, 1e-6);
+}
+
+}  // namespace
+}  // namespace retrograde::gradient
