@@ -25,6 +25,8 @@
 //         intervals is the steady state. Inner loops are then partitioned in the steady state
 //         only; in the rest too where the rest may be large (a border of whole tiles) and the body
 //         is small.
+//         A loop is cut only if that saves something that is worth the copies (`Saving` in
+//         steady_state.h), or if the schedule says always.
 // Not done: a condition that both this loop and an inner loop of unknown extent decide: it is left
 //         to the inner loop. Ends that depend on the lane of an enclosing vectorized loop: the
 //         worst lane decides.
@@ -32,15 +34,10 @@
 // Tests: test/golden/lower/partition_loops/, test/property/loop_passes_test.cpp.
 #include "lower/partition_loops.h"
 
-#include <algorithm>
-#include <unordered_map>
-
-#include "analysis/interval.h"
-#include "analysis/linear.h"
-#include "diagnostics/error.h"
 #include "ir/build.h"
 #include "ir/visit.h"
 #include "lower/copy_statement.h"
+#include "lower/steady_state.h"
 #include "simplify/simplify.h"
 
 namespace retrograde::ir {
@@ -49,15 +46,8 @@ namespace {
 
 // Border bodies with more nodes than this are not partitioned further.
 constexpr int small_body = 1500;
-// A border is thick when the inner loops that a condition is about run a serial loop of at least
-// this extent, ...
-constexpr int64_t thick_loop = 8;
-// ... and at least this many points in all: a tile then, and not a stencil or a vector.
-constexpr int64_t thick_points = 32;
-
-bool is_likely(const Call* call) {
-  return call && (call->is_op(Op::likely) || call->is_op(Op::likely_if_innermost));
-}
+// An operation less an iteration is worth a copy of a body that has up to this many nodes.
+constexpr int nodes_an_operation = 64;
 
 bool contains_likely(const Stmt& s) {
   bool found = false;
@@ -71,16 +61,6 @@ bool contains_likely(const Stmt& s) {
   return found;
 }
 
-class MarkerRemover : public Rewriter {
- protected:
-  Expr rewrite(const Expr& e) override {
-    Expr copy = children(e);
-    const Call* call = copy.as<Call>();
-    return is_likely(call) ? call->args[0] : copy;
-  }
-  Stmt rewrite(const Stmt& s) override { return children(s); }
-};
-
 int node_count(const Stmt& s) {
   int count = 0;
   auto visit = [&](const auto&) { return ++count, true; };
@@ -88,229 +68,6 @@ int node_count(const Stmt& s) {
       s, [&](const Expr& e) { return visit(e); }, [&](const Stmt& child) { return visit(child); });
   return count;
 }
-
-bool is_serial(const For& loop) {
-  return loop.for_type == ForType::Serial || loop.for_type == ForType::Parallel;
-}
-
-// Names whose values a solution may not mention: what a let stands for, and between what a loop
-// variable lies.
-class Context {
- public:
-  void add_let(const std::string& name, const Expr& value) {
-    if (is_pure(value)) {
-      lets_[name] = expand(value);
-    } else {
-      ranges_.push(name, Interval::everything());
-    }
-  }
-  void add_range(const std::string& name, const Interval& range) { ranges_.push(name, range); }
-  void add_loop(const For& loop) {
-    Expr last =
-        binary(Kind::Sub, binary(Kind::Add, loop.min, loop.extent), make_one(loop.min.type()));
-    add_range(loop.name,
-              {bounds_of(expand(loop.min), ranges_).min, bounds_of(expand(last), ranges_).max});
-  }
-  // Without lets and markers.
-  Expr expand(const Expr& e) const { return MarkerRemover()(substitute(e, lets_)); }
-  const Scope<Interval>& ranges() const { return ranges_; }
-
- private:
-  static bool is_pure(const Expr& e) {
-    if (!e.type().is_int_or_uint() || !e.type().is_scalar()) return false;
-    bool pure = true;
-    walk(e, [&](const Expr& node) {
-      const Call* call = node.as<Call>();
-      pure &= node.kind() != Kind::Load && node.kind() != Kind::Let;
-      pure &= !call ||
-              (call->call_type == CallType::Operator && op_info(call->op).cls != OpClass::Effect);
-      return pure;
-    });
-    return pure;
-  }
-
-  Substitution lets_;
-  Scope<Interval> ranges_;
-};
-
-// Where the steady state of one loop lies.
-struct SteadyState {
-  Interval range;                 // of the loop variable
-  Expr needed;                    // and only if this holds; undefined: always
-  bool has_thick_border = false;  // some iteration of the rest is a tile or more
-  int solved = 0;
-};
-
-// Rewrites the body of a loop for its steady state, and finds where that lies.
-class SteadyRewriter : public Rewriter {
- public:
-  SteadyRewriter(const For& loop, const Context& outer)
-      : loop_(loop), context_(outer), dependent_{loop.name} {}
-  const SteadyState& steady() const { return steady_; }
-
- protected:
-  Expr rewrite(const Expr& e) override {
-    if (const Let* n = e.as<Let>()) return rewrite_let(e, *n);
-    if (const Variable* v = e.as<Variable>()) {
-      auto it = decided_lets_.find(v->name);
-      return it == decided_lets_.end() ? e : it->second;
-    }
-    Expr copy = children(e);
-    if (const Call* n = e.as<Call>(); is_likely(n) && e.type().is_bool() && is_mark(*n)) {
-      return holds(copy.as<Call>()->args[0], true) ? const_true() : copy;
-    }
-    if (e.kind() == Kind::Min || e.kind() == Kind::Max)
-      return rewrite_extreme(*e.as<Binary>(), copy);
-    if (const Select* n = e.as<Select>()) return rewrite_select(*n, copy);
-    return copy;
-  }
-
-  Stmt rewrite(const Stmt& s) override {
-    if (const LetStmt* n = s.as<LetStmt>()) {
-      Expr value = bind(n->name, n->value);
-      Stmt body = (*this)(n->body);
-      return value.same_as(n->value) && body.same_as(n->body) ? s : make_let(n->name, value, body);
-    }
-    if (const For* n = s.as<For>()) return rewrite_loop(s, *n);
-    Stmt copy = children(s);
-    const IfThenElse* n = copy.defined() ? copy.as<IfThenElse>() : nullptr;
-    if (n && is_const_true(n->condition)) return n->then_case;
-    if (n && is_const_false(n->condition)) return n->else_case;
-    return copy;
-  }
-
- private:
-  Expr rewrite_let(const Expr& e, const Let& n) {
-    Expr value = bind(n.name, n.value);
-    Expr body = (*this)(n.body);
-    return value.same_as(n.value) && body.same_as(n.body) ? e : make_let(n.name, value, body);
-  }
-
-  // The value of a let. Marks and decided conditions go on into the body.
-  Expr bind(const std::string& name, const Expr& original) {
-    Expr value = (*this)(original);
-    context_.add_let(name, value);
-    marked_lets_[name] = mark(original);
-    if (is_const(value) && !value.same_as(original)) decided_lets_[name] = value;
-    return value;
-  }
-
-  // Inner loops of unknown extent keep their variables to themselves.
-  Stmt rewrite_loop(const Stmt& s, const For& n) {
-    auto extent = as_const_int(simplify(n.extent));
-    if (!is_serial(n) || extent) {
-      inner_extents_[n.name] = extent.value_or(1);
-      context_.add_loop(n);
-      if (uses_any_variable(context_.expand(n.min), dependent_)) dependent_.insert(n.name);
-    } else {
-      context_.add_range(n.name, Interval::everything());
-    }
-    if (is_serial(n)) inner_serial_.insert(n.name);
-    Stmt copy = children(s);
-    return copy;
-  }
-
-  Expr rewrite_extreme(const Binary& n, const Expr& copy) {
-    const Binary* op = copy.as<Binary>();
-    const Mark a_mark = mark(n.a), b_mark = mark(n.b);
-    if (a_mark == b_mark || !op || copy.kind() != n.kind) return copy;
-    const Expr& kept = a_mark > b_mark ? op->a : op->b;
-    const Expr& other = a_mark > b_mark ? op->b : op->a;
-    bool decided = holds(binary(n.kind == Kind::Min ? Kind::LE : Kind::GE, kept, other), true);
-    return decided ? kept : copy;
-  }
-
-  Expr rewrite_select(const Select& n, const Expr& copy) {
-    const Select* op = copy.as<Select>();
-    const Mark t_mark = mark(n.true_value), f_mark = mark(n.false_value);
-    if (t_mark == f_mark || !op) return copy;
-    if (!holds(op->condition, t_mark > f_mark)) return copy;
-    return t_mark > f_mark ? op->true_value : op->false_value;
-  }
-
-  // ---- marks ----
-
-  bool is_mark(const Call& call) const { return call.is_op(Op::likely) || inner_serial_.empty(); }
-
-  // In the order of what wins.
-  enum class Mark : uint8_t { None, Decided, Likely };
-
-  // Whether e is computed from something marked, not counting what it loads.
-  Mark mark(const Expr& e) {
-    if (auto it = marks_.find(e.get()); it != marks_.end()) return it->second;
-    const auto decided = [&](const Expr& a, const Expr& b) {
-      return std::max(mark(a), mark(b)) == Mark::None ? Mark::None : Mark::Decided;
-    };
-    const auto arithmetic = [&](const Binary& n) {
-      if (n.type.is_bool()) return Mark::None;
-      if (n.kind == Kind::Min || n.kind == Kind::Max) return decided(n.a, n.b);
-      const Mark strongest = std::max(mark(n.a), mark(n.b));
-      return n.kind == Kind::Mod && strongest == Mark::Decided ? Mark::None : strongest;
-    };
-    const Mark result = match(
-        e,
-        [&](const Variable& n) {
-          auto it = marked_lets_.find(n.name);
-          return it == marked_lets_.end() ? Mark::None : it->second;
-        },
-        [&](const Call& n) {
-          if (is_likely(&n)) return is_mark(n) ? Mark::Likely : mark(n.args[0]);
-          bool is_promise = n.is_op(Op::promise_clamped) || n.is_op(Op::unsafe_promise_clamped);
-          return is_promise ? mark(n.args[0]) : Mark::None;
-        },
-        [&](const Cast& n) { return mark(n.value); }, [&](const Let& n) { return mark(n.body); },
-        [&](const Select& n) { return decided(n.true_value, n.false_value); }, arithmetic,
-        [&](const ExprNode&) { return Mark::None; });
-    marks_.emplace(e.get(), result);
-    return result;
-  }
-
-  // ---- conditions ----
-
-  // Whether the steady state can be where the condition is `is_true`; then it is from now on.
-  bool holds(const Expr& condition, bool is_true) {
-    Expr expanded = context_.expand(is_true ? condition : logical_not(condition));
-    if (!uses_any_variable(expanded, dependent_)) return false;
-    auto solution = solve_for(expanded, loop_.name, context_.ranges());
-    if (!solution) return false;
-    ++steady_.solved;
-    steady_.range = intersection(steady_.range, solution->interval);
-    if (solution->needed.defined()) {
-      steady_.needed = steady_.needed.defined()
-                           ? binary(Kind::And, steady_.needed, solution->needed)
-                           : solution->needed;
-    }
-    steady_.has_thick_border |= is_about_tiles(expanded);
-    return true;
-  }
-
-  bool is_about_tiles(const Expr& condition) const {
-    std::unordered_set<std::string> names;
-    walk(condition, [&](const Expr& e) {
-      if (const Variable* v = e.as<Variable>()) names.insert(v->name);
-      return true;
-    });
-    int64_t points = 1, longest = 0;
-    for (const std::string& name : names) {
-      auto it = inner_extents_.find(name);
-      if (it == inner_extents_.end()) continue;
-      points *= it->second;
-      if (inner_serial_.count(name)) longest = std::max(longest, it->second);
-    }
-    return longest >= thick_loop && points >= thick_points;
-  }
-
-  const For& loop_;
-  Context context_;
-  SteadyState steady_;
-  std::unordered_set<std::string>
-      dependent_;  // the loop's variable, and those of inner loops that start from it
-  std::unordered_set<std::string> inner_serial_;
-  std::unordered_map<std::string, int64_t> inner_extents_;  // constant ones
-  std::unordered_map<std::string, Mark> marked_lets_;
-  std::unordered_map<std::string, Expr> decided_lets_;
-  std::unordered_map<const ExprNode*, Mark> marks_;  // of nodes of the body, which outlives this
-};
 
 class Partitioner : public Rewriter {
  public:
@@ -329,13 +86,20 @@ class Partitioner : public Rewriter {
  private:
   Stmt partition(const Stmt& s, const For& loop) {
     if (!is_serial(loop)) return inside_lanes(s, loop);
-    SteadyRewriter rewriter(loop, context_);
+    if (loop.partition == Partition::Never) return children(s);
+    SteadyRewriter rewriter(loop, context_, in_vectorized_ > 0);
     Stmt body = rewriter(loop.body);
     const SteadyState& steady = rewriter.steady();
-    if (steady.solved == 0) return children(s);
+    if (steady.solved == 0 || !is_worth_copies(loop, steady.saving)) return children(s);
     Stmt rest = loop.body;
     if (steady.has_thick_border && node_count(rest) <= small_body) rest = (*this)(rest);
     return assemble(loop, (*this)(body), rest, steady);
+  }
+
+  static bool is_worth_copies(const For& loop, const Saving& saving) {
+    if (saving.always_pays || loop.partition == Partition::Always) return true;
+    if (saving.operations == 0) return false;
+    return saving.divides || node_count(loop.body) <= nodes_an_operation * saving.operations;
   }
 
   // Loops inside a vectorized one have the same bounds in all lanes.
@@ -422,7 +186,7 @@ class Partitioner : public Rewriter {
   }
 
   FreshNames fresh_;
-  Context context_;
+  PartitionContext context_;
   int in_vectorized_ = 0;
 };
 
