@@ -1,39 +1,27 @@
-// The way through LLVM: generate, optimize, emit.
+// The way through LLVM: generate, optimize, emit. What the JIT compiles is split after the first
+// step, and its parts go on at the same time; a file of its own is one module from start to end.
 #include "codegen/codegen.h"
 
-#include <llvm/Bitcode/BitcodeWriter.h>
-#include <llvm/IR/LegacyPassManager.h>
 #include <llvm/IR/Verifier.h>
+#include <llvm/Object/ArchiveWriter.h>
 #include <llvm/Support/raw_ostream.h>
-#include <llvm/Target/TargetMachine.h>
-#include <llvm/Transforms/Utils/Cloning.h>
 
 #include <algorithm>
-#include <chrono>
+#include <exception>
+#include <system_error>
+#include <thread>
 #include <utility>
 
 #include "codegen/function_generator.h"
 #include "codegen/make_exports.h"
-#include "codegen/optimize.h"
+#include "codegen/split_module.h"
+#include "codegen/stopwatch.h"
+#include "codegen/unit.h"
 #include "diagnostics/error.h"
 #include "diagnostics/large_stack.h"
 
 namespace retrograde::codegen {
 namespace {
-
-// Seconds since the last reading.
-class Stopwatch {
- public:
-  double lap() {
-    const auto now = std::chrono::steady_clock::now();
-    const double seconds = std::chrono::duration<double>(now - last_).count();
-    last_ = now;
-    return seconds;
-  }
-
- private:
-  std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
-};
 
 void verify(const llvm::Module& module) {
   std::string problem;
@@ -45,148 +33,163 @@ void verify(const llvm::Module& module) {
   throw InternalError("LLVM rejects the generated code: " + problem, "codegen", program);
 }
 
-// One compilation: nothing in it is shared with another.
-class Compilation {
- public:
-  // Names of values cost time, and only people read them.
-  Compilation(const Program& program, const Options& options, bool keep_names)
-      : machine_(machine_for(options.target, options.tune_for_host)),
-        target_machine_(make_target_machine(machine_)),
-        module_(program.functions.empty() ? "retrograde" : program.functions[0].name, context_) {
-    context_.setDiscardValueNames(!keep_names);
-    Stopwatch watch;
-    module_.setTargetTriple(machine_.triple);
-    module_.setDataLayout(target_machine_->createDataLayout());
-    Emitter emitter(module_, machine_);
-    for (const ir::LoweredFunction& function : program.functions)
-      FunctionGenerator(emitter, function).generate();
-    add_exports(emitter, program);
-    verify(module_);
-    times.generate_seconds = watch.lap();
-    if (options.optimization_level > 0) optimize(module_, *target_machine_);
-    times.optimize_seconds = watch.lap();
+// The function itself is called through its export; its argv form is not needed.
+void add_exports(Emitter& emitter, const Program& program) {
+  for (const Export& e : program.exports) {
+    const std::string& name = program.functions[e.function].name;
+    emitter.module.getFunction(name + "_argv")->eraseFromParent();
+    make_export(emitter, e, emitter.module.getFunction(name));
   }
+  for (const Dispatch& dispatch : program.dispatches) make_dispatch(emitter, dispatch);
+}
 
-  // Emitting changes the module: what comes later is emitted from `source`, a copy.
-  std::string emit(llvm::CodeGenFileType type, llvm::Module& source) {
-    Stopwatch watch;
-    llvm::SmallVector<char, 0> bytes;
-    llvm::raw_svector_ostream out(bytes);
-    llvm::legacy::PassManager passes;
-    const bool failed = target_machine_->addPassesToEmitFile(passes, out, nullptr, type);
-    RETROGRADE_ASSERT(!failed, "LLVM cannot write machine code for ", machine_.triple);
-    passes.run(source);
-    times.emit_seconds = watch.lap();
-    return std::string(bytes.begin(), bytes.end());
-  }
+void generate(const Program& program, const Machine& machine, Unit& unit) {
+  Stopwatch watch;
+  Emitter emitter(unit.module(), machine);
+  for (const ir::LoweredFunction& function : program.functions)
+    FunctionGenerator(emitter, function).generate();
+  add_exports(emitter, program);
+  verify(unit.module());
+  unit.times.generate_seconds = watch.lap();
+}
 
-  std::string emit(llvm::CodeGenFileType type) { return emit(type, module_); }
-
-  std::string emit(Format format) {
-    switch (format) {
-      case Format::LlvmIr:
-        return print();
-      case Format::Bitcode:
-        return bitcode();
-      default:
-        target_machine_->Options.MCOptions.AsmVerbose = true;  // comments name blocks and spills
-        return emit(format == Format::Object ? llvm::CodeGenFileType::ObjectFile
-                                             : llvm::CodeGenFileType::AssemblyFile,
-                    *llvm::CloneModule(module_));
-    }
-  }
-
-  std::string bitcode() {
-    std::string bytes;
-    llvm::raw_string_ostream out(bytes);
-    llvm::WriteBitcodeToFile(module_, out);
-    return bytes;
-  }
-
-  std::string print() {
-    std::string program;
-    llvm::raw_string_ostream out(program);
-    module_.print(out, nullptr);
-    return program;
-  }
-
-  std::vector<std::string> externals() const {
-    std::vector<std::string> names;
-    for (const llvm::Function& function : module_) {
-      if (function.isDeclaration() && !function.isIntrinsic())
-        names.push_back(function.getName().str());
-    }
-    std::sort(names.begin(), names.end());
-    return names;
-  }
-
-  Times times;
-
- private:
-  // The function itself is called through its export; its argv form is not needed.
-  void add_exports(Emitter& emitter, const Program& program) {
-    for (const Export& e : program.exports) {
-      const std::string& name = program.functions[e.function].name;
-      module_.getFunction(name + "_argv")->eraseFromParent();
-      make_export(emitter, e, module_.getFunction(name));
-    }
-    for (const Dispatch& dispatch : program.dispatches) make_dispatch(emitter, dispatch);
-  }
-
-  Machine machine_;
-  std::unique_ptr<llvm::TargetMachine> target_machine_;
-  llvm::LLVMContext context_;
-  llvm::Module module_;
-};
-
-}  // namespace
-
-// Compiles on a deep stack and gives what `use` makes of the compilation.
+// Generates on a deep stack and gives what `use` makes of it there.
 template <typename Use>
-static auto compile(const Program& program, const Options& options, bool keep_names,
+auto with_generated(const Program& program, const Options& options, bool keep_names,
                     const Use& use) {
-  decltype(use(std::declval<Compilation&>())) result;
+  decltype(use(std::declval<Unit&>(), std::declval<const Machine&>())) result;
   run_on_large_stack([&] {
-    Compilation compilation(program, options, keep_names);
-    result = use(compilation);
+    const Machine machine = machine_for(options.target, options.tune_for_host);
+    const bool is_empty = program.functions.empty();
+    Unit unit(machine, is_empty ? "retrograde" : program.functions[0].name, keep_names);
+    generate(program, machine, unit);
+    result = use(unit, machine);
   });
   return result;
 }
 
-Module compile_object(const std::vector<ir::LoweredFunction>& functions, const Options& options) {
-  return compile({functions, {}, {}}, options, false, [](Compilation& compilation) {
-    Module result;
-    result.externals = compilation.externals();
-    const std::string bytes = compilation.emit(llvm::CodeGenFileType::ObjectFile);
-    result.object.assign(bytes.begin(), bytes.end());
-    result.times = compilation.times;
-    return result;
+template <typename Use>
+auto with_optimized(const Program& program, const Options& options, bool keep_names,
+                    const Use& use) {
+  return with_generated(program, options, keep_names, [&](Unit& unit, const Machine&) {
+    if (options.optimization_level > 0) unit.optimize();
+    return use(unit);
   });
 }
 
+// ---- the parts of a program at the same time ----
+
+struct Part {
+  std::string object;
+  Times times;
+  std::exception_ptr problem;
+};
+
+void finish(Unit& unit, const Options& options, Part& part) {
+  if (options.optimization_level > 0) unit.optimize();
+  part.object = unit.emit_last(llvm::CodeGenFileType::ObjectFile);
+  part.times = unit.times;
+}
+
+void compile_part(const std::string& name, const std::string& bitcode, const Machine& machine,
+                  const Options& options, Part& part) {
+  try {
+    run_on_large_stack([&] {
+      Unit unit(machine, name, bitcode);
+      finish(unit, options, part);
+    });
+  } catch (...) {
+    part.problem = std::current_exception();
+  }
+}
+
+std::vector<Part> compile_parts(const std::string& name, const std::vector<std::string>& bitcode,
+                                const Machine& machine, const Options& options) {
+  std::vector<Part> parts(bitcode.size());
+  const auto run = [&](size_t i) { compile_part(name, bitcode[i], machine, options, parts[i]); };
+  {
+    std::vector<std::jthread> threads;  // joined at the end of the block
+    threads.reserve(parts.size());
+    for (size_t i = 1; i < parts.size(); i++) {
+      try {
+        threads.emplace_back(run, i);
+      } catch (const std::system_error&) {  // no more threads to be had
+        run(i);
+      }
+    }
+    run(0);
+  }
+  for (const Part& part : parts) {
+    if (part.problem) std::rethrow_exception(part.problem);
+  }
+  return parts;
+}
+
+std::string archive_of(const std::vector<Part>& parts) {
+  std::vector<llvm::NewArchiveMember> members;
+  for (const Part& part : parts) members.emplace_back(llvm::MemoryBufferRef(part.object, "part.o"));
+  auto buffer = llvm::writeArchiveToBuffer(members, llvm::SymtabWritingMode::NoSymtab,
+                                           llvm::object::Archive::K_GNU, /*Deterministic=*/true,
+                                           /*Thin=*/false);
+  if (!buffer) internal_error("writing an archive: " + llvm::toString(buffer.takeError()));
+  return (*buffer)->getBuffer().str();
+}
+
+// The parts run at the same time: what is told is how long the slowest took.
+void join_times(const std::vector<Part>& parts, Times& times) {
+  for (const Part& part : parts) {
+    times.optimize_seconds = std::max(times.optimize_seconds, part.times.optimize_seconds);
+    times.emit_seconds = std::max(times.emit_seconds, part.times.emit_seconds);
+  }
+}
+
+Module compile_unit(Unit& unit, const Machine& machine, const Options& options) {
+  const unsigned count = options.parts ? options.parts : worthwhile_parts(unit.module());
+  Module result;
+  result.externals = unit.externals();
+  result.times = unit.times;
+  std::vector<Part> parts(1);
+  if (count == 1) {
+    finish(unit, options, parts[0]);
+  } else {
+    Stopwatch watch;
+    const std::vector<std::string> bitcode = split_into_bitcode(unit.module(), count);
+    result.times.generate_seconds += watch.lap();
+    parts = compile_parts(unit.module().getModuleIdentifier(), bitcode, machine, options);
+  }
+  const std::string bytes = count == 1 ? std::move(parts[0].object) : archive_of(parts);
+  result.object.assign(bytes.begin(), bytes.end());
+  join_times(parts, result.times);
+  return result;
+}
+
+}  // namespace
+
 Module compile_object(const ir::LoweredFunction& function, const Options& options) {
-  return compile_object(std::vector<ir::LoweredFunction>{function}, options);
+  return with_generated(
+      {{function}, {}, {}}, options, /*keep_names=*/false,
+      [&](Unit& unit, const Machine& machine) { return compile_unit(unit, machine, options); });
 }
 
 std::map<Format, std::string> compile_program(const Program& program, const Options& options,
                                               const std::vector<Format>& formats) {
   bool keep_names = false;  // an object needs none
   for (Format format : formats) keep_names = keep_names || format != Format::Object;
-  return compile(program, options, keep_names, [&](Compilation& compilation) {
+  return with_optimized(program, options, keep_names, [&](Unit& unit) {
     std::map<Format, std::string> result;
-    for (Format format : formats) result[format] = compilation.emit(format);
+    for (Format format : formats) result[format] = unit.emit(format);
     return result;
   });
 }
 
 std::string compile_llvm_ir(const ir::LoweredFunction& function, const Options& options) {
-  return compile({{function}, {}, {}}, options, true,
-                 [](Compilation& compilation) { return compilation.print(); });
+  return with_optimized({{function}, {}, {}}, options, /*keep_names=*/true,
+                        [](Unit& unit) { return unit.emit(Format::LlvmIr); });
 }
 
 std::string compile_assembly(const ir::LoweredFunction& function, const Options& options) {
-  return compile({{function}, {}, {}}, options, true, [](Compilation& compilation) {
-    return compilation.emit(llvm::CodeGenFileType::AssemblyFile);
+  return with_optimized({{function}, {}, {}}, options, /*keep_names=*/true, [](Unit& unit) {
+    return unit.emit_last(llvm::CodeGenFileType::AssemblyFile);
   });
 }
 

@@ -21,6 +21,9 @@ struct Options {
   bool tune_for_host = true;
   // 0: straight from the IR; 1: what the passes of optimize.cpp make of it.
   int optimization_level = 1;
+  // Of compile_object: into how many parts the program is cut, which are compiled at the same time.
+  // 0: what its size and the machine's cores suggest.
+  unsigned parts = 0;
 };
 
 struct Times {
@@ -30,14 +33,13 @@ struct Times {
 };
 
 struct Module {
-  std::vector<uint8_t> object;         // ELF, relocatable
+  std::vector<uint8_t> object;         // ELF, relocatable; of several parts an archive of such
   std::vector<std::string> externals;  // symbols that it needs, sorted
   Times times;
 };
 
 // InternalError when the function is not what lowering promises; Unsupported for a target without a
 // code generator.
-Module compile_object(const std::vector<ir::LoweredFunction>& functions, const Options& options);
 Module compile_object(const ir::LoweredFunction& function, const Options& options);
 
 // Ahead of time: functions that the exports refer to are reached through these alone.

@@ -186,6 +186,7 @@ Handle compile(const ir::LoweredFunction& function, const Target& target, const 
   codegen::Options code_options;
   code_options.target = target;
   code_options.optimization_level = options.optimization_level;
+  code_options.parts = options.parts;
   if (!options.use_cache) return std::make_shared<Compiled>(function, code_options, options.externs);
   const Fingerprint key = key_of(function, code_options, options.externs);
   if (Handle found = cache().find(key)) return found;

@@ -48,6 +48,7 @@ class CompiledFunction {
 struct Options {
   bool use_cache = true;
   int optimization_level = 1;
+  unsigned parts = 0;  // that are compiled at the same time; 0: what suits size and machine
   // C functions that the code calls by name, before those of the runtime and the process.
   std::map<std::string, void*> externs = {};
 };

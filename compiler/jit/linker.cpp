@@ -7,8 +7,11 @@
 #include <llvm/ExecutionEngine/Orc/Core.h>
 #include <llvm/ExecutionEngine/Orc/ExecutorProcessControl.h>
 #include <llvm/ExecutionEngine/Orc/ObjectLinkingLayer.h>
+#include <llvm/Object/Archive.h>
 #include <llvm/Object/ObjectFile.h>
 #include <llvm/Support/MemoryBuffer.h>
+
+#include <set>
 
 #include "diagnostics/error.h"
 #include "jit/symbols.h"
@@ -26,17 +29,32 @@ void checked(llvm::Error error, const char* what) {
   if (error) internal_error(std::string(what) + ": " + llvm::toString(std::move(error)));
 }
 
-std::vector<std::string> undefined_symbols(llvm::MemoryBufferRef buffer) {
+// The object itself, or the members of an archive.
+std::vector<llvm::MemoryBufferRef> objects_in(llvm::MemoryBufferRef bytes) {
+  if (!bytes.getBuffer().starts_with("!<arch>")) return {bytes};
+  const auto archive = checked(llvm::object::Archive::create(bytes), "reading an archive");
+  std::vector<llvm::MemoryBufferRef> objects;
+  llvm::Error problem = llvm::Error::success();
+  for (const llvm::object::Archive::Child& member : archive->children(problem))
+    objects.push_back(checked(member.getMemoryBufferRef(), "reading an archive"));
+  checked(std::move(problem), "reading an archive");
+  return objects;
+}
+
+struct Symbols {
+  std::set<std::string> defined, undefined;
+};
+
+void add_symbols(llvm::MemoryBufferRef buffer, Symbols& symbols) {
   const auto object =
       checked(llvm::object::ObjectFile::createObjectFile(buffer), "reading an object file");
-  std::vector<std::string> names;
   for (const llvm::object::SymbolRef& symbol : object->symbols()) {
     const uint32_t flags = checked(symbol.getFlags(), "reading a symbol");
-    if (!(flags & llvm::object::SymbolRef::SF_Undefined)) continue;
     const std::string name = checked(symbol.getName(), "reading a symbol").str();
-    if (!name.empty()) names.push_back(name);
+    if (name.empty()) continue;
+    const bool is_undefined = flags & llvm::object::SymbolRef::SF_Undefined;
+    (is_undefined ? symbols.undefined : symbols.defined).insert(name);
   }
-  return names;
 }
 
 void* find_or_throw(const std::string& name, const std::string& function, const Externs& externs) {
@@ -86,16 +104,27 @@ class Linked : public LinkedObject {
 
   void add(const std::vector<uint8_t>& object, const std::string& name, const Externs& externs) {
     const llvm::StringRef bytes(reinterpret_cast<const char*>(object.data()), object.size());
-    auto buffer = llvm::MemoryBuffer::getMemBufferCopy(bytes, name);
-    llvm::orc::SymbolMap symbols;
-    for (const std::string& symbol : undefined_symbols(buffer->getMemBufferRef())) {
-      symbols[session_.intern(symbol)] = {
+    const std::vector<llvm::MemoryBufferRef> parts = objects_in({bytes, name});
+    Symbols symbols;
+    for (const llvm::MemoryBufferRef& part : parts) add_symbols(part, symbols);
+    define_externals(symbols, name, externs);
+    for (const llvm::MemoryBufferRef& part : parts) {
+      auto copy = llvm::MemoryBuffer::getMemBufferCopy(part.getBuffer(), name);
+      checked(layer_.add(library_, std::move(copy)), "linking");
+    }
+  }
+
+  // What no part defines.
+  void define_externals(const Symbols& symbols, const std::string& name, const Externs& externs) {
+    llvm::orc::SymbolMap addresses;
+    for (const std::string& symbol : symbols.undefined) {
+      if (symbols.defined.count(symbol)) continue;
+      addresses[session_.intern(symbol)] = {
           llvm::orc::ExecutorAddr::fromPtr(find_or_throw(symbol, name, externs)),
           llvm::JITSymbolFlags::Exported | llvm::JITSymbolFlags::Callable};
     }
-    checked(library_.define(llvm::orc::absoluteSymbols(std::move(symbols))),
+    checked(library_.define(llvm::orc::absoluteSymbols(std::move(addresses))),
             "defining the runtime's symbols");
-    checked(layer_.add(library_, std::move(buffer)), "linking");
   }
 
   void close() { llvm::consumeError(session_.endSession()); }

@@ -1,4 +1,4 @@
-// An object file brought into executable memory by LLVM's JITLink.
+// An object file, or an archive of several, brought into executable memory by LLVM's JITLink.
 #pragma once
 
 #include <cstdint>

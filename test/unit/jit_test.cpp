@@ -121,6 +121,42 @@ TEST(Jit, RunHandsPrintsOn) {
   EXPECT_EQ(lines, 100);
 }
 
+// Three parallel loops, so four functions; the first reads text that the others read, too.
+LoweredFunction three_loops() {
+  LoweredFunction f;
+  f.name = "three_loops";
+  f.args = {input("in", Float(32)), output("out", Float(32))};
+  std::vector<Stmt> loops;
+  for (int i = 0; i < 3; i++) {
+    const std::string name = "x" + std::to_string(i);
+    const Expr x = variable(name), index = make_ramp((x + i * 20) * 4, 1, 4);
+    const Expr in = make_load(Float(32, 4), "in", index);
+    const Expr shown = call_op(Op::error, Int(32), {Expr(-9), Expr("x = "), x});
+    loops.push_back(make_for(
+        name, 0, 20, ForType::Parallel,
+        make_block({make_assert(x >= 0, shown),
+                    make_store("out", call_op(Op::exp, {in}) + in * float(i), index)})));
+  }
+  f.body = make_block(loops);
+  return f;
+}
+
+TEST(Jit, PartsGiveWhatTheWholeGives) {
+  const auto results = [](unsigned parts) {
+    jit::Options options;
+    options.use_cache = false;
+    options.parts = parts;
+    Array in(Float(32), 240), out(Float(32), 240);
+    for (int i = 0; i < 240; i++) in.data<float>()[i] = 0.01f * float(i);
+    void* args[] = {in.raw(), out.raw()};
+    jit::compile(three_loops(), test_target(), options)->run(args);
+    return std::vector<float>(out.data<float>(), out.data<float>() + 240);
+  };
+  const std::vector<float> whole = results(1);
+  EXPECT_NEAR(whole[239], std::exp(2.39) + 2.39 * 2, 1e-4);
+  for (unsigned parts : {2u, 3u, 5u, 9u}) EXPECT_EQ(results(parts), whole) << parts;
+}
+
 TEST(Jit, CallsOfUnknownFunctionsAreUserErrors) {
   LoweredFunction f;
   f.name = "escapes";
@@ -263,6 +299,14 @@ TEST(Codegen, OutputIsDeterministic) {
     return codegen::compile_object(vector_sum(), options_for("x86-64-linux")).object;
   };
   EXPECT_EQ(object(), object());
+}
+
+TEST(Codegen, PartsAreAnArchiveAndDeterministic) {
+  codegen::Options options = options_for("x86-64-linux");
+  options.parts = 3;
+  const std::vector<uint8_t> object = codegen::compile_object(three_loops(), options).object;
+  EXPECT_EQ(std::string(object.begin(), object.begin() + 7), "!<arch>");
+  EXPECT_EQ(codegen::compile_object(three_loops(), options).object, object);
 }
 
 TEST(Codegen, UnknownTargetsAreUnsupported) {

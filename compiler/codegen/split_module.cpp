@@ -1,0 +1,98 @@
+#include "codegen/split_module.h"
+
+#include <llvm/Bitcode/BitcodeWriter.h>
+#include <llvm/IR/Module.h>
+#include <llvm/Support/raw_ostream.h>
+#include <llvm/Transforms/Utils/Cloning.h>
+
+#include <algorithm>
+#include <map>
+#include <thread>
+
+namespace retrograde::codegen {
+namespace {
+
+// Instructions that take LLVM several times as long as starting a thread and handing them over.
+constexpr unsigned worth_a_thread = 1000;
+
+using Parts = std::map<const llvm::GlobalValue*, unsigned>;
+
+std::vector<const llvm::Function*> largest_first(const llvm::Module& module) {
+  std::vector<const llvm::Function*> functions;
+  for (const llvm::Function& function : module) {
+    if (!function.isDeclaration()) functions.push_back(&function);
+  }
+  std::stable_sort(functions.begin(), functions.end(), [](const auto* a, const auto* b) {
+    return a->getInstructionCount() > b->getInstructionCount();
+  });
+  return functions;
+}
+
+Parts assign(const std::vector<const llvm::Function*>& functions, unsigned parts) {
+  std::vector<unsigned> sizes(parts, 0);
+  Parts result;
+  for (const llvm::Function* function : functions) {
+    const auto least = std::min_element(sizes.begin(), sizes.end());
+    *least += function->getInstructionCount();
+    result[function] = static_cast<unsigned>(least - sizes.begin());
+  }
+  return result;
+}
+
+bool is_local_constant(const llvm::GlobalValue& value) {
+  const auto* variable = llvm::dyn_cast<llvm::GlobalVariable>(&value);
+  return variable && variable->isConstant() && variable->hasLocalLinkage();
+}
+
+// Other parts must find it, and nobody else.
+void share(llvm::GlobalValue& value) {
+  if (!value.hasLocalLinkage()) return;
+  value.setLinkage(llvm::GlobalValue::ExternalLinkage);
+  value.setVisibility(llvm::GlobalValue::HiddenVisibility);
+}
+
+void erase_unused_constants(llvm::Module& module) {
+  for (llvm::GlobalVariable& variable : llvm::make_early_inc_range(module.globals())) {
+    if (is_local_constant(variable) && variable.use_empty()) variable.eraseFromParent();
+  }
+}
+
+std::string bitcode_of(const llvm::Module& module) {
+  std::string bytes;
+  llvm::raw_string_ostream out(bytes);
+  llvm::WriteBitcodeToFile(module, out);
+  return bytes;
+}
+
+}  // namespace
+
+unsigned worthwhile_parts(const llvm::Module& module) {
+  unsigned functions = 0;
+  for (const llvm::Function& function : module) functions += !function.isDeclaration();
+  const unsigned size = module.getInstructionCount() / worth_a_thread;
+  return std::max(1u, std::min({size, functions, std::thread::hardware_concurrency()}));
+}
+
+std::vector<std::string> split_into_bitcode(llvm::Module& module, unsigned parts) {
+  const std::vector<const llvm::Function*> functions = largest_first(module);
+  parts = std::min<unsigned>(parts, functions.size());
+  const Parts part_of = assign(functions, parts);
+  for (llvm::Function& function : module) share(function);
+  for (llvm::GlobalVariable& variable : module.globals()) {
+    if (!is_local_constant(variable)) share(variable);
+  }
+  std::vector<std::string> result;
+  for (unsigned part = 0; part < parts; part++) {
+    llvm::ValueToValueMapTy copies;
+    const auto belongs_here = [&](const llvm::GlobalValue* value) {
+      const auto found = part_of.find(value);
+      return is_local_constant(*value) || (found == part_of.end() ? 0 : found->second) == part;
+    };
+    const std::unique_ptr<llvm::Module> copy = llvm::CloneModule(module, copies, belongs_here);
+    erase_unused_constants(*copy);
+    result.push_back(bitcode_of(*copy));
+  }
+  return result;
+}
+
+}  // namespace retrograde::codegen

@@ -1,0 +1,89 @@
+#include "codegen/unit.h"
+
+#include <llvm/Bitcode/BitcodeReader.h>
+#include <llvm/Bitcode/BitcodeWriter.h>
+#include <llvm/IR/LegacyPassManager.h>
+#include <llvm/Support/raw_ostream.h>
+#include <llvm/Transforms/Utils/Cloning.h>
+
+#include <algorithm>
+
+#include "codegen/optimize.h"
+#include "codegen/stopwatch.h"
+#include "diagnostics/error.h"
+
+namespace retrograde::codegen {
+
+Unit::Unit(const Machine& machine, const std::string& name, bool keep_names)
+    : target_machine_(make_target_machine(machine)),
+      module_(std::make_unique<llvm::Module>(name, context_)) {
+  context_.setDiscardValueNames(!keep_names);
+  module_->setTargetTriple(machine.triple);
+  module_->setDataLayout(target_machine_->createDataLayout());
+}
+
+Unit::Unit(const Machine& machine, const std::string& name, const std::string& bitcode)
+    : target_machine_(make_target_machine(machine)) {
+  auto parsed = llvm::parseBitcodeFile(llvm::MemoryBufferRef(bitcode, name), context_);
+  if (!parsed)
+    internal_error("reading a part of " + name + ": " + llvm::toString(parsed.takeError()));
+  module_ = std::move(*parsed);
+}
+
+void Unit::optimize() {
+  Stopwatch watch;
+  codegen::optimize(*module_, *target_machine_);
+  times.optimize_seconds = watch.lap();
+}
+
+std::string Unit::emit(llvm::CodeGenFileType type, llvm::Module& source) {
+  Stopwatch watch;
+  llvm::SmallVector<char, 0> bytes;
+  llvm::raw_svector_ostream out(bytes);
+  llvm::legacy::PassManager passes;
+  const bool failed = target_machine_->addPassesToEmitFile(passes, out, nullptr, type);
+  RETROGRADE_ASSERT(!failed, "LLVM cannot write machine code for ", source.getTargetTriple());
+  passes.run(source);
+  times.emit_seconds = watch.lap();
+  return std::string(bytes.begin(), bytes.end());
+}
+
+std::string Unit::emit(Format format) {
+  switch (format) {
+    case Format::LlvmIr:
+      return print();
+    case Format::Bitcode:
+      return bitcode();
+    default:
+      target_machine_->Options.MCOptions.AsmVerbose = true;  // comments name blocks and spills
+      return emit(format == Format::Object ? llvm::CodeGenFileType::ObjectFile
+                                           : llvm::CodeGenFileType::AssemblyFile,
+                  *llvm::CloneModule(*module_));
+  }
+}
+
+std::string Unit::bitcode() const {
+  std::string bytes;
+  llvm::raw_string_ostream out(bytes);
+  llvm::WriteBitcodeToFile(*module_, out);
+  return bytes;
+}
+
+std::string Unit::print() const {
+  std::string program;
+  llvm::raw_string_ostream out(program);
+  module_->print(out, nullptr);
+  return program;
+}
+
+std::vector<std::string> Unit::externals() const {
+  std::vector<std::string> names;
+  for (const llvm::Function& function : *module_) {
+    if (function.isDeclaration() && !function.isIntrinsic())
+      names.push_back(function.getName().str());
+  }
+  std::sort(names.begin(), names.end());
+  return names;
+}
+
+}  // namespace retrograde::codegen
