@@ -5,9 +5,9 @@
 
 namespace retrograde::ir {
 
-void map_boxes(Emitted& code, const std::function<Box(const Box&)>& map) {
-  for (auto& [name, use] : code.uses) use.box = map(use.box);
-  for (auto& [name, box] : code.storage) box = map(box);
+void map_boxes(Needs& needs, const std::function<Box(const Box&)>& map) {
+  for (auto& [name, use] : needs.uses) use.box = map(use.box);
+  for (auto& [name, box] : needs.storage) box = map(box);
 }
 
 Box ranged_over(const std::vector<Loop>& loops, Box box) {
@@ -21,10 +21,10 @@ Box ranged_over(const std::vector<Loop>& loops, Box box) {
   return box;
 }
 
-void range_over_loops(Emitted& code) {
-  if (code.unranged.empty()) return;
-  map_boxes(code, [&](const Box& box) { return ranged_over(code.unranged, box); });
-  code.unranged.clear();
+void range_over_loops(Needs& needs) {
+  if (needs.unranged.empty()) return;
+  map_boxes(needs, [&](const Box& box) { return ranged_over(needs.unranged, box); });
+  needs.unranged.clear();
 }
 
 Box simplified(Box box) {
@@ -35,17 +35,13 @@ Box simplified(Box box) {
   return box;
 }
 
-namespace {
-
-void merge_storage(std::map<std::string, Box>& into, const std::map<std::string, Box>& from) {
-  for (const auto& [name, box] : from) into[name] = hull(into[name], box);
+void merge_needs(Needs& into, const Needs& from) {
+  merge_footprints(into.uses, from.uses);
+  for (const auto& [name, box] : from.storage) into.storage[name] = hull(into.storage[name], box);
 }
 
-}  // namespace
-
 void merge_code(Emitted& into, const Emitted& from) {
-  merge_footprints(into.uses, from.uses);
-  merge_storage(into.storage, from.storage);
+  merge_needs(into, from);
   into.has_loops |= from.has_loops;
   into.has_vectors |= from.has_vectors;
 }
@@ -56,6 +52,11 @@ void wrap(const Loop& loop, Emitted& code) {
   code.stmt = make_for(loop.name, min, extent, loop.for_type, code.stmt, loop.partition);
   code.lead = 0;
   code.unranged.push_back(loop);
+  for (Strand& strand : code.strands) {
+    strand.unranged.push_back(strand.loops.back());
+    strand.loops.pop_back();
+    strand.at.pop_back();
+  }
   code.has_loops |= loop.for_type == ForType::Parallel ||
                     (loop.for_type == ForType::Serial && !is_one(loop.extent));
   code.has_vectors |= loop.for_type == ForType::Vectorized;

@@ -7,6 +7,7 @@
 #include "diagnostics/error.h"
 #include "frontend/wrappers.h"
 #include "ir/visit.h"
+#include "lower/fused_groups.h"
 #include "lower/refuse_unsupported.h"
 #include "lower/resolve_undef.h"
 
@@ -97,6 +98,7 @@ Program inline_functions(const std::vector<FuncPtr>& unwrapped) {
   }
   resolve_outermost_levels(program);
   refuse_unsupported(program);
+  order_fused_groups(program);
   resolve_undef(program);
   return program;
 }

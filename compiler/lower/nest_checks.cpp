@@ -46,12 +46,16 @@ namespace {
 std::string loops_of(const Program& program, const std::string& func) {
   const LoopedFunc* f = program.find(func);
   if (!f) return text(quoted(func), " has no loops: it is inlined or not part of this pipeline");
-  std::string names;
+  std::string names, host;
   for (const Definition& stage : f->stages) {
     for (const Dim& dim : stage.schedule.dims)
       names += (names.empty() ? "" : ", ") + quoted(dim.var);
+    if (stage.schedule.fuse_level.kind == LoopLevel::Kind::At)
+      host = stage.schedule.fuse_level.func;
   }
-  return text("the loops of ", quoted(func), " are ", names.empty() ? "none" : names);
+  std::string result = text("the loops of ", quoted(func), " are ", names.empty() ? "none" : names);
+  if (!host.empty()) result += text(", of which the outer ones run in the loops of ", quoted(host));
+  return result;
 }
 
 std::string dimension_of(const LoopedFunc& f, int d) {
@@ -89,6 +93,15 @@ void check_room(const LoopedFunc& f, const Box& room) {
                text("the extent of its ", dimension_of(f, static_cast<int>(d)), " is not"),
                "Give it with bound_storage, or hoist it less far");
   }
+}
+
+void check_all_used(const Program& program, const LoopedFunc& needed, const LoopedFunc& unused) {
+  user_error(
+      text("compute ", quoted(unused.name()), " together with ", quoted(needed.name())),
+      "Funcs that share loops are all needed at each place where they are computed",
+      text("at one place ", quoted(needed.name()), " is used, but ", quoted(unused.name()),
+           " is not; ", quoted(unused.name()), " is used by ", consumers_of(program, unused)),
+      "Compute them further out, or drop compute_with");
 }
 
 void check_storage_of_output(const LoopedFunc& f) {

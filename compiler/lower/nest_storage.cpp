@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "ir/build.h"
+#include "lower/copy_statement.h"
 #include "lower/nest_checks.h"
 #include "simplify/simplify.h"
 
@@ -15,15 +16,22 @@ bool is_stored_where_computed(const LoopedFunc& f) {
   return store.kind == compute.kind && store.func == compute.func && store.var == compute.var;
 }
 
+namespace {
+
+// Whether a directive that names a loop of a Func, in any of its stages, means this one.
+bool is_named_by(const LoopLevel& level, const Loop& loop) {
+  if (level.kind != LoopLevel::Kind::At) return false;
+  const LoopName name = decode_loop_name(loop.known_as());
+  return name.func == level.func && name.var == level.var;
+}
+
+}  // namespace
+
 std::vector<Loop> loops_to_storage(const LoopedFunc& f, const Site& site) {
   std::vector<Loop> loops;
   if (is_stored_where_computed(f) || f.is_output) return loops;
-  const LoopLevel& store = f.schedule.store_level;
   for (const Loop& loop : site.around) {
-    if (store.kind == LoopLevel::Kind::At &&
-        loop.name.compare(0, store.func.size() + 2, store.func + ".s") == 0 &&
-        store.var == loop.var)
-      break;
+    if (is_named_by(f.schedule.store_level, loop)) break;
     loops.push_back(loop);
   }
   return loops;

@@ -10,24 +10,12 @@ namespace {
 
 // ---- directives that are not carried out yet ----
 
-bool any_stage(const LoopedFunc& f, bool (*has)(const StageSchedule&)) {
-  for (const Definition& stage : f.stages) {
-    if (has(stage.schedule)) return true;
-  }
-  return false;
-}
-
 struct Directive {
   const char* name;
   bool (*given)(const LoopedFunc&);
 };
 
 constexpr Directive not_yet[] = {
-    {"compute_with",
-     [](const LoopedFunc& f) {
-       return any_stage(
-           f, [](const StageSchedule& s) { return s.fuse_level.kind == LoopLevel::Kind::At; });
-     }},
     {"hoist_storage together with async or memoize",
      [](const LoopedFunc& f) {
        return is_hoisted(f) && (f.schedule.async || f.schedule.memoized);
@@ -109,6 +97,8 @@ void check_inlined(const FuncContents& f, const FuncSchedule& schedule) {
     refuse("store " + quoted(f.name) + " at a level", inlined);
   if (schedule.hoist_level.kind != LoopLevel::Kind::Inlined)
     refuse("hoist the storage of " + quoted(f.name), inlined);
+  if (const LoopLevel& level = f.pure->schedule.fuse_level; level.kind == LoopLevel::Kind::At)
+    refuse(text("compute ", quoted(f.name), " with ", quoted(level.func)), inlined);
   for (const StorageRule& rule : schedule.storage_rules) {
     refuse(text("lay out the storage of ", quoted(f.name), " in ", quoted(rule.var)), inlined);
   }

@@ -47,11 +47,20 @@ void Site::note_part(const Expr& end, const Interval& whole, const Interval& tou
   touched_.push(name, touched);
 }
 
-Box Site::expand(const Box& box, const Scope<Interval>& parts) {
+void Site::learn_names() {
   for (; known_ < bindings.size(); known_++) {
     const auto& [name, value] = bindings[known_];
-    if (!parts.contains(name)) values_[name] = simplify(substitute(value, values_));
+    if (!whole_.contains(name)) values_[name] = simplify(substitute(value, values_));
   }
+}
+
+Expr Site::without_names(const Expr& e) {
+  learn_names();
+  return simplify(substitute(e, values_));
+}
+
+Box Site::expand(const Box& box, const Scope<Interval>& parts) {
+  learn_names();
   Box result = box;
   for (Interval& side : result) {
     for (Expr* end : {&side.min, &side.max}) {

@@ -35,6 +35,8 @@ class Site {
   Box whole(const Box& box) { return expand(box, whole_); }
   Box touched(const Box& box) { return expand(box, touched_); }
   bool has_names() const { return !bindings.empty(); }
+  // The same value without names that stand for one.
+  Expr without_names(const Expr& e);
 
  private:
   Substitution values_;  // of names that stand for one value, in terms of parts and outer names
@@ -44,6 +46,7 @@ class Site {
 
   Expr name(const std::string& name, const Expr& value, bool always);
   void note_part(const Expr& end, const Interval& whole, const Interval& touched);
+  void learn_names();
   Box expand(const Box& box, const Scope<Interval>& parts);
 };
 

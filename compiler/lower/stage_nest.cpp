@@ -56,8 +56,9 @@ class NestBuilder {
   Loop loop_of(const Dim& dim) const {
     auto it = ranges_.find(dim.var);
     RETROGRADE_ASSERT(it != ranges_.end(), "loop over a variable that does not exist: " + dim.var);
-    return {dim.var,           prefix_ + dim.var, it->second.min,
-            it->second.extent, dim.for_type,      dim.partition};
+    return {
+        dim.var, prefix_ + dim.var, it->second.min, it->second.extent, dim.for_type, dim.partition,
+        {}};
   }
 
   void apply(const Split& split) {

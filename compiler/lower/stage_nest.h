@@ -23,7 +23,10 @@ struct Loop {
   Expr min, extent;
   ForType for_type = ForType::Serial;
   Partition partition = Partition::Auto;
+  // The loop of another stage that this one runs in, which directives name; empty: it runs alone.
+  std::string runs_in = {};
   Interval range() const;
+  const std::string& known_as() const { return runs_in.empty() ? name : runs_in; }
 };
 
 struct StageNest {

@@ -1,11 +1,12 @@
 // fuzz_pipelines -- looks for random programs whose machine code disagrees with the interpreter.
 //
 //   fuzz_pipelines [--seed N | --from N] [--count N | --seconds N] [--no-shrink] [--print]
-//                  [--refusals] [--without DIRECTIVE]...
+//                  [--refusals] [--without DIRECTIVE]... [--only DIRECTIVE]
 //
 // Each program runs in a process of its own, so that a crash or a hang is a finding like any other.
 // A finding is shrunk and printed as C++. A program that is refused with an error for its author is
 // counted, and is a finding only when refusals are asked for or make up more than a tenth of all.
+// Only a directive: seeds whose schedules do not use it are passed over and not counted.
 // Exit code: 0 nothing found, 1 something found.
 #include <sys/resource.h>
 #include <sys/wait.h>
@@ -40,6 +41,7 @@ struct Options {
   double seconds = 1e9;
   bool shrink = true, print = false, refusals = false;
   std::vector<std::string> without;
+  std::string only;
 };
 
 Options parse(int argc, char** argv) {
@@ -55,6 +57,8 @@ Options parse(int argc, char** argv) {
       options.refusals = true;
     } else if (name == "--without" && has_value) {
       options.without.push_back(argv[++i]);
+    } else if (name == "--only" && has_value) {
+      options.only = argv[++i];
     } else if (name == "--seed" && has_value) {
       options.seed = std::strtoull(argv[++i], nullptr, 10);
       options.count = 1;
@@ -137,19 +141,26 @@ void report(uint64_t seed, const Program& program, const Finding& finding, bool 
   std::fflush(stdout);
 }
 
+bool uses(const Program& program, const std::string& directive) {
+  ScheduleSpec without = program.schedule;
+  leave_out(without, directive);
+  return to_cpp(program.pipeline, without) != to_cpp(program.pipeline, program.schedule);
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
   const Options options = parse(argc, argv);
   const auto start = std::chrono::steady_clock::now();
   uint64_t found = 0, tried = 0, refused = 0;
-  for (; tried < options.count; ++tried) {
+  for (uint64_t seed = options.seed; tried < options.count; ++seed) {
     const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - start;
     if (elapsed.count() > options.seconds) break;
-    const uint64_t seed = options.seed + tried;
     Program program{random_pipeline(seed), {}};
     program.schedule = random_schedule(program.pipeline, seed);
     for (const std::string& directive : options.without) leave_out(program.schedule, directive);
+    if (!options.only.empty() && !uses(program, options.only)) continue;
+    ++tried;
     if (options.print) std::puts(to_cpp(program.pipeline, program.schedule).c_str());
     const Finding finding = run_apart(program);
     if (finding.code == static_cast<int>(Verdict::Agrees)) continue;

@@ -1,0 +1,348 @@
+// Stages that share loops: the nests that compute_with makes, and that values stay what they are.
+// Oracles: nests written by hand; the same Funcs computed apart.
+#include <gtest/gtest.h>
+
+#include <functional>
+#include <regex>
+
+#include "ir/visit.h"
+#include "lower/lower.h"
+#include "retrograde/retrograde.h"
+
+namespace retrograde {
+namespace {
+
+using Align = LoopAlignStrategy;
+
+class ComputeWith : public testing::Test {
+ protected:
+  Var x{"x"}, y{"y"}, xo{"xo"}, xi{"xi"}, yo{"yo"}, yi{"yi"};
+  static constexpr int width = 21, height = 18;
+
+  // `make(true)` computes together what `make(false)` computes apart.
+  static void expect_same(const std::function<Func(bool)>& make, int w = width, int h = height) {
+    Buffer<int> apart = make(false).realize({w, h}), together = make(true).realize({w, h});
+    for (int j = 0; j < h; ++j) {
+      for (int i = 0; i < w; ++i) ASSERT_EQ(together(i, j), apart(i, j)) << "at " << i << ", " << j;
+    }
+  }
+
+  // Names as in the test, without what makes them unique.
+  static std::string nest_of(const Func& f) {
+    return std::regex_replace(ir::loop_nest_text({f.function()}), std::regex("\\$[0-9]+"), "");
+  }
+
+  static int count(const Func& output, const char* stop_after,
+                   const std::function<bool(const Stmt&)>& is_counted) {
+    ir::LowerOptions options;
+    options.stop_after = stop_after;
+    ir::LoweredFunction lowered =
+        ir::lower("test", {output.function()}, ir::infer_arguments({output.function()}), options);
+    int found = 0;
+    ir::walk(
+        lowered.body, [](const Expr&) { return true; },
+        [&](const Stmt& s) {
+          found += is_counted(s);
+          return true;
+        });
+    return found;
+  }
+};
+
+TEST_F(ComputeWith, SharesLoopsDownToTheLevel) {
+  Func f("f"), g("g"), h("h");
+  f(x, y) = x + y;
+  g(x, y) = x * y;
+  h(x, y) = f(x, y) + g(x, y);
+  f.compute_root();
+  g.compute_root().compute_with(f, y);
+  EXPECT_EQ(nest_of(h), R"(produce f:
+  produce g:
+    for y:
+      for x:
+        f(...) = ...
+      for x:
+        g(...) = ...
+consume f:
+  consume g:
+    produce h:
+      for y:
+        for x:
+          h(...) = ...
+)");
+}
+
+TEST_F(ComputeWith, ChainsShareEachWhatTheySay) {
+  Func f("f"), g("g"), h("h"), out("out");
+  f(x, y) = x + y;
+  g(x, y) = x * y;
+  h(x, y) = x - y;
+  out(x, y) = f(x, y) + g(x, y) + h(x, y);
+  for (Func* func : {&f, &g, &h}) func->compute_at(out, yo);
+  out.split(y, yo, yi, 4);
+  g.compute_with(f, y);
+  h.compute_with(g, x);
+  EXPECT_NE(nest_of(out).find(R"(
+          for y:
+            for x:
+              f(...) = ...
+            for x:
+              g(...) = ...
+              h(...) = ...
+)"),
+            std::string::npos)
+      << nest_of(out);
+  // What g does not share with f it cannot hand on.
+  g.compute_with(f, x);
+  h.compute_with(g, y);
+  EXPECT_NE(nest_of(out).find(R"(
+          for y:
+            for x:
+              f(...) = ...
+              g(...) = ...
+            for x:
+              h(...) = ...
+)"),
+            std::string::npos)
+      << nest_of(out);
+}
+
+TEST_F(ComputeWith, UpdatesRunTogetherInTheOrderOfTheirFuncs) {
+  expect_same([&](bool together) {
+    Func f("f"), g("g"), h("h");
+    f(x, y) = x + y;
+    f(x, y) += f(x, y) * 3;
+    g(x, y) = x * y;
+    g(x, y) -= x;
+    h(x, y) = f(x, y) * 7 + g(x, y);
+    f.compute_root();
+    g.compute_root();
+    if (together) {
+      g.compute_with(f.update(0), x);
+    }
+    return h;
+  });
+  Func f("f"), g("g"), h("h");
+  f(x, y) = x + y;
+  f(x, y) += 1;
+  g(x, y) = x * y;
+  h(x, y) = f(x, y) + g(x, y);
+  f.compute_root();
+  g.compute_root().compute_with(f.update(0), y);
+  EXPECT_EQ(nest_of(h).substr(0, nest_of(h).find("consume")), R"(produce f:
+  produce g:
+    for y:
+      for x:
+        f(...) = ...
+    for y:
+      for x:
+        f(...) = ...
+      for x:
+        g(...) = ...
+)");
+}
+
+TEST_F(ComputeWith, OnlyDifferentRangesNeedConditions) {
+  const auto conditions = [&](bool together, int apart) {
+    Func f("f"), g("g"), h("h");
+    f(x, y) = x + y;
+    g(x, y) = x * y;
+    h(x, y) = f(x, y) + g(x, y + apart);
+    f.compute_root().split(x, xo, xi, 8);
+    g.compute_root().split(x, xo, xi, 8);
+    if (together) g.compute_with(f, xo);
+    return count(h, "build_loop_nests",
+                 [](const Stmt& s) { return s.as<ir::IfThenElse>() != nullptr; });
+  };
+  EXPECT_EQ(conditions(true, 0), conditions(false, 0));
+  EXPECT_EQ(conditions(true, 1), conditions(false, 1) + 2);
+}
+
+TEST_F(ComputeWith, DifferentRangesAreAlignedAsAsked) {
+  for (Align align : {Align::Auto, Align::NoAlign, Align::AlignStart, Align::AlignEnd}) {
+    for (const int far : {0, 3, 100}) {
+      expect_same([&](bool together) {
+        Func f("f"), g("g"), h("h");
+        f(x, y) = x + y;
+        g(x, y) = x * y;
+        h(x, y) = f(x, y) + g(x - far, y - far) * g(x - far + 2, y + 2 - far);
+        f.compute_root();
+        g.compute_root();
+        if (together) g.compute_with(f, x, align);
+        return h;
+      });
+    }
+  }
+}
+
+TEST_F(ComputeWith, EachDimensionIsAlignedOnItsOwn) {
+  expect_same([&](bool together) {
+    Func f("f"), g("g"), k("k"), h("h");
+    f(x, y) = x + y;
+    g(x, y) = x * y;
+    k(x, y) = x - 3 * y;
+    h(x, y) = f(x, y) + f(x + 1, y) + g(x - 5, y - 2) * k(x + 4, y) + k(x, y + 9);
+    f.compute_root();
+    g.compute_root();
+    k.compute_root();
+    if (together) {
+      g.compute_with(f, x, {{x, Align::AlignStart}, {y, Align::AlignEnd}});
+      k.compute_with(g, x, {{x, Align::AlignEnd}, {y, Align::AlignStart}});
+    }
+    return h;
+  });
+}
+
+TEST_F(ComputeWith, SplitsMayDiffer) {
+  expect_same([&](bool together) {
+    Func f("f"), g("g"), h("h");
+    f(x, y) = x + y;
+    g(x, y) = x * y;
+    h(x, y) = f(x, y) + g(x, y);
+    f.compute_root().split(x, xo, xi, 8).vectorize(xi).parallel(y);
+    g.compute_root().split(x, xo, xi, 4).unroll(xi).parallel(y);
+    if (together) g.compute_with(f, xo);
+    return h;
+  });
+}
+
+TEST_F(ComputeWith, ProducersInsideServeAllWhoShare) {
+  for (const int apart : {0, 1, 5}) {
+    expect_same([&](bool together) {
+      Func p("p"), f("f"), g("g"), h("h");
+      p(x, y) = x * x + y;
+      f(x, y) = p(x, y) + p(x + 1, y);
+      g(x, y) = p(x, y - 1) * 5;
+      h(x, y) = f(x, y) + g(x, y + apart) + g(x, y - apart);
+      f.compute_root();
+      g.compute_root();
+      p.compute_root();
+      if (together) {
+        g.compute_with(f, y);
+        p.compute_at(f, y);
+      }
+      return h;
+    });
+  }
+}
+
+TEST_F(ComputeWith, ProducersInsideSlideOverSharedLoops) {
+  for (const int apart : {0, 2}) {
+    expect_same([&](bool together) {
+      Func p("p"), f("f"), g("g"), h("h");
+      p(x, y) = x * x + y;
+      f(x, y) = p(x, y - 1) + p(x, y + 1);
+      g(x, y) = p(x, y) * 5;
+      h(x, y) = f(x, y) + g(x, y + apart);
+      f.compute_root();
+      g.compute_root();
+      p.compute_root();
+      if (together) {
+        g.compute_with(f, y);
+        p.store_root().compute_at(f, y);
+      }
+      return h;
+    });
+  }
+}
+
+TEST_F(ComputeWith, ProducersOfAGuestStayInItsOwnLoops) {
+  expect_same([&](bool together) {
+    Func p("p"), f("f"), g("g"), h("h");
+    p(x, y) = x * x + y;
+    f(x, y) = x - y;
+    g(x, y) = p(x, y) * p(x + 1, y);
+    h(x, y) = f(x, y) + g(x, y + 2);
+    f.compute_root();
+    g.compute_root();
+    p.compute_at(g, x);
+    if (together) {
+      g.compute_with(f, y, Align::AlignStart);
+      p.store_at(f, y);
+    }
+    return h;
+  });
+}
+
+TEST_F(ComputeWith, GroupsInsideOfConsumersSlideTogether) {
+  expect_same([&](bool together) {
+    Func f("f"), g("g"), h("h");
+    f(x, y) = x + y * y;
+    g(x, y) = x * y;
+    h(x, y) = f(x, y) + f(x, y + 1) + g(x + 1, y) + g(x, y + 3);
+    f.store_root().compute_at(h, y);
+    g.store_root().compute_at(h, y);
+    if (together) g.compute_with(f, x);
+    return h;
+  });
+}
+
+TEST_F(ComputeWith, ConsumersBetweenMembersComeAfterTheGroup) {
+  expect_same([&](bool together) {
+    Func f("f"), k("k"), p("p"), g("g"), h("h");
+    f(x, y) = x + y;
+    k(x, y) = f(x, y) * 2;
+    p(x, y) = x - 7 * y;
+    g(x, y) = p(x, y + 1) * y;
+    h(x, y) = k(x, y) + g(x, y);
+    for (Func* func : {&f, &k, &p, &g}) func->compute_root();
+    if (together) g.compute_with(f, y);
+    return h;
+  });
+}
+
+TEST_F(ComputeWith, ReductionLoopsAreShared) {
+  expect_same([&](bool together) {
+    RDom r(0, 10, "r"), q(2, 5, "q");
+    Func f("f"), g("g"), h("h");
+    f(x, y) = 0;
+    f(x, y) += r * x;
+    g(x, y) = 1;
+    g(x, y) += q * y;
+    h(x, y) = f(x, y) + g(x, y);
+    f.compute_root().update().reorder(x, y, r);
+    g.compute_root().update().reorder(x, y, q);
+    if (together) {
+      g.compute_with(f, x);
+      g.update().compute_with(f.update(), x);
+    }
+    return h;
+  });
+}
+
+TEST_F(ComputeWith, OutputsShareLoops) {
+  Func f("f"), g("g");
+  f(x, y) = x + y;
+  g(x, y) = x * y + f(0, 0) * 0;
+  Func k("k");
+  k(x, y) = x * y;
+  k.compute_with(f, y);
+  Pipeline pipeline({f, k});
+  Buffer<int> a(9, 7), b(4, 12);
+  pipeline.realize({a, b});
+  for (int j = 0; j < 7; ++j)
+    for (int i = 0; i < 9; ++i) ASSERT_EQ(a(i, j), i + j);
+  for (int j = 0; j < 12; ++j)
+    for (int i = 0; i < 4; ++i) ASSERT_EQ(b(i, j), i * j);
+}
+
+TEST_F(ComputeWith, TheFirstStageMayBeSpecialized) {
+  for (const bool set : {false, true}) {
+    expect_same([&](bool together) {
+      Param<bool> p("p");
+      p.set(set);
+      Func f("f"), g("g"), h("h");
+      f(x, y) = select(p, x + y, x - y);
+      g(x, y) = x * y;
+      h(x, y) = f(x, y) + g(x, y + 1);
+      f.compute_root();
+      g.compute_root();
+      f.specialize(p);
+      if (together) g.compute_with(f, y);
+      return h;
+    });
+  }
+}
+
+}  // namespace
+}  // namespace retrograde
