@@ -249,7 +249,7 @@ class AheadOfTime : public ModuleCompiler {
                             const Target& target) override {
     codegen::machine_for(target, false);  // says what cannot be compiled for before any work
     ir::LowerOptions options;
-    options.target = target;
+    options.target = pipeline.traced(target);
     options.validate = validate_passes;
     return ir::lower(pipeline.name, pipeline.outputs, inputs, options);
   }
@@ -276,6 +276,10 @@ class AheadOfTime : public ModuleCompiler {
                          const Files& output_files) override {
     for (const auto& [type, path] : output_files) check_type(type, function_name);
     aot::write_files(MultitargetOutputs(function_name, modules, suffixes).files(output_files));
+  }
+
+  void write_text(const std::string& path, const std::string& contents) override {
+    aot::write_files({{path, contents}});
   }
 
   void write_runtime(const Files& output_files, const Target& target) override {

@@ -110,6 +110,7 @@ AutoSchedulerResults Pipeline::auto_schedule(const std::string& name, const Targ
                                              const MachineParams& machine) const {
   const AutoSchedulerFn scheduler = find_autoscheduler(name);
   AutoSchedulerResults results;
+  results.scheduler_name = name;
   results.target = target;
   results.machine_params_string = machine.to_string();
   scheduler(*this, target, machine, &results);

@@ -30,6 +30,7 @@ struct MachineParams {
 };
 
 struct AutoSchedulerResults {
+  std::string scheduler_name;
   Target target;
   std::string machine_params_string;
   std::string schedule_source;  // the schedule as C++

@@ -29,6 +29,9 @@ halide_type_t to_halide_type(Type type) {
 }
 
 Type::Type(const halide_type_t& type) : Type(from_halide_type(type)) {}
+Type::Type(halide_type_code_t code, int bits, int lanes)
+    : Type(from_halide_type(
+          halide_type_t(code, static_cast<uint8_t>(bits), static_cast<uint16_t>(lanes)))) {}
 Type::operator halide_type_t() const { return to_halide_type(*this); }
 
 Type from_halide_type(halide_type_t type) {
@@ -148,6 +151,11 @@ void check_convertible(const Runtime::Buffer<>& buffer, const std::string& name,
                "the dimensions must agree", text("it has ", buffer.dimensions()),
                "Slice or embed it first");
   }
+}
+
+void no_device(const char* method) {
+  unsupported(text("call ", method, "() on a Buffer"), "buffers have memory of the CPU only", "",
+              "Leave it out");
 }
 
 void undefined_buffer(const char* method) {

@@ -21,6 +21,7 @@
 #include "frontend/function.h"
 #include "frontend/rdom.h"
 #include "frontend/var.h"
+#include "ir/target.h"
 
 // Element types that HalideBuffer.h does not know.
 template <>
@@ -37,6 +38,7 @@ namespace retrograde {
 namespace Runtime = ::Halide::Runtime;
 
 inline bool operator==(const Type& a, const halide_type_t& b) { return a == Type(b); }
+inline bool operator==(TypeCode a, halide_type_code_t b) { return a == Type(b, 8).code(); }
 halide_type_t to_halide_type(Type type);
 Type from_halide_type(halide_type_t type);
 
@@ -71,6 +73,7 @@ void check_sizes(halide_type_t type, const std::vector<int>& sizes, const std::s
 void check_convertible(const Runtime::Buffer<>& buffer, const std::string& name, halide_type_t type,
                        bool any_type, int dimensions);
 [[noreturn]] void undefined_buffer(const char* method);
+[[noreturn]] void no_device(const char* method);
 void check_dimension(const Runtime::Buffer<>& buffer, const std::string& name, int d,
                      const char* method);
 void check_crop(const Runtime::Buffer<>& buffer, const std::string& name, int d, int min,
@@ -462,6 +465,17 @@ class Buffer {
   // ---- devices: for generated code on a GPU ----
   int copy_to_host() { return runtime_mutable().copy_to_host(); }
   int device_sync() { return runtime_mutable().device_sync(); }
+  int device_free() { return runtime_mutable().device_free(); }
+  void device_deallocate() { runtime_mutable().device_deallocate(); }
+  // Unsupported.
+  int copy_to_device(const Target& = Target()) { ir::no_device("copy_to_device"); }
+  int copy_to_device(DeviceAPI, const Target& = Target()) { ir::no_device("copy_to_device"); }
+  int device_malloc(const Target& = Target()) { ir::no_device("device_malloc"); }
+  int device_malloc(DeviceAPI, const Target& = Target()) { ir::no_device("device_malloc"); }
+  int device_wrap_native(DeviceAPI, uint64_t, const Target& = Target()) {
+    ir::no_device("device_wrap_native");
+  }
+  int device_detach_native() { ir::no_device("device_detach_native"); }
   bool has_device_allocation() const { return runtime().has_device_allocation(); }
   bool device_dirty() const { return runtime().device_dirty(); }
   bool host_dirty() const { return runtime().host_dirty(); }

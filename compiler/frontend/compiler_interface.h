@@ -21,6 +21,12 @@ struct PipelineSpec {
   std::string name;
   std::vector<ir::FuncPtr> outputs;
   std::map<std::string, void*> externs = {};  // C functions by name, before those of the process
+  bool is_traced = false;                     // a call tells when it begins and ends
+
+  Target traced(Target target) const {
+    if (is_traced) target.set_feature(Target::TracePipeline);
+    return target;
+  }
 };
 
 // One call. Handlers may be called from several threads at once.
@@ -78,6 +84,8 @@ class ModuleCompiler {
                                  const std::vector<Module>& modules,
                                  const std::vector<std::string>& suffixes,
                                  const std::map<OutputFileType, std::string>& output_files) = 0;
+  // A text file, whole or not at all.
+  virtual void write_text(const std::string& path, const std::string& contents) = 0;
   virtual void write_runtime(const std::map<OutputFileType, std::string>& output_files,
                              const Target& target) = 0;
 };

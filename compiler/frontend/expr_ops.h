@@ -67,6 +67,8 @@ RETROGRADE_CONCISE_CAST(u64, UInt(64))
 #undef RETROGRADE_CONCISE_CAST
 inline Expr f32(Expr e) { return cast(Float(32), std::move(e)); }
 inline Expr f64(Expr e) { return cast(Float(64), std::move(e)); }
+inline Expr f16(Expr e) { return cast(Float(16), std::move(e)); }
+inline Expr bf16(Expr e) { return cast(BFloat(16), std::move(e)); }
 }  // namespace ConciseCasts
 
 // ---- choice ----
@@ -92,15 +94,23 @@ requires(sizeof...(Rest) >= 1 && (std::is_convertible_v<Rest, Expr> && ...)) Exp
 // Element by element; the condition is one for all, or a Tuple of its own.
 Tuple select(const Tuple& condition, const Tuple& true_value, const Tuple& false_value);
 Tuple select(const Expr& condition, const Tuple& true_value, const Tuple& false_value);
-// Halide's name for the two above.
-template <typename... Args>
-Tuple tuple_select(const Args&... args) {
-  return select(args...);
-}
 template <typename... Rest>
 requires(sizeof...(Rest) >= 1) Tuple
     select(const Expr& c0, const Tuple& v0, const Expr& c1, const Tuple& v1, Rest&&... rest) {
   return select(c0, v0, select(c1, v1, std::forward<Rest>(rest)...));
+}
+// Halide's name for these.
+inline Tuple tuple_select(const Tuple& condition, const Tuple& t, const Tuple& f) {
+  return select(condition, t, f);
+}
+inline Tuple tuple_select(const Expr& condition, const Tuple& t, const Tuple& f) {
+  return select(condition, t, f);
+}
+template <typename Condition, typename... Rest>
+requires(sizeof...(Rest) >= 1) Tuple tuple_select(const Condition& c0, const Tuple& v0,
+                                                  const Condition& c1, const Tuple& v1,
+                                                  const Rest&... rest) {
+  return tuple_select(c0, v0, tuple_select(c1, v1, rest...));
 }
 // values[id]; the last one when id is out of range.
 Expr mux(const Expr& id, const std::vector<Expr>& values);
@@ -170,9 +180,9 @@ Expr strict_float(Expr e);                     // no contraction to FMA inside
 // The value, which a memoized Func's cache knows by `key`: what an image holds is no part of the
 // cache's key by itself. Keys are made of Params and constants.
 Expr memoize_tag(Expr value, const std::vector<Expr>& key);
-template <typename... Rest>
-Expr memoize_tag(Expr value, Expr key, Rest&&... rest) {
-  return memoize_tag(std::move(value), std::vector<Expr>{std::move(key), std::forward<Rest>(rest)...});
+template <typename... Keys>
+requires(std::is_convertible_v<Keys, Expr>&&...) Expr memoize_tag(Expr value, Keys&&... key) {
+  return memoize_tag(std::move(value), std::vector<Expr>{Expr(std::forward<Keys>(key))...});
 }
 Expr stop_gradient(Expr e);                    // a constant as far as derivatives go
 

@@ -8,6 +8,7 @@
 #include "frontend/buffer.h"
 #include "frontend/function.h"
 #include "frontend/image_param.h"
+#include "frontend/param.h"
 
 namespace retrograde {
 
@@ -17,6 +18,8 @@ struct ExternFuncArgument {
   template <typename T, int Dims>
   ExternFuncArgument(const Buffer<T, Dims>& buffer) : ExternFuncArgument(buffer.parameter()) {}
   ExternFuncArgument(Expr e);
+  template <typename T>
+  ExternFuncArgument(const Param<T>& param) : ExternFuncArgument(Expr(param)) {}
   ExternFuncArgument(int e) : ExternFuncArgument(Expr(e)) {}
   ExternFuncArgument(float e) : ExternFuncArgument(Expr(e)) {}
   ExternFuncArgument(std::shared_ptr<ir::ParameterContents> image);

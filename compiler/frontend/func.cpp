@@ -136,29 +136,57 @@ Pipeline& Func::pipeline() {
   return pipeline_;
 }
 
-Realization Func::realize(const std::vector<int32_t>& sizes, const Target& target) {
+Realization Func::realize(JITUserContext* context, const std::vector<int32_t>& sizes,
+                          const Target& target, const ParamMap& map) {
   check_defined("realize " + quoted(name()));
-  return pipeline().realize(sizes, target);
+  return pipeline().realize(context, sizes, target, map);
 }
 
-void Func::realize(Pipeline::RealizationArg outputs, const Target& target) {
+void Func::realize(JITUserContext* context, Pipeline::RealizationArg outputs, const Target& target,
+                   const ParamMap& map) {
   check_defined("realize " + quoted(name()));
-  pipeline().realize(std::move(outputs), target);
+  pipeline().realize(context, std::move(outputs), target, map);
 }
 
-void Func::infer_input_bounds(const std::vector<int32_t>& sizes, const Target& target) {
-  check_defined("infer the input bounds of " + quoted(name()));
-  pipeline().infer_input_bounds(sizes, target);
+Realization Func::realize(const std::vector<int32_t>& sizes, const Target& target,
+                          const ParamMap& map) {
+  return realize(nullptr, sizes, target, map);
 }
 
-void Func::infer_input_bounds(Pipeline::RealizationArg outputs, const Target& target) {
+void Func::realize(Pipeline::RealizationArg outputs, const Target& target, const ParamMap& map) {
+  realize(nullptr, std::move(outputs), target, map);
+}
+
+void Func::infer_input_bounds(JITUserContext* context, const std::vector<int32_t>& sizes,
+                              const Target& target, const ParamMap& map) {
   check_defined("infer the input bounds of " + quoted(name()));
-  pipeline().infer_input_bounds(std::move(outputs), target);
+  pipeline().infer_input_bounds(context, sizes, target, map);
+}
+
+void Func::infer_input_bounds(JITUserContext* context, Pipeline::RealizationArg outputs,
+                              const Target& target, const ParamMap& map) {
+  check_defined("infer the input bounds of " + quoted(name()));
+  pipeline().infer_input_bounds(context, std::move(outputs), target, map);
+}
+
+void Func::infer_input_bounds(const std::vector<int32_t>& sizes, const Target& target,
+                              const ParamMap& map) {
+  infer_input_bounds(nullptr, sizes, target, map);
+}
+
+void Func::infer_input_bounds(Pipeline::RealizationArg outputs, const Target& target,
+                              const ParamMap& map) {
+  infer_input_bounds(nullptr, std::move(outputs), target, map);
 }
 
 void Func::compile_jit(const Target& target) {
   check_defined("compile " + quoted(name()));
   pipeline().compile_jit(target);
+}
+
+Callable Func::compile_to_callable(const std::vector<Argument>& args, const Target& target) {
+  check_defined("compile " + quoted(name()));
+  return pipeline().compile_to_callable(args, target);
 }
 
 std::string Func::loop_nest(const Target& target) {

@@ -11,6 +11,7 @@
 #include <type_traits>
 #include <vector>
 
+#include "frontend/callable.h"
 #include "frontend/extern_argument.h"
 #include "frontend/func_ref.h"
 #include "frontend/image_param.h"
@@ -80,15 +81,27 @@ class Func {
   bool same_as(const Func& other) const { return func_ == other.func_; }
 
   // ---- running it ----
-  Realization realize(const std::vector<int32_t>& sizes = {}, const Target& target = Target());
-  void realize(Pipeline::RealizationArg outputs, const Target& target = Target());
+  Realization realize(const std::vector<int32_t>& sizes = {}, const Target& target = Target(),
+                      const ParamMap& map = ParamMap::empty_map());
+  void realize(Pipeline::RealizationArg outputs, const Target& target = Target(),
+               const ParamMap& map = ParamMap::empty_map());
   Realization realize(JITUserContext* context, const std::vector<int32_t>& sizes = {},
-                      const Target& target = Target());
+                      const Target& target = Target(), const ParamMap& map = ParamMap::empty_map());
   void realize(JITUserContext* context, Pipeline::RealizationArg outputs,
-               const Target& target = Target());
-  void infer_input_bounds(const std::vector<int32_t>& sizes, const Target& target = Target());
-  void infer_input_bounds(Pipeline::RealizationArg outputs, const Target& target = Target());
+               const Target& target = Target(), const ParamMap& map = ParamMap::empty_map());
+  void infer_input_bounds(const std::vector<int32_t>& sizes, const Target& target = Target(),
+                          const ParamMap& map = ParamMap::empty_map());
+  void infer_input_bounds(Pipeline::RealizationArg outputs, const Target& target = Target(),
+                          const ParamMap& map = ParamMap::empty_map());
+  void infer_input_bounds(JITUserContext* context, const std::vector<int32_t>& sizes,
+                          const Target& target = Target(),
+                          const ParamMap& map = ParamMap::empty_map());
+  void infer_input_bounds(JITUserContext* context, Pipeline::RealizationArg outputs,
+                          const Target& target = Target(),
+                          const ParamMap& map = ParamMap::empty_map());
   void compile_jit(const Target& target = Target());
+  Callable compile_to_callable(const std::vector<Argument>& args,
+                               const Target& target = get_jit_target_from_environment());
   std::string loop_nest(const Target& target = Target());
   void print_loop_nest();
   std::vector<Argument> infer_arguments() const;
@@ -440,6 +453,7 @@ class Func {
   }
   Func& hexagon(const VarOrRVar& x = Var::outermost()) { return with(pure_stage().hexagon(x)); }
   const ir::StageSchedule& get_schedule() const { return pure_stage().get_schedule(); }
+  void unscheduled() {}  // says that no directive was forgotten
 
  private:
   ir::FuncPtr func_;

@@ -57,6 +57,15 @@ class FuncRef {
 
 inline Expr min(const FuncRef& a, const FuncRef& b) { return min(Expr(a), Expr(b)); }
 inline Expr max(const FuncRef& a, const FuncRef& b) { return max(Expr(a), Expr(b)); }
+// An Expr of Funcs with one value; tuple_select takes Tuples.
+inline Expr select(const Expr& condition, const FuncRef& t, const FuncRef& f) {
+  return select(condition, Expr(t), Expr(f));
+}
+template <typename... Rest>
+requires(sizeof...(Rest) >= 1 && (std::is_convertible_v<Rest, Expr> && ...)) Expr
+    select(const Expr& c0, const FuncRef& v0, const Expr& c1, const FuncRef& v1, Rest&&... rest) {
+  return select(c0, Expr(v0), select(c1, Expr(v1), Expr(std::forward<Rest>(rest))...));
+}
 
 // f(x)[1]: assigning to it updates one value and leaves the others of the point alone.
 class FuncTupleElementRef {

@@ -160,10 +160,8 @@ ImageParam::ImageParam(Type type, int dimensions, const std::string& name)
           type, dimensions, name.empty() ? ir::unique_name("p") : ir::claim_parameter_name(name))) {
 }
 
-void ImageParam::set(const Buffer<>& buffer) {
-  ir::ParameterContents& parameter = checked();
+void ir::check_image(const ir::ParameterContents& parameter, const Buffer<>& buffer) {
   const std::string asked = "set the ImageParam " + quoted(parameter.name);
-  if (!buffer.defined()) return reset();
   if (buffer.type() != parameter.type) {
     user_error(asked, "the buffer's elements are of the parameter's type",
                text("it takes ", to_string(parameter.type), " and ", quoted(buffer.name()),
@@ -176,6 +174,12 @@ void ImageParam::set(const Buffer<>& buffer) {
                     buffer.dimensions()),
                "Give a buffer of that many dimensions");
   }
+}
+
+void ImageParam::set(const Buffer<>& buffer) {
+  ir::ParameterContents& parameter = checked();
+  if (!buffer.defined()) return reset();
+  ir::check_image(parameter, buffer);
   parameter.buffer_owner = buffer.contents();
   parameter.buffer = buffer.contents()->buffer.raw_buffer();
 }

@@ -75,6 +75,11 @@ class OutputImageParam {
   std::shared_ptr<ir::ParameterContents> parameter_;
 };
 
+namespace ir {
+// CompileError when the buffer's type or dimensions are not the parameter's.
+void check_image(const ParameterContents& parameter, const Buffer<>& buffer);
+}  // namespace ir
+
 class ImageParam : public OutputImageParam {
  public:
   ImageParam() = default;

@@ -5,6 +5,7 @@
 #include <limits>
 #include <unordered_set>
 
+#include "frontend/integer_ops.h"
 #include "ir/print.h"
 #include "ir/visit.h"
 
@@ -126,11 +127,12 @@ Expr mention_domain(const Expr& e, const Reduction& reduction) {
   return select(Expr(r) >= r.min(), e, ir::make_zero(e.type()));
 }
 
-enum class Fold { Sum, Product, Maximum, Minimum };
+enum class Fold { Sum, SaturatingSum, Product, Maximum, Minimum };
 
 Expr initial_value(Fold fold, Type type) {
   switch (fold) {
     case Fold::Sum:
+    case Fold::SaturatingSum:
       return ir::make_zero(type);
     case Fold::Product:
       return ir::make_one(type);
@@ -146,6 +148,8 @@ Expr combine(Fold fold, Expr a, Expr b) {
   switch (fold) {
     case Fold::Sum:
       return a + b;
+    case Fold::SaturatingSum:
+      return saturating_add(a, b);
     case Fold::Product:
       return a * b;
     case Fold::Maximum:
@@ -198,6 +202,7 @@ Tuple reduce_place(bool is_max, const DomainPtr& domain, const Expr& e, const Fu
     return function(kind, domain.domain(), e, func, #name);                                 \
   }
 RETROGRADE_DEFINE_REDUCTION(Expr, sum, reduce, Fold::Sum)
+RETROGRADE_DEFINE_REDUCTION(Expr, saturating_sum, reduce, Fold::SaturatingSum)
 RETROGRADE_DEFINE_REDUCTION(Expr, product, reduce, Fold::Product)
 RETROGRADE_DEFINE_REDUCTION(Expr, maximum, reduce, Fold::Maximum)
 RETROGRADE_DEFINE_REDUCTION(Expr, minimum, reduce, Fold::Minimum)

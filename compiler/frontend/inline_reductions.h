@@ -20,6 +20,7 @@ namespace retrograde {
   Result name(Expr e, const Func& func);                                         \
   Result name(const RDom& domain, Expr e, const Func& func);
 RETROGRADE_INLINE_REDUCTION(Expr, sum)
+RETROGRADE_INLINE_REDUCTION(Expr, saturating_sum)  // each step clamped to the range of the type
 RETROGRADE_INLINE_REDUCTION(Expr, product)
 RETROGRADE_INLINE_REDUCTION(Expr, maximum)
 RETROGRADE_INLINE_REDUCTION(Expr, minimum)

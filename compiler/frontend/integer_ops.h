@@ -18,22 +18,76 @@ inline Expr fast_integer_divide_round_to_zero(const Expr& numerator, const Expr&
   return div_round_to_zero(numerator, cast(numerator.type(), divisor));
 }
 
-// In twice the bits, where nothing overflows.
-inline Expr widening_mul(const Expr& a, const Expr& b) {
+// In twice the bits, where nothing overflows; signed when one operand is.
+namespace ir {
+inline Type wide_type(const Expr& a, const Expr& b) {
   const bool is_signed = a.type().is_int() || b.type().is_int();
   const int bits = 2 * std::max(a.type().bits(), b.type().bits());
-  const Type wide = a.type().is_float() ? Float(bits) : is_signed ? Int(bits) : UInt(bits);
+  return a.type().is_float() ? retrograde::Float(bits)
+         : is_signed         ? retrograde::Int(bits)
+                             : retrograde::UInt(bits);
+}
+}  // namespace ir
+inline Expr widening_mul(const Expr& a, const Expr& b) {
+  const Type wide = ir::wide_type(a, b);
   return cast(wide, a) * cast(wide, b);
+}
+inline Expr widening_add(const Expr& a, const Expr& b) {
+  const Type wide = ir::wide_type(a, b);
+  return cast(wide, a) + cast(wide, b);
+}
+// Signed whatever the operands are.
+inline Expr widening_sub(const Expr& a, const Expr& b) {
+  Type wide = ir::wide_type(a, b);
+  if (wide.is_uint()) wide = wide.with_code(TypeCode::Int);
+  return cast(wide, a) - cast(wide, b);
+}
+// Clamped to the range of the operands' type.
+inline Expr saturating_add(const Expr& a, const Expr& b) {
+  return saturating_cast(a.type(), widening_add(a, b));
+}
+inline Expr saturating_sub(const Expr& a, const Expr& b) {
+  return saturating_cast(a.type(), widening_sub(a, b));
+}
+// The mean, rounded down or up: no bit is lost on the way.
+inline Expr halving_add(const Expr& a, const Expr& b) {
+  return cast(a.type(), widening_add(a, b) / 2);
+}
+inline Expr rounding_halving_add(const Expr& a, const Expr& b) {
+  return cast(a.type(), (widening_add(a, b) + 1) / 2);
+}
+inline Expr halving_sub(const Expr& a, const Expr& b) {
+  return cast(a.type(), widening_sub(a, b) / 2);
+}
+
+// `bits` of e's bits, from the lowest on, as a value of `type`; out of the top come zeros.
+inline Expr extract_bits(Type type, const Expr& e, const Expr& lowest) {
+  const Type bits = e.type().with_code(TypeCode::UInt);
+  return reinterpret(
+      type, cast(type.with_code(TypeCode::UInt), reinterpret(bits, e) >> cast(bits, lowest)));
+}
+template <typename T>
+Expr extract_bits(const Expr& e, const Expr& lowest) {
+  return extract_bits(type_of<T>(), e, lowest);
+}
+// The bits of all, the first lowest, as one unsigned number.
+Expr concat_bits(const std::vector<Expr>& parts);
+
+// The caller's context as an argument of a C function: it is handed to handlers only.
+inline Expr user_context_value() {
+  unsupported("use user_context_value()", "C functions are called with values of the pipeline",
+              "the caller's context is given to handlers only",
+              "Pass what the function needs as a Param<void*>");
 }
 
 // f(scatter(a, b)) = gather(x, y): several points in one definition.
 template <typename... Points>
-Expr gather(const Expr&, Points&&...) {
+Expr gather(const Points&...) {
   unsupported("define several points with gather()", "a definition stores to one point at a time",
               "gather() reads many", "Write one update definition for each point");
 }
 template <typename... Points>
-Expr scatter(const Expr&, Points&&...) {
+Expr scatter(const Points&...) {
   unsupported("define several points with scatter()", "a definition stores to one point at a time",
               "scatter() names many", "Write one update definition for each point");
 }

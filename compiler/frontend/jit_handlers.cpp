@@ -78,18 +78,6 @@ Expr ir::checked_extern_call(const std::string& function, Type result,
 
 // ---- the same of a Func ----
 
-Realization Func::realize(JITUserContext* context, const std::vector<int32_t>& sizes,
-                          const Target& target) {
-  check_defined("realize " + quoted(name()));
-  return pipeline().realize(context, sizes, target);
-}
-
-void Func::realize(JITUserContext* context, Pipeline::RealizationArg outputs,
-                   const Target& target) {
-  check_defined("realize " + quoted(name()));
-  pipeline().realize(context, std::move(outputs), target);
-}
-
 void Func::set_error_handler(void (*handler)(void*, const char*)) {
   pipeline().set_error_handler(handler);
 }

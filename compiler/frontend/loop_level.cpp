@@ -61,7 +61,8 @@ const ir::LoopLevel& LoopLevel::loop(const char* asked) const {
 
 std::string LoopLevel::func() const { return loop("take the Func of a loop level").func; }
 VarOrRVar LoopLevel::var() const {
-  return VarOrRVar(loop("take the variable of a loop level").var, false);
+  const std::string& name = loop("take the variable of a loop level").var;
+  return VarOrRVar(name, name.find('.') != std::string::npos);
 }
 int LoopLevel::stage_index() const { return loop("take the stage of a loop level").stage; }
 

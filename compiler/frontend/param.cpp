@@ -39,13 +39,17 @@ std::shared_ptr<ParameterContents> make_scalar_parameter(Type type, const std::s
   return result;
 }
 
-void set_scalar(ParameterContents& parameter, const Scalar& value) {
+Scalar converted_scalar(const ParameterContents& parameter, const Scalar& value) {
   if (!holds(parameter.type, value)) {
     user_error(text("set the Param ", quoted(parameter.name), " to ", value_text(value)),
                "the value must fit the parameter's type",
                "its type is " + to_string(parameter.type), "Give a value of that type");
   }
-  parameter.value = parameter.type.is_handle() ? value : eval_cast(parameter.type, value);
+  return parameter.type.is_handle() ? value : eval_cast(parameter.type, value);
+}
+
+void set_scalar(ParameterContents& parameter, const Scalar& value) {
+  parameter.value = converted_scalar(parameter, value);
 }
 
 void set_limit(ParameterContents& parameter, Expr ParameterContents::*field, const Expr& value) {

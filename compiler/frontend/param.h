@@ -16,8 +16,9 @@ namespace retrograde {
 
 namespace ir {
 std::shared_ptr<ParameterContents> make_scalar_parameter(Type type, const std::string& name);
-void set_scalar(ParameterContents& parameter,
-                const Scalar& value);  // checks that the type can hold the value
+// The value as the parameter's type holds it; CompileError when that cannot.
+Scalar converted_scalar(const ParameterContents& parameter, const Scalar& value);
+void set_scalar(ParameterContents& parameter, const Scalar& value);
 void set_limit(ParameterContents& parameter, Expr ParameterContents::*field, const Expr& value);
 Scalar get_scalar(const ParameterContents& parameter, Type type);
 

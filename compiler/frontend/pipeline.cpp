@@ -1,13 +1,11 @@
-// pipeline.cpp -- compiling on demand and calling compiled code: finding its arguments, checking
-// them, reporting errors.
+// pipeline.cpp -- compiling on demand, the buffers of the outputs, bounds queries.
 #include "frontend/pipeline.h"
 
-#include <cstdio>
-#include <cstring>
 #include <iostream>
 #include <mutex>
 #include <unordered_set>
 
+#include "frontend/call.h"
 #include "frontend/func.h"
 #include "frontend/wrappers.h"
 
@@ -24,8 +22,7 @@ struct Stamp {
 
   static Stamp of(const std::vector<ir::FuncPtr>& outputs) {
     Stamp result;
-    for (const ir::FuncPtr& f : ir::functions_of(outputs))
-      result.funcs.emplace_back(f, f->version);
+    for (const ir::FuncPtr& f : ir::functions_of(outputs)) result.funcs.emplace_back(f, f->version);
     for (const ParameterPtr& p : ir::parameters_of(outputs))
       result.parameters.emplace_back(p, p->version);
     for (const ir::FuncPtr& f : outputs) {
@@ -50,58 +47,6 @@ std::string names_of(const std::vector<ir::FuncPtr>& outputs) {
   return out;
 }
 
-// The bytes of a scalar as generated code reads them.
-uint64_t scalar_bits(const ir::Scalar& value) {
-  if (!value.type.is_float()) return value.u;
-  return ir::eval_reinterpret(UInt(value.type.bits()), value).u;
-}
-
-void check_parameter_limits(const ir::ParameterContents& parameter, const std::string& asked) {
-  const auto limit = [&](const Expr& e) { return e.defined() ? ir::as_scalar(e) : std::nullopt; };
-  const auto minimum = limit(parameter.min_value), maximum = limit(parameter.max_value);
-  const auto less = [](const ir::Scalar& a, const ir::Scalar& b) {
-    return ir::eval_binary(ir::Kind::LT, a, b).as_bool();
-  };
-  const bool too_small = minimum && less(*parameter.value, *minimum);
-  const bool too_large = maximum && less(*maximum, *parameter.value);
-  if (!too_small && !too_large) return;
-  call_error(
-      asked, text("the Param ", quoted(parameter.name), " must keep its limits"),
-      text("its value is ", parameter.value->as_double(), " and its ",
-           too_small ? "minimum " : "maximum ", (too_small ? *minimum : *maximum).as_double()),
-      "Set a value inside the limits");
-}
-
-// Checks that do not depend on the code: null, type, dimensions, extents.
-void check_buffer(const halide_buffer_t* buffer, const std::string& name, Type type, int dimensions,
-                  bool with_memory, const std::string& asked) {
-  const std::string what = "the buffer for " + quoted(name);
-  if (!buffer)
-    call_error(asked, what + " must not be null", "a null halide_buffer_t* was given",
-               "Give a buffer");
-  const Type actual = from_halide_type(buffer->type);
-  if (actual != type) {
-    call_error(asked, what + " must have the right element type",
-               text("it holds ", to_string(actual), ", ", to_string(type), " is needed"),
-               "Give a buffer of that type");
-  }
-  if (buffer->dimensions != dimensions) {
-    call_error(asked, what + " must have the right number of dimensions",
-               text("it has ", buffer->dimensions, ", ", dimensions, " are needed"),
-               "Give a buffer of that many dimensions");
-  }
-  for (int d = 0; d < dimensions; d++) {
-    if (buffer->dim[d].extent >= 0) continue;
-    call_error(asked, what + " must not have negative extents",
-               text("dimension ", d, " has extent ", buffer->dim[d].extent),
-               "Give extents of at least 0");
-  }
-  if (with_memory && !buffer->host && !buffer->device) {
-    call_error(asked, what + " must have memory", "it has only a shape",
-               "Call allocate() on it first");
-  }
-}
-
 bool same_shape(const halide_buffer_t& a, const std::vector<halide_dimension_t>& shape) {
   for (int d = 0; d < a.dimensions; d++) {
     if (a.dim[d].min != shape[d].min || a.dim[d].extent != shape[d].extent ||
@@ -112,18 +57,13 @@ bool same_shape(const halide_buffer_t& a, const std::vector<halide_dimension_t>&
   return true;
 }
 
-// Beside what the program itself prints.
-void default_print(const char* message) {
-  std::fputs(message, stdout);
-  std::fflush(stdout);
-}
-
 }  // namespace
 
 struct Pipeline::Contents {
   std::vector<ir::FuncPtr> outputs;
   JITHandlers handlers;
   std::map<std::string, JITExtern> externs;
+  bool is_traced = false;
   std::mutex mutex;
   // The latest compilation.
   std::shared_ptr<CompiledPipeline> compiled;
@@ -174,6 +114,7 @@ PipelineSpec Pipeline::spec() const {
   PipelineSpec result{checked().outputs[0]->name, contents_->outputs};
   for (const auto& [name, function] : contents_->externs)
     result.externs[name] = function.extern_c_function().address();
+  result.is_traced = contents_->is_traced;
   return result;
 }
 
@@ -235,6 +176,11 @@ void Pipeline::invalidate_cache() {
   contents_->compiled.reset();
 }
 
+void Pipeline::trace_pipeline() {
+  invalidate_cache();
+  contents_->is_traced = true;
+}
+
 std::string Pipeline::loop_nest(const Target& target) const {
   const PipelineSpec pipeline = spec();
   return default_compiler().loop_nest(
@@ -285,7 +231,7 @@ std::vector<halide_buffer_t*> Pipeline::checked_outputs(const RealizationArg& gi
   size_t i = 0;
   for (const ir::FuncPtr& f : contents_->outputs) {
     for (const ParameterPtr& value : f->outputs) {
-      check_buffer(buffers[i++], value->name, value->type, f->dimensions(), with_memory, asked);
+      ir::check_buffer(buffers[i++], value->name, value->type, f->dimensions(), with_memory, asked);
     }
   }
   return buffers;
@@ -293,170 +239,51 @@ std::vector<halide_buffer_t*> Pipeline::checked_outputs(const RealizationArg& gi
 
 // ---- calling ----
 
-namespace {
-
-// The arguments of one call. Scalars and query buffers live here while it runs.
-class Arguments {
- public:
-  Arguments(const CompiledPipeline& code, std::vector<halide_buffer_t*> outputs, bool is_query,
-            std::string asked)
-      : asked_(std::move(asked)), outputs_(std::move(outputs)) {
-    scalars_.reserve(code.arguments().size());
-    queries_.reserve(code.arguments().size());
-    for (const ir::LoweredArgument& arg : code.arguments()) argv_.push_back(bind(arg, is_query));
-    RETROGRADE_ASSERT(next_output_ == outputs_.size(),
-                      "compiled code has another number of outputs");
-  }
-  void* const* argv() const { return argv_.data(); }
-
-  struct Query {
-    ParameterPtr parameter;
-    Runtime::Buffer<> buffer;
-  };
-  std::vector<Query>& queries() { return queries_; }
-
- private:
-  std::string asked_;
-  std::vector<halide_buffer_t*> outputs_;
-  size_t next_output_ = 0;
-  std::vector<uint64_t> scalars_;
-  std::vector<Query> queries_;
-  std::vector<void*> argv_;
-
-  void* bind(const ir::LoweredArgument& arg, bool is_query) {
-    if (arg.kind == ir::LoweredArgument::Kind::OutputBuffer) {
-      RETROGRADE_ASSERT(next_output_ < outputs_.size(),
-                        "compiled code has another number of outputs");
-      return outputs_[next_output_++];
-    }
-    auto parameter = std::dynamic_pointer_cast<ir::ParameterContents>(arg.symbol.lock());
-    RETROGRADE_ASSERT(parameter != nullptr, "the argument ", quoted(arg.name),
-                      " of compiled code stands for nothing");
-    return arg.is_buffer() ? bind_buffer(parameter, is_query) : bind_scalar(*parameter);
-  }
-
-  void* bind_scalar(const ir::ParameterContents& parameter) {
-    if (!parameter.value) {
-      call_error(asked_, text("the Param ", quoted(parameter.name), " needs a value"),
-                 "none was set", "Call set() on it first");
-    }
-    check_parameter_limits(parameter, asked_);
-    scalars_.push_back(scalar_bits(*parameter.value));
-    return &scalars_.back();
-  }
-
-  void* bind_buffer(const ParameterPtr& parameter, bool is_query) {
-    if (parameter->buffer) {
-      check_buffer(parameter->buffer, parameter->name, parameter->type, parameter->dimensions, true,
-                   asked_);
-      return parameter->buffer;
-    }
-    if (!is_query) {
-      call_error(asked_, text("the ImageParam ", quoted(parameter->name), " needs a buffer"),
-                 "none was set", "Call set() on it first, or infer_input_bounds()");
-    }
-    std::vector<int> nothing(parameter->dimensions, 0);
-    queries_.push_back(
-        {parameter, Runtime::Buffer<>(to_halide_type(parameter->type), nullptr, nothing)});
-    return queries_.back().buffer.raw_buffer();
-  }
-};
-
-// The Pipeline's handlers with those of the call's context in front.
-JITHandlers merged(JITHandlers handlers, const JITUserContext* context) {
-  if (!context) return handlers;
-  const JITHandlers& first = context->handlers;
-  const auto take = [](auto& to, const auto& from) {
-    if (from) to = from;
-  };
-  take(handlers.custom_print, first.custom_print);
-  take(handlers.custom_malloc, first.custom_malloc);
-  take(handlers.custom_free, first.custom_free);
-  take(handlers.custom_do_task, first.custom_do_task);
-  take(handlers.custom_do_par_for, first.custom_do_par_for);
-  take(handlers.custom_error, first.custom_error);
-  take(handlers.custom_trace, first.custom_trace);
-  take(handlers.print, first.print);
-  if (first.thread_limit > 0) handlers.thread_limit = first.thread_limit;
-  return handlers;
-}
-
-void check_handlers(const JITHandlers& handlers, const std::string& asked) {
-  if (!handlers.custom_malloc != !handlers.custom_free) {
-    user_error(asked, "custom_malloc and custom_free come together",
-               handlers.custom_malloc ? "only custom_malloc is set" : "only custom_free is set",
-               "Set both, or neither");
-  }
-}
-
-void call(const CompiledPipeline& code, const JITHandlers& own, void* const* argv,
-          const std::string& asked, JITUserContext* user = nullptr) {
-  JITUserContext nobody;
-  CallContext context;
-  context.handlers = merged(own, user);
-  context.user_context = user ? user : &nobody;
-  check_handlers(context.handlers, asked);
-  context.print = context.handlers.print ? context.handlers.print : default_print;
-  if (const auto custom = context.handlers.custom_print) {
-    context.print = [custom, to = context.user_context](const char* text) { custom(to, text); };
-  }
-  context.thread_limit = context.handlers.thread_limit;
-  const int code_returned = code.run(argv, context);
-  if (code_returned == 0) return;
-  if (const auto custom = context.handlers.custom_error) {
-    const std::string unnamed = text("cannot ", asked, ": error code ", code_returned);
-    custom(context.user_context, context.error.empty() ? unnamed.c_str() : context.error.c_str());
-    return;
-  }
-  if (!context.error.empty()) throw RuntimeError(context.error, code_returned);
-  call_error(asked, "the compiled code must succeed",
-             text("it returned the error code ", code_returned), "", code_returned);
-}
-
-}  // namespace
-
 void Pipeline::run(const std::vector<halide_buffer_t*>& outputs, const Target& target,
-                   JITUserContext* context) const {
+                   JITUserContext* context, const ParamMap& map) const {
   const auto code = compiled(target);
   const std::string asked = "realize " + names_of(contents_->outputs);
-  Arguments arguments(*code, outputs, false, asked);
-  call(*code, contents_->handlers, arguments.argv(), asked, context);
+  ir::Arguments arguments(*code, outputs, false, asked, map);
+  ir::call(*code, contents_->handlers, arguments.argv(), asked, context);
 }
 
-Realization Pipeline::realize(const std::vector<int32_t>& sizes, const Target& target) {
-  return realize(nullptr, sizes, target);
+Realization Pipeline::realize(const std::vector<int32_t>& sizes, const Target& target,
+                              const ParamMap& map) {
+  return realize(nullptr, sizes, target, map);
 }
 
-void Pipeline::realize(RealizationArg outputs, const Target& target) {
-  realize(nullptr, std::move(outputs), target);
+void Pipeline::realize(RealizationArg outputs, const Target& target, const ParamMap& map) {
+  realize(nullptr, std::move(outputs), target, map);
 }
 
 Realization Pipeline::realize(JITUserContext* context, const std::vector<int32_t>& sizes,
-                              const Target& target) {
+                              const Target& target, const ParamMap& map) {
   std::vector<Buffer<>> buffers = make_outputs(sizes, true);
   RealizationArg outputs(buffers);
-  run(outputs.buffers(), target, context);
+  run(outputs.buffers(), target, context, map);
   return Realization(std::move(buffers));
 }
 
-void Pipeline::realize(JITUserContext* context, RealizationArg outputs, const Target& target) {
-  run(checked_outputs(outputs, true), target, context);
+void Pipeline::realize(JITUserContext* context, RealizationArg outputs, const Target& target,
+                       const ParamMap& map) {
+  run(checked_outputs(outputs, true), target, context, map);
 }
 
 // Asks the code for the regions again until they agree: a region may depend on the shape of another
 // buffer.
-void Pipeline::infer(const std::vector<halide_buffer_t*>& outputs, const Target& target) const {
+void Pipeline::infer(const std::vector<halide_buffer_t*>& outputs, const Target& target,
+                     JITUserContext* context, const ParamMap& map) const {
   constexpr int max_rounds = 16;
   const auto code = compiled(target);
   const std::string asked = "infer the input bounds of " + names_of(contents_->outputs);
-  Arguments arguments(*code, outputs, true, asked);
+  ir::Arguments arguments(*code, outputs, true, asked, map);
   if (arguments.queries().empty()) return;
   for (int round = 0;; round++) {
     std::vector<std::vector<halide_dimension_t>> before;
     for (auto& [parameter, buffer] : arguments.queries()) {
       before.emplace_back(buffer.raw_buffer()->dim, buffer.raw_buffer()->dim + buffer.dimensions());
     }
-    call(*code, contents_->handlers, arguments.argv(), asked);
+    ir::call(*code, contents_->handlers, arguments.argv(), asked, context);
     bool settled = true;
     for (size_t i = 0; i < before.size(); i++) {
       settled = settled && same_shape(*arguments.queries()[i].buffer.raw_buffer(), before[i]);
@@ -469,24 +296,39 @@ void Pipeline::infer(const std::vector<halide_buffer_t*>& outputs, const Target&
     }
   }
   for (auto& [parameter, buffer] : arguments.queries()) {
-    check_buffer(buffer.raw_buffer(), parameter->name, parameter->type, parameter->dimensions,
-                 false, asked);
+    ir::check_buffer(buffer.raw_buffer(), parameter->name, parameter->type, parameter->dimensions,
+                     false, asked);
     std::vector<int> extents;
     for (int d = 0; d < buffer.dimensions(); d++) extents.push_back(buffer.dim(d).extent());
     ir::check_sizes(buffer.type(), extents, asked);
     ir::allocate_host(buffer);
-    ImageParam(parameter).set(Buffer<>(buffer));
+    if (const ParamMap::Entry* entry = map.find(parameter))
+      entry->receive(Buffer<>(buffer));
+    else
+      ImageParam(parameter).set(Buffer<>(buffer));
   }
 }
 
-void Pipeline::infer_input_bounds(const std::vector<int32_t>& sizes, const Target& target) {
+void Pipeline::infer_input_bounds(JITUserContext* context, const std::vector<int32_t>& sizes,
+                                  const Target& target, const ParamMap& map) {
   std::vector<Buffer<>> buffers = make_outputs(sizes, false);
   RealizationArg outputs(buffers);
-  infer(outputs.buffers(), target);
+  infer(outputs.buffers(), target, context, map);
 }
 
-void Pipeline::infer_input_bounds(RealizationArg outputs, const Target& target) {
-  infer(checked_outputs(outputs, false), target);
+void Pipeline::infer_input_bounds(JITUserContext* context, RealizationArg outputs,
+                                  const Target& target, const ParamMap& map) {
+  infer(checked_outputs(outputs, false), target, context, map);
+}
+
+void Pipeline::infer_input_bounds(const std::vector<int32_t>& sizes, const Target& target,
+                                  const ParamMap& map) {
+  infer_input_bounds(nullptr, sizes, target, map);
+}
+
+void Pipeline::infer_input_bounds(RealizationArg outputs, const Target& target,
+                                  const ParamMap& map) {
+  infer_input_bounds(nullptr, std::move(outputs), target, map);
 }
 
 }  // namespace retrograde

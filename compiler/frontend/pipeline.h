@@ -11,10 +11,12 @@
 #include "frontend/compiler_interface.h"
 #include "frontend/jit_handlers.h"
 #include "frontend/module.h"
+#include "frontend/param_map.h"
 #include "frontend/realization.h"
 
 namespace retrograde {
 
+class Callable;
 class Func;
 
 struct JITExtern;
@@ -55,21 +57,39 @@ class Pipeline {
   std::vector<Func> outputs() const;
   Func get_func(size_t index) const;  // of all Funcs, producers first
 
-  // Computes all outputs over [0, size) in each dimension, into new buffers.
-  Realization realize(const std::vector<int32_t>& sizes = {}, const Target& target = Target());
+  // Computes all outputs over [0, size) in each dimension, into new buffers. Parameters have their
+  // values from the map before those that were set.
+  Realization realize(const std::vector<int32_t>& sizes = {}, const Target& target = Target(),
+                      const ParamMap& map = ParamMap::empty_map());
   // Computes all outputs over the given buffers. RuntimeError when a buffer or parameter does not
   // fit.
-  void realize(RealizationArg outputs, const Target& target = Target());
+  void realize(RealizationArg outputs, const Target& target = Target(),
+               const ParamMap& map = ParamMap::empty_map());
   // The same; the handlers of `context` go before those of jit_handlers().
   Realization realize(JITUserContext* context, const std::vector<int32_t>& sizes = {},
-                      const Target& target = Target());
-  void realize(JITUserContext* context, RealizationArg outputs, const Target& target = Target());
-  // Gives every ImageParam without a buffer one of exactly the region that the outputs need.
-  void infer_input_bounds(const std::vector<int32_t>& sizes, const Target& target = Target());
-  void infer_input_bounds(RealizationArg outputs, const Target& target = Target());
+                      const Target& target = Target(), const ParamMap& map = ParamMap::empty_map());
+  void realize(JITUserContext* context, RealizationArg outputs, const Target& target = Target(),
+               const ParamMap& map = ParamMap::empty_map());
+  // Gives every ImageParam without a buffer one of exactly the region that the outputs need; those
+  // of the map, whose Buffers it makes, keep their own.
+  void infer_input_bounds(const std::vector<int32_t>& sizes, const Target& target = Target(),
+                          const ParamMap& map = ParamMap::empty_map());
+  void infer_input_bounds(RealizationArg outputs, const Target& target = Target(),
+                          const ParamMap& map = ParamMap::empty_map());
+  void infer_input_bounds(JITUserContext* context, const std::vector<int32_t>& sizes,
+                          const Target& target = Target(),
+                          const ParamMap& map = ParamMap::empty_map());
+  void infer_input_bounds(JITUserContext* context, RealizationArg outputs,
+                          const Target& target = Target(),
+                          const ParamMap& map = ParamMap::empty_map());
   // Compiles now what realize would compile on its first call.
   void compile_jit(const Target& target = Target());
+  // A function of `args`, in their order, then the output buffers; see callable.h.
+  Callable compile_to_callable(const std::vector<Argument>& args,
+                               const Target& target = get_jit_target_from_environment());
   void invalidate_cache();
+  // Tells the trace handler when a call begins and when it ends.
+  void trace_pipeline();
   std::string loop_nest(const Target& target = Target()) const;
   void print_loop_nest() const;  // to the standard error stream
   std::vector<Argument> infer_arguments() const;
@@ -139,8 +159,8 @@ class Pipeline {
   // first output among its outputs.
   void add_requirement(const Expr& condition, const std::vector<Expr>& message);
   template <typename... Parts>
-  requires((std::is_convertible_v<Parts, Expr> &&
-            ...)) void add_requirement(const Expr& condition, Parts&&... message) {
+  requires((std::is_convertible_v<Parts, Expr> && ...)) void add_requirement(const Expr& condition,
+                                                                             Parts&&... message) {
     add_requirement(condition, std::vector<Expr>{Expr(std::forward<Parts>(message))...});
   }
 
@@ -165,8 +185,9 @@ class Pipeline {
   std::vector<halide_buffer_t*> checked_outputs(const RealizationArg& outputs,
                                                 bool with_memory) const;
   void run(const std::vector<halide_buffer_t*>& outputs, const Target& target,
-           JITUserContext* context = nullptr) const;
-  void infer(const std::vector<halide_buffer_t*>& outputs, const Target& target) const;
+           JITUserContext* context, const ParamMap& map) const;
+  void infer(const std::vector<halide_buffer_t*>& outputs, const Target& target,
+             JITUserContext* context, const ParamMap& map) const;
 
   std::shared_ptr<Contents> contents_;
 };

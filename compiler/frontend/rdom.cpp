@@ -49,7 +49,10 @@ void check_extent(const Expr& extent, const std::string& name) {
 
 RVar::RVar() : name_(ir::unique_name("r")) {}
 
-RVar::RVar(const std::string& name) : name_(Var(name).name()) {}
+// The variables of a domain have dots in their names: "r.x".
+RVar::RVar(const std::string& name) : name_(name) {
+  static_cast<void>(Var(name.substr(name.rfind('.') + 1)));
+}
 
 RVar::RVar(std::shared_ptr<ir::ReductionDomainContents> domain, int index)
     : name_(domain->vars.at(index).var), domain_(std::move(domain)), index_(index) {}

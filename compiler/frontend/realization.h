@@ -11,6 +11,8 @@ namespace retrograde {
 class Realization {
  public:
   explicit Realization(std::vector<Buffer<>> buffers);
+  Realization(std::initializer_list<Buffer<>> buffers)
+      : Realization(std::vector<Buffer<>>(buffers)) {}
   template <typename T, int Dims, typename... Rest>
   requires((std::is_convertible_v<Rest, Buffer<>> && ...))
       Realization(Buffer<T, Dims>& first, Rest&&... rest)

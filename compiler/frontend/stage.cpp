@@ -160,11 +160,9 @@ void Stage::check_new_name(const VarOrRVar& var, const std::string& replaced,
   const ir::StageSchedule& now = schedule();
   const bool is_loop = std::any_of(now.dims.begin(), now.dims.end(),
                                    [&](const ir::Dim& dim) { return dim.var == name; });
-  const std::string fate = fate_of(now, name);
-  if (!is_loop && fate.empty()) return;
-  user_error(asked, "a new loop needs a name that this stage has not used yet",
-             is_loop ? text(quoted(name), " is a loop already; ", loops_of(now)) : fate,
-             "Use a new Var");
+  if (!is_loop) return;
+  user_error(asked, "the loops of a stage have different names",
+             text(quoted(name), " is a loop already; ", loops_of(now)), "Use another Var");
 }
 
 // Iterations that may touch the same element need atomic() of an update that is proven associative

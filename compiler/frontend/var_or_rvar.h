@@ -14,7 +14,9 @@ struct VarOrRVar {
   VarOrRVar(const RDom& r) : rvar(RVar(r)), is_rvar(true) {}
   template <int N>
   VarOrRVar(const ImplicitVar<N>& v) : var(v.to_var()), is_rvar(false) {}
-  VarOrRVar(const std::string& name, bool is_rvar) : var(name), rvar(name), is_rvar(is_rvar) {}
+  // Names of reduction variables have dots ("r.x"), those of Vars have none.
+  VarOrRVar(const std::string& name, bool is_rvar)
+      : var(is_rvar ? "_" : name), rvar(is_rvar ? name : "_"), is_rvar(is_rvar) {}
   const std::string& name() const { return is_rvar ? rvar.name() : var.name(); }
 
   Var var = Var("_");

@@ -130,7 +130,8 @@ std::string base_name(const std::string& function) {
 
 std::unique_ptr<GeneratorBase> make_generator(const CommandLine& command, const Target& target) {
   auto generator = GeneratorRegistry::create(command.generator, GeneratorContext(target));
-  generator->set_generator_param_values(command.params);
+  generator->set_generator_param_values(
+      GeneratorParamsMap(command.params.begin(), command.params.end()));
   return generator;
 }
 
@@ -171,7 +172,12 @@ void run_generator(const CommandLine& command) {
     return command.gradient ? generator->build_gradient_module(name)
                             : generator->build_module(name);
   };
-  const auto files = files_of(command, base);
+  auto files = files_of(command, base);
+  if (const auto stub = files.find(OutputFileType::cpp_stub); stub != files.end()) {
+    make_generator(command, command.targets[0])->emit_cpp_stub(stub->second);
+    files.erase(stub);
+    if (files.empty()) return;
+  }
   if (command.targets.size() == 1)
     build(function, command.targets[0]).compile(files);
   else

@@ -62,13 +62,16 @@ GeneratorContext GeneratorBase::context() const {
 
 void GeneratorBase::set_generator_param_values(const GeneratorParamsMap& values) {
   check_names();
-  for (const auto& [key, text] : values) {
+  for (const auto& [key, value] : values) {
     const auto param = std::find_if(members_.params.begin(), members_.params.end(),
                                     [&](const GeneratorParamBase* p) { return p->name() == key; });
-    if (param != members_.params.end())
-      (*param)->set_from_string(text);
-    else if (!set_open_part(key, text))
-      unknown_param(key);
+    if (param == members_.params.end()) {
+      if (!set_open_part(key, value.text)) unknown_param(key);
+    } else if (value.level.defined()) {
+      (*param)->set_from_loop_level(value.level);
+    } else {
+      (*param)->set_from_string(value.text);
+    }
   }
 }
 
@@ -233,6 +236,14 @@ Pipeline GeneratorBase::get_pipeline() {
     add_requirements(pipeline_);
   }
   return pipeline_;
+}
+
+std::vector<Func> GeneratorBase::output_funcs(const std::string& name) const {
+  for (const GeneratorOutputBase* output : members_.outputs) {
+    if (output->name() == name) return output->funcs();
+  }
+  user_error("take the output " + quoted(name) + " of the generator " + quoted(name_),
+             "the generator declares it", "it has no output of that name");
 }
 
 void GeneratorBase::add_requirements(Pipeline& pipeline) const {

@@ -21,7 +21,15 @@
 namespace retrograde {
 namespace Internal {
 
-using GeneratorParamsMap = std::map<std::string, std::string>;
+// A param's value: as text, or a level to be computed at.
+struct StringOrLoopLevel {
+  StringOrLoopLevel(const std::string& text) : text(text) {}
+  StringOrLoopLevel(const char* text) : text(text) {}
+  StringOrLoopLevel(const LoopLevel& level) : level(level) {}
+  std::string text;
+  LoopLevel level;  // undefined: the text says it
+};
+using GeneratorParamsMap = std::map<std::string, StringOrLoopLevel>;
 
 // auto_schedule=false, =true (the default scheduler) or =<name of a scheduler>.
 class AutoScheduleParam : public GeneratorParamBase {
@@ -36,6 +44,7 @@ class AutoScheduleParam : public GeneratorParamBase {
   // CompileError when there is no such scheduler.
   void set_from_string(const std::string& text) override;
   std::string to_string() const override { return value() ? scheduler_ : "false"; }
+  InCpp in_cpp() const override { return {}; }
 
  private:
   std::string scheduler_;
@@ -64,6 +73,10 @@ class GeneratorBase : public NamesInterface {
   // By name: GeneratorParams, and what declarations leave open: in.type=float32, in.dim=2,
   // in.size=3. CompileError for a name that the generator does not have, and for a bad value.
   void set_generator_param_values(const GeneratorParamsMap& values);
+  // Writes a header with a class that runs this generator inside another one: see cpp_stub.h.
+  void emit_cpp_stub(const std::string& path) const;
+  // Name of that class, with its namespaces; by default that of the generator.
+  void set_stub_name(const std::string& name) { stub_name_ = name; }
 
   // Values for all inputs, in their order; a std::vector for an array.
   template <typename... Args>
@@ -79,6 +92,9 @@ class GeneratorBase : public NamesInterface {
   void schedule_all();
   // All outputs together; after generate().
   Pipeline get_pipeline();
+  void trace_pipeline() { get_pipeline().trace_pipeline(); }
+  // Of one output; CompileError when there is none of the name. After generate().
+  std::vector<Func> output_funcs(const std::string& name) const;
   template <typename... Args>
   decltype(auto) realize(Args&&... args) {
     schedule_all();
@@ -177,7 +193,7 @@ class GeneratorBase : public NamesInterface {
   GIOBase* find_input(size_t i) const { return members_.inputs[i]; }
   void set_input_values(size_t i, std::vector<InputValue> values);
 
-  std::string name_ = "generator";
+  std::string name_ = "generator", stub_name_;
   Phase phase_ = Phase::Created;
   std::vector<std::unique_ptr<GIOBase>> extras_;
   std::vector<Requirement> requirements_;

@@ -25,6 +25,38 @@ void GeneratorParamBase::refuse(const std::string& value, const std::string& rul
              instead);
 }
 
+void GeneratorParamBase::set_from_loop_level(const LoopLevel& level) {
+  refuse(level.to_string(), "it is of another type than LoopLevel", "a LoopLevel was given",
+         "Give a value of its type");
+}
+
+std::string cpp_literal(const std::string& text) {
+  std::string literal = "\"";
+  for (const char c : text) {
+    if (c == '"' || c == '\\')
+      literal += std::string("\\") + c;
+    else
+      literal += c == '\n' ? "\\n" : std::string(1, c);
+  }
+  return literal + "\"";
+}
+
+std::string cpp_type(const Type& type) {
+  if (type.is_bool()) return "::retrograde::Bool()";
+  if (type.is_handle()) return "::retrograde::Handle()";
+  const char* names[] = {"Int", "UInt", "Float", "BFloat"};
+  return text("::retrograde::", names[static_cast<int>(type.code())], "(", type.bits(), ")");
+}
+
+std::string cpp_element_name(const Type& type) {
+  if (type.is_bool()) return "bool";
+  if (type.is_handle()) return "void*";
+  if (type.is_bfloat()) return "::retrograde::bfloat16_t";
+  if (type.is_float())
+    return type.bits() == 16 ? "::retrograde::float16_t" : type.bits() == 32 ? "float" : "double";
+  return to_string(type) + "_t";
+}
+
 std::optional<bool> read_bool(const std::string& text) {
   if (text == "true" || text == "True") return true;
   if (text == "false" || text == "False") return false;

@@ -32,8 +32,17 @@ class GeneratorParamBase {
 
   const std::string& name() const { return name_; }
   virtual void set_from_string(const std::string& text) = 0;
+  // CompileError unless it is a param of that type.
+  virtual void set_from_loop_level(const LoopLevel& level);
   // What set_from_string reads back.
   virtual std::string to_string() const = 0;
+  // How a stub declares it; see cpp_stub.h.
+  struct InCpp {
+    std::string type, value;           // "int", "3"
+    std::vector<std::string> choices;  // of an enumeration; its type has no name
+    const char* to_text = "";          // the function that makes a text of a value; "": it is one
+  };
+  virtual InCpp in_cpp() const = 0;
 
  protected:
   // CompileError once generate() has run: the value would come too late.
@@ -60,10 +69,21 @@ std::optional<Type> read_type(const std::string& text);
 std::optional<LoopLevel> read_loop_level(const std::string& text);
 std::string type_choices();  // "bool, int8, ..."
 
+std::string cpp_literal(const std::string& text);  // "\"a\\n\""
+std::string cpp_type(const Type& type);            // "::retrograde::Int(32)"
+std::string cpp_element_name(const Type& type);    // "int32_t"
+
 template <typename T>
 std::string number_text(T value) {
   char text[64];
   return std::string(text, std::to_chars(text, text + sizeof text, value).ptr);
+}
+
+// A value as set_from_string reads it.
+inline std::string param_text(bool value) { return value ? "true" : "false"; }
+template <typename T>
+std::string param_text(T value) {
+  return number_text(value);
 }
 
 // Whether `from` keeps its value as a To: floats may round, whole numbers may not.
@@ -121,7 +141,14 @@ class GeneratorParam : public Internal::GeneratorParamBase {
     }
   }
   void set_from_string(const std::string& text) override;
+  void set_from_loop_level(const LoopLevel& level) override {
+    if constexpr (std::is_same_v<T, LoopLevel>)
+      set(level);
+    else
+      GeneratorParamBase::set_from_loop_level(level);
+  }
   std::string to_string() const override;
+  InCpp in_cpp() const override;
 
  private:
   T value_;
@@ -187,6 +214,30 @@ std::string GeneratorParam<T>::to_string() const {
     return Internal::number_text(value_);
   } else {
     return value_.to_string();
+  }
+}
+
+template <typename T>
+Internal::GeneratorParamBase::InCpp GeneratorParam<T>::in_cpp() const {
+  if constexpr (is_text) {
+    return {"std::string", Internal::cpp_literal(value_), {}};
+  } else if constexpr (std::is_enum_v<T>) {
+    std::vector<std::string> choices;
+    for (const auto& choice : choices_) choices.push_back(choice.first);
+    return {"", to_string(), choices};
+  } else if constexpr (std::is_same_v<T, Type>) {
+    return {"::retrograde::Type", Internal::cpp_type(value_), {}, "::retrograde::to_string"};
+  } else if constexpr (std::is_same_v<T, LoopLevel>) {
+    return {"::retrograde::LoopLevel", "::retrograde::LoopLevel::" + to_string() + "()", {}};
+  } else if constexpr (std::is_same_v<T, bool>) {
+    return {"bool", to_string(), {}, "::retrograde::Internal::param_text"};
+  } else if constexpr (is_number) {
+    return {Internal::cpp_element_name(type_of<T>()),
+            to_string(),
+            {},
+            "::retrograde::Internal::param_text"};
+  } else {
+    return {};  // of every generator: target and machine, which the context says
   }
 }
 

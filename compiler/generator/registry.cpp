@@ -14,6 +14,7 @@ namespace {
 struct Registered {
   std::mutex mutex;
   std::map<std::string, GeneratorFactory> factories;
+  std::map<std::string, std::string> stub_names;
   std::set<std::string> claimed_twice;
 };
 Registered& registered() {
@@ -30,8 +31,10 @@ std::string list_of_names() {
 
 }  // namespace
 
-void GeneratorRegistry::register_factory(const std::string& name, GeneratorFactory factory) {
+void GeneratorRegistry::register_factory(const std::string& name, GeneratorFactory factory,
+                                         const std::string& stub_name) {
   std::lock_guard lock(registered().mutex);
+  registered().stub_names[name] = stub_name;
   if (!registered().factories.emplace(name, std::move(factory)).second)
     registered().claimed_twice.insert(name);
 }
@@ -52,11 +55,13 @@ std::vector<std::string> GeneratorRegistry::enumerate() {
 std::unique_ptr<GeneratorBase> GeneratorRegistry::create(const std::string& name,
                                                          const GeneratorContext& context) {
   GeneratorFactory factory;
+  std::string stub_name;
   bool twice = false;
   {
     std::lock_guard lock(registered().mutex);
     if (auto found = registered().factories.find(name); found != registered().factories.end())
       factory = found->second;
+    stub_name = registered().stub_names[name];
     twice = registered().claimed_twice.count(name) > 0;
   }
   if (!factory) {
@@ -68,11 +73,13 @@ std::unique_ptr<GeneratorBase> GeneratorRegistry::create(const std::string& name
     user_error("create the generator " + quoted(name), "a name is registered once",
                "two generators have it", "Rename one of them");
   }
-  return factory(context);
+  std::unique_ptr<GeneratorBase> generator = factory(context);
+  generator->set_stub_name(stub_name);
+  return generator;
 }
 
 std::unique_ptr<GeneratorBase> create_alias(const std::string& name, const std::string& original,
-                                            const std::map<std::string, std::string>& params,
+                                            const GeneratorParamsMap& params,
                                             const GeneratorContext& context) {
   std::unique_ptr<GeneratorBase> generator = GeneratorRegistry::create(original, context);
   generator->set_name(name);

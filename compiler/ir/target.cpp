@@ -259,6 +259,40 @@ bool Target::supports_device_api(DeviceAPI device) const {
   return has_feature(target_feature_for_device_api(device));
 }
 
+namespace {
+constexpr DeviceAPI gpus[] = {DeviceAPI::Metal, DeviceAPI::OpenCL, DeviceAPI::CUDA,
+                              DeviceAPI::OpenGLCompute, DeviceAPI::D3D12Compute};
+
+// The first of them that the target has, else `otherwise`.
+template <size_t N>
+DeviceAPI first_of(const DeviceAPI (&devices)[N], const Target& target, DeviceAPI otherwise) {
+  for (DeviceAPI device : devices) {
+    if (target.supports_device_api(device)) return device;
+  }
+  return otherwise;
+}
+}  // namespace
+
+DeviceAPI Target::get_required_device_api() const {
+  constexpr DeviceAPI others[] = {DeviceAPI::Hexagon, DeviceAPI::HexagonDma};
+  return first_of(gpus, *this, first_of(others, *this, DeviceAPI::None));
+}
+
+DeviceAPI get_default_device_api_for_target(const Target& target) {
+  return first_of(gpus, target, DeviceAPI::Host);
+}
+
+int Target::get_cuda_capability_lower_bound() const {
+  constexpr std::pair<Feature, int> capabilities[] = {
+      {CUDACapability30, 30}, {CUDACapability32, 32}, {CUDACapability35, 35},
+      {CUDACapability50, 50}, {CUDACapability61, 61}, {CUDACapability70, 70},
+      {CUDACapability75, 75}, {CUDACapability80, 80}, {CUDACapability86, 86}};
+  for (const auto& [feature, capability] : capabilities) {
+    if (has_feature(feature)) return capability;
+  }
+  return 20;
+}
+
 bool Target::get_runtime_compatible_target(const Target& other, Target& result) const {
   if (arch != other.arch || os != other.os || bits != other.bits) return false;
   // What changes the functions that a runtime offers. The rest is code that the runtime never sees.

@@ -101,6 +101,9 @@ struct Target {
     return supports_type(type) && supports_device_api(device);
   }
   bool supports_device_api(DeviceAPI device) const;
+  // A device that its features ask for, any one of several; None without.
+  DeviceAPI get_required_device_api() const;
+  int get_cuda_capability_lower_bound() const;  // 75 for cuda_capability_75; 20 when it says none
   // The first part that no code can be generated for, such as "cuda"; empty when there is none.
   std::string unsupported_part() const;
   bool supported() const { return unsupported_part().empty(); }
@@ -124,6 +127,8 @@ Target get_target_from_environment();  // RG_TARGET or HL_TARGET, else host
 // RG_JIT_TARGET or HL_JIT_TARGET, else host, plus JIT. UserError when this machine cannot run it.
 Target get_jit_target_from_environment();
 Target::Feature target_feature_for_device_api(DeviceAPI device);  // FeatureEnd: no single one
+// What DeviceAPI::Default_GPU means for the target; Host where it has no GPU.
+DeviceAPI get_default_device_api_for_target(const Target& target);
 bool host_supports_target_device(const Target& target);
 
 }  // namespace retrograde

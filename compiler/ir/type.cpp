@@ -119,6 +119,15 @@ bool Type::can_represent(Type other) const {
   return is_int() && other.is_uint() && bits() > other.bits();
 }
 
+bool Type::is_max(uint64_t value) const { return is_int_or_uint() && value == max_uint(); }
+bool Type::is_max(int64_t value) const {
+  return value >= 0 && is_max(static_cast<uint64_t>(value));
+}
+bool Type::is_min(int64_t value) const { return is_int_or_uint() && value == min_int(); }
+bool Type::is_min(uint64_t value) const {
+  return value <= INT64_MAX && is_min(static_cast<int64_t>(value));
+}
+
 std::string to_string(Type type) {
   static constexpr const char* prefixes[] = {"int", "uint", "float", "bfloat", "handle"};
   std::string name = prefixes[static_cast<int>(type.code())];

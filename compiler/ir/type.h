@@ -8,6 +8,7 @@
 #include <type_traits>
 
 struct halide_type_t;
+enum halide_type_code_t : uint8_t;
 
 namespace retrograde {
 
@@ -101,10 +102,14 @@ auto operator<=>(T a, T b) {
 
 class Type {
  public:
+  static constexpr TypeCode Int = TypeCode::Int, UInt = TypeCode::UInt, Float = TypeCode::Float,
+                            BFloat = TypeCode::BFloat, Handle = TypeCode::Handle;
+
   constexpr Type() = default;
   // The types of the runtime's buffers; defined by frontend/buffer.cpp, which knows them.
   Type(const halide_type_t& type);
   operator halide_type_t() const;
+  Type(halide_type_code_t code, int bits, int lanes = 1);
   constexpr Type(TypeCode code, int bits, int lanes = 1)
       : code_(code), bits_(static_cast<uint8_t>(bits)), lanes_(static_cast<uint16_t>(lanes)) {}
 
@@ -127,6 +132,14 @@ class Type {
   constexpr Type with_bits(int bits) const { return Type(code_, bits, lanes_); }
   constexpr Type with_code(TypeCode code) const { return Type(code, bits_, lanes_); }
   constexpr Type element_of() const { return with_lanes(1); }
+  // Twice and half as many bits; those of a bool are 1 and those of a byte 8.
+  constexpr Type widen() const { return with_bits(bits_ == 1 ? 8 : 2 * bits_); }
+  constexpr Type narrow() const { return with_bits(bits_ == 8 ? 1 : bits_ / 2); }
+  // Whether arithmetic beyond the range wraps around.
+  constexpr bool can_overflow_int() const { return is_int() && bits_ <= 16; }
+  constexpr bool can_overflow() const { return is_uint() || can_overflow_int(); }
+  // Handles are all alike: what they point to is not known.
+  constexpr bool same_handle_type(const Type&) const { return true; }
 
   // Largest and smallest finite values, for scalar integer types as 64-bit patterns.
   int64_t min_int() const;
@@ -138,6 +151,11 @@ class Type {
   bool can_represent(uint64_t value) const;
   bool can_represent(double value) const;
   bool can_represent(Type other) const;  // every value of `other`
+  // Whether the value is the largest (smallest) of this integer type.
+  bool is_max(int64_t value) const;
+  bool is_max(uint64_t value) const;
+  bool is_min(int64_t value) const;
+  bool is_min(uint64_t value) const;
 
   // The largest and smallest value as expressions; infinities for floats.
   Expr max() const;

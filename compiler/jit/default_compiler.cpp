@@ -116,7 +116,7 @@ class JitCompiler : public Compiler {
   std::shared_ptr<CompiledPipeline> compile(const PipelineSpec& pipeline,
                                             const Target& target) override {
     ir::LowerOptions options;
-    options.target = target;
+    options.target = pipeline.traced(target);
     options.validate = validate_passes;
     ir::LoweredFunction function =
         ir::lower(pipeline.name, pipeline.outputs, ir::infer_arguments(pipeline.outputs), options);

@@ -4,12 +4,20 @@
 
 #include <retrograde/retrograde.h>
 
+// Programs rely on these.
+#include <iostream>
+#include <map>
+
 // Not an alias: HalideBuffer.h opens namespace Halide for Halide::Runtime.
 namespace Halide {
 using namespace ::retrograde;
 
 // Errors are always exceptions here.
 inline bool exceptions_enabled() { return true; }
+
+// Deep programs are compiled on a stack of its own, as large as they need.
+inline void set_compiler_stack_size(size_t) {}
+inline size_t get_compiler_stack_size() { return size_t{1} << 30; }
 }  // namespace Halide
 
 // ---- macros that programs use ----

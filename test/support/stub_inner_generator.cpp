@@ -1,0 +1,47 @@
+// The generator that test/unit/generator_stub_test.cpp uses through its stub.
+#include "Halide.h"
+
+namespace {
+
+enum class Shape { Square, Ramp };
+
+class Inner : public Halide::Generator<Inner> {
+ public:
+  GeneratorParam<int> factor{"factor", 2};
+  GeneratorParam<float> bias{"bias", 0.5f};
+  GeneratorParam<bool> negate{"negate", false};
+  GeneratorParam<std::string> word{"word", "a \"word\""};
+  GeneratorParam<Shape> shape{
+      "shape", Shape::Ramp, {{"square", Shape::Square}, {"ramp", Shape::Ramp}}};
+  GeneratorParam<Halide::Type> type{"type", Halide::Int(32)};
+  GeneratorParam<LoopLevel> level{"level", LoopLevel::root()};
+
+  Input<Func> source{"source", Int(32), 1};
+  Input<Buffer<int, 1>> image{"image"};
+  Input<Func[]> many{"many", Int(32), 1};
+  Input<int> offset{"offset"};
+
+  Output<Func> scaled{"scaled", 1};
+  Output<Buffer<float, 1>> shaped{"shaped"};
+  Output<Func[2]> pair{"pair", Int(32), 1};
+  Output<Buffer<>> open{"open", 1};
+
+  void generate() {
+    partial(x) = source(x) * factor + offset;
+    scaled(x) = cast(type, negate ? -partial(x) : partial(x));
+    const Expr here = cast<float>(image(x));
+    shaped(x) = (shape == Shape::Square ? here * here : here) + bias;
+    pair[0](x) = many[0](x) + static_cast<int>(word.value().size());
+    pair[1](x) = many[1](x) + static_cast<int>(many.size());
+    open(x) = cast(open.type(), source(x));
+  }
+  void schedule() { partial.compute_at(level); }
+
+ private:
+  Var x{"x"};
+  Func partial{"partial"};
+};
+
+}  // namespace
+
+HALIDE_REGISTER_GENERATOR(Inner, stub_inner, test::inner::InnerStub)

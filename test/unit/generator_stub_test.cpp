@@ -1,0 +1,94 @@
+// A generator inside another one, by the header that it writes of itself (-e cpp_stub). The header
+// is made by the build; values are compared with plain C++.
+#include <gtest/gtest.h>
+
+#include "Halide.h"
+#include "stub_inner.stub.h"
+
+using namespace Halide;
+using test::inner::Enum_shape;
+using test::inner::InnerStub;
+
+namespace {
+
+class Outer : public Halide::Generator<Outer> {
+ public:
+  Input<Buffer<int, 1>> input{"input"};
+  Output<Buffer<int, 1>> output{"output"};
+  void generate() {
+    Func source("source"), other("other");
+    source(x) = input(x) + 1;
+    other(x) = 10 * x;
+    InnerStub::GeneratorParams params;
+    params.factor = 3;
+    params.negate = true;
+    params.open_type = UInt(8);
+    params.level.set(LoopLevel(output, x));
+    const auto inner = InnerStub::generate(this, {source, input, {source, other}, 4}, params);
+    output(x) = inner.scaled(x) + inner.pair[1](x) + cast<int>(inner.open(x));
+  }
+
+ private:
+  Var x{"x"};
+};
+
+TEST(GeneratorStub, ComputesInsideAnotherGenerator) {
+  const GeneratorContext context(get_jit_target_from_environment());
+  Buffer<int> input(8);
+  input.for_each_element([&](int i) { input(i) = i * i; });
+  auto outer = context.create<Outer>();
+  outer->apply(input);
+  Buffer<int> output = outer->realize({8});
+  for (int i = 0; i < 8; i++) {
+    const int source = i * i + 1;
+    EXPECT_EQ(output(i), -(3 * source + 4) + (10 * i + 2) + source) << i;
+  }
+}
+
+TEST(GeneratorStub, HasParamsWithTheirDefaults) {
+  const InnerStub::GeneratorParams params;
+  EXPECT_EQ(params.factor, 2);
+  EXPECT_EQ(params.bias, 0.5f);
+  EXPECT_FALSE(params.negate);
+  EXPECT_EQ(params.word, "a \"word\"");
+  EXPECT_EQ(params.shape, Enum_shape::ramp);
+  EXPECT_EQ(params.type, Int(32));
+  EXPECT_TRUE(params.level.is_root());
+}
+
+TEST(GeneratorStub, GivesImagesThatCanBeRealized) {
+  Func source("source");
+  Var x("x");
+  source(x) = x;
+  Buffer<int> image(4);
+  image.fill(3);
+  InnerStub::Inputs inputs;
+  inputs.source = source;
+  inputs.image = image;
+  inputs.many = {source, source};
+  inputs.offset = 0;
+  InnerStub::GeneratorParams params;
+  params.shape = Enum_shape::square;
+  params.open_type = Int(16);
+  const auto inner = InnerStub::generate(get_jit_target_from_environment(), inputs, params);
+  Func of_shape = inner.shaped;
+  Buffer<float> shaped = of_shape.realize({4});
+  EXPECT_EQ(shaped(2), 9.5f);
+  Realization all = inner.realize({4});
+  EXPECT_EQ(all.size(), 5u);
+  Buffer<int16_t> open = all[4];
+  EXPECT_EQ(open(3), 3);
+  EXPECT_TRUE(inner.target.has_feature(Target::JIT) || !inner.target.has_unknowns());
+}
+
+TEST(GeneratorStub, RefusesWhatDoesNotFit) {
+  Func floats("floats");
+  Var x("x");
+  floats(x) = 1.0f;
+  Buffer<int> image(4);
+  EXPECT_THROW(
+      InnerStub::generate(get_jit_target_from_environment(), {floats, image, {floats, floats}, 0}),
+      CompileError);
+}
+
+}  // namespace

@@ -1,0 +1,307 @@
+// Names of Halide's API that programs use less often: each does what it says, compared with plain
+// C++; and what cannot be done says so.
+#include "Halide.h"
+
+#include <gtest/gtest.h>
+
+#include <cstdint>
+#include <limits>
+#include <thread>
+
+#include "support/errors.h"
+
+using namespace Halide;
+using retrograde::error_of;
+using retrograde::expect_mentions;
+
+namespace {
+
+// out(x) = in(x) * factor
+struct Scaled {
+  ImageParam in{Int(32), 1, "in"};
+  Param<int> factor{"factor"};
+  Func out{"out"};
+  Var x{"x"};
+  Scaled() { out(x) = in(x)*factor; }
+};
+
+Buffer<int> ramp(int size, int first = 0) {
+  Buffer<int> result(size);
+  for (int i = 0; i < size; i++) result(i) = first + i;
+  return result;
+}
+
+// ---- ParamMap ----
+
+TEST(ParamMaps, StandInForWhatWasSet) {
+  Scaled s;
+  Buffer<int> set = ramp(4), mapped = ramp(4, 100);
+  s.in.set(set);
+  s.factor.set(2);
+  Buffer<int> plain = s.out.realize({4});
+  Buffer<int> other = s.out.realize({4}, Target(), {{s.factor, 3}, {s.in, mapped}});
+  ParamMap map;
+  map.set(s.factor, 5);
+  EXPECT_EQ(map.size(), 1u);
+  Buffer<int> into(4);
+  Pipeline(s.out).realize(into, get_jit_target_from_environment(), map);
+  for (int i = 0; i < 4; i++) {
+    EXPECT_EQ(plain(i), 2 * i);
+    EXPECT_EQ(other(i), 3 * (100 + i));
+    EXPECT_EQ(into(i), 5 * i);
+  }
+  EXPECT_EQ(s.factor.get(), 2);
+}
+
+TEST(ParamMaps, OfTheirOwnServeThreads) {
+  Scaled s;
+  s.out.compile_jit();
+  const Pipeline pipeline(s.out);
+  std::vector<std::thread> threads;
+  std::vector<Buffer<int>> results(4);
+  for (int t = 0; t < 4; t++) {
+    threads.emplace_back([&, t] {
+      Buffer<int> in = ramp(50, t);
+      for (int i = 0; i < 20; i++)
+        results[t] = Pipeline(pipeline).realize({50}, Target(), {{s.factor, t}, {s.in, in}});
+    });
+  }
+  for (std::thread& thread : threads) thread.join();
+  for (int t = 0; t < 4; t++) EXPECT_EQ(results[t](49), t * (49 + t));
+}
+
+TEST(ParamMaps, TakeInferredImages) {
+  Scaled s;
+  Buffer<int> wanted;
+  s.out.infer_input_bounds({7}, Target(), {{s.in, &wanted}, {s.factor, 1}});
+  ASSERT_TRUE(wanted.defined());
+  EXPECT_EQ(wanted.dim(0).extent(), 7);
+  EXPECT_FALSE(s.in.get().defined());
+}
+
+TEST(ParamMaps, RefuseWhatDoesNotFit) {
+  Scaled s;
+  Buffer<float> floats(4);
+  expect_mentions(error_of<CompileError>([&] {
+                    ParamMap{{s.in, floats}};
+                  }),
+                  {"\"in\"", "it takes int32", "holds float32"});
+  expect_mentions(error_of<CompileError>([&] {
+                    ParamMap{{s.factor, 2.5}};
+                  }),
+                  {"\"factor\"", "must fit"});
+  expect_mentions(error_of<RuntimeError>([&] {
+                    s.out.realize({4}, Target(), {{s.factor, 1}});
+                  }),
+                  {"\"in\" needs a buffer"});
+}
+
+// ---- Callable ----
+
+TEST(Callables, TakeTheirArgumentsInOrder) {
+  Scaled s;
+  const Callable scaled = s.out.compile_to_callable({s.factor, s.in});
+  Buffer<int> in = ramp(5), out(5);
+  EXPECT_EQ(scaled(7, in, out), 0);
+  EXPECT_EQ(out(4), 28);
+  JITUserContext context;
+  EXPECT_EQ(scaled(&context, 8, in, out), 0);
+  EXPECT_EQ(out(4), 32);
+  const auto function = scaled.make_std_function<int, Buffer<int>, Buffer<int>>();
+  EXPECT_EQ(function(9, in, out), 0);
+  EXPECT_EQ(out(4), 36);
+  const auto with_context =
+      scaled.make_std_function<JITUserContext*, int, Buffer<int, 1>, Buffer<int, 1>>();
+  EXPECT_EQ(with_context(&context, 10, in, out), 0);
+  EXPECT_EQ(out(4), 40);
+}
+
+TEST(Callables, RefuseWhatDoesNotFit) {
+  Scaled s;
+  const Callable scaled = Pipeline(s.out).compile_to_callable({s.factor, s.in});
+  Buffer<int> in = ramp(5), out(5);
+  expect_mentions(error_of<RuntimeError>([&] { scaled(1, in); }), {"there are 3", "2 were given"});
+  expect_mentions(error_of<RuntimeError>([&] { scaled(1.0f, in, out); }),
+                  {"argument 1", "\"factor\"", "float32 was given"});
+  expect_mentions(error_of<RuntimeError>([&] { scaled(in, 1, out); }), {"is a scalar"});
+  expect_mentions(error_of<RuntimeError>([&] { scaled.make_std_function<int, int, int>(); }),
+                  {"argument 2", "is a buffer"});
+  expect_mentions(error_of<CompileError>([&] { s.out.compile_to_callable({s.in}); }),
+                  {"\"factor\" is not among them"});
+  expect_mentions(error_of<CompileError>([&] { Callable()(); }), {"without a pipeline"});
+}
+
+// ---- events of a pipeline ----
+
+int events = 0;
+
+TEST(TracePipeline, TellsWhenACallBeginsAndEnds) {
+  Func f("f");
+  Var x("x");
+  f(x) = x;
+  Pipeline pipeline(f);
+  pipeline.set_custom_trace([](void*, const halide_trace_event_t* event) {
+    const bool is_begin = event->event == halide_trace_begin_pipeline;
+    if (is_begin || event->event == halide_trace_end_pipeline) events++;
+    return 1;
+  });
+  pipeline.realize({3});
+  EXPECT_EQ(events, 0);
+  pipeline.trace_pipeline();
+  pipeline.realize({3});
+  EXPECT_EQ(events, 2);
+}
+
+// ---- expressions ----
+
+TEST(Selects, OfFuncsAreExprs) {
+  Func a("a"), b("b"), c("c"), two("two");
+  Var x("x");
+  a(x) = x;
+  b(x) = 10 * x;
+  c(x) = select(x > 2, a(x), b(x));
+  two(x) = select(x == 0, a(x) + 7, x == 1, b(x), a(x));
+  Buffer<int> r = c.realize({4}), t = two.realize({3});
+  EXPECT_EQ(r(2), 20);
+  EXPECT_EQ(r(3), 3);
+  EXPECT_EQ(t(0), 7);
+  EXPECT_EQ(t(1), 10);
+  EXPECT_EQ(t(2), 2);
+}
+
+TEST(Selects, OfTuplesInBraces) {
+  Func f("f");
+  Var x("x");
+  f(x) = tuple_select(x > 1, {x, 2.0f}, {-x, 3.0f});
+  Realization r = f.realize({3});
+  Buffer<int> first = r[0];
+  Buffer<float> second = r[1];
+  EXPECT_EQ(first(1), -1);
+  EXPECT_EQ(second(2), 2.0f);
+}
+
+Expr u8_of(int value) { return cast<uint8_t>(value); }
+
+TEST(Integers, SaturateHalveAndWiden) {
+  EXPECT_EQ(evaluate<uint8_t>(saturating_add(u8_of(200), u8_of(100))), 255);
+  EXPECT_EQ(evaluate<uint8_t>(saturating_sub(u8_of(100), u8_of(200))), 0);
+  EXPECT_EQ(evaluate<uint8_t>(halving_add(u8_of(201), u8_of(100))), 150);
+  EXPECT_EQ(evaluate<uint8_t>(rounding_halving_add(u8_of(201), u8_of(100))), 151);
+  EXPECT_EQ(evaluate<uint8_t>(halving_sub(u8_of(100), u8_of(200))), static_cast<uint8_t>(-50));
+  EXPECT_EQ(evaluate<uint16_t>(widening_add(u8_of(200), u8_of(100))), 300);
+  EXPECT_EQ(evaluate<uint16_t>(widening_mul(u8_of(200), u8_of(100))), 20000);
+  EXPECT_EQ(evaluate<int16_t>(widening_sub(u8_of(100), u8_of(200))), -100);
+}
+
+TEST(Integers, SaturatingSum) {
+  RDom r(0, 20);
+  Func f("f");
+  Var x("x");
+  f(x) = saturating_sum(cast<uint8_t>(r.x * x));
+  Buffer<uint8_t> out = f.realize({3});
+  EXPECT_EQ(out(1), 190);
+  EXPECT_EQ(out(2), 255);
+}
+
+TEST(Integers, BitsTakenOutAndPutTogether) {
+  const Expr word = Expr(0x12345678);
+  EXPECT_EQ(evaluate<uint8_t>(extract_bits<uint8_t>(word, 8)), 0x56);
+  EXPECT_EQ(evaluate<uint16_t>(extract_bits(UInt(16), word, 12)), 0x2345);
+  EXPECT_EQ(evaluate<uint32_t>(concat_bits({u8_of(0x78), u8_of(0x56), u8_of(0x34), u8_of(0x12)})),
+            0x12345678u);
+  expect_mentions(error_of<CompileError>([] {
+                    concat_bits({u8_of(1), u8_of(2), u8_of(3)});
+                  }),
+                  {"8, 16, 32 or 64 bits", "24"});
+}
+
+TEST(Casts, ToSixteenBitFloats) {
+  using namespace ConciseCasts;
+  EXPECT_EQ(static_cast<float>(evaluate<float16_t>(f16(Expr(1.0009766f)))), 1.0009766f);
+  EXPECT_EQ(static_cast<float>(evaluate<bfloat16_t>(bf16(Expr(1.001f)))), 1.0f);
+}
+
+// ---- types ----
+
+TEST(Types, WidenNarrowAndLimits) {
+  EXPECT_EQ(UInt(8).widen(), UInt(16));
+  EXPECT_EQ(Bool().widen(), UInt(8));
+  EXPECT_EQ(Int(32, 4).narrow(), Int(16, 4));
+  EXPECT_EQ(UInt(8).narrow(), Bool());
+  EXPECT_TRUE(UInt(8).is_max(uint64_t{255}));
+  EXPECT_TRUE(Int(8).is_min(int64_t{-128}));
+  EXPECT_FALSE(Int(8).is_max(int64_t{-128}));
+  EXPECT_TRUE(UInt(32).can_overflow());
+  EXPECT_FALSE(Int(32).can_overflow());
+  EXPECT_TRUE(Int(16).can_overflow_int());
+  EXPECT_EQ(Type(Type::Int, 8, 1), Int(8));
+  EXPECT_EQ(Type(halide_type_float, 32, 4), Float(32, 4));
+  EXPECT_TRUE(Float(32).code() == halide_type_float);
+}
+
+TEST(Targets, SayTheirDevices) {
+  const Target cuda("x86-64-linux-cuda-cuda_capability_61"), plain("x86-64-linux");
+  EXPECT_EQ(cuda.get_required_device_api(), DeviceAPI::CUDA);
+  EXPECT_EQ(cuda.get_cuda_capability_lower_bound(), 61);
+  EXPECT_EQ(plain.get_required_device_api(), DeviceAPI::None);
+  EXPECT_EQ(plain.get_cuda_capability_lower_bound(), 20);
+  EXPECT_EQ(get_default_device_api_for_target(plain), DeviceAPI::Host);
+}
+
+// ---- loops whose names are used again, as Halide takes them ----
+
+// f(x, y) = x + 10 * y under a schedule
+template <typename Schedule>
+void expect_same_values(Schedule&& schedule) {
+  Func f("f");
+  Var x("x"), y("y");
+  f(x, y) = x + 10 * y;
+  schedule(f);
+  Buffer<int> out = f.realize({85, 53});
+  out.for_each_element([&](int i, int j) { ASSERT_EQ(out(i, j), i + 10 * j) << i << " " << j; });
+}
+
+TEST(LoopNames, AreFreeAgainWhenTheirLoopIsGone) {
+  Var x("x"), y("y"), xo("xo"), xi("xi"), t("t");
+  expect_same_values([&](Func f) { f.split(x, xo, xi, 8).split(xo, x, t, 4); });
+  expect_same_values([&](Func f) { f.split(x, xo, xi, 8).split(xi, x, t, 4).vectorize(x); });
+  expect_same_values([&](Func f) { f.split(x, xi, x, 8).vectorize(x); });
+  expect_same_values([&](Func f) { f.split(x, xo, xi, 8).split(y, x, t, 4).parallel(x); });
+  expect_same_values([&](Func f) { f.split(x, xo, xi, 8).split(y, y, x, 4).reorder(x, xi); });
+  expect_same_values([&](Func f) { f.split(x, xo, xi, 8).rename(xo, x); });
+  expect_same_values([&](Func f) { f.split(x, xo, xi, 8).fuse(xi, xo, x).vectorize(x, 4); });
+  expect_same_values([&](Func f) { f.fuse(x, y, t).split(t, x, y, 4); });
+  expect_same_values([&](Func f) { f.fuse(x, y, x); });
+  expect_same_values([&](Func f) { f.fuse(x, y, y); });
+  expect_same_values([&](Func f) { f.fuse(x, y, y).split(y, y, x, 4).vectorize(x); });
+  expect_same_values([&](Func f) { f.rename(x, xo).rename(y, x).split(x, x, xi, 4); });
+  expect_same_values(
+      [&](Func f) { f.split(x, xo, xi, 8).split(y, x, t, 4).split(xo, y, xo, 2).vectorize(xi); });
+}
+
+TEST(LoopNames, OfLevelsMayHaveDots) {
+  Func f("f"), g("g");
+  Var x("x");
+  RDom r(0, 5, "r");
+  f(x) = x;
+  g(x) = 0;
+  g(x) += f(x + r.x);
+  const LoopLevel level(g, r.x, 1);
+  EXPECT_TRUE(level.var().is_rvar);
+  EXPECT_EQ(level.var().name(), r.x.name());
+  f.compute_at(g, level.var().rvar);
+  Buffer<int> out = g.realize({3});
+  EXPECT_EQ(out(1), 1 + 2 + 3 + 4 + 5);
+}
+
+// ---- what is refused ----
+
+TEST(Refusals, SayWhatIsNotThere) {
+  Buffer<float> buffer(3);
+  expect_mentions(error_of<Unsupported>([&] { buffer.copy_to_device(Target()); }),
+                  {"copy_to_device", "memory of the CPU"});
+  expect_mentions(error_of<Unsupported>([] { user_context_value(); }), {"user_context_value"});
+  expect_mentions(error_of<Unsupported>([] { gather(Expr(1), Expr(2)); }), {"gather()"});
+}
+
+}  // namespace
