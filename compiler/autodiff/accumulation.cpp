@@ -77,19 +77,19 @@ struct UpdateGroup {
   std::vector<Expr> sums;  // one a value; undefined: nothing is added
 };
 
-// Whether elements that it reaches, or between them, may be exactly 0 for a reason.
+// Whether elements between those that it reaches stay 0.
 bool leaves_zeros(const Contribution& c) {
   bool everywhere =
       std::all_of(c.gather.pure.begin(), c.gather.pure.end(), [](bool p) { return p; });
-  return may_be_masked(c.adjoint) || !everywhere ||
-         (c.gather.predicate.defined() && !is_range_condition(c.gather.predicate));
+  return !everywhere || (c.gather.predicate.defined() && !is_range_condition(c.gather.predicate));
 }
 
-void note_masks(const FuncPtr& f, const std::vector<Expr>& adjoints, bool masks) {
+void note_traits(const FuncPtr& f, const std::vector<Expr>& adjoints) {
   auto* adjoint = dynamic_cast<AdjointContents*>(f.get());
   if (!adjoint) return;
-  for (const Expr& e : adjoints) masks |= e.defined() && may_be_masked(e);
-  adjoint->masked |= masks;
+  for (const Expr& e : adjoints) {
+    if (e.defined()) adjoint->traits.add(traits_of(e));
+  }
 }
 
 // What two gathers must agree on, with the reduction variables numbered.
@@ -151,8 +151,11 @@ class Builder {
   AdjointFunc build(const std::vector<Contribution>& contributions,
                     const std::vector<Expr>& initial) {
     define_pointwise(contributions, initial);
-    bool masks = std::any_of(contributions.begin(), contributions.end(), leaves_zeros);
-    note_masks(result_.func, initial, masks);
+    note_traits(result_.func, initial);
+    for (const Contribution& c : contributions) {
+      note_traits(result_.func, {c.adjoint});
+      if (leaves_zeros(c)) static_cast<AdjointContents&>(*result_.func).traits.masked = true;
+    }
     for (const UpdateGroup& group : group_updates(contributions, target_.types.size())) {
       is_worth_splitting(group.gather) ? add_privatised(group) : add_update(group);
     }
@@ -331,7 +334,7 @@ Expr call_value(const FuncPtr& f, const std::vector<Expr>& args, int index) {
 void append_update(const FuncPtr& f, std::vector<Expr> args, std::vector<Expr> values,
                    const std::vector<ReductionVariable>& rvars, Expr predicate) {
   Definition update;
-  note_masks(f, values, false);
+  note_traits(f, values);
   for (Expr& e : args) e = cast_to(Int(32), e);
   update.args = std::move(args);
   update.values = std::move(values);

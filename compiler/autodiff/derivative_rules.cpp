@@ -80,7 +80,12 @@ Partials atan2_partials(Args a, const Expr&) {
 }
 Partials sinh_partials(Args a, const Expr&) { return {strong(op1(Op::cosh, a[0]))}; }
 Partials cosh_partials(Args a, const Expr&) { return {strong(op1(Op::sinh, a[0]))}; }
-Partials tanh_partials(Args, const Expr& v) { return {strong(one_minus_square(v))}; }
+// 1 - v^2 has no digits left where v has rounded to 1: 4 e / (1 + e)^2 with e = exp(-2 |x|) keeps
+// them.
+Partials tanh_partials(Args a, const Expr&) {
+  Expr e = op1(Op::exp, num(a[0], -2) * op1(Op::abs, a[0]));
+  return {strong(num(a[0], 4) * e / square(num(a[0], 1) + e))};
+}
 Partials asinh_partials(Args a, const Expr&) {
   return {strong(num(a[0], 1) / call_op(Op::hypot, a[0].type(), {a[0], num(a[0], 1)}))};
 }
@@ -139,6 +144,60 @@ DerivativeRule no_rule(const char* reason) {
 }
 
 using OpTable = std::map<Op, DerivativeRule>;
+// What people read: formula, infinities, ULP.
+struct Description {
+  const char* formula;
+  const char* infinities;
+  int max_ulp;
+};
+void describe(DerivativeRule& rule, const Description& d) {
+  rule.formula = d.formula;
+  rule.infinities = d.infinities;
+  rule.max_ulp = d.max_ulp;
+}
+
+void describe_operators(OpTable& t) {
+  const std::map<Op, Description> descriptions = {
+      {Op::abs, {"sign(x)", "-1 and 1", 0}},
+      {Op::absd, {"sign(x - y), -sign(x - y)", "-1 and 1; 0 for equal infinities", 0}},
+      {Op::lerp, {"1 - w, w, y - x", "infinite or NaN, as the value", 1}},
+      {Op::sqrt, {"1 / (2 v)", "0 at +inf", 2}},
+      {Op::exp, {"v", "0 at -inf, inf at +inf", 1}},
+      {Op::log, {"1 / x", "0 at +inf", 1}},
+      {Op::pow, {"y x^(y-1), v log x", "as x^(y-1) and v log x", 36}},
+      {Op::hypot,
+       {"x / v, y / v", "NaN where an operand is infinite, 0 where only v overflows", 2}},
+      {Op::sin, {"cos x", "NaN, as the value", 1}},
+      {Op::cos, {"-sin x", "NaN, as the value", 1}},
+      {Op::tan, {"1 + v^2", "NaN, as the value", 4}},
+      {Op::asin, {"1 / sqrt((1 - x)(1 + x))", "NaN, as the value", 3}},
+      {Op::acos, {"-1 / sqrt((1 - x)(1 + x))", "NaN, as the value", 3}},
+      {Op::atan, {"1 / (1 + x^2)", "0", 3}},
+      {Op::atan2,
+       {"y / r / r, -x / r / r with r = hypot(x, y)", "NaN where an operand is infinite", 4}},
+      {Op::sinh, {"cosh x", "inf", 2}},
+      {Op::cosh, {"sinh x", "-inf and inf", 2}},
+      {Op::tanh, {"4 e / (1 + e)^2 with e = exp(-2 |x|)", "0", 6}},
+      {Op::asinh, {"1 / hypot(x, 1)", "0", 2}},
+      {Op::acosh, {"1 / (sqrt(x - 1) sqrt(x + 1))", "0 at +inf", 4}},
+      {Op::atanh, {"1 / ((1 - x)(1 + x))", "0, where the value is NaN", 3}},
+      {Op::erf, {"2 / sqrt(pi) exp(-x^2)", "0", 90}},
+      {Op::fast_exp, {"exp's, with v", "as exp", -1}},
+      {Op::fast_log, {"log's", "as log", 1}},
+      {Op::fast_pow, {"pow's, by fast_pow and fast_log", "as pow", -1}},
+      {Op::fast_sin, {"fast_cos x", "NaN", -1}},
+      {Op::fast_cos, {"-fast_sin x", "NaN", -1}},
+      {Op::fast_inverse, {"-v^2", "0", -1}},
+      {Op::fast_inverse_sqrt, {"-v^3 / 2", "0 at +inf", -1}},
+      {Op::saturating_cast, {"1 or 0", "0: the value saturates", 0}},
+      {Op::strong_mul, {"y, x", "as a product, with strong zeros", 0}},
+  };
+  for (auto& [op, rule] : t) {
+    auto found = descriptions.find(op);
+    if (found != descriptions.end()) describe(rule, found->second);
+  }
+}
+
 OpTable make_op_table() {
   const char* bits = "integers only: derivative 0";
   const char* test = "a truth value: derivative 0";
@@ -211,6 +270,7 @@ OpTable make_op_table() {
                 Op::runtime_call, Op::pack, Op::trace, Op::error}) {
     t.emplace(op, no_rule(lowering));
   }
+  describe_operators(t);
   return t;
 }
 
@@ -250,6 +310,17 @@ KindTable make_kind_table() {
   t.emplace(Kind::Select,
             DerivativeRule{RuleClass::Smooth, nullptr, -1, "where the condition does not change",
                            "the chosen arm gets all, the other exactly 0", "definition"});
+  const std::map<Kind, Description> descriptions = {
+      {Kind::Add, {"1, 1", "1", 0}},
+      {Kind::Sub, {"1, -1", "1 and -1", 0}},
+      {Kind::Mul, {"y, x", "infinite, but for strong zeros", 0}},
+      {Kind::Div, {"1 / y, -v / y", "0 where y is infinite", 2}},
+      {Kind::Mod, {"1, -floor(x / y)", "NaN, as the value", 0}},
+      {Kind::Min, {"1, 0 or 0, 1", "as for finite operands", 0}},
+      {Kind::Max, {"1, 0 or 0, 1", "as for finite operands", 0}},
+      {Kind::Select, {"1 or 0", "as for finite operands", 0}},
+  };
+  for (const auto& [kind, d] : descriptions) describe(t.at(kind), d);
   return t;
 }
 
@@ -278,6 +349,11 @@ const DerivativeRule& derivative_rule(Kind kind) {
 
 bool has_derivative_rule(Kind kind) { return kind_table().contains(kind); }
 
+bool has_poles(Op op) {
+  return op == Op::sqrt || op == Op::pow || op == Op::asin || op == Op::acos || op == Op::acosh ||
+         op == Op::fast_pow;
+}
+
 Type adjoint_type(Type type) {
   return type.bits() < 32 || type.is_bfloat() ? Float(32, type.lanes()) : type;
 }
@@ -293,7 +369,10 @@ Expr times_partial(const Expr& adjoint, const Partial& partial) {
   Expr factor = cast_to(adjoint.type(), partial.factor);
   if (is_one(factor)) return adjoint;
   if (is_const(factor) || partial.strength == Strength::Plain) return adjoint * factor;
-  return call_op(Op::strong_mul, adjoint.type(), {adjoint, factor});
+  Expr product = call_op(Op::strong_mul, adjoint.type(), {adjoint, factor});
+  if (partial.strength != Strength::Both) return product;
+  Expr zero = make_zero(factor.type());
+  return make_select(factor == zero, make_zero(product.type()), product);
 }
 
 }  // namespace retrograde::ir

@@ -1,6 +1,5 @@
 #include "autodiff/local_derivative.h"
 
-#include "autodiff/default_schedule.h"
 #include "diagnostics/error.h"
 #include "ir/build.h"
 
@@ -62,6 +61,30 @@ LocalDerivative sum_of(const std::vector<Expr>& operands, std::vector<Partial> p
   return result;
 }
 
+// exp(w) where e is 1 + exp(w).
+Expr exp_of_one_plus_exp(const Expr& e) {
+  const auto* sum = e.as<Add>();
+  if (!sum || !(is_one(sum->a) || is_one(sum->b))) return {};
+  Expr other = is_one(sum->a) ? sum->b : sum->a;
+  const auto* call = other.as<Call>();
+  return call && call->is_op(Op::exp) ? other : Expr();
+}
+
+// s / (1 + exp(w)), the logistic function for s = 1: step by step, exp(w) overflows where the value
+// has long been 0, and its square underflows. In one step, with q = exp(w) / (1 + exp(w)):
+//   d/ds = 1 / (1 + exp(w)),   d/dw = -v q
+LocalDerivative of_quotient(const Expr& e, const Div& quotient, const ExprFacts& facts) {
+  Expr grown = e.type().is_float() ? exp_of_one_plus_exp(quotient.b) : Expr();
+  if (!grown.defined()) {
+    return sum_of({quotient.a, quotient.b},
+                  derivative_rule(Kind::Div).partials({quotient.a, quotient.b}, e), facts);
+  }
+  Expr one = make_one(e.type()), reciprocal = one / quotient.b;
+  Expr q = make_select(grown > one, one - reciprocal, grown * reciprocal);
+  return sum_of({quotient.a, grown.as<Call>()->args[0]},
+                {{reciprocal, Strength::Strong}, {-(e * q), Strength::Strong}}, facts);
+}
+
 LocalDerivative of_call(const Expr& e, const Call& call, const ExprFacts& facts) {
   if (call.call_type == CallType::Extern) {
     unsupported(text("differentiate the call of the C function ", quoted(call.name)),
@@ -72,10 +95,12 @@ LocalDerivative of_call(const Expr& e, const Call& call, const ExprFacts& facts)
   }
   const DerivativeRule& rule = derivative_rule(call.op);
   const char* name = op_info(call.op).name;
-  LocalDerivative zero;
+  LocalDerivative zero, smooth;
   switch (rule.cls) {
     case RuleClass::Smooth:
-      return sum_of(call.args, rule.partials(call.args, e), facts);
+      smooth = sum_of(call.args, rule.partials(call.args, e), facts);
+      smooth.poles = has_poles(call.op);
+      return smooth;
     case RuleClass::Transparent:
       return same_as(e, call.args[static_cast<size_t>(rule.transparent_arg)]);
     case RuleClass::Constant:
@@ -155,6 +180,7 @@ LocalDerivative local_derivative(const Expr& e, const ExprFacts& facts) {
       [&](const Broadcast&) -> LocalDerivative {
         internal_error("vectors have no place in the definition of a Func");
       },
+      [&](const Div& quotient) { return of_quotient(e, quotient, facts); },
       [&](const Binary& b) {
         return sum_of({b.a, b.b}, derivative_rule(e.kind()).partials({b.a, b.b}, e), facts);
       },
@@ -167,20 +193,25 @@ LocalDerivative local_derivative(const Expr& e, const ExprFacts& facts) {
       });
 }
 
-bool may_be_masked(const Expr& adjoint) {
+AdjointTraits traits_of(const Expr& adjoint) {
+  AdjointTraits result;
   Expr top = adjoint;
   while (const auto* cast = top.as<Cast>()) top = cast->value;
-  bool found = false, is_bare = is_leaf(top) && top.as<Call>();
+  bool is_seed = is_leaf(top) && top.as<Call>();
   walk(adjoint, [&](const Expr& e) {
-    if (e.type().is_float() && e.as<Select>()) found = true;
+    result.masked |= e.type().is_float() && e.as<Select>();
     const auto* call = e.as<Call>();
-    if (!call || call->call_type != CallType::Func) return !found;
-    const auto* f = dynamic_cast<const AdjointContents*>(call->symbol.raw());
-    if (e.same_as(top) && f) is_bare = false;
-    found |= f && f->masked;
-    return !found;
+    if (!call) return true;
+    result.singular |= call->call_type == CallType::Operator && has_poles(call->op);
+    const auto* f = call->call_type == CallType::Func
+                        ? dynamic_cast<const AdjointContents*>(call->symbol.raw())
+                        : nullptr;
+    if (f) result.add(f->traits);
+    if (f && e.same_as(top)) is_seed = false;
+    return true;
   });
-  return found || is_bare;
+  result.masked |= is_seed;
+  return result;
 }
 
 namespace {

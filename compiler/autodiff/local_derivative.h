@@ -10,6 +10,7 @@
 #include <unordered_set>
 #include <vector>
 
+#include "autodiff/default_schedule.h"
 #include "autodiff/derivative_rules.h"
 #include "ir/expr.h"
 #include "ir/visit.h"
@@ -58,15 +59,15 @@ struct LocalDerivative {
   Expr condition;
   std::string note;
   bool risky_operand = false, reads = false;  // one of the operands
+  bool poles = false;                         // partials may be infinite where the value is finite
 };
 
 // Of an active node that is no leaf. Partials that meet infinite or NaN operands are Strong. Throws
 // Unsupported where there is no rule.
 LocalDerivative local_derivative(const Expr& e, const ExprFacts& facts);
 
-// Whether an adjoint may be exactly 0 because a branch was not taken, here or in a Func between
-// here and the output. A seed that the user gives counts as one.
-bool may_be_masked(const Expr& adjoint);
+// Here or in a Func between here and the output. A seed that the user gives counts as masked.
+AdjointTraits traits_of(const Expr& adjoint);
 
 // The expression with its lets substituted: a DAG without names.
 Expr without_lets(const Expr& e);

@@ -17,8 +17,7 @@ class Sweep {
       : order_(post_order(values)), facts_(order_, is_wanted, [](const Expr&) { return false; }) {
     result_.notes = facts_.notes();
     for (size_t i = 0; i < values.size(); ++i) {
-      if (values[i].defined() && seeds[i].defined())
-        add(values[i], seeds[i], may_be_masked(seeds[i]));
+      if (values[i].defined() && seeds[i].defined()) add(values[i], seeds[i], traits_of(seeds[i]));
     }
   }
 
@@ -39,15 +38,15 @@ class Sweep {
  private:
   struct State {
     Expr sum;
-    bool masked = false;  // exactly 0 on points whose branch was not taken
+    AdjointTraits traits;
   };
 
-  void add(const Expr& e, const Expr& adjoint, bool masked) {
+  void add(const Expr& e, const Expr& adjoint, const AdjointTraits& traits) {
     if (!facts_.is_active(e) || is_zero(adjoint)) return;
     Expr converted = cast_to(adjoint_type(e.type()), adjoint);
     State& state = adjoints_[e.get()];
     state.sum = state.sum.defined() ? state.sum + converted : converted;
-    state.masked |= masked;
+    state.traits.add(traits);
   }
 
   void propagate(const LocalDerivative& local, const State& state) {
@@ -57,8 +56,9 @@ class Sweep {
         return;
       case LocalDerivative::Kind::Choice: {
         Expr zero = make_zero(state.sum.type());
-        add(local.operands[0], make_select(local.condition, state.sum, zero), true);
-        add(local.operands[1], make_select(local.condition, zero, state.sum), true);
+        AdjointTraits traits{true, state.traits.singular};
+        add(local.operands[0], make_select(local.condition, state.sum, zero), traits);
+        add(local.operands[1], make_select(local.condition, zero, state.sum), traits);
         return;
       }
       case LocalDerivative::Kind::Sum:
@@ -70,9 +70,11 @@ class Sweep {
   void add_partial(const LocalDerivative& local, size_t i, const State& state) {
     Partial partial = local.partials[i];
     if (!partial.factor.defined() || !facts_.is_active(local.operands[i])) return;
-    if (state.masked && local.reads) partial.strength = Strength::Strong;
-    bool masks = partial.factor.as<Select>() != nullptr;
-    add(local.operands[i], times_partial(state.sum, partial), state.masked || masks);
+    if (state.traits.masked && local.reads) partial.strength = Strength::Strong;
+    if (state.traits.singular) partial.strength = Strength::Both;
+    AdjointTraits traits{partial.factor.as<Select>() != nullptr, local.poles};
+    traits.add(state.traits);
+    add(local.operands[i], times_partial(state.sum, partial), traits);
   }
 
   std::vector<Expr> order_;

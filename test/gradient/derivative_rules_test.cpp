@@ -86,6 +86,10 @@ TEST(DerivativeRules, EveryOperatorHasARuleOrAReason) {
     const DerivativeRule& rule = derivative_rule(o);
     EXPECT_STRNE(rule.convention, "") << op_info(o).name;
     EXPECT_STRNE(rule.source, "") << op_info(o).name;
+    if (rule.cls == RuleClass::Smooth) {
+      EXPECT_STRNE(rule.formula, "") << op_info(o).name;
+      EXPECT_STRNE(rule.infinities, "") << op_info(o).name;
+    }
     EXPECT_EQ(rule.cls == RuleClass::Smooth, rule.partials != nullptr) << op_info(o).name;
     EXPECT_TRUE(rule.cls != RuleClass::NoRule || op_info(o).cls == OpClass::Internal)
         << op_info(o).name;
@@ -237,6 +241,82 @@ TEST(DerivativeRules, CallsOfCFunctionsAreRefusedOnlyWhereTheGradientIsWanted) {
     return leaf.as<Variable>() && leaf.as<Variable>()->name == "y";
   });
   EXPECT_EQ(sweep.leaves.size(), 1u);
+}
+
+TEST(DerivativeRules, NormsAtTheOriginHaveGradientZero) {
+  for (const Expr& norm :
+       {op(Op::sqrt, {x * x + y * y}), op(Op::hypot, {x, y}),
+        op(Op::pow, {x * x + y * y, num(0.5)}), op(Op::sqrt, {x * x}), op(Op::abs, {x})}) {
+    Env g = gradient(norm, {{"x", 0}, {"y", 0}});
+    EXPECT_EQ(g["x"], 0) << norm;
+    EXPECT_EQ(g["y"], 0) << norm;
+  }
+  EXPECT_EQ(gradient(op(Op::sqrt, {x}), {{"x", 0}})["x"], inf) << "no norm: the pole stays";
+}
+
+TEST(DerivativeRules, TheLogisticFunctionKeepsItsDigitsAtBothEnds) {
+  const Expr logistic = num(1) / (num(1) + op(Op::exp, {-x}));
+  for (double at : {-700.0, -300.0, -5.0, 0.0, 5.0, 30.0, 300.0, 700.0}) {
+    double e = std::exp(-std::abs(at)), expected = e / ((1 + e) * (1 + e));
+    EXPECT_NEAR(gradient(logistic, {{"x", at}})["x"] / expected, 1, 1e-14) << at;
+  }
+  EXPECT_EQ(gradient(logistic, {{"x", -1000}})["x"], 0) << "exp overflows";
+  expect_central_differences(x / (op(Op::exp, {y * x}) + num(1)), {{"x", 1.2}, {"y", -0.7}});
+}
+
+// Points of the rule's domain, as numbers that are exact in float32.
+std::vector<Env> ulp_points(Op o) {
+  std::vector<Env> points;
+  uint32_t state = 12345;
+  auto unit = [&] {
+    state = state * 1664525u + 1013904223u;
+    return (state >> 8) / static_cast<double>(1 << 24);
+  };
+  auto magnitude = [&](double low, double high) {
+    return static_cast<double>(static_cast<float>(low * std::pow(high / low, unit())));
+  };
+  const bool in_unit = o == Op::asin || o == Op::acos || o == Op::atanh;
+  const bool positive = o == Op::sqrt || o == Op::log || o == Op::pow || o == Op::acosh ||
+                        o == Op::fast_log || o == Op::fast_inverse_sqrt;
+  const double high = in_unit         ? 0.9999
+                      : o == Op::erf  ? 8
+                      : o == Op::tanh ? 40
+                      : o == Op::pow  ? 8
+                                      : 80;
+  for (int i = 0; i < 2000; ++i) {
+    double a = magnitude(o == Op::acosh ? 1.001 : 1e-4, high), b = magnitude(1e-3, high);
+    if (!positive && unit() < 0.5) a = -a;
+    if (unit() < 0.5) b = -b;
+    points.push_back({{"x", a}, {"y", b}, {"w", static_cast<double>(static_cast<float>(unit()))}});
+  }
+  return points;
+}
+
+TEST(DerivativeRules, PartialsInFloat32AreWithinTheirStatedUlp) {
+  const Type f32 = Float(32);
+  for (int i = 0; i < op_count; ++i) {
+    const Op o = static_cast<Op>(i);
+    const DerivativeRule& rule = derivative_rule(o);
+    if (rule.cls != RuleClass::Smooth || rule.max_ulp < 0) continue;
+    std::vector<Expr> narrow, wide;
+    for (int k = 0; k < op_info(o).arity; ++k) {
+      const char* name = k == 0 ? "x" : k == 1 ? "y" : "w";
+      narrow.push_back(variable(name, f32));
+      wide.push_back(variable(name, f64));
+    }
+    double worst = 0;
+    for (const Env& env : ulp_points(o)) {
+      Env found = gradient(op(o, narrow), env), expected = gradient(op(o, wide), env);
+      for (const auto& [name, value] : expected) {
+        double size = std::abs(value);
+        if (!(size > 1e-30 && size < 1e30)) continue;  // no normal float32
+        double ulp = std::ldexp(1.0, std::ilogb(size) - 23);
+        worst = std::max(worst, std::abs(found[name] - value) / ulp);
+      }
+    }
+    EXPECT_LE(worst, rule.max_ulp + 0.5) << op_info(o).name;
+    EXPECT_GE(worst, rule.max_ulp / 8.0) << op_info(o).name << ": stated too loosely";
+  }
 }
 
 TEST(DerivativeRules, HalfPrecisionAccumulatesInFloat32) {

@@ -1,0 +1,107 @@
+// docs/derivatives.md is written here from the rule table itself, so that the page cannot state a
+// convention that the code does not have. RETROGRADE_UPDATE_GOLDEN=1 writes the page; read the
+// difference before you commit it.
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <fstream>
+#include <iterator>
+#include <map>
+#include <sstream>
+
+#include "autodiff/derivative_rules.h"
+#include "ir/build.h"
+
+namespace retrograde::ir {
+namespace {
+
+const char* const introduction = R"(# Derivatives: rules and conventions
+
+Written from the compiler's rule table by `test/golden/derivatives_page_test.cpp`. Forward and reverse
+mode use the same partials, so they are transposes of each other at every point, at kinks too.
+
+- **Kinks.** At a tie of `min` and `max` the operand that the primal takes gets 1 and the other 0: both
+  lie in [0, 1] and sum to 1. `clamp` is a `max` of a `min`: at a bound its derivative is 0 or 1. `abs`,
+  `absd` and `hypot` have 0 at 0, the smallest subgradient.
+- **Strong zeros.** An adjoint (or tangent) that is exactly 0 contributes exactly 0, whatever the
+  partial is: infinite, NaN, or overflowed. That holds across Funcs: adjoints know whether a `select`,
+  `min`, `max`, `clamp`, a stride or a seed of 0 in a consumer may have made them 0. NaNs and infinities
+  that the output uses stay.
+- **Poles.** Where a partial is infinite and the value finite (`sqrt`, `pow`, `asin`, `acos`, `acosh`), a
+  factor of exactly 0 after it contributes 0: so norms, `sqrt(x*x + y*y)` at the origin, have gradient 0,
+  and `sqrt(x)` at 0 keeps its infinity.
+- **Steps.** Rounding, comparisons, integer arithmetic and casts to integers have derivative 0;
+  `Derivative::explain()` says so where it makes a gradient 0.
+- **Stable forms.** `s / (1 + exp(w))` (the logistic function) is differentiated in one step, which neither
+  overflows nor underflows before its derivative does; `tanh` by exp(-2 |x|), since 1 - v^2 has no digits
+  left for large x; 1 - x^2 as (1 - x)(1 + x); `hypot` and `atan2` by scaled quotients. A quotient's
+  partial is written with its value, -(v / y), not with y^2.
+- **Narrow types.** Adjoints and tangents of float16 and bfloat16 are float32.
+- **ULP** is the largest error of a partial in float32, in units in the last place, on test points inside
+  the domain, with operators that are themselves right to about one ULP.
+
+x, y, w are the operands in order, v is the value.
+
+)";
+
+std::string cell(const std::string& text) {
+  std::string result;
+  for (char c : text) result += c == '|' ? std::string("\\|") : std::string(1, c);
+  return result;
+}
+
+std::string row(const std::string& name, const DerivativeRule& rule) {
+  std::ostringstream out;
+  out << "| `" << name << "` | " << cell(rule.formula) << " | " << cell(rule.domain) << " | "
+      << cell(rule.convention) << " | " << cell(rule.infinities) << " | ";
+  if (rule.max_ulp < 0) {
+    out << "not bounded";
+  } else {
+    out << rule.max_ulp;
+  }
+  out << " | " << cell(rule.source) << " |\n";
+  return out.str();
+}
+
+std::string page() {
+  std::ostringstream smooth, others;
+  std::map<std::string, std::string> by_reason;  // operators without partials, together
+  auto add = [&](const std::string& name, const DerivativeRule& rule) {
+    if (rule.cls == RuleClass::Smooth) {
+      smooth << row(name, rule);
+    } else if (rule.cls != RuleClass::NoRule) {
+      std::string& names = by_reason[rule.convention];
+      names += (names.empty() ? "`" : ", `") + name + "`";
+    }
+  };
+#define RETROGRADE_BINARY(K) add(#K, derivative_rule(Kind::K));
+#include "ir/kinds.def"
+  for (Kind k : {Kind::Select, Kind::Cast, Kind::Not}) add(kind_name(k), derivative_rule(k));
+  for (int i = 0; i < op_count; ++i) {
+    const Op op = static_cast<Op>(i);
+    add(op_info(op).name, derivative_rule(op));
+  }
+  for (const auto& [reason, names] : by_reason)
+    others << "| " << names << " | " << cell(reason) << " |\n";
+  return introduction +
+         std::string(
+             "| operator | partials | domain | at kinks and poles | at infinities | ULP | source "
+             "|\n"
+             "|---|---|---|---|---|---|---|\n") +
+         smooth.str() + "\n## Operators without partials\n\n| operators | rule |\n|---|---|\n" +
+         others.str() +
+         "\nSources: [GW] Griewank and Walther, Evaluating Derivatives, 2nd edition; [DLMF] NIST "
+         "Digital Library of\nMathematical Functions; \"definition\": follows from the operator's "
+         "definition.\n";
+}
+
+TEST(DerivativesPage, IsWhatTheRuleTableSays) {
+  const std::string path = RETROGRADE_TEST_DIR "/../docs/derivatives.md", text = page();
+  if (std::getenv("RETROGRADE_UPDATE_GOLDEN")) std::ofstream(path) << text;
+  std::ifstream file(path);
+  const std::string on_disk{std::istreambuf_iterator<char>(file), {}};
+  EXPECT_EQ(on_disk, text) << "RETROGRADE_UPDATE_GOLDEN=1 writes " << path;
+}
+
+}  // namespace
+}  // namespace retrograde::ir
