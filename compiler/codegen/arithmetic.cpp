@@ -1,5 +1,9 @@
 // Binary operators and conversions.
 #include <llvm/IR/Intrinsics.h>
+#include <llvm/IR/IntrinsicsX86.h>
+
+#include <algorithm>
+#include <bit>
 
 #include "codegen/emitter.h"
 #include "diagnostics/error.h"
@@ -172,6 +176,23 @@ Value* reinterpret(Emitter& e, Type to, Type from, Value* value) {
   auto* type = llvm_type(e, to);
   if (to.is_handle() == from.is_handle()) return e.b.CreateBitCast(value, type);
   return to.is_handle() ? e.b.CreateIntToPtr(value, type) : e.b.CreatePtrToInt(value, type);
+}
+
+// In registers of the widest kind that a and b fill; the last one may be filled in part.
+Value* add_products_in_pairs(Emitter& e, Value* a, Value* b) {
+  const int lanes = lanes_of(a), widest = e.machine.has_avx512_words() ? 32
+                                          : e.machine.has_avx2()       ? 16
+                                                                       : 8;
+  const int width = std::clamp(static_cast<int>(std::bit_ceil(unsigned(lanes))), 8, widest);
+  const auto id = width == 32   ? llvm::Intrinsic::x86_avx512_pmaddw_d_512
+                  : width == 16 ? llvm::Intrinsic::x86_avx2_pmadd_wd
+                                : llvm::Intrinsic::x86_sse2_pmadd_wd;
+  std::vector<Value*> parts;
+  for (int start = 0; start < lanes; start += width) {
+    parts.push_back(
+        e.b.CreateIntrinsic(id, {}, {slice(e, a, start, width), slice(e, b, start, width)}));
+  }
+  return slice(e, concat(e, parts), 0, lanes / 2);
 }
 
 // ---- saturating_cast ----

@@ -88,6 +88,8 @@ Value* binary(Emitter& e, ir::Kind kind, Type type, Value* a, Value* b);
 Value* convert(Emitter& e, Type to, Type from, Value* value);             // Cast
 Value* convert_saturating(Emitter& e, Type to, Type from, Value* value);  // saturating_cast
 Value* reinterpret(Emitter& e, Type to, Type from, Value* value);
+// Lane i is a[2i] b[2i] + a[2i + 1] b[2i + 1] as int32; a and b are vectors of int16. Only on x86.
+Value* add_products_in_pairs(Emitter& e, Value* a, Value* b);
 // Op::floor, abs, shift_left ... : everything Pure that is no function of math_table.h. Null when
 // `op` is none of them. `types` and `args` have one entry for each argument.
 Value* simple_operator(Emitter& e, ir::Op op, Type result, const std::vector<Type>& types,

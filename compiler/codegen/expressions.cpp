@@ -4,6 +4,7 @@
 #include "codegen/function_generator.h"
 #include "diagnostics/error.h"
 #include "ir/build.h"
+#include "ir/narrow_product.h"
 #include "ir/print.h"
 #include "ir/visit.h"
 
@@ -191,9 +192,19 @@ static Kind binary_kind(ReduceOp op) {
   internal_error("unknown reduction");
 }
 
+// What is to be reduced, some of it done already.
+Value* FunctionGenerator::reduced_in_part(const VectorReduce& e) {
+  const bool has_pairs = e.value.type().lanes() / e.type.lanes() % 2 == 0;
+  if (e.op == ReduceOp::Add && has_pairs && e_.machine.is_x86()) {
+    if (const auto product = as_narrow_product(e.value))
+      return add_products_in_pairs(e_, value(product->a), value(product->b));
+  }
+  return value(e.value);
+}
+
 Value* FunctionGenerator::make(const VectorReduce& e) {
   const Type element = e.type.element_of();
-  return reduce_groups(e_, value(e.value), e.type.lanes(), [&](Value* a, Value* b) {
+  return reduce_groups(e_, reduced_in_part(e), e.type.lanes(), [&](Value* a, Value* b) {
     return binary(e_, binary_kind(e.op), element.with_lanes(lanes_of(a)), a, b);
   });
 }

@@ -167,6 +167,7 @@ class FunctionGenerator {
   Value* make(const ir::Ramp& e);
   Value* make(const ir::Shuffle& e);
   Value* make(const ir::VectorReduce& e);
+  Value* reduced_in_part(const ir::VectorReduce& e);
   Value* make(const ir::Select& e);
   Value* make_immediate(const Expr& e);
   Value* make_value(const Expr& e);

@@ -83,6 +83,7 @@ std::string sleef_suffix(const Machine& machine, int vector_bits) {
 bool Machine::has_avx512() const {
   return is_x86() && (has_any(target, {F::AVX512}) || has_skylake(target));
 }
+bool Machine::has_avx512_words() const { return is_x86() && has_skylake(target); }
 bool Machine::has_avx2() const { return has_avx512() || (is_x86() && target.has_feature(F::AVX2)); }
 bool Machine::has_fma() const {
   return !is_x86() || has_avx512() || (target.has_feature(F::FMA) && target.has_feature(F::AVX2));

@@ -1,5 +1,6 @@
 #include "lower/pass_table.h"
 
+#include "lower/accumulate_vectors.h"
 #include "lower/deinterleave_loads.h"
 #include "lower/drop_checks.h"
 #include "lower/flatten_storage.h"
@@ -16,6 +17,7 @@ namespace retrograde::ir {
 
 const std::vector<StatementPass>& statement_passes() {
   static const std::vector<StatementPass> passes = {
+      {"accumulate_vectors", accumulate_vectors},
       {"deinterleave_loads", deinterleave_loads},
       {"drop_asserts", drop_asserts},
       {"drop_bounds_query", drop_bounds_query},

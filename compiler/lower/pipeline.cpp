@@ -8,6 +8,7 @@
 #include "ir/build.h"
 #include "ir/print.h"
 #include "ir/validate.h"
+#include "lower/accumulate_vectors.h"
 #include "lower/argument_checks.h"
 #include "lower/build_loop_nests.h"
 #include "lower/drop_checks.h"
@@ -123,6 +124,8 @@ constexpr Pass passes[] = {
      [](Lowering&, const Stmt& s) { return partition_loops(s); }},
     {"unroll_loops", Phase::FlatStorage, [](Lowering&, const Stmt& s) { return unroll_loops(s); }},
     {"vectorize_loops", Phase::Vector, [](Lowering&, const Stmt& s) { return vectorize_loops(s); }},
+    {"accumulate_vectors", Phase::Vector,
+     [](Lowering&, const Stmt& s) { return accumulate_vectors(s); }},
     {"interleave_vectors", Phase::Vector,
      [](Lowering&, const Stmt& s) { return interleave_vectors(s); }},
     {"transpose_loads", Phase::Vector, [](Lowering&, const Stmt& s) { return transpose_loads(s); }},

@@ -25,7 +25,6 @@
 #include "lower/vectorize_loops.h"
 
 #include <cstdlib>
-#include <limits>
 #include <optional>
 #include <unordered_map>
 #include <unordered_set>
@@ -37,6 +36,7 @@
 #include "ir/print.h"
 #include "ir/visit.h"
 #include "lower/copy_statement.h"
+#include "lower/reductions.h"
 #include "lower/widen_expr.h"
 #include "simplify/simplify.h"
 
@@ -133,48 +133,6 @@ std::optional<Reduction> find_reduction(const Store& store) {
   }
   reduction.load = e;
   return reduction;
-}
-
-ReduceOp reduce_op(Kind kind) {
-  switch (kind) {
-    case Kind::Add:
-      return ReduceOp::Add;
-    case Kind::Mul:
-      return ReduceOp::Mul;
-    case Kind::Min:
-      return ReduceOp::Min;
-    case Kind::Max:
-      return ReduceOp::Max;
-    case Kind::And:
-      return ReduceOp::And;
-    default:
-      return ReduceOp::Or;
-  }
-}
-
-Expr infinity(Type type, int sign) {
-  return make_const(type, sign * std::numeric_limits<double>::infinity());
-}
-
-// x op identity == x, bit for bit.
-Expr identity_of(Kind kind, Type type) {
-  Type element = type.element_of();
-  auto largest = [&] {
-    if (type.is_float()) return infinity(element, 1);
-    return type.is_int() ? make_const(element, type.max_int())
-                         : make_uint_const(element, type.max_uint());
-  };
-  auto smallest = [&] {
-    if (type.is_float()) return infinity(element, -1);
-    return type.is_int() ? make_const(element, type.min_int()) : make_zero(element);
-  };
-  Expr value = kind == Kind::Add
-                   ? (type.is_float() ? make_const(element, -0.0) : make_zero(element))
-               : kind == Kind::Min ? largest()
-               : kind == Kind::Max ? smallest()
-               : kind == Kind::Or  ? make_zero(element)
-                                   : make_one(element);
-  return make_broadcast(value, type.lanes());
 }
 
 // ---- one loop ----
@@ -414,7 +372,8 @@ class LoopVectorizer {
   Expr reduce(Kind kind, const Expr& term, const Expr& active) {
     int lanes = term.type().lanes();
     Expr wide = widen_.spread(term);
-    if (active.defined()) wide = make_select(active, wide, identity_of(kind, wide.type()));
+    if (active.defined())
+      wide = make_select(active, wide, identity_of(reduce_op(kind), wide.type()));
     if (lanes > 1) {  // iteration-major to lane-major: the groups that are reduced lie side by side
       std::vector<int> indices;
       for (int lane = 0; lane < lanes; ++lane) {

@@ -77,7 +77,10 @@ const std::vector<Directive>& loop_directives() {
               (f.specialize(wide).vectorize(x, 8); f.specialize_fail("f wants wide images"))),
     DIRECTIVE("atomic",
               "Updates of one element are indivisible, so that a reduction may run in parallel or "
-              "in lanes.",
+              "in lanes. Lanes are partial results: the serial loops around them carry a vector, "
+              "which is combined after the loops. So a sum of floats is rounded in another order "
+              "than the declared one; that order depends on the schedule alone, and every run "
+              "gives the same bits unless the reduction is parallel, too.",
               Loops, SUM, (f.update().atomic().vectorize(r, 8))),
     DIRECTIVE("rfactor",
               "An associative update is cut in two; the first half reduces separately for each "

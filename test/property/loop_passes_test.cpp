@@ -5,6 +5,7 @@
 #include <random>
 
 #include "ir/validate.h"
+#include "lower/accumulate_vectors.h"
 #include "lower/deinterleave_loads.h"
 #include "lower/free_early.h"
 #include "lower/interleave_vectors.h"
@@ -90,7 +91,7 @@ class RandomProgram {
   }
 
   Stmt statement(const Expr& x, const Expr& y, int depth) {
-    switch (depth == 0 ? number(0, 1) : number(0, 10)) {
+    switch (depth == 0 ? number(0, 1) : number(0, 11)) {
       case 0:
       case 1:
         return make_store(flip() ? "a" : "b", value(2), x + y * width + margin);
@@ -129,6 +130,8 @@ class RandomProgram {
         Expr index = (x + y * width) * 2 + margin;
         return make_block({make_store("d", value(2), index + 1), make_store("d", value(1), index)});
       }
+      case 11:
+        return summed_blocks(y);
       case 7:
         return make_evaluate(call_op(Op::print, {value(1)}));
       case 8: {  // extent may vary
@@ -147,6 +150,24 @@ class RandomProgram {
             x >= 3 && x < 10,
             make_store("b", make_load(Int(32), "tight", x - 3) + value(1), x + y * width + margin));
     }
+  }
+
+  // A reduction over blocks of lanes, whose sums may go through several loops.
+  Stmt summed_blocks(const Expr& y) {
+    const Expr block = variable(name("block")), lane = variable(name("lane"));
+    coordinates_.push_back(block);
+    coordinates_.push_back(lane);
+    const Expr index = y + margin, old = make_load(Int(32), "s", index), g = value(1);
+    const Expr sums[] = {old + g, old - g, min(old, g), old + g - value(1)};
+    const int kind = number(0, 3);
+    Stmt sum = make_store(kind == 2 ? "m" : "s",
+                          kind == 2 ? min(make_load(Int(32), "m", index), g) : sums[kind], index);
+    if (number(0, 3) == 0) sum = make_if(condition(), sum);
+    coordinates_.resize(coordinates_.size() - 2);
+    sum = make_for(lane.as<Variable>()->name, block * 2, number(2, 5), ForType::Vectorized, sum);
+    if (number(0, 2) == 0) sum = make_if(condition(), sum);
+    const Expr extent = flip() ? Expr(number(1, 3)) : variable("w") - 5;
+    return make_for(block.as<Variable>()->name, 0, extent, ForType::Serial, sum);
   }
 
   // Storage of one iteration.
@@ -297,6 +318,7 @@ class LoopPasses : public testing::TestWithParam<int> {};
 
 TEST_P(LoopPasses, KeepWhatProgramsCompute) {
   constexpr unsigned count = 100;
+  int accumulated = 0;
   for (unsigned seed = GetParam() * count; seed < (GetParam() + 1) * count; ++seed) {
     Stmt program = RandomProgram(seed).make();
     ASSERT_NO_THROW(validate(program, Phase::FlatStorage, "generator", free_names))
@@ -308,6 +330,8 @@ TEST_P(LoopPasses, KeepWhatProgramsCompute) {
     expect_same("unroll_loops", seed, program, unrolled, Phase::FlatStorage);
     Stmt vectorized = vectorize_loops(unrolled);
     expect_same("vectorize_loops", seed, program, vectorized, Phase::Vector);
+    expect_same("accumulate_vectors", seed, program, accumulate_vectors(vectorized), Phase::Vector);
+    accumulated += !accumulate_vectors(vectorized).same_as(vectorized);
     expect_same("interleave_vectors", seed, program, interleave_vectors(vectorized), Phase::Vector);
     expect_same("deinterleave_loads", seed, program, deinterleave_loads(vectorized), Phase::Vector);
     expect_same("transpose_loads", seed, program, transpose_loads(vectorized), Phase::Vector);
@@ -316,6 +340,7 @@ TEST_P(LoopPasses, KeepWhatProgramsCompute) {
                 Phase::Vector);
     if (HasFatalFailure()) return;
   }
+  EXPECT_GT(accumulated, 0) << "no program had a reduction to accumulate";
 }
 
 INSTANTIATE_TEST_SUITE_P(Seeds, LoopPasses, testing::Range(0, 8));

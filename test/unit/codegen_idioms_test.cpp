@@ -129,6 +129,51 @@ TEST(CodegenIdioms, AccumulatorsOfAMatrixProductStayInRegisters) {
   EXPECT_EQ(count(inner, "(%rsp"), 0u) << "a spilled accumulator";
 }
 
+// One product in each iteration; lanes are combined behind the loop.
+TEST(CodegenIdioms, SumsAreCarriedAsVectors) {
+  ImageParam a(Float(32), 1, "a"), b(Float(32), 1, "b");
+  RDom r(0, 4096, "r");
+  Func f("f");
+  f() = 0.0f;
+  f() += a(r) * b(r);
+  f.update().atomic().vectorize(r, 8);
+  const auto loop = block_with_most(assembly(f, avx2), "vfmadd");
+  EXPECT_EQ(count(loop, "vfmadd"), 1u);
+  EXPECT_EQ(count(loop, "vextract") + count(loop, "vhadd") + count(loop, "vaddss"), 0u);
+}
+
+TEST(CodegenIdioms, ProductsOf16BitsAreAddedInPairs) {
+  ImageParam a(Int(16), 1, "a"), b(UInt(8), 1, "b");
+  RDom r(0, 4096, "r");
+  Func f("f");
+  f() = 0;
+  f() += cast<int>(a(r)) * cast<int>(b(r));
+  f.update().atomic().vectorize(r, 32);
+  const auto wide = block_with_most(assembly(f, avx512), "vpmaddwd");
+  EXPECT_EQ(count(wide, "vpmaddwd"), 1u);
+  EXPECT_EQ(count(wide, "vpmull") + count(wide, "vextract"), 0u);
+  const auto narrow = block_with_most(assembly(f, avx2), "vpmaddwd");
+  EXPECT_EQ(count(narrow, "vpmaddwd"), 2u);
+  EXPECT_EQ(count(narrow, "vpmull"), 0u);
+}
+
+// The pairs lie side by side in the innermost dimension, the sums in another.
+TEST(CodegenIdioms, PairsBelongToTheSumsOfSeveralLanes) {
+  ImageParam a(Int(16), 2, "a"), b(Int(16), 1, "b");
+  Var x("x");
+  RVar ro("ro"), ri("ri");
+  RDom r(0, 64, "r");
+  Func f("f");
+  f(x) = 0;
+  f(x) += cast<int>(a(r, x)) * cast<int>(b(r));
+  a.dim(1).set_stride(2);
+  f.bound(x, 0, 8).vectorize(x);
+  f.update().split(r, ro, ri, 2).reorder(ri, x, ro).atomic().vectorize(ri).vectorize(x);
+  const auto loop = block_with_most(assembly(f, avx2), "vpmaddwd");
+  EXPECT_EQ(count(loop, "vpmaddwd"), 1u);
+  EXPECT_EQ(count(loop, "vpmull"), 0u);
+}
+
 TEST(CodegenIdioms, BordersOfBytesAreCompact) {
   ImageParam in(UInt(8), 1, "in");
   Var x("x");
