@@ -1,4 +1,5 @@
 // stage_company.cpp -- directives that relate a stage to others: compute_with and prefetch.
+#include "frontend/define.h"
 #include "frontend/func.h"
 #include "ir/build.h"
 #include "ir/print.h"
@@ -7,20 +8,58 @@ namespace retrograde {
 
 // ---- compute_with ----
 
-// 1. The level is a loop. 2. It is of another Func. 3. This stage has no specializations and is no
+namespace {
+
+std::string level_text(const ir::LoopLevel& level) {
+  if (level.kind == ir::LoopLevel::Kind::Root) return quoted("root");
+  return level.kind == ir::LoopLevel::Kind::At ? quoted(level.func + "." + level.var)
+                                               : quoted("inlined");
+}
+
+// 1. The level is a loop. 2. It is of another Func.
+void check_fuse_level(const std::string& stage, const std::string& func,
+                      const ir::LoopLevel& level) {
+  const std::string asked = text("compute ", quoted(stage), " with ", level_text(level));
+  if (level.kind != ir::LoopLevel::Kind::At) {
+    user_error(asked, "a stage joins the loops of another one down to a loop",
+               "the level is " + level_text(level), "Name a stage and one of its loops");
+  }
+  if (level.func == func) {
+    user_error(asked, "the stages belong to different Funcs", "both are of " + quoted(func),
+               "Stages of one Func run in their order");
+  }
+}
+
+// What a stage joins as long as its level object is not set: no loop of any Func.
+ir::LoopLevel undefined_level(const LoopLevel& level) {
+  const auto object = reinterpret_cast<uintptr_t>(level.contents().get());
+  return {ir::LoopLevel::Kind::At, "", std::to_string(object), -1};
+}
+
+// What the object says later, the schedule says, unless it was given another level since.
+void follow_fuse_level(const ir::FuncPtr& f, int index, const LoopLevel& level) {
+  level.contents()->followers.push_back(
+      [weak = f->weak_from_this(), index, stage = stage_name(*f, index),
+       last = f->stage(index).schedule.fuse_level](const ir::LoopLevel& now) mutable {
+        const auto func = weak.lock();
+        if (!func || !(func->stage(index).schedule.fuse_level == last)) return;
+        check_fuse_level(stage, func->name, now);
+        last = func->stage(index).schedule.fuse_level = now;
+        func->version++;
+      });
+}
+
+}  // namespace
+
+// 1. and 2. as above, now or when the level is set. 3. This stage has no specializations and is no
 // extern stage. Whether the loops agree and nothing depends on each other is checked when the whole
 // schedule is known.
 Stage& Stage::compute_with(const LoopLevel& level,
                            const std::vector<std::pair<VarOrRVar, LoopAlignStrategy>>& align) {
-  const std::string asked = text("compute ", quoted(name()), " with ", quoted(level.to_string()));
-  if (level.is_inlined() || level.is_root()) {
-    user_error(asked, "a stage joins the loops of another one down to a loop",
-               "the level is " + quoted(level.to_string()), "Name a stage and one of its loops");
-  }
-  if (level.func() == func_->name) {
-    user_error(asked, "the stages belong to different Funcs", "both are of " + quoted(func_->name),
-               "Stages of one Func run in their order");
-  }
+  if (level.defined()) check_fuse_level(name(), func_->name, level.contents()->level);
+  const std::string asked =
+      text("compute ", quoted(name()), " with ",
+           level.defined() ? level_text(level.contents()->level) : "another stage");
   if (func_->is_extern()) {
     user_error(asked, "the stage has loops", quoted(func_->name) + " is computed by a C function");
   }
@@ -30,9 +69,10 @@ Stage& Stage::compute_with(const LoopLevel& level,
                "Specialize the other stage instead");
   }
   ir::StageSchedule& now = touch();
-  now.fuse_level = level.contents()->level;
+  now.fuse_level = level.defined() ? level.contents()->level : undefined_level(level);
   now.fuse_alignment.clear();
   for (const auto& [var, strategy] : align) now.fuse_alignment[var.name()] = strategy;
+  follow_fuse_level(func_, index_, level);
   return *this;
 }
 

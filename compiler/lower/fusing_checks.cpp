@@ -73,6 +73,11 @@ class JoiningCheck {
         asked_(asked_of(program, f, stage)) {}
 
   void run() const {
+    if (level_.func.empty()) {
+      user_error(text("compute ", quoted(f_.name()), " with another stage"),
+                 "the loop level is set before the pipeline is compiled", "it never was",
+                 "Set it: level.set(LoopLevel(f, x))");
+    }
     const auto found = program_.index_of.find(level_.func);
     if (found == program_.index_of.end()) {
       user_error(asked_, "both stages belong to the pipeline and are computed somewhere",
@@ -219,8 +224,12 @@ std::vector<Joining> joinings_of(const Program& program) {
       const StageSchedule& own = program.funcs[f].stages[s].schedule;
       if (!joins(own)) continue;
       const LoopLevel& level = own.fuse_level;
-      Joining joining{static_cast<int>(f), static_cast<int>(s), program.index_of.at(level.func),
-                      with_stage_of(level), 0, {}};
+      Joining joining{static_cast<int>(f),
+                      static_cast<int>(s),
+                      program.index_of.at(level.func),
+                      with_stage_of(level),
+                      0,
+                      {}};
       const StageSchedule& other = schedule_of(program, joining.with, joining.with_stage);
       joining.depth = depth_of(other, level.var);
       for (int d = 1; d <= joining.depth; d++) {

@@ -331,7 +331,11 @@ class Scheduler {
   // computed. Only loops that a level can name.
   std::vector<Level> levels_around(int f, int stage) const {
     std::vector<Level> levels;
-    for (const Loop& loop : loops_[f][stage].variants[0]) levels.push_back({f, stage, loop.name});
+    const Companion* shared = stage == 0 ? companion_of_guest(f) : nullptr;
+    for (const Loop& loop : loops_[f][stage].variants[0]) {
+      if (shared && loop.name == shared->loop) return with_shared_loops(*shared, levels);
+      levels.push_back({f, stage, loop.name});
+    }
     const Placement& placement = schedule_.funcs[f].placement;
     if (placement.where != Where::At) return levels;
     const std::vector<Level> around = levels_around(placement.consumer, placement.stage);
@@ -340,10 +344,26 @@ class Scheduler {
     return levels;
   }
 
+  // Of a Func whose outer loops are another's.
+  const Companion* companion_of_guest(int f) const {
+    for (const Companion& companion : schedule_.companions) {
+      if (companion.func == f) return &companion;
+    }
+    return nullptr;
+  }
+
+  // Shared loops are named by the Func that they are of, as far as that one is scheduled already.
+  std::vector<Level> with_shared_loops(const Companion& shared, std::vector<Level> levels) const {
+    if (loops_[shared.with].empty()) return levels;
+    const std::vector<Level> around = levels_around(shared.with, 0);
+    const auto first = std::find(around.begin(), around.end(), Level{shared.with, 0, shared.loop});
+    levels.insert(levels.end(), first, around.end());
+    return levels;
+  }
+
   // Whether something may be computed there, in each of the stage's schedules.
   bool is_legal_level(const Level& level) const {
     if (level.name.empty() || !is_unique(level)) return false;
-    if (level.stage == 0 && companions_.count(level.func)) return false;
     for (const Loops& loops : loops_[level.func][level.stage].variants) {
       bool found = false, vectorized = false;
       for (const Loop& loop : loops) {
@@ -435,6 +455,7 @@ class Scheduler {
     const bool stored_outside = !spec.placement.store_loop.empty();
     if (!stored_outside && random_.chance(8)) spec.memoized = true;
     if (!spec.memoized && random_.chance(8)) spec.async = true;
+    if (companions_.count(f)) spec.memoized = spec.async = false;
     if (func(f).dimensions == 0) return;
     const auto add = [&](Rule kind, int a, int b = 0) {
       spec.rules.push_back({kind, random_dimension(f), a, b});

@@ -139,6 +139,13 @@ TEST_F(ComputeWithErrors, AStageThatIsNotNamed) {
   expect_refused({"names one stage", "has 2 stages"});
 }
 
+TEST_F(ComputeWithErrors, ALevelThatIsNeverSet) {
+  LoopLevel level;
+  g.compute_with(level);
+  expect_refused({"is set before the pipeline is compiled", "never was"});
+  expect_mentions(error_of<CompileError>([&] { level.set(LoopLevel(g, x)); }), {"different Funcs"});
+}
+
 TEST_F(ComputeWithErrors, UsedAtOnePlaceOnly) {
   f.compute_at(out, y);
   g.compute_at(out, y).compute_with(f, y);

@@ -18,10 +18,10 @@
 namespace retrograde {
 namespace {
 
-enum class View {
-  Loops,    // what Func::print_loop_nest shows
-  Storage,  // the statement in which storage has its layout
-};
+// What is shown: the loops of Func::print_loop_nest, or the statement after this pass.
+using View = const char*;
+constexpr View Loops = nullptr, Storage = "simplify_storage", Branches = "fork_async",
+               Lookups = "add_memoization_lookups", Cut = "partition_loops";
 
 struct Directive {
   const char* name;
@@ -36,7 +36,7 @@ struct Directive {
 // The algorithm defines the Funcs and adds the outputs to `outputs`; both parts in parentheses.
 #define DIRECTIVE(name, meaning, view, algorithm, schedule)                           \
   {                                                                                   \
-    name, meaning, View::view, AS_TEXT algorithm, AS_TEXT schedule,                   \
+    name, meaning, view, AS_TEXT algorithm, AS_TEXT schedule,                         \
         [](std::vector<Func>&outputs, bool is_scheduled) {                            \
           Var x("x"), y("y"), xo("xo"), yo("yo"), xi("xi"), yi("yi"), t("t"), u("u"); \
           PLAIN algorithm;                                                            \
@@ -69,6 +69,11 @@ const std::vector<Directive>& loop_directives() {
               ONE_FUNC, (f.vectorize(x, 8))),
     DIRECTIVE("unroll", "The iterations of a loop of constant extent become a sequence.", Loops,
               ONE_FUNC, (f.unroll(x, 2))),
+    DIRECTIVE("partition, never_partition, always_partition",
+              "Whether a loop is cut where conditions change that hold in most of it. Auto cuts "
+              "where that saves something.",
+              Cut, (Func f("f"); f(x) = select(likely(x > 3), x * x * x, x / 3)),
+              (f.never_partition(x))),
     DIRECTIVE("specialize", "Another schedule where a condition over parameters holds.", Loops,
               (Func f("f"); Param<bool> wide("wide"); f(x, y) = x + y),
               (f.specialize(wide).vectorize(x, 8))),
@@ -103,12 +108,28 @@ const std::vector<Directive>& place_directives() {
               "Storage outside of the loop at which it is computed: each iteration computes only "
               "what is new, and storage is folded to what is alive.",
               Loops, TWO_FUNCS, (g.store_root().compute_at(f, y))),
+    DIRECTIVE("compute_with",
+              "A stage runs in the loops of another one, down to a loop. Where their ranges differ "
+              "the loops run over both, and each stage where it would alone.",
+              Loops,
+              (Func f("f"), g("g"), h("h"); g(x, y) = x * y; h(x, y) = x - y; g.compute_root();
+               h.compute_root(); f(x, y) = g(x, y) + h(x, y)),
+              (h.compute_with(g, y))),
+    DIRECTIVE("async",
+              "A thread of its own computes it, while the rest goes on until it needs the values.",
+              Branches, (Func f("f"), g("g"); g(x) = x * x; g.compute_root(); f(x) = g(x)),
+              (g.async())),
+    DIRECTIVE(
+        "memoize", "Values are kept in a cache between calls, found by all that they depend on.",
+        Lookups, (Func f("f"), g("g"); g(x) = x * x; g.compute_root(); f(x) = g(x)), (g.memoize())),
     DIRECTIVE("in", "A Func between another and its users, to be scheduled on its own.", Loops,
               TWO_FUNCS, (g.compute_root(); g.in(f).compute_at(f, y))),
     DIRECTIVE("clone_in", "A copy of a Func for some of its users.", Loops, TWO_FUNCS,
               (g.clone_in(f).compute_root())),
     DIRECTIVE("bound", "A promise of what is computed; a call that needs more fails.", Loops,
               ONE_FUNC, (f.bound(x, 0, 64))),
+    DIRECTIVE("align_extent", "Computes more, so that the extent is a multiple.", Loops, TWO_FUNCS,
+              (g.compute_at(f, y).align_extent(x, 8).vectorize(x, 8))),
     DIRECTIVE("align_bounds", "Computes more, so that the min and the extent are multiples.", Loops,
               TWO_FUNCS, (g.compute_at(f, y).align_bounds(x, 8).vectorize(x, 8))),
   };
@@ -123,6 +144,18 @@ const std::vector<Directive>& storage_directives() {
     DIRECTIVE("align_storage", "The extent in memory grows to a multiple.", Storage,
               (Func f("f"), g("g"); g(x, y) = x * y; g.compute_root(); f(x, y) = g(x, y)),
               (g.align_storage(x, 16))),
+    DIRECTIVE("bound_storage",
+              "A promise of how large an extent in memory ever is; a call that needs more fails.",
+              Storage,
+              (Func f("f"), g("g"); g(x, y) = x * y; g.compute_at(f, y); f(x, y) = g(x, y)),
+              (g.bound_storage(x, 64))),
+    DIRECTIVE(
+        "hoist_storage",
+        "Memory is allocated further out than the values live, once, as large as it ever gets.",
+        Storage,
+        (Func f("f"), g("g"); g(x, y) = x * y; f(x, y) = g(x, y) + g(x + 1, y);
+         f.split(x, xo, xi, 8); g.compute_at(f, xo)),
+        (g.hoist_storage_root())),
     DIRECTIVE("fold_storage", "Coordinates are taken modulo an extent.", Storage,
               (Func f("f"), g("g"); g(x, y) = x * y; g.store_root().compute_at(f, y);
                f(x, y) = g(x, y) + g(x, y + 1)),
@@ -134,6 +167,12 @@ const std::vector<Directive>& storage_directives() {
     DIRECTIVE("prefetch", "What a later iteration reads is fetched into the cache.", Storage,
               (Func f("f"), g("g"); g(x, y) = x * y; g.compute_root(); f(x, y) = g(x, y)),
               (f.prefetch(g, y, y, 2))),
+    DIRECTIVE(
+        "trace_stores, trace_loads, trace_realizations",
+        "A function that the caller may set is told of every access, or of where values begin "
+        "and end to live.",
+        Storage, (Func f("f"), g("g"); g(x) = x * x; g.compute_root(); f(x) = g(x)),
+        (g.trace_stores())),
   };
   return directives;
 }
@@ -147,26 +186,34 @@ std::string as_code(const char* text) {
   return replaced(replaced(text, ";\\s*$", ""), ";\\s*", ";\n") + ";\n";
 }
 
-std::string statement_text(const std::vector<Func>& outputs) {
+std::string statement_text(const std::vector<Func>& outputs, View view) {
   std::vector<ir::FuncPtr> funcs;
   for (const Func& f : outputs) funcs.push_back(f.function());
   std::string result;
   ir::LowerOptions options;
-  options.stop_after = "simplify_storage";
-  options.target = get_host_target();
+  options.stop_after = view;
+  options.target = Target("x86-64-linux");
   ir::LoweredFunction lowered = ir::lower("f", funcs, ir::infer_arguments(funcs), options);
   return ir::print(lowered.body);
 }
 
-// The first allocation with its body: what is around it are checks of the arguments, the same for
-// every pipeline.
-std::string first_allocation(const std::string& text) {
+// Whether a line begins the part that is shown.
+bool is_beginning(const std::string& line, size_t first) {
+  for (const char* word : {"allocate", "realize", "produce"}) {
+    if (line.find(word) == first) return true;
+  }
+  return false;
+}
+
+// The first allocation or computation with its body: what is around it are checks of the arguments,
+// the same for every pipeline.
+std::string first_computation(const std::string& text) {
   std::istringstream lines(text);
   std::string result, line;
   size_t indent = std::string::npos;
   while (std::getline(lines, line)) {
     const size_t first = line.find_first_not_of(' ');
-    if (indent == std::string::npos && line.find("allocate") == first) indent = first;
+    if (indent == std::string::npos && is_beginning(line, first)) indent = first;
     if (indent == std::string::npos) continue;
     if (first < indent) break;
     result += line.substr(indent) + "\n";
@@ -177,10 +224,12 @@ std::string first_allocation(const std::string& text) {
 std::string view_of(const Directive& directive, bool is_scheduled) {
   std::vector<Func> outputs;
   directive.build(outputs, is_scheduled);
-  const std::string text = directive.view == View::Loops
+  const std::string text = directive.view == Loops
                                ? Pipeline(outputs).loop_nest()
-                               : first_allocation(statement_text(outputs));
-  return replaced(text, "\\$\\d+", "");  // names count up within a process
+                               : first_computation(statement_text(outputs, directive.view));
+  // Names count up within a process; a key of the cache holds them letter by letter, and its hash.
+  const std::string keys = replaced(text, "\\d+, (\\d+_u8, )+", "..., ");
+  return replaced(replaced(keys, "(_key:handle), \\d+", "$1, ..."), "\\$\\d+", "");
 }
 
 std::string section(const Directive& d) {

@@ -144,7 +144,7 @@ void report(uint64_t seed, const Program& program, const Finding& finding, bool 
 bool uses(const Program& program, const std::string& directive) {
   ScheduleSpec without = program.schedule;
   leave_out(without, directive);
-  return to_cpp(program.pipeline, without) != to_cpp(program.pipeline, program.schedule);
+  return to_cpp(without) != to_cpp(program.schedule);
 }
 
 }  // namespace

@@ -326,6 +326,23 @@ TEST_F(ComputeWith, OutputsShareLoops) {
     for (int i = 0; i < 4; ++i) ASSERT_EQ(b(i, j), i * j);
 }
 
+TEST_F(ComputeWith, TheLevelMayBeSetLater) {
+  Func f("f"), g("g"), h("h");
+  f(x, y) = x + y;
+  g(x, y) = x * y;
+  h(x, y) = f(x, y) + g(x, y);
+  LoopLevel level;
+  f.compute_root();
+  g.compute_root().compute_with(level);
+  level.set(LoopLevel(f, x));
+  EXPECT_NE(nest_of(h).find("      for x:\n        f(...) = ...\n        g(...)"),
+            std::string::npos)
+      << nest_of(h);
+  level.set(LoopLevel(f, y));
+  EXPECT_NE(nest_of(h).find("      for x:\n        f(...) = ...\n      for x:"), std::string::npos)
+      << nest_of(h);
+}
+
 TEST_F(ComputeWith, TheFirstStageMayBeSpecialized) {
   for (const bool set : {false, true}) {
     expect_same([&](bool together) {

@@ -109,3 +109,52 @@ PIPELINE(long_chain) {
   }
   return {{last}, {{100, 4}}, {}};
 }
+
+PIPELINE(compute_with_other_ranges) {
+  Func f = stencil_source(noise<int32_t>({40, 30}, 1), "f"), g("g"), h("h");
+  g(x, y) = x * 3 - y * y;
+  h(x, y) = f(x, y) + f(x + 1, y + 2) * g(x, y) - g(x - 3, y - 1);
+  if (scheduled) {
+    f.compute_root();
+    g.compute_root().compute_with(f, x, LoopAlignStrategy::AlignEnd);
+  }
+  return {{h}, {{33, 27}}, {}};
+}
+
+PIPELINE(compute_with_producer_inside) {
+  Func p = stencil_source(noise<int32_t>({40, 40}, 1), "p"), f("f"), g("g"), h("h");
+  f(x, y) = p(x, y) + p(x + 1, y);
+  g(x, y) = p(x, y + 1) * 3;
+  h(x, y) = f(x, y) - g(x, y);
+  if (scheduled) {
+    h.split(y, yo, yi, 8, TailStrategy::GuardWithIf);
+    f.compute_at(h, yo).vectorize(x, 8);
+    g.compute_at(h, yo).vectorize(x, 8).compute_with(f, y);
+    p.compute_at(f, y);
+  }
+  return {{h}, {{37, 29}}, {}};
+}
+
+PIPELINE(compute_with_updates) {
+  Func f("f"), g("g"), h("h");
+  RDom r(0, 9);
+  f(x, y) = x + y;
+  f(x, y) += r * x;
+  g(x, y) = x * y;
+  g(x, y) = g(x, y) * 3 + x;
+  h(x, y) = f(x, y) - g(x, y);
+  if (scheduled) {
+    f.compute_root();
+    g.compute_root().compute_with(f, x);
+    g.update(0).compute_with(f.update(0), y, LoopAlignStrategy::AlignStart);
+  }
+  return {{h}, {{21, 17}}, {}};
+}
+
+PIPELINE(compute_with_outputs) {
+  Func f("f"), g("g");
+  f(x, y) = x + 2 * y;
+  g(x, y) = x * y;
+  if (scheduled) g.compute_with(f, y);
+  return {{f, g}, {{31, 13}, {16, 29}}, {}};
+}
