@@ -5,6 +5,7 @@
 #include "autodiff/derivative_rules.h"
 #include "autodiff/reverse_sweep.h"
 #include "autodiff/update.h"
+#include "autodiff/update_context.h"
 #include "diagnostics/error.h"
 #include "frontend/define.h"
 #include "ir/build.h"
@@ -33,8 +34,6 @@ std::vector<std::string> implicit_args(int n) {
   for (int d = 0; d < n; ++d) names.push_back("_" + std::to_string(d));
   return names;
 }
-
-using SelfValues = std::map<Expr, Expr, StructuralLess>;
 
 class Synthesis {
  public:
@@ -126,22 +125,6 @@ class Synthesis {
     return target;
   }
 
-  // Where an update chooses undef the old value stays, and so must its adjoint: that needs the
-  // choice as a predicate, which undef hides inside a value.
-  static void reject_undef(const FuncContents& f, int stage) {
-    for (const Expr& value : f.stage(stage).values) {
-      walk(value, [&](const Expr& e) {
-        const Call* call = e.as<Call>();
-        if (!call || !call->is_op(Op::undef)) return true;
-        unsupported(text("differentiate update ", stage - 1, " of ", quoted(f.name)),
-                    "an update whose value is undef in places has no derivative rule yet",
-                    "its value contains undef, so it keeps what was stored there before",
-                    "Say where it stores with RDom::where, or select the old value instead of "
-                    "undef");
-      });
-    }
-  }
-
   void differentiate(const FuncPtr& f) {
     auto found = pending_.find(f.get());
     if (found == pending_.end() || found->second.empty()) return;
@@ -151,21 +134,17 @@ class Synthesis {
     record(*f, f->stage_count() - 1, adjoint);
     register_func(adjoint, f->name);
     for (int s = f->stage_count() - 1; s >= 1; --s) {
-      reject_undef(*f, s);
       UpdateAdjoint update = differentiate_update(
           {f, s, regions_, target, adjoint, extendable, options_.store_overwritten,
            [&](const Expr& leaf) { return is_wanted(leaf); }});
-      for (size_t v = 0; v < update.versions.size(); ++v) {
-        regions_.add(update.versions[v], update.version_regions[v]);
-        active_.insert(update.versions[v].get());
-      }
       if (update.current.func != adjoint.func) register_func(update.current, f->name);
-      for (const IterationDomain& domain : update.domains) {
-        contribute_stage(f, s, update.values, domain, update.current.func, update.self_values);
-      }
+      for (const FuncPtr& helper : update.helpers) result_.funcs.push_back(helper);
+      std::vector<Expr> seeds =
+          update.seeds.empty() ? adjoints_at_write(*f, s, update.current.func) : update.seeds;
+      for (const IterationDomain& domain : update.domains)
+        contribute_stage(f, update.values, seeds, domain, update.self_values);
       if (update.previous.func) register_func(update.previous, f->name);
       for (const Explanation& e : update.explanations) result_.explanations.push_back(e);
-      for (const FuncPtr& version : update.versions) differentiate(version);
       adjoint = update.previous.func ? update.previous : update.current;
       extendable = update.previous.func != nullptr;
       record(*f, s - 1, adjoint);
@@ -186,23 +165,31 @@ class Synthesis {
   void contribute_pure(const FuncPtr& f, const FuncPtr& adjoint) {
     std::vector<Expr> values;
     for (const Expr& v : f->pure->values) values.push_back(without_lets(v));
-    contribute_stage(f, 0, values, regions_.domain(*f, 0), adjoint, {});
+    contribute_stage(f, values, adjoints_at_write(*f, 0, adjoint), regions_.domain(*f, 0), {});
   }
 
-  void contribute_stage(const FuncPtr& f, int stage, const std::vector<Expr>& values,
-                        const IterationDomain& domain, const FuncPtr& adjoint,
-                        const SelfValues& self_values) {
+  std::vector<Expr> adjoints_at_write(const FuncContents& f, int stage,
+                                      const FuncPtr& adjoint) const {
     std::vector<Expr> seeds;
-    for (size_t k = 0; k < values.size(); ++k) {
-      seeds.push_back(f->types[k].is_float() ? adjoint_at(*f, stage, adjoint, static_cast<int>(k))
-                                             : Expr());
+    for (size_t k = 0; k < f.types.size(); ++k) {
+      seeds.push_back(f.types[k].is_float() ? adjoint_at(f, stage, adjoint, static_cast<int>(k))
+                                            : Expr());
     }
+    return seeds;
+  }
+
+  void contribute_stage(const FuncPtr& f, const std::vector<Expr>& values,
+                        const std::vector<Expr>& seeds, const IterationDomain& domain,
+                        const SelfValues& self_values) {
     SweepResult sweep = sweep_reverse(values, seeds, [&](const Expr& leaf) {
       return is_wanted(leaf) && symbol_of(leaf) != f.get();
     });
     for (const std::string& note : sweep.notes) explain(Explanation::Kind::Zero, f->name, note);
     for (const LeafAdjoint& leaf : sweep.leaves) {
-      add_contribution(f, {leaf.leaf, with_values(f, leaf.adjoint, self_values)}, domain);
+      add_contribution(f,
+                       {with_values_in_indices(leaf.leaf, f, self_values),
+                        with_values(leaf.adjoint, f, self_values)},
+                       domain);
     }
   }
 
@@ -222,12 +209,7 @@ class Synthesis {
     const Box& box = regions_.of(&f);
     for (size_t d = 0; d < f.args.size(); ++d) {
       Expr index = without_lets(f.stage(stage).args[d]);
-      bool depends_on_data = false;
-      walk(index, [&](const Expr& e) {
-        const auto* call = e.as<Call>();
-        return !(depends_on_data |= call && call->call_type != CallType::Operator);
-      });
-      if (depends_on_data && box[d].is_bounded() && !is_inside(index, f, stage, box[d])) {
+      if (depends_on_data(index) && box[d].is_bounded() && !is_inside(index, f, stage, box[d])) {
         inside = inside && index >= box[d].min && index <= box[d].max;
         index = clamp(index, box[d].min, box[d].max);
       }
@@ -265,16 +247,10 @@ class Synthesis {
     return it->second;
   }
 
-  // Calls of the Func by itself: kept versions where the final value is another; strong, since the
-  // adjoint owns it.
-  static Expr with_values(const FuncPtr& f, const Expr& e, const SelfValues& self_values) {
-    if (f->updates.empty()) return e;
-    Expr replaced =
-        self_values.empty() ? e : rewrite(e, [&](const Expr& node, const auto& recurse) {
-          auto it = self_values.find(node);
-          return it != self_values.end() ? it->second : map_children(node, recurse);
-        });
-    return redirect_calls(replaced, f, f, false);
+  // Where something is read may depend on values of f, too.
+  static Expr with_values_in_indices(const Expr& leaf, const FuncPtr& f,
+                                     const SelfValues& self_values) {
+    return map_children(leaf, [&](const Expr& e) { return with_values(e, f, self_values); });
   }
 
   // ---- results ----

@@ -2,19 +2,23 @@
 // contributions are swept from.
 //
 // One update runs, for i over its domain in order,   f[W(i)] <- V(f[R_1(i)], f[R_2(i)], ...,
-// others(i)). Reversed, in the opposite order:                   a = A[W(i)];  A[W(i)] = 0;
-// A[R_k(i)] += a * dV/df_k(i). Four shapes, tried in this order:
+// others(i)). Reversed, in the opposite order:   a = A[W(i)];  A[W(i)] = 0;
+// A[R_k(i)] += a * dV/df_k(i). The shapes, tried in this order:
 //   accumulation  V = f[W(i)] + E(i), E free of f: A stays as it is, E is swept with A[W(i)].
-//   Iterations commute. selection     V takes either f[W(i)] or E(i), as max, min and argmax do: a
-//   helper Func recomputes which iteration
-//                 wrote each element last; that one gets the adjoint.
-//   overwriting   V free of f: the last writer gets the adjoint, and A is 0 before the update where
-//   it writes. recurrence    anything else whose writes never meet: reads of values that an earlier
-//   iteration wrote make A a
-//                 recurrence in the opposite order, reads of older values contribute to the adjoint
-//                 before the update.
+//                 Iterations commute.
+//   selection     V takes either f[W(i)] or E(i), as max, min and argmax do: a helper Func computes
+//                 again which iteration wrote each element last; that one gets the adjoint.
+//   overwriting   V free of f, places known: the last writer gets the adjoint, and A is 0 before
+//   the
+//                 update where it writes.
+//   recurrence    places known and writes that never meet: reads of values that an earlier
+//   iteration
+//                 wrote make A a recurrence in the opposite order, reads of older values contribute
+//                 to the adjoint before the update.
+//   tape          anything else: the iterations run backward one by one inside each element of the
+//                 pure dimensions, and what they need is kept (tape.h).
 // A value that a partial needs must still be in f at the end: proven over index sets, never
-// sampled. Otherwise this is an error, or with Overwritten::Store the versions are kept.
+// sampled. Otherwise this is an error, or with Overwritten::Store the values are kept.
 #pragma once
 
 #include <functional>
@@ -27,6 +31,9 @@
 #include "ir/equal.h"
 
 namespace retrograde::ir {
+
+// What a read of an updated Func by itself is in a partial, where it is not the final value.
+using SelfValues = std::map<Expr, Expr, StructuralLess>;
 
 struct UpdateQuery {
   FuncPtr f;
@@ -43,12 +50,10 @@ struct UpdateAdjoint {
   AdjointFunc current;                   // the adjoint that contributions of this stage read
   AdjointFunc previous;                  // before the stage; null: the same as `current`
   std::vector<Expr> values;              // to sweep for contributions to others; undefined: none
+  std::vector<Expr> seeds;               // their adjoints; empty: `current` where the stage writes
   std::vector<IterationDomain> domains;  // over which
-  std::map<Expr, Expr, StructuralLess>
-      self_values;  // what a call of f itself is in a partial, when not f's final value
-  std::vector<FuncPtr>
-      versions;  // Funcs made for kept versions, to be differentiated next, consumers first
-  std::vector<Box> version_regions;  // of each
+  SelfValues self_values;
+  std::vector<FuncPtr> helpers;  // Funcs made on the way, producers first
   std::vector<Explanation> explanations;
 };
 

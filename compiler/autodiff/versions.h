@@ -1,10 +1,8 @@
 // Funcs that keep what an update overwrites.
 #pragma once
 
-#include <optional>
 #include <vector>
 
-#include "autodiff/regions.h"
 #include "frontend/function.h"
 
 namespace retrograde::ir {
@@ -20,17 +18,5 @@ Expr call_instead(const Expr& e, const FuncPtr& f, const FuncPtr& g,
 // out by a predicate count.
 Expr iteration_number(const std::vector<ReductionVariable>& rvars);
 Expr iteration_count(const std::vector<ReductionVariable>& rvars);
-
-// Stage `stage` of f, whose elements are rewritten by many iterations, as a recurrence in a new
-// last dimension:
-//   versions(p, 0) = f before the stage,   versions(p, t + 1) = V(versions(p, t)),   f(p) after it
-//   = versions(p, T)
-// nullopt unless the left-hand side and all reads of f are the pure variables themselves.
-struct Versions {
-  FuncPtr func;
-  Box region;
-};
-std::optional<Versions> keep_versions(const FuncPtr& f, int stage, const FuncPtr& before,
-                                      const Box& region);
 
 }  // namespace retrograde::ir

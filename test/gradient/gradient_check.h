@@ -30,6 +30,24 @@ inline Buffer<float> random_image(const std::vector<int>& sizes, double low, dou
   return result;
 }
 
+// A scalar that weighs every element differently, so that misplaced gradients show.
+inline Func weighted_sum(const Func& f, const std::vector<int>& sizes) {
+  Func loss("loss");
+  std::vector<Range> ranges;
+  for (int n : sizes) ranges.push_back({0, n});
+  RDom r(ranges);
+  std::vector<Expr> at;
+  Expr weight = 1.0f;
+  for (size_t d = 0; d < sizes.size(); ++d) {
+    at.push_back(r[static_cast<int>(d)]);
+    weight =
+        weight + cast<float>(r[static_cast<int>(d)] + 1) * (0.25f + 0.125f * static_cast<float>(d));
+  }
+  loss() = 0.0f;
+  loss() += f(at) * weight + 0.5f * f(at) * f(at);
+  return loss;
+}
+
 inline oracle::Array evaluate(const Func& f, const oracle::Region& region) {
   oracle::InterpreterOptions options;
   options.widen = true;

@@ -6,24 +6,6 @@ namespace {
 
 Var x("x"), y("y"), c("c"), t("t");
 
-// A scalar that weighs every element differently, so that misplaced gradients show.
-Func weighted_sum(const Func& f, const std::vector<int>& sizes) {
-  Func loss("loss");
-  std::vector<Range> ranges;
-  for (int n : sizes) ranges.push_back({0, n});
-  RDom r(ranges);
-  std::vector<Expr> at;
-  Expr weight = 1.0f;
-  for (size_t d = 0; d < sizes.size(); ++d) {
-    at.push_back(r[static_cast<int>(d)]);
-    weight =
-        weight + cast<float>(r[static_cast<int>(d)] + 1) * (0.25f + 0.125f * static_cast<float>(d));
-  }
-  loss() = 0.0f;
-  loss() += f(at) * weight + 0.5f * f(at) * f(at);
-  return loss;
-}
-
 class Programs : public ::testing::Test {
  protected:
   Buffer<float> a = random_image({9}, 0.25, 2, 1);

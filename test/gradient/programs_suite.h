@@ -1,0 +1,50 @@
+// The gradient suite: small programs by name. A file of programs is a list of PROGRAM(name) { ...
+// }; the driver (programs_suite_test.cpp) checks each one.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "gradient/gradient_check.h"
+
+namespace retrograde::gradient {
+
+struct Program {
+  Func loss;  // a scalar
+  std::vector<Buffer<float>> inputs;
+  bool store_overwritten = false;  // without it: a UserError; with it: right
+};
+
+struct NamedProgram {
+  const char* name;
+  Program (*build)();
+};
+
+inline std::vector<NamedProgram>& programs() {
+  static std::vector<NamedProgram> all;
+  return all;
+}
+struct RegisteredProgram {
+  RegisteredProgram(const char* name, Program (*build)()) { programs().push_back({name, build}); }
+};
+
+#define PROGRAM(name)                                            \
+  static Program name();                                         \
+  static const RegisteredProgram registered_##name(#name, name); \
+  static Program name()
+
+// Inputs that most programs use: values between 0.25 and 2.
+inline Buffer<float> line(int n = 9, unsigned seed = 1) { return random_image({n}, 0.25, 2, seed); }
+inline Buffer<float> plane(int w = 7, int h = 6, unsigned seed = 2) {
+  return random_image({w, h}, 0.25, 2, seed);
+}
+// Integers 0, 1, ..., bound - 1, scrambled: places that data decide.
+inline Buffer<int> places(int n, int bound, unsigned seed = 3) {
+  Buffer<int> result(n);
+  std::mt19937 random(seed);
+  result.get()->for_each_value(
+      [&](int& v) { v = static_cast<int>(random() % static_cast<unsigned>(bound)); });
+  return result;
+}
+
+}  // namespace retrograde::gradient
