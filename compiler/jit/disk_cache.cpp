@@ -1,7 +1,6 @@
 #include "jit/disk_cache.h"
 
 #include <dlfcn.h>
-#include <fcntl.h>
 #include <llvm/ADT/ArrayRef.h>
 #include <llvm/Config/llvm-config.h>
 #include <llvm/Support/SHA256.h>
@@ -9,18 +8,21 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <atomic>
-#include <cerrno>
+#include <charconv>
 #include <cstdlib>
 #include <cstring>
 #include <mutex>
+#include <tuple>
 
 #include "codegen/machine.h"
 #include "diagnostics/error.h"
 #include "diagnostics/large_stack.h"
 #include "frontend/compile_cache.h"
 #include "jit/fingerprint.h"
+#include "jit/private_folder.h"
 
 namespace retrograde::jit {
 namespace {
@@ -28,7 +30,8 @@ namespace {
 using Bytes = std::string;
 constexpr size_t digest_bytes = 32;
 constexpr char magic[] = "RGCACHE1";
-constexpr off_t max_entry_bytes = off_t{256} << 20;
+constexpr int64_t max_entry_bytes = int64_t{256} << 20;
+constexpr size_t key_digits = 64;
 
 Bytes sha256(const Bytes& data) {
   const auto digest = llvm::SHA256::hash(
@@ -47,120 +50,10 @@ Bytes hmac(const Bytes& key, const Bytes& data) {
 
 Bytes number(uint64_t value) { return {reinterpret_cast<const char*>(&value), sizeof value}; }
 
-// ---- files ----
-
-class Descriptor {
- public:
-  explicit Descriptor(int fd) : fd_(fd) {}
-  Descriptor(const Descriptor&) = delete;
-  Descriptor& operator=(const Descriptor&) = delete;
-  ~Descriptor() {
-    if (fd_ >= 0) close(fd_);
-  }
-  bool valid() const { return fd_ >= 0; }
-  int get() const { return fd_; }
-
- private:
-  int fd_;
-};
-
-bool is_private(const struct stat& status) {
-  return status.st_uid == geteuid() && (status.st_mode & 077) == 0;
-}
-
-bool write_all(int fd, const Bytes& data) {
-  size_t done = 0;
-  while (done < data.size()) {
-    const ssize_t written = write(fd, data.data() + done, data.size() - done);
-    if (written < 0 && errno == EINTR) continue;
-    if (written <= 0) return false;
-    done += static_cast<size_t>(written);
-  }
-  return true;
-}
-
-std::optional<Bytes> read_all(int fd, size_t size) {
-  Bytes data(size, 0);
-  size_t done = 0;
-  while (done < size) {
-    const ssize_t got = read(fd, data.data() + done, size - done);
-    if (got < 0 && errno == EINTR) continue;
-    if (got <= 0) return std::nullopt;
-    done += static_cast<size_t>(got);
-  }
-  return data;
-}
-
-// Everything happens relative to the folder that was checked, whatever its path means later.
-class Folder {
- public:
-  explicit Folder(const std::string& path) : fd_(open_checked(path)) {}
-
-  // Nothing when it is not there, and when it is no plain file of this user's alone.
-  std::optional<Bytes> read(const std::string& name) const {
-    const Descriptor file(openat(fd_.get(), name.c_str(), O_RDONLY | O_NOFOLLOW | O_CLOEXEC));
-    struct stat status;
-    if (!file.valid() || fstat(file.get(), &status) != 0) return std::nullopt;
-    if (!S_ISREG(status.st_mode) || !is_private(status)) return std::nullopt;
-    if (status.st_size > max_entry_bytes) return std::nullopt;
-    return read_all(file.get(), static_cast<size_t>(status.st_size));
-  }
-
-  bool contains(const std::string& name) const {
-    struct stat status;
-    return fstatat(fd_.get(), name.c_str(), &status, AT_SYMLINK_NOFOLLOW) == 0;
-  }
-
-  void remove(const std::string& name) const { unlinkat(fd_.get(), name.c_str(), 0); }
-
-  // `replaces`: takes the place of a file of that name; else it loses to one.
-  bool write(const std::string& name, const Bytes& data, bool replaces) const {
-    static std::atomic<uint64_t> counter{0};
-    const std::string temporary =
-        "tmp." + std::to_string(getpid()) + "." + std::to_string(counter++);
-    const int flags = O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC;
-    bool written = false;
-    {
-      const Descriptor file(openat(fd_.get(), temporary.c_str(), flags, 0600));
-      if (!file.valid()) return false;
-      written = write_all(file.get(), data);
-    }
-    if (written && replaces)
-      written = renameat(fd_.get(), temporary.c_str(), fd_.get(), name.c_str()) == 0;
-    if (written && !replaces)
-      written = linkat(fd_.get(), temporary.c_str(), fd_.get(), name.c_str(), 0) == 0;
-    if (!written || !replaces) remove(temporary);
-    return written;
-  }
-
- private:
-  Descriptor fd_;
-
-  [[noreturn]] static void refuse(const std::string& path, const std::string& evidence) {
-    user_error("keep compiled code in " + quoted(path),
-               "its folder belongs to the user alone (mode 0700)", evidence,
-               "Name another folder, or make this one private: chmod 700");
-  }
-
-  static int open_checked(const std::string& path) {
-    if (mkdir(path.c_str(), 0700) != 0 && errno != EEXIST)
-      refuse(path, std::string("it cannot be made: ") + std::strerror(errno));
-    const int fd = open(path.c_str(), O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC);
-    if (fd < 0) refuse(path, std::string("it cannot be opened: ") + std::strerror(errno));
-    struct stat status;
-    const bool is_known = fstat(fd, &status) == 0;
-    if (is_known && is_private(status)) return fd;
-    close(fd);
-    if (!is_known) refuse(path, "its owner cannot be found");
-    if (status.st_uid != geteuid()) refuse(path, "it belongs to another user");
-    refuse(path, "others can read or write it");
-  }
-};
-
 // The key of the folder's MACs, made by whoever comes first.
-Bytes folder_key(const Folder& folder) {
+Bytes folder_key(const PrivateFolder& folder) {
   for (int attempt = 0; attempt < 3; attempt++) {
-    const std::optional<Bytes> found = folder.read("key");
+    const std::optional<Bytes> found = folder.read("key", max_entry_bytes);
     if (found && found->size() == digest_bytes) return *found;
     if (folder.contains("key")) folder.remove("key");  // not as it was written
     Bytes fresh(digest_bytes, 0);
@@ -216,10 +109,14 @@ std::optional<CachedObject> unpack(const std::string& key, const Bytes& data) {
 
 class FolderCache : public DiskCache {
  public:
-  explicit FolderCache(const std::string& path) : folder_(path), mac_key_(folder_key(folder_)) {}
+  FolderCache(const std::string& path, int64_t max_bytes)
+      : folder_(path, "keep compiled code"),
+        mac_key_(folder_key(folder_)),
+        max_bytes_(max_bytes),
+        held_(folder_.bytes_of(list())) {}
 
   std::optional<CachedObject> find(const std::string& key) override {
-    const std::optional<Bytes> data = folder_.read(key);
+    const std::optional<Bytes> data = folder_.read(key, max_entry_bytes);
     std::optional<CachedObject> entry;
     if (data && data->size() > digest_bytes) {
       const Bytes content = data->substr(0, data->size() - digest_bytes);
@@ -227,6 +124,7 @@ class FolderCache : public DiskCache {
     }
     if (entry) {
       hits_++;
+      folder_.touch(key);
       return entry;
     }
     misses_++;
@@ -238,16 +136,49 @@ class FolderCache : public DiskCache {
   }
 
   void insert(const std::string& key, const CachedObject& object) override {
-    const Bytes content = pack(key, object);
-    if (folder_.write(key, content + hmac(mac_key_, content), true)) written_++;
+    const Bytes content = pack(key, object), entry = content + hmac(mac_key_, content);
+    const auto bytes = static_cast<int64_t>(entry.size());
+    if (bytes > std::min(max_bytes_, max_entry_bytes) || !folder_.write(key, entry, true)) return;
+    written_++;
+    const std::lock_guard lock(mutex_);
+    held_ += bytes;
+    if (held_ > max_bytes_) shrink();
   }
 
-  DiskCacheStatistics statistics() const override { return {hits_, misses_, rejected_, written_}; }
+  DiskCacheStatistics statistics() const override {
+    return {hits_, misses_, rejected_, written_, removed_};
+  }
 
  private:
-  const Folder folder_;
+  // Other processes may add and remove at the same time: the folder itself says what there is.
+  std::vector<FileInFolder> list() const {
+    return folder_.list([](const std::string& name) {
+      const bool is_left_over = name.compare(0, 4, "tmp.") == 0;
+      return is_left_over || name.size() == key_digits;
+    });
+  }
+
+  // Removes those that were not used for longest, down to nine tenths, so that it is rare.
+  void shrink() {
+    std::vector<FileInFolder> files = list();
+    std::sort(files.begin(), files.end(), [](const FileInFolder& a, const FileInFolder& b) {
+      return std::tie(a.used, a.name) < std::tie(b.used, b.name);
+    });
+    held_ = folder_.bytes_of(files);
+    for (const FileInFolder& file : files) {
+      if (held_ <= max_bytes_ / 10 * 9) break;
+      folder_.remove(file.name);
+      held_ -= file.bytes;
+      removed_++;
+    }
+  }
+
+  const PrivateFolder folder_;
   const Bytes mac_key_;
-  std::atomic<size_t> hits_{0}, misses_{0}, rejected_{0}, written_{0};
+  const int64_t max_bytes_;
+  std::mutex mutex_;
+  int64_t held_;  // by what is known here
+  std::atomic<size_t> hits_{0}, misses_{0}, rejected_{0}, written_{0}, removed_{0};
 };
 
 // ---- what machine code depends on ----
@@ -265,6 +196,20 @@ Bytes compiler_build() {
   return build;
 }
 
+// Millions of bytes.
+int64_t bytes_from_environment() {
+  const char* text = std::getenv("RETROGRADE_CACHE_MB");
+  if (!text || !*text) return default_compile_cache_bytes;
+  int64_t value = 0;
+  const char* const end = text + std::strlen(text);
+  const auto parsed = std::from_chars(text, end, value);
+  if (parsed.ec == std::errc() && parsed.ptr == end && value > 0 && value <= int64_t{1} << 30)
+    return value * 1000000;
+  user_error("keep compiled code on disk",
+             "RETROGRADE_CACHE_MB is a whole number of megabytes, 1 or more",
+             "it is " + quoted(text), "Set it so, or leave it unset");
+}
+
 struct Configuration {
   std::mutex mutex;
   bool environment_was_read = false;
@@ -278,8 +223,12 @@ Configuration& configuration() {
 
 }  // namespace
 
-std::shared_ptr<DiskCache> open_disk_cache(const std::string& folder) {
-  return std::make_shared<FolderCache>(folder);
+std::shared_ptr<DiskCache> open_disk_cache(const std::string& folder, int64_t max_bytes) {
+  if (max_bytes <= 0) {
+    user_error("keep compiled code in " + quoted(folder), "its size in bytes is positive",
+               "it is " + std::to_string(max_bytes), "Give the bytes that it may take");
+  }
+  return std::make_shared<FolderCache>(folder, max_bytes);
 }
 
 std::shared_ptr<DiskCache> disk_cache() {
@@ -287,7 +236,7 @@ std::shared_ptr<DiskCache> disk_cache() {
   const std::lock_guard lock(now.mutex);
   if (!now.environment_was_read) {
     const char* folder = std::getenv("RETROGRADE_CACHE_DIR");
-    if (folder && *folder) now.cache = open_disk_cache(folder);
+    if (folder && *folder) now.cache = open_disk_cache(folder, bytes_from_environment());
     now.environment_was_read = true;
   }
   return now.cache;
@@ -314,8 +263,8 @@ std::string disk_cache_key(const ir::LoweredFunction& function, const codegen::O
 
 namespace retrograde {
 
-void set_compile_cache_directory(const std::string& folder) {
-  auto cache = folder.empty() ? nullptr : jit::open_disk_cache(folder);
+void set_compile_cache_directory(const std::string& folder, int64_t max_bytes) {
+  auto cache = folder.empty() ? nullptr : jit::open_disk_cache(folder, max_bytes);
   jit::Configuration& now = jit::configuration();
   const std::lock_guard lock(now.mutex);
   now.environment_was_read = true;

@@ -6,6 +6,9 @@
 // user alone. Entries are written under another name and then renamed, and carry a MAC
 // (HMAC-SHA256, RFC 2104, with a key that the folder keeps): one that is cut off, changed or made
 // elsewhere is removed and built again; it never runs.
+//
+// A folder has a size that it stays within: what was not used for longest is removed when it grows
+// beyond that, and so is what a writer left that did not come to its end.
 #pragma once
 
 #include <cstdint>
@@ -22,6 +25,7 @@ struct DiskCacheStatistics {
   size_t hits = 0, misses = 0;
   size_t rejected = 0;  // entries that were there and not as they were written
   size_t written = 0;
+  size_t removed = 0;  // to stay within the size
 };
 
 // A linkable object and the name of its function, which is that of the program it was built for.
@@ -39,8 +43,9 @@ class DiskCache {
   virtual DiskCacheStatistics statistics() const = 0;
 };
 
-// CompileError when the folder cannot be made, or is not the user's own and nobody else's.
-std::shared_ptr<DiskCache> open_disk_cache(const std::string& folder);
+// CompileError when the folder cannot be made, or is not the user's own and nobody else's, and when
+// the size is not positive.
+std::shared_ptr<DiskCache> open_disk_cache(const std::string& folder, int64_t max_bytes);
 // The one in use; null when there is none. CompileError as above for the folder that the
 // environment names.
 std::shared_ptr<DiskCache> disk_cache();

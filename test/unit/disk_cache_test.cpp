@@ -92,7 +92,13 @@ class DiskCache : public testing::Test {
 TEST_F(DiskCache, TheEnvironmentNamesAFolder) {
   setenv("RETROGRADE_CACHE_DIR", folder().c_str(), 1);
   jit::clear_cache();
+  for (const char* size : {"many", "0", "-3", "5 MB"}) {
+    setenv("RETROGRADE_CACHE_MB", size, 1);
+    EXPECT_THROW(jit::disk_cache(), UserError) << size;
+  }
+  setenv("RETROGRADE_CACHE_MB", "5", 1);
   expect_runs(scaled(7), 7);
+  unsetenv("RETROGRADE_CACHE_MB");
   EXPECT_EQ(entries(folder()).size(), 1u);
   unsetenv("RETROGRADE_CACHE_DIR");
 }
@@ -257,6 +263,62 @@ TEST_F(DiskCache, AFolderThatCannotBeMadeIsRefused) {
 
 // ---- several at once ----
 
+// ---- size ----
+
+TEST_F(DiskCache, WhatWasNotUsedForLongestGoesFirst) {
+  start_again(folder());
+  expect_runs(scaled(3), 3);
+  const auto one = static_cast<int64_t>(fs::file_size(entries(folder()).at(0)));
+  const auto start_small = [&] {
+    jit::clear_cache();
+    set_compile_cache_directory(folder(), 4 * one);
+  };
+  for (const int factor : {4, 5}) expect_runs(scaled(factor), factor);
+  // 3 is the oldest, and then used again.
+  start_small();
+  expect_runs(scaled(3), 3);
+  EXPECT_EQ(statistics().hits, 1u);
+  for (const int factor : {6, 7}) expect_runs(scaled(factor), factor);
+  EXPECT_GE(statistics().removed, 1u);
+  EXPECT_LE(entries(folder()).size(), 4u);
+  start_small();
+  for (const int factor : {3, 7}) expect_runs(scaled(factor), factor);
+  EXPECT_EQ(statistics().hits, 2u);
+  expect_runs(scaled(4), 4);
+  EXPECT_EQ(statistics().misses, 1u);
+}
+
+TEST_F(DiskCache, AnEntryLargerThanTheFolderMayBeIsNotKept) {
+  set_compile_cache_directory(folder(), 100);
+  expect_runs(scaled(3), 3);
+  EXPECT_TRUE(entries(folder()).empty());
+  EXPECT_EQ(statistics().written, 0u);
+}
+
+TEST_F(DiskCache, WhatAWriterLeftHalfDoneIsRemovedInTime) {
+  start_again(folder());
+  const fs::path left = fs::path(folder()) / "tmp.1.0";
+  write_file(left, std::string(5000000, 'x'));
+  fs::last_write_time(left, fs::file_time_type::clock::now() - std::chrono::hours(2));
+  jit::clear_cache();
+  set_compile_cache_directory(folder(), 1000000);
+  expect_runs(scaled(3), 3);
+  EXPECT_FALSE(fs::exists(left));
+  EXPECT_EQ(entries(folder()).size(), 1u);
+  EXPECT_TRUE(fs::exists(fs::path(folder()) / "key"));
+}
+
+TEST_F(DiskCache, ItsSizeIsPositive) {
+  for (const int64_t bytes : {int64_t{0}, int64_t{-5}}) {
+    try {
+      set_compile_cache_directory(folder(), bytes);
+      FAIL() << "nothing was thrown";
+    } catch (const UserError& error) {
+      EXPECT_NE(std::string(error.what()).find("its size in bytes is positive"), std::string::npos);
+    }
+  }
+}
+
 TEST_F(DiskCache, SeveralWritersLeaveWholeEntries) {
   fs::create_directory(folder());
   fs::permissions(folder(), fs::perms::owner_all);
@@ -266,7 +328,8 @@ TEST_F(DiskCache, SeveralWritersLeaveWholeEntries) {
   std::atomic<int> torn{0};
   for (int t = 0; t < 4; t++) {
     threads.emplace_back([&] {
-      const auto cache = jit::open_disk_cache(folder());  // each as a process of its own
+      const auto cache = jit::open_disk_cache(
+          folder(), default_compile_cache_bytes);  // each as a process of its own
       for (int i = 0; i < 20; i++) {
         cache->insert(key, object);
         const auto found = cache->find(key);
