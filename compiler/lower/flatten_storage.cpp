@@ -184,8 +184,10 @@ class Flattener : public Rewriter {
       elements = binary(Kind::Mul, elements, cast_to(Int(64), count));
     }
     layouts_[n.name] = std::move(layout);
+    const auto places_around = places_;
     const bool has_memory = !find_place(n.name);
     Stmt body = (*this)(n.body);
+    places_ = places_around;
     for (size_t i = n.types.size(); has_memory && i-- > 0;) {
       body = make_allocate(element_name(n.name, n.types.size(), i), n.types[i], n.memory, elements,
                            body);

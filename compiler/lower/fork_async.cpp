@@ -17,20 +17,23 @@
 //         producer may be ahead, which build_loop_nests knows from the folding, or is left out
 //         where nothing that is still read is ever overwritten. Storage of several async Funcs
 //         nests, and so do the Forks: outermost first, each next one splits the branch that
-//         consumes.
-// Errors: a producer that shares the inner loops with another that it reads and that is not async;
-//         two branches that both read a third async Func.
+//         consumes. When both of its parts read the Func of a Fork around, each has semaphores of
+//         its own to that producer. What else the producer reads and is computed in the same loops
+//         is computed in its branch, and in the other as well where that reads it too.
+// Errors: such a value that both branches read, and whose storage lasts longer than theirs.
 // Source: Halide's documentation of async; the handshake is a bounded buffer's (Dijkstra 1965).
 // Tests: test/unit/async_test.cpp.
 #include "lower/fork_async.h"
 
 #include <algorithm>
+#include <set>
 #include <utility>
 
 #include "diagnostics/error.h"
 #include "ir/build.h"
 #include "ir/visit.h"
 #include "lower/copy_statement.h"
+#include "lower/make_names_unique.h"
 
 namespace retrograde::ir {
 
@@ -38,7 +41,9 @@ namespace {
 
 std::string semaphores_of(const std::string& func) { return func + ".semaphores"; }
 
+// Of one reader; those of the next follow.
 enum Semaphore { Ready = 0, Space = 1 };
+constexpr int per_reader = 2;
 
 bool is_semaphore_step(const Stmt& s, const std::string& func) {
   bool found = false;
@@ -89,20 +94,50 @@ bool uses_func(const Tree& tree, const std::string& func) {
   return finder.found;
 }
 
-bool is_producer_of(const Stmt& s, const std::string& func) {
+using Names = std::set<std::string>;
+
+const ProducerConsumer* as_producer(const Stmt& s) {
   const ProducerConsumer* n = s.as<ProducerConsumer>();
-  return n && n->is_producer && n->name == func;
+  return n && n->is_producer ? n : nullptr;
 }
 
-bool produces(const Stmt& s, const std::string& func) {
+bool is_producer_of(const Stmt& s, const std::string& func) {
+  const ProducerConsumer* n = as_producer(s);
+  return n && n->name == func;
+}
+
+bool produces_any(const Stmt& s, const Names& funcs) {
   bool found = false;
   walk(
       s, [](const Expr&) { return false; },
       [&](const Stmt& part) {
-        found |= is_producer_of(part, func);
+        const ProducerConsumer* n = as_producer(part);
+        found |= n && funcs.count(n->name);
         return !found;
       });
   return found;
+}
+
+bool produces(const Stmt& s, const std::string& func) { return produces_any(s, {func}); }
+
+Names realized_in(const Stmt& s) {
+  Names names;
+  walk(
+      s, [](const Expr&) { return false; },
+      [&](const Stmt& part) {
+        if (const Realize* n = part.as<Realize>()) names.insert(n->name);
+        return true;
+      });
+  return names;
+}
+
+// Whether anything but the computation of the Func itself reads it.
+bool is_read_outside(const Stmt& s, const std::string& func) {
+  UseFinder finder{func};
+  walk(
+      s, [&](const Expr& e) { return finder.visit(e); },
+      [&](const Stmt& part) { return !is_producer_of(part, func) && !finder.found; });
+  return finder.found;
 }
 
 // A loop around the producer, inside of `s`.
@@ -130,6 +165,7 @@ class AsyncForker : public Rewriter {
   Stmt rewrite(const Stmt& given) override {
     const Stmt s = producers_outermost(given);
     const Realize* n = s.as<Realize>();
+    if (n) around_[original(n->name)] = s;
     if (!n || !is_async(n->name) || !produces(n->body, n->name)) return children(s);
     const Stmt body = has_loop_around(n->body, n->name) ? fork_loops(*n) : fork_once(*n);
     return make_realize(n->name, n->types, n->memory, n->bounds, body);
@@ -140,8 +176,9 @@ class AsyncForker : public Rewriter {
   const RenamedFuncs& renamed_;
   const AsyncRoom& room_;
   FreshNames fresh_;
-  Substitution own_names_;
-  std::vector<std::string> forked_;  // async Funcs around whose consumers this is
+  std::vector<std::string> forked_;     // async Funcs around whose consumers this is
+  std::map<std::string, int> readers_;  // of those, with semaphores of their own
+  std::map<std::string, Stmt> around_;  // by original name, the last one entered
 
   const std::string& original(const std::string& name) const {
     const auto it = renamed_.find(name);
@@ -152,7 +189,8 @@ class AsyncForker : public Rewriter {
     return f && f->schedule.async;
   }
 
-  // Realizes directly inside each other, those of producers around those of what reads them.
+  // Realizes directly inside each other: those of async Funcs first, producers around what reads
+  // them. The others are then inside of the Forks, where each branch can have its own.
   Stmt producers_outermost(const Stmt& s) const {
     std::vector<const Realize*> chain;
     for (const Realize* n = s.as<Realize>(); n; n = n->body.as<Realize>()) chain.push_back(n);
@@ -160,7 +198,8 @@ class AsyncForker : public Rewriter {
     const Stmt body = chain.back()->body;
     const auto position = [&](const Realize* n) {
       const auto it = program_.index_of.find(original(n->name));
-      return it == program_.index_of.end() ? -1 : it->second;
+      const bool is_func = it != program_.index_of.end();
+      return std::pair(is_func && !is_async(n->name), is_func ? it->second : -1);
     };
     std::stable_sort(chain.begin(), chain.end(),
                      [&](const Realize* a, const Realize* b) { return position(a) < position(b); });
@@ -171,63 +210,204 @@ class AsyncForker : public Rewriter {
     return result;
   }
 
-  // Work that the producer's branch leaves out and the producer needs.
-  static void check_is_complete(const Realize& n, const Stmt& producer) {
+  // ---- the two branches ----
+
+  struct Branches {
+    Stmt producer, consumer;
+  };
+
+  Branches branches_of(const Realize& n, bool loops, int room) {
+    Names made = {n.name};
+    Stmt producer = only_producer(n.body, n.name, made, loops, room);
+    while (add_what_is_read(n, producer, made))
+      producer = only_producer(n.body, n.name, made, loops, room);
+    Stmt consumer = without_producer(n.body, n.name, loops, room);
+    made.erase(n.name);
+    consumer = without_unread(consumer, made);
+    check_is_apart(n, made, consumer);
+    share_waits(producer, consumer);
+    return {with_own_places(producer, consumer), consumer};
+  }
+
+  // Funcs that are computed beside `n` and that its producer reads.
+  static bool add_what_is_read(const Realize& n, const Stmt& producer, Names& made) {
+    const size_t before = made.size();
     walk(
         n.body, [](const Expr&) { return false; },
         [&](const Stmt& part) {
-          if (is_producer_of(part, n.name)) return false;
-          const ProducerConsumer* other = part.as<ProducerConsumer>();
-          if (!other || !other->is_producer || !uses_func(producer, other->name)) return true;
-          if (produces(part, n.name)) return true;
-          unsupported(text("compute ", quoted(n.name), " async"),
-                      "what an async Func reads is computed outside of the loops that it shares "
-                      "with its consumer, inside its own, or async itself",
-                      text(quoted(other->name), " is computed in these loops, and ", quoted(n.name),
-                           " reads it"),
-                      text("Compute ", quoted(other->name), " at root or at a loop of ",
-                           quoted(n.name), ", or call async() on it"));
+          const ProducerConsumer* other = as_producer(part);
+          if (!other || (other->name != n.name && produces(part, n.name))) return true;
+          if (uses_func(producer, other->name)) made.insert(other->name);
           return false;
         });
+    return made.size() > before;
+  }
+
+  // Without the computation of those that nothing reads.
+  Stmt without_unread(Stmt s, Names funcs) {
+    for (auto it = funcs.begin(); s.defined() && it != funcs.end();) {
+      if (!produces(s, *it) || is_read_outside(s, *it)) {
+        ++it;
+        continue;
+      }
+      s = without_producer(s, *it, false);
+      funcs.erase(it);
+      it = funcs.begin();
+    }
+    return s;
+  }
+
+  // Both branches may compute a Func only where each has storage for it.
+  void check_is_apart(const Realize& n, const Names& made, const Stmt& consumer) const {
+    const Names inside = realized_in(n.body);
+    for (const std::string& other : made) {
+      const LoopedFunc* f = program_.find(original(other));
+      const bool is_output = f && f->is_output;
+      if (inside.count(other) || (!is_output && !produces(consumer, other))) continue;
+      user_error(text("compute ", quoted(original(n.name)), " async"),
+                 "what an async Func and its consumer both read is stored no further out than the "
+                 "async Func, or computed outside of the loops that they share",
+                 text(quoted(original(other)), " is computed in these loops and stored around ",
+                      quoted(original(n.name))),
+                 text("Compute ", quoted(original(other)), " at root, store it where ",
+                      quoted(original(n.name)), " is stored, or call async() on it"));
+    }
+  }
+
+  // Memory that both branches would hoist theirs to.
+  Stmt with_own_places(Stmt producer, const Stmt& consumer) const {
+    const Names here = places_of(producer), there = places_of(consumer);
+    for (const std::string& place : here) {
+      const auto around = around_.find(place);
+      if (!there.count(place) || around == around_.end()) continue;
+      const Realize& n = *around->second.as<Realize>();
+      producer = make_realize(n.name, n.types, n.memory, n.bounds, producer);
+    }
+    return producer;
+  }
+
+  // Places outside of the statement in which its Funcs lie, by their original names.
+  Names places_of(const Stmt& s) const {
+    Names places, inside;
+    if (!s.defined()) return places;
+    for (const std::string& name : realized_in(s)) inside.insert(original(name));
+    for (const std::string& name : inside) {
+      const LoopedFunc* f = program_.find(name);
+      if (f && is_hoisted(*f) && !inside.count(place_name(name))) places.insert(place_name(name));
+    }
+    return places;
+  }
+
+  // Whether the statement has to do with what was realized under this name: a Func or a place.
+  bool needs(const Stmt& s, const std::string& name) const {
+    return s.defined() && (uses_func(s, name) || places_of(s).count(original(name)));
   }
 
   // ---- semaphores ----
 
-  static Expr call(const char* function, const std::string& func, Semaphore which, int count) {
+  static Expr call(const char* function, const std::string& func, int which, int count) {
     const Expr place = call_op(
         Op::address_of, Handle(),
         {call_func(semaphores_of(func), UInt(64), {Expr(static_cast<int32_t>(which))}, 0, {})});
     return call_op(Op::runtime_call, Int(32), {Expr(function), place, Expr(count)});
   }
 
-  Stmt acquire(const std::string& func, Semaphore which) {
+  Stmt acquire(const std::string& func, int which) {
     const std::string code = fresh_(func + ".waited");
     return make_let(code, call("retrograde_semaphore_acquire", func, which, 1),
                     make_assert(variable(code) == 0, variable(code)));
   }
 
-  static Stmt release(const std::string& func, Semaphore which) {
+  static Stmt release(const std::string& func, int which) {
     return make_evaluate(call("retrograde_semaphore_release", func, which, 1));
   }
 
-  static Stmt with_semaphores(const std::string& func, int room, const Stmt& fork) {
-    const Stmt start =
-        make_block({make_evaluate(call("retrograde_semaphore_init", func, Ready, 0)),
-                    make_evaluate(call("retrograde_semaphore_init", func, Space, room)), fork});
-    return make_realize(semaphores_of(func), {UInt(64)}, MemoryType::Stack, {Range{0, 2}}, start);
+  static Stmt with_semaphores(const std::string& func, int room, int readers, const Stmt& fork) {
+    std::vector<Stmt> stmts;
+    for (int i = 0; i < readers; i++) {
+      stmts.push_back(
+          make_evaluate(call("retrograde_semaphore_init", func, per_reader * i + Ready, 0)));
+      stmts.push_back(
+          make_evaluate(call("retrograde_semaphore_init", func, per_reader * i + Space, room)));
+    }
+    stmts.push_back(fork);
+    return make_realize(semaphores_of(func), {UInt(64)}, MemoryType::Stack,
+                        {Range{0, per_reader * readers}}, make_block(stmts));
+  }
+
+  static bool is_step(const Stmt& s, const std::string& func) {
+    const LetStmt* let = s.as<LetStmt>();
+    const bool has_form = let ? let->body.kind() == Kind::Assert : s.kind() == Kind::Evaluate;
+    return has_form && is_semaphore_step(s, func);
+  }
+  static bool has_steps(const Stmt& s, const std::string& func) {
+    bool found = false;
+    walk(
+        s, [](const Expr&) { return false; },
+        [&](const Stmt& part) {
+          found |= is_step(part, func);
+          return !found;
+        });
+    return found;
+  }
+
+  // Each wait for the Func and each signal to it replaced; `s.defined()` need not hold of what
+  // comes in.
+  template <class Replace>
+  static Stmt replace_steps(const Stmt& s, const std::string& func, const Replace& replace) {
+    struct Replacer : Rewriter {
+      Replacer(const std::string& func, const Replace& replace) : func(func), replace(replace) {}
+      const std::string& func;
+      const Replace& replace;
+      Expr rewrite(const Expr& e) override { return e; }
+      Stmt rewrite(const Stmt& s) override { return is_step(s, func) ? replace(s) : children(s); }
+    };
+    return Replacer(func, replace)(s);
+  }
+
+  Stmt step_of_reader(const Stmt& step, const std::string& func, int reader) {
+    int which = -1;
+    walk(
+        step,
+        [&](const Expr& e) {
+          const Call* call = e.as<Call>();
+          if (call && call->call_type == CallType::Func)
+            which = static_cast<int>(*as_const_int(call->args[0])) % per_reader;
+          return true;
+        },
+        [](const Stmt&) { return true; });
+    const int semaphore = per_reader * reader + which;
+    return step.kind() == Kind::LetStmt ? acquire(func, semaphore) : release(func, semaphore);
+  }
+
+  // Waits of the Func that each of its readers makes with the producer.
+  Stmt with_all_readers(const Stmt& producer, const std::string& func) {
+    const int readers = readers_.at(func);
+    if (readers == 1) return producer;
+    return replace_steps(producer, func, [&](const Stmt& step) {
+      std::vector<Stmt> stmts;
+      for (int i = 0; i < readers; i++) stmts.push_back(step_of_reader(step, func, i));
+      return make_block(stmts);
+    });
+  }
+
+  Stmt forked(const Realize& n, int room, const Branches& branches) {
+    readers_[n.name] = 1;
+    forked_.push_back(n.name);
+    const Stmt consumer = (*this)(branches.consumer);
+    forked_.pop_back();
+    const Stmt producer = with_all_readers((*this)(branches.producer), n.name);
+    return with_semaphores(n.name, room, readers_.at(n.name), make_fork(producer, consumer));
   }
 
   // ---- produced once ----
 
   Stmt fork_once(const Realize& n) {
-    Stmt producer = only_producer(n.body, n.name, false);
-    Stmt consumer = without_producer(n.body, n.name, false);
-    if (!consumer.defined()) return children(n.body);
-    producer = with_own_names(producer);
-    consumer = acquired_late(consumer, n.name);
-    return with_semaphores(
-        n.name, 0,
-        make_fork(make_block({(*this)(producer), release(n.name, Ready)}), (*this)(consumer)));
+    Branches branches = branches_of(n, false, 0);
+    if (!branches.consumer.defined()) return children(n.body);
+    branches.producer = make_block({branches.producer, release(n.name, Ready)});
+    branches.consumer = acquired_late(branches.consumer, n.name);
+    return forked(n, 0, branches);
   }
 
   // A producer that does not run when its result is in the cache.
@@ -267,47 +447,25 @@ class AsyncForker : public Rewriter {
   Stmt fork_loops(const Realize& n) {
     const auto found = room_.find(original(n.name));
     const int room = found == room_.end() ? 1 : found->second;
-    Stmt producer = only_producer(n.body, n.name, true, room);
-    Stmt consumer = without_producer(n.body, n.name, true, room);
-    check_is_complete(n, producer);
-    share_waits(n.name, producer, consumer);
-    producer = with_own_names(producer);
-    forked_.push_back(n.name);
-    Stmt fork = make_fork((*this)(producer), (*this)(consumer));
-    forked_.pop_back();
-    return with_semaphores(n.name, room, fork);
+    return forked(n, room, branches_of(n, true, room));
   }
 
-  // The handshake of an async Func around belongs to the branch that reads it.
-  void share_waits(const std::string& func, Stmt& producer, Stmt& consumer) const {
+  // The handshake of an async Func around belongs to the branch that reads it. Where both do, the
+  // producer's has one of its own.
+  void share_waits(Stmt& producer, Stmt& consumer) {
     for (const std::string& outer : forked_) {
+      if (!has_steps(producer, outer) || !consumer.defined() || !has_steps(consumer, outer))
+        continue;
       const bool in_producer = uses_func(producer, outer), in_consumer = uses_func(consumer, outer);
       if (in_producer && in_consumer) {
-        unsupported(text("compute ", quoted(func), " async"),
-                    "an async Func that is computed in a loop is read by one thread",
-                    text(quoted(outer), " is read by ", quoted(func), " and by its consumer"),
-                    text("Leave out async() of ", quoted(outer), " or of ", quoted(func)));
+        const int reader = readers_.at(outer)++;
+        producer = replace_steps(
+            producer, outer, [&](const Stmt& step) { return step_of_reader(step, outer, reader); });
+        continue;
       }
       Stmt& other = in_producer ? consumer : producer;
-      other = without_waits(other, outer);
+      other = replace_steps(other, outer, [](const Stmt&) { return make_evaluate(0); });
     }
-  }
-
-  static Stmt without_waits(const Stmt& s, const std::string& func) {
-    struct Remover : Rewriter {
-      explicit Remover(const std::string& func) : func(func) {}
-      const std::string& func;
-      Expr rewrite(const Expr& e) override { return e; }
-      Stmt rewrite(const Stmt& s) override {
-        const bool is_step = s.kind() == Kind::LetStmt || s.kind() == Kind::Evaluate;
-        if (is_step && is_semaphore_step(s, func)) {
-          const LetStmt* let = s.as<LetStmt>();
-          if (!let || let->body.kind() == Kind::Assert) return make_evaluate(0);
-        }
-        return children(s);
-      }
-    };
-    return Remover(func)(s);
   }
 
   // The body of the innermost loop around the producer, with its waits.
@@ -332,66 +490,47 @@ class AsyncForker : public Rewriter {
                 "Store the Func inside of that loop");
   }
 
-  // Loops and lets that both branches have get new names in the producer's.
-  std::string own_name(const std::string& name, Type type) {
-    const std::string fresh = fresh_(name);
-    own_names_[name] = variable(fresh, type);
-    return fresh;
-  }
-  Stmt with_own_names(const Stmt& producer) {
-    const Substitution names = std::exchange(own_names_, {});
-    return substitute(producer, names);
-  }
-
-  // Just the work of the producer, and the control around it. Undefined where there is none.
-  Stmt only_producer(const Stmt& s, const std::string& func, bool loops, int room = 0) {
-    if (!s.defined() || !produces(s, func)) return {};
-    if (is_producer_of(s, func)) return s;
+  // Just the work of the producer and of what it needs, and the control around. Undefined where
+  // there is none.
+  Stmt only_producer(const Stmt& s, const std::string& func, const Names& made, bool loops,
+                     int room = 0) {
+    if (!s.defined() || !produces_any(s, made)) return {};
+    if (const ProducerConsumer* n = as_producer(s); n && made.count(n->name)) return s;
+    const auto part = [&](const Stmt& child) {
+      return only_producer(child, func, made, loops, room);
+    };
     return match(
         s,
         [&](const For& n) {
-          check_serial(n, func);
-          Stmt body = only_producer(n.body, func, loops, room);
+          const bool is_shared = produces(n.body, func);
+          if (is_shared) check_serial(n, func);
+          Stmt body = part(n.body);
           if (loops && is_innermost_around(n, func)) body = shake_hands(body, func, true, room);
-          return make_for(own_name(n.name, n.min.type()), n.min, n.extent, n.for_type, body,
-                          n.partition);
+          return make_for(n.name, n.min, n.extent, n.for_type, body, n.partition);
         },
-        [&](const LetStmt& n) {
-          return make_let(own_name(n.name, n.value.type()), n.value,
-                          only_producer(n.body, func, loops, room));
-        },
+        [&](const LetStmt& n) { return make_let(n.name, n.value, part(n.body)); },
         [&](const IfThenElse& n) {
-          Stmt then_case = only_producer(n.then_case, func, loops, room);
-          Stmt else_case = only_producer(n.else_case, func, loops, room);
+          Stmt then_case = part(n.then_case), else_case = part(n.else_case);
           if (!then_case.defined()) return make_if(!n.condition, else_case);
           return make_if(n.condition, then_case, else_case);
         },
         [&](const Block& n) {
           std::vector<Stmt> stmts;
-          for (const Stmt& part : n.stmts) {
-            if (is_wait(part)) {
-              stmts.push_back(part);
-            } else {
-              stmts.push_back(only_producer(part, func, loops, room));
-            }
-          }
+          for (const Stmt& child : n.stmts) stmts.push_back(is_wait(child) ? child : part(child));
           return make_block(std::move(stmts));
         },
-        [&](const ProducerConsumer& n) { return only_producer(n.body, func, loops, room); },
+        [&](const ProducerConsumer& n) { return part(n.body); },
         [&](const Realize& n) {
-          Stmt body = only_producer(n.body, func, loops, room);
-          if (!uses_func(body, n.name)) return body;
+          Stmt body = part(n.body);
+          if (!needs(body, n.name)) return body;
           return make_realize(n.name, n.types, n.memory, n.bounds, body);
         },
         [&](const StmtNode&) { return s; });
   }
 
   bool is_wait(const Stmt& s) const {
-    for (const std::string& func : forked_) {
-      if ((s.kind() == Kind::LetStmt || s.kind() == Kind::Evaluate) && is_semaphore_step(s, func))
-        return true;
-    }
-    return false;
+    return std::any_of(forked_.begin(), forked_.end(),
+                       [&](const std::string& func) { return is_step(s, func); });
   }
 
   // Everything but the work of the producer.
@@ -428,7 +567,7 @@ class AsyncForker : public Rewriter {
         },
         [&](const Realize& n) {
           Stmt body = without_producer(n.body, func, loops, room);
-          if (!body.defined() || !uses_func(body, n.name)) return body;
+          if (!needs(body, n.name)) return body;
           return make_realize(n.name, n.types, n.memory, n.bounds, body);
         },
         [&](const StmtNode&) { return s; });
@@ -437,12 +576,18 @@ class AsyncForker : public Rewriter {
 
 }  // namespace
 
-Stmt fork_async(const Stmt& s, const Program& program, const RenamedFuncs& renamed,
+Stmt fork_async(const Stmt& s, const Program& program, RenamedFuncs& renamed,
                 const AsyncRoom& room) {
-  for (const LoopedFunc& f : program.funcs) {
-    if (f.schedule.async) return AsyncForker(s, program, renamed, room)(s);
+  const bool any = std::any_of(program.funcs.begin(), program.funcs.end(),
+                               [](const LoopedFunc& f) { return f.schedule.async; });
+  if (!any) return s;
+  // Both branches have the loops around them, and may compute the same Func.
+  UniqueNames unique = make_names_unique(AsyncForker(s, program, renamed, room)(s));
+  for (const auto& [name, copied] : unique.original) {
+    const auto it = renamed.find(copied);
+    renamed[name] = it == renamed.end() ? copied : it->second;
   }
-  return s;
+  return unique.stmt;
 }
 
 }  // namespace retrograde::ir

@@ -13,7 +13,8 @@ namespace retrograde::ir {
 // async Funcs that are stored outside of where they are computed.
 using AsyncRoom = std::map<std::string, int>;
 
-Stmt fork_async(const Stmt& s, const Program& program, const RenamedFuncs& renamed,
+// Funcs that both branches compute get new names, which are added to `renamed`.
+Stmt fork_async(const Stmt& s, const Program& program, RenamedFuncs& renamed,
                 const AsyncRoom& room);
 
 }  // namespace retrograde::ir

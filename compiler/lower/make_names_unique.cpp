@@ -25,7 +25,9 @@ class UseRenamer : public Rewriter {
   using Rewriter::rewrite;
   Expr rewrite(const Expr& e) override {
     if (const Variable* v = e.as<Variable>()) {
-      return renamings_.count(v->name) ? variable(renamings_.at(v->name), v->type, v->symbol) : e;
+      if (renamings_.count(v->name)) return variable(renamings_.at(v->name), v->type, v->symbol);
+      const std::string fact = renamed_fact(v->name);
+      return fact.empty() ? e : variable(fact, v->type, v->symbol);
     }
     Expr result = children(e);
     const Call* call = result.as<Call>();
@@ -35,6 +37,17 @@ class UseRenamer : public Rewriter {
   }
 
  private:
+  // "f.stride.1" of a Func that is "f.$1" here.
+  std::string renamed_fact(const std::string& name) const {
+    for (const char* fact : {".stride.", ".min.", ".extent."}) {
+      const size_t at = name.rfind(fact);
+      if (at == std::string::npos) continue;
+      const auto it = renamings_.find(name.substr(0, at));
+      if (it != renamings_.end()) return it->second + name.substr(at);
+    }
+    return {};
+  }
+
   const Renamings& renamings_;
 };
 

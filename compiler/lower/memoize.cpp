@@ -1,18 +1,17 @@
 // memoize -- look the results of memoized Funcs up before they are computed.
-// In:  Loops (keys), then FlatStorage with the same names (lookups).
-// Out: the same phases.
+// In:  Loops; names unique.
+// Out: Loops.
 //
-//   allocate f[n] {                   allocate f[n] {
+//   realize f [min, extent] {         realize f [min, extent] {
 //     produce f { P }                   let key = pack("pipeline", "f", target, k, min, extent ...)
-//     consume f { C }           =>      let missing = lookup(key, &f[0], 4 n)
-//   }                                   if (missing) { produce f { P }  store(key, &f[0], 4 n) }
+//     consume f { C }           =>      let missing = lookup(key, &f(min), 4 extent)
+//   }                                   if (missing) { produce f { P }  store(key, ...) }
 //                                       consume f { C }
 //                                     }
 //
 // Method: the key names the compiled function, the Func, and holds the values of the Params that it
 //         depends on (found through all Funcs that it calls), what memoize_tag puts in place of an
-//         expression, and the region that is computed. The region stands in the Realize, the memory
-//         in the Allocate: hence two passes.
+//         expression, and the region that is computed. What is kept is the whole storage.
 // Errors: a memoized Func that reads an ImageParam without memoize_tag; one that is stored outside
 //         of where it is computed; a tag or eviction key that depends on Vars.
 // Source: Halide's documentation of memoize and memoize_tag. Tests: test/unit/memoize_test.cpp.
@@ -36,7 +35,7 @@ const LoopedFunc* find_func(const Program& program, const RenamedFuncs& renamed,
 
 bool is_memoized(const LoopedFunc* f) { return f && f->schedule.memoized; }
 
-std::string key_name(const std::string& func) { return func + ".memoization_key"; }
+constexpr const char* computed_extent_mark = ".computed.extent.";
 
 // ---- what a key is made of ----
 
@@ -128,13 +127,6 @@ std::vector<Expr> bytes_of(const std::string& text) {
 }
 
 void check_schedule(const LoopedFunc& f) {
-  for (const StorageRule& rule : f.schedule.storage_rules) {
-    if (!rule.alignment.defined() && !rule.bound.defined()) continue;
-    unsupported("memoize " + quoted(f.name()),
-                "the storage of a memoized Func has the extents that are computed",
-                "align_storage or bound_storage of " + quoted(rule.var) + " makes it larger",
-                "Leave out that directive, or memoize");
-  }
   const LoopLevel &compute = f.schedule.compute_level, &store = f.schedule.store_level;
   const bool together =
       store.kind == LoopLevel::Kind::Inlined ||
@@ -150,11 +142,27 @@ void check_schedule(const LoopedFunc& f) {
              "Leave store_at and store_root out");
 }
 
-class KeyInserter : public Rewriter {
+// The region that storage is larger than, if it is: see `NestStorage::realize`.
+class ComputedExtents {
  public:
-  KeyInserter(const Program& program, const RenamedFuncs& renamed, const std::string& function,
-              const Target& target)
-      : program_(program), renamed_(renamed), function_(function), target_(target) {}
+  void note(const std::string& let) {
+    const size_t at = let.find(computed_extent_mark);
+    if (at != std::string::npos) lets_[let.substr(0, let.find(".$", at))] = let;
+  }
+  Expr of(const LoopedFunc& f, size_t dimension, const Expr& stored) const {
+    const auto it = lets_.find(computed_extent_name(f.name(), dimension));
+    return it == lets_.end() ? stored : variable(it->second);
+  }
+
+ private:
+  std::map<std::string, std::string> lets_;  // the innermost, by name before renaming
+};
+
+class Memoizer : public Rewriter {
+ public:
+  Memoizer(const Program& program, const RenamedFuncs& renamed, const std::string& function,
+           const Target& target, const StorageFolds& folds)
+      : program_(program), renamed_(renamed), function_(function), target_(target), folds_(folds) {}
 
  protected:
   Expr rewrite(const Expr& e) override {
@@ -164,81 +172,61 @@ class KeyInserter : public Rewriter {
 
   Stmt rewrite(const Stmt& s) override {
     if (const Realize* n = s.as<Realize>()) bounds_[n->name] = n->bounds;
+    if (const LetStmt* n = s.as<LetStmt>()) computed_.note(n->name);
     const ProducerConsumer* n = s.as<ProducerConsumer>();
-    if (!n || !n->is_producer) return children(s);
-    const LoopedFunc* f = find_func(program_, renamed_, n->name);
+    const LoopedFunc* f = n && n->is_producer ? find_func(program_, renamed_, n->name) : nullptr;
     if (!is_memoized(f)) return children(s);
     check_schedule(*f);
-    return make_let(key_name(n->name), call_op(Op::pack, Handle(), key_of(*f, n->name)),
-                    children(s));
+    return lookup(*f, n->name, children(s));
   }
 
  private:
-  std::vector<Expr> key_of(const LoopedFunc& f, const std::string& name) {
+  std::vector<Expr> key_of(const LoopedFunc& f, const std::vector<Range>& bounds) {
     std::vector<Expr> key = bytes_of(function_ + "\n" + f.name() + "\n" + target_.to_string());
     for (const Expr& part : Dependencies(f).parts) key.push_back(part);
-    const auto bounds = bounds_.find(name);
-    RETROGRADE_ASSERT(bounds != bounds_.end(), "no storage of ", name);
-    for (const Range& range : bounds->second) {
-      key.push_back((*this)(range.min));
-      key.push_back((*this)(range.extent));
+    for (size_t d = 0; d < bounds.size(); d++) {
+      key.push_back((*this)(bounds[d].min));
+      key.push_back((*this)(computed_.of(f, d, bounds[d].extent)));
     }
     return key;
   }
 
-  const Program& program_;
-  const RenamedFuncs& renamed_;
-  const std::string& function_;
-  const Target& target_;
-  std::map<std::string, std::vector<Range>> bounds_;
-};
-
-// ---- lookups ----
-
-class LookupInserter : public Rewriter {
- public:
-  LookupInserter(const Program& program, const RenamedFuncs& renamed)
-      : program_(program), renamed_(renamed) {}
-
- protected:
-  Expr rewrite(const Expr& e) override { return e; }
-
-  Stmt rewrite(const Stmt& s) override {
-    if (const Allocate* n = s.as<Allocate>()) allocated_[n->name] = {n->type, n->elements};
-    if (const LetStmt* n = s.as<LetStmt>()) {
-      const ProducerConsumer* producer = n->body.as<ProducerConsumer>();
-      if (producer && n->name == key_name(producer->name)) return lookup(*n, *producer);
-    }
-    return children(s);
+  // Where storage wraps around, its first element is that of 0.
+  Expr fold_of(const LoopedFunc& f, size_t dimension) const {
+    const auto it = folds_.find(f.name());
+    return it == folds_.end() || it->second.size() <= dimension ? Expr() : it->second[dimension];
   }
 
- private:
-  struct Memory {
-    Type type;
-    Expr elements;
-  };
-
-  Stmt lookup(const LetStmt& let, const ProducerConsumer& producer) {
-    const LoopedFunc& f = *find_func(program_, renamed_, producer.name);
-    std::vector<Expr> blocks, sizes;
-    const size_t count = f.func->types.size();
-    for (size_t i = 0; i < count; i++) {
-      const std::string name = count == 1 ? producer.name : producer.name + "." + std::to_string(i);
-      const Memory& memory = allocated_.at(name);
-      blocks.push_back(call_op(Op::address_of, Handle(), {make_load(memory.type, name, Expr(0))}));
-      sizes.push_back(binary(Kind::Mul, memory.elements, make_const(Int(64), memory.type.bytes())));
+  Stmt lookup(const LoopedFunc& f, const std::string& name, const Stmt& produce) {
+    const auto found = bounds_.find(name);
+    RETROGRADE_ASSERT(found != bounds_.end(), "no storage of ", name);
+    const std::vector<Range>& bounds = found->second;
+    std::vector<Expr> first;
+    Expr elements = make_const(Int(64), 1);
+    for (size_t d = 0; d < bounds.size(); d++) {
+      const Expr fold = fold_of(f, d);
+      first.push_back(fold.defined() ? Expr(0) : bounds[d].min);
+      const Expr extent = fold.defined() ? fold : max(bounds[d].extent, Expr(0));
+      elements = elements * cast(Int(64), extent);
     }
-    const std::string name = producer.name + ".memoization";
-    const Expr places = variable(name + "_blocks", Handle()),
-               bytes = variable(name + "_bytes", Handle());
-    const std::vector<Expr> what = {variable(let.name, Handle()), Expr(key_bytes(let.value)),
-                                    Expr(static_cast<int32_t>(count)), places, bytes};
-    const Expr missing = variable(name + "_missing");
-    Stmt body = make_if(missing != 0, make_block({(*this)(let.body), store(f, what)}));
-    body = make_let(name + "_missing", call("retrograde_memoization_lookup", what), body);
-    body = make_let(name + "_bytes", call_op(Op::pack, Handle(), sizes), body);
-    body = make_let(name + "_blocks", call_op(Op::pack, Handle(), blocks), body);
-    return make_let(let.name, let.value, body);
+    std::vector<Expr> blocks, sizes;
+    for (size_t i = 0; i < f.func->types.size(); i++) {
+      const Type type = f.func->types[i];
+      blocks.push_back(call_op(Op::address_of, Handle(),
+                               {call_func(name, type, first, static_cast<int>(i), {})}));
+      sizes.push_back(elements * make_const(Int(64), type.bytes()));
+    }
+    const Expr key = call_op(Op::pack, Handle(), key_of(f, bounds));
+    const std::string prefix = name + ".memoization";
+    const std::vector<Expr> what = {variable(prefix + "_key", Handle()), Expr(key_bytes(key)),
+                                    Expr(static_cast<int32_t>(blocks.size())),
+                                    variable(prefix + "_blocks", Handle()),
+                                    variable(prefix + "_bytes", Handle())};
+    Stmt body = make_if(variable(prefix + "_missing") != 0, make_block({produce, store(f, what)}));
+    body = make_let(prefix + "_missing", call("retrograde_memoization_lookup", what), body);
+    body = make_let(prefix + "_bytes", call_op(Op::pack, Handle(), sizes), body);
+    body = make_let(prefix + "_blocks", call_op(Op::pack, Handle(), blocks), body);
+    return make_let(prefix + "_key", key, body);
   }
 
   static Stmt store(const LoopedFunc& f, std::vector<Expr> what) {
@@ -268,7 +256,11 @@ class LookupInserter : public Rewriter {
 
   const Program& program_;
   const RenamedFuncs& renamed_;
-  std::map<std::string, Memory> allocated_;
+  const std::string& function_;
+  const Target& target_;
+  const StorageFolds& folds_;
+  std::map<std::string, std::vector<Range>> bounds_;
+  ComputedExtents computed_;
 };
 
 bool any_memoized(const Program& program) {
@@ -280,13 +272,13 @@ bool any_memoized(const Program& program) {
 
 }  // namespace
 
-Stmt add_memoization_keys(const Stmt& s, const Program& program, const RenamedFuncs& renamed,
-                          const std::string& function, const Target& target) {
-  return any_memoized(program) ? KeyInserter(program, renamed, function, target)(s) : s;
+std::string computed_extent_name(const std::string& func, size_t dimension) {
+  return func + computed_extent_mark + std::to_string(dimension);
 }
 
-Stmt add_memoization_lookups(const Stmt& s, const Program& program, const RenamedFuncs& renamed) {
-  return any_memoized(program) ? LookupInserter(program, renamed)(s) : s;
+Stmt memoize(const Stmt& s, const Program& program, const RenamedFuncs& renamed,
+             const std::string& function, const Target& target, const StorageFolds& folds) {
+  return any_memoized(program) ? Memoizer(program, renamed, function, target, folds)(s) : s;
 }
 
 }  // namespace retrograde::ir

@@ -12,10 +12,15 @@ namespace retrograde::ir {
 // Original names of Funcs that have others in the statement.
 using RenamedFuncs = std::map<std::string, std::string>;
 
-// Loops to Loops: names the key of each memoized Func. `function`: what is compiled.
-Stmt add_memoization_keys(const Stmt& s, const Program& program, const RenamedFuncs& renamed,
-                          const std::string& function, const Target& target);
-// FlatStorage to FlatStorage, directly after flattening: turns the keys into lookups.
-Stmt add_memoization_lookups(const Stmt& s, const Program& program, const RenamedFuncs& renamed);
+// By original name: what each dimension of its storage folds by, undefined where it does not.
+using StorageFolds = std::map<std::string, std::vector<Expr>>;
+
+// The let around the storage of a memoized Func that holds how much of it is computed, where
+// bound_storage or align_storage make it larger.
+std::string computed_extent_name(const std::string& func, size_t dimension);
+
+// `function`: what is compiled.
+Stmt memoize(const Stmt& s, const Program& program, const RenamedFuncs& renamed,
+             const std::string& function, const Target& target, const StorageFolds& folds);
 
 }  // namespace retrograde::ir

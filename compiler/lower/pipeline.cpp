@@ -107,17 +107,13 @@ constexpr Pass passes[] = {
      [](Lowering& lowering, const Stmt& s) {
        return fork_async(s, lowering.program, lowering.renamed_funcs, lowering.async_room);
      }},
-    {"add_memoization_keys", Phase::Loops,
+    {"memoize", Phase::Loops,
      [](Lowering& lowering, const Stmt& s) {
-       return add_memoization_keys(s, lowering.program, lowering.renamed_funcs, lowering.name,
-                                   lowering.options.target);
+       return memoize(s, lowering.program, lowering.renamed_funcs, lowering.name,
+                      lowering.options.target, lowering.folds);
      }},
     {"flatten_storage", Phase::FlatStorage,
      [](Lowering& lowering, const Stmt& s) { return flatten_storage(s, storage_layouts(lowering)); }},
-    {"add_memoization_lookups", Phase::FlatStorage,
-     [](Lowering& lowering, const Stmt& s) {
-       return add_memoization_lookups(s, lowering.program, lowering.renamed_funcs);
-     }},
     {"simplify_storage", Phase::FlatStorage, run_simplify},
     {"lower_atomics", Phase::FlatStorage, [](Lowering&, const Stmt& s) { return lower_atomics(s); }},
     {"partition_loops", Phase::FlatStorage,

@@ -8,33 +8,13 @@ namespace retrograde::ir {
 
 namespace {
 
-// ---- directives that are not carried out yet ----
-
-struct Directive {
-  const char* name;
-  bool (*given)(const LoopedFunc&);
-};
-
-constexpr Directive not_yet[] = {
-    {"hoist_storage together with async or memoize",
-     [](const LoopedFunc& f) {
-       return is_hoisted(f) && (f.schedule.async || f.schedule.memoized);
-     }},
-};
-
 bool is_memory_of_device(MemoryType memory) {
   return memory == MemoryType::GPUShared || memory == MemoryType::GPUTexture ||
          memory == MemoryType::LockedCache || memory == MemoryType::VTCM ||
          memory == MemoryType::AMXTile;
 }
 
-void refuse_directives(const LoopedFunc& f) {
-  for (const Directive& directive : not_yet) {
-    if (!directive.given(f)) continue;
-    unsupported(text("compile ", quoted(f.name()), " with ", directive.name),
-                "every directive of its schedule is carried out",
-                text(directive.name, " is not carried out yet"), "Leave it out");
-  }
+void refuse_memory_of_devices(const LoopedFunc& f) {
   if (is_memory_of_device(f.schedule.memory)) {
     unsupported(text("store ", quoted(f.name()), " in memory of a device"),
                 "storage lies in memory that the CPU has",
@@ -76,7 +56,7 @@ void refuse_unsupported(const Program& program) {
     check_level_is_set(f, f.schedule.hoist_from, "hoist the storage of");
     for (size_t s = 0; s < f.stages.size(); s++)
       check_loops(f, static_cast<int>(s), f.stages[s].schedule);
-    refuse_directives(f);
+    refuse_memory_of_devices(f);
   }
 }
 

@@ -186,6 +186,155 @@ TEST_P(Async, AnAsyncFuncThatReadsAnotherOfTheSameLoopsInOrder) {
   }
 }
 
+// ---- what both branches read ----
+
+// out(x, y) = g(x, y) + g(x, y + 1) + f(x, y) over f(x, y) = x + y, g(x, y) = 2 f(x, y) + 1.
+int shared_value(int x, int y) { return 5 * (x + y) + 4; }
+
+struct SharedInput {
+  Var x{"x"}, y{"y"};
+  Func f{"f"}, g{"g"}, out{"out"};
+  SharedInput() {
+    f(x, y) = x + y;
+    g(x, y) = 2 * f(x, y) + 1;
+    out(x, y) = g(x, y) + g(x, y + 1) + f(x, y);
+    g.store_root().compute_at(out, y).async();
+  }
+  void expect() {
+    for (int height : {1, 2, 33}) {
+      Buffer<int> result = out.realize({17, height});
+      for (int j = 0; j < height; j++) {
+        for (int i = 0; i < 17; i++) ASSERT_EQ(result(i, j), shared_value(i, j)) << i << " " << j;
+      }
+    }
+  }
+};
+
+TEST_P(Async, AFuncComputedInTheSharedLoopsIsComputedInBothBranches) {
+  SharedInput program;
+  program.f.compute_at(program.out, program.y);
+  limit(program.out);
+  program.expect();
+}
+
+TEST_P(Async, AFuncStoredBesideTheAsyncOneHasStorageInBothBranches) {
+  SharedInput program;
+  program.f.store_root().compute_at(program.out, program.y);
+  limit(program.out);
+  program.expect();
+}
+
+TEST_P(Async, AFuncComputedInTheSharedLoopsMayBeHoistedOutOfThem) {
+  SharedInput program;
+  program.f.compute_at(program.out, program.y).hoist_storage_root();
+  limit(program.out);
+  program.expect();
+}
+
+TEST_P(Async, AFuncComputedInTheSharedLoopsMayBeMemoizedOrAsyncItself) {
+  SharedInput memoized, parallel;
+  memoized.f.compute_at(memoized.out, memoized.y).memoize();
+  parallel.f.compute_at(parallel.out, parallel.y).async();
+  for (SharedInput* program : {&memoized, &parallel}) {
+    limit(program->out);
+    program->expect();
+  }
+}
+
+TEST_P(Async, TwoBranchesReadAThirdAsyncFunc) {
+  SharedInput program;
+  program.f.store_root().compute_at(program.out, program.y).async();
+  limit(program.out);
+  for (int round = 0; round < 5; round++) program.expect();
+}
+
+TEST_P(Async, ThreeBranchesReadAFoldedAsyncFunc) {
+  Var x("x"), y("y");
+  Func f("f"), g("g"), h("h"), out("out");
+  f(x, y) = x + y;
+  g(x, y) = f(x, y) * 2;
+  h(x, y) = f(x, y) * 3 + g(x, y);
+  out(x, y) = f(x, y) + g(x, y + 1) + h(x, y);
+  for (Func* func : {&f, &g, &h}) func->store_root().compute_at(out, y).async();
+  for (Func* func : {&f, &g}) func->fold_storage(y, 4);
+  limit(out);
+  for (int round = 0; round < 5; round++) {
+    Buffer<int> result = out.realize({19, 60});
+    for (int j = 0; j < 60; j++) {
+      for (int i = 0; i < 19; i++) ASSERT_EQ(result(i, j), 8 * (i + j) + 2) << i << " " << j;
+    }
+  }
+}
+
+// f is made once, before the loops in which g runs ahead of its consumer.
+TEST_P(Async, BranchesInLoopsReadAnAsyncFuncThatIsComputedBeforeThem) {
+  SharedInput program;
+  program.f.compute_root().async();
+  limit(program.out);
+  for (int round = 0; round < 20; round++) program.expect();
+}
+
+TEST_P(Async, AMemoizedAsyncFuncWaitsForWhatItReads) {
+  for (int round = 0; round < 20; round++) {
+    Var x("x");
+    Func f("f"), g("g"), out("out");
+    f(x) = x * 2;
+    g(x) = f(x) + 1;
+    out(x) = g(x) + f(x);
+    f.compute_root().async();
+    g.compute_root().async().memoize();
+    limit(out);
+    for (const int min : {0, 7}) {
+      Buffer<int> result(std::vector<int>{1000});
+      result.set_min({min});
+      out.realize(result);
+      for (int i = min; i < min + 1000; i++) ASSERT_EQ(result(i), 4 * i + 1);
+    }
+  }
+}
+
+TEST_P(Async, StorageMayBeHoisted) {
+  for (const bool slides : {false, true}) {
+    Var x("x"), y("y"), yo("yo"), yi("yi");
+    Func f("f"), out("out");
+    f(x, y) = x + 2 * y;
+    out(x, y) = f(x, y) + f(x, y + 1);
+    out.split(y, yo, yi, 4);
+    if (slides) {
+      f.store_at(out, yo).compute_at(out, yi);
+    } else {
+      f.compute_at(out, yo);
+    }
+    f.hoist_storage_root().async();
+    limit(out);
+    Buffer<int> result = out.realize({13, 23});
+    for (int j = 0; j < 23; j++) {
+      for (int i = 0; i < 13; i++) ASSERT_EQ(result(i, j), 2 * i + 4 * j + 2) << i << " " << j;
+    }
+  }
+}
+
+// f keeps its rows over the loop over tiles, g only inside of a tile: there is one storage of f.
+TEST(AsyncErrors, AFuncThatBothBranchesReadAndThatIsStoredFurtherOut) {
+  Var x("x"), y("y"), yo("yo"), yi("yi");
+  Func f("f"), g("g"), out("out");
+  f(x, y) = x + y;
+  g(x, y) = f(x, y) * 2;
+  out(x, y) = f(x, y) + g(x, y) + g(x, y + 1);
+  out.split(y, yo, yi, 4);
+  f.store_root().compute_at(out, yi);
+  g.store_at(out, yo).compute_at(out, yi).async();
+  try {
+    out.realize({8, 16});
+    FAIL() << "nothing was thrown";
+  } catch (const UserError& error) {
+    const std::string message = error.what();
+    EXPECT_NE(message.find("compute \"g\" async"), std::string::npos) << message;
+    EXPECT_NE(message.find("\"f\" is computed in these loops and stored around"), std::string::npos)
+        << message;
+  }
+}
+
 // ---- failures ----
 
 // The first reader is not computed when its result is in the cache; the second one waits all the

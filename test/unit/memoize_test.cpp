@@ -241,26 +241,82 @@ TEST_F(Memoize, AnOutputCannotBeMemoized) {
   EXPECT_NE(error_of(f).find("an output is computed by every call"), std::string::npos);
 }
 
-// Its entry would be found again for a larger region that needs the same storage.
-TEST(MemoizeErrors, StorageLargerThanWhatIsComputed) {
-  for (const bool aligned : {true, false}) {
+// The entry must not be found again for another region that needs the same storage.
+TEST_F(Memoize, StorageLargerThanWhatIsComputed) {
+  for (const int how : {0, 1, 2}) {
     Var x("x");
     Func f("f"), g("g");
-    f(x) = x * 2;
+    f(x) = counted(x * 2);
+    const int before = calls;
     g(x) = f(x) + 1;
     f.compute_root().memoize();
-    if (aligned) {
-      f.align_storage(x, 16);
-    } else {
-      f.bound_storage(x, 64);
+    if (how == 0) f.align_storage(x, 16);
+    if (how == 1) f.bound_storage(x, 64);
+    if (how == 2) f.align_storage(x, 16).bound_storage(x, 61);
+    for (const int width : {10, 13, 10, 9}) {
+      Buffer<int> result = g.realize({width});
+      for (int i = 0; i < width; i++) ASSERT_EQ(result(i), 2 * i + 1) << how << " " << i;
     }
-    try {
-      g.realize({10});
-      FAIL() << "nothing was thrown";
-    } catch (const Unsupported& error) {
-      EXPECT_NE(std::string(error.what()).find("makes it larger"), std::string::npos);
+    EXPECT_EQ(calls - before, 10 + 13 + 9) << how;
+  }
+}
+
+TEST_F(Memoize, BoundsThatAreAligned) {
+  for (const bool extent_only : {false, true}) {
+    Var x("x");
+    Func f("f"), g("g");
+    f(x) = counted(x * 2);
+    g(x) = f(x) + 1;
+    f.compute_root().memoize();
+    extent_only ? f.align_extent(x, 8) : f.align_bounds(x, 8, 3);
+    const int before = calls;
+    for (const int width : {9, 11, 17, 11}) {
+      Buffer<int> result = g.realize({width});
+      for (int i = 0; i < width; i++) ASSERT_EQ(result(i), 2 * i + 1) << extent_only << " " << i;
+    }
+    // 9 and 11 elements lie in one aligned region.
+    EXPECT_EQ(calls - before, 16 + 24) << extent_only;
+  }
+}
+
+TEST_F(Memoize, StorageThatIsHoisted) {
+  for (const bool rules : {false, true}) {
+    Var x("x"), y("y"), xo("xo"), yo("yo"), xi("xi"), yi("yi");
+    Func f("f"), g("g");
+    f(x, y) = Tuple(counted(x * 3 + y), cast<float>(x));
+    g(x, y) = f(x - 1, y)[0] + cast<int>(f(x, y + 1)[1]);
+    g.tile(x, y, xo, yo, xi, yi, 8, 4);
+    f.compute_at(g, xo).hoist_storage_root().memoize();
+    if (rules) f.align_storage(x, 16).bound_storage(y, 7);
+    const int before = calls;
+    int after_first = 0;
+    for (int round = 0; round < 2; round++) {
+      Buffer<int> result = g.realize({21, 18});
+      for (int j = 0; j < 18; j++) {
+        for (int i = 0; i < 21; i++) ASSERT_EQ(result(i, j), (i - 1) * 3 + j + i) << i << " " << j;
+      }
+      if (round == 0) after_first = calls;
+    }
+    EXPECT_GT(after_first, before);
+    EXPECT_EQ(calls, after_first);
+  }
+}
+
+TEST_F(Memoize, StorageThatWrapsAround) {
+  Var x("x");
+  Func f("f"), g("g");
+  f(x) = counted(x * 2);
+  g(x) = f(x) + f(x + 1);
+  f.compute_root().memoize().fold_storage(x, 32);
+  for (int round = 0; round < 2; round++) {
+    for (const int min : {0, 13, 40}) {
+      Buffer<int> result(std::vector<int>{20});
+      result.set_min({min});
+      g.realize(result);
+      for (int i = min; i < min + 20; i++) ASSERT_EQ(result(i), 4 * i + 2);
     }
   }
+  EXPECT_EQ(calls, 3 * 21);
 }
 
 }  // namespace
