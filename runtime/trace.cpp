@@ -1,16 +1,19 @@
 // Events of traced pipelines: to the context's handler, or, as text, to where print() goes; with
 // HL_TRACE_FILE in the environment, as packets to that file.
+#include "trace.h"
+
 #include <HalideRuntime.h>
+#include <fcntl.h>
+#include <unistd.h>
 
 #include <atomic>
+#include <cerrno>
 #include <charconv>
-#include <cstdio>
 #include <cstdlib>
 #include <cstring>
 #include <mutex>
 #include <new>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "report.h"
@@ -19,6 +22,7 @@ namespace retrograde::runtime {
 namespace {
 
 std::atomic<int32_t> next_id{1};
+constexpr int no_file = -2;
 
 // ---- text ----
 
@@ -135,77 +139,104 @@ std::string text_of(const halide_trace_event_t& e) {
 
 // ---- packets ----
 
-class TraceFile {
- public:
-  TraceFile() {
-    if (const char* path = std::getenv("HL_TRACE_FILE"); path && *path) {
-      is_wanted_ = true;
-      file_ = std::fopen(path, "ab");
-    }
-  }
-  bool is_wanted() const { return is_wanted_; }
-  // False when the file cannot be written.
-  bool write(const halide_trace_event_t& e, int32_t id) {
-    const size_t value_bytes =
-        e.value ? static_cast<size_t>(e.type.lanes) * static_cast<size_t>(e.type.bytes()) : 0;
-    const size_t coordinate_bytes = sizeof(int32_t) * static_cast<size_t>(e.dimensions);
-    const char* tag = e.trace_tag ? e.trace_tag : "";
-    const size_t func_bytes = std::strlen(e.func) + 1, tag_bytes = std::strlen(tag) + 1;
-    const size_t used =
-        sizeof(halide_trace_packet_t) + coordinate_bytes + value_bytes + func_bytes + tag_bytes;
-    std::vector<char> packet((used + 3) / 4 * 4);
-    halide_trace_packet_t header = {};
-    header.size = static_cast<uint32_t>(packet.size());
-    header.id = id;
-    header.type = e.value ? e.type : halide_type_t(halide_type_int, 0, 0);
-    header.event = e.event;
-    header.parent_id = e.parent_id;
-    header.value_index = e.value_index;
-    header.dimensions = e.dimensions;
-    char* to = packet.data();
-    const auto put = [&](const void* from, size_t bytes) {
-      if (bytes > 0) std::memcpy(to, from, bytes);
-      to += bytes;
-    };
-    put(&header, sizeof header);
-    put(e.coordinates, coordinate_bytes);
-    put(e.value, value_bytes);
-    put(e.func, func_bytes);
-    put(tag, tag_bytes);
-    const std::lock_guard lock(mutex_);
-    bool written = file_ && std::fwrite(packet.data(), packet.size(), 1, file_) == 1;
-    if (written && e.event == halide_trace_end_pipeline) written = std::fflush(file_) == 0;
-    return written || std::exchange(has_complained_, true);
-  }
-
- private:
-  bool is_wanted_ = false, has_complained_ = false;
-  std::FILE* file_ = nullptr;
-  std::mutex mutex_;
-};
-
-TraceFile& trace_file() {
-  static TraceFile& file = *new TraceFile;  // open to the end of the process
-  return file;
+std::vector<char> packet_of(const halide_trace_event_t& e, int32_t id) {
+  const size_t value_bytes =
+      e.value ? static_cast<size_t>(e.type.lanes) * static_cast<size_t>(e.type.bytes()) : 0;
+  const size_t coordinate_bytes = sizeof(int32_t) * static_cast<size_t>(e.dimensions);
+  const char* tag = e.trace_tag ? e.trace_tag : "";
+  const size_t func_bytes = std::strlen(e.func) + 1, tag_bytes = std::strlen(tag) + 1;
+  const size_t used =
+      sizeof(halide_trace_packet_t) + coordinate_bytes + value_bytes + func_bytes + tag_bytes;
+  std::vector<char> packet((used + 3) / 4 * 4);
+  halide_trace_packet_t header = {};
+  header.size = static_cast<uint32_t>(packet.size());
+  header.id = id;
+  header.type = e.value ? e.type : halide_type_t(halide_type_int, 0, 0);
+  header.event = e.event;
+  header.parent_id = e.parent_id;
+  header.value_index = e.value_index;
+  header.dimensions = e.dimensions;
+  char* to = packet.data();
+  const auto put = [&](const void* from, size_t bytes) {
+    if (bytes > 0) std::memcpy(to, from, bytes);
+    to += bytes;
+  };
+  put(&header, sizeof header);
+  put(e.coordinates, coordinate_bytes);
+  put(e.value, value_bytes);
+  put(e.func, func_bytes);
+  put(tag, tag_bytes);
+  return packet;
 }
+
+// Whole packets, one after the other, whichever threads they come from.
+bool write_packet(int file, const std::vector<char>& packet) {
+  static std::mutex mutex;
+  const std::lock_guard lock(mutex);
+  size_t done = 0;
+  while (done < packet.size()) {
+    const ssize_t written = write(file, packet.data() + done, packet.size() - done);
+    if (written < 0 && errno == EINTR) continue;
+    if (written <= 0) return false;
+    done += static_cast<size_t>(written);
+  }
+  return true;
+}
+
+std::atomic<bool> has_complained{false};
 
 void print(retrograde_context* context, const char* text) {
   if (context && context->print_handler) context->print_handler(context, text);
 }
 
+// What is to be written to: -1 before HL_TRACE_FILE was looked at. Guarded by `file_mutex`.
+int chosen_file = -1;
+bool is_own_file = false;
+std::mutex file_mutex;
+
+// A file that cannot be opened is one that cannot be written: the first event says so.
+int open_from_environment() {
+  const char* path = std::getenv("HL_TRACE_FILE");
+  if (!path || !*path) return 0;
+  is_own_file = true;
+  const int file = open(path, O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0666);
+  return file < 0 ? no_file : file;
+}
+
 }  // namespace
+
+int trace_file() {
+  const std::lock_guard lock(file_mutex);
+  if (chosen_file == -1) chosen_file = open_from_environment();
+  return chosen_file;
+}
+
+bool set_trace_file(int file) {
+  const std::lock_guard lock(file_mutex);
+  const bool closes = is_own_file && chosen_file > 0;
+  const bool closed = !closes || close(chosen_file) == 0;
+  chosen_file = file;
+  is_own_file = false;
+  has_complained = false;
+  return closed;
+}
+
 }  // namespace retrograde::runtime
 
 namespace rt = retrograde::runtime;
 
 int32_t retrograde_default_trace(retrograde_context* context, const halide_trace_event_t* event) {
+  return rt::trace_to(rt::trace_file(), context, event);
+}
+
+int32_t rt::trace_to(int file, retrograde_context* context, const halide_trace_event_t* event) {
   const int32_t id = rt::next_id.fetch_add(1, std::memory_order_relaxed);
   try {
-    if (!rt::trace_file().is_wanted()) {
+    if (file == 0) {
       rt::print(context, rt::text_of(*event).c_str());
-    } else if (!rt::trace_file().write(*event, id)) {
-      rt::print(context,
-                "cannot write the trace: HL_TRACE_FILE names no file that can be written\n");
+    } else if (!rt::write_packet(file, rt::packet_of(*event, id)) &&
+               !rt::has_complained.exchange(true)) {
+      rt::print(context, "cannot write the trace: its file cannot be written\n");
     }
   } catch (const std::bad_alloc&) {  // then this event goes untold
   }

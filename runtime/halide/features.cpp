@@ -1,8 +1,9 @@
-// Traces, the cache of memoized Funcs and the profiler by their names in HalideRuntime.h.
+// Traces and the profiler by their names in HalideRuntime.h.
 #include <cstdint>
 
 #include "halide/weak.h"
 #include "retrograde_runtime.h"
+#include "trace.h"
 
 namespace {
 
@@ -19,7 +20,7 @@ halide_trace_t custom_trace = nullptr;
 RETROGRADE_WEAK int32_t halide_default_trace(void* user_context,
                                              const halide_trace_event_t* event) {
   retrograde_context context = context_of(user_context);
-  return retrograde_default_trace(&context, event);
+  return retrograde::runtime::trace_to(halide_get_trace_file(user_context), &context, event);
 }
 
 RETROGRADE_WEAK int32_t halide_trace(void* user_context, const halide_trace_event_t* event) {
@@ -32,16 +33,13 @@ RETROGRADE_WEAK halide_trace_t halide_set_custom_trace(halide_trace_t trace) {
   return before ? before : halide_default_trace;
 }
 
-// Every packet is written when it happens: there is nothing to shut down.
-RETROGRADE_WEAK int halide_shutdown_trace() { return 0; }
-
-RETROGRADE_WEAK void halide_memoization_cache_set_size(int64_t size) {
-  retrograde_memoization_set_size(size);
+// 0 stands for text, whatever HL_TRACE_FILE says.
+RETROGRADE_WEAK void halide_set_trace_file(int file) { retrograde::runtime::set_trace_file(file); }
+RETROGRADE_WEAK int halide_get_trace_file(void*) { return retrograde::runtime::trace_file(); }
+// Every packet is written when it happens. Events that come later are printed.
+RETROGRADE_WEAK int halide_shutdown_trace() {
+  return retrograde::runtime::set_trace_file(0) ? 0 : halide_error_code_generic_error;
 }
-RETROGRADE_WEAK void halide_memoization_cache_evict(void*, uint64_t eviction_key) {
-  retrograde_memoization_evict(eviction_key);
-}
-RETROGRADE_WEAK void halide_memoization_cache_cleanup() { retrograde_memoization_cleanup(); }
 
 RETROGRADE_WEAK halide_profiler_pipeline_stats* halide_profiler_get_pipeline_state(
     const char* pipeline_name) {

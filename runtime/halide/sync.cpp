@@ -2,6 +2,7 @@
 #include <atomic>
 #include <new>
 
+#include "halide/parallel_tasks.h"
 #include "halide/weak.h"
 
 namespace {
@@ -15,6 +16,11 @@ Word word(halide_cond* cond) { return Word(cond->_private[0]); }
 std::atomic_ref<uint64_t> word(halide_semaphore_t* semaphore) {
   return std::atomic_ref<uint64_t>(semaphore->_private[0]);
 }
+
+std::atomic<halide_semaphore_init_t> init_handler{halide_default_semaphore_init};
+std::atomic<halide_semaphore_try_acquire_t> try_acquire_handler{
+    halide_default_semaphore_try_acquire};
+std::atomic<halide_semaphore_release_t> release_handler{halide_default_semaphore_release};
 
 }  // namespace
 
@@ -77,7 +83,9 @@ RETROGRADE_WEAK int halide_default_semaphore_init(halide_semaphore_t* semaphore,
   return count;
 }
 RETROGRADE_WEAK int halide_default_semaphore_release(halide_semaphore_t* semaphore, int count) {
-  return static_cast<int>(word(semaphore).fetch_add(static_cast<uint64_t>(count))) + count;
+  const int before = static_cast<int>(word(semaphore).fetch_add(static_cast<uint64_t>(count)));
+  retrograde::runtime::note_semaphore_release();
+  return before + count;
 }
 RETROGRADE_WEAK bool halide_default_semaphore_try_acquire(halide_semaphore_t* semaphore,
                                                           int count) {
@@ -88,11 +96,21 @@ RETROGRADE_WEAK bool halide_default_semaphore_try_acquire(halide_semaphore_t* se
   return true;
 }
 RETROGRADE_WEAK int halide_semaphore_init(halide_semaphore_t* semaphore, int count) {
-  return halide_default_semaphore_init(semaphore, count);
+  return init_handler.load()(semaphore, count);
 }
 RETROGRADE_WEAK int halide_semaphore_release(halide_semaphore_t* semaphore, int count) {
-  return halide_default_semaphore_release(semaphore, count);
+  const int now = release_handler.load()(semaphore, count);
+  retrograde::runtime::note_semaphore_release();
+  return now;
 }
 RETROGRADE_WEAK bool halide_semaphore_try_acquire(halide_semaphore_t* semaphore, int count) {
-  return halide_default_semaphore_try_acquire(semaphore, count);
+  return try_acquire_handler.load()(semaphore, count);
+}
+
+void retrograde::runtime::set_semaphore_handlers(halide_semaphore_init_t init,
+                                                 halide_semaphore_try_acquire_t try_acquire,
+                                                 halide_semaphore_release_t release) {
+  init_handler = init ? init : halide_default_semaphore_init;
+  try_acquire_handler = try_acquire ? try_acquire : halide_default_semaphore_try_acquire;
+  release_handler = release ? release : halide_default_semaphore_release;
 }
