@@ -87,6 +87,11 @@ Func Derivative::adjoint(const Func& func) const {
   return (*this)(func, func.num_update_definitions() - 1);
 }
 
+Func Derivative::of(const AdjointInput& input) const {
+  if (auto f = std::dynamic_pointer_cast<ir::FuncContents>(input.symbol())) return adjoint(Func(f));
+  return of_parameter(dynamic_cast<const ir::ParameterContents&>(*input.symbol()));
+}
+
 Func Derivative::of_parameter(const ir::ParameterContents& parameter) const {
   auto it = result_->parameters.find(&parameter);
   return it == result_->parameters.end() ? Func(std::make_shared<ir::FuncContents>())

@@ -28,6 +28,8 @@ namespace ir {
 struct SynthesisResult;
 }
 
+class AdjointInput;
+
 class Derivative {
  public:
   explicit Derivative(std::shared_ptr<const ir::SynthesisResult> result);
@@ -45,6 +47,8 @@ class Derivative {
   }
   // The adjoint of `func` as its consumers see it: after its last definition.
   Func adjoint(const Func& func) const;
+  // The same for an input of any kind.
+  Func of(const AdjointInput& input) const;
 
   // Everything that was made, producers before consumers: adjoints, private parts, helpers.
   std::vector<Func> funcs() const;
@@ -66,6 +70,7 @@ enum class Overwritten {
 // Something to differentiate by.
 class AdjointInput {
  public:
+  explicit AdjointInput(std::shared_ptr<ir::Symbol> symbol) : symbol_(std::move(symbol)) {}
   AdjointInput(const Func& f) : symbol_(f.function()) {}
   AdjointInput(const ImageParam& image) : symbol_(image.parameter()) {}
   template <typename T>

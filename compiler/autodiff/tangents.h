@@ -34,11 +34,11 @@ struct Direction {
   Direction(AdjointInput input, const Buffer<T, Dims>& tangent)
       : Direction(std::move(input), as_func(Buffer<>(tangent))) {}
 
+  // The Func that reads a buffer.
+  static Func as_func(const Buffer<>& buffer);
+
   AdjointInput input;
   Func tangent;
-
- private:
-  static Func as_func(const Buffer<>& buffer);
 };
 
 class Tangents {

@@ -2,7 +2,9 @@
 #pragma once
 
 #include "autodiff/derivative.h"
+#include "autodiff/second_order.h"
 #include "autodiff/tangents.h"
+#include "checks/check_gradients.h"
 #include "diagnostics/error.h"
 #include "frontend/boundary_conditions.h"
 #include "frontend/buffer.h"

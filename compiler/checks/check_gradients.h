@@ -1,0 +1,60 @@
+// check_gradients.h -- does the derivative agree with differences of the pipeline?
+//
+// Func loss; ...; photo.set(buffer);                 // every input bound
+// GradientReport report = check_gradients(loss);
+// EXPECT_LT(report.worst_error, 1e-7); std::ofstream("report.json") << report.to_json();
+//
+// The output (over `sizes`, from 0) is summed with random weights w. In double, for random
+// directions v of each floating input: the adjoint <v, J^T w>, the tangent <J v, w>, and central
+// differences over steps of many sizes with Richardson extrapolation. The step is chosen by the
+// differences alone: where two neighbouring extrapolations agree best. The adjoint as it will run,
+// in its own precision, is compared with the one in double, Func by Func.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "frontend/func.h"
+
+namespace retrograde {
+
+struct GradientCheckOptions {
+  int directions = 3;      // of each input
+  unsigned seed = 1;       // of directions and weights
+  int smallest_step = 24;  // steps are 2^-4 ... 2^-smallest_step of the input's size
+};
+
+struct GradientReport {
+  struct Step {
+    double step;                             // relative to the input's size
+    double central_error, richardson_error;  // relative, against the adjoint in double
+    double seconds;                          // of the two runs of the primal
+  };
+  struct Input {
+    std::string name;
+    double adjoint_error = 0;        // adjoint in double against the chosen differences, worst
+    double dot_product_error = 0;    // adjoint against tangent, both in double, worst
+    double own_precision_error = 0;  // adjoint in its own precision against double, worst
+    std::vector<Step> steps;         // along the first direction
+  };
+  struct FuncError {
+    std::string name;
+    double error;  // of its adjoint in its own precision, relative to its largest element
+    double lost;   // error over that of the worst adjoint that it is computed from
+  };
+
+  std::vector<Input> inputs;
+  std::vector<FuncError> funcs;  // from the output back to the inputs
+  std::string loses_digits;      // the Func whose adjoint adds most to the error; empty: none does
+  double worst_error = 0;        // of adjoint_error and dot_product_error
+  double primal_seconds = 0, adjoint_seconds = 0;  // in their own precision, without compiling
+
+  std::string to_json() const;
+};
+
+// `sizes`: of the output; none for a scalar. RuntimeError: an input is not bound. CompileError and
+// Unsupported as propagate_adjoints; Unsupported, too, for what has no meaning in double (extern).
+GradientReport check_gradients(const Func& output, const std::vector<int>& sizes = {},
+                               const GradientCheckOptions& options = {});
+
+}  // namespace retrograde

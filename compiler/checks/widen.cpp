@@ -1,0 +1,144 @@
+#include "checks/widen.h"
+
+#include "autodiff/accumulation.h"
+#include "autodiff/default_schedule.h"
+#include "autodiff/local_derivative.h"
+#include "diagnostics/error.h"
+#include "frontend/define.h"
+#include "frontend/image_param.h"
+#include "frontend/param.h"
+#include "ir/build.h"
+
+namespace retrograde::ir {
+
+namespace {
+
+Type wide(Type t) { return t.is_float() ? Float(64, t.lanes()) : t; }
+
+Op exact(Op op) {
+  switch (op) {
+    case Op::fast_exp:
+      return Op::exp;
+    case Op::fast_log:
+      return Op::log;
+    case Op::fast_pow:
+      return Op::pow;
+    case Op::fast_sin:
+      return Op::sin;
+    case Op::fast_cos:
+      return Op::cos;
+    default:
+      return op;
+  }
+}
+
+class Widening {
+ public:
+  explicit Widening(const std::vector<FuncPtr>& outputs) {
+    for (const auto& p : parameters_of(outputs)) {
+      if (p->type.is_float()) result_.parameters[p.get()] = wide_parameter(*p);
+    }
+    for (const FuncPtr& f : topological_order(outputs)) add(f);
+  }
+  Widened take() { return std::move(result_); }
+
+ private:
+  static std::shared_ptr<ParameterContents> wide_parameter(const ParameterContents& p) {
+    const std::string name = claim_name(p.name + "_double");
+    return p.is_buffer ? ImageParam(Float(64), p.dimensions, name).parameter()
+                       : Param<double>(name).parameter();
+  }
+
+  [[noreturn]] static void refuse(const std::string& what) {
+    unsupported("evaluate the pipeline in double", "every operation needs a meaning in double",
+                "it contains " + what, "Check the part of the pipeline around it");
+  }
+
+  void add(const FuncPtr& f) {
+    if (f->is_extern())
+      refuse(text("the C function ", quoted(f->extern_definition->function), " behind ",
+                  quoted(f->name)));
+    auto to = std::make_shared<AdjointContents>();  // for its default schedule
+    to->name = claim_name(f->name + "_double");
+    result_.funcs[f.get()] = to;
+    std::vector<Expr> args;
+    for (const std::string& arg : f->args) args.push_back(variable(arg));
+    for (int s = 0; s < f->stage_count(); ++s) {
+      Definition d = map_exprs(f->stage(s), [&](const Expr& e) { return widened(e); });
+      if (s == 0) {
+        define_pure(to, args, d.values);
+      } else {
+        append_update(to, d.args, d.values, d.rvars, d.predicate);
+      }
+    }
+  }
+
+  Expr widened(const Expr& root) {
+    return rewrite(without_lets(root),
+                   [&](const Expr& e, const auto& recurse) { return node(e, recurse); });
+  }
+
+  using Recurse = std::function<Expr(const Expr&)>;
+
+  Expr node(const Expr& e, const Recurse& recurse) {
+    return match(
+        e, [&](const FloatImm&) { return make_const(Float(64), *as_const_float(e)); },
+        [&](const Variable& v) { return scalar(e, v); },
+        [&](const Cast& c) { return cast_to(wide(c.type), recurse(c.value)); },
+        [&](const Reinterpret& r) -> Expr {
+          if (r.type.is_float() || r.value.type().is_float()) refuse("the bits of a float");
+          return map_children(e, recurse);
+        },
+        [&](const Binary& b) { return binary(e.kind(), recurse(b.a), recurse(b.b)); },
+        [&](const Select& s) {
+          return make_select(recurse(s.condition), recurse(s.true_value), recurse(s.false_value));
+        },
+        [&](const Call& c) { return call(c, recurse); },
+        [&](const ExprNode&) { return map_children(e, recurse); });
+  }
+
+  Expr scalar(const Expr& e, const Variable& v) {
+    auto found = result_.parameters.find(v.symbol.raw());
+    return found == result_.parameters.end()
+               ? e
+               : variable(found->second->name, Float(64), SymbolRef(found->second));
+  }
+
+  Expr call(const Call& c, const Recurse& recurse) {
+    std::vector<Expr> args;
+    for (const Expr& a : c.args) args.push_back(recurse(a));
+    switch (c.call_type) {
+      case CallType::Operator:
+        return operation(c, args);
+      case CallType::Func: {
+        const FuncPtr& to = result_.funcs.at(c.symbol.raw());
+        return call_func(to->name, wide(c.type), args, c.value_index, SymbolRef(to));
+      }
+      case CallType::Image: {
+        auto found = result_.parameters.find(c.symbol.raw());
+        return found == result_.parameters.end()
+                   ? call_image(c.name, c.type, args, c.symbol)
+                   : call_image(found->second->name, Float(64), args, SymbolRef(found->second));
+      }
+      case CallType::Extern:
+        break;
+    }
+    refuse("a call of the C function " + quoted(c.name));
+  }
+
+  static Expr operation(const Call& c, const std::vector<Expr>& args) {
+    if (c.op == Op::random) return cast_to(wide(c.type), call_op(c.op, c.type, args));
+    if (c.op == Op::fast_inverse) return make_one(args[0].type()) / args[0];
+    if (c.op == Op::fast_inverse_sqrt)
+      return make_one(args[0].type()) / call_op(Op::sqrt, args[0].type(), args);
+    return call_op(exact(c.op), wide(c.type), args);
+  }
+
+  Widened result_;
+};
+
+}  // namespace
+
+Widened widen(const std::vector<FuncPtr>& outputs) { return Widening(outputs).take(); }
+
+}  // namespace retrograde::ir
