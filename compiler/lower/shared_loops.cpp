@@ -125,9 +125,10 @@ void join(Emitted& code, SharedLoops around, Emitted other, const std::vector<Lo
 
 namespace {
 
-// A strand's boxes in terms of the shared loops: its loop variables stay inside of their ranges.
+// A strand's loop variables in terms of the shared loops: as they are where its stage runs, and
+// kept inside of their ranges.
 struct InLoops {
-  Substitution values;
+  Substitution values, inside;
   std::vector<Expr> conditions;
 };
 
@@ -143,40 +144,54 @@ InLoops in_loops(const Strand& strand, SharedLoops around, size_t inner) {
     Expr value = strand.at[d];
     const Interval own = strand.loops[d].range();
     const Interval all{substitute(value, first), substitute(value, last)};
+    result.values[strand.loops[d].name] = value;
     add_conditions(around.home, value, own, all, result.conditions);
     if (!is_known(around.home, own.max >= all.max)) value = min(value, own.max);
     if (!is_known(around.home, own.min <= all.min)) value = max(value, own.min);
-    result.values[strand.loops[d].name] = simplify(value);
+    result.inside[strand.loops[d].name] = simplify(value);
   }
   return result;
 }
 
-// The hull of boxes of which only those count whose condition holds; one at least always does.
+// The hull of boxes of which only those count whose condition holds. Where none does, anything will
+// do that lies inside of what is ever needed.
 class ConditionalHull {
  public:
-  void add(const Expr& runs, const Box& box) {
-    if (box_.empty()) {
-      box_ = box;
+  // `inside`: the box, moved to where its stage runs when it does not.
+  void add(const Expr& runs, const Box& box, const Box& inside) {
+    if (hull_.empty()) {
+      hull_ = box;
+      always_ = inside;
       runs_ = runs;
       return;
     }
-    const Box both = hull(box_, box);
-    for (size_t d = 0; d < box_.size(); d++) {
-      box_[d].min = choose(runs, box_[d].min, box[d].min, both[d].min);
-      box_[d].max = choose(runs, box_[d].max, box[d].max, both[d].max);
+    const Box both = hull(hull_, box);
+    for (size_t d = 0; d < hull_.size(); d++) {
+      add_end(runs, box[d].min, both[d].min, hull_[d].min, always_[d].min);
+      add_end(runs, box[d].max, both[d].max, hull_[d].max, always_[d].max);
     }
     runs_ = simplify(runs_ || runs);
   }
-  const Box& box() const { return box_; }
+  const Box& box() const { return always_; }
 
  private:
-  Box box_;
-  Expr runs_;
+  Box hull_;    // where any stage runs
+  Box always_;  // the same, and something where none does
+  Expr runs_;   // whether any does
 
-  Expr choose(const Expr& runs, const Expr& a, const Expr& b, const Expr& both) const {
-    if (!both.defined() || is_zero(simplify(a - b))) return both;
-    Expr here = is_const_true(runs_) ? both : select(runs_, both, b);
-    return simplify(is_const_true(runs) ? here : select(runs, here, a));
+  void add_end(const Expr& runs, const Expr& end, const Expr& both, Expr& hull_end,
+               Expr& always_end) const {
+    if (!both.defined()) {
+      hull_end = always_end = both;
+      return;
+    }
+    const Expr here = choose(runs_, both, end);
+    hull_end = choose(runs, here, hull_end);
+    always_end = choose(runs, here, always_end);
+  }
+  static Expr choose(const Expr& condition, const Expr& a, const Expr& b) {
+    const bool either = is_const_true(condition) || is_zero(simplify(a - b));
+    return either ? a : simplify(select(condition, a, b));
   }
 };
 
@@ -197,8 +212,12 @@ void gather_uses(Emitted& code, SharedLoops around, size_t inner,
     for (const std::string& name : names) {
       const auto use = strand.uses.find(name);
       if (use == strand.uses.end()) continue;
-      hulls[name].add(keeps_moving(name) ? const_true() : runs,
-                      substituted(use->second.box, here.values));
+      const Box inside = substituted(use->second.box, here.inside);
+      if (keeps_moving(name)) {
+        hulls[name].add(const_true(), inside, inside);
+      } else {
+        hulls[name].add(runs, substituted(use->second.box, here.values), inside);
+      }
       found.emplace(name, use->second);
       strand.uses.erase(use);
     }
@@ -206,7 +225,7 @@ void gather_uses(Emitted& code, SharedLoops around, size_t inner,
   range_over_loops(code);
   for (auto& [name, use] : found) {
     if (auto own = code.uses.find(name); own != code.uses.end())
-      hulls[name].add(const_true(), own->second.box);
+      hulls[name].add(const_true(), own->second.box, own->second.box);
     use.box = hulls[name].box();
     code.uses[name] = use;
   }
@@ -222,7 +241,7 @@ void gather_storage(Emitted& code, SharedLoops around, size_t inner,
     std::erase_if(strand.storage, [&](const auto& entry) {
       if (!is_wanted(entry.first)) return false;
       Box& box = code.storage[entry.first];
-      box = hull(box, substituted(entry.second, here.values));
+      box = hull(box, substituted(entry.second, here.inside));
       return true;
     });
   }

@@ -226,6 +226,24 @@ TEST_F(ComputeWith, ProducersInsideServeAllWhoShare) {
   }
 }
 
+TEST_F(ComputeWith, ProducersInsideComputeNoMoreThanRuns) {
+  Func p("p"), f("f"), g("g"), h("h");
+  p(x, y) = x * x + y;
+  f(x, y) = p(x, y) + 1;
+  g(x, y) = p(x, y) * 5;
+  h(x, y) = f(x, y) + g(x, y + 2);
+  f.compute_root();
+  g.compute_root().compute_with(f, y);
+  p.compute_at(f, y);
+  // The row of both stages is one; where only one of them runs, it is not joined to another row.
+  EXPECT_EQ(count(h, "simplify_storage",
+                  [&](const Stmt& s) {
+                    const ir::For* loop = s.as<ir::For>();
+                    return loop && loop->name == p.name() + ".s0.y";
+                  }),
+            0);
+}
+
 TEST_F(ComputeWith, ProducersInsideSlideOverSharedLoops) {
   for (const int apart : {0, 2}) {
     expect_same([&](bool together) {
