@@ -4,7 +4,6 @@
 #include "codegen/function_generator.h"
 #include "diagnostics/error.h"
 #include "ir/build.h"
-#include "ir/narrow_product.h"
 #include "ir/print.h"
 #include "ir/visit.h"
 
@@ -30,6 +29,7 @@ Value* FunctionGenerator::make_value(const Expr& e) {
       [&](const Cast& c) { return convert(e_, c.type, c.value.type(), value(c.value)); },
       [&](const Reinterpret& r) { return reinterpret(e_, r.type, r.value.type(), value(r.value)); },
       [&](const Binary& node) {
+        if (Value* sum = sum_of_products(e)) return sum;
         Value *a = value(node.a), *b = value(node.b);
         return binary(e_, node.kind, node.a.type(), a, b);
       },
@@ -190,16 +190,6 @@ static Kind binary_kind(ReduceOp op) {
       return Kind::Or;
   }
   internal_error("unknown reduction");
-}
-
-// What is to be reduced, some of it done already.
-Value* FunctionGenerator::reduced_in_part(const VectorReduce& e) {
-  const bool has_pairs = e.value.type().lanes() / e.type.lanes() % 2 == 0;
-  if (e.op == ReduceOp::Add && has_pairs && e_.machine.is_x86()) {
-    if (const auto product = as_narrow_product(e.value))
-      return add_products_in_pairs(e_, value(product->a), value(product->b));
-  }
-  return value(e.value);
 }
 
 Value* FunctionGenerator::make(const VectorReduce& e) {

@@ -167,7 +167,6 @@ class FunctionGenerator {
   Value* make(const ir::Ramp& e);
   Value* make(const ir::Shuffle& e);
   Value* make(const ir::VectorReduce& e);
-  Value* reduced_in_part(const ir::VectorReduce& e);
   Value* make(const ir::Select& e);
   Value* make_immediate(const Expr& e);
   Value* make_value(const Expr& e);
@@ -180,6 +179,10 @@ class FunctionGenerator {
   Value* branch_value(const Expr& condition, const Expr& then_value, const Expr& else_value);
   Value* require(const ir::Call& e);
   Value* random(const ir::Call& e);
+
+  // narrow_products.cpp
+  Value* reduced_in_part(const ir::VectorReduce& e);
+  Value* sum_of_products(const Expr& e);
 
   // access.cpp
   std::optional<LinearIndex> as_linear(const Expr& index);

@@ -157,6 +157,20 @@ TEST(CodegenIdioms, ProductsOf16BitsAreAddedInPairs) {
   EXPECT_EQ(count(narrow, "vpmull"), 0u);
 }
 
+// Taps of a filter: one multiplication for two of them.
+TEST(CodegenIdioms, TapsOf16BitsAreAddedInPairs) {
+  ImageParam a(Int(16), 1, "a");
+  Param<int16_t> k("k");
+  Var x("x");
+  Func f("f");
+  const auto at = [&](int i) { return cast<int>(a(x + i)); };
+  f(x) = at(0) * 13 + at(1) * cast<int>(k) + at(2) * 33 + at(3) * 14 + 5;
+  f.vectorize(x, 16);
+  const auto loop = block_with_most(assembly(f, avx512), "vpmaddwd");
+  EXPECT_EQ(count(loop, "vpmaddwd"), 2u);
+  EXPECT_EQ(count(loop, "vpmovsxwd") + count(loop, "vpmull"), 0u);
+}
+
 // The pairs lie side by side in the innermost dimension, the sums in another.
 TEST(CodegenIdioms, PairsBelongToTheSumsOfSeveralLanes) {
   ImageParam a(Int(16), 2, "a"), b(Int(16), 1, "b");

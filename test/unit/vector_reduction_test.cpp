@@ -179,6 +179,33 @@ TEST(VectorReduction, NarrowProducts) {
   }
 }
 
+// Sums of scaled numbers, even and odd many, with terms of other kinds and factors that do not fit.
+TEST(VectorReduction, SumsOfScaledNumbers) {
+  const Buffer<int16_t> a = numbers<int16_t>();
+  const Buffer<uint8_t> b = numbers<uint8_t>();
+  Param<int16_t> k("k");
+  k.set(-321);
+  Var x("x");
+  for (const int lanes : {4, 8, 12, 16, 32}) {
+    const auto v = [&](int i) { return cast<int>(a(x + i, 1)); };
+    const auto u = [&](int i) { return cast<int>(b(x + i, 2)); };
+    const Expr pair = v(0) * 3 + v(1) * -32768;
+    const Expr sums[] = {pair,
+                         pair + v(2) * 7,
+                         (pair + 100) + (u(1) * 255 + v(2) * cast<int>(k)),
+                         v(0) * 40000 + v(1) * 5 + v(2) * 6 + x,
+                         u(0) * v(1) + u(2) * v(3) + v(0) * 9,
+                         (pair + pair) * (pair + u(3) * 2)};
+    for (size_t variant = 0; variant < std::size(sums); variant++) {
+      SCOPED_TRACE(testing::Message() << lanes << " lanes, sum " << variant);
+      Func f("f");
+      f(x) = sums[variant];
+      f.vectorize(x, lanes, TailStrategy::GuardWithIf);
+      expect_interpreted(f, {39});
+    }
+  }
+}
+
 // Factors that are constants, repeated, or one; sums of several lanes.
 TEST(VectorReduction, OtherNarrowFactors) {
   const Buffer<int16_t> a = numbers<int16_t>();
