@@ -2,6 +2,7 @@
 #include "frontend/var.h"
 
 #include <algorithm>
+#include <atomic>
 #include <cctype>
 #include <mutex>
 #include <ostream>
@@ -31,7 +32,12 @@ const std::string& checked_name(const std::string& name) {
 
 }  // namespace
 
-Var::Var() : name_(ir::unique_name("v")), expr_(ir::variable(name_)) {}
+// Counted by themselves: print_loop_nest shows "v$0" as v0, and so on.
+Var::Var() : expr_() {
+  static std::atomic<uint64_t> next{0};
+  name_ = text("v$", next++);
+  expr_ = ir::variable(name_);
+}
 
 Var::Var(const std::string& name) : name_(checked_name(name)), expr_(ir::variable(name_)) {}
 

@@ -1,5 +1,7 @@
 // The loop nest of a pipeline as a user schedules it: one line a loop, producers marked.
+#include <algorithm>
 #include <sstream>
+#include <unordered_map>
 
 #include "diagnostics/error.h"
 #include "diagnostics/large_stack.h"
@@ -9,6 +11,7 @@
 #include "lower/build_loop_nests.h"
 #include "lower/inline_functions.h"
 #include "lower/lower.h"
+#include "simplify/simplify.h"
 
 namespace retrograde::ir {
 namespace {
@@ -27,12 +30,66 @@ const char* keyword(ForType type) {
   internal_error("a loop of no type");
 }
 
-// "f.s0.xo" -> "xo". A Func's own name may contain dots, a variable's may not start a stage.
-std::string user_name(const std::string& loop) {
-  size_t stage = loop.find(".s");
-  size_t dot = stage == std::string::npos ? std::string::npos : loop.find('.', stage + 2);
-  return dot == std::string::npos ? loop : loop.substr(dot + 1);
+// Names as users wrote them, without the numbers that make them unique ("f$1_in_g$2"); but the
+// variables of vectorize(x, 8) and its like have no other name: "v$3" is shown as "v3".
+std::string shown(const std::string& name) {
+  if (name.compare(0, 2, "v$") == 0) return "v" + name.substr(2);
+  std::string result;
+  bool is_number = false;
+  for (const char c : name) {
+    is_number = c == '$' || (is_number && c >= '0' && c <= '9');
+    if (!is_number) result += c;
+  }
+  return result;
 }
+
+// Loops say where they come from: after split(x, xo, xi, 8) they are "x.xo" and "x.xi", after
+// fuse(x, y, t) "x.t". A reduction variable is shown by the name of its domain.
+class LoopNames {
+ public:
+  explicit LoopNames(const Program& program) {
+    for (const LoopedFunc& f : program.funcs) {
+      for (size_t s = 0; s < f.stages.size(); s++)
+        add(stage_prefix(f.name(), static_cast<int>(s)), f.stages[s].schedule);
+    }
+  }
+  std::string operator()(const std::string& loop) const {
+    const auto found = names_.find(loop);
+    return found == names_.end() ? shown(loop) : found->second;
+  }
+
+ private:
+  std::unordered_map<std::string, std::string> names_;
+
+  // Of the general schedule first: specializations add the loops that only they have.
+  void add(const std::string& prefix, const StageSchedule& schedule) {
+    std::unordered_map<std::string, std::string> paths;
+    const auto own = [](const std::string& var) { return shown(var.substr(0, var.find('.'))); };
+    const auto path = [&](const std::string& var) {
+      const auto found = paths.find(var);
+      return found != paths.end() ? found->second : own(var);
+    };
+    for (const Split& split : schedule.splits) {
+      const std::string from = path(split.kind == Split::Kind::Fuse ? split.inner : split.old_var);
+      switch (split.kind) {
+        case Split::Kind::Fuse:
+          paths[split.old_var] = from + "." + own(split.old_var);
+          break;
+        case Split::Kind::Split:
+          paths[split.outer] = from + "." + own(split.outer);
+          paths[split.inner] = from + "." + own(split.inner);
+          break;
+        case Split::Kind::Rename: {
+          // A variable of rfactor's own takes the name of the reduction variable it stands for.
+          const bool is_rvar = split.outer.find('.') != std::string::npos;
+          paths[split.outer] = is_rvar ? own(split.outer) : from + "." + own(split.outer);
+        }
+      }
+    }
+    for (const Dim& dim : schedule.dims) names_.emplace(prefix + dim.var, path(dim.var));
+    for (const StageSchedule& special : schedule.specializations) add(prefix, special);
+  }
+};
 
 bool is_over_parameters(const Expr& condition) {
   bool result = true, any = false;
@@ -48,7 +105,11 @@ bool is_over_parameters(const Expr& condition) {
 
 class LoopNestPrinter {
  public:
-  explicit LoopNestPrinter(const Program& program) : program_(program) {}
+  explicit LoopNestPrinter(const Program& program) : program_(program), names_(program) {}
+  // What a name of the nest stands for.
+  void bind(const std::string& name, const Expr& value) {
+    values_[name] = simplify(substitute(value, values_));
+  }
   std::string print(const Stmt& s) {
     visit(s);
     return out_.str();
@@ -56,6 +117,8 @@ class LoopNestPrinter {
 
  private:
   const Program& program_;
+  const LoopNames names_;
+  Substitution values_;  // of the lets around
   std::ostringstream out_;
   int depth_ = 0;
 
@@ -84,26 +147,53 @@ class LoopNestPrinter {
     line() << "else:\n";
     nested(branch.else_case);
   }
+  // Funcs stored at one level, producers first.
+  void visit_storage(const Stmt& s) {
+    std::vector<std::string> names;
+    Stmt body = s;
+    for (const Realize* r = body.as<Realize>(); r; r = body.as<Realize>()) {
+      if (is_stored_further_out(r->name)) names.push_back(r->name);
+      body = r->body;
+    }
+    std::sort(names.begin(), names.end(), [&](const std::string& a, const std::string& b) {
+      return program_.index_of.at(a) < program_.index_of.at(b);
+    });
+    for (const std::string& name : names) {
+      line() << "store " << shown(name) << ":\n";
+      depth_++;
+    }
+    visit(body);
+    depth_ -= static_cast<int>(names.size());
+  }
+  // A loop of one iteration is none.
+  void visit_loop(const For& loop) {
+    const auto constant = [&](const Expr& e) {
+      return as_const_int(simplify(substitute(e, values_)));
+    };
+    const auto min = constant(loop.min), extent = constant(loop.extent);
+    if (extent && *extent == 1) {
+      bind(loop.name, loop.min);
+      return visit(loop.body);
+    }
+    line() << keyword(loop.for_type) << ' ' << names_(loop.name);
+    if (min && extent) out_ << " in [" << *min << ", " << *min + *extent - 1 << "]";
+    out_ << ":\n";
+    nested(loop.body);
+  }
   void visit(const Stmt& s) {
     match(
         s,
         [&](const ProducerConsumer& p) {
-          line() << (p.is_producer ? "produce " : "consume ") << p.name << ":\n";
+          line() << (p.is_producer ? "produce " : "consume ") << shown(p.name) << ":\n";
           nested(p.body);
         },
-        [&](const For& loop) {
-          line() << keyword(loop.for_type) << ' ' << user_name(loop.name);
-          auto min = as_const_int(loop.min), extent = as_const_int(loop.extent);
-          if (min && extent) out_ << " in [" << *min << ", " << *min + *extent - 1 << "]";
-          out_ << ":\n";
-          nested(loop.body);
+        [&](const For& loop) { visit_loop(loop); },
+        [&](const LetStmt& let) {
+          bind(let.name, let.value);
+          visit(let.body);
         },
-        [&](const Provide& p) { line() << p.name << "(...) = ...\n"; },
-        [&](const Realize& r) {
-          if (!is_stored_further_out(r.name)) return visit(r.body);
-          line() << "store " << r.name << ":\n";
-          nested(r.body);
-        },
+        [&](const Provide& p) { line() << shown(p.name) << "(...) = ...\n"; },
+        [&](const Realize&) { visit_storage(s); },
         [&](const IfThenElse& branch) { visit_branch(branch); },
         [&](const Assert& a) {
           if (is_const_false(a.condition)) line() << "fail\n";
@@ -120,8 +210,11 @@ class LoopNestPrinter {
 std::string loop_nest_text(const std::vector<FuncPtr>& outputs) {
   std::string result;
   run_on_large_stack([&] {
-    Program program = inline_functions(outputs);
-    result = LoopNestPrinter(program).print(build_loop_nests(program, {.slide = false}).body);
+    const Program program = inline_functions(outputs);
+    const LoopNests nests = build_loop_nests(program, {.slide = true});
+    LoopNestPrinter printer(program);
+    for (const auto& [name, value] : nests.bounds) printer.bind(name, value);
+    result = printer.print(nests.body);
   });
   return result;
 }

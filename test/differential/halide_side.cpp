@@ -28,4 +28,12 @@ std::vector<HostBuffer> run_in_halide(const std::string& name, bool scheduled) {
   return in_halide::realize_built(in_halide::find_case(name).build(scheduled));
 }
 
+std::vector<std::string> nest_names() {
+  std::vector<std::string> names;
+  for (const auto& one : in_halide::nest_cases()) names.push_back(one.name);
+  return names;
+}
+
+void print_nest_in_halide(const std::string& name) { in_halide::find_nest(name).print_loop_nest(); }
+
 }  // namespace differential

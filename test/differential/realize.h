@@ -26,3 +26,10 @@ inline std::vector<HostBuffer> realize_built(const Built& built) {
   for (Buffer<>& buffer : buffers) result.push_back(HostBuffer(*buffer.raw_buffer()).copy());
   return result;
 }
+
+inline Func find_nest(const std::string& name) {
+  for (const NestCase& one : nest_cases()) {
+    if (one.name == name) return one.build();
+  }
+  throw std::runtime_error("no loop nest " + name);
+}

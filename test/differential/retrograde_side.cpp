@@ -32,4 +32,8 @@ std::vector<retrograde::oracle::Array> interpret(const std::string& name) {
   return interpreter.realize(funcs, regions);
 }
 
+void print_nest_in_retrograde(const std::string& name) {
+  in_retrograde::find_nest(name).print_loop_nest();
+}
+
 }  // namespace differential

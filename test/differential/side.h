@@ -23,4 +23,10 @@ std::vector<HostBuffer> run_in_retrograde(const std::string& name, bool schedule
 // reassociate allows.
 std::vector<retrograde::oracle::Array> interpret(const std::string& name);
 
+// Names of the schedules whose loops are shown.
+std::vector<std::string> nest_names();
+// print_loop_nest() of one, to the standard error stream.
+void print_nest_in_halide(const std::string& name);
+void print_nest_in_retrograde(const std::string& name);
+
 }  // namespace differential

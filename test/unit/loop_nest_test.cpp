@@ -60,9 +60,8 @@ TEST(LoopNest, computes_inside_a_loop_of_the_consumer) {
             "produce g:\n"
             "  for y:\n"
             "    produce f:\n"
-            "      for y:\n"
-            "        for x:\n"
-            "          f(...) = ...\n"
+            "      for x:\n"
+            "        f(...) = ...\n"
             "    consume f:\n"
             "      for x:\n"
             "        g(...) = ...\n");
@@ -79,9 +78,8 @@ TEST(LoopNest, says_where_a_func_is_stored) {
             "  produce g:\n"
             "    for y:\n"
             "      produce f:\n"
-            "        for y:\n"
-            "          for x:\n"
-            "            f(...) = ...\n"
+            "        for x:\n"
+            "          f(...) = ...\n"
             "      consume f:\n"
             "        for x:\n"
             "          g(...) = ...\n");
@@ -95,8 +93,8 @@ TEST(LoopNest, shows_splits_and_loop_types) {
   EXPECT_EQ(without_numbers(nest_of(f)),
             "produce f:\n"
             "  parallel y:\n"
-            "    for xo:\n"
-            "      vectorized xi in [0, 7]:\n"
+            "    for x.xo:\n"
+            "      vectorized x.xi in [0, 7]:\n"
             "        f(...) = ...\n");
 }
 
@@ -111,11 +109,9 @@ TEST(LoopNest, computes_a_reduction_in_the_innermost_loop_of_its_consumer) {
             "produce g:\n"
             "  for x:\n"
             "    produce f:\n"
-            "      for x:\n"
+            "      f(...) = ...\n"
+            "      for r in [0, 4]:\n"
             "        f(...) = ...\n"
-            "      for x:\n"
-            "        for r.x in [0, 4]:\n"
-            "          f(...) = ...\n"
             "    consume f:\n"
             "      g(...) = ...\n");
 }

@@ -8,5 +8,8 @@
 #include "differential/pipelines/reductions.h"
 #include "differential/pipelines/schedules.h"
 
+// Not realized, only shown.
+#include "differential/pipelines/loop_nests.h"
+
 // Nor this.
 #include "differential/realize.h"
