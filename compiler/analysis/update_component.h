@@ -1,0 +1,57 @@
+// update_component.h -- an update of several values, cut into components whose values depend on
+// each other, each as a function of the old values x and of unknowns g that are free of them.
+//
+//   f(x) = (f(x)[0] + a(x) - b(x), max(f(x)[1], c(x)))   =>   {x0 + g0}, {max(x0, g0)}
+#pragma once
+
+#include <string>
+#include <unordered_map>
+#include <unordered_set>
+#include <utility>
+#include <vector>
+
+#include "ir/expr.h"
+
+namespace retrograde::ir {
+
+bool is_bitwise(const Expr& e);
+
+// Sums and products with what is free of x gathered in one term or factor, and every largest part
+// that is free of x replaced by a variable: x + a - b becomes x + g.
+class Abstraction {
+ public:
+  explicit Abstraction(const std::vector<std::string>& xs) : xs_(xs.begin(), xs.end()) {}
+
+  Expr operator()(const Expr& e);
+
+  std::vector<std::pair<std::string, Expr>> unknowns;  // name -> what it stands for
+
+ private:
+  std::unordered_set<std::string> xs_;
+  std::unordered_map<const ExprNode*, std::pair<Expr, Expr>> done_;
+  std::unordered_map<const ExprNode*, bool> depends_;
+
+  bool depends(const Expr& e);
+  Expr unknown(const Expr& e);
+  Expr abstract(const Expr& e);
+  void collect_terms(const Expr& e, bool negative, Expr& fixed, Expr& varying);
+  Expr sum(const Expr& e);
+  void collect_factors(const Expr& e, Expr& fixed, Expr& varying);
+  Expr product(const Expr& e);
+};
+
+// Sets of values that are connected by "the new i reads the old j".
+std::vector<std::vector<int>> components_of(const std::vector<Expr>& values,
+                                            const std::vector<std::string>& xs);
+
+// One component, with its variables renamed x0.., y0.., g0..
+struct Component {
+  std::vector<Expr> update;  // over xs and gs
+  std::vector<std::string> xs, ys;
+  std::vector<std::pair<std::string, Expr>> gs;
+  bool bitwise = false;
+  size_t size() const { return update.size(); }
+  Type type(size_t i) const { return update[i].type(); }
+};
+
+}  // namespace retrograde::ir
