@@ -20,6 +20,7 @@
 #include "frontend/associative_update.h"
 #include "frontend/define.h"
 #include "frontend/func.h"
+#include "frontend/reduction_leaves.h"
 #include "ir/build.h"
 #include "ir/print.h"
 #include "ir/visit.h"
@@ -30,104 +31,8 @@ namespace {
 
 using ir::Definition;
 using ir::FuncPtr;
-
-// A reduction loop as a variable.
-struct Leaf {
-  std::string loop;  // its name in the schedule
-  std::string name;  // in expressions; fresh
-  Expr min, extent;
-  Expr value() const { return ir::variable(name); }
-};
-
-// The reduction variables of an update after its splits.
-struct Leaves {
-  std::vector<Leaf> all;
-  ir::Substitution values;        // original variable -> over leaves
-  std::vector<Expr> tails;        // that splits do not run over the end
-  std::vector<ir::Split> others;  // splits of pure variables, left as they are
-};
-
-class LeafFinder {
- public:
-  LeafFinder(const Definition& update, const ir::StageSchedule& schedule, std::string asked)
-      : asked_(std::move(asked)) {
-    for (const ir::ReductionVariable& rvar : update.rvars) {
-      leaves_.all.push_back({rvar.var, ir::unique_name("leaf"), rvar.min, rvar.extent});
-      leaves_.values[rvar.var] = leaves_.all.back().value();
-    }
-    for (const ir::Split& split : schedule.splits) apply(split);
-  }
-  Leaves take() { return std::move(leaves_); }
-
- private:
-  const std::string asked_;
-  Leaves leaves_;
-
-  Leaf* find(const std::string& loop) {
-    for (Leaf& leaf : leaves_.all) {
-      if (leaf.loop == loop) return &leaf;
-    }
-    return nullptr;
-  }
-
-  void apply(const ir::Split& split) {
-    if (split.kind == ir::Split::Kind::Fuse) return fuse(split);
-    Leaf* leaf = find(split.old_var);
-    if (!leaf) {
-      leaves_.others.push_back(split);
-    } else if (split.kind == ir::Split::Kind::Rename) {
-      leaf->loop = split.outer;
-    } else {
-      cut(*leaf, split);
-    }
-  }
-
-  // old == min + outer * factor + inner
-  void cut(Leaf& leaf, const ir::Split& split) {
-    const Expr factor = split.factor;
-    Leaf outer{split.outer, ir::unique_name("leaf"), 0, (leaf.extent + factor - 1) / factor};
-    Leaf inner{split.inner, ir::unique_name("leaf"), 0, factor};
-    const Expr offset = outer.value() * factor + inner.value();
-    const auto extent = ir::as_const_int(leaf.extent), step = ir::as_const_int(factor);
-    const bool divides = extent && step && *extent % *step == 0;
-    // Where the outer variable becomes a pure one its schedule may run it past both ends.
-    if (!divides) leaves_.tails.push_back(offset >= 0 && offset < leaf.extent);
-    // The tail's condition holds wherever the variable is used.
-    const Expr inside =
-        divides ? offset
-                : ir::call_op(ir::Op::promise_clamped, Int(32), {offset, 0, leaf.extent - 1});
-    replace(leaf.name, leaf.min + inside);
-    leaf = std::move(inner);
-    leaves_.all.push_back(std::move(outer));
-  }
-
-  void fuse(const ir::Split& split) {
-    const Leaf* inner = find(split.inner);
-    const Leaf* outer = find(split.outer);
-    if (!inner && !outer) return leaves_.others.push_back(split);
-    if (!inner || !outer) {
-      user_error(asked_, "reduction variables are fused with each other only",
-                 text(quoted(split.inner), " and ", quoted(split.outer),
-                      " were fused, and one of them is a pure variable"),
-                 "Call rfactor before that fuse");
-    }
-    Leaf fused{split.old_var, ir::unique_name("leaf"), 0, inner->extent * outer->extent};
-    const std::string inner_loop = inner->loop, outer_loop = outer->loop;
-    const Expr low = inner->min + fused.value() % inner->extent;
-    const Expr high = outer->min + fused.value() / inner->extent;
-    replace(inner->name, low);
-    replace(outer->name, high);
-    std::erase_if(leaves_.all, [&](const Leaf& leaf) {
-      return leaf.loop == inner_loop || leaf.loop == outer_loop;
-    });
-    leaves_.all.push_back(std::move(fused));
-  }
-
-  void replace(const std::string& name, const Expr& value) {
-    for (auto& entry : leaves_.values) entry.second = ir::substitute(entry.second, name, value);
-    for (Expr& tail : leaves_.tails) tail = ir::substitute(tail, name, value);
-  }
-};
+using ir::Leaf;
+using ir::Leaves;
 
 void add_conjuncts(const Expr& e, std::vector<Expr>& conjuncts) {
   if (!e.defined()) return;
@@ -451,7 +356,7 @@ Func Stage::rfactor(const std::vector<std::pair<RVar, Var>>& preserved) {
                proof.why_not_commutative,
                "Factor the outermost reduction loops: reorder is legal only if it commutes");
   }
-  Leaves leaves = LeafFinder(definition(), schedule(), asked).take();
+  Leaves leaves = ir::leaves_of(definition(), schedule(), asked);
   return Func(Factoring(func_, index_, preserved, *proof.op, std::move(leaves)).run());
 }
 
