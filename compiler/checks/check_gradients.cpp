@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <functional>
 #include <limits>
 #include <map>
 #include <nlohmann/json.hpp>
@@ -11,93 +10,21 @@
 
 #include "autodiff/regions.h"
 #include "autodiff/tangents.h"
+#include "checks/arrays.h"
 #include "checks/widen.h"
 #include "diagnostics/error.h"
 #include "ir/build.h"
-#include "simplify/simplify.h"
 
 namespace retrograde {
 
 namespace {
 
-using Values = std::vector<double>;
+using namespace checks;
 using Clock = std::chrono::steady_clock;
 
 double seconds_since(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
 }
-
-double dot(const Values& a, const Values& b) {
-  double sum = 0;
-  for (size_t i = 0; i < a.size(); ++i) sum += a[i] * b[i];
-  return sum;
-}
-// The size that a sum of such products has when their signs are random.
-double typical(const Values& a, const Values& b) {
-  double sum = 0;
-  for (size_t i = 0; i < a.size(); ++i) sum += a[i] * a[i] * b[i] * b[i];
-  return std::sqrt(sum);
-}
-double largest(const Values& a) {
-  double result = 0;
-  for (double v : a) result = std::max(result, std::abs(v));
-  return result;
-}
-// Of two numbers that should be equal. NaN where one of them is.
-double relative_error(double a, double b, double scale) {
-  if (a == b) return 0;
-  scale = std::max({std::abs(a), std::abs(b), scale});
-  return std::abs(a - b) / scale;
-}
-void worsen(double& worst, double error) {
-  if (!(error <= worst)) worst = error;  // not std::max: a NaN must win
-}
-
-// Where an array lies.
-struct Shape {
-  std::vector<int> mins, extents;
-};
-
-Buffer<> new_buffer(Type type, const Shape& shape) {
-  Buffer<> result(type, shape.extents);
-  if (!shape.mins.empty()) result.set_min(shape.mins);
-  return result;
-}
-
-Values values_of(const Buffer<>& buffer) {
-  Values result;
-  if (buffer.type() == Float(64)) {
-    Buffer<double>(buffer).get()->for_each_value([&](double v) { result.push_back(v); });
-  } else if (buffer.type() == Float(32)) {
-    Buffer<float>(buffer).get()->for_each_value([&](float v) { result.push_back(v); });
-  } else {
-    unsupported("check gradients", "inputs and outputs are float32 or float64",
-                "there is one of type " + to_string(buffer.type()));
-  }
-  return result;
-}
-void fill(Buffer<>& buffer, const Values& values) {
-  size_t i = 0;
-  if (buffer.type() == Float(64)) {
-    Buffer<double>(buffer).get()->for_each_value([&](double& v) { v = values[i++]; });
-  } else {
-    Buffer<float>(buffer).get()->for_each_value(
-        [&](float& v) { v = static_cast<float>(values[i++]); });
-  }
-}
-
-// One floating input, as it is bound, and its copy in double.
-struct Input {
-  std::shared_ptr<ir::ParameterContents> own, wide;
-  Shape shape;
-  Values values;
-  Buffer<> buffer;  // behind `wide`; undefined for scalars
-
-  void set(const Values& to) {
-    if (own->is_buffer) return fill(buffer, to);
-    ir::set_scalar(*wide, ir::Scalar::of_float(Float(64), to[0]));
-  }
-};
 
 class Checker {
  public:
@@ -117,7 +44,8 @@ class Checker {
                   "Check a Func that combines them");
     weights_ = own_precision(random_values(count(shape_)));
     for (const auto& p : ir::parameters_of({output.function()})) {
-      if (p->type.is_float()) add_input(p);
+      if (p->type.is_float())
+        inputs_.push_back(bind_wide(p, widened_.parameters.at(p.get()), asked()));
     }
   }
 
@@ -137,11 +65,6 @@ class Checker {
     return "check the gradients of " + retrograde::quoted(output_.name());
   }
 
-  static size_t count(const Shape& shape) {
-    size_t n = 1;
-    for (int e : shape.extents) n *= static_cast<size_t>(e);
-    return n;
-  }
   Values random_values(size_t n) {
     std::normal_distribution<double> normal;
     Values result(n);
@@ -153,28 +76,6 @@ class Checker {
     return values;
   }
 
-  void add_input(const std::shared_ptr<ir::ParameterContents>& p) {
-    Input input{p, widened_.parameters.at(p.get()), {}, {}, {}};
-    if (p->is_buffer ? p->buffer == nullptr : !p->value) {
-      call_error(asked(), "every input must be bound", retrograde::quoted(p->name) + " is not",
-                 "Set it before the check");
-    }
-    if (p->is_buffer) {
-      Buffer<> bound(*p->buffer);
-      for (int d = 0; d < p->dimensions; ++d) {
-        input.shape.mins.push_back(bound.dim(d).min());
-        input.shape.extents.push_back(bound.dim(d).extent());
-      }
-      input.values = values_of(bound);
-      input.buffer = new_buffer(Float(64), input.shape);
-      ImageParam(input.wide).set(input.buffer);
-    } else {
-      input.values = {p->value->as_double()};
-    }
-    input.set(input.values);
-    inputs_.push_back(std::move(input));
-  }
-
   Func seed(Type type) {
     Buffer<> buffer = new_buffer(type, shape_);
     fill(buffer, weights_);
@@ -184,12 +85,6 @@ class Checker {
     Region region;
     for (int e : shape_.extents) region.push_back({0, e});
     return region;
-  }
-
-  static Values realize(Func f, const Shape& shape) {
-    Buffer<> out = new_buffer(f.types()[0], shape);
-    f.realize(Realization(std::vector<Buffer<>>{out}));
-    return values_of(out);
   }
 
   void differentiate() {
@@ -214,11 +109,11 @@ class Checker {
     auto at = [&](double step) {
       Values moved = input.values;
       for (size_t i = 0; i < moved.size(); ++i) moved[i] += step * v[i];
-      input.set(moved);
+      input.set_wide(moved);
       return weighted_output();
     };
     double slope = (at(h) - at(-h)) / (2 * h);
-    input.set(input.values);
+    input.set_wide(input.values);
     return {slope, seconds_since(start)};
   }
 
@@ -270,21 +165,6 @@ class Checker {
   }
 
   // ---- where the digits go ----
-
-  static std::optional<Shape> constant_shape(const ir::Box& box) {
-    Shape shape;
-    double elements = 1;
-    for (const ir::Interval& i : box) {
-      if (!i.is_bounded()) return std::nullopt;
-      auto min = ir::as_const_int(ir::simplify(i.min)), max = ir::as_const_int(ir::simplify(i.max));
-      if (!min || !max || *max < *min) return std::nullopt;
-      shape.mins.push_back(static_cast<int>(*min));
-      shape.extents.push_back(static_cast<int>(*max - *min + 1));
-      elements *= shape.extents.back();
-    }
-    if (elements > 1e7) return std::nullopt;
-    return shape;
-  }
 
   void compare_funcs() {
     auto order = ir::topological_order({output_.function()});

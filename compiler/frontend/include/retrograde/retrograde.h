@@ -5,6 +5,7 @@
 #include "autodiff/second_order.h"
 #include "autodiff/tangents.h"
 #include "checks/check_gradients.h"
+#include "checks/check_stability.h"
 #include "diagnostics/error.h"
 #include "frontend/boundary_conditions.h"
 #include "frontend/buffer.h"

@@ -1,0 +1,135 @@
+#include "checks/arrays.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "diagnostics/error.h"
+#include "frontend/image_param.h"
+#include "frontend/param.h"
+#include "ir/build.h"
+#include "simplify/simplify.h"
+
+namespace retrograde::checks {
+
+double dot(const Values& a, const Values& b) {
+  double sum = 0;
+  for (size_t i = 0; i < a.size(); ++i) sum += a[i] * b[i];
+  return sum;
+}
+
+double typical(const Values& a, const Values& b) {
+  double sum = 0;
+  for (size_t i = 0; i < a.size(); ++i) sum += a[i] * a[i] * b[i] * b[i];
+  return std::sqrt(sum);
+}
+
+double largest(const Values& a) {
+  double result = 0;
+  for (double v : a) {
+    if (std::isfinite(v)) result = std::max(result, std::abs(v));
+  }
+  return result;
+}
+
+double relative_error(double a, double b, double scale) {
+  if (a == b) return 0;
+  scale = std::max({std::abs(a), std::abs(b), scale});
+  return std::abs(a - b) / scale;
+}
+
+void worsen(double& worst, double error) {
+  if (!std::isnan(worst) && !(error <= worst)) worst = error;
+}
+
+size_t count(const Shape& shape) {
+  size_t n = 1;
+  for (int e : shape.extents) n *= static_cast<size_t>(e);
+  return n;
+}
+
+std::optional<Shape> constant_shape(const ir::Box& box) {
+  constexpr double most_elements = 1e7;
+  Shape shape;
+  double elements = 1;
+  for (const ir::Interval& i : box) {
+    if (!i.is_bounded()) return std::nullopt;
+    auto min = ir::as_const_int(ir::simplify(i.min)), max = ir::as_const_int(ir::simplify(i.max));
+    if (!min || !max || *max < *min) return std::nullopt;
+    shape.mins.push_back(static_cast<int>(*min));
+    shape.extents.push_back(static_cast<int>(*max - *min + 1));
+    elements *= shape.extents.back();
+  }
+  if (elements > most_elements) return std::nullopt;
+  return shape;
+}
+
+Buffer<> new_buffer(Type type, const Shape& shape) {
+  Buffer<> result(type, shape.extents);
+  if (!shape.mins.empty()) result.set_min(shape.mins);
+  return result;
+}
+
+Values values_of(const Buffer<>& buffer) {
+  Values result;
+  if (buffer.type() == Float(64)) {
+    Buffer<double>(buffer).get()->for_each_value([&](double v) { result.push_back(v); });
+  } else if (buffer.type() == Float(32)) {
+    Buffer<float>(buffer).get()->for_each_value([&](float v) { result.push_back(v); });
+  } else {
+    unsupported("check a pipeline", "its inputs and outputs are float32 or float64",
+                "there is one of type " + to_string(buffer.type()));
+  }
+  return result;
+}
+
+void fill(Buffer<>& buffer, const Values& values) {
+  size_t i = 0;
+  if (buffer.type() == Float(64)) {
+    Buffer<double>(buffer).get()->for_each_value([&](double& v) { v = values[i++]; });
+  } else {
+    Buffer<float>(buffer).get()->for_each_value(
+        [&](float& v) { v = static_cast<float>(values[i++]); });
+  }
+}
+
+Values realize(Func f, const Shape& shape) {
+  Buffer<> out = new_buffer(f.types()[0], shape);
+  f.realize(Realization(std::vector<Buffer<>>{out}));
+  return values_of(out);
+}
+
+void Input::set_wide(const Values& to) {
+  if (own->is_buffer) return fill(buffer, to);
+  ir::set_scalar(*wide, ir::Scalar::of_float(Float(64), to[0]));
+}
+
+void Input::set_own(const Values& to) {
+  if (!own->is_buffer) return ir::set_scalar(*own, ir::Scalar::of_float(own->type, to[0]));
+  Buffer<> bound(*own->buffer);
+  fill(bound, to);
+}
+
+Input bind_wide(const std::shared_ptr<ir::ParameterContents>& own,
+                const std::shared_ptr<ir::ParameterContents>& wide, const std::string& asked) {
+  Input input{own, wide, {}, {}, {}};
+  if (own->is_buffer ? own->buffer == nullptr : !own->value) {
+    call_error(asked, "every input must be bound", retrograde::quoted(own->name) + " is not",
+               "Set it before the check");
+  }
+  if (own->is_buffer) {
+    Buffer<> bound(*own->buffer);
+    for (int d = 0; d < own->dimensions; ++d) {
+      input.shape.mins.push_back(bound.dim(d).min());
+      input.shape.extents.push_back(bound.dim(d).extent());
+    }
+    input.values = values_of(bound);
+    input.buffer = new_buffer(Float(64), input.shape);
+    ImageParam(wide).set(input.buffer);
+  } else {
+    input.values = {own->value->as_double()};
+  }
+  input.set_wide(input.values);
+  return input;
+}
+
+}  // namespace retrograde::checks

@@ -1,0 +1,56 @@
+// What the checks share: arrays of values, their errors, and inputs in two precisions.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "analysis/interval.h"
+#include "frontend/buffer.h"
+#include "frontend/func.h"
+
+namespace retrograde::checks {
+
+using Values = std::vector<double>;
+
+double dot(const Values& a, const Values& b);
+// The size that dot(a, b) has when the signs of its terms are random.
+double typical(const Values& a, const Values& b);
+// The largest magnitude among the finite ones.
+double largest(const Values& a);
+// Of two numbers that should be equal, relative to the larger of them and `scale`. NaN where one
+// is.
+double relative_error(double a, double b, double scale);
+// worst = max(worst, error), but a NaN wins.
+void worsen(double& worst, double error);
+
+// Where an array lies.
+struct Shape {
+  std::vector<int> mins, extents;
+};
+size_t count(const Shape& shape);
+// Nothing when the box is not of constants, or too large to look at.
+std::optional<Shape> constant_shape(const ir::Box& box);
+
+Buffer<> new_buffer(Type type, const Shape& shape);
+// Unsupported unless float32 or float64.
+Values values_of(const Buffer<>& buffer);
+void fill(Buffer<>& buffer, const Values& values);
+Values realize(Func f, const Shape& shape);
+
+// One floating input, as it is bound, and its copy in double.
+struct Input {
+  std::shared_ptr<ir::ParameterContents> own, wide;
+  Shape shape;
+  Values values;    // as bound when the check began
+  Buffer<> buffer;  // behind `wide`; undefined for scalars
+
+  void set_wide(const Values& to);
+  void set_own(const Values& to);  // rounds; of a buffer: in the memory that the user bound
+};
+// RuntimeError, that one cannot do what is `asked`, when it is not bound.
+Input bind_wide(const std::shared_ptr<ir::ParameterContents>& own,
+                const std::shared_ptr<ir::ParameterContents>& wide, const std::string& asked);
+
+}  // namespace retrograde::checks
