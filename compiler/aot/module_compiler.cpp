@@ -9,6 +9,7 @@
 #include "aot/header.h"
 #include "aot/html.h"
 #include "aot/mangle.h"
+#include "aot/merge_objects.h"
 #include "aot/program.h"
 #include "aot/runtime_object.h"
 #include "codegen/machine.h"
@@ -120,7 +121,7 @@ class Outputs {
   std::string contents(OutputFileType type) const {
     switch (type) {
       case OutputFileType::object:
-        return object();
+        return object_with_runtime();
       case OutputFileType::static_library:
         return library();
       case OutputFileType::assembly:
@@ -146,9 +147,15 @@ class Outputs {
   const Module module_;
   std::map<Format, std::string> code_;
 
+  bool has_runtime() const { return !module_.target().has_feature(Target::NoRuntime); }
+  // Where this build has no runtime for the target, an object leaves it to its user.
+  std::string object_with_runtime() const {
+    if (!has_runtime() || !aot::has_runtime_object(module_.target())) return object();
+    return aot::merge_objects(object(), aot::runtime_object(module_.target()));
+  }
   std::string library() const {
     std::vector<aot::Member> members = {{aot::name_parts(module_.name()).back() + ".o", object()}};
-    if (!module_.target().has_feature(Target::NoRuntime))
+    if (has_runtime())
       members.push_back({"retrograde_runtime.o", aot::runtime_object(module_.target())});
     return aot::archive(members);
   }
@@ -204,7 +211,9 @@ class MultitargetOutputs {
       const Outputs outputs(modules_[i], wanted);
       for (const auto& [type, path] : multi) {
         const std::string place = with_suffix(path, suffixes_[i], info.at(type).extension);
-        result.push_back({place, outputs.contents(type)});
+        // One runtime for all of them: an object of its own.
+        result.push_back(
+            {place, type == OutputFileType::object ? outputs.object() : outputs.contents(type)});
       }
       if (wants_library)
         members_.push_back({modules_[i].functions()[0].name + ".o", outputs.object()});

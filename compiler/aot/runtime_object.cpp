@@ -16,16 +16,27 @@ RETROGRADE_EMBED(retrograde_embedded_arm_runtime, RETROGRADE_ARM_RUNTIME_OBJECT)
 
 namespace retrograde::aot {
 
-std::string runtime_object(const Target& target) {
+namespace {
+
+// Empty when there is none.
+std::string embedded_object(const Target& target) {
   const Target host = get_host_target();
-  if (target.os == host.os && target.bits == host.bits) {
-    if (target.arch == host.arch)
-      return {retrograde_embedded_runtime, retrograde_embedded_runtime_end};
+  if (target.os != host.os || target.bits != host.bits) return {};
+  if (target.arch == host.arch)
+    return {retrograde_embedded_runtime, retrograde_embedded_runtime_end};
 #ifdef RETROGRADE_ARM_RUNTIME_OBJECT
-    if (target.arch == Target::ARM)
-      return {retrograde_embedded_arm_runtime, retrograde_embedded_arm_runtime_end};
+  if (target.arch == Target::ARM)
+    return {retrograde_embedded_arm_runtime, retrograde_embedded_arm_runtime_end};
 #endif
-  }
+  return {};
+}
+
+}  // namespace
+
+bool has_runtime_object(const Target& target) { return !embedded_object(target).empty(); }
+
+std::string runtime_object(const Target& target) {
+  if (std::string object = embedded_object(target); !object.empty()) return object;
   unsupported("add the runtime for target " + quoted(target.to_string()),
               "a runtime is there for this machine and for those that a cross compiler was found "
               "for when the compiler was built",

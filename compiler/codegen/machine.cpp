@@ -95,6 +95,7 @@ int Machine::min_math_lanes(int bits) const { return 128 / bits; }
 
 std::string Machine::math_symbol(const std::string& stem, const std::string& precision, int bits,
                                  int lanes) const {
+  if (!has_sleef) return stem + (bits == 32 ? "f" : "");
   // finz, cinz: SLEEF's functions whose results do not depend on the vector width.
   const std::string family = has_fma() ? "finz_" : "cinz_";
   return "Sleef_" + family + stem + (bits == 32 ? "f" : "d") + std::to_string(lanes) + "_" +
@@ -119,6 +120,7 @@ Machine machine_for(const Target& target, bool tune_for_host) {
     machine.triple = "aarch64-unknown-linux-gnu";
     machine.cpu = "generic";
     machine.features = "+neon";
+    machine.has_sleef = tune_for_host;
   }
   const bool is_host = target.arch == get_host_target().arch;
   if (tune_for_host && is_host) machine.tune_cpu = llvm::sys::getHostCPUName().str();

@@ -16,6 +16,9 @@ struct Machine {
   Target target;
   std::string triple, cpu, tune_cpu, features;
   int vector_bits = 128;
+  // Whether vector math is SLEEF's; else the C library's, lane by lane: what is compiled ahead of
+  // time for AArch64 needs no library that its toolchains lack.
+  bool has_sleef = true;
 
   bool is_x86() const { return target.arch == Target::X86; }
   bool has_avx512() const;  // F at least

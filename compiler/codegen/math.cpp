@@ -34,7 +34,7 @@ llvm::FunctionCallee declare_pure(Emitter& e, const std::string& name, llvm::Typ
 
 // The narrowest width that holds `lanes`, or the widest there is.
 int call_lanes(const Machine& machine, int bits, int lanes) {
-  if (lanes == 1) return 1;
+  if (lanes == 1 || !machine.has_sleef) return 1;
   int width = machine.min_math_lanes(bits);
   while (width < lanes && width < machine.max_math_lanes(bits)) width *= 2;
   return width;

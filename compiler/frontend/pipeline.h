@@ -136,7 +136,7 @@ class Pipeline {
   void compile_to_lowered_stmt(const std::string& filename, const std::vector<Argument>& args,
                                StmtOutputFormat format = Text,
                                const Target& target = get_target_from_environment());
-  // prefix.o and prefix.h
+  // prefix.o, with the runtime unless the target says no_runtime, and prefix.h
   void compile_to_file(const std::string& filename_prefix, const std::vector<Argument>& args,
                        const std::string& function_name,
                        const Target& target = get_target_from_environment());

@@ -7,7 +7,10 @@
 #include <cstring>
 #include <string>
 
+#include <cmath>
+
 #include "aot_blur_alone.h"
+#include "aot_math.h"
 #include "aot_scalars.h"
 #include "aot_table.h"
 #include "aot_tuple.h"
@@ -67,7 +70,18 @@ static void test_arguments() {
   expect(aot_table(table) == 0 && table(2, 4) == 46.0f, "embedded tables");
 }
 
+static void test_math() {
+  Buffer<float, 1> in(13), out(13);
+  for (int i = 0; i < 13; i++) in(i) = 0.25f * static_cast<float>(i);
+  expect(aot_math(in, out) == 0, "vector math links and runs");
+  for (int i = 0; i < 13; i++) {
+    const double x = in(i), wanted = std::sin(x) + std::exp(x) * std::pow(x, 1.5);
+    expect(std::fabs(out(i) - wanted) <= 1e-6 * std::fabs(wanted), "vector math is right");
+  }
+}
+
 int main() {
+  test_math();
   test_blur();
   test_arguments();
   std::printf("%d failures\n", failures);

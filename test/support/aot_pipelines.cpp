@@ -108,6 +108,16 @@ void write_table() {
   write(out, {table}, "aot_table_given", target);
 }
 
+// Vector math: a library's, or lane by lane.
+void write_math() {
+  ImageParam in(Float(32), 1, "in");
+  Var x("x");
+  Func out("math");
+  out(x) = sin(in(x)) + exp(in(x)) * pow(in(x), 1.5f);
+  out.vectorize(x, 8);
+  write(out, {in}, "aot_math", target);
+}
+
 // Which variant ran can be seen in the result.
 void write_variants() {
   std::vector<Target> targets = {target};
@@ -164,6 +174,7 @@ int main(int argc, char** argv) {
     write_scalars();
     write_tuple();
     write_table();
+    write_math();
     write_variants();
     write_talker();
     write_services();

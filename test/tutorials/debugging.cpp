@@ -44,6 +44,15 @@ int main(int argc, char** argv) {
     consumer.reorder(y, x).parallel(x);
     producer.compute_root().parallel(y);
     consumer.print_loop_nest();
+
+    // Splits, what slides, and where it is stored.
+    Func rows("rows"), stencil("stencil");
+    Var xo("xo"), xi("xi");
+    rows(x, y) = x - y;
+    stencil(x, y) = rows(x, y) + rows(x + 1, y);
+    stencil.split(x, xo, xi, 4).vectorize(xi).unroll(y, 2);
+    rows.compute_at(stencil, xo).vectorize(x, 4);
+    stencil.print_loop_nest();
   }
   {
     // What remains of it before machine code is made, as text and as a page.

@@ -41,6 +41,13 @@ class AotFiles : public testing::Test {
   int shell(const std::string& command) const {
     return std::system((command + " >" + path("log") + " 2>&1").c_str());
   }
+  // main.cpp with these and the system's libraries, no more.
+  int link(const std::vector<std::string>& files) const {
+    std::string command = "c++ -std=c++17 " RETROGRADE_TEST_COMPILE_FLAGS " -I" + folder.string() +
+                          " " + path("main.cpp");
+    for (const std::string& file : files) command += " " + path(file);
+    return shell(command + " -o " + path("main") + " -lpthread -ldl");
+  }
 
   const TemporaryFolder temporary;
   const fs::path& folder = temporary.path();
@@ -173,13 +180,35 @@ TEST_F(AotFiles, LibraryLinksWithNothingElse) {
          "  in.fill(50);\n"
          "  if (argc > 1) return a(nullptr, 3.0f, out);\n"
          "  return a(in, 3.0f, out) == 0 && out(63, 15) == 150 ? 0 : 1;\n}\n";
-  ASSERT_EQ(shell("c++ -std=c++17 " RETROGRADE_TEST_COMPILE_FLAGS " -I" + folder.string() + " " +
-                  path("main.cpp") + " " + path("a.a") + " -o " + path("main") + " -lpthread -ldl"),
-            0)
-      << read_file(path("log"));
+  ASSERT_EQ(link({"a.a"}), 0) << read_file(path("log"));
   EXPECT_EQ(shell(path("main")), 0);
   // A program's own halide_error is called in place of the library's.
   EXPECT_EQ(WEXITSTATUS(shell(path("main") + " null")), 7);
+}
+
+// Objects bring the runtime, too, and any number of them can be linked together.
+TEST_F(AotFiles, ObjectsLinkWithNothingElse) {
+  Func twice("twice");
+  twice(x, y) = in(x, y) + in(x, y);
+  twice.parallel(y);
+  out.compile_to_object(path("a.o"), {in, gain}, "a", Target("host"));
+  twice.compile_to_object(path("b.o"), {in}, "b", Target("host"));
+  twice.compile_to_object(path("c.o"), {in}, "c", Target("host-no_runtime"));
+  twice.compile_to_header(path("b.h"), {in}, "b");
+  twice.compile_to_header(path("c.h"), {in}, "c");
+  out.compile_to_header(path("a.h"), {in, gain}, "a");
+  std::ofstream(path("main.cpp"))
+      << "#include \"a.h\"\n#include \"b.h\"\n#include \"c.h\"\n#include <HalideBuffer.h>\n"
+         "int main() {\n"
+         "  Halide::Runtime::Buffer<uint8_t> in(64, 16), out(64, 16);\n"
+         "  in.fill(50);\n"
+         "  if (a(in, 3.0f, out) != 0 || out(63, 15) != 150) return 1;\n"
+         "  if (b(in, out) != 0 || out(63, 15) != 100) return 2;\n"
+         "  return c(in, out) == 0 && out(0, 0) == 100 ? 0 : 3;\n}\n";
+  ASSERT_EQ(link({"a.o", "b.o", "c.o"}), 0) << read_file(path("log"));
+  EXPECT_EQ(shell(path("main")), 0);
+  EXPECT_LT(fs::file_size(path("c.o")), fs::file_size(path("b.o")) / 4);
+  EXPECT_NE(link({"c.o"}), 0) << "no_runtime leaves the runtime to the caller";
 }
 
 // ---- modules ----
