@@ -61,4 +61,8 @@ Requirements requirements_of(const LoopedFunc& f, int stage, const StageNest& ne
   return uses;
 }
 
+bool never_stores(const LoopedFunc& f, int stage, const Requirements& uses) {
+  return f.stages[stage].predicate.defined() && !uses.count(f.name());
+}
+
 }  // namespace retrograde::ir

@@ -20,4 +20,8 @@ Stmt emit_definition(const LoopedFunc& f, int stage, const StageNest& nest);
 Requirements requirements_of(const LoopedFunc& f, int stage, const StageNest& nest,
                              const ValueBounds& values);
 
+// Whether no point passes the predicate, by the same analysis: what the stage reads is then not
+// computed anywhere.
+bool never_stores(const LoopedFunc& f, int stage, const Requirements& uses);
+
 }  // namespace retrograde::ir

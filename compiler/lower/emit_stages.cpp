@@ -198,6 +198,7 @@ Emitted NestEmitter::emit_stage(const FusedNest& nest, std::vector<NestStage>& s
   Emitted code;
   code.stmt = emit_definition(f, own.stage, own.nest);
   code.uses = requirements_of(f, own.stage, own.nest, values_);
+  if (never_stores(f, own.stage, code.uses)) code.stmt = make_evaluate(0);
   code = emit_children(computed_innermost_in(f), std::move(code), loops, 0, home);
   for (size_t i = 0; i < loops.size(); i++) {
     const int depth = static_cast<int>(loops.size() - i);

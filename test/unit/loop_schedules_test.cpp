@@ -79,6 +79,40 @@ TEST_F(LoopSchedules, TilesOfEveryBoundaryCondition) {
   }
 }
 
+// The predicate is never true, which only an analysis of its range tells: g is computed nowhere.
+TEST_F(LoopSchedules, AnUpdateThatNeverRunsReadsNothing) {
+  for (const bool is_scalar : {false, true}) {
+    Var x("x"), y("y");
+    Func f("f"), g("g");
+    RDom r(1, 3);
+    g(x) = x;
+    g(x) += 1;
+    r.where(11 < (r * 5) % -1);
+    if (is_scalar) {
+      f() = 7;
+      f() += g(r);
+      EXPECT_EQ(Buffer<int>(f.realize())(), 7);
+    } else {
+      f(x) = 7;
+      f(x) += g(x + r);
+      EXPECT_EQ(Buffer<int>(f.realize({3}))(2), 7);
+    }
+  }
+}
+
+// One that may run reads and writes all the same, in no dimension too.
+TEST_F(LoopSchedules, AnUpdateOfAScalarThatRunsSometimes) {
+  Var x("x");
+  Func f("f"), g("g");
+  RDom r(0, 10);
+  g(x) = x;
+  g(x) += 1;
+  r.where(r % 3 == 1);
+  f() = 7;
+  f() += g(r);
+  EXPECT_EQ(Buffer<int>(f.realize())(), 7 + 2 + 5 + 8);
+}
+
 TEST_F(LoopSchedules, LoopBoundsAndPredicatesThatVaryByLane) {
   auto triangle = [&](bool scheduled) {
     Func f("f");
