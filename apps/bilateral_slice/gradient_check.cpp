@@ -146,8 +146,9 @@ class Checker {
     const double difference = central_difference(p, direction);
     const double scale = std::max({std::abs(adjoint), std::abs(difference), smallest});
     const double error = scale > 0 ? std::abs(adjoint - difference) / scale : 0.0;
-    // Not std::max: a NaN must win.
-    if (!(error <= found_.max_relative_error)) found_.max_relative_error = error;
+    // Not std::max: a NaN must win, and stay.
+    double& worst = found_.max_relative_error;
+    if (!std::isnan(worst) && !(error <= worst)) worst = error;
     ++found_.compared;
   }
 
