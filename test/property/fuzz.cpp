@@ -6,13 +6,16 @@
 // Each program runs in a process of its own, so that a crash or a hang is a finding like any other.
 // A finding is shrunk and printed as C++. A program that is refused with an error for its author is
 // counted, and is a finding only when refusals are asked for or make up more than a tenth of all.
-// Only a directive: seeds whose schedules do not use it are passed over and not counted.
-// Exit code: 0 nothing found, 1 something found.
+// So is one that computes for too long, when there are more of these than one in a hundred: a
+// random schedule may well ask for a thousand times the work. Only a directive: seeds whose
+// schedules do not use it are passed over and not counted. Exit code: 0 nothing found, 1 something
+// found.
 #include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <chrono>
+#include <csignal>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
@@ -32,7 +35,7 @@ using namespace retrograde::fuzz;
 
 // A program that computes for longer, or that stands still for longer, on a machine however busy.
 constexpr unsigned max_cpu_seconds = 60, max_seconds = 240;
-constexpr double max_refused_fraction = 0.1;
+constexpr double max_refused_fraction = 0.1, max_slow_fraction = 0.01;
 constexpr int crashed = 100;  // exit codes of a child: a Verdict, or this plus the signal
 
 struct Options {
@@ -152,7 +155,7 @@ bool uses(const Program& program, const std::string& directive) {
 int main(int argc, char** argv) {
   const Options options = parse(argc, argv);
   const auto start = std::chrono::steady_clock::now();
-  uint64_t found = 0, tried = 0, refused = 0;
+  uint64_t found = 0, tried = 0, refused = 0, slow = 0;
   for (uint64_t seed = options.seed; tried < options.count; ++seed) {
     const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - start;
     if (elapsed.count() > options.seconds) break;
@@ -168,13 +171,20 @@ int main(int argc, char** argv) {
       ++refused;
       if (!options.refusals) continue;
     }
+    if (finding.code == crashed + SIGXCPU && options.count > 1) {
+      ++slow;
+      report(seed, program, finding, false);
+      continue;
+    }
     ++found;
     report(seed, program, finding, options.shrink);
   }
-  std::printf("%llu programs, %llu findings, %llu refused\n",
+  std::printf("%llu programs, %llu findings, %llu refused, %llu too slow\n",
               static_cast<unsigned long long>(tried), static_cast<unsigned long long>(found),
-              static_cast<unsigned long long>(refused));
+              static_cast<unsigned long long>(refused), static_cast<unsigned long long>(slow));
   const bool refuses_much = tried >= 50 && refused > tried * max_refused_fraction;
   if (refuses_much) std::puts("too many are refused: the generator or a check is wrong");
-  return found > 0 || refuses_much ? 1 : 0;
+  const bool is_slow = tried >= 100 && slow > tried * max_slow_fraction;
+  if (is_slow) std::puts("too many are slow: the generator or the compiler is wrong");
+  return found > 0 || refuses_much || is_slow ? 1 : 0;
 }
