@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "autodiff/derivative_rules.h"
+#include "autodiff/inversion_cost.h"
 #include "autodiff/reverse_sweep.h"
 #include "autodiff/update.h"
 #include "autodiff/update_context.h"
@@ -132,18 +133,19 @@ class Synthesis {
     AdjointFunc adjoint = make_adjoint(target, f->name + "_adj", found->second);
     bool extendable = true;  // nothing has read it yet
     record(*f, f->stage_count() - 1, adjoint);
-    register_func(adjoint, f->name);
+    register_func(adjoint, f->name, target.region);
     for (int s = f->stage_count() - 1; s >= 1; --s) {
       UpdateAdjoint update = differentiate_update(
           {f, s, regions_, target, adjoint, extendable, options_.store_overwritten,
            [&](const Expr& leaf) { return is_wanted(leaf); }});
-      if (update.current.func != adjoint.func) register_func(update.current, f->name);
+      if (update.current.func != adjoint.func)
+        register_func(update.current, f->name, target.region);
       for (const FuncPtr& helper : update.helpers) result_.funcs.push_back(helper);
       std::vector<Expr> seeds =
           update.seeds.empty() ? adjoints_at_write(*f, s, update.current.func) : update.seeds;
       for (const IterationDomain& domain : update.domains)
         contribute_stage(f, update.values, seeds, domain, update.self_values);
-      if (update.previous.func) register_func(update.previous, f->name);
+      if (update.previous.func) register_func(update.previous, f->name, target.region);
       for (const Explanation& e : update.explanations) result_.explanations.push_back(e);
       adjoint = update.previous.func ? update.previous : update.current;
       extendable = update.previous.func != nullptr;
@@ -243,7 +245,7 @@ class Synthesis {
     for (const LoopVariable& v : query.domain.vars) key += ";" + v.name;
     key += f->name;
     auto [it, is_new] = inversions_.try_emplace(key);
-    if (is_new) it->second = invert_access(query);
+    if (is_new) it->second = invert_or_scatter(query);
     return it->second;
   }
 
@@ -260,10 +262,24 @@ class Synthesis {
     if (found == pending_.end()) return;
     AdjointFunc adjoint = make_adjoint(target_of(*p), p->name + "_adj", found->second);
     result_.parameters[p.get()] = adjoint.func;
-    register_func(adjoint, p->name);
+    register_func(adjoint, p->name, target_of(*p).region);
   }
 
-  void register_func(const AdjointFunc& adjoint, const std::string& primal) {
+  // ", 96 elements, 384 bytes when stored"; nothing when the region is known at run time only.
+  static std::string size_text(const FuncContents& f, const std::vector<LoopVariable>& region) {
+    int64_t elements = 1, bytes = 0;
+    for (const LoopVariable& v : region) {
+      auto extent = v.min.defined() && v.max.defined() ? as_const_int(simplify(v.max - v.min + 1))
+                                                       : std::nullopt;
+      if (!extent) return "";
+      elements *= std::max<int64_t>(*extent, 0);
+    }
+    for (Type t : f.types) bytes += t.bytes();
+    return text(", ", elements, " elements, ", elements * bytes, " bytes when stored");
+  }
+
+  void register_func(const AdjointFunc& adjoint, const std::string& primal,
+                     const std::vector<LoopVariable>& region) {
     for (const FuncPtr& helper : adjoint.helpers) result_.funcs.push_back(helper);
     result_.funcs.push_back(adjoint.func);
     int gathers = 0, scatters = 0, privatised = 0;
@@ -274,7 +290,8 @@ class Synthesis {
     }
     explain(Explanation::Kind::Built, primal,
             text(quoted(adjoint.func->name), ", ", gathers, " gathers over reduction domains, ",
-                 scatters, " scatters inside pure dimensions, ", privatised, " privatised sums"));
+                 scatters, " scatters inside pure dimensions, ", privatised, " privatised sums",
+                 size_text(*adjoint.func, region)));
     if (gathers + scatters + privatised > 0) {
       explain(Explanation::Kind::Performance, primal,
               text("unless a directive schedules ", quoted(adjoint.func->name),

@@ -1,0 +1,16 @@
+// When a gather is not worth it: its reduction domain is a box around the points that read an
+// element, and for accesses like (13 * x) % 64 + x / 64 the box holds far more than those points.
+#pragma once
+
+#include "autodiff/access_inversion.h"
+
+namespace retrograde::ir {
+
+// The inversion of the query, or the scatter where the gathers would run more than `dearer` times
+// as many iterations as the stage has points; `note` says so. A gather is parallel and writes each
+// element once, so it may cost several times as many iterations. Extents that are no constants
+// count as equal on both sides: then the gather stays.
+constexpr double dearer = 32;
+Inversion invert_or_scatter(const AccessQuery& query);
+
+}  // namespace retrograde::ir
