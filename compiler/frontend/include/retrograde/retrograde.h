@@ -3,6 +3,7 @@
 
 #include "autodiff/derivative.h"
 #include "autodiff/second_order.h"
+#include "autodiff/straight_through.h"
 #include "autodiff/tangents.h"
 #include "checks/check_gradients.h"
 #include "checks/check_stability.h"
