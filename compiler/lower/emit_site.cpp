@@ -10,13 +10,13 @@
 
 namespace retrograde::ir {
 
-bool NestEmitter::is_needed(const FusedGroup& group, const Emitted& code) const {
-  const LoopedFunc *needed = nullptr, *unused = nullptr;
-  for (const int index : group.funcs) {
-    const LoopedFunc& f = program_.funcs[index];
-    (f.is_output || code.uses.count(f.name()) ? needed : unused) = &f;
+// A Func whose values nothing reads here is not computed, also when others run with it elsewhere.
+std::vector<int> NestEmitter::needed_of(const FusedGroup& group, const Emitted& code) const {
+  std::vector<int> needed;
+  for (const int f : group.funcs) {
+    if (program_.funcs[f].is_output || code.uses.count(program_.funcs[f].name()))
+      needed.push_back(f);
   }
-  if (needed && unused) check_all_used(program_, *needed, *unused);
   return needed;
 }
 
@@ -28,7 +28,10 @@ Emitted NestEmitter::emit_site(const std::vector<int>& children, Emitted code, S
   for (auto it = children.rbegin(); it != children.rend(); ++it) {
     const FusedGroup& group = groups_[group_of_[*it]];
     if (*it != group.funcs.back()) continue;  // the group is dealt with as a whole
-    if (is_needed(group, code)) pieces.push_back(emit_piece(group, code, wanted, site));
+    const std::vector<int> needed = needed_of(group, code);
+    if (needed.empty()) continue;
+    const bool is_whole = needed.size() == group.funcs.size();
+    pieces.push_back(emit_piece(is_whole ? group : part_of(group, needed), code, wanted, site));
   }
   for (const Piece& piece : pieces) code.lead = std::max(code.lead, piece.lead);
   code.stmt = assemble(pieces, inner, code, site);

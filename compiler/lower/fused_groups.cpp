@@ -170,4 +170,43 @@ void order_fused_groups(Program& program) {
 
 std::vector<FusedGroup> fused_groups(const Program& program) { return Grouping(program).groups(); }
 
+namespace {
+
+// Stages of a nest that are left, each with those that join its loops: the first nest holds those
+// that still run with the first stage, if it is left.
+std::vector<FusedNest> parts_of(const FusedNest& nest, const std::vector<int>& kept) {
+  std::vector<FusedNest> parts;
+  std::vector<std::pair<int, int>> now(nest.stages.size(), {-1, -1});  // part, position in it
+  for (size_t i = 0; i < nest.stages.size(); i++) {
+    FusedStage stage = nest.stages[i];
+    if (std::find(kept.begin(), kept.end(), stage.func) == kept.end()) continue;
+    if (stage.joins >= 0 && now[stage.joins].first >= 0) {
+      const auto [part, position] = now[stage.joins];
+      if (now[stage.aligned_to].first == part) {
+        stage.aligned_to = now[stage.aligned_to].second;
+      } else {  // what it was aligned to is not here
+        stage.aligned_to = position;
+        std::fill(stage.align.begin(), stage.align.end(), LoopAlignStrategy::NoAlign);
+      }
+      stage.joins = position;
+      now[i] = {part, static_cast<int>(parts[part].stages.size())};
+      parts[part].stages.push_back(std::move(stage));
+    } else {
+      now[i] = {static_cast<int>(parts.size()), 0};
+      parts.push_back({{FusedStage{stage.func, stage.stage, -1, -1, 0, {}}}});
+    }
+  }
+  return parts;
+}
+
+}  // namespace
+
+FusedGroup part_of(const FusedGroup& group, const std::vector<int>& kept) {
+  FusedGroup result{kept, {}};
+  for (const FusedNest& nest : group.nests) {
+    for (FusedNest& part : parts_of(nest, kept)) result.nests.push_back(std::move(part));
+  }
+  return result;
+}
+
 }  // namespace retrograde::ir

@@ -45,4 +45,8 @@ void order_fused_groups(Program& program);
 // Of an ordered program: every Func is in exactly one of the groups, most of them alone.
 std::vector<FusedGroup> fused_groups(const Program& program);
 
+// The group without the Funcs that are not `kept`. What joined the loops of one of these runs
+// alone.
+FusedGroup part_of(const FusedGroup& group, const std::vector<int>& kept);
+
 }  // namespace retrograde::ir

@@ -95,15 +95,6 @@ void check_room(const LoopedFunc& f, const Box& room) {
   }
 }
 
-void check_all_used(const Program& program, const LoopedFunc& needed, const LoopedFunc& unused) {
-  user_error(
-      text("compute ", quoted(unused.name()), " together with ", quoted(needed.name())),
-      "Funcs that share loops are all needed at each place where they are computed",
-      text("at one place ", quoted(needed.name()), " is used, but ", quoted(unused.name()),
-           " is not; ", quoted(unused.name()), " is used by ", consumers_of(program, unused)),
-      "Compute them further out, or drop compute_with");
-}
-
 void check_storage_of_output(const LoopedFunc& f) {
   for (const StorageRule& rule : f.schedule.storage_rules) {
     if (!rule.fold.defined() && !rule.bound.defined()) continue;

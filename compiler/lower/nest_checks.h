@@ -18,8 +18,6 @@ void check_found_its_place(const Program& program, const LoopedFunc& f, bool is_
 // A place for hoisted storage that no loop gave, and one that nothing bounds.
 void check_place_found(const Program& program, const LoopedFunc& f);
 void check_room(const LoopedFunc& f, const Box& room);
-// Of a group of Funcs that share loops, at a place where they are computed.
-void check_all_used(const Program& program, const LoopedFunc& needed, const LoopedFunc& unused);
 void check_storage_of_output(const LoopedFunc& f);
 
 // Checks at run time.

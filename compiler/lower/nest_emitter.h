@@ -78,7 +78,7 @@ class NestEmitter {
 
   Emitted emit_site(const std::vector<int>& children, Emitted code, Site& site);
   Stmt assemble(const std::vector<Piece>& pieces, Stmt stmt, const Emitted& code, const Site& site);
-  bool is_needed(const FusedGroup& group, const Emitted& code) const;
+  std::vector<int> needed_of(const FusedGroup& group, const Emitted& code) const;
   Piece emit_piece(const FusedGroup& group, Emitted& code, WantedFuncs& wanted, Site& site);
   Box take_required(const LoopedFunc& f, Emitted& code, std::vector<Stmt>& checks);
   Wanted slide_together(std::vector<Member>& members, const WantedFuncs& wanted, Site& site) const;

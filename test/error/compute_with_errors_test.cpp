@@ -146,14 +146,6 @@ TEST_F(ComputeWithErrors, ALevelThatIsNeverSet) {
   expect_mentions(error_of<CompileError>([&] { level.set(LoopLevel(g, x)); }), {"different Funcs"});
 }
 
-TEST_F(ComputeWithErrors, UsedAtOnePlaceOnly) {
-  f.compute_at(out, y);
-  g.compute_at(out, y).compute_with(f, y);
-  out(x, y) = f(x, y);
-  out(x, y) += g(x, y);
-  expect_refused({"all needed at each place", "is not"});
-}
-
 TEST_F(ComputeWithErrors, AProducerAtALoopOfTheGuest) {
   Func p("p"), h("h");
   p(x, y) = x - y;

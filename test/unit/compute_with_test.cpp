@@ -328,6 +328,27 @@ TEST_F(ComputeWith, ReductionLoopsAreShared) {
   });
 }
 
+TEST_F(ComputeWith, WhereOneIsNotNeededTheOthersRunWithoutIt) {
+  for (int missing = 0; missing < 3; ++missing) {
+    expect_same([&](bool together) {
+      Func funcs[3] = {Func("f"), Func("g"), Func("k")}, out("out");
+      for (int i = 0; i < 3; ++i) funcs[i](x, y) = x * (i + 2) - y;
+      Expr sum = 1;
+      for (int i = 0; i < 3; ++i) {
+        if (i != missing) sum += funcs[i](x, y + i);
+      }
+      out(x, y) = sum;
+      out(x, y) += funcs[missing](x, y) + funcs[(missing + 1) % 3](x - 1, y);
+      for (Func& f : funcs) f.compute_at(out, y);
+      if (together) {
+        funcs[1].compute_with(funcs[0], x, Align::AlignStart);
+        funcs[2].compute_with(funcs[1], x, Align::AlignEnd);
+      }
+      return out;
+    });
+  }
+}
+
 TEST_F(ComputeWith, OutputsShareLoops) {
   Func f("f"), g("g");
   f(x, y) = x + y;
