@@ -1,13 +1,11 @@
-// refuse_unsupported -- what no single directive could know when it was given, and what is not
-// built yet.
+// refuse_unsupported -- what no single directive could know when it was given, and what no CPU has.
 #pragma once
 
 #include "lower/program.h"
 
 namespace retrograde::ir {
 
-// CompileError for schedules that contradict themselves; Unsupported for directives that lowering
-// does not carry out: a line in the table of refuse_unsupported.cpp each, until it does.
+// CompileError for schedules that contradict themselves; Unsupported for memory of devices.
 void refuse_unsupported(const Program& program);
 
 // CompileError for a Func that is substituted into its users and has a schedule that needs storage
