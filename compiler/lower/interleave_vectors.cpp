@@ -197,7 +197,7 @@ class LaneSplitter {
         e,
         [&](const Variable& n) {
           const Named& named = names_.at(n.name);
-          return named.parts.empty() ? part(named.value) : named.parts.at(first_);
+          return named.parts.empty() ? part(named.value) : part_of_parts(named.parts, lanes);
         },
         [&](const Let& n) { return part(n.body); },
         [&](const Broadcast& n) { return make_broadcast(n.value, lanes); },
@@ -228,6 +228,16 @@ class LaneSplitter {
           return call_op(n.op, n.type.with_lanes(lanes), std::move(args));
         },
         [&](const ExprNode&) -> Expr { internal_error("interleave_vectors: no parts"); });
+  }
+
+  // Of a name that has fewer parts than are asked for, each of these is split further.
+  Expr part_of_parts(const std::vector<Expr>& parts, int lanes) const {
+    const int count = static_cast<int>(parts.size()), step = period_ / count;
+    const Expr& whole_part = parts.at(static_cast<size_t>(first_ % count));
+    if (step == 1) return whole_part;
+    std::vector<int> indices;
+    for (int i = 0; i < lanes; i++) indices.push_back(first_ / count + i * step);
+    return make_shuffle({whole_part}, std::move(indices));
   }
 
   // (base + stride (first + period i)) / c = (base + stride first) / c + (stride period / c) i.

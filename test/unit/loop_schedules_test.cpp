@@ -2,6 +2,8 @@
 // unscheduled one gives, bit for bit. Sizes are odd, so that every split has a tail.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include <retrograde/retrograde.h>
 #include <functional>
 
@@ -76,6 +78,31 @@ TEST_F(LoopSchedules, TilesOfEveryBoundaryCondition) {
       return f;
     };
     expect_same<float>(make, 50, 40);  // beyond the input
+  }
+}
+
+// A vector that is bound in two parts is read where four are asked for.
+TEST_F(LoopSchedules, LanesThatAlternateInTwoWays) {
+  Var x("x"), y("y"), xo("xo"), xi("xi"), xoo("xoo"), xoi("xoi"), t("t");
+  Func f("f"), g("g");
+  f(x, y) = x + 3 * y;
+  Buffer<uint8_t> image(21, 16, 2);
+  image.set_min(0, 0, -2);
+  image.for_each_element([&](int i, int j, int k) { image(i, j, k) = i + 7 * j + 3 * k; });
+  Func repeated = BoundaryConditions::repeat_image(image);
+  g(x) = select(1 < f(x + 1, x - 3), cast<uint16_t>(f(0, clamp(f(x + 1, x - 3), 0, 11))),
+                cast<uint16_t>(repeated(x, x * 2 + 1, x)));
+  f.compute_root().fold_storage(y, 256);
+  g.split(x, xo, xi, 2, TailStrategy::Predicate);
+  g.split(xo, xoo, xoi, 4, TailStrategy::Predicate);
+  g.fuse(xi, xoi, t).vectorize(t);
+  Buffer<uint16_t> result = g.realize({21});
+  const auto value = [](int i, int j) { return i + 3 * j; };
+  for (int i = 0; i < 21; i++) {
+    const int own = value(i + 1, i - 3);
+    ASSERT_EQ(result(i),
+              1 < own ? value(0, std::clamp(own, 0, 11)) : image(i, (i * 2 + 1) % 16, -2 + i % 2))
+        << i;
   }
 }
 
