@@ -5,6 +5,7 @@
 #include <sys/stat.h>
 
 #include <algorithm>
+#include <chrono>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -271,9 +272,21 @@ TEST_F(DiskCache, WhatWasNotUsedForLongestGoesFirst) {
   const auto one = static_cast<int64_t>(fs::file_size(entries(folder()).at(0)));
   const auto start_small = [&] {
     jit::clear_cache();
-    set_compile_cache_directory(folder(), 4 * one);
+    set_compile_cache_directory(folder(), 4 * one + one / 2);
   };
-  for (const int factor : {4, 5}) expect_runs(scaled(factor), factor);
+  // Clocks of files are coarse: what was just written is said to be hours old.
+  const auto age = [&](int hours) {
+    const auto now = fs::file_time_type::clock::now();
+    for (const fs::path& entry : entries(folder())) {
+      if (now - fs::last_write_time(entry) < std::chrono::minutes(30))
+        fs::last_write_time(entry, now - std::chrono::hours(hours));
+    }
+  };
+  age(3);
+  expect_runs(scaled(4), 4);
+  age(2);
+  expect_runs(scaled(5), 5);
+  age(1);
   // 3 is the oldest, and then used again.
   start_small();
   expect_runs(scaled(3), 3);
