@@ -212,7 +212,6 @@ class Flattener : public Rewriter {
   Stmt store(const Provide& n) {
     std::vector<Expr> values = mapped(n.values), args = mapped(n.args);
     Expr predicate = (*this)(n.predicate);
-    size_t count = usage_.value_counts.at(n.name);
     std::vector<Binding> bindings;
     if (values.size() > 1) bind_operands(n, values, args, predicate, bindings);
     std::vector<Stmt> stores;
