@@ -20,7 +20,8 @@
 //         consumes. When both of its parts read the Func of a Fork around, each has semaphores of
 //         its own to that producer. What else the producer reads and is computed in the same loops
 //         is computed in its branch, and in the other as well where that reads it too.
-// Errors: such a value that both branches read, and whose storage lasts longer than theirs.
+// Errors: such a value that both branches read, and whose storage lasts longer than theirs; loops
+//         between storage and computation that are not serial.
 // Source: Halide's documentation of async; the handshake is a bounded buffer's (Dijkstra 1965).
 // Tests: test/unit/async_test.cpp.
 #include "lower/fork_async.h"
@@ -482,11 +483,11 @@ class AsyncForker : public Rewriter {
     return produces(n.body, func) && !has_loop_around(n.body, func);
   }
 
-  static void check_serial(const For& n, const std::string& func) {
+  void check_serial(const For& n, const std::string& func) const {
     if (n.for_type == ForType::Serial) return;
-    unsupported(text("compute ", quoted(func), " async"),
+    unsupported(text("compute ", quoted(original(func)), " async"),
                 "the loops between storage and computation of an async Func are serial",
-                text("the loop over ", quoted(n.name), " is not"),
+                text("the loop ", describe_loop(n.name), " is not"),
                 "Store the Func inside of that loop");
   }
 

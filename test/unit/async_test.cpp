@@ -11,6 +11,7 @@
 #include "ir/print.h"
 #include "lower/lower.h"
 #include "retrograde_runtime.h"
+#include "support/errors.h"
 
 namespace {
 std::mutex threads_mutex;
@@ -333,6 +334,20 @@ TEST(AsyncErrors, AFuncThatBothBranchesReadAndThatIsStoredFurtherOut) {
     EXPECT_NE(message.find("\"f\" is computed in these loops and stored around"), std::string::npos)
         << message;
   }
+}
+
+TEST(AsyncErrors, LoopsBetweenStorageAndComputationThatAreNotSerial) {
+  Var x("x"), y("y"), yo("yo"), yi("yi");
+  Func f("f"), out("out");
+  f(x, y) = x + y;
+  out(x, y) = f(x, y) + f(x, y + 1);
+  out.split(y, yo, yi, 4).unroll(yi);
+  f.store_at(out, yo).compute_at(out, yi).async();
+  expect_mentions(error_of<Unsupported>([&] {
+                    out.realize({8, 16});
+                  }),
+                  {"compute \"f", "async", "are serial", "the loop \"yi\" of \"out", "is not",
+                   "Store the Func inside of that loop"});
 }
 
 // ---- failures ----
