@@ -100,24 +100,25 @@ codegen::Export export_of(const Internal::LoweredFunc& function, const Module& m
   return result;
 }
 
-void collect(const Module& module, std::vector<std::pair<Internal::LoweredFunc, Module>>& found) {
+// Of `module`, which is `whole` or inside of it.
+void collect(const Module& module, const Module& whole,
+             std::vector<std::pair<Internal::LoweredFunc, Module>>& found) {
+  const std::string asked = "compile the module " + quoted(whole.name());
   for (const Internal::LoweredFunc& function : module.functions()) {
     if (function.linkage == LinkageType::Internal) continue;
     for (const auto& [other, where] : found) {
       if (other.name != function.name) continue;
-      user_error("compile the module " + quoted(module.name()),
-                 "functions of a module and its submodules have different names",
+      user_error(asked, "functions of a module and its submodules have different names",
                  "two are called " + quoted(function.name), "Rename one of them");
     }
     found.emplace_back(function, module);
   }
   for (const Module& submodule : module.submodules()) {
     if (submodule.target() == module.target()) {
-      collect(submodule, found);
+      collect(submodule, whole, found);
       continue;
     }
-    unsupported("compile the module " + quoted(module.name()),
-                "a module and its submodules are made for one target",
+    unsupported(asked, "a module and its submodules are made for one target",
                 quoted(submodule.name()) + " is for " + quoted(submodule.target().to_string()),
                 "Compile it by itself");
   }
@@ -136,7 +137,7 @@ std::vector<uint64_t> feature_mask(const Target& target) {
 
 std::vector<Internal::LoweredFunc> exported_functions(const Module& module) {
   std::vector<std::pair<Internal::LoweredFunc, Module>> found;
-  collect(module, found);
+  collect(module, module, found);
   std::vector<Internal::LoweredFunc> functions;
   for (auto& [function, where] : found) functions.push_back(std::move(function));
   return functions;
@@ -152,7 +153,7 @@ Signature signature_of(const Internal::LoweredFunc& function, const Module& modu
 
 codegen::Program program_of(const Module& module) {
   std::vector<std::pair<Internal::LoweredFunc, Module>> found;
-  collect(module, found);
+  collect(module, module, found);
   codegen::Program program;
   for (const auto& [function, where] : found) {
     program.exports.push_back(export_of(function, where, program.functions.size()));

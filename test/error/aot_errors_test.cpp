@@ -85,7 +85,8 @@ TEST_F(AotErrors, FolderThatIsNotThere) {
       [&] {
         f.compile_to_file(path("no/such/a"), {in, gain}, "a", host);
       },
-      {"cannot write", "no/such/a", "No such file or directory"});
+      {"cannot write", "no/such/a", "folder must exist and be writable",
+       "the system says: No such file or directory", "Give a path that can be written"});
 }
 
 TEST_F(AotErrors, PathThatIsAFolder) {
@@ -223,6 +224,34 @@ TEST_F(AotErrors, TwoFunctionsOfOneName) {
   Module module = f.compile_to_module({in, gain}, "f", host);
   const Internal::LoweredFunc function = module.functions()[0];
   expect_error([&] { module.append(function); }, {"\"f\"", "have different names"});
+}
+
+TEST_F(AotErrors, TwoFunctionsOfOneNameInSubmodules) {
+  Module both("both", host);
+  for (const char* name : {"first", "second"}) {
+    Module part(name, host);
+    part.append(f.compile_to_module({in, gain}, "twin", host).functions()[0]);
+    both.append(part);
+  }
+  expect_error(
+      [&] {
+        both.compile({{OutputFileType::object, path("a.o")}});
+      },
+      {"compile the module \"both\"", "a module and its submodules have different names",
+       "two are called \"twin\"", "Rename one of them"});
+  EXPECT_TRUE(is_empty());
+}
+
+TEST_F(AotErrors, SubmoduleForAnotherTarget) {
+  Module both("both", Target("x86-64-linux"));
+  both.append(f.compile_to_module({in, gain}, "wide", Target("x86-64-linux-avx2")));
+  expect_error<Unsupported>(
+      [&] {
+        both.compile({{OutputFileType::object, path("a.o")}});
+      },
+      {"compile the module \"both\"", "are made for one target",
+       "\"wide\" is for \"x86-64-linux-avx", "Compile it by itself"});
+  EXPECT_TRUE(is_empty());
 }
 
 TEST_F(AotErrors, LinkedModulesForDifferentTargets) {
