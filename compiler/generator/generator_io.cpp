@@ -129,7 +129,8 @@ void GIOBase::check_not_generated(const char* asked) const {
 
 void GIOBase::check_index(size_t i) const {
   if (i < array_size()) return;
-  refuse(text("take element ", i, " of"), text("it has ", array_size(), " elements"), "", "");
+  refuse(text("take element ", i, " of"), "elements are counted from 0 to below the array's size",
+         text("its size is ", array_size()), "Take an element that it has, or give another size");
 }
 
 }  // namespace retrograde::Internal

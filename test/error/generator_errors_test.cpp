@@ -161,6 +161,77 @@ TEST(GeneratorErrors, GenerateDefinesWhatIsDeclared) {
   EXPECT_SAYS(refusal_of<Contradicting>(), "2 as the dimensions of the input \"in\"");
 }
 
+class Misnamed : public Generator<Misnamed> {
+ public:
+  Input<Buffer<float, 1>> in{"2nd input"};
+  Output<Buffer<float, 1>> out{"out"};
+  void generate() {}
+};
+class OneTooFar : public Generator<OneTooFar> {
+ public:
+  Input<int> shift{"shift"};
+  Output<Func[]> outs{"outs", Int(32), 1};
+  void generate() {
+    outs.resize(2);
+    for (size_t i = 0; i < 3; i++) outs[i](x) = x + shift;
+  }
+
+ private:
+  Var x{"x"};
+};
+
+TEST(GeneratorErrors, NamesAreIdentifiers) {
+  const std::string text = refusal_of<Misnamed>();
+  EXPECT_SAYS(text, "letters, digits and underscores");
+  EXPECT_SAYS(text, "it has the input \"2nd input\"");
+}
+
+TEST(GeneratorErrors, ElementsOfArraysAreThere) {
+  EXPECT_SAYS(refusal_of<OneTooFar>(), "take element 2 of the output \"outs\" of the generator");
+  EXPECT_SAYS(refusal_of<OneTooFar>(), "its size is 2");
+}
+
+TEST(GeneratorErrors, OpenDeclarationsHaveNoTypeDimensionsOrSize) {
+  class Open : public Generator<Open> {
+   public:
+    Input<Buffer<>> open{"open"};
+    Input<Func> two{"two", std::vector<Type>{Int(32), Int(8)}, 1};
+    Output<Func[]> funcs{"funcs"};
+    void generate() {}
+  };
+  const auto made = GeneratorContext(get_host_target()).create<Open>();
+  EXPECT_SAYS(message_of([&] { made->open.type(); }), "take the type of the input \"open\"");
+  EXPECT_SAYS(message_of([&] { made->open.dims(); }), "take the dimensions of the input \"open\"");
+  EXPECT_SAYS(message_of([&] { made->funcs.array_size(); }),
+              "take the array size of the output \"funcs\"");
+  EXPECT_SAYS(message_of([&] { made->two.type(); }), "it has 2");
+}
+
+TEST(GeneratorErrors, NumbersFitTheInputsType) {
+  class Byte : public Generator<Byte> {
+   public:
+    Input<uint8_t> level{"level"};
+    Output<Buffer<uint8_t, 1>> out{"out"};
+    void generate() {
+      Var x;
+      out(x) = level;
+    }
+  };
+  const GeneratorContext context(get_host_target());
+  const std::string text = message_of([&] { context.apply<Byte>(300); });
+  EXPECT_SAYS(text, "set the input \"level\" to 300");
+  EXPECT_SAYS(text, "its type is uint8");
+}
+
+TEST(GeneratorErrors, LoopLevelsAreForParamsOfTheirType) {
+  auto simple = GeneratorContext(get_host_target()).create<Simple>();
+  const std::string text = message_of([&] {
+    simple->set_generator_param_values({{"count", LoopLevel::root()}});
+  });
+  EXPECT_SAYS(text, "set the GeneratorParam \"count\" to \"root\"");
+  EXPECT_SAYS(text, "a LoopLevel was given");
+}
+
 TEST(GeneratorErrors, GradientsAreOfFloats) {
   class Whole : public Generator<Whole> {
    public:
@@ -246,7 +317,16 @@ TEST(GeneratorProgram, RefusesBadTargets) {
   expect_usage(run({"-g", "simple_for_errors", "-o", ".", "target=x86-64"}), "\"x86-64\"");
 }
 
+TEST(GeneratorProgram, RefusesOneRuntimeForMachinesThatDiffer) {
+  const Outcome result =
+      run({"-r", "rt", "-o", ".", "-e", "object", "target=x86-64-linux,x86-64-linux-debug"});
+  EXPECT_EQ(result.status, 1);
+  EXPECT_SAYS(result.errors, "make the runtime \"rt\"");
+  EXPECT_SAYS(result.errors, "\"x86-64-linux-debug\" and \"x86-64-linux\" need different ones");
+}
+
 TEST(GeneratorProgram, RefusesWhatIsNoFlag) {
+  expect_usage(run({"simple_for_errors"}), "\"simple_for_errors\" is neither");
   expect_usage(run({"--help"}), "\"--help\"");
   expect_usage(run({"-x", "1"}), "\"-x\"");
   expect_usage(run({"-g"}), "-g has none");
