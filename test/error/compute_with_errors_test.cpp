@@ -120,6 +120,13 @@ TEST_F(ComputeWithErrors, OtherKindsOfLoops) {
   expect_refused({"are of one kind", "\"y\" is serial", "is parallel"});
 }
 
+TEST_F(ComputeWithErrors, OtherPartitions) {
+  g.never_partition(y).compute_with(f, y);
+  expect_refused({"compute \"g", "are partitioned alike",
+                  "\"y\" was given another partition than that of \"f",
+                  "Give the directive to \"f"});
+}
+
 TEST_F(ComputeWithErrors, OnlyOneIsVectorized) {
   f.split(x, xo, xi, 8).vectorize(xi);
   g.split(x, xo, xi, 8).compute_with(f, xi);

@@ -66,6 +66,57 @@ TEST_F(ScheduleErrors, promised_bounds_that_are_too_small) {
   expect_mentions(message(), {"bounded to [0, 3]", "need [0, 8]"});
 }
 
+// ---- directives for what is inlined ----
+
+struct InlinedErrors : ScheduleErrors {
+  void expect_refused(std::initializer_list<const char*> phrases) {
+    const std::string said = message();
+    expect_mentions(said, phrases);
+    expect_mentions(said,
+                    {"is inlined into its users", "Compute \"producer", "at a loop or at root"});
+  }
+};
+
+TEST_F(InlinedErrors, storage_of_its_own) {
+  f.memoize();
+  expect_refused({"memoize \"producer", "has storage of its own"});
+}
+
+TEST_F(InlinedErrors, async) {
+  f.async();
+  expect_refused({"compute \"producer", "asynchronously", "has storage of its own"});
+}
+
+TEST_F(InlinedErrors, store_level) {
+  f.store_root();
+  expect_refused({"store \"producer", "at a level", "has storage of its own"});
+}
+
+TEST_F(InlinedErrors, hoisted_storage) {
+  f.hoist_storage_root();
+  expect_refused({"hoist the storage of \"producer", "has storage of its own"});
+}
+
+TEST_F(InlinedErrors, storage_layout) {
+  f.align_storage(x, 16);
+  expect_refused({"lay out the storage of \"producer", "in \"x\"", "has storage of its own"});
+}
+
+TEST_F(InlinedErrors, parallel_loop) {
+  f.parallel(y);
+  expect_refused({"parallelize \"producer", "over \"y\"", "has loops"});
+}
+
+TEST_F(InlinedErrors, vectorized_loop) {
+  f.vectorize(x);
+  expect_refused({"vectorize \"producer", "over \"x\"", "has loops"});
+}
+
+TEST_F(InlinedErrors, unrolled_loop) {
+  f.unroll(x);
+  expect_refused({"unroll \"producer", "over \"x\"", "has loops"});
+}
+
 TEST_F(ScheduleErrors, recursion_among_funcs_is_named) {
   Func a("a"), b("b");
   EXPECT_NE(error_of([&] {

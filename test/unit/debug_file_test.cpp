@@ -7,6 +7,7 @@
 #include <iterator>
 
 #include "frontend/include/retrograde/retrograde.h"
+#include "support/errors.h"
 
 namespace retrograde {
 namespace {
@@ -72,6 +73,28 @@ TEST(DebugToFile, AnUnwritablePathIsAnError) {
 
 TEST(DebugToFile, FormatsThatCannotBeWrittenAreRefused) {
   for (const char* name : {"f.tiff", "f.mat", "f"}) EXPECT_THROW(run(name), Unsupported) << name;
+}
+
+TEST(DebugToFile, TuplesAreRefused) {
+  Var x("x");
+  Func pair("pair"), out("out");
+  pair(x) = Tuple(x, 2 * x);
+  out(x) = pair(x)[0] + pair(x)[1];
+  pair.compute_root().debug_to_file("pair.npy");
+  expect_mentions(error_of<Unsupported>([&] { out.realize({4}); }),
+                  {"write \"pair\" to the file \"pair.npy\"", "one value of each point",
+                   "\"pair\" has 2", "one element of the Tuple"});
+}
+
+TEST(DebugToFile, TypesThatTheFormatsLackAreRefused) {
+  Var x("x");
+  Func half("half"), out("out");
+  half(x) = cast(Float(16), x);
+  out(x) = cast<float>(half(x));
+  half.compute_root().debug_to_file("half.npy");
+  expect_mentions(error_of<Unsupported>([&] { out.realize({4}); }),
+                  {"write \"half\" to the file \"half.npy\"", "the type of the elements",
+                   "of type float16", "Cast them to float"});
 }
 
 }  // namespace
