@@ -20,7 +20,8 @@
 //         by taking every k-th lane (ramps, broadcasts). The largest such subtrees with a load in
 //         them are split; dense loads stay whole. Splitting a node is linear in the nodes below it.
 //         Stores: neighbours of one buffer whose ramps have stride k and bases at distances
-//         0 ... k - 1 become one store, when no value reads the buffer.
+//         0 ... k - 1 become one store, when no value reads the buffer. What an Atomic loads from
+//         the element that it stores to stays whole, next to a store that does.
 // Not done: nested ramps; stores apart from each other.
 // Source: folklore. Tests: test/golden/lower/interleave_vectors/, loop_passes_test.
 #include "lower/interleave_vectors.h"
@@ -114,6 +115,8 @@ class LaneSplitter {
     }
     return result;
   }
+
+  void keep_whole(const Expr& e) { patterns_.insert_or_assign(e.get(), Entry{e, whole}); }
 
   // From now on `name`, which is bound to a vector, may be split like this.
   void bind(const std::string& name, const Expr& value, const Pattern& p) {
@@ -298,6 +301,7 @@ class Interleaver : public Rewriter {
 
   Stmt rewrite(const Stmt& s) override {
     if (const auto* let = s.as<LetStmt>()) return visit_let(s, *let);
+    if (const auto* atomic = s.as<Atomic>()) keep_own_loads(*atomic);
     const Stmt copy = children(s);
     const auto* block = copy.as<Block>();
     return block ? merge_stores(*block) : copy;
@@ -326,6 +330,17 @@ class Interleaver : public Rewriter {
   }
 
   // ---- stores ----
+
+  // An update is one operation of its element only while both have the same index.
+  void keep_own_loads(const Atomic& n) {
+    const auto* store = n.body.as<Store>();
+    if (!store) return;
+    walk(store->value, [&](const Expr& e) {
+      const auto* load = e.as<Load>();
+      if (load && load->name == store->name) splitter_.keep_whole(e);
+      return true;
+    });
+  }
 
   static Stmt merge_stores(const Block& block) {
     std::vector<Stmt> result;

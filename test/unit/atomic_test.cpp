@@ -142,6 +142,20 @@ TEST(Atomic, VectorizedUpdatesWithConflictingLanesAreExact) {
   for (int i = 0; i < bins; i++) EXPECT_EQ(out(i), expected[i]) << i;
 }
 
+// Neighbouring lanes meet in an element whose place has a pattern: no pass may take it apart.
+TEST(Atomic, LanesThatMeetInPairsAreExact) {
+  constexpr int width = 4, height = 6;
+  Var x("x");
+  RVar t("t"), outer("outer"), lanes("lanes");
+  RDom r(0, width, 0, height);
+  Func f("f");
+  f(x) = cast<int8_t>(1);
+  f(r.y) += cast<int8_t>(r.x + 1);
+  f.update().fuse(r.x, r.y, t).split(t, outer, lanes, 8).atomic().vectorize(lanes).parallel(outer);
+  Buffer<int8_t> out = f.realize({height});
+  for (int i = 0; i < height; i++) EXPECT_EQ(out(i), 1 + width * (width + 1) / 2) << i;
+}
+
 // All lanes go to one element: they are added up first.
 TEST(Atomic, OneElementTakesVectorsFromAllThreads) {
   for (int threads : {1, 2, 8}) {
