@@ -662,15 +662,31 @@ class Generator {
   std::vector<bool> usable_;  // variables of the update being made; empty: all
 };
 
+// Takes the reduction variables from what folds away: the terms of an update whose domain is gone.
+void forget_domain(FuncSpec& func, int update) {
+  const int first = func.dimensions;
+  const int count = static_cast<int>(func.updates[update].domain.size());
+  const auto renumbered = [&](int v) { return v < first ? v : v < first + count ? -1 : v - count; };
+  const auto forget = [&](Index& index) { index.variable = renumbered(index.variable); };
+  func.updates[update].domain.clear();
+  func.updates[update].predicate.clear();
+  for (Index& index : func.updates[update].left) forget(index);
+  for_each_term_of_stage(func, update + 1, [&](Term& term) {
+    for (Index& index : term.indices) forget(index);
+    if (term.action != Action::Variable) return;
+    term.source = renumbered(term.source);
+    if (term.source < 0) term = constant(term.type, 0);
+  });
+}
+
 // The language knows a reduction domain by its use: an update that does not mention it has none.
 // Only the Funcs themselves tell, because constants fold when terms become expressions.
 void drop_unused_domains(PipelineSpec& pipeline) {
   const BuiltPipeline built = build(pipeline);
   for (size_t f = 0; f < pipeline.funcs.size(); ++f) {
     for (size_t u = 0; u < pipeline.funcs[f].updates.size(); ++u) {
-      if (!built.funcs[f].rvars(static_cast<int>(u)).empty()) continue;
-      pipeline.funcs[f].updates[u].domain.clear();
-      pipeline.funcs[f].updates[u].predicate.clear();
+      const int update = static_cast<int>(u);
+      if (built.funcs[f].rvars(update).empty()) forget_domain(pipeline.funcs[f], update);
     }
   }
 }
