@@ -239,11 +239,13 @@ Pipeline GeneratorBase::get_pipeline() {
 }
 
 std::vector<Func> GeneratorBase::output_funcs(const std::string& name) const {
+  std::string list;
   for (const GeneratorOutputBase* output : members_.outputs) {
     if (output->name() == name) return output->funcs();
+    list += (list.empty() ? "" : ", ") + quoted(output->name());
   }
   user_error("take the output " + quoted(name) + " of the generator " + quoted(name_),
-             "the generator declares it", "it has no output of that name");
+             "the generator declares it", "its outputs are " + list, "Name one of these");
 }
 
 void GeneratorBase::add_requirements(Pipeline& pipeline) const {
@@ -254,7 +256,7 @@ std::vector<Argument> GeneratorBase::input_arguments() const {
   std::vector<Argument> arguments;
   for (const GeneratorInputBase* input : members_.inputs) {
     for (const InputValue& value : input->values()) {
-      if (!value.parameter) {
+      if (!value.parameter || value.parameter->is_literal) {
         user_error("compile the generator " + quoted(name_) + " ahead of time",
                    "its inputs are those of the compiled function",
                    quoted(input->name()) + " was given a value from C++",

@@ -232,6 +232,65 @@ TEST(GeneratorErrors, LoopLevelsAreForParamsOfTheirType) {
   EXPECT_SAYS(text, "a LoopLevel was given");
 }
 
+class NoOutput : public Generator<NoOutput> {
+ public:
+  Input<float> in{"in"};
+  void generate() {}
+};
+class TooLate : public Generator<TooLate> {
+ public:
+  Output<Buffer<float, 1>> out{"out"};
+  void generate() { add_input<float>("late"); }
+};
+class TooEarly : public Generator<TooEarly> {
+ public:
+  Input<float> in{"in"};
+  Output<Buffer<float, 1>> out{"out"};
+  void configure() { Expr early = in * 2.0f; }
+  void generate() {}
+};
+class Undefined : public Generator<Undefined> {
+ public:
+  Output<Buffer<float, 1>> out{"out"};
+  void generate() { out = Func("nothing"); }
+};
+
+TEST(GeneratorErrors, EachPhaseHasWhatItMayDo) {
+  EXPECT_SAYS(refusal_of<NoOutput>(), "at least one Output");
+  EXPECT_SAYS(refusal_of<TooLate>(), "add the input \"late\" to the generator");
+  EXPECT_SAYS(refusal_of<TooEarly>(), "use the input \"in\" of the generator");
+  EXPECT_SAYS(refusal_of<Undefined>(), "to the output \"out\" of the generator");
+}
+
+TEST(GeneratorErrors, WhatIsMadeIsTakenAfterwards) {
+  auto simple = GeneratorContext(get_host_target()).create<Simple>();
+  EXPECT_SAYS(message_of([&] { simple->get_pipeline(); }), "once generate() has run");
+  EXPECT_SAYS(message_of([&] { simple->output_funcs("off"); }), "its outputs are \"out\"");
+  simple->apply(Buffer<float>(4));
+  EXPECT_SAYS(message_of([&] { simple->in.set_type(Float(32)); }), "Do it in configure()");
+  EXPECT_SAYS(message_of([&] { simple->build_module(); }), "\"in\" was given a value from C++");
+}
+
+TEST(GeneratorErrors, NumbersForOpenPartsAreWholeAndNotNegative) {
+  EXPECT_SAYS(refusal("in.dim", "-1"), "set in.dim of the generator");
+  EXPECT_SAYS(refusal("in.dim", "two"), "\"two\" is not");
+}
+
+TEST(GeneratorErrors, SizesOfArraysAreSaidOnce) {
+  class Fixed : public Generator<Fixed> {
+   public:
+    Input<int[2]> in{"in"};
+    Output<Buffer<int, 1>> out{"out"};
+    void generate() {}
+  };
+  auto fixed = GeneratorContext(get_host_target()).create<Fixed>();
+  const std::string text = message_of([&] {
+    fixed->set_generator_param_values({{"in.size", "3"}});
+  });
+  EXPECT_SAYS(text, "use 3 as the array size of the input \"in\"");
+  EXPECT_SAYS(text, "it is 2");
+}
+
 TEST(GeneratorErrors, GradientsAreOfFloats) {
   class Whole : public Generator<Whole> {
    public:
