@@ -192,7 +192,7 @@ class Factoring {
     std::vector<Expr> conditions;
     for (const Expr& e : leaves_.tails) conditions.push_back(place(e));
     for (const Expr& e : conjuncts_) conditions.push_back(place(e));
-    if (!conditions.empty()) partial.predicate = ir::conjunction(conditions);
+    partial.predicate = reading_last(conditions);
     set_domain(partial, domain);
     partial.schedule = schedule_with(renames);
     for (ir::Dim dim : update_.schedule.dims) {
@@ -205,6 +205,18 @@ class Factoring {
     }
     take_prefetches(partial.schedule);
     return partial;
+  }
+
+  // All conditions, or nothing where there are none. What is read for one of them is read only
+  // where those that read nothing hold: past the end of a split there is nothing to read.
+  static Expr reading_last(const std::vector<Expr>& conditions) {
+    std::vector<Expr> plain, reading;
+    for (const Expr& e : conditions) (has_load(e) ? reading : plain).push_back(e);
+    if (reading.empty()) return plain.empty() ? Expr() : ir::conjunction(plain);
+    const Expr last = ir::conjunction(reading);
+    if (plain.empty()) return last;
+    return ir::call_op(ir::Op::if_then_else, Bool(),
+                       {ir::conjunction(plain), last, ir::const_false()});
   }
 
   // References to f become references to the intermediate Func at `args`.

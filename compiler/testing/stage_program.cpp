@@ -86,6 +86,8 @@ class Flattener {
         return Step::Code::Random;
       case Op::require:
         return Step::Code::Require;
+      case Op::if_then_else:  // what is not chosen is not evaluated
+        return Step::Code::Select;
       case Op::print:
       case Op::print_when:
         return Step::Code::Print;

@@ -99,6 +99,29 @@ TEST_F(Rfactor, ThePreservedLoopMayRunPastItsEnds) {
       {6});
 }
 
+// What the condition reads lies where the domain does, not where a rounded loop goes.
+TEST_F(Rfactor, ConditionsReadNothingPastTheEnds) {
+  expect_same(
+      [&](bool scheduled) {
+        Func f("f"), g("g");
+        RDom r(4, 5);
+        g(x) = x % 3;
+        g.compute_root();
+        r.where(g(r) > 0);
+        f(x) = 9;
+        f(clamp(g(r), 0, 5)) = min(f(clamp(g(r), 0, 5)), cast<int>(r));
+        if (scheduled) {
+          f.update().split(r, rxo, rxi, 4);
+          Func partial = f.update().rfactor(rxo, u);
+          Var uo("uo"), ui("ui");
+          partial.compute_root();
+          partial.update().split(u, uo, ui, 1 << 16, TailStrategy::RoundUp);
+        }
+        return f;
+      },
+      {6});
+}
+
 TEST_F(Rfactor, TwiceMakesATree) {
   expect_same(
       [&](bool scheduled) {
