@@ -4,7 +4,6 @@
 #include <chrono>
 #include <sstream>
 
-#include "aot/archive.h"
 #include "aot/files.h"
 #include "aot/header.h"
 #include "aot/html.h"
@@ -12,6 +11,7 @@
 #include "aot/merge_objects.h"
 #include "aot/program.h"
 #include "aot/runtime_object.h"
+#include "codegen/archive.h"
 #include "codegen/machine.h"
 #include "diagnostics/error.h"
 #include "diagnostics/large_stack.h"
@@ -154,10 +154,11 @@ class Outputs {
     return aot::merge_objects(object(), aot::runtime_object(module_.target()));
   }
   std::string library() const {
-    std::vector<aot::Member> members = {{aot::name_parts(module_.name()).back() + ".o", object()}};
+    std::vector<codegen::Member> members = {
+        {aot::name_parts(module_.name()).back() + ".o", object()}};
     if (has_runtime())
       members.push_back({"retrograde_runtime.o", aot::runtime_object(module_.target())});
-    return aot::archive(members);
+    return codegen::archive(members);
   }
 };
 
@@ -197,7 +198,7 @@ class MultitargetOutputs {
   const std::string& name_;
   const std::vector<Module>& modules_;
   const std::vector<std::string>& suffixes_;
-  std::vector<aot::Member> members_;
+  std::vector<codegen::Member> members_;
 
   const Module& baseline() const { return modules_.back(); }
   bool has_runtime() const { return !baseline().target().has_feature(Target::NoRuntime); }
@@ -243,11 +244,11 @@ class MultitargetOutputs {
     if (type == OutputFileType::registration)
       return aot::registration_text(functions, baseline().target());
     RETROGRADE_ASSERT(type == OutputFileType::static_library, "an output without a writer");
-    std::vector<aot::Member> members = members_;
+    std::vector<codegen::Member> members = members_;
     members.push_back({aot::name_parts(name_).back() + "_wrapper.o", wrapper_object()});
     if (has_runtime())
       members.push_back({"retrograde_runtime.o", aot::runtime_object(baseline().target())});
-    return aot::archive(members);
+    return codegen::archive(members);
   }
 };
 
@@ -297,7 +298,7 @@ class AheadOfTime : public ModuleCompiler {
     for (const auto& [type, path] : output_files) {
       const bool is_library = type == OutputFileType::static_library;
       files.push_back(
-          {path, is_library ? aot::archive({{"retrograde_runtime.o", object}}) : object});
+          {path, is_library ? codegen::archive({{"retrograde_runtime.o", object}}) : object});
     }
     aot::write_files(files);
   }

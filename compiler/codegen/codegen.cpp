@@ -3,7 +3,6 @@
 #include "codegen/codegen.h"
 
 #include <llvm/IR/Verifier.h>
-#include <llvm/Object/ArchiveWriter.h>
 #include <llvm/Support/raw_ostream.h>
 
 #include <algorithm>
@@ -12,6 +11,7 @@
 #include <thread>
 #include <utility>
 
+#include "codegen/archive.h"
 #include "codegen/function_generator.h"
 #include "codegen/make_exports.h"
 #include "codegen/split_module.h"
@@ -126,13 +126,9 @@ std::vector<Part> compile_parts(const std::string& name, const std::vector<std::
 }
 
 std::string archive_of(const std::vector<Part>& parts) {
-  std::vector<llvm::NewArchiveMember> members;
-  for (const Part& part : parts) members.emplace_back(llvm::MemoryBufferRef(part.object, "part.o"));
-  auto buffer = llvm::writeArchiveToBuffer(members, llvm::SymtabWritingMode::NoSymtab,
-                                           llvm::object::Archive::K_GNU, /*Deterministic=*/true,
-                                           /*Thin=*/false);
-  if (!buffer) internal_error("writing an archive: " + llvm::toString(buffer.takeError()));
-  return (*buffer)->getBuffer().str();
+  std::vector<Member> members;
+  for (const Part& part : parts) members.push_back({"part.o", part.object});
+  return archive(members);
 }
 
 // The parts run at the same time: what is told is how long the slowest took.

@@ -5,6 +5,7 @@
 
 #include "diagnostics/error.h"
 #include "frontend/define.h"
+#include "ir/text.h"
 #include "ir/visit.h"
 #include "lower/specialize.h"
 
@@ -40,20 +41,6 @@ int depth_of(const StageSchedule& schedule, const std::string& var) {
 
 const Dim& loop_at(const StageSchedule& schedule, int depth) {
   return schedule.dims[schedule.dims.size() - depth];
-}
-
-const char* kind_of(const Dim& dim) {
-  switch (dim.for_type) {
-    case ForType::Serial:
-      return "serial";
-    case ForType::Parallel:
-      return "parallel";
-    case ForType::Vectorized:
-      return "vectorized";
-    case ForType::Unrolled:
-      return "unrolled";
-  }
-  internal_error("a loop of no type");
 }
 
 std::string loops_text(const StageSchedule& schedule) {
@@ -165,10 +152,11 @@ class JoiningCheck {
                  "Split and reorder both alike, or name a loop further out");
     }
     if (own.for_type != other.for_type) {
-      user_error(asked_, "loops that run as one are of one kind",
-                 text("the loop ", quoted(own.var), " is ", kind_of(own), ", and ",
-                      quoted(other.var), " of ", quoted(level_.func), " is ", kind_of(other)),
-                 "Give both loops the same directives");
+      user_error(
+          asked_, "loops that run as one are of one kind",
+          text("the loop ", quoted(own.var), " is ", for_name(own.for_type), ", and ",
+               quoted(other.var), " of ", quoted(level_.func), " is ", for_name(other.for_type)),
+          "Give both loops the same directives");
     }
     if (own.partition != other.partition && own.partition != Partition::Auto) {
       user_error(asked_, "loops that run as one are partitioned alike",

@@ -7,6 +7,7 @@
 #include "diagnostics/large_stack.h"
 #include "ir/build.h"
 #include "ir/print.h"
+#include "ir/text.h"
 #include "ir/visit.h"
 #include "lower/build_loop_nests.h"
 #include "lower/inline_functions.h"
@@ -16,19 +17,7 @@
 namespace retrograde::ir {
 namespace {
 
-const char* keyword(ForType type) {
-  switch (type) {
-    case ForType::Serial:
-      return "for";
-    case ForType::Parallel:
-      return "parallel";
-    case ForType::Vectorized:
-      return "vectorized";
-    case ForType::Unrolled:
-      return "unrolled";
-  }
-  internal_error("a loop of no type");
-}
+const char* keyword(ForType type) { return type == ForType::Serial ? "for" : for_name(type); }
 
 // Names as users wrote them, without the numbers that make them unique ("f$1_in_g$2"); but the
 // variables of vectorize(x, 8) and its like have no other name: "v$3" is shown as "v3".

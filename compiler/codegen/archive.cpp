@@ -1,11 +1,11 @@
-#include "aot/archive.h"
+#include "codegen/archive.h"
 
 #include <llvm/Object/ArchiveWriter.h>
 #include <llvm/Support/MemoryBuffer.h>
 
 #include "diagnostics/error.h"
 
-namespace retrograde::aot {
+namespace retrograde::codegen {
 
 std::string archive(const std::vector<Member>& members) {
   std::vector<llvm::NewArchiveMember> parts;
@@ -18,4 +18,4 @@ std::string archive(const std::vector<Member>& members) {
   return (*buffer)->getBuffer().str();
 }
 
-}  // namespace retrograde::aot
+}  // namespace retrograde::codegen
