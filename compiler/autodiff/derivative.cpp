@@ -110,6 +110,16 @@ std::vector<Func> Derivative::funcs() const {
 
 const std::vector<Explanation>& Derivative::explanations() const { return result_->explanations; }
 
+GradientOperations Derivative::operations() const {
+  return {ir::count_operations({result_->output}), ir::count_operations(result_->gradients)};
+}
+
+std::optional<double> GradientOperations::ratio() const {
+  auto before = primal.operations().value(), after = gradient.operations().value();
+  if (!before || !after || *before == 0) return std::nullopt;
+  return *after / *before;
+}
+
 Derivative propagate_adjoints(const Func& output, const Func& adjoint, const Region& output_bounds,
                               const AdjointOptions& options) {
   check_output(output);

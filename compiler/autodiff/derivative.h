@@ -12,11 +12,13 @@
 
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "autodiff/explain.h"
+#include "autodiff/operation_count.h"
 #include "frontend/buffer.h"
 #include "frontend/func.h"
 #include "frontend/image_param.h"
@@ -29,6 +31,16 @@ struct SynthesisResult;
 }
 
 class AdjointInput;
+
+// What the output takes to compute, and what the gradients by all that was requested take (with no
+// request: by all images and parameters), each as a pipeline of its own. What the gradients read of
+// the primal counts among theirs.
+struct GradientOperations {
+  ir::OperationCount primal, gradient;
+  // gradient over primal; nothing where a count depends on extents known at run time only. The
+  // cheap-gradient principle bounds it by a small constant, whatever the number of inputs.
+  std::optional<double> ratio() const;
+};
 
 class Derivative {
  public:
@@ -55,6 +67,8 @@ class Derivative {
   // What was built and how, what was left out, and why a gradient is zero.
   const std::vector<Explanation>& explanations() const;
   std::string explain() const { return to_string(explanations()); }
+  // Counted with the schedules that the Funcs have now.
+  GradientOperations operations() const;
 
  private:
   Func of_parameter(const ir::ParameterContents& parameter) const;

@@ -44,6 +44,11 @@ Regions::Regions(const std::vector<FuncPtr>& order, const Box& output) {
   for (auto f = order.rbegin(); f != order.rend(); ++f) add_func(*f);
 }
 
+Regions::Regions(const std::vector<FuncPtr>& order, const std::map<const Symbol*, Box>& outputs)
+    : boxes_(outputs.begin(), outputs.end()) {
+  for (auto f = order.rbegin(); f != order.rend(); ++f) add_func(*f);
+}
+
 void Regions::add(const FuncPtr& f, const Box& box) {
   grow(f.get(), box);
   add_func(f);

@@ -1,6 +1,7 @@
 // The region of every Func that a region of the outputs needs: what the adjoint sums over.
 #pragma once
 
+#include <map>
 #include <unordered_map>
 #include <vector>
 
@@ -14,6 +15,8 @@ class Regions {
  public:
   // `order`: producers before consumers, the output last. `output`: its region.
   Regions(const std::vector<FuncPtr>& order, const Box& output);
+  // The same for several outputs, anywhere in the order.
+  Regions(const std::vector<FuncPtr>& order, const std::map<const Symbol*, Box>& outputs);
 
   // One more Func and its region, and what it reads.
   void add(const FuncPtr& f, const Box& box);

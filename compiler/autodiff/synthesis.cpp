@@ -54,6 +54,8 @@ class Synthesis {
     }
     for (const auto& parameter : parameters_of({seed_.output})) finish_parameter(parameter);
     explain_absent();
+    result_.output = {seed_.output, seed_.region};
+    list_gradients();
     return std::move(result_);
   }
 
@@ -309,6 +311,27 @@ class Synthesis {
       if (e.kind == kind && e.subject == subject && e.detail == detail) return;
     }
     result_.explanations.push_back({kind, subject, detail});
+  }
+
+  void list_gradients() {
+    for (const auto& p : parameters_of({seed_.output})) {
+      auto found = result_.parameters.find(p.get());
+      if (found == result_.parameters.end() || !is_requested(p.get())) continue;
+      result_.gradients.push_back({found->second, box_of(target_of(*p).region)});
+    }
+    if (result_.gradients.empty() || options_.only_requested) list_func_gradients();
+  }
+  void list_func_gradients() {
+    for (const FuncPtr& f : order_) {
+      auto found = result_.after_stage.find({f.get(), f->stage_count() - 1});
+      if (found == result_.after_stage.end() || !is_requested(f.get())) continue;
+      result_.gradients.push_back({found->second, box_of(target_of(*f).region)});
+    }
+  }
+  static Box box_of(const std::vector<LoopVariable>& region) {
+    Box box;
+    for (const LoopVariable& v : region) box.push_back({v.min, v.max});
+    return box;
   }
 
   // What was asked for and got no contribution is zero, and says why.

@@ -19,6 +19,7 @@
 
 #include "autodiff/accumulation.h"
 #include "autodiff/explain.h"
+#include "autodiff/operation_count.h"
 #include "autodiff/regions.h"
 #include "frontend/function.h"
 
@@ -43,6 +44,10 @@ struct SynthesisResult {
   std::map<const Symbol*, FuncPtr> parameters;  // images and scalars
   std::vector<FuncPtr> funcs;                   // all that was made, producers before consumers
   std::vector<Explanation> explanations;
+  // What was differentiated, and what for: the adjoints of what was requested, else of all images
+  // and parameters, or of all Funcs where there are none.
+  WantedFunc output;
+  std::vector<WantedFunc> gradients;
 };
 
 SynthesisResult synthesize_adjoints(const Seed& seed, const SynthesisOptions& options);

@@ -1,0 +1,330 @@
+#include "autodiff/operation_count.h"
+
+#include <algorithm>
+#include <cmath>
+#include <unordered_map>
+
+#include "autodiff/default_schedule.h"
+#include "autodiff/local_derivative.h"
+#include "autodiff/regions.h"
+#include "diagnostics/error.h"
+#include "ir/build.h"
+#include "ir/print.h"
+#include "ir/visit.h"
+#include "simplify/simplify.h"
+
+namespace retrograde::ir {
+
+namespace {
+
+std::string number_text(double value) {
+  bool whole = value == std::floor(value) && std::abs(value) < 1e15;
+  return whole ? std::to_string(static_cast<int64_t>(value)) : text(value);
+}
+
+Operations of_operator(const Call& call) {
+  switch (call.op) {
+    case Op::strong_mul:  // a product and a choice
+      return {.adds = 1, .mults = 1};
+    case Op::lerp:
+      return {.adds = 2, .mults = 2};
+    case Op::absd:
+      return {.adds = 2};
+    case Op::abs:
+    case Op::floor:
+    case Op::ceil:
+    case Op::round:
+    case Op::trunc:
+    case Op::is_nan:
+    case Op::is_inf:
+    case Op::is_finite:
+    case Op::saturating_cast:
+    case Op::if_then_else:
+      return {.adds = 1};
+    default:
+      break;
+  }
+  OpClass cls = op_info(call.op).cls;
+  return cls == OpClass::Pure || call.op == Op::random ? Operations{.nonlinear = 1} : Operations{};
+}
+
+// Work of the node itself, where floats take part in it.
+Operations of_node(const Expr& e) {
+  bool floating = e.type().is_float();
+  for_each_child(e, [&](const Expr& child) { floating |= child.type().is_float(); });
+  if (!floating) return {};
+  if (const auto* call = e.as<Call>())
+    return call->call_type == CallType::Operator ? of_operator(*call) : Operations{};
+  if (e.as<Mul>() || e.as<Div>() || e.as<Mod>()) return {.mults = 1};
+  return e.as<Binary>() || e.as<Select>() || e.as<Cast>() ? Operations{.adds = 1} : Operations{};
+}
+
+// The distinct nodes below some expressions, equal ones taken together.
+class DistinctNodes {
+ public:
+  std::vector<Expr> nodes;
+  void add(const Expr& root) { number_of(root); }
+
+ private:
+  // A node is printed with numbers in place of its children: equal text, equal node.
+  Expr number_of(const Expr& e) {
+    auto [seen, is_new] = by_node_.try_emplace(e.get());
+    if (!is_new) return seen->second;
+    Expr shallow = map_children(e, [&](const Expr& child) { return number_of(child); });
+    auto [known, is_distinct] = by_text_.try_emplace(print(shallow));
+    if (is_distinct) {
+      known->second = variable("node#" + std::to_string(nodes.size()), e.type());
+      nodes.push_back(e);
+    }
+    return by_node_[e.get()] = known->second;
+  }
+  std::unordered_map<const ExprNode*, Expr> by_node_;
+  std::unordered_map<std::string, Expr> by_text_;
+};
+
+// One iteration of a stage, or one value of a Func: its own work, and what it reads.
+struct Body {
+  Operations own;
+  std::vector<const Call*> reads;  // of Funcs
+  std::vector<Expr> kept_alive;
+};
+
+Body body_of(const std::vector<Expr>& roots) {
+  DistinctNodes distinct;
+  for (const Expr& root : roots) {
+    if (root.defined()) distinct.add(without_lets(root));
+  }
+  Body body;
+  for (const Expr& node : distinct.nodes) {
+    body.own += of_node(node);
+    const auto* call = node.as<Call>();
+    if (!call || call->call_type == CallType::Operator) continue;
+    if (call->call_type == CallType::Func) {
+      body.reads.push_back(call);
+    } else {
+      body.own.moves += 1;
+    }
+  }
+  body.kept_alive = std::move(distinct.nodes);
+  return body;
+}
+
+class Counter {
+ public:
+  explicit Counter(const std::vector<WantedFunc>& outputs)
+      : outputs_(funcs_of(outputs)),
+        order_(topological_order(outputs_)),
+        regions_(order_, regions_of(outputs)),
+        schedules_(default_schedules(outputs_)) {}
+
+  OperationCount run() {
+    for (const FuncPtr& f : order_) count(f);
+    for (auto f = result_.funcs.rbegin(); f != result_.funcs.rend(); ++f) count_evaluations(*f);
+    return std::move(result_);
+  }
+
+ private:
+  static std::vector<FuncPtr> funcs_of(const std::vector<WantedFunc>& outputs) {
+    std::vector<FuncPtr> result;
+    for (const WantedFunc& wanted : outputs) result.push_back(wanted.func);
+    return result;
+  }
+  static std::map<const Symbol*, Box> regions_of(const std::vector<WantedFunc>& outputs) {
+    std::map<const Symbol*, Box> result;
+    for (const WantedFunc& wanted : outputs) {
+      Box& box = result[wanted.func.get()];
+      box = hull(box, wanted.region);
+    }
+    return result;
+  }
+
+  bool is_stored(const FuncPtr& f) const {
+    return !f->is_pure() || schedules_.contains(f.get()) ||
+           f->schedule.compute_level.kind != LoopLevel::Kind::Inlined ||
+           std::find(outputs_.begin(), outputs_.end(), f) != outputs_.end();
+  }
+
+  void count(const FuncPtr& f) {
+    FuncOperations entry{f, regions_.of(f.get()), is_stored(f), {}, {}, {}, f->is_extern()};
+    if (entry.stored) {
+      int bytes = 0;
+      for (Type t : f->types) bytes += t.bytes();
+      entry.evaluations = elements(entry);
+      entry.bytes = entry.evaluations * bytes;
+    }
+    for (int s = 0; s < f->stage_count(); ++s) entry.stages.push_back(count_stage(entry, s));
+    if (!entry.stored) {
+      for (const Expr& value : f->pure->values)
+        value_costs_[f.get()].push_back(with_reads(body_of({value})));
+    }
+    places_[f.get()] = result_.funcs.size();
+    result_.funcs.push_back(std::move(entry));
+  }
+
+  // None where the region is empty: nobody reads it.
+  static Count elements(const FuncOperations& f) {
+    return f.region.empty() && f.func->dimensions() > 0 ? Count() : Count::points(f.region);
+  }
+
+  StageOperations count_stage(const FuncOperations& entry, int s) {
+    const FuncContents& f = *entry.func;
+    if (f.is_extern()) return {};
+    const Definition& definition = f.stage(s);
+    std::vector<Expr> roots = definition.values;
+    roots.insert(roots.end(), definition.args.begin(), definition.args.end());
+    roots.push_back(definition.predicate);
+    Body& body = bodies_[&definition] = body_of(roots);
+    StageOperations stage{with_reads(body), {}};
+    if (!entry.stored) return stage;
+    stage.each.moves += static_cast<double>(definition.values.size());
+    if (entry.region.empty() && f.dimensions() > 0) return stage;
+    Box box;
+    for (const LoopVariable& v : regions_.domain(f, s).vars) box.push_back({v.min, v.max});
+    stage.iterations = Count::points(box);
+    return stage;
+  }
+
+  Operations with_reads(const Body& body) const {
+    Operations result = body.own;
+    for (const Call* call : body.reads) {
+      auto inlined = value_costs_.find(call->symbol.raw());
+      if (inlined == value_costs_.end()) {
+        result.moves += 1;
+      } else {
+        result += inlined->second.at(static_cast<size_t>(call->value_index));
+      }
+    }
+    return result;
+  }
+
+  // Consumers first: how often `entry` runs is known, and so how often what it reads does.
+  void count_evaluations(FuncOperations& entry) {
+    for (size_t s = 0; s < entry.stages.size(); ++s) {
+      auto body = bodies_.find(&entry.func->stage(static_cast<int>(s)));
+      if (body == bodies_.end()) continue;
+      const Count& runs = entry.stored ? entry.stages[s].iterations : entry.evaluations;
+      for (const Call* call : body->second.reads) {
+        FuncOperations& callee = result_.funcs[places_.at(call->symbol.raw())];
+        if (!callee.stored) callee.evaluations += runs;
+      }
+    }
+  }
+
+  std::vector<FuncPtr> outputs_, order_;
+  Regions regions_;
+  DefaultSchedules schedules_;
+  std::unordered_map<const Symbol*, std::vector<Operations>> value_costs_;  // of what is inlined
+  std::unordered_map<const Definition*, Body> bodies_;
+  std::unordered_map<const Symbol*, size_t> places_;
+  OperationCount result_;
+};
+
+}  // namespace
+
+Operations& Operations::operator+=(const Operations& other) {
+  moves += other.moves;
+  adds += other.adds;
+  mults += other.mults;
+  nonlinear += other.nonlinear;
+  return *this;
+}
+
+Count Count::points(const Box& box) {
+  double factor = 1;
+  std::vector<std::string> symbols;
+  Count unknown;
+  unknown.unknown_ = true;
+  for (const Interval& i : box) {
+    if (!i.is_bounded()) return unknown;
+    Expr extent = simplify(i.max - i.min + 1);
+    if (auto constant = as_const_int(extent)) {
+      factor *= static_cast<double>(std::max<int64_t>(*constant, 0));
+    } else {
+      symbols.push_back(print(extent));
+    }
+  }
+  if (symbols.empty()) return factor;
+  std::sort(symbols.begin(), symbols.end());
+  std::string product;
+  for (const std::string& s : symbols) product += (product.empty() ? "" : "*") + s;
+  Count result;
+  if (factor != 0) result.terms_[product] = factor;
+  return result;
+}
+
+Count& Count::operator+=(const Count& other) {
+  constant_ += other.constant_;
+  unknown_ |= other.unknown_;
+  for (const auto& [product, factor] : other.terms_) terms_[product] += factor;
+  return *this;
+}
+
+Count operator*(const Count& count, double factor) {
+  Count result;
+  if (factor == 0) return result;
+  result = count;
+  result.constant_ *= factor;
+  for (auto& [product, f] : result.terms_) f *= factor;
+  return result;
+}
+
+std::optional<double> Count::value() const {
+  if (unknown_ || !terms_.empty()) return std::nullopt;
+  return constant_;
+}
+
+std::string Count::text() const {
+  if (unknown_) return "unknown";
+  if (terms_.empty()) return number_text(constant_);
+  std::string out = constant_ != 0 ? number_text(constant_) : "";
+  for (const auto& [product, factor] : terms_) {
+    out += out.empty() ? "" : " + ";
+    out += factor == 1 ? product : number_text(factor) + "*" + product;
+  }
+  return out;
+}
+
+Count FuncOperations::operations() const {
+  Count total;
+  if (!stored) return total;
+  for (const StageOperations& s : stages) total += s.iterations * s.each.total();
+  return total;
+}
+
+Count OperationCount::sum(double Operations::*part) const {
+  Count total;
+  for (const FuncOperations& f : funcs) {
+    if (!f.stored) continue;
+    for (const StageOperations& s : f.stages) total += s.iterations * (s.each.*part);
+  }
+  return total;
+}
+Count OperationCount::moves() const { return sum(&Operations::moves); }
+Count OperationCount::adds() const { return sum(&Operations::adds); }
+Count OperationCount::mults() const { return sum(&Operations::mults); }
+Count OperationCount::nonlinear() const { return sum(&Operations::nonlinear); }
+
+Count OperationCount::operations() const {
+  Count total;
+  for (const FuncOperations& f : funcs) total += f.operations();
+  return total;
+}
+
+Count OperationCount::bytes() const {
+  Count total;
+  for (const FuncOperations& f : funcs) total += f.bytes;
+  return total;
+}
+
+const FuncOperations* OperationCount::find(const FuncContents* f) const {
+  for (const FuncOperations& entry : funcs) {
+    if (entry.func.get() == f) return &entry;
+  }
+  return nullptr;
+}
+
+OperationCount count_operations(const std::vector<WantedFunc>& outputs) {
+  return Counter(outputs).run();
+}
+
+}  // namespace retrograde::ir
