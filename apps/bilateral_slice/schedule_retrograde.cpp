@@ -131,7 +131,9 @@ void schedule_guide_gradient(TrainingPipeline& t) {
   vectorize_all(depth, m.x);
   unroll_reduction(depth, 0, {m.x, m.y});
 
-  Func slopes = t.adjoints(m.row_slopes), mixture = t.adjoints(m.row_mixture);
+  // Sums over a row's pixels: in double on wide photos.
+  Func slopes = t.adjoints.accumulator(t.adjoints(m.row_slopes)),
+       mixture = t.adjoints.accumulator(t.adjoints(m.row_mixture));
   slopes.compute_root().bound(m.k, 0, m.shape.knots).vectorize(m.k).parallel(m.y);
   slopes.update().reorder(m.k, slopes.rvars(0)[0], m.y).vectorize(m.k).parallel(m.y);
   mixture.compute_root().bound(m.i, 0, 4).vectorize(m.i).parallel(m.y);

@@ -142,30 +142,70 @@ std::vector<ReductionVariable> rvars_of(const Gather& g) {
 
 class Builder {
  public:
-  Builder(const AdjointTarget& target, const std::string& name) : target_(target) {
-    result_.func = std::make_shared<AdjointContents>();
-    result_.func->name = claim_name(name);
+  Builder(const AdjointTarget& target, const std::string& name)
+      : target_(target), name_(claim_name(name)), types_(target.types) {
     for (const std::string& arg : target.args) args_.push_back(variable(arg));
   }
 
   AdjointFunc build(const std::vector<Contribution>& contributions,
                     const std::vector<Expr>& initial) {
+    std::vector<UpdateGroup> groups = group_updates(contributions, types_.size());
+    bool is_long = std::any_of(groups.begin(), groups.end(), [&](const UpdateGroup& group) {
+      return sums_many_terms(group.gather);
+    });
+    if (is_long) widen();
+    result_.func = new_func(is_wide_ ? claim_name(name_ + "_sum") : name_);
     define_pointwise(contributions, initial);
     note_traits(result_.func, initial);
     for (const Contribution& c : contributions) {
       note_traits(result_.func, {c.adjoint});
       if (leaves_zeros(c)) static_cast<AdjointContents&>(*result_.func).traits.masked = true;
     }
-    for (const UpdateGroup& group : group_updates(contributions, target_.types.size())) {
+    for (const UpdateGroup& group : groups) {
       is_worth_splitting(group.gather) ? add_privatised(group) : add_update(group);
     }
+    if (is_wide_) round_once();
     return std::move(result_);
   }
 
  private:
+  static FuncPtr new_func(const std::string& name) {
+    FuncPtr f = std::make_shared<AdjointContents>();
+    f->name = name;
+    return f;
+  }
+
+  // ---- long sums ----
+
+  void widen() {
+    for (Type& t : types_) {
+      is_wide_ |= t.bits() < 64;
+      t = Float(64, t.lanes());
+    }
+  }
+  void round_once() {
+    result_.accumulator = result_.func;
+    result_.helpers.push_back(result_.accumulator);
+    result_.func = new_func(name_);
+    std::vector<Expr> values;
+    for (size_t k = 0; k < types_.size(); ++k) {
+      values.push_back(
+          cast_to(target_.types[k], call_value(result_.accumulator, args_, static_cast<int>(k))));
+    }
+    define_pure(result_.func, args_, values);
+    note_traits(result_.func, values);
+  }
+
+  // Whether an element may get many terms. Data may send all iterations of a scatter to one.
+  bool sums_many_terms(const Gather& g) const {
+    return g.rdom && (is_worth_splitting(g) || iterations_of(g, many_terms) >= many_terms);
+  }
+
+  // ---- definitions ----
+
   void define_pointwise(const std::vector<Contribution>& contributions,
                         const std::vector<Expr>& initial) {
-    std::vector<Expr> values(target_.types.size());
+    std::vector<Expr> values(types_.size());
     for (size_t k = 0; k < initial.size(); ++k) values[k] = initial[k];
     for (const Contribution& c : contributions) {
       if (!is_pointwise(c.gather)) continue;
@@ -174,8 +214,7 @@ class Builder {
       value = value.defined() ? value + term : term;
     }
     for (size_t k = 0; k < values.size(); ++k) {
-      values[k] =
-          values[k].defined() ? cast_to(target_.types[k], values[k]) : make_zero(target_.types[k]);
+      values[k] = values[k].defined() ? cast_to(types_[k], values[k]) : make_zero(types_[k]);
     }
     define_pure(result_.func, args_, values);
     result_.stages.push_back(Accumulation::Pointwise);
@@ -184,7 +223,7 @@ class Builder {
   void add_update(const UpdateGroup& group) {
     const Gather& g = group.gather;
     std::vector<Expr> values;
-    for (size_t k = 0; k < target_.types.size(); ++k) {
+    for (size_t k = 0; k < types_.size(); ++k) {
       Expr self = call_value(result_.func, g.lhs, static_cast<int>(k));
       Expr term = group.sums[k];
       if (term.defined() && !g.rdom) term = masked(g.predicate, term);
@@ -198,12 +237,17 @@ class Builder {
   // iterations.
   bool is_worth_splitting(const Gather& g) const {
     if (!g.rdom || elements_of(g) > few_elements) return false;
+    double iterations = iterations_of(g, many_iterations);
+    return iterations >= (has_pure_dimension(g) ? many_iterations : part_count * lane_count);
+  }
+  // A loop of unknown extent counts as `unknown` iterations.
+  static double iterations_of(const Gather& g, double unknown) {
     double iterations = 1;
     for (const ReductionVariable& r : g.rdom->vars) {
       auto extent = as_const_int(r.extent);
-      iterations *= extent ? static_cast<double>(*extent) : many_iterations;
+      iterations *= extent ? static_cast<double>(*extent) : unknown;
     }
-    return iterations >= (has_pure_dimension(g) ? many_iterations : part_count * lane_count);
+    return iterations;
   }
   // Elements that the pure dimensions of the update run over; a great many when unknown.
   double elements_of(const Gather& g) const {
@@ -262,12 +306,11 @@ class Builder {
   // iterations may meet.
   void add_privatised(const UpdateGroup& group) {
     const Gather& g = group.gather;
-    FuncPtr parts = std::make_shared<AdjointContents>();
-    parts->name = claim_name(result_.func->name + "_parts");
+    FuncPtr parts = new_func(claim_name(name_ + "_parts"));
     Expr part = variable(unique_name("part")),
          lane = g.scatters ? Expr() : variable(unique_name("lane"));
     std::vector<Expr> zeros;
-    for (Type t : target_.types) zeros.push_back(make_zero(t));
+    for (Type t : types_) zeros.push_back(make_zero(t));
     define_pure(parts, parts_point(g, args_, lane, part), zeros);
 
     Slice slice = slice_of(g, lane, part);
@@ -275,7 +318,7 @@ class Builder {
     std::vector<Expr> element;
     for (const Expr& e : g.lhs) element.push_back(substitute(e, slice.place));
     std::vector<Expr> lhs = parts_point(g, element, lane, part), values;
-    for (size_t k = 0; k < target_.types.size(); ++k) {
+    for (size_t k = 0; k < types_.size(); ++k) {
       Expr self = call_value(parts, lhs, static_cast<int>(k));
       const Expr& term = group.sums[k];
       values.push_back(term.defined() ? self + cast_to(self.type(), substitute(term, slice.place))
@@ -312,7 +355,7 @@ class Builder {
     std::vector<Expr> point =
         parts_point(g, lhs, has_lanes ? rvar(0) : Expr(), rvar(rdom->vars.size() - 1));
     std::vector<Expr> values;
-    for (size_t k = 0; k < target_.types.size(); ++k) {
+    for (size_t k = 0; k < types_.size(); ++k) {
       values.push_back(call_value(result_.func, lhs, static_cast<int>(k)) +
                        call_value(parts, point, static_cast<int>(k)));
     }
@@ -321,6 +364,9 @@ class Builder {
   }
 
   const AdjointTarget& target_;
+  std::string name_;
+  std::vector<Type> types_;  // in which to accumulate
+  bool is_wide_ = false;     // wider than the target's
   std::vector<Expr> args_;
   AdjointFunc result_;
 };

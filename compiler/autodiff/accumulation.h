@@ -9,6 +9,15 @@
 //   of the outermost reduction
 //               variable, and lanes of the innermost, accumulate apart in a Func of their own, and
 //               are then summed in order. The result does not depend on the number of threads.
+//
+// Long sums. Adding n float32 terms one after the other may lose log2(n) bits: 12 million times 0.1
+// is wrong by a tenth. An adjoint in float32 that sums many_terms iterations or more for an element
+// (or an unknown number, or whatever a scatter brings to it) is accumulated in double, private
+// parts included, by a Func of its own, f_adj_sum, and is rounded once: f_adj(y) =
+// float(f_adj_sum(y)). So its error is that of its terms, under every schedule, and only the result
+// can overflow. Compensated sums in float32 would cost four dependent additions a term and break
+// under reassociation by rfactor; a tree costs storage. Shorter sums stay in float32: gathers over
+// stencils and small kernels, at most many_terms * 2^-24 of the sum of absolute values wrong.
 #pragma once
 
 #include <string>
@@ -32,11 +41,15 @@ struct AdjointTarget {
   std::vector<LoopVariable> region;
 };
 
+// Iterations from which float32 terms are summed in double.
+inline constexpr double many_terms = 4096;
+
 enum class Accumulation : uint8_t { Pointwise, Gather, Scatter, Privatised };
 
 struct AdjointFunc {
   FuncPtr func;
-  std::vector<FuncPtr> helpers;      // private parts
+  std::vector<FuncPtr> helpers;      // private parts, then the accumulator
+  FuncPtr accumulator;               // sums in double what func rounds; null: func itself
   std::vector<Accumulation> stages;  // how each stage of func accumulates; the first is Pointwise
 };
 

@@ -87,6 +87,11 @@ Func Derivative::adjoint(const Func& func) const {
   return (*this)(func, func.num_update_definitions() - 1);
 }
 
+Func Derivative::accumulator(const Func& adjoint) const {
+  auto it = result_->accumulators.find(adjoint.function().get());
+  return it == result_->accumulators.end() ? adjoint : Func(it->second);
+}
+
 Func Derivative::of(const AdjointInput& input) const {
   if (auto f = std::dynamic_pointer_cast<ir::FuncContents>(input.symbol())) return adjoint(Func(f));
   return of_parameter(dynamic_cast<const ir::ParameterContents&>(*input.symbol()));

@@ -61,6 +61,9 @@ class Derivative {
   Func adjoint(const Func& func) const;
   // The same for an input of any kind.
   Func of(const AdjointInput& input) const;
+  // Where an adjoint is summed up, for schedules by hand: the adjoint itself; or, where an element
+  // gets many terms (accumulation.h), the Func in double that it rounds.
+  Func accumulator(const Func& adjoint) const;
 
   // Everything that was made, producers before consumers: adjoints, private parts, helpers.
   std::vector<Func> funcs() const;

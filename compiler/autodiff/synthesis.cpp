@@ -284,6 +284,8 @@ class Synthesis {
                      const std::vector<LoopVariable>& region) {
     for (const FuncPtr& helper : adjoint.helpers) result_.funcs.push_back(helper);
     result_.funcs.push_back(adjoint.func);
+    if (adjoint.accumulator) result_.accumulators[adjoint.func.get()] = adjoint.accumulator;
+    const FuncContents& accumulating = adjoint.accumulator ? *adjoint.accumulator : *adjoint.func;
     int gathers = 0, scatters = 0, privatised = 0;
     for (Accumulation a : adjoint.stages) {
       gathers += a == Accumulation::Gather;
@@ -293,12 +295,18 @@ class Synthesis {
     explain(Explanation::Kind::Built, primal,
             text(quoted(adjoint.func->name), ", ", gathers, " gathers over reduction domains, ",
                  scatters, " scatters inside pure dimensions, ", privatised, " privatised sums",
-                 size_text(*adjoint.func, region)));
+                 size_text(accumulating, region)));
     if (gathers + scatters + privatised > 0) {
       explain(Explanation::Kind::Performance, primal,
-              text("unless a directive schedules ", quoted(adjoint.func->name),
+              text("unless a directive schedules ", quoted(accumulating.name),
                    ", it is computed at root, in parallel over its outermost dimension, in vectors "
                    "along its first"));
+    }
+    if (adjoint.accumulator) {
+      explain(Explanation::Kind::Built, primal,
+              text(quoted(accumulating.name), " adds up in double what ",
+                   quoted(adjoint.func->name), " rounds once: an element may get ",
+                   static_cast<int>(many_terms), " terms or more"));
     }
     if (privatised > 0) {
       explain(Explanation::Kind::Privatised, primal,

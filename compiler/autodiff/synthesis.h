@@ -41,8 +41,9 @@ struct Seed {
 struct SynthesisResult {
   // By Func and stage: the adjoint of the Func as it is after that stage.
   std::map<std::pair<const Symbol*, int>, FuncPtr> after_stage;
-  std::map<const Symbol*, FuncPtr> parameters;  // images and scalars
-  std::vector<FuncPtr> funcs;                   // all that was made, producers before consumers
+  std::map<const Symbol*, FuncPtr> parameters;    // images and scalars
+  std::map<const Symbol*, FuncPtr> accumulators;  // of adjoints that sum in double: by adjoint
+  std::vector<FuncPtr> funcs;                     // all that was made, producers before consumers
   std::vector<Explanation> explanations;
   // What was differentiated, and what for: the adjoints of what was requested, else of all images
   // and parameters, or of all Funcs where there are none.

@@ -1,0 +1,166 @@
+// Adjoints that sum millions of float32 terms are right to 1e-6 of the sum of absolute values,
+// under every schedule, whether they gather or scatter. Oracle: the same terms, added in long
+// double.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+#include <numeric>
+
+#include "autodiff/derivative.h"
+#include "frontend/func.h"
+
+namespace retrograde {
+namespace {
+
+constexpr int many = 12'000'000;
+constexpr float huge = 3e38f;
+
+struct Nature {
+  const char* name;
+  std::function<float(int)> term;  // of `many`
+};
+const std::vector<Nature>& natures() {
+  static const std::vector<Nature> all = {
+      {"constant", [](int) { return 0.1f; }},
+      {"random", [](int i) { return static_cast<float>((i * 2654435761u) >> 8) * 0x1p-24f; }},
+      {"growing", [](int i) { return static_cast<float>(i) * 1e-7f; }},
+      {"one huge among small", [](int i) { return i == 5 ? 1e7f : 0.3f; }},
+      {"big ones that cancel", [](int i) { return i % 2   ? 0.1f
+                                                  : i % 4 ? 1e6f
+                                                          : -1e6f; }},
+      {"overflowing but for the end", [](int i) { return i < many / 2 ? huge : -huge; }},
+  };
+  return all;
+}
+
+using Terms = std::vector<float>;
+Terms terms_of(const Nature& nature, int count = many) {
+  Terms result(static_cast<size_t>(count));
+  for (int i = 0; i < count; ++i) result[static_cast<size_t>(i)] = nature.term(i);
+  return result;
+}
+
+// Term i belongs to element i % elements.
+void expect_sums(const Buffer<float>& found, const Terms& terms) {
+  const size_t elements = static_cast<size_t>(found.width());
+  std::vector<long double> value(elements), absolute(elements);
+  for (size_t i = 0, e = 0; i < terms.size(); ++i, e = e + 1 == elements ? 0 : e + 1) {
+    value[e] += static_cast<long double>(terms[i]);
+    absolute[e] += std::fabs(static_cast<long double>(terms[i]));
+  }
+  for (size_t e = 0; e < elements; ++e) {
+    const float actual = found(static_cast<int>(e));
+    EXPECT_LE(std::fabs(static_cast<long double>(actual) - value[e]), 1e-6L * absolute[e])
+        << "element " << e << ": " << actual << " instead of " << value[e];
+  }
+}
+
+using Schedule = std::function<void(Func)>;  // of the Func that sums
+
+// loss = sum over e and row of gain(e) * terms(e, row): the gradient sums each column.
+void check_gather(int elements, Terms& terms, const Schedule& schedule = nullptr) {
+  const int rows = static_cast<int>(terms.size()) / elements;
+  Var x("x"), y("y");
+  Func scaled("scaled"), loss("loss");
+  Buffer<float> gain(elements), columns(terms.data(), elements, rows);
+  gain.fill(1);
+  RDom r(0, elements, 0, rows);
+  scaled(x, y) = gain(x) * columns(x, y);
+  loss() = 0.0f;
+  loss() += scaled(r.x, r.y);
+  Derivative d = propagate_adjoints(loss);
+  if (schedule) schedule(d.accumulator(d(gain)));
+  expect_sums(d(gain).realize({elements}), terms);
+}
+
+// loss = sum over i of table(i % elements, by data) * terms(i)
+void check_scatter(int elements, Terms& terms) {
+  Func loss("loss");
+  Buffer<float> table(elements), all(terms.data(), static_cast<int>(terms.size()));
+  Buffer<int> place(elements);
+  table.fill(1);
+  std::iota(place.begin(), place.end(), 0);
+  RDom r(0, static_cast<int>(terms.size()));
+  loss() = 0.0f;
+  loss() += table(clamp(place(r % elements), 0, elements - 1)) * all(r);
+  Derivative d = propagate_adjoints(loss);
+  EXPECT_NE(d.explain().find("depend"), std::string::npos) << d.explain();
+  expect_sums(d(table).realize({elements}), terms);
+}
+
+TEST(LongSums, OfEveryNatureUnderTheDefaultSchedule) {
+  for (const Nature& nature : natures()) {
+    SCOPED_TRACE(nature.name);
+    Terms terms = terms_of(nature);
+    check_gather(1, terms);
+  }
+  Terms terms = terms_of(natures()[0]);
+  check_gather(200, terms);
+}
+
+TEST(LongSums, OfScattersToFewAndToManyElements) {
+  Terms constant = terms_of(natures()[0]), cancelling = terms_of(natures()[4], many / 4);
+  check_scatter(3, constant);
+  check_scatter(3, cancelling);
+  check_scatter(1000, cancelling);
+}
+
+TEST(LongSums, UnderSchedulesByHand) {
+  Terms terms = terms_of(natures()[0], many / 4);
+  Var part("part"), xo("xo"), xi("xi");
+  RVar outer("outer"), inner("inner");
+  const std::vector<Schedule> schedules = {
+      [](Func f) { f.compute_root(); },
+      [](Func f) { f.compute_root().update().parallel(f.args()[0]); },
+      [](Func f) { f.compute_root().update().vectorize(f.args()[0], 8); },
+      [&](Func f) {
+        f.compute_root().update().split(f.args()[0], xo, xi, 8).reorder(xi, f.rvars()[0], xo);
+        f.update().vectorize(xi).parallel(xo);
+      },
+      [&](Func f) {
+        f.compute_root().update().split(f.rvars()[0], outer, inner, 1000);
+        Func parts = f.update().rfactor(outer, part);
+        parts.compute_root().parallel(part).update().parallel(part);
+      },
+      [](Func f) { f.compute_root().update().atomic().vectorize(f.rvars()[0], 8); },
+  };
+  for (size_t s = 0; s < schedules.size(); ++s) {
+    SCOPED_TRACE("schedule " + std::to_string(s));
+    check_gather(200, terms, schedules[s]);
+  }
+}
+
+TEST(LongSums, ShortOnesStayInFloat32) {
+  Var x("x");
+  Func blur("blur"), loss("loss");
+  Buffer<float> a(10010), b(10000);
+  RDom taps(0, 9), r(0, 10000);
+  blur(x) = 0.0f;
+  blur(x) += a(x + taps) * b(taps);
+  loss() = 0.0f;
+  loss() += blur(r);
+  Derivative d = propagate_adjoints(loss);
+  EXPECT_EQ(d.accumulator(d(a)).name(), d(a).name());
+  EXPECT_EQ(d.accumulator(d(b)).types()[0], Float(64));
+  EXPECT_EQ(d(b).types()[0], Float(32));
+  EXPECT_NE(d.explain().find("adds up in double"), std::string::npos) << d.explain();
+}
+
+// loss = sum of exp(p t_i): d2/dp2 = sum of t_i^2 exp(p t_i), through the sum in double.
+TEST(LongSums, DifferentiateAgain) {
+  Terms terms(many, 0.1f);  // exp(0) is 1
+  Buffer<float> p(1), all(terms.data(), many);
+  p(0) = 0;
+  Func loss("loss"), slope("slope");
+  RDom r(0, many);
+  loss() = 0.0f;
+  loss() += exp(p(Expr(0)) * all(r));
+  Derivative first = propagate_adjoints(loss);
+  slope() = first(p)(0);
+  Buffer<float> second = propagate_adjoints(slope)(p).realize({1});
+  EXPECT_NEAR(second(0), many * 0.1f * 0.1f, many * 0.01 * 1e-6);
+}
+
+}  // namespace
+}  // namespace retrograde
