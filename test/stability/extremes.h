@@ -1,0 +1,19 @@
+// The inputs of the suite: every pair, or many random sets, of ordinary and of extreme numbers.
+#pragma once
+
+#include <array>
+#include <string>
+#include <vector>
+
+namespace retrograde::stability {
+
+// What is the most extreme among the numbers of a case; later ones win.
+enum class Extreme { Ordinary, Large, Zeros, Tiny, Denormals, Huge, Infinities, NaNs };
+constexpr int extreme_count = 8;
+const char* to_string(Extreme extreme);
+Extreme extreme_of(const std::vector<float>& numbers);
+
+// Of n numbers each. n = 1 and 2: every combination; more: random ones, the same each time.
+std::vector<std::vector<float>> cases(int n);
+
+}  // namespace retrograde::stability

@@ -1,0 +1,26 @@
+// The adjoint of a problem in float32, as machine code, against its true gradient.
+#pragma once
+
+#include <array>
+#include <string>
+
+#include "stability/extremes.h"
+#include "stability/problems.h"
+
+namespace retrograde::stability {
+
+// Cases whose true gradient is finite in float32.
+struct Cell {
+  int cases = 0;
+  int lost = 0;            // came out infinite or NaN
+  double worst_error = 0;  // of the others, relative to the case's largest derivative
+  std::string lost_at, worst_at;
+};
+struct Row {
+  std::array<Cell, extreme_count> cells;  // by the case's most extreme number
+  Cell left;  // the program's values or adjoints leave float32 (traced.h), whatever the numbers
+};
+
+Row measure(const Problem& problem);
+
+}  // namespace retrograde::stability

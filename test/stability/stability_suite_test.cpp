@@ -1,0 +1,78 @@
+// Every program of the suite on every input: the gradient that comes out of the compiler in float32
+// is finite where the true one is, and its errors are those that docs/stability.md states. The
+// oracle is described in problems.h and traced.h.
+//
+// The page is written here: RETROGRADE_UPDATE_GOLDEN=1 measures and writes it; read the difference
+// before you commit it. Its bounds are powers of ten, so that they hold on every machine; a bound
+// that is far from what is measured fails like one that does not hold.
+#include <gtest/gtest.h>
+
+#include <cctype>
+#include <cstdlib>
+#include <fstream>
+#include <iterator>
+#include <set>
+
+#include "stability/page.h"
+
+namespace retrograde::stability {
+namespace {
+
+const std::string path = RETROGRADE_TEST_DIR "/../docs/stability.md";
+
+std::string on_disk() {
+  std::ifstream file(path);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+// At denormals and close to float32's ends: 1 / y overflows where the derivative, adjoint / y, does
+// not. Rules are factors of the adjoint.
+const std::set<std::string> reciprocal_overflows = {
+    "m sqrt((x/m)² + (y/m)²), m = max(|x|, |y|)",
+    "x log(x)",
+    "-x log(x) - (1 - x) log(1 - x)",
+    "pow(x, y)",
+    "log(x / y)",
+    "atan(x / y)",
+    "2 x 2 system by elimination",
+    "Newton's square root, 8 steps",
+};
+
+class Suite : public ::testing::TestWithParam<size_t> {};
+
+TEST_P(Suite, GradientsAreFiniteAndErrorsAreThoseOfThePage) {
+  const Family family = all_families()[GetParam()];
+  const std::string page = on_disk();
+  for (const Problem& problem : family.problems) {
+    const Row row = measure(problem);
+    for (const Cell& cell : row.cells) {
+      if (reciprocal_overflows.contains(problem.name)) continue;
+      EXPECT_EQ(cell.lost, 0) << problem.name << " at " << cell.lost_at;
+    }
+    const std::string disagreement = disagreement_with(page, problem.name, row);
+    EXPECT_EQ(disagreement, "") << problem.name << "; RETROGRADE_UPDATE_GOLDEN=1 writes " << path;
+  }
+}
+
+std::string name_of(const ::testing::TestParamInfo<size_t>& info) {
+  std::string result;
+  const Family family = all_families()[info.param];
+  for (char c : family.name) {
+    if (std::isalpha(static_cast<unsigned char>(c))) result += c;
+  }
+  return result;
+}
+INSTANTIATE_TEST_SUITE_P(Families, Suite, ::testing::Range<size_t>(0, all_families().size()),
+                         name_of);
+
+TEST(StabilityPage, HasTheProgramsOfTheSuite) {
+  if (std::getenv("RETROGRADE_UPDATE_GOLDEN")) {
+    std::ofstream(path) << render([](const Problem& p) { return measure(p); });
+  }
+  // Everything but what was measured: a row's cells after the program.
+  EXPECT_EQ(without_figures(on_disk()),
+            without_figures(render([](const Problem&) { return Row(); })));
+}
+
+}  // namespace
+}  // namespace retrograde::stability
