@@ -22,6 +22,16 @@ class Inverter {
   }
 
   Inversion run() {
+    Inversion result = attempt();
+    if (!is_circular_) return result;
+    may_fix_ = is_circular_ = false;
+    fixed_.clear();
+    note_.clear();
+    return attempt();
+  }
+
+ private:
+  Inversion attempt() {
     resolve_indices();
     std::vector<std::vector<GroupPiece>> pieces;
     std::vector<Group> groups = make_groups();
@@ -33,7 +43,6 @@ class Inverter {
     return result;
   }
 
- private:
   void split_conjunction(const Expr& e) {
     if (const auto* both = e.as<And>()) {
       split_conjunction(both->a);
@@ -57,7 +66,7 @@ class Inverter {
       std::set<Expr, StructuralLess> obstacles;
       isl::map inverse = relation(bridge, obstacles).reverse();
       for (const Expr& obstacle : obstacles) {
-        if (!is_fixed_by(inverse, obstacle)) continue;
+        if (!may_fix_ || !is_fixed_by(inverse, obstacle)) continue;
         bridge.make_parameter(obstacle);
         fixed_.push_back(obstacle);
         progress = true;
@@ -201,6 +210,7 @@ class Inverter {
       Substitution now = g.iteration;
       for (auto& [name, e] : g.iteration) e = substitute(e, now);
     }
+    note_circular(g.iteration);
     predicate.insert(predicate.end(), residual_.begin(), residual_.end());
     for (Expr& e : predicate) e = substitute(e, g.iteration);
     for (size_t d = 0; d < g.lhs.size(); ++d) {
@@ -210,6 +220,13 @@ class Inverter {
     if (!predicate.empty()) g.predicate = conjunction(predicate);
     rename(g, extents);
     return g;
+  }
+
+  // f(x + s(x), x): isl may choose x = e0 - s(x), which says nothing. Without parameters it is e1.
+  void note_circular(const Substitution& iteration) const {
+    for (const auto& [name, e] : iteration) {
+      for (const LoopVariable& v : query_.domain.vars) is_circular_ |= uses_variable(e, v.name);
+    }
   }
 
   // From the inversion's own names to the target's variables and a reduction domain.
@@ -240,6 +257,8 @@ class Inverter {
   std::vector<Expr> fixed_;       // obstacles that are parameters
   std::vector<Expr> conjuncts_, residual_;
   std::string note_;
+  bool may_fix_ = true;               // parameters are allowed
+  mutable bool is_circular_ = false;  // a variable was found in terms of itself
 };
 
 }  // namespace

@@ -102,9 +102,12 @@ class Synthesis {
 
   // ---- contributions ----
 
+  // Over the bounds that were given: updates of the output may reach further, where the seed is 0.
   void add_seed() {
     const FuncPtr& f = seed_.output;
-    AccessQuery query{{regions_.loop_variables(f.get(), f->args), {}}, {}, f->args, {}};
+    AccessQuery query{{}, {}, f->args, regions_.loop_variables(f.get(), f->args)};
+    for (size_t d = 0; d < f->args.size(); ++d)
+      query.domain.vars.push_back({f->args[d], seed_.region[d].min, seed_.region[d].max});
     for (const std::string& arg : f->args) query.indices.push_back(variable(arg));
     Inversion inversion = invert_access(query);
     for (size_t k = 0; k < seed_.values.size(); ++k) {

@@ -4,6 +4,7 @@
 #include <set>
 
 #include "autodiff/default_schedule.h"
+#include "autodiff/local_derivative.h"
 #include "autodiff/recurrence.h"
 #include "autodiff/tape_layout.h"
 #include "autodiff/versions.h"
@@ -34,8 +35,7 @@ class Tape {
         iterations_(iteration_count(context.definition.rvars)) {}
 
   void run() {
-    adjoint_ = make_func(f_->name + "_adj_tape");
-    define_pure(adjoint_, tape_point(), initial_adjoint());
+    begin_adjoint();
     seeds_ = saved_seeds();
     SweepResult sweep = c_.sweep(seeds_);
     find_needed(sweep);
@@ -45,6 +45,17 @@ class Tape {
   }
 
  private:
+  // Its elements outside of what is read, and those that were overwritten, are exactly 0.
+  void begin_adjoint() {
+    const std::vector<Expr> initial = initial_adjoint();
+    auto contents = std::make_shared<AdjointContents>();
+    contents->name = claim_name(f_->name + "_adj_tape");
+    for (const Expr& e : initial) contents->traits.add(traits_of(e));
+    contents->traits.masked = true;
+    adjoint_ = contents;
+    define_pure(adjoint_, tape_point(), initial);
+  }
+
   FuncPtr make_func(const std::string& name) const {
     FuncPtr f = std::make_shared<AdjointContents>();
     f->name = claim_name(name);

@@ -90,6 +90,14 @@ PROGRAM(diagonal_of_a_matrix_of_funcs) {
   return squared(f, {6}, a);
 }
 
+// x is known from the second index only: the first says x = e0 - (a truth value of x).
+PROGRAM(diagonal_that_a_condition_bends) {
+  Buffer<float> a = plane(7, 6);
+  Func f("f");
+  f(x) = a(x + cast<int>(x == 0), x);
+  return squared(f, {6}, a);
+}
+
 PROGRAM(toeplitz) {
   Buffer<float> a = line(9);
   Func f("f");

@@ -131,6 +131,19 @@ PROGRAM(many_writers_of_one_element) {
   return {weighted_sum(f, {9}), {a}};
 }
 
+// Nothing reads row 0, where a tape runs the update backward.
+PROGRAM(infinite_factor_where_nothing_is_read) {
+  Buffer<float> a = line(), scale = line(1);
+  Buffer<int> row = places(2, 1);
+  Func big("big"), f("f"), g("g");
+  RDom r(0, 2);
+  big() = -std::numeric_limits<float>::infinity();
+  f(x, y) = sin(a(x));
+  f(r, clamp(row(r), 0, 4)) *= big() * scale(Expr(0));
+  g(x) = f(x, 1);
+  return {weighted_sum(g, {9}), {a}, true};
+}
+
 PROGRAM(gather_of_integers_that_were_floats) {
   Buffer<float> a = line(), b = line(9, 6);
   Func f("f");

@@ -10,10 +10,6 @@
 // random schedule may well ask for a thousand times the work. Only a directive: seeds whose
 // schedules do not use it are passed over and not counted. Exit code: 0 nothing found, 1 something
 // found.
-#include <sys/resource.h>
-#include <sys/wait.h>
-#include <unistd.h>
-
 #include <chrono>
 #include <csignal>
 #include <cstdio>
@@ -23,6 +19,7 @@
 #include <vector>
 
 #include "ir/target.h"
+#include "support/run_apart.h"
 #include "testing/check_program.h"
 #include "testing/print_program.h"
 #include "testing/reducer.h"
@@ -85,39 +82,15 @@ struct Finding {
   std::string detail;
 };
 
-std::string read_all(int descriptor) {
-  std::string result;
-  char chunk[4096];
-  for (ssize_t n; (n = read(descriptor, chunk, sizeof(chunk))) > 0;) result.append(chunk, n);
-  return result;
-}
-
-[[noreturn]] void run_child(const Program& program, int descriptor) {
-  const rlimit cpu = {max_cpu_seconds, max_cpu_seconds + 1};
-  setrlimit(RLIMIT_CPU, &cpu);
-  alarm(max_seconds);
-  const Outcome outcome =
-      check_program(program.pipeline, program.schedule, get_jit_target_from_environment());
-  const ssize_t written = write(descriptor, outcome.detail.data(), outcome.detail.size());
-  _exit(written < 0 ? 2 : static_cast<int>(outcome.verdict));
-}
-
-Finding run_apart(const Program& program) {
-  int ends[2];
-  if (pipe(ends) != 0) std::exit(2);
-  const pid_t child = fork();
-  if (child == 0) {
-    close(ends[0]);
-    run_child(program, ends[1]);
-  }
-  close(ends[1]);
-  Finding finding;
-  finding.detail = read_all(ends[0]);
-  close(ends[0]);
-  int status = 0;
-  waitpid(child, &status, 0);
-  finding.code = WIFSIGNALED(status) ? crashed + WTERMSIG(status) : WEXITSTATUS(status);
-  return finding;
+Finding run_program(const Program& program) {
+  const ApartLimits limits{max_cpu_seconds, max_seconds};
+  const ApartResult result = run_apart(limits, [&](std::string& detail) {
+    const Outcome outcome =
+        check_program(program.pipeline, program.schedule, get_jit_target_from_environment());
+    detail = outcome.detail;
+    return static_cast<int>(outcome.verdict);
+  });
+  return {result.signal ? crashed + result.signal : result.code, result.detail};
 }
 
 std::string describe(const Finding& finding) {
@@ -138,8 +111,8 @@ void report(uint64_t seed, const Program& program, const Finding& finding, bool 
   if (!may_shrink) return;
   const std::string kind = kind_of(finding);
   const Program small =
-      shrink(program, [&](const Program& p) { return kind_of(run_apart(p)) == kind; });
-  std::printf("shrunk, it %s\n%s\n", describe(run_apart(small)).c_str(),
+      shrink(program, [&](const Program& p) { return kind_of(run_program(p)) == kind; });
+  std::printf("shrunk, it %s\n%s\n", describe(run_program(small)).c_str(),
               to_cpp(small.pipeline, small.schedule).c_str());
   std::fflush(stdout);
 }
@@ -165,7 +138,7 @@ int main(int argc, char** argv) {
     if (!options.only.empty() && !uses(program, options.only)) continue;
     ++tried;
     if (options.print) std::puts(to_cpp(program.pipeline, program.schedule).c_str());
-    const Finding finding = run_apart(program);
+    const Finding finding = run_program(program);
     if (finding.code == static_cast<int>(Verdict::Agrees)) continue;
     if (finding.code == static_cast<int>(Verdict::Refused)) {
       ++refused;

@@ -1,0 +1,91 @@
+// Programs made to break propagate_adjoints: a fixed set of them has right gradients or is refused,
+// by the oracle of adversary/check.h (differences in double, forward against reverse mode, machine
+// code against the interpreter). And the oracle itself: it finds a gradient that is wrong, knows a
+// kink, and a failing list of choices shrinks to the smallest one. fuzz_adjoints runs many more.
+#include <gtest/gtest.h>
+
+#include <numeric>
+
+#include "gradient/adversary/check.h"
+
+namespace retrograde::gradient {
+namespace {
+
+constexpr unsigned programs_per_shard = 25, shards = 8, one_compiled_of = 8;
+
+class Adversary : public ::testing::TestWithParam<unsigned> {};
+
+TEST_P(Adversary, IsRightOrRefused) {
+  unsigned checked = 0;
+  for (unsigned i = 0; i < programs_per_shard; ++i) {
+    const unsigned seed = GetParam() * programs_per_shard + i + 1;
+    Choices choices(seed);
+    const Judged judged = judge(choices, i % one_compiled_of == 0);
+    EXPECT_LT(judged.judgement, Judgement::Wrong)
+        << "fuzz_adjoints --seed " << seed << ": " << judged.detail;
+    checked += judged.judgement == Judgement::Right;
+  }
+  EXPECT_GT(checked, programs_per_shard / 2);
+}
+
+INSTANTIATE_TEST_SUITE_P(Shard, Adversary, ::testing::Range(0u, shards));
+
+// out(x) = value(image(x)) over an image of `elements`.
+Judged judge_pointwise(Expr (*value)(const Expr&), float element) {
+  AdversaryProgram p;
+  Buffer<float> image(std::vector<int>{natural_size}, "image");
+  image.fill(element);
+  p.images.push_back(image);
+  p.scale.set(1.0f);
+  p.region = {{0}, {natural_size}};
+  Var x("x");
+  Func out("out");
+  out(x) = value(image(x)) * p.scale;
+  p.funcs = {out};
+  return judge(p, 1, false);
+}
+
+TEST(AdversaryOracle, AcceptsARightGradient) {
+  const auto square = [](const Expr& e) { return e * sin(e); };
+  EXPECT_EQ(judge_pointwise(square, 0.5f).judgement, Judgement::Right);
+}
+
+TEST(AdversaryOracle, FindsAGradientThatLacksATerm) {
+  const auto cut = [](const Expr& e) { return e * stop_gradient(e); };
+  EXPECT_EQ(judge_pointwise(cut, 0.5f).judgement, Judgement::Wrong);
+}
+
+TEST(AdversaryOracle, KnowsAKinkAndAJump) {
+  const auto kink = [](const Expr& e) { return max(e, 0.5f); };
+  const auto jump = [](const Expr& e) { return select(e > 0.5f, e, 2.0f * e); };
+  EXPECT_EQ(judge_pointwise(kink, 0.5f).judgement, Judgement::Kink);
+  EXPECT_EQ(judge_pointwise(kink, 0.75f).judgement, Judgement::Right);
+  EXPECT_EQ(judge_pointwise(jump, 0.5f).judgement, Judgement::Kink);
+}
+
+TEST(AdversaryOracle, PassesOverWhatIsNotFinite) {
+  const auto infinite = [](const Expr& e) { return 1.0f / (e - e); };
+  EXPECT_EQ(judge_pointwise(infinite, 0.5f).judgement, Judgement::Illegal);
+}
+
+TEST(AdversaryChoices, AreReplayedAndContinueWithZeros) {
+  Choices drawn(7);
+  std::vector<int> first;
+  for (int i = 0; i < 20; ++i) first.push_back(drawn.below(100));
+  Choices replayed(drawn.taken());
+  for (int i = 0; i < 20; ++i) EXPECT_EQ(replayed.below(100), first[static_cast<size_t>(i)]);
+  EXPECT_EQ(replayed.below(100), 0);
+  EXPECT_FALSE(replayed.chance(99));
+}
+
+TEST(AdversaryChoices, ShrinkToTheSmallestListThatFails) {
+  std::vector<uint32_t> list(40);
+  std::iota(list.begin(), list.end(), 3u);
+  const auto has_large_pair = [](const std::vector<uint32_t>& l) {
+    return l.size() >= 2 && l[0] >= 5 && l[1] >= 7;
+  };
+  EXPECT_EQ(shrink_choices(list, has_large_pair), (std::vector<uint32_t>{5, 7}));
+}
+
+}  // namespace
+}  // namespace retrograde::gradient

@@ -1,0 +1,35 @@
+// The oracle of one program: its gradient is right, or it is refused.
+#pragma once
+
+#include <string>
+
+#include "gradient/adversary/program.h"
+
+namespace retrograde::gradient {
+
+enum class Judgement : uint8_t {
+  Right,    // against central differences, and forward against reverse
+  Kink,     // no differences at a kink or a jump; forward agrees with reverse
+  Refused,  // UserError or Unsupported
+  Illegal,  // the program itself is refused, or its value is not finite
+  Wrong,    // the gradient is
+  Broken,   // InternalError or another exception
+};
+
+struct Judged {
+  Judgement judgement = Judgement::Right;
+  std::string detail;
+};
+
+const char* name_of(Judgement judgement);
+
+// Differences: of sum w * output along a random direction of all inputs, in double by the
+// interpreter, of sixth order in the step, with the differences between one-sided and two-sided
+// slopes as the bound on what they can tell. Forward mode: <J v, w> against <v, J^T w>, along the
+// inputs and along a Func. Machine code, when asked for: the gradients in their declared types,
+// within the rounding that the interpreter allows for, and the same bits twice.
+Judged judge(const AdversaryProgram& program, uint64_t seed, bool machine_code);
+// The same from choices.
+Judged judge(Choices& choices, bool machine_code);
+
+}  // namespace retrograde::gradient

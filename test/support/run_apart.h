@@ -1,0 +1,61 @@
+// Runs a function in a process of its own: a crash or a hang there is a result like any other.
+#pragma once
+
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <csignal>
+#include <cstdlib>
+#include <cstring>
+#include <functional>
+#include <string>
+
+namespace retrograde::fuzz {
+
+struct ApartResult {
+  int code = 0;    // what the function returned
+  int signal = 0;  // what ended it instead; SIGXCPU and SIGALRM: it took too long
+  std::string detail;
+
+  bool is_slow() const { return signal == SIGXCPU || signal == SIGALRM || signal == SIGKILL; }
+  std::string crash() const { return std::string("crashes: ") + strsignal(signal); }
+};
+
+struct ApartLimits {
+  unsigned cpu_seconds = 60;
+  unsigned seconds = 240;  // it may stand still for so long, on a machine however busy
+};
+
+// `f` returns an exit code below 256 and fills in the detail.
+inline ApartResult run_apart(const ApartLimits& limits, const std::function<int(std::string&)>& f) {
+  int ends[2];
+  if (pipe(ends) != 0) std::exit(2);
+  const pid_t child = fork();
+  if (child == 0) {
+    close(ends[0]);
+    const rlimit cpu = {limits.cpu_seconds, limits.cpu_seconds + 1};
+    setrlimit(RLIMIT_CPU, &cpu);
+    alarm(limits.seconds);
+    std::string detail;
+    const int code = f(detail);
+    const ssize_t written = write(ends[1], detail.data(), detail.size());
+    _exit(written < 0 ? 2 : code);
+  }
+  close(ends[1]);
+  ApartResult result;
+  char chunk[4096];
+  for (ssize_t n; (n = read(ends[0], chunk, sizeof(chunk))) > 0;)
+    result.detail.append(chunk, static_cast<size_t>(n));
+  close(ends[0]);
+  int status = 0;
+  waitpid(child, &status, 0);
+  if (WIFSIGNALED(status)) {
+    result.signal = WTERMSIG(status);
+  } else {
+    result.code = WEXITSTATUS(status);
+  }
+  return result;
+}
+
+}  // namespace retrograde::fuzz
