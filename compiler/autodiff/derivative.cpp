@@ -33,10 +33,26 @@ ir::Box box_of(const Region& bounds) {
   return box;
 }
 
+ir::CheckpointBudget budget_of(const AdjointOptions& options) {
+  const char* asked = "propagate adjoints with a budget for checkpoints";
+  if (options.checkpoint_states && options.checkpoint_bytes)
+    user_error(asked, "a budget is a number of states or of bytes",
+               "both checkpoint_states and checkpoint_bytes are set", "Set one of them");
+  int64_t states = options.checkpoint_states.value_or(1);
+  int64_t bytes = options.checkpoint_bytes.value_or(1);
+  if (states < 1 || bytes < 1)
+    user_error(
+        asked, "a loop is run backward from at least one kept state, the first",
+        text("the budget is ", states < 1 ? states : bytes, states < 1 ? " states" : " bytes"),
+        "Give a larger one");
+  return {options.checkpoint_states.value_or(0), options.checkpoint_bytes.value_or(0)};
+}
+
 ir::SynthesisOptions to_synthesis(const AdjointOptions& options) {
   ir::SynthesisOptions result;
   result.store_overwritten = options.overwritten == Overwritten::Store;
   result.only_requested = !options.wrt.empty();
+  result.checkpoints = budget_of(options);
   for (const AdjointInput& input : options.wrt) result.requested.insert(input.symbol().get());
   return result;
 }

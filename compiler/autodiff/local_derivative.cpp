@@ -85,7 +85,12 @@ LocalDerivative of_quotient(const Expr& e, const Div& quotient, const ExprFacts&
                 {{reciprocal, Strength::Strong}, {-(e * q), Strength::Strong}}, facts);
 }
 
+LocalDerivative choice_of(const Expr& condition, const Expr& a, const Expr& b) {
+  return {LocalDerivative::Kind::Choice, {a, b}, {}, condition, {}};
+}
+
 LocalDerivative of_call(const Expr& e, const Call& call, const ExprFacts& facts) {
+  if (call.is_op(Op::if_then_else)) return choice_of(call.args[0], call.args[1], call.args[2]);
   if (call.call_type == CallType::Extern) {
     unsupported(text("differentiate the call of the C function ", quoted(call.name)),
                 "a C function has no known derivative",
@@ -171,11 +176,7 @@ void ExprFacts::classify(const Expr& e, FunctionRef<bool(const Expr&)> is_wanted
 
 LocalDerivative local_derivative(const Expr& e, const ExprFacts& facts) {
   return match(
-      e,
-      [&](const Select& s) {
-        return LocalDerivative{
-            LocalDerivative::Kind::Choice, {s.true_value, s.false_value}, {}, s.condition, {}};
-      },
+      e, [&](const Select& s) { return choice_of(s.condition, s.true_value, s.false_value); },
       [&](const Cast& c) { return same_as(e, c.value); },
       [&](const Broadcast&) -> LocalDerivative {
         internal_error("vectors have no place in the definition of a Func");

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <set>
 
+#include "autodiff/checkpoint.h"
 #include "autodiff/update_relations.h"
 #include "autodiff/versions.h"
 #include "frontend/define.h"
@@ -33,7 +34,7 @@ class Recurrence {
     if (has_recurrence && !find_order(*reads)) return false;
     Expr written = written_elements();
     if (!written.defined()) return false;
-    check_values(*reads);
+    if (!find_values(*reads)) return false;
     if (has_recurrence) {
       own_current();
       sweep = c_.sweep_at_write(result_.current.func);
@@ -93,13 +94,15 @@ class Recurrence {
     }
   }
 
-  // A needed value must be the final one, or a kept version.
-  void check_values(const std::vector<SelfRead>& reads) {
+  // A needed value must be the final one, or a kept version; false: one that a budget for
+  // checkpoints is to bring back.
+  bool find_values(const std::vector<SelfRead>& reads) {
     for (const SelfRead& r : reads) {
       if (!r.is_needed) continue;
       const auto* call = r.call.as<Call>();
       bool later = is_written_later(c_, relations_, r.relation);
       if (!later && !r.relation.overwritten) continue;
+      if (wants_checkpoints(c_)) return false;
       if (!c_.query.store_overwritten) c_.refuse_overwritten(r.call);
       Expr after = later ? call_value(prefix(c_.query.stage + 1), call->args, call->value_index)
                          : call_value(c_.query.f, call->args, call->value_index);
@@ -112,6 +115,7 @@ class Recurrence {
               text("update ", c_.query.stage - 1, ": the value of ",
                    point_text(f_->name, call->args), " is kept in a copy"));
     }
+    return true;
   }
   const FuncPtr& prefix(int stages) {
     FuncPtr& copy = prefixes_[stages];

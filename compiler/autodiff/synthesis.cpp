@@ -142,7 +142,7 @@ class Synthesis {
     for (int s = f->stage_count() - 1; s >= 1; --s) {
       UpdateAdjoint update = differentiate_update(
           {f, s, regions_, target, adjoint, extendable, options_.store_overwritten,
-           [&](const Expr& leaf) { return is_wanted(leaf); }});
+           options_.checkpoints, [&](const Expr& leaf) { return is_wanted(leaf); }});
       if (update.current.func != adjoint.func)
         register_func(update.current, f->name, target.region);
       for (const FuncPtr& helper : update.helpers) result_.funcs.push_back(helper);
@@ -150,6 +150,9 @@ class Synthesis {
           update.seeds.empty() ? adjoints_at_write(*f, s, update.current.func) : update.seeds;
       for (const IterationDomain& domain : update.domains)
         contribute_stage(f, update.values, seeds, domain, update.self_values);
+      for (const GivenAdjoint& g : update.given) {
+        if (is_wanted(g.leaf.leaf)) add_contribution(f, g.leaf, g.domain);
+      }
       if (update.previous.func) register_func(update.previous, f->name, target.region);
       for (const Explanation& e : update.explanations) result_.explanations.push_back(e);
       adjoint = update.previous.func ? update.previous : update.current;

@@ -21,12 +21,14 @@
 #include "autodiff/explain.h"
 #include "autodiff/operation_count.h"
 #include "autodiff/regions.h"
+#include "autodiff/update.h"
 #include "frontend/function.h"
 
 namespace retrograde::ir {
 
 struct SynthesisOptions {
   bool store_overwritten = false;
+  CheckpointBudget checkpoints;
   bool only_requested = false;                  // else everything that the output depends on
   std::unordered_set<const Symbol*> requested;  // Funcs and parameters
 };

@@ -20,7 +20,9 @@ class TapeLayout {
   Expr slot_of(const std::vector<Expr>& args) const;
   // Whether `args` lies in the region, beside the pure dimensions.
   Expr is_inside(const std::vector<Expr>& args) const;
-  // Coordinates of the element that slot() stands for, or of the last one beyond them.
+  // Coordinates of element `number`, or of the nearest one there is.
+  std::vector<Expr> element(const Expr& number) const;
+  // The same for slot().
   std::vector<Expr> element_of_slot() const;
 
  private:

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "autodiff/checkpoint.h"
 #include "autodiff/recurrence.h"
 #include "autodiff/selection.h"
 #include "autodiff/tape.h"
@@ -27,7 +28,11 @@ class UpdateDifferentiation {
     bool fixed_places =
         std::none_of(c_.write.begin(), c_.write.end(), [&](const Expr& e) { return calls(e, f_); });
     if (fixed_places && (accumulates() || selects() || is_recurrence())) return std::move(result_);
-    differentiate_by_tape(c_, result_);
+    if (wants_checkpoints(c_)) {
+      differentiate_by_checkpoints(c_, result_);
+    } else {
+      differentiate_by_tape(c_, result_);
+    }
     return std::move(result_);
   }
 

@@ -15,6 +15,8 @@
 //   iteration
 //                 wrote make A a recurrence in the opposite order, reads of older values contribute
 //                 to the adjoint before the update.
+//   checkpoints   with a budget, anything else in a loop over time: run backward from a few kept
+//                 states (checkpoint.h).
 //   tape          anything else: the iterations run backward one by one inside each element of the
 //                 pure dimensions, and what they need is kept (tape.h).
 // A value that a partial needs must still be in f at the end: proven over index sets, never
@@ -28,12 +30,19 @@
 #include "autodiff/accumulation.h"
 #include "autodiff/explain.h"
 #include "autodiff/regions.h"
+#include "autodiff/reverse_sweep.h"
 #include "ir/equal.h"
 
 namespace retrograde::ir {
 
 // What a read of an updated Func by itself is in a partial, where it is not the final value.
 using SelfValues = std::map<Expr, Expr, StructuralLess>;
+
+// Room for states of a loop over time: one of the two numbers, or none.
+struct CheckpointBudget {
+  int64_t states = 0, bytes = 0;
+  bool is_given() const { return states > 0 || bytes > 0; }
+};
 
 struct UpdateQuery {
   FuncPtr f;
@@ -43,7 +52,14 @@ struct UpdateQuery {
   const AdjointFunc& adjoint;  // of f after the stage
   bool extendable;             // nothing reads it yet
   bool store_overwritten;
+  CheckpointBudget checkpoints;
   std::function<bool(const Expr&)> is_wanted;
+};
+
+// A contribution to what `leaf` reads, for each point of the domain.
+struct GivenAdjoint {
+  LeafAdjoint leaf;
+  IterationDomain domain;
 };
 
 struct UpdateAdjoint {
@@ -52,6 +68,7 @@ struct UpdateAdjoint {
   std::vector<Expr> values;              // to sweep for contributions to others; undefined: none
   std::vector<Expr> seeds;               // their adjoints; empty: `current` where the stage writes
   std::vector<IterationDomain> domains;  // over which
+  std::vector<GivenAdjoint> given;       // contributions to others that need no sweep
   SelfValues self_values;
   std::vector<FuncPtr> helpers;  // Funcs made on the way, producers first
   std::vector<Explanation> explanations;

@@ -1,0 +1,296 @@
+// Loops over time, run backward from a few kept states. Oracles: central differences; the gradient
+// that keeps all versions, bit by bit; the memory that the profiler sees; the steps that the
+// interpreter evaluates.
+#include <atomic>
+
+#include "gradient/programs_suite.h"
+#include "support/errors.h"
+
+namespace retrograde::gradient {
+namespace {
+
+Var x("x"), y("y");
+
+// u(x) pushed by a force for n steps, nonlinear in u.
+Program pushed(int n) {
+  Buffer<float> start = line(7), stiffness = line(1, 4), force = plane(7, n);
+  Func u("pushed_u");
+  RDom t(0, n);
+  u(x) = start(x);
+  u(x) = u(x) + 0.125f * (force(x, t) - stiffness(Expr(0)) * sin(u(x)));
+  return {weighted_sum(u, {7}), {start, stiffness, force}};
+}
+
+// A row that every step sweeps from left to right, in place: iterations of one step see each other.
+Program swept(int n) {
+  Buffer<float> start = line(8), weights = line(3, 4);
+  Func u("swept_u");
+  RDom r(1, 6, 0, n);
+  u(x) = start(x);
+  u(r.x) = weights(Expr(0)) * 0.25f * u(r.x - 1) + weights(Expr(1)) * 0.25f * sin(u(r.x)) +
+           weights(Expr(2)) * u(r.x + 1) * 0.125f;
+  return {weighted_sum(u, {8}), {start, weights}};
+}
+
+// Position and velocity of pendulums.
+Program pendulums(int n) {
+  Buffer<float> angle = line(5), gravity = line(5, 9);
+  Func u("pendulum"), end("end");
+  RDom t(0, n);
+  u(x) = Tuple(angle(x), 0.0f);
+  Expr wind = 0.0625f * cos(cast<float>(t));
+  Expr speed = u(x)[1] + wind - 0.125f * gravity(x) * sin(u(x)[0]);
+  u(x) = Tuple(u(x)[0] + 0.125f * speed, speed);
+  end(x) = u(x)[0] * u(x)[1];
+  return {weighted_sum(end, {5}), {angle, gravity}};
+}
+
+// Two rows that take turns.
+Program diffusion(int n) {
+  Buffer<float> start = line(9), k = line(9, 3);
+  Func u("two_rows");
+  RDom r(1, 7, 0, n);
+  u(x, y) = start(x) + 0.0f * cast<float>(y);
+  Expr old = r.y % 2, here = u(r.x, old);
+  u(r.x, (r.y + 1) % 2) =
+      here + 0.25f * k(r.x) * (u(r.x - 1, old) - 2.0f * here + u(r.x + 1, old)) * here;
+  return {weighted_sum(u, {9, 2}), {start, k}};
+}
+
+// Only some steps push some elements; time starts elsewhere.
+Program predicated(int n) {
+  Buffer<float> start = line(6), gain = line(6, 5);
+  Func u("predicated_u");
+  RDom r(0, 6, 3, n);
+  r.where(r.x + r.y < 9 && r.x % 2 == r.y % 2);
+  u(x) = start(x);
+  u(r.x) = u(r.x) * gain(r.x) * u(5 - r.x) + 0.125f;
+  return {weighted_sum(u, {6}), {start, gain}};
+}
+
+// What a step needs is known without its state: nothing is kept.
+Program linear(int n) {
+  Buffer<float> start = line(6), decay = plane(6, n, 8);
+  Func u("linear_u");
+  RDom t(0, n);
+  u(x) = start(x);
+  u(x) = u(x) * 0.75f + decay(x, t);
+  return {weighted_sum(u, {6}), {start, decay}};
+}
+
+struct Case {
+  const char* name;
+  Program (*build)(int n);
+};
+const Case cases[] = {{"pushed", pushed},         {"swept", swept},
+                      {"pendulums", pendulums},   {"diffusion", diffusion},
+                      {"predicated", predicated}, {"linear", linear}};
+
+TEST(Checkpoints, GradientsAgreeWithCentralDifferences) {
+  for (const Case& c : cases) {
+    SCOPED_TRACE(c.name);
+    Program p = c.build(6);
+    for (Buffer<float>& input : p.inputs) expect_gradient(p.loss, input, {.checkpoint_states = 2});
+  }
+}
+
+std::vector<double> values_of(const Func& gradient, const Buffer<float>& like, bool exact) {
+  oracle::InterpreterOptions options;
+  options.widen = !exact;
+  oracle::Region region = oracle::region_of(*like.raw_buffer());
+  std::vector<double> result;
+  oracle::Array array = oracle::Interpreter(options).realize(gradient.function(), region).front();
+  for (const oracle::Value& v : array.values) result.push_back(v.scalar.as_double());
+  return result;
+}
+
+// In float32, operation by operation. What a step contributes to inputs without a time axis is
+// summed from the last step to the first, and without a budget in another order: only rounded
+// alike.
+TEST(Checkpoints, GradientsAreTheBitsOfTheStoredOnes) {
+  for (const Case& c : cases) {
+    for (int n : {3, 7}) {
+      Program p = c.build(n);
+      Derivative stored = propagate_adjoints(p.loss, {.overwritten = Overwritten::Store});
+      for (int s : {1, 2, 3, 20}) {
+        SCOPED_TRACE(text(c.name, ", ", n, " steps, ", s, " states"));
+        Derivative d = propagate_adjoints(p.loss, {.checkpoint_states = s});
+        for (size_t i = 0; i < p.inputs.size(); ++i) {
+          std::vector<double> expected = values_of(stored(p.inputs[i]), p.inputs[i], true);
+          std::vector<double> found = values_of(d(p.inputs[i]), p.inputs[i], true);
+          for (size_t at = 0; at < expected.size(); ++at) {
+            if (i == 0) {
+              EXPECT_EQ(found[at], expected[at]);
+            } else {
+              EXPECT_NEAR(found[at], expected[at], 2e-6 * (1 + std::abs(expected[at])));
+            }
+          }
+        }
+      }
+    }
+  }
+}
+
+TEST(Checkpoints, MachineCodeGivesTheSameBitsForEveryBudget) {
+  for (const Case& c : cases) {
+    Program p = c.build(8);
+    std::vector<Buffer<float>> expected;
+    for (int s : {1, 3, 8}) {
+      SCOPED_TRACE(text(c.name, ", ", s, " states"));
+      Derivative d = propagate_adjoints(p.loss, {.checkpoint_states = s});
+      for (size_t i = 0; i < p.inputs.size(); ++i) {
+        oracle::Region region = oracle::region_of(*p.inputs[i].raw_buffer());
+        Buffer<float> found = d(p.inputs[i]).realize(region.extents);
+        if (s == 1) {
+          expected.push_back(found);
+        } else {
+          region.for_each([&](const std::vector<int>& at) {
+            EXPECT_EQ(found.get()->operator()(at.data()), expected[i].get()->operator()(at.data()));
+          });
+        }
+      }
+    }
+  }
+}
+
+// ---- what it costs ----
+
+std::atomic<int64_t> evaluations;
+extern "C" __attribute__((visibility("default"))) float checkpoint_test_counted(float value) {
+  ++evaluations;
+  return value;
+}
+
+// Every evaluation of a step passes through the C function.
+Func counted(const Buffer<float>& start, int n) {
+  Func u("counted_u");
+  RDom t(0, n);
+  u(x) = start(x);
+  Expr force = ir::call_extern("checkpoint_test_counted", Float(32), {cast<float>(t)});
+  u(x) = u(x) + 0.125f * sin(u(x)) + stop_gradient(force) * 0.0625f;
+  return weighted_sum(u, {start.width()});
+}
+
+TEST(Checkpoints, StepsAreComputedAgainAsOftenAsTheBinomialBoundSays) {
+  Buffer<float> start = line(3);
+  for (auto [n, s, again] : {std::tuple(10, 1, 45),
+                             {10, 3, 15},
+                             {10, 10, 9},
+                             {35, 4, 3 * 35 - 21},
+                             {56, 3, 5 * 56 - 70}}) {
+    Derivative d = propagate_adjoints(counted(start, n), {.wrt = {start}, .checkpoint_states = s});
+    Func gradient = d(start);
+    gradient.compile_jit();
+    evaluations = 0;
+    gradient.realize({3});
+    // The loss needs the last state: n steps before anything runs backward.
+    EXPECT_EQ(evaluations, 3 * (n + again + n)) << n << " steps, " << s << " states";
+  }
+}
+
+// Bytes that were allocated at one time, as the profiler reports them.
+int64_t peak_memory(const Derivative& d, const Buffer<float>& input) {
+  Func gradient = d(input);
+  std::string report;
+  gradient.jit_handlers().print = [&](const char* text) { report += text; };
+  gradient.realize({input.width()},
+                   get_jit_target_from_environment().with_feature(Target::Profile));
+  size_t at = report.find("peak memory: ");
+  EXPECT_NE(at, std::string::npos) << report;
+  return at == std::string::npos ? 0 : std::stoll(report.substr(at + 13));
+}
+
+TEST(Checkpoints, MemoryGrowsWithTheStatesAndNotWithTheSteps) {
+  Buffer<float> start = line(100);
+  auto peak = [&](int n, const AdjointOptions& options) {
+    Func u("remembered_u");
+    RDom t(0, n);
+    u(x) = start(x);
+    u(x) = u(x) + 0.125f * sin(u(x) + cast<float>(t));
+    AdjointOptions only = options;
+    only.wrt = {start};
+    return peak_memory(propagate_adjoints(weighted_sum(u, {100}), only), start);
+  };
+  int64_t state = 400;
+  EXPECT_GT(peak(500, {.overwritten = Overwritten::Store}), 500 * state);
+  int64_t ten = peak(500, {.checkpoint_states = 10});
+  EXPECT_LT(ten, 20 * state);
+  EXPECT_EQ(peak(1000, {.checkpoint_states = 10}), ten);
+  EXPECT_EQ(peak(500, {.checkpoint_states = 20}), ten + 10 * state);
+  EXPECT_EQ(peak(500, {.checkpoint_bytes = 10 * 400 + 399}), ten);
+}
+
+// A parameter and an image without a time axis cost no memory for each step, however many steps
+// contribute to them.
+TEST(Checkpoints, GradientsOfWhatEveryStepReadsTakeNoMemoryForEachStep) {
+  Buffer<float> start = line(50), k = line(50, 3);
+  auto peak = [&](int n) {
+    Func u("shared_u");
+    RDom t(0, n);
+    u(x) = start(x);
+    u(x) = u(x) + 0.125f * k(x) * sin(u(x) + cast<float>(t));
+    return peak_memory(
+        propagate_adjoints(weighted_sum(u, {50}), {.wrt = {k}, .checkpoint_states = 6}), k);
+  };
+  EXPECT_EQ(peak(400), peak(100));
+}
+
+// ---- what it is part of ----
+
+TEST(Checkpoints, TheGradientCanBeDifferentiatedAgain) {
+  Program p = pushed(4);
+  Derivative d = propagate_adjoints(p.loss, {.checkpoint_states = 2});
+  Func gradient = d(p.inputs[0]);
+  Func second = weighted_sum(gradient, {7});
+  expect_gradient(second, p.inputs[0], {.overwritten = Overwritten::Store});
+  expect_gradient(second, p.inputs[1], {.overwritten = Overwritten::Store});
+}
+
+TEST(Checkpoints, ExplainSaysWhatIsKeptAndWhatIsComputedAgain) {
+  Program p = pushed(10);
+  Derivative d = propagate_adjoints(p.loss, {.checkpoint_states = 3});
+  expect_mentions(d.explain(), {"a loop of 10 steps", "3 kept states of 28 bytes",
+                                "15 steps computed again beside the 10 that are reversed"});
+}
+
+// ---- refusals ----
+
+TEST(Checkpoints, BudgetsThatCannotBeMetAreErrors) {
+  Program p = pushed(5);
+  auto message = [&](const AdjointOptions& options) {
+    return error_of([&] { propagate_adjoints(p.loss, options); });
+  };
+  expect_mentions(message({.checkpoint_states = 0}), {"at least one kept state", "0 states"});
+  expect_mentions(message({.checkpoint_bytes = -4}), {"at least one kept state", "-4 bytes"});
+  expect_mentions(message({.checkpoint_states = 2, .checkpoint_bytes = 100}), {"Set one of them"});
+  expect_mentions(message({.checkpoint_bytes = 27}), {"28 bytes", "the budget is 27"});
+  expect_mentions(
+      error_of([] { propagate_adjoints(pushed(100000).loss, {.checkpoint_states = 1}); }),
+      {"100000 steps with 1 kept states", "larger budget"});
+}
+
+TEST(Checkpoints, AnUnknownNumberOfStepsIsAnError) {
+  Param<int> n("n");
+  Buffer<float> start = line(5);
+  Func u("unknown_u");
+  RDom t(0, n);
+  u(x) = start(x);
+  u(x) = sin(u(x)) * cast<float>(t);
+  expect_mentions(
+      error_of([&] { propagate_adjoints(weighted_sum(u, {5}), {.checkpoint_states = 2}); }),
+      {"constant number of steps", "\"unknown_u\"", "Overwritten::Store"});
+}
+
+TEST(Checkpoints, PlacesThatDependOnForgottenValuesAreRefused) {
+  Buffer<float> start = line(5), table = line(8, 6);
+  Func u("placed_u");
+  RDom t(0, 4);
+  u(x) = start(x);
+  u(x) = u(x) * 0.5f + table(clamp(cast<int>(u(x) * 2.0f) + t, 0, 7));
+  expect_mentions(error_of<Unsupported>(
+                      [&] { propagate_adjoints(weighted_sum(u, {5}), {.checkpoint_states = 2}); }),
+                  {"forgets the values", "Leave out the budget"});
+}
+
+}  // namespace
+}  // namespace retrograde::gradient
