@@ -107,7 +107,8 @@ class CheckpointedLoop {
     states = std::min<int64_t>(states, steps_);
     if (!needed_.empty() && rows_of(steps_, states) > most_actions) {
       user_error(c_.asked(), text("a schedule has at most ", most_actions, " actions"),
-                 text(steps_, " steps with ", states, " kept states compute ",
+                 text(steps_, " steps with room for ", states,
+                      states == 1 ? " state compute " : " states compute ",
                       revolve_advances(steps_, states), " steps again"),
                  "Give a larger budget: AdjointOptions::checkpoint_states");
     }

@@ -1,6 +1,7 @@
 #include "autodiff/derivative.h"
 
 #include "autodiff/derivative_rules.h"
+#include "autodiff/explain_costs.h"
 #include "autodiff/synthesis.h"
 #include "frontend/define.h"
 #include "ir/build.h"
@@ -130,6 +131,11 @@ std::vector<Func> Derivative::funcs() const {
 }
 
 const std::vector<Explanation>& Derivative::explanations() const { return result_->explanations; }
+
+std::vector<Explanation> Derivative::costs() const {
+  GradientOperations counts = operations();
+  return ir::explain_costs(result_->output, counts.primal, counts.gradient);
+}
 
 GradientOperations Derivative::operations() const {
   return {ir::count_operations({result_->output}), ir::count_operations(result_->gradients)};

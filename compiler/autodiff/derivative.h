@@ -67,9 +67,14 @@ class Derivative {
 
   // Everything that was made, producers before consumers: adjoints, private parts, helpers.
   std::vector<Func> funcs() const;
-  // What was built and how, what was left out, and why a gradient is zero.
+  // What was built and how, what was not requested, and why a gradient is zero.
   const std::vector<Explanation>& explanations() const;
-  std::string explain() const { return to_string(explanations()); }
+  // What of it is stored and what computed again, in bytes and operations, and what of the primal
+  // is not needed, with the schedules that the Funcs have now: the gradients that were asked for,
+  // computed together as one pipeline (operation_count.h says what counts).
+  std::vector<Explanation> costs() const;
+  // Both, one line a fact.
+  std::string explain() const { return to_string(explanations()) + to_string(costs()); }
   // Counted with the schedules that the Funcs have now.
   GradientOperations operations() const;
 

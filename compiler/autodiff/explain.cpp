@@ -20,6 +20,14 @@ const char* to_string(Explanation::Kind kind) {
       return "version";
     case Explanation::Kind::Performance:
       return "performance";
+    case Explanation::Kind::Stored:
+      return "stored";
+    case Explanation::Kind::Recomputed:
+      return "recomputed";
+    case Explanation::Kind::LeftOut:
+      return "left out";
+    case Explanation::Kind::Cost:
+      return "cost";
   }
   return "";
 }

@@ -16,6 +16,10 @@ struct Explanation {
     NotRequested,  // left out: nothing that was asked for needs it
     Version,       // an update needed the adjoint or the value of an earlier version
     Performance,   // legal, but slow
+    Stored,        // values that are computed once and kept: bytes and operations
+    Recomputed,    // values that are computed again at each read: reads and operations
+    LeftOut,       // values of the output's pipeline that the gradient needs nothing of
+    Cost,          // operations and bytes of the output and of its gradient
   };
   Kind kind;
   std::string subject;

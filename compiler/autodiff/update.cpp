@@ -126,12 +126,22 @@ class UpdateDifferentiation {
     try {
       if (!differentiate_recurrence(c_, trial)) return false;
       result_ = std::move(trial);
+      if (c_.reads_self() && wants_checkpoints(c_)) explain_unused_budget();
       return true;
     } catch (const isl::exception& e) {
       explain(Explanation::Kind::Version,
               text("update ", c_.query.stage - 1, ": isl gave up on its index sets: ", e.what()));
       return false;
     }
+  }
+
+  void explain_unused_budget() {
+    explain(Explanation::Kind::Performance,
+            text("update ", c_.query.stage - 1,
+                 " overwrites nothing that is needed: ", quoted(f_->name),
+                 " keeps its steps along a dimension of its own, and the budget for checkpoints is "
+                 "not used; written in place, as f(x) = g(f(x), t), it is run backward from kept "
+                 "states"));
   }
 
   void explain(Explanation::Kind kind, const std::string& detail) {

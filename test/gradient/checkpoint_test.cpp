@@ -253,6 +253,20 @@ TEST(Checkpoints, ExplainSaysWhatIsKeptAndWhatIsComputedAgain) {
                                 "15 steps computed again beside the 10 that are reversed"});
 }
 
+TEST(Checkpoints, ABudgetThatAFuncWithATimeAxisDoesNotUseIsExplained) {
+  Buffer<float> start = line(5);
+  Func u("long_u");
+  RDom t(0, 6);
+  u(x, y) = start(x);
+  u(x, t + 1) = 0.5f * sin(u(x, t));
+  Func last("last");
+  last(x) = u(x, 6);
+  Func loss = weighted_sum(last, {5});
+  Derivative d = propagate_adjoints(loss, {.checkpoint_states = 2});
+  expect_mentions(d.explain(), {"the budget for checkpoints is not used", "written in place"});
+  expect_gradient(loss, start, {.checkpoint_states = 2});
+}
+
 // ---- refusals ----
 
 TEST(Checkpoints, BudgetsThatCannotBeMetAreErrors) {
@@ -266,7 +280,7 @@ TEST(Checkpoints, BudgetsThatCannotBeMetAreErrors) {
   expect_mentions(message({.checkpoint_bytes = 27}), {"28 bytes", "the budget is 27"});
   expect_mentions(
       error_of([] { propagate_adjoints(pushed(100000).loss, {.checkpoint_states = 1}); }),
-      {"100000 steps with 1 kept states", "larger budget"});
+      {"100000 steps with room for 1 state ", "larger budget"});
 }
 
 TEST(Checkpoints, AnUnknownNumberOfStepsIsAnError) {
