@@ -91,7 +91,11 @@ void schedule_forward(Model& m) {
       .unroll(m.o)
       .unroll(m.k);
   m.row_grid.compute_at(m.plane, m.y).vectorize(m.i);
-  m.row_loss.compute_root().update().parallel(m.y);
+  m.row_loss.compute_root()
+      .update()
+      .atomic()
+      .vectorize(m.row_loss.rvars(0)[0], lanes, guarded)
+      .parallel(m.y);
 }
 
 // A pixel adds to four transforms: layers k = 0, 1 of the nodes before and after it. These short

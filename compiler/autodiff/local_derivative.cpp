@@ -40,23 +40,35 @@ bool makes_risky(const Expr& e) {
                    (call->call_type == CallType::Operator && is_risky_op(call->op))));
 }
 
+// The operands that decide whether the value is finite: an integer is, and so is a choice between
+// finite values.
+void for_each_operand(const Expr& e, ExprVisit visit) {
+  const auto* cast = e.as<Cast>();
+  if (cast && !cast->value.type().is_float()) return;
+  if (const auto* choice = e.as<Select>()) {
+    visit(choice->true_value);
+    visit(choice->false_value);
+  } else if (!is_leaf(e)) {
+    for_each_child(e, visit);
+  }
+}
+
 // The value of the operand, whatever the types.
 LocalDerivative same_as(const Expr& e, const Expr& operand) {
-  LocalDerivative result{LocalDerivative::Kind::Sum, {operand}, {}, {}, {}};
+  LocalDerivative result{LocalDerivative::Kind::Sum, {operand}, {}, {}, {}, {false}};
   result.partials.push_back({make_one(adjoint_type(e.type())), Strength::Plain});
   return result;
 }
 
 LocalDerivative sum_of(const std::vector<Expr>& operands, std::vector<Partial> partials,
                        const ExprFacts& facts) {
-  LocalDerivative result{LocalDerivative::Kind::Sum, operands, std::move(partials), {}, {}};
+  LocalDerivative result{LocalDerivative::Kind::Sum, operands, std::move(partials), {}, {}, {}};
   result.partials.resize(operands.size());
-  for (const Expr& operand : operands) {
-    result.risky_operand |= facts.is_risky(operand);
-    result.reads |= facts.reads(operand);
-  }
-  if (result.risky_operand) {
-    for (Partial& p : result.partials) p.strength = Strength::Strong;
+  for (Partial& p : result.partials) {
+    const ExprFacts::Finiteness factor =
+        p.factor.defined() ? facts.finiteness_of(p.factor) : ExprFacts::Finiteness();
+    if (factor.risky) p.strength = Strength::Strong;
+    result.reads.push_back(factor.read);
   }
   return result;
 }
@@ -153,25 +165,44 @@ ExprFacts::ExprFacts(const std::vector<Expr>& order, FunctionRef<bool(const Expr
 
 void ExprFacts::classify(const Expr& e, FunctionRef<bool(const Expr&)> is_wanted,
                          FunctionRef<bool(const Expr&)> is_risky_leaf) {
-  bool active = false, risky = makes_risky(e), loads = is_leaf(e) && !e.as<Variable>();
-  for_each_child(e, [&](const Expr& child) { loads |= reads(child); });
+  bool active = false, risky = makes_risky(e), read = is_leaf(e) && !e.as<Variable>();
+  for_each_operand(e, [&](const Expr& operand) {
+    risky |= is_risky(operand);
+    read |= is_read(operand);
+  });
   if (is_leaf(e)) {
     active = e.type().is_float() && is_wanted(e);
     risky = e.type().is_float() && is_risky_leaf(e);
   } else {
-    for_each_child(e, [&](const Expr& child) {
-      active |= is_active(child);
-      risky |= is_risky(child);
-    });
+    for_each_child(e, [&](const Expr& child) { active |= is_active(child); });
     if (active && !e.type().is_float()) {  // derivatives pass through floating values only
       if (e.as<Cast>()) notes_.insert("a cast to " + to_string(e.type()) + " has derivative 0");
       active = false;
     }
   }
   if (const auto* div = e.as<Div>(); div && is_const(div->b) && !is_risky(div->a)) risky = false;
+  classified_.insert(e.get());
   if (active) active_.insert(e.get());
   if (risky) risky_.insert(e.get());
-  if (loads) loads_.insert(e.get());
+  if (read) read_.insert(e.get());
+}
+
+ExprFacts::Finiteness ExprFacts::finiteness_of(const Expr& factor) const {
+  Finiteness result;
+  std::unordered_set<const ExprNode*> seen;
+  std::vector<Expr> open{factor};
+  while (!open.empty()) {
+    const Expr e = open.back();
+    open.pop_back();
+    if (!seen.insert(e.get()).second) continue;
+    if (classified_.contains(e.get())) {
+      result.risky |= is_risky(e);
+      result.read |= is_read(e);
+    } else {
+      for_each_operand(e, [&](const Expr& operand) { open.push_back(operand); });
+    }
+  }
+  return result;
 }
 
 LocalDerivative local_derivative(const Expr& e, const ExprFacts& facts) {
@@ -214,18 +245,5 @@ AdjointTraits traits_of(const Expr& adjoint) {
   result.masked |= is_seed;
   return result;
 }
-
-namespace {
-class LetRemover : public Rewriter {
- protected:
-  using Rewriter::rewrite;
-  Expr rewrite(const Expr& e) override {
-    const auto* let = e.as<Let>();
-    return let ? (*this)(substitute(let->body, let->name, let->value)) : children(e);
-  }
-};
-}  // namespace
-
-Expr without_lets(const Expr& e) { return LetRemover()(e); }
 
 }  // namespace retrograde::ir

@@ -13,6 +13,7 @@
 #include "autodiff/default_schedule.h"
 #include "autodiff/derivative_rules.h"
 #include "ir/expr.h"
+#include "ir/lets.h"
 #include "ir/visit.h"
 
 namespace retrograde::ir {
@@ -35,15 +36,20 @@ class ExprFacts {
   bool is_active(const Expr& e) const { return active_.contains(e.get()); }
   // May be infinite or NaN at finite operands.
   bool is_risky(const Expr& e) const { return risky_.contains(e.get()); }
-  // Contains a read of a Func or image.
-  bool reads(const Expr& e) const { return loads_.contains(e.get()); }
+  // May be what a Func or image holds, however wild that is.
+  bool is_read(const Expr& e) const { return read_.contains(e.get()); }
+  // The same of a factor made of nodes of the DAG.
+  struct Finiteness {
+    bool risky = false, read = false;
+  };
+  Finiteness finiteness_of(const Expr& factor) const;
   // Casts through which a derivative is lost.
   const std::set<std::string>& notes() const { return notes_; }
 
  private:
   void classify(const Expr& e, FunctionRef<bool(const Expr&)> is_wanted,
                 FunctionRef<bool(const Expr&)> is_risky_leaf);
-  std::unordered_set<const ExprNode*> active_, risky_, loads_;
+  std::unordered_set<const ExprNode*> classified_, active_, risky_, read_;
   std::set<std::string> notes_;
 };
 
@@ -58,18 +64,16 @@ struct LocalDerivative {
   std::vector<Partial> partials;  // Sum: one an operand; an undefined factor is 0
   Expr condition;
   std::string note;
-  bool risky_operand = false, reads = false;  // one of the operands
-  bool poles = false;                         // partials may be infinite where the value is finite
+  std::vector<bool> reads;  // Sum: whether a factor may be what memory holds
+  bool poles = false;       // partials may be infinite where the value is finite
 };
 
-// Of an active node that is no leaf. Partials that meet infinite or NaN operands are Strong. Throws
+// Of an active node that is no leaf. Partials that may be infinite or NaN are Strong. Throws
 // Unsupported where there is no rule.
 LocalDerivative local_derivative(const Expr& e, const ExprFacts& facts);
 
 // Here or in a Func between here and the output. A seed that the user gives counts as masked.
 AdjointTraits traits_of(const Expr& adjoint);
 
-// The expression with its lets substituted: a DAG without names.
-Expr without_lets(const Expr& e);
 
 }  // namespace retrograde::ir

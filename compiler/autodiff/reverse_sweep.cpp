@@ -70,7 +70,7 @@ class Sweep {
   void add_partial(const LocalDerivative& local, size_t i, const State& state) {
     Partial partial = local.partials[i];
     if (!partial.factor.defined() || !facts_.is_active(local.operands[i])) return;
-    if (state.traits.masked && local.reads) partial.strength = Strength::Strong;
+    if (state.traits.masked && local.reads[i]) partial.strength = Strength::Strong;
     if (state.traits.singular) partial.strength = Strength::Both;
     AdjointTraits traits{partial.factor.as<Select>() != nullptr, local.poles};
     traits.add(state.traits);

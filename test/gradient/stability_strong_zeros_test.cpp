@@ -63,6 +63,32 @@ TEST_F(StrongZeros, InfiniteAndNaNInputsOfAnUnselectedFunc) {
   for (int i = 0; i < 4; ++i) EXPECT_EQ(found(i), i == 2 ? 4.0f : 0.0f) << i;
 }
 
+// They cost a comparison and a mask each, so they stand only where a factor may be infinite or NaN.
+TEST_F(StrongZeros, StandOnlyWhereAFactorMayBeInfinite) {
+  set(a, {1, 2, 3, -4});
+  set(b, {1, 2, 3, 4});
+  Buffer<uint16_t> counts(4);
+  for (int i = 0; i < 4; ++i) counts(i) = static_cast<uint16_t>(i);
+  const auto has_strong_zeros = [&](const Expr& factor) {
+    Func f("f");
+    f(x) = select(a(x) > 0, a(x) * factor, 0.0f);
+    const Func gradient = propagate_adjoints(sum_of(f))(a);
+    const auto is_strong = [](const Expr& e) {
+      return ir::print(e).find("strong_mul") != std::string::npos;
+    };
+    bool found = is_strong(gradient.value());
+    for (int u = 0; u < gradient.num_update_definitions(); ++u)
+      found |= is_strong(gradient.update_value(u));
+    return found;
+  };
+  EXPECT_FALSE(has_strong_zeros(1.0f - cast<float>(x % 3) * 0.25f)) << "a weight";
+  EXPECT_FALSE(has_strong_zeros(cast<float>(counts(x)))) << "an integer, whatever it is";
+  EXPECT_FALSE(has_strong_zeros(select(b(x) > 1, 2.0f, 3.0f))) << "a choice between constants";
+  EXPECT_TRUE(has_strong_zeros(b(x))) << "what memory holds";
+  EXPECT_TRUE(has_strong_zeros(exp(cast<float>(x)))) << "a function that overflows";
+  EXPECT_TRUE(has_strong_zeros(select(b(x) > 1, b(x), 3.0f))) << "a choice of what memory holds";
+}
+
 TEST_F(StrongZeros, OverflowOfAProductInAnUnselectedFunc) {
   set(a, {1e30f, 2, 1e25f, 3});
   Func square("square"), fourth("fourth"), f("f");
