@@ -9,6 +9,7 @@
 #include "lower/lower_atomics.h"
 #include "lower/partition_loops.h"
 #include "lower/transpose_loads.h"
+#include "lower/trim_loops.h"
 #include "lower/unroll_loops.h"
 #include "lower/vectorize_loops.h"
 #include "simplify/simplify.h"
@@ -27,6 +28,7 @@ const std::vector<StatementPass>& statement_passes() {
       {"partition_loops", partition_loops},
       {"simplify", [](const Stmt& s) { return simplify(s); }},
       {"transpose_loads", transpose_loads},
+      {"trim_loops", trim_loops},
       {"unroll_loops", unroll_loops},
       {"vectorize_loops", vectorize_loops},
       {"interleave_vectors", interleave_vectors},

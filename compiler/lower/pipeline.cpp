@@ -27,6 +27,7 @@
 #include "lower/memoize.h"
 #include "lower/partition_loops.h"
 #include "lower/transpose_loads.h"
+#include "lower/trim_loops.h"
 #include "lower/unroll_loops.h"
 #include "lower/vectorize_loops.h"
 #include "lower/write_debug_files.h"
@@ -118,6 +119,7 @@ constexpr Pass passes[] = {
     {"lower_atomics", Phase::FlatStorage, [](Lowering&, const Stmt& s) { return lower_atomics(s); }},
     {"partition_loops", Phase::FlatStorage,
      [](Lowering&, const Stmt& s) { return partition_loops(s); }},
+    {"trim_loops", Phase::FlatStorage, [](Lowering&, const Stmt& s) { return trim_loops(s); }},
     {"unroll_loops", Phase::FlatStorage, [](Lowering&, const Stmt& s) { return unroll_loops(s); }},
     {"vectorize_loops", Phase::Vector, [](Lowering&, const Stmt& s) { return vectorize_loops(s); }},
     {"accumulate_vectors", Phase::Vector,

@@ -11,6 +11,7 @@
 #include "lower/interleave_vectors.h"
 #include "lower/partition_loops.h"
 #include "lower/transpose_loads.h"
+#include "lower/trim_loops.h"
 #include "lower/unroll_loops.h"
 #include "lower/vectorize_loops.h"
 #include "property/statement_evaluator.h"
@@ -318,7 +319,7 @@ class LoopPasses : public testing::TestWithParam<int> {};
 
 TEST_P(LoopPasses, KeepWhatProgramsCompute) {
   constexpr unsigned count = 100;
-  int accumulated = 0;
+  int accumulated = 0, changed = 0;
   for (unsigned seed = GetParam() * count; seed < (GetParam() + 1) * count; ++seed) {
     Stmt program = RandomProgram(seed).make();
     ASSERT_NO_THROW(validate(program, Phase::FlatStorage, "generator", free_names))
@@ -326,7 +327,11 @@ TEST_P(LoopPasses, KeepWhatProgramsCompute) {
         << program;
     Stmt partitioned = partition_loops(program);
     expect_same("partition_loops", seed, program, partitioned, Phase::FlatStorage);
-    Stmt unrolled = unroll_loops(partitioned);
+    Stmt trimmed = trim_loops(partitioned);
+    expect_same("trim_loops", seed, program, trimmed, Phase::FlatStorage);
+    changed += !trimmed.same_as(partitioned);
+    expect_same("trim_loops alone", seed, program, trim_loops(program), Phase::FlatStorage);
+    Stmt unrolled = unroll_loops(trimmed);
     expect_same("unroll_loops", seed, program, unrolled, Phase::FlatStorage);
     Stmt vectorized = vectorize_loops(unrolled);
     expect_same("vectorize_loops", seed, program, vectorized, Phase::Vector);
@@ -341,6 +346,7 @@ TEST_P(LoopPasses, KeepWhatProgramsCompute) {
     if (HasFatalFailure()) return;
   }
   EXPECT_GT(accumulated, 0) << "no program had a reduction to accumulate";
+  EXPECT_GT(changed, 0) << "no program had a loop to trim";
 }
 
 INSTANTIATE_TEST_SUITE_P(Seeds, LoopPasses, testing::Range(0, 8));
