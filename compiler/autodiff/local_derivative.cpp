@@ -45,9 +45,13 @@ bool makes_risky(const Expr& e) {
 void for_each_operand(const Expr& e, ExprVisit visit) {
   const auto* cast = e.as<Cast>();
   if (cast && !cast->value.type().is_float()) return;
+  const auto* call = e.as<Call>();
   if (const auto* choice = e.as<Select>()) {
     visit(choice->true_value);
     visit(choice->false_value);
+  } else if (call && call->is_op(Op::if_then_else)) {
+    visit(call->args[1]);
+    visit(call->args[2]);
   } else if (!is_leaf(e)) {
     for_each_child(e, visit);
   }
@@ -98,7 +102,7 @@ LocalDerivative of_quotient(const Expr& e, const Div& quotient, const ExprFacts&
 }
 
 LocalDerivative choice_of(const Expr& condition, const Expr& a, const Expr& b) {
-  return {LocalDerivative::Kind::Choice, {a, b}, {}, condition, {}};
+  return {LocalDerivative::Kind::Choice, {a, b}, {}, condition, {}, {}};
 }
 
 LocalDerivative of_call(const Expr& e, const Call& call, const ExprFacts& facts) {
