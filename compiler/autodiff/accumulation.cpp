@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <map>
 
-#include "autodiff/default_schedule.h"
+#include "autodiff/adjoint_contents.h"
 #include "autodiff/local_derivative.h"
 #include "autodiff/regions.h"
 #include "frontend/define.h"

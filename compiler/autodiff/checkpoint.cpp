@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <set>
 
-#include "autodiff/default_schedule.h"
+#include "autodiff/adjoint_contents.h"
 #include "autodiff/revolve.h"
 #include "autodiff/tape_layout.h"
 #include "autodiff/versions.h"

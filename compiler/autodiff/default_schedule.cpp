@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <unordered_set>
 
+#include "autodiff/adjoint_contents.h"
 #include "autodiff/regions.h"
 #include "frontend/stage.h"
 #include "ir/build.h"

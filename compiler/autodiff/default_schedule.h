@@ -15,25 +15,6 @@
 
 namespace retrograde::ir {
 
-// What multiplies an adjoint must beware of.
-struct AdjointTraits {
-  // Exactly 0 where a consumer chose another branch or reads nothing: a factor may be infinite or
-  // NaN there.
-  bool masked = false;
-  // Infinite where it passed the pole of a partial: a factor may be 0 there, as in a norm at 0.
-  bool singular = false;
-  void add(const AdjointTraits& other) {
-    masked |= other.masked;
-    singular |= other.singular;
-  }
-};
-
-// A Func made by differentiation.
-struct AdjointContents : FuncContents {
-  AdjointTraits traits;
-  FuncPtr copy() const override { return std::make_shared<AdjointContents>(*this); }
-};
-
 struct ChosenSchedule {
   FuncSchedule func;
   std::vector<StageSchedule> stages;

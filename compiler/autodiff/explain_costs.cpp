@@ -2,7 +2,7 @@
 
 #include <cstdio>
 
-#include "autodiff/default_schedule.h"
+#include "autodiff/adjoint_contents.h"
 #include "diagnostics/error.h"
 
 namespace retrograde::ir {

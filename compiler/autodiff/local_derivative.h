@@ -10,7 +10,7 @@
 #include <unordered_set>
 #include <vector>
 
-#include "autodiff/default_schedule.h"
+#include "autodiff/adjoint_contents.h"
 #include "autodiff/derivative_rules.h"
 #include "ir/expr.h"
 #include "ir/lets.h"

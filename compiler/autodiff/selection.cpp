@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "autodiff/accumulation.h"
-#include "autodiff/default_schedule.h"
+#include "autodiff/adjoint_contents.h"
 #include "autodiff/regions.h"
 #include "autodiff/reverse_sweep.h"
 #include "autodiff/versions.h"

@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "autodiff/accumulation.h"
-#include "autodiff/default_schedule.h"
+#include "autodiff/adjoint_contents.h"
 #include "autodiff/forward_sweep.h"
 #include "diagnostics/error.h"
 #include "frontend/define.h"

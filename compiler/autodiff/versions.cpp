@@ -1,7 +1,7 @@
 #include "autodiff/versions.h"
 
 #include "autodiff/accumulation.h"
-#include "autodiff/default_schedule.h"
+#include "autodiff/adjoint_contents.h"
 #include "autodiff/reverse_sweep.h"
 #include "frontend/define.h"
 #include "frontend/var.h"

@@ -1,7 +1,7 @@
 #include "checks/widen.h"
 
 #include "autodiff/accumulation.h"
-#include "autodiff/default_schedule.h"
+#include "autodiff/adjoint_contents.h"
 #include "autodiff/local_derivative.h"
 #include "diagnostics/error.h"
 #include "frontend/define.h"
