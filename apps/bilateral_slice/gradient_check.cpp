@@ -187,6 +187,33 @@ class Checker {
 
 }  // namespace
 
+retrograde::GradientReport check_gradients_in_full(const Shape& shape, const float* photo,
+                                                   const float* target) {
+  const Shape crop = crop_shape(shape);
+  Model model(crop, lang::Float(32));
+  std::mt19937 random(20);
+  std::uniform_real_distribution<float> noise(-0.1f, 0.1f);
+  const auto bound = [&](lang::ImageParam& to, const std::vector<int>& sizes, auto&& base) {
+    lang::Buffer<float> buffer(sizes);
+    size_t n = 0;
+    buffer.for_each_value([&](float& value) { value = base(n++); });
+    to.set(buffer);
+  };
+  const auto image = [&](lang::ImageParam& to, const float* from, int planes) {
+    const Values values = crop_planes(shape, crop, from, planes);
+    bound(to, {crop.width, crop.height, planes},
+          [&](size_t n) { return static_cast<float>(values[n]); });
+  };
+  image(model.photo, photo, 4);
+  image(model.target, target, 3);
+  bound(model.grid, {4, 3, crop.grid_z, crop.grid_x, crop.grid_y},
+        [&](size_t n) { return (n % 4 == n / 4 % 3 ? 1.0f : 0.0f) + noise(random); });
+  bound(model.mix, {4}, [&](size_t n) { return (n < 3 ? 0.3f : 0.05f) + noise(random); });
+  bound(model.curve, {crop.knots},
+        [&](size_t n) { return (n == 0 ? 0.9f : 0.0f) + noise(random); });
+  return retrograde::check_gradients(model.loss, {}, {.wrt = {model.grid, model.mix, model.curve}});
+}
+
 GradientCheck check_gradient(const Shape& shape, const float* photo, const float* target) {
   const Shape crop = crop_shape(shape);
   Checker checker(crop, crop_planes(shape, crop, photo, 4), crop_planes(shape, crop, target, 3));

@@ -1,6 +1,8 @@
 // gradient_check.h -- the model's adjoints against central differences, both in double.
 #pragma once
 
+#include <retrograde/retrograde.h>
+
 #include "shape.h"
 
 namespace bilateral_slice {
@@ -13,5 +15,10 @@ struct GradientCheck {
 // On a crop from the middle of the pair (layout as for Trainer), with a grid of 8 x 8 x 8 and
 // parameters away from the identity. An error is relative to the larger of the two values.
 GradientCheck check_gradient(const Shape& shape, const float* photo, const float* target);
+
+// The library's own check of the same crop and parameters, with the model in float32: by the grid,
+// the mix and the curve.
+retrograde::GradientReport check_gradients_in_full(const Shape& shape, const float* photo,
+                                                   const float* target);
 
 }  // namespace bilateral_slice

@@ -12,6 +12,7 @@
 
 #include "common/files.h"
 #include "common/images.h"
+#include "common/plots.h"
 #include "common/process.h"
 #include "common/progress.h"
 #include "diagnostics/error.h"
@@ -128,7 +129,8 @@ void write_results(const Options& options, const Pair& pair, const Fit& fit, con
   write_planes(options.output / "target.png", pair.shape, pair.target, pair.bits);
   write_planes(options.output / "result.png", pair.shape, fit.result, pair.bits);
   write_report(options.output / "report.json", report, fit);
-  draw_plot(options.output / "report.json", options.output / "error_against_time.png");
+  apps::draw_plot("plot_error_against_time.py", options.output / "report.json",
+                  options.output / "error_against_time.png");
 }
 
 void print_summary(const Options& options, const Report& report, const Fit& fit) {
@@ -143,12 +145,31 @@ void print_summary(const Options& options, const Report& report, const Fit& fit)
   if (!fit.why_no_peer.empty()) std::fprintf(stderr, "%s\n", fit.why_no_peer.c_str());
 }
 
+// --check-gradients
+void check_gradients(const Options& options, const Pair& pair) {
+  const retrograde::GradientReport report =
+      check_gradients_in_full(pair.shape, pair.photo.data(), pair.target.data());
+  const auto json = options.output / "gradients.json", plot = options.output / "gradients.png";
+  apps::write_file(json, report.to_json() + "\n");
+  apps::draw_plot("plot_report.py", json, plot);
+  std::printf(
+      "input: adjoint in double against complex step, tangent; in float32 against double\n");
+  for (const auto& input : report.inputs) {
+    std::printf("%s: %.1e, %.1e; %.1e\n", input.name.c_str(), input.complex_step_error,
+                input.dot_product_error, input.own_precision_error);
+  }
+  std::printf("loses digits: %s\nreport in %s, drawn in %s\n",
+              report.loses_digits.empty() ? "no Func" : report.loses_digits.c_str(), json.c_str(),
+              plot.c_str());
+}
+
 void run(const Options& options) {
   apps::require_writable_folder(options.output);
   const tbb::global_control threads(tbb::global_control::max_allowed_parallelism,
                                     static_cast<size_t>(options.threads));
   const auto start = std::chrono::steady_clock::now();
   Pair pair = read_pair(options);
+  if (options.check_gradients) return check_gradients(options, pair);
   Report report;
   report.shape = pair.shape;
   report.threads = options.threads;

@@ -40,6 +40,9 @@ std::optional<Options> read_options(int argc, char** argv) {
   app.add_option("--halide-seconds", options.halide_seconds,
                  "how long to measure the same with Halide 14; 0 to leave it out")
       ->capture_default_str();
+  app.add_flag("--check-gradients", options.check_gradients,
+               "instead of learning: the model's adjoints against tangents, differences and the "
+               "complex step, into gradients.json and gradients.png");
   try {
     app.parse(argc, argv);
   } catch (const CLI::CallForHelp&) {

@@ -11,7 +11,8 @@ struct Options {
   std::filesystem::path target;  // empty: the built-in edit
   int steps = 200;
   int threads = 0;
-  double halide_seconds = 90;  // the peer stops after this long; 0 leaves it out
+  bool check_gradients = false;  // instead of learning
+  double halide_seconds = 90;    // the peer stops after this long; 0 leaves it out
 };
 
 // Nothing when the command line asked only for help, which is then printed. Throws

@@ -3,11 +3,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
 #include <nlohmann/json.hpp>
 
 #include "common/files.h"
-#include "common/process.h"
 #include "diagnostics/error.h"
 
 namespace bilateral_slice {
@@ -16,8 +14,6 @@ using nlohmann::json;
 using retrograde::text;
 
 namespace {
-
-constexpr const char* script_name = "plot_error_against_time.py";
 
 // Error against time: the loss before step n, at the time that the n steps before it took.
 json curve_of(const Series& series) {
@@ -32,27 +28,6 @@ json curve_of(const Series& series) {
 }
 
 json or_null(bool known, double value) { return known ? json(value) : json(nullptr); }
-
-std::filesystem::path find_script() {
-  const auto here = apps::program_folder();
-  for (const auto& place :
-       {here / ".." / "share" / "retrograde" / script_name, here / script_name}) {
-    if (std::filesystem::exists(place)) return place;
-  }
-  return script_name;
-}
-
-// Debian's Python has Debian's matplotlib; another one that comes first on the path may not.
-std::string find_python() {
-  if (const char* chosen = std::getenv("RETROGRADE_PYTHON")) return chosen;
-  return std::filesystem::exists("/usr/bin/python3") ? "/usr/bin/python3" : "python3";
-}
-
-std::string last_line(std::string output) {
-  while (!output.empty() && output.back() == '\n') output.pop_back();
-  const size_t start = output.rfind('\n');
-  return start == std::string::npos ? output : output.substr(start + 1);
-}
 
 }  // namespace
 
@@ -84,21 +59,6 @@ void write_report(const std::filesystem::path& path, const Report& report, const
       {"halide", curve_of(fit.peer)},
   };
   apps::write_file(path, out.dump(1) + "\n");
-}
-
-void draw_plot(const std::filesystem::path& report, const std::filesystem::path& plot) {
-  const std::string script = find_script().string();
-  const apps::Outcome outcome =
-      apps::run_program({find_python(), script, report.string(), plot.string()});
-  if (outcome.started && outcome.status == 0) return;
-  retrograde::call_error(
-      text("draw ", retrograde::quoted(plot.string())),
-      "the plot is drawn by Python with matplotlib",
-      outcome.started ? text(script_name, " ended with status ", outcome.status, ", saying \"",
-                             last_line(outcome.output), "\"")
-                      : text(find_python(), " did not start"),
-      "Install python3-matplotlib, or set RETROGRADE_PYTHON to a Python that has it; all other "
-      "results are written");
 }
 
 }  // namespace bilateral_slice

@@ -1,4 +1,4 @@
-// report.h -- report.json, and the plot that is drawn from it.
+// report.h -- report.json.
 #pragma once
 
 #include <filesystem>
@@ -23,9 +23,5 @@ struct Report {
 
 // What was not measured is null. Throws retrograde::UserError; see apps::write_file.
 void write_report(const std::filesystem::path& path, const Report& report, const Fit& fit);
-
-// Draws error against run time. Throws retrograde::UserError when Python, matplotlib or the disk
-// does not play along.
-void draw_plot(const std::filesystem::path& report, const std::filesystem::path& plot);
 
 }  // namespace bilateral_slice

@@ -98,6 +98,27 @@ Values realize(Func f, const Shape& shape) {
   return values_of(out);
 }
 
+bool is_checkable(Type type) { return type == Float(32) || type == Float(64); }
+
+std::vector<Values> realize_values(Func f, const Shape& shape) {
+  std::vector<Buffer<>> out;
+  for (Type t : f.types()) out.push_back(new_buffer(t, shape));
+  f.realize(Realization(out));
+  std::vector<Values> result;
+  for (const Buffer<>& b : out) result.push_back(is_checkable(b.type()) ? values_of(b) : Values());
+  return result;
+}
+
+std::vector<int> place_of(size_t i, const Shape& shape) {
+  std::vector<int> result;
+  for (size_t d = 0; d < shape.extents.size(); ++d) {
+    const size_t extent = static_cast<size_t>(shape.extents[d]);
+    result.push_back(shape.mins[d] + static_cast<int>(i % extent));
+    i /= extent;
+  }
+  return result;
+}
+
 void Input::set_wide(const Values& to) {
   if (own->is_buffer) return fill(buffer, to);
   ir::set_scalar(*wide, ir::Scalar::of_float(Float(64), to[0]));

@@ -38,6 +38,11 @@ Buffer<> new_buffer(Type type, const Shape& shape);
 Values values_of(const Buffer<>& buffer);
 void fill(Buffer<>& buffer, const Values& values);
 Values realize(Func f, const Shape& shape);
+// One array for each value of the Func; empty for those that are neither float32 nor float64.
+std::vector<Values> realize_values(Func f, const Shape& shape);
+bool is_checkable(Type type);  // float32 or float64
+// The place of the i-th element of an array.
+std::vector<int> place_of(size_t i, const Shape& shape);
 
 // One floating input, as it is bound, and its copy in double.
 struct Input {

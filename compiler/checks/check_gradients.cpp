@@ -5,14 +5,15 @@
 #include <cmath>
 #include <limits>
 #include <map>
-#include <nlohmann/json.hpp>
 #include <random>
 
 #include "autodiff/regions.h"
 #include "autodiff/tangents.h"
 #include "checks/arrays.h"
+#include "checks/complex_step.h"
 #include "checks/widen.h"
 #include "diagnostics/error.h"
+#include "frontend/image_param.h"
 #include "ir/build.h"
 
 namespace retrograde {
@@ -22,8 +23,26 @@ namespace {
 using namespace checks;
 using Clock = std::chrono::steady_clock;
 
-double seconds_since(Clock::time_point start) {
-  return std::chrono::duration<double>(Clock::now() - start).count();
+// The complex step, relative to the input's size: its square vanishes beside 1, and exists.
+const double tiny_step = std::ldexp(1.0, -200);
+
+// A result, and how long it took.
+template <class T>
+struct Timed {
+  T value;
+  double seconds;
+};
+template <class F>
+auto timed(F&& f) -> Timed<decltype(f())> {
+  const auto start = Clock::now();
+  auto value = f();
+  return {value, std::chrono::duration<double>(Clock::now() - start).count()};
+}
+// The second of two runs: the first compiles.
+template <class F>
+auto timed_warm(F&& f) {
+  f();
+  return timed(f);
 }
 
 class Checker {
@@ -39,22 +58,23 @@ class Checker {
       user_error(asked(), "the output needs a size in each of its dimensions",
                  text("it has ", output.dimensions(), " dimensions and ", sizes.size(), " sizes"));
     }
-    if (output.outputs() != 1)
-      unsupported(asked(), "an output has one value", text("it has ", output.outputs()),
-                  "Check a Func that combines them");
-    weights_ = own_precision(random_values(count(shape_)));
+    draw_weights();
     for (const auto& p : ir::parameters_of({output.function()})) {
       if (p->type.is_float())
         inputs_.push_back(bind_wide(p, widened_.parameters.at(p.get()), asked()));
     }
+    check_wrt();
   }
 
   GradientReport run() {
     differentiate();
-    for (size_t i = 0; i < inputs_.size(); ++i) check(i);
+    for (Input& input : inputs_) {
+      if (is_wanted(input)) check(input);
+    }
     compare_funcs();
     for (const auto& input : report_.inputs) {
       worsen(report_.worst_error, input.adjoint_error);
+      worsen(report_.worst_error, input.complex_step_error);
       worsen(report_.worst_error, input.dot_product_error);
     }
     return std::move(report_);
@@ -63,6 +83,25 @@ class Checker {
  private:
   std::string asked() const {
     return "check the gradients of " + retrograde::quoted(output_.name());
+  }
+
+  // ---- what is asked for ----
+
+  bool is_wanted(const Input& input) const {
+    for (const AdjointInput& w : options_.wrt) {
+      if (w.symbol() == input.own) return true;
+    }
+    return options_.wrt.empty();
+  }
+  void check_wrt() const {
+    for (const AdjointInput& w : options_.wrt) {
+      bool found = false;
+      for (const Input& input : inputs_) found |= input.own == w.symbol();
+      if (!found) {
+        user_error(asked(), "`wrt` names floating inputs that the output depends on",
+                   "it names something else", "Give an ImageParam, a Buffer or a Param");
+      }
+    }
   }
 
   Values random_values(size_t n) {
@@ -75,11 +114,42 @@ class Checker {
     for (double& v : values) v = static_cast<float>(v);
     return values;
   }
+  // Of each value of the output; none for integers.
+  void draw_weights() {
+    bool any = false;
+    for (Type t : output_.types()) {
+      any |= t.is_float();
+      weights_.push_back(t.is_float() ? own_precision(random_values(count(shape_))) : Values());
+    }
+    if (!any)
+      unsupported(asked(), "derivatives are of floats", "the output has integers only",
+                  "Check a Func of floats");
+  }
+  double weighted(const std::vector<Values>& values) const {
+    double sum = 0;
+    for (size_t k = 0; k < weights_.size(); ++k) {
+      if (!weights_[k].empty()) sum += dot(values[k], weights_[k]);
+    }
+    return sum;
+  }
 
-  Func seed(Type type) {
-    Buffer<> buffer = new_buffer(type, shape_);
-    fill(buffer, weights_);
-    return Direction::as_func(buffer);
+  // The weights as a Func, of the types of `of`.
+  Func seed(const Func& of) {
+    std::vector<Expr> values;
+    for (size_t k = 0; k < weights_.size(); ++k) {
+      if (weights_[k].empty()) {
+        values.push_back(0.0f);
+        continue;
+      }
+      Buffer<> buffer = new_buffer(of.types()[k], shape_);
+      fill(buffer, weights_[k]);
+      std::vector<Expr> point;
+      for (const Var& v : of.args()) point.push_back(v);
+      values.push_back(buffer(point));
+    }
+    Func result("weights");
+    result(of.args()) = Tuple(values);
+    return result;
   }
   Region bounds() const {
     Region region;
@@ -89,48 +159,49 @@ class Checker {
 
   void differentiate() {
     const AdjointOptions store{.overwritten = Overwritten::Store};
-    own_ = std::make_unique<Derivative>(
-        propagate_adjoints(output_, seed(output_.types()[0]), bounds(), store));
+    own_ =
+        std::make_unique<Derivative>(propagate_adjoints(output_, seed(output_), bounds(), store));
     wide_ = std::make_unique<Derivative>(
-        propagate_adjoints(wide_output_, seed(Float(64)), bounds(), store));
-    realize(output_, shape_);  // compiles
-    auto start = Clock::now();
-    realize(output_, shape_);
-    report_.primal_seconds = seconds_since(start);
+        propagate_adjoints(wide_output_, seed(wide_output_), bounds(), store));
+    report_.primal_seconds = timed_warm([&] { return realize_values(output_, shape_); }).seconds;
+    complex_ = complex_graph(wide_output_);
+    report_.complex_step_refused = complex_.refused;
+    if (complex_.refused.empty()) bind_imaginary();
   }
 
-  double weighted_output() { return dot(realize(wide_output_, shape_), weights_); }
+  // ---- slopes along a direction v ----
 
-  struct Slopes {
+  struct Difference {
     double central, seconds;
   };
-  Slopes central(Input& input, const Values& v, double h) {
-    auto start = Clock::now();
+  Difference central(Input& input, const Values& v, double h) {
     auto at = [&](double step) {
       Values moved = input.values;
       for (size_t i = 0; i < moved.size(); ++i) moved[i] += step * v[i];
       input.set_wide(moved);
-      return weighted_output();
+      return weighted(realize_values(wide_output_, shape_));
     };
-    double slope = (at(h) - at(-h)) / (2 * h);
+    auto slope = timed([&] { return (at(h) - at(-h)) / (2 * h); });
     input.set_wide(input.values);
-    return {slope, seconds_since(start)};
+    return {slope.value, slope.seconds};
   }
 
-  // The best estimate of the slope along v, by the differences alone.
-  double difference(Input& input, const Values& v, double adjoint, double scale,
-                    std::vector<GradientReport::Step>* steps) {
-    double size = std::max(largest(input.values), 1e-3);
-    double best = 0, best_gap = std::numeric_limits<double>::infinity();
+  static double size_of(const Input& input) { return std::max(largest(input.values), 1e-3); }
+
+  // The best estimate by the differences alone; the time is that of all that were tried.
+  Timed<double> difference(Input& input, const Values& v, double adjoint, double scale,
+                           std::vector<GradientReport::Step>* steps) {
+    Timed<double> best{0, 0};
+    double best_gap = std::numeric_limits<double>::infinity();
     double last_slope = 0, last_extrapolated = 0;
     for (int k = 4, n = 0; k <= options_.smallest_step; k += 2, ++n) {
-      double h = std::ldexp(size, -k);
-      Slopes s = central(input, v, h);
+      Difference s = central(input, v, std::ldexp(size_of(input), -k));
       double extrapolated = n == 0 ? s.central : (16 * s.central - last_slope) / 15;
       double gap = n < 2 ? best_gap : std::abs(extrapolated - last_extrapolated);
-      if (n == 0 || gap < best_gap) best = extrapolated, best_gap = gap;
+      if (n == 0 || gap < best_gap) best.value = extrapolated, best_gap = gap;
       last_slope = s.central;
       last_extrapolated = extrapolated;
+      best.seconds += s.seconds;
       if (steps)
         steps->push_back({std::ldexp(1.0, -k), relative_error(s.central, adjoint, scale),
                           relative_error(extrapolated, adjoint, scale), s.seconds});
@@ -138,15 +209,46 @@ class Checker {
     return best;
   }
 
-  void check(size_t index) {
-    Input& input = inputs_[index];
-    GradientReport::Input result{input.own->name, 0, 0, 0, {}};
-    Func own = own_->of(AdjointInput(input.own));
-    realize(own, input.shape);  // compiles
-    auto start = Clock::now();
-    Values g_own = realize(own, input.shape);
-    report_.adjoint_seconds += seconds_since(start);
-    Values g = realize(wide_->of(AdjointInput(input.wide)), input.shape);
+  void bind_imaginary() {
+    for (const Input& input : inputs_) {
+      const auto& p = complex_.imaginary.at(input.wide.get());
+      imaginary_.push_back(input);
+      Input& to = imaginary_.back();
+      to.wide = p;
+      if (p->is_buffer) {
+        to.buffer = new_buffer(Float(64), to.shape);
+        ImageParam(p).set(to.buffer);
+      }
+      to.set_wide(Values(to.values.size(), 0.0));
+    }
+  }
+  // The slope in the imaginary part.
+  Timed<double> complex_step(const Input& input, const Values& v) {
+    Input& moved = imaginary_[static_cast<size_t>(&input - inputs_.data())];
+    const double h = tiny_step * size_of(input);
+    Values step = v;
+    for (double& s : step) s *= h;
+    moved.set_wide(step);
+    auto result = timed_warm([&] {
+      std::vector<Values> parts = realize_values(complex_.output, shape_), imaginary;
+      for (size_t k = 0, at = 0; k < weights_.size(); ++k) {
+        const bool is_float = !weights_[k].empty();
+        imaginary.push_back(is_float ? parts[at + 1] : Values());
+        at += is_float ? 2 : 1;
+      }
+      return weighted(imaginary) / h;
+    });
+    moved.set_wide(Values(v.size(), 0.0));
+    return result;
+  }
+
+  void check(Input& input) {
+    GradientReport::Input result;
+    result.name = input.own->name;
+    Func own = own_->of(AdjointInput(input.own)), wide = wide_->of(AdjointInput(input.wide));
+    const auto g_own = timed_warm([&] { return realize(own, input.shape); });
+    const auto g = timed_warm([&] { return realize(wide, input.shape); });
+    report_.adjoint_seconds += g_own.seconds;
 
     Buffer<> direction = new_buffer(Float(64), input.shape);
     Func tangent =
@@ -154,12 +256,27 @@ class Checker {
     for (int d = 0; d < options_.directions; ++d) {
       Values v = own_precision(random_values(count(input.shape)));
       fill(direction, v);
-      double adjoint = dot(g, v), scale = 1e-2 * typical(g, v);
-      double forward = dot(realize(tangent, shape_), weights_);
-      double slope = difference(input, v, adjoint, scale, d == 0 ? &result.steps : nullptr);
-      worsen(result.adjoint_error, relative_error(adjoint, slope, scale));
-      worsen(result.dot_product_error, relative_error(adjoint, forward, scale));
-      worsen(result.own_precision_error, relative_error(dot(g_own, v), adjoint, scale));
+      const double adjoint = dot(g.value, v), scale = 1e-2 * typical(g.value, v);
+      const auto forward = timed_warm([&] { return weighted(realize_values(tangent, shape_)); });
+      const auto slope = difference(input, v, adjoint, scale, d == 0 ? &result.steps : nullptr);
+      const auto by_complex = complex_.refused.empty() ? complex_step(input, v) : Timed<double>{};
+      auto error = [&](double value, double reference) {
+        return relative_error(value, reference, scale);
+      };
+      worsen(result.adjoint_error, error(adjoint, slope.value));
+      if (complex_.refused.empty())
+        worsen(result.complex_step_error, error(adjoint, by_complex.value));
+      worsen(result.dot_product_error, error(adjoint, forward.value));
+      worsen(result.own_precision_error, error(dot(g_own.value, v), adjoint));
+      if (d > 0) continue;
+      const double reference = complex_.refused.empty() ? by_complex.value : adjoint;
+      result.methods = {
+          {"differences", error(slope.value, reference), slope.seconds},
+          {"tangent in double", error(forward.value, reference), forward.seconds},
+          {"adjoint in double", error(adjoint, reference), g.seconds},
+          {"adjoint in its own precision", error(dot(g_own.value, v), reference), g_own.seconds}};
+      if (complex_.refused.empty())
+        result.methods.push_back({"complex step", 0, by_complex.seconds});
     }
     report_.inputs.push_back(result);
   }
@@ -188,15 +305,19 @@ class Checker {
     }
   }
 
+  // The worst of the adjoint's values.
   std::optional<double> func_error(const ir::FuncPtr& f, const ir::Regions& regions) {
     auto shape = constant_shape(regions.of(f.get()));
     Func own = own_->adjoint(Func(f)), wide = wide_->adjoint(Func(widened_.funcs.at(f.get())));
-    if (!shape || shape->extents.size() != f->args.size() || !own.defined() || !wide.defined() ||
-        own.outputs() != 1)
+    if (!shape || shape->extents.size() != f->args.size() || !own.defined() || !wide.defined())
       return std::nullopt;
-    Values a = realize(own, *shape), b = realize(wide, *shape);
-    double size = largest(b), worst = 0;
-    for (size_t i = 0; i < a.size(); ++i) worsen(worst, relative_error(a[i], b[i], size));
+    const auto a = realize_values(own, *shape), b = realize_values(wide, *shape);
+    double worst = 0;
+    for (size_t k = 0; k < a.size(); ++k) {
+      const double size = largest(b[k]);
+      for (size_t i = 0; i < a[k].size(); ++i)
+        worsen(worst, relative_error(a[k][i], b[k][i], size));
+    }
     return worst;
   }
 
@@ -206,41 +327,14 @@ class Checker {
   std::mt19937_64 random_;
   ir::Widened widened_;
   Func wide_output_;
-  Values weights_;
-  std::vector<Input> inputs_;
+  std::vector<Values> weights_;
+  std::vector<Input> inputs_, imaginary_;
   std::unique_ptr<Derivative> own_, wide_;
+  ComplexGraph complex_;
   GradientReport report_;
 };
 
-// JSON has no NaN and no infinity.
-nlohmann::json number(double v) {
-  return std::isfinite(v) ? nlohmann::json(v) : nlohmann::json(std::isnan(v) ? "nan" : "inf");
-}
-
 }  // namespace
-
-std::string GradientReport::to_json() const {
-  nlohmann::json result{{"worst_error", number(worst_error)}, {"loses_digits", loses_digits},
-                        {"primal_seconds", primal_seconds},   {"adjoint_seconds", adjoint_seconds},
-                        {"inputs", nlohmann::json::array()},  {"funcs", nlohmann::json::array()}};
-  for (const Input& i : inputs) {
-    nlohmann::json steps = nlohmann::json::array();
-    for (const Step& s : i.steps)
-      steps.push_back({{"step", s.step},
-                       {"central_error", number(s.central_error)},
-                       {"richardson_error", number(s.richardson_error)},
-                       {"seconds", s.seconds}});
-    result["inputs"].push_back({{"name", i.name},
-                                {"adjoint_error", number(i.adjoint_error)},
-                                {"dot_product_error", number(i.dot_product_error)},
-                                {"own_precision_error", number(i.own_precision_error)},
-                                {"steps", steps}});
-  }
-  for (const FuncError& f : funcs)
-    result["funcs"].push_back(
-        {{"name", f.name}, {"adjoint_error", number(f.error)}, {"lost", number(f.lost)}});
-  return result.dump(2);
-}
 
 GradientReport check_gradients(const Func& output, const std::vector<int>& sizes,
                                const GradientCheckOptions& options) {

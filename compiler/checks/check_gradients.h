@@ -2,26 +2,30 @@
 //
 // Func loss; ...; photo.set(buffer);                 // every input bound
 // GradientReport report = check_gradients(loss);
-// EXPECT_LT(report.worst_error, 1e-7); std::ofstream("report.json") << report.to_json();
+// EXPECT_LT(report.worst_error, 1e-7);
+// std::ofstream("report.json") << report.to_json();  // tools/plot_report draws it
 //
 // The output (over `sizes`, from 0) is summed with random weights w. In double, for random
-// directions v of each floating input: the adjoint <v, J^T w>, the tangent <J v, w>, and central
-// differences over steps of many sizes with Richardson extrapolation. The step is chosen by the
-// differences alone: where two neighbouring extrapolations agree best. The adjoint as it will run,
-// in its own precision, is compared with the one in double, Func by Func.
+// directions v of each floating input: the adjoint <v, J^T w>, the tangent <J v, w>, central
+// differences over steps of many sizes with Richardson extrapolation, and a complex step where the
+// program allows it (checks/complex_step.h). The step of the differences is chosen by themselves:
+// where two neighbouring extrapolations agree best. The adjoint as it will run, in its own
+// precision, is compared with the one in double, Func by Func.
 #pragma once
 
 #include <string>
 #include <vector>
 
+#include "autodiff/derivative.h"
 #include "frontend/func.h"
 
 namespace retrograde {
 
 struct GradientCheckOptions {
-  int directions = 3;      // of each input
-  unsigned seed = 1;       // of directions and weights
-  int smallest_step = 24;  // steps are 2^-4 ... 2^-smallest_step of the input's size
+  int directions = 3;                  // of each input
+  unsigned seed = 1;                   // of directions and weights
+  int smallest_step = 24;              // steps are 2^-4 ... 2^-smallest_step of the input's size
+  std::vector<AdjointInput> wrt = {};  // only these inputs are moved; empty: all floating ones
 };
 
 struct GradientReport {
@@ -30,12 +34,20 @@ struct GradientReport {
     double central_error, richardson_error;  // relative, against the adjoint in double
     double seconds;                          // of the two runs of the primal
   };
+  // One way to the derivative along the first direction.
+  struct Method {
+    std::string name;
+    double error;    // relative, against the complex step; without one, the adjoint in double
+    double seconds;  // without compiling; of the adjoint: of the derivatives by all elements
+  };
   struct Input {
     std::string name;
     double adjoint_error = 0;        // adjoint in double against the chosen differences, worst
+    double complex_step_error = 0;   // adjoint in double against the complex step, worst
     double dot_product_error = 0;    // adjoint against tangent, both in double, worst
     double own_precision_error = 0;  // adjoint in its own precision against double, worst
     std::vector<Step> steps;         // along the first direction
+    std::vector<Method> methods;
   };
   struct FuncError {
     std::string name;
@@ -44,16 +56,19 @@ struct GradientReport {
   };
 
   std::vector<Input> inputs;
-  std::vector<FuncError> funcs;  // from the output back to the inputs
-  std::string loses_digits;      // the Func whose adjoint adds most to the error; empty: none does
-  double worst_error = 0;        // of adjoint_error and dot_product_error
+  std::vector<FuncError> funcs;      // from the output back to the inputs
+  std::string loses_digits;          // the Func whose adjoint adds most to the error; empty: none
+  std::string complex_step_refused;  // why there is none; empty when there is
+  double worst_error = 0;            // of the errors of adjoints and tangents in double
   double primal_seconds = 0, adjoint_seconds = 0;  // in their own precision, without compiling
 
   std::string to_json() const;
 };
 
-// `sizes`: of the output; none for a scalar. RuntimeError: an input is not bound. CompileError and
-// Unsupported as propagate_adjoints; Unsupported, too, for what has no meaning in double (extern).
+// `sizes`: of the output; none for a scalar. Of a Tuple, all floating values are summed.
+// RuntimeError: an input is not bound. CompileError: sizes or `wrt` do not fit. CompileError and
+// Unsupported as propagate_adjoints; Unsupported, too, for what has no meaning in double (extern),
+// and for an output of integers.
 GradientReport check_gradients(const Func& output, const std::vector<int>& sizes = {},
                                const GradientCheckOptions& options = {});
 

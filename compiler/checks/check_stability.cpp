@@ -3,14 +3,14 @@
 #include <cmath>
 #include <limits>
 #include <map>
-#include <nlohmann/json.hpp>
 #include <random>
 
-#include "autodiff/derivative.h"
 #include "autodiff/regions.h"
 #include "checks/arrays.h"
+#include "checks/culprit.h"
 #include "checks/widen.h"
 #include "diagnostics/error.h"
+#include "frontend/param.h"
 
 namespace retrograde {
 
@@ -37,92 +37,164 @@ double magnitude(Extreme extreme) {
   return 0;
 }
 
-// One array of the pipeline, in both precisions.
+// One Func or adjoint, and what it is in double: the same definitions, so that they differ by
+// rounding alone.
 struct Watched {
-  std::string name;
+  std::string name;  // of the primal
   bool is_adjoint;
   Func own, wide;
   Shape shape;
 };
+using Arrays = std::vector<std::vector<Values>>;  // of each watched Func, of each of its values
 
 class Checker {
  public:
   Checker(const Func& output, const std::vector<int>& sizes, const StabilityOptions& options)
       : output_(output),
+        asked_("check the stability of " + retrograde::quoted(output.name())),
         shape_{std::vector<int>(sizes.size(), 0), sizes},
         options_(options),
-        random_(options.seed),
-        widened_(ir::widen({output.function()})) {
-    const std::string asked = "check the stability of " + retrograde::quoted(output.name());
+        random_(options.seed) {
     if (static_cast<int>(sizes.size()) != output.dimensions()) {
-      user_error(asked, "the output needs a size in each of its dimensions",
+      user_error(asked_, "the output needs a size in each of its dimensions",
                  text("it has ", output.dimensions(), " dimensions and ", sizes.size(), " sizes"));
     }
-    for (const auto& p : ir::parameters_of({output.function()})) {
-      if (p->type.is_float())
-        inputs_.push_back(bind_wide(p, widened_.parameters.at(p.get()), asked));
-    }
+    amount_.set(0);
+    seed_.set(0);
     watch();
+    check_ranges();
   }
   ~Checker() { restore(); }
 
   StabilityReport run() {
-    report_.cases.push_back(compare("as bound"));
-    estimate_condition(report_.cases.back());
+    add_case("as bound");
+    estimate(report_.cases.back());
     for (Extreme extreme : options_.extremes) {
       replace_some(extreme);
-      report_.cases.push_back(compare(to_string(extreme)));
+      add_case(to_string(extreme));
+      restore();
+    }
+    if (!options_.ranges.empty()) {
+      for (int s = 0; s < options_.samples; ++s) {
+        draw([&](const InputRange& r) { return inside(r); });
+        add_case("in the ranges");
+        if (s == 0) estimate(report_.cases.back());
+      }
+      draw([&](const InputRange& r) { return random_() % 2 ? r.low : r.high; });
+      add_case("at the ends of the ranges");
       restore();
     }
     return std::move(report_);
   }
 
  private:
-  Derivative adjoints_of(const Func& f) const {
+  // ---- what is looked at ----
+
+  Derivative adjoints() const {
     Region bounds;
     for (int e : shape_.extents) bounds.push_back({0, e});
     std::vector<Expr> ones;
-    for (Type t : f.types()) ones.push_back(cast(t.is_float() ? t : Float(32), 1.0f));
+    for (Type t : output_.types()) ones.push_back(cast(t.is_float() ? t : Float(32), 1.0f));
     Func seed("seed");
-    seed(f.args()) = Tuple(ones);
-    return propagate_adjoints(f, seed, bounds, {.overwritten = Overwritten::Store});
+    seed(output_.args()) = Tuple(ones);
+    return propagate_adjoints(output_, seed, bounds, {.overwritten = Overwritten::Store});
   }
 
   void watch() {
     auto order = ir::topological_order({output_.function()});
+    ir::widen({output_.function()});  // says what has no meaning in double before anything is bound
     ir::Box box;
     for (int e : shape_.extents) box.push_back({Expr(0), Expr(e - 1)});
     ir::Regions regions(order, box);
-    Derivative own = adjoints_of(output_);
-    Derivative wide = adjoints_of(Func(widened_.funcs.at(output_.function().get())));
+    Derivative derivative = adjoints();
     std::vector<Watched> adjoints;
     for (const ir::FuncPtr& f : order) {
-      auto shape = constant_shape(regions.of(f.get()));
-      if (!shape || shape->extents.size() != f->args.size() || f->types.size() != 1 ||
-          !(f->types[0] == Float(32) || f->types[0] == Float(64)))
-        continue;
-      Func primal(f), wide_primal(widened_.funcs.at(f.get()));
-      watched_.push_back({f->name, false, primal, wide_primal, *shape});
-      Func a = own.adjoint(primal), b = wide.adjoint(wide_primal);
-      if (a.defined() && b.defined()) adjoints.push_back({f->name, true, a, b, *shape});
+      const Func primal(f);
+      auto shape = shape_of(*f, regions);
+      if (!shape) continue;
+      watched_.push_back({f->name, false, primal, {}, *shape});
+      Func a = derivative.adjoint(primal);
+      if (a.defined()) {
+        adjoints.push_back({f->name, true, a, {}, *shape});
+      } else {
+        report_.left_out.push_back({"adjoint of " + f->name, "there is none"});
+      }
     }
     watched_.insert(watched_.end(), adjoints.rbegin(), adjoints.rend());
-    for (const Input& input : inputs_) {
-      Func a = own.of(AdjointInput(input.own)), b = wide.of(AdjointInput(input.wide));
-      if (a.defined() && b.defined())
-        watched_.push_back({input.own->name, true, a, b, input.shape});
+    std::vector<ir::FuncPtr> all;
+    for (const auto& p : ir::parameters_of({output_.function()})) {
+      if (!p->type.is_float()) continue;
+      Shape shape = shape_of_bound(*p);
+      Func a = derivative.of(AdjointInput(p));
+      if (a.defined()) watched_.push_back({p->name, true, a, {}, shape});
     }
+    widen_watched();
   }
 
-  void restore() {
-    for (Input& input : inputs_) {
-      input.set_own(input.values);
-      input.set_wide(input.values);
+  std::optional<Shape> shape_of(const ir::FuncContents& f, const ir::Regions& regions) {
+    auto leave_out = [&](const char* reason) {
+      report_.left_out.push_back({f.name, reason});
+      return std::nullopt;
+    };
+    bool any = false;
+    for (Type t : f.types) any |= is_checkable(t);
+    if (!any) return leave_out("none of its values is float32 or float64");
+    auto shape = constant_shape(regions.of(&f));
+    if (!shape || shape->extents.size() != f.args.size())
+      return leave_out("its region is not known before it runs, or is too large");
+    return shape;
+  }
+
+  Shape shape_of_bound(const ir::ParameterContents& p) const {
+    Shape shape;
+    if (!p.is_buffer || !p.buffer) return shape;
+    Buffer<> bound(*p.buffer);
+    for (int d = 0; d < p.dimensions; ++d) {
+      shape.mins.push_back(bound.dim(d).min());
+      shape.extents.push_back(bound.dim(d).extent());
+    }
+    return shape;
+  }
+
+  void widen_watched() {
+    std::vector<ir::FuncPtr> all{output_.function()};
+    for (const Watched& w : watched_) all.push_back(w.own.function());
+    ir::Widened widened = ir::widen(all, {amount_, seed_});
+    for (Watched& w : watched_) w.wide = Func(widened.funcs.at(w.own.function().get()));
+    for (const auto& p : ir::parameters_of({output_.function()})) {
+      if (p->type.is_float())
+        inputs_.push_back(bind_wide(p, widened.parameters.at(p.get()), asked_));
+    }
+    for (const Input& input : inputs_) now_.push_back(input.values);
+  }
+
+  // ---- the inputs ----
+
+  void check_ranges() {
+    for (const InputRange& r : options_.ranges) {
+      if (!(std::isfinite(r.low) && std::isfinite(r.high) && r.low <= r.high)) {
+        user_error(asked_, "a range has two finite ends, the lower first",
+                   text("there is one from ", r.low, " to ", r.high));
+      }
+      bool found = false;
+      for (const Input& input : inputs_) found |= input.own == r.input.symbol();
+      if (!found) {
+        user_error(asked_, "a range is one of a floating input that the output depends on",
+                   "there is one of something else", "Give an ImageParam, a Buffer or a Param");
+      }
     }
   }
+  void set(size_t i, const Values& values) {
+    now_[i] = values;
+    inputs_[i].set_own(values);
+    inputs_[i].set_wide(values);
+  }
+  void restore() {
+    for (size_t i = 0; i < inputs_.size(); ++i) set(i, inputs_[i].values);
+  }
   void replace_some(Extreme extreme) {
-    for (Input& input : inputs_) {
-      Values values = input.values;
+    for (size_t k = 0; k < inputs_.size(); ++k) {
+      Values values = inputs_[k].values;
       bool any = false;
       for (size_t i = 0; i < values.size(); ++i) {
         bool chosen = random_() % 4 == 0 || (i + 1 == values.size() && !any);
@@ -130,113 +202,127 @@ class Checker {
         any = true;
         values[i] = magnitude(extreme) * (random_() % 2 ? 1 : -1);
       }
-      input.set_own(values);
-      input.set_wide(values);
+      set(k, values);
     }
   }
-
-  StabilityReport::Case compare(const std::string& name) {
-    StabilityReport::Case result{name, {}, {}, {}};
-    for (const Watched& w : watched_) {
-      StabilityReport::FuncResult f = compare(realize(w.own, w.shape), realize(w.wide, w.shape));
-      f.name = w.name;
-      f.is_adjoint = w.is_adjoint;
-      std::string where = w.is_adjoint ? "adjoint of " + w.name : w.name;
-      if (f.lost > 0 && result.first_lost.empty()) result.first_lost = where;
-      if (f.non_finite > f.lost && result.first_non_finite.empty()) result.first_non_finite = where;
-      result.funcs.push_back(f);
+  template <class Pick>
+  void draw(Pick pick) {
+    for (const InputRange& range : options_.ranges) {
+      for (size_t k = 0; k < inputs_.size(); ++k) {
+        if (inputs_[k].own != range.input.symbol()) continue;
+        Values values = inputs_[k].values;
+        // What both precisions can hold.
+        for (double& v : values) v = static_cast<float>(pick(range));
+        set(k, values);
+      }
     }
+  }
+  double inside(const InputRange& range) {
+    std::uniform_real_distribution<double> at(0, 1);
+    const double t = at(random_);
+    if (range.low > 0 && range.high > 1000 * range.low)
+      return range.low * std::pow(range.high / range.low, t);
+    return range.low + (range.high - range.low) * t;
+  }
+
+  // ---- errors ----
+
+  Arrays wide_arrays() const {
+    Arrays result;
+    for (const Watched& w : watched_) result.push_back(realize_values(w.wide, w.shape));
     return result;
   }
 
-  static StabilityReport::FuncResult compare(const Values& own, const Values& wide) {
-    StabilityReport::FuncResult result;
+  // A case of the same name grows: samples are one case.
+  void add_case(const std::string& name) {
+    const bool is_new = report_.cases.empty() || report_.cases.back().name != name;
+    if (is_new) report_.cases.push_back({name, {}, {}, {}});
+    StabilityReport::Case& to = report_.cases.back();
+    size_t n = 0;
+    for (const Watched& w : watched_) {
+      const auto own = realize_values(w.own, w.shape), wide = realize_values(w.wide, w.shape);
+      for (size_t v = 0; v < own.size(); ++v) {
+        if (own[v].empty()) continue;
+        if (is_new) to.funcs.push_back({w.name, w.is_adjoint, static_cast<int>(v)});
+        compare(to, to.funcs[n++], w, own[v], wide[v]);
+      }
+    }
+  }
+
+  void compare(StabilityReport::Case& to, StabilityReport::FuncResult& f, const Watched& w,
+               const Values& own, const Values& wide) {
     const double size = largest(wide);
     for (size_t i = 0; i < own.size(); ++i) {
-      bool finite = std::isfinite(own[i]), finite_wide = std::isfinite(wide[i]);
-      result.non_finite += !finite;
-      result.lost += !finite && finite_wide;
-      if (finite && finite_wide) worsen(result.worst_error, relative_error(own[i], wide[i], size));
+      const bool finite = std::isfinite(own[i]), finite_wide = std::isfinite(wide[i]);
+      f.non_finite += !finite;
+      f.lost += !finite && finite_wide;
+      if (finite && finite_wide) worsen(f.worst_error, relative_error(own[i], wide[i], size));
+      if (finite) continue;
+      auto& first = finite_wide ? to.first_lost : to.first_non_finite;
+      if (!first) first = place(w, f.value, i, own[i], wide[i]);
     }
-    return result;
   }
 
-  // In double, so that what is seen is the function and not its rounding: inputs move by random
-  // relative amounts of the size of a float32 rounding.
-  void estimate_condition(StabilityReport::Case& to) {
+  static StabilityReport::Place place(const Watched& w, int value, size_t i, double own,
+                                      double wide) {
+    const auto at = place_of(i, w.shape);
+    return {w.name, w.is_adjoint, value, at, own, wide, culprit(w.own, value, at)};
+  }
+
+  // ---- estimates, in double, so that what is seen is not its rounding ----
+
+  void estimate(StabilityReport::Case& to) {
     const double eps = Limits::epsilon();
-    std::vector<Values> base;
-    for (const Watched& w : watched_) base.push_back(realize(w.wide, w.shape));
+    const Arrays base = wide_arrays();
     std::uniform_real_distribution<double> rounding(-eps, eps);
     for (int n = 0; n < options_.perturbations; ++n) {
-      for (Input& input : inputs_) {
-        Values moved = input.values;
+      for (size_t k = 0; k < inputs_.size(); ++k) {
+        Values moved = now_[k];
         for (double& v : moved) v *= 1 + rounding(random_);
-        input.set_wide(moved);
+        inputs_[k].set_wide(moved);
       }
-      for (size_t i = 0; i < watched_.size(); ++i) {
-        Values now = realize(watched_[i].wide, watched_[i].shape);
-        double size = largest(base[i]);
-        for (size_t k = 0; k < now.size(); ++k)
-          worsen(to.funcs[i].condition, relative_error(now[k], base[i][k], size) / eps);
+      grow(to, base, &StabilityReport::FuncResult::condition);
+    }
+    for (size_t k = 0; k < inputs_.size(); ++k) inputs_[k].set_wide(now_[k]);
+    amount_.set(eps / 2);
+    for (int n = 0; n < options_.perturbations; ++n) {
+      seed_.set(n + 1);
+      grow(to, base, &StabilityReport::FuncResult::rounding);
+    }
+    amount_.set(0);
+  }
+
+  void grow(StabilityReport::Case& to, const Arrays& base,
+            double StabilityReport::FuncResult::*what) {
+    const Arrays now = wide_arrays();
+    size_t n = 0;
+    for (size_t w = 0; w < now.size(); ++w) {
+      for (size_t v = 0; v < now[w].size(); ++v) {
+        if (now[w][v].empty()) continue;
+        double& worst = to.funcs[n++].*what;
+        const double size = largest(base[w][v]);
+        for (size_t i = 0; i < now[w][v].size(); ++i) {
+          if (!std::isfinite(base[w][v][i])) continue;
+          worsen(worst, relative_error(now[w][v][i], base[w][v][i], size) / Limits::epsilon());
+        }
       }
     }
-    restore();
   }
 
   const Func& output_;
+  std::string asked_;
   Shape shape_;
   StabilityOptions options_;
   std::mt19937_64 random_;
-  ir::Widened widened_;
-  std::vector<Input> inputs_;
+  Param<double> amount_{"rounding_amount"};
+  Param<int> seed_{"rounding_seed"};
   std::vector<Watched> watched_;
+  std::vector<Input> inputs_;
+  std::vector<Values> now_;  // the inputs' values
   StabilityReport report_;
 };
 
-// JSON has no NaN and no infinity.
-nlohmann::json number(double v) {
-  return std::isfinite(v) ? nlohmann::json(v) : nlohmann::json(std::isnan(v) ? "nan" : "inf");
-}
-
 }  // namespace
-
-const char* to_string(Extreme extreme) {
-  switch (extreme) {
-    case Extreme::Zeros:
-      return "zeros";
-    case Extreme::Denormals:
-      return "denormals";
-    case Extreme::Huge:
-      return "huge";
-    case Extreme::Tiny:
-      return "tiny";
-    case Extreme::Infinities:
-      return "infinities";
-    case Extreme::NaNs:
-      return "NaNs";
-  }
-  return "";
-}
-
-std::string StabilityReport::to_json() const {
-  nlohmann::json result = nlohmann::json::array();
-  for (const Case& c : cases) {
-    nlohmann::json funcs = nlohmann::json::array();
-    for (const FuncResult& f : c.funcs)
-      funcs.push_back({{"name", f.name},
-                       {"adjoint", f.is_adjoint},
-                       {"worst_error", number(f.worst_error)},
-                       {"condition", number(f.condition)},
-                       {"non_finite", f.non_finite},
-                       {"lost", f.lost}});
-    result.push_back({{"inputs", c.name},
-                      {"first_lost", c.first_lost},
-                      {"first_non_finite", c.first_non_finite},
-                      {"funcs", funcs}});
-  }
-  return result.dump(2);
-}
 
 StabilityReport check_stability(const Func& output, const std::vector<int>& sizes,
                                 const StabilityOptions& options) {

@@ -34,7 +34,7 @@ Op exact(Op op) {
 
 class Widening {
  public:
-  explicit Widening(const std::vector<FuncPtr>& outputs) {
+  Widening(const std::vector<FuncPtr>& outputs, const Rounding& rounding) : rounding_(rounding) {
     for (const auto& p : parameters_of(outputs)) {
       if (p->type.is_float()) result_.parameters[p.get()] = wide_parameter(*p);
     }
@@ -65,11 +65,34 @@ class Widening {
     for (const std::string& arg : f->args) args.push_back(variable(arg));
     for (int s = 0; s < f->stage_count(); ++s) {
       Definition d = map_exprs(f->stage(s), [&](const Expr& e) { return widened(e); });
+      if (rounding_.amount.defined()) round(d, *f, s);
       if (s == 0) {
         define_pure(to, args, d.values);
       } else {
         append_update(to, d.args, d.values, d.rvars, d.predicate);
       }
+    }
+  }
+
+  // What only moves is not rounded: constants, reads, `undef`.
+  static bool is_computed(const Expr& value) {
+    if (value.as<FloatImm>() || !value.type().is_float()) return false;
+    const Call* call = value.as<Call>();
+    return !call || (call->call_type == CallType::Operator && call->op != Op::undef);
+  }
+  void round(Definition& d, const FuncContents& f, int stage) {
+    std::vector<Expr> words{rounding_.seed, make_const(Int(32), funcs_seen_++), Expr(stage)};
+    for (const std::string& arg : f.args) {
+      for (const Expr& e : d.args) {
+        if (const Variable* v = e.as<Variable>(); v && v->name == arg) words.push_back(e);
+      }
+    }
+    for (const ReductionVariable& r : d.rvars) words.push_back(variable(r.var));
+    for (Expr& value : d.values) {
+      if (!is_computed(value)) continue;
+      words.push_back(make_const(Int(32), static_cast<int>(words.size())));  // of this value
+      Expr u = cast_to(Float(64), call_op(Op::random, Float(32), words));
+      value = value * (1.0 + rounding_.amount * (2.0 * u - 1.0));
     }
   }
 
@@ -134,11 +157,15 @@ class Widening {
     return call_op(exact(c.op), wide(c.type), args);
   }
 
+  Rounding rounding_;
+  int funcs_seen_ = 0;
   Widened result_;
 };
 
 }  // namespace
 
-Widened widen(const std::vector<FuncPtr>& outputs) { return Widening(outputs).take(); }
+Widened widen(const std::vector<FuncPtr>& outputs, const Rounding& rounding) {
+  return Widening(outputs, rounding).take();
+}
 
 }  // namespace retrograde::ir

@@ -36,11 +36,65 @@ TEST_F(CheckGradients, ARightGradientHasSmallErrors) {
   for (const auto& input : report.inputs) {
     EXPECT_LT(input.dot_product_error, 1e-12) << report.to_json();
     EXPECT_LT(input.own_precision_error, 1e-4) << report.to_json();
+    EXPECT_LT(input.complex_step_error, 1e-12) << report.to_json();
+    ASSERT_EQ(input.methods.size(), 5u);
+    for (const auto& m : input.methods) EXPECT_GT(m.seconds, 0) << m.name;
     ASSERT_EQ(input.steps.size(), 11u);
     EXPECT_GT(input.steps.front().central_error, input.steps[4].central_error);
     EXPECT_GT(input.steps.front().seconds, 0);
   }
   EXPECT_GE(report.funcs.size(), 4u);
+  EXPECT_EQ(report.complex_step_refused, "");
+}
+
+// Every operator that has a complex form, and both kinds of stages.
+TEST_F(CheckGradients, TheComplexStepIsExactWhereItIsAllowed) {
+  Func f("f"), g("g"), loss("loss");
+  RDom r(1, 11), all(0, 12, 0, 9);
+  Expr u = image(x, y), w = image(11 - x, y);
+  f(x, y) = exp(u * 0.3f) * log(w + 1.0f) + sqrt(u * u + w) + pow(u, 1.5f) + pow(u, w) +
+            sin(u) * cos(w) + tan(u * 0.25f) + sinh(u * 0.5f) - cosh(w * 0.5f) + tanh(u - w) +
+            hypot(u, w * gain) + abs(u - 1.01f * w) + max(u, w) * min(u, 1.0f) +
+            clamp(w, 0.5f, 1.5f) + lerp(u, w, gain * 0.5f) + (u * 4.0f) % 1.0f +
+            floor(u * 3.0f) * w + u / w + select(u > w, u * w, -u);
+  g(x, y) = f(x, y);
+  g(r, y) = g(r, y) * 0.5f + sin(g(r - 1, y)) * image(r, y);
+  loss() += g(all.x, all.y) * gain;
+  GradientReport report = check_gradients(loss, {}, {.directions = 2});
+  EXPECT_EQ(report.complex_step_refused, "");
+  for (const auto& input : report.inputs) {
+    EXPECT_GT(input.complex_step_error, 0) << "it was computed";
+    EXPECT_LT(input.complex_step_error, 1e-11) << report.to_json();
+  }
+}
+
+TEST_F(CheckGradients, TheComplexStepIsRefusedWithTheReason) {
+  Func f("f");
+  f(x, y) = erf(image(x, y)) * gain;
+  GradientReport report = check_gradients(f, {12, 9}, {.directions = 1});
+  EXPECT_NE(report.complex_step_refused.find("\"erf\""), std::string::npos);
+  EXPECT_LT(report.worst_error, 1e-8) << report.to_json();
+  EXPECT_EQ(report.inputs[0].methods.size(), 4u);
+}
+
+TEST_F(CheckGradients, AllFloatingValuesOfATupleAreSummed) {
+  Func pair("pair"), f("f");
+  pair(x, y) = Tuple(image(x, y) * gain, cast<int>(image(x, y) * 4.0f), sin(image(x, y)));
+  f(x, y) = Tuple(pair(x, y)[0] * pair(x, y)[2], pair(x, y)[1],
+                  pair(11 - x, y)[2] + cast<float>(pair(x, y)[1]));
+  GradientReport report = check_gradients(f, {12, 9}, {.directions = 2});
+  EXPECT_LT(report.worst_error, 1e-8) << report.to_json();
+  EXPECT_LT(report.inputs[0].complex_step_error, 1e-12) << report.to_json();
+  ASSERT_GE(report.funcs.size(), 2u) << "Tuples' adjoints are compared too";
+}
+
+TEST_F(CheckGradients, OnlyWantedInputsAreMoved) {
+  Func f("f");
+  f(x, y) = image(x, y) * gain;
+  GradientReport report = check_gradients(f, {12, 9}, {.directions = 1, .wrt = {gain}});
+  ASSERT_EQ(report.inputs.size(), 1u);
+  EXPECT_EQ(report.inputs[0].name, gain.name());
+  EXPECT_LT(report.worst_error, 1e-8);
 }
 
 TEST_F(CheckGradients, OutputsWithDimensionsAndUpdates) {
@@ -57,6 +111,7 @@ TEST_F(CheckGradients, AWrongGradientIsFound) {
   f(x, y) = image(x, y) * image(x, y) + stop_gradient(image(x, y) * 0.01f);
   GradientReport report = check_gradients(f, {12, 9});
   EXPECT_GT(report.inputs[0].adjoint_error, 1e-4) << report.to_json();
+  EXPECT_GT(report.inputs[0].complex_step_error, 1e-4) << "it does not know of stop_gradient";
   EXPECT_LT(report.inputs[0].dot_product_error, 1e-12) << "both modes stop there";
 }
 
@@ -90,8 +145,15 @@ TEST_F(CheckGradients, ErrorsNameWhatIsMissing) {
   g(x, y) = image(x, y);
   expect_mentions(error_of<CompileError>([&] { check_gradients(g, {4}); }),
                   {"2 dimensions", "1 sizes"});
-  pair(x, y) = {image(x, y), image(x, y)};
-  EXPECT_THROW(check_gradients(pair, {4, 4}), Unsupported);
+  pair(x, y) = {cast<int>(image(x, y)), 1};
+  expect_mentions(error_of<Unsupported>([&] {
+                    check_gradients(pair, {4, 4});
+                  }),
+                  {"integers only", "Check a Func of floats"});
+  expect_mentions(error_of<CompileError>([&] {
+                    check_gradients(g, {4, 4}, {.wrt = {unbound}});
+                  }),
+                  {"something else", "Param"});
 }
 
 }  // namespace

@@ -1,9 +1,11 @@
 // check_stability finds what was built to be unstable, names the Func, and leaves stable pipelines
 // alone.
+#include <map>
 #include <nlohmann/json.hpp>
 
 #include "checks/check_stability.h"
 #include "frontend/image_param.h"
+#include "frontend/param.h"
 #include "gradient/gradient_check.h"
 #include "support/errors.h"
 
@@ -28,13 +30,23 @@ class CheckStability : public ::testing::Test {
 
 TEST_F(CheckStability, OverflowOfAnIntermediateValueIsFoundWhereItHappens) {
   Func square("square"), root("root"), f("f");
+  Buffer<float> before = a.copy();
   square(x) = image(x) * image(x) + 1.0f;
   root(x) = sqrt(square(x));
   f(x) = root(x) * 0.5f;
   StabilityReport report = check_stability(f, {16}, {.extremes = {Extreme::Huge}});
   ASSERT_EQ(report.cases.size(), 2u);
-  EXPECT_EQ(report.cases[0].first_lost, "") << report.to_json();
-  EXPECT_EQ(report.cases[1].first_lost, square.name()) << report.to_json();
+  EXPECT_FALSE(report.cases[0].first_lost) << report.to_json();
+  ASSERT_TRUE(report.cases[1].first_lost) << report.to_json();
+  const StabilityReport::Place& place = *report.cases[1].first_lost;
+  EXPECT_EQ(place.func, square.name());
+  EXPECT_FALSE(place.is_adjoint);
+  ASSERT_EQ(place.at.size(), 1u);
+  EXPECT_EQ(place.own, INFINITY);
+  EXPECT_GT(place.in_double, 1e75);
+  EXPECT_NE(place.operation.find("*"), std::string::npos) << place.operation;
+  EXPECT_EQ(place.operation.find("+"), std::string::npos) << "the sum comes later";
+  EXPECT_EQ(a(place.at[0]), before(place.at[0])) << "inputs are restored";
   EXPECT_GT(result(report.cases[1], square.name(), false).lost, 0);
 }
 
@@ -63,16 +75,97 @@ TEST_F(CheckStability, AGuardedPipelineStaysFiniteAndInputsAreRestored) {
     EXPECT_EQ(result(c, "image", true).non_finite, 0) << c.name << report.to_json();
     EXPECT_LT(result(c, "image", true).worst_error, 1e-5) << c.name;
   }
-  EXPECT_EQ(report.cases[1].first_non_finite, inverse.name()) << "1 / 0, in double too";
+  ASSERT_TRUE(report.cases[1].first_non_finite);
+  EXPECT_EQ(report.cases[1].first_non_finite->func, inverse.name()) << "1 / 0, in double too";
   for (int i = 0; i < 16; ++i) EXPECT_EQ(a(i), before(i));
 }
 
 TEST_F(CheckStability, TheReportIsJson) {
   Func f("f");
   f(x) = image(x) * 2.0f;
-  auto json = nlohmann::json::parse(check_stability(f, {4}).to_json());
-  EXPECT_EQ(json.size(), 7u);
+  auto json = nlohmann::json::parse(check_stability(f, {16}).to_json())["cases"];
+  ASSERT_EQ(json.size(), 7u);
   EXPECT_EQ(json[6]["inputs"], "NaNs");
+  EXPECT_TRUE(json[0]["first_non_finite"].is_null());
+  EXPECT_EQ(json[6]["first_non_finite"]["own"], "nan");
+  EXPECT_NE(json[6]["first_non_finite"]["operation"].dump().find("an input"), std::string::npos);
+}
+
+TEST_F(CheckStability, RandomRoundingTellsALosingPipelineFromAnIllPosedOne) {
+  Func large("large"), small("small"), f("f");
+  large(x) = image(x) * 0.7f + 4096.0f;
+  small(x) = large(x) - 4096.0f;
+  f(x) = small(x) * 2.0f;
+  StabilityReport report = check_stability(f, {16}, {.extremes = {}});
+  const auto& c = report.cases[0];
+  EXPECT_LT(result(c, large.name(), false).rounding, 2) << report.to_json();
+  EXPECT_GT(result(c, f.name(), false).rounding, 500) << report.to_json();
+  EXPECT_LT(result(c, f.name(), false).condition, 3) << report.to_json();
+}
+
+TEST_F(CheckStability, RoundingInsideOfReductionsAndScansIsSeen) {
+  Func sums("sums"), f("f");
+  RDom r(0, 16), t(1, 15);
+  Func scan("scan");
+  scan(x) = image(x);
+  scan(t) = scan(t) + scan(t - 1);  // sums up to 20
+  sums() += scan(r);
+  f() = sums() - 100.0f;
+  StabilityReport report = check_stability(f, {}, {.extremes = {}});
+  const auto& c = report.cases[0];
+  EXPECT_GT(result(c, scan.name(), false).rounding, 0.1) << report.to_json();
+  EXPECT_GT(result(c, sums.name(), false).rounding, 0.1) << report.to_json();
+}
+
+TEST_F(CheckStability, DeclaredRangesAreDrawnFromAndTheirEndsTried) {
+  Func root("root"), f("f");
+  Param<float> shift("shift");
+  shift.set(0);
+  root(x) = sqrt(image(x) - shift);
+  f(x) = root(x);
+  auto cases = [&](double low, double high) {
+    return check_stability(f, {16}, {.extremes = {}, .ranges = {{image, low, high}}}).cases;
+  };
+  const auto fine = cases(1, 1e6);
+  ASSERT_EQ(fine.size(), 3u);
+  EXPECT_EQ(fine[1].name, "in the ranges");
+  EXPECT_EQ(fine[2].name, "at the ends of the ranges");
+  for (const auto& c : fine) EXPECT_FALSE(c.first_non_finite) << c.name;
+  EXPECT_GT(result(fine[1], root.name(), false).condition, 0.1);
+  const auto broken = cases(-1, 1);
+  EXPECT_FALSE(broken[0].first_non_finite) << "as bound";
+  ASSERT_TRUE(broken[1].first_non_finite);
+  EXPECT_EQ(broken[1].first_non_finite->func, root.name());
+  EXPECT_GT(result(broken[2], root.name(), false).non_finite, 0);
+  const auto pole = cases(0, 0)[2];
+  ASSERT_TRUE(pole.first_non_finite) << "the adjoint of sqrt at 0";
+  EXPECT_TRUE(pole.first_non_finite->is_adjoint);
+}
+
+TEST_F(CheckStability, TuplesAreLookedAtValueByValue) {
+  Func pair("pair"), f("f");
+  pair(x) = Tuple(image(x) * 2.0f, cast<int>(image(x)), image(x) * 0.7f + 4096.0f);
+  f(x) = pair(x)[0] + cast<float>(pair(x)[1]) + (pair(x)[2] - 4096.0f);
+  StabilityReport report = check_stability(f, {16}, {.extremes = {}});
+  std::vector<int> values;
+  for (const auto& r : report.cases[0].funcs) {
+    if (r.name == pair.name() && !r.is_adjoint) values.push_back(r.value);
+  }
+  EXPECT_EQ(values, (std::vector<int>{0, 2}));
+  EXPECT_TRUE(report.left_out.empty()) << report.to_json();
+}
+
+TEST_F(CheckStability, WhatIsLeftOutIsListedWithTheReason) {
+  Func wave("wave"), index("index"), f("f");
+  Var i("i");
+  wave(i) = sin(cast<float>(i));
+  index(x) = cast<int>(image(x) * 100.0f);
+  f(x) = wave(index(x)) * image(x);
+  StabilityReport report = check_stability(f, {16}, {.extremes = {}});
+  std::map<std::string, std::string> reasons;
+  for (const auto& l : report.left_out) reasons[l.name] = l.reason;
+  EXPECT_NE(reasons[index.name()].find("none of its values"), std::string::npos);
+  EXPECT_NE(reasons[wave.name()].find("region"), std::string::npos) << report.to_json();
 }
 
 TEST_F(CheckStability, UnboundInputsAndWrongSizesAreErrors) {
@@ -82,6 +175,12 @@ TEST_F(CheckStability, UnboundInputsAndWrongSizesAreErrors) {
   g(x) = image(x);
   expect_mentions(error_of<RuntimeError>([&] { check_stability(f, {4}); }), {"\"unbound_too\""});
   expect_mentions(error_of<CompileError>([&] { check_stability(g, {4, 4}); }), {"2 sizes"});
+  auto with_range = [&](const InputRange& range) {
+    return error_of<CompileError>([&] { check_stability(g, {4}, {.ranges = {range}}); });
+  };
+  expect_mentions(with_range({image, 2, 1}), {"from 2 to 1", "the lower first"});
+  expect_mentions(with_range({image, 0, INFINITY}), {"finite"});
+  expect_mentions(with_range({unbound, 0, 1}), {"something else", "Param"});
 }
 
 }  // namespace

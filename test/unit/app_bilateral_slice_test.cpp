@@ -100,4 +100,23 @@ TEST_F(BilateralSlice, TheResultDoesNotDependOnTheThreads) {
   EXPECT_EQ(run(one)["retrograde"]["psnr_db"], run(three)["retrograde"]["psnr_db"]);
 }
 
+TEST_F(BilateralSlice, ChecksItsGradientsInsteadOfLearning) {
+  const auto photo = write_photo("photo.png", 60, 50);
+  const apps::Outcome outcome =
+      apps::run_program({BILATERAL_SLICE_PROGRAM, "--output", (folder_ / "out").string(), "--input",
+                         photo, "--check-gradients"});
+  EXPECT_EQ(outcome.status, 0) << outcome.output;
+  EXPECT_FALSE(fs::exists(folder_ / "out" / "result.png"));
+  EXPECT_TRUE(fs::exists(folder_ / "out" / "gradients.png"));
+  std::ifstream file(folder_ / "out" / "gradients.json");
+  const auto report = nlohmann::json::parse(file);
+  ASSERT_EQ(report["inputs"].size(), 3u);
+  EXPECT_EQ(report["complex_step_refused"], "");
+  for (const auto& input : report["inputs"]) {
+    EXPECT_LE(input["complex_step_error"], 1e-9) << outcome.output;
+    EXPECT_LE(input["dot_product_error"], 1e-9) << outcome.output;
+    EXPECT_LE(input["own_precision_error"], 1e-3) << outcome.output;
+  }
+}
+
 }  // namespace
