@@ -7,6 +7,7 @@
 #include "autodiff/reverse_sweep.h"
 #include "autodiff/update.h"
 #include "autodiff/update_context.h"
+#include "autodiff/versions.h"
 #include "diagnostics/error.h"
 #include "frontend/define.h"
 #include "ir/build.h"
@@ -140,9 +141,11 @@ class Synthesis {
     record(*f, f->stage_count() - 1, adjoint);
     register_func(adjoint, f->name, target.region);
     for (int s = f->stage_count() - 1; s >= 1; --s) {
+      const int own_stages = adjoint.func->stage_count();
       UpdateAdjoint update = differentiate_update(
           {f, s, regions_, target, adjoint, extendable, options_.store_overwritten,
            options_.checkpoints, [&](const Expr& leaf) { return is_wanted(leaf); }});
+      if (adjoint.func->stage_count() > own_stages) keep_unextended(*f, s, adjoint, own_stages);
       if (update.current.func != adjoint.func)
         register_func(update.current, f->name, target.region);
       for (const FuncPtr& helper : update.helpers) result_.funcs.push_back(helper);
@@ -161,6 +164,16 @@ class Synthesis {
     }
     contribute_pure(f, adjoint.func);
     pending_.erase(f.get());
+  }
+
+  // The reverse of a recurrence goes on in the adjoint of what comes after it, which then also
+  // holds what later iterations read of earlier ones. Who asks for the adjoint after the update
+  // gets one without.
+  void keep_unextended(const FuncContents& f, int stage, AdjointFunc adjoint, int own_stages) {
+    if (!is_requested(&f)) return;
+    adjoint.func =
+        clone_prefix(adjoint.func, own_stages, text(f.name, "_adj_after_update", stage - 1));
+    record(f, stage, adjoint);
   }
 
   void record(const FuncContents& f, int stage, const AdjointFunc& adjoint) {

@@ -11,16 +11,20 @@
 
 namespace retrograde::ir {
 
-FuncPtr clone_prefix(const FuncPtr& f, int stages) {
-  FuncPtr g = std::make_shared<AdjointContents>();
-  g->name = claim_name(f->name + "_before_update" + std::to_string(stages - 1));
+FuncPtr clone_prefix(const FuncPtr& f, int stages, const std::string& name) {
+  auto copy = std::make_shared<AdjointContents>();
+  if (const auto* adjoint = dynamic_cast<const AdjointContents*>(f.get()))
+    copy->traits = adjoint->traits;
+  FuncPtr g = copy;
+  g->name =
+      claim_name(name.empty() ? f->name + "_before_update" + std::to_string(stages - 1) : name);
   std::vector<Expr> args;
   for (const std::string& arg : f->args) args.push_back(variable(arg));
   define_pure(g, args, f->pure->values);
   for (int s = 1; s < stages; ++s) {
-    Definition copy =
+    Definition stage =
         map_exprs(f->stage(s), [&](const Expr& e) { return redirect_calls(e, f, g, false); });
-    append_update(g, copy.args, copy.values, copy.rvars, copy.predicate);
+    append_update(g, stage.args, stage.values, stage.rvars, stage.predicate);
   }
   return g;
 }

@@ -1,14 +1,16 @@
 // Funcs that keep what an update overwrites.
 #pragma once
 
+#include <string>
 #include <vector>
 
 #include "frontend/function.h"
 
 namespace retrograde::ir {
 
-// f with its first `stages` stages only: the values before stage number `stages`.
-FuncPtr clone_prefix(const FuncPtr& f, int stages);
+// f with its first `stages` stages only: the values before stage number `stages`. Without a name:
+// that of f and "_before_update" with its number.
+FuncPtr clone_prefix(const FuncPtr& f, int stages, const std::string& name = "");
 
 // Calls of `f` replaced by calls of `g` at the same arguments, followed by `extra` arguments.
 Expr call_instead(const Expr& e, const FuncPtr& f, const FuncPtr& g,

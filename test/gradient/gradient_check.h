@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstring>
 #include <functional>
 #include <random>
 
@@ -13,6 +14,7 @@
 #include "frontend/func.h"
 #include "frontend/inline_reductions.h"
 #include "ir/print.h"
+#include "support/own_threads.h"
 #include "testing/interpreter.h"
 
 namespace retrograde::gradient {
@@ -77,23 +79,36 @@ inline double difference(const Func& loss, Buffer<float>& image, const std::vect
   return (4 * fine - coarse) / 3;
 }
 
-// The gradient as machine code, under its default schedule, in float32; the same bits again on a
-// second run.
+inline Buffer<float> run_on_threads(Func& gradient, const oracle::Region& region, int threads,
+                                    bool backward) {
+  Buffer<float> result(region.extents);
+  result.set_min(region.mins);
+  OwnThreads context(threads, backward);
+  gradient.realize(&context, result);
+  return result;
+}
+
+// Bit for bit; NaNs too.
+inline bool same_bits(const Buffer<float>& a, const Buffer<float>& b) {
+  return std::memcmp(a.data(), b.data(), a.size_in_bytes()) == 0;
+}
+
+// The gradient as machine code, under its default schedule, in float32; the same bits on every
+// number of threads.
 inline void expect_machine_code_agrees(Func gradient, const oracle::Region& region) {
   oracle::Array expected = evaluate(gradient, region);
-  Buffer<float> first(region.extents), second(region.extents);
-  first.set_min(region.mins);
-  second.set_min(region.mins);
-  gradient.realize(first);
-  gradient.realize(second);
+  Buffer<float> first = run_on_threads(gradient, region, 1, false);
   double scale = 1;
   for (const oracle::Value& v : expected.values)
     scale = std::max(scale, std::abs(v.scalar.as_double()));
   region.for_each([&](const std::vector<int>& point) {
     float found = first.get()->operator()(point.data());
     EXPECT_NEAR(found, expected.at(point).scalar.as_double(), 1e-4 * scale);
-    EXPECT_EQ(found, second.get()->operator()(point.data()));
   });
+  for (int threads : {1, 2, 4, 8}) {
+    EXPECT_TRUE(same_bits(first, run_on_threads(gradient, region, threads, threads == 4)))
+        << "other bits on " << threads << " threads";
+  }
 }
 
 // Checks d(image) on all of the image, and that it is 0 in a ring around it.

@@ -458,5 +458,38 @@ TEST_F(Programs, SecondDerivative) {
   expect_gradient(again, a);
 }
 
+TEST(Gradients, TheAdjointAfterAScanIsThatOfItsConsumersOnly) {
+  Buffer<float> a = random_image({5}, 0.25, 2, 1), seed = random_image({5}, -1, 1, 2);
+  Func f("f");
+  RDom r(1, 4);
+  Var x("x");
+  f(x) = a(x);
+  f(r) = 0.5f * f(r - 1) + f(r);
+  Derivative d = propagate_adjoints(f, seed);
+  oracle::Array after = evaluate(d.adjoint(f), {{0}, {5}}), before = evaluate(d(f), {{0}, {5}});
+  double expected = 0;
+  for (int i = 4; i >= 0; --i) {
+    expected = expected * 0.5 + static_cast<double>(seed(i));
+    EXPECT_EQ(after.at({i}).scalar.as_double(), static_cast<double>(seed(i)));
+    EXPECT_NEAR(before.at({i}).scalar.as_double(), expected, 1e-12);
+  }
+}
+
+// The output is updated beyond the bounds that were given, and its updates read that.
+TEST(Gradients, ASeedIsReadInsideOfItsBoundsOnly) {
+  Buffer<float> a = random_image({5}, 0.25, 2, 1), seed = random_image({4}, -1, 1, 2);
+  Func f("f");
+  RDom r(0, 5);
+  Var x("x");
+  f(x) = a(clamp(x, 0, 4));
+  f(4 - r) = f(4 - r) + 0.5f * f(5 - r);
+  oracle::Array found = evaluate(propagate_adjoints(f, seed)(a), {{0}, {5}});
+  double expected = 0;
+  for (int i = 0; i < 4; ++i) {
+    expected = expected * 0.5 + static_cast<double>(seed(i));
+    EXPECT_NEAR(found.at({i}).scalar.as_double(), expected, 1e-12) << i;
+  }
+}
+
 }  // namespace
 }  // namespace retrograde::gradient

@@ -335,14 +335,14 @@ class Maker {
         return sum(r, a);
       case 1:
         return product(r, a);
-      case 2:
-        return maximum(r, a);
+      case 2:  // of nothing: infinite
+        return max(maximum(r, a), converted(type, Expr(-9.0f)));
       case 3:
-        return minimum(r, a);
+        return min(minimum(r, a), converted(type, Expr(9.0f)));
       case 4:
         return select(argmax(r, a)[0] > 1, constant(type), leaf(type, at));
       default:
-        return argmin(r, a)[1];
+        return min(argmin(r, a)[1], converted(type, Expr(9.0f)));
     }
   }
 
