@@ -4,10 +4,13 @@
 #include "autodiff/derivative_rules.h"
 
 #include <cmath>
+#include <limits>
 #include <map>
 #include <numbers>
 
+#include "autodiff/stable_forms.h"
 #include "ir/build.h"
+#include "ir/scalar.h"
 
 namespace retrograde::ir {
 
@@ -19,6 +22,18 @@ using Partials = std::vector<Partial>;
 Expr num(const Expr& like, double value) { return make_const(like.type(), value); }
 Expr op1(Op op, const Expr& a) { return call_op(op, a.type(), {a}); }
 Expr square(const Expr& a) { return a * a; }
+Expr infinity(Type type) { return make_const(type, std::numeric_limits<double>::infinity()); }
+double smallest_normal_of(Type type) {
+  return type.bits() == 64                       ? std::numeric_limits<double>::min()
+         : type.bits() == 32 || type.is_bfloat() ? std::numeric_limits<float>::min()
+                                                 : 0x1p-14;
+}
+double largest_of(Type type) {
+  return type.bits() == 64   ? std::numeric_limits<double>::max()
+         : type.bits() == 32 ? std::numeric_limits<float>::max()
+         : type.is_bfloat()  ? 0x1.fep127
+                             : 65504;
+}
 Partial strong(Expr e) { return {std::move(e), Strength::Strong}; }
 Partial plain(Expr e) { return {std::move(e), Strength::Plain}; }
 Expr zero_where(const Expr& condition, const Expr& e) {
@@ -41,10 +56,23 @@ Partials lerp_partials(Args a, const Expr&) {
 Partials sqrt_partials(Args a, const Expr& v) { return {strong(num(a[0], 0.5) / v)}; }
 Partials exp_partials(Args, const Expr& v) { return {strong(v)}; }
 Partials log_partials(Args a, const Expr&) { return {strong(num(a[0], 1) / a[0])}; }
+// Whether p - 1 is a number of p's type.
+bool has_exact_predecessor(const Expr& p) {
+  auto value = as_const_float(p);
+  return value && round_to_type(p.type(), *value - 1) == *value - 1;
+}
 // dx: p x^(p-1), 0 where p is 0.  dp: x^p log x, 0 where x is 0.
+// Where p - 1 is rounded, x^(p-1) is wrong by that times log x, or is another power altogether:
+// p v / x is not, unless v overflowed or underflowed.
 Partials power_partials(Args a, const Expr& v, Op power, Op logarithm) {
   const Expr &x = a[0], &p = a[1];
   Expr dx = p * call_op(power, x.type(), {x, p - num(p, 1)});
+  if (!has_exact_predecessor(p)) {
+    Expr size = op1(Op::abs, v);
+    Expr lost = size < num(x, smallest_normal_of(x.type())) || size == infinity(x.type()) ||
+                op1(Op::abs, x) == infinity(x.type());
+    dx = make_select(lost, dx, p * v / x);
+  }
   if (!is_const(p)) dx = zero_where(p == num(p, 0), dx);
   Expr dp = zero_where(x == num(x, 0), v * op1(logarithm, x));
   return {strong(dx), strong(dp)};
@@ -53,9 +81,9 @@ Partials pow_partials(Args a, const Expr& v) { return power_partials(a, v, Op::p
 Partials fast_pow_partials(Args a, const Expr& v) {
   return power_partials(a, v, Op::fast_pow, Op::fast_log);
 }
-Partials hypot_partials(Args a, const Expr& v) {
-  Expr at_origin = v == num(v, 0);
-  return {strong(zero_where(at_origin, a[0] / v)), strong(zero_where(at_origin, a[1] / v))};
+Partials hypot_partials(Args a, const Expr&) {
+  std::vector<Expr> unit = unit_vector(a);
+  return {strong(unit[0]), strong(unit[1])};
 }
 Partials sin_partials(Args a, const Expr&) { return {strong(op1(Op::cos, a[0]))}; }
 Partials cos_partials(Args a, const Expr&) { return {strong(-op1(Op::sin, a[0]))}; }
@@ -71,12 +99,15 @@ Partials acos_partials(Args a, const Expr&) {
 Partials atan_partials(Args a, const Expr&) {
   return {strong(num(a[0], 1) / (num(a[0], 1) + square(a[0])))};
 }
-// Scaled by the radius in two steps, so that neither overflow nor underflow of y^2 + x^2 shows.
+// With y and x scaled by the larger of them: neither overflow nor underflow of y^2 + x^2 shows.
 Partials atan2_partials(Args a, const Expr&) {
   const Expr &y = a[0], &x = a[1];
-  Expr r = call_op(Op::hypot, x.type(), {x, y});
-  Expr at_origin = r == num(r, 0);
-  return {strong(zero_where(at_origin, x / r / r)), strong(zero_where(at_origin, -(y / r / r)))};
+  Expr zero = num(x, 0), size_x = op1(Op::abs, x), size_y = op1(Op::abs, y);
+  Expr scale = binary(Kind::Max, size_x, size_y), inf = infinity(x.type());
+  Expr along_y = y / scale, along_x = x / scale, square_sum = square(along_y) + square(along_x);
+  Expr nowhere = (x == zero && y == zero) || size_x == inf || size_y == inf;
+  return {strong(zero_where(nowhere, along_x / square_sum / scale)),
+          strong(zero_where(nowhere, -(along_y / square_sum / scale)))};
 }
 Partials sinh_partials(Args a, const Expr&) { return {strong(op1(Op::cosh, a[0]))}; }
 Partials cosh_partials(Args a, const Expr&) { return {strong(op1(Op::sinh, a[0]))}; }
@@ -96,8 +127,14 @@ Partials acosh_partials(Args a, const Expr&) {
 Partials atanh_partials(Args a, const Expr&) {
   return {strong(num(a[0], 1) / one_minus_square(a[0]))};
 }
+// exp(-x^2) as exp(-h^2) exp(-(x - h)(x + h)), where h is x rounded to sixteenths and its square
+// exact: the rounding error of a large square would be a factor. Beyond 30 both are 0.
 Partials erf_partials(Args a, const Expr&) {
-  return {strong(num(a[0], 2 * std::numbers::inv_sqrtpi) * op1(Op::exp, -square(a[0])))};
+  const Expr& x = a[0];
+  Expr h = op1(Op::floor, x * num(x, 16)) / num(x, 16);
+  Expr rest = make_select(op1(Op::abs, x) < num(x, 30), (x - h) * (x + h), num(x, 0));
+  return {strong(num(x, 2 * std::numbers::inv_sqrtpi) * op1(Op::exp, -square(h)) *
+                 op1(Op::exp, -rest))};
 }
 Partials fast_log_partials(Args a, const Expr&) { return {strong(num(a[0], 1) / a[0])}; }
 Partials fast_sin_partials(Args a, const Expr&) { return {strong(op1(Op::fast_cos, a[0]))}; }
@@ -109,7 +146,7 @@ Partials fast_inverse_sqrt_partials(Args, const Expr& v) {
 Partials saturating_cast_partials(Args a, const Expr& v) {
   Expr inside = cast_to(a[0].type(), v) == a[0];
   if (v.type().can_represent(a[0].type())) return {plain(make_one(v.type()))};
-  if (v.type().is_float()) inside = call_op(Op::is_finite, Bool(a[0].type().lanes()), {v});
+  if (v.type().is_float()) inside = op1(Op::abs, a[0]) <= num(a[0], largest_of(v.type()));
   return {plain(make_select(inside, make_one(v.type()), make_zero(v.type())))};
 }
 Partials strong_mul_partials(Args a, const Expr&) { return {strong(a[1]), strong(a[0])}; }
@@ -164,9 +201,10 @@ void describe_operators(OpTable& t) {
       {Op::sqrt, {"1 / (2 v)", "0 at +inf", 2}},
       {Op::exp, {"v", "0 at -inf, inf at +inf", 1}},
       {Op::log, {"1 / x", "0 at +inf", 1}},
-      {Op::pow, {"y x^(y-1), v log x", "as x^(y-1) and v log x", 36}},
-      {Op::hypot,
-       {"x / v, y / v", "NaN where an operand is infinite, 0 where only v overflows", 2}},
+      {Op::pow,
+       {"y x^(y-1), or y v / x, v log x",
+        "as x^(y-1) and v log x; a pole may have either sign where y - 1 is rounded", 3}},
+      {Op::hypot, {"x / v, y / v, scaled by |x| + |y|", "NaN where v is infinite", 2}},
       {Op::sin, {"cos x", "NaN, as the value", 1}},
       {Op::cos, {"-sin x", "NaN, as the value", 1}},
       {Op::tan, {"1 + v^2", "NaN, as the value", 4}},
@@ -174,14 +212,14 @@ void describe_operators(OpTable& t) {
       {Op::acos, {"-1 / sqrt((1 - x)(1 + x))", "NaN, as the value", 3}},
       {Op::atan, {"1 / (1 + x^2)", "0", 3}},
       {Op::atan2,
-       {"y / r / r, -x / r / r with r = hypot(x, y)", "NaN where an operand is infinite", 4}},
+       {"y / r / r, -x / r / r with r = hypot(x, y), scaled", "0 where an operand is infinite", 4}},
       {Op::sinh, {"cosh x", "inf", 2}},
       {Op::cosh, {"sinh x", "-inf and inf", 2}},
       {Op::tanh, {"4 e / (1 + e)^2 with e = exp(-2 |x|)", "0", 6}},
       {Op::asinh, {"1 / hypot(x, 1)", "0", 2}},
       {Op::acosh, {"1 / (sqrt(x - 1) sqrt(x + 1))", "0 at +inf", 4}},
       {Op::atanh, {"1 / ((1 - x)(1 + x))", "0, where the value is NaN", 3}},
-      {Op::erf, {"2 / sqrt(pi) exp(-x^2)", "0", 90}},
+      {Op::erf, {"2 / sqrt(pi) exp(-x^2)", "0", 4}},
       {Op::fast_exp, {"exp's, with v", "as exp", -1}},
       {Op::fast_log, {"log's", "as log", 1}},
       {Op::fast_pow, {"pow's, by fast_pow and fast_log", "as pow", -1}},
@@ -214,11 +252,11 @@ OpTable make_op_table() {
   t.emplace(Op::absd, smooth(absd_partials, "a != b", "0 where a == b"));
   t.emplace(Op::lerp, smooth(lerp_partials, "everywhere",
                              "floating weights; integer weights are constants", "definition"));
-  t.emplace(Op::sqrt,
-            smooth(sqrt_partials, "x > 0", "+inf at 0, times a strong zero; NaN below 0"));
+  t.emplace(Op::sqrt, smooth(sqrt_partials, "x > 0",
+                             "+inf at 0 (-inf at -0), times a strong zero; NaN below 0"));
   t.emplace(Op::exp, smooth(exp_partials, "everywhere", "inf where exp overflows"));
-  t.emplace(Op::log,
-            smooth(log_partials, "x > 0", "inf at 0, 1/x below 0 where the primal is NaN"));
+  t.emplace(Op::log, smooth(log_partials, "x > 0",
+                            "inf at 0 (-inf at -0), 1/x below 0 where the primal is NaN"));
   t.emplace(Op::pow, smooth(pow_partials, "x > 0, or integer p",
                             "dx is 0 where p == 0; dp is 0 where x == 0 and NaN where x < 0"));
   t.emplace(Op::hypot, smooth(hypot_partials, "(x, y) != (0, 0)",
@@ -236,7 +274,9 @@ OpTable make_op_table() {
   t.emplace(Op::tanh, smooth(tanh_partials, "everywhere", "0 at infinities"));
   t.emplace(Op::asinh, smooth(asinh_partials, "everywhere", "0 at infinities", "[DLMF] 4.40"));
   t.emplace(Op::acosh, smooth(acosh_partials, "x > 1", "inf at 1, NaN below", "[DLMF] 4.40"));
-  t.emplace(Op::atanh, smooth(atanh_partials, "|x| < 1", "inf at -1 and 1", "[DLMF] 4.40"));
+  t.emplace(Op::atanh,
+            smooth(atanh_partials, "|x| < 1",
+                   "inf at -1 and 1; the formula outside, where the value is NaN", "[DLMF] 4.40"));
   t.emplace(Op::erf, smooth(erf_partials, "everywhere", "0 at infinities", "[DLMF] 7.2"));
   const char* approximated = "that of the function it approximates";
   t.emplace(Op::fast_exp, smooth(exp_partials, "as exp", approximated));

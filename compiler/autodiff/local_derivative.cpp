@@ -1,5 +1,6 @@
 #include "autodiff/local_derivative.h"
 
+#include "autodiff/stable_forms.h"
 #include "diagnostics/error.h"
 #include "ir/build.h"
 
@@ -75,30 +76,6 @@ LocalDerivative sum_of(const std::vector<Expr>& operands, std::vector<Partial> p
     result.reads.push_back(factor.read);
   }
   return result;
-}
-
-// exp(w) where e is 1 + exp(w).
-Expr exp_of_one_plus_exp(const Expr& e) {
-  const auto* sum = e.as<Add>();
-  if (!sum || !(is_one(sum->a) || is_one(sum->b))) return {};
-  Expr other = is_one(sum->a) ? sum->b : sum->a;
-  const auto* call = other.as<Call>();
-  return call && call->is_op(Op::exp) ? other : Expr();
-}
-
-// s / (1 + exp(w)), the logistic function for s = 1: step by step, exp(w) overflows where the value
-// has long been 0, and its square underflows. In one step, with q = exp(w) / (1 + exp(w)):
-//   d/ds = 1 / (1 + exp(w)),   d/dw = -v q
-LocalDerivative of_quotient(const Expr& e, const Div& quotient, const ExprFacts& facts) {
-  Expr grown = e.type().is_float() ? exp_of_one_plus_exp(quotient.b) : Expr();
-  if (!grown.defined()) {
-    return sum_of({quotient.a, quotient.b},
-                  derivative_rule(Kind::Div).partials({quotient.a, quotient.b}, e), facts);
-  }
-  Expr one = make_one(e.type()), reciprocal = one / quotient.b;
-  Expr q = make_select(grown > one, one - reciprocal, grown * reciprocal);
-  return sum_of({quotient.a, grown.as<Call>()->args[0]},
-                {{reciprocal, Strength::Strong}, {-(e * q), Strength::Strong}}, facts);
 }
 
 LocalDerivative choice_of(const Expr& condition, const Expr& a, const Expr& b) {
@@ -210,13 +187,14 @@ ExprFacts::Finiteness ExprFacts::finiteness_of(const Expr& factor) const {
 }
 
 LocalDerivative local_derivative(const Expr& e, const ExprFacts& facts) {
+  if (StableForm whole = stable_form(e); !whole.operands.empty())
+    return sum_of(whole.operands, whole.partials, facts);
   return match(
       e, [&](const Select& s) { return choice_of(s.condition, s.true_value, s.false_value); },
       [&](const Cast& c) { return same_as(e, c.value); },
       [&](const Broadcast&) -> LocalDerivative {
         internal_error("vectors have no place in the definition of a Func");
       },
-      [&](const Div& quotient) { return of_quotient(e, quotient, facts); },
       [&](const Binary& b) {
         return sum_of({b.a, b.b}, derivative_rule(e.kind()).partials({b.a, b.b}, e), facts);
       },

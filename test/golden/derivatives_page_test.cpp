@@ -32,10 +32,14 @@ mode use the same partials, so they are transposes of each other at every point,
   and `sqrt(x)` at 0 keeps its infinity.
 - **Steps.** Rounding, comparisons, integer arithmetic and casts to integers have derivative 0;
   `Derivative::explain()` says so where it makes a gradient 0.
-- **Stable forms.** `s / (1 + exp(w))` (the logistic function) is differentiated in one step, which neither
-  overflows nor underflows before its derivative does; `tanh` by exp(-2 |x|), since 1 - v^2 has no digits
-  left for large x; 1 - x^2 as (1 - x)(1 + x); `hypot` and `atan2` by scaled quotients. A quotient's
-  partial is written with its value, -(v / y), not with y^2.
+- **Stable forms.** Differentiated in one step, so that nothing cancels, overflows or underflows before
+  the derivative does (`compiler/autodiff/stable_forms.h`): `s / (1 + exp(w))` and
+  `exp(w) / (1 + exp(w))` (the logistic function), `log(1 + exp(w))` and `log(exp(a) + exp(b))`
+  (softplus, log-sum-exp), `sqrt(a*a + b*b + ...)` of up to four squares (norms, whose squares may
+  underflow). `tanh` goes by exp(-2 |x|), since 1 - v^2
+  has no digits left for large x; `erf` by two exponentials, since the rounding error of x^2 would be a
+  factor; 1 - x^2 is (1 - x)(1 + x); `hypot` and `atan2` are scaled; `pow`'s dx is y v / x where y - 1
+  would be rounded. A quotient's partial is written with its value, -(v / y), not with y^2.
 - **Narrow types.** Adjoints and tangents of float16 and bfloat16 are float32.
 - **Long sums.** An adjoint in float32 whose elements may get 4,096 terms or more (or a number that is
   known at run time only, or whatever a scatter of so many iterations brings) is summed in double by a

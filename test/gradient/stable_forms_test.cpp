@@ -1,0 +1,133 @@
+// Functions as users write them, whose derivative taken operator by operator would cancel, overflow
+// or underflow: wherever value and true derivative are finite in float32, the gradient is right to
+// a few ULP. Oracle: the derivative in long double, in closed form.
+#include <cmath>
+#include <functional>
+#include <limits>
+
+#include "gradient/gradient_check.h"
+
+namespace retrograde::gradient {
+namespace {
+
+using Real = long double;
+
+struct Shape {
+  const char* name;
+  std::function<Expr(Expr, Expr)> write;
+  std::function<Real(Real, Real)> by_x;
+  int max_ulp;
+};
+
+Real logistic_slope(Real x) {
+  Real e = std::exp(-std::fabs(x));
+  return e / ((1 + e) * (1 + e));
+}
+Real logistic(Real x) { return x > 0 ? 1 / (1 + std::exp(-x)) : std::exp(x) / (1 + std::exp(x)); }
+
+const std::vector<Shape>& shapes() {
+  static const std::vector<Shape> all = {
+      {"1 / (1 + exp(-x))", [](Expr x, Expr) { return 1.0f / (1.0f + exp(-x)); },
+       [](Real x, Real) { return logistic_slope(x); }, 6},
+      {"1 / (exp(-x) + 1)", [](Expr x, Expr) { return 1.0f / (exp(-x) + 1.0f); },
+       [](Real x, Real) { return logistic_slope(x); }, 6},
+      {"exp(x) / (1 + exp(x))", [](Expr x, Expr) { return exp(x) / (1.0f + exp(x)); },
+       [](Real x, Real) { return logistic_slope(x); }, 6},
+      {"1 - 1 / (1 + exp(x))", [](Expr x, Expr) { return 1.0f - 1.0f / (1.0f + exp(x)); },
+       [](Real x, Real) { return logistic_slope(x); }, 6},
+      {"(1 + tanh(x / 2)) / 2", [](Expr x, Expr) { return (1.0f + tanh(x / 2.0f)) / 2.0f; },
+       [](Real x, Real) { return logistic_slope(x); }, 8},
+      {"y / (1 + exp(-x)), swish", [](Expr x, Expr) { return x / (1.0f + exp(-x)); },
+       [](Real x, Real) { return logistic(x) + x * logistic_slope(x); }, 16},
+      {"log(1 / (1 + exp(-x)))", [](Expr x, Expr) { return log(1.0f / (1.0f + exp(-x))); },
+       [](Real x, Real) { return logistic(-x); }, 8},
+      {"-log(1 + exp(-x))", [](Expr x, Expr) { return -log(1.0f + exp(-x)); },
+       [](Real x, Real) { return logistic(-x); }, 6},
+      {"log(1 + exp(x))", [](Expr x, Expr) { return log(1.0f + exp(x)); },
+       [](Real x, Real) { return logistic(x); }, 6},
+      // Where exp(x) is denormal, so few digits of it are left as the value has.
+      {"log(exp(x) + exp(y))", [](Expr x, Expr y) { return log(exp(x) + exp(y)); },
+       [](Real x, Real y) { return x < -87 ? std::nanl("") : logistic(x - y); }, 6},
+      {"log(1 + x)", [](Expr x, Expr) { return log(1.0f + x); },
+       [](Real x, Real) { return x <= -1 ? std::nanl("") : 1 / (1 + x); }, 2},
+      {"exp(x) - 1", [](Expr x, Expr) { return exp(x) - 1.0f; },
+       [](Real x, Real) { return std::exp(x); }, 2},
+      {"sqrt(x*x)", [](Expr x, Expr) { return sqrt(x * x); },
+       [](Real x, Real) { return x > 0   ? 1
+                                 : x < 0 ? -1
+                                         : 0; }, 4},
+      {"sqrt(x*x + y*y)", [](Expr x, Expr y) { return sqrt(x * x + y * y); },
+       [](Real x, Real y) { return x == 0 ? 0 : x / std::hypot(x, y); }, 4},
+      {"sqrt(pow(x, 2) + pow(y, 2))", [](Expr x, Expr y) { return sqrt(pow(x, 2) + pow(y, 2)); },
+       [](Real x, Real y) { return x == 0 ? 0 : x / std::hypot(x, y); }, 4},
+      {"hypot(x, y)", [](Expr x, Expr y) { return hypot(x, y); },
+       [](Real x, Real y) { return x == 0 ? 0 : x / std::hypot(x, y); }, 4},
+      {"sqrt(x*x + y*y + 1)", [](Expr x, Expr y) { return sqrt(x * x + y * y + 1.0f); },
+       [](Real x, Real y) { return x / std::sqrt(x * x + y * y + 1); }, 4},
+  };
+  return all;
+}
+
+std::vector<float> extremes() {
+  std::vector<float> all;
+  for (float v : {0.0f,  1e-45f, 1e-40f, 2e-38f, 1e-30f, 1e-22f, 1e-19f, 1e-10f, 1e-5f,
+                  1e-3f, 0.3f,   1.0f,   3.0f,   10.0f,  17.0f,  25.0f,  50.0f,  80.0f,
+                  87.0f, 88.5f,  100.0f, 1e3f,   1e10f,  1e18f,  1e25f,  3e38f}) {
+    all.push_back(v);
+    all.push_back(-v);
+  }
+  return all;
+}
+
+// What is lost below the smallest normal number does not count.
+double ulps(float found, Real expected) {
+  if (!std::isfinite(found)) return 1e30;
+  if (std::fabs(static_cast<Real>(found) - expected) < std::numeric_limits<float>::min()) return 0;
+  float size = std::max(std::fabs(static_cast<float>(expected)), std::numeric_limits<float>::min());
+  return static_cast<double>(std::fabs(static_cast<Real>(found) - expected) /
+                             (std::nextafter(size, 2 * size) - size));
+}
+
+TEST(StableForms, AreFiniteWhereExpIsDenormal) {
+  Buffer<float> x(2), one(1);
+  x(0) = -100, x(1) = -101, one(0) = 1;
+  Var i("i");
+  Func f("f");
+  f(i) = log(exp(x(i)) + exp(x(i + 1)));
+  Buffer<float> gradient = propagate_adjoints(f, one)(x).realize({2});
+  EXPECT_NEAR(gradient(0), logistic(1), 0.02);
+  EXPECT_NEAR(gradient(1), logistic(-1), 0.02);
+}
+
+TEST(StableForms, AreRightToAFewUlpWhereverTheyAreFinite) {
+  const std::vector<float> values = extremes();
+  const int n = static_cast<int>(values.size());
+  Buffer<float> x(n, n), y(n, n), ones(n, n);
+  ones.fill(1);
+  for (int j = 0; j < n; ++j) {
+    for (int i = 0; i < n; ++i)
+      x(i, j) = values[static_cast<size_t>(i)], y(i, j) = values[static_cast<size_t>(j)];
+  }
+  for (const Shape& shape : shapes()) {
+    Var i("i"), j("j");
+    Func f("f");
+    f(i, j) = shape.write(x(i, j), y(i, j));
+    Buffer<float> value = f.realize({n, n});
+    Buffer<float> gradient = propagate_adjoints(f, ones)(x).realize({n, n});
+    int checked = 0;
+    for (int b = 0; b < n; ++b) {
+      for (int a = 0; a < n; ++a) {
+        const Real expected = shape.by_x(x(a, b), y(a, b));
+        if (!std::isfinite(value(a, b)) || !std::isfinite(static_cast<float>(expected))) continue;
+        ++checked;
+        EXPECT_LE(ulps(gradient(a, b), expected), shape.max_ulp)
+            << shape.name << " at " << x(a, b) << ", " << y(a, b) << ": " << gradient(a, b)
+            << " instead of " << expected;
+      }
+    }
+    EXPECT_GT(checked, n * n / 3) << shape.name;
+  }
+}
+
+}  // namespace
+}  // namespace retrograde::gradient
