@@ -1,6 +1,8 @@
 // Funcs that differentiation makes, and what is known of their values.
 #pragma once
 
+#include <vector>
+
 #include "frontend/function.h"
 
 namespace retrograde::ir {
@@ -18,9 +20,17 @@ struct AdjointTraits {
   }
 };
 
+// A part of the iterations of an update: what each evaluates, and how often it runs at each point of
+// the pure dimensions.
+struct AdjointWork {
+  std::vector<Expr> values;  // of each write: its place, then its values
+  std::vector<Expr> loops;   // extents
+};
+
 // A Func made by differentiation.
 struct AdjointContents : FuncContents {
   AdjointTraits traits;
+  std::vector<AdjointWork> work;  // of its only update, where a table says what iterations do
   FuncPtr copy() const override { return std::make_shared<AdjointContents>(*this); }
 };
 

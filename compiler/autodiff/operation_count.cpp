@@ -4,6 +4,7 @@
 #include <cmath>
 #include <unordered_map>
 
+#include "autodiff/adjoint_contents.h"
 #include "autodiff/default_schedule.h"
 #include "autodiff/local_derivative.h"
 #include "autodiff/regions.h"
@@ -153,6 +154,9 @@ class Counter {
       entry.bytes = entry.evaluations * bytes;
     }
     for (int s = 0; s < f->stage_count(); ++s) entry.stages.push_back(count_stage(entry, s));
+    if (const auto* made = dynamic_cast<const AdjointContents*>(f.get());
+        made && !made->work.empty())
+      count_work(entry, made->work);
     if (!entry.stored) {
       for (const Expr& value : f->pure->values)
         value_costs_[f.get()].push_back(with_reads(body_of({value})));
@@ -173,8 +177,7 @@ class Counter {
     std::vector<Expr> roots = definition.values;
     roots.insert(roots.end(), definition.args.begin(), definition.args.end());
     roots.push_back(definition.predicate);
-    Body& body = bodies_[&definition] = body_of(roots);
-    StageOperations stage{with_reads(body), {}};
+    StageOperations stage{with_reads(add_body(f, roots)), {}};
     if (!entry.stored) return stage;
     stage.each.moves += static_cast<double>(definition.values.size());
     if (entry.region.empty() && f.dimensions() > 0) return stage;
@@ -182,6 +185,26 @@ class Counter {
     for (const LoopVariable& v : regions_.domain(f, s).vars) box.push_back({v.min, v.max});
     stage.iterations = Count::points(box);
     return stage;
+  }
+
+  // An update whose iterations follow a table counts by what they do.
+  void count_work(FuncOperations& entry, const std::vector<AdjointWork>& work) {
+    entry.stages.resize(1);
+    bodies_[entry.func.get()].resize(1);
+    double values = static_cast<double>(entry.func->types.size());
+    for (const AdjointWork& part : work) {
+      StageOperations stage{with_reads(add_body(*entry.func, part.values)), {}};
+      stage.each.moves += static_cast<double>(part.values.size()) * values / (1 + values);
+      Box box = regions_.of(entry.func.get());
+      box.pop_back();  // the slot
+      for (const Expr& extent : part.loops) box.push_back({Expr(0), extent - 1});
+      stage.iterations = Count::points(box);
+      entry.stages.push_back(stage);
+    }
+  }
+
+  const Body& add_body(const FuncContents& f, const std::vector<Expr>& roots) {
+    return bodies_[&f].emplace_back(body_of(roots));
   }
 
   Operations with_reads(const Body& body) const {
@@ -199,11 +222,10 @@ class Counter {
 
   // Consumers first: how often `entry` runs is known, and so how often what it reads does.
   void count_evaluations(FuncOperations& entry) {
-    for (size_t s = 0; s < entry.stages.size(); ++s) {
-      auto body = bodies_.find(&entry.func->stage(static_cast<int>(s)));
-      if (body == bodies_.end()) continue;
+    const std::vector<Body>& bodies = bodies_[entry.func.get()];
+    for (size_t s = 0; s < bodies.size(); ++s) {
       const Count& runs = entry.stored ? entry.stages[s].iterations : entry.evaluations;
-      for (const Call* call : body->second.reads) {
+      for (const Call* call : bodies[s].reads) {
         FuncOperations& callee = result_.funcs[places_.at(call->symbol.raw())];
         if (!callee.stored) callee.evaluations += runs;
       }
@@ -214,7 +236,7 @@ class Counter {
   Regions regions_;
   DefaultSchedules schedules_;
   std::unordered_map<const Symbol*, std::vector<Operations>> value_costs_;  // of what is inlined
-  std::unordered_map<const Definition*, Body> bodies_;
+  std::unordered_map<const Symbol*, std::vector<Body>> bodies_;  // one for each entry of stages
   std::unordered_map<const Symbol*, size_t> places_;
   OperationCount result_;
 };

@@ -62,7 +62,7 @@ struct FuncOperations {
   FuncPtr func;
   Box region;
   bool stored = false;
-  std::vector<StageOperations> stages;
+  std::vector<StageOperations> stages;  // or, of loops that follow a table, parts of them
   Count evaluations;       // of the definition: elements when stored, reads by others when not
   Count bytes;             // kept in memory
   bool is_extern = false;  // computed elsewhere: nothing is known

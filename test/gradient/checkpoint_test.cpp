@@ -3,6 +3,7 @@
 // interpreter evaluates.
 #include <atomic>
 
+#include "autodiff/revolve.h"
 #include "gradient/programs_suite.h"
 #include "support/errors.h"
 
@@ -233,6 +234,31 @@ TEST(Checkpoints, GradientsOfWhatEveryStepReadsTakeNoMemoryForEachStep) {
         propagate_adjoints(weighted_sum(u, {50}), {.wrt = {k}, .checkpoint_states = 6}), k);
   };
   EXPECT_EQ(peak(400), peak(100));
+}
+
+// Float32 sums of 10,000 equal terms lose four digits when added one by one.
+TEST(Checkpoints, SumsOverLongTimesKeepTheirDigits) {
+  Buffer<float> start = line(2), push = line(1, 3);
+  Func u("long_pushed_u"), loss("loss");
+  RDom t(0, 10000), r(0, 2);
+  u(x) = start(x);
+  u(x) = u(x) * 1.0f + push(Expr(0)) * 0.1f + 0.0f * cast<float>(t);
+  loss() = 0.0f;
+  loss() += u(r);
+  Derivative d = propagate_adjoints(loss, {.wrt = {push}, .checkpoint_states = 5});
+  float found = Buffer<float>(d(push).realize({1}))(0);
+  EXPECT_NEAR(found, 2 * 10000 * double(0.1f), 2 * 10000 * 0.1 * 2e-7);
+}
+
+TEST(Checkpoints, OperationsFollowTheSchedule) {
+  for (int s : {1, 4, 10, 100}) {
+    Program p = pushed(100);
+    Derivative d = propagate_adjoints(p.loss, {.wrt = {p.inputs[0]}, .checkpoint_states = s});
+    double again = static_cast<double>(ir::revolve_advances(100, s));
+    // 7 sines in each step that is run: for the loss, again, and to reverse it; there a cosine,
+    // too.
+    EXPECT_EQ(d.operations().gradient.nonlinear().value(), 7 * (100 + again + 100 + 100));
+  }
 }
 
 // ---- what it is part of ----

@@ -1,0 +1,46 @@
+// What a loop over time needs of its steps, what its steps give, and how many states are kept.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "autodiff/adjoint_contents.h"
+#include "autodiff/tape_layout.h"
+#include "autodiff/update_context.h"
+
+namespace retrograde::ir {
+
+struct CheckpointPlan {
+  // What iterations contribute at one place of another Func or image.
+  struct Given {
+    LeafAdjoint leaf;
+    bool over_time = false;    // one value for each iteration of each step, not a sum over steps
+    bool compensated = false;  // a long sum: what rounding lost is summed beside it
+    Expr start;                // its first slot
+    int width() const { return compensated ? 2 : 1; }
+  };
+
+  int steps = 0, states = 0;
+  ReductionVariable time;
+  std::vector<ReductionVariable> inner;  // the loops of one step
+  Expr inner_count;
+  std::vector<Type> types;                // in which values of f and their adjoints are held
+  int sum_value = -1;                     // the value that sums use: the first of a floating type
+  std::string at_hand;                    // a variable: the slot of the adjoints at hand
+  std::vector<LeafAdjoint> passed_on;     // contributions to f itself
+  std::vector<Given> given;               // to others
+  std::vector<Expr> needed;               // reads of f that partials and places need, inner first
+  std::vector<std::vector<Expr>> places;  // the distinct places of those
+  std::vector<size_t> place_of;           // of each needed read
+  std::optional<int64_t> bytes_of_state;  // over all pure dimensions; none: not constant
+};
+
+// The adjoints at hand will be read from `machine`, whose types and traits are set here. Throws
+// when the number of steps is not known, the budget too small, or a place forgotten.
+CheckpointPlan plan_checkpoints(const UpdateContext& context, const TapeLayout& layout,
+                                const FuncPtr& adjoint,
+                                const std::shared_ptr<AdjointContents>& machine);
+
+}  // namespace retrograde::ir
