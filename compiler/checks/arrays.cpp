@@ -109,6 +109,52 @@ std::vector<Values> realize_values(Func f, const Shape& shape) {
   return result;
 }
 
+void Batch::add(const Func& f, const Shape& shape) {
+  for (const Entry& e : entries_) {
+    if (e.func.function() != f.function()) continue;
+    if (e.shape.mins != shape.mins || e.shape.extents != shape.extents) together_ = false;
+    entries_.push_back({f, shape, e.position});
+    return;
+  }
+  entries_.push_back({f, shape, values_});
+  outputs_.push_back(f);
+  shapes_.push_back(shape);
+  values_ += f.types().size();
+  elements_ += static_cast<double>(count(shape) * f.types().size());
+}
+
+bool Batch::realize_together(std::vector<std::vector<Values>>& to) {
+  constexpr double most_elements = 3e7;
+  if (elements_ > most_elements) return false;
+  if (!pipeline_.defined()) pipeline_ = Pipeline(outputs_);
+  std::vector<Buffer<>> out;
+  for (size_t i = 0; i < outputs_.size(); ++i) {
+    for (Type t : outputs_[i].types()) out.push_back(new_buffer(t, shapes_[i]));
+  }
+  try {
+    pipeline_.realize(Realization(out));
+  } catch (const UserError&) {
+    return false;
+  }
+  for (const Entry& e : entries_) {
+    to.emplace_back();
+    for (size_t v = 0; v < e.func.types().size(); ++v) {
+      const Buffer<>& b = out[e.position + v];
+      to.back().push_back(is_checkable(b.type()) ? values_of(b) : Values());
+    }
+  }
+  return true;
+}
+
+std::vector<std::vector<Values>> Batch::realize() {
+  std::vector<std::vector<Values>> result;
+  if (entries_.empty()) return result;
+  together_ = together_ && realize_together(result);
+  if (together_) return result;
+  for (const Entry& e : entries_) result.push_back(realize_values(e.func, e.shape));
+  return result;
+}
+
 std::vector<int> place_of(size_t i, const Shape& shape) {
   std::vector<int> result;
   for (size_t d = 0; d < shape.extents.size(); ++d) {

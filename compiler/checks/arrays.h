@@ -9,6 +9,7 @@
 #include "analysis/interval.h"
 #include "frontend/buffer.h"
 #include "frontend/func.h"
+#include "frontend/pipeline.h"
 
 namespace retrograde::checks {
 
@@ -40,6 +41,31 @@ void fill(Buffer<>& buffer, const Values& values);
 Values realize(Func f, const Shape& shape);
 // One array for each value of the Func; empty for those that are neither float32 nor float64.
 std::vector<Values> realize_values(Func f, const Shape& shape);
+// Many Funcs in one run, so that what they share is compiled and computed once. One after the other
+// when that does not work: together they are very large, one reads another outside of its shape, or
+// what was inlined into one would have to be stored for two.
+class Batch {
+ public:
+  void add(const Func& f, const Shape& shape);
+  size_t size() const { return entries_.size(); }
+  std::vector<std::vector<Values>> realize();  // as realize_values, for each that was added
+
+ private:
+  struct Entry {
+    Func func;
+    Shape shape;
+    size_t position;  // of its first value among the outputs; a Func may be added twice
+  };
+  bool realize_together(std::vector<std::vector<Values>>& to);
+  std::vector<Entry> entries_;
+  std::vector<Func> outputs_;
+  std::vector<Shape> shapes_;  // of the outputs
+  size_t values_ = 0;
+  double elements_ = 0;
+  bool together_ = true;
+  Pipeline pipeline_;
+};
+
 bool is_checkable(Type type);  // float32 or float64
 // The place of the i-th element of an array.
 std::vector<int> place_of(size_t i, const Shape& shape);

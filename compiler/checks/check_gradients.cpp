@@ -288,37 +288,48 @@ class Checker {
     ir::Box box;
     for (int e : shape_.extents) box.push_back({Expr(0), Expr(e - 1)});
     ir::Regions regions(order, box);
+    const auto errors = func_errors(order, regions);
     std::map<const ir::Symbol*, double> inherited;
     double most = 4;  // an adjoint that only rounds loses less than this
     for (auto f = order.rbegin(); f != order.rend(); ++f) {
-      auto error = func_error(*f, regions);
-      double before = inherited[f->get()];
-      for (const ir::FuncPtr& callee : ir::direct_callees(**f)) {
-        double& worst = inherited[callee.get()];
-        worsen(worst, error.value_or(before));
-      }
-      if (!error) continue;
+      const double before = inherited[f->get()];
+      const auto found = errors.find(f->get());
+      const double error = found == errors.end() ? before : found->second;
+      for (const ir::FuncPtr& callee : ir::direct_callees(**f))
+        worsen(inherited[callee.get()], error);
+      if (found == errors.end()) continue;
       double eps = std::numeric_limits<float>::epsilon();
-      double lost = *error / std::max(before, eps);
-      report_.funcs.push_back({(*f)->name, *error, lost});
+      double lost = error / std::max(before, eps);
+      report_.funcs.push_back({(*f)->name, error, lost});
       if (!(lost <= most)) most = lost, report_.loses_digits = (*f)->name;
     }
   }
 
-  // The worst of the adjoint's values.
-  std::optional<double> func_error(const ir::FuncPtr& f, const ir::Regions& regions) {
-    auto shape = constant_shape(regions.of(f.get()));
-    Func own = own_->adjoint(Func(f)), wide = wide_->adjoint(Func(widened_.funcs.at(f.get())));
-    if (!shape || shape->extents.size() != f->args.size() || !own.defined() || !wide.defined())
-      return std::nullopt;
-    const auto a = realize_values(own, *shape), b = realize_values(wide, *shape);
-    double worst = 0;
-    for (size_t k = 0; k < a.size(); ++k) {
-      const double size = largest(b[k]);
-      for (size_t i = 0; i < a[k].size(); ++i)
-        worsen(worst, relative_error(a[k][i], b[k][i], size));
+  // The worst of the adjoint's values; of Funcs that have one over a known region.
+  std::map<const ir::Symbol*, double> func_errors(const std::vector<ir::FuncPtr>& order,
+                                                  const ir::Regions& regions) {
+    std::vector<const ir::Symbol*> funcs;
+    Batch own, wide;
+    for (const ir::FuncPtr& f : order) {
+      auto shape = constant_shape(regions.of(f.get()));
+      Func a = own_->adjoint(Func(f)), b = wide_->adjoint(Func(widened_.funcs.at(f.get())));
+      if (!shape || shape->extents.size() != f->args.size() || !a.defined() || !b.defined())
+        continue;
+      funcs.push_back(f.get());
+      own.add(a, *shape);
+      wide.add(b, *shape);
     }
-    return worst;
+    const auto a = own.realize(), b = wide.realize();
+    std::map<const ir::Symbol*, double> result;
+    for (size_t n = 0; n < funcs.size(); ++n) {
+      double& worst = result[funcs[n]] = 0;
+      for (size_t k = 0; k < a[n].size(); ++k) {
+        const double size = largest(b[n][k]);
+        for (size_t i = 0; i < a[n][k].size(); ++i)
+          worsen(worst, relative_error(a[n][k][i], b[n][k][i], size));
+      }
+    }
+    return result;
   }
 
   const Func& output_;

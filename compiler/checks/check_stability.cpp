@@ -42,7 +42,7 @@ double magnitude(Extreme extreme) {
 struct Watched {
   std::string name;  // of the primal
   bool is_adjoint;
-  Func own, wide;
+  Func own;
   Shape shape;
 };
 using Arrays = std::vector<std::vector<Values>>;  // of each watched Func, of each of its values
@@ -112,10 +112,10 @@ class Checker {
       const Func primal(f);
       auto shape = shape_of(*f, regions);
       if (!shape) continue;
-      watched_.push_back({f->name, false, primal, {}, *shape});
+      watched_.push_back({f->name, false, primal, *shape});
       Func a = derivative.adjoint(primal);
       if (a.defined()) {
-        adjoints.push_back({f->name, true, a, {}, *shape});
+        adjoints.push_back({f->name, true, a, *shape});
       } else {
         report_.left_out.push_back({"adjoint of " + f->name, "there is none"});
       }
@@ -126,7 +126,7 @@ class Checker {
       if (!p->type.is_float()) continue;
       Shape shape = shape_of_bound(*p);
       Func a = derivative.of(AdjointInput(p));
-      if (a.defined()) watched_.push_back({p->name, true, a, {}, shape});
+      if (a.defined()) watched_.push_back({p->name, true, a, shape});
     }
     widen_watched();
   }
@@ -160,7 +160,10 @@ class Checker {
     std::vector<ir::FuncPtr> all{output_.function()};
     for (const Watched& w : watched_) all.push_back(w.own.function());
     ir::Widened widened = ir::widen(all, {amount_, seed_});
-    for (Watched& w : watched_) w.wide = Func(widened.funcs.at(w.own.function().get()));
+    for (const Watched& w : watched_) {
+      own_.add(w.own, w.shape);
+      wide_.add(Func(widened.funcs.at(w.own.function().get())), w.shape);
+    }
     for (const auto& p : ir::parameters_of({output_.function()})) {
       if (p->type.is_float())
         inputs_.push_back(bind_wide(p, widened.parameters.at(p.get()), asked_));
@@ -227,24 +230,18 @@ class Checker {
 
   // ---- errors ----
 
-  Arrays wide_arrays() const {
-    Arrays result;
-    for (const Watched& w : watched_) result.push_back(realize_values(w.wide, w.shape));
-    return result;
-  }
-
   // A case of the same name grows: samples are one case.
   void add_case(const std::string& name) {
     const bool is_new = report_.cases.empty() || report_.cases.back().name != name;
     if (is_new) report_.cases.push_back({name, {}, {}, {}});
     StabilityReport::Case& to = report_.cases.back();
-    size_t n = 0;
-    for (const Watched& w : watched_) {
-      const auto own = realize_values(w.own, w.shape), wide = realize_values(w.wide, w.shape);
-      for (size_t v = 0; v < own.size(); ++v) {
-        if (own[v].empty()) continue;
+    const Arrays own = own_.realize(), wide = wide_.realize();
+    for (size_t k = 0, n = 0; k < watched_.size(); ++k) {
+      const Watched& w = watched_[k];
+      for (size_t v = 0; v < own[k].size(); ++v) {
+        if (own[k][v].empty()) continue;
         if (is_new) to.funcs.push_back({w.name, w.is_adjoint, static_cast<int>(v)});
-        compare(to, to.funcs[n++], w, own[v], wide[v]);
+        compare(to, to.funcs[n++], w, own[k][v], wide[k][v]);
       }
     }
   }
@@ -273,7 +270,7 @@ class Checker {
 
   void estimate(StabilityReport::Case& to) {
     const double eps = Limits::epsilon();
-    const Arrays base = wide_arrays();
+    const Arrays base = wide_.realize();
     std::uniform_real_distribution<double> rounding(-eps, eps);
     for (int n = 0; n < options_.perturbations; ++n) {
       for (size_t k = 0; k < inputs_.size(); ++k) {
@@ -294,7 +291,7 @@ class Checker {
 
   void grow(StabilityReport::Case& to, const Arrays& base,
             double StabilityReport::FuncResult::*what) {
-    const Arrays now = wide_arrays();
+    const Arrays now = wide_.realize();
     size_t n = 0;
     for (size_t w = 0; w < now.size(); ++w) {
       for (size_t v = 0; v < now[w].size(); ++v) {
@@ -317,6 +314,7 @@ class Checker {
   Param<double> amount_{"rounding_amount"};
   Param<int> seed_{"rounding_seed"};
   std::vector<Watched> watched_;
+  Batch own_, wide_;  // what is watched, in its own precision and in double
   std::vector<Input> inputs_;
   std::vector<Values> now_;  // the inputs' values
   StabilityReport report_;
