@@ -2,7 +2,10 @@
 // or underflow where the derivative of the whole does not. They are differentiated in one step.
 //
 // Logistic, s / (1 + exp(w)): exp(w) overflows where the value has long been 0, and so for s = 1.
-// Logistic, exp(w) / (1 + exp(w)): the difference of 1 / (1 + e) and v / (1 + e) cancels.
+// Shares, a / (a + b + ...), a / (1 + |a|), exp(a) / (exp(a) + exp(b) + ...): softmax. The
+// difference
+//   of 1 / S and v / S cancels.
+// Normalised, a / sqrt(a * a + b * b + ...), also by max(norm, c): the same.
 // Softplus, log-sum-exp, log(exp(a) + exp(b) + c): the reciprocal of a tiny sum is infinite.
 // Norm, sqrt(a * a + b * b + ...): the squares underflow where the norm is tiny.
 //

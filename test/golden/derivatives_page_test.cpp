@@ -33,10 +33,11 @@ mode use the same partials, so they are transposes of each other at every point,
 - **Steps.** Rounding, comparisons, integer arithmetic and casts to integers have derivative 0;
   `Derivative::explain()` says so where it makes a gradient 0.
 - **Stable forms.** Differentiated in one step, so that nothing cancels, overflows or underflows before
-  the derivative does (`compiler/autodiff/stable_forms.h`): `s / (1 + exp(w))` and
-  `exp(w) / (1 + exp(w))` (the logistic function), `log(1 + exp(w))` and `log(exp(a) + exp(b))`
-  (softplus, log-sum-exp), `sqrt(a*a + b*b + ...)` of up to four squares (norms, whose squares may
-  underflow). `tanh` goes by exp(-2 |x|), since 1 - v^2
+  the derivative does (`compiler/autodiff/stable_forms.h`): `s / (1 + exp(w))` (the logistic function);
+  shares, `a / (a + b + ...)` and `a / (1 + |a|)`, of exponentials too (softmax);
+  `log(exp(a) + exp(b) + c)` (softplus, log-sum-exp); `sqrt(a*a + b*b + ...)` (norms, whose squares may
+  underflow) and `a / sqrt(a*a + b*b + ...)` (normalised, also by `max(norm, c)`): of up to four terms
+  in one expression. `tanh` goes by exp(-2 |x|), since 1 - v^2
   has no digits left for large x; `erf` by two exponentials, since the rounding error of x^2 would be a
   factor; 1 - x^2 is (1 - x)(1 + x); `hypot` and `atan2` are scaled; `pow`'s dx is y v / x where y - 1
   would be rounded. A quotient's partial is written with its value, -(v / y), not with y^2.

@@ -25,6 +25,9 @@ Real logistic_slope(Real x) {
 }
 Real logistic(Real x) { return x > 0 ? 1 / (1 + std::exp(-x)) : std::exp(x) / (1 + std::exp(x)); }
 
+// An exponential is denormal or overflows: so few digits are left as the value has.
+bool is_wide(Real x, Real y) { return std::min(x, y) < -87 || std::max(x, y) > 87; }
+
 const std::vector<Shape>& shapes() {
   static const std::vector<Shape> all = {
       {"1 / (1 + exp(-x))", [](Expr x, Expr) { return 1.0f / (1.0f + exp(-x)); },
@@ -48,6 +51,37 @@ const std::vector<Shape>& shapes() {
       // Where exp(x) is denormal, so few digits of it are left as the value has.
       {"log(exp(x) + exp(y))", [](Expr x, Expr y) { return log(exp(x) + exp(y)); },
        [](Real x, Real y) { return x < -87 ? std::nanl("") : logistic(x - y); }, 6},
+      {"softmax", [](Expr x, Expr y) { return exp(x) / (exp(x) + exp(y)); },
+       [](Real x, Real y) { return is_wide(x, y) ? std::nanl("") : logistic_slope(x - y); }, 8},
+      {"softmax, by the other", [](Expr x, Expr y) { return exp(y) / (exp(x) + exp(y) + exp(y)); },
+       [](Real x, Real y) {
+         Real e = std::exp(x - y);
+         return is_wide(x, y) ? std::nanl("") : -(1 / (e + 2)) * (e / (e + 2));
+       },
+       8},
+      {"x / (x + y)", [](Expr x, Expr y) { return x / (x + y); },
+       [](Real x, Real y) { return x * y < 0 ? std::nanl("") : y / (x + y) / (x + y); }, 6},
+      {"x / (1 + |x|)", [](Expr x, Expr) { return x / (1.0f + abs(x)); },
+       [](Real x, Real) { return 1 / (1 + std::fabs(x)) / (1 + std::fabs(x)); }, 4},
+      {"x / sqrt(x*x + y*y)", [](Expr x, Expr y) { return x / sqrt(x * x + y * y); },
+       [](Real x, Real y) {
+         Real n = std::hypot(x, y);
+         return n < 1e-18L || n > 1e19L ? std::nanl("") : y / n * (y / n) / n;
+       },
+       12},
+      {"x / hypot(x, y)", [](Expr x, Expr y) { return x / hypot(x, y); },
+       [](Real x, Real y) {
+         Real n = std::hypot(x, y);
+         return n < 1e-37L || n > 3e38L ? std::nanl("") : y / n * (y / n) / n;
+       },
+       12},
+      {"x / max(sqrt(x*x + y*y), 1e-12)",
+       [](Expr x, Expr y) { return x / max(sqrt(x * x + y * y), 1e-12f); },
+       [](Real x, Real y) {
+         Real n = std::hypot(x, y);
+         return n > 1e19L ? std::nanl("") : n > 1e-12L ? y / n * (y / n) / n : 1 / Real(1e-12f);
+       },
+       12},
       {"log(1 + x)", [](Expr x, Expr) { return log(1.0f + x); },
        [](Real x, Real) { return x <= -1 ? std::nanl("") : 1 / (1 + x); }, 2},
       {"exp(x) - 1", [](Expr x, Expr) { return exp(x) - 1.0f; },
