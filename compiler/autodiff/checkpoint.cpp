@@ -440,7 +440,7 @@ class CheckpointedLoop {
 bool wants_checkpoints(const UpdateContext& c) {
   if (!c.query.checkpoints.is_given() || c.definition.rvars.empty()) return false;
   auto steps = as_const_int(simplify(c.definition.rvars.back().extent));
-  return !steps || *steps > 1;
+  return !steps || *steps > 0;
 }
 
 void differentiate_by_checkpoints(const UpdateContext& context, UpdateAdjoint& result) {

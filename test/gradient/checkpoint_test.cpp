@@ -124,6 +124,17 @@ Program twice(int n) {
   return {weighted_sum(u, {5}), {start, gain}};
 }
 
+// One number, without dimensions.
+Program number(int n) {
+  Buffer<float> start = line(1), factors = line(n, 7), gain = line(1, 2);
+  Func u("number_u"), loss("loss");
+  RDom t(0, n);
+  u() = start(Expr(0));
+  u() = sin(u() * factors(t)) + gain(Expr(0)) * 0.5f * u();
+  loss() = u() * u() * 0.5f;
+  return {loss, {start, factors, gain}};
+}
+
 struct Case {
   const char* name;
   Program (*build)(int n);
@@ -132,7 +143,7 @@ const Case cases[] = {
     {"pushed", pushed},       {"swept", swept},           {"pendulums", pendulums},
     {"diffusion", diffusion}, {"predicated", predicated}, {"linear", linear},
     {"field", field},         {"steered", steered},       {"wide", wide},
-    {"twice", twice}};
+    {"twice", twice},         {"number", number}};
 
 TEST(Checkpoints, GradientsAgreeWithCentralDifferences) {
   for (const Case& c : cases) {
@@ -338,6 +349,34 @@ TEST(Checkpoints, ABudgetThatAFuncWithATimeAxisDoesNotUseIsExplained) {
   Derivative d = propagate_adjoints(loss, {.checkpoint_states = 2});
   expect_mentions(d.explain(), {"the budget for checkpoints is not used", "written in place"});
   expect_gradient(loss, start, {.checkpoint_states = 2});
+}
+
+TEST(Checkpoints, ALoopOfOneStepNeedsNoCheckpointAndIsNoError) {
+  Program p = number(1);
+  expect_gradient(p.loss, p.inputs[0], {.checkpoint_states = 3});
+}
+
+// Extents of space and the gradient by a Param may be known at run time only.
+TEST(Checkpoints, SpaceMayHaveExtentsOfRunTime) {
+  Param<int> width("width");
+  Param<float> gain("gain");
+  width.set(6);
+  gain.set(0.75f);
+  Buffer<float> start = line(6);
+  Func u("sized_u"), loss("loss");
+  RDom r(1, width - 2, 0, 5), s(0, width);
+  u(x) = start(clamp(x, 0, 5));
+  u(r.x) = gain * sin(u(r.x - 1)) + 0.25f * u(r.x + 1) * u(r.x);
+  loss() = 0.0f;
+  loss() += u(s) * u(s);
+  Derivative d = propagate_adjoints(loss, {.checkpoint_states = 2});
+  Derivative stored = propagate_adjoints(loss, {.overwritten = Overwritten::Store});
+  EXPECT_EQ(values_of(d(start), start, true), values_of(stored(start), start, true));
+  double by_gain = evaluate_scalar(d(gain));
+  EXPECT_NEAR(by_gain, evaluate_scalar(stored(gain)), 1e-12 * std::abs(by_gain));
+  EXPECT_NEAR(Buffer<float>(d(gain).realize())(), by_gain, 1e-5 * std::abs(by_gain));
+  expect_mentions(error_of([&] { propagate_adjoints(loss, {.checkpoint_bytes = 1000}); }),
+                  {"size of a state", "run time only", "checkpoint_states"});
 }
 
 // ---- refusals ----
