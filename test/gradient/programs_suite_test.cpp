@@ -1,6 +1,13 @@
 // Every program of the suite, each input's gradient element by element against central differences
 // in double, which only the interpreter of the algorithm evaluates; then as machine code. A program
 // that overwrites what its partials need is refused unless the compiler may keep the values.
+//
+// Then every twelfth program, or every one where RETROGRADE_ALL_PROGRAMS is set, by
+// check_gradients: adjoint, tangent and complex step, in machine code, of which no two share their
+// derivatives.
+#include <cstdlib>
+
+#include "checks/check_gradients.h"
 #include "gradient/programs_suite.h"
 
 namespace retrograde::gradient {
@@ -24,11 +31,28 @@ TEST_P(Suite, GradientIsRight) {
   }
 }
 
+class CheckedSuite : public Suite {};
+
+TEST_P(CheckedSuite, AdjointTangentAndComplexStepAgree) {
+  GradientReport report = check_gradients(program.loss, {}, {.directions = 1, .smallest_step = 14});
+  for (const auto& input : report.inputs) {
+    EXPECT_LT(input.complex_step_error, 1e-11) << report.to_json();
+    EXPECT_LT(input.dot_product_error, 1e-11) << report.to_json();
+    EXPECT_LT(input.own_precision_error, 1e-4) << report.to_json();
+  }
+}
+
+size_t step_of_checked() { return std::getenv("RETROGRADE_ALL_PROGRAMS") ? 1 : 12; }
+
 std::string name_of(const ::testing::TestParamInfo<size_t>& info) {
   return programs()[info.param].name;
 }
 
 INSTANTIATE_TEST_SUITE_P(Programs, Suite, ::testing::Range<size_t>(0, programs().size()), name_of);
+
+INSTANTIATE_TEST_SUITE_P(Programs, CheckedSuite,
+                         ::testing::Range<size_t>(0, programs().size(), step_of_checked()),
+                         name_of);
 
 }  // namespace
 }  // namespace retrograde::gradient
