@@ -49,7 +49,7 @@ class NestBuilder {
   const std::string prefix_;
   const bool is_update_;
   Domain ranges_;  // of every variable that exists after the splits so far
-  std::vector<Derived> derived_;
+  std::vector<std::vector<Derived>> derived_;  // by split; what one of them derives is one step
 
   Expr loop_variable(const std::string& var) const { return variable(prefix_ + var); }
 
@@ -74,7 +74,7 @@ class NestBuilder {
   }
 
   void derive(const std::string& var, const Expr& value) {
-    derived_.push_back({var, value, value, {}, {}});
+    derived_.push_back({{var, value, value, {}, {}}});
   }
 
   TailStrategy tail_of(const Split& split, const Expr& extent) const {
@@ -98,11 +98,11 @@ class NestBuilder {
         base = min(likely(base), old.extent - factor);
         return derive(split.old_var, base + inner + old.min);
       default:  // GuardWithIf and its predicated forms
-        derived_.push_back({split.old_var,
-                            base + inner + old.min,
-                            min(base + inner, old.extent - 1) + old.min,
-                            likely(base + inner < old.extent),
-                            {}});
+        derived_.push_back({{split.old_var,
+                             base + inner + old.min,
+                             min(base + inner, old.extent - 1) + old.min,
+                             likely(base + inner < old.extent),
+                             {}}});
     }
   }
 
@@ -114,9 +114,8 @@ class NestBuilder {
     Expr inner_value = fused % inner.extent + inner.min,
          outer_value = fused / inner.extent + outer.min;
     derived_.push_back(
-        {split.inner, inner_value, inner_value, {}, Fused{split.old_var, outer, inner, false}});
-    derived_.push_back(
-        {split.outer, outer_value, outer_value, {}, Fused{split.old_var, outer, inner, true}});
+        {{split.outer, outer_value, outer_value, {}, Fused{split.old_var, outer, inner, true}},
+         {split.inner, inner_value, inner_value, {}, Fused{split.old_var, outer, inner, false}}});
   }
 
   // Interval arithmetic cannot divide by an extent that is a symbol. But a fused variable that
@@ -138,15 +137,21 @@ class NestBuilder {
   }
 
   // Later derivations replace variables that earlier ones introduced: resolve from the last to the
-  // first. At each step `values` holds what the variables stand for that exist after that split.
+  // first. At each step `values` holds what the variables stand for that exist after that split: a
+  // fused variable may have the name of one that it replaced, which only what was before it means.
   void resolve(StageNest& nest) {
     Substitution values, guarded;
-    for (auto it = derived_.rbegin(); it != derived_.rend(); ++it) {
-      if (it->guard.defined()) nest.guards.push_back(simplify(substitute(it->guard, values)));
-      values[prefix_ + it->var] = simplify(substitute(it->value, values));
-      Expr value = simplify(substitute(it->guarded_value, guarded));
-      guarded[prefix_ + it->var] =
-          it->fused ? within_fused_range(*it->fused, value, guarded) : value;
+    for (auto step = derived_.rbegin(); step != derived_.rend(); ++step) {
+      Substitution values_before = values, guarded_before = guarded;
+      for (const Derived& d : *step) {
+        if (d.guard.defined()) nest.guards.push_back(simplify(substitute(d.guard, values)));
+        values_before[prefix_ + d.var] = simplify(substitute(d.value, values));
+        Expr value = simplify(substitute(d.guarded_value, guarded));
+        guarded_before[prefix_ + d.var] =
+            d.fused ? within_fused_range(*d.fused, value, guarded) : value;
+      }
+      values = std::move(values_before);
+      guarded = std::move(guarded_before);
     }
     auto value_in = [&](const Substitution& map, const std::string& var) {
       auto it = map.find(prefix_ + var);
