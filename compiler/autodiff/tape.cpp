@@ -235,7 +235,7 @@ class Tape {
     auto chosen = [&](const std::function<Expr(const Step&)>& part) {
       Expr result = part(steps.back());
       for (int s = count - 2; s >= 0; --s)
-        result = make_select(step == s, part(steps[static_cast<size_t>(s)]), result);
+        result = if_step(step == s, part(steps[static_cast<size_t>(s)]), result);
       return here(kept(result));
     };
     std::vector<Expr> values;
@@ -246,6 +246,21 @@ class Tape {
     Expr place = chosen([](const Step& s) { return s.place; });
     append_update(tape, layout_.with_pure(place), values, rdom->vars,
                   predicate.defined() ? here(kept(predicate)) : Expr());
+    note_work(tape, steps);
+  }
+  // Steps differ in what they cost: only the one at hand is evaluated.
+  static Expr if_step(const Expr& condition, const Expr& a, const Expr& b) {
+    return equal(a, b) ? a : call_op(Op::if_then_else, a.type(), {condition, a, b});
+  }
+  void note_work(const FuncPtr& tape, const std::vector<Step>& steps) const {
+    AdjointWork work;
+    for (const Step& s : steps) {
+      work.values.push_back(redirect_calls(kept(s.place), tape, tape, true));
+      for (const Expr& v : s.values)
+        work.values.push_back(redirect_calls(kept(v), tape, tape, true));
+    }
+    for (const ReductionVariable& r : c_.definition.rvars) work.loops.push_back(r.extent);
+    static_cast<AdjointContents&>(*tape).work = {std::move(work)};
   }
   Expr kept(const Expr& e) const {
     if (result_.self_values.empty()) return e;

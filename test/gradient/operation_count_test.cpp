@@ -105,5 +105,17 @@ TEST(OperationCount, TheGradientOfASquaredErrorCostsASmallMultiple) {
             value(operations.gradient.operations()));
 }
 
+// Of a tape's steps each iteration runs one: a sine to bring back the value, a cosine for the
+// adjoint; a third for the gradient by the factors.
+TEST(OperationCount, OneStepOfATapeRunsAtATime) {
+  Buffer<float> a = line(6);
+  Func f("f");
+  RDom r(0, 6);
+  f() = 1.0f;
+  f() = sin(f()) * a(r);
+  Derivative d = propagate_adjoints(f, {.overwritten = Overwritten::Store});
+  EXPECT_EQ(value(d.operations().gradient.nonlinear()), 3 * 6);
+}
+
 }  // namespace
 }  // namespace retrograde::gradient
