@@ -59,7 +59,9 @@ bool is_range_condition(const Expr& e) {
         k == Kind::LT || k == Kind::LE || k == Kind::GT || k == Kind::GE || k == Kind::And;
     bool arithmetic =
         k == Kind::Add || k == Kind::Sub || k == Kind::Mul || k == Kind::Min || k == Kind::Max;
-    result &= ordered || arithmetic || k == Kind::Variable || k == Kind::IntImm;
+    const auto* call = node.as<Call>();
+    bool marker = call && call->is_op(Op::likely);
+    result &= ordered || arithmetic || marker || k == Kind::Variable || k == Kind::IntImm;
     return result;
   });
   return result;
@@ -273,7 +275,7 @@ class Builder {
   // x = (part * chunk + rho) * lanes + lane for the outermost variable when it is the innermost
   // too; else lanes split the innermost and parts the outermost variable. Without `lane` there are
   // no lanes. Beyond the end the place is clamped: what it reads must exist even where the
-  // condition is false.
+  // condition is false. Both are cut off the steady state, whose accumulators stay in registers.
   static Slice slice_of(const Gather& g, const Expr& lane, const Expr& part) {
     Slice slice;
     slice.rvars = rvars_of(g);
@@ -290,7 +292,7 @@ class Builder {
       if (i == last) at = part * r.extent + at;
       if (i == 0 && lane.defined()) at = at * lane_count + lane;
       if (i == last || (i == 0 && lane.defined())) {
-        slice.conditions.push_back(at < all);
+        slice.conditions.push_back(likely(at < all));
         at = min_of(likely(at), all - 1);
       }
       slice.place[old] = min + at;
