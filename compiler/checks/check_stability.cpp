@@ -2,7 +2,6 @@
 
 #include <cmath>
 #include <limits>
-#include <map>
 #include <random>
 
 #include "autodiff/regions.h"
@@ -121,7 +120,6 @@ class Checker {
       }
     }
     watched_.insert(watched_.end(), adjoints.rbegin(), adjoints.rend());
-    std::vector<ir::FuncPtr> all;
     for (const auto& p : ir::parameters_of({output_.function()})) {
       if (!p->type.is_float()) continue;
       Shape shape = shape_of_bound(*p);
