@@ -28,6 +28,8 @@ const char* to_string(Explanation::Kind kind) {
       return "left out";
     case Explanation::Kind::Cost:
       return "cost";
+    case Explanation::Kind::Custom:
+      return "custom";
   }
   return "";
 }

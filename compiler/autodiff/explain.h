@@ -20,6 +20,7 @@ struct Explanation {
     Recomputed,    // values that are computed again at each read: reads and operations
     LeftOut,       // values of the output's pipeline that the gradient needs nothing of
     Cost,          // operations and bytes of the output and of its gradient
+    Custom,        // a rule that the user wrote stands for the definitions
   };
   Kind kind;
   std::string subject;

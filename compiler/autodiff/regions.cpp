@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <set>
 
+#include "autodiff/custom_rules.h"
 #include "autodiff/reverse_sweep.h"
 #include "ir/build.h"
 #include "simplify/simplify.h"
@@ -91,6 +92,16 @@ void Regions::add_func(const FuncPtr& f) {
     });
   }
   for (const auto& [symbol, box] : callees) grow(symbol, box);
+  add_extern_arguments(*f);
+}
+
+// The definitions do not say what a C function reads.
+void Regions::add_extern_arguments(const FuncContents& f) {
+  if (!f.is_extern()) return;
+  for (const ExternArgument& a : f.extern_definition->args) {
+    if (a.func) grow(a.func.get(), extern_reads(f, a.func, a.func->dimensions(), of(&f)));
+    if (a.buffer) grow(a.buffer.get(), extern_reads(f, a.buffer, a.buffer->dimensions, of(&f)));
+  }
 }
 
 const Box& Regions::of(const Symbol* symbol) const {

@@ -31,6 +31,7 @@ class Regions {
 
  private:
   void add_func(const FuncPtr& f);
+  void add_extern_arguments(const FuncContents& f);
   void grow(const Symbol* symbol, const Box& box);
   std::unordered_map<const Symbol*, Box> boxes_;
 };

@@ -2,7 +2,9 @@
 
 #include <algorithm>
 
+#include "autodiff/custom_rules.h"
 #include "autodiff/derivative_rules.h"
+#include "autodiff/input_shape.h"
 #include "autodiff/inversion_cost.h"
 #include "autodiff/reverse_sweep.h"
 #include "autodiff/update.h"
@@ -44,7 +46,6 @@ class Synthesis {
         options_(options),
         order_(topological_order({seed.output})),
         regions_(order_, seed.region) {
-    for (const FuncPtr& f : order_) refuse_extern(*f);
     find_active();
   }
 
@@ -54,6 +55,7 @@ class Synthesis {
       if (active_.contains(f->get())) differentiate(*f);
     }
     for (const auto& parameter : parameters_of({seed_.output})) finish_parameter(parameter);
+    forget_covered();
     explain_absent();
     result_.output = {seed_.output, seed_.region};
     list_gradients();
@@ -61,13 +63,23 @@ class Synthesis {
   }
 
  private:
-  void refuse_extern(const FuncContents& f) const {
-    if (!f.is_extern()) return;
+  // Derivatives come from definitions, or from a rule.
+  void refuse_without_rule(const FuncContents& f) const {
+    if (f.custom_derivatives) {
+      unsupported(text("propagate adjoints through ", quoted(f.name)),
+                  "a Func with a custom tangent needs a rule for adjoints, too",
+                  "the output depends on it, and it has none: its definitions need not agree with "
+                  "the rule",
+                  "Give it a custom_adjoint");
+    }
     unsupported(text("differentiate ", quoted(seed_.output->name)),
                 "derivatives come from definitions",
                 text("it depends on ", quoted(f.name), ", which the C function ",
                      quoted(f.extern_definition->function), " computes"),
-                "Differentiate what comes after it, with its values in an ImageParam");
+                text("Give ", quoted(f.name),
+                     " a custom_adjoint, leave its inputs out of what is "
+                     "differentiated by, or differentiate what comes after it, with its values in "
+                     "an ImageParam"));
   }
 
   // ---- which symbols lie between the requested inputs and the output ----
@@ -82,12 +94,27 @@ class Synthesis {
         active_.insert(parameter.get());
     }
     for (const FuncPtr& f : order_) {
-      bool active = is_requested(f.get());
-      for (int s = 0; s < f->stage_count() && !active; ++s) active = reads_active(f->stage(s));
-      bool floating =
-          std::any_of(f->types.begin(), f->types.end(), [](Type t) { return t.is_float(); });
-      if (active && floating) active_.insert(f.get());
+      if (!is_floating(f->types)) continue;
+      bool passes = passes_on(*f);
+      if (passes) passing_.insert(f.get());
+      if (passes || is_requested(f.get())) active_.insert(f.get());
     }
+  }
+  // Whether derivatives go on from f to something wanted.
+  bool passes_on(const FuncContents& f) const {
+    if (has_custom_adjoint(f)) {
+      for (const AdjointInput& input : f.custom_derivatives->adjoint_inputs) {
+        if (active_.contains(input.symbol().get())) return true;
+      }
+    }
+    if (f.custom_derivatives || f.is_extern()) {
+      for (const auto& symbol : read_by(f)) {
+        if (active_.contains(symbol.get())) return true;
+      }
+    }
+    bool found = false;
+    for (int s = 0; s < f.stage_count() && !found; ++s) found = reads_active(f.stage(s));
+    return found;
   }
   bool reads_active(const Definition& definition) const {
     bool found = false;
@@ -106,17 +133,23 @@ class Synthesis {
   // Over the bounds that were given: updates of the output may reach further, where the seed is 0.
   void add_seed() {
     const FuncPtr& f = seed_.output;
-    AccessQuery query{{}, {}, f->args, regions_.loop_variables(f.get(), f->args)};
-    for (size_t d = 0; d < f->args.size(); ++d)
-      query.domain.vars.push_back({f->args[d], seed_.region[d].min, seed_.region[d].max});
-    for (const std::string& arg : f->args) query.indices.push_back(variable(arg));
+    add_pointwise(f.get(), f->args, seed_.region, regions_.loop_variables(f.get(), f->args),
+                  seed_.values);
+  }
+
+  // values(args), one for each value of the symbol, inside of a box; undefined ones are zero.
+  // `read`: elements that anybody looks at; may be empty (unknown).
+  void add_pointwise(const Symbol* symbol, const std::vector<std::string>& args, const Box& box,
+                     const std::vector<LoopVariable>& read, const std::vector<Expr>& values) {
+    AccessQuery query{{}, {}, args, read};
+    for (size_t d = 0; d < args.size(); ++d)
+      query.domain.vars.push_back({args[d], box[d].min, box[d].max});
+    for (const std::string& arg : args) query.indices.push_back(variable(arg));
     Inversion inversion = invert_access(query);
-    for (size_t k = 0; k < seed_.values.size(); ++k) {
-      if (!seed_.values[k].defined()) continue;
-      for (const Gather& g : inversion.gathers) {
-        pending_[f.get()].push_back(
-            {static_cast<int>(k), g, substitute(seed_.values[k], g.iteration)});
-      }
+    for (size_t k = 0; k < values.size(); ++k) {
+      if (!values[k].defined()) continue;
+      for (const Gather& g : inversion.gathers)
+        pending_[symbol].push_back({static_cast<int>(k), g, substitute(values[k], g.iteration)});
     }
   }
 
@@ -140,6 +173,10 @@ class Synthesis {
     bool extendable = true;  // nothing has read it yet
     record(*f, f->stage_count() - 1, adjoint);
     register_func(adjoint, f->name, target.region);
+    if (f->custom_derivatives || f->is_extern()) {
+      if (passing_.contains(f.get())) contribute_by_rule(f, adjoint.func);
+      return;
+    }
     for (int s = f->stage_count() - 1; s >= 1; --s) {
       const int own_stages = adjoint.func->stage_count();
       UpdateAdjoint update = differentiate_update(
@@ -174,6 +211,40 @@ class Synthesis {
     adjoint.func =
         clone_prefix(adjoint.func, own_stages, text(f.name, "_adj_after_update", stage - 1));
     record(f, stage, adjoint);
+  }
+
+  void contribute_by_rule(const FuncPtr& f, const FuncPtr& adjoint) {
+    if (!has_custom_adjoint(*f)) refuse_without_rule(*f);
+    CustomAdjointResult rule = run_custom_adjoint(
+        f, adjoint, regions_, [&](const Symbol* s) { return active_.contains(s); },
+        [&](const Symbol* s) { return options_.only_requested && options_.requested.contains(s); });
+    for (const CustomContribution& c : rule.contributions) add_custom(*f, c);
+    for (const FuncPtr& inner : rule.covered) {
+      covered_.insert(inner.get());
+      explain(Explanation::Kind::Custom, inner->name,
+              text("inside of the custom adjoint of ", quoted(f->name),
+                   ": it has no adjoint of its own"));
+    }
+  }
+  void add_custom(const FuncContents& f, const CustomContribution& c) {
+    const auto* p = as_parameter(c.input.get());
+    AdjointTarget target =
+        p ? target_of(*p) : target_of(dynamic_cast<const FuncContents&>(*c.input));
+    std::vector<Expr> args, values;
+    for (const std::string& arg : target.args) args.push_back(variable(arg));
+    for (size_t k = 0; k < target.types.size(); ++k) {
+      bool floating = p || dynamic_cast<const FuncContents&>(*c.input).types[k].is_float();
+      Expr value = call_value(c.adjoint, args, static_cast<int>(k));
+      values.push_back(floating ? cast_to(target.types[k], value) : Expr());
+    }
+    const Box& box = regions_.of(c.input.get());
+    RETROGRADE_ASSERT(box.size() == args.size(), "the region of ", quoted(target.name),
+                      " is known, since ", quoted(f.name), " depends on it");
+    add_pointwise(c.input.get(), target.args, box, {}, values);
+    result_.funcs.push_back(c.adjoint);
+    explain(Explanation::Kind::Custom, f.name,
+            text("its custom adjoint contributes ", quoted(c.adjoint->name), " to ",
+                 quoted(target.name)));
   }
 
   void record(const FuncContents& f, int stage, const AdjointFunc& adjoint) {
@@ -361,13 +432,18 @@ class Synthesis {
     return box;
   }
 
+  // What reaches them past the rule alone is no gradient of the output by them.
+  void forget_covered() {
+    std::erase_if(result_.after_stage,
+                  [&](const auto& entry) { return covered_.contains(entry.first.first); });
+  }
+
   // What was asked for and got no contribution is zero, and says why.
   void explain_absent() {
     for (const FuncPtr& f : order_) {
-      bool floating =
-          std::any_of(f->types.begin(), f->types.end(), [](Type t) { return t.is_float(); });
-      if (result_.after_stage.contains({f.get(), 0}) ||
-          !explain_absent(f.get(), f->name, floating, f->types[0]))
+      if (covered_.contains(f.get()) ||
+          result_.after_stage.contains({f.get(), f->stage_count() - 1}) ||
+          !explain_absent(f.get(), f->name, is_floating(f->types), f->types[0]))
         continue;
       AdjointFunc zero = make_adjoint(target_of(*f), f->name + "_adj", {});
       for (int s = 0; s < f->stage_count(); ++s) record(*f, s, zero);
@@ -399,6 +475,8 @@ class Synthesis {
   std::vector<FuncPtr> order_;
   Regions regions_;
   std::unordered_set<const Symbol*> active_;
+  std::unordered_set<const Symbol*> passing_;  // Funcs that depend on something else active
+  std::unordered_set<const Symbol*> covered_;  // inside of a custom adjoint that was used
   std::unordered_map<const Symbol*, std::vector<Contribution>> pending_;
   std::map<std::string, Inversion> inversions_;
   SynthesisResult result_;

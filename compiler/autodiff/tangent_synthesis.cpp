@@ -4,6 +4,7 @@
 
 #include "autodiff/accumulation.h"
 #include "autodiff/adjoint_contents.h"
+#include "autodiff/custom_rules.h"
 #include "autodiff/forward_sweep.h"
 #include "diagnostics/error.h"
 #include "frontend/define.h"
@@ -166,7 +167,9 @@ class Synthesis {
  private:
   void differentiate(const FuncPtr& f) {
     FuncPtr own;
-    if (f->is_extern()) {
+    if (f->custom_derivatives) {
+      own = differentiate_by_rule(f);
+    } else if (f->is_extern()) {
       refuse_active(*f);
     } else {
       own = differentiate_stages(f);
@@ -178,6 +181,24 @@ class Synthesis {
       explain(Explanation::Kind::Zero, *f,
               "it does not depend on an input that moves by a differentiable path");
     }
+  }
+
+  FuncPtr differentiate_by_rule(const FuncPtr& f) {
+    auto found_in = [](const auto& tangents, const Symbol* symbol) {
+      auto found = tangents.find(symbol);
+      return found == tangents.end() ? FuncPtr() : found->second;
+    };
+    FuncPtr own = run_custom_tangent(
+        f,
+        [&](const Symbol* symbol) {
+          bool is_func = dynamic_cast<const FuncContents*>(symbol) != nullptr;
+          return found_in(is_func ? result_.tangents : directions_, symbol);
+        },
+        [&](const Symbol* symbol) { return directions_.contains(symbol); });
+    if (!own) return nullptr;
+    result_.funcs.push_back(own);
+    explain(Explanation::Kind::Custom, *f, text(quoted(own->name), ", from its custom tangent"));
+    return own;
   }
 
   FuncPtr differentiate_stages(const FuncPtr& f) {

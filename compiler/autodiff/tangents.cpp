@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "autodiff/accumulation.h"
+#include "autodiff/input_shape.h"
 #include "autodiff/tangent_synthesis.h"
 #include "ir/build.h"
 
@@ -12,64 +13,34 @@ namespace {
 
 std::string asked(const Func& output) { return "propagate tangents to " + quoted(output.name()); }
 
-bool is_floating(const std::vector<Type>& types) {
-  return std::any_of(types.begin(), types.end(), [](Type t) { return t.is_float(); });
-}
-
 void check_output(const Func& output) {
   if (!output.defined()) {
     user_error(asked(output), "the output must be defined", "it has no definition",
                "Define it first");
   }
-  if (!is_floating(output.types())) {
+  if (!ir::is_floating(output.types())) {
     user_error(asked(output), "only floating-point values have derivatives",
                "its type is " + to_string(output.types()[0]), "Convert it to float");
   }
 }
 
-// What a direction must look like.
-struct Shape {
-  std::string name;
-  int dimensions;
-  std::vector<Type> types;
-};
-Shape shape_of(const Func& output, const ir::Symbol* symbol) {
-  if (const auto* p = dynamic_cast<const ir::ParameterContents*>(symbol))
-    return {p->name, p->is_buffer ? p->dimensions : 0, {p->type}};
-  const auto* f = dynamic_cast<const ir::FuncContents*>(symbol);
-  if (!f || !f->is_defined()) {
+ir::InputShape shape_of(const Func& output, const ir::Symbol* symbol) {
+  ir::InputShape shape = ir::shape_of(symbol);
+  if (shape.types.empty()) {
     user_error(asked(output), "what moves must be defined",
-               f ? quoted(f->name) + " has no definition" : "an input has no memory and no type");
+               shape.name.empty() ? "an input has no memory and no type"
+                                  : quoted(shape.name) + " has no definition");
   }
-  return {f->name, f->dimensions(), f->types};
+  return shape;
 }
 
-void check_direction(const Func& output, const Shape& shape, const Func& tangent) {
-  if (!tangent.defined()) {
-    user_error(asked(output), "a direction must be defined",
-               text("that of ", quoted(shape.name), " has no definition"));
-  }
-  if (!is_floating(shape.types)) {
+void check_direction(const Func& output, const ir::InputShape& shape, const Func& tangent) {
+  if (tangent.defined() && !shape.is_floating()) {
     user_error(asked(output), "only floating-point values have derivatives",
                text(quoted(shape.name), " has type ", to_string(shape.types[0])),
                "Convert it to float in a Func, and give that a direction");
   }
-  if (tangent.dimensions() != shape.dimensions) {
-    user_error(asked(output), "a direction has the dimensions of what moves",
-               text(quoted(tangent.name()), " has ", tangent.dimensions(), " and ",
-                    quoted(shape.name), " has ", shape.dimensions),
-               "Define the direction over the same dimensions");
-  }
-  if (tangent.types().size() != shape.types.size()) {
-    user_error(asked(output), "a direction has as many values as what moves",
-               text(quoted(tangent.name()), " has ", tangent.types().size(), " and ",
-                    quoted(shape.name), " has ", shape.types.size()));
-  }
-  for (Type t : tangent.types()) {
-    if (t.is_float()) continue;
-    user_error(asked(output), "a direction is made of floating-point values",
-               text(quoted(tangent.name()), " has type ", to_string(t)));
-  }
+  ir::check_shape(asked(output), "a direction", "what moves", shape, *tangent.function());
 }
 
 }  // namespace
@@ -115,7 +86,7 @@ Tangents propagate_tangents(const Func& output, const std::vector<Direction>& di
   ir::Directions by_symbol;
   for (const Direction& d : directions) {
     const ir::Symbol* symbol = d.input.symbol().get();
-    Shape shape = shape_of(output, symbol);
+    ir::InputShape shape = shape_of(output, symbol);
     check_direction(output, shape, d.tangent);
     if (!by_symbol.emplace(symbol, d.tangent.function()).second) {
       user_error(asked(output), "each input has one direction",

@@ -220,6 +220,9 @@ struct ExternDefinition {
   NameMangling mangling = NameMangling::Default;
 };
 
+// What a user gave for autodiff to use instead of the definitions (autodiff/custom_derivative.h).
+struct CustomDerivatives;
+
 // Pipeline::add_requirement: calls fail with the message unless it holds.
 struct Requirement {
   Expr condition;             // of parameters only
@@ -245,6 +248,7 @@ struct FuncContents : Symbol, std::enable_shared_from_this<FuncContents> {
   std::string debug_file;  // debug_to_file: written after it is computed; empty: not
   // When set, `pure` has args but no values and no loops, and there are no updates.
   std::optional<ExternDefinition> extern_definition;
+  std::shared_ptr<const CustomDerivatives> custom_derivatives;  // null: none; clones share it
   // Func::in and clone_in: consumers named here read the wrapper instead; "" stands for all others.
   std::map<std::string, std::shared_ptr<FuncContents>> wrappers;
   // Type the user asked for in the declaration (Func f(type, dims)), empty when none

@@ -1,6 +1,7 @@
 // retrograde.h -- everything that a pipeline's author needs, in one include.
 #pragma once
 
+#include "autodiff/custom_derivative.h"
 #include "autodiff/derivative.h"
 #include "autodiff/second_order.h"
 #include "autodiff/straight_through.h"

@@ -1,0 +1,151 @@
+#include "autodiff/custom_derivative.h"
+
+#include <algorithm>
+
+#include "autodiff/custom_rules.h"
+#include "autodiff/input_shape.h"
+#include "diagnostics/error.h"
+
+namespace retrograde {
+
+namespace {
+
+bool is_given_twice(const std::vector<AdjointInput>& inputs, size_t i) {
+  return std::any_of(inputs.begin(), inputs.begin() + static_cast<std::ptrdiff_t>(i),
+                     [&](const AdjointInput& a) { return a.symbol() == inputs[i].symbol(); });
+}
+
+bool depends_on(const Func& func, const ir::Symbol* symbol) {
+  for (const ir::FuncPtr& f : ir::topological_order({func.function()})) {
+    if (f.get() == symbol) return true;
+  }
+  for (const auto& p : ir::parameters_of({func.function()})) {
+    if (p.get() == symbol) return true;
+  }
+  return false;
+}
+
+void check_func(const std::string& asked, const Func& func, bool has_rule) {
+  if (!func.defined()) {
+    user_error(asked, "a rule belongs to a Func that is defined",
+               quoted(func.name()) + " has no definition", "Define it first");
+  }
+  if (!ir::is_floating(func.types())) {
+    user_error(asked, "only floating-point values have derivatives",
+               "its type is " + to_string(func.types()[0]), "Convert it to float");
+  }
+  if (!has_rule) {
+    user_error(asked, "a rule is a function", "there is none",
+               "Give a function of the context that returns what the derivative is");
+  }
+}
+
+void check_inputs(const std::string& asked, const Func& func,
+                  const std::vector<AdjointInput>& inputs) {
+  for (size_t i = 0; i < inputs.size(); ++i) {
+    const ir::Symbol* symbol = inputs[i].symbol().get();
+    ir::InputShape shape = ir::shape_of(symbol);
+    if (shape.types.empty()) {
+      user_error(asked, "its inputs must be defined",
+                 text("input ", i, " has no ", shape.name.empty() ? "memory" : "definition"),
+                 "Define them first");
+    }
+    if (!shape.is_floating()) {
+      user_error(asked, "only floating-point values have derivatives",
+                 text("the input ", quoted(shape.name), " has type ", to_string(shape.types[0])),
+                 "Leave it out: nothing is propagated to integers");
+    }
+    if (is_given_twice(inputs, i)) {
+      user_error(asked, "each input is listed once", text(quoted(shape.name), " is there twice"),
+                 "Leave one out");
+    }
+    if (symbol == func.function().get() || !depends_on(func, symbol)) {
+      user_error(asked, "its inputs are what the Func is computed from",
+                 text(quoted(func.name()), symbol == func.function().get()
+                                               ? " is listed itself"
+                                               : " does not depend on " + quoted(shape.name)),
+                 "List Funcs, images and Params that its definitions or extern arguments use, "
+                 "directly or through other Funcs");
+    }
+  }
+}
+
+ir::CustomDerivatives rules_of(const Func& func) {
+  const auto& now = func.function()->custom_derivatives;
+  return now ? *now : ir::CustomDerivatives();
+}
+
+void set_rules(const Func& func, ir::CustomDerivatives rules) {
+  func.function()->custom_derivatives =
+      std::make_shared<const ir::CustomDerivatives>(std::move(rules));
+}
+
+}  // namespace
+
+bool AdjointContext::wants(const AdjointInput& input) const {
+  return std::any_of(wanted_.begin(), wanted_.end(),
+                     [&](const Wanted& w) { return w.input == input.symbol().get(); });
+}
+
+Region AdjointContext::region_of(const AdjointInput& input) const {
+  for (const Wanted& w : wanted_) {
+    if (w.input == input.symbol().get()) return w.region;
+  }
+  return {};
+}
+
+AdjointContribution AdjointContribution::zero(AdjointInput input) {
+  AdjointContribution result(std::move(input), Func(std::make_shared<ir::FuncContents>()));
+  result.is_zero = true;
+  return result;
+}
+
+bool TangentContext::moves(const AdjointInput& input) const {
+  const ir::Symbol* symbol = input.symbol().get();
+  if (std::none_of(inputs_.begin(), inputs_.end(),
+                   [&](const AdjointInput& i) { return i.symbol().get() == symbol; })) {
+    ir::InputShape shape = ir::shape_of(symbol);
+    user_error("propagate tangents through " + quoted(func_.name()),
+               "a rule asks for the tangents of its inputs",
+               text(quoted(shape.name), " is not listed"), "List it in custom_tangent");
+  }
+  return std::any_of(moving_.begin(), moving_.end(),
+                     [&](const auto& m) { return m.first == symbol; });
+}
+
+Func TangentContext::tangent(const AdjointInput& input) const {
+  const ir::Symbol* symbol = input.symbol().get();
+  if (!moves(input)) return Func(ir::zero_derivative(*symbol));
+  return std::find_if(moving_.begin(), moving_.end(),
+                      [&](const auto& m) { return m.first == symbol; })
+      ->second;
+}
+
+void custom_adjoint(const Func& func, const std::vector<AdjointInput>& inputs, CustomAdjoint rule,
+                    ExternReads reads) {
+  std::string asked = "give " + quoted(func.name()) + " a custom adjoint";
+  check_func(asked, func, rule != nullptr);
+  check_inputs(asked, func, inputs);
+  if (reads && !func.is_extern()) {
+    user_error(asked, "what a Func reads is told for extern stages only",
+               quoted(func.name()) + " has definitions, which say it",
+               "Leave the last argument out");
+  }
+  ir::CustomDerivatives rules = rules_of(func);
+  rules.adjoint_inputs = inputs;
+  rules.adjoint = std::move(rule);
+  rules.reads = std::move(reads);
+  set_rules(func, std::move(rules));
+}
+
+void custom_tangent(const Func& func, const std::vector<AdjointInput>& inputs, CustomTangent rule) {
+  std::string asked = "give " + quoted(func.name()) + " a custom tangent";
+  check_func(asked, func, rule != nullptr);
+  check_inputs(asked, func, inputs);
+  ir::CustomDerivatives rules = rules_of(func);
+  rules.tangent_inputs = inputs;
+  rules.tangent = std::move(rule);
+  set_rules(func, std::move(rules));
+}
+
+}  // namespace retrograde
