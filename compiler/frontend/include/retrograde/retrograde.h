@@ -3,6 +3,7 @@
 
 #include "autodiff/custom_derivative.h"
 #include "autodiff/derivative.h"
+#include "autodiff/jacobian.h"
 #include "autodiff/second_order.h"
 #include "autodiff/straight_through.h"
 #include "autodiff/tangents.h"

@@ -1,0 +1,396 @@
+#include "autodiff/jacobian.h"
+
+#include "autodiff/compressed.h"
+#include "autodiff/input_shape.h"
+#include "autodiff/regions.h"
+#include "autodiff/tangents.h"
+#include "diagnostics/error.h"
+#include "ir/build.h"
+#include "ir/visit.h"
+#include "simplify/simplify.h"
+
+namespace retrograde {
+
+namespace ir {
+
+struct JacobianResult {
+  std::string asked, explanation;
+  bool by_rows = false;
+  Colours colours;
+  size_t coloured_dimensions = 0;  // of what has colours
+  Func compressed, dense, band;    // band: undefined when there is none
+  Region band_offsets;
+  std::string no_band;  // why
+};
+
+}  // namespace ir
+
+namespace {
+
+using ir::Compressed;
+
+std::vector<Expr> expressions(const std::vector<Var>& vars) { return {vars.begin(), vars.end()}; }
+std::vector<Var> variables(const std::string& base, size_t n) {
+  std::vector<Var> result;
+  for (size_t d = 0; d < n; ++d) result.emplace_back(base + std::to_string(d));
+  return result;
+}
+std::vector<Var> both(std::vector<Var> a, const std::vector<Var>& b) {
+  a.insert(a.end(), b.begin(), b.end());
+  return a;
+}
+
+// Zeros of the shape of an input or output: a seed to be replaced.
+Func placeholder(const std::string& name, int dimensions, Type type) {
+  Func f(name);
+  f(variables("x", static_cast<size_t>(dimensions))) =
+      ir::make_zero(type.is_float() ? type : Float(32));
+  return f;
+}
+
+ir::InputShape checked_input(const std::string& asked, const AdjointInput& input) {
+  ir::InputShape shape = ir::shape_of(input.symbol().get());
+  if (shape.types.empty()) {
+    user_error(asked, "what to differentiate by must be defined",
+               shape.name.empty() ? "it has no memory and no type"
+                                  : quoted(shape.name) + " has no definition",
+               "Define it first");
+  }
+  if (shape.types.size() != 1) {
+    unsupported(asked, "an input of a whole Jacobian has one value",
+                text(quoted(shape.name), " has ", shape.types.size()),
+                "Differentiate by a Func of one value that the Tuple is made from, or use products "
+                "with single directions");
+  }
+  if (!shape.is_floating()) {
+    user_error(asked, "only floating-point values have derivatives",
+               text(quoted(shape.name), " has type ", to_string(shape.types[0])),
+               "Convert it to float in a Func, and differentiate by that");
+  }
+  return shape;
+}
+
+ir::Box box_of(const Region& region) {
+  ir::Box box;
+  for (const Range& r : region) {
+    Expr min = ir::cast_to(Int(32), r.min);
+    box.push_back({min, ir::simplify(min + ir::cast_to(Int(32), r.extent) - 1)});
+  }
+  return box;
+}
+
+// Elements of the input that a region of the output depends on, and that exist.
+ir::Box box_of_input(const Func& output, const ir::Box& region, const AdjointInput& input,
+                     const ir::InputShape& shape) {
+  ir::Regions regions(ir::topological_order({output.function()}), region);
+  ir::Box box = regions.of(input.symbol().get());
+  box.resize(static_cast<size_t>(shape.dimensions));
+  auto p = std::dynamic_pointer_cast<ir::ParameterContents>(input.symbol());
+  if (!p || !p->is_literal || !p->buffer) return box;
+  for (size_t d = 0; d < box.size(); ++d) {
+    const halide_dimension_t& dim = p->buffer->dim[d];
+    ir::Interval own{ir::make_const(Int(32), dim.min),
+                     ir::make_const(Int(32), dim.min + dim.extent - 1)};
+    box[d] = ir::intersection(box[d], own);
+  }
+  return box;
+}
+
+// ---- the two compressions, up to colours ----
+
+struct Candidate {
+  std::unique_ptr<Compressed> compressed;
+  bool by_rows = false;
+};
+
+Candidate by_columns(const Func& output, const AdjointInput& input, const ir::InputShape& shape,
+                     const ir::Box& rows, const ir::Box& columns) {
+  Func seed = placeholder(shape.name + "_seed", shape.dimensions, shape.types[0]);
+  Func tangent = propagate_tangents(output, {{input, seed}})(output);
+  return {Compressed::make({.output = tangent.function(),
+                            .seed = seed.function(),
+                            .rows = rows,
+                            .columns = columns}),
+          false};
+}
+
+Candidate by_rows(const Func& output, const AdjointInput& input, const ir::Box& rows,
+                  const ir::Box& columns, const Region& bounds, Overwritten overwritten,
+                  int64_t most) {
+  Func seed = placeholder(output.name() + "_seed", output.dimensions(), output.types()[0]);
+  Func adjoint =
+      propagate_adjoints(output, seed, bounds, {.overwritten = overwritten, .wrt = {input}})
+          .of(input);
+  if (!adjoint.defined()) return {nullptr, true};
+  return {Compressed::make({.output = adjoint.function(),
+                            .seed = seed.function(),
+                            .rows = columns,
+                            .columns = rows,
+                            .most_colours = most}),
+          true};
+}
+
+// Fewer colours; the other way where one is not possible.
+Candidate best(const Func& output, const AdjointInput& input, const ir::InputShape& shape,
+               const ir::Box& rows, const ir::Box& columns, const Region& bounds,
+               const JacobianOptions& options) {
+  Candidate result;
+  if (options.compression == Compression::Rows)
+    return by_rows(output, input, rows, columns, bounds, options.overwritten, 0);
+  bool try_rows = options.compression == Compression::Auto && output.outputs() == 1;
+  std::exception_ptr refused;
+  try {
+    result = by_columns(output, input, shape, rows, columns);
+  } catch (const Unsupported&) {
+    if (!try_rows) throw;
+    refused = std::current_exception();
+  }
+  if (!try_rows || (result.compressed && result.compressed->colours().count() == 1)) return result;
+  try {
+    int64_t most = result.compressed ? result.compressed->colours().count() - 1 : 0;
+    Candidate other = by_rows(output, input, rows, columns, bounds, options.overwritten, most);
+    if (other.compressed) return other;
+  } catch (const Error&) {  // a reverse mode that is not there is no choice
+    if (refused) std::rethrow_exception(refused);
+  }
+  if (!result.compressed && refused) std::rethrow_exception(refused);
+  return result;
+}
+
+// ---- from products to entries ----
+
+struct Entries {
+  const Candidate& candidate;
+  Func all;  // undefined: zero
+  std::vector<Type> types;
+
+  // d output(y) / d input(x)
+  std::vector<Expr> at(const std::vector<Expr>& y, const std::vector<Expr>& x) const {
+    const std::vector<Expr>& row = candidate.by_rows ? x : y;
+    const std::vector<Expr>& column = candidate.by_rows ? y : x;
+    std::vector<Expr> values;
+    for (size_t k = 0; k < types.size(); ++k) {
+      Expr zero = ir::make_zero(types[k]);
+      if (!all.defined()) {
+        values.push_back(zero);
+        continue;
+      }
+      Expr value = candidate.compressed->entry(all.function(), row, column, static_cast<int>(k));
+      values.push_back(
+          select(candidate.compressed->may_be_nonzero(row, column), cast(types[k], value), zero));
+    }
+    return values;
+  }
+};
+
+void define(Func f, const std::vector<Var>& vars, const std::vector<Expr>& values) {
+  if (values.size() == 1) {
+    f(vars) = values[0];
+  } else {
+    f(vars) = Tuple(values);
+  }
+}
+
+void make_band(ir::JacobianResult& result, const Entries& entries, size_t dims,
+               const std::string& name) {
+  auto offsets = entries.candidate.compressed->offsets();
+  if (!offsets) {
+    result.no_band =
+        "output and input differ in dimensions, or the pattern has entries at offsets "
+        "without constant bounds";
+    return;
+  }
+  std::vector<Var> y = variables("y", dims), k = variables("k", dims);
+  std::vector<Expr> x;
+  for (size_t d = 0; d < dims; ++d) {
+    auto [low, high] = (*offsets)[d];
+    // Of rows, the pattern is the transpose.
+    if (entries.candidate.by_rows) std::tie(low, high) = std::tuple(-high, -low);
+    result.band_offsets.push_back({static_cast<int>(low), static_cast<int>(high - low + 1)});
+    x.push_back(Expr(y[d]) + static_cast<int>(low) + k[d]);
+  }
+  result.band = Func(name + "_band");
+  define(result.band, both(y, k), entries.at(expressions(y), x));
+}
+
+std::shared_ptr<ir::JacobianResult> result_of(const std::string& asked, const Candidate& candidate,
+                                              const std::vector<Type>& types, int output_dims,
+                                              int input_dims, const std::string& name) {
+  auto result = std::make_shared<ir::JacobianResult>();
+  result->asked = asked;
+  result->by_rows = candidate.by_rows;
+  result->colours = candidate.compressed->colours();
+  result->coloured_dimensions = static_cast<size_t>(candidate.by_rows ? output_dims : input_dims);
+  ir::FuncPtr all = candidate.compressed->evaluate();
+  Entries entries{candidate, all ? Func(all) : Func(std::make_shared<ir::FuncContents>()), types};
+  result->compressed = entries.all;
+  std::vector<Var> y = variables("y", static_cast<size_t>(output_dims)),
+                   x = variables("x", static_cast<size_t>(input_dims));
+  result->dense = Func(name + "_dense");
+  define(result->dense, both(y, x), entries.at(expressions(y), expressions(x)));
+  if (output_dims == input_dims) make_band(*result, entries, static_cast<size_t>(input_dims), name);
+  result->explanation =
+      all ? text(candidate.by_rows ? "adjoints" : "tangents", " for ", result->colours.count(),
+                 " seeds in ", quoted(all->name), ": elements of one colour share no ",
+                 candidate.by_rows ? "column" : "row", "\n")
+          : "identically zero: no differentiable path leads from the input to the output\n";
+  return result;
+}
+
+std::vector<Type> derivative_types(const Func& f) {
+  std::vector<Type> types;
+  for (Type t : f.types()) types.push_back(t.is_float() && t.bits() > 32 ? t : Float(32));
+  return types;
+}
+
+// ---- second derivatives ----
+
+// The gradient by one input, and how it moves along a seed of another.
+struct SecondOrder {
+  Func gradient, seed, moved;
+  ir::InputShape row_shape, column_shape;
+  ir::Box rows, columns;
+};
+SecondOrder second_order(const std::string& asked, const Func& loss, const AdjointInput& rows,
+                         const AdjointInput& columns, Overwritten overwritten) {
+  SecondOrder s;
+  s.row_shape = checked_input(asked, rows);
+  s.column_shape = checked_input(asked, columns);
+  s.gradient = propagate_adjoints(loss, {.overwritten = overwritten, .wrt = {rows}}).of(rows);
+  if (!s.gradient.defined()) {
+    user_error(asked, "the input is a float that the loss depends on",
+               text(quoted(s.row_shape.name), " has no gradient"),
+               "Differentiate by something that the loss depends on");
+  }
+  s.seed = placeholder(s.column_shape.name + "_seed", s.column_shape.dimensions,
+                       s.column_shape.types[0]);
+  s.moved = propagate_tangents(s.gradient, {{columns, s.seed}})(s.gradient);
+  ir::Box point(static_cast<size_t>(loss.dimensions()), ir::Interval::point(Expr(0)));
+  s.rows = box_of_input(loss, point, rows, s.row_shape);
+  s.columns = box_of_input(loss, point, columns, s.column_shape);
+  return s;
+}
+
+// Whether what autodiff gives as the gradient is one, so that second derivatives commute: not where
+// rules or stop_gradient stand for derivatives.
+bool is_a_gradient(const Func& loss) {
+  bool result = true;
+  for (const ir::FuncPtr& f : ir::topological_order({loss.function()})) {
+    result &= f->custom_derivatives == nullptr;
+    for (int s = 0; s < f->stage_count(); ++s) {
+      ir::for_each_expr(f->stage(s), [&](const Expr& root) {
+        ir::walk(root, [&](const Expr& e) {
+          const auto* call = e.as<ir::Call>();
+          result &= !(call && call->call_type == ir::CallType::Operator &&
+                      call->op == ir::Op::stop_gradient);
+          return result;
+        });
+      });
+    }
+  }
+  return result;
+}
+
+}  // namespace
+
+Jacobian::Jacobian(std::shared_ptr<const ir::JacobianResult> result) : result_(std::move(result)) {}
+
+int Jacobian::colours() const { return static_cast<int>(result_->colours.count()); }
+bool Jacobian::by_rows() const { return result_->by_rows; }
+Expr Jacobian::colour(const std::vector<Expr>& element) const {
+  if (element.size() != result_->coloured_dimensions) {
+    user_error(result_->asked, "an element has a coordinate in each dimension",
+               text(element.size(), " are given of ", result_->coloured_dimensions),
+               "Give one Expr a dimension");
+  }
+  return result_->colours.of(element);
+}
+Func Jacobian::compressed() const { return result_->compressed; }
+Func Jacobian::dense() const { return result_->dense; }
+Func Jacobian::band() const {
+  if (!result_->band.defined()) {
+    user_error(result_->asked, "a band is made of constant offsets between output and input",
+               result_->no_band, "Use dense(), or compressed() and colour()");
+  }
+  return result_->band;
+}
+Region Jacobian::band_offsets() const {
+  band();
+  return result_->band_offsets;
+}
+std::string Jacobian::explain() const { return result_->explanation; }
+
+Jacobian jacobian(const Func& output, const AdjointInput& input, const Region& output_bounds,
+                  const JacobianOptions& options) {
+  std::string asked = "make the Jacobian of " + quoted(output.name());
+  if (!output.defined() || !ir::is_floating(output.types())) {
+    user_error(
+        asked, "only floating-point values that are defined have derivatives",
+        output.defined() ? "its type is " + to_string(output.types()[0]) : "it has no definition",
+        "Define it, with values that are floats");
+  }
+  if (static_cast<int>(output_bounds.size()) != output.dimensions()) {
+    user_error(
+        asked, "the output needs bounds in each of its dimensions",
+        text("it has ", output.dimensions(), " dimensions and ", output_bounds.size(), " bounds"),
+        "Give min and extent of each dimension");
+  }
+  if (options.compression == Compression::Rows && output.outputs() != 1) {
+    unsupported(asked, "rows are compressed of an output of one value",
+                text("it has ", output.outputs()), "Use Compression::Columns");
+  }
+  ir::InputShape shape = checked_input(asked, input);
+  ir::Box rows = box_of(output_bounds), columns = box_of_input(output, rows, input, shape);
+  Candidate candidate = best(output, input, shape, rows, columns, output_bounds, options);
+  if (!candidate.compressed) {
+    user_error(asked, "an input is something that the output depends on",
+               text("it does not depend on ", quoted(shape.name)), "Name another input");
+  }
+  return Jacobian(result_of(asked, candidate, derivative_types(output), output.dimensions(),
+                            shape.dimensions, output.name() + "_by_" + shape.name));
+}
+
+Jacobian hessian(const Func& loss, const AdjointInput& wrt, Overwritten overwritten) {
+  return hessian(loss, wrt, wrt, overwritten);
+}
+
+Jacobian hessian(const Func& loss, const AdjointInput& rows, const AdjointInput& columns,
+                 Overwritten overwritten) {
+  std::string asked = "make the Hessian of " + quoted(loss.name());
+  SecondOrder s = second_order(asked, loss, rows, columns, overwritten);
+  bool symmetric = rows.symbol() == columns.symbol() && is_a_gradient(loss);
+  Candidate candidate{Compressed::make({.output = s.moved.function(),
+                                        .seed = s.seed.function(),
+                                        .rows = s.rows,
+                                        .columns = s.columns,
+                                        .symmetric = symmetric}),
+                      false};
+  return Jacobian(result_of(asked, candidate, derivative_types(s.gradient), s.row_shape.dimensions,
+                            s.column_shape.dimensions, loss.name() + "_hessian"));
+}
+
+// diagonal(x) = sum of H(x, x') over x' of the colour of x; but x itself, none of them has an entry
+// in row x.
+HessianDiagonal hessian_diagonal(const Func& loss, const AdjointInput& wrt,
+                                 Overwritten overwritten) {
+  std::string asked = "make the diagonal of the Hessian of " + quoted(loss.name());
+  SecondOrder s = second_order(asked, loss, wrt, wrt, overwritten);
+  auto compressed = Compressed::make({.output = s.moved.function(),
+                                      .seed = s.seed.function(),
+                                      .rows = s.rows,
+                                      .columns = s.rows,
+                                      .diagonal_only = true});
+  HessianDiagonal result;
+  result.colours = static_cast<int>(compressed->colours().count());
+  ir::FuncPtr all = compressed->evaluate();
+  result.compressed = all ? Func(all) : Func(std::make_shared<ir::FuncContents>());
+  result.diagonal = Func(loss.name() + "_hessian_diagonal");
+  std::vector<Var> x = variables("x", static_cast<size_t>(s.row_shape.dimensions));
+  std::vector<Expr> place = expressions(x);
+  place.push_back(compressed->colours().of(expressions(x)));
+  result.diagonal(x) =
+      all ? Expr(result.compressed(place)) : ir::make_zero(derivative_types(s.gradient)[0]);
+  return result;
+}
+
+}  // namespace retrograde

@@ -1,0 +1,86 @@
+// jacobian.h -- whole Jacobians and Hessians that are sparse or small, from few pipelines' worth of
+// work.
+//
+// Jacobian j = jacobian(blur, image, {{0, 64}});   // d blur(y) / d image(x), y in [0, 64)
+// j.colours();                                     // 3 for a three-point stencil, whatever its
+// size j.dense()(y, x);  j.band()(y, k);                // as Funcs
+//
+// Elements that no output element has in common share a seed (colouring.h), so as many products are
+// evaluated as there are colours, in one pipeline with one more dimension. The pattern is proven
+// from the definitions (dependence.h): entries that it leaves out are zero, and all others are
+// read off the products directly, without subtractions. Data-dependent places and reductions over
+// everything make dense parts, which cost a colour an element.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "autodiff/derivative.h"
+
+namespace retrograde {
+
+namespace ir {
+struct JacobianResult;
+}
+
+// Which sums are evaluated: over columns (tangents, one seed an element of the input) or over rows
+// (adjoints, one an element of the output). Auto: the one with fewer colours, Columns at a tie.
+enum class Compression { Auto, Columns, Rows };
+
+struct JacobianOptions {
+  Compression compression = Compression::Auto;
+  Overwritten overwritten = Overwritten::Store;
+};
+
+class Jacobian {
+ public:
+  explicit Jacobian(std::shared_ptr<const ir::JacobianResult> result);
+
+  // How many products are evaluated.
+  int colours() const;
+  bool by_rows() const;
+  // The colour of an element of the input (of the output when by_rows), int32 in [0, colours()).
+  Expr colour(const std::vector<Expr>& element) const;
+  // All products: the dimensions of the output (the input when by_rows), then the colour. Schedule
+  // this one; what follows reads it.
+  Func compressed() const;
+  // Dimensions of the output, then those of the input: the derivative of output(y...) by
+  // input(x...).
+  Func dense() const;
+  // Dimensions of the output, then an offset for each: band()(y..., k...) is the derivative of
+  // output(y...) by input(y + band_offsets().min + k ...). CompileError when output and input
+  // differ in dimensions, or the offsets have no constant bounds.
+  Func band() const;
+  Region band_offsets() const;  // of entries that may be nonzero: constants
+  std::string explain() const;
+
+ private:
+  std::shared_ptr<const ir::JacobianResult> result_;
+};
+
+// Of `output` over output_bounds (min and extent in each dimension) by an input of one float value.
+// CompileError: as propagate_tangents, propagate_adjoints. Unsupported: places or reductions in the
+// pattern without constant bounds, more than 4096 colours, an extern stage on the way.
+Jacobian jacobian(const Func& output, const AdjointInput& input, const Region& output_bounds,
+                  const JacobianOptions& options = {});
+
+// The second derivatives of a scalar: dense()(i..., j...) = d2 loss / d wrt(i) d wrt(j). Tangents
+// of the adjoint. Errors as jacobian and hessian_vector_product.
+Jacobian hessian(const Func& loss, const AdjointInput& wrt,
+                 Overwritten overwritten = Overwritten::Store);
+// A block off the diagonal: dense()(i..., j...) = d2 loss / d rows(i) d columns(j).
+Jacobian hessian(const Func& loss, const AdjointInput& rows, const AdjointInput& columns,
+                 Overwritten overwritten = Overwritten::Store);
+
+// d2 loss / d wrt(i)^2 alone, with the dimensions of wrt: fewer colours, as only neighbours must
+// differ.
+struct HessianDiagonal {
+  Func diagonal;
+  int colours = 1;
+  Func compressed;  // undefined when the diagonal is zero
+};
+HessianDiagonal hessian_diagonal(const Func& loss, const AdjointInput& wrt,
+                                 Overwritten overwritten = Overwritten::Store);
+
+}  // namespace retrograde

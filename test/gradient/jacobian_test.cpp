@@ -1,0 +1,557 @@
+// Whole Jacobians and Hessians: dense() against central differences in double, entry by entry;
+// band(), diagonal and both compressions against dense(); against products with unit vectors;
+// numbers of colours against what is known for the pattern; machine code; third derivatives.
+#include "autodiff/jacobian.h"
+
+#include "autodiff/custom_derivative.h"
+#include "autodiff/second_order.h"
+#include "frontend/param.h"
+#include "gradient/random_program.h"
+#include "support/errors.h"
+
+namespace retrograde::gradient {
+namespace {
+
+using Point = std::vector<int>;
+
+Point joined(const Point& a, const Point& b) {
+  Point result = a;
+  result.insert(result.end(), b.begin(), b.end());
+  return result;
+}
+oracle::Region region_from_zero(const Point& sizes) { return {Point(sizes.size(), 0), sizes}; }
+
+class Jacobians : public ::testing::Test {
+ protected:
+  static constexpr int n = 7;
+  Var x{"x"}, y{"y"};
+  Buffer<float> a = random_image({n}, 0.25, 1.5, 1), plane = random_image({5, 4}, 0.25, 1.5, 2);
+
+  double at(const Func& f, const Point& point) {
+    oracle::Region one{point, Point(point.size(), 1)};
+    return evaluate(f, one).values[0].scalar.as_double();
+  }
+
+  // dense() of f over `sizes` by `image`, against differences.
+  void expect_right(const Func& f, const Point& sizes, Buffer<float>& image, const Jacobian& j,
+                    double tolerance = 1e-5) {
+    oracle::Region rows = region_from_zero(sizes), columns = oracle::region_of(*image.raw_buffer());
+    oracle::Region all{joined(rows.mins, columns.mins), joined(rows.extents, columns.extents)};
+    oracle::Array found = evaluate(j.dense(), all);
+    columns.for_each([&](const Point& column) {
+      float& element = image.get()->operator()(column.data());
+      const float center = element;
+      auto values = [&](float h) {
+        element = center + h;
+        oracle::Array result = evaluate(f, rows);
+        element = center;
+        return result;
+      };
+      oracle::Array up = values(1.0f / 256), down = values(-1.0f / 256),
+                    far_up = values(1.0f / 128), far_down = values(-1.0f / 128);
+      rows.for_each([&](const Point& row) {
+        auto slope = [&](const oracle::Array& u, const oracle::Array& d, double h) {
+          return (u.at(row).scalar.as_double() - d.at(row).scalar.as_double()) / (2 * h);
+        };
+        double expected = (4 * slope(up, down, 1.0 / 256) - slope(far_up, far_down, 1.0 / 128)) / 3;
+        double actual = found.at(joined(row, column)).scalar.as_double();
+        EXPECT_NEAR(actual, expected, tolerance * (1 + std::abs(expected)))
+            << ::testing::PrintToString(row) << " by " << ::testing::PrintToString(column);
+      });
+    });
+    if (!::testing::Test::HasFailure()) expect_machine_code_agrees(j.dense(), all);
+  }
+  void expect_band_agrees(const Jacobian& j, const Point& sizes) {
+    oracle::Region rows = region_from_zero(sizes);
+    Region offsets = j.band_offsets();
+    Point mins, extents;
+    for (const Range& r : offsets) {
+      mins.push_back(static_cast<int>(*ir::as_const_int(r.min)));
+      extents.push_back(static_cast<int>(*ir::as_const_int(r.extent)));
+    }
+    region_from_zero(extents).for_each([&](const Point& k) {
+      rows.for_each([&](const Point& row) {
+        Point column = row;
+        for (size_t d = 0; d < row.size(); ++d) column[d] += mins[d] + k[d];
+        EXPECT_EQ(at(j.band(), joined(row, k)), at(j.dense(), joined(row, column)));
+      });
+    });
+  }
+};
+
+TEST_F(Jacobians, OfAPointwiseFuncHaveOneColour) {
+  Func f("f");
+  f(x) = sin(a(x)) * a(x);
+  Jacobian j = jacobian(f, a, {{0, n}});
+  EXPECT_EQ(j.colours(), 1);
+  expect_right(f, {n}, a, j);
+  expect_band_agrees(j, {n});
+}
+
+TEST_F(Jacobians, OfAThreePointStencilHaveThree) {
+  Func f("f");
+  f(x) = a(x) * a(x + 1) + exp(a(x + 2));
+  Jacobian j = jacobian(f, a, {{0, n - 2}});
+  EXPECT_EQ(j.colours(), 3);
+  EXPECT_FALSE(j.by_rows());
+  expect_right(f, {n - 2}, a, j);
+  expect_band_agrees(j, {n - 2});
+  expect_mentions(j.explain(), {"tangents for 3 seeds", "share no row"});
+}
+
+TEST_F(Jacobians, OfTheFivePointStencilHaveFive) {
+  Func f("f"), g("g");
+  g(x, y) = plane(x, y) * plane(x, y);
+  f(x, y) = g(x, y + 1) + g(x + 1, y) * g(x + 1, y + 1) + g(x + 2, y + 1) + g(x + 1, y + 2);
+  EXPECT_EQ(jacobian(f, plane, {{0, 30}, {0, 20}}).colours(), 5);
+  Jacobian j = jacobian(f, plane, {{0, 3}, {0, 2}});
+  EXPECT_EQ(j.colours(), 4);  // so few rows have fewer conflicts
+  expect_right(f, {3, 2}, plane, j);
+  expect_band_agrees(j, {3, 2});
+}
+
+TEST_F(Jacobians, OfABoxStencilHaveAsManyAsTheBox) {
+  Func f("f");
+  RDom r(0, 3, 0, 2);
+  f(x, y) = 0.0f;
+  f(x, y) += plane(x + r.x, y + r.y) * plane(x + r.x, y + r.y) * cast<float>(r.x + 2 * r.y + 1);
+  Jacobian j = jacobian(f, plane, {{0, 3}, {0, 3}});
+  EXPECT_EQ(j.colours(), 6);
+  expect_right(f, {3, 3}, plane, j);
+}
+
+TEST_F(Jacobians, OfDownsamplingHaveThoseOfABlockOrOne) {
+  Func f("f");
+  f(x) = a(2 * x) * a(2 * x + 1);
+  Jacobian j = jacobian(f, a, {{0, 3}}, {.compression = Compression::Columns});
+  EXPECT_EQ(j.colours(), 2);
+  expect_right(f, {3}, a, j);
+  Jacobian rows = jacobian(f, a, {{0, 3}});  // no two outputs read one element
+  EXPECT_TRUE(rows.by_rows());
+  EXPECT_EQ(rows.colours(), 1);
+  expect_right(f, {3}, a, rows);
+}
+
+TEST_F(Jacobians, OfBordersStayNarrow) {
+  Func g = BoundaryConditions::repeat_edge(a), f("f");
+  f(x) = g(x - 1) * g(x) + g(x + 1);
+  Jacobian j = jacobian(f, a, {{0, n}});
+  EXPECT_EQ(j.colours(), 3);
+  expect_right(f, {n}, a, j);
+}
+
+TEST_F(Jacobians, TakeRowsWhereOutputsAreFewer) {
+  Func f("f");
+  RDom r(0, n);
+  f(x) = 0.0f;
+  f(x) += a(r) * a(r) * cast<float>(r + x);
+  Jacobian rows = jacobian(f, a, {{0, 2}});
+  EXPECT_TRUE(rows.by_rows());
+  EXPECT_EQ(rows.colours(), 2);
+  expect_right(f, {2}, a, rows);
+  Jacobian columns = jacobian(f, a, {{0, 2}}, {.compression = Compression::Columns});
+  EXPECT_FALSE(columns.by_rows());
+  EXPECT_EQ(columns.colours(), n);
+  expect_right(f, {2}, a, columns);
+}
+
+TEST_F(Jacobians, RowsOfAStencil) {
+  Func f("f");
+  f(x) = a(x) * a(x + 1) + exp(a(x + 2));
+  Jacobian j = jacobian(f, a, {{0, n - 2}}, {.compression = Compression::Rows});
+  EXPECT_TRUE(j.by_rows());
+  EXPECT_EQ(j.colours(), 3);
+  expect_right(f, {n - 2}, a, j);
+  expect_band_agrees(j, {n - 2});
+}
+
+TEST_F(Jacobians, OfDataDependentPlacesAreDense) {
+  Buffer<int> index(4);
+  for (int i = 0; i < 4; ++i) index(i) = (3 * i + 1) % n;
+  Func f("f");
+  f(x) = a(clamp(index(x), 0, n - 1)) * a(clamp(index(x) + 1, 0, n - 1));
+  Jacobian j = jacobian(f, a, {{0, 4}}, {.compression = Compression::Columns});
+  EXPECT_EQ(j.colours(), n);
+  expect_right(f, {4}, a, j);
+  EXPECT_EQ(jacobian(f, a, {{0, 4}}).colours(), 4);
+}
+
+TEST_F(Jacobians, OfScansAreDenseAlongTheScan) {
+  Func f("f");
+  RDom r(1, 4);
+  f(x, y) = plane(x, y);
+  f(r, y) = f(r, y) * f(r - 1, y) + f(r - 1, y);
+  Jacobian j = jacobian(f, plane, {{0, 5}, {0, 4}}, {.compression = Compression::Columns});
+  EXPECT_EQ(j.colours(), 5);
+  expect_right(f, {5, 4}, plane, j);
+}
+
+TEST_F(Jacobians, OfHistogramsAndParameters) {
+  Param<float> gain("gain");
+  gain.set(0.75f);
+  Func f("f"), g("g");
+  RDom r(0, n);
+  f(x) = 0.0f;
+  f(clamp(cast<int>(a(r) * 3.0f), 0, 4)) += a(r) * gain * gain;
+  Jacobian by_gain = jacobian(f, gain, {{0, 5}});
+  EXPECT_EQ(by_gain.colours(), 1);
+  double total = 0, expected = 0;
+  for (int i = 0; i < 5; ++i) total += at(by_gain.dense(), {i});
+  for (int i = 0; i < n; ++i) expected += 1.5 * a(i);
+  EXPECT_NEAR(total, expected, 1e-12);
+  expect_right(f, {5}, a, jacobian(f, a, {{0, 5}}), 1e-4);
+}
+
+TEST_F(Jacobians, ByFuncsAndOfTuples) {
+  Func g("g"), f("f"), first("first");
+  g(x) = a(x) * 2.0f;
+  f(x) = Tuple(g(x) * g(x + 1), cast<int>(x), sin(g(x)));
+  Jacobian j = jacobian(f, g, {{0, 4}});
+  EXPECT_EQ(j.colours(), 2);
+  Func second("second");
+  first(x, y) = j.dense()(x, y)[0];
+  second(x, y) = j.dense()(x, y)[2];
+  for (int i = 0; i < 4; ++i) {
+    for (int k = 0; k < 5; ++k) {
+      double left = k == i ? 2.0 * a(i + 1) : k == i + 1 ? 2.0 * a(i) : 0;
+      EXPECT_NEAR(at(first, {i, k}), left, 1e-12);
+      EXPECT_NEAR(at(second, {i, k}), k == i ? std::cos(2.0 * a(i)) : 0, 1e-12);
+    }
+  }
+}
+
+TEST_F(Jacobians, OfExtentsKnownAtRunTimeOnly) {
+  ImageParam image(Float(32), 1, "image");
+  Func f("f");
+  f(x) = image(x) * image(x + 1) - image(x + 2);
+  Jacobian j = jacobian(f, image, {{0, image.width() - 2}});
+  EXPECT_EQ(j.colours(), 3);
+  image.set(a);
+  expect_right(f, {n - 2}, a, j);
+}
+
+TEST_F(Jacobians, WithoutAPathAreZero) {
+  Buffer<float> b = random_image({n}, 0.25, 1.5, 3);
+  Func f("f");
+  f(x) = a(x) + cast<float>(cast<int>(b(x)));
+  Jacobian j = jacobian(f, b, {{0, n}});
+  EXPECT_EQ(j.colours(), 1);
+  EXPECT_EQ(at(j.dense(), {2, 2}), 0.0);
+  expect_mentions(j.explain(), {"identically zero"});
+}
+
+// ---- Hessians ----
+
+class SparseHessians : public Jacobians {
+ protected:
+  Func summed(const Func& f, int size) {
+    Func loss("loss");
+    RDom r(0, size);
+    loss() = 0.0f;
+    loss() += f(r);
+    return loss;
+  }
+  void expect_hessian(const Func& loss, Buffer<float>& image, int colours) {
+    Func gradient =
+        propagate_adjoints(loss, {.overwritten = Overwritten::Store, .wrt = {image}})(image);
+    Jacobian h = hessian(loss, image);
+    EXPECT_EQ(h.colours(), colours);
+    oracle::Region all = oracle::region_of(*image.raw_buffer());
+    expect_right(gradient, all.extents, image, h);
+    HessianDiagonal d = hessian_diagonal(loss, image);
+    EXPECT_LE(d.colours, colours);
+    all.for_each([&](const Point& p) {
+      EXPECT_NEAR(at(d.diagonal, p), at(h.dense(), joined(p, p)), 1e-12);
+    });
+    expect_machine_code_agrees(d.diagonal, all);
+  }
+};
+
+TEST_F(SparseHessians, OfSeparableLossesHaveOneColour) {
+  Func f("f");
+  f(x) = sin(a(x)) * exp(a(x));
+  expect_hessian(summed(f, n), a, 1);
+}
+
+TEST_F(SparseHessians, OfChainsAreTridiagonal) {
+  Func f("f");
+  f(x) = sin(a(x) * a(x + 1)) + a(x) * a(x);
+  Func loss = summed(f, n - 1);
+  expect_hessian(loss, a, 3);
+  EXPECT_EQ(hessian_diagonal(loss, a).colours, 2);
+  Jacobian h = hessian(loss, a);
+  expect_band_agrees(h, {n});
+  Region offsets = h.band_offsets();
+  EXPECT_EQ(ir::print(offsets[0].min), "-1");
+  EXPECT_EQ(ir::print(offsets[0].extent), "3");
+}
+
+TEST_F(SparseHessians, OfDenseLossesHaveAColourAnElement) {
+  Func total("total"), loss("loss");
+  RDom r(0, n);
+  total() = 0.0f;
+  total() += a(r) * cast<float>(r + 1);
+  loss() = total() * total() * 0.25f + sin(total());
+  expect_hessian(loss, a, n);
+}
+
+// One element meets all others: as columns they all conflict in its row, as a star they do not.
+TEST_F(SparseHessians, OfArrowsHaveTwoColours) {
+  Func f("f");
+  f(x) = sin(a(Expr(0)) * a(x)) + exp(a(x)) * a(x);
+  Func loss = summed(f, n);
+  expect_hessian(loss, a, 2);
+  oracle::Array entries = evaluate(hessian(loss, a).dense(), region_from_zero({n, n}));
+  EXPECT_NE(entries.at({0, 5}).scalar.as_double(), 0.0);
+  EXPECT_EQ(entries.at({4, 5}).scalar.as_double(), 0.0);
+}
+
+// A rule's "second derivatives" need not be symmetric: then no entry is read off its transpose.
+TEST_F(SparseHessians, OfRulesReadEachEntryInItsRow) {
+  Func f("f");
+  f(x) = a(Expr(0)) * a(x);
+  Func loss = summed(f, n);
+  Buffer<float> input = a;
+  auto adjoint = [input](const AdjointContext& c) {
+    Func adj("a_adj");
+    Var i;
+    adj(i) = c.adjoint()(i) * input(Expr(0)) * input(Expr(0)) * input(clamp(i, 0, n - 1));
+    return std::vector<AdjointContribution>{{input, adj}};
+  };
+  custom_adjoint(f, {a}, adjoint);
+  Jacobian h = hessian(loss, a);
+  for (int i = 0; i < n; ++i) {
+    for (int j = 0; j < n; ++j) {
+      double expected = (i == j ? 1.0 * a(0) * a(0) : 0.0) + (j == 0 ? 2.0 * a(0) * a(i) : 0.0);
+      EXPECT_NEAR(at(h.dense(), {i, j}), expected, 1e-12);
+    }
+  }
+}
+
+TEST_F(SparseHessians, OfPlanes) {
+  Func f("f"), loss("loss");
+  f(x, y) = pow(plane(x + 1, y) - plane(x, y), 2) * pow(plane(x, y + 1) - plane(x, y), 2);
+  RDom r(0, 4, 0, 3);
+  loss() = 0.0f;
+  loss() += f(r.x, r.y);
+  expect_hessian(loss, plane, 6);  // a star colouring: a linear form takes 7
+  EXPECT_EQ(hessian_diagonal(loss, plane).colours, 3);
+}
+
+TEST_F(SparseHessians, AgreeWithProductsAlongUnitVectors) {
+  Func f("f"), unit("unit");
+  f(x) = tanh(a(x) + a(x + 1) * a(x + 2));
+  Func loss = summed(f, n - 2);
+  Jacobian h = hessian(loss, a);
+  Param<int> which("which");
+  unit(x) = select(x == which, 1.0f, 0.0f);
+  Func product = hessian_vector_product(loss, a, {{a, unit}});
+  for (int j = 0; j < n; ++j) {
+    which.set(j);
+    for (int i = 0; i < n; ++i) EXPECT_NEAR(at(h.dense(), {i, j}), at(product, {i}), 1e-12);
+  }
+  EXPECT_EQ(h.colours(), 5);
+}
+
+TEST_F(SparseHessians, AreDifferentiatedAgain) {
+  Func f("f");
+  f(x) = sin(a(x) * a(x + 1));
+  Func loss = summed(f, n - 1), dense = hessian(loss, a).dense();
+  Func third = propagate_tangents(dense, {{a, a}})(dense);
+  oracle::Region all = region_from_zero({n, n});
+  oracle::Array found = evaluate(third, all);
+  Buffer<float> kept = a.copy();
+  auto moved = [&](float h) {
+    for (int i = 0; i < n; ++i) a(i) = kept(i) + h * kept(i);
+    return evaluate(dense, all);
+  };
+  oracle::Array up = moved(1.0f / 256), down = moved(-1.0f / 256);
+  for (size_t i = 0; i < found.values.size(); ++i) {
+    double slope = (up.values[i].scalar.as_double() - down.values[i].scalar.as_double()) * 128;
+    EXPECT_NEAR(found.values[i].scalar.as_double(), slope, 1e-3 * (1 + std::abs(slope)));
+  }
+}
+
+TEST_F(SparseHessians, BlocksBetweenInputs) {
+  Buffer<float> b = random_image({n}, 0.25, 1.5, 4);
+  Param<float> gain("gain");
+  gain.set(0.75f);
+  Func f("f");
+  f(x) = sin(a(x) * b(x)) + a(x) * b(x + 1) * gain * gain;
+  Func loss = summed(f, n - 1);
+  Jacobian h = hessian(loss, a, b), scalar = hessian(loss, gain), mixed = hessian(loss, a, gain);
+  EXPECT_EQ(h.colours(), 2);
+  expect_right(propagate_adjoints(loss, {.wrt = {a}})(a), {n}, b, h);
+  double twice = 0;
+  for (int i = 0; i < n - 1; ++i) {
+    twice += 2.0 * a(i) * b(i + 1);
+    EXPECT_NEAR(at(mixed.dense(), {i}), 1.5 * b(i + 1), 1e-12);
+  }
+  EXPECT_NEAR(at(scalar.dense(), {}), twice, 1e-12);
+  EXPECT_NEAR(at(hessian_diagonal(loss, gain).diagonal, {}), twice, 1e-12);
+}
+
+// Random accesses, selects and updates: J v is the tangent along v, w J the adjoint of w, element
+// by element; and H v for the Hessian. Values that a pattern leaves out, or mixes up, would show.
+class RandomJacobians : public Jacobians {
+ protected:
+  const oracle::Region square{{0, 0}, {size, size}}, all{{0, 0, 0, 0}, {size, size, size, size}};
+
+  std::vector<double> values_of(const Func& f, const oracle::Region& region) {
+    std::vector<double> result;
+    for (const oracle::Value& v : evaluate(f, region).values)
+      result.push_back(v.scalar.as_double());
+    return result;
+  }
+  static std::vector<double> values_of(const Buffer<float>& b) {
+    std::vector<double> result;
+    b.get()->for_each_value([&](float v) { result.push_back(v); });
+    return result;
+  }
+  static void expect_near(const std::vector<double>& found, const std::vector<double>& expected) {
+    double scale = 1;
+    for (double e : expected) scale = std::max(scale, std::abs(e));
+    for (size_t i = 0; i < found.size(); ++i)
+      ASSERT_NEAR(found[i], expected[i], 1e-11 * scale) << "element " << i;
+  }
+  // Of a matrix whose rows run innermost.
+  static std::vector<double> times(const std::vector<double>& m, const std::vector<double>& v,
+                                   bool transposed) {
+    size_t n = v.size();
+    std::vector<double> result(n, 0.0);
+    for (size_t column = 0; column < n; ++column) {
+      for (size_t row = 0; row < n; ++row) {
+        double entry = m[column * n + row];
+        transposed ? result[column] += entry * v[row] : result[row] += entry * v[column];
+      }
+    }
+    return result;
+  }
+};
+
+TEST_F(RandomJacobians, AgreeWithTangentsAndAdjoints) {
+  int refused = 0, sparse = 0;
+  for (unsigned seed = 700; seed < 708; ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    RandomProgram p(seed);
+    Buffer<float> v = random_image({size, size}, -1, 1, seed + 1),
+                  w = random_image({size, size}, -1, 1, seed + 2);
+    const Region bounds{{0, size}, {0, size}};
+    for (Compression c : {Compression::Columns, Compression::Rows}) {
+      try {
+        Jacobian j = jacobian(p.output(), p.image, bounds, {.compression = c});
+        sparse += j.colours() < size * size;
+        std::vector<double> matrix = values_of(j.dense(), all);
+        Func tangent = propagate_tangents(p.output(), {{p.image, v}})(p.output());
+        expect_near(times(matrix, values_of(v), false), values_of(tangent, square));
+        Func adjoint =
+            propagate_adjoints(p.output(), w, {.overwritten = Overwritten::Store})(p.image);
+        expect_near(times(matrix, values_of(w), true), values_of(adjoint, square));
+      } catch (const Unsupported&) {
+        ++refused;
+      }
+    }
+  }
+  EXPECT_LT(refused, 4);
+  EXPECT_GT(sparse, 4);
+}
+
+TEST_F(RandomJacobians, HessiansAgreeWithProducts) {
+  int refused = 0;
+  for (unsigned seed = 500; seed < 503; ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    RandomProgram p(seed);
+    Buffer<float> v = random_image({size, size}, -1, 1, seed + 1);
+    try {
+      std::vector<double> matrix = values_of(hessian(p.loss, p.image).dense(), all);
+      std::vector<double> product =
+          values_of(hessian_vector_product(p.loss, p.image, {{p.image, v}}), square);
+      expect_near(times(matrix, values_of(v), false), product);
+      expect_near(times(matrix, values_of(v), true), product);  // symmetric
+      std::vector<double> diagonal = values_of(hessian_diagonal(p.loss, p.image).diagonal, square);
+      for (size_t i = 0; i < diagonal.size(); ++i)
+        EXPECT_NEAR(diagonal[i], matrix[i * diagonal.size() + i], 1e-11);
+    } catch (const Unsupported&) {
+      ++refused;
+    }
+  }
+  EXPECT_LT(refused, 2);
+}
+
+// A rule for adjoints alone leaves rows only.
+TEST_F(Jacobians, OfCustomAdjointsGoByRows) {
+  Func g("g"), f("f");
+  g(x) = floor(a(x));
+  f(x) = g(x) * g(x + 1);
+  Buffer<float> input = a;
+  custom_adjoint(g, {a}, [input](const AdjointContext& c) {
+    return std::vector<AdjointContribution>{{input, c.adjoint()}};
+  });
+  Jacobian j = jacobian(f, a, {{0, 4}});
+  EXPECT_TRUE(j.by_rows());
+  EXPECT_EQ(j.colours(), 2);
+  for (int i = 0; i < 4; ++i) {
+    for (int k = 0; k < 5; ++k) {
+      double expected = k == i ? std::floor(a(i + 1)) : k == i + 1 ? std::floor(a(i)) : 0;
+      EXPECT_EQ(at(j.dense(), {i, k}), expected);
+    }
+  }
+  EXPECT_THROW(jacobian(f, a, {{0, 4}}, {.compression = Compression::Columns}), Unsupported);
+}
+
+// ---- errors ----
+
+TEST_F(Jacobians, Errors) {
+  Func undefined("undefined"), whole("whole"), f("f"), pair("pair"), g("g");
+  Param<int> count("count");
+  whole(x) = x;
+  f(x) = a(x) * cast<float>(count);
+  pair(x) = Tuple(a(x), a(x));
+  g(x) = pair(x)[0] + pair(x)[1];
+  expect_mentions(error_of([&] { jacobian(undefined, a, {}); }),
+                  {"make the Jacobian", "no definition"});
+  expect_mentions(error_of([&] { jacobian(whole, a, {{0, 4}}); }), {"its type is int32"});
+  expect_mentions(error_of([&] { jacobian(f, a, {}); }), {"1 dimensions and 0 bounds"});
+  expect_mentions(error_of([&] { jacobian(f, count, {{0, 4}}); }), {"has type int32"});
+  expect_mentions(error_of([&] { jacobian(f, undefined, {{0, 4}}); }), {"has no definition"});
+  expect_mentions(error_of<Unsupported>([&] {
+                    jacobian(g, pair, {{0, 4}});
+                  }),
+                  {"has one value", "\"pair\" has 2"});
+  expect_mentions(error_of<Unsupported>([&] {
+                    jacobian(pair, a, {{0, 4}}, {.compression = Compression::Rows});
+                  }),
+                  {"of one value", "Compression::Columns"});
+  Jacobian j = jacobian(f, a, {{0, 4}});
+  expect_mentions(error_of([&] { j.colour({x, x}); }), {"2 are given of 1"});
+  Func scalar("scalar");
+  scalar() = a(0) * a(1);
+  expect_mentions(error_of([&] { jacobian(scalar, a, {}).band(); }),
+                  {"constant offsets", "dense()"});
+  expect_mentions(error_of([&] { hessian(scalar, count); }),
+                  {"make the Hessian", "has type int32"});
+  expect_mentions(error_of([&] { hessian_diagonal(scalar, undefined); }), {"has no definition"});
+}
+
+TEST_F(Jacobians, WithoutBoundsAreRefused) {
+  ImageParam image(Float(32), 1, "image");
+  Param<int> length("length");
+  Func f("f"), big("big");
+  RDom r(0, length);
+  f(x) = 0.0f;
+  f(x) += image(r) * image(r) * cast<float>(x);
+  expect_mentions(error_of<Unsupported>([&] {
+                    jacobian(f, image, {{0, length}});
+                  }),
+                  {"compress", "constant bounds"});
+  RDom s(0, 5000);
+  big(x) = 0.0f;
+  big(x) += image(s) * image(s) * cast<float>(x + s);
+  expect_mentions(error_of<Unsupported>([&] {
+                    jacobian(big, image, {{0, 5000}});
+                  }),
+                  {"4096 seeds", "needs more"});
+}
+
+}  // namespace
+}  // namespace retrograde::gradient
