@@ -12,7 +12,7 @@
 // right when no difference of two columns that conflict is a multiple of n. It needs no table and
 // no extents; for bands and stencils it finds the known optima: 3 for a band of 3, 5 for the
 // five-point stencil. Differences are taken over the whole pattern, so a single dense row makes
-// every column a colour of its own.
+// every column a colour of its own; graph_colouring.h is for such.
 #pragma once
 
 #include <cstdint>

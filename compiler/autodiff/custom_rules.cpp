@@ -216,9 +216,14 @@ CustomAdjointResult run_custom_adjoint(const FuncPtr& f, const FuncPtr& adjoint,
       AdjointContext(Func(f), Func(adjoint), region_of(regions.of(f.get())), wanted));
   check_contributions(*f, given, is_wanted);
   for (const AdjointContribution& c : given) {
-    if (c.is_zero || !is_wanted(c.input.symbol().get())) continue;
-    std::string name = shape_of(c.input.symbol().get()).name + "_from_" + f->name;
-    result.contributions.push_back({c.input.symbol(), as_adjoint(name, c.adjoint.function())});
+    if (!is_wanted(c.input.symbol().get())) continue;
+    std::string name = shape_of(c.input.symbol().get()).name;
+    if (c.is_zero) {
+      result.zeros.push_back(name);
+    } else {
+      result.contributions.push_back(
+          {c.input.symbol(), as_adjoint(name + "_from_" + f->name, c.adjoint.function())});
+    }
   }
   return result;
 }

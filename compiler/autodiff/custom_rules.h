@@ -43,6 +43,7 @@ struct CustomContribution {
 };
 struct CustomAdjointResult {
   std::vector<CustomContribution> contributions;  // to wanted inputs, without zeros
+  std::vector<std::string> zeros;                 // wanted inputs that were declared zero
   std::vector<FuncPtr> covered;                   // between the inputs and f
 };
 // is_wanted: lies between what was requested and the output; is_requested: by name.

@@ -219,6 +219,9 @@ class Synthesis {
         f, adjoint, regions_, [&](const Symbol* s) { return active_.contains(s); },
         [&](const Symbol* s) { return options_.only_requested && options_.requested.contains(s); });
     for (const CustomContribution& c : rule.contributions) add_custom(*f, c);
+    for (const std::string& name : rule.zeros) {
+      explain(Explanation::Kind::Zero, name, text("by the custom adjoint of ", quoted(f->name)));
+    }
     for (const FuncPtr& inner : rule.covered) {
       covered_.insert(inner.get());
       explain(Explanation::Kind::Custom, inner->name,

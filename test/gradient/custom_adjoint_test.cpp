@@ -65,7 +65,9 @@ TEST_F(CustomAdjoints, ReplaceOneAnother) {
   custom_adjoint(f, {a}, [input](const AdjointContext&) {
     return Contributions{AdjointContribution::zero(input)};
   });
-  EXPECT_EQ(at(propagate_adjoints(sum_of(f))(a), 2), 0.0);
+  Derivative d = propagate_adjoints(sum_of(f));
+  EXPECT_EQ(at(d(a), 2), 0.0);
+  expect_mentions(d.explain(), {"by the custom adjoint of \"f"});
 }
 
 TEST_F(CustomAdjoints, OfAStencilReadSeveralTimes) {
