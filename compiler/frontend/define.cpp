@@ -279,18 +279,49 @@ void check_self_calls(const Site& site, const Names& names, const std::vector<st
   }
 }
 
+using DomainPtr = std::shared_ptr<ReductionDomainContents>;
+
+// The domain as an update of f may own it: one with a predicate that reads f would own f in turn,
+// so that neither ever went away. Then a copy that does not.
+DomainPtr domain_for(const FuncPtr& f, const DomainPtr& domain) {
+  if (!domain->predicate.defined()) return domain;
+  const Expr released = redirect_calls(domain->predicate, f, f, true);
+  if (released.same_as(domain->predicate)) return domain;
+  const auto copy = std::make_shared<ReductionDomainContents>(*domain);
+  copy->predicate = rebind_symbol(released, domain.get(), SymbolRef::weak(copy));
+  return copy;
+}
+
+void check_bounds(const Site& site, const FuncPtr& f, const ReductionDomainContents& domain) {
+  for (const ReductionVariable& v : domain.vars) {
+    for (const Expr& bound : {v.min, v.extent}) {
+      if (redirect_calls(bound, f, f, true).same_as(bound)) continue;
+      user_error(site.asked, "the bounds of a reduction domain are known before its update runs",
+                 text("the domain of ", quoted(v.var), " has the bound ", bound, ", which reads ",
+                      quoted(f->name), " itself"),
+                 text("Compute the bound in another Func, or give the domain a constant bound and "
+                      "say with RDom::where which points count"));
+    }
+  }
+}
+
 Definition make_update(const FuncPtr& f, std::vector<Expr> args, std::vector<Expr> values,
-                       const std::shared_ptr<ReductionDomainContents>& domain) {
+                       const DomainPtr& given) {
   Definition update;
   update.args = std::move(args);
   update.values = std::move(values);
-  if (domain) {
-    domain->frozen = true;
+  DomainPtr domain = given;
+  if (given) {
+    given->frozen = true;
+    domain = domain_for(f, given);
     update.rvars = domain->vars;
     if (domain->predicate.defined())
       update.predicate = rebind_symbol(domain->predicate, SymbolRef(domain));
   }
-  return map_exprs(update, [&](const Expr& e) { return redirect_calls(e, f, f, true); });
+  return map_exprs(update, [&](const Expr& e) {
+    const Expr own = redirect_calls(e, f, f, true);
+    return domain == given ? own : rebind_symbol(own, given.get(), SymbolRef(domain));
+  });
 }
 
 // Loops innermost first: the reduction variables, then the pure variables.
@@ -390,6 +421,7 @@ void define_update(const FuncPtr& f, const std::vector<Expr>& raw_args,
   if (domain && domain->predicate.defined()) exprs.push_back(domain->predicate);
   const Names names = names_in(*f, exprs);
   domain_in(site, names);  // the predicate may bring in another one
+  if (domain) check_bounds(site, f, *domain);
   const std::vector<std::string> pure = pure_positions(*f, args);
   check_free_variables(site, names, pure);
   check_self_calls(site, names, pure);

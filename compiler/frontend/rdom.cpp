@@ -166,10 +166,14 @@ std::shared_ptr<ReductionDomainContents> domain_of(const Variable& variable) {
 }
 
 Expr rebind_symbol(const Expr& e, const SymbolRef& symbol) {
+  return rebind_symbol(e, symbol.raw(), symbol);
+}
+
+Expr rebind_symbol(const Expr& e, const Symbol* from, const SymbolRef& to) {
   return rewrite(e, [&](const Expr& part, const std::function<Expr(const Expr&)>& recurse) -> Expr {
     const Variable* v = part.as<Variable>();
-    if (!v || v->symbol.raw() != symbol.raw()) return map_children(part, recurse);
-    return variable(v->name, v->type, symbol);
+    if (!v || v->symbol.raw() != from) return map_children(part, recurse);
+    return variable(v->name, v->type, to);
   });
 }
 

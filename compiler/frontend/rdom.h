@@ -91,5 +91,7 @@ namespace ir {
 std::shared_ptr<ReductionDomainContents> domain_of(const Variable& variable);
 // `e` with every mention of `symbol`'s entity made through this very reference (weak or strong).
 Expr rebind_symbol(const Expr& e, const SymbolRef& symbol);
+// With the variables of the symbol `from` referring to another.
+Expr rebind_symbol(const Expr& e, const Symbol* from, const SymbolRef& to);
 }  // namespace ir
 }  // namespace retrograde

@@ -277,6 +277,18 @@ TEST(DefinitionErrors, ReductionVariablesOfTwoDomains) {
       {"come from one RDom"});
 }
 
+TEST(DefinitionErrors, BoundsOfADomainThatReadTheFuncItself) {
+  expect_error<UserError>(
+      [] {
+        Func f("f");
+        Var x("x");
+        f(x) = x;
+        RDom r(0, clamp(f(5), 0, 8), "r");
+        f(r) = f(r) + 1;
+      },
+      {"\"f\"", "before its update runs", "f(5)", "another Func"});
+}
+
 TEST(DefinitionErrors, UpdateOfAnotherTypeOrSize) {
   Setting s;
   expect_compile_error([&] { s.f(s.x, s.y) = 1.5f; }, {"same types", "int32", "float32"});

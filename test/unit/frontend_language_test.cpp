@@ -250,6 +250,20 @@ TEST(Definitions, AFuncDoesNotOwnItselfThroughItsUpdates) {
   EXPECT_TRUE(watched.expired());
 }
 
+TEST(Definitions, NorThroughADomainThatReadsIt) {
+  std::weak_ptr<ir::FuncContents> watched;
+  {
+    Var x("x");
+    Func f;
+    f(x) = x;
+    RDom r(0, 8);
+    r.where(f(r) > 2);
+    f(r) = f(r) * 10 + r;
+    watched = f.function();
+  }
+  EXPECT_TRUE(watched.expired());
+}
+
 TEST(Definitions, AnUpdateTakenOutOfItsFuncKeepsTheFuncAlive) {
   Expr value;
   {

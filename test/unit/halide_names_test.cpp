@@ -298,6 +298,19 @@ TEST(LoopNames, OfLevelsMayHaveDots) {
   EXPECT_EQ(out(1), 1 + 2 + 3 + 4 + 5);
 }
 
+// ---- a predicate that reads the Func which it guards ----
+
+TEST(Predicates, MayReadWhatTheyGuard) {
+  Var x("x");
+  Func f("f");
+  RDom r(0, 8);
+  f(x) = x;
+  r.where(f(r) > 2);
+  f(r) = f(r) * 10 + r;
+  Buffer<int> of_f = f.realize({8});
+  for (int i = 0; i < 8; ++i) EXPECT_EQ(of_f(i), i > 2 ? 11 * i : i);
+}
+
 // ---- what is refused ----
 
 TEST(Refusals, SayWhatIsNotThere) {
