@@ -19,6 +19,10 @@ namespace {
 // Parts of a privatised accumulation: enough for the threads of today's machines, few enough to sum
 // and to store.
 constexpr int part_count = 32;
+// Setting parts to zero and summing them may cost as much as this many elements an iteration; with
+// fewer parts than the least, a scatter stays one.
+constexpr double elements_an_iteration = 4;
+constexpr int least_parts = 4;
 // Elements of a part's vector: neighbouring iterations accumulate apart.
 constexpr int lane_count = 16;
 // Below so many elements, with so many iterations each, the pure dimensions alone do not fill a
@@ -239,8 +243,22 @@ class Builder {
   // iterations.
   bool is_worth_splitting(const Gather& g) const {
     if (!g.rdom || elements_of(g) > few_elements) return false;
+    if (parts_of(g) < least_parts) return false;
     double iterations = iterations_of(g, many_iterations);
     return iterations >= (has_pure_dimension(g) ? many_iterations : part_count * lane_count);
+  }
+  // Each part of a scatter holds every element that it may reach: the more elements for the
+  // iterations, the fewer parts. A power of two.
+  int parts_of(const Gather& g) const {
+    if (!g.scatters || target_.region.size() != g.pure.size()) return part_count;
+    double elements = 1;
+    for (const LoopVariable& v : target_.region) elements *= extent_of(v);
+    if (elements >= unknown_elements) return part_count;
+    const double most = iterations_of(g, many_iterations) * elements_of(g) * elements_an_iteration /
+                        std::max(elements, 1.0);
+    int parts = part_count;
+    while (parts > most && parts > 1) parts /= 2;
+    return parts;
   }
   // A loop of unknown extent counts as `unknown` iterations.
   static double iterations_of(const Gather& g, double unknown) {
@@ -257,12 +275,14 @@ class Builder {
     for (size_t d = 0; d < g.pure.size(); ++d) {
       if (!g.pure[d]) continue;
       if (target_.region.size() != g.pure.size()) return unknown_elements;
-      const LoopVariable& v = target_.region[d];
-      auto extent = v.min.defined() && v.max.defined() ? as_const_int(simplify(v.max - v.min + 1))
-                                                       : std::nullopt;
-      elements *= extent ? static_cast<double>(*extent) : unknown_elements;
+      elements *= extent_of(target_.region[d]);
     }
     return elements;
+  }
+  static double extent_of(const LoopVariable& v) {
+    auto extent = v.min.defined() && v.max.defined() ? as_const_int(simplify(v.max - v.min + 1))
+                                                     : std::nullopt;
+    return extent ? static_cast<double>(*extent) : unknown_elements;
   }
 
   // One slice of the reduction domain, in which lane and part are fixed.
@@ -276,7 +296,7 @@ class Builder {
   // too; else lanes split the innermost and parts the outermost variable. Without `lane` there are
   // no lanes. Beyond the end the place is clamped: what it reads must exist even where the
   // condition is false. Both are cut off the steady state, whose accumulators stay in registers.
-  static Slice slice_of(const Gather& g, const Expr& lane, const Expr& part) {
+  static Slice slice_of(const Gather& g, const Expr& lane, const Expr& part, int parts) {
     Slice slice;
     slice.rvars = rvars_of(g);
     auto rdom = std::make_shared<ReductionDomainContents>();
@@ -287,7 +307,7 @@ class Builder {
       Expr all = r.extent, min = r.min;
       r = {unique_name(old), make_zero(Int(32)), all};
       if (i == 0 && lane.defined()) r.extent = simplify((r.extent + (lane_count - 1)) / lane_count);
-      if (i == last) r.extent = simplify((r.extent + (part_count - 1)) / part_count);
+      if (i == last) r.extent = simplify((r.extent + (parts - 1)) / parts);
       Expr at = variable(r.var, Int(32), SymbolRef(rdom));
       if (i == last) at = part * r.extent + at;
       if (i == 0 && lane.defined()) at = at * lane_count + lane;
@@ -315,7 +335,7 @@ class Builder {
     for (Type t : types_) zeros.push_back(make_zero(t));
     define_pure(parts, parts_point(g, args_, lane, part), zeros);
 
-    Slice slice = slice_of(g, lane, part);
+    Slice slice = slice_of(g, lane, part, parts_of(g));
     if (g.predicate.defined()) slice.conditions.push_back(substitute(g.predicate, slice.place));
     std::vector<Expr> element;
     for (const Expr& e : g.lhs) element.push_back(substitute(e, slice.place));
@@ -350,7 +370,7 @@ class Builder {
       rdom->vars.push_back(
           {unique_name("lane"), make_zero(Int(32)), make_const(Int(32), lane_count)});
     rdom->vars.push_back(
-        {unique_name("part"), make_zero(Int(32)), make_const(Int(32), part_count)});
+        {unique_name("part"), make_zero(Int(32)), make_const(Int(32), parts_of(g))});
     rdom->frozen = true;
     auto rvar = [&](size_t i) { return variable(rdom->vars[i].var, Int(32), SymbolRef(rdom)); };
     const std::vector<Expr>& lhs = g.scatters ? args_ : g.lhs;

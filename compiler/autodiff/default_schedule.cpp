@@ -18,7 +18,7 @@ constexpr int lanes = 16;
 constexpr double cheap = 6;
 // And in a Func that the user left alone in a schedule by hand.
 constexpr double explosion = 500;
-// One read inside a reduction counts as this many.
+// One read inside a reduction, or along a dimension that a Func lacks, counts as this many.
 constexpr double reads_of_a_reduction = 8;
 
 bool is_touched(const FuncContents& f) {
@@ -78,12 +78,17 @@ class Chooser {
           if (!seen.insert(e.get()).second) return false;
           const auto* call = e.as<Call>();
           if (call && call->call_type == CallType::Func && call->symbol.raw() != &f) {
-            uses_[call->symbol.raw()].reads += weight;
+            uses_[call->symbol.raw()].reads += weight * repeats(*call, f);
           }
           return true;
         });
       });
     }
+  }
+
+  // A Func of fewer dimensions is read again along those that it lacks.
+  static double repeats(const Call& call, const FuncContents& reader) {
+    return call.args.size() < reader.args.size() ? reads_of_a_reduction : 1;
   }
 
   double operations(const FuncContents& f) const {
@@ -138,13 +143,8 @@ class Chooser {
     if (pure.size() > 1 || (reduces && pure[0] != 0)) stage.parallel(outermost);
     if (pure[0] != 0) return;
     Var innermost(f->args[0]);
-    if (pure.size() > 1) {
-      stage.vectorize(innermost, lanes, TailStrategy::GuardWithIf);
-    } else if (reduces) {
-      stage.parallel(innermost);  // few elements, much work for each
-    } else {
-      stage.vectorize(innermost, lanes, TailStrategy::GuardWithIf);
-    }
+    stage.vectorize(innermost, lanes, TailStrategy::GuardWithIf);
+    if (pure.size() == 1 && reduces) stage.parallel(innermost);  // of the vectors
   }
 
   const std::vector<FuncPtr>& outputs_;

@@ -2,9 +2,9 @@
 //
 // Inlining an adjoint into every reader multiplies work: a chain of n stencils with k taps costs
 // k^n. So, in a pipeline that contains adjoints, an untouched Func is computed at root when it
-// reduces, scatters, or is read more than once and costs more than a few operations; its innermost
-// dimension is vectorized, its outermost run in parallel. That goes for primal Funcs too, which
-// both directions read. A directive of the user on a Func or one of its stages switches this off
+// reduces, scatters, or costs more than a few operations and is read more than once, or by a Func of
+// more dimensions; its innermost dimension is vectorized, its outermost run in parallel. That goes
+// for primal Funcs too, which both directions read. A directive of the user on a Func or one of its stages switches this off
 // for that Func. Pipelines without adjoints are left as they are.
 #pragma once
 

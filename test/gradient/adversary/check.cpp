@@ -352,9 +352,10 @@ class Judge {
       try {
         compare_machine_code(gradient, region);
       } catch (const UserError& error) {
-        // Machine code bounds what is read before it runs. A program that runs has a gradient that
-        // does.
-        if (primal_runs()) decide(Judgement::Broken, error.what());
+        // Machine code bounds what is read before it runs.
+        if (primal_runs())
+          decide(Judgement::Refused,
+                 std::string("its gradient has no machine code: ") + error.what());
         return;
       }
     }

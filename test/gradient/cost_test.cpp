@@ -1,0 +1,138 @@
+// The cheap-gradient principle: a gradient takes at most 5 times the operations of its program,
+// however many inputs it is for (Griewank and Walther, Evaluating Derivatives, 2nd edition, 4.6:
+// 3 to 4 in theory). Counted by operation_count.h, which small tests of its own check, over every
+// program of the suite and the large ones. Exceptions are listed here, each with its reason, and
+// only those that are one; docs/gradient_costs.md is written from them
+// (RETROGRADE_UPDATE_GOLDEN=1).
+#include <cstdlib>
+#include <fstream>
+#include <iomanip>
+#include <map>
+#include <sstream>
+
+#include "gradient/programs_large.h"
+
+namespace retrograde::gradient {
+namespace {
+
+constexpr double limit = 5, limit_of_exceptions = 12;
+
+enum class Reason { Tape, Zeros, Stable, InPlace };
+
+const char* text_of(Reason reason) {
+  switch (reason) {
+    case Reason::Tape:
+      return "it runs backward on a tape";
+    case Reason::Zeros:
+      return "most elements of the gradient are never read and set to 0";
+    case Reason::Stable:
+      return "the program is one function, whose stable partials are several operations";
+    case Reason::InPlace:
+      break;
+  }
+  return "every iteration reads what others overwrite, which is computed again";
+}
+
+const std::map<std::string, Reason> exceptions = {
+    {"HistogramInColumnsThatMultiplies", Reason::Tape},
+    {"alpha_compositing_front_to_back", Reason::Tape},
+    {"angle_of_a_vector", Reason::Stable},
+    {"length_of_a_vector", Reason::Stable},
+    {"complex_product_in_a_tuple", Reason::Tape},
+    {"diagonal_of_a_matrix_of_funcs", Reason::Zeros},
+    {"diagonal_read_twice", Reason::Zeros},
+    {"diagonals", Reason::Zeros},
+    {"horner", Reason::Tape},
+    {"in_place_normalisation", Reason::InPlace},
+    {"log_sum_exp_as_an_operator", Reason::Tape},
+    {"multiplicative_histogram", Reason::Tape},
+    {"product_of_all", Reason::Tape},
+    {"product_with_one_zero", Reason::Tape},
+    {"products_along_rows", Reason::Tape},
+    {"streaming_log_sum_exp_in_a_tuple", Reason::Tape},
+};
+
+struct Cost {
+  std::string name;
+  double primal = 0, gradient = 0;
+  bool has_tape = false;
+  double ratio() const { return gradient / primal; }
+};
+
+Cost cost_of(const std::string& name, const Program& program) {
+  AdjointOptions options;
+  if (program.store_overwritten) options.overwritten = Overwritten::Store;
+  const Derivative d = propagate_adjoints(program.loss, options);
+  const GradientOperations operations = d.operations();
+  return {name, operations.primal.operations().value().value_or(0),
+          operations.gradient.operations().value().value_or(1e9),
+          d.explain().find("one iteration after the other") != std::string::npos};
+}
+
+const std::vector<Cost>& costs() {
+  static const std::vector<Cost> all = [] {
+    std::vector<Cost> result;
+    for (const NamedProgram& p : programs()) result.push_back(cost_of(p.name, p.build()));
+    for (const LargeProgram& p : large_programs())
+      result.push_back(cost_of(p.name, p.build(test_side)));
+    return result;
+  }();
+  return all;
+}
+
+TEST(GradientCost, IsAtMostFiveTimesThatOfTheProgram) {
+  for (const Cost& cost : costs()) {
+    SCOPED_TRACE(cost.name);
+    ASSERT_GT(cost.primal, 0);
+    const auto listed = exceptions.find(cost.name);
+    if (listed == exceptions.end()) {
+      EXPECT_LE(cost.ratio(), limit);
+      continue;
+    }
+    EXPECT_GT(cost.ratio(), limit) << "it is no exception any more";
+    EXPECT_LE(cost.ratio(), limit_of_exceptions);
+    EXPECT_EQ(cost.has_tape, listed->second == Reason::Tape);
+  }
+}
+
+double median() {
+  std::vector<double> ratios;
+  for (const Cost& cost : costs()) ratios.push_back(cost.ratio());
+  std::nth_element(ratios.begin(), ratios.begin() + std::ptrdiff_t(ratios.size() / 2),
+                   ratios.end());
+  return ratios[ratios.size() / 2];
+}
+
+std::string page() {
+  std::ostringstream out;
+  out << std::fixed << std::setprecision(1);
+  out << "# What gradients cost\n\nWritten by `test/gradient/cost_test.cpp`. Operations of a "
+         "gradient "
+         "by all inputs, over those of its\nprogram, as `Derivative::operations()` counts them "
+         "(loads and stores, additions, products, functions)\nunder the default schedules: at most "
+      << limit << " times, on all but " << exceptions.size() << " of " << costs().size()
+      << " programs; the median is " << median() << ".\n\n"
+      << "The exceptions. On a tape the update is computed again, and each iteration records, "
+         "reads and\n"
+         "writes: a constant factor, whatever the size.\n\n| program | ratio | reason "
+         "|\n|---|---|---|\n";
+  for (const Cost& cost : costs()) {
+    const auto listed = exceptions.find(cost.name);
+    if (listed == exceptions.end()) continue;
+    out << "| `" << cost.name << "` | " << cost.ratio() << " | " << text_of(listed->second)
+        << " |\n";
+  }
+  out << "\nRun times: `tools/bench gradients`.\n";
+  return out.str();
+}
+
+TEST(GradientCost, ThePageSaysSo) {
+  const std::string path = RETROGRADE_TEST_DIR "/../docs/gradient_costs.md";
+  if (std::getenv("RETROGRADE_UPDATE_GOLDEN")) std::ofstream(path) << page();
+  std::ifstream file(path);
+  const std::string on_disk((std::istreambuf_iterator<char>(file)), {});
+  EXPECT_EQ(on_disk, page()) << "RETROGRADE_UPDATE_GOLDEN=1 writes " << path;
+}
+
+}  // namespace
+}  // namespace retrograde::gradient
