@@ -41,6 +41,9 @@ mode use the same partials, so they are transposes of each other at every point,
   has no digits left for large x; `erf` by two exponentials, since the rounding error of x^2 would be a
   factor; 1 - x^2 is (1 - x)(1 + x); `hypot` and `atan2` are scaled; `pow`'s dx is y v / x where y - 1
   would be rounded. A quotient's partial is written with its value, -(v / y), not with y^2.
+  Over Funcs, softmax and log-sum-exp shifted by the maximum are right to 3e-6 of the sum of magnitudes
+  (300 values): the adjoint that passes the maximum cancels but for its rounding error, which the
+  largest element gets; `stop_gradient` on the maximum removes it.
 - **Narrow types.** Adjoints and tangents of float16 and bfloat16 are float32.
 - **Long sums.** An adjoint in float32 whose elements may get 4,096 terms or more (or a number that is
   known at run time only, or whatever a scatter of so many iterations brings) is summed in double by a

@@ -163,5 +163,66 @@ TEST(StableForms, AreRightToAFewUlpWhereverTheyAreFinite) {
   }
 }
 
+// Over Funcs, shifted by the largest as usual. The adjoint that passes the maximum is 0 but for the
+// rounding of its sum, which the largest element gets: errors are relative to the sum of
+// magnitudes.
+class OverFuncs : public ::testing::Test {
+ protected:
+  static constexpr int n = 300;
+  Var i{"i"};
+  RDom r{0, n};
+  Buffer<float> x = Buffer<float>(n);
+  Func largest{"largest"}, weight{"weight"}, total{"total"}, loss{"loss"};
+
+  OverFuncs() {
+    largest() = x(Expr(0));
+    largest() = max(largest(), x(r));
+    weight(i) = exp(x(i) - largest());
+    total() = 0.0f;
+    total() += weight(r);
+  }
+  // Of softmax; `spread`: how far apart the values are.
+  std::vector<Real> probabilities(float offset, float spread) {
+    std::vector<Real> p(n);
+    Real top = -1e9L, sum = 0;
+    for (int k = 0; k < n; ++k) x(k) = offset + spread * static_cast<float>((k * 37) % 101) / 101;
+    for (int k = 0; k < n; ++k) top = std::max(top, static_cast<Real>(x(k)));
+    for (int k = 0; k < n; ++k)
+      sum += p[static_cast<size_t>(k)] = std::exp(static_cast<Real>(x(k)) - top);
+    for (Real& v : p) v /= sum;
+    return p;
+  }
+  void expect(const std::vector<Real>& expected) {
+    Buffer<float> found = propagate_adjoints(loss)(x).realize({n});
+    Real sum = 0;
+    for (Real v : expected) sum += std::fabs(v);
+    for (int k = 0; k < n; ++k)
+      EXPECT_NEAR(found(k), expected[static_cast<size_t>(k)], 3e-6L * sum) << x(k);
+  }
+};
+
+TEST_F(OverFuncs, LogSumExpIsRightForValuesFarFromZeroAndFarApart) {
+  loss() = largest() + log(total());
+  for (float offset : {-1e4f, -90.0f, 0.0f, 90.0f, 1e4f}) {
+    for (float spread : {0.0f, 1.0f, 60.0f, 1000.0f}) expect(probabilities(offset, spread));
+  }
+}
+
+TEST_F(OverFuncs, SoftmaxIsRightForValuesFarFromZeroAndFarApart) {
+  Func share("share");
+  share(i) = weight(i) / total();
+  loss() = 0.0f;
+  loss() += share(r) * cast<float>(r % 7);
+  for (float offset : {-1e4f, -90.0f, 0.0f, 90.0f, 1e4f}) {
+    for (float spread : {0.0f, 1.0f, 60.0f}) {
+      std::vector<Real> p = probabilities(offset, spread), expected(p);
+      Real mean = 0;
+      for (size_t k = 0; k < p.size(); ++k) mean += p[k] * static_cast<Real>(k % 7);
+      for (size_t k = 0; k < p.size(); ++k) expected[k] = p[k] * (static_cast<Real>(k % 7) - mean);
+      expect(expected);
+    }
+  }
+}
+
 }  // namespace
 }  // namespace retrograde::gradient
