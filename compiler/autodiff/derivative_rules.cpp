@@ -36,6 +36,9 @@ double largest_of(Type type) {
 }
 Partial strong(Expr e) { return {std::move(e), Strength::Strong}; }
 Partial plain(Expr e) { return {std::move(e), Strength::Plain}; }
+Partial quotient(Expr e, Expr divisor) {
+  return {std::move(e), Strength::Strong, std::move(divisor)};
+}
 Expr zero_where(const Expr& condition, const Expr& e) {
   return make_select(condition, make_zero(e.type()), e);
 }
@@ -53,9 +56,9 @@ Partials absd_partials(Args a, const Expr&) {
 Partials lerp_partials(Args a, const Expr&) {
   return {plain(num(a[2], 1) - a[2]), plain(a[2]), plain(a[1] - a[0])};
 }
-Partials sqrt_partials(Args a, const Expr& v) { return {strong(num(a[0], 0.5) / v)}; }
+Partials sqrt_partials(Args a, const Expr& v) { return {quotient(num(a[0], 0.5), v)}; }
 Partials exp_partials(Args, const Expr& v) { return {strong(v)}; }
-Partials log_partials(Args a, const Expr&) { return {strong(num(a[0], 1) / a[0])}; }
+Partials log_partials(Args a, const Expr&) { return {quotient(num(a[0], 1), a[0])}; }
 // Whether p - 1 is a number of p's type.
 bool has_exact_predecessor(const Expr& p) {
   auto value = as_const_float(p);
@@ -136,7 +139,7 @@ Partials erf_partials(Args a, const Expr&) {
   return {strong(num(x, 2 * std::numbers::inv_sqrtpi) * op1(Op::exp, -square(h)) *
                  op1(Op::exp, -rest))};
 }
-Partials fast_log_partials(Args a, const Expr&) { return {strong(num(a[0], 1) / a[0])}; }
+Partials fast_log_partials(Args a, const Expr&) { return {quotient(num(a[0], 1), a[0])}; }
 Partials fast_sin_partials(Args a, const Expr&) { return {strong(op1(Op::fast_cos, a[0]))}; }
 Partials fast_cos_partials(Args a, const Expr&) { return {strong(-op1(Op::fast_sin, a[0]))}; }
 Partials fast_inverse_partials(Args, const Expr& v) { return {strong(-square(v))}; }
@@ -150,6 +153,9 @@ Partials saturating_cast_partials(Args a, const Expr& v) {
   return {plain(make_select(inside, make_one(v.type()), make_zero(v.type())))};
 }
 Partials strong_mul_partials(Args a, const Expr&) { return {strong(a[1]), strong(a[0])}; }
+Partials strong_div_partials(Args a, const Expr& v) {
+  return {quotient(num(a[0], 1), a[1]), quotient(-v, a[1])};
+}
 
 Partials add_partials(Args a, const Expr&) {
   return {plain(make_one(a[0].type())), plain(make_one(a[0].type()))};
@@ -160,7 +166,7 @@ Partials sub_partials(Args a, const Expr&) {
 Partials mul_partials(Args a, const Expr&) { return {plain(a[1]), plain(a[0])}; }
 Partials div_partials(Args a, const Expr& v) {
   if (is_const(a[1]) && !is_zero(a[1])) return {plain(num(a[0], 1) / a[1]), Partial{}};
-  return {strong(num(a[0], 1) / a[1]), strong(-(v / a[1]))};
+  return {quotient(num(a[0], 1), a[1]), quotient(-v, a[1])};
 }
 Partials mod_partials(Args a, const Expr&) {
   return {plain(make_one(a[0].type())), strong(-op1(Op::floor, a[0] / a[1]))};
@@ -228,6 +234,7 @@ void describe_operators(OpTable& t) {
       {Op::fast_inverse, {"-v^2", "0", -1}},
       {Op::fast_inverse_sqrt, {"-v^3 / 2", "0 at +inf", -1}},
       {Op::saturating_cast, {"1 or 0", "0: the value saturates", 0}},
+      {Op::strong_div, {"1 / y, -v / y", "as a quotient, with strong zeros", 2}},
       {Op::strong_mul, {"y, x", "as a product, with strong zeros", 0}},
   };
   for (auto& [op, rule] : t) {
@@ -289,6 +296,8 @@ OpTable make_op_table() {
   t.emplace(Op::saturating_cast,
             smooth(saturating_cast_partials, "inside the type's range",
                    "0 where the value saturates; to integers: 0", "definition"));
+  t.emplace(Op::strong_div, smooth(strong_div_partials, "b != 0",
+                                   "as a quotient, with strong zeros", "definition"));
   t.emplace(Op::strong_mul, smooth(strong_mul_partials, "everywhere",
                                    "as a product, with strong zeros", "definition"));
   t.emplace(Op::likely, transparent(0));
@@ -398,13 +407,36 @@ Type adjoint_type(Type type) {
   return type.bits() < 32 || type.is_bfloat() ? Float(32, type.lanes()) : type;
 }
 
+namespace {
+
+// adjoint / divisor * factor, in that order. A constant factor, at most 1, goes first: it cannot
+// overflow, and one division is all.
+Expr divided_first(const Expr& adjoint, const Partial& partial) {
+  const Expr divisor = cast_to(adjoint.type(), partial.divisor);
+  const bool is_scaled = is_const(partial.factor);
+  const Expr scaled =
+      is_scaled ? times_partial(adjoint, {partial.factor, Strength::Plain}) : adjoint;
+  const Expr divided = partial.strength == Strength::Strong
+                           ? call_op(Op::strong_div, adjoint.type(), {scaled, divisor})
+                           : scaled / divisor;
+  // The quotient may have overflowed where the factor is 0.
+  return is_scaled ? divided : times_partial(divided, {partial.factor, Strength::Both});
+}
+
+}  // namespace
+
 Expr times_partial(const Expr& adjoint, const Partial& partial) {
   if (is_zero(partial.factor)) return make_zero(adjoint.type());
   // A choice stays a choice: inf * 0 must not make a NaN of the operand that was not taken.
   if (const auto* choice = partial.factor.as<Select>()) {
-    return make_select(choice->condition,
-                       times_partial(adjoint, {choice->true_value, partial.strength}),
-                       times_partial(adjoint, {choice->false_value, partial.strength}));
+    return make_select(
+        choice->condition,
+        times_partial(adjoint, {choice->true_value, partial.strength, partial.divisor}),
+        times_partial(adjoint, {choice->false_value, partial.strength, partial.divisor}));
+  }
+  if (partial.divisor.defined()) {
+    if (partial.strength != Strength::Both) return divided_first(adjoint, partial);
+    return times_partial(adjoint, {partial.factor / partial.divisor, partial.strength});
   }
   Expr factor = cast_to(adjoint.type(), partial.factor);
   if (is_one(factor)) return adjoint;

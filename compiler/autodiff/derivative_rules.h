@@ -28,6 +28,9 @@ enum class Strength : uint8_t {
 struct Partial {
   Expr factor;  // undefined: this operand gets nothing
   Strength strength = Strength::Plain;
+  // The partial is factor / divisor; undefined: 1. The adjoint is divided before it is multiplied:
+  // 1 / y may overflow where adjoint / y, an adjoint itself, does not.
+  Expr divisor = {};
 };
 
 // Partials for operands `args` with value `value` (the node itself, for rules that reuse it).

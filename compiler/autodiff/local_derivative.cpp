@@ -28,6 +28,7 @@ bool is_risky_op(Op op) {
     case Op::fast_inverse:
     case Op::fast_inverse_sqrt:
     case Op::strong_mul:
+    case Op::strong_div:
       return true;
     default:
       return false;
@@ -70,10 +71,12 @@ LocalDerivative sum_of(const std::vector<Expr>& operands, std::vector<Partial> p
   LocalDerivative result{LocalDerivative::Kind::Sum, operands, std::move(partials), {}, {}, {}};
   result.partials.resize(operands.size());
   for (Partial& p : result.partials) {
-    const ExprFacts::Finiteness factor =
-        p.factor.defined() ? facts.finiteness_of(p.factor) : ExprFacts::Finiteness();
-    if (factor.risky) p.strength = Strength::Strong;
-    result.reads.push_back(factor.read);
+    ExprFacts::Finiteness partial;
+    for (const Expr& part : {p.factor, p.divisor}) {
+      if (part.defined()) partial.add(facts.finiteness_of(part));
+    }
+    if (partial.risky) p.strength = Strength::Strong;
+    result.reads.push_back(partial.read);
   }
   return result;
 }

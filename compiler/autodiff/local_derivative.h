@@ -41,6 +41,10 @@ class ExprFacts {
   // The same of a factor made of nodes of the DAG.
   struct Finiteness {
     bool risky = false, read = false;
+    void add(const Finiteness& other) {
+      risky |= other.risky;
+      read |= other.read;
+    }
   };
   Finiteness finiteness_of(const Expr& factor) const;
   // Casts through which a derivative is lost.
@@ -74,6 +78,5 @@ LocalDerivative local_derivative(const Expr& e, const ExprFacts& facts);
 
 // Here or in a Func between here and the output. A seed that the user gives counts as masked.
 AdjointTraits traits_of(const Expr& adjoint);
-
 
 }  // namespace retrograde::ir

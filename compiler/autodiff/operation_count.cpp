@@ -25,7 +25,8 @@ std::string number_text(double value) {
 
 Operations of_operator(const Call& call) {
   switch (call.op) {
-    case Op::strong_mul:  // a product and a choice
+    case Op::strong_mul:  // a product, or a quotient, and a choice
+    case Op::strong_div:
       return {.adds = 1, .mults = 1};
     case Op::lerp:
       return {.adds = 2, .mults = 2};

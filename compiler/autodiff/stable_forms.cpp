@@ -76,6 +76,15 @@ StableForm log_sum_exp(const Expr& sum) {
   return result;
 }
 
+// v = log(a / b):  d/da = 1 / a, d/db = -1 / b
+StableForm log_of_quotient(const Expr& e) {
+  const auto* quotient = e.as<Div>();
+  if (!quotient || is_const(quotient->b) || !stable_form(e).operands.empty()) return {};
+  const Expr one = make_one(e.type());
+  return {{quotient->a, quotient->b},
+          {{one, Strength::Strong, quotient->a}, {-one, Strength::Strong, quotient->b}}};
+}
+
 // v = a / S, S = a + R or |a| + R:          d/da = (R / S) / S, d/dt = -v / S for a term t of R
 // and where a or t is an exponential, by its argument:  d/dw = v (R / S), d/dw = -v (t / S)
 StableForm share(const Expr& v, const Div& quotient) {
@@ -181,7 +190,10 @@ StableForm of_quotient(const Expr& e, const Div& quotient) {
 StableForm stable_form(const Expr& e) {
   if (!e.type().is_float()) return {};
   if (const auto* quotient = e.as<Div>()) return of_quotient(e, *quotient);
-  if (const Call* log = as_operator(e, Op::log)) return log_sum_exp(log->args[0]);
+  if (const Call* log = as_operator(e, Op::log)) {
+    const StableForm quotient = log_of_quotient(log->args[0]);
+    return quotient.operands.empty() ? log_sum_exp(log->args[0]) : quotient;
+  }
   if (const Call* sqrt = as_operator(e, Op::sqrt)) return norm(sqrt->args[0]);
   return {};
 }

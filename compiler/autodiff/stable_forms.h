@@ -7,6 +7,7 @@
 //   of 1 / S and v / S cancels.
 // Normalised, a / sqrt(a * a + b * b + ...), also by max(norm, c): the same.
 // Softplus, log-sum-exp, log(exp(a) + exp(b) + c): the reciprocal of a tiny sum is infinite.
+// Logarithm of a quotient, log(a / b): the quotient may be denormal, and its reciprocal infinite.
 // Norm, sqrt(a * a + b * b + ...): the squares underflow where the norm is tiny.
 //
 // Source: folklore; Higham, Accuracy and Stability of Numerical Algorithms, 2nd ed., 1.14 and 27.8.

@@ -265,6 +265,8 @@ class Complexifier {
         return x[0] + (x[1] - x[0]) * x[2];
       case Op::strong_mul:
         return chosen(x[0].re == zero() && x[0].im == zero(), real(zero()), x[0] * x[1]);
+      case Op::strong_div:
+        return chosen(x[0].re == zero() && x[0].im == zero(), real(zero()), x[0] / x[1]);
       case Op::floor:
       case Op::ceil:
       case Op::round:

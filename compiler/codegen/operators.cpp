@@ -135,13 +135,14 @@ Value* classify(Emitter& e, Op op, Type type, Value* value) {
   return op == Op::is_inf ? e.b.CreateFCmpOEQ(size, infinity) : e.b.CreateFCmpOLT(size, infinity);
 }
 
-// A select of zero is a masked multiplication in machine code.
-Value* strong_multiply(Emitter& e, Type type, Value* adjoint, Value* partial) {
+// A select of zero is a masked multiplication or division in machine code.
+Value* strong(Emitter& e, llvm::Instruction::BinaryOps op, Type type, Value* adjoint,
+              Value* partial) {
   const Type wide = is_half(type) ? Float(32, type.lanes()) : type;
   Value* a = convert(e, wide, type, adjoint);
   Value* is_zero = e.b.CreateFCmpOEQ(a, float_constant(a, 0.0));
-  Value* product = e.b.CreateFMul(a, convert(e, wide, type, partial));
-  return convert(e, type, wide, e.b.CreateSelect(is_zero, float_constant(a, 0.0), product));
+  Value* result = e.b.CreateBinOp(op, a, convert(e, wide, type, partial));
+  return convert(e, type, wide, e.b.CreateSelect(is_zero, float_constant(a, 0.0), result));
 }
 
 }  // namespace
@@ -192,7 +193,9 @@ Value* simple_operator(Emitter& e, Op op, Type result, const std::vector<Type>& 
     case Op::saturating_cast:
       return convert_saturating(e, result, type, arg(0));
     case Op::strong_mul:
-      return strong_multiply(e, type, arg(0), arg(1));
+      return strong(e, llvm::Instruction::FMul, type, arg(0), arg(1));
+    case Op::strong_div:
+      return strong(e, llvm::Instruction::FDiv, type, arg(0), arg(1));
     default:
       return nullptr;
   }

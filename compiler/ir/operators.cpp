@@ -215,6 +215,8 @@ Scalar eval_two(Op op, const Scalar& a, const Scalar& b, Type type) {
       return Scalar::of_float(type, std::atan2(a.f, b.f));
     case Op::strong_mul:
       return Scalar::of_float(type, a.f == 0 ? 0.0 : a.f * b.f);
+    case Op::strong_div:
+      return Scalar::of_float(type, a.f == 0 ? 0.0 : a.f / b.f);
     default:
       return eval_bitwise(op, a, b);
   }

@@ -176,6 +176,7 @@ double own_error(Op op, Rounding rounding, const std::vector<Value>& args, const
   if (op == Op::strong_mul) {
     return rounding_residual(Kind::Mul, args[0].scalar, args[1].scalar, result);
   }
+  if (op == Op::strong_div && rounding == Rounding::Reordering) return 2 * ulp(result.type, r);
   if (op == Op::absd && rounding == Rounding::Reordering) {
     return rounding_residual(Kind::Sub, args[0].scalar, args[1].scalar, result);
   }
@@ -256,7 +257,8 @@ Value apply_operator(Rounding rounding, Op op, const std::vector<Value>& args, T
   const auto result = ir::eval_operator(op, scalars_of(args), type);
   if (!result) internal_error(std::string("no scalar meaning of operator ") + op_info(op).name);
   if (rounding == Rounding::Strict) return {*result};
-  if (op == Op::strong_mul && args[0].error == 0 && args[0].scalar.f == 0) return {*result};
+  const bool is_strong = op == Op::strong_mul || op == Op::strong_div;
+  if (is_strong && args[0].error == 0 && args[0].scalar.f == 0) return {*result};
   double error = sensitivity(op, args, type, *result);
   if (type.is_float()) {
     if (has_error(args) && !is_discrete(op)) error += ulp(type, result->f);

@@ -35,12 +35,13 @@ mode use the same partials, so they are transposes of each other at every point,
 - **Stable forms.** Differentiated in one step, so that nothing cancels, overflows or underflows before
   the derivative does (`compiler/autodiff/stable_forms.h`): `s / (1 + exp(w))` (the logistic function);
   shares, `a / (a + b + ...)` and `a / (1 + |a|)`, of exponentials too (softmax);
-  `log(exp(a) + exp(b) + c)` (softplus, log-sum-exp); `sqrt(a*a + b*b + ...)` (norms, whose squares may
+  `log(a / b)`; `log(exp(a) + exp(b) + c)` (softplus, log-sum-exp); `sqrt(a*a + b*b + ...)` (norms, whose squares may
   underflow) and `a / sqrt(a*a + b*b + ...)` (normalised, also by `max(norm, c)`): of up to four terms
   in one expression. `tanh` goes by exp(-2 |x|), since 1 - v^2
   has no digits left for large x; `erf` by two exponentials, since the rounding error of x^2 would be a
   factor; 1 - x^2 is (1 - x)(1 + x); `hypot` and `atan2` are scaled; `pow`'s dx is y v / x where y - 1
-  would be rounded. A quotient's partial is written with its value, -(v / y), not with y^2.
+  would be rounded. A quotient's adjoint goes in two
+  steps, by 1 / y and then by -v: both are adjoints of the program, where 1 / y or y^2 may overflow.
   Over Funcs, softmax and log-sum-exp shifted by the maximum are right to 3e-6 of the sum of magnitudes
   (300 values): the adjoint that passes the maximum cancels but for its rounding error, which the
   largest element gets; `stop_gradient` on the maximum removes it.

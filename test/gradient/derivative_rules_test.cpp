@@ -133,6 +133,7 @@ TEST(DerivativeRules, SmoothOperatorsAgreeWithCentralDifferences) {
       {Op::fast_inverse, {{{"x", 1.7}}}},
       {Op::fast_inverse_sqrt, {{{"x", 1.7}}}},
       {Op::saturating_cast, {{{"x", 1.7}}}},
+      {Op::strong_div, {{{"x", 1.7}, {"y", 0.4}}}},
       {Op::strong_mul, {{{"x", 1.7}, {"y", 0.4}}}},
   };
   for (int i = 0; i < op_count; ++i) {

@@ -96,6 +96,10 @@ const std::vector<Row>& rows() {
            if (h == 0 || std::isinf(o.x) || std::isinf(o.y)) return std::vector<Real>{0, 0};
            return std::vector<Real>{o.y / h / h, -o.x / h / h};
          }),
+      of(Op::strong_div, 3,
+         [](const Operands& o) {
+           return std::vector<Real>{1 / o.y, o.x == 0 || std::isinf(o.y) ? 0 : -(o.x / o.y) / o.y};
+         }),
       of(Op::strong_mul, 0,
          [](const Operands& o) {
            return std::vector<Real>{o.y, o.x};
@@ -139,7 +143,7 @@ const std::vector<Row>& rows() {
        0},
       {"div", 2, [](const std::vector<Expr>& a) { return a[0] / a[1]; },
        [](const Operands& o) {
-         return std::vector<Real>{1 / o.y, -(o.x / o.y / o.y)};
+         return std::vector<Real>{1 / o.y, std::isinf(o.y) ? 0 : -(o.x / o.y / o.y)};
        },
        2},
       {"mod", 2, [](const std::vector<Expr>& a) { return a[0] % a[1]; },

@@ -18,8 +18,7 @@ compiler, in float32 and as machine code, on every combination of ordinary and e
   1e18 (the square overflows). 1e-6 is a few roundings; "none" means that no digit is left; "–" that no true gradient
   exists there.
 - **Every gradient of these cells is finite**: where the true gradient is, and the chain rule has a way through
-  float32 at all. Cells that say "not finite" are the exceptions: a partial 1 / y overflows where the derivative,
-  adjoint / y, does not.
+  float32 at all. A cell that says "not finite" is an exception: what rounding left of a cancellation overflows.
 - **outside**: cases in which it has none, because a value of the program itself on the path taken, or the exact
   adjoint of one, overflows, vanishes or has lost all its digits in float32. How many of their gradients are finite,
   and the error of these. Written in another way, the program may have none of them.

@@ -11,7 +11,6 @@
 #include <cstdlib>
 #include <fstream>
 #include <iterator>
-#include <set>
 
 #include "stability/page.h"
 
@@ -25,17 +24,10 @@ std::string on_disk() {
   return {std::istreambuf_iterator<char>(file), {}};
 }
 
-// At denormals and close to float32's ends: 1 / y overflows where the derivative, adjoint / y, does
-// not. Rules are factors of the adjoint.
-const std::set<std::string> reciprocal_overflows = {
-    "m sqrt((x/m)² + (y/m)²), m = max(|x|, |y|)",
-    "x log(x)",
-    "-x log(x) - (1 - x) log(1 - x)",
-    "log(x / y)",
-    "atan(x / y)",
-    "2 x 2 system by elimination",
-    "Newton's square root, 8 steps",
-};
+// Where a = 1e-30: 1 - b * second is what rounding left of a cancellation, and it is divided by a
+// twice, beyond float32. The exact value of the difference is small, not lost, so these cases do
+// not count as outside.
+const std::string rounding_noise = "2 x 2 system by elimination";
 
 class Suite : public ::testing::TestWithParam<size_t> {};
 
@@ -45,7 +37,7 @@ TEST_P(Suite, GradientsAreFiniteAndErrorsAreThoseOfThePage) {
   for (const Problem& problem : family.problems) {
     const Row row = measure(problem);
     for (const Cell& cell : row.cells) {
-      if (reciprocal_overflows.contains(problem.name)) continue;
+      if (problem.name == rounding_noise) continue;
       EXPECT_EQ(cell.lost, 0) << problem.name << " at " << cell.lost_at;
     }
     const std::string disagreement = disagreement_with(page, problem.name, row);

@@ -130,7 +130,8 @@ class RandomIr {
     using ir::Op;
     const auto arg = [&] { return expr(type, depth - 1); };
     if (type.is_float()) {
-      if (chance(30)) return ir::call_op(Op::strong_mul, {arg(), arg()});
+      if (chance(30))
+        return ir::call_op(pick<Op>({Op::strong_mul, Op::strong_div}), {arg(), arg()});
       return ir::call_op(pick<Op>({Op::floor, Op::abs, Op::sqrt, Op::trunc, Op::round}), {arg()});
     }
     if (chance(30))

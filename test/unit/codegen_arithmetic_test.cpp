@@ -255,7 +255,8 @@ TEST(CodegenArithmetic, FloatOperators) {
           cases.push_back(operator_case(op, Bool(), lanes));
         check({type}, lanes, cases, target);
         check({type, type}, lanes,
-              {operator_case(Op::absd, type, lanes), operator_case(Op::strong_mul, type, lanes)},
+              {operator_case(Op::absd, type, lanes), operator_case(Op::strong_mul, type, lanes),
+               operator_case(Op::strong_div, type, lanes)},
               target);
       }
     }

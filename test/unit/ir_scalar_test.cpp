@@ -177,6 +177,10 @@ TEST(Operator, StrongZeroBeatsInfinityAndNan) {
   EXPECT_EQ(run(Op::strong_mul, {f32(-0.0), f32(NAN)}, Float(32)).f, 0);
   EXPECT_EQ(run(Op::strong_mul, {f32(2), f32(3)}, Float(32)).f, 6);
   EXPECT_TRUE(std::isnan(run(Op::strong_mul, {f32(2), f32(NAN)}, Float(32)).f));
+  EXPECT_EQ(run(Op::strong_div, {f32(0), f32(0)}, Float(32)).f, 0);
+  EXPECT_EQ(run(Op::strong_div, {f32(-0.0), f32(NAN)}, Float(32)).f, 0);
+  EXPECT_EQ(run(Op::strong_div, {f32(3), f32(2)}, Float(32)).f, 1.5);
+  EXPECT_EQ(run(Op::strong_div, {f32(3), f32(0)}, Float(32)).f, INFINITY);
 }
 
 TEST(Operator, EveryPureAndMarkerOperatorHasAMeaning) {
