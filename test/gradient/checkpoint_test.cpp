@@ -231,7 +231,7 @@ Func counted(const Buffer<float>& start, int n) {
 }
 
 TEST(Checkpoints, StepsAreComputedAgainAsOftenAsTheBinomialBoundSays) {
-  Buffer<float> start = line(3);
+  Buffer<float> start = line(1);  // what does not depend on x runs once in a vector
   for (auto [n, s, again] : {std::tuple(10, 1, 45),
                              {10, 3, 15},
                              {10, 10, 9},
@@ -241,9 +241,9 @@ TEST(Checkpoints, StepsAreComputedAgainAsOftenAsTheBinomialBoundSays) {
     Func gradient = d(start);
     gradient.compile_jit();
     evaluations = 0;
-    gradient.realize({3});
+    gradient.realize({1});
     // The loss needs the last state: n steps before anything runs backward.
-    EXPECT_EQ(evaluations, 3 * (n + again + n)) << n << " steps, " << s << " states";
+    EXPECT_EQ(evaluations, n + again + n) << n << " steps, " << s << " states";
   }
 }
 
