@@ -156,9 +156,10 @@ class Maker {
         return converted(type, read_image(at));
       case 4:
         return converted(type, p_.scale);
-      case 5:
+      case 5:  // by a Param: where inversion fixes the coordinate, functions of it alone would be
+               // folded in float32, which the checks in double take for an error
         return at.all.empty() ? constant(type)
-                              : converted(type, cast<float>(coordinate(at, 0)) * 0.125f);
+                              : converted(type, cast<float>(coordinate(at, 0)) * p_.scale * 0.125f);
       default:
         return converted(type, read_func(at));
     }
