@@ -1,7 +1,6 @@
 #include "autodiff/checkpoint_plan.h"
 
 #include <algorithm>
-#include <set>
 
 #include "autodiff/accumulation.h"
 #include "autodiff/revolve.h"
@@ -173,21 +172,7 @@ class Planner {
   }
 
   void find_needed(const SweepResult& sweep) {
-    std::set<Expr, StructuralLess> found;
-    auto need = [&](const Expr& e) {
-      walk(e, [&](const Expr& node) {
-        if (as_call_of(node, f_)) found.insert(node);
-        return true;
-      });
-    };
-    for (const LeafAdjoint& leaf : sweep.leaves) {
-      need(leaf.adjoint);
-      for_each_child(leaf.leaf, need);
-    }
-    for (const Expr& w : c_.write) need(w);
-    for (const Expr& read : c_.self_reads()) {  // inner ones first
-      if (found.contains(read)) add_needed(read);
-    }
+    for (const Expr& read : c_.needed_reads(sweep)) add_needed(read);
   }
   void add_needed(const Expr& read) {
     auto& places = plan_.places;

@@ -1,7 +1,6 @@
 #include "autodiff/tape.h"
 
 #include <algorithm>
-#include <set>
 
 #include "autodiff/adjoint_contents.h"
 #include "autodiff/local_derivative.h"
@@ -92,23 +91,11 @@ class Tape {
 
   // ---- kept values ----
 
-  // Reads of f whose value a partial, a place or another read's place needs, and that is lost.
+  // Of the reads that are needed those whose value is lost.
   void find_needed(const SweepResult& sweep) {
-    std::set<Expr, StructuralLess> found;
-    auto need = [&](const Expr& e) {
-      walk(e, [&](const Expr& node) {
-        if (as_call_of(node, f_)) found.insert(node);
-        return true;
-      });
-    };
-    for (const LeafAdjoint& leaf : sweep.leaves) {
-      need(leaf.adjoint);
-      for_each_child(leaf.leaf, need);
-    }
-    for (const Expr& w : c_.write) need(w);
     FinalValues finals(c_);
-    for (const Expr& read : c_.self_reads()) {  // inner ones first
-      if (found.contains(read) && !finals.contains(read)) needed_.push_back(read);
+    for (const Expr& read : c_.needed_reads(sweep)) {
+      if (!finals.contains(read)) needed_.push_back(read);
     }
   }
 

@@ -156,6 +156,24 @@ std::vector<Expr> UpdateContext::self_reads() const {
   return reads;
 }
 
+std::vector<Expr> UpdateContext::needed_reads(const SweepResult& sweep) const {
+  std::set<Expr, StructuralLess> found;
+  const auto need = [&](const Expr& e) {
+    walk(e, [&](const Expr& node) {
+      if (as_call_of(node, f)) found.insert(node);
+      return true;
+    });
+  };
+  for (const LeafAdjoint& leaf : sweep.leaves) {
+    need(leaf.adjoint);
+    for_each_child(leaf.leaf, need);
+  }
+  for (const Expr& w : write) need(w);
+  std::vector<Expr> reads = self_reads();
+  std::erase_if(reads, [&](const Expr& read) { return !found.contains(read); });
+  return reads;
+}
+
 SweepResult UpdateContext::sweep(const std::vector<Expr>& seeds) const {
   return sweep_reverse(values, seeds, [&](const Expr& leaf) {
     return as_call_of(leaf, f) || query.is_wanted(leaf);

@@ -42,6 +42,9 @@ struct UpdateContext {
   SweepResult sweep(const std::vector<Expr>& seeds) const;
   // The same with the adjoint of f at the place written.
   SweepResult sweep_at_write(const FuncPtr& adjoint) const;
+  // Those of self_reads() whose value is needed by what a sweep found: by a partial, a place, or
+  // another read's place.
+  std::vector<Expr> needed_reads(const SweepResult& sweep) const;
 
   [[noreturn]] void refuse_overwritten(const Expr& read) const;
 };
