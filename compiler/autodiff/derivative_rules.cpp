@@ -409,6 +409,11 @@ Type adjoint_type(Type type) {
 
 namespace {
 
+bool is_finite_constant(const Expr& e) {
+  auto value = as_const_float(e);
+  return value && std::isfinite(*value);
+}
+
 // adjoint / divisor * factor, in that order. A constant factor, at most 1, goes first: it cannot
 // overflow, and one division is all.
 Expr divided_first(const Expr& adjoint, const Partial& partial) {
@@ -440,7 +445,7 @@ Expr times_partial(const Expr& adjoint, const Partial& partial) {
   }
   Expr factor = cast_to(adjoint.type(), partial.factor);
   if (is_one(factor)) return adjoint;
-  if (is_const(factor) || partial.strength == Strength::Plain) return adjoint * factor;
+  if (is_finite_constant(factor) || partial.strength == Strength::Plain) return adjoint * factor;
   Expr product = call_op(Op::strong_mul, adjoint.type(), {adjoint, factor});
   if (partial.strength != Strength::Both) return product;
   Expr zero = make_zero(factor.type());

@@ -1,5 +1,7 @@
 #include "autodiff/local_derivative.h"
 
+#include <cmath>
+
 #include "autodiff/stable_forms.h"
 #include "diagnostics/error.h"
 #include "ir/build.h"
@@ -37,7 +39,9 @@ bool is_risky_op(Op op) {
 
 bool makes_risky(const Expr& e) {
   const auto* call = e.as<Call>();
-  return (e.kind() == Kind::Div && e.type().is_float()) ||
+  const auto* constant = e.as<FloatImm>();
+  return (constant && !std::isfinite(constant->value)) ||
+         (e.kind() == Kind::Div && e.type().is_float()) ||
          (call && (call->call_type == CallType::Extern ||
                    (call->call_type == CallType::Operator && is_risky_op(call->op))));
 }
@@ -183,6 +187,8 @@ ExprFacts::Finiteness ExprFacts::finiteness_of(const Expr& factor) const {
       result.risky |= is_risky(e);
       result.read |= is_read(e);
     } else {
+      const auto* constant = e.as<FloatImm>();
+      result.risky |= constant && !std::isfinite(constant->value);
       for_each_operand(e, [&](const Expr& operand) { open.push_back(operand); });
     }
   }

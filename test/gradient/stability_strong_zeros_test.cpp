@@ -89,6 +89,18 @@ TEST_F(StrongZeros, StandOnlyWhereAFactorMayBeInfinite) {
   EXPECT_TRUE(has_strong_zeros(select(b(x) > 1, b(x), 3.0f))) << "a choice of what memory holds";
 }
 
+TEST_F(StrongZeros, ConstantsThatAreNotFiniteWhereNobodyReads) {
+  set(a, {1, 2, 3, 4});
+  for (float wild : {nan, inf}) {
+    Func f("f"), g("g");
+    Var y("y");
+    f(x, y) = a(x);
+    f(2, 0) = f(2, 0) * wild;
+    g(x) = f(x, 1);
+    expect(g, a, {1, 1, 1, 1});
+  }
+}
+
 TEST_F(StrongZeros, OverflowOfAProductInAnUnselectedFunc) {
   set(a, {1e30f, 2, 1e25f, 3});
   Func square("square"), fourth("fourth"), f("f");
