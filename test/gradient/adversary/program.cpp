@@ -81,7 +81,8 @@ class Maker {
   float weight() { return static_cast<float>(c_.around_zero(6)) / 8.0f + 0.0625f; }
   static Expr converted(const Type& type, const Expr& e) {
     if (e.type() == type) return e;
-    if (e.type().is_float() && !type.is_float()) return cast(type, clamp(e, -100.0f, 100.0f));
+    if (e.type().is_float() && !type.is_float())  // outside of the type's range casts are undefined
+      return cast(type, clamp(e, type.is_uint() ? 0.0f : -100.0f, 100.0f));
     return cast(type, e);
   }
   Expr constant(const Type& type) { return converted(type, Expr(0.5f + weight())); }
