@@ -19,6 +19,7 @@
 #include <vector>
 
 #include "ir/target.h"
+#include "support/fuzz_options.h"
 #include "support/run_apart.h"
 #include "testing/check_program.h"
 #include "testing/print_program.h"
@@ -35,11 +36,7 @@ constexpr unsigned max_cpu_seconds = 60, max_seconds = 240;
 constexpr double max_refused_fraction = 0.1, max_slow_fraction = 0.01;
 constexpr int crashed = 100;  // exit codes of a child: a Verdict, or this plus the signal
 
-struct Options {
-  uint64_t seed = 1000;
-  uint64_t count = 100;
-  double seconds = 1e9;
-  bool shrink = true, print = false, refusals = false;
+struct Options : FuzzOptions {
   std::vector<std::string> without;
   std::string only;
 };
@@ -47,28 +44,13 @@ struct Options {
 Options parse(int argc, char** argv) {
   Options options;
   for (int i = 1; i < argc; ++i) {
+    if (options.take(i, argc, argv)) continue;
     const std::string name = argv[i];
     const bool has_value = i + 1 < argc;
-    if (name == "--no-shrink") {
-      options.shrink = false;
-    } else if (name == "--print") {
-      options.print = true;
-    } else if (name == "--refusals") {
-      options.refusals = true;
-    } else if (name == "--without" && has_value) {
+    if (name == "--without" && has_value) {
       options.without.push_back(argv[++i]);
     } else if (name == "--only" && has_value) {
       options.only = argv[++i];
-    } else if (name == "--seed" && has_value) {
-      options.seed = std::strtoull(argv[++i], nullptr, 10);
-      options.count = 1;
-    } else if (name == "--from" && has_value) {
-      options.seed = std::strtoull(argv[++i], nullptr, 10);
-    } else if (name == "--count" && has_value) {
-      options.count = std::strtoull(argv[++i], nullptr, 10);
-    } else if (name == "--seconds" && has_value) {
-      options.seconds = std::strtod(argv[++i], nullptr);
-      options.count = UINT64_MAX;
     } else {
       std::fprintf(stderr, "fuzz_pipelines: unknown argument %s\n", argv[i]);
       std::exit(2);

@@ -10,9 +10,11 @@
 // Exit code: 0 nothing found, 1 something found.
 #include <chrono>
 #include <cstdio>
+#include <cstdlib>
 #include <map>
 
 #include "gradient/adversary/check.h"
+#include "support/fuzz_options.h"
 #include "support/run_apart.h"
 
 namespace {
@@ -24,50 +26,19 @@ using fuzz::ApartResult;
 constexpr fuzz::ApartLimits limits = {20, 240};
 constexpr double max_refused_fraction = 1.0 / 3;
 
-struct Options {
-  uint64_t seed = 1000, count = 100;
-  double seconds = 1e9;
+struct Options : fuzz::FuzzOptions {
   unsigned compile = 25;
-  bool shrink = true, print = false, refusals = false;
 };
-
-[[noreturn]] void refuse(const char* argument) {
-  std::fprintf(stderr, "fuzz_adjoints: unknown argument %s\n", argument);
-  std::exit(2);
-}
 
 Options parse(int argc, char** argv) {
   Options options;
   for (int i = 1; i < argc; ++i) {
-    const std::string name = argv[i];
-    const char* value = i + 1 < argc ? argv[i + 1] : nullptr;
-    if (name == "--no-shrink") {
-      options.shrink = false;
-    } else if (name == "--print") {
-      options.print = true;
-    } else if (name == "--refusals") {
-      options.refusals = true;
-    } else if (!value) {
-      refuse(argv[i]);
-    } else if (name == "--seed") {
-      options.seed = std::strtoull(value, nullptr, 10);
-      options.count = 1;
-      ++i;
-    } else if (name == "--from") {
-      options.seed = std::strtoull(value, nullptr, 10);
-      ++i;
-    } else if (name == "--count") {
-      options.count = std::strtoull(value, nullptr, 10);
-      ++i;
-    } else if (name == "--seconds") {
-      options.seconds = std::strtod(value, nullptr);
-      options.count = UINT64_MAX;
-      ++i;
-    } else if (name == "--compile") {
-      options.compile = static_cast<unsigned>(std::strtoul(value, nullptr, 10));
-      ++i;
+    if (options.take(i, argc, argv)) continue;
+    if (std::string(argv[i]) == "--compile" && i + 1 < argc) {
+      options.compile = static_cast<unsigned>(std::strtoul(argv[++i], nullptr, 10));
     } else {
-      refuse(argv[i]);
+      std::fprintf(stderr, "fuzz_adjoints: unknown argument %s\n", argv[i]);
+      std::exit(2);
     }
   }
   return options;
