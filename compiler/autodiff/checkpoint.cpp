@@ -1,69 +1,20 @@
 #include "autodiff/checkpoint.h"
 
 #include <algorithm>
-#include <array>
+#include <optional>
 
-#include "autodiff/checkpoint_plan.h"
-#include "autodiff/revolve.h"
+#include "autodiff/checkpoint_actions.h"
+#include "autodiff/checkpoint_step.h"
 #include "autodiff/versions.h"
-#include "frontend/buffer.h"
 #include "frontend/define.h"
+#include "frontend/var.h"
 #include "ir/build.h"
+#include "ir/print.h"
 #include "simplify/simplify.h"
 
 namespace retrograde::ir {
 
 namespace {
-
-// Rows of the table: what one pass over the inner loops does.
-enum class Action : int { Store, Restore, Advance, Record, Adjoint };
-
-// One write of an action: place <- values.
-struct Write {
-  Expr place;
-  std::vector<Expr> values;
-};
-
-using Table = std::vector<std::array<int, 3>>;  // action, step, slot
-
-Table table_of(const std::vector<RevolveAction>& actions) {
-  Table rows;
-  auto add = [&](Action action, const RevolveAction& a) {
-    rows.push_back({static_cast<int>(action), a.step, std::max(a.slot, 0)});
-  };
-  for (const RevolveAction& a : actions) {
-    switch (a.kind) {
-      case RevolveAction::Kind::Store:
-        add(Action::Store, a);
-        break;
-      case RevolveAction::Kind::Restore:
-        add(Action::Restore, a);
-        break;
-      case RevolveAction::Kind::Advance:
-        add(Action::Advance, a);
-        break;
-      case RevolveAction::Kind::Reverse:
-        add(Action::Record, a);
-        add(Action::Adjoint, a);
-        break;
-    }
-  }
-  return rows;
-}
-
-Buffer<int> in_memory(const Table& rows) {
-  Buffer<int> table(3, static_cast<int>(rows.size()));
-  for (size_t i = 0; i < rows.size(); ++i) {
-    for (int c = 0; c < 3; ++c) table(c, static_cast<int>(i)) = rows[i][static_cast<size_t>(c)];
-  }
-  return table;
-}
-
-int count_rows(const Table& rows, Action action) {
-  return static_cast<int>(std::count_if(rows.begin(), rows.end(), [&](const auto& row) {
-    return row[0] == static_cast<int>(action);
-  }));
-}
 
 class CheckpointedLoop {
  public:
@@ -77,65 +28,17 @@ class CheckpointedLoop {
   void run() {
     machine_->name = claim_name(f_->name + "_checkpoints");
     plan_ = plan_checkpoints(c_, layout_, result_.current.func, machine_);
-    table_ = table_of(actions());
-    lay_out();
+    table_ = action_table(plan_.steps, plan_.states, plan_.needs_values());
+    slots_.emplace(c_, layout_, plan_, machine_);
     define_machine();
-    record_ = record_writes();
-    adjoint_ = adjoint_writes();
+    record_ = record_writes(c_, plan_, *slots_);
+    adjoint_ = adjoint_writes(c_, plan_, *slots_);
     append_loop();
     note_work();
     hand_over();
   }
 
  private:
-  std::vector<RevolveAction> actions() const {
-    if (needs_values()) return revolve_schedule(plan_.steps, plan_.states);
-    std::vector<RevolveAction> reversals;  // nothing is computed again
-    for (int step = plan_.steps - 1; step >= 0; --step)
-      reversals.push_back({RevolveAction::Kind::Reverse, step});
-    return reversals;
-  }
-  bool needs_values() const { return !plan_.needed.empty(); }
-
-  // ---- slots ----
-
-  void lay_out() {
-    Expr next = layout_.elements() * 2;
-    at_hand_ = simplify(next);
-    noted_ = simplify(at_hand_ + 1);
-    next = noted_ + plan_.inner_count * static_cast<int>(plan_.places.size());
-    for (CheckpointPlan::Given& g : plan_.given) {
-      g.start = simplify(next);
-      next = next + plan_.inner_count * (g.over_time ? plan_.steps : g.width());
-    }
-    kept_ = simplify(next);
-    size_ = simplify(kept_ + layout_.elements() * (needs_values() ? plan_.states : 0));
-  }
-  Expr adjoint_slot(const Expr& element) const { return element + layout_.elements(); }
-  Expr note_slot(size_t place) const {
-    return noted_ + iteration_number(plan_.inner) * static_cast<int>(plan_.places.size()) +
-           static_cast<int>(place);
-  }
-  Expr given_slot(const CheckpointPlan::Given& g) const {
-    if (g.over_time) return g.start + iteration_number(c_.definition.rvars);
-    return g.start + iteration_number(plan_.inner) * g.width();
-  }
-
-  Expr at(const Expr& slot, size_t k) const {
-    return call_value(machine_, layout_.with_pure(slot), static_cast<int>(k));
-  }
-  // The value of f, its adjoint, a sum, that the slot holds.
-  Expr value_at(const Expr& slot, size_t k) const { return cast_to(f_->types[k], at(slot, k)); }
-  Expr adjoint_at(const Expr& slot, size_t k) const {
-    return cast_to(c_.query.target.types[k], at(slot, k));
-  }
-  Expr sum_at(const Expr& slot) const { return at(slot, static_cast<size_t>(plan_.sum_value)); }
-  std::vector<Expr> all_values(const Expr& slot) const {
-    std::vector<Expr> values;
-    for (size_t k = 0; k < plan_.types.size(); ++k) values.push_back(at(slot, k));
-    return values;
-  }
-
   void define_machine() {
     FuncPtr before = clone_prefix(c_.query.f, c_.query.stage);
     Expr slot = layout_.slot(), elements = layout_.elements();
@@ -157,99 +60,14 @@ class CheckpointedLoop {
     result_.helpers.push_back(machine_);
   }
 
-  // ---- one iteration of a step ----
-
-  // Reads of f as they are in the current state.
-  Expr in_state(const Expr& e) const {
-    return rewrite(e, [&](const Expr& node, const auto& recurse) -> Expr {
-      const Call* call = as_call_of(node, f_);
-      if (!call) return map_children(node, recurse);
-      std::vector<Expr> args;
-      for (const Expr& arg : call->args) args.push_back(recurse(arg));
-      return value_at(layout_.slot_of(args), static_cast<size_t>(call->value_index));
-    });
-  }
-  // Reads of f as the step noted them.
-  Expr noted(const Expr& e) const {
-    return rewrite(e, [&](const Expr& node, const auto& recurse) -> Expr {
-      const Call* call = as_call_of(node, f_);
-      for (size_t i = 0; call && i < plan_.needed.size(); ++i) {
-        if (equal(plan_.needed[i], node))
-          return value_at(note_slot(plan_.place_of[i]), static_cast<size_t>(call->value_index));
-      }
-      return map_children(node, recurse);
-    });
-  }
-
-  // Forward: the values that are needed later, then the write.
-  std::vector<Write> record_writes() const {
-    std::vector<Write> writes;
-    for (size_t i = 0; i < plan_.places.size(); ++i)
-      writes.push_back({note_slot(i), all_values(in_state(layout_.slot_of(plan_.places[i])))});
-    Write last{in_state(layout_.slot_of(c_.write)), {}};
-    Expr inside = in_state(layout_.is_inside(c_.write));
-    for (size_t k = 0; k < plan_.types.size(); ++k) {
-      Expr value = cast_to(plan_.types[k], in_state(c_.values[k]));
-      last.values.push_back(make_select(inside, value, at(last.place, k)));
-    }
-    writes.push_back(last);
-    return writes;
-  }
-
-  // Backward: a = A[W]; A[W] = 0; A[R_k] += a dV/dv_k; then what others get.
-  std::vector<Write> adjoint_writes() const {
-    Expr written = adjoint_slot(noted(layout_.slot_of(c_.write)));
-    std::vector<Write> writes{{at_hand_, all_values(written)}, {written, {}}};
-    for (Type t : plan_.types) writes[1].values.push_back(make_zero(t));
-    std::vector<std::vector<Expr>> places{c_.write};  // of the writes after the first
-    for (const LeafAdjoint& leaf : plan_.passed_on) {
-      const Call* call = as_call_of(leaf.leaf, f_);
-      auto known = std::find_if(places.begin(), places.end(),
-                                [&](const auto& p) { return same_args(p, call->args); });
-      size_t i = static_cast<size_t>(known - places.begin()) + 1;
-      if (known == places.end()) {
-        places.push_back(call->args);
-        Expr slot = adjoint_slot(noted(layout_.slot_of(call->args)));
-        writes.push_back({slot, all_values(slot)});
-      }
-      size_t k = static_cast<size_t>(call->value_index);
-      Expr term = make_select(noted(layout_.is_inside(call->args)), noted(leaf.adjoint),
-                              make_zero(leaf.adjoint.type()));
-      Type type = c_.query.target.types[k];
-      Expr& value = writes[i].values[k];
-      value = cast_to(plan_.types[k], cast_to(type, value) + cast_to(type, term));
-    }
-    for (const CheckpointPlan::Given& g : plan_.given) append_given(g, writes);
-    return writes;
-  }
-  void append_given(const CheckpointPlan::Given& g, std::vector<Write>& writes) const {
-    Expr slot = given_slot(g), old = sum_at(slot);
-    Expr term = cast_to(old.type(), noted(g.leaf.adjoint));
-    auto write = [&](const Expr& place, const Expr& value) {
-      writes.push_back({place, all_values(place)});
-      writes.back().values[static_cast<size_t>(plan_.sum_value)] = value;
-    };
-    if (g.over_time) return write(slot, term);
-    if (!g.compensated) return write(slot, old + term);
-    // What old + term loses, exactly: D. Knuth, The Art of Computer Programming 2, section 4.2.2,
-    // theorem B.
-    term = exactly(term);
-    Expr sum = exactly(old + term), from_term = exactly(sum - old);
-    Expr lost = exactly(exactly(old - exactly(sum - from_term)) + exactly(term - from_term));
-    write(slot + 1, exactly(sum_at(slot + 1) + lost));
-    write(slot, sum);
-  }
-  static Expr exactly(const Expr& e) { return call_op(Op::strict_float, e.type(), {e}); }
-
   // ---- the loop over actions ----
 
   struct Branch {
     Expr is_chosen, runs;
-    Write write;
+    SlotWrite write;
   };
 
   void append_loop() {
-    Buffer<int> table = in_memory(table_);
     auto rdom = std::make_shared<ReductionDomainContents>();
     auto add_loop = [&](const std::string& name, const Expr& min, const Expr& extent) {
       rdom->vars.push_back({unique_name(name), min, extent});
@@ -258,7 +76,7 @@ class CheckpointedLoop {
     // All loops first: variables refer to the finished domain.
     add_loop("write", make_zero(Int(32)), writes_per_iteration());
     for (const ReductionVariable& r : plan_.inner) add_loop(r.var, r.min, r.extent);
-    add_loop("action", make_zero(Int(32)), make_const(Int(32), table.dim(1).extent()));
+    add_loop("action", make_zero(Int(32)), table_.rows);
     rdom->frozen = true;
     auto loop = [&](size_t i) { return variable(rdom->vars[i].var, Int(32), SymbolRef(rdom)); };
 
@@ -268,15 +86,15 @@ class CheckpointedLoop {
       backward_[r.var] = r.min + (r.min + (r.extent - 1) - loop(i + 1));
     }
     Expr row = loop(rdom->vars.size() - 1);
-    Expr step = clamp(entry(table, 1, row), 0, plan_.steps - 1);
+    Expr step = clamp(table_.entry(1, row), 0, plan_.steps - 1);
     forward_[plan_.time.var] = backward_[plan_.time.var] = plan_.time.min + step;
-    forward_[plan_.at_hand] = backward_[plan_.at_hand] = at_hand_;
+    forward_[plan_.at_hand] = backward_[plan_.at_hand] = slots_->at_hand();
 
     std::vector<ReductionVariable> pass(rdom->vars.begin(), rdom->vars.end() - 1);
     Expr number = substitute(iteration_number(pass), names_of(pass, rdom));
-    Branch all = one_of(branches(entry(table, 0, row), loop(0), number,
-                                 clamp(entry(table, 2, row), 0, std::max(plan_.states - 1, 0))));
-    append_update(machine_, layout_.with_pure(clamp(all.write.place, 0, size_ - 1)),
+    Branch all = one_of(branches(table_.entry(0, row), loop(0), number,
+                                 clamp(table_.entry(2, row), 0, std::max(plan_.states - 1, 0))));
+    append_update(machine_, layout_.with_pure(clamp(all.write.place, 0, slots_->count() - 1)),
                   all.write.values, rdom->vars, all.runs);
   }
   static Substitution names_of(const std::vector<ReductionVariable>& loops,
@@ -289,7 +107,7 @@ class CheckpointedLoop {
   // Copies of a state go through the same loops: enough for all elements.
   Expr writes_per_iteration() const {
     Expr most = make_const(Int(32), static_cast<int>(std::max(record_.size(), adjoint_.size())));
-    if (!needs_values()) return most;
+    if (!plan_.needs_values()) return most;
     Expr inner = max(plan_.inner_count, 1);
     return simplify(max(most, (layout_.elements() + inner - 1) / inner));
   }
@@ -298,14 +116,14 @@ class CheckpointedLoop {
   std::vector<Branch> branches(const Expr& action, const Expr& write, const Expr& number,
                                const Expr& slot) const {
     auto is = [&](Action a) { return action == static_cast<int>(a); };
-    auto within = [&](const std::vector<Write>& writes) {
+    auto within = [&](const std::vector<SlotWrite>& writes) {
       return write < static_cast<int>(writes.size());
     };
     Expr written = placed(layout_.is_inside(c_.write), backward_);
     std::vector<Branch> result{{is(Action::Adjoint),
                                 has_run(backward_) && written && within(adjoint_),
                                 chosen(adjoint_, write, backward_)}};
-    if (!needs_values()) {
+    if (!plan_.needs_values()) {
       result.push_back({const_true(), const_false(), result[0].write});
       return result;
     }
@@ -315,9 +133,9 @@ class CheckpointedLoop {
         {is(Action::Advance), has_run(forward_) && write == 0, placed(record_.back(), forward_)});
     Expr in_state = number < layout_.elements();
     Expr element = clamp(number, 0, layout_.elements() - 1);
-    Expr kept = kept_ + slot * layout_.elements() + element;
-    result.push_back({is(Action::Store), in_state, {kept, all_values(element)}});
-    result.push_back({is(Action::Restore), in_state, {element, all_values(kept)}});
+    Expr kept = slots_->kept() + slot * layout_.elements() + element;
+    result.push_back({is(Action::Store), in_state, {kept, slots_->all_values(element)}});
+    result.push_back({is(Action::Restore), in_state, {element, slots_->all_values(kept)}});
     return result;
   }
   Expr has_run(const Substitution& places) const {
@@ -333,23 +151,19 @@ class CheckpointedLoop {
     }
     return all;
   }
-  Write chosen(const std::vector<Write>& writes, const Expr& write,
-               const Substitution& places) const {
-    Write result = placed(writes.back(), places);
+  SlotWrite chosen(const std::vector<SlotWrite>& writes, const Expr& write,
+                   const Substitution& places) const {
+    SlotWrite result = placed(writes.back(), places);
     for (size_t i = writes.size() - 1; i-- > 0;)
       result = choose(write == static_cast<int>(i), placed(writes[i], places), result);
     return result;
-  }
-  static Expr entry(const Buffer<int>& table, int column, const Expr& row) {
-    auto p = table.parameter();
-    return call_image(p->name, p->type, {Expr(column), row}, SymbolRef(p));
   }
   // Actions differ in what they cost: only the one at hand is evaluated.
   static Expr choose(const Expr& condition, const Expr& a, const Expr& b) {
     return equal(a, b) ? a : call_op(Op::if_then_else, a.type(), {condition, a, b});
   }
-  static Write choose(const Expr& condition, const Write& a, const Write& b) {
-    Write result{choose(condition, a.place, b.place), {}};
+  static SlotWrite choose(const Expr& condition, const SlotWrite& a, const SlotWrite& b) {
+    SlotWrite result{choose(condition, a.place, b.place), {}};
     for (size_t k = 0; k < a.values.size(); ++k)
       result.values.push_back(choose(condition, a.values[k], b.values[k]));
     return result;
@@ -357,8 +171,8 @@ class CheckpointedLoop {
   Expr placed(const Expr& e, const Substitution& places) const {
     return with_values(substitute(e, places), c_.query.f, {});
   }
-  Write placed(const Write& w, const Substitution& places) const {
-    Write result{placed(w.place, places), {}};
+  SlotWrite placed(const SlotWrite& w, const Substitution& places) const {
+    SlotWrite result{placed(w.place, places), {}};
     for (const Expr& v : w.values) result.values.push_back(placed(v, places));
     return result;
   }
@@ -368,10 +182,10 @@ class CheckpointedLoop {
   void note_work() {
     std::vector<Expr> inner;
     for (const ReductionVariable& r : plan_.inner) inner.push_back(r.extent);
-    auto note = [&](const std::vector<Write>& writes, Action action, std::vector<Expr> loops) {
+    auto note = [&](const std::vector<SlotWrite>& writes, Action action, std::vector<Expr> loops) {
       AdjointWork work{{}, std::move(loops)};
-      work.loops.emplace_back(count_rows(table_, action));
-      for (const Write& w : writes) {
+      work.loops.push_back(table_.count(action));
+      for (const SlotWrite& w : writes) {
         work.values.push_back(redirect_calls(w.place, machine_, machine_, true));
         for (const Expr& v : w.values)
           work.values.push_back(redirect_calls(v, machine_, machine_, true));
@@ -379,10 +193,10 @@ class CheckpointedLoop {
       machine_->work.push_back(std::move(work));
     };
     note(adjoint_, Action::Adjoint, inner);
-    if (!needs_values()) return;
+    if (!plan_.needs_values()) return;
     note(record_, Action::Record, inner);
     note({record_.back()}, Action::Advance, inner);
-    Write copy{make_zero(Int(32)), all_values(layout_.slot())};
+    SlotWrite copy{make_zero(Int(32)), slots_->all_values(layout_.slot())};
     note({copy}, Action::Store, {layout_.elements()});
     note({copy}, Action::Restore, {layout_.elements()});
   }
@@ -391,14 +205,16 @@ class CheckpointedLoop {
     std::vector<Expr> before;
     Expr inside = layout_.is_inside(c_.point);
     for (size_t k = 0; k < plan_.types.size(); ++k) {
-      Expr a = f_->types[k].is_float() ? adjoint_at(adjoint_slot(layout_.slot_of(c_.point)), k)
-                                       : make_zero(c_.query.target.types[k]);
+      Expr a = f_->types[k].is_float()
+                   ? slots_->adjoint_at(slots_->adjoint(layout_.slot_of(c_.point)), k)
+                   : make_zero(c_.query.target.types[k]);
       before.push_back(make_select(inside, a, make_zero(a.type())));
     }
     result_.previous = make_adjoint(c_.query.target, name_before(*f_, c_.query.stage), {}, before);
-    for (const CheckpointPlan::Given& g : plan_.given) {
-      Expr slot = given_slot(g), sum = sum_at(slot);
-      if (g.compensated) sum = sum + sum_at(slot + 1);
+    for (size_t i = 0; i < plan_.given.size(); ++i) {
+      const CheckpointPlan::Given& g = plan_.given[i];
+      Expr slot = slots_->given(i), sum = slots_->sum_at(slot);
+      if (g.compensated) sum = sum + slots_->sum_at(slot + 1);
       result_.given.push_back({{g.leaf.leaf, cast_to(g.leaf.adjoint.type(), sum)},
                                g.over_time ? c_.domain : one_step()});
     }
@@ -414,9 +230,9 @@ class CheckpointedLoop {
     const auto& bytes = plan_.bytes_of_state;
     std::string kept = text(plan_.states, plan_.states == 1 ? " kept state" : " kept states",
                             bytes ? text(" of ", *bytes, " bytes") : std::string());
-    std::string what = text("from ", kept, ", ", count_rows(table_, Action::Advance),
+    std::string what = text("from ", kept, ", ", print(table_.count(Action::Advance)),
                             " steps computed again beside the ", plan_.steps, " that are reversed");
-    if (!needs_values()) what = "no value of it is needed, none is kept";
+    if (!plan_.needs_values()) what = "no value of it is needed, none is kept";
     result_.explanations.push_back(
         {Explanation::Kind::Version, f_->name,
          text("update ", c_.query.stage - 1, " is a loop of ", plan_.steps, " steps that ",
@@ -429,10 +245,10 @@ class CheckpointedLoop {
   TapeLayout layout_;
   std::shared_ptr<AdjointContents> machine_;
   CheckpointPlan plan_;
-  Table table_;
-  Expr at_hand_, noted_, kept_, size_;   // first slots, and their number
-  std::vector<Write> record_, adjoint_;  // one iteration of a step, over its own variables
-  Substitution forward_, backward_;      // the loop's variables for these
+  ActionTable table_;
+  std::optional<CheckpointSlots> slots_;
+  std::vector<SlotWrite> record_, adjoint_;  // one iteration of a step, over its own variables
+  Substitution forward_, backward_;          // the loop's variables for these
 };
 
 }  // namespace

@@ -18,7 +18,6 @@ struct CheckpointPlan {
     LeafAdjoint leaf;
     bool over_time = false;    // one value for each iteration of each step, not a sum over steps
     bool compensated = false;  // a long sum: what rounding lost is summed beside it
-    Expr start;                // its first slot
     int width() const { return compensated ? 2 : 1; }
   };
 
@@ -35,6 +34,9 @@ struct CheckpointPlan {
   std::vector<std::vector<Expr>> places;  // the distinct places of those
   std::vector<size_t> place_of;           // of each needed read
   std::optional<int64_t> bytes_of_state;  // over all pure dimensions; none: not constant
+
+  // Whether a step backward needs values of f.
+  bool needs_values() const { return !needed.empty(); }
 };
 
 // The adjoints at hand will be read from `machine`, whose types and traits are set here. Throws
