@@ -7,16 +7,24 @@
 
 namespace retrograde::ir {
 
-// What multiplies an adjoint must beware of.
+// What multiplies an adjoint, or a tangent, must beware of.
 struct AdjointTraits {
   // Exactly 0 where a consumer chose another branch or reads nothing: a factor may be infinite or
   // NaN there.
   bool masked = false;
+  // Exactly 0 where an operand of a consumer is infinite, as that of exp(-inf): a factor that may
+  // be infinite meets it there.
+  bool vanished = false;
   // Infinite where it passed the pole of a partial: a factor may be 0 there, as in a norm at 0.
   bool singular = false;
+  // Of tangents: infinite where a value that they passed is, and a later partial may be 0 there.
+  bool infinite = false;
+  bool operator==(const AdjointTraits& other) const = default;
   void add(const AdjointTraits& other) {
     masked |= other.masked;
+    vanished |= other.vanished;
     singular |= other.singular;
+    infinite |= other.infinite;
   }
 };
 

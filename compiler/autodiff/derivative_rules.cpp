@@ -403,6 +403,25 @@ bool has_poles(Op op) {
          op == Op::fast_pow;
 }
 
+bool levels_off(Op op) {
+  switch (op) {
+    case Op::exp:
+    case Op::fast_exp:
+    case Op::pow:
+    case Op::fast_pow:
+    case Op::atan:
+    case Op::atan2:
+    case Op::tanh:
+    case Op::erf:
+    case Op::fast_inverse:
+    case Op::fast_inverse_sqrt:
+    case Op::strong_div:
+      return true;
+    default:
+      return false;
+  }
+}
+
 Type adjoint_type(Type type) {
   return type.bits() < 32 || type.is_bfloat() ? Float(32, type.lanes()) : type;
 }
@@ -413,6 +432,8 @@ bool is_finite_constant(const Expr& e) {
   auto value = as_const_float(e);
   return value && std::isfinite(*value);
 }
+
+bool is_cut(Strength strength) { return strength == Strength::Cut || strength == Strength::Both; }
 
 // adjoint / divisor * factor, in that order. A constant factor, at most 1, goes first: it cannot
 // overflow, and one division is all.
@@ -440,12 +461,14 @@ Expr times_partial(const Expr& adjoint, const Partial& partial) {
         times_partial(adjoint, {choice->false_value, partial.strength, partial.divisor}));
   }
   if (partial.divisor.defined()) {
-    if (partial.strength != Strength::Both) return divided_first(adjoint, partial);
+    if (!is_cut(partial.strength)) return divided_first(adjoint, partial);
     return times_partial(adjoint, {partial.factor / partial.divisor, partial.strength});
   }
   Expr factor = cast_to(adjoint.type(), partial.factor);
   if (is_one(factor)) return adjoint;
   if (is_finite_constant(factor) || partial.strength == Strength::Plain) return adjoint * factor;
+  if (partial.strength == Strength::Cut)
+    return call_op(Op::strong_mul, adjoint.type(), {factor, adjoint});
   Expr product = call_op(Op::strong_mul, adjoint.type(), {adjoint, factor});
   if (partial.strength != Strength::Both) return product;
   Expr zero = make_zero(factor.type());

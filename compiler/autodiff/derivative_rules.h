@@ -21,8 +21,8 @@ enum class RuleClass : uint8_t {
 enum class Strength : uint8_t {
   Plain,   // finite wherever the operands are
   Strong,  // may be infinite or NaN where the primal is finite: an adjoint of 0 makes the product 0
-  Both,    // the adjoint may be infinite (it passed a pole): a partial of 0 makes the product 0 as
-           // well
+  Cut,     // the adjoint may be infinite (it passed a pole): a partial of 0 makes the product 0
+  Both,    // Strong and Cut
 };
 
 struct Partial {
@@ -62,6 +62,8 @@ bool has_derivative_rule(Kind kind);  // whether the table has a row for the kin
 Type adjoint_type(Type type);
 // Whether a partial of the operator may be infinite where its value is finite: sqrt at 0.
 bool has_poles(Op op);
+// Whether the value may be finite, and the partial 0, where an operand is infinite: exp at -inf.
+bool levels_off(Op op);
 // adjoint * partial, by the partial's strength; `adjoint` and the result are of the adjoint type.
 Expr times_partial(const Expr& adjoint, const Partial& partial);
 

@@ -17,11 +17,12 @@ bool is_undef(const Expr& e) {
 class Sweep {
  public:
   Sweep(const std::vector<Expr>& values, FunctionRef<Expr(const Expr&)> tangent_of,
-        FunctionRef<bool(const Expr&)> is_risky_leaf)
+        FunctionRef<bool(const Expr&)> is_infinite_leaf)
       : order_(post_order(values)),
         tangent_of_(tangent_of),
         facts_(
-            order_, [&](const Expr& leaf) { return tangent_of(leaf).defined(); }, is_risky_leaf) {
+            order_, [&](const Expr& leaf) { return tangent_of(leaf).defined(); },
+            is_infinite_leaf) {
     result_.notes = facts_.notes();
   }
 
@@ -30,6 +31,7 @@ class Sweep {
     for (const Expr& value : values) {
       result_.tangents.push_back(value.defined() ? tangent(value) : Expr());
       result_.moves |= result_.tangents.back().defined() && facts_.is_active(value);
+      if (value.defined()) result_.traits.add(traits_[value.get()]);
     }
     return std::move(result_);
   }
@@ -48,7 +50,9 @@ class Sweep {
     }
     note_undef(e);
     if (is_leaf(e)) {
-      if (facts_.is_active(e)) tangents_[e.get()] = cast_to(adjoint_type(e.type()), tangent_of_(e));
+      if (!facts_.is_active(e)) return;
+      tangents_[e.get()] = cast_to(adjoint_type(e.type()), tangent_of_(e));
+      traits_[e.get()] = traits_of(tangents_[e.get()]);
     } else if (e.type().is_float() && (facts_.is_active(e) || undefs_.contains(e.get()))) {
       Expr t = combine(e, local_derivative(e, facts_));
       if (t.defined()) tangents_[e.get()] = t;
@@ -79,6 +83,7 @@ class Sweep {
         return {};
       case LocalDerivative::Kind::Choice: {
         Expr a = tangent(local.operands[0]), b = tangent(local.operands[1]);
+        for (const Expr& operand : local.operands) traits_[e.get()].add(traits_[operand.get()]);
         if (!a.defined() && !b.defined()) return {};
         return make_select(local.condition, a.defined() ? a : make_zero(type),
                            b.defined() ? b : make_zero(type));
@@ -90,11 +95,27 @@ class Sweep {
     for (size_t i = 0; i < local.operands.size(); ++i) {
       Expr t = tangent(local.operands[i]);
       if (!t.defined() || !local.partials[i].factor.defined()) continue;
-      Expr term = cast_to(type, times_partial(t, local.partials[i]));
+      Expr term = cast_to(type, times_partial(t, partial_of(local, i, e)));
       if (is_zero(term)) continue;
       sum = sum.defined() ? sum + term : term;
     }
     return sum;
+  }
+
+  // How the tangent of operand i meets its partial; notes in e's traits what becomes of it. An
+  // adjoint meets the partials in the opposite order: where it would be 0 before it reaches an
+  // infinite partial, the tangent has passed that one and is cut.
+  Partial partial_of(const LocalDerivative& local, size_t i, const Expr& e) {
+    Partial partial = local.partials[i];
+    const Finiteness& factor = local.factors[i];
+    const AdjointTraits& passed = traits_[local.operands[i].get()];
+    if (factor.infinite) partial.strength = Strength::Strong;
+    if (passed.singular || (passed.infinite && local.levels_off))
+      partial.strength = partial.strength == Strength::Plain ? Strength::Cut : Strength::Both;
+    AdjointTraits& traits = traits_[e.get()];
+    traits.add(passed);
+    traits.add({.singular = local.poles, .infinite = factor.risky || factor.infinite});
+    return partial;
   }
 
   std::vector<Expr> order_;
@@ -102,6 +123,7 @@ class Sweep {
   ExprFacts facts_;
   std::unordered_set<const ExprNode*> undefs_;
   std::unordered_map<const ExprNode*, Expr> tangents_;
+  std::unordered_map<const ExprNode*, AdjointTraits> traits_;
   ForwardResult result_;
 };
 
@@ -109,8 +131,8 @@ class Sweep {
 
 ForwardResult sweep_forward(const std::vector<Expr>& values,
                             FunctionRef<Expr(const Expr&)> tangent_of,
-                            FunctionRef<bool(const Expr&)> is_risky_leaf) {
-  return Sweep(values, tangent_of, is_risky_leaf).run(values);
+                            FunctionRef<bool(const Expr&)> is_infinite_leaf) {
+  return Sweep(values, tangent_of, is_infinite_leaf).run(values);
 }
 
 }  // namespace retrograde::ir

@@ -20,13 +20,14 @@ struct ForwardResult {
   std::vector<Expr> tangents;   // one a value, of its adjoint type; undefined: identically zero
   bool moves = false;           // a value depends on a leaf that has a tangent
   std::set<std::string> notes;  // operators through which the derivative is zero
+  AdjointTraits traits;         // of all tangents
 };
 
-// `tangent_of` gives the tangent of a leaf, undefined where it has none; `is_risky_leaf` as in
+// `tangent_of` gives the tangent of a leaf, undefined where it has none; `is_infinite_leaf` as in
 // ExprFacts. undef has tangent undef, so that a tangent is stored exactly where its value is.
 // Throws Unsupported on an operator without a rule between a value and a leaf with a tangent.
 ForwardResult sweep_forward(const std::vector<Expr>& values,
                             FunctionRef<Expr(const Expr&)> tangent_of,
-                            FunctionRef<bool(const Expr&)> is_risky_leaf);
+                            FunctionRef<bool(const Expr&)> is_infinite_leaf);
 
 }  // namespace retrograde::ir

@@ -10,33 +10,6 @@ namespace retrograde::ir {
 
 namespace {
 
-// Operators whose value may be infinite or NaN at finite operands.
-bool is_risky_op(Op op) {
-  switch (op) {
-    case Op::sqrt:
-    case Op::exp:
-    case Op::log:
-    case Op::pow:
-    case Op::tan:
-    case Op::asin:
-    case Op::acos:
-    case Op::sinh:
-    case Op::cosh:
-    case Op::acosh:
-    case Op::atanh:
-    case Op::fast_exp:
-    case Op::fast_log:
-    case Op::fast_pow:
-    case Op::fast_inverse:
-    case Op::fast_inverse_sqrt:
-    case Op::strong_mul:
-    case Op::strong_div:
-      return true;
-    default:
-      return false;
-  }
-}
-
 bool makes_risky(const Expr& e) {
   const auto* call = e.as<Call>();
   const auto* constant = e.as<FloatImm>();
@@ -65,7 +38,7 @@ void for_each_operand(const Expr& e, ExprVisit visit) {
 
 // The value of the operand, whatever the types.
 LocalDerivative same_as(const Expr& e, const Expr& operand) {
-  LocalDerivative result{LocalDerivative::Kind::Sum, {operand}, {}, {}, {}, {false}};
+  LocalDerivative result{LocalDerivative::Kind::Sum, {operand}, {}, {}, {}, {{}}};
   result.partials.push_back({make_one(adjoint_type(e.type())), Strength::Plain});
   return result;
 }
@@ -75,14 +48,21 @@ LocalDerivative sum_of(const std::vector<Expr>& operands, std::vector<Partial> p
   LocalDerivative result{LocalDerivative::Kind::Sum, operands, std::move(partials), {}, {}, {}};
   result.partials.resize(operands.size());
   for (Partial& p : result.partials) {
-    ExprFacts::Finiteness partial;
+    Finiteness partial;
     for (const Expr& part : {p.factor, p.divisor}) {
       if (part.defined()) partial.add(facts.finiteness_of(part));
     }
     if (partial.risky) p.strength = Strength::Strong;
-    result.reads.push_back(partial.read);
+    partial.risky |= p.divisor.defined();
+    result.factors.push_back(partial);
   }
   return result;
+}
+
+// By what may be infinite: the value is 0 there.
+bool is_quotient(const Expr& e) {
+  const auto* quotient = e.as<Div>();
+  return quotient && e.type().is_float() && !is_const(quotient->b);
 }
 
 LocalDerivative choice_of(const Expr& condition, const Expr& a, const Expr& b) {
@@ -105,6 +85,7 @@ LocalDerivative of_call(const Expr& e, const Call& call, const ExprFacts& facts)
     case RuleClass::Smooth:
       smooth = sum_of(call.args, rule.partials(call.args, e), facts);
       smooth.poles = has_poles(call.op);
+      smooth.levels_off = levels_off(call.op);
       return smooth;
     case RuleClass::Transparent:
       return same_as(e, call.args[static_cast<size_t>(rule.transparent_arg)]);
@@ -119,6 +100,32 @@ LocalDerivative of_call(const Expr& e, const Call& call, const ExprFacts& facts)
 }
 
 }  // namespace
+
+bool is_risky_op(Op op) {
+  switch (op) {
+    case Op::sqrt:
+    case Op::exp:
+    case Op::log:
+    case Op::pow:
+    case Op::tan:
+    case Op::asin:
+    case Op::acos:
+    case Op::sinh:
+    case Op::cosh:
+    case Op::acosh:
+    case Op::atanh:
+    case Op::fast_exp:
+    case Op::fast_log:
+    case Op::fast_pow:
+    case Op::fast_inverse:
+    case Op::fast_inverse_sqrt:
+    case Op::strong_mul:
+    case Op::strong_div:
+      return true;
+    default:
+      return false;
+  }
+}
 
 std::vector<Expr> post_order(const std::vector<Expr>& roots) {
   std::vector<Expr> order;
@@ -147,35 +154,33 @@ bool is_leaf(const Expr& e) {
 }
 
 ExprFacts::ExprFacts(const std::vector<Expr>& order, FunctionRef<bool(const Expr&)> is_wanted,
-                     FunctionRef<bool(const Expr&)> is_risky_leaf) {
-  for (const Expr& e : order) classify(e, is_wanted, is_risky_leaf);
+                     FunctionRef<bool(const Expr&)> is_infinite_leaf) {
+  for (const Expr& e : order) classify(e, is_wanted, is_infinite_leaf);
 }
 
 void ExprFacts::classify(const Expr& e, FunctionRef<bool(const Expr&)> is_wanted,
-                         FunctionRef<bool(const Expr&)> is_risky_leaf) {
-  bool active = false, risky = makes_risky(e), read = is_leaf(e) && !e.as<Variable>();
-  for_each_operand(e, [&](const Expr& operand) {
-    risky |= is_risky(operand);
-    read |= is_read(operand);
-  });
+                         FunctionRef<bool(const Expr&)> is_infinite_leaf) {
+  const bool floating = e.type().is_float();
+  bool active = false;
+  Finiteness own{.risky = makes_risky(e)};
+  for_each_operand(e, [&](const Expr& operand) { own.add(classified_.at(operand.get())); });
   if (is_leaf(e)) {
-    active = e.type().is_float() && is_wanted(e);
-    risky = e.type().is_float() && is_risky_leaf(e);
+    active = floating && is_wanted(e);
+    own = {.read = e.as<Variable>() == nullptr, .infinite = floating && is_infinite_leaf(e)};
   } else {
     for_each_child(e, [&](const Expr& child) { active |= is_active(child); });
-    if (active && !e.type().is_float()) {  // derivatives pass through floating values only
+    if (active && !floating) {  // derivatives pass through floating values only
       if (e.as<Cast>()) notes_.insert("a cast to " + to_string(e.type()) + " has derivative 0");
       active = false;
     }
   }
-  if (const auto* div = e.as<Div>(); div && is_const(div->b) && !is_risky(div->a)) risky = false;
-  classified_.insert(e.get());
+  if (const auto* div = e.as<Div>(); div && is_const(div->b))
+    own.risky = classified_.at(div->a.get()).risky;
+  classified_[e.get()] = own;
   if (active) active_.insert(e.get());
-  if (risky) risky_.insert(e.get());
-  if (read) read_.insert(e.get());
 }
 
-ExprFacts::Finiteness ExprFacts::finiteness_of(const Expr& factor) const {
+Finiteness ExprFacts::finiteness_of(const Expr& factor) const {
   Finiteness result;
   std::unordered_set<const ExprNode*> seen;
   std::vector<Expr> open{factor};
@@ -183,9 +188,9 @@ ExprFacts::Finiteness ExprFacts::finiteness_of(const Expr& factor) const {
     const Expr e = open.back();
     open.pop_back();
     if (!seen.insert(e.get()).second) continue;
-    if (classified_.contains(e.get())) {
-      result.risky |= is_risky(e);
-      result.read |= is_read(e);
+    auto known = classified_.find(e.get());
+    if (known != classified_.end()) {
+      result.add(known->second);
     } else {
       const auto* constant = e.as<FloatImm>();
       result.risky |= constant && !std::isfinite(constant->value);
@@ -196,8 +201,11 @@ ExprFacts::Finiteness ExprFacts::finiteness_of(const Expr& factor) const {
 }
 
 LocalDerivative local_derivative(const Expr& e, const ExprFacts& facts) {
-  if (StableForm whole = stable_form(e); !whole.operands.empty())
-    return sum_of(whole.operands, whole.partials, facts);
+  if (StableForm whole = stable_form(e); !whole.operands.empty()) {
+    LocalDerivative sum = sum_of(whole.operands, whole.partials, facts);
+    sum.levels_off = is_quotient(e);
+    return sum;
+  }
   return match(
       e, [&](const Select& s) { return choice_of(s.condition, s.true_value, s.false_value); },
       [&](const Cast& c) { return same_as(e, c.value); },
@@ -205,7 +213,10 @@ LocalDerivative local_derivative(const Expr& e, const ExprFacts& facts) {
         internal_error("vectors have no place in the definition of a Func");
       },
       [&](const Binary& b) {
-        return sum_of({b.a, b.b}, derivative_rule(e.kind()).partials({b.a, b.b}, e), facts);
+        LocalDerivative sum =
+            sum_of({b.a, b.b}, derivative_rule(e.kind()).partials({b.a, b.b}, e), facts);
+        sum.levels_off = is_quotient(e);
+        return sum;
       },
       [&](const Call& call) { return of_call(e, call, facts); },
       [&](const ExprNode& node) -> LocalDerivative {
@@ -223,9 +234,12 @@ AdjointTraits traits_of(const Expr& adjoint) {
   bool is_seed = is_leaf(top) && top.as<Call>();
   walk(adjoint, [&](const Expr& e) {
     result.masked |= e.type().is_float() && e.as<Select>();
+    result.vanished |= is_quotient(e);
     const auto* call = e.as<Call>();
     if (!call) return true;
-    result.singular |= call->call_type == CallType::Operator && has_poles(call->op);
+    const bool is_operator = call->call_type == CallType::Operator;
+    result.singular |= is_operator && has_poles(call->op);
+    result.vanished |= is_operator && levels_off(call->op);
     const auto* f = call->call_type == CallType::Func
                         ? dynamic_cast<const AdjointContents*>(call->symbol.raw())
                         : nullptr;

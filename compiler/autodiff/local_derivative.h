@@ -7,6 +7,7 @@
 
 #include <set>
 #include <string>
+#include <unordered_map>
 #include <unordered_set>
 #include <vector>
 
@@ -24,36 +25,37 @@ std::vector<Expr> post_order(const std::vector<Expr>& roots);
 // Where derivatives end inside an expression: reads of Funcs and images, variables.
 bool is_leaf(const Expr& e);
 
+struct Finiteness {
+  bool risky = false;     // infinite or NaN at finite operands
+  bool read = false;      // what a Func or image holds, however wild that is
+  bool infinite = false;  // by a leaf that may be
+  void add(const Finiteness& other) {
+    risky |= other.risky;
+    read |= other.read;
+    infinite |= other.infinite;
+  }
+};
+
 // What is true of the nodes of a DAG.
 class ExprFacts {
  public:
   // `order`: children before parents. `is_wanted` says by which leaves to differentiate,
-  // `is_risky_leaf` which of them may be infinite or NaN at finite inputs.
+  // `is_infinite_leaf` which may be infinite at finite inputs.
   ExprFacts(const std::vector<Expr>& order, FunctionRef<bool(const Expr&)> is_wanted,
-            FunctionRef<bool(const Expr&)> is_risky_leaf);
+            FunctionRef<bool(const Expr&)> is_infinite_leaf);
 
   // Depends on a wanted leaf by a path of floating values.
   bool is_active(const Expr& e) const { return active_.contains(e.get()); }
-  // May be infinite or NaN at finite operands.
-  bool is_risky(const Expr& e) const { return risky_.contains(e.get()); }
-  // May be what a Func or image holds, however wild that is.
-  bool is_read(const Expr& e) const { return read_.contains(e.get()); }
-  // The same of a factor made of nodes of the DAG.
-  struct Finiteness {
-    bool risky = false, read = false;
-    void add(const Finiteness& other) {
-      risky |= other.risky;
-      read |= other.read;
-    }
-  };
+  // What a factor made of nodes of the DAG may be.
   Finiteness finiteness_of(const Expr& factor) const;
   // Casts through which a derivative is lost.
   const std::set<std::string>& notes() const { return notes_; }
 
  private:
   void classify(const Expr& e, FunctionRef<bool(const Expr&)> is_wanted,
-                FunctionRef<bool(const Expr&)> is_risky_leaf);
-  std::unordered_set<const ExprNode*> classified_, active_, risky_, read_;
+                FunctionRef<bool(const Expr&)> is_infinite_leaf);
+  std::unordered_map<const ExprNode*, Finiteness> classified_;
+  std::unordered_set<const ExprNode*> active_;
   std::set<std::string> notes_;
 };
 
@@ -68,13 +70,17 @@ struct LocalDerivative {
   std::vector<Partial> partials;  // Sum: one an operand; an undefined factor is 0
   Expr condition;
   std::string note;
-  std::vector<bool> reads;  // Sum: whether a factor may be what memory holds
-  bool poles = false;       // partials may be infinite where the value is finite
+  std::vector<Finiteness> factors;  // Sum: what the partials may be
+  bool poles = false;               // partials may be infinite where the value is finite
+  bool levels_off = false;          // partials may be 0 where an operand is infinite
 };
 
 // Of an active node that is no leaf. Partials that may be infinite or NaN are Strong. Throws
 // Unsupported where there is no rule.
 LocalDerivative local_derivative(const Expr& e, const ExprFacts& facts);
+
+// Whether the operator's value may be infinite or NaN at finite operands.
+bool is_risky_op(Op op);
 
 // Here or in a Func between here and the output. A seed that the user gives counts as masked.
 AdjointTraits traits_of(const Expr& adjoint);

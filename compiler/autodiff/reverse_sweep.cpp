@@ -13,8 +13,8 @@ namespace {
 class Sweep {
  public:
   Sweep(const std::vector<Expr>& values, const std::vector<Expr>& seeds,
-        FunctionRef<bool(const Expr&)> is_wanted)
-      : order_(post_order(values)), facts_(order_, is_wanted, [](const Expr&) { return false; }) {
+        FunctionRef<bool(const Expr&)> is_wanted, FunctionRef<bool(const Expr&)> is_infinite_leaf)
+      : order_(post_order(values)), facts_(order_, is_wanted, is_infinite_leaf) {
     result_.notes = facts_.notes();
     for (size_t i = 0; i < values.size(); ++i) {
       if (values[i].defined() && seeds[i].defined()) add(values[i], seeds[i], traits_of(seeds[i]));
@@ -56,7 +56,8 @@ class Sweep {
         return;
       case LocalDerivative::Kind::Choice: {
         Expr zero = make_zero(state.sum.type());
-        AdjointTraits traits{true, state.traits.singular};
+        AdjointTraits traits = state.traits;
+        traits.masked = true;
         add(local.operands[0], make_select(local.condition, state.sum, zero), traits);
         add(local.operands[1], make_select(local.condition, zero, state.sum), traits);
         return;
@@ -70,10 +71,15 @@ class Sweep {
   void add_partial(const LocalDerivative& local, size_t i, const State& state) {
     Partial partial = local.partials[i];
     if (!partial.factor.defined() || !facts_.is_active(local.operands[i])) return;
-    if (state.traits.masked && local.reads[i]) partial.strength = Strength::Strong;
-    if (state.traits.singular) partial.strength = Strength::Both;
-    AdjointTraits traits{partial.factor.as<Select>() != nullptr, local.poles};
-    traits.add(state.traits);
+    const Finiteness& factor = local.factors[i];
+    AdjointTraits traits = state.traits;
+    if ((traits.masked && factor.read) || (traits.vanished && factor.infinite))
+      partial.strength = Strength::Strong;
+    if (traits.singular)
+      partial.strength = partial.strength == Strength::Strong ? Strength::Both : Strength::Cut;
+    traits.add({.masked = partial.factor.as<Select>() != nullptr,
+                .vanished = local.levels_off,
+                .singular = local.poles});
     add(local.operands[i], times_partial(state.sum, partial), traits);
   }
 
@@ -86,8 +92,9 @@ class Sweep {
 }  // namespace
 
 SweepResult sweep_reverse(const std::vector<Expr>& values, const std::vector<Expr>& seeds,
-                          FunctionRef<bool(const Expr&)> is_wanted) {
-  return Sweep(values, seeds, is_wanted).run();
+                          FunctionRef<bool(const Expr&)> is_wanted,
+                          FunctionRef<bool(const Expr&)> is_infinite_leaf) {
+  return Sweep(values, seeds, is_wanted, is_infinite_leaf).run();
 }
 
 }  // namespace retrograde::ir

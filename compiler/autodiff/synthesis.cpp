@@ -45,7 +45,8 @@ class Synthesis {
       : seed_(seed),
         options_(options),
         order_(topological_order({seed.output})),
-        regions_(order_, seed.region) {
+        regions_(order_, seed.region),
+        ranges_(order_) {
     find_active();
   }
 
@@ -181,7 +182,7 @@ class Synthesis {
       const int own_stages = adjoint.func->stage_count();
       UpdateAdjoint update = differentiate_update(
           {f, s, regions_, target, adjoint, extendable, options_.store_overwritten,
-           options_.checkpoints, [&](const Expr& leaf) { return is_wanted(leaf); }});
+           options_.checkpoints, [&](const Expr& leaf) { return is_wanted(leaf); }, ranges_});
       if (adjoint.func->stage_count() > own_stages) keep_unextended(*f, s, adjoint, own_stages);
       if (update.current.func != adjoint.func)
         register_func(update.current, f->name, target.region);
@@ -278,9 +279,10 @@ class Synthesis {
   void contribute_stage(const FuncPtr& f, const std::vector<Expr>& values,
                         const std::vector<Expr>& seeds, const IterationDomain& domain,
                         const SelfValues& self_values) {
-    SweepResult sweep = sweep_reverse(values, seeds, [&](const Expr& leaf) {
-      return is_wanted(leaf) && symbol_of(leaf) != f.get();
-    });
+    SweepResult sweep = sweep_reverse(
+        values, seeds,
+        [&](const Expr& leaf) { return is_wanted(leaf) && symbol_of(leaf) != f.get(); },
+        [&](const Expr& leaf) { return ranges_.may_be_infinite(leaf); });
     for (const std::string& note : sweep.notes) explain(Explanation::Kind::Zero, f->name, note);
     for (const LeafAdjoint& leaf : sweep.leaves) {
       add_contribution(f,
@@ -477,6 +479,7 @@ class Synthesis {
   const SynthesisOptions& options_;
   std::vector<FuncPtr> order_;
   Regions regions_;
+  ValueRanges ranges_;
   std::unordered_set<const Symbol*> active_;
   std::unordered_set<const Symbol*> passing_;  // Funcs that depend on something else active
   std::unordered_set<const Symbol*> covered_;  // inside of a custom adjoint that was used

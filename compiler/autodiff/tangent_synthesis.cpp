@@ -6,6 +6,7 @@
 #include "autodiff/adjoint_contents.h"
 #include "autodiff/custom_rules.h"
 #include "autodiff/forward_sweep.h"
+#include "autodiff/value_range.h"
 #include "diagnostics/error.h"
 #include "frontend/define.h"
 #include "frontend/var.h"
@@ -44,19 +45,21 @@ bool calls(const Expr& e, const Symbol* f) {
 struct StageTangent {
   std::vector<Expr> values;  // one a value; undefined: zero
   bool moves = false;        // a value has a tangent that is not identically zero
+  AdjointTraits traits;
 };
 
 // The tangent of one Func.
 class FuncTangent {
  public:
-  FuncTangent(const FuncPtr& f, FunctionRef<Expr(const Expr&)> tangent_of)
-      : f_(f), tangent_of_(tangent_of) {}
+  FuncTangent(const FuncPtr& f, FunctionRef<Expr(const Expr&)> tangent_of,
+              const ValueRanges& ranges)
+      : f_(f), tangent_of_(tangent_of), ranges_(ranges) {}
 
   // Null when it is identically zero. With `dual` set, the tangent reads it.
   FuncPtr build() {
     if (!moves()) return nullptr;
     tangent_ = new_func(f_->name + "_tan");
-    if (!linearise(tangent_, 0)) return build_dual();
+    if (!linearise_all(tangent_, 0)) return build_dual();
     for (int s = 0; s < f_->stage_count(); ++s) define(tangent_, s, {}, stages_[s].values);
     return tangent_;
   }
@@ -72,6 +75,19 @@ class FuncTangent {
     bool result = false;
     for (int s = 0; s < f_->stage_count(); ++s) result |= linearise_stage(s, nullptr, 0).moves;
     return result;
+  }
+
+  // Tangents pass through the stages again and again: what one does to them concerns all.
+  bool linearise_all(const FuncPtr& own, size_t offset) {
+    AdjointTraits& traits = static_cast<AdjointContents&>(*own).traits;
+    AdjointTraits before;
+    bool alone = false;
+    do {
+      before = traits;
+      alone = linearise(own, offset);
+      for (const StageTangent& stage : stages_) traits.add(stage.traits);
+    } while (traits != before && f_->stage_count() > 1);
+    return alone;
   }
 
   // The tangents of all stages, where the Func's own stand at `offset` of `own`. False when they
@@ -100,7 +116,7 @@ class FuncTangent {
     std::vector<Expr> values;
     for (const Expr& v : f_->stage(s).values) values.push_back(without_lets(v));
     ForwardResult swept = sweep(s, values, tangent_of);
-    StageTangent result{swept.tangents, swept.moves};
+    StageTangent result{swept.tangents, swept.moves, swept.traits};
     notes_.insert(swept.notes.begin(), swept.notes.end());
     return result;
   }
@@ -108,7 +124,8 @@ class FuncTangent {
   ForwardResult sweep(int s, const std::vector<Expr>& values,
                       FunctionRef<Expr(const Expr&)> tangent_of) const {
     try {
-      return sweep_forward(values, tangent_of, [](const Expr&) { return false; });
+      return sweep_forward(values, tangent_of,
+                           [&](const Expr& leaf) { return ranges_.may_be_infinite(leaf); });
     } catch (const Unsupported& e) {  // an expression does not know where it stands
       Message m = e.message();
       m.asked += " in " + quoted(stage_name(*f_, s));
@@ -118,7 +135,8 @@ class FuncTangent {
 
   FuncPtr build_dual() {
     dual_ = new_func(f_->name + "_dual");
-    linearise(dual_, count());
+    linearise_all(dual_, count());
+    static_cast<AdjointContents&>(*tangent_).traits = static_cast<AdjointContents&>(*dual_).traits;
     for (int s = 0; s < f_->stage_count(); ++s)
       define(dual_, s, f_->stage(s).values, stages_[s].values);
     std::vector<Expr> values, args = variables_of(*f_);
@@ -148,6 +166,7 @@ class FuncTangent {
 
   const FuncPtr& f_;
   FunctionRef<Expr(const Expr&)> tangent_of_;
+  const ValueRanges& ranges_;
   std::vector<StageTangent> stages_;
   std::set<std::string> notes_;
   FuncPtr tangent_, dual_;
@@ -155,7 +174,8 @@ class FuncTangent {
 
 class Synthesis {
  public:
-  Synthesis(const FuncPtr& output, const Directions& directions) : directions_(directions) {
+  Synthesis(const FuncPtr& output, const Directions& directions)
+      : directions_(directions), ranges_(topological_order({output})) {
     result_.order = topological_order({output});
   }
 
@@ -203,7 +223,7 @@ class Synthesis {
 
   FuncPtr differentiate_stages(const FuncPtr& f) {
     auto tangent_of = [&](const Expr& leaf) { return tangent_of_leaf(leaf); };
-    FuncTangent builder(f, tangent_of);
+    FuncTangent builder(f, tangent_of, ranges_);
     FuncPtr own = builder.build();
     for (const std::string& note : builder.notes()) explain(Explanation::Kind::Zero, *f, note);
     if (!own) return nullptr;
@@ -243,6 +263,7 @@ class Synthesis {
           cast_to(tangent_type(f.types[k]), call_value(found->second, args, static_cast<int>(k))));
     }
     define_pure(sum, args, values);
+    static_cast<AdjointContents&>(*sum).traits = static_cast<const AdjointContents&>(*own).traits;
     result_.funcs.push_back(sum);
     return sum;
   }
@@ -279,6 +300,7 @@ class Synthesis {
   }
 
   const Directions& directions_;
+  ValueRanges ranges_;
   TangentResult result_;
 };
 

@@ -31,6 +31,7 @@
 #include "autodiff/explain.h"
 #include "autodiff/regions.h"
 #include "autodiff/reverse_sweep.h"
+#include "autodiff/value_range.h"
 #include "ir/equal.h"
 
 namespace retrograde::ir {
@@ -54,6 +55,7 @@ struct UpdateQuery {
   bool store_overwritten;
   CheckpointBudget checkpoints;
   std::function<bool(const Expr&)> is_wanted;
+  const ValueRanges& ranges;
 };
 
 // A contribution to what `leaf` reads, for each point of the domain.

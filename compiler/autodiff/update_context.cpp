@@ -175,9 +175,9 @@ std::vector<Expr> UpdateContext::needed_reads(const SweepResult& sweep) const {
 }
 
 SweepResult UpdateContext::sweep(const std::vector<Expr>& seeds) const {
-  return sweep_reverse(values, seeds, [&](const Expr& leaf) {
-    return as_call_of(leaf, f) || query.is_wanted(leaf);
-  });
+  return sweep_reverse(
+      values, seeds, [&](const Expr& leaf) { return as_call_of(leaf, f) || query.is_wanted(leaf); },
+      [&](const Expr& leaf) { return query.ranges.may_be_infinite(leaf); });
 }
 
 SweepResult UpdateContext::sweep_at_write(const FuncPtr& adjoint) const {

@@ -46,11 +46,13 @@ Scalar eval(const Expr& e, const Env& env) {
       });
 }
 
+const auto no_leaf = [](const Expr&) { return false; };
+
 // Leaves are Variables that count as reads of images: every one is wanted.
 Env gradient(const Expr& e, const Env& env, double seed = 1) {
-  SweepResult sweep =
-      sweep_reverse({e}, {make_const(adjoint_type(e.type()), seed)},
-                    [](const Expr& leaf) { return leaf.as<Variable>() != nullptr; });
+  SweepResult sweep = sweep_reverse(
+      {e}, {make_const(adjoint_type(e.type()), seed)},
+      [](const Expr& leaf) { return leaf.as<Variable>() != nullptr; }, no_leaf);
   Env result;
   for (const auto& [name, value] : env) result[name] = 0;
   for (const LeafAdjoint& leaf : sweep.leaves) {
@@ -238,9 +240,10 @@ TEST(DerivativeRules, StopGradientAndIntegersPassNothing) {
 TEST(DerivativeRules, CallsOfCFunctionsAreRefusedOnlyWhereTheGradientIsWanted) {
   Expr call = call_extern("mystery", f64, {x});
   EXPECT_THROW(gradient(call, {{"x", 1}}), Unsupported);
-  SweepResult sweep = sweep_reverse({call * y}, {num(1)}, [](const Expr& leaf) {
-    return leaf.as<Variable>() && leaf.as<Variable>()->name == "y";
-  });
+  SweepResult sweep = sweep_reverse(
+      {call * y}, {num(1)},
+      [](const Expr& leaf) { return leaf.as<Variable>() && leaf.as<Variable>()->name == "y"; },
+      no_leaf);
   EXPECT_EQ(sweep.leaves.size(), 1u);
 }
 

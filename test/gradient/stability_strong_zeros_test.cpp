@@ -89,6 +89,23 @@ TEST_F(StrongZeros, StandOnlyWhereAFactorMayBeInfinite) {
   EXPECT_TRUE(has_strong_zeros(select(b(x) > 1, b(x), 3.0f))) << "a choice of what memory holds";
 }
 
+TEST_F(StrongZeros, StandOnlyWhereAnInfiniteFactorMayMeetASlopeOfZero) {
+  const auto has_strong_zeros = [&](const Expr& factor, bool levels_off) {
+    Func held("held"), product("product"), f("f");
+    held(x) = factor;
+    product(x) = a(x) * held(x);
+    f(x) = levels_off ? tanh(product(x)) : 3.0f * product(x);
+    const Func gradient = propagate_adjoints(sum_of(f))(a);
+    return ir::print(gradient.value()).find("strong_") != std::string::npos;
+  };
+  EXPECT_TRUE(has_strong_zeros(exp(b(x)), true));
+  EXPECT_TRUE(has_strong_zeros(1.0f / b(x), true));
+  EXPECT_FALSE(has_strong_zeros(exp(b(x)), false)) << "the product is infinite, too";
+  EXPECT_FALSE(has_strong_zeros(1.0f / (1.0f + exp(b(x))), true)) << "at most 1";
+  EXPECT_FALSE(has_strong_zeros(tanh(b(x)), true)) << "at most 1";
+  EXPECT_FALSE(has_strong_zeros(b(x) * b(x), true)) << "what memory holds counts as finite";
+}
+
 TEST_F(StrongZeros, ConstantsThatAreNotFiniteWhereNobodyReads) {
   set(a, {1, 2, 3, 4});
   for (float wild : {nan, inf}) {
@@ -137,6 +154,52 @@ TEST_F(StrongZeros, SeedsOfZero) {
   product(x) = inverse(x) * a(x) * a(x);
   Buffer<float> found = propagate_adjoints(product, b)(a).realize({4});
   for (int i = 0; i < 4; ++i) EXPECT_NEAR(found(i), i % 2 ? 0.0f : 1.0f, 1e-6) << i;
+}
+
+// The exponential of -inf is 0, and so is its slope, which then meets the infinity.
+TEST_F(StrongZeros, AnInfiniteFactorThatAnotherFuncHolds) {
+  set(a, {0, 0, 0, 0});
+  set(b, {1, 2, 0.5f, 3});
+  Func largest("largest"), f("f");
+  RDom none(0, 0);
+  largest() = -inf;
+  largest() = max(largest(), a(none));
+  f(x) = exp(largest() * b(x));
+  expect(f, b, {0, 0, 0, 0});
+}
+
+TEST_F(StrongZeros, AnInfiniteFactorIsFollowedThroughFuncs) {
+  set(a, {1, 0, 2, 0});
+  set(b, {1, 2, 0.5f, 3});
+  Func inverse("inverse"), sum("sum"), product("product"), f("f");
+  RDom r(0, 2);
+  inverse(x) = 1.0f / a(x);
+  sum(x) = 0.0f;
+  sum(x) += inverse(x) * 0.5f * cast<float>(r + 1);
+  product(x) = sum(x) * b(x);
+  f(x) = 1.0f / (1.0f + product(x));
+  expect(f, b, {-0.24f, 0, -0.75f / 1.375f / 1.375f, 0});
+}
+
+TEST_F(StrongZeros, AnInfiniteTangentMeetsASlopeOfZero) {
+  set(a, {0, 1, 2, 0.5f});
+  Func f("f"), inverse("inverse"), g("g");
+  f(x) = exp(-1.0f / a(x));
+  const auto slope = [](float v) { return std::exp(-1 / v) / (v * v); };
+  expect(f, a, {0, slope(1), slope(2), slope(0.5f)});
+  inverse(x) = 1.0f / a(x);
+  g(x) = exp(-inverse(x));
+  expect(g, a, {0, slope(1), slope(2), slope(0.5f)});
+}
+
+TEST_F(StrongZeros, AFactorOfZeroAfterAPole) {
+  set(a, {0, 1, 4, 0.25f});
+  Func f("f"), root("root"), g("g");
+  f(x) = a(x) * sqrt(a(x));
+  expect(f, a, {0, 1.5f, 3, 0.75f});
+  root(x) = sqrt(a(x));
+  g(x) = root(x) * a(x);
+  expect(g, a, {0, 1.5f, 3, 0.75f});
 }
 
 TEST_F(StrongZeros, NaNsThatTheOutputUsesStay) {
