@@ -108,22 +108,12 @@ class Planner {
 
   // ---- one step ----
 
-  // Values of a step pass through the adjoints of later ones: what masks or blows up one of them
-  // may do so to all.
   SweepResult sweep_all(const FuncPtr& adjoint) {
     AdjointTraits& traits = machine_->traits;
     if (auto* made = dynamic_cast<AdjointContents*>(adjoint.get())) traits.add(made->traits);
     traits.masked = true;
     choose_types({});
-    bool was_singular = false;
-    SweepResult sweep;
-    do {
-      was_singular = traits.singular;
-      sweep = c_.sweep(seeds());
-      for (const LeafAdjoint& leaf : sweep.leaves)
-        traits.singular |= traits_of(leaf.adjoint).singular;
-    } while (traits.singular != was_singular);
-    choose_types(sweep.leaves);
+    choose_types(c_.sweep_iterations(machine_, [&] { return seeds(); }).leaves);
     return c_.sweep(seeds());
   }
 

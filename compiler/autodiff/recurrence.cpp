@@ -37,7 +37,8 @@ class Recurrence {
     if (!find_values(*reads)) return false;
     if (has_recurrence) {
       own_current();
-      sweep = c_.sweep_at_write(result_.current.func);
+      sweep = c_.sweep_iterations(result_.current.func,
+                                  [&] { return c_.adjoints_at_write(result_.current.func); });
       append_reverse_loop(self_contributions(*reads, sweep, true));
     }
     start_previous(written, self_contributions(*reads, sweep, false));

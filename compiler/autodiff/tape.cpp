@@ -36,7 +36,7 @@ class Tape {
   void run() {
     begin_adjoint();
     seeds_ = saved_seeds();
-    SweepResult sweep = c_.sweep(seeds_);
+    SweepResult sweep = c_.sweep_iterations(adjoint_, [&] { return seeds_; });
     find_needed(sweep);
     if (!needed_.empty()) keep_values();
     append_reverse(sweep);

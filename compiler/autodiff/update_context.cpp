@@ -180,13 +180,32 @@ SweepResult UpdateContext::sweep(const std::vector<Expr>& seeds) const {
       [&](const Expr& leaf) { return query.ranges.may_be_infinite(leaf); });
 }
 
-SweepResult UpdateContext::sweep_at_write(const FuncPtr& adjoint) const {
+std::vector<Expr> UpdateContext::adjoints_at_write(const FuncPtr& adjoint) const {
   std::vector<Expr> seeds;
   for (size_t k = 0; k < values.size(); ++k) {
     seeds.push_back(f->types[k].is_float() ? call_value(adjoint, write, static_cast<int>(k))
                                            : Expr());
   }
-  return sweep(seeds);
+  return seeds;
+}
+
+SweepResult UpdateContext::sweep_at_write(const FuncPtr& adjoint) const {
+  return sweep(adjoints_at_write(adjoint));
+}
+
+SweepResult UpdateContext::sweep_iterations(const FuncPtr& adjoint,
+                                            FunctionRef<std::vector<Expr>()> seeds) const {
+  AdjointTraits& traits = static_cast<AdjointContents&>(*adjoint).traits;
+  AdjointTraits before;
+  SweepResult result;
+  do {
+    before = traits;
+    result = sweep(seeds());
+    for (const LeafAdjoint& leaf : result.leaves) {
+      if (as_call_of(leaf.leaf, f)) traits.add(traits_of(leaf.adjoint));
+    }
+  } while (traits != before);
+  return result;
 }
 
 void UpdateContext::refuse_overwritten(const Expr& read) const {

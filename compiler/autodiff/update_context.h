@@ -37,11 +37,16 @@ struct UpdateContext {
   // Distinct reads of f on the right-hand side, those inside of another's index first.
   std::vector<Expr> self_reads() const;
   bool reads_self() const { return !self_reads().empty(); }
+  std::vector<Expr> adjoints_at_write(const FuncPtr& adjoint) const;
   // The values, with `seeds` as their adjoints (undefined: none), down to reads of f and to what is
   // wanted.
   SweepResult sweep(const std::vector<Expr>& seeds) const;
   // The same with the adjoint of f at the place written.
   SweepResult sweep_at_write(const FuncPtr& adjoint) const;
+  // The values of all iterations, whose adjoints `adjoint` holds: what one iteration passes to the
+  // reads of f reaches all earlier ones, so its traits become the adjoint's.
+  SweepResult sweep_iterations(const FuncPtr& adjoint,
+                               FunctionRef<std::vector<Expr>()> seeds) const;
   // Those of self_reads() whose value is needed by what a sweep found: by a partial, a place, or
   // another read's place.
   std::vector<Expr> needed_reads(const SweepResult& sweep) const;

@@ -202,6 +202,35 @@ TEST_F(StrongZeros, AFactorOfZeroAfterAPole) {
   expect(g, a, {0, 1.5f, 3, 0.75f});
 }
 
+// f <- b(t) sqrt(f) for t = 0, 1 with b(0) = 0: what is infinite behind the pole at t = 1 meets a
+// factor of 0 at t = 0. The last value is 0 whatever f was.
+TEST_F(StrongZeros, AFactorOfZeroInAnEarlierStepThanThePole) {
+  set(a, {4, 1, 9, 16});
+  set(b, {0, 1, 0, 1});
+  RDom t(0, 2);
+  Func places("places"), scan("scan"), folded("folded");
+  Var s("s");
+  scan(x, s) = a(x);
+  scan(x, t + 1) = b(t) * sqrt(scan(x, t));
+  places(x) = x * 0;
+  folded(x, s) = a(x);
+  folded(x, places(t)) = b(t) * sqrt(folded(x, places(t)));
+  for (const Func& f : {scan, folded}) {
+    Func loss("loss");
+    RDom r(0, 4);
+    loss() += f(r, f.name() == scan.name() ? 2 : 0);
+    Func gradient = propagate_adjoints(loss, {.overwritten = Overwritten::Store})(a);
+    Buffer<float> found = gradient.realize({4});
+    for (int i = 0; i < 4; ++i) {
+      EXPECT_EQ(found(i), 0) << f.name();
+      Buffer<float> unit(4);
+      unit.fill(0);
+      unit(i) = 1;
+      EXPECT_EQ(evaluate_scalar(propagate_tangents(loss, {{a, unit}})(loss)), 0) << f.name();
+    }
+  }
+}
+
 TEST_F(StrongZeros, NaNsThatTheOutputUsesStay) {
   set(a, {-1, 4, 1, 1});
   set(b, {2, 2, 2, 2});
