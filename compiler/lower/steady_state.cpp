@@ -122,6 +122,7 @@ Stmt SteadyRewriter::rewrite(const Stmt& s) {
 Expr SteadyRewriter::rewrite_let(const Expr& e, const Let& n) {
   Expr value = bind(n.name, n.value);
   Expr body = (*this)(n.body);
+  if (is_const(body)) return body;
   return value.same_as(n.value) && body.same_as(n.body) ? e : make_let(n.name, value, body);
 }
 

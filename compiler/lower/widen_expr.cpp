@@ -346,7 +346,8 @@ Expr Widener::widen_let(const Expr& e, const Let& n) {
   std::string name = is_first ? n.name : fresh_(n.name);
   if (varies) {
     bind(n.name, variable(name, value.type()));
-    return make_let(name, value, (*this)(n.body));
+    Expr body = (*this)(n.body);
+    return body.same_as(n.body) ? make_broadcast(body, iterations_) : make_let(name, value, body);
   }
   Expr body = is_first ? n.body : substitute(n.body, n.name, variable(name, value.type()));
   return make_let(name, value, (*this)(body));
