@@ -79,4 +79,9 @@ std::optional<AtomicUpdate> find_atomic_update(const Store& store) {
   return update.operand.defined() ? std::optional(update) : std::nullopt;
 }
 
+Expr updated(const AtomicUpdate& update, const Expr& old, const Expr& operand) {
+  if (update.op != Op::none) return call_op(update.op, {old, operand});
+  return binary(update.is_negated ? Kind::Sub : update.kind, old, operand);
+}
+
 }  // namespace retrograde::ir

@@ -19,6 +19,8 @@ struct AtomicUpdate {
 // Of integers also a chain of one associative operation: the operands are put together. None when
 // the store has another form.
 std::optional<AtomicUpdate> find_atomic_update(const Store& store);
+// What the element `old` becomes by it, with `operand` in place of its own.
+Expr updated(const AtomicUpdate& update, const Expr& old, const Expr& operand);
 
 // Whether one instruction can exchange a value of the type.
 bool is_one_word(Type type);

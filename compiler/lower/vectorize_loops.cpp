@@ -9,15 +9,17 @@
 //     out[x + 1] = in[x] * k         =>   out[ramp(a + 1, 1, 8)] = in[ramp(a, 1, 8)] * broadcast(k)
 //     if (x < n) { f[x*2] = 0 }           f[ramp(a*2, 2, 8) if ramp(a, 1, 8) < broadcast(n)] = 0
 //     s[0] = s[0] + in[x]                 s[0] = s[0] + reduce(add, in[ramp(a, 1, 8)], 1)
-//   }
+//     h[i(x)] = h[i(x)] + g(x)            let p = i(ramp(a, 1, 8)), t = g(ramp(a, 1, 8))
+//   }                                     h[p.0] = h[p.0] + t.0; ... h[p.7] = h[p.7] + t.7
 //
 // Method: inner loops first. Expressions are widened by widen_expr.h; a condition that varies
 //         becomes the predicate of the loads and stores under it. What has no vector form runs lane
 //         by lane: statements with effects (print, require, assertions), loops whose bounds vary,
 //         allocations whose size varies, stores to one element that are no reduction.
-//         The whole loop stays a serial one when a store may hit one element in several lanes and
-//         the body reads that buffer elsewhere (argmax: two stores and the comparison of the old
-//         value; histograms).
+//         Where lanes may hit one element, an update of the element by one operation keeps the
+//         order of the iterations: places and operands are vectors, the elements are not.
+//         The whole loop stays a serial one when the body reads that buffer elsewhere (argmax: two
+//         stores and the comparison of the old value).
 // Not done: loops with varying bounds under a mask; reductions through casts.
 // Source: folklore; the mask of a branch is Allen, Kennedy, Porterfield & Warren 1983
 //         (if-conversion).
@@ -305,7 +307,11 @@ class LoopVectorizer {
     }
     if (varies(n.index)) {
       Expr index = widen_(n.index);
-      if (!hits_each_element_once(index)) require_no_load(n.name, 0);
+      const bool may_meet = !hits_each_element_once(index);
+      if (may_meet) {
+        if (auto update = as_plain_update(n)) return update_in_order(n, index, *update);
+        require_no_load(n.name, 0);
+      }
       return make_store(n.name, widen_.spread(n.value), index, widen_.masked(n.predicate, lanes),
                         n.symbol);
     }
@@ -313,6 +319,36 @@ class LoopVectorizer {
     require_no_load(n.name, 0);
     bool is_same = !varies(n.value) && !varies(n.predicate);
     return is_same ? s : lane_by_lane(s);  // the last lane wins
+  }
+
+  // f[i] = f[i] op g, and nothing else in the body reads f.
+  std::optional<AtomicUpdate> as_plain_update(const Store& n) const {
+    if (!n.index.type().is_scalar() || n.predicate.defined() || !n.value.type().is_scalar())
+      return std::nullopt;
+    std::unordered_map<std::string, int> own;
+    count_loads(n.value, own);
+    count_loads(n.index, own);
+    auto total = facts_.loads.find(n.name);
+    if (total == facts_.loads.end() || total->second > own[n.name]) return std::nullopt;
+    return find_atomic_update(n);
+  }
+
+  // Places and operands are vectors; the elements change one after the other, in the order of the
+  // iterations, as several may be the same.
+  Stmt update_in_order(const Store& n, const Expr& index, const AtomicUpdate& update) {
+    Expr operand = widen_.spread(update.operand);
+    const std::string places = fresh_(loop_.name + ".places"),
+                      terms = fresh_(loop_.name + ".terms");
+    std::vector<Stmt> stores;
+    for (int i = 0; i < iterations_; ++i) {
+      Expr place = extract_iteration(variable(places, index.type()), i, 1);
+      Expr term = extract_iteration(variable(terms, operand.type()), i, 1);
+      Expr old = make_load(n.value.type(), n.name, place, {}, n.symbol);
+      Stmt store = make_store(n.name, updated(update, old, term), place, {}, n.symbol);
+      const Expr& mask = widen_.mask();
+      stores.push_back(mask.defined() ? make_if(extract_iteration(mask, i, 1), store) : store);
+    }
+    return make_let(places, index, make_let(terms, operand, make_block(std::move(stores))));
   }
 
   // One operation on the element stays a vector, whose lanes may hit one element: it is stored lane
