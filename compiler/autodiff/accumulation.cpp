@@ -71,6 +71,23 @@ bool is_range_condition(const Expr& e) {
   return result;
 }
 
+// The conditions of a gather that fail in a border only: those on ranges, in which reduction
+// variables move no further than a stencil does. Loops are cut there. What a wider reduction
+// variable decides becomes the ends of its own loop (trim_loops).
+constexpr double stencil_reach = 64;
+bool fails_in_a_border(const Expr& e, const std::vector<ReductionVariable>& rvars) {
+  if (!is_range_condition(e)) return false;
+  return std::all_of(rvars.begin(), rvars.end(), [&](const ReductionVariable& r) {
+    auto extent = as_const_int(r.extent);
+    return !uses_variable(e, r.var) || (extent && static_cast<double>(*extent) <= stencil_reach);
+  });
+}
+Expr with_likely_parts(const Expr& predicate, const std::vector<ReductionVariable>& rvars) {
+  if (const auto* both = predicate.as<And>())
+    return with_likely_parts(both->a, rvars) && with_likely_parts(both->b, rvars);
+  return fails_in_a_border(predicate, rvars) ? likely(predicate) : predicate;
+}
+
 Expr masked(const Expr& predicate, const Expr& value) {
   if (!predicate.defined()) return value;
   Expr condition = is_range_condition(predicate) ? likely(predicate) : predicate;
@@ -235,7 +252,9 @@ class Builder {
       if (term.defined() && !g.rdom) term = masked(g.predicate, term);
       values.push_back(term.defined() ? self + cast_to(self.type(), term) : self);
     }
-    append_update(result_.func, g.lhs, values, rvars_of(g), g.rdom ? g.predicate : Expr());
+    Expr predicate;
+    if (g.rdom && g.predicate.defined()) predicate = with_likely_parts(g.predicate, g.rdom->vars);
+    append_update(result_.func, g.lhs, values, rvars_of(g), predicate);
     result_.stages.push_back(g.scatters ? Accumulation::Scatter : Accumulation::Gather);
   }
 
@@ -336,7 +355,10 @@ class Builder {
     define_pure(parts, parts_point(g, args_, lane, part), zeros);
 
     Slice slice = slice_of(g, lane, part, parts_of(g));
-    if (g.predicate.defined()) slice.conditions.push_back(substitute(g.predicate, slice.place));
+    if (g.predicate.defined()) {
+      slice.conditions.push_back(
+          substitute(with_likely_parts(g.predicate, g.rdom->vars), slice.place));
+    }
     std::vector<Expr> element;
     for (const Expr& e : g.lhs) element.push_back(substitute(e, slice.place));
     std::vector<Expr> lhs = parts_point(g, element, lane, part), values;
