@@ -1,6 +1,6 @@
 // gradients.cpp -- run time of gradients beside that of their programs.
 //
-//   bench_gradients [--output FILE] [--side N] [--rounds N]
+//   bench_gradients [--program NAME] [--output FILE] [--side N] [--rounds N]
 //
 // The programs are the large ones of the gradient suite (test/gradient/programs_large.h). Both
 // sides have a fair schedule: gradients their default one; programs the same kind (what reduces or
@@ -27,7 +27,7 @@ using namespace retrograde::gradient;
 constexpr int lanes = 16, parts = 64;
 
 struct Options {
-  std::string output;
+  std::string program, output;  // empty: all; none
   int side = 1024, rounds = 15;
 };
 
@@ -35,7 +35,9 @@ Options parse(int argc, char** argv) {
   Options options;
   for (int i = 1; i + 1 < argc; i += 2) {
     const std::string name = argv[i];
-    if (name == "--output") {
+    if (name == "--program") {
+      options.program = argv[i + 1];
+    } else if (name == "--output") {
       options.output = argv[i + 1];
     } else if (name == "--side") {
       options.side = std::atoi(argv[i + 1]);
@@ -161,7 +163,9 @@ int main(int argc, char** argv) {
   const Options options = parse(argc, argv);
   std::printf("%-34s %10s %10s %8s\n", "program", "primal ms", "gradient", "ratio");
   nlohmann::json report{{"side", options.side}, {"rounds", options.rounds}};
-  for (const LargeProgram& program : large_programs())
-    report["programs"].push_back(measure(program, options));
+  for (const LargeProgram& program : large_programs()) {
+    if (options.program.empty() || options.program == program.name)
+      report["programs"].push_back(measure(program, options));
+  }
   if (!options.output.empty()) std::ofstream(options.output) << report.dump(2) << "\n";
 }

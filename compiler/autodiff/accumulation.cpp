@@ -25,6 +25,8 @@ constexpr double elements_an_iteration = 4;
 constexpr int least_parts = 4;
 // Elements of a part's vector: neighbouring iterations accumulate apart.
 constexpr int lane_count = 16;
+// Elements of one part of a scatter, lanes included, that stay in a near cache.
+constexpr double near_elements = 1 << 14;
 // Below so many elements, with so many iterations each, the pure dimensions alone do not fill a
 // machine.
 constexpr double few_elements = 64, many_iterations = 4096, unknown_elements = 1e9;
@@ -270,14 +272,27 @@ class Builder {
   // iterations, the fewer parts. A power of two.
   int parts_of(const Gather& g) const {
     if (!g.scatters || target_.region.size() != g.pure.size()) return part_count;
-    double elements = 1;
-    for (const LoopVariable& v : target_.region) elements *= extent_of(v);
+    const double elements = elements_of_target();
     if (elements >= unknown_elements) return part_count;
     const double most = iterations_of(g, many_iterations) * elements_of(g) * elements_an_iteration /
                         std::max(elements, 1.0);
     int parts = part_count;
     while (parts > most && parts > 1) parts /= 2;
     return parts;
+  }
+  // Lanes let a gather add in vectors. In a scatter, neighbouring iterations often meet in one
+  // element, and would wait for each other: lanes have elements of their own where these are few.
+  bool has_lanes(const Gather& g) const {
+    if (!g.scatters) return true;
+    if (target_.region.size() != g.pure.size()) return false;
+    const double elements = elements_of_target() * lane_count;
+    const double iterations = iterations_of(g, many_iterations) * elements_of(g);
+    return elements <= near_elements && elements * parts_of(g) <= iterations;
+  }
+  double elements_of_target() const {
+    double elements = 1;
+    for (const LoopVariable& v : target_.region) elements *= extent_of(v);
+    return elements;
   }
   // A loop of unknown extent counts as `unknown` iterations.
   static double iterations_of(const Gather& g, double unknown) {
@@ -343,13 +358,12 @@ class Builder {
   static Expr min_of(const Expr& a, const Expr& b) { return binary(Kind::Min, a, b); }
 
   // parts(lane, y..., part) accumulates a slice of the reduction domain; then adj(y...) sums over
-  // lanes and parts. Elements fixed on the left-hand side need no y. A scatter has no lanes: its
-  // iterations may meet.
+  // lanes and parts. Elements fixed on the left-hand side need no y.
   void add_privatised(const UpdateGroup& group) {
     const Gather& g = group.gather;
     FuncPtr parts = new_func(claim_name(name_ + "_parts"));
     Expr part = variable(unique_name("part")),
-         lane = g.scatters ? Expr() : variable(unique_name("lane"));
+         lane = has_lanes(g) ? variable(unique_name("lane")) : Expr();
     std::vector<Expr> zeros;
     for (Type t : types_) zeros.push_back(make_zero(t));
     define_pure(parts, parts_point(g, args_, lane, part), zeros);

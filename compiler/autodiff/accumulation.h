@@ -4,11 +4,13 @@
 // become update definitions; those with the same left-hand side, reduction domain and predicate
 // share one. Who owns an element:
 //   gather      each element is written by the iterations of its own pure variables only: race-free
-//   in parallel. scatter     an index depends on data: serial inside each element of the pure
-//   dimensions. privatised  few elements are left to run over in parallel: a fixed number of parts
-//   of the outermost reduction
-//               variable, and lanes of the innermost, accumulate apart in a Func of their own, and
-//               are then summed in order. The result does not depend on the number of threads.
+//               in parallel.
+//   scatter     an index depends on data: serial inside each element of the pure dimensions; places
+//               and terms are computed in vectors.
+//   privatised  few elements are left to run over in parallel: a fixed number of parts of the
+//               outermost reduction variable, and lanes of the innermost, accumulate apart in a
+//               Func of their own, and are then summed in order. A scatter has lanes where its
+//               elements are few. The result does not depend on the number of threads.
 //
 // Long sums. Adding n float32 terms one after the other may lose log2(n) bits: 12 million times 0.1
 // is wrong by a tenth. An adjoint in float32 that sums many_terms iterations or more for an element

@@ -5,8 +5,10 @@
 
 #include "autodiff/adjoint_contents.h"
 #include "autodiff/regions.h"
+#include "frontend/rdom.h"
 #include "frontend/stage.h"
 #include "ir/build.h"
+#include "ir/equal.h"
 #include "ir/visit.h"
 
 namespace retrograde::ir {
@@ -124,18 +126,22 @@ class Chooser {
     ChosenSchedule result{f.schedule, {}};
     result.func.compute_level.kind = result.func.store_level.kind = LoopLevel::Kind::Root;
     for (int s = 0; s < f.stage_count(); ++s) {
-      schedule_stage(scratch, s);
+      schedule_stage(scratch, s, scatters_in_order(f, f.stage(s)));
       result.stages.push_back(scratch->stage(s).schedule);
     }
     return result;
   }
 
   // Pure dimensions only: their iterations are independent whatever the stage does.
-  static void schedule_stage(const FuncPtr& f, int s) {
+  static void schedule_stage(const FuncPtr& f, int s, bool scatters) {
     Stage stage(f, s);
     std::vector<size_t> pure;
     for (size_t d = 0; d < f->args.size(); ++d) {
       if (is_pure_position(*f, f->stage(s), d)) pure.push_back(d);
+    }
+    if (scatters) {
+      RVar innermost(f->stage(s).rvars[0].var);
+      stage.allow_race_conditions().vectorize(innermost, lanes, TailStrategy::GuardWithIf);
     }
     if (pure.empty()) return;
     Var outermost(f->args[pure.back()]);
@@ -145,6 +151,41 @@ class Chooser {
     Var innermost(f->args[0]);
     stage.vectorize(innermost, lanes, TailStrategy::GuardWithIf);
     if (pure.size() == 1 && reduces) stage.parallel(innermost);  // of the vectors
+  }
+
+  // f(places) += terms, where data decide the place along the first dimension, over a loop that is
+  // worth vectors. Vectors of places and terms are computed; lowering adds them in the order of the
+  // iterations (vectorize_loops.h), so that this is no race.
+  static bool scatters_in_order(const FuncContents& f, const Definition& stage) {
+    if (stage.rvars.empty() || stage.args.empty()) return false;
+    auto extent = as_const_int(stage.rvars[0].extent);
+    if (extent && *extent < lanes) return false;
+    bool by_data = false;
+    walk(stage.args[0], [&](const Expr& e) {
+      const auto* call = e.as<Call>();
+      by_data |= call && call->call_type != CallType::Operator;
+      return !by_data;
+    });
+    if (!by_data) return false;
+    return std::all_of(stage.values.begin(), stage.values.end(), [&](const Expr& value) {
+      const auto* sum = value.as<Add>();
+      return sum && as_self(sum->a, f, stage) && !reads(sum->b, f);
+    });
+  }
+  static bool as_self(const Expr& e, const FuncContents& f, const Definition& stage) {
+    const auto* call = e.as<Call>();
+    return call && call->symbol.raw() == &f &&
+           std::equal(call->args.begin(), call->args.end(), stage.args.begin(), stage.args.end(),
+                      [](const Expr& a, const Expr& b) { return equal(a, b); });
+  }
+  static bool reads(const Expr& e, const FuncContents& f) {
+    bool found = false;
+    walk(e, [&](const Expr& node) {
+      const auto* call = node.as<Call>();
+      found |= call && call->symbol.raw() == &f;
+      return !found;
+    });
+    return found;
   }
 
   const std::vector<FuncPtr>& outputs_;

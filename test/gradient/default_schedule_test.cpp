@@ -5,6 +5,9 @@
 
 #include "autodiff/derivative.h"
 #include "frontend/func.h"
+#include "ir/build.h"
+#include "ir/print.h"
+#include "ir/visit.h"
 
 namespace retrograde {
 namespace {
@@ -50,6 +53,91 @@ TEST_F(DefaultSchedule, AHandScheduleOfThePrimalKeepsItsInlinedFuncsInlined) {
   blur.compute_root();
   Derivative d = propagate_adjoints(loss);
   EXPECT_FALSE(choose(d(a)).contains(heavy.function().get()));
+}
+
+void expect_all_likely(const Expr& condition) {
+  if (const auto* both = condition.as<ir::And>()) {
+    expect_all_likely(both->a);
+    expect_all_likely(both->b);
+    return;
+  }
+  const auto* call = condition.as<ir::Call>();
+  EXPECT_TRUE(call && call->is_op(ir::Op::likely)) << print(condition);
+}
+
+// f(x, y) += a(x + r, y): the gradient reads the adjoint at x - r, which is inside but for a
+// border.
+TEST_F(DefaultSchedule, ConditionsOfAGatherOverAStencilAreTestedInItsBordersOnly) {
+  Buffer<float> wide(640, 4), weights(5);
+  Func f("f"), sum("sum");
+  RDom taps(0, 5), r(0, 636, 0, 4);
+  f(x, y) = 0.0f;
+  f(x, y) += wide(x + taps, y) * weights(taps);
+  sum() = 0.0f;
+  sum() += f(r.x, r.y) * f(r.x, r.y);
+  const ir::FuncPtr adjoint = propagate_adjoints(sum)(wide).function();
+  ASSERT_TRUE(adjoint->updates.back().predicate.defined());
+  expect_all_likely(adjoint->updates.back().predicate);
+}
+
+// Half of the iterations of a triangle are outside: its loops get their ends instead.
+TEST_F(DefaultSchedule, ConditionsOfATriangleAreNoBorders) {
+  Buffer<float> wide(640);
+  Func f("f"), sum("sum");
+  RDom t(0, 640, 0, 640), r(0, 640);
+  t.where(t.x <= t.y);
+  f(x) = 0.0f;
+  f(t.y) += wide(t.x);
+  sum() = 0.0f;
+  sum() += f(r) * f(r);
+  const ir::FuncPtr adjoint = propagate_adjoints(sum)(wide).function();
+  const Expr& predicate = adjoint->updates.back().predicate;
+  ASSERT_TRUE(predicate.defined());
+  std::vector<Expr> conjuncts{predicate};
+  while (const auto* both = conjuncts.back().as<ir::And>()) {
+    Expr a = both->a, b = both->b;
+    conjuncts.back() = b;
+    conjuncts.push_back(a);
+  }
+  for (const Expr& e : conjuncts) {
+    const auto* call = e.as<ir::Call>();
+    EXPECT_FALSE(uses_variable(e, adjoint->updates.back().rvars[0].var) && call) << print(e);
+  }
+}
+
+Func parts_of_adjoint(const Derivative& d, const Buffer<float>& of) {
+  for (const Func& f : d.funcs()) {
+    const std::string name = f.name(), start = of.name() + "_adj";
+    if (name.find(start) == 0 && name.find("_parts") != std::string::npos) return f;
+  }
+  return {};
+}
+
+TEST_F(DefaultSchedule, ScattersRunInVectorsThatKeepTheirOrder) {
+  Buffer<float> rows(640, 100);
+  Buffer<int> place(640, 100);
+  Func sum("sum");
+  RDom r(0, 640, 0, 100);
+  sum() = 0.0f;
+  sum() += rows(clamp(place(r.x, r.y), 0, 639), r.y);
+  Derivative d = propagate_adjoints(sum);
+  auto chosen = choose(d(rows));
+  const auto& stages = chosen.at(d(rows).function().get()).stages;
+  ASSERT_EQ(stages.size(), 2u);
+  EXPECT_EQ(stages[1].dims.front().for_type, ForType::Vectorized);
+  EXPECT_EQ(stages[1].dims.back().for_type, ForType::Parallel);
+}
+
+TEST_F(DefaultSchedule, ScattersToFewElementsHaveElementsForEachLane) {
+  Buffer<float> few(33), many(5000);
+  Buffer<int> place(1 << 20);
+  Func sum("sum");
+  RDom r(0, 1 << 20);
+  sum() = 0.0f;
+  sum() += few(clamp(place(r), 0, 32)) * many(clamp(place(r), 0, 4999));
+  Derivative d = propagate_adjoints(sum);
+  EXPECT_EQ(parts_of_adjoint(d, few).dimensions(), 3) << "lane, element, part";
+  EXPECT_EQ(parts_of_adjoint(d, many).dimensions(), 2) << "element, part";
 }
 
 }  // namespace
