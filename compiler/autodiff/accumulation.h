@@ -44,7 +44,7 @@ struct AdjointTarget {
 };
 
 // Iterations from which float32 terms are summed in double.
-inline constexpr double many_terms = 4096;
+inline constexpr int many_terms = 4096;
 
 enum class Accumulation : uint8_t { Pointwise, Gather, Scatter, Privatised };
 

@@ -28,7 +28,8 @@ class CheckpointedLoop {
   void run() {
     machine_->name = claim_name(f_->name + "_checkpoints");
     plan_ = plan_checkpoints(c_, layout_, result_.current.func, machine_);
-    table_ = action_table(plan_.steps, plan_.states, plan_.needs_values());
+    table_ = make_table();
+    if (table_.made_by) result_.helpers.push_back(table_.made_by);
     slots_.emplace(c_, layout_, plan_, machine_);
     define_machine();
     record_ = record_writes(c_, plan_, *slots_);
@@ -39,6 +40,12 @@ class CheckpointedLoop {
   }
 
  private:
+  ActionTable make_table() const {
+    if (!plan_.needs_values()) return reversals_alone(plan_.steps);
+    if (plan_.constant_steps) return action_table(*plan_.constant_steps, plan_.states);
+    return action_table(plan_.steps, plan_.states, claim_name(f_->name + "_actions"));
+  }
+
   void define_machine() {
     FuncPtr before = clone_prefix(c_.query.f, c_.query.stage);
     Expr slot = layout_.slot(), elements = layout_.elements();
@@ -136,6 +143,7 @@ class CheckpointedLoop {
     Expr kept = slots_->kept() + slot * layout_.elements() + element;
     result.push_back({is(Action::Store), in_state, {kept, slots_->all_values(element)}});
     result.push_back({is(Action::Restore), in_state, {element, slots_->all_values(kept)}});
+    if (table_.made_by) result.push_back({const_true(), const_false(), result.back().write});
     return result;
   }
   Expr has_run(const Substitution& places) const {
@@ -227,16 +235,24 @@ class CheckpointedLoop {
   }
 
   void explain_schedule() {
-    const auto& bytes = plan_.bytes_of_state;
-    std::string kept = text(plan_.states, plan_.states == 1 ? " kept state" : " kept states",
-                            bytes ? text(" of ", *bytes, " bytes") : std::string());
-    std::string what = text("from ", kept, ", ", print(table_.count(Action::Advance)),
-                            " steps computed again beside the ", plan_.steps, " that are reversed");
-    if (!plan_.needs_values()) what = "no value of it is needed, none is kept";
+    std::string what = "no value of it is needed, none is kept";
+    if (plan_.needs_values())
+      what = text("from ", kept_text(), ", ", again_text(), " computed again beside the ",
+                  print(plan_.steps), " that are reversed");
     result_.explanations.push_back(
         {Explanation::Kind::Version, f_->name,
-         text("update ", c_.query.stage - 1, " is a loop of ", plan_.steps, " steps that ",
+         text("update ", c_.query.stage - 1, " is a loop of ", print(plan_.steps), " steps that ",
               quoted(machine_->name), " runs backward: ", what)});
+  }
+  std::string kept_text() const {
+    const auto& bytes = plan_.bytes_of_state;
+    return text(plan_.states, plan_.states == 1 ? " kept state" : " kept states",
+                bytes ? text(" of ", *bytes, " bytes") : std::string());
+  }
+  std::string again_text() const {
+    if (plan_.constant_steps) return text(print(table_.count(Action::Advance)), " steps");
+    return text("each step at most r times, as ", quoted(table_.made_by->name),
+                " finds at run time,");
   }
 
   const UpdateContext& c_;

@@ -6,6 +6,7 @@
 #include "autodiff/revolve.h"
 #include "frontend/buffer.h"
 #include "ir/build.h"
+#include "simplify/simplify.h"
 
 namespace retrograde::ir {
 
@@ -34,13 +35,6 @@ void add_rows(const RevolveAction& a, Rows& rows) {
   }
 }
 
-std::vector<RevolveAction> reversals_alone(int steps) {
-  std::vector<RevolveAction> result;
-  for (int step = steps - 1; step >= 0; --step)
-    result.push_back({RevolveAction::Kind::Reverse, step});
-  return result;
-}
-
 Buffer<int> in_memory(const Rows& rows) {
   Buffer<int> table(3, static_cast<int>(rows.size()));
   for (size_t i = 0; i < rows.size(); ++i) {
@@ -51,12 +45,22 @@ Buffer<int> in_memory(const Rows& rows) {
 
 }  // namespace
 
-ActionTable action_table(int steps, int states, bool needs_values) {
+ActionTable reversals_alone(const Expr& steps) {
+  ActionTable result;
+  result.rows = steps;
+  result.counts.fill(make_zero(Int(32)));
+  result.counts[static_cast<size_t>(Action::Adjoint)] = steps;
+  result.entry = [steps](int column, const Expr& row) {
+    return column == 0   ? Expr(static_cast<int>(Action::Adjoint))
+           : column == 1 ? simplify(steps - 1 - row)
+                         : make_zero(Int(32));
+  };
+  return result;
+}
+
+ActionTable action_table(int steps, int states) {
   Rows rows;
-  for (const RevolveAction& a :
-       needs_values ? revolve_schedule(steps, states) : reversals_alone(steps)) {
-    add_rows(a, rows);
-  }
+  for (const RevolveAction& a : revolve_schedule(steps, states)) add_rows(a, rows);
   ActionTable result;
   result.rows = make_const(Int(32), static_cast<int64_t>(rows.size()));
   for (size_t kind = 0; kind < action_kinds; ++kind) {

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "autodiff/accumulation.h"
+#include "autodiff/checkpoint_actions.h"
 #include "autodiff/revolve.h"
 #include "autodiff/versions.h"
 #include "diagnostics/error.h"
@@ -13,8 +14,6 @@
 namespace retrograde::ir {
 
 namespace {
-
-constexpr int64_t most_actions = int64_t{1} << 24;
 
 class Planner {
  public:
@@ -29,7 +28,8 @@ class Planner {
   }
 
   CheckpointPlan run(const FuncPtr& adjoint) {
-    plan_.steps = number_of_steps();
+    plan_.steps = simplify(plan_.time.extent);
+    if (auto n = as_const_int(plan_.steps)) plan_.constant_steps = static_cast<int>(*n);
     SweepResult sweep = sweep_all(adjoint);
     for (const LeafAdjoint& leaf : sweep.leaves) {
       if (as_call_of(leaf.leaf, f_)) {
@@ -47,26 +47,17 @@ class Planner {
  private:
   // ---- the budget ----
 
-  int number_of_steps() const {
-    auto n = as_const_int(simplify(plan_.time.extent));
-    if (!n || *n > most_actions) {
-      user_error(c_.asked(), "a loop that is checkpointed has a constant number of steps",
-                 text("the extent of ", quoted(plan_.time.var), ", its outermost loop, is ",
-                      print(simplify(plan_.time.extent))),
-                 "Make it a constant, or leave out the budget and pass "
-                 "AdjointOptions{.overwritten = Overwritten::Store}");
-    }
-    return static_cast<int>(*n);
-  }
-
   int number_of_states() const {
     int64_t states = c_.query.checkpoints.states;
     if (c_.query.checkpoints.bytes > 0) states = states_in_bytes(c_.query.checkpoints.bytes);
-    states = std::min<int64_t>(states, plan_.steps);
-    int64_t again = revolve_advances(plan_.steps, states);
-    if (!plan_.needed.empty() && again + 4 * plan_.steps > most_actions) {
-      user_error(c_.asked(), text("a schedule has at most ", most_actions, " actions"),
-                 text(plan_.steps, " steps with room for ", states,
+    if (!plan_.constant_steps)
+      return static_cast<int>(std::min<int64_t>(states, most_states_at_run_time));
+    const int64_t steps = *plan_.constant_steps;
+    states = std::min(states, steps);
+    int64_t again = revolve_advances(steps, states);
+    if (plan_.needs_values() && again + 4 * steps > most_rows) {
+      user_error(c_.asked(), text("a schedule has at most ", most_rows, " actions"),
+                 text(steps, " steps with room for ", states,
                       states == 1 ? " state compute " : " states compute ", again, " steps again"),
                  "Give a larger budget: AdjointOptions::checkpoint_states");
     }
@@ -157,7 +148,7 @@ class Planner {
           "Leave out the budget and pass AdjointOptions{.overwritten = "
           "Overwritten::Store}");
     });
-    given.compensated = !given.over_time && plan_.steps >= many_terms;
+    given.compensated = !given.over_time && plan_.constant_steps.value_or(many_terms) >= many_terms;
     plan_.given.push_back(given);
   }
 

@@ -21,7 +21,9 @@ struct CheckpointPlan {
     int width() const { return compensated ? 2 : 1; }
   };
 
-  int steps = 0, states = 0;
+  Expr steps;
+  std::optional<int> constant_steps;  // none: known at run time only
+  int states = 0;
   ReductionVariable time;
   std::vector<ReductionVariable> inner;  // the loops of one step
   Expr inner_count;
@@ -40,7 +42,7 @@ struct CheckpointPlan {
 };
 
 // The adjoints at hand will be read from `machine`, whose types and traits are set here. Throws
-// when the number of steps is not known, the budget too small, or a place forgotten.
+// when the budget is too small, or a place forgotten.
 CheckpointPlan plan_checkpoints(const UpdateContext& context, const TapeLayout& layout,
                                 const FuncPtr& adjoint,
                                 const std::shared_ptr<AdjointContents>& machine);

@@ -18,7 +18,9 @@ CheckpointSlots::CheckpointSlots(const UpdateContext& context, const TapeLayout&
     next = next + plan_.inner_count * (g.over_time ? plan_.steps : g.width());
   }
   kept_ = simplify(next);
-  count_ = simplify(kept_ + layout_.elements() * (plan_.needs_values() ? plan_.states : 0));
+  Expr states = plan_.needs_values() ? Expr(plan_.states) : make_zero(Int(32));
+  if (!plan_.constant_steps) states = min(states, max(plan_.steps, 1));
+  count_ = simplify(kept_ + layout_.elements() * states);
 }
 
 Expr CheckpointSlots::adjoint(const Expr& element) const { return element + layout_.elements(); }

@@ -112,10 +112,11 @@ struct AdjointOptions {
   // which overwrite values that their partials need. Instead of all n versions, a few states of the
   // Func are kept, and the steps between them are computed again: with s states the least number of
   // steps, r n - C(s + r, r - 1) for C(s + r - 1, s) < n <= C(s + r, s) (revolve: A. Griewank, A.
-  // Walther, Algorithm 799, ACM Transactions on Mathematical Software 26(1), 2000). n must be
-  // constant. Gradients are the same bits for every budget; other updates follow `overwritten`.
-  // Give one: the number of states kept, at least 1, or the bytes that they may take, enough for
-  // one.
+  // Walther, Algorithm 799, ACM Transactions on Mathematical Software 26(1), 2000). n may be known
+  // at run time only: a Param, an extent of an input. Then a table of about (r + 3) n rows of 12
+  // bytes is made as the pipeline runs; a call whose n needs more than 2^24 rows fails. Gradients
+  // are the same bits for every budget; other updates follow `overwritten`. Give one: the number of
+  // states kept, at least 1, or the bytes that they may take, enough for one.
   std::optional<int> checkpoint_states = {};
   std::optional<int64_t> checkpoint_bytes = {};
 };

@@ -296,13 +296,19 @@ std::optional<double> Count::value() const {
   return constant_;
 }
 
+// A product of extents that nobody would read, as of table lookups, is left out.
+static std::string readable(const std::string& product) {
+  constexpr size_t longest = 200;
+  return product.size() <= longest ? product : "(...)";
+}
+
 std::string Count::text() const {
   if (unknown_) return "unknown";
   if (terms_.empty()) return number_text(constant_);
   std::string out = constant_ != 0 ? number_text(constant_) : "";
   for (const auto& [product, factor] : terms_) {
     out += out.empty() ? "" : " + ";
-    out += factor == 1 ? product : number_text(factor) + "*" + product;
+    out += factor == 1 ? readable(product) : number_text(factor) + "*" + readable(product);
   }
   return out;
 }

@@ -4,10 +4,7 @@
 
 namespace retrograde::ir {
 
-namespace {
-
-// C(s + r, s); 0 for a negative number. Large values stop at a bound beyond every loop.
-int64_t steps_within(int64_t states, int64_t repetitions) {
+int64_t revolve_steps_within(int64_t states, int64_t repetitions) {
   constexpr int64_t enough = int64_t{1} << 40;
   if (states < 0 || repetitions < 0) return 0;
   int64_t result = 1, few = std::min(states, repetitions), many = std::max(states, repetitions);
@@ -18,11 +15,13 @@ int64_t steps_within(int64_t states, int64_t repetitions) {
   return result;
 }
 
+namespace {
+
 // The least number of times that every step may run with so many states.
 int64_t repetitions_for(int64_t steps, int64_t states) {
   if (states == 1) return steps - 1;
   int64_t r = 0;
-  while (steps_within(states, r) < steps) ++r;
+  while (revolve_steps_within(states, r) < steps) ++r;
   return r;
 }
 
@@ -53,8 +52,8 @@ class Schedule {
   static int first_part(int64_t steps, int64_t states) {
     if (states == 1) return static_cast<int>(steps - 1);
     int64_t r = repetitions_for(steps, states);
-    return static_cast<int>(
-        std::min(steps_within(states, r - 1), steps - steps_within(states - 1, r - 1)));
+    return static_cast<int>(std::min(revolve_steps_within(states, r - 1),
+                                     steps - revolve_steps_within(states - 1, r - 1)));
   }
 };
 
@@ -63,7 +62,7 @@ class Schedule {
 int64_t revolve_advances(int64_t steps, int64_t states) {
   if (states == 1) return steps * (steps - 1) / 2;
   int64_t r = repetitions_for(steps, states);
-  return r * steps - steps_within(states + 1, r - 1);
+  return r * steps - revolve_steps_within(states + 1, r - 1);
 }
 
 std::vector<RevolveAction> revolve_schedule(int steps, int states) {

@@ -26,6 +26,10 @@ struct RevolveAction {
   int slot = -1;
 };
 
+// C(states + repetitions, states), 0 for negative numbers, at most 2^40: the number of steps that
+// can be reversed with so many states when each runs so often at most.
+int64_t revolve_steps_within(int64_t states, int64_t repetitions);
+
 // Steps computed again, beside the one that each reversal runs itself. steps >= 1, states >= 1.
 int64_t revolve_advances(int64_t steps, int64_t states);
 

@@ -221,7 +221,7 @@ extern "C" __attribute__((visibility("default"))) float checkpoint_test_counted(
 }
 
 // Every evaluation of a step passes through the C function.
-Func counted(const Buffer<float>& start, int n) {
+Func counted(const Buffer<float>& start, const Expr& n) {
   Func u("counted_u");
   RDom t(0, n);
   u(x) = start(x);
@@ -379,6 +379,103 @@ TEST(Checkpoints, SpaceMayHaveExtentsOfRunTime) {
                   {"size of a state", "run time only", "checkpoint_states"});
 }
 
+// ---- a number of steps that is known at run time only ----
+
+// The same bits as with a constant number of steps, for every number and every budget.
+TEST(Checkpoints, TheNumberOfStepsMayBeAParam) {
+  Buffer<float> start = line(5), gain = line(1, 7);
+  auto loss_of = [&](const Expr& n) {
+    Func u("run_time_u");
+    RDom t(0, n);
+    u(x) = start(x);
+    u(x) = u(x) * gain(Expr(0)) + 0.25f * sin(u(x) + cast<float>(t));
+    return weighted_sum(u, {5});
+  };
+  for (int s : {1, 2, 3, 40}) {
+    Param<int> n("n");
+    Derivative d = propagate_adjoints(loss_of(n), {.checkpoint_states = s});
+    Func by_start = d(start), by_gain = d(gain);
+    for (int steps : {0, 1, 2, 3, 4, 7, 30}) {
+      SCOPED_TRACE(text(steps, " steps, ", s, " states"));
+      n.set(steps);
+      Derivative constant = propagate_adjoints(loss_of(steps), {.checkpoint_states = s});
+      for (bool exact : {true, false}) {
+        EXPECT_EQ(values_of(by_start, start, exact), values_of(constant(start), start, exact));
+      }
+      std::vector<double> expected = values_of(constant(gain), gain, false);
+      EXPECT_NEAR(values_of(by_gain, gain, false)[0], expected[0], 1e-10 * std::abs(expected[0]));
+      Buffer<float> found = by_start.realize({5}), same = constant(start).realize({5});
+      for (int i = 0; i < 5; ++i) EXPECT_EQ(found(i), same(i));
+    }
+    n.set(6);
+    expect_gradient(loss_of(n), d, start);
+  }
+}
+
+// A row that every step sweeps in place, as many times as an image has rows; a force for each step.
+TEST(Checkpoints, TheNumberOfStepsMayBeAnExtentOfAnInput) {
+  ImageParam force(Float(32), 2, "force");
+  Buffer<float> start = line(8), weights = line(2, 4);
+  Func u("swept_as_often");
+  RDom r(1, 6, 0, force.dim(1).extent());
+  u(x) = start(x);
+  u(r.x) =
+      weights(Expr(0)) * 0.25f * sin(u(r.x - 1)) * u(r.x + 1) + weights(Expr(1)) * force(r.x, r.y);
+  Func loss = weighted_sum(u, {8});
+  Derivative d = propagate_adjoints(loss, {.checkpoint_states = 2});
+  Derivative stored = propagate_adjoints(loss, {.overwritten = Overwritten::Store});
+  for (int rows : {1, 4, 9}) {
+    Buffer<float> forces = plane(8, rows, 9);
+    force.set(forces);
+    EXPECT_EQ(values_of(d(start), start, true), values_of(stored(start), start, true));
+    EXPECT_EQ(values_of(d(force), forces, true), values_of(stored(force), forces, true));
+    expect_gradient(loss, d, weights);
+  }
+}
+
+TEST(Checkpoints, AtRunTimeStepsAreComputedAgainAsOftenAsTheBinomialBoundSays) {
+  Buffer<float> start = line(1);
+  for (int s : {1, 2, 3, 10, 100}) {
+    Param<int> n("n");
+    Derivative d = propagate_adjoints(counted(start, n), {.wrt = {start}, .checkpoint_states = s});
+    Func gradient = d(start);
+    for (int steps = 1; steps < 60; steps += steps < 12 ? 1 : 9) {
+      n.set(steps);
+      evaluations = 0;
+      gradient.realize({1});
+      EXPECT_EQ(evaluations, steps + ir::revolve_advances(steps, s) + steps)
+          << steps << " steps, " << s << " states";
+    }
+  }
+}
+
+TEST(Checkpoints, AtRunTimeMemoryIsThatOfTheStatesAndOfTheTable) {
+  Buffer<float> start = line(1000);
+  Param<int> n("n");
+  auto peak = [&](int steps) {
+    Func u("remembered_u");
+    RDom t(0, n);
+    u(x) = start(x);
+    u(x) = u(x) + 0.125f * sin(u(x) + cast<float>(t));
+    n.set(steps);
+    return peak_memory(
+        propagate_adjoints(weighted_sum(u, {1000}), {.wrt = {start}, .checkpoint_states = 10}),
+        start);
+  };
+  // 12 bytes for each of at most 3 n + 4 n rows.
+  EXPECT_LT(peak(200), peak(100) + 7 * 12 * 100 + 100);
+}
+
+TEST(Checkpoints, MoreStepsAtRunTimeThanATableMayHaveFailTheCall) {
+  Param<int> n("n");
+  Buffer<float> start = line(1);
+  Derivative d = propagate_adjoints(counted(start, n), {.wrt = {start}, .checkpoint_states = 1});
+  n.set(100000);
+  expect_mentions(error_of<RuntimeError>([&] { d(start).realize({1}); }),
+                  {"room for 1 kept state has at most 5789 steps", "this one has 100000", "larger budget"});
+  expect_mentions(d.explain(), {"a loop of n steps", "1 kept state of 4 bytes", "at run time"});
+}
+
 // ---- refusals ----
 
 TEST(Checkpoints, BudgetsThatCannotBeMetAreErrors) {
@@ -393,18 +490,6 @@ TEST(Checkpoints, BudgetsThatCannotBeMetAreErrors) {
   expect_mentions(
       error_of([] { propagate_adjoints(pushed(100000).loss, {.checkpoint_states = 1}); }),
       {"100000 steps with room for 1 state ", "larger budget"});
-}
-
-TEST(Checkpoints, AnUnknownNumberOfStepsIsAnError) {
-  Param<int> n("n");
-  Buffer<float> start = line(5);
-  Func u("unknown_u");
-  RDom t(0, n);
-  u(x) = start(x);
-  u(x) = sin(u(x)) * cast<float>(t);
-  expect_mentions(
-      error_of([&] { propagate_adjoints(weighted_sum(u, {5}), {.checkpoint_states = 2}); }),
-      {"constant number of steps", "\"unknown_u\"", "Overwritten::Store"});
 }
 
 TEST(Checkpoints, PlacesThatDependOnForgottenValuesAreRefused) {
