@@ -69,27 +69,36 @@ Buffer<> new_buffer(Type type, const Shape& shape) {
   return result;
 }
 
+namespace {
+
+// Calls visit(Buffer<T>) with the element type of a floating buffer; false: it has another.
+template <class Visit>
+bool with_floats(const Buffer<>& buffer, Visit visit) {
+  if (buffer.type() == Float(64)) return visit(Buffer<double>(buffer)), true;
+  if (buffer.type() == Float(32)) return visit(Buffer<float>(buffer)), true;
+  if (buffer.type() == Float(16)) return visit(Buffer<float16_t>(buffer)), true;
+  if (buffer.type() == BFloat(16)) return visit(Buffer<bfloat16_t>(buffer)), true;
+  return false;
+}
+
+}  // namespace
+
 Values values_of(const Buffer<>& buffer) {
   Values result;
-  if (buffer.type() == Float(64)) {
-    Buffer<double>(buffer).get()->for_each_value([&](double v) { result.push_back(v); });
-  } else if (buffer.type() == Float(32)) {
-    Buffer<float>(buffer).get()->for_each_value([&](float v) { result.push_back(v); });
-  } else {
-    unsupported("check a pipeline", "its inputs and outputs are float32 or float64",
-                "there is one of type " + to_string(buffer.type()));
-  }
+  const bool is_float = with_floats(buffer, [&](auto b) {
+    using T = typename decltype(b)::ElemType;
+    b.get()->for_each_value([&](T v) { result.push_back(static_cast<double>(v)); });
+  });
+  RETROGRADE_ASSERT(is_float, "values of ", to_string(buffer.type()), " are not looked at");
   return result;
 }
 
 void fill(Buffer<>& buffer, const Values& values) {
   size_t i = 0;
-  if (buffer.type() == Float(64)) {
-    Buffer<double>(buffer).get()->for_each_value([&](double& v) { v = values[i++]; });
-  } else {
-    Buffer<float>(buffer).get()->for_each_value(
-        [&](float& v) { v = static_cast<float>(values[i++]); });
-  }
+  with_floats(buffer, [&](auto b) {
+    using T = typename decltype(b)::ElemType;
+    b.get()->for_each_value([&](T& v) { v = static_cast<T>(values[i++]); });
+  });
 }
 
 Values realize(Func f, const Shape& shape) {
@@ -98,7 +107,7 @@ Values realize(Func f, const Shape& shape) {
   return values_of(out);
 }
 
-bool is_checkable(Type type) { return type == Float(32) || type == Float(64); }
+bool is_checkable(Type type) { return type.is_float() && type.lanes() == 1; }
 
 std::vector<Values> realize_values(Func f, const Shape& shape) {
   std::vector<Buffer<>> out;

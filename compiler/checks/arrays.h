@@ -35,11 +35,11 @@ size_t count(const Shape& shape);
 std::optional<Shape> constant_shape(const ir::Box& box);
 
 Buffer<> new_buffer(Type type, const Shape& shape);
-// Unsupported unless float32 or float64.
+// Of floats of any width.
 Values values_of(const Buffer<>& buffer);
 void fill(Buffer<>& buffer, const Values& values);
 Values realize(Func f, const Shape& shape);
-// One array for each value of the Func; empty for those that are neither float32 nor float64.
+// One array for each value of the Func; empty for those that are no floats.
 std::vector<Values> realize_values(Func f, const Shape& shape);
 // Many Funcs in one run, so that what they share is compiled and computed once. One after the other
 // when that does not work: together they are very large, one reads another outside of its shape, or
@@ -66,7 +66,7 @@ class Batch {
   Pipeline pipeline_;
 };
 
-bool is_checkable(Type type);  // float32 or float64
+bool is_checkable(Type type);  // a float
 // The place of the i-th element of an array.
 std::vector<int> place_of(size_t i, const Shape& shape);
 

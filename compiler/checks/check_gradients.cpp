@@ -7,6 +7,7 @@
 #include <map>
 #include <random>
 
+#include "autodiff/custom_rules.h"
 #include "autodiff/regions.h"
 #include "autodiff/tangents.h"
 #include "checks/arrays.h"
@@ -51,17 +52,16 @@ class Checker {
       : output_(output),
         shape_{std::vector<int>(sizes.size(), 0), sizes},
         options_(options),
-        random_(options.seed),
-        widened_(ir::widen({output.function()})),
-        wide_output_(widened_.funcs.at(output.function().get())) {
+        random_(options.seed) {
     if (static_cast<int>(sizes.size()) != output.dimensions()) {
       user_error(asked(), "the output needs a size in each of its dimensions",
-                 text("it has ", output.dimensions(), " dimensions and ", sizes.size(), " sizes"));
+                 text("it has ", output.dimensions(), " dimensions and ", sizes.size(), " sizes"),
+                 "Give one a dimension: check_gradients(output, {width, height})");
     }
+    ir::widen({output.function()});  // says what has no meaning in double before all else
     draw_weights();
     for (const auto& p : ir::parameters_of({output.function()})) {
-      if (p->type.is_float())
-        inputs_.push_back(bind_wide(p, widened_.parameters.at(p.get()), asked()));
+      if (p->type.is_float()) own_inputs_.push_back(p);
     }
     check_wrt();
   }
@@ -96,7 +96,7 @@ class Checker {
   void check_wrt() const {
     for (const AdjointInput& w : options_.wrt) {
       bool found = false;
-      for (const Input& input : inputs_) found |= input.own == w.symbol();
+      for (const auto& own : own_inputs_) found |= own == w.symbol();
       if (!found) {
         user_error(asked(), "`wrt` names floating inputs that the output depends on",
                    "it names something else", "Give an ImageParam, a Buffer or a Param");
@@ -110,8 +110,9 @@ class Checker {
     for (double& v : result) v = normal(random_);
     return result;
   }
-  static Values own_precision(Values values) {  // so that both precisions see the same numbers
-    for (double& v : values) v = static_cast<float>(v);
+  // So that both precisions see the same numbers.
+  static Values own_precision(Values values, Type type = Float(32)) {
+    for (double& v : values) v = ir::Scalar::of_float(type, v).as_double();
     return values;
   }
   // Of each value of the output; none for integers.
@@ -119,7 +120,9 @@ class Checker {
     bool any = false;
     for (Type t : output_.types()) {
       any |= t.is_float();
-      weights_.push_back(t.is_float() ? own_precision(random_values(count(shape_))) : Values());
+      const Type type = t.bits() < 32 ? t : Float(32);
+      weights_.push_back(t.is_float() ? own_precision(random_values(count(shape_)), type)
+                                      : Values());
     }
     if (!any)
       unsupported(asked(), "derivatives are of floats", "the output has integers only",
@@ -161,12 +164,68 @@ class Checker {
     const AdjointOptions store{.overwritten = Overwritten::Store};
     own_ =
         std::make_unique<Derivative>(propagate_adjoints(output_, seed(output_), bounds(), store));
-    wide_ = std::make_unique<Derivative>(
-        propagate_adjoints(wide_output_, seed(wide_output_), bounds(), store));
+    std::vector<ir::FuncPtr> all{output_.function()};
+    if (has_rules()) add_adjoints(all);
+    widened_ = ir::widen(all);
+    wide_output_ = Func(widened_.funcs.at(output_.function().get()));
+    if (!has_rules()) {
+      wide_ = std::make_unique<Derivative>(
+          propagate_adjoints(wide_output_, seed(wide_output_), bounds(), store));
+    }
+    for (const auto& p : ir::parameters_of(all)) bind(p);
     report_.primal_seconds = timed_warm([&] { return realize_values(output_, shape_); }).seconds;
     complex_ = complex_graph(wide_output_);
     report_.complex_step_refused = complex_.refused;
     if (complex_.refused.empty()) bind_imaginary();
+  }
+  // Rules of the user are made of Funcs in the user's precision. They are checked by giving those a
+  // meaning in double, constants as they are; all else is differentiated in double.
+  bool has_rules() const {
+    const auto order = ir::topological_order({output_.function()});
+    return std::any_of(order.begin(), order.end(),
+                       [](const ir::FuncPtr& f) { return f->custom_derivatives != nullptr; });
+  }
+  void add_adjoints(std::vector<ir::FuncPtr>& to) const {
+    for (const auto& p : own_inputs_) to.push_back(own_->of(AdjointInput(p)).function());
+    for (const ir::FuncPtr& f : ir::topological_order({output_.function()})) {
+      Func adjoint = own_->adjoint(Func(f));
+      if (adjoint.defined()) to.push_back(adjoint.function());
+    }
+  }
+  // The adjoint of `input`, whose copy in double is `wide`.
+  Func wide_adjoint(const AdjointInput& input, const AdjointInput& wide) const {
+    if (wide_) return wide_->of(wide);
+    return Func(widened_.funcs.at(own_->of(input).function().get()));
+  }
+  // Beside the inputs: weights, and what rules of the user read.
+  void bind(const std::shared_ptr<ir::ParameterContents>& p) {
+    auto wide = widened_.parameters.find(p.get());
+    if (wide == widened_.parameters.end()) return;
+    Input bound = bind_wide(p, wide->second, asked());
+    if (std::find(own_inputs_.begin(), own_inputs_.end(), p) != own_inputs_.end())
+      inputs_.push_back(bound);
+  }
+
+  // In double. Definitions say it where no rule of the user does.
+  Func tangent(const Input& input, const Buffer<>& direction) const {
+    for (const ir::FuncPtr& f : ir::topological_order({output_.function()})) {
+      if (ir::has_custom_tangent(*f)) return tangent_by_rules(input, direction);
+    }
+    return propagate_tangents(wide_output_, {{AdjointInput(input.wide), direction}})(wide_output_);
+  }
+  Func tangent_by_rules(const Input& input, const Buffer<>& direction) const {
+    Func own = propagate_tangents(output_, {{AdjointInput(input.own), direction}})(output_);
+    ir::Widened widened = ir::widen({own.function()});
+    for (const auto& p : ir::parameters_of({own.function()})) {
+      auto wide = widened.parameters.find(p.get());
+      if (wide == widened.parameters.end()) continue;
+      if (p == direction.parameter()) {
+        ImageParam(wide->second).set(direction);
+      } else {
+        bind_wide(p, wide->second, asked());
+      }
+    }
+    return Func(widened.funcs.at(own.function().get()));
   }
 
   // ---- slopes along a direction v ----
@@ -245,19 +304,19 @@ class Checker {
   void check(Input& input) {
     GradientReport::Input result;
     result.name = input.own->name;
-    Func own = own_->of(AdjointInput(input.own)), wide = wide_->of(AdjointInput(input.wide));
+    Func own = own_->of(AdjointInput(input.own)),
+         wide = wide_adjoint(AdjointInput(input.own), AdjointInput(input.wide));
     const auto g_own = timed_warm([&] { return realize(own, input.shape); });
     const auto g = timed_warm([&] { return realize(wide, input.shape); });
     report_.adjoint_seconds += g_own.seconds;
 
     Buffer<> direction = new_buffer(Float(64), input.shape);
-    Func tangent =
-        propagate_tangents(wide_output_, {{AdjointInput(input.wide), direction}})(wide_output_);
+    Func moved = tangent(input, direction);
     for (int d = 0; d < options_.directions; ++d) {
       Values v = own_precision(random_values(count(input.shape)));
       fill(direction, v);
       const double adjoint = dot(g.value, v), scale = 1e-2 * typical(g.value, v);
-      const auto forward = timed_warm([&] { return weighted(realize_values(tangent, shape_)); });
+      const auto forward = timed_warm([&] { return weighted(realize_values(moved, shape_)); });
       const auto slope = difference(input, v, adjoint, scale, d == 0 ? &result.steps : nullptr);
       const auto by_complex = complex_.refused.empty() ? complex_step(input, v) : Timed<double>{};
       auto error = [&](double value, double reference) {
@@ -312,12 +371,13 @@ class Checker {
     Batch own, wide;
     for (const ir::FuncPtr& f : order) {
       auto shape = constant_shape(regions.of(f.get()));
-      Func a = own_->adjoint(Func(f)), b = wide_->adjoint(Func(widened_.funcs.at(f.get())));
-      if (!shape || shape->extents.size() != f->args.size() || !a.defined() || !b.defined())
-        continue;
+      Func adjoint = own_->adjoint(Func(f));
+      if (!shape || shape->extents.size() != f->args.size() || !adjoint.defined()) continue;
+      Func in_double = wide_adjoint(Func(f), Func(widened_.funcs.at(f.get())));
+      if (!in_double.defined()) continue;
       funcs.push_back(f.get());
-      own.add(a, *shape);
-      wide.add(b, *shape);
+      own.add(adjoint, *shape);
+      wide.add(in_double, *shape);
     }
     const auto a = own.realize(), b = wide.realize();
     std::map<const ir::Symbol*, double> result;
@@ -336,11 +396,12 @@ class Checker {
   Shape shape_;
   GradientCheckOptions options_;
   std::mt19937_64 random_;
+  std::vector<std::shared_ptr<ir::ParameterContents>> own_inputs_;
+  std::vector<Values> weights_;
+  std::unique_ptr<Derivative> own_, wide_;  // wide_: null where rules of the user take part
   ir::Widened widened_;
   Func wide_output_;
-  std::vector<Values> weights_;
   std::vector<Input> inputs_, imaginary_;
-  std::unique_ptr<Derivative> own_, wide_;
   ComplexGraph complex_;
   GradientReport report_;
 };

@@ -18,16 +18,28 @@ namespace {
 using namespace checks;
 using Limits = std::numeric_limits<float>;
 
-double magnitude(Extreme extreme) {
+// Of the largest, smallest normal and smallest number of a type. Doubles are taken to the ends of
+// float32, beyond which there is nothing to compare them with.
+struct Ends {
+  double max, min, denormal;
+};
+Ends ends_of(Type type) {
+  if (type == Float(16)) return {65504.0, std::ldexp(1.0, -14), std::ldexp(1.0, -24)};
+  if (type == BFloat(16))
+    return {std::ldexp(255.0, 120), std::ldexp(1.0, -126), std::ldexp(1.0, -133)};
+  return {Limits::max(), Limits::min(), Limits::denorm_min()};
+}
+double magnitude(Extreme extreme, Type type) {
+  const Ends ends = ends_of(type);
   switch (extreme) {
     case Extreme::Zeros:
       return 0;
     case Extreme::Denormals:
-      return Limits::denorm_min() * 100.0;
+      return ends.denormal * 100;
     case Extreme::Huge:
-      return Limits::max() / 4;
+      return ends.max / 4;
     case Extreme::Tiny:
-      return Limits::min() * 2.0;
+      return ends.min * 2;
     case Extreme::Infinities:
       return std::numeric_limits<double>::infinity();
     case Extreme::NaNs:
@@ -56,7 +68,8 @@ class Checker {
         random_(options.seed) {
     if (static_cast<int>(sizes.size()) != output.dimensions()) {
       user_error(asked_, "the output needs a size in each of its dimensions",
-                 text("it has ", output.dimensions(), " dimensions and ", sizes.size(), " sizes"));
+                 text("it has ", output.dimensions(), " dimensions and ", sizes.size(), " sizes"),
+                 "Give one a dimension: check_stability(output, {width, height})");
     }
     amount_.set(0);
     seed_.set(0);
@@ -136,7 +149,7 @@ class Checker {
     };
     bool any = false;
     for (Type t : f.types) any |= is_checkable(t);
-    if (!any) return leave_out("none of its values is float32 or float64");
+    if (!any) return leave_out("none of its values is a float");
     auto shape = constant_shape(regions.of(&f));
     if (!shape || shape->extents.size() != f.args.size())
       return leave_out("its region is not known before it runs, or is too large");
@@ -175,7 +188,8 @@ class Checker {
     for (const InputRange& r : options_.ranges) {
       if (!(std::isfinite(r.low) && std::isfinite(r.high) && r.low <= r.high)) {
         user_error(asked_, "a range has two finite ends, the lower first",
-                   text("there is one from ", r.low, " to ", r.high));
+                   text("there is one from ", r.low, " to ", r.high),
+                   "Give the lower end first, and leave infinities to StabilityOptions::extremes");
       }
       bool found = false;
       for (const Input& input : inputs_) found |= input.own == r.input.symbol();
@@ -201,7 +215,7 @@ class Checker {
         bool chosen = random_() % 4 == 0 || (i + 1 == values.size() && !any);
         if (!chosen) continue;
         any = true;
-        values[i] = magnitude(extreme) * (random_() % 2 ? 1 : -1);
+        values[i] = magnitude(extreme, inputs_[k].own->type) * (random_() % 2 ? 1 : -1);
       }
       set(k, values);
     }
@@ -213,7 +227,8 @@ class Checker {
         if (inputs_[k].own != range.input.symbol()) continue;
         Values values = inputs_[k].values;
         // What both precisions can hold.
-        for (double& v : values) v = static_cast<float>(pick(range));
+        const Type own = inputs_[k].own->type, type = own.bits() < 32 ? own : Float(32);
+        for (double& v : values) v = ir::Scalar::of_float(type, pick(range)).as_double();
         set(k, values);
       }
     }

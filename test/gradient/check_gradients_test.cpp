@@ -2,6 +2,7 @@
 // stop_gradient, whose derivative is not that of the values; lost digits by a cancellation.
 #include <nlohmann/json.hpp>
 
+#include "autodiff/custom_derivative.h"
 #include "checks/check_gradients.h"
 #include "frontend/image_param.h"
 #include "frontend/param.h"
@@ -115,6 +116,57 @@ TEST_F(CheckGradients, AWrongGradientIsFound) {
   EXPECT_LT(report.inputs[0].dot_product_error, 1e-12) << "both modes stop there";
 }
 
+// factor 2: right. The rule reads a Buffer of its own, which needs a copy in double, too.
+void give_rules(const Func& f, const ImageParam& image, float adjoint_factor,
+                float tangent_factor) {
+  Buffer<float> half(1);
+  half(0) = 0.5f;
+  custom_adjoint(f, {image}, [=](const AdjointContext& c) {
+    Func adjoint("rule");
+    Var u("u"), v("v");
+    adjoint(u, v) =
+        2.0f * adjoint_factor * half(Expr(0)) * ImageParam(image)(u, v) * c.adjoint()(u, v);
+    return std::vector<AdjointContribution>{{image, adjoint}};
+  });
+  if (tangent_factor == 0) return;
+  custom_tangent(f, {image}, [=](const TangentContext& c) {
+    Func tangent("rule_tan");
+    Var u("u"), v("v");
+    tangent(u, v) = tangent_factor * ImageParam(image)(u, v) * c.tangent(image)(u, v);
+    return tangent;
+  });
+}
+
+TEST_F(CheckGradients, RulesOfTheUserAreCheckedLikeAnyOther) {
+  auto report = [&](float adjoint_factor, float tangent_factor) {
+    Func f("f"), g("g");
+    f(x, y) = image(x, y) * image(x, y);
+    give_rules(f, image, adjoint_factor, tangent_factor);
+    g(x, y) = f(x, y) * gain;
+    return check_gradients(g, {12, 9}, {.directions = 1, .wrt = {image}});
+  };
+  EXPECT_LT(report(2, 2).worst_error, 1e-8);
+  EXPECT_LT(report(2, 0).worst_error, 1e-8) << "tangents of the definitions";
+  EXPECT_GT(report(1, 1).inputs[0].adjoint_error, 0.4);
+  EXPECT_LT(report(1, 1).inputs[0].dot_product_error, 1e-12) << "both rules are wrong alike";
+  EXPECT_GT(report(2, 3).inputs[0].dot_product_error, 0.3);
+  EXPECT_GT(report(1, 0).inputs[0].dot_product_error, 0.4);
+}
+
+TEST_F(CheckGradients, NarrowFloats) {
+  for (Type type : {Float(16), BFloat(16)}) {
+    ImageParam narrow(type, 1, "narrow");
+    Func values("values"), f("f");
+    values(x) = cast(type, cast<float>(x % 7) * 0.3f + 0.5f);
+    narrow.set(values.realize({12}));
+    f(x) = narrow(x) * narrow(11 - x) * narrow(x);
+    GradientReport report = check_gradients(f, {12}, {.directions = 1});
+    EXPECT_LT(report.worst_error, 1e-8) << report.to_json();
+    EXPECT_GT(report.inputs[0].own_precision_error, 1e-6) << "values are rounded to 16 bits";
+    EXPECT_LT(report.inputs[0].own_precision_error, 0.05);
+  }
+}
+
 TEST_F(CheckGradients, TheFuncThatLosesTheDigitsIsNamed) {
   Func smooth("smooth"), cancels("cancels"), f("f");
   smooth(x, y) = image(x, y) * 2.0f;
@@ -144,7 +196,7 @@ TEST_F(CheckGradients, ErrorsNameWhatIsMissing) {
   Func g("g");
   g(x, y) = image(x, y);
   expect_mentions(error_of<CompileError>([&] { check_gradients(g, {4}); }),
-                  {"2 dimensions", "1 sizes"});
+                  {"2 dimensions", "1 sizes", "Give one a dimension"});
   pair(x, y) = {cast<int>(image(x, y)), 1};
   expect_mentions(error_of<Unsupported>([&] {
                     check_gradients(pair, {4, 4});

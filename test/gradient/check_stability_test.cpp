@@ -142,6 +142,21 @@ TEST_F(CheckStability, DeclaredRangesAreDrawnFromAndTheirEndsTried) {
   EXPECT_TRUE(pole.first_non_finite->is_adjoint);
 }
 
+// 60000 is a float16, its double is none: the ends are those of the type.
+TEST_F(CheckStability, NarrowFloatsGoToTheirOwnEnds) {
+  ImageParam narrow(Float(16), 1, "narrow");
+  Func values("values"), f("f");
+  values(x) = cast(Float(16), cast<float>(x) * 0.25f + 0.5f);
+  narrow.set(values.realize({8}));
+  f(x) = narrow(x) * cast(Float(16), 8.0f);
+  StabilityReport report = check_stability(f, {8}, {.extremes = {Extreme::Tiny, Extreme::Huge}});
+  ASSERT_EQ(report.cases.size(), 3u);
+  EXPECT_EQ(report.cases[0].funcs.at(0).lost, 0);
+  EXPECT_EQ(report.cases[1].funcs.at(0).lost, 0);
+  EXPECT_GT(report.cases[2].funcs.at(0).lost, 0) << "an eighth of the range, times 8";
+  EXPECT_EQ(report.cases[2].funcs.at(1).non_finite, 0) << "its derivative is 8";
+}
+
 TEST_F(CheckStability, TuplesAreLookedAtValueByValue) {
   Func pair("pair"), f("f");
   pair(x) = Tuple(image(x) * 2.0f, cast<int>(image(x)), image(x) * 0.7f + 4096.0f);
