@@ -58,7 +58,18 @@ void drop_derived(ScheduleSpec& schedule, int index) {
               [&](const Companion& c) { return c.func == id || c.with == id; });
 }
 
+void check_can_be_left_out(const std::string& directive) {
+  const std::string known =
+      "specialize prefetch async memoize trace hoist_storage fold_storage compute_with rfactor "
+      "wrappers";
+  if (!directive.empty() && (" " + known + " ").find(" " + directive + " ") != std::string::npos)
+    return;
+  user_error("leave out " + quoted(directive), "directives are left out by name",
+             "it is none of those that can be left out", "Name one of: " + known);
+}
+
 void leave_out(ScheduleSpec& schedule, const std::string& directive) {
+  check_can_be_left_out(directive);
   const auto drop = [&](auto test) {
     for (size_t i = 0; i < schedule.derived.size(); ++i) {
       if (test(schedule.derived[i].kind)) drop_derived(schedule, static_cast<int>(i));
@@ -81,12 +92,10 @@ void leave_out(ScheduleSpec& schedule, const std::string& directive) {
       func.traced = false;
     } else if (directive == "hoist_storage") {
       func.placement.hoist_loop.clear();
-    } else if (directive == "fold_storage") {
+    } else {
       erase_where(func.rules, [](const DimensionRule& rule) {
         return rule.kind == DimensionRule::Kind::FoldStorage;
       });
-    } else {
-      user_error("leave out " + quoted(directive), "it is one of those that can be left out");
     }
   }
 }

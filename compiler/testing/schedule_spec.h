@@ -120,7 +120,9 @@ bool is_reduction_variable(const std::string& name);  // one of the definition's
 void drop_derived(ScheduleSpec& schedule, int index);
 
 // Takes every use of a directive out of a schedule, which stays legal: specialize, prefetch, async,
-// memoize, trace, hoist_storage, fold_storage, compute_with, rfactor, wrappers. Others: UserError.
+// memoize, trace, hoist_storage, fold_storage, compute_with, rfactor, wrappers. Others: UserError,
+// as the check alone.
+void check_can_be_left_out(const std::string& directive);
 void leave_out(ScheduleSpec& schedule, const std::string& directive);
 
 const char* tail_name(TailStrategy tail);

@@ -18,6 +18,7 @@
 #include <string>
 #include <vector>
 
+#include "diagnostics/error.h"
 #include "ir/target.h"
 #include "support/fuzz_options.h"
 #include "support/run_apart.h"
@@ -41,6 +42,16 @@ struct Options : FuzzOptions {
   std::string only;
 };
 
+void check_names(const Options& options) {
+  try {
+    if (!options.only.empty()) check_can_be_left_out(options.only);
+    for (const std::string& directive : options.without) check_can_be_left_out(directive);
+  } catch (const UserError& e) {
+    std::fprintf(stderr, "fuzz_pipelines: %s\n", e.what());
+    std::exit(2);
+  }
+}
+
 Options parse(int argc, char** argv) {
   Options options;
   for (int i = 1; i < argc; ++i) {
@@ -56,6 +67,7 @@ Options parse(int argc, char** argv) {
       std::exit(2);
     }
   }
+  check_names(options);
   return options;
 }
 
