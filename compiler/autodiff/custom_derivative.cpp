@@ -115,7 +115,7 @@ bool TangentContext::moves(const AdjointInput& input) const {
 
 Func TangentContext::tangent(const AdjointInput& input) const {
   const ir::Symbol* symbol = input.symbol().get();
-  if (!moves(input)) return Func(ir::zero_derivative(*symbol));
+  if (!moves(input)) return Func(ir::zero_derivative(*symbol, "_tan"));
   return std::find_if(moving_.begin(), moving_.end(),
                       [&](const auto& m) { return m.first == symbol; })
       ->second;

@@ -260,9 +260,9 @@ FuncPtr run_custom_tangent(const FuncPtr& f, FunctionRef<FuncPtr(const Symbol*)>
   return as_adjoint(f->name + "_tan", given.function());
 }
 
-FuncPtr zero_derivative(const Symbol& symbol) {
+FuncPtr zero_derivative(const Symbol& symbol, const std::string& suffix) {
   InputShape shape = shape_of(&symbol);
-  FuncPtr zero = new_func(shape.name + "_tan");
+  FuncPtr zero = new_func(shape.name + suffix);
   std::vector<Expr> values;
   for (Type t : shape.types)
     values.push_back(make_zero(t.is_float() ? adjoint_type(t) : Float(32)));

@@ -57,7 +57,7 @@ CustomAdjointResult run_custom_adjoint(const FuncPtr& f, const FuncPtr& adjoint,
 FuncPtr run_custom_tangent(const FuncPtr& f, FunctionRef<FuncPtr(const Symbol*)> tangent_of,
                            FunctionRef<bool(const Symbol*)> has_direction);
 
-// Zeros in the shape of an input.
-FuncPtr zero_derivative(const Symbol& symbol);
+// Zeros in the shape of an input, under its name and `suffix`.
+FuncPtr zero_derivative(const Symbol& symbol, const std::string& suffix);
 
 }  // namespace retrograde::ir

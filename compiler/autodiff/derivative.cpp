@@ -1,7 +1,9 @@
 #include "autodiff/derivative.h"
 
+#include "autodiff/custom_rules.h"
 #include "autodiff/derivative_rules.h"
 #include "autodiff/explain_costs.h"
+#include "autodiff/input_shape.h"
 #include "autodiff/synthesis.h"
 #include "frontend/define.h"
 #include "ir/build.h"
@@ -64,8 +66,10 @@ Expr seed_value(const Func& output, size_t k, const Expr& value) {
 }
 
 Derivative run(const ir::Seed& seed, const AdjointOptions& options) {
-  return Derivative(
-      std::make_shared<ir::SynthesisResult>(ir::synthesize_adjoints(seed, to_synthesis(options))));
+  auto result =
+      std::make_shared<ir::SynthesisResult>(ir::synthesize_adjoints(seed, to_synthesis(options)));
+  for (const AdjointInput& input : options.wrt) result->requested.push_back(input.symbol());
+  return Derivative(result);
 }
 
 void check_dimensions(const Func& output, size_t bounds, int adjoint,
@@ -95,9 +99,20 @@ Derivative::Derivative(std::shared_ptr<const ir::SynthesisResult> result)
     : result_(std::move(result)) {}
 
 Func Derivative::operator()(const Func& func, int update_id) const {
+  if (update_id < -1 || update_id >= func.num_update_definitions()) {
+    user_error(text("find the adjoint of ", quoted(func.name()), " after update ", update_id),
+               "a Func has an adjoint after each of its definitions",
+               text("it has ", func.num_update_definitions(), " updates, the first is 0"),
+               "Name one of them, or -1 for the pure definition");
+  }
   auto it = result_->after_stage.find({func.function().get(), update_id + 1});
-  return it == result_->after_stage.end() ? Func(std::make_shared<ir::FuncContents>())
-                                          : Func(it->second);
+  return it == result_->after_stage.end() ? absent(*func.function()) : Func(it->second);
+}
+
+Func Derivative::absent(const ir::Symbol& input) const {
+  const bool is_zero = result_->everything_requested && !result_->reached.contains(&input) &&
+                       ir::shape_of(&input).is_floating();
+  return Func(is_zero ? ir::zero_derivative(input, "_adj") : std::make_shared<ir::FuncContents>());
 }
 
 Func Derivative::adjoint(const Func& func) const {
@@ -116,8 +131,7 @@ Func Derivative::of(const AdjointInput& input) const {
 
 Func Derivative::of_parameter(const ir::ParameterContents& parameter) const {
   auto it = result_->parameters.find(&parameter);
-  return it == result_->parameters.end() ? Func(std::make_shared<ir::FuncContents>())
-                                         : Func(it->second);
+  return it == result_->parameters.end() ? absent(parameter) : Func(it->second);
 }
 Func Derivative::operator()(const Buffer<>& buffer) const {
   return of_parameter(*buffer.parameter());
@@ -152,13 +166,14 @@ Derivative propagate_adjoints(const Func& output, const Func& adjoint, const Reg
   check_output(output);
   if (!adjoint.defined()) {
     user_error(asked(output), "the adjoint must be defined",
-               quoted(adjoint.name()) + " has no definition");
+               quoted(adjoint.name()) + " has no definition", "Define it before it is given");
   }
   check_dimensions(output, output_bounds.size(), adjoint.dimensions(), adjoint.name());
   if (adjoint.outputs() != output.outputs()) {
     user_error(asked(output), "an adjoint has as many values as its Func",
                text(quoted(adjoint.name()), " has ", adjoint.outputs(), " and ",
-                    quoted(output.name()), " has ", output.outputs()));
+                    quoted(output.name()), " has ", output.outputs()),
+               "Define it as a Tuple of as many values, zeros for what does not count");
   }
   ir::Seed seed{output.function(), box_of(output_bounds), {}};
   for (size_t k = 0; k < output.types().size(); ++k) {
@@ -172,7 +187,8 @@ Derivative propagate_adjoints(const Func& output, const Buffer<float>& adjoint,
                               const AdjointOptions& options) {
   check_output(output);
   if (!adjoint.defined())
-    user_error(asked(output), "the adjoint must be a defined Buffer", "it has no memory");
+    user_error(asked(output), "the adjoint must be a defined Buffer", "it has no memory",
+               "Give it sizes: Buffer<float> adjoint(width, height)");
   check_dimensions(output, static_cast<size_t>(output.dimensions()), adjoint.dimensions(),
                    adjoint.name());
   Region region;

@@ -10,7 +10,8 @@ Func hessian_vector_product(const Func& loss, const AdjointInput& wrt,
   if (!gradient.defined()) {
     user_error(text("differentiate ", quoted(loss.name()), " twice"),
                "the input is a float that the loss depends on",
-               "it has no gradient by what was given");
+               "it has no gradient by what was given",
+               "Differentiate by something that the loss depends on");
   }
   return propagate_tangents(gradient, directions)(gradient);
 }

@@ -58,6 +58,7 @@ class Synthesis {
     for (const auto& parameter : parameters_of({seed_.output})) finish_parameter(parameter);
     forget_covered();
     explain_absent();
+    explain_strangers();
     result_.output = {seed_.output, seed_.region};
     list_gradients();
     return std::move(result_);
@@ -458,6 +459,25 @@ class Synthesis {
           !explain_absent(p.get(), p->name, p->type.is_float(), p->type))
         continue;
       result_.parameters[p.get()] = make_adjoint(target_of(*p), p->name + "_adj", {}).func;
+    }
+  }
+  // What was asked for and has nothing to do with the output.
+  void explain_strangers() {
+    for (const FuncPtr& f : order_) result_.reached.insert(f.get());
+    for (const auto& p : parameters_of({seed_.output})) result_.reached.insert(p.get());
+    result_.everything_requested = !options_.only_requested;
+    std::map<std::string, const Symbol*> strangers;  // by name: in an order that is always the same
+    for (const Symbol* symbol : options_.requested) {
+      if (symbol && !result_.reached.contains(symbol)) strangers[shape_of(symbol).name] = symbol;
+    }
+    for (const auto& [name, symbol] : strangers) {
+      const InputShape shape = shape_of(symbol);
+      explain(Explanation::Kind::Zero, shape.name, "the output does not depend on it");
+      if (!shape.is_floating()) continue;
+      const auto* f = dynamic_cast<const FuncContents*>(symbol);
+      if (!f) result_.parameters[symbol] = zero_derivative(*symbol, "_adj");
+      for (int s = 0; f && s < f->stage_count(); ++s)
+        result_.after_stage[{f, s}] = zero_derivative(*symbol, "_adj");
     }
   }
   // Whether its gradient is a zero that somebody may ask for.

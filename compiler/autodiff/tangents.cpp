@@ -29,7 +29,8 @@ ir::InputShape shape_of(const Func& output, const ir::Symbol* symbol) {
   if (shape.types.empty()) {
     user_error(asked(output), "what moves must be defined",
                shape.name.empty() ? "an input has no memory and no type"
-                                  : quoted(shape.name) + " has no definition");
+                                  : quoted(shape.name) + " has no definition",
+               "Define it first");
   }
   return shape;
 }

@@ -3,6 +3,7 @@
 #include <regex>
 
 #include "gradient/programs_suite.h"
+#include "support/errors.h"
 
 namespace retrograde::gradient {
 namespace {
@@ -71,6 +72,28 @@ TEST(Explain, ZerosAndWhatWasNotRequestedSayWhy) {
   expect_line(only, Explanation::Kind::NotRequested, b.name(), "nothing that was requested");
 }
 
+TEST(Explain, WhatTheOutputDoesNotDependOnIsZeroAndSaysSo) {
+  Buffer<float> a = line(), other = line(4, 2);
+  Func f("explained_f"), g("explained_g");
+  f(x) = a(x) * a(x);
+  g(x) = Tuple(1.0f, 2);
+  g(x) = Tuple(3.0f, 4);
+  Func loss = weighted_sum(f, {9});
+  Derivative all = propagate_adjoints(loss);
+  Derivative asked = propagate_adjoints(loss, {.wrt = {other, g}});
+  expect_line(asked, Explanation::Kind::Zero, other.name(), "the output does not depend on it");
+  expect_line(asked, Explanation::Kind::Zero, g.name(), "the output does not depend on it");
+  for (const Derivative& d : {all, asked}) {
+    ASSERT_TRUE(d(other).defined());
+    EXPECT_EQ(Buffer<float>(d(other).realize({4}))(3), 0.0f);
+    EXPECT_EQ(d.adjoint(g).outputs(), 2);
+    EXPECT_TRUE(d(g, -1).defined());
+  }
+  EXPECT_FALSE(asked(a).defined()) << "it was not requested";
+  EXPECT_FALSE(all(places(3, 2)).defined()) << "integers have none";
+  expect_mentions(error_of<CompileError>([&] { all(g, 1); }), {"1 updates", "Name one"});
+}
+
 // The account of a small pipeline, whole; numbers in names are left out.
 std::string without_numbers(const std::string& text) {
   return std::regex_replace(text, std::regex("[$][0-9]+"), "");
@@ -92,7 +115,9 @@ TEST(Explain, TheAccountOfASmallPipeline) {
   loss() = 0.0f;
   loss() += (blurred(s) - 1.0f) * (blurred(s) - 1.0f) + 0.0f * count();
   Derivative d = propagate_adjoints(loss, {.wrt = {in}});
-  EXPECT_EQ(without_numbers(d.explain()), R"(built "told_loss": "told_loss_adj", 0 gathers over reduction domains, 0 scatters inside pure dimensions, 0 privatised sums, 1 elements, 4 bytes when stored
+  EXPECT_EQ(
+      without_numbers(d.explain()),
+      R"(built "told_loss": "told_loss_adj", 0 gathers over reduction domains, 0 scatters inside pure dimensions, 0 privatised sums, 1 elements, 4 bytes when stored
 built "told_blurred": "told_blurred_adj", 0 gathers over reduction domains, 0 scatters inside pure dimensions, 0 privatised sums, 8 elements, 32 bytes when stored
 built "told_gain": "told_gain_adj", 1 gathers over reduction domains, 0 scatters inside pure dimensions, 0 privatised sums, 10 elements, 40 bytes when stored
 performance "told_gain": unless a directive schedules "told_gain_adj", it is computed at root, in parallel over its outermost dimension, in vectors along its first
