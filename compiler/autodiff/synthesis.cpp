@@ -5,6 +5,7 @@
 #include "autodiff/custom_rules.h"
 #include "autodiff/derivative_rules.h"
 #include "autodiff/input_shape.h"
+#include "autodiff/invariance.h"
 #include "autodiff/inversion_cost.h"
 #include "autodiff/reverse_sweep.h"
 #include "autodiff/update.h"
@@ -46,7 +47,8 @@ class Synthesis {
         options_(options),
         order_(topological_order({seed.output})),
         regions_(order_, seed.region),
-        ranges_(order_) {
+        ranges_(order_),
+        cancelling_(cancelling_funcs(order_)) {
     find_active();
   }
 
@@ -96,7 +98,7 @@ class Synthesis {
         active_.insert(parameter.get());
     }
     for (const FuncPtr& f : order_) {
-      if (!is_floating(f->types)) continue;
+      if (!is_floating(f->types) || cancelling_.contains(f.get())) continue;
       bool passes = passes_on(*f);
       if (passes) passing_.insert(f.get());
       if (passes || is_requested(f.get())) active_.insert(f.get());
@@ -485,6 +487,12 @@ class Synthesis {
     if (!floating) {
       explain(Explanation::Kind::Zero, name,
               "its type is " + to_string(type) + ": integers have no derivative");
+    } else if (cancelling_.contains(symbol)) {
+      explain(
+          Explanation::Kind::Zero, name,
+          "the output is the same for all of its values: it is what a softmax, a log-sum-exp or "
+          "a norm is shifted or scaled by, which cancels");
+      return true;
     } else if (!active_.contains(symbol)) {
       explain(Explanation::Kind::NotRequested, name, "nothing that was requested depends on it");
     } else {
@@ -500,6 +508,7 @@ class Synthesis {
   std::vector<FuncPtr> order_;
   Regions regions_;
   ValueRanges ranges_;
+  std::unordered_set<const Symbol*> cancelling_;
   std::unordered_set<const Symbol*> active_;
   std::unordered_set<const Symbol*> passing_;  // Funcs that depend on something else active
   std::unordered_set<const Symbol*> covered_;  // inside of a custom adjoint that was used

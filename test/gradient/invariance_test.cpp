@@ -1,0 +1,170 @@
+// Funcs that cancel are found, and nothing else is: their adjoint is 0, and says why. Forward mode,
+// which follows every path, is the oracle for the gradients.
+#include "autodiff/invariance.h"
+
+#include "autodiff/tangents.h"
+#include "gradient/gradient_check.h"
+
+namespace retrograde::gradient {
+namespace {
+
+class Invariance : public ::testing::Test {
+ protected:
+  static constexpr int n = 5, rows = 3;
+  Var x{"x"}, y{"y"};
+  RDom r{0, n};
+  Buffer<float> a = random_image({n, rows}, -2, 2, 7), w = random_image({n, rows}, -2, 2, 8);
+  Func m{"m"}, e{"e"}, s{"s"}, p{"p"};
+
+  Invariance() { m(y) = maximum(r, a(r, y)); }
+  void softmax(const Expr& exponential) {
+    e(x, y) = exponential;
+    s(y) += e(r, y);
+    p(x, y) = e(x, y) / s(y);
+  }
+  // Weighted, so that no symmetry hides a wrong gradient.
+  Func loss_of(const Func& f, const Expr& extra = 0.0f) {
+    Func loss("loss");
+    RDom q(0, n, 0, rows);
+    loss() = extra;
+    loss() += f(q.x, q.y) * w(q.x, q.y) + 0.5f * f(q.x, q.y) * f(q.x, q.y);
+    return loss;
+  }
+  static bool cancels(const Func& m, const Func& loss) {
+    return ir::cancelling_funcs(ir::topological_order({loss.function()}))
+        .contains(m.function().get());
+  }
+  // In double.
+  void expect_right(const Func& loss) {
+    oracle::Array gradient = evaluate(propagate_adjoints(loss)(a), {{0, 0}, {n, rows}});
+    for (int j = 0; j < rows; ++j) {
+      for (int i = 0; i < n; ++i) {
+        Buffer<float> unit(n, rows);
+        unit.fill(0);
+        unit(i, j) = 1;
+        EXPECT_NEAR(gradient.at({i, j}).scalar.as_double(),
+                    evaluate_scalar(propagate_tangents(loss, {{a, unit}})(loss)), 1e-11);
+      }
+    }
+  }
+  void expect_cancels(const Func& f) {
+    Func loss = loss_of(f);
+    EXPECT_TRUE(cancels(m, loss));
+    expect_right(loss);
+  }
+  void expect_counts(const Func& loss) {
+    EXPECT_FALSE(cancels(m, loss));
+    expect_right(loss);
+  }
+};
+
+TEST_F(Invariance, OfSoftmaxShiftedByTheMaximum) {
+  softmax(exp(a(x, y) - m(y)));
+  expect_cancels(p);
+  Buffer<float> zero = propagate_adjoints(loss_of(p))(m).realize({rows});
+  for (int j = 0; j < rows; ++j) EXPECT_EQ(zero(j), 0);
+  EXPECT_NE(propagate_adjoints(loss_of(p)).explain().find("zero \"m\": the output is the same"),
+            std::string::npos);
+}
+
+TEST_F(Invariance, OfSoftmaxWithATemperatureAndInAnotherBase) {
+  softmax(pow(2.0f, 3.0f * (a(x, y) - m(y)) / 2.0f));
+  expect_cancels(p);
+}
+
+TEST_F(Invariance, OfTheLogarithmOfSoftmax) {
+  Func shifted("shifted"), f("f");
+  shifted(x, y) = a(x, y) - m(y);
+  s(y) += exp(shifted(r, y));
+  f(x, y) = shifted(x, y) - log(s(y));
+  expect_cancels(f);
+}
+
+TEST_F(Invariance, OfLogSumExp) {
+  Func f("f");
+  s(y) += exp(a(r, y) - m(y));
+  f(x, y) = m(y) + log(s(y));
+  expect_cancels(f);
+}
+
+TEST_F(Invariance, OfNormsScaledByTheMaximum) {
+  Func f("f");
+  m(y) = 0.5f;
+  m(y) = max(m(y), abs(a(r, y)));
+  s(y) += pow(a(r, y) / m(y), 2);
+  f(x, y) = m(y) * sqrt(s(y));
+  expect_cancels(f);
+}
+
+TEST_F(Invariance, OfSoftmaxWithAMask) {
+  Buffer<uint8_t> mask(n, rows);
+  mask.fill(1);
+  mask(2, 1) = 0;
+  softmax(select(mask(x, y) != 0, exp(a(x, y) - m(y)), 0.0f));
+  expect_cancels(p);
+}
+
+TEST_F(Invariance, OfAGradientOfSoftmax) {
+  softmax(exp(a(x, y) - m(y)));
+  Func gradient = propagate_adjoints(loss_of(p))(a);
+  Func loss = loss_of(gradient);
+  EXPECT_TRUE(cancels(m, loss));
+  expect_right(loss);
+}
+
+TEST_F(Invariance, NotWhereItIsUsedElsewhere) {
+  softmax(exp(a(x, y) - m(y)));
+  expect_counts(loss_of(p, m(1)));
+  expect_counts(loss_of(e));
+}
+
+TEST_F(Invariance, NotOfAnotherRow) {
+  e(x, y) = exp(a(x, y) - m(y));
+  s(y) += e(r, y);
+  p(x, y) = e(x, y) / s((y + 1) % rows);
+  expect_counts(loss_of(p));
+}
+
+TEST_F(Invariance, NotWhereASumGoesOverDifferentShifts) {
+  RDom all(0, n, 0, rows);
+  e(x, y) = exp(a(x, y) - m(y));
+  s() += e(all.x, all.y);
+  p(x, y) = e(x, y) / s();
+  expect_counts(loss_of(p));
+}
+
+TEST_F(Invariance, NotWhereAConstantIsAddedToTheSum) {
+  e(x, y) = exp(a(x, y) - m(y));
+  s(y) = 1.0f;
+  s(y) += e(r, y);
+  p(x, y) = e(x, y) / s(y);
+  expect_counts(loss_of(p));
+}
+
+TEST_F(Invariance, NotOfADifferentDegree) {
+  e(x, y) = exp(a(x, y) - m(y));
+  s(y) += e(r, y) * e(r, y);
+  p(x, y) = e(x, y) / s(y);
+  expect_counts(loss_of(p));
+  Func root("root");
+  root(x, y) = e(x, y) / sqrt(s(y));
+  expect_cancels(root);
+}
+
+TEST_F(Invariance, NotPastAStoppedGradient) {
+  e(x, y) = exp(a(x, y) - m(y));
+  s(y) += exp(a(r, y) - stop_gradient(m(y)));
+  p(x, y) = e(x, y) / s(y);
+  expect_counts(loss_of(p));
+}
+
+TEST_F(Invariance, NotOfAMeanThatIsSubtracted) {
+  Func mean("mean"), f("f");
+  mean(y) += a(r, y) / float(n);
+  f(x, y) = (a(x, y) - mean(y)) * (a(x, y) - mean(y));
+  EXPECT_FALSE(cancels(mean, loss_of(f)));
+  expect_right(loss_of(f));
+}
+
+}  // namespace
+}  // namespace retrograde::gradient
