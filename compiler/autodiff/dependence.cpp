@@ -91,9 +91,13 @@ class StageRelations {
     return without_parameters(result.intersect_domain(domain));
   }
 
-  // Reads of Funcs anywhere in the definition.
-  std::vector<Read> reads() {
-    for_each_expr(definition_, [&](const Expr& e) { collect(without_lets(e)); });
+  // Reads of Funcs anywhere in the definition, or in one of its values.
+  std::vector<Read> reads(std::optional<size_t> value) {
+    if (value) {
+      collect(without_lets(definition_.values[*value]));
+    } else {
+      for_each_expr(definition_, [&](const Expr& e) { collect(without_lets(e)); });
+    }
     return std::move(reads_);
   }
 
@@ -159,36 +163,49 @@ class Composer {
   Composer(IslContext& context, const FuncPtr& source) : context_(context), source_(source) {}
 
   isl::map of(const FuncPtr& output) {
-    for (const FuncPtr& f : topological_order({output})) relations_.emplace(f.get(), relation(*f));
-    return *relations_.at(output.get());
+    for (const FuncPtr& f : topological_order({output})) relations_.emplace(f.get(), relations(*f));
+    isl::map result = empty_map(context_.ctx, output->args.size(), dims());
+    for (const isl::map& of_value : relations_.at(output.get())) result = result.unite(of_value);
+    return tidy(result);
   }
 
  private:
   size_t dims() const { return source_->args.size(); }
 
-  isl::map relation_of(const Symbol* f, size_t f_dims) const {
-    auto found = relations_.find(f);
-    return found == relations_.end() ? empty_map(context_.ctx, f_dims, dims()) : *found->second;
+  // Of the value that is read, where they are known apart.
+  isl::map relation_of(const Call& call) const {
+    auto found = relations_.find(call.symbol.raw());
+    if (found == relations_.end()) return empty_map(context_.ctx, call.args.size(), dims());
+    const std::vector<isl::map>& values = found->second;
+    return values.size() == 1 ? values[0] : values[static_cast<size_t>(call.value_index)];
   }
   bool depends(const Symbol* f) const {
     auto found = relations_.find(f);
-    return found != relations_.end() && !isl_map_is_empty(found->second->get());
+    return found != relations_.end() &&
+           std::any_of(found->second.begin(), found->second.end(),
+                       [](const isl::map& m) { return !isl_map_is_empty(m.get()); });
   }
 
-  std::unique_ptr<isl::map> relation(const FuncContents& f) const {
+  // One for each value of a Tuple, or one for all where updates may couple them.
+  std::vector<isl::map> relations(const FuncContents& f) const {
     if (&f == source_.get()) {
-      return std::make_unique<isl::map>(isl::manage(
-          isl_map_identity(isl_space_alloc(context_.ctx, 0, size_of(dims()), size_of(dims())))));
+      return {isl::manage(
+          isl_map_identity(isl_space_alloc(context_.ctx, 0, size_of(dims()), size_of(dims()))))};
     }
     if (f.is_extern()) refuse_dependent(f);
-    isl::map result = empty_map(context_.ctx, f.args.size(), dims());
     std::vector<FuncPtr> callees = direct_callees(f);
     if (std::none_of(callees.begin(), callees.end(),
                      [&](const FuncPtr& callee) { return depends(callee.get()); }))
-      return std::make_unique<isl::map>(result);
-    for (int s = 0; s < f.stage_count(); ++s) result = result.unite(of_stage(f, s));
+      return {empty_map(context_.ctx, f.args.size(), dims())};
+    if (f.is_pure() && f.types.size() > 1) {
+      std::vector<isl::map> result;
+      for (size_t k = 0; k < f.types.size(); ++k) result.push_back(tidy(of_stage(f, 0, k)));
+      return result;
+    }
+    isl::map result = empty_map(context_.ctx, f.args.size(), dims());
+    for (int s = 0; s < f.stage_count(); ++s) result = result.unite(of_stage(f, s, std::nullopt));
     if (!isl_map_is_empty(result.get())) result = coupling(f).apply_range(result);
-    return std::make_unique<isl::map>(tidy(result));
+    return {tidy(result)};
   }
 
   void refuse_dependent(const FuncContents& f) const {
@@ -201,17 +218,16 @@ class Composer {
     }
   }
 
-  isl::map of_stage(const FuncContents& f, int s) const {
+  isl::map of_stage(const FuncContents& f, int s, std::optional<size_t> value) const {
     StageRelations stage(context_, f, s);
     isl::map result = empty_map(context_.ctx, f.args.size(), dims());
-    std::vector<Read> reads = stage.reads();
+    std::vector<Read> reads = stage.reads(value);
     std::erase_if(reads, [&](const Read& r) { return !depends(r.call->symbol.raw()); });
     if (reads.empty()) return result;
     isl::map written = stage.written_by();
     for (const Read& r : reads) {
       isl::map read = stage.access(r.call->args, r.where);
-      result = result.unite(
-          written.apply_range(read).apply_range(relation_of(r.call->symbol.raw(), dims())));
+      result = result.unite(written.apply_range(read).apply_range(relation_of(*r.call)));
       result = tidy(result);
     }
     return result;
@@ -263,7 +279,7 @@ class Composer {
 
   IslContext& context_;
   const FuncPtr& source_;
-  std::unordered_map<const Symbol*, std::unique_ptr<isl::map>> relations_;
+  std::unordered_map<const Symbol*, std::vector<isl::map>> relations_;
 };
 
 isl::set box_set(isl_ctx* ctx, const Box& box, size_t dims) {

@@ -1,6 +1,7 @@
 #include "autodiff/jacobian.h"
 
 #include "autodiff/compressed.h"
+#include "autodiff/flat_input.h"
 #include "autodiff/input_shape.h"
 #include "autodiff/regions.h"
 #include "autodiff/tangents.h"
@@ -27,18 +28,12 @@ struct JacobianResult {
 
 namespace {
 
+using ir::both;
 using ir::Compressed;
-
-std::vector<Expr> expressions(const std::vector<Var>& vars) { return {vars.begin(), vars.end()}; }
-std::vector<Var> variables(const std::string& base, size_t n) {
-  std::vector<Var> result;
-  for (size_t d = 0; d < n; ++d) result.emplace_back(base + std::to_string(d));
-  return result;
-}
-std::vector<Var> both(std::vector<Var> a, const std::vector<Var>& b) {
-  a.insert(a.end(), b.begin(), b.end());
-  return a;
-}
+using ir::direction;
+using ir::expressions;
+using ir::flat;
+using ir::variables;
 
 // Zeros of the shape of an input or output: a seed to be replaced.
 Func placeholder(const std::string& name, int dimensions, Type type) {
@@ -55,12 +50,6 @@ ir::InputShape checked_input(const std::string& asked, const AdjointInput& input
                shape.name.empty() ? "it has no memory and no type"
                                   : quoted(shape.name) + " has no definition",
                "Define it first");
-  }
-  if (shape.types.size() != 1) {
-    unsupported(asked, "an input of a whole Jacobian has one value",
-                text(quoted(shape.name), " has ", shape.types.size()),
-                "Differentiate by a Func of one value that the Tuple is made from, or use products "
-                "with single directions");
   }
   if (!shape.is_floating()) {
     user_error(asked, "only floating-point values have derivatives",
@@ -79,21 +68,21 @@ ir::Box box_of(const Region& region) {
   return box;
 }
 
-// Elements of the input that a region of the output depends on, and that exist.
+// Elements of the input that a region of the output depends on, and that exist; flat.
 ir::Box box_of_input(const Func& output, const ir::Box& region, const AdjointInput& input,
                      const ir::InputShape& shape) {
   ir::Regions regions(ir::topological_order({output.function()}), region);
   ir::Box box = regions.of(input.symbol().get());
   box.resize(static_cast<size_t>(shape.dimensions));
   auto p = std::dynamic_pointer_cast<ir::ParameterContents>(input.symbol());
-  if (!p || !p->is_literal || !p->buffer) return box;
+  if (!p || !p->is_literal || !p->buffer) return flat(box, shape);
   for (size_t d = 0; d < box.size(); ++d) {
     const halide_dimension_t& dim = p->buffer->dim[d];
     ir::Interval own{ir::make_const(Int(32), dim.min),
                      ir::make_const(Int(32), dim.min + dim.extent - 1)};
     box[d] = ir::intersection(box[d], own);
   }
-  return box;
+  return flat(box, shape);
 }
 
 // ---- the two compressions, up to colours ----
@@ -105,8 +94,8 @@ struct Candidate {
 
 Candidate by_columns(const Func& output, const AdjointInput& input, const ir::InputShape& shape,
                      const ir::Box& rows, const ir::Box& columns) {
-  Func seed = placeholder(shape.name + "_seed", shape.dimensions, shape.types[0]);
-  Func tangent = propagate_tangents(output, {{input, seed}})(output);
+  Func seed = placeholder(shape.name + "_seed", flat(shape).dimensions, flat(shape).types[0]);
+  Func tangent = propagate_tangents(output, {{input, direction(seed, shape)}})(output);
   return {Compressed::make({.output = tangent.function(),
                             .seed = seed.function(),
                             .rows = rows,
@@ -114,15 +103,15 @@ Candidate by_columns(const Func& output, const AdjointInput& input, const ir::In
           false};
 }
 
-Candidate by_rows(const Func& output, const AdjointInput& input, const ir::Box& rows,
-                  const ir::Box& columns, const Region& bounds, Overwritten overwritten,
-                  int64_t most) {
+Candidate by_rows(const Func& output, const AdjointInput& input, const ir::InputShape& shape,
+                  const ir::Box& rows, const ir::Box& columns, const Region& bounds,
+                  Overwritten overwritten, int64_t most) {
   Func seed = placeholder(output.name() + "_seed", output.dimensions(), output.types()[0]);
   Func adjoint =
       propagate_adjoints(output, seed, bounds, {.overwritten = overwritten, .wrt = {input}})
           .of(input);
   if (!adjoint.defined()) return {nullptr, true};
-  return {Compressed::make({.output = adjoint.function(),
+  return {Compressed::make({.output = flat(adjoint, shape).function(),
                             .seed = seed.function(),
                             .rows = columns,
                             .columns = rows,
@@ -136,7 +125,7 @@ Candidate best(const Func& output, const AdjointInput& input, const ir::InputSha
                const JacobianOptions& options) {
   Candidate result;
   if (options.compression == Compression::Rows)
-    return by_rows(output, input, rows, columns, bounds, options.overwritten, 0);
+    return by_rows(output, input, shape, rows, columns, bounds, options.overwritten, 0);
   bool try_rows = options.compression == Compression::Auto && output.outputs() == 1;
   std::exception_ptr refused;
   try {
@@ -148,7 +137,8 @@ Candidate best(const Func& output, const AdjointInput& input, const ir::InputSha
   if (!try_rows || (result.compressed && result.compressed->colours().count() == 1)) return result;
   try {
     int64_t most = result.compressed ? result.compressed->colours().count() - 1 : 0;
-    Candidate other = by_rows(output, input, rows, columns, bounds, options.overwritten, most);
+    Candidate other =
+        by_rows(output, input, shape, rows, columns, bounds, options.overwritten, most);
     if (other.compressed) return other;
   } catch (const Error&) {  // a reverse mode that is not there is no choice
     if (refused) std::rethrow_exception(refused);
@@ -248,7 +238,7 @@ std::vector<Type> derivative_types(const Func& f) {
 // The gradient by one input, and how it moves along a seed of another.
 struct SecondOrder {
   Func gradient, seed, moved;
-  ir::InputShape row_shape, column_shape;
+  ir::InputShape row_shape, column_shape;  // flat
   ir::Box rows, columns;
 };
 SecondOrder second_order(const std::string& asked, const Func& loss, const AdjointInput& rows,
@@ -262,12 +252,16 @@ SecondOrder second_order(const std::string& asked, const Func& loss, const Adjoi
                text(quoted(s.row_shape.name), " has no gradient"),
                "Differentiate by something that the loss depends on");
   }
-  s.seed = placeholder(s.column_shape.name + "_seed", s.column_shape.dimensions,
-                       s.column_shape.types[0]);
-  s.moved = propagate_tangents(s.gradient, {{columns, s.seed}})(s.gradient);
+  s.gradient = flat(s.gradient, s.row_shape);
+  s.seed = placeholder(s.column_shape.name + "_seed", flat(s.column_shape).dimensions,
+                       flat(s.column_shape).types[0]);
+  s.moved =
+      propagate_tangents(s.gradient, {{columns, direction(s.seed, s.column_shape)}})(s.gradient);
   ir::Box point(static_cast<size_t>(loss.dimensions()), ir::Interval::point(Expr(0)));
   s.rows = box_of_input(loss, point, rows, s.row_shape);
   s.columns = box_of_input(loss, point, columns, s.column_shape);
+  s.row_shape = flat(s.row_shape);
+  s.column_shape = flat(s.column_shape);
   return s;
 }
 
@@ -347,7 +341,7 @@ Jacobian jacobian(const Func& output, const AdjointInput& input, const Region& o
                text("it does not depend on ", quoted(shape.name)), "Name another input");
   }
   return Jacobian(result_of(asked, candidate, derivative_types(output), output.dimensions(),
-                            shape.dimensions, output.name() + "_by_" + shape.name));
+                            flat(shape).dimensions, output.name() + "_by_" + shape.name));
 }
 
 Jacobian hessian(const Func& loss, const AdjointInput& wrt, Overwritten overwritten) {

@@ -59,7 +59,10 @@ class Jacobian {
   std::shared_ptr<const ir::JacobianResult> result_;
 };
 
-// Of `output` over output_bounds (min and extent in each dimension) by an input of one float value.
+// Of `output` over output_bounds (min and extent in each dimension) by an input. One of several
+// values (a Func of Tuples) has one more dimension here, the value, last:
+//   jacobian(f, pair, ...).dense()(y..., x..., k)     d f(y) / d pair(x)[k]
+//   hessian(loss, pair).dense()(i..., k, j..., l)     d2 loss / d pair(i)[k] d pair(j)[l]
 // CompileError: as propagate_tangents, propagate_adjoints. Unsupported: places or reductions in the
 // pattern without constant bounds, more than 4096 colours, an extern stage on the way.
 Jacobian jacobian(const Func& output, const AdjointInput& input, const Region& output_bounds,
