@@ -471,8 +471,9 @@ Expr times_partial(const Expr& adjoint, const Partial& partial) {
     return call_op(Op::strong_mul, adjoint.type(), {factor, adjoint});
   Expr product = call_op(Op::strong_mul, adjoint.type(), {adjoint, factor});
   if (partial.strength != Strength::Both) return product;
-  Expr zero = make_zero(factor.type());
-  return make_select(factor == zero, make_zero(product.type()), product);
+  // A product in both branches: the derivative of this one is that of a product where factor is 0.
+  return make_select(factor == make_zero(factor.type()),
+                     call_op(Op::strong_mul, product.type(), {factor, adjoint}), product);
 }
 
 }  // namespace retrograde::ir

@@ -60,6 +60,19 @@ TEST_F(Nesting, HigherDerivativesInEveryOrderOfModes) {
   EXPECT_NEAR(compiled(), closed_form(0.5, 0.75, 3), 1e-5);
 }
 
+// A factor that is exactly 0 cuts an infinite adjoint off; its own derivative goes on.
+TEST_F(Nesting, FactorsThatAreZeroHaveDerivatives) {
+  Expr a = u - 0.75f;
+  for (const Expr& e : {pow(a * a + 1.0f, 0.5625f), sqrt(a * a + 0.25f), fast_pow(a * a + 1, w)}) {
+    Func f("f");
+    f() = e;
+    double expected = evaluate_scalar(derivative(f, u, "ff"));
+    EXPECT_GT(expected, 1);
+    for (const char* modes : {"fr", "rf", "rr"})
+      EXPECT_NEAR(evaluate_scalar(derivative(f, u, modes)), expected, 1e-12) << modes;
+  }
+}
+
 TEST_F(Nesting, MixedPartialsInEveryOrder) {
   Func f("f");
   Expr x = u, y = v, z = w;

@@ -1,0 +1,60 @@
+// Central differences with a bound on what they can tell.
+#include <cmath>
+
+#include "gradient/adversary/probe.h"
+#include "ir/visit.h"
+
+namespace retrograde::gradient {
+
+namespace {
+
+constexpr double step = 1.0 / 128;
+
+// The first column of a Richardson tableau for slopes at h, h/2, h/4, whose errors go with
+// h^order, h^(order+grow) ...
+double extrapolated(const double (&slopes)[3], double first, double second) {
+  const auto& [a, b, c] = slopes;
+  const double ab = (first * b - a) / (first - 1), bc = (first * c - b) / (first - 1);
+  return (second * bc - ab) / (second - 1);
+}
+
+int narrowest_float(const Func& output) {
+  int bits = 64;  // of the mantissa, about
+  for (const ir::FuncPtr& f : ir::topological_order({output.function()})) {
+    for (int s = 0; s < f->stage_count(); ++s) {
+      ir::for_each_expr(f->stage(s), [&](const Expr& root) {
+        ir::walk(root, [&](const Expr& e) {
+          if (e.type().is_float())
+            bits = std::min(bits, e.type().is_bfloat() ? 8 : e.type().bits());
+          return true;
+        });
+      });
+    }
+  }
+  return bits;
+}
+
+}  // namespace
+
+double precision_of(const Func& output) {
+  const int bits = narrowest_float(output);
+  return bits == 8 ? 3e-2 : bits == 16 ? 4e-3 : 1e-6;
+}
+
+Slope slope_of(const std::function<double(double)>& f, double at_rest, double scale, double largest,
+               double precision) {
+  double central[3], right[3], left[3];
+  for (int i = 0; i < 3; ++i) {
+    const double h = step / (1 << i), up = f(h), down = f(-h);
+    central[i] = (up - down) / (2 * h);
+    right[i] = (up - at_rest) / h;
+    left[i] = (at_rest - down) / h;
+  }
+  const double slope = extrapolated(central, 4, 16), coarse = (4 * central[1] - central[0]) / 3,
+               one_sided = extrapolated(right, 2, 4) - extrapolated(left, 2, 4);
+  const double doubt = precision * (scale + std::abs(slope) + 1e-3) +
+                       10 * std::abs(slope - coarse) + 3 * std::abs(one_sided) + 1e-10 * largest;
+  return {slope, doubt, doubt < 1e-2 * (std::abs(slope) + largest)};
+}
+
+}  // namespace retrograde::gradient

@@ -1,0 +1,114 @@
+// Derivatives of derivatives along two directions u and v: by every order of the two modes, which
+// must agree, and against differences of <v, gradient> along u. Third ones along u, v and u.
+#include <cmath>
+
+#include "diagnostics/error.h"
+#include "gradient/adversary/probe.h"
+
+namespace retrograde::gradient {
+
+namespace {
+
+class Higher {
+ public:
+  Higher(Subject& s, const Motion& v, const Derivative& d)
+      : s_(s), v_(v), d_(d), u_(s.program, s.weights, "u") {}
+
+  void run() {
+    first_ = v_.along([&](const AdjointInput& x) { return d_.of(x); });
+    second_ = u_and_v();
+    compare_with_differences();
+    compare("tangents of tangents", weighted_output(tangent_twice()), second_);
+    if (s_.weights.below(2) == 0) {
+      compare("adjoints of tangents", adjoint_of_tangent(), second_);
+    } else {
+      compare("adjoints of adjoints", adjoint_of_adjoint(), second_);
+    }
+    if (s_.program.checks.order >= 3) compare_third();
+  }
+
+ private:
+  static Func along(const Func& f, const std::vector<Direction>& directions) {
+    return f.defined() ? propagate_tangents(f, directions)(f) : f;
+  }
+  Product u_and_v() const {
+    return v_.along([&](const AdjointInput& x) { return along(d_.of(x), u_.directions()); });
+  }
+  Func tangent() const { return along(s_.program.output(), v_.directions()); }
+  Func tangent_twice() const { return along(tangent(), u_.directions()); }
+  Product weighted_output(const Func& f) const {
+    if (!f.defined()) return {};
+    return weighted(evaluate(f, s_.program.region), s_.program.region, s_.w);
+  }
+  Product adjoint_of_tangent() const {
+    const Derivative d = propagate_adjoints(tangent(), s_.seed, s_.bounds(), s_.options());
+    return u_.along([&](const AdjointInput& x) { return d.of(x); });
+  }
+  // Of the sum over inputs of <v, gradient>, one input at a time.
+  Product adjoint_of_adjoint() const {
+    Product result;
+    const std::vector<Direction> directions = v_.directions();
+    for (size_t i = 0; i < directions.size(); ++i) {
+      const Func gradient = d_.of(directions[i].input);
+      if (!gradient.defined()) continue;
+      Region bounds;
+      const oracle::Region region = v_.region(i);
+      for (size_t d = 0; d < region.mins.size(); ++d)
+        bounds.push_back({Expr(region.mins[d]), Expr(region.extents[d])});
+      const Derivative d =
+          propagate_adjoints(gradient, directions[i].tangent, bounds, s_.options());
+      const Product part = u_.along([&](const AdjointInput& x) { return d.of(x); });
+      result.sum += part.sum;
+      result.magnitude += part.magnitude;
+    }
+    return result;
+  }
+
+  // What is not finite may be a pole of the second derivative: differences tell.
+  void compare(const char* what, const Product& a, const Product& b) const {
+    if (!a.is_finite() || !b.is_finite()) return;
+    const double slack = 1e-9 * (a.magnitude + b.magnitude + first_.magnitude + 1 + s_.largest);
+    if (std::abs(a.sum - b.sum) <= slack) return;
+    decide(Judgement::Wrong, text("second derivatives differ: ", what, " say ", a.sum,
+                                  ", tangents of adjoints ", b.sum));
+  }
+  void compare_with_differences() const {
+    if (!s_.program.checks.higher) return;
+    const auto moved = [&](double by) {
+      u_.move(by);
+      const Product result = v_.along([&](const AdjointInput& x) { return d_.of(x); });
+      u_.move(-by);
+      return result.sum;
+    };
+    const Slope slope = slope_of(moved, first_.sum, second_.magnitude, first_.magnitude,
+                                 10 * precision_of(s_.program.output()));
+    if (!slope.is_smooth) return;
+    if (std::abs(slope.value - second_.sum) <= slope.doubt) return;
+    decide(Judgement::Wrong, text("tangents of adjoints say ", second_.sum, " and differences ",
+                                  slope.value, " +- ", slope.doubt));
+  }
+
+  void compare_third() const {
+    const auto u = u_.directions(), v = v_.directions();
+    const Product a = v_.along([&](const AdjointInput&x) { return along(along(d_.of(x), u), v); }),
+                  b = weighted_output(along(tangent_twice(), v));
+    if (!a.is_finite() || !b.is_finite()) return;
+    const double slack = 1e-8 * (a.magnitude + b.magnitude + second_.magnitude + 1 + s_.largest);
+    if (std::abs(a.sum - b.sum) <= slack) return;
+    decide(Judgement::Wrong, text("third derivatives differ: ", a.sum, " and ", b.sum));
+  }
+
+  Subject& s_;
+  const Motion& v_;
+  const Derivative& d_;
+  const Motion u_;
+  Product first_, second_;
+};
+
+}  // namespace
+
+void compare_higher(Subject& s, const Motion& v, const Derivative& derivative) {
+  Higher(s, v, derivative).run();
+}
+
+}  // namespace retrograde::gradient

@@ -1,0 +1,113 @@
+// Gradients as machine code: within the rounding that the interpreter allows for, and the same bits
+// on any number of threads; as they are, and under a random schedule.
+#include <cstring>
+
+#include "diagnostics/error.h"
+#include "frontend/realization.h"
+#include "gradient/adversary/probe.h"
+#include "gradient/adversary/schedules.h"
+#include "support/own_threads.h"
+#include "testing/interpreter.h"
+
+namespace retrograde::gradient {
+
+namespace {
+
+Buffer<> room_for(const Type& type, const oracle::Region& region) {
+  Buffer<> result(type, region.extents);
+  result.set_min(region.mins);
+  return result;
+}
+
+class Compiled {
+ public:
+  Compiled(Subject& s, const Gradients& gradients) : s_(s), gradients_(gradients) {}
+
+  // False: nothing of the program runs as machine code.
+  bool compare_unscheduled() {
+    for (const auto& [gradient, region] : gradients_) {
+      oracle::InterpreterOptions options;
+      options.rounding = oracle::Rounding::Contraction;
+      options.max_points = max_points;
+      expected_.push_back(oracle::Interpreter(options).realize(gradient.function(), region)[0]);
+      try {
+        compare(expected_.size() - 1, "");
+      } catch (const UserError& error) {
+        // Machine code bounds what is read before it runs.
+        if (!primal_runs()) return false;
+        decide(Judgement::Refused,
+               std::string("its gradient has no machine code: ") + error.what());
+      }
+    }
+    return true;
+  }
+
+  void compare_scheduled(const Derivative& derivative) {
+    std::vector<Func> funcs = derivative.funcs();
+    if (s_.program.checks.primal)
+      funcs.insert(funcs.begin(), s_.program.funcs.begin(), s_.program.funcs.end());
+    schedule_at_random(funcs, static_cast<uint64_t>(s_.program.checks.schedule));
+    for (size_t i = 0; i < gradients_.size(); ++i) {
+      try {
+        compare(i, ", scheduled");
+      } catch (const UserError&) {  // of the schedule
+      }
+    }
+  }
+
+ private:
+  bool primal_runs() const {
+    try {
+      Func output = s_.program.output();
+      std::vector<Buffer<>> results;
+      for (const Type& t : output.types()) results.push_back(room_for(t, s_.program.region));
+      output.realize(Realization(results));
+      return true;
+    } catch (const UserError&) {
+      return false;
+    }
+  }
+
+  void compare(size_t i, const std::string& how) {
+    const auto& [gradient, region] = gradients_[i];
+    const int threads = 1 << s_.weights.below(4);
+    const Buffer<> first = realized(gradient, region, nullptr);
+    OwnThreads context(threads, s_.weights.below(2) == 1);
+    const Buffer<> second = realized(gradient, region, &context);
+    const auto comparison =
+        oracle::compare(expected_[i], *const_cast<Buffer<>&>(first).raw_buffer(), 4);
+    if (!comparison.agrees()) {
+      decide(Judgement::Wrong,
+             text("machine code of ", gradient.name(), how, ": ", comparison.mismatches,
+                  " differ, first ", comparison.first_mismatch));
+    }
+    if (std::memcmp(first.data(), second.data(), first.size_in_bytes()) != 0) {
+      decide(Judgement::Wrong, text("machine code of ", gradient.name(), how, ": other bits on ",
+                                    threads, " threads"));
+    }
+  }
+  static Buffer<> realized(Func gradient, const oracle::Region& region, JITUserContext* context) {
+    Buffer<> result = room_for(gradient.types()[0], region);
+    std::memset(result.data(), 0x7f, result.size_in_bytes());
+    if (context) {
+      gradient.realize(context, result);
+    } else {
+      gradient.realize(result);
+    }
+    return result;
+  }
+
+  Subject& s_;
+  const Gradients& gradients_;
+  std::vector<oracle::Array> expected_;
+};
+
+}  // namespace
+
+void compare_machine_code(Subject& s, const Derivative& derivative, const Gradients& gradients) {
+  Compiled code(s, gradients);
+  if (code.compare_unscheduled() && s.program.checks.schedule > 0)
+    code.compare_scheduled(derivative);
+}
+
+}  // namespace retrograde::gradient

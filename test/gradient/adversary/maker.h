@@ -1,0 +1,85 @@
+// How a program is put together: one object that the parts of the generator share.
+//
+// program.cpp: the order of things. inputs.cpp: images, and reads of them and of Funcs. values.cpp:
+// expressions. functions.cpp: smooth functions, kinks, guarded branches. stages.cpp: Funcs,
+// updates, reductions. loops.cpp: loops over time. rules.cpp: derivatives that the author writes.
+#pragma once
+
+#include "gradient/adversary/places.h"
+#include "gradient/adversary/program.h"
+
+namespace retrograde::gradient {
+
+// The coordinates of a point, and the Func that is being updated there.
+struct Point {
+  std::vector<Expr> all;    // pure variables, then reduction variables
+  std::vector<Expr> write;  // where the update writes
+  Func self;
+  std::vector<bool> is_pure;  // dimensions of `self` that the update leaves alone
+  bool in_update() const { return !write.empty(); }
+};
+
+class Maker {
+ public:
+  Maker(Choices& choices, AdversaryProgram& program)
+      : c_(choices), p_(program), places_(choices, program.data, program.count) {}
+  void run();
+
+ private:
+  void choose_checks();
+
+  // ---- inputs ----
+  void make_inputs();
+  Type image_type();
+  static ImageParam handle_of(const Buffer<>& image);
+  void fill(Buffer<>& image, bool ties);
+  Expr read_image(const Point& at);
+  Expr read_func(const Point& at);
+  Expr read_self(const Point& at);
+  Expr coordinate(const Point& at, int d);
+  const Func& any_func();
+  Expr any_value(const FuncRef& ref);
+
+  // ---- values ----
+  float weight();
+  Expr constant(const Type& type);
+  Expr leaf(const Type& type, const Point& at);
+  Expr value(const Type& type, const Point& at, int depth);
+  Expr integer(const Type& type, const Point& at, int depth);
+  Expr smooth(const Type& type, const Point& at, int depth);
+  Expr fast(const Type& type, const Point& at, int depth);
+  Expr broken(const Type& type, const Point& at, int depth);
+  Expr guarded(const Type& type, const Point& at, int depth);
+  Expr reduced(const Type& type, const Point& at, int depth);
+
+  // ---- stages ----
+  Type value_type();
+  Region ranges(int most);
+  RDom domain(int most);
+  void add_func(int dimensions);
+  void add_chain();
+  void add_output();
+  Expr write_place(const RDom& r, size_t d, const std::vector<Var>& vars);
+  void add_update(Func& f, const std::vector<Var>& vars);
+  Expr updated(const Func& f, int k, const Point& at);
+
+  // ---- loops over time ----
+  void add_loop();
+  Expr stepped(const Func& f, int k, const Point& at);
+
+  // ---- rules ----
+  Expr ruled(const Type& type, const Point& at, int depth);
+  void add_custom();
+
+  Choices& c_;
+  AdversaryProgram& p_;
+  Places places_;
+  int budget_ = 0;
+};
+
+std::vector<Var> first_variables(int dimensions);
+
+// Outside of an integer type's range casts are undefined: floats are clamped.
+Expr converted(const Type& type, const Expr& e);
+
+}  // namespace retrograde::gradient

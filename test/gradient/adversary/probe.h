@@ -1,0 +1,105 @@
+// What all checks of one program share: evaluation in double, random weights, how inputs move.
+#pragma once
+
+#include <random>
+
+#include "autodiff/tangents.h"
+#include "gradient/adversary/check.h"
+
+namespace retrograde::gradient {
+
+constexpr size_t max_points = size_t{1} << 17;  // of one Func; more is passed over
+
+// Ends the judgement.
+struct Verdict {
+  Judged judged;
+};
+[[noreturn]] void decide(Judgement judgement, const std::string& detail);
+
+// sum a * b, and of the magnitudes.
+struct Product {
+  double sum = 0, magnitude = 0;
+  void add(double a, double b);
+  bool is_finite() const;
+};
+
+// Weights of all values of a box, none of them 0: odd multiples of 1/4 up to 7/4.
+class Weights {
+ public:
+  explicit Weights(uint64_t seed) : random_(seed) {}
+  float next() { return (2.0f * static_cast<float>(random_() % 4) + 1.0f) * sign() / 4.0f; }
+  float sign() { return random_() % 2 ? 1.0f : -1.0f; }
+  int below(int n) { return static_cast<int>(random_() % static_cast<uint64_t>(n)); }
+  Buffer<float> over(const oracle::Region& region, const std::string& name);
+  Buffer<float> signs_over(const oracle::Region& region, const std::string& name);
+
+ private:
+  std::mt19937_64 random_;
+};
+
+double as_double(const oracle::Value& v);
+double element(const Buffer<float>& buffer, const std::vector<int>& at);
+
+// In double. `evaluate` is for what was synthesized: when the program can be evaluated, its
+// derivative can, or it is wrong.
+std::vector<oracle::Array> interpret(const Func& f, const oracle::Region& region);
+std::vector<oracle::Array> evaluate(const Func& f, const oracle::Region& region);
+
+// sum weights * values of a Func over a region; integers count as 0.
+Product weighted(const std::vector<oracle::Array>& arrays, const oracle::Region& region,
+                 const std::vector<Buffer<float>>& weights);
+
+// A Func that reads one buffer for each value; outside of the region it is `outside`.
+Func reading(const std::vector<Buffer<float>>& buffers, const std::string& name);
+Func reading_inside(const std::vector<Buffer<float>>& buffers, const oracle::Region& region,
+                    float outside);
+
+// All inputs of a program, and by how much each element of them moves: by +1 or -1.
+class Motion {
+ public:
+  Motion(const AdversaryProgram& program, Weights& weights, const std::string& name);
+  std::vector<AdjointInput> inputs() const;
+  std::vector<Direction> directions() const;
+  oracle::Region region(size_t input) const;  // of input i; none of `scale`, the last
+  void move(double by) const;
+  // <gradients, directions>; `of` gives the gradient by an input, undefined where there is none.
+  Product along(const std::function<Func(const AdjointInput&)>& of) const;
+
+ private:
+  const AdversaryProgram& p_;
+  std::vector<Buffer<float>> v_;
+  float of_scale_;
+};
+
+// One program and the seed of its gradient.
+struct Subject {
+  const AdversaryProgram& program;
+  Weights weights;
+  std::vector<Buffer<float>> w = {};  // of each value of the output
+  Func seed = {};
+  double largest = 0;  // of the magnitudes summed up in the primal
+  Region bounds() const;
+  AdjointOptions options() const;  // by inputs only
+};
+
+// ---- differences ----
+
+// The slope of f at 0, by sixth-order central differences; smooth: one-sided slopes say the same.
+struct Slope {
+  double value, doubt;
+  bool is_smooth;
+};
+// `scale`: of the errors of rounding relative to 1e-6. f gives its value at a place.
+Slope slope_of(const std::function<double(double)>& f, double at_rest, double scale, double largest,
+               double precision);
+// Of the narrowest floats of a program: partials have their digits, in double too.
+double precision_of(const Func& output);
+
+// ---- the checks ----
+
+void compare_higher(Subject& s, const Motion& v, const Derivative& derivative);
+void compare_dense(Subject& s);
+using Gradients = std::vector<std::pair<Func, oracle::Region>>;
+void compare_machine_code(Subject& s, const Derivative& derivative, const Gradients& gradients);
+
+}  // namespace retrograde::gradient

@@ -1,0 +1,127 @@
+// Derivatives that the author writes, all of them right: the gradient is the one without them.
+#include "autodiff/custom_derivative.h"
+#include "autodiff/straight_through.h"
+#include "autodiff/tangents.h"
+#include "gradient/adversary/maker.h"
+#include "ir/visit.h"
+
+namespace retrograde::gradient {
+
+namespace {
+
+bool is_floating(const Func& f) {
+  return std::all_of(f.types().begin(), f.types().end(),
+                     [](const Type& t) { return t.is_float(); });
+}
+
+// The derivative of `source` by its inputs, synthesized: what a rule of a copy of it gives.
+std::vector<AdjointContribution> by_synthesis(const Func& source,
+                                              const std::vector<AdjointInput>& inputs,
+                                              const AdjointContext& c) {
+  AdjointOptions options{.overwritten = Overwritten::Store};
+  for (const AdjointInput& input : inputs) {
+    if (c.wants(input)) options.wrt.push_back(input);
+  }
+  std::vector<AdjointContribution> result;
+  if (options.wrt.empty()) return result;
+  const Derivative d = propagate_adjoints(source, c.adjoint(), c.region(), options);
+  for (const AdjointInput& input : options.wrt) result.emplace_back(input, d.of(input));
+  return result;
+}
+
+Func tangent_by_synthesis(const Func& source, const std::vector<AdjointInput>& inputs,
+                          const TangentContext& c) {
+  std::vector<Direction> directions;
+  for (const AdjointInput& input : inputs) {
+    if (c.moves(input)) directions.emplace_back(input, c.tangent(input));
+  }
+  return propagate_tangents(source, directions)(source);
+}
+
+// f(x) = sin(source(x)).
+void give_closed_rule(const Func& f, const Func& source) {
+  custom_adjoint(f, {source}, [source](const AdjointContext& c) {
+    Func contribution("rule_adj");
+    const std::vector<Var> vars = c.adjoint().args();
+    std::vector<Expr> values;
+    for (int k = 0; k < source.outputs(); ++k) {
+      const Expr adjoint = c.adjoint()(vars).element(k);
+      values.push_back(adjoint * cast(adjoint.type(), cos(source(vars).element(k))));
+    }
+    contribution(vars) = Tuple(values);
+    return std::vector<AdjointContribution>{{source, contribution}};
+  });
+  custom_tangent(f, {source}, [source](const TangentContext& c) {
+    Func result("rule_tan");
+    const Func tangent = c.tangent(source);
+    const std::vector<Var> vars = first_variables(source.dimensions());
+    std::vector<Expr> values;
+    for (int k = 0; k < source.outputs(); ++k) {
+      const Expr t = tangent(vars).element(k);
+      values.push_back(t * cast(t.type(), cos(source(vars).element(k))));
+    }
+    result(vars) = Tuple(values);
+    return result;
+  });
+}
+
+}  // namespace
+
+// Values that are `a`, written so that rules of derivatives act in them.
+Expr Maker::ruled(const Type& type, const Point& at, int depth) {
+  const Expr a = value(type, at, depth - 1);
+  switch (c_.below(5)) {
+    case 0:
+      return straight_through(a, a * converted(type, Expr(2.0f)) - a);
+    case 1:  // a product, one factor at a time
+    {
+      const Expr b = leaf(type, at);
+      p_.checks.higher = false;
+      return stop_gradient(a) * b + a * stop_gradient(b) - stop_gradient(a * b);
+    }
+    case 2:
+      return a + stop_gradient(floor(a));
+    case 3:
+      return straight_through(a + floor(leaf(type, at)), a);
+    default:
+      return select(stop_gradient(a) > converted(type, Expr(0.5f)), a, leaf(type, at));
+  }
+}
+
+// A Func that reads the last one, with rules: by all inputs of the program, or by the Func read.
+void Maker::add_custom() {
+  const Func source = p_.funcs.back();
+  if (!is_floating(source)) return;
+  Func f("ruled" + std::to_string(p_.funcs.size()));
+  const std::vector<Var> vars = first_variables(source.dimensions());
+  const bool by_inputs = c_.chance(50);
+  std::vector<Expr> values;
+  for (int k = 0; k < source.outputs(); ++k) {
+    const Expr e = source(vars).element(k);
+    values.push_back(by_inputs ? e : sin(e));
+  }
+  f(vars) = Tuple(values);
+  p_.funcs.push_back(f);
+  if (!by_inputs) return give_closed_rule(f, source);
+
+  std::vector<AdjointInput> inputs;
+  const auto parameters = ir::parameters_of({source.function()});
+  auto add = [&](const AdjointInput& input) {
+    const bool is_read = std::any_of(parameters.begin(), parameters.end(), [&](const auto& p) {
+      return p.get() == input.symbol().get();
+    });
+    if (is_read) inputs.push_back(input);
+  };
+  for (size_t i = 0; i < p_.images.size(); ++i) add(p_.image(i));
+  add(p_.scale);
+  if (inputs.empty()) return;
+  p_.checks.along = false;  // what lies between is the rule's own
+  custom_adjoint(f, inputs, [source, inputs](const AdjointContext& c) {
+    return by_synthesis(source, inputs, c);
+  });
+  custom_tangent(f, inputs, [source, inputs](const TangentContext& c) {
+    return tangent_by_synthesis(source, inputs, c);
+  });
+}
+
+}  // namespace retrograde::gradient
