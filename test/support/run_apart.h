@@ -24,7 +24,8 @@ struct ApartResult {
 
 struct ApartLimits {
   unsigned cpu_seconds = 60;
-  unsigned seconds = 240;  // it may stand still for so long, on a machine however busy
+  unsigned seconds = 240;   // it may stand still for so long, on a machine however busy
+  size_t memory_bytes = 0;  // of address space; 0: no limit
 };
 
 // `f` returns an exit code below 256 and fills in the detail.
@@ -36,6 +37,10 @@ inline ApartResult run_apart(const ApartLimits& limits, const std::function<int(
     close(ends[0]);
     const rlimit cpu = {limits.cpu_seconds, limits.cpu_seconds + 1};
     setrlimit(RLIMIT_CPU, &cpu);
+    if (limits.memory_bytes > 0) {
+      const rlimit memory = {limits.memory_bytes, limits.memory_bytes};
+      setrlimit(RLIMIT_AS, &memory);
+    }
     alarm(limits.seconds);
     std::string detail;
     const int code = f(detail);

@@ -16,9 +16,13 @@ enum class Judgement : uint8_t {
   Broken,   // InternalError or another exception
 };
 
+// What was done beside the gradient, one bit each.
+enum Checked : unsigned { HigherOrders = 1, DenseMatrices = 2, MachineCode = 4 };
+
 struct Judged {
   Judgement judgement = Judgement::Right;
   std::string detail;
+  unsigned checked = 0;  // bits of Checked
 };
 
 const char* name_of(Judgement judgement);
@@ -26,8 +30,10 @@ const char* name_of(Judgement judgement);
 // Differences: of sum w * output along a random direction of all inputs, in double by the
 // interpreter, of sixth order in the step, with the differences between one-sided and two-sided
 // slopes as the bound on what they can tell. Forward mode: <J v, w> against <v, J^T w>, along the
-// inputs and along a Func. Machine code, when asked for: the gradients in their declared types,
-// within the rounding that the interpreter allows for, and the same bits twice.
+// inputs and along a Func. Derivatives of derivatives: modes in several orders, and differences of
+// the gradient. Jacobians and Hessians: one product for each column. Machine code, when asked for:
+// the gradients in their declared types, within the rounding that the interpreter allows for, with
+// and without a schedule, and the same bits on any number of threads.
 Judged judge(const AdversaryProgram& program, uint64_t seed, bool machine_code);
 // The same from choices.
 Judged judge(Choices& choices, bool machine_code);

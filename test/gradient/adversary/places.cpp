@@ -104,7 +104,7 @@ Expr Places::near(const Expr& u, const std::vector<Expr>& all) {
   }
 }
 
-Expr Places::inside(const Expr& u, const std::vector<Expr>& all, int n) {
+Expr Places::inside(const Expr& u, const std::vector<Expr>& all, const Expr& n) {
   switch (choices_.below(5)) {
     case 0:
       return clamp(near(u, all), 0, n - 1);
@@ -119,7 +119,7 @@ Expr Places::inside(const Expr& u, const std::vector<Expr>& all, int n) {
   }
 }
 
-Expr Places::by_data(const Expr& u, int n) {
+Expr Places::by_data(const Expr& u, const Expr& n) {
   return clamp(data_(clamp(u, 0, data_.width() - 1)), 0, n - 1);
 }
 

@@ -17,9 +17,9 @@ class Places {
   // Near `u`, made of it and of the other coordinates in `all`.
   Expr near(const Expr& u, const std::vector<Expr>& all);
   // The same inside of [0, n).
-  Expr inside(const Expr& u, const std::vector<Expr>& all, int n);
+  Expr inside(const Expr& u, const std::vector<Expr>& all, const Expr& n);
   // A place in [0, n) that `data` decides.
-  Expr by_data(const Expr& u, int n);
+  Expr by_data(const Expr& u, const Expr& n);
   // Of the coordinates only.
   Expr condition(const std::vector<Expr>& all);
 
