@@ -11,6 +11,7 @@
 #include "autodiff/update.h"
 #include "autodiff/update_context.h"
 #include "autodiff/versions.h"
+#include "autodiff/zero_reasons.h"
 #include "diagnostics/error.h"
 #include "frontend/define.h"
 #include "ir/build.h"
@@ -197,14 +198,33 @@ class Synthesis {
       for (const GivenAdjoint& g : update.given) {
         if (is_wanted(g.leaf.leaf)) add_contribution(f, g.leaf, g.domain);
       }
-      if (update.previous.func) register_func(update.previous, f->name, target.region);
       for (const Explanation& e : update.explanations) result_.explanations.push_back(e);
+      if (update.previous.func && is_zero_over(*update.previous.func, target.region)) {
+        stop_at_update(*f, s, target);
+        return;
+      }
+      if (update.previous.func) register_func(update.previous, f->name, target.region);
       adjoint = update.previous.func ? update.previous : update.current;
       extendable = update.previous.func != nullptr;
       record(*f, s - 1, adjoint);
     }
     contribute_pure(f, adjoint.func);
     pending_.erase(f.get());
+  }
+
+  static bool is_zero_over(const FuncContents& f, const std::vector<LoopVariable>& region) {
+    BoundsMap bounds;
+    for (const LoopVariable& v : region) bounds[v.name] = {v.min, v.max};
+    return f.is_pure() && std::all_of(f.pure->values.begin(), f.pure->values.end(),
+                                      [&](const Expr& v) { return is_zero(simplify(v, bounds)); });
+  }
+  // Nothing of the stages before the update is left where anybody reads.
+  void stop_at_update(const FuncContents& f, int stage, const AdjointTarget& target) {
+    explain(Explanation::Kind::Zero, f.name,
+            text("before update ", stage - 1, ", which overwrites every element that is read"));
+    AdjointFunc zero = make_adjoint(target, text(f.name, "_adj_before_update", stage - 1), {});
+    for (int s = 0; s < stage; ++s) record(f, s, zero);
+    pending_.erase(&f);
   }
 
   // The reverse of a recurrence goes on in the adjoint of what comes after it, which then also
@@ -482,6 +502,17 @@ class Synthesis {
         result_.after_stage[{f, s}] = zero_derivative(*symbol, "_adj");
     }
   }
+  std::string without_path(const Symbol* symbol) const {
+    std::string result = "the output does not depend on its value by a differentiable path";
+    const char* separator = ": ";
+    for (const std::string& reason : zero_reasons(symbol, order_, [&](const FuncContents& f) {
+           return result_.after_stage.contains({&f, f.stage_count() - 1}) && !zero_.contains(&f);
+         })) {
+      result += separator + reason;
+      separator = "; ";
+    }
+    return result;
+  }
   // Whether its gradient is a zero that somebody may ask for.
   bool explain_absent(const Symbol* symbol, const std::string& name, bool floating, Type type) {
     if (!floating) {
@@ -496,8 +527,8 @@ class Synthesis {
     } else if (!active_.contains(symbol)) {
       explain(Explanation::Kind::NotRequested, name, "nothing that was requested depends on it");
     } else {
-      explain(Explanation::Kind::Zero, name,
-              "the output does not depend on its value by a differentiable path");
+      explain(Explanation::Kind::Zero, name, without_path(symbol));
+      zero_.insert(symbol);
       return true;
     }
     return false;
@@ -511,6 +542,7 @@ class Synthesis {
   std::unordered_set<const Symbol*> cancelling_;
   std::unordered_set<const Symbol*> active_;
   std::unordered_set<const Symbol*> passing_;  // Funcs that depend on something else active
+  std::unordered_set<const Symbol*> zero_;     // by no path
   std::unordered_set<const Symbol*> covered_;  // inside of a custom adjoint that was used
   std::unordered_map<const Symbol*, std::vector<Contribution>> pending_;
   std::map<std::string, Inversion> inversions_;

@@ -72,6 +72,36 @@ TEST(Explain, ZerosAndWhatWasNotRequestedSayWhy) {
   expect_line(only, Explanation::Kind::NotRequested, b.name(), "nothing that was requested");
 }
 
+// Each input is told who reads it, and what stands in between.
+TEST(Explain, ZerosSayWhichReaderStopsThem) {
+  std::vector<Buffer<float>> a;
+  for (unsigned k = 0; k < 8; ++k) a.push_back(line(9, k + 1));
+  Param<float> scale("explained_scale");
+  Func f("explained_f"), g("explained_g"), h("explained_h");
+  g(x) = a[6](x) * 2.0f;
+  h(x) = a[7](x);
+  h(x) = a[5](x);
+  f(x) = floor(a[0](x)) + cast<float>(cast<int>(a[1](x))) + stop_gradient(a[2](x)) +
+         select(a[3](x) > 1.0f, 1.0f, 2.0f) + a[5](clamp(cast<int>(a[4](x)), 0, 8)) + round(g(x)) +
+         h(x) + 0.0f * scale;
+  Derivative d = propagate_adjoints(weighted_sum(f, {9}));
+  auto stopped = [&](const std::string& input, const Func& reader, const std::string& how) {
+    expect_line(d, Explanation::Kind::Zero, input, text('"', reader.name(), "\" reads it", how));
+  };
+  stopped(a[0].name(), f, " in floor, whose derivative is 0");
+  stopped(a[1].name(), f, " in a cast to int32");
+  stopped(a[2].name(), f, " in stop_gradient");
+  stopped(a[3].name(), f, " in a condition");
+  stopped(a[4].name(), f, " in the place where \"" + a[5].name());
+  stopped(a[6].name(), g, ", and its own gradient is zero");
+  stopped(g.name(), f, " in round");
+  expect_line(d, Explanation::Kind::Zero, h.name(),
+              "before update 0, which overwrites every element that is read");
+  stopped(a[7].name(), h, " where the derivative is 0");
+  stopped("explained_scale", f, " where the derivative is 0");
+  EXPECT_EQ(Buffer<float>(d(h, -1).realize({9}))(4), 0.0f);
+}
+
 TEST(Explain, WhatTheOutputDoesNotDependOnIsZeroAndSaysSo) {
   Buffer<float> a = line(), other = line(4, 2);
   Func f("explained_f"), g("explained_g");
