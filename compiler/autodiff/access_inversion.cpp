@@ -8,6 +8,8 @@
 #include "autodiff/isl_bridge.h"
 #include "autodiff/isl_maps.h"
 #include "ir/build.h"
+#include "ir/print.h"
+#include "ir/visit.h"
 #include "simplify/simplify.h"
 
 namespace retrograde::ir {
@@ -108,12 +110,19 @@ class Inverter {
     return true;
   }
 
+  // Data that decide, and what else is no quasi-affine form: x % w, x * y.
   void note_obstacles(const std::set<Expr, StructuralLess>& obstacles) {
     for (const Expr& e : obstacles) {
-      const auto* call = e.as<Call>();
-      note_ += note_.empty() ? "an index depends on " : ", ";
-      note_ +=
-          call && call->call_type != CallType::Operator ? quoted(call->name) : std::string("data");
+      std::set<std::string> data;
+      walk(e, [&](const Expr& node) {
+        const auto* call = node.as<Call>();
+        if (call && call->call_type != CallType::Operator) data.insert(quoted(call->name));
+        return true;
+      });
+      std::string reason = data.empty() ? quoted(print(e)) + " in an index is not affine" : "";
+      for (const std::string& name : data)
+        reason += (reason.empty() ? "an index depends on " : ", ") + name;
+      note_ += (note_.empty() ? "" : "; ") + reason;
     }
   }
 

@@ -120,6 +120,21 @@ std::optional<isl::pw_aff> IslBridge::absolute(const Cast& c) {
   return a->max(a->neg()).coalesce();
 }
 
+// Shifts and masks by constants: multiples, floors and moduli of powers of two.
+std::optional<isl::pw_aff> IslBridge::bits(const Call& c, const Expr& e) {
+  const bool shifts = c.is_op(Op::shift_left) || c.is_op(Op::shift_right);
+  if (!(shifts || c.is_op(Op::bitwise_and)) || !e.type().is_int() || e.type().bits() < 32)
+    return obstacle(e);
+  const std::optional<int64_t> amount = as_const_int(c.args[1]);
+  if (!amount || *amount < 0 || (shifts && *amount > 30)) return obstacle(e);
+  const int64_t power = shifts ? int64_t{1} << *amount : *amount + 1;
+  if ((power & (power - 1)) != 0) return obstacle(e);
+  const Expr factor = make_const(e.type(), power);
+  return affine(c.is_op(Op::shift_left)    ? c.args[0] * factor
+                : c.is_op(Op::shift_right) ? c.args[0] / factor
+                                           : c.args[0] % factor);
+}
+
 std::optional<isl::pw_aff> IslBridge::affine(const Expr& e) {
   if (fixed_.contains(e)) return parameter(e);
   if (auto value = as_const_int(e)) return constant(*value);
@@ -141,13 +156,15 @@ std::optional<isl::pw_aff> IslBridge::affine(const Expr& e) {
       },
       [&](const Cast& c) -> std::optional<isl::pw_aff> {
         if (auto magnitude = absolute(c)) return magnitude;
+        if (c.value.type().is_bool() && c.type.is_int())
+          return affine(make_select(c.value, make_one(c.type), make_zero(c.type)));
         bool exact = c.value.type().is_int() && c.type.is_int() && c.value.type().bits() >= 32 &&
                      c.type.bits() >= 32;
         return exact ? affine(c.value) : obstacle(e);
       },
       [&](const Call& c) -> std::optional<isl::pw_aff> {
         bool marker = c.call_type == CallType::Operator && op_info(c.op).cls == OpClass::Marker;
-        return marker ? affine(c.args[0]) : obstacle(e);
+        return marker ? affine(c.args[0]) : bits(c, e);
       },
       [&](const ExprNode&) { return obstacle(e); });
 }

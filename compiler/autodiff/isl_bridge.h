@@ -71,6 +71,7 @@ class IslBridge {
   std::optional<isl::pw_aff> obstacle(const Expr& e);
   std::optional<isl::pw_aff> binary(const Binary& b, const Expr& e);
   std::optional<isl::pw_aff> absolute(const Cast& c);
+  std::optional<isl::pw_aff> bits(const Call& c, const Expr& e);
   std::optional<isl::set> comparison(const Binary& b);
 
   isl_ctx* ctx_;

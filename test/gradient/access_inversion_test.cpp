@@ -45,6 +45,9 @@ int64_t eval(const Expr& e, const Env& env) {
         return eval(s.condition, env) ? eval(s.true_value, env) : eval(s.false_value, env);
       },
       [&](const Call& c) -> int64_t {
+        if (c.is_op(Op::shift_left)) return eval(c.args[0], env) << eval(c.args[1], env);
+        if (c.is_op(Op::shift_right)) return eval(c.args[0], env) >> eval(c.args[1], env);
+        if (c.is_op(Op::bitwise_and)) return eval(c.args[0], env) & eval(c.args[1], env);
         if (c.is_op(Op::absd)) return std::abs(eval(c.args[0], env) - eval(c.args[1], env));
         if (c.call_type == CallType::Operator) return eval(c.args[0], env);
         std::vector<int64_t> args;
@@ -250,6 +253,18 @@ TEST(AccessInversion, SumOfVariables) {
   expect_gathers(make_case({x10, loop("y", 0, 3)}, {x + y}), {4});
 }
 TEST(AccessInversion, Modulus) { expect_gathers(make_case({loop("x", 0, 11)}, {x % 4}), {3}); }
+TEST(AccessInversion, ShiftsAndMasksArePowersOfTwo) {
+  auto op = [](Op name, const Expr& a, int b) { return call_op(name, Int(32), {a, Expr(b)}); };
+  expect_gathers(make_case({x10}, {op(Op::shift_right, x, 2)}), {4});
+  expect_gathers(make_case({x10}, {op(Op::shift_left, x, 1) + 1}), {1});
+  expect_gathers(make_case({loop("x", -6, 5)}, {op(Op::bitwise_and, x, 3)}), {3});
+  expect_gathers(
+      make_case({loop("x", -4, 7)}, {op(Op::shift_right, x, 1), op(Op::bitwise_and, x, 1)}), {1});
+  EXPECT_FALSE(all_gather(check(make_case({x10}, {op(Op::bitwise_and, x, 5)})))) << "no mask";
+}
+TEST(AccessInversion, ConditionsAsNumbersAreSelects) {
+  EXPECT_TRUE(all_gather(check(make_case({x10}, {x + cast_to(Int(32), x > 4)}))));
+}
 TEST(AccessInversion, SelectBetweenAffineIndices) {
   Inversion inversion = check(make_case({x10}, {select(x < 5, x + 10, 5 - x)}));
   EXPECT_TRUE(all_gather(inversion));
