@@ -188,10 +188,10 @@ class Counter {
     return stage;
   }
 
-  // An update whose iterations follow a table counts by what they do.
+  // A last update whose iterations follow a table counts by what they do.
   void count_work(FuncOperations& entry, const std::vector<AdjointWork>& work) {
-    entry.stages.resize(1);
-    bodies_[entry.func.get()].resize(1);
+    entry.stages.pop_back();
+    bodies_[entry.func.get()].pop_back();
     double values = static_cast<double>(entry.func->types.size());
     for (const AdjointWork& part : work) {
       StageOperations stage{with_reads(add_body(*entry.func, part.values)), {}};

@@ -46,37 +46,31 @@ class Tape {
  private:
   // Its elements outside of what is read, and those that were overwritten, are exactly 0.
   void begin_adjoint() {
-    const std::vector<Expr> initial = initial_adjoint();
-    auto contents = std::make_shared<AdjointContents>();
-    contents->name = claim_name(f_->name + "_adj_tape");
-    for (const Expr& e : initial) contents->traits.add(traits_of(e));
-    contents->traits.masked = true;
-    adjoint_ = contents;
-    define_pure(adjoint_, tape_point(), initial);
+    adjoint_ = begin_tape(f_->name + "_adj_tape", result_.current.func);
+    static_cast<AdjointContents&>(*adjoint_).traits.masked = true;
   }
 
-  FuncPtr make_func(const std::string& name) const {
-    FuncPtr f = std::make_shared<AdjointContents>();
-    f->name = claim_name(name);
-    return f;
+  // A tape whose elements are those of `from`, and whose other slots are 0.
+  FuncPtr begin_tape(const std::string& name, const FuncPtr& from) const {
+    FuncPtr tape = std::make_shared<AdjointContents>();
+    tape->name = claim_name(name);
+    auto rdom = std::make_shared<ReductionDomainContents>();
+    rdom->frozen = true;
+    rdom->vars.push_back({unique_name("element"), make_zero(Int(32)), layout_.elements()});
+    const Expr number = variable(rdom->vars[0].var, Int(32), SymbolRef(rdom));
+    std::vector<Expr> zeros, values;
+    for (size_t k = 0; k < f_->types.size(); ++k) {
+      values.push_back(call_value(from, layout_.element(number), static_cast<int>(k)));
+      zeros.push_back(make_zero(values.back().type()));
+    }
+    define_pure(tape, layout_.with_pure(layout_.slot()), zeros);
+    append_update(tape, layout_.with_pure(number), values, rdom->vars, {});
+    return tape;
   }
 
-  std::vector<Expr> tape_point() const { return layout_.with_pure(layout_.slot()); }
   // Value k of `tape` in slot s.
   Expr at(const FuncPtr& tape, const Expr& slot, size_t k) const {
     return call_value(tape, layout_.with_pure(slot), static_cast<int>(k));
-  }
-
-  // `value` of the element that the slot stands for, else nothing.
-  Expr element_or_zero(const FuncPtr& f, size_t k) const {
-    Expr value = call_value(f, layout_.element_of_slot(), static_cast<int>(k));
-    return make_select(layout_.slot() < layout_.elements(), value, make_zero(value.type()));
-  }
-  std::vector<Expr> initial_adjoint() const {
-    std::vector<Expr> values;
-    for (size_t k = 0; k < f_->types.size(); ++k)
-      values.push_back(element_or_zero(result_.current.func, k));
-    return values;
   }
 
   // a(i), for the iteration at hand.
@@ -103,10 +97,7 @@ class Tape {
   void keep_values() {
     if (!c_.query.store_overwritten) c_.refuse_overwritten(needed_.front());
     FuncPtr before = clone_prefix(c_.query.f, c_.query.stage);
-    FuncPtr tape = make_func(f_->name + "_tape");
-    std::vector<Expr> initial;
-    for (size_t k = 0; k < f_->types.size(); ++k) initial.push_back(element_or_zero(before, k));
-    define_pure(tape, tape_point(), initial);
+    FuncPtr tape = begin_tape(f_->name + "_tape", before);
 
     std::vector<std::vector<Expr>> places;  // distinct ones; Tuples read several values at one
     std::vector<Step> steps;

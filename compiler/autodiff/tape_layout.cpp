@@ -64,8 +64,6 @@ Expr TapeLayout::is_inside(const std::vector<Expr>& args) const {
   return conjunction(terms);
 }
 
-std::vector<Expr> TapeLayout::element_of_slot() const { return element(slot_); }
-
 std::vector<Expr> TapeLayout::element(const Expr& any_number) const {
   Expr number = clamp(any_number, make_zero(Int(32)), elements_ - 1);
   std::vector<Expr> point;

@@ -22,8 +22,6 @@ class TapeLayout {
   Expr is_inside(const std::vector<Expr>& args) const;
   // Coordinates of element `number`, or of the nearest one there is.
   std::vector<Expr> element(const Expr& number) const;
-  // The same for slot().
-  std::vector<Expr> element_of_slot() const;
 
  private:
   bool is_always_inside(const Expr& index, size_t d) const;
