@@ -367,6 +367,7 @@ class Builder {
     std::vector<Expr> zeros;
     for (Type t : types_) zeros.push_back(make_zero(t));
     define_pure(parts, parts_point(g, args_, lane, part), zeros);
+    if (lane.defined()) static_cast<AdjointContents&>(*parts).lanes = lane_count;
 
     Slice slice = slice_of(g, lane, part, parts_of(g));
     if (g.predicate.defined()) {

@@ -38,7 +38,8 @@ struct AdjointWork {
 // A Func made by differentiation.
 struct AdjointContents : FuncContents {
   AdjointTraits traits;
-  std::vector<AdjointWork> work;  // of its only update, where a table says what iterations do
+  std::vector<AdjointWork> work;  // of its last update, where a table says what iterations do
+  int lanes = 0;  // of private parts: extent of the first dimension, in which lanes add apart
   FuncPtr copy() const override { return std::make_shared<AdjointContents>(*this); }
 };
 

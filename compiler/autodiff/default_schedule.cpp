@@ -1,9 +1,11 @@
 #include "autodiff/default_schedule.h"
 
 #include <algorithm>
+#include <optional>
 #include <unordered_set>
 
 #include "autodiff/adjoint_contents.h"
+#include "autodiff/read_estimate.h"
 #include "autodiff/regions.h"
 #include "frontend/rdom.h"
 #include "frontend/stage.h"
@@ -18,10 +20,11 @@ namespace {
 constexpr int lanes = 16;
 // Operations up to which a value is computed again rather than stored.
 constexpr double cheap = 6;
+// What it takes to store a value and to load it again, in operations of a vectorized loop: 12 bytes
+// at the bandwidth of a core, against an operation a lane and cycle.
+constexpr double way_to_memory = 24;
 // And in a Func that the user left alone in a schedule by hand.
 constexpr double explosion = 500;
-// One read inside a reduction, or along a dimension that a Func lacks, counts as this many.
-constexpr double reads_of_a_reduction = 8;
 
 bool is_touched(const FuncContents& f) {
   if (f.schedule.touched) return true;
@@ -67,30 +70,27 @@ class Chooser {
   bool is_output(const FuncPtr& f) const {
     return std::find(outputs_.begin(), outputs_.end(), f) != outputs_.end();
   }
+  // Beyond the first, each read computes the value again: more than a few operations, and all
+  // together more than it takes to bring the value to memory and back.
   static bool is_worth_storing(const Use& use, double free_operations) {
-    return use.reads > 1.5 && use.operations > free_operations;
+    return use.reads > 1.5 && use.operations > free_operations &&
+           (use.reads - 1) * use.operations > way_to_memory;
   }
 
   void count_reads(const FuncContents& f) {
     for (int s = 0; s < f.stage_count(); ++s) {
-      double weight = f.stage(s).rvars.empty() ? 1 : reads_of_a_reduction;
       std::unordered_set<const ExprNode*> seen;
       for_each_expr(f.stage(s), [&](const Expr& root) {
         walk(root, [&](const Expr& e) {
           if (!seen.insert(e.get()).second) return false;
           const auto* call = e.as<Call>();
           if (call && call->call_type == CallType::Func && call->symbol.raw() != &f) {
-            uses_[call->symbol.raw()].reads += weight * repeats(*call, f);
+            uses_[call->symbol.raw()].reads += reads_an_element(*call, f, f.stage(s));
           }
           return true;
         });
       });
     }
-  }
-
-  // A Func of fewer dimensions is read again along those that it lacks.
-  static double repeats(const Call& call, const FuncContents& reader) {
-    return call.args.size() < reader.args.size() ? reads_of_a_reduction : 1;
   }
 
   double operations(const FuncContents& f) const {
@@ -144,6 +144,8 @@ class Chooser {
       stage.allow_race_conditions().vectorize(innermost, lanes, TailStrategy::GuardWithIf);
     }
     if (pure.empty()) return;
+    if (auto d = pure[0] == 0 ? transposed_dimension(*f, f->stage(s)) : std::nullopt)
+      return tile_stage(f, s, *d);
     Var outermost(f->args[pure.back()]);
     bool reduces = !f->stage(s).rvars.empty();
     if (pure.size() > 1 || (reduces && pure[0] != 0)) stage.parallel(outermost);
@@ -151,6 +153,37 @@ class Chooser {
     Var innermost(f->args[0]);
     stage.vectorize(innermost, lanes, TailStrategy::GuardWithIf);
     if (pure.size() == 1 && reduces) stage.parallel(innermost);  // of the vectors
+  }
+
+  // A dimension beyond the first that runs along the rows of what a pure stage reads, while the
+  // first one runs across them.
+  static std::optional<size_t> transposed_dimension(const FuncContents& f,
+                                                    const Definition& stage) {
+    std::optional<size_t> result;
+    if (!stage.rvars.empty() || f.args.size() < 2) return result;
+    for_each_expr(stage, [&](const Expr& root) {
+      walk(root, [&](const Expr& e) {
+        const auto* call = e.as<Call>();
+        if (!call || call->call_type == CallType::Operator || call->args.size() < 2) return true;
+        const bool across =
+            !uses_variable(call->args[0], f.args[0]) &&
+            std::any_of(call->args.begin() + 1, call->args.end(),
+                        [&](const Expr& arg) { return uses_variable(arg, f.args[0]); });
+        for (size_t d = 1; across && d < f.args.size(); ++d) {
+          if (is_pure_position(f, stage, d) && uses_variable(call->args[0], f.args[d])) result = d;
+        }
+        return true;
+      });
+    });
+    return result;
+  }
+
+  // Squares, whose rows stay in the cache until their columns are read.
+  static void tile_stage(const FuncPtr& f, int s, size_t dimension) {
+    Stage stage(f, s);
+    Var x(f->args[0]), y(f->args[dimension]), xi(unique_name("column")), yi(unique_name("row"));
+    stage.tile(x, y, xi, yi, lanes, lanes, TailStrategy::GuardWithIf).vectorize(xi);
+    stage.parallel(Var(f->args.back()));
   }
 
   // f(places) += terms, where data decide the place along the first dimension, over a loop that is

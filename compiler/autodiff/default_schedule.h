@@ -2,10 +2,12 @@
 //
 // Inlining an adjoint into every reader multiplies work: a chain of n stencils with k taps costs
 // k^n. So, in a pipeline that contains adjoints, an untouched Func is computed at root when it
-// reduces, scatters, or costs more than a few operations and is read more than once, or by a Func of
-// more dimensions; its innermost dimension is vectorized, its outermost run in parallel. That goes
-// for primal Funcs too, which both directions read. A directive of the user on a Func or one of its stages switches this off
-// for that Func. Pipelines without adjoints are left as they are.
+// reduces, scatters, or costs more to compute again at its reads (read_estimate.h) than a way to
+// memory and back does. Its innermost dimension is vectorized, its outermost run in parallel; a
+// stage that reads across rows is tiled; a scatter along its reduction domain computes places and
+// terms in vectors. That goes for primal Funcs too, which both directions read. A directive of the
+// user on a Func or one of its stages switches this off for that Func. Pipelines without adjoints
+// are left as they are.
 #pragma once
 
 #include <unordered_map>

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "autodiff/derivative.h"
+#include "autodiff/read_estimate.h"
 #include "frontend/func.h"
 #include "ir/build.h"
 #include "ir/print.h"
@@ -138,6 +139,65 @@ TEST_F(DefaultSchedule, ScattersToFewElementsHaveElementsForEachLane) {
   Derivative d = propagate_adjoints(sum);
   EXPECT_EQ(parts_of_adjoint(d, few).dimensions(), 3) << "lane, element, part";
   EXPECT_EQ(parts_of_adjoint(d, many).dimensions(), 2) << "element, part";
+}
+
+// Reads of `read` in the last stage of `reader`.
+double reads(const Func& reader, const Func& read) {
+  const ir::FuncContents& f = *reader.function();
+  const ir::Definition& stage = f.stage(f.stage_count() - 1);
+  double total = 0;
+  ir::for_each_expr(stage, [&](const Expr& root) {
+    ir::walk(root, [&](const Expr& e) {
+      const auto* call = e.as<ir::Call>();
+      if (call && call->symbol.raw() == read.function().get())
+        total += ir::reads_an_element(*call, f, stage);
+      return true;
+    });
+  });
+  return total;
+}
+
+TEST_F(DefaultSchedule, KnowsHowOftenAnElementIsRead) {
+  Func pointwise("pointwise"), twice("twice"), halves("halves"), up("up"), stencil("stencil"),
+      strided("strided"), image_sum("image_sum"), along("along"), clamped("clamped");
+  RDom r(0, 5), strip(0, 8), image(0, 30, 0, 40);
+  pointwise(x, y) = heavy(y, x + 3);
+  twice(x, y) = heavy(x, y) + heavy(x + 1, y);
+  halves(x, y) = heavy(2 * x, y) + heavy(2 * x + 1, y);
+  up(x, y) = heavy(x / 2, y / 3);
+  stencil(x, y) = 0.0f;
+  stencil(x, y) += heavy(x - r, y);
+  strided(x, y) = 0.0f;
+  strided(x, y) += heavy(4 * x + strip, y);
+  image_sum() = 0.0f;
+  image_sum() += heavy(image.x, image.y);
+  along(x) = 0.0f;
+  along(x) += heavy(image.x, image.y);
+  clamped(x, y) = 0.0f;
+  clamped(x, y) += heavy(clamp(likely(x + r), 0, 31), y);
+  EXPECT_EQ(reads(pointwise, heavy), 1);
+  EXPECT_EQ(reads(twice, heavy), 2);
+  EXPECT_EQ(reads(halves, heavy), 1);
+  EXPECT_EQ(reads(up, heavy), 6);
+  EXPECT_EQ(reads(stencil, heavy), 5);
+  EXPECT_EQ(reads(strided, heavy), 2);
+  EXPECT_EQ(reads(image_sum, heavy), 1);
+  EXPECT_EQ(reads(along, heavy), 8) << "x has several values";
+  EXPECT_EQ(reads(clamped, heavy), 5);
+}
+
+TEST_F(DefaultSchedule, TilesWhatItReadsAcross) {
+  Buffer<float> b(32, 32);
+  Func sum("sum");
+  RDom r(0, 32, 0, 32);
+  sum() = 0.0f;
+  sum() += a(r.y, r.x) * b(r.x, r.y);
+  Derivative d = propagate_adjoints(sum);
+  const auto chosen = choose(d(a));
+  const std::vector<ir::Dim>& loops = chosen.at(d(a).function().get()).stages[0].dims;
+  ASSERT_EQ(loops.size(), 4u);
+  EXPECT_EQ(loops[0].for_type, ForType::Vectorized);
+  EXPECT_EQ(loops[3].for_type, ForType::Parallel);
 }
 
 }  // namespace
