@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <set>
 
+#include "autodiff/carried_sums.h"
 #include "autodiff/checkpoint.h"
 #include "autodiff/update_relations.h"
 #include "autodiff/versions.h"
@@ -36,7 +37,11 @@ class Recurrence {
     if (!written.defined()) return false;
     if (!find_values(*reads)) return false;
     if (has_recurrence) {
-      own_current();
+      if (carries_long_sums(self_contributions(*reads, sweep, true))) {
+        carry_in_double();
+      } else {
+        own_current();
+      }
       sweep = c_.sweep_iterations(result_.current.func,
                                   [&] { return c_.adjoints_at_write(result_.current.func); });
       append_reverse_loop(self_contributions(*reads, sweep, true));
@@ -136,6 +141,47 @@ class Recurrence {
                      {}, initial);
   }
 
+  // ---- what is carried from element to element ----
+
+  bool carries_long_sums(const std::vector<Contribution>& contributions) const {
+    const auto& types = c_.query.target.types;
+    if (std::all_of(types.begin(), types.end(), [](Type t) { return t.bits() == 64; }))
+      return false;
+    double elements = 1;
+    for (const ReverseLoop& loop : order_) {
+      const LoopVariable& range = c_.query.target.region[static_cast<size_t>(loop.dim)];
+      auto extent = as_const_int(simplify(range.max - range.min + 1));
+      elements *= extent ? static_cast<double>(*extent) : many_carried;
+    }
+    std::vector<Expr> terms;
+    for (const Contribution& c : contributions) terms.push_back(c.adjoint);
+    return elements >= many_carried && carries_sums(terms, result_.current.func.get());
+  }
+
+  void carry_in_double() {
+    AdjointTarget wide = c_.query.target;
+    std::vector<Expr> initial, rounded;
+    for (size_t k = 0; k < c_.values.size(); ++k) {
+      wide.types[k] = Float(64);
+      initial.push_back(call_value(result_.current.func, c_.point, static_cast<int>(k)));
+    }
+    const std::string name = text(f_->name, "_adj_update", c_.query.stage - 1);
+    exact_ = make_adjoint(wide, name + "_carried", {}, initial).func;
+    for (size_t k = 0; k < c_.values.size(); ++k)
+      rounded.push_back(call_value(exact_, c_.point, static_cast<int>(k)));
+    result_.current = make_adjoint(c_.query.target, name, {}, rounded);
+    result_.current.helpers = {exact_};
+    result_.current.accumulator = exact_;
+    explain(Explanation::Kind::Version,
+            text("update ", c_.query.stage - 1,
+                 ": its adjoint carries sums along many elements, in double"));
+  }
+  // The Func that runs backward.
+  const FuncPtr& carrying() const { return exact_ ? exact_ : result_.current.func; }
+  Expr as_carried(const Expr& term) const {
+    return exact_ ? carried_in_double(term, result_.current.func, exact_) : term;
+  }
+
   // Contributions of self reads: to newer values (`to_new`) or to those before the stage.
   std::vector<Contribution> self_contributions(const std::vector<SelfRead>& reads,
                                                const SweepResult& sweep, bool to_new) {
@@ -206,17 +252,17 @@ class Recurrence {
       if (c.gather.predicate.defined()) condition = condition && c.gather.predicate;
       condition = substitute(condition, place);
       if (summed && !c.gather.rdom) condition = condition && first;
-      Expr term = substitute(c.adjoint, place);
+      Expr term = as_carried(substitute(c.adjoint, place));
       term = make_select(condition, term, make_zero(term.type()));
       Expr& sum = sums[static_cast<size_t>(c.value_index)];
       sum = sum.defined() ? sum + term : term;
     }
     std::vector<Expr> values;
     for (size_t k = 0; k < c_.values.size(); ++k) {
-      Expr self = call_value(result_.current.func, lhs, static_cast<int>(k));
+      Expr self = call_value(carrying(), lhs, static_cast<int>(k));
       values.push_back(sums[k].defined() ? self + cast_to(self.type(), sums[k]) : self);
     }
-    append_update(result_.current.func, lhs, values, rdom->vars, {});
+    append_update(carrying(), lhs, values, rdom->vars, {});
     result_.current.stages.push_back(Accumulation::Scatter);
     explain(Explanation::Kind::Version,
             text("update ", c_.query.stage - 1, " is a recurrence: its adjoint runs backward"));
@@ -283,6 +329,7 @@ class Recurrence {
   UpdateAdjoint& result_;
   UpdateRelations relations_;
   std::vector<ReverseLoop> order_;
+  FuncPtr exact_;  // in double, what the current adjoint rounds; null: that one itself
   std::map<int, FuncPtr> prefixes_;
 };
 

@@ -423,8 +423,7 @@ class Synthesis {
     if (adjoint.accumulator) {
       explain(Explanation::Kind::Built, primal,
               text(quoted(accumulating.name), " adds up in double what ",
-                   quoted(adjoint.func->name), " rounds once: an element may get ",
-                   static_cast<int>(many_terms), " terms or more"));
+                   quoted(adjoint.func->name), " rounds once: an element may get many terms"));
     }
     if (privatised > 0) {
       explain(Explanation::Kind::Privatised, primal,

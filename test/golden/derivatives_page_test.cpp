@@ -59,13 +59,18 @@ mode use the same partials, so they are transposes of each other at every point,
   of their absolute values. `Derivative::explain()` names the Func, `Derivative::accumulator()` gives it
   to schedules.
   Shorter sums stay in float32, wrong by at most the number of terms times 2^-24. Sums of the primal
-  and tangents are as the program writes them.
+  and tangents are as the program writes them. The adjoint of a scan carries sums from element to
+  element, as the suffix sum that belongs to a prefix sum: over 64 elements or more (or a number that is
+  known at run time only), unless constant factors with a sum below 1 - 1/64 forget them, the scan runs
+  in double, and each element is rounded once. Adjoints on tapes and between kept states of loops over
+  time are carried in the precision of the program.
 - **Loops over time.** An update such as `f(x) = g(f(x), t)` over a long `RDom t` overwrites what its
   partials need. `Overwritten::Store` keeps every version: memory for all n steps. With
   `AdjointOptions::checkpoint_states` (s states) or `checkpoint_bytes` a few states are kept and the
   steps between them are computed again, as few as that memory allows: r n - C(s + r, r - 1) for C(s +
   r - 1, s) < n <= C(s + r, s) (revolve: Griewank and Walther, ACM Algorithm 799), so 1,954 steps again
-  for n = 1,000 and s = 44, and 3,636 for s = 10. n is constant; time is the outermost reduction
+  for n = 1,000 and s = 44, and 3,636 for s = 10. n may be known at run time only, a Param or an extent
+  of an input: then the pipeline finds r and the schedule itself. Time is the outermost reduction
   variable; gradients are the same bits for every s. What steps give to inputs without a time axis is
   summed inside, last step first, and from 4,096 steps on with what rounding lost beside it. A Func
   with a time axis of its own, `f(x, t + 1) = g(f(x, t))`, keeps its steps itself: the budget does not

@@ -132,6 +132,95 @@ TEST(LongSums, UnderSchedulesByHand) {
   }
 }
 
+// ---- sums that are carried from element to element ----
+
+// loss = sum of terms(i) * f(i), f the running sum of a: the gradient by a sums the terms from each
+// element on, which was added up as a suffix sum.
+TEST(CarriedSums, OfAPrefixSumAreRight) {
+  for (const Nature& nature : {natures()[0], natures()[1], natures()[4]}) {
+    SCOPED_TRACE(nature.name);
+    Terms terms = terms_of(nature);
+    Var x("x");
+    Func f("f"), loss("loss");
+    Buffer<float> a(many), weights(terms.data(), many);
+    a.fill(1);
+    RDom r(1, many - 1), all(0, many);
+    f(x) = a(x);
+    f(r) += f(r - 1);
+    loss() = 0.0f;
+    loss() += f(all) * weights(all);
+    Buffer<float> found = propagate_adjoints(loss, {.wrt = {a}})(a).realize({many});
+    long double value = 0, absolute = 0, worst = 0;
+    for (int i = many - 1; i >= 0; --i) {
+      value += static_cast<long double>(terms[static_cast<size_t>(i)]);
+      absolute += std::fabs(static_cast<long double>(terms[static_cast<size_t>(i)]));
+      worst = std::max(worst, std::fabs(static_cast<long double>(found(i)) - value) / absolute);
+    }
+    EXPECT_LE(worst, 1e-6L);
+  }
+}
+
+// The gradient by the corner of a summed-area table sums 12 million terms.
+TEST(CarriedSums, OfASummedAreaTableAreRight) {
+  const int n = 3464;
+  Var x("x"), y("y");
+  Func f("f"), loss("loss");
+  Buffer<float> a(n, n);
+  a.fill(1);
+  RDom rx(1, n - 1), ry(1, n - 1), r(0, n, 0, n);
+  f(x, y) = a(x, y);
+  f(rx, y) += f(rx - 1, y);
+  f(x, ry) += f(x, ry - 1);
+  loss() = 0.0f;
+  loss() += f(r.x, r.y) * 0.1f;
+  Buffer<float> found = propagate_adjoints(loss, {.wrt = {a}})(a).realize({n, n});
+  for (int at : {0, 1, 700, n - 1}) {
+    const double expected = static_cast<double>(0.1f) * (n - at) * n;
+    EXPECT_NEAR(found(at, 0), expected, 1e-6 * expected) << at;
+    EXPECT_NEAR(found(0, at), expected, 1e-6 * expected) << at;
+  }
+}
+
+// f(i) = f(i - 1) + (keep(i) - 1) f(i - 1): a factor that is not constant may be 1 everywhere; in a
+// Tuple, whose other value decays.
+TEST(CarriedSums, OfFactorsThatDataGiveAreRight) {
+  const int n = 3'000'000;
+  Var x("x");
+  Func f("f"), loss("loss");
+  Buffer<float> a(n), keep(n);
+  a.fill(1);
+  keep.fill(1);
+  RDom r(1, n - 1), all(0, n);
+  f(x) = Tuple(a(x), a(x));
+  f(r) = Tuple(f(r)[0] + keep(r) * f(r - 1)[0] + 0.0f * f(r - 1)[1], 0.5f * f(r - 1)[1]);
+  loss() = 0.0f;
+  loss() += f(all)[0] * 0.1f + f(all)[1] * 0.1f;
+  Buffer<float> found = propagate_adjoints(loss, {.wrt = {a}})(a).realize({n});
+  for (int i : {1, 17, 1000, n / 2}) {
+    const double expected = static_cast<double>(0.1f) * (n - i);
+    EXPECT_NEAR(found(i), expected, 1e-6 * expected) << i;
+  }
+}
+
+Derivative filter_gradient(const Buffer<float>& a, float decay, int length) {
+  Var x("x");
+  Func f("f"), loss("loss");
+  RDom r(1, length - 1), all(0, length);
+  f(x) = a(x);
+  f(r) = (1 - decay) * f(r) + decay * f(r - 1);
+  loss() = 0.0f;
+  loss() += f(all);
+  return propagate_adjoints(loss, {.wrt = {a}});
+}
+
+// What a constant below 1 forgets, or few elements carry, stays in float32.
+TEST(CarriedSums, ThatAreShortStayInFloat32) {
+  Buffer<float> a(100'000);
+  EXPECT_EQ(filter_gradient(a, 0.9f, 100'000).explain().find("in double"), std::string::npos);
+  EXPECT_NE(filter_gradient(a, 0.99f, 100'000).explain().find("in double"), std::string::npos);
+  EXPECT_EQ(filter_gradient(a, 0.99f, 63).explain().find("in double"), std::string::npos);
+}
+
 TEST(LongSums, ShortOnesStayInFloat32) {
   Var x("x");
   Func blur("blur"), loss("loss");
