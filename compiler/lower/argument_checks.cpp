@@ -184,8 +184,8 @@ class Checks {
       if (box[d].is_bounded()) continue;
       user_error(text("read ", quoted(arg.name)),
                  "the region that a pipeline reads of its input must be bounded",
-                 text("dimension ", d, " is read without a ",
-                      box[d].has_lower_bound() ? "upper" : "lower", " bound"),
+                 text("dimension ", d, " is read without ",
+                      box[d].has_lower_bound() ? "an upper" : "a lower", " bound"),
                  "Clamp the index that depends on data, as in clamp(index, 0, extent - 1), or "
                  "promise its range with unsafe_promise_clamped");
     }

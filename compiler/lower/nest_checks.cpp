@@ -20,14 +20,14 @@ std::string consumers_of(const Program& program, const LoopedFunc& f) {
 void check_bounded(const Program& program, const LoopedFunc& f, const Box& box) {
   for (size_t d = 0; d < box.size(); d++) {
     if (box[d].is_bounded()) continue;
-    user_error(
-        text("compute ", quoted(f.name())),
-        "the region of a Func that its consumers read must be bounded",
-        text("dimension ", d, " (", quoted(f.func->args[d]), ") is read without a ",
-             box[d].has_lower_bound() ? "upper" : "lower", " bound by ", consumers_of(program, f)),
-        "Clamp the index that depends on data, as in clamp(index, 0, extent - 1), or "
-        "promise its range with "
-        "unsafe_promise_clamped");
+    user_error(text("compute ", quoted(f.name())),
+               "the region of a Func that its consumers read must be bounded",
+               text("dimension ", d, " (", quoted(f.func->args[d]), ") is read without ",
+                    box[d].has_lower_bound() ? "an upper" : "a lower", " bound by ",
+                    consumers_of(program, f)),
+               "Clamp the index that depends on data, as in clamp(index, 0, extent - 1), or "
+               "promise its range with "
+               "unsafe_promise_clamped");
   }
 }
 

@@ -96,6 +96,12 @@ TEST_F(IntervalTest, NarrowTypesHaveTheirRange) {
   EXPECT_EQ(bounds(call_op(Op::shift_right, {cast(Int(32), a), Expr(4)})), "[0, 15]");
 }
 
+TEST_F(IntervalTest, MagnitudesOfIndicesHaveSymbolicEnds) {
+  Expr far = call_op(Op::abs, UInt(32), {x - n}), from_zero = call_op(Op::absd, UInt(32), {x, 0});
+  EXPECT_EQ(bounds(cast(Int(32), far)), interval(0, max(xmax - n, n - xmin)));
+  EXPECT_EQ(bounds(cast(Int(32), from_zero)), interval(0, max(xmax, xmin * -1)));
+}
+
 TEST_F(IntervalTest, WideningIsFollowedIntoTheNarrowerSum) {
   EXPECT_EQ(bounds(cast_to(Int(64), i)), "[0_i64, 7_i64]");
   EXPECT_EQ(bounds(cast_to(Int(64), i * 2 + 1)), "[1_i64, 15_i64]");
