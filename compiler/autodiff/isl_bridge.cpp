@@ -126,7 +126,8 @@ std::optional<isl::pw_aff> IslBridge::bits(const Call& c, const Expr& e) {
   if (!(shifts || c.is_op(Op::bitwise_and)) || !e.type().is_int() || e.type().bits() < 32)
     return obstacle(e);
   const std::optional<int64_t> amount = as_const_int(c.args[1]);
-  if (!amount || *amount < 0 || (shifts && *amount > 30)) return obstacle(e);
+  constexpr int64_t largest = int64_t{1} << 30;  // power of two in an int32
+  if (!amount || *amount < 0 || *amount >= largest || (shifts && *amount > 30)) return obstacle(e);
   const int64_t power = shifts ? int64_t{1} << *amount : *amount + 1;
   if ((power & (power - 1)) != 0) return obstacle(e);
   const Expr factor = make_const(e.type(), power);

@@ -261,6 +261,8 @@ TEST(AccessInversion, ShiftsAndMasksArePowersOfTwo) {
   expect_gathers(
       make_case({loop("x", -4, 7)}, {op(Op::shift_right, x, 1), op(Op::bitwise_and, x, 1)}), {1});
   EXPECT_FALSE(all_gather(check(make_case({x10}, {op(Op::bitwise_and, x, 5)})))) << "no mask";
+  EXPECT_FALSE(all_gather(check(make_case({x10}, {op(Op::bitwise_and, x, 0x7fffffff)}))))
+      << "2^31 is no int32";
 }
 TEST(AccessInversion, ConditionsAsNumbersAreSelects) {
   EXPECT_TRUE(all_gather(check(make_case({x10}, {x + cast_to(Int(32), x > 4)}))));
