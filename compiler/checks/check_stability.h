@@ -64,7 +64,8 @@ struct StabilityReport {
     std::vector<int> at;
     double own = 0, in_double = 0;
     // The first operation of the Func's definition, in the order of evaluation, whose result is not
-    // finite there; "image(3, 4), an input" when that is where it came from. Empty: in an update.
+    // finite there; "image(3, 4), an input" when that is where it came from; in an update, with the
+    // iteration.
     std::string operation;
   };
   struct Case {

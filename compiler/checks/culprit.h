@@ -9,8 +9,9 @@
 namespace retrograde::checks {
 
 // The first in the order of evaluation of value `value` of f at a place, as text; in f's own
-// precision, or as it is. Empty when f has updates, when all are finite, or when there are very
-// many.
+// precision, or as it is. Of updates: with the iteration; "what its updates make of finite values"
+// when all that they are given is finite; "an update" where that cannot be looked at: loops without
+// constant bounds, places that are no variables, very many iterations. Otherwise empty.
 std::string culprit(const Func& f, int value, const std::vector<int>& at);
 
 }  // namespace retrograde::checks

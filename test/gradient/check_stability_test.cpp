@@ -50,6 +50,30 @@ TEST_F(CheckStability, OverflowOfAnIntermediateValueIsFoundWhereItHappens) {
   EXPECT_GT(result(report.cases[1], square.name(), false).lost, 0);
 }
 
+// In updates: the iteration, or that the sum itself left the range; 0 * inf in no predicate's way.
+TEST_F(CheckStability, TheIterationOfAnUpdateIsNamed) {
+  Func sums("sums"), product("product"), odd("odd");
+  RDom r(0, 3), all(0, 16);
+  sums(x) = 0.0f;
+  sums(x) += image(x + r) * image(x + r);
+  a(5) = 1e30f;
+  auto lost = [&](const Func& f, const std::vector<int>& sizes) {
+    StabilityReport report = check_stability(f, sizes, {.extremes = {}});
+    return report.cases[0].first_lost ? report.cases[0].first_lost->operation : "nothing";
+  };
+  EXPECT_NE(lost(sums, {8}).find("*"), std::string::npos) << "the first element that meets it";
+  EXPECT_NE(lost(sums, {8}).find(", in update 0 at "), std::string::npos) << lost(sums, {8});
+  EXPECT_NE(lost(sums, {8}).find(" = 2"), std::string::npos) << lost(sums, {8});
+  product() = 1e20f;
+  product() *= image(all);
+  EXPECT_EQ(lost(product, {}), "what its updates make of finite values");
+  RDom even(0, 16);
+  even.where(even % 2 == 0);
+  odd() = 0.0f;
+  odd() += image(even) * image(even);
+  EXPECT_EQ(lost(odd, {}), "nothing") << "the predicate leaves it out";
+}
+
 TEST_F(CheckStability, CancellationShowsAsErrorAndAsCondition) {
   Func large("large"), f("f"), fine("fine");
   large(x) = image(x) * 0.7f + 4096.0f;
