@@ -8,7 +8,7 @@
 #include <map>
 #include <numbers>
 
-#include "autodiff/stable_forms.h"
+#include "autodiff/stable_norms.h"
 #include "ir/build.h"
 #include "ir/scalar.h"
 
@@ -102,15 +102,9 @@ Partials acos_partials(Args a, const Expr&) {
 Partials atan_partials(Args a, const Expr&) {
   return {strong(num(a[0], 1) / (num(a[0], 1) + square(a[0])))};
 }
-// With y and x scaled by the larger of them: neither overflow nor underflow of y^2 + x^2 shows.
 Partials atan2_partials(Args a, const Expr&) {
-  const Expr &y = a[0], &x = a[1];
-  Expr zero = num(x, 0), size_x = op1(Op::abs, x), size_y = op1(Op::abs, y);
-  Expr scale = binary(Kind::Max, size_x, size_y), inf = infinity(x.type());
-  Expr along_y = y / scale, along_x = x / scale, square_sum = square(along_y) + square(along_x);
-  Expr nowhere = (x == zero && y == zero) || size_x == inf || size_y == inf;
-  return {strong(zero_where(nowhere, along_x / square_sum / scale)),
-          strong(zero_where(nowhere, -(along_y / square_sum / scale)))};
+  const std::vector<Expr> gradient = angle_gradient(a[0], a[1]);
+  return {strong(gradient[0]), strong(gradient[1])};
 }
 Partials sinh_partials(Args a, const Expr&) { return {strong(op1(Op::cosh, a[0]))}; }
 Partials cosh_partials(Args a, const Expr&) { return {strong(op1(Op::sinh, a[0]))}; }

@@ -203,7 +203,8 @@ Finiteness ExprFacts::finiteness_of(const Expr& factor) const {
 LocalDerivative local_derivative(const Expr& e, const ExprFacts& facts) {
   if (StableForm whole = stable_form(e); !whole.operands.empty()) {
     LocalDerivative sum = sum_of(whole.operands, whole.partials, facts);
-    sum.levels_off = is_quotient(e);
+    const auto* call = e.as<Call>();
+    sum.levels_off = call ? levels_off(call->op) : is_quotient(e);
     return sum;
   }
   return match(

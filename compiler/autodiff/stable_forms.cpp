@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "autodiff/stable_norms.h"
+#include "autodiff/stable_patterns.h"
 #include "ir/build.h"
 #include "ir/equal.h"
 
@@ -10,7 +12,6 @@ namespace retrograde::ir {
 
 namespace {
 
-Expr op1(Op op, const Expr& a) { return call_op(op, a.type(), {a}); }
 Partial strong(Expr e) { return {std::move(e), Strength::Strong}; }
 
 // exp(w) where e is 1 + exp(w).
@@ -34,27 +35,6 @@ StableForm logistic(const Expr& v, const Div& quotient) {
   if (!e.defined()) return {};
   Expr reciprocal = make_one(v.type()) / quotient.b, w = e.as<Call>()->args[0];
   return {{quotient.a, w}, {strong(reciprocal), strong(-(v * odds_to_probability(e)))}};
-}
-
-// The terms of a sum; empty when there are more than four: longer ones are reductions.
-std::vector<Expr> terms_of(const Expr& sum) {
-  std::vector<Expr> terms, todo{sum};
-  while (!todo.empty()) {
-    Expr e = todo.back();
-    todo.pop_back();
-    if (const auto* add = e.as<Add>()) {
-      todo.insert(todo.end(), {add->b, add->a});
-    } else {
-      terms.push_back(e);
-    }
-    if (terms.size() + todo.size() > 4) return {};
-  }
-  return terms;
-}
-
-const Call* as_operator(const Expr& e, Op op) {
-  const auto* call = e.as<Call>();
-  return call && call->is_op(op) ? call : nullptr;
 }
 
 // t / S for a term t that may be infinite, and S with it.
@@ -111,78 +91,150 @@ StableForm share(const Expr& v, const Div& quotient) {
   return result;
 }
 
-// a where e is a * a or pow(a, 2).
-Expr square_root_of(const Expr& e) {
-  if (const auto* product = e.as<Mul>()) return equal(product->a, product->b) ? product->a : Expr();
-  const Call* power = as_operator(e, Op::pow);
-  return power && as_const_float(power->args[1]) == 2.0 ? power->args[0] : Expr();
-}
+struct Coefficients {
+  Expr term;  // 1 for constants
+  double above = 0, below = 0;
+};
 
-// The components of the norm whose square the sum is; of a constant, its root. Empty: it is none.
-std::vector<Expr> components_of(const Expr& sum) {
-  std::vector<Expr> result;
-  for (const Expr& term : terms_of(sum)) {
-    auto constant = as_const_float(term);
-    Expr a = !constant        ? square_root_of(term)
-             : *constant >= 0 ? make_const(term.type(), std::sqrt(*constant))
-                              : Expr();
-    if (!a.defined()) return {};
-    result.push_back(a);
-  }
-  return result;
-}
-
-// v = |a|:  d/da_i = a_i / |a|. With a constant among the squares these do not underflow.
-StableForm norm(const Expr& sum) {
-  StableForm result{components_of(sum), {}};
-  if (result.operands.empty()) return {};
-  if (std::any_of(result.operands.begin(), result.operands.end(),
-                  [](const Expr& a) { return is_const(a); }))
-    return {};
-  for (const Expr& component : unit_vector(result.operands))
-    result.partials.push_back(strong(component));
-  return result;
-}
-
-std::vector<Expr> components_of_norm(const Expr& e) {
-  if (const Call* hypot = as_operator(e, Op::hypot)) return hypot->args;
-  const Call* root = as_operator(e, Op::sqrt);
-  return root ? components_of(root->args[0]) : std::vector<Expr>{};
-}
-
-// v = a_i / |a| with u = a / |a|:  d/da_i = (sum of the other u_j^2) / |a|, d/da_j = -u_i u_j / |a|
-// The same above the constant c for v = a_i / max(|a|, c), and 1 / c, 0 below.
-StableForm normalised(const Div& quotient) {
-  const auto* bounded = quotient.b.as<Max>();
-  if (bounded && !is_const(bounded->b)) return {};
-  const Expr& norm = bounded ? bounded->a : quotient.b;
-  std::vector<Expr> a = components_of_norm(norm);
-  size_t own = 0;
-  while (own < a.size() && !equal(a[own], quotient.a)) ++own;
-  if (a.size() < 2 || own == a.size()) return {};
-  std::vector<Expr> u = unit_vector(a);
-  StableForm result;
-  auto add = [&](size_t j, const Expr& above, const Expr& below) {
-    result.operands.push_back(a[j]);
-    result.partials.push_back(
-        strong(bounded ? make_select(norm > bounded->b, above, below) : above));
+// Numerator and denominator as combinations of the same terms. Empty: they are none, or have too
+// many.
+std::vector<Coefficients> coefficients_of(const Div& quotient) {
+  std::vector<Coefficients> result;
+  auto add = [&](const SignedTerm& t, double Coefficients::*side) {
+    const auto constant = as_const_float(t.value);
+    const Expr term = constant ? make_one(t.value.type()) : t.value;
+    auto known = std::find_if(result.begin(), result.end(),
+                              [&](const Coefficients& c) { return equal(c.term, term); });
+    if (known == result.end()) known = result.insert(result.end(), {term, 0, 0});
+    (*known).*side += t.sign * constant.value_or(1);
   };
-  Expr others;
-  for (size_t j = 0; j < a.size(); ++j) {
-    if (j == own) continue;
-    Expr scaled = u[j] / norm;
-    others = others.defined() ? others + scaled * u[j] : scaled * u[j];
-    if (!is_const(a[j])) add(j, -(scaled * u[own]), make_zero(norm.type()));
+  for (const SignedTerm& t : signed_terms_of(quotient.a)) add(t, &Coefficients::above);
+  for (const SignedTerm& t : signed_terms_of(quotient.b)) add(t, &Coefficients::below);
+  const bool is_common = std::any_of(result.begin(), result.end(), [](const Coefficients& c) {
+    return !is_const(c.term) && c.above != 0 && c.below != 0;
+  });
+  return is_common ? result : std::vector<Coefficients>{};
+}
+
+// v = N / S, N = sum of n_t t, S = sum of s_t t:  d/dt = sum of (n_t s_u - s_t n_u) u / S / S
+// In n_t / S - v s_t / S the terms u = t cancel. By the argument of an exponential: times t.
+StableForm ratio_of_sums(const Div& quotient) {
+  StableForm result;
+  const std::vector<Coefficients> terms = coefficients_of(quotient);
+  for (const Coefficients& t : terms) {
+    if (is_const(t.term)) continue;
+    Expr sum;
+    for (const Coefficients& u : terms) {
+      const double c = t.above * u.below - t.below * u.above;
+      if (c == 0) continue;
+      Expr share = make_const(t.term.type(), c) * ratio(u.term, quotient.b);
+      sum = sum.defined() ? sum + share : share;
+    }
+    if (!sum.defined()) continue;
+    const Call* e = as_operator(t.term, Op::exp);
+    result.operands.push_back(e ? e->args[0] : t.term);
+    result.partials.push_back(strong(e ? sum * ratio(t.term, quotient.b) : sum / quotient.b));
   }
-  add(own, others, make_one(norm.type()) / quotient.b);
   return result;
+}
+
+// v = sin(x) / x:  dv/dx = (cos(x) - v) / x, which cancels near 0: sum of (-1)^k 2k x^(2k-1) /
+// (2k+1)!
+StableForm sine_quotient(const Expr& v, const Div& quotient) {
+  const Call* sine = as_operator(quotient.a, Op::sin);
+  const Expr& x = quotient.b;
+  if (!sine || !equal(sine->args[0], x)) return {};
+  const int terms = x.type().bits() == 64 ? 8 : 4;
+  Expr series = make_zero(x.type()), square = x * x;
+  for (int k = terms; k >= 1; --k) {
+    const double c = (k % 2 ? -2.0 : 2.0) * k / std::tgamma(2 * k + 2);
+    series = make_const(x.type(), c) + square * series;
+  }
+  const Expr is_small = call_op(Op::abs, x.type(), {x}) < make_const(x.type(), 0.5);
+  const Expr cosine = call_op(Op::cos, x.type(), {x});
+  return {{x}, {strong(make_select(is_small, series * x, (cosine - v) / x))}};
 }
 
 StableForm of_quotient(const Expr& e, const Div& quotient) {
-  for (const StableForm& form : {share(e, quotient), logistic(e, quotient), normalised(quotient)}) {
+  for (const StableForm& form : {share(e, quotient), ratio_of_sums(quotient), logistic(e, quotient),
+                                 normalised_form(e), sine_quotient(e, quotient)}) {
     if (!form.operands.empty()) return form;
   }
   return {};
+}
+
+// v = atan(a / b), whose partials are those of atan2: the quotient's square overflows. 0 where b
+// is: the value jumps.
+StableForm angle(const Expr& e) {
+  const auto* quotient = e.as<Div>();
+  if (!quotient || is_const(quotient->b)) return {};
+  std::vector<Expr> gradient = angle_gradient(quotient->a, quotient->b);
+  const Expr zero = make_zero(e.type());
+  for (Expr& partial : gradient) partial = make_select(quotient->b == zero, zero, partial);
+  return {{quotient->a, quotient->b}, {strong(gradient[0]), strong(gradient[1])}};
+}
+
+// ---- max(a, b) + log(1 + exp(-|a - b|)) ----
+
+// exp(-|d|) where e is log(1 + exp(-|d|)).
+Expr decay_of(const Expr& e) {
+  const Call* log = as_operator(e, Op::log);
+  return log ? exp_of_one_plus_exp(log->args[0]) : Expr();
+}
+// e, or what it is the negation of.
+Expr without_sign(const Expr& e) {
+  const auto* difference = e.as<Sub>();
+  return difference && is_zero(difference->a) ? difference->b : e;
+}
+// Whether e is exp(-|a - b|); without the difference where b is 0.
+bool is_decay_by(const Expr& e, const Expr& a, const Expr& b) {
+  const Expr exponent = e.as<Call>()->args[0], size = without_sign(exponent);
+  const Call* distance = as_operator(size, Op::abs);
+  if (!distance || size.same_as(exponent)) return false;
+  const Expr& d = distance->args[0];
+  const auto* difference = d.as<Sub>();
+  const auto is_by = [&](const Expr& x, const Expr& y) {
+    return is_zero(y) ? equal(without_sign(d), without_sign(x))
+                      : difference && equal(difference->a, x) && equal(difference->b, y);
+  };
+  return is_by(a, b) || is_by(b, a);
+}
+
+// v = max(a, b) + log(1 + exp(-|a - b|)) + rest = log(exp(a) + exp(b)) + rest, which is smooth
+// where its parts have a kink:  dv/da = 1 / (1 + exp(b - a)), dv/db = 1 / (1 + exp(a - b)) With
+// -min(a, b) for the maximum: of -a and -b.
+StableForm smooth_maximum(const Expr& sum) {
+  std::vector<SignedTerm> terms = signed_terms_of(sum);
+  const auto logarithm = std::find_if(terms.begin(), terms.end(), [](const SignedTerm& t) {
+    return t.sign > 0 && decay_of(t.value).defined();
+  });
+  if (logarithm == terms.end()) return {};
+  const Expr decay = decay_of(logarithm->value);
+  terms.erase(logarithm);
+  const auto extreme = std::find_if(terms.begin(), terms.end(), [&](const SignedTerm& t) {
+    const auto* pair = t.value.as<Binary>();
+    return pair && pair->kind == (t.sign > 0 ? Kind::Max : Kind::Min) &&
+           is_decay_by(decay, pair->a, pair->b);
+  });
+  if (extreme == terms.end()) return {};
+  const SignedTerm pair = *extreme;
+  terms.erase(extreme);
+  StableForm result;
+  auto add = [&](const Expr& operand, const Partial& partial) {
+    if (is_const(operand)) return;
+    result.operands.push_back(operand);
+    result.partials.push_back(partial);
+  };
+  const Expr one = make_one(sum.type()), sign = make_const(sum.type(), pair.sign);
+  auto add_logistic = [&](const Expr& x, const Expr& y) {
+    const Expr behind = pair.sign > 0 ? y - x : x - y;
+    add(x, strong(sign / (one + call_op(Op::exp, sum.type(), {behind}))));
+  };
+  const auto* ends = pair.value.as<Binary>();
+  add_logistic(ends->a, ends->b);
+  add_logistic(ends->b, ends->a);
+  for (const SignedTerm& t : terms) add(t.value, {make_const(sum.type(), t.sign)});
+  return result;
 }
 
 }  // namespace
@@ -190,29 +242,14 @@ StableForm of_quotient(const Expr& e, const Div& quotient) {
 StableForm stable_form(const Expr& e) {
   if (!e.type().is_float()) return {};
   if (const auto* quotient = e.as<Div>()) return of_quotient(e, *quotient);
+  if (e.as<Add>() || e.as<Sub>()) return smooth_maximum(e);
   if (const Call* log = as_operator(e, Op::log)) {
     const StableForm quotient = log_of_quotient(log->args[0]);
     return quotient.operands.empty() ? log_sum_exp(log->args[0]) : quotient;
   }
-  if (const Call* sqrt = as_operator(e, Op::sqrt)) return norm(sqrt->args[0]);
-  return {};
-}
-
-// Divided by |a_1| + ... + |a_n| first. Its own derivative cancels, so none is taken.
-std::vector<Expr> unit_vector(const std::vector<Expr>& a) {
-  Expr scale, squares;
-  for (const Expr& e : a) scale = scale.defined() ? scale + op1(Op::abs, e) : op1(Op::abs, e);
-  scale = op1(Op::stop_gradient, scale);
-  std::vector<Expr> result;
-  for (const Expr& e : a) {
-    result.push_back(e / scale);
-    Expr square = result.back() * result.back();
-    squares = squares.defined() ? squares + square : square;
-  }
-  Expr zero = make_zero(scale.type()), at_origin = scale == zero;
-  Expr inverse = make_one(scale.type()) / op1(Op::sqrt, squares);
-  for (Expr& e : result) e = make_select(at_origin, zero, e * inverse);
-  return result;
+  if (const Call* arctangent = as_operator(e, Op::atan)) return angle(arctangent->args[0]);
+  const StableForm norm = norm_form(e);
+  return norm.operands.empty() ? normalised_form(e) : norm;
 }
 
 }  // namespace retrograde::ir

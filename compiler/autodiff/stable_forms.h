@@ -3,12 +3,14 @@
 //
 // Logistic, s / (1 + exp(w)): exp(w) overflows where the value has long been 0, and so for s = 1.
 // Shares, a / (a + b + ...), a / (1 + |a|), exp(a) / (exp(a) + exp(b) + ...): softmax. The
-// difference
-//   of 1 / S and v / S cancels.
-// Normalised, a / sqrt(a * a + b * b + ...), also by max(norm, c): the same.
+// difference of 1 / S and v / S cancels. So it does in ratios of sums of the same terms:
+// (a - b) / (a + b), tanh as (exp(a) - exp(-a)) / (exp(a) + exp(-a)), (1 - a * a) / (1 + a * a).
 // Softplus, log-sum-exp, log(exp(a) + exp(b) + c): the reciprocal of a tiny sum is infinite.
+// The same by max(a, b) + log(1 + exp(-|a - b|)), also in a sum: both parts have a kink at a = b.
 // Logarithm of a quotient, log(a / b): the quotient may be denormal, and its reciprocal infinite.
-// Norm, sqrt(a * a + b * b + ...): the squares underflow where the norm is tiny.
+// Angle, atan(a / b): the quotient's square overflows.
+// sin(a) / a: cos(a) - sin(a) / a cancels near 0.
+// Norms and what is divided by them: stable_norms.h.
 //
 // Source: folklore; Higham, Accuracy and Stability of Numerical Algorithms, 2nd ed., 1.14 and 27.8.
 #pragma once
@@ -25,9 +27,5 @@ struct StableForm {
   std::vector<Partial> partials;
 };
 StableForm stable_form(const Expr& e);
-
-// The components of (a_1, ..., a_n) / |(a_1, ..., a_n)|: 0 at the origin; NaN where a component is
-// infinite or NaN, or the norm overflows; right to 3 ULP for denormal and huge vectors too.
-std::vector<Expr> unit_vector(const std::vector<Expr>& a);
 
 }  // namespace retrograde::ir

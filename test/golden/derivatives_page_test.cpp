@@ -37,11 +37,16 @@ mode use the same partials, so they are transposes of each other at every point,
 - **Steps.** Rounding, comparisons, integer arithmetic and casts to integers have derivative 0;
   `Derivative::explain()` says so where it makes a gradient 0.
 - **Stable forms.** Differentiated in one step, so that nothing cancels, overflows or underflows before
-  the derivative does (`compiler/autodiff/stable_forms.h`): `s / (1 + exp(w))` (the logistic function);
-  shares, `a / (a + b + ...)` and `a / (1 + |a|)`, of exponentials too (softmax);
-  `log(a / b)`; `log(exp(a) + exp(b) + c)` (softplus, log-sum-exp); `sqrt(a*a + b*b + ...)` (norms, whose squares may
-  underflow) and `a / sqrt(a*a + b*b + ...)` (normalised, also by `max(norm, c)`): of up to four terms
-  in one expression. `tanh` goes by exp(-2 |x|), since 1 - v^2
+  the derivative does (`compiler/autodiff/stable_forms.h`), of up to four terms in one expression:
+  `s / (1 + exp(w))`, the logistic function; shares, `a / (a + b + ...)` and `a / (1 + |a|)`, of
+  exponentials too (softmax); other ratios of sums of the same terms, `(a - b) / (a + b)`,
+  `(exp(a) - exp(-a)) / (exp(a) + exp(-a))`, `(1 - a*a) / (1 + a*a)`; `log(exp(a) + exp(b) + c)`, and
+  `max(a, b) + log(1 + exp(-|a - b|))` inside a sum, smooth where its parts have kinks (softplus,
+  log-sum-exp, cross entropy of logits); `log(a / b)`, `atan(a / b)`, `sin(a) / a`;
+  `sqrt(a*a + b*b + ...)` (norms, whose squares may underflow or overflow), their reciprocals, and
+  `a / sqrt(a*a + b*b + ...)` (normalised, also by `max(norm, c)`, by a product with `1 / norm`, with
+  `pow(a*a + b*b, -0.5f)` or with `fast_inverse_sqrt(a*a + b*b)`).
+  `tanh` goes by exp(-2 |x|), since 1 - v^2
   has no digits left for large x; `erf` by two exponentials, since the rounding error of x^2 would be a
   factor; 1 - x^2 is (1 - x)(1 + x); `hypot` and `atan2` are scaled; `pow`'s dx is y v / x where y - 1
   would be rounded. A quotient's adjoint goes in two

@@ -86,6 +86,65 @@ const std::vector<Shape>& shapes() {
        [](Real x, Real) { return x <= -1 ? std::nanl("") : 1 / (1 + x); }, 2},
       {"exp(x) - 1", [](Expr x, Expr) { return exp(x) - 1.0f; },
        [](Real x, Real) { return std::exp(x); }, 2},
+      {"max(-x, 0) + log(1 + exp(-|x|))",
+       [](Expr x, Expr) { return max(-x, 0.0f) + log(1.0f + exp(-abs(x))); },
+       [](Real x, Real) { return -logistic(-x); }, 6},
+      {"log(1 + exp(-|x|)) - min(x, 0)",
+       [](Expr x, Expr) { return log(1.0f + exp(-abs(x))) - min(x, 0.0f); },
+       [](Real x, Real) { return -logistic(-x); }, 6},
+      {"max(x - y, 0) + log(1 + exp(-|x - y|))",
+       [](Expr x, Expr y) { return max(x - y, 0.0f) + log(1.0f + exp(-abs(x - y))); },
+       [](Real x, Real y) {
+         const Real d = static_cast<float>(x) - static_cast<float>(y);
+         return logistic(d);
+       },
+       6},
+      {"(x - y) / (x + y)", [](Expr x, Expr y) { return (x - y) / (x + y); },
+       [](Real x, Real y) {
+         return x * y < 0 || std::fabs(x + y) > 3e38L ? std::nanl("") : 2 * y / (x + y) / (x + y);
+       },
+       6},
+      {"(1 - x*x) / (1 + x*x)", [](Expr x, Expr) { return (1.0f - x * x) / (1.0f + x * x); },
+       [](Real x, Real) {  // by x*x it is denormal from 1e9 on
+         return std::fabs(x) > 1e9L ? std::nanl("") : -4 * x / (1 + x * x) / (1 + x * x);
+       },
+       8},
+      {"tanh by exponentials", [](Expr x, Expr) { return (exp(x) - exp(-x)) / (exp(x) + exp(-x)); },
+       [](Real x, Real) { return 4 * logistic_slope(2 * x); }, 8},
+      {"(exp(2 x) - 1) / (exp(2 x) + 1)",
+       [](Expr x, Expr) { return (exp(2.0f * x) - 1.0f) / (exp(2.0f * x) + 1.0f); },
+       [](Real x, Real) { return 4 * logistic_slope(2 * x); }, 8},
+      {"sin(x) / x", [](Expr x, Expr) { return sin(x) / x; },
+       [](Real x, Real) {
+         const Real series = -x / 3 + x * x * x / 30;
+         return std::fabs(x) < 0.001L ? series : (std::cos(x) - std::sin(x) / x) / x;
+       },
+       24},
+      {"atan(x / y)", [](Expr x, Expr y) { return atan(x / y); },
+       [](Real x, Real y) {
+         const Real r = std::hypot(x, y);
+         return y == 0 ? std::nanl("") : y / r / r;
+       },
+       12},
+      {"x * fast_inverse_sqrt(x*x + y*y)",
+       [](Expr x, Expr y) { return x * fast_inverse_sqrt(x * x + y * y); },
+       [](Real x, Real y) {
+         Real n = std::hypot(x, y);
+         return n < 1e-18L || n > 1e19L ? std::nanl("") : y / n * (y / n) / n;
+       },
+       12},
+      {"pow(x*x + y*y, -0.5) * x", [](Expr x, Expr y) { return pow(x * x + y * y, -0.5f) * x; },
+       [](Real x, Real y) {
+         Real n = std::hypot(x, y);
+         return n < 1e-18L || n > 1e19L ? std::nanl("") : y / n * (y / n) / n;
+       },
+       12},
+      {"pow(x*x + y*y, -0.5)", [](Expr x, Expr y) { return pow(x * x + y * y, -0.5f); },
+       [](Real x, Real y) {
+         Real n = std::hypot(x, y);
+         return n < 1e-18L || n > 1e19L ? std::nanl("") : -x / n / n / n;
+       },
+       12},
       {"sqrt(x*x)", [](Expr x, Expr) { return sqrt(x * x); },
        [](Real x, Real) { return x > 0   ? 1
                                  : x < 0 ? -1
@@ -161,6 +220,23 @@ TEST(StableForms, AreRightToAFewUlpWhereverTheyAreFinite) {
     }
     EXPECT_GT(checked, n * n / 3) << shape.name;
   }
+}
+
+// The parts have kinks at 0; the sum, and its derivative, do not.
+TEST(StableForms, HaveDerivativesOfTheirOwn) {
+  Buffer<float> x(3), one(3);
+  x(0) = 0, x(1) = -2, x(2) = 1.5f;
+  one.fill(1);
+  Var i("i");
+  Func f("f"), sine("sine");
+  f(i) = max(x(i), 0.0f) + log(1.0f + exp(-abs(x(i))));
+  sine(i) = sin(x(i)) / x(i);
+  const auto second = [&](const Func& g) {
+    return propagate_adjoints(propagate_adjoints(g, one)(x), one)(x).realize({3});
+  };
+  Buffer<float> of_softplus = second(f), of_sine = second(sine);
+  for (int k = 0; k < 3; ++k) EXPECT_NEAR(of_softplus(k), logistic_slope(x(k)), 1e-6);
+  EXPECT_NEAR(of_sine(0), -1.0 / 3, 1e-6);
 }
 
 // Over Funcs, shifted by the largest as usual. The adjoint that passes the maximum is exactly 0:

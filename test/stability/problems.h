@@ -35,6 +35,7 @@ struct Family {
 
 Family norms();
 Family exponentials();
+Family activations();
 Family quotients();
 Family selections();
 Family angles();
@@ -42,8 +43,13 @@ Family ill_conditioned();
 Family reductions();
 Family recurrences();
 inline std::vector<Family> all_families() {
-  return {norms(),  exponentials(),    quotients(),  selections(),
-          angles(), ill_conditioned(), reductions(), recurrences()};
+  return {norms(),  exponentials(),    activations(), quotients(),  selections(),
+          angles(), ill_conditioned(), reductions(),  recurrences()};
+}
+
+// 1 / (1 + exp(-x)).
+inline Real logistic(Real x) {
+  return x >= 0 ? 1 / (1 + std::exp(-x)) : std::exp(x) / (1 + std::exp(x));
 }
 
 // f is generic: of a vector of Exprs it makes the program, of Traced numbers the oracle.

@@ -11,10 +11,29 @@ Family quotients() {
           pointwise("1 / x", 1, [](const auto& x) { return 1.0f / x[0]; }),
           pointwise("x / y", 2, [](const auto& x) { return x[0] / x[1]; }),
           pointwise("x y", 2, [](const auto& x) { return x[0] * x[1]; }),
-          pointwise("x / (x + y)", 2, [](const auto& x) { return x[0] / (x[0] + x[1]); }),
-          pointwise("(x - y) / (x + y)", 2,
-                    [](const auto& x) { return (x[0] - x[1]) / (x[0] + x[1]); }),
-          pointwise("x / (1 + x)", 1, [](const auto& x) { return x[0] / (1.0f + x[0]); }),
+          pointwise(
+              "x / (x + y)", 2, [](const auto& x) { return x[0] / (x[0] + x[1]); },
+              [](const Reals& x) {
+                const Real s = x[0] + x[1];
+                if (std::isinf(x[1])) return Reals{0, 0};
+                return Reals{x[1] / s / s, -x[0] / s / s};
+              }),
+          pointwise(
+              "(x - y) / (x + y)", 2, [](const auto& x) { return (x[0] - x[1]) / (x[0] + x[1]); },
+              [](const Reals& x) {
+                const Real s = x[0] + x[1];
+                return Reals{2 * x[1] / s / s, -2 * x[0] / s / s};
+              }),
+          pointwise(
+              "x / (1 + x)", 1, [](const auto& x) { return x[0] / (1.0f + x[0]); },
+              [](const Reals& x) { return Reals{1 / (1 + x[0]) / (1 + x[0])}; }),
+          pointwise(
+              "(1 - x²) / (1 + x²)", 1,
+              [](const auto& x) { return (1.0f - x[0] * x[0]) / (1.0f + x[0] * x[0]); },
+              [](const Reals& x) {
+                const Real s = 1 + x[0] * x[0];
+                return Reals{-4 * x[0] / s / s};
+              }),
           pointwise("x y / (x + y)", 2, [](const auto& x) { return x[0] * x[1] / (x[0] + x[1]); }),
           pointwise("1 / (1 + x²)", 1, [](const auto& x) { return 1.0f / (1.0f + x[0] * x[0]); }),
           pointwise("sqrt(x)", 1, [](const auto& x) { return sqrt(x[0]); }),
@@ -41,12 +60,19 @@ Family angles() {
                         [](const auto& x) { return asin(clamp(x[0], -1.0f, 1.0f)); }),
               pointwise("acos(clamp(x, -0.999, 0.999))", 1,
                         [](const auto& x) { return acos(clamp(x[0], -0.999f, 0.999f)); }),
-              pointwise("sin(x) / x, 1 at 0", 1,
-                        [](const auto& x) {
-                          return select(abs(x[0]) < 1e4f,
-                                        select(x[0] == 0.0f, 1.0f + 0.0f * x[0], sin(x[0]) / x[0]),
-                                        0.0f * x[0]);
-                        }),
+              pointwise(
+                  "sin(x) / x, 1 at 0", 1,
+                  [](const auto& x) {
+                    return select(abs(x[0]) < 1e4f,
+                                  select(x[0] == 0.0f, 1.0f + 0.0f * x[0], sin(x[0]) / x[0]),
+                                  0.0f * x[0]);
+                  },
+                  [](const Reals& x) {
+                    const Real v = x[0], square = v * v;
+                    if (!(std::abs(v) < 1e4L)) return Reals{0};
+                    if (std::abs(v) < 0.01L) return Reals{-v / 3 * (1 - square / 10)};
+                    return Reals{(std::cos(v) - std::sin(v) / v) / v};
+                  }),
               pointwise("refraction: select(k < 0, 0, e c - sqrt(k)), k = 1 - e² (1 - c²)", 2,
                         [](const auto& x) {
                           auto e = x[0], c = x[1], k = 1.0f - e * e * (1.0f - c * c);

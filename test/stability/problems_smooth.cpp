@@ -9,8 +9,6 @@ namespace {
 
 constexpr float tiny_norm = 1e-12f;
 
-Real logistic(Real x) { return x >= 0 ? 1 / (1 + std::exp(-x)) : std::exp(x) / (1 + std::exp(x)); }
-
 // The softmax weights, without overflow.
 Reals softmax(const Reals& x) {
   const Real top = *std::max_element(x.begin(), x.end());
@@ -82,6 +80,13 @@ Family norms() {
                 const bool floored = !(std::hypot(x[0], x[1]) > tiny_norm);
                 return floored ? Reals{1 / Real(tiny_norm), 0} : unit_gradient(x);
               }),
+          pointwise(
+              "x (1 / sqrt(x² + y²))", 2,
+              [length](const auto& x) { return x[0] * (1.0f / length(x)); }, unit_gradient),
+          pointwise(
+              "x pow(x² + y², -1/2)", 2,
+              [](const auto& x) { return x[0] * pow(x[0] * x[0] + x[1] * x[1], -0.5f); },
+              unit_gradient),
           pointwise("1 / sqrt(x² + y²)", 2, [length](const auto& x) { return 1.0f / length(x); }),
           pointwise("Huber(x)", 1,
                     [](const auto& x) {
@@ -117,7 +122,7 @@ Family exponentials() {
           pointwise(
               "max(x, 0) + log(1 + exp(-|x|))", 1,
               [](const auto& x) { return max(x[0], 0.0f) + log(1.0f + exp(-abs(x[0]))); },
-              of_one([](Real x) { return x == 0 ? NAN : logistic(x); })),
+              of_one(logistic)),
           pointwise(
               "-log(1 / (1 + exp(-x)))", 1, [sigma](const auto& x) { return -log(sigma(x)); },
               of_one([](Real x) { return -logistic(-x); })),
@@ -156,7 +161,6 @@ Family exponentials() {
               })),
           pointwise("select(x > 0, x, exp(x) - 1)", 1,
                     [](const auto& x) { return select(x[0] > 0.0f, x[0], exp(x[0]) - 1.0f); }),
-          pointwise("x / (1 + |x|)", 1, [](const auto& x) { return x[0] / (1.0f + abs(x[0])); }),
           pointwise("sinh(x)", 1, [](const auto& x) { return sinh(x[0]); }),
           pointwise(
               "log(cosh(x))", 1, [](const auto& x) { return log(cosh(x[0])); },
