@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "autodiff/checkpoint.h"
+#include "autodiff/fold.h"
 #include "autodiff/recurrence.h"
 #include "autodiff/selection.h"
 #include "autodiff/tape.h"
@@ -30,6 +31,8 @@ class UpdateDifferentiation {
     if (fixed_places && (accumulates() || selects() || is_recurrence())) return std::move(result_);
     if (wants_checkpoints(c_)) {
       differentiate_by_checkpoints(c_, result_);
+    } else if (is_fold(c_)) {
+      differentiate_fold(c_, result_);
     } else {
       differentiate_by_tape(c_, result_);
     }

@@ -17,6 +17,9 @@
 //                 to the adjoint before the update.
 //   checkpoints   with a budget, anything else in a loop over time: run backward from a few kept
 //                 states (checkpoint.h).
+//   fold          iterations that read and write one element only, as products do: the steps of
+//   each
+//                 element become a dimension, and its adjoint a recurrence along it (fold.h).
 //   tape          anything else: the iterations run backward one by one inside each element of the
 //                 pure dimensions, and what they need is kept (tape.h).
 // A value that a partial needs must still be in f at the end: proven over index sets, never

@@ -137,6 +137,36 @@ PROGRAM(products_along_rows) {
   return {weighted_sum(f, {6}), {a}, true};
 }
 
+PROGRAM(product_where_data_say) {
+  Buffer<float> a = plane();
+  Func f("f");
+  RDom r(0, 7);
+  r.where(a(r, 2) > 1.0f);
+  f(y) = a(3, y);
+  f(y) *= a(r, y);
+  return {weighted_sum(f, {6}), {a}, true};
+}
+
+PROGRAM(product_over_two_dimensions_then_a_power) {
+  Buffer<float> a = random_image({3, 4}, 0.75, 1.25, 2);
+  Func f("f");
+  RDom r(0, 3, 1, 3), q(-1, 3);
+  f() = a(0, 0);
+  f() *= a(r.x, r.y);
+  f() = f() * (0.5f * f() + cast<float>(q + 2) * a(q + 1, 2));
+  return {f, {a}, true};
+}
+
+PROGRAM(decay_in_place_of_what_a_counter_has_reached) {
+  Buffer<float> a = plane();
+  Func f("f"), g("g");
+  RDom r(0, 7);
+  f(y) = Tuple(a(0, y), 0, 1.0f);
+  f(y) = Tuple(0.5f * f(y)[0] + a(r, y) * a(r, y), f(y)[1] + 1, a(r, y) + 0.25f * f(y)[0]);
+  g(y) = f(y)[0] * cast<float>(f(y)[1]) + f(y)[2];
+  return {weighted_sum(g, {6}), {a}};
+}
+
 PROGRAM(maximum_and_minimum) {
   Buffer<float> a = line();
   Func f("f");
