@@ -436,6 +436,23 @@ Expr call_value(const FuncPtr& f, const std::vector<Expr>& args, int index) {
   return call_func(f->name, f->types.at(static_cast<size_t>(index)), args, index, SymbolRef(f));
 }
 
+namespace {
+
+// Of this definition only: an adjoint may get hundreds of them.
+void freeze_callees(const Definition& d, const FuncContents& f) {
+  for_each_expr(d, [&](const Expr& root) {
+    walk(root, [&](const Expr& e) {
+      const auto* call = e.as<Call>();
+      if (!call || call->call_type != CallType::Func) return true;
+      const FuncPtr callee = func_of(*call);
+      if (callee.get() != &f) callee->frozen = true;
+      return true;
+    });
+  });
+}
+
+}  // namespace
+
 void append_update(const FuncPtr& f, std::vector<Expr> args, std::vector<Expr> values,
                    const std::vector<ReductionVariable>& rvars, Expr predicate) {
   Definition update;
@@ -452,8 +469,8 @@ void append_update(const FuncPtr& f, std::vector<Expr> args, std::vector<Expr> v
     if (is_pure_position(*f, update, d))
       update.schedule.dims.push_back({f->args[d], ForType::Serial, false});
   }
+  freeze_callees(update, *f);
   f->updates.push_back(std::move(update));
-  for (const FuncPtr& callee : direct_callees(*f)) callee->frozen = true;
   f->version++;
 }
 
