@@ -30,7 +30,7 @@ constexpr size_t memory_bytes = 0;  // their shadow takes address space
 #else
 constexpr size_t memory_bytes = size_t{6} << 30;
 #endif
-constexpr fuzz::ApartLimits limits = {30, 300, memory_bytes};
+constexpr fuzz::ApartLimits limits = {60, 600, memory_bytes};
 
 struct Options : fuzz::FuzzOptions {
   unsigned compile = 25;

@@ -1,6 +1,7 @@
 // What all checks of one program share: evaluation in double, random weights, how inputs move.
 #pragma once
 
+#include <ctime>
 #include <random>
 
 #include "autodiff/tangents.h"
@@ -78,8 +79,11 @@ struct Subject {
   std::vector<Buffer<float>> w = {};  // of each value of the output
   Func seed = {};
   double largest = 0;  // of the magnitudes summed up in the primal
+  std::clock_t begun = std::clock();
   Region bounds() const;
   AdjointOptions options() const;  // by inputs only
+  // The interpreter took long already: dear checks that are not begun are left out.
+  bool is_late() const;
 };
 
 // ---- differences ----
