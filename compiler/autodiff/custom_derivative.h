@@ -45,7 +45,8 @@ class AdjointContext {
   // The Func with the rule; its values may be used.
   const Func& func() const { return func_; }
   // The adjoint of func() after its last definition: its dimensions and number of values, float32
-  // or wider. 0 outside of region().
+  // or wider. 0 outside of region(), where a partial p may be NaN as nobody reads it there: multiply
+  // by select(is_finite(p), p, 0).
   const Func& adjoint() const { return adjoint_; }
   // What the output depends on: min and extent in each dimension of func(); undefined where it has
   // no bounds.

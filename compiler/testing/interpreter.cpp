@@ -238,6 +238,14 @@ class Interpreter::Impl {
     }
   }
 
+  void check_work() const {
+    if (operations_ > options_.max_operations) {
+      call_error("interpret the program", "a run has a bounded number of operations",
+                 text("more than ", options_.max_operations),
+                 "Raise InterpreterOptions::max_operations.");
+    }
+  }
+
   // The cells of a point inside the island's box.
   Value* cell(FuncState& f, Island& island, const Point& point, const Point& place) {
     size_t index = 0, stride = 1;
@@ -377,6 +385,7 @@ class Interpreter::Impl {
   }
 
   Value evaluate(Frame& frame, const Step& step) {
+    check_work();
     const auto child = [&](int i) -> const Value& { return get(frame, step.children[i]); };
     switch (step.code) {
       case Step::Code::Constant:

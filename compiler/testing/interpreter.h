@@ -29,6 +29,7 @@ struct InterpreterOptions {
   bool widen = false;                    // every float type becomes float64
   Rounding rounding = Rounding::Strict;  // freedom to account for in Value::error
   size_t max_points = size_t{1} << 24;   // of one Func; more is a UserError, not a hang
+  uint64_t max_operations = UINT64_MAX;  // of one interpreter; the same
 };
 
 class Interpreter {

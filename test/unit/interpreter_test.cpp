@@ -118,6 +118,15 @@ TEST(Interpreter, FailedRequireIsAnError) {
   EXPECT_THROW(ints(f, 3), UserError);
 }
 
+TEST(Interpreter, OperationsOfARunAreBounded) {
+  Func f;
+  f(x) = x * x + 1;
+  Interpreter enough(InterpreterOptions{.max_operations = 20}),
+      too_few(InterpreterOptions{.max_operations = 19});
+  EXPECT_NO_THROW(enough.realize(f.function(), {{0}, {10}}));
+  EXPECT_THROW(too_few.realize(f.function(), {{0}, {11}}), UserError);
+}
+
 TEST(Interpreter, WideningComputesInDouble) {
   Func f;
   f(x) = cast<float>(x + 1) / 3.0f;

@@ -37,6 +37,7 @@ std::vector<oracle::Array> interpret(const Func& f, const oracle::Region& region
   oracle::InterpreterOptions options;
   options.widen = true;
   options.max_points = max_points;
+  options.max_operations = max_operations;
   return oracle::Interpreter(options).realize(f.function(), region);
 }
 
@@ -45,7 +46,7 @@ std::vector<oracle::Array> evaluate(const Func& f, const oracle::Region& region)
     return interpret(f, region);
   } catch (const UserError& error) {
     const std::string message = error.what();
-    const bool is_large = message.find("points") != std::string::npos;
+    const bool is_large = message.find("InterpreterOptions::max_") != std::string::npos;
     decide(is_large ? Judgement::Illegal : Judgement::Wrong, f.name() + " " + message);
   }
 }

@@ -9,7 +9,9 @@
 
 namespace retrograde::gradient {
 
-constexpr size_t max_points = size_t{1} << 17;  // of one Func; more is passed over
+// Of one Func, and of one evaluation; more is passed over.
+constexpr size_t max_points = size_t{1} << 17;
+constexpr uint64_t max_operations = 20'000'000;
 
 // Ends the judgement.
 struct Verdict {

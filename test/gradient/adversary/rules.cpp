@@ -38,6 +38,12 @@ Func tangent_by_synthesis(const Func& source, const std::vector<AdjointInput>& i
   return propagate_tangents(source, directions)(source);
 }
 
+// What nobody reads may be NaN: it must not meet a derivative of 0.
+Expr times(const Expr& derivative, const Expr& partial) {
+  const Expr zero = cast(partial.type(), Expr(0.0f));
+  return derivative * cast(derivative.type(), select(is_finite(partial), partial, zero));
+}
+
 // f(x) = sin(source(x)).
 void give_closed_rule(const Func& f, const Func& source) {
   custom_adjoint(f, {source}, [source](const AdjointContext& c) {
@@ -46,7 +52,7 @@ void give_closed_rule(const Func& f, const Func& source) {
     std::vector<Expr> values;
     for (int k = 0; k < source.outputs(); ++k) {
       const Expr adjoint = c.adjoint()(vars).element(k);
-      values.push_back(adjoint * cast(adjoint.type(), cos(source(vars).element(k))));
+      values.push_back(times(adjoint, cos(source(vars).element(k))));
     }
     contribution(vars) = Tuple(values);
     return std::vector<AdjointContribution>{{source, contribution}};
@@ -58,7 +64,7 @@ void give_closed_rule(const Func& f, const Func& source) {
     std::vector<Expr> values;
     for (int k = 0; k < source.outputs(); ++k) {
       const Expr t = tangent(vars).element(k);
-      values.push_back(t * cast(t.type(), cos(source(vars).element(k))));
+      values.push_back(times(t, cos(source(vars).element(k))));
     }
     result(vars) = Tuple(values);
     return result;
