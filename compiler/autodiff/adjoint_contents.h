@@ -15,6 +15,8 @@ struct AdjointTraits {
   // Exactly 0 where an operand of a consumer is infinite, as that of exp(-inf): a factor that may
   // be infinite meets it there.
   bool vanished = false;
+  // The same within the expression that is swept: a product of reads may have overflowed there.
+  bool levelled = false;
   // Infinite where it passed the pole of a partial: a factor may be 0 there, as in a norm at 0.
   bool singular = false;
   // Of tangents: infinite where a value that they passed is, and a later partial may be 0 there.
@@ -23,13 +25,14 @@ struct AdjointTraits {
   void add(const AdjointTraits& other) {
     masked |= other.masked;
     vanished |= other.vanished;
+    levelled |= other.levelled;
     singular |= other.singular;
     infinite |= other.infinite;
   }
 };
 
-// A part of the iterations of an update: what each evaluates, and how often it runs at each point of
-// the pure dimensions.
+// A part of the iterations of an update: what each evaluates, and how often it runs at each point
+// of the pure dimensions.
 struct AdjointWork {
   std::vector<Expr> values;  // of each write: its place, then its values
   std::vector<Expr> loops;   // extents

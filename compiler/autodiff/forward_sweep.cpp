@@ -110,11 +110,12 @@ class Sweep {
     const Finiteness& factor = local.factors[i];
     const AdjointTraits& passed = traits_[local.operands[i].get()];
     if (factor.infinite) partial.strength = Strength::Strong;
-    if (passed.singular || (passed.infinite && local.levels_off))
+    if (passed.singular || (passed.infinite && local.levels_off_by(i)))
       partial.strength = partial.strength == Strength::Plain ? Strength::Cut : Strength::Both;
     AdjointTraits& traits = traits_[e.get()];
     traits.add(passed);
-    traits.add({.singular = local.poles, .infinite = factor.risky || factor.infinite});
+    traits.add(
+        {.singular = local.poles, .infinite = factor.risky || factor.infinite || factor.product});
     return partial;
   }
 

@@ -85,7 +85,7 @@ LocalDerivative of_call(const Expr& e, const Call& call, const ExprFacts& facts)
     case RuleClass::Smooth:
       smooth = sum_of(call.args, rule.partials(call.args, e), facts);
       smooth.poles = has_poles(call.op);
-      smooth.levels_off = levels_off(call.op);
+      smooth.levels_off.assign(call.args.size(), levels_off(call.op));
       return smooth;
     case RuleClass::Transparent:
       return same_as(e, call.args[static_cast<size_t>(rule.transparent_arg)]);
@@ -174,6 +174,9 @@ void ExprFacts::classify(const Expr& e, FunctionRef<bool(const Expr&)> is_wanted
       active = false;
     }
   }
+  const auto* product = e.as<Mul>();
+  own.product |= product && floating && classified_.at(product->a.get()).read &&
+                 classified_.at(product->b.get()).read;
   if (const auto* div = e.as<Div>(); div && is_const(div->b))
     own.risky = classified_.at(div->a.get()).risky;
   classified_[e.get()] = own;
@@ -204,7 +207,7 @@ LocalDerivative local_derivative(const Expr& e, const ExprFacts& facts) {
   if (StableForm whole = stable_form(e); !whole.operands.empty()) {
     LocalDerivative sum = sum_of(whole.operands, whole.partials, facts);
     const auto* call = e.as<Call>();
-    sum.levels_off = call ? levels_off(call->op) : is_quotient(e);
+    sum.levels_off.assign(sum.operands.size(), call ? levels_off(call->op) : is_quotient(e));
     return sum;
   }
   return match(
@@ -216,7 +219,7 @@ LocalDerivative local_derivative(const Expr& e, const ExprFacts& facts) {
       [&](const Binary& b) {
         LocalDerivative sum =
             sum_of({b.a, b.b}, derivative_rule(e.kind()).partials({b.a, b.b}, e), facts);
-        sum.levels_off = is_quotient(e);
+        sum.levels_off = {false, is_quotient(e)};
         return sum;
       },
       [&](const Call& call) { return of_call(e, call, facts); },

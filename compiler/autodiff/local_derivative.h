@@ -29,10 +29,12 @@ struct Finiteness {
   bool risky = false;     // infinite or NaN at finite operands
   bool read = false;      // what a Func or image holds, however wild that is
   bool infinite = false;  // by a leaf that may be
+  bool product = false;   // of reads, which may overflow
   void add(const Finiteness& other) {
     risky |= other.risky;
     read |= other.read;
     infinite |= other.infinite;
+    product |= other.product;
   }
 };
 
@@ -72,7 +74,9 @@ struct LocalDerivative {
   std::string note;
   std::vector<Finiteness> factors;  // Sum: what the partials may be
   bool poles = false;               // partials may be infinite where the value is finite
-  bool levels_off = false;          // partials may be 0 where an operand is infinite
+  // Sum: whether the partial may be 0 where the operand is infinite; empty: none is.
+  std::vector<bool> levels_off = {};
+  bool levels_off_by(size_t i) const { return i < levels_off.size() && levels_off[i]; }
 };
 
 // Of an active node that is no leaf. Partials that may be infinite or NaN are Strong. Throws

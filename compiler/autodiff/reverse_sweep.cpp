@@ -73,12 +73,14 @@ class Sweep {
     if (!partial.factor.defined() || !facts_.is_active(local.operands[i])) return;
     const Finiteness& factor = local.factors[i];
     AdjointTraits traits = state.traits;
-    if ((traits.masked && factor.read) || (traits.vanished && factor.infinite))
+    if ((traits.masked && factor.read) || (traits.vanished && factor.infinite) ||
+        (traits.levelled && factor.product))
       partial.strength = Strength::Strong;
     if (traits.singular)
       partial.strength = partial.strength == Strength::Strong ? Strength::Both : Strength::Cut;
     traits.add({.masked = partial.factor.as<Select>() != nullptr,
-                .vanished = local.levels_off,
+                .vanished = local.levels_off_by(i),
+                .levelled = local.levels_off_by(i),
                 .singular = local.poles});
     add(local.operands[i], times_partial(state.sum, partial), traits);
   }

@@ -28,9 +28,9 @@ mode use the same partials, so they are transposes of each other at every point,
   `min`, `max`, `clamp`, a stride or a seed of 0 in a consumer may have made them 0, or a slope that is 0
   where an operand is infinite: `exp(m * b)` with m = -inf, the maximum over an empty domain. Which
   factors of other Funcs may be infinite follows from their definitions
-  (`compiler/autodiff/value_range.h`), where what images hold, sums and products count as finite. In
-  forward mode an infinite tangent and a later slope of 0 make 0, too. NaNs and infinities that the
-  output uses stay.
+  (`compiler/autodiff/value_range.h`), where what images hold, sums and products count as finite; products
+  that overflow inside one expression, `exp(-x * x * y)`, are seen. In forward mode an infinite tangent
+  and a later slope of 0 make 0, too. NaNs and infinities that the output uses stay.
 - **Poles.** Where a partial is infinite and the value finite (`sqrt`, `pow`, `asin`, `acos`, `acosh`), a
   factor of exactly 0 after it contributes 0: so norms, `sqrt(x*x + y*y)` at the origin, have gradient 0,
   and `sqrt(x)` at 0 keeps its infinity.

@@ -127,6 +127,16 @@ TEST_F(StrongZeros, OverflowOfAProductInAnUnselectedFunc) {
   expect(f, a, {1, 32, 1, 108});
 }
 
+TEST_F(StrongZeros, OverflowOfAProductUnderAnExponential) {
+  set(a, {1e30f, 2, 1e25f, 0.5f});
+  set(b, {1, 2, 0.5f, 3});
+  Func f("f"), g("g");
+  f(x) = exp(-(a(x) * a(x)) * b(x));
+  expect(f, b, {0, -4 * std::exp(-8.0f), 0, -0.25f * std::exp(-0.75f)});
+  g(x) = b(x) / (1.0f + a(x) * a(x) * b(x));
+  expect(g, b, {0, 1.0f / 81, 0, 1 / 1.75f / 1.75f});
+}
+
 TEST_F(StrongZeros, SaturatedByClampAndMaximum) {
   set(a, {1e30f, 2, 0.5f, 1e20f});
   set(b, {1e30f, 0.25f, 0.5f, 1e30f});
