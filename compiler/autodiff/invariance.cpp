@@ -27,7 +27,7 @@ struct Response {
   };
   Kind kind = Kind::Fixed;
   double degree = 0;        // Shifted, Scaled: not 0
-  std::vector<Expr> place;  // the element of the Func, over the variables at hand
+  std::vector<Expr> place;  // the element of the Func, over the variables at hand, without hints
   bool is(Kind k) const { return kind == k; }
 };
 using How = Response::Kind;
@@ -192,7 +192,6 @@ Response where(const Expr& condition, const Response& r) {
   Response result = r;
   const Expr given = result.place.empty() ? condition : simplify(without_hints(condition));
   for (Expr& index : result.place) {
-    index = without_hints(index);
     const Expr choice = simplify(make_select(given, index, index + 1));
     const auto* select = choice.as<Select>();
     if (select && equal(select->condition, given)) index = select->true_value;
@@ -289,7 +288,7 @@ class Propagation {
     const auto& f = dynamic_cast<const FuncContents&>(*call->symbol.raw());
     Substitution arguments;
     for (size_t d = 0; d < f.args.size(); ++d) arguments[f.args[d]] = call->args[d];
-    for (Expr& index : result.place) index = substitute(index, arguments);
+    for (Expr& index : result.place) index = without_hints(substitute(index, arguments));
     return result;
   }
 

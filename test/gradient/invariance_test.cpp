@@ -166,5 +166,67 @@ TEST_F(Invariance, NotOfAMeanThatIsSubtracted) {
   expect_right(loss_of(f));
 }
 
+// Expressions over what shifts and what scales: every gradient agrees with the tangents, and some
+// programs cancel.
+class RandomInvariance : public Invariance {
+ protected:
+  std::mt19937 random{2026};
+  int below(int n) { return std::uniform_int_distribution<int>(0, n - 1)(random); }
+  Expr leaf() {
+    const std::vector<Expr> leaves = {e(x, y), s(y), e(x, y),          s(y), m(y), a(x, y),
+                                      2.0f,    0.0f, s((y + 1) % rows)};
+    return leaves[static_cast<size_t>(below(static_cast<int>(leaves.size())))];
+  }
+  Expr expression(int depth) {
+    if (depth == 0) return leaf();
+    const Expr u = expression(depth - 1), v = expression(below(depth));
+    switch (below(9)) {
+      case 0:
+        return u + v;
+      case 1:
+        return u - v;
+      case 2:
+        return u * v;
+      case 3:
+      case 4:
+        return u / v;
+      case 5:
+        return max(u, v);
+      case 6:
+        return log(abs(u)) + v;
+      case 7:
+        return exp(0.5f * u) * v;
+      default:
+        return sqrt(abs(u));
+    }
+  }
+};
+
+TEST_F(RandomInvariance, AgreesWithTangents) {
+  e(x, y) = exp(a(x, y) - m(y));
+  s(y) += e(r, y);
+  int checked = 0, cancelling = 0;
+  for (int program = 0; program < 250; ++program) {
+    Func f("f");
+    f(x, y) = expression(1 + below(3));
+    Func loss = loss_of(f);
+    const double along = evaluate_scalar(propagate_tangents(loss, {{a, w}})(loss));
+    if (!std::isfinite(along) || !std::isfinite(evaluate_scalar(loss))) continue;
+    oracle::Array gradient = evaluate(propagate_adjoints(loss)(a), {{0, 0}, {n, rows}});
+    double sum = 0, size = 0;
+    for (int j = 0; j < rows; ++j) {
+      for (int i = 0; i < n; ++i) {
+        sum += gradient.at({i, j}).scalar.as_double() * w(i, j);
+        size += std::abs(gradient.at({i, j}).scalar.as_double() * w(i, j));
+      }
+    }
+    EXPECT_NEAR(sum, along, 1e-9 * (size + 1)) << ir::print(f.value());
+    ++checked;
+    cancelling += cancels(m, loss);
+  }
+  EXPECT_GT(checked, 120);
+  EXPECT_GT(cancelling, 3);
+}
+
 }  // namespace
 }  // namespace retrograde::gradient
