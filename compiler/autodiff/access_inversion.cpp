@@ -37,7 +37,8 @@ class Inverter {
     resolve_indices();
     std::vector<std::vector<GroupPiece>> pieces;
     std::vector<Group> groups = make_groups();
-    for (const Group& group : groups) pieces.push_back(invert_group(group, fixed_));
+    for (const Group& group : groups)
+      pieces.push_back(invert_group(group, fixed_, query_.operations));
     Inversion result;
     result.note = note_;
     std::vector<const GroupPiece*> chosen;
@@ -58,7 +59,7 @@ class Inverter {
   // value is the same all over the fibre. Indices with any other obstacle take no part in the
   // relation.
   void resolve_indices() {
-    IslContext context;
+    IslContext context(query_.operations);
     std::vector<std::string> names;
     for (const LoopVariable& v : query_.domain.vars) names.push_back(v.name);
     IslBridge bridge(context, names);
@@ -388,7 +389,9 @@ Inversion invert_access(const AccessQuery& query) {
     }
     return result;
   } catch (const isl::exception& e) {
-    return {{scatter_access(query)}, text("isl gave up: ", e.what())};
+    return {
+        {scatter_access(query)},
+        text("the search for the points that read an element was given up (isl: ", e.what(), ")")};
   }
 }
 

@@ -14,6 +14,7 @@
 #include <string>
 #include <vector>
 
+#include "autodiff/isl_budget.h"
 #include "frontend/function.h"
 #include "ir/expr.h"
 #include "ir/visit.h"
@@ -37,6 +38,8 @@ struct AccessQuery {
   std::vector<std::string> target_args;  // pure variables of the target's adjoint, one an index
   std::vector<LoopVariable>
       region;  // of the target; may be empty (unknown). Assumed not to be an empty set.
+  // Work for each part of the search (isl_budget.h); when it is not enough: the scatter.
+  unsigned long operations = isl_operations;
 };
 
 // One way in which elements are read: g_adj(lhs...) += sum over rvars where predicate of

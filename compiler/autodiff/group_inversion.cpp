@@ -82,8 +82,11 @@ struct Plan {
 
 class GroupInverter {
  public:
-  GroupInverter(const Group& group, const std::vector<Expr>& fixed)
-      : group_(group), bridge_(context_, names_of(group.vars)), domain_(bridge_.universe()) {
+  GroupInverter(const Group& group, const std::vector<Expr>& fixed, unsigned long operations)
+      : context_(operations),
+        group_(group),
+        bridge_(context_, names_of(group.vars)),
+        domain_(bridge_.universe()) {
     for (const Expr& e : fixed) bridge_.make_parameter(e);
     build_domain();
     for (const Expr& index : group.indices) affine_.push_back(*bridge_.affine(index));
@@ -468,8 +471,9 @@ class GroupInverter {
 std::string element_name(int d) { return "element$" + std::to_string(d); }
 std::string rho_name(const std::string& stage_var) { return "rho$" + stage_var; }
 
-std::vector<GroupPiece> invert_group(const Group& group, const std::vector<Expr>& fixed) {
-  return GroupInverter(group, fixed).run();
+std::vector<GroupPiece> invert_group(const Group& group, const std::vector<Expr>& fixed,
+                                     unsigned long operations) {
+  return GroupInverter(group, fixed, operations).run();
 }
 
 }  // namespace retrograde::ir

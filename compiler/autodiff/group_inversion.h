@@ -38,7 +38,8 @@ struct Group {
 };
 
 // Every point of the group's domain is in exactly one piece. `fixed`: sub-expressions that are
-// parameters.
-std::vector<GroupPiece> invert_group(const Group& group, const std::vector<Expr>& fixed);
+// parameters. `operations`: see AccessQuery.
+std::vector<GroupPiece> invert_group(const Group& group, const std::vector<Expr>& fixed,
+                                     unsigned long operations);
 
 }  // namespace retrograde::ir

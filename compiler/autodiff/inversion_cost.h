@@ -11,6 +11,8 @@ namespace retrograde::ir {
 // element once, so it may cost several times as many iterations. Extents that are no constants
 // count as equal on both sides: then the gather stays.
 constexpr double dearer = 32;
+// Nor may the search for it take longer than compiling the scatter does: some tenths of a second.
+constexpr unsigned long worthwhile_operations = 150'000;
 Inversion invert_or_scatter(const AccessQuery& query);
 
 }  // namespace retrograde::ir

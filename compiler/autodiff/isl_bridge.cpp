@@ -12,12 +12,7 @@
 
 namespace retrograde::ir {
 
-namespace {
-// Work that isl may do for one inversion; beyond it the caller falls back to a scatter.
-constexpr unsigned long max_operations = 20'000'000;
-}  // namespace
-
-IslContext::IslContext() : ctx(isl_ctx_alloc()) {
+IslContext::IslContext(unsigned long max_operations) : ctx(isl_ctx_alloc()) {
   isl_options_set_on_error(ctx, ISL_ON_ERROR_CONTINUE);
   isl_ctx_set_max_operations(ctx, max_operations);
 }

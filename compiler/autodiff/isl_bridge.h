@@ -14,13 +14,14 @@
 #include <string>
 #include <vector>
 
+#include "autodiff/isl_budget.h"
 #include "ir/equal.h"
 #include "ir/expr.h"
 
 namespace retrograde::ir {
 
 struct IslContext {
-  IslContext();
+  explicit IslContext(unsigned long max_operations = isl_operations);
   ~IslContext();
   IslContext(const IslContext&) = delete;
   IslContext& operator=(const IslContext&) = delete;

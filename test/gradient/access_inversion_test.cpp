@@ -371,17 +371,27 @@ TEST(AccessInversion, SlicedGridGathersPixelsOfACell) {
 
 // A box around the points that read an element would be far larger than those.
 TEST(AccessInversion, ScattersWhereTheInverseIsDearer) {
-  Case k = make_case({loop("x", 0, 511)}, {(13 * x) % 64 + x / 64});
-  k.query.region = {loop("y0", 0, 70)};
+  Case k = make_case({loop("x", 0, 1023)}, {(3 * x) % 32 + x / 32});
+  k.query.region = {loop("y0", 0, 62)};
   Inversion gathered = invert_access(k.query), chosen = invert_or_scatter(k.query);
   EXPECT_TRUE(all_gather(gathered));
   EXPECT_GT(iterations(gathered, {})[0], 256);
   ASSERT_EQ(chosen.gathers.size(), 1u);
   EXPECT_TRUE(chosen.gathers[0].scatters);
-  EXPECT_NE(chosen.note.find("for 512 points"), std::string::npos) << chosen.note;
+  EXPECT_NE(chosen.note.find("for 1024 points"), std::string::npos) << chosen.note;
   Case cheap = make_case({x10, r3}, {2 * x + r});
   cheap.query.region = {loop("y0", 0, 20)};
   EXPECT_FALSE(invert_or_scatter(cheap.query).gathers[0].scatters);
+}
+
+// It took half a minute to find gathers for such an access.
+TEST(AccessInversion, ScattersWhereTheSearchTakesTooLong) {
+  Case k = make_case({loop("x", 0, 63)}, {((7 * x) % 16) * 32 + (x / 3) % 32 + x % 5});
+  EXPECT_EQ(k.query.operations, isl_operations);
+  Inversion chosen = invert_or_scatter(k.query);
+  ASSERT_EQ(chosen.gathers.size(), 1u);
+  EXPECT_TRUE(chosen.gathers[0].scatters);
+  EXPECT_NE(chosen.note.find("was given up"), std::string::npos) << chosen.note;
 }
 
 // Random quasi-affine accesses, by enumeration.
