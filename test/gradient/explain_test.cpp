@@ -42,20 +42,32 @@ TEST(Explain, ScattersSayWhichDataDecide) {
 }
 
 TEST(Explain, DearGathersSayWhatTheyWouldCost) {
-  Buffer<float> a = line(71);
+  Buffer<float> a = line(63);
   Func f("explained_f");
-  f(x) = a((13 * x) % 64 + x / 64);
-  Derivative d = propagate_adjoints(weighted_sum(f, {512}));
-  expect_line(d, Explanation::Kind::Scattered, a.name(), "iterations for 512 points");
+  f(x) = a((3 * x) % 32 + x / 32);
+  Derivative d = propagate_adjoints(weighted_sum(f, {1024}));
+  expect_line(d, Explanation::Kind::Scattered, a.name(), "iterations for 1024 points");
 }
 
-TEST(Explain, TapesSayWhatTheyKeep) {
+TEST(Explain, FoldsSayWhatTheyKeep) {
   Buffer<float> a = line(6);
   Func f("explained_f");
   RDom r(0, 6);
   f() = 1.0f;
   f() *= a(r);
   Derivative d = propagate_adjoints(f, {.overwritten = Overwritten::Store});
+  expect_line(d, Explanation::Kind::Version, f.name(), "keeps 4 bytes in each iteration");
+  expect_line(d, Explanation::Kind::Version, f.name(), "folds its domain into each element");
+}
+
+TEST(Explain, TapesSayWhatTheyKeep) {
+  Buffer<float> a = line(6);
+  Buffer<int> at = places(6, 3);
+  Func f("explained_f");
+  RDom r(0, 6);
+  f(x) = 1.0f;
+  f(clamp(at(r), 0, 2)) *= a(r);
+  Derivative d = propagate_adjoints(weighted_sum(f, {3}), {.overwritten = Overwritten::Store});
   expect_line(d, Explanation::Kind::Version, f.name(),
               "keeps 1 place of 4 bytes in each iteration");
   expect_line(d, Explanation::Kind::Version, f.name(), "is run backward");
