@@ -3,6 +3,7 @@
 #include "autodiff/custom_rules.h"
 #include "autodiff/derivative_rules.h"
 #include "autodiff/explain_costs.h"
+#include "autodiff/fold_time.h"
 #include "autodiff/input_shape.h"
 #include "autodiff/synthesis.h"
 #include "frontend/define.h"
@@ -66,8 +67,10 @@ Expr seed_value(const Func& output, size_t k, const Expr& value) {
 }
 
 Derivative run(const ir::Seed& seed, const AdjointOptions& options) {
-  auto result =
-      std::make_shared<ir::SynthesisResult>(ir::synthesize_adjoints(seed, to_synthesis(options)));
+  const ir::SynthesisOptions how = to_synthesis(options);
+  auto result = std::make_shared<ir::SynthesisResult>(how.checkpoints.is_given()
+                                                          ? ir::synthesize_folded(seed, how)
+                                                          : ir::synthesize_adjoints(seed, how));
   for (const AdjointInput& input : options.wrt) result->requested.push_back(input.symbol());
   return Derivative(result);
 }

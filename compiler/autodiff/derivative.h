@@ -115,7 +115,10 @@ struct AdjointOptions {
   // steps, r n - C(s + r, r - 1) for C(s + r - 1, s) < n <= C(s + r, s) (revolve: A. Griewank, A.
   // Walther, Algorithm 799, ACM Transactions on Mathematical Software 26(1), 2000). n may be known
   // at run time only: a Param, an extent of an input. Then a table of about (r + 3) n rows of 12
-  // bytes is made as the pipeline runs; a call whose n needs more than 2^24 rows fails. Gradients
+  // bytes is made as the pipeline runs; a call whose n needs more than 2^24 rows fails. A Func that
+  // keeps its steps along a dimension of its own, f(x, t + 1) = g(f(x, t)), is run the same way where
+  // others read its last steps only (fold_time.h): then it has no adjoint of its own, unless it is in
+  // `wrt`. Where every step is read it keeps them, and explain() says so. Gradients
   // are the same bits for every budget; other updates follow `overwritten`. Give one: the number of
   // states kept, at least 1, or the bytes that they may take, enough for one.
   std::optional<int> checkpoint_states = {};

@@ -126,6 +126,12 @@ std::optional<UpdateRelations::Read> UpdateRelations::read(const std::vector<Exp
   return r;
 }
 
+bool UpdateRelations::sees_new_unless(const Read& read, const Expr& condition) {
+  auto excepted = bridge_.condition(condition);
+  return domain_.subtract(read.sees_new)
+      .is_subset(excepted ? *excepted : domain_.subtract(domain_));
+}
+
 bool UpdateRelations::may_write(const Read& read, const IterationDomain& other,
                                 const std::vector<Expr>& other_write) const {
   IslBridge bridge = bridge_.with_dims(names_of(other.vars));

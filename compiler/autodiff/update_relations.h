@@ -39,6 +39,8 @@ class UpdateRelations {
     Expr sees_new_condition;
   };
   std::optional<Read> read(const std::vector<Expr>& indices);
+  // Whether every iteration reads what an earlier one wrote, but for those where `condition` holds.
+  bool sees_new_unless(const Read& read, const Expr& condition);
   // Whether one of the elements read may be written by another stage, given its domain and
   // left-hand side.
   bool may_write(const Read& read, const IterationDomain& other,

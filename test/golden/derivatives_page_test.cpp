@@ -78,8 +78,11 @@ mode use the same partials, so they are transposes of each other at every point,
   of an input: then the pipeline finds r and the schedule itself. Time is the outermost reduction
   variable; gradients are the same bits for every s. What steps give to inputs without a time axis is
   summed inside, last step first, and from 4,096 steps on with what rounding lost beside it. A Func
-  with a time axis of its own, `f(x, t + 1) = g(f(x, t))`, keeps its steps itself: the budget does not
-  apply, and `Derivative::explain()` says so.
+  with a time axis of its own, `f(x, t + 1) = g(f(x, t))`, of which others read the last steps only, is
+  folded first: a state is as many slices as a step looks back. Its adjoint is made when `wrt` names it;
+  then, or when others read every step, it keeps its steps itself, the budget does not apply, and
+  `Derivative::explain()` says so. To read every step within a budget, add up in the loop what is read
+  of each: `f(x) = Tuple(g(f(x)[0], t), f(x)[1] + loss(f(x)[0], t))`.
 - **Costs.** `Derivative::explain()` tells of every Func of a gradient whether it is stored or computed
   again, with bytes and operations; `Derivative::operations()` gives the numbers and their ratio.
 - **ULP** is the largest error of a partial in float32, in units in the last place, on test points inside

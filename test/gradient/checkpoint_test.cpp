@@ -337,20 +337,6 @@ TEST(Checkpoints, ExplainSaysWhatIsKeptAndWhatIsComputedAgain) {
                                 "15 steps computed again beside the 10 that are reversed"});
 }
 
-TEST(Checkpoints, ABudgetThatAFuncWithATimeAxisDoesNotUseIsExplained) {
-  Buffer<float> start = line(5);
-  Func u("long_u");
-  RDom t(0, 6);
-  u(x, y) = start(x);
-  u(x, t + 1) = 0.5f * sin(u(x, t));
-  Func last("last");
-  last(x) = u(x, 6);
-  Func loss = weighted_sum(last, {5});
-  Derivative d = propagate_adjoints(loss, {.checkpoint_states = 2});
-  expect_mentions(d.explain(), {"the budget for checkpoints is not used", "written in place"});
-  expect_gradient(loss, start, {.checkpoint_states = 2});
-}
-
 TEST(Checkpoints, ALoopOfOneStepNeedsNoCheckpointAndIsNoError) {
   Program p = number(1);
   expect_gradient(p.loss, p.inputs[0], {.checkpoint_states = 3});

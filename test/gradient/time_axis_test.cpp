@@ -1,0 +1,270 @@
+// Loops over time that keep every step along an axis of their own, of which the last are read, run
+// backward from a few kept states. Oracles: central differences; the gradient without a budget, bit
+// by bit; the memory that the profiler sees.
+#include "gradient/programs_suite.h"
+#include "support/errors.h"
+
+namespace retrograde::gradient {
+namespace {
+
+Var x("x"), y("y"), t("t");
+
+Program at_own_place(int n) {
+  Buffer<float> start = line(7), force = plane(7, n, 4);
+  Func u("u"), last("last");
+  RDom r(0, n);
+  u(x, t) = 0.0f;
+  u(x, 0) = start(x);
+  u(x, r + 1) = u(x, r) + 0.25f * (force(x, r) - sin(u(x, r)));
+  last(x) = u(x, n);
+  return {weighted_sum(last, {7}), {start, force}};
+}
+
+// Every element of an image is the start of its own scan: its pure definition is overwritten.
+Program filter_along_an_image(int n) {
+  Buffer<float> image = plane(5, n + 1, 4), c = line(2, 6);
+  Func f("f"), last("last");
+  RDom r(1, n);
+  f(x, y) = image(x, y);
+  f(x, r) = c(Expr(0)) * f(x, r) + 0.5f * c(Expr(1)) * sin(f(x, r - 1));
+  last(x) = f(x, n);
+  return {weighted_sum(last, {5}), {image, c}};
+}
+
+Program two_steps_back(int n) {
+  Buffer<float> start = plane(6, 2, 4), speed = line(6, 5);
+  Func u("u"), last("last");
+  RDom r(1, n);
+  u(x, t) = start(x, clamp(t, 0, 1));
+  u(x, r + 1) = 2.0f * u(x, r) - u(x, r - 1) - 0.25f * speed(x) * sin(u(x, r));
+  last(x) = u(x, n + 1);
+  return {weighted_sum(last, {6}), {start, speed}};
+}
+
+// Elements at the border are 0 at every step but the first.
+Program stencil_with_a_border(int n) {
+  Buffer<float> start = line(9), k = line(9, 3);
+  Func u("u"), last("last");
+  RDom r(1, 7, 0, n);
+  u(x, t) = 0.125f;
+  u(x, 0) = start(x);
+  Expr here = u(r.x, r.y);
+  u(r.x, r.y + 1) =
+      here + 0.25f * k(r.x) * (u(r.x - 1, r.y) - 2.0f * here + u(r.x + 1, r.y)) * here;
+  last(x) = u(x, n);
+  return {weighted_sum(last, {9}), {start, k}};
+}
+
+// The last two steps, of a Tuple, through other Funcs.
+Program tuple_and_its_last_difference(int n) {
+  Buffer<float> angle = line(5), gravity = line(5, 9);
+  Func u("u"), energy("energy"), end("end");
+  RDom r(0, n);
+  u(x, t) = Tuple(angle(x), 0.0f);
+  Expr speed = u(x, r)[1] - 0.25f * gravity(x) * sin(u(x, r)[0]);
+  u(x, r + 1) = Tuple(u(x, r)[0] + 0.25f * speed, speed);
+  energy(x) = u(x, n)[1] * u(x, n)[1] + u(x, n)[0];
+  end(x) = energy(x) + gravity(x) * (u(x, n)[0] - u(x, n - 1)[0]);
+  return {weighted_sum(end, {5}), {angle, gravity}};
+}
+
+Program backward_in_time(int n) {
+  Buffer<float> reward = plane(6, n, 4), end = line(6, 4);
+  Func v("v"), first("first");
+  RDom r(0, 6, 0, n);
+  v(x, t) = end(x);
+  Expr now = n - 1 - r.y;
+  v(r.x, now) = reward(r.x, now) + 0.5f * sin(v(r.x, now + 1)) * v((r.x + 1) % 6, now + 1);
+  first(x) = v(x, 0);
+  return {weighted_sum(first, {6}), {reward, end}};
+}
+
+// Each step sweeps a row in place: reads of this step and of the one before.
+Program sweep_within_a_step(int n) {
+  Buffer<float> start = line(8), w = line(3, 4);
+  Func u("u"), last("last");
+  RDom r(1, 6, 0, n);
+  u(x, t) = start(x);
+  u(r.x, r.y + 1) = 0.25f * w(Expr(0)) * u(r.x - 1, r.y + 1) + 0.25f * sin(u(r.x, r.y)) +
+                    0.125f * w(Expr(1)) * u(r.x + 1, r.y);
+  last(x) = u(x, n);
+  return {weighted_sum(last, {8}), {start, w}};
+}
+
+// The second loop starts where the first one ends.
+Program one_loop_after_another(int n) {
+  Buffer<float> start = line(5), gain = random_image({5}, 0.25, 0.75, 7);
+  Func u("u"), v("v"), last("last");
+  RDom r(0, n), s(0, n + 1);
+  u(x, t) = start(x);
+  u(x, r + 1) = u(x, r) * gain(x) + 0.25f * sin(u(x, r));
+  v(x, t) = u(x, n);
+  v(x, s + 1) = cos(v(x, s)) * gain(x);
+  last(x) = v(x, n + 1);
+  return {weighted_sum(last, {5}), {start, gain}};
+}
+
+// A matrix applied again and again: several iterations add up an element.
+Program power_of_a_matrix(int n) {
+  Buffer<float> m = random_image({3, 3}, -1, 1, 12), start = line(3);
+  Func v("v"), last("last");
+  RDom r(0, 3, 0, 3, 0, n);
+  v(x, t) = select(t == 0, start(clamp(x, 0, 2)), 0.0f);
+  v(r.y, r.z + 1) += m(r.x, r.y) * sin(v(r.x, r.z));
+  last(x) = v(x, n);
+  return {weighted_sum(last, {3}), {start, m}};
+}
+
+struct Case {
+  const char* name;
+  Program (*build)(int n);
+};
+const Case cases[] = {{"at_own_place", at_own_place},
+                      {"filter_along_an_image", filter_along_an_image},
+                      {"two_steps_back", two_steps_back},
+                      {"stencil_with_a_border", stencil_with_a_border},
+                      {"tuple_and_its_last_difference", tuple_and_its_last_difference},
+                      {"backward_in_time", backward_in_time},
+                      {"sweep_within_a_step", sweep_within_a_step},
+                      {"one_loop_after_another", one_loop_after_another},
+                      {"power_of_a_matrix", power_of_a_matrix}};
+
+TEST(TimeAxis, GradientsAgreeWithCentralDifferences) {
+  for (const Case& c : cases) {
+    SCOPED_TRACE(c.name);
+    Program p = c.build(6);
+    Derivative d = propagate_adjoints(p.loss, {.checkpoint_states = 2});
+    expect_mentions(d.explain(), {"others read its last steps only", "2 kept states"});
+    for (Buffer<float>& input : p.inputs) expect_gradient(p.loss, d, input);
+  }
+}
+
+std::vector<float> gradient_of(const Derivative& d, const Buffer<float>& input) {
+  oracle::Region region = oracle::region_of(*input.raw_buffer());
+  oracle::Array array = oracle::Interpreter(oracle::InterpreterOptions{})
+                            .realize(d(input).function(), region)
+                            .front();
+  std::vector<float> result;
+  for (const oracle::Value& v : array.values)
+    result.push_back(static_cast<float>(v.scalar.as_double()));
+  return result;
+}
+
+// In float32, operation by operation, as the gradient that keeps all steps; what every step reads
+// is summed in another order.
+TEST(TimeAxis, GradientsAreThoseOfAllStepsKept) {
+  for (const Case& c : cases) {
+    for (int n : {1, 2, 3, 12}) {
+      Program p = c.build(n);
+      Derivative all = propagate_adjoints(p.loss, {.overwritten = Overwritten::Store});
+      for (int s : {1, 3, 20}) {
+        SCOPED_TRACE(text(c.name, ", ", n, " steps, ", s, " states"));
+        Derivative d = propagate_adjoints(p.loss, {.checkpoint_states = s});
+        for (const Buffer<float>& input : p.inputs) {
+          std::vector<float> found = gradient_of(d, input), expected = gradient_of(all, input);
+          for (size_t i = 0; i < found.size(); ++i)
+            EXPECT_NEAR(found[i], expected[i], 4e-6 * (1 + std::abs(expected[i])));
+        }
+      }
+    }
+  }
+}
+
+int64_t peak_memory(const Derivative& d, const Buffer<float>& input) {
+  Func gradient = d(input);
+  std::string report;
+  gradient.jit_handlers().print = [&](const char* text) { report += text; };
+  gradient.realize({input.width()},
+                   get_jit_target_from_environment().with_feature(Target::Profile));
+  size_t at = report.find("peak memory: ");
+  EXPECT_NE(at, std::string::npos) << report;
+  return at == std::string::npos ? 0 : std::stoll(report.substr(at + 13));
+}
+
+// One slice a state, however many steps: the loss, which is not linear, reads the last step too.
+TEST(TimeAxis, MemoryIsThatOfTheKeptSlices) {
+  Buffer<float> start = line(100);
+  auto peak = [&](int n, int states) {
+    Func u("u"), last("last");
+    RDom r(0, n);
+    u(x, t) = start(x);
+    u(x, r + 1) = u(x, r) + 0.125f * sin(u(x, r) + cast<float>(r));
+    last(x) = u(x, n);
+    return peak_memory(propagate_adjoints(weighted_sum(last, {100}),
+                                          {.wrt = {start}, .checkpoint_states = states}),
+                       start);
+  };
+  int64_t ten = peak(500, 10);
+  EXPECT_LT(ten, 20 * 400);
+  EXPECT_EQ(peak(1000, 10), ten);
+  EXPECT_EQ(peak(500, 20), ten + 10 * 400);
+}
+
+TEST(TimeAxis, TheNumberOfStepsMayBeAParam) {
+  Buffer<float> c = line(9), a = random_image({5}, 0.25, 1, 6);
+  Param<int> n("n");
+  Func f("f"), last("last");
+  RDom r(0, n);
+  f(x, t) = 0.5f;
+  f(x, r + 1) = f(x, r) * a(x) + c(clamp(n - 1 - r, 0, 8));
+  last(x) = f(x, n);
+  Func loss = weighted_sum(last, {5});
+  Derivative d = propagate_adjoints(loss, {.checkpoint_states = 2});
+  expect_mentions(d.explain(), {"_folded", "a loop of n steps"});
+  for (int steps : {0, 1, 2, 9}) {
+    SCOPED_TRACE(steps);
+    n.set(steps);
+    expect_gradient(loss, d, a);
+    expect_gradient(loss, d, c);
+  }
+}
+
+// Adjoints of Funcs between the loop and the output are found by the user's Funcs.
+TEST(TimeAxis, FuncsBehindTheLoopHaveTheirAdjoints) {
+  Func u("u"), last("last");
+  Buffer<float> start = line(7);
+  RDom r(0, 5);
+  u(x, t) = start(x);
+  u(x, r + 1) = u(x, r) + 0.25f * sin(u(x, r));
+  last(x) = u(x, 5);
+  Func loss = weighted_sum(last, {7});
+  Derivative d = propagate_adjoints(loss, {.checkpoint_states = 2});
+  Derivative all = propagate_adjoints(loss);
+  ASSERT_TRUE(d(last).defined());
+  EXPECT_FALSE(d(u).defined()) << d.explain();
+  Buffer<float> found = d(last).realize({7}), expected = all(last).realize({7});
+  for (int i = 0; i < 7; ++i) EXPECT_EQ(found(i), expected(i));
+  // Who asks for the adjoint of every step gets it, and the memory for it.
+  Derivative asked = propagate_adjoints(loss, {.wrt = {u}, .checkpoint_states = 2});
+  EXPECT_TRUE(asked(u).defined());
+}
+
+// Whether a step writes, data decide: which slot holds what is not known.
+TEST(TimeAxis, WithStepsThatDataSkipIsLeftAsItIs) {
+  Buffer<float> start = line(5), gate = line(6, 4);
+  Func u("u"), last("last");
+  RDom r(0, 6);
+  r.where(gate(r) > 1.0f);
+  u(x, t) = start(x) * cast<float>(t + 1);
+  u(x, r + 1) = u(x, r + 1) * 0.5f + 0.25f * sin(u(x, r));
+  last(x) = u(x, 6);
+  Func loss = weighted_sum(last, {5});
+  Derivative d = propagate_adjoints(loss, {.checkpoint_states = 2});
+  EXPECT_EQ(d.explain().find("last steps only"), std::string::npos) << d.explain();
+  expect_gradient(loss, d, start);
+}
+
+TEST(TimeAxis, WhoseEveryStepIsReadIsLeftAsItIs) {
+  Buffer<float> start = line(5);
+  Func u("u");
+  RDom r(0, 6);
+  u(x, t) = start(x);
+  u(x, r + 1) = 0.5f * sin(u(x, r));
+  Func loss = weighted_sum(u, {5, 7});
+  Derivative d = propagate_adjoints(loss, {.checkpoint_states = 2});
+  expect_mentions(d.explain(), {"the budget for checkpoints is not used"});
+  expect_gradient(loss, d, start);
+}
+
+}  // namespace
+}  // namespace retrograde::gradient
