@@ -50,6 +50,9 @@ class Inverter {
     if (const auto* both = e.as<And>()) {
       split_conjunction(both->a);
       split_conjunction(both->b);
+    } else if (const auto* n = e.as<Not>(); n && n->a.as<Or>()) {
+      split_conjunction(!n->a.as<Or>()->a);
+      split_conjunction(!n->a.as<Or>()->b);
     } else {
       conjuncts_.push_back(e);
     }

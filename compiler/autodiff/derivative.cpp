@@ -1,10 +1,8 @@
 #include "autodiff/derivative.h"
 
-#include "autodiff/custom_rules.h"
 #include "autodiff/derivative_rules.h"
 #include "autodiff/explain_costs.h"
 #include "autodiff/fold_time.h"
-#include "autodiff/input_shape.h"
 #include "autodiff/synthesis.h"
 #include "frontend/define.h"
 #include "ir/build.h"
@@ -109,13 +107,8 @@ Func Derivative::operator()(const Func& func, int update_id) const {
                "Name one of them, or -1 for the pure definition");
   }
   auto it = result_->after_stage.find({func.function().get(), update_id + 1});
-  return it == result_->after_stage.end() ? absent(*func.function()) : Func(it->second);
-}
-
-Func Derivative::absent(const ir::Symbol& input) const {
-  const bool is_zero = result_->everything_requested && !result_->reached.contains(&input) &&
-                       ir::shape_of(&input).is_floating();
-  return Func(is_zero ? ir::zero_derivative(input, "_adj") : std::make_shared<ir::FuncContents>());
+  return it == result_->after_stage.end() ? Func(std::make_shared<ir::FuncContents>())
+                                          : Func(it->second);
 }
 
 Func Derivative::adjoint(const Func& func) const {
@@ -134,7 +127,8 @@ Func Derivative::of(const AdjointInput& input) const {
 
 Func Derivative::of_parameter(const ir::ParameterContents& parameter) const {
   auto it = result_->parameters.find(&parameter);
-  return it == result_->parameters.end() ? absent(parameter) : Func(it->second);
+  return it == result_->parameters.end() ? Func(std::make_shared<ir::FuncContents>())
+                                         : Func(it->second);
 }
 Func Derivative::operator()(const Buffer<>& buffer) const {
   return of_parameter(*buffer.parameter());

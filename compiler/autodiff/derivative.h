@@ -48,8 +48,10 @@ class Derivative {
 
   // The adjoint of `func` as it is after update definition `update_id`; -1: after its pure
   // definition. For a Func that is only accumulated into, all of these are the same. An undefined
-  // Func when there is none: integers, and what was not requested. Zero everywhere when the output
-  // does not depend on it. CompileError when there is no such update.
+  // Func when there is none: integers, what was not requested, and, unless requested by name, what
+  // the output does not mention: a Buffer that is bound to an ImageParam is something else than the
+  // ImageParam. Zero everywhere when the output does not depend on it. CompileError when there is
+  // no such update.
   Func operator()(const Func& func, int update_id = -1) const;
   Func operator()(const Buffer<>& buffer) const;
   Func operator()(const ImageParam& image) const;
@@ -80,7 +82,6 @@ class Derivative {
 
  private:
   Func of_parameter(const ir::ParameterContents& parameter) const;
-  Func absent(const ir::Symbol& input) const;  // the adjoint of what has none
   std::shared_ptr<const ir::SynthesisResult> result_;
 };
 

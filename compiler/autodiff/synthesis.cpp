@@ -347,14 +347,39 @@ class Synthesis {
     AdjointTarget target =
         as_parameter(symbol) ? target_of(*as_parameter(symbol)) : target_of(*func_of(*call));
     AccessQuery query{domain, call ? call->args : std::vector<Expr>{}, target.args, target.region};
-    const Inversion& inversion = invert_cached(f, symbol, query);
-    if (!inversion.note.empty())
+    const Inversion* inversion = invert_where_selected(f, symbol, query, leaf.adjoint);
+    if (!inversion) inversion = &invert_cached(f, symbol, query);
+    if (!inversion->note.empty())
       explain(Explanation::Kind::Scattered, target.name,
-              text("read by ", quoted(f->name), ": ", inversion.note));
-    for (const Gather& g : inversion.gathers) {
+              text("read by ", quoted(f->name), ": ", inversion->note));
+    for (const Gather& g : inversion->gathers) {
       pending_[symbol].push_back(
           {call ? call->value_index : 0, g, substitute(leaf.adjoint, g.iteration)});
     }
+  }
+
+  // Where a selection makes the adjoint 0, the read does not count. That turns the many pieces of
+  // a clamped read into one: select(x < 0 || x > 9, 0, a(clamp(x, 0, 9))). Null: no such thing.
+  const Inversion* invert_where_selected(const FuncPtr& f, const Symbol* symbol, AccessQuery query,
+                                         const Expr& adjoint) {
+    const bool chooses = std::any_of(query.indices.begin(), query.indices.end(), [](const Expr& e) {
+      bool found = false;
+      walk(e, [&](const Expr& node) {
+        found |= node.as<Min>() || node.as<Max>() || node.as<Select>();
+        return !found;
+      });
+      return found;
+    });
+    const auto* selection = adjoint.as<Select>();
+    if (!chooses || !selection) return nullptr;
+    Expr counts = is_zero(selection->true_value)    ? !selection->condition
+                  : is_zero(selection->false_value) ? selection->condition
+                                                    : Expr();
+    if (!counts.defined() || calls(counts, f.get())) return nullptr;
+    Expr& predicate = query.domain.predicate;
+    predicate = predicate.defined() ? predicate && counts : counts;
+    const Inversion& inversion = invert_cached(f, symbol, query);
+    return inversion.note.empty() && inversion.gathers.size() == 1 ? &inversion : nullptr;
   }
 
   // Accesses of one stage often share their indices; the inversion is the expensive part.
@@ -484,12 +509,12 @@ class Synthesis {
   }
   // What was asked for and has nothing to do with the output.
   void explain_strangers() {
-    for (const FuncPtr& f : order_) result_.reached.insert(f.get());
-    for (const auto& p : parameters_of({seed_.output})) result_.reached.insert(p.get());
-    result_.everything_requested = !options_.only_requested;
+    std::unordered_set<const Symbol*> reached;
+    for (const FuncPtr& f : order_) reached.insert(f.get());
+    for (const auto& p : parameters_of({seed_.output})) reached.insert(p.get());
     std::map<std::string, const Symbol*> strangers;  // by name: in an order that is always the same
     for (const Symbol* symbol : options_.requested) {
-      if (symbol && !result_.reached.contains(symbol)) strangers[shape_of(symbol).name] = symbol;
+      if (symbol && !reached.contains(symbol)) strangers[shape_of(symbol).name] = symbol;
     }
     for (const auto& [name, symbol] : strangers) {
       const InputShape shape = shape_of(symbol);

@@ -100,13 +100,15 @@ Func constant_exterior(const Func& source, const Tuple& value, const Region& bou
                     " constants"));
   }
   const std::vector<Var> args = source.args();
+  std::vector<Expr> at(args.begin(), args.end());
   Expr outside = ir::const_false();
   for (size_t d = 0; d < bounds.size(); d++) {
     if (!is_bounded(bounds[d])) continue;
-    const Expr x = args[d], min = as_int(bounds[d].min);
-    outside = outside || x < min || x >= min + as_int(bounds[d].extent);
+    const Expr x = args[d], min = as_int(bounds[d].min), extent = as_int(bounds[d].extent);
+    outside = outside || x < min || x >= min + extent;
+    at[d] = edge(x, min, extent);
   }
-  const Tuple inside = repeat_edge(source, bounds)(args);
+  const Tuple inside = source(at);
   std::vector<Expr> values;
   for (size_t i = 0; i < value.size(); i++) {
     const Expr constant = cast(source.output_types()[i], value[i]);
