@@ -16,10 +16,12 @@ namespace retrograde::ir {
 
 namespace {
 
-// Beyond so many pieces a relation becomes its convex hull, and beyond so many conditions those
-// inside of others do not count: both stay supersets.
+// Beyond so many pieces a relation becomes its hull, and beyond so many conditions those inside of
+// others do not count: both stay supersets.
 constexpr int many_pieces = 24;
 constexpr size_t many_conditions = 64;
+// The search for pieces that are one: some hundredths of a second.
+constexpr unsigned long coalescing_operations = 20'000;
 
 unsigned size_of(size_t n) { return static_cast<unsigned>(n); }
 
@@ -36,10 +38,30 @@ isl::map without_parameters(const isl::map& m) {
                                          size_of(isl_map_dim(m.get(), isl_dim_param))));
 }
 
+isl::map hull_of(const isl::map& m) {
+  return isl::manage(isl_map_from_basic_map(isl_map_simple_hull(m.copy())));
+}
+
+// Fewer pieces of the same, when they are found soon.
+std::optional<isl::map> coalesced_soon(const isl::map& m) {
+  isl_ctx* ctx = isl_map_get_ctx(m.get());
+  isl_ctx_reset_operations(ctx);
+  isl_ctx_set_max_operations(ctx, coalescing_operations);
+  std::optional<isl::map> result;
+  try {
+    result = m.coalesce();
+  } catch (const isl::exception&) {
+    isl_ctx_reset_error(ctx);
+  }
+  isl_ctx_reset_operations(ctx);
+  isl_ctx_set_max_operations(ctx, isl_operations);
+  return result;
+}
+
 isl::map tidy(const isl::map& m) {
-  isl::map result = m.coalesce();
-  if (isl_map_n_basic_map(result.get()) <= many_pieces) return result;
-  return isl::manage(isl_map_from_basic_map(isl_map_simple_hull(result.copy())));
+  if (isl_map_n_basic_map(m.get()) <= 1) return m;
+  const isl::map result = coalesced_soon(m).value_or(m);
+  return isl_map_n_basic_map(result.get()) <= many_pieces ? result : hull_of(m);
 }
 
 bool reads_func(const Expr& e, const Symbol* f) {
