@@ -17,8 +17,13 @@ constexpr size_t longest_detail = 600;  // internal errors carry whole programs
 
 class Judge {
  public:
-  Judge(const AdversaryProgram& program, uint64_t seed, bool machine_code, unsigned& checked)
-      : p_(program), s_{program, Weights(seed)}, machine_code_(machine_code), checked_(checked) {}
+  Judge(const AdversaryProgram& program, const AdversaryProgram* twin, uint64_t seed,
+        bool machine_code, unsigned& checked)
+      : p_(program),
+        twin_(twin),
+        s_{program, Weights(seed)},
+        machine_code_(machine_code),
+        checked_(checked) {}
 
   void run() {
     for (int k = 0; k < p_.output().outputs(); ++k)
@@ -41,7 +46,7 @@ class Judge {
     }
     if (machine_code_) {
       checked_ |= MachineCode;
-      compare_machine_code(s_, *derivative_, gradients_);
+      compare_machine_code(s_, *derivative_, gradients_, twin_);
     }
     if (!is_smooth) decide(Judgement::Kink, "");
   }
@@ -163,6 +168,7 @@ class Judge {
   }
 
   const AdversaryProgram& p_;
+  const AdversaryProgram* twin_;
   Subject s_;
   const bool machine_code_;
   unsigned& checked_;
@@ -198,10 +204,11 @@ const char* name_of(Judgement judgement) {
   return names[static_cast<int>(judgement)];
 }
 
-Judged judge(const AdversaryProgram& program, uint64_t seed, bool machine_code) {
+Judged judge(const AdversaryProgram& program, uint64_t seed, bool machine_code,
+             const AdversaryProgram* twin) {
   unsigned checked = 0;
   Judged result = guard([&] {
-    Judge(program, seed, machine_code, checked).run();
+    Judge(program, twin, seed, machine_code, checked).run();
     return Judged{};
   });
   result.checked = checked;
@@ -209,13 +216,16 @@ Judged judge(const AdversaryProgram& program, uint64_t seed, bool machine_code) 
 }
 
 Judged judge(Choices& choices, bool machine_code) {
-  std::optional<AdversaryProgram> program;
+  std::optional<AdversaryProgram> program, twin;
   Judged made = guard([&] {
     program.emplace(make_program(choices));
+    Choices again(choices.taken());
+    if (machine_code && program->checks.stage) twin.emplace(make_program(again, true));
     return Judged{};
   });
   if (made.judgement == Judgement::Refused) made.judgement = Judgement::Illegal;
-  return program ? judge(*program, 1, machine_code) : made;
+  if (made.judgement != Judgement::Right) return made;
+  return judge(*program, 1, machine_code, twin ? &*twin : nullptr);
 }
 
 }  // namespace retrograde::gradient

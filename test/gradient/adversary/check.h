@@ -34,7 +34,9 @@ const char* name_of(Judgement judgement);
 // the gradient. Jacobians and Hessians: one product for each column. Machine code, when asked for:
 // the gradients in their declared types, within the rounding that the interpreter allows for, with
 // and without a schedule, and the same bits on any number of threads.
-Judged judge(const AdversaryProgram& program, uint64_t seed, bool machine_code);
+// twin: null, or the same program with an extern stage, whose gradients run as machine code.
+Judged judge(const AdversaryProgram& program, uint64_t seed, bool machine_code,
+             const AdversaryProgram* twin = nullptr);
 // The same from choices.
 Judged judge(Choices& choices, bool machine_code);
 

@@ -55,6 +55,19 @@ class Compiled {
     }
   }
 
+  // The same gradients of the same program with an extern stage in it.
+  void compare_twin(const AdversaryProgram& twin) {
+    AdjointOptions options = s_.program.options;
+    for (size_t i = 0; i < twin.images.size(); ++i) options.wrt.push_back(twin.image(i));
+    options.wrt.push_back(twin.scale);
+    const Derivative d = propagate_adjoints(twin.output(), s_.seed, s_.bounds(), options);
+    size_t i = 0;
+    for (const AdjointInput& input : options.wrt) {
+      const Func gradient = d.of(input);
+      if (gradient.defined() && i < gradients_.size()) compare(i++, gradient, ", by a C function");
+    }
+  }
+
  private:
   bool primal_runs() const {
     try {
@@ -68,8 +81,9 @@ class Compiled {
     }
   }
 
-  void compare(size_t i, const std::string& how) {
-    const auto& [gradient, region] = gradients_[i];
+  void compare(size_t i, const std::string& how) { compare(i, gradients_[i].first, how); }
+  void compare(size_t i, const Func& gradient, const std::string& how) {
+    const oracle::Region& region = gradients_[i].second;
     const int threads = 1 << s_.weights.below(4);
     const Buffer<> first = realized(gradient, region, nullptr);
     OwnThreads context(threads, s_.weights.below(2) == 1);
@@ -104,10 +118,16 @@ class Compiled {
 
 }  // namespace
 
-void compare_machine_code(Subject& s, const Derivative& derivative, const Gradients& gradients) {
+void compare_machine_code(Subject& s, const Derivative& derivative, const Gradients& gradients,
+                          const AdversaryProgram* twin) {
   Compiled code(s, gradients);
-  if (code.compare_unscheduled() && s.program.checks.schedule > 0)
-    code.compare_scheduled(derivative);
+  if (!code.compare_unscheduled()) return;
+  try {
+    if (twin) code.compare_twin(*twin);
+  } catch (const UserError&) {  // what a C function reads must have bounds, and no versions
+  } catch (const Unsupported&) {
+  }
+  if (s.program.checks.schedule > 0) code.compare_scheduled(derivative);
 }
 
 }  // namespace retrograde::gradient

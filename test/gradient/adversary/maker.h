@@ -21,8 +21,11 @@ struct Point {
 
 class Maker {
  public:
-  Maker(Choices& choices, AdversaryProgram& program)
-      : c_(choices), p_(program), places_(choices, program.data, program.count) {}
+  Maker(Choices& choices, AdversaryProgram& program, bool as_extern)
+      : c_(choices),
+        p_(program),
+        places_(choices, program.data, program.count),
+        as_extern_(as_extern) {}
   void run();
 
  private:
@@ -74,6 +77,7 @@ class Maker {
   Choices& c_;
   AdversaryProgram& p_;
   Places places_;
+  const bool as_extern_;
   int budget_ = 0;
 };
 

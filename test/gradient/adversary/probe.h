@@ -106,6 +106,8 @@ double precision_of(const Func& output);
 void compare_higher(Subject& s, const Motion& v, const Derivative& derivative);
 void compare_dense(Subject& s);
 using Gradients = std::vector<std::pair<Func, oracle::Region>>;
-void compare_machine_code(Subject& s, const Derivative& derivative, const Gradients& gradients);
+// twin: null, or the same program with a stage that a C function computes.
+void compare_machine_code(Subject& s, const Derivative& derivative, const Gradients& gradients,
+                          const AdversaryProgram* twin);
 
 }  // namespace retrograde::gradient

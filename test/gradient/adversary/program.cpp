@@ -37,9 +37,9 @@ void Maker::choose_checks() {
   p_.checks.wild = c_.chance(20);
 }
 
-AdversaryProgram make_program(Choices& choices) {
+AdversaryProgram make_program(Choices& choices, bool as_extern) {
   AdversaryProgram program;
-  Maker(choices, program).run();
+  Maker(choices, program, as_extern).run();
   return program;
 }
 

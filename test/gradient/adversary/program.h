@@ -32,6 +32,7 @@ struct AdversaryChecks {
   int schedule = 0;     // seed of a schedule of the gradient as machine code; 0: none
   bool primal = false;  // the schedule is given to the primal's Funcs too
   bool wild = false;    // the seed is NaN outside of its region
+  bool stage = false;   // one Func may be an extern stage instead, as machine code
   bool higher = true;   // derivatives of derivatives are those of the values (no stop_gradient)
 };
 
@@ -57,8 +58,9 @@ struct AdversaryProgram {
 // Elements in each dimension of what updates work on.
 constexpr int natural_size = 5;
 
-// UserError: the program is no legal one.
-AdversaryProgram make_program(Choices& choices);
+// UserError: the program is no legal one. as_extern: a C function computes the Func that
+// checks.stage speaks of.
+AdversaryProgram make_program(Choices& choices, bool as_extern = false);
 
 // Every definition that the output depends on, and its inputs.
 std::string to_text(const AdversaryProgram& program);

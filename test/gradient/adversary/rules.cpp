@@ -2,6 +2,7 @@
 #include "autodiff/custom_derivative.h"
 #include "autodiff/straight_through.h"
 #include "autodiff/tangents.h"
+#include "gradient/adversary/extern_stage.h"
 #include "gradient/adversary/maker.h"
 #include "ir/visit.h"
 
@@ -46,7 +47,7 @@ Expr times(const Expr& derivative, const Expr& partial) {
 
 // f(x) = sin(source(x)).
 void give_closed_rule(const Func& f, const Func& source) {
-  custom_adjoint(f, {source}, [source](const AdjointContext& c) {
+  const CustomAdjoint rule = [source](const AdjointContext& c) {
     Func contribution("rule_adj");
     const std::vector<Var> vars = c.adjoint().args();
     std::vector<Expr> values;
@@ -56,7 +57,10 @@ void give_closed_rule(const Func& f, const Func& source) {
     }
     contribution(vars) = Tuple(values);
     return std::vector<AdjointContribution>{{source, contribution}};
-  });
+  };
+  ExternReads reads;
+  if (f.is_extern()) reads = [](const AdjointInput&, const Region& of_func) { return of_func; };
+  custom_adjoint(f, {source}, rule, reads);
   custom_tangent(f, {source}, [source](const TangentContext& c) {
     Func result("rule_tan");
     const Func tangent = c.tangent(source);
@@ -100,16 +104,15 @@ void Maker::add_custom() {
   if (!is_floating(source)) return;
   Func f("ruled" + std::to_string(p_.funcs.size()));
   const std::vector<Var> vars = first_variables(source.dimensions());
-  const bool by_inputs = c_.chance(50);
-  std::vector<Expr> values;
-  for (int k = 0; k < source.outputs(); ++k) {
-    const Expr e = source(vars).element(k);
-    values.push_back(by_inputs ? e : sin(e));
-  }
-  f(vars) = Tuple(values);
   p_.funcs.push_back(f);
-  if (!by_inputs) return give_closed_rule(f, source);
-
+  if (c_.chance(50)) {
+    p_.checks.stage = source.outputs() == 1 && source.type() == Float(32);
+    define_sine(f, source, p_.checks.stage && as_extern_);
+    return give_closed_rule(f, source);
+  }
+  std::vector<Expr> values;
+  for (int k = 0; k < source.outputs(); ++k) values.push_back(source(vars).element(k));
+  f(vars) = Tuple(values);
   std::vector<AdjointInput> inputs;
   const auto parameters = ir::parameters_of({source.function()});
   auto add = [&](const AdjointInput& input) {

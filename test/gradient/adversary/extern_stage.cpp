@@ -1,0 +1,58 @@
+#include "gradient/adversary/extern_stage.h"
+
+#include <HalideRuntime.h>
+
+#include <cmath>
+
+#include "gradient/adversary/maker.h"
+
+namespace {
+
+bool is_query(const halide_buffer_t* b) { return !b->host && !b->device; }
+
+float& element(halide_buffer_t* b, const int* at) {
+  int64_t offset = 0;
+  for (int d = 0; d < b->dimensions; ++d)
+    offset += int64_t{at[d] - b->dim[d].min} * b->dim[d].stride;
+  return reinterpret_cast<float*>(b->host)[offset];
+}
+
+}  // namespace
+
+// out = sin(in), of at most three dimensions: in is needed where out is asked for.
+extern "C" __attribute__((visibility("default"))) int adversary_sine(halide_buffer_t* in,
+                                                                     halide_buffer_t* out) {
+  if (is_query(in)) {
+    for (int d = 0; d < out->dimensions; ++d) {
+      in->dim[d].min = out->dim[d].min;
+      in->dim[d].extent = out->dim[d].extent;
+    }
+    return 0;
+  }
+  int mins[3] = {0, 0, 0}, ends[3] = {1, 1, 1}, at[3];
+  for (int d = 0; d < out->dimensions; ++d) {
+    mins[d] = out->dim[d].min;
+    ends[d] = mins[d] + out->dim[d].extent;
+  }
+  for (at[2] = mins[2]; at[2] < ends[2]; ++at[2])
+    for (at[1] = mins[1]; at[1] < ends[1]; ++at[1])
+      for (at[0] = mins[0]; at[0] < ends[0]; ++at[0]) element(out, at) = std::sin(element(in, at));
+  return 0;
+}
+
+namespace retrograde::gradient {
+
+void define_sine(const Func& f, const Func& source, bool as_extern) {
+  const std::vector<Var> vars = first_variables(source.dimensions());
+  if (!as_extern) {
+    std::vector<Expr> values;
+    for (int k = 0; k < source.outputs(); ++k) values.push_back(sin(source(vars).element(k)));
+    f(vars) = Tuple(values);
+    return;
+  }
+  Func(source).compute_root();
+  Func(f).define_extern("adversary_sine", {source}, Float(32), vars);
+  Func(f).compute_root();
+}
+
+}  // namespace retrograde::gradient
