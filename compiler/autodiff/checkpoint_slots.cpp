@@ -1,5 +1,6 @@
 #include "autodiff/checkpoint_slots.h"
 
+#include "autodiff/numbering.h"
 #include "autodiff/versions.h"
 #include "frontend/expr_ops.h"
 #include "ir/build.h"
@@ -10,6 +11,7 @@ namespace retrograde::ir {
 CheckpointSlots::CheckpointSlots(const UpdateContext& context, const TapeLayout& layout,
                                  const CheckpointPlan& plan, const FuncPtr& machine)
     : c_(context), layout_(layout), plan_(plan), machine_(machine) {
+  check_numbers(c_, least_slots(), "the slots of a loop with checkpoints");
   at_hand_ = simplify(layout_.elements() * 2);
   noted_ = simplify(at_hand_ + 1);
   Expr next = noted_ + plan_.inner_count * static_cast<int>(plan_.places.size());
@@ -21,6 +23,16 @@ CheckpointSlots::CheckpointSlots(const UpdateContext& context, const TapeLayout&
   Expr states = plan_.needs_values() ? Expr(plan_.states) : make_zero(Int(32));
   if (!plan_.constant_steps) states = min(states, max(plan_.steps, 1));
   count_ = simplify(kept_ + layout_.elements() * states);
+}
+
+double CheckpointSlots::least_slots() const {
+  const double inner = least_iterations(plan_.inner);
+  double states = 2 + (plan_.needs_values() && plan_.constant_steps ? plan_.states : 0);
+  double slots = layout_.least_elements() * states + 1;
+  slots += inner * static_cast<double>(plan_.places.size());
+  for (const CheckpointPlan::Given& g : plan_.given)
+    slots += inner * (g.over_time ? plan_.constant_steps.value_or(1) : g.width());
+  return slots;
 }
 
 Expr CheckpointSlots::adjoint(const Expr& element) const { return element + layout_.elements(); }

@@ -33,6 +33,7 @@ class CheckpointSlots {
   std::vector<Expr> all_values(const Expr& slot) const;
 
  private:
+  double least_slots() const;
   const UpdateContext& c_;
   const TapeLayout& layout_;
   const CheckpointPlan& plan_;

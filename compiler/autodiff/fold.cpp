@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "autodiff/adjoint_contents.h"
+#include "autodiff/numbering.h"
 #include "autodiff/versions.h"
 #include "frontend/define.h"
 #include "frontend/var.h"
@@ -23,6 +24,7 @@ class Fold {
         now_(iteration_number(context.definition.rvars)) {}
 
   void run() {
+    check_numbers(c_, least_iterations(c_.definition.rvars) + 1, "the kept steps of an update");
     adjoint_ = begin_steps(f_->name + "_adj_steps", iteration_count(c_.definition.rvars),
                            result_.current.func);
     if (c_.domain.predicate.defined())

@@ -34,6 +34,7 @@ class Tape {
         iterations_(iteration_count(context.definition.rvars)) {}
 
   void run() {
+    check_slots(1);
     begin_adjoint();
     seeds_ = saved_seeds();
     SweepResult sweep = c_.sweep_iterations(adjoint_, [&] { return seeds_; });
@@ -44,6 +45,11 @@ class Tape {
   }
 
  private:
+  void check_slots(int an_iteration) const {
+    double kept = least_iterations(c_.definition.rvars) * an_iteration;
+    check_numbers(c_, layout_.least_elements() + kept, "the slots of a tape");
+  }
+
   // Its elements outside of what is read, and those that were overwritten, are exactly 0.
   void begin_adjoint() {
     adjoint_ = begin_tape(f_->name + "_adj_tape", result_.current.func);
@@ -109,6 +115,7 @@ class Tape {
       kept_at_.push_back(static_cast<int>(known - places.begin()));
     }
     int width = static_cast<int>(places.size());
+    check_slots(width);
     auto kept_slot = [&](int i) { return layout_.elements() + now_ * width + i; };
     for (int i = 0; i < width; ++i) {
       Expr from = on_tape(layout_.slot_of(places[static_cast<size_t>(i)]), tape);

@@ -1,5 +1,6 @@
 #include "autodiff/tape_layout.h"
 
+#include "autodiff/numbering.h"
 #include "diagnostics/error.h"
 #include "frontend/var.h"
 #include "ir/build.h"
@@ -24,6 +25,7 @@ TapeLayout::TapeLayout(const UpdateContext& context)
     }
     extents_.back() = simplify(box_[d].max - box_[d].min + 1);
     strides_.back() = elements_;
+    check_numbers(c_, least_product(extents_), "the elements that an update may reach");
     elements_ = simplify(elements_ * extents_.back());
   }
   for (const LoopVariable& v : c_.domain.vars) scope_.push(v.name, {v.min, v.max});

@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "autodiff/update_context.h"
+#include "autodiff/numbering.h"
 
 namespace retrograde::ir {
 
@@ -14,6 +14,8 @@ class TapeLayout {
 
   Expr slot() const { return slot_; }          // the variable of the tape's last dimension
   Expr elements() const { return elements_; }  // number of slots that are elements
+  // The same, as a lower bound: unknown extents count as one.
+  double least_elements() const { return least_product(extents_); }
   // The pure variables, then `slot`: a point of a tape.
   std::vector<Expr> with_pure(const Expr& slot) const;
   // The element at `args`; where it lies outside of the Func's region, the nearest one inside.

@@ -4,6 +4,7 @@
 
 #include "autodiff/checkpoint.h"
 #include "autodiff/fold.h"
+#include "autodiff/numbering.h"
 #include "autodiff/recurrence.h"
 #include "autodiff/selection.h"
 #include "autodiff/tape.h"
@@ -100,6 +101,8 @@ class UpdateDifferentiation {
   bool selects() {
     auto selection = find_selection(c_.query.f, c_.query.stage);
     if (!selection) return false;
+    check_numbers(c_, least_iterations(c_.definition.rvars),
+                  "the iterations of an update that selects");
     Expr mine = iteration_number(c_.definition.rvars);
     FuncPtr winner = selection->winner;
     int index = selection->index_value;

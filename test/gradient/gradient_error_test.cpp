@@ -5,6 +5,7 @@
 #include "autodiff/derivative.h"
 #include "frontend/func.h"
 #include "frontend/inline_reductions.h"
+#include "support/errors.h"
 
 namespace retrograde {
 namespace {
@@ -135,6 +136,48 @@ TEST_F(Gradients, ZeroGradientsSayWhy) {
   EXPECT_FALSE(d(bytes).defined());
   ASSERT_TRUE(d(a).defined()) << "a float that the output reads has a gradient, here zero";
   EXPECT_EQ(d(a).num_update_definitions(), 0);
+}
+
+// Sizes whose slots have no 32-bit numbers: refused before anything is allocated.
+TEST(GradientErrors, SizesBeyondThirtyTwoBitsAreRefused) {
+  Var x("x");
+  const int n = 50000;
+  ImageParam place(Int(32), 1, "place"), a(Float(32), 1, "a");
+  auto expect_refused = [&](const Func& f, const AdjointOptions& options, const char* what) {
+    Func loss("loss");
+    loss() = f(Expr(0)) * 2.0f;
+    expect_mentions(error_of<Unsupported>([&] { propagate_adjoints(loss, options); }),
+                    {what, "2147483647", "Split its loops"});
+  };
+  const AdjointOptions store{.overwritten = Overwritten::Store};
+  {
+    Func f("f");
+    RDom r(0, n, 0, n);
+    f(x) = a(x);
+    f(clamp(place(r.x), 0, 9)) = f(clamp(place(r.y), 0, 9)) * a(r.x);
+    expect_refused(f, store, "slots of a tape");
+  }
+  {
+    Func f("f");
+    RDom r(0, n, 0, n);
+    f(x) = a(x);
+    f(x) = f(x) * a(r.x) * a(r.y);
+    expect_refused(f, store, "kept steps of an update");
+  }
+  {
+    Func f("f");
+    RDom r(0, n, 0, n);
+    f(x) = a(x);
+    f(x) = max(f(x), a(r.x) * a(r.y));
+    expect_refused(f, {}, "iterations of an update that selects");
+  }
+  {
+    Func f("f");
+    RDom r(0, 1000000, 0, 10000);
+    f(x) = a(x);
+    f(r.x) = sin(f(999999 - r.x)) * a(r.x);
+    expect_refused(f, {.checkpoint_states = 3000}, "slots of a loop with checkpoints");
+  }
 }
 
 }  // namespace
