@@ -191,7 +191,7 @@ SynthesisResult synthesize_folded(const Seed& seed, SynthesisOptions options) {
   FuncPtr output = copy_of(seed.output.get());
   if (!output) return synthesize_adjoints(seed, options);
   for (const auto& [f, copy] : folder.copies) {
-    if (options.requested.contains(f)) options.requested.insert(copy.get());
+    if (options.requested.erase(f) > 0) options.requested.insert(copy.get());
   }
   SynthesisResult result = synthesize_adjoints({output, seed.region, seed.values}, options);
   for (const auto& [f, copy] : folder.copies) {
@@ -201,7 +201,6 @@ SynthesisResult synthesize_folded(const Seed& seed, SynthesisOptions options) {
     }
   }
   result.output.func = seed.output;
-  for (const FuncPtr& f : folder.order()) result.reached.insert(f.get());
   result.explanations.insert(result.explanations.begin(), folder.explanations.begin(),
                              folder.explanations.end());
   return result;

@@ -509,7 +509,7 @@ class Synthesis {
   }
   // What was asked for and has nothing to do with the output.
   void explain_strangers() {
-    std::unordered_set<const Symbol*>& reached = result_.reached;
+    std::unordered_set<const Symbol*> reached;
     for (const FuncPtr& f : order_) reached.insert(f.get());
     for (const auto& p : parameters_of({seed_.output})) reached.insert(p.get());
     std::map<std::string, const Symbol*> strangers;  // by name: in an order that is always the same

@@ -48,7 +48,6 @@ struct SynthesisResult {
   std::map<const Symbol*, FuncPtr> accumulators;  // of adjoints that sum in double: by adjoint
   std::vector<FuncPtr> funcs;                     // all that was made, producers before consumers
   std::vector<Explanation> explanations;
-  std::unordered_set<const Symbol*> reached;  // what the output depends on, integers too
   std::vector<std::shared_ptr<Symbol>> requested;  // kept alive: nothing else may hold them
   // What was differentiated, and what for: the adjoints of what was requested, else of all images
   // and parameters, or of all Funcs where there are none.

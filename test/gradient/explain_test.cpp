@@ -84,6 +84,21 @@ TEST(Explain, ZerosAndWhatWasNotRequestedSayWhy) {
   expect_line(only, Explanation::Kind::NotRequested, b.name(), "nothing that was requested");
 }
 
+// Between a loop over time that is folded and the output, copies stand for the Funcs of the user.
+TEST(Explain, RequestedFuncsOfAFoldedLoopAreNoStrangers) {
+  Buffer<float> a = line(5);
+  Func f("explained_f"), last("explained_last");
+  Var t("t");
+  RDom r(0, 20);
+  f(x, t) = a(x);
+  f(x, r + 1) = sin(f(x, r)) * 1.1f;
+  last(x) = f(x, 20) * 2.0f;
+  Derivative d =
+      propagate_adjoints(weighted_sum(last, {5}), {.wrt = {last, a}, .checkpoint_states = 3});
+  EXPECT_EQ(d.explain().find("does not depend"), std::string::npos) << d.explain();
+  EXPECT_NE(Buffer<float>(d(last).realize({5}))(2), 0.0f);
+}
+
 // A clamp behind a selection that takes it inside only: no borders to gather.
 TEST(Explain, ConstantExteriorsAreOneGather) {
   ImageParam a(Float(32), 3, "explained_a");
