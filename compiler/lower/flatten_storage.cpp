@@ -161,6 +161,13 @@ class Flattener : public Rewriter {
     return is_const(value) ? value : variable(name);
   }
 
+  // What a predicate leaves nothing of has a negative extent: no element at all.
+  static Expr count_of(const Expr& extent) {
+    const auto constant = as_const_int(extent);
+    if (!constant) return binary(Kind::Max, extent, Expr(0));
+    return *constant < 0 ? Expr(0) : extent;
+  }
+
   Stmt allocate(const Realize& n) {
     std::vector<Binding> bindings;
     Layout layout;
@@ -179,9 +186,7 @@ class Flattener : public Rewriter {
     for (int d : storage_order(n.name, n.bounds.size())) {
       layout.strides[d] = stride = bind(fact(n.name, "stride", d), stride, bindings);
       stride = binary(Kind::Mul, stride, extents[d]);
-      // What a predicate leaves nothing of has a negative extent: no element at all.
-      const Expr count = is_const(extents[d]) ? extents[d] : binary(Kind::Max, extents[d], Expr(0));
-      elements = binary(Kind::Mul, elements, cast_to(Int(64), count));
+      elements = binary(Kind::Mul, elements, cast_to(Int(64), count_of(extents[d])));
     }
     layouts_[n.name] = std::move(layout);
     const auto places_around = places_;

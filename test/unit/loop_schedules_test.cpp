@@ -127,6 +127,19 @@ TEST_F(LoopSchedules, AnUpdateThatNeverRunsReadsNothing) {
   }
 }
 
+// No iteration, of which a condition asks for one: the region of s in y ends 4 before it begins.
+TEST_F(LoopSchedules, AFuncThatNoIterationReadsTakesNoMemory) {
+  Var x("x"), y("y");
+  Func f("f"), s("s");
+  RDom r(0, 2, 0, 0);
+  s(x, y) = 1;
+  s(x, y) += x * y;
+  s.compute_root();
+  f(x) = 7;
+  f(r.x) = select(r.y == 4, s(r.x, r.y), undef<int>());
+  EXPECT_EQ(Buffer<int>(f.realize({5}))(1), 7);
+}
+
 // One that may run reads and writes all the same, in no dimension too.
 TEST_F(LoopSchedules, AnUpdateOfAScalarThatRunsSometimes) {
   Var x("x");
