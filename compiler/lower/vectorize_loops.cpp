@@ -16,8 +16,8 @@
 //         becomes the predicate of the loads and stores under it. What has no vector form runs lane
 //         by lane: statements with effects (print, require, assertions), loops whose bounds vary,
 //         allocations whose size varies, stores to one element that are no reduction.
-//         Where lanes may hit one element, an update of the element by one operation keeps the
-//         order of the iterations: places and operands are vectors, the elements are not.
+//         Where lanes may hit one element, updates of elements by one operation go through the
+//         lanes in order: places and operands are vectors, the elements are not.
 //         The whole loop stays a serial one when the body reads that buffer elsewhere (argmax: two
 //         stores and the comparison of the old value).
 // Not done: loops with varying bounds under a mask; reductions through casts.
@@ -28,6 +28,7 @@
 
 #include <cstdlib>
 #include <optional>
+#include <set>
 #include <unordered_map>
 #include <unordered_set>
 
@@ -56,6 +57,9 @@ struct BodyFacts {
   std::unordered_set<std::string> allocated;  // inside the body
   std::unordered_map<std::string, int> stores;
   std::unordered_set<std::string> produced;  // Funcs computed inside the body
+  // Of stores f[i] = f[i] op g: their loads of f, and which operations there are.
+  std::unordered_map<std::string, int> update_loads;
+  std::unordered_map<std::string, std::set<std::pair<Kind, Op>>> update_operations;
 };
 
 void count_loads(const Expr& e, std::unordered_map<std::string, int>& loads) {
@@ -65,10 +69,25 @@ void count_loads(const Expr& e, std::unordered_map<std::string, int>& loads) {
   });
 }
 
+int own_loads(const Store& n) {
+  std::unordered_map<std::string, int> loads;
+  count_loads(n.value, loads);
+  count_loads(n.index, loads);
+  return loads[n.name];
+}
+
+void find_store_facts(const Store& n, BodyFacts& facts) {
+  ++facts.stores[n.name];
+  if (auto update = find_atomic_update(n)) {
+    facts.update_loads[n.name] += own_loads(n);
+    facts.update_operations[n.name].insert({update->kind, update->op});
+  }
+}
+
 void find_facts(const Stmt& s, BodyFacts& facts) {
   if (!s.defined()) return;
   if (const Allocate* a = s.as<Allocate>()) facts.allocated.insert(a->name);
-  if (const Store* store = s.as<Store>()) ++facts.stores[store->name];
+  if (const Store* store = s.as<Store>()) find_store_facts(*store, facts);
   const ProducerConsumer* p = s.as<ProducerConsumer>();
   if (p && p->is_producer) facts.produced.insert(p->name);
   for_each_child(
@@ -321,20 +340,19 @@ class LoopVectorizer {
     return is_same ? s : lane_by_lane(s);  // the last lane wins
   }
 
-  // f[i] = f[i] op g, and nothing else in the body reads f.
+  // f[i] = f[i] op g, where nothing else in the body reads f but updates by the same operation.
   std::optional<AtomicUpdate> as_plain_update(const Store& n) const {
     if (!n.index.type().is_scalar() || n.predicate.defined() || !n.value.type().is_scalar())
       return std::nullopt;
-    std::unordered_map<std::string, int> own;
-    count_loads(n.value, own);
-    count_loads(n.index, own);
-    auto total = facts_.loads.find(n.name);
-    if (total == facts_.loads.end() || total->second > own[n.name]) return std::nullopt;
-    return find_atomic_update(n);
+    auto update = find_atomic_update(n);
+    if (!update || facts_.loads.at(n.name) > facts_.update_loads.at(n.name) ||
+        facts_.update_operations.at(n.name).size() > 1)
+      return std::nullopt;
+    return update;
   }
 
   // Places and operands are vectors; the elements change one after the other, in the order of the
-  // iterations, as several may be the same.
+  // lanes, as several may be the same.
   Stmt update_in_order(const Store& n, const Expr& index, const AtomicUpdate& update) {
     Expr operand = widen_.spread(update.operand);
     const std::string places = fresh_(loop_.name + ".places"),
