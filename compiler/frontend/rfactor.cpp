@@ -22,6 +22,7 @@
 #include "frontend/func.h"
 #include "frontend/reduction_leaves.h"
 #include "ir/build.h"
+#include "ir/memory_reads.h"
 #include "ir/print.h"
 #include "ir/visit.h"
 
@@ -42,16 +43,6 @@ void add_conjuncts(const Expr& e, std::vector<Expr>& conjuncts) {
   } else {
     conjuncts.push_back(e);
   }
-}
-
-bool has_load(const Expr& root) {
-  bool found = false;
-  ir::walk(root, [&](const Expr& e) {
-    const ir::Call* call = e.as<ir::Call>();
-    found = found || (call && call->call_type != ir::CallType::Operator);
-    return !found;
-  });
-  return found;
 }
 
 class Factoring {
@@ -211,7 +202,8 @@ class Factoring {
   // where those that read nothing hold: past the end of a split there is nothing to read.
   static Expr reading_last(const std::vector<Expr>& conditions) {
     std::vector<Expr> plain, reading;
-    for (const Expr& e : conditions) (has_load(e) ? reading : plain).push_back(e);
+    for (const Expr& e : conditions)
+      (ir::reads_memory(e, ir::MemoryReads::Functions) ? reading : plain).push_back(e);
     if (reading.empty()) return plain.empty() ? Expr() : ir::conjunction(plain);
     const Expr last = ir::conjunction(reading);
     if (plain.empty()) return last;
@@ -238,7 +230,7 @@ class Factoring {
   std::vector<Expr> common_conditions() const {
     std::vector<Expr> result;
     for (const Expr& e : conjuncts_) {
-      if (!uses_removed(e) && !has_load(e)) result.push_back(e);
+      if (!uses_removed(e) && !ir::reads_memory(e, ir::MemoryReads::Functions)) result.push_back(e);
     }
     return result;
   }
@@ -246,7 +238,8 @@ class Factoring {
   // A coordinate may stand as it is when every value of the kept variables that passes the
   // conditions has a partial result there.
   bool keeps_coordinate(const Expr& arg, bool all_conditions_common) const {
-    return all_conditions_common && !uses_removed(arg) && !has_load(arg);
+    return all_conditions_common && !uses_removed(arg) &&
+           !ir::reads_memory(arg, ir::MemoryReads::Functions);
   }
 
   Definition merged() const {

@@ -30,6 +30,7 @@
 #include "ir/atomic_update.h"
 #include "ir/build.h"
 #include "ir/equal.h"
+#include "ir/memory_reads.h"
 #include "ir/narrow_product.h"
 #include "ir/visit.h"
 #include "lower/copy_statement.h"
@@ -76,15 +77,6 @@ std::optional<Chain> as_chain(const Store& store) {
   if (chain.terms.empty() || std::any_of(chain.terms.begin(), chain.terms.end(), has_other_lanes))
     return std::nullopt;
   return chain;
-}
-
-bool has_load(const Expr& e) {
-  bool found = false;
-  walk(e, [&](const Expr& node) {
-    found |= node.kind() == Kind::Load || node.kind() == Kind::Call;
-    return !found;
-  });
-  return found;
 }
 
 // ---- what a loop does to its buffers ----
@@ -177,7 +169,9 @@ class LoopReductions {
     candidates_.push_back({&n, std::move(*chain), whole, conditions_});
   }
 
-  bool is_invariant(const Expr& e) const { return !has_load(e) && !uses_any_variable(e, bound_); }
+  bool is_invariant(const Expr& e) const {
+    return !reads_memory(e, MemoryReads::Calls) && !uses_any_variable(e, bound_);
+  }
 
   // Buffers that the expression reads, or hands on.
   void note(const Expr& e) {

@@ -24,6 +24,7 @@
 #include "diagnostics/error.h"
 #include "frontend/function.h"
 #include "ir/build.h"
+#include "ir/memory_reads.h"
 #include "ir/visit.h"
 #include "lower/copy_statement.h"
 
@@ -236,7 +237,7 @@ class Flattener : public Rewriter {
   void bind_operands(const Provide& n, std::vector<Expr>& values, std::vector<Expr>& args,
                      Expr& predicate, std::vector<Binding>& bindings) {
     auto bind_if_loading = [&](Expr& e, const std::string& part) {
-      if (!e.defined() || !has_load(e)) return;
+      if (!e.defined() || !reads_memory(e, MemoryReads::Loads)) return;
       std::string name = fresh_(n.name + "." + part);
       bindings.push_back({name, e});
       e = variable(name, e.type());
@@ -246,15 +247,6 @@ class Flattener : public Rewriter {
     }
     for (size_t d = 0; d < args.size(); ++d) bind_if_loading(args[d], "arg." + std::to_string(d));
     bind_if_loading(predicate, "predicate");
-  }
-
-  static bool has_load(const Expr& e) {
-    bool found = false;
-    walk(e, [&](const Expr& node) {
-      found |= node.kind() == Kind::Load;
-      return !found;
-    });
-    return found;
   }
 
   const StorageLayouts& asked_;

@@ -31,6 +31,7 @@
 #include <optional>
 #include <unordered_map>
 
+#include "ir/atomic_update.h"
 #include "ir/build.h"
 #include "ir/visit.h"
 #include "lower/copy_statement.h"
@@ -263,16 +264,6 @@ class LaneSplitter {
   int first_ = 0, period_ = 1;
   std::unordered_map<const ExprNode*, Expr> memo_;
 };
-
-bool loads_from(const Expr& e, const std::string& buffer) {
-  bool found = false;
-  walk(e, [&](const Expr& node) {
-    const Load* load = node.as<Load>();
-    found |= load && load->name == buffer;
-    return !found;
-  });
-  return found;
-}
 
 // Stores with the lets around each, that may become one.
 struct StoreGroup {

@@ -5,6 +5,7 @@
 
 #include "ir/build.h"
 #include "ir/equal.h"
+#include "ir/memory_reads.h"
 #include "ir/visit.h"
 
 namespace retrograde::ir {
@@ -18,16 +19,6 @@ bool is_undef(const Expr& e) {
 bool mentions_undef(const Expr& e) {
   bool found = false;
   walk(e, [&](const Expr& node) { return !(found |= is_undef(node)); });
-  return found;
-}
-
-bool reads_storage(const Expr& e) {
-  bool found = false;
-  walk(e, [&](const Expr& node) {
-    const Call* call = node.as<Call>();
-    found |= call && (call->call_type == CallType::Func || call->call_type == CallType::Image);
-    return !found;
-  });
   return found;
 }
 
@@ -45,7 +36,8 @@ Expr either(const Expr& a, const Expr& b) {
 
 // What `first` guards is not read where it is false.
 Expr first_then(const Expr& first, const Expr& second) {
-  if (is_const_true(first) || !reads_storage(second)) return both(first, second);
+  if (is_const_true(first) || !reads_memory(second, MemoryReads::Storage))
+    return both(first, second);
   return call_op(Op::if_then_else, Bool(), {first, second, const_false()});
 }
 

@@ -22,6 +22,7 @@
 #include <unordered_set>
 
 #include "ir/build.h"
+#include "ir/memory_reads.h"
 #include "ir/visit.h"
 #include "lower/copy_statement.h"
 #include "simplify/simplify.h"
@@ -34,15 +35,6 @@ constexpr int64_t min_stride = 5;
 constexpr size_t min_columns = 4, max_columns = 16;
 
 bool is_power_of_two(int64_t n) { return n > 0 && (n & (n - 1)) == 0; }
-
-bool has_load(const Expr& e) {
-  bool found = false;
-  walk(e, [&](const Expr& node) {
-    found |= node.kind() == Kind::Load || node.kind() == Kind::Call;
-    return !found;
-  });
-  return found;
-}
 
 struct Column {
   Expr load;
@@ -77,7 +69,8 @@ bool joins(Run& run, const Stmt& s) {
   std::unordered_set<std::string> inside;  // cannot be known before the run
   Stmt inner = s;
   while (const auto* let = inner.as<LetStmt>()) {
-    const bool is_plain = let->value.type().is_scalar() && !has_load(let->value) &&
+    const bool is_plain = let->value.type().is_scalar() &&
+                          !reads_memory(let->value, MemoryReads::Calls) &&
                           !uses_any_variable(let->value, inside);
     if (is_plain) {
       lets[let->name] = substitute(let->value, lets);
@@ -94,7 +87,8 @@ bool joins(Run& run, const Stmt& s) {
     const auto* load = e.as<Load>();
     if (load && stride_of(*load)) {
       const Expr base = substitute(load->index.as<Ramp>()->base, lets);
-      if (!has_load(base) && !uses_any_variable(base, inside)) run.columns.push_back({e, base});
+      if (!reads_memory(base, MemoryReads::Calls) && !uses_any_variable(base, inside))
+        run.columns.push_back({e, base});
     }
     const auto* call = e.as<Call>();
     return e.kind() != Kind::Let && !(call && call->is_op(Op::if_then_else));

@@ -28,6 +28,7 @@
 #include "analysis/linear.h"
 #include "ir/build.h"
 #include "ir/lets.h"
+#include "ir/memory_reads.h"
 #include "ir/visit.h"
 #include "lower/copy_statement.h"
 #include "lower/steady_state.h"
@@ -44,16 +45,6 @@ bool is_trimmable(const For& loop) {
   if (!is_serial(loop)) return false;
   auto extent = as_const_int(loop.extent);
   return !extent || *extent > few_iterations;
-}
-
-bool reads_memory(const Expr& e) {
-  bool found = false;
-  walk(e, [&](const Expr& node) {
-    const auto* call = node.as<Call>();
-    found |= node.kind() == Kind::Load || (call && call->call_type != CallType::Operator);
-    return !found;
-  });
-  return found;
 }
 
 // The sum that is at least 0 where the comparison holds; nullopt for anything else.
@@ -91,7 +82,7 @@ class Trimmer {
         s,
         [&](const LetStmt& n) {
           Expr value = substitute(without_lets(n.value), lets_);
-          if (reads_memory(value)) {
+          if (reads_memory(value, MemoryReads::Functions)) {
             unusable_.insert(n.name);
           } else {
             lets_[n.name] = value;
@@ -152,7 +143,8 @@ class Trimmer {
   }
 
   bool becomes_end(const Expr& condition) {
-    if (reads_memory(condition) || uses_any_variable(condition, unusable_)) return false;
+    if (reads_memory(condition, MemoryReads::Functions) || uses_any_variable(condition, unusable_))
+      return false;
     auto form = nonnegative_where(condition);
     if (!form || form->type != loop_.min.type()) return false;
     const int64_t c = form->coefficient_of(loop_.name);

@@ -36,6 +36,7 @@
 #include "ir/atomic_update.h"
 #include "ir/build.h"
 #include "ir/equal.h"
+#include "ir/memory_reads.h"
 #include "ir/print.h"
 #include "ir/visit.h"
 #include "lower/copy_statement.h"
@@ -117,15 +118,6 @@ struct Reduction {
   };
   std::vector<Term> terms;
 };
-
-bool has_load(const Expr& e) {
-  bool found = false;
-  walk(e, [&](const Expr& node) {
-    found |= node.kind() == Kind::Load;
-    return !found;
-  });
-  return found;
-}
 
 bool is_associative(Kind kind) {
   return kind == Kind::Add || kind == Kind::Mul || kind == Kind::Min || kind == Kind::Max ||
@@ -254,8 +246,9 @@ class LoopVectorizer {
     Expr condition = widen_(n.condition);
     if (condition.same_as(n.condition))
       return make_if(n.condition, visit(n.then_case), visit(n.else_case));
-    bool must_bind =
-        has_load(condition);  // a store of the branch may change what the condition reads
+    bool must_bind = reads_memory(
+        condition,
+        MemoryReads::Loads);  // a store of the branch may change what the condition reads
     std::string name = must_bind ? fresh_(loop_.name + ".mask") : "";
     Expr mask = must_bind ? variable(name, condition.type()) : condition;
     Stmt branches =
@@ -446,7 +439,9 @@ class LoopVectorizer {
   Stmt lane_by_lane(const Stmt& s) { return can_recompute() ? lane_loop(s) : lane_copies(s); }
 
   bool can_recompute() const {
-    auto is_pure = [](const Expr& e) { return !has_effects(e) && !has_load(e); };
+    auto is_pure = [](const Expr& e) {
+      return !has_effects(e) && !reads_memory(e, MemoryReads::Loads);
+    };
     for (const OuterLet& let : lets_) {
       if (!is_pure(let.value)) return false;
     }
