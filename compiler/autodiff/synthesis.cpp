@@ -6,8 +6,9 @@
 #include "autodiff/derivative_rules.h"
 #include "autodiff/input_shape.h"
 #include "autodiff/invariance.h"
-#include "autodiff/inversion_cost.h"
+#include "autodiff/read_inversions.h"
 #include "autodiff/reverse_sweep.h"
+#include "autodiff/synthesis_account.h"
 #include "autodiff/update.h"
 #include "autodiff/update_context.h"
 #include "autodiff/versions.h"
@@ -64,6 +65,7 @@ class Synthesis {
     explain_strangers();
     result_.output = {seed_.output, seed_.region};
     list_gradients();
+    result_.explanations = account_.take();
     return std::move(result_);
   }
 
@@ -198,7 +200,7 @@ class Synthesis {
       for (const GivenAdjoint& g : update.given) {
         if (is_wanted(g.leaf.leaf)) add_contribution(f, g.leaf, g.domain);
       }
-      for (const Explanation& e : update.explanations) result_.explanations.push_back(e);
+      account_.add(update.explanations);
       if (update.previous.func && is_zero_over(*update.previous.func, target.region)) {
         stop_at_update(*f, s, target);
         return;
@@ -347,51 +349,14 @@ class Synthesis {
     AdjointTarget target =
         as_parameter(symbol) ? target_of(*as_parameter(symbol)) : target_of(*func_of(*call));
     AccessQuery query{domain, call ? call->args : std::vector<Expr>{}, target.args, target.region};
-    const Inversion* inversion = invert_where_selected(f, symbol, query, leaf.adjoint);
-    if (!inversion) inversion = &invert_cached(f, symbol, query);
-    if (!inversion->note.empty())
+    const Inversion& inversion = inversions_.of(*f, *symbol, query, leaf.adjoint);
+    if (!inversion.note.empty())
       explain(Explanation::Kind::Scattered, target.name,
-              text("read by ", quoted(f->name), ": ", inversion->note));
-    for (const Gather& g : inversion->gathers) {
+              text("read by ", quoted(f->name), ": ", inversion.note));
+    for (const Gather& g : inversion.gathers) {
       pending_[symbol].push_back(
           {call ? call->value_index : 0, g, substitute(leaf.adjoint, g.iteration)});
     }
-  }
-
-  // Where a selection makes the adjoint 0, the read does not count. That turns the many pieces of
-  // a clamped read into one: select(x < 0 || x > 9, 0, a(clamp(x, 0, 9))). Null: no such thing.
-  const Inversion* invert_where_selected(const FuncPtr& f, const Symbol* symbol, AccessQuery query,
-                                         const Expr& adjoint) {
-    const bool chooses = std::any_of(query.indices.begin(), query.indices.end(), [](const Expr& e) {
-      bool found = false;
-      walk(e, [&](const Expr& node) {
-        found |= node.as<Min>() || node.as<Max>() || node.as<Select>();
-        return !found;
-      });
-      return found;
-    });
-    const auto* selection = adjoint.as<Select>();
-    if (!chooses || !selection) return nullptr;
-    Expr counts = is_zero(selection->true_value)    ? !selection->condition
-                  : is_zero(selection->false_value) ? selection->condition
-                                                    : Expr();
-    if (!counts.defined() || calls(counts, f.get())) return nullptr;
-    Expr& predicate = query.domain.predicate;
-    predicate = predicate.defined() ? predicate && counts : counts;
-    const Inversion& inversion = invert_cached(f, symbol, query);
-    return inversion.note.empty() && inversion.gathers.size() == 1 ? &inversion : nullptr;
-  }
-
-  // Accesses of one stage often share their indices; the inversion is the expensive part.
-  const Inversion& invert_cached(const FuncPtr& f, const Symbol* symbol, const AccessQuery& query) {
-    std::string key = std::to_string(reinterpret_cast<uintptr_t>(symbol));
-    for (const Expr& e : query.indices) key += "," + print(e);
-    if (query.domain.predicate.defined()) key += "|" + print(query.domain.predicate);
-    for (const LoopVariable& v : query.domain.vars) key += ";" + v.name;
-    key += f->name;
-    auto [it, is_new] = inversions_.try_emplace(key);
-    if (is_new) it->second = invert_or_scatter(query);
-    return it->second;
   }
 
   // Where something is read may depend on values of f, too.
@@ -410,57 +375,16 @@ class Synthesis {
     register_func(adjoint, p->name, target_of(*p).region);
   }
 
-  // ", 96 elements, 384 bytes when stored"; nothing when the region is known at run time only.
-  static std::string size_text(const FuncContents& f, const std::vector<LoopVariable>& region) {
-    int64_t elements = 1, bytes = 0;
-    for (const LoopVariable& v : region) {
-      auto extent = v.min.defined() && v.max.defined() ? as_const_int(simplify(v.max - v.min + 1))
-                                                       : std::nullopt;
-      if (!extent) return "";
-      elements *= std::max<int64_t>(*extent, 0);
-    }
-    for (Type t : f.types) bytes += t.bytes();
-    return text(", ", elements, " elements, ", elements * bytes, " bytes when stored");
-  }
-
   void register_func(const AdjointFunc& adjoint, const std::string& primal,
                      const std::vector<LoopVariable>& region) {
     for (const FuncPtr& helper : adjoint.helpers) result_.funcs.push_back(helper);
     result_.funcs.push_back(adjoint.func);
     if (adjoint.accumulator) result_.accumulators[adjoint.func.get()] = adjoint.accumulator;
-    const FuncContents& accumulating = adjoint.accumulator ? *adjoint.accumulator : *adjoint.func;
-    int gathers = 0, scatters = 0, privatised = 0;
-    for (Accumulation a : adjoint.stages) {
-      gathers += a == Accumulation::Gather;
-      scatters += a == Accumulation::Scatter;
-      privatised += a == Accumulation::Privatised;
-    }
-    explain(Explanation::Kind::Built, primal,
-            text(quoted(adjoint.func->name), ", ", gathers, " gathers over reduction domains, ",
-                 scatters, " scatters inside pure dimensions, ", privatised, " privatised sums",
-                 size_text(accumulating, region)));
-    if (gathers + scatters + privatised > 0) {
-      explain(Explanation::Kind::Performance, primal,
-              text("unless a directive schedules ", quoted(accumulating.name),
-                   ", it is computed at root, in parallel over its outermost dimension, in vectors "
-                   "along its first"));
-    }
-    if (adjoint.accumulator) {
-      explain(Explanation::Kind::Built, primal,
-              text(quoted(accumulating.name), " adds up in double what ",
-                   quoted(adjoint.func->name), " rounds once: an element may get many terms"));
-    }
-    if (privatised > 0) {
-      explain(Explanation::Kind::Privatised, primal,
-              "accumulated in a fixed number of parts, which are summed in order");
-    }
+    account_.built(adjoint, primal, region);
   }
 
   void explain(Explanation::Kind kind, const std::string& subject, const std::string& detail) {
-    for (const Explanation& e : result_.explanations) {
-      if (e.kind == kind && e.subject == subject && e.detail == detail) return;
-    }
-    result_.explanations.push_back({kind, subject, detail});
+    account_.add(kind, subject, detail);
   }
 
   void list_gradients() {
@@ -569,7 +493,8 @@ class Synthesis {
   std::unordered_set<const Symbol*> zero_;     // by no path
   std::unordered_set<const Symbol*> covered_;  // inside of a custom adjoint that was used
   std::unordered_map<const Symbol*, std::vector<Contribution>> pending_;
-  std::map<std::string, Inversion> inversions_;
+  ReadInversions inversions_;
+  SynthesisAccount account_;
   SynthesisResult result_;
 };
 
