@@ -96,9 +96,12 @@ class LetMaker : public Rewriter {
   }
 
  private:
-  // What only an arm shares is bound inside the arm.
+  // What only an arm shares is bound inside the arm, under names of its own: both arms may have the
+  // same inner if_then_else.
   Expr branch(const Call& e) {
-    const auto arm = [&](const Expr& value) { return wrap(make_lets({(*this)(value)})); };
+    const auto arm = [&](const Expr& value) {
+      return wrap(make_lets({expand_lets((*this)(value))}));
+    };
     return call_op(e.op, e.type, {(*this)(e.args[0]), arm(e.args[1]), arm(e.args[2])});
   }
   const UseCounter& uses_;

@@ -170,6 +170,67 @@ TEST(TimeAxis, GradientsAreThoseOfAllStepsKept) {
   }
 }
 
+// A loop of random shape: where it reads, which elements it writes, what was there before, in which
+// direction time runs, which steps are read at the end.
+Program random_loop(unsigned seed) {
+  std::mt19937 random(seed);
+  auto pick = [&](int n) { return static_cast<int>(random() % static_cast<unsigned>(n)); };
+  const int width = 7, n = 1 + pick(6), lags = 1 + pick(2), margin = pick(3);
+  const bool in_rows = pick(3) > 0, forward = pick(3) > 0;
+  Buffer<float> start = plane(width, n + 4, seed), k = random_image({3}, 0.25, 0.5, seed + 1);
+  Func u("u"), last("last");
+  RDom r(margin, width - 2 * margin, 0, n);
+  // Times lags to lags + n - 1 are written, or n - 1 to 0.
+  Expr time = forward ? r.y + lags : n - 1 - r.y, place = in_rows ? Expr(r.x) : Expr(x);
+  auto back = [&](int steps) { return forward ? time - steps : time + steps; };
+  const int before = forward ? lags - 1 : n, end = forward ? lags + n - 1 : 0;
+  switch (pick(3)) {
+    case 0:
+      u(x, t) = start(clamp(x, 0, width - 1), clamp(t, 0, n + 3));
+      break;
+    case 1:
+      u(x, t) = 0.25f;
+      u(x, before) = start(clamp(x, 0, width - 1), 0);
+      break;
+    default:
+      u(x, t) = start(clamp(x, 0, width - 1), 1) * 0.5f;
+  }
+  auto near = [&](int reach) {
+    return in_rows ? clamp(place + pick(2 * reach + 1) - reach, 0, width - 1) : place;
+  };
+  Expr value = k(0) * sin(u(near(2), back(1))) + k(1) * u(near(1), back(1 + pick(lags)));
+  if (pick(2)) value = value + k(2) * u(place, time);
+  if (pick(2)) value = value * cos(u(place, back(lags)));
+  if (in_rows && pick(3) == 0) value = value + 0.125f * u(max(place - 1, 0), time);
+  u(place, time) = value;
+  Expr earlier = forward ? Expr(end - 1) : Expr(end + 1);
+  last(x) = pick(2) && n > 1 ? u(x, end) + 0.5f * u(x, earlier) : u(x, end);
+  return {weighted_sum(last, {width}), {start, k}};
+}
+
+TEST(TimeAxis, RandomLoopsAgreeWithThoseThatKeepAllSteps) {
+  int folded = 0;
+  for (unsigned seed = 0; seed < 60; ++seed) {
+    SCOPED_TRACE(text("seed ", seed));
+    Program p = random_loop(seed);
+    Derivative all = propagate_adjoints(p.loss, {.overwritten = Overwritten::Store});
+    Derivative d = propagate_adjoints(
+        p.loss, {.overwritten = Overwritten::Store, .checkpoint_states = 1 + int(seed % 3)});
+    folded += d.explain().find("last steps only") != std::string::npos;
+    for (const Buffer<float>& input : p.inputs) {
+      ASSERT_EQ(d(input).defined(), all(input).defined()) << d.explain() << all.explain();
+      if (!d(input).defined()) continue;  // not read
+      oracle::Region region = oracle::region_of(*input.raw_buffer());
+      oracle::Array found = evaluate(d(input), region), expected = evaluate(all(input), region);
+      for (size_t i = 0; i < found.values.size(); ++i) {
+        const double e = expected.values[i].scalar.as_double();
+        EXPECT_NEAR(found.values[i].scalar.as_double(), e, 1e-9 * (1 + std::abs(e)));
+      }
+    }
+  }
+  EXPECT_GT(folded, 30);
+}
+
 int64_t peak_memory(const Derivative& d, const Buffer<float>& input) {
   Func gradient = d(input);
   std::string report;
@@ -217,6 +278,19 @@ TEST(TimeAxis, TheNumberOfStepsMayBeAParam) {
     expect_gradient(loss, d, a);
     expect_gradient(loss, d, c);
   }
+}
+
+TEST(TimeAxis, TheGradientCanBeDifferentiatedAgain) {
+  Buffer<float> start = line(2);
+  Param<int> n("n");
+  n.set(2);
+  Func u("u"), last("last");
+  RDom r(0, n);
+  u(x, t) = start(x);
+  u(x, r + 1) = u(x, r) + 0.25f * sin(u(x, r));
+  last(x) = u(x, n);
+  Derivative d = propagate_adjoints(weighted_sum(last, {2}), {.checkpoint_states = 2});
+  expect_gradient(weighted_sum(d(start), {2}), start, {.overwritten = Overwritten::Store});
 }
 
 // Adjoints of Funcs between the loop and the output are found by the user's Funcs.

@@ -1,5 +1,6 @@
 // Each rule of the simplifier once, as IR text before and after.
 #include <gtest/gtest.h>
+#include <set>
 
 #include "diagnostics/large_stack.h"
 #include "ir/build.h"
@@ -286,6 +287,18 @@ TEST(Cse, LeavesTrivialThingsAndUnsharedThingsAlone) {
                            "undef<int32>() + undef<int32>()"}) {
     EXPECT_TRUE(equal(introduce_lets(parse_expr(text)), parse_expr(text))) << text;
   }
+}
+
+TEST(Cse, NamesInArmsAreBoundOnceThoughBothArmsHaveThem) {
+  const Expr e = introduce_lets(
+      parse_expr("if_then_else<int32>(y < 3, if_then_else<int32>(x < 3, (y/x)*(y/x), 1) + 1, "
+                 "if_then_else<int32>(x < 3, (y/x)*(y/x), 1) + 2)"));
+  std::set<std::string> names;
+  walk(e, [&](const Expr& node) {
+    if (const auto* let = node.as<Let>()) EXPECT_TRUE(names.insert(let->name).second) << let->name;
+    return true;
+  });
+  EXPECT_EQ(names.size(), 2U);
 }
 
 TEST(Cse, WhatOnlyAnArmComputesStaysInTheArm) {
