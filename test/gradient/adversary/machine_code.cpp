@@ -29,7 +29,9 @@ class Compiled {
       oracle::InterpreterOptions options;
       options.rounding = oracle::Rounding::Contraction;
       options.max_points = max_points;
-      expected_.push_back(oracle::Interpreter(options).realize(gradient.function(), region)[0]);
+      expected_.emplace_back();
+      if (!gradient.defined()) continue;
+      expected_.back() = oracle::Interpreter(options).realize(gradient.function(), region)[0];
       try {
         compare(expected_.size() - 1, "");
       } catch (const UserError& error) {
@@ -49,7 +51,7 @@ class Compiled {
     schedule_at_random(funcs, static_cast<uint64_t>(s_.program.checks.schedule));
     for (size_t i = 0; i < gradients_.size(); ++i) {
       try {
-        compare(i, ", scheduled");
+        if (gradients_[i].first.defined()) compare(i, ", scheduled");
       } catch (const UserError&) {  // of the schedule
       }
     }
@@ -61,10 +63,10 @@ class Compiled {
     for (size_t i = 0; i < twin.images.size(); ++i) options.wrt.push_back(twin.image(i));
     options.wrt.push_back(twin.scale);
     const Derivative d = propagate_adjoints(twin.output(), s_.seed, s_.bounds(), options);
-    size_t i = 0;
-    for (const AdjointInput& input : options.wrt) {
-      const Func gradient = d.of(input);
-      if (gradient.defined() && i < gradients_.size()) compare(i++, gradient, ", by a C function");
+    for (size_t i = 0; i < options.wrt.size(); ++i) {
+      const Func gradient = d.of(options.wrt[i]);
+      if (gradient.defined() && gradients_[i].first.defined())
+        compare(i, gradient, ", by a C function");
     }
   }
 

@@ -105,6 +105,7 @@ double precision_of(const Func& output);
 
 void compare_higher(Subject& s, const Motion& v, const Derivative& derivative);
 void compare_dense(Subject& s);
+// By each input; undefined where it is not read.
 using Gradients = std::vector<std::pair<Func, oracle::Region>>;
 // twin: null, or the same program with a stage that a C function computes.
 void compare_machine_code(Subject& s, const Derivative& derivative, const Gradients& gradients,
