@@ -47,6 +47,33 @@ size_t count(const Shape& shape) {
   return n;
 }
 
+Shape shape_of_output(const Func& output, const std::vector<int>& mins,
+                      const std::vector<int>& sizes, const std::string& asked,
+                      const std::string& function) {
+  const size_t dims = static_cast<size_t>(output.dimensions());
+  if (sizes.size() != dims || !(mins.empty() || mins.size() == dims)) {
+    user_error(
+        asked, "the output needs a size in each of its dimensions, and a min in each or none",
+        text("it has ", dims, " dimensions, ", sizes.size(), " sizes and ", mins.size(), " mins"),
+        "Give one a dimension: " + function + "(output, {width, height})");
+  }
+  return {mins.empty() ? std::vector<int>(dims, 0) : mins, sizes};
+}
+
+ir::Box box_of(const Shape& shape) {
+  ir::Box box;
+  for (size_t d = 0; d < shape.mins.size(); ++d)
+    box.push_back({Expr(shape.mins[d]), Expr(shape.mins[d] + shape.extents[d] - 1)});
+  return box;
+}
+
+Region region_of(const Shape& shape) {
+  Region region;
+  for (size_t d = 0; d < shape.mins.size(); ++d)
+    region.push_back({shape.mins[d], shape.extents[d]});
+  return region;
+}
+
 std::optional<Shape> constant_shape(const ir::Box& box) {
   constexpr double most_elements = 1e7;
   Shape shape;

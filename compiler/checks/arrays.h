@@ -31,6 +31,13 @@ struct Shape {
   std::vector<int> mins, extents;
 };
 size_t count(const Shape& shape);
+// `mins` may be empty: zeros. CompileError, with an example of the call `function`, when one does
+// not fit the output.
+Shape shape_of_output(const Func& output, const std::vector<int>& mins,
+                      const std::vector<int>& sizes, const std::string& asked,
+                      const std::string& function);
+ir::Box box_of(const Shape& shape);
+Region region_of(const Shape& shape);
 // Nothing when the box is not of constants, or too large to look at.
 std::optional<Shape> constant_shape(const ir::Box& box);
 

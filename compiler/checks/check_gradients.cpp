@@ -50,14 +50,9 @@ class Checker {
  public:
   Checker(const Func& output, const std::vector<int>& sizes, const GradientCheckOptions& options)
       : output_(output),
-        shape_{std::vector<int>(sizes.size(), 0), sizes},
+        shape_(shape_of_output(output, options.mins, sizes, asked(), "check_gradients")),
         options_(options),
         random_(options.seed) {
-    if (static_cast<int>(sizes.size()) != output.dimensions()) {
-      user_error(asked(), "the output needs a size in each of its dimensions",
-                 text("it has ", output.dimensions(), " dimensions and ", sizes.size(), " sizes"),
-                 "Give one a dimension: check_gradients(output, {width, height})");
-    }
     ir::widen({output.function()});  // says what has no meaning in double before all else
     draw_weights();
     for (const auto& p : ir::parameters_of({output.function()})) {
@@ -154,11 +149,7 @@ class Checker {
     result(of.args()) = Tuple(values);
     return result;
   }
-  Region bounds() const {
-    Region region;
-    for (int e : shape_.extents) region.push_back({0, e});
-    return region;
-  }
+  Region bounds() const { return region_of(shape_); }
 
   void differentiate() {
     const AdjointOptions store{.overwritten = Overwritten::Store};
@@ -344,9 +335,7 @@ class Checker {
 
   void compare_funcs() {
     auto order = ir::topological_order({output_.function()});
-    ir::Box box;
-    for (int e : shape_.extents) box.push_back({Expr(0), Expr(e - 1)});
-    ir::Regions regions(order, box);
+    ir::Regions regions(order, box_of(shape_));
     const auto errors = func_errors(order, regions);
     std::map<const ir::Symbol*, double> inherited;
     double most = 4;  // an adjoint that only rounds loses less than this

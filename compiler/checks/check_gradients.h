@@ -5,7 +5,7 @@
 // EXPECT_LT(report.worst_error, 1e-7);
 // std::ofstream("report.json") << report.to_json();  // tools/plot_report draws it
 //
-// The output (over `sizes`, from 0) is summed with random weights w. In double, for random
+// The output (over `sizes`, from `mins`) is summed with random weights w. In double, for random
 // directions v of each floating input: the adjoint <v, J^T w>, the tangent <J v, w>, central
 // differences over steps of many sizes with Richardson extrapolation, and a complex step where the
 // program allows it (checks/complex_step.h). The step of the differences is chosen by themselves:
@@ -26,6 +26,7 @@ struct GradientCheckOptions {
   unsigned seed = 1;                   // of directions and weights
   int smallest_step = 24;              // steps are 2^-4 ... 2^-smallest_step of the input's size
   std::vector<AdjointInput> wrt = {};  // only these inputs are moved; empty: all floating ones
+  std::vector<int> mins = {};          // where the output begins; empty: at 0
 };
 
 struct GradientReport {

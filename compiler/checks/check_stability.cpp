@@ -63,14 +63,9 @@ class Checker {
   Checker(const Func& output, const std::vector<int>& sizes, const StabilityOptions& options)
       : output_(output),
         asked_("check the stability of " + retrograde::quoted(output.name())),
-        shape_{std::vector<int>(sizes.size(), 0), sizes},
+        shape_(shape_of_output(output, options.mins, sizes, asked_, "check_stability")),
         options_(options),
         random_(options.seed) {
-    if (static_cast<int>(sizes.size()) != output.dimensions()) {
-      user_error(asked_, "the output needs a size in each of its dimensions",
-                 text("it has ", output.dimensions(), " dimensions and ", sizes.size(), " sizes"),
-                 "Give one a dimension: check_stability(output, {width, height})");
-    }
     amount_.set(0);
     seed_.set(0);
     watch();
@@ -103,21 +98,18 @@ class Checker {
   // ---- what is looked at ----
 
   Derivative adjoints() const {
-    Region bounds;
-    for (int e : shape_.extents) bounds.push_back({0, e});
     std::vector<Expr> ones;
     for (Type t : output_.types()) ones.push_back(cast(t.is_float() ? t : Float(32), 1.0f));
     Func seed("seed");
     seed(output_.args()) = Tuple(ones);
-    return propagate_adjoints(output_, seed, bounds, {.overwritten = Overwritten::Store});
+    return propagate_adjoints(output_, seed, region_of(shape_),
+                              {.overwritten = Overwritten::Store});
   }
 
   void watch() {
     auto order = ir::topological_order({output_.function()});
     ir::widen({output_.function()});  // says what has no meaning in double before anything is bound
-    ir::Box box;
-    for (int e : shape_.extents) box.push_back({Expr(0), Expr(e - 1)});
-    ir::Regions regions(order, box);
+    ir::Regions regions(order, box_of(shape_));
     Derivative derivative = adjoints();
     std::vector<Watched> adjoints;
     for (const ir::FuncPtr& f : order) {

@@ -41,6 +41,7 @@ struct StabilityOptions {
   int samples = 3;                      // drawn from the ranges
   int perturbations = 3;                // random roundings, for each of the two estimates
   unsigned seed = 1;
+  std::vector<int> mins = {};  // where the output begins; empty: at 0
 };
 
 struct StabilityReport {

@@ -153,6 +153,17 @@ TEST_F(CheckGradients, RulesOfTheUserAreCheckedLikeAnyOther) {
   EXPECT_GT(report(1, 0).inputs[0].dot_product_error, 0.4);
 }
 
+TEST_F(CheckGradients, OutputsMayBeginAnywhere) {
+  Func f("f");
+  f(x, y) = image(x + 3, y - 2) * image(x + 4, y - 1);  // defined from (-3, 2) on only
+  GradientReport report = check_gradients(f, {11, 8}, {.directions = 1, .mins = {-3, 2}});
+  EXPECT_LT(report.worst_error, 1e-8) << report.to_json();
+  expect_mentions(error_of<CompileError>([&] {
+                    check_gradients(f, {11, 8}, {.mins = {1}});
+                  }),
+                  {"1 mins", "Give one a dimension"});
+}
+
 TEST_F(CheckGradients, NarrowFloats) {
   for (Type type : {Float(16), BFloat(16)}) {
     ImageParam narrow(type, 1, "narrow");

@@ -167,6 +167,15 @@ TEST_F(CheckStability, DeclaredRangesAreDrawnFromAndTheirEndsTried) {
 }
 
 // 60000 is a float16, its double is none: the ends are those of the type.
+TEST_F(CheckStability, OutputsMayBeginAnywhere) {
+  Func f("f");
+  f(x) = image(x + 5) * 2.0f;
+  StabilityReport report = check_stability(f, {16}, {.extremes = {Extreme::NaNs}, .mins = {-5}});
+  ASSERT_TRUE(report.cases[1].first_non_finite) << report.to_json();
+  EXPECT_LT(report.cases[1].first_non_finite->at[0], 11);
+  EXPECT_GE(report.cases[1].first_non_finite->at[0], -5);
+}
+
 TEST_F(CheckStability, NarrowFloatsGoToTheirOwnEnds) {
   ImageParam narrow(Float(16), 1, "narrow");
   Func values("values"), f("f");
