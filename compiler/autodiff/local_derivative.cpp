@@ -75,8 +75,8 @@ LocalDerivative of_call(const Expr& e, const Call& call, const ExprFacts& facts)
     unsupported(text("differentiate the call of the C function ", quoted(call.name)),
                 "a C function has no known derivative",
                 "the gradient of one of its arguments is wanted",
-                text("wrap the argument in stop_gradient, or write ", quoted(call.name),
-                     " in the language"));
+                text("wrap the argument in stop_gradient, write ", quoted(call.name),
+                     " in the language, or give the Func that calls it a custom_adjoint"));
   }
   const DerivativeRule& rule = derivative_rule(call.op);
   const char* name = op_info(call.op).name;
