@@ -36,15 +36,20 @@ int64_t product(const std::vector<int64_t>& factors) {
 
 Compressed::Compressed(const CompressionQuery& query)
     : query_(query),
-      dependence_(std::make_unique<Dependence>(query.output, query.seed)),
+      dependence_(std::make_unique<Dependence>(query.output, query.seed, query.operations)),
       pattern_(dependence_->inside(query.rows, query.columns)) {}
 
-std::unique_ptr<Compressed> Compressed::make(const CompressionQuery& query) {
+std::unique_ptr<Compressed> Compressed::make(const CompressionQuery& query) try {
   std::unique_ptr<Compressed> result(new Compressed(query));
   std::optional<Colours> colours = result->colour();
   if (!colours) return nullptr;
   result->colours_ = *colours;
   return result;
+} catch (const isl::exception&) {
+  unsupported(text("compress the derivative in ", quoted(query.output->name)),
+              "which elements depend on which is found by a bounded search over index sets",
+              text("a part of it takes more than ", query.operations, " operations of isl"),
+              "Use products with single directions, or differentiate parts of it");
 }
 
 std::optional<Colours> Compressed::colour() const {

@@ -21,11 +21,13 @@ struct CompressionQuery {
   bool diagonal_only = false;  // entries (x, x) alone are wanted; rows and columns have one shape
   bool symmetric = false;      // M equals its transpose
   int64_t most_colours = 0;    // 0: any number
+  unsigned long operations = isl_operations;  // of isl, in a part of the search for the pattern
 };
 
 class Compressed {
  public:
-  // Null when more than `most_colours` are needed.
+  // Null when more than `most_colours` are needed. Unsupported where the pattern has no bounds,
+  // needs too many colours, or takes too long to find.
   static std::unique_ptr<Compressed> make(const CompressionQuery& query);
 
   const Colours& colours() const { return colours_; }

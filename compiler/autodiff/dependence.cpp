@@ -45,8 +45,9 @@ isl::map hull_of(const isl::map& m) {
 // Fewer pieces of the same, when they are found soon.
 std::optional<isl::map> coalesced_soon(const isl::map& m) {
   isl_ctx* ctx = isl_map_get_ctx(m.get());
+  const unsigned long operations = isl_ctx_get_max_operations(ctx);
   isl_ctx_reset_operations(ctx);
-  isl_ctx_set_max_operations(ctx, coalescing_operations);
+  isl_ctx_set_max_operations(ctx, std::min(coalescing_operations, operations));
   std::optional<isl::map> result;
   try {
     result = m.coalesce();
@@ -54,7 +55,7 @@ std::optional<isl::map> coalesced_soon(const isl::map& m) {
     isl_ctx_reset_error(ctx);
   }
   isl_ctx_reset_operations(ctx);
-  isl_ctx_set_max_operations(ctx, isl_operations);
+  isl_ctx_set_max_operations(ctx, operations);
   return result;
 }
 
@@ -317,8 +318,8 @@ isl::set box_set(isl_ctx* ctx, const Box& box, size_t dims) {
 
 }  // namespace
 
-Dependence::Dependence(const FuncPtr& f, const FuncPtr& source)
-    : map_(Composer(context_, source).of(f)) {}
+Dependence::Dependence(const FuncPtr& f, const FuncPtr& source, unsigned long operations)
+    : context_(operations), map_(Composer(context_, source).of(f)) {}
 
 isl::map Dependence::inside(const Box& of_f, const Box& of_source) const {
   auto dims = [&](isl_dim_type type) { return static_cast<size_t>(isl_map_dim(map_.get(), type)); };

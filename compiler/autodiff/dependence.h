@@ -25,8 +25,9 @@ namespace retrograde::ir {
 
 class Dependence {
  public:
-  // `source` is any Func that `f` may depend on. Unsupported where an extern stage lies between.
-  Dependence(const FuncPtr& f, const FuncPtr& source);
+  // `source` is any Func that `f` may depend on. Unsupported where an extern stage lies between;
+  // isl::exception where a part of the search takes more than so many operations.
+  Dependence(const FuncPtr& f, const FuncPtr& source, unsigned long operations = isl_operations);
 
   // {element of f -> element of source}; without parameters. Empty: f does not depend on it.
   const isl::map& map() const { return map_; }

@@ -1,6 +1,7 @@
 // Colours of patterns: linear forms (colouring.h) and greedy colours of explicit graphs
 // (graph_colouring.h), checked by their definitions on random patterns, against known optima, and
-// against the fewest that any assignment of colours can do on small graphs.
+// against the fewest that any assignment of colours can do on small graphs. And how long the search
+// for a pattern may take.
 #include "autodiff/colouring.h"
 
 #include <gtest/gtest.h>
@@ -8,7 +9,10 @@
 #include <algorithm>
 #include <random>
 
+#include "autodiff/compressed.h"
 #include "autodiff/graph_colouring.h"
+#include "frontend/func.h"
+#include "support/errors.h"
 
 namespace retrograde::ir {
 namespace {
@@ -183,6 +187,20 @@ TEST(ColumnColouring, ColumnsOfOneRowDiffer) {
       EXPECT_TRUE(std::adjacent_find(seen.begin(), seen.end()) == seen.end());
     }
   }
+}
+
+TEST(Compression, PatternsThatTakeTooLongToFindAreRefused) {
+  Var x("x");
+  Func seed("seed"), g("g");
+  seed(x) = 1.0f;
+  g(x) = seed(clamp(3 * x / 2, 0, 6)) + seed(x % 3);
+  Box box{{Expr(0), Expr(6)}};
+  CompressionQuery query{
+      .output = g.function(), .seed = seed.function(), .rows = box, .columns = box};
+  EXPECT_NE(Compressed::make(query), nullptr);
+  query.operations = 20;
+  expect_mentions(error_of<Unsupported>([&] { Compressed::make(query); }),
+                  {"\"g\"", "bounded search", "20 operations", "single directions"});
 }
 
 }  // namespace
