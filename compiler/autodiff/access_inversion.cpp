@@ -391,10 +391,9 @@ Inversion invert_access(const AccessQuery& query) {
       if (!one.note.empty()) result.note = one.note;
     }
     return result;
-  } catch (const isl::exception& e) {
-    return {
-        {scatter_access(query)},
-        text("the search for the points that read an element was given up (isl: ", e.what(), ")")};
+  } catch (const isl::exception&) {
+    return {{scatter_access(query)},
+            "the search for the points that read an element takes too long, and was given up"};
   }
 }
 

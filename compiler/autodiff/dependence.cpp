@@ -45,6 +45,7 @@ isl::map hull_of(const isl::map& m) {
 // Fewer pieces of the same, when they are found soon.
 std::optional<isl::map> coalesced_soon(const isl::map& m) {
   isl_ctx* ctx = isl_map_get_ctx(m.get());
+  throw_if_failed(ctx);
   const unsigned long operations = isl_ctx_get_max_operations(ctx);
   isl_ctx_reset_operations(ctx);
   isl_ctx_set_max_operations(ctx, std::min(coalescing_operations, operations));

@@ -18,6 +18,10 @@ IslContext::IslContext(unsigned long max_operations) : ctx(isl_ctx_alloc()) {
 }
 IslContext::~IslContext() { isl_ctx_free(ctx); }
 
+void throw_if_failed(isl_ctx* ctx) {
+  if (isl_ctx_last_error(ctx) != isl_error_none) isl::exception::throw_last_error(isl::ctx(ctx));
+}
+
 IslBridge::IslBridge(IslContext& context, std::vector<std::string> dims)
     : ctx_(context.ctx), dims_(std::move(dims)) {
   isl_space* space = isl_space_set_alloc(ctx_, 0, static_cast<unsigned>(dims_.size()));
@@ -388,10 +392,14 @@ class IslToExpr {
 };
 
 Expr IslBridge::to_expr(const isl::pw_aff& e, const std::vector<Expr>& names) const {
-  return IslToExpr(*this, names).pieces(e.get());
+  Expr result = IslToExpr(*this, names).pieces(e.get());
+  throw_if_failed(ctx_);
+  return result;
 }
 Expr IslBridge::to_expr(const isl::set& s, const std::vector<Expr>& names) const {
-  return IslToExpr(*this, names).set(s.get());
+  Expr result = IslToExpr(*this, names).set(s.get());
+  throw_if_failed(ctx_);
+  return result;
 }
 
 }  // namespace retrograde::ir

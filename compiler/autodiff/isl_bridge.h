@@ -28,6 +28,10 @@ struct IslContext {
   isl_ctx* ctx;
 };
 
+// Throws what isl failed by. Its C functions report a failure, the end of the budget as a rule, by
+// a value that passes for an answer, or by stopping half-way through a loop over pieces.
+void throw_if_failed(isl_ctx* ctx);
+
 class IslBridge {
  public:
   // Dimensions in tuple order.

@@ -1,5 +1,7 @@
 #include "autodiff/isl_maps.h"
 
+#include "autodiff/isl_bridge.h"
+
 namespace retrograde::ir {
 
 isl::map only_output(const isl::map& m, int which) {
@@ -19,7 +21,9 @@ isl::map output_equals(const isl::pw_aff& e, int which, int n) {
 }
 
 bool is_single_valued(const isl::map& m) {
-  return isl_map_is_single_valued(m.get()) == isl_bool_true;
+  const bool result = isl_map_is_single_valued(m.get()) == isl_bool_true;
+  throw_if_failed(isl_map_get_ctx(m.get()));
+  return result;
 }
 
 }  // namespace retrograde::ir

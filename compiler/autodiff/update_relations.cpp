@@ -80,7 +80,9 @@ std::optional<isl::map> UpdateRelations::access(IslBridge& bridge,
 }
 
 bool UpdateRelations::write_is_injective() const {
-  return isl_map_is_injective(write_->get()) == isl_bool_true;
+  const bool result = isl_map_is_injective(write_->get()) == isl_bool_true;
+  throw_if_failed(context_.ctx);
+  return result;
 }
 
 Expr UpdateRelations::written(const std::vector<Expr>& names) const {
