@@ -267,8 +267,13 @@ class Synthesis {
       values.push_back(floating ? cast_to(target.types[k], value) : Expr());
     }
     const Box& box = regions_.of(c.input.get());
-    RETROGRADE_ASSERT(box.size() == args.size(), "the region of ", quoted(target.name),
-                      " is known, since ", quoted(f.name), " depends on it");
+    if (box.size() != args.size()) {
+      explain(Explanation::Kind::Zero, target.name,
+              text("the output reads no element of it, at most its bounds: what the custom adjoint "
+                   "of ",
+                   quoted(f.name), " contributes does not count"));
+      return;
+    }
     add_pointwise(c.input.get(), target.args, box, {}, values);
     result_.funcs.push_back(c.adjoint);
     explain(Explanation::Kind::Custom, f.name,

@@ -379,6 +379,27 @@ TEST_F(CustomAdjoints, TangentsOfInputsThatMove) {
   expect_mentions(t.explain(), {"custom \"f", "from its custom tangent"});
 }
 
+TEST_F(CustomAdjoints, OfAnInputWhoseBoundsAloneAreReadContributeNothingToIt) {
+  ImageParam sized(Float(32), 1, "sized");
+  sized.set(a);
+  Func f("f");
+  f(x) = sin(a(x)) * cast<float>(sized.width());
+  Buffer<float> input = a;
+  custom_adjoint(f, {a, sized}, [input, sized](const AdjointContext& c) {
+    Func adj("a_adj"), sized_adj("sized_adj");
+    Var j;
+    adj(j) = c.adjoint()(j) * 3.0f;
+    sized_adj(j) = 1.0f;
+    return Contributions{{input, adj}, {sized, sized_adj}};
+  });
+  Derivative d = propagate_adjoints(sum_of(f));
+  for (int n = 0; n < 6; ++n) {
+    EXPECT_EQ(at(d(a), n), 3.0 * (n + 1));
+    EXPECT_EQ(at(d(sized), n), 0.0);
+  }
+  expect_mentions(d.explain(), {"zero \"sized\"", "reads no element of it"});
+}
+
 TEST_F(CustomAdjoints, WithoutATangentIsRefusedWhereInputsMove) {
   Func f = with_slope(3.0f), h("h");
   Buffer<float> b = random_image({6}, 0.25, 1.5, 2);
