@@ -151,20 +151,32 @@ class Judge {
 
   // ---- differences ----
 
-  // False: it cannot be told here.
+  // False: it cannot be told here. A wrong gradient is wrong along any direction, while kinks that
+  // cancel along one do not along another.
   bool compare_with_differences() {
+    const Differences first = differences_along(*v_, reverse_);
+    if (first.is_right() || !first.slope.is_smooth) return first.slope.is_smooth;
+    const Motion another(p_, s_.weights, "v_again");
+    const Differences second = differences_along(
+        another, another.along([&](const AdjointInput& x) { return derivative_->of(x); }));
+    if (second.is_right() || !second.slope.is_smooth) return false;
+    decide(Judgement::Wrong, text("the gradient says ", first.gradient, " and differences ",
+                                  first.slope.value, " +- ", first.slope.doubt));
+  }
+  struct Differences {
+    double gradient;
+    Slope slope;
+    bool is_right() const { return std::abs(slope.value - gradient) <= slope.doubt; }
+  };
+  Differences differences_along(const Motion& v, const Product& gradient) {
     const auto moved = [&](double by) {
-      v_->move(by);
+      v.move(by);
       const double result = primal("a neighbour of it");
-      v_->move(-by);
+      v.move(-by);
       return result;
     };
-    const Slope slope =
-        slope_of(moved, at_rest_, reverse_.magnitude, s_.largest, precision_of(p_.output()));
-    if (!slope.is_smooth) return false;
-    if (std::abs(slope.value - reverse_.sum) <= slope.doubt) return true;
-    decide(Judgement::Wrong, text("the gradient says ", reverse_.sum, " and differences ",
-                                  slope.value, " +- ", slope.doubt));
+    return {gradient.sum,
+            slope_of(moved, at_rest_, gradient.magnitude, s_.largest, precision_of(p_.output()))};
   }
 
   const AdversaryProgram& p_;

@@ -26,11 +26,12 @@ struct Product {
   bool is_finite() const;
 };
 
-// Weights of all values of a box, none of them 0: odd multiples of 1/4 up to 7/4.
+// Weights of all values of a box, from 1/4 to 7/4 and of either sign. No two are alike, so that
+// kinks of two elements do not cancel.
 class Weights {
  public:
   explicit Weights(uint64_t seed) : random_(seed) {}
-  float next() { return (2.0f * static_cast<float>(random_() % 4) + 1.0f) * sign() / 4.0f; }
+  float next() { return sign() * (0.25f + 1.5f * static_cast<float>(random_() >> 40) * 0x1p-24f); }
   float sign() { return random_() % 2 ? 1.0f : -1.0f; }
   int below(int n) { return static_cast<int>(random_() % static_cast<uint64_t>(n)); }
   Buffer<float> over(const oracle::Region& region, const std::string& name);
