@@ -182,13 +182,28 @@ class Recurrence {
     return exact_ ? carried_in_double(term, result_.current.func, exact_) : term;
   }
 
+  // Equal reads are one, with the sum of their adjoints: it has one domain to sum over.
+  std::vector<LeafAdjoint> self_leaves(const SweepResult& sweep) const {
+    std::vector<LeafAdjoint> result;
+    for (const LeafAdjoint& leaf : sweep.leaves) {
+      if (!as_call_of(leaf.leaf, f_)) continue;
+      auto known = std::find_if(result.begin(), result.end(),
+                                [&](const LeafAdjoint& l) { return equal(l.leaf, leaf.leaf); });
+      if (known == result.end()) {
+        result.push_back(leaf);
+      } else {
+        known->adjoint = known->adjoint + leaf.adjoint;
+      }
+    }
+    return result;
+  }
+
   // Contributions of self reads: to newer values (`to_new`) or to those before the stage.
   std::vector<Contribution> self_contributions(const std::vector<SelfRead>& reads,
                                                const SweepResult& sweep, bool to_new) {
     std::vector<Contribution> result;
-    for (const LeafAdjoint& leaf : sweep.leaves) {
+    for (const LeafAdjoint& leaf : self_leaves(sweep)) {
       const Call* call = as_call_of(leaf.leaf, f_);
-      if (!call) continue;
       auto read = std::find_if(reads.begin(), reads.end(),
                                [&](const SelfRead& r) { return equal(r.call, leaf.leaf); });
       const UpdateRelations::Read& relation = read->relation;

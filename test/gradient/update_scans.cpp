@@ -315,5 +315,15 @@ PROGRAM(triangular_solve) {
   return {weighted_sum(s, {4}), {l, b}};
 }
 
+// Each row reads its diagonal twice, before and after it is overwritten.
+PROGRAM(diagonal_read_twice_while_rows_are_overwritten) {
+  Buffer<float> a = random_image({5, 5}, 0.25, 2, 14);
+  Func f("f");
+  RDom r(0, 3);
+  f(x, y) = a(x, y);
+  f(r, y) = f(y, y) * 0.0625f + sin(f(y, y));
+  return {weighted_sum(f, {5, 5}), {a}, true};
+}
+
 }  // namespace
 }  // namespace retrograde::gradient
