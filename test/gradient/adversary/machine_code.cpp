@@ -1,11 +1,15 @@
 // Gradients as machine code: within the rounding that the interpreter allows for, and the same bits
 // on any number of threads; as they are, and under a random schedule.
+#include <algorithm>
+#include <cmath>
 #include <cstring>
+#include <string_view>
 
 #include "diagnostics/error.h"
 #include "frontend/realization.h"
 #include "gradient/adversary/probe.h"
 #include "gradient/adversary/schedules.h"
+#include "ir/visit.h"
 #include "support/own_threads.h"
 #include "testing/interpreter.h"
 
@@ -19,9 +23,32 @@ Buffer<> room_for(const Type& type, const oracle::Region& region) {
   return result;
 }
 
+bool uses_fast_functions(const Func& output) {
+  bool found = false;
+  for (const ir::FuncPtr& f : ir::topological_order({output.function()})) {
+    for (int s = 0; s < f->stage_count(); ++s) {
+      ir::for_each_expr(f->stage(s), [&](const Expr& root) {
+        ir::walk(root, [&](const Expr& e) {
+          const auto* call = e.as<ir::Call>();
+          found |= call && call->call_type == ir::CallType::Operator &&
+                   std::string_view(ir::op_info(call->op).name).starts_with("fast_");
+          return !found;
+        });
+      });
+    }
+  }
+  return found;
+}
+
+bool is_finite(const oracle::Array& values) {
+  return std::all_of(values.values.begin(), values.values.end(),
+                     [](const oracle::Value& v) { return std::isfinite(as_double(v)); });
+}
+
 class Compiled {
  public:
-  Compiled(Subject& s, const Gradients& gradients) : s_(s), gradients_(gradients) {}
+  Compiled(Subject& s, const Gradients& gradients)
+      : s_(s), gradients_(gradients), has_fast_(uses_fast_functions(s.program.output())) {}
 
   // False: nothing of the program runs as machine code.
   bool compare_unscheduled() {
@@ -85,6 +112,8 @@ class Compiled {
 
   void compare(size_t i, const std::string& how) { compare(i, gradients_[i].first, how); }
   void compare(size_t i, const Func& gradient, const std::string& how) {
+    // Approximations are finite where the functions that they stand for have long overflowed.
+    if (has_fast_ && !is_finite(expected_[i])) return;
     const oracle::Region& region = gradients_[i].second;
     const int threads = 1 << s_.weights.below(4);
     const Buffer<> first = realized(gradient, region, nullptr);
@@ -115,6 +144,7 @@ class Compiled {
 
   Subject& s_;
   const Gradients& gradients_;
+  const bool has_fast_;
   std::vector<oracle::Array> expected_;
 };
 
