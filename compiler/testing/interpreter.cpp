@@ -398,7 +398,7 @@ class Interpreter::Impl {
         return buffer_fact(step);
       case Step::Code::Cast:
         ++operations_;
-        return apply_cast(step.type, child(0));
+        return apply_cast(options_.rounding, step.type, child(0));
       case Step::Code::Reinterpret:
         return reinterpret(frame, step);
       case Step::Code::Binary:
@@ -462,8 +462,9 @@ class Interpreter::Impl {
   Value reinterpret(Frame& frame, const Step& step) {
     ++operations_;
     const int child = step.children[0];
-    const Value exact = apply_cast(frame.program.steps[child].declared, get(frame, child));
-    return apply_cast(step.type, apply_reinterpret(step.declared, exact));
+    const Value exact =
+        apply_cast(options_.rounding, frame.program.steps[child].declared, get(frame, child));
+    return apply_cast(options_.rounding, step.type, apply_reinterpret(step.declared, exact));
   }
 
   Value random(Frame& frame, const Step& step) {
@@ -477,7 +478,7 @@ class Interpreter::Impl {
     const Scalar number = step.declared.is_float()
                               ? Scalar::of_float(step.declared, ir::random_float(bits))
                               : Scalar::of_uint(UInt(32), bits);
-    const Value value = apply_cast(step.type, {number});
+    const Value value = apply_cast(Rounding::Strict, step.type, {number});
     return stable ? value : Value::unstable(value.scalar);
   }
 
@@ -509,7 +510,8 @@ class Interpreter::Impl {
     if (bound == scalars_.end() && !p.value) {
       call_error("interpret with parameter " + quoted(p.name), "every parameter needs a value");
     }
-    return apply_cast(step.type, {bound != scalars_.end() ? bound->second : *p.value});
+    return apply_cast(Rounding::Strict, step.type,
+                      {bound != scalars_.end() ? bound->second : *p.value});
   }
 
   const halide_buffer_t& buffer_of(const ParameterContents& p) const {
@@ -560,7 +562,7 @@ class Interpreter::Impl {
                  quoted(p.name) + " is read at " + show(point));
     }
     touched_[&p].include(point);
-    const Value value = apply_cast(step.type, {read_element(buffer, point)});
+    const Value value = apply_cast(Rounding::Strict, step.type, {read_element(buffer, point)});
     return stable ? value : Value::unstable(value.scalar);
   }
 
@@ -573,7 +575,7 @@ class Interpreter::Impl {
     ++operations_;
     std::vector<Scalar> args;
     for (const Value& arg : children(frame, step)) args.push_back(arg.scalar);
-    return apply_cast(step.type, {it->second(args)});
+    return apply_cast(Rounding::Strict, step.type, {it->second(args)});
   }
 
   std::unordered_map<const FuncContents*, std::unique_ptr<FuncState>> states_;

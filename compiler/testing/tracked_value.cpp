@@ -39,6 +39,13 @@ double rounding_residual(Kind kind, const Scalar& a, const Scalar& b, const Scal
   return std::fabs((a.f - (r - virtual_y)) + (y - virtual_y));
 }
 
+// What a cast to a narrower float rounds off. float32(float64(a) * float64(b)) is the product of
+// float32 exactly, and a compiler that computes it so may contract it: then this rounding is gone.
+double narrowing_residual(const Scalar& a, const Scalar& result) {
+  if (!a.type.is_float() || !result.type.is_float()) return 0;
+  return std::isfinite(result.f) ? std::fabs(a.f - result.f) : 0;
+}
+
 // The error that reaches the result through the operands.
 double propagated(Kind kind, const Value& a, const Value& b, double result) {
   const double x = std::fabs(a.scalar.f), y = std::fabs(b.scalar.f);
@@ -232,10 +239,11 @@ Value apply_not(const Value& a) {
   return {ir::eval_not(a.scalar), a.error};
 }
 
-Value apply_cast(Type type, const Value& a) {
+Value apply_cast(Rounding rounding, Type type, const Value& a) {
   if (a.is_undef()) return a;
   const Scalar result = ir::eval_cast(type, a.scalar);
-  if (a.error == 0) return {result};
+  if (rounding == Rounding::Strict) return {result};
+  if (a.error == 0) return {result, narrowing_residual(a.scalar, result)};
   if (!a.is_stable() || !a.scalar.type.is_float()) return Value::unstable(result);
   if (type.is_float()) return {result, a.error + ulp(type, result.f)};
   for (const double sign : {-1.0, 1.0}) {

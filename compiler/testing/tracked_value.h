@@ -22,7 +22,8 @@ namespace retrograde::oracle {
 
 enum class Rounding {
   Strict,       // no freedom: error stays 0
-  Contraction,  // a * b + c may round once; math functions differ by math_ulps
+  Contraction,  // a * b + c may round once, also across a cast of the product to a narrower float;
+                // math functions differ by math_ulps
   Reordering,   // every rounding may happen elsewhere: sums reassociated, x / c as x * (1 / c)
 };
 
@@ -52,7 +53,7 @@ int math_ulps(ir::Op op);
 // The operations of ir/scalar.h with errors carried along.
 Value apply_binary(Rounding rounding, ir::Kind kind, const Value& a, const Value& b);
 Value apply_not(const Value& a);
-Value apply_cast(Type type, const Value& a);
+Value apply_cast(Rounding rounding, Type type, const Value& a);
 Value apply_reinterpret(Type type, const Value& a);
 Value apply_operator(Rounding rounding, ir::Op op, const std::vector<Value>& args, Type type);
 

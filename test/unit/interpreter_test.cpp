@@ -168,6 +168,18 @@ TEST(TrackedValue, BoundCoversContractionIntoAnOperator) {
   EXPECT_LE(std::fabs(contracted - value.scalar.f), value.error);
 }
 
+// LLVM computes the product in float32, where it is the same, and fuses it with the sum.
+TEST(TrackedValue, BoundCoversContractionAcrossANarrowingCast) {
+  const float a = 1.1f, b = 3.3f, c = -3.63f;
+  Func f;
+  f(x) = cast<float>(cast<double>(cast<float>(x) + Expr(a)) * cast<double>(Expr(b))) + Expr(c);
+  const Value value = value_at(f, 0, Rounding::Contraction);
+  const float contracted = std::fma(a, b, c);
+  EXPECT_NE(contracted, static_cast<float>(value.scalar.f)) << "the case is too easy";
+  EXPECT_LE(std::fabs(contracted - value.scalar.f), value.error);
+  EXPECT_EQ(value_at(f, 0, Rounding::Strict).error, 0);
+}
+
 TEST(TrackedValue, DecisionWithinTheErrorIsUnstable) {
   Func third, f;
   third(x) = cast<float>(x) * 0.1f;
