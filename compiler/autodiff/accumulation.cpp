@@ -4,6 +4,7 @@
 #include <map>
 
 #include "autodiff/adjoint_contents.h"
+#include "autodiff/gather_places.h"
 #include "autodiff/local_derivative.h"
 #include "autodiff/regions.h"
 #include "frontend/define.h"
@@ -34,26 +35,6 @@ constexpr double few_elements = 64, many_iterations = 4096, unknown_elements = 1
 bool is_pointwise(const Gather& g) {
   return !g.rdom && !g.scatters &&
          std::all_of(g.pure.begin(), g.pure.end(), [](bool p) { return p; });
-}
-
-// In a dimension of few elements a fixed index becomes a condition: plane_adj(x, 0) and
-// plane_adj(x, 1) in one pass, and in the pure definition, rather than an update for each.
-constexpr int64_t few = 8;
-Gather with_few_elements_pure(Gather g, const AdjointTarget& target) {
-  if (g.rdom || g.scatters || target.region.size() != g.lhs.size()) return g;
-  for (size_t d = 0; d < g.lhs.size(); ++d) {
-    if (g.pure[d]) continue;
-    const LoopVariable& v = target.region[d];
-    if (!v.min.defined() || !v.max.defined()) continue;
-    auto extent = as_const_int(simplify(v.max - v.min + 1));
-    if (!extent || *extent > few) continue;
-    Expr arg = variable(target.args[d]);
-    Expr here = arg == g.lhs[d];
-    g.predicate = g.predicate.defined() ? g.predicate && here : here;
-    g.lhs[d] = arg;
-    g.pure[d] = true;
-  }
-  return g;
 }
 
 // Conditions on ranges are true but for borders; those on residues are not.
@@ -477,7 +458,7 @@ void append_update(const FuncPtr& f, std::vector<Expr> args, std::vector<Expr> v
 AdjointFunc make_adjoint(const AdjointTarget& target, const std::string& name,
                          const std::vector<Contribution>& given, const std::vector<Expr>& initial) {
   std::vector<Contribution> contributions = given;
-  for (Contribution& c : contributions) c.gather = with_few_elements_pure(c.gather, target);
+  for (Contribution& c : contributions) c.gather = with_safe_places(c.gather, target);
   return Builder(target, name).build(contributions, initial);
 }
 

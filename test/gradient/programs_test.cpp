@@ -324,6 +324,38 @@ TEST_F(Programs, ParametricSizes) {
   expect_machine_code_agrees(gradient, region);
 }
 
+// The adjoint of clamp(x, 0, p) adds to element p, which the image has only where it is read.
+TEST_F(Programs, AClampWiderThanTheImageIsNotReachedAndAddsNowhere) {
+  Param<int> p("p");
+  p.set(50);
+  Func f("f");
+  f(x, y) = image(clamp(x, 0, p), clamp(y, 0, 2 * p)) * image(clamp(2 * y, 0, p / 20), y);
+  expect_gradient(weighted_sum(f, {7, 6}), image);
+}
+
+TEST_F(Programs, AClampToSizesOfAnImageAddsInsideOfIt) {
+  ImageParam in(Float(32), 2, "in");
+  in.set(image);
+  Func f("f");
+  const Expr w = in.width(), h = in.height();
+  f(x) = pow(in(clamp(2 * x + 1, 0, w - 1), h - 1 - clamp(x + cast<int>(x < 4), 0, h - 1)), 2);
+  Func gradient = propagate_adjoints(weighted_sum(f, {5}))(in);
+  expect_machine_code_agrees(gradient, {{0, 0}, {7, 6}});
+}
+
+// Room up to element p would be 8 GB.
+TEST_F(Programs, AClampWiderThanAFuncTakesNoRoom) {
+  Param<int> p("p");
+  p.set(2000000000);
+  Func f("f"), g("g");
+  f(x) = sin(image(x, 0));
+  g(x) = f(clamp(x, 0, p)) + f(clamp(x + 1, 0, p)) * 2.0f;
+  Derivative d = propagate_adjoints(weighted_sum(g, {6}));
+  Func of_f = d.adjoint(f);
+  of_f.compute_root();
+  expect_machine_code_agrees(d(image), {{0, 0}, {7, 6}});
+}
+
 TEST_F(Programs, DeepChainOfStencilsIsNotInlined) {
   std::vector<Func> chain;
   Buffer<float> wide = random_image({70}, 0.25, 2, 21);
