@@ -25,25 +25,48 @@ int64_t repetitions_for(int64_t steps, int64_t states) {
   return r;
 }
 
+// A stretch of steps whose first state is kept is cut in two: the later part is reversed first,
+// then the stretch is what is before the cut. As many stretches are open as states are kept, which
+// may be millions: they are a list, not calls within calls.
 class Schedule {
  public:
-  std::vector<RevolveAction> actions;
-
-  // Reverses the steps in [begin, end). State `begin` is current and, unless one step is left, is
-  // to be kept in `slot`, the first of `states` free ones.
-  void reverse(int begin, int end, int slot, int states) {
-    if (end - begin > 1) add(RevolveAction::Kind::Store, begin, slot);
-    while (end - begin > 1) {
-      int middle = begin + first_part(end - begin, states);
-      for (int step = begin; step < middle; ++step) add(RevolveAction::Kind::Advance, step);
-      reverse(middle, end, slot + 1, states - 1);
-      end = middle;
-      add(RevolveAction::Kind::Restore, begin, slot);
+  Schedule(int steps, int states) : states_(states) {
+    open(0, steps);
+    while (!stretches_.empty()) {
+      if (stretches_.back().end - stretches_.back().begin > 1)
+        cut();
+      else
+        reverse();
     }
-    add(RevolveAction::Kind::Reverse, begin);
   }
 
+  std::vector<RevolveAction> actions;
+
  private:
+  struct Stretch {
+    int begin, end;
+  };
+
+  // State `begin` is current. It is kept unless one step is left.
+  void open(int begin, int end) {
+    stretches_.push_back({begin, end});
+    if (end - begin > 1) add(RevolveAction::Kind::Store, begin, slot());
+  }
+  void cut() {
+    Stretch& now = stretches_.back();
+    const int end = now.end, middle = now.begin + first_part(end - now.begin, states_ - slot());
+    for (int step = now.begin; step < middle; ++step) add(RevolveAction::Kind::Advance, step);
+    now.end = middle;
+    open(middle, end);
+  }
+  void reverse() {
+    add(RevolveAction::Kind::Reverse, stretches_.back().begin);
+    stretches_.pop_back();
+    if (!stretches_.empty()) add(RevolveAction::Kind::Restore, stretches_.back().begin, slot());
+  }
+
+  // Where the innermost stretch keeps its first state.
+  int slot() const { return static_cast<int>(stretches_.size()) - 1; }
   void add(RevolveAction::Kind kind, int step, int slot = -1) {
     actions.push_back({kind, step, slot});
   }
@@ -55,6 +78,9 @@ class Schedule {
     return static_cast<int>(std::min(revolve_steps_within(states, r - 1),
                                      steps - revolve_steps_within(states - 1, r - 1)));
   }
+
+  int states_;
+  std::vector<Stretch> stretches_;  // the innermost last
 };
 
 }  // namespace
@@ -66,9 +92,7 @@ int64_t revolve_advances(int64_t steps, int64_t states) {
 }
 
 std::vector<RevolveAction> revolve_schedule(int steps, int states) {
-  Schedule schedule;
-  schedule.reverse(0, steps, 0, std::min(states, steps));
-  return std::move(schedule.actions);
+  return std::move(Schedule(steps, std::min(states, steps)).actions);
 }
 
 }  // namespace retrograde::ir

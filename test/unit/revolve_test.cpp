@@ -74,5 +74,7 @@ TEST(Revolve, WithRoomForAllStatesNothingButTheFirstRunIsComputed) {
   EXPECT_EQ(run(50, 500), 49);
 }
 
+TEST(Revolve, MillionsOfStatesNeedNoDeepStack) { EXPECT_EQ(run(2000000, 2000000), 1999999); }
+
 }  // namespace
 }  // namespace retrograde::ir
