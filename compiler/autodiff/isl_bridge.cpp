@@ -69,6 +69,13 @@ std::optional<isl::pw_aff> IslBridge::obstacle(const Expr& e) {
   return std::nullopt;
 }
 
+// A condition that isl does not follow: a parameter, 0 or 1, where its value is known to be fixed.
+std::optional<isl::set> IslBridge::opaque(const Expr& e) {
+  if (fixed_.contains(e)) return parameter(e).ge_set(constant(1));
+  obstacles_.insert(e);
+  return std::nullopt;
+}
+
 std::optional<isl::pw_aff> IslBridge::binary(const Binary& b, const Expr& e) {
   std::optional<int64_t> divisor = as_const_int(b.b);
   if (b.kind == Kind::Mul) {
@@ -175,8 +182,8 @@ isl::pw_aff IslBridge::bound(const Expr& e) {
   return parameter(e);
 }
 
-std::optional<isl::set> IslBridge::comparison(const Binary& b) {
-  if (!b.a.type().is_int() && !b.a.type().is_uint()) return obstacles_.insert(b.a), std::nullopt;
+std::optional<isl::set> IslBridge::comparison(const Binary& b, const Expr& e) {
+  if (!b.a.type().is_int() && !b.a.type().is_uint()) return opaque(e);
   auto a = affine(b.a), c = affine(b.b);
   if (!a || !c) return std::nullopt;
   switch (b.kind) {
@@ -208,14 +215,14 @@ std::optional<isl::set> IslBridge::condition(const Expr& e) {
     return condition(call->args[0]);
   }
   const auto* b = e.as<Binary>();
-  if (!b) return obstacles_.insert(e), std::nullopt;
+  if (!b) return opaque(e);
   if (b->kind == Kind::And || b->kind == Kind::Or) {
     auto a = condition(b->a), c = condition(b->b);
     if (!a || !c) return std::nullopt;
     return (b->kind == Kind::And ? a->intersect(*c) : a->unite(*c)).coalesce();
   }
-  if (b->kind >= Kind::EQ && b->kind <= Kind::GE) return comparison(*b);
-  return obstacles_.insert(e), std::nullopt;
+  if (b->kind >= Kind::EQ && b->kind <= Kind::GE) return comparison(*b, e);
+  return opaque(e);
 }
 
 // ---- back to expressions ----

@@ -77,7 +77,8 @@ class IslBridge {
   std::optional<isl::pw_aff> binary(const Binary& b, const Expr& e);
   std::optional<isl::pw_aff> absolute(const Cast& c);
   std::optional<isl::pw_aff> bits(const Call& c, const Expr& e);
-  std::optional<isl::set> comparison(const Binary& b);
+  std::optional<isl::set> comparison(const Binary& b, const Expr& e);
+  std::optional<isl::set> opaque(const Expr& e);
 
   isl_ctx* ctx_;
   std::vector<std::string> dims_;

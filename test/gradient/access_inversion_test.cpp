@@ -52,7 +52,7 @@ int64_t eval(const Expr& e, const Env& env) {
         if (c.call_type == CallType::Operator) return eval(c.args[0], env);
         std::vector<int64_t> args;
         for (const Expr& a : c.args) args.push_back(eval(a, env));
-        return table(args) % 5;
+        return table(args) % (c.type.is_bool() ? 2 : 5);
       },
       [&](const ExprNode&) -> int64_t {
         ADD_FAILURE() << "cannot evaluate " << e;
@@ -328,6 +328,11 @@ Expr data(std::vector<Expr> args) { return call_image("data", Int(32), std::move
 
 TEST(AccessInversion, DataOnDeterminedVariablesIsAParameter) {
   expect_gathers(make_case({x10, y8}, {x + data({y}), y}), {1});
+}
+TEST(AccessInversion, ConditionOnDeterminedVariablesIsAParameter) {
+  Expr flag = call_image("flag", Bool(), {y}, {});
+  for (const Expr& c : {flag, flag && data({y}) > 2, !flag})
+    expect_gathers(make_case({x10, y8}, {make_select(c, x, x + 2), y}), {1});
 }
 TEST(AccessInversion, DataInOneDimensionScattersThereOnly) {
   Inversion inversion = check(make_case({x10, y8, loop("c", 0, 3)}, {c, x, data({x, y})}));
