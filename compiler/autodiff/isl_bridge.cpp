@@ -63,6 +63,33 @@ bool IslBridge::mentions_dim(const Expr& e) const {
   return found;
 }
 
+namespace {
+
+// Sums and products of such integers are taken modulo a power of two, which isl's are not.
+bool wraps(Type t) { return !t.is_int() || t.bits() < 32; }
+
+// Parameters come back as int32, of which wider data have no counterpart.
+bool is_wide(Type t) { return t.bits() > 32 || (t.is_uint() && t.bits() == 32); }
+bool has_wide_data(const Expr& e) {
+  bool found = false;
+  walk(e, [&](const Expr& node) {
+    const auto* call = node.as<Call>();
+    const bool is_data = node.as<Variable>() || (call && call->call_type != CallType::Operator);
+    found |= is_data && is_wide(node.type());
+    return !found;
+  });
+  return found;
+}
+
+// Whether numbers of such operands are those of isl.
+bool is_followed(const Binary& comparison) {
+  const Type t = comparison.a.type();
+  if (is_wide(t)) return t.is_int() && !has_wide_data(comparison.a) && !has_wide_data(comparison.b);
+  return t.is_int() || t.is_uint();
+}
+
+}  // namespace
+
 std::optional<isl::pw_aff> IslBridge::obstacle(const Expr& e) {
   if (!mentions_dim(e) || fixed_.contains(e)) return parameter(e);
   obstacles_.insert(e);
@@ -77,6 +104,7 @@ std::optional<isl::set> IslBridge::opaque(const Expr& e) {
 }
 
 std::optional<isl::pw_aff> IslBridge::binary(const Binary& b, const Expr& e) {
+  if (wraps(e.type())) return obstacle(e);
   std::optional<int64_t> divisor = as_const_int(b.b);
   if (b.kind == Kind::Mul) {
     if (!divisor && !as_const_int(b.a)) return obstacle(e);
@@ -183,7 +211,7 @@ isl::pw_aff IslBridge::bound(const Expr& e) {
 }
 
 std::optional<isl::set> IslBridge::comparison(const Binary& b, const Expr& e) {
-  if (!b.a.type().is_int() && !b.a.type().is_uint()) return opaque(e);
+  if (!is_followed(b)) return opaque(e);
   auto a = affine(b.a), c = affine(b.b);
   if (!a || !c) return std::nullopt;
   switch (b.kind) {

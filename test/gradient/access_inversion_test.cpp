@@ -331,7 +331,8 @@ TEST(AccessInversion, DataOnDeterminedVariablesIsAParameter) {
 }
 TEST(AccessInversion, ConditionOnDeterminedVariablesIsAParameter) {
   Expr flag = call_image("flag", Bool(), {y}, {});
-  for (const Expr& c : {flag, flag && data({y}) > 2, !flag})
+  Expr wide = call_image("wide", UInt(32), {y}, {}) > make_const(UInt(32), 2);
+  for (const Expr& c : {flag, wide, flag && !wide, flag == wide})
     expect_gathers(make_case({x10, y8}, {make_select(c, x, x + 2), y}), {1});
 }
 TEST(AccessInversion, DataInOneDimensionScattersThereOnly) {

@@ -143,6 +143,31 @@ TEST_F(Programs, DataDependentGatherScatters) {
   EXPECT_NE(d.explain().find("scattered"), std::string::npos) << d.explain();
 }
 
+// Numbers of these types are taken modulo 2^8, 2^16 and 2^32, or are beyond int32.
+template <class T>
+void expect_place_chosen_by_data_of_the_row(Buffer<float>& image) {
+  Buffer<T> row(6);
+  for (int i = 0; i < 6; ++i) row(i) = static_cast<T>(i * 50 + (i % 2) * 3000000000u);
+  const auto number = [](int n) { return cast(type_of<T>(), Expr(n)); };
+  Expr v = row(y);
+  for (const Expr& shifts : {v + number(100) > number(120), v - number(60) < number(90),
+                             v * number(3) < number(100), v > number(70)}) {
+    Func f("f");
+    f(x, y) = image(select(shifts, x, x + 2), y);
+    Func loss = weighted_sum(f, {5, 6});
+    Derivative d = propagate_adjoints(loss);
+    expect_gradient(loss, d, image);
+    EXPECT_EQ(d.explain().find("scattered"), std::string::npos) << d.explain();
+  }
+}
+TEST_F(Programs, PlaceChosenByUnsignedAndNarrowDataOfTheRow) {
+  expect_place_chosen_by_data_of_the_row<uint8_t>(image);
+  expect_place_chosen_by_data_of_the_row<int8_t>(image);
+  expect_place_chosen_by_data_of_the_row<uint16_t>(image);
+  expect_place_chosen_by_data_of_the_row<uint32_t>(image);
+  expect_place_chosen_by_data_of_the_row<int64_t>(image);
+}
+
 TEST_F(Programs, LookupTableAtDataDependentPlace) {
   Buffer<float> table = random_image({8}, 0.25, 2, 3);
   Func f("f");
