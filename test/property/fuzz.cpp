@@ -35,7 +35,7 @@ using namespace retrograde::fuzz;
 // A program that computes for longer, or that stands still for longer, on a machine however busy.
 constexpr unsigned max_cpu_seconds = 60, max_seconds = 240;
 constexpr double max_refused_fraction = 0.1, max_slow_fraction = 0.01;
-constexpr int crashed = 100;  // exit codes of a child: a Verdict, or this plus the signal
+constexpr int crashed = 100;  // codes of findings: a Verdict, or this plus the signal (0: exited)
 
 struct Options : FuzzOptions {
   std::vector<std::string> without;
@@ -84,11 +84,12 @@ Finding run_program(const Program& program) {
     detail = outcome.detail;
     return static_cast<int>(outcome.verdict);
   });
-  return {result.signal ? crashed + result.signal : result.code, result.detail};
+  if (result.is_crash()) return {crashed + result.signal, result.crash()};
+  return {result.code, result.detail};
 }
 
 std::string describe(const Finding& finding) {
-  if (finding.code >= crashed) return std::string("crashes: ") + strsignal(finding.code - crashed);
+  if (finding.code >= crashed) return finding.detail;
   return std::string(verdict_name(static_cast<Verdict>(finding.code))) + ": " + finding.detail;
 }
 

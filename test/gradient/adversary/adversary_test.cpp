@@ -7,6 +7,7 @@
 #include <numeric>
 
 #include "gradient/adversary/check.h"
+#include "support/run_apart.h"
 
 namespace retrograde::gradient {
 namespace {
@@ -85,6 +86,21 @@ TEST(AdversaryChoices, ShrinkToTheSmallestListThatFails) {
     return l.size() >= 2 && l[0] >= 5 && l[1] >= 7;
   };
   EXPECT_EQ(shrink_choices(list, has_large_pair), (std::vector<uint32_t>{5, 7}));
+}
+
+// A sanitizer ends a process by an exit code, which is no result.
+TEST(RunApart, AProcessThatExitsOnItsOwnIsACrash) {
+  for (int code : {0, 1}) {
+    const fuzz::ApartResult exited = fuzz::run_apart({}, [&](std::string&) -> int { _exit(code); });
+    EXPECT_TRUE(exited.is_crash()) << code;
+  }
+  const fuzz::ApartResult returned = fuzz::run_apart({}, [](std::string& detail) {
+    detail = "seen";
+    return 3;
+  });
+  EXPECT_FALSE(returned.is_crash());
+  EXPECT_EQ(returned.code, 3);
+  EXPECT_EQ(returned.detail, "seen");
 }
 
 }  // namespace

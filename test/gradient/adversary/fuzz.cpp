@@ -71,20 +71,20 @@ Outcome run(Choices choices, bool machine_code) {
   });
   result.judged.judgement = static_cast<Judgement>(result.apart.code);
   const std::string& detail = result.apart.detail;
-  if (detail.empty()) return result;
+  if (result.apart.is_crash() || detail.empty()) return result;
   result.judged.checked = static_cast<unsigned>(detail[0] - first_flag);
   result.judged.detail = detail.substr(1);
   return result;
 }
 
 bool is_finding(const Outcome& result, const std::string& want) {
-  if (result.apart.signal || result.judged.judgement >= Judgement::Wrong) return true;
+  if (result.apart.is_crash() || result.judged.judgement >= Judgement::Wrong) return true;
   return !want.empty() && result.judged.judgement == Judgement::Refused &&
          result.judged.detail.find(want) != std::string::npos;
 }
 std::string describe(const Outcome& result) {
   if (result.apart.is_slow()) return "takes too long";
-  if (result.apart.signal) return result.apart.crash();
+  if (result.apart.is_crash()) return result.apart.crash();
   return std::string(name_of(result.judged.judgement)) + ": " + result.judged.detail;
 }
 // Findings of one kind: how their messages begin.
