@@ -76,6 +76,7 @@ Partials power_partials(Args a, const Expr& v, Op power, Op logarithm) {
                 op1(Op::abs, x) == infinity(x.type());
     dx = make_select(lost, dx, p * v / x);
   }
+  if (is_zero(p)) dx = num(x, 0);
   if (!is_const(p)) dx = zero_where(p == num(p, 0), dx);
   Expr dp = zero_where(x == num(x, 0), v * op1(logarithm, x));
   return {strong(dx), strong(dp)};
@@ -392,9 +393,21 @@ const DerivativeRule& derivative_rule(Kind kind) {
 
 bool has_derivative_rule(Kind kind) { return kind_table().contains(kind); }
 
-bool has_poles(Op op) {
-  return op == Op::sqrt || op == Op::pow || op == Op::asin || op == Op::acos || op == Op::acosh ||
-         op == Op::fast_pow;
+bool has_poles(const Call& call) {
+  switch (call.op) {
+    case Op::sqrt:
+    case Op::asin:
+    case Op::acos:
+    case Op::acosh:
+      return true;
+    case Op::pow:
+    case Op::fast_pow: {
+      auto exponent = as_const_float(call.args[1]);
+      return !exponent || *exponent < 1;
+    }
+    default:
+      return false;
+  }
 }
 
 bool levels_off(Op op) {

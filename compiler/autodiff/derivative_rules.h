@@ -61,7 +61,7 @@ bool has_derivative_rule(Kind kind);  // whether the table has a row for the kin
 // 16-bit floats.
 Type adjoint_type(Type type);
 // Whether a partial of the operator may be infinite where its value is finite: sqrt at 0.
-bool has_poles(Op op);
+bool has_poles(const Call& call);
 // Whether the value may be finite, and the partial 0, where an operand is infinite: exp at -inf.
 bool levels_off(Op op);
 // adjoint * partial, by the partial's strength; `adjoint` and the result are of the adjoint type.

@@ -84,7 +84,8 @@ LocalDerivative of_call(const Expr& e, const Call& call, const ExprFacts& facts)
   switch (rule.cls) {
     case RuleClass::Smooth:
       smooth = sum_of(call.args, rule.partials(call.args, e), facts);
-      smooth.poles = has_poles(call.op);
+      smooth.poles = has_poles(call);
+      for (Finiteness& factor : smooth.factors) factor.risky |= is_risky_op(call.op);
       smooth.levels_off.assign(call.args.size(), levels_off(call.op));
       return smooth;
     case RuleClass::Transparent:
@@ -242,7 +243,7 @@ AdjointTraits traits_of(const Expr& adjoint) {
     const auto* call = e.as<Call>();
     if (!call) return true;
     const bool is_operator = call->call_type == CallType::Operator;
-    result.singular |= is_operator && has_poles(call->op);
+    result.singular |= is_operator && has_poles(*call);
     result.vanished |= is_operator && levels_off(call->op);
     const auto* f = call->call_type == CallType::Func
                         ? dynamic_cast<const AdjointContents*>(call->symbol.raw())

@@ -191,6 +191,8 @@ TEST(DerivativeRules, KinksGiveZeroWhereTheConventionSaysSo) {
   }
   EXPECT_EQ(gradient(op(Op::pow, {x, y}), {{"x", 0}, {"y", 2}})["y"], 0);
   EXPECT_EQ(gradient(op(Op::pow, {x, y}), {{"x", 0}, {"y", 0}})["x"], 0);
+  for (double at : {0.0, 5e-324, nan})
+    EXPECT_EQ(gradient(op(Op::pow, {x, num(0)}), {{"x", at}})["x"], 0) << at;
   EXPECT_EQ(gradient(op(Op::floor, {x}), {{"x", 0.5}})["x"], 0);
 }
 
@@ -229,6 +231,12 @@ TEST(DerivativeRules, LargeArgumentsDoNotOverflowInThePartials) {
   Env a = gradient(op(Op::atan2, {y, x}), huge);
   EXPECT_NEAR(a["x"] * 1e201, -4.0 / 25 * 10, 1e-9);
   EXPECT_NEAR(gradient(op(Op::asinh, {x}), {{"x", 1e200}})["x"] * 1e200, 1, 1e-12);
+}
+
+// 1 / y overflows; the derivative does not.
+TEST(DerivativeRules, APowerWithoutAPoleIsDividedLast) {
+  const Expr square = op(Op::pow, {x / y, num(2)});
+  EXPECT_NEAR(gradient(square, {{"x", 0x1p-1070}, {"y", 0x1p-1045}})["x"] * 0x1p-1021, 1, 1e-15);
 }
 
 TEST(DerivativeRules, StopGradientAndIntegersPassNothing) {
