@@ -205,7 +205,7 @@ void describe_operators(OpTable& t) {
       {Op::pow,
        {"y x^(y-1), or y v / x, v log x",
         "as x^(y-1) and v log x; a pole may have either sign where y - 1 is rounded", 3}},
-      {Op::hypot, {"x / v, y / v, scaled by |x| + |y|", "NaN where v is infinite", 2}},
+      {Op::hypot, {"x / v, y / v, scaled by max(|x|, |y|)", "NaN", 2}},
       {Op::sin, {"cos x", "NaN, as the value", 1}},
       {Op::cos, {"-sin x", "NaN, as the value", 1}},
       {Op::tan, {"1 + v^2", "NaN, as the value", 4}},

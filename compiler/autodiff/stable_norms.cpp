@@ -49,10 +49,16 @@ struct Polar {
   Expr over_length(const Expr& e) const { return e * inverse / scale; }
 };
 
-// Divided by |a_1| + ... + |a_n| first. Its own derivative cancels, so none is taken.
+// Divided by the largest of |a_1|, ..., |a_n| first: their sum may overflow. Its own derivative
+// cancels, so none is taken.
 Polar polar(const std::vector<Expr>& a) {
-  Expr scale, squares;
-  for (const Expr& e : a) scale = scale.defined() ? scale + op1(Op::abs, e) : op1(Op::abs, e);
+  const Expr zero = make_zero(a[0].type());
+  Expr scale, squares, at_origin;
+  for (const Expr& e : a) {
+    const Expr size = op1(Op::abs, e), is_zero = e == zero;
+    scale = scale.defined() ? binary(Kind::Max, scale, size) : size;
+    at_origin = at_origin.defined() ? at_origin && is_zero : is_zero;  // not so beside a NaN
+  }
   scale = op1(Op::stop_gradient, scale);
   Polar result{{}, scale, {}};
   for (const Expr& e : a) {
@@ -60,7 +66,6 @@ Polar polar(const std::vector<Expr>& a) {
     Expr square = result.u.back() * result.u.back();
     squares = squares.defined() ? squares + square : square;
   }
-  Expr zero = make_zero(scale.type()), at_origin = scale == zero;
   result.inverse = make_one(scale.type()) / op1(Op::sqrt, squares);
   for (Expr& e : result.u) e = make_select(at_origin, zero, e * result.inverse);
   return result;

@@ -239,6 +239,15 @@ TEST(DerivativeRules, APowerWithoutAPoleIsDividedLast) {
   EXPECT_NEAR(gradient(square, {{"x", 0x1p-1070}, {"y", 0x1p-1045}})["x"] * 0x1p-1021, 1, 1e-15);
 }
 
+TEST(DerivativeRules, VectorsWhoseMagnitudesOverflowTogetherHaveDirections) {
+  const double huge = 1.5e308;
+  const Env at{{"x", huge}, {"y", huge}};
+  EXPECT_NEAR(gradient(op(Op::hypot, {x, y}), at)["x"], std::sqrt(0.5), 1e-15);
+  const Expr length = op(Op::sqrt, {x * x + y * y});
+  for (const Expr& unit : {x / op(Op::hypot, {x, y}), x / length, x * (num(1) / length)})
+    EXPECT_NEAR(gradient(unit, at)["x"] * huge, std::sqrt(0.125), 1e-10) << unit;
+}
+
 TEST(DerivativeRules, StopGradientAndIntegersPassNothing) {
   EXPECT_EQ(gradient(op(Op::stop_gradient, {x}) * y, {{"x", 2}, {"y", 3}})["x"], 0);
   EXPECT_EQ(gradient(cast_to(f64, cast_to(Int(32), x)) * y, {{"x", 2.5}, {"y", 3}})["x"], 0);

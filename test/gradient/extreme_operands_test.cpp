@@ -87,7 +87,7 @@ const std::vector<Row>& rows() {
          [](const Operands& o) {
            Real h = std::hypot(o.x, o.y);
            if (h == 0) return std::vector<Real>{0, 0};
-           if (h > o.most) return std::vector<Real>{nan, nan};
+           if (std::isinf(h)) return std::vector<Real>{nan, nan};
            return std::vector<Real>{o.x / h, o.y / h};
          }),
       of(Op::atan2, 5,
