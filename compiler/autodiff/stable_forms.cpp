@@ -2,9 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "autodiff/stable_norms.h"
 #include "autodiff/stable_patterns.h"
+#include "autodiff/stable_quotients.h"
 #include "ir/build.h"
 #include "ir/equal.h"
 
@@ -37,21 +39,38 @@ StableForm logistic(const Expr& v, const Div& quotient) {
   return {{quotient.a, w}, {strong(reciprocal), strong(-(v * odds_to_probability(e)))}};
 }
 
+Expr is_infinite(const Expr& e) { return call_op(Op::is_inf, Bool(e.type().lanes()), {e}); }
+
 // t / S for a term t that may be infinite, and S with it.
 Expr ratio(const Expr& t, const Expr& sum) {
-  Expr infinite = call_op(Op::is_inf, Bool(t.type().lanes()), {t});
-  return make_select(infinite, make_one(t.type()), t / sum);
+  return make_select(is_infinite(t), make_one(t.type()), t / sum);
+}
+
+// 1 / the number of infinite terms, where terms[own] is one.
+Expr share_of_infinite(const std::vector<Expr>& terms, size_t own) {
+  const Expr one = make_one(terms[own].type()), half = make_const(one.type(), 0.5);
+  if (terms.size() == 2) return make_select(is_infinite(terms[1 - own]), half, one);
+  Expr count = one;
+  for (size_t i = 0; i < terms.size(); ++i) {
+    if (i != own) count = count + make_select(is_infinite(terms[i]), one, make_zero(one.type()));
+  }
+  return terms.size() == 1 ? one : one / count;
 }
 
 // v = log(S), S = sum of e_i and a constant, e_i = exp(w_i):  d/dw_i = e_i / S
 StableForm log_sum_exp(const Expr& sum) {
   StableForm result;
+  std::vector<Expr> terms;
   for (const Expr& term : terms_of(sum)) {
     if (is_const(term)) continue;
     const Call* e = as_operator(term, Op::exp);
     if (!e) return {};
+    terms.push_back(term);
     result.operands.push_back(e->args[0]);
-    result.partials.push_back(strong(ratio(term, sum)));
+  }
+  for (size_t i = 0; i < terms.size(); ++i) {
+    const Expr share = share_of_infinite(terms, i);
+    result.partials.push_back(strong(make_select(is_infinite(terms[i]), share, terms[i] / sum)));
   }
   return result;
 }
@@ -138,26 +157,9 @@ StableForm ratio_of_sums(const Div& quotient) {
   return result;
 }
 
-// v = sin(x) / x:  dv/dx = (cos(x) - v) / x, which cancels near 0: sum of (-1)^k 2k x^(2k-1) /
-// (2k+1)!
-StableForm sine_quotient(const Expr& v, const Div& quotient) {
-  const Call* sine = as_operator(quotient.a, Op::sin);
-  const Expr& x = quotient.b;
-  if (!sine || !equal(sine->args[0], x)) return {};
-  const int terms = x.type().bits() == 64 ? 8 : 4;
-  Expr series = make_zero(x.type()), square = x * x;
-  for (int k = terms; k >= 1; --k) {
-    const double c = (k % 2 ? -2.0 : 2.0) * k / std::tgamma(2 * k + 2);
-    series = make_const(x.type(), c) + square * series;
-  }
-  const Expr is_small = call_op(Op::abs, x.type(), {x}) < make_const(x.type(), 0.5);
-  const Expr cosine = call_op(Op::cos, x.type(), {x});
-  return {{x}, {strong(make_select(is_small, series * x, (cosine - v) / x))}};
-}
-
 StableForm of_quotient(const Expr& e, const Div& quotient) {
   for (const StableForm& form : {share(e, quotient), ratio_of_sums(quotient), logistic(e, quotient),
-                                 normalised_form(e), sine_quotient(e, quotient)}) {
+                                 normalised_form(e), quotient_form(e, quotient)}) {
     if (!form.operands.empty()) return form;
   }
   return {};
@@ -174,17 +176,45 @@ StableForm angle(const Expr& e) {
   return {{quotient->a, quotient->b}, {strong(gradient[0]), strong(gradient[1])}};
 }
 
+// The constant c where a is c b.
+std::optional<double> multiple_of(const Expr& a, const Expr& b) {
+  if (const double sign = sign_between(a, b); sign != 0) return sign;
+  const auto* product = a.as<Mul>();
+  if (!product) return std::nullopt;
+  if (equal(product->a, b)) return as_const_float(product->b);
+  return equal(product->b, b) ? as_const_float(product->a) : std::nullopt;
+}
+
+// v = c b log(b):      dv/db = c (log(b) + 1): in log(b) + b / b the quotient 1 / b overflows
+// v = c p log(p / q):  dv/dp = c (log(p / q) + 1), dv/dq = -c p / q
+StableForm entropy(const Expr& factor, const Expr& logarithm) {
+  const Call* log = as_operator(logarithm, Op::log);
+  if (!log) return {};
+  const auto* quotient = log->args[0].as<Div>();
+  std::optional<double> c = multiple_of(factor, log->args[0]);
+  const bool is_relative = !c && quotient;
+  const Expr& p = is_relative ? quotient->a : log->args[0];
+  if (is_relative) c = multiple_of(factor, p);
+  if (!c || is_const(p)) return {};
+  const Expr scale = make_const(p.type(), *c);
+  StableForm result{{p}, {strong(scale * (logarithm + make_one(p.type())))}};
+  if (is_relative && !is_const(quotient->b)) {
+    result.operands.push_back(quotient->b);
+    result.partials.push_back(strong(-(scale * log->args[0])));
+  }
+  return result;
+}
+StableForm of_product(const Mul& product) {
+  const StableForm form = entropy(product.a, product.b);
+  return form.operands.empty() ? entropy(product.b, product.a) : form;
+}
+
 // ---- max(a, b) + log(1 + exp(-|a - b|)) ----
 
 // exp(-|d|) where e is log(1 + exp(-|d|)).
 Expr decay_of(const Expr& e) {
   const Call* log = as_operator(e, Op::log);
   return log ? exp_of_one_plus_exp(log->args[0]) : Expr();
-}
-// e, or what it is the negation of.
-Expr without_sign(const Expr& e) {
-  const auto* difference = e.as<Sub>();
-  return difference && is_zero(difference->a) ? difference->b : e;
 }
 // Whether e is exp(-|a - b|); without the difference where b is 0.
 bool is_decay_by(const Expr& e, const Expr& a, const Expr& b) {
@@ -246,6 +276,10 @@ StableForm stable_form(const Expr& e) {
   if (const Call* log = as_operator(e, Op::log)) {
     const StableForm quotient = log_of_quotient(log->args[0]);
     return quotient.operands.empty() ? log_sum_exp(log->args[0]) : quotient;
+  }
+  if (const auto* product = e.as<Mul>()) {
+    const StableForm form = of_product(*product);
+    if (!form.operands.empty()) return form;
   }
   if (const Call* arctangent = as_operator(e, Op::atan)) return angle(arctangent->args[0]);
   const StableForm norm = norm_form(e);

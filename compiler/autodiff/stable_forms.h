@@ -9,8 +9,8 @@
 // The same by max(a, b) + log(1 + exp(-|a - b|)), also in a sum: both parts have a kink at a = b.
 // Logarithm of a quotient, log(a / b): the quotient may be denormal, and its reciprocal infinite.
 // Angle, atan(a / b): the quotient's square overflows.
-// sin(a) / a: cos(a) - sin(a) / a cancels near 0.
-// Norms and what is divided by them: stable_norms.h.
+// Entropy, a log(a), and a log(a / b): 1 / a overflows where a is denormal.
+// Norms and what is divided by them: stable_norms.h. sin(a) / a and its kin: stable_quotients.h.
 //
 // Source: folklore; Higham, Accuracy and Stability of Numerical Algorithms, 2nd ed., 1.14 and 27.8.
 #pragma once

@@ -16,7 +16,8 @@ StableForm norm_form(const Expr& e);
 StableForm normalised_form(const Expr& e);
 
 // The components of (a_1, ..., a_n) / |(a_1, ..., a_n)|: 0 at the origin; NaN where a component is
-// infinite or NaN; right to 3 ULP for denormal and huge vectors too, even where the length overflows.
+// infinite or NaN; right to 3 ULP for denormal and huge vectors too, even where the length
+// overflows.
 std::vector<Expr> unit_vector(const std::vector<Expr>& a);
 // The partials of atan2(y, x) by y and x: 0 at the origin and where an operand is infinite.
 std::vector<Expr> angle_gradient(const Expr& y, const Expr& x);

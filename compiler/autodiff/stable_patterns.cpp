@@ -1,6 +1,7 @@
 #include "autodiff/stable_patterns.h"
 
 #include "ir/build.h"
+#include "ir/equal.h"
 
 namespace retrograde::ir {
 
@@ -11,6 +12,16 @@ constexpr size_t most_terms = 4;
 const Call* as_operator(const Expr& e, Op op) {
   const auto* call = e.as<Call>();
   return call && call->is_op(op) ? call : nullptr;
+}
+
+Expr without_sign(const Expr& e) {
+  const auto* difference = e.as<Sub>();
+  return difference && is_zero(difference->a) ? difference->b : e;
+}
+
+double sign_between(const Expr& w, const Expr& x) {
+  const Expr size = without_sign(w);
+  return equal(w, x) ? 1 : equal(size, without_sign(x)) ? -1 : 0;
 }
 
 std::vector<SignedTerm> signed_terms_of(const Expr& sum) {

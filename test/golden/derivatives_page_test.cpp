@@ -44,6 +44,8 @@ mode use the same partials, so they are transposes of each other at every point,
   `max(a, b) + log(1 + exp(-|a - b|))` inside a sum, smooth where its parts have kinks (softplus,
   log-sum-exp, cross entropy of logits); `log(a / b)`, `atan(a / b)`, `sin(a) / a`;
   `sqrt(a*a + b*b + ...)` (norms, whose squares may underflow or overflow), their reciprocals, and
+  `a log(a)` and `a log(a / b)`; `(exp(a) - 1) / a`, `(1 - exp(-a)) / a`, `log(1 + a) / a` and their
+  reciprocals;
   `a / sqrt(a*a + b*b + ...)` (normalised, also by `max(norm, c)`, by a product with `1 / norm`, with
   `pow(a*a + b*b, -0.5f)` or with `fast_inverse_sqrt(a*a + b*b)`).
   `tanh` goes by exp(-2 |x|), since 1 - v^2

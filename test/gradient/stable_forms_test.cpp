@@ -25,6 +25,17 @@ Real logistic_slope(Real x) {
 }
 Real logistic(Real x) { return x > 0 ? 1 / (1 + std::exp(-x)) : std::exp(x) / (1 + std::exp(x)); }
 
+// Of (exp(x) - 1) / x, at the numbers below.
+Real growth_slope(Real x) {
+  const Real series = 0.5L + x / 3 + x * x / 8 + x * x * x / 30;
+  return std::fabs(x) < 0.002L ? series : (std::exp(x) - std::expm1(x) / x) / x;
+}
+// Of log(1 + x) / x.
+Real logarithm_slope(Real x) {
+  const Real series = -0.5L + x * 2 / 3 - x * x * 3 / 4 + x * x * x * 4 / 5;
+  return std::fabs(x) < 0.002L ? series : (1 / (1 + x) - std::log1p(x) / x) / x;
+}
+
 // An exponential is denormal or overflows: so few digits are left as the value has.
 bool is_wide(Real x, Real y) { return std::min(x, y) < -87 || std::max(x, y) > 87; }
 
@@ -120,6 +131,18 @@ const std::vector<Shape>& shapes() {
          return std::fabs(x) < 0.001L ? series : (std::cos(x) - std::sin(x) / x) / x;
        },
        24},
+      {"(exp(x) - 1) / x", [](Expr x, Expr) { return (exp(x) - 1.0f) / x; },
+       [](Real x, Real) { return growth_slope(x); }, 24},
+      {"(1 - exp(-x)) / x", [](Expr x, Expr) { return (1.0f - exp(-x)) / x; },
+       [](Real x, Real) { return -growth_slope(-x); }, 24},
+      {"-log(1 - x) / x", [](Expr x, Expr) { return -log(1.0f - x) / x; },
+       [](Real x, Real) { return -logarithm_slope(-x); }, 24},
+      {"x log(x)", [](Expr x, Expr) { return x * log(x); },
+       [](Real x, Real) { return x > 0 ? std::log(x) + 1 : std::nanl(""); }, 4},
+      {"-log(x) x", [](Expr x, Expr) { return log(x) * -x; },
+       [](Real x, Real) { return x > 0 ? -1 - std::log(x) : std::nanl(""); }, 4},
+      {"y log(y / x)", [](Expr x, Expr y) { return y * log(y / x); },
+       [](Real x, Real y) { return -y / x; }, 2},
       {"atan(x / y)", [](Expr x, Expr y) { return atan(x / y); },
        [](Real x, Real y) {
          const Real r = std::hypot(x, y);
@@ -190,6 +213,22 @@ TEST(StableForms, AreFiniteWhereExpIsDenormal) {
   Buffer<float> gradient = propagate_adjoints(f, one)(x).realize({2});
   EXPECT_NEAR(gradient(0), logistic(1), 0.02);
   EXPECT_NEAR(gradient(1), logistic(-1), 0.02);
+}
+
+TEST(StableForms, ShareWhatAnInfiniteSumHasAmongItsInfiniteTerms) {
+  Buffer<float> x(2), one(1);
+  x(0) = 100, x(1) = 100, one(0) = 1;
+  Var i("i");
+  Func f("f");
+  f(i) = log(exp(x(i)) + exp(x(i + 1)));
+  Func gradient = propagate_adjoints(f, one)(x);
+  Buffer<float> equal = gradient.realize({2});
+  EXPECT_EQ(equal(0), 0.5f);
+  EXPECT_EQ(equal(1), 0.5f);
+  x(1) = 3;
+  Buffer<float> found = gradient.realize({2});
+  EXPECT_EQ(found(0), 1);
+  EXPECT_EQ(found(1), 0);
 }
 
 TEST(StableForms, AreRightToAFewUlpWhereverTheyAreFinite) {
