@@ -83,6 +83,9 @@ class Sweep {
         return {};
       case LocalDerivative::Kind::Choice: {
         Expr a = tangent(local.operands[0]), b = tangent(local.operands[1]);
+        passed_[e.get()].choice = true;
+        for (const Expr& operand : local.operands)
+          passed_[e.get()].quotient |= passed_[operand.get()].quotient;
         for (const Expr& operand : local.operands) traits_[e.get()].add(traits_[operand.get()]);
         if (!a.defined() && !b.defined()) return {};
         return make_select(local.condition, a.defined() ? a : make_zero(type),
@@ -109,9 +112,14 @@ class Sweep {
     Partial partial = local.partials[i];
     const Finiteness& factor = local.factors[i];
     const AdjointTraits& passed = traits_[local.operands[i].get()];
-    if (factor.infinite) partial.strength = Strength::Strong;
-    if (passed.singular || (passed.infinite && local.levels_off_by(i)))
+    const Passed here = passed_[local.operands[i].get()];
+    const bool is_quotient = partial.divisor.defined();
+    if (factor.infinite || (here.choice && factor.read)) partial.strength = Strength::Strong;
+    if (passed.singular || (passed.infinite && local.levels_off_by(i)) ||
+        (here.quotient && !is_quotient))
       partial.strength = partial.strength == Strength::Plain ? Strength::Cut : Strength::Both;
+    passed_[e.get()].choice |= here.choice || partial.factor.as<Select>();
+    passed_[e.get()].quotient |= here.quotient || is_quotient;
     AdjointTraits& traits = traits_[e.get()];
     traits.add(passed);
     traits.add(
@@ -125,6 +133,13 @@ class Sweep {
   std::unordered_set<const ExprNode*> undefs_;
   std::unordered_map<const ExprNode*, Expr> tangents_;
   std::unordered_map<const ExprNode*, AdjointTraits> traits_;
+  // Within the expression that is swept: what a tangent came through, which may have made it 0 or,
+  // where the value is finite, infinite.
+  struct Passed {
+    bool choice = false;
+    bool quotient = false;  // by a denormal number, or a logarithm of one
+  };
+  std::unordered_map<const ExprNode*, Passed> passed_;
   ForwardResult result_;
 };
 

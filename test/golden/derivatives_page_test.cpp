@@ -30,7 +30,8 @@ mode use the same partials, so they are transposes of each other at every point,
   factors of other Funcs may be infinite follows from their definitions
   (`compiler/autodiff/value_range.h`), where what images hold, sums and products count as finite; products
   that overflow inside one expression, `exp(-x * x * y)`, are seen. In forward mode an infinite tangent
-  and a later slope of 0 make 0, too. NaNs and infinities that the output uses stay.
+  and a later slope of 0 make 0, too, and so do, inside one expression, a quotient or logarithm of a
+  denormal number and a later factor of 0. NaNs and infinities that the output uses stay.
 - **Poles.** Where a partial is infinite and the value finite (`sqrt`, `pow`, `asin`, `acos`, `acosh`), a
   factor of exactly 0 after it contributes 0: so norms, `sqrt(x*x + y*y)` at the origin, have gradient 0,
   and `sqrt(x)` at 0 keeps its infinity.
@@ -43,9 +44,9 @@ mode use the same partials, so they are transposes of each other at every point,
   `(exp(a) - exp(-a)) / (exp(a) + exp(-a))`, `(1 - a*a) / (1 + a*a)`; `log(exp(a) + exp(b) + c)`, and
   `max(a, b) + log(1 + exp(-|a - b|))` inside a sum, smooth where its parts have kinks (softplus,
   log-sum-exp, cross entropy of logits); `log(a / b)`, `atan(a / b)`, `sin(a) / a`;
-  `sqrt(a*a + b*b + ...)` (norms, whose squares may underflow or overflow), their reciprocals, and
   `a log(a)` and `a log(a / b)`; `(exp(a) - 1) / a`, `(1 - exp(-a)) / a`, `log(1 + a) / a` and their
   reciprocals;
+  `sqrt(a*a + b*b + ...)` (norms, whose squares may underflow or overflow), their reciprocals, and
   `a / sqrt(a*a + b*b + ...)` (normalised, also by `max(norm, c)`, by a product with `1 / norm`, with
   `pow(a*a + b*b, -0.5f)` or with `fast_inverse_sqrt(a*a + b*b)`).
   `tanh` goes by exp(-2 |x|), since 1 - v^2

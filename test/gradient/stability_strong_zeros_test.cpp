@@ -241,6 +241,22 @@ TEST_F(StrongZeros, AFactorOfZeroInAnEarlierStepThanThePole) {
   }
 }
 
+// 1 / a overflows.
+TEST_F(StrongZeros, AFactorOfZeroAfterAQuotient) {
+  set(a, {1e-45f, 2, -3, 0.25f});
+  Func shrunk("shrunk");
+  shrunk(x) = a(x) / abs(a(x)) * max(abs(a(x)) - 0.5f, 0.0f);
+  expect(shrunk, a, {0, 1, 1, 0});
+}
+
+TEST_F(StrongZeros, AnInfiniteFactorOfAMaximumThatIsConstant) {
+  set(a, {-1, 2, -3, 4});
+  set(b, {inf, 3, -inf, 5});
+  Func f("f");
+  f(x) = max(a(x), 0.0f) * b(x);
+  expect(f, a, {0, 3, 0, 5});
+}
+
 TEST_F(StrongZeros, NaNsThatTheOutputUsesStay) {
   set(a, {-1, 4, 1, 1});
   set(b, {2, 2, 2, 2});
