@@ -42,9 +42,10 @@ Family angles();
 Family ill_conditioned();
 Family reductions();
 Family recurrences();
+Family programs();
 inline std::vector<Family> all_families() {
-  return {norms(),  exponentials(),    activations(), quotients(),  selections(),
-          angles(), ill_conditioned(), reductions(),  recurrences()};
+  return {norms(),  exponentials(),    activations(), quotients(),   selections(),
+          angles(), ill_conditioned(), reductions(),  recurrences(), programs()};
 }
 
 // 1 / (1 + exp(-x)).
