@@ -145,7 +145,7 @@ class Chooser {
     }
     if (pure.empty()) return;
     if (auto d = pure[0] == 0 ? transposed_dimension(*f, f->stage(s)) : std::nullopt)
-      return tile_stage(f, s, *d);
+      return tile_stage(f, s, *d, pure.back());
     Var outermost(f->args[pure.back()]);
     bool reduces = !f->stage(s).rvars.empty();
     if (pure.size() > 1 || (reduces && pure[0] != 0)) stage.parallel(outermost);
@@ -179,11 +179,11 @@ class Chooser {
   }
 
   // Squares, whose rows stay in the cache until their columns are read.
-  static void tile_stage(const FuncPtr& f, int s, size_t dimension) {
+  static void tile_stage(const FuncPtr& f, int s, size_t dimension, size_t outermost) {
     Stage stage(f, s);
     Var x(f->args[0]), y(f->args[dimension]), xi(unique_name("column")), yi(unique_name("row"));
     stage.tile(x, y, xi, yi, lanes, lanes, TailStrategy::GuardWithIf).vectorize(xi);
-    stage.parallel(Var(f->args.back()));
+    stage.parallel(Var(f->args[outermost]));
   }
 
   // f(places) += terms, where data decide the place along the first dimension, over a loop that is

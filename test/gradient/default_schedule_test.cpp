@@ -200,5 +200,19 @@ TEST_F(DefaultSchedule, TilesWhatItReadsAcross) {
   EXPECT_EQ(loops[3].for_type, ForType::Parallel);
 }
 
+// The adjoint of `planes` has updates of one plane each, of which z is no loop.
+TEST_F(DefaultSchedule, TilesAPlaneThatIsReadAcross) {
+  Buffer<float> planes(32, 32, 32);
+  Func sum("sum");
+  RDom r(0, 32, 0, 32);
+  sum() = 0.0f;
+  sum() += planes(r.y, r.x, 0) * planes(r.y, r.x, 20) * a(r.x, r.y);
+  Func gradient = propagate_adjoints(sum)(planes);
+  const auto stages = choose(gradient).at(gradient.function().get()).stages;
+  ASSERT_EQ(stages.size(), 3u);
+  ASSERT_EQ(stages[1].dims.size(), 4u);
+  EXPECT_EQ(stages[1].dims[3].for_type, ForType::Parallel);
+}
+
 }  // namespace
 }  // namespace retrograde
