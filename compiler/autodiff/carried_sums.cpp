@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <unordered_map>
 
 #include "autodiff/accumulation.h"
 #include "autodiff/versions.h"
@@ -67,25 +68,89 @@ std::optional<double> magnitude(const Expr& factor) {
   return value ? std::optional(std::fabs(*value)) : std::nullopt;
 }
 
+// Terms share nodes: each is looked at once.
+class Factors {
+ public:
+  explicit Factors(const FuncContents* carried) : carried_(carried) {}
+
+  std::optional<double> of(const Expr& term) {
+    auto known = known_.find(term.get());
+    if (known != known_.end()) return known->second;
+    return known_[term.get()] = calls(term, carried_) ? of_linear(as_linear(term, carried_)) : 0;
+  }
+
+ private:
+  std::optional<double> of_linear(const Linear& n) {
+    if (n.kind == Linear::Kind::Carried) return 1;
+    if (n.kind == Linear::Kind::Unknown) return std::nullopt;
+    double sum = 0, largest = 0;
+    for (const Expr& part : n.parts) {
+      auto factor = of(part);
+      if (!factor) return std::nullopt;
+      sum += *factor;
+      largest = std::max(largest, *factor);
+    }
+    if (n.kind == Linear::Kind::Choice) return largest;
+    if (n.kind == Linear::Kind::Sum) return sum;
+    auto factor = magnitude(n.factor);
+    if (!factor) return std::nullopt;
+    return n.kind == Linear::Kind::Scaled ? sum * *factor : sum / *factor;
+  }
+
+  const FuncContents* carried_;
+  std::unordered_map<const ExprNode*, std::optional<double>> known_;
+};
+
+class InDouble {
+ public:
+  InDouble(const FuncPtr& rounded, const FuncPtr& exact) : rounded_(rounded), exact_(exact) {}
+
+  Expr of(const Expr& term) {
+    auto known = known_.find(term.get());
+    if (known != known_.end()) return known->second;
+    return known_[term.get()] = calls(term, rounded_.get()) ? of_linear(term) : cast_to(wide, term);
+  }
+
+ private:
+  static constexpr Type wide = Float(64);
+
+  Expr of_linear(const Expr& term) {
+    const Linear n = as_linear(term, rounded_.get());
+    switch (n.kind) {
+      case Linear::Kind::Carried: {
+        const Call* call = as_call_of(term, rounded_.get());
+        return call_value(exact_, call->args, call->value_index);
+      }
+      case Linear::Kind::Choice:
+        return make_select(n.factor, of(n.parts[0]), of(n.parts[1]));
+      case Linear::Kind::Unknown:
+        return cast_to(wide, of_exact(term));
+      default:
+        break;
+    }
+    if (term.as<Cast>()) return of(n.parts[0]);
+    const auto* call = term.as<Call>();
+    return call ? call_op(call->op, wide, {of(call->args[0]), of(call->args[1])})
+                : map_children(term, [&](const Expr& part) { return of(part); });
+  }
+
+  // The term in its own type, of exact values.
+  Expr of_exact(const Expr& term) const {
+    return rewrite(term, [&](const Expr& node, const auto& recurse) -> Expr {
+      const Call* call = as_call_of(node, rounded_.get());
+      if (!call) return map_children(node, recurse);
+      return cast_to(call->type, call_value(exact_, call->args, call->value_index));
+    });
+  }
+
+  const FuncPtr &rounded_, &exact_;
+  std::unordered_map<const ExprNode*, Expr> known_;
+};
+
 }  // namespace
 
 std::optional<double> carried_factor(const Expr& term, const FuncContents* carried) {
-  if (!calls(term, carried)) return 0;
-  Linear n = as_linear(term, carried);
-  if (n.kind == Linear::Kind::Carried) return 1;
-  if (n.kind == Linear::Kind::Unknown) return std::nullopt;
-  double sum = 0, largest = 0;
-  for (const Expr& part : n.parts) {
-    auto factor = carried_factor(part, carried);
-    if (!factor) return std::nullopt;
-    sum += *factor;
-    largest = std::max(largest, *factor);
-  }
-  if (n.kind == Linear::Kind::Choice) return largest;
-  if (n.kind == Linear::Kind::Sum) return sum;
-  auto factor = magnitude(n.factor);
-  if (!factor) return std::nullopt;
-  return n.kind == Linear::Kind::Scaled ? sum * *factor : sum / *factor;
+  return Factors(carried).of(term);
 }
 
 bool carries_sums(const std::vector<Expr>& terms, const FuncContents* carried) {
@@ -100,30 +165,7 @@ bool carries_sums(const std::vector<Expr>& terms, const FuncContents* carried) {
 }
 
 Expr carried_in_double(const Expr& term, const FuncPtr& rounded, const FuncPtr& exact) {
-  const Type wide = Float(64);
-  if (!calls(term, rounded.get())) return cast_to(wide, term);
-  auto part = [&](const Expr& e) { return carried_in_double(e, rounded, exact); };
-  Linear n = as_linear(term, rounded.get());
-  switch (n.kind) {
-    case Linear::Kind::Carried: {
-      const Call* call = as_call_of(term, rounded.get());
-      return call_value(exact, call->args, call->value_index);
-    }
-    case Linear::Kind::Choice:
-      return make_select(n.factor, part(n.parts[0]), part(n.parts[1]));
-    case Linear::Kind::Unknown:
-      return cast_to(wide, rewrite(term, [&](const Expr& node, const auto& recurse) -> Expr {
-                       const Call* call = as_call_of(node, rounded.get());
-                       if (!call) return map_children(node, recurse);
-                       return cast_to(call->type, call_value(exact, call->args, call->value_index));
-                     }));
-    default:
-      break;
-  }
-  if (term.as<Cast>()) return part(n.parts[0]);
-  const auto* call = term.as<Call>();
-  return call ? call_op(call->op, wide, {part(call->args[0]), part(call->args[1])})
-              : map_children(term, part);
+  return InDouble(rounded, exact).of(term);
 }
 
 }  // namespace retrograde::ir

@@ -214,6 +214,26 @@ Derivative filter_gradient(const Buffer<float>& a, float decay, int length) {
 }
 
 // What a constant below 1 forgets, or few elements carry, stays in float32.
+// The term that is carried holds each value of the step twice: 2^40 of them, if it were a tree.
+TEST(CarriedSums, OfStepsThatUseTheirValuesTwiceAreFoundInTime) {
+  const int n = 100;
+  Buffer<float> input(n);
+  input.fill(1);
+  Var x("x");
+  Func f("f"), loss("loss");
+  RDom r(1, n - 1), all(0, n);
+  f(x) = input(x);
+  Expr step = f(r - 1);
+  for (int i = 0; i < 40; ++i) step = step * 0.5f + step * 0.5f;
+  f(r) = f(r) + step;
+  loss() = 0.0f;
+  loss() += f(all);
+  Derivative d = propagate_adjoints(loss);
+  EXPECT_NE(d.explain().find("carried"), std::string::npos) << d.explain();
+  Buffer<float> found = d(input).realize({n});
+  for (int i = 0; i < n; ++i) EXPECT_EQ(found(i), static_cast<float>(n - i)) << i;
+}
+
 TEST(CarriedSums, ThatAreShortStayInFloat32) {
   Buffer<float> a(100'000);
   EXPECT_EQ(filter_gradient(a, 0.9f, 100'000).explain().find("in double"), std::string::npos);
