@@ -11,6 +11,7 @@
 #include "frontend/var.h"
 #include "ir/build.h"
 #include "ir/print.h"
+#include "ir/variables.h"
 #include "simplify/simplify.h"
 
 namespace retrograde::ir {
@@ -149,9 +150,10 @@ std::vector<ReductionVariable> rvars_of(const Gather& g) {
 class Builder {
  public:
   Builder(const AdjointTarget& target, const std::string& name)
-      : target_(target), name_(claim_name(name)), types_(target.types) {
-    for (const std::string& arg : target.args) args_.push_back(variable(arg));
-  }
+      : target_(target),
+        name_(claim_name(name)),
+        types_(target.types),
+        args_(variables_of(target.args)) {}
 
   AdjointFunc build(const std::vector<Contribution>& contributions,
                     const std::vector<Expr>& initial) {

@@ -8,6 +8,7 @@
 #include "frontend/define.h"
 #include "frontend/var.h"
 #include "ir/build.h"
+#include "ir/variables.h"
 #include "ir/visit.h"
 
 namespace retrograde::ir {
@@ -48,8 +49,7 @@ class Lifter {
     if (const auto* adjoint = dynamic_cast<const AdjointContents*>(f.get()))
       result->traits = adjoint->traits;
     lifted_[f.get()] = result;
-    std::vector<Expr> args;
-    for (const std::string& arg : f->args) args.push_back(variable(arg));
+    std::vector<Expr> args = variables_of(f->args);
     args.push_back(colour_);
     define_pure(result, args, map_all(f->pure->values));
     for (const Definition& update : f->updates) {

@@ -9,6 +9,7 @@
 #include "frontend/define.h"
 #include "frontend/var.h"
 #include "ir/build.h"
+#include "ir/variables.h"
 #include "ir/visit.h"
 #include "simplify/simplify.h"
 
@@ -126,9 +127,8 @@ FuncPtr Compressed::evaluate() const {
   auto seeds = std::make_shared<AdjointContents>();
   seeds->name = claim_name(query_.seed->name + "_by_colour");
   seeds->traits.masked = true;
-  std::vector<Expr> column, args;
-  for (const std::string& arg : query_.seed->args) column.push_back(variable(arg));
-  args = column;
+  const std::vector<Expr> column = variables_of(query_.seed->args);
+  std::vector<Expr> args = column;
   args.push_back(variable(unique_name("colour")));
   define_pure(seeds, args, {seed_value(column, args.back())});
   return with_seeds(query_.output, query_.seed, seeds);

@@ -6,6 +6,7 @@
 #include "autodiff/synthesis.h"
 #include "frontend/define.h"
 #include "ir/build.h"
+#include "ir/variables.h"
 #include "simplify/simplify.h"
 
 namespace retrograde {
@@ -88,12 +89,6 @@ void check_dimensions(const Func& output, size_t bounds, int adjoint,
   }
 }
 
-std::vector<Expr> variables_of(const Func& f) {
-  std::vector<Expr> result;
-  for (const Var& v : f.args()) result.push_back(v);
-  return result;
-}
-
 }  // namespace
 
 Derivative::Derivative(std::shared_ptr<const ir::SynthesisResult> result)
@@ -174,8 +169,9 @@ Derivative propagate_adjoints(const Func& output, const Func& adjoint, const Reg
   }
   ir::Seed seed{output.function(), box_of(output_bounds), {}};
   for (size_t k = 0; k < output.types().size(); ++k) {
-    seed.values.push_back(
-        seed_value(output, k, adjoint(variables_of(output)).element(static_cast<int>(k))));
+    seed.values.push_back(seed_value(
+        output, k,
+        adjoint(ir::variables_of(output.function()->args)).element(static_cast<int>(k))));
   }
   return run(seed, options);
 }
@@ -193,8 +189,8 @@ Derivative propagate_adjoints(const Func& output, const Buffer<float>& adjoint,
     region.push_back({Expr(adjoint.min(d)), Expr(adjoint.extent(d))});
   ir::Seed seed{output.function(), box_of(region), {}};
   auto parameter = adjoint.parameter();
-  Expr value = ir::call_image(parameter->name, parameter->type, variables_of(output),
-                              ir::SymbolRef(parameter));
+  Expr value = ir::call_image(parameter->name, parameter->type,
+                              ir::variables_of(output.function()->args), ir::SymbolRef(parameter));
   for (size_t k = 0; k < output.types().size(); ++k)
     seed.values.push_back(seed_value(output, k, value));
   return run(seed, options);

@@ -7,6 +7,7 @@
 #include "frontend/var.h"
 #include "ir/build.h"
 #include "ir/print.h"
+#include "ir/variables.h"
 #include "simplify/simplify.h"
 
 namespace retrograde::ir {
@@ -148,8 +149,7 @@ class Folder {
       copy->traits = adjoint->traits;
     FuncPtr g = copy;
     g->name = claim_name(name);
-    std::vector<Expr> args, values;
-    for (const std::string& arg : f->args) args.push_back(variable(arg));
+    std::vector<Expr> args = variables_of(f->args), values;
     for (const Expr& v : f->pure->values) values.push_back(mapped(v));
     define_pure(g, args, values);
     for (int s = 1; s < stages; ++s) {

@@ -10,6 +10,7 @@
 #include "frontend/define.h"
 #include "ir/build.h"
 #include "ir/equal.h"
+#include "ir/variables.h"
 #include "simplify/simplify.h"
 
 namespace retrograde::ir {
@@ -222,9 +223,7 @@ class Propagation {
 
   bool output_ignores(size_t source, How kind) {
     responses_.clear();
-    std::vector<Expr> own;
-    for (const std::string& arg : order_[source]->args) own.push_back(variable(arg));
-    responses_[order_[source].get()] = {{kind, 1, own}};
+    responses_[order_[source].get()] = {{kind, 1, variables_of(order_[source]->args)}};
     for (size_t i = source + 1; i < order_.size(); ++i) {
       if (responds(i) && !add(order_[i])) return false;
     }

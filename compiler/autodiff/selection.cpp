@@ -11,6 +11,7 @@
 #include "frontend/var.h"
 #include "ir/build.h"
 #include "ir/equal.h"
+#include "ir/variables.h"
 #include "ir/visit.h"
 
 namespace retrograde::ir {
@@ -86,8 +87,7 @@ class Finder {
   FuncPtr make_winner(const Expr& condition) const {
     FuncPtr w = std::make_shared<AdjointContents>();
     w->name = claim_name(f_->name + "_winner");
-    std::vector<Expr> args, initial;
-    for (const std::string& arg : f_->args) args.push_back(variable(arg));
+    std::vector<Expr> args = variables_of(f_->args), initial;
     FuncPtr before = stage_ > 1 ? clone_prefix(f_, stage_) : nullptr;
     for (size_t k = 0; k < f_->types.size(); ++k) {
       initial.push_back(before ? call_value(before, args, static_cast<int>(k))

@@ -17,6 +17,7 @@
 #include "frontend/define.h"
 #include "ir/build.h"
 #include "ir/print.h"
+#include "ir/variables.h"
 #include "simplify/simplify.h"
 
 namespace retrograde::ir {
@@ -151,7 +152,7 @@ class Synthesis {
     AccessQuery query{{}, {}, args, read};
     for (size_t d = 0; d < args.size(); ++d)
       query.domain.vars.push_back({args[d], box[d].min, box[d].max});
-    for (const std::string& arg : args) query.indices.push_back(variable(arg));
+    query.indices = variables_of(args);
     Inversion inversion = invert_access(query);
     for (size_t k = 0; k < values.size(); ++k) {
       if (!values[k].defined()) continue;
@@ -259,8 +260,7 @@ class Synthesis {
     const auto* p = as_parameter(c.input.get());
     AdjointTarget target =
         p ? target_of(*p) : target_of(dynamic_cast<const FuncContents&>(*c.input));
-    std::vector<Expr> args, values;
-    for (const std::string& arg : target.args) args.push_back(variable(arg));
+    std::vector<Expr> args = variables_of(target.args), values;
     for (size_t k = 0; k < target.types.size(); ++k) {
       bool floating = p || dynamic_cast<const FuncContents&>(*c.input).types[k].is_float();
       Expr value = call_value(c.adjoint, args, static_cast<int>(k));

@@ -11,6 +11,7 @@
 #include "frontend/define.h"
 #include "frontend/var.h"
 #include "ir/build.h"
+#include "ir/variables.h"
 
 namespace retrograde::ir {
 
@@ -22,12 +23,6 @@ FuncPtr new_func(const std::string& name) {
   auto f = std::make_shared<AdjointContents>();
   f->name = claim_name(name);
   return f;
-}
-
-std::vector<Expr> variables_of(const FuncContents& f) {
-  std::vector<Expr> result;
-  for (const std::string& arg : f.args) result.push_back(variable(arg));
-  return result;
 }
 
 bool calls(const Expr& e, const Symbol* f) {
@@ -139,7 +134,7 @@ class FuncTangent {
     static_cast<AdjointContents&>(*tangent_).traits = static_cast<AdjointContents&>(*dual_).traits;
     for (int s = 0; s < f_->stage_count(); ++s)
       define(dual_, s, f_->stage(s).values, stages_[s].values);
-    std::vector<Expr> values, args = variables_of(*f_);
+    std::vector<Expr> values, args = variables_of(f_->args);
     for (size_t k = 0; k < count(); ++k)
       values.push_back(call_value(dual_, args, static_cast<int>(count() + k)));
     define_pure(tangent_, args, values);
@@ -158,7 +153,7 @@ class FuncTangent {
       return e.defined() ? redirect_calls(e, f_, to, false) : e;
     };
     for (Expr& e : values) e = redirected(e);
-    if (s == 0) return define_pure(to, variables_of(*f_), values);
+    if (s == 0) return define_pure(to, variables_of(f_->args), values);
     std::vector<Expr> args;
     for (const Expr& e : definition.args) args.push_back(redirected(e));
     append_update(to, args, values, definition.rvars, redirected(definition.predicate));
@@ -256,7 +251,7 @@ class Synthesis {
     if (found == directions_.end()) return own;
     if (!own) return found->second;
     FuncPtr sum = new_func(f.name + "_tan_sum");
-    std::vector<Expr> args = variables_of(f), values;
+    std::vector<Expr> args = variables_of(f.args), values;
     for (size_t k = 0; k < f.types.size(); ++k) {
       values.push_back(
           call_value(own, args, static_cast<int>(k)) +
@@ -310,7 +305,7 @@ FuncPtr zero_tangent(const FuncContents& f) {
   FuncPtr zero = new_func(f.name + "_tan");
   std::vector<Expr> values;
   for (Type t : f.types) values.push_back(make_zero(tangent_type(t)));
-  define_pure(zero, variables_of(f), values);
+  define_pure(zero, variables_of(f.args), values);
   return zero;
 }
 

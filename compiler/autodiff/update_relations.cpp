@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "ir/build.h"
+#include "ir/variables.h"
 #include "ir/visit.h"
 
 namespace retrograde::ir {
@@ -13,12 +14,6 @@ std::vector<std::string> names_of(const std::vector<LoopVariable>& vars) {
   std::vector<std::string> names;
   for (const LoopVariable& v : vars) names.push_back(v.name);
   return names;
-}
-
-std::vector<Expr> variables_of(const std::vector<LoopVariable>& vars) {
-  std::vector<Expr> result;
-  for (const LoopVariable& v : vars) result.push_back(variable(v.name));
-  return result;
 }
 
 isl::map empty_like(const isl::map& m) {
@@ -110,7 +105,7 @@ Expr UpdateRelations::last_writers() const {
   isl::map same_element = write_->apply_range(write_->reverse());
   isl::set overwritten = same_element.intersect(earlier().reverse()).domain();
   isl::set last = domain_.subtract(overwritten).coalesce().gist(domain_);
-  return bridge_.to_expr(last, variables_of(domain_expr_.vars));
+  return bridge_.to_expr(last, variables_of(names_of(domain_expr_.vars)));
 }
 
 std::optional<UpdateRelations::Read> UpdateRelations::read(const std::vector<Expr>& indices) {
@@ -124,7 +119,8 @@ std::optional<UpdateRelations::Read> UpdateRelations::read(const std::vector<Exp
   r.never_new = r.sees_new.is_empty();
   r.always_new = domain_.is_subset(r.sees_new);
   r.overwritten = !writer.subtract(before).is_empty();
-  r.sees_new_condition = bridge_.to_expr(r.sees_new.gist(domain_), variables_of(domain_expr_.vars));
+  r.sees_new_condition =
+      bridge_.to_expr(r.sees_new.gist(domain_), variables_of(names_of(domain_expr_.vars)));
   return r;
 }
 

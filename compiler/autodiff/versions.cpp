@@ -6,6 +6,7 @@
 #include "frontend/define.h"
 #include "frontend/var.h"
 #include "ir/build.h"
+#include "ir/variables.h"
 #include "ir/visit.h"
 #include "simplify/simplify.h"
 
@@ -18,9 +19,7 @@ FuncPtr clone_prefix(const FuncPtr& f, int stages, const std::string& name) {
   FuncPtr g = copy;
   g->name =
       claim_name(name.empty() ? f->name + "_before_update" + std::to_string(stages - 1) : name);
-  std::vector<Expr> args;
-  for (const std::string& arg : f->args) args.push_back(variable(arg));
-  define_pure(g, args, f->pure->values);
+  define_pure(g, variables_of(f->args), f->pure->values);
   for (int s = 1; s < stages; ++s) {
     Definition stage =
         map_exprs(f->stage(s), [&](const Expr& e) { return redirect_calls(e, f, g, false); });

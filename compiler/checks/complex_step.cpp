@@ -11,6 +11,7 @@
 #include "frontend/param.h"
 #include "ir/build.h"
 #include "ir/print.h"
+#include "ir/variables.h"
 
 namespace retrograde::checks {
 
@@ -110,8 +111,7 @@ class Complexifier {
     auto to = std::make_shared<AdjointContents>();  // for its default schedule
     to->name = claim_name(f->name + "_complex");
     funcs_[f.get()] = to;
-    std::vector<Expr> args;
-    for (const std::string& arg : f->args) args.push_back(variable(arg));
+    const std::vector<Expr> args = variables_of(f->args);
     for (int s = 0; s < f->stage_count(); ++s) {
       Definition d = f->stage(s);
       std::vector<Expr> values;

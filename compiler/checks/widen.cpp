@@ -8,6 +8,7 @@
 #include "frontend/image_param.h"
 #include "frontend/param.h"
 #include "ir/build.h"
+#include "ir/variables.h"
 
 namespace retrograde::ir {
 
@@ -61,8 +62,7 @@ class Widening {
     auto to = std::make_shared<AdjointContents>();  // for its default schedule
     to->name = claim_name(f->name + "_double");
     result_.funcs[f.get()] = to;
-    std::vector<Expr> args;
-    for (const std::string& arg : f->args) args.push_back(variable(arg));
+    const std::vector<Expr> args = variables_of(f->args);
     for (int s = 0; s < f->stage_count(); ++s) {
       Definition d = map_exprs(f->stage(s), [&](const Expr& e) { return widened(e); });
       if (rounding_.amount.defined()) round(d, *f, s);

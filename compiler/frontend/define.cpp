@@ -13,6 +13,7 @@
 #include "frontend/rdom.h"
 #include "frontend/var.h"
 #include "ir/print.h"
+#include "ir/variables.h"
 #include "ir/visit.h"
 
 namespace retrograde::ir {
@@ -388,7 +389,7 @@ void define_pure(const FuncPtr& f, const std::vector<Expr>& args, const std::vec
   f->args = variables;
   for (const Expr& value : values) f->types.push_back(value.type());
   Definition pure;
-  for (const std::string& name : variables) pure.args.push_back(variable(name));
+  pure.args = variables_of(variables);
   pure.values = bind_all_random(*f, 0, variables, values);
   add_loops(pure, variables);
   f->pure = std::move(pure);

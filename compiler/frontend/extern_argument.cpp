@@ -4,6 +4,7 @@
 #include "frontend/define.h"
 #include "frontend/func.h"
 #include "ir/print.h"
+#include "ir/variables.h"
 
 namespace retrograde {
 
@@ -94,7 +95,7 @@ void define_extern(const FuncPtr& f, ExternDefinition definition, const std::vec
   f->args = variables;
   f->types = types;
   Definition pure;
-  for (const std::string& name : variables) pure.args.push_back(variable(name));
+  pure.args = variables_of(variables);
   f->pure = std::move(pure);
   f->schedule.storage_dims = variables;
   f->extern_definition = std::move(definition);

@@ -24,6 +24,7 @@
 #include "ir/build.h"
 #include "ir/memory_reads.h"
 #include "ir/print.h"
+#include "ir/variables.h"
 #include "ir/visit.h"
 
 namespace retrograde {
@@ -108,8 +109,7 @@ class Factoring {
     intermediate_ = std::make_shared<ir::FuncContents>();
     intermediate_->name = ir::claim_name(f_->name + "_intm");
     intermediate_->declared_at = f_->declared_at;
-    std::vector<Expr> args, values;
-    for (const std::string& arg : f_->args) args.push_back(ir::variable(arg));
+    std::vector<Expr> args = ir::variables_of(f_->args), values;
     args.insert(args.end(), kept_vars_.begin(), kept_vars_.end());
     for (size_t i = 0; i < f_->types.size(); i++) values.push_back(identity(i));
     ir::define_pure(intermediate_, args, values);

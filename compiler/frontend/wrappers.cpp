@@ -8,6 +8,7 @@
 #include "frontend/define.h"
 #include "frontend/func.h"
 #include "ir/print.h"
+#include "ir/variables.h"
 #include "ir/visit.h"
 
 namespace retrograde {
@@ -198,8 +199,7 @@ FuncPtr owning(std::shared_ptr<Owner> owner, FuncPtr f) {
 FuncPtr identity_of(const FuncPtr& f, const std::string& name) {
   auto wrapper = std::make_shared<FuncContents>();
   wrapper->name = claim_name(name);
-  std::vector<Expr> args, values;
-  for (const std::string& arg : f->args) args.push_back(variable(arg));
+  std::vector<Expr> args = variables_of(f->args), values;
   for (size_t i = 0; i < f->types.size(); i++) {
     values.push_back(
         call_func(f->name, f->types[i], args, static_cast<int>(i), SymbolRef::weak(f)));
