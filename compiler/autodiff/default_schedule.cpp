@@ -5,6 +5,7 @@
 #include <unordered_set>
 
 #include "autodiff/adjoint_contents.h"
+#include "autodiff/cost_estimate.h"
 #include "autodiff/read_estimate.h"
 #include "autodiff/regions.h"
 #include "frontend/rdom.h"
@@ -18,12 +19,7 @@ namespace retrograde::ir {
 namespace {
 
 constexpr int lanes = 16;
-// Operations up to which a value is computed again rather than stored.
-constexpr double cheap = 6;
-// What it takes to store a value and to load it again, in operations of a vectorized loop: 12 bytes
-// at the bandwidth of a core, against an operation a lane and cycle.
-constexpr double way_to_memory = 24;
-// And in a Func that the user left alone in a schedule by hand.
+// Operations up to which a Func that the user left alone in a schedule by hand is inlined.
 constexpr double explosion = 500;
 
 bool is_touched(const FuncContents& f) {
@@ -105,15 +101,9 @@ class Chooser {
     }
     return total;
   }
-  // Integers are indices and borders: mostly simplified away.
   double cost_of(const Expr& e) const {
     const auto* call = e.as<Call>();
-    if (!call)
-      return e.type().is_float() && (e.as<Binary>() || e.as<Select>() || e.as<Cast>()) ? 1 : 0;
-    if (call->call_type == CallType::Operator) {
-      return op_info(call->op).cls == OpClass::Marker ? 0 : call->op == Op::strong_mul ? 1 : 4;
-    }
-    if (call->call_type != CallType::Func) return 1;
+    if (!call || call->call_type != CallType::Func) return operations_of(e);
     auto found = uses_.find(call->symbol.raw());
     auto callee = std::dynamic_pointer_cast<FuncContents>(call->symbol.lock());
     bool stored = !callee || !callee->is_pure() || result_.contains(callee.get()) ||

@@ -6,6 +6,7 @@
 
 #include "autodiff/adjoint_contents.h"
 #include "autodiff/default_schedule.h"
+#include "autodiff/distinct_nodes.h"
 #include "autodiff/local_derivative.h"
 #include "autodiff/regions.h"
 #include "diagnostics/error.h"
@@ -61,29 +62,6 @@ Operations of_node(const Expr& e) {
   return e.as<Binary>() || e.as<Select>() || e.as<Cast>() ? Operations{.adds = 1} : Operations{};
 }
 
-// The distinct nodes below some expressions, equal ones taken together.
-class DistinctNodes {
- public:
-  std::vector<Expr> nodes;
-  void add(const Expr& root) { number_of(root); }
-
- private:
-  // A node is printed with numbers in place of its children: equal text, equal node.
-  Expr number_of(const Expr& e) {
-    auto [seen, is_new] = by_node_.try_emplace(e.get());
-    if (!is_new) return seen->second;
-    Expr shallow = map_children(e, [&](const Expr& child) { return number_of(child); });
-    auto [known, is_distinct] = by_text_.try_emplace(print(shallow));
-    if (is_distinct) {
-      known->second = variable("node#" + std::to_string(nodes.size()), e.type());
-      nodes.push_back(e);
-    }
-    return by_node_[e.get()] = known->second;
-  }
-  std::unordered_map<const ExprNode*, Expr> by_node_;
-  std::unordered_map<std::string, Expr> by_text_;
-};
-
 // One iteration of a stage, or one value of a Func: its own work, and what it reads.
 struct Body {
   Operations own;
@@ -92,12 +70,13 @@ struct Body {
 };
 
 Body body_of(const std::vector<Expr>& roots) {
-  DistinctNodes distinct;
+  std::vector<Expr> plain;
   for (const Expr& root : roots) {
-    if (root.defined()) distinct.add(without_lets(root));
+    if (root.defined()) plain.push_back(without_lets(root));
   }
+  const DistinctNodes distinct(plain);
   Body body;
-  for (const Expr& node : distinct.nodes) {
+  for (const Expr& node : distinct.nodes()) {
     body.own += of_node(node);
     const auto* call = node.as<Call>();
     if (!call || call->call_type == CallType::Operator) continue;
@@ -107,7 +86,7 @@ Body body_of(const std::vector<Expr>& roots) {
       body.own.moves += 1;
     }
   }
-  body.kept_alive = std::move(distinct.nodes);
+  body.kept_alive = distinct.nodes();
   return body;
 }
 

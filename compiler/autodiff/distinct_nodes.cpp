@@ -1,0 +1,35 @@
+#include "autodiff/distinct_nodes.h"
+
+#include "autodiff/local_derivative.h"
+#include "ir/build.h"
+#include "ir/print.h"
+#include "ir/visit.h"
+
+namespace retrograde::ir {
+
+namespace {
+
+// Equal for equal nodes, whose children stand as numbers: users may give two images one name.
+std::string key_of(const Expr& shallow) {
+  const auto* call = shallow.as<Call>();
+  const auto* v = shallow.as<Variable>();
+  const Symbol* symbol = call ? call->symbol.raw() : v ? v->symbol.raw() : nullptr;
+  return print(shallow) + "@" + std::to_string(reinterpret_cast<uintptr_t>(symbol));
+}
+
+}  // namespace
+
+DistinctNodes::DistinctNodes(const std::vector<Expr>& roots) : kept_(post_order(roots)) {
+  std::unordered_map<std::string, size_t> by_key;
+  std::vector<Expr> names;
+  for (const Expr& e : kept_) {
+    Expr shallow = map_children(e, [&](const Expr& child) { return names[number_of(child)]; });
+    auto [known, is_distinct] = by_key.try_emplace(key_of(shallow), nodes_.size());
+    by_node_[e.get()] = known->second;
+    if (!is_distinct) continue;
+    names.push_back(variable("node#" + std::to_string(nodes_.size()), e.type()));
+    nodes_.push_back(e);
+  }
+}
+
+}  // namespace retrograde::ir
