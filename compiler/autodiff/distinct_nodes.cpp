@@ -32,4 +32,15 @@ DistinctNodes::DistinctNodes(const std::vector<Expr>& roots) : kept_(post_order(
   }
 }
 
+std::vector<Expr> with_equal_nodes_shared(const std::vector<Expr>& roots) {
+  const DistinctNodes distinct(roots);
+  std::vector<Expr> shared, result;
+  const auto in_shared = [&](const Expr& e) { return shared[distinct.number_of(e)]; };
+  for (const Expr& e : distinct.nodes())
+    shared.push_back(is_leaf(e) ? e : map_children(e, in_shared));
+  for (const Expr& root : roots)
+    result.push_back(root.defined() ? shared[distinct.number_of(root)] : Expr());
+  return result;
+}
+
 }  // namespace retrograde::ir

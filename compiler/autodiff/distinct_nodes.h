@@ -25,4 +25,8 @@ class DistinctNodes {
   std::unordered_map<const ExprNode*, size_t> by_node_;
 };
 
+// The same expressions, in which equal nodes are one. Undefined ones stay so. Leaves are left as
+// they are, inside too: others look for them, and an index that is built again may be simplified.
+std::vector<Expr> with_equal_nodes_shared(const std::vector<Expr>& roots);
+
 }  // namespace retrograde::ir

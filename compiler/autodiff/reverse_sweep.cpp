@@ -3,6 +3,7 @@
 #include <unordered_map>
 
 #include "autodiff/derivative_rules.h"
+#include "autodiff/distinct_nodes.h"
 #include "diagnostics/error.h"
 #include "ir/build.h"
 
@@ -14,10 +15,13 @@ class Sweep {
  public:
   Sweep(const std::vector<Expr>& values, const std::vector<Expr>& seeds,
         FunctionRef<bool(const Expr&)> is_wanted, FunctionRef<bool(const Expr&)> is_infinite_leaf)
-      : order_(post_order(values)), facts_(order_, is_wanted, is_infinite_leaf) {
+      : values_(with_equal_nodes_shared(values)),
+        order_(post_order(values_)),
+        facts_(order_, is_wanted, is_infinite_leaf) {
     result_.notes = facts_.notes();
     for (size_t i = 0; i < values.size(); ++i) {
-      if (values[i].defined() && seeds[i].defined()) add(values[i], seeds[i], traits_of(seeds[i]));
+      if (values_[i].defined() && seeds[i].defined())
+        add(values_[i], seeds[i], traits_of(seeds[i]));
     }
   }
 
@@ -85,6 +89,7 @@ class Sweep {
     add(local.operands[i], times_partial(state.sum, partial), traits);
   }
 
+  std::vector<Expr> values_;
   std::vector<Expr> order_;
   ExprFacts facts_;
   std::unordered_map<const ExprNode*, State> adjoints_;

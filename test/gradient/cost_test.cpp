@@ -38,11 +38,9 @@ const char* text_of(Reason reason) {
 }
 
 const std::map<std::string, Reason> exceptions = {
-    {"HistogramInColumnsThatMultiplies", Reason::Tape},
     {"angle_of_a_vector", Reason::Stable},
     {"length_of_a_vector", Reason::Stable},
     {"gated_recurrent_cell", Reason::Tape},
-    {"kalman_filter", Reason::Steps},
     {"long_short_term_memory", Reason::Steps},
     {"recursive_filter_of_second_order_along_both_axes", Reason::InPlace},
     {"streaming_softmax", Reason::Steps},

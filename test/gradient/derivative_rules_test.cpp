@@ -12,6 +12,7 @@
 #include "autodiff/reverse_sweep.h"
 #include "diagnostics/error.h"
 #include "ir/build.h"
+#include "ir/equal.h"
 #include "ir/print.h"
 #include "ir/scalar.h"
 
@@ -262,6 +263,42 @@ TEST(DerivativeRules, CallsOfCFunctionsAreRefusedOnlyWhereTheGradientIsWanted) {
       [](const Expr& leaf) { return leaf.as<Variable>() && leaf.as<Variable>()->name == "y"; },
       no_leaf);
   EXPECT_EQ(sweep.leaves.size(), 1u);
+}
+
+// As a user's helper function makes them, called twice, or two values of a Tuple.
+TEST(DerivativeRules, EqualNodesAreOne) {
+  auto leaf = [] { return op(Op::exp, {variable("x", f64) * num(2)}); };
+  SweepResult sweep = sweep_reverse(
+      {leaf() * y, leaf() + y}, {num(3), num(5)},
+      [](const Expr& e) { return e.as<Variable>() != nullptr; }, no_leaf);
+  ASSERT_EQ(sweep.leaves.size(), 2u);
+  const Env at{{"x", 0.5}, {"y", 7}};
+  for (const LeafAdjoint& found : sweep.leaves) {
+    const double expected =
+        equal(found.leaf, y) ? 3 * std::exp(1.0) + 5 : 2 * std::exp(1.0) * (3 * 7 + 5);
+    EXPECT_NEAR(eval(found.adjoint, at).as_double(), expected, 1e-12);
+  }
+}
+
+TEST(DerivativeRules, ReadsOfTwoImagesOfOneNameAreTwo) {
+  auto image = [] { return std::make_shared<ParameterContents>(); };
+  auto a = image(), b = image();
+  auto read = [](const auto& of) {
+    return call_image("image", f64, {variable("i")}, SymbolRef(of));
+  };
+  SweepResult sweep = sweep_reverse(
+      {read(a) * read(b)}, {num(1)}, [](const Expr& e) { return e.as<Call>() != nullptr; },
+      no_leaf);
+  EXPECT_EQ(sweep.leaves.size(), 2u);
+}
+
+// An update looks for its own reads among the leaves.
+TEST(DerivativeRules, LeavesStayAsTheyAre) {
+  const Expr read = call_image("image", f64, {variable("i") - variable("i")}, {});
+  SweepResult sweep = sweep_reverse(
+      {read * y}, {num(1)}, [](const Expr& e) { return e.as<Call>() != nullptr; }, no_leaf);
+  ASSERT_EQ(sweep.leaves.size(), 1u);
+  EXPECT_TRUE(equal(sweep.leaves[0].leaf, read)) << sweep.leaves[0].leaf;
 }
 
 TEST(DerivativeRules, NormsAtTheOriginHaveGradientZero) {
