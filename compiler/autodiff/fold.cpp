@@ -142,6 +142,7 @@ class Fold {
     result_.previous = make_adjoint(c_.query.target, name_before(*f_, c_.query.stage), {}, before);
     result_.helpers.push_back(adjoint_);
     result_.values = c_.values;
+    result_.keeps_steps = true;
     result_.seeds = seeds;
     result_.domains = {c_.domain};
     explain(text("update ", c_.query.stage - 1, " folds its domain into each element: ",

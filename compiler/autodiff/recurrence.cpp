@@ -49,6 +49,7 @@ class Recurrence {
     start_previous(written, self_contributions(*reads, sweep, false));
     result_.values = c_.values;
     result_.domains = {c_.domain};
+    result_.keeps_steps = true;
     return true;
   }
 

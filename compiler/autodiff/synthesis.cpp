@@ -8,6 +8,7 @@
 #include "autodiff/invariance.h"
 #include "autodiff/read_inversions.h"
 #include "autodiff/reverse_sweep.h"
+#include "autodiff/shared_adjoints.h"
 #include "autodiff/synthesis_account.h"
 #include "autodiff/update.h"
 #include "autodiff/update_context.h"
@@ -197,7 +198,7 @@ class Synthesis {
       std::vector<Expr> seeds =
           update.seeds.empty() ? adjoints_at_write(*f, s, update.current.func) : update.seeds;
       for (const IterationDomain& domain : update.domains)
-        contribute_stage(f, update.values, seeds, domain, update.self_values);
+        contribute_stage(f, update.values, seeds, domain, update.self_values, update.keeps_steps);
       for (const GivenAdjoint& g : update.given) {
         if (is_wanted(g.leaf.leaf)) add_contribution(f, g.leaf, g.domain);
       }
@@ -293,7 +294,8 @@ class Synthesis {
   void contribute_pure(const FuncPtr& f, const FuncPtr& adjoint) {
     std::vector<Expr> values;
     for (const Expr& v : f->pure->values) values.push_back(without_lets(v));
-    contribute_stage(f, values, adjoints_at_write(*f, 0, adjoint), regions_.domain(*f, 0), {});
+    contribute_stage(f, values, adjoints_at_write(*f, 0, adjoint), regions_.domain(*f, 0), {},
+                     false);
   }
 
   std::vector<Expr> adjoints_at_write(const FuncContents& f, int stage,
@@ -308,18 +310,36 @@ class Synthesis {
 
   void contribute_stage(const FuncPtr& f, const std::vector<Expr>& values,
                         const std::vector<Expr>& seeds, const IterationDomain& domain,
-                        const SelfValues& self_values) {
+                        const SelfValues& self_values, bool keeps_steps) {
     SweepResult sweep = sweep_reverse(
         values, seeds,
         [&](const Expr& leaf) { return is_wanted(leaf) && symbol_of(leaf) != f.get(); },
         [&](const Expr& leaf) { return ranges_.may_be_infinite(leaf); });
     for (const std::string& note : sweep.notes) explain(Explanation::Kind::Zero, f->name, note);
-    for (const LeafAdjoint& leaf : sweep.leaves) {
-      add_contribution(f,
-                       {with_values_in_indices(leaf.leaf, f, self_values),
-                        with_values(leaf.adjoint, f, self_values)},
-                       domain);
+    for (LeafAdjoint& leaf : sweep.leaves) {
+      leaf = {with_values_in_indices(leaf.leaf, f, self_values),
+              with_values(leaf.adjoint, f, self_values)};
     }
+    if (keeps_steps) {
+      add_sharing(f, sweep.leaves, seeds, domain);
+    } else {
+      for (const LeafAdjoint& leaf : sweep.leaves) add_contribution(f, leaf, domain);
+    }
+  }
+  // What the contributions share is computed once an iteration.
+  void add_sharing(const FuncPtr& f, const std::vector<LeafAdjoint>& leaves,
+                   const std::vector<Expr>& seeds, const IterationDomain& domain) {
+    SharedAdjoints shared = share_adjoints(f->name + "_adj_inner", domain, leaves, seeds, regions_);
+    if (shared.func) {
+      const size_t kept = shared.func->types.size();
+      result_.funcs.push_back(shared.func);
+      explain(Explanation::Kind::Version, f->name,
+              text(quoted(shared.func->name), " keeps ", kept,
+                   kept == 1 ? " inner adjoint" : " inner adjoints",
+                   " of each iteration, from which ", leaves.size(), " contributions go on"));
+    }
+    for (size_t i = 0; i < leaves.size(); ++i)
+      add_contribution(f, leaves[i], shared.adjoints[i], domain);
   }
 
   bool is_inside(const Expr& index, const FuncContents& f, int stage, const Interval& range) const {
@@ -349,6 +369,11 @@ class Synthesis {
   }
 
   void add_contribution(const FuncPtr& f, const LeafAdjoint& leaf, const IterationDomain& domain) {
+    add_contribution(f, leaf, leaf.adjoint, domain);
+  }
+  // `adjoint`: that of the leaf, in other words.
+  void add_contribution(const FuncPtr& f, const LeafAdjoint& leaf, const Expr& adjoint,
+                        const IterationDomain& domain) {
     Symbol* symbol = symbol_of(leaf.leaf);
     const auto* call = leaf.leaf.as<Call>();
     AdjointTarget target =
@@ -360,7 +385,7 @@ class Synthesis {
               text("read by ", quoted(f->name), ": ", inversion.note));
     for (const Gather& g : inversion.gathers) {
       pending_[symbol].push_back(
-          {call ? call->value_index : 0, g, substitute(leaf.adjoint, g.iteration)});
+          {call ? call->value_index : 0, g, substitute(adjoint, g.iteration)});
     }
   }
 

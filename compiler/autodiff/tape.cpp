@@ -267,6 +267,7 @@ class Tape {
     result_.previous = make_adjoint(c_.query.target, name_before(*f_, c_.query.stage), {}, before);
     result_.helpers.push_back(adjoint_);
     result_.values = c_.values;
+    result_.keeps_steps = true;
     result_.seeds = seeds_;
     IterationDomain domain = c_.domain;
     if (domain.predicate.defined())

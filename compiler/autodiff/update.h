@@ -75,6 +75,7 @@ struct UpdateAdjoint {
   std::vector<IterationDomain> domains;  // over which
   std::vector<GivenAdjoint> given;       // contributions to others that need no sweep
   SelfValues self_values;
+  bool keeps_steps = false;      // f, or a helper, has an element for every iteration
   std::vector<FuncPtr> helpers;  // Funcs made on the way, producers first
   std::vector<Explanation> explanations;
 };
