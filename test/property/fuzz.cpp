@@ -9,7 +9,7 @@
 // So is one that computes for too long, when there are more of these than one in a hundred: a
 // random schedule may well ask for a thousand times the work. Only a directive: seeds whose
 // schedules do not use it are passed over and not counted. Exit code: 0 nothing found, 1 something
-// found.
+// found or nothing tried.
 #include <chrono>
 #include <csignal>
 #include <cstdio>
@@ -63,7 +63,7 @@ Options parse(int argc, char** argv) {
     } else if (name == "--only" && has_value) {
       options.only = argv[++i];
     } else {
-      std::fprintf(stderr, "fuzz_pipelines: unknown argument %s\n", argv[i]);
+      std::fprintf(stderr, "fuzz_pipelines: unknown argument, or no number: %s\n", argv[i]);
       std::exit(2);
     }
   }
@@ -154,5 +154,5 @@ int main(int argc, char** argv) {
   if (refuses_much) std::puts("too many are refused: the generator or a check is wrong");
   const bool is_slow = tried >= 100 && slow > tried * max_slow_fraction;
   if (is_slow) std::puts("too many are slow: the generator or the compiler is wrong");
-  return found > 0 || refuses_much || is_slow ? 1 : 0;
+  return !options.has_tried(tried) || found > 0 || refuses_much || is_slow ? 1 : 0;
 }
