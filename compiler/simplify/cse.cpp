@@ -89,7 +89,7 @@ class LetMaker : public Rewriter {
   using Rewriter::rewrite;
   Expr rewrite(const Expr& e) override {
     Expr rebuilt = as_if_then_else(e) ? branch(*as_if_then_else(e)) : children(e);
-    if (!uses_.is_shared(e) || is_trivial(e) || must_stay(e)) return rebuilt;
+    if (!gets_name(e)) return rebuilt;
     const std::string name = unique_name("t");
     lets_.emplace_back(name, rebuilt);
     return variable(name, rebuilt.type());
@@ -99,13 +99,29 @@ class LetMaker : public Rewriter {
   // What only an arm shares is bound inside the arm, under names of its own: both arms may have the
   // same inner if_then_else.
   Expr branch(const Call& e) {
-    const auto arm = [&](const Expr& value) {
-      return wrap(make_lets({expand_lets((*this)(value))}));
-    };
+    const auto arm = [&](const Expr& value) { return wrap(make_lets({named_(value)})); };
     return call_op(e.op, e.type, {(*this)(e.args[0]), arm(e.args[1]), arm(e.args[2])});
   }
+  // What is evaluated for certain becomes its name; all else stays, so that an arm inside an arm is
+  // bound once, by the arm around it.
+  class Namer : public Rewriter {
+   public:
+    explicit Namer(LetMaker& maker) : maker_(maker) {}
+
+   protected:
+    using Rewriter::rewrite;
+    Expr rewrite(const Expr& e) override { return maker_.gets_name(e) ? maker_(e) : children(e); }
+
+   private:
+    LetMaker& maker_;
+  };
+  bool gets_name(const Expr& e) const {
+    return uses_.is_shared(e) && !is_trivial(e) && !must_stay(e);
+  }
+
   const UseCounter& uses_;
   std::vector<std::pair<std::string, Expr>>& lets_;
+  Namer named_{*this};
 };
 
 // Values of the enclosing Lets stand for their names. Names are unique, so one memo serves all

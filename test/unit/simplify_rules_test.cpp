@@ -330,5 +330,20 @@ TEST(Cse, IsLinearInTheNumberOfNodes) {
   run_on_large_stack([&] { EXPECT_TRUE(equal(expand_lets(lets), e + copy)); });
 }
 
+TEST(Cse, ArmsInsideArmsAreBoundOnce) {
+  const Expr x = parse_expr("x");
+  Expr e = x;
+  for (int i = 0; i < 100; ++i) {
+    const Expr square = e * e + i;
+    e = ir::call_op(ir::Op::if_then_else, Int(32), {x > i, square * square, x * i});
+  }
+  Expr lets;
+  run_on_large_stack([&] { lets = introduce_lets(e); });
+  int count = 0;
+  walk(lets, [&](const Expr& node) { return count += node.kind() == Kind::Let, true; });
+  EXPECT_EQ(count, 199) << "square everywhere, and each arm but the last inside one";
+  run_on_large_stack([&] { EXPECT_TRUE(equal(expand_lets(lets), e)); });
+}
+
 }  // namespace
 }  // namespace retrograde
