@@ -384,11 +384,12 @@ Interval BoundsEngine::operator_bounds(const Call& call) {
   switch (call.op) {
     case Op::likely:
     case Op::likely_if_innermost:
-    case Op::strict_float:
     case Op::stop_gradient:
     case Op::memoize_tag:
     case Op::print:
       return arg(0);
+    case Op::strict_float:  // rounds the same at the ends
+      return interval_monotone(call.op, type, arg(0));
     case Op::print_when:
     case Op::require:
       return arg(1);

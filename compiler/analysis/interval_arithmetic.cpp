@@ -95,8 +95,8 @@ Expr negate(const Expr& e) {
   return e.defined() ? canonical(binary(Kind::Sub, make_zero(e.type()), e)) : e;
 }
 
-Interval float_corners(Type type, Kind kind, const Interval& a, const Interval& b) {
-  if (!float_ends(a) || !float_ends(b)) return Interval::everything();
+// Of constant ends.
+Interval float_corners(Kind kind, const Interval& a, const Interval& b) {
   Interval result;
   for (const Expr& x : {a.min, a.max}) {
     for (const Expr& y : {b.min, b.max}) {
@@ -106,8 +106,18 @@ Interval float_corners(Type type, Kind kind, const Interval& a, const Interval& 
       result.max = result.max.defined() ? binary(Kind::Max, result.max, corner) : corner;
     }
   }
-  (void)type;
   return result;
+}
+
+// v * factor or v / factor, where factor is one value, for floats: rounded, it is still monotone.
+Interval float_scaled(Kind kind, const Interval& v, const Expr& factor) {
+  Interval result{end_op(kind, v.min, factor), end_op(kind, v.max, factor)};
+  if (auto c = as_const_float(factor)) {
+    if (*c == 0 || !std::isfinite(*c)) return Interval::everything();
+    return *c > 0 ? result : Interval{result.max, result.min};
+  }
+  if (!result.is_bounded()) return Interval::everything();
+  return {canonical_min(result.min, result.max), canonical_max(result.min, result.max)};
 }
 
 // v * factor, where factor is one value, for wide signed integers.
@@ -163,7 +173,11 @@ Interval interval_sub(Type type, const Interval& a, const Interval& b) {
 }
 
 Interval interval_mul(Type type, const Interval& a, const Interval& b) {
-  if (type.is_float()) return float_corners(type, Kind::Mul, a, b);
+  if (type.is_float()) {
+    if (float_ends(a) && float_ends(b)) return float_corners(Kind::Mul, a, b);
+    if (b.is_point()) return float_scaled(Kind::Mul, a, b.min);
+    return a.is_point() ? float_scaled(Kind::Mul, b, a.min) : Interval::everything();
+  }
   auto x = wide_ends(a), y = wide_ends(b);
   if (x && y) return combine_corners(type, *x, *y, [](Wide p, Wide q) { return p * q; });
   if (!has_linear_form(type)) return type_range(type);
@@ -179,8 +193,9 @@ Interval interval_mul(Type type, const Interval& a, const Interval& b) {
 Interval interval_div(Type type, const Interval& a, const Interval& b) {
   if (type.is_float()) {
     auto divisor = float_ends(b);
-    if (!divisor || (divisor->min <= 0 && divisor->max >= 0)) return Interval::everything();
-    return float_corners(type, Kind::Div, a, b);
+    if (divisor && divisor->min <= 0 && divisor->max >= 0) return Interval::everything();
+    if (divisor && float_ends(a)) return float_corners(Kind::Div, a, b);
+    return b.is_point() ? float_scaled(Kind::Div, a, b.min) : Interval::everything();
   }
   auto low = wide_end(b.min), high = wide_end(b.max);
   if (low && high && *low == *high &&
@@ -392,7 +407,10 @@ Interval interval_shift(Op op, Type type, const Interval& a, const Interval& amo
 }
 
 Interval interval_monotone(Op op, Type type, const Interval& v) {
-  auto end = [&](const Expr& e) { return e.defined() ? call_op(op, type, {e}) : e; };
+  auto end = [&](const Expr& e) {
+    const bool is_itself = !e.defined() || (op == Op::strict_float && is_const(e));
+    return is_itself ? e : call_op(op, type, {e});
+  };
   return without_nan({end(v.min), end(v.max)});
 }
 

@@ -10,6 +10,7 @@
 #include "lower/fused_groups.h"
 #include "lower/refuse_unsupported.h"
 #include "lower/resolve_undef.h"
+#include "lower/strict_indices.h"
 
 namespace retrograde::ir {
 
@@ -100,6 +101,7 @@ Program inline_functions(const std::vector<FuncPtr>& unwrapped) {
   refuse_unsupported(program);
   order_fused_groups(program);
   resolve_undef(program);
+  make_indices_strict(program);
   return program;
 }
 

@@ -5,7 +5,8 @@
 //
 // Method: producers first, so that what is substituted has no inlined call left; memoised by node
 // identity, so a definition stays a DAG of linear size however often an argument is used. Then
-// every undef is known, and resolve_undef says where nothing is stored. Not done:
+// every undef is known, and resolve_undef says where nothing is stored, and all coordinates are
+// (strict_indices). Not done:
 // Funcs with updates (see LoopedFunc::is_computed_innermost) and outputs. Source: folklore. Tests:
 // test/unit/lower_inline_test.cpp.
 #pragma once

@@ -46,6 +46,12 @@ const Call* as_if_then_else(const Expr& e) {
   return call && call->is_op(Op::if_then_else) ? call : nullptr;
 }
 
+// What a strict_float rounds stays inside of it: named outside, it might be contracted there.
+bool is_strict(const Expr& e) {
+  const auto* call = e.as<Call>();
+  return call && call->is_op(Op::strict_float);
+}
+
 // Counts the parents of each node among what is evaluated for certain.
 class UseCounter {
  public:
@@ -62,7 +68,7 @@ class UseCounter {
     if (uses_[e.get()]++ > 0) return;
     if (const Call* branch = as_if_then_else(e)) {
       count(branch->args[0]);  // the arms run only when chosen
-    } else {
+    } else if (!is_strict(e)) {
       for_each_child(e, [&](const Expr& child) { count(child); });
     }
   }
@@ -88,14 +94,20 @@ class LetMaker : public Rewriter {
  protected:
   using Rewriter::rewrite;
   Expr rewrite(const Expr& e) override {
-    Expr rebuilt = as_if_then_else(e) ? branch(*as_if_then_else(e)) : children(e);
+    if (is_strict(e)) return name(e, e);
+    const Call* choice = as_if_then_else(e);
+    return name(e, choice ? branch(*choice) : children(e));
+  }
+
+ private:
+  // What stands for e in the expression, which has become `rebuilt`.
+  Expr name(const Expr& e, Expr rebuilt) {
     if (!gets_name(e)) return rebuilt;
     const std::string name = unique_name("t");
     lets_.emplace_back(name, rebuilt);
     return variable(name, rebuilt.type());
   }
 
- private:
   // What only an arm shares is bound inside the arm, under names of its own: both arms may have the
   // same inner if_then_else.
   Expr branch(const Call& e) {
@@ -110,7 +122,10 @@ class LetMaker : public Rewriter {
 
    protected:
     using Rewriter::rewrite;
-    Expr rewrite(const Expr& e) override { return maker_.gets_name(e) ? maker_(e) : children(e); }
+    Expr rewrite(const Expr& e) override {
+      if (maker_.gets_name(e)) return maker_(e);
+      return is_strict(e) ? e : children(e);
+    }
 
    private:
     LetMaker& maker_;

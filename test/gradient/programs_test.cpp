@@ -50,6 +50,24 @@ TEST_F(Programs, StridedConvolutionAndUpsampling) {
   expect_gradient(loss, kernel);
 }
 
+// Cells are found from float coordinates, as those of an image are when it is scaled.
+TEST_F(Programs, BilateralSliceOfCellsByFloatCoordinates) {
+  Buffer<float> grid = random_image({4, 3, 3}, -1, 1, 9);
+  const Expr gx = cast<float>(x) * (3 / 7.0f), gy = cast<float>(y) * (2 / 6.0f);
+  const Expr gz = clamp(image(x, y), 0.0f, 1.99f);
+  const Expr i = cast<int>(floor(gx)), j = cast<int>(floor(gy)), k = cast<int>(floor(gz));
+  const auto plane = [&](const Expr& at) {
+    return lerp(lerp(grid(i, j, at), grid(i + 1, j, at), gx - floor(gx)),
+                lerp(grid(i, j + 1, at), grid(i + 1, j + 1, at), gx - floor(gx)), gy - floor(gy));
+  };
+  Func sliced("sliced");
+  sliced(x, y) =
+      lerp(plane(clamp(k, 0, 1)), plane(clamp(k, 0, 1) + 1), gz - floor(gz)) * image(x, y);
+  Func loss = weighted_sum(sliced, {7, 6});
+  expect_gradient(loss, grid);
+  expect_gradient(loss, image);
+}
+
 TEST_F(Programs, BoundaryConditions) {
   for (int which = 0; which < 5; ++which) {
     SCOPED_TRACE(which);
