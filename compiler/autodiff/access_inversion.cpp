@@ -7,6 +7,7 @@
 #include "autodiff/group_inversion.h"
 #include "autodiff/isl_bridge.h"
 #include "autodiff/isl_maps.h"
+#include "autodiff/narrow_reductions.h"
 #include "ir/build.h"
 #include "ir/print.h"
 #include "ir/visit.h"
@@ -263,6 +264,7 @@ class Inverter {
     for (Expr& e : g.lhs) e = simplify(substitute(e, names));
     if (g.predicate.defined()) g.predicate = simplify(substitute(g.predicate, names));
     if (g.predicate.defined() && is_const_true(g.predicate)) g.predicate = Expr();
+    narrow_reductions(g, query_.target_args);
   }
 
   const AccessQuery& query_;

@@ -308,6 +308,20 @@ TEST(AccessInversion, ParametricBorder) {
   Case c = make_case({loop("x", 0, n + 3)}, {min(max(x - 2, 0), n - 1)}, {{"n", 7}});
   EXPECT_TRUE(all_gather(check(c)));
 }
+TEST(AccessInversion, ParametricBorderIsAsLongAsItsParametersSay) {
+  Expr n = var("n"), m = var("m");  // m + 4 points that are clamped into n elements
+  Expr across = min(max(x - 2, 0), n - 1), down = min(max(y - 2, 0), n - 1);
+  Case k = make_case({loop("x", 0, m + 3), loop("y", 0, m + 3)}, {across, down});
+  for (auto [size, points] : {std::pair(7, 0), {3, 20}, {1, 5}, {0, 3}}) {
+    k.params = {{"n", size}, {"m", points}};
+    check(k);
+  }
+  k.params = {{"n", 20}, {"m", 20}};
+  Inversion inversion = check(k);
+  int64_t steps = 0;
+  for (int64_t of_border : iterations(inversion, k.params)) steps += of_border;
+  EXPECT_LE(steps, 60) << "corners of 2 x 2 points in 24 x 24: " << describe(inversion);
+}
 TEST(AccessInversion, ParametricReduction) {
   Expr n = var("n");
   expect_gathers(make_case({x10, loop("r", 0, n - 1, true)}, {x}, {{"n", 6}}), {6});
