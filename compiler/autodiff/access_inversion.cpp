@@ -391,11 +391,13 @@ Inversion invert_access(const AccessQuery& query) {
       Inversion one = invert_access(part);
       result.gathers.insert(result.gathers.end(), one.gathers.begin(), one.gathers.end());
       if (!one.note.empty()) result.note = one.note;
+      result.gave_up |= one.gave_up;
     }
     return result;
   } catch (const isl::exception&) {
     return {{scatter_access(query)},
-            "the search for the points that read an element takes too long, and was given up"};
+            "the search for the points that read an element takes too long, and was given up",
+            true};
   }
 }
 

@@ -57,6 +57,7 @@ struct Gather {
 struct Inversion {
   std::vector<Gather> gathers;  // every point of the domain is in exactly one
   std::string note;             // why something could not be inverted; empty when all was
+  bool gave_up = false;         // for want of operations
 };
 
 Inversion invert_access(const AccessQuery& query);

@@ -88,8 +88,8 @@ class GroupInverter {
         bridge_(context_, names_of(group.vars)),
         domain_(bridge_.universe()) {
     for (const Expr& e : fixed) bridge_.make_parameter(e);
-    build_domain();
     for (const Expr& index : group.indices) affine_.push_back(*bridge_.affine(index));
+    build_domain();
   }
 
   std::vector<GroupPiece> run() {
@@ -116,15 +116,20 @@ class GroupInverter {
       own_range_.push_back(range);
       domain_ = domain_.intersect(range);
     }
-    // Where the target has no element there is nothing to do.
-    for (const LoopVariable& v : group_.region) {
-      if (!v.min.defined() || !v.max.defined()) continue;
-      isl::set not_empty = bridge_.bound(v.min).le_set(bridge_.bound(v.max));
-      domain_ = domain_.intersect(not_empty);
-    }
+    std::vector<isl::set> conditions;
+    for (const Expr& e : group_.predicate) conditions.push_back(*bridge_.condition(e));
+    for (const LoopVariable& v : group_.region) assume_not_empty(v);
     box_ = domain_;
-    for (const Expr& e : group_.predicate)
-      domain_ = domain_.intersect(*bridge_.condition(e)).coalesce();
+    for (const isl::set& s : conditions) domain_ = domain_.intersect(s).coalesce();
+  }
+
+  // Where the target has no element there is nothing to do. Ends over parameters of their own, as
+  // those that isl cannot follow, say nothing about the others, and would make the search longer.
+  void assume_not_empty(const LoopVariable& v) {
+    if (!v.min.defined() || !v.max.defined()) return;
+    const size_t known = bridge_.parameters().size();
+    isl::pw_aff min = bridge_.bound(v.min), max = bridge_.bound(v.max);
+    if (bridge_.parameters().size() == known) domain_ = domain_.intersect(min.le_set(max));
   }
 
   // {z -> y} over all of z: the domain is not applied.

@@ -44,9 +44,9 @@ std::optional<double> iterations_of(const Gather& g, const AccessQuery& query) {
 
 }  // namespace
 
-Inversion invert_or_scatter(const AccessQuery& any_query) {
+Inversion invert_or_scatter(const AccessQuery& any_query, unsigned long operations) {
   AccessQuery query = any_query;
-  query.operations = worthwhile_operations;
+  query.operations = operations;
   Inversion inversion = invert_access(query);
   auto points = points_of(query.domain);
   double total = 0;

@@ -11,8 +11,13 @@ namespace retrograde::ir {
 // element once, so it may cost several times as many iterations. Extents that are no constants
 // count as equal on both sides: then the gather stays.
 constexpr double dearer = 32;
-// Nor may the search for it take longer than compiling the scatter does: some tenths of a second.
-constexpr unsigned long worthwhile_operations = 150'000;
-Inversion invert_or_scatter(const AccessQuery& query);
+// Nor may the search for it take long: a million operations are about half a second. Clamps with
+// run-time ends need 10,000 (a repeated edge) to 900,000 (three of them over sums of variables).
+constexpr unsigned long worthwhile_operations = 1'000'000;
+// Once searches of a program have been given up, the next may take half as many each time, down to
+// this.
+constexpr unsigned long least_operations = 125'000;
+Inversion invert_or_scatter(const AccessQuery& query,
+                            unsigned long operations = worthwhile_operations);
 
 }  // namespace retrograde::ir

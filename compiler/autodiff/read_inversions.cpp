@@ -2,7 +2,6 @@
 
 #include <algorithm>
 
-#include "autodiff/inversion_cost.h"
 #include "autodiff/update_context.h"
 #include "ir/build.h"
 #include "ir/print.h"
@@ -57,7 +56,9 @@ const Inversion& ReadInversions::find(const FuncContents& f, const Symbol& symbo
   for (const LoopVariable& v : query.domain.vars) key += ";" + v.name;
   key += f.name;
   auto [it, is_new] = found_.try_emplace(key);
-  if (is_new) it->second = invert_or_scatter(query);
+  if (!is_new) return it->second;
+  it->second = invert_or_scatter(query, operations_);
+  if (it->second.gave_up) operations_ = std::max(operations_ / 2, least_operations);
   return it->second;
 }
 

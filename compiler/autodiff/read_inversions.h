@@ -5,7 +5,7 @@
 #include <map>
 #include <string>
 
-#include "autodiff/access_inversion.h"
+#include "autodiff/inversion_cost.h"
 #include "frontend/function.h"
 
 namespace retrograde::ir {
@@ -23,6 +23,7 @@ class ReadInversions {
                                   const Expr& adjoint);
   const Inversion& find(const FuncContents& f, const Symbol& symbol, const AccessQuery& query);
   std::map<std::string, Inversion> found_;
+  unsigned long operations_ = worthwhile_operations;  // for the next
 };
 
 }  // namespace retrograde::ir

@@ -412,6 +412,7 @@ TEST(AccessInversion, ScattersWhereTheSearchTakesTooLong) {
   Inversion chosen = invert_or_scatter(k.query);
   ASSERT_EQ(chosen.gathers.size(), 1u);
   EXPECT_TRUE(chosen.gathers[0].scatters);
+  EXPECT_TRUE(chosen.gave_up);
   EXPECT_NE(chosen.note.find("was given up"), std::string::npos) << chosen.note;
 }
 

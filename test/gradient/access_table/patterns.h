@@ -107,6 +107,34 @@ static std::vector<Pattern> patterns() {
          n.set(10);
          return made(in(clamp(x - 3, 0, n - 1)), {x});
        }},
+      {{"strided and mirrored, clamped with parameters", QuasiAffine, {4, 6}, {12}},
+       [](const Func& in) {
+         Param<int> w("w"), h("h"), p("p");
+         w.set(4);
+         h.set(6);
+         p.set(-3);
+         return made(in(max(min((2 - x) / 3 + 1, w - 1), 0), h - 1 - max(min(x + p, h - 1), 0)),
+                     {x});
+       }},
+      {{"three clamps of x with parameters", QuasiAffine, {4, 5, 3}, {10}},
+       [](const Func& in) {
+         Param<int> w("w"), h("h"), d("d"), p("p"), q("q");
+         w.set(4);
+         h.set(5);
+         d.set(3);
+         p.set(2);
+         q.set(-4);
+         return made(in(clamp(x, 0, w - 1), clamp(x + p, 0, h - 1), clamp(x + q, 0, d - 1)), {x});
+       }},
+      {{"sum along a shear, clamped with parameters", QuasiAffine, {6, 5}, {6, 5}},
+       [](const Func& in) {
+         Param<int> w("w"), h("h");
+         w.set(6);
+         h.set(5);
+         RDom r(0, 3);
+         return summed(in(clamp(x + r, 0, w - 1), clamp(y - r, 0, h - 1)) * cast<float>(r + 1),
+                       {x, y});
+       }},
       {{"mirror: select of three", QuasiAffine, {8}, {16}},
        [](const Func& in) {
          Expr u = x - 4;
