@@ -24,7 +24,7 @@ TEST_P(Adversary, IsRightOrRefused) {
     const Judged judged = judge(choices, i % one_compiled_of == 0);
     EXPECT_LT(judged.judgement, Judgement::Wrong)
         << "fuzz_adjoints --seed " << seed << ": " << judged.detail;
-    checked += judged.judgement == Judgement::Right;
+    checked += judged.judgement <= Judgement::Kink;  // forward agrees with reverse
   }
   EXPECT_GT(checked, programs_per_shard / 2);
 }

@@ -26,7 +26,9 @@ Func bounded(Choices& choices, const Image& image, const Type& type) {
 }  // namespace
 
 Type Maker::image_type() {
-  switch (c_.below(12)) {
+  switch (c_.below(13)) {
+    case 12:
+      return BFloat(16);
     case 10:
       return Float(64);
     case 11:
@@ -58,14 +60,17 @@ ImageParam Maker::handle_of(const Buffer<>& image) {
   return handle;
 }
 
-// In [0.25, 1.25], so that a step of 2^-9 to either side is exact in the type; ties: few values.
+// So that a step of 2^-7 to either side, and a quarter of it, is exact in the type: in
+// [0.25, 1.25], or in [0.27, 0.46] with 8 bits. ties: few values.
 void Maker::fill(Buffer<>& image, bool ties) {
   const halide_buffer_t& raw = *image.raw_buffer();
   const Type type = oracle::type_of_buffer(raw);
-  const int steps = ties ? 3 : type.bits() == 16 ? 32 : 4096;
+  const int steps = ties ? 3 : type.is_bfloat() ? 97 : type.bits() == 16 ? 32 : 4096;
+  const double low = type.is_bfloat() ? 0.265625 : 0.25,
+               high = type.is_bfloat() ? 0.455078125 : 1.25;
   std::mt19937 random(static_cast<unsigned>(c_.below(1 << 16)));
   oracle::region_of(raw).for_each([&](const std::vector<int>& at) {
-    const double value = 0.25 + (random() % static_cast<unsigned>(steps)) / double(steps);
+    const double value = low + (high - low) * (random() % static_cast<unsigned>(steps)) / steps;
     oracle::write_element(*image.raw_buffer(), at, ir::Scalar::of_float(type, value));
   });
 }

@@ -2,7 +2,8 @@
 //
 // program.cpp: the order of things. inputs.cpp: images, and reads of them and of Funcs. values.cpp:
 // expressions. functions.cpp: smooth functions, kinks, guarded branches. stages.cpp: Funcs,
-// updates, reductions. loops.cpp: loops over time. rules.cpp: derivatives that the author writes.
+// updates, reductions. loops.cpp: loops over time. structures.cpp: what programs of users are made
+// of. rules.cpp: derivatives that the author writes.
 #pragma once
 
 #include "gradient/adversary/places.h"
@@ -69,6 +70,21 @@ class Maker {
   // ---- loops over time ----
   void add_loop();
   Expr stepped(const Func& f, int k, const Point& at);
+
+  // ---- structures ----
+  Expr last_at(const Expr& u, const Expr& v);
+  Func define(const std::string& name, const std::vector<Var>& vars, const Expr& value);
+  Func define(const std::string& name, const std::vector<Var>& vars, const Tuple& values);
+  void add_structure();
+  void add_pyramid();
+  void add_grid();
+  void add_convolution();
+  void add_table();
+  void add_scans();
+  void add_two_loops();
+  void add_place_of_maximum();
+  void add_parametric_sum();
+  void add_boundaries();
 
   // ---- rules ----
   Expr ruled(const Type& type, const Point& at, int depth);

@@ -9,6 +9,7 @@ void Maker::run() {
   for (int n = c_.between(1, 4); n > 0; --n) add_func(c_.between(1, 2));
   if (c_.chance(10)) add_chain();
   if (c_.chance(8)) add_func(3);
+  for (int n = c_.chance(30) ? c_.between(1, 2) : 0; n > 0; --n) add_structure();
   const bool has_loop = c_.chance(15);
   if (has_loop) add_loop();
   if (c_.chance(12)) add_custom();

@@ -92,7 +92,7 @@ Expr Maker::ruled(const Type& type, const Point& at, int depth) {
     case 2:
       return a + stop_gradient(floor(a));
     case 3:
-      return straight_through(a + floor(leaf(type, at)), a);
+      return straight_through(a + converted(type, floor(leaf(type, at))), a);
     default:
       return select(stop_gradient(a) > converted(type, Expr(0.5f)), a, leaf(type, at));
   }

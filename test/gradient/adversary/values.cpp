@@ -34,6 +34,7 @@ Expr Maker::leaf(const Type& type, const Point& at) {
   }
 }
 
+// Functions of bfloat16 are float32.
 Expr Maker::value(const Type& type, const Point& at, int depth) {
   if (depth <= 0 || --budget_ < 0) return leaf(type, at);
   if (!type.is_float()) return integer(type, at, depth);
@@ -49,17 +50,17 @@ Expr Maker::value(const Type& type, const Point& at, int depth) {
       return value(type, at, depth - 1) * value(type, at, depth - 1);
     case 5:
     case 6:
-      return smooth(type, at, depth);
+      return converted(type, smooth(type, at, depth));
     case 7:
-      return broken(type, at, depth);
+      return converted(type, broken(type, at, depth));
     case 8:
-      return guarded(type, at, depth);
+      return converted(type, guarded(type, at, depth));
     case 9:
       return reduced(type, at, depth);
     case 10:
       return fast(type, at, depth);
     default:
-      return ruled(type, at, depth);
+      return converted(type, ruled(type, at, depth));
   }
 }
 
