@@ -4,6 +4,7 @@
 // kink, and a failing list of choices shrinks to the smallest one. fuzz_adjoints runs many more.
 #include <gtest/gtest.h>
 
+#include <functional>
 #include <numeric>
 
 #include "gradient/adversary/check.h"
@@ -31,19 +32,24 @@ TEST_P(Adversary, IsRightOrRefused) {
 
 INSTANTIATE_TEST_SUITE_P(Shard, Adversary, ::testing::Range(0u, shards));
 
-// out(x) = value(image(x)) over an image of `elements`.
-Judged judge_pointwise(Expr (*value)(const Expr&), float element) {
+Var x("x");
+
+// out(x) = value(image) over an image of `natural_size` equal elements.
+Judged judge_of_equal(const std::function<Expr(const Buffer<float>&)>& value, float element) {
   AdversaryProgram p;
   Buffer<float> image(std::vector<int>{natural_size}, "image");
   image.fill(element);
   p.images.push_back(image);
   p.scale.set(1.0f);
   p.region = {{0}, {natural_size}};
-  Var x("x");
   Func out("out");
-  out(x) = value(image(x)) * p.scale;
+  out(x) = value(image) * p.scale;
   p.funcs = {out};
   return judge(p, 1, false);
+}
+
+Judged judge_pointwise(Expr (*value)(const Expr&), float element) {
+  return judge_of_equal([&](const Buffer<float>& image) { return value(image(x)); }, element);
 }
 
 TEST(AdversaryOracle, AcceptsARightGradient) {
@@ -62,6 +68,15 @@ TEST(AdversaryOracle, KnowsAKinkAndAJump) {
   EXPECT_EQ(judge_pointwise(kink, 0.5f).judgement, Judgement::Kink);
   EXPECT_EQ(judge_pointwise(kink, 0.75f).judgement, Judgement::Right);
   EXPECT_EQ(judge_pointwise(jump, 0.5f).judgement, Judgement::Kink);
+}
+
+// Along any direction the median of equal elements has the same slope on both sides.
+TEST(AdversaryOracle, KnowsTheKinkOfAMedian) {
+  const auto median = [](const Buffer<float>& image) {
+    const Expr a = image(x), b = image((x + 1) % natural_size), c = image((x + 2) % natural_size);
+    return max(min(a, b), min(max(a, b), c));
+  };
+  EXPECT_EQ(judge_of_equal(median, 0.5f).judgement, Judgement::Kink);
 }
 
 TEST(AdversaryOracle, PassesOverWhatIsNotFinite) {

@@ -99,6 +99,16 @@ Motion::Motion(const AdversaryProgram& program, Weights& weights, const std::str
   of_scale_ = weights.sign();
 }
 
+Motion Motion::operator+(const Motion& other) const {
+  Motion sum = *this;
+  for (size_t i = 0; i < v_.size(); ++i) {
+    sum.v_[i] = v_[i].copy();
+    sum.v_[i].for_each_element([&](const int* at) { sum.v_[i](at) += other.v_[i](at); });
+  }
+  sum.of_scale_ += other.of_scale_;
+  return sum;
+}
+
 std::vector<AdjointInput> Motion::inputs() const {
   std::vector<AdjointInput> result;
   for (size_t i = 0; i < p_.images.size(); ++i) result.push_back(p_.image(i));

@@ -62,6 +62,7 @@ Func reading_inside(const std::vector<Buffer<float>>& buffers, const oracle::Reg
 class Motion {
  public:
   Motion(const AdversaryProgram& program, Weights& weights, const std::string& name);
+  Motion operator+(const Motion& other) const;
   std::vector<AdjointInput> inputs() const;
   std::vector<Direction> directions() const;
   oracle::Region region(size_t input) const;  // of input i; none of `scale`, the last
