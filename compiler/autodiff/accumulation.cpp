@@ -246,14 +246,25 @@ class Builder {
   // Whether the elements alone give too little to do in parallel, and each sums over many
   // iterations.
   bool is_worth_splitting(const Gather& g) const {
+    if (g.rdom && leaves_lanes_idle(g)) return true;
     if (!g.rdom || elements_of(g) > few_elements) return false;
     if (parts_of(g) < least_parts) return false;
     double iterations = iterations_of(g, many_iterations);
     return iterations >= (has_pure_dimension(g) ? many_iterations : part_count * lane_count);
   }
+  // Whether rows of elements are shorter than a vector, as in a small kernel with many channels,
+  // while each element sums over long rows.
+  bool leaves_lanes_idle(const Gather& g) const {
+    if (g.scatters || g.pure.empty() || target_.region.size() != g.pure.size()) return false;
+    const auto row = as_const_int(g.rdom->vars[0].extent);
+    return g.pure[0] && extent_of(target_.region[0]) * 2 <= lane_count &&
+           (!row || *row >= lane_count) && elements_of(g) <= near_elements &&
+           iterations_of(g, many_iterations) >= many_iterations;
+  }
   // Each part of a scatter holds every element that it may reach: the more elements for the
-  // iterations, the fewer parts. A power of two.
+  // iterations, the fewer parts. A power of two. One: there are only lanes.
   int parts_of(const Gather& g) const {
+    if (!g.scatters && elements_of(g) > few_elements) return 1;
     if (!g.scatters || target_.region.size() != g.pure.size()) return part_count;
     const double elements = elements_of_target();
     if (elements >= unknown_elements) return part_count;
@@ -311,8 +322,9 @@ class Builder {
 
   // x = (part * chunk + rho) * lanes + lane for the outermost variable when it is the innermost
   // too; else lanes split the innermost and parts the outermost variable. Without `lane` there are
-  // no lanes. Beyond the end the place is clamped: what it reads must exist even where the
-  // condition is false. Both are cut off the steady state, whose accumulators stay in registers.
+  // no lanes, without `part` no parts. Beyond the end the place is clamped: what it reads must
+  // exist even where the condition is false. Both are cut off the steady state, whose accumulators
+  // stay in registers.
   static Slice slice_of(const Gather& g, const Expr& lane, const Expr& part, int parts) {
     Slice slice;
     slice.rvars = rvars_of(g);
@@ -323,12 +335,13 @@ class Builder {
       std::string old = r.var;
       Expr all = r.extent, min = r.min;
       r = {unique_name(old), make_zero(Int(32)), all};
-      if (i == 0 && lane.defined()) r.extent = simplify((r.extent + (lane_count - 1)) / lane_count);
-      if (i == last) r.extent = simplify((r.extent + (parts - 1)) / parts);
+      const bool in_parts = i == last && part.defined(), in_lanes = i == 0 && lane.defined();
+      if (in_lanes) r.extent = simplify((r.extent + (lane_count - 1)) / lane_count);
+      if (in_parts) r.extent = simplify((r.extent + (parts - 1)) / parts);
       Expr at = variable(r.var, Int(32), SymbolRef(rdom));
-      if (i == last) at = part * r.extent + at;
-      if (i == 0 && lane.defined()) at = at * lane_count + lane;
-      if (i == last || (i == 0 && lane.defined())) {
+      if (in_parts) at = part * r.extent + at;
+      if (in_lanes) at = at * lane_count + lane;
+      if (in_parts || in_lanes) {
         slice.conditions.push_back(likely(at < all));
         at = min_of(likely(at), all - 1);
       }
@@ -345,7 +358,7 @@ class Builder {
   void add_privatised(const UpdateGroup& group) {
     const Gather& g = group.gather;
     FuncPtr parts = new_func(claim_name(name_ + "_parts"));
-    Expr part = variable(unique_name("part")),
+    Expr part = parts_of(g) > 1 ? variable(unique_name("part")) : Expr(),
          lane = has_lanes(g) ? variable(unique_name("lane")) : Expr();
     std::vector<Expr> zeros;
     for (Type t : types_) zeros.push_back(make_zero(t));
@@ -372,7 +385,7 @@ class Builder {
   }
 
   // Coordinates of `parts`: the lane, the elements that a scatter reaches or the pure ones, the
-  // part.
+  // part; lane and part where they are defined.
   static std::vector<Expr> parts_point(const Gather& g, const std::vector<Expr>& element,
                                        const Expr& lane, const Expr& part) {
     std::vector<Expr> point;
@@ -380,7 +393,7 @@ class Builder {
     for (size_t d = 0; d < element.size(); ++d) {
       if (g.scatters || g.pure[d]) point.push_back(element[d]);
     }
-    point.push_back(part);
+    if (part.defined()) point.push_back(part);
     return point;
   }
 
@@ -389,13 +402,14 @@ class Builder {
     if (has_lanes)
       rdom->vars.push_back(
           {unique_name("lane"), make_zero(Int(32)), make_const(Int(32), lane_count)});
-    rdom->vars.push_back(
-        {unique_name("part"), make_zero(Int(32)), make_const(Int(32), parts_of(g))});
+    const int count = parts_of(g);
+    if (count > 1)
+      rdom->vars.push_back({unique_name("part"), make_zero(Int(32)), make_const(Int(32), count)});
     rdom->frozen = true;
     auto rvar = [&](size_t i) { return variable(rdom->vars[i].var, Int(32), SymbolRef(rdom)); };
     const std::vector<Expr>& lhs = g.scatters ? args_ : g.lhs;
-    std::vector<Expr> point =
-        parts_point(g, lhs, has_lanes ? rvar(0) : Expr(), rvar(rdom->vars.size() - 1));
+    std::vector<Expr> point = parts_point(g, lhs, has_lanes ? rvar(0) : Expr(),
+                                          count > 1 ? rvar(rdom->vars.size() - 1) : Expr());
     std::vector<Expr> values;
     for (size_t k = 0; k < types_.size(); ++k) {
       values.push_back(call_value(result_.func, lhs, static_cast<int>(k)) +

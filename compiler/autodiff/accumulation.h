@@ -9,8 +9,9 @@
 //               and terms are computed in vectors.
 //   privatised  few elements are left to run over in parallel: a fixed number of parts of the
 //               outermost reduction variable, and lanes of the innermost, accumulate apart in a
-//               Func of their own, and are then summed in order. A scatter has lanes where its
-//               elements are few. The result does not depend on the number of threads.
+//               Func of their own, and are then summed in order. Lanes alone where the elements are
+//               more, in rows shorter than a vector. A scatter has lanes where its elements are
+//               few. The result does not depend on the number of threads.
 //
 // Long sums. Adding n float32 terms one after the other may lose log2(n) bits: 12 million times 0.1
 // is wrong by a tenth. An adjoint in float32 that sums many_terms iterations or more for an element

@@ -6,6 +6,7 @@
 #include "autodiff/derivative.h"
 #include "autodiff/read_estimate.h"
 #include "frontend/func.h"
+#include "gradient/gradient_check.h"
 #include "ir/build.h"
 #include "ir/print.h"
 #include "ir/visit.h"
@@ -139,6 +140,30 @@ TEST_F(DefaultSchedule, ScattersToFewElementsHaveElementsForEachLane) {
   Derivative d = propagate_adjoints(sum);
   EXPECT_EQ(parts_of_adjoint(d, few).dimensions(), 3) << "lane, element, part";
   EXPECT_EQ(parts_of_adjoint(d, many).dimensions(), 2) << "element, part";
+}
+
+// Kernels of 3 x 3: vectors along their rows would be four fifths empty.
+TEST_F(DefaultSchedule, SmallKernelsOfManyChannelsAreSummedInLanes) {
+  constexpr int side = 70, channels = 9;
+  const Buffer<float> image = gradient::random_image({side + 2, side + 2, channels}, -1, 1, 4);
+  const Buffer<float> kernels = gradient::random_image({3, 3, channels, channels}, -1, 1, 5);
+  const Buffer<float> seed = gradient::random_image({side, side, channels}, -1, 1, 6);
+  Var c("c");
+  Func layer("layer");
+  RDom r(0, 3, 0, 3, 0, channels);
+  layer(x, y, c) = 0.0f;
+  layer(x, y, c) += kernels(r.x, r.y, r.z, c) * image(x + r.x, y + r.y, r.z);
+  Derivative d = propagate_adjoints(layer, seed);
+  EXPECT_EQ(parts_of_adjoint(d, kernels).dimensions(), 5) << "lane and element";
+  const Buffer<float> gradient = d(kernels).realize({3, 3, channels, channels});
+  gradient.for_each_element([&](int i, int j, int from, int to) {
+    double sum = 0;
+    for (int v = 0; v < side; ++v) {
+      for (int u = 0; u < side; ++u)
+        sum += static_cast<double>(seed(u, v, to)) * image(u + i, v + j, from);
+    }
+    EXPECT_NEAR(gradient(i, j, from, to), sum, 1e-5 * (1 + std::abs(sum)));
+  });
 }
 
 // Reads of `read` in the last stage of `reader`.
