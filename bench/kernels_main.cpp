@@ -1,4 +1,5 @@
-// kernels_main.cpp -- run time, compile time and memory of forward pipelines, beside Halide 14's.
+// kernels_main.cpp -- run time, compile time and memory of forward pipelines and of gradients,
+// beside Halide 14's.
 //
 // Google Benchmark runs each kernel as one benchmark with manual time: an iteration is one run of
 // each side. See README.md.
@@ -59,12 +60,11 @@ class TableReporter : public benchmark::BenchmarkReporter {
 };
 
 // All threads; the matrix multiplication on one core as well.
-std::vector<Job> jobs(const std::vector<std::string>& asked, const Machine& machine) {
+std::vector<Job> jobs(const std::vector<std::string>& names, const Machine& machine) {
   std::vector<Job> out;
-  for (const std::string& name : kernel_names()) {
-    if (!asked.empty() && !std::count(asked.begin(), asked.end(), name)) continue;
+  for (const std::string& name : names) {
     if (name == "matrix_multiply" && machine.threads > 1) out.push_back({name, false, 1});
-    out.push_back({name, false, machine.threads});
+    out.push_back({name, false, machine.threads, is_gradient(name)});
   }
   return out;
 }

@@ -46,6 +46,9 @@ target_compile_options(retrograde_dep_halide_runtime INTERFACE
 target_link_libraries(retrograde_dep_halide_runtime INTERFACE ${CMAKE_DL_LIBS})
 
 find_library(RETROGRADE_HALIDE_LIBRARY NAMES Halide14 REQUIRED)
+get_filename_component(retrograde_halide_folder ${RETROGRADE_HALIDE_LIBRARY} DIRECTORY)
+find_library(RETROGRADE_HALIDE_LI2018 NAMES autoschedule_li2018
+  PATHS ${retrograde_halide_folder}/halide14 ${retrograde_halide_folder} NO_DEFAULT_PATH REQUIRED)
 add_library(retrograde_dep_halide INTERFACE)
 target_include_directories(retrograde_dep_halide SYSTEM INTERFACE
   ${RETROGRADE_HALIDE_RUNTIME_INCLUDE})

@@ -1,8 +1,9 @@
 // kernel.h -- what one benchmark kernel is, in the dialect that Halide 14 and Retrograde share.
 //
-// Every kernel is one source file: algorithm and schedule, written once, compiled once against
-// Halide's header and once against ours. list.def names them all. Inputs are made by a generator
-// that depends on nothing but the point, so both sides compute from the same numbers.
+// Every kernel is one source file: algorithm and schedule (of a gradient the algorithm), written
+// once, compiled once against Halide's header and once against ours. list.def names them all.
+// Inputs are made by a generator that depends on nothing but the point, so both sides compute from
+// the same numbers.
 #pragma once
 
 #include <Halide.h>
@@ -15,6 +16,8 @@ namespace kernels {
 struct Setup {
   Halide::Target target;
   bool small = false;  // sizes for a check of the results: odd, and quick
+  int threads = 1;
+  bool primal = false;  // of a gradient: the program itself, without a schedule
 
   // Lanes of a full vector register.
   template <typename T>
@@ -33,8 +36,8 @@ struct Kernel {
 };
 
 #define KERNEL(name) Kernel name(const Setup& setup);
-#include "list.def"
-#undef KERNEL
+#define GRADIENT(name) Kernel name(const Setup& setup);
+#include "../list.def"
 
 // ---- inputs ----
 

@@ -14,10 +14,12 @@ using retrograde::text;
 namespace {
 
 void check_kernels(const std::vector<std::string>& asked) {
+  std::vector<std::string> all = kernel_names();
+  all.insert(all.end(), gradient_names().begin(), gradient_names().end());
   std::string known;
-  for (const std::string& name : kernel_names()) known += (known.empty() ? "" : ", ") + name;
+  for (const std::string& name : all) known += (known.empty() ? "" : ", ") + name;
   for (const std::string& name : asked) {
-    if (std::count(kernel_names().begin(), kernel_names().end(), name)) continue;
+    if (std::count(all.begin(), all.end(), name)) continue;
     retrograde::call_error(text("run the kernel ", retrograde::quoted(name)),
                            "it must be one of the benchmark's", text("they are ", known),
                            "Give --kernel one of these names");
@@ -29,16 +31,30 @@ void check_kernels(const std::vector<std::string>& asked) {
 const std::vector<std::string>& kernel_names() {
   static const std::vector<std::string> names{
 #define KERNEL(name) #name,
-#include "../kernels/list.def"
-#undef KERNEL
+#include "../list.def"
   };
   return names;
+}
+
+const std::vector<std::string>& gradient_names() {
+  static const std::vector<std::string> names{
+#define GRADIENT(name) #name,
+#include "../list.def"
+  };
+  return names;
+}
+
+bool is_gradient(const std::string& name) {
+  return std::count(gradient_names().begin(), gradient_names().end(), name) > 0;
 }
 
 std::optional<Options> read_options(int argc, char** argv) {
   Options options;
   CLI::App app("Forward pipelines with one schedule, compiled by Halide 14 and by Retrograde.");
+  bool gradients = false;
   app.add_option("--kernel", options.kernels, "run this kernel; may be given several times");
+  app.add_flag("--gradients", gradients,
+               "gradients instead, which each compiler makes and schedules itself");
   app.add_flag("--quick", options.quick, "few runs of each: numbers for guidance only");
   auto* rounds = app.add_option("--rounds", options.rounds, "timed runs of each side")
                      ->check(CLI::Range(1, 100000))
@@ -55,6 +71,7 @@ std::optional<Options> read_options(int argc, char** argv) {
   }
   if (options.quick && rounds->count() == 0) options.rounds = 7;
   check_kernels(options.kernels);
+  if (options.kernels.empty()) options.kernels = gradients ? gradient_names() : kernel_names();
   return options;
 }
 

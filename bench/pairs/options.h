@@ -9,13 +9,15 @@
 namespace bench {
 
 struct Options {
-  std::vector<std::string> kernels;  // to run; all when empty
+  std::vector<std::string> kernels;  // to run, gradients among them
   bool quick = false;                // few runs of each: numbers for guidance only
   int rounds = 31;
   std::filesystem::path output = "kernels.json";
 };
 
-const std::vector<std::string>& kernel_names();
+const std::vector<std::string>& kernel_names();    // of forward pipelines
+const std::vector<std::string>& gradient_names();  // of gradients
+bool is_gradient(const std::string& name);
 
 // Nothing when only help was asked for. Throws retrograde::UserError.
 std::optional<Options> read_options(int argc, char** argv);

@@ -89,6 +89,10 @@ PairResult Pair::result(const std::filesystem::path& scratch) {
   const std::vector<Values> ours = retrograde_.outputs(scratch), theirs = halide_.outputs(scratch);
   result.max_relative_error = max_relative_error(ours, theirs);
   result.integers = std::all_of(ours.begin(), ours.end(), [](auto& o) { return o.integers; });
+  if (job_.is_gradient && !(result.max_relative_error <= tolerance(result))) {
+    result.retrograde_slope_error = retrograde_.slope_error();
+    result.halide_slope_error = halide_.slope_error();
+  }
   result.bytes = retrograde_.bytes;
   result.operations = retrograde_.operations;
   return result;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -23,6 +24,8 @@ struct PairResult {
   double retrograde_compile_ms = 0, halide_compile_ms = 0;
   Worker::Memory retrograde_memory{}, halide_memory{};
   double max_relative_error = 0;
+  // Of gradients that differ: how far each is from differences of its own program.
+  std::optional<double> retrograde_slope_error, halide_slope_error;
   bool integers = false;  // all outputs are
   double bytes = 0, operations = 0;
 };
@@ -33,6 +36,8 @@ struct PairResult {
 double max_relative_error(const std::vector<Values>& a, const std::vector<Values>& b);
 // The largest max_relative_error for which both sides have computed the same.
 double tolerance(const PairResult& result);
+// The slope error from which a gradient counts as wrong.
+inline constexpr double wrong_slope = 0.02;
 
 // The two workers of one kernel.
 class Pair {

@@ -28,6 +28,15 @@ double percent_of_peak(const PairResult& r, const Machine& machine) {
   return 100e3 * r.operations / machine.flops(r.threads) / r.retrograde.median;
 }
 
+// What follows the error in the table.
+std::string remark(const PairResult& r) {
+  if (r.max_relative_error <= tolerance(r)) return "";
+  if (!r.halide_slope_error) return "  DIFFERS";
+  return formatted("  %s, from differences: ours by %.1e, Halide's by %.1e",
+                   is_wrong(r) ? "DIFFERS" : "Halide's is wrong", *r.retrograde_slope_error,
+                   *r.halide_slope_error);
+}
+
 double geometric_mean(const std::vector<PairResult>& results, double (*value)(const PairResult&)) {
   double sum = 0;
   for (const PairResult& r : results) sum += std::log(value(r));
@@ -60,6 +69,10 @@ nlohmann::json entry(const PairResult& r, const Machine& machine) {
   e["halide_peak_mb"] = r.halide_memory.peak_mb;
   e["percent_of_bound"] = percent_of_bound(r, machine);
   e["max_relative_error"] = r.max_relative_error;
+  if (r.halide_slope_error) {
+    e["retrograde_slope_error"] = *r.retrograde_slope_error;
+    e["halide_slope_error"] = *r.halide_slope_error;
+  }
   e["retrograde_min_ms"] = r.retrograde.least;
   e["halide_min_ms"] = r.halide.least;
   e["retrograde_spread_ms"] = r.retrograde.spread;
@@ -78,7 +91,10 @@ nlohmann::json entry(const PairResult& r, const Machine& machine) {
 }  // namespace
 
 bool is_wrong(const PairResult& result) {
-  return !result.failure.empty() || !(result.max_relative_error <= tolerance(result));
+  if (!result.failure.empty()) return true;
+  if (result.max_relative_error <= tolerance(result)) return false;
+  return !result.retrograde_slope_error || !(*result.retrograde_slope_error <= wrong_slope) ||
+         *result.halide_slope_error <= wrong_slope;
 }
 
 std::string table_head(const Machine& machine) {
@@ -95,12 +111,15 @@ std::string table_row(const PairResult& r, const Machine& machine) {
   if (!r.failure.empty())
     return formatted("%-22s %2d FAILED: ", r.kernel.c_str(), r.threads) + r.failure + "\n";
   return formatted(
-      "%-22s %2d %8.2f [%.2f+%.2f] %8.2f [%.2f+%.2f] %6.3f %7.0f %8.0f %7.3f %6.0f %6.0f %7.1f "
-      "%9.1e%s\n",
-      r.kernel.c_str(), r.threads, r.retrograde.median, r.retrograde.least, r.retrograde.spread,
-      r.halide.median, r.halide.least, r.halide.spread, run_ratio(r), r.retrograde_compile_ms,
-      r.halide_compile_ms, compile_ratio(r), r.retrograde_memory.peak_mb, r.halide_memory.peak_mb,
-      percent_of_bound(r, machine), r.max_relative_error, is_wrong(r) ? "  DIFFERS" : "");
+             "%-22s %2d %8.2f [%.2f+%.2f] %8.2f [%.2f+%.2f] %6.3f %7.0f %8.0f %7.3f %6.0f %6.0f "
+             "%7.1f "
+             "%9.1e",
+             r.kernel.c_str(), r.threads, r.retrograde.median, r.retrograde.least,
+             r.retrograde.spread, r.halide.median, r.halide.least, r.halide.spread, run_ratio(r),
+             r.retrograde_compile_ms, r.halide_compile_ms, compile_ratio(r),
+             r.retrograde_memory.peak_mb, r.halide_memory.peak_mb, percent_of_bound(r, machine),
+             r.max_relative_error) +
+         remark(r) + "\n";
 }
 
 std::vector<Target> targets(const std::vector<PairResult>& all, const Machine& machine) {

@@ -24,7 +24,8 @@ struct Target {
 std::vector<Target> targets(const std::vector<PairResult>& results, const Machine& machine);
 std::string table_foot(const std::vector<PairResult>& results, const Machine& machine);
 
-// It failed, or the two sides differ.
+// It failed, or the two sides differ; but not when differences say that ours is right and Halide's
+// is not.
 bool is_wrong(const PairResult& result);
 
 void write_json(const std::filesystem::path& path, const std::vector<PairResult>& results,

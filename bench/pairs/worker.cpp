@@ -105,6 +105,8 @@ std::vector<Values> Worker::outputs(const std::filesystem::path& scratch) {
   return values;
 }
 
+double Worker::slope_error() { return ask("slope", "slope").at(0); }
+
 Worker::Memory Worker::memory() {
   const std::vector<double> numbers = ask("memory", "memory");
   return {numbers.at(0), numbers.at(1)};

@@ -22,6 +22,7 @@ struct Job {
   std::string kernel;
   bool small = false;
   int threads = 1;
+  bool is_gradient = false;
 };
 
 // The elements of one output, whatever their type was.
@@ -38,6 +39,8 @@ class Worker {
   double run();  // seconds
   // By way of a file in `scratch`.
   std::vector<Values> outputs(const std::filesystem::path& scratch);
+  // Of a gradient: how far it is from differences of its own program (../gradients/slope.h).
+  double slope_error();
   struct Memory {
     double peak_mb, run_mb;
   };

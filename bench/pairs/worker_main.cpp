@@ -12,7 +12,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "../kernels/kernel.h"
+#include "../gradients/slope.h"
 #include "worker_protocol.h"
 
 namespace {
@@ -26,8 +26,8 @@ double seconds_since(Clock::time_point start) {
 kernels::Kernel make_kernel(const std::string& name, const kernels::Setup& setup) {
 #define KERNEL(known) \
   if (name == #known) return kernels::known(setup);
-#include "../kernels/list.def"
-#undef KERNEL
+#define GRADIENT(known) KERNEL(known)
+#include "../list.def"
   throw std::runtime_error("there is no kernel \"" + name + "\"");
 }
 
@@ -51,7 +51,7 @@ void forget_peak() { std::ofstream("/proc/self/clear_refs") << "5"; }
 
 class Worker {
  public:
-  Worker(const std::string& name, bool small, int threads) : threads_(threads) {
+  Worker(const std::string& name, bool small, int threads) : name_(name), threads_(threads) {
     const Clock::time_point start = Clock::now();
     Halide::Func first("first");
     Halide::Var x("x");
@@ -59,7 +59,8 @@ class Worker {
     Halide::Buffer<int> values(16);
     first.realize(values, target_);
     start_seconds_ = seconds_since(start);
-    kernel_ = make_kernel(name, {target_, small});
+    setup_ = {target_, small, threads};
+    kernel_ = make_kernel(name, setup_);
   }
 
   void compile() {
@@ -97,6 +98,12 @@ class Worker {
     std::cout << "saved" << std::endl;
   }
 
+  void tell_slope() {
+    setup_.primal = true;
+    kernels::Kernel primal = make_kernel(name_, setup_);
+    std::cout << "slope " << kernels::slope_error(kernel_, primal, target_) << std::endl;
+  }
+
   void tell_memory() const {
     const double run_peak = status_mb("VmHWM");
     std::cout << "memory " << std::max(compile_peak_mb_, run_peak) << " "
@@ -112,7 +119,9 @@ class Worker {
   }
 
   Halide::Target target_ = target();
+  std::string name_;
   int threads_;
+  kernels::Setup setup_;
   kernels::Kernel kernel_;
   double start_seconds_ = 0, compile_peak_mb_ = 0, resident_mb_ = 0;
 };
@@ -124,6 +133,7 @@ void serve(Worker& worker) {
     words >> order >> path;
     if (order == "run") worker.run();
     if (order == "save") worker.save(path);
+    if (order == "slope") worker.tell_slope();
     if (order == "memory") worker.tell_memory();
   }
 }

@@ -4,6 +4,7 @@
 //   worker  ready COMPILE_SECONDS START_SECONDS BYTES OPERATIONS    or   failed MESSAGE
 //   driver  run           worker  ran SECONDS                       or   failed MESSAGE
 //   driver  save PATH     worker  saved            the outputs, as OutputHeader and elements, each
+//   driver  slope         worker  slope ERROR      of a gradient that has run, see slope.h
 //   driver  memory        worker  memory PEAK_MB RUN_MB
 //
 // START_SECONDS: compiling and running a first, trivial pipeline, which makes each compiler set up
