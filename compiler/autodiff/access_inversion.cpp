@@ -264,7 +264,7 @@ class Inverter {
     for (Expr& e : g.lhs) e = simplify(substitute(e, names));
     if (g.predicate.defined()) g.predicate = simplify(substitute(g.predicate, names));
     if (g.predicate.defined() && is_const_true(g.predicate)) g.predicate = Expr();
-    narrow_reductions(g, query_.target_args);
+    if (query_.narrows) narrow_reductions(g, query_.target_args);
   }
 
   const AccessQuery& query_;

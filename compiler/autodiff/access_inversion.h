@@ -40,6 +40,9 @@ struct AccessQuery {
       region;  // of the target; may be empty (unknown). Assumed not to be an empty set.
   // Work for each part of the search (isl_budget.h); when it is not enough: the scatter.
   unsigned long operations = isl_operations;
+  // Reduction domains end where conditions say (narrow_reductions.h), and may be empty at run time.
+  // False: they run over the domain's own loops, as often as these do.
+  bool narrows = true;
 };
 
 // One way in which elements are read: g_adj(lhs...) += sum over rvars where predicate of

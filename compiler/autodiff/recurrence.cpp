@@ -219,8 +219,10 @@ class Recurrence {
     Expr condition = relation.sees_new_condition;
     if (!to_new) condition = logical_not(condition);
     if (to_new ? relation.always_new : relation.never_new) condition = const_true();
-    return invert_access({restricted(c_.domain, condition), call.args, c_.query.target.args,
-                          c_.query.target.region});
+    AccessQuery query{restricted(c_.domain, condition), call.args, c_.query.target.args,
+                      c_.query.target.region};
+    query.narrows = !to_new;  // other terms are added in the first iteration of a sum
+    return invert_access(query);
   }
 
   // A(p) += sum over reads of A(W(i)) dV/df, p running against the order in which it was written.

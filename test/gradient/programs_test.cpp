@@ -367,6 +367,23 @@ TEST_F(Programs, ParametricSizes) {
   expect_machine_code_agrees(gradient, region);
 }
 
+// Of a recurrence whose steps are counted at run time, those that read the end of the clamp may be
+// none: the others still count.
+TEST_F(Programs, ARecurrenceThatMayNotReachTheEndOfAClamp) {
+  Param<int> steps("steps");
+  Func f("f");
+  RDom r(0, steps);
+  f(x) = a(x);
+  f(r) = f(clamp(r - 1, 0, 4)) * 2.0f;
+  Func loss = weighted_sum(f, {9});
+  Derivative d = propagate_adjoints(loss);
+  for (const int count : {1, 3, 5, 6, 9}) {
+    SCOPED_TRACE(count);
+    steps.set(count);
+    expect_gradient(loss, d, a);
+  }
+}
+
 // The adjoint of clamp(x, 0, p) adds to element p, which the image has only where it is read.
 TEST_F(Programs, AClampWiderThanTheImageIsNotReachedAndAddsNowhere) {
   Param<int> p("p");
