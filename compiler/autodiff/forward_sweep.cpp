@@ -53,6 +53,9 @@ class Sweep {
       if (!facts_.is_active(e)) return;
       tangents_[e.get()] = cast_to(adjoint_type(e.type()), tangent_of_(e));
       traits_[e.get()] = traits_of(tangents_[e.get()]);
+      // A Func's tangent may have overflowed, as its value may.
+      const auto* call = e.as<Call>();
+      traits_[e.get()].infinite |= call && call->call_type == CallType::Func;
     } else if (e.type().is_float() && (facts_.is_active(e) || undefs_.contains(e.get()))) {
       Expr t = combine(e, local_derivative(e, facts_));
       if (t.defined()) tangents_[e.get()] = t;
@@ -122,8 +125,8 @@ class Sweep {
     passed_[e.get()].quotient |= here.quotient || is_quotient;
     AdjointTraits& traits = traits_[e.get()];
     traits.add(passed);
-    traits.add(
-        {.singular = local.poles, .infinite = factor.risky || factor.infinite || factor.product});
+    const bool may_overflow = factor.risky || factor.infinite || factor.product || factor.read;
+    traits.add({.singular = local.poles, .infinite = may_overflow});
     return partial;
   }
 

@@ -137,6 +137,33 @@ TEST_F(StrongZeros, OverflowOfAProductUnderAnExponential) {
   expect(g, b, {0, 1.0f / 81, 0, 1 / 1.75f / 1.75f});
 }
 
+// Squares of squares: value and tangent overflow in the Func that the exponential reads. (Adjoints
+// know of it under a seed that is given; else a product that overflows in another Func counts as
+// finite.)
+TEST_F(StrongZeros, OverflowOfAnUpdateUnderAnExponential) {
+  set(a, {3, 4, 0.99f, 0.5f});
+  Func power("power"), f("f");
+  RDom r(0, 10);
+  power(x) = a(x);
+  power(x) = select(r >= 0, power(x) * power(x), 0.0f);
+  f(x) = exp(-(power(x) * power(x)));
+  const Func loss = sum_of(f);
+  AdjointOptions options;
+  options.overwritten = Overwritten::Store;
+  Buffer<float> ones(4);
+  ones.fill(1);
+  const Buffer<float> adjoint = propagate_adjoints(f, ones, options)(a).realize({4});
+  const double high = std::pow(static_cast<double>(0.99f), 2047);
+  const double expected[] = {0, 0, -2048 * high * std::exp(-0.99 * high), 0};
+  for (int i = 0; i < 4; ++i) {
+    EXPECT_NEAR(adjoint(i), expected[i], 1e-5) << i;
+    Buffer<float> unit(4);
+    unit.fill(0);
+    unit(i) = 1;
+    EXPECT_NEAR(evaluate_scalar(propagate_tangents(loss, {{a, unit}})(loss)), expected[i], 1e-5);
+  }
+}
+
 TEST_F(StrongZeros, SaturatedByClampAndMaximum) {
   set(a, {1e30f, 2, 0.5f, 1e20f});
   set(b, {1e30f, 0.25f, 0.5f, 1e30f});
