@@ -4,6 +4,7 @@
 #include <unordered_set>
 
 #include "analysis/linear.h"
+#include "autodiff/update_context.h"
 #include "ir/build.h"
 #include "ir/visit.h"
 #include "simplify/simplify.h"
@@ -32,16 +33,6 @@ std::optional<LinearForm> nonnegative_where(const Expr& condition) {
                          : plus(linear_form(c->a), linear_form(c->b), -1);
   form.constant -= strict;
   return form;
-}
-
-bool reads(const Expr& e) {
-  bool found = false;
-  walk(e, [&](const Expr& node) {
-    const auto* call = node.as<Call>();
-    found |= call && call->call_type != CallType::Operator;
-    return !found;
-  });
-  return found;
 }
 
 class Narrower {
@@ -78,7 +69,8 @@ class Narrower {
   Expr end_of(const LinearForm& form, const ReductionVariable& r, int64_t c) const {
     LinearForm alone{form.type, {{variable(r.var), c}}, 0};
     Expr end = to_expr(times(plus(form, alone, -1), -c));
-    return !end.defined() || uses_any_variable(end, variables_) || reads(end) ? Expr() : end;
+    return !end.defined() || uses_any_variable(end, variables_) || depends_on_data(end) ? Expr()
+                                                                                        : end;
   }
 
   static void raise_min(ReductionVariable& r, const Expr& end) {
