@@ -6,21 +6,13 @@
 #include "analysis/linear.h"
 #include "autodiff/update_context.h"
 #include "ir/build.h"
+#include "ir/conjuncts.h"
 #include "ir/visit.h"
 #include "simplify/simplify.h"
 
 namespace retrograde::ir {
 
 namespace {
-
-void split_conjunction(const Expr& e, std::vector<Expr>& terms) {
-  if (const auto* both = e.as<And>()) {
-    split_conjunction(both->a, terms);
-    split_conjunction(both->b, terms);
-  } else {
-    terms.push_back(e);
-  }
-}
 
 // The sum that is at least 0 where the comparison holds.
 std::optional<LinearForm> nonnegative_where(const Expr& condition) {
@@ -44,7 +36,7 @@ class Narrower {
 
   void run() {
     std::vector<Expr> terms, rest;
-    split_conjunction(g_.predicate, terms);
+    add_conjuncts(g_.predicate, terms);
     for (const Expr& term : terms) {
       if (!becomes_an_end(term)) rest.push_back(term);
     }

@@ -22,6 +22,7 @@
 #include "frontend/func.h"
 #include "frontend/reduction_leaves.h"
 #include "ir/build.h"
+#include "ir/conjuncts.h"
 #include "ir/memory_reads.h"
 #include "ir/print.h"
 #include "ir/variables.h"
@@ -35,16 +36,6 @@ using ir::Definition;
 using ir::FuncPtr;
 using ir::Leaf;
 using ir::Leaves;
-
-void add_conjuncts(const Expr& e, std::vector<Expr>& conjuncts) {
-  if (!e.defined()) return;
-  if (const ir::And* both = e.as<ir::And>()) {
-    add_conjuncts(both->a, conjuncts);
-    add_conjuncts(both->b, conjuncts);
-  } else {
-    conjuncts.push_back(e);
-  }
-}
 
 class Factoring {
  public:
@@ -67,7 +58,7 @@ class Factoring {
     for (const Leaf& leaf : kept_leaves_) kept_vars_.push_back(ir::variable(kept_.at(leaf.loop)));
     over_leaves_ =
         ir::map_exprs(update_, [&](const Expr& e) { return ir::substitute(e, leaves_.values); });
-    add_conjuncts(over_leaves_.predicate, conjuncts_);
+    ir::add_conjuncts(over_leaves_.predicate, conjuncts_);
   }
 
   FuncPtr run() {
