@@ -59,7 +59,18 @@ Pair::Pair(const Job& job, const std::filesystem::path& programs)
     : job_(job),
       retrograde_(Side::Retrograde, job, programs),
       halide_(Side::Halide, job, programs) {
-  // The first run of a process makes its threads and touches its memory.
+  warm_up();
+}
+
+Pair::Pair(const Job& job, const WorkerCommand& retrograde, const WorkerCommand& halide)
+    : job_(job),
+      retrograde_(Side::Retrograde, retrograde, job.threads),
+      halide_(Side::Halide, halide, job.threads) {
+  warm_up();
+}
+
+// The first run of a process makes its threads and touches its memory.
+void Pair::warm_up() {
   retrograde_.run();
   halide_.run();
 }

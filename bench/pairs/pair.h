@@ -43,12 +43,15 @@ inline constexpr double wrong_slope = 0.02;
 class Pair {
  public:
   Pair(const Job& job, const std::filesystem::path& programs);
+  Pair(const Job& job, const WorkerCommand& retrograde, const WorkerCommand& halide);
 
   // One run of each, the one that goes first changing from time to time. Milliseconds of ours.
   double run();
   PairResult result(const std::filesystem::path& scratch);
 
  private:
+  void warm_up();
+
   Job job_;
   Worker retrograde_, halide_;
   std::vector<double> retrograde_ms_, halide_ms_;

@@ -11,8 +11,9 @@ namespace bench {
 
 namespace {
 
-std::filesystem::path program_of(Side side, const std::filesystem::path& programs) {
-  return programs / (side == Side::Halide ? "bench_kernels_halide" : "bench_kernels_retrograde");
+WorkerCommand command_of(Side side, const Job& job, const std::filesystem::path& programs) {
+  const char* name = side == Side::Halide ? "bench_kernels_halide" : "bench_kernels_retrograde";
+  return {programs / name, {job.kernel, job.small ? "small" : "full", std::to_string(job.threads)}};
 }
 
 template <typename T>
@@ -60,10 +61,11 @@ std::vector<Values> read_outputs(const std::filesystem::path& path) {
 }  // namespace
 
 Worker::Worker(Side side, const Job& job, const std::filesystem::path& programs)
+    : Worker(side, command_of(side, job, programs), job.threads) {}
+
+Worker::Worker(Side side, const WorkerCommand& command, int threads)
     : side_(side),
-      process_(program_of(side, programs),
-               {job.kernel, job.small ? "small" : "full", std::to_string(job.threads)},
-               {{"HL_NUM_THREADS", std::to_string(job.threads)}}) {
+      process_(command.program, command.arguments, {{"HL_NUM_THREADS", std::to_string(threads)}}) {
   const std::vector<double> ready = answer("ready");
   if (ready.size() != 4) fail("its first answer has not four numbers");
   compile_seconds = ready[0];

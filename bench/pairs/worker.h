@@ -25,6 +25,12 @@ struct Job {
   bool is_gradient = false;
 };
 
+// How a worker is started.
+struct WorkerCommand {
+  std::filesystem::path program;
+  std::vector<std::string> arguments;
+};
+
 // The elements of one output, whatever their type was.
 struct Values {
   bool integers = false;
@@ -35,6 +41,8 @@ class Worker {
  public:
   // Compiles. `programs` is the folder of the two worker programs.
   Worker(Side side, const Job& job, const std::filesystem::path& programs);
+  // Another that speaks worker_protocol.h.
+  Worker(Side side, const WorkerCommand& command, int threads);
 
   double run();  // seconds
   // By way of a file in `scratch`.

@@ -13,6 +13,7 @@
 #include <string>
 
 #include "../gradients/slope.h"
+#include "process_memory.h"
 #include "worker_protocol.h"
 
 namespace {
@@ -38,17 +39,6 @@ Halide::Target target() {
       Halide::Target::AVX512_SapphireRapids);
 }
 
-// A few KiB of "/proc/self/status".
-double status_mb(const std::string& field) {
-  std::ifstream status("/proc/self/status");
-  for (std::string line; std::getline(status, line);) {
-    if (line.rfind(field + ":", 0) == 0) return std::stod(line.substr(field.size() + 1)) / 1024;
-  }
-  return 0;
-}
-// The peak from now on (Linux 4.0); where that is not allowed, RUN_MB counts from the old peak.
-void forget_peak() { std::ofstream("/proc/self/clear_refs") << "5"; }
-
 class Worker {
  public:
   Worker(const std::string& name, bool small, int threads) : name_(name), threads_(threads) {
@@ -72,9 +62,9 @@ class Worker {
     const double seconds = seconds_since(start);
     std::cout << "ready " << seconds << " " << start_seconds_ << " " << bytes() << " "
               << kernel_.operations << std::endl;
-    compile_peak_mb_ = status_mb("VmHWM");
-    forget_peak();
-    resident_mb_ = status_mb("VmRSS");
+    compile_peak_mb_ = bench::status_mb("VmHWM");
+    bench::forget_peak();
+    resident_mb_ = bench::status_mb("VmRSS");
   }
 
   void run() {
@@ -105,7 +95,7 @@ class Worker {
   }
 
   void tell_memory() const {
-    const double run_peak = status_mb("VmHWM");
+    const double run_peak = bench::status_mb("VmHWM");
     std::cout << "memory " << std::max(compile_peak_mb_, run_peak) << " "
               << std::max(0.0, run_peak - resident_mb_) << std::endl;
   }

@@ -1,0 +1,43 @@
+// library.h -- one program compiled ahead of time by one side, as a library that a worker loads.
+#pragma once
+
+#include <filesystem>
+#include <stdexcept>
+#include <string>
+
+#include "../pairs/worker.h"
+
+namespace programs {
+
+// The program does not compile: what the compiler said.
+struct BuildError : std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
+
+struct Library {
+  std::filesystem::path path, cases;
+  double compile_ms = 0, compile_peak_mb = 0;
+};
+
+// Where a side's files are: its builder, its runtime, the folder of its libraries.
+class Toolchain {
+ public:
+  // `programs`: the folder of the builders. `folder` is made.
+  Toolchain(bench::Side side, const std::filesystem::path& programs,
+            const std::filesystem::path& folder);
+
+  // With `reuse`, what an earlier run has left, where there is something. Throws BuildError.
+  Library build(const std::string& name, bool reuse) const;
+
+ private:
+  Library read(const std::string& name) const;
+  void link(const std::string& name) const;
+  std::filesystem::path file(const std::string& name, const std::string& extension) const {
+    return folder_ / (name + extension);
+  }
+
+  bench::Side side_;
+  std::filesystem::path builder_, folder_;
+};
+
+}  // namespace programs

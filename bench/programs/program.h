@@ -1,0 +1,61 @@
+// program.h -- what one benchmark program is: a generator as users of Halide write it, and what its
+// function is called with, in one source file that is compiled once against Halide 14's header and
+// once against ours. list.def names them all.
+#pragma once
+
+#include <Halide.h>
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "cases.h"
+
+namespace programs {
+
+// A program with what its generator is told.
+struct Registered {
+  Program program;
+  std::vector<std::string> params;  // "name=value"
+
+  Registered& threads(int count) {
+    for (Case& c : program.cases) c.threads = count;
+    return *this;
+  }
+  Registered& tolerance(double most) {
+    program.tolerance = most;
+    return *this;
+  }
+  Registered& with(const std::string& param) {
+    params.push_back(param);
+    return *this;
+  }
+};
+
+// A case for each of the sizes, of which there are one to three: small, medium, large.
+using Sizes = std::vector<int>;
+inline Registered at_sizes(const std::vector<Sizes>& sizes,
+                           const std::function<std::vector<Argument>(const Sizes&)>& arguments) {
+  static const char* const labels[] = {"small", "medium", "large"};
+  Registered all;
+  for (size_t i = 0; i < sizes.size(); i++)
+    all.program.cases.push_back({labels[i], 0, arguments(sizes[i])});
+  return all;
+}
+
+// All programs of this process.
+std::vector<Registered>& registered();
+inline bool add(const char* name, Registered program) {
+  program.program.name = name;
+  registered().push_back(std::move(program));
+  return true;
+}
+
+}  // namespace programs
+
+// At the end of a file: PROGRAM(name, generator class, at_sizes(...)).
+#define PROGRAM(name, Class, ...)                                                    \
+  HALIDE_REGISTER_GENERATOR(Class, name)                                             \
+  namespace programs {                                                               \
+  [[maybe_unused]] static const bool name##_is_registered = add(#name, __VA_ARGS__); \
+  }

@@ -1,0 +1,43 @@
+// rgb_gain -- interleaved RGB, of which only the values count, not whose they are: pixel and
+// channel are one dimension, and that is vectorized.
+#include "program.h"
+
+namespace {
+
+class RgbGain : public Halide::Generator<RgbGain> {
+ public:
+  Input<Buffer<uint8_t>> input{"input", 3};  // (x, y, c)
+  Input<Buffer<uint8_t>> other{"other", 3};
+  Input<float> gain{"gain"};
+  Output<Buffer<uint8_t>> output{"output", 3};
+
+  void generate() {
+    Expr fixed = cast<uint16_t>(gain * 256);
+    Expr mixed =
+        cast<uint32_t>(fixed) * input(x, y, c) + cast<uint32_t>(256 - fixed) * other(x, y, c);
+    output(x, y, c) = Halide::saturating_cast<uint8_t>((mixed + 128) / 256);
+  }
+
+  void schedule() {
+    Var cx("cx");
+    for (auto* image : {&input, &other}) {
+      (*image).dim(0).set_stride(3);
+      (*image).dim(2).set_stride(1).set_bounds(0, 3);
+    }
+    output.dim(0).set_stride(3);
+    output.dim(2).set_stride(1).set_bounds(0, 3);
+    output.reorder(c, x, y).fuse(c, x, cx).vectorize(cx, natural_vector_size<uint8_t>());
+    output.parallel(y, 8);
+  }
+
+ private:
+  Var x{"x"}, y{"y"}, c{"c"};
+};
+
+}  // namespace
+
+PROGRAM(rgb_gain, RgbGain, at_sizes({{127, 71}, {1000, 750}, {4000, 3000}}, [](const Sizes& n) {
+          return std::vector{in<uint8_t>({n[0], n[1], 3}, 0, 255).interleaved(),
+                             in<uint8_t>({n[0], n[1], 3}, 0, 255).interleaved(), value<float>(0.3f),
+                             out<uint8_t>({n[0], n[1], 3}).interleaved()};
+        }))

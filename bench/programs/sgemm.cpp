@@ -1,0 +1,4 @@
+// sgemm -- see matrix_product.h; single precision.
+#include "matrix_product.h"
+
+PROGRAM(sgemm, programs::MatrixProduct, products<float>())

@@ -1,0 +1,35 @@
+// wavelet_forward -- one level of Daubechies' transform along x of each row: averages in plane 0,
+// details in plane 1, both half as wide.
+#include "wavelets.h"
+
+namespace {
+
+class WaveletForward : public Halide::Generator<WaveletForward> {
+ public:
+  Input<Buffer<float>> input{"input", 2};
+  Output<Buffer<float>> bands{"bands", 3};
+
+  void generate() {
+    const float* h = programs::daubechies;
+    Func at = Halide::BoundaryConditions::repeat_edge(input);
+    auto tap = [&](int i) -> Expr { return at(2 * x + i, y); };
+    Expr average = h[0] * tap(0) + h[1] * tap(1) + h[2] * tap(2) + h[3] * tap(3);
+    Expr detail = h[3] * tap(0) - h[2] * tap(1) + h[1] * tap(2) - h[0] * tap(3);
+    bands(x, y, b) = select(b == 0, average, detail);
+  }
+
+  void schedule() {
+    bands.bound(b, 0, 2).reorder(b, x, y).unroll(b);
+    bands.vectorize(x, natural_vector_size<float>()).parallel(y, 8);
+  }
+
+ private:
+  Var x{"x"}, y{"y"}, b{"b"};
+};
+
+}  // namespace
+
+PROGRAM(wavelet_forward, WaveletForward,
+        at_sizes({{127, 61}, {1024, 768}, {3001, 2000}}, [](const Sizes& n) {
+          return std::vector{in<float>({n[0], n[1]}), out<float>({(n[0] + 1) / 2, n[1], 2})};
+        }))

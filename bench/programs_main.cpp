@@ -1,0 +1,118 @@
+// programs_main.cpp -- programs as users write them for Halide, compiled ahead of time by Halide 14
+// and by Retrograde and run in turn: see README.md.
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <csignal>
+#include <cstdio>
+#include <exception>
+#include <thread>
+
+#include "common/files.h"
+#include "common/process.h"
+#include "diagnostics/error.h"
+#include "programs/compare.h"
+
+namespace programs {
+
+namespace {
+
+const std::vector<std::string> names{
+#define PROGRAM(name) #name,
+#include "programs/list.def"
+};
+
+struct Options {
+  std::vector<std::string> programs;
+  bool quick = false, compile_only = false, reuse = false, reuse_halide = false;
+  double seconds = 1;
+  std::filesystem::path output = "programs.json";
+};
+
+void check_names(const std::vector<std::string>& asked) {
+  std::string known;
+  for (const std::string& name : names) known += (known.empty() ? "" : ", ") + name;
+  for (const std::string& name : asked) {
+    if (std::count(names.begin(), names.end(), name)) continue;
+    retrograde::call_error("run the program " + retrograde::quoted(name),
+                           "it must be one of the benchmark's", "they are " + known,
+                           "Give --program one of these names");
+  }
+}
+
+void add_options(CLI::App& app, Options& options) {
+  app.add_option("--program", options.programs, "run this program; may be given several times");
+  app.add_flag("--quick", options.quick, "the smallest size of each, few runs");
+  app.add_flag("--compile-only", options.compile_only,
+               "make the libraries, for a run with --reuse");
+  app.add_flag("--reuse", options.reuse, "take the libraries that an earlier run made");
+  app.add_flag("--reuse-halide", options.reuse_halide, "take only Halide's");
+  app.add_option("--seconds", options.seconds, "for the runs of each program at each size")
+      ->check(CLI::Range(0.0, 1000.0))
+      ->capture_default_str();
+  app.add_option("--output", options.output, "the report, as JSON")->capture_default_str();
+}
+
+// False when only help was asked for.
+bool read(int argc, char** argv, Options& options) {
+  CLI::App app("Programs as users write them, compiled ahead of time by Halide 14 and Retrograde.");
+  add_options(app, options);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::CallForHelp&) {
+    std::fputs(app.help().c_str(), stdout);
+    return false;
+  } catch (const CLI::ParseError& error) {
+    retrograde::call_error("understand the command line", "each option takes one value",
+                           error.what(), "Run with --help for the options");
+  }
+  check_names(options.programs);
+  if (options.programs.empty()) options.programs = names;
+  return true;
+}
+
+void say(const std::string& line) {
+  std::fputs(line.c_str(), stdout);
+  std::fflush(stdout);
+}
+
+int run(const Options& options) {
+  std::filesystem::path folder = options.output.parent_path();
+  folder = (folder.empty() ? std::filesystem::path(".") : folder) / "programs";
+  apps::require_writable_folder(folder);
+  const std::filesystem::path here = apps::program_folder();
+  const Toolchains toolchains{{bench::Side::Retrograde, here, folder},
+                              {bench::Side::Halide, here, folder},
+                              options.reuse,
+                              options.reuse || options.reuse_halide};
+  Limits limits;
+  limits.threads = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+  limits.seconds = options.quick ? 0 : options.seconds;
+  if (options.quick) limits.most_sizes = 1;
+  if (options.compile_only) limits.most_sizes = 0;
+  if (!options.compile_only) say(table_head());
+  std::vector<Result> results;
+  for (const std::string& name : options.programs) {
+    results.push_back(
+        compare(name, toolchains, limits, here / "bench_programs_worker", folder, say));
+    say(program_row(results.back()));
+  }
+  say(table_foot(results));
+  write_json(options.output, results);
+  say("report: " + options.output.string() + "\n");
+  return std::any_of(results.begin(), results.end(), is_wrong) ? 1 : 0;
+}
+
+}  // namespace
+
+}  // namespace programs
+
+int main(int argc, char** argv) {
+  std::signal(SIGPIPE, SIG_IGN);  // a worker that has ended is an error of its program only
+  try {
+    programs::Options options;
+    return programs::read(argc, argv, options) ? programs::run(options) : 0;
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "bench_programs: %s\n", error.what());
+    return 1;
+  }
+}
