@@ -7,6 +7,7 @@
 //   {m, r} / c       {m / c, floor(r / c)}, when c divides m
 //   either of two    {gcd(m, n, r - s), r}
 // Products beyond int64 make it unknown, {1, 0}.
+#include <algorithm>
 #include <numeric>
 
 #include "ir/build.h"
@@ -71,11 +72,33 @@ Congruence Facts::congruence(const Sum& sum) {
   return result;
 }
 
+// x % c == r, and (x + k) % c == r.
+void Facts::assume_congruent(const Expr& remainder, const Expr& value) {
+  const auto* n = remainder.as<Mod>();
+  const auto divisor = n ? as_const_int(n->b) : std::nullopt, known = as_const_int(value);
+  if (!divisor || *divisor <= 0 || *divisor >= limit || !known) return;
+  const Sum sum = sum_of(n->a);
+  if (sum.terms.size() != 1 || sum.terms[0].factor != 1) return;
+  const auto* variable = sum.terms[0].atom.as<Variable>();
+  if (!variable) return;
+  congruent_.push_back({variable->name, {*divisor, floor_mod(*known - sum.constant, *divisor)}});
+}
+
+// What a condition says of a variable is also true of what lets around the condition made of it.
+Congruence Facts::congruence_of_variable(const Variable& n) {
+  const auto is_it = [&](const Congruent& c) { return c.name == n.name; };
+  const auto assumed = std::find_if(congruent_.begin(), congruent_.end(), is_it);
+  if (assumed != congruent_.end()) return assumed->congruence;
+  const auto found = variables_.find(n.name);
+  if (found == variables_.end()) return unknown;
+  const Bounds& bounds = found->second;
+  const bool may_know_more = !congruent_.empty() && bounds.congruence.modulus == 1 &&
+                             bounds.min.defined() && bounds.min.same_as(bounds.max);
+  return may_know_more ? congruence(Expr(bounds.min)) : bounds.congruence;
+}
+
 Congruence Facts::congruence_of_node(const Expr& e) {
-  if (const auto* n = e.as<Variable>()) {
-    const auto found = variables_.find(n->name);
-    return found == variables_.end() ? unknown : found->second.congruence;
-  }
+  if (const auto* n = e.as<Variable>()) return congruence_of_variable(*n);
   if (const auto* n = e.as<Select>()) {
     return either(congruence(n->true_value), congruence(n->false_value));
   }

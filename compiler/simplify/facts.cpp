@@ -230,6 +230,17 @@ void Facts::bind(const std::string& name, Expr min, Expr max) {
 
 void Facts::unbind(const std::string& name) { variables_.erase(name); }
 
+Expr Facts::min_of(const std::string& name) const {
+  const auto found = variables_.find(name);
+  return found == variables_.end() ? Expr() : found->second.min;
+}
+
+Expr Facts::value_of(const std::string& name) const {
+  const auto found = variables_.find(name);
+  const bool is_one = found != variables_.end() && found->second.min.same_as(found->second.max);
+  return is_one ? found->second.min : Expr();
+}
+
 namespace {
 
 // Of the terms in any order; factors are taken relative to `divisor`.
@@ -281,6 +292,7 @@ void Facts::assume_comparison(const Binary& n, bool value) {
     case Kind::EQ:
     case Kind::NE:
       if (value != (n.kind == Kind::EQ)) return;
+      assume_congruent(n.a, n.b);
       assume_at_most(difference, 0);
       return assume_at_most(opposite, 0);
     default:
@@ -312,7 +324,7 @@ void Facts::assume(const Expr& condition) {
 }
 
 Facts::Assumption::Assumption(Facts& facts, const Expr& condition)
-    : facts_(facts), first_(facts.known_.size()) {
+    : facts_(facts), first_(facts.known_.size()), first_congruent_(facts.congruent_.size()) {
   if (condition.defined()) facts_.assume(condition);
 }
 
@@ -322,6 +334,7 @@ Facts::Assumption::~Assumption() {
     it = it->second >= first_ ? facts_.index_.erase(it) : std::next(it);
   }
   facts_.known_.resize(first_);
+  facts_.congruent_.resize(first_congruent_);
   facts_.forget();
 }
 
@@ -426,10 +439,6 @@ int64_t Facts::eliminate_structure(const Sum& sum, int& budget) {
                     b = replace(sum, term, n->false_value, budget);
       return std::max(a, b);
     }
-    if (const auto* n = term.atom.as<Div>()) {
-      const int64_t bound = eliminate_division(sum, term, *n, budget);
-      if (bound != infinity) return bound;
-    }
     const auto* call = term.atom.as<Call>();
     if (call && (call->is_op(Op::likely) || call->is_op(Op::likely_if_innermost))) {
       return replace(sum, term, call->args[0], budget);
@@ -438,6 +447,11 @@ int64_t Facts::eliminate_structure(const Sum& sum, int& budget) {
       return std::min(replace(sum, term, call->args[0], budget),
                       replace(sum, term, call->args[term.factor > 0 ? 2 : 1], budget));
     }
+  }
+  for (const Term& term : sum.terms) {  // last: what is inside of the others may cancel it
+    const auto* n = term.atom.as<Div>();
+    const int64_t bound = n ? eliminate_division(sum, term, *n, budget) : infinity;
+    if (bound != infinity) return bound;
   }
   return infinity;
 }

@@ -39,6 +39,10 @@ class Facts {
   // not vice versa.
   void bind(const std::string& name, Expr min, Expr max);
   void unbind(const std::string& name);
+  // Of a name whose ends are the same; else undefined.
+  Expr value_of(const std::string& name) const;
+  // The lower end of a name; undefined where unknown.
+  Expr min_of(const std::string& name) const;
 
   // While alive, the condition (simplified) holds. Takes conjunctions apart.
   class Assumption {
@@ -50,7 +54,7 @@ class Facts {
 
    private:
     Facts& facts_;
-    size_t first_;
+    size_t first_, first_congruent_;
   };
   // Until the end of time (or of an enclosing Assumption).
   void assume(const Expr& condition);
@@ -84,6 +88,11 @@ class Facts {
     Expr condition;
     bool value = true;
   };
+  // A variable that a condition says so of.
+  struct Congruent {
+    std::string name;
+    Congruence congruence;
+  };
   struct Remembered {
     Expr key;
     ConstantRange range;
@@ -96,6 +105,7 @@ class Facts {
   void assume(const Expr& condition, bool value);
   void assume_comparison(const Binary& comparison, bool value);
   void assume_at_most(Sum sum, int64_t bound);
+  void assume_congruent(const Expr& remainder, const Expr& value);
   void add(uint64_t key, Known known);
   int64_t known_bound(const Sum& sum) const;
   int64_t known_bound(const Expr& atom, int64_t factor) const;
@@ -105,6 +115,7 @@ class Facts {
   ConstantRange range_of_binary(const Binary& n);
   ConstantRange range_of_call(const Call& n);
   Congruence congruence_of_node(const Expr& e);
+  Congruence congruence_of_variable(const Variable& n);
 
   int64_t search(const Sum& sum, int& budget);
   int64_t bound_by_ranges(const Sum& sum);
@@ -115,6 +126,7 @@ class Facts {
 
   std::unordered_map<std::string, Bounds> variables_;
   std::vector<Known> known_;
+  std::vector<Congruent> congruent_;
   std::unordered_multimap<uint64_t, size_t>
       index_;  // hash of the terms or condition -> position in known_
   std::unordered_map<const ExprNode*, Remembered> ranges_;

@@ -48,6 +48,8 @@ Expr Simplifier::equals(const Expr& a, const Expr& b) {
   if (ra.max < rb.min || rb.max < ra.min) return const_false(lanes);
   Sum sum = plus(sum_of(a), sum_of(b), -1);
   if (!sum.valid) return binary(Kind::EQ, a, b);
+  while (cancel_names(sum)) {
+  }
   if (sum.is_constant()) return make_const(Bool(lanes), int64_t{sum.constant == 0});
   if (!is_scalar_index(a)) {
     if (const Expr both = compare_vectors(Kind::EQ, a, b); both.defined()) return both;
@@ -113,6 +115,8 @@ Expr Simplifier::less(Kind kind, const Expr& a, const Expr& b) {
 }
 
 Expr Simplifier::less_than_zero(Sum sum) {
+  while (cancel_names(sum)) {
+  }
   if (sum.is_constant()) return make_const(Bool(), int64_t{sum.constant < 0});
   divide_by_common_factor(sum);
   if (facts_.upper_bound(sum) < 0) return const_true();

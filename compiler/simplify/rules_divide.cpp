@@ -77,6 +77,27 @@ Expr Simplifier::div_by(const Expr& a, int64_t c) {
   return rebuild(plus(split.quotient, rest), Kind::Div, a, constant(a, c));
 }
 
+// The multiple of c at or below x, when the lower end of a variable in x gives it: of x between
+// 8 k + 2 and 8 k + 7, that is 8 k.
+std::optional<Sum> Simplifier::multiple_below(const Sum& x, int64_t c) {
+  for (const Term& term : x.terms) {
+    const auto* variable = term.atom.as<Variable>();
+    const Expr min = variable && term.factor > 0 ? facts_.min_of(variable->name) : Expr();
+    if (!min.defined() || is_const(min) || min.type() != x.type) continue;
+    if (facts_.value_of(variable->name).defined()) continue;
+    Sum base = x;
+    base.add(term.atom, -term.factor);
+    base.add(sum_of(min), term.factor);
+    const std::optional<int64_t> r = facts_.congruence(base).modulo(c);
+    if (!base.valid || !r) continue;
+    base.add_constant(-*r);
+    const Sum offset = plus(x, base, -1);
+    if (base.valid && facts_.lower_bound(offset) >= 0 && facts_.upper_bound(offset) < c)
+      return base;
+  }
+  return std::nullopt;
+}
+
 // rest / c, where no term is divisible and the constant lies in [0, c).
 Expr Simplifier::div_atom(const Sum& rest, int64_t c) {
   const auto as_constant = [&](int64_t value) { return make_const(rest.type, value); };
@@ -85,6 +106,8 @@ Expr Simplifier::div_atom(const Sum& rest, int64_t c) {
   if (low != INT64_MIN && high != INT64_MAX && floor_div(low, c) == floor_div(high, c)) {
     return as_constant(floor_div(low, c));
   }
+  if (const std::optional<Sum> base = multiple_below(rest, c))
+    return apply(Kind::Div, rebuild(*base), as_constant(c));
   // (g x + k) / (g c) => (x + k / g) / c
   const int64_t g = std::gcd(common_factor(rest), c);
   if (g > 1) {
@@ -129,6 +152,8 @@ Expr Simplifier::mod_by(const Expr& a, int64_t c) {
   if (!rest.valid) return binary(Kind::Mod, a, constant(a, c));
   if (const std::optional<int64_t> known = facts_.congruence(rest).modulo(c))
     return constant(a, *known);
+  if (const std::optional<Sum> base = multiple_below(rest, c))
+    return rebuild(plus(rest, *base, -1));
   // f * (x % m) => f * x, when c divides f * m
   for (const Term& term : Sum(rest).terms) {
     const auto* inner = term.atom.as<Mod>();

@@ -56,7 +56,9 @@ Expr Simplifier::min_max(Kind kind, const Expr& a, const Expr& b) {
     const std::optional<int64_t> cx = as_const_int(x), cy = as_const_int(y);
     if (cx && cy) return is_min ? *cx >= *cy : *cx <= *cy;
     if (!is_index_type(x.type()) || x.type().is_vector()) return false;
-    const Sum difference = plus(sum_of(x), sum_of(y), -1);
+    Sum difference = plus(sum_of(x), sum_of(y), -1);
+    while (cancel_names(difference)) {
+    }
     if (difference.terms.size() > max_compared_terms) return false;
     return is_min ? facts_.lower_bound(difference) >= 0 : facts_.upper_bound(difference) <= 0;
   };

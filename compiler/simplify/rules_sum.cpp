@@ -72,7 +72,7 @@ Expr Simplifier::rebuild(Sum sum, Kind kind, const Expr& a, const Expr& b) {
 }
 
 Expr Simplifier::rebuild(Sum sum) {
-  while (join_divisions(sum) || expand_product(sum)) {
+  while (cancel_names(sum) || join_divisions(sum) || expand_product(sum)) {
   }
   if (!sum.type.is_vector()) {
     if (Expr pushed = push_into_min_max(sum); pushed.defined()) return pushed;

@@ -6,6 +6,7 @@
 //   rules_compare.cpp  == != < <=
 //   rules_logic.cpp    && || ! select
 //   rules_other.cpp    casts, vectors, operators, lets
+//   names.cpp          what names of index values stand for
 //   simplify_stmt.cpp  statements
 #pragma once
 
@@ -65,6 +66,7 @@ class Simplifier {
   Expr div_vector(const Ramp& a, int64_t c);
   Expr mod_vector(const Ramp& a, int64_t c);
   Expr div_atom(const Sum& rest, int64_t c);
+  std::optional<Sum> multiple_below(const Sum& rest, int64_t c);
 
   // ---- comparisons of index sums ----
   Expr less_than_zero(Sum sum);
@@ -76,6 +78,14 @@ class Simplifier {
   Expr combine_conditions(Kind kind, const Expr& a, const Expr& b, bool& drop_a, bool& drop_b);
   Expr distribute_broadcast(Kind kind, const Expr& a, const Expr& b);
   Expr constant(const Expr& like, int64_t value) const;
+
+  // ---- names of index values (names.cpp) ----
+  std::optional<Sum> find_meaning(const Expr& atom);
+  const Sum* meaning(const Expr& atom);
+  bool cancel_names(Sum& sum);
+  Expr number_of(const Expr& variable);
+  void learn_numbers(const Expr& condition, std::vector<std::string>& learned);
+  void unlearn_numbers(const std::vector<std::string>& learned);
 
   // ---- statements ----
   Stmt let_stmt(const Stmt& s);
@@ -111,6 +121,7 @@ class Simplifier {
    private:
     Simplifier& owner_;
     Facts::Assumption assumption_;
+    std::vector<std::string> learned_;  // names that are numbers here
   };
   void forget() {
     memo_.clear();
@@ -124,6 +135,10 @@ class Simplifier {
   std::unordered_map<const ExprNode*, Entry> memo_;
   std::unordered_map<std::string, Expr> replacements_;
   std::unordered_set<std::string> seen_names_;
+  std::unordered_set<std::string> varying_;  // bound inside loops
+  std::unordered_map<std::string, std::optional<Sum>> meanings_;
+  int known_numbers_ = 0;  // branches around that have made names numbers
+  int loops_around_ = 0;
   int depth_ = 0;  // of rules calling rules
 };
 

@@ -47,7 +47,9 @@ Simplifier::Simplifier(const BoundsMap& bounds) {
 Expr Simplifier::operator()(const Expr& e) {
   if (const auto* var = e.as<Variable>()) {
     const auto found = replacements_.find(var->name);
-    return found == replacements_.end() ? e : found->second;
+    if (found != replacements_.end()) return found->second;
+    const Expr number = number_of(e);
+    return number.defined() ? number : e;
   }
   if (e.kind() <= Kind::StringImm) return e;
   if (const auto found = memo_.find(e.get()); found != memo_.end()) return found->second.value;
@@ -144,7 +146,11 @@ Simplifier::Binding::Binding(Simplifier& owner, const std::string& name, const E
                              const Expr& max, const Expr& replacement)
     : owner_(owner), name_(name) {
   // What was found for a name of another scope does not hold for this one.
-  if (!owner.seen_names_.insert(name).second) owner.forget();
+  if (!owner.seen_names_.insert(name).second) {
+    owner.forget();
+    owner.meanings_.erase(name);
+  }
+  if (owner.loops_around_ > 0) owner.varying_.insert(name);
   if (replacement.defined()) {
     owner.replacements_[name] = replacement;
   } else {
@@ -155,13 +161,18 @@ Simplifier::Binding::Binding(Simplifier& owner, const std::string& name, const E
 Simplifier::Binding::~Binding() {
   owner_.replacements_.erase(name_);
   owner_.facts_.unbind(name_);
+  owner_.meanings_.erase(name_);
 }
 
 Simplifier::Given::Given(Simplifier& owner, const Expr& condition)
     : owner_(owner), assumption_(owner.facts_, condition) {
   if (condition.defined()) owner_.memo_.clear();
+  owner_.learn_numbers(condition, learned_);
 }
 
-Simplifier::Given::~Given() { owner_.memo_.clear(); }
+Simplifier::Given::~Given() {
+  owner_.memo_.clear();
+  owner_.unlearn_numbers(learned_);
+}
 
 }  // namespace retrograde::ir

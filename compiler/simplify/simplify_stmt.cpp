@@ -52,12 +52,14 @@ Stmt Simplifier::loop(const Stmt& s, const For& n) {
   if (is_const_true(less(Kind::LE, extent, make_zero(extent.type())))) return {};
   if (is_const_int(extent, 1)) return let_stmt(Stmt(new LetStmt(n.name, min, n.body)));
   Stmt body;
+  ++loops_around_;
   {
     const Binding binding(*this, n.name, min, sub(add(min, extent), make_one(min.type())), Expr());
     // Inside, the loop runs at least once.
     const Given runs(*this, less(Kind::LT, make_zero(extent.type()), extent));
     body = (*this)(n.body);
   }
+  --loops_around_;
   if (min.same_as(n.min) && extent.same_as(n.extent) && body.same_as(n.body)) return s;
   return make_for(n.name, min, extent, n.for_type, std::move(body), n.partition);
 }

@@ -239,6 +239,55 @@ TEST(SimplifyStmt, UsesLoopBoundsConditionsAndAsserts) {
              "if (c:bool && 0 < n) { a[0] = 1 }");
 }
 
+TEST(SimplifyStmt, OpensNamesWhereTermsCancel) {
+  check_stmt("let m = t*64 - q*64\na[x + t*64 - m] = 1", "a[q*64 + x] = 1");
+  check_stmt("let m = t*64 - q\nlet k = t*64 + p\na[k - m + x] = 1", "a[p + q + x] = 1");
+  check_stmt("let m = min(p*8, q)\nlet k = m + r\na[k - min(p*8, q)] = 1", "a[r] = 1");
+  const std::string loaded = "let m = b[0]:int32*3\n";
+  check_stmt(loaded + "a[x + b[0]:int32*3 - m] = 1", loaded + "a[x + b[0]:int32*3 - m] = 1");
+  const std::string long_way = "let m = p*8 + q\n";
+  check_stmt(long_way + "a[m + p] = m", long_way + "a[m + p] = m");
+}
+
+TEST(SimplifyStmt, BranchesKnowNumbers) {
+  check_stmt("if (s == 1) { a[x*s] = 1 } else { a[x*s] = 2 }",
+             "if (s == 1) { a[x] = 1 } else { a[s*x] = 2 }");
+  check_stmt("if (c:bool && n == 3) { for (i, 0, n) { a[i] = n } }",
+             "if (c:bool && n == 3) { for (i, 0, 3) { a[i] = 3 } }");
+  const std::string ends = "let e = m + n*2\n";
+  check_stmt(ends + "if (n == 3) { for (i, m, e - m) { a[i] = e } } else { a[e] = e }",
+             ends + "if (n == 3) { for (i, m, 6) { a[i] = e } } else { a[e] = e }");
+  const std::string twice = "let t = n*2\n";
+  check_stmt(twice + "if (n == 3) { a[t] = t } else { a[t] = t }",
+             twice + "if (n == 3) { a[6] = 6 } else { a[t] = t }");
+  check_stmt("if (n != 3) { a[n] = 1 } else { a[n] = 2 }",
+             "if (n != 3) { a[n] = 1 } else { a[3] = 2 }");
+  // Lanes of a loop stay lanes.
+  check_stmt("for (x, 0, n) { if (x == 3) { a[x] = 1 } }",
+             "for (x, 0, n) { if (x == 3) { a[x] = 1 } }");
+}
+
+TEST(SimplifyStmt, BranchesKnowMultiples) {
+  const std::string tiles = "for (x, 0, (n + 7)/8) { a[min(x*8, n - 8)] = 1 }";
+  check_stmt("if (n % 8 == 0) { " + tiles + " }",
+             "if (n % 8 == 0) { for (x, 0, n/8) { a[x*8] = 1 } }");
+  const std::string last = "let l = m + n\n";
+  check_stmt(last + "if (n % 4 == 0 && m % 4 == 1) { a[l] = l % 4 } else { a[l] = l % 4 }",
+             last + "if (n % 4 == 0 && m % 4 == 1) { a[l] = 1 } else { a[l] = l % 4 }");
+  check_stmt("if ((n + 3) % 4 == 0) { a[n] = n % 2 }", "if ((n + 3) % 4 == 0) { a[n] = 1 }");
+}
+
+// What lies between a multiple and the next one.
+TEST(SimplifyStmt, DividesInsideTiles) {
+  const std::string tile = "let m = min(k, l)*8\n";
+  check_stmt(tile + "for (i, m, 8) { a[i/8] = i % 8 }",
+             tile + "for (i, m, 8) { a[m/8] = i - m }");
+  check_stmt(tile + "for (i, m + 2, 4) { a[(i + 1)/8] = (i + 1) % 8 }",
+             tile + "for (i, m + 2, 4) { a[m/8] = i - m + 1 }");
+  check_stmt(tile + "for (i, m + 2, 7) { a[i/8] = i % 8 }",
+             tile + "for (i, m + 2, 7) { a[i/8] = i % 8 }");
+}
+
 TEST(SimplifyStmt, GivesTheSameHandleWhenNothingChanges) {
   const Stmt s = parse_stmt("for (x, 0, n) { let t = x*x\n a[t] = t\n if (x < m) { a[x] = 1 } }");
   const Stmt once = simplify(s);

@@ -108,6 +108,30 @@ TEST_F(Specialize, OnTheSizeOfTheOutput) {
   expect_values(f.realize({37, 2}), [](int i, int j) { return i - j; });
 }
 
+TEST_F(Specialize, ConditionsAreFactsInTheirBranches) {
+  ImageParam in(Int(32), 3, "in");
+  Var c("c");
+  Func f("f"), g("g");
+  g(x, y, c) = in(x, y, c) * 2;
+  f(x, y, c) = g(x, y, c) + c;
+  const auto channels = f.output_buffer().dim(2);
+  f.reorder(c, x, y).specialize(channels.extent() == 3).unroll(c);
+  f.specialize(channels.extent() % 2 == 0 && in.dim(0).stride() == 4).vectorize(x, 4);
+  g.compute_at(f, x);
+  in.dim(0).set_stride(Expr());
+  for (int n : {3, 4, 5}) {
+    Buffer<int> image = Buffer<int>::make_interleaved(7, 5, n);
+    for (int k = 0; k < n; ++k) {
+      for (int j = 0; j < 5; ++j) {
+        for (int i = 0; i < 7; ++i) image(i, j, k) = 100 * k + 10 * j + i;
+      }
+    }
+    in.set(image);
+    Buffer<int> found = f.realize({7, 5, n});
+    for (int i = 0; i < 7; ++i) ASSERT_EQ(found(i, 4, n - 1), 2 * (100 * (n - 1) + 40 + i) + n - 1);
+  }
+}
+
 TEST_F(Specialize, FailsWhenNoneFits) {
   Param<int> n("n");
   Func f("f");

@@ -1,0 +1,144 @@
+// Names of index values: what they stand for, where that says more than the name does.
+//
+//   let m = t*64 - q in  .. x + t*64 - m ..    =>    x + q          (what cancels)
+//   if (s == 1) { .. i*s .. }                  =>    i              (what a branch knows)
+//
+// Lets keep the text of bounds small, so names are opened only where that makes no more terms. What
+// a branch knows of a value goes into what lets outside of it derive from that. Loop variables, and
+// what depends on them, keep their names in branches: lanes of `if (x == 3) f[x]` stay a vector.
+#include <algorithm>
+
+#include "ir/build.h"
+#include "ir/conjuncts.h"
+#include "ir/visit.h"
+#include "simplify/simplifier.h"
+
+namespace retrograde::ir {
+
+namespace {
+
+// Larger sums stay behind their names.
+constexpr size_t max_opened_terms = 8;
+
+// Whether the value is the same wherever its name is in scope, and may be computed again there.
+bool is_steady(const Expr& value) {
+  bool steady = true;
+  walk(value, [&](const Expr& node) {
+    const auto* call = node.as<Call>();
+    const bool may_change = call && (call->call_type != CallType::Operator ||
+                                     op_info(call->op).cls == OpClass::Effect ||
+                                     op_info(call->op).cls == OpClass::Internal);
+    steady = steady && !may_change && node.kind() != Kind::Load && node.kind() != Kind::Let;
+    return steady;
+  });
+  return steady;
+}
+
+}  // namespace
+
+std::optional<Sum> Simplifier::find_meaning(const Expr& atom) {
+  const std::string& name = atom.as<Variable>()->name;
+  const auto replaced = replacements_.find(name);
+  const Expr value = replaced == replacements_.end() ? facts_.value_of(name) : replaced->second;
+  if (!value.defined() || value.type() != atom.type() || !is_steady(value)) return std::nullopt;
+  const Sum sum = sum_of(value);
+  Sum opened = constant_sum(atom.type(), sum.constant);
+  for (const Term& term : sum.terms) {
+    const Sum* inner = meaning(term.atom);
+    inner ? opened.add(*inner, term.factor) : opened.add(term.atom, term.factor);
+  }
+  if (!opened.valid || opened.terms.size() > max_opened_terms) return std::nullopt;
+  return opened;
+}
+
+// What a name stands for, in terms of those that have no such meaning; null when it has none
+// itself.
+const Sum* Simplifier::meaning(const Expr& atom) {
+  const auto* variable = atom.as<Variable>();
+  if (!variable || !is_index_type(atom.type()) || atom.type().is_vector()) return nullptr;
+  auto found = meanings_.find(variable->name);
+  if (found == meanings_.end()) {
+    std::optional<Sum> sum = find_meaning(atom);
+    found = meanings_.emplace(variable->name, std::move(sum)).first;
+  }
+  return found->second ? &*found->second : nullptr;
+}
+
+// Opens one name where fewer terms remain, or two of which something cancels.
+bool Simplifier::cancel_names(Sum& sum) {
+  if (!is_index_type(sum.type) || sum.type.is_vector() || sum.terms.size() < 2) return false;
+  std::vector<Term> named;
+  for (const Term& term : sum.terms) {
+    if (meaning(term.atom)) named.push_back(term);
+  }
+  const auto open = [&](Sum& in, const Term& term) {
+    in.add(term.atom, -term.factor);
+    in.add(*meaning(term.atom), term.factor);
+  };
+  const auto is_better = [&](const Sum& opened, size_t most_terms) {
+    return opened.valid && opened.terms.size() <= most_terms;
+  };
+  for (size_t i = 0; i < named.size(); ++i) {
+    Sum opened = sum;
+    open(opened, named[i]);
+    if (is_better(opened, sum.terms.size() - 1)) return sum = std::move(opened), true;
+    for (size_t j = i + 1; j < named.size() && opened.valid; ++j) {
+      Sum both = opened;
+      open(both, named[j]);
+      const size_t apart = sum.terms.size() - 2 + meaning(named[i].atom)->terms.size() +
+                           meaning(named[j].atom)->terms.size();
+      if (is_better(both, std::min(sum.terms.size(), apart - 1)))
+        return sum = std::move(both), true;
+    }
+  }
+  return false;
+}
+
+// The number that a name is where a branch has decided it.
+Expr Simplifier::number_of(const Expr& variable) {
+  if (known_numbers_ == 0) return {};
+  const Sum* sum = meaning(variable);
+  return sum && sum->is_constant() ? make_const(variable.type(), sum->constant) : Expr();
+}
+
+// ---- what branches know ----
+
+namespace {
+
+struct Equality {
+  std::string name;
+  Expr value;
+};
+
+std::optional<Equality> as_equality(const Expr& condition) {
+  if (condition.kind() != Kind::EQ) return std::nullopt;
+  const auto* n = condition.as<Binary>();
+  const auto* variable = n->a.as<Variable>();
+  if (!variable || !as_const_int(n->b)) return std::nullopt;
+  return Equality{variable->name, n->b};
+}
+
+}  // namespace
+
+void Simplifier::learn_numbers(const Expr& condition, std::vector<std::string>& learned) {
+  std::vector<Expr> conjuncts;
+  add_conjuncts(condition, conjuncts);
+  for (const Expr& conjunct : conjuncts) {
+    const auto equality = as_equality(conjunct);
+    if (!equality || varying_.count(equality->name)) continue;
+    if (replacements_.emplace(equality->name, equality->value).second)
+      learned.push_back(equality->name);
+  }
+  if (learned.empty()) return;
+  ++known_numbers_;
+  meanings_.clear();
+}
+
+void Simplifier::unlearn_numbers(const std::vector<std::string>& learned) {
+  if (learned.empty()) return;
+  for (const std::string& name : learned) replacements_.erase(name);
+  --known_numbers_;
+  meanings_.clear();
+}
+
+}  // namespace retrograde::ir
