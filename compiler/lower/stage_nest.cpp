@@ -20,12 +20,20 @@ struct Fused {
   bool is_outer = false;  // which of the two this is about
 };
 
+// A split whose last part is guarded: no iteration of the outer loop begins past the end.
+struct Tail {
+  std::string outer, inner;
+  Expr outer_extent;
+  Expr first, last;  // what an iteration of the outer loop stays between
+};
+
 struct Derived {
   std::string var;
   Expr value;          // over the variables that replaced it
   Expr guarded_value;  // the same, clamped where a guard applies
   Expr guard;          // over them, too; undefined when there is none
   std::optional<Fused> fused;
+  std::optional<Tail> tail = {};
 };
 
 class NestBuilder {
@@ -97,12 +105,17 @@ class NestBuilder {
       case TailStrategy::ShiftInwards:
         base = min(likely(base), old.extent - factor);
         return derive(split.old_var, base + inner + old.min);
-      default:  // GuardWithIf and its predicated forms
+      default: {  // GuardWithIf and its predicated forms
+        const Expr last = old.extent - 1;
+        const Tail tail{split.outer, split.inner, ranges_[split.outer].extent, base + old.min,
+                        last + old.min};
         derived_.push_back({{split.old_var,
                              base + inner + old.min,
-                             min(base + inner, old.extent - 1) + old.min,
+                             min(base + inner, last) + old.min,
                              likely(base + inner < old.extent),
-                             {}}});
+                             {},
+                             tail}});
+      }
     }
   }
 
@@ -116,6 +129,24 @@ class NestBuilder {
     derived_.push_back(
         {{split.outer, outer_value, outer_value, {}, Fused{split.old_var, outer, inner, true}},
          {split.inner, inner_value, inner_value, {}, Fused{split.old_var, outer, inner, false}}});
+  }
+
+  // Interval arithmetic does not know that a part begins inside the range, when outer and inner
+  // variable stay inside theirs. So what the part needs of others begins where it does: at a
+  // multiple of the factor. (A variable that is split again, and shifted inwards, may begin before
+  // its range.)
+  Expr within_tail(const Tail& tail, const Expr& value, const Substitution& guarded) const {
+    Scope<Interval> loops;
+    for (const Dim& dim : definition_.schedule.dims)
+      loops.push(prefix_ + dim.var, loop_of(dim).range());
+    const auto reached = [&](const std::string& var) {
+      return bounds_of(substitute(loop_variable(var), guarded), loops);
+    };
+    const Interval outer = reached(tail.outer), inner = reached(tail.inner);
+    if (!outer.is_bounded() || !inner.is_bounded()) return value;
+    if (!can_prove(outer.max < tail.outer_extent) || !can_prove(inner.min >= 0)) return value;
+    return call_op(Op::promise_clamped, Int(32),
+                   {value, simplify(substitute(tail.first, guarded)), simplify(tail.last)});
   }
 
   // Interval arithmetic cannot divide by an extent that is a symbol. But a fused variable that
@@ -147,8 +178,9 @@ class NestBuilder {
         if (d.guard.defined()) nest.guards.push_back(simplify(substitute(d.guard, values)));
         values_before[prefix_ + d.var] = simplify(substitute(d.value, values));
         Expr value = simplify(substitute(d.guarded_value, guarded));
-        guarded_before[prefix_ + d.var] =
-            d.fused ? within_fused_range(*d.fused, value, guarded) : value;
+        if (d.fused) value = within_fused_range(*d.fused, value, guarded);
+        if (d.tail) value = within_tail(*d.tail, value, guarded);
+        guarded_before[prefix_ + d.var] = value;
       }
       values = std::move(values_before);
       guarded = std::move(guarded_before);

@@ -129,6 +129,31 @@ TEST(CodegenIdioms, AccumulatorsOfAMatrixProductStayInRegisters) {
   EXPECT_EQ(count(inner, "(%rsp"), 0u) << "a spilled accumulator";
 }
 
+// Tiles with guarded tails begin at multiples of their size, so that panels of that size are read
+// as vectors.
+TEST(CodegenIdioms, GuardedTilesReadPackedPanelsDensely) {
+  ImageParam a(Float(64), 2, "a"), b(Float(64), 2, "b");
+  Var x("x"), y("y"), z("z"), xi("xi"), yi("yi"), xo("xo"), yo("yo"), t("t");
+  const TailStrategy tail = TailStrategy::GuardWithIf;
+  RDom k(0, a.height(), "k");
+  Func panels("panels"), product("product"), f("f");
+  panels(x, y, z) = a(z * 8 + x, y);
+  product(x, y) = 0.0;
+  product(x, y) += panels(x % 8, k, x / 8) * b(k, y);
+  f(x, y) = product(x, y);
+  f.bound(x, 0, a.width()).bound(y, 0, b.height());
+  f.tile(x, y, xi, yi, 8, 4, tail).vectorize(xi).unroll(yi);
+  f.tile(x, y, xo, yo, x, y, 2, 2, tail).fuse(xo, yo, t);
+  panels.compute_root().bound_extent(x, 8);
+  product.compute_at(f, x).bound_extent(x, 8).bound_extent(y, 4).vectorize(x).unroll(y);
+  product.update().reorder(x, y, k).vectorize(x).unroll(y);
+  const auto inner = block_with_most(assembly(f, avx2), "vfmadd");
+  EXPECT_GE(count(inner, "vfmadd"), 8u);
+  EXPECT_EQ(count(inner, "gather") + count(inner, "vmovhpd") + count(inner, "vunpck") +
+                count(inner, "vinsertf"),
+            0u);
+}
+
 // One product in each iteration; lanes are combined behind the loop.
 TEST(CodegenIdioms, SumsAreCarriedAsVectors) {
   ImageParam a(Float(32), 1, "a"), b(Float(32), 1, "b");
