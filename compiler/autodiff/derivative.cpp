@@ -1,8 +1,11 @@
 #include "autodiff/derivative.h"
 
+#include <algorithm>
+
 #include "autodiff/derivative_rules.h"
 #include "autodiff/explain_costs.h"
-#include "autodiff/fold_time.h"
+#include "autodiff/gradient_lookup.h"
+#include "autodiff/leave_out.h"
 #include "autodiff/synthesis.h"
 #include "frontend/define.h"
 #include "ir/build.h"
@@ -67,9 +70,7 @@ Expr seed_value(const Func& output, size_t k, const Expr& value) {
 
 Derivative run(const ir::Seed& seed, const AdjointOptions& options) {
   const ir::SynthesisOptions how = to_synthesis(options);
-  auto result = std::make_shared<ir::SynthesisResult>(how.checkpoints.is_given()
-                                                          ? ir::synthesize_folded(seed, how)
-                                                          : ir::synthesize_adjoints(seed, how));
+  auto result = std::make_shared<ir::SynthesisResult>(ir::synthesize_what_can_be(seed, how));
   for (const AdjointInput& input : options.wrt) result->requested.push_back(input.symbol());
   return Derivative(result);
 }
@@ -92,18 +93,41 @@ void check_dimensions(const Func& output, size_t bounds, int adjoint,
 }  // namespace
 
 Derivative::Derivative(std::shared_ptr<const ir::SynthesisResult> result)
-    : result_(std::move(result)) {}
+    : result_(std::move(result)), zeros_(std::make_shared<ZeroGradients>()) {}
+
+Func Derivative::absent(const ir::Symbol& symbol, const std::string& name) const {
+  return Func(zeros_->find(symbol, name, result_->explanations));
+}
+
+bool Derivative::output_uses(const ir::FuncContents& f) const {
+  const std::vector<ir::FuncPtr> order = ir::topological_order({result_->output.func});
+  return std::any_of(order.begin(), order.end(),
+                     [&](const ir::FuncPtr& used) { return used.get() == &f; });
+}
+
+bool Derivative::has(const AdjointInput& input) const {
+  const ir::Symbol* symbol = input.symbol().get();
+  const auto* f = dynamic_cast<const ir::FuncContents*>(symbol);
+  return f ? result_->after_stage.contains({symbol, f->stage_count() - 1})
+           : result_->parameters.contains(symbol);
+}
 
 Func Derivative::operator()(const Func& func, int update_id) const {
+  if (!func.defined()) {
+    user_error("find the adjoint of " + quoted(func.name()), "a Func has a definition",
+               "it has none", "Define it, and differentiate what depends on it");
+  }
   if (update_id < -1 || update_id >= func.num_update_definitions()) {
     user_error(text("find the adjoint of ", quoted(func.name()), " after update ", update_id),
                "a Func has an adjoint after each of its definitions",
                text("it has ", func.num_update_definitions(), " updates, the first is 0"),
                "Name one of them, or -1 for the pure definition");
   }
-  auto it = result_->after_stage.find({func.function().get(), update_id + 1});
-  return it == result_->after_stage.end() ? Func(std::make_shared<ir::FuncContents>())
-                                          : Func(it->second);
+  const ir::FuncContents& f = *func.function();
+  auto it = result_->after_stage.find({&f, update_id + 1});
+  if (it != result_->after_stage.end()) return Func(it->second);
+  const ir::ParameterContents* image = ir::image_read_by(f);
+  return image && !output_uses(f) ? of_parameter(*image) : absent(f, f.name);
 }
 
 Func Derivative::adjoint(const Func& func) const {
@@ -122,8 +146,7 @@ Func Derivative::of(const AdjointInput& input) const {
 
 Func Derivative::of_parameter(const ir::ParameterContents& parameter) const {
   auto it = result_->parameters.find(&parameter);
-  return it == result_->parameters.end() ? Func(std::make_shared<ir::FuncContents>())
-                                         : Func(it->second);
+  return it == result_->parameters.end() ? absent(parameter, parameter.name) : Func(it->second);
 }
 Func Derivative::operator()(const Buffer<>& buffer) const {
   return of_parameter(*buffer.parameter());
@@ -136,7 +159,11 @@ std::vector<Func> Derivative::funcs() const {
   return {result_->funcs.begin(), result_->funcs.end()};
 }
 
-const std::vector<Explanation>& Derivative::explanations() const { return result_->explanations; }
+std::vector<Explanation> Derivative::explanations() const {
+  std::vector<Explanation> all = result_->explanations, later = zeros_->explanations();
+  all.insert(all.end(), later.begin(), later.end());
+  return all;
+}
 
 std::vector<Explanation> Derivative::costs() const {
   GradientOperations counts = operations();
@@ -202,9 +229,14 @@ Derivative propagate_adjoints(const Func& output, const AdjointOptions& options)
     user_error(asked(output), "a scalar output has one value", text("it has ", output.outputs()),
                "Give the adjoint of each value as a Tuple-valued Func");
   }
-  ir::Seed seed{output.function(), {}, {seed_value(output, 0, ir::make_one(output.type()))}};
-  for (int d = 0; d < output.dimensions(); ++d) seed.region.push_back(ir::Interval::point(Expr(0)));
-  return run(seed, options);
+  if (output.dimensions() != 0) {
+    user_error(asked(output), "the gradient is that of a scalar, or of a sum with given weights",
+               text(quoted(output.name()), " has ", output.dimensions(), " dimensions"),
+               "Sum its elements up in a Func without dimensions, as in loss() += f(r.x, r.y), or "
+               "give the adjoint of each element: propagate_adjoints(f, adjoint, bounds)");
+  }
+  return run({output.function(), {}, {seed_value(output, 0, ir::make_one(output.type()))}},
+             options);
 }
 
 }  // namespace retrograde

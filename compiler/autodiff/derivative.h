@@ -31,6 +31,7 @@ struct SynthesisResult;
 }
 
 class AdjointInput;
+class ZeroGradients;
 
 // What the output takes to compute, and what the gradients by all that was requested take (with no
 // request: by all images and parameters), each as a pipeline of its own. What the gradients read of
@@ -47,11 +48,13 @@ class Derivative {
   explicit Derivative(std::shared_ptr<const ir::SynthesisResult> result);
 
   // The adjoint of `func` as it is after update definition `update_id`; -1: after its pure
-  // definition. For a Func that is only accumulated into, all of these are the same. An undefined
-  // Func when there is none: integers, what was not requested, and, unless requested by name, what
-  // the output does not mention: a Buffer that is bound to an ImageParam is something else than the
-  // ImageParam. Zero everywhere when the output does not depend on it. CompileError when there is
-  // no such update.
+  // definition. For a Func that is only accumulated into, all of these are the same. A Func that
+  // only reads an image point by point, and that the output does not use, stands for the image.
+  //
+  // Zero everywhere where the output does not depend on it, and for integers; explanations() then
+  // say why. (A Buffer that is bound to an ImageParam is something else than the ImageParam.)
+  // CompileError when there is no such update, and for what has a gradient that was not built:
+  // because `wrt` names others, a custom adjoint covers it, or its steps are not kept.
   Func operator()(const Func& func, int update_id = -1) const;
   Func operator()(const Buffer<>& buffer) const;
   Func operator()(const ImageParam& image) const;
@@ -63,14 +66,17 @@ class Derivative {
   Func adjoint(const Func& func) const;
   // The same for an input of any kind.
   Func of(const AdjointInput& input) const;
+  // Whether a gradient by it was built: of() gives a Func of zeros, or an error, where none was.
+  bool has(const AdjointInput& input) const;
   // Where an adjoint is summed up, for schedules by hand: the adjoint itself; or, where an element
   // gets many terms (accumulation.h), the Func in double that it rounds.
   Func accumulator(const Func& adjoint) const;
 
   // Everything that was made, producers before consumers: adjoints, private parts, helpers.
   std::vector<Func> funcs() const;
-  // What was built and how, what was not requested, and why a gradient is zero.
-  const std::vector<Explanation>& explanations() const;
+  // What was built and how, what was not requested, and why a gradient is zero: also one that was
+  // looked up since and has nothing to do with the output.
+  std::vector<Explanation> explanations() const;
   // What of it is stored and what computed again, in bytes and operations, and what of the primal
   // is not needed, with the schedules that the Funcs have now: the gradients that were asked for,
   // computed together as one pipeline (operation_count.h says what counts).
@@ -82,7 +88,10 @@ class Derivative {
 
  private:
   Func of_parameter(const ir::ParameterContents& parameter) const;
+  Func absent(const ir::Symbol& symbol, const std::string& name) const;
+  bool output_uses(const ir::FuncContents& f) const;
   std::shared_ptr<const ir::SynthesisResult> result_;
+  std::shared_ptr<ZeroGradients> zeros_;  // that were looked up
 };
 
 // What to do about an update that overwrites a value which a partial derivative needs.
@@ -134,7 +143,7 @@ Derivative propagate_adjoints(const Func& output, const Func& adjoint, const Reg
 // The same with an adjoint in memory, whose shape gives the bounds.
 Derivative propagate_adjoints(const Func& output, const Buffer<float>& adjoint,
                               const AdjointOptions& options = {});
-// Of a scalar: a Func without dimensions, or its element at 0.
+// Of a Func without dimensions: the adjoint of its value is 1.
 Derivative propagate_adjoints(const Func& output, const AdjointOptions& options = {});
 
 }  // namespace retrograde

@@ -94,6 +94,7 @@ class Synthesis {
   // ---- which symbols lie between the requested inputs and the output ----
 
   bool is_requested(const Symbol* symbol) const {
+    if (options_.left_out.contains(symbol)) return false;
     return !options_.only_requested || options_.requested.contains(symbol);
   }
 
@@ -502,6 +503,8 @@ class Synthesis {
           "the output is the same for all of its values: it is what a softmax, a log-sum-exp or "
           "a norm is shifted or scaled by, which cancels");
       return true;
+    } else if (auto left = options_.left_out.find(symbol); left != options_.left_out.end()) {
+      explain(Explanation::Kind::NotRequested, name, "left out: " + left->second);
     } else if (!active_.contains(symbol)) {
       explain(Explanation::Kind::NotRequested, name, "nothing that was requested depends on it");
     } else {

@@ -32,6 +32,7 @@ struct SynthesisOptions {
   CheckpointBudget checkpoints;
   bool only_requested = false;                  // else everything that the output depends on
   std::unordered_set<const Symbol*> requested;  // Funcs and parameters
+  std::unordered_map<const Symbol*, std::string> left_out;  // parameters, and why
 };
 
 // The adjoint of the output: an expression over its pure variables for each value; undefined: zero.

@@ -74,8 +74,7 @@ Module GeneratorBase::build_gradient_module(const std::string& function_name) {
       names.push_back("_grad_loss_for_" + of);
       const Derivative derivative = propagate_adjoints(funcs[i], seed, region_of(seed), options);
       for (size_t k = 0; k < images.size(); k++) {
-        Func gradient = derivative(images[k]);
-        if (!gradient.defined()) gradient = zeros(images[k]);
+        Func gradient = derivative.has(images[k]) ? derivative(images[k]) : zeros(images[k]);
         if (!seen.insert(gradient.function().get()).second) gradient = lambda(gradient(_));
         gradients.push_back(gradient);
         gradient_names.push_back("_grad_loss_" + of + "_wrt_" + image_names[k]);

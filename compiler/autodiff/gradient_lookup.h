@@ -1,0 +1,37 @@
+// gradient_lookup -- what was asked for by a name that has no gradient of its own: a zero that says
+// why, or an error.
+#pragma once
+
+#include <map>
+#include <mutex>
+#include <string>
+#include <vector>
+
+#include "autodiff/explain.h"
+#include "frontend/function.h"
+
+namespace retrograde {
+
+// Gradients of what the output does not depend on, made when somebody asks for them: the same Func
+// each time.
+class ZeroGradients {
+ public:
+  // `facts`: what synthesis said.  CompileError when they say that there is a gradient which was not
+  // built.
+  ir::FuncPtr find(const ir::Symbol& symbol, const std::string& name,
+                   const std::vector<Explanation>& facts);
+  std::vector<Explanation> explanations() const;
+
+ private:
+  mutable std::mutex mutex_;
+  std::map<const ir::Symbol*, ir::FuncPtr> zeros_;
+  std::vector<Explanation> explanations_;
+};
+
+namespace ir {
+
+// The image that a Func reads point by point and does nothing else: f(x, y) = im(x, y); else null.
+const ParameterContents* image_read_by(const FuncContents& f);
+
+}  // namespace ir
+}  // namespace retrograde

@@ -1,0 +1,139 @@
+// Looking up gradients: each look-up gives a gradient, zeros with a reason, or an error.
+#include <gtest/gtest.h>
+
+#include "gradient/gradient_check.h"
+#include "support/errors.h"
+
+namespace retrograde {
+namespace {
+
+const Var x("x"), y("y");
+
+Buffer<float> ramp(int n) {
+  Buffer<float> values(n);
+  for (int i = 0; i < n; i++) values(i) = 1.0f + 0.5f * i;
+  return values;
+}
+
+// sum over [0, 4) of im(x)^2
+struct Squares {
+  ImageParam im{Float(32), 1};
+  Func f{"f"}, loss{"loss"};
+  RDom r{0, 4};
+  Squares() {
+    im.set(ramp(4));
+    f(x) = im(x) * im(x);
+    loss() = 0.0f;
+    loss() += f(r);
+  }
+};
+
+void expect_values(const Func& gradient, const std::vector<float>& expected) {
+  const Buffer<float> found = Func(gradient).realize({static_cast<int>(expected.size())});
+  for (size_t i = 0; i < expected.size(); i++) EXPECT_EQ(found(static_cast<int>(i)), expected[i]) << i;
+}
+
+void expect_reason(const Derivative& d, const std::string& subject, const std::string& phrase) {
+  for (const Explanation& e : d.explanations()) {
+    if (e.subject == subject && e.detail.find(phrase) != std::string::npos) return;
+  }
+  ADD_FAILURE() << "no '" << phrase << "' about " << subject << " in:\n" << d.explain();
+}
+
+TEST(GradientLookup, FuncsThatReadAnImageStandForIt) {
+  Squares s;
+  const Derivative d = propagate_adjoints(s.loss);
+  expect_values(d(Func(s.im)), {2, 3, 4, 5});
+  Func reads;
+  reads(x) = s.im(x);
+  expect_values(d(reads), {2, 3, 4, 5});
+  Buffer<float> b = ramp(4);
+  Func f, loss;
+  f(x) = b(x) * b(x);
+  loss() = 0.0f;
+  loss() += f(s.r);
+  expect_values(propagate_adjoints(loss)(Func(b)), {2, 3, 4, 5});
+}
+
+TEST(GradientLookup, FuncsThatReadAnImageDifferentlyAreTheirOwn) {
+  Squares s;
+  Func shifted, g, loss;
+  shifted(x) = s.im(x);
+  shifted.compute_root();
+  g(x) = shifted(x) * s.im(x);
+  loss() = 0.0f;
+  loss() += g(s.r);
+  const Derivative d = propagate_adjoints(loss);
+  expect_values(d(shifted), {1.0f, 1.5f, 2.0f, 2.5f});
+  expect_values(d(s.im), {2, 3, 4, 5});
+}
+
+TEST(GradientLookup, IntegersAndWhatIsNotReadAreZerosWithAReason) {
+  Squares s;
+  Param<float> unread("unread");
+  Param<int> count("count");
+  ImageParam other(Float(32), 2, "other"), bytes(UInt(8), 1, "bytes");
+  Buffer<uint8_t> ones(4);
+  ones.fill(1);
+  bytes.set(ones);
+  count.set(3);
+  Func index("index"), g("g"), loss("sum"), stranger("stranger");
+  index(x) = x;
+  stranger(x) = cast<float>(x);
+  g(x) = s.im(x) * count * bytes(x) + index(x);
+  loss() = 0.0f;
+  loss() += g(s.r);
+  const Derivative d = propagate_adjoints(loss);
+  expect_values(d(s.im), {3, 3, 3, 3});
+  EXPECT_EQ(Buffer<float>(d(unread).realize())(), 0.0f);
+  EXPECT_EQ(Buffer<float>(d(count).realize())(), 0.0f);
+  EXPECT_EQ(Buffer<float>(d(other).realize({2, 2}))(1, 1), 0.0f);
+  expect_values(d(bytes), {0, 0, 0, 0});
+  expect_values(d(index), {0, 0, 0, 0});
+  expect_values(d(stranger), {0, 0, 0, 0});
+  for (const std::string& name : {unread.name(), other.name(), stranger.name()})
+    expect_reason(d, name, "does not depend on it");
+  expect_reason(d, count.name(), "int32");
+  expect_reason(d, bytes.name(), "uint8");
+  EXPECT_TRUE(d(stranger).same_as(d(stranger))) << "a schedule of it must not be lost";
+  EXPECT_FALSE(d.has(stranger));
+  EXPECT_TRUE(d.has(s.im));
+}
+
+TEST(GradientLookup, WhatWasNotBuiltIsAnError) {
+  Squares s;
+  ImageParam weights(Float(32), 1, "weights");
+  Func g("g"), loss("sum");
+  g(x) = s.f(x) * weights(x);
+  loss() = 0.0f;
+  loss() += g(s.r);
+  const Derivative d = propagate_adjoints(loss, {.wrt = {weights}});
+  expect_mentions(error_of<CompileError>([&] { d(s.im); }),
+                  {"the gradient by", "nothing that was requested depends on it", "wrt"});
+  expect_mentions(error_of<CompileError>([&] { d(Func("undefined")); }), {"undefined", "it has none"});
+}
+
+TEST(GradientLookup, OutputsWithDimensionsNeedAnAdjoint) {
+  Squares s;
+  expect_mentions(error_of<CompileError>([&] { propagate_adjoints(s.f); }),
+                  {"that of a scalar", "1 dimensions", "loss() += f(r.x, r.y)"});
+}
+
+// A Param that nobody wants a gradient of scales places that nothing bounds from above.
+TEST(GradientLookup, AParamThatNobodyAskedForDoesNotStandInTheWay) {
+  Squares s;
+  Param<float> step("step");
+  step.set(2.0f);
+  Func line("line"), g("g"), loss("sum");
+  line(x) = step * x;
+  g(x) = s.im(x) * line(cast<int>(s.im(x)));
+  loss() = 0.0f;
+  loss() += g(s.r);
+  const Derivative d = propagate_adjoints(loss);
+  expect_values(d(s.im), {2, 2, 4, 4});
+  expect_mentions(error_of<CompileError>([&] { d(step); }), {"step", "left out"});
+  EXPECT_THROW(propagate_adjoints(loss, {.wrt = {step}}), Error);
+}
+
+}  // namespace
+}  // namespace retrograde
