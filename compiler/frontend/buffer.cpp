@@ -197,8 +197,9 @@ void check_in_bounds(const Runtime::Buffer<>& buffer, const std::string& name, c
     user_error(place(), "the buffer must have memory", "it has only a shape", "Call allocate()");
   for (int d = 0; d < std::min(count, buffer.dimensions()); d++) {
     const auto dim = buffer.dim(d);
-    if (at[d] >= dim.min() && at[d] <= dim.max()) continue;
-    user_error(place(), "a coordinate lies inside the buffer",
+    // One past the end has an address: where a loop over pointers stops.
+    if (at[d] >= dim.min() && at[d] <= dim.max() + 1) continue;
+    user_error(place(), "a coordinate lies inside the buffer, or one past its end",
                text("dimension ", d, " covers [", dim.min(), ", ", dim.max(), "]"));
   }
 }

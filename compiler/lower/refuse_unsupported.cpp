@@ -103,6 +103,12 @@ void resolve(const Program& program, LoopLevel& level) {
                               : consumer->schedule.compute_level;
 }
 
+// Stages that share nothing but the outermost loop, which runs once, share nothing.
+void leave_outermost_company(StageSchedule& schedule) {
+  LoopLevel& level = schedule.fuse_level;
+  if (level.kind == LoopLevel::Kind::At && level.var == Var::outermost().name()) level = {};
+}
+
 }  // namespace
 
 void resolve_outermost_levels(Program& program) {
@@ -111,6 +117,7 @@ void resolve_outermost_levels(Program& program) {
     resolve(program, f->schedule.compute_level);
     resolve(program, f->schedule.store_level);
     resolve(program, f->schedule.hoist_level);
+    for (Definition& stage : f->stages) leave_outermost_company(stage.schedule);
   }
 }
 
