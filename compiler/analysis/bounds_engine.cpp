@@ -3,6 +3,8 @@
 #include "analysis/bounds_engine.h"
 
 #include "analysis/interval_arithmetic.h"
+#include "analysis/nonnegative.h"
+#include "analysis/nonnegative.h"
 #include "ir/build.h"
 #include "ir/visit.h"
 
@@ -159,7 +161,14 @@ Interval BoundsEngine::cast_bounds(Type type, const Expr& value) {
                ? interval_abs(type, type, bounds(call->args[0]))
                : interval_absd(type, type, bounds(call->args[0]), bounds(call->args[1]));
   }
-  return interval_cast(type, value.type(), bounds(value));
+  Interval v = bounds(value);
+  if (!value.type().is_float() || v.min.defined() || !is_nonnegative_or_nan(value))
+    return interval_cast(type, value.type(), v);
+  if (v.max.defined()) return interval_cast(type, value.type(), {make_zero(value.type()), v.max});
+  // Where it may be NaN, too, the integer is kept from being negative (lower/strict_indices.h).
+  Interval result = type_range(type);
+  if (has_linear_form(type)) result.min = make_zero(type);
+  return result;
 }
 
 Interval BoundsEngine::binary_bounds(const Expr& e, const Binary& op) {

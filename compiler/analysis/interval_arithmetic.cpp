@@ -348,6 +348,8 @@ Interval interval_cast(Type to, Type from, const Interval& v) {
 Interval interval_abs(Type result, Type operand, const Interval& v) {
   if (operand.is_float()) {
     auto ends = float_ends(v);
+    if (!ends && v.is_bounded())
+      return {make_zero(result), canonical_max(v.max, negate(v.min))};
     if (!ends)
       return may_be_nan(operand, v) ? Interval::everything() : Interval{make_zero(result), {}};
     double largest = std::max(std::abs(ends->min), std::abs(ends->max));

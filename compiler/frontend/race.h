@@ -7,9 +7,9 @@
 
 namespace retrograde::ir {
 
-// Whether iterations of `rvar` touch different elements: some coordinate of the left-hand side is a
-// * rvar + b with a constant a != 0 and b free of other reduction variables, and every read of the
-// Func by itself has that very coordinate. Then they may run at the same time. False means unknown.
+// Whether iterations of `rvar` touch different elements: no iteration writes what another one, with
+// another value of `rvar`, reads or writes, whatever the values of the other variables are
+// (analysis/never_meet.h). Then they may run at the same time. False means unknown.
 bool can_prove_race_free(const FuncContents& f, const Definition& update, const std::string& rvar);
 
 // Whether all points of the update commute: it is f(same point) op e with an operator that is

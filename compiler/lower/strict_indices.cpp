@@ -2,6 +2,8 @@
 
 #include <functional>
 
+#include "analysis/interval.h"
+#include "analysis/nonnegative.h"
 #include "ir/build.h"
 #include "ir/visit.h"
 
@@ -30,6 +32,11 @@ bool may_contract(const Expr& e) {
   return sum && product;
 }
 
+bool may_be_negative_as_nan(const Expr& value, Type type) {
+  return type.is_int() && is_nonnegative_or_nan(value) &&
+         !bounds_of(value, Scope<Interval>()).has_lower_bound();
+}
+
 // Of a coordinate, down to the elements that it reads.
 class StrictCoordinate : public Rewriter {
  protected:
@@ -37,9 +44,12 @@ class StrictCoordinate : public Rewriter {
   Expr rewrite(const Expr& e) override {
     if (reads_element(e)) return e;
     const auto* cast = e.as<Cast>();
-    if (!cast || !cast->type.is_int_or_uint() || !may_contract(cast->value)) return children(e);
+    if (!cast || !cast->type.is_int_or_uint() || !cast->value.type().is_float()) return children(e);
     const Expr& value = cast->value;
-    return cast_to(cast->type, call_op(Op::strict_float, value.type(), {value}));
+    const Expr place = may_contract(value)
+                           ? cast_to(cast->type, call_op(Op::strict_float, value.type(), {value}))
+                           : children(e);
+    return may_be_negative_as_nan(value, cast->type) ? max(place, make_zero(cast->type)) : place;
   }
 };
 

@@ -1,0 +1,237 @@
+#include "analysis/never_meet.h"
+
+#include <isl/constraint.h>
+#include <isl/ctx.h>
+#include <isl/local_space.h>
+#include <isl/options.h>
+#include <isl/set.h>
+#include <isl/space.h>
+#include <isl/val.h>
+
+#include <algorithm>
+#include <map>
+#include <memory>
+#include <unordered_set>
+#include <utility>
+
+#include "analysis/linear.h"
+#include "ir/build.h"
+#include "ir/conjuncts.h"
+#include "ir/equal.h"
+#include "ir/visit.h"
+
+namespace retrograde::ir {
+
+namespace {
+
+constexpr unsigned long most_operations = 1'000'000;  // of isl, about a second
+constexpr int most_unknowns = 40;
+constexpr int max_depth = 16;  // of divisions and minima inside one another
+
+// c0 * unknown0 + c1 * unknown1 + ... + constant
+struct Sum {
+  std::map<int, int64_t> terms;
+  int64_t constant = 0;
+};
+
+Sum sum_of(const Sum& a, const Sum& b, int64_t factor) {
+  Sum result = a;
+  for (const auto& [unknown, coefficient] : b.terms) {
+    int64_t& term = result.terms[unknown];
+    term += factor * coefficient;
+    if (term == 0) result.terms.erase(unknown);
+  }
+  result.constant += factor * b.constant;
+  return result;
+}
+Sum constant_sum(int64_t value) { return {{}, value}; }
+
+// Conditions on whole numbers, all of which hold.
+class Conditions {
+ public:
+  int unknown() { return count_++; }
+  void is_zero(Sum sum) { equalities_.push_back(std::move(sum)); }
+  void at_least_zero(Sum sum) { inequalities_.push_back(std::move(sum)); }
+
+  // Whether there is certainly no solution.
+  bool contradict() const {
+    if (count_ > most_unknowns) return false;
+    std::unique_ptr<isl_ctx, void (*)(isl_ctx*)> ctx(isl_ctx_alloc(), isl_ctx_free);
+    isl_options_set_on_error(ctx.get(), ISL_ON_ERROR_CONTINUE);
+    isl_ctx_set_max_operations(ctx.get(), most_operations);
+    isl_space* space = isl_space_set_alloc(ctx.get(), 0, static_cast<unsigned>(count_));
+    isl_basic_set* set = isl_basic_set_universe(isl_space_copy(space));
+    isl_local_space* local = isl_local_space_from_space(space);
+    for (const Sum& sum : equalities_)
+      set = constrained(set, isl_constraint_alloc_equality(isl_local_space_copy(local)), sum);
+    for (const Sum& sum : inequalities_)
+      set = constrained(set, isl_constraint_alloc_inequality(isl_local_space_copy(local)), sum);
+    isl_local_space_free(local);
+    const bool is_empty = isl_basic_set_is_empty(set) == isl_bool_true;
+    isl_basic_set_free(set);
+    return is_empty;
+  }
+
+ private:
+  int count_ = 0;
+  std::vector<Sum> equalities_, inequalities_;
+
+  static isl_basic_set* constrained(isl_basic_set* set, isl_constraint* constraint,
+                                    const Sum& sum) {
+    isl_ctx* ctx = isl_basic_set_get_ctx(set);
+    for (const auto& [unknown, coefficient] : sum.terms) {
+      constraint = isl_constraint_set_coefficient_val(constraint, isl_dim_set, unknown,
+                                                      isl_val_int_from_si(ctx, coefficient));
+    }
+    constraint =
+        isl_constraint_set_constant_val(constraint, isl_val_int_from_si(ctx, sum.constant));
+    return isl_basic_set_add_constraint(set, constraint);
+  }
+};
+
+using Known = std::map<Expr, Sum, StructuralLess>;
+
+// Expressions at one of the two points, as sums over unknowns.
+class Point {
+ public:
+  // `shared`: unknowns of what neither point varies.
+  Point(Conditions& conditions, Known& shared, const MeetingPoints& points)
+      : conditions_(conditions), shared_(shared) {
+    for (const auto& v : points.variables) varying_.insert(v.name);
+    for (const auto& v : points.variables) {
+      const Sum here = of(variable(v.name));
+      if (v.min.defined()) conditions_.at_least_zero(sum_of(here, of(v.min), -1));
+      if (v.max.defined()) conditions_.at_least_zero(sum_of(of(v.max), here, -1));
+    }
+    for (const Expr& condition : points.conditions) require(condition);
+  }
+
+  Sum of(const Expr& e) {
+    const LinearForm form = linear_form(e);
+    Sum result = constant_sum(form.constant);
+    if (!has_linear_form(e.type())) return atom(e);
+    for (const LinearTerm& term : form.terms)
+      result = sum_of(result, atom(term.atom), term.coefficient);
+    return result;
+  }
+
+ private:
+  Conditions& conditions_;
+  Known& shared_;
+  Known own_;
+  std::unordered_set<std::string> varying_;
+  int depth_ = 0;
+
+  // Equal expressions are one unknown: nothing is stored between two reads at a point, and what
+  // does not vary is read from what is complete.
+  Sum atom(const Expr& e) {
+    Known& known = uses_any_variable(e, varying_) ? own_ : shared_;
+    if (const auto found = known.find(e); found != known.end()) return found->second;
+    const Sum sum = new_atom(e);
+    return known.emplace(e, sum).first->second;
+  }
+
+  Sum new_atom(const Expr& e) {
+    if (depth_ == max_depth) return unknown();
+    depth_++;
+    const Sum sum = taken_apart(e);
+    depth_--;
+    return sum;
+  }
+
+  Sum taken_apart(const Expr& e) {
+    if (const Call* call = e.as<Call>()) {
+      const bool is_marker = call->op != Op::none && op_info(call->op).cls == OpClass::Marker;
+      return is_marker ? of(call->args[0]) : of_type(e.type());
+    }
+    if (const Cast* cast = e.as<Cast>()) return converted(*cast);
+    const Binary* op = e.as<Binary>();
+    if (!op || !has_linear_form(e.type())) return of_type(e.type());
+    if (e.kind() == Kind::Min || e.kind() == Kind::Max) return extreme(*op, e.kind());
+    const auto divisor = as_const_int(op->b);
+    const bool divides = e.kind() == Kind::Div || e.kind() == Kind::Mod;
+    if (!divides || !divisor || *divisor <= 0 || *divisor > INT32_MAX) return of_type(e.type());
+    if (e.kind() == Kind::Div) return divided(op->a, *divisor);
+    return sum_of(of(op->a), atom(binary(Kind::Div, op->a, op->b)), -*divisor);
+  }
+
+  Sum unknown() { return {{{conditions_.unknown(), 1}}, 0}; }
+
+  Sum of_type(Type type) {
+    const Sum sum = unknown();
+    if (!type.is_int_or_uint() || type.bits() > 32) return sum;
+    const int64_t low = type.is_uint() ? 0 : type.min_int();
+    const int64_t high = type.is_uint() ? static_cast<int64_t>(type.max_uint()) : type.max_int();
+    conditions_.at_least_zero(sum_of(sum, constant_sum(low), -1));
+    conditions_.at_least_zero(sum_of(constant_sum(high), sum, -1));
+    return sum;
+  }
+
+  // A conversion that keeps every value.
+  Sum converted(const Cast& cast) {
+    const Type from = cast.value.type();
+    const bool keeps = from.is_int_or_uint() && cast.type.can_represent(from);
+    return keeps ? of(cast.value) : of_type(cast.type);
+  }
+
+  // divisor * quotient <= e < divisor * (quotient + 1)
+  Sum divided(const Expr& e, int64_t divisor) {
+    const Sum quotient = unknown(), rest = sum_of(of(e), quotient, -divisor);
+    conditions_.at_least_zero(rest);
+    conditions_.at_least_zero(sum_of(constant_sum(divisor - 1), rest, -1));
+    return quotient;
+  }
+
+  Sum extreme(const Binary& op, Kind kind) {
+    const Sum result = unknown();
+    for (const Expr& side : {op.a, op.b}) {
+      conditions_.at_least_zero(kind == Kind::Min ? sum_of(of(side), result, -1)
+                                                  : sum_of(result, of(side), -1));
+    }
+    return result;
+  }
+
+  // Comparisons say something; of other conditions nothing is known.
+  void require(const Expr& condition) {
+    std::vector<Expr> conjuncts;
+    add_conjuncts(condition, conjuncts);
+    for (const Expr& conjunct : conjuncts) {
+      if (const Call* call = conjunct.as<Call>();
+          call && call->op != Op::none && op_info(call->op).cls == OpClass::Marker) {
+        require(call->args[0]);
+        continue;
+      }
+      const Binary* op = conjunct.as<Binary>();
+      if (op && has_linear_form(op->a.type())) compare(conjunct.kind(), of(op->a), of(op->b));
+    }
+  }
+
+  void compare(Kind kind, const Sum& a, const Sum& b) {
+    const Sum a_minus_b = sum_of(a, b, -1), b_minus_a = sum_of(b, a, -1);
+    const Sum one = constant_sum(1);
+    if (kind == Kind::EQ) conditions_.is_zero(a_minus_b);
+    if (kind == Kind::LE) conditions_.at_least_zero(b_minus_a);
+    if (kind == Kind::LT) conditions_.at_least_zero(sum_of(b_minus_a, one, -1));
+    if (kind == Kind::GE) conditions_.at_least_zero(a_minus_b);
+    if (kind == Kind::GT) conditions_.at_least_zero(sum_of(a_minus_b, one, -1));
+  }
+};
+
+}  // namespace
+
+bool can_prove_never_meet(const MeetingPoints& points, const std::string& loop,
+                          const std::vector<Expr>& a, const std::vector<Expr>& b) {
+  for (const int64_t later : {1, -1}) {  // the second point is on, or before
+    Conditions conditions;
+    Known shared;
+    Point first(conditions, shared, points), second(conditions, shared, points);
+    Sum steps = sum_of(second.of(variable(loop)), first.of(variable(loop)), -1);
+    conditions.at_least_zero(sum_of(constant_sum(-1), steps, later));
+    for (size_t d = 0; d < a.size(); d++)
+      conditions.is_zero(sum_of(first.of(a[d]), second.of(b[d]), -1));
+    if (!conditions.contradict()) return false;
+  }
+  return true;
+}
+
+}  // namespace retrograde::ir
