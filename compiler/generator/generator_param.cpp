@@ -12,9 +12,13 @@ GeneratorParamBase::GeneratorParamBase(const std::string& name) : name_(name) {
   if (GeneratorMembers* members = GeneratorMembers::around(this)) members->params.push_back(this);
 }
 
-void GeneratorParamBase::check_writable() const {
+bool GeneratorParamBase::is_writable() const {
   const GeneratorMembers* members = GeneratorMembers::around(this);
-  if (!members || !members->owner()->is_generated()) return;
+  return !members || !members->owner()->is_generated();
+}
+
+void GeneratorParamBase::check_writable() const {
+  if (is_writable()) return;
   user_error("set the GeneratorParam " + quoted(name_), "its value is read by generate()",
              "generate() has run", "Set it before apply() or build_module()");
 }

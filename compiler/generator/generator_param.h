@@ -45,6 +45,7 @@ class GeneratorParamBase {
   virtual InCpp in_cpp() const = 0;
 
  protected:
+  bool is_writable() const;  // until generate() has run
   // CompileError once generate() has run: the value would come too late.
   void check_writable() const;
   [[noreturn]] void refuse(const std::string& value, const std::string& rule,
@@ -128,6 +129,13 @@ class GeneratorParam : public Internal::GeneratorParamBase {
   operator T() const { return value_; }
   operator Expr() const requires std::is_arithmetic_v<T> { return Expr(value_); }
 
+  // Where it is a LoopLevel: after generate() too, which has given it to schedules. They follow it.
+  void set(const LoopLevel& level) requires std::is_same_v<T, LoopLevel> {
+    if (is_writable())
+      value_ = level;
+    else
+      value_.set(level);
+  }
   template <typename V>
   void set(const V& value) {
     check_writable();

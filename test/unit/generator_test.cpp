@@ -65,6 +65,38 @@ TEST(Generator, RunsFromCpp) {
   EXPECT_EQ(twice(20), 2.0f * out(20));
 }
 
+class Leveled : public Generator<Leveled> {
+ public:
+  GeneratorParam<LoopLevel> level{"level", LoopLevel::root()};
+  Output<Buffer<int, 2>> out{"out"};
+  Var x{"x"}, y{"y"};
+  Func inner{"inner"};
+
+  void generate() {
+    inner(x, y) = x + y;
+    out(x, y) = inner(x, y) * 2;
+  }
+  void schedule() { inner.compute_at(level); }
+};
+
+// The loop of an output exists only when generate() has run.
+TEST(Generator, LoopLevelsAreSetBeforeAndAfterGenerate) {
+  const GeneratorContext context(get_jit_target_from_environment());
+  auto early = context.create<Leveled>(), late = context.create<Leveled>();
+  Func other("other");
+  early->level.set({other, early->y});
+  early->apply();
+  early->level.set({early->out, early->y});
+  EXPECT_NE(Func(early->out).loop_nest().find("for y:\n    produce inner"), std::string::npos)
+      << Func(early->out).loop_nest();
+  late->apply();
+  late->level.set({late->out, late->x});
+  EXPECT_NE(Func(late->out).loop_nest().find("for x:\n      produce inner"), std::string::npos)
+      << Func(late->out).loop_nest();
+  const Buffer<int> values = late->realize({4, 3});
+  EXPECT_EQ(values(3, 2), 10);
+}
+
 TEST(Generator, ParamsComeAsText) {
   const GeneratorContext context(get_jit_target_from_environment());
   auto blur = context.create<BoxBlur>();
