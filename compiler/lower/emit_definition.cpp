@@ -1,5 +1,7 @@
 #include "lower/emit_definition.h"
 
+#include <algorithm>
+
 #include "ir/build.h"
 #include "ir/visit.h"
 #include "simplify/cse.h"
@@ -59,6 +61,63 @@ Requirements requirements_of(const LoopedFunc& f, int stage, const StageNest& ne
   add_guarded(call_func(f.name(), Int(32), definition.args, 0, SymbolRef(f.func)));
   if (definition.predicate.defined()) add(definition.predicate);
   return uses;
+}
+
+namespace {
+
+bool reads_memory(const Expr& e) {
+  bool found = false;
+  walk(e, [&](const Expr& part) {
+    const Call* call = part.as<Call>();
+    found = found || (call && (call->call_type == CallType::Func ||
+                               call->call_type == CallType::Image));
+    return !found;
+  });
+  return found;
+}
+
+// Whether values that do not count could do harm: as coordinates, or outside of the pipeline.
+bool depends_on_every_value(const Definition& definition) {
+  bool found = false;
+  for_each_expr(definition, [&](const Expr& root) {
+    walk(root, [&](const Expr& e) {
+      const Call* call = e.as<Call>();
+      if (!call) return !found;
+      if (call->call_type == CallType::Operator) {
+        found = found || (op_info(call->op).cls == OpClass::Effect && !call->is_op(Op::random));
+      } else {
+        found = found || call->call_type == CallType::Extern ||
+                std::any_of(call->args.begin(), call->args.end(), reads_memory);
+      }
+      return !found;
+    });
+  });
+  return found;
+}
+
+}  // namespace
+
+std::set<std::string> funcs_read_rounded(const LoopedFunc& f, int stage, const StageNest& nest,
+                                         const Requirements& uses) {
+  std::set<std::string> names;
+  const Definition& definition = f.stages[stage];
+  if (!nest.rounds_up || stage > 0 || depends_on_every_value(definition)) return names;
+  for (const auto& [name, use] : uses) {
+    if (!use.is_image && name != f.name()) names.insert(name);
+  }
+  return names;
+}
+
+Box read_inside(const LoopedFunc& f, int stage, const Domain& domain, const ValueBounds& values,
+                const std::string& func) {
+  Scope<Interval> points;
+  for (const auto& [var, range] : domain)
+    points.push(var, {range.min, simplify(range.min + range.extent - 1)});
+  Requirements uses;
+  for (const Expr& value : f.stages[stage].values)
+    merge_footprints(uses, footprints(value, points, &values));
+  const auto found = uses.find(func);
+  return found == uses.end() ? Box{} : found->second.box;
 }
 
 bool never_stores(const LoopedFunc& f, int stage, const Requirements& uses) {

@@ -7,6 +7,9 @@
 // of the DAG.
 #pragma once
 
+#include <set>
+#include <string>
+
 #include "lower/build_loop_nests.h"
 #include "lower/stage_nest.h"
 
@@ -19,6 +22,14 @@ Stmt emit_definition(const LoopedFunc& f, int stage, const StageNest& nest);
 // writes of f. `values`: between what values Funcs lie, for those that are coordinates here.
 Requirements requirements_of(const LoopedFunc& f, int stage, const StageNest& nest,
                              const ValueBounds& values);
+
+// The Funcs among `uses` of which a stage may read any values beyond its domain, where its loops
+// round up: what it computes there does not count. None where values are places, or have effects.
+std::set<std::string> funcs_read_rounded(const LoopedFunc& f, int stage, const StageNest& nest,
+                                         const Requirements& uses);
+// What a stage reads of a Func at the points of its domain.
+Box read_inside(const LoopedFunc& f, int stage, const Domain& domain, const ValueBounds& values,
+                const std::string& func);
 
 // Whether no point passes the predicate, by the same analysis: what the stage reads is then not
 // computed anywhere.

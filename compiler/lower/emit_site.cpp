@@ -65,11 +65,21 @@ Stmt NestEmitter::assemble(const std::vector<Piece>& pieces, Stmt stmt, const Em
   return stmt;
 }
 
-Box NestEmitter::take_required(const LoopedFunc& f, Emitted& code, std::vector<Stmt>& checks) {
+Box NestEmitter::take_required(const LoopedFunc& f, Emitted& code, Box& touched,
+                               std::vector<Stmt>& checks) {
   Box required;
   if (auto use = code.uses.find(f.name()); use != code.uses.end()) {
     required = use->second.box;
     code.uses.erase(use);
+    code.read_rounded.erase(f.name());
+  }
+  if (auto more = code.touched.extract(f.name())) {
+    const bool has_own_storage =
+        !f.is_output && !f.func->is_extern() && !f.schedule.memoized && !f.schedule.async;
+    if (has_own_storage)
+      touched = more.mapped();
+    else
+      required = hull(required, more.mapped());
   }
   if (f.is_output) required = output_box(f, required);
   check_bounded(program_, f, required);
@@ -139,7 +149,10 @@ NestEmitter::Piece NestEmitter::emit_piece(const FusedGroup& group, Emitted& cod
   for (const int index : group.funcs) {
     const LoopedFunc& f = program_.funcs[index];
     piece.funcs.push_back(&f);
-    members.push_back({&f, take_required(f, code, checks), loops_to_storage(f, site), {}});
+    Box touched;
+    Box required = take_required(f, code, touched, checks);
+    members.push_back(
+        {&f, std::move(required), loops_to_storage(f, site), {}, {}, std::move(touched)});
   }
   const Wanted want = slide_together(members, wanted, site);
   piece.lead = want.first;
@@ -152,7 +165,7 @@ NestEmitter::Piece NestEmitter::emit_piece(const FusedGroup& group, Emitted& cod
   made.storage.clear();
   for (Member& member : members) {
     auto own = allocated.extract(member.f->name());
-    member.need = std::move(own.mapped());
+    member.need = hull(own.mapped(), member.touched);
   }
   made.storage = std::move(allocated);
   for (const auto& [name, use] : made.uses) {

@@ -60,6 +60,7 @@ Emitted NestEmitter::emit_members(const FusedGroup& group, std::vector<Member>& 
     Emitted code = stages[0].f->func->is_extern()
                        ? emit_extern(*stages[0].f, stages[0].domain, site)
                        : emit_variants(group.nests[n], stages, site);
+    leave_rounded(stages[0], code);
     for (const FusedStage& stage : group.nests[n].stages)
       widen_by_own_reads(member_of(stage), code);
     nests[n] = code.stmt;
@@ -73,6 +74,18 @@ Emitted NestEmitter::emit_members(const FusedGroup& group, std::vector<Member>& 
     result.storage[member.f->name()] = std::move(box);
   }
   return result;
+}
+
+// Outside of its loops, a stage needs what the points of its domain read. What loops that round up
+// read beyond that must be there, and no more.
+void NestEmitter::leave_rounded(const NestStage& stage, Emitted& code) const {
+  for (const std::string& name : code.read_rounded) {
+    Box& needed = code.uses.at(name).box;
+    Box& touched = code.touched[name];
+    touched = hull(touched, needed);
+    needed = read_inside(*stage.f, stage.stage, stage.domain, values_, name);
+  }
+  code.read_rounded.clear();
 }
 
 // What an update reads of its own Func, the stages before it compute.
@@ -199,6 +212,8 @@ Emitted NestEmitter::emit_stage(const FusedNest& nest, std::vector<NestStage>& s
   code.stmt = emit_definition(f, own.stage, own.nest);
   code.uses = requirements_of(f, own.stage, own.nest, values_);
   if (never_stores(f, own.stage, code.uses)) code.stmt = make_evaluate(0);
+  const bool is_alone = nest.stages.size() == 1 && f.stages[own.stage].schedule.specializations.empty();
+  if (is_alone) code.read_rounded = funcs_read_rounded(f, own.stage, own.nest, code.uses);
   code = emit_children(computed_innermost_in(f), std::move(code), loops, 0, home);
   for (size_t i = 0; i < loops.size(); i++) {
     const int depth = static_cast<int>(loops.size() - i);

@@ -8,6 +8,7 @@ namespace retrograde::ir {
 void map_boxes(Needs& needs, const std::function<Box(const Box&)>& map) {
   for (auto& [name, use] : needs.uses) use.box = map(use.box);
   for (auto& [name, box] : needs.storage) box = map(box);
+  for (auto& [name, box] : needs.touched) box = map(box);
 }
 
 Box ranged_over(const std::vector<Loop>& loops, Box box) {
@@ -36,8 +37,10 @@ Box simplified(Box box) {
 }
 
 void merge_needs(Needs& into, const Needs& from) {
+  for (const auto& [name, use] : from.uses) into.read_rounded.erase(name);
   merge_footprints(into.uses, from.uses);
   for (const auto& [name, box] : from.storage) into.storage[name] = hull(into.storage[name], box);
+  for (const auto& [name, box] : from.touched) into.touched[name] = hull(into.touched[name], box);
 }
 
 void merge_code(Emitted& into, const Emitted& from) {

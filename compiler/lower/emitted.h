@@ -3,6 +3,7 @@
 
 #include <functional>
 #include <map>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -17,6 +18,11 @@ struct Needs {
   Requirements uses;
   std::map<std::string, Box> storage;  // Funcs computed inside but stored further out
   std::vector<Loop> unranged;
+  // What is read of a Func beyond what is needed of it: there must be storage, the values are of no
+  // matter.
+  std::map<std::string, Box> touched;
+  // Inside of the loops of one stage that round up: Funcs that nothing but its definition reads.
+  std::set<std::string> read_rounded;
 };
 
 // What one of several stages that share loops needs, while the loops around are still shared.

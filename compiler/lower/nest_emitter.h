@@ -58,6 +58,7 @@ class NestEmitter {
     std::vector<Loop> loops;  // to its storage
     std::vector<Slide> slides;
     Box required = {};
+    Box touched = {};  // of its storage, beside what is computed
   };
 
   // A group's part of the site:
@@ -80,7 +81,7 @@ class NestEmitter {
   Stmt assemble(const std::vector<Piece>& pieces, Stmt stmt, const Emitted& code, const Site& site);
   std::vector<int> needed_of(const FusedGroup& group, const Emitted& code) const;
   Piece emit_piece(const FusedGroup& group, Emitted& code, WantedFuncs& wanted, Site& site);
-  Box take_required(const LoopedFunc& f, Emitted& code, std::vector<Stmt>& checks);
+  Box take_required(const LoopedFunc& f, Emitted& code, Box& touched, std::vector<Stmt>& checks);
   Wanted slide_together(std::vector<Member>& members, const WantedFuncs& wanted, Site& site) const;
   void keep(Member& member, Box allocated, Emitted& code, Emitted& made, Piece& piece, Site& site);
   Box output_box(const LoopedFunc& f, const Box& read);
@@ -101,6 +102,7 @@ class NestEmitter {
   // come back in `storage`.
   Emitted emit_members(const FusedGroup& group, std::vector<Member>& members, Site& site,
                        std::vector<Stmt> stmts);
+  void leave_rounded(const NestStage& stage, Emitted& code) const;
   void widen_by_own_reads(Member& member, Emitted& code) const;
   Emitted emit_extern(const LoopedFunc& f, const Domain& domain, Site& site) const;
   Emitted emit_variants(const FusedNest& nest, std::vector<NestStage> stages, Site& home);

@@ -48,6 +48,7 @@ class NestBuilder {
     for (const Split& split : definition_.schedule.splits) apply(split);
     StageNest nest;
     for (const Dim& dim : definition_.schedule.dims) nest.loops.push_back(loop_of(dim));
+    nest.rounds_up = rounds_up_;
     resolve(nest);
     return nest;
   }
@@ -56,6 +57,7 @@ class NestBuilder {
   const Definition& definition_;
   const std::string prefix_;
   const bool is_update_;
+  bool rounds_up_ = false;
   Domain ranges_;  // of every variable that exists after the splits so far
   std::vector<std::vector<Derived>> derived_;  // by split; what one of them derives is one step
 
@@ -101,6 +103,7 @@ class NestBuilder {
     Expr inner = loop_variable(split.inner);
     switch (tail_of(split, old.extent)) {
       case TailStrategy::RoundUp:
+        rounds_up_ = rounds_up_ || !is_zero(simplify(old.extent % factor));
         return derive(split.old_var, base + inner + old.min);
       case TailStrategy::ShiftInwards:
         base = min(likely(base), old.extent - factor);

@@ -35,6 +35,7 @@ struct StageNest {
   // The same for bounds inference: where a guard keeps the point inside, the value says so.
   Substitution guarded_coordinate;
   std::vector<Expr> guards;  // the point is in the domain iff all hold
+  bool rounds_up = false;    // the loops run beyond the domain
 };
 
 // `extent_of_domain`: for each pure and reduction variable of the stage, the range it must cover.
