@@ -191,7 +191,8 @@ void retrograde_pool_release(void) { rt::pool().release(); }
 
 void* retrograde_allocate(retrograde_context* context, int64_t elements, int64_t element_bytes) {
   size_t bytes = 0;
-  if (!rt::allocation_bytes(elements, element_bytes, &bytes)) return nullptr;
+  if (elements > INT32_MAX || !rt::allocation_bytes(elements, element_bytes, &bytes))
+    return nullptr;
   return context && context->malloc_handler ? context->malloc_handler(context, bytes)
                                             : retrograde_pool_malloc(bytes);
 }
@@ -204,6 +205,13 @@ int32_t retrograde_allocation_error(retrograde_context* context, const char* nam
         context, retrograde_error_extents_negative,
         "cannot allocate \"%s\": its number of elements is negative; it is "
         "%i. Check the extents of the buffers",
+        name, elements);
+  }
+  if (elements > INT32_MAX) {
+    return retrograde_report_error(
+        context, retrograde_error_allocation_too_large,
+        "cannot allocate \"%s\": places in it are numbered in 31 bits, so that it may have 2147483647 "
+        "elements; it has %i. Compute it in smaller parts, for example with compute_at",
         name, elements);
   }
   if (!rt::allocation_bytes(elements, element_bytes, &bytes)) {

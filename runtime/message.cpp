@@ -191,6 +191,8 @@ const char* retrograde_error_name(int32_t code) {
       return "host pointer is null";
     case retrograde_error_bad_dimensions:
       return "wrong number of dimensions";
+    case retrograde_error_device_dirty_with_no_device_support:
+      return "data on a device";
     default:
       return "unknown error";
   }

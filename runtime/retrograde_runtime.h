@@ -47,6 +47,7 @@ enum retrograde_error_code {
   retrograde_error_specialize_fail = -31,
   retrograde_error_host_is_null = -34,
   retrograde_error_bad_dimensions = -43,
+  retrograde_error_device_dirty_with_no_device_support = -44,
   retrograde_error_storage_bound_too_small = -45
 };
 
@@ -139,6 +140,12 @@ int32_t retrograde_default_trace(retrograde_context*, const struct halide_trace_
 /* Writes a buffer to a .npy or .tmp file; see Func::debug_to_file. */
 int32_t retrograde_debug_to_file(retrograde_context*, const char* path,
                                  const struct halide_buffer_t* buffer);
+
+/* Whether a device has a newer copy of the data. */
+int32_t retrograde_buffer_device_dirty(retrograde_context*, const struct halide_buffer_t* buffer);
+/* Part of the answer to a query: the stride of a dimension, in elements. */
+int32_t retrograde_buffer_set_stride(retrograde_context*, struct halide_buffer_t* buffer,
+                                     int32_t dimension, int32_t stride);
 
 /* The profiler. A run begins with the names of Funcs, one a line; afterwards they are numbers. Null
  * stands for a run that is not profiled. */

@@ -57,6 +57,30 @@ bool same_shape(const halide_buffer_t& a, const std::vector<halide_dimension_t>&
   return true;
 }
 
+// The answer to a query, and at least [0, size) in each dimension: then the call itself says what is
+// wrong with that. Its strides are the answer's, unless it is larger, or they put elements onto each
+// other.
+void enlarge_to(Runtime::Buffer<>& buffer, const std::vector<int32_t>& sizes) {
+  bool is_answer = true;
+  for (size_t d = 0; d < sizes.size(); d++) {
+    halide_dimension_t& dim = buffer.raw_buffer()->dim[d];
+    const int32_t min = std::min(dim.min, 0), end = std::max(dim.min + dim.extent, sizes[d]);
+    is_answer = is_answer && min == dim.min && end == dim.min + dim.extent &&
+                (dim.stride != 0 || dim.extent <= 1);
+    dim.min = min;
+    dim.extent = end - min;
+  }
+  int32_t stride = 1;
+  for (size_t d = 0; d < sizes.size() && !is_answer; d++) {
+    buffer.raw_buffer()->dim[d].stride = stride;
+    stride *= buffer.raw_buffer()->dim[d].extent;
+  }
+}
+
+void crop_to(Runtime::Buffer<>& buffer, const std::vector<int32_t>& sizes) {
+  for (size_t d = 0; d < sizes.size(); d++) buffer.crop(static_cast<int>(d), 0, sizes[d]);
+}
+
 }  // namespace
 
 struct Pipeline::Contents {
@@ -258,9 +282,22 @@ void Pipeline::realize(RealizationArg outputs, const Target& target, const Param
 
 Realization Pipeline::realize(JITUserContext* context, const std::vector<int32_t>& sizes,
                               const Target& target, const ParamMap& map) {
-  std::vector<Buffer<>> buffers = make_outputs(sizes, true);
+  std::vector<Buffer<>> buffers = make_outputs(sizes, false);
   RealizationArg outputs(buffers);
-  run(outputs.buffers(), target, context, map);
+  const auto code = compiled(target);
+  const std::string asked = "realize " + names_of(contents_->outputs);
+  ir::Arguments arguments(*code, outputs.buffers(), false, asked, map);
+  const auto call = [&] {
+    return ir::call(*code, contents_->handlers, arguments.argv(), asked, context) == 0;
+  };
+  // Without memory the call is a query of what the outputs must be.
+  const bool succeeds = contents_->target.has_feature(Target::NoBoundsQuery) || call();
+  for (Buffer<>& buffer : buffers) {
+    enlarge_to(*buffer.get(), sizes);
+    ir::allocate_host(*buffer.get());
+  }
+  if (succeeds) call();
+  for (Buffer<>& buffer : buffers) crop_to(*buffer.get(), sizes);
   return Realization(std::move(buffers));
 }
 

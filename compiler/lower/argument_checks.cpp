@@ -4,6 +4,7 @@
 
 #include "diagnostics/error.h"
 #include "ir/build.h"
+#include "ir/visit.h"
 #include "retrograde_runtime.h"
 #include "simplify/simplify.h"
 
@@ -32,7 +33,7 @@ uint32_t type_word(Type type) {
 class Checks {
  public:
   Checks(const LoopNests& nests, const std::vector<LoweredArgument>& args, const Program& program)
-      : nests_(nests), args_(args), program_(program) {}
+      : nests_(nests), args_(args), program_(program), actual_(names_of_actual_facts()) {}
 
   Stmt build() {
     std::vector<Stmt> shape_checks;
@@ -59,6 +60,7 @@ class Checks {
   const LoopNests& nests_;
   const std::vector<LoweredArgument>& args_;
   const Program& program_;
+  const Substitution actual_;
   using Bindings = std::vector<std::pair<std::string, Expr>>;
 
   static Stmt bind(const Bindings& bindings, Stmt body) {
@@ -74,7 +76,7 @@ class Checks {
     for (const LoweredArgument& arg : args_) {
       if (!arg.is_buffer()) continue;
       for (int d = 0; d < arg.dimensions; d++) {
-        BufferConstraint promised = constraint_of(arg, d);
+        BufferConstraint promised = promise_of(arg, d);
         add_fact(arg, "min", Op::buffer_min, d, promised.min, facts, promises);
         add_fact(arg, "extent", Op::buffer_extent, d, promised.extent, facts, promises);
         add_fact(arg, "stride", Op::buffer_stride, d, promised.stride, facts, promises);
@@ -106,6 +108,33 @@ class Checks {
       promised.stride = dim.stride;
     }
     return promised;
+  }
+
+  // The promise in terms of what the buffers are: it may speak of facts that are promised, too, its
+  // own among them, as "a multiple of 8" does.
+  BufferConstraint promise_of(const LoweredArgument& arg, int d) const {
+    BufferConstraint promised = constraint_of(arg, d);
+    for (Expr* side : {&promised.min, &promised.extent, &promised.stride}) {
+      if (side->defined()) *side = substitute(*side, actual_);
+    }
+    return promised;
+  }
+
+  Substitution names_of_actual_facts() const {
+    Substitution names;
+    for (const LoweredArgument& arg : args_) {
+      for (int d = 0; arg.is_buffer() && d < arg.dimensions; d++) {
+        const BufferConstraint promised = constraint_of(arg, d);
+        const auto add = [&](const char* what, const Expr& promise) {
+          if (promise.defined())
+            names[fact(arg.name, what, d)] = variable(fact(arg.name, what, d) + ".actual");
+        };
+        add("min", promised.min);
+        add("extent", promised.extent);
+        add("stride", promised.stride);
+      }
+    }
+    return names;
   }
 
   static void add_shape_checks(const LoweredArgument& arg, std::vector<Stmt>& checks) {
@@ -144,6 +173,55 @@ class Checks {
                              text("cannot run: a buffer may have at most 2147483647 elements; ",
                                   quoted(arg.name), " has at least "),
                              elements, Expr(". Process it in tiles.")));
+    }
+  }
+
+  // The data are on the host, where they are promised to be.
+  static void add_memory_checks(const LoweredArgument& arg, std::vector<Stmt>& checks) {
+    const Expr handle = handle_of(arg.name);
+    const Expr host = reinterpret_as(UInt(64), call_op(Op::buffer_host, Handle(), {handle}));
+    const Expr zero = make_zero(UInt(64));
+    Expr has_elements = const_true();
+    for (int d = 0; d < arg.dimensions; d++)
+      has_elements = has_elements && call_op(Op::buffer_extent, Int(32), {handle, d}) > 0;
+    checks.push_back(check(host != zero || !has_elements, retrograde_error_host_is_null,
+                           text("cannot run: data must be in memory of the host; the host pointer of "
+                                "the buffer ",
+                                quoted(arg.name),
+                                " is null, and it is on a device. Copy it to the host first.")));
+    if (arg.kind == LoweredArgument::Kind::InputBuffer) {
+      const Expr is_dirty =
+          call_op(Op::runtime_call, Int(32), {Expr("retrograde_buffer_device_dirty"), handle});
+      checks.push_back(check(
+          is_dirty == 0, retrograde_error_device_dirty_with_no_device_support,
+          text("cannot run: data must be in memory of the host; the buffer ", quoted(arg.name),
+               " says that the newer copy is on a device. Copy it to the host first.")));
+    }
+    auto param = std::dynamic_pointer_cast<ParameterContents>(arg.symbol.lock());
+    if (!param || param->host_alignment <= arg.type.bytes()) return;
+    const Expr alignment = make_uint_const(UInt(64), static_cast<uint64_t>(param->host_alignment));
+    checks.push_back(check(
+        host % alignment == zero, retrograde_error_unaligned_host_ptr,
+        text("cannot run: the address of the buffer ", quoted(arg.name),
+             " was promised to be a multiple of ", param->host_alignment, ", but its remainder is "),
+        host % alignment, Expr(". Pass aligned memory, or lift the promise.")));
+  }
+
+  // Distances between elements, in elements: extents may be small and strides large.
+  static void add_span_checks(const LoweredArgument& arg, std::vector<Stmt>& checks) {
+    Expr span = make_const(Int(64), 0);
+    for (int d = 0; d < arg.dimensions; d++) {
+      const auto wide = [&](Op op) {
+        return cast(Int(64), call_op(op, Int(32), {handle_of(arg.name), d}));
+      };
+      const Expr stride = wide(Op::buffer_stride);
+      span = span + max(wide(Op::buffer_extent) - 1, 0) * max(stride, -stride);
+      checks.push_back(check(
+          span <= make_const(Int(64), int64_t{0x7fffffff}), retrograde_error_allocation_too_large,
+          text("cannot run: the elements of a buffer lie at most 2147483647 elements apart; those of ",
+               quoted(arg.name), " lie up to "),
+          span, text(" apart, by its extents and strides up to dimension ", d,
+                     ". Process it in tiles.")));
     }
   }
 
@@ -201,6 +279,9 @@ class Checks {
       Expr is_query = call_op(Op::buffer_is_query, Bool(), {handle_of(arg.name)});
       any_query = any_query || is_query;
       answers.push_back(make_if(is_query, answer(arg, box)));
+      add_memory_checks(arg, run);
+      add_span_checks(arg, run);
+      add_promise_checks(arg, box, run);
       add_box_checks(arg, box, run);
       add_constraint_checks(arg, run);
     }
@@ -220,15 +301,60 @@ class Checks {
     }
   }
 
-  static Stmt answer(const LoweredArgument& arg, const Box& box) {
+  // What is needed, but where the user promised what it is. A promise that speaks of the buffer
+  // itself means what is needed of it.
+  Stmt answer(const LoweredArgument& arg, const Box& box) const {
+    const Expr handle = handle_of(arg.name);
+    Substitution needed;
+    for (size_t d = 0; d < box.size(); d++) {
+      const int dimension = static_cast<int>(d);
+      needed[fact(arg.name, "min", dimension)] = box[d].min;
+      needed[fact(arg.name, "extent", dimension)] = simplify(box[d].max - box[d].min + 1);
+      needed[fact(arg.name, "stride", dimension)] =
+          call_op(Op::buffer_stride, Int(32), {handle, dimension});
+    }
+    const auto said = [&](const Expr& promise) {
+      return substitute(substitute(promise, needed), actual_);
+    };
     std::vector<Stmt> sets;
     for (size_t d = 0; d < box.size(); d++) {
-      Expr extent = simplify(box[d].max - box[d].min + 1);
-      sets.push_back(
-          make_evaluate(call_op(Op::buffer_set_bounds, Int(32),
-                                {handle_of(arg.name), static_cast<int>(d), box[d].min, extent})));
+      const int dimension = static_cast<int>(d);
+      const BufferConstraint promised = constraint_of(arg, dimension);
+      const Expr min = promised.min.defined() ? said(promised.min) : box[d].min;
+      const Expr extent = promised.extent.defined() ? said(promised.extent)
+                                                    : simplify(box[d].max - min + 1);
+      sets.push_back(make_evaluate(
+          call_op(Op::buffer_set_bounds, Int(32), {handle, dimension, min, extent})));
+      if (!promised.stride.defined() || (d == 0 && is_one(promised.stride))) continue;
+      sets.push_back(make_evaluate(call_op(
+          Op::runtime_call, Int(32),
+          {Expr("retrograde_buffer_set_stride"), handle, dimension, said(promised.stride)})));
     }
     return sets.empty() ? make_evaluate(0) : make_block(sets);
+  }
+
+  // A region that was promised must hold what is used: this is known before any buffer is.
+  void add_promise_checks(const LoweredArgument& arg, const Box& box,
+                          std::vector<Stmt>& checks) const {
+    auto param = std::dynamic_pointer_cast<ParameterContents>(arg.symbol.lock());
+    if (param && param->is_literal) return;
+    for (size_t d = 0; d < box.size(); d++) {
+      const BufferConstraint promised = promise_of(arg, static_cast<int>(d));
+      if (!promised.min.defined() && !promised.extent.defined()) continue;
+      const Expr min = promised.min.defined() ? promised.min : box[d].min;
+      Expr holds = min <= box[d].min;
+      if (promised.extent.defined()) holds = holds && box[d].max < min + promised.extent;
+      holds = simplify(holds);
+      if (is_const_true(holds)) continue;
+      checks.push_back(check(
+          holds, retrograde_error_constraints_make_required_region_smaller,
+          text("cannot run: what is promised of a buffer must hold what is used of it; ",
+               quoted(arg.name), " is used over ["),
+          box[d].min, Expr(", "), box[d].max, text("] in dimension ", d, ", but its min is promised"
+               " to be "), min, Expr(" and its extent "),
+          promised.extent.defined() ? promised.extent : Expr("whatever it is"),
+          Expr(". Promise a larger region, or lift the promise.")));
+    }
   }
 
   // Nothing is read when another extent is empty, so an empty buffer fits an empty requirement only
@@ -251,9 +377,9 @@ class Checks {
     }
   }
 
-  static void add_constraint_checks(const LoweredArgument& arg, std::vector<Stmt>& checks) {
+  void add_constraint_checks(const LoweredArgument& arg, std::vector<Stmt>& checks) const {
     for (int d = 0; d < arg.dimensions; d++) {
-      BufferConstraint promised = constraint_of(arg, d);
+      BufferConstraint promised = promise_of(arg, d);
       add_constraint_check(arg, "min", d, promised.min, checks);
       add_constraint_check(arg, "extent", d, promised.extent, checks);
       add_constraint_check(arg, "stride", d, promised.stride, checks);

@@ -195,13 +195,16 @@ TEST(Memory, ImpossibleRequestsGiveNullAndAReason) {
   retrograde_context context = reporting_to(&reports);
   EXPECT_EQ(retrograde_allocate(&context, -1, 4), nullptr);
   EXPECT_EQ(retrograde_allocate(&context, INT64_MAX, 4), nullptr);
-  EXPECT_EQ(retrograde_allocate(&context, INT64_MAX / 8, 4), nullptr);
+  EXPECT_EQ(retrograde_allocate(&context, int64_t{INT32_MAX} + 1, 1), nullptr);
+  EXPECT_EQ(retrograde_allocate(&context, INT32_MAX, INT32_MAX), nullptr);
   EXPECT_EQ(retrograde_allocation_error(&context, "f", -1, 4), retrograde_error_extents_negative);
   EXPECT_EQ(retrograde_allocation_error(&context, "f", INT64_MAX, 4),
             retrograde_error_allocation_too_large);
-  EXPECT_EQ(retrograde_allocation_error(&context, "f", INT64_MAX / 8, 4),
+  EXPECT_EQ(retrograde_allocation_error(&context, "f", int64_t{INT32_MAX} + 1, 1),
+            retrograde_error_allocation_too_large);
+  EXPECT_EQ(retrograde_allocation_error(&context, "f", INT32_MAX, INT32_MAX),
             retrograde_error_out_of_memory);
-  EXPECT_EQ(reports.size(), 3u);
+  EXPECT_EQ(reports.size(), 4u);
   EXPECT_NE(reports[0].message.find("\"f\""), std::string::npos);
 }
 

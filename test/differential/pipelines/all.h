@@ -7,6 +7,7 @@
 #include "differential/pipelines/images.h"
 #include "differential/pipelines/reductions.h"
 #include "differential/pipelines/schedules.h"
+#include "differential/pipelines/updates.h"
 
 // Not realized, only shown.
 #include "differential/pipelines/loop_nests.h"

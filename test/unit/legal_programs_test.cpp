@@ -1,0 +1,335 @@
+// Programs that are legal though a simple rule would turn them away: outputs larger than was asked
+// for, updates whose iterations never meet, loops whose extent is bounded but not known, promises
+// that speak of themselves. Each is compared with itself unscheduled, or with what it must give.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+
+#include "retrograde/retrograde.h"
+#include "support/errors.h"
+
+namespace retrograde {
+namespace {
+
+const Var x("x"), y("y"), c("c");
+
+template <typename T = int>
+std::vector<T> line(const Buffer<T>& buffer) {
+  std::vector<T> values;
+  for (int i = 0; i < buffer.width(); i++) values.push_back(buffer(i));
+  return values;
+}
+
+std::vector<int> doubled(int n) {
+  std::vector<int> values;
+  for (int i = 0; i < n; i++) values.push_back(2 * i);
+  return values;
+}
+
+// ---- realize(sizes) gives that size, whatever the schedule or a promise makes of it ----
+
+Func twice() {
+  Func f("f");
+  f(x) = 2 * x;
+  return f;
+}
+
+void expect_ten(Func f) {
+  const Buffer<int> out = f.realize({10});
+  EXPECT_EQ(out.min(0), 0);
+  EXPECT_EQ(line(out), doubled(10));
+}
+
+TEST(RealizedSizes, OfLoopsThatRoundUp) {
+  expect_ten(twice().vectorize(x, 8, TailStrategy::RoundUp));
+  expect_ten(twice().vectorize(x, 16));
+  expect_ten(twice().align_bounds(x, 16));
+  expect_ten(twice().bound(x, 0, 16));
+}
+
+TEST(RealizedSizes, OfConstrainedOutputs) {
+  Func wide = twice(), early = twice(), even = twice();
+  wide.output_buffer().dim(0).set_bounds(0, 16);
+  expect_ten(wide);
+  early.output_buffer().dim(0).set_min(-4);
+  expect_ten(early);
+  Dimension dim = even.output_buffer().dim(0);
+  dim.set_extent((dim.extent() + 7) / 8 * 8);
+  expect_ten(even);
+}
+
+TEST(RealizedSizes, OfTuplesAndOfOutputsThatOthersRead) {
+  Func pair("pair"), f("f"), g("g");
+  pair(x) = Tuple(2 * x, x + 1);
+  pair.vectorize(x, 8, TailStrategy::RoundUp);
+  Realization both = pair.realize({10});
+  EXPECT_EQ(line(Buffer<int>(both[0])), doubled(10));
+  EXPECT_EQ(both[1].as<int>()(9), 10);
+  f(x) = 2 * x;
+  g(x) = f(x) + f(x + 3);
+  f.compute_root().vectorize(x, 8, TailStrategy::RoundUp);
+  Realization two = Pipeline({f, g}).realize({10});
+  EXPECT_EQ(line(Buffer<int>(two[0])), doubled(10));
+  EXPECT_EQ(two[1].as<int>()(9), 42);
+  EXPECT_EQ(two[1].width(), 10);
+}
+
+TEST(RealizedSizes, KeepTheStridesThatWerePromised) {
+  Func f("f");
+  f(x, y, c) = x + 10 * y + 100 * c;
+  f.output_buffer().dim(0).set_stride(3);
+  f.output_buffer().dim(2).set_stride(1).set_bounds(0, 3);
+  const Buffer<int> out = f.realize({4, 2, 3});
+  EXPECT_EQ(out.stride(0), 3);
+  EXPECT_EQ(out.stride(1), 12);
+  EXPECT_EQ(out.stride(2), 1);
+  EXPECT_EQ(out(3, 1, 2), 213);
+}
+
+TEST(RealizedSizes, SmallerPromisesAreRefused) {
+  Func f = twice();
+  f.output_buffer().dim(0).set_bounds(0, 8);
+  expect_mentions(error_of<RuntimeError>([&] { f.realize({10}); }), {"promised to be 8", "it is 10"});
+}
+
+// ---- updates whose iterations never touch the same element ----
+
+// The update scheduled and not.
+void expect_same(const std::vector<int>& sizes, const std::function<Func()>& define,
+                 const std::function<void(Func&)>& schedule) {
+  Func plain = define(), scheduled = define();
+  ASSERT_NO_THROW(schedule(scheduled));
+  const Buffer<int> expected = plain.realize(sizes), found = scheduled.realize(sizes);
+  for (int i = 0; i < static_cast<int>(expected.number_of_elements()); i++)
+    ASSERT_EQ(found.begin()[i], expected.begin()[i]) << i;
+}
+
+TEST(DistinctWrites, OfDigits) {
+  RDom r(0, 4, 0, 4);
+  const auto define = [&] {
+    Func f("f");
+    f(x) = x;
+    f(r.x * 4 + r.y) += r.x - 10 * r.y;
+    return f;
+  };
+  expect_same({16}, define, [&](Func& f) { f.update().parallel(r.x); });
+  expect_same({16}, define, [&](Func& f) { f.update().vectorize(r.y); });
+}
+
+TEST(DistinctWrites, OfShears) {
+  RDom r(0, 4, 0, 4);
+  const auto define = [&] {
+    Func f("f");
+    f(x, y) = 0;
+    f(r.x + r.y, r.y) = f(r.x + r.y, r.y) * 2 + r.x + 10 * r.y;
+    return f;
+  };
+  expect_same({8, 4}, define, [&](Func& f) { f.update().reorder(r.y, r.x).parallel(r.x); });
+}
+
+TEST(DistinctWrites, OfQuotientsAndRemainders) {
+  RDom r(0, 16);
+  const auto define = [&] {
+    Func f("f");
+    f(x, y) = 0;
+    f(r % 4, r / 4) = cast<int>(r) * 3;
+    return f;
+  };
+  expect_same({4, 4}, define, [&](Func& f) { f.update().parallel(r); });
+}
+
+TEST(DistinctWrites, ByPredicates) {
+  RDom odd(0, 14), upper(0, 16), triangle(0, 5, 0, 5);
+  odd.where(odd % 2 == 1);
+  upper.where(upper >= 8);
+  triangle.where(triangle.x < triangle.y);
+  const auto of_odd = [&] {
+    Func f("f");
+    f(x) = x * x;
+    f(odd) = f(odd - 1) + f(odd + 1);
+    return f;
+  };
+  expect_same({16}, of_odd, [&](Func& f) { f.update().parallel(odd); });
+  const auto of_upper = [&] {
+    Func f("f");
+    f(x) = x * x;
+    f(upper) = f(upper - 8) + 1;
+    return f;
+  };
+  expect_same({16}, of_upper, [&](Func& f) { f.update().parallel(upper); });
+  const auto transposed = [&] {
+    Func f("f");
+    f(x, y) = x + 10 * y;
+    f(triangle.x, triangle.y) = f(triangle.y, triangle.x);
+    return f;
+  };
+  expect_same({5, 5}, transposed, [&](Func& f) { f.update().parallel(triangle.y); });
+}
+
+TEST(DistinctWrites, AreNotSeenWhereTheyMeet) {
+  RDom r(0, 4, 0, 5), half(0, 9);
+  Func digits("digits"), mirrored("mirrored");
+  digits(x) = 0;
+  digits(r.x * 4 + r.y) = r.x;  // 4 follows 0 + 4
+  EXPECT_THROW(digits.update().parallel(r.x), CompileError);
+  mirrored(x) = x;
+  mirrored(15 - half) = mirrored(half) * 2;  // 7 is read and written
+  EXPECT_THROW(mirrored.update().parallel(half), CompileError);
+  Param<int> n("n");
+  RDom some(0, n);
+  Func shifted("shifted");
+  shifted(x) = x;
+  shifted(some) = shifted(some + 8);
+  EXPECT_THROW(shifted.update().parallel(some), CompileError);
+  Func known("known");
+  known(x) = x;
+  known(some) = known(some + n);
+  EXPECT_NO_THROW(known.update().parallel(some));
+}
+
+TEST(DistinctWrites, OfPlacesThatDataMove) {
+  Buffer<int> row(4);
+  row.fill(1);
+  RDom r(0, 4, 0, 4);
+  Func f("f");
+  f(x, y) = 0;
+  f(r.x + row(r.y), r.y) = r.x;
+  EXPECT_NO_THROW(f.update().vectorize(r.x));
+  EXPECT_NO_THROW(f.update().parallel(r.y));
+}
+
+// ---- loops that are unrolled up to a bound ----
+
+TEST(BoundedLoops, AreUnrolledUnderTheirBound) {
+  Param<int> n("n");
+  RDom r(0, n);
+  Func f("f"), g("g");
+  f(x) = 0;
+  f(x) += x * (r + 1);
+  f.update().specialize(n <= 4).unroll(r);
+  for (const int length : {0, 1, 3, 4, 7}) {
+    n.set(length);
+    const Buffer<int> out = f.realize({5});
+    EXPECT_EQ(out(4), 4 * length * (length + 1) / 2) << length;
+  }
+  g(x) = 0;
+  g(x) += x * r;
+  g.update().unroll(r);
+  n.set(3);
+  expect_mentions(error_of<CompileError>([&] { g.realize({5}); }), {"constant above it"});
+}
+
+// ---- stages that share the outermost loop only ----
+
+TEST(Outermost, StagesComputedTogetherThere) {
+  Func f("f"), g("g"), h("h");
+  f(x) = x;
+  g(x, y) = 2 * x + y;
+  h(x) = f(x) + g(x, 1);
+  f.compute_root();
+  g.compute_root().compute_with(f, Var::outermost());
+  const Buffer<int> out = h.realize({6});
+  EXPECT_EQ(out(5), 16);
+}
+
+// ---- buffers ----
+
+TEST(Buffers, HaveAnAddressOnePastTheEnd) {
+  Buffer<int> row(3), image(4, 2);
+  EXPECT_EQ(&row(3) - &row(0), 3);
+  EXPECT_EQ(&image(4, 1), image.end());
+  EXPECT_EQ(&image(0, 2), image.end());
+#ifndef NDEBUG
+  EXPECT_THROW(row(4), CompileError);
+  EXPECT_THROW(row(-1), CompileError);
+#endif
+}
+
+// ---- coordinates ----
+
+TEST(Coordinates, FromAbsoluteValuesAreNotNegative) {
+  Func squares("squares"), f("f"), g("g");
+  squares(x) = x * x;
+  squares.compute_root();
+  f(x) = squares(cast<int>(abs(cast<float>(x - 4))));
+  EXPECT_EQ(line(Buffer<int>(f.realize({8}))), (std::vector<int>{16, 9, 4, 1, 0, 1, 4, 9}));
+  Buffer<float> image(4);
+  image(0) = -2.5f;
+  image(1) = 100.0f;
+  image(2) = -INFINITY;
+  image(3) = NAN;
+  g(x) = squares(min(cast<int>(min(abs(image(x)), 50.0f)), 20));
+  const Buffer<int> out = g.realize({4});
+  EXPECT_EQ(out(0), 4);
+  EXPECT_EQ(out(1), 400);
+  EXPECT_EQ(out(2), 400);
+}
+
+// ---- what is needed of inputs ----
+
+int inferred_extent(Func f, ImageParam in, int size) {
+  f.infer_input_bounds({size});
+  return in.get().width();
+}
+
+// What a loop that rounds up reads of a Func beyond its domain need not be right, only there.
+TEST(InputRegions, AreThoseOfTheLoopsThatReadThem) {
+  ImageParam in(Int(32), 1);
+  Func direct("direct"), g("g"), h("h"), f("f");
+  direct(x) = in(x) + in(x + 2);
+  direct.vectorize(x, 8, TailStrategy::RoundUp);
+  Func user("user");
+  user(x) = direct(x);
+  direct.compute_root();
+  EXPECT_EQ(inferred_extent(user, in, 12), 18);
+  in.reset();
+  g(x) = in(x);
+  g.compute_root();
+  h(x) = g(x) + 1;
+  h.compute_root().vectorize(x, 8, TailStrategy::RoundUp);
+  f(x) = h(x) + g(x);
+  EXPECT_EQ(inferred_extent(f, in, 12), 12);
+  Buffer<int> data(12);
+  for (int i = 0; i < 12; i++) data(i) = i;
+  in.set(data);
+  const Buffer<int> out = f.realize({12});
+  for (int i = 0; i < 12; i++) EXPECT_EQ(out(i), 2 * i + 1);
+}
+
+TEST(InputRegions, StayWhereValuesArePlaces) {
+  ImageParam in(Int(32), 1);
+  Func g("g"), h("h"), f("f");
+  g(x) = in(x) % 8;
+  g.compute_root();
+  h(x) = in(g(x));
+  h.compute_root().vectorize(x, 8, TailStrategy::RoundUp);
+  f(x) = h(x);
+  EXPECT_EQ(inferred_extent(f, in, 12), 16);
+}
+
+// ---- promises ----
+
+TEST(Promises, MaySpeakOfThemselves) {
+  ImageParam a(Float(32), 1, "a"), b(Float(32), 1, "b");
+  Buffer<float> ones(16);
+  ones.fill(1.0f);
+  a.set(ones);
+  b.set(ones);
+  a.dim(0).set_bounds(0, a.dim(0).extent() / 8 * 8);
+  b.dim(0).set_bounds(0, a.dim(0).extent());
+  RDom r(0, a.width());
+  Func dot("dot");
+  dot() = 0.0f;
+  dot() += a(r) * b(r);
+  const Buffer<float> out = dot.realize();
+  EXPECT_EQ(out(), 16.0f);
+  Func f = twice();
+  f.bound(x, 0, f.output_buffer().width() / 8 * 8).vectorize(x, 8);
+  Buffer<int> wide(16);
+  f.realize(wide);
+  EXPECT_EQ(line(wide), doubled(16));
+}
+
+}  // namespace
+}  // namespace retrograde
