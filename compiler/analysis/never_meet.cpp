@@ -94,10 +94,13 @@ using Known = std::map<Expr, Sum, StructuralLess>;
 // Expressions at one of the two points, as sums over unknowns.
 class Point {
  public:
-  // `shared`: unknowns of what neither point varies.
-  Point(Conditions& conditions, Known& shared, const MeetingPoints& points)
+  // `shared`: unknowns of what is the same at both points, as the variables in `fixed` are.
+  Point(Conditions& conditions, Known& shared, const MeetingPoints& points,
+        const std::unordered_set<std::string>& fixed)
       : conditions_(conditions), shared_(shared) {
-    for (const auto& v : points.variables) varying_.insert(v.name);
+    for (const auto& v : points.variables) {
+      if (!fixed.count(v.name)) varying_.insert(v.name);
+    }
     for (const auto& v : points.variables) {
       const Sum here = of(variable(v.name));
       if (v.min.defined()) conditions_.at_least_zero(sum_of(here, of(v.min), -1));
@@ -217,14 +220,28 @@ class Point {
   }
 };
 
+// Variables that are a coordinate of both places: where the points meet, they are equal, and so is
+// what data say of them.
+std::unordered_set<std::string> common_coordinates(const std::string& loop,
+                                                   const std::vector<Expr>& a,
+                                                   const std::vector<Expr>& b) {
+  std::unordered_set<std::string> names;
+  for (size_t d = 0; d < a.size(); d++) {
+    const Variable *v = a[d].as<Variable>(), *w = b[d].as<Variable>();
+    if (v && w && v->name == w->name && v->name != loop) names.insert(v->name);
+  }
+  return names;
+}
+
 }  // namespace
 
 bool can_prove_never_meet(const MeetingPoints& points, const std::string& loop,
                           const std::vector<Expr>& a, const std::vector<Expr>& b) {
+  const std::unordered_set<std::string> fixed = common_coordinates(loop, a, b);
   for (const int64_t later : {1, -1}) {  // the second point is on, or before
     Conditions conditions;
     Known shared;
-    Point first(conditions, shared, points), second(conditions, shared, points);
+    Point first(conditions, shared, points, fixed), second(conditions, shared, points, fixed);
     Sum steps = sum_of(second.of(variable(loop)), first.of(variable(loop)), -1);
     conditions.at_least_zero(sum_of(constant_sum(-1), steps, later));
     for (size_t d = 0; d < a.size(); d++)
