@@ -12,6 +12,11 @@
 // Entropy, a log(a), and a log(a / b): 1 / a overflows where a is denormal.
 // Norms and what is divided by them: stable_norms.h. sin(a) / a and its kin: stable_quotients.h.
 //
+// Forms overlap on shared nodes. A sweep takes the outermost one first: at each node that an adjoint
+// reaches, the form of that node or, where it has none, its operator. What a form passes over keeps
+// the adjoints that reach it from elsewhere. A form is taken where all of its equalities hold
+// between the nodes themselves (equal.h); test/gradient/forms looks for what is not so.
+//
 // Source: folklore; Higham, Accuracy and Stability of Numerical Algorithms, 2nd ed., 1.14 and 27.8.
 #pragma once
 

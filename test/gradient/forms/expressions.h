@@ -1,0 +1,13 @@
+// Random pointwise expressions of the shapes that stable_forms.h looks for, of near misses of them,
+// and of both around sub-expressions that they share.
+#pragma once
+
+#include "gradient/adversary/choices.h"
+#include "ir/expr.h"
+
+namespace retrograde::gradient {
+
+// Over the variables x, y and z of `type`. The same choices make the same expression.
+Expr make_form(Choices& choices, Type type);
+
+}  // namespace retrograde::gradient
