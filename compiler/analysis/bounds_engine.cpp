@@ -2,6 +2,8 @@
 // each atom of the sum then has its own rule below. What does not vary stands for itself.
 #include "analysis/bounds_engine.h"
 
+#include <algorithm>
+
 #include "analysis/interval_arithmetic.h"
 #include "analysis/nonnegative.h"
 #include "analysis/nonnegative.h"
@@ -13,10 +15,11 @@ namespace retrograde::ir {
 BoundsEngine::BoundsEngine(const Scope<Interval>& variables, const ValueBounds* values)
     : shared_(std::make_shared<Shared>(Shared{values})), scope_(&variables) {}
 
-BoundsEngine::BoundsEngine(const BoundsEngine& outer)
-    : shared_(outer.shared_), scope_(&outer.scope_) {}
+BoundsEngine::BoundsEngine(BoundsEngine& outer)
+    : shared_(outer.shared_), scope_(&outer.scope_), outer_(&outer) {}
 
 void BoundsEngine::bind(const Let& let) {
+  if (outer_) outer_->bind(let);
   if (!scope_.contains(let.name)) scope_.push(let.name, bounds(let.value));
 }
 
@@ -79,8 +82,32 @@ Interval BoundsEngine::ramp_bounds(const Ramp& ramp) {
   return hull(base, interval_add(type, base, last));
 }
 
-// Every end adds up on its own; the part that does not vary goes into both.
 Interval BoundsEngine::sum_bounds(const LinearForm& form) {
+  const std::optional<Interval> known = bounds_by_facts(form);
+  return known ? *known : sum_of_bounds(form);
+}
+
+// Where x + y <= 29 is known, x + y + z lies below 29 + z. The ends of x and y apart, 29 - y and
+// 29 - x, would add up to more than that as soon as the loops over x and y are looked at.
+std::optional<Interval> BoundsEngine::bounds_by_facts(const LinearForm& form) {
+  std::optional<Interval> result;
+  for (const LinearForm& fact : facts_) {
+    if (!(fact.type == form.type)) continue;
+    const LinearForm below = plus(form, fact, -1), above = plus(form, fact);  // form <= below
+    const size_t left = form.terms.size() - std::min(form.terms.size(), fact.terms.size());
+    const bool is_below = below.terms.size() == left, is_above = above.terms.size() == left;
+    if (form.terms.size() < fact.terms.size() || (!is_below && !is_above)) continue;
+    if (!result) result = outer_->sum_bounds(form);
+    Interval implied;
+    if (is_below) implied.max = outer_->sum_bounds(below).max;
+    if (is_above) implied.min = outer_->sum_bounds(above).min;
+    result = intersection(*result, implied);
+  }
+  return result;
+}
+
+// Every end adds up on its own; the part that does not vary goes into both.
+Interval BoundsEngine::sum_of_bounds(const LinearForm& form) {
   LinearForm fixed{form.type, {}, form.constant};
   std::vector<std::pair<Interval, int64_t>> varying;
   for (const LinearTerm& term : form.terms) {
@@ -273,10 +300,11 @@ BoundsEngine& BoundsEngine::under(const Expr& condition, bool is_true) {
   size_t index = children_.size() - 1;
   Narrowed narrowed;
   narrow(condition, is_true, narrowed);
-  if (narrowed.empty()) return *this;
+  if (narrowed.variables.empty()) return *this;
   --shared_->engines_left;
   std::unique_ptr<BoundsEngine> child(new BoundsEngine(*this));
-  for (auto& [name, interval] : narrowed) child->scope_.push(name, interval);
+  for (auto& [name, interval] : narrowed.variables) child->scope_.push(name, interval);
+  child->facts_ = std::move(narrowed.facts);
   children_[index].engine = std::move(child);
   return *children_[index].engine;
 }
@@ -335,10 +363,12 @@ void BoundsEngine::narrow_by_comparison(Kind kind, const Expr& a, const Expr& b,
 
 // form <= 0 bounds each variable v of the scope in it: c*v <= -rest, and -rest <= -(min of rest).
 void BoundsEngine::narrow_nonpositive(const LinearForm& form, Narrowed& narrowed) {
+  size_t loose = 0;
   for (const LinearTerm& term : form.terms) {
     const Variable* v = term.atom.as<Variable>();
     const Interval* old = v ? scope_.find(v->name) : nullptr;
     if (!old) continue;
+    ++loose;
     LinearForm rest = plus(form, linear_form(term.atom), -term.coefficient);
     Expr least = sum_bounds(with_remainders(rest)).min;
     if (!least.defined()) continue;
@@ -353,9 +383,11 @@ void BoundsEngine::narrow_nonpositive(const LinearForm& form, Narrowed& narrowed
       Expr numerator = to_expr(limit);
       if (numerator.defined()) implied.min = canonical_div(numerator, -c);
     }
-    auto it = narrowed.find(v->name);
-    narrowed[v->name] = intersection(it == narrowed.end() ? *old : it->second, implied);
+    auto it = narrowed.variables.find(v->name);
+    narrowed.variables[v->name] =
+        intersection(it == narrowed.variables.end() ? *old : it->second, implied);
   }
+  if (loose > 1) narrowed.facts.push_back(form);
 }
 
 // ---- calls ----

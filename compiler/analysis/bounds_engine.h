@@ -8,7 +8,9 @@
 // simplifier.
 #pragma once
 
+#include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <unordered_map>
 #include <vector>
@@ -43,10 +45,12 @@ class BoundsEngine {
     int engines_left =
         16;  // contexts multiply with nested conditions: beyond this many, conditions are not used
   };
-  explicit BoundsEngine(const BoundsEngine& outer);
+  explicit BoundsEngine(BoundsEngine& outer);
 
   Interval compute(const Expr& e);
   Interval sum_bounds(const LinearForm& form);
+  Interval sum_of_bounds(const LinearForm& form);
+  std::optional<Interval> bounds_by_facts(const LinearForm& form);
   LinearForm with_remainders(LinearForm form);
   Interval bounds_of_atom(const Expr& atom);
   Interval atom_bounds(const Expr& e);
@@ -58,13 +62,19 @@ class BoundsEngine {
   Interval operator_bounds(const Call& call);
   Interval value_of_func(const Call& call);
   Truth compare_truth(Kind kind, const Expr& a, const Expr& b);
-  using Narrowed = std::map<std::string, Interval>;
+  // What a condition says of the variables of the scope: of each alone, and sums of several, <= 0.
+  struct Narrowed {
+    std::map<std::string, Interval> variables;
+    std::vector<LinearForm> facts;
+  };
   void narrow(const Expr& condition, bool is_true, Narrowed& narrowed);
   void narrow_by_comparison(Kind kind, const Expr& a, const Expr& b, Narrowed& narrowed);
   void narrow_nonpositive(const LinearForm& form, Narrowed& narrowed);
 
   std::shared_ptr<Shared> shared_;
   Scope<Interval> scope_;
+  BoundsEngine* outer_ = nullptr;  // without the condition
+  std::vector<LinearForm> facts_;  // of the condition
   struct Entry {
     Expr key;
     Interval value;

@@ -344,6 +344,7 @@ class Builder {
       if (in_parts || in_lanes) {
         slice.conditions.push_back(likely(at < all));
         at = min_of(likely(at), all - 1);
+        if (!as_const_int(all)) at = max(at, make_zero(Int(32)));  // it may be 0
       }
       slice.place[old] = min + at;
     }

@@ -430,8 +430,11 @@ class GroupInverter {
       bool below = !v.max.defined() || (range.max.defined() && can_prove(range.max <= v.max));
       if (above && below) continue;
       e = likely(e);
-      if (v.min.defined()) e = max(e, v.min);
+      // The first point of a domain whose run-time extent may be 0: its last one lies before it.
+      const bool may_be_empty = v.min.defined() && v.max.defined() && !can_prove(v.min <= v.max);
+      if (v.min.defined() && !may_be_empty) e = max(e, v.min);
       if (v.max.defined()) e = min(e, v.max);
+      if (may_be_empty) e = max(e, v.min);
     }
   }
 
