@@ -11,6 +11,7 @@
 #include "lower/transpose_loads.h"
 #include "lower/trim_loops.h"
 #include "lower/unroll_loops.h"
+#include "lower/vectorize_inner_loops.h"
 #include "lower/vectorize_loops.h"
 #include "simplify/simplify.h"
 
@@ -30,6 +31,10 @@ const std::vector<StatementPass>& statement_passes() {
       {"transpose_loads", transpose_loads},
       {"trim_loops", trim_loops},
       {"unroll_loops", unroll_loops},
+      {"vectorize_inner_loops",  // every loop taken for one over a pure variable
+       [](const Stmt& s) {
+         return vectorize_inner_loops(s, {32, [](const For&) { return true; }});
+       }},
       {"vectorize_loops", vectorize_loops},
       {"interleave_vectors", interleave_vectors},
   };

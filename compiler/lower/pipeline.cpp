@@ -11,8 +11,9 @@
 #include "lower/accumulate_vectors.h"
 #include "lower/argument_checks.h"
 #include "lower/build_loop_nests.h"
-#include "lower/drop_checks.h"
+#include "lower/copy_statement.h"
 #include "lower/deinterleave_loads.h"
+#include "lower/drop_checks.h"
 #include "lower/flatten_storage.h"
 #include "lower/fork_async.h"
 #include "lower/free_early.h"
@@ -29,6 +30,7 @@
 #include "lower/transpose_loads.h"
 #include "lower/trim_loops.h"
 #include "lower/unroll_loops.h"
+#include "lower/vectorize_inner_loops.h"
 #include "lower/vectorize_loops.h"
 #include "lower/write_debug_files.h"
 #include "simplify/simplify.h"
@@ -60,9 +62,8 @@ StorageLayouts storage_layouts(const Lowering& lowering) {
     if (auto it = lowering.folds.find(f.name()); it != lowering.folds.end())
       layout.folds = it->second;
     for (const std::string& var : f.schedule.storage_dims)
-      layout.order.push_back(
-          static_cast<int>(std::find(f.func->args.begin(), f.func->args.end(), var) -
-                           f.func->args.begin()));
+      layout.order.push_back(static_cast<int>(
+          std::find(f.func->args.begin(), f.func->args.end(), var) - f.func->args.begin()));
     if (!is_hoisted(f)) continue;
     layout.lies_in = place_name(f.name());
     layouts[layout.lies_in].is_place = layout.lies_in;
@@ -81,6 +82,37 @@ Stmt nest_loops(Lowering& lowering, const Stmt&) {
       make_names_unique(add_argument_checks(nests, lowering.args, lowering.program));
   lowering.renamed_funcs = std::move(unique.original);
   return unique.stmt;
+}
+
+// Whether a schedule has `var` as a loop, and as one over pure variables wherever it has it.
+struct LoopKinds {
+  bool is_pure = false, is_reduction = false;
+};
+void find_kinds(const StageSchedule& schedule, const std::string& var, LoopKinds& kinds) {
+  for (const Dim& dim : schedule.dims) {
+    if (dim.var == var) (dim.is_reduction ? kinds.is_reduction : kinds.is_pure) = true;
+  }
+  for (const StageSchedule& other : schedule.specializations) find_kinds(other, var, kinds);
+}
+
+// Iterations of a loop over a pure variable touch elements of their own (define.cpp sees to it).
+bool is_pure_loop(const Lowering& lowering, const For& loop) {
+  const LoopName name = decode_loop_name(loop.name);
+  const auto renamed = lowering.renamed_funcs.find(name.func);
+  const LoopedFunc* func =
+      lowering.program.find(renamed == lowering.renamed_funcs.end() ? name.func : renamed->second);
+  if (!func) return false;
+  const auto stage = static_cast<size_t>(std::stoi(name.stage));
+  LoopKinds kinds;
+  if (stage < func->stages.size()) find_kinds(func->stages[stage].schedule, name.var, kinds);
+  return kinds.is_pure && !kinds.is_reduction;
+}
+
+Stmt vectorize_unscheduled(const Lowering& lowering, const Stmt& s) {
+  const Target& target = lowering.options.target;
+  if (target.has_feature(Target::DisableLLVMLoopOpt)) return s;
+  return vectorize_inner_loops(s, {target.natural_vector_size(UInt(8)),
+                                   [&](const For& loop) { return is_pure_loop(lowering, loop); }});
 }
 
 Stmt run_simplify(Lowering&, const Stmt& s) { return simplify(s); }
@@ -114,13 +146,18 @@ constexpr Pass passes[] = {
                       lowering.options.target, lowering.folds);
      }},
     {"flatten_storage", Phase::FlatStorage,
-     [](Lowering& lowering, const Stmt& s) { return flatten_storage(s, storage_layouts(lowering)); }},
+     [](Lowering& lowering, const Stmt& s) {
+       return flatten_storage(s, storage_layouts(lowering));
+     }},
     {"simplify_storage", Phase::FlatStorage, run_simplify},
-    {"lower_atomics", Phase::FlatStorage, [](Lowering&, const Stmt& s) { return lower_atomics(s); }},
+    {"lower_atomics", Phase::FlatStorage,
+     [](Lowering&, const Stmt& s) { return lower_atomics(s); }},
     {"partition_loops", Phase::FlatStorage,
      [](Lowering&, const Stmt& s) { return partition_loops(s); }},
     {"trim_loops", Phase::FlatStorage, [](Lowering&, const Stmt& s) { return trim_loops(s); }},
     {"unroll_loops", Phase::FlatStorage, [](Lowering&, const Stmt& s) { return unroll_loops(s); }},
+    {"vectorize_inner_loops", Phase::FlatStorage,
+     [](Lowering& lowering, const Stmt& s) { return vectorize_unscheduled(lowering, s); }},
     {"vectorize_loops", Phase::Vector, [](Lowering&, const Stmt& s) { return vectorize_loops(s); }},
     {"accumulate_vectors", Phase::Vector,
      [](Lowering&, const Stmt& s) { return accumulate_vectors(s); }},

@@ -2,7 +2,10 @@
 // same prints. The seed of a failure is in its message.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <map>
 #include <random>
+#include <set>
 
 #include "ir/validate.h"
 #include "lower/accumulate_vectors.h"
@@ -13,6 +16,7 @@
 #include "lower/transpose_loads.h"
 #include "lower/trim_loops.h"
 #include "lower/unroll_loops.h"
+#include "lower/vectorize_inner_loops.h"
 #include "lower/vectorize_loops.h"
 #include "property/statement_evaluator.h"
 
@@ -315,11 +319,30 @@ void expect_same(const char* pass, unsigned seed, const Stmt& before, const Stmt
   }
 }
 
+// Each buffer is stored to once, and not loaded from.
+bool is_surely_independent(const For& loop) {
+  std::map<std::string, int> stores;
+  std::set<std::string> loads;
+  walk(
+      loop.body,
+      [&](const Expr& e) {
+        if (const auto* load = e.as<Load>()) loads.insert(load->name);
+        return true;
+      },
+      [&](const Stmt& s) {
+        if (const auto* store = s.as<Store>()) ++stores[store->name];
+        return true;
+      });
+  return std::all_of(stores.begin(), stores.end(), [&](const auto& entry) {
+    return entry.second == 1 && loads.count(entry.first) == 0;
+  });
+}
+
 class LoopPasses : public testing::TestWithParam<int> {};
 
 TEST_P(LoopPasses, KeepWhatProgramsCompute) {
   constexpr unsigned count = 100;
-  int accumulated = 0, changed = 0;
+  int accumulated = 0, changed = 0, widened = 0;
   for (unsigned seed = GetParam() * count; seed < (GetParam() + 1) * count; ++seed) {
     Stmt program = RandomProgram(seed).make();
     ASSERT_NO_THROW(validate(program, Phase::FlatStorage, "generator", free_names))
@@ -333,6 +356,10 @@ TEST_P(LoopPasses, KeepWhatProgramsCompute) {
     expect_same("trim_loops alone", seed, program, trim_loops(program), Phase::FlatStorage);
     Stmt unrolled = unroll_loops(trimmed);
     expect_same("unroll_loops", seed, program, unrolled, Phase::FlatStorage);
+    Stmt inner = vectorize_inner_loops(unrolled, {8, is_surely_independent});
+    expect_same("vectorize_inner_loops", seed, program, inner, Phase::FlatStorage);
+    widened += !inner.same_as(unrolled);
+    expect_same("both vectorizers", seed, program, vectorize_loops(inner), Phase::Vector);
     Stmt vectorized = vectorize_loops(unrolled);
     expect_same("vectorize_loops", seed, program, vectorized, Phase::Vector);
     expect_same("accumulate_vectors", seed, program, accumulate_vectors(vectorized), Phase::Vector);
@@ -346,6 +373,7 @@ TEST_P(LoopPasses, KeepWhatProgramsCompute) {
     if (HasFatalFailure()) return;
   }
   EXPECT_GT(accumulated, 0) << "no program had a reduction to accumulate";
+  EXPECT_GT(widened, 0) << "no program had an inner loop for vectors";
   EXPECT_GT(changed, 0) << "no program had a loop to trim";
 }
 

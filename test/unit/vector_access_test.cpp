@@ -1,11 +1,16 @@
 // Vectorized reads at divided coordinates give what a point alone reads, and touch nothing else:
 // for every phase of the division, ends below zero, all ways to treat a tail, and inputs that begin
-// or end at a page that cannot be touched. Oracle: floor division in plain C++.
+// or end at a page that cannot be touched. Oracle: floor division in plain C++. Loops that no
+// schedule says anything about get lanes where that is known to be right.
 #include <gtest/gtest.h>
 
 #include <retrograde/retrograde.h>
 
+#include <fstream>
+#include <iterator>
+
 #include "support/guarded_array.h"
+#include "support/temporary_folder.h"
 
 namespace retrograde {
 namespace {
@@ -29,7 +34,7 @@ class DividedProgram {
   DividedProgram(const DividedAccess& access, int lanes, TailStrategy tail) : access_(access) {
     const Expr q = access.stride * x_ + offset_;
     f_(x_) = in_(q / access.divisor) + 1000 * (q % access.divisor);
-    f_.vectorize(x_, lanes, tail);
+    if (lanes > 1) f_.vectorize(x_, lanes, tail);
   }
 
   void expect_right(int min, int extent, int offset, Array::Guard guard) {
@@ -80,6 +85,54 @@ TEST(VectorAccess, DividedCoordinates) {
       }
     }
   }
+}
+
+// The same without a schedule: the compiler takes lanes by itself, and a scalar loop for the rest.
+TEST(VectorAccess, DividedCoordinatesUnscheduled) {
+  for (const DividedAccess access :
+       {DividedAccess{1, 1}, {1, 2}, {2, 1}, {2, 2}, {1, 3}, {3, 2}, {4, 1}, {2, 4}, {1, 16}}) {
+    DividedProgram program(access, 1, TailStrategy::Auto);
+    for (int min = -4; min <= 3; min++) {
+      for (const int extent : {1, 7, 8, 16, 19, 33, 48}) {
+        const Array::Guard guard = (min + extent) % 2 ? Array::Guard::Above : Array::Guard::Below;
+        program.expect_right(min, extent, min % 3, guard);
+        if (HasFatalFailure()) return;
+      }
+    }
+  }
+}
+
+bool has_vectors(Func f, const Target& target) {
+  const TemporaryFolder folder;
+  const std::string path = folder.path() / "f.stmt";
+  f.compile_to_lowered_stmt(path, f.infer_arguments(), Text, target);
+  std::ifstream file(path);
+  const std::string lowered{std::istreambuf_iterator<char>(file), {}};
+  return lowered.find("ramp(") != std::string::npos;
+}
+
+TEST(VectorAccess, OnlyPureVariablesGetLanesUnasked) {
+  const Target target("x86-64-linux-sse41-avx-avx2");
+  ImageParam in(Float(32), 2, "in");
+  Var x("x"), y("y"), xi("xi");
+  RDom r(0, 64);
+  Func pure("pure"), column("column"), scan("scan"), transposed("transposed"),
+      looked_up("looked_up");
+  pure(x, y) = sqrt(in(x, y));
+  EXPECT_TRUE(has_vectors(pure, target));
+  EXPECT_FALSE(has_vectors(pure, target.with_feature(Target::DisableLLVMLoopOpt)));
+  column(x, y) = undef<float>();
+  column(x, r) = column(x, r - 1) + in(x, r);
+  column.update().reorder(x, r);
+  EXPECT_TRUE(has_vectors(column, target));
+  scan(x, y) = undef<float>();
+  scan(r, y) = scan(r - 1, y) + in(r, y);
+  EXPECT_FALSE(has_vectors(scan, target));
+  transposed(x, y) = in(x, y);
+  transposed.reorder(y, x);
+  EXPECT_FALSE(has_vectors(transposed, target));
+  looked_up(x, y) = in(clamp(cast<int>(in(x, y)), 0, 9), y);
+  EXPECT_FALSE(has_vectors(looked_up, target));
 }
 
 // Both phases of a stretched signal beside each other, as inverse wavelets have them.
