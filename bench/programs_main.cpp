@@ -16,19 +16,25 @@ namespace programs {
 
 namespace {
 
-const std::vector<std::string> names{
+const std::vector<std::string> program_names{
 #define PROGRAM(name) #name,
+#include "programs/list.def"
+};
+const std::vector<std::string> gradient_names{
+#define GRADIENT(name) #name,
 #include "programs/list.def"
 };
 
 struct Options {
   std::vector<std::string> programs;
-  bool quick = false, compile_only = false, reuse = false, reuse_halide = false;
+  bool gradients = false, quick = false, compile_only = false, reuse = false, reuse_halide = false;
   double seconds = 1;
   std::filesystem::path output = "programs.json";
 };
 
 void check_names(const std::vector<std::string>& asked) {
+  std::vector<std::string> names = program_names;
+  names.insert(names.end(), gradient_names.begin(), gradient_names.end());
   std::string known;
   for (const std::string& name : names) known += (known.empty() ? "" : ", ") + name;
   for (const std::string& name : asked) {
@@ -41,6 +47,8 @@ void check_names(const std::vector<std::string>& asked) {
 
 void add_options(CLI::App& app, Options& options) {
   app.add_option("--program", options.programs, "run this program; may be given several times");
+  app.add_flag("--gradients", options.gradients,
+               "gradients instead, Halide's scheduled by Li2018, ours as they come");
   app.add_flag("--quick", options.quick, "the smallest size of each, few runs");
   app.add_flag("--compile-only", options.compile_only,
                "make the libraries, for a run with --reuse");
@@ -66,7 +74,8 @@ bool read(int argc, char** argv, Options& options) {
                            error.what(), "Run with --help for the options");
   }
   check_names(options.programs);
-  if (options.programs.empty()) options.programs = names;
+  if (options.programs.empty())
+    options.programs = options.gradients ? gradient_names : program_names;
   return true;
 }
 

@@ -87,6 +87,11 @@ double Pair::run() {
   return retrograde_ms_.back();
 }
 
+void Pair::check_slopes(PairResult& result, const std::filesystem::path& primal) {
+  result.retrograde_slope_error = retrograde_.slope_error(primal);
+  result.halide_slope_error = halide_.slope_error(primal);
+}
+
 PairResult Pair::result(const std::filesystem::path& scratch) {
   PairResult result;
   result.kernel = job_.kernel;

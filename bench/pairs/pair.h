@@ -48,6 +48,8 @@ class Pair {
   // One run of each, the one that goes first changing from time to time. Milliseconds of ours.
   double run();
   PairResult result(const std::filesystem::path& scratch);
+  // Of gradients that have run: how far each is from differences of the program in a library.
+  void check_slopes(PairResult& result, const std::filesystem::path& primal);
 
  private:
   void warm_up();

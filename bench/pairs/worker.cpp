@@ -107,7 +107,10 @@ std::vector<Values> Worker::outputs(const std::filesystem::path& scratch) {
   return values;
 }
 
-double Worker::slope_error() { return ask("slope", "slope").at(0); }
+double Worker::slope_error(const std::filesystem::path& library) {
+  const std::string order = library.empty() ? "slope" : "slope " + library.string();
+  return ask(order, "slope").at(0);
+}
 
 Worker::Memory Worker::memory() {
   const std::vector<double> numbers = ask("memory", "memory");

@@ -47,8 +47,9 @@ class Worker {
   double run();  // seconds
   // By way of a file in `scratch`.
   std::vector<Values> outputs(const std::filesystem::path& scratch);
-  // Of a gradient: how far it is from differences of its own program (../gradients/slope.h).
-  double slope_error();
+  // Of a gradient: how far it is from differences of its own program (../gradients/slope.h), or of
+  // one in a library.
+  double slope_error(const std::filesystem::path& library = {});
   struct Memory {
     double peak_mb, run_mb;
   };

@@ -4,7 +4,9 @@
 //   worker  ready COMPILE_SECONDS START_SECONDS BYTES OPERATIONS    or   failed MESSAGE
 //   driver  run           worker  ran SECONDS                       or   failed MESSAGE
 //   driver  save PATH     worker  saved            the outputs, as OutputHeader and elements, each
-//   driver  slope         worker  slope ERROR      of a gradient that has run, see slope.h
+//   driver  slope [PATH]  worker  slope ERROR      of a gradient that has run, see slope.h; PATH is
+//   the
+//                                                  library of its program, if that is another
 //   driver  memory        worker  memory PEAK_MB RUN_MB
 //
 // START_SECONDS: compiling and running a first, trivial pipeline, which makes each compiler set up

@@ -1,8 +1,10 @@
 // builder_main.cpp -- compiles one program ahead of time. Built twice from the same text, with
 // Halide 14 and with Retrograde, together with all programs.
 //
-//   builder NAME FOLDER    writes FOLDER/NAME.o and NAME.cases, and prints "compiled SECONDS
-//   PEAK_MB" builder -r FOLDER      writes FOLDER/runtime.o, the compiler's own runtime
+//   builder NAME FOLDER [PARAM=VALUE...]
+//       writes FOLDER/NAME.o and NAME.cases, and prints "compiled SECONDS PEAK_MB"
+//   builder -r FOLDER
+//       writes FOLDER/runtime.o, the compiler's own runtime
 //
 // SECONDS: from the command line of a generator to its object file, after a trivial generator has
 // made the compiler set up what it needs once in a process. A failure is said on standard error.
@@ -13,6 +15,7 @@
 #include <exception>
 #include <iostream>
 #include <stdexcept>
+#include <thread>
 
 #ifdef BENCH_RETROGRADE
 #include "generator/command_line.h"
@@ -62,8 +65,18 @@ const programs::Registered& find(const std::string& name) {
   throw std::runtime_error("there is no program \"" + name + "\"");
 }
 
-void build(const std::string& name, const std::string& folder) {
-  const programs::Registered& program = find(name);
+void build(const std::string& name, const std::string& folder,
+           const std::vector<std::string>& more) {
+  programs::Registered program = find(name);
+  program.params.insert(program.params.end(), more.begin(), more.end());
+#ifndef BENCH_RETROGRADE
+  if (program.program.gradients > 0) {
+    const std::string threads = std::to_string(std::thread::hardware_concurrency());
+    program.params.insert(program.params.begin(),
+                          {"-p", BENCH_LI2018, "-s", "Li2018", "auto_schedule=true",
+                           "machine_params=" + threads + ",16777216,40"});
+  }
+#endif
   programs::write_cases(folder + "/" + name + ".cases", program.program);
   generate("trivial", folder, {});
   const auto start = std::chrono::steady_clock::now();
@@ -84,15 +97,15 @@ std::vector<programs::Registered>& programs::registered() {
 }
 
 int main(int argc, char** argv) {
-  if (argc != 3) {
-    std::fprintf(stderr, "usage: %s NAME|-r FOLDER\n", argv[0]);
+  if (argc < 3) {
+    std::fprintf(stderr, "usage: %s NAME|-r FOLDER [PARAM=VALUE...]\n", argv[0]);
     return 2;
   }
   try {
     if (argv[1] == std::string("-r"))
       run_command({"-r", "runtime", "-o", argv[2], "-e", "object", "target=" + target()});
     else
-      build(argv[1], argv[2]);
+      build(argv[1], argv[2], {argv + 3, argv + argc});
     return 0;
   } catch (const std::exception& error) {
     std::fprintf(stderr, "%s\n", error.what());

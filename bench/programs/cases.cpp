@@ -81,6 +81,7 @@ void write_cases(const std::filesystem::path& path, const Program& program) {
   std::ofstream file(path);
   file.precision(17);
   file << "program " << program.name << " " << program.tolerance << "\n";
+  file << "gradients " << program.gradients << "\n";
   for (const Case& c : program.cases) {
     file << "case " << c.label << " " << c.threads << "\n";
     for (const Argument& argument : c.arguments) write_argument(file, argument);
@@ -98,6 +99,8 @@ Program read_cases(const std::filesystem::path& path) {
     words >> first;
     if (first == "program") {
       words >> program.name >> program.tolerance;
+    } else if (first == "gradients") {
+      words >> program.gradients;
     } else if (first == "case") {
       Case& c = program.cases.emplace_back();
       words >> c.label >> c.threads;

@@ -2,6 +2,8 @@
 // sizes, as a text that the programs' builders write and their workers read:
 //
 //   program NAME TOLERANCE
+//   gradients COUNT                                     of so many inputs, the first ones; their
+//                                                         outputs follow a scalar one, the sum
 //   case LABEL THREADS                                  threads: 0 means all
 //   in   TYPE LAYOUT FILL LOW HIGH MIN:EXTENT...        an array; LAYOUT planar or interleaved,
 //   out  TYPE LAYOUT MIN:EXTENT...                        FILL picture or noise
@@ -44,6 +46,7 @@ struct Case {
 
 struct Program {
   std::string name;
+  int gradients = 0;     // of so many inputs; none: not a gradient
   double tolerance = 0;  // largest relative error; 0: none for integers, 1e-4 otherwise
   std::vector<Case> cases;
 };

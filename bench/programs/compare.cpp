@@ -43,7 +43,11 @@ Result compare(const std::string& name, const Toolchains& toolchains, const Limi
       bench::Pair pair(job, {worker, {ours.path, ours.cases, std::to_string(i)}},
                        {worker, {theirs.path, ours.cases, std::to_string(i)}});
       run_rounds(pair, limits);
-      result.cases.push_back(pair.result(scratch));
+      bench::PairResult measured = pair.result(scratch);
+      if (program.gradients > 0)
+        pair.check_slopes(measured,
+                          toolchains.halide.build_primal(name, toolchains.reuse_halide).path);
+      result.cases.push_back(measured);
       result.labels.push_back(c.label);
       say(case_row(result, i));
     }

@@ -46,11 +46,11 @@ Library Toolchain::read(const std::string& name) const {
   return library;
 }
 
-void Toolchain::link(const std::string& name) const {
+void Toolchain::link(const std::string& name, const std::filesystem::path& runtime) const {
   std::vector<std::string> command = {BENCH_CXX, "-shared", "-o", file(name, ".so"),
                                       file(name, ".o")};
   if (side_ == bench::Side::Halide)
-    command.push_back(file("runtime", ".o"));
+    command.push_back(runtime);
   else
     command.insert(command.end(), {BENCH_RETROGRADE_RUNTIME, "-lsleef"});
   command.insert(command.end(), {"-lpthread", "-ldl", "-lm"});
@@ -61,8 +61,18 @@ Library Toolchain::build(const std::string& name, bool reuse) const {
   if (reuse && std::filesystem::exists(file(name, ".so"))) return read(name);
   std::filesystem::remove(file(name, ".so"));
   apps::write_file(file(name, ".log"), output_of({builder_, name, folder_}));
-  link(name);
+  link(name, file("runtime", ".o"));
   return read(name);
+}
+
+Library Toolchain::build_primal(const std::string& name, bool reuse) const {
+  Toolchain primal = *this;
+  primal.folder_ /= "primal";
+  apps::require_writable_folder(primal.folder_);
+  if (reuse && std::filesystem::exists(primal.file(name, ".so"))) return primal.read(name);
+  output_of({builder_, name, primal.folder_, "primal=true"});
+  primal.link(name, file("runtime", ".o"));
+  return primal.read(name);
 }
 
 }  // namespace programs

@@ -28,10 +28,12 @@ class Toolchain {
 
   // With `reuse`, what an earlier run has left, where there is something. Throws BuildError.
   Library build(const std::string& name, bool reuse) const;
+  // Of gradients: what they are of, by the same function.
+  Library build_primal(const std::string& name, bool reuse) const;
 
  private:
   Library read(const std::string& name) const;
-  void link(const std::string& name) const;
+  void link(const std::string& name, const std::filesystem::path& runtime) const;
   std::filesystem::path file(const std::string& name, const std::string& extension) const {
     return folder_ / (name + extension);
   }

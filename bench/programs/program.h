@@ -26,6 +26,11 @@ struct Registered {
     program.tolerance = most;
     return *this;
   }
+  // The first inputs' gradients, each with an output, after the sum's.
+  Registered& gradients(int count) {
+    program.gradients = count;
+    return *this;
+  }
   Registered& with(const std::string& param) {
     params.push_back(param);
     return *this;

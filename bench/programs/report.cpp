@@ -28,28 +28,35 @@ double geometric_mean(const std::vector<T>& all, F value) {
   return all.empty() ? 1 : std::exp(sum / static_cast<double>(all.size()));
 }
 
+// Gradients are right when differences say so; else both sides must agree.
 bool differs(const Result& result, const bench::PairResult& r) {
+  if (r.retrograde_slope_error) return !(*r.retrograde_slope_error <= bench::wrong_slope);
   const double most = result.tolerance > 0 ? result.tolerance : bench::tolerance(r);
   return !(r.max_relative_error <= most);
 }
 
 nlohmann::json entry(const Result& result, size_t which) {
   const bench::PairResult& r = result.cases[which];
-  return {{"size", result.labels[which]},
-          {"threads", r.threads},
-          {"retrograde_ms", r.retrograde.median},
-          {"halide_ms", r.halide.median},
-          {"run_ratio", ratio_of(r)},
-          {"retrograde_min_ms", r.retrograde.least},
-          {"halide_min_ms", r.halide.least},
-          {"min_ratio", r.retrograde.least / r.halide.least},
-          {"retrograde_spread_ms", r.retrograde.spread},
-          {"halide_spread_ms", r.halide.spread},
-          {"retrograde_run_mb", r.retrograde_memory.run_mb},
-          {"halide_run_mb", r.halide_memory.run_mb},
-          {"max_relative_error", r.max_relative_error},
-          {"differs", differs(result, r)},
-          {"bytes", r.bytes}};
+  nlohmann::json e{{"size", result.labels[which]},
+                   {"threads", r.threads},
+                   {"retrograde_ms", r.retrograde.median},
+                   {"halide_ms", r.halide.median},
+                   {"run_ratio", ratio_of(r)},
+                   {"retrograde_min_ms", r.retrograde.least},
+                   {"halide_min_ms", r.halide.least},
+                   {"min_ratio", r.retrograde.least / r.halide.least},
+                   {"retrograde_spread_ms", r.retrograde.spread},
+                   {"halide_spread_ms", r.halide.spread},
+                   {"retrograde_run_mb", r.retrograde_memory.run_mb},
+                   {"halide_run_mb", r.halide_memory.run_mb},
+                   {"max_relative_error", r.max_relative_error},
+                   {"differs", differs(result, r)},
+                   {"bytes", r.bytes}};
+  if (r.retrograde_slope_error) {
+    e["retrograde_slope_error"] = *r.retrograde_slope_error;
+    e["halide_slope_error"] = *r.halide_slope_error;
+  }
+  return e;
 }
 
 nlohmann::json entry(const Result& result) {
@@ -96,10 +103,15 @@ std::string table_head() {
 
 std::string case_row(const Result& result, size_t which) {
   const bench::PairResult& r = result.cases[which];
-  return formatted("%-24s %-7s %2d %12.4f %12.4f %7.3f %8.3f %10.1e%s\n", result.name.c_str(),
+  std::string remark = differs(result, r) ? "  DIFFERS" : "";
+  if (r.retrograde_slope_error)
+    remark += formatted("  from differences: ours by %.1e, Halide's by %.1e; %.0f / %.0f MB",
+                        *r.retrograde_slope_error, *r.halide_slope_error,
+                        r.retrograde_memory.run_mb, r.halide_memory.run_mb);
+  return formatted("%-24s %-7s %2d %12.4f %12.4f %7.3f %8.3f %10.1e", result.name.c_str(),
                    result.labels[which].c_str(), r.threads, r.retrograde.median, r.halide.median,
-                   ratio_of(r), r.retrograde.least / r.halide.least, r.max_relative_error,
-                   differs(result, r) ? "  DIFFERS" : "");
+                   ratio_of(r), r.retrograde.least / r.halide.least, r.max_relative_error) +
+         remark + "\n";
 }
 
 std::string program_row(const Result& result) {

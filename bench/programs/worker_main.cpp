@@ -11,6 +11,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <cstdio>
 #include <cstring>
 #include <exception>
@@ -56,6 +57,7 @@ class Value {
   size_t size_bytes() const { return count_ * argument_.type.bits / 8; }
   const Argument& argument() const { return argument_; }
   const char* data() const { return bytes_.get(); }
+  float* floats() { return reinterpret_cast<float*>(bytes_.get()); }
 
  private:
   struct Free {
@@ -140,6 +142,8 @@ class Value {
   std::unique_ptr<char[], Free> bytes_;
 };
 
+using Function = int (*)(void**);
+
 class Worker {
  public:
   Worker(const std::string& library, const std::string& cases, int index) {
@@ -148,7 +152,9 @@ class Worker {
     for (size_t i = 0; i < c.arguments.size(); i++)
       values_.push_back(std::make_unique<Value>(c.arguments[i], static_cast<uint32_t>(i)));
     for (auto& each : values_) arguments_.push_back(each->address());
-    load(library, program.name);
+    name_ = program.name;
+    gradient_count_ = program.gradients;
+    function_ = loaded(library, name_);
     std::cout << "ready 0 0 " << bytes() << " 0" << std::endl;
     compile_peak_mb_ = bench::status_mb("VmHWM");
     bench::forget_peak();
@@ -177,6 +183,34 @@ class Worker {
     std::cout << "saved" << std::endl;
   }
 
+  // See ../gradients/slope.h; the sum is the first output of the program in `library`.
+  void tell_slope(const std::string& library) {
+    const Function primal = loaded(library, name_);
+    std::vector<Value*> inputs, gradients;
+    for (auto& value : values_) {
+      if (value->is_output())
+        gradients.push_back(value.get());
+      else if (inputs.size() < static_cast<size_t>(gradient_count_))
+        inputs.push_back(value.get());
+    }
+    gradients.erase(gradients.begin());
+    std::vector<std::unique_ptr<Value>> scratch;
+    std::vector<void*> arguments = arguments_;
+    for (size_t i = 0; i < values_.size(); i++) {
+      if (!values_[i]->is_output()) continue;
+      scratch.push_back(std::make_unique<Value>(values_[i]->argument(), 0));
+      arguments[i] = scratch.back()->address();
+    }
+    const auto sum = [&] {
+      if (primal(arguments.data()) != 0) throw std::runtime_error("the primal returned an error");
+      return *reinterpret_cast<const double*>(scratch[0]->data());
+    };
+    double worst = 0;
+    for (uint32_t direction = 0; direction < 3; direction++)
+      worst = std::max(worst, slope_error(inputs, gradients, direction, sum));
+    std::cout << "slope " << worst << std::endl;
+  }
+
   void tell_memory() const {
     const double run_peak = bench::status_mb("VmHWM");
     std::cout << "memory " << std::max(compile_peak_mb_, run_peak) << " "
@@ -184,13 +218,42 @@ class Worker {
   }
 
  private:
-  using Function = int (*)(void**);
-
-  void load(const std::string& library, const std::string& name) {
+  static Function loaded(const std::string& library, const std::string& name) {
     void* handle = dlopen(library.c_str(), RTLD_NOW | RTLD_LOCAL);
     if (!handle) throw std::runtime_error(dlerror());
-    function_ = reinterpret_cast<Function>(dlsym(handle, (name + "_argv").c_str()));
-    if (!function_) throw std::runtime_error("\"" + name + "_argv\" is not in its library");
+    void* function = dlsym(handle, (name + "_argv").c_str());
+    if (!function) throw std::runtime_error("\"" + name + "_argv\" is not in its library");
+    return reinterpret_cast<Function>(function);
+  }
+
+  // Along one direction of signs: the gradients' product with it against a central difference.
+  template <typename Sum>
+  static double slope_error(const std::vector<Value*>& inputs, const std::vector<Value*>& gradients,
+                            uint32_t direction, const Sum& sum) {
+    constexpr float step = 1.0f / 8192;
+    const auto sign = [&](size_t input, int64_t element) {
+      const auto n = static_cast<uint32_t>(element * 8 + static_cast<int64_t>(input));
+      return kernels::scrambled(kernels::scrambled(n) + direction) & 1 ? 1.0f : -1.0f;
+    };
+    double product = 0, squares = 0;
+    for (size_t i = 0; i < inputs.size(); i++) {
+      const float* g = gradients[i]->floats();
+      for (int64_t k = 0; k < gradients[i]->count(); k++) {
+        product += static_cast<double>(g[k]) * sign(i, k);
+        squares += static_cast<double>(g[k]) * g[k];
+      }
+    }
+    const auto move = [&](float by) {
+      for (size_t i = 0; i < inputs.size(); i++) {
+        for (int64_t k = 0; k < inputs[i]->count(); k++) inputs[i]->floats()[k] += by * sign(i, k);
+      }
+    };
+    move(step);
+    const double up = sum();
+    move(-2 * step);
+    const double slope = (up - sum()) / (2 * step);
+    move(step);
+    return std::abs(product - slope) / std::sqrt(squares);
   }
 
   // Seconds of so many calls.
@@ -212,6 +275,8 @@ class Worker {
 
   std::vector<std::unique_ptr<Value>> values_;
   std::vector<void*> arguments_;
+  std::string name_;
+  int gradient_count_ = 0;
   Function function_ = nullptr;
   int calls_ = 0;
   double compile_peak_mb_ = 0, resident_mb_ = 0;
@@ -224,6 +289,7 @@ void serve(Worker& worker) {
     words >> order >> path;
     if (order == "run") worker.run();
     if (order == "save") worker.save(path);
+    if (order == "slope") worker.tell_slope(path);
     if (order == "memory") worker.tell_memory();
   }
 }
