@@ -87,7 +87,7 @@ std::string page_text(const Module& module, const std::string& assembly) {
     for (const Internal::LoweredFunc& function : aot::exported_functions(module)) {
       std::ostringstream statement;
       statement << function.lowered.body;
-      functions.push_back({function.name, function.loop_nest, statement.str()});
+      functions.push_back({function.name, function.lowered.loop_nest(), statement.str()});
     }
   });
   return aot::html_page(module.name() + " for " + module.target().to_string(), functions, assembly);
@@ -262,10 +262,6 @@ class AheadOfTime : public ModuleCompiler {
     options.target = pipeline.traced(target);
     options.validate = validate_passes;
     return ir::lower(pipeline.name, pipeline.outputs, inputs, options);
-  }
-
-  std::string loop_nest(const PipelineSpec& pipeline) override {
-    return ir::loop_nest_text(pipeline.outputs);
   }
 
   std::vector<uint8_t> object(const Module& module) override {

@@ -164,7 +164,6 @@ Module Pipeline::compile_to_module(const std::vector<Argument>& args,
   function.name = name;
   function.linkage = linkage;
   function.lowered = module_compiler().lower({name, pipeline.outputs}, inputs.inputs, target);
-  function.loop_nest = module_compiler().loop_nest(pipeline);
   if (target.has_feature(Target::UserContext)) function.args.push_back(user_context_argument());
   function.args.insert(function.args.end(), args.begin(), args.end());
   for (const ir::LoweredArgument& argument : function.lowered.args) {

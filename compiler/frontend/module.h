@@ -67,7 +67,6 @@ struct LoweredFunc {
   LinkageType linkage = LinkageType::ExternalPlusMetadata;
   // Buffers among its arguments that `args` does not name are embedded in the code.
   ir::LoweredFunction lowered;
-  std::string loop_nest;  // the schedule as text, for the HTML page
 };
 
 }  // namespace Internal

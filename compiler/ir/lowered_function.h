@@ -1,6 +1,7 @@
 // What lowering hands to code generation: one function with a flat body.
 #pragma once
 
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -32,6 +33,9 @@ struct LoweredFunction {
   std::string name;
   std::vector<LoweredArgument> args;
   Stmt body;
+  // The loops of the schedule as text, as it was when the function was lowered. Made when asked
+  // for: the regions of a deep nest take longer to write than to compile.
+  std::function<std::string()> loop_nest;
 };
 
 }  // namespace retrograde::ir

@@ -1,4 +1,5 @@
-// The loop nest of a pipeline as a user schedules it: one line a loop, producers marked.
+#include "lower/loop_nest_text.h"
+
 #include <algorithm>
 #include <sstream>
 #include <unordered_map>
@@ -92,12 +93,22 @@ bool is_over_parameters(const Expr& condition) {
   return any && result;
 }
 
+// Of an expression whose shared parts count once; `most` when there are that many or more.
+size_t distinct_nodes(const Expr& e, size_t most) {
+  size_t count = 0;
+  walk(e, [&](const Expr&) { return ++count < most; });
+  return std::min(count, most);
+}
+
 class LoopNestPrinter {
  public:
   explicit LoopNestPrinter(const Program& program) : program_(program), names_(program) {}
-  // What a name of the nest stands for.
+  // What a name of the nest stands for. Bounds that say how one grows out of the last, as those of
+  // a pyramid do, become large when they are put into each other, and no constant comes of them:
+  // such names stay names.
   void bind(const std::string& name, const Expr& value) {
-    values_[name] = simplify(substitute(value, values_));
+    const Expr known = value_of(value);
+    if (distinct_nodes(known, most_nodes) < most_nodes) values_[name] = known;
   }
   std::string print(const Stmt& s) {
     visit(s);
@@ -105,6 +116,9 @@ class LoopNestPrinter {
   }
 
  private:
+  static constexpr size_t most_nodes = 64;
+  Expr value_of(const Expr& e) const { return simplify(substitute(e, values_)); }
+
   const Program& program_;
   const LoopNames names_;
   Substitution values_;  // of the lets around
@@ -156,9 +170,7 @@ class LoopNestPrinter {
   }
   // A loop of one iteration is none.
   void visit_loop(const For& loop) {
-    const auto constant = [&](const Expr& e) {
-      return as_const_int(simplify(substitute(e, values_)));
-    };
+    const auto constant = [&](const Expr& e) { return as_const_int(value_of(e)); };
     const auto min = constant(loop.min), extent = constant(loop.extent);
     if (extent && *extent == 1) {
       bind(loop.name, loop.min);
@@ -196,16 +208,21 @@ class LoopNestPrinter {
 
 }  // namespace
 
-std::string loop_nest_text(const std::vector<FuncPtr>& outputs) {
+std::string loop_nest_text(const Program& program) {
   std::string result;
   run_on_large_stack([&] {
-    const Program program = inline_functions(outputs);
     const LoopNests nests = build_loop_nests(program, {.slide = true});
     LoopNestPrinter printer(program);
     for (const auto& [name, value] : nests.bounds) printer.bind(name, value);
     result = printer.print(nests.body);
   });
   return result;
+}
+
+std::string loop_nest_text(const std::vector<FuncPtr>& outputs) {
+  Program program;
+  run_on_large_stack([&] { program = inline_functions(outputs); });
+  return loop_nest_text(program);
 }
 
 }  // namespace retrograde::ir

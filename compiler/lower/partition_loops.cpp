@@ -9,6 +9,9 @@
 //
 // with  let begin = clamp(1, 0, w), let end = w,  and an epilogue where there is an upper limit. A
 // parallel loop, and one whose borders are as large as tiles, stays one loop, with an if inside.
+// Where the order of iterations is free, as in a pure definition that nothing slides in, both
+// borders of a large body are one loop before the steady state: what LLVM compiles of it is mostly
+// borders.
 //
 // What likely says:  likely(c)                     c is true
 //                    min(likely(a), b), max        the marked operand is the result
@@ -34,6 +37,9 @@
 // Tests: test/golden/lower/partition_loops/, test/property/loop_passes_test.cpp.
 #include "lower/partition_loops.h"
 
+#include <string>
+#include <unordered_set>
+
 #include "ir/build.h"
 #include "ir/visit.h"
 #include "lower/copy_statement.h"
@@ -46,6 +52,8 @@ namespace {
 
 // Border bodies with more nodes than this are not partitioned further.
 constexpr int small_body = 1500;
+// Both borders of bodies with more nodes than this are one loop, where the order allows it.
+constexpr int costly_border = 200;
 // An operation less an iteration is worth a copy of a body that has up to this many nodes.
 constexpr int nodes_an_operation = 64;
 
@@ -67,6 +75,34 @@ int node_count(const Stmt& s) {
   walk(
       s, [&](const Expr& e) { return visit(e); }, [&](const Stmt& child) { return visit(child); });
   return count;
+}
+
+// "f" of the loop "f.s0.x" of its pure definition; else nothing.
+std::string func_of_pure_loop(const std::string& loop) {
+  const size_t stage = loop.find(".s0.");
+  return stage == std::string::npos ? "" : loop.substr(0, stage);
+}
+
+// Whether the loop is one of a pure definition, each of whose points is written once, and nothing
+// in it stores anywhere else for later iterations to find.
+bool runs_in_any_order(const For& loop) {
+  const std::string func = func_of_pure_loop(loop.name);
+  if (func.empty()) return false;
+  std::unordered_set<std::string> own;
+  bool result = true;
+  const auto is_of_func = [&](const std::string& name) {
+    return name == func || name.compare(0, func.size() + 1, func + ".") == 0;
+  };
+  walk(
+      loop.body, [](const Expr&) { return true; },
+      [&](const Stmt& s) {
+        if (const auto* a = s.as<Allocate>()) own.insert(a->name);
+        if (const auto* store = s.as<Store>())
+          result &= is_of_func(store->name) || own.contains(store->name);
+        result &= !s.as<Evaluate>() && !s.as<Provide>();
+        return result;
+      });
+  return result;
 }
 
 class Partitioner : public Rewriter {
@@ -171,18 +207,37 @@ class Partitioner : public Rewriter {
     if (has_epilogue) end = variable(end_name, loop.min.type());
 
     std::vector<Stmt> loops;
+    if (has_prologue && has_epilogue && node_count(rest) > costly_border &&
+        runs_in_any_order(loop)) {
+      loops.push_back(both_borders(loop, begin, end, loop_end, rest));
+      has_prologue = has_epilogue = false;
+    }
     if (has_prologue) loops.push_back(border_loop(loop, loop.min, begin, rest));
     loops.push_back(make_for(loop.name, begin, simplify(end - begin), loop.for_type, steady_body));
     if (has_epilogue) loops.push_back(border_loop(loop, end, loop_end, rest));
     Stmt result = make_block(std::move(loops));
-    if (has_epilogue) result = make_let(end_name, end_value, result);
-    if (!has_prologue) return result;
+    if (end.as<Variable>() && uses_variable(result, end_name))
+      result = make_let(end_name, end_value, result);
+    if (!ends.begin.defined()) return result;
     return make_let(begin_name, simplify(max(min(ends.begin, loop_end), loop.min)), result);
   }
 
   Stmt border_loop(const For& loop, const Expr& begin, const Expr& end, const Stmt& body) {
     return copy_statement(make_for(loop.name, begin, simplify(end - begin), loop.for_type, body),
                           fresh_);
+  }
+
+  // border 0, 1, ... of [loop.min, begin) and then of [end, loop_end)
+  Stmt both_borders(const For& loop, const Expr& begin, const Expr& end, const Expr& loop_end,
+                    const Stmt& body) {
+    const Type type = loop.min.type();
+    const Expr before = simplify(begin - loop.min);
+    const Expr border = variable(loop.name + ".border", type);
+    const Expr place = make_select(border < before, border + loop.min, border + (end - before));
+    return copy_statement(
+        make_for(loop.name + ".border", make_zero(type), simplify(before + (loop_end - end)),
+                 loop.for_type, make_let(loop.name, simplify(place), body)),
+        fresh_);
   }
 
   FreshNames fresh_;

@@ -22,11 +22,13 @@
 #include "lower/inline_functions.h"
 #include "lower/insert_prefetches.h"
 #include "lower/interleave_vectors.h"
+#include "lower/loop_nest_text.h"
 #include "lower/lower.h"
 #include "lower/lower_atomics.h"
 #include "lower/make_names_unique.h"
 #include "lower/memoize.h"
 #include "lower/partition_loops.h"
+#include "lower/share_parameters.h"
 #include "lower/transpose_loads.h"
 #include "lower/trim_loops.h"
 #include "lower/unroll_loops.h"
@@ -74,7 +76,9 @@ StorageLayouts storage_layouts(const Lowering& lowering) {
 
 Stmt nest_loops(Lowering& lowering, const Stmt&) {
   lowering.program = inline_functions(lowering.outputs);
+  const auto shared = share_parameters(lowering.program);
   LoopNests nests = build_loop_nests(lowering.program);
+  nests.bounds.insert(nests.bounds.begin(), shared.begin(), shared.end());
   lowering.folds = nests.folds;
   lowering.async_room = nests.async_room;
   inject_tracing(nests, lowering.program, lowering.name, lowering.options.target);
@@ -219,11 +223,14 @@ Stmt run_passes(Lowering& lowering, const LowerOptions& options) {
 
 LoweredFunction lower(const std::string& name, const std::vector<FuncPtr>& outputs,
                       const std::vector<LoweredArgument>& inputs, const LowerOptions& options) {
-  LoweredFunction function{name, inputs, {}};
+  LoweredFunction function{name, inputs, {}, {}};
   run_on_large_stack([&] {
     append_outputs(outputs, function.args);
     Lowering lowering{outputs, function.args, {}, {}, {}, {}, name, options};
     function.body = run_passes(lowering, options);
+    function.loop_nest = [program = std::move(lowering.program)] {
+      return loop_nest_text(program);
+    };
   });
   return function;
 }
