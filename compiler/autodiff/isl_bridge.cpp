@@ -204,7 +204,24 @@ std::optional<isl::pw_aff> IslBridge::affine(const Expr& e) {
       [&](const ExprNode&) { return obstacle(e); });
 }
 
+namespace {
+
+// Nodes of the tree, shared parts counted each time, up to `most`.
+int tree_size(const Expr& e, int most) {
+  int size = 1;
+  for_each_child(e, [&](const Expr& child) {
+    if (size < most) size += tree_size(child, most - size);
+  });
+  return size;
+}
+// From here on a bound has pieces as a rule, or floors in floors, as those of a pyramid's levels:
+// what isl would find out about it is not worth the time.
+constexpr int large_bound = 40;
+
+}  // namespace
+
 isl::pw_aff IslBridge::bound(const Expr& e) {
+  if (tree_size(e, large_bound) >= large_bound && !mentions_dim(e)) return parameter(e);
   auto result = affine(e);
   if (result && isl_pw_aff_n_piece(result->get()) == 1) return *result;
   return parameter(e);
