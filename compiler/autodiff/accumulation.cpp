@@ -29,6 +29,9 @@ constexpr int least_parts = 4;
 constexpr int lane_count = 16;
 // Elements of one part of a scatter, lanes included, that stay in a near cache.
 constexpr double near_elements = 1 << 14;
+// Bytes that all parts of one adjoint may take: what a large target has no room for is accumulated
+// in place, in parallel over its pure dimensions only.
+constexpr double private_bytes = 64 << 20;
 // Below so many elements, with so many iterations each, the pure dimensions alone do not fill a
 // machine.
 constexpr double few_elements = 64, many_iterations = 4096, unknown_elements = 1e9;
@@ -262,7 +265,8 @@ class Builder {
            iterations_of(g, many_iterations) >= many_iterations;
   }
   // Each part of a scatter holds every element that it may reach: the more elements for the
-  // iterations, the fewer parts. A power of two. One: there are only lanes.
+  // iterations, the fewer parts. A power of two. One: there are only lanes. Where sizes are known
+  // at run time only, the most there may be.
   int parts_of(const Gather& g) const {
     if (!g.scatters && elements_of(g) > few_elements) return 1;
     if (!g.scatters || target_.region.size() != g.pure.size()) return part_count;
@@ -271,8 +275,27 @@ class Builder {
     const double most = iterations_of(g, many_iterations) * elements_of(g) * elements_an_iteration /
                         std::max(elements, 1.0);
     int parts = part_count;
-    while (parts > most && parts > 1) parts /= 2;
+    while ((parts > most || parts * elements * bytes_an_element() > private_bytes) && parts > 1)
+      parts /= 2;
     return parts;
+  }
+  double bytes_an_element() const {
+    double bytes = 0;
+    for (Type t : types_) bytes += t.bytes();
+    return bytes;
+  }
+  // `parts_of`, or as many of them as fit at run time.
+  Expr part_count_of(const Gather& g) const {
+    const Expr most = make_const(Int(32), parts_of(g));
+    if (!g.scatters || target_.region.size() != g.pure.size() ||
+        elements_of_target() < unknown_elements)
+      return most;
+    Expr fit = make_const(Int(64), static_cast<int64_t>(private_bytes / bytes_an_element()));
+    for (const LoopVariable& v : target_.region) {
+      if (!v.min.defined() || !v.max.defined()) return most;
+      fit = fit / max(cast_to(Int(64), v.max - v.min + 1), make_one(Int(64)));
+    }
+    return simplify(cast_to(Int(32), min(max(fit, make_one(Int(64))), cast_to(Int(64), most))));
   }
   // Lanes let a gather add in vectors. In a scatter, neighbouring iterations often meet in one
   // element, and would wait for each other: lanes have elements of their own where these are few.
@@ -325,7 +348,7 @@ class Builder {
   // no lanes, without `part` no parts. Beyond the end the place is clamped: what it reads must
   // exist even where the condition is false. Both are cut off the steady state, whose accumulators
   // stay in registers.
-  static Slice slice_of(const Gather& g, const Expr& lane, const Expr& part, int parts) {
+  static Slice slice_of(const Gather& g, const Expr& lane, const Expr& part, const Expr& parts) {
     Slice slice;
     slice.rvars = rvars_of(g);
     auto rdom = std::make_shared<ReductionDomainContents>();
@@ -366,7 +389,9 @@ class Builder {
     define_pure(parts, parts_point(g, args_, lane, part), zeros);
     if (lane.defined()) static_cast<AdjointContents&>(*parts).lanes = lane_count;
 
-    Slice slice = slice_of(g, lane, part, parts_of(g));
+    const Expr count = part_count_of(g);
+    static_cast<AdjointContents&>(*parts).has_parts = part.defined();
+    Slice slice = slice_of(g, lane, part, count);
     if (g.predicate.defined()) {
       slice.conditions.push_back(
           substitute(with_likely_parts(g.predicate, g.rdom->vars), slice.place));
@@ -382,7 +407,18 @@ class Builder {
     }
     append_update(parts, lhs, values, slice.rvars, conjunction(slice.conditions));
     result_.helpers.push_back(parts);
-    sum_parts(g, parts, lane.defined());
+    sum_parts(g, parts, lane.defined(), count);
+    note_parts(g, count);
+  }
+  void note_parts(const Gather& g, const Expr& count) {
+    const double bytes = elements_of_target() * bytes_an_element();
+    if (!g.scatters || as_const_int(count) == 1) return;
+    const std::string number = is_const(count) ? print(count) : text("at most ", parts_of(g));
+    const std::string each =
+        bytes >= unknown_elements ? "" : text(" of ", static_cast<int64_t>(bytes), " bytes each");
+    result_.notes.push_back(text("accumulated in ", number, " private parts", each,
+                                 ", as many as fit ", static_cast<int64_t>(private_bytes),
+                                 " bytes"));
   }
 
   // Coordinates of `parts`: the lane, the elements that a scatter reaches or the pure ones, the
@@ -398,19 +434,18 @@ class Builder {
     return point;
   }
 
-  void sum_parts(const Gather& g, const FuncPtr& parts, bool has_lanes) {
+  void sum_parts(const Gather& g, const FuncPtr& parts, bool has_lanes, const Expr& count) {
     auto rdom = std::make_shared<ReductionDomainContents>();
     if (has_lanes)
       rdom->vars.push_back(
           {unique_name("lane"), make_zero(Int(32)), make_const(Int(32), lane_count)});
-    const int count = parts_of(g);
-    if (count > 1)
-      rdom->vars.push_back({unique_name("part"), make_zero(Int(32)), make_const(Int(32), count)});
+    const bool has_parts = parts_of(g) > 1;
+    if (has_parts) rdom->vars.push_back({unique_name("part"), make_zero(Int(32)), count});
     rdom->frozen = true;
     auto rvar = [&](size_t i) { return variable(rdom->vars[i].var, Int(32), SymbolRef(rdom)); };
     const std::vector<Expr>& lhs = g.scatters ? args_ : g.lhs;
     std::vector<Expr> point = parts_point(g, lhs, has_lanes ? rvar(0) : Expr(),
-                                          count > 1 ? rvar(rdom->vars.size() - 1) : Expr());
+                                          has_parts ? rvar(rdom->vars.size() - 1) : Expr());
     std::vector<Expr> values;
     for (size_t k = 0; k < types_.size(); ++k) {
       values.push_back(call_value(result_.func, lhs, static_cast<int>(k)) +

@@ -11,7 +11,8 @@
 //               outermost reduction variable, and lanes of the innermost, accumulate apart in a
 //               Func of their own, and are then summed in order. Lanes alone where the elements are
 //               more, in rows shorter than a vector. A scatter has lanes where its elements are
-//               few. The result does not depend on the number of threads.
+//               few. The parts are as many as fit a budget of bytes, whatever the number of
+//               threads, on which the result does not depend. Where fewer than four fit, a scatter.
 //
 // Long sums. Adding n float32 terms one after the other may lose log2(n) bits: 12 million times 0.1
 // is wrong by a tenth. An adjoint in float32 that sums many_terms iterations or more for an element
@@ -54,6 +55,7 @@ struct AdjointFunc {
   std::vector<FuncPtr> helpers;      // private parts, then the accumulator
   FuncPtr accumulator;               // sums in double what func rounds; null: func itself
   std::vector<Accumulation> stages;  // how each stage of func accumulates; the first is Pointwise
+  std::vector<std::string> notes;    // what private parts take
 };
 
 // `initial`: values that the pure definition starts from, empty for zeros.

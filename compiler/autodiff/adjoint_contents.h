@@ -43,6 +43,7 @@ struct AdjointContents : FuncContents {
   AdjointTraits traits;
   std::vector<AdjointWork> work;  // of its last update, where a table says what iterations do
   int lanes = 0;  // of private parts: extent of the first dimension, in which lanes add apart
+  bool has_parts = false;  // of private parts: its last dimension numbers them
   FuncPtr copy() const override { return std::make_shared<AdjointContents>(*this); }
 };
 

@@ -21,6 +21,7 @@ namespace {
 constexpr int lanes = 16;
 // Operations up to which a Func that the user left alone in a schedule by hand is inlined.
 constexpr double explosion = 500;
+constexpr int64_t unknown_iterations = 8;
 
 bool is_touched(const FuncContents& f) {
   if (f.schedule.touched) return true;
@@ -52,8 +53,9 @@ class Chooser {
       // Who schedules the primal means an untouched primal Func to be inlined, unless that
       // explodes.
       bool left_inline = by_hand && !is_adjoint(f);
-      bool stored = is_worth_storing(uses_[f.get()], left_inline ? explosion : cheap);
-      if (!left_inline) stored |= is_output(f) || !f->is_pure();
+      bool stored =
+          is_worth_storing(uses_[f.get()], left_inline && f->is_pure() ? explosion : cheap);
+      stored |= left_inline ? computes_more_than_is_read(*f) : is_output(f) || !f->is_pure();
       if (stored) result_[f.get()] = stored_schedule(*f);
     }
     return std::move(result_);
@@ -73,6 +75,17 @@ class Chooser {
            (use.reads - 1) * use.operations > way_to_memory;
   }
 
+  // Whether an element takes others of the Func: an update writes where its reduction variables or
+  // data say. Inside of the loops of who reads it, all of them would be computed for each read.
+  static bool computes_more_than_is_read(const FuncContents& f) {
+    return std::any_of(f.updates.begin(), f.updates.end(), [&](const Definition& update) {
+      for (size_t d = 0; d < f.args.size(); ++d) {
+        if (!is_pure_position(f, update, d) && !is_const(update.args[d])) return true;
+      }
+      return false;
+    });
+  }
+
   void count_reads(const FuncContents& f) {
     for (int s = 0; s < f.stage_count(); ++s) {
       std::unordered_set<const ExprNode*> seen;
@@ -89,10 +102,21 @@ class Chooser {
     }
   }
 
+  // Of an element, when nothing is stored.
   double operations(const FuncContents& f) const {
+    double total = f.is_extern() ? 0 : operations(*f.pure);
+    for (const Definition& update : f.updates) {
+      double iterations = 1;
+      for (const ReductionVariable& r : update.rvars)
+        iterations *= static_cast<double>(as_const_int(r.extent).value_or(unknown_iterations));
+      total += operations(update) * iterations;
+    }
+    return total;
+  }
+  double operations(const Definition& stage) const {
     double total = 0;
     std::unordered_set<const ExprNode*> seen;
-    for (const Expr& value : f.pure->values) {
+    for (const Expr& value : stage.values) {
       walk(value, [&](const Expr& e) {
         if (!seen.insert(e.get()).second) return false;
         total += cost_of(e);
@@ -139,6 +163,10 @@ class Chooser {
     Var outermost(f->args[pure.back()]);
     bool reduces = !f->stage(s).rvars.empty();
     if (pure.size() > 1 || (reduces && pure[0] != 0)) stage.parallel(outermost);
+    // Few private parts may be left where the target is large.
+    const auto* made = dynamic_cast<const AdjointContents*>(f.get());
+    if (made && made->has_parts && pure.size() > 1 && pure[pure.size() - 2] != 0)
+      stage.parallel(Var(f->args[pure[pure.size() - 2]]));
     if (pure[0] != 0) return;
     Var innermost(f->args[0]);
     stage.vectorize(innermost, lanes, TailStrategy::GuardWithIf);

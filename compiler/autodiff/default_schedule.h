@@ -6,8 +6,10 @@
 // memory and back does. Its innermost dimension is vectorized, its outermost run in parallel; a
 // stage that reads across rows is tiled; a scatter along its reduction domain computes places and
 // terms in vectors. That goes for primal Funcs too, which both directions read. A directive of the
-// user on a Func or one of its stages switches this off for that Func. Pipelines without adjoints
-// are left as they are.
+// user on a Func or one of its stages switches this off for that Func. Where the user scheduled
+// part of the primal, its other pure Funcs stay inline unless that explodes; but a scan, and a
+// reduction that is read again and again, is stored: inside of the loops of who reads it, all of it
+// would run for each element. Pipelines without adjoints are left as they are.
 #pragma once
 
 #include <unordered_map>

@@ -54,9 +54,20 @@ ir::CheckpointBudget budget_of(const AdjointOptions& options) {
   return {options.checkpoint_states.value_or(0), options.checkpoint_bytes.value_or(0)};
 }
 
+ir::VersionRules rules_of(const AdjointOptions& options) {
+  using Keep = ir::VersionRules::Keep;
+  if (options.version_bytes < 0)
+    user_error("propagate adjoints with a budget for versions", "a budget is a number of bytes",
+               text("version_bytes is ", options.version_bytes), "Give 0 or more");
+  const Keep keep = options.overwritten == Overwritten::Auto    ? Keep::WithinBudget
+                    : options.overwritten == Overwritten::Store ? Keep::Always
+                                                                : Keep::Never;
+  return {keep, options.version_bytes};
+}
+
 ir::SynthesisOptions to_synthesis(const AdjointOptions& options) {
   ir::SynthesisOptions result;
-  result.store_overwritten = options.overwritten == Overwritten::Store;
+  result.versions = rules_of(options);
   result.only_requested = !options.wrt.empty();
   result.checkpoints = budget_of(options);
   for (const AdjointInput& input : options.wrt) result.requested.insert(input.symbol().get());
@@ -167,7 +178,7 @@ std::vector<Explanation> Derivative::explanations() const {
 
 std::vector<Explanation> Derivative::costs() const {
   GradientOperations counts = operations();
-  return ir::explain_costs(result_->output, counts.primal, counts.gradient);
+  return ir::explain_costs(result_->output, result_->gradients, counts.primal, counts.gradient);
 }
 
 GradientOperations Derivative::operations() const {

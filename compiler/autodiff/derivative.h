@@ -19,6 +19,7 @@
 
 #include "autodiff/explain.h"
 #include "autodiff/operation_count.h"
+#include "autodiff/version_budget.h"
 #include "frontend/buffer.h"
 #include "frontend/func.h"
 #include "frontend/image_param.h"
@@ -96,8 +97,14 @@ class Derivative {
 
 // What to do about an update that overwrites a value which a partial derivative needs.
 enum class Overwritten {
-  Error,  // a CompileError that names the update, the value and the rewrite
-  Store,  // keep the versions, in Funcs with one more dimension or in copies
+  // Keep the versions, in Funcs with one more dimension or in copies, where all of them together
+  // fit
+  // AdjointOptions::version_bytes; else a CompileError. Where sizes are known at run time only, a
+  // call that needs more fails. explain() says what is kept.
+  Auto,
+  Refuse,  // a CompileError that names the update, the value and the rewrite
+  Store,   // keep the versions whatever they cost
+  Error = Refuse,
 };
 
 // Something to differentiate by.
@@ -117,8 +124,9 @@ class AdjointInput {
 };
 
 struct AdjointOptions {
-  Overwritten overwritten = Overwritten::Error;
-  std::vector<AdjointInput> wrt = {};  // only these gradients are wanted; empty: all
+  Overwritten overwritten = Overwritten::Auto;
+  int64_t version_bytes = ir::default_version_bytes;  // 256 MiB; under Overwritten::Auto
+  std::vector<AdjointInput> wrt = {};                 // only these gradients are wanted; empty: all
   // A budget for loops over time: updates whose outermost reduction variable is time, run n times,
   // which overwrite values that their partials need. Instead of all n versions, a few states of the
   // Func are kept, and the steps between them are computed again: with s states the least number of
@@ -126,10 +134,10 @@ struct AdjointOptions {
   // Walther, Algorithm 799, ACM Transactions on Mathematical Software 26(1), 2000). n may be known
   // at run time only: a Param, an extent of an input. Then a table of about (r + 3) n rows of 12
   // bytes is made as the pipeline runs; a call whose n needs more than 2^24 rows fails. A Func that
-  // keeps its steps along a dimension of its own, f(x, t + 1) = g(f(x, t)), is run the same way where
-  // others read its last steps only (fold_time.h): then it has no adjoint of its own, unless it is in
-  // `wrt`. Where every step is read it keeps them, and explain() says so. Gradients
-  // are the same bits for every budget; other updates follow `overwritten`. Give one: the number of
+  // keeps its steps along a dimension of its own, f(x, t + 1) = g(f(x, t)), is run the same way
+  // where others read its last steps only (fold_time.h): then it has no adjoint of its own, unless
+  // it is in `wrt`. Where every step is read it keeps them, and explain() says so. Gradients are
+  // the same bits for every budget; other updates follow `overwritten`. Give one: the number of
   // states kept, at least 1, or the bytes that they may take, enough for one.
   std::optional<int> checkpoint_states = {};
   std::optional<int64_t> checkpoint_bytes = {};

@@ -10,8 +10,11 @@
 namespace retrograde::ir {
 
 // `primal` and `gradient`: counts of the output alone, and of the gradients alone. Funcs in the
-// order in which the gradient computes them, then what it needs nothing of, then the sums.
-std::vector<Explanation> explain_costs(const WantedFunc& output, const OperationCount& primal,
+// order in which the gradient computes them, then what it needs nothing of, then the sums; where it
+// keeps more than twice what the program does on its way, that too.
+std::vector<Explanation> explain_costs(const WantedFunc& output,
+                                       const std::vector<WantedFunc>& gradients,
+                                       const OperationCount& primal,
                                        const OperationCount& gradient);
 
 }  // namespace retrograde::ir

@@ -70,7 +70,7 @@ class Fold {
   }
 
   void keep_values(const std::vector<Expr>& needed) {
-    if (!c_.query.store_overwritten) c_.refuse_overwritten(needed.front());
+    c_.check_versions_are_kept(needed.front());
     const FuncPtr before = clone_prefix(c_.query.f, c_.query.stage);
     const FuncPtr steps = begin_steps(f_->name + "_steps", make_zero(Int(32)), before);
     int bytes = 0;
@@ -79,6 +79,9 @@ class Fold {
       kept_[read] =
           value_of(steps, at_step(now_), static_cast<size_t>(as_call_of(read, f_)->value_index));
     append_loop(steps, now_ + 1, c_.values, now_, {});
+    std::vector<Expr> extents = c_.extents();
+    extents.push_back(iteration_count(c_.definition.rvars) + 1);
+    c_.take_room(steps, extents, result_);
     for (const Expr& read : needed) result_.self_values[read] = kept_.at(read);
     result_.helpers.push_back(before);
     result_.helpers.push_back(steps);

@@ -7,7 +7,7 @@
 //
 // For a product, F holds the products before each factor and A those after it, times the seed:
 // nothing is divided by a factor that may be 0. Both are recurrences at known places, so they
-// differentiate again. F is made only if a partial needs it (Overwritten::Store). The price is
+// differentiate again. F is made only if a partial needs it (version_budget.h). The price is
 // memory for every iteration; a tape (tape.h) would also save and clear the adjoint in each.
 #pragma once
 

@@ -50,9 +50,11 @@ class Folder {
     const int stage = f->stage_count() - 1;
     const AdjointTarget target{f->name, f->args, {}, {}};
     const AdjointFunc none;
-    const UpdateQuery query{
-        f,      stage, regions_, target, none, false, false, {}, [](const Expr&) { return false; },
-        ranges_};
+    VersionBudget nothing({.keep = VersionRules::Keep::Never});
+    const UpdateQuery query{f,       stage, regions_,
+                            target,  none,  false,
+                            nothing, {},    [](const Expr&) { return false; },
+                            ranges_};
     const UpdateContext c(query);
     auto axis = find_time_axis(c, order_);
     if (!axis) return false;

@@ -110,7 +110,7 @@ class Recurrence {
       bool later = is_written_later(c_, relations_, r.relation);
       if (!later && !r.relation.overwritten) continue;
       if (wants_checkpoints(c_)) return false;
-      if (!c_.query.store_overwritten) c_.refuse_overwritten(r.call);
+      c_.check_versions_are_kept(r.call);
       Expr after = later ? call_value(prefix(c_.query.stage + 1), call->args, call->value_index)
                          : call_value(c_.query.f, call->args, call->value_index);
       Expr before = call_value(prefix(c_.query.stage), call->args, call->value_index);
@@ -122,6 +122,7 @@ class Recurrence {
               text("update ", c_.query.stage - 1, ": the value of ",
                    point_text(f_->name, call->args), " is kept in a copy"));
     }
+    for (const auto& [stages, copy] : prefixes_) c_.take_room(copy, c_.extents(), result_);
     return true;
   }
   const FuncPtr& prefix(int stages) {

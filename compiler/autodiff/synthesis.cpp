@@ -52,7 +52,8 @@ class Synthesis {
         order_(topological_order({seed.output})),
         regions_(order_, seed.region),
         ranges_(order_),
-        cancelling_(cancelling_funcs(order_)) {
+        cancelling_(cancelling_funcs(order_)),
+        versions_(options.versions) {
     find_active();
   }
 
@@ -190,8 +191,8 @@ class Synthesis {
     for (int s = f->stage_count() - 1; s >= 1; --s) {
       const int own_stages = adjoint.func->stage_count();
       UpdateAdjoint update = differentiate_update(
-          {f, s, regions_, target, adjoint, extendable, options_.store_overwritten,
-           options_.checkpoints, [&](const Expr& leaf) { return is_wanted(leaf); }, ranges_});
+          {f, s, regions_, target, adjoint, extendable, versions_, options_.checkpoints,
+           [&](const Expr& leaf) { return is_wanted(leaf); }, ranges_});
       if (adjoint.func->stage_count() > own_stages) keep_unextended(*f, s, adjoint, own_stages);
       if (update.current.func != adjoint.func)
         register_func(update.current, f->name, target.region);
@@ -526,6 +527,7 @@ class Synthesis {
   std::unordered_set<const Symbol*> zero_;     // by no path
   std::unordered_set<const Symbol*> covered_;  // inside of a custom adjoint that was used
   std::unordered_map<const Symbol*, std::vector<Contribution>> pending_;
+  VersionBudget versions_;
   ReadInversions inversions_;
   SynthesisAccount account_;
   SynthesisResult result_;

@@ -23,12 +23,13 @@
 #include "autodiff/operation_count.h"
 #include "autodiff/regions.h"
 #include "autodiff/update.h"
+#include "autodiff/version_budget.h"
 #include "frontend/function.h"
 
 namespace retrograde::ir {
 
 struct SynthesisOptions {
-  bool store_overwritten = false;
+  VersionRules versions;
   CheckpointBudget checkpoints;
   bool only_requested = false;                  // else everything that the output depends on
   std::unordered_set<const Symbol*> requested;  // Funcs and parameters

@@ -60,6 +60,8 @@ void SynthesisAccount::built(const AdjointFunc& adjoint, const std::string& prim
         text(quoted(accumulating.name), " adds up in double what ", quoted(adjoint.func->name),
              " rounds once: an element may get many terms"));
   }
+  for (const std::string& note : adjoint.notes)
+    add(Explanation::Kind::Performance, primal, text(quoted(adjoint.func->name), ": ", note));
   if (privatised > 0) {
     add(Explanation::Kind::Privatised, primal,
         "accumulated in a fixed number of parts, which are summed in order");

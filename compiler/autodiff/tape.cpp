@@ -101,7 +101,7 @@ class Tape {
 
   // f_tape runs the update again and records what it reads.
   void keep_values() {
-    if (!c_.query.store_overwritten) c_.refuse_overwritten(needed_.front());
+    c_.check_versions_are_kept(needed_.front());
     FuncPtr before = clone_prefix(c_.query.f, c_.query.stage);
     FuncPtr tape = begin_tape(f_->name + "_tape", before);
 
@@ -123,6 +123,7 @@ class Tape {
     }
     steps.push_back(write_step(tape));
     append_steps(tape, steps, {}, c_.domain.predicate);
+    c_.take_room(tape, slots_of(width), result_);
     for (size_t i = 0; i < needed_.size(); ++i) {
       const Call* call = as_call_of(needed_[i], f_);
       result_.self_values[needed_[i]] =
@@ -131,6 +132,17 @@ class Tape {
     result_.helpers.push_back(before);
     result_.helpers.push_back(tape);
     explain_kept(tape, width);
+  }
+
+  // Extents of the tape: those of the pure dimensions, then slots.
+  std::vector<Expr> slots_of(int width) const {
+    std::vector<Expr> extents;
+    const std::vector<Expr> all = c_.extents();
+    for (size_t d = 0; d < all.size(); ++d) {
+      if (c_.pure[d]) extents.push_back(all[d]);
+    }
+    extents.push_back(layout_.elements() + iterations_ * width);
+    return extents;
   }
 
   void explain_kept(const FuncPtr& tape, int width) {

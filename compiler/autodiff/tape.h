@@ -7,7 +7,7 @@
 // Both sides are one Func with one more dimension, and one update whose innermost reduction
 // variable is the step inside an iteration:
 //   f_tape(x, s)      s < P: the elements of f beside its pure variables x, in storage order;
-//                     s >= P: the values v_k(i) that partials and places need (Overwritten::Store)
+//                     s >= P: the values v_k(i) that partials and places need (version_budget.h)
 //   f_adj_tape(x, s)  s < P: A; s >= P: a(i), from which contributions to others are swept
 // No index set is looked at: places may depend on data, iterations may meet. The price is memory
 // for every iteration, and a serial loop over them in each element of the pure dimensions, which

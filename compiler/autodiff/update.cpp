@@ -129,12 +129,17 @@ class UpdateDifferentiation {
 
   bool is_recurrence() {
     UpdateAdjoint trial = result_;
+    const VersionBudget untouched = c_.query.versions;
     try {
-      if (!differentiate_recurrence(c_, trial)) return false;
+      if (!differentiate_recurrence(c_, trial)) {
+        c_.query.versions = untouched;
+        return false;
+      }
       result_ = std::move(trial);
       if (c_.reads_self() && wants_checkpoints(c_)) explain_unused_budget();
       return true;
     } catch (const isl::exception& e) {
+      c_.query.versions = untouched;
       explain(Explanation::Kind::Version,
               text("update ", c_.query.stage - 1, ": isl gave up on its index sets: ", e.what()));
       return false;

@@ -23,7 +23,7 @@
 //   tape          anything else: the iterations run backward one by one inside each element of the
 //                 pure dimensions, and what they need is kept (tape.h).
 // A value that a partial needs must still be in f at the end: proven over index sets, never
-// sampled. Otherwise this is an error, or with Overwritten::Store the values are kept.
+// sampled. Otherwise the values are kept within a budget (version_budget.h), or this is an error.
 #pragma once
 
 #include <functional>
@@ -35,6 +35,7 @@
 #include "autodiff/regions.h"
 #include "autodiff/reverse_sweep.h"
 #include "autodiff/value_range.h"
+#include "autodiff/version_budget.h"
 #include "ir/equal.h"
 
 namespace retrograde::ir {
@@ -55,7 +56,7 @@ struct UpdateQuery {
   const AdjointTarget& target;
   const AdjointFunc& adjoint;  // of f after the stage
   bool extendable;             // nothing reads it yet
-  bool store_overwritten;
+  VersionBudget& versions;     // for values that updates overwrite
   CheckpointBudget checkpoints;
   std::function<bool(const Expr&)> is_wanted;
   const ValueRanges& ranges;

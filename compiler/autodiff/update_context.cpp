@@ -208,7 +208,8 @@ SweepResult UpdateContext::sweep_iterations(const FuncPtr& adjoint,
   return result;
 }
 
-void UpdateContext::refuse_overwritten(const Expr& read) const {
+void UpdateContext::check_versions_are_kept(const Expr& read) const {
+  if (query.versions.keeps_any()) return;
   const auto* call = read.as<Call>();
   user_error(
       asked(),
@@ -218,6 +219,19 @@ void UpdateContext::refuse_overwritten(const Expr& read) const {
       text("Give ", quoted(f->name),
            " one more dimension that keeps the versions, or pass "
            "AdjointOptions{.overwritten = Overwritten::Store} to let the compiler keep them"));
+}
+
+void UpdateContext::take_room(const FuncPtr& copy, const std::vector<Expr>& extents,
+                              UpdateAdjoint& result) const {
+  FuncPtr check = query.versions.take({copy, extents, f->name, asked()}, result.explanations);
+  if (check) result.helpers.push_back(check);
+}
+
+std::vector<Expr> UpdateContext::extents() const {
+  std::vector<Expr> result;
+  for (const Interval& side : query.regions.of(f))
+    result.push_back(side.is_bounded() ? side.max - side.min + 1 : Expr());
+  return result;
 }
 
 Expr with_values(const Expr& e, const FuncPtr& f, const SelfValues& self_values) {

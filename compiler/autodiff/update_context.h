@@ -51,7 +51,13 @@ struct UpdateContext {
   // another read's place.
   std::vector<Expr> needed_reads(const SweepResult& sweep) const;
 
-  [[noreturn]] void refuse_overwritten(const Expr& read) const;
+  // Before a version of f is kept for `read`: throws when none may be.
+  void check_versions_are_kept(const Expr& read) const;
+  // Takes room for `copy`, with so many elements in each dimension, from the budget.
+  void take_room(const FuncPtr& copy, const std::vector<Expr>& extents,
+                 UpdateAdjoint& result) const;
+  // Extents of what is read of f; undefined ones are not known.
+  std::vector<Expr> extents() const;
 };
 
 // Reads of f in an expression that belongs to another Func become what `self_values` says, else the

@@ -72,6 +72,13 @@ mode use the same partials, so they are transposes of each other at every point,
   known at run time only), unless constant factors with a sum below 1 - 1/64 forget them, the scan runs
   in double, and each element is rounded once. Adjoints on tapes and between kept states of loops over
   time are carried in the precision of the program.
+- **Overwritten values.** Where a partial needs a value that an update has overwritten, as in
+  `f(x) *= a(x, r)` or a filter in place, its versions are kept (`Overwritten::Auto`), in a Func with
+  one more dimension or in copies, if all that the program keeps fits `AdjointOptions::version_bytes`,
+  256 MiB; `Derivative::explain()` says what is kept and its bytes. More is refused when the gradient
+  is made; where sizes are known at run time only, the call that needs more fails, before the memory
+  is touched. `Overwritten::Refuse` keeps nothing: an error names the update, the value and what to
+  write instead. `Overwritten::Store` keeps whatever it costs.
 - **Loops over time.** An update such as `f(x) = g(f(x), t)` over a long `RDom t` overwrites what its
   partials need. `Overwritten::Store` keeps every version: memory for all n steps. With
   `AdjointOptions::checkpoint_states` (s states) or `checkpoint_bytes` a few states are kept and the

@@ -202,6 +202,7 @@ not requested "told_kernel": nothing that was requested depends on it
 recomputed "told_loss_adj": in each of 30 reads, 0 operations a time, no bytes
 recomputed "told_gain": the gradient reads its values; in each of 24 reads, 2 operations a time, no bytes
 stored "told_blurred": the gradient reads its values; 32 bytes, 176 operations, as it has updates
+performance "told_blurred": unless a directive schedules it, it is computed at root: inside of the loops of who reads it, its updates would run again for each element
 recomputed "told_blurred_adj": in each of 30 reads, 5 operations a time, no bytes
 stored "told_gain_adj": 40 bytes, 310 operations, as it has updates
 stored "told_in_adj": 40 bytes, 70 operations, as it is wanted itself or read often

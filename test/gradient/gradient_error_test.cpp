@@ -35,6 +35,7 @@ void expect_error(Action action, const std::vector<std::string>& phrases) {
 struct Gradients : ::testing::Test {
   Buffer<float> a{8};
   Func f{"f"}, loss{"loss"};
+  const AdjointOptions strict{.overwritten = Overwritten::Refuse};
   void sum_up() {
     RDom r(0, 8);
     loss() = 0.0f;
@@ -46,7 +47,7 @@ TEST_F(Gradients, OverwrittenValueThatAPartialNeeds) {
   f(x) = a(x);
   f(x) = f(x) * f(x);
   sum_up();
-  expect_error<UserError>([&] { propagate_adjoints(loss); },
+  expect_error<UserError>([&] { propagate_adjoints(loss, strict); },
                           {"differentiate the update \"f", "Overwritten::Store"});
 }
 
@@ -55,7 +56,7 @@ TEST_F(Gradients, ProductInPlace) {
   f(x) = 1.0f;
   f(x) *= a(r);
   sum_up();
-  expect_error<UserError>([&] { propagate_adjoints(loss); }, {"\"f", "Overwritten::Store"});
+  expect_error<UserError>([&] { propagate_adjoints(loss, strict); }, {"\"f", "Overwritten::Store"});
 }
 
 TEST_F(Gradients, ValueOverwrittenByALaterUpdate) {
@@ -64,7 +65,7 @@ TEST_F(Gradients, ValueOverwrittenByALaterUpdate) {
   f(r) = f(r) + f(r - 1) * f(r - 1);
   f(q) = f(q) * 2.0f;
   sum_up();
-  expect_error<UserError>([&] { propagate_adjoints(loss); }, {"overwrote"});
+  expect_error<UserError>([&] { propagate_adjoints(loss, strict); }, {"overwrote"});
   EXPECT_NO_THROW(propagate_adjoints(loss, {.overwritten = Overwritten::Store}));
 }
 
@@ -73,7 +74,7 @@ TEST_F(Gradients, PlaceThatDependsOnAnOverwrittenValueOfTheFuncItself) {
   RDom r(0, 8);
   f(clamp(cast<int>(f(r)), 0, 7)) += a(r);
   sum_up();
-  expect_error<UserError>([&] { propagate_adjoints(loss); }, {"\"f", "Overwritten::Store"});
+  expect_error<UserError>([&] { propagate_adjoints(loss, strict); }, {"\"f", "Overwritten::Store"});
 }
 
 TEST_F(Gradients, PredicateThatDependsOnTheFuncItself) {

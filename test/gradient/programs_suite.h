@@ -12,7 +12,7 @@ namespace retrograde::gradient {
 struct Program {
   Func loss;  // a scalar
   std::vector<Buffer<float>> inputs;
-  bool store_overwritten = false;  // without it: a UserError; with it: right
+  bool store_overwritten = false;  // under Overwritten::Refuse a UserError
 };
 
 struct NamedProgram {

@@ -132,6 +132,11 @@ void check(unsigned seed, const AdjointOptions& options) {
 
 constexpr unsigned programs_checked = 300;
 
+TEST(RandomUpdates, AreRightWhenValuesAreKeptWithinABudget) {
+  for (unsigned seed = 0; seed < programs_checked / 3 && !::testing::Test::HasFailure(); ++seed)
+    check(seed, {});
+}
+
 TEST(RandomUpdates, AreRightWhenValuesMayBeKept) {
   for (unsigned seed = 0; seed < programs_checked && !::testing::Test::HasFailure(); ++seed)
     check(seed, {.overwritten = Overwritten::Store});
@@ -159,7 +164,7 @@ TEST(RandomUpdates, AreRightOrRefusedWhenValuesMayNotBeKept) {
   int refused = 0;
   for (unsigned seed = 0; seed < programs_checked && !::testing::Test::HasFailure(); ++seed) {
     try {
-      check(seed, {});
+      check(seed, {.overwritten = Overwritten::Refuse});
     } catch (const UserError&) {
       ++refused;
     }

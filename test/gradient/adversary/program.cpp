@@ -18,7 +18,7 @@ void Maker::run() {
     p_.region.mins.push_back(c_.chance(20) ? c_.around_zero(2) : 0);
     p_.region.extents.push_back(c_.chance(10) ? c_.between(1, 3) : natural_size);
   }
-  p_.options.overwritten = c_.chance(25) ? Overwritten::Error : Overwritten::Store;
+  p_.options.overwritten = c_.chance(25) ? Overwritten::Refuse : Overwritten::Store;
   p_.only_inputs = c_.chance(40) || !p_.checks.along;
   if (c_.chance(has_loop ? 60 : 8)) {
     if (c_.chance(70)) {
