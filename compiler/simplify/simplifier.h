@@ -94,6 +94,8 @@ class Simplifier {
   Stmt branches(const Stmt& s, const IfThenElse& n);
   Stmt store(const Stmt& s, const Store& n);
   Stmt provide(const Stmt& s, const Provide& n);
+  int64_t most_elements(const Expr& count);
+  Stmt allocate(const Allocate& n, const Stmt& simplified);
   Stmt children(const Stmt& s);
 
   // A name bound while this lives; `replacement`, when defined, stands for it.

@@ -1,4 +1,6 @@
 // Statements: loop bounds, conditions and asserts are known inside what they guard.
+#include <algorithm>
+
 #include "ir/build.h"
 #include "ir/visit.h"
 #include "simplify/simplifier.h"
@@ -11,6 +13,7 @@ Stmt Simplifier::operator()(const Stmt& s) {
       s, [&](const LetStmt&) { return let_stmt(s); }, [&](const For& n) { return loop(s, n); },
       [&](const IfThenElse& n) { return branches(s, n); },
       [&](const Block& n) { return block(s, n); }, [&](const Store& n) { return store(s, n); },
+      [&](const Allocate& n) { return allocate(n, children(s)); },
       [&](const Provide& n) { return provide(s, n); },
       [&](const Assert& n) {
         const Expr condition = (*this)(n.condition);
@@ -98,6 +101,36 @@ Stmt Simplifier::branches(const Stmt& s, const IfThenElse& n) {
       else_case.same_as(n.else_case))
     return s;
   return make_if(condition, std::move(then_case), std::move(else_case));
+}
+
+namespace {
+
+// What is at most as large may lie on the stack, at its largest size (codegen/statements.cpp).
+constexpr int64_t most_stack_bytes = int64_t{16} << 10;
+
+}  // namespace
+
+// At most that many elements; more than any allocation has where that is unknown.
+int64_t Simplifier::most_elements(const Expr& count) {
+  if (const auto* product = count.as<Mul>()) {
+    const int64_t a = most_elements(product->a), b = most_elements(product->b);
+    return a <= most_stack_bytes && b <= most_stack_bytes ? a * b : INT64_MAX;
+  }
+  const auto* cast = count.as<Cast>();
+  const Expr& value = cast && is_index_type(cast->value.type()) ? cast->value : count;
+  if (!is_index_type(value.type())) return INT64_MAX;
+  return std::max<int64_t>(facts_.upper_bound(sum_of(value)), 0);
+}
+
+// allocate a[min(n, 8)] => allocate a[8]: a small block of known size costs nothing, and may stay
+// in registers; one of run-time size is asked for in each iteration of the loops around.
+Stmt Simplifier::allocate(const Allocate& n, const Stmt& simplified) {
+  const auto* a = simplified.defined() ? simplified.as<Allocate>() : nullptr;
+  if (!a || is_const(a->elements) || n.memory == MemoryType::Heap || loops_around_ == 0)
+    return simplified;
+  const int64_t most = most_elements(a->elements);
+  if (most > most_stack_bytes / (a->type.bytes() * a->type.lanes())) return simplified;
+  return make_allocate(a->name, a->type, a->memory, make_const(a->elements.type(), most), a->body);
 }
 
 Stmt Simplifier::store(const Stmt& s, const Store& n) {

@@ -277,11 +277,25 @@ TEST(SimplifyStmt, BranchesKnowMultiples) {
   check_stmt("if ((n + 3) % 4 == 0) { a[n] = n % 2 }", "if ((n + 3) % 4 == 0) { a[n] = 1 }");
 }
 
+// They need not be asked for in each iteration.
+TEST(SimplifyStmt, SmallBlocksInLoopsHaveTheirLargestSize) {
+  const auto in_loop = [](const std::string& elements, const char* memory = "auto") {
+    return "for (x, 0, n) { let l = min(m, x*2 + 1)\n allocate b[" + elements + "]:float32 " +
+           memory + " { b[0] = float32(l)\n a[x] = b[0]:float32 } }";
+  };
+  const std::string two = "int64(l - x*2 + 1)";
+  check_stmt(in_loop(two), in_loop("2_i64"));
+  check_stmt(in_loop(two + " * 16_i64"), in_loop("32_i64"));
+  check_stmt(in_loop("int64(max(min(n, 4), 0)) * " + two), in_loop("8_i64"));
+  const std::string large = "int64(l - x*2 + 1) * 2049_i64";
+  check_stmt(in_loop(large), in_loop(large));
+  check_stmt(in_loop(two, "heap"), in_loop(two, "heap"));
+}
+
 // What lies between a multiple and the next one.
 TEST(SimplifyStmt, DividesInsideTiles) {
   const std::string tile = "let m = min(k, l)*8\n";
-  check_stmt(tile + "for (i, m, 8) { a[i/8] = i % 8 }",
-             tile + "for (i, m, 8) { a[m/8] = i - m }");
+  check_stmt(tile + "for (i, m, 8) { a[i/8] = i % 8 }", tile + "for (i, m, 8) { a[m/8] = i - m }");
   check_stmt(tile + "for (i, m + 2, 4) { a[(i + 1)/8] = (i + 1) % 8 }",
              tile + "for (i, m + 2, 4) { a[m/8] = i - m + 1 }");
   check_stmt(tile + "for (i, m + 2, 7) { a[i/8] = i % 8 }",
