@@ -39,15 +39,15 @@ PIPELINE(update_quarter_turn) {
   RDom r(0, 6, 0, 6);
   f(x, y) = x - 3 * y;
   f(r.y, 5 - r.x) = r.x * 100 + r.y;
-  if (scheduled) f.update().parallel(r.x).vectorize(r.y, 3);
+  if (scheduled) f.update().parallel(r.y).vectorize(r.x, 3);
   return {{f}, {{6, 6}}, {}};
 }
 
 PIPELINE(unrolled_below_a_bound) {
   Func f("f");
-  Buffer<int32_t> lengths = noise<int32_t>({1}, 3);
-  lengths(0) = 3;
-  RDom r(0, clamp(lengths(0), 0, 4));
+  Param<int32_t> n;
+  n.set(3);
+  RDom r(0, clamp(n, 0, 4));
   f(x) = 0;
   f(x) += x * r;
   if (scheduled) f.update().unroll(r);
