@@ -14,11 +14,27 @@
 #     every machine can run. GRADIENT: the function of the gradient, see
 #     generator/gradient_module.cpp. The variables get names of extra files beside the header.
 #
+#   add_retrograde_runtime(<target> [FROM <generator-target>] [TARGETS <target>...])
+#     A runtime for USE_RUNTIME: retrograde::runtime, or for another platform one that the
+#     generator's program writes. Every library <lib> has one that is called <lib>.runtime.
+#
+# A program that runs a library's function from the command line is its registration file (the file
+# that REGISTRATION names), linked with it and with retrograde::run_gen.
+#
 # The library needs a runtime: retrograde::runtime, which is small and static, unless USE_RUNTIME
 # names another. No compiler is in a process that uses such a library.
 
 function(add_retrograde_generator target)
-  cmake_parse_arguments(PARSE_ARGV 1 arg "" "" "SOURCES;LINK_LIBRARIES")
+  cmake_parse_arguments(PARSE_ARGV 1 arg "PYSTUB" "PACKAGE_NAME;PACKAGE_NAMESPACE;EXPORT_FILE"
+    "SOURCES;LINK_LIBRARIES")
+  if(arg_PYSTUB)
+    message(FATAL_ERROR "add_retrograde_generator(${target}): PYSTUB asks for a Python module of the "
+      "generator, which is not made. Leave it out.")
+  endif()
+  if(arg_PACKAGE_NAME OR arg_EXPORT_FILE)
+    message(STATUS "add_retrograde_generator(${target}): no package of the generator is written; "
+      "it is built where it is used")
+  endif()
   if(NOT arg_SOURCES)
     set(arg_SOURCES ${arg_UNPARSED_ARGUMENTS})
   endif()
@@ -50,6 +66,22 @@ function(_retrograde_foreign_runtime name generator target)
   set_target_properties(${name} PROPERTIES IMPORTED_LOCATION ${file})
   add_dependencies(${name} ${name}.update)
   target_link_libraries(${name} INTERFACE Threads::Threads ${CMAKE_DL_LIBS})
+endfunction()
+
+function(add_retrograde_runtime target)
+  cmake_parse_arguments(PARSE_ARGV 1 arg "" "FROM" "TARGETS")
+  list(APPEND arg_TARGETS host)
+  list(GET arg_TARGETS 0 first_target)
+  _retrograde_is_native(native ${first_target})
+  if(native)
+    add_library(${target} INTERFACE)
+    target_link_libraries(${target} INTERFACE retrograde::runtime)
+  elseif(arg_FROM)
+    _retrograde_foreign_runtime(${target} ${arg_FROM} ${first_target})
+  else()
+    message(FATAL_ERROR "add_retrograde_runtime(${target}): a runtime for ${first_target} is written "
+      "by a generator's program. Name one with FROM.")
+  endif()
 endfunction()
 
 function(add_retrograde_library target)
@@ -109,6 +141,12 @@ function(add_retrograde_library target)
     set(gradient 1)
   endif()
   set(scheduler)
+  if(arg_AUTOSCHEDULER MATCHES "^Halide::" AND NOT TARGET "${arg_AUTOSCHEDULER}")
+    message(STATUS "${asked}: ${arg_AUTOSCHEDULER} is a scheduler of another compiler; the "
+      "generator's own schedule is used")
+    set(arg_AUTOSCHEDULER)
+    list(FILTER arg_PARAMS EXCLUDE REGEX "^(auto_schedule|autoscheduler)(=|\\.)")
+  endif()
   if(arg_AUTOSCHEDULER)
     # A::B is a plugin's target that holds the scheduler B.
     if(TARGET "${arg_AUTOSCHEDULER}")
@@ -176,11 +214,8 @@ function(add_retrograde_library target)
   add_dependencies(${target} ${target}.update)
   target_include_directories(${target} INTERFACE $<BUILD_INTERFACE:${folder}>)
   if(NOT arg_USE_RUNTIME)
-    set(arg_USE_RUNTIME retrograde::runtime)
-    if(NOT native)
-      set(arg_USE_RUNTIME ${target}.runtime)
-      _retrograde_foreign_runtime(${target}.runtime ${arg_FROM} ${first_target})
-    endif()
+    set(arg_USE_RUNTIME ${target}.runtime)
+    add_retrograde_runtime(${target}.runtime FROM ${arg_FROM} TARGETS ${first_target})
   endif()
   target_link_libraries(${target} INTERFACE ${arg_USE_RUNTIME})
 endfunction()

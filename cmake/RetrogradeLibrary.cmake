@@ -39,6 +39,7 @@ target_link_libraries(retrograde_halide_compat INTERFACE retrograde)
 include(CMakePackageConfigHelpers)
 set(package_dir ${CMAKE_INSTALL_LIBDIR}/cmake/retrograde)
 install(TARGETS retrograde retrograde_halide_compat retrograde_static_runtime
+  retrograde_run_gen_main
   EXPORT retrogradeTargets)
 install(EXPORT retrogradeTargets NAMESPACE retrograde:: DESTINATION ${package_dir})
 configure_package_config_file(${PROJECT_SOURCE_DIR}/cmake/retrogradeConfig.cmake.in
@@ -64,6 +65,20 @@ write_basic_package_version_file(${CMAKE_BINARY_DIR}/HalideConfigVersion.cmake
 install(FILES ${CMAKE_BINARY_DIR}/HalideConfig.cmake ${CMAKE_BINARY_DIR}/HalideConfigVersion.cmake
   DESTINATION ${halide_package_dir})
 
+# The same under the name of its package for builds that call generators only.
+set(helpers_package_dir ${CMAKE_INSTALL_LIBDIR}/cmake/HalideHelpers)
+configure_package_config_file(${PROJECT_SOURCE_DIR}/cmake/halide/HalideConfig.cmake.in
+  ${CMAKE_BINARY_DIR}/HalideHelpersConfig.cmake INSTALL_DESTINATION ${helpers_package_dir})
+install(FILES ${CMAKE_BINARY_DIR}/HalideHelpersConfig.cmake DESTINATION ${helpers_package_dir})
+install(FILES ${CMAKE_BINARY_DIR}/HalideConfigVersion.cmake DESTINATION ${helpers_package_dir}
+  RENAME HalideHelpersConfigVersion.cmake)
+
+foreach(package IN ITEMS generator run-gen)
+  configure_file(${PROJECT_SOURCE_DIR}/cmake/retrograde-${package}.pc.in
+    ${CMAKE_BINARY_DIR}/retrograde-${package}.pc @ONLY)
+  install(FILES ${CMAKE_BINARY_DIR}/retrograde-${package}.pc
+    DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig)
+endforeach()
 configure_file(${PROJECT_SOURCE_DIR}/cmake/retrograde.pc.in ${CMAKE_BINARY_DIR}/retrograde.pc @ONLY)
 configure_file(${PROJECT_SOURCE_DIR}/cmake/retrograde-halide.pc.in
   ${CMAKE_BINARY_DIR}/retrograde-halide.pc @ONLY)

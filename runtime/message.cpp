@@ -4,6 +4,7 @@
 #include <cstdarg>
 #include <cstring>
 
+#include "inquiries.h"
 #include "report.h"
 
 namespace retrograde::runtime {
@@ -141,6 +142,10 @@ void retrograde_print(retrograde_context* context, const char* format, ...) {
   format_message(message, sizeof message, format, args);
   va_end(args);
   context->print_handler(context, message);
+}
+
+void* retrograde_user_context(retrograde_context* context) {
+  return context ? context->user_data : nullptr;
 }
 
 const char* retrograde_error_name(int32_t code) {

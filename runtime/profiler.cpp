@@ -17,6 +17,7 @@
 #include <thread>
 #include <vector>
 
+#include "inquiries.h"
 #include "report.h"
 
 namespace retrograde::runtime {
@@ -118,14 +119,23 @@ class Profiler {
     return nullptr;
   }
 
+  halide_profiler_state* state() { return &state_; }
+
  private:
-  static constexpr auto period = std::chrono::milliseconds(1);
   std::mutex mutex_;
+  halide_profiler_state state_ = initial_state();
   std::condition_variable wake_;
   std::vector<std::unique_ptr<Pipeline>> pipelines_;  // the latest first
   std::vector<std::unique_ptr<Run>> runs_;
   std::thread thread_;
   uint64_t generation_ = 0;  // of the sampling thread
+
+  static halide_profiler_state initial_state() {
+    halide_profiler_state state = {};
+    state.sleep_time = 1;
+    state.current_func = halide_profiler_outside_of_halide;
+    return state;
+  }
 
   Pipeline& find(const char* name, const char* funcs) {
     std::vector<std::string> names;
@@ -149,6 +159,7 @@ class Profiler {
   void link() {
     for (size_t i = pipelines_.size(); i-- > 0;)
       pipelines_[i]->link(i + 1 < pipelines_.size() ? pipelines_[i + 1].get() : nullptr);
+    state_.pipelines = pipelines_.empty() ? nullptr : &pipelines_.front()->stats;
   }
 
   void start() {
@@ -167,7 +178,7 @@ class Profiler {
   void look(uint64_t generation) {
     std::unique_lock lock(mutex_);
     while (generation == generation_) {
-      wake_.wait_for(lock, period);
+      wake_.wait_for(lock, std::chrono::milliseconds(std::max(1, state_.sleep_time)));
       const auto now = Clock::now();
       for (auto& run : runs_) sample(*run, now, true);
     }
@@ -305,6 +316,10 @@ void retrograde_profiler_report(retrograde_context* context) {
     if (!text.empty()) context->print_handler(context, text.c_str());
   } catch (const std::bad_alloc&) {
   }
+}
+
+struct halide_profiler_state* retrograde_profiler_state(void) {
+  return rt::profiler().state();
 }
 
 struct halide_profiler_pipeline_stats* retrograde_profiler_pipeline(const char* name) {

@@ -35,3 +35,30 @@ RETROGRADE_WEAK int halide_device_sync(void* user_context, halide_buffer_t* buff
   return buffer && buffer->device ? no_device(user_context, "wait for a device") : 0;
 }
 RETROGRADE_WEAK void halide_device_release(void*, const halide_device_interface_t*) {}
+
+// ---- what a device would offer: views of its memory, and memory that it keeps ----
+
+RETROGRADE_WEAK int halide_device_crop(void* user_context, const halide_buffer_t* src,
+                                       halide_buffer_t*) {
+  return src && src->device ? no_device(user_context, "crop device memory") : 0;
+}
+RETROGRADE_WEAK int halide_device_slice(void* user_context, const halide_buffer_t* src, int, int,
+                                        halide_buffer_t*) {
+  return src && src->device ? no_device(user_context, "slice device memory") : 0;
+}
+RETROGRADE_WEAK int halide_device_release_crop(void* user_context, halide_buffer_t* buffer) {
+  return buffer && buffer->device ? no_device(user_context, "release a view of device memory") : 0;
+}
+RETROGRADE_WEAK int halide_device_wrap_native(void* user_context, halide_buffer_t*, uint64_t,
+                                              const halide_device_interface_t*) {
+  return no_device(user_context, "wrap device memory");
+}
+RETROGRADE_WEAK int halide_device_detach_native(void* user_context, halide_buffer_t* buffer) {
+  return buffer && buffer->device ? no_device(user_context, "detach device memory") : 0;
+}
+// Nothing is ever kept, whatever is allowed.
+RETROGRADE_WEAK int halide_reuse_device_allocations(void*, bool) { return 0; }
+RETROGRADE_WEAK bool halide_can_reuse_device_allocations(void*) { return false; }
+RETROGRADE_WEAK void halide_register_device_allocation_pool(halide_device_allocation_pool*) {}
+RETROGRADE_WEAK void halide_set_gpu_device(int) {}
+RETROGRADE_WEAK int halide_get_gpu_device(void*) { return -1; }

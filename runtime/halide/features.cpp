@@ -2,6 +2,7 @@
 #include <cstdint>
 
 #include "halide/weak.h"
+#include "inquiries.h"
 #include "retrograde_runtime.h"
 #include "trace.h"
 
@@ -45,6 +46,16 @@ RETROGRADE_WEAK halide_profiler_pipeline_stats* halide_profiler_get_pipeline_sta
     const char* pipeline_name) {
   return retrograde_profiler_pipeline(pipeline_name);
 }
+RETROGRADE_WEAK halide_profiler_state* halide_profiler_get_state() {
+  return retrograde_profiler_state();
+}
+// Samples are taken by the profiler's own thread: there is no timer to start or to stop.
+RETROGRADE_WEAK int halide_profiler_sample(halide_profiler_state* state, uint64_t*) {
+  return state ? state->sleep_time : -1;
+}
+RETROGRADE_WEAK void halide_start_timer_chain() {}
+RETROGRADE_WEAK void halide_disable_timer_interrupt() {}
+RETROGRADE_WEAK void halide_enable_timer_interrupt() {}
 RETROGRADE_WEAK void halide_profiler_report(void* user_context) {
   retrograde_context context = context_of(user_context);
   retrograde_profiler_report(&context);

@@ -14,6 +14,7 @@
 #include <string>
 #include <vector>
 
+#include "retrograde_runtime.h"
 #include "support/temporary_folder.h"
 
 namespace {
@@ -115,6 +116,71 @@ TEST_F(HalideServices, ATraceFileThatCannotBeWrittenIsToldOnce) {
   halide_set_trace_file(0);
   close(file);
   EXPECT_EQ(prints, "cannot write the trace: its file cannot be written\n");
+}
+
+// ---- copies ----
+
+std::string error_text;
+
+int copy(Buffer<int>& from, Buffer<int>& to) {
+  halide_set_error_handler([](void*, const char* text) { error_text = text; });
+  return halide_buffer_copy(nullptr, from.raw_buffer(), nullptr, to.raw_buffer());
+}
+
+TEST_F(HalideServices, ACopyTakesTheSameCoordinatesWhateverTheStrides) {
+  Buffer<int> from(9, 7), planar(4, 3);
+  from.set_min(-2, 5);
+  from.for_each_element([&](int x, int y) { from(x, y) = 100 * y + x; });
+  planar.set_min(1, 6);
+  Buffer<int> turned = Buffer<int>(3, 4);
+  turned.transpose(0, 1);
+  turned.set_min(1, 6);
+  EXPECT_EQ(copy(from, planar), 0);
+  EXPECT_EQ(copy(from, turned), 0);
+  EXPECT_TRUE(planar.host_dirty());
+  int wrong = 0;
+  planar.for_each_element(
+      [&](int x, int y) { wrong += planar(x, y) != 100 * y + x || turned(x, y) != 100 * y + x; });
+  EXPECT_EQ(wrong, 0);
+}
+
+TEST_F(HalideServices, ACopyThatDoesNotFitIsRefused) {
+  Buffer<int> from(4), to(5), flat(4, 4), none(nullptr, 4);
+  Buffer<float> other(4);
+  EXPECT_EQ(copy(from, to), halide_error_code_access_out_of_bounds);
+  EXPECT_NE(error_text.find("[0, 5), the source [0, 4)"), std::string::npos) << error_text;
+  EXPECT_EQ(copy(from, flat), halide_error_code_bad_dimensions);
+  EXPECT_EQ(copy(from, none), halide_error_code_host_is_null);
+  EXPECT_EQ(halide_buffer_copy(nullptr, from, nullptr, other), halide_error_code_bad_type);
+  EXPECT_EQ(halide_buffer_copy(nullptr, from, nullptr, nullptr), halide_error_code_buffer_is_null);
+  from.set_device_dirty();
+  EXPECT_EQ(copy(from, from), halide_error_code_no_device_interface);
+}
+
+TEST_F(HalideServices, NoDeviceMemoryIsEverKept) {
+  EXPECT_EQ(halide_reuse_device_allocations(nullptr, true), 0);
+  EXPECT_FALSE(halide_can_reuse_device_allocations(nullptr));
+}
+
+// ---- the profiler's state ----
+
+TEST_F(HalideServices, TheProfilersStateListsPipelines) {
+  retrograde_context context = {};
+  void* run = retrograde_profiler_begin(&context, "services_pipeline", "overhead\nf");
+  retrograde_profiler_memory(&context, run, 1, 640);
+  retrograde_profiler_end(&context, run);
+  halide_profiler_state* state = halide_profiler_get_state();
+  ASSERT_NE(state, nullptr);
+  EXPECT_EQ(state->sleep_time, 1);
+  const halide_profiler_pipeline_stats* found = state->pipelines;
+  while (found && std::string(found->name) != "services_pipeline")
+    found = static_cast<const halide_profiler_pipeline_stats*>(found->next);
+  ASSERT_NE(found, nullptr);
+  EXPECT_EQ(found->runs, 1);
+  ASSERT_EQ(found->num_funcs, 2);
+  EXPECT_STREQ(found->funcs[1].name, "f");
+  EXPECT_EQ(found->funcs[1].memory_peak, 640u);
+  EXPECT_EQ(found, halide_profiler_get_pipeline_state("services_pipeline"));
 }
 
 // ---- memoized results ----

@@ -1,0 +1,68 @@
+// filter.h -- one compiled function by its metadata: its arguments get values and shapes that fit
+// each other, then it is called.
+#pragma once
+
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "run_gen/inputs.h"
+
+namespace retrograde::run_gen {
+
+struct Filter {
+  int (*call)(void** argv) = nullptr;
+  const halide_filter_metadata_t* metadata = nullptr;
+};
+
+// The functions that registration files told of.
+std::vector<Filter>& registered_filters();
+// The one of that name, or the only one. Problem when there is none.
+Filter find_filter(const std::string& name);
+std::string description(const Filter& filter);
+
+// A call with all of its arguments.
+class Call {
+ public:
+  // Problem where a value is missing or does not fit.
+  Call(const Filter& filter, const Options& options);
+  // Its error code.
+  int run();
+  // Those that --output files were named for.
+  void write_outputs() const;
+  double output_elements() const;  // of the largest output
+  std::string shapes() const;      // a line for each buffer
+
+ private:
+  struct Argument {
+    const halide_filter_argument_t* about;
+    halide_scalar_value_t scalar = {};
+    BufferSpec spec;
+    Image image;
+    std::string path;        // of an output
+    bool is_known = false;   // its shape is
+    bool is_wanted = false;  // the user said the shape
+  };
+  const Filter filter_;
+  const Options& options_;
+  std::vector<Argument> arguments_;
+
+  void set_scalar(Argument& argument);
+  void set_input(Argument& argument);
+  void set_output(Argument& argument);
+  void check_names() const;
+  void guess_outputs();
+  bool shrink_outputs();
+  std::vector<Image> query();
+  void settle(const std::vector<Image>& required);
+  std::string value_of(const Argument& argument, const std::optional<std::string>& otherwise) const;
+  bool is_buffer(const Argument& argument) const {
+    return argument.about->kind != halide_argument_kind_input_scalar;
+  }
+  bool is_output(const Argument& argument) const {
+    return argument.about->kind == halide_argument_kind_output_buffer;
+  }
+};
+
+}  // namespace retrograde::run_gen

@@ -1,0 +1,135 @@
+#include "run_gen/options.h"
+
+#include <charconv>
+
+namespace retrograde::run_gen {
+
+namespace {
+
+bool read_switch(const std::string& flag, const std::string& value) {
+  if (value.empty() || value == "true" || value == "1") return true;
+  if (value == "false" || value == "0") return false;
+  throw Problem("--" + flag + " is true or false, not \"" + value + "\"");
+}
+
+double read_seconds(const std::string& value) {
+  try {
+    size_t used = 0;
+    const double seconds = std::stod(value, &used);
+    if (used == value.size() && seconds > 0) return seconds;
+  } catch (const std::exception&) {  // the same message
+  }
+  throw Problem("--benchmark_min_time takes a number of seconds, not \"" + value + "\"");
+}
+
+void set_flag(const std::string& flag, const std::string& value, Options& options) {
+  const std::map<std::string, bool Options::*> switches = {
+      {"help", &Options::help},
+      {"describe", &Options::describe},
+      {"quiet", &Options::quiet},
+      {"verbose", &Options::verbose},
+      {"parsable_output", &Options::parsable},
+      {"track_memory", &Options::track_memory}};
+  if (const auto found = switches.find(flag); found != switches.end()) {
+    options.*found->second = read_switch(flag, value);
+  } else if (flag == "benchmarks") {
+    if (value != "all") throw Problem("--benchmarks takes \"all\", not \"" + value + "\"");
+    options.benchmark = true;
+  } else if (flag == "benchmark_min_time") {
+    options.min_seconds = read_seconds(value);
+  } else if (flag == "name") {
+    options.filter = value;
+  } else if (flag == "output_extents") {
+    options.output_extents = value;
+  } else if (flag == "default_input_buffers") {
+    options.default_buffers = value.empty() ? "zero:auto" : value;
+  } else if (flag == "default_input_scalars") {
+    options.default_scalars = value.empty() ? "estimate,default" : value;
+  } else if (flag == "estimate_all") {
+    options.default_buffers = "estimate_then_auto";
+    options.default_scalars = "estimate";
+    options.output_extents = "estimate";
+  } else {
+    throw Problem("there is no flag --" + flag + "; see --help");
+  }
+}
+
+}  // namespace
+
+std::vector<std::string> split(const std::string& text, char separator) {
+  std::vector<std::string> parts(1);
+  for (const char c : text) {
+    if (c == separator)
+      parts.emplace_back();
+    else
+      parts.back() += c;
+  }
+  return parts;
+}
+
+std::vector<int> read_extents(const std::string& text) {
+  const Problem problem("extents are numbers like [640,480,3], not \"" + text + "\"");
+  if (text.size() < 2 || text.front() != '[' || text.back() != ']') throw problem;
+  const std::string list = text.substr(1, text.size() - 2);
+  std::vector<int> extents;
+  if (list.empty()) return extents;
+  for (const std::string& word : split(list, ',')) {
+    int extent = 0;
+    const auto [stop, error] = std::from_chars(word.data(), word.data() + word.size(), extent);
+    if (error != std::errc() || stop != word.data() + word.size() || extent < 0) throw problem;
+    extents.push_back(extent);
+  }
+  return extents;
+}
+
+Options read_options(int argc, const char* const* argv) {
+  Options options;
+  for (int i = 1; i < argc; i++) {
+    std::string word = argv[i];
+    const bool is_flag = word.rfind("-", 0) == 0;
+    if (is_flag) word = word.substr(word.rfind("--", 0) == 0 ? 2 : 1);
+    const size_t equals = word.find('=');
+    const std::string key = word.substr(0, equals);
+    const std::string value = equals == std::string::npos ? "" : word.substr(equals + 1);
+    if (is_flag) {
+      set_flag(key, value, options);
+    } else if (equals == std::string::npos || key.empty()) {
+      throw Problem("\"" + word + "\" is neither name=value nor a flag; see --help");
+    } else if (!options.values.emplace(key, value).second) {
+      throw Problem("\"" + key + "\" is given twice");
+    }
+  }
+  return options;
+}
+
+std::string usage(const std::string& program) {
+  return "usage: " + program + R"( name=value ... [flags]
+
+  Runs a compiled function once, with a value for each of its arguments:
+    scalars   gain=1.5, or default or estimate: what the generator says; with a comma, the first
+              that it says
+    inputs    a file, or made up: zero:SHAPE  constant:VALUE:SHAPE  identity:SHAPE  random:SEED:SHAPE
+              SHAPE is [640,480,3], auto: what the output needs, estimate: what the generator says,
+              or estimate_then_auto. A shape alone is random
+    outputs   a file to be written; an output that is not named is computed and dropped
+  Files: .npy and .tmp of any type; .pgm, .ppm and .png of 8 and 16 bits, whose values become
+  fractions of 1 for functions of floats.
+
+  --help                       this text
+  --describe                   the function's arguments and their types
+  --name=NAME                  which function, where several are linked into the program
+  --output_extents=[W,H,...]   the size of every output, or estimate; by default what the inputs
+                               suffice for
+  --default_input_buffers=V    for inputs that are not named; without =V zero:auto
+  --default_input_scalars=V    for scalars that are not named; without =V estimate,default
+  --estimate_all               all inputs and the size of the outputs as the generator estimates
+  --benchmarks=all             runs it many times and tells the best time
+  --benchmark_min_time=S       for at least so many seconds; by default 0.1
+  --track_memory               tells how much memory its intermediate results took
+  --parsable_output            tells results one a line: NAME KEY VALUE
+  --quiet                      drops what the function prints
+  --verbose                    tells shapes and steps
+)";
+}
+
+}  // namespace retrograde::run_gen
