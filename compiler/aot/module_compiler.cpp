@@ -41,7 +41,7 @@ codegen::Options options_for(const Target& target) {
 }
 
 void check_type(OutputFileType type, const std::string& module) {
-  const std::string asked = "write " + quoted(Internal::get_output_info({}).at(type).name) +
+  const std::string asked = "write " + quoted(internal::get_output_info({}).at(type).name) +
                             " of the module " + quoted(module);
   switch (type) {
     case OutputFileType::c_source:
@@ -66,7 +66,7 @@ void check_type(OutputFileType type, const std::string& module) {
 std::string statement_text(const Module& module) {
   std::ostringstream out;
   run_on_large_stack([&] {
-    for (const Internal::LoweredFunc& function : aot::exported_functions(module)) {
+    for (const internal::LoweredFunc& function : aot::exported_functions(module)) {
       out << "// " << function.name << " for " << module.target().to_string() << "\n"
           << function.lowered.body << "\n";
     }
@@ -76,7 +76,7 @@ std::string statement_text(const Module& module) {
 
 std::vector<aot::DeclaredFunction> declared_functions(const Module& module) {
   std::vector<aot::DeclaredFunction> result;
-  for (const Internal::LoweredFunc& function : aot::exported_functions(module))
+  for (const internal::LoweredFunc& function : aot::exported_functions(module))
     result.push_back({function.name, aot::signature_of(function, module)});
   return result;
 }
@@ -84,7 +84,7 @@ std::vector<aot::DeclaredFunction> declared_functions(const Module& module) {
 std::string page_text(const Module& module, const std::string& assembly) {
   std::vector<aot::PageFunction> functions;
   run_on_large_stack([&] {
-    for (const Internal::LoweredFunc& function : aot::exported_functions(module)) {
+    for (const internal::LoweredFunc& function : aot::exported_functions(module)) {
       std::ostringstream statement;
       statement << function.lowered.body;
       functions.push_back({function.name, function.lowered.loop_nest(), statement.str()});
@@ -180,7 +180,7 @@ class MultitargetOutputs {
 
   std::vector<aot::File> files(const Files& wanted) {
     std::vector<aot::File> result;
-    const auto info = Internal::get_output_info(baseline().target());
+    const auto info = internal::get_output_info(baseline().target());
     Files multi;
     for (const auto& [type, path] : wanted) {
       if (info.at(type).is_multi) multi[type] = path;
@@ -204,7 +204,7 @@ class MultitargetOutputs {
   bool has_runtime() const { return !baseline().target().has_feature(Target::NoRuntime); }
 
   void add_variants(const Files& multi,
-                    const std::map<OutputFileType, const Internal::OutputInfo>& info,
+                    const std::map<OutputFileType, const internal::OutputInfo>& info,
                     bool wants_library, std::vector<aot::File>& result) {
     for (size_t i = 0; i < modules_.size(); i++) {
       Files wanted = multi;

@@ -81,7 +81,7 @@ const halide_buffer_t* embedded_buffer(const ir::LoweredArgument& argument,
              "Give it data, or add it to the list of arguments");
 }
 
-codegen::Export export_of(const Internal::LoweredFunc& function, const Module& module,
+codegen::Export export_of(const internal::LoweredFunc& function, const Module& module,
                           size_t index) {
   codegen::Export result;
   result.function = index;
@@ -102,9 +102,9 @@ codegen::Export export_of(const Internal::LoweredFunc& function, const Module& m
 
 // Of `module`, which is `whole` or inside of it.
 void collect(const Module& module, const Module& whole,
-             std::vector<std::pair<Internal::LoweredFunc, Module>>& found) {
+             std::vector<std::pair<internal::LoweredFunc, Module>>& found) {
   const std::string asked = "compile the module " + quoted(whole.name());
-  for (const Internal::LoweredFunc& function : module.functions()) {
+  for (const internal::LoweredFunc& function : module.functions()) {
     if (function.linkage == LinkageType::Internal) continue;
     for (const auto& [other, where] : found) {
       if (other.name != function.name) continue;
@@ -135,15 +135,15 @@ std::vector<uint64_t> feature_mask(const Target& target) {
 
 }  // namespace
 
-std::vector<Internal::LoweredFunc> exported_functions(const Module& module) {
-  std::vector<std::pair<Internal::LoweredFunc, Module>> found;
+std::vector<internal::LoweredFunc> exported_functions(const Module& module) {
+  std::vector<std::pair<internal::LoweredFunc, Module>> found;
   collect(module, module, found);
-  std::vector<Internal::LoweredFunc> functions;
+  std::vector<internal::LoweredFunc> functions;
   for (auto& [function, where] : found) functions.push_back(std::move(function));
   return functions;
 }
 
-Signature signature_of(const Internal::LoweredFunc& function, const Module& module) {
+Signature signature_of(const internal::LoweredFunc& function, const Module& module) {
   Signature signature;
   for (const Argument& argument : function.args)
     signature.arguments.push_back(export_argument(argument, module.get_metadata_name_map()));
@@ -152,7 +152,7 @@ Signature signature_of(const Internal::LoweredFunc& function, const Module& modu
 }
 
 codegen::Program program_of(const Module& module) {
-  std::vector<std::pair<Internal::LoweredFunc, Module>> found;
+  std::vector<std::pair<internal::LoweredFunc, Module>> found;
   collect(module, module, found);
   codegen::Program program;
   for (const auto& [function, where] : found) {
@@ -165,7 +165,7 @@ codegen::Program program_of(const Module& module) {
 
 Signature dispatcher_signature(const std::string& function_name, const Module& baseline) {
   RETROGRADE_ASSERT(baseline.functions().size() == 1, "a variant has one function");
-  const Internal::LoweredFunc& function = baseline.functions()[0];
+  const internal::LoweredFunc& function = baseline.functions()[0];
   Signature signature = signature_of(function, baseline);
   set_symbols(signature, function_name, baseline.target(), function.linkage);
   return signature;

@@ -10,9 +10,9 @@
 namespace retrograde::aot {
 
 // Functions of the module and of its submodules that callers can reach.
-std::vector<Internal::LoweredFunc> exported_functions(const Module& module);
+std::vector<internal::LoweredFunc> exported_functions(const Module& module);
 
-codegen::Signature signature_of(const Internal::LoweredFunc& function, const Module& module);
+codegen::Signature signature_of(const internal::LoweredFunc& function, const Module& module);
 codegen::Program program_of(const Module& module);
 
 // The function that chooses among modules[i], which were made for their own targets.

@@ -102,7 +102,24 @@ std::string Machine::math_symbol(const std::string& stem, const std::string& pre
          precision + sleef_suffix(*this, lanes == 1 ? 0 : lanes * bits);
 }
 
+namespace {
+
+void refuse_sanitizers(const Target& target) {
+  for (const F sanitizer : {F::MSAN, F::TSAN, F::ASAN, F::SanitizerCoverage}) {
+    if (!target.has_feature(sanitizer)) continue;
+    const std::string name = quoted(Target::feature_to_name(sanitizer));
+    unsupported("generate code for target \"" + target.to_string() + "\"",
+                "generated code carries no checks of a sanitizer", "the target asks for " + name,
+                "Leave out " + name +
+                    ": code without it links with programs that a sanitizer checks, and bounds "
+                    "are checked at every call");
+  }
+}
+
+}  // namespace
+
 Machine machine_for(const Target& target, bool tune_for_host) {
+  refuse_sanitizers(target);
   if (const std::string part = target.unsupported_part(); !part.empty()) {
     unsupported("generate code for target \"" + target.to_string() + "\"",
                 "code is generated for 64-bit x86 and ARM under Linux",

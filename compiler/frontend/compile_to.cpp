@@ -7,6 +7,7 @@
 #include "diagnostics/error.h"
 #include "frontend/func.h"
 #include "frontend/pipeline.h"
+#include "frontend/warnings.h"
 
 namespace retrograde {
 namespace {
@@ -160,10 +161,11 @@ Module Pipeline::compile_to_module(const std::vector<Argument>& args,
   const std::string name = function_name.empty() ? default_name(pipeline) : function_name;
   check_function_name(name, target);
   Inputs inputs(pipeline, args, "compile the function " + quoted(name));
-  Internal::LoweredFunc function;
+  internal::LoweredFunc function;
   function.name = name;
   function.linkage = linkage;
-  function.lowered = module_compiler().lower({name, pipeline.outputs}, inputs.inputs, target);
+  function.lowered =
+      module_compiler().lower({name, pipeline.outputs}, inputs.inputs, pipeline.traced(target));
   if (target.has_feature(Target::UserContext)) function.args.push_back(user_context_argument());
   function.args.insert(function.args.end(), args.begin(), args.end());
   for (const ir::LoweredArgument& argument : function.lowered.args) {
@@ -171,6 +173,7 @@ Module Pipeline::compile_to_module(const std::vector<Argument>& args,
       function.args.push_back(output_argument(argument));
   }
   add_estimates(pipeline.outputs, function.args);
+  ir::tell_warnings(pipeline.outputs);
   Module module(name, target);
   module.append(function);
   return module;
@@ -222,7 +225,7 @@ void Pipeline::compile_to_lowered_stmt(const std::string& filename,
 void Pipeline::compile_to_file(const std::string& filename_prefix,
                                const std::vector<Argument>& args, const std::string& function_name,
                                const Target& target) {
-  const auto info = Internal::get_output_info(target);
+  const auto info = internal::get_output_info(target);
   compile_to({{OutputFileType::object, filename_prefix + info.at(OutputFileType::object).extension},
               {OutputFileType::c_header, filename_prefix + ".h"}},
              args, function_name, target);
@@ -231,7 +234,7 @@ void Pipeline::compile_to_file(const std::string& filename_prefix,
 void Pipeline::compile_to_static_library(const std::string& filename_prefix,
                                          const std::vector<Argument>& args,
                                          const std::string& function_name, const Target& target) {
-  const auto info = Internal::get_output_info(target);
+  const auto info = internal::get_output_info(target);
   compile_to({{OutputFileType::static_library,
                filename_prefix + info.at(OutputFileType::static_library).extension},
               {OutputFileType::c_header, filename_prefix + ".h"}},
@@ -252,7 +255,7 @@ void Pipeline::compile_to_multitarget_static_library(const std::string& filename
   const std::string extension =
       targets.empty()
           ? ".a"
-          : Internal::get_output_info(targets.back()).at(OutputFileType::static_library).extension;
+          : internal::get_output_info(targets.back()).at(OutputFileType::static_library).extension;
   compile_multitarget(name_in_prefix(filename_prefix),
                       {{OutputFileType::static_library, filename_prefix + extension},
                        {OutputFileType::c_header, filename_prefix + ".h"}},
@@ -269,7 +272,7 @@ void Pipeline::compile_to_multitarget_object_files(const std::string& filename_p
   const std::string extension =
       targets.empty()
           ? ".o"
-          : Internal::get_output_info(targets.back()).at(OutputFileType::object).extension;
+          : internal::get_output_info(targets.back()).at(OutputFileType::object).extension;
   compile_multitarget(name_in_prefix(filename_prefix),
                       {{OutputFileType::object, filename_prefix + extension},
                        {OutputFileType::c_header, filename_prefix + ".h"}},

@@ -2,6 +2,10 @@
 
 namespace retrograde {
 
+Expr user_context_value() {
+  return ir::call_op(ir::Op::runtime_call, Handle(), {Expr("retrograde_user_context")});
+}
+
 Expr concat_bits(const std::vector<Expr>& parts) {
   const std::string asked = "concatenate bits";
   if (parts.empty()) user_error(asked, "there is at least one part", "none was given");

@@ -73,12 +73,9 @@ Expr extract_bits(const Expr& e, const Expr& lowest) {
 // The bits of all, the first lowest, as one unsigned number.
 Expr concat_bits(const std::vector<Expr>& parts);
 
-// The caller's context as an argument of a C function: it is handed to handlers only.
-inline Expr user_context_value() {
-  unsupported("use user_context_value()", "C functions are called with values of the pipeline",
-              "the caller's context is given to handlers only",
-              "Pass what the function needs as a Param<void*>");
-}
+// What the caller handed over, for a C function: the JITUserContext of realize(), or one of its
+// own; ahead of time, with Target::UserContext, the first argument.
+Expr user_context_value();
 
 // f(scatter(a, b)) = gather(x, y): several points in one definition.
 template <typename... Points>

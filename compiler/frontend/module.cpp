@@ -11,7 +11,7 @@ namespace retrograde {
 struct Module::Contents {
   std::string name;
   Target target;
-  std::vector<Internal::LoweredFunc> functions;
+  std::vector<internal::LoweredFunc> functions;
   std::vector<Module> submodules;
   std::map<std::string, std::string> metadata_names;
 };
@@ -22,7 +22,7 @@ std::ostream& operator<<(std::ostream& out, const LinkageType& linkage) {
   return out << names[static_cast<int>(linkage)];
 }
 
-namespace Internal {
+namespace internal {
 
 std::map<OutputFileType, const OutputInfo> get_output_info(const Target& target) {
   const bool is_windows = target.os == Target::Windows;
@@ -46,7 +46,7 @@ std::map<OutputFileType, const OutputInfo> get_output_info(const Target& target)
   };
 }
 
-}  // namespace Internal
+}  // namespace internal
 
 // ---- Module ----
 
@@ -58,14 +58,14 @@ Module::Module(const std::string& name, const Target& target)
 
 const Target& Module::target() const { return contents_->target; }
 const std::string& Module::name() const { return contents_->name; }
-const std::vector<Internal::LoweredFunc>& Module::functions() const { return contents_->functions; }
-std::vector<Internal::LoweredFunc>& Module::functions() { return contents_->functions; }
+const std::vector<internal::LoweredFunc>& Module::functions() const { return contents_->functions; }
+std::vector<internal::LoweredFunc>& Module::functions() { return contents_->functions; }
 const std::vector<Module>& Module::submodules() const { return contents_->submodules; }
 bool Module::any_strict_float() const { return target().has_feature(Target::StrictFloat); }
 
-Internal::LoweredFunc Module::get_function_by_name(const std::string& name) const {
+internal::LoweredFunc Module::get_function_by_name(const std::string& name) const {
   std::string names;
-  for (const Internal::LoweredFunc& function : functions()) {
+  for (const internal::LoweredFunc& function : functions()) {
     if (function.name == name) return function;
     names += (names.empty() ? "" : ", ") + quoted(function.name);
   }
@@ -74,8 +74,8 @@ Internal::LoweredFunc Module::get_function_by_name(const std::string& name) cons
              names.empty() ? "it has none" : "it has " + names);
 }
 
-void Module::append(const Internal::LoweredFunc& function) {
-  for (const Internal::LoweredFunc& other : functions()) {
+void Module::append(const internal::LoweredFunc& function) {
+  for (const internal::LoweredFunc& other : functions()) {
     if (other.name != function.name) continue;
     user_error("append the function " + quoted(function.name) + " to the module " + quoted(name()),
                "functions of a module have different names", "it has one of that name",
@@ -120,7 +120,7 @@ Module link_modules(const std::string& name, const std::vector<Module>& modules)
                  quoted(modules[0].name()) + " is for " + quoted(result.target().to_string()) +
                      ", " + quoted(module.name()) + " for " + quoted(module.target().to_string()));
     }
-    for (const Internal::LoweredFunc& function : module.functions()) result.append(function);
+    for (const internal::LoweredFunc& function : module.functions()) result.append(function);
     for (const Module& submodule : module.submodules()) result.append(submodule);
     for (const auto& [from, to] : module.get_metadata_name_map())
       result.remap_metadata_name(from, to);

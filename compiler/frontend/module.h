@@ -51,7 +51,7 @@ std::ostream& operator<<(std::ostream& out, const LinkageType& linkage);
 // Of compile_to_lowered_stmt.
 enum StmtOutputFormat { Text, HTML };
 
-namespace Internal {
+namespace internal {
 
 struct OutputInfo {
   std::string name, extension;  // "object", ".o"
@@ -69,7 +69,7 @@ struct LoweredFunc {
   ir::LoweredFunction lowered;
 };
 
-}  // namespace Internal
+}  // namespace internal
 
 class Module {
  public:
@@ -77,15 +77,15 @@ class Module {
 
   const Target& target() const;
   const std::string& name() const;
-  const std::vector<Internal::LoweredFunc>& functions() const;
-  std::vector<Internal::LoweredFunc>& functions();
+  const std::vector<internal::LoweredFunc>& functions() const;
+  std::vector<internal::LoweredFunc>& functions();
   const std::vector<Module>& submodules() const;
   bool any_strict_float() const;  // its target is strict about all floats
   // CompileError when there is none.
-  Internal::LoweredFunc get_function_by_name(const std::string& name) const;
+  internal::LoweredFunc get_function_by_name(const std::string& name) const;
 
   // CompileError when a function or submodule of that name is there.
-  void append(const Internal::LoweredFunc& function);
+  void append(const internal::LoweredFunc& function);
   void append(const Module& module);
 
   // Writes the files. CompileError when one cannot be written: then none is left half-written.

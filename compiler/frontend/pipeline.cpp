@@ -7,6 +7,7 @@
 
 #include "frontend/call.h"
 #include "frontend/func.h"
+#include "frontend/warnings.h"
 #include "frontend/wrappers.h"
 
 namespace retrograde {
@@ -189,6 +190,7 @@ std::shared_ptr<CompiledPipeline> Pipeline::compiled(const Target& wanted) const
     contents.stamp = Stamp::of(contents.outputs);
     contents.compiled = default_compiler().compile(spec(), target);
     contents.target = target;
+    ir::tell_warnings(contents.outputs);
   }
   return contents.compiled;
 }

@@ -9,7 +9,7 @@
 #include "generator/generator_base.h"
 #include "generator/registry.h"
 
-namespace retrograde::Internal {
+namespace retrograde::internal {
 
 namespace {
 
@@ -214,7 +214,7 @@ CommandLine read_command_line(int argc, const char* const* argv) {
     }
     if (word.size() != 2 || word[0] != '-' || flags.find(word[1]) == std::string::npos) {
       user_error(asked, "its arguments are flags of one letter and param=value",
-                 quoted(word) + " is neither", "See the usage");
+                 quoted(word) + " is neither", "See --help");
     }
     if (i + 1 == argc)
       user_error(asked, "every flag has a value", word + " has none", "Put it behind the flag");
@@ -249,13 +249,24 @@ std::string usage() {
          "  -t  give up after so many seconds; 0: never; by default 900\n";
 }
 
+static bool asks_for_help(int argc, const char* const* argv) {
+  for (int i = 1; i < argc; i++) {
+    if (std::string(argv[i]) == "--help" || std::string(argv[i]) == "-h") return true;
+  }
+  return argc <= 1;
+}
+
 int generate_filter_main(int argc, char** argv, std::ostream& errors) {
   try {
+    if (asks_for_help(argc, argv)) {
+      errors << usage();
+      return argc <= 1 ? 1 : 0;
+    }
     CommandLine command;
     try {
       command = prepare(argc, argv);
     } catch (const Error& error) {
-      errors << "Error: " << error.what() << "\n" << usage();
+      errors << "Error: " << error.what() << "\nRun it with --help for its usage.\n";
       return 1;
     }
     run(command);
@@ -270,4 +281,4 @@ int generate_filter_main(int argc, char** argv) {
   return generate_filter_main(argc, argv, std::cerr);
 }
 
-}  // namespace retrograde::Internal
+}  // namespace retrograde::internal

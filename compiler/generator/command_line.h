@@ -12,7 +12,7 @@
 
 #include "frontend/module.h"
 
-namespace retrograde::Internal {
+namespace retrograde::internal {
 
 struct CommandLine {
   std::string generator, function, folder, file_base, runtime, scheduler;
@@ -31,9 +31,9 @@ CommandLine read_command_line(int argc, const char* const* argv);
 void run(const CommandLine& command);
 std::string usage();
 
-// All of it: what goes wrong is written to `errors`, with the usage where the command line is to
-// blame. The program's exit status: 0, or 1.
+// All of it: what goes wrong is written to `errors`, and nothing else; with --help, or without any
+// argument, the usage. The program's exit status: 0, or 1.
 int generate_filter_main(int argc, char** argv, std::ostream& errors);
 int generate_filter_main(int argc, char** argv);  // errors to the standard error stream
 
-}  // namespace retrograde::Internal
+}  // namespace retrograde::internal

@@ -5,7 +5,7 @@
 
 #include "frontend/compiler_interface.h"
 
-namespace retrograde::Internal {
+namespace retrograde::internal {
 
 namespace {
 
@@ -42,7 +42,7 @@ std::string element_type(const GIOBase& io, const char* buffer_class) {
       break;
   }
   const bool is_known = io.types_defined() && io.types().size() == 1;
-  return text("::retrograde::Internal::", buffer_class, "<",
+  return text("::retrograde::internal::", buffer_class, "<",
               is_known ? cpp_element_name(io.types()[0]) : "", ">");
 }
 
@@ -61,8 +61,8 @@ void add_open_parts(const GIOBase& output, std::vector<Member>& params) {
   };
   if (!output.types_defined())
     add("::retrograde::Type", "type", "::retrograde::Type()", "::retrograde::to_string");
-  if (!output.dims_defined()) add("int", "dim", "-1", "::retrograde::Internal::param_text");
-  if (!output.array_size_defined()) add("int", "size", "-1", "::retrograde::Internal::param_text");
+  if (!output.dims_defined()) add("int", "dim", "-1", "::retrograde::internal::param_text");
+  if (!output.array_size_defined()) add("int", "size", "-1", "::retrograde::internal::param_text");
 }
 
 class StubWriter {
@@ -148,8 +148,8 @@ class StubWriter {
 
   std::string map_of_params() const {
     std::string body =
-        "    ::retrograde::Internal::GeneratorParamsMap to_generator_params_map() "
-        "const {\n      ::retrograde::Internal::GeneratorParamsMap map;\n";
+        "    ::retrograde::internal::GeneratorParamsMap to_generator_params_map() "
+        "const {\n      ::retrograde::internal::GeneratorParamsMap map;\n";
     for (const Member& param : params_) {
       const bool is_open = param.key.find('.') != std::string::npos;
       const std::string set = "map.insert_or_assign(\"" + param.key + "\", " + param.text + ");\n";
@@ -193,19 +193,19 @@ class StubWriter {
       if (!is_array_output_[i])
         outputs.push_back(funcs + ".at(0)");
       else
-        outputs.push_back("::retrograde::Internal::StubOutputs{" + funcs + "}");
+        outputs.push_back("::retrograde::internal::StubOutputs{" + funcs + "}");
     }
     outputs.push_back("generator->get_target()");
     out_
         << "  static Outputs generate(const ::retrograde::GeneratorContext& context, const Inputs& "
            "inputs,\n                          const GeneratorParams& params = {}) {\n"
-        << "    auto generator = ::retrograde::Internal::GeneratorRegistry::create(\"" << generator_
+        << "    auto generator = ::retrograde::internal::GeneratorRegistry::create(\"" << generator_
         << "\", context);\n"
         << "    generator->set_generator_param_values(params.to_generator_params_map());\n"
         << "    generator->set_inputs(" << joined(inputs, ", ") << ");\n"
         << "    generator->schedule_all();\n"
         << "    return {" << joined(outputs, ",\n            ") << "};\n  }\n"
-        << "  static Outputs generate(const ::retrograde::Internal::GeneratorBase* caller,\n"
+        << "  static Outputs generate(const ::retrograde::internal::GeneratorBase* caller,\n"
         << "                          const Inputs& inputs, const GeneratorParams& params = {}) {\n"
         << "    return generate(caller->context(), inputs, params);\n  }\n"
         << "  static Outputs generate(const ::retrograde::Target& target, const Inputs& inputs,\n"
@@ -225,4 +225,4 @@ void GeneratorBase::emit_cpp_stub(const std::string& path) const {
   module_compiler().write_text(path, writer.text());
 }
 
-}  // namespace retrograde::Internal
+}  // namespace retrograde::internal

@@ -15,7 +15,7 @@
 #include "generator/generator_base.h"
 #include "generator/registry.h"
 
-namespace retrograde::Internal {
+namespace retrograde::internal {
 
 // An image for an Input<Buffer<T>>.
 template <typename T = void>
@@ -46,4 +46,4 @@ struct StubOutputs {
   }
 };
 
-}  // namespace retrograde::Internal
+}  // namespace retrograde::internal

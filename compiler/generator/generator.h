@@ -23,7 +23,7 @@
 namespace retrograde {
 
 template <typename T>
-class Generator : public Internal::GeneratorBase {
+class Generator : public internal::GeneratorBase {
  public:
   static std::unique_ptr<T> create(const GeneratorContext& context) {
     auto generator = std::make_unique<T>();

@@ -9,7 +9,7 @@
 #include "ir/equal.h"
 #include "ir/scalar.h"
 
-namespace retrograde::Internal {
+namespace retrograde::internal {
 
 namespace {
 
@@ -132,7 +132,8 @@ void GeneratorBase::unknown_param(const std::string& key) const {
   std::string list;
   for (const std::string& name : known) list += (list.empty() ? "" : ", ") + quoted(name);
   user_error("set the GeneratorParam " + quoted(key) + " of the generator " + quoted(name_),
-             "the generator declares it", "it has " + list, "Name one of these");
+             "a name is that of a param, or an open part of an input or output, of this generator",
+             "it has " + list, "Name one of these");
 }
 
 void GeneratorBase::check_names() const {
@@ -234,8 +235,14 @@ Pipeline GeneratorBase::get_pipeline() {
     }
     pipeline_ = Pipeline(funcs);
     add_requirements(pipeline_);
+    if (is_traced_) pipeline_.trace_pipeline();
   }
   return pipeline_;
+}
+
+void GeneratorBase::trace_pipeline() {
+  is_traced_ = true;
+  if (pipeline_.defined()) pipeline_.trace_pipeline();
 }
 
 std::vector<Func> GeneratorBase::output_funcs(const std::string& name) const {
@@ -245,7 +252,8 @@ std::vector<Func> GeneratorBase::output_funcs(const std::string& name) const {
     list += (list.empty() ? "" : ", ") + quoted(output->name());
   }
   user_error("take the output " + quoted(name) + " of the generator " + quoted(name_),
-             "the generator declares it", "its outputs are " + list, "Name one of these");
+             "a name is that of an output of this generator", "its outputs are " + list,
+             "Name one of these");
 }
 
 void GeneratorBase::add_requirements(Pipeline& pipeline) const {
@@ -296,6 +304,13 @@ std::vector<std::string> GeneratorBase::input_names() const {
   return names;
 }
 
+Callable GeneratorBase::compile_to_callable() {
+  schedule_all();
+  Pipeline pipeline = get_pipeline();
+  auto_schedule_pipeline(pipeline);
+  return pipeline.compile_to_callable(input_arguments(), get_target().with_feature(Target::JIT));
+}
+
 Module GeneratorBase::build_module(const std::string& function_name, LinkageType linkage) {
   schedule_all();
   Pipeline pipeline = get_pipeline();
@@ -313,4 +328,4 @@ Module GeneratorBase::build_module(const std::string& function_name, LinkageType
   return to_module(pipeline, input_arguments(), names, function_name, linkage);
 }
 
-}  // namespace retrograde::Internal
+}  // namespace retrograde::internal

@@ -19,7 +19,7 @@
 #include "generator/members.h"
 
 namespace retrograde {
-namespace Internal {
+namespace internal {
 
 // A param's value: as text, or a level to be computed at.
 struct StringOrLoopLevel {
@@ -92,7 +92,8 @@ class GeneratorBase : public NamesInterface {
   void schedule_all();
   // All outputs together; after generate().
   Pipeline get_pipeline();
-  void trace_pipeline() { get_pipeline().trace_pipeline(); }
+  // Every call tells when it begins and ends; may be said before generate() has run.
+  void trace_pipeline();
   // Of one output; CompileError when there is none of the name. After generate().
   std::vector<Func> output_funcs(const std::string& name) const;
   template <typename... Args>
@@ -108,6 +109,8 @@ class GeneratorBase : public NamesInterface {
   // The function takes the inputs, then the outputs. Its name defaults to the generator's.
   Module build_module(const std::string& function_name = "",
                       LinkageType linkage = LinkageType::ExternalPlusMetadata);
+  // The same in this process: see Pipeline::compile_to_callable.
+  Callable compile_to_callable();
   // The gradient of every output with respect to every image: the function takes the same inputs,
   // then for each output _grad_loss_for_<output>, then for each output and each image input
   // _grad_loss_<output>_wrt_<input>, all of the shape of what they belong to. schedule() is not
@@ -197,6 +200,7 @@ class GeneratorBase : public NamesInterface {
   Phase phase_ = Phase::Created;
   std::vector<std::unique_ptr<GIOBase>> extras_;
   std::vector<Requirement> requirements_;
+  bool is_traced_ = false;
   Pipeline pipeline_;
 };
 
@@ -242,5 +246,5 @@ void GeneratorBase::set_input(size_t i, const std::vector<A>& args) {
   set_input_values(i, std::move(values));
 }
 
-}  // namespace Internal
+}  // namespace internal
 }  // namespace retrograde

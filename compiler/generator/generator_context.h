@@ -44,7 +44,7 @@ class GeneratorContext {
   MachineParams machine_;
 };
 
-namespace Internal {
+namespace internal {
 
 class NamesInterface {
  protected:
@@ -79,5 +79,5 @@ class NamesInterface {
   static Type UInt(int bits, int lanes = 1) { return retrograde::UInt(bits, lanes); }
 };
 
-}  // namespace Internal
+}  // namespace internal
 }  // namespace retrograde

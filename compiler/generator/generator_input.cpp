@@ -3,7 +3,7 @@
 
 #include "generator/generator_base.h"
 
-namespace retrograde::Internal {
+namespace retrograde::internal {
 
 InputValue InputValue::of_func(const Func& f) {
   InputValue value;
@@ -75,10 +75,29 @@ void GeneratorInputBase::set_values(std::vector<InputValue> values) {
   values_changed();
 }
 
+void GeneratorInputBase::set_estimate_of(const Var& var, const Expr& min,
+                                         const Expr& extent) const {
+  for (const InputValue& value : values_) {
+    if (!value.parameter) continue;
+    const ImageParam image(value.parameter);
+    const std::vector<Var> names = Func(image).args();
+    size_t d = 0;
+    while (d < names.size() && names[d].name() != var.name()) d++;
+    if (d == names.size()) {
+      std::string list;
+      for (const Var& name : names) list += (list.empty() ? "" : ", ") + quoted(name.name());
+      refuse("set an estimate of " + quoted(var.name()) + " of",
+             "a dimension goes by the name of the input's argument", "these are " + list,
+             "Use one of them, or dim(i).set_estimate()");
+    }
+    image.dim(static_cast<int>(d)).set_estimate(min, extent);
+  }
+}
+
 void GeneratorInputBase::check_ready() const {
   if (!values_.empty() || (array_size_defined() && array_size() == 0)) return;
   refuse("use", "inputs have values in generate() and schedule()", "it has none yet",
          "Use it there, and in configure() its declaration only");
 }
 
-}  // namespace retrograde::Internal
+}  // namespace retrograde::internal

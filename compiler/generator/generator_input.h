@@ -16,7 +16,7 @@
 #include "generator/generator_io.h"
 
 namespace retrograde {
-namespace Internal {
+namespace internal {
 
 // One element of an input: a parameter of the compiled function, or a value given from C++.
 struct InputValue {
@@ -48,6 +48,8 @@ class GeneratorInputBase : public GIOBase {
   // Default, limits and estimate of a scalar's parameter.
   virtual void describe(ir::ParameterContents&) const {}
   void check_ready() const;  // CompileError before generate()
+  // Of the dimension that the Func of an image or Func has under this name.
+  void set_estimate_of(const Var& var, const Expr& min, const Expr& extent) const;
 
  private:
   std::vector<InputValue> values_;
@@ -121,31 +123,45 @@ class ScalarElements : public InputElements<T> {
   bool has_default_ = false, has_limits_ = false;
 };
 
-}  // namespace Internal
+}  // namespace internal
 
 // One image or Func: it is its handle.
 template <typename T>
-class GeneratorInput : public Internal::InputElements<T>,
-                       public Internal::ElementTraits<T>::Handle {
-  using Base = Internal::InputElements<T>;
-  using Handle = typename Internal::ElementTraits<T>::Handle;
+class GeneratorInput : public internal::InputElements<T>,
+                       public internal::ElementTraits<T>::Handle {
+  using Base = internal::InputElements<T>;
+  using GeneratorInputBase = internal::GeneratorInputBase;
+  using Handle = typename internal::ElementTraits<T>::Handle;
 
  public:
   template <typename... Args>
-  requires std::is_constructible_v<Internal::Declared, Args...>
-  explicit GeneratorInput(Args&&... args) : Base(Internal::Declared(std::forward<Args>(args)...)) {}
+  requires std::is_constructible_v<internal::Declared, Args...>
+  explicit GeneratorInput(Args&&... args) : Base(internal::Declared(std::forward<Args>(args)...)) {}
   using Base::name;
   using Base::type;
   using Base::types;
   int dimensions() const { return Base::dims(); }
   Handle& handle() { return *this; }
 
-  // Guesses of its size, for schedulers.
+  // Guesses of its size, for schedulers. `var` is one of _0, _1, ..., or an argument of the Func.
+  GeneratorInput& set_estimate(const Var& var, const Expr& min, const Expr& extent) {
+    Base::check_ready();
+    GeneratorInputBase::set_estimate_of(var, min, extent);
+    return *this;
+  }
   GeneratorInput& set_estimates(const Region& estimates) {
+    Base::check_ready();
     if (const auto& image = Base::values().at(0).parameter) {
       ImageParam(image).set_estimates(estimates);
     }
     return *this;
+  }
+  // What a C function is given of it: the buffer itself, where there is one.
+  operator ExternFuncArgument() const requires std::is_same_v<Handle, Func> {
+    Base::check_ready();
+    const auto& image = Base::values().at(0).parameter;
+    return image ? ExternFuncArgument(ImageParam(image))
+                 : ExternFuncArgument(Func(Base::values().at(0).func));
   }
 
  protected:
@@ -157,11 +173,11 @@ class GeneratorInput : public Internal::InputElements<T>,
 
 // One scalar.
 template <typename T>
-requires(Internal::IsScalarIO<T> && !Internal::IsArrayIO<T>) class GeneratorInput<T>
-    : public Internal::ScalarElements<T> {
-  using Base = Internal::ScalarElements<T>;
+requires(internal::IsScalarIO<T> && !internal::IsArrayIO<T>) class GeneratorInput<T>
+    : public internal::ScalarElements<T> {
+  using Base = internal::ScalarElements<T>;
   using Value = typename Base::Value;
-  using Declared = Internal::Declared;
+  using Declared = internal::Declared;
 
  public:
   explicit GeneratorInput(const std::string& name) : Base(Declared(name)) {}
@@ -174,14 +190,14 @@ requires(Internal::IsScalarIO<T> && !Internal::IsArrayIO<T>) class GeneratorInpu
 
 // An array.
 template <typename T>
-requires Internal::IsArrayIO<T>
+requires internal::IsArrayIO<T>
 class GeneratorInput<T>
-    : public std::conditional_t<Internal::IsScalarIO<T>, Internal::ScalarElements<T>,
-                                Internal::InputElements<T>> {
-  using Base = std::conditional_t<Internal::IsScalarIO<T>, Internal::ScalarElements<T>,
-                                  Internal::InputElements<T>>;
-  using Declared = Internal::Declared;
-  static constexpr bool is_scalar = Internal::IsScalarIO<T>;
+    : public std::conditional_t<internal::IsScalarIO<T>, internal::ScalarElements<T>,
+                                internal::InputElements<T>> {
+  using Base = std::conditional_t<internal::IsScalarIO<T>, internal::ScalarElements<T>,
+                                  internal::InputElements<T>>;
+  using Declared = internal::Declared;
+  static constexpr bool is_scalar = internal::IsScalarIO<T>;
 
  public:
   explicit GeneratorInput(const std::string& name) : Base(Declared(name)) {}
@@ -207,11 +223,13 @@ class GeneratorInput<T>
       : Base(Declared(size, name), value, min, max) {}
 
   size_t size() const { return Base::handles().size(); }
-  const auto& operator[](size_t i) const {
+  // A handle of the element: what is said of it is said of the input.
+  auto operator[](size_t i) const {
+    const auto& handles = Base::handles();
     this->check_index(i);
-    return Base::handles()[i];
+    return handles[i];
   }
-  const auto& at(size_t i) const { return (*this)[i]; }
+  auto at(size_t i) const { return (*this)[i]; }
   auto begin() const { return Base::handles().begin(); }
   auto end() const { return Base::handles().end(); }
   void set_estimate(size_t i, const Expr& value) requires is_scalar {

@@ -4,7 +4,7 @@
 #include "generator/generator_base.h"
 #include "ir/print.h"
 
-namespace retrograde::Internal {
+namespace retrograde::internal {
 
 namespace {
 
@@ -133,4 +133,4 @@ void GIOBase::check_index(size_t i) const {
          text("its size is ", array_size()), "Take an element that it has, or give another size");
 }
 
-}  // namespace retrograde::Internal
+}  // namespace retrograde::internal

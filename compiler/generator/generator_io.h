@@ -12,7 +12,7 @@
 #include "generator/members.h"
 
 namespace retrograde {
-namespace Internal {
+namespace internal {
 
 enum class IOKind { Scalar, Function, Buffer };
 
@@ -162,5 +162,5 @@ concept IsScalarIO = ElementTraits<ElementOf<T>>::kind == IOKind::Scalar;
 template <typename T>
 concept IsArrayIO = ArrayTraits<T>::is_array;
 
-}  // namespace Internal
+}  // namespace internal
 }  // namespace retrograde

@@ -11,7 +11,7 @@ namespace {
 void limit_time(int argc, char** argv) {
   try {
     alarm(
-        static_cast<unsigned>(retrograde::Internal::read_command_line(argc, argv).timeout_seconds));
+        static_cast<unsigned>(retrograde::internal::read_command_line(argc, argv).timeout_seconds));
   } catch (const std::exception&) {  // generate_filter_main reports it
   }
 }
@@ -20,5 +20,5 @@ void limit_time(int argc, char** argv) {
 
 int main(int argc, char** argv) {
   limit_time(argc, argv);
-  return retrograde::Internal::generate_filter_main(argc, argv, std::cerr);
+  return retrograde::internal::generate_filter_main(argc, argv, std::cerr);
 }

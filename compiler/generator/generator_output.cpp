@@ -3,7 +3,7 @@
 
 #include "generator/generator_base.h"
 
-namespace retrograde::Internal {
+namespace retrograde::internal {
 
 GeneratorOutputBase::GeneratorOutputBase(Declared declared, IOKind kind, Declared said,
                                          bool is_array)
@@ -12,8 +12,17 @@ GeneratorOutputBase::GeneratorOutputBase(Declared declared, IOKind kind, Declare
 }
 
 Func GeneratorOutputBase::make_func(size_t i) const {
-  if (types_defined() && dims_defined()) return Func(types(), dims(), element_name(i));
-  return Func(element_name(i));
+  Func f;
+  declare(f, i);
+  return f;
+}
+
+void GeneratorOutputBase::declare(const Func& f, size_t i) const {
+  ir::FuncContents& contents = *f.function();
+  contents.name = ir::claim_name(element_name(i));
+  if (!types_defined() || !dims_defined()) return;
+  contents.required_types = types();
+  contents.required_dimensions = dims();
 }
 
 void GeneratorOutputBase::check_assignable(const Func& f) const {
@@ -35,4 +44,4 @@ void GeneratorOutputBase::check_defined() {
   }
 }
 
-}  // namespace retrograde::Internal
+}  // namespace retrograde::internal

@@ -16,7 +16,7 @@
 #include "generator/generator_io.h"
 
 namespace retrograde {
-namespace Internal {
+namespace internal {
 
 class GeneratorOutputBase : public GIOBase {
  public:
@@ -30,6 +30,9 @@ class GeneratorOutputBase : public GIOBase {
  protected:
   GeneratorOutputBase(Declared declared, IOKind kind, Declared said, bool is_array);
   Func make_func(size_t i) const;
+  // The Func of element i is to be as declared. The handle stays the same: who took it before
+  // generate() has run has the output.
+  void declare(const Func& f, size_t i) const;
   void check_assignable(const Func& f) const;
 };
 
@@ -44,14 +47,14 @@ class OutputElements : public GeneratorOutputBase {
             IsArrayIO<T>) {}
 };
 
-}  // namespace Internal
+}  // namespace internal
 
 // One output: it is a Func.
 template <typename T>
-class GeneratorOutput : public Internal::OutputElements<T>, public Func {
-  using Base = Internal::OutputElements<T>;
-  using Declared = Internal::Declared;
-  static constexpr bool is_image = Internal::ElementTraits<T>::kind == Internal::IOKind::Buffer;
+class GeneratorOutput : public internal::OutputElements<T>, public Func {
+  using Base = internal::OutputElements<T>;
+  using Declared = internal::Declared;
+  static constexpr bool is_image = internal::ElementTraits<T>::kind == internal::IOKind::Buffer;
 
  public:
   template <typename... Args>
@@ -94,15 +97,17 @@ class GeneratorOutput : public Internal::OutputElements<T>, public Func {
   Expr bottom() const requires is_image { return output_buffer().bottom(); }
 
   std::vector<Func> funcs() const override { return {*this}; }
-  void make_funcs() override { static_cast<Func&>(*this) = Base::make_func(0); }
+  void make_funcs() override {
+    if (!Func::defined()) Base::declare(*this, 0);
+  }
 };
 
 // An array of outputs.
 template <typename T>
-requires Internal::IsArrayIO<T>
-class GeneratorOutput<T> : public Internal::OutputElements<T> {
-  using Base = Internal::OutputElements<T>;
-  using Declared = Internal::Declared;
+requires internal::IsArrayIO<T>
+class GeneratorOutput<T> : public internal::OutputElements<T> {
+  using Base = internal::OutputElements<T>;
+  using Declared = internal::Declared;
 
  public:
   template <typename... Args>
@@ -134,6 +139,10 @@ class GeneratorOutput<T> : public Internal::OutputElements<T> {
   auto begin() const { return funcs_.begin(); }
   auto end() const { return funcs_.end(); }
   // Of every element.
+  GeneratorOutput& set_estimate(const Var& var, const Expr& min, const Expr& extent) {
+    for (Func& f : funcs_) f.set_estimate(var, min, extent);
+    return *this;
+  }
   GeneratorOutput& set_estimates(const Region& estimates) {
     for (Func& f : funcs_) f.set_estimates(estimates);
     return *this;

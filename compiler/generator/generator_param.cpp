@@ -6,7 +6,7 @@
 #include "generator/generator_base.h"
 #include "generator/members.h"
 
-namespace retrograde::Internal {
+namespace retrograde::internal {
 
 GeneratorParamBase::GeneratorParamBase(const std::string& name) : name_(name) {
   if (GeneratorMembers* members = GeneratorMembers::around(this)) members->params.push_back(this);
@@ -92,4 +92,4 @@ std::optional<LoopLevel> read_loop_level(const std::string& text) {
   return std::nullopt;
 }
 
-}  // namespace retrograde::Internal
+}  // namespace retrograde::internal

@@ -21,7 +21,7 @@
 #include "ir/print.h"
 
 namespace retrograde {
-namespace Internal {
+namespace internal {
 
 class GeneratorParamBase {
  public:
@@ -102,10 +102,10 @@ bool keeps_value(From from) {
   }
 }
 
-}  // namespace Internal
+}  // namespace internal
 
 template <typename T>
-class GeneratorParam : public Internal::GeneratorParamBase {
+class GeneratorParam : public internal::GeneratorParamBase {
   static constexpr bool is_number = std::is_arithmetic_v<T> && !std::is_same_v<T, bool>;
   static constexpr bool is_text = std::is_same_v<T, std::string>;
 
@@ -129,20 +129,18 @@ class GeneratorParam : public Internal::GeneratorParamBase {
   operator T() const { return value_; }
   operator Expr() const requires std::is_arithmetic_v<T> { return Expr(value_); }
 
-  // Where it is a LoopLevel: after generate() too, which has given it to schedules. They follow it.
-  void set(const LoopLevel& level) requires std::is_same_v<T, LoopLevel> {
-    if (is_writable())
-      value_ = level;
-    else
-      value_.set(level);
+  // A level may be set at any time: whatever was given this param follows.
+  void set(const T& value) requires std::is_same_v<T, LoopLevel> {
+    if (value.defined()) value_.set(value);
+    value_ = value;
   }
   template <typename V>
   void set(const V& value) {
-    check_writable();
+    if constexpr (!std::is_same_v<T, LoopLevel>) check_writable();
     if constexpr (std::is_convertible_v<V, std::string> && !is_text) {
       set_from_string(value);
     } else if constexpr (is_number && std::is_arithmetic_v<V>) {
-      if (!Internal::keeps_value<T>(value)) refuse_value(text(value), "it does not fit the type");
+      if (!internal::keeps_value<T>(value)) refuse_value(text(value), "it does not fit the type");
       assign(static_cast<T>(value));
     } else {
       value_ = value;
@@ -170,7 +168,7 @@ class GeneratorParam : public Internal::GeneratorParamBase {
   void assign(const T& value) {
     if constexpr (is_number) {
       if (has_limits() && !(value >= min_ && value <= max_))
-        refuse_value(Internal::number_text(value), "it is out of range");
+        refuse_value(internal::number_text(value), "it is out of range");
     }
     value_ = value;
   }
@@ -188,18 +186,18 @@ void GeneratorParam<T>::set_from_string(const std::string& text) {
   if constexpr (is_text) {
     value = text;
   } else if constexpr (std::is_same_v<T, bool>) {
-    value = Internal::read_bool(text);
+    value = internal::read_bool(text);
   } else if constexpr (std::is_enum_v<T>) {
     if (auto found = choices_.find(text); found != choices_.end()) value = found->second;
   } else if constexpr (std::is_same_v<T, Type>) {
-    value = Internal::read_type(text);
+    value = internal::read_type(text);
   } else if constexpr (std::is_same_v<T, LoopLevel>) {
-    value = Internal::read_loop_level(text);
+    value = internal::read_loop_level(text);
   } else if constexpr (std::is_same_v<T, Target> || std::is_same_v<T, MachineParams>) {
     value = T(text);
   } else {
     static_assert(is_number, "a GeneratorParam cannot be of this type");
-    value = Internal::read_number<T>(text);
+    value = internal::read_number<T>(text);
   }
   if (!value) refuse_value(text, "this is none of them");
   assign(*value);
@@ -219,31 +217,31 @@ std::string GeneratorParam<T>::to_string() const {
   } else if constexpr (std::is_same_v<T, Type>) {
     return retrograde::to_string(value_);
   } else if constexpr (is_number) {
-    return Internal::number_text(value_);
+    return internal::number_text(value_);
   } else {
     return value_.to_string();
   }
 }
 
 template <typename T>
-Internal::GeneratorParamBase::InCpp GeneratorParam<T>::in_cpp() const {
+internal::GeneratorParamBase::InCpp GeneratorParam<T>::in_cpp() const {
   if constexpr (is_text) {
-    return {"std::string", Internal::cpp_literal(value_), {}};
+    return {"std::string", internal::cpp_literal(value_), {}};
   } else if constexpr (std::is_enum_v<T>) {
     std::vector<std::string> choices;
     for (const auto& choice : choices_) choices.push_back(choice.first);
     return {"", to_string(), choices};
   } else if constexpr (std::is_same_v<T, Type>) {
-    return {"::retrograde::Type", Internal::cpp_type(value_), {}, "::retrograde::to_string"};
+    return {"::retrograde::Type", internal::cpp_type(value_), {}, "::retrograde::to_string"};
   } else if constexpr (std::is_same_v<T, LoopLevel>) {
     return {"::retrograde::LoopLevel", "::retrograde::LoopLevel::" + to_string() + "()", {}};
   } else if constexpr (std::is_same_v<T, bool>) {
-    return {"bool", to_string(), {}, "::retrograde::Internal::param_text"};
+    return {"bool", to_string(), {}, "::retrograde::internal::param_text"};
   } else if constexpr (is_number) {
-    return {Internal::cpp_element_name(type_of<T>()),
+    return {internal::cpp_element_name(type_of<T>()),
             to_string(),
             {},
-            "::retrograde::Internal::param_text"};
+            "::retrograde::internal::param_text"};
   } else {
     return {};  // of every generator: target and machine, which the context says
   }
@@ -259,13 +257,13 @@ std::string GeneratorParam<T>::allowed() const {
       list += (list.empty() ? "" : ", ") + retrograde::quoted(text);
     return list;
   } else if constexpr (std::is_same_v<T, Type>) {
-    return Internal::type_choices();
+    return internal::type_choices();
   } else if constexpr (std::is_same_v<T, LoopLevel>) {
     return "\"root\" and \"inlined\"";
   } else if constexpr (is_number) {
     std::string kind = std::is_floating_point_v<T> ? "numbers" : "whole numbers";
     if (has_limits()) {
-      return kind + " from " + Internal::number_text(min_) + " to " + Internal::number_text(max_);
+      return kind + " from " + internal::number_text(min_) + " to " + internal::number_text(max_);
     }
     return kind + " of type " + retrograde::to_string(type_of<T>());
   } else {
@@ -316,7 +314,7 @@ auto operator!(const GeneratorParam<T>& a) -> decltype(!a.value()) {
   return !a.value();
 }
 
-namespace Internal {
+namespace internal {
 // min and max of numbers are std's, of Exprs ours.
 template <typename A, typename B>
 auto smaller(const A& a, const B& b) {
@@ -336,30 +334,30 @@ auto larger(const A& a, const B& b) {
     return retrograde::max(Expr(a), Expr(b));
   }
 }
-}  // namespace Internal
+}  // namespace internal
 template <typename T, typename U>
 auto min(const GeneratorParam<T>& a, const U& b) {
-  return Internal::smaller(a.value(), b);
+  return internal::smaller(a.value(), b);
 }
 template <typename T, typename U>
 auto min(const GeneratorParam<T>& a, const GeneratorParam<U>& b) {
-  return Internal::smaller(a.value(), b.value());
+  return internal::smaller(a.value(), b.value());
 }
 template <typename T, typename U>
 auto min(const U& a, const GeneratorParam<T>& b) {
-  return Internal::smaller(a, b.value());
+  return internal::smaller(a, b.value());
 }
 template <typename T, typename U>
 auto max(const GeneratorParam<T>& a, const U& b) {
-  return Internal::larger(a.value(), b);
+  return internal::larger(a.value(), b);
 }
 template <typename T, typename U>
 auto max(const GeneratorParam<T>& a, const GeneratorParam<U>& b) {
-  return Internal::larger(a.value(), b.value());
+  return internal::larger(a.value(), b.value());
 }
 template <typename T, typename U>
 auto max(const U& a, const GeneratorParam<T>& b) {
-  return Internal::larger(a, b.value());
+  return internal::larger(a, b.value());
 }
 
 }  // namespace retrograde

@@ -5,14 +5,16 @@
 //
 // L is never named: whoever trains gives L_y, its gradient at the output. For several outputs the
 // gradients are kept apart, one for each pair of output and input; the caller sums what it needs.
-// Names, order and types of the arguments are those of Halide 14's gradient modules: images only,
-// an image of integers gets a gradient of zeros.
+// Names, order and types of the arguments are those of Halide 14's gradient modules: images only.
+// An image of integers gets a gradient of zeros; so does every image from an output of integers,
+// which stands still while the inputs change a little.
+#include <optional>
 #include <set>
 
 #include "autodiff/derivative.h"
 #include "generator/generator_base.h"
 
-namespace retrograde::Internal {
+namespace retrograde::internal {
 
 namespace {
 
@@ -23,13 +25,23 @@ Region region_of(const ImageParam& image) {
   return region;
 }
 
-void check_differentiable(const Func& f, const std::string& generator) {
-  if (f.outputs() == 1 && f.type().is_float()) return;
-  user_error("build the gradient of the generator " + quoted(generator),
-             "gradients are of outputs with one floating-point value",
-             f.outputs() == 1 ? quoted(f.name()) + " holds " + to_string(f.type())
-                              : quoted(f.name()) + text(" has ", f.outputs(), " values"),
-             "Make it an output of floats, or split the Tuple into outputs");
+// Every output has one value, and at least one of them is of floats.
+void check_differentiable(const std::vector<Func>& outputs, const std::string& generator) {
+  const std::string asked = "build the gradient of the generator " + quoted(generator);
+  std::string types;
+  bool has_floats = false;
+  for (const Func& f : outputs) {
+    if (f.outputs() != 1) {
+      user_error(asked, "gradients are of outputs with one value",
+                 quoted(f.name()) + text(" has ", f.outputs(), " values"),
+                 "Split the Tuple into outputs");
+    }
+    has_floats = has_floats || f.type().is_float();
+    types += (types.empty() ? "" : ", ") + quoted(f.name()) + " holds " + to_string(f.type());
+  }
+  if (has_floats) return;
+  user_error(asked, "gradients are of floating-point outputs", types,
+             "Make one an output of floats");
 }
 
 Func zeros(const ImageParam& image) {
@@ -62,19 +74,27 @@ Module GeneratorBase::build_gradient_module(const std::string& function_name) {
   AdjointOptions options;
   for (const ImageParam& image : images) options.wrt.push_back(image);
 
+  std::vector<Func> all;
+  for (const GeneratorOutputBase* output : members_.outputs) {
+    for (const Func& f : output->funcs()) all.push_back(f);
+  }
+  check_differentiable(all, name_);
+
   std::vector<Func> gradients;
   std::set<const ir::FuncContents*> seen;
   for (const GeneratorOutputBase* output : members_.outputs) {
     const std::vector<Func> funcs = output->funcs();
     for (size_t i = 0; i < funcs.size(); i++) {
       const std::string of = output->element_name(i);
-      check_differentiable(funcs[i], name_);
       const ImageParam seed(funcs[i].type(), funcs[i].dimensions(), "_grad_loss_for_" + of);
       arguments.push_back(ir::argument_of(*seed.parameter()));
       names.push_back("_grad_loss_for_" + of);
-      const Derivative derivative = propagate_adjoints(funcs[i], seed, region_of(seed), options);
+      std::optional<Derivative> derivative;
+      if (funcs[i].type().is_float())
+        derivative = propagate_adjoints(funcs[i], seed, region_of(seed), options);
       for (size_t k = 0; k < images.size(); k++) {
-        Func gradient = derivative.has(images[k]) ? derivative(images[k]) : zeros(images[k]);
+        const bool has = derivative && derivative->has(images[k]);
+        Func gradient = has ? (*derivative)(images[k]) : zeros(images[k]);
         if (!seen.insert(gradient.function().get()).second) gradient = lambda(gradient(_));
         gradients.push_back(gradient);
         gradient_names.push_back("_grad_loss_" + of + "_wrt_" + image_names[k]);
@@ -88,4 +108,4 @@ Module GeneratorBase::build_gradient_module(const std::string& function_name) {
   return to_module(pipeline, arguments, names, function_name, LinkageType::ExternalPlusMetadata);
 }
 
-}  // namespace retrograde::Internal
+}  // namespace retrograde::internal

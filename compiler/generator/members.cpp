@@ -5,7 +5,7 @@
 #include <map>
 #include <mutex>
 
-namespace retrograde::Internal {
+namespace retrograde::internal {
 
 namespace {
 
@@ -50,4 +50,4 @@ GeneratorMembers* GeneratorMembers::around(const void* object) {
   return nullptr;
 }
 
-}  // namespace retrograde::Internal
+}  // namespace retrograde::internal

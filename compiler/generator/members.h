@@ -6,7 +6,7 @@
 #include <cstddef>
 #include <vector>
 
-namespace retrograde::Internal {
+namespace retrograde::internal {
 
 class GeneratorBase;
 class GeneratorParamBase;
@@ -34,4 +34,4 @@ class GeneratorMembers {
   GeneratorBase* owner_;
 };
 
-}  // namespace retrograde::Internal
+}  // namespace retrograde::internal

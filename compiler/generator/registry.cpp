@@ -7,7 +7,7 @@
 #include "diagnostics/error.h"
 #include "generator/generator_base.h"
 
-namespace retrograde::Internal {
+namespace retrograde::internal {
 
 namespace {
 
@@ -65,7 +65,8 @@ std::unique_ptr<GeneratorBase> GeneratorRegistry::create(const std::string& name
     twice = registered().claimed_twice.count(name) > 0;
   }
   if (!factory) {
-    user_error("create the generator " + quoted(name), "it is registered in this program",
+    user_error("create the generator " + quoted(name),
+               "a generator goes by the name that it is registered under in this program",
                list_of_names(),
                "Name one of these, or register it with RETROGRADE_REGISTER_GENERATOR");
   }
@@ -87,4 +88,20 @@ std::unique_ptr<GeneratorBase> create_alias(const std::string& name, const std::
   return generator;
 }
 
-}  // namespace retrograde::Internal
+}  // namespace retrograde::internal
+
+namespace retrograde {
+
+Callable create_callable_from_generator(const GeneratorContext& context, const std::string& name,
+                                        const std::map<std::string, std::string>& params) {
+  const auto generator = internal::GeneratorRegistry::create(name, context);
+  generator->set_generator_param_values(internal::GeneratorParamsMap(params.begin(), params.end()));
+  return generator->compile_to_callable();
+}
+
+Callable create_callable_from_generator(const Target& target, const std::string& name,
+                                        const std::map<std::string, std::string>& params) {
+  return create_callable_from_generator(GeneratorContext(target), name, params);
+}
+
+}  // namespace retrograde

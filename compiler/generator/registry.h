@@ -9,7 +9,7 @@
 
 #include "generator/generator_context.h"
 
-namespace retrograde::Internal {
+namespace retrograde::internal {
 
 class GeneratorBase;
 struct StringOrLoopLevel;
@@ -39,24 +39,37 @@ std::unique_ptr<GeneratorBase> create_alias(const std::string& name, const std::
                                             const std::map<std::string, StringOrLoopLevel>& params,
                                             const GeneratorContext& context);
 
-}  // namespace retrograde::Internal
+}  // namespace retrograde::internal
 
-// At global scope. A third argument is the name of the stub class: ns::Blur.
+namespace retrograde {
+
+// A function of this process that a registered generator makes, with these values of its params: it
+// takes the inputs, then the outputs. CompileError when there is no generator of the name.
+Callable create_callable_from_generator(const GeneratorContext& context, const std::string& name,
+                                        const std::map<std::string, std::string>& params = {});
+Callable create_callable_from_generator(const Target& target, const std::string& name,
+                                        const std::map<std::string, std::string>& params = {});
+
+}  // namespace retrograde
+
+// At global scope. A class whose name has commas stands in parentheses: (Fir<float, 5>). A third
+// argument is the name of the stub class: ns::Blur.
 #define RETROGRADE_REGISTER_GENERATOR(Class, name, ...)                   \
   namespace retrograde_register_generator {                               \
-  static const ::retrograde::Internal::RegisterGenerator register_##name( \
+  static const ::retrograde::internal::RegisterGenerator register_##name( \
       #name,                                                              \
       [](const ::retrograde::GeneratorContext& context)                   \
-          -> std::unique_ptr<::retrograde::Internal::GeneratorBase> {     \
-        return Class::create(context, #name);                             \
+          -> std::unique_ptr<::retrograde::internal::GeneratorBase> {     \
+        using Generated = std::remove_pointer_t<decltype(new Class)>;     \
+        return Generated::create(context, #name);                         \
       },                                                                  \
       #__VA_ARGS__);                                                      \
   }
 // RETROGRADE_REGISTER_GENERATOR_ALIAS(blur_3, blur, {{"radius", "3"}})
 #define RETROGRADE_REGISTER_GENERATOR_ALIAS(alias, original, ...)                             \
   namespace retrograde_register_generator {                                                   \
-  static const ::retrograde::Internal::RegisterGenerator register_##alias(                    \
+  static const ::retrograde::internal::RegisterGenerator register_##alias(                    \
       #alias, [](const ::retrograde::GeneratorContext& context) {                             \
-        return ::retrograde::Internal::create_alias(#alias, #original, __VA_ARGS__, context); \
+        return ::retrograde::internal::create_alias(#alias, #original, __VA_ARGS__, context); \
       });                                                                                     \
   }

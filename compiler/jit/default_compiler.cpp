@@ -79,6 +79,7 @@ retrograde_context context_for(const CallContext& caller) {
   context.error_handler = keep_error;
   context.print_handler = hand_on_print;
   context.thread_limit = caller.thread_limit;
+  context.user_data = caller.user_context;
   if (handlers.custom_malloc) context.malloc_handler = hand_on_malloc;
   if (handlers.custom_free) context.free_handler = hand_on_free;
   if (handlers.custom_trace) context.trace_handler = hand_on_trace;

@@ -6,6 +6,7 @@
 #include <cstring>
 #include <map>
 
+#include "inquiries.h"
 #include "retrograde_runtime.h"
 
 // A function of SLEEF, to keep the library loaded and to find it by.
@@ -29,6 +30,7 @@ void add_runtime(Table& table) {
   table["retrograde_free_all"] = pointer(retrograde_free_all);
   table["retrograde_report_error"] = pointer(retrograde_report_error);
   table["retrograde_print"] = pointer(retrograde_print);
+  table["retrograde_user_context"] = pointer(retrograde_user_context);
   table["retrograde_lock_element"] = pointer(retrograde_lock_element);
   table["retrograde_unlock_element"] = pointer(retrograde_unlock_element);
   table["retrograde_profiler_begin"] = pointer(retrograde_profiler_begin);
@@ -65,20 +67,21 @@ void add_libm(Table& table) {
   table[#name "f"] = pointer<float(float, float)>(::name##f);
   RETROGRADE_UNARY(acos)
   RETROGRADE_UNARY(acosh)
-  RETROGRADE_UNARY(asin) RETROGRADE_UNARY(asinh) RETROGRADE_UNARY(atan) RETROGRADE_UNARY(atanh)
-      RETROGRADE_UNARY(cbrt) RETROGRADE_UNARY(ceil) RETROGRADE_UNARY(cos) RETROGRADE_UNARY(
-          cosh) RETROGRADE_UNARY(erf) RETROGRADE_UNARY(erfc) RETROGRADE_UNARY(exp)
-          RETROGRADE_UNARY(exp2) RETROGRADE_UNARY(expm1) RETROGRADE_UNARY(fabs) RETROGRADE_UNARY(
-              floor) RETROGRADE_UNARY(lgamma) RETROGRADE_UNARY(log) RETROGRADE_UNARY(log10)
-              RETROGRADE_UNARY(log1p) RETROGRADE_UNARY(log2) RETROGRADE_UNARY(nearbyint)
-                  RETROGRADE_UNARY(rint) RETROGRADE_UNARY(round) RETROGRADE_UNARY(roundeven)
-                      RETROGRADE_UNARY(sin) RETROGRADE_UNARY(sinh) RETROGRADE_UNARY(sqrt)
-                          RETROGRADE_UNARY(tan) RETROGRADE_UNARY(tanh) RETROGRADE_UNARY(tgamma)
-                              RETROGRADE_UNARY(trunc) RETROGRADE_BINARY(atan2) RETROGRADE_BINARY(
-                                  copysign) RETROGRADE_BINARY(fdim) RETROGRADE_BINARY(fmax)
-                                  RETROGRADE_BINARY(fmin) RETROGRADE_BINARY(fmod)
-                                      RETROGRADE_BINARY(hypot) RETROGRADE_BINARY(nextafter)
-                                          RETROGRADE_BINARY(pow) RETROGRADE_BINARY(remainder)
+  RETROGRADE_UNARY(asin)
+  RETROGRADE_UNARY(asinh) RETROGRADE_UNARY(atan) RETROGRADE_UNARY(atanh) RETROGRADE_UNARY(cbrt)
+      RETROGRADE_UNARY(ceil) RETROGRADE_UNARY(cos) RETROGRADE_UNARY(cosh) RETROGRADE_UNARY(
+          erf) RETROGRADE_UNARY(erfc) RETROGRADE_UNARY(exp) RETROGRADE_UNARY(exp2)
+          RETROGRADE_UNARY(expm1) RETROGRADE_UNARY(fabs) RETROGRADE_UNARY(floor) RETROGRADE_UNARY(
+              lgamma) RETROGRADE_UNARY(log) RETROGRADE_UNARY(log10) RETROGRADE_UNARY(log1p)
+              RETROGRADE_UNARY(log2) RETROGRADE_UNARY(nearbyint) RETROGRADE_UNARY(rint)
+                  RETROGRADE_UNARY(round) RETROGRADE_UNARY(roundeven) RETROGRADE_UNARY(sin)
+                      RETROGRADE_UNARY(sinh) RETROGRADE_UNARY(sqrt) RETROGRADE_UNARY(tan)
+                          RETROGRADE_UNARY(tanh) RETROGRADE_UNARY(tgamma) RETROGRADE_UNARY(trunc)
+                              RETROGRADE_BINARY(atan2) RETROGRADE_BINARY(copysign)
+                                  RETROGRADE_BINARY(fdim) RETROGRADE_BINARY(fmax) RETROGRADE_BINARY(
+                                      fmin) RETROGRADE_BINARY(fmod) RETROGRADE_BINARY(hypot)
+                                      RETROGRADE_BINARY(nextafter) RETROGRADE_BINARY(pow)
+                                          RETROGRADE_BINARY(remainder)
 #undef RETROGRADE_UNARY
 #undef RETROGRADE_BINARY
                                               table["fma"] =

@@ -12,6 +12,7 @@
 #include "lower/argument_checks.h"
 #include "lower/build_loop_nests.h"
 #include "lower/copy_statement.h"
+#include "lower/debug_features.h"
 #include "lower/deinterleave_loads.h"
 #include "lower/drop_checks.h"
 #include "lower/flatten_storage.h"
@@ -128,6 +129,11 @@ constexpr Pass passes[] = {
        const bool drops = lowering.options.target.has_feature(Target::NoBoundsQuery);
        return drops ? drop_bounds_query(s) : s;
      }},
+    {"check_promises", Phase::Loops,
+     [](Lowering& lowering, const Stmt& s) {
+       const bool checks = lowering.options.target.has_feature(Target::CheckUnsafePromises);
+       return checks ? check_promises(s) : s;
+     }},
     {"write_debug_files", Phase::Loops,
      [](Lowering& lowering, const Stmt& s) {
        return write_debug_files(s, lowering.program, lowering.renamed_funcs);
@@ -171,6 +177,11 @@ constexpr Pass passes[] = {
     {"deinterleave_loads", Phase::Vector,
      [](Lowering&, const Stmt& s) { return deinterleave_loads(s); }},
     {"simplify_vectors", Phase::Vector, run_simplify},
+    {"fuzz_float_stores", Phase::Vector,
+     [](Lowering& lowering, const Stmt& s) {
+       const bool fuzzes = lowering.options.target.has_feature(Target::FuzzFloatStores);
+       return fuzzes ? fuzz_float_stores(s) : s;
+     }},
     {"inject_profiling", Phase::Vector,
      [](Lowering& lowering, const Stmt& s) {
        if (!lowering.options.target.has_feature(Target::Profile)) return s;

@@ -222,7 +222,7 @@ TEST_F(AotErrors, FunctionThatIsNotInTheModule) {
 
 TEST_F(AotErrors, TwoFunctionsOfOneName) {
   Module module = f.compile_to_module({in, gain}, "f", host);
-  const Internal::LoweredFunc function = module.functions()[0];
+  const internal::LoweredFunc function = module.functions()[0];
   expect_error([&] { module.append(function); }, {"\"f\"", "have different names"});
 }
 

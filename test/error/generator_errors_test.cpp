@@ -335,45 +335,58 @@ Outcome run(std::vector<std::string> words) {
   for (std::string& word : words) argv.push_back(word.data());
   std::ostringstream errors;
   const int status =
-      Internal::generate_filter_main(static_cast<int>(argv.size()), argv.data(), errors);
+      internal::generate_filter_main(static_cast<int>(argv.size()), argv.data(), errors);
   return {status, errors.str()};
 }
 
-void expect_usage(const Outcome& result, const std::string& phrase) {
+void expect_refusal(const Outcome& result, const std::string& phrase) {
   EXPECT_EQ(result.status, 1);
   EXPECT_SAYS(result.errors, "Error: cannot ");
   EXPECT_SAYS(result.errors, phrase);
-  EXPECT_SAYS(result.errors, "usage: ");
+  EXPECT_SAYS(result.errors, "--help");
+  EXPECT_EQ(result.errors.find("usage: "), std::string::npos) << "buries the error";
 }
 
 TEST(GeneratorProgram, NeedsAGeneratorAFolderAndATarget) {
-  expect_usage(run({}), "-g names the generator");
-  expect_usage(run({"-g", "simple_for_errors", "target=host"}), "-o names the folder");
-  expect_usage(run({"-g", "simple_for_errors", "-o", "."}), "target= names what to compile for");
+  expect_refusal(run({"target=host"}), "-g names the generator");
+  expect_refusal(run({"-g", "simple_for_errors", "target=host"}), "-o names the folder");
+  expect_refusal(run({"-g", "simple_for_errors", "-o", "."}), "target= names what to compile for");
+}
+
+TEST(GeneratorProgram, TellsItsUsageWhenAsked) {
+  const Outcome asked = run({"-g", "complex", "--help"}), bare = run({});
+  EXPECT_EQ(asked.status, 0);
+  EXPECT_EQ(bare.status, 1);
+  for (const Outcome& result : {asked, bare}) {
+    EXPECT_SAYS(result.errors, "usage: ");
+    EXPECT_SAYS(result.errors, "\"simple_for_errors\"");
+  }
 }
 
 TEST(GeneratorProgram, RefusesUnknownGenerators) {
   const Outcome result = run({"-g", "complex", "-o", ".", "target=host"});
-  expect_usage(result, "\"complex\"");
+  expect_refusal(result, "\"complex\"");
   EXPECT_SAYS(result.errors, "\"simple_for_errors\"");
 }
 
 TEST(GeneratorProgram, RefusesUnknownFileTypes) {
   const Outcome result =
       run({"-g", "simple_for_errors", "-o", ".", "-e", "object,exe", "target=host"});
-  expect_usage(result, "\"exe\"");
+  expect_refusal(result, "\"exe\"");
   EXPECT_SAYS(result.errors, "\"static_library\"");
 }
 
 TEST(GeneratorProgram, RefusesBadParams) {
-  expect_usage(run({"-g", "simple_for_errors", "-o", ".", "target=host", "cuont=1"}), "\"cuont\"");
-  expect_usage(run({"-g", "simple_for_errors", "-o", ".", "target=host", "count=1.5"}), "\"1.5\"");
-  expect_usage(run({"-g", "simple_for_errors", "-o", ".", "target=host", "auto_schedule=Best"}),
-               "\"Best\"");
+  expect_refusal(run({"-g", "simple_for_errors", "-o", ".", "target=host", "cuont=1"}),
+                 "\"cuont\"");
+  expect_refusal(run({"-g", "simple_for_errors", "-o", ".", "target=host", "count=1.5"}),
+                 "\"1.5\"");
+  expect_refusal(run({"-g", "simple_for_errors", "-o", ".", "target=host", "auto_schedule=Best"}),
+                 "\"Best\"");
 }
 
 TEST(GeneratorProgram, RefusesBadTargets) {
-  expect_usage(run({"-g", "simple_for_errors", "-o", ".", "target=x86-64"}), "\"x86-64\"");
+  expect_refusal(run({"-g", "simple_for_errors", "-o", ".", "target=x86-64"}), "\"x86-64\"");
 }
 
 TEST(GeneratorProgram, RefusesOneRuntimeForMachinesThatDiffer) {
@@ -385,19 +398,19 @@ TEST(GeneratorProgram, RefusesOneRuntimeForMachinesThatDiffer) {
 }
 
 TEST(GeneratorProgram, RefusesWhatIsNoFlag) {
-  expect_usage(run({"simple_for_errors"}), "\"simple_for_errors\" is neither");
-  expect_usage(run({"--help"}), "\"--help\"");
-  expect_usage(run({"-x", "1"}), "\"-x\"");
-  expect_usage(run({"-g"}), "-g has none");
-  expect_usage(run({"-g", "simple_for_errors", "-d", "2", "-o", ".", "target=host"}), "-d takes 1");
-  expect_usage(run({"-t", "soon"}), "-t takes a number");
+  expect_refusal(run({"simple_for_errors"}), "\"simple_for_errors\" is neither");
+  expect_refusal(run({"-x", "1"}), "\"-x\"");
+  expect_refusal(run({"-g"}), "-g has none");
+  expect_refusal(run({"-g", "simple_for_errors", "-d", "2", "-o", ".", "target=host"}),
+                 "-d takes 1");
+  expect_refusal(run({"-t", "soon"}), "-t takes a number");
 }
 
 TEST(GeneratorProgram, RefusesPluginsAndSchedulersThatAreNotThere) {
-  expect_usage(run({"-g", "simple_for_errors", "-o", ".", "target=host", "-p", "no_such_plugin"}),
-               "\"no_such_plugin\"");
-  expect_usage(run({"-g", "simple_for_errors", "-o", ".", "target=host", "-s", "Li2018"}),
-               "\"Li2018\"");
+  expect_refusal(run({"-g", "simple_for_errors", "-o", ".", "target=host", "-p", "no_such_plugin"}),
+                 "\"no_such_plugin\"");
+  expect_refusal(run({"-g", "simple_for_errors", "-o", ".", "target=host", "-s", "Li2018"}),
+                 "\"Li2018\"");
 }
 
 // What the generator itself does wrong is no fault of the command line.

@@ -217,7 +217,7 @@ TEST_F(AotFiles, ModuleHoldsItsFunction) {
   const Module module = out.compile_to_module({in, gain}, "f", Target("host"));
   EXPECT_EQ(module.name(), "f");
   ASSERT_EQ(module.functions().size(), 1u);
-  const Internal::LoweredFunc f = module.get_function_by_name("f");
+  const internal::LoweredFunc f = module.get_function_by_name("f");
   ASSERT_EQ(f.args.size(), 3u);
   EXPECT_EQ(f.args[0].name, "in");
   EXPECT_TRUE(f.args[2].is_output());

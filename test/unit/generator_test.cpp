@@ -293,6 +293,35 @@ TEST(Generator, GradientModuleHasHalidesArguments) {
   EXPECT_FALSE(square->scheduled);
 }
 
+// Outputs of several types: each float gets a gradient of its own type, integers stand still.
+class Several : public Generator<Several> {
+ public:
+  Input<Buffer<float, 1>> in{"in"};
+  Output<Buffer<float, 1>> square{"square"};
+  Output<Buffer<int, 1>> whole{"whole"};
+  Output<Buffer<double, 1>> twice{"twice"};
+  void generate() {
+    square(x) = in(x)*in(x);
+    whole(x) = cast<int>(in(x));
+    twice(x) = 2.0 * cast<double>(in(x));
+  }
+
+ private:
+  Var x{"x"};
+};
+
+TEST(Generator, GradientModuleTakesOutputsOfSeveralTypes) {
+  auto several = GeneratorContext(Target("x86-64-linux")).create<Several>();
+  const Module module = several->build_gradient_module("several_grad");
+  EXPECT_EQ(argument_names(module), (Names{"in", "_grad_loss_for_square", "_grad_loss_for_whole",
+                                           "_grad_loss_for_twice", "_grad_loss_square_wrt_in",
+                                           "_grad_loss_whole_wrt_in", "_grad_loss_twice_wrt_in"}));
+  const std::vector<Argument>& args = module.functions().back().args;
+  EXPECT_EQ(args[2].type, Int(32));
+  EXPECT_EQ(args[3].type, Float(64));
+  for (int i : {4, 5, 6}) EXPECT_EQ(args[i].type, Float(32)) << "of the input's type";
+}
+
 TEST(Generator, AutoScheduleRunsTheSchedulerItNames) {
   std::vector<std::string> scheduled;
   Pipeline::add_autoscheduler(
@@ -347,8 +376,8 @@ RETROGRADE_REGISTER_GENERATOR_ALIAS(test_wide_blur, test_box_blur, {{"radius", "
 
 TEST(GeneratorRegistry, MakesGeneratorsByName) {
   const GeneratorContext context(get_jit_target_from_environment());
-  auto blur = Internal::GeneratorRegistry::create("test_box_blur", context);
+  auto blur = internal::GeneratorRegistry::create("test_box_blur", context);
   EXPECT_EQ(blur->name(), "test_box_blur");
-  auto wide = Internal::GeneratorRegistry::create("test_wide_blur", context);
+  auto wide = internal::GeneratorRegistry::create("test_wide_blur", context);
   EXPECT_EQ(dynamic_cast<BoxBlur&>(*wide).radius, 4);
 }

@@ -5,8 +5,48 @@
 #include <retrograde/retrograde.h>
 
 // Programs rely on these.
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <bitset>
+#include <cassert>
+#include <chrono>
+#include <cmath>
+#include <condition_variable>
+#include <cstddef>
+#include <cstdint>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <functional>
+#include <future>
+#include <initializer_list>
 #include <iostream>
+#include <iterator>
+#include <limits>
+#include <list>
 #include <map>
+#include <memory>
+#include <mutex>
+#include <queue>
+#include <random>
+#include <set>
+#include <sstream>
+#include <stack>
+#include <stdexcept>
+#include <string>
+#include <thread>
+#include <type_traits>
+#include <utility>
+#include <vector>
+
+#include <assert.h>
+#include <math.h>
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <string.h>
+#include <unistd.h>
 
 // Not an alias: HalideBuffer.h opens namespace Halide for Halide::Runtime.
 namespace Halide {
@@ -18,6 +58,11 @@ inline bool exceptions_enabled() { return true; }
 // Deep programs are compiled on a stack of its own, as large as they need.
 inline void set_compiler_stack_size(size_t) {}
 inline size_t get_compiler_stack_size() { return size_t{1} << 30; }
+// A namespace of its own: ours has another name, so that programs which add to this one can still
+// say Internal:: behind `using namespace Halide`.
+namespace Internal {
+using namespace ::retrograde::internal;
+}
 }  // namespace Halide
 
 // ---- macros that programs use ----
@@ -35,6 +80,10 @@ inline size_t get_compiler_stack_size() { return size_t{1} << 30; }
 #endif
 #define HALIDE_NO_USER_CODE_INLINE __attribute__((noinline))
 
+// Declared by what registers generators: at global scope.
+namespace halide_register_generator {
+struct halide_global_ns;
+}
 #define HALIDE_REGISTER_GENERATOR(...) RETROGRADE_REGISTER_GENERATOR(__VA_ARGS__)
 #define HALIDE_REGISTER_GENERATOR_ALIAS(...) RETROGRADE_REGISTER_GENERATOR_ALIAS(__VA_ARGS__)
 

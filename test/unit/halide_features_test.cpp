@@ -1,0 +1,392 @@
+// Features of targets, generators and calls under Halide's names: each does what it says.
+//
+// Only Halide.h: what programs rely on comes with it.
+#include "Halide.h"
+
+#include <gtest/gtest.h>
+
+#include "support/errors.h"
+
+using namespace Halide;
+using retrograde::error_of;
+using retrograde::expect_mentions;
+
+// A program may add to Halide's namespaces, as Halide's own extensions do.
+namespace Halide {
+namespace Internal {
+struct Addition {
+  int value = 7;
+};
+}  // namespace Internal
+}  // namespace Halide
+
+namespace {
+
+TEST(HalideHeader, BringsWhatProgramsRelyOn) {
+  std::mt19937 random(1);
+  std::vector<float> values = {std::sqrt(4.0f), static_cast<float>(random() % 2)};
+  std::sort(values.begin(), values.end());
+  std::set<int> set = {3};
+  std::queue<int> queue;
+  std::list<int> list;
+  std::stringstream stream;
+  stream << values[1];
+  char copy[4];
+  std::memcpy(copy, stream.str().c_str(), stream.str().size() + 1);
+  std::thread thread([&] { queue.push(static_cast<int>(set.size())); });
+  thread.join();
+  EXPECT_STREQ(copy, "2");
+  EXPECT_EQ(queue.size(), 1u);
+  EXPECT_TRUE(list.empty());
+}
+
+TEST(HalideHeader, InternalIsOneNamespace) {
+  EXPECT_EQ(Internal::Addition().value, 7);
+  EXPECT_EQ(Halide::Internal::reinterpret_bits<uint32_t>(1.0f), 0x3f800000u);
+  EXPECT_EQ(reinterpret_bits<float>(uint32_t{0x40000000}), 2.0f);
+  const Internal::GeneratorParamsMap none;
+  EXPECT_TRUE(none.empty());
+}
+
+// ---- targets ----
+
+TEST(Targets, RefuseSanitizersByName) {
+  Func f("f");
+  Var x("x");
+  f(x) = x;
+  const Target jit = get_jit_target_from_environment();
+  for (const auto& [feature, name] : {std::pair{Target::ASAN, "\"asan\""},
+                                      {Target::MSAN, "\"msan\""},
+                                      {Target::TSAN, "\"tsan\""},
+                                      {Target::SanitizerCoverage, "\"sanitizer_coverage\""}}) {
+    expect_mentions(error_of<Unsupported>(
+                        [&, feature = feature] { f.realize({3}, jit.with_feature(feature)); }),
+                    {name, "no checks of a sanitizer", "Leave out"});
+  }
+}
+
+// ---- Target::FuzzFloatStores ----
+
+Target with(Target::Feature feature) {
+  return get_jit_target_from_environment().with_feature(feature);
+}
+
+template <typename T>
+void expect_even_bits(bool is_vectorized) {
+  Func f("f");
+  Var x("x");
+  f(x) = cast<T>(1.0f) / cast<T>(x + 3);
+  if (is_vectorized) f.vectorize(x, 4);
+  Buffer<T> plain = f.realize({21}), fuzzed = f.realize({21}, with(Target::FuzzFloatStores));
+  int odd = 0;
+  for (int i = 0; i < 21; i++) {
+    using Bits = std::conditional_t<sizeof(T) == 4, uint32_t, uint64_t>;
+    const auto before = reinterpret_bits<Bits>(plain(i)), after = reinterpret_bits<Bits>(fuzzed(i));
+    EXPECT_EQ(after, before & ~Bits{1}) << i;
+    odd += before != after;
+  }
+  EXPECT_GT(odd, 0);
+}
+
+TEST(FuzzFloatStores, ClearsTheLastBit) {
+  expect_even_bits<float>(false);
+  expect_even_bits<float>(true);
+  expect_even_bits<double>(true);
+}
+
+TEST(FuzzFloatStores, LeavesNaNsInfinitiesAndIntegersAlone) {
+  Func f("f");
+  Var x("x");
+  const float lowest_nan = reinterpret_bits<float>(uint32_t{0x7f800001});
+  f(x) = Tuple(mux(x, {Expr(lowest_nan), Expr(std::numeric_limits<float>::infinity())}), 2 * x + 1);
+  const Realization r = f.realize({2}, with(Target::FuzzFloatStores));
+  const Buffer<float> floats = r[0];
+  const Buffer<int> whole = r[1];
+  EXPECT_TRUE(std::isnan(floats(0)));
+  EXPECT_TRUE(std::isinf(floats(1)));
+  EXPECT_EQ(whole(1), 3);
+}
+
+// ---- Target::CheckUnsafePromises ----
+
+TEST(CheckUnsafePromises, FailsWhereAPromiseIsBroken) {
+  for (const bool is_vectorized : {false, true}) {
+    Param<int> limit("limit");
+    Func f("f"), g("g");
+    Var x("x");
+    f(x) = 3 * x;
+    g(x) = f(unsafe_promise_clamped(x, 0, limit));
+    f.compute_root().bound_extent(x, 64);
+    if (is_vectorized) g.vectorize(x, 4);
+    limit.set(9);
+    Buffer<int> kept = g.realize({10}, with(Target::CheckUnsafePromises));
+    EXPECT_EQ(kept(9), 27);
+    limit.set(8);
+    expect_mentions(
+        error_of<RuntimeError>([&] { g.realize({10}, with(Target::CheckUnsafePromises)); }),
+        {"unsafe_promise_clamped", "between 0 and 8"});
+  }
+}
+
+// ---- user_context_value ----
+
+struct Greeting : JITUserContext {
+  int number = 0;
+};
+
+extern "C" __attribute__((visibility("default"))) int halide_features_number(void* context, int x) {
+  return static_cast<Greeting*>(context)->number + x;
+}
+HalideExtern_2(int, halide_features_number, void*, int);
+
+TEST(UserContext, IsAValueForCFunctions) {
+  for (const bool is_parallel : {false, true}) {
+    Func f("f");
+    Var x("x");
+    f(x) = halide_features_number(user_context_value(), x);
+    if (is_parallel) f.vectorize(x, 4).parallel(x);
+    Greeting first, second;
+    first.number = 40;
+    second.number = 50;
+    Buffer<int> a = f.realize(&first, {9}), b = f.realize(&second, {9});
+    for (int i = 0; i < 9; i++) {
+      EXPECT_EQ(a(i), 40 + i);
+      EXPECT_EQ(b(i), 50 + i);
+    }
+  }
+}
+
+extern "C" __attribute__((visibility("default"))) int halide_features_fill(void* context,
+                                                                           halide_buffer_t* out) {
+  if (!out->is_bounds_query()) {
+    for (int i = 0; i < out->dim[0].extent; i++)
+      reinterpret_cast<int32_t*>(out->host)[i] = static_cast<Greeting*>(context)->number;
+  }
+  return 0;
+}
+
+TEST(UserContext, IsAnArgumentOfExternStages) {
+  Func f("f"), g("g");
+  Var x("x");
+  f.define_extern("halide_features_fill", {user_context_value()}, Int(32), 1);
+  g(x) = f(x) + x;
+  f.compute_root();
+  Greeting greeting;
+  greeting.number = 11;
+  Buffer<int> out = g.realize(&greeting, {5});
+  EXPECT_EQ(out(4), 15);
+}
+
+// ---- Parameter ----
+
+TEST(Parameters, StandForParamsAndImages) {
+  Param<int> p("p", 3);
+  ImageParam image(Float(32), 2, "image");
+  const Parameter of_p = p.parameter(), of_image = image.parameter();
+  EXPECT_TRUE(of_p.defined() && !of_p.is_buffer() && of_image.is_buffer());
+  EXPECT_EQ(of_p.name(), "p");
+  EXPECT_EQ(of_image.dimensions(), 2);
+  EXPECT_EQ(of_p.scalar<int>(), 3);
+  Parameter(of_p).set_scalar(5);
+  EXPECT_EQ(p.get(), 5);
+  const Parameter made(Int(16), true, 3, "made");
+  EXPECT_EQ(made.type(), Int(16));
+  expect_mentions(error_of<CompileError>([&] { of_p.buffer(); }), {"\"p\"", "it is a scalar"});
+  expect_mentions(error_of<CompileError>([&] { of_image.scalar<float>(); }), {"it is a buffer"});
+  expect_mentions(error_of<CompileError>([] { Parameter().name(); }), {"made without one"});
+  expect_mentions(error_of<CompileError>([] { Parameter(Int(8), false, 1); }), {"no dimensions"});
+}
+
+TEST(Serialization, SaysWhatIsThereInstead) {
+  std::vector<uint8_t> bytes;
+  expect_mentions(error_of<Unsupported>([&] { deserialize_pipeline(bytes); }),
+                  {"no form as bytes", "compile_to_static_library"});
+}
+
+// ---- warnings ----
+
+TEST(Warnings, AreToldInTheirScope) {
+  Func f("f");
+  Var x("x");
+  std::vector<std::string> told;
+  f(x) = x;
+  f(x) = 2 * x;
+  f.realize({3});
+  f.vectorize(x, 4);
+  {
+    WarningScope scope([&](const std::string& warning) { told.push_back(warning); });
+    f.realize({3});
+    f.realize({3});
+  }
+  ASSERT_EQ(told.size(), 2u) << "once for a compilation";
+  expect_mentions(told[0], {"update 0 of \"f", "hides", "its first definition"});
+  expect_mentions(told[1], {"update 0 of \"f", "has no schedule", "update(0)"});
+  f.update().vectorize(x, 4);
+  f.realize({3});
+  EXPECT_EQ(told.size(), 2u) << "outside of the scope";
+  EXPECT_EQ(warnings_of(Pipeline(f)).size(), 1u);
+}
+
+TEST(Warnings, AreOfWhatIsHardlyMeant) {
+  Func f("f"), g("g"), h("h");
+  Var x("x");
+  RDom none(0, 0), r(0, 4);
+  f(x) = x;
+  f(x) += r * x;
+  f.vectorize(x, 1);
+  f.update().atomic();
+  g(x) = f(x);
+  g(x) += none.x;
+  h(x) = g(x);
+  h.specialize(Expr(true)).vectorize(x, 4);
+  const std::vector<std::string> found = warnings_of(Pipeline(h));
+  ASSERT_EQ(found.size(), 4u);
+  expect_mentions(found[0], {"vectorizing \"x\"", "by 1"});
+  expect_mentions(found[1], {"atomic()", "changes nothing"});
+  expect_mentions(found[2], {"never runs", "is 0"});
+  expect_mentions(found[3], {"specialization of \"h", "does not depend on the call"});
+}
+
+TEST(Warnings, SpareProgramsThatMeanWhatTheySay) {
+  Func f("f"), g("g"), h("h");
+  Var x("x"), y("y");
+  RDom r(0, 4);
+  f(x, y) = undef<int>();
+  f(x, y) = x + y;  // all of it: undef said that nothing was before
+  g(x, y) = f(x, y);
+  g(y, x) = f(x, y);  // another element
+  g(x, y) += f(x, y);
+  h(x, y) = g(x, y);
+  h(x, 0) = 1;
+  h(r, y) = r;
+  EXPECT_TRUE(warnings_of(Pipeline(h)).empty());
+}
+
+// ---- generators ----
+
+class Adder : public Halide::Generator<Adder> {
+ public:
+  GeneratorParam<int> amount{"amount", 1};
+  Input<Buffer<int, 1>> in{"in"};
+  Output<Buffer<int, 1>> out{"out"};
+  void generate() {
+    trace_pipeline();
+    out(x) = in(x) + amount;
+  }
+  void schedule() {
+    in.set_estimate(Halide::_0, 0, 100);
+    out.set_estimates({{0, 100}});
+  }
+  Var x{"x"};
+};
+
+TEST(Generators, AreCallableInTheProcess) {
+  const Target target = get_jit_target_from_environment();
+  const Callable add = create_callable_from_generator(target, "features_adder", {{"amount", "5"}});
+  Buffer<int> in(4), out(4);
+  in.fill(7);
+  EXPECT_EQ(add(in, out), 0);
+  EXPECT_EQ(out(3), 12);
+  expect_mentions(error_of<CompileError>([&] {
+                    create_callable_from_generator(GeneratorContext(target), "no_such_generator");
+                  }),
+                  {"\"no_such_generator\""});
+}
+
+int begun = 0;
+
+TEST(Generators, TraceTheirPipelineFromGenerate) {
+  auto adder = GeneratorContext(get_jit_target_from_environment()).create<Adder>();
+  Buffer<int> in(4);
+  in.fill(1);
+  adder->apply(in);
+  adder->get_pipeline().set_custom_trace([](void*, const halide_trace_event_t* event) {
+    begun += event->event == halide_trace_begin_pipeline;
+    return 1;
+  });
+  adder->realize({4});
+  EXPECT_EQ(begun, 1);
+}
+
+TEST(Generators, HaveOutputsThatMayBeTakenBeforeTheyAreDefined) {
+  auto adder = GeneratorContext(get_jit_target_from_environment()).create<Adder>();
+  const Func taken = adder->out;
+  Buffer<int> in(4);
+  in.fill(1);
+  adder->apply(in);
+  Func user("user");
+  Var x("x");
+  user(x) = taken(x) * 2;
+  Buffer<int> out = user.realize({4});
+  EXPECT_EQ(out(0), 4);
+}
+
+TEST(Generators, EstimateImagesByTheNamesOfTheirArguments) {
+  auto adder = GeneratorContext(Target("x86-64-linux")).create<Adder>();
+  const Module module = adder->build_module("adder");
+  const std::vector<Argument>& args = module.functions().back().args;
+  ASSERT_EQ(args[0].argument_estimates.buffer_estimates.size(), 1u);
+  EXPECT_EQ(retrograde::text(args[0].argument_estimates.buffer_estimates[0].extent), "100");
+  EXPECT_TRUE(adder->get_pipeline().defined());
+  expect_mentions(error_of<CompileError>([&] { adder->in.set_estimate(Var("q"), 0, 3); }),
+                  {"an estimate of \"q\"", "\"_0\""});
+}
+
+template <typename T, int Factor>
+class Times : public Halide::Generator<Times<T, Factor>> {
+  using Base = Halide::Generator<Times<T, Factor>>;
+
+ public:
+  template <typename T2>
+  using Input = typename Base::template Input<T2>;
+  template <typename T2>
+  using Output = typename Base::template Output<T2>;
+  Input<Halide::Buffer<T>> in{"in", 1};
+  Output<Halide::Buffer<T>> out{"out", 1};
+  Halide::Var x{"x"};
+  void generate() { out(x) = in(x)*Halide::cast<T>(Factor); }
+};
+
+TEST(Generators, MayBeTemplates) {
+  const Target target = get_jit_target_from_environment();
+  Buffer<int16_t> in(4), out(4);
+  in.fill(3);
+  EXPECT_EQ(create_callable_from_generator(target, "features_times_3")(in, out), 0);
+  EXPECT_EQ(out(0), 9);
+}
+
+class Inner : public Halide::Generator<Inner> {
+ public:
+  GeneratorParam<LoopLevel> level{"level", LoopLevel::root()};
+  Input<Func> in{"in", Int(32), 1};
+  Output<Func> out{"out", Int(32), 1};
+  void generate() {
+    middle(x) = in(x) + in(x + 1);
+    out(x) = middle(x) * middle(x + 1);
+    middle.compute_at(level);
+  }
+  Var x{"x"};
+  Func middle{"middle"};
+};
+
+TEST(Generators, TakeLoopLevelsAfterTheyHaveRun) {
+  auto inner = GeneratorContext(get_jit_target_from_environment()).create<Inner>();
+  Func source("source"), user("user");
+  Var x("x"), y("y");
+  source(x) = x;
+  inner->apply(source);
+  user(x, y) = inner->out(x) + y;
+  inner->level.set({user, y});
+  EXPECT_NE(user.loop_nest().find("middle"), std::string::npos);
+  Buffer<int> out = user.realize({6, 2});
+  EXPECT_EQ(out(2, 1), 5 * 7 + 1);
+  const std::string nest = user.loop_nest();
+  EXPECT_LT(nest.find("for y"), nest.find("middle")) << nest;
+}
+
+}  // namespace
+
+using FeaturesTimes3 = Times<int16_t, 3>;
+HALIDE_REGISTER_GENERATOR(Adder, features_adder)
+HALIDE_REGISTER_GENERATOR((Times<int16_t, 3>), features_times_3)
+HALIDE_REGISTER_GENERATOR(FeaturesTimes3, features_times_alias)
