@@ -197,20 +197,13 @@ Value* add_products_in_pairs(Emitter& e, Value* a, Value* b) {
 
 // ---- saturating_cast ----
 
-static Value* largest_finite_for_infinity(Emitter& e, Type to, Type from, Value* value,
-                                          Value* converted) {
-  Value* bits = is_half(to) ? converted : bits_as_integer(e, converted);
-  const int mantissa = to.bits() == 64 ? 52 : to.bits() == 32 ? 23 : to.is_bfloat() ? 7 : 10;
-  const int64_t all = static_cast<int64_t>(~uint64_t{0} >> (65 - to.bits()));  // without the sign
-  const int64_t infinity = all >> mantissa << mantissa;
-  Value* is_inf =
-      e.b.CreateICmpEQ(e.b.CreateAnd(bits, int_constant(bits, all)), int_constant(bits, infinity));
-  if (from.is_float() && from.bits() == to.bits()) {
-    is_inf = e.b.CreateAnd(is_inf, e.b.CreateNot(simple_operator(
-                                       e, ir::Op::is_inf, Bool(to.lanes()), {from}, {value})));
-  }
-  Value* result = e.b.CreateSelect(is_inf, e.b.CreateSub(bits, int_constant(bits, 1)), bits);
-  return is_half(to) ? result : bits_as_float(e, result);
+// To float16, whose range ends at 65504; NaNs stay. The ranges of wider floats end at infinity.
+static Value* saturated_float16(Emitter& e, Type to, Type from, Value* value) {
+  Value* bits = convert(e, to, from, value);
+  constexpr int64_t without_sign = 0x7fff, infinity = 0x7c00;
+  Value* is_inf = e.b.CreateICmpEQ(e.b.CreateAnd(bits, int_constant(bits, without_sign)),
+                                   int_constant(bits, infinity));
+  return e.b.CreateSelect(is_inf, e.b.CreateSub(bits, int_constant(bits, 1)), bits);
 }
 
 static Value* clamp_integer(Emitter& e, Type to, Type from, Value* value) {
@@ -229,9 +222,8 @@ static Value* clamp_integer(Emitter& e, Type to, Type from, Value* value) {
 
 Value* convert_saturating(Emitter& e, Type to, Type from, Value* value) {
   if (to == from) return value;
-  if (to.is_float()) {
-    return largest_finite_for_infinity(e, to, from, value, convert(e, to, from, value));
-  }
+  if (to.element_of() == Float(16)) return saturated_float16(e, to, from, value);
+  if (to.is_float()) return convert(e, to, from, value);
   if (from.is_bool() || to.is_bool()) {
     if (from.is_float() || !to.is_bool()) return convert(e, to, from, value);
     // Negative numbers clamp to false.

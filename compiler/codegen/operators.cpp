@@ -83,9 +83,15 @@ Value* lerp_bools(Emitter& e, Type weight_type, Value* a, Value* b, Value* weigh
   return e.b.CreateSelect(is_above, b, a);
 }
 
-// A float weight in fixed point of the values' width, rounding down.
+// A weight in fixed point of the values' width, rounding down (ir/operators.cpp has the rule).
 Value* fixed_point_weight(Emitter& e, Type fixed, Type weight_type, Value* weight) {
-  const Type wide = Float(64, fixed.lanes());
+  if (!weight_type.is_float()) {
+    const uint64_t ratio = weight_type.max_uint() / fixed.max_uint();
+    Value* scaled = e.b.CreateUDiv(weight, int_constant(weight, static_cast<int64_t>(ratio)));
+    return e.b.CreateTrunc(scaled, llvm_type(e, fixed));
+  }
+  const bool in_double = weight_type.bits() > 32 || fixed.bits() > 16;
+  const Type wide = Float(in_double ? 64 : 32, fixed.lanes());
   Value* w = convert(e, wide, weight_type, weight);
   w = e.b.CreateFMul(w, float_constant(w, static_cast<double>(fixed.max_uint())));
   return convert_saturating(e, fixed, wide, w);
@@ -94,7 +100,7 @@ Value* fixed_point_weight(Emitter& e, Type fixed, Type weight_type, Value* weigh
 // a +- round(|b - a| * w / max). The product fits the sum of both widths, its half of max included,
 // and there are no ties because max is odd.
 Value* lerp_integers(Emitter& e, Type type, Type weight_type, Value* a, Value* b, Value* weight) {
-  if (weight_type.is_float()) {
+  if (weight_type.is_float() || weight_type.bits() > type.bits()) {
     const Type fixed = UInt(type.bits(), type.lanes());
     weight = fixed_point_weight(e, fixed, weight_type, weight);
     weight_type = fixed;

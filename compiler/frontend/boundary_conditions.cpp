@@ -5,6 +5,8 @@
 // box.
 #include "frontend/boundary_conditions.h"
 
+#include "ir/literal.h"
+
 namespace retrograde::BoundaryConditions {
 
 namespace {
@@ -56,7 +58,7 @@ void check(const Func& source, const Region& bounds, const char* name) {
 
 bool is_bounded(const Range& range) { return range.min.defined() && range.extent.defined(); }
 
-Expr as_int(const Expr& e) { return cast<int>(e); }
+Expr as_int(const Expr& e) { return ir::int32_literal(e, "apply a boundary condition"); }
 
 Func remap(const Func& source, const Region& bounds, CoordinateMap map, const char* name) {
   check(source, bounds, name);
@@ -97,7 +99,8 @@ Func constant_exterior(const Func& source, const Tuple& value, const Region& bou
     user_error("apply constant_exterior to " + quoted(source.name()),
                "there is one constant for each value",
                text("it has ", source.output_types().size(), " values and was given ", value.size(),
-                    " constants"));
+                    " constants"),
+               "Give a Tuple of that many constants");
   }
   const std::vector<Var> args = source.args();
   std::vector<Expr> at(args.begin(), args.end());
@@ -111,7 +114,9 @@ Func constant_exterior(const Func& source, const Tuple& value, const Region& bou
   const Tuple inside = source(at);
   std::vector<Expr> values;
   for (size_t i = 0; i < value.size(); i++) {
-    const Expr constant = cast(source.output_types()[i], value[i]);
+    const Expr constant = ir::literal_in(source.output_types()[i], value[i],
+                                         "apply constant_exterior to " + quoted(source.name()),
+                                         "the value outside is one of the type inside");
     values.push_back(ir::make_select(outside, constant, likely(inside[i])));
   }
   Func result("constant_exterior");

@@ -12,6 +12,7 @@
 
 #include "frontend/rdom.h"
 #include "frontend/var.h"
+#include "ir/literal.h"
 #include "ir/print.h"
 #include "ir/variables.h"
 #include "ir/visit.h"
@@ -37,14 +38,15 @@ Site site_of(const FuncContents& f, const std::vector<Expr>& args, bool is_updat
     if (arg.defined()) continue;
     user_error("define " + quoted(f.name),
                "every argument on the left-hand side must be a defined expression",
-               "one of them was never assigned");
+               "one of them was never assigned", "Assign every Expr before it is used");
   }
   return {f, text(is_update ? "update " : "define ", quoted(f.name), list(args))};
 }
 
 void check_values(const Site& site, const std::vector<Expr>& values) {
   if (values.empty())
-    user_error(site.asked, "a definition has at least one value", "the Tuple is empty");
+    user_error(site.asked, "a definition has at least one value", "the Tuple is empty",
+               "Give it an Expr");
   for (size_t i = 0; i < values.size(); i++) {
     if (!values[i].defined()) {
       user_error(site.asked, "the right-hand side must be a defined expression",
@@ -53,7 +55,8 @@ void check_values(const Site& site, const std::vector<Expr>& values) {
                  "Assign every Expr before it is used");
     }
     if (values[i].type().is_handle()) {
-      user_error(site.asked, "values are numbers", text(values[i], " is a handle"), "");
+      user_error(site.asked, "values are numbers", text(values[i], " is a handle"),
+                 "Use the numbers behind the handle");
     }
   }
 }
@@ -62,7 +65,8 @@ void check_types(const Site& site, const std::vector<Expr>& values, const std::v
                  const char* whose) {
   if (values.size() != types.size()) {
     user_error(site.asked, "all definitions of a Func have as many values",
-               text(whose, " has ", types.size(), " and this one has ", values.size()), "");
+               text(whose, " has ", types.size(), " and this one has ", values.size()),
+               "Give as many values");
   }
   for (size_t i = 0; i < types.size(); i++) {
     if (values[i].type() == types[i]) continue;
@@ -150,7 +154,8 @@ void check_free_variables(const Site& site, const Names& names,
     user_error(
         site.asked,
         "every variable on the right-hand side stands on the left-hand side, or is of an RDom",
-        text(quoted(v->name), " does not"), "Add it as an argument, or reduce over an RDom");
+        text(quoted(v->name), " stands on the right-hand side only"),
+        "Add it as an argument, or reduce over an RDom");
   }
 }
 
@@ -210,7 +215,8 @@ std::vector<std::string> pure_names(const Site& site, const std::vector<Expr>& a
     }
     if (std::find(names.begin(), names.end(), v->name) != names.end()) {
       user_error(site.asked, "the arguments of a first definition are different Vars",
-                 quoted(v->name) + " stands there twice", "");
+                 quoted(v->name) + " stands there twice",
+                 "Use a Var of its own for each dimension");
     }
     names.push_back(v->name);
   }
@@ -222,7 +228,7 @@ void check_declared(const Site& site, size_t dimensions, const std::vector<Expr>
   if (f.required_dimensions >= 0 && static_cast<int>(dimensions) != f.required_dimensions) {
     user_error(site.asked, "a definition has the dimensions that the Func was declared with",
                text("it was declared with ", f.required_dimensions, " and is given ", dimensions),
-               "");
+               "Give that many arguments");
   }
   if (!f.required_types.empty()) check_types(site, values, f.required_types, "the declaration");
 }
@@ -236,7 +242,7 @@ void check_update_arity(const Site& site, const std::vector<Expr>& args) {
   if (args.size() == site.f.args.size()) return;
   user_error(site.asked, "all definitions of a Func have as many arguments",
              text("its first definition has ", site.f.args.size(), " and this one ", args.size()),
-             "");
+             "Give as many arguments");
 }
 
 // Coordinates of the left-hand side as int32.
@@ -247,7 +253,7 @@ std::vector<Expr> update_coordinates(const Site& site, const std::vector<Expr>& 
       user_error(site.asked, "coordinates are integers",
                  text(arg, " has type ", to_string(arg.type())), "Convert it: cast<int>(...)");
     }
-    result.push_back(cast_to(Int(32), arg));
+    result.push_back(int32_literal(arg, site.asked));
   }
   return result;
 }
@@ -402,7 +408,8 @@ void define_update(const FuncPtr& f, const std::vector<Expr>& raw_args,
                    const std::vector<Expr>& values) {
   const Site site = site_of(*f, raw_args, true);
   if (!f->is_defined())
-    user_error(site.asked, "a Func is updated after its first definition", "it has none", "");
+    user_error(site.asked, "a Func is updated after its first definition", "it has none",
+               "Define it first: f(x) = 0");
   if (f->is_extern()) {
     user_error(site.asked, "a Func that a C function computes has no updates",
                text("it is defined by ", quoted(f->extern_definition->function)),

@@ -3,6 +3,7 @@
 
 #include <atomic>
 
+#include "ir/literal.h"
 #include "ir/print.h"
 
 namespace retrograde {
@@ -153,7 +154,8 @@ Tuple select(const Tuple& condition, const Tuple& true_value, const Tuple& false
   if (condition.size() != true_value.size() || true_value.size() != false_value.size()) {
     user_error("select between Tuples", "all Tuples have one size",
                text("they have ", condition.size(), ", ", true_value.size(), " and ",
-                    false_value.size(), " elements"));
+                    false_value.size(), " elements"),
+               "Give Tuples of one size");
   }
   std::vector<Expr> result;
   for (size_t i = 0; i < condition.size(); i++)
@@ -166,7 +168,9 @@ Tuple select(const Expr& condition, const Tuple& true_value, const Tuple& false_
 }
 
 Expr mux(const Expr& id, const std::vector<Expr>& values) {
-  if (values.empty()) user_error("apply mux", "it chooses among at least one value");
+  if (values.empty())
+    user_error("apply mux", "it chooses among at least one value", "the list is empty",
+               "Give the values");
   Expr result = values.back();
   for (size_t i = values.size() - 1; i-- > 0;)
     result = select(id == static_cast<int>(i), values[i], result);
@@ -192,26 +196,61 @@ Expr absd(Expr a, Expr b) {
   return call_op(Op::absd, unsigned_form(a.type()), {a, b});
 }
 
+namespace {
+
+// A constant takes the type of the other end.
+void match_ends(Expr& zero, Expr& one) {
+  const std::string asked = text("apply lerp to ", zero, " and ", one);
+  const std::string rule = "a constant end takes the type of the other and must fit it";
+  if (ir::is_const(zero) && !ir::is_const(one)) {
+    zero = ir::literal_in(one.type(), zero, asked, rule);
+  } else if (ir::is_const(one)) {
+    one = ir::literal_in(zero.type(), one, asked, rule);
+  }
+  if (zero.type() != one.type()) {
+    user_error(asked, "both values have one type",
+               text("they are ", to_string(zero.type()), " and ", to_string(one.type())),
+               "Cast one of them");
+  }
+  if (!zero.type().is_int_or_uint() || zero.type().bits() < 64) return;
+  user_error(asked, "integers are of at most 32 bits", "their type is " + to_string(zero.type()),
+             "Cast them to double, or write zero + (one - zero) * weight");
+}
+
+// The literals 0 and 1 are weights too, whatever their type.
+Expr checked_weight(const Expr& zero, Expr weight) {
+  const auto constant = ir::as_const_int(weight);
+  const bool is_end = constant && weight.type().is_int() && (*constant == 0 || *constant == 1);
+  if (is_end) weight = ir::cast_to(Float(32), weight);
+  if (!weight.type().is_uint() && !weight.type().is_float()) {
+    type_error("lerp", "its weight is a float or an unsigned integer", weight);
+  }
+  const auto value = ir::as_const_float(weight);
+  if (value && !zero.type().is_float() && !(*value >= 0 && *value <= 1)) {
+    user_error(text("apply lerp with the weight ", *value),
+               "integers are interpolated with weights in [0, 1]",
+               text("the ends are ", to_string(zero.type()), ", and the weight is ", *value),
+               "Give a weight in [0, 1], or interpolate floats");
+  }
+  if (!zero.type().is_float()) return weight;
+  if (weight.type().is_float()) return ir::cast_to(zero.type(), weight);
+  const auto whole = static_cast<double>(weight.type().max_uint());
+  return ir::cast_to(zero.type(), weight) / ir::make_const(zero.type(), whole);
+}
+
+}  // namespace
+
+// Of integers the result is rounded to the nearest, after the weight was brought to their width,
+// rounding down: for n bits to w / (2^n - 1), where a float weight times 2^n - 1 is rounded as floats
+// are (as doubles are for 32 bits).
 Expr lerp(Expr zero, Expr one, Expr weight) {
   check_defined(zero, "lerp");
   check_defined(one, "lerp");
   check_defined(weight, "lerp");
-  if (ir::is_const(zero)) zero = ir::cast_to(one.type(), zero);
-  if (ir::is_const(one)) one = ir::cast_to(zero.type(), one);
-  if (zero.type() != one.type()) {
-    user_error(text("apply lerp to ", zero, " and ", one), "both values have one type",
-               text("they are ", to_string(zero.type()), " and ", to_string(one.type())));
-  }
-  if (ir::as_const_int(weight) && weight.type().is_int()) weight = ir::cast_to(Float(32), weight);
-  if (!weight.type().is_uint() && !weight.type().is_float()) {
-    type_error("lerp", "its weight is a float or an unsigned integer", weight);
-  }
-  if (zero.type().is_float() && weight.type().is_uint()) {
-    const auto whole = static_cast<double>(weight.type().max_uint());
-    weight = ir::cast_to(zero.type(), weight) / ir::make_const(zero.type(), whole);
-  }
-  if (weight.type().is_float() && zero.type().is_float()) weight = ir::cast_to(zero.type(), weight);
-  return call_op(Op::lerp, zero.type(), {zero, one, weight});
+  match_ends(zero, one);
+  weight = checked_weight(zero, std::move(weight));
+  const Type type = zero.type();
+  return call_op(Op::lerp, type, {zero, one, weight});
 }
 
 Expr div_round_to_zero(Expr a, Expr b) {
@@ -361,8 +400,8 @@ namespace ir {
 namespace {
 void check_parts(const std::vector<Expr>& values, const char* what) {
   if (values.empty())
-    user_error(text("apply ", what),
-               "it gives the value of its first argument, and was given none");
+    user_error(text("apply ", what), "it gives the value of its first argument",
+               "it was given none", "Give it a value");
   for (const Expr& value : values) check_defined(value, what);
 }
 }  // namespace

@@ -5,6 +5,7 @@
 
 #include "frontend/func.h"
 #include "frontend/wrappers.h"
+#include "ir/literal.h"
 #include "ir/print.h"
 #include "ir/visit.h"
 
@@ -16,10 +17,12 @@ std::shared_ptr<ir::ParameterContents> make_parameter(Type type, int dimensions,
                                                       const std::string& name) {
   const std::string asked = "make the ImageParam " + quoted(name);
   if (type.is_handle() || !type.is_scalar() || type.bits() == 0) {
-    user_error(asked, "its elements are numbers", "the type is " + to_string(type));
+    user_error(asked, "its elements are numbers", "the type is " + to_string(type),
+               "Give a type of numbers");
   }
   if (dimensions < 0)
-    user_error(asked, "dimensions are not negative", text("they are ", dimensions));
+    user_error(asked, "dimensions are not negative", text("they are ", dimensions),
+               "Give 0 or more");
   auto result = std::make_shared<ir::ParameterContents>();
   result->name = name;
   result->type = type;
@@ -32,9 +35,10 @@ std::shared_ptr<ir::ParameterContents> make_parameter(Type type, int dimensions,
 Expr as_size(const Expr& e, const std::string& asked) {
   if (!e.defined()) return e;
   if (!e.type().is_int_or_uint() || !e.type().is_scalar()) {
-    user_error(asked, "it is an integer", text(e, " has type ", to_string(e.type())));
+    user_error(asked, "sizes and strides are integers", text(e, " has type ", to_string(e.type())),
+               "Convert it: cast<int>(...)");
   }
-  return ir::cast_to(Int(32), e);
+  return ir::int32_literal(e, asked);
 }
 
 }  // namespace
@@ -44,7 +48,7 @@ Dimension::Dimension(std::shared_ptr<ir::ParameterContents> parameter, int d)
   if (d_ >= 0 && d_ < parameter_->dimensions) return;
   user_error(text("use dimension ", d_, " of ", quoted(parameter_->name)),
              "a dimension is numbered from 0",
-             text("it has ", parameter_->dimensions, " dimensions"));
+             text("it has ", parameter_->dimensions, " dimensions"), "Give a number below that");
 }
 
 Expr Dimension::fact(const char* which) const {
@@ -62,7 +66,7 @@ void Dimension::set(Expr ir::BufferConstraint::*field, Expr value, const char* w
   value = as_size(value, asked);
   auto constant = value.defined() ? ir::as_const_int(value) : std::nullopt;
   if (constant && *constant < 0 && field == &ir::BufferConstraint::extent) {
-    user_error(asked, "an extent is not negative", text("it is ", *constant));
+    user_error(asked, "an extent is not negative", text("it is ", *constant), "Give 0 or more");
   }
   // A promise about an entity in terms of itself is kept weakly: it must not own itself.
   if (value.defined()) {
@@ -119,9 +123,10 @@ Dimension OutputImageParam::dim(int i) const {
 
 OutputImageParam& OutputImageParam::set_estimates(const Region& estimates) {
   if (static_cast<int>(estimates.size()) != dimensions()) {
-    user_error("set estimates of " + quoted(name()), "there is one for each dimension",
-               text("it has ", dimensions(), " dimensions and was given ", estimates.size(),
-                    " estimates"));
+    user_error(
+        "set estimates of " + quoted(name()), "there is one for each dimension",
+        text("it has ", dimensions(), " dimensions and was given ", estimates.size(), " estimates"),
+        "Give that many");
   }
   for (int d = 0; d < dimensions(); d++) dim(d).set_estimate(estimates[d].min, estimates[d].extent);
   return *this;

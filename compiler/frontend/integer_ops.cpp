@@ -1,17 +1,107 @@
 #include "frontend/integer_ops.h"
 
+#include "ir/literal.h"
+#include "ir/print.h"
+
 namespace retrograde {
 
 Expr user_context_value() {
   return ir::call_op(ir::Op::runtime_call, Handle(), {Expr("retrograde_user_context")});
 }
 
+namespace {
+
+// The operands of a division in a signed type that holds both, the divisor from 1 to 256.
+struct Division {
+  Type type;  // of the result
+  Expr numerator, divisor;
+
+  Division(const Expr& n, const Expr& d, const char* what) {
+    if (!n.defined() || !d.defined()) {
+      user_error(text("apply ", what), "every operand must be a defined expression",
+                 "one of them was never assigned", "Assign the Expr before its use");
+    }
+    const std::string asked = text("apply ", what, " to ", n, " and ", d);
+    if (!n.type().is_int_or_uint() || n.type().bits() < 8 || n.type().bits() > 32) {
+      user_error(asked, "the numerator is an integer of 8, 16 or 32 bits",
+                 "its type is " + to_string(n.type()), "Use operator/ and operator%");
+    }
+    const Type byte = UInt(8);
+    if (!ir::is_const(d) && d.type().element_of() != byte) {
+      user_error(asked, "the divisor is of type uint8", "its type is " + to_string(d.type()),
+                 "Cast it to uint8");
+    }
+    const Expr small = ir::literal_in(byte, d, asked, "the divisor is of type uint8");
+    type = n.type().element_of();
+    const Type wide = Int(type.bits() == 32 ? 64 : 32);
+    numerator = cast(wide, n);
+    divisor = select(small == 0, ir::make_const(wide, 256), cast(wide, small));
+  }
+
+  Expr result(const Expr& e) const { return cast(type, e); }
+};
+
+}  // namespace
+
+Expr fast_integer_divide(const Expr& numerator, const Expr& divisor) {
+  const Division d(numerator, divisor, "fast_integer_divide");
+  return d.result(d.numerator / d.divisor);
+}
+
+Expr fast_integer_modulo(const Expr& numerator, const Expr& divisor) {
+  const Division d(numerator, divisor, "fast_integer_modulo");
+  return d.result(d.numerator % d.divisor);
+}
+
+Expr fast_integer_divide_round_to_zero(const Expr& numerator, const Expr& divisor) {
+  const Division d(numerator, divisor, "fast_integer_divide_round_to_zero");
+  return d.result(div_round_to_zero(d.numerator, d.divisor));
+}
+
+namespace {
+
+// A literal beside an expression of another type must fit it, as in a + 300.
+Type match_operands(Expr& a, Expr& b, const char* what) {
+  const bool is_literal_a = ir::is_const(a), is_literal_b = ir::is_const(b);
+  if (is_literal_a != is_literal_b && a.defined() && b.defined()) {
+    Expr& literal = is_literal_a ? a : b;
+    const Type type = is_literal_a ? b.type() : a.type();
+    if (literal.type() == Int(32)) {
+      literal = ir::literal_in(type, literal, text("apply ", what, " to ", a, " and ", b),
+                               "a constant takes the type of the other operand and must fit it");
+    }
+  }
+  ir::match_types(a, b, what);
+  return a.type();
+}
+
+}  // namespace
+
+Expr halving_add(Expr a, Expr b) {
+  const Type type = match_operands(a, b, "halving_add");
+  return cast(type, widening_add(a, b) / 2);
+}
+
+Expr rounding_halving_add(Expr a, Expr b) {
+  const Type type = match_operands(a, b, "rounding_halving_add");
+  return cast(type, (widening_add(a, b) + 1) / 2);
+}
+
+Expr halving_sub(Expr a, Expr b) {
+  const Type type = match_operands(a, b, "halving_sub");
+  return cast(type, widening_sub(a, b) / 2);
+}
+
 Expr concat_bits(const std::vector<Expr>& parts) {
   const std::string asked = "concatenate bits";
-  if (parts.empty()) user_error(asked, "there is at least one part", "none was given");
+  if (parts.empty())
+    user_error(asked, "there is at least one part", "none was given",
+               "Give the parts, the lowest first");
   int total = 0;
   for (const Expr& part : parts) {
-    if (!part.defined()) user_error(asked, "every part is a defined expression");
+    if (!part.defined())
+      user_error(asked, "every part is a defined expression", "one was never assigned",
+                 "Assign every Expr before it is used");
     if (part.type() != parts[0].type()) {
       user_error(asked, "all parts have one type",
                  to_string(parts[0].type()) + " and " + to_string(part.type()) + " were given",

@@ -6,17 +6,13 @@
 
 namespace retrograde {
 
-// Division and remainder by an unsigned 8-bit divisor, of the numerator's type. No faster than the
-// operators here: they find reciprocals of constants by themselves.
-inline Expr fast_integer_divide(const Expr& numerator, const Expr& divisor) {
-  return numerator / cast(numerator.type(), divisor);
-}
-inline Expr fast_integer_modulo(const Expr& numerator, const Expr& divisor) {
-  return numerator % cast(numerator.type(), divisor);
-}
-inline Expr fast_integer_divide_round_to_zero(const Expr& numerator, const Expr& divisor) {
-  return div_round_to_zero(numerator, cast(numerator.type(), divisor));
-}
+// Division and remainder by an unsigned 8-bit divisor, whose 0 stands for 256; of the type of the
+// numerator, an integer of 8, 16 or 32 bits. The remainder is numerator - quotient * divisor, which
+// wraps in int8. No faster than the operators here: they find reciprocals of constants by
+// themselves.
+Expr fast_integer_divide(const Expr& numerator, const Expr& divisor);
+Expr fast_integer_modulo(const Expr& numerator, const Expr& divisor);
+Expr fast_integer_divide_round_to_zero(const Expr& numerator, const Expr& divisor);
 
 // In twice the bits, where nothing overflows; signed when one operand is.
 namespace ir {
@@ -49,16 +45,11 @@ inline Expr saturating_add(const Expr& a, const Expr& b) {
 inline Expr saturating_sub(const Expr& a, const Expr& b) {
   return saturating_cast(a.type(), widening_sub(a, b));
 }
-// The mean, rounded down or up: no bit is lost on the way.
-inline Expr halving_add(const Expr& a, const Expr& b) {
-  return cast(a.type(), widening_add(a, b) / 2);
-}
-inline Expr rounding_halving_add(const Expr& a, const Expr& b) {
-  return cast(a.type(), (widening_add(a, b) + 1) / 2);
-}
-inline Expr halving_sub(const Expr& a, const Expr& b) {
-  return cast(a.type(), widening_sub(a, b) / 2);
-}
+// The mean, rounded down or up: no bit is lost on the way. Of the type that a + b has; a C++
+// integer takes the other operand's type.
+Expr halving_add(Expr a, Expr b);
+Expr rounding_halving_add(Expr a, Expr b);
+Expr halving_sub(Expr a, Expr b);
 
 // `bits` of e's bits, from the lowest on, as a value of `type`; out of the top come zeros.
 inline Expr extract_bits(Type type, const Expr& e, const Expr& lowest) {

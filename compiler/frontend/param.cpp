@@ -1,32 +1,11 @@
 // param.cpp -- values and limits of scalar parameters.
 #include "frontend/param.h"
 
-#include <cmath>
-
+#include "ir/literal.h"
 #include "ir/print.h"
 #include "ir/visit.h"
 
 namespace retrograde::ir {
-
-namespace {
-
-std::string value_text(const Scalar& value) {
-  if (value.type.is_float()) return text(value.f);
-  return value.type.is_int() ? text(value.i) : text(value.u);
-}
-
-bool holds(Type type, const Scalar& value) {
-  if (type.is_handle() || value.type.is_handle()) return type.is_handle() == value.type.is_handle();
-  if (value.type.is_float()) {
-    // Floats may round; an integer parameter takes whole numbers only.
-    if (type.is_float()) return std::isfinite(value.f) ? type.can_represent(value.f) : true;
-    return value.f == std::floor(value.f) && type.can_represent(value.f);
-  }
-  if (type.is_float()) return eval_cast(type, value).f == value.as_double();
-  return value.type.is_int() ? type.can_represent(value.i) : type.can_represent(value.u);
-}
-
-}  // namespace
 
 std::shared_ptr<ParameterContents> make_scalar_parameter(Type type, const std::string& name) {
   auto result = std::make_shared<ParameterContents>();
@@ -34,14 +13,14 @@ std::shared_ptr<ParameterContents> make_scalar_parameter(Type type, const std::s
   result->type = type;
   if (type.bits() == 0 || !type.is_scalar()) {
     user_error("make the Param " + quoted(result->name), "its type is a scalar",
-               "it is " + to_string(type));
+               "it is " + to_string(type), "Give a type of one number");
   }
   return result;
 }
 
 Scalar converted_scalar(const ParameterContents& parameter, const Scalar& value) {
-  if (!holds(parameter.type, value)) {
-    user_error(text("set the Param ", quoted(parameter.name), " to ", value_text(value)),
+  if (!holds_value(parameter.type, value)) {
+    user_error(text("set the Param ", quoted(parameter.name), " to ", literal_text(value)),
                "the value must fit the parameter's type",
                "its type is " + to_string(parameter.type), "Give a value of that type");
   }
@@ -55,9 +34,12 @@ void set_scalar(ParameterContents& parameter, const Scalar& value) {
 void set_limit(ParameterContents& parameter, Expr ParameterContents::*field, const Expr& value) {
   if (value.defined() && value.type().is_handle()) {
     user_error("limit the Param " + quoted(parameter.name), "limits are numbers",
-               text("one is ", value));
+               text("one is ", value), "Give numbers");
   }
-  parameter.*field = value.defined() ? cast_to(parameter.type, value) : value;
+  const std::string asked = "limit the Param " + quoted(parameter.name);
+  parameter.*field = value.defined() ? literal_in(parameter.type, value, asked,
+                                                  "a limit is a value of the parameter's type")
+                                     : value;
   parameter.version++;
 }
 
@@ -67,7 +49,7 @@ Scalar get_scalar(const ParameterContents& parameter, Type type) {
     user_error(asked, "a value must have been set", "it has none", "Call set() first");
   if (type != parameter.type) {
     user_error(text(asked, " as ", to_string(type)), "the types must agree",
-               "it is of type " + to_string(parameter.type));
+               "it is of type " + to_string(parameter.type), "Use it as what it is");
   }
   return *parameter.value;
 }

@@ -4,6 +4,7 @@
 #include <ostream>
 
 #include "frontend/image_param.h"
+#include "ir/literal.h"
 #include "ir/print.h"
 #include "ir/visit.h"
 
@@ -20,7 +21,9 @@ std::string variable_name(const std::string& domain, size_t i) {
 // Bounds are int32 and may depend on parameters and on the pure variables of no definition.
 Expr checked_bound(const Expr& e, const std::string& domain, const char* which) {
   const std::string asked = text("make the RDom ", quoted(domain));
-  if (!e.defined()) user_error(asked, text("its ", which, " must be a defined expression"));
+  if (!e.defined())
+    user_error(asked, text("its ", which, " must be a defined expression"), "it was never assigned",
+               "Assign every Expr before it is used");
   if (!e.type().is_int_or_uint() || !e.type().is_scalar()) {
     user_error(asked, text("its ", which, " must be an integer"),
                text(e, " has type ", to_string(e.type())), "Convert it with cast<int>");
@@ -34,14 +37,14 @@ Expr checked_bound(const Expr& e, const std::string& domain, const char* which) 
     }
     return true;
   });
-  return ir::cast_to(Int(32), e);
+  return ir::int32_literal(e, asked);
 }
 
 void check_extent(const Expr& extent, const std::string& name) {
   auto constant = ir::as_const_int(extent);
   if (constant && *constant < 0) {
     user_error(text("make the RDom ", quoted(name)), "an extent is not negative",
-               text("it is ", *constant));
+               text("it is ", *constant), "Give 0 or more");
   }
 }
 
@@ -90,7 +93,8 @@ RDom::RDom(const OutputImageParam& image) {
 void RDom::initialize(const Region& region, const std::string& name) {
   const std::string unique = name.empty() ? ir::unique_name("r") : ir::claim_name(name);
   if (region.empty())
-    user_error("make the RDom " + quoted(unique), "a reduction domain has at least one variable");
+    user_error("make the RDom " + quoted(unique), "a reduction domain has at least one variable",
+               "the region has no dimensions", "Give a min and an extent for each variable");
   domain_ = std::make_shared<ir::ReductionDomainContents>();
   for (size_t i = 0; i < region.size(); i++) {
     Expr min = checked_bound(region[i].min, unique, "min");
@@ -110,8 +114,8 @@ int RDom::dimensions() const { return domain_ ? static_cast<int>(domain_->vars.s
 
 RVar RDom::operator[](int i) const {
   if (i < 0 || i >= dimensions()) {
-    user_error(text("take variable ", i, " of an RDom"),
-               text("it has ", dimensions(), " variables"));
+    user_error(text("take variable ", i, " of an RDom"), "variables are numbered from 0",
+               text("it has ", dimensions(), " variables"), "Give a number below that");
   }
   return RVar(domain_, i);
 }
@@ -130,8 +134,12 @@ RDom::operator Expr() const { return only_variable(); }
 
 void RDom::where(Expr predicate) {
   const std::string asked = "add a predicate to an RDom";
-  if (!domain_) user_error(asked, "the RDom was never given a domain");
-  if (!predicate.defined()) user_error(asked, "the predicate must be a defined expression");
+  if (!domain_)
+    user_error(asked, "the RDom was never given a domain", "it was constructed without bounds",
+               "Construct it: RDom r(0, 10)");
+  if (!predicate.defined())
+    user_error(asked, "the predicate must be a defined expression", "it was never assigned",
+               "Assign every Expr before it is used");
   if (domain_->frozen) {
     user_error(asked, "a predicate is given before the domain's first use in a definition",
                text("the domain of ", quoted(domain_->vars[0].var), " is in use"),

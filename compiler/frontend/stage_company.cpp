@@ -2,6 +2,7 @@
 #include "frontend/define.h"
 #include "frontend/func.h"
 #include "ir/build.h"
+#include "ir/literal.h"
 #include "ir/print.h"
 
 namespace retrograde {
@@ -61,7 +62,8 @@ Stage& Stage::compute_with(const LoopLevel& level,
       text("compute ", quoted(name()), " with ",
            level.defined() ? level_text(level.contents()->level) : "another stage");
   if (func_->is_extern()) {
-    user_error(asked, "the stage has loops", quoted(func_->name) + " is computed by a C function");
+    user_error(asked, "the stage has loops", quoted(func_->name) + " is computed by a C function",
+               "Schedule another stage");
   }
   if (!schedule().specializations.empty() || !specialization_.empty()) {
     user_error(asked, "a stage that joins the loops of another one has no specializations",
@@ -118,7 +120,8 @@ Stage& Stage::prefetch(const std::shared_ptr<ir::ParameterContents>& image, cons
                        const VarOrRVar& from, Expr offset, PrefetchBoundStrategy strategy) {
   if (!image || !image->is_buffer) {
     user_error("prefetch for " + quoted(name()), "it is a Func or an image that is prefetched",
-               image ? quoted(image->name) + " is a scalar" : std::string("it is undefined"));
+               image ? quoted(image->name) + " is a scalar" : std::string("it is undefined"),
+               "Name a Func or an ImageParam");
   }
   return add_prefetch(image->name, ir::SymbolRef(image), at, from, std::move(offset), strategy);
 }
@@ -136,14 +139,15 @@ Stage& Stage::add_prefetch(std::string what, ir::SymbolRef symbol, const VarOrRV
   if (!offset.defined() || !offset.type().is_int_or_uint() || !offset.type().is_scalar()) {
     user_error(asked, "the offset is an integer",
                offset.defined() ? text(offset, " has type ", to_string(offset.type()))
-                                : std::string("it is undefined"));
+                                : std::string("it is undefined"),
+               "Give an integer");
   }
   ir::PrefetchDirective directive;
   directive.name = std::move(what);
   directive.symbol = std::move(symbol);
   directive.at = at.name();
   directive.from = from.name();
-  directive.offset = ir::cast_to(Int(32), std::move(offset));
+  directive.offset = ir::int32_literal(std::move(offset), asked);
   directive.strategy = strategy;
   touch().prefetches.push_back(std::move(directive));
   return *this;

@@ -7,6 +7,7 @@
 
 #include "frontend/define.h"
 #include "frontend/func.h"
+#include "ir/literal.h"
 #include "ir/print.h"
 #include "ir/visit.h"
 
@@ -101,10 +102,12 @@ Func& Func::reorder_storage(const std::vector<Var>& dims) {
   for (const Var& dim : dims) {
     const auto it = std::find(storage.begin(), storage.end(), dim.name());
     if (it == storage.end())
-      user_error(asked, quoted(dim.name()) + " must be one of its dimensions", "it is not");
+      user_error(asked, quoted(dim.name()) + " must be one of its dimensions",
+                 dimensions_of(*func_), "Name one of them");
     const size_t place = static_cast<size_t>(it - storage.begin());
     if (std::find(places.begin(), places.end(), place) != places.end()) {
-      user_error(asked, "each dimension is named once", quoted(dim.name()) + " is named twice");
+      user_error(asked, "each dimension is named once", quoted(dim.name()) + " is named twice",
+                 "Drop one of them");
     }
     places.push_back(place);
   }
@@ -122,10 +125,12 @@ void Func::check_is_dimension(const Var& var, const std::string& asked) const {
 
 // An integer as int32; positive when it is known.
 Expr Func::checked_size(Expr e, const char* what, const std::string& asked) const {
-  if (!e.defined()) user_error(asked, text("the ", what, " must be a defined expression"));
+  if (!e.defined())
+    user_error(asked, text("the ", what, " must be a defined expression"), "it was never assigned",
+               "Assign every Expr before it is used");
   if (!e.type().is_int_or_uint() || !e.type().is_scalar()) {
     user_error(asked, text("the ", what, " is an integer"),
-               text(e, " has type ", to_string(e.type())));
+               text(e, " has type ", to_string(e.type())), "Give an integer");
   }
   const auto constant = ir::as_const_int(e);
   if (constant && (*constant <= 0 || *constant > INT32_MAX)) {
@@ -181,10 +186,15 @@ Func& Func::memoize(const EvictionKey& eviction_key) {
                  text(key, " has type ", to_string(key.type())), "Convert it to uint64");
     }
     ir::check_over_parameters(key, "the eviction key", asked);
+    if (const Expr& given = func_->schedule.eviction_key; given.defined()) {
+      user_error(asked, "a Func has one eviction key",
+                 text("it was given ", given, " before, and now ", key),
+                 "Give the key once; combine two with arithmetic");
+    }
   }
   ir::FuncSchedule& schedule = touch();
   schedule.memoized = true;
-  schedule.eviction_key = eviction_key.key();
+  if (eviction_key.key().defined()) schedule.eviction_key = eviction_key.key();
   return *this;
 }
 
@@ -229,17 +239,20 @@ void check_alignment(const ir::Bound& bound, const std::string& asked) {
 void Func::add_bound(std::vector<ir::Bound>& bounds, const std::string& asked, const Var& var,
                      Expr min, Expr extent) {
   check_is_dimension(var, asked);
-  if (!extent.defined()) user_error(asked, "the extent must be a defined expression");
+  if (!extent.defined())
+    user_error(asked, "the extent must be a defined expression", "it was never assigned",
+               "Give the extent");
   for (Expr* e : {&min, &extent}) {
     if (!e->defined()) continue;
     if (!e->type().is_int_or_uint() || !e->type().is_scalar()) {
-      user_error(asked, "bounds are integers", text(*e, " has type ", to_string(e->type())));
+      user_error(asked, "bounds are integers", text(*e, " has type ", to_string(e->type())),
+                 "Convert it: cast<int>(...)");
     }
-    *e = ir::cast_to(Int(32), *e);
+    *e = ir::int32_literal(*e, asked);
   }
   const auto constant = ir::as_const_int(extent);
   if (constant && *constant < 0)
-    user_error(asked, "an extent is not negative", text("it is ", *constant));
+    user_error(asked, "an extent is not negative", text("it is ", *constant), "Give 0 or more");
   ir::Bound changed = bound_of(bounds, var.name());
   changed.min = std::move(min);
   changed.extent = std::move(extent);
@@ -264,9 +277,9 @@ Func& Func::align_bounds(const Var& var, Expr modulus, Expr remainder) {
   if (remainder.defined()) {
     if (!remainder.type().is_int_or_uint() || !remainder.type().is_scalar()) {
       user_error(asked, "the remainder is an integer",
-                 text(remainder, " has type ", to_string(remainder.type())));
+                 text(remainder, " has type ", to_string(remainder.type())), "Give an integer");
     }
-    remainder = ir::cast_to(Int(32), std::move(remainder));
+    remainder = ir::int32_literal(std::move(remainder), asked);
   }
   ir::Bound changed = bound_of(func_->schedule.bounds, var.name());
   changed.modulus = std::move(modulus);
@@ -289,9 +302,10 @@ Func& Func::set_estimate(const Var& var, const Expr& min, const Expr& extent) {
 
 Func& Func::set_estimates(const Region& estimates) {
   if (static_cast<int>(estimates.size()) != dimensions()) {
-    user_error("set estimates of " + quoted(name()), "there is one for each dimension",
-               text("it has ", dimensions(), " dimensions and was given ", estimates.size(),
-                    " estimates"));
+    user_error(
+        "set estimates of " + quoted(name()), "there is one for each dimension",
+        text("it has ", dimensions(), " dimensions and was given ", estimates.size(), " estimates"),
+        "Give that many");
   }
   const std::vector<Var> variables = args();
   for (int d = 0; d < dimensions(); d++)

@@ -8,6 +8,7 @@
 #include <ostream>
 #include <unordered_map>
 
+#include "ir/literal.h"
 #include "ir/print.h"
 #include "ir/visit.h"
 
@@ -92,13 +93,13 @@ Expr as_coordinate(const Expr& e, int dimension, const std::string& what) {
   const std::string asked = text("read dimension ", dimension, " of ", what);
   if (!e.defined())
     user_error(asked, "a coordinate must be a defined expression", "this one was never assigned",
-               "");
+               "Assign every Expr before it is used");
   if (!e.type().is_int_or_uint() || !e.type().is_scalar()) {
     user_error(asked, "coordinates are integers",
                text("the coordinate ", e, " has type ", to_string(e.type())),
                "Convert it: cast<int>(floor(e)) or cast<int>(round(e))");
   }
-  return cast_to(Int(32), e);
+  return int32_literal(e, asked);
 }
 
 }  // namespace

@@ -1,5 +1,6 @@
 // What the operators of operators.def do to scalars. Floats narrower than 64 bits are computed in
 // double and rounded once, so these are the exact functions that vector math approximates.
+#include <algorithm>
 #include <bit>
 #include <cmath>
 
@@ -53,12 +54,14 @@ double unit_weight(const Scalar& weight) {
 }
 
 // A weight is first brought to the width of the values, rounding down: 0.5 of 8 bits is 127 / 255.
-// (A narrower one is the same fraction of its own range and can stay.)
+// The product is one of floats, so that the weight k / 65535.0f is k. (A narrower one is the same
+// fraction of its own range and can stay.)
 Scalar fixed_point_weight(const Scalar& weight, Type values) {
   const Type fixed = UInt(values.bits());
   if (weight.type.is_float()) {
+    const Type product = weight.type.bits() > 32 || values.bits() > 16 ? Float(64) : Float(32);
     return eval_cast(fixed,
-                     Scalar::of_float(Float(64), weight.f * static_cast<double>(fixed.max_uint())));
+                     Scalar::of_float(product, weight.f * static_cast<double>(fixed.max_uint())));
   }
   if (weight.type.bits() <= values.bits()) return weight;
   return Scalar::of_uint(fixed, weight.u / (weight.type.max_uint() / fixed.max_uint()));
@@ -89,15 +92,13 @@ Scalar eval_lerp(const Scalar& a, const Scalar& b, const Scalar& weight, Type ty
 // ---- others ----
 
 Scalar eval_saturating_cast(Type type, const Scalar& a) {
-  if (type.is_float()) {
-    const Scalar value = eval_cast(type, a);
-    if (!std::isinf(value.f) ||
-        (a.type.is_float() && std::isinf(a.f) && a.type.bits() == type.bits()))
-      return value;
-    const uint64_t infinity_pattern =
-        eval_reinterpret(UInt(type.bits()), value).u;  // one below: the largest finite
-    return eval_reinterpret(type, Scalar::of_uint(UInt(type.bits()), infinity_pattern - 1));
+  if (type == a.type) return a;
+  if (type == Float(16)) {
+    if (std::isnan(a.as_double())) return eval_cast(type, a);
+    const double largest = 65504;
+    return Scalar::of_float(type, std::clamp(a.as_double(), -largest, largest));
   }
+  if (type.is_float()) return eval_cast(type, a);    // the ends of its range are infinities
   if (a.type.is_float()) return eval_cast(type, a);  // saturates already
   if (a.type.is_int() ? type.can_represent(a.i) : type.can_represent(a.u))
     return eval_cast(type, a);

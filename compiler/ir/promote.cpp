@@ -1,5 +1,6 @@
 // Promotion of operands, and the C++ operators that users write.
 #include "ir/build.h"
+#include "ir/literal.h"
 #include "ir/print.h"
 
 namespace retrograde {
@@ -52,7 +53,7 @@ void match_types(Expr& a, Expr& b, const char* what) {
 
 Expr constant_like(const Expr& other, int64_t value, const char* what) {
   check_operand(other, what);
-  if (!other.type().element_of().can_represent(value)) {
+  if (!holds_value(other.type().element_of(), Scalar::of_int(Int(64), value))) {
     user_error(text("apply ", what, " to an expression and the constant ", value),
                "a constant takes the type of the other operand and must fit it",
                text("the other operand has the type ", other.type()),
@@ -174,10 +175,28 @@ Expr select(Expr condition, Expr true_value, Expr false_value) {
   return ir::make_select(std::move(condition), std::move(true_value), std::move(false_value));
 }
 
+namespace {
+
+// Integers of another type would wrap, and clamp to something else. Floats only round.
+Expr clamp_bound(const Expr& value, Expr bound) {
+  const std::string asked = text("clamp ", value, " with the bound ", bound);
+  const std::string rule = "a bound is a value of the type that is clamped";
+  if (!value.type().is_float() && !ir::is_const(bound) && !ir::always_fits(value.type(), bound)) {
+    user_error(asked, rule,
+               text(bound.type(), " has values that ", value.type().element_of(), " has not"),
+               "Cast the bound, or clamp in the wider type");
+  }
+  if (bound.type().is_vector() && bound.type().lanes() != value.type().lanes())
+    ir::no_common_type(value.type(), bound.type(), "clamp");
+  return ir::literal_in(value.type(), std::move(bound), asked, rule);
+}
+
+}  // namespace
+
 Expr clamp(Expr value, Expr low, Expr high) {
   for (const Expr* e : {&value, &low, &high}) ir::check_operand(*e, "clamp");
-  low = cast(value.type(), std::move(low));
-  high = cast(value.type(), std::move(high));
+  low = clamp_bound(value, std::move(low));
+  high = clamp_bound(value, std::move(high));
   return ir::binary(Kind::Max, ir::binary(Kind::Min, std::move(value), std::move(high)),
                     std::move(low));
 }

@@ -153,6 +153,16 @@ PIPELINE(saturating_casts) {
   return {{f}, {{128}}, {}};
 }
 
+PIPELINE(saturating_float_casts) {
+  Buffer<double> d = noise<double>({128}, 1);
+  Func f("f");
+  f(x) = Tuple(saturating_cast<float>(d(x) * Expr(1e300)), saturating_cast<float>(d(x)),
+               saturating_cast<double>(cast<float>(d(x))),
+               saturating_cast<int32_t>(d(x) * Expr(1e300)),
+               saturating_cast<uint8_t>(d(x) * Expr(1e300)));
+  return {{f}, {{128}}, {}};
+}
+
 PIPELINE(absolute_differences) {
   Buffer<int8_t> a = edges<int8_t>({128}, 1), b = edges<int8_t>({128}, 2);
   Buffer<uint16_t> p = edges<uint16_t>({128}, 3), q = edges<uint16_t>({128}, 4);
@@ -173,6 +183,22 @@ PIPELINE(lerp_integers) {
   f(x) = Tuple(lerp(a(x), b(x), w(x)), lerp(p(x), q(x), v(x)), lerp(p(x), q(x), w(x)),
                lerp(m(x), n(x), w(x)), lerp(a(x), b(x), cast<float>(w(x)) / 256.0f));
   return {{f}, {{128}}, {}};
+}
+
+// Weights that are shares of the range of 16 bits, and weights wider than the values.
+PIPELINE(lerp_weights) {
+  Buffer<uint16_t> p = edges<uint16_t>({4096}, 1), q = edges<uint16_t>({4096}, 2),
+                   v = noise<uint16_t>({4096}, 3);
+  Buffer<uint8_t> a = edges<uint8_t>({4096}, 4), b = edges<uint8_t>({4096}, 5);
+  Buffer<uint32_t> w = noise<uint32_t>({4096}, 6);
+  Buffer<float> share(4096);
+  for (int i = 0; i < 4096; ++i) share(i) = static_cast<float>(16 * i + 5) / 65535.0f;
+  Func f("f");
+  f(x) = Tuple(lerp(p(x), q(x), share(x)), lerp(cast<int16_t>(p(x)), cast<int16_t>(q(x)), share(x)),
+               lerp(a(x), b(x), share(x)), lerp(p(x), q(x), cast<double>(share(x))),
+               lerp(cast<int32_t>(p(x)) * 30000, cast<int32_t>(q(x)) * 25000, share(x)),
+               lerp(a(x), b(x), v(x)), lerp(a(x), b(x), w(x)), lerp(p(x), q(x), w(x)));
+  return {{f}, {{4096}}, {}};
 }
 
 PIPELINE(lerp_floats) {
