@@ -62,10 +62,12 @@ std::unordered_set<std::string> reduction_roots(const ir::Definition& definition
 }
 
 void check_factor(const Expr& factor, const std::string& asked) {
-  if (!factor.defined()) user_error(asked, "the factor must be a defined expression");
+  if (!factor.defined())
+    user_error(asked, "the factor must be a defined expression", "it was never assigned",
+               "Assign every Expr before it is used");
   if (!factor.type().is_int_or_uint() || !factor.type().is_scalar()) {
     user_error(asked, "a factor is an integer",
-               text(factor, " has type ", to_string(factor.type())));
+               text(factor, " has type ", to_string(factor.type())), "Give an integer");
   }
   auto constant = ir::as_const_int(factor);
   if (constant && *constant <= 0) {
@@ -90,6 +92,42 @@ void check_tail(TailStrategy tail, bool is_update, bool is_reduction, const std:
                "TailStrategy::ShiftInwards would, at the end of the range",
                "Use TailStrategy::GuardWithIf or TailStrategy::RoundUp");
   }
+}
+
+// Whether what lies behind the end of a loop belongs to no other iteration. Behind the end of an
+// inner loop lie the points of the next iteration around it.
+bool ends_alone(const ir::StageSchedule& schedule, std::string loop) {
+  for (auto split = schedule.splits.rbegin(); split != schedule.splits.rend(); ++split) {
+    if (split->kind == ir::Split::Kind::Fuse) {
+      if (split->old_var == loop) loop = split->outer;
+    } else if (split->outer == loop) {
+      loop = split->old_var;
+    } else if (split->kind == ir::Split::Kind::Split && split->inner == loop) {
+      return false;
+    }
+  }
+  return true;
+}
+
+// Whether the loop is an inner one of constant extent that the factor divides: then it has no tail.
+bool divides_inner(const ir::StageSchedule& schedule, const std::string& loop, const Expr& factor) {
+  const auto small = ir::as_const_int(factor);
+  for (auto split = schedule.splits.rbegin(); split != schedule.splits.rend(); ++split) {
+    if (split->kind == ir::Split::Kind::Rename || split->inner != loop) continue;
+    const auto large = split->kind == ir::Split::Kind::Split ? ir::as_const_int(split->factor)
+                                                             : std::optional<int64_t>();
+    return small && large && *large % *small == 0;
+  }
+  return false;
+}
+
+void check_round_up(const ir::StageSchedule& schedule, const std::string& loop, const Expr& factor,
+                    const std::string& asked) {
+  if (ends_alone(schedule, loop) || divides_inner(schedule, loop, factor)) return;
+  user_error(asked, "an update definition does not run a point twice",
+             text("TailStrategy::RoundUp runs ", quoted(loop),
+                  " past its end, into the points of the next iteration around it"),
+             "Use TailStrategy::GuardWithIf, or a factor that divides the loop's extent");
 }
 
 // The variable that makes a loop's iterations depend on each other; empty when none does.
@@ -123,6 +161,16 @@ void check_reduction_order(const ir::FuncContents& f, const ir::Definition& defi
                   quoted(dependent_root(f, definition, now, after[i])),
                   " is neither an accumulation nor independent from point to point"),
              "Keep the reduction loops in their order; pure loops may go anywhere");
+}
+
+// One element is updated as one, and no more: another iteration may write the others at any time.
+void check_atomic_reads(const ir::FuncContents& f, const ir::Definition& update,
+                        const std::string& asked) {
+  const Expr other = ir::read_of_other_element(f, update);
+  if (!other.defined()) return;
+  user_error(asked, "an atomic update reads no element of its Func but the one that it writes",
+             text("it reads ", other, ", which another iteration may write"),
+             "Keep the loop serial, or compute what is read in another Func");
 }
 
 std::string names_of(const std::vector<VarOrRVar>& vars) {
@@ -170,10 +218,12 @@ void Stage::check_new_name(const VarOrRVar& var, const std::string& replaced,
 void Stage::check_race_free(const VarOrRVar& var, const std::string& asked) const {
   const ir::Definition& stage = definition();
   const ir::StageSchedule& now = schedule();
-  if (now.allow_races || (now.atomic && now.override_associativity)) return;
+  if (now.allow_races) return;
   for (const std::string& root : reduction_roots(stage, now, var.name())) {
     if (ir::can_prove_race_free(*func_, stage, root)) continue;
     if (now.atomic) {
+      check_atomic_reads(*func_, stage, asked);
+      if (now.override_associativity) continue;
       const ir::AssociativityProof update = ir::prove_associative(*func_, stage);
       if (update.op && update.op->commutative) return;
       user_error(asked, "an atomic update is associative and commutative",
@@ -223,6 +273,8 @@ Stage& Stage::split(const VarOrRVar& old, const VarOrRVar& outer, const VarOrRVa
   check_factor(factor, asked);
   const bool is_reduction = schedule().dims[at].is_reduction;
   check_tail(tail, index_ > 0, is_reduction, asked);
+  if (index_ > 0 && tail == TailStrategy::RoundUp)
+    check_round_up(schedule(), old.name(), factor, asked);
 
   ir::StageSchedule& schedule = touch();
   ir::Split split;
@@ -249,7 +301,7 @@ Stage& Stage::fuse(const VarOrRVar& inner, const VarOrRVar& outer, const VarOrRV
   // around the inner one.
   size_t inner_at = loop_index(inner, asked), outer_at = loop_index(outer, asked);
   if (inner_at == outer_at)
-    user_error(asked, "it takes two loops", "both are " + quoted(inner.name()));
+    user_error(asked, "it takes two loops", "both are " + quoted(inner.name()), "Name two loops");
   if (fused.name() != outer.name()) check_new_name(fused, inner.name(), asked);
   if (outer_at != inner_at + 1) {
     std::vector<ir::Dim> dims = schedule().dims;
@@ -410,7 +462,8 @@ Stage& Stage::tile(const std::vector<VarOrRVar>& previous, const std::vector<Var
     user_error(
         text("tile ", names_of(previous), " of ", quoted(name())), "all lists have one length",
         text("they have ", count, " loops, ", outers.size(), " outer and ", inners.size(),
-             " inner names, ", factors.size(), " factors and ", tails.size(), " tail strategies"));
+             " inner names, ", factors.size(), " factors and ", tails.size(), " tail strategies"),
+        "Give lists of one length");
   }
   for (size_t i = 0; i < count; i++) split(previous[i], outers[i], inners[i], factors[i], tails[i]);
   std::vector<VarOrRVar> order = inners;

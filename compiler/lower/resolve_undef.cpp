@@ -3,9 +3,11 @@
 
 #include <algorithm>
 
+#include "diagnostics/error.h"
 #include "ir/build.h"
 #include "ir/equal.h"
 #include "ir/memory_reads.h"
+#include "ir/print.h"
 #include "ir/visit.h"
 
 namespace retrograde::ir {
@@ -105,40 +107,40 @@ Expr without_undef(const Expr& value, WhereDefined& where_defined) {
   });
 }
 
-Expr with_old_value(const Expr& value, const Expr& where, const Expr& old) {
-  Expr filled = rewrite(value, [&](const Expr& e, const std::function<Expr(const Expr&)>& recurse) {
-    return is_undef(e) ? cast_to(e.type(), old) : map_children(e, recurse);
-  });
-  return make_select(where, filled, old);
-}
-
 class StageResolver {
  public:
-  StageResolver(const LoopedFunc& f, Definition& definition, bool is_update)
-      : f_(f), definition_(definition), is_update_(is_update) {}
+  StageResolver(const LoopedFunc& f, Definition& definition) : f_(f), definition_(definition) {}
 
   void run() {
     for (const Expr& value : definition_.values) where_.push_back(where_defined_(value));
     for (size_t i = 0; i < where_.size(); ++i) {
       if (is_const_false(where_[i])) definition_.values[i] = undef_of(i);
     }
-    if (all_alike())
-      move_into_predicate();
-    else if (is_update_)
-      keep_old_values();
+    check_alike();
+    move_into_predicate();
   }
 
  private:
   Expr undef_of(size_t i) const { return call_op(Op::undef, definition_.values[i].type(), {}); }
 
   // Elements that are never stored have no say.
-  bool all_alike() {
+  void check_alike() {
     for (const Expr& where : where_) {
       if (is_const_false(where)) continue;
-      if (common_.defined() && !equal(common_, where)) return false;
+      if (common_.defined() && !equal(common_, where)) refuse(common_, where);
       common_ = where;
     }
-    return true;
+  }
+
+  [[noreturn]] void refuse(const Expr& a, const Expr& b) const {
+    const auto condition = [](const Expr& e) {
+      return is_const_true(e) ? std::string("always") : text("where ", e);
+    };
+    user_error("define " + quoted(f_.name()),
+               "the elements of a Tuple are undefined in the same places, or everywhere",
+               text("one is stored ", condition(a), " and another ", condition(b)),
+               "Write the old value instead of undef, as in select(c, value, f(x)[0]), or one "
+               "condition for all elements");
   }
 
   void move_into_predicate() {
@@ -150,19 +152,8 @@ class StageResolver {
     predicate = predicate.defined() ? first_then(predicate, common_) : common_;
   }
 
-  void keep_old_values() {
-    for (size_t i = 0; i < where_.size(); ++i) {
-      if (is_const(where_[i])) continue;
-      Expr& value = definition_.values[i];
-      Expr old = call_func(f_.name(), value.type(), definition_.args, static_cast<int>(i),
-                           SymbolRef(f_.func));
-      value = with_old_value(value, where_[i], old);
-    }
-  }
-
   const LoopedFunc& f_;
   Definition& definition_;
-  const bool is_update_;
   WhereDefined where_defined_;
   std::vector<Expr> where_;  // of each value
   Expr common_;              // of all that are stored
@@ -172,10 +163,9 @@ class StageResolver {
 
 void resolve_undef(Program& program) {
   for (LoopedFunc& f : program.funcs) {
-    for (size_t s = 0; s < f.stages.size(); ++s) {
-      Definition& stage = f.stages[s];
+    for (Definition& stage : f.stages) {
       if (std::any_of(stage.values.begin(), stage.values.end(), mentions_undef))
-        StageResolver(f, stage, s > 0).run();
+        StageResolver(f, stage).run();
     }
   }
 }

@@ -300,11 +300,12 @@ PROGRAM(old_value_kept_by_undef) {
   return {weighted_sum(f, {9}), {a}};
 }
 
-PROGRAM(old_tuple_component_kept_by_undef) {
+PROGRAM(old_tuple_kept_by_undef) {
   Buffer<float> a = line();
   Func f("f"), g("g");
   f(x) = Tuple(a(x) * a(x), sin(a(x)));
-  f(x) = Tuple(select(a(x) > 1.0f, undef<float>(), a(x) * 3.0f), f(x)[1] + f(x)[0]);
+  f(x) = select(a(x) > 1.0f, Tuple(undef<float>(), undef<float>()),
+                Tuple(a(x) * 3.0f, f(x)[1] + f(x)[0]));
   g(x) = f(x)[0] + 2.0f * f(x)[1];
   return {weighted_sum(g, {9}), {a}};
 }

@@ -73,7 +73,7 @@ class RandomUpdates {
       case 5:
         return select(r < pick(1, 3), self, one * 0.5f + in);
       case 6:
-        return select(r == pick(0, 4), undef<float>(), one + in * in);
+        return select(r == pick(0, 4), is_tuple_ ? self : undef<float>(), one + in * in);
       case 7:
         return in * weight();
       default:

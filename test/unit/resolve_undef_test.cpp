@@ -63,11 +63,11 @@ TEST(ResolveUndef, WithAPredicateOfTheDomainAndVectors) {
   EXPECT_EQ(values_of(f.realize({8})), (Ints{20, 0, 0, 23, 0, 0, 26, 0}));
 }
 
-TEST(ResolveUndef, ElementsOfATupleAreUndefinedOnTheirOwn) {
+TEST(ResolveUndef, ElementsOfATupleKeepTheirOldValuesByName) {
   Func f("f");
   RDom r(0, 4);
   f(x) = Tuple(1, 2);
-  f(r) = Tuple(select(r < 2, r + 10, undef<int>()), select(r == 1, undef<int>(), f(r)[0] + 30));
+  f(r) = Tuple(select(r < 2, r + 10, f(r)[0]), select(r == 1, f(r)[1], f(r)[0] + 30));
   Realization both = f.realize({4});
   EXPECT_EQ(values_of(both[0]), (Ints{10, 11, 1, 1}));
   EXPECT_EQ(values_of(both[1]), (Ints{31, 2, 31, 31}));
