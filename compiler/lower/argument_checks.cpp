@@ -144,12 +144,14 @@ class Checks {
         !call_op(Op::buffer_is_null, Bool(), {handle}), retrograde_error_buffer_argument_is_null,
         text("cannot run: the buffer argument ", name,
              " is null. Pass a halide_buffer_t (with a null host to ask for bounds).")));
-    Expr type = call_op(Op::buffer_type, UInt(32), {handle});
+    const Expr type = call_op(Op::buffer_type, UInt(32), {handle});
+    const auto byte = [&](int place) { return cast(Int(32), type / place % 256); };
     checks.push_back(
         check(type == make_uint_const(UInt(32), type_word(arg.type)), retrograde_error_bad_type,
               text("cannot run: the buffer ", name, " must have elements of type ",
-                   to_string(arg.type), ", but its type word (code | bits << 8 | lanes << 16) is "),
-              type, text(". Pass a buffer of ", to_string(arg.type), ".")));
+                   to_string(arg.type), ", but its elements are of the kind "),
+              byte(1), Expr(" (0: int, 1: uint, 2: float, 3: handle, 4: bfloat) with "), byte(256),
+              text(" bits. Pass a buffer of ", to_string(arg.type), ".")));
     Expr dimensions = call_op(Op::buffer_dimensions, Int(32), {handle});
     checks.push_back(check(dimensions == arg.dimensions, retrograde_error_bad_dimensions,
                            text("cannot run: the buffer ", name, " must have ", arg.dimensions,

@@ -275,6 +275,8 @@ TEST_F(Aot, WrongElementType) {
   Buffer<uint16_t, 2> out(64, 32);
   EXPECT_EQ(aot_blur(in, 5, out), halide_error_code_bad_type);
   EXPECT_TRUE(error_has("\"in\" must have elements of type"));
+  EXPECT_TRUE(error_has("of the kind 0 (0: int"));
+  EXPECT_TRUE(error_has("with 16 bits"));
 }
 
 TEST_F(Aot, WrongDimensions) {
