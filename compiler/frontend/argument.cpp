@@ -47,7 +47,7 @@ Argument::Argument(std::string name, Kind kind, const Type& type, int dimensions
   if (dimensions < 0 || dimensions > 255 || (is_scalar() && dimensions != 0)) {
     user_error("make the Argument " + quoted(this->name),
                "a buffer has 0 to 255 dimensions, a scalar has none",
-               text("it was given ", dimensions));
+               text("it was given ", dimensions), "Give the dimensions that the argument has");
   }
 }
 

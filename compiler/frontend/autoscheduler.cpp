@@ -6,6 +6,7 @@
 #include <charconv>
 #include <map>
 #include <mutex>
+#include <set>
 
 #include "diagnostics/error.h"
 #include "frontend/pipeline.h"
@@ -17,6 +18,7 @@ namespace {
 struct Loaded {
   std::mutex mutex;
   std::map<std::string, AutoSchedulerFn> by_name;
+  std::set<std::string> claimed_twice;
   std::string default_name;
 };
 Loaded& loaded() {
@@ -57,12 +59,15 @@ std::string MachineParams::to_string() const {
   return text(parallelism, ",", last_level_cache_size, ",", balance);
 }
 
+// Plugins call it as they are loaded, where nothing may be thrown: find_autoscheduler tells of it.
 void add_autoscheduler(const std::string& name, const AutoSchedulerFn& scheduler) {
   std::lock_guard lock(loaded().mutex);
-  if (scheduler)
-    loaded().by_name[name] = scheduler;
-  else
+  if (!scheduler) {
     loaded().by_name.erase(name);
+    loaded().claimed_twice.erase(name);
+  } else if (!loaded().by_name.emplace(name, scheduler).second) {
+    loaded().claimed_twice.insert(name);
+  }
 }
 
 std::vector<std::string> autoscheduler_names() {
@@ -88,6 +93,11 @@ AutoSchedulerFn find_autoscheduler(const std::string& name) {
     present += (present.empty() ? "" : ", ") + quoted(known);
   }
   std::lock_guard lock(loaded().mutex);
+  if (loaded().claimed_twice.count(name)) {
+    user_error("schedule automatically with " + quoted(name), "autoschedulers have different names",
+               "two of that name were added",
+               "Take one away: add_autoscheduler(name, nullptr), or rename it");
+  }
   if (auto found = loaded().by_name.find(name); found != loaded().by_name.end())
     return found->second;
   user_error("schedule automatically with " + quoted(name),

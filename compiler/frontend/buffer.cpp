@@ -106,7 +106,8 @@ Runtime::Buffer<> allocate_buffer(halide_type_t type, const std::vector<int>& si
     if (d < 0 || d >= static_cast<int>(sizes.size()) || sorted[d]++ ||
         storage_order.size() != sizes.size()) {
       user_error("make a Buffer", "a storage order names each dimension once",
-                 text("there are ", sizes.size(), " dimensions"));
+                 text("there are ", sizes.size(), " dimensions"),
+                 "Name every dimension, in the order of storage");
     }
   }
   std::vector<int> in_memory;
@@ -167,7 +168,8 @@ void check_dimension(const Runtime::Buffer<>& buffer, const std::string& name, i
                      const char* method) {
   if (d >= 0 && d < buffer.dimensions()) return;
   user_error(text("call ", method, " for dimension ", d, " of the Buffer ", quoted(name)),
-             "a dimension is numbered from 0", text("it has ", buffer.dimensions(), " dimensions"));
+             "a dimension is numbered from 0", text("it has ", buffer.dimensions(), " dimensions"),
+             "Give a number below that");
 }
 
 void check_crop(const Runtime::Buffer<>& buffer, const std::string& name, int d, int min,
@@ -191,7 +193,7 @@ void check_in_bounds(const Runtime::Buffer<>& buffer, const std::string& name, c
   for (int d = buffer.dimensions(); d < count; d++) {
     if (at[d] == 0) continue;  // Halide's users write scalar(0)
     user_error(place(), "an access gives one coordinate for each dimension",
-               text("it has ", buffer.dimensions(), " dimensions"));
+               text("it has ", buffer.dimensions(), " dimensions"), "Give that many coordinates");
   }
   if (!buffer.raw_buffer()->host)
     user_error(place(), "the buffer must have memory", "it has only a shape", "Call allocate()");
@@ -200,7 +202,8 @@ void check_in_bounds(const Runtime::Buffer<>& buffer, const std::string& name, c
     // One past the end has an address: where a loop over pointers stops.
     if (at[d] >= dim.min() && at[d] <= dim.max() + 1) continue;
     user_error(place(), "a coordinate lies inside the buffer, or one past its end",
-               text("dimension ", d, " covers [", dim.min(), ", ", dim.max(), "]"));
+               text("dimension ", d, " covers [", dim.min(), ", ", dim.max(), "]"),
+               "Give a coordinate in this range");
   }
 }
 

@@ -164,8 +164,9 @@ int call(const CompiledPipeline& code, const JITHandlers& own, void* const* argv
     return code_returned;
   }
   if (!context.error.empty()) throw RuntimeError(context.error, code_returned);
-  call_error(asked, "the compiled code must succeed",
-             text("it returned the error code ", code_returned), "", code_returned);
+  call_error(
+      asked, "the compiled code must succeed", text("it returned the error code ", code_returned),
+      "Look the code up in HalideRuntime.h; a handler of errors gets its text", code_returned);
 }
 
 }  // namespace retrograde::ir

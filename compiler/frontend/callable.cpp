@@ -81,8 +81,8 @@ Callable Pipeline::compile_to_callable(const std::vector<Argument>& args, const 
 
 void Callable::check(const std::vector<Value>& values) const {
   if (!defined())
-    user_error("call a Callable", "it was compiled", "it was constructed without a pipeline",
-               "Get it from compile_to_callable()");
+    user_error("call a Callable", "only what was compiled can be called",
+               "it was constructed without a pipeline", "Get it from compile_to_callable()");
   const std::string asked = contents_->asked();
   const std::vector<Place>& places = contents_->places;
   if (values.size() != places.size()) {
@@ -94,16 +94,19 @@ void Callable::check(const std::vector<Value>& values) const {
     const Place& place = places[i];
     const std::string what = text("argument ", i + 1, ", ", quoted(place.name), ",");
     if (values[i].is_buffer != place.is_buffer) {
-      call_error(asked, what + (place.is_buffer ? " is a buffer" : " is a scalar"),
-                 place.is_buffer ? "a scalar was given" : "a buffer was given");
+      call_error(asked, what + (place.is_buffer ? " must be a buffer" : " must be a scalar"),
+                 place.is_buffer ? "a scalar was given" : "a buffer was given",
+                 place.is_buffer ? "Give a Buffer" : "Give a number");
     }
     if (values[i].type.bits() > 0 && values[i].type != place.type) {
-      call_error(asked, text(what, " is of type ", to_string(place.type)),
+      call_error(asked, text(what, " must be of type ", to_string(place.type)),
                  to_string(values[i].type) + " was given", "Give a value of that type");
     }
     if (values[i].dimensions >= 0 && values[i].dimensions != place.dimensions) {
-      call_error(asked, text(what, " has ", place.dimensions, " dimensions"),
-                 text("a buffer of ", values[i].dimensions, " was given"));
+      call_error(asked, what + " must have the dimensions that it was compiled for",
+                 text("they are ", place.dimensions, ", and a buffer of ", values[i].dimensions,
+                      " was given"),
+                 "Give a buffer of that many dimensions");
     }
   }
 }

@@ -11,11 +11,7 @@ namespace retrograde {
 }
 
 // Weak: the definitions of compiler/jit and compiler/aot win wherever they are linked in.
-__attribute__((weak)) Compiler& default_compiler() {
-  no_compiler();
-}
-__attribute__((weak)) ModuleCompiler& module_compiler() {
-  no_compiler();
-}
+__attribute__((weak)) Compiler& default_compiler() { no_compiler(); }
+__attribute__((weak)) ModuleCompiler& module_compiler() { no_compiler(); }
 
 }  // namespace retrograde

@@ -47,7 +47,9 @@ void Func::define_extern(const std::string& function_name,
   definition.function = function_name;
   definition.mangling = mangling;
   for (const ExternFuncArgument& arg : args) {
-    if (!arg.defined()) user_error(asked, "every argument is a Func, an image or an Expr");
+    if (!arg.defined())
+      user_error(asked, "every argument is a Func, an image or an Expr", "one is undefined",
+                 "Give each a value");
     definition.args.push_back(arg.contents);
   }
   std::vector<std::string> variables;
@@ -58,7 +60,8 @@ void Func::define_extern(const std::string& function_name,
 const std::string& Func::extern_function_name() const {
   if (!is_extern()) {
     user_error("take the name of the C function of " + quoted(name()),
-               "it is defined by define_extern", "it is not");
+               "a Func that define_extern defines has one",
+               "its values are expressions, or none yet", "Ask is_extern() first");
   }
   return func_->extern_definition->function;
 }
@@ -71,13 +74,17 @@ void define_extern(const FuncPtr& f, ExternDefinition definition, const std::vec
                    const std::vector<std::string>& variables, const std::string& asked) {
   if (f->is_defined())
     user_error(asked, "a Func is defined once", "it has a definition already", "Use a new Func");
-  if (definition.function.empty()) user_error(asked, "the C function has a name", "it is empty");
-  if (types.empty()) user_error(asked, "it has at least one value", "no type was given");
+  if (definition.function.empty())
+    user_error(asked, "the C function has a name", "it is empty", "Give the name of its symbol");
+  if (types.empty())
+    user_error(asked, "it has at least one value", "no type was given",
+               "Give the types of its values");
   for (size_t i = 0; i < variables.size(); i++) {
     for (size_t j = 0; j < i; j++) {
       if (variables[i] != variables[j]) continue;
       user_error(asked, "its arguments are different Vars",
-                 quoted(variables[i]) + " stands there twice");
+                 quoted(variables[i]) + " stands there twice",
+                 "Use a Var of its own for each dimension");
     }
   }
   for (const ExternArgument& arg : definition.args) {
@@ -88,7 +95,9 @@ void define_extern(const FuncPtr& f, ExternDefinition definition, const std::vec
       }
       arg.func->frozen = true;
     } else if (arg.kind == ExternArgument::Kind::Expr) {
-      if (!arg.expr.defined()) user_error(asked, "every argument is a defined expression");
+      if (!arg.expr.defined())
+        user_error(asked, "every argument is a defined expression", "one was never assigned",
+                   "Assign every Expr before it is used");
       check_over_parameters(arg.expr, "an argument", asked);
     }
   }

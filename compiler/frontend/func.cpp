@@ -22,7 +22,8 @@ ir::FuncPtr make_func(const std::string& unique_name, std::source_location where
 void check_not_extern(const ir::FuncContents& f, const std::string& asked) {
   if (!f.is_extern()) return;
   user_error(asked, "its values are expressions",
-             "the C function " + quoted(f.extern_definition->function) + " computes them");
+             "the C function " + quoted(f.extern_definition->function) + " computes them",
+             "Ask is_extern() first");
 }
 
 }  // namespace
@@ -84,7 +85,7 @@ std::string Func::source_location() const { return ir::source_location_of(*func_
 const ir::Definition& Func::checked_update(int index, const char* asked) const {
   if (index >= 0 && index < num_update_definitions()) return func_->updates[index];
   user_error(text(asked, " ", index, " of ", quoted(name())), "updates are numbered from 0",
-             text("it has ", num_update_definitions(), " update definitions"));
+             text("it has ", num_update_definitions(), " update definitions"), "Name one of them");
 }
 
 // What leaves the Func may outlive it: references to it are strong again.

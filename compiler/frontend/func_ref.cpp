@@ -31,7 +31,8 @@ bool is_plain_var(const Expr& e) {
 
 Tuple::Tuple(const std::vector<Expr>& exprs) : exprs_(exprs) {
   if (exprs.empty())
-    user_error("make a Tuple", "a Tuple has at least one element", "it was given none");
+    user_error("make a Tuple", "a Tuple has at least one element", "it was given none",
+               "Give it an Expr");
 }
 
 Tuple::Tuple(const FuncRef& ref) {
@@ -40,7 +41,8 @@ Tuple::Tuple(const FuncRef& ref) {
 
 void Tuple::check_index(size_t i) const {
   if (i < exprs_.size()) return;
-  user_error(text("take element ", i, " of a Tuple"), text("it has ", exprs_.size(), " elements"));
+  user_error(text("take element ", i, " of a Tuple"), "elements are numbered from 0",
+             text("it has ", exprs_.size(), " elements"), "Give a smaller number");
 }
 
 Expr& Tuple::operator[](size_t i) {
@@ -91,7 +93,8 @@ void FuncRef::define_initial(const std::vector<Expr>& args, const std::vector<Ex
   for (size_t i = 0; i < values.size(); i++) {
     if (!values[i].defined()) {
       user_error("update " + quoted(func_->name),
-                 "the right-hand side must be a defined expression", "it was never assigned");
+                 "the right-hand side must be a defined expression", "it was never assigned",
+                 "Assign every Expr before it is used");
     }
     const Type type =
         func_->required_types.size() == values.size() ? func_->required_types[i] : values[i].type();
@@ -105,7 +108,8 @@ Stage FuncRef::update(const std::vector<Expr>& values, int initial, Combine comb
   define_initial(here.args_, values, initial);
   if (values.size() != func_->types.size()) {
     user_error("update " + quoted(func_->name), "all definitions of a Func have as many values",
-               text("it has ", func_->types.size(), " and the right-hand side ", values.size()));
+               text("it has ", func_->types.size(), " and the right-hand side ", values.size()),
+               "Give as many values");
   }
   std::vector<Expr> combined;
   for (size_t i = 0; i < values.size(); i++)
@@ -141,7 +145,9 @@ Expr FuncRef::element(int i) const {
   }
   if (i < 0 || i >= static_cast<int>(func_->types.size())) {
     user_error(text("read value ", i, " of ", quoted(func_->name)),
-               text("it has ", func_->types.size(), " values at each point"));
+               "the values of a point are numbered from 0",
+               text("it has ", func_->types.size(), " values at each point"),
+               "Give a number below that");
   }
   std::vector<Expr> at =
       ir::access_coordinates(args_, func_->dimensions(), "the Func " + quoted(func_->name));

@@ -29,7 +29,8 @@ class Finder {
 
   Reduction find(const Expr& e) {
     if (!e.defined())
-      user_error("reduce with " + name_, "the expression must be defined", "it was never assigned");
+      user_error("reduce with " + name_, "the expression must be defined", "it was never assigned",
+                 "Assign the Expr before its use");
     collect(e);
     if (!domain_) choose_domain();
     if (domain_->predicate.defined()) collect(domain_->predicate);

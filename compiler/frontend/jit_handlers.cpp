@@ -66,7 +66,9 @@ Expr ir::checked_extern_call(const std::string& function, Type result,
                              const std::vector<Type>& types, const std::vector<Expr>& args) {
   const std::string asked = "call the C function " + quoted(function);
   for (size_t i = 0; i < args.size(); i++) {
-    if (!args[i].defined()) user_error(asked, "every argument is a defined expression");
+    if (!args[i].defined())
+      user_error(asked, "every argument is a defined expression", "one was never assigned",
+                 "Assign every Expr before it is used");
     if (args[i].type() == types[i]) continue;
     user_error(asked, "its arguments have the types that it was declared with",
                text("argument ", i + 1, " is of type ", to_string(args[i].type()), ", not ",

@@ -47,15 +47,16 @@ LoopLevel& LoopLevel::lock() {
 
 const ir::LoopLevel& LoopLevel::level() const {
   if (!contents_->defined) {
-    user_error("use a loop level", "it says where", "it was made without a loop and never set",
-               "Set it: level.set(LoopLevel(f, x))");
+    user_error("use a loop level", "a level is a loop, root or inlined",
+               "it was made without a loop and never set", "Set it: level.set(LoopLevel(f, x))");
   }
   return contents_->level;
 }
 
 const ir::LoopLevel& LoopLevel::loop(const char* asked) const {
   if (level().kind != ir::LoopLevel::Kind::At)
-    user_error(asked, "the level is a loop of a Func", "it is " + quoted(to_string()));
+    user_error(asked, "the level is a loop of a Func", "it is " + quoted(to_string()),
+               "Ask is_root() and is_inlined() first");
   return level();
 }
 

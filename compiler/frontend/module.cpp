@@ -71,7 +71,7 @@ internal::LoweredFunc Module::get_function_by_name(const std::string& name) cons
   }
   user_error("find the function " + quoted(name) + " in the module " + quoted(this->name()),
              "a module gives functions that were appended to it",
-             names.empty() ? "it has none" : "it has " + names);
+             names.empty() ? "it has none" : "it has " + names, "Name one of them");
 }
 
 void Module::append(const internal::LoweredFunc& function) {
@@ -87,7 +87,8 @@ void Module::append(const internal::LoweredFunc& function) {
 void Module::append(const Module& module) {
   if (module.contents_ == contents_) {
     user_error("append the module " + quoted(name()) + " to itself",
-               "a module contains other modules");
+               "a module contains other modules", "it was appended to itself",
+               "Append it to another Module");
   }
   contents_->submodules.push_back(module);
 }
@@ -112,13 +113,15 @@ std::map<std::string, std::string> Module::get_metadata_name_map() const {
 
 Module link_modules(const std::string& name, const std::vector<Module>& modules) {
   if (modules.empty())
-    user_error("link modules into " + quoted(name), "there must be at least one", "none was given");
+    user_error("link modules into " + quoted(name), "there must be at least one", "none was given",
+               "Give a Module");
   Module result(name, modules[0].target());
   for (const Module& module : modules) {
     if (!(module.target() == result.target())) {
       user_error("link modules into " + quoted(name), "all must be made for one target",
                  quoted(modules[0].name()) + " is for " + quoted(result.target().to_string()) +
-                     ", " + quoted(module.name()) + " for " + quoted(module.target().to_string()));
+                     ", " + quoted(module.name()) + " for " + quoted(module.target().to_string()),
+                 "Compile them for one target");
     }
     for (const internal::LoweredFunc& function : module.functions()) result.append(function);
     for (const Module& submodule : module.submodules()) result.append(submodule);
@@ -158,10 +161,12 @@ std::string identifier(std::string text) {
 
 void check_targets(const std::string& asked, const std::vector<Target>& targets,
                    const std::vector<std::string>& suffixes) {
-  if (targets.empty()) user_error(asked, "there must be at least one target", "none was given");
+  if (targets.empty())
+    user_error(asked, "there must be at least one target", "none was given", "Name a target");
   if (!suffixes.empty() && suffixes.size() != targets.size()) {
     user_error(asked, "there is one suffix for each target",
-               text(targets.size(), " targets and ", suffixes.size(), " suffixes were given"));
+               text(targets.size(), " targets and ", suffixes.size(), " suffixes were given"),
+               "Give that many suffixes");
   }
   const Target& base = targets.back();
   for (const Target& target : targets) {

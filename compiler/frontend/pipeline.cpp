@@ -114,7 +114,8 @@ Pipeline::Pipeline(const Func& output) : Pipeline(std::vector<Func>{output}) {}
 
 Pipeline::Pipeline(const std::vector<Func>& outputs) : contents_(std::make_shared<Contents>()) {
   if (outputs.empty())
-    user_error("make a Pipeline", "it has at least one output", "it was given none");
+    user_error("make a Pipeline", "a Pipeline has at least one output", "it was given none",
+               "Give the Funcs that are wanted");
   std::unordered_set<const ir::FuncContents*> seen;
   for (const Func& f : outputs) {
     if (!f.defined()) {
@@ -123,7 +124,7 @@ Pipeline::Pipeline(const std::vector<Func>& outputs) : contents_(std::make_share
     }
     if (!seen.insert(f.function().get()).second) {
       user_error("make a Pipeline", "its outputs are different Funcs",
-                 quoted(f.name()) + " is given twice");
+                 quoted(f.name()) + " is given twice", "Name each output once");
     }
     contents_->outputs.push_back(f.function());
   }
@@ -131,7 +132,8 @@ Pipeline::Pipeline(const std::vector<Func>& outputs) : contents_(std::make_share
 
 Pipeline::Contents& Pipeline::checked() const {
   if (!contents_)
-    user_error("use a Pipeline", "it needs outputs", "it was constructed without any");
+    user_error("use a Pipeline", "it needs outputs", "it was constructed without any",
+               "Construct it: Pipeline p(f)");
   return *contents_;
 }
 
@@ -152,8 +154,8 @@ std::vector<Func> Pipeline::outputs() const {
 Func Pipeline::get_func(size_t index) const {
   const std::vector<ir::FuncPtr> order = ir::topological_order(checked().outputs);
   if (index >= order.size()) {
-    user_error(text("take Func ", index, " of a Pipeline"),
-               text("it has ", order.size(), " Funcs"));
+    user_error(text("take Func ", index, " of a Pipeline"), "Funcs are numbered from 0",
+               text("it has ", order.size(), " Funcs"), "Give a smaller number");
   }
   return Func(order[index]);
 }
@@ -243,6 +245,22 @@ std::vector<Buffer<>> Pipeline::make_outputs(const std::vector<int32_t>& sizes,
   return result;
 }
 
+// The values of a Tuple are computed point by point.
+static void check_one_shape(const halide_buffer_t& first, const halide_buffer_t& other,
+                            const ir::FuncContents& f, const std::string& asked) {
+  for (int d = 0; d < f.dimensions(); d++) {
+    const halide_dimension_t &a = first.dim[d], &b = other.dim[d];
+    if (a.min == b.min && a.extent == b.extent) continue;
+    const auto range = [](const halide_dimension_t& dim) {
+      return text("[", dim.min, ", ", dim.min + dim.extent - 1, "]");
+    };
+    call_error(asked, "the buffers of one Func cover one region",
+               text("in dimension ", d, " of ", quoted(f.name), " one covers ", range(a),
+                    " and another ", range(b)),
+               "Give buffers of one shape");
+  }
+}
+
 std::vector<halide_buffer_t*> Pipeline::checked_outputs(const RealizationArg& given,
                                                         bool with_memory) const {
   const std::string asked = "realize " + names_of(checked().outputs);
@@ -256,8 +274,10 @@ std::vector<halide_buffer_t*> Pipeline::checked_outputs(const RealizationArg& gi
   }
   size_t i = 0;
   for (const ir::FuncPtr& f : contents_->outputs) {
+    const halide_buffer_t* first = buffers[i];
     for (const ParameterPtr& value : f->outputs) {
-      ir::check_buffer(buffers[i++], value->name, value->type, f->dimensions(), with_memory, asked);
+      ir::check_buffer(buffers[i], value->name, value->type, f->dimensions(), with_memory, asked);
+      check_one_shape(*first, *buffers[i++], *f, asked);
     }
   }
   return buffers;

@@ -17,12 +17,12 @@ void check_uses_parameters_only(const Expr& condition) {
   ir::walk(condition, [&](const Expr& e) {
     const ir::Variable* variable = e.as<ir::Variable>();
     if (variable && !variable->symbol.defined()) {
-      refuse(condition, "it is checked once, before anything is computed",
+      refuse(condition, "a requirement is checked once, before anything is computed",
              "it uses the Var " + quoted(variable->name), "Use require() inside a definition");
     }
     const ir::Call* call = e.as<ir::Call>();
     if (call && (call->call_type == ir::CallType::Func || call->call_type == ir::CallType::Image)) {
-      refuse(condition, "it is checked once, before anything is computed",
+      refuse(condition, "a requirement is checked once, before anything is computed",
              "it reads " + quoted(call->name), "Use require() inside a definition");
     }
     return true;
@@ -34,7 +34,8 @@ void check_uses_parameters_only(const Expr& condition) {
 void Pipeline::add_requirement(const Expr& condition, const std::vector<Expr>& message) {
   const ir::FuncPtr first = spec().outputs[0];
   if (!condition.defined() || !condition.type().is_bool() || !condition.type().is_scalar()) {
-    user_error("add a requirement to the Pipeline of " + quoted(first->name), "it is a condition",
+    user_error("add a requirement to the Pipeline of " + quoted(first->name),
+               "a requirement is a condition of type bool",
                condition.defined() ? text("it is of type ", to_string(condition.type()))
                                    : "it is undefined",
                "Give a comparison of Params");

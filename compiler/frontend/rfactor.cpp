@@ -312,7 +312,8 @@ Func Stage::rfactor(const RVar& r, const Var& v) {
 Func Stage::rfactor(const std::vector<std::pair<RVar, Var>>& preserved) {
   const std::string asked = text("factor ", list(preserved), " out of ", quoted(name()));
   if (index_ == 0) {
-    user_error(asked, "it is an update that reduces", quoted(name()) + " is a first definition",
+    user_error(asked, "only an update that reduces is factored",
+               quoted(name()) + " is a first definition",
                "Call it on update(): f.update().rfactor(r, u)");
   }
   if (!specialization_.empty() || !schedule().specializations.empty()) {
@@ -332,7 +333,8 @@ Func Stage::rfactor(const std::vector<std::pair<RVar, Var>>& preserved) {
                  "Name a variable of its RDom, or one that comes from it");
     }
     if (!loops.insert(rvar.name()).second)
-      user_error(asked, "each loop is named once", quoted(rvar.name()) + " is named twice");
+      user_error(asked, "each loop is named once", quoted(rvar.name()) + " is named twice",
+                 "Drop one of them");
     check_new_name(VarOrRVar(var), rvar.name(), asked);
     const auto& args = func_->args;
     if (!variables.insert(var.name()).second ||

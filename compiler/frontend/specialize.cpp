@@ -86,7 +86,9 @@ void check_not_closed(const ir::StageSchedule& schedule, const std::string& aske
 // 4. The stage does not join the loops of another.
 Stage Stage::specialize(const Expr& condition) {
   const std::string asked = "specialize " + quoted(name());
-  if (!condition.defined()) user_error(asked, "the condition is a defined expression");
+  if (!condition.defined())
+    user_error(asked, "the condition is a defined expression", "it was never assigned",
+               "Assign every Expr before it is used");
   if (!condition.type().is_bool() || !condition.type().is_scalar()) {
     user_error(asked, "the condition is of type bool",
                text(condition, " has type ", to_string(condition.type())),

@@ -120,7 +120,8 @@ class Wrapping {
       for (const auto& [user, wrapper] : f->wrappers) {
         if (user.empty() || !names.count(user) || used_.count({f, user})) continue;
         user_error(text("wrap ", quoted(f->name), " in ", quoted(user)),
-                   text(quoted(user), " reads ", quoted(f->name)), "it does not",
+                   "a Func is wrapped in the Funcs that read it",
+                   text("nothing in ", quoted(user), " reads ", quoted(f->name)),
                    "Name a Func that reads it, or leave the wrapper out");
       }
     }
@@ -254,7 +255,8 @@ void check_users(const FuncPtr& f, const std::vector<FuncPtr>& users, const std:
                  quoted(f->name) + " is wrapped in itself", "Name one of its users");
     }
     if (!user->frozen || reads(*user, *f)) continue;
-    user_error(asked, text(quoted(user->name), " reads ", quoted(f->name)), "it does not",
+    user_error(asked, "a Func is wrapped in the Funcs that read it",
+               text("nothing in ", quoted(user->name), " reads ", quoted(f->name)),
                "Name a Func that reads it");
   }
 }
@@ -345,7 +347,8 @@ Func Func::in(const std::vector<Func>& fs) {
 
 Func Func::clone_in(const std::vector<Func>& fs) {
   if (fs.empty())
-    user_error("clone " + quoted(name()), "at least one user is named", "the list is empty");
+    user_error("clone " + quoted(name()), "at least one user is named", "the list is empty",
+               "Name the Funcs that read it, or leave the list out");
   return wrap(fs, name() + "_clone", true);
 }
 

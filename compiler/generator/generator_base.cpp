@@ -109,8 +109,8 @@ bool GeneratorBase::set_open_part(const std::string& key, const std::string& tex
   const std::optional<int> number = read_number<int>(text);
   if (!number || *number < 0) {
     user_error("set " + key + " of the generator " + quoted(name_) + " to " + quoted(text),
-               "it is a whole number of at least 0", quoted(text) + " is not",
-               "Give such a number");
+               "numbers of dimensions and of elements are whole and at least 0",
+               quoted(text) + " was given", "Give such a number");
   }
   if (part == "dim")
     io->set_dimensions(*number);
@@ -225,7 +225,7 @@ Expr constant_for_input(const Expr& value, const GIOBase& input) {
 Pipeline GeneratorBase::get_pipeline() {
   if (!is_generated()) {
     user_error("take the Pipeline of the generator " + quoted(name_),
-               "it is there once generate() has run", "it has not",
+               "the Pipeline is made of what generate() defines", "generate() has not run",
                "Call it in schedule(), or after apply()");
   }
   if (!pipeline_.defined()) {

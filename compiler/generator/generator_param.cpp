@@ -19,7 +19,7 @@ bool GeneratorParamBase::is_writable() const {
 
 void GeneratorParamBase::check_writable() const {
   if (is_writable()) return;
-  user_error("set the GeneratorParam " + quoted(name_), "its value is read by generate()",
+  user_error("set the GeneratorParam " + quoted(name_), "a value is set before generate() reads it",
              "generate() has run", "Set it before apply() or build_module()");
 }
 

@@ -220,6 +220,7 @@ TEST_F(AotErrors, FunctionThatIsNotInTheModule) {
   expect_error([&] { module.get_function_by_name("g"); }, {"\"g\"", "it has \"f\""});
 }
 
+// rule: functions of a module have different names
 TEST_F(AotErrors, TwoFunctionsOfOneName) {
   Module module = f.compile_to_module({in, gain}, "f", host);
   const internal::LoweredFunc function = module.functions()[0];

@@ -75,6 +75,7 @@ TEST_F(ComputeWithErrors, OtherPlaces) {
   expect_refused({"at the same place", "is computed at \"y\" of \"out", "is computed at root"});
 }
 
+// rule: both stages are computed at one place
 TEST_F(ComputeWithErrors, OneIsInlined) {
   f.compute_inline();
   g.compute_with(f, y);

@@ -89,6 +89,7 @@ TEST(ExpressionErrors, RandomSeedThatIsNoInteger) {
   expect_compile_error([] { random_float(Expr(0.5f)); }, {"seed is an integer"});
 }
 
+// rule: the name of a Var is an identifier
 TEST(ExpressionErrors, NamesThatAreNoIdentifiers) {
   expect_compile_error([] { Var v("a b"); }, {"\"a b\"", "identifier"});
 }
@@ -193,6 +194,7 @@ TEST(DefinitionErrors, HandleValues) {
       {"values are numbers"});
 }
 
+// rule: the arguments of a first definition are Vars
 TEST(DefinitionErrors, ArgumentsOfAFirstDefinitionAreDistinctVars) {
   Var x("x");
   expect_compile_error(
@@ -289,6 +291,7 @@ TEST(DefinitionErrors, BoundsOfADomainThatReadTheFuncItself) {
       {"\"f\"", "before its update runs", "f(5)", "another Func"});
 }
 
+// rule: all definitions of a Func have as many values
 TEST(DefinitionErrors, UpdateOfAnotherTypeOrSize) {
   Setting s;
   expect_compile_error([&] { s.f(s.x, s.y) = 1.5f; }, {"same types", "int32", "float32"});
@@ -343,6 +346,7 @@ TEST(DefinitionErrors, RecursionAmongFuncs) {
   a.function()->pure->values[0] = x;
 }
 
+// rule: a definition has the dimensions that the Func was declared with
 TEST(DefinitionErrors, DeclaredTypesAndDimensions) {
   Var x("x");
   expect_compile_error(
@@ -359,6 +363,7 @@ TEST(DefinitionErrors, DeclaredTypesAndDimensions) {
       {"declared with 2"});
 }
 
+// rule: a parameter and a pure variable of one definition have different names
 TEST(DefinitionErrors, ParameterNamedLikeAVar) {
   Var x("same_name");
   Param<int> p("same_name", 1);
@@ -370,6 +375,7 @@ TEST(DefinitionErrors, ParameterNamedLikeAVar) {
       {"different names", "\"same_name\""});
 }
 
+// rule: parameters of one pipeline have different names
 TEST(DefinitionErrors, TwoParametersOfOneName) {
   Var x("x");
   Param<int> p("twin", 1), q("twin", 2);
@@ -478,6 +484,7 @@ TEST(ScheduleErrors, LoopThatWasFusedAway) {
   expect_compile_error([&] { s.f.vectorize(s.x); }, {"\"x\" was fused into \"z\""});
 }
 
+// rule: the loops of a stage have different names
 TEST(ScheduleErrors, ReusedNames) {
   Setting s;
   expect_compile_error([&] { s.f.split(s.x, s.y, s.xi, 4); }, {"\"y\" is a loop already"});
@@ -487,6 +494,7 @@ TEST(ScheduleErrors, ReusedNames) {
   EXPECT_NO_THROW(s.f.split(s.y, s.x, Var("yi"), 4)) << "no loop has the name x any more";
 }
 
+// rule: a factor is at least 1
 TEST(ScheduleErrors, FactorsThatAreNotPositive) {
   Setting s;
   expect_compile_error([&] { s.f.split(s.x, s.xo, s.xi, 0); }, {"at least 1", "it is 0"});
@@ -495,6 +503,7 @@ TEST(ScheduleErrors, FactorsThatAreNotPositive) {
   expect_compile_error([&] { s.f.parallel(s.x, Expr()); }, {"must be a defined expression"});
 }
 
+// rule: each loop is named once
 TEST(ScheduleErrors, ReorderNamesALoopTwice) {
   Setting s;
   expect_compile_error([&] { s.f.reorder(s.x, s.x); }, {"named twice"});
@@ -578,6 +587,7 @@ TEST(ScheduleErrors, BoundsOfUnknownVariables) {
 
 // ---- buffers and parameters ----
 
+// rule: an extent is not negative
 TEST(BufferErrors, Sizes) {
   expect_compile_error([] { Buffer<float> b(-1, 3); }, {"not negative", "-1 x 3"});
   expect_compile_error([] { Buffer<double> b(INT32_MAX, INT32_MAX, INT32_MAX); },
@@ -609,6 +619,8 @@ TEST(BufferErrors, CropsAndSlicesOutside) {
   expect_compile_error([&] { b.cropped(2, 0, 1); }, {"it has 2 dimensions"});
 }
 
+// rule: the buffer has as many dimensions as the parameter
+// rule: a dimension is numbered from 0
 TEST(ParameterErrors, BuffersThatDoNotFit) {
   ImageParam in(UInt(8), 2, "bytes");
   expect_compile_error([&] { in.set(Buffer<float>(3, 3)); }, {"\"bytes\"", "uint8", "float32"});
@@ -655,6 +667,7 @@ TEST(CallArguments, Sizes) {
   expect_error<UserError>([&] { s.f.realize({INT32_MAX, INT32_MAX}); }, {"address space"});
 }
 
+// rule: must have the right element type
 TEST(CallArguments, OutputBuffers) {
   Setting s;
   Buffer<float> wrong_type(4, 4);

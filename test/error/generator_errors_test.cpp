@@ -264,7 +264,7 @@ TEST(GeneratorErrors, EachPhaseHasWhatItMayDo) {
 
 TEST(GeneratorErrors, WhatIsMadeIsTakenAfterwards) {
   auto simple = GeneratorContext(get_host_target()).create<Simple>();
-  EXPECT_SAYS(message_of([&] { simple->get_pipeline(); }), "once generate() has run");
+  EXPECT_SAYS(message_of([&] { simple->get_pipeline(); }), "what generate() defines");
   EXPECT_SAYS(message_of([&] { simple->output_funcs("off"); }), "its outputs are \"out\"");
   simple->apply(Buffer<float>(4));
   EXPECT_SAYS(message_of([&] { simple->in.set_type(Float(32)); }), "Do it in configure()");
@@ -273,7 +273,7 @@ TEST(GeneratorErrors, WhatIsMadeIsTakenAfterwards) {
 
 TEST(GeneratorErrors, NumbersForOpenPartsAreWholeAndNotNegative) {
   EXPECT_SAYS(refusal("in.dim", "-1"), "set in.dim of the generator");
-  EXPECT_SAYS(refusal("in.dim", "two"), "\"two\" is not");
+  EXPECT_SAYS(refusal("in.dim", "two"), "\"two\" was given");
 }
 
 TEST(GeneratorErrors, SizesOfArraysAreSaidOnce) {
@@ -318,7 +318,7 @@ TEST(GeneratorErrors, RequirementsAreConditionsOnParameters) {
     pipeline.add_requirement(p + 1, "p");
     FAIL();
   } catch (const CompileError& error) {
-    EXPECT_SAYS(std::string(error.what()), "it is a condition; it is of type int32");
+    EXPECT_SAYS(std::string(error.what()), "a condition of type bool; it is of type int32");
   }
 }
 

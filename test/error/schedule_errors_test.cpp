@@ -43,6 +43,7 @@ TEST_F(ScheduleErrors, compute_level_in_an_inlined_func) {
   expect_mentions(error_of([&] { h.realize({8, 8}); }), {"has no loops"});
 }
 
+// rule: iterations of a parallel loop must not share the storage
 TEST_F(ScheduleErrors, storage_outside_of_a_parallel_loop) {
   f.store_root().compute_at(g, y);
   g.parallel(y);

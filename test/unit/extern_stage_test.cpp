@@ -181,6 +181,7 @@ TEST(ExternStage, ErrorCodesPropagate) {
   }
 }
 
+// rule: a Func that a C function reads has memory
 TEST(ExternStage, AnInlinedInputIsAnError) {
   Var x("x"), y("y");
   Func in("in"), f("f"), out("out");

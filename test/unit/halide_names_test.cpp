@@ -123,9 +123,9 @@ TEST(Callables, RefuseWhatDoesNotFit) {
   expect_mentions(error_of<RuntimeError>([&] { scaled(1, in); }), {"there are 3", "2 were given"});
   expect_mentions(error_of<RuntimeError>([&] { scaled(1.0f, in, out); }),
                   {"argument 1", "\"factor\"", "float32 was given"});
-  expect_mentions(error_of<RuntimeError>([&] { scaled(in, 1, out); }), {"is a scalar"});
+  expect_mentions(error_of<RuntimeError>([&] { scaled(in, 1, out); }), {"must be a scalar"});
   expect_mentions(error_of<RuntimeError>([&] { scaled.make_std_function<int, int, int>(); }),
-                  {"argument 2", "is a buffer"});
+                  {"argument 2", "must be a buffer"});
   expect_mentions(error_of<CompileError>([&] { s.out.compile_to_callable({s.in}); }),
                   {"\"factor\" is not among them"});
   expect_mentions(error_of<CompileError>([&] { Callable()(); }), {"without a pipeline"});
@@ -313,6 +313,9 @@ TEST(Predicates, MayReadWhatTheyGuard) {
 
 // ---- what is refused ----
 
+// rule: buffers have memory of the CPU only
+// rule: buffers of arguments are memory of the CPU
+// rule: storage lies in the memory of the CPU
 TEST(Refusals, SayWhatIsNotThere) {
   Buffer<float> buffer(3);
   expect_mentions(error_of<Unsupported>([&] { buffer.copy_to_device(Target()); }),

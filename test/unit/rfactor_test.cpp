@@ -320,6 +320,7 @@ TEST_F(Rfactor, RefusesReadsOfOtherElements) {
                   {"it reads f", "not the element that it writes"});
 }
 
+// rule: the new variables differ from each other and from the Func's
 TEST_F(Rfactor, RefusesWrongNames) {
   Func f("f");
   RDom r(0, 8, 0, 8);

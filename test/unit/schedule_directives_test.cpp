@@ -93,6 +93,7 @@ TEST_F(Directives, StorageRulesAreKeptByDimension) {
   EXPECT_FALSE(schedule(f).storage_rules[1].fold_forward);
 }
 
+// rule: is at least 1 and fits an int32
 TEST_F(Directives, StorageRulesNeedADimensionAndAPositiveSize) {
   expect_refused([&] { f.align_storage(Var("z"), 8); }, {"\"z\"", "\"x\", \"y\""});
   expect_refused([&] { f.fold_storage(y, 0); }, {"fold", "at least 1", "it is 0"});
@@ -194,6 +195,7 @@ TEST_F(Directives, SpecializationsNest) {
   EXPECT_EQ(first.specializations[0].dims.size(), 2u);
 }
 
+// rule: has one value in each call
 TEST_F(Directives, ConditionsAreOverParameters) {
   Param<int> n("n");
   ImageParam image(Int(32), 1, "image");
@@ -254,6 +256,7 @@ TEST_F(Directives, RacesMayBeAllowed) {
 
 // ---- other stages ----
 
+// rule: the stages belong to different Funcs
 TEST_F(Directives, ComputeWithNamesALoopOfAnotherFunc) {
   Func h("h");
   h(x, y) = x;

@@ -387,6 +387,7 @@ TEST_F(StorageDirectives, AFoldThatNoLoopCarriesMustHoldAll) {
                "cannot fold the storage");
 }
 
+// rule: storage that the compiler lays out can be folded or bounded
 TEST_F(StorageDirectives, OutputsAreNotFolded) {
   expect_error(rows([&](Func&, Func& g) { g.fold_storage(y, 4); }), "is an output");
 }
