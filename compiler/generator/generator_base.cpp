@@ -132,8 +132,8 @@ void GeneratorBase::unknown_param(const std::string& key) const {
   std::string list;
   for (const std::string& name : known) list += (list.empty() ? "" : ", ") + quoted(name);
   user_error("set the GeneratorParam " + quoted(key) + " of the generator " + quoted(name_),
-             "a name is that of a param, or an open part of an input or output, of this generator",
-             "it has " + list, "Name one of these");
+             "only what the generator declares can be set", "it declares " + list,
+             "Name one of these");
 }
 
 void GeneratorBase::check_names() const {
@@ -252,7 +252,7 @@ std::vector<Func> GeneratorBase::output_funcs(const std::string& name) const {
     list += (list.empty() ? "" : ", ") + quoted(output->name());
   }
   user_error("take the output " + quoted(name) + " of the generator " + quoted(name_),
-             "a name is that of an output of this generator", "its outputs are " + list,
+             "an output has the name that the generator declares", "its outputs are " + list,
              "Name one of these");
 }
 

@@ -66,8 +66,7 @@ std::unique_ptr<GeneratorBase> GeneratorRegistry::create(const std::string& name
   }
   if (!factory) {
     user_error("create the generator " + quoted(name),
-               "a generator goes by the name that it is registered under in this program",
-               list_of_names(),
+               "a generator is created by the name that it is registered under", list_of_names(),
                "Name one of these, or register it with RETROGRADE_REGISTER_GENERATOR");
   }
   if (twice) {

@@ -401,6 +401,7 @@ TEST_F(CustomAdjoints, OfAnInputWhoseBoundsAloneAreReadContributeNothingToIt) {
   expect_mentions(d.explain(), {"zero \"sized\"", "reads no element of it"});
 }
 
+// rule: a Func with a custom adjoint needs a rule for tangents, too
 TEST_F(CustomAdjoints, WithoutATangentIsRefusedWhereInputsMove) {
   Func f = with_slope(3.0f), h("h");
   Buffer<float> b = random_image({6}, 0.25, 1.5, 2);
@@ -434,6 +435,8 @@ class CustomAdjointErrors : public CustomAdjoints {
   }
 };
 
+// rule: a rule belongs to a Func that is defined
+// rule: only floating-point values have derivatives
 TEST_F(CustomAdjointErrors, OfTheFunc) {
   Func undefined("undefined"), whole("whole");
   whole(x) = x;
@@ -461,6 +464,7 @@ TEST_F(CustomAdjointErrors, OfTheInputs) {
   expect_mentions(when_given({undefined}), {"must be defined", "input 0"});
 }
 
+// rule: its custom adjoint must know every input whose gradient is wanted
 TEST_F(CustomAdjointErrors, AWantedInputThatTheRuleDoesNotKnow) {
   auto rule = [this](const AdjointContext& c) { return Contributions{{g, c.adjoint()}}; };
   expect_mentions(when_run({g}, rule),
@@ -469,6 +473,7 @@ TEST_F(CustomAdjointErrors, AWantedInputThatTheRuleDoesNotKnow) {
   expect_mentions(when_run({a, gain}, none, {.wrt = {g, a}}), {"reads \"g"});
 }
 
+// rule: has the dimensions of
 TEST_F(CustomAdjointErrors, OfContributions) {
   Func flat("flat"), whole("whole"), pair("pair"), undefined("undefined");
   Var y("y");
@@ -489,6 +494,7 @@ TEST_F(CustomAdjointErrors, OfContributions) {
   expect_mentions(giving({{g, undefined}}), {"must be defined"});
 }
 
+// rule: a rule asks for the tangents of its inputs
 TEST_F(CustomAdjointErrors, OfTangents) {
   Func flat("flat"), one("one"), h("h");
   Var y("y");

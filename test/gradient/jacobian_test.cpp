@@ -558,6 +558,8 @@ TEST_F(Jacobians, OfCustomAdjointsGoByRows) {
 
 // ---- errors ----
 
+// rule: what to differentiate by must be defined
+// rule: the output needs bounds in each of its dimensions
 TEST_F(Jacobians, Errors) {
   Func undefined("undefined"), whole("whole"), f("f"), pair("pair");
   Param<int> count("count");
