@@ -13,14 +13,16 @@ Expr Type::max() const {
   if (is_float()) return ir::make_const(*this, std::numeric_limits<double>::infinity());
   if (is_int()) return ir::make_const(*this, max_int());
   if (is_uint()) return ir::make_uint_const(*this, max_uint());
-  user_error("take the largest value of a handle", "only numbers have one");
+  user_error("take the largest value of a handle", "only numbers have one",
+             "a handle is an address", "Ask a type of numbers");
 }
 
 Expr Type::min() const {
   if (is_float()) return ir::make_const(*this, -std::numeric_limits<double>::infinity());
   if (is_int()) return ir::make_const(*this, min_int());
   if (is_uint()) return ir::make_uint_const(*this, 0);
-  user_error("take the smallest value of a handle", "only numbers have one");
+  user_error("take the smallest value of a handle", "only numbers have one",
+             "a handle is an address", "Ask a type of numbers");
 }
 
 }  // namespace retrograde
