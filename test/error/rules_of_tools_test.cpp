@@ -89,6 +89,7 @@ TEST_F(Rules, AdjointsOfWhatIsThere) {
   loss() += g(r) * g(r);
   const Derivative d = propagate_adjoints(loss);
   expect("a Func has an adjoint after each of its definitions", [&] { d(g, 3); });
+  expect("a Func has a definition", [&] { d(Func("nobody")); });
   expect("the adjoint must be a defined Buffer", [&] { propagate_adjoints(g, Buffer<float>()); });
   Func pair("pair");
   pair() = Tuple(in(0), in(1));

@@ -235,6 +235,7 @@ TEST(Outermost, StagesComputedTogetherThere) {
 
 // ---- buffers ----
 
+// rule: a coordinate lies inside the buffer, or one past its end
 TEST(Buffers, HaveAnAddressOnePastTheEnd) {
   Buffer<int> row(3), image(4, 2);
   EXPECT_EQ(&row(3) - &row(0), 3);
