@@ -70,7 +70,7 @@ void build(const std::string& name, const std::string& folder,
   programs::Registered program = find(name);
   program.params.insert(program.params.end(), more.begin(), more.end());
 #ifndef BENCH_RETROGRADE
-  if (program.program.gradients > 0) {
+  if (program.program.gradients > 0 && more.empty()) {
     const std::string threads = std::to_string(std::thread::hardware_concurrency());
     program.params.insert(program.params.begin(),
                           {"-p", BENCH_LI2018, "-s", "Li2018", "auto_schedule=true",

@@ -28,11 +28,11 @@ double geometric_mean(const std::vector<T>& all, F value) {
   return all.empty() ? 1 : std::exp(sum / static_cast<double>(all.size()));
 }
 
-// Gradients are right when differences say so; else both sides must agree.
+// Where gradients disagree, differences say whether ours is right.
 bool differs(const Result& result, const bench::PairResult& r) {
-  if (r.retrograde_slope_error) return !(*r.retrograde_slope_error <= bench::wrong_slope);
   const double most = result.tolerance > 0 ? result.tolerance : bench::tolerance(r);
-  return !(r.max_relative_error <= most);
+  if (r.max_relative_error <= most) return false;
+  return !r.retrograde_slope_error || !(*r.retrograde_slope_error <= bench::wrong_slope);
 }
 
 nlohmann::json entry(const Result& result, size_t which) {

@@ -230,7 +230,7 @@ class Worker {
   template <typename Sum>
   static double slope_error(const std::vector<Value*>& inputs, const std::vector<Value*>& gradients,
                             uint32_t direction, const Sum& sum) {
-    constexpr float step = 1.0f / 8192;
+    constexpr float step = 1.0f / 32768;
     const auto sign = [&](size_t input, int64_t element) {
       const auto n = static_cast<uint32_t>(element * 8 + static_cast<int64_t>(input));
       return kernels::scrambled(kernels::scrambled(n) + direction) & 1 ? 1.0f : -1.0f;

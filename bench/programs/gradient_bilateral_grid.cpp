@@ -1,0 +1,81 @@
+// gradient_bilateral_grid -- a picture splatted into a coarse grid by place and by a guide's
+// brightness, blurred there, and read back by interpolation (Chen, Paris and Durand 2007): by
+// picture and guide.
+#include "gradient.h"
+
+namespace {
+
+class GradientBilateralGrid : public Halide::Generator<GradientBilateralGrid> {
+ public:
+  GeneratorParam<bool> primal{"primal", false};
+  Input<Buffer<float>> image{"image", 2};
+  Input<Buffer<float>> guide{"guide", 2};
+  Input<Buffer<float>> seed{"seed", 2};
+  Output<Buffer<double>> sum{"sum", 0};
+  Output<Buffer<float>> d_image{"d_image", 2};
+  Output<Buffer<float>> d_guide{"d_guide", 2};
+
+  void generate() {
+    Func picture = programs::values_of(image, "picture", {512, 384});
+    Func brightness = programs::values_of(guide, "brightness", {512, 384});
+
+    const int cell = 8, depth = 12;
+    Func grid("grid"), blur_z("blur_z"), blur_x("blur_x"), blur_y("blur_y"), slice("slice");
+    Var z("z");
+    grid(x, y, z, c) = 0.0f;
+    RDom corner(0, 512, 0, 384, 0, 2, 0, 2, "corner");
+    Expr lev = brightness(corner.x, corner.y) * (depth - 1);
+    Expr lo = clamp(cast<int>(lev), 0, depth - 2), part = lev - cast<float>(lo);
+    Expr weight = select(corner.z == 0, 1.0f - part, part);
+    grid(corner.x / cell, corner.y / cell, lo + corner.z, corner.w) +=
+        weight * select(corner.w == 0, picture(corner.x, corner.y), 1.0f);
+    auto blurred = [](auto at) { return 0.25f * at(-1) + 0.5f * at(0) + 0.25f * at(1); };
+    const std::vector<int> cells = {64, 48, depth, 2};
+    blur_z(x, y, z, c) = blurred([&](int d) {
+      return programs::nearest(grid, cells, {x, y, z + d, c});
+    });
+    blur_x(x, y, z, c) = blurred([&](int d) {
+      return programs::nearest(blur_z, cells, {x + d, y, z, c});
+    });
+    blur_y(x, y, z, c) = blurred([&](int d) {
+      return programs::nearest(blur_x, cells, {x, y + d, z, c});
+    });
+    Expr fx = cast<float>(x % cell) / cell, fy = cast<float>(y % cell) / cell;
+    Expr place = brightness(x, y) * (depth - 1), zi = clamp(cast<int>(place), 0, depth - 2);
+    auto at = [&](int i, int j, int k) {
+      return programs::nearest(blur_y, cells, {x / cell + i, y / cell + j, zi + k, c});
+    };
+    auto plane = [&](int k) {
+      return lerp(lerp(at(0, 0, k), at(1, 0, k), fx), lerp(at(0, 1, k), at(1, 1, k), fx), fy);
+    };
+    slice(x, y, c) = lerp(plane(0), plane(1), place - cast<float>(zi));
+    Func result("result");
+    result(x, y) = slice(x, y, 0) / (slice(x, y, 1) + 0.01f);
+    programs::store({grid, blur_z, blur_x, blur_y}, primal);
+    programs::Weighed weighed(result, seed, {512, 384}, primal);
+    sum() = weighed.sum();
+    d_image = weighed.by(picture);
+    programs::estimate(image, {512, 384});
+    programs::estimate(d_image, {512, 384});
+    d_guide = weighed.by(brightness);
+    programs::estimate(guide, {512, 384});
+    programs::estimate(d_guide, {512, 384});
+    programs::estimate(seed, {512, 384});
+    programs::estimate(sum, {});
+  }
+
+ private:
+  Var x{"x"}, y{"y"}, c{"c"};
+};
+
+}  // namespace
+
+PROGRAM(gradient_bilateral_grid, GradientBilateralGrid, at_sizes({{}}, [](const Sizes&) {
+                                                          return std::vector{
+                                                              in<float>({512, 384}),
+                                                              in<float>({512, 384}, 0.02, 0.97),
+                                                              in<float>({512, 384}, -1, 1).noise(),
+                                                              out<double>({}),
+                                                              out<float>({512, 384}),
+                                                              out<float>({512, 384})};
+                                                        }).gradients(2))

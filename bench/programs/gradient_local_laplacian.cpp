@@ -1,0 +1,106 @@
+// gradient_local_laplacian -- local Laplacian filters of 8 levels and 4 greys (Paris, Hasinoff and
+// Kautz 2011), each level with a gain: by picture and gains.
+#include "gradient.h"
+
+namespace {
+
+class GradientLocalLaplacian : public Halide::Generator<GradientLocalLaplacian> {
+ public:
+  GeneratorParam<bool> primal{"primal", false};
+  Input<Buffer<float>> image{"image", 2};
+  Input<Buffer<float>> detail{"detail", 1};
+  Input<Buffer<float>> seed{"seed", 2};
+  Output<Buffer<double>> sum{"sum", 0};
+  Output<Buffer<float>> d_image{"d_image", 2};
+  Output<Buffer<float>> d_detail{"d_detail", 1};
+
+  void generate() {
+    Func picture = programs::values_of(image, "picture", {512, 384});
+    Func gain = programs::values_of(detail, "gain", {8});
+
+    const int levels = 8, greys = 4;
+    std::vector<Func> remapped(levels), own(levels);
+    std::vector<std::vector<int>> size = {{512, 384, greys}};
+    Expr difference = picture(x, y) - cast<float>(c) / (greys - 1);
+    remapped[0](x, y, c) = picture(x, y) + 0.5f * difference * exp(-4.0f * difference * difference);
+    own[0](x, y, c) = picture(x, y);
+    stages.push_back(remapped[0]);
+    for (int j = 1; j < levels; j++) {
+      remapped[j] = smaller(remapped[j - 1], size[j - 1], "remapped_" + std::to_string(j));
+      own[j] = smaller(own[j - 1], {size[j - 1][0], size[j - 1][1], 1}, "own_" + std::to_string(j));
+      size.push_back({half(size[j - 1][0]), half(size[j - 1][1]), greys});
+    }
+    Func result;
+    for (int j = levels - 1; j >= 0; j--) {
+      const std::string number = std::to_string(j);
+      Expr place = clamp(own[j](x, y, 0), 0.0f, 1.0f) * (greys - 1);
+      Expr low = clamp(cast<int>(place), 0, greys - 2), share = place - cast<float>(low);
+      Func band("band_" + number), mixed("mixed_" + number);
+      Expr detail_of = remapped[j](x, y, c);
+      if (j < levels - 1)
+        detail_of -= larger(remapped[j + 1], size[j + 1], "base_" + number)(x, y, c);
+      band(x, y, c) = detail_of;
+      Expr value = gain(j) * lerp(band(x, y, low), band(x, y, low + 1), share);
+      if (j < levels - 1)
+        value += larger(result, {size[j + 1][0], size[j + 1][1], 1}, "up_" + number)(x, y, 0);
+      mixed(x, y, c) = value;
+      stages.insert(stages.end(), {band, mixed});
+      result = mixed;
+    }
+    Func grey("grey");
+    grey(x, y) = result(x, y, 0);
+    programs::store(stages, primal);
+    programs::Weighed weighed(grey, seed, {512, 384}, primal);
+    sum() = weighed.sum();
+    d_image = weighed.by(picture);
+    programs::estimate(image, {512, 384});
+    programs::estimate(d_image, {512, 384});
+    d_detail = weighed.by(gain);
+    programs::estimate(detail, {8});
+    programs::estimate(d_detail, {8});
+    programs::estimate(seed, {512, 384});
+    programs::estimate(sum, {});
+  }
+
+ private:
+  Var x{"x"}, y{"y"}, c{"c"};
+
+  // Half the size, and twice: 1 3 3 1 along both axes, and what undoes it best.
+  static int half(int n) { return (n + 1) / 2; }
+  Func smaller(Func f, std::vector<int> size, const std::string& name) {
+    auto smooth = [](auto at) { return (at(-1) + 3.0f * (at(0) + at(1)) + at(2)) * 0.125f; };
+    Func rows(name + "_rows"), small(name);
+    rows(x, y, c) = smooth([&](int d) { return programs::nearest(f, size, {x, 2 * y + d, c}); });
+    const std::vector<int> narrow = {size[0], half(size[1]), size[2]};
+    small(x, y, c) = smooth([&](int d) {
+      return programs::nearest(rows, narrow, {2 * x + d, y, c});
+    });
+    stages.insert(stages.end(), {rows, small});
+    return small;
+  }
+  Func larger(Func f, std::vector<int> size, const std::string& name) {
+    Func rows(name + "_rows"), large(name);
+    auto mix = [](Expr near, Expr far) { return 0.75f * near + 0.25f * far; };
+    rows(x, y, c) = mix(programs::nearest(f, size, {x, y / 2, c}),
+                        programs::nearest(f, size, {x, y / 2 - 1 + 2 * (y % 2), c}));
+    const std::vector<int> tall = {size[0], 2 * size[1], size[2]};
+    large(x, y, c) = mix(programs::nearest(rows, tall, {x / 2, y, c}),
+                         programs::nearest(rows, tall, {x / 2 - 1 + 2 * (x % 2), y, c}));
+    stages.insert(stages.end(), {rows, large});
+    return large;
+  }
+
+  std::vector<Func> stages;
+};
+
+}  // namespace
+
+PROGRAM(gradient_local_laplacian, GradientLocalLaplacian,
+        at_sizes({{}}, [](const Sizes&) {
+          return std::vector{in<float>({512, 384}),
+                             in<float>({8}, 0.5, 1.5).noise(),
+                             in<float>({512, 384}, -1, 1).noise(),
+                             out<double>({}),
+                             out<float>({512, 384}),
+                             out<float>({8})};
+        }).gradients(2))
