@@ -30,8 +30,8 @@ class CheckPromises : public Rewriter {
     const Expr checked = call_op(
         Op::require, value.type(),
         {min <= value && value <= max, value,
-         Expr("cannot run: unsafe_promise_clamped() promises a value between "), min, Expr("and"),
-         max, Expr("; it is"), value, Expr(". Use clamp(), or mend what computes it.")});
+         Expr("cannot run: unsafe_promise_clamped() promises a value between"), min, Expr("and"),
+         max, Expr("but it is"), value, Expr("here. Use clamp(), or mend what computes it.")});
     return call_op(Op::unsafe_promise_clamped, e.type(), {checked, min, max});
   }
 };
