@@ -38,7 +38,7 @@ class CheckPromises : public Rewriter {
 
 Expr without_last_bit(const Expr& value) {
   const Type type = value.type(), bits = type.with_code(TypeCode::UInt);
-  const Expr mask = make_const(bits, ~int64_t{1});
+  const Expr mask = make_uint_const(bits, ~uint64_t{1} >> (64 - type.bits()) & ~uint64_t{1});
   const Expr cleared =
       reinterpret_as(type, call_op(Op::bitwise_and, bits, {reinterpret_as(bits, value), mask}));
   return make_select(value == value, cleared, value);
