@@ -129,10 +129,12 @@ class GeneratorParam : public internal::GeneratorParamBase {
   operator T() const { return value_; }
   operator Expr() const requires std::is_arithmetic_v<T> { return Expr(value_); }
 
-  // A level may be set at any time: whatever was given this param follows.
-  void set(const T& value) requires std::is_same_v<T, LoopLevel> {
-    if (value.defined()) value_.set(value);
-    value_ = value;
+  // Where it is a LoopLevel: after generate() too, which has given it to schedules. They follow it.
+  void set(const LoopLevel& level) requires std::is_same_v<T, LoopLevel> {
+    if (is_writable())
+      value_ = level;
+    else
+      value_.set(level);
   }
   template <typename V>
   void set(const V& value) {

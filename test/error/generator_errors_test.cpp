@@ -302,7 +302,24 @@ TEST(GeneratorErrors, GradientsAreOfFloats) {
     }
   };
   auto whole = GeneratorContext(get_host_target()).create<Whole>();
-  EXPECT_SAYS(message_of([&] { whole->build_gradient_module(); }), "holds uint8");
+  const std::string text = message_of([&] { whole->build_gradient_module(); });
+  EXPECT_SAYS(text, "gradients are of floating-point outputs");
+  EXPECT_SAYS(text, "holds uint8");
+}
+
+TEST(GeneratorErrors, GradientsAreOfOutputsWithOneValue) {
+  class Pair : public Generator<Pair> {
+   public:
+    Input<Buffer<float, 1>> in{"in"};
+    Output<Func> out{"out", {Float(32), Float(32)}, 1};
+    void generate() {
+      Var x;
+      out(x) = Tuple(in(x), 2.0f * in(x));
+    }
+  };
+  auto pair = GeneratorContext(get_host_target()).create<Pair>();
+  EXPECT_SAYS(message_of([&] { pair->build_gradient_module(); }),
+              "gradients are of outputs with one value");
 }
 
 TEST(GeneratorErrors, RequirementsAreConditionsOnParameters) {

@@ -192,13 +192,60 @@ TEST(Parameters, StandForParamsAndImages) {
   const Parameter made(Int(16), true, 3, "made");
   EXPECT_EQ(made.type(), Int(16));
   expect_mentions(error_of<CompileError>([&] { of_p.buffer(); }), {"\"p\"", "it is a scalar"});
-  expect_mentions(error_of<CompileError>([&] { of_image.scalar<float>(); }), {"it is a buffer"});
+  expect_mentions(error_of<CompileError>([&] { of_image.scalar<float>(); }),
+                  {"this is for scalars", "it is a buffer"});
   expect_mentions(error_of<CompileError>([] { Parameter().name(); }), {"made without one"});
   expect_mentions(error_of<CompileError>([] { Parameter(Int(8), false, 1); }), {"no dimensions"});
 }
 
+TEST(Parameters, OfScalarsHaveLimitsAndAnEstimate) {
+  Param<int> p("p", 3);
+  Func f("f");
+  Var x("x");
+  f(x) = p + x;
+  Parameter of_p = p.parameter();
+  of_p.set_min_value(2);
+  of_p.set_max_value(4);
+  of_p.set_estimate(3);
+  EXPECT_EQ(retrograde::text(of_p.min_value(), of_p.max_value(), of_p.estimate()), "243");
+  EXPECT_EQ(retrograde::text(of_p.scalar_expr()), "3");
+  f.realize({3});
+  of_p.set_scalar(5);
+  expect_mentions(error_of<RuntimeError>([&] { f.realize({3}); }), {"\"p\"", "4"});
+  EXPECT_TRUE(of_p.same_as(p.parameter()));
+  const std::shared_ptr<retrograde::ir::ParameterContents> contents = of_p;
+  EXPECT_EQ(contents, p.parameter());
+}
+
+TEST(Parameters, OfImagesHaveABufferAndConstraints) {
+  ImageParam image(Float(32), 1, "image");
+  Func f("f");
+  Var x("x");
+  f(x) = image(x) + 1.0f;
+  Parameter parameter = image.parameter();
+  Buffer<float> data(4);
+  data.fill(2.0f);
+  parameter.set_buffer(data);
+  Buffer<float> out = f.realize({4});
+  EXPECT_EQ(out(3), 3.0f);
+  parameter.set_host_alignment(64);
+  EXPECT_EQ(parameter.host_alignment(), 64);
+  parameter.set_host_alignment(4);
+  parameter.set_min_constraint(0, 0);
+  parameter.set_stride_constraint(0, 1);
+  parameter.set_extent_constraint(0, 5);
+  expect_mentions(error_of<RuntimeError>([&] { f.realize({4}); }), {"\"image\"", "5"});
+}
+
 TEST(Serialization, SaysWhatIsThereInstead) {
   std::vector<uint8_t> bytes;
+  std::map<std::string, Parameter> parameters;
+  Func f("f");
+  f() = 1;
+  expect_mentions(error_of<Unsupported>([&] { serialize_pipeline(Pipeline(f), bytes); }),
+                  {"serialize a Pipeline"});
+  expect_mentions(error_of<Unsupported>([&] { parameters = deserialize_parameters(bytes); }),
+                  {"parameters of a Pipeline"});
   expect_mentions(error_of<Unsupported>([&] { deserialize_pipeline(bytes); }),
                   {"no form as bytes", "compile_to_static_library"});
 }
@@ -287,6 +334,9 @@ TEST(Generators, AreCallableInTheProcess) {
   in.fill(7);
   EXPECT_EQ(add(in, out), 0);
   EXPECT_EQ(out(3), 12);
+  const Callable plain = GeneratorContext(target).create<Adder>()->compile_to_callable();
+  EXPECT_EQ(plain(in, out), 0);
+  EXPECT_EQ(out(3), 8);
   expect_mentions(error_of<CompileError>([&] {
                     create_callable_from_generator(GeneratorContext(target), "no_such_generator");
                   }),
