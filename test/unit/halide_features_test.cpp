@@ -301,7 +301,7 @@ TEST(Warnings, SpareProgramsThatMeanWhatTheySay) {
   f(x, y) = undef<int>();
   f(x, y) = x + y;  // all of it: undef said that nothing was before
   g(x, y) = f(x, y);
-  g(y, x) = f(x, y);  // another element
+  g(x, 3) = f(x, 3);  // one row
   g(x, y) += f(x, y);
   h(x, y) = g(x, y);
   h(x, 0) = 1;
