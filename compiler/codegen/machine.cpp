@@ -141,6 +141,8 @@ Machine machine_for(const Target& target, bool tune_for_host) {
   }
   const bool is_host = target.arch == get_host_target().arch;
   if (tune_for_host && is_host) machine.tune_cpu = llvm::sys::getHostCPUName().str();
+  if (const std::string name = target.processor_name(); !name.empty() && machine.is_x86())
+    machine.tune_cpu = name == "k8_sse3" ? "k8-sse3" : name;
   return machine;
 }
 

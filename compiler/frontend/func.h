@@ -453,7 +453,7 @@ class Func {
   }
   Func& hexagon(const VarOrRVar& x = Var::outermost()) { return with(pure_stage().hexagon(x)); }
   const ir::StageSchedule& get_schedule() const { return pure_stage().get_schedule(); }
-  void unscheduled() {}  // says that no directive was forgotten
+  void unscheduled() { pure_stage().unscheduled(); }  // says that no directive was forgotten
 
  private:
   ir::FuncPtr func_;

@@ -24,6 +24,9 @@ enum class TailStrategy : uint8_t {
   Predicate,    // as GuardWithIf, by predicated loads and stores
   PredicateLoads,
   PredicateStores,
+  // For splits that do not divide, with stores that write back what was there: PredicateStores.
+  RoundUpAndBlend,
+  ShiftInwardsAndBlend,
   ShiftInwards,  // the last block moves inwards and recomputes (pure definitions only)
   Auto,  // ShiftInwards for pure definitions, GuardWithIf for updates; RoundUp inside storage we
          // size ourselves

@@ -130,6 +130,13 @@ void check_round_up(const ir::StageSchedule& schedule, const std::string& loop, 
              "Use TailStrategy::GuardWithIf, or a factor that divides the loop's extent");
 }
 
+// Whoever stores beyond the range writes back what was there: to leave it alone is the same.
+TailStrategy without_blending(TailStrategy tail) {
+  const bool blends =
+      tail == TailStrategy::RoundUpAndBlend || tail == TailStrategy::ShiftInwardsAndBlend;
+  return blends ? TailStrategy::PredicateStores : tail;
+}
+
 // The variable that makes a loop's iterations depend on each other; empty when none does.
 std::string dependent_root(const ir::FuncContents& f, const ir::Definition& definition,
                            const ir::StageSchedule& schedule, const std::string& loop) {
@@ -252,6 +259,14 @@ Stage& Stage::atomic(bool override_associativity_test) {
   return *this;
 }
 
+void Stage::unscheduled() { touch(); }
+
+std::vector<VarOrRVar> Stage::split_vars() const {
+  std::vector<VarOrRVar> vars;
+  for (const ir::Dim& dim : schedule().dims) vars.emplace_back(dim.var, dim.is_reduction);
+  return vars;
+}
+
 Stage& Stage::allow_race_conditions() {
   touch().allow_races = true;
   return *this;
@@ -272,6 +287,7 @@ Stage& Stage::split(const VarOrRVar& old, const VarOrRVar& outer, const VarOrRVa
   check_new_name(inner, old.name(), asked);
   check_factor(factor, asked);
   const bool is_reduction = schedule().dims[at].is_reduction;
+  tail = without_blending(tail);
   check_tail(tail, index_ > 0, is_reduction, asked);
   if (index_ > 0 && tail == TailStrategy::RoundUp)
     check_round_up(schedule(), old.name(), factor, asked);

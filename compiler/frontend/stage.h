@@ -33,6 +33,7 @@ class Stage {
   int index() const { return index_; }
   const ir::StageSchedule& get_schedule() const { return schedule(); }
   std::string dump_argument_list() const;  // the loops, innermost first
+  std::vector<VarOrRVar> split_vars() const;  // the same as variables
   std::string source_location() const;     // where the Func was declared: "blur.cpp:12"
 
   // ---- the shape of the loops ----
@@ -259,7 +260,7 @@ class Stage {
                   DeviceAPI device = DeviceAPI::Default_GPU);
   Stage& hexagon(const VarOrRVar& x = Var::outermost());
 
-  void unscheduled() {}  // says that no directive was forgotten
+  void unscheduled();  // says that no directive was forgotten
 
  private:
   const ir::Definition& definition() const { return func_->stage(index_); }

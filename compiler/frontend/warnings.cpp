@@ -94,7 +94,8 @@ class Findings {
       if (f.stage(s).schedule.touched) continue;
       add(stage_name(f, s) + " has no schedule",
           "other definitions of " + quoted(f.name) + " have one, and it holds for them alone",
-          text("Schedule it through update(", s - 1, ") too"));
+          text("Schedule it through update(", s - 1, "), or say update(", s - 1,
+               ").unscheduled()"));
     }
   }
 

@@ -35,6 +35,21 @@ constexpr Named<Target::Arch> arch_names[] = {{"arch_unknown", Target::ArchUnkno
                                               {"powerpc", Target::POWERPC},
                                               {"wasm", Target::WebAssembly},
                                               {"riscv", Target::RISCV}};
+// As they stand behind "tune_": LLVM's names, but for dashes.
+constexpr Named<Target::Processor> processor_names[] = {{"generic", Target::ProcessorGeneric},
+                                                        {"k8", Target::K8},
+                                                        {"k8_sse3", Target::K8_SSE3},
+                                                        {"amdfam10", Target::AMDFam10},
+                                                        {"btver1", Target::BtVer1},
+                                                        {"bdver1", Target::BdVer1},
+                                                        {"bdver2", Target::BdVer2},
+                                                        {"bdver3", Target::BdVer3},
+                                                        {"bdver4", Target::BdVer4},
+                                                        {"btver2", Target::BtVer2},
+                                                        {"znver1", Target::ZnVer1},
+                                                        {"znver2", Target::ZnVer2},
+                                                        {"znver3", Target::ZnVer3},
+                                                        {"znver4", Target::ZnVer4}};
 constexpr Named<Target::Feature> feature_names[] = {
 #define RETROGRADE_FEATURE(enumerator, name, generated) {name, Target::enumerator},
 #include "ir/target_features.def"
@@ -88,6 +103,23 @@ bool read_bits(const std::string& word, int& bits) {
   return true;
 }
 
+bool has_prefix(const std::string& word, const std::string& prefix) {
+  return word.rfind(prefix, 0) == 0;
+}
+
+// "tune_znver3", "vector_bits_256"
+bool read_option(const std::string& word, Target& target) {
+  const std::string tune = "tune_", bits = "vector_bits_";
+  if (has_prefix(word, tune))
+    return find_name(processor_names, word.substr(tune.size()), target.processor_tune);
+  if (!has_prefix(word, bits) || word.size() == bits.size() || word.size() > bits.size() + 5)
+    return false;
+  const std::string digits = word.substr(bits.size());
+  if (digits.find_first_not_of("0123456789") != std::string::npos) return false;
+  target.vector_bits = std::stoi(digits);
+  return target.vector_bits > 0;
+}
+
 bool read_feature(const std::string& word, Target& target) {
   if (word == "trace_all") {
     target.set_features({Target::TraceLoads, Target::TraceStores, Target::TraceRealizations});
@@ -102,7 +134,7 @@ bool read_word(const std::string& word, Target& target, Parts& parts) {
   if (read_bits(word, target.bits)) return !std::exchange(parts.bits, true);
   if (find_name(arch_names, word, target.arch)) return !std::exchange(parts.arch, true);
   if (find_name(os_names, word, target.os)) return !std::exchange(parts.os, true);
-  return read_feature(word, target);
+  return read_option(word, target) || read_feature(word, target);
 }
 
 // The first word that is out of place; "" also when a part is missing, see `parts`.
@@ -215,6 +247,80 @@ bool Target::features_all_of(const std::vector<Feature>& features) const {
   return true;
 }
 
+namespace {
+
+// A feature and what every processor that has it has too, each line of what stands below it.
+struct Implication {
+  Target::Feature feature;
+  std::vector<Target::Feature> implied;
+};
+const std::vector<Implication>& implications() {
+  static const std::vector<Implication> all = {
+      {Target::AVX512_Zen4, {Target::AVX512_Cannonlake}},
+      {Target::AVX512_SapphireRapids, {Target::AVX512_Cannonlake}},
+      {Target::AVX512_Cannonlake, {Target::AVX512_Skylake}},
+      {Target::AVX512_Skylake, {Target::AVX512}},
+      {Target::AVX512_KNL, {Target::AVX512}},
+      {Target::AVX512, {Target::AVX2}},
+      {Target::AVX2, {Target::AVX, Target::FMA, Target::F16C}},
+      {Target::FMA, {Target::AVX}},
+      {Target::F16C, {Target::AVX}},
+      {Target::AVX, {Target::SSE41}},
+      {Target::CUDACapability86, {Target::CUDACapability80}},
+      {Target::CUDACapability80, {Target::CUDACapability75}},
+      {Target::CUDACapability75, {Target::CUDACapability70}},
+      {Target::CUDACapability70, {Target::CUDACapability61}},
+      {Target::CUDACapability61, {Target::CUDACapability50}},
+      {Target::CUDACapability50, {Target::CUDACapability35}},
+      {Target::CUDACapability35, {Target::CUDACapability32}},
+      {Target::CUDACapability32, {Target::CUDACapability30}},
+      {Target::CUDACapability30, {Target::CUDA}},
+      {Target::HVX_v68, {Target::HVX_v66}},
+      {Target::HVX_v66, {Target::HVX_v65}},
+      {Target::HVX_v65, {Target::HVX_v62}},
+      {Target::HVX_v62, {Target::HVX_128}},
+      {Target::SVE2, {Target::SVE}},
+      {Target::ARMv81a, {Target::ARMv8a}}};
+  return all;
+}
+
+constexpr std::pair<Target::Feature, int> sme_lengths[] = {{Target::SME_SVL128, 128},
+                                                           {Target::SME_SVL256, 256},
+                                                           {Target::SME_SVL512, 512},
+                                                           {Target::SME_SVL1024, 1024},
+                                                           {Target::SME_SVL2048, 2048}};
+
+}  // namespace
+
+void Target::set_implied_features() {
+  for (const Implication& line : implications()) {
+    if (has_feature(line.feature)) set_features(line.implied);
+  }
+}
+
+void Target::unset_implied_features() {
+  Target implied(os, arch, bits);
+  for (const Implication& line : implications()) {
+    if (has_feature(line.feature) || implied.has_feature(line.feature))
+      implied.set_features(line.implied);
+  }
+  features_ &= ~implied.features_;
+}
+
+int Target::sme_streaming_vector_bits() const {
+  for (const auto& [feature, length] : sme_lengths) {
+    if (has_feature(feature)) return length;
+  }
+  return 0;
+}
+
+Target::Feature Target::sme_svl_feature_from_bits(int bits) {
+  for (const auto& [feature, length] : sme_lengths) {
+    if (length == bits) return feature;
+  }
+  return FeatureEnd;
+}
+
 int Target::natural_vector_size(Type type) const {
   const bool wide =
       features_any_of({AVX512, AVX512_Skylake, AVX512_Cannonlake, AVX512_SapphireRapids});
@@ -231,7 +337,14 @@ std::string Target::to_string() const {
   }
   std::sort(features.begin(), features.end());
   for (const std::string& feature : features) result += "-" + feature;
+  if (processor_tune != ProcessorGeneric)
+    result += "-tune_" + std::string(name_of(processor_names, processor_tune));
+  if (vector_bits != 0) result += "-vector_bits_" + std::to_string(vector_bits);
   return result;
+}
+
+std::string Target::processor_name() const {
+  return processor_tune == ProcessorGeneric ? "" : name_of(processor_names, processor_tune);
 }
 
 std::string Target::feature_to_name(Feature feature) { return name_of(feature_names, feature); }
@@ -260,8 +373,9 @@ bool Target::supports_device_api(DeviceAPI device) const {
 }
 
 namespace {
-constexpr DeviceAPI gpus[] = {DeviceAPI::Metal, DeviceAPI::OpenCL, DeviceAPI::CUDA,
-                              DeviceAPI::OpenGLCompute, DeviceAPI::D3D12Compute};
+constexpr DeviceAPI gpus[] = {DeviceAPI::Metal,         DeviceAPI::OpenCL,       DeviceAPI::CUDA,
+                              DeviceAPI::OpenGLCompute, DeviceAPI::D3D12Compute, DeviceAPI::Vulkan,
+                              DeviceAPI::WebGPU};
 
 // The first of them that the target has, else `otherwise`.
 template <size_t N>
@@ -326,6 +440,10 @@ Target::Feature target_feature_for_device_api(DeviceAPI device) {
       return Target::HexagonDma;
     case DeviceAPI::D3D12Compute:
       return Target::D3D12Compute;
+    case DeviceAPI::Vulkan:
+      return Target::Vulkan;
+    case DeviceAPI::WebGPU:
+      return Target::WebGPU;
     default:
       return Target::FeatureEnd;
   }

@@ -21,6 +21,8 @@ enum class DeviceAPI {
   Hexagon,
   HexagonDma,
   D3D12Compute,
+  Vulkan,
+  WebGPU,
 };
 
 // A feature, architecture or system that no code is generated for has a name all the same: programs
@@ -49,6 +51,25 @@ struct Target {
     RISCV
   } arch = ArchUnknown;
   int bits = 0;
+  // Length of the vectors where the instruction set leaves it open: "vector_bits_256"; 0: not said.
+  int vector_bits = 0;
+  // Whose pipeline instructions are scheduled for: "tune_znver3". Never changes which are used.
+  enum Processor {
+    ProcessorGeneric,
+    K8,
+    K8_SSE3,
+    AMDFam10,
+    BtVer1,
+    BdVer1,
+    BdVer2,
+    BdVer3,
+    BdVer4,
+    BtVer2,
+    ZnVer1,
+    ZnVer2,
+    ZnVer3,
+    ZnVer4
+  } processor_tune = ProcessorGeneric;
   // The first ones have the positions of halide_target_feature_t. AVX512 is F and CD;
   // AVX512_Skylake adds VL, BW, DQ.
   enum Feature {
@@ -81,6 +102,13 @@ struct Target {
   }
   bool features_any_of(const std::vector<Feature>& features) const;
   bool features_all_of(const std::vector<Feature>& features) const;
+  // Adds what a processor with its features has too (AVX2: AVX, FMA, F16C, SSE4.1); the other one
+  // leaves out what the features that stay imply.
+  void set_implied_features();
+  void unset_implied_features();
+  // Length of SME's vectors by sme_svl128 to sme_svl2048; 0 without one.
+  int sme_streaming_vector_bits() const;
+  static Feature sme_svl_feature_from_bits(int bits);  // FeatureEnd: there is none
 
   // Natural lanes of a vector of the type: 64-byte vectors with AVX-512, 32 with AVX2, else 16.
   int natural_vector_size(Type type) const;
@@ -109,13 +137,15 @@ struct Target {
   bool supported() const { return unsupported_part().empty(); }
   // Whether one runtime serves code for both; `result` is then its target.
   bool get_runtime_compatible_target(const Target& other, Target& result) const;
+  std::string processor_name() const;  // "znver3"; empty for ProcessorGeneric
   // arch-bits-os, then features by name; round-trips through the constructor
   std::string to_string() const;
   const std::bitset<FeatureEnd>& get_features_bitset() const { return features_; }
   static std::string feature_to_name(Feature feature);
   static Feature feature_from_name(const std::string& name);  // FeatureEnd: there is none
   friend bool operator==(const Target& a, const Target& b) {
-    return a.os == b.os && a.arch == b.arch && a.bits == b.bits && a.features_ == b.features_;
+    return a.os == b.os && a.arch == b.arch && a.bits == b.bits && a.vector_bits == b.vector_bits &&
+           a.processor_tune == b.processor_tune && a.features_ == b.features_;
   }
 
  private:

@@ -18,6 +18,8 @@ enum class TypeCode : uint8_t { Int, UInt, Float, BFloat, Handle };
 
 // A 16-bit IEEE half; arithmetic happens in float32 and rounds to nearest even at each operation.
 struct float16_t {
+  static constexpr int mantissa_bits = 10;
+  static constexpr uint16_t sign_mask = 0x8000, exponent_mask = 0x7c00, mantissa_mask = 0x03ff;
   uint16_t bits = 0;
   float16_t() = default;
   explicit float16_t(float value);
@@ -45,6 +47,8 @@ struct float16_t {
 
 // The upper half of a float32, rounded to nearest even.
 struct bfloat16_t {
+  static constexpr int mantissa_bits = 7;
+  static constexpr uint16_t sign_mask = 0x8000, exponent_mask = 0x7f80, mantissa_mask = 0x007f;
   uint16_t bits = 0;
   bfloat16_t() = default;
   explicit bfloat16_t(float value);

@@ -118,6 +118,10 @@ const char* tail_name(TailStrategy tail) {
       return "PredicateLoads";
     case TailStrategy::PredicateStores:
       return "PredicateStores";
+    case TailStrategy::RoundUpAndBlend:
+      return "RoundUpAndBlend";
+    case TailStrategy::ShiftInwardsAndBlend:
+      return "ShiftInwardsAndBlend";
     case TailStrategy::ShiftInwards:
       return "ShiftInwards";
     case TailStrategy::Auto:

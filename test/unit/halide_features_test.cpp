@@ -48,7 +48,57 @@ TEST(HalideHeader, InternalIsOneNamespace) {
   EXPECT_TRUE(none.empty());
 }
 
+// ---- 16-bit floats ----
+
+template <typename T>
+void expect_fields(T value, int exponent, int mantissa) {
+  const uint16_t bits = value.to_bits();
+  EXPECT_EQ((bits & T::exponent_mask) >> T::mantissa_bits, exponent);
+  EXPECT_EQ(bits & T::mantissa_mask, mantissa);
+  EXPECT_EQ(T::sign_mask ^ T::exponent_mask ^ T::mantissa_mask, 0xffff);
+}
+
+TEST(SmallFloats, HaveTheirFields) {
+  expect_fields(float16_t(1.5f), 15, 0x200);
+  expect_fields(bfloat16_t(1.5f), 127, 0x40);
+  EXPECT_EQ(float16_t(-1.5f).to_bits() & float16_t::sign_mask, 0x8000);
+}
+
 // ---- targets ----
+
+TEST(Targets, SayWhomTheyAreTunedFor) {
+  const Target tuned("x86-64-linux-avx2-tune_znver3-vector_bits_256");
+  EXPECT_EQ(tuned.processor_tune, Target::Processor::ZnVer3);
+  EXPECT_EQ(tuned.processor_name(), "znver3");
+  EXPECT_EQ(tuned.vector_bits, 256);
+  EXPECT_EQ(Target(tuned.to_string()), tuned);
+  EXPECT_NE(Target("x86-64-linux-avx2"), tuned);
+  EXPECT_EQ(Target().processor_tune, Target::ProcessorGeneric);
+  EXPECT_FALSE(Target::validate_target_string("x86-64-linux-tune_abacus"));
+  EXPECT_FALSE(Target::validate_target_string("x86-64-linux-vector_bits_"));
+  EXPECT_FALSE(Target::validate_target_string("x86-64-linux-vector_bits_many"));
+}
+
+TEST(Targets, ImplyFeatures) {
+  Target target("x86-64-linux-avx512_skylake");
+  target.set_implied_features();
+  EXPECT_TRUE(target.features_all_of(
+      {Target::AVX512, Target::AVX2, Target::FMA, Target::F16C, Target::AVX, Target::SSE41}));
+  EXPECT_FALSE(target.has_feature(Target::AVX512_Cannonlake));
+  target.unset_implied_features();
+  EXPECT_EQ(target, Target("x86-64-linux-avx512_skylake"));
+  Target bare("x86-64-linux-fma");
+  bare.unset_implied_features();
+  EXPECT_TRUE(bare.has_feature(Target::FMA));
+}
+
+TEST(Targets, NameTheLengthOfStreamingVectors) {
+  EXPECT_EQ(Target::sme_svl_feature_from_bits(512), Target::SME_SVL512);
+  EXPECT_EQ(Target::sme_svl_feature_from_bits(500), Target::FeatureEnd);
+  EXPECT_EQ(Target("arm-64-linux-sme_svl1024").sme_streaming_vector_bits(), 1024);
+  EXPECT_EQ(Target("arm-64-linux").sme_streaming_vector_bits(), 0);
+  EXPECT_TRUE(Target("x86-64-linux-webgpu").supports_device_api(DeviceAPI::WebGPU));
+}
 
 TEST(Targets, RefuseSanitizersByName) {
   Func f("f");
@@ -177,6 +227,38 @@ TEST(UserContext, IsAnArgumentOfExternStages) {
   EXPECT_EQ(out(4), 15);
 }
 
+// ---- stages ----
+
+TEST(Stages, ListTheirLoops) {
+  Func f("f");
+  Var x("x"), y("y"), xo("xo"), xi("xi");
+  RDom r(0, 4, "r");
+  f(x, y) = 0;
+  f(x, y) += r;
+  f.update().split(x, xo, xi, 8);
+  const std::vector<VarOrRVar> vars = f.update().split_vars();
+  ASSERT_GE(vars.size(), 4u);
+  EXPECT_EQ(vars[0].name(), RVar(r.x).name());
+  EXPECT_TRUE(vars[0].is_rvar);
+  EXPECT_EQ(vars[1].name(), "xi");
+  EXPECT_EQ(vars[2].name(), "xo");
+  EXPECT_FALSE(vars[2].is_rvar);
+}
+
+TEST(Tails, BlendWhatWasThere) {
+  for (const TailStrategy tail :
+       {TailStrategy::RoundUpAndBlend, TailStrategy::ShiftInwardsAndBlend}) {
+    Func f("f"), g("g");
+    Var x("x");
+    f(x) = x;
+    f(x) = f(x) * 3 + 1;
+    g(x) = f(x);
+    f.compute_root().update().vectorize(x, 8, tail);
+    Buffer<int> out = g.realize({21});
+    for (int i = 0; i < 21; i++) EXPECT_EQ(out(i), 3 * i + 1);
+  }
+}
+
 // ---- Parameter ----
 
 TEST(Parameters, StandForParamsAndImages) {
@@ -268,7 +350,7 @@ TEST(Warnings, AreToldInTheirScope) {
   ASSERT_EQ(told.size(), 2u) << "once for a compilation";
   expect_mentions(told[0], {"update 0 of \"f", "hides", "its first definition"});
   expect_mentions(told[1], {"update 0 of \"f", "has no schedule", "update(0)"});
-  f.update().vectorize(x, 4);
+  f.update().unscheduled();
   f.realize({3});
   EXPECT_EQ(told.size(), 2u) << "outside of the scope";
   EXPECT_EQ(warnings_of(Pipeline(f)).size(), 1u);
