@@ -400,6 +400,11 @@ Interval interval_shift(Op op, Type type, const Interval& a, const Interval& amo
   auto low = constant_min(amount), high = constant_max(amount);
   bool is_fixed = low && high && *low == *high && *low >= 0 && *low < type.bits() && *low < 62;
   if (!is_fixed) {
+    if (op == Op::shift_left && type.is_int() && low && high && *low >= 0 &&
+        *high < std::min(type.bits() - 1, 62)) {
+      return interval_mul(
+          type, a, {make_const(type, int64_t{1} << *low), make_const(type, int64_t{1} << *high)});
+    }
     bool shrinks = op == Op::shift_right && low && *low >= 0 && is_nonnegative(a);
     return shrinks ? Interval{make_zero(type), a.max} : type_range(type);
   }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <map>
 #include <unordered_map>
+#include <unordered_set>
 
 #include "ir/build.h"
 #include "ir/equal.h"
@@ -31,13 +32,14 @@ class Sharer : public Rewriter {
 
  private:
   std::map<Expr, Expr, StructuralLess> known_;
+  std::unordered_set<std::string> made_;
   std::unordered_map<const ExprNode*, int> sizes_;  // 0: not of parameters alone
   std::vector<Expr> kept_;                          // whose addresses stand in sizes_
 
   static bool is_arithmetic(const Expr& e) { return e.as<Binary>() || e.as<Select>(); }
 
-  static bool is_parameter(const Variable& v) {
-    return v.name.compare(0, 7, "shared.") == 0 ||
+  bool is_parameter(const Variable& v) const {
+    return made_.contains(v.name) ||
            dynamic_cast<const ParameterContents*>(v.symbol.raw()) != nullptr;
   }
 
@@ -67,6 +69,7 @@ class Sharer : public Rewriter {
     auto [it, is_new] = known_.try_emplace(value);
     if (is_new) {
       names.emplace_back("shared." + std::to_string(names.size()), value);
+      made_.insert(names.back().first);
       it->second = variable(names.back().first);
     }
     return it->second;

@@ -239,5 +239,99 @@ TEST_F(DefaultSchedule, TilesAPlaneThatIsReadAcross) {
   EXPECT_EQ(stages[1].dims[3].for_type, ForType::Parallel);
 }
 
+// A recursive filter beside a schedule by hand that says nothing of it.
+TEST_F(DefaultSchedule, AScanIsNotComputedAgainForEachElement) {
+  Func scan("scan"), squares("squares"), total("total");
+  RDom r(1, 31), all(0, 32, 0, 32);
+  scan(x, y) = a(x, y);
+  scan(r, y) = 0.25f * scan(r, y) + 0.75f * scan(r - 1, y);
+  squares(x, y) = scan(x, y) * scan(x, y);
+  squares.compute_root();
+  total() = 0.0f;
+  total() += squares(all.x, all.y) * squares(all.x, all.y);
+  const Derivative d = propagate_adjoints(total);
+  EXPECT_TRUE(choose(d(a)).contains(scan.function().get()));
+  EXPECT_NE(d.explain().find("performance \"scan\": unless a directive schedules it, it is "
+                             "computed at root"),
+            std::string::npos)
+      << d.explain();
+}
+
+TEST_F(DefaultSchedule, AHandScheduleKeepsSmallReductionsThatAreReadOnceInline) {
+  Func window("window"), squares("squares"), total("total");
+  RDom r(0, 3), all(0, 30, 0, 30);
+  window(x, y) = 0.0f;
+  window(x, y) += a(x + r, y);
+  squares(x, y) = exp(window(x, y));
+  squares.compute_root();
+  total() = 0.0f;
+  total() += squares(all.x, all.y) * squares(all.x, all.y);
+  EXPECT_FALSE(choose(propagate_adjoints(total)(a)).contains(window.function().get()));
+}
+
+// A warp whose private parts would take as much as 32 images.
+TEST(PrivateParts, TakeNoMoreThanABudget) {
+  Var x("x"), y("y"), c("c");
+  ImageParam image(Float(32), 3, "image"), flow(Float(32), 3, "flow");
+  Func warped("warped"), total("total");
+  Expr px = clamp(cast<int>(flow(x, y, 0)), 0, 511), py = clamp(cast<int>(flow(x, y, 1)), 0, 511);
+  warped(x, y, c) = image(px, py, c) * image(px, py, c);
+  RDom r(0, 512, 0, 512, 0, 64);
+  total() = 0.0f;
+  total() += warped(r.x, r.y, r.z);
+  const Derivative d = propagate_adjoints(total, {.wrt = {image}});
+  const double image_bytes = 512.0 * 512 * 64 * 4;  // the gradient, and twice that for its sums
+  ASSERT_TRUE(d.operations().gradient.bytes().value().has_value());
+  EXPECT_LE(*d.operations().gradient.bytes().value(), 3.1 * image_bytes) << d.explain();
+}
+
+TEST(PrivateParts, AreFewerForLargeTargets) {
+  Var x("x"), y("y");
+  const auto explained = [&](int side) {
+    ImageParam image(Float(32), 2, "image"), flow(Float(32), 3, "flow");
+    Func warped("warped"), total("total");
+    warped(x, y) = image(clamp(cast<int>(flow(x, y, 0)), 0, side - 1),
+                         clamp(cast<int>(flow(x, y, 1)), 0, side - 1));
+    RDom r(0, 4 * side, 0, 4 * side);
+    total() = 0.0f;
+    total() += warped(r.x, r.y) * warped(r.x, r.y);
+    return propagate_adjoints(total, {.wrt = {image}}).explain();
+  };
+  EXPECT_NE(explained(256).find("32 private parts of 524288 bytes each"), std::string::npos);
+  EXPECT_NE(explained(1024).find("8 private parts of 8388608 bytes each, as many as fit 67108864"),
+            std::string::npos);
+}
+
+// As many as fit is known when the pipeline runs; the bits are those of any number of threads.
+TEST(PrivateParts, OfSizesKnownAtRunTime) {
+  Var x("x");
+  ImageParam image(Float(32), 1, "image"), place(Int(32), 1, "place");
+  Func read("read"), total("total");
+  read(x) = image(clamp(place(x), 0, image.width() - 1));
+  RDom r(0, place.width());
+  total() = 0.0f;
+  total() += read(r) * read(r) * cast<float>(r % 7);
+  const Derivative d = propagate_adjoints(total, {.wrt = {image}});
+  EXPECT_NE(d.explain().find("at most 32 private parts"), std::string::npos) << d.explain();
+  Buffer<float> values(37), expected(37);
+  Buffer<int> places(5000);
+  for (int i = 0; i < 37; ++i) values(i) = 0.25f * static_cast<float>(i - 18);
+  expected.fill(0.0f);
+  for (int i = 0; i < 5000; ++i) {
+    places(i) = i * i % 37;
+    expected(places(i)) += 2.0f * values(places(i)) * static_cast<float>(i % 7);
+  }
+  image.set(values);
+  place.set(places);
+  Func by_image = d(image);
+  const oracle::Region region{{0}, {37}};
+  const Buffer<float> found = gradient::run_on_threads(by_image, region, 1, false);
+  for (int i = 0; i < 37; ++i)
+    EXPECT_NEAR(found(i), expected(i), 1e-3f * (1 + std::abs(expected(i))));
+  for (int threads : {2, 4})
+    EXPECT_TRUE(gradient::same_bits(
+        found, gradient::run_on_threads(by_image, region, threads, threads == 4)));
+}
+
 }  // namespace
 }  // namespace retrograde
