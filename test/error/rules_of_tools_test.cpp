@@ -13,7 +13,7 @@
 namespace retrograde {
 namespace {
 
-using Internal::GeneratorFactory, Internal::GeneratorRegistry;
+using internal::GeneratorFactory, internal::GeneratorRegistry;
 
 // ---- modules, targets, autoschedulers ----
 
@@ -238,8 +238,10 @@ TEST_F(Rules, PartsOfACompiledGenerator) {
   expect("an output has the name that the generator declares",
          [&] { generator->output_funcs("nobody"); });
   expect("its inputs are those of the compiled function", [&] { generator->build_module("g"); });
-  expect("gradients are of outputs with one floating-point value",
+  expect("gradients are of floating-point outputs",
          [&] { context.create<ByteGenerator>()->build_gradient_module("g"); });
+  expect("gradients are of outputs with one value",
+         [&] { context.create<RuleGenerator>()->build_gradient_module("g"); });
   const GeneratorFactory factory = [](const GeneratorContext& c) {
     return ByteGenerator::create(c);
   };
@@ -252,7 +254,7 @@ TEST_F(Rules, OneRuntimeForAllTargets) {
   const std::vector<const char*> words{"program", "-r", "runtime",
                                        "-o",      ".",  "target=x86-64-linux,arm-64-linux"};
   std::ostringstream errors;
-  EXPECT_NE(Internal::generate_filter_main(static_cast<int>(words.size()),
+  EXPECT_NE(internal::generate_filter_main(static_cast<int>(words.size()),
                                            const_cast<char**>(words.data()), errors),
             0);
   EXPECT_NE(errors.str().find("one runtime serves all targets"), std::string::npos) << errors.str();
@@ -261,7 +263,7 @@ TEST_F(Rules, OneRuntimeForAllTargets) {
 TEST_F(Rules, CommandLinesOfGenerators) {
   const auto read = [](std::vector<const char*> words) {
     words.insert(words.begin(), "program");
-    Internal::read_command_line(static_cast<int>(words.size()), words.data());
+    internal::read_command_line(static_cast<int>(words.size()), words.data());
   };
   expect("its arguments are flags of one letter and param=value", [&] { read({"--help-me"}); });
   expect("every flag has a value", [&] { read({"-g"}); });

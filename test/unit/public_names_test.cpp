@@ -8,7 +8,7 @@
 #include "generator/registry.h"
 
 using namespace retrograde;
-using Internal::create_alias, Internal::GeneratorRegistry;
+using internal::create_alias, internal::GeneratorRegistry;
 
 namespace {
 
@@ -203,8 +203,8 @@ TEST_F(FuncNames, ModulesAndTheirFiles) {
   EXPECT_FALSE(m.target().has_unknowns());
   EXPECT_FALSE(m.any_strict_float());
   EXPECT_TRUE(m.submodules().empty());
-  const auto files = Internal::get_output_info(m.target());
-  const Internal::OutputInfo& object = files.at(OutputFileType::object);
+  const auto files = internal::get_output_info(m.target());
+  const internal::OutputInfo& object = files.at(OutputFileType::object);
   EXPECT_EQ(object.name, "object");
   EXPECT_EQ(object.extension, ".o");
   EXPECT_TRUE(object.is_multi);
