@@ -12,6 +12,8 @@
 //   }
 //
 // Method: inner loops first; copies after the first get fresh names for everything that they bind.
+//         Of select(x == 0, .., select(x == 1, ..)) a copy has its own arm, which is looked up: n
+//         copies of a choice from n arms take n steps.
 // Not done: a limit on the size of the result: the user asked for the copies.
 // Source: folklore. Tests: test/golden/lower/unroll_loops/.
 #include "lower/unroll_loops.h"
@@ -23,6 +25,7 @@
 #include "ir/build.h"
 #include "ir/print.h"
 #include "ir/visit.h"
+#include "lower/choice_arms.h"
 #include "lower/copy_statement.h"
 #include "simplify/facts.h"
 #include "simplify/simplify.h"
@@ -99,11 +102,14 @@ class Unroller : public Rewriter {
 
   Stmt unrolled(const For& loop, int64_t extent, bool is_guarded) {
     std::vector<Stmt> copies;
+    ChoiceArms arms(loop.name);
+    const bool chooses = arms.has_any(loop.body);
     for (int64_t i = 0; i < extent; ++i) {
       Expr value = binary(Kind::Add, loop.min, make_const(loop.min.type(), i));
+      const auto number = chooses ? as_const_int(value) : std::nullopt;
+      const Stmt body = number ? arms.choose(loop.body, *number) : loop.body;
       Substitution iteration{{loop.name, value}};
-      Stmt copy = i == 0 ? substitute(loop.body, iteration)
-                         : copy_statement(loop.body, fresh_, iteration);
+      Stmt copy = i == 0 ? substitute(body, iteration) : copy_statement(body, fresh_, iteration);
       const Expr runs = make_const(loop.extent.type(), i) < loop.extent;
       copies.push_back(is_guarded ? make_if(runs, copy) : copy);
     }

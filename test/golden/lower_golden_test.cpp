@@ -5,16 +5,20 @@
 
 #include <algorithm>
 #include <cstdlib>
+#include <ctime>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
 
 #include "diagnostics/error.h"
+#include "diagnostics/large_stack.h"
+#include "ir/build.h"
 #include "ir/equal.h"
 #include "ir/parse.h"
 #include "ir/print.h"
 #include "ir/validate.h"
 #include "lower/pass_table.h"
+#include "lower/unroll_loops.h"
 
 namespace retrograde::ir {
 namespace {
@@ -87,6 +91,23 @@ INSTANTIATE_TEST_SUITE_P(Cases, LowerGolden, testing::ValuesIn(find_cases()), []
 TEST_P(LowerGolden, InputRoundTrips) {
   Stmt program = parse_stmt(read_file(GetParam().input));
   EXPECT_TRUE(equal(program, parse_stmt(print(program))));
+}
+
+// Copying all arms into each copy would take half a minute.
+TEST(UnrollLoops, CopiesOfAChoiceFromManyArmsTakeAStepEach) {
+  constexpr int n = 4000;
+  const Expr c = variable("c");
+  Expr choice = Expr(-1);
+  for (int i = n; i-- > 0;)
+    choice = make_select(binary(Kind::EQ, c, Expr(i)), variable("x") * Expr(i + 2), choice);
+  const Stmt loop = make_for("c", Expr(0), Expr(n), ForType::Unrolled, make_store("f", choice, c));
+  const std::clock_t begin = std::clock();
+  Stmt copies;
+  run_on_large_stack([&] { copies = unroll_loops(loop); });
+  EXPECT_LT(static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC, 3);
+  const auto* block = copies.as<Block>();
+  ASSERT_TRUE(block && block->stmts.size() == n);
+  EXPECT_TRUE(equal(block->stmts[7], make_store("f", variable("x") * Expr(9), Expr(7))));
 }
 
 }  // namespace
