@@ -4,9 +4,23 @@
 #include "diagnostics/error.h"
 #include "frontend/var.h"
 #include "ir/build.h"
+#include "ir/visit.h"
 #include "simplify/simplify.h"
 
 namespace retrograde::ir {
+
+namespace {
+
+bool has_operators(const Expr& e) {
+  bool found = false;
+  walk(e, [&](const Expr& node) {
+    found |= node.as<Call>() != nullptr;
+    return !found;
+  });
+  return found;
+}
+
+}  // namespace
 
 TapeLayout::TapeLayout(const UpdateContext& context)
     : c_(context),
@@ -51,7 +65,9 @@ Expr TapeLayout::slot_of(const std::vector<Expr>& args) const {
   for (size_t d = 0; d < args.size(); ++d) {
     if (c_.pure[d]) continue;
     Expr index = cast_to(Int(32), args[d]);
-    if (!is_always_inside(index, d)) index = clamp(index, box_[d].min, box_[d].max);
+    // What operators give has bounds here, where all loops are known, but none inside of some.
+    if (has_operators(index) || !is_always_inside(index, d))
+      index = clamp(index, box_[d].min, box_[d].max);
     slot = slot + (index - box_[d].min) * strides_[d];
   }
   return simplify(slot);
