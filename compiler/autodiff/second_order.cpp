@@ -6,13 +6,14 @@ namespace retrograde {
 
 Func hessian_vector_product(const Func& loss, const AdjointInput& wrt,
                             const std::vector<Direction>& directions, Overwritten overwritten) {
-  Func gradient = propagate_adjoints(loss, {.overwritten = overwritten, .wrt = {wrt}}).of(wrt);
-  if (!gradient.defined()) {
+  const Derivative first = propagate_adjoints(loss, {.overwritten = overwritten, .wrt = {wrt}});
+  if (!first.has(wrt)) {
     user_error(text("differentiate ", quoted(loss.name()), " twice"),
                "the input is a float that the loss depends on",
                "it has no gradient by what was given",
                "Differentiate by something that the loss depends on");
   }
+  Func gradient = first.of(wrt);
   return propagate_tangents(gradient, directions)(gradient);
 }
 
