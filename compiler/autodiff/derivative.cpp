@@ -119,8 +119,10 @@ bool Derivative::output_uses(const ir::FuncContents& f) const {
 bool Derivative::has(const AdjointInput& input) const {
   const ir::Symbol* symbol = input.symbol().get();
   const auto* f = dynamic_cast<const ir::FuncContents*>(symbol);
-  return f ? result_->after_stage.contains({symbol, f->stage_count() - 1})
-           : result_->parameters.contains(symbol);
+  if (!f) return result_->parameters.contains(symbol);
+  if (result_->after_stage.contains({symbol, f->stage_count() - 1})) return true;
+  const ir::ParameterContents* image = ir::image_read_by(*f);
+  return image && result_->parameters.contains(image);
 }
 
 Func Derivative::operator()(const Func& func, int update_id) const {
