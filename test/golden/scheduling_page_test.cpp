@@ -195,7 +195,8 @@ std::string statement_text(const std::vector<Func>& outputs, View view) {
   std::string result;
   ir::LowerOptions options;
   options.stop_after = view;
-  options.target = Target("x86-64-linux");
+  // Loops that no directive speaks of stay as they are.
+  options.target = Target("x86-64-linux-disable_llvm_loop_opt");
   ir::LoweredFunction lowered = ir::lower("f", funcs, ir::infer_arguments(funcs), options);
   return ir::print(lowered.body);
 }
