@@ -45,7 +45,7 @@ TEST(Compare, SaysThatAProgramIsUnknown) {
 }
 
 TEST(Cases, SurviveTheirText) {
-  Program program{"some", 0.25, {{"small", 2, {}}, {"large", 0, {}}}};
+  Program program{"some", 0, 0.25, {{"small", 2, {}}, {"large", 0, {}}}};
   program.cases[0].arguments = {in<uint16_t>({5, 7, 3}, 0, 1000).interleaved(),
                                 value<float>(0.125f), in<int8_t>({9}, -128, 127).noise(),
                                 out<double>({4, 6}).from({-1, 2})};

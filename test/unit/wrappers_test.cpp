@@ -205,12 +205,12 @@ TEST_F(Wrappers, RefusesAUserThatDoesNotRead) {
   expect_mentions(error_of([&] {
                     out.realize({3, 3});
                   }),
-                  {"wrap", "\"k", "reads", "does not", "Name a Func that reads it"});
+                  {"wrap", "\"k", "reads", "nothing in", "Name a Func that reads it"});
   Func complete("complete");  // another Func uses it: no update can follow
   complete(x, y) = y;
   Func user("user");
   user(x, y) = complete(x, y);
-  expect_mentions(error_of([&] { f.in(complete); }), {"wrap", "\"complete", "does not"});
+  expect_mentions(error_of([&] { f.in(complete); }), {"wrap", "\"complete", "nothing in"});
 }
 
 TEST_F(Wrappers, AWrapperInAnotherPipelineIsLeftAlone) {
