@@ -405,6 +405,9 @@ Interval interval_shift(Op op, Type type, const Interval& a, const Interval& amo
       return interval_mul(
           type, a, {make_const(type, int64_t{1} << *low), make_const(type, int64_t{1} << *high)});
     }
+    // By an amount that stays: the larger, the larger, whichever way it shifts.
+    if (amount.is_point() && !low && a.is_bounded() && type.is_int() && type.bits() >= 32)
+      return {call_op(op, type, {a.min, amount.min}), call_op(op, type, {a.max, amount.max})};
     bool shrinks = op == Op::shift_right && low && *low >= 0 && is_nonnegative(a);
     return shrinks ? Interval{make_zero(type), a.max} : type_range(type);
   }

@@ -249,6 +249,16 @@ TEST(Buffers, HaveAnAddressOnePastTheEnd) {
 
 // ---- coordinates ----
 
+TEST(Coordinates, AreShiftedByLoops) {
+  Func squares("squares"), f("f");
+  squares(x) = x * x;
+  RDom r(0, 4, 0, 3);
+  f(x) = 0;
+  f(r.x) += squares(r.x + (1 << r.y));
+  squares.compute_at(f, r.x);
+  EXPECT_EQ(line(Buffer<int>(f.realize({4}))), (std::vector<int>{21, 38, 61, 90}));
+}
+
 TEST(Coordinates, FromAbsoluteValuesAreNotNegative) {
   Func squares("squares"), f("f"), g("g");
   squares(x) = x * x;
