@@ -38,12 +38,8 @@ class Lifter {
   }
 
   void lift(const FuncPtr& f) {
-    if (f->is_extern()) {
-      unsupported(text("evaluate ", quoted(f->name), " for several seeds at once"),
-                  "every definition on the way gets one more dimension",
-                  text("the C function ", quoted(f->extern_definition->function), " computes it"),
-                  "Evaluate products with single directions");
-    }
+    // The pattern of derivatives, which is found before, refuses extern stages.
+    if (f->is_extern()) internal_error("an extern stage lies on the way of several seeds");
     auto result = std::make_shared<AdjointContents>();
     result->name = claim_name(f->name + "_by_colour");
     if (const auto* adjoint = dynamic_cast<const AdjointContents*>(f.get()))

@@ -125,9 +125,15 @@ TEST_F(Rules, SeedsThroughCFunctions) {
     tangent.define_extern("its_tangent", {c.tangent(in)}, Float(32), 1);
     return tangent;
   });
-  expect<Unsupported>("every definition on the way gets one more dimension", [&] {
-    jacobian(g, image, {{0, 8}}, {.compression = Compression::Columns});
+  custom_adjoint(outside, {in}, [&](const AdjointContext& c) {
+    Func adjoint("adjoint");
+    adjoint.define_extern("its_adjoint", {c.adjoint()}, Float(32), 1);
+    return std::vector<AdjointContribution>{{in, adjoint}};
   });
+  for (const Compression way : {Compression::Rows, Compression::Columns}) {
+    expect<Unsupported>("which element depends on which is read off definitions",
+                        [&] { jacobian(g, image, {{0, 8}}, {.compression = way}); });
+  }
 }
 
 TEST_F(Rules, BudgetsOfCheckpoints) {
