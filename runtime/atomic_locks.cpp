@@ -8,6 +8,7 @@
 #include <thread>
 
 #include "retrograde_runtime.h"
+#include "spin.h"
 
 namespace retrograde::runtime {
 namespace {
@@ -21,6 +22,7 @@ struct alignas(64) SpinLock {
     for (int spins = 0; is_taken.exchange(true, std::memory_order_acquire);) {
       while (is_taken.load(std::memory_order_relaxed)) {
         if (++spins % 64 == 0) std::this_thread::yield();  // its holder may not be running
+        spin_pause();
       }
     }
   }

@@ -7,6 +7,10 @@
 // every loop makes progress whatever the workers do, and nesting cannot deadlock. Pieces are a
 // share of what is left (guided self-scheduling, Polychronopoulos and Kuck 1987): large at first,
 // single iterations at the end.
+//
+// Who waits spins for some microseconds before it sleeps (competitive spinning, Karlin, Li, Manasse
+// and Owicki 1991): to wake a thread costs more than many a loop takes, and loops follow one
+// another.
 #include "thread_pool.h"
 
 #include <algorithm>
@@ -18,12 +22,34 @@
 #include <thread>
 #include <vector>
 
+#include "spin.h"
 #include "threads.h"
 
 namespace retrograde::runtime {
 namespace {
 
 using RunRange = void (*)(void*, int64_t, int64_t);
+
+// Spins until `ready()`, for about as long as it takes to put a thread to sleep and to wake it
+// again. False when it still is not. Gives the core away now and then: others may have work for it.
+template <typename Ready>
+bool spin_until(const Ready& ready) {
+  constexpr int turns = 200, reads = 16;
+  for (int turn = 0; turn < turns; turn++) {
+    for (int read = 0; read < reads; read++) {
+      if (ready()) return true;
+      spin_pause();
+    }
+    std::this_thread::yield();
+  }
+  return ready();
+}
+
+// The pool's mutex is held for some instructions only.
+std::unique_lock<std::mutex> lock_briefly(std::mutex& mutex) {
+  if (spin_until([&] { return mutex.try_lock(); })) return {mutex, std::adopt_lock};
+  return std::unique_lock(mutex);
+}
 
 class SharedLoop {
  public:
@@ -40,10 +66,9 @@ class SharedLoop {
     run_(data_, begin, end);
     return true;
   }
-  bool has_pieces() const { return next_.load(std::memory_order_relaxed) < extent_; }
   bool takes_workers() const { return inside < threads_ - 1 && has_pieces(); }
 
-  int inside = 0;  // workers, guarded by the pool's mutex
+  std::atomic<int> inside{0};  // workers; they enter under the pool's mutex, while it is listed
 
  private:
   const int64_t extent_;
@@ -51,6 +76,8 @@ class SharedLoop {
   const RunRange run_;
   void* const data_;
   std::atomic<int64_t> next_{0};
+
+  bool has_pieces() const { return next_.load(std::memory_order_relaxed) < extent_; }
 };
 
 int default_threads() {
@@ -75,8 +102,7 @@ class Pool {
   }
 
   int set_threads(int count) {
-    const std::lock_guard lock(mutex_);
-    const int before = wanted_ > 0 ? wanted_ : default_threads();
+    const int before = threads_for(0);
     wanted_ = std::min(count, max_threads);
     return before;
   }
@@ -85,9 +111,10 @@ class Pool {
   void shut_down() {
     std::vector<std::thread> workers;
     {
-      const std::lock_guard lock(mutex_);
+      const std::unique_lock lock = lock_briefly(mutex_);
       stops_ = true;
       workers.swap(workers_);
+      changes_++;
     }
     wake_.notify_all();
     for (std::thread& worker : workers) worker.join();
@@ -100,22 +127,28 @@ class Pool {
   std::condition_variable wake_, done_;
   std::vector<SharedLoop*> loops_;  // the newest last
   std::vector<std::thread> workers_;
-  int wanted_ = 0;  // 0: default_threads
+  std::atomic<int> wanted_{0};  // threads; 0: not yet known
   bool stops_ = false;
+  int sleepers_ = 0;                       // workers that only wake_ wakes
+  std::atomic<int> sleeping_starters_{0};  // that only done_ wakes
+  std::atomic<uint64_t> changes_{0};       // counts what a worker that spins would like to know
 
   int threads_for(int32_t limit) {
-    const std::lock_guard lock(mutex_);
-    if (wanted_ <= 0) wanted_ = default_threads();
-    return limit > 0 ? std::min(wanted_, limit) : wanted_;
+    int wanted = wanted_.load(std::memory_order_relaxed);
+    if (wanted <= 0) wanted_ = wanted = default_threads();
+    return limit > 0 ? std::min(wanted, limit) : wanted;
   }
 
   void enter(SharedLoop& loop, int helpers) {
+    int sleepers = 0;
     {
-      const std::lock_guard lock(mutex_);
+      const std::unique_lock lock = lock_briefly(mutex_);
       loops_.push_back(&loop);
       grow(helpers);
+      changes_.fetch_add(1, std::memory_order_release);
+      sleepers = sleepers_;
     }
-    helpers == 1 ? wake_.notify_one() : wake_.notify_all();
+    if (sleepers > 0) helpers == 1 ? wake_.notify_one() : wake_.notify_all();
   }
 
   // A thread that cannot be had is done without.
@@ -127,34 +160,62 @@ class Pool {
     }
   }
 
+  // The loop is gone when this returns: no worker touches it after it has counted itself out.
   void leave(SharedLoop& loop) {
+    {
+      const std::unique_lock lock = lock_briefly(mutex_);
+      loops_.erase(std::find(loops_.begin(), loops_.end(), &loop));
+    }
+    const auto is_left = [&] { return loop.inside.load() == 0; };
+    if (spin_until(is_left)) return;
     std::unique_lock lock(mutex_);
-    loops_.erase(std::find(loops_.begin(), loops_.end(), &loop));
-    done_.wait(lock, [&] { return loop.inside == 0; });
+    sleeping_starters_++;  // before it looks again, as a worker counts itself out before it looks
+                           // here
+    done_.wait(lock, is_left);
+    sleeping_starters_--;
   }
 
+  void count_out(SharedLoop& loop) {
+    if (loop.inside.fetch_sub(1) > 1 || sleeping_starters_.load() == 0) return;
+    const std::lock_guard lock(mutex_);  // whoever saw a worker inside waits by now
+    done_.notify_all();
+  }
+
+  // A loop that takes a worker, and has counted this one in.
   SharedLoop* newest_with_work() const {
     for (auto it = loops_.rbegin(); it != loops_.rend(); ++it) {
-      if ((*it)->takes_workers()) return *it;
+      if (!(*it)->takes_workers()) continue;
+      (*it)->inside++;
+      return *it;
     }
     return nullptr;
   }
 
   void work() {
-    std::unique_lock lock(mutex_);
+    std::unique_lock lock = lock_briefly(mutex_);
     while (!stops_) {
-      SharedLoop* loop = newest_with_work();
-      if (!loop) {
-        wake_.wait(lock);
-        continue;
+      if (SharedLoop* loop = newest_with_work()) {
+        lock.unlock();
+        while (loop->run_piece()) {
+        }
+        count_out(*loop);
+        lock = lock_briefly(mutex_);
+      } else {
+        wait_for_change(lock);
       }
-      loop->inside++;
-      lock.unlock();
-      while (loop->run_piece()) {
-      }
-      lock.lock();
-      if (--loop->inside == 0) done_.notify_all();
     }
+  }
+
+  void wait_for_change(std::unique_lock<std::mutex>& lock) {
+    const uint64_t seen = changes_.load(std::memory_order_relaxed);
+    const auto is_changed = [&] { return changes_.load(std::memory_order_acquire) != seen; };
+    lock.unlock();
+    spin_until(is_changed);
+    lock = lock_briefly(mutex_);
+    if (is_changed()) return;
+    sleepers_++;
+    wake_.wait(lock, is_changed);
+    sleepers_--;
   }
 };
 

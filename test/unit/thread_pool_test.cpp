@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
+#include <chrono>
 #include <string>
 #include <thread>
 #include <vector>
@@ -96,6 +97,34 @@ TEST_F(ThreadPool, StartsAgainAfterItsEnd) {
     run(100, 0, [&](int64_t begin, int64_t end) { sum += end - begin; });
     EXPECT_EQ(sum, 100);
     shut_down_threads();
+  }
+}
+
+// Threads spin for a while before they sleep: both ways to wait must see what comes.
+TEST_F(ThreadPool, WorkersThatSleptTakeLoops) {
+  for (int repeat = 0; repeat < 8; repeat++) {
+    std::atomic<int> inside{0};
+    const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(20);
+    run(2, 0, [&](int64_t begin, int64_t end) {  // ends only when a worker has come
+      inside += static_cast<int>(end - begin);
+      while (inside < 2 && std::chrono::steady_clock::now() < deadline) std::this_thread::yield();
+    });
+    EXPECT_EQ(inside, 2);
+    EXPECT_LT(std::chrono::steady_clock::now(), deadline);
+    std::this_thread::sleep_for(std::chrono::milliseconds(repeat));
+  }
+}
+
+TEST_F(ThreadPool, StartersThatSleepAreWoken) {
+  const std::thread::id starter = std::this_thread::get_id();
+  for (int repeat = 0; repeat < 5; repeat++) {
+    std::atomic<int> done{0};
+    run(4, 0, [&](int64_t begin, int64_t end) {
+      if (std::this_thread::get_id() != starter)
+        std::this_thread::sleep_for(std::chrono::milliseconds(5 * repeat));
+      done += static_cast<int>(end - begin);
+    });
+    EXPECT_EQ(done, 4);
   }
 }
 
