@@ -35,6 +35,8 @@ constexpr double private_bytes = 64 << 20;
 // Below so many elements, with so many iterations each, the pure dimensions alone do not fill a
 // machine.
 constexpr double few_elements = 64, many_iterations = 4096, unknown_elements = 1e9;
+// Iterations from which on lanes of their own are worth setting to zero and adding up.
+constexpr double lanes_pay = 16 * lane_count;
 
 bool is_pointwise(const Gather& g) {
   return !g.rdom && !g.scatters &&
@@ -209,7 +211,7 @@ class Builder {
 
   // Whether an element may get many terms. Data may send all iterations of a scatter to one.
   bool sums_many_terms(const Gather& g) const {
-    return g.rdom && (is_worth_splitting(g) || iterations_of(g, many_terms) >= many_terms);
+    return g.rdom && (is_few_elements(g) || iterations_of(g, many_terms) >= many_terms);
   }
 
   // ---- definitions ----
@@ -249,8 +251,10 @@ class Builder {
   // Whether the elements alone give too little to do in parallel, and each sums over many
   // iterations.
   bool is_worth_splitting(const Gather& g) const {
-    if (g.rdom && leaves_lanes_idle(g)) return true;
-    if (!g.rdom || elements_of(g) > few_elements) return false;
+    return g.rdom && (leaves_lanes_idle(g) || is_few_elements(g));
+  }
+  bool is_few_elements(const Gather& g) const {
+    if (elements_of(g) > few_elements) return false;
     if (parts_of(g) < least_parts) return false;
     double iterations = iterations_of(g, many_iterations);
     return iterations >= (has_pure_dimension(g) ? many_iterations : part_count * lane_count);
@@ -262,7 +266,7 @@ class Builder {
     const auto row = as_const_int(g.rdom->vars[0].extent);
     return g.pure[0] && extent_of(target_.region[0]) * 2 <= lane_count &&
            (!row || *row >= lane_count) && elements_of(g) <= near_elements &&
-           iterations_of(g, many_iterations) >= many_iterations;
+           iterations_of(g, many_iterations) >= lanes_pay;
   }
   // Each part of a scatter holds every element that it may reach: the more elements for the
   // iterations, the fewer parts. A power of two. One: there are only lanes. Where sizes are known

@@ -18,6 +18,10 @@ namespace {
 constexpr int64_t unbounded = -1;
 // Folding a border into the interior may cost this much more iterations before the two are split.
 constexpr double fold_tolerance = 2.5;
+// An interior of fewer iterations an element than this does not choose between its own places and
+// those of a border. A larger one stays one update all the same: its border would be a large update
+// of its own.
+constexpr double short_interior = 4;
 
 isl::pw_aff insert_input(const isl::pw_aff& e) {
   int n = isl_pw_aff_dim(e.get(), isl_dim_in);
@@ -156,8 +160,16 @@ class GroupInverter {
       Plan p = plan(piece);
       if (!has_fixed_index(piece)) interior = std::max(interior, p.cost);
     }
-    bool folds = interior > 1 && all.cost <= fold_tolerance * interior;
+    bool folds = interior > 1 && all.cost <= fold_tolerance * interior &&
+                 (interior >= short_interior || in_one_piece(all));
     return folds ? std::vector<isl::map>{whole} : split;
+  }
+
+  // Whether the places that are read are the same sums all over the domain. Where they are not,
+  // every vector of the interior would choose between those of the borders.
+  static bool in_one_piece(const Plan& plan) {
+    return std::all_of(plan.coordinates.begin(), plan.coordinates.end(),
+                       [](const Coordinate& c) { return pieces_of(c.value) == 1; });
   }
 
   std::vector<isl::map> split_pieces() const {

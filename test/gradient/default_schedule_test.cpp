@@ -143,18 +143,21 @@ TEST_F(DefaultSchedule, ScattersToFewElementsHaveElementsForEachLane) {
 }
 
 // Kernels of 3 x 3: vectors along their rows would be four fifths empty.
-TEST_F(DefaultSchedule, SmallKernelsOfManyChannelsAreSummedInLanes) {
-  constexpr int side = 70, channels = 9;
+void expect_sums_in_lanes(int side, Type in) {
+  constexpr int channels = 9;
   const Buffer<float> image = gradient::random_image({side + 2, side + 2, channels}, -1, 1, 4);
   const Buffer<float> kernels = gradient::random_image({3, 3, channels, channels}, -1, 1, 5);
   const Buffer<float> seed = gradient::random_image({side, side, channels}, -1, 1, 6);
-  Var c("c");
+  Var x("x"), y("y"), c("c");
   Func layer("layer");
   RDom r(0, 3, 0, 3, 0, channels);
   layer(x, y, c) = 0.0f;
   layer(x, y, c) += kernels(r.x, r.y, r.z, c) * image(x + r.x, y + r.y, r.z);
   Derivative d = propagate_adjoints(layer, seed);
-  EXPECT_EQ(parts_of_adjoint(d, kernels).dimensions(), 5) << "lane and element";
+  const Func parts = parts_of_adjoint(d, kernels);
+  ASSERT_TRUE(parts.defined());
+  EXPECT_EQ(parts.dimensions(), 5) << "lane and element";
+  EXPECT_EQ(parts.type(), in);
   const Buffer<float> gradient = d(kernels).realize({3, 3, channels, channels});
   gradient.for_each_element([&](int i, int j, int from, int to) {
     double sum = 0;
@@ -164,6 +167,40 @@ TEST_F(DefaultSchedule, SmallKernelsOfManyChannelsAreSummedInLanes) {
     }
     EXPECT_NEAR(gradient(i, j, from, to), sum, 1e-5 * (1 + std::abs(sum)));
   });
+}
+
+TEST_F(DefaultSchedule, SmallKernelsOfManyChannelsAreSummedInLanes) {
+  expect_sums_in_lanes(70, Float(64));
+}
+// Too few terms for sums in double, and enough for lanes.
+TEST_F(DefaultSchedule, SmallKernelsOfSmallPicturesAreSummedInLanes) {
+  expect_sums_in_lanes(40, Float(32));
+}
+
+bool has_select(const Expr& e) {
+  bool found = false;
+  ir::walk(e, [&](const Expr& node) { return found |= node.kind() == ir::Kind::Select, !found; });
+  return found;
+}
+
+// Twice as large, the nearest inside: the first element is read four times, the others twice, at
+// places that are one sum for all of them.
+TEST_F(DefaultSchedule, BordersReadMoreOftenLeaveThePlacesOfTheInteriorAlone) {
+  const Buffer<float> small = gradient::random_image({64, 5}, -1, 1, 4);
+  const Buffer<float> seed = gradient::random_image({128, 5}, -1, 1, 6);
+  Func inside("inside"), large("large");
+  inside(x, y) = small(x, y);
+  large(x, y) = inside(clamp(x / 2 - 1, 0, 63), y);
+  Func adjoint = propagate_adjoints(large, seed)(inside);
+  for (const ir::Definition& update : adjoint.function()->updates)
+    for (const Expr& value : update.values) EXPECT_FALSE(has_select(value)) << print(value);
+  const Buffer<float> gradient = adjoint.realize({64, 5});
+  for (int j = 0; j < 5; ++j) {
+    EXPECT_NEAR(gradient(0, j), seed(0, j) + seed(1, j) + seed(2, j) + seed(3, j), 1e-5);
+    for (int i = 1; i < 63; ++i)
+      EXPECT_NEAR(gradient(i, j), seed(2 * i + 2, j) + seed(2 * i + 3, j), 1e-5);
+    EXPECT_EQ(gradient(63, j), 0.0f);
+  }
 }
 
 // Reads of `read` in the last stage of `reader`.
