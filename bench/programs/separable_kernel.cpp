@@ -1,0 +1,44 @@
+// separable_kernel -- a picture convolved along both axes with a kernel that is an input, of any
+// odd length, by tiles.
+#include "program.h"
+
+namespace {
+
+class SeparableKernel : public Halide::Generator<SeparableKernel> {
+ public:
+  Input<Buffer<float>> input{"input", 2};
+  Input<Buffer<float>> kernel{"kernel", 1};
+  Output<Buffer<float>> output{"output", 2};
+
+  void generate() {
+    Func pixel = Halide::BoundaryConditions::mirror_image(input);
+    Expr taps = kernel.dim(0).extent(), radius = taps / 2;
+    r = RDom(0, taps, "r");
+    columns(x, y) += kernel(r) * pixel(x, y + r - radius);
+    rows(x, y) += kernel(r) * columns(x + r - radius, y);
+    output(x, y) = rows(x, y);
+  }
+
+  void schedule() {
+    Var xi("xi"), yi("yi");
+    const int lanes = natural_vector_size<float>();
+    kernel.dim(0).set_min(0);
+    output.tile(x, y, xi, yi, 128, 32).vectorize(xi, lanes).parallel(y);
+    columns.compute_at(output, x).vectorize(x, lanes);
+    columns.update().reorder(x, r, y).vectorize(x, lanes);
+    rows.compute_at(output, yi).vectorize(x, lanes);
+    rows.update().reorder(x, r).vectorize(x, lanes).unroll(x, 4);
+  }
+
+ private:
+  Var x{"x"}, y{"y"};
+  RDom r;
+  Func columns{"columns"}, rows{"rows"};
+};
+
+}  // namespace
+
+PROGRAM(separable_kernel, SeparableKernel,
+        at_sizes({{160, 90}, {1000, 749}, {2400, 1601}}, [](const Sizes& n) {
+          return std::vector{in<float>({n[0], n[1]}), in<float>({13}), out<float>({n[0], n[1]})};
+        }))
