@@ -113,6 +113,7 @@ Value* math_operator(Emitter& e, Op op, Type type, const Args& args) {
     for (Value* arg : args) wide.push_back(half_to_float(e, type, arg));
     return float_to_half(e, type, math_operator(e, op, Float(32, type.lanes()), wide));
   }
+  if (op == Op::pow && type.bits() == 32) return float_pow(e, args[0], args[1]);
   const MathFunction& function = *find_math_function(op);
   Value* result = call_by_pieces(e, function, args);
   const double limit = type.bits() == 32 ? function.float32_limit : function.float64_limit;

@@ -1,9 +1,9 @@
 // The vector math functions: operator, SLEEF's name, and the largest error that we promise, in
 // units in the last place of the result, over the whole domain and for every width. The unit test
-// holds every row to its numbers. All come from SLEEF's families whose bits do not depend on the
-// width, so a scalar tail agrees with the vector body. Special values follow C99 Annex F. Code that
-// is compiled ahead of time for AArch64 calls the C library instead, whose errors are its own (2 ULP
-// with the GNU C library).
+// holds every row to its numbers. All but pow of float32, which is inlined, come from SLEEF's
+// families whose bits do not depend on the width, so a scalar tail agrees with the vector body.
+// Special values follow C99 Annex F. Code that is compiled ahead of time for AArch64 calls the C
+// library instead of SLEEF; its errors are its own (2 ULP with the GNU C library).
 //
 // Half types compute in float32 and round once more.
 #pragma once
@@ -25,7 +25,7 @@ struct MathFunction {
 inline constexpr MathFunction math_functions[] = {
     {ir::Op::exp, "exp", "u10", 1.0, 1.0, 0, 0},
     {ir::Op::log, "log", "u10", 1.0, 1.0, 0, 0},
-    {ir::Op::pow, "pow", "u10", 1.0, 1.0, 0, 0},
+    {ir::Op::pow, "pow", "u10", 0.55, 1.0, 0, 0},  // float32: float_pow.cpp
     {ir::Op::hypot, "hypot", "u05", 1.0, 0.6, 0, 0},  // float32: 0.6 but for denormals
     {ir::Op::sin, "sin", "u10", 1.0, 1.0, 0, 0},
     {ir::Op::cos, "cos", "u10", 1.0, 1.0, 0, 0},

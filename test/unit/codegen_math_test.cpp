@@ -236,6 +236,30 @@ TEST(CodegenMath, BitsDoNotDependOnTheWidth) {
   }
 }
 
+TEST(CodegenMath, PowOfEveryPairOfSpecialValuesFollowsC99) {
+  const float infinity = std::numeric_limits<float>::infinity(),
+              nan = std::numeric_limits<float>::quiet_NaN();
+  std::vector<float> special = {0,        1,        2,          3,      0.5f,
+                                2.5f,     1e-30f,   1e5f,       1e-45f, 0.999f,
+                                16777215, 16777216, 8388607.5f, 3e38f,  infinity};
+  for (size_t i = 0, n = special.size(); i < n; i++) special.push_back(-special[i]);
+  special.push_back(nan);
+  std::vector<float> x(count, 1.0f), y(count, 1.0f);
+  for (size_t i = 0; i < special.size() * special.size(); i++) {
+    x[i] = special[i / special.size()];
+    y[i] = special[i % special.size()];
+  }
+  const auto got = run(Op::pow, 8, x, y);
+  for (size_t i = 0; i < special.size() * special.size(); i++) {
+    const double exact = std::pow(static_cast<double>(x[i]), static_cast<double>(y[i]));
+    ASSERT_LE(ulp_error<float>(got[i], exact), 0.55)
+        << "pow(" << x[i] << ", " << y[i] << ") = " << got[i] << ", exactly " << exact;
+    if (!std::isnan(exact)) {
+      ASSERT_EQ(std::signbit(got[i]), std::signbit(exact)) << "pow(" << x[i] << ", " << y[i] << ")";
+    }
+  }
+}
+
 TEST(CodegenMath, EveryOperatorHasCode) {
   // Totality: what is neither a simple operator nor in a table would throw. Effects and internals
   // have tests of their own.
