@@ -9,6 +9,7 @@
 //   LICM           loop-invariant loads and address parts, past unrelated stores
 //   GVN            loads that an earlier iteration's tail or another block already did, where
 //                  EarlyCSE is too local
+//   LoopLoadElim   what a scan stored in the iteration before stays in a register
 //   LoopUnroll     short innermost loops over scalars
 //   InstCombine, SimplifyCFG, ADCE to clean up
 //
@@ -26,6 +27,7 @@
 #include <llvm/Transforms/Scalar/EarlyCSE.h>
 #include <llvm/Transforms/Scalar/GVN.h>
 #include <llvm/Transforms/Scalar/LICM.h>
+#include <llvm/Transforms/Scalar/LoopLoadElimination.h>
 #include <llvm/Transforms/Scalar/LoopPassManager.h>
 #include <llvm/Transforms/Scalar/LoopUnrollPass.h>
 #include <llvm/Transforms/Scalar/SROA.h>
@@ -70,6 +72,7 @@ static llvm::FunctionPassManager pipeline() {
   passes.addPass(llvm::createFunctionToLoopPassAdaptor(llvm::LICMPass(llvm::LICMOptions()),
                                                        /*UseMemorySSA=*/true));
   passes.addPass(llvm::GVNPass());
+  passes.addPass(llvm::LoopLoadEliminationPass());
   passes.addPass(MarkSmallLoops());
   passes.addPass(llvm::LoopUnrollPass(llvm::LoopUnrollOptions(2, /*OnlyWhenForced=*/true)));
   passes.addPass(llvm::InstCombinePass());

@@ -222,5 +222,21 @@ TEST(CodegenIdioms, BordersOfBytesAreCompact) {
   EXPECT_EQ(count(assembly(f, avx2), "vpinsrb"), 0u);
 }
 
+// What a scan computed in the iteration before is not read back from memory.
+TEST(CodegenIdioms, ScansCarryTheirLastValueInARegister) {
+  ImageParam in(Float(32), 1, "in");
+  RDom t(1, 99, "t");
+  Var x("x"), y("y");
+  Func scan("scan"), f("f");
+  scan(x, y) = 0.0f;
+  scan(x, t) = scan(x, t - 1) * scan(x, t - 1) + in(x);
+  f(x) = scan(x, 99) + scan(x, 50);
+  scan.compute_at(f, x).vectorize(x, 8).update().reorder(x, t).vectorize(x, 8);
+  f.vectorize(x, 8);
+  const auto loop = block_with_most(assembly(f, avx2), "vfmadd");
+  EXPECT_EQ(count(loop, "vfmadd"), 1u);
+  EXPECT_EQ(count(loop, "(%r"), 0u) << "nothing is loaded before it";
+}
+
 }  // namespace
 }  // namespace retrograde
