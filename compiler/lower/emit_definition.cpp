@@ -1,8 +1,11 @@
 #include "lower/emit_definition.h"
 
 #include <algorithm>
+#include <unordered_set>
 
 #include "ir/build.h"
+#include "ir/conjuncts.h"
+#include "ir/variables.h"
 #include "ir/visit.h"
 #include "simplify/cse.h"
 #include "simplify/simplify.h"
@@ -13,6 +16,27 @@ namespace {
 bool is_undef(const Expr& e) {
   const Call* call = e.as<Call>();
   return call && call->is_op(Op::undef);
+}
+
+bool is_comparison(const Expr& e) {
+  const Kind kind = e.kind();
+  return kind == Kind::LT || kind == Kind::LE || kind == Kind::GT || kind == Kind::GE;
+}
+
+// A domain's condition that its vectorized loop decides would mask all iterations of the loops
+// around it. Marked likely, it masks only those that reach over the domain's end.
+Expr likely_in_lanes(const Expr& condition, const StageNest& nest) {
+  std::unordered_set<std::string> lanes;
+  for (const Loop& loop : nest.loops) {
+    if (loop.for_type == ForType::Vectorized) lanes.insert(loop.name);
+  }
+  if (lanes.empty()) return condition;
+  std::vector<Expr> conjuncts;
+  add_conjuncts(condition, conjuncts);
+  for (Expr& e : conjuncts) {
+    if (is_comparison(e) && uses_any_variable(e, lanes)) e = likely(e);
+  }
+  return conjunction(conjuncts);
 }
 
 }  // namespace
@@ -37,7 +61,9 @@ Stmt emit_definition(const LoopedFunc& f, int stage, const StageNest& nest) {
   if (definition.schedule.atomic) stmt = make_atomic(f.name(), stmt);
 
   if (definition.predicate.defined())
-    stmt = make_if(introduce_lets(substitute(definition.predicate, nest.coordinate)), stmt);
+    stmt = make_if(
+        introduce_lets(likely_in_lanes(substitute(definition.predicate, nest.coordinate), nest)),
+        stmt);
   Expr inside = conjunction(nest.guards);
   return is_const_true(inside) ? stmt : make_if(inside, stmt);
 }
@@ -69,8 +95,8 @@ bool reads_memory(const Expr& e) {
   bool found = false;
   walk(e, [&](const Expr& part) {
     const Call* call = part.as<Call>();
-    found = found || (call && (call->call_type == CallType::Func ||
-                               call->call_type == CallType::Image));
+    found = found ||
+            (call && (call->call_type == CallType::Func || call->call_type == CallType::Image));
     return !found;
   });
   return found;

@@ -238,5 +238,21 @@ TEST(CodegenIdioms, ScansCarryTheirLastValueInARegister) {
   EXPECT_EQ(count(loop, "(%r"), 0u) << "nothing is loaded before it";
 }
 
+// The last part of a reduction in lanes is masked, the others are not.
+TEST(CodegenIdioms, FactoredReductionsAreMaskedOnlyAtTheirEnd) {
+  ImageParam in(Float(32), 1, "in");
+  RDom r(0, in.dim(0).extent(), "r");
+  RVar ro("ro"), ri("ri");
+  Var lane("lane");
+  Func f("f");
+  f() = 0.0f;
+  f() += in(r)*in(r);
+  Func lanes = f.update().split(r, ro, ri, 8).rfactor(ri, lane);
+  lanes.compute_root().vectorize(lane, 8).update().reorder(lane, ro).vectorize(lane, 8);
+  const auto loop = block_with_most(assembly(f, avx2), "vfmadd231ps");
+  EXPECT_EQ(count(loop, "vmaskmov"), 0u);
+  EXPECT_EQ(count(loop, "(%r"), 1u) << "a load of the input";
+}
+
 }  // namespace
 }  // namespace retrograde
