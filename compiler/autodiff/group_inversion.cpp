@@ -90,7 +90,8 @@ class GroupInverter {
       : context_(operations),
         group_(group),
         bridge_(context_, names_of(group.vars)),
-        domain_(bridge_.universe()) {
+        domain_(bridge_.universe()),
+        not_empty_(bridge_.universe()) {
     for (const Expr& e : fixed) bridge_.make_parameter(e);
     for (const Expr& index : group.indices) affine_.push_back(*bridge_.affine(index));
     build_domain();
@@ -123,6 +124,7 @@ class GroupInverter {
     std::vector<isl::set> conditions;
     for (const Expr& e : group_.predicate) conditions.push_back(*bridge_.condition(e));
     for (const LoopVariable& v : group_.region) assume_not_empty(v);
+    domain_ = domain_.intersect(not_empty_);
     box_ = domain_;
     for (const isl::set& s : conditions) domain_ = domain_.intersect(s).coalesce();
   }
@@ -133,7 +135,7 @@ class GroupInverter {
     if (!v.min.defined() || !v.max.defined()) return;
     const size_t known = bridge_.parameters().size();
     isl::pw_aff min = bridge_.bound(v.min), max = bridge_.bound(v.max);
-    if (bridge_.parameters().size() == known) domain_ = domain_.intersect(min.le_set(max));
+    if (bridge_.parameters().size() == known) not_empty_ = not_empty_.intersect(min.le_set(max));
   }
 
   // {z -> y} over all of z: the domain is not applied.
@@ -386,13 +388,22 @@ class GroupInverter {
                      const std::vector<Expr>& names) {
     isl::set context = rho_box(p).intersect(fixed_elements(piece, p));
     isl::set needed = p.valid.gist(context).coalesce();
-    isl::set assumed = isl::manage(isl_set_params(box_.copy()));
-    needed = isl::manage(isl_set_gist_params(needed.release(), assumed.copy()));
+    needed = isl::manage(isl_set_gist_params(needed.release(), assumed().release()));
     // Coalescing leaves unions that are one basic set all the same.
     isl::set hull = isl::manage(isl_set_from_basic_set(isl_set_simple_hull(needed.copy())));
     if (hull.is_equal(needed)) needed = hull;
     if (!isl_set_plain_is_universe(needed.get()))
       g.predicate.push_back(bridge_.to_expr(needed, names));
+  }
+
+  // What holds wherever a gather adds anything: the adjoints that it reads are 0 where a stage's
+  // pure variables have no value. A reduction domain may be empty, and what is read is not 0 then.
+  isl::set assumed() const {
+    isl::set pure = not_empty_;
+    for (size_t i = 0; i < group_.vars.size(); ++i) {
+      if (!group_.vars[i].is_reduction) pure = pure.intersect(own_range_[i]);
+    }
+    return isl::manage(isl_set_params(pure.release()));
   }
 
   isl::set rho_box(const Plan& p) const {
@@ -482,6 +493,7 @@ class GroupInverter {
   const Group& group_;
   IslBridge bridge_;
   isl::set domain_, box_;            // with and without the predicate
+  isl::set not_empty_;               // where the target has elements
   std::vector<isl::set> own_range_;  // of each variable alone
   std::vector<isl::pw_aff> affine_;  // the indices
 };

@@ -25,6 +25,18 @@ PROGRAM(cumulative_sum_from_the_right) {
   return {weighted_sum(f, {9}), {a}};
 }
 
+// The iteration that reads a(0) is the first: there is none.
+PROGRAM(shift_of_no_elements) {
+  Buffer<float> a = line();
+  Param<int> n("n");
+  n.set(0);
+  Func f("f");
+  RDom r(0, n);
+  f(x) = a(x);
+  f(r) = f(clamp(r - 1, 0, 8));
+  return {weighted_sum(f, {9}), {a}};
+}
+
 PROGRAM(exponential_filter) {
   Buffer<float> a = line();
   Func f("f");
