@@ -106,7 +106,8 @@ void check_dimensions(const Func& output, size_t bounds, int adjoint,
 Derivative::Derivative(std::shared_ptr<const ir::SynthesisResult> result)
     : result_(std::move(result)), zeros_(std::make_shared<ZeroGradients>()) {}
 
-Func Derivative::absent(const ir::Symbol& symbol, const std::string& name) const {
+Func Derivative::absent(const std::shared_ptr<const ir::Symbol>& symbol,
+                        const std::string& name) const {
   return Func(zeros_->find(symbol, name, result_->explanations));
 }
 
@@ -121,8 +122,8 @@ bool Derivative::has(const AdjointInput& input) const {
   const auto* f = dynamic_cast<const ir::FuncContents*>(symbol);
   if (!f) return result_->parameters.contains(symbol);
   if (result_->after_stage.contains({symbol, f->stage_count() - 1})) return true;
-  const ir::ParameterContents* image = ir::image_read_by(*f);
-  return image && result_->parameters.contains(image);
+  const auto image = ir::image_read_by(*f);
+  return image && result_->parameters.contains(image.get());
 }
 
 Func Derivative::operator()(const Func& func, int update_id) const {
@@ -139,8 +140,8 @@ Func Derivative::operator()(const Func& func, int update_id) const {
   const ir::FuncContents& f = *func.function();
   auto it = result_->after_stage.find({&f, update_id + 1});
   if (it != result_->after_stage.end()) return Func(it->second);
-  const ir::ParameterContents* image = ir::image_read_by(f);
-  return image && !output_uses(f) ? of_parameter(*image) : absent(f, f.name);
+  const auto image = ir::image_read_by(f);
+  return image && !output_uses(f) ? of_parameter(image) : absent(func.function(), f.name);
 }
 
 Func Derivative::adjoint(const Func& func) const {
@@ -154,18 +155,18 @@ Func Derivative::accumulator(const Func& adjoint) const {
 
 Func Derivative::of(const AdjointInput& input) const {
   if (auto f = std::dynamic_pointer_cast<ir::FuncContents>(input.symbol())) return adjoint(Func(f));
-  return of_parameter(dynamic_cast<const ir::ParameterContents&>(*input.symbol()));
+  return of_parameter(std::dynamic_pointer_cast<const ir::ParameterContents>(input.symbol()));
 }
 
-Func Derivative::of_parameter(const ir::ParameterContents& parameter) const {
-  auto it = result_->parameters.find(&parameter);
-  return it == result_->parameters.end() ? absent(parameter, parameter.name) : Func(it->second);
+Func Derivative::of_parameter(const std::shared_ptr<const ir::ParameterContents>& parameter) const {
+  auto it = result_->parameters.find(parameter.get());
+  return it == result_->parameters.end() ? absent(parameter, parameter->name) : Func(it->second);
 }
 Func Derivative::operator()(const Buffer<>& buffer) const {
-  return of_parameter(*buffer.parameter());
+  return of_parameter(buffer.parameter());
 }
 Func Derivative::operator()(const ImageParam& image) const {
-  return of_parameter(*image.parameter());
+  return of_parameter(image.parameter());
 }
 
 std::vector<Func> Derivative::funcs() const {

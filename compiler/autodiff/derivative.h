@@ -61,7 +61,7 @@ class Derivative {
   Func operator()(const ImageParam& image) const;
   template <typename T>
   Func operator()(const Param<T>& param) const {
-    return of_parameter(*param.parameter());
+    return of_parameter(param.parameter());
   }
   // The adjoint of `func` as its consumers see it: after its last definition.
   Func adjoint(const Func& func) const;
@@ -88,8 +88,8 @@ class Derivative {
   GradientOperations operations() const;
 
  private:
-  Func of_parameter(const ir::ParameterContents& parameter) const;
-  Func absent(const ir::Symbol& symbol, const std::string& name) const;
+  Func of_parameter(const std::shared_ptr<const ir::ParameterContents>& parameter) const;
+  Func absent(const std::shared_ptr<const ir::Symbol>& symbol, const std::string& name) const;
   bool output_uses(const ir::FuncContents& f) const;
   std::shared_ptr<const ir::SynthesisResult> result_;
   std::shared_ptr<ZeroGradients> zeros_;  // that were looked up

@@ -9,9 +9,8 @@ namespace {
 
 bool is_about(const Explanation& fact, const std::string& name) {
   using Kind = Explanation::Kind;
-  return fact.subject == name &&
-         (fact.kind == Kind::Zero || fact.kind == Kind::NotRequested || fact.kind == Kind::Custom ||
-          fact.kind == Kind::Version);
+  return fact.subject == name && (fact.kind == Kind::Zero || fact.kind == Kind::NotRequested ||
+                                  fact.kind == Kind::Custom || fact.kind == Kind::Version);
 }
 
 // What was said of a name. `is_zero`: nothing else but that its gradient is zero.
@@ -31,10 +30,10 @@ Facts facts_about(const std::string& name, const std::vector<Explanation>& all) 
 
 }  // namespace
 
-ir::FuncPtr ZeroGradients::find(const ir::Symbol& symbol, const std::string& name,
-                                const std::vector<Explanation>& facts) {
+ir::FuncPtr ZeroGradients::find(const std::shared_ptr<const ir::Symbol>& symbol,
+                                const std::string& name, const std::vector<Explanation>& facts) {
   const std::lock_guard lock(mutex_);
-  ir::FuncPtr& zero = zeros_[&symbol];
+  ir::FuncPtr& zero = zeros_[symbol];
   if (zero) return zero;
   const Facts known = facts_about(name, facts);
   if (!known.is_zero) {
@@ -43,10 +42,9 @@ ir::FuncPtr ZeroGradients::find(const ir::Symbol& symbol, const std::string& nam
                "Name it in AdjointOptions::wrt; explain() says what was built");
   }
   if (known.text.empty()) {
-    explanations_.push_back(
-        {Explanation::Kind::Zero, name, "the output does not depend on it"});
+    explanations_.push_back({Explanation::Kind::Zero, name, "the output does not depend on it"});
   }
-  return zero = ir::zero_derivative(symbol, "_adj");
+  return zero = ir::zero_derivative(*symbol, "_adj");
 }
 
 std::vector<Explanation> ZeroGradients::explanations() const {
@@ -56,10 +54,11 @@ std::vector<Explanation> ZeroGradients::explanations() const {
 
 namespace ir {
 
-const ParameterContents* image_read_by(const FuncContents& f) {
+std::shared_ptr<const ParameterContents> image_read_by(const FuncContents& f) {
   if (!f.is_pure() || f.is_extern() || f.types.size() != 1) return nullptr;
   const auto* call = f.pure->values[0].as<Call>();
-  const auto* image = call ? dynamic_cast<const ParameterContents*>(call->symbol.raw()) : nullptr;
+  if (!call) return nullptr;
+  const auto image = std::dynamic_pointer_cast<const ParameterContents>(call->symbol.lock());
   if (!image || call->args.size() != f.args.size()) return nullptr;
   for (size_t d = 0; d < f.args.size(); ++d) {
     const auto* v = call->args[d].as<Variable>();

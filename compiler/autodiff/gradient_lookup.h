@@ -3,6 +3,7 @@
 #pragma once
 
 #include <map>
+#include <memory>
 #include <mutex>
 #include <string>
 #include <vector>
@@ -16,22 +17,23 @@ namespace retrograde {
 // each time.
 class ZeroGradients {
  public:
-  // `facts`: what synthesis said.  CompileError when they say that there is a gradient which was not
-  // built.
-  ir::FuncPtr find(const ir::Symbol& symbol, const std::string& name,
+  // `facts`: what synthesis said.  CompileError when they say that there is a gradient which was
+  // not built.
+  ir::FuncPtr find(const std::shared_ptr<const ir::Symbol>& symbol, const std::string& name,
                    const std::vector<Explanation>& facts);
   std::vector<Explanation> explanations() const;
 
  private:
   mutable std::mutex mutex_;
-  std::map<const ir::Symbol*, ir::FuncPtr> zeros_;
+  // Nothing else may hold what was looked up: the next one must not get its address.
+  std::map<std::shared_ptr<const ir::Symbol>, ir::FuncPtr> zeros_;
   std::vector<Explanation> explanations_;
 };
 
 namespace ir {
 
 // The image that a Func reads point by point and does nothing else: f(x, y) = im(x, y); else null.
-const ParameterContents* image_read_by(const FuncContents& f);
+std::shared_ptr<const ParameterContents> image_read_by(const FuncContents& f);
 
 }  // namespace ir
 }  // namespace retrograde

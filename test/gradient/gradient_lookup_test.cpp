@@ -119,6 +119,16 @@ TEST(GradientLookup, OutputsWithDimensionsNeedAnAdjoint) {
                   {"that of a scalar", "1 dimensions", "loss() += f(r.x, r.y)"});
 }
 
+// Nothing else holds the parameter of a Buffer that no Func reads.
+TEST(GradientLookup, BuffersThatNothingReadsAreNotTakenForEachOther) {
+  Squares s;
+  const Derivative d = propagate_adjoints(s.loss);
+  for (size_t i = 0; i < 20; ++i) {
+    const Buffer<float> unread(std::vector<int>(1 + i % 3, 2));
+    EXPECT_EQ(d(unread).dimensions(), unread.dimensions());
+  }
+}
+
 // A Param that nobody wants a gradient of scales places that nothing bounds from above.
 TEST(GradientLookup, AParamThatNobodyAskedForDoesNotStandInTheWay) {
   Squares s;
