@@ -42,7 +42,7 @@ void Maker::make_inputs() {
   p_.data = Buffer<int>(std::vector<int>{8}, "data");
   p_.data.get()->for_each_value([&](int& v) { v = c_.between(0, 7) - 1; });
   p_.scale.set(0.75f);
-  p_.count.set(c_.between(1, 4));
+  p_.count.set(c_.chance(10) ? 0 : c_.between(1, 4));
   for (int n = c_.between(1, 2); n > 0; --n) {
     std::vector<int> sizes{c_.between(natural_size, 7)};
     if (c_.chance(50)) sizes.push_back(natural_size);

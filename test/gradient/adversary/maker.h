@@ -31,6 +31,8 @@ class Maker {
 
  private:
   void choose_checks();
+  int side_of_output();
+  Overwritten overwriting();
 
   // ---- inputs ----
   void make_inputs();
@@ -77,6 +79,7 @@ class Maker {
   Func define(const std::string& name, const std::vector<Var>& vars, const Tuple& values);
   void add_structure();
   void add_pyramid();
+  Func with_mirrored_border(const Func& f);
   void add_grid();
   void add_convolution();
   void add_table();

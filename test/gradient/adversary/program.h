@@ -5,10 +5,11 @@
 // Accesses: strides, divisions, remainders, clamps, diagonals, choices between indices, places that
 // data decide, boundary conditions. Updates: partial, repeated, under predicates, over domains with
 // odd starts and empty ones, reading what they overwrite shifted, mirrored, strided and at places
-// of data; loops over time. Structures: pyramids, bilateral grids, convolutions, tables, scans,
-// domains with parametric ends, composed boundary conditions. Values: branches that are NaN where
-// they are not taken, ties, casts between all types, fast functions, Tuples with coupled
-// components, inline reductions, undef. Extents may be parameters, or those of an ImageParam.
+// of data; loops over time. Structures: pyramids on borders of run-time size, bilateral grids,
+// convolutions, tables, scans, domains with parametric ends that may be empty, composed boundary
+// conditions. Values: branches that are NaN where they are not taken, ties, casts between all
+// types, fast functions, Tuples with coupled components, inline reductions, undef. Extents may be
+// parameters, or those of an ImageParam.
 // Rules: stop_gradient, straight_through, custom_adjoint and custom_tangent, all so that the
 // derivative is still the true one.
 #pragma once

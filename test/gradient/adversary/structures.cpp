@@ -48,13 +48,15 @@ Func Maker::define(const std::string& name, const std::vector<Var>& vars, const 
   return define(name, vars, Tuple(value));
 }
 
-// Down and up again, with what is lost on the way.
+// Down and up again, with what is lost on the way, times a gain; on a mirrored border of run-time
+// size.
 void Maker::add_pyramid() {
-  const bool in_both = c_.chance(25);
+  const bool in_both = c_.chance(40);
   const auto half = [&](const Expr& v) { return in_both ? v / 2 : v; };
   const auto twice = [&](const Expr& v) { return in_both ? 2 * v : v; };
   std::vector<Func> levels{define("level", {x, y}, last_at(x, y))};
-  for (int n = c_.between(1, 3); n > 0; --n) {
+  if (c_.chance(30)) levels.push_back(with_mirrored_border(levels.back()));
+  for (int n = c_.between(1, 4); n > 0; --n) {
     const Func f = levels.back();
     const int shift = c_.around_zero(1);
     const Expr sides = f(2 * x - 1 + shift, twice(y)) + f(2 * x + 1 + shift, twice(y));
@@ -64,9 +66,16 @@ void Maker::add_pyramid() {
   for (size_t i = levels.size() - 1; i-- > 0;) {
     const Expr fine = levels[i](x, y), odd = cast<float>(x % 2);
     const Expr coarse = lerp(up(x / 2, half(y)), up((x + 1) / 2, half(y)), 0.25f + odd * 0.5f);
+    const Expr gain = c_.chance(40) ? Expr(p_.scale) : fine;
     up = define("up", {x, y},
-                c_.chance(50) ? coarse + (fine - coarse) * fine : coarse * 0.5f + sin(fine));
+                c_.chance(50) ? coarse + (fine - coarse) * gain : coarse * 0.5f + sin(fine));
   }
+}
+
+Func Maker::with_mirrored_border(const Func& f) {
+  Region region;
+  for (int d = 0; d < 2; ++d) region.push_back({Expr(0), p_.count + c_.between(1, 3)});
+  return bounded(c_.between(2, 4), f, region);
 }
 
 // A bilateral grid in small: sums and counts of what is alike, blurred, read between its planes.
@@ -171,7 +180,8 @@ void Maker::add_place_of_maximum() {
 // Triangles and bands whose ends are parameters.
 void Maker::add_parametric_sum() {
   const Func f = define("source", {x, y}, last_at(x, y));
-  RDom r(0, c_.chance(50) ? p_.count + 1 : Expr(natural_size), c_.around_zero(1), p_.count);
+  const Expr rows = c_.chance(30) ? max(p_.count - c_.between(1, 4), 0) : Expr(p_.count);
+  RDom r(0, c_.chance(50) ? p_.count + 1 : Expr(natural_size), c_.around_zero(1), rows);
   switch (c_.below(4)) {
     case 0:
       r.where(r.x + r.y < p_.count);
@@ -199,9 +209,12 @@ void Maker::add_boundaries() {
     Region region;
     for (int d = 0; d < 2; ++d)
       region.push_back({Expr(c_.around_zero(1)),
-                        c_.chance(25) ? p_.count + 1 : Expr(c_.between(2, natural_size))});
+                        c_.chance(40) ? p_.count + 1 : Expr(c_.between(2, natural_size))});
     const Func around = bounded(c_.below(5), f, region);
-    f = define("around", {x, y}, around(x + c_.around_zero(2), y) + f(x, y) * 0.25f);
+    RDom taps(0, c_.between(2, 3));
+    const Expr sides = c_.chance(30) ? sum(taps, around(x + taps - 1, y) * p_.scale)
+                                     : around(x + c_.around_zero(2), y);
+    f = define("around", {x, y}, sides + f(x, y) * 0.25f);
   }
 }
 

@@ -54,7 +54,9 @@ std::string to_text(const AdversaryProgram& program) {
   out << "output over";
   for (size_t d = 0; d < program.region.mins.size(); ++d)
     out << " [" << program.region.mins[d] << ", +" << program.region.extents[d] << ")";
-  out << (program.options.overwritten == Overwritten::Store ? ", values kept" : "")
+  out << (program.options.overwritten == Overwritten::Store    ? ", values kept"
+          : program.options.overwritten == Overwritten::Refuse ? ", overwriting refused"
+                                                               : "")
       << (program.only_inputs ? ", gradients of inputs only" : "") << "\n";
   return out.str();
 }
