@@ -13,6 +13,9 @@
 #endif
 
 #include "retrograde_runtime.h"
+#ifdef RETROGRADE_RUN_GEN_JPEG
+#include "run_gen/jpeg_file.h"
+#endif
 
 namespace retrograde::run_gen {
 
@@ -223,6 +226,16 @@ void write_png(const std::string& path, const Image& image) {
 }
 #endif
 
+#ifdef RETROGRADE_RUN_GEN_JPEG
+void write_as_jpeg(const std::string& path, const Image& image) {
+  const int channels = image.dim(2).extent();
+  if (channels != 1 && channels != 3) refuse(path, "holds 1 or 3 channels of 8 bits");
+  std::ostringstream samples;
+  write_samples<uint8_t>(image, channels, samples);
+  write_jpeg(path, image.dim(0).extent(), image.dim(1).extent(), channels, samples.str());
+}
+#endif
+
 // ---- types and dimensions ----
 
 // As fractions of the largest value, which floats hold as they are.
@@ -273,13 +286,15 @@ Image with_dimensions(const std::string& path, Image image, int dimensions) {
   return image;
 }
 
+bool is_jpeg(const std::string& kind) { return kind == "jpg" || kind == "jpeg"; }
+
 bool is_picture(const std::string& path) {
   const std::string kind = extension(path);
-  return kind == "pgm" || kind == "ppm" || kind == "png";
+  return kind == "pgm" || kind == "ppm" || kind == "png" || is_jpeg(kind);
 }
 
 [[noreturn]] void refuse_kind(const std::string& path) {
-  refuse(path, "is of no known kind: these are .npy, .tmp, .pgm, .ppm and .png");
+  refuse(path, "is of no known kind: these are .npy, .tmp, .pgm, .ppm, .png and .jpg");
 }
 
 }  // namespace
@@ -297,6 +312,10 @@ Image read_image(const std::string& path, halide_type_t type, int dimensions) {
   else if (kind == "png")
     image = read_png(path);
 #endif
+#ifdef RETROGRADE_RUN_GEN_JPEG
+  else if (is_jpeg(kind))
+    image = read_jpeg(path);
+#endif
   else
     refuse_kind(path);
   return with_dimensions(path, converted(image, type, is_picture(path)), dimensions);
@@ -310,13 +329,16 @@ void write_image(const std::string& path, const Image& image) {
     return;
   }
   if (!is_picture(path)) refuse_kind(path);
-  const bool is_wide = image.type().bits == 16 && kind != "png";
+  const bool is_wide = image.type().bits == 16 && kind != "png" && !is_jpeg(kind);
   const Image picture = with_dimensions(
       path, converted(image, {halide_type_uint, uint8_t(is_wide ? 16 : 8)}, true), 3);
 #ifdef RETROGRADE_RUN_GEN_PNG
   if (kind == "png") return write_png(path, picture);
 #endif
-  if (kind == "png") refuse_kind(path);
+#ifdef RETROGRADE_RUN_GEN_JPEG
+  if (is_jpeg(kind)) return write_as_jpeg(path, picture);
+#endif
+  if (kind == "png" || is_jpeg(kind)) refuse_kind(path);
   write_pnm(path, picture);
 }
 

@@ -1,5 +1,5 @@
-// image_files.h -- buffers in files: .npy and .tmp keep every type; .pgm, .ppm and .png hold 8 or
-// 16 bits, which are fractions of 1 where floats are wanted.
+// image_files.h -- buffers in files: .npy and .tmp keep every type; .pgm, .ppm, .png and
+// .jpg hold 8 or 16 bits, which are fractions of 1 where floats are wanted.
 #pragma once
 
 #include <string>

@@ -112,8 +112,8 @@ std::string usage(const std::string& program) {
               SHAPE is [640,480,3], auto: what the output needs, estimate: what the generator says,
               or estimate_then_auto. A shape alone is random
     outputs   a file to be written; an output that is not named is computed and dropped
-  Files: .npy and .tmp of any type; .pgm, .ppm and .png of 8 and 16 bits, whose values become
-  fractions of 1 for functions of floats.
+  Files: .npy and .tmp of any type; .pgm, .ppm, .png and .jpg of 8 and 16 bits, whose values
+  become fractions of 1 for functions of floats.
 
   --help                       this text
   --describe                   the function's arguments and their types

@@ -1,0 +1,134 @@
+// Errors of libjpeg come back by longjmp: it is C, through which no exception goes. Between setjmp
+// and the jump no object with a destructor is made, and what is used after it is not changed.
+#include "run_gen/jpeg_file.h"
+
+#include <csetjmp>
+#include <cstdio>
+#include <memory>
+#include <vector>
+
+#include <jpeglib.h>
+
+namespace retrograde::run_gen {
+
+namespace {
+
+constexpr int quality = 98;  // as good as those who compare pictures want them
+
+struct Errors {
+  jpeg_error_mgr manager;
+  std::jmp_buf back;
+  char message[JMSG_LENGTH_MAX] = "";
+};
+
+[[noreturn]] void give_up(j_common_ptr codec) {
+  auto* errors = static_cast<Errors*>(codec->client_data);
+  codec->err->format_message(codec, errors->message);
+  std::longjmp(errors->back, 1);
+}
+
+template <typename Codec>
+void report_to(Errors& errors, Codec& codec) {
+  codec.err = jpeg_std_error(&errors.manager);
+  errors.manager.error_exit = give_up;
+  errors.manager.emit_message = [](j_common_ptr, int) {};
+  codec.client_data = &errors;
+}
+
+struct Decoder {
+  jpeg_decompress_struct codec = {};
+  Errors errors;
+  ~Decoder() { jpeg_destroy_decompress(&codec); }
+};
+struct Encoder {
+  jpeg_compress_struct codec = {};
+  Errors errors;
+  ~Encoder() { jpeg_destroy_compress(&codec); }
+};
+
+using File = std::unique_ptr<std::FILE, int (*)(std::FILE*)>;
+
+File open(const std::string& path, const char* mode) {
+  File file(std::fopen(path.c_str(), mode), std::fclose);
+  if (!file)
+    throw Problem("the file \"" + path + "\" cannot be " + (*mode == 'r' ? "read" : "written"));
+  return file;
+}
+
+// False: see errors.message. client_data outlives jpeg_create_*, which clears the rest.
+bool start(Decoder& decoder, std::FILE* file) {
+  report_to(decoder.errors, decoder.codec);
+  if (setjmp(decoder.errors.back)) return false;
+  jpeg_create_decompress(&decoder.codec);
+  jpeg_stdio_src(&decoder.codec, file);
+  jpeg_read_header(&decoder.codec, TRUE);
+  const bool is_grey = decoder.codec.jpeg_color_space == JCS_GRAYSCALE;
+  decoder.codec.out_color_space = is_grey ? JCS_GRAYSCALE : JCS_RGB;
+  jpeg_start_decompress(&decoder.codec);
+  return true;
+}
+
+bool read_lines(Decoder& decoder, uint8_t* samples, size_t bytes_of_line) {
+  if (setjmp(decoder.errors.back)) return false;
+  while (decoder.codec.output_scanline < decoder.codec.output_height) {
+    JSAMPROW line = samples + decoder.codec.output_scanline * bytes_of_line;
+    jpeg_read_scanlines(&decoder.codec, &line, 1);
+  }
+  jpeg_finish_decompress(&decoder.codec);
+  return true;
+}
+
+bool write_lines(Encoder& encoder, std::FILE* file, int width, int height, int channels,
+                 const uint8_t* samples) {
+  jpeg_compress_struct& codec = encoder.codec;
+  report_to(encoder.errors, codec);
+  if (setjmp(encoder.errors.back)) return false;
+  jpeg_create_compress(&codec);
+  jpeg_stdio_dest(&codec, file);
+  codec.image_width = static_cast<JDIMENSION>(width);
+  codec.image_height = static_cast<JDIMENSION>(height);
+  codec.input_components = channels;
+  codec.in_color_space = channels == 1 ? JCS_GRAYSCALE : JCS_RGB;
+  jpeg_set_defaults(&codec);
+  jpeg_set_quality(&codec, quality, TRUE);
+  jpeg_start_compress(&codec, TRUE);
+  while (codec.next_scanline < codec.image_height) {
+    const size_t first = static_cast<size_t>(codec.next_scanline) * codec.image_width;
+    JSAMPROW line = const_cast<uint8_t*>(samples) + first * static_cast<size_t>(channels);
+    jpeg_write_scanlines(&codec, &line, 1);
+  }
+  jpeg_finish_compress(&codec);
+  return true;
+}
+
+}  // namespace
+
+Image read_jpeg(const std::string& path) {
+  const File file = open(path, "rb");
+  Decoder decoder;
+  const auto check = [&](bool is_done) {
+    if (!is_done)
+      throw Problem("the file \"" + path + "\" cannot be read: " + decoder.errors.message);
+  };
+  check(start(decoder, file.get()));
+  const int channels = decoder.codec.output_components;
+  auto image = Halide::Runtime::Buffer<uint8_t>::make_interleaved(
+      static_cast<int>(decoder.codec.output_width), static_cast<int>(decoder.codec.output_height),
+      channels);
+  const size_t line = static_cast<size_t>(channels) * decoder.codec.output_width;
+  check(read_lines(decoder, image.data(), line));
+  return image;
+}
+
+void write_jpeg(const std::string& path, int width, int height, int channels,
+                const std::string& samples) {
+  File file = open(path, "wb");
+  Encoder encoder;
+  const auto* bytes = reinterpret_cast<const uint8_t*>(samples.data());
+  if (!write_lines(encoder, file.get(), width, height, channels, bytes))
+    throw Problem("the file \"" + path + "\" cannot be written: " + encoder.errors.message);
+  if (std::fclose(file.release()) != 0)
+    throw Problem("the file \"" + path + "\" cannot be written");
+}
+
+}  // namespace retrograde::run_gen

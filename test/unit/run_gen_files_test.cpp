@@ -1,0 +1,100 @@
+// Pictures that programs with RunGenMain read and write.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <fstream>
+#include <iterator>
+#include <string>
+
+#include "run_gen/image_files.h"
+#include "support/temporary_folder.h"
+
+namespace retrograde::run_gen {
+namespace {
+
+const halide_type_t bytes(halide_type_uint, 8), floats(halide_type_float, 32);
+
+// Smooth, so that JPEG keeps it.
+Image picture(int width, int height, int channels) {
+  auto image = Halide::Runtime::Buffer<uint8_t>(width, height, channels);
+  image.for_each_element([&](int x, int y, int c) {
+    image(x, y, c) = static_cast<uint8_t>(20 + 3 * x + 2 * y + 10 * c);
+  });
+  return image;
+}
+
+int largest_difference(const Image& a, const Image& b) {
+  int result = 0;
+  const auto &u = a.as<const uint8_t>(), &v = b.as<const uint8_t>();
+  u.for_each_element([&](const int* at) { result = std::max(result, std::abs(u(at) - v(at))); });
+  return result;
+}
+
+class RunGenFiles : public ::testing::TestWithParam<const char*> {
+ protected:
+  std::string path() const { return (folder_.path() / (std::string("it.") + GetParam())).string(); }
+  int tolerance() const { return *GetParam() == 'j' ? 6 : 0; }
+  std::string error_of_reading() const {
+    try {
+      read_image(path(), bytes, 3);
+    } catch (const Problem& problem) {
+      return problem.what();
+    }
+    return "no error";
+  }
+  TemporaryFolder folder_;
+};
+
+TEST_P(RunGenFiles, PicturesComeBack) {
+  for (int channels : {1, 3}) {
+    const Image drawn = picture(37, 21, channels);
+    write_image(path(), drawn);
+    const Image read = read_image(path(), bytes, 3);
+    ASSERT_EQ(read.dim(0).extent(), 37);
+    ASSERT_EQ(read.dim(1).extent(), 21);
+    ASSERT_EQ(read.dim(2).extent(), channels);
+    EXPECT_LE(largest_difference(drawn, read), tolerance());
+  }
+}
+
+TEST_P(RunGenFiles, FloatsAreFractionsOfOne) {
+  write_image(path(), picture(16, 8, 3));
+  const Image read = read_image(path(), floats, 3);
+  EXPECT_NEAR(read.as<const float>()(5, 4, 1), (20 + 15 + 8 + 10) / 255.0f,
+              tolerance() / 255.0f + 1e-6f);
+  write_image(path(), read);
+  EXPECT_LE(largest_difference(picture(16, 8, 3), read_image(path(), bytes, 3)), 2 * tolerance());
+}
+
+TEST_P(RunGenFiles, WhatIsNoPictureIsRefused) {
+  EXPECT_NE(error_of_reading().find("cannot be read"), std::string::npos) << error_of_reading();
+  std::ofstream(path()) << "this is no picture";
+  EXPECT_NE(error_of_reading().find("cannot be read: "), std::string::npos) << error_of_reading();
+  std::ofstream(path()).close();
+  EXPECT_NE(error_of_reading().find("cannot be read"), std::string::npos) << error_of_reading();
+  EXPECT_THROW(write_image(path(), picture(4, 4, 5)), Problem);
+  EXPECT_THROW(write_image(path() + ".nowhere/it.jpg", picture(4, 4, 1)), Problem);
+}
+
+// The end of a JPEG that lacks is grey; its beginning is not.
+TEST_P(RunGenFiles, CutOffFilesDoNotCrash) {
+  write_image(path(), picture(64, 64, 3));
+  std::string all;
+  {
+    std::ifstream in(path(), std::ios::binary);
+    all.assign(std::istreambuf_iterator<char>(in), {});
+  }
+  for (size_t kept : {size_t{10}, all.size() / 4, all.size() - 20}) {
+    std::ofstream(path(), std::ios::binary) << all.substr(0, kept);
+    try {
+      EXPECT_EQ(read_image(path(), bytes, 3).dim(0).extent(), 64);
+    } catch (const Problem&) {
+    }
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Kinds, RunGenFiles, ::testing::Values("png", "jpg", "jpeg"));
+
+}  // namespace
+}  // namespace retrograde::run_gen
