@@ -10,6 +10,7 @@
 #include <HalideBuffer.h>
 
 #include <algorithm>
+#include <concepts>
 #include <memory>
 #include <mutex>
 #include <string>
@@ -457,7 +458,9 @@ class Buffer {
     checked("operator()");
     return ir::buffer_access(contents_, args);
   }
-  Expr operator()(const std::vector<Var>& args) const {
+  // Not of braces, whose elements are Exprs: {x, 0}.
+  template <std::same_as<Var> V>
+  Expr operator()(const std::vector<V>& args) const {
     checked("operator()");
     return ir::buffer_access(contents_, std::vector<Expr>(args.begin(), args.end()));
   }

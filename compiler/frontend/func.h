@@ -6,6 +6,8 @@
 // they chain.
 #pragma once
 
+#include <concepts>
+#include <initializer_list>
 #include <source_location>
 #include <string>
 #include <type_traits>
@@ -35,8 +37,10 @@ class Func {
   Func(std::source_location where = std::source_location::current());
   explicit Func(const std::string& name,
                 std::source_location where = std::source_location::current());
-  explicit Func(const char* name, std::source_location where = std::source_location::current())
-      : Func(std::string(name), where) {}
+  template <ir::TextPointer T>
+  explicit Func(const T& name, std::source_location where = std::source_location::current())
+      : Func(ir::name_from(name, "a Func"), where) {}
+  explicit Func(std::nullptr_t) = delete;  // and of a literal 0: Func(Expr(0)) is a constant
   // Definitions must have these types and dimensions.
   Func(Type required_type, int required_dimensions, const std::string& name = "");
   Func(const std::vector<Type>& required_types, int required_dimensions,
@@ -53,7 +57,9 @@ class Func {
     return FuncRef(func_, {Expr(std::forward<Args>(args))...});
   }
   FuncRef operator()(const std::vector<Expr>& args) const { return FuncRef(func_, args); }
-  FuncRef operator()(const std::vector<Var>& args) const {
+  // Not of braces, whose elements are Exprs: {x, 0}.
+  template <std::same_as<Var> V>
+  FuncRef operator()(const std::vector<V>& args) const {
     return FuncRef(func_, std::vector<Expr>(args.begin(), args.end()));
   }
 
@@ -83,6 +89,11 @@ class Func {
   // ---- running it ----
   Realization realize(const std::vector<int32_t>& sizes = {}, const Target& target = Target(),
                       const ParamMap& map = ParamMap::empty_map());
+  // Of braces, so that {0} is a size and no pointer.
+  Realization realize(std::initializer_list<int32_t> sizes, const Target& target = Target(),
+                      const ParamMap& map = ParamMap::empty_map()) {
+    return realize(std::vector<int32_t>(sizes), target, map);
+  }
   void realize(Pipeline::RealizationArg outputs, const Target& target = Target(),
                const ParamMap& map = ParamMap::empty_map());
   Realization realize(JITUserContext* context, const std::vector<int32_t>& sizes = {},

@@ -2,6 +2,7 @@
 // their shape.
 #pragma once
 
+#include <concepts>
 #include <memory>
 #include <string>
 #include <vector>
@@ -85,6 +86,7 @@ class ImageParam : public OutputImageParam {
   ImageParam() = default;
   ImageParam(Type type, int dimensions);
   ImageParam(Type type, int dimensions, const std::string& name);
+  ImageParam(Type type, int dimensions, std::nullptr_t) = delete;
 
   explicit ImageParam(std::shared_ptr<ir::ParameterContents> parameter)
       : OutputImageParam(std::move(parameter)) {}
@@ -99,7 +101,9 @@ class ImageParam : public OutputImageParam {
     return access({Expr(std::forward<Args>(args))...});
   }
   Expr operator()(const std::vector<Expr>& args) const { return access(args); }
-  Expr operator()(const std::vector<Var>& args) const {
+  // Not of braces, whose elements are Exprs: {x, 0}.
+  template <std::same_as<Var> V>
+  Expr operator()(const std::vector<V>& args) const {
     return access(std::vector<Expr>(args.begin(), args.end()));
   }
   // The Func that reads this image point by point: the same each time. What is said of it, such as

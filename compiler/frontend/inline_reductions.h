@@ -14,9 +14,18 @@
 
 namespace retrograde {
 
+namespace ir {
+template <typename E>
+concept ReducedValue = std::is_convertible_v<E, Expr> && !std::is_convertible_v<E, const RDom&>;
+}
+
 #define RETROGRADE_INLINE_REDUCTION(Result, name)                                \
   Result name(Expr e, const std::string& func_name = #name);                     \
   Result name(const RDom& domain, Expr e, const std::string& func_name = #name); \
+  /* a literal 0 names nothing */                                                \
+  template <ir::ReducedValue E>                                                  \
+  Result name(const E& e, std::nullptr_t) = delete;                              \
+  Result name(const RDom& domain, Expr e, std::nullptr_t) = delete;              \
   Result name(Expr e, const Func& func);                                         \
   Result name(const RDom& domain, Expr e, const Func& func);
 RETROGRADE_INLINE_REDUCTION(Expr, sum)

@@ -69,9 +69,13 @@ class Param {
   Param() requires has_static_type : parameter_(ir::make_scalar_parameter(type_of<T>(), "")) {}
   explicit Param(const std::string& name) requires has_static_type
       : parameter_(ir::make_scalar_parameter(type_of<T>(), name)) {}
-  explicit Param(const char* name) requires has_static_type : Param(std::string(name)) {}
+  template <ir::TextPointer Text>
+  requires has_static_type explicit Param(const Text& name)
+      : Param(ir::name_from(name, "a Param")) {}
+  explicit Param(std::nullptr_t) requires(std::is_pointer_v<T>) = delete;
   explicit Param(Type type, const std::string& name = "") requires(!has_static_type)
       : parameter_(ir::make_scalar_parameter(type, name)) {}
+  Param(Type type, std::nullptr_t) = delete;
   explicit Param(Value value) requires(has_static_type && !std::is_pointer_v<T>) : Param() {
     set(value);
   }

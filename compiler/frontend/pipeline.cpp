@@ -58,9 +58,9 @@ bool same_shape(const halide_buffer_t& a, const std::vector<halide_dimension_t>&
   return true;
 }
 
-// The answer to a query, and at least [0, size) in each dimension: then the call itself says what is
-// wrong with that. Its strides are the answer's, unless it is larger, or they put elements onto each
-// other.
+// The answer to a query, and at least [0, size) in each dimension: then the call itself says what
+// is wrong with that. Its strides are the answer's, unless it is larger, or they put elements onto
+// each other.
 void enlarge_to(Runtime::Buffer<>& buffer, const std::vector<int32_t>& sizes) {
   bool is_answer = true;
   for (size_t d = 0; d < sizes.size(); d++) {
@@ -231,9 +231,9 @@ std::vector<Buffer<>> Pipeline::make_outputs(const std::vector<int32_t>& sizes,
                  "Give that many sizes, or buffers");
     }
     for (size_t d = 0; d < sizes.size(); d++) {
-      if (sizes[d] > 0) continue;
-      call_error(asked, "sizes are positive", text("the size of dimension ", d, " is ", sizes[d]),
-                 "Give sizes of at least 1");
+      if (sizes[d] >= 0) continue;
+      call_error(asked, "sizes are not negative",
+                 text("the size of dimension ", d, " is ", sizes[d]), "Give sizes of at least 0");
     }
     for (const Type& type : f->types) {
       ir::check_sizes(to_halide_type(type), sizes, asked);

@@ -61,6 +61,10 @@ class Pipeline {
   // values from the map before those that were set.
   Realization realize(const std::vector<int32_t>& sizes = {}, const Target& target = Target(),
                       const ParamMap& map = ParamMap::empty_map());
+  Realization realize(std::initializer_list<int32_t> sizes, const Target& target = Target(),
+                      const ParamMap& map = ParamMap::empty_map()) {
+    return realize(std::vector<int32_t>(sizes), target, map);
+  }
   // Computes all outputs over the given buffers. RuntimeError when a buffer or parameter does not
   // fit.
   void realize(RealizationArg outputs, const Target& target = Target(),

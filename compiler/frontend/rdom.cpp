@@ -79,10 +79,6 @@ RVar::operator Expr() const {
 
 RDom::RDom(const Region& region, const std::string& name) { initialize(region, name); }
 
-RDom::RDom(std::shared_ptr<ir::ReductionDomainContents> domain) : domain_(std::move(domain)) {
-  name_variables();
-}
-
 RDom::RDom(const OutputImageParam& image) {
   Region region;
   for (int d = 0; d < image.dimensions(); d++)

@@ -4,6 +4,8 @@
 // The first variable runs innermost. Points that fail a predicate are left out.
 #pragma once
 
+#include <concepts>
+#include <initializer_list>
 #include <memory>
 #include <string>
 #include <type_traits>
@@ -26,7 +28,9 @@ class RVar {
  public:
   RVar();  // a fresh name
   explicit RVar(const std::string& name);
-  explicit RVar(const char* name) : RVar(std::string(name)) {}
+  template <ir::TextPointer T>
+  explicit RVar(const T& name) : RVar(ir::name_from(name, "an RVar")) {}
+  explicit RVar(std::nullptr_t) = delete;
   RVar(std::shared_ptr<ir::ReductionDomainContents> domain, int index);
 
   const std::string& name() const { return name_; }
@@ -46,6 +50,8 @@ class RDom {
  public:
   RDom() = default;
   RDom(const Region& region, const std::string& name = "");
+  RDom(const Region& region, std::nullptr_t) = delete;
+  RDom(std::initializer_list<Range> region) : RDom(Region(region)) {}
   // (min, extent) of each variable, and optionally a name: RDom r(0, 3, 0, 3, "r").
   template <typename... Args>
   RDom(Expr min, Expr extent, Args&&... rest) {
@@ -55,7 +61,11 @@ class RDom {
   template <typename T, int Dims>
   RDom(const Buffer<T, Dims>& buffer);  // all of its elements
   RDom(const OutputImageParam& image);
-  explicit RDom(std::shared_ptr<ir::ReductionDomainContents> domain);
+  // Not of braces, which hold a min and an extent.
+  template <std::same_as<std::shared_ptr<ir::ReductionDomainContents>> Domain>
+  explicit RDom(const Domain& domain) : domain_(domain) {
+    name_variables();
+  }
 
   bool defined() const { return domain_ != nullptr; }
   bool same_as(const RDom& other) const { return domain_ == other.domain_; }

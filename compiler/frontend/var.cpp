@@ -33,6 +33,14 @@ const std::string& checked_name(const std::string& name) {
 
 }  // namespace
 
+namespace ir {
+std::string name_from(const char* text, const char* of) {
+  if (text) return text;
+  user_error(retrograde::text("name ", of), "a name is text", "the pointer to it is null",
+             "Give it a text, or none at all");
+}
+}  // namespace ir
+
 // Counted by themselves: print_loop_nest shows "v$0" as v0, and so on.
 Var::Var() : expr_() {
   static std::atomic<uint64_t> next{0};

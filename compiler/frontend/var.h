@@ -3,18 +3,31 @@
 // Var x, y; f(x, y) = x + y. A Var is nothing but its name: two Vars of one name are the same Var.
 #pragma once
 
+#include <cstddef>
 #include <string>
+#include <type_traits>
 #include <vector>
 
 #include "ir/build.h"
 
 namespace retrograde {
 
+namespace ir {
+// A pointer to text. A literal 0, which converts to every pointer, is none: it means a number.
+template <typename T>
+concept TextPointer = std::is_same_v < std::decay_t<T>,
+const char* > || std::is_same_v<std::decay_t<T>, char*>;
+// CompileError when there is no text. `of` names what it is for: "a Var".
+std::string name_from(const char* text, const char* of);
+}  // namespace ir
+
 class Var {
  public:
   Var();  // a fresh name
   Var(const std::string& name);
-  Var(const char* name) : Var(std::string(name)) {}
+  template <ir::TextPointer T>
+  Var(const T& name) : Var(ir::name_from(name, "a Var")) {}
+  explicit Var(std::nullptr_t) = delete;  // and of a literal 0
 
   const std::string& name() const { return name_; }
   bool same_as(const Var& other) const { return name_ == other.name_; }

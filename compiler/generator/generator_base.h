@@ -25,6 +25,7 @@ namespace internal {
 struct StringOrLoopLevel {
   StringOrLoopLevel(const std::string& text) : text(text) {}
   StringOrLoopLevel(const char* text) : text(text) {}
+  StringOrLoopLevel(std::nullptr_t) = delete;  // and of a literal 0
   StringOrLoopLevel(const LoopLevel& level) : level(level) {}
   std::string text;
   LoopLevel level;  // undefined: the text says it

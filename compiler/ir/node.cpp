@@ -75,6 +75,12 @@ Expr::Expr(bfloat16_t value) : Expr(ir::make_const(BFloat(16), static_cast<doubl
 Expr::Expr(float value) : Expr(ir::make_const(Float(32), static_cast<double>(value))) {}
 Expr::Expr(double value) : Expr(ir::make_const(Float(64), value)) {}
 Expr::Expr(const std::string& text) : Ref(new ir::StringImm(text)) {}
-Expr::Expr(const char* text) : Ref(new ir::StringImm(text)) {}
+Expr::Expr(const char* text) {
+  if (!text) {
+    user_error("make an Expr of a text", "a text is not null", "the pointer to it is null",
+               "Give it a text, or a number such as 0");
+  }
+  *this = Expr(std::string(text));
+}
 
 }  // namespace retrograde

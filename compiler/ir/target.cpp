@@ -215,6 +215,21 @@ Target::Target(const std::string& text) {
              "Write for example \"host\" or \"x86-64-linux-avx2-fma\"");
 }
 
+Target::Target(const char* text) {
+  if (!text) {
+    user_error("read a target", "a target is a text such as \"host\"", "the pointer to it is null",
+               "Look whether the environment has the variable that it is taken from");
+  }
+  *this = Target(std::string(text));
+}
+
+Target::Feature Target::checked(Feature feature) {
+  if (feature >= 0 && feature < FeatureEnd) return feature;
+  user_error(text("use feature ", static_cast<int>(feature), " of a target"),
+             "a feature is one of Target::Feature",
+             text("they end with ", static_cast<int>(FeatureEnd)), "Name one, as in Target::AVX2");
+}
+
 bool Target::validate_target_string(const std::string& text) {
   Target target;
   Parts parts;

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <bitset>
+#include <cstddef>
 #include <string>
 #include <vector>
 
@@ -85,17 +86,18 @@ struct Target {
   // "host", "x86-64-linux-avx2-fma", "arm-64-linux", "host-no_asserts"; "" is the host. UserError
   // on anything else.
   explicit Target(const std::string& text);
-  explicit Target(const char* text) : Target(std::string(text)) {}
+  explicit Target(const char* text);  // UserError when it is null
+  explicit Target(std::nullptr_t) = delete;
   static bool validate_target_string(const std::string& text);
 
   // Every target has FeatureEnd.
   bool has_feature(Feature feature) const {
-    return feature == FeatureEnd || features_.test(feature);
+    return feature == FeatureEnd || features_.test(checked(feature));
   }
   Target with_feature(Feature feature) const;
   Target without_feature(Feature feature) const;
   void set_feature(Feature feature, bool value = true) {
-    if (feature != FeatureEnd) features_.set(feature, value);
+    if (feature != FeatureEnd) features_.set(checked(feature), value);
   }
   void set_features(const std::vector<Feature>& features, bool value = true) {
     for (Feature feature : features) set_feature(feature, value);
@@ -149,6 +151,7 @@ struct Target {
   }
 
  private:
+  static Feature checked(Feature feature);  // UserError when there is no such one
   std::bitset<FeatureEnd> features_;
 };
 

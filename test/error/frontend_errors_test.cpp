@@ -660,10 +660,10 @@ TEST(CallArguments, Sizes) {
   expect_error<RuntimeError>([&] { s.f.realize({3}); }, {"one size for each dimension"});
   expect_error<RuntimeError>(
       [&] {
-        s.f.realize({3, 0});
+        s.f.realize({3, -1});
       },
-      {"sizes are positive", "dimension 1 is 0"});
-  expect_error<RuntimeError>([&] { s.f.realize({-3, 4}); }, {"sizes are positive"});
+      {"sizes are not negative", "dimension 1 is -1"});
+  expect_error<RuntimeError>([&] { s.f.realize({-3, 4}); }, {"sizes are not negative"});
   expect_error<UserError>([&] { s.f.realize({INT32_MAX, INT32_MAX}); }, {"address space"});
 }
 

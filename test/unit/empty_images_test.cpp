@@ -1,0 +1,75 @@
+// Images without elements, as inputs and as results.
+#include <gtest/gtest.h>
+#include <retrograde/retrograde.h>
+
+#include <vector>
+
+namespace retrograde {
+namespace {
+
+const Var x("x"), y("y");
+
+// f(x, y) = 2 im(x, y) through a stage at root.
+struct Doubled {
+  ImageParam im{Float(32), 2, "im"};
+  Func stage{"stage"}, f{"f"};
+  Doubled() {
+    stage(x, y) = im(x, y);
+    f(x, y) = 2.0f * stage(x, y);
+    stage.compute_root();
+  }
+  std::vector<int> extents_over(const std::vector<int>& sizes) {
+    im.set(Buffer<float>(sizes));
+    const Buffer<float> result = f.realize(sizes);
+    return {result.width(), result.height()};
+  }
+};
+
+TEST(EmptyImages, AreResults) {
+  for (const std::vector<int>& sizes : std::vector<std::vector<int>>{{0, 0}, {5, 0}, {0, 5}}) {
+    Doubled plain, wide, cut;
+    EXPECT_EQ(plain.extents_over(sizes), sizes);
+    wide.f.vectorize(x, 8, TailStrategy::GuardWithIf).parallel(y);
+    wide.stage.vectorize(x, 8, TailStrategy::GuardWithIf);
+    EXPECT_EQ(wide.extents_over(sizes), sizes);
+    cut.f.vectorize(x, 8, TailStrategy::Predicate).unroll(y, 2, TailStrategy::GuardWithIf);
+    EXPECT_EQ(cut.extents_over(sizes), sizes);
+  }
+}
+
+TEST(EmptyImages, AddUpToNothing) {
+  for (bool is_wide : {false, true}) {
+    ImageParam im(Float(32), 2, "im");
+    RDom r(0, im.height());
+    Func f("f");
+    f(x) = 1.0f;
+    f(x) += im(x, r);
+    if (is_wide) f.update().vectorize(x, 4);
+    im.set(Buffer<float>(4, 0));
+    const Buffer<float> result = f.realize({4});
+    for (int i = 0; i < 4; i++) EXPECT_EQ(result(i), 1.0f);
+  }
+}
+
+TEST(EmptyImages, PlacesOfDataInAnEmptyOne) {
+  using Schedule = void (*)(Func&, const RDom&);
+  const Schedule schedules[] = {
+      [](Func&, const RDom&) {},
+      [](Func& f, const RDom& r) {
+        f.update().atomic().vectorize(r, 8, TailStrategy::GuardWithIf);
+      },
+      [](Func& f, const RDom& r) { f.update().atomic().vectorize(r, 8, TailStrategy::Predicate); }};
+  for (const Schedule schedule : schedules) {
+    ImageParam at(Int(32), 1, "at");
+    RDom r(0, at.width());
+    Func f("f");
+    f(x) = 0;
+    f(clamp(at(r), 0, 3)) += r + 1;
+    schedule(f, r);
+    at.set(Buffer<int>(0));
+    EXPECT_EQ(Buffer<int>(f.realize({4}))(0), 0);
+  }
+}
+
+}  // namespace
+}  // namespace retrograde
