@@ -118,6 +118,14 @@ void refuse_sanitizers(const Target& target) {
 
 }  // namespace
 
+// LLVM's order of instructions follows a model of latencies and ports. That of the oldest
+// processors keeps more values alive than registers hold, so ask for the oldest that has the
+// instructions.
+static std::string tuning_for(const Machine& machine) {
+  if (!machine.is_x86() || !machine.has_avx2()) return "";
+  return machine.has_avx512_words() ? "x86-64-v4" : "x86-64-v3";
+}
+
 Machine machine_for(const Target& target, bool tune_for_host) {
   refuse_sanitizers(target);
   if (const std::string part = target.unsupported_part(); !part.empty()) {
@@ -139,6 +147,7 @@ Machine machine_for(const Target& target, bool tune_for_host) {
     machine.features = "+neon";
     machine.has_sleef = tune_for_host;
   }
+  machine.tune_cpu = tuning_for(machine);
   const bool is_host = target.arch == get_host_target().arch;
   if (tune_for_host && is_host) machine.tune_cpu = llvm::sys::getHostCPUName().str();
   if (const std::string name = target.processor_name(); !name.empty() && machine.is_x86())
