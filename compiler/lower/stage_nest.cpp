@@ -4,6 +4,8 @@
 
 #include "diagnostics/error.h"
 #include "ir/build.h"
+#include "ir/visit.h"
+#include "lower/nest_storage.h"
 #include "simplify/simplify.h"
 
 namespace retrograde::ir {
@@ -36,12 +38,34 @@ struct Derived {
   std::optional<Tail> tail = {};
 };
 
+// Whether storage of the Func grows with what its loops touch, and holds nothing else.
+bool has_room_of_its_own(const LoopedFunc& f) {
+  return !f.is_output && !f.func->is_extern() && !f.schedule.memoized && !f.schedule.async &&
+         is_stored_where_computed(f);
+}
+
+// Tiles of what needs nothing may run past the end. So they begin where the tiles of what is added
+// to it later do, and a tile in registers has constant places, at the border, too.
+bool reads_nothing(const Definition& definition) {
+  bool reads = false;
+  for_each_expr(definition, [&](const Expr& root) {
+    walk(root, [&](const Expr& e) {
+      const Call* call = e.as<Call>();
+      reads = reads || (call && (call->call_type != CallType::Operator ||
+                                 op_info(call->op).cls == OpClass::Effect));
+      return !reads;
+    });
+  });
+  return !reads;
+}
+
 class NestBuilder {
  public:
   NestBuilder(const LoopedFunc& f, int stage, const Domain& domain)
       : definition_(f.stages[stage]),
         prefix_(stage_prefix(f.name(), stage)),
         is_update_(stage > 0),
+        may_run_past_the_end_(stage == 0 && has_room_of_its_own(f) && reads_nothing(definition_)),
         ranges_(domain) {}
 
   StageNest build() {
@@ -56,7 +80,7 @@ class NestBuilder {
  private:
   const Definition& definition_;
   const std::string prefix_;
-  const bool is_update_;
+  const bool is_update_, may_run_past_the_end_;
   bool rounds_up_ = false;
   Domain ranges_;  // of every variable that exists after the splits so far
   std::vector<std::vector<Derived>> derived_;  // by split; what one of them derives is one step
@@ -90,6 +114,7 @@ class NestBuilder {
   TailStrategy tail_of(const Split& split, const Expr& extent) const {
     if (is_zero(simplify(extent % split.factor))) return TailStrategy::RoundUp;  // there is no tail
     if (split.tail != TailStrategy::Auto) return split.tail;
+    if (may_run_past_the_end_) return TailStrategy::RoundUp;
     // An update may read what it writes, so no point of it may run twice.
     return is_update_ || split.exact ? TailStrategy::GuardWithIf : TailStrategy::ShiftInwards;
   }
