@@ -1,6 +1,7 @@
 #include "lower/pass_table.h"
 
 #include "lower/accumulate_vectors.h"
+#include "lower/blend_masked_stores.h"
 #include "lower/deinterleave_loads.h"
 #include "lower/drop_checks.h"
 #include "lower/flatten_storage.h"
@@ -20,6 +21,7 @@ namespace retrograde::ir {
 const std::vector<StatementPass>& statement_passes() {
   static const std::vector<StatementPass> passes = {
       {"accumulate_vectors", accumulate_vectors},
+      {"blend_masked_stores", blend_masked_stores},
       {"deinterleave_loads", deinterleave_loads},
       {"drop_asserts", drop_asserts},
       {"drop_bounds_query", drop_bounds_query},

@@ -10,6 +10,7 @@
 #include "ir/validate.h"
 #include "lower/accumulate_vectors.h"
 #include "lower/argument_checks.h"
+#include "lower/blend_masked_stores.h"
 #include "lower/build_loop_nests.h"
 #include "lower/copy_statement.h"
 #include "lower/debug_features.h"
@@ -177,6 +178,8 @@ constexpr Pass passes[] = {
     {"deinterleave_loads", Phase::Vector,
      [](Lowering&, const Stmt& s) { return deinterleave_loads(s); }},
     {"simplify_vectors", Phase::Vector, run_simplify},
+    {"blend_masked_stores", Phase::Vector,
+     [](Lowering&, const Stmt& s) { return blend_masked_stores(s); }},
     {"fuzz_float_stores", Phase::Vector,
      [](Lowering& lowering, const Stmt& s) {
        const bool fuzzes = lowering.options.target.has_feature(Target::FuzzFloatStores);

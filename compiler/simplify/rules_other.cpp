@@ -1,4 +1,5 @@
 // Casts, vectors, operators and lets.
+#include <algorithm>
 #include <memory>
 
 #include "ir/build.h"
@@ -55,8 +56,39 @@ Expr Simplifier::distribute_broadcast(Kind kind, const Expr& a, const Expr& b) {
   return broadcast(apply(kind, x->value, y->value), x->lanes);
 }
 
+namespace {
+
+// Whether a mask holds in any lane, where one lane decides: of x + i s < y it is the first or last.
+Expr holds_anywhere(const Expr& mask) {
+  const auto* op = mask.as<Binary>();
+  if (!op) return {};
+  const auto *a = op->a.as<Broadcast>(), *b = op->b.as<Broadcast>();
+  if (mask.kind() == Kind::And && (a || b)) {
+    const Expr& one = a ? a->value : b->value;
+    return one.type().is_scalar()
+               ? binary(Kind::And, one, make_vector_reduce(ReduceOp::Or, a ? op->b : op->a, 1))
+               : Expr();
+  }
+  if (mask.kind() != Kind::LT && mask.kind() != Kind::LE) return {};
+  const auto* ramp = (b ? op->a : op->b).as<Ramp>();
+  const Expr other = b ? b->value : a ? a->value : Expr();
+  if (!ramp || !other.defined() || !other.type().is_scalar() || !ramp->base.type().is_scalar())
+    return {};
+  const auto stride = as_const_int(ramp->stride);
+  const Type type = other.type();
+  if (!stride || !type.is_int() || type.bits() < 32) return {};
+  const int64_t reach = *stride * (ramp->lanes - 1), least = std::min<int64_t>(reach, 0);
+  const Expr end = ramp->base + make_const(type, b ? least : reach - least);
+  return b ? binary(mask.kind(), end, other) : binary(mask.kind(), other, end);
+}
+
+}  // namespace
+
 Expr Simplifier::vector_reduce(const VectorReduce& n) {
   Expr value = (*this)(n.value);
+  if (n.op == ReduceOp::Or && n.type.is_scalar()) {
+    if (const Expr one = holds_anywhere(value); one.defined()) return (*this)(one);
+  }
   const auto* splat = value.as<Broadcast>();
   const bool idempotent = n.op != ReduceOp::Add && n.op != ReduceOp::Mul;
   if (splat && splat->value.type().is_scalar()) {
@@ -187,8 +219,7 @@ bool has_effect(const Expr& e) {
     if (call && call->call_type == CallType::Operator) {
       found |= call->is_op(Op::print) || call->is_op(Op::print_when) || call->is_op(Op::require) ||
                call->is_op(Op::buffer_set_bounds) || call->is_op(Op::error) ||
-               call->is_op(Op::prefetch) || call->is_op(Op::runtime_call) ||
-               call->is_op(Op::trace);
+               call->is_op(Op::prefetch) || call->is_op(Op::runtime_call) || call->is_op(Op::trace);
     }
     found |= call && call->call_type == CallType::Extern;
     return !found;

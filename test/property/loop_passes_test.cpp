@@ -3,12 +3,14 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <functional>
 #include <map>
 #include <random>
 #include <set>
 
 #include "ir/validate.h"
 #include "lower/accumulate_vectors.h"
+#include "lower/blend_masked_stores.h"
 #include "lower/deinterleave_loads.h"
 #include "lower/free_early.h"
 #include "lower/interleave_vectors.h"
@@ -33,7 +35,8 @@ class RandomProgram {
 
   Stmt make() {
     std::vector<Stmt> nests;
-    for (int i = number(1, 2); i > 0; --i) nests.push_back(nest());
+    for (int i = number(1, 2); i > 0; --i)
+      nests.push_back(number(0, 5) == 0 ? row_of_storage() : nest());
     return make_block(std::move(nests));
   }
 
@@ -86,6 +89,34 @@ class RandomProgram {
     ForType outer = flip() ? ForType::Serial : ForType::Parallel;
     loop = make_for(x_name, 0, (variable("w") + (factor - 1)) / factor, outer, loop);
     return make_for(y_name, 0, number(1, height), y_type, loop);
+  }
+
+  // Rows in storage of their own, updated by vectors whose last one is guarded, then copied out.
+  Stmt row_of_storage() {
+    coordinates_.clear();
+    const std::string row = name("row");
+    const Expr y = variable(name("y")), w = variable("w");
+    const auto loop = [&](ForType type, int factor, const std::function<Stmt(const Expr&)>& store) {
+      const Expr x = variable(name("x")), xi = variable(name("xi"));
+      const Expr t = x * factor + xi;
+      coordinates_ = {x, y};
+      const Stmt inner =
+          make_for(xi.as<Variable>()->name, 0, factor, type, make_if(likely(t < w), store(t)));
+      return make_for(x.as<Variable>()->name, 0, (w + (factor - 1)) / factor, ForType::Serial,
+                      inner);
+    };
+    const auto old = [&](const Expr& t) { return make_load(Int(32), row, t); };
+    const Stmt rows = make_block(
+        {loop(ForType::Serial, 1, [&](const Expr& t) { return make_store(row, value(1), t); }),
+         loop(ForType::Vectorized, number(2, 8),
+              [&](const Expr& t) { return make_store(row, old(t) + value(1), t); }),
+         loop(ForType::Vectorized, 4,
+              [&](const Expr& t) { return make_store(row, max(value(1), old(t)), t); }),
+         loop(ForType::Serial, 1,
+              [&](const Expr& t) { return make_store("a", old(t), t + y * width + margin); })});
+    const Expr elements = flip() ? Expr(make_const(Int(64), 3 * width)) : cast(Int(64), w);
+    return make_for(y.as<Variable>()->name, 0, number(1, height), ForType::Serial,
+                    make_allocate(row, Int(32), MemoryType::Auto, elements, rows));
   }
 
   // Writes only elements that belong to (x, y).
@@ -342,7 +373,7 @@ class LoopPasses : public testing::TestWithParam<int> {};
 
 TEST_P(LoopPasses, KeepWhatProgramsCompute) {
   constexpr unsigned count = 100;
-  int accumulated = 0, changed = 0, widened = 0;
+  int accumulated = 0, changed = 0, widened = 0, blended = 0;
   for (unsigned seed = GetParam() * count; seed < (GetParam() + 1) * count; ++seed) {
     Stmt program = RandomProgram(seed).make();
     ASSERT_NO_THROW(validate(program, Phase::FlatStorage, "generator", free_names))
@@ -364,6 +395,9 @@ TEST_P(LoopPasses, KeepWhatProgramsCompute) {
     expect_same("vectorize_loops", seed, program, vectorized, Phase::Vector);
     expect_same("accumulate_vectors", seed, program, accumulate_vectors(vectorized), Phase::Vector);
     accumulated += !accumulate_vectors(vectorized).same_as(vectorized);
+    expect_same("blend_masked_stores", seed, program, blend_masked_stores(vectorized),
+                Phase::Vector);
+    blended += !blend_masked_stores(vectorized).same_as(vectorized);
     expect_same("interleave_vectors", seed, program, interleave_vectors(vectorized), Phase::Vector);
     expect_same("deinterleave_loads", seed, program, deinterleave_loads(vectorized), Phase::Vector);
     expect_same("transpose_loads", seed, program, transpose_loads(vectorized), Phase::Vector);
@@ -373,6 +407,7 @@ TEST_P(LoopPasses, KeepWhatProgramsCompute) {
     if (HasFatalFailure()) return;
   }
   EXPECT_GT(accumulated, 0) << "no program had a reduction to accumulate";
+  EXPECT_GT(blended, 0) << "no program had a masked store into storage of its own";
   EXPECT_GT(widened, 0) << "no program had an inner loop for vectors";
   EXPECT_GT(changed, 0) << "no program had a loop to trim";
 }

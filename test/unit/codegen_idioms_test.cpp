@@ -154,6 +154,41 @@ TEST(CodegenIdioms, GuardedTilesReadPackedPanelsDensely) {
             0u);
 }
 
+// A matrix product in tiles of 12 vectors, which leaves four registers for operands.
+Func tiled_product(const Type& type, int lanes) {
+  ImageParam a(type, 2, "a"), b(type, 2, "b");
+  Var j("j"), i("i"), ji("ji"), ii("ii"), jt("jt"), it("it");
+  const TailStrategy tail = TailStrategy::GuardWithIf;
+  RDom k(0, a.dim(0).extent(), "k");
+  Func product("product"), f("f");
+  product(j, i) = cast(type, 0);
+  product(j, i) += a(k, i) * b(j, k);
+  f(j, i) = product(j, i);
+  f.tile(j, i, ji, ii, 3 * lanes, 4, tail).vectorize(ji, lanes).unroll(ji).unroll(ii);
+  f.reorder(ji, ii, i, j).parallel(j);
+  product.compute_at(f, i).tile(j, i, jt, it, 3 * lanes, 4).vectorize(jt, lanes);
+  product.unroll(jt).unroll(it);
+  product.update().tile(j, i, jt, it, 3 * lanes, 4, tail).reorder(jt, it, k, j, i);
+  product.update().vectorize(jt, lanes).unroll(jt).unroll(it);
+  return f;
+}
+
+TEST(CodegenIdioms, TilesThatFillTheRegistersAreNotSpilled) {
+  const auto inner = block_with_most(assembly(tiled_product(Float(64), 4), avx2), "vfmadd");
+  EXPECT_EQ(count(inner, "vfmadd"), 12u);
+  EXPECT_EQ(count(inner, "(%rsp"), 0u);
+}
+
+// Vectors that reach past the end are accumulated in registers, too, and not by masked stores.
+TEST(CodegenIdioms, TilesAtTheBorderStayInRegisters) {
+  const auto code = assembly(tiled_product(Float(32), 8), avx2);
+  const auto masked_on_stack = std::count_if(code.begin(), code.end(), [](const std::string& line) {
+    return line.find("vmaskmov") != std::string::npos && line.find("(%rsp") != std::string::npos;
+  });
+  EXPECT_GT(count(code, "vmaskmov"), 0u);
+  EXPECT_EQ(masked_on_stack, 0);
+}
+
 // One product in each iteration; lanes are combined behind the loop.
 TEST(CodegenIdioms, SumsAreCarriedAsVectors) {
   ImageParam a(Float(32), 1, "a"), b(Float(32), 1, "b");

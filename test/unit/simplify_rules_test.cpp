@@ -146,6 +146,11 @@ TEST(Simplify, LinesOfLanes) {
           "select(c:bool, ramp(x, 1, 8), ramp(y, 1, 8))"},
          {"sqrt(broadcast(f:float32, 4))", "broadcast(sqrt(f:float32), 4)"},
          {"a[broadcast(x, 4)]:float32x4", "broadcast(a[x]:float32, 4)"},
+         {"reduce(or, ramp(x, 1, 8) < broadcast(y, 8), 1)", "x < y"},
+         {"reduce(or, ramp(x, -1, 8) <= broadcast(y, 8), 1)", "x <= y + 7"},
+         {"reduce(or, broadcast(y, 8) < ramp(x, 2, 8), 1)", "y <= x + 13"},
+         {"reduce(or, broadcast(c:bool, 8) && (broadcast(y, 8) <= ramp(x, 1, 8)), 1)",
+          "c:bool && y <= x + 7"},
          {"reduce(max, broadcast(x, 8), 1)", "x"},
          {"reduce(add, broadcast(x, 8), 1)", "x*8"}});
 }
