@@ -35,8 +35,8 @@ class RandomProgram {
 
   Stmt make() {
     std::vector<Stmt> nests;
-    for (int i = number(1, 2); i > 0; --i)
-      nests.push_back(number(0, 5) == 0 ? row_of_storage() : nest());
+    for (int i = number(1, 2); i > 0; --i) nests.push_back(nest());
+    if (number(0, 3) == 0) nests.push_back(row_of_storage());
     return make_block(std::move(nests));
   }
 

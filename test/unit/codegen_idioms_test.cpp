@@ -189,6 +189,39 @@ TEST(CodegenIdioms, TilesAtTheBorderStayInRegisters) {
   EXPECT_EQ(masked_on_stack, 0);
 }
 
+// The steps of an unrolled sum are no stores, where its place is no constant.
+TEST(CodegenIdioms, AnUnrolledSumIsStoredOnce) {
+  ImageParam in(Float(32), 1, "in"), taps(Float(32), 1, "taps");
+  Var x("x"), y("y");
+  RDom r(0, 7, "r");
+  Func sum("sum"), f("f");
+  sum(x) += in(x + r) * taps(r);
+  f(x, y) = sum(x) * sum(x + y);
+  sum.compute_at(f, y).update().reorder(r, x).unroll(r).vectorize(x, 8, TailStrategy::RoundUp);
+  const auto inner = block_with_most(assembly(f, avx2), "vfmadd");
+  EXPECT_EQ(count(inner, "vfmadd"), 7u);
+  EXPECT_EQ(count(inner, "ps\t%ymm"), 0u) << "a store between the steps";
+}
+
+// A loop that always runs 16 times, over what a vector has left in memory, is no loop: nothing goes
+// through memory.
+TEST(CodegenIdioms, LanesOfAnAccumulatorAreSummedInRegisters) {
+  ImageParam in(Float(32), 1, "in");
+  Var l("l"), y("y");
+  RDom blocks(0, in.width() / 16, "blocks"), lane(0, 16, "lane");
+  Func partial("partial"), f("f");
+  partial(l) += in(blocks * 16 + l);
+  f(y) = sum(partial(lane));
+  partial.compute_at(f, y).vectorize(l, 8).unroll(l);
+  partial.update().reorder(l, blocks).vectorize(l, 8).unroll(l);
+  const auto code = assembly(f, avx2);
+  EXPECT_GE(count(code, "vaddss"), 15u);
+  const auto through_memory = std::count_if(code.begin(), code.end(), [](const std::string& line) {
+    return line.find("addss") != std::string::npos && line.find("(%rsp") != std::string::npos;
+  });
+  EXPECT_EQ(through_memory, 0);
+}
+
 // One product in each iteration; lanes are combined behind the loop.
 TEST(CodegenIdioms, SumsAreCarriedAsVectors) {
   ImageParam a(Float(32), 1, "a"), b(Float(32), 1, "b");
