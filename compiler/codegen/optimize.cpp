@@ -10,7 +10,10 @@
 //   GVN            loads that an earlier iteration's tail or another block already did, where
 //                  EarlyCSE is too local
 //   LoopLoadElim   what a scan stored in the iteration before stays in a register
+//   DSE            stores that a later one replaces: the steps of an unrolled sum, of which GVN has
+//                  taken the loads
 //   LoopUnroll     short innermost loops over scalars
+//   SROA           allocations of which only such a loop hid the places
 //   InstCombine, SimplifyCFG, ADCE to clean up
 //
 // Left out: loop and SLP vectorization, inlining, loop idioms (a memset call is slower on the short
@@ -18,12 +21,14 @@
 #include "codegen/optimize.h"
 
 #include <llvm/Analysis/LoopInfo.h>
+#include <llvm/Analysis/ScalarEvolution.h>
 #include <llvm/Analysis/TargetTransformInfo.h>
 #include <llvm/IR/Module.h>
 #include <llvm/Passes/PassBuilder.h>
 #include <llvm/Target/TargetMachine.h>
 #include <llvm/Transforms/InstCombine/InstCombine.h>
 #include <llvm/Transforms/Scalar/ADCE.h>
+#include <llvm/Transforms/Scalar/DeadStoreElimination.h>
 #include <llvm/Transforms/Scalar/EarlyCSE.h>
 #include <llvm/Transforms/Scalar/GVN.h>
 #include <llvm/Transforms/Scalar/LICM.h>
@@ -38,16 +43,24 @@
 
 namespace retrograde::codegen {
 
-// Copies of the body of a loop. Only of loops over scalars, where counting costs as much as the
-// work: the others do enough in one iteration.
-static unsigned unroll_count(const llvm::Loop& loop) {
-  constexpr size_t most_instructions = 20;
+// Iterations of a loop in one copy of its body, 1 where it stays as it is. One that always runs a
+// few times is no loop afterwards, and what it passes through memory may be registers. Of the
+// others those over scalars, where counting costs as much as the work.
+static unsigned unroll_count(const llvm::Loop& loop, llvm::ScalarEvolution& evolution) {
+  constexpr size_t most_instructions = 20, most_in_all = 256, most_of_vectors = 64;
   if (!loop.isInnermost() || loop.getNumBlocks() != 1) return 1;
   const llvm::BasicBlock& body = *loop.getHeader();
   if (body.size() > most_instructions) return 1;
-  const bool is_scalar = std::none_of(body.begin(), body.end(), [](const llvm::Instruction& one) {
-    return one.getType()->isVectorTy() || llvm::isa<llvm::CallBase>(one);
+  const bool has_calls = std::any_of(body.begin(), body.end(), [](const llvm::Instruction& one) {
+    return llvm::isa<llvm::CallBase>(one);
   });
+  if (has_calls) return 1;
+  const bool is_scalar = std::none_of(body.begin(), body.end(), [](const llvm::Instruction& one) {
+    return one.getType()->isVectorTy();
+  });
+  const unsigned times = evolution.getSmallConstantTripCount(&loop);
+  const size_t in_all = times * body.size();
+  if (times > 0 && in_all <= (is_scalar ? most_in_all : most_of_vectors)) return times;
   return is_scalar ? 4 : 1;
 }
 
@@ -55,8 +68,9 @@ static unsigned unroll_count(const llvm::Loop& loop) {
 class MarkSmallLoops : public llvm::PassInfoMixin<MarkSmallLoops> {
  public:
   llvm::PreservedAnalyses run(llvm::Function& function, llvm::FunctionAnalysisManager& analyses) {
+    auto& evolution = analyses.getResult<llvm::ScalarEvolutionAnalysis>(function);
     for (llvm::Loop* loop : analyses.getResult<llvm::LoopAnalysis>(function).getLoopsInPreorder()) {
-      const unsigned count = unroll_count(*loop);
+      const unsigned count = unroll_count(*loop, evolution);
       if (count > 1) llvm::addStringMetadataToLoop(loop, "llvm.loop.unroll.count", count);
     }
     return llvm::PreservedAnalyses::all();
@@ -73,8 +87,10 @@ static llvm::FunctionPassManager pipeline() {
                                                        /*UseMemorySSA=*/true));
   passes.addPass(llvm::GVNPass());
   passes.addPass(llvm::LoopLoadEliminationPass());
+  passes.addPass(llvm::DSEPass());
   passes.addPass(MarkSmallLoops());
   passes.addPass(llvm::LoopUnrollPass(llvm::LoopUnrollOptions(2, /*OnlyWhenForced=*/true)));
+  passes.addPass(llvm::SROAPass(llvm::SROAOptions::PreserveCFG));
   passes.addPass(llvm::InstCombinePass());
   passes.addPass(llvm::SimplifyCFGPass());
   passes.addPass(llvm::ADCEPass());
