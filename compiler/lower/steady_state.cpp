@@ -16,13 +16,24 @@ constexpr int64_t thick_loop = 8;
 // ... and at least this many points in all: a tile then, and not a stencil or a vector.
 constexpr int64_t thick_points = 32;
 
+// A loop whose extent varies has at most so many iterations if it follows what is unrolled around
+// it: what is prepared for its copies, say. No more than they does it count as a loop.
+constexpr int few_iterations = 4;
+
+bool is_short(const For& loop, const Substitution& lets) {
+  return !is_const(loop.extent) && can_prove(substitute(loop.extent, lets) <= Expr(few_iterations));
+}
+
 bool contains_serial_loop(const Stmt& s) {
   bool found = false;
+  Substitution lets;
   walk(
       s, [](const Expr&) { return false; },
       [&](const Stmt& part) {
+        if (const auto* let = part.as<LetStmt>(); let && let->value.type() == Int(32))
+          lets[let->name] = let->value;
         const For* loop = part.as<For>();
-        found |= loop && is_serial(*loop);
+        found |= loop && is_serial(*loop) && !is_short(*loop, lets);
         return !found;
       });
   return found;
