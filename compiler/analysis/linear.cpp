@@ -306,6 +306,18 @@ Expr to_expr(const LinearForm& form) {
   return sum;
 }
 
+std::optional<LinearForm> nonnegative_where(const Expr& comparison) {
+  const auto* c = comparison.as<Binary>();
+  if (!c || c->kind < Kind::LT || c->kind > Kind::GE || !has_linear_form(c->a.type()))
+    return std::nullopt;
+  const bool less = c->kind == Kind::LT || c->kind == Kind::LE,
+             strict = c->kind == Kind::LT || c->kind == Kind::GT;
+  LinearForm form = less ? plus(linear_form(c->b), linear_form(c->a), -1)
+                         : plus(linear_form(c->a), linear_form(c->b), -1);
+  form.constant -= strict;
+  return form;
+}
+
 std::optional<int64_t> constant_difference(const Expr& a, const Expr& b) {
   if (a.same_as(b) && has_linear_form(a.type())) return 0;
   if (a.type() != b.type() || !has_linear_form(a.type())) return std::nullopt;

@@ -35,6 +35,10 @@ Expr to_expr(const LinearForm& form);  // undefined when a coefficient does not 
 LinearForm plus(const LinearForm& a, const LinearForm& b, int64_t factor_of_b = 1);
 LinearForm times(const LinearForm& a, int64_t factor);
 
+// The sum that is at least 0 where the comparison holds, and nowhere else; nullopt for anything that
+// is no <, <=, >, >= of sums.
+std::optional<LinearForm> nonnegative_where(const Expr& comparison);
+
 // a - b when it is the same for all values of all variables.
 std::optional<int64_t> constant_difference(const Expr& a, const Expr& b);
 // The expression in canonical form: like terms gathered; the same handle when it is no sum.

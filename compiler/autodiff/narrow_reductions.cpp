@@ -14,19 +14,6 @@ namespace retrograde::ir {
 
 namespace {
 
-// The sum that is at least 0 where the comparison holds.
-std::optional<LinearForm> nonnegative_where(const Expr& condition) {
-  const auto* c = condition.as<Binary>();
-  if (!c || c->kind < Kind::LT || c->kind > Kind::GE || !has_linear_form(c->a.type()))
-    return std::nullopt;
-  const bool less = c->kind == Kind::LT || c->kind == Kind::LE,
-             strict = c->kind == Kind::LT || c->kind == Kind::GT;
-  LinearForm form = less ? plus(linear_form(c->b), linear_form(c->a), -1)
-                         : plus(linear_form(c->a), linear_form(c->b), -1);
-  form.constant -= strict;
-  return form;
-}
-
 class Narrower {
  public:
   Narrower(Gather& g, const std::vector<std::string>& target_args) : g_(g) {

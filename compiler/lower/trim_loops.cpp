@@ -47,29 +47,6 @@ bool is_trimmable(const For& loop) {
   return !extent || *extent > few_iterations;
 }
 
-// The sum that is at least 0 where the comparison holds; nullopt for anything else.
-std::optional<LinearForm> nonnegative_where(const Expr& condition) {
-  const auto* op = condition.as<Binary>();
-  if (!op || !has_linear_form(op->a.type())) return std::nullopt;
-  const auto difference = [](const Expr& big, const Expr& small, int64_t gap) {
-    LinearForm form = plus(linear_form(big), linear_form(small), -1);
-    form.constant -= gap;
-    return form;
-  };
-  switch (condition.kind()) {
-    case Kind::LT:
-      return difference(op->b, op->a, 1);
-    case Kind::LE:
-      return difference(op->b, op->a, 0);
-    case Kind::GT:
-      return difference(op->a, op->b, 1);
-    case Kind::GE:
-      return difference(op->a, op->b, 0);
-    default:
-      return std::nullopt;
-  }
-}
-
 // Takes conditions on one loop out of its body.
 class Trimmer {
  public:
