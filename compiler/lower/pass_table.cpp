@@ -4,6 +4,7 @@
 #include "lower/blend_masked_stores.h"
 #include "lower/deinterleave_loads.h"
 #include "lower/drop_checks.h"
+#include "lower/drop_guarded_clamps.h"
 #include "lower/flatten_storage.h"
 #include "lower/free_early.h"
 #include "lower/interleave_vectors.h"
@@ -31,6 +32,7 @@ const std::vector<StatementPass>& statement_passes() {
       {"partition_loops", partition_loops},
       {"simplify", [](const Stmt& s) { return simplify(s); }},
       {"transpose_loads", transpose_loads},
+      {"drop_guarded_clamps", drop_guarded_clamps},
       {"trim_loops", trim_loops},
       {"unroll_loops", unroll_loops},
       {"vectorize_inner_loops",  // every loop taken for one over a pure variable

@@ -16,6 +16,7 @@
 #include "lower/debug_features.h"
 #include "lower/deinterleave_loads.h"
 #include "lower/drop_checks.h"
+#include "lower/drop_guarded_clamps.h"
 #include "lower/flatten_storage.h"
 #include "lower/fork_async.h"
 #include "lower/free_early.h"
@@ -165,6 +166,8 @@ constexpr Pass passes[] = {
      [](Lowering&, const Stmt& s) { return lower_atomics(s); }},
     {"partition_loops", Phase::FlatStorage,
      [](Lowering&, const Stmt& s) { return partition_loops(s); }},
+    {"drop_guarded_clamps", Phase::FlatStorage,
+     [](Lowering&, const Stmt& s) { return drop_guarded_clamps(s); }},
     {"trim_loops", Phase::FlatStorage, [](Lowering&, const Stmt& s) { return trim_loops(s); }},
     {"unroll_loops", Phase::FlatStorage, [](Lowering&, const Stmt& s) { return unroll_loops(s); }},
     {"vectorize_inner_loops", Phase::FlatStorage,

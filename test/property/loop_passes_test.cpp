@@ -12,6 +12,7 @@
 #include "lower/accumulate_vectors.h"
 #include "lower/blend_masked_stores.h"
 #include "lower/deinterleave_loads.h"
+#include "lower/drop_guarded_clamps.h"
 #include "lower/free_early.h"
 #include "lower/interleave_vectors.h"
 #include "lower/partition_loops.h"
@@ -381,9 +382,13 @@ TEST_P(LoopPasses, KeepWhatProgramsCompute) {
         << program;
     Stmt partitioned = partition_loops(program);
     expect_same("partition_loops", seed, program, partitioned, Phase::FlatStorage);
-    Stmt trimmed = trim_loops(partitioned);
+    expect_same("drop_guarded_clamps alone", seed, program, drop_guarded_clamps(program),
+                Phase::FlatStorage);
+    Stmt guarded = drop_guarded_clamps(partitioned);
+    expect_same("drop_guarded_clamps", seed, program, guarded, Phase::FlatStorage);
+    Stmt trimmed = trim_loops(guarded);
     expect_same("trim_loops", seed, program, trimmed, Phase::FlatStorage);
-    changed += !trimmed.same_as(partitioned);
+    changed += !trimmed.same_as(guarded);
     expect_same("trim_loops alone", seed, program, trim_loops(program), Phase::FlatStorage);
     Stmt unrolled = unroll_loops(trimmed);
     expect_same("unroll_loops", seed, program, unrolled, Phase::FlatStorage);
