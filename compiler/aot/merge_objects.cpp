@@ -1,8 +1,9 @@
-// merge_objects -- two relocatable ELF objects as one, without a linker.
+// merge_objects -- several relocatable ELF objects as one, without a linker.
 //
 // Sections are kept apart, also those of one name: a linker joins them later. What changes is
 // numbers: each section and each symbol gets a new one, and whatever refers to it by number
-// (relocations, groups, headers) is rewritten. Global symbols of one name become one.
+// (relocations, groups, headers) is rewritten. Global symbols of one name become one; those that
+// are hidden between the parts of one program become local.
 //
 // Source: System V ABI, chapter 4; only 64-bit little-endian objects, as x86-64 and AArch64 have.
 #include "aot/merge_objects.h"
@@ -98,24 +99,22 @@ struct Object {
 
 class Merger {
  public:
-  std::string merge(Object object, Object library) {
-    RETROGRADE_ASSERT(object.header.e_machine == library.header.e_machine,
-                      "objects of two architectures");
-    for (NamedSymbol& symbol : library.symbols) {
-      if (symbol.is_local() || !symbol.is_defined()) continue;
-      symbol.entry.st_info = ELF64_ST_INFO(STB_WEAK, ELF64_ST_TYPE(symbol.entry.st_info));
-    }
-    Object* const parts[] = {&object, &library};
+  std::string merge(std::vector<Object> parts, bool are_of_one_program) {
     sections_.push_back({});
     symbols_.push_back({});
-    for (Object* part : parts) number_sections(*part);
-    for (size_t i = 0; i < 2; i++) add_locals(*parts[i], numbers_[i]);
+    for (Object& part : parts) number_sections(part);
+    const auto each = [&](const auto& step) {
+      for (size_t i = 0; i < parts.size(); i++) step(parts[i], numbers_[i]);
+    };
+    each([&](const Object& part, Numbers& numbers) { add_locals(part, numbers); });
+    if (are_of_one_program)
+      each([&](const Object& part, Numbers& numbers) { add_shared(part, numbers); });
     first_global_ = symbols_.size();
-    for (size_t i = 0; i < 2; i++) add_globals(*parts[i], numbers_[i]);
+    each([&](const Object& part, Numbers& numbers) { add_globals(part, numbers); });
     symbol_table_ = static_cast<uint32_t>(sections_.size());
-    for (size_t i = 0; i < 2; i++) rewrite_references(*parts[i], numbers_[i]);
+    each([&](const Object& part, Numbers& numbers) { rewrite_references(part, numbers); });
     add_symbol_table();
-    return write(object.header);
+    return write(parts[0].header);
   }
 
  private:
@@ -125,7 +124,7 @@ class Merger {
   std::vector<Section> sections_;
   std::vector<NamedSymbol> symbols_;
   std::vector<Numbers> numbers_;
-  std::map<std::string, uint32_t> globals_;
+  std::map<std::string, uint32_t> globals_;  // and those that were: shared by parts
   size_t first_global_ = 0;
   uint32_t symbol_table_ = 0;
 
@@ -153,6 +152,19 @@ class Merger {
     }
   }
 
+  // What a part defines for the others only.
+  void add_shared(const Object& part, Numbers& numbers) {
+    for (size_t i = 1; i < part.symbols.size(); i++) {
+      NamedSymbol symbol = renumbered(part.symbols[i], numbers);
+      const bool is_hidden = ELF64_ST_VISIBILITY(symbol.entry.st_other) == STV_HIDDEN;
+      if (symbol.is_local() || !symbol.is_defined() || !is_hidden) continue;
+      symbol.entry.st_info = ELF64_ST_INFO(STB_LOCAL, ELF64_ST_TYPE(symbol.entry.st_info));
+      symbol.entry.st_other = STV_DEFAULT;
+      globals_.emplace(symbol.name, static_cast<uint32_t>(symbols_.size()));
+      symbols_.push_back(std::move(symbol));
+    }
+  }
+
   void add_globals(const Object& part, Numbers& numbers) {
     for (size_t i = 1; i < part.symbols.size(); i++) {
       if (part.symbols[i].is_local()) continue;
@@ -162,7 +174,7 @@ class Merger {
       numbers.symbol[i] = found->second;
       if (is_new)
         symbols_.push_back(symbol);
-      else if (goes_before(symbol, symbols_[found->second]))
+      else if (found->second >= first_global_ && goes_before(symbol, symbols_[found->second]))
         symbols_[found->second] = symbol;
     }
   }
@@ -262,7 +274,19 @@ class Merger {
 }  // namespace
 
 std::string merge_objects(const std::string& object, const std::string& library) {
-  return Merger().merge(Object(object), Object(library));
+  std::vector<Object> parts{Object(object), Object(library)};
+  RETROGRADE_ASSERT(parts[0].header.e_machine == parts[1].header.e_machine,
+                    "objects of two architectures");
+  for (NamedSymbol& symbol : parts[1].symbols) {
+    if (symbol.is_local() || !symbol.is_defined()) continue;
+    symbol.entry.st_info = ELF64_ST_INFO(STB_WEAK, ELF64_ST_TYPE(symbol.entry.st_info));
+  }
+  return Merger().merge(std::move(parts), /*are_of_one_program=*/false);
+}
+
+std::string join_parts(const std::vector<std::string>& parts) {
+  if (parts.size() == 1) return parts[0];
+  return Merger().merge({parts.begin(), parts.end()}, /*are_of_one_program=*/true);
 }
 
 }  // namespace retrograde::aot

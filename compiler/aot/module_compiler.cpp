@@ -102,21 +102,23 @@ class Outputs {
       const bool is_new = std::find(formats.begin(), formats.end(), format) == formats.end();
       if (wanted.count(type) && is_new) formats.push_back(format);
     };
-    need(OutputFileType::object, Format::Object);
-    need(OutputFileType::static_library, Format::Object);
     need(OutputFileType::assembly, Format::Assembly);
     need(OutputFileType::stmt_html, Format::Assembly);
     need(OutputFileType::llvm_assembly, Format::LlvmIr);
     need(OutputFileType::bitcode, Format::Bitcode);
-    if (formats.empty()) return;
+    const bool needs_object =
+        wanted.count(OutputFileType::object) || wanted.count(OutputFileType::static_library);
+    if (formats.empty() && !needs_object) return;
     const auto start = std::chrono::steady_clock::now();
-    code_ =
-        codegen::compile_program(aot::program_of(module), options_for(module.target()), formats);
+    const codegen::Program program = aot::program_of(module);
+    const codegen::Options options = options_for(module.target());
+    if (needs_object) object_ = aot::join_parts(codegen::compile_parts(program, options));
+    if (!formats.empty()) texts_ = codegen::compile_texts(program, options, formats);
     const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - start;
     tell_pass_observers({module.name(), "llvm", seconds.count(), {}});
   }
 
-  std::string object() const { return code_.at(Format::Object); }
+  const std::string& object() const { return object_; }
 
   std::string contents(OutputFileType type) const {
     switch (type) {
@@ -125,15 +127,15 @@ class Outputs {
       case OutputFileType::static_library:
         return library();
       case OutputFileType::assembly:
-        return code_.at(Format::Assembly);
+        return texts_.at(Format::Assembly);
       case OutputFileType::llvm_assembly:
-        return code_.at(Format::LlvmIr);
+        return texts_.at(Format::LlvmIr);
       case OutputFileType::bitcode:
-        return code_.at(Format::Bitcode);
+        return texts_.at(Format::Bitcode);
       case OutputFileType::stmt:
         return statement_text(module_);
       case OutputFileType::stmt_html:
-        return page_text(module_, code_.at(Format::Assembly));
+        return page_text(module_, texts_.at(Format::Assembly));
       case OutputFileType::c_header:
         return aot::header_text(module_.name(), module_.target(), declared_functions(module_));
       case OutputFileType::registration:
@@ -145,7 +147,8 @@ class Outputs {
 
  private:
   const Module module_;
-  std::map<Format, std::string> code_;
+  std::string object_;
+  std::map<Format, std::string> texts_;
 
   bool has_runtime() const { return !module_.target().has_feature(Target::NoRuntime); }
   // Where this build has no runtime for the target, an object leaves it to its user.
@@ -222,9 +225,8 @@ class MultitargetOutputs {
   }
 
   std::string wrapper_object() const {
-    return codegen::compile_program(aot::dispatcher(name_, modules_),
-                                    options_for(baseline().target()), {Format::Object})
-        .at(Format::Object);
+    return aot::join_parts(
+        codegen::compile_parts(aot::dispatcher(name_, modules_), options_for(baseline().target())));
   }
 
   void add_objects(const std::string& path, const std::string& extension,

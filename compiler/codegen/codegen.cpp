@@ -1,5 +1,6 @@
-// The way through LLVM: generate, optimize, emit. What the JIT compiles is split after the first
-// step, and its parts go on at the same time; a file of its own is one module from start to end.
+// The way through LLVM: generate, optimize, emit. Machine code is split after the first step, and
+// its parts go on at the same time; a text is one module from start to end. No step looks from one
+// function into another, so that both have the same code.
 #include "codegen/codegen.h"
 
 #include <llvm/IR/Verifier.h>
@@ -103,8 +104,8 @@ void compile_part(const std::string& name, const std::string& bitcode, const Mac
   }
 }
 
-std::vector<Part> compile_parts(const std::string& name, const std::vector<std::string>& bitcode,
-                                const Machine& machine, const Options& options) {
+std::vector<Part> compile_at_once(const std::string& name, const std::vector<std::string>& bitcode,
+                                  const Machine& machine, const Options& options) {
   std::vector<Part> parts(bitcode.size());
   const auto run = [&](size_t i) { compile_part(name, bitcode[i], machine, options, parts[i]); };
   {
@@ -139,21 +140,28 @@ void join_times(const std::vector<Part>& parts, Times& times) {
   }
 }
 
-Module compile_unit(Unit& unit, const Machine& machine, const Options& options) {
-  const unsigned count = options.parts ? options.parts : worthwhile_parts(unit.module());
-  Module result;
-  result.externals = unit.externals();
-  result.times = unit.times;
+// In at most `most` parts, where the options do not say.
+std::vector<Part> compile_unit(Unit& unit, const Machine& machine, const Options& options,
+                               unsigned most) {
+  const unsigned count = options.parts ? options.parts : worthwhile_parts(unit.module(), most);
   std::vector<Part> parts(1);
   if (count == 1) {
     finish(unit, options, parts[0]);
-  } else {
-    Stopwatch watch;
-    const std::vector<std::string> bitcode = split_into_bitcode(unit.module(), count);
-    result.times.generate_seconds += watch.lap();
-    parts = compile_parts(unit.module().getModuleIdentifier(), bitcode, machine, options);
+    return parts;
   }
-  const std::string bytes = count == 1 ? std::move(parts[0].object) : archive_of(parts);
+  Stopwatch watch;
+  const std::vector<std::string> bitcode = split_into_bitcode(unit.module(), count);
+  unit.times.generate_seconds += watch.lap();
+  return compile_at_once(unit.module().getModuleIdentifier(), bitcode, machine, options);
+}
+
+Module compile_for_here(Unit& unit, const Machine& machine, const Options& options) {
+  Module result;
+  result.externals = unit.externals();
+  std::vector<Part> parts =
+      compile_unit(unit, machine, options, std::thread::hardware_concurrency());
+  result.times = unit.times;
+  const std::string bytes = parts.size() == 1 ? std::move(parts[0].object) : archive_of(parts);
   result.object.assign(bytes.begin(), bytes.end());
   join_times(parts, result.times);
   return result;
@@ -164,14 +172,23 @@ Module compile_unit(Unit& unit, const Machine& machine, const Options& options) 
 Module compile_object(const ir::LoweredFunction& function, const Options& options) {
   return with_generated(
       {{function}, {}, {}}, options, /*keep_names=*/false,
-      [&](Unit& unit, const Machine& machine) { return compile_unit(unit, machine, options); });
+      [&](Unit& unit, const Machine& machine) { return compile_for_here(unit, machine, options); });
 }
 
-std::map<Format, std::string> compile_program(const Program& program, const Options& options,
-                                              const std::vector<Format>& formats) {
-  bool keep_names = false;  // an object needs none
-  for (Format format : formats) keep_names = keep_names || format != Format::Object;
-  return with_optimized(program, options, keep_names, [&](Unit& unit) {
+std::vector<std::string> compile_parts(const Program& program, const Options& options) {
+  constexpr unsigned most = 8;
+  return with_generated(program, options, /*keep_names=*/false,
+                        [&](Unit& unit, const Machine& machine) {
+                          std::vector<std::string> objects;
+                          for (Part& part : compile_unit(unit, machine, options, most))
+                            objects.push_back(std::move(part.object));
+                          return objects;
+                        });
+}
+
+std::map<Format, std::string> compile_texts(const Program& program, const Options& options,
+                                            const std::vector<Format>& formats) {
+  return with_optimized(program, options, /*keep_names=*/true, [&](Unit& unit) {
     std::map<Format, std::string> result;
     for (Format format : formats) result[format] = unit.emit(format);
     return result;

@@ -21,8 +21,8 @@ struct Options {
   bool tune_for_host = true;
   // 0: straight from the IR; 1: what the passes of optimize.cpp make of it.
   int optimization_level = 1;
-  // Of compile_object: into how many parts the program is cut, which are compiled at the same time.
-  // 0: what its size and the machine's cores suggest.
+  // Into how many parts a program is cut, which are compiled at the same time. 0: what its size
+  // suggests; of compile_object, at most the machine's cores.
   unsigned parts = 0;
 };
 
@@ -48,9 +48,13 @@ struct Program {
   std::vector<Export> exports;
   std::vector<Dispatch> dispatches;
 };
-enum class Format { Object, Assembly, LlvmIr, Bitcode };
-std::map<Format, std::string> compile_program(const Program& program, const Options& options,
-                                              const std::vector<Format>& formats);
+// The parts of one object file, which refer to each other by hidden symbols. The same whatever the
+// machine that it runs on.
+std::vector<std::string> compile_parts(const Program& program, const Options& options);
+
+enum class Format { Assembly, LlvmIr, Bitcode };
+std::map<Format, std::string> compile_texts(const Program& program, const Options& options,
+                                            const std::vector<Format>& formats);
 
 std::string compile_llvm_ir(const ir::LoweredFunction& function, const Options& options);
 std::string compile_assembly(const ir::LoweredFunction& function, const Options& options);

@@ -7,13 +7,12 @@
 
 #include <algorithm>
 #include <map>
-#include <thread>
 
 namespace retrograde::codegen {
 namespace {
 
 // Instructions that take LLVM several times as long as starting a thread and handing them over.
-constexpr unsigned worth_a_thread = 1000;
+constexpr unsigned worth_a_thread = 300;
 
 using Parts = std::map<const llvm::GlobalValue*, unsigned>;
 
@@ -66,11 +65,11 @@ std::string bitcode_of(const llvm::Module& module) {
 
 }  // namespace
 
-unsigned worthwhile_parts(const llvm::Module& module) {
+unsigned worthwhile_parts(const llvm::Module& module, unsigned most) {
   unsigned functions = 0;
   for (const llvm::Function& function : module) functions += !function.isDeclaration();
   const unsigned size = module.getInstructionCount() / worth_a_thread;
-  return std::max(1u, std::min({size, functions, std::thread::hardware_concurrency()}));
+  return std::max(1u, std::min({size, functions, most}));
 }
 
 std::vector<std::string> split_into_bitcode(llvm::Module& module, unsigned parts) {

@@ -10,9 +10,9 @@ class Module;
 
 namespace retrograde::codegen {
 
-// How many parts of this module are worth a thread each: at most one a core, and one for a small
+// How many parts of this module are worth a thread each: at most `most`, and one for a small
 // module.
-unsigned worthwhile_parts(const llvm::Module& module);
+unsigned worthwhile_parts(const llvm::Module& module, unsigned most);
 
 // The bitcode of `parts` modules, at most one a function, which together are this one. Functions go
 // where the least is, the largest first, so the same module always splits in the same way. What was

@@ -56,9 +56,7 @@ std::string Unit::emit(Format format) {
       return bitcode();
     default:
       target_machine_->Options.MCOptions.AsmVerbose = true;  // comments name blocks and spills
-      return emit(format == Format::Object ? llvm::CodeGenFileType::ObjectFile
-                                           : llvm::CodeGenFileType::AssemblyFile,
-                  *llvm::CloneModule(*module_));
+      return emit(llvm::CodeGenFileType::AssemblyFile, *llvm::CloneModule(*module_));
   }
 }
 

@@ -285,6 +285,53 @@ TEST_F(AotFiles, ParametersBecomeArguments) {
   EXPECT_FALSE(a == b);
 }
 
+// Large programs are compiled in parts at the same time; what the parts call of each other is seen
+// by nobody else, so that the same program may be linked twice.
+TEST_F(AotFiles, PartsOfAProgramAreOneObject) {
+  ImageParam samples(Float(32), 1, "samples");
+  const auto stages = [&] {
+    std::vector<Func> chain;
+    for (int i = 0; i < 6; i++) {
+      Func next("stage");
+      const Expr before = chain.empty() ? samples(x) : chain.back()(x);
+      next(x) = sqrt(before * before + 1.0f / (1.0f + before)) + i;
+      next.compute_root().parallel(x, 64).vectorize(x, 8, TailStrategy::GuardWithIf);
+      chain.push_back(next);
+    }
+    return chain.back();
+  };
+  Func program = stages();
+  program.compile_to_static_library(path("a"), {samples}, "first", Target("host"));
+  program.compile_to_object(path("b.o"), {samples}, "second", Target("host-no_runtime"));
+  program.compile_to_object(path("c.o"), {samples}, "second", Target("host-no_runtime"));
+  EXPECT_EQ(read_file(path("b.o")), read_file(path("c.o")));
+  ASSERT_EQ(shell("nm --defined-only --extern-only " + path("b.o")), 0);
+  const std::string symbols = read_file(path("log"));
+  EXPECT_EQ(std::count(symbols.begin(), symbols.end(), '\n'), 3) << symbols;
+  ASSERT_EQ(shell("nm " + path("b.o") + " | grep -c ' t .*parallel'"), 0);
+  EXPECT_GE(std::stoi(read_file(path("log"))), 6) << "several functions";
+  ASSERT_EQ(shell("readelf -SW " + path("b.o") + " | grep -c 'PROGBITS.* AX '"), 0);
+  EXPECT_GE(std::stoi(read_file(path("log"))), 2) << "several parts";
+
+  std::ofstream(path("main.cpp"))
+      << "#include <HalideBuffer.h>\n#include <cmath>\n"
+         "extern \"C\" int first(halide_buffer_t *, halide_buffer_t *);\n"
+         "extern \"C\" int second(halide_buffer_t *, halide_buffer_t *);\n"
+         "int main() {\n"
+         "  Halide::Runtime::Buffer<float> in(1000), a(1000), b(1000);\n"
+         "  for (int i = 0; i < 1000; i++) in(i) = i * 0.01f;\n"
+         "  if (first(in, a) || second(in, b)) return 1;\n"
+         "  for (int i = 0; i < 1000; i++) {\n"
+         "    double v = in(i);\n"
+         "    for (int k = 0; k < 6; k++) v = std::sqrt(v * v + 1 / (1 + v)) + k;\n"
+         "    if (a(i) != b(i) || std::abs(a(i) - v) > 1e-4 * v) return 2;\n"
+         "  }\n"
+         "  return 0;\n"
+         "}\n";
+  ASSERT_EQ(link({"a.a", "b.o"}), 0) << read_file(path("log"));
+  EXPECT_EQ(shell(path("main")), 0);
+}
+
 TEST_F(AotFiles, CodeForOtherMachines) {
   out.compile_to_file(path("arm"), {in, gain}, "f", Target("arm-64-linux-no_runtime"));
   const std::string object = read_file(path("arm.o"));
