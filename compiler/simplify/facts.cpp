@@ -280,14 +280,41 @@ void Facts::assume_at_most(Sum sum, int64_t bound) {
   add(key, Known{std::move(sum.terms), bound, {}, true});
 }
 
+bool Facts::is_older(const Expr& e, int order) const {
+  bool result = true;
+  walk(e, [&](const Expr& part) {
+    const auto* name = part.as<Variable>();
+    const auto found = name ? variables_.find(name->name) : variables_.end();
+    result &= found == variables_.end() || found->second.order < order;
+    return result;
+  });
+  return result;
+}
+
+// low + gap <= high, where low is a loop's variable: a new upper end. The old one stays beside it,
+// as it may be the tighter one.
+void Facts::narrow(const Expr& low, const Expr& high, int64_t gap) {
+  const auto* name = low.as<Variable>();
+  const auto found = name ? variables_.find(name->name) : variables_.end();
+  if (found == variables_.end() || is_const(high)) return;
+  Bounds& bounds = found->second;
+  if (!bounds.max.defined() || bounds.min.same_as(bounds.max) || !is_older(high, bounds.order))
+    return;
+  narrowed_.push_back({name->name, bounds});
+  const Expr end = binary(Kind::Sub, high, make_const(high.type(), gap));
+  bounds.max = binary(Kind::Min, end, bounds.max);
+}
+
 void Facts::assume_comparison(const Binary& n, bool value) {
   if (!is_index_type(n.a.type()) || n.a.type().is_vector()) return;
   const Sum difference = plus(sum_of(n.a), sum_of(n.b), -1);
   const Sum opposite = times(difference, -1);
   switch (n.kind) {
     case Kind::LT:
+      value ? narrow(n.a, n.b, 1) : narrow(n.b, n.a, 0);
       return value ? assume_at_most(difference, -1) : assume_at_most(opposite, 0);
     case Kind::LE:
+      value ? narrow(n.a, n.b, 0) : narrow(n.b, n.a, 1);
       return value ? assume_at_most(difference, 0) : assume_at_most(opposite, -1);
     case Kind::EQ:
     case Kind::NE:
@@ -324,7 +351,10 @@ void Facts::assume(const Expr& condition) {
 }
 
 Facts::Assumption::Assumption(Facts& facts, const Expr& condition)
-    : facts_(facts), first_(facts.known_.size()), first_congruent_(facts.congruent_.size()) {
+    : facts_(facts),
+      first_(facts.known_.size()),
+      first_congruent_(facts.congruent_.size()),
+      first_narrowed_(facts.narrowed_.size()) {
   if (condition.defined()) facts_.assume(condition);
 }
 
@@ -335,6 +365,11 @@ Facts::Assumption::~Assumption() {
   }
   facts_.known_.resize(first_);
   facts_.congruent_.resize(first_congruent_);
+  for (; facts_.narrowed_.size() > first_narrowed_; facts_.narrowed_.pop_back()) {
+    const Narrowed& last = facts_.narrowed_.back();
+    if (const auto it = facts_.variables_.find(last.name); it != facts_.variables_.end())
+      it->second = last.before;
+  }
   facts_.forget();
 }
 

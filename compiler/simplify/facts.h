@@ -54,7 +54,7 @@ class Facts {
 
    private:
     Facts& facts_;
-    size_t first_, first_congruent_;
+    size_t first_, first_congruent_, first_narrowed_;
   };
   // Until the end of time (or of an enclosing Assumption).
   void assume(const Expr& condition);
@@ -88,6 +88,11 @@ class Facts {
     Expr condition;
     bool value = true;
   };
+  // What was known of a variable before a condition said more.
+  struct Narrowed {
+    std::string name;
+    Bounds before;
+  };
   // A variable that a condition says so of.
   struct Congruent {
     std::string name;
@@ -105,6 +110,8 @@ class Facts {
   void assume(const Expr& condition, bool value);
   void assume_comparison(const Binary& comparison, bool value);
   void assume_at_most(Sum sum, int64_t bound);
+  void narrow(const Expr& low, const Expr& high, int64_t gap);
+  bool is_older(const Expr& e, int order) const;
   void assume_congruent(const Expr& remainder, const Expr& value);
   void add(uint64_t key, Known known);
   int64_t known_bound(const Sum& sum) const;
@@ -127,6 +134,7 @@ class Facts {
   std::unordered_map<std::string, Bounds> variables_;
   std::vector<Known> known_;
   std::vector<Congruent> congruent_;
+  std::vector<Narrowed> narrowed_;
   std::unordered_multimap<uint64_t, size_t>
       index_;  // hash of the terms or condition -> position in known_
   std::unordered_map<const ExprNode*, Remembered> ranges_;
