@@ -26,7 +26,8 @@ void for_each_name(const Stmt& s, Found found) {
         if (const Variable* v = e.as<Variable>()) found(v->name);
         if (const Let* let = e.as<Let>()) found(let->name);
         if (const Load* load = e.as<Load>()) found(load->name);
-        if (const Call* call = e.as<Call>()) found(call->name);
+        const Call* call = e.as<Call>();
+        if (call && call->call_type != CallType::Operator) found(call->name);
         return true;
       },
       [&](const Stmt& node) {
@@ -126,11 +127,14 @@ class Copier : public Rewriter {
 
 }  // namespace
 
-FreshNames::FreshNames(const Stmt& s) {
-  for_each_name(s, [&](const std::string& name) { taken_.insert(name); });
+void FreshNames::read_program() {
+  if (!program_.defined()) return;
+  for_each_name(program_, [&](const std::string& name) { taken_.insert(name); });
+  program_ = Stmt();
 }
 
 std::string FreshNames::operator()(const std::string& model) {
+  read_program();
   std::string base = original_name(model), name;
   do {
     name = base + ".$" + std::to_string(++next_[base]);

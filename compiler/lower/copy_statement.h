@@ -6,6 +6,7 @@
 #include <string>
 #include <unordered_map>
 #include <unordered_set>
+#include <utility>
 
 #include "ir/expr.h"
 #include "ir/visit.h"
@@ -16,10 +17,12 @@ namespace retrograde::ir {
 // "f.s0.x.$3", ...
 class FreshNames {
  public:
-  explicit FreshNames(const Stmt& s);
+  explicit FreshNames(Stmt s) : program_(std::move(s)) {}
   std::string operator()(const std::string& model);
 
  private:
+  void read_program();
+  Stmt program_;  // until the first name is asked for: most programs leave most passes as they are
   std::unordered_set<std::string> taken_;
   std::unordered_map<std::string, int> next_;
 };
