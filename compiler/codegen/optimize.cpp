@@ -12,8 +12,8 @@
 //   LoopLoadElim   what a scan stored in the iteration before stays in a register
 //   DSE            stores that a later one replaces: the steps of an unrolled sum, of which GVN has
 //                  taken the loads
-//   LoopUnroll     short innermost loops over scalars
-//   SROA           allocations of which only such a loop hid the places
+//   LoopUnroll     loops of few iterations altogether, other small innermost ones two or four times
+//   SROA, EarlyCSE allocations of which only such a loop hid the places; what it loaded twice
 //   InstCombine, SimplifyCFG, ADCE to clean up
 //
 // Left out: loop and SLP vectorization, inlining, loop idioms (a memset call is slower on the short
@@ -23,6 +23,7 @@
 #include <llvm/Analysis/LoopInfo.h>
 #include <llvm/Analysis/ScalarEvolution.h>
 #include <llvm/Analysis/TargetTransformInfo.h>
+#include <llvm/IR/IntrinsicInst.h>
 #include <llvm/IR/Module.h>
 #include <llvm/Passes/PassBuilder.h>
 #include <llvm/Target/TargetMachine.h>
@@ -40,28 +41,62 @@
 #include <llvm/Transforms/Utils/LoopUtils.h>
 
 #include <algorithm>
+#include <optional>
 
 namespace retrograde::codegen {
 
-// Iterations of a loop in one copy of its body, 1 where it stays as it is. One that always runs a
-// few times is no loop afterwards, and what it passes through memory may be registers. Of the
-// others those over scalars, where counting costs as much as the work.
-static unsigned unroll_count(const llvm::Loop& loop, llvm::ScalarEvolution& evolution) {
-  constexpr size_t most_instructions = 20, most_in_all = 256, most_of_vectors = 64;
+// About how many instructions of the machine a block is: addresses and conversions of indices fold
+// into what uses them, vectors wider than a register count as often as they have registers.
+static unsigned cost_of(const llvm::BasicBlock& block) {
+  constexpr unsigned register_bits = 256;
+  unsigned cost = 0;
+  for (const llvm::Instruction& one : block) {
+    if (llvm::isa<llvm::PHINode, llvm::GetElementPtrInst, llvm::CastInst>(one)) continue;
+    const auto* store = llvm::dyn_cast<llvm::StoreInst>(&one);
+    const llvm::Type* type = store ? store->getValueOperand()->getType() : one.getType();
+    const auto bits = static_cast<unsigned>(type->getPrimitiveSizeInBits().getFixedValue());
+    cost += std::max(1u, bits / register_bits);
+  }
+  return cost;
+}
+
+// What a loop adds to its counter, compares and jumps.
+constexpr unsigned counting = 3;
+// The most that a loop without a loop in it, copied as often as it runs, may grow to. Loops over
+// the lanes of a vector of bytes, as borders have them, stay compact.
+constexpr unsigned most_unrolled = 160, few_iterations = 16;
+
+// A loop of few iterations, whose number is known, is copied for each; the loops in it first. Its
+// cost as straight code, or nothing where it stays a loop.
+static std::optional<unsigned> unrolled_cost(const llvm::Loop& loop,
+                                             llvm::ScalarEvolution& evolution) {
+  const unsigned count = evolution.getSmallConstantTripCount(&loop);
+  if (count == 0 || count > few_iterations || !loop.getExitingBlock()) return std::nullopt;
+  unsigned cost = 0;
+  for (const llvm::Loop* inner : loop.getSubLoops()) {
+    const auto inner_cost = unrolled_cost(*inner, evolution);
+    if (!inner_cost) return std::nullopt;
+    cost += *inner_cost;
+  }
+  for (const llvm::BasicBlock* block : loop.blocks()) {
+    const bool is_own = std::none_of(
+        loop.begin(), loop.end(), [&](const llvm::Loop* inner) { return inner->contains(block); });
+    if (is_own) cost += cost_of(*block);
+  }
+  cost -= std::min(cost, counting);
+  return cost * count <= most_unrolled ? std::optional<unsigned>(cost * count) : std::nullopt;
+}
+
+// Copies of the body of a small innermost loop, where counting costs a good part of the work.
+static unsigned unroll_count(const llvm::Loop& loop) {
+  constexpr unsigned room = 48;
   if (!loop.isInnermost() || loop.getNumBlocks() != 1) return 1;
   const llvm::BasicBlock& body = *loop.getHeader();
-  if (body.size() > most_instructions) return 1;
-  const bool has_calls = std::any_of(body.begin(), body.end(), [](const llvm::Instruction& one) {
-    return llvm::isa<llvm::CallBase>(one);
+  const bool calls = std::any_of(body.begin(), body.end(), [](const llvm::Instruction& one) {
+    return llvm::isa<llvm::CallBase>(one) && !llvm::isa<llvm::IntrinsicInst>(one);
   });
-  if (has_calls) return 1;
-  const bool is_scalar = std::none_of(body.begin(), body.end(), [](const llvm::Instruction& one) {
-    return one.getType()->isVectorTy();
-  });
-  const unsigned times = evolution.getSmallConstantTripCount(&loop);
-  const size_t in_all = times * body.size();
-  if (times > 0 && in_all <= (is_scalar ? most_in_all : most_of_vectors)) return times;
-  return is_scalar ? 4 : 1;
+  const unsigned cost = cost_of(body);
+  return calls || cost * 2 > room ? 1 : cost * 4 > room ? 2 : 4;
 }
 
 // Tells LoopUnroll what to do: it follows nothing but these marks.
@@ -70,8 +105,11 @@ class MarkSmallLoops : public llvm::PassInfoMixin<MarkSmallLoops> {
   llvm::PreservedAnalyses run(llvm::Function& function, llvm::FunctionAnalysisManager& analyses) {
     auto& evolution = analyses.getResult<llvm::ScalarEvolutionAnalysis>(function);
     for (llvm::Loop* loop : analyses.getResult<llvm::LoopAnalysis>(function).getLoopsInPreorder()) {
-      const unsigned count = unroll_count(*loop, evolution);
-      if (count > 1) llvm::addStringMetadataToLoop(loop, "llvm.loop.unroll.count", count);
+      if (unrolled_cost(*loop, evolution)) {
+        llvm::addStringMetadataToLoop(loop, "llvm.loop.unroll.full", 1);
+      } else if (const unsigned count = unroll_count(*loop); count > 1) {
+        llvm::addStringMetadataToLoop(loop, "llvm.loop.unroll.count", count);
+      }
     }
     return llvm::PreservedAnalyses::all();
   }
@@ -91,6 +129,7 @@ static llvm::FunctionPassManager pipeline() {
   passes.addPass(MarkSmallLoops());
   passes.addPass(llvm::LoopUnrollPass(llvm::LoopUnrollOptions(2, /*OnlyWhenForced=*/true)));
   passes.addPass(llvm::SROAPass(llvm::SROAOptions::PreserveCFG));
+  passes.addPass(llvm::EarlyCSEPass(false));
   passes.addPass(llvm::InstCombinePass());
   passes.addPass(llvm::SimplifyCFGPass());
   passes.addPass(llvm::ADCEPass());

@@ -1,6 +1,7 @@
 // What machine code looks like where its speed depends on it: shuffles instead of gathers,
 // accumulators in registers. Each test compiles for AVX2 or AVX-512, whatever it runs on, and looks
-// at the assembly; what the code computes is tested elsewhere.
+// at the assembly; what the code computes is tested elsewhere. Small loops are unrolled: a block
+// has two or four of their iterations.
 #include <gtest/gtest.h>
 
 #include <retrograde/retrograde.h>
@@ -222,7 +223,7 @@ TEST(CodegenIdioms, LanesOfAnAccumulatorAreSummedInRegisters) {
   EXPECT_EQ(through_memory, 0);
 }
 
-// One product in each iteration; lanes are combined behind the loop.
+// One product in each of four iterations; lanes are combined behind the loop.
 TEST(CodegenIdioms, SumsAreCarriedAsVectors) {
   ImageParam a(Float(32), 1, "a"), b(Float(32), 1, "b");
   RDom r(0, 4096, "r");
@@ -231,7 +232,7 @@ TEST(CodegenIdioms, SumsAreCarriedAsVectors) {
   f() += a(r) * b(r);
   f.update().atomic().vectorize(r, 8);
   const auto loop = block_with_most(assembly(f, avx2), "vfmadd");
-  EXPECT_EQ(count(loop, "vfmadd"), 1u);
+  EXPECT_EQ(count(loop, "vfmadd"), 4u);
   EXPECT_EQ(count(loop, "vextract") + count(loop, "vhadd") + count(loop, "vaddss"), 0u);
 }
 
@@ -243,10 +244,10 @@ TEST(CodegenIdioms, ProductsOf16BitsAreAddedInPairs) {
   f() += cast<int>(a(r)) * cast<int>(b(r));
   f.update().atomic().vectorize(r, 32);
   const auto wide = block_with_most(assembly(f, avx512), "vpmaddwd");
-  EXPECT_EQ(count(wide, "vpmaddwd"), 1u);
+  EXPECT_EQ(count(wide, "vpmaddwd"), 2u) << "of two iterations";
   EXPECT_EQ(count(wide, "vpmull") + count(wide, "vextract"), 0u);
   const auto narrow = block_with_most(assembly(f, avx2), "vpmaddwd");
-  EXPECT_EQ(count(narrow, "vpmaddwd"), 2u);
+  EXPECT_EQ(count(narrow, "vpmaddwd"), 4u) << "of two iterations";
   EXPECT_EQ(count(narrow, "vpmull"), 0u);
 }
 
@@ -260,7 +261,7 @@ TEST(CodegenIdioms, TapsOf16BitsAreAddedInPairs) {
   f(x) = at(0) * 13 + at(1) * cast<int>(k) + at(2) * 33 + at(3) * 14 + 5;
   f.vectorize(x, 16);
   const auto loop = block_with_most(assembly(f, avx512), "vpmaddwd");
-  EXPECT_EQ(count(loop, "vpmaddwd"), 2u);
+  EXPECT_EQ(count(loop, "vpmaddwd"), 4u) << "of two iterations";
   EXPECT_EQ(count(loop, "vpmovsxwd") + count(loop, "vpmull"), 0u);
 }
 
@@ -277,7 +278,7 @@ TEST(CodegenIdioms, PairsBelongToTheSumsOfSeveralLanes) {
   f.bound(x, 0, 8).vectorize(x);
   f.update().split(r, ro, ri, 2).reorder(ri, x, ro).atomic().vectorize(ri).vectorize(x);
   const auto loop = block_with_most(assembly(f, avx2), "vpmaddwd");
-  EXPECT_EQ(count(loop, "vpmaddwd"), 1u);
+  EXPECT_EQ(count(loop, "vpmaddwd"), 4u) << "of four iterations";
   EXPECT_EQ(count(loop, "vpmull"), 0u);
 }
 
@@ -302,8 +303,8 @@ TEST(CodegenIdioms, ScansCarryTheirLastValueInARegister) {
   scan.compute_at(f, x).vectorize(x, 8).update().reorder(x, t).vectorize(x, 8);
   f.vectorize(x, 8);
   const auto loop = block_with_most(assembly(f, avx2), "vfmadd");
-  EXPECT_EQ(count(loop, "vfmadd"), 1u);
-  EXPECT_EQ(count(loop, "(%r"), 0u) << "nothing is loaded before it";
+  EXPECT_EQ(count(loop, "vfmadd"), 4u);
+  EXPECT_EQ(count(loop, "(%r"), 3u) << "stores between them, no loads";
 }
 
 // The last part of a reduction in lanes is masked, the others are not.
@@ -317,9 +318,30 @@ TEST(CodegenIdioms, FactoredReductionsAreMaskedOnlyAtTheirEnd) {
   f() += in(r)*in(r);
   Func lanes = f.update().split(r, ro, ri, 8).rfactor(ri, lane);
   lanes.compute_root().vectorize(lane, 8).update().reorder(lane, ro).vectorize(lane, 8);
-  const auto loop = block_with_most(assembly(f, avx2), "vfmadd231ps");
+  const auto loop = block_with_most(assembly(f, avx2), "vfmadd");
   EXPECT_EQ(count(loop, "vmaskmov"), 0u);
-  EXPECT_EQ(count(loop, "(%r"), 1u) << "a load of the input";
+  EXPECT_EQ(count(loop, "vfmadd"), 4u);
+  EXPECT_EQ(count(loop, "(%r"), 4u) << "loads of the input";
+}
+
+// The loop of a small reduction inside of a vector is straight code.
+TEST(CodegenIdioms, ReductionsOverAFewElementsAreUnrolled) {
+  ImageParam in(UInt(8), 2, "in");
+  RDom r(-2, 5, -2, 5, "r");
+  Var x("x"), y("y");
+  Func f("f");
+  f(x, y) = minimum(in(x + r.x, y + r.y));
+  f.vectorize(x, 32);
+  EXPECT_GE(count(block_with_most(assembly(f, avx2), "vpminub"), "vpminub"), 24u);
+}
+
+TEST(CodegenIdioms, ShortVectorLoopsAreUnrolled) {
+  ImageParam in(UInt(16), 1, "in");
+  Var x("x");
+  Func f("f");
+  f(x) = in(x) + in(x + 1);
+  f.vectorize(x, 16, TailStrategy::RoundUp);
+  EXPECT_EQ(count(block_with_most(assembly(f, avx2), "vpaddw"), "vpaddw"), 4u);
 }
 
 }  // namespace
