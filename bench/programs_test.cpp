@@ -32,7 +32,8 @@ TEST_P(Smallest, GivesWhatHalideGives) {
 
 INSTANTIATE_TEST_SUITE_P(Programs, Smallest,
                          testing::Values("blur_u16", "wavelet_forward", "resample_u8", "gemv",
-                                         "conv_layer_x86", "harris", "rgb_gain"),
+                                         "conv_layer_x86", "harris", "rgb_gain",
+                                         "gradient_recursive_filter"),
                          [](const auto& test) { return test.param; });
 
 TEST(Compare, SaysThatAProgramIsUnknown) {

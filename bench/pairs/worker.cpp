@@ -1,6 +1,7 @@
 // worker.cpp -- see worker.h.
 #include "worker.h"
 
+#include <cstdlib>
 #include <cstring>
 #include <fstream>
 #include <sstream>
@@ -83,7 +84,9 @@ std::vector<double> Worker::answer(const std::string& expected) {
   words >> word;
   if (word != expected) fail(line.substr(std::min(line.size(), word.size() + 1)));
   std::vector<double> numbers;
-  for (double number; words >> number;) numbers.push_back(number);
+  // Not read as a double: streams refuse "inf" and "nan", which a wrong gradient may give.
+  for (std::string number; words >> number;)
+    numbers.push_back(std::strtod(number.c_str(), nullptr));
   return numbers;
 }
 
