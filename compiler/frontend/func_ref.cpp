@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "frontend/define.h"
+#include "frontend/several_points.h"
 #include "frontend/var.h"
 
 namespace retrograde {
@@ -70,7 +71,9 @@ std::vector<Expr> FuncRef::left_args(const std::vector<Expr>& values) const {
 
 Stage FuncRef::define(const std::vector<Expr>& values) {
   const std::vector<Expr> args = left_args(values);
-  if (func_->is_defined()) {
+  if (ir::names_several_points(args) || ir::names_several_points(values)) {
+    ir::define_several_points(func_, args, values);
+  } else if (func_->is_defined()) {
     ir::define_update(func_, args, values);
   } else {
     ir::define_pure(func_, args, values);

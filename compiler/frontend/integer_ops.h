@@ -1,5 +1,5 @@
-// integer_ops.h -- arithmetic on integers with the width of its result said; and accesses of many
-// points at once, which are not there.
+// integer_ops.h -- arithmetic on integers with the width of its result said; and updates at several
+// points at once.
 #pragma once
 
 #include "frontend/expr_ops.h"
@@ -68,16 +68,21 @@ Expr concat_bits(const std::vector<Expr>& parts);
 // own; ahead of time, with Target::UserContext, the first argument.
 Expr user_context_value();
 
-// f(scatter(a, b)) = gather(x, y): several points in one definition.
+// f(scatter(a, b)) = gather(u, v): an update that stores to several points, from the first to the
+// last; what it reads of f is read before. Between operators they stand for one point after the
+// other: f(x + scatter(1, 0), y + scatter(0, 3)) = 2 * gather(x, y). Unsupported where an update
+// over an RDom reads the Func that it stores to.
+Expr scatter(const std::vector<Expr>& points);
+Expr gather(const std::vector<Expr>& points);
 template <typename... Points>
-Expr gather(const Points&...) {
-  unsupported("define several points with gather()", "a definition stores to one point at a time",
-              "gather() reads many", "Write one update definition for each point");
+requires((std::is_convertible_v<Points, Expr> && ...)) Expr
+    scatter(const Expr& first, Points&&... others) {
+  return scatter(std::vector<Expr>{first, Expr(std::forward<Points>(others))...});
 }
 template <typename... Points>
-Expr scatter(const Points&...) {
-  unsupported("define several points with scatter()", "a definition stores to one point at a time",
-              "scatter() names many", "Write one update definition for each point");
+requires((std::is_convertible_v<Points, Expr> && ...)) Expr
+    gather(const Expr& first, Points&&... others) {
+  return gather(std::vector<Expr>{first, Expr(std::forward<Points>(others))...});
 }
 
 }  // namespace retrograde

@@ -154,6 +154,19 @@ bool is_scheduled(const FuncContents& reader) {
 
 }  // namespace
 
+FuncPtr clone_of(const FuncPtr& f, const std::string& name) {
+  FuncPtr clone = f->copy();
+  clone->name = claim_name(name);
+  clone->wrappers.clear();
+  clone->outputs.clear();
+  make_outputs(*clone);
+  for (int s = 1; s < f->stage_count(); s++) {
+    clone->stage(s) =
+        map_exprs(f->stage(s), [&](const Expr& e) { return redirect_calls(e, f, clone, true); });
+  }
+  return clone;
+}
+
 std::vector<FuncPtr> apply_wrappers(const std::vector<FuncPtr>& outputs) {
   for (const FuncPtr& f : topological_order(outputs)) {
     const auto readers = image_readers(*f);
@@ -207,20 +220,6 @@ FuncPtr identity_of(const FuncPtr& f, const std::string& name) {
   }
   define_pure(wrapper, args, values);
   return wrapper;
-}
-
-// The same definitions and schedule under another name.
-FuncPtr clone_of(const FuncPtr& f, const std::string& name) {
-  FuncPtr clone = f->copy();
-  clone->name = claim_name(name);
-  clone->wrappers.clear();
-  clone->outputs.clear();
-  make_outputs(*clone);
-  for (int s = 1; s < f->stage_count(); s++) {
-    clone->stage(s) =
-        map_exprs(f->stage(s), [&](const Expr& e) { return redirect_calls(e, f, clone, true); });
-  }
-  return clone;
 }
 
 bool is_identity(const FuncContents& wrapper, const FuncContents& f) {

@@ -28,6 +28,9 @@ std::vector<FuncPtr> functions_of(const std::vector<FuncPtr>& outputs);
 FuncPtr wrapper_of(const FuncPtr& f, const std::vector<FuncPtr>& users, const std::string& name,
                    bool clone);
 
+// The same definitions and schedule under another name.
+FuncPtr clone_of(const FuncPtr& f, const std::string& name);
+
 // The Func that reads an image point by point, the same for each call.
 FuncPtr func_of_image(const std::shared_ptr<ParameterContents>& image);
 

@@ -320,7 +320,6 @@ TEST(Refusals, SayWhatIsNotThere) {
   Buffer<float> buffer(3);
   expect_mentions(error_of<Unsupported>([&] { buffer.copy_to_device(Target()); }),
                   {"copy_to_device", "memory of the CPU"});
-  expect_mentions(error_of<Unsupported>([] { gather(Expr(1), Expr(2)); }), {"gather()"});
 }
 
 }  // namespace
