@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "codegen/constant_math.h"
 #include "codegen/emitter.h"
 #include "codegen/math_table.h"
 #include "diagnostics/error.h"
@@ -53,6 +54,7 @@ Value* padded_slice(Emitter& e, Value* vector, int start, int lanes) {
 
 // One function over all lanes of float or double vectors.
 Value* call_by_pieces(Emitter& e, const MathFunction& function, const Args& args) {
+  if (Value* known = constant_result(e, function, args)) return known;
   const int total = lanes_of(args[0]);
   auto* scalar = args[0]->getType()->getScalarType();
   const int bits = static_cast<int>(scalar->getPrimitiveSizeInBits());

@@ -1,11 +1,13 @@
 // Node builders: type checks and constant folding.
 #include "ir/build.h"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
 #include "ir/print.h"
 #include "ir/scalar.h"
+#include "ir/visit.h"
 
 namespace retrograde {
 
@@ -194,10 +196,42 @@ Expr fold_logical(Kind kind, const Expr& a, const Expr& b) {
   return a.same_as(b) ? a : Expr();
 }
 
+// The value of an expression over constants with functions in it that only code generation folds:
+// for integers and conditions that depend on it, as extents of loops do. Small ones: nodes that
+// are shared are visited again.
+std::optional<Scalar> value_over_constants(const Expr& e, int& budget) {
+  if (--budget < 0) return std::nullopt;
+  if (auto known = as_scalar(e)) return known;
+  std::vector<Scalar> args;
+  bool is_known = true;
+  for_each_child(e, [&](const Expr& child) {
+    const auto value = is_known ? value_over_constants(child, budget) : std::nullopt;
+    is_known = value.has_value();
+    if (value) args.push_back(*value);
+  });
+  if (!is_known || args.empty() || !e.type().is_float()) return std::nullopt;
+  const Type type = e.type().element_of();
+  if (const auto* call = e.as<Call>())
+    return call->call_type == CallType::Operator ? eval_operator(call->op, args, type)
+                                                 : std::nullopt;
+  if (e.kind() == Kind::Cast) return eval_cast(type, args[0]);
+  if (e.kind() == Kind::Broadcast) return args[0];
+  const bool is_arithmetic = e.kind() >= Kind::Add && e.kind() <= Kind::Max;
+  return is_arithmetic ? std::optional(eval_binary(e.kind(), args[0], args[1])) : std::nullopt;
+}
+std::optional<Scalar> value_over_constants(const Expr& e) {
+  int budget = 100;
+  return value_over_constants(e, budget);
+}
+
 Expr fold_binary(Kind kind, Type result, const Expr& a, const Expr& b) {
   const std::optional<Scalar> x = as_scalar(a);
   const std::optional<Scalar> y = x ? as_scalar(b) : std::nullopt;
   if (x && y) return constant(eval_binary(kind, *x, *y), result.lanes());
+  if (is_comparison(kind) && a.type().is_float()) {
+    const auto u = value_over_constants(a), v = u ? value_over_constants(b) : u;
+    if (u && v) return constant(eval_binary(kind, *u, *v), result.lanes());
+  }
   if (kind == Kind::And || kind == Kind::Or) return fold_logical(kind, a, b);
   if (a.type().is_float()) return fold_float(kind, a, b);
   return a.type().is_int_or_uint() ? fold_integer(kind, a, b) : Expr();
@@ -246,7 +280,8 @@ Expr cast_to(Type type, Expr value) {
   if (type == value.type()) return value;
   RETROGRADE_ASSERT(!type.is_handle() && !value.type().is_handle(), "cast of ", value.type(),
                     " to ", type);
-  const std::optional<Scalar> s = as_scalar(value);
+  const bool may_round = value.type().is_float() && !type.is_float();
+  const std::optional<Scalar> s = may_round ? value_over_constants(value) : as_scalar(value);
   if (s && cast_is_defined(type.element_of(), *s))
     return constant(eval_cast(type.element_of(), *s), type.lanes());
   return new Cast(type, std::move(value));
@@ -338,6 +373,36 @@ Expr make_vector_reduce(ReduceOp op, Expr value, int result_lanes) {
 
 namespace {
 
+// Generated code has functions of its own for these, whose last bit may be another one: code
+// generation folds them (codegen/constant_math.h).
+bool is_rounded_otherwise(Op op) {
+  switch (op) {
+    case Op::exp:
+    case Op::log:
+    case Op::sin:
+    case Op::cos:
+    case Op::tan:
+    case Op::asin:
+    case Op::acos:
+    case Op::atan:
+    case Op::sinh:
+    case Op::cosh:
+    case Op::tanh:
+    case Op::asinh:
+    case Op::acosh:
+    case Op::atanh:
+    case Op::erf:
+    case Op::pow:
+    case Op::hypot:
+    case Op::atan2:
+      return true;
+    default:
+      return false;
+  }
+}
+
+bool is_zero_or_one(const Scalar& s) { return s.f == 0 || s.f == 1; }
+
 Expr fold_operator(Op op, Type type, const std::vector<Expr>& args) {
   std::vector<Scalar> values;
   for (const Expr& arg : args) {
@@ -345,7 +410,12 @@ Expr fold_operator(Op op, Type type, const std::vector<Expr>& args) {
     if (!value) return {};
     values.push_back(*value);
   }
-  return constant(*eval_operator(op, values, type.element_of()), type.lanes());
+  const Scalar result = *eval_operator(op, values, type.element_of());
+  // cos(0), log(1) and their kin are exact.
+  const bool is_exact =
+      !is_rounded_otherwise(op) ||
+      (is_zero_or_one(result) && std::all_of(values.begin(), values.end(), is_zero_or_one));
+  return is_exact ? constant(result, type.lanes()) : Expr();
 }
 
 // Scalar arguments of a vector operator are broadcast.

@@ -6,11 +6,9 @@
 #include <cstring>
 #include <map>
 
+#include "codegen/sleef_library.h"
 #include "inquiries.h"
 #include "retrograde_runtime.h"
-
-// A function of SLEEF, to keep the library loaded and to find it by.
-extern "C" float Sleef_expf_u10(float);
 
 namespace retrograde::jit {
 namespace {
@@ -97,30 +95,13 @@ Table make_table() {
   return table;
 }
 
-// By the file that holds a known function: the process may have loaded us and SLEEF privately,
-// where a search of the whole process does not look. (Where the address is that of a jump inside a
-// program, that search does find it.)
-void* sleef_library() {
-  static void* const library = [] {
-    Dl_info info;
-    const bool found = dladdr(pointer(Sleef_expf_u10), &info) != 0 && info.dli_fname;
-    return found ? dlopen(info.dli_fname, RTLD_LAZY | RTLD_NOLOAD) : nullptr;
-  }();
-  return library;
-}
-
-void* find_in_sleef(const char* name) {
-  void *library = sleef_library(), *address = library ? dlsym(library, name) : nullptr;
-  return address ? address : dlsym(RTLD_DEFAULT, name);
-}
-
 }  // namespace
 
 void* find_symbol(const std::string& name) {
   static const Table table = make_table();
   const auto found = table.find(name);
   if (found != table.end()) return found->second;
-  if (name.rfind("Sleef_", 0) == 0) return find_in_sleef(name.c_str());
+  if (name.rfind("Sleef_", 0) == 0) return codegen::find_in_sleef(name.c_str());
   return dlsym(RTLD_DEFAULT, name.c_str());
 }
 

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "codegen/codegen.h"
+#include "ir/build.h"
 #include "lower/lower.h"
 
 namespace retrograde {
@@ -62,6 +63,27 @@ TEST(CodegenIdioms, NeighbouringStridedLoadsAreShuffles) {
   EXPECT_EQ(count(code, "gather"), 0u);
   EXPECT_EQ(count(code, "vinsertps"), 0u);
   EXPECT_GE(count(code, "vshufps"), 2u);
+}
+
+// What only code generation knows to be a constant: the name of one.
+TEST(CodegenIdioms, MathOfConstantsCallsNothing) {
+  if (get_host_target().arch != Target::X86) GTEST_SKIP() << "the functions of x86 do not run here";
+  const Type type = Float(32);
+  ir::LoweredFunction f;
+  f.name = "f";
+  f.args = {{"out", ir::LoweredArgument::Kind::OutputBuffer, type, 1, {}}};
+  const auto stores = [&](const Expr& angle) {
+    const Expr lanes = ir::make_broadcast(ir::variable("angle", type), 8);
+    const Stmt vector = ir::make_store("out", ir::call_op(ir::Op::sin, {lanes}),
+                                       ir::make_ramp(Expr(0), Expr(1), 8));
+    return ir::make_let("angle", angle, vector);
+  };
+  codegen::Options options;
+  options.target = Target("x86-64-linux");
+  f.body = stores(Expr(0.3f));
+  EXPECT_EQ(codegen::compile_assembly(f, options).find("Sleef"), std::string::npos);
+  f.body = stores(ir::make_load(type, "out", Expr(0)));
+  EXPECT_NE(codegen::compile_assembly(f, options).find("Sleef"), std::string::npos);
 }
 
 TEST(CodegenIdioms, AlternatingArmsAreInterleaved) {

@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "codegen/math_table.h"
+#include "ir/text.h"
 #include "unit/codegen_testing.h"
 
 namespace retrograde::testing_codegen {
@@ -257,6 +258,51 @@ TEST(CodegenMath, PowOfEveryPairOfSpecialValuesFollowsC99) {
     if (!std::isnan(exact)) {
       ASSERT_EQ(std::signbit(got[i]), std::signbit(exact)) << "pow(" << x[i] << ", " << y[i] << ")";
     }
+  }
+}
+
+// The function of constants that only code generation knows, in vectors and alone.
+template <typename Number>
+void check_constants(Op op, const Target& target) {
+  constexpr size_t values = 48;
+  const auto x = samples<Number>(6), y = samples<Number>(7);
+  const auto expected = run(op, 1, x, y, target);
+  const Type type = type_of<Number>();
+  LoweredFunction f;
+  f.name = op_info(op).name;
+  f.args = {output("out", type)};
+  std::vector<Stmt> stores;
+  for (size_t i = 0; i < values; i++) {
+    const int lanes = i % 2 ? 4 : 1;
+    std::vector<Expr> args;
+    for (int k = 0; k < arity_of(op); k++) {
+      const Expr named = variable(text("c", i, ".", k), type);  // else the IR's builders know it
+      args.push_back(lanes == 1 ? named : make_broadcast(named, lanes));
+    }
+    Stmt store = make_store("out", call_op(op, type.with_lanes(lanes), args),
+                            lanes_at(static_cast<int>(i), lanes));
+    for (int k = 0; k < arity_of(op); k++) {
+      const double number = static_cast<double>(k == 0 ? x[i] : y[i]);
+      store = make_let(text("c", i, ".", k), make_const(type, number), store);
+    }
+    stores.push_back(store);
+  }
+  f.body = make_block(stores);
+  Array out(type, values + 4);
+  ASSERT_EQ(call(f, {&out}, nullptr, target), 0);
+  for (size_t i = 0; i < values; i++) {
+    ASSERT_TRUE(same(Scalar::of_float(type, expected[i]), out.get(i)))
+        << op_info(op).name << "(" << x[i] << ", " << y[i] << ") = " << expected[i]
+        << " at run time, " << show(out.get(i)) << " when it was compiled";
+  }
+}
+
+TEST(CodegenMath, ConstantsGiveTheBitsOfTheRunTimeFunction) {
+  for (const MathFunction& function : codegen::math_functions) {
+    check_constants<float>(function.op, test_target());
+    check_constants<double>(function.op, test_target());
+    if (test_target().arch == Target::X86)
+      check_constants<float>(function.op, Target("x86-64-linux"));
   }
 }
 
