@@ -33,7 +33,7 @@ void Maker::run() {
 // Small ones, and odd ones that no vector fits.
 int Maker::side_of_output() {
   if (c_.chance(10)) return c_.between(1, 3);
-  return c_.chance(15) ? c_.between(7, 13) : natural_size;
+  return c_.chance(15) ? c_.between(7, 9) : natural_size;
 }
 
 Overwritten Maker::overwriting() {
