@@ -8,6 +8,7 @@
 #include "lower/flatten_storage.h"
 #include "lower/free_early.h"
 #include "lower/interleave_vectors.h"
+#include "lower/join_indices.h"
 #include "lower/lower_atomics.h"
 #include "lower/partition_loops.h"
 #include "lower/transpose_loads.h"
@@ -28,6 +29,7 @@ const std::vector<StatementPass>& statement_passes() {
       {"drop_bounds_query", drop_bounds_query},
       {"flatten_storage", [](const Stmt& s) { return flatten_storage(s); }},
       {"free_early", free_early},
+      {"join_indices", join_indices},
       {"lower_atomics", lower_atomics},
       {"partition_loops", partition_loops},
       {"simplify", [](const Stmt& s) { return simplify(s); }},

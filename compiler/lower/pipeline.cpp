@@ -25,6 +25,7 @@
 #include "lower/inline_functions.h"
 #include "lower/insert_prefetches.h"
 #include "lower/interleave_vectors.h"
+#include "lower/join_indices.h"
 #include "lower/loop_nest_text.h"
 #include "lower/lower.h"
 #include "lower/lower_atomics.h"
@@ -170,6 +171,7 @@ constexpr Pass passes[] = {
      [](Lowering&, const Stmt& s) { return drop_guarded_clamps(s); }},
     {"trim_loops", Phase::FlatStorage, [](Lowering&, const Stmt& s) { return trim_loops(s); }},
     {"unroll_loops", Phase::FlatStorage, [](Lowering&, const Stmt& s) { return unroll_loops(s); }},
+    {"join_indices", Phase::FlatStorage, [](Lowering&, const Stmt& s) { return join_indices(s); }},
     {"vectorize_inner_loops", Phase::FlatStorage,
      [](Lowering& lowering, const Stmt& s) { return vectorize_unscheduled(lowering, s); }},
     {"vectorize_loops", Phase::Vector, [](Lowering&, const Stmt& s) { return vectorize_loops(s); }},

@@ -15,6 +15,7 @@
 #include "lower/drop_guarded_clamps.h"
 #include "lower/free_early.h"
 #include "lower/interleave_vectors.h"
+#include "lower/join_indices.h"
 #include "lower/partition_loops.h"
 #include "lower/transpose_loads.h"
 #include "lower/trim_loops.h"
@@ -392,6 +393,7 @@ TEST_P(LoopPasses, KeepWhatProgramsCompute) {
     expect_same("trim_loops alone", seed, program, trim_loops(program), Phase::FlatStorage);
     Stmt unrolled = unroll_loops(trimmed);
     expect_same("unroll_loops", seed, program, unrolled, Phase::FlatStorage);
+    expect_same("join_indices", seed, program, join_indices(unrolled), Phase::FlatStorage);
     Stmt inner = vectorize_inner_loops(unrolled, {8, is_surely_independent});
     expect_same("vectorize_inner_loops", seed, program, inner, Phase::FlatStorage);
     widened += !inner.same_as(unrolled);

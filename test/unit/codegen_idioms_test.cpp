@@ -86,6 +86,20 @@ TEST(CodegenIdioms, MathOfConstantsCallsNothing) {
   EXPECT_NE(codegen::compile_assembly(f, options).find("Sleef"), std::string::npos);
 }
 
+TEST(CodegenIdioms, FusedChannelsOfAnInterleavedImageAreDense) {
+  ImageParam in(Float(32), 3, "in");
+  Var x("x"), y("y"), c("c"), fused("fused");
+  Func f("f");
+  f(x, y, c) = in(x, y, c) * 0.5f;
+  in.dim(0).set_stride(3).dim(2).set_stride(1).set_bounds(0, 3);
+  f.output_buffer().dim(0).set_stride(3).dim(2).set_stride(1).set_bounds(0, 3);
+  f.bound(c, 0, 3).reorder(c, x, y).fuse(c, x, fused).vectorize(fused, 24);
+  const auto code = assembly(f, avx2);
+  EXPECT_EQ(count(code, "vextractps"), 0u);
+  EXPECT_EQ(count(code, "vshufps"), 0u);
+  EXPECT_EQ(count(code, "gather"), 0u);
+}
+
 TEST(CodegenIdioms, AlternatingArmsAreInterleaved) {
   ImageParam a(Float(32), 1, "a"), b(Float(32), 1, "b");
   Var x("x");
