@@ -11,7 +11,7 @@
 // parallel loop, and one whose borders are as large as tiles, stays one loop, with an if inside.
 // Where the order of iterations is free, as in a pure definition that nothing slides in, both
 // borders of a large body are one loop before the steady state: what LLVM compiles of it is mostly
-// borders.
+// borders. Where it is not, a large body with loops in it stays one loop with an if inside, too.
 //
 // What likely says:  likely(c)                     c is true
 //                    min(likely(a), b), max        the marked operand is the result
@@ -75,6 +75,18 @@ int node_count(const Stmt& s) {
   walk(
       s, [&](const Expr& e) { return visit(e); }, [&](const Stmt& child) { return visit(child); });
   return count;
+}
+
+bool contains_loop(const Stmt& s) {
+  bool found = false;
+  walk(
+      s, [](const Expr&) { return false; },
+      [&](const Stmt& child) {
+        const For* loop = child.as<For>();
+        found |= loop && is_serial(*loop);
+        return !found;
+      });
+  return found;
 }
 
 // "f" of the loop "f.s0.x" of its pure definition; else nothing.
@@ -169,9 +181,17 @@ class Partitioner : public Rewriter {
     if (!ends.begin.defined() && !ends.end.defined() && !steady.needed.defined()) {
       return make_for(loop.name, loop.min, loop.extent, loop.for_type, steady_body);
     }
-    bool stays_one = loop.for_type == ForType::Parallel || steady.has_thick_border;
+    const bool stays_one = loop.for_type == ForType::Parallel || steady.has_thick_border ||
+                           has_costly_borders_in_order(loop, rest, ends);
     return stays_one ? branch_inside(loop, steady_body, rest, ends, steady.needed)
                      : three_loops(loop, steady_body, rest, ends, steady.needed);
+  }
+
+  // Two borders that must stay on their sides would be two copies; a branch around a large body
+  // costs nothing beside it.
+  static bool has_costly_borders_in_order(const For& loop, const Stmt& rest, const Ends& ends) {
+    return ends.begin.defined() && ends.end.defined() && contains_loop(rest) &&
+           node_count(rest) > costly_border && !runs_in_any_order(loop);
   }
 
   Stmt branch_inside(const For& loop, const Stmt& steady_body, const Stmt& rest, const Ends& ends,
