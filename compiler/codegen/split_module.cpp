@@ -43,9 +43,11 @@ bool is_local_constant(const llvm::GlobalValue& value) {
   return variable && variable->isConstant() && variable->hasLocalLinkage();
 }
 
-// Other parts must find it, and nobody else.
+// Other parts must find it, and nobody else. Numbers that LLVM would give what has no name differ
+// from part to part.
 void share(llvm::GlobalValue& value) {
   if (!value.hasLocalLinkage()) return;
+  if (!value.hasName()) value.setName("shared");
   value.setLinkage(llvm::GlobalValue::ExternalLinkage);
   value.setVisibility(llvm::GlobalValue::HiddenVisibility);
 }

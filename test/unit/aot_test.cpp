@@ -289,12 +289,14 @@ TEST_F(AotFiles, ParametersBecomeArguments) {
 // by nobody else, so that the same program may be linked twice.
 TEST_F(AotFiles, PartsOfAProgramAreOneObject) {
   ImageParam samples(Float(32), 1, "samples");
+  Buffer<float> ones(6);  // embedded, without a name among the symbols
+  ones.fill(1.0f);
   const auto stages = [&] {
     std::vector<Func> chain;
     for (int i = 0; i < 6; i++) {
       Func next("stage");
       const Expr before = chain.empty() ? samples(x) : chain.back()(x);
-      next(x) = sqrt(before * before + 1.0f / (1.0f + before)) + i;
+      next(x) = sqrt(before * before + 1.0f / (1.0f + before)) + i * ones(i);
       next.compute_root().parallel(x, 64).vectorize(x, 8, TailStrategy::GuardWithIf);
       chain.push_back(next);
     }
