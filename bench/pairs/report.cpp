@@ -1,24 +1,15 @@
 // report.cpp -- see report.h.
 #include "report.h"
 
-#include <cmath>
-#include <cstdio>
 #include <nlohmann/json.hpp>
 
 #include "common/files.h"
+#include "figures.h"
 
 namespace bench {
 
 namespace {
 
-template <typename... Args>
-std::string formatted(const char* format, Args... args) {
-  char line[512];
-  std::snprintf(line, sizeof line, format, args...);
-  return line;
-}
-
-double run_ratio(const PairResult& r) { return r.retrograde.median / r.halide.median; }
 double compile_ratio(const PairResult& r) { return r.retrograde_compile_ms / r.halide_compile_ms; }
 
 double percent_of_bound(const PairResult& r, const Machine& machine) {
@@ -35,20 +26,6 @@ std::string remark(const PairResult& r) {
   return formatted("  %s, from differences: ours by %.1e, Halide's by %.1e",
                    is_wrong(r) ? "DIFFERS" : "Halide's is wrong", *r.retrograde_slope_error,
                    *r.halide_slope_error);
-}
-
-double geometric_mean(const std::vector<PairResult>& results, double (*value)(const PairResult&)) {
-  double sum = 0;
-  for (const PairResult& r : results) sum += std::log(value(r));
-  return std::exp(sum / static_cast<double>(results.size()));
-}
-
-std::vector<PairResult> completed(const std::vector<PairResult>& results) {
-  std::vector<PairResult> out;
-  for (const PairResult& r : results) {
-    if (r.failure.empty()) out.push_back(r);
-  }
-  return out;
 }
 
 nlohmann::json entry(const PairResult& r, const Machine& machine) {

@@ -2,31 +2,18 @@
 #include "report.h"
 
 #include <algorithm>
-#include <cmath>
-#include <cstdio>
 #include <nlohmann/json.hpp>
 
 #include "common/files.h"
+#include "pairs/figures.h"
 
 namespace programs {
 
 namespace {
 
-template <typename... Args>
-std::string formatted(const char* format, Args... args) {
-  char line[512];
-  std::snprintf(line, sizeof line, format, args...);
-  return line;
-}
-
-double ratio_of(const bench::PairResult& r) { return r.retrograde.median / r.halide.median; }
-
-template <typename T, typename F>
-double geometric_mean(const std::vector<T>& all, F value) {
-  double sum = 0;
-  for (const T& each : all) sum += std::log(value(each));
-  return all.empty() ? 1 : std::exp(sum / static_cast<double>(all.size()));
-}
+using bench::completed;
+using bench::formatted;
+using bench::geometric_mean;
 
 // Where gradients disagree, differences say whether ours is right.
 bool differs(const Result& result, const bench::PairResult& r) {
@@ -41,7 +28,7 @@ nlohmann::json entry(const Result& result, size_t which) {
                    {"threads", r.threads},
                    {"retrograde_ms", r.retrograde.median},
                    {"halide_ms", r.halide.median},
-                   {"run_ratio", ratio_of(r)},
+                   {"run_ratio", bench::run_ratio(r)},
                    {"retrograde_min_ms", r.retrograde.least},
                    {"halide_min_ms", r.halide.least},
                    {"min_ratio", r.retrograde.least / r.halide.least},
@@ -75,17 +62,12 @@ nlohmann::json entry(const Result& result) {
   return e;
 }
 
-std::vector<Result> completed(const std::vector<Result>& results) {
-  std::vector<Result> out;
-  for (const Result& r : results) {
-    if (r.failure.empty()) out.push_back(r);
-  }
-  return out;
-}
-
 }  // namespace
 
-double run_ratio(const Result& result) { return geometric_mean(result.cases, ratio_of); }
+double run_ratio(const Result& result) {
+  return geometric_mean(result.cases,
+                        [](const bench::PairResult& r) { return bench::run_ratio(r); });
+}
 double compile_ratio(const Result& result) {
   return result.retrograde_compile_ms / result.halide_compile_ms;
 }
@@ -110,7 +92,7 @@ std::string case_row(const Result& result, size_t which) {
                         r.retrograde_memory.run_mb, r.halide_memory.run_mb);
   return formatted("%-24s %-7s %2d %12.4f %12.4f %7.3f %8.3f %10.1e", result.name.c_str(),
                    result.labels[which].c_str(), r.threads, r.retrograde.median, r.halide.median,
-                   ratio_of(r), r.retrograde.least / r.halide.least, r.max_relative_error) +
+                   bench::run_ratio(r), r.retrograde.least / r.halide.least, r.max_relative_error) +
          remark + "\n";
 }
 
