@@ -9,15 +9,17 @@
 //   }
 //
 // and (x < 62) ends the loop over x in turn. Gathers over domains that are no boxes, and where() of
-// a user's RDom, look like this.
+// a user's RDom, look like this. A condition that is the same in all iterations goes around the
+// loop.
 //
 // Method: a loop is trimmed where all of its body stands under the condition (looking through lets,
 //         inner loops and further conditions without an else). Each conjunct is brought into the
 //         form  c*v + rest >= 0  with a constant c, rest free of the loop's variable v and of
 //         what is bound inside the loop: then v >= -floor(rest / c), or v <= floor(rest / -c), says
-//         exactly the same, and the conjunct goes away.
-// Not done: loops with a constant extent of a few iterations, which are unrolled with their
-//           conditions; ends that depend on the lane of an enclosing vectorized loop; several
+//         exactly the same, and the conjunct goes away. A conjunct without v and what is bound
+//         inside goes around the loop. Loops with a constant extent of a few iterations keep their
+//         ends: they are unrolled with their conditions.
+// Not done: ends that depend on the lane of an enclosing vectorized loop; several
 //           statements, each under a condition of its own.
 // Source: folklore (loop bounds from guards). Tests: test/golden/lower/trim_loops/,
 // test/property/loop_passes_test.cpp.
@@ -41,9 +43,8 @@ namespace {
 // Constant extents up to this one are left alone.
 constexpr int64_t few_iterations = 16;
 
-bool is_trimmable(const For& loop) {
-  if (!is_serial(loop)) return false;
-  auto extent = as_const_int(loop.extent);
+bool may_end_elsewhere(const For& loop) {
+  const auto extent = as_const_int(loop.extent);
   return !extent || *extent > few_iterations;
 }
 
@@ -92,10 +93,11 @@ class Trimmer {
     Expr from = is_simple ? begin : variable(fresh(loop_.name + ".begin"), type);
     Expr extent = simplify(max(binary(Kind::Sub, end, from), make_zero(type)));
     Stmt loop = make_for(loop_.name, from, extent, loop_.for_type, body);
+    if (!around_.empty()) loop = make_if(conjunction(around_), loop);
     return is_simple ? loop : make_let(from.as<Variable>()->name, begin, loop);
   }
 
-  bool found() const { return !begins_.empty() || !lasts_.empty(); }
+  bool found() const { return !begins_.empty() || !lasts_.empty() || !around_.empty(); }
 
  private:
   Stmt with_body(const Stmt& s, const Stmt& body) {
@@ -106,7 +108,7 @@ class Trimmer {
         [&](const Stmt& child) { return child.same_as(body) ? trimmed : child; });
   }
 
-  // The condition less the conjuncts that became ends.
+  // The condition less the conjuncts that became ends or go around the loop.
   Expr without_ends(const Expr& condition) {
     if (condition.kind() == Kind::And) {
       const auto* both = condition.as<Binary>();
@@ -116,12 +118,23 @@ class Trimmer {
     }
     if (const auto* let = condition.as<Let>())
       return without_ends(substitute(let->body, let->name, let->value));
-    return becomes_end(substitute(without_lets(condition), lets_)) ? const_true() : condition;
+    const Expr open = substitute(without_lets(condition), lets_);
+    return goes_around(open) || becomes_end(open) ? const_true() : condition;
+  }
+
+  bool is_known_outside(const Expr& condition) const {
+    return !reads_memory(condition, MemoryReads::Functions) &&
+           !uses_any_variable(condition, unusable_);
+  }
+
+  bool goes_around(const Expr& condition) {
+    if (!is_known_outside(condition) || uses_any_variable(condition, {loop_.name})) return false;
+    around_.push_back(condition);
+    return true;
   }
 
   bool becomes_end(const Expr& condition) {
-    if (reads_memory(condition, MemoryReads::Functions) || uses_any_variable(condition, unusable_))
-      return false;
+    if (!may_end_elsewhere(loop_) || !is_known_outside(condition)) return false;
     auto form = nonnegative_where(condition);
     if (!form || form->type != loop_.min.type()) return false;
     const int64_t c = form->coefficient_of(loop_.name);
@@ -142,6 +155,7 @@ class Trimmer {
   std::unordered_set<std::string> unusable_;
   Substitution lets_;
   std::vector<Expr> begins_, lasts_;  // the variable lies between them
+  std::vector<Expr> around_;          // without the variable
 };
 
 class LoopTrimmer : public Rewriter {
@@ -159,7 +173,7 @@ class LoopTrimmer : public Rewriter {
     const auto* loop = s.as<For>();
     if (!loop) return children(s);
     if (loop->for_type == ForType::Vectorized) lanes_.insert(loop->name);
-    if (!is_trimmable(*loop)) return children(s);
+    if (!is_serial(*loop)) return children(s);
     Trimmer trimmer(*loop, lanes_);
     Stmt body = trimmer.trim(loop->body);
     if (!trimmer.found()) return children(s);
