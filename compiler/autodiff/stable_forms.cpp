@@ -267,12 +267,36 @@ StableForm smooth_maximum(const Expr& sum) {
   return result;
 }
 
+// v = a - a + rest: dv/da = 0. By its two paths an infinite adjoint would reach a as inf - inf.
+StableForm sum_that_cancels(const Expr& sum) {
+  std::vector<SignedTerm> distinct;
+  bool cancels = false;
+  for (const SignedTerm& t : signed_terms_of(sum)) {
+    if (is_const(t.value)) continue;
+    auto known = std::find_if(distinct.begin(), distinct.end(),
+                              [&](const SignedTerm& d) { return equal(d.value, t.value); });
+    if (known == distinct.end()) known = distinct.insert(distinct.end(), {t.value, 0});
+    known->sign += t.sign;
+    cancels |= known->sign == 0;
+  }
+  StableForm result;
+  if (!cancels) return result;
+  for (const SignedTerm& t : distinct) {
+    result.operands.push_back(t.value);
+    result.partials.push_back({t.sign == 0 ? Expr() : make_const(sum.type(), t.sign)});
+  }
+  return result;
+}
+
 }  // namespace
 
 StableForm stable_form(const Expr& e) {
   if (!e.type().is_float()) return {};
   if (const auto* quotient = e.as<Div>()) return of_quotient(e, *quotient);
-  if (e.as<Add>() || e.as<Sub>()) return smooth_maximum(e);
+  if (e.as<Add>() || e.as<Sub>()) {
+    const StableForm form = smooth_maximum(e);
+    return form.operands.empty() ? sum_that_cancels(e) : form;
+  }
   if (const Call* log = as_operator(e, Op::log)) {
     const StableForm quotient = log_of_quotient(log->args[0]);
     return quotient.operands.empty() ? log_sum_exp(log->args[0]) : quotient;

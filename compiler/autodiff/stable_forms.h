@@ -9,6 +9,7 @@
 // The same by max(a, b) + log(1 + exp(-|a - b|)), also in a sum: both parts have a kink at a = b.
 // Logarithm of a quotient, log(a / b): the quotient may be denormal, and its reciprocal infinite.
 // Angle, atan(a / b): the quotient's square overflows.
+// Sums in which a term cancels, a - a + b: an infinite adjoint would reach a as inf - inf.
 // Entropy, a log(a), and a log(a / b): 1 / a overflows where a is denormal.
 // Norms and what is divided by them: stable_norms.h. sin(a) / a and its kin: stable_quotients.h.
 //

@@ -35,6 +35,10 @@ mode use the same partials, so they are transposes of each other at every point,
 - **Poles.** Where a partial is infinite and the value finite (`sqrt`, `pow`, `asin`, `acos`, `acosh`), a
   factor of exactly 0 after it contributes 0: so norms, `sqrt(x*x + y*y)` at the origin, have gradient 0,
   and `sqrt(x)` at 0 keeps its infinity.
+  Terms of one sum that cancel have derivative 0 before the pole is met: `pow(a - a, 0.5f)` has 0 by `a`
+  in both modes. Where infinite adjoints of both signs reach an element by different Funcs, as in
+  `sqrt(f - g)` where `g` is a copy of `f`, the gradient is NaN; forward mode, which sees one direction, has
+  0 there along those that leave `f - g` as it is.
 - **Steps.** Rounding, comparisons, integer arithmetic and casts to integers have derivative 0;
   `Derivative::explain()` says so where it makes a gradient 0.
 - **Stable forms.** Differentiated in one step, so that nothing cancels, overflows or underflows before
@@ -44,8 +48,8 @@ mode use the same partials, so they are transposes of each other at every point,
   `(exp(a) - exp(-a)) / (exp(a) + exp(-a))`, `(1 - a*a) / (1 + a*a)`; `log(exp(a) + exp(b) + c)`, and
   `max(a, b) + log(1 + exp(-|a - b|))` inside a sum, smooth where its parts have kinks (softplus,
   log-sum-exp, cross entropy of logits); `log(a / b)`, `atan(a / b)`, `sin(a) / a`;
-  `a log(a)` and `a log(a / b)`; `(exp(a) - 1) / a`, `(1 - exp(-a)) / a`, `log(1 + a) / a` and their
-  reciprocals;
+  `a - a + b`; `a log(a)` and `a log(a / b)`; `(exp(a) - 1) / a`, `(1 - exp(-a)) / a`, `log(1 + a) / a`
+  and their reciprocals;
   `sqrt(a*a + b*b + ...)` (norms, whose squares may underflow or overflow), their reciprocals, and
   `a / sqrt(a*a + b*b + ...)` (normalised, also by `max(norm, c)`, by a product with `1 / norm`, with
   `pow(a*a + b*b, -0.5f)` or with `fast_inverse_sqrt(a*a + b*b)`).

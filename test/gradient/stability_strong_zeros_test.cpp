@@ -276,6 +276,18 @@ TEST_F(StrongZeros, AFactorOfZeroAfterAQuotient) {
   expect(shrunk, a, {0, 1, 1, 0});
 }
 
+// Term by term, the infinite adjoint reaches f with both signs.
+TEST_F(StrongZeros, ATermThatCancelsBehindAPole) {
+  set(a, {1, 0, -3, 2});
+  set(b, {1, 2, 4, 9});
+  Func held("held"), nothing("nothing"), rest("rest");
+  held(x) = 3.0f * a(x);
+  nothing(x) = pow(held(x) - held(x), 0.5f);
+  expect(nothing, a, {0, 0, 0, 0});
+  rest(x) = sqrt((b(x) + held(x)) - (1.0f + held(x)));
+  expect(rest, a, {0, 0, 0, 0});
+}
+
 TEST_F(StrongZeros, AnInfiniteFactorOfAMaximumThatIsConstant) {
   set(a, {-1, 2, -3, 4});
   set(b, {inf, 3, -inf, 5});
