@@ -1,0 +1,142 @@
+#!/usr/bin/env python3
+"""Writes what a benchmark measured into its section of a page (tools/bench --record).
+
+usage: measurements.py SECTION REPORT.json PAGE --commit COMMIT [--machine WORDS]
+
+A section stands between the lines "<!-- measured: SECTION -->" and "<!-- end of section -->"; what is
+around it is written by hand. The first line says on which machine and at which commit.
+"""
+import argparse
+import json
+import math
+import os
+import re
+import sys
+
+
+def geometric_mean(ratios):
+    ratios = list(ratios)
+    return math.exp(sum(math.log(r) for r in ratios) / len(ratios)) if ratios else float("nan")
+
+
+def table(head, rows):
+    lines = [head, ["---"] * len(head), *rows]
+    return "".join("| " + " | ".join(cells) + " |\n" for cells in lines)
+
+
+def ms(value):
+    return f"{value:.2f} ms" if value >= 0.1 else f"{value:.4f} ms"
+
+
+def pairs(report):
+    """Kernels, or gradients, in process beside Halide 14's."""
+    rows, done = [], [r for r in report if not r.get("failure")]
+    for r in report:
+        name = f"{r['kernel']} ({r['threads']})"
+        if r.get("failure"):
+            rows.append([name, "failed", "", "", "", "", ""])
+            continue
+        rows.append([name, ms(r["retrograde_ms"]), ms(r["halide_ms"]), f"{r['run_ratio']:.2f}",
+                     f"{r['compile_ratio']:.2f}",
+                     f"{r['retrograde_peak_mb']:.0f} / {r['halide_peak_mb']:.0f}",
+                     f"{r['percent_of_bound']:.0f} %"])
+    head = ["program (threads)", "Retrograde", "Halide 14", "run ratio", "compile ratio", "peak MB",
+            "of bound"]
+    return table(head, rows) + means(done)
+
+
+def programs(report):
+    """Programs compiled ahead of time, and gradients of such."""
+    done = [p for p in report["programs"] if not p.get("failure")]
+    rows = [[p["program"], f"{p['run_ratio']:.2f}",
+             ", ".join(f"{c['retrograde_ms']:.3g} / {c['halide_ms']:.3g}" for c in p["cases"]),
+             f"{p['compile_ratio']:.2f}"] for p in done]
+    rows += [[p["program"], "failed", "", ""] for p in report["programs"] if p.get("failure")]
+    head = ["program", "run ratio", "ms, Retrograde / Halide 14, by size", "compile ratio"]
+    return table(head, rows) + means(done)
+
+
+def means(rows):
+    run, compiled = ([r[key] for r in rows] for key in ("run_ratio", "compile_ratio"))
+    return (f"\nGeometric means of {len(rows)}: run time {geometric_mean(run):.2f} of Halide 14's, "
+            f"compile time {geometric_mean(compiled):.2f}.\n")
+
+
+def gradients(report):
+    rows = [[p["program"], ms(p["primal_ms"]), ms(p["gradient_ms"]), f"{p['ratio']:.1f}"]
+            for p in report["programs"]]
+    return table(["program", "program", "gradient", "ratio"], rows)
+
+
+def pytorch(report):
+    rows = [[p["program"], ms(p["retrograde_ms"]), ms(p["pytorch_ms"]), f"{p['ratio']:.2f}"]
+            for p in report["programs"]]
+    return (table(["gradient", "Retrograde", f"PyTorch {report['pytorch']}", "ratio"], rows) +
+            f"\nGeometric mean: {report['geometric_mean']:.2f}.\n")
+
+
+def demo(report):
+    halide = report["halide_ms_per_step"]
+    rows = [["one training step", ms(report["ms_per_step"])],
+            ["the same with Halide 14, scheduled by Li2018",
+             "not measured" if halide is None else f"{ms(halide)}, {halide / report['ms_per_step']:.1f} times"],
+            ["likeness", f"{report['psnr_initial_db']:.1f} to {report['psnr_final_db']:.1f} dB in "
+                         f"{report['steps']} steps, {report['seconds']:.1f} s"],
+            ["gradients from differences in double",
+             f"{report['gradient_check_max_relative_error']:.1e} at most"],
+            ["memory", f"{report['peak_memory_mb']:.0f} MB"]]
+    return table(["what", "figure"], rows)
+
+
+def compile_time(report):
+    """Google Benchmark's JSON: names end in the number of stages."""
+    rows = [[b["name"], f"{b['real_time']:.3g} {b['time_unit']}"] for b in report["benchmarks"]
+            if b.get("run_type") != "aggregate"]
+    return table(["chain of stencils", "time"], rows)
+
+
+SECTIONS = {"demo": demo, "kernels": pairs, "gradient_peers": pairs, "programs": programs,
+            "programs_second": programs, "programs_gradients": programs, "gradients": gradients,
+            "pytorch_peers": pytorch, "compile_time": compile_time}
+
+
+def this_machine():
+    with open("/proc/cpuinfo", encoding="utf-8") as file:
+        info = file.read()
+    name = re.search(r"model name\s*: (.*)", info)
+    wide = next((words for flag, words in (("avx512f", ", AVX-512"), ("avx2", ", AVX2"))
+                 if re.search(rf"\b{flag}\b", info)), "")
+    return f"{os.cpu_count()} cores of {name.group(1) if name else 'a processor'}{wide}"
+
+
+def record(page, section, body):
+    opening, closing = f"<!-- measured: {section} -->\n", "<!-- end of section -->\n"
+    start = page.find(opening)
+    end = page.find(closing, start)
+    if start < 0 or end < 0:
+        sys.exit(f'cannot record "{section}": the page must have the line "{opening.strip()}" and, after '
+                 f'it, "{closing.strip()}"; one is missing. Add them where the figures shall stand.')
+    return page[:start + len(opening)] + body + page[end:]
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("section", choices=SECTIONS)
+    parser.add_argument("report")
+    parser.add_argument("page")
+    parser.add_argument("--commit", required=True)
+    parser.add_argument("--machine", default=this_machine())
+    options = parser.parse_args()
+    with open(options.report, encoding="utf-8") as file:
+        report = json.load(file)
+    with open(options.page, encoding="utf-8") as file:
+        page = file.read()
+    body = (f"Measured on {options.machine}, at commit {options.commit}.\n\n" +
+            SECTIONS[options.section](report))
+    page = record(page, options.section, body)
+    with open(options.page, "w", encoding="utf-8") as file:
+        file.write(page)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,67 @@
+#!/usr/bin/env python3
+"""measurements.py: a section is replaced, the text around it stays, and missing ones are errors."""
+import json
+import os
+import subprocess
+import sys
+import tempfile
+import unittest
+
+here = os.path.dirname(os.path.abspath(__file__))
+PAGE = ("# Page\n\nBy hand.\n\n<!-- measured: programs -->\nold figures\n<!-- end of section -->\n\n"
+        "<!-- measured: gradients -->\nkept\n<!-- end of section -->\nLast.\n")
+PROGRAMS = {"programs": [
+    {"program": "fast", "run_ratio": 0.5, "compile_ratio": 0.25,
+     "cases": [{"retrograde_ms": 1.0, "halide_ms": 2.0}]},
+    {"program": "slow", "run_ratio": 2.0, "compile_ratio": 1.0,
+     "cases": [{"retrograde_ms": 4.0, "halide_ms": 2.0}]},
+    {"program": "broken", "cases": [], "failure": "no worker"}]}
+PAIR = {"kernel": "blur", "threads": 2, "retrograde_ms": 1.5, "halide_ms": 3.0, "run_ratio": 0.5,
+        "compile_ratio": 0.2, "retrograde_peak_mb": 80.4, "halide_peak_mb": 90.6,
+        "percent_of_bound": 41.7}
+
+
+class Measurements(unittest.TestCase):
+    def record(self, section, report, page=PAGE):
+        with tempfile.TemporaryDirectory() as folder:
+            names = [os.path.join(folder, name) for name in ("report.json", "page.md")]
+            for name, text in zip(names, (json.dumps(report), page)):
+                with open(name, "w", encoding="utf-8") as file:
+                    file.write(text)
+            self.done = subprocess.run(
+                [sys.executable, os.path.join(here, "measurements.py"), section, *names,
+                 "--commit", "abc1234", "--machine", "2 cores"],
+                capture_output=True, text=True, check=False)
+            with open(names[1], encoding="utf-8") as file:
+                return file.read()
+
+    def test_a_section_is_replaced_and_the_rest_stays(self):
+        page = self.record("programs", PROGRAMS)
+        self.assertEqual(self.done.returncode, 0, self.done.stderr)
+        self.assertTrue(page.startswith("# Page\n\nBy hand.\n"))
+        self.assertTrue(page.endswith("<!-- measured: gradients -->\nkept\n<!-- end of section -->\nLast.\n"))
+        self.assertNotIn("old figures", page)
+        self.assertIn("Measured on 2 cores, at commit abc1234.", page)
+        self.assertIn("| fast | 0.50 | 1 / 2 | 0.25 |", page)
+
+    def test_means_are_geometric_and_leave_out_what_failed(self):
+        page = self.record("programs", PROGRAMS)
+        self.assertIn("| broken | failed |", page)
+        self.assertIn("Geometric means of 2: run time 1.00 of Halide 14's, compile time 0.50.", page)
+
+    def test_recording_twice_changes_nothing(self):
+        once = self.record("programs", PROGRAMS)
+        self.assertEqual(self.record("programs", PROGRAMS, once), once)
+
+    def test_pairs_have_their_memory_and_bound(self):
+        page = self.record("kernels", [PAIR], PAGE.replace("programs", "kernels"))
+        self.assertIn("| blur (2) | 1.50 ms | 3.00 ms | 0.50 | 0.20 | 80 / 91 | 42 % |", page)
+
+    def test_a_section_that_the_page_lacks_is_an_error_that_changes_nothing(self):
+        self.assertEqual(self.record("kernels", [PAIR]), PAGE)
+        self.assertNotEqual(self.done.returncode, 0)
+        self.assertIn('"kernels"', self.done.stderr)
+
+
+if __name__ == "__main__":
+    unittest.main()
