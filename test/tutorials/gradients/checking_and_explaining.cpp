@@ -1,0 +1,94 @@
+// Checking a gradient, and reading what it says of itself.
+//
+// check_gradients compares adjoints with differences, the complex step and tangents, in double.
+// explanations() says how each adjoint is made, what is kept, and why a gradient is zero.
+#include <retrograde/retrograde.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "tutorial.h"
+
+using namespace retrograde;
+
+int main(int argc, char** argv) {
+  const int n = 24;
+  Buffer<float> a({n}, "a"), table({8}, "table");
+  Buffer<int> places({n}, "places");
+  for (int i = 0; i < n; ++i) {
+    a(i) = 0.5f + static_cast<float>(i * 5 % 11) / 16;
+    places(i) = i * 3 % 8;
+  }
+  for (int i = 0; i < 8; ++i) table(i) = 1.0f + 0.125f * static_cast<float>(i);
+
+  Var x("x");
+  Func looked_up("looked_up"), model("model"), loss("loss");
+  RDom r(0, n - 1);
+  looked_up(x) = table(clamp(places(x), 0, 7));
+  model(x) = tanh(a(x) * a(x + 1)) * looked_up(x) + floor(8.0f * a(x)) / 8.0f;
+  loss() = 0.0f;
+  loss() += pow(model(r), 2);
+
+  // ---- Is it right? Differences of a function with steps say nothing at the steps, so the step is left
+  // out of what is checked. ----
+  Func smooth("smooth"), smooth_loss("smooth_loss");
+  smooth(x) = tanh(a(x) * a(x + 1)) * looked_up(x);
+  smooth_loss() = 0.0f;
+  smooth_loss() += pow(smooth(r), 2);
+  GradientReport report = check_gradients(smooth_loss);
+  claim(report.worst_error < 1e-8, "adjoints in double agree with differences to eight digits");
+  for (const GradientReport::Input& input : report.inputs)
+    claim(input.dot_product_error < 1e-12, "and with tangents to twelve: " + input.name);
+  claim(report.complex_step_refused.empty(), "the complex step, exact to rounding, was possible");
+  for (const GradientReport::Input& input : report.inputs)
+    claim(input.own_precision_error < 1e-4, "in float32, as it will run, four digits are right");
+
+  // ---- Would it have been noticed if it were wrong? A rule that forgets a factor of two. ----
+  Func wrong("wrong"), wrong_loss("wrong_loss");
+  wrong(x) = a(x) * a(x);
+  custom_adjoint(wrong, {a}, [a](const AdjointContext& context) {
+    Func half("half");
+    Var i("i");
+    half(i) = context.adjoint()(i) * a(i);  // should be 2 a(i)
+    return std::vector<AdjointContribution>{{a, half}};
+  });
+  wrong_loss() = 0.0f;
+  wrong_loss() += wrong(r);
+  GradientCheckOptions quick;
+  quick.directions = 1;
+  claim(check_gradients(wrong_loss, {}, quick).worst_error > 0.1, "a wrong rule is found");
+
+  // ---- What does it say of itself? ----
+  Derivative d = propagate_adjoints(loss);
+  std::printf("\n%s\n", d.explain().c_str());
+  auto says = [&](Explanation::Kind kind, const std::string& subject) {
+    const std::vector<Explanation> facts = d.explanations();
+    return std::any_of(facts.begin(), facts.end(), [&](const Explanation& fact) {
+      return fact.kind == kind && fact.subject.find(subject) != std::string::npos;
+    });
+  };
+  claim(says(Explanation::Kind::Built, a.name()), "built: the gradient by a is a gather");
+  claim(says(Explanation::Kind::Scattered, table.name()),
+        "scattered: data decide where the table is read, so its gradient is a scatter");
+  Derivative by_places = propagate_adjoints(loss);
+  by_places(places);  // of integers: asked for all the same
+  bool zero = false;
+  for (const Explanation& fact : by_places.explanations())
+    zero = zero || fact.kind == Explanation::Kind::Zero;
+  claim(zero, "zero: what has no slope is told, with the reason");
+
+  // ---- And what does it cost? ----
+  const GradientOperations operations = d.operations();
+  claim(operations.ratio() && *operations.ratio() < 6,
+        "all slopes together take a few times the operations of the program");
+
+  std::vector<double> central, richardson;
+  for (const GradientReport::Step& step : report.inputs.front().steps) {
+    central.push_back(std::log10(std::max(step.central_error, 1e-16)));
+    richardson.push_back(std::log10(std::max(step.richardson_error, 1e-16)));
+  }
+  Picture picture("Checking: log10 of the error of differences, for smaller and smaller steps");
+  picture.curve("central differences", central, -16, 0);
+  picture.curve("extrapolated", richardson, -16, 0);
+  picture.write(argc, argv, "checking_and_explaining");
+}
