@@ -24,10 +24,13 @@ class Doubles {
     if (!e_.machine.has_fma()) return e_.b.CreateFAdd(e_.b.CreateFMul(a, b), c);
     return e_.b.CreateIntrinsic(llvm::Intrinsic::fma, {a->getType()}, {a, b, c});
   }
-  // c[0] + c[1] x + ..., by Horner's rule.
+  // c[0] + c[1] x + ..., an odd number of terms: Horner's rule over pairs, half as long a chain as
+  // over terms.
   Value* polynomial(Value* x, const std::vector<double>& c) {
-    Value* result = float_constant(x, c.back());
-    for (size_t i = c.size() - 1; i-- > 0;) result = fma(result, x, float_constant(x, c[i]));
+    const auto constant = [&](size_t i) { return float_constant(x, c[i]); };
+    Value *square = e_.b.CreateFMul(x, x), *result = constant(c.size() - 1);
+    for (size_t i = c.size() - 1; i >= 2; i -= 2)
+      result = fma(result, square, fma(x, constant(i - 1), constant(i - 2)));
     return result;
   }
 
@@ -36,43 +39,35 @@ class Doubles {
   Contraction contraction_;
 };
 
-// x = 2^k m, m in [sqrt(1/2), sqrt(2)), of a finite x >= 2^-149; 0 has a k below -150 and m = 1.
+// x = 2^k m, m in [sqrt(1/2), sqrt(2)), of a finite x > 0, which as a double is no denormal; of 0,
+// k is -1023 and m is 1.
 struct Parts {
   Value *k, *m;
 };
 
 Parts split(Emitter& e, Value* x) {
-  constexpr int64_t one = 0x3f800000, sqrt_half = 0x3f3504f3, scale_exponent = 32;
-  Value* is_small = e.b.CreateFCmpOLT(x, float_constant(x, 0x1p-126));
-  Value* scaled = e.b.CreateFMul(x, float_constant(x, 0x1p32));
-  Value* bits = bits_as_integer(e, e.b.CreateSelect(is_small, scaled, x));
+  constexpr int64_t one = 0x3ff0000000000000, sqrt_half = 0x3fe6a09e667f3bcd;
+  constexpr int64_t mantissa_mask = 0xfffffffffffff, two_to_52 = 0x4330000000000000;
+  Value* bits = bits_as_integer(e, x);
   const auto integer = [&](int64_t value) { return int_constant(bits, value); };
   Value* moved = e.b.CreateAdd(bits, integer(one - sqrt_half));
-  Value* mantissa = e.b.CreateAnd(moved, integer(0x7fffff));
-  Value* bias = e.b.CreateSelect(is_small, integer(127 + scale_exponent), integer(127));
-  return {e.b.CreateSub(e.b.CreateLShr(moved, integer(23)), bias),
+  Value* mantissa = e.b.CreateAnd(moved, integer(mantissa_mask));
+  // The biased exponent as the last bits of 2^52 + it: AVX2 converts no integers of 64 bits.
+  Value* biased = e.b.CreateOr(e.b.CreateLShr(moved, integer(52)), integer(two_to_52));
+  return {e.b.CreateFSub(bits_as_float(e, biased), float_constant(x, 0x1p52 + 1023)),
           bits_as_float(e, e.b.CreateAdd(mantissa, integer(sqrt_half)))};
 }
 
-// log2(x) = k + s P(s^2), s = (m - 1) / (m + 1), |s| <= 0.172; 0 only of 1. The quotient from a
-// reciprocal in float and one of Newton's steps: den * r has 49 bits and is exact. A division of
-// doubles would take longer than all the rest.
-Value* log2_as_double(Emitter& e, Value* x) {
+// y log2(x) = y k + y s P(s^2), s = (m - 1) / (m + 1), |s| <= 0.172; 0 only of 1.
+Value* times_log2(Emitter& e, Value* y, Value* x) {
   Doubles d(e);
-  auto* wide = with_lanes(e.b.getDoubleTy(), lanes_of(x));
-  const auto [k, narrow_m] = split(e, x);
+  const auto [k, m] = split(e, x);
   Value* one = float_constant(x, 1.0);
-  Value* narrow_r = e.b.CreateFDiv(one, e.b.CreateFAdd(narrow_m, one));
-  Value *num = e.b.CreateFPExt(e.b.CreateFSub(narrow_m, one), wide),  // exact
-      *r = e.b.CreateFPExt(narrow_r, wide);
-  Value* den = e.b.CreateFAdd(num, float_constant(num, 2.0));
-  Value *guess = e.b.CreateFMul(num, r),
-        *rest = d.fma(e.b.CreateFNeg(den), r, float_constant(num, 1.0));
-  Value* s = d.fma(guess, rest, guess);
+  Value* s = e.b.CreateFDiv(e.b.CreateFSub(m, one), e.b.CreateFAdd(m, one));
   Value* p = d.polynomial(e.b.CreateFMul(s, s),
                           {0x1.71547652bede5p+1, 0x1.ec709d12e151ap-1, 0x1.27777fda6996cp-1,
                            0x1.a58d8fbfbfbdcp-2, 0x1.5ce7cd9d80bd4p-2});
-  return d.fma(s, p, e.b.CreateSIToFP(k, wide));
+  return d.fma(e.b.CreateFMul(y, s), p, e.b.CreateFMul(y, k));
 }
 
 // u = n + f, |f| <= 1/2;  2^u = 2^n (1 + f Q(f)). Saturates at 2^-1000 and 2^1000. A NaN that was a
@@ -100,9 +95,8 @@ Value* power_of_magnitude(Emitter& e, Value* size, Value* y) {
   Value *low = float_constant(y, -0x1p100), *high = float_constant(y, 0x1p100);
   y = e.b.CreateSelect(e.b.CreateFCmpOGT(low, y), low, y);
   y = e.b.CreateSelect(e.b.CreateFCmpOLT(high, y), high, y);
-  Value* log = log2_as_double(e, size);
-  Value* power = exp2_of_double(e, e.b.CreateFMul(e.b.CreateFPExt(y, wide), log));
-  return e.b.CreateFPTrunc(power, size->getType());
+  Value* u = times_log2(e, e.b.CreateFPExt(y, wide), e.b.CreateFPExt(size, wide));
+  return e.b.CreateFPTrunc(exp2_of_double(e, u), size->getType());
 }
 
 // What depends on y alone; LLVM moves it out of loops that do not change y. The powers of 0,
@@ -158,9 +152,11 @@ Value* piece_of_pow(Emitter& e, Value* x, Value* y) {
 
 }  // namespace
 
-// In pieces of one register of floats: of more, the doubles would not stay in registers.
+// In pieces of two registers of floats, four of doubles: steps of four chains stand side by side,
+// overlap in time and share the loads of coefficients. One register's chain is as long as what a
+// processor looks ahead, so that chains of different pieces would hardly meet.
 Value* float_pow(Emitter& e, Value* x, Value* y) {
-  const int lanes = lanes_of(x), most = std::max(4, e.machine.vector_bits / 32);
+  const int lanes = lanes_of(x), most = std::max(4, e.machine.vector_bits / 16);
   if (lanes <= most) return piece_of_pow(e, x, y);
   std::vector<Value*> pieces;
   for (int start = 0; start < lanes; start += most) {
