@@ -4,10 +4,9 @@
 //   For a < 0, a ^ sign = -a - 1 >= 0 and  -1 - (-a - 1) / c = floor(a / c). LLVM turns the
 //   unsigned division into a multiplication, in vectors too. By a negative constant: q = -(a /
 //   |c|), since a = q c + r with the same r.
-// By a variable, vectors of up to 32 bits: in double, whose quotient truncates exactly: a / b
-// differs from the next
-//   integer by at least 1 / |b|, and the rounding error of the quotient is at most |a / b| 2^-53 <
-//   1 / |b|.
+// By a variable, vectors of up to 32 bits: in floats that hold both operands, float32 for up to 16
+//   bits, else double. Their quotient truncates exactly: a / b differs from the next integer by at
+//   least 1 / |b|; the rounding error is at most |a / b| 2^-24, or 2^-53, less than 1 / |b|.
 // By a variable otherwise: LLVM's division with the two cases that it leaves undefined taken out.
 #include <llvm/IR/Constants.h>
 
@@ -44,23 +43,27 @@ Value* divide_by_constant(Emitter& e, Type type, Value* a, const llvm::APInt& di
   return divisor.isNegative() ? e.b.CreateNeg(quotient) : quotient;
 }
 
-Value* truncating_in_double(Emitter& e, Type type, Value* a, Value* b) {
-  auto* wide = with_lanes(e.b.getDoubleTy(), type.lanes());
-  // To 64 bits: the quotient of the most negative number and -1 does not fit 32.
-  auto* integer = with_lanes(e.b.getInt64Ty(), type.lanes());
+Value* truncating_in_floats(Emitter& e, Type type, Value* a, Value* b) {
+  const bool is_narrow = type.bits() < 32, is_signed = type.is_int();
+  auto* wide = with_lanes(is_narrow ? e.b.getFloatTy() : e.b.getDoubleTy(), type.lanes());
+  auto* integer = with_lanes(e.b.getInt32Ty(), type.lanes());
   Contraction off(e, false);
-  if (type.is_int()) {
-    Value* quotient = e.b.CreateFDiv(e.b.CreateSIToFP(a, wide), e.b.CreateSIToFP(b, wide));
-    return e.b.CreateTrunc(e.b.CreateFPToSI(quotient, integer), a->getType());
-  }
-  Value* quotient = e.b.CreateFDiv(e.b.CreateUIToFP(a, wide), e.b.CreateUIToFP(b, wide));
-  return e.b.CreateTrunc(e.b.CreateFPToUI(quotient, integer), a->getType());
+  const auto widened = [&](Value* v) {
+    return is_signed ? e.b.CreateSIToFP(v, wide) : e.b.CreateUIToFP(v, wide);
+  };
+  Value* quotient = e.b.CreateFDiv(widened(a), widened(b));
+  if (is_narrow) return e.b.CreateTrunc(e.b.CreateFPToSI(quotient, integer), a->getType());
+  if (!is_signed) return e.b.CreateFPToUI(quotient, integer);
+  // The quotient of the most negative number and -1 alone does not fit.
+  Value* is_minus_one = e.b.CreateICmpEQ(b, int_constant(b, -1));
+  Value* fitting = e.b.CreateFreeze(e.b.CreateFPToSI(quotient, integer));
+  return e.b.CreateSelect(is_minus_one, e.b.CreateNeg(a), fitting);
 }
 
 // Rounding toward zero; b is not 0.
 Value* truncating(Emitter& e, Type type, Value* a, Value* b) {
   if (type.is_vector() && type.bits() >= 8 && type.bits() <= 32)
-    return truncating_in_double(e, type, a, b);
+    return truncating_in_floats(e, type, a, b);
   if (!type.is_int()) return e.b.CreateUDiv(a, b);
   Value* is_minus_one = e.b.CreateICmpEQ(b, int_constant(b, -1));
   Value* quotient = e.b.CreateSDiv(a, e.b.CreateSelect(is_minus_one, int_constant(b, 1), b));

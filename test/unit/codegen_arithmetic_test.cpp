@@ -41,15 +41,22 @@ LoweredFunction elementwise(const std::vector<Type>& inputs, const Cases& cases,
   return function;
 }
 
-void check(const std::vector<Type>& inputs, int lanes, const Cases& cases,
-           const Target& target = test_target()) {
-  const int count = 240;  // divisible by all widths
-  RandomScalars random(static_cast<uint32_t>(lanes));
-  std::vector<std::unique_ptr<Array>> arrays;
+constexpr int count = 240;  // divisible by all widths
+using Operands = std::vector<std::unique_ptr<Array>>;
+
+Operands random_operands(const std::vector<Type>& inputs, uint32_t seed) {
+  RandomScalars random(seed);
+  Operands operands;
   for (Type type : inputs) {
-    arrays.push_back(std::make_unique<Array>(type, count));
-    for (size_t i = 0; i < count; i++) arrays.back()->set(i, random(type));
+    operands.push_back(std::make_unique<Array>(type, count));
+    for (size_t i = 0; i < count; i++) operands.back()->set(i, random(type));
   }
+  return operands;
+}
+
+void check(Operands arrays, int lanes, const Cases& cases, const Target& target = test_target()) {
+  std::vector<Type> inputs;
+  for (const auto& array : arrays) inputs.push_back(array->type());
   for (const Case& c : cases) arrays.push_back(std::make_unique<Array>(c.result, count));
   std::vector<Array*> raw;
   for (auto& array : arrays) raw.push_back(array.get());
@@ -69,6 +76,11 @@ void check(const std::vector<Type>& inputs, int lanes, const Cases& cases,
           << ", expected " << show(expected);
     }
   }
+}
+
+void check(const std::vector<Type>& inputs, int lanes, const Cases& cases,
+           const Target& target = test_target()) {
+  check(random_operands(inputs, static_cast<uint32_t>(lanes)), lanes, cases, target);
 }
 
 Case binary_case(Kind kind, Type type) {
@@ -163,6 +175,39 @@ TEST(CodegenArithmetic, DivisionByConstants) {
         }
       }
       check({type}, lanes, cases);
+    }
+  }
+}
+
+// Where a quotient of floats is nearest to the next integer: large multiples of the divisor and
+// their neighbours.
+TEST(CodegenArithmetic, DivisionNextToWholeQuotients) {
+  std::mt19937_64 random(1);
+  for (Type type : {Int(8), UInt(8), Int(16), UInt(16), Int(32), UInt(32)}) {
+    Operands operands = random_operands({type, type}, 1);
+    for (size_t i = 0; i < count; i++) {
+      const uint64_t largest = type.max_uint() >> (i % (type.bits() - 1));
+      const auto divisor = static_cast<int64_t>(1 + random() % largest);
+      const int64_t multiple = static_cast<int64_t>(type.max_uint()) / divisor * divisor;
+      const int64_t near = multiple - 1 + static_cast<int64_t>(random() % 2);
+      const bool negates = type.is_int() && random() % 2;
+      operands[0]->set(i, Scalar::of_int(type, negates ? -near : near));
+      operands[1]->set(i, Scalar::of_int(type, divisor));
+    }
+    check(std::move(operands), 8, {binary_case(Kind::Div, type), binary_case(Kind::Mod, type)});
+  }
+}
+
+TEST(CodegenArithmetic, MostNegativeByMinusOne) {
+  for (Type type : {Int(8), Int(16), Int(32), Int(64)}) {
+    for (int lanes : {1, 5, 16}) {
+      Operands operands = random_operands({type, type}, 1);
+      for (size_t i = 0; i < count; i += 2) {
+        operands[0]->set(i, Scalar::of_int(type, type.min_int()));
+        operands[1]->set(i, Scalar::of_int(type, -1));
+      }
+      check(std::move(operands), lanes,
+            {binary_case(Kind::Div, type), binary_case(Kind::Mod, type)});
     }
   }
 }
