@@ -295,7 +295,7 @@ Value* FunctionGenerator::gather_filled_up(const Storage& from, Type type, Value
 }
 
 Value* FunctionGenerator::gather(const Storage& from, Type type, Value* indices, Value* predicate) {
-  if (predicate || machine_gathers(e_.machine, type)) {
+  if (predicate || (machine_gathers(e_.machine, type) && e_.machine.gathers_fast)) {
     if (!std::has_single_bit(unsigned(type.lanes()))) {
       Value* all = splat(e_, b_.getTrue(), type.lanes());
       return gather_filled_up(from, type, indices, predicate ? predicate : all);
@@ -307,11 +307,10 @@ Value* FunctionGenerator::gather(const Storage& from, Type type, Value* indices,
     auto* gathered = b_.CreateMaskedGather(vector, pointers, alignment_of(type), mask, off);
     return from_memory(type, tagged(gathered, from));
   }
+  indices = b_.CreateSExt(indices, with_lanes(b_.getInt64Ty(), type.lanes()));
   std::vector<Value*> lanes;
-  for (int i = 0; i < type.lanes(); i++) {
-    Value* index = b_.CreateSExt(lane(e_, indices, i), b_.getInt64Ty());
-    lanes.push_back(load_scalar(from, type.element_of(), index, nullptr));
-  }
+  for (int i = 0; i < type.lanes(); i++)
+    lanes.push_back(load_scalar(from, type.element_of(), lane(e_, indices, i), nullptr));
   return from_lanes(e_, lanes);
 }
 

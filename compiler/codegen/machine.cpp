@@ -2,6 +2,7 @@
 #include "codegen/machine.h"
 
 #include <llvm/ADT/StringMap.h>
+#include <llvm/MC/MCSubtargetInfo.h>
 #include <llvm/MC/TargetRegistry.h>
 #include <llvm/Support/TargetSelect.h>
 #include <llvm/Target/TargetMachine.h>
@@ -126,6 +127,22 @@ static std::string tuning_for(const Machine& machine) {
   return machine.has_avx512_words() ? "x86-64-v4" : "x86-64-v3";
 }
 
+static const llvm::Target& llvm_target(const Machine& machine) {
+  initialize_llvm();
+  std::string problem;
+  const llvm::Target* target = llvm::TargetRegistry::lookupTarget(machine.triple, problem);
+  RETROGRADE_ASSERT(target != nullptr, "LLVM has no target ", machine.triple, ": ", problem);
+  return *target;
+}
+
+// Where it does not, LLVM takes gathers apart, after all addresses have been computed as vectors.
+static bool gathers_fast(const Machine& machine) {
+  if (!machine.has_avx2() || machine.has_avx512()) return machine.has_avx512();
+  const std::unique_ptr<llvm::MCSubtargetInfo> tuned(llvm_target(machine).createMCSubtargetInfo(
+      machine.triple, machine.tune_cpu, machine.features));
+  return tuned->checkFeatures("+fast-gather");
+}
+
 Machine machine_for(const Target& target, bool tune_for_host) {
   refuse_sanitizers(target);
   if (const std::string part = target.unsupported_part(); !part.empty()) {
@@ -152,18 +169,15 @@ Machine machine_for(const Target& target, bool tune_for_host) {
   if (tune_for_host && is_host) machine.tune_cpu = llvm::sys::getHostCPUName().str();
   if (const std::string name = target.processor_name(); !name.empty() && machine.is_x86())
     machine.tune_cpu = name == "k8_sse3" ? "k8-sse3" : name;
+  machine.gathers_fast = gathers_fast(machine);
   return machine;
 }
 
 std::unique_ptr<llvm::TargetMachine> make_target_machine(const Machine& machine) {
-  initialize_llvm();
-  std::string problem;
-  const llvm::Target* target = llvm::TargetRegistry::lookupTarget(machine.triple, problem);
-  RETROGRADE_ASSERT(target != nullptr, "LLVM has no target ", machine.triple, ": ", problem);
   llvm::TargetOptions options;
   options.AllowFPOpFusion = llvm::FPOpFusion::Standard;  // fuses what carries the contract flag
   options.TrapUnreachable = true;
-  return std::unique_ptr<llvm::TargetMachine>(target->createTargetMachine(
+  return std::unique_ptr<llvm::TargetMachine>(llvm_target(machine).createTargetMachine(
       machine.triple, machine.cpu, machine.features, options, llvm::Reloc::PIC_,
       llvm::CodeModel::Small, llvm::CodeGenOptLevel::Default));
 }

@@ -16,6 +16,7 @@ struct Machine {
   Target target;
   std::string triple, cpu, tune_cpu, features;
   int vector_bits = 128;
+  bool gathers_fast = false;  // what the code is tuned for: not lane by lane inside
   // Whether vector math is SLEEF's; else the C library's, lane by lane: what is compiled ahead of
   // time for AArch64 needs no library that its toolchains lack.
   bool has_sleef = true;
