@@ -8,6 +8,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cstddef>
 #include <cstdint>
 #include <cstdlib>
 #include <mutex>
@@ -41,7 +42,7 @@ size_t round_up(size_t bytes, size_t multiple) {
 }
 
 size_t capacity_for(size_t bytes) {
-  return bytes < small_bytes ? round_up(std::max<size_t>(bytes, 1), alignment)
+  return bytes < small_bytes ? round_up(std::max<size_t>(bytes, 1), sizeof(Header))
                              : round_up(bytes + alignment, page_bytes) - alignment;
 }
 
@@ -57,9 +58,12 @@ void* with_header(void* allocation, void* block, size_t capacity) {
 }
 
 // malloc and room to align by hand: posix_memalign would cut a piece off the front each time, and
-// free would join it again, which takes longer than a stage computes a row.
+// free would join it again, which takes longer than a stage computes a row. No more room than the
+// header needs: malloc has lists of its own for each thread for blocks of up to a kilobyte, such as
+// a row of a small picture, and takes several times as long for larger ones.
 void* small_malloc(size_t capacity) {
-  void* allocation = std::malloc(capacity + 2 * alignment);
+  static_assert(alignof(std::max_align_t) == sizeof(Header));  // of which malloc gives multiples
+  void* allocation = std::malloc(capacity + alignment);
   if (!allocation) return nullptr;
   const uintptr_t behind = reinterpret_cast<uintptr_t>(allocation) + sizeof(Header);
   const size_t skipped = round_up(behind, alignment) - behind;
