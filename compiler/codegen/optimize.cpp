@@ -20,6 +20,7 @@
 // rows that schedules produce). Strength reduction of addresses is part of LLVM's code generator.
 #include "codegen/optimize.h"
 
+#include <llvm/ADT/STLExtras.h>
 #include <llvm/Analysis/LoopInfo.h>
 #include <llvm/Analysis/ScalarEvolution.h>
 #include <llvm/Analysis/TargetTransformInfo.h>
@@ -63,15 +64,23 @@ static unsigned cost_of(const llvm::BasicBlock& block) {
 // What a loop adds to its counter, compares and jumps.
 constexpr unsigned counting = 3;
 // The most that a loop without a loop in it, copied as often as it runs, may grow to. Loops over
-// the lanes of a vector of bytes, as borders have them, stay compact.
-constexpr unsigned most_unrolled = 160, few_iterations = 16;
+// the lanes of a vector of bytes, as borders have them, stay compact; those that store nothing, as
+// sums over the lanes of partial sums, may run as often: their operands become registers.
+constexpr unsigned most_unrolled = 160, few_iterations = 16, few_without_stores = 32;
+
+static bool stores(const llvm::Loop& loop) {
+  return llvm::any_of(loop.blocks(), [](const llvm::BasicBlock* block) {
+    return llvm::any_of(*block, [](const auto& one) { return one.mayWriteToMemory(); });
+  });
+}
 
 // A loop of few iterations, whose number is known, is copied for each; the loops in it first. Its
 // cost as straight code, or nothing where it stays a loop.
 static std::optional<unsigned> unrolled_cost(const llvm::Loop& loop,
                                              llvm::ScalarEvolution& evolution) {
   const unsigned count = evolution.getSmallConstantTripCount(&loop);
-  if (count == 0 || count > few_iterations || !loop.getExitingBlock()) return std::nullopt;
+  if (count == 0 || count > few_without_stores || !loop.getExitingBlock()) return std::nullopt;
+  if (count > few_iterations && stores(loop)) return std::nullopt;
   unsigned cost = 0;
   for (const llvm::Loop* inner : loop.getSubLoops()) {
     const auto inner_cost = unrolled_cost(*inner, evolution);
