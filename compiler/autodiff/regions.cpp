@@ -6,6 +6,7 @@
 #include "autodiff/custom_rules.h"
 #include "autodiff/reverse_sweep.h"
 #include "ir/build.h"
+#include "ir/equal.h"
 #include "simplify/simplify.h"
 
 namespace retrograde::ir {
@@ -20,6 +21,21 @@ Scope<Interval> scope_of(const FuncContents& f, const Definition& definition, co
   for (const ReductionVariable& r : definition.rvars)
     scope.push(r.var, {r.min, simplify(r.min + r.extent - 1)});
   return scope;
+}
+
+// Whether an update reads an element of its Func other than the one that it writes.
+bool reads_elsewhere(const FuncContents& f, const Definition& definition) {
+  bool found = false;
+  for_each_expr(definition, [&](const Expr& e) {
+    walk(e, [&](const Expr& part) {
+      const auto* read = part.as<Call>();
+      if (!read || read->symbol.raw() != &f) return true;
+      for (size_t d = 0; d < read->args.size(); ++d)
+        found |= !equal(read->args[d], definition.args[d]);
+      return true;
+    });
+  });
+  return found;
 }
 
 // Where the place of an update depends on data, only what others read counts.
@@ -42,11 +58,13 @@ bool is_pure_position(const FuncContents& f, const Definition& definition, size_
 Regions::Regions(const std::vector<FuncPtr>& order, const Box& output) {
   if (order.empty()) return;
   boxes_[order.back().get()] = output;
+  outputs_.insert(order.back().get());
   for (auto f = order.rbegin(); f != order.rend(); ++f) add_func(*f);
 }
 
 Regions::Regions(const std::vector<FuncPtr>& order, const std::map<const Symbol*, Box>& outputs)
     : boxes_(outputs.begin(), outputs.end()) {
+  for (const auto& [symbol, box] : outputs) outputs_.insert(symbol);
   for (auto f = order.rbegin(); f != order.rend(); ++f) add_func(*f);
 }
 
@@ -68,6 +86,8 @@ void Regions::add_func(const FuncPtr& f) {
   auto found = boxes_.find(f.get());
   if (found == boxes_.end() || (found->second.empty() && !f->args.empty()))
     return;  // nothing of it is read
+  // An output's elements are given: beyond them it has none.
+  const bool is_output = outputs_.contains(f.get());
   std::map<const Symbol*, Box> callees;
   // From the last stage back: what an update reads of the Func itself, the stages before it must
   // hold.
@@ -81,11 +101,12 @@ void Regions::add_func(const FuncPtr& f) {
                                                             : bounds_of(definition.args[d], scope));
     }
     if (s > 0) grow(f.get(), or_else(written, boxes_[f.get()]));
+    const bool has_known_reads = is_output || !reads_elsewhere(*f, definition);
     for_each_expr(definition, [&](const Expr& e) {
       for (const auto& [name, footprint] : footprints(without_lets(e), scope)) {
         Symbol* symbol = footprint.symbol.raw();
         if (symbol == f.get())
-          grow(f.get(), or_else(footprint.box, boxes_[f.get()]));
+          grow(f.get(), has_known_reads ? or_else(footprint.box, boxes_[f.get()]) : footprint.box);
         else
           callees[symbol] = hull(callees[symbol], footprint.box);
       }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <map>
+#include <set>
 #include <unordered_map>
 #include <vector>
 
@@ -34,6 +35,7 @@ class Regions {
   void add_extern_arguments(const FuncContents& f);
   void grow(const Symbol* symbol, const Box& box);
   std::unordered_map<const Symbol*, Box> boxes_;
+  std::set<const Symbol*> outputs_;
 };
 
 // Dimension d of `args` when it is the pure variable of that dimension.

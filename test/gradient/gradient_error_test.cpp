@@ -99,6 +99,23 @@ TEST_F(Gradients, UpdateThatReachesElementsWithoutBounds) {
   expect_error<Unsupported>([&] { propagate_adjoints(loss); }, {"\"f", "bounds", "Clamp"});
 }
 
+// What others read has bounds: the elements beyond them count where the update reads them.
+TEST_F(Gradients, UpdateThatReadsElementsWithoutBounds) {
+  for (bool accumulates : {false, true}) {
+    Func reads("reads");
+    RDom r(0, 8);
+    reads(x) = a(clamp(x, 0, 7));
+    const Expr read = reads(cast<int>(a(r))) * 2.0f;
+    if (accumulates)
+      reads(0) += read;
+    else
+      reads(r) = read;
+    Func sum("sum");
+    sum() = reads(0) + reads(1);
+    expect_error<Unsupported>([&] { propagate_adjoints(sum); }, {"\"reads", "bounds", "Clamp"});
+  }
+}
+
 TEST_F(Gradients, IntegerOutput) {
   f(x) = cast<int>(a(x));
   expect_error<UserError>([&] { propagate_adjoints(f); }, {"\"f", "int32", "float"});
