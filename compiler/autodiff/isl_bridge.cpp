@@ -33,6 +33,7 @@ IslBridge IslBridge::with_dims(std::vector<std::string> dims) const {
   result.universe_ = isl::manage(
       isl_set_universe(isl_space_set_alloc(ctx_, 0, static_cast<unsigned>(dims.size()))));
   result.dims_ = std::move(dims);
+  result.known_.clear();
   return result;
 }
 
@@ -171,6 +172,14 @@ std::optional<isl::pw_aff> IslBridge::bits(const Call& c, const Expr& e) {
 }
 
 std::optional<isl::pw_aff> IslBridge::affine(const Expr& e) {
+  const auto known = known_.find(e.get());
+  if (known != known_.end()) return known->second.second;
+  std::optional<isl::pw_aff> result = affine_form(e);
+  known_.insert_or_assign(e.get(), std::pair(e, result));
+  return result;
+}
+
+std::optional<isl::pw_aff> IslBridge::affine_form(const Expr& e) {
   if (fixed_.contains(e)) return parameter(e);
   if (auto value = as_const_int(e)) return constant(*value);
   if (e.type().is_float() || e.type().is_bool()) return obstacle(e);

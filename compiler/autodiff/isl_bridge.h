@@ -12,6 +12,7 @@
 #include <optional>
 #include <set>
 #include <string>
+#include <unordered_map>
 #include <vector>
 
 #include "autodiff/isl_budget.h"
@@ -52,9 +53,15 @@ class IslBridge {
   isl::pw_aff dim(int position) const;
 
   // A sub-expression over the dimensions whose value is known to be fixed: from now on a parameter.
-  void make_parameter(const Expr& e) { fixed_.insert(e); }
+  void make_parameter(const Expr& e) {
+    fixed_.insert(e);
+    known_.clear();
+  }
   const std::set<Expr, StructuralLess>& obstacles() const { return obstacles_; }
-  void clear_obstacles() { obstacles_.clear(); }
+  void clear_obstacles() {
+    obstacles_.clear();
+    known_.clear();  // those without an affine form are to be noted again
+  }
 
   // Back. `names` gives an expression for each dimension of the space at hand (sets and domains of
   // pw_affs).
@@ -73,6 +80,7 @@ class IslBridge {
   isl::pw_aff constant(int64_t value) const;
   isl::pw_aff parameter(const Expr& e);
   bool mentions_dim(const Expr& e) const;
+  std::optional<isl::pw_aff> affine_form(const Expr& e);
   std::optional<isl::pw_aff> obstacle(const Expr& e);
   std::optional<isl::pw_aff> binary(const Binary& b, const Expr& e);
   std::optional<isl::pw_aff> absolute(const Cast& c);
@@ -86,6 +94,8 @@ class IslBridge {
   std::map<Expr, std::string, StructuralLess> parameter_names_;
   std::map<std::string, Expr> parameters_;
   std::set<Expr, StructuralLess> fixed_, obstacles_;
+  // Of nodes seen: expressions share them. The Expr keeps its node alive.
+  std::unordered_map<const ExprNode*, std::pair<Expr, std::optional<isl::pw_aff>>> known_;
 };
 
 }  // namespace retrograde::ir

@@ -268,6 +268,13 @@ TEST(AccessInversion, ShiftsAndMasksArePowersOfTwo) {
 TEST(AccessInversion, ConditionsAsNumbersAreSelects) {
   EXPECT_TRUE(all_gather(check(make_case({x10}, {x + cast_to(Int(32), x > 4)}))));
 }
+// 2^40 paths lead from the index to x.
+TEST(AccessInversion, SharedPartsOfAnIndexAreFollowedOnce) {
+  Expr index = x;
+  for (int i = 0; i < 40; ++i) index = (index + index) / 2;
+  const Inversion inversion = invert_access(make_case({x10}, {index}).query);
+  EXPECT_EQ(inversion.gathers.size(), 1u);
+}
 TEST(AccessInversion, SelectBetweenAffineIndices) {
   Inversion inversion = check(make_case({x10}, {select(x < 5, x + 10, 5 - x)}));
   EXPECT_TRUE(all_gather(inversion));
