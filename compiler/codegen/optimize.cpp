@@ -15,6 +15,7 @@
 //   LoopUnroll     loops of few iterations altogether, other small innermost ones two or four times
 //   SROA, EarlyCSE allocations of which only such a loop hid the places; what it loaded twice
 //   InstCombine, SimplifyCFG, ADCE to clean up
+//   FenceLongBlocks so that LLVM's scheduler takes linear time
 //
 // Left out: loop and SLP vectorization, inlining, loop idioms (a memset call is slower on the short
 // rows that schedules produce). Strength reduction of addresses is part of LLVM's code generator.
@@ -43,6 +44,8 @@
 
 #include <algorithm>
 #include <optional>
+
+#include "codegen/fence_long_blocks.h"
 
 namespace retrograde::codegen {
 
@@ -142,6 +145,7 @@ static llvm::FunctionPassManager pipeline() {
   passes.addPass(llvm::InstCombinePass());
   passes.addPass(llvm::SimplifyCFGPass());
   passes.addPass(llvm::ADCEPass());
+  passes.addPass(FenceLongBlocks());
   return passes;
 }
 

@@ -380,5 +380,24 @@ TEST(CodegenIdioms, ShortVectorLoopsAreUnrolled) {
   EXPECT_EQ(count(block_with_most(assembly(f, avx2), "vpaddw"), "vpaddw"), 4u);
 }
 
+// LLVM's scheduler takes time quadratic in a block's accesses, but for fences, which are no
+// instructions.
+TEST(CodegenIdioms, LongStraightCodeIsFenced) {
+  const auto fences_of = [](int statements) {
+    ImageParam in(Float(32), 1, "in");
+    Var x("x");
+    Func f("f");
+    std::vector<Expr> values;
+    for (int i = 0; i < statements; ++i) values.push_back(in(i * 37 % statements) * 2.0f);
+    f(x) = mux(x, values);
+    f.bound(x, 0, statements).unroll(x);
+    const auto code = assembly(f, avx2);
+    EXPECT_EQ(count(code, "mfence"), 0u);
+    return count(code, "MEMBARRIER");
+  };
+  EXPECT_EQ(fences_of(200), 0u);
+  EXPECT_EQ(fences_of(400), 6u) << "one after each 64 stores";
+}
+
 }  // namespace
 }  // namespace retrograde
