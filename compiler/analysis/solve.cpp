@@ -20,7 +20,7 @@ namespace retrograde::ir {
 
 namespace {
 
-constexpr int max_depth =
+constexpr int most_levels =
     8;  // of min, max and division inside one another; each level may try two forms
 
 LinearForm without(const LinearForm& form, const LinearTerm& term) {
@@ -113,7 +113,7 @@ class Solver {
     if (!whole.defined()) return std::nullopt;
     Expr largest = engine_.bounds(whole).max;
     if (!largest.defined()) return std::nullopt;
-    return isolate(linear_form(largest), max_depth);
+    return isolate(linear_form(largest), most_levels);
   }
 
   // form <= 0, free of inner names.

@@ -14,8 +14,6 @@ namespace retrograde::ir {
 
 namespace {
 
-Partial strong(Expr e) { return {std::move(e), Strength::Strong}; }
-
 // exp(w) where e is 1 + exp(w).
 Expr exp_of_one_plus_exp(const Expr& e) {
   const auto* sum = e.as<Add>();

@@ -13,7 +13,6 @@ namespace retrograde::ir {
 namespace {
 
 Expr op1(Op op, const Expr& a) { return call_op(op, a.type(), {a}); }
-Partial strong(Expr e) { return {std::move(e), Strength::Strong}; }
 
 // a where e is a * a or pow(a, 2).
 Expr square_root_of(const Expr& e) {

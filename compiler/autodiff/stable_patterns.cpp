@@ -1,5 +1,7 @@
 #include "autodiff/stable_patterns.h"
 
+#include <utility>
+
 #include "ir/build.h"
 #include "ir/equal.h"
 
@@ -8,6 +10,8 @@ namespace retrograde::ir {
 namespace {
 constexpr size_t most_terms = 4;
 }
+
+Partial strong(Expr factor) { return {std::move(factor), Strength::Strong}; }
 
 const Call* as_operator(const Expr& e, Op op) {
   const auto* call = e.as<Call>();

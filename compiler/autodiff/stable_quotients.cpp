@@ -10,8 +10,6 @@ namespace retrograde::ir {
 
 namespace {
 
-Partial strong(Expr e) { return {std::move(e), Strength::Strong}; }
-
 // c_0 + c_1 x + ...
 Expr polynomial(const std::vector<double>& coefficients, const Expr& x) {
   Expr result = make_const(x.type(), coefficients.back());

@@ -167,9 +167,9 @@ class FuncTangent {
   FuncPtr tangent_, dual_;
 };
 
-class Synthesis {
+class TangentSynthesis {
  public:
-  Synthesis(const FuncPtr& output, const Directions& directions)
+  TangentSynthesis(const FuncPtr& output, const Directions& directions)
       : directions_(directions), ranges_(topological_order({output})) {
     result_.order = topological_order({output});
   }
@@ -310,7 +310,7 @@ FuncPtr zero_tangent(const FuncContents& f) {
 }
 
 TangentResult synthesize_tangents(const FuncPtr& output, const Directions& directions) {
-  return Synthesis(output, directions).run();
+  return TangentSynthesis(output, directions).run();
 }
 
 }  // namespace retrograde::ir

@@ -58,9 +58,9 @@ struct Watched {
 };
 using Arrays = std::vector<std::vector<Values>>;  // of each watched Func, of each of its values
 
-class Checker {
+class StabilityChecker {
  public:
-  Checker(const Func& output, const std::vector<int>& sizes, const StabilityOptions& options)
+  StabilityChecker(const Func& output, const std::vector<int>& sizes, const StabilityOptions& options)
       : output_(output),
         asked_("check the stability of " + retrograde::quoted(output.name())),
         shape_(shape_of_output(output, options.mins, sizes, asked_, "check_stability")),
@@ -71,7 +71,7 @@ class Checker {
     watch();
     check_ranges();
   }
-  ~Checker() { restore(); }
+  ~StabilityChecker() { restore(); }
 
   StabilityReport run() {
     add_case("as bound");
@@ -328,7 +328,7 @@ class Checker {
 
 StabilityReport check_stability(const Func& output, const std::vector<int>& sizes,
                                 const StabilityOptions& options) {
-  return Checker(output, sizes, options).run();
+  return StabilityChecker(output, sizes, options).run();
 }
 
 }  // namespace retrograde

@@ -146,7 +146,7 @@ class Widening {
       case CallType::Extern:
         break;
     }
-    refuse("a call of the C function " + quoted(c.name));
+    refuse("a call of the C function " + retrograde::quoted(c.name));
   }
 
   static Expr operation(const Call& c, const std::vector<Expr>& args) {

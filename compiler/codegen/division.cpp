@@ -70,11 +70,11 @@ Value* truncating(Emitter& e, Type type, Value* a, Value* b) {
   return e.b.CreateSelect(is_minus_one, e.b.CreateNeg(a), quotient);
 }
 
-struct Parts {
+struct Divided {
   Value *quotient, *remainder;
 };
 
-Parts divide_by_variable(Emitter& e, Type type, Value* a, Value* b) {
+Divided divide_by_variable(Emitter& e, Type type, Value* a, Value* b) {
   Value *zero = int_constant(b, 0), *is_zero = e.b.CreateICmpEQ(b, zero);
   Value* divisor = e.b.CreateSelect(is_zero, int_constant(b, 1), b);
   Value* quotient = truncating(e, type, a, divisor);

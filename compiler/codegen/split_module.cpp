@@ -14,7 +14,7 @@ namespace {
 // Instructions that take LLVM several times as long as starting a thread and handing them over.
 constexpr unsigned worth_a_thread = 300;
 
-using Parts = std::map<const llvm::GlobalValue*, unsigned>;
+using PartOf = std::map<const llvm::GlobalValue*, unsigned>;
 
 std::vector<const llvm::Function*> largest_first(const llvm::Module& module) {
   std::vector<const llvm::Function*> functions;
@@ -27,9 +27,9 @@ std::vector<const llvm::Function*> largest_first(const llvm::Module& module) {
   return functions;
 }
 
-Parts assign(const std::vector<const llvm::Function*>& functions, unsigned parts) {
+PartOf assign(const std::vector<const llvm::Function*>& functions, unsigned parts) {
   std::vector<unsigned> sizes(parts, 0);
-  Parts result;
+  PartOf result;
   for (const llvm::Function* function : functions) {
     const auto least = std::min_element(sizes.begin(), sizes.end());
     *least += function->getInstructionCount();
@@ -77,7 +77,7 @@ unsigned worthwhile_parts(const llvm::Module& module, unsigned most) {
 std::vector<std::string> split_into_bitcode(llvm::Module& module, unsigned parts) {
   const std::vector<const llvm::Function*> functions = largest_first(module);
   parts = std::min<unsigned>(parts, functions.size());
-  const Parts part_of = assign(functions, parts);
+  const PartOf part_of = assign(functions, parts);
   for (llvm::Function& function : module) share(function);
   for (llvm::GlobalVariable& variable : module.globals()) {
     if (!is_local_constant(variable)) share(variable);

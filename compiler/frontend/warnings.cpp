@@ -48,7 +48,7 @@ bool overwrites_all(const FuncContents& f, const Definition& update) {
   return true;
 }
 
-std::string stage_name(const FuncContents& f, int stage) {
+std::string words_for_stage(const FuncContents& f, int stage) {
   return stage == 0 ? quoted(f.name) : text("update ", stage - 1, " of ", quoted(f.name));
 }
 
@@ -79,7 +79,7 @@ class Findings {
       if (s == 1 && is_undef(f.pure->values[0])) return;
       const std::string earlier =
           s == 1 ? "its first definition" : text("its first ", s, " definitions");
-      add(stage_name(f, s) + " hides what is defined before",
+      add(words_for_stage(f, s) + " hides what is defined before",
           "it stores every element and reads none of " + quoted(f.name) + ", so that " + earlier +
               " decide nothing",
           "Leave them out, or give the new values a Func of their own");
@@ -92,7 +92,7 @@ class Findings {
     for (int s = 0; s < f.stage_count(); s++) any = any || f.stage(s).schedule.touched;
     for (int s = 1; any && s < f.stage_count(); s++) {
       if (f.stage(s).schedule.touched) continue;
-      add(stage_name(f, s) + " has no schedule",
+      add(words_for_stage(f, s) + " has no schedule",
           "other definitions of " + quoted(f.name) + " have one, and it holds for them alone",
           text("Schedule it through update(", s - 1, "), or say update(", s - 1,
                ").unscheduled()"));
@@ -103,7 +103,7 @@ class Findings {
     for (const ReductionVariable& var : f.stage(s).rvars) {
       const auto extent = as_const_int(var.extent);
       if (!extent || *extent > 0) continue;
-      add(stage_name(f, s) + " never runs",
+      add(words_for_stage(f, s) + " never runs",
           text("the extent of ", quoted(var.var), " is ", *extent),
           "Give the reduction domain a positive extent, or leave the update out");
     }
@@ -114,7 +114,7 @@ class Findings {
     find_idle_atomic(f, s, schedule);
     for (const StageSchedule& special : schedule.specializations) {
       if (special.condition.defined() && as_const_int(special.condition)) {
-        add("a specialization of " + stage_name(f, s) + " does not depend on the call",
+        add("a specialization of " + words_for_stage(f, s) + " does not depend on the call",
             text("its condition is ", special.condition),
             "Give a condition on parameters, or schedule the stage itself");
       }
@@ -130,7 +130,7 @@ class Findings {
         if (split.kind != Split::Kind::Split || split.inner != dim.var) continue;
         if (as_const_int(split.factor) != 1) continue;
         add(text(is_vector ? "vectorizing " : "unrolling ", quoted(split.old_var), " of ",
-                 stage_name(f, s), " by 1 changes nothing"),
+                 words_for_stage(f, s), " by 1 changes nothing"),
             "the loop runs once", "Give a larger factor, or leave the directive out");
       }
     }
@@ -142,7 +142,7 @@ class Findings {
       if (dim.is_reduction && dim.for_type != ForType::Serial && dim.for_type != ForType::Unrolled)
         return;
     }
-    add("atomic() of " + stage_name(f, s) + " changes nothing",
+    add("atomic() of " + words_for_stage(f, s) + " changes nothing",
         "none of its reduction loops is parallel or vectorized",
         "Make one parallel or vectorized, or leave atomic() out");
   }

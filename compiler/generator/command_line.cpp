@@ -15,7 +15,7 @@ namespace {
 
 constexpr char asked[] = "run a generator";
 
-std::vector<std::string> split_at_commas(const std::string& text) {
+std::vector<std::string> words_between_commas(const std::string& text) {
   std::vector<std::string> words;
   for (size_t begin = 0; begin <= text.size();) {
     const size_t end = std::min(text.find(',', begin), text.size());
@@ -64,7 +64,7 @@ int read_seconds(const std::string& text) {
 }
 
 void read_targets(const std::string& text, CommandLine& command) {
-  command.suffixes = split_at_commas(text);
+  command.suffixes = words_between_commas(text);
   command.targets.clear();
   for (const std::string& word : command.suffixes) command.targets.push_back(Target(word));
 }
@@ -96,10 +96,10 @@ void set_flag(char flag, const std::string& value, CommandLine& command) {
       command.timeout_seconds = read_seconds(value);
       return;
     case 'p':
-      command.plugins = split_at_commas(value);
+      command.plugins = words_between_commas(value);
       return;
     case 'e':
-      for (const std::string& word : split_at_commas(value))
+      for (const std::string& word : words_between_commas(value))
         command.emit.push_back(read_emit_type(word));
       return;
   }
