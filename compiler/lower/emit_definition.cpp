@@ -7,16 +7,12 @@
 #include "ir/conjuncts.h"
 #include "ir/variables.h"
 #include "ir/visit.h"
+#include "lower/resolve_undef.h"
 #include "simplify/cse.h"
 #include "simplify/simplify.h"
 
 namespace retrograde::ir {
 namespace {
-
-bool is_undef(const Expr& e) {
-  const Call* call = e.as<Call>();
-  return call && call->is_op(Op::undef);
-}
 
 bool is_comparison(const Expr& e) {
   const Kind kind = e.kind();

@@ -27,6 +27,7 @@
 #include "ir/memory_reads.h"
 #include "ir/visit.h"
 #include "lower/copy_statement.h"
+#include "lower/resolve_undef.h"
 
 namespace retrograde::ir {
 
@@ -38,11 +39,6 @@ std::string fact(const std::string& name, const char* what, size_t dimension) {
 
 std::string element_name(const std::string& func, size_t value_count, size_t value_index) {
   return value_count == 1 ? func : func + "." + std::to_string(value_index);
-}
-
-bool is_undef(const Expr& e) {
-  const Call* call = e.as<Call>();
-  return call && call->is_op(Op::undef);
 }
 
 // What addressing needs to know of a buffer: an Expr per dimension.

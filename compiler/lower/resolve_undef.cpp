@@ -11,12 +11,13 @@
 #include "ir/visit.h"
 
 namespace retrograde::ir {
-namespace {
 
 bool is_undef(const Expr& e) {
   const Call* call = e.as<Call>();
   return call && call->is_op(Op::undef);
 }
+
+namespace {
 
 bool mentions_undef(const Expr& e) {
   bool found = false;

@@ -11,6 +11,9 @@
 
 namespace retrograde::ir {
 
+// undef() itself.
+bool is_undef(const Expr& e);
+
 void resolve_undef(Program& program);
 
 }  // namespace retrograde::ir
