@@ -2,15 +2,13 @@
 // gradients are right and its autoscheduler does its best; the function is the same.
 //
 // 1. Halide inverts an index like x / 17 one at a time. In row_grid(i, o, layer(x, y), x / 17, y)
-// it
-//    replaces x by what the fourth index determines but leaves the third index at the old point,
+//    it replaces x by what the fourth index determines but leaves the third index at the old point,
 //    and its gradient is silently wrong (apps/bilateral_slice/README.md shows it). Behind a Func
 //    the division is opaque to it: it then scatters along gx, correctly.
 // 2. Where it does invert (y / 13, in the grid's own gradient) it reads the photo outside its
 //    bounds, at points whose contribution is zero; a boundary condition makes these reads legal.
 // 3. The transforms along a row are a Func of their own for Retrograde, whose schedule keeps them
-// in
-//    a buffer of a few pixels. Li2018 would store them for the whole photo, and be slower.
+//    in a buffer of a few pixels. Li2018 would store them for the whole photo, and be slower.
 #pragma once
 
 #include "language.h"

@@ -5,8 +5,7 @@
 // the two planes); transforms live in a buffer of 16 pixels. Directions of vectors:
 //   along x     everything that is one value a pixel
 //   along i     a transform's coefficients: four are adjacent in the grid, and the pixels of a
-//   vector
-//               along x would come from different layers
+//               vector along x would come from different layers
 //   along k     the curve's knots
 #include <algorithm>
 #include <iterator>

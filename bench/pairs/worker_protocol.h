@@ -5,8 +5,7 @@
 //   driver  run           worker  ran SECONDS                       or   failed MESSAGE
 //   driver  save PATH     worker  saved            the outputs, as OutputHeader and elements, each
 //   driver  slope [PATH]  worker  slope ERROR      of a gradient that has run, see slope.h; PATH is
-//   the
-//                                                  library of its program, if that is another
+//                                                  the library of its program, if that is another
 //   driver  memory        worker  memory PEAK_MB RUN_MB
 //
 // START_SECONDS: compiling and running a first, trivial pipeline, which makes each compiler set up

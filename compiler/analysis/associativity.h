@@ -4,10 +4,9 @@
 // an operator op on elements and a constant id are found with F(x, g) == op(x, F(id, g)), op
 // associative and id its identity: so partial results, each started from id, may be combined.
 //
-//   F(x, g) = x + g                                         op(x, y) = x + y               id = 0
-//   F(x, g) = {min(x0, g0), select(g0 < x0, g1, x1)}        the same with y for g          {inf,
-//   any} F(x, g) = {x0 * g0 - x1 * g1, x0 * g1 + x1 * g0}        the same with y for g          {1,
-//   0}
+//   F(x, g) = x + g                                        op(x, y) = x + y         id = 0
+//   F(x, g) = {min(x0, g0), select(g0 < x0, g1, x1)}       the same with y for g    {inf, any}
+//   F(x, g) = {x0 * g0 - x1 * g1, x0 * g1 + x1 * g0}       the same with y for g    {1, 0}
 //
 // Method: candidates from a table of operators, and from F itself with parts of y in the place of
 // g. A candidate counts only when its laws are proven: comparisons are decided by cases over every

@@ -1,7 +1,7 @@
 // Scatter becomes gather: which points of a stage read a given element?
 //
-// Primal:      f(x, r) reads g(e(x, r))                        for all (x, r) in the stage's domain
-// D Transposed:  g_adj(y) += sum over {(x, r) in D : e(x, r) = y} of a(x, r)
+// Primal:      f(x, r) reads g(e(x, r)), for all (x, r) in the stage's domain D
+// Transposed:  g_adj(y) += sum over {(x, r) in D : e(x, r) = y} of a(x, r)
 //
 // The access relation {(x, r) -> e(x, r)} is built over all indices at once and inverted with isl.
 // In the fibre over an element y each stage variable is either determined (an expression of y) or

@@ -23,7 +23,9 @@ namespace retrograde::ir {
 
 // Whether the update is a loop over time whose values are lost, and a budget was given.
 bool wants_checkpoints(const UpdateContext& context);
-// Throws when the number of steps is not known, or the budget has no room for one state.
+// Throws when the budget has no room for one state, is in bytes while a state's size is known at
+// run time only, or makes a known number of steps need too long a table. A number of steps that is
+// known at run time only is no obstacle: the pipeline makes its table then (checkpoint_actions.h).
 void differentiate_by_checkpoints(const UpdateContext& context, UpdateAdjoint& result);
 
 }  // namespace retrograde::ir

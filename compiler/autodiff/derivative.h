@@ -2,8 +2,7 @@
 //
 // Func loss; RDom r(input); loss() += pow(model(r.x, r.y) - target(r.x, r.y), 2);
 // Derivative d = propagate_adjoints(loss);
-// Func grad = d(weights);            // weights: a Func, Buffer, ImageParam or Param; schedule it
-// like any other
+// Func grad = d(weights);            // weights: a Func, Buffer, ImageParam or Param
 //
 // The adjoint of a Func or image has its dimensions; that of a Param has none. It is 0 outside of
 // the region that the output depends on. Adjoints are ordinary Funcs without side effects: they can
@@ -98,9 +97,8 @@ class Derivative {
 // What to do about an update that overwrites a value which a partial derivative needs.
 enum class Overwritten {
   // Keep the versions, in Funcs with one more dimension or in copies, where all of them together
-  // fit
-  // AdjointOptions::version_bytes; else a CompileError. Where sizes are known at run time only, a
-  // call that needs more fails. explain() says what is kept.
+  // fit AdjointOptions::version_bytes; else a CompileError. Where sizes are known at run time only,
+  // a call that needs more fails. explain() says what is kept.
   Auto,
   Refuse,  // a CompileError that names the update, the value and the rewrite
   Store,   // keep the versions whatever they cost

@@ -200,7 +200,7 @@ Response where(const Expr& condition, const Response& r) {
   return result;
 }
 
-// Of no leaf. `of`: of its children.
+// Of a constant, or of a node by the responses of its children, which `of` gives.
 Response of_node(const Expr& e, FunctionRef<const Response&(const Expr&)> of) {
   if (auto value = as_const_float(e)) return of_constant(*value);
   if (const auto* binary = e.as<Binary>()) return of_binary(*binary, of(binary->a), of(binary->b));

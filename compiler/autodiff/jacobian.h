@@ -2,8 +2,8 @@
 // work.
 //
 // Jacobian j = jacobian(blur, image, {{0, 64}});   // d blur(y) / d image(x), y in [0, 64)
-// j.colours();                                     // 3 for a three-point stencil, whatever its
-// size j.dense()(y, x);  j.band()(y, k);                // as Funcs
+// j.colours();                                     // 3 for a stencil of three points, of any size
+// j.dense()(y, x);  j.band()(y, k);                // as Funcs
 //
 // Elements that no output element has in common share a seed (colouring.h), so as many products are
 // evaluated as there are colours, in one pipeline with one more dimension. The pattern is proven

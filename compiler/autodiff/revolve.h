@@ -3,8 +3,7 @@
 // A loop of n steps goes from state 0 to state n. Running step i backward needs state i; a state
 // that was not kept is computed again from the nearest one before it. With room for s states, kept
 // ones freed as soon as the steps after them are done, the least number of steps computed again is
-//   T(n, s) = r n - B(s + 1, r - 1),   B(s, r) = C(s + r, s),   r such that B(s, r-1) < n <= B(s,
-//   r)
+//   T(n, s) = r n - B(s + 1, r - 1),   B(s, r) = C(s + r, s),   B(s, r - 1) < n <= B(s, r)
 // reached by cutting n into m steps and a rest, each again of such sizes (A. Griewank, A. Walther,
 // Algorithm 799: revolve, ACM Transactions on Mathematical Software 26(1), 2000, section 2).
 #pragma once

@@ -1,7 +1,7 @@
 // second_order.h -- products with second derivatives: tangents of adjoints.
 //
-// Func hv = hessian_vector_product(loss, weights, {{weights, v}});   // sum_j d2 loss / dw_i dw_j
-// v_j
+// Func hv = hessian_vector_product(loss, weights, {{weights, v}});
+// // hv(i) = sum_j d2 loss / dw_i dw_j v(j)
 //
 // One adjoint and one tangent whatever the number of inputs. The result is an ordinary Func: its
 // tangent along another direction is a product with third derivatives, and so on.

@@ -1,8 +1,10 @@
 // The reverse pipeline of a graph of Funcs, as Funcs.
 //
 // Primal:      f_n = F_n(f_0, ..., f_{n-1}, images, parameters), Funcs in topological order, each a
-// chain of stages Linearised:  df_n = sum_j (dF_n / df_j) df_j Transposed:  f_j_adj = sum_n (dF_n /
-// df_j)^T f_n_adj, Funcs in the opposite order, stages from last to first
+//              chain of stages
+// Linearised:  df_n = sum_j (dF_n / df_j) df_j
+// Transposed:  f_j_adj = sum_n (dF_n / df_j)^T f_n_adj, Funcs in the opposite order, stages from
+//              last to first
 //
 // Every access of a stage contributes to the adjoint of what it reads; access_inversion.h turns the
 // contribution into a gather, accumulation.h adds them up. update.h handles updates that read or

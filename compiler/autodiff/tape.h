@@ -1,8 +1,8 @@
 // Any update at all, run backward iteration by iteration.
 //
 // Primal, for i in order:          reads k:  v_k = f[R_k(i)];   write: f[W(i)] <- V(v_1, v_2, ...)
-// Transposed, i in reverse order:  a(i) = A[W(i)];  A[W(i)] = 0;  for all k: A[R_k(i)] += a(i)
-// dV/dv_k
+// Transposed, i in reverse order:  a(i) = A[W(i)];  A[W(i)] = 0;
+//                                  for all k: A[R_k(i)] += a(i) dV/dv_k
 //
 // Both sides are one Func with one more dimension, and one update whose innermost reduction
 // variable is the step inside an iteration:

@@ -1,25 +1,23 @@
 // The adjoint of an update definition: what it does to the adjoint of its own Func, and what its
 // contributions are swept from.
 //
-// One update runs, for i over its domain in order,   f[W(i)] <- V(f[R_1(i)], f[R_2(i)], ...,
-// others(i)). Reversed, in the opposite order:   a = A[W(i)];  A[W(i)] = 0;
-// A[R_k(i)] += a * dV/df_k(i). The shapes, tried in this order:
+// Primal, for i over the domain in order:   f[W(i)] <- V(f[R_1(i)], f[R_2(i)], ..., others(i))
+// Transposed, i in the opposite order:      a = A[W(i)];  A[W(i)] = 0;  A[R_k(i)] += a dV/df_k(i)
+//
+// The shapes, tried in this order:
 //   accumulation  V = f[W(i)] + E(i), E free of f: A stays as it is, E is swept with A[W(i)].
 //                 Iterations commute.
 //   selection     V takes either f[W(i)] or E(i), as max, min and argmax do: a helper Func computes
 //                 again which iteration wrote each element last; that one gets the adjoint.
 //   overwriting   V free of f, places known: the last writer gets the adjoint, and A is 0 before
-//   the
-//                 update where it writes.
+//                 the update where it writes.
 //   recurrence    places known and writes that never meet: reads of values that an earlier
-//   iteration
-//                 wrote make A a recurrence in the opposite order, reads of older values contribute
-//                 to the adjoint before the update.
+//                 iteration wrote make A a recurrence in the opposite order, reads of older values
+//                 contribute to the adjoint before the update.
 //   checkpoints   with a budget, anything else in a loop over time: run backward from a few kept
 //                 states (checkpoint.h).
 //   fold          iterations that read and write one element only, as products do: the steps of
-//   each
-//                 element become a dimension, and its adjoint a recurrence along it (fold.h).
+//                 each element become a dimension, and its adjoint a recurrence along it (fold.h).
 //   tape          anything else: the iterations run backward one by one inside each element of the
 //                 pure dimensions, and what they need is kept (tape.h).
 // A value that a partial needs must still be in f at the end: proven over index sets, never

@@ -164,7 +164,7 @@ ValueRange of_binary(const Binary& e, const ValueRange& a, const ValueRange& b) 
   }
 }
 
-// Of no leaf. `of`: of its children.
+// Of a constant, or of a node by the ranges of its children, which `of` gives.
 ValueRange of_node(const Expr& e, FunctionRef<ValueRange(const Expr&)> of) {
   if (auto value = as_const_float(e)) return constant(*value);
   if (!e.type().is_float()) return {};

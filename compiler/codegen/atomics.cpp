@@ -2,8 +2,7 @@
 //
 //   one value of at most 64 bits   an instruction where there is one (integers: + - min max & | ^;
 //                                  floats: + -), else compare-and-swap until nobody came between
-//   a Tuple                        a lock of the runtime, chosen by the address of its first
-//   element
+//   a Tuple                        a lock of the runtime, chosen by its first element's address
 //
 // All updates of one element go the same way: instructions and compare-and-swap exclude each other,
 // and whether locks are needed depends on the Func alone. A vector is updated lane by lane, so that

@@ -2,8 +2,8 @@
 //
 // By a positive constant c, signed:  sign = a < 0 ? -1 : 0;  q = ((a ^ sign) /u c) ^ sign
 //   For a < 0, a ^ sign = -a - 1 >= 0 and  -1 - (-a - 1) / c = floor(a / c). LLVM turns the
-//   unsigned division into a multiplication, in vectors too. By a negative constant: q = -(a /
-//   |c|), since a = q c + r with the same r.
+//   unsigned division into a multiplication, in vectors too.
+// By a negative constant:  q = -(a / |c|), since a = q c + r with the same r.
 // By a variable, vectors of up to 32 bits: in floats that hold both operands, float32 for up to 16
 //   bits, else double. Their quotient truncates exactly: a / b differs from the next integer by at
 //   least 1 / |b|; the rounding error is at most |a / b| 2^-24, or 2^-53, less than 1 / |b|.

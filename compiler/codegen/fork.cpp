@@ -1,9 +1,8 @@
 // Fork: both statements become tasks, as bodies of parallel loops do; the runtime runs the first on
 // a thread of its own.
 //
-//   fork { first } { rest }  =>  code = retrograde_fork(context, task1, &closure1, task2,
-//   &closure2,
-//                                                       semaphores, count)
+//   fork { first } { rest }  =>  code = retrograde_fork(context, task1, &closure1,
+//                                                       task2, &closure2, semaphores, count)
 //                                if (code) fail(code)
 //
 // The semaphores are those that the two statements name and that live around the Fork: when a

@@ -1,9 +1,12 @@
 // A parallel loop: its body becomes a function of its own, which gets the values that it uses from
 // around the loop in a struct on the caller's stack.
 //
-//   parallel x in [min, extent): body    =>    closure = {a, b, &block}
-//                                              code = retrograde_parallel_for(context, task, min,
-//                                              extent, &closure) if (code) fail(code)
+//   parallel x in [min, min + extent): body
+//      =>
+//   closure = {a, b, &block}
+//   code = retrograde_parallel_for(context, task, min, extent, &closure)
+//   if (code) fail(code)
+//
 //   int32 task(context, x, closure): a = closure->a ...; body
 #include <set>
 

@@ -1,7 +1,6 @@
 // The module of a generator's gradient.
 //
-//   y = f(a, w)   =>   (a, w, L_y) -> (L_a, L_w)     L_v: the derivative of a loss L with respect
-//   to v
+//   y = f(a, w)   =>   (a, w, L_y) -> (L_a, L_w)     L_v: the derivative of a loss L by v
 //
 // L is never named: whoever trains gives L_y, its gradient at the output. For several outputs the
 // gradients are kept apart, one for each pair of output and input; the caller sums what it needs.

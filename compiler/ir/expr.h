@@ -210,8 +210,7 @@ struct StringImm : ExprNode {
   const std::string value;
 };
 // A pure variable, loop variable, let-bound name, scalar parameter, reduction variable, or a fact
-// of a buffer
-// ("input.min.0", "input.extent.1", "input.stride.0").
+// of a buffer ("input.min.0", "input.extent.1", "input.stride.0").
 struct Variable : ExprNode {
   RETROGRADE_NODE(Variable)
   Variable(Type type, std::string name, SymbolRef symbol)

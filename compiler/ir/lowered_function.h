@@ -22,8 +22,8 @@ struct LoweredArgument {
 
 // Names inside the body:
 //   scalar argument "k"   Variable "k"
-//   buffer argument "in"  Variable "in.buffer" (Handle: halide_buffer_t*), used by the buffer_*
-//   operators;
+//   buffer argument "in"  Variable "in.buffer" (Handle: halide_buffer_t*), used by the operators
+//                         buffer_*;
 //                         Load/Store with name "in" address element `index` from its host pointer.
 //                         The host pointer may be null in a bounds query; then no Load or Store is
 //                         reached.

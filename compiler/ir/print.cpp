@@ -1,23 +1,23 @@
 // IR text.
 //
-// Expressions   3  2.5f  7_u8  1.5_f64  true  nan_f32  "text"     immediates: int32, float32,
-// others by suffix
-//               x  y:float32  `odd name`                          variables: int32 unless said
-//               (a + b)  min(a, b)  !c  select(c, a, b)
-//               float32x8(v)  reinterpret<int32>(v)
-//               ramp(b, s, 8)  broadcast(v, 8)  shuffle(u, v; 0, 2, 1)  reduce(add, v, 1)
-//               a[i]:float32x8  a[i if p]:float32                 loads
-//               floor(v)  abs<uint32>(v)                          operators; <type> unless that of
-//               the first argument f(x, y).1:float32  image in(x, y):uint8  extern hypotf(x,
-//               y):float32 (let t = v in body)
-//               {#0 = v; #1 = w; body}                            nodes used more than once in a
-//               large expression
-// Statements    let t = v            its body is the rest of the block
-//               assert(c, e)  free a  evaluate v  a[i if p] = v  f(x, y if p) = {u, v}
-//               produce f {..}  consume f {..}  if (c) {..} else {..}  {..}
-//               for (x, min, extent) {..}                         serial; or parallel, vectorized,
-//               unrolled before it realize f(float32, int8) auto [min, extent], [min, extent] {..}
-//               allocate a[elements]:float32 heap {..}
+// Expressions
+//   3  2.5f  7_u8  1.5_f64  true  nan_f32  "text"    immediates: int32, float32, others by suffix
+//   x  y:float32  `odd name`                         variables: int32 unless said
+//   (a + b)  min(a, b)  !c  select(c, a, b)
+//   float32x8(v)  reinterpret<int32>(v)
+//   ramp(b, s, 8)  broadcast(v, 8)  shuffle(u, v; 0, 2, 1)  reduce(add, v, 1)
+//   a[i]:float32x8  a[i if p]:float32                loads
+//   floor(v)  abs<uint32>(v)                         operators; <type> unless the first argument's
+//   f(x, y).1:float32  image in(x, y):uint8  extern hypotf(x, y):float32
+//   (let t = v in body)
+//   {#0 = v; #1 = w; body}                           nodes that a large expression uses repeatedly
+// Statements
+//   let t = v                                        its body is the rest of the block
+//   assert(c, e)  free a  evaluate v  a[i if p] = v  f(x, y if p) = {u, v}
+//   produce f {..}  consume f {..}  if (c) {..} else {..}  {..}
+//   for (x, min, extent) {..}                        serial, or with parallel, vectorized, unrolled
+//   realize f(float32, int8) auto [min, extent], [min, extent] {..}
+//   allocate a[elements]:float32 heap {..}
 #include "ir/print.h"
 
 #include <charconv>

@@ -3,12 +3,11 @@
 // Out: Vector; names unique. The operands of a reduction are combined in another order, which
 //      depends on the program alone.
 //
-//   for (r, 0, n) {                                  allocate t[16] {
-//     f[i] = f[i] + reduce(add, x, 1)                  t[ramp(0, 1, 16)] = broadcast(-0, 16)
-//   }                                          =>      for (r, 0, n) { t[...] = t[...] + x }
-//                                                      if (0 < n) { f[i] = f[i] + reduce(add,
-//                                                      t[...], 1) }
-//                                                    }
+//   for (r, 0, n) {                          allocate t[16] {
+//     f[i] = f[i] + reduce(add, x, 1)          t[ramp(0, 1, 16)] = broadcast(-0, 16)
+//   }                                  =>      for (r, 0, n) { t[...] = t[...] + x }
+//                                              if (0 < n) { f[i] = f[i] + reduce(add, t[...], 1) }
+//                                            }
 //
 // The vector t has a constant size, so that it lives in registers. Sums of products of 16-bit
 // numbers keep half as many lanes: machines add such products in pairs (ir/narrow_product.h).

@@ -2,15 +2,14 @@
 //
 // In:  a Program (definitions as DAGs, nothing inlined left).
 // Out: Loops phase. One statement for all outputs; each Func is realised at its storage level and
-// produced at its
-//      compute level over exactly the box that the code below reads; the boxes are bound to names
-//      "f.s0.x.min" / "f.s0.x.max" just outside.
+//      produced at its compute level over exactly the box that the code below reads; the boxes are
+//      bound to names "f.s0.x.min" / "f.s0.x.max" just outside.
 //
-//   out(x) = f(x - 1) + f(x + 1), f at out's y         for out.s0.y:
-//                                                        let f.s0.x.max = out.s0.x.max + 1 ...
-//                                                 =>     realize f [..]: produce f: for f.s0.x:
-//                                                 f(..) = ..
-//                                                          for out.s0.x: out(..) = f(..) + f(..)
+//   out(x, y) = f(x - 1, y) + f(x + 1, y)        for out.s0.y:
+//   f at out's y                                   let f.s0.x.max = out.s0.x.max + 1 ...
+//                                           =>     realize f [..]:
+//                                                    produce f: for f.s0.x: f(..) = ..
+//                                                    for out.s0.x: out(..) = f(..) + f(..)
 //
 // Method: one walk over the tree of loops, consumers before producers. Going up from an innermost
 // body, `uses` holds the box that everything below reads of each Func, in terms of the loop

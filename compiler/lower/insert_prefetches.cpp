@@ -2,9 +2,9 @@
 // In:  Loops; names unique.
 // Out: Loops; the same stores.
 //
-//   for y { out(x, y) = in(x, y) ... }   =>   for y { prefetch in [.., ..], [y + 2, 1]; out ... }
-//                                        =>   for y { for line { prefetch(&in(16 line, y + 2)) }
-//                                        ... }
+//   for y { out(x, y) = in(x, y) ... }
+//     =>   for y { prefetch in [.., ..], [y + 2, 1]; out(x, y) = in(x, y) ... }
+//     =>   for y { for line { prefetch(&in(16 line, y + 2)) }; out(x, y) = in(x, y) ... }
 //
 // Method: the box that one iteration of the loop `at` reads, with the loop variable `from` moved by
 //         the offset; lets between the two loops are written out first. What the bound strategy

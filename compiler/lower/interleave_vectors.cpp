@@ -3,7 +3,7 @@
 // Out: Vector; the same values in the same places.
 //
 //   out[ramp(b, 1, 8)] = select(ramp(b, 1, 8) % 2 == 0, f[ramp(b, 1, 8) / 2], g[ramp(b, 1, 8) / 2])
-//   =>
+//      =>
 //   out[ramp(b, 1, 8)] = interleave(
 //       select(broadcast(b % 2 == 0, 4), f[ramp(b / 2, 1, 4)], g[ramp(b / 2, 1, 4)]),
 //       select(broadcast((b + 1) % 2 == 0, 4), f[ramp((b + 1) / 2, 1, 4)], ...))

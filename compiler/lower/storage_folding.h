@@ -5,10 +5,10 @@
 //   realize f [0, w], [-1, h + 2]      =>      storage of w * 4 elements; row y lies at y & 3
 //
 // Method: loops between computation and storage from the outermost inwards; a dimension of which
-// one
-//         iteration touches no more than a constant number of coordinates folds to the next power
-//         of two. Values that iterations hand on to the next must move one way, so that what is
-//         overwritten is never read again; inside a loop that hands values on nothing else folds.
+//         one iteration touches no more than a constant number of coordinates folds to the next
+//         power of two. Values that iterations hand on to the next must move one way, so that what
+//         is overwritten is never read again; inside a loop that hands values on nothing else
+//         folds.
 // Not done on its own: the innermost dimension of vectorized code, whose vectors would tear.
 // Source: the scheduling model of Ragan-Kelley et al., PLDI 2013, section 4.3.
 // Tests: test/unit/sliding_window_test.cpp.
