@@ -78,6 +78,7 @@ std::vector<std::string> autoscheduler_names() {
 }
 
 void set_default_autoscheduler_name(const std::string& name) {
+  if (!name.empty()) find_autoscheduler(name);
   std::lock_guard lock(loaded().mutex);
   loaded().default_name = name;
 }

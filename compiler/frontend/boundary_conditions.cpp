@@ -6,6 +6,7 @@
 #include "frontend/boundary_conditions.h"
 
 #include "ir/literal.h"
+#include "ir/print.h"
 
 namespace retrograde::BoundaryConditions {
 
@@ -44,6 +45,18 @@ Expr mirror_inside(const Expr& x, const Expr& min, const Expr& extent) {
   return inside_or(x, min, extent, clamp_into(min + reflected, min, extent));
 }
 
+void check_range(const Range& range, const std::string& asked) {
+  for (const Expr& e : {range.min, range.extent}) {
+    if (e.defined() && !(e.type().is_int_or_uint() && e.type().is_scalar())) {
+      user_error(asked, "bounds are integers", text(e, " has type ", to_string(e.type())),
+                 "Convert it: cast<int>(...)");
+    }
+  }
+  const auto extent = range.extent.defined() ? ir::as_const_int(range.extent) : std::nullopt;
+  if (extent && *extent < 0)
+    user_error(asked, "an extent is not negative", text("it is ", *extent), "Give 0 or more");
+}
+
 void check(const Func& source, const Region& bounds, const char* name) {
   const std::string asked = text("apply ", name, " to ", quoted(source.name()));
   if (!source.defined())
@@ -54,6 +67,7 @@ void check(const Func& source, const Region& bounds, const char* name) {
                     " bounds"),
                "Drop the bounds beyond");
   }
+  for (const Range& range : bounds) check_range(range, asked);
 }
 
 bool is_bounded(const Range& range) { return range.min.defined() && range.extent.defined(); }
@@ -101,6 +115,12 @@ Func constant_exterior(const Func& source, const Tuple& value, const Region& bou
                text("it has ", source.output_types().size(), " values and was given ", value.size(),
                     " constants"),
                "Give a Tuple of that many constants");
+  }
+  for (const Expr& constant : value.as_vector()) {
+    if (constant.defined()) continue;
+    user_error("apply constant_exterior to " + quoted(source.name()),
+               "the value outside is a defined expression", "it was never assigned",
+               "Give the value");
   }
   const std::vector<Var> args = source.args();
   std::vector<Expr> at(args.begin(), args.end());

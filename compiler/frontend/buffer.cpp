@@ -93,6 +93,16 @@ Runtime::Buffer<> wrap_memory(halide_type_t type, const void* data, const std::v
 
 void allocate_host(Runtime::Buffer<>& buffer) { buffer.allocate(allocate_or_throw, std::free); }
 
+void check_storage_order(const std::vector<int>& order, int dimensions, const std::string& asked) {
+  std::vector<int> times_named(dimensions, 0);
+  bool is_order = static_cast<int>(order.size()) == dimensions;
+  for (int d : order) is_order = is_order && d >= 0 && d < dimensions && times_named[d]++ == 0;
+  if (is_order) return;
+  user_error(asked, "a storage order names each dimension once",
+             text("there are ", dimensions, " dimensions"),
+             "Name every dimension, in the order of storage");
+}
+
 Runtime::Buffer<> allocate_buffer(halide_type_t type, const std::vector<int>& sizes,
                                   const std::vector<int>& storage_order) {
   check_sizes(type, sizes, "make a Buffer");
@@ -101,15 +111,7 @@ Runtime::Buffer<> allocate_buffer(halide_type_t type, const std::vector<int>& si
     allocate_host(buffer);
     return buffer;
   }
-  std::vector<int> sorted(sizes.size(), 0);
-  for (int d : storage_order) {
-    if (d < 0 || d >= static_cast<int>(sizes.size()) || sorted[d]++ ||
-        storage_order.size() != sizes.size()) {
-      user_error("make a Buffer", "a storage order names each dimension once",
-                 text("there are ", sizes.size(), " dimensions"),
-                 "Name every dimension, in the order of storage");
-    }
-  }
+  check_storage_order(storage_order, static_cast<int>(sizes.size()), "make a Buffer");
   std::vector<int> in_memory;
   for (int d : storage_order) in_memory.push_back(sizes[d]);
   Runtime::Buffer<> buffer(type, nullptr, in_memory);
@@ -170,6 +172,25 @@ void check_dimension(const Runtime::Buffer<>& buffer, const std::string& name, i
   user_error(text("call ", method, " for dimension ", d, " of the Buffer ", quoted(name)),
              "a dimension is numbered from 0", text("it has ", buffer.dimensions(), " dimensions"),
              "Give a number below that");
+}
+
+void check_embed(const Runtime::Buffer<>& buffer, const std::string& name, int d) {
+  if (d >= 0 && d <= buffer.dimensions()) return;
+  user_error(text("embed the Buffer ", quoted(name), " as dimension ", d, " of another"),
+             "a new dimension stands before, between or behind those that are there",
+             text("it has ", buffer.dimensions(), " dimensions"),
+             text("Give a number from 0 to ", buffer.dimensions()));
+}
+
+void check_same_shape(const Runtime::Buffer<>& buffer, const std::string& name,
+                      const Runtime::Buffer<>& other) {
+  bool is_same = buffer.dimensions() == other.dimensions();
+  for (int d = 0; is_same && d < buffer.dimensions(); d++)
+    is_same = buffer.dim(d).extent() == other.dim(d).extent();
+  if (is_same) return;
+  user_error("visit the values of the Buffer " + quoted(name) + " and of others",
+             "all Buffers have the same extents", "those of one of them are others",
+             "Crop them to one size first");
 }
 
 void check_crop(const Runtime::Buffer<>& buffer, const std::string& name, int d, int min,

@@ -77,6 +77,10 @@ void check_convertible(const Runtime::Buffer<>& buffer, const std::string& name,
 [[noreturn]] void no_device(const char* method);
 void check_dimension(const Runtime::Buffer<>& buffer, const std::string& name, int d,
                      const char* method);
+void check_storage_order(const std::vector<int>& order, int dimensions, const std::string& asked);
+void check_embed(const Runtime::Buffer<>& buffer, const std::string& name, int d);
+void check_same_shape(const Runtime::Buffer<>& buffer, const std::string& name,
+                      const Runtime::Buffer<>& other);
 void check_crop(const Runtime::Buffer<>& buffer, const std::string& name, int d, int min,
                 int extent);
 void check_in_bounds(const Runtime::Buffer<>& buffer, const std::string& name, const int* at,
@@ -104,6 +108,9 @@ struct AreSizes<First, Second, Rest...>
 
 }  // namespace ir
 
+// Requires: the handle must have a buffer; an extent is not negative; its elements must fit the
+// address space; its elements must fit the memory of this machine; a storage order names each
+// dimension once; the element types must agree; the dimensions must agree.
 template <typename T, int Dims>
 class Buffer {
   static constexpr bool is_typed = !std::is_void_v<T>;
@@ -156,11 +163,14 @@ class Buffer {
     ir::collect_sizes(sizes, name, std::forward<Args>(rest)...);
     *this = adopt(ir::allocate_buffer(to_halide_type(type), sizes), name);
   }
+  // Requires: an extent is not negative; its elements must fit the address space; its elements must
+  // fit the memory of this machine.
   explicit Buffer(const std::vector<int>& sizes, const std::string& name = "")
       : Buffer(adopt(ir::allocate_buffer(static_halide_type(), sizes), name)) {}
   explicit Buffer(Type type, const std::vector<int>& sizes, const std::string& name = "")
       : Buffer(adopt(ir::allocate_buffer(to_halide_type(type), sizes), name)) {}
   // storage_order: dimensions, innermost in memory first.
+  // Requires: a storage order names each dimension once.
   explicit Buffer(const std::vector<int>& sizes, const std::vector<int>& storage_order,
                   const std::string& name = "")
       : Buffer(adopt(ir::allocate_buffer(static_halide_type(), sizes, storage_order), name)) {}
@@ -251,7 +261,8 @@ class Buffer {
   bool same_as(const Buffer<T2, D2>& other) const {
     return contents_ == other.contents_;
   }
-  // The same buffer under another static type; CompileError when the elements are of another one.
+  // The same buffer under another static type.
+  // Requires: the element types must agree; the dimensions must agree.
   template <typename T2, int D2 = Dims>
   Buffer<T2, D2> as() const {
     Buffer<T2, D2> result;
@@ -281,6 +292,7 @@ class Buffer {
   // ---- shape ----
   Type type() const { return from_halide_type(runtime().type()); }
   int dimensions() const { return runtime().dimensions(); }
+  // Requires: a dimension is numbered from 0.
   auto dim(int i) const {
     check_dimension(i, "dim");
     return runtime().dim(i);
@@ -307,6 +319,7 @@ class Buffer {
   T* data() const { return reinterpret_cast<T*>(raw_buffer()->host); }
 
   // ---- changing the shape, for all handles ----
+  // Requires: a dimension is numbered from 0; a crop or slice lies inside the buffer.
   void crop(int d, int min, int extent) {
     ir::check_crop(runtime(), name(), d, min, extent);
     contents_->buffer.crop(d, min, extent);
@@ -314,12 +327,18 @@ class Buffer {
   void crop(const std::vector<std::pair<int, int>>& box) {
     for (size_t d = 0; d < box.size(); d++) crop(static_cast<int>(d), box[d].first, box[d].second);
   }
+  // Requires: a dimension is numbered from 0; a crop or slice lies inside the buffer.
   void slice(int d, int position) {
     ir::check_crop(runtime(), name(), d, position, 1);
     contents_->buffer.slice(d, position);
   }
   void slice(int d) { slice(d, min(d)); }
-  void embed(int d, int position = 0) { checked("embed")->buffer.embed(d, position); }
+  // Requires: a new dimension stands before, between or behind those that are there.
+  void embed(int d, int position = 0) {
+    ir::check_embed(runtime(), name(), d);
+    contents_->buffer.embed(d, position);
+  }
+  // Requires: a dimension is numbered from 0.
   void translate(int d, int delta) {
     check_dimension(d, "translate");
     contents_->buffer.translate(d, delta);
@@ -327,6 +346,7 @@ class Buffer {
   void translate(const std::vector<int>& delta) {
     for (size_t d = 0; d < delta.size(); d++) translate(static_cast<int>(d), delta[d]);
   }
+  // Requires: a dimension is numbered from 0.
   template <typename... Ints>
   void set_min(Ints... mins) {
     set_min(std::vector<int>{mins...});
@@ -335,12 +355,18 @@ class Buffer {
     if (!mins.empty()) check_dimension(static_cast<int>(mins.size()) - 1, "set_min");
     contents_->buffer.set_min(mins);
   }
+  // Requires: a dimension is numbered from 0.
   void transpose(int d1, int d2) {
     check_dimension(d1, "transpose");
     check_dimension(d2, "transpose");
     contents_->buffer.transpose(d1, d2);
   }
-  void transpose(const std::vector<int>& order) { checked("transpose")->buffer.transpose(order); }
+  // Requires: a storage order names each dimension once.
+  void transpose(const std::vector<int>& order) {
+    ir::check_storage_order(order, dimensions(), "transpose the Buffer " +
+                                                         retrograde::quoted(name()));
+    contents_->buffer.transpose(order);
+  }
   void add_dimension() { checked("add_dimension")->buffer.add_dimension(); }
   void allocate() { ir::allocate_host(checked("allocate")->buffer); }
   void deallocate() { checked("deallocate")->buffer.deallocate(); }
@@ -395,6 +421,7 @@ class Buffer {
     return Buffer<Bare, Dims>(untyped(get()->copy_to_interleaved()));
   }
   // Into this buffer, where the two overlap.
+  // Requires: both Buffers have one type and as many dimensions.
   template <typename T2, int D2>
   void copy_from(const Buffer<T2, D2>& source) {
     if (runtime().type() != source.runtime().type() || dimensions() != source.dimensions()) {
@@ -414,13 +441,16 @@ class Buffer {
     return get()->all_equal(static_cast<Bare>(value));
   }
   // f(element of this, elements of the others at the same place...)
+  // Requires: all Buffers have the same extents.
   template <typename Fn, typename... Others>
   Buffer& for_each_value(Fn&& f, Others... others) {
+    (ir::check_same_shape(runtime(), name(), others.runtime()), ...);
     get()->for_each_value(std::forward<Fn>(f), (*others.get())...);
     return *this;
   }
   template <typename Fn, typename... Others>
   const Buffer& for_each_value(Fn&& f, Others... others) const {
+    (ir::check_same_shape(runtime(), name(), others.runtime()), ...);
     get()->for_each_value(std::forward<Fn>(f), (*others.get())...);
     return *this;
   }
@@ -438,6 +468,8 @@ class Buffer {
 
   // The element at a point. Checked unless NDEBUG is set, as Halide::Runtime::Buffer does, but by
   // an exception.
+  // Requires: an access gives one coordinate for each dimension; the buffer must have memory; a
+  // coordinate lies inside the buffer, or one past its end.
   template <typename... Ints>
   requires(std::is_convertible_v<Ints, int>&&...) decltype(auto) operator()(int first,
                                                                             Ints... rest) const {
@@ -470,7 +502,8 @@ class Buffer {
   int device_sync() { return runtime_mutable().device_sync(); }
   int device_free() { return runtime_mutable().device_free(); }
   void device_deallocate() { runtime_mutable().device_deallocate(); }
-  // Unsupported.
+  // Names of Halide's that do nothing here.
+  // Requires: buffers have memory of the CPU only (Unsupported).
   int copy_to_device(const Target& = Target()) { ir::no_device("copy_to_device"); }
   int copy_to_device(DeviceAPI, const Target& = Target()) { ir::no_device("copy_to_device"); }
   int device_malloc(const Target& = Target()) { ir::no_device("device_malloc"); }

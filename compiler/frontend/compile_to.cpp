@@ -96,7 +96,7 @@ class Inputs {
 
   void check(const Argument& argument, std::set<std::string>& names) const {
     if (argument.is_output()) {
-      user_error(asked_, "the list of arguments holds inputs; outputs follow by themselves",
+      user_error(asked_, "the list of arguments holds inputs, and outputs follow by themselves",
                  quoted(argument.name) + " is an output", "Leave it out");
     }
     if (!names.insert(argument.name).second) {

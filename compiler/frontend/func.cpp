@@ -41,6 +41,10 @@ Func::Func(Type required_type, int required_dimensions, const std::string& name)
 Func::Func(const std::vector<Type>& required_types, int required_dimensions,
            const std::string& name)
     : Func(name) {
+  if (required_dimensions < 0) {
+    user_error("declare " + quoted(func_->name), "dimensions are not negative",
+               text("they are ", required_dimensions), "Give 0 or more");
+  }
   func_->required_types = required_types;
   func_->required_dimensions = required_dimensions;
 }

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "frontend/define.h"
 #include "frontend/func.h"
 #include "frontend/wrappers.h"
 #include "ir/literal.h"
@@ -64,6 +65,7 @@ void Dimension::set(Expr ir::BufferConstraint::*field, Expr value, const char* w
   const std::string asked =
       text("set the ", which, " of dimension ", d_, " of ", quoted(parameter_->name));
   value = as_size(value, asked);
+  if (value.defined()) ir::check_over_parameters(value, "a promise", asked);
   auto constant = value.defined() ? ir::as_const_int(value) : std::nullopt;
   if (constant && *constant < 0 && field == &ir::BufferConstraint::extent) {
     user_error(asked, "an extent is not negative", text("it is ", *constant), "Give 0 or more");

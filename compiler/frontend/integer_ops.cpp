@@ -1,5 +1,7 @@
 #include "frontend/integer_ops.h"
 
+#include <algorithm>
+
 #include "ir/literal.h"
 #include "ir/print.h"
 
@@ -77,19 +79,103 @@ Type match_operands(Expr& a, Expr& b, const char* what) {
 
 }  // namespace
 
+// ---- twice the bits ----
+
+namespace {
+
+void check_defined(const Expr& a, const Expr& b, const char* what) {
+  if (a.defined() && b.defined()) return;
+  user_error(text("apply ", what), "every operand must be a defined expression",
+             "one of them was never assigned", "Assign the Expr before its use");
+}
+
+void check_integers(const Expr& a, const Expr& b, const char* what) {
+  for (const Expr& e : {a, b}) {
+    if (e.type().is_int_or_uint()) continue;
+    user_error(text("apply ", what, " to ", e), "it takes integers",
+               "its type is " + to_string(e.type()), "Convert it with cast<>()");
+  }
+}
+
+int widest(const Expr& a, const Expr& b) { return std::max(a.type().bits(), b.type().bits()); }
+
+Type wide_type(const Expr& a, const Expr& b, const char* what) {
+  check_defined(a, b, what);
+  const int bits = 2 * widest(a, b);
+  if (bits > 64) {
+    user_error(text("apply ", what, " to ", a, " and ", b), "its result has at most 64 bits",
+               text("their types are ", to_string(a.type()), " and ", to_string(b.type())),
+               "Cast them to 32 bits");
+  }
+  const bool is_signed = a.type().is_int() || b.type().is_int();
+  return a.type().is_float() || b.type().is_float() ? Float(bits)
+         : is_signed                                ? Int(bits)
+                                                    : UInt(bits);
+}
+
+}  // namespace
+
+Expr widening_mul(const Expr& a, const Expr& b) {
+  const Type wide = wide_type(a, b, "widening_mul");
+  return cast(wide, a) * cast(wide, b);
+}
+
+Expr widening_add(const Expr& a, const Expr& b) {
+  const Type wide = wide_type(a, b, "widening_add");
+  return cast(wide, a) + cast(wide, b);
+}
+
+Expr widening_sub(const Expr& a, const Expr& b) {
+  Type wide = wide_type(a, b, "widening_sub");
+  if (wide.is_uint()) wide = wide.with_code(TypeCode::Int);
+  return cast(wide, a) - cast(wide, b);
+}
+
+// ---- clamped ----
+
+Expr saturating_add(const Expr& a, const Expr& b) {
+  check_defined(a, b, "saturating_add");
+  check_integers(a, b, "saturating_add");
+  return saturating_cast(a.type(), widening_add(a, b));
+}
+
+Expr saturating_sub(const Expr& a, const Expr& b) {
+  check_defined(a, b, "saturating_sub");
+  check_integers(a, b, "saturating_sub");
+  return saturating_cast(a.type(), widening_sub(a, b));
+}
+
+// ---- means. Of 64 bits bit by bit: a = 2 (a >> 1) + (a & 1), so that no sum overflows ----
+
 Expr halving_add(Expr a, Expr b) {
   const Type type = match_operands(a, b, "halving_add");
-  return cast(type, widening_add(a, b) / 2);
+  check_integers(a, b, "halving_add");
+  if (type.bits() < 64) return cast(type, widening_add(a, b) / 2);
+  return (a & b) + ((a ^ b) >> 1);
 }
 
 Expr rounding_halving_add(Expr a, Expr b) {
   const Type type = match_operands(a, b, "rounding_halving_add");
-  return cast(type, (widening_add(a, b) + 1) / 2);
+  check_integers(a, b, "rounding_halving_add");
+  if (type.bits() < 64) return cast(type, (widening_add(a, b) + 1) / 2);
+  return (a | b) - ((a ^ b) >> 1);
 }
 
 Expr halving_sub(Expr a, Expr b) {
   const Type type = match_operands(a, b, "halving_sub");
-  return cast(type, widening_sub(a, b) / 2);
+  check_integers(a, b, "halving_sub");
+  if (type.bits() < 64) return cast(type, widening_sub(a, b) / 2);
+  return (a >> 1) - (b >> 1) - (~a & b & 1);
+}
+
+// ---- parts of a number ----
+
+Expr extract_bits(Type type, const Expr& e, const Expr& lowest) {
+  check_defined(e, lowest, "extract_bits");
+  check_integers(lowest, lowest, "extract_bits");
+  const Type bits = e.type().with_code(TypeCode::UInt);
+  return reinterpret(
+      type, cast(type.with_code(TypeCode::UInt), reinterpret(bits, e) >> cast(bits, lowest)));
 }
 
 Expr concat_bits(const std::vector<Expr>& parts) {

@@ -10,58 +10,40 @@ namespace retrograde {
 // numerator, an integer of 8, 16 or 32 bits. The remainder is numerator - quotient * divisor, which
 // wraps in int8. No faster than the operators here: they find reciprocals of constants by
 // themselves.
+// Requires: every operand must be a defined expression; the numerator is an integer of 8, 16 or 32
+// bits; the divisor is of type uint8.
 Expr fast_integer_divide(const Expr& numerator, const Expr& divisor);
 Expr fast_integer_modulo(const Expr& numerator, const Expr& divisor);
 Expr fast_integer_divide_round_to_zero(const Expr& numerator, const Expr& divisor);
 
 // In twice the bits, where nothing overflows; signed when one operand is.
-namespace ir {
-inline Type wide_type(const Expr& a, const Expr& b) {
-  const bool is_signed = a.type().is_int() || b.type().is_int();
-  const int bits = 2 * std::max(a.type().bits(), b.type().bits());
-  return a.type().is_float() ? retrograde::Float(bits)
-         : is_signed         ? retrograde::Int(bits)
-                             : retrograde::UInt(bits);
-}
-}  // namespace ir
-inline Expr widening_mul(const Expr& a, const Expr& b) {
-  const Type wide = ir::wide_type(a, b);
-  return cast(wide, a) * cast(wide, b);
-}
-inline Expr widening_add(const Expr& a, const Expr& b) {
-  const Type wide = ir::wide_type(a, b);
-  return cast(wide, a) + cast(wide, b);
-}
+// Requires: every operand must be a defined expression; its result has at most 64 bits.
+Expr widening_mul(const Expr& a, const Expr& b);
+Expr widening_add(const Expr& a, const Expr& b);
 // Signed whatever the operands are.
-inline Expr widening_sub(const Expr& a, const Expr& b) {
-  Type wide = ir::wide_type(a, b);
-  if (wide.is_uint()) wide = wide.with_code(TypeCode::Int);
-  return cast(wide, a) - cast(wide, b);
-}
-// Clamped to the range of the operands' type.
-inline Expr saturating_add(const Expr& a, const Expr& b) {
-  return saturating_cast(a.type(), widening_add(a, b));
-}
-inline Expr saturating_sub(const Expr& a, const Expr& b) {
-  return saturating_cast(a.type(), widening_sub(a, b));
-}
+Expr widening_sub(const Expr& a, const Expr& b);
+// Clamped to the range of the type of `a`; computed in twice the bits.
+// Requires: every operand must be a defined expression; it takes integers; its result has at most
+// 64 bits.
+Expr saturating_add(const Expr& a, const Expr& b);
+Expr saturating_sub(const Expr& a, const Expr& b);
 // The mean, rounded down or up: no bit is lost on the way. Of the type that a + b has; a C++
 // integer takes the other operand's type.
+// Requires: it takes integers; a constant takes the type of the other operand and must fit it.
 Expr halving_add(Expr a, Expr b);
 Expr rounding_halving_add(Expr a, Expr b);
 Expr halving_sub(Expr a, Expr b);
 
 // `bits` of e's bits, from the lowest on, as a value of `type`; out of the top come zeros.
-inline Expr extract_bits(Type type, const Expr& e, const Expr& lowest) {
-  const Type bits = e.type().with_code(TypeCode::UInt);
-  return reinterpret(
-      type, cast(type.with_code(TypeCode::UInt), reinterpret(bits, e) >> cast(bits, lowest)));
-}
+// Requires: every operand must be a defined expression; it takes integers.
+Expr extract_bits(Type type, const Expr& e, const Expr& lowest);
 template <typename T>
 Expr extract_bits(const Expr& e, const Expr& lowest) {
   return extract_bits(type_of<T>(), e, lowest);
 }
 // The bits of all, the first lowest, as one unsigned number.
+// Requires: there is at least one part; every part is a defined expression; all parts have one
+// type; the result has 8, 16, 32 or 64 bits.
 Expr concat_bits(const std::vector<Expr>& parts);
 
 // What the caller handed over, for a C function: the JITUserContext of realize(), or one of its
@@ -70,8 +52,11 @@ Expr user_context_value();
 
 // f(scatter(a, b)) = gather(u, v): an update that stores to several points, from the first to the
 // last; what it reads of f is read before. Between operators they stand for one point after the
-// other: f(x + scatter(1, 0), y + scatter(0, 3)) = 2 * gather(x, y). Unsupported where an update
-// over an RDom reads the Func that it stores to.
+// other: f(x + scatter(1, 0), y + scatter(0, 3)) = 2 * gather(x, y).
+// Requires: at least one point is named; each point is a defined Expr; all points are of one type;
+// a first definition is for all points; scatter() names the places on the left-hand side; all of an
+// update's scatter() and gather() have as many points; over an RDom, what is stored does not depend
+// on what stood there (Unsupported).
 Expr scatter(const std::vector<Expr>& points);
 Expr gather(const std::vector<Expr>& points);
 template <typename... Points>

@@ -29,9 +29,16 @@ void check_evaluates_to(const Expr& e) {
              e.defined() ? "its type is " + to_string(e.type()) : "it is undefined",
              "Convert it with cast<>()");
 }
+inline void check_count(size_t values, size_t results) {
+  if (values == results) return;
+  user_error("evaluate a Tuple", "there is one result for each value",
+             text("it has ", values, " values and was given ", results, " results"),
+             "Give the address of that many variables");
+}
 }  // namespace ir
 
 // Compiles and runs an expression without free variables.
+// Requires: it must be of that type.
 template <typename T>
 T evaluate(const Expr& e) {
   ir::check_evaluates_to<T>(e);
@@ -41,8 +48,10 @@ T evaluate(const Expr& e) {
   return result();
 }
 // evaluate(Tuple(a, b), &x, &y)
+// Requires: there is one result for each value.
 template <typename... Results>
 requires(sizeof...(Results) >= 1) void evaluate(const Tuple& values, Results*... results) {
+  ir::check_count(values.size(), sizeof...(Results));
   size_t i = 0;
   (ir::check_evaluates_to<Results>(values[i++]), ...);
   Func f;

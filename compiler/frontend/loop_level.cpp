@@ -41,6 +41,7 @@ void LoopLevel::set(const LoopLevel& other) {
 }
 
 LoopLevel& LoopLevel::lock() {
+  level();
   contents_->locked = true;
   return *this;
 }

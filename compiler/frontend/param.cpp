@@ -1,6 +1,7 @@
 // param.cpp -- values and limits of scalar parameters.
 #include "frontend/param.h"
 
+#include "frontend/define.h"
 #include "ir/literal.h"
 #include "ir/print.h"
 #include "ir/visit.h"
@@ -37,6 +38,7 @@ void set_limit(ParameterContents& parameter, Expr ParameterContents::*field, con
                text("one is ", value), "Give numbers");
   }
   const std::string asked = "limit the Param " + quoted(parameter.name);
+  if (value.defined()) check_over_parameters(value, "a limit", asked);
   parameter.*field = value.defined() ? literal_in(parameter.type, value, asked,
                                                   "a limit is a value of the parameter's type")
                                      : value;

@@ -18,8 +18,9 @@ ir::Scalar ParamMap::checked(const ir::ParameterContents& parameter, const ir::S
   return ir::converted_scalar(parameter, value);
 }
 
-Buffer<> ParamMap::checked(const ir::ParameterContents& parameter, const Buffer<>& buffer) {
-  if (buffer.defined()) ir::check_image(parameter, buffer);
+Buffer<> ParamMap::checked(const ImageParam& image, const Buffer<>& buffer) {
+  image.name();  // an error where it has none
+  if (buffer.defined()) ir::check_image(*image.parameter(), buffer);
   return buffer;
 }
 

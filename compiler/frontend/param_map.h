@@ -38,10 +38,11 @@ class ParamMap {
     template <typename T, int Dims>
     ParamMapping(const ImageParam& image, const Buffer<T, Dims>& buffer)
         : parameter(image.parameter()) {
-      entry.buffer = checked(*parameter, buffer);
+      entry.buffer = checked(image, buffer);
     }
     template <typename T, int Dims>
     ParamMapping(const ImageParam& image, Buffer<T, Dims>* buffer) : parameter(image.parameter()) {
+      checked(image, {});
       entry.receive = [buffer](const Buffer<>& made) { *buffer = made; };
     }
     std::shared_ptr<ir::ParameterContents> parameter;
@@ -58,18 +59,19 @@ class ParamMap {
   void set(const Param<T>& param, const V& value) {
     entries_[param.parameter()] = ParamMapping(param, value).entry;
   }
+  // Requires: it needs a type and dimensions.
   void set(const ImageParam& image, const Buffer<>& buffer) {
     entries_[image.parameter()] = ParamMapping(image, buffer).entry;
   }
 
-  size_t size() const { return entries_.size(); }
+  size_t size() const { return entries_.size(); }  // how many parameters it gives values to
   static const ParamMap& empty_map();
   // Null when the map says nothing of it.
   const Entry* find(const std::shared_ptr<ir::ParameterContents>& parameter) const;
 
  private:
   static ir::Scalar checked(const ir::ParameterContents& parameter, const ir::Scalar& value);
-  static Buffer<> checked(const ir::ParameterContents& parameter, const Buffer<>& buffer);
+  static Buffer<> checked(const ImageParam& image, const Buffer<>& buffer);
   std::map<std::shared_ptr<ir::ParameterContents>, Entry> entries_;
 };
 

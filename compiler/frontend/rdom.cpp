@@ -131,7 +131,7 @@ RDom::operator Expr() const { return only_variable(); }
 void RDom::where(Expr predicate) {
   const std::string asked = "add a predicate to an RDom";
   if (!domain_)
-    user_error(asked, "the RDom was never given a domain", "it was constructed without bounds",
+    user_error(asked, "the RDom was given a domain", "it was constructed without bounds",
                "Construct it: RDom r(0, 10)");
   if (!predicate.defined())
     user_error(asked, "the predicate must be a defined expression", "it was never assigned",

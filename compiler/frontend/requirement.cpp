@@ -7,24 +7,20 @@ namespace retrograde {
 
 namespace {
 
-[[noreturn]] void refuse(const Expr& condition, const std::string& rule,
-                         const std::string& evidence, const std::string& instead) {
-  user_error(text("require ", condition, " of a Pipeline's calls"), rule, evidence, instead);
-}
-
-// Parameters and their sizes are known when the call begins; nothing else is.
-void check_uses_parameters_only(const Expr& condition) {
-  ir::walk(condition, [&](const Expr& e) {
+// Parameters and their sizes are known when the call begins; nothing else is. `part` is the
+// condition or what its message shows.
+void check_uses_parameters_only(const Expr& part, const std::string& asked) {
+  const auto refuse = [&](const std::string& evidence) {
+    user_error(asked, "a requirement is checked once, before anything is computed", evidence,
+               "Use require() inside a definition");
+  };
+  ir::walk(part, [&](const Expr& e) {
     const ir::Variable* variable = e.as<ir::Variable>();
-    if (variable && !variable->symbol.defined()) {
-      refuse(condition, "a requirement is checked once, before anything is computed",
-             "it uses the Var " + quoted(variable->name), "Use require() inside a definition");
-    }
+    if (variable && !variable->symbol.defined())
+      refuse("it uses the Var " + quoted(variable->name));
     const ir::Call* call = e.as<ir::Call>();
-    if (call && (call->call_type == ir::CallType::Func || call->call_type == ir::CallType::Image)) {
-      refuse(condition, "a requirement is checked once, before anything is computed",
-             "it reads " + quoted(call->name), "Use require() inside a definition");
-    }
+    if (call && (call->call_type == ir::CallType::Func || call->call_type == ir::CallType::Image))
+      refuse("it reads " + quoted(call->name));
     return true;
   });
 }
@@ -40,7 +36,16 @@ void Pipeline::add_requirement(const Expr& condition, const std::vector<Expr>& m
                                    : "it is undefined",
                "Give a comparison of Params");
   }
-  check_uses_parameters_only(condition);
+  check_uses_parameters_only(condition,
+                             text("require ", condition, " of a Pipeline's calls"));
+  for (const Expr& part : message) {
+    const std::string asked = "add a requirement to the Pipeline of " + quoted(first->name);
+    if (!part.defined()) {
+      user_error(asked, "every part of its message is a defined expression",
+                 "one was never assigned", "Assign every Expr before it is used");
+    }
+    check_uses_parameters_only(part, text(asked, " whose message shows ", part));
+  }
   std::vector<Expr> parts = message;
   if (parts.empty()) parts.push_back(Expr(text("cannot run: it is required that ", condition)));
   first->requirements.push_back({condition, std::move(parts)});

@@ -69,6 +69,7 @@ void check_factor(const Expr& factor, const std::string& asked) {
     user_error(asked, "a factor is an integer",
                text(factor, " has type ", to_string(factor.type())), "Give an integer");
   }
+  ir::check_over_parameters(factor, "a factor", asked);
   auto constant = ir::as_const_int(factor);
   if (constant && *constant <= 0) {
     user_error(asked, "a factor is at least 1", text("it is ", *constant),

@@ -126,7 +126,8 @@ Stage& Stage::prefetch(const std::shared_ptr<ir::ParameterContents>& image, cons
   return add_prefetch(image->name, ir::SymbolRef(image), at, from, std::move(offset), strategy);
 }
 
-// 1. Both loops exist, and `at` is `from` or inside of it. 2. The offset is an integer.
+// 1. Both loops exist, and `at` is `from` or inside of it. 2. The offset is an integer that is known
+// when a call begins.
 Stage& Stage::add_prefetch(std::string what, ir::SymbolRef symbol, const VarOrRVar& at,
                            const VarOrRVar& from, Expr offset, PrefetchBoundStrategy strategy) {
   const std::string asked = text("prefetch ", quoted(what), " for ", quoted(name()), " at ",
@@ -142,6 +143,7 @@ Stage& Stage::add_prefetch(std::string what, ir::SymbolRef symbol, const VarOrRV
                                 : std::string("it is undefined"),
                "Give an integer");
   }
+  ir::check_over_parameters(offset, "the offset", asked);
   ir::PrefetchDirective directive;
   directive.name = std::move(what);
   directive.symbol = std::move(symbol);

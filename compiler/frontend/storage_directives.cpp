@@ -132,6 +132,7 @@ Expr Func::checked_size(Expr e, const char* what, const std::string& asked) cons
     user_error(asked, text("the ", what, " is an integer"),
                text(e, " has type ", to_string(e.type())), "Give an integer");
   }
+  ir::check_over_parameters(e, text("the ", what).c_str(), asked);
   const auto constant = ir::as_const_int(e);
   if (constant && (*constant <= 0 || *constant > INT32_MAX)) {
     user_error(asked, text("the ", what, " is at least 1 and fits an int32"),
@@ -248,6 +249,7 @@ void Func::add_bound(std::vector<ir::Bound>& bounds, const std::string& asked, c
       user_error(asked, "bounds are integers", text(*e, " has type ", to_string(e->type())),
                  "Convert it: cast<int>(...)");
     }
+    ir::check_over_parameters(*e, "a bound", asked);
     *e = ir::int32_literal(*e, asked);
   }
   const auto constant = ir::as_const_int(extent);
@@ -279,6 +281,7 @@ Func& Func::align_bounds(const Var& var, Expr modulus, Expr remainder) {
       user_error(asked, "the remainder is an integer",
                  text(remainder, " has type ", to_string(remainder.type())), "Give an integer");
     }
+    ir::check_over_parameters(remainder, "the remainder", asked);
     remainder = ir::int32_literal(std::move(remainder), asked);
   }
   ir::Bound changed = bound_of(func_->schedule.bounds, var.name());

@@ -188,10 +188,7 @@ void run_generator(const CommandLine& command) {
 CommandLine prepare(int argc, const char* const* argv) {
   CommandLine command = read_command_line(argc, argv);
   for (const std::string& plugin : command.plugins) load_plugin(plugin);
-  if (!command.scheduler.empty()) {
-    find_autoscheduler(command.scheduler);
-    set_default_autoscheduler_name(command.scheduler);
-  }
+  if (!command.scheduler.empty()) set_default_autoscheduler_name(command.scheduler);
   if (!command.generator.empty()) make_generator(command, command.targets[0]);
   return command;
 }

@@ -43,7 +43,7 @@ void AutoScheduleParam::set_from_string(const std::string& text) {
   }
   const std::string scheduler = on ? default_autoscheduler_name() : text;
   if (scheduler.empty()) {
-    refuse(text, "a scheduler was named as the default", "none was",
+    refuse(text, "the default scheduler is named first", "none was",
            "Name one here: auto_schedule=<name>, or with -s");
   }
   find_autoscheduler(scheduler);

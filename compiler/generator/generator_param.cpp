@@ -30,7 +30,7 @@ void GeneratorParamBase::refuse(const std::string& value, const std::string& rul
 }
 
 void GeneratorParamBase::set_from_loop_level(const LoopLevel& level) {
-  refuse(level.to_string(), "it is of another type than LoopLevel", "a LoopLevel was given",
+  refuse(level.to_string(), "a param takes values of its type", "a LoopLevel was given",
          "Give a value of its type");
 }
 

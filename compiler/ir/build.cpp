@@ -464,7 +464,13 @@ Expr call_image(const std::string& name, Type type, std::vector<Expr> args, Symb
   return new Call(type, CallType::Image, Op::none, name, std::move(args), 0, std::move(symbol));
 }
 
-Expr likely(Expr e) { return call_op(Op::likely, {std::move(e)}); }
+Expr likely(Expr e) {
+  if (!e.defined()) {
+    user_error("apply likely", "every operand must be a defined expression",
+               "it was never assigned", "Assign the Expr before its use");
+  }
+  return call_op(Op::likely, {std::move(e)});
+}
 
 Expr conjunction(const std::vector<Expr>& terms) {
   Expr result;

@@ -20,6 +20,12 @@ void check_operand(const Expr& e, const char* what) {
   }
 }
 
+bool is_type_of_numbers(Type type) {
+  const int bits = type.bits();
+  if (type.is_float()) return bits == 16 || bits == 32 || bits == 64;
+  return type.is_bool() || bits == 8 || bits == 16 || bits == 32 || bits == 64;
+}
+
 [[noreturn]] void no_common_type(Type a, Type b, const char* what) {
   user_error(text("apply ", what), "both operands must have a common type",
              text("the types are ", a, " and ", b), "Cast one of them explicitly");
@@ -141,6 +147,10 @@ Expr cast(Type type, Expr value) {
   if (type.is_handle() || type.bits() == 0) {
     user_error("cast", "the new type must be a number", text("it is ", type),
                "Use reinterpret for handles");
+  }
+  if (!ir::is_type_of_numbers(type)) {
+    user_error("cast", "integers have 1, 8, 16, 32 or 64 bits, floats 16, 32 or 64",
+               text("the new type is ", type), "Name a type of one of these widths");
   }
   if (type.is_vector() && value.type().is_vector() && type.lanes() != value.type().lanes()) {
     ir::no_common_type(type, value.type(), "cast");

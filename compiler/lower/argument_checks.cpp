@@ -5,6 +5,7 @@
 #include "diagnostics/error.h"
 #include "ir/build.h"
 #include "ir/visit.h"
+#include "lower/schedule_checks.h"
 #include "retrograde_runtime.h"
 #include "simplify/simplify.h"
 
@@ -288,6 +289,7 @@ class Checks {
       add_constraint_checks(arg, run);
     }
     add_requirements(run);
+    for (Stmt& sizes : schedule_checks(program_)) run.push_back(std::move(sizes));
     run.push_back(nests_.body);
     return make_if(any_query, make_block(answers), make_block(run));
   }

@@ -410,7 +410,7 @@ TEST(DomainErrors, PredicateThatIsNoBool) {
   RDom r(0, 4);
   expect_compile_error([&] { r.where(r + 1); }, {"bool"});
   expect_compile_error([&] { r.where(Expr()); }, {"must be a defined expression"});
-  expect_compile_error([&] { RDom().where(Expr(true)); }, {"never given a domain"});
+  expect_compile_error([&] { RDom().where(Expr(true)); }, {"the RDom was given a domain"});
 }
 
 TEST(DomainErrors, SeveralVariablesAsOne) {

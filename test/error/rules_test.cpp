@@ -99,7 +99,7 @@ TEST_F(Rules, VariablesOfADomain) {
   RDom r(0, 3);
   expect("variables are numbered from 0", [&] { r[1]; });
   expect("a predicate is of type bool", [&] { r.where(r); });
-  expect("the RDom was never given a domain", [&] { RDom().where(Expr(true)); });
+  expect("the RDom was given a domain", [&] { RDom().where(Expr(true)); });
 }
 
 TEST_F(Rules, LevelsAreLoopsOrSetOnce) {
