@@ -81,14 +81,17 @@ using CustomAdjoint = std::function<std::vector<AdjointContribution>(const Adjoi
 
 // For extern stages: which region of one of its Func or image arguments a region of the Func needs,
 // as its answer to a bounds query says. An empty Region: all of it, without bounds; then an adjoint
-// that sums over the argument cannot be built (CompileError).
+// that sums over the argument cannot be built.
+// Requires: a region has min and extent in each dimension of the argument.
 using ExternReads = std::function<Region(const AdjointInput& argument, const Region& of_func)>;
 
 // Adjoints pass through `func` by `rule`. Replaces an earlier rule.
-// CompileError: func is undefined or has no floats; an input is undefined, an integer, given twice,
-// the Func itself, or nothing that it depends on; no rule. While differentiating: a contribution of
-// another shape, to something else, twice or missing; a wanted input that is not listed.
-// Unsupported: propagate_tangents where it has no custom_tangent, and inputs of it move.
+// Requires: a rule belongs to a Func that is defined; only floating-point values have derivatives;
+// a rule is a function; its inputs must be defined; each input is listed once; its inputs are what
+// the Func is computed from; what a Func reads is told for extern stages only; its custom adjoint
+// must know every input whose gradient is wanted; a rule contributes to the inputs that it was made
+// for; each input gets one contribution; each wanted input gets a contribution; a Func with a
+// custom adjoint needs a rule for tangents, too (Unsupported).
 void custom_adjoint(const Func& func, const std::vector<AdjointInput>& inputs, CustomAdjoint rule,
                     ExternReads reads = nullptr);
 
@@ -100,7 +103,8 @@ class TangentContext {
       : func_(std::move(func)), inputs_(std::move(inputs)), moving_(std::move(moving)) {}
 
   const Func& func() const { return func_; }
-  // Whether the input has a tangent other than zero. CompileError when it is not one of the rule's.
+  // Whether the input has a tangent other than zero.
+  // Requires: a rule asks for the tangents of its inputs.
   bool moves(const AdjointInput& input) const;
   // The tangent of an input: its dimensions and number of values; zeros when it does not move.
   Func tangent(const AdjointInput& input) const;
@@ -114,8 +118,9 @@ class TangentContext {
 // Gives the tangent of the Func: its dimensions and number of values; floats.
 using CustomTangent = std::function<Func(const TangentContext&)>;
 
-// Tangents pass through `func` by `rule`; otherwise as custom_adjoint. Where it has no
-// custom_adjoint, propagate_adjoints through it is Unsupported.
+// Tangents pass through `func` by `rule`; otherwise as custom_adjoint.
+// Requires: its custom tangent must know every input that moves; a Func with a custom tangent needs
+// a rule for adjoints, too (Unsupported).
 void custom_tangent(const Func& func, const std::vector<AdjointInput>& inputs, CustomTangent rule);
 
 }  // namespace retrograde

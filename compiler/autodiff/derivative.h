@@ -53,8 +53,10 @@ class Derivative {
   //
   // Zero everywhere where the output does not depend on it, and for integers; explanations() then
   // say why. (A Buffer that is bound to an ImageParam is something else than the ImageParam.)
-  // CompileError when there is no such update, and for what has a gradient that was not built:
-  // because `wrt` names others, a custom adjoint covers it, or its steps are not kept.
+  // A gradient is not built where `wrt` names others, a custom adjoint covers it, or its steps are
+  // not kept.
+  // Requires: a Func has a definition; a Func has an adjoint after each of its definitions; a
+  // gradient is looked up that was built, or is zero.
   Func operator()(const Func& func, int update_id = -1) const;
   Func operator()(const Buffer<>& buffer) const;
   Func operator()(const ImageParam& image) const;
@@ -121,6 +123,13 @@ class AdjointInput {
   std::shared_ptr<ir::Symbol> symbol_;
 };
 
+// Requires: a schedule has at most 2^24 actions; a budget in bytes needs to know the size of a
+// state; the budget must have room for one state, the first; a checkpointed loop forgets the values
+// that its steps saw (Unsupported); a budget is a number of states or of bytes; a loop is run
+// backward from at least one kept state, the first; a budget is a number of bytes; an update that
+// runs backward needs to know the elements it may reach (Unsupported); a partial derivative may
+// need only values that are still there when the Func is complete; whether an update writes may not
+// depend on the values of the Func that it updates.
 struct AdjointOptions {
   Overwritten overwritten = Overwritten::Auto;
   int64_t version_bytes = ir::default_version_bytes;  // 256 MiB; under Overwritten::Auto
@@ -144,12 +153,21 @@ struct AdjointOptions {
 // The gradient of sum over output_bounds of adjoint * output with respect to everything that
 // `output` depends on. output_bounds: min and extent of each dimension of the output; `adjoint` is
 // read there only.
+// Requires: the output must be defined; only floating-point values have derivatives; the output
+// needs bounds in each of its dimensions; an adjoint has the dimensions of its Func; an adjoint has
+// as many values as its Func; the adjoint must be defined; a Func with a custom tangent needs a
+// rule for adjoints, too (Unsupported); derivatives come from definitions (Unsupported); a C
+// function has no known derivative (Unsupported); elements of a scatter have 32-bit numbers: there
+// may be 2147483647 at most (Unsupported); every variable needs a range.
 Derivative propagate_adjoints(const Func& output, const Func& adjoint, const Region& output_bounds,
                               const AdjointOptions& options = {});
 // The same with an adjoint in memory, whose shape gives the bounds.
+// Requires: the adjoint must be a defined Buffer.
 Derivative propagate_adjoints(const Func& output, const Buffer<float>& adjoint,
                               const AdjointOptions& options = {});
 // Of a Func without dimensions: the adjoint of its value is 1.
+// Requires: a scalar output has one value; the gradient is that of a scalar, or of a sum with given
+// weights.
 Derivative propagate_adjoints(const Func& output, const AdjointOptions& options = {});
 
 }  // namespace retrograde

@@ -41,6 +41,7 @@ class Jacobian {
   int colours() const;
   bool by_rows() const;
   // The colour of an element of the input (of the output when by_rows), int32 in [0, colours()).
+  // Requires: an element has a coordinate in each dimension.
   Expr colour(const std::vector<Expr>& element) const;
   // All products: the dimensions of the output (the input when by_rows), then the colour. Schedule
   // this one; what follows reads it.
@@ -49,8 +50,8 @@ class Jacobian {
   // input(x...).
   Func dense() const;
   // Dimensions of the output, then an offset for each: band()(y..., k...) is the derivative of
-  // output(y...) by input(y + band_offsets().min + k ...). CompileError when output and input
-  // differ in dimensions, or the offsets have no constant bounds.
+  // output(y...) by input(y + band_offsets().min + k ...).
+  // Requires: a band is made of constant offsets between output and input.
   Func band() const;
   Region band_offsets() const;  // of entries that may be nonzero: constants
   std::string explain() const;
@@ -63,13 +64,20 @@ class Jacobian {
 // values (a Func of Tuples) has one more dimension here, the value, last:
 //   jacobian(f, pair, ...).dense()(y..., x..., k)     d f(y) / d pair(x)[k]
 //   hessian(loss, pair).dense()(i..., k, j..., l)     d2 loss / d pair(i)[k] d pair(j)[l]
-// CompileError: as propagate_tangents, propagate_adjoints. Unsupported: places or reductions in the
-// pattern without constant bounds, more than 4096 colours, an extern stage on the way.
+// What propagate_tangents and propagate_adjoints require, it requires.
+// Requires: what to differentiate by must be defined; only floating-point values have derivatives;
+// only floating-point values that are defined have derivatives; the output needs bounds in each of
+// its dimensions; an input is something that the output depends on; rows are compressed of an
+// output of one value (Unsupported); which elements depend on which is found by a bounded search
+// over index sets (Unsupported); at most 4096 seeds are evaluated together (Unsupported); elements
+// that one element may depend on must lie within constant bounds (Unsupported); which element
+// depends on which is read off definitions (Unsupported).
 Jacobian jacobian(const Func& output, const AdjointInput& input, const Region& output_bounds,
                   const JacobianOptions& options = {});
 
 // The second derivatives of a scalar: dense()(i..., j...) = d2 loss / d wrt(i) d wrt(j). Tangents
 // of the adjoint. Errors as jacobian and hessian_vector_product.
+// Requires: the input is a float that the loss depends on.
 Jacobian hessian(const Func& loss, const AdjointInput& wrt,
                  Overwritten overwritten = Overwritten::Store);
 // A block off the diagonal: dense()(i..., j...) = d2 loss / d rows(i) d columns(j).

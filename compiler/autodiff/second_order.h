@@ -16,6 +16,7 @@ namespace retrograde {
 // How the gradient of the scalar `loss` by `wrt` (its dimensions) changes along the directions,
 // which may be of `wrt` itself or of other inputs: then it is a block off the diagonal.
 // Errors as propagate_adjoints and propagate_tangents.
+// Requires: the input is a float that the loss depends on.
 Func hessian_vector_product(const Func& loss, const AdjointInput& wrt,
                             const std::vector<Direction>& directions,
                             Overwritten overwritten = Overwritten::Store);

@@ -7,7 +7,8 @@ namespace retrograde {
 
 // The value of `value`, exactly, and the derivative of `surrogate`, in both modes: for steps whose
 // true derivative is 0. straight_through(round(x), x) rounds, and passes gradients as if it did
-// not. `surrogate` must be finite. Both floats of one type, else CompileError.
+// not. `surrogate` must be finite.
+// Requires: the value and its surrogate are floats of one type.
 Expr straight_through(const Expr& value, const Expr& surrogate);
 
 }  // namespace retrograde

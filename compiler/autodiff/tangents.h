@@ -61,9 +61,12 @@ class Tangents {
 };
 
 // The tangents of `output` and of everything between it and the directions.
-// CompileError: the output is undefined or an integer; no direction; two for one input; a direction
-// of another shape; an integer input. Unsupported: an operator without a derivative, an extern
-// stage, or undef inside an operation, on a path from an input that moves.
+// No operator without a derivative lies on a path from an input that moves (Unsupported).
+// Requires: the output must be defined; only floating-point values have derivatives; what moves
+// must be defined; something has to move; each input has one direction; a direction must be
+// defined; it has the dimensions of its input; it has as many values as its input; it is made of
+// floating-point values; derivatives come from definitions (Unsupported); the tangent of undef is
+// known where a select chooses it and nothing else is done with it (Unsupported).
 Tangents propagate_tangents(const Func& output, const std::vector<Direction>& directions);
 
 }  // namespace retrograde

@@ -67,9 +67,10 @@ struct GradientReport {
 };
 
 // `sizes`: of the output; none for a scalar. Of a Tuple, all floating values are summed.
-// RuntimeError: an input is not bound. CompileError: sizes or `wrt` do not fit. CompileError and
-// Unsupported as propagate_adjoints; Unsupported, too, for what has no meaning in double (extern),
-// and for an output of integers.
+// What propagate_adjoints requires, it requires.
+// Requires: every input must be bound (RuntimeError); the output needs a size in each of its
+// dimensions, and a min in each or none; `wrt` names floating inputs that the output depends on;
+// derivatives are of floats (Unsupported); every operation needs a meaning in double (Unsupported).
 GradientReport check_gradients(const Func& output, const std::vector<int>& sizes = {},
                                const GradientCheckOptions& options = {});
 

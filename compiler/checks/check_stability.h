@@ -86,8 +86,11 @@ struct StabilityReport {
   std::string to_json() const;
 };
 
-// As check_gradients. CompileError: a range of something that is no floating input, or whose ends
-// are not finite numbers in order.
+// `sizes` as of check_gradients.
+// Requires: every input must be bound (RuntimeError); the output needs a size in each of its
+// dimensions, and a min in each or none; a range has two finite ends, the lower first; a range is
+// one of a floating input that the output depends on; every operation needs a meaning in double
+// (Unsupported).
 StabilityReport check_stability(const Func& output, const std::vector<int>& sizes = {},
                                 const StabilityOptions& options = {});
 

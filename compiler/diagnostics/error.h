@@ -11,6 +11,10 @@
 //
 //   cannot vectorize "blur_x" over "r": iterations of a vectorized loop must be independent; its
 //   update definition reads "blur_x"(r - 1). Vectorize "x" instead.
+//
+// Headers say what a function asks of its callers in the words of these messages: after "Requires:"
+// stand rules, which throw CompileError where they are broken, or the kind in parentheses behind.
+// tools/api_table holds them against each other, and names the test of each in docs/api.md.
 #pragma once
 
 #include <memory>

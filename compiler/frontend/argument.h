@@ -32,6 +32,7 @@ struct Argument {
   ArgumentEstimates argument_estimates;
 
   Argument() = default;
+  // Requires: a buffer has 0 to 255 dimensions, a scalar has none.
   Argument(std::string name, Kind kind, const Type& type, int dimensions,
            ArgumentEstimates estimates = {});
   template <typename T, int Dims>

@@ -24,7 +24,8 @@ struct MachineParams {
   MachineParams() = default;
   MachineParams(int parallelism, uint64_t last_level_cache_size, float balance)
       : parallelism(parallelism), last_level_cache_size(last_level_cache_size), balance(balance) {}
-  explicit MachineParams(const std::string& text);  // CompileError when it cannot be read
+  // Requires: they are the threads, the bytes of the last-level cache and the cost of a load.
+  explicit MachineParams(const std::string& text);
   static MachineParams generic() { return {}; }
   std::string to_string() const;
 };
@@ -46,12 +47,15 @@ void add_autoscheduler(const std::string& name, const AutoSchedulerFn& scheduler
 // Names of all that are loaded.
 std::vector<std::string> autoscheduler_names();
 // The one that auto_schedule() without a name means; "" when none was set.
+// Requires: an autoscheduler is loaded from a plugin before it is used.
 void set_default_autoscheduler_name(const std::string& name);
 std::string default_autoscheduler_name();
-// CompileError when there is none of the name; it lists those that are there.
+// By its name; the error where there is none lists those that are there.
+// Requires: autoschedulers have different names; an autoscheduler is loaded from a plugin before it
+// is used.
 AutoSchedulerFn find_autoscheduler(const std::string& name);
-// Opens a shared library; its static initialisers register what it holds. CompileError when it
-// cannot be opened.
+// Opens a shared library; its static initialisers register what it holds.
+// Requires: it is a shared library that can be opened.
 void load_plugin(const std::string& library);
 
 }  // namespace retrograde

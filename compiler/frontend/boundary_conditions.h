@@ -7,6 +7,7 @@
 //   repeat_image        the box again and again:                bcd|abcd|abc
 //   mirror_image        the box mirrored, edges twice:          cba|abcd|dcb
 //   mirror_interior     the box mirrored, edges once:           dcb|abcd|cba
+//                       (of one element: that element everywhere)
 // Sources: a Func with bounds, or a Buffer or ImageParam, whose own bounds are the default. A
 // dimension whose min or extent is an undefined Expr is left alone, as are dimensions beyond the
 // bounds. Loops are cut so that the inside costs nothing extra.
@@ -21,6 +22,9 @@
 
 namespace retrograde::BoundaryConditions {
 
+// Requires: it must have a definition; there are bounds for at most its dimensions; bounds are
+// integers; an extent is not negative; there is one constant for each value; the value outside is a
+// defined expression; the value outside is one of the type inside.
 Func constant_exterior(const Func& source, const Tuple& value, const Region& bounds);
 Func constant_exterior(const Func& source, const Expr& value, const Region& bounds);
 Func repeat_edge(const Func& source, const Region& bounds);
@@ -72,6 +76,8 @@ Region region_of(Bounds&&... bounds) {
   Func name(const T& image, const Region& bounds) {                \
     return name(detail::func_of(image), bounds);                   \
   }
+// Requires: it must have a definition; there are bounds for at most its dimensions; bounds are
+// integers; an extent is not negative.
 RETROGRADE_BOUNDARY_CONDITION(repeat_edge)
 RETROGRADE_BOUNDARY_CONDITION(repeat_image)
 RETROGRADE_BOUNDARY_CONDITION(mirror_image)

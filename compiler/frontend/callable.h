@@ -21,11 +21,15 @@ namespace retrograde {
 class Callable {
  public:
   Callable() = default;
-  bool defined() const { return contents_ != nullptr; }
+  bool defined() const { return contents_ != nullptr; }  // whether it was compiled
 
   // Scalars of exactly the parameters' types, and buffers; a JITUserContext* may stand first.
-  // Returns 0; RuntimeError for arguments that do not fit, and for an error of the call, whose code
-  // is returned when a handler was told of it. May be called from several threads at once.
+  // Returns 0; RuntimeError for an error of the call, whose code is returned when a handler was
+  // told of it. May be called from several threads at once.
+  // Requires: only what was compiled can be called; it takes its arguments, then its output buffers
+  // (RuntimeError); what is a buffer must be a buffer, and what is a scalar must be a scalar
+  // (RuntimeError); a value must be of type T, its parameter's (RuntimeError); a buffer must have
+  // the dimensions that it was compiled for (RuntimeError).
   template <typename... Args>
   int operator()(JITUserContext* context, const Args&... args) const {
     return call(context, {value_of(args)...});

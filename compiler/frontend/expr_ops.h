@@ -13,7 +13,8 @@
 
 namespace retrograde {
 
-// ---- bits: integers of one type; a C++ int takes the other operand's type ----
+// ---- bits: of integers; two types are promoted as by +, a C++ int takes the other one's ----
+// Requires: every operand must be a defined expression; it takes integers.
 #define RETROGRADE_BIT_OPERATOR(name)               \
   Expr name(Expr a, Expr b);                        \
   inline Expr name(Expr a, int b) {                 \
@@ -30,6 +31,7 @@ RETROGRADE_BIT_OPERATOR(operator^)
 #undef RETROGRADE_BIT_OPERATOR
 Expr operator~(Expr a);
 // The result has the type of `a`; a negative amount shifts the other way.
+// Requires: every operand must be a defined expression; it takes integers.
 Expr operator<<(Expr a, Expr b);
 Expr operator<<(Expr a, int b);
 Expr operator>>(Expr a, Expr b);
@@ -40,11 +42,13 @@ template <typename T>
 Expr cast(Expr value) {
   return cast(type_of<T>(), std::move(value));
 }
+// Requires: it takes and gives numbers.
 Expr saturating_cast(Type type, Expr value);  // clamped to the range of the type
 template <typename T>
 Expr saturating_cast(Expr value) {
   return saturating_cast(type_of<T>(), std::move(value));
 }
+// Requires: both types are equally wide.
 Expr reinterpret(Type type, Expr value);  // same bits; both types equally wide
 template <typename T>
 Expr reinterpret(Expr value) {
@@ -92,6 +96,7 @@ requires(sizeof...(Rest) >= 1 && (std::is_convertible_v<Rest, Expr> && ...)) Exp
                 select(std::move(c1), std::move(v1), Expr(std::forward<Rest>(rest))...));
 }
 // Element by element; the condition is one for all, or a Tuple of its own.
+// Requires: all Tuples have one size.
 Tuple select(const Tuple& condition, const Tuple& true_value, const Tuple& false_value);
 Tuple select(const Expr& condition, const Tuple& true_value, const Tuple& false_value);
 template <typename... Rest>
@@ -113,22 +118,30 @@ requires(sizeof...(Rest) >= 1) Tuple tuple_select(const Condition& c0, const Tup
   return tuple_select(c0, v0, tuple_select(c1, v1, rest...));
 }
 // values[id]; the last one when id is out of range.
+// Requires: it chooses among at least one value.
 Expr mux(const Expr& id, const std::vector<Expr>& values);
 Expr mux(const Expr& id, const std::initializer_list<Expr>& values);
 Expr mux(const Expr& id, const Tuple& values);
 
 // ---- arithmetic ----
+// Requires: it takes a number.
 Expr abs(Expr x);           // of signed integers: unsigned
 Expr absd(Expr a, Expr b);  // |a - b| without overflow; of integers: unsigned
 // zero * (1 - weight) + one * weight. An unsigned weight of n bits stands for weight / (2^n - 1).
+// Requires: both values have one type; a constant end takes the type of the other and must fit it;
+// integers are of at most 32 bits; its weight is a float or an unsigned integer; integers are
+// interpolated with weights in [0, 1].
 Expr lerp(Expr zero, Expr one, Expr weight);
+// Requires: it takes integers.
 Expr div_round_to_zero(Expr a, Expr b);  // as C++ does; x / 0 == 0
 Expr mod_round_to_zero(Expr a, Expr b);
+// Requires: it takes integers.
 Expr popcount(Expr x);
 Expr count_leading_zeros(Expr x);   // the width when x is 0
 Expr count_trailing_zeros(Expr x);  // the width when x is 0
 
 // ---- functions of real numbers ----
+// Requires: every operand must be a defined expression; it takes a number.
 Expr floor(Expr x);
 Expr ceil(Expr x);
 Expr round(Expr x);  // half to even
@@ -157,6 +170,7 @@ Expr is_nan(Expr x);
 Expr is_inf(Expr x);
 Expr is_finite(Expr x);
 // Less exact, faster, float32 only.
+// Requires: it takes float32.
 Expr fast_exp(Expr x);
 Expr fast_log(Expr x);
 Expr fast_pow(Expr x, Expr y);
@@ -165,8 +179,8 @@ Expr fast_cos(Expr x);
 Expr fast_inverse(Expr x);
 Expr fast_inverse_sqrt(Expr x);
 
-// ---- random numbers: a function of the seed, of the Func and of the point; the same on every run
-// ----
+// ---- random numbers: of the seed, the Func and the point; the same on every run ----
+// Requires: its seed is an integer.
 Expr random_float(Expr seed = {});  // float32 in [0, 1)
 Expr random_uint(Expr seed = {});   // uint32
 Expr random_int(Expr seed = {});    // int32
@@ -176,7 +190,8 @@ using ir::likely;                  // the loop may be cut so that this holds in 
 Expr likely_if_innermost(Expr e);  // only worth it in an innermost loop
 Expr unsafe_promise_clamped(const Expr& value, const Expr& min,
                             const Expr& max);  // an undefined end: unlimited
-Expr strict_float(Expr e);                     // no contraction to FMA inside
+// Requires: every operand must be a defined expression.
+Expr strict_float(Expr e);  // no contraction to FMA inside
 // The value, which a memoized Func's cache knows by `key`: what an image holds is no part of the
 // cache's key by itself. Keys are made of Params and constants.
 Expr memoize_tag(Expr value, const std::vector<Expr>& key);
@@ -187,6 +202,7 @@ requires(std::is_convertible_v<Keys, Expr>&&...) Expr memoize_tag(Expr value, Ke
 Expr stop_gradient(Expr e);                    // a constant as far as derivatives go
 
 // Any value: a definition whose value is undef stores nothing there.
+// Requires: the elements of a Tuple are undefined in the same places, or everywhere.
 Expr undef(Type type);
 template <typename T>
 Expr undef() {
@@ -206,6 +222,7 @@ Expr print_values_when(Expr condition, std::vector<Expr> values);
 Expr require_values(Expr condition, std::vector<Expr> values);
 }  // namespace ir
 // The first value; prints all of them, a line for each evaluation.
+// Requires: it gives the value of its first argument; every operand must be a defined expression.
 inline Expr print(const std::vector<Expr>& values) { return ir::print_values(values); }
 template <typename First, typename... Rest>
 requires(std::is_convertible_v<First, Expr>) Expr print(First&& first, Rest&&... rest) {
@@ -213,6 +230,7 @@ requires(std::is_convertible_v<First, Expr>) Expr print(First&& first, Rest&&...
   ir::collect_parts(values, std::forward<Rest>(rest)...);
   return ir::print_values(std::move(values));
 }
+// Requires: its condition is of type bool.
 inline Expr print_when(Expr condition, const std::vector<Expr>& values) {
   return ir::print_values_when(std::move(condition), values);
 }
@@ -223,6 +241,7 @@ Expr print_when(Expr condition, Expr first, Rest&&... rest) {
   return ir::print_values_when(std::move(condition), std::move(values));
 }
 // The value where the condition holds; elsewhere the call of the pipeline fails with the message.
+// Requires: its condition is of type bool.
 inline Expr require(Expr condition, const std::vector<Expr>& value_and_message) {
   return ir::require_values(std::move(condition), value_and_message);
 }

@@ -12,6 +12,7 @@
 
 namespace retrograde {
 
+// Requires: every argument is a defined expression.
 struct ExternFuncArgument {
   ExternFuncArgument() = default;
   ExternFuncArgument(ir::FuncPtr func);

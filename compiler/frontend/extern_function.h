@@ -16,6 +16,8 @@ Expr checked_extern_call(const std::string& function, Type result, const std::ve
 
 // function(args...), a C function from Ts... to R of this process, or of the JIT externs. It is
 // taken to depend on its arguments alone; a vector calls it lane by lane.
+// Requires: every argument is a defined expression; its arguments have the types that it was
+// declared with.
 template <typename R, typename... Ts, typename... Args>
 Expr call_c_function(const std::string& function, const Args&... args) {
   static_assert(sizeof...(Ts) == sizeof...(Args), "one type for each argument");

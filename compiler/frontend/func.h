@@ -35,6 +35,7 @@ class EvictionKey {
 class Func {
  public:
   Func(std::source_location where = std::source_location::current());
+  // Requires: a name is text.
   explicit Func(const std::string& name,
                 std::source_location where = std::source_location::current());
   template <ir::TextPointer T>
@@ -42,6 +43,8 @@ class Func {
       : Func(ir::name_from(name, "a Func"), where) {}
   explicit Func(std::nullptr_t) = delete;  // and of a literal 0: Func(Expr(0)) is a constant
   // Definitions must have these types and dimensions.
+  // Requires: dimensions are not negative; a definition has the dimensions that the Func was
+  // declared with; all definitions of a Func have the same types.
   Func(Type required_type, int required_dimensions, const std::string& name = "");
   Func(const std::vector<Type>& required_types, int required_dimensions,
        const std::string& name = "");
@@ -56,6 +59,8 @@ class Func {
   requires((std::is_convertible_v<Args, Expr> && ...)) FuncRef operator()(Args&&... args) const {
     return FuncRef(func_, {Expr(std::forward<Args>(args))...});
   }
+  // Requires: a coordinate must be a defined expression; coordinates are integers; an access gives
+  // one coordinate for each dimension; sizes and coordinates are of 32 bits.
   FuncRef operator()(const std::vector<Expr>& args) const { return FuncRef(func_, args); }
   // Not of braces, whose elements are Exprs: {x, 0}.
   template <std::same_as<Var> V>
@@ -64,26 +69,32 @@ class Func {
   }
 
   // ---- what it is ----
+  // The name given, made unique, or a fresh one.
   const std::string& name() const { return func_->name; }
-  bool defined() const { return func_->is_defined(); }
-  int dimensions() const { return func_->dimensions(); }
-  std::vector<Var> args() const;
-  Expr value() const;
-  Tuple values() const;
-  const std::vector<Type>& output_types() const { return func_->types; }
-  const std::vector<Type>& types() const { return func_->types; }
-  const Type& type() const;
-  int outputs() const { return static_cast<int>(func_->types.size()); }
+  bool defined() const { return func_->is_defined(); }  // whether it has a first definition
+  int dimensions() const { return func_->dimensions(); }  // how many coordinates it takes
+  std::vector<Var> args() const;  // the Vars of its first definition
+  // Requires: the Func needs a definition first; its values are expressions; it has one value only
+  // if it is no Tuple.
+  Expr value() const;  // what its first definition stores
+  Tuple values() const;  // the same of a Func of any number of values
+  const std::vector<Type>& output_types() const { return func_->types; }  // of its values
+  const std::vector<Type>& types() const { return func_->types; }  // of its values
+  const Type& type() const;  // of its one value
+  int outputs() const { return static_cast<int>(func_->types.size()); }  // how many values it has
   bool has_update_definition() const { return !func_->updates.empty(); }
   int num_update_definitions() const { return static_cast<int>(func_->updates.size()); }
-  std::vector<Expr> update_args(int index = 0) const;
-  Expr update_value(int index = 0) const;
-  Tuple update_values(int index = 0) const;
-  std::vector<RVar> rvars(int index = 0) const;
-  bool is_extern() const { return func_->is_extern(); }
-  const std::string& extern_function_name() const;  // CompileError when it is not
+  // Requires: updates are numbered from 0.
+  std::vector<Expr> update_args(int index = 0) const;  // where an update stores
+  Expr update_value(int index = 0) const;  // what an update stores
+  Tuple update_values(int index = 0) const;  // the same of any number of values
+  std::vector<RVar> rvars(int index = 0) const;  // the reduction variables of an update
+  bool is_extern() const { return func_->is_extern(); }  // whether a C function computes it
+  // Requires: a Func that define_extern defines has one.
+  const std::string& extern_function_name() const;
   std::string source_location() const;              // of its declaration: "blur.cpp:12"
   const ir::FuncPtr& function() const { return func_; }
+  // One function, two handles.
   bool same_as(const Func& other) const { return func_ == other.func_; }
 
   // ---- running it ----
@@ -110,12 +121,12 @@ class Func {
   void infer_input_bounds(JITUserContext* context, Pipeline::RealizationArg outputs,
                           const Target& target = Target(),
                           const ParamMap& map = ParamMap::empty_map());
-  void compile_jit(const Target& target = Target());
+  void compile_jit(const Target& target = Target());  // now, not at the first realize()
   Callable compile_to_callable(const std::vector<Argument>& args,
                                const Target& target = get_jit_target_from_environment());
-  std::string loop_nest(const Target& target = Target());
-  void print_loop_nest();
-  std::vector<Argument> infer_arguments() const;
+  std::string loop_nest(const Target& target = Target());  // its loops as text, after scheduling
+  void print_loop_nest();  // the same to the standard error stream
+  std::vector<Argument> infer_arguments() const;  // Params and ImageParams that it uses
   JITHandlers& jit_handlers();
   // See pipeline.h.
   void set_error_handler(void (*handler)(void*, const char*));
@@ -128,6 +139,7 @@ class Func {
   void set_jit_externs(const std::map<std::string, JITExtern>& externs);
   const std::map<std::string, JITExtern>& get_jit_externs();
   // Promises about the buffer that this Func is realized into.
+  // Requires: it has one only if it is no Tuple.
   OutputImageParam output_buffer() const;
   std::vector<OutputImageParam> output_buffers() const;
 
@@ -188,6 +200,12 @@ class Func {
   // once with buffers whose host is null, to ask which regions of its inputs it needs for the
   // outputs' shapes, and then to compute. Funcs and images are passed as halide_buffer_t*, Exprs as
   // scalars; it returns 0 or an error code.
+  // Requires: the C function has a name; every argument is a Func, an image or an Expr; every Func
+  // among the arguments has a definition; its arguments are different Vars; it has at least one
+  // value; a Func is defined once; extern stages run on the CPU (Unsupported); the function's
+  // symbol is its plain name (Unsupported); a Func that a C function reads has memory; what a C
+  // function reads or writes lies in memory as one box; what a C function reads or writes is stored
+  // where it is computed (Unsupported).
   void define_extern(const std::string& function_name, const std::vector<ExternFuncArgument>& args,
                      const std::vector<Type>& types, const std::vector<Var>& arguments,
                      NameMangling mangling = NameMangling::Default,
@@ -218,6 +236,9 @@ class Func {
   //                                     f(x) = g_in_f(x) + g_in_f(x + 1)
   // Asked for again it is the same Func. It is inlined like any other Func unless scheduled, and
   // has wrappers itself: g.in(f).in(f). Compiling applies them; f's definition stays as it is.
+  // Requires: a Func is wrapped in the Funcs that read it; a user needs a definition first; Funcs
+  // that share a wrapper share it in every request; a user has either a wrapper or a clone; at
+  // least one user is named.
   Func in(const Func& f);
   Func in(const std::vector<Func>& fs);
   Func in();
@@ -228,8 +249,9 @@ class Func {
   //   h(x) = g(x)                       f(x) = g_clone_in_f(x);  h(x) = g(x)
   Func clone_in(const Func& f);
   Func clone_in(const std::vector<Func>& fs);
-  Func copy_to_device(DeviceAPI device = DeviceAPI::Default_GPU);  // Unsupported
-  Func copy_to_host();                                             // Unsupported
+  // Requires: storage lies in the memory of the CPU (Unsupported).
+  Func copy_to_device(DeviceAPI device = DeviceAPI::Default_GPU);
+  Func copy_to_host();
 
   // ---- where it is computed and stored ----
 
@@ -247,6 +269,9 @@ class Func {
   //       f(x, y) = ...              for x in [0, n): f(x, y) = g(x, y) + g(x + 1, y)
   Func& compute_at(const Func& f, const Var& var) { return compute_at(LoopLevel(f, var)); }
   Func& compute_at(const Func& f, const RVar& var) { return compute_at(LoopLevel(f, var)); }
+  // Requires: a Func must be stored and computed at a loop that encloses every use of it, and its
+  // compute level; the level is set before the pipeline is compiled; the region of a Func that its
+  // consumers read must be bounded.
   Func& compute_at(const LoopLevel& level);
   // Its storage lives for the whole of that loop, which is around the compute level; what is there
   // already is not computed again, and storage is folded where that suffices.
@@ -258,6 +283,8 @@ class Func {
   Func& store_root();
   Func& store_at(const Func& f, const Var& var) { return store_at(LoopLevel(f, var)); }
   Func& store_at(const Func& f, const RVar& var) { return store_at(LoopLevel(f, var)); }
+  // Requires: only what is computed somewhere has storage of its own; iterations of a parallel loop
+  // must not share the storage of what each of them computes.
   Func& store_at(const LoopLevel& level);
   // Where its memory is allocated: at this level, around the store level, once for all iterations
   // in between. What is computed does not change.
@@ -266,12 +293,16 @@ class Func {
   //       g(...) = ...                    g(...) = ...
   Func& hoist_storage(const Func& f, const Var& var) { return hoist_storage(LoopLevel(f, var)); }
   Func& hoist_storage(const Func& f, const RVar& var) { return hoist_storage(LoopLevel(f, var)); }
+  // Requires: storage is hoisted to a loop that encloses its store level; the size of hoisted
+  // storage is known outside of the loops it is hoisted over.
   Func& hoist_storage(const LoopLevel& level);
   Func& hoist_storage_root();
-  // In which memory. Unsupported for memory that only GPUs and accelerators have.
+  // In which memory.
+  // Requires: storage lies in memory that the CPU has (Unsupported).
   Func& store_in(MemoryType memory);
   // Dimensions innermost in memory first. reorder_storage(c, x, y):
   //   g[x + w * y + w * h * c]    =>    g[c + 3 * x + 3 * w * y]
+  // Requires: each must be one of its dimensions; each dimension is named once.
   Func& reorder_storage(const std::vector<Var>& dims);
   template <typename... Rest>
   requires((std::is_convertible_v<Rest, Var> &&
@@ -280,19 +311,35 @@ class Func {
   }
   // The extent of this dimension in storage grows to a multiple of `alignment`, so that every line
   // begins aligned.  align_storage(x, 8):   allocate g[w * h]  =>  allocate g[(w + 7) / 8 * 8 * h]
+  // Requires: the dimension must be a pure variable of the first definition; the alignment must be
+  // a defined expression; the alignment is an integer; the alignment is at least 1 and fits an
+  // int32; the alignment has one value in each call: it is made of parameters and facts about
+  // buffers.
   Func& align_storage(const Var& dim, const Expr& alignment);
   // Storage of this extent, coordinates taken modulo it: right when no more is alive at a time,
   // which is checked. fold_storage(y, 2):   g[x, y]  =>  g[x, y % 2]
   // `fold_forward`: the coordinate grows from iteration to iteration; false: it falls.
+  // Requires: the extent is at least 1 and fits an int32; the extent has one value in each call: it
+  // is made of parameters and facts about buffers; storage that the compiler lays out can be folded
+  // or bounded.
   Func& fold_storage(const Var& dim, const Expr& extent, bool fold_forward = true);
   // Storage of this extent whatever the bounds say; a call that needs more fails.
   //   allocate g[n']   =>   assert(n' <= bound); allocate g[bound]
+  // Requires: the bound is at least 1 and fits an int32; storage that the compiler lays out can be
+  // folded or bounded.
   Func& bound_storage(const Var& dim, const Expr& bound);
   // Keeps results in the runtime's cache, under the values of all parameters it depends on.
   //   produce g   =>   if not in cache: produce g, put it in
+  // Requires: an eviction key is an integer or a pointer; a Func has one eviction key; what an
+  // image holds is no part of a memoized Func's key; the key must be made of Params and constants;
+  // an output is computed by every call; a memoized Func must be computed whole, where its storage
+  // begins.
   Func& memoize(const EvictionKey& eviction_key = EvictionKey());
   // Computed by a thread of its own, at most as far ahead of its users as storage allows.
   //   produce g; consume g   =>   fork { produce g, signal } and { wait, consume g }
+  // Requires: what an async Func and its consumer both read is stored no further out than the async
+  // Func, or computed outside of the loops that they share; the loops between storage and
+  // computation of an async Func are serial (Unsupported).
   Func& async();
 
   // ---- what is known of its size ----
@@ -300,16 +347,22 @@ class Func {
   // A promise: exactly this is computed. A call that needs more fails.
   //   for x in [x0, x0 + n): ...   =>   assert(range is within [min, min + extent))
   //                                     for x in [min, min + extent): ...
+  // Requires: the variable must be a pure variable of the first definition; the extent must be a
+  // defined expression; bounds are integers; an extent is not negative; a bound has one value in
+  // each call: it is made of parameters and facts about buffers.
   Func& bound(const Var& var, Expr min, Expr extent);
   // A promise about the extent only: loops are of this constant extent.
   Func& bound_extent(const Var& var, Expr extent);
   // Computes more than is needed, so that min % modulus == remainder and the extent is a multiple.
   //   for x in [x0, x1): ...   =>   for x in [x0 rounded down, x1 rounded up): ...
+  // Requires: the modulus is at least 1 and fits an int32; the remainder is an integer; the extent
+  // is a multiple of the modulus; min % modulus is the remainder.
   Func& align_bounds(const Var& var, Expr modulus, Expr remainder = 0);
   // The same for the extent only: the min stays.
   Func& align_extent(const Var& var, Expr modulus);
   // A guess, for schedulers.
   Func& set_estimate(const Var& var, const Expr& min, const Expr& extent);
+  // Requires: there is one for each dimension.
   Func& set_estimates(const Region& estimates);
 
   // ---- watching it ----
@@ -321,6 +374,8 @@ class Func {
   Func& trace_realizations();
   Func& add_trace_tag(const std::string& tag);
   // Writes what was computed to a file, in NumPy's format (.npy) or raw (.tmp).
+  // Requires: the file has a name; a file holds one value of each point (Unsupported); the name's
+  // end says in which format (Unsupported); its format has the type of the elements (Unsupported).
   void debug_to_file(const std::string& filename);
 
   // ---- loops: of the first definition here, of updates through update(i); see stage.h ----

@@ -19,10 +19,24 @@ class FuncRef {
   FuncRef(ir::FuncPtr func, std::vector<Expr> args)
       : func_(std::move(func)), args_(std::move(args)) {}
 
+  // Requires: every argument on the left-hand side must be a defined expression; a definition has
+  // at least one value; the right-hand side must be a defined expression; values are numbers; a
+  // Func is defined once; a first definition has no reduction variables; the arguments of a first
+  // definition are Vars; the arguments of a first definition are different Vars; a definition has
+  // the dimensions that the Func was declared with; a right-hand side that uses _ needs _ on the
+  // left-hand side; every variable on the right-hand side stands on the left-hand side, or is of an
+  // RDom; a parameter and a pure variable of one definition have different names.
   Stage operator=(const Expr& value);
   Stage operator=(const Tuple& values);
   Stage operator=(const FuncRef& value);
   FuncRef(const FuncRef&) = default;
+// Requires: a Func is updated after its first definition; all definitions of a Func have as many
+// arguments; coordinates are integers; all definitions of a Func have as many values; all
+// definitions of a Func have the same types; all reduction variables of one definition come from
+// one RDom; a pure variable stands at its own place in every reference of a Func to itself, so that
+// its iterations are independent; the bounds of a reduction domain are known before its update
+// runs; a Func that a C function computes has no updates; a Func is complete when another Func uses
+// it.
 #define RETROGRADE_UPDATE(op)      \
   Stage operator op(Expr value);   \
   Stage operator op(const Tuple&); \
@@ -33,12 +47,15 @@ class FuncRef {
   RETROGRADE_UPDATE(/=)
 #undef RETROGRADE_UPDATE
 
+  // Requires: a Func of several values is a Tuple at each point; a Func is defined before it is
+  // read.
   operator Expr() const;                        // of a Func with one value
   FuncTupleElementRef operator[](int i) const;  // one value of a Tuple-valued Func
   size_t size() const;                          // number of values
   const ir::FuncPtr& function() const { return func_; }
 
   // One value of the Func here, whatever their number.
+  // Requires: the values of a point are numbered from 0.
   Expr element(int i) const;
 
  private:

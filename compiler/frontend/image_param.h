@@ -17,6 +17,7 @@ class Func;
 
 // Facts of one dimension as Exprs, and promises about it: set_min(0), set_stride(3). A call with a
 // buffer that breaks a promise fails.
+// Requires: a dimension is numbered from 0.
 class Dimension {
  public:
   Dimension(std::shared_ptr<ir::ParameterContents> parameter, int d);
@@ -24,7 +25,10 @@ class Dimension {
   Expr extent() const;
   Expr max() const { return min() + extent() - 1; }
   Expr stride() const;
+  // Requires: sizes and strides are integers; a promise has one value in each call: it is made of
+  // parameters and facts about buffers.
   Dimension& set_min(Expr min);
+  // Requires: an extent is not negative.
   Dimension& set_extent(Expr extent);
   Dimension& set_stride(Expr stride);
   Dimension& set_bounds(Expr min, Expr extent);
@@ -45,6 +49,7 @@ class Dimension {
 };
 
 // What inputs and outputs have in common. For outputs: Func::output_buffer().
+// Requires: it needs a type and dimensions.
 class OutputImageParam {
  public:
   OutputImageParam() = default;
@@ -52,9 +57,9 @@ class OutputImageParam {
       : parameter_(std::move(parameter)) {}
   bool defined() const { return parameter_ != nullptr; }
   const std::string& name() const { return checked().name; }
-  Type type() const { return checked().type; }
+  Type type() const { return checked().type; }  // of its elements
   int dimensions() const { return checked().dimensions; }
-  Dimension dim(int i) const;
+  Dimension dim(int i) const;  // facts and promises of one dimension
   Expr left() const { return dim(0).min(); }
   Expr right() const { return dim(0).max(); }
   Expr top() const { return dim(1).min(); }
@@ -62,12 +67,15 @@ class OutputImageParam {
   Expr width() const { return dim(0).extent(); }
   Expr height() const { return dim(1).extent(); }
   Expr channels() const { return dim(2).extent(); }
+  // Requires: there is one for each dimension.
   OutputImageParam& set_estimates(const Region& estimates);
   // A promise about the address of the buffer, in bytes: a power of two, at least the elements'
   // size.
+  // Requires: it is a power of two of at least the elements' bytes.
   OutputImageParam& set_host_alignment(int bytes);
   int host_alignment() const;
-  OutputImageParam& store_in(MemoryType memory);  // Unsupported but for memory of the CPU
+  // Requires: buffers of arguments are memory of the CPU (Unsupported).
+  OutputImageParam& store_in(MemoryType memory);
   operator Argument() const { return ir::argument_of(checked()); }
   const std::shared_ptr<ir::ParameterContents>& parameter() const { return parameter_; }
 
@@ -84,6 +92,7 @@ void check_image(const ParameterContents& parameter, const Buffer<>& buffer);
 class ImageParam : public OutputImageParam {
  public:
   ImageParam() = default;
+  // Requires: its elements are numbers; dimensions are not negative.
   ImageParam(Type type, int dimensions);
   ImageParam(Type type, int dimensions, const std::string& name);
   ImageParam(Type type, int dimensions, std::nullptr_t) = delete;
@@ -91,10 +100,12 @@ class ImageParam : public OutputImageParam {
   explicit ImageParam(std::shared_ptr<ir::ParameterContents> parameter)
       : OutputImageParam(std::move(parameter)) {}
 
-  // The buffer of the next calls. CompileError when type or dimensions differ.
+  // The buffer of the next calls.
+  // Requires: the buffer's elements are of the parameter's type; the buffer has as many dimensions
+  // as the parameter.
   void set(const Buffer<>& buffer);
   Buffer<> get() const;
-  void reset();
+  void reset();  // no buffer for the next calls
 
   template <typename... Args>
   requires((std::is_convertible_v<Args, Expr> && ...)) Expr operator()(Args&&... args) const {

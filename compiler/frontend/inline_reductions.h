@@ -19,6 +19,8 @@ template <typename E>
 concept ReducedValue = std::is_convertible_v<E, Expr> && !std::is_convertible_v<E, const RDom&>;
 }
 
+// Requires: the expression must be defined; it runs over one RDom; the expression must use a
+// reduction variable; the Func that is given must have no definition.
 #define RETROGRADE_INLINE_REDUCTION(Result, name)                                \
   Result name(Expr e, const std::string& func_name = #name);                     \
   Result name(const RDom& domain, Expr e, const std::string& func_name = #name); \

@@ -23,19 +23,23 @@ class LoopLevel {
   LoopLevel();  // undefined: to be set before the pipeline is compiled
   // `stage_index`: of which stage of f; -1: of any that has the loop.
   LoopLevel(const Func& f, const VarOrRVar& var, int stage_index = -1);
-  static LoopLevel inlined();
-  static LoopLevel root();
+  static LoopLevel inlined();  // in each use
+  static LoopLevel root();  // outside of all loops
 
-  // From now on this is the level `other`. CompileError when this is locked or `other` undefined.
+  // From now on this is the level `other`.
+  // Requires: a locked level does not change; a level is a loop, root or inlined.
   void set(const LoopLevel& other);
+  // Requires: a level is a loop, root or inlined.
   LoopLevel& lock();  // set() is an error from now on
 
-  bool defined() const { return contents_->defined; }
-  bool is_inlined() const { return level().kind == ir::LoopLevel::Kind::Inlined; }
+  bool defined() const { return contents_->defined; }  // whether it was set
+  bool is_inlined() const { return level().kind == ir::LoopLevel::Kind::Inlined; }  // in each use
+  // Outside of all loops.
   bool is_root() const { return level().kind == ir::LoopLevel::Kind::Root; }
-  std::string func() const;  // CompileError at root and inline
-  VarOrRVar var() const;
-  int stage_index() const;
+  // Requires: the level is a loop of a Func.
+  std::string func() const;  // whose loop it is
+  VarOrRVar var() const;  // which loop it is
+  int stage_index() const;  // of which stage; -1: of any
   std::string to_string() const;  // "f.x", "root", "inlined"
   bool operator==(const LoopLevel& other) const { return level() == other.level(); }
   bool operator!=(const LoopLevel& other) const { return !(*this == other); }

@@ -75,20 +75,24 @@ class Module {
  public:
   Module(const std::string& name, const Target& target);
 
-  const Target& target() const;
-  const std::string& name() const;
+  const Target& target() const;  // what its functions are made for
+  const std::string& name() const;  // the name given
   const std::vector<internal::LoweredFunc>& functions() const;
   std::vector<internal::LoweredFunc>& functions();
-  const std::vector<Module>& submodules() const;
+  const std::vector<Module>& submodules() const;  // modules that were appended to it
   bool any_strict_float() const;  // its target is strict about all floats
-  // CompileError when there is none.
+  // Requires: a module gives functions that were appended to it.
   internal::LoweredFunc get_function_by_name(const std::string& name) const;
 
-  // CompileError when a function or submodule of that name is there.
+  // Requires: functions of a module have different names; a module contains other modules.
   void append(const internal::LoweredFunc& function);
   void append(const Module& module);
 
-  // Writes the files. CompileError when one cannot be written: then none is left half-written.
+  // Writes the files; where one cannot be written, none is left half-written.
+  // Requires: an output file's folder must exist and be writable; a module is compiled to machine
+  // code, LLVM's formats, statements and headers (Unsupported); only generators have stubs and
+  // schedules (Unsupported); functions of a module and its submodules have different names; a
+  // module and its submodules are made for one target (Unsupported).
   void compile(const std::map<OutputFileType, std::string>& output_files) const;
   // The object file.
   Buffer<uint8_t> compile_to_buffer() const;
@@ -102,11 +106,13 @@ class Module {
   std::shared_ptr<Contents> contents_;
 };
 
-// One module with the functions of all. CompileError when targets differ or names collide.
+// One module with the functions of all.
+// Requires: there must be at least one; all must be made for one target.
 Module link_modules(const std::string& name, const std::vector<Module>& modules);
 
 // The runtime as an object file, a static library, or both; returns what was written.
-// Unsupported when this build has no runtime for the target.
+// Requires: a runtime is there for this machine and for those that a cross compiler was found for
+// when the compiler was built (Unsupported).
 void compile_standalone_runtime(const std::string& object_filename, const Target& target);
 std::map<OutputFileType, std::string> compile_standalone_runtime(
     const std::map<OutputFileType, std::string>& output_files, const Target& target);
@@ -117,6 +123,9 @@ using ModuleFactory = std::function<Module(const std::string& function_name, con
 // last; `function_name` picks the first that the machine can run. Files of types that are
 // OutputInfo::is_multi are written once for each target, with a suffix ("-" and the target, or what
 // `suffixes` says) before their extension; static libraries hold all of it.
+// Requires: there must be at least one target; there is one suffix for each target; all targets
+// have the same architecture, width and operating system; the function is called in the same way
+// for all targets.
 void compile_multitarget(const std::string& function_name,
                          const std::map<OutputFileType, std::string>& output_files,
                          const std::vector<Target>& targets,

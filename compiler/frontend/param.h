@@ -66,6 +66,7 @@ class Param {
   static constexpr bool has_static_type = !std::is_void_v<T>;
   static Type static_type() { return type_of<T>(); }
 
+  // Requires: its type is a scalar.
   Param() requires has_static_type : parameter_(ir::make_scalar_parameter(type_of<T>(), "")) {}
   explicit Param(const std::string& name) requires has_static_type
       : parameter_(ir::make_scalar_parameter(type_of<T>(), name)) {}
@@ -89,6 +90,7 @@ class Param {
     set(value);
     set_range(min, max);
   }
+  // Requires: the types must agree.
   template <typename Other>
   Param(const Param<Other>& other) : parameter_(other.parameter_) {
     check_type(other.type());
@@ -97,17 +99,20 @@ class Param {
   Param& operator=(const Param&) = default;
 
   const std::string& name() const { return parameter_->name; }
-  Type type() const { return parameter_->type; }
+  Type type() const { return parameter_->type; }  // of its values
+  // Requires: a value must have been set; the types must agree.
   template <typename V = Value>
   V get() const {
     return ir::from_scalar<V>(ir::get_scalar(*parameter_, type_of<V>()));
   }
-  // CompileError when the parameter's type cannot hold the value.
+  // Requires: the value must fit the parameter's type.
   template <typename V>
   void set(const V& value) {
     ir::set_scalar(*parameter_, ir::to_scalar(value));
   }
   // Limits that every call is checked against, and that the compiler relies on.
+  // Requires: limits are numbers; a limit is a value of the parameter's type; a limit has one value
+  // in each call: it is made of parameters and facts about buffers.
   void set_range(const Expr& min, const Expr& max) {
     set_min_value(min);
     set_max_value(max);
@@ -118,8 +123,8 @@ class Param {
   void set_max_value(const Expr& max) {
     ir::set_limit(*parameter_, &ir::ParameterContents::max_value, max);
   }
-  Expr min_value() const { return parameter_->min_value; }
-  Expr max_value() const { return parameter_->max_value; }
+  Expr min_value() const { return parameter_->min_value; }  // undefined: no limit
+  Expr max_value() const { return parameter_->max_value; }  // undefined: no limit
   template <typename V>
   void set_estimate(const V& value) {
     ir::set_limit(*parameter_, &ir::ParameterContents::estimate, Expr(value));

@@ -17,16 +17,19 @@ class Parameter {
   Parameter(std::shared_ptr<ir::ParameterContents> contents) : contents_(std::move(contents)) {}
   Parameter(const Type& type, bool is_buffer, int dimensions)
       : Parameter(type, is_buffer, dimensions, "") {}
+  // Requires: a scalar has no dimensions.
   Parameter(const Type& type, bool is_buffer, int dimensions, const std::string& name);
 
   bool defined() const { return contents_ != nullptr; }
   bool same_as(const Parameter& other) const { return contents_ == other.contents_; }
+  // Requires: it stands for a Param or an ImageParam.
   const std::string& name() const { return checked("take the name of").name; }
-  Type type() const { return checked("take the type of").type; }
+  Type type() const { return checked("take the type of").type; }  // of a scalar, or of elements
   bool is_buffer() const { return checked("look at").is_buffer; }
   int dimensions() const { return checked("take the dimensions of").dimensions; }
 
-  // Of scalars; CompileError for a buffer, and for another type than the value's.
+  // Of scalars, as a value of their type.
+  // Requires: this is for scalars.
   template <typename T>
   T scalar() const {
     return ir::from_scalar<T>(ir::get_scalar(checked_scalar("take the value of"), type_of<T>()));
@@ -43,7 +46,8 @@ class Parameter {
   Expr max_value() const { return checked_scalar("take the largest value of").max_value; }
   Expr estimate() const { return checked_scalar("take the estimate of").estimate; }
 
-  // Of buffers; CompileError for a scalar.
+  // Of buffers.
+  // Requires: this is for buffers.
   Buffer<> buffer() const { return image("take the buffer of").get(); }
   void set_buffer(const Buffer<>& buffer) { image("set the buffer of").set(buffer); }
   void set_min_constraint(int d, const Expr& e) { image("constrain").dim(d).set_min(e); }

@@ -21,6 +21,7 @@ class Func;
 
 struct JITExtern;
 
+// Requires: it needs outputs.
 class Pipeline {
  public:
   // Buffers to compute into: one, several in braces, a Realization, or one of the runtime.
@@ -51,22 +52,35 @@ class Pipeline {
 
   Pipeline() = default;
   Pipeline(const Func& output);
+  // Requires: a Pipeline has at least one output; an output needs a definition; its outputs are
+  // different Funcs; Funcs may not depend on each other in a circle; every Func that is used needs
+  // a definition; parameters of one pipeline have different names.
   Pipeline(const std::vector<Func>& outputs);
 
-  bool defined() const { return contents_ != nullptr; }
-  std::vector<Func> outputs() const;
+  bool defined() const { return contents_ != nullptr; }  // whether it has outputs
+  std::vector<Func> outputs() const;  // in the order given
+  // Requires: Funcs are numbered from 0.
   Func get_func(size_t index) const;  // of all Funcs, producers first
 
   // Computes all outputs over [0, size) in each dimension, into new buffers. Parameters have their
   // values from the map before those that were set.
+  // Requires: it takes one size for each dimension (RuntimeError); sizes are not negative
+  // (RuntimeError); custom_malloc and custom_free come together.
   Realization realize(const std::vector<int32_t>& sizes = {}, const Target& target = Target(),
                       const ParamMap& map = ParamMap::empty_map());
   Realization realize(std::initializer_list<int32_t> sizes, const Target& target = Target(),
                       const ParamMap& map = ParamMap::empty_map()) {
     return realize(std::vector<int32_t>(sizes), target, map);
   }
-  // Computes all outputs over the given buffers. RuntimeError when a buffer or parameter does not
-  // fit.
+  // Computes all outputs over the given buffers.
+  // Requires: the buffers of one Func cover one region (RuntimeError); it takes one buffer for each
+  // value of each output (RuntimeError); the Param must keep its limits (RuntimeError); the Param
+  // needs a value (RuntimeError); the ImageParam needs a buffer (RuntimeError); a buffer must not
+  // be null (RuntimeError); it must have the right element type (RuntimeError); it must have the
+  // right number of dimensions (RuntimeError); it must not have negative extents (RuntimeError); it
+  // must have memory (RuntimeError); the compiled code must succeed (RuntimeError); the JIT runs
+  // code on this machine (Unsupported); a C function that it calls must be in this process, or
+  // among its JIT externs.
   void realize(RealizationArg outputs, const Target& target = Target(),
                const ParamMap& map = ParamMap::empty_map());
   // The same; the handlers of `context` go before those of jit_handlers().
@@ -76,6 +90,8 @@ class Pipeline {
                const ParamMap& map = ParamMap::empty_map());
   // Gives every ImageParam without a buffer one of exactly the region that the outputs need; those
   // of the map, whose Buffers it makes, keep their own.
+  // Requires: the regions of the inputs must settle (RuntimeError); the region that a pipeline
+  // reads of its input must be bounded.
   void infer_input_bounds(const std::vector<int32_t>& sizes, const Target& target = Target(),
                           const ParamMap& map = ParamMap::empty_map());
   void infer_input_bounds(RealizationArg outputs, const Target& target = Target(),
@@ -87,18 +103,22 @@ class Pipeline {
                           const Target& target = Target(),
                           const ParamMap& map = ParamMap::empty_map());
   // Compiles now what realize would compile on its first call.
+  // Requires: this program must be linked with the compiler (Unsupported).
   void compile_jit(const Target& target = Target());
   // A function of `args`, in their order, then the output buffers; see callable.h.
+  // Requires: its arguments are all that the outputs need.
   Callable compile_to_callable(const std::vector<Argument>& args,
                                const Target& target = get_jit_target_from_environment());
-  void invalidate_cache();
+  void invalidate_cache();  // forgets what was compiled
   // Tells the trace handler when a call begins and when it ends.
   void trace_pipeline();
+  // Its loops as text, after scheduling.
   std::string loop_nest(const Target& target = Target()) const;
   void print_loop_nest() const;  // to the standard error stream
-  std::vector<Argument> infer_arguments() const;
-  JITHandlers& jit_handlers();
+  std::vector<Argument> infer_arguments() const;  // Params and ImageParams that it uses
+  JITHandlers& jit_handlers();  // what its compiled code calls back
   void set_error_handler(void (*handler)(void*, const char*));
+  // Requires: allocation and release come together.
   void set_custom_allocator(void* (*malloc)(void*, size_t), void (*free)(void*, void*));
   void set_custom_do_task(int (*handler)(void*, int (*)(void*, int, uint8_t*), int, uint8_t*));
   void set_custom_do_par_for(int (*handler)(void*, int (*)(void*, int, uint8_t*), int, int,
@@ -106,12 +126,16 @@ class Pipeline {
   void set_custom_trace(int (*handler)(void*, const halide_trace_event_t*));
   void set_custom_print(void (*handler)(void*, const char*));
   // What the C functions that the pipeline calls by name are; others are looked up in the process.
+  // Requires: what a pipeline calls by name is a C function (Unsupported).
   void set_jit_externs(const std::map<std::string, JITExtern>& externs);
   const std::map<std::string, JITExtern>& get_jit_externs();
 
   // ---- ahead of time ----
-  // What the function takes is `args`, in their order, then the output buffers. CompileError when
-  // the outputs need a Param or ImageParam that is not among them.
+  // What the function takes is `args`, in their order, then the output buffers.
+  // Requires: a function's name is an identifier of C; C functions have no namespace; the list of
+  // arguments holds inputs, and outputs follow by themselves; every argument is listed once; an
+  // argument is what the pipeline uses under its name; the list of arguments holds every Param and
+  // ImageParam that it uses; a Buffer that is no argument is embedded with its data.
   Module compile_to_module(const std::vector<Argument>& args, const std::string& function_name,
                            const Target& target = get_target_from_environment(),
                            LinkageType linkage = LinkageType::ExternalPlusMetadata);
@@ -161,6 +185,8 @@ class Pipeline {
   // Calls fail with the message, whose parts may be Exprs, unless the condition holds. It may use
   // Params and sizes of images, but no Func and no Var; it holds for every pipeline that has the
   // first output among its outputs.
+  // Requires: a requirement is checked once, before anything is computed; a requirement is a
+  // condition of type bool; every part of its message is a defined expression.
   void add_requirement(const Expr& condition, const std::vector<Expr>& message);
   template <typename... Parts>
   requires((std::is_convertible_v<Parts, Expr> && ...)) void add_requirement(const Expr& condition,

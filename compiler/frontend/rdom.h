@@ -16,7 +16,7 @@
 
 namespace retrograde {
 
-using Region = std::vector<Range>;
+using Region = std::vector<Range>;  // min and extent of each dimension
 
 class OutputImageParam;
 template <typename T, int Dims>
@@ -34,8 +34,9 @@ class RVar {
   RVar(std::shared_ptr<ir::ReductionDomainContents> domain, int index);
 
   const std::string& name() const { return name_; }
-  Expr min() const;
-  Expr extent() const;
+  // Requires: only a variable of an RDom has a range.
+  Expr min() const;  // where its range begins
+  Expr extent() const;  // how many values it takes
   operator Expr() const;
   const std::shared_ptr<ir::ReductionDomainContents>& domain() const { return domain_; }
 
@@ -49,6 +50,9 @@ class RVar {
 class RDom {
  public:
   RDom() = default;
+  // Requires: a reduction domain has at least one variable; its min must be a defined expression;
+  // its extent must be an integer; its bounds must be known before any loop starts; an extent is
+  // not negative.
   RDom(const Region& region, const std::string& name = "");
   RDom(const Region& region, std::nullptr_t) = delete;
   RDom(std::initializer_list<Range> region) : RDom(Region(region)) {}
@@ -67,13 +71,18 @@ class RDom {
     name_variables();
   }
 
-  bool defined() const { return domain_ != nullptr; }
+  bool defined() const { return domain_ != nullptr; }  // whether it was given a domain
+  // One domain, two handles.
   bool same_as(const RDom& other) const { return domain_ == other.domain_; }
-  int dimensions() const;
-  RVar operator[](int i) const;
+  int dimensions() const;  // how many variables it has
+  // Requires: variables are numbered from 0.
+  RVar operator[](int i) const;  // one of its variables, the innermost first
+  // Requires: only a domain of one variable stands for that variable.
   operator RVar() const;  // of a domain of one variable
   operator Expr() const;
   // Keeps only the points where the predicate holds. Before the domain's first use in a definition.
+  // Requires: the RDom was given a domain; the predicate must be a defined expression; a
+  // predicate is of type bool; a predicate is given before the domain's first use in a definition.
   void where(Expr predicate);
   const std::shared_ptr<ir::ReductionDomainContents>& domain() const { return domain_; }
 

@@ -10,6 +10,7 @@ namespace retrograde {
 
 class Realization {
  public:
+  // Requires: it holds at least one Buffer; its Buffers must be defined.
   explicit Realization(std::vector<Buffer<>> buffers);
   Realization(std::initializer_list<Buffer<>> buffers)
       : Realization(std::vector<Buffer<>>(buffers)) {}
@@ -18,10 +19,12 @@ class Realization {
       Realization(Buffer<T, Dims>& first, Rest&&... rest)
       : Realization(std::vector<Buffer<>>{first, Buffer<>(std::forward<Rest>(rest))...}) {}
 
-  size_t size() const { return buffers_.size(); }
+  size_t size() const { return buffers_.size(); }  // how many Buffers
+  // Requires: its Buffers are numbered from 0.
   const Buffer<>& operator[](size_t i) const { return buffers_[checked(i)]; }
   Buffer<>& operator[](size_t i) { return buffers_[checked(i)]; }
   // Of a Func with one value.
+  // Requires: it must hold exactly one.
   template <typename T, int Dims>
   operator Buffer<T, Dims>() const {
     check_one_value();

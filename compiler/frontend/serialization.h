@@ -16,6 +16,7 @@ namespace ir {
 [[noreturn]] void refuse_serialization(const char* asked);
 }
 
+// Requires: pipelines live in the process that defines them (Unsupported).
 template <typename... Args>
 void serialize_pipeline(const Pipeline&, Args&&...) {
   ir::refuse_serialization("serialize a Pipeline");

@@ -20,6 +20,9 @@ namespace retrograde {
 
 class Func;
 
+// Requires: a name must be a loop of this stage; the loops of a stage have different names; only
+// what is computed somewhere has loops; a size has one value in each call: it is made of parameters
+// and facts about buffers.
 class Stage {
  public:
   // `specialization`: which of the stage's schedules; see StageSchedule::specializations. Empty:
@@ -43,6 +46,9 @@ class Stage {
   //                               body(xo * f + xi)
   // What happens when f does not divide n is the tail strategy's: see TailStrategy. ShiftInwards is
   // for first definitions; a loop over a reduction variable takes GuardWithIf or Predicate.
+  // Requires: the factor must be a defined expression; a factor is an integer; a factor is at least
+  // 1; a factor fits an int32; the two new loops have different names; a loop over a reduction
+  // variable runs exactly over its domain; an update definition does not run a point twice.
   Stage& split(const VarOrRVar& old, const VarOrRVar& outer, const VarOrRVar& inner,
                const Expr& factor, TailStrategy tail = TailStrategy::Auto);
   //   for y in [0, m):           for t in [0, n * m):
@@ -50,6 +56,7 @@ class Stage {
   //       body(x, y)
   // Two reduction variables, or two pure ones; a pure one with a reduction variable gives a loop
   // that counts as a reduction loop.
+  // Requires: it takes two loops.
   Stage& fuse(const VarOrRVar& inner, const VarOrRVar& outer, const VarOrRVar& fused);
   //   for x:          for t:
   //     body(x)   =>    body(t)
@@ -59,6 +66,8 @@ class Stage {
   //     for x:     =>     for y:
   //       body(x, y)        body(x, y)
   // Reduction loops change places among each other only where that is known to change no result.
+  // Requires: each loop is named once; the order of reduction loops may change only where it
+  // changes no result.
   Stage& reorder(const std::vector<VarOrRVar>& vars);
   template <typename... Rest>
   requires((std::is_convertible_v<Rest, VarOrRVar> &&
@@ -76,6 +85,7 @@ class Stage {
               TailStrategy tail = TailStrategy::Auto);
   Stage& tile(const VarOrRVar& x, const VarOrRVar& y, const VarOrRVar& xi, const VarOrRVar& yi,
               const Expr& xfactor, const Expr& yfactor, TailStrategy tail = TailStrategy::Auto);
+  // Requires: all lists have one length.
   Stage& tile(const std::vector<VarOrRVar>& previous, const std::vector<VarOrRVar>& outers,
               const std::vector<VarOrRVar>& inners, const std::vector<Expr>& factors,
               const std::vector<TailStrategy>& tails);
@@ -92,14 +102,19 @@ class Stage {
   //     body(y)   =>    body(y)
   // A loop over a reduction variable only where its iterations are independent, the update is
   // atomic(), or race conditions are allowed.
+  // Requires: iterations that run at the same time must not touch the same element; a parallel loop
+  // is not inside of a vectorized one.
   Stage& parallel(const VarOrRVar& var);
   //   for x in [0, 4):      body(ramp(0, 1, 4))
   //     body(x)         =>
   // Of a loop of constant extent; the same rule for reduction variables.
+  // Requires: iterations that run at the same time must not touch the same element; the extent of a
+  // vectorized loop must be a constant; vectors have at most 4096 lanes.
   Stage& vectorize(const VarOrRVar& var);
   //   for x in [0, 2):      body(0)
   //     body(x)         =>  body(1)
   // Of a loop of constant extent.
+  // Requires: the extent of an unrolled loop must be a constant, or have a constant above it.
   Stage& unroll(const VarOrRVar& var);
   // The same after a split; the outer loop keeps the name of `var`, except that a parallel loop is
   // the outer one.
@@ -145,6 +160,9 @@ class Stage {
   // The update must be proven associative and commutative when such a loop is asked for; of floats,
   // and of ties in argmin and its like, in exact arithmetic only: results may then depend on the
   // order of threads. `override_associativity_test`: the caller vouches for it.
+  // Requires: an atomic update is associative and commutative; an atomic update reads no element of
+  // its Func but the one that it writes; the values of a Tuple are updated under a lock, which must
+  // not be left (Unsupported).
   Stage& atomic(bool override_associativity_test = false);
   // Loops over reduction variables may run in parallel or as vectors although their iterations
   // touch the same elements: results may then be any of those that races give.
@@ -159,10 +177,15 @@ class Stage {
   //       f(x) += g(x, r.x, r.y)         for r.y: f(x) += f_intm(x, r.y)
   // The variables may come from splits, and are pure loops of the new Func: parallel or vectorized
   // at will. Splits, order and kinds of loops go to whichever of the two has the loop; a
-  // specialized stage can't be cut. CompileError when the update is not proven to be
+  // specialized stage can't be cut. The update must be proven to be
   // f(x) = op(f(x), e) with an associative op that has an identity; and commutative, unless
   // the variables are the outermost reduction loops. Where op is min or max with payload (argmin),
   // any of several equal extremes may win.
+  // Requires: only an update that reduces is factored; only reduction loops are factored; each loop
+  // is named once; the new variables differ from each other and from the Func's; partial results
+  // can be combined only of an associative update; partial results over inner loops change the
+  // order of the reduction; a specialized stage keeps its definition; a stage in the loops of
+  // another one keeps its own; reduction variables are fused with each other only.
   Func rfactor(const std::vector<std::pair<RVar, Var>>& preserved);
   Func rfactor(const RVar& r, const Var& v);
 
@@ -176,6 +199,17 @@ class Stage {
   // common loop covers both, shifted as `align` says, and each runs only within its own:
   // AlignStart lets the ranges begin together, AlignEnd end together, NoAlign and Auto shift
   // nothing. The stage that joins has no specializations.
+  // Requires: a stage joins the loops of another one down to a loop; the stages belong to different
+  // Funcs; the stage has loops; a stage that joins the loops of another one has no specializations;
+  // the loop level is set before the pipeline is compiled; both stages belong to the pipeline and
+  // are computed somewhere; both stages have loops; both stages are computed at one place; both
+  // stages are computed at the same place; compute_with names one stage; the level is a loop of
+  // both stages; both stages have the same loops down to the level; loops that run as one are of
+  // one kind; loops that run as one are partitioned alike; what is prefetched in shared loops is
+  // prefetched by the stage whose loops they are; one of the stages that share loops is the first;
+  // Funcs that share loops do not depend on each other; the stages of a Func run one after another,
+  // also where others run with them; what is computed together is computed after all that any of it
+  // reads; Funcs that share loops are computed whenever any of them is needed (Unsupported).
   Stage& compute_with(const LoopLevel& level,
                       const std::vector<std::pair<VarOrRVar, LoopAlignStrategy>>& align);
   Stage& compute_with(const LoopLevel& level, LoopAlignStrategy align = LoopAlignStrategy::Auto);
@@ -190,9 +224,14 @@ class Stage {
   //   for x:          if n > 64: for x: for x' in [0, 8): body   (vectorized)
   //     body(x)   =>  else:      for x: body(x)
   // Conditions are tried in the order given; the same condition gives the same stage again.
+  // Requires: the condition is a defined expression; the condition is of type bool; the condition
+  // has one value in each call: it is made of parameters and facts about buffers; specialize_fail
+  // is the last of a stage's specializations; a stage that joins the loops of another one has no
+  // specializations.
   Stage specialize(const Expr& condition);
   // When none of the conditions holds, the call fails with this message instead of running the
   // general schedule.
+  // Requires: the message says something; specialize_fail is the last of a stage's specializations.
   void specialize_fail(const std::string& message);
 
   // Fetches into the cache what iteration `from + offset` reads of an image or Func, at every
@@ -200,6 +239,8 @@ class Stage {
   //   for x:                for x:
   //     g(x) = 2 * f(x)  =>   prefetch(f[x + 2])
   //                           g(x) = 2 * f(x)
+  // Requires: it needs a definition first; it is a Func or an image that is prefetched; the loop it
+  // happens at is the one it counts from, or inside of it; the offset is an integer.
   Stage& prefetch(const Func& f, const VarOrRVar& at, const VarOrRVar& from, Expr offset = 1,
                   PrefetchBoundStrategy strategy = PrefetchBoundStrategy::GuardWithIf);
   Stage& prefetch(const std::shared_ptr<ir::ParameterContents>& image, const VarOrRVar& at,
@@ -219,6 +260,7 @@ class Stage {
   }
 
   // ---- GPUs and accelerators: Unsupported ----
+  // Requires: loops run on the CPU (Unsupported).
   Stage& gpu_threads(const VarOrRVar& x, DeviceAPI device = DeviceAPI::Default_GPU);
   Stage& gpu_threads(const VarOrRVar& x, const VarOrRVar& y,
                      DeviceAPI device = DeviceAPI::Default_GPU);

@@ -24,13 +24,14 @@ std::string name_from(const char* text, const char* of);
 class Var {
  public:
   Var();  // a fresh name
+  // Requires: the name of a Var is an identifier: letters, digits, _ and $; a name is text.
   Var(const std::string& name);
   template <ir::TextPointer T>
   Var(const T& name) : Var(ir::name_from(name, "a Var")) {}
   explicit Var(std::nullptr_t) = delete;  // and of a literal 0
 
-  const std::string& name() const { return name_; }
-  bool same_as(const Var& other) const { return name_ == other.name_; }
+  const std::string& name() const { return name_; }  // all that a Var is
+  bool same_as(const Var& other) const { return name_ == other.name_; }  // whether the names agree
 
   // _0, _1 ...: what the placeholder _ stands for, dimension by dimension.
   static Var implicit(int n);

@@ -25,9 +25,14 @@ struct CommandLine {
   int timeout_seconds = 900;  // 0: none
 };
 
-// CompileError for what cannot be read, and where something that must be said is missing.
+// Reads it all before anything is generated.
+// Requires: its arguments are flags of one letter and param=value; every flag has a value; -g names
+// the generator, or -r a runtime; -o names the folder of its files; target= names what to compile
+// for; the types of -e are names of OutputFileType; -d takes 1, the gradient, or 0; -t takes a
+// number of seconds, 0 for no limit.
 CommandLine read_command_line(int argc, const char* const* argv);
 // Writes the files.
+// Requires: one runtime serves all targets.
 void run(const CommandLine& command);
 std::string usage();
 

@@ -42,7 +42,8 @@ class AutoScheduleParam : public GeneratorParamBase {
   void set(bool on) { set_from_string(on ? "true" : "false"); }
   void set(const std::string& text) { set_from_string(text); }
   void set(const char* text) { set_from_string(text); }
-  // CompileError when there is no such scheduler.
+  // Requires: the default scheduler is named first; an autoscheduler is loaded from a plugin before
+  // it is used.
   void set_from_string(const std::string& text) override;
   std::string to_string() const override { return value() ? scheduler_ : "false"; }
   InCpp in_cpp() const override { return {}; }
@@ -72,7 +73,10 @@ class GeneratorBase : public NamesInterface {
   }
 
   // By name: GeneratorParams, and what declarations leave open: in.type=float32, in.dim=2,
-  // in.size=3. CompileError for a name that the generator does not have, and for a bad value.
+  // in.size=3.
+  // Requires: only what the generator declares can be set; types are names such as float32; numbers
+  // of dimensions and of elements are whole and at least 0; a value is set before generate() reads
+  // it.
   void set_generator_param_values(const GeneratorParamsMap& values);
   // Writes a header with a class that runs this generator inside another one: see cpp_stub.h.
   void emit_cpp_stub(const std::string& path) const;
@@ -80,6 +84,7 @@ class GeneratorBase : public NamesInterface {
   void set_stub_name(const std::string& name) { stub_name_ = name; }
 
   // Values for all inputs, in their order; a std::vector for an array.
+  // Requires: all are given, in their order; the value fits the input's type.
   template <typename... Args>
   void set_inputs(const Args&... args) {
     check_input_count(sizeof...(args));
@@ -89,13 +94,17 @@ class GeneratorBase : public NamesInterface {
 
   bool is_generated() const { return phase_ >= Phase::Generated; }
   // Runs what has not run yet of configure(), generate() and schedule().
+  // Requires: names are letters, digits and underscores, a letter first; its params, inputs and
+  // outputs have different names; it declares at least one Output.
   void generate_all();
   void schedule_all();
   // All outputs together; after generate().
+  // Requires: the Pipeline is made of what generate() defines.
   Pipeline get_pipeline();
   // Every call tells when it begins and ends; may be said before generate() has run.
   void trace_pipeline();
-  // Of one output; CompileError when there is none of the name. After generate().
+  // Of one output. After generate().
+  // Requires: an output has the name that the generator declares.
   std::vector<Func> output_funcs(const std::string& name) const;
   template <typename... Args>
   decltype(auto) realize(Args&&... args) {
@@ -108,6 +117,7 @@ class GeneratorBase : public NamesInterface {
   }
 
   // The function takes the inputs, then the outputs. Its name defaults to the generator's.
+  // Requires: its inputs are those of the compiled function.
   Module build_module(const std::string& function_name = "",
                       LinkageType linkage = LinkageType::ExternalPlusMetadata);
   // The same in this process: see Pipeline::compile_to_callable.
@@ -117,9 +127,11 @@ class GeneratorBase : public NamesInterface {
   // _grad_loss_<output>_wrt_<input>, all of the shape of what they belong to. schedule() is not
   // called: it speaks of another pipeline. Funcs that generate() has not scheduled get the default
   // schedule of gradients.
+  // Requires: gradients are of outputs with one value; gradients are of floating-point outputs.
   Module build_gradient_module(const std::string& function_name = "");
 
   // ---- in configure() ----
+  // Requires: inputs and outputs are added in configure().
   template <typename T, typename... Args>
   GeneratorInput<T>* add_input(const std::string& name, const Args&... args) {
     check_configuring("input", name);

@@ -39,7 +39,8 @@ class GeneratorInputBase : public GIOBase {
   // Makes parameters of the compiled function. CompileError when types, dimensions or array size
   // are still open.
   void make_parameters();
-  // Values from C++; CompileError when they do not fit the declaration.
+  // Values from C++.
+  // Requires: the value is what the input declares.
   void set_values(std::vector<InputValue> values);
 
  protected:
@@ -144,6 +145,8 @@ class GeneratorInput : public internal::InputElements<T>,
   Handle& handle() { return *this; }
 
   // Guesses of its size, for schedulers. `var` is one of _0, _1, ..., or an argument of the Func.
+  // Requires: inputs have values in generate() and schedule(); a dimension goes by the name of the
+  // input's argument.
   GeneratorInput& set_estimate(const Var& var, const Expr& min, const Expr& extent) {
     Base::check_ready();
     GeneratorInputBase::set_estimate_of(var, min, extent);

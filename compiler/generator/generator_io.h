@@ -52,7 +52,9 @@ class GIOBase {
   IOKind kind() const { return kind_; }
   bool is_array() const { return is_array_; }
 
-  // CompileError where it is not known yet.
+  // What is open until configure() or the caller has said it.
+  // Requires: it is known once it is declared, set or given; they are known once they are declared,
+  // set or given; it has one value.
   bool types_defined() const { return !types_.empty(); }
   const std::vector<Type>& types() const;
   Type type() const;
@@ -61,7 +63,9 @@ class GIOBase {
   bool array_size_defined() const { return array_size_ != any_size; }
   size_t array_size() const;
 
-  // In configure() only, for what the declaration leaves open; CompileError otherwise.
+  // In configure() only, for what the declaration leaves open.
+  // Requires: configure() is the place for that; its type is declared once; its dimensions are
+  // declared once; its size is said once, and not negative.
   void set_type(const Type& type) { set_types({type}); }
   void set_types(const std::vector<Type>& types);
   void set_dimensions(int dims);

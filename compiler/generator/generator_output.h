@@ -24,7 +24,8 @@ class GeneratorOutputBase : public GIOBase {
   virtual std::vector<Func> funcs() const = 0;
   // Makes Funcs without definitions, for generate() to define.
   virtual void make_funcs() = 0;
-  // CompileError unless every Func is defined with the declared types and dimensions.
+  // Every Func has the declared types and dimensions.
+  // Requires: generate() defines every output.
   void check_defined();
 
  protected:
@@ -71,6 +72,7 @@ class GeneratorOutput : public internal::OutputElements<T>, public Func {
   Func& handle() { return *this; }
 
   // This Func becomes the output.
+  // Requires: the Func has a definition.
   GeneratorOutput& operator=(const Func& f) {
     Base::check_assignable(f);
     static_cast<Func&>(*this) = f;
@@ -124,6 +126,7 @@ class GeneratorOutput<T> : public internal::OutputElements<T> {
     Base::agree_on_size(size);
     make_funcs();
   }
+  // Requires: elements are counted from 0 to below the array's size.
   Func& operator[](size_t i) {
     Base::check_index(i);
     return funcs_[i];

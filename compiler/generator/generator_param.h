@@ -32,7 +32,7 @@ class GeneratorParamBase {
 
   const std::string& name() const { return name_; }
   virtual void set_from_string(const std::string& text) = 0;
-  // CompileError unless it is a param of that type.
+  // Requires: a param takes values of its type.
   virtual void set_from_loop_level(const LoopLevel& level);
   // What set_from_string reads back.
   virtual std::string to_string() const = 0;

@@ -23,7 +23,9 @@ class GeneratorRegistry {
                                const std::string& stub_name = "");
   static void unregister_factory(const std::string& name);
   static std::vector<std::string> enumerate();
-  // CompileError when there is none of that name; it lists those that are there.
+  // By its name; the error where there is none lists those that are there.
+  // Requires: a generator is created by the name that it is registered under; a name is registered
+  // once.
   static std::unique_ptr<GeneratorBase> create(const std::string& name,
                                                const GeneratorContext& context);
 };

@@ -56,6 +56,7 @@ Expr call_extern(const std::string& name, Type type, std::vector<Expr> args);
 Expr call_func(const std::string& name, Type type, std::vector<Expr> args, int value_index,
                SymbolRef symbol);
 Expr call_image(const std::string& name, Type type, std::vector<Expr> args, SymbolRef symbol);
+// Requires: every operand must be a defined expression.
 Expr likely(Expr e);
 Expr conjunction(const std::vector<Expr>& terms);  // true when empty
 
@@ -107,6 +108,8 @@ Expr constant_for(const Expr& other, T value, const char* what) {
 }
 }  // namespace ir
 
+// Requires: both operands must be defined; operands must be numbers; both operands must have a
+// common type; a constant takes the type of the other operand and must fit it.
 #define RETROGRADE_DECLARE_OPERATOR(name)           \
   Expr name(Expr a, Expr b);                        \
   template <IntegerConstant T>                      \
@@ -133,6 +136,7 @@ RETROGRADE_DECLARE_OPERATOR(operator!=)
 RETROGRADE_DECLARE_OPERATOR(min)
 RETROGRADE_DECLARE_OPERATOR(max)
 #undef RETROGRADE_DECLARE_OPERATOR
+// Requires: operands must be bool.
 Expr operator&&(Expr a, Expr b);
 Expr operator||(Expr a, Expr b);
 Expr operator!(Expr a);
@@ -141,8 +145,11 @@ Expr& operator+=(Expr& a, Expr b);
 Expr& operator-=(Expr& a, Expr b);
 Expr& operator*=(Expr& a, Expr b);
 Expr& operator/=(Expr& a, Expr b);
-Expr cast(Type type, Expr value);                                // UserError for handles
+// Requires: both operands must be defined; the new type must be a number; integers have 1, 8, 16,
+// 32 or 64 bits, floats 16, 32 or 64.
+Expr cast(Type type, Expr value);
 Expr select(Expr condition, Expr true_value, Expr false_value);  // promotes the arms
+// Requires: both operands must be defined; a bound is a value of the type that is clamped.
 Expr clamp(Expr value, Expr low, Expr high);                     // low and high take value's type
 
 }  // namespace retrograde

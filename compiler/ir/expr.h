@@ -118,6 +118,7 @@ class Expr : public ir::Ref<ir::ExprNode> {
   Expr(long long value) : Expr(static_cast<int64_t>(value)) {}
   Expr(unsigned long long value) : Expr(static_cast<uint64_t>(value)) {}
   Expr(const std::string& text);
+  // Requires: a text is not null.
   Expr(const char* text);
   Type type() const { return get()->type; }
 };

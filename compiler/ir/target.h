@@ -83,14 +83,16 @@ struct Target {
 
   Target() = default;
   Target(OS os, Arch arch, int bits, const std::vector<Feature>& features = {});
-  // "host", "x86-64-linux-avx2-fma", "arm-64-linux", "host-no_asserts"; "" is the host. UserError
-  // on anything else.
+  // "host", "x86-64-linux-avx2-fma", "arm-64-linux", "host-no_asserts"; "" is the host.
+  // Requires: a target is arch-bits-os or host, then features, joined by dashes; a target is a text
+  // such as "host".
   explicit Target(const std::string& text);
   explicit Target(const char* text);  // UserError when it is null
   explicit Target(std::nullptr_t) = delete;
   static bool validate_target_string(const std::string& text);
 
   // Every target has FeatureEnd.
+  // Requires: a feature is one of Target::Feature.
   bool has_feature(Feature feature) const {
     return feature == FeatureEnd || features_.test(checked(feature));
   }
@@ -157,7 +159,8 @@ struct Target {
 
 Target get_host_target();              // this machine, by cpuid
 Target get_target_from_environment();  // RG_TARGET or HL_TARGET, else host
-// RG_JIT_TARGET or HL_JIT_TARGET, else host, plus JIT. UserError when this machine cannot run it.
+// RG_JIT_TARGET or HL_JIT_TARGET, else host, plus JIT.
+// Requires: the target of HL_JIT_TARGET is one that this machine can run.
 Target get_jit_target_from_environment();
 Target::Feature target_feature_for_device_api(DeviceAPI device);  // FeatureEnd: no single one
 // What DeviceAPI::Default_GPU means for the target; Host where it has no GPU.

@@ -162,6 +162,7 @@ class Type {
   bool is_min(uint64_t value) const;
 
   // The largest and smallest value as expressions; infinities for floats.
+  // Requires: only numbers have one.
   Expr max() const;
   Expr min() const;
 

@@ -170,6 +170,7 @@ TEST_F(AotErrors, TargetsWithoutACodeGenerator) {
   EXPECT_TRUE(is_empty());
 }
 
+// rule: a runtime is there for this machine
 TEST_F(AotErrors, RuntimeForAMachineThatThereIsNoneFor) {
   expect_error<Unsupported>(
       [&] { compile_standalone_runtime(path("a.o"), Target("mips-32-linux")); },

@@ -164,6 +164,7 @@ TEST_F(ComputeWithErrors, AProducerAtALoopOfTheGuest) {
   expect_refused({"run in the loops of \"f"});
 }
 
+// rule: what is prefetched in shared loops is prefetched by the stage
 TEST_F(ComputeWithErrors, PrefetchedInSharedLoops) {
   Func p("p"), h("h");
   p(x, y) = x - y;
@@ -180,6 +181,7 @@ TEST_F(ComputeWithErrors, MemoizedOrAsynchronous) {
   expect_refused<Unsupported>({"is memoized", "Drop memoize"});
 }
 
+// rule: Funcs that share loops are computed whenever any of them is needed
 TEST_F(ComputeWithErrors, Asynchronous) {
   f.async();
   g.compute_with(f, y);

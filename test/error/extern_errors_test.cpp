@@ -74,18 +74,21 @@ TEST_F(ExternErrors, TheNameOfTheFunctionOfAnOrdinaryFunc) {
                   {"take the name of the C function of \"f", "define_extern"});
 }
 
+// rule: the function's symbol is its plain name
 TEST_F(ExternErrors, MangledNames) {
   build(NameMangling::CPlusPlus);
   expect_mentions(compile_error<Unsupported>(),
                   {"compute \"f", "by the C function \"nobody\"", "mangled as C++ does"});
 }
 
+// rule: what a C function reads or writes lies in memory as one box
 TEST_F(ExternErrors, FoldedStorage) {
   build();
   in.fold_storage(x, 4);
   expect_mentions(compile_error<UserError>(), {"the storage of \"in", "is folded over \"x\""});
 }
 
+// rule: what a C function reads or writes is stored where it is computed
 TEST_F(ExternErrors, StorageOutsideOfTheComputation) {
   build();
   f.compute_at(out, x).store_root();

@@ -62,6 +62,7 @@ TEST(GeneratorErrors, UnknownParamListsThoseThereAre) {
   EXPECT_SAYS(text, "\"count\", \"flag\", \"in.type\", \"kind\"");
 }
 
+// rule: its values are …
 TEST(GeneratorErrors, ValuesParseToTheirLastCharacter) {
   for (const char* value : {"", "3x", "3.0", " 3", "+3", "0x3", "three"})
     EXPECT_SAYS(refusal("count", value), "whole numbers from 0 to 10");
@@ -87,11 +88,13 @@ TEST(GeneratorErrors, EnumerationsListTheirChoices) {
   EXPECT_SAYS(refusal("machine_params", "16,huge"), "three numbers");
 }
 
+// rule: the default scheduler is named first
 TEST(GeneratorErrors, AutoschedulersMustBeLoaded) {
   EXPECT_SAYS(refusal("auto_schedule", "Adams2019"), "\"Adams2019\"");
   EXPECT_SAYS(refusal("auto_schedule", "true"), "none was");
 }
 
+// rule: its dimensions are declared once
 TEST(GeneratorErrors, DeclarationsAreNotContradicted) {
   EXPECT_SAYS(refusal("in.dim", "2"), "it is declared with 1");
   EXPECT_SAYS(refusal("out.type", "uint8"), "it is declared as float32");
@@ -103,12 +106,14 @@ TEST(GeneratorErrors, OpenTypesMustBeSaidForAModule) {
       "in.type=");
 }
 
+// rule: a value is set before generate() reads it
 TEST(GeneratorErrors, ParamsAreSetBeforeGenerate) {
   auto simple = GeneratorContext(get_host_target()).create<Simple>();
   simple->apply(Buffer<float>(4));
   EXPECT_SAYS(message_of([&] { simple->count.set(2); }), "generate() has run");
 }
 
+// rule: the value is what the input declares
 TEST(GeneratorErrors, InputsFitTheirDeclaration) {
   const GeneratorContext context(get_host_target());
   EXPECT_SAYS(message_of([&] { context.apply<Simple>(); }), "it has 1 and was given 0");
@@ -154,6 +159,9 @@ std::string refusal_of() {
   return message_of([] { GeneratorContext(get_host_target()).create<G>()->build_module(); });
 }
 
+// rule: generate() defines every output
+// rule: its params, inputs and outputs have different names
+// rule: its type is declared once
 TEST(GeneratorErrors, GenerateDefinesWhatIsDeclared) {
   EXPECT_SAYS(refusal_of<Forgetful>(), "\"out\" has no definition");
   EXPECT_SAYS(refusal_of<Clashing>(), "two are called \"same\"");
@@ -186,11 +194,15 @@ TEST(GeneratorErrors, NamesAreIdentifiers) {
   EXPECT_SAYS(text, "it has the input \"2nd input\"");
 }
 
+// rule: elements are counted from 0 to below the array's size
 TEST(GeneratorErrors, ElementsOfArraysAreThere) {
   EXPECT_SAYS(refusal_of<OneTooFar>(), "take element 2 of the output \"outs\" of the generator");
   EXPECT_SAYS(refusal_of<OneTooFar>(), "its size is 2");
 }
 
+// rule: it is known once it is declared, set or given
+// rule: they are known once they are declared, set or given
+// rule: it has one value
 TEST(GeneratorErrors, OpenDeclarationsHaveNoTypeDimensionsOrSize) {
   class Open : public Generator<Open> {
    public:
@@ -223,6 +235,7 @@ TEST(GeneratorErrors, NumbersFitTheInputsType) {
   EXPECT_SAYS(text, "its type is uint8");
 }
 
+// rule: a param takes values of its type
 TEST(GeneratorErrors, LoopLevelsAreForParamsOfTheirType) {
   auto simple = GeneratorContext(get_host_target()).create<Simple>();
   const std::string text = message_of([&] {
@@ -255,6 +268,9 @@ class Undefined : public Generator<Undefined> {
   void generate() { out = Func("nothing"); }
 };
 
+// rule: inputs and outputs are added in configure()
+// rule: inputs have values in generate() and schedule()
+// rule: the Func has a definition
 TEST(GeneratorErrors, EachPhaseHasWhatItMayDo) {
   EXPECT_SAYS(refusal_of<NoOutput>(), "at least one Output");
   EXPECT_SAYS(refusal_of<TooLate>(), "add the input \"late\" to the generator");
@@ -262,6 +278,7 @@ TEST(GeneratorErrors, EachPhaseHasWhatItMayDo) {
   EXPECT_SAYS(refusal_of<Undefined>(), "to the output \"out\" of the generator");
 }
 
+// rule: configure() is the place for that
 TEST(GeneratorErrors, WhatIsMadeIsTakenAfterwards) {
   auto simple = GeneratorContext(get_host_target()).create<Simple>();
   EXPECT_SAYS(message_of([&] { simple->get_pipeline(); }), "what generate() defines");
@@ -276,6 +293,7 @@ TEST(GeneratorErrors, NumbersForOpenPartsAreWholeAndNotNegative) {
   EXPECT_SAYS(refusal("in.dim", "two"), "\"two\" was given");
 }
 
+// rule: its size is said once, and not negative
 TEST(GeneratorErrors, SizesOfArraysAreSaidOnce) {
   class Fixed : public Generator<Fixed> {
    public:

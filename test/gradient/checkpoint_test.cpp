@@ -464,6 +464,18 @@ TEST(Checkpoints, MoreStepsAtRunTimeThanATableMayHaveFailTheCall) {
 
 // ---- refusals ----
 
+// With two states, four million steps are computed again some ten thousand times over.
+TEST(Checkpoints, SchedulesOfTooManyStepsAreErrors) {
+  Buffer<float> start = line(7);
+  Func u("u");
+  RDom t(0, 1 << 22);
+  u(x) = start(x);
+  u(x) = u(x) + 0.125f * sin(u(x) + cast<float>(t));
+  const Func loss = weighted_sum(u, {7});
+  expect_mentions(error_of([&] { propagate_adjoints(loss, {.checkpoint_states = 2}); }),
+                  {"a schedule has at most", "4194304 steps", "larger budget"});
+}
+
 TEST(Checkpoints, BudgetsThatCannotBeMetAreErrors) {
   Program p = pushed(5);
   auto message = [&](const AdjointOptions& options) {

@@ -202,6 +202,7 @@ TEST_F(CustomExternStages, WithoutARuleAreRefusedOnTheWayOnly) {
               propagate_adjoints(weighed(twin), {.wrt = {w}})(w));
 }
 
+// rule: every variable needs a range
 TEST_F(CustomExternStages, SumsOverAnArgumentNeedItsRegion) {
   Func f = stage_of(g);
   custom_adjoint(f, {g}, [this](const AdjointContext& c) {

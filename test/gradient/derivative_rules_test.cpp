@@ -11,10 +11,12 @@
 
 #include "autodiff/reverse_sweep.h"
 #include "diagnostics/error.h"
+#include "frontend/func.h"
 #include "ir/build.h"
 #include "ir/equal.h"
 #include "ir/print.h"
 #include "ir/scalar.h"
+#include "support/errors.h"
 
 namespace retrograde::ir {
 namespace {
@@ -381,6 +383,15 @@ TEST(DerivativeRules, HalfPrecisionAccumulatesInFloat32) {
   EXPECT_EQ(adjoint_type(Float(16)), Float(32));
   EXPECT_EQ(adjoint_type(BFloat(16)), Float(32));
   EXPECT_EQ(adjoint_type(Float(64)), Float(64));
+}
+
+// This program links no back end.
+TEST(FrontEndAlone, SaysWhatToLink) {
+  Func f("f");
+  Var x("x");
+  f(x) = x;
+  expect_mentions(error_of<Unsupported>([&] { f.realize({4}); }),
+                  {"this program must be linked with the compiler"});
 }
 
 }  // namespace

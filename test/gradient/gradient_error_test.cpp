@@ -59,6 +59,7 @@ TEST_F(Gradients, ProductInPlace) {
   expect_error<UserError>([&] { propagate_adjoints(loss, strict); }, {"\"f", "Overwritten::Store"});
 }
 
+// rule: a partial derivative may need only values that are still there
 TEST_F(Gradients, ValueOverwrittenByALaterUpdate) {
   f(x) = a(x);
   RDom r(1, 7), q(0, 8);

@@ -100,6 +100,7 @@ TEST(GradientLookup, IntegersAndWhatIsNotReadAreZerosWithAReason) {
   EXPECT_TRUE(d.has(s.im));
 }
 
+// rule: a gradient is looked up that was built, or is zero
 TEST(GradientLookup, WhatWasNotBuiltIsAnError) {
   Squares s;
   ImageParam weights(Float(32), 1, "weights");

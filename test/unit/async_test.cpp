@@ -316,6 +316,7 @@ TEST_P(Async, StorageMayBeHoisted) {
 }
 
 // f keeps its rows over the loop over tiles, g only inside of a tile: there is one storage of f.
+// rule: what an async Func and its consumer both read is stored no further out than the async Func
 TEST(AsyncErrors, AFuncThatBothBranchesReadAndThatIsStoredFurtherOut) {
   Var x("x"), y("y"), yo("yo"), yi("yi");
   Func f("f"), g("g"), out("out");

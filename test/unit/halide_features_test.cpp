@@ -215,6 +215,16 @@ extern "C" __attribute__((visibility("default"))) int halide_features_fill(void*
   return 0;
 }
 
+extern "C" __attribute__((visibility("default"))) int halide_features_add_one(
+    halide_buffer_t* in, halide_buffer_t* out) {
+  if (in->is_bounds_query()) in->dim[0] = out->dim[0];
+  if (in->is_bounds_query() || out->is_bounds_query()) return 0;
+  const Halide::Runtime::Buffer<int32_t> from(*in);
+  Halide::Runtime::Buffer<int32_t> to(*out);
+  to.for_each_element([&](int i) { to(i) = from(i) + 1; });
+  return 0;
+}
+
 TEST(UserContext, IsAnArgumentOfExternStages) {
   Func f("f"), g("g");
   Var x("x");
@@ -514,6 +524,37 @@ TEST(Generators, TakeLoopLevelsAfterTheyHaveRun) {
   EXPECT_EQ(out(2, 1), 5 * 7 + 1);
   const std::string nest = user.loop_nest();
   EXPECT_LT(nest.find("for y"), nest.find("middle")) << nest;
+}
+
+// Two C functions in one generator: of its image, and of a Func or what the first one gives.
+class Externs : public Halide::Generator<Externs> {
+ public:
+  Input<Buffer<int, 1>> image{"image"};
+  Input<Func> func{"func", Int(32), 1};
+  Output<Buffer<int, 1>> out{"out"};
+  void generate() {
+    Func once("once"), twice("twice"), other("other");
+    const std::vector<ExternFuncArgument> of_image{image}, of_once{once}, of_func{func};
+    once.define_extern("halide_features_add_one", of_image, Int(32), 1);
+    twice.define_extern("halide_features_add_one", of_once, Int(32), 1);
+    other.define_extern("halide_features_add_one", of_func, Int(32), 1);
+    out(x) = 10000 * once(x) + 100 * twice(x) + other(x);
+    for (Func f : {once, twice, other}) f.compute_root();
+  }
+  Var x{"x"};
+};
+
+TEST(Generators, HaveSeveralExternStages) {
+  Func source("source");
+  Var x("x");
+  source(x) = x;
+  source.compute_root();
+  Buffer<int> image(5);
+  image.fill(6);
+  auto externs = GeneratorContext(get_jit_target_from_environment()).create<Externs>();
+  externs->apply(image, source);
+  Buffer<int> out = externs->realize({5});
+  for (int i = 0; i < 5; i++) EXPECT_EQ(out(i), 70801 + i);
 }
 
 }  // namespace

@@ -1,0 +1,52 @@
+"""What counts as public, and how programs show it: lists that no header says."""
+import re
+
+HEADER_FOLDERS = ["frontend", "generator", "checks"]
+MORE_HEADERS = [
+    "autodiff/custom_derivative.h", "autodiff/derivative.h", "autodiff/jacobian.h", "autodiff/compressed.h",
+    "autodiff/second_order.h", "autodiff/straight_through.h", "autodiff/tangents.h", "diagnostics/error.h",
+    "ir/build.h", "ir/expr.h", "ir/target.h", "ir/type.h"]
+INTERNAL_HEADERS = {
+    "frontend/argument.h", "frontend/associative_update.h", "frontend/call.h", "frontend/define.h",
+    "frontend/function.h", "frontend/race.h", "frontend/reduction_leaves.h", "frontend/wrappers.h",
+    "frontend/compiler_interface.h", "checks/arrays.h", "checks/culprit.h", "checks/json_number.h",
+    "checks/complex_step.h", "checks/widen.h", "generator/members.h", "generator/cpp_stub.h",
+    "generator/command_line.h"}
+# Parts of templates that users name in no other way than by the whole.
+INTERNAL_SCOPES = {"Declared", "ArrayTraits", "ElementTraits", "InputValue", "InputElements", "ScalarElements",
+                   "OutputElements", "GeneratorParamBase::InCpp", "RegisterGenerator", "tell_pass_observers",
+                   "GeneratorInputBase::values", "ParamMap::Entry", "AutoScheduleParam"}
+INTERNAL_NAMES = re.compile(
+    r"contents|function|parameter|symbol|raw|handle|make_funcs|make_parameters|in_cpp|set_from_string|set_values|"
+    r"set_from_loop_level|check_\w+|role_name|element_name|cpp_\w+|read_\w+|type_choices|number_text|param_text|"
+    r"keeps_value|ElementOf|IsScalarIO|IsArrayIO|any_size|get_schedule|spec|entry|Ref|key|constant_for_input|"
+    r"input_value|set_input|operator=|init_from_context|generate_all|schedule_all|is_generated|set_stub_name|"
+    r"allowed|smaller|larger|Var|generator|GeneratorFactory|RegisterGenerator|NamesInterface|IOKind|kind|"
+    r"GeneratorParamsMap|set_inputs|emit_cpp_stub")
+
+# How programs show an object whose class they seldom name.
+SHOWN_BY = {
+    "Dimension": r"\.dim\(", "OutputImageParam": r"ImageParam|output_buffer", "JITHandlers": r"jit_handlers|JITUserContext",
+    "FuncTupleElementRef": r"\)\[\d\]", "FuncRef": r"Func", "Realization": r"realize", "Stage": r"update\(|Func",
+    "Pipeline::RealizationArg": r"realize", "GIOBase": r"(Input|Output)<", "GeneratorInputBase": r"Input<",
+    "GeneratorInput": r"Input<", "GeneratorOutputBase": r"Output<", "GeneratorOutput": r"Output<",
+    "GeneratorParamBase": r"GeneratorParam<", "GeneratorBase": r"Generator<|apply\(|GeneratorRegistry",
+    "VarOrRVar": r"Var", "ExternSignature": r"JITExtern", "ExternCFunction": r"JITExtern", "ImplicitVar": r"\b_\d?\b",
+    "GradientCheckOptions": r"check_gradients", "GradientReport::Step": r"check_gradients",
+    "GradientReport::Method": r"check_gradients", "GradientReport::FuncError": r"check_gradients",
+    "StabilityOptions": r"check_stability", "StabilityReport::LeftOut": r"check_stability",
+    "AdjointContext::Wanted": r"AdjointContext", "TangentContext": r"custom_tangent|TangentContext", "GradientReport::Input": r"check_gradients",
+    "GradientReport": r"check_gradients", "VarOrRVar": r"Var",
+    "JacobianOptions": r"jacobian", "Jacobian": r"jacobian|hessian", "HessianDiagonal": r"hessian_diagonal", "Direction": r"propagate_tangents",
+    "Tangents": r"propagate_tangents", "ExprCompare": r"ExprCompare", "StringOrLoopLevel": r"set_generator_param_values",
+    "AutoScheduleParam": r"auto_schedule", "MachineParams": r"MachineParams|machine_params", "GeneratorContext": r"Generator",
+    "AutoSchedulerResults": r"auto_schedule", "InputValue": r"Input<", "StubOutputs": r"stub", "OutputInfo": r"get_output_info",
+    "LoweredFunc": r"LoweredFunc|functions\(\)", "ParamMap::Entry": r"ParamMap", "ParamMap::ParamMapping": r"ParamMap|\{\{",
+    "Buffer": r"Buffer|realize", "Type": r"type\(|Type|Int\(|Float\(", "CommandLine": r"command_line|run_generators",
+    "ScheduleHandle": r"Stage", "ExternFuncArgument": r"define_extern|ExternFuncArgument", "Module": r"compile_to_module|Module",
+    "Tuple": r"Tuple", "Message": r"message\(\)", "Error": r"error", "RVar": r"RDom|RVar", "Expr": r"Expr", "Func": r"Func",
+}
+
+# Rules that guard against what no program is known to do.
+UNBROKEN = {"an input is something that the output depends on",
+            "the size of hoisted storage is known outside of the loops it is hoisted over"}
