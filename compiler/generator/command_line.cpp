@@ -1,6 +1,8 @@
 // From a command line to files.
 #include "generator/command_line.h"
 
+#include <malloc.h>
+
 #include <iostream>
 #include <set>
 
@@ -253,7 +255,17 @@ static bool asks_for_help(int argc, const char* const* argv) {
   return argc <= 1;
 }
 
+// The process compiles and ends. By default glibc asks the system for memory a page at a time where
+// a thread compiles, and gives back what will be wanted again.
+static void expect_much_memory() {
+#ifdef __GLIBC__
+  constexpr int at_once_bytes = 8 << 20;
+  mallopt(M_TOP_PAD, at_once_bytes);
+#endif
+}
+
 int generate_filter_main(int argc, char** argv, std::ostream& errors) {
+  expect_much_memory();
   try {
     if (asks_for_help(argc, argv)) {
       errors << usage();
