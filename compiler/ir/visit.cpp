@@ -6,6 +6,7 @@
 
 #include "diagnostics/error.h"
 #include "ir/build.h"
+#include "ir/node_set.h"
 
 namespace retrograde::ir {
 
@@ -299,10 +300,10 @@ class Walker {
       stack_.pop_back();
       const size_t first = stack_.size();
       if (item.expr.defined()) {
-        if (!visited_.insert(item.expr.get()).second || !enter_expr_(item.expr)) continue;
+        if (!visited_.insert(item.expr.get()) || !enter_expr_(item.expr)) continue;
         for_each_child(item.expr, [&](const Expr& child) { push(child); });
       } else {
-        if (!visited_.insert(item.stmt.get()).second || !enter_stmt_(item.stmt)) continue;
+        if (!visited_.insert(item.stmt.get()) || !enter_stmt_(item.stmt)) continue;
         for_each_child(
             item.stmt, [&](const Expr& child) { push(child); },
             [&](const Stmt& child) { push(child); });
@@ -314,7 +315,7 @@ class Walker {
   FunctionRef<bool(const Expr&)> enter_expr_;
   FunctionRef<bool(const Stmt&)> enter_stmt_;
   std::vector<Item> stack_;
-  std::unordered_set<const Node*> visited_;
+  NodeSet visited_;
 };
 
 }  // namespace
