@@ -104,21 +104,25 @@ void compile_part(const std::string& name, const std::string& bitcode, const Mac
   }
 }
 
-std::vector<Part> compile_at_once(const std::string& name, const std::vector<std::string>& bitcode,
-                                  const Machine& machine, const Options& options) {
-  std::vector<Part> parts(bitcode.size());
-  const auto run = [&](size_t i) { compile_part(name, bitcode[i], machine, options, parts[i]); };
+// Each part begins while the next is cut off.
+std::vector<Part> compile_at_once(Unit& unit, unsigned count, const Machine& machine,
+                                  const Options& options) {
+  const std::string& name = unit.module().getModuleIdentifier();
+  std::vector<Part> parts(count);
   {
     std::vector<std::jthread> threads;  // joined at the end of the block
-    threads.reserve(parts.size());
-    for (size_t i = 1; i < parts.size(); i++) {
+    threads.reserve(count);
+    split_into_bitcode(unit.module(), count, [&](unsigned part, std::string bitcode) {
+      const auto run = [&, part, bitcode = std::move(bitcode)] {
+        compile_part(name, bitcode, machine, options, parts[part]);
+      };
+      if (part + 1 == count) return run();
       try {
-        threads.emplace_back(run, i);
+        threads.emplace_back(run);
       } catch (const std::system_error&) {  // no more threads to be had
-        run(i);
+        run();
       }
-    }
-    run(0);
+    });
   }
   for (const Part& part : parts) {
     if (part.problem) std::rethrow_exception(part.problem);
@@ -143,16 +147,14 @@ void join_times(const std::vector<Part>& parts, Times& times) {
 // In at most `most` parts, where the options do not say.
 std::vector<Part> compile_unit(Unit& unit, const Machine& machine, const Options& options,
                                unsigned most) {
-  const unsigned count = options.parts ? options.parts : worthwhile_parts(unit.module(), most);
+  const unsigned count = options.parts ? possible_parts(unit.module(), options.parts)
+                                 : worthwhile_parts(unit.module(), most);
   std::vector<Part> parts(1);
   if (count == 1) {
     finish(unit, options, parts[0]);
     return parts;
   }
-  Stopwatch watch;
-  const std::vector<std::string> bitcode = split_into_bitcode(unit.module(), count);
-  unit.times.generate_seconds += watch.lap();
-  return compile_at_once(unit.module().getModuleIdentifier(), bitcode, machine, options);
+  return compile_at_once(unit, count, machine, options);
 }
 
 Module compile_for_here(Unit& unit, const Machine& machine, const Options& options) {

@@ -43,6 +43,8 @@ class Contraction {
 };
 
 // ---- types.cpp ----
+// The same for all functions of a module: LLVM sets itself up for each combination that it meets.
+void set_target(Emitter& e, llvm::Function* function);
 llvm::Type* llvm_type(Emitter& e, Type type);
 llvm::Type* memory_type(Emitter& e, Type type);  // of a scalar: bool is a byte
 llvm::Type* with_lanes(llvm::Type* scalar, int lanes);

@@ -102,9 +102,7 @@ class Exporter {
   }
 
   llvm::Function* set_up(llvm::Function* function) {
-    function->addFnAttr(llvm::Attribute::NoUnwind);
-    function->addFnAttr("target-cpu", e_.machine.cpu);
-    function->addFnAttr("target-features", e_.machine.features);
+    set_target(e_, function);
     b_.SetInsertPoint(llvm::BasicBlock::Create(e_.context(), "entry", function));
     return function;
   }

@@ -11,8 +11,11 @@
 namespace retrograde::codegen {
 namespace {
 
-// Instructions that take LLVM several times as long as starting a thread and handing them over.
+// Instructions that take LLVM several times as long as starting a thread, handing them over and
+// setting LLVM up for them.
 constexpr unsigned worth_a_thread = 300;
+// Less of them is no part by itself.
+constexpr unsigned small_function = 100;
 
 using PartOf = std::map<const llvm::GlobalValue*, unsigned>;
 
@@ -65,24 +68,31 @@ std::string bitcode_of(const llvm::Module& module) {
   return bytes;
 }
 
-}  // namespace
-
-unsigned worthwhile_parts(const llvm::Module& module, unsigned most) {
-  unsigned functions = 0;
-  for (const llvm::Function& function : module) functions += !function.isDeclaration();
-  const unsigned size = module.getInstructionCount() / worth_a_thread;
-  return std::max(1u, std::min({size, functions, most}));
+// With at least so many instructions.
+unsigned functions_of(const llvm::Module& module, unsigned least) {
+  return static_cast<unsigned>(std::count_if(module.begin(), module.end(), [&](const auto& f) {
+    return !f.isDeclaration() && f.getInstructionCount() >= least;
+  }));
 }
 
-std::vector<std::string> split_into_bitcode(llvm::Module& module, unsigned parts) {
+}  // namespace
+
+unsigned possible_parts(const llvm::Module& module, unsigned asked) {
+  return std::min(asked, std::max(1u, functions_of(module, 0)));
+}
+
+unsigned worthwhile_parts(const llvm::Module& module, unsigned most) {
+  const unsigned size = module.getInstructionCount() / worth_a_thread;
+  return std::max(1u, std::min({size, functions_of(module, small_function), most}));
+}
+
+void split_into_bitcode(llvm::Module& module, unsigned parts, const UsePart& use) {
   const std::vector<const llvm::Function*> functions = largest_first(module);
-  parts = std::min<unsigned>(parts, functions.size());
   const PartOf part_of = assign(functions, parts);
   for (llvm::Function& function : module) share(function);
   for (llvm::GlobalVariable& variable : module.globals()) {
     if (!is_local_constant(variable)) share(variable);
   }
-  std::vector<std::string> result;
   for (unsigned part = 0; part < parts; part++) {
     llvm::ValueToValueMapTy copies;
     const auto belongs_here = [&](const llvm::GlobalValue* value) {
@@ -91,9 +101,8 @@ std::vector<std::string> split_into_bitcode(llvm::Module& module, unsigned parts
     };
     const std::unique_ptr<llvm::Module> copy = llvm::CloneModule(module, copies, belongs_here);
     erase_unused_constants(*copy);
-    result.push_back(bitcode_of(*copy));
+    use(part, bitcode_of(*copy));
   }
-  return result;
 }
 
 }  // namespace retrograde::codegen

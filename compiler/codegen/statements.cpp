@@ -32,14 +32,7 @@ FunctionGenerator::FunctionGenerator(Emitter& emitter, const LoweredFunction& fu
 // ---- functions ----
 
 void FunctionGenerator::begin_function(llvm::Function* function) {
-  function->addFnAttr(llvm::Attribute::NoUnwind);
-  function->addFnAttr("target-cpu", e_.machine.cpu);
-  function->addFnAttr("target-features", e_.machine.features);
-  if (!e_.machine.tune_cpu.empty()) function->addFnAttr("tune-cpu", e_.machine.tune_cpu);
-  // Vectors are as wide as the schedule says, whatever width the processor would prefer.
-  const std::string bits = std::to_string(e_.machine.vector_bits);
-  function->addFnAttr("min-legal-vector-width", bits);
-  function->addFnAttr("prefer-vector-width", bits);
+  set_target(e_, function);
   frame_.function = function;
   frame_.context = function->getArg(0);
   frame_.context->setName("context");

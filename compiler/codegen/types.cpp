@@ -4,6 +4,17 @@
 
 namespace retrograde::codegen {
 
+void set_target(Emitter& e, llvm::Function* function) {
+  function->addFnAttr(llvm::Attribute::NoUnwind);
+  function->addFnAttr("target-cpu", e.machine.cpu);
+  function->addFnAttr("target-features", e.machine.features);
+  if (!e.machine.tune_cpu.empty()) function->addFnAttr("tune-cpu", e.machine.tune_cpu);
+  // Vectors are as wide as the schedule says, whatever width the processor would prefer.
+  const std::string bits = std::to_string(e.machine.vector_bits);
+  function->addFnAttr("min-legal-vector-width", bits);
+  function->addFnAttr("prefer-vector-width", bits);
+}
+
 bool is_half(Type type) { return type.is_float() && type.bits() == 16; }
 
 llvm::Type* with_lanes(llvm::Type* scalar, int lanes) {
