@@ -12,6 +12,42 @@ namespace {
 
 using Wide = __int128;
 
+// ---- means of 64 bits ----
+
+template <typename T>
+std::vector<T> ends();
+
+Wide floor_half(Wide sum) { return (sum - (sum & 1)) / 2; }
+
+// All pairs of the ends of the range, beside 128 bits.
+template <typename T>
+void expect_means() {
+  const std::vector<T> values = ends<T>();
+  const int n = static_cast<int>(values.size());
+  Buffer<T> data(n);
+  for (int i = 0; i < n; ++i) data(i) = values[static_cast<size_t>(i)];
+  Var x("x"), y("y");
+  Func f("means");
+  const Expr a = data(x), b = data(y);
+  f(x, y) = Tuple(halving_add(a, b), rounding_halving_add(a, b), halving_sub(a, b));
+  Realization means = f.realize({n, n});
+  Buffer<T> down = means[0], up = means[1], difference = means[2];
+  for (int j = 0; j < n; ++j) {
+    for (int i = 0; i < n; ++i) {
+      const Wide u = data(i), v = data(j);
+      EXPECT_EQ(down(i, j), static_cast<T>(floor_half(u + v))) << i << " " << j;
+      EXPECT_EQ(up(i, j), static_cast<T>(floor_half(u + v + 1))) << i << " " << j;
+      EXPECT_EQ(difference(i, j), static_cast<T>(floor_half(u - v))) << i << " " << j;
+    }
+  }
+}
+
+TEST(WideIntegers, MeansOfSixtyFourBitsLoseNothing) {
+  expect_means<int64_t>();
+  expect_means<uint64_t>();
+  expect_means<int16_t>();
+}
+
 // ---- lerp ----
 
 Wide nearest(Wide sum, Wide divisor) {
