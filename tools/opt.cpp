@@ -4,6 +4,9 @@
 //   opt --pass=vectorize_loops program.ir           on IR text; "-" or nothing: standard input
 //   opt --pass=unroll_loops,simplify program.ir     several in this order
 //   opt --pass=simplify --expr                      the text is one expression
+//   opt --graph [--pass=schedule_unscheduled] program.graph
+//                                                   the text is an algorithm (graph/graph.h), which
+//                                                   is checked; --stop-after=PASS lowers it so far
 //   opt --time-passes --dump-after=all ...          how long each took; what each gave
 //   opt --time-passes --dump-after=PASS,... -- PROGRAM ARGS...
 //                                                   of all that a program compiles while it runs
@@ -27,7 +30,9 @@
 #include <string>
 #include <vector>
 
+#include "autodiff/graph_passes.h"
 #include "diagnostics/error.h"
+#include "graph/graph.h"
 #include "ir/parse.h"
 #include "ir/print.h"
 #include "lower/lower.h"
@@ -40,9 +45,9 @@ using namespace retrograde;
 
 struct Options {
   std::vector<std::string> passes, dumped;
-  std::string file = "-";
+  std::string file = "-", stop_after;
   std::vector<char*> program;  // what stands behind "--", null-terminated
-  bool lists = false, lists_pipeline = false, is_expr = false, times = false;
+  bool lists = false, lists_pipeline = false, is_expr = false, is_graph = false, times = false;
   bool dumps(const std::string& pass) const {
     return std::find(dumped.begin(), dumped.end(), pass) != dumped.end() ||
            std::find(dumped.begin(), dumped.end(), "all") != dumped.end();
@@ -74,6 +79,10 @@ bool read_option(const std::string& arg, Options& options) {
     options.lists_pipeline = true;
   } else if (arg == "--expr") {
     options.is_expr = true;
+  } else if (arg == "--graph") {
+    options.is_graph = true;
+  } else if (const auto last = value_of(arg, "stop-after")) {
+    options.stop_after = *last;
   } else if (arg == "--time-passes") {
     options.times = true;
   } else if (arg == "-" || arg[0] != '-') {
@@ -94,7 +103,7 @@ std::optional<Options> parse_options(int argc, char** argv) {
     if (!read_option(argv[i], options)) return std::nullopt;
   }
   const bool has_task = !options.passes.empty() || options.lists || options.lists_pipeline ||
-                        !options.program.empty();
+                        options.is_graph || !options.program.empty();
   if (!has_task) return std::nullopt;
   if (!options.program.empty()) options.program.push_back(nullptr);
   return options;
@@ -151,6 +160,26 @@ void run_expr(const Options& options) {
   if (options.passes != std::vector<std::string>{"simplify"})
     user_error("read one expression", "only the pass \"simplify\" takes one");
   std::cout << ir::simplify(ir::parse_expr(read_all(options.file))) << "\n";
+}
+
+void run_graph(const Options& options) {
+  ir::Graph graph = ir::parse_graph(read_all(options.file));
+  ir::validate(graph, "parse_graph");
+  for (const std::string& name : options.passes) {
+    const ir::GraphPass* pass = ir::find_graph_pass(name);
+    if (!pass) {
+      user_error(text("run the pass ", quoted(name), " on a graph"),
+                 "it must be one from graph to graph, as --list marks them");
+    }
+    graph = ir::graph_of(pass->run(graph.outputs));
+    ir::validate(graph, name);
+  }
+  if (options.stop_after.empty()) {
+    std::cout << ir::to_text(graph);
+    return;
+  }
+  ir::LowerOptions lowering{get_host_target(), true, {}, options.stop_after};
+  std::cout << ir::lower("graph", graph.outputs, ir::infer_arguments(graph.outputs), lowering).body;
 }
 
 void run_passes(const Options& options) {
@@ -234,9 +263,13 @@ int run_program(const Options& options) {
 int run(const Options& options) {
   if (!options.program.empty()) return run_program(options);
   if (options.lists) {
+    for (const ir::GraphPass& pass : ir::graph_passes())
+      std::cout << pass.name << " (--graph)\n";
     for (const ir::StatementPass& pass : ir::statement_passes()) std::cout << pass.name << "\n";
   } else if (options.lists_pipeline) {
     for (const std::string& name : ir::pass_names()) std::cout << name << "\n";
+  } else if (options.is_graph) {
+    run_graph(options);
   } else {
     options.is_expr ? run_expr(options) : run_passes(options);
   }
@@ -250,6 +283,7 @@ int main(int argc, char** argv) {
   if (!options) {
     std::cerr << "usage: opt --pass=NAME,... [--expr] [--time-passes] [--dump-after=NAME,...|all] "
                  "[FILE]\n"
+                 "       opt --graph [--pass=NAME,...] [--stop-after=NAME] [FILE]\n"
                  "       opt [--time-passes] [--dump-after=NAME,...|all] -- PROGRAM ARGS...\n"
                  "       opt --list | --list-pipeline\n";
     return 2;

@@ -11,13 +11,14 @@
 #include "aot/merge_objects.h"
 #include "aot/program.h"
 #include "aot/runtime_object.h"
+#include "autodiff/default_schedule.h"
 #include "codegen/archive.h"
 #include "codegen/machine.h"
 #include "diagnostics/error.h"
 #include "diagnostics/large_stack.h"
+#include "diagnostics/pass_observer.h"
 #include "frontend/compiler_interface.h"
 #include "frontend/module.h"
-#include "frontend/pass_observer.h"
 #include "ir/print.h"
 #include "lower/lower.h"
 
@@ -263,7 +264,7 @@ class AheadOfTime : public ModuleCompiler {
     ir::LowerOptions options;
     options.target = pipeline.traced(target);
     options.validate = validate_passes;
-    return ir::lower(pipeline.name, pipeline.outputs, inputs, options);
+    return ir::lower(pipeline.name, ir::schedule_unscheduled(pipeline.outputs), inputs, options);
   }
 
   std::vector<uint8_t> object(const Module& module) override {

@@ -15,7 +15,7 @@
 #include <vector>
 
 #include "autodiff/isl_budget.h"
-#include "frontend/function.h"
+#include "graph/function.h"
 #include "ir/expr.h"
 #include "ir/visit.h"
 

@@ -3,12 +3,13 @@
 #include <algorithm>
 #include <map>
 
-#include "autodiff/adjoint_contents.h"
 #include "autodiff/gather_places.h"
 #include "autodiff/local_derivative.h"
 #include "autodiff/regions.h"
-#include "frontend/define.h"
 #include "frontend/var.h"
+#include "graph/define.h"
+#include "graph/directive.h"
+#include "graph/function.h"
 #include "ir/build.h"
 #include "ir/print.h"
 #include "ir/variables.h"
@@ -97,10 +98,9 @@ bool leaves_zeros(const Contribution& c) {
 }
 
 void note_traits(const FuncPtr& f, const std::vector<Expr>& adjoints) {
-  auto* adjoint = dynamic_cast<AdjointContents*>(f.get());
-  if (!adjoint) return;
+  if (!f->made) return;
   for (const Expr& e : adjoints) {
-    if (e.defined()) adjoint->traits.add(traits_of(e));
+    if (e.defined()) f->made->traits.add(traits_of(e));
   }
 }
 
@@ -167,12 +167,13 @@ class Builder {
       return sums_many_terms(group.gather);
     });
     if (is_long) widen();
-    result_.func = new_func(is_wide_ ? claim_name(name_ + "_sum") : name_);
+    result_.func = new_func(is_wide_ ? claim_name(name_ + "_sum") : name_,
+                            is_wide_ ? Role::Accumulator : Role::Adjoint);
     define_pointwise(contributions, initial);
     note_traits(result_.func, initial);
     for (const Contribution& c : contributions) {
       note_traits(result_.func, {c.adjoint});
-      if (leaves_zeros(c)) static_cast<AdjointContents&>(*result_.func).traits.masked = true;
+      if (leaves_zeros(c)) result_.func->made->traits.masked = true;
     }
     for (const UpdateGroup& group : groups) {
       is_worth_splitting(group.gather) ? add_privatised(group) : add_update(group);
@@ -182,8 +183,8 @@ class Builder {
   }
 
  private:
-  static FuncPtr new_func(const std::string& name) {
-    FuncPtr f = std::make_shared<AdjointContents>();
+  static FuncPtr new_func(const std::string& name, Role role = Role::Adjoint) {
+    FuncPtr f = make_func(role);
     f->name = name;
     return f;
   }
@@ -385,16 +386,16 @@ class Builder {
   // lanes and parts. Elements fixed on the left-hand side need no y.
   void add_privatised(const UpdateGroup& group) {
     const Gather& g = group.gather;
-    FuncPtr parts = new_func(claim_name(name_ + "_parts"));
+    FuncPtr parts = new_func(claim_name(name_ + "_parts"), Role::Accumulator);
     Expr part = parts_of(g) > 1 ? variable(unique_name("part")) : Expr(),
          lane = has_lanes(g) ? variable(unique_name("lane")) : Expr();
     std::vector<Expr> zeros;
     for (Type t : types_) zeros.push_back(make_zero(t));
     define_pure(parts, parts_point(g, args_, lane, part), zeros);
-    if (lane.defined()) static_cast<AdjointContents&>(*parts).lanes = lane_count;
+    if (lane.defined()) parts->made->lanes = lane_count;
 
     const Expr count = part_count_of(g);
-    static_cast<AdjointContents&>(*parts).has_parts = part.defined();
+    parts->made->has_parts = part.defined();
     Slice slice = slice_of(g, lane, part, count);
     if (g.predicate.defined()) {
       slice.conditions.push_back(
@@ -500,12 +501,7 @@ void append_update(const FuncPtr& f, std::vector<Expr> args, std::vector<Expr> v
   update.rvars = rvars;
   if (predicate.defined() && !is_const_true(predicate)) update.predicate = predicate;
   update = map_exprs(update, [&](const Expr& e) { return redirect_calls(e, f, f, true); });
-  for (const ReductionVariable& r : rvars)
-    update.schedule.dims.push_back({r.var, ForType::Serial, true});
-  for (size_t d = 0; d < f->args.size(); ++d) {
-    if (is_pure_position(*f, update, d))
-      update.schedule.dims.push_back({f->args[d], ForType::Serial, false});
-  }
+  update.schedule.dims = first_loops(*f, update);
   freeze_callees(update, *f);
   f->updates.push_back(std::move(update));
   f->version++;

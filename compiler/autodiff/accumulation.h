@@ -28,7 +28,7 @@
 #include <vector>
 
 #include "autodiff/access_inversion.h"
-#include "frontend/function.h"
+#include "graph/function.h"
 
 namespace retrograde::ir {
 

@@ -6,8 +6,8 @@
 #include "autodiff/checkpoint_actions.h"
 #include "autodiff/checkpoint_step.h"
 #include "autodiff/versions.h"
-#include "frontend/define.h"
 #include "frontend/var.h"
+#include "graph/define.h"
 #include "ir/build.h"
 #include "ir/print.h"
 #include "simplify/simplify.h"
@@ -23,7 +23,7 @@ class CheckpointedLoop {
         f_(context.f),
         result_(result),
         layout_(context),
-        machine_(std::make_shared<AdjointContents>()) {}
+        machine_(make_func(Role::Checkpoints)) {}
 
   void run() {
     machine_->name = claim_name(f_->name + "_checkpoints");
@@ -198,7 +198,7 @@ class CheckpointedLoop {
         for (const Expr& v : w.values)
           work.values.push_back(redirect_calls(v, machine_, machine_, true));
       }
-      machine_->work.push_back(std::move(work));
+      machine_->made->work.push_back(std::move(work));
     };
     note(adjoint_, Action::Adjoint, inner);
     if (!plan_.needs_values()) return;
@@ -259,7 +259,7 @@ class CheckpointedLoop {
   FuncContents* f_;
   UpdateAdjoint& result_;
   TapeLayout layout_;
-  std::shared_ptr<AdjointContents> machine_;
+  FuncPtr machine_;
   CheckpointPlan plan_;
   ActionTable table_;
   std::optional<CheckpointSlots> slots_;

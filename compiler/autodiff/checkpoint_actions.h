@@ -14,7 +14,7 @@
 #include <functional>
 #include <string>
 
-#include "frontend/function.h"
+#include "graph/function.h"
 
 namespace retrograde::ir {
 

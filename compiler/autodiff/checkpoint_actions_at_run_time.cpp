@@ -2,12 +2,12 @@
 #include <algorithm>
 
 #include "autodiff/accumulation.h"
-#include "autodiff/adjoint_contents.h"
 #include "autodiff/checkpoint_actions.h"
 #include "autodiff/revolve.h"
 #include "diagnostics/error.h"
 #include "frontend/buffer.h"
-#include "frontend/define.h"
+#include "graph/define.h"
+#include "graph/function.h"
 #include "ir/build.h"
 #include "simplify/simplify.h"
 
@@ -77,7 +77,7 @@ class ActionsFunc {
       : states_(states),
         steps_(clamp(steps, 0, most_steps_at_run_time(states))),
         bound_(steps_, states),
-        func_(std::make_shared<AdjointContents>()) {
+        func_(make_func(Role::CheckpointPlan)) {
     func_->name = name;
     // Reversing a step takes two rows; of n frames all but the first are followed by a restored
     // state, and at most all begin with a stored one.

@@ -17,8 +17,7 @@ namespace {
 
 class Planner {
  public:
-  Planner(const UpdateContext& context, const TapeLayout& layout,
-          const std::shared_ptr<AdjointContents>& machine)
+  Planner(const UpdateContext& context, const TapeLayout& layout, const FuncPtr& machine)
       : c_(context), f_(context.f), layout_(layout), machine_(machine) {
     const auto& loops = c_.definition.rvars;
     plan_.time = loops.back();
@@ -100,8 +99,8 @@ class Planner {
   // ---- one step ----
 
   SweepResult sweep_all(const FuncPtr& adjoint) {
-    AdjointTraits& traits = machine_->traits;
-    if (auto* made = dynamic_cast<AdjointContents*>(adjoint.get())) traits.add(made->traits);
+    AdjointTraits& traits = machine_->made->traits;
+    if (adjoint->made) traits.add(adjoint->made->traits);
     traits.masked = true;
     choose_types({});
     choose_types(c_.sweep_iterations(machine_, [&] { return seeds(); }).leaves);
@@ -168,15 +167,14 @@ class Planner {
   const UpdateContext& c_;
   FuncContents* f_;
   const TapeLayout& layout_;
-  const std::shared_ptr<AdjointContents>& machine_;
+  const FuncPtr& machine_;
   CheckpointPlan plan_;
 };
 
 }  // namespace
 
 CheckpointPlan plan_checkpoints(const UpdateContext& context, const TapeLayout& layout,
-                                const FuncPtr& adjoint,
-                                const std::shared_ptr<AdjointContents>& machine) {
+                                const FuncPtr& adjoint, const FuncPtr& machine) {
   return Planner(context, layout, machine).run(adjoint);
 }
 

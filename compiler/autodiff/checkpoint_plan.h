@@ -6,9 +6,9 @@
 #include <string>
 #include <vector>
 
-#include "autodiff/adjoint_contents.h"
 #include "autodiff/tape_layout.h"
 #include "autodiff/update_context.h"
+#include "graph/function.h"
 
 namespace retrograde::ir {
 
@@ -44,7 +44,6 @@ struct CheckpointPlan {
 // The adjoints at hand will be read from `machine`, whose types and traits are set here. Throws
 // when the budget is too small, or a place forgotten.
 CheckpointPlan plan_checkpoints(const UpdateContext& context, const TapeLayout& layout,
-                                const FuncPtr& adjoint,
-                                const std::shared_ptr<AdjointContents>& machine);
+                                const FuncPtr& adjoint, const FuncPtr& machine);
 
 }  // namespace retrograde::ir

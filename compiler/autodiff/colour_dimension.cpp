@@ -3,10 +3,10 @@
 #include <unordered_map>
 
 #include "autodiff/accumulation.h"
-#include "autodiff/adjoint_contents.h"
 #include "diagnostics/error.h"
-#include "frontend/define.h"
 #include "frontend/var.h"
+#include "graph/define.h"
+#include "graph/function.h"
 #include "ir/build.h"
 #include "ir/variables.h"
 #include "ir/visit.h"
@@ -40,10 +40,9 @@ class Lifter {
   void lift(const FuncPtr& f) {
     // The pattern of derivatives, which is found before, refuses extern stages.
     if (f->is_extern()) internal_error("an extern stage lies on the way of several seeds");
-    auto result = std::make_shared<AdjointContents>();
+    const FuncPtr result = make_func(Role::Coloured);
     result->name = claim_name(f->name + "_by_colour");
-    if (const auto* adjoint = dynamic_cast<const AdjointContents*>(f.get()))
-      result->traits = adjoint->traits;
+    if (f->made) result->made->traits = f->made->traits;
     lifted_[f.get()] = result;
     std::vector<Expr> args = variables_of(f->args);
     args.push_back(colour_);

@@ -8,7 +8,7 @@
 // run in parallel. What does not depend on the seed is computed once.
 #pragma once
 
-#include "frontend/function.h"
+#include "graph/function.h"
 
 namespace retrograde::ir {
 

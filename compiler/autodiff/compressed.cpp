@@ -3,11 +3,11 @@
 #include <algorithm>
 
 #include "autodiff/accumulation.h"
-#include "autodiff/adjoint_contents.h"
 #include "autodiff/colour_dimension.h"
 #include "diagnostics/error.h"
-#include "frontend/define.h"
 #include "frontend/var.h"
+#include "graph/define.h"
+#include "graph/function.h"
 #include "ir/build.h"
 #include "ir/variables.h"
 #include "ir/visit.h"
@@ -124,9 +124,9 @@ Expr Compressed::seed_value(const std::vector<Expr>& column, const Expr& colour)
 
 FuncPtr Compressed::evaluate() const {
   if (isl_map_is_empty(pattern_.get()) == isl_bool_true) return nullptr;
-  auto seeds = std::make_shared<AdjointContents>();
+  auto seeds = make_func(Role::Coloured);
   seeds->name = claim_name(query_.seed->name + "_by_colour");
-  seeds->traits.masked = true;
+  seeds->made->traits.masked = true;
   const std::vector<Expr> column = variables_of(query_.seed->args);
   std::vector<Expr> args = column;
   args.push_back(variable(unique_name("colour")));

@@ -11,7 +11,7 @@
 #include "autodiff/colour_table.h"
 #include "autodiff/dependence.h"
 #include "autodiff/isl_points.h"
-#include "frontend/function.h"
+#include "graph/function.h"
 
 namespace retrograde::ir {
 

@@ -4,12 +4,12 @@
 #include <unordered_set>
 
 #include "autodiff/accumulation.h"
-#include "autodiff/adjoint_contents.h"
 #include "autodiff/derivative_rules.h"
 #include "autodiff/input_shape.h"
 #include "diagnostics/error.h"
-#include "frontend/define.h"
 #include "frontend/var.h"
+#include "graph/define.h"
+#include "graph/function.h"
 #include "ir/build.h"
 #include "simplify/simplify.h"
 
@@ -125,7 +125,7 @@ void check_contributions(const FuncContents& f, const std::vector<AdjointContrib
 }
 
 FuncPtr new_func(const std::string& name) {
-  auto f = std::make_shared<AdjointContents>();
+  auto f = make_func(Role::CustomRule);
   f->name = claim_name(name);
   return f;
 }
@@ -140,7 +140,7 @@ std::vector<Expr> arguments(int n) {
 // partials of the input are infinite, and infinite where they are 0.
 FuncPtr as_adjoint(const std::string& name, const FuncPtr& given) {
   FuncPtr result = new_func(name);
-  static_cast<AdjointContents&>(*result).traits = {.masked = true, .singular = true};
+  result->made->traits = {.masked = true, .singular = true};
   std::vector<Expr> args = arguments(given->dimensions()), values;
   for (size_t k = 0; k < given->types.size(); ++k)
     values.push_back(

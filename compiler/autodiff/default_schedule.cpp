@@ -4,12 +4,15 @@
 #include <optional>
 #include <unordered_set>
 
-#include "autodiff/adjoint_contents.h"
 #include "autodiff/cost_estimate.h"
 #include "autodiff/read_estimate.h"
 #include "autodiff/regions.h"
+#include "diagnostics/large_stack.h"
 #include "frontend/rdom.h"
 #include "frontend/stage.h"
+#include "graph/copy_graph.h"
+#include "graph/function.h"
+#include "graph/wrappers.h"
 #include "ir/build.h"
 #include "ir/equal.h"
 #include "ir/visit.h"
@@ -62,9 +65,7 @@ class Chooser {
   }
 
  private:
-  static bool is_adjoint(const FuncPtr& f) {
-    return dynamic_cast<const AdjointContents*>(f.get()) != nullptr;
-  }
+  static bool is_adjoint(const FuncPtr& f) { return f->made.has_value(); }
   bool is_output(const FuncPtr& f) const {
     return std::find(outputs_.begin(), outputs_.end(), f) != outputs_.end();
   }
@@ -164,8 +165,7 @@ class Chooser {
     bool reduces = !f->stage(s).rvars.empty();
     if (pure.size() > 1 || (reduces && pure[0] != 0)) stage.parallel(outermost);
     // Few private parts may be left where the target is large.
-    const auto* made = dynamic_cast<const AdjointContents*>(f.get());
-    if (made && made->has_parts && pure.size() > 1 && pure[pure.size() - 2] != 0)
+    if (f->made && f->made->has_parts && pure.size() > 1 && pure[pure.size() - 2] != 0)
       stage.parallel(Var(f->args[pure[pure.size() - 2]]));
     if (pure[0] != 0) return;
     Var innermost(f->args[0]);
@@ -249,6 +249,32 @@ class Chooser {
 
 DefaultSchedules default_schedules(const std::vector<FuncPtr>& outputs) {
   return Chooser(outputs).choose();
+}
+
+namespace {
+
+std::vector<FuncPtr> with_schedules(const std::vector<FuncPtr>& outputs,
+                                    const DefaultSchedules& chosen) {
+  const GraphCopy copy = copy_graph(outputs);
+  for (const auto& [f, schedule] : chosen) {
+    FuncContents& scheduled = *copy.of.at(f);
+    scheduled.schedule = schedule.func;
+    for (int s = 0; s < scheduled.stage_count(); ++s)
+      scheduled.stage(s).schedule = schedule.stages[static_cast<size_t>(s)];
+  }
+  return copy.outputs;
+}
+
+}  // namespace
+
+std::vector<FuncPtr> schedule_unscheduled(const std::vector<FuncPtr>& outputs) {
+  std::vector<FuncPtr> result;
+  run_on_large_stack([&] {
+    result = apply_wrappers(outputs);
+    const DefaultSchedules chosen = default_schedules(result);
+    if (!chosen.empty()) result = with_schedules(result, chosen);
+  });
+  return result;
 }
 
 }  // namespace retrograde::ir

@@ -15,7 +15,7 @@
 #include <unordered_map>
 #include <vector>
 
-#include "frontend/function.h"
+#include "graph/function.h"
 
 namespace retrograde::ir {
 
@@ -26,5 +26,9 @@ struct ChosenSchedule {
 // Chosen schedules by Func; a Func that is not here keeps its own. The Funcs are not changed.
 using DefaultSchedules = std::unordered_map<const FuncContents*, ChosenSchedule>;
 DefaultSchedules default_schedules(const std::vector<FuncPtr>& outputs);
+
+// The pass: the outputs with their wrappers applied, or, where schedules are chosen, of a copy of
+// the graph that has them. What lowering is given.
+std::vector<FuncPtr> schedule_unscheduled(const std::vector<FuncPtr>& outputs);
 
 }  // namespace retrograde::ir

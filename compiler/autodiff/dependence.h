@@ -19,7 +19,7 @@
 
 #include "analysis/interval.h"
 #include "autodiff/isl_bridge.h"
-#include "frontend/function.h"
+#include "graph/function.h"
 
 namespace retrograde::ir {
 

@@ -7,7 +7,7 @@
 #include "autodiff/gradient_lookup.h"
 #include "autodiff/leave_out.h"
 #include "autodiff/synthesis.h"
-#include "frontend/define.h"
+#include "graph/define.h"
 #include "ir/build.h"
 #include "ir/variables.h"
 #include "simplify/simplify.h"

@@ -3,16 +3,14 @@
 #include <algorithm>
 #include <cstdio>
 
-#include "autodiff/adjoint_contents.h"
 #include "diagnostics/error.h"
+#include "graph/function.h"
 
 namespace retrograde::ir {
 
 namespace {
 
 using What = Explanation::Kind;
-
-bool is_made(const FuncContents& f) { return dynamic_cast<const AdjointContents*>(&f) != nullptr; }
 
 std::string counted(const Count& count, const char* what) {
   return count.text() + " " + what + (count.value() == 1.0 ? "" : "s");
@@ -29,13 +27,13 @@ Explanation stored(const FuncOperations& f) {
   std::string work =
       f.is_extern ? "operations of a C function" : counted(f.operations(), "operation");
   return {What::Stored, f.func->name,
-          text(is_made(*f.func) ? "" : "the gradient reads its values; ", counted(f.bytes, "byte"),
+          text(f.func->made ? "" : "the gradient reads its values; ", counted(f.bytes, "byte"),
                ", ", work, ", ", reason_to_store(*f.func))};
 }
 
 // A Func of the program with updates that nobody scheduled.
 bool is_stored_by_default(const FuncOperations& f) {
-  return f.stored && !is_made(*f.func) && !f.func->is_pure() && !f.is_extern &&
+  return f.stored && !f.func->made && !f.func->is_pure() && !f.is_extern &&
          f.func->schedule.compute_level.kind == LoopLevel::Kind::Inlined;
 }
 Explanation computed_once(const FuncOperations& f) {
@@ -49,7 +47,7 @@ Explanation recomputed(const FuncOperations& f) {
   Operations each;
   for (const StageOperations& s : f.stages) each += s.each;
   return {What::Recomputed, f.func->name,
-          text(is_made(*f.func) ? "" : "the gradient reads its values; ", "in each of ",
+          text(f.func->made ? "" : "the gradient reads its values; ", "in each of ",
                counted(f.evaluations, "read"), ", ", counted(each.total(), "operation"),
                " a time, no bytes")};
 }

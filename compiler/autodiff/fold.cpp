@@ -2,11 +2,11 @@
 
 #include <algorithm>
 
-#include "autodiff/adjoint_contents.h"
 #include "autodiff/numbering.h"
 #include "autodiff/versions.h"
-#include "frontend/define.h"
 #include "frontend/var.h"
+#include "graph/define.h"
+#include "graph/function.h"
 #include "ir/build.h"
 #include "ir/visit.h"
 
@@ -27,8 +27,7 @@ class Fold {
     check_numbers(c_, least_iterations(c_.definition.rvars) + 1, "the kept steps of an update");
     adjoint_ = begin_steps(f_->name + "_adj_steps", iteration_count(c_.definition.rvars),
                            result_.current.func);
-    if (c_.domain.predicate.defined())
-      static_cast<AdjointContents&>(*adjoint_).traits.masked = true;
+    if (c_.domain.predicate.defined()) adjoint_->made->traits.masked = true;
     const std::vector<Expr> seeds = seeds_after();
     const SweepResult sweep = c_.sweep_iterations(adjoint_, [&] { return seeds; });
     const std::vector<Expr> needed = c_.needed_reads(sweep);
@@ -49,7 +48,7 @@ class Fold {
 
   // A Func with a dimension for steps, which has the values of `from` at one of them.
   FuncPtr begin_steps(const std::string& name, const Expr& at, const FuncPtr& from) const {
-    FuncPtr steps = std::make_shared<AdjointContents>();
+    FuncPtr steps = make_func(Role::Steps);
     steps->name = claim_name(name);
     std::vector<Expr> zeros, values;
     for (size_t k = 0; k < f_->types.size(); ++k) {

@@ -1,10 +1,10 @@
 #include "autodiff/fold_time.h"
 
-#include "autodiff/adjoint_contents.h"
 #include "autodiff/time_axis.h"
 #include "diagnostics/error.h"
-#include "frontend/define.h"
 #include "frontend/var.h"
+#include "graph/define.h"
+#include "graph/function.h"
 #include "ir/build.h"
 #include "ir/print.h"
 #include "ir/variables.h"
@@ -74,7 +74,7 @@ class Folder {
 
   FuncPtr make_folded(const UpdateContext& c, const TimeAxis& axis, const FuncPtr& start,
                       const FuncPtr& pure) const {
-    FuncPtr folded = std::make_shared<AdjointContents>();
+    FuncPtr folded = make_func(Role::TimeFold);
     folded->name = claim_name(c.f->name + "_folded");
     std::vector<Expr> at_start = c.point, initial;
     at_start[axis.dim] = time_at_start(c.point[axis.dim], axis);
@@ -146,10 +146,8 @@ class Folder {
 
   // The first stages of f.
   FuncPtr clone(const FuncPtr& f, int stages, const std::string& name) const {
-    auto copy = std::make_shared<AdjointContents>();
-    if (const auto* adjoint = dynamic_cast<const AdjointContents*>(f.get()))
-      copy->traits = adjoint->traits;
-    FuncPtr g = copy;
+    FuncPtr g = make_func(Role::TimeFold);
+    if (f->made) g->made->traits = f->made->traits;
     g->name = claim_name(name);
     std::vector<Expr> args = variables_of(f->args), values;
     for (const Expr& v : f->pure->values) values.push_back(mapped(v));

@@ -7,7 +7,7 @@
 #include "autodiff/custom_derivative.h"
 #include "autodiff/custom_rules.h"
 #include "autodiff/local_derivative.h"
-#include "frontend/define.h"
+#include "graph/define.h"
 #include "ir/build.h"
 #include "ir/equal.h"
 #include "ir/variables.h"

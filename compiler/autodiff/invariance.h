@@ -22,7 +22,7 @@
 #include <unordered_set>
 #include <vector>
 
-#include "frontend/function.h"
+#include "graph/function.h"
 
 namespace retrograde::ir {
 

@@ -245,11 +245,9 @@ AdjointTraits traits_of(const Expr& adjoint) {
     const bool is_operator = call->call_type == CallType::Operator;
     result.singular |= is_operator && has_poles(*call);
     result.vanished |= is_operator && levels_off(call->op);
-    const auto* f = call->call_type == CallType::Func
-                        ? dynamic_cast<const AdjointContents*>(call->symbol.raw())
-                        : nullptr;
-    if (f) result.add(f->traits);
-    if (f && e.same_as(top)) is_seed = false;
+    const Provenance* made = provenance_of(*call);
+    if (made) result.add(made->traits);
+    if (made && e.same_as(top)) is_seed = false;
     return true;
   });
   result.masked |= is_seed;

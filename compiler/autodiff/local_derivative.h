@@ -11,8 +11,8 @@
 #include <unordered_set>
 #include <vector>
 
-#include "autodiff/adjoint_contents.h"
 #include "autodiff/derivative_rules.h"
+#include "graph/function.h"
 #include "ir/expr.h"
 #include "ir/lets.h"
 #include "ir/visit.h"

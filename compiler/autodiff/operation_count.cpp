@@ -4,12 +4,12 @@
 #include <cmath>
 #include <unordered_map>
 
-#include "autodiff/adjoint_contents.h"
 #include "autodiff/default_schedule.h"
 #include "autodiff/distinct_nodes.h"
 #include "autodiff/local_derivative.h"
 #include "autodiff/regions.h"
 #include "diagnostics/error.h"
+#include "graph/function.h"
 #include "ir/build.h"
 #include "ir/print.h"
 #include "ir/visit.h"
@@ -134,9 +134,7 @@ class Counter {
       entry.bytes = entry.evaluations * bytes;
     }
     for (int s = 0; s < f->stage_count(); ++s) entry.stages.push_back(count_stage(entry, s));
-    if (const auto* made = dynamic_cast<const AdjointContents*>(f.get());
-        made && !made->work.empty())
-      count_work(entry, made->work);
+    if (f->made && !f->made->work.empty()) count_work(entry, f->made->work);
     if (!entry.stored) {
       for (const Expr& value : f->pure->values)
         value_costs_[f.get()].push_back(with_reads(body_of({value})));

@@ -19,7 +19,7 @@
 #include <vector>
 
 #include "analysis/interval.h"
-#include "frontend/function.h"
+#include "graph/function.h"
 
 namespace retrograde::ir {
 

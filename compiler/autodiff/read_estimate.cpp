@@ -6,9 +6,9 @@
 #include <cmath>
 
 #include "analysis/linear.h"
-#include "autodiff/adjoint_contents.h"
 #include "autodiff/local_derivative.h"
 #include "autodiff/regions.h"
+#include "graph/function.h"
 #include "ir/build.h"
 #include "ir/visit.h"
 #include "simplify/simplify.h"
@@ -33,11 +33,10 @@ std::vector<Loop> loops_of(const FuncContents& f, const Definition& stage) {
     auto extent = as_const_int(simplify(r.extent));
     loops.push_back({r.var, extent ? std::max(1.0, static_cast<double>(*extent)) : several});
   }
-  const auto* made = dynamic_cast<const AdjointContents*>(&f);
   for (size_t d = 0; d < f.args.size(); ++d) {
     if (!is_pure_position(f, stage, d)) continue;
-    const bool is_lane = made && made->lanes > 0 && d == 0;
-    loops.push_back({f.args[d], is_lane ? made->lanes : several, !is_lane});
+    const bool is_lane = f.made && f.made->lanes > 0 && d == 0;
+    loops.push_back({f.args[d], is_lane ? f.made->lanes : several, !is_lane});
   }
   return loops;
 }

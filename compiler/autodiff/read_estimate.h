@@ -2,7 +2,7 @@
 // is weighed against.
 #pragma once
 
-#include "frontend/function.h"
+#include "graph/function.h"
 
 namespace retrograde::ir {
 

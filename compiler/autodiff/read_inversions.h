@@ -6,7 +6,7 @@
 #include <string>
 
 #include "autodiff/inversion_cost.h"
-#include "frontend/function.h"
+#include "graph/function.h"
 
 namespace retrograde::ir {
 

@@ -8,8 +8,8 @@
 #include "autodiff/checkpoint.h"
 #include "autodiff/update_relations.h"
 #include "autodiff/versions.h"
-#include "frontend/define.h"
 #include "frontend/var.h"
+#include "graph/define.h"
 #include "ir/build.h"
 #include "simplify/simplify.h"
 

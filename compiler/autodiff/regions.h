@@ -8,7 +8,7 @@
 
 #include "analysis/interval.h"
 #include "autodiff/access_inversion.h"
-#include "frontend/function.h"
+#include "graph/function.h"
 
 namespace retrograde::ir {
 

@@ -3,12 +3,12 @@
 #include <algorithm>
 
 #include "autodiff/accumulation.h"
-#include "autodiff/adjoint_contents.h"
 #include "autodiff/regions.h"
 #include "autodiff/reverse_sweep.h"
 #include "autodiff/versions.h"
-#include "frontend/define.h"
 #include "frontend/var.h"
+#include "graph/define.h"
+#include "graph/function.h"
 #include "ir/build.h"
 #include "ir/equal.h"
 #include "ir/variables.h"
@@ -85,7 +85,7 @@ class Finder {
   }
 
   FuncPtr make_winner(const Expr& condition) const {
-    FuncPtr w = std::make_shared<AdjointContents>();
+    FuncPtr w = make_func(Role::Winner);
     w->name = claim_name(f_->name + "_winner");
     std::vector<Expr> args = variables_of(f_->args), initial;
     FuncPtr before = stage_ > 1 ? clone_prefix(f_, stage_) : nullptr;

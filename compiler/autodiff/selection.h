@@ -5,7 +5,7 @@
 #include <optional>
 #include <vector>
 
-#include "frontend/function.h"
+#include "graph/function.h"
 
 namespace retrograde::ir {
 

@@ -9,11 +9,11 @@
 
 #include "analysis/interval.h"
 #include "autodiff/accumulation.h"
-#include "autodiff/adjoint_contents.h"
 #include "autodiff/cost_estimate.h"
 #include "autodiff/distinct_nodes.h"
-#include "frontend/define.h"
 #include "frontend/var.h"
+#include "graph/define.h"
+#include "graph/function.h"
 #include "ir/build.h"
 #include "ir/print.h"
 #include "simplify/simplify.h"
@@ -120,8 +120,7 @@ class Sharing {
       if (!seed.defined()) continue;
       walk(seed, [&](const Expr& e) {
         const auto* call = e.as<Call>();
-        if (call && dynamic_cast<const AdjointContents*>(call->symbol.raw()))
-          result.insert(call->symbol.raw());
+        if (call && provenance_of(*call)) result.insert(call->symbol.raw());
         return true;
       });
     }
@@ -202,7 +201,7 @@ bool is_bounded_box(const IterationDomain& domain) {
 
 FuncPtr define_over(const IterationDomain& domain, const std::string& name,
                     const std::vector<Expr>& values) {
-  auto f = std::make_shared<AdjointContents>();
+  auto f = make_func(Role::SharedValue);
   f->name = claim_name(name);
   Substitution names;
   std::vector<Expr> args, here;
@@ -212,7 +211,7 @@ FuncPtr define_over(const IterationDomain& domain, const std::string& name,
   }
   for (const Expr& value : values) {
     here.push_back(substitute(value, names));
-    f->traits.add(traits_of(value));
+    f->made->traits.add(traits_of(value));
   }
   define_pure(f, args, here);
   return f;

@@ -15,7 +15,7 @@
 #include "autodiff/versions.h"
 #include "autodiff/zero_reasons.h"
 #include "diagnostics/error.h"
-#include "frontend/define.h"
+#include "graph/define.h"
 #include "ir/build.h"
 #include "ir/print.h"
 #include "ir/variables.h"

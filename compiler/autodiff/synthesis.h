@@ -26,7 +26,7 @@
 #include "autodiff/regions.h"
 #include "autodiff/update.h"
 #include "autodiff/version_budget.h"
-#include "frontend/function.h"
+#include "graph/function.h"
 
 namespace retrograde::ir {
 

@@ -3,13 +3,13 @@
 #include <algorithm>
 
 #include "autodiff/accumulation.h"
-#include "autodiff/adjoint_contents.h"
 #include "autodiff/custom_rules.h"
 #include "autodiff/forward_sweep.h"
 #include "autodiff/value_range.h"
 #include "diagnostics/error.h"
-#include "frontend/define.h"
 #include "frontend/var.h"
+#include "graph/define.h"
+#include "graph/function.h"
 #include "ir/build.h"
 #include "ir/variables.h"
 
@@ -20,7 +20,7 @@ namespace {
 Type tangent_type(Type t) { return t.is_float() ? adjoint_type(t) : Float(32); }
 
 FuncPtr new_func(const std::string& name) {
-  auto f = std::make_shared<AdjointContents>();
+  auto f = make_func(Role::Tangent);
   f->name = claim_name(name);
   return f;
 }
@@ -74,7 +74,7 @@ class FuncTangent {
 
   // Tangents pass through the stages again and again: what one does to them concerns all.
   bool linearise_all(const FuncPtr& own, size_t offset) {
-    AdjointTraits& traits = static_cast<AdjointContents&>(*own).traits;
+    AdjointTraits& traits = own->made->traits;
     AdjointTraits before;
     bool alone = false;
     do {
@@ -131,7 +131,7 @@ class FuncTangent {
   FuncPtr build_dual() {
     dual_ = new_func(f_->name + "_dual");
     linearise_all(dual_, count());
-    static_cast<AdjointContents&>(*tangent_).traits = static_cast<AdjointContents&>(*dual_).traits;
+    tangent_->made->traits = dual_->made->traits;
     for (int s = 0; s < f_->stage_count(); ++s)
       define(dual_, s, f_->stage(s).values, stages_[s].values);
     std::vector<Expr> values, args = variables_of(f_->args);
@@ -258,7 +258,7 @@ class TangentSynthesis {
           cast_to(tangent_type(f.types[k]), call_value(found->second, args, static_cast<int>(k))));
     }
     define_pure(sum, args, values);
-    static_cast<AdjointContents&>(*sum).traits = static_cast<const AdjointContents&>(*own).traits;
+    sum->made->traits = own->made->traits;
     result_.funcs.push_back(sum);
     return sum;
   }

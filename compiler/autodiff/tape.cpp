@@ -2,14 +2,14 @@
 
 #include <algorithm>
 
-#include "autodiff/adjoint_contents.h"
 #include "autodiff/local_derivative.h"
 #include "autodiff/recurrence.h"
 #include "autodiff/tape_layout.h"
 #include "autodiff/versions.h"
 #include "diagnostics/error.h"
-#include "frontend/define.h"
 #include "frontend/var.h"
+#include "graph/define.h"
+#include "graph/function.h"
 #include "ir/build.h"
 #include "simplify/simplify.h"
 
@@ -53,12 +53,12 @@ class Tape {
   // Its elements outside of what is read, and those that were overwritten, are exactly 0.
   void begin_adjoint() {
     adjoint_ = begin_tape(f_->name + "_adj_tape", result_.current.func);
-    static_cast<AdjointContents&>(*adjoint_).traits.masked = true;
+    adjoint_->made->traits.masked = true;
   }
 
   // A tape whose elements are those of `from`, and whose other slots are 0.
   FuncPtr begin_tape(const std::string& name, const FuncPtr& from) const {
-    FuncPtr tape = std::make_shared<AdjointContents>();
+    FuncPtr tape = make_func(Role::Tape);
     tape->name = claim_name(name);
     auto rdom = std::make_shared<ReductionDomainContents>();
     rdom->frozen = true;
@@ -257,7 +257,7 @@ class Tape {
         work.values.push_back(redirect_calls(kept(v), tape, tape, true));
     }
     for (const ReductionVariable& r : c_.definition.rvars) work.loops.push_back(r.extent);
-    static_cast<AdjointContents&>(*tape).work = {std::move(work)};
+    tape->made->work = {std::move(work)};
   }
   Expr kept(const Expr& e) const {
     if (result_.self_values.empty()) return e;

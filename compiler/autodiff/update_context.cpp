@@ -4,7 +4,7 @@
 #include <set>
 
 #include "diagnostics/error.h"
-#include "frontend/define.h"
+#include "graph/define.h"
 #include "ir/build.h"
 #include "ir/print.h"
 #include "simplify/simplify.h"
@@ -195,7 +195,7 @@ SweepResult UpdateContext::sweep_at_write(const FuncPtr& adjoint) const {
 
 SweepResult UpdateContext::sweep_iterations(const FuncPtr& adjoint,
                                             FunctionRef<std::vector<Expr>()> seeds) const {
-  AdjointTraits& traits = static_cast<AdjointContents&>(*adjoint).traits;
+  AdjointTraits& traits = adjoint->made->traits;
   AdjointTraits before;
   SweepResult result;
   do {

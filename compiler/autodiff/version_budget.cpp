@@ -3,11 +3,11 @@
 #include <algorithm>
 
 #include "autodiff/accumulation.h"
-#include "autodiff/adjoint_contents.h"
 #include "diagnostics/error.h"
-#include "frontend/define.h"
 #include "frontend/expr_ops.h"
 #include "frontend/var.h"
+#include "graph/define.h"
+#include "graph/function.h"
 #include "ir/build.h"
 #include "simplify/simplify.h"
 
@@ -70,7 +70,7 @@ FuncPtr VersionBudget::take(const KeptVersions& versions, std::vector<Explanatio
 
 // A scalar that is 0, or fails; the copy's pure definition reads it.
 FuncPtr VersionBudget::guard(const KeptVersions& versions, const Expr& bytes) const {
-  FuncPtr check = std::make_shared<AdjointContents>();
+  FuncPtr check = make_func(Role::VersionCheck);
   check->name = claim_name(versions.copy->name + "_fits");
   const Expr fits = bytes <= make_const(Float(64), static_cast<double>(rules_.bytes));
   const std::string asked = text("cannot ", versions.asked, ": ", rule(), ", but with those of ",

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "autodiff/explain.h"
-#include "frontend/function.h"
+#include "graph/function.h"
 
 namespace retrograde::ir {
 

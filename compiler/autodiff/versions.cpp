@@ -1,10 +1,10 @@
 #include "autodiff/versions.h"
 
 #include "autodiff/accumulation.h"
-#include "autodiff/adjoint_contents.h"
 #include "autodiff/reverse_sweep.h"
-#include "frontend/define.h"
 #include "frontend/var.h"
+#include "graph/define.h"
+#include "graph/function.h"
 #include "ir/build.h"
 #include "ir/variables.h"
 #include "ir/visit.h"
@@ -13,10 +13,8 @@
 namespace retrograde::ir {
 
 FuncPtr clone_prefix(const FuncPtr& f, int stages, const std::string& name) {
-  auto copy = std::make_shared<AdjointContents>();
-  if (const auto* adjoint = dynamic_cast<const AdjointContents*>(f.get()))
-    copy->traits = adjoint->traits;
-  FuncPtr g = copy;
+  FuncPtr g = make_func(Role::Version);
+  if (f->made) g->made->traits = f->made->traits;
   g->name =
       claim_name(name.empty() ? f->name + "_before_update" + std::to_string(stages - 1) : name);
   define_pure(g, variables_of(f->args), f->pure->values);

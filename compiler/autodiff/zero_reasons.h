@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "frontend/function.h"
+#include "graph/function.h"
 #include "ir/visit.h"
 
 namespace retrograde::ir {

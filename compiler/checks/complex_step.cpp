@@ -6,9 +6,9 @@
 #include "autodiff/accumulation.h"
 #include "autodiff/default_schedule.h"
 #include "autodiff/local_derivative.h"
-#include "frontend/define.h"
 #include "frontend/image_param.h"
 #include "frontend/param.h"
+#include "graph/define.h"
 #include "ir/build.h"
 #include "ir/print.h"
 #include "ir/variables.h"
@@ -108,7 +108,7 @@ class Complexifier {
   }
 
   void add(const FuncPtr& f) {
-    auto to = std::make_shared<AdjointContents>();  // for its default schedule
+    auto to = make_func(Role::Widened);
     to->name = claim_name(f->name + "_complex");
     funcs_[f.get()] = to;
     const std::vector<Expr> args = variables_of(f->args);

@@ -1,12 +1,12 @@
 #include "checks/widen.h"
 
 #include "autodiff/accumulation.h"
-#include "autodiff/adjoint_contents.h"
 #include "autodiff/local_derivative.h"
 #include "diagnostics/error.h"
-#include "frontend/define.h"
 #include "frontend/image_param.h"
 #include "frontend/param.h"
+#include "graph/define.h"
+#include "graph/function.h"
 #include "ir/build.h"
 #include "ir/variables.h"
 
@@ -59,7 +59,7 @@ class Widening {
     if (f->is_extern())
       refuse(text("the C function ", quoted(f->extern_definition->function), " behind ",
                   quoted(f->name)));
-    auto to = std::make_shared<AdjointContents>();  // for its default schedule
+    auto to = make_func(Role::Widened);
     to->name = claim_name(f->name + "_double");
     result_.funcs[f.get()] = to;
     const std::vector<Expr> args = variables_of(f->args);

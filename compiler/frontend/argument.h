@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
-#include "frontend/function.h"
 #include "frontend/rdom.h"
+#include "graph/function.h"
 
 namespace retrograde {
 

@@ -19,9 +19,9 @@
 #include <vector>
 
 #include "frontend/expr_ops.h"
-#include "frontend/function.h"
 #include "frontend/rdom.h"
 #include "frontend/var.h"
+#include "graph/function.h"
 #include "ir/target.h"
 
 // Element types that HalideBuffer.h does not know.

@@ -10,8 +10,8 @@
 #include <string>
 #include <vector>
 
-#include "frontend/function.h"
 #include "frontend/jit_handlers.h"
+#include "graph/function.h"
 #include "ir/lowered_function.h"
 #include "ir/target.h"
 
@@ -33,7 +33,7 @@ struct PipelineSpec {
 struct CallContext {
   std::function<void(const char*)> print;  // text of print() and print_when(); empty: thrown away
   int thread_limit = 0;                    // 0: as many as there are
-  JITHandlers handlers;  // those that are set replace what the runtime does
+  JITHandlers handlers;                    // those that are set replace what the runtime does
   JITUserContext* user_context = nullptr;  // for the handlers; not null when one is set
   std::string error;                       // out: the message of the error code that run() returned
 };

@@ -1,8 +1,8 @@
 // extern_argument.cpp -- stages that a C function computes.
 #include "frontend/extern_argument.h"
 
-#include "frontend/define.h"
 #include "frontend/func.h"
+#include "graph/define.h"
 #include "ir/print.h"
 #include "ir/variables.h"
 

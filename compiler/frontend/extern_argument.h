@@ -6,9 +6,9 @@
 #include <type_traits>
 
 #include "frontend/buffer.h"
-#include "frontend/function.h"
 #include "frontend/image_param.h"
 #include "frontend/param.h"
+#include "graph/function.h"
 
 namespace retrograde {
 

@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "frontend/define.h"
+#include "graph/define.h"
 #include "ir/print.h"
 #include "ir/visit.h"
 

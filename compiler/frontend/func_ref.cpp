@@ -3,9 +3,9 @@
 
 #include <algorithm>
 
-#include "frontend/define.h"
 #include "frontend/several_points.h"
 #include "frontend/var.h"
+#include "graph/define.h"
 
 namespace retrograde {
 

@@ -4,9 +4,9 @@
 #include <vector>
 
 #include "frontend/expr_ops.h"
-#include "frontend/function.h"
 #include "frontend/stage.h"
 #include "frontend/tuple.h"
+#include "graph/function.h"
 
 namespace retrograde {
 

@@ -3,9 +3,9 @@
 
 #include <algorithm>
 
-#include "frontend/define.h"
+#include "graph/define.h"
 #include "frontend/func.h"
-#include "frontend/wrappers.h"
+#include "graph/wrappers.h"
 #include "ir/literal.h"
 #include "ir/print.h"
 #include "ir/visit.h"

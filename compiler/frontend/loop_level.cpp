@@ -5,14 +5,6 @@
 
 namespace retrograde {
 
-namespace ir {
-
-bool operator==(const LoopLevel& a, const LoopLevel& b) {
-  return a.kind == b.kind && a.func == b.func && a.var == b.var && a.stage == b.stage;
-}
-
-}  // namespace ir
-
 LoopLevel::LoopLevel() : contents_(std::make_shared<ir::LoopLevelContents>()) {}
 
 LoopLevel::LoopLevel(ir::LoopLevel level) : LoopLevel() {

@@ -11,8 +11,8 @@
 #include <memory>
 #include <string>
 
-#include "frontend/function.h"
 #include "frontend/var_or_rvar.h"
+#include "graph/function.h"
 
 namespace retrograde {
 

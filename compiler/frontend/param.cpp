@@ -1,7 +1,7 @@
 // param.cpp -- values and limits of scalar parameters.
 #include "frontend/param.h"
 
-#include "frontend/define.h"
+#include "graph/define.h"
 #include "ir/literal.h"
 #include "ir/print.h"
 #include "ir/visit.h"

@@ -9,8 +9,8 @@
 #include <type_traits>
 
 #include "frontend/argument.h"
-#include "frontend/function.h"
 #include "frontend/var.h"
+#include "graph/function.h"
 
 namespace retrograde {
 

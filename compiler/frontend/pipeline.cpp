@@ -8,7 +8,7 @@
 #include "frontend/call.h"
 #include "frontend/func.h"
 #include "frontend/warnings.h"
-#include "frontend/wrappers.h"
+#include "graph/wrappers.h"
 
 namespace retrograde {
 

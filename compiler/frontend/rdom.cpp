@@ -162,24 +162,4 @@ std::ostream& operator<<(std::ostream& out, const RDom& domain) {
   return out << ")";
 }
 
-namespace ir {
-
-std::shared_ptr<ReductionDomainContents> domain_of(const Variable& variable) {
-  if (!variable.symbol.defined()) return nullptr;
-  return std::dynamic_pointer_cast<ReductionDomainContents>(variable.symbol.lock());
-}
-
-Expr rebind_symbol(const Expr& e, const SymbolRef& symbol) {
-  return rebind_symbol(e, symbol.raw(), symbol);
-}
-
-Expr rebind_symbol(const Expr& e, const Symbol* from, const SymbolRef& to) {
-  return rewrite(e, [&](const Expr& part, const std::function<Expr(const Expr&)>& recurse) -> Expr {
-    const Variable* v = part.as<Variable>();
-    if (!v || v->symbol.raw() != from) return map_children(part, recurse);
-    return variable(v->name, v->type, to);
-  });
-}
-
-}  // namespace ir
 }  // namespace retrograde

@@ -11,8 +11,8 @@
 #include <type_traits>
 #include <vector>
 
-#include "frontend/function.h"
 #include "frontend/var.h"
+#include "graph/function.h"
 
 namespace retrograde {
 
@@ -105,12 +105,4 @@ class RDom {
 std::ostream& operator<<(std::ostream& out, const RVar& var);
 std::ostream& operator<<(std::ostream& out, const RDom& domain);
 
-namespace ir {
-// The reduction domain that a variable belongs to; null for any other variable.
-std::shared_ptr<ReductionDomainContents> domain_of(const Variable& variable);
-// `e` with every mention of `symbol`'s entity made through this very reference (weak or strong).
-Expr rebind_symbol(const Expr& e, const SymbolRef& symbol);
-// With the variables of the symbol `from` referring to another.
-Expr rebind_symbol(const Expr& e, const Symbol* from, const SymbolRef& to);
-}  // namespace ir
 }  // namespace retrograde

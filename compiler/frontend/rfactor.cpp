@@ -17,10 +17,10 @@
 #include <map>
 #include <unordered_set>
 
-#include "frontend/associative_update.h"
-#include "frontend/define.h"
 #include "frontend/func.h"
-#include "frontend/reduction_leaves.h"
+#include "graph/associative_update.h"
+#include "graph/define.h"
+#include "graph/reduction_leaves.h"
 #include "ir/build.h"
 #include "ir/conjuncts.h"
 #include "ir/memory_reads.h"

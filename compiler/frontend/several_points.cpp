@@ -10,11 +10,11 @@
 
 #include <algorithm>
 
-#include "frontend/define.h"
 #include "frontend/integer_ops.h"
 #include "frontend/rdom.h"
 #include "frontend/stage.h"
-#include "frontend/wrappers.h"
+#include "graph/define.h"
+#include "graph/wrappers.h"
 #include "ir/build.h"
 #include "ir/print.h"
 #include "ir/variables.h"

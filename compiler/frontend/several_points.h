@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "frontend/function.h"
+#include "graph/function.h"
 
 namespace retrograde::ir {
 

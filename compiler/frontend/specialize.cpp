@@ -3,8 +3,8 @@
 // A stage's schedule owns a list of specializations, each a whole schedule that may be specialized
 // again: a tree. A Stage handle holds the path from the stage to one of its schedules, so that it
 // stays right when siblings are added.
-#include "frontend/define.h"
 #include "frontend/stage.h"
+#include "graph/define.h"
 #include "ir/equal.h"
 #include "ir/print.h"
 #include "ir/visit.h"

@@ -5,9 +5,9 @@
 #include <algorithm>
 #include <unordered_set>
 
-#include "frontend/associative_update.h"
-#include "frontend/define.h"
-#include "frontend/race.h"
+#include "graph/associative_update.h"
+#include "graph/define.h"
+#include "graph/race.h"
 #include "ir/print.h"
 
 namespace retrograde {

@@ -11,9 +11,9 @@
 #include <utility>
 #include <vector>
 
-#include "frontend/function.h"
 #include "frontend/loop_level.h"
 #include "frontend/var_or_rvar.h"
+#include "graph/function.h"
 #include "ir/target.h"
 
 namespace retrograde {
@@ -35,9 +35,9 @@ class Stage {
   const ir::FuncPtr& function() const { return func_; }
   int index() const { return index_; }
   const ir::StageSchedule& get_schedule() const { return schedule(); }
-  std::string dump_argument_list() const;  // the loops, innermost first
+  std::string dump_argument_list() const;     // the loops, innermost first
   std::vector<VarOrRVar> split_vars() const;  // the same as variables
-  std::string source_location() const;     // where the Func was declared: "blur.cpp:12"
+  std::string source_location() const;        // where the Func was declared: "blur.cpp:12"
 
   // ---- the shape of the loops ----
 

@@ -1,6 +1,6 @@
 // stage_company.cpp -- directives that relate a stage to others: compute_with and prefetch.
-#include "frontend/define.h"
 #include "frontend/func.h"
+#include "graph/define.h"
 #include "ir/build.h"
 #include "ir/literal.h"
 #include "ir/print.h"

@@ -5,8 +5,8 @@
 // is checked when the pipeline is compiled.
 #include <algorithm>
 
-#include "frontend/define.h"
 #include "frontend/func.h"
+#include "graph/define.h"
 #include "ir/literal.h"
 #include "ir/print.h"
 #include "ir/visit.h"

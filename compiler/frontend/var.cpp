@@ -4,9 +4,7 @@
 #include <algorithm>
 #include <atomic>
 #include <cctype>
-#include <mutex>
 #include <ostream>
-#include <unordered_map>
 
 #include "ir/literal.h"
 #include "ir/print.h"
@@ -50,51 +48,13 @@ Var::Var() : expr_() {
 
 Var::Var(const std::string& name) : name_(checked_name(name)), expr_(ir::variable(name_)) {}
 
-Var Var::implicit(int n) { return Var("_" + std::to_string(n)); }
-
-int Var::implicit_index(const std::string& name) {
-  if (name.size() < 2 || name.size() > 4 || name[0] != '_') return -1;
-  auto is_digit = [](unsigned char c) { return std::isdigit(c) != 0; };
-  return std::all_of(name.begin() + 1, name.end(), is_digit) ? std::stoi(name.substr(1)) : -1;
-}
+Var Var::implicit(int n) { return Var(ir::implicit_name(n)); }
 
 std::ostream& operator<<(std::ostream& out, const Var& var) { return out << var.name(); }
 
 namespace ir {
 
 namespace {
-
-std::string as_identifier(std::string name) {
-  for (char& c : name) {
-    if (!std::isalnum(static_cast<unsigned char>(c)) && c != '_' && c != '$') c = '_';
-  }
-  if (name.empty() || std::isdigit(static_cast<unsigned char>(name[0])))
-    name.insert(name.begin(), '_');
-  return name;
-}
-
-enum class NameUse { Func, Parameter };
-
-// Who was given a name first. Names that contain '$' come from unique_name and need no entry.
-class NameTable {
- public:
-  std::string claim(const std::string& name, NameUse use) {
-    if (name.find('$') != std::string::npos) return unique_name(name);
-    std::lock_guard lock(mutex_);
-    auto [it, is_new] = used_.try_emplace(name, use);
-    if (is_new || (use == NameUse::Parameter && it->second == NameUse::Parameter)) return name;
-    return unique_name(name);
-  }
-
- private:
-  std::mutex mutex_;
-  std::unordered_map<std::string, NameUse> used_;
-};
-
-NameTable& name_table() {
-  static NameTable table;
-  return table;
-}
 
 // Coordinates are int32; floats are refused because a rounding rule would have to be guessed.
 Expr as_coordinate(const Expr& e, int dimension, const std::string& what) {
@@ -111,14 +71,6 @@ Expr as_coordinate(const Expr& e, int dimension, const std::string& what) {
 }
 
 }  // namespace
-
-std::string claim_name(const std::string& wanted) {
-  return name_table().claim(as_identifier(wanted), NameUse::Func);
-}
-
-std::string claim_parameter_name(const std::string& wanted) {
-  return name_table().claim(as_identifier(wanted), NameUse::Parameter);
-}
 
 int placeholder_position(const std::vector<Expr>& args) {
   for (size_t i = 0; i < args.size(); i++) {

@@ -8,6 +8,7 @@
 #include <type_traits>
 #include <vector>
 
+#include "graph/names.h"
 #include "ir/build.h"
 
 namespace retrograde {
@@ -35,15 +36,16 @@ class Var {
 
   // _0, _1 ...: what the placeholder _ stands for, dimension by dimension.
   static Var implicit(int n);
-  static bool is_implicit(const std::string& name) { return implicit_index(name) >= 0; }
-  static int implicit_index(const std::string& name);  // -1: not implicit
-  static bool is_placeholder(const std::string& name) { return name == "_"; }
+  static bool is_implicit(const std::string& name) { return ir::implicit_index(name) >= 0; }
+  // -1: not implicit
+  static int implicit_index(const std::string& name) { return ir::implicit_index(name); }
+  static bool is_placeholder(const std::string& name) { return ir::is_placeholder(name); }
   bool is_implicit() const { return is_implicit(name_); }
   int implicit_index() const { return implicit_index(name_); }
   bool is_placeholder() const { return is_placeholder(name_); }
 
   // A loop of one iteration around all others of a stage.
-  static Var outermost() { return Var("__outermost"); }
+  static Var outermost() { return Var(ir::outermost_loop); }
 
   operator const Expr&() const { return expr_; }
 
@@ -74,12 +76,6 @@ inline constexpr ImplicitVar<9> _9;
 std::ostream& operator<<(std::ostream& out, const Var& var);
 
 namespace ir {
-
-// `wanted` when no entity of this process has that name yet, else a fresh one that begins with it.
-// Characters that a C identifier cannot hold become underscores.
-std::string claim_name(const std::string& wanted);
-// The same for names that callers of compiled code see: `wanted` itself unless a Func has it.
-std::string claim_parameter_name(const std::string& wanted);
 
 // Arguments of an access with the placeholder _ replaced by `count` implicit variables. Position of
 // the placeholder, or -1, goes to `placeholder`.

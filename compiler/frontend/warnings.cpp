@@ -12,7 +12,7 @@
 #include <utility>
 
 #include "diagnostics/error.h"
-#include "frontend/wrappers.h"
+#include "graph/wrappers.h"
 #include "ir/build.h"
 #include "ir/print.h"
 #include "ir/visit.h"

@@ -28,9 +28,9 @@ std::string shortened(std::string text) {
 
 class Validator {
  public:
-  Validator(const Stmt& root, Phase phase, const std::string& pass,
+  Validator(const Stmt& before, Phase phase, const std::string& pass,
             const std::vector<std::string>& free_names)
-      : root_(root),
+      : before_(before),
         phase_(phase),
         pass_(pass),
         visible_(free_names.begin(), free_names.end()),
@@ -43,7 +43,7 @@ class Validator {
   [[noreturn]] void fail(const Tree& node, const std::string& rule) const {
     throw InternalError(text("after this pass the program breaks a rule of the phase ",
                              phase_name(phase_), ": ", rule, "\n  in: ", shortened(print(node))),
-                        pass_, shortened(print(root_)));
+                        pass_, before_.defined() ? print(before_) : "");
   }
   template <class Tree>
   void require(bool holds, const Tree& node, const char* rule) const {
@@ -116,7 +116,7 @@ class Validator {
       fail(node, std::string(kind_name(node.kind())) + " belongs to the phase FlatStorage");
   }
 
-  const Stmt& root_;
+  const Stmt& before_;
   const Phase phase_;
   const std::string pass_;
   std::unordered_set<std::string> visible_, bound_;
@@ -347,8 +347,8 @@ void Validator::check_branches(const IfThenElse& n) {
 }  // namespace
 
 void validate(const Stmt& s, Phase phase, const std::string& after_pass,
-              const std::vector<std::string>& free_names) {
-  Validator(s, phase, after_pass, free_names).check(s);
+              const std::vector<std::string>& free_names, const Stmt& before) {
+  Validator(before, phase, after_pass, free_names).check(s);
 }
 
 }  // namespace retrograde::ir

@@ -1,5 +1,6 @@
 // default_compiler.cpp -- what the front end's realize() reaches: lowering, then machine code in
 // this process.
+#include "autodiff/default_schedule.h"
 #include "frontend/compiler_interface.h"
 #include "jit/jit.h"
 #include "lower/lower.h"
@@ -120,7 +121,8 @@ class JitCompiler : public Compiler {
     options.target = pipeline.traced(target);
     options.validate = validate_passes;
     ir::LoweredFunction function =
-        ir::lower(pipeline.name, pipeline.outputs, ir::infer_arguments(pipeline.outputs), options);
+        ir::lower(pipeline.name, ir::schedule_unscheduled(pipeline.outputs),
+                  ir::infer_arguments(pipeline.outputs), options);
     jit::Options code_options;
     code_options.externs = pipeline.externs;
     auto code = jit::compile(function, target, code_options);
@@ -129,7 +131,7 @@ class JitCompiler : public Compiler {
   }
 
   std::string loop_nest(const PipelineSpec& pipeline, const Target&) override {
-    return ir::loop_nest_text(pipeline.outputs);
+    return ir::loop_nest_text(ir::schedule_unscheduled(pipeline.outputs));
   }
 };
 

@@ -9,7 +9,7 @@
 #include "codegen/codegen.h"
 #include "diagnostics/error.h"
 #include "diagnostics/large_stack.h"
-#include "frontend/pass_observer.h"
+#include "diagnostics/pass_observer.h"
 #include "jit/disk_cache.h"
 #include "jit/fingerprint.h"
 #include "jit/linker.h"
@@ -187,7 +187,8 @@ Handle compile(const ir::LoweredFunction& function, const Target& target, const 
   code_options.target = target;
   code_options.optimization_level = options.optimization_level;
   code_options.parts = options.parts;
-  if (!options.use_cache) return std::make_shared<Compiled>(function, code_options, options.externs);
+  if (!options.use_cache)
+    return std::make_shared<Compiled>(function, code_options, options.externs);
   const Fingerprint key = key_of(function, code_options, options.externs);
   if (Handle found = cache().find(key)) return found;
   return cache().insert(key, std::make_shared<Compiled>(function, code_options, options.externs));

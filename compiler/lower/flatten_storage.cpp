@@ -22,7 +22,7 @@
 #include <unordered_set>
 
 #include "diagnostics/error.h"
-#include "frontend/function.h"
+#include "graph/function.h"
 #include "ir/build.h"
 #include "ir/memory_reads.h"
 #include "ir/visit.h"

@@ -4,7 +4,7 @@
 #include <set>
 
 #include "diagnostics/error.h"
-#include "frontend/define.h"
+#include "graph/define.h"
 #include "ir/text.h"
 #include "ir/visit.h"
 #include "lower/specialize.h"

@@ -3,9 +3,8 @@
 #include <algorithm>
 #include <functional>
 
-#include "autodiff/default_schedule.h"
 #include "diagnostics/error.h"
-#include "frontend/wrappers.h"
+#include "graph/wrappers.h"
 #include "ir/visit.h"
 #include "lower/fused_groups.h"
 #include "lower/refuse_unsupported.h"
@@ -77,25 +76,18 @@ Program inline_functions(const std::vector<FuncPtr>& unwrapped) {
   Program program;
   InlinedFuncs inlined;
   Inliner inliner(inlined);
-  const DefaultSchedules defaults =
-      default_schedules(outputs);  // of adjoints that nobody scheduled
   for (const FuncPtr& f : topological_order(outputs)) {
     bool is_output = std::find(outputs.begin(), outputs.end(), f) != outputs.end();
     std::vector<Definition> stages;
     for (int i = 0; i < f->stage_count(); i++)
       stages.push_back(map_exprs(f->stage(i), std::ref(inliner)));
-    const auto chosen = defaults.find(f.get());
-    const FuncSchedule& schedule = chosen == defaults.end() ? f->schedule : chosen->second.func;
-    if (is_inlined(*f, schedule, is_output)) {
-      check_inlined(*f, schedule);
+    if (is_inlined(*f, f->schedule, is_output)) {
+      check_inlined(*f, f->schedule);
       inlined[f.get()] = {f->args, stages[0].values};
       continue;
     }
     program.index_of[f->name] = static_cast<int>(program.funcs.size());
-    for (size_t i = 0; chosen != defaults.end() && i < stages.size(); i++) {
-      stages[i].schedule = chosen->second.stages[i];
-    }
-    program.funcs.push_back({f, schedule, std::move(stages), is_output});
+    program.funcs.push_back({f, f->schedule, std::move(stages), is_output});
   }
   resolve_outermost_levels(program);
   refuse_unsupported(program);

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "frontend/function.h"
+#include "graph/function.h"
 #include "ir/lowered_function.h"
 #include "ir/target.h"
 
@@ -21,7 +21,7 @@ struct LowerOptions {
 
 // `inputs`: scalars and input buffers in the order the caller wants; outputs are appended as the
 // last arguments, one for each value of each output Func. Errors: UserError for illegal schedules,
-// unbounded regions, recursion; see the passes.
+// unbounded regions, recursion; see the passes. Requires: lowering stops after one of its passes.
 LoweredFunction lower(const std::string& name, const std::vector<FuncPtr>& outputs,
                       const std::vector<LoweredArgument>& inputs, const LowerOptions& options);
 

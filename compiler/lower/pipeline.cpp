@@ -4,7 +4,7 @@
 
 #include "diagnostics/error.h"
 #include "diagnostics/large_stack.h"
-#include "frontend/pass_observer.h"
+#include "diagnostics/pass_observer.h"
 #include "ir/build.h"
 #include "ir/print.h"
 #include "ir/validate.h"
@@ -228,9 +228,10 @@ Stmt run_passes(Lowering& lowering, const LowerOptions& options) {
   Stmt stmt;
   for (const Pass& pass : passes) {
     auto start = std::chrono::steady_clock::now();
-    stmt = pass.run(lowering, stmt);
+    const Stmt before = stmt;
+    stmt = pass.run(lowering, before);
     std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - start;
-    if (options.validate) validate(stmt, pass.phase, pass.name, names_of(lowering.args));
+    if (options.validate) validate(stmt, pass.phase, pass.name, names_of(lowering.args), before);
     if (options.observe) options.observe(pass.name, seconds.count(), stmt);
     tell_pass_observers({lowering.name, pass.name, seconds.count(), [&] { return print(stmt); }});
     if (options.stop_after == pass.name) break;
@@ -240,8 +241,23 @@ Stmt run_passes(Lowering& lowering, const LowerOptions& options) {
 
 }  // namespace
 
+namespace {
+
+void check_stop(const std::string& stop_after) {
+  const std::vector<std::string> names = pass_names();
+  if (stop_after.empty() || std::find(names.begin(), names.end(), stop_after) != names.end())
+    return;
+  std::string known;
+  for (const std::string& pass : names) known += (known.empty() ? "" : ", ") + pass;
+  user_error("stop lowering after " + quoted(stop_after), "lowering stops after one of its passes",
+             "they are " + known, "Name one of them, or none to run them all");
+}
+
+}  // namespace
+
 LoweredFunction lower(const std::string& name, const std::vector<FuncPtr>& outputs,
                       const std::vector<LoweredArgument>& inputs, const LowerOptions& options) {
+  check_stop(options.stop_after);
   LoweredFunction function{name, inputs, {}, {}};
   run_on_large_stack([&] {
     append_outputs(outputs, function.args);

@@ -1,8 +1,8 @@
 #include "lower/refuse_unsupported.h"
 
 #include "diagnostics/error.h"
-#include "frontend/define.h"
-#include "frontend/var.h"
+#include "graph/define.h"
+#include "graph/names.h"
 
 namespace retrograde::ir {
 
@@ -96,7 +96,7 @@ void check_inlined(const FuncContents& f, const FuncSchedule& schedule) {
 namespace {
 
 void resolve(const Program& program, LoopLevel& level) {
-  if (level.kind != LoopLevel::Kind::At || level.var != Var::outermost().name()) return;
+  if (level.kind != LoopLevel::Kind::At || level.var != outermost_loop) return;
   const LoopedFunc* consumer = program.find(level.func);
   if (!consumer) return;  // refused where every level finds its place
   level = consumer->is_output ? LoopLevel{LoopLevel::Kind::Root, "", "", -1}
@@ -106,7 +106,7 @@ void resolve(const Program& program, LoopLevel& level) {
 // Stages that share nothing but the outermost loop, which runs once, share nothing.
 void leave_outermost_company(StageSchedule& schedule) {
   LoopLevel& level = schedule.fuse_level;
-  if (level.kind == LoopLevel::Kind::At && level.var == Var::outermost().name()) level = {};
+  if (level.kind == LoopLevel::Kind::At && level.var == outermost_loop) level = {};
 }
 
 }  // namespace

@@ -20,7 +20,7 @@
 #include <string>
 #include <vector>
 
-#include "frontend/function.h"
+#include "graph/function.h"
 #include "testing/array.h"
 
 namespace retrograde::oracle {

@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "frontend/function.h"
+#include "graph/function.h"
 
 namespace retrograde::fuzz {
 

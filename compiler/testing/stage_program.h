@@ -9,7 +9,7 @@
 #include <unordered_map>
 #include <vector>
 
-#include "frontend/function.h"
+#include "graph/function.h"
 #include "testing/tracked_value.h"
 
 namespace retrograde::oracle {

@@ -4,7 +4,7 @@
 
 #include <limits>
 
-#include "frontend/define.h"
+#include "graph/define.h"
 #include "support/errors.h"
 
 namespace retrograde {

@@ -21,7 +21,7 @@ namespace {
 // What is shown: the loops of Func::print_loop_nest, or the statement after this pass.
 using View = const char*;
 constexpr View Loops = nullptr, Storage = "simplify_storage", Branches = "fork_async",
-               Lookups = "add_memoization_lookups", Cut = "partition_loops";
+               Lookups = "memoize", Cut = "partition_loops";
 
 struct Directive {
   const char* name;
@@ -67,11 +67,12 @@ const std::vector<Directive>& loop_directives() {
               Loops, ONE_FUNC, (f.parallel(y, 4))),
     DIRECTIVE("vectorize", "The iterations of a loop of constant extent become lanes.", Loops,
               ONE_FUNC, (f.vectorize(x, 8))),
-    DIRECTIVE("unroll",
-              "The iterations of a loop of constant extent become a sequence; where only a constant above "
-              "the extent is known, by itself or from a condition around, each runs if the loop has it.",
-              Loops,
-              ONE_FUNC, (f.unroll(x, 2))),
+    DIRECTIVE(
+        "unroll",
+        "The iterations of a loop of constant extent become a sequence; where only a constant "
+        "above "
+        "the extent is known, by itself or from a condition around, each runs if the loop has it.",
+        Loops, ONE_FUNC, (f.unroll(x, 2))),
     DIRECTIVE("partition, never_partition, always_partition",
               "Whether a loop is cut where conditions change that hold in most of it. Auto cuts "
               "where that saves something.",

@@ -9,6 +9,7 @@
 
 #include "checks/check_gradients.h"
 #include "gradient/programs_suite.h"
+#include "graph/graph.h"
 
 namespace retrograde::gradient {
 namespace {
@@ -26,6 +27,15 @@ TEST_P(Suite, GradientIsRight) {
     SCOPED_TRACE("input " + std::to_string(i));
     expect_gradient(program.loss, d, program.inputs[i]);
   }
+}
+
+TEST_P(Suite, GraphsAreTheirText) {
+  std::vector<ir::FuncPtr> outputs{program.loss.function()};
+  Derivative d = propagate_adjoints(program.loss);
+  for (const Buffer<float>& input : program.inputs) outputs.push_back(d(input).function());
+  const ir::Graph graph = ir::graph_of(outputs);
+  ir::validate(graph, "propagate_adjoints");
+  EXPECT_EQ(ir::difference(ir::parse_graph(ir::to_text(graph)), graph), "") << ir::to_text(graph);
 }
 
 class CheckedSuite : public Suite {};

@@ -5,10 +5,10 @@
 #include <gtest/gtest.h>
 
 #include "autodiff/accumulation.h"
-#include "autodiff/adjoint_contents.h"
 #include "autodiff/derivative.h"
-#include "frontend/define.h"
 #include "gradient/gradient_check.h"
+#include "graph/define.h"
+#include "graph/function.h"
 #include "ir/build.h"
 
 namespace retrograde::gradient {
@@ -112,9 +112,8 @@ struct Guarded : ::testing::Test {
     const Regions regions({a, b, c}, {{a.get(), {{Expr(0), Expr(9)}}}});
     return share_adjoints("inner", {{{"i", Expr(first), Expr(9)}}, {}}, leaves, {seed}, regions);
   }
-  ir::FuncPtr adjoint = std::make_shared<ir::AdjointContents>(),
-              a = std::make_shared<ir::FuncContents>(), b = std::make_shared<ir::FuncContents>(),
-              c = std::make_shared<ir::FuncContents>();
+  ir::FuncPtr adjoint = ir::make_func(ir::Role::Adjoint), a = std::make_shared<ir::FuncContents>(),
+              b = std::make_shared<ir::FuncContents>(), c = std::make_shared<ir::FuncContents>();
 };
 
 TEST_F(Guarded, WhatIsReadInTheWholeDomainMayBeKept) { EXPECT_NE(share(3).func, nullptr); }

@@ -5,6 +5,7 @@
 
 #include "ir/build.h"
 #include "ir/parse.h"
+#include "ir/print.h"
 
 namespace retrograde {
 namespace {
@@ -15,13 +16,14 @@ void expect_valid(const Stmt& s, Phase phase) {
   EXPECT_NO_THROW(validate(s, phase, "some_pass", {"n"}));
 }
 void expect_broken(const Stmt& s, Phase phase, const std::string& rule) {
+  const Stmt before = parse_stmt("evaluate 17");
   try {
-    validate(s, phase, "some_pass", {"n"});
+    validate(s, phase, "some_pass", {"n"}, before);
     FAIL() << "the validator accepts: " << rule;
   } catch (const InternalError& error) {
     EXPECT_EQ(error.pass(), "some_pass");
     EXPECT_NE(std::string(error.what()).find(rule), std::string::npos) << error.what();
-    EXPECT_FALSE(error.ir_before().empty());
+    EXPECT_EQ(error.ir_before(), print(before));
   }
 }
 void expect_broken(const std::string& text, Phase phase, const std::string& rule) {

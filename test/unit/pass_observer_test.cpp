@@ -78,6 +78,10 @@ class Opt : public testing::Test {
     std::ifstream in(out);
     return {std::istreambuf_iterator<char>(in), {}};
   }
+  std::string text_file(const std::string& text) {
+    std::ofstream(folder / "p.graph") << text;
+    return (folder / "p.graph").string();
+  }
   std::string program() {
     std::ofstream(folder / "p.ir") << "unrolled for (f.s0.x, 0, 2) {\n  f[f.s0.x] = 1f + 2f\n}\n";
     return (folder / "p.ir").string();
@@ -123,6 +127,16 @@ TEST_F(Opt, GivesTheStatusOfTheProgram) {
 TEST_F(Opt, NamesThePasses) {
   EXPECT_TRUE(has(opt("--list"), "unroll_loops\n"));
   EXPECT_TRUE(has(opt("--list-pipeline"), "build_loop_nests\n"));
+}
+
+TEST_F(Opt, ReadsGraphsAndLowersThemSoFar) {
+  const std::string graph = text_file("func f(x) int32\n  define\n    value (x * 2)\noutput f\n");
+  EXPECT_TRUE(has(opt("--graph --pass=apply_wrappers " + graph), "value (x * 2)\n"));
+  EXPECT_TRUE(
+      has(opt("--graph --stop-after=build_loop_nests " + graph), "f(f.s0.x) = {(f.s0.x * 2)}"));
+  EXPECT_TRUE(has(opt("--graph --pass=simplify " + graph, 1), "from graph to graph"));
+  EXPECT_TRUE(has(opt("--graph --stop-after=nothing " + graph, 1),
+                  "lowering stops after one of its passes"));
 }
 
 TEST_F(Opt, RefusesWhatItDoesNotKnow) {

@@ -4,7 +4,7 @@
 #include <retrograde/retrograde.h>
 #include <algorithm>
 
-#include "frontend/wrappers.h"
+#include "graph/wrappers.h"
 #include "support/errors.h"
 
 namespace retrograde {

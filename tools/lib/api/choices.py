@@ -4,11 +4,14 @@ import re
 HEADER_FOLDERS = ["frontend", "generator", "checks"]
 MORE_HEADERS = [
     "autodiff/custom_derivative.h", "autodiff/derivative.h", "autodiff/jacobian.h", "autodiff/compressed.h",
-    "autodiff/second_order.h", "autodiff/straight_through.h", "autodiff/tangents.h", "diagnostics/error.h",
+    "autodiff/second_order.h", "autodiff/straight_through.h", "autodiff/tangents.h", "diagnostics/error.h", "diagnostics/pass_observer.h",
     "ir/build.h", "ir/expr.h", "ir/target.h", "ir/type.h"]
 INTERNAL_HEADERS = {
-    "frontend/argument.h", "frontend/associative_update.h", "frontend/call.h", "frontend/define.h",
-    "frontend/function.h", "frontend/race.h", "frontend/reduction_leaves.h", "frontend/wrappers.h",
+    "graph/copy_graph.h", "graph/directive.h", "graph/directive_text.h", "graph/graph.h", "graph/names.h",
+    "graph/parameter_contents.h", "graph/provenance.h", "graph/reduction_domain.h", "graph/schedule.h",
+    "lower/lower.h",
+    "frontend/argument.h", "graph/associative_update.h", "frontend/call.h", "graph/define.h",
+    "graph/function.h", "graph/race.h", "graph/reduction_leaves.h", "graph/wrappers.h",
     "frontend/compiler_interface.h", "checks/arrays.h", "checks/culprit.h", "checks/json_number.h",
     "checks/complex_step.h", "checks/widen.h", "generator/members.h", "generator/cpp_stub.h",
     "generator/command_line.h"}

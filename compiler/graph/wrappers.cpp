@@ -1,12 +1,14 @@
-#include "frontend/wrappers.h"
+#include "graph/wrappers.h"
 
 #include <algorithm>
 #include <set>
 #include <unordered_map>
 #include <unordered_set>
 
-#include "frontend/define.h"
-#include "frontend/func.h"
+#include "diagnostics/error.h"
+#include "graph/define.h"
+#include "graph/names.h"
+#include "ir/build.h"
 #include "ir/print.h"
 #include "ir/variables.h"
 #include "ir/visit.h"
@@ -36,10 +38,11 @@ const FuncContents* resolve(const FuncContents* f, const FuncContents& user,
   return f;
 }
 
-// The Func that stands for an image in what `user` reads; null when it reads the image itself.
+// The Func that stands for an image in what `user` reads; null when it reads the image itself, as
+// that Func does and its copies do.
 const FuncContents* reader_of_image(const Call& call, const FuncContents& user) {
   const auto* image = static_cast<const ParameterContents*>(call.symbol.raw());
-  return image->func.get() == &user ? nullptr : image->func.get();
+  return !image->func || image->func->name == user.name ? nullptr : image->func.get();
 }
 
 class Wrapping {
@@ -63,7 +66,7 @@ class Wrapping {
   const FuncPtr& copy_of(const FuncContents* f) {
     FuncPtr& copy = copies_[f];
     if (!copy) {
-      copy = f->copy();
+      copy = std::make_shared<FuncContents>(*f);
       queue_.push_back(f);
     }
     return copy;
@@ -155,7 +158,7 @@ bool is_scheduled(const FuncContents& reader) {
 }  // namespace
 
 FuncPtr clone_of(const FuncPtr& f, const std::string& name) {
-  FuncPtr clone = f->copy();
+  FuncPtr clone = std::make_shared<FuncContents>(*f);
   clone->name = claim_name(name);
   clone->wrappers.clear();
   clone->outputs.clear();
@@ -315,7 +318,7 @@ FuncPtr func_of_image(const std::shared_ptr<ParameterContents>& image) {
     auto reader = std::make_shared<FuncContents>();
     reader->name = claim_name(image->name + "_im");
     std::vector<Expr> args;
-    for (int d = 0; d < image->dimensions; d++) args.push_back(Var::implicit(d));
+    for (int d = 0; d < image->dimensions; d++) args.push_back(variable(implicit_name(d)));
     define_pure(reader, args, {call_image(image->name, image->type, args, SymbolRef::weak(image))});
     reader->frozen = true;
     image->func = reader;
@@ -325,40 +328,5 @@ FuncPtr func_of_image(const std::shared_ptr<ParameterContents>& image) {
 }
 
 }  // namespace ir
-
-Func Func::wrap(const std::vector<Func>& users, const std::string& name, bool clone) const {
-  std::vector<ir::FuncPtr> contents;
-  for (const Func& user : users) contents.push_back(user.function());
-  return Func(ir::wrapper_of(func_, contents, name, clone));
-}
-
-Func Func::in(const Func& f) { return wrap({f}, name() + "_in_" + f.name(), false); }
-Func Func::in() { return wrap({}, name() + "_global_wrapper", false); }
-Func Func::clone_in(const Func& f) { return wrap({f}, name() + "_clone_in_" + f.name(), true); }
-
-Func Func::in(const std::vector<Func>& fs) {
-  if (fs.empty()) {
-    user_error("wrap " + quoted(name()), "at least one user is named", "the list is empty",
-               "Call in() for all users");
-  }
-  return wrap(fs, name() + "_wrapper", false);
-}
-
-Func Func::clone_in(const std::vector<Func>& fs) {
-  if (fs.empty())
-    user_error("clone " + quoted(name()), "at least one user is named", "the list is empty",
-               "Name the Funcs that read it, or leave the list out");
-  return wrap(fs, name() + "_clone", true);
-}
-
-Func Func::copy_to_device(DeviceAPI) {
-  unsupported("copy " + quoted(name()) + " to a device", "storage lies in the memory of the CPU",
-              "no code is generated for devices", "Leave it out");
-}
-
-Func Func::copy_to_host() {
-  unsupported("copy " + quoted(name()) + " from a device", "storage lies in the memory of the CPU",
-              "no code is generated for devices", "Leave it out");
-}
 
 }  // namespace retrograde

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "frontend/function.h"
+#include "graph/function.h"
 
 namespace retrograde::ir {
 

@@ -1,11 +1,23 @@
-// Funcs that differentiation makes, and what is known of their values.
+// provenance.h -- where a Func comes from that no user wrote, and what is known of its values.
 #pragma once
 
+#include <cstdint>
+#include <string>
 #include <vector>
 
-#include "frontend/function.h"
+#include "ir/expr.h"
 
 namespace retrograde::ir {
+
+enum class Role : uint8_t {
+#define RETROGRADE_ROLE(Name, text) Name,
+#include "graph/roles.def"
+};
+inline constexpr int role_count = 0
+#define RETROGRADE_ROLE(Name, text) +1
+#include "graph/roles.def"
+    ;
+const char* role_name(Role role);  // "adjoint", as IR text has it
 
 // What multiplies an adjoint, or a tangent, must beware of.
 struct AdjointTraits {
@@ -38,13 +50,13 @@ struct AdjointWork {
   std::vector<Expr> loops;   // extents
 };
 
-// A Func made by differentiation.
-struct AdjointContents : FuncContents {
+struct Provenance {
+  Role role = Role::Adjoint;
+  std::string of;  // the Func that it was made for; may be empty
   AdjointTraits traits;
   std::vector<AdjointWork> work;  // of its last update, where a table says what iterations do
   int lanes = 0;  // of private parts: extent of the first dimension, in which lanes add apart
   bool has_parts = false;  // of private parts: its last dimension numbers them
-  FuncPtr copy() const override { return std::make_shared<AdjointContents>(*this); }
 };
 
 }  // namespace retrograde::ir

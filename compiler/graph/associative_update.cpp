@@ -1,4 +1,4 @@
-#include "frontend/associative_update.h"
+#include "graph/associative_update.h"
 
 #include "diagnostics/error.h"
 #include "ir/build.h"

@@ -1,4 +1,4 @@
-#include "frontend/reduction_leaves.h"
+#include "graph/reduction_leaves.h"
 
 #include <algorithm>
 

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "analysis/associativity.h"
-#include "frontend/function.h"
+#include "graph/function.h"
 
 namespace retrograde::ir {
 

@@ -1,11 +1,11 @@
 // function.cpp -- walks over the graph of Funcs.
-#include "frontend/function.h"
+#include "graph/function.h"
 
 #include <unordered_map>
 #include <unordered_set>
 
 #include "diagnostics/error.h"
-#include "frontend/wrappers.h"
+#include "graph/wrappers.h"
 #include "ir/print.h"
 #include "ir/visit.h"
 
@@ -105,6 +105,28 @@ class Sorter {
 };
 
 }  // namespace
+
+const char* role_name(Role role) {
+  switch (role) {
+#define RETROGRADE_ROLE(Name, text) \
+  case Role::Name:                  \
+    return text;
+#include "graph/roles.def"
+  }
+  return "";
+}
+
+FuncPtr make_func(Role role) {
+  FuncPtr f = std::make_shared<FuncContents>();
+  f->made.emplace().role = role;
+  return f;
+}
+
+const Provenance* provenance_of(const Call& call) {
+  if (call.call_type != CallType::Func || !call.symbol.defined()) return nullptr;
+  const auto& made = static_cast<const FuncContents*>(call.symbol.raw())->made;
+  return made ? &*made : nullptr;
+}
 
 FuncPtr func_of(const Call& call) {
   FuncPtr f = std::dynamic_pointer_cast<FuncContents>(call.symbol.lock());

@@ -12,7 +12,7 @@
 #include <string>
 #include <vector>
 
-#include "frontend/function.h"
+#include "graph/function.h"
 
 namespace retrograde::ir {
 

@@ -1,4 +1,4 @@
-#include "frontend/pass_observer.h"
+#include "diagnostics/pass_observer.h"
 
 #include <algorithm>
 #include <atomic>

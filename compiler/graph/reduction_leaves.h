@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "frontend/function.h"
+#include "graph/function.h"
 #include "ir/build.h"
 #include "ir/visit.h"
 

@@ -1,10 +1,10 @@
-#include "frontend/race.h"
+#include "graph/race.h"
 
 #include <unordered_set>
 
 #include "analysis/interval.h"
 #include "analysis/never_meet.h"
-#include "frontend/associative_update.h"
+#include "graph/associative_update.h"
 #include "ir/build.h"
 #include "ir/equal.h"
 #include "ir/visit.h"

@@ -4,14 +4,16 @@
 // variables; for pure definitions that the arguments are distinct Vars; for updates that all
 // reduction variables are of one domain, that the Func is not frozen, and that a pure variable
 // keeps its place in every reference of the Func to itself.
-#include "frontend/define.h"
+#include "graph/define.h"
 
 #include <algorithm>
 #include <unordered_map>
 #include <unordered_set>
 
-#include "frontend/rdom.h"
-#include "frontend/var.h"
+#include "diagnostics/error.h"
+#include "graph/directive.h"
+#include "graph/names.h"
+#include "ir/build.h"
 #include "ir/literal.h"
 #include "ir/print.h"
 #include "ir/variables.h"
@@ -146,7 +148,7 @@ void check_free_variables(const Site& site, const Names& names,
       continue;
     }
     if (is_arg) continue;
-    if (Var::is_implicit(v->name) || Var::is_placeholder(v->name)) {
+    if (implicit_index(v->name) >= 0 || is_placeholder(v->name)) {
       user_error(site.asked, "a right-hand side that uses _ needs _ on the left-hand side",
                  text("it uses ", quoted(v->name)),
                  text("Write ", quoted(site.f.name), "(..., _) = ..."));
@@ -331,16 +333,6 @@ Definition make_update(const FuncPtr& f, std::vector<Expr> args, std::vector<Exp
   });
 }
 
-// Loops innermost first: the reduction variables, then the pure variables.
-void add_loops(Definition& definition, const std::vector<std::string>& pure) {
-  for (const ReductionVariable& rvar : definition.rvars) {
-    definition.schedule.dims.push_back({rvar.var, ForType::Serial, true});
-  }
-  for (const std::string& name : pure) {
-    if (!name.empty()) definition.schedule.dims.push_back({name, ForType::Serial, false});
-  }
-}
-
 }  // namespace
 
 void make_outputs(FuncContents& f) {
@@ -397,8 +389,8 @@ void define_pure(const FuncPtr& f, const std::vector<Expr>& args, const std::vec
   Definition pure;
   pure.args = variables_of(variables);
   pure.values = bind_all_random(*f, 0, variables, values);
-  add_loops(pure, variables);
   f->pure = std::move(pure);
+  f->pure->schedule.dims = first_loops(*f, *f->pure);
   f->schedule.storage_dims = variables;
   make_outputs(*f);
   f->version++;
@@ -444,7 +436,7 @@ void define_update(const FuncPtr& f, const std::vector<Expr>& raw_args,
   }
   const int stage = f->stage_count();
   Definition update = make_update(f, args, bind_all_random(*f, stage, variables, values), domain);
-  add_loops(update, pure);
+  update.schedule.dims = first_loops(*f, update);
   f->updates.push_back(std::move(update));
   f->version++;
 }

@@ -1,0 +1,60 @@
+#include "graph/copy_graph.h"
+
+#include "ir/build.h"
+#include "ir/visit.h"
+
+namespace retrograde::ir {
+
+namespace {
+
+// One rewriter for all definitions, which remembers every node.
+class Copier : public Rewriter {
+ public:
+  GraphCopy run(const std::vector<FuncPtr>& outputs) {
+    for (const FuncPtr& f : topological_order(outputs)) copy(f);
+    for (const FuncPtr& output : outputs) copies_.outputs.push_back(copies_.of.at(output.get()));
+    for (const auto& entry : copies_.of) redirect_prefetches(*entry.second);
+    return std::move(copies_);
+  }
+
+ protected:
+  using Rewriter::rewrite;
+  Expr rewrite(const Expr& e) override {
+    const Expr mapped = children(e);
+    const Call* call = mapped.as<Call>();
+    if (!call || call->call_type != CallType::Func) return mapped;
+    const FuncPtr& callee = copies_.of.at(static_cast<const FuncContents*>(call->symbol.raw()));
+    const SymbolRef symbol = call->symbol.is_weak() ? SymbolRef::weak(callee) : SymbolRef(callee);
+    return call_func(call->name, call->type, call->args, call->value_index, symbol);
+  }
+
+ private:
+  void copy(const FuncPtr& f) {
+    const FuncPtr copy = std::make_shared<FuncContents>(*f);
+    copies_.of[f.get()] = copy;
+    for (int s = 0; s < f->stage_count(); ++s)
+      copy->stage(s) = map_exprs(f->stage(s), [&](const Expr& e) { return (*this)(e); });
+    if (!copy->extern_definition) return;
+    for (ExternArgument& arg : copy->extern_definition->args) {
+      if (arg.kind == ExternArgument::Kind::Func) arg.func = copies_.of.at(arg.func.get());
+    }
+  }
+
+  void redirect_prefetches(FuncContents& f) const {
+    for (int s = 0; s < f.stage_count(); ++s) {
+      for (PrefetchDirective& prefetch : f.stage(s).schedule.prefetches) {
+        const auto* source = static_cast<const FuncContents*>(prefetch.symbol.raw());
+        if (const auto found = copies_.of.find(source); found != copies_.of.end())
+          prefetch.symbol = SymbolRef::weak(found->second);
+      }
+    }
+  }
+
+  GraphCopy copies_;
+};
+
+}  // namespace
+
+GraphCopy copy_graph(const std::vector<FuncPtr>& outputs) { return Copier().run(outputs); }
+
+}  // namespace retrograde::ir

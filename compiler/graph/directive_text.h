@@ -1,0 +1,26 @@
+// directive_text.h -- directives as IR text: split(x, xo, xi, 8, Auto).
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "graph/directive.h"
+
+namespace retrograde::ir {
+
+std::string to_text(const StageDirective& directive);
+std::string to_text(const FuncDirective& directive);
+
+// The directive in a line such as "split(x, xo, xi, 8, Auto)"; nothing when no directive has that
+// name. Requires: its arguments are those of directive.h.
+std::optional<StageDirective> parse_stage_directive(const std::string& line);
+std::optional<FuncDirective> parse_func_directive(const std::string& line);
+
+bool equal(const StageDirective& a, const StageDirective& b);
+bool equal(const FuncDirective& a, const FuncDirective& b);
+
+// The arguments of a line such as "name(a, b, _)": undefined where it says _.
+std::vector<Expr> parse_arguments(const std::string& line);
+std::string print_argument(const Expr& e);  // "_" when undefined
+
+}  // namespace retrograde::ir

@@ -1,0 +1,64 @@
+#include "graph/names.h"
+
+#include <algorithm>
+#include <cctype>
+#include <mutex>
+#include <unordered_map>
+
+#include "ir/visit.h"
+
+namespace retrograde::ir {
+
+namespace {
+
+std::string as_identifier(std::string name) {
+  for (char& c : name) {
+    if (!std::isalnum(static_cast<unsigned char>(c)) && c != '_' && c != '$') c = '_';
+  }
+  if (name.empty() || std::isdigit(static_cast<unsigned char>(name[0])))
+    name.insert(name.begin(), '_');
+  return name;
+}
+
+enum class NameUse { Func, Parameter };
+
+// Who was given a name first. Names that contain '$' come from unique_name and need no entry.
+class NameTable {
+ public:
+  std::string claim(const std::string& name, NameUse use) {
+    if (name.find('$') != std::string::npos) return unique_name(name);
+    std::lock_guard lock(mutex_);
+    auto [it, is_new] = used_.try_emplace(name, use);
+    if (is_new || (use == NameUse::Parameter && it->second == NameUse::Parameter)) return name;
+    return unique_name(name);
+  }
+
+ private:
+  std::mutex mutex_;
+  std::unordered_map<std::string, NameUse> used_;
+};
+
+NameTable& name_table() {
+  static NameTable table;
+  return table;
+}
+
+}  // namespace
+
+std::string claim_name(const std::string& wanted) {
+  return name_table().claim(as_identifier(wanted), NameUse::Func);
+}
+
+std::string claim_parameter_name(const std::string& wanted) {
+  return name_table().claim(as_identifier(wanted), NameUse::Parameter);
+}
+
+std::string implicit_name(int n) { return "_" + std::to_string(n); }
+
+int implicit_index(const std::string& name) {
+  if (name.size() < 2 || name.size() > 4 || name[0] != '_') return -1;
+  auto is_digit = [](unsigned char c) { return std::isdigit(c) != 0; };
+  return std::all_of(name.begin() + 1, name.end(), is_digit) ? std::stoi(name.substr(1)) : -1;
+}
+
+}  // namespace retrograde::ir

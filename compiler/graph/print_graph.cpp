@@ -1,0 +1,203 @@
+#include "diagnostics/error.h"
+#include "graph/directive_text.h"
+#include "graph/graph.h"
+#include "graph/wrappers.h"
+#include "ir/print.h"
+#include "ir/text.h"
+
+namespace retrograde::ir {
+
+namespace {
+
+class GraphPrinter {
+ public:
+  std::string run(const Graph& graph) {
+    for (const auto& parameter : graph.parameters) print(*parameter);
+    for (const FuncPtr& f : graph.funcs) print(*f);
+    for (const FuncPtr& f : graph.outputs) print_output(*f);
+    return std::move(out_);
+  }
+
+ private:
+  template <typename... Parts>
+  void line(const Parts&... parts) {
+    out_.append(2 * indent_, ' ');
+    out_ += text(parts...) + '\n';
+  }
+  template <typename Body>
+  void indented(const Body& body) {
+    ++indent_;
+    body();
+    --indent_;
+  }
+  void line_if(const char* word, const Expr& e) {
+    if (e.defined()) line(word, " ", e);
+  }
+
+  // ---- parameters ----
+
+  void print(const ParameterContents& p) {
+    if (p.is_buffer) {
+      line(p.is_literal ? "buffer " : "image ", to_string(p.type), " ", quote_name(p.name), "(",
+           p.dimensions, ")");
+    } else {
+      line("param ", to_string(p.type), " ", quote_name(p.name));
+    }
+    indented([&] {
+      if (p.value) line("value ", to_expr(*p.value));
+      line_if("at_least", p.min_value);
+      line_if("at_most", p.max_value);
+      line_if("estimate", p.estimate);
+      print_constraints(p);
+      if (p.func) line("reader ", quote_name(p.func->name));
+      print(p.trace);
+    });
+  }
+
+  void print_constraints(const ParameterContents& p) {
+    for (size_t d = 0; d < p.constraints.size(); ++d) {
+      const BufferConstraint& c = p.constraints[d];
+      if (c.min.defined() || c.extent.defined() || c.stride.defined()) {
+        line("dim(", d, ", ", print_argument(c.min), ", ", print_argument(c.extent), ", ",
+             print_argument(c.stride), ")");
+      }
+      if (c.min_estimate.defined() || c.extent_estimate.defined()) {
+        line("estimates(", d, ", ", print_argument(c.min_estimate), ", ",
+             print_argument(c.extent_estimate), ")");
+      }
+      if (c.any_stride) line("any_stride(", d, ")");
+    }
+    if (p.host_alignment != 0) line("aligned(", p.host_alignment, ")");
+  }
+
+  void print(const TraceSchedule& trace) {
+    if (trace.loads) line("trace_loads");
+    if (trace.stores) line("trace_stores");
+    if (trace.realizations) line("trace_realizations");
+    for (const std::string& tag : trace.tags) line("trace_tag ", Expr(tag));
+  }
+
+  // ---- Funcs ----
+
+  void print(const FuncContents& f) {
+    std::string args, types;
+    for (const std::string& arg : f.args) args += (args.empty() ? "" : ", ") + quote_name(arg);
+    for (const Type& type : f.types) types += ", " + to_string(type);
+    line("func ", quote_name(f.name), "(", args, ")", types.empty() ? "" : " " + types.substr(2));
+    indented([&] {
+      if (f.made) print(*f.made);
+      if (f.extern_definition) print(*f.extern_definition);
+      for (int s = 0; s < f.stage_count(); ++s) {
+        line(s == 0 ? "define" : "update");
+        indented([&] { print(f.stage(s), f); });
+      }
+      print_schedule(f);
+      for (const auto& [user, wrapper] : f.wrappers)
+        line("wrapper ", user.empty() ? "_" : quote_name(user), " ", quote_name(wrapper->name));
+      if (f.custom_derivatives) line("custom_derivatives");
+      print(f.trace);
+      if (!f.debug_file.empty()) line("debug_file ", Expr(f.debug_file));
+    });
+  }
+
+  void print(const Provenance& made) {
+    line("made ", role_name(made.role), made.of.empty() ? "" : " of " + quote_name(made.of));
+    indented([&] {
+      const AdjointTraits& t = made.traits;
+      if (t.masked) line("masked");
+      if (t.vanished) line("vanished");
+      if (t.levelled) line("levelled");
+      if (t.singular) line("singular");
+      if (t.infinite) line("infinite");
+      if (made.lanes > 0) line("lanes ", made.lanes);
+      if (made.has_parts) line("parts");
+      for (const AdjointWork& work : made.work) {
+        line("work");
+        for (const Expr& value : work.values) line("work_value ", value);
+        for (const Expr& loop : work.loops) line("work_loop ", loop);
+      }
+    });
+  }
+
+  void print(const ExternDefinition& definition) {
+    static constexpr const char* manglings[] = {"default", "c", "c++"};
+    line("extern ", quote_name(definition.function), " ",
+         manglings[static_cast<int>(definition.mangling)]);
+    indented([&] {
+      for (const ExternArgument& arg : definition.args) {
+        switch (arg.kind) {
+          case ExternArgument::Kind::Func:
+            line("give_func ", quote_name(arg.func->name));
+            break;
+          case ExternArgument::Kind::Buffer:
+            line("give_buffer ", quote_name(arg.buffer->name));
+            break;
+          case ExternArgument::Kind::Expr:
+            line("give ", arg.expr);
+            break;
+        }
+      }
+    });
+  }
+
+  void print(const Definition& definition, const FuncContents& f) {
+    if (&definition != &*f.pure) {
+      for (const Expr& place : definition.args) line("place ", place);
+    }
+    for (const ReductionVariable& v : definition.rvars)
+      line("loop(", quote_name(v.var), ", ", v.min, ", ", v.extent, ")");
+    line_if("where", definition.predicate);
+    for (const Expr& value : definition.values) line("value ", value);
+    print(definition.schedule, first_loops(f, definition));
+  }
+
+  void print(const StageSchedule& schedule, const std::vector<Dim>& first) {
+    for (const StageDirective& directive : directives_of(schedule, first)) line(to_text(directive));
+    for (const StageSchedule& special : schedule.specializations) {
+      if (!special.failure.empty()) {
+        line("specialize_fail ", Expr(special.failure));
+        continue;
+      }
+      line("specialize ", special.condition);
+      indented([&] { print(special, first); });
+      line("end");
+    }
+  }
+
+  void print_schedule(const FuncContents& f) {
+    const std::vector<FuncDirective> log = directives_of(f.schedule, f.args);
+    if (log.empty()) return;
+    line("schedule");
+    indented([&] {
+      for (const FuncDirective& directive : log) line(to_text(directive));
+    });
+  }
+
+  void print_output(const FuncContents& f) {
+    line("output ", quote_name(f.name));
+    indented([&] {
+      for (size_t i = 0; i < f.outputs.size(); ++i) {
+        const ParameterContents& p = *f.outputs[i];
+        if (f.outputs.size() > 1) line("component ", i);
+        print_constraints(p);
+      }
+      for (const Requirement& requirement : f.requirements) {
+        line("require ", requirement.condition);
+        for (const Expr& part : requirement.message) line("message ", part);
+      }
+    });
+  }
+
+  std::string out_;
+  size_t indent_ = 0;
+};
+
+}  // namespace
+
+Graph graph_of(const std::vector<FuncPtr>& outputs) {
+  return {outputs, functions_of(outputs), parameters_of(outputs)};
+}
+
+std::string to_text(const Graph& graph) { return GraphPrinter().run(graph); }
+
+}  // namespace retrograde::ir

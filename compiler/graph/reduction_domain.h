@@ -1,0 +1,31 @@
+// reduction_domain.h -- the loops that belong to an update definition.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "ir/expr.h"
+
+namespace retrograde::ir {
+
+// Reduction variables innermost first, as listed in the RDom.
+struct ReductionVariable {
+  std::string var;  // unique in the process: "r$0.x"
+  Expr min, extent;
+};
+// Symbol behind each RVar's Variable node.
+struct ReductionDomainContents : Symbol {
+  std::vector<ReductionVariable> vars;
+  Expr predicate;       // RDom::where, undefined when none; may only grow until the domain is used
+  bool frozen = false;  // used in a definition: where() is an error from now on
+};
+
+// The reduction domain that a variable belongs to; null for any other variable.
+std::shared_ptr<ReductionDomainContents> domain_of(const Variable& variable);
+// `e` with every mention of `symbol`'s entity made through this very reference (weak or strong).
+Expr rebind_symbol(const Expr& e, const SymbolRef& symbol);
+// With the variables of the symbol `from` referring to another.
+Expr rebind_symbol(const Expr& e, const Symbol* from, const SymbolRef& to);
+
+}  // namespace retrograde::ir
