@@ -3,160 +3,21 @@
 #include <functional>
 #include <map>
 #include <optional>
-#include <sstream>
 
 #include "diagnostics/error.h"
+#include "graph/binder.h"
 #include "graph/define.h"
 #include "graph/directive_text.h"
 #include "graph/graph.h"
-#include "graph/names.h"
+#include "graph/graph_lines.h"
 #include "ir/build.h"
 #include "ir/parse.h"
 #include "ir/print.h"
 #include "ir/text.h"
-#include "ir/visit.h"
 
 namespace retrograde::ir {
 
 namespace {
-
-using ParameterPtr = std::shared_ptr<ParameterContents>;
-using DomainPtr = std::shared_ptr<ReductionDomainContents>;
-
-struct Line {
-  int number = 0;
-  std::string word, rest, whole;  // "func", "blur(x, y) float32"
-};
-
-std::vector<Line> lines_of(const std::string& text) {
-  std::vector<Line> lines;
-  std::istringstream in(text);
-  std::string raw;
-  for (int number = 1; std::getline(in, raw); ++number) {
-    const size_t begin = raw.find_first_not_of(" \t");
-    if (begin == std::string::npos) continue;
-    const std::string whole = raw.substr(begin);
-    const size_t end = whole.find_first_of(" (");
-    std::string rest = end == std::string::npos ? "" : whole.substr(end);
-    rest.erase(0, rest.find_first_not_of(' ') == std::string::npos ? rest.size()
-                                                                   : rest.find_first_not_of(' '));
-    lines.push_back({number, whole.substr(0, end), std::move(rest), whole});
-  }
-  return lines;
-}
-
-[[noreturn]] void fail(const Line& line, const std::string& expected) {
-  user_error("read the text of a graph",
-             text("line ", line.number, ": ", expected, " must stand here"),
-             "it says " + quoted(line.whole), "Write it as graph.h shows");
-}
-
-// The names of "blur(x, y) float32": back quotes are taken off.
-std::string unquoted(const Line& line, const std::string& word) {
-  const Variable* v = nullptr;
-  const Expr e = word.empty() ? Expr() : parse_expr(word);
-  if (e.defined()) v = e.as<Variable>();
-  if (!v) fail(line, "a name");
-  return v->name;
-}
-
-std::vector<Type> types_of(const Line& line, const std::string& list) {
-  std::vector<Type> types;
-  std::istringstream in(list);
-  for (std::string word; std::getline(in, word, ',');) {
-    word.erase(0, word.find_first_not_of(' '));
-    Type type;
-    if (!read_type(word, type)) fail(line, "a type");
-    types.push_back(type);
-  }
-  return types;
-}
-
-// ---- what names stand for ----
-
-struct Names {
-  std::map<std::string, FuncPtr> funcs;
-  std::map<std::string, ParameterPtr> parameters, outputs;  // outputs: the buffers of Funcs
-
-  // The buffer of a fact such as "input.extent.1"; null when the name is none.
-  ParameterPtr buffer_of_fact(const std::string& name) const {
-    for (const char* fact : {".min.", ".extent.", ".stride."}) {
-      const size_t at = name.rfind(fact);
-      if (at == std::string::npos) continue;
-      const std::string buffer = name.substr(0, at);
-      if (const auto found = parameters.find(buffer); found != parameters.end())
-        return found->second;
-      if (const auto found = outputs.find(buffer); found != outputs.end()) return found->second;
-    }
-    return nullptr;
-  }
-};
-
-// Gives calls and variables of an expression what they stand for.
-class Binder {
- public:
-  Binder(const Names& names, FuncPtr f, DomainPtr domain)
-      : names_(names), f_(std::move(f)), domain_(std::move(domain)) {}
-
-  Expr operator()(const Expr& root) const {
-    return rewrite(root, [&](const Expr& e, const std::function<Expr(const Expr&)>& recurse) {
-      const Expr mapped = map_children(e, recurse);
-      if (const Call* call = mapped.as<Call>()) return bound(*call, mapped);
-      const Variable* v = mapped.as<Variable>();
-      const SymbolRef symbol = v ? symbol_of(v->name) : SymbolRef();
-      return symbol.defined() ? variable(v->name, v->type, symbol) : mapped;
-    });
-  }
-
- private:
-  Expr bound(const Call& call, const Expr& e) const {
-    if (call.call_type == CallType::Func) {
-      const auto found = names_.funcs.find(call.name);
-      if (found == names_.funcs.end()) unknown("Func", call.name);
-      const FuncPtr& callee = found->second;
-      const SymbolRef symbol = owns_me(*callee) ? SymbolRef::weak(callee) : SymbolRef(callee);
-      return call_func(call.name, call.type, call.args, call.value_index, symbol);
-    }
-    if (call.call_type != CallType::Image) return e;
-    const auto found = names_.parameters.find(call.name);
-    if (found == names_.parameters.end()) unknown("image", call.name);
-    const SymbolRef symbol =
-        found->second->func == f_ ? SymbolRef::weak(found->second) : SymbolRef(found->second);
-    return call_image(call.name, call.type, call.args, symbol);
-  }
-  [[noreturn]] static void unknown(const char* what, const std::string& name) {
-    user_error("read the text of a graph", "every Func and image that is read is of the graph",
-               text("no ", what, " of it is called ", quoted(name)),
-               "Add its lines, or mend the name");
-  }
-  // A Func owns its definitions and its wrappers, which must not own it in turn.
-  bool owns_me(const FuncContents& callee) const {
-    if (&callee == f_.get()) return true;
-    for (const auto& entry : callee.wrappers) {
-      if (entry.second == f_) return true;
-    }
-    return false;
-  }
-
-  SymbolRef symbol_of(const std::string& name) const {
-    if (domain_) {
-      for (const ReductionVariable& v : domain_->vars) {
-        if (v.var == name) return SymbolRef(domain_);
-      }
-    }
-    if (f_ && std::find(f_->args.begin(), f_->args.end(), name) != f_->args.end()) return {};
-    if (const auto found = names_.parameters.find(name); found != names_.parameters.end())
-      return SymbolRef(found->second);
-    const ParameterPtr buffer = names_.buffer_of_fact(name);
-    return buffer ? SymbolRef(buffer) : SymbolRef();
-  }
-
-  const Names& names_;
-  FuncPtr f_;
-  DomainPtr domain_;
-};
-
-// ---- the passes ----
 
 class GraphReader {
  public:
@@ -585,7 +446,7 @@ class GraphReader {
   }
 
   std::vector<Line> lines_;
-  Names names_;
+  NamedEntities names_;
   std::vector<FuncPtr> outputs_;
   // Where the line stands.
   FuncPtr f_;

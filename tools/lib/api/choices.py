@@ -7,14 +7,14 @@ MORE_HEADERS = [
     "autodiff/second_order.h", "autodiff/straight_through.h", "autodiff/tangents.h", "diagnostics/error.h", "diagnostics/pass_observer.h",
     "ir/build.h", "ir/expr.h", "ir/target.h", "ir/type.h"]
 INTERNAL_HEADERS = {
-    "graph/copy_graph.h", "graph/directive.h", "graph/directive_text.h", "graph/graph.h", "graph/names.h",
-    "graph/parameter_contents.h", "graph/provenance.h", "graph/reduction_domain.h", "graph/schedule.h",
-    "lower/lower.h",
-    "frontend/argument.h", "graph/associative_update.h", "frontend/call.h", "graph/define.h",
-    "graph/function.h", "graph/race.h", "graph/reduction_leaves.h", "graph/wrappers.h",
-    "frontend/compiler_interface.h", "checks/arrays.h", "checks/culprit.h", "checks/json_number.h",
-    "checks/complex_step.h", "checks/widen.h", "generator/members.h", "generator/cpp_stub.h",
-    "generator/command_line.h"}
+    "checks/arrays.h", "checks/complex_step.h", "checks/culprit.h", "checks/json_number.h",
+    "checks/widen.h", "frontend/argument.h", "frontend/call.h", "frontend/compiler_interface.h",
+    "generator/command_line.h", "generator/cpp_stub.h", "generator/members.h",
+    "graph/associative_update.h", "graph/binder.h", "graph/copy_graph.h", "graph/define.h",
+    "graph/directive.h", "graph/directive_text.h", "graph/function.h", "graph/graph.h",
+    "graph/graph_lines.h", "graph/names.h", "graph/parameter_contents.h", "graph/provenance.h",
+    "graph/race.h", "graph/reduction_domain.h", "graph/reduction_leaves.h", "graph/schedule.h",
+    "graph/wrappers.h", "lower/lower.h"}
 # Parts of templates that users name in no other way than by the whole.
 INTERNAL_SCOPES = {"Declared", "ArrayTraits", "ElementTraits", "InputValue", "InputElements", "ScalarElements",
                    "OutputElements", "GeneratorParamBase::InCpp", "RegisterGenerator", "tell_pass_observers",

@@ -1,0 +1,80 @@
+#include "graph/binder.h"
+
+#include <algorithm>
+
+#include "diagnostics/error.h"
+#include "ir/build.h"
+#include "ir/visit.h"
+
+namespace retrograde::ir {
+
+namespace {
+
+[[noreturn]] void unknown(const char* what, const std::string& name) {
+  user_error("read the text of a graph", "every Func and image that is read is of the graph",
+             text("no ", what, " of it is called ", quoted(name)),
+             "Add its lines, or mend the name");
+}
+
+}  // namespace
+
+ParameterPtr NamedEntities::buffer_of_fact(const std::string& name) const {
+  for (const char* fact : {".min.", ".extent.", ".stride."}) {
+    const size_t at = name.rfind(fact);
+    if (at == std::string::npos) continue;
+    const std::string buffer = name.substr(0, at);
+    if (const auto found = parameters.find(buffer); found != parameters.end()) return found->second;
+    if (const auto found = outputs.find(buffer); found != outputs.end()) return found->second;
+  }
+  return nullptr;
+}
+
+Expr Binder::operator()(const Expr& root) const {
+  return rewrite(root, [&](const Expr& e, const std::function<Expr(const Expr&)>& recurse) {
+    const Expr mapped = map_children(e, recurse);
+    if (const Call* call = mapped.as<Call>()) return bound(*call, mapped);
+    const Variable* v = mapped.as<Variable>();
+    const SymbolRef symbol = v ? symbol_of(v->name) : SymbolRef();
+    return symbol.defined() ? variable(v->name, v->type, symbol) : mapped;
+  });
+}
+
+Expr Binder::bound(const Call& call, const Expr& e) const {
+  if (call.call_type == CallType::Func) {
+    const auto found = names_.funcs.find(call.name);
+    if (found == names_.funcs.end()) unknown("Func", call.name);
+    const FuncPtr& callee = found->second;
+    const SymbolRef symbol = owns_me(*callee) ? SymbolRef::weak(callee) : SymbolRef(callee);
+    return call_func(call.name, call.type, call.args, call.value_index, symbol);
+  }
+  if (call.call_type != CallType::Image) return e;
+  const auto found = names_.parameters.find(call.name);
+  if (found == names_.parameters.end()) unknown("image", call.name);
+  const SymbolRef symbol =
+      f_ && found->second->func == f_ ? SymbolRef::weak(found->second) : SymbolRef(found->second);
+  return call_image(call.name, call.type, call.args, symbol);
+}
+
+// A Func owns its definitions and its wrappers, which must not own it in turn.
+bool Binder::owns_me(const FuncContents& callee) const {
+  if (&callee == f_.get()) return true;
+  for (const auto& entry : callee.wrappers) {
+    if (entry.second == f_) return true;
+  }
+  return false;
+}
+
+SymbolRef Binder::symbol_of(const std::string& name) const {
+  if (domain_) {
+    for (const ReductionVariable& v : domain_->vars) {
+      if (v.var == name) return SymbolRef(domain_);
+    }
+  }
+  if (f_ && std::find(f_->args.begin(), f_->args.end(), name) != f_->args.end()) return {};
+  if (const auto found = names_.parameters.find(name); found != names_.parameters.end())
+    return SymbolRef(found->second);
+  const ParameterPtr buffer = names_.buffer_of_fact(name);
+  return buffer ? SymbolRef(buffer) : SymbolRef();
+}
+
+}  // namespace retrograde::ir
