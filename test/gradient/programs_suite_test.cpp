@@ -21,7 +21,9 @@ class Suite : public ::testing::TestWithParam<size_t> {
 
 TEST_P(Suite, GradientIsRight) {
   const AdjointOptions strict{.overwritten = Overwritten::Refuse};
-  if (program.store_overwritten) EXPECT_THROW(propagate_adjoints(program.loss, strict), UserError);
+  if (program.store_overwritten) {
+    EXPECT_THROW(propagate_adjoints(program.loss, strict), UserError);
+  }
   Derivative d = propagate_adjoints(program.loss);
   for (size_t i = 0; i < program.inputs.size(); ++i) {
     SCOPED_TRACE("input " + std::to_string(i));
