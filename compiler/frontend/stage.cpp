@@ -7,6 +7,7 @@
 
 #include "graph/associative_update.h"
 #include "graph/define.h"
+#include "graph/directive.h"
 #include "graph/race.h"
 #include "ir/print.h"
 
@@ -293,21 +294,9 @@ Stage& Stage::split(const VarOrRVar& old, const VarOrRVar& outer, const VarOrRVa
   if (index_ > 0 && tail == TailStrategy::RoundUp)
     check_round_up(schedule(), old.name(), factor, asked);
 
-  ir::StageSchedule& schedule = touch();
-  ir::Split split;
-  split.kind = ir::Split::Kind::Split;
-  split.old_var = old.name();
-  split.outer = outer.name();
-  split.inner = inner.name();
-  split.factor = ir::cast_to(Int(32), factor);
-  split.tail = tail;
-  split.exact = is_reduction;
-  schedule.splits.push_back(std::move(split));
-  ir::Dim outer_dim = schedule.dims[at], inner_dim = outer_dim;
-  outer_dim.var = outer.name();
-  inner_dim.var = inner.name();
-  schedule.dims[at] = std::move(inner_dim);
-  schedule.dims.insert(schedule.dims.begin() + at + 1, std::move(outer_dim));
+  ir::apply_directive(
+      ir::SplitLoop{old.name(), outer.name(), inner.name(), ir::cast_to(Int(32), factor), tail},
+      touch());
   return *this;
 }
 
@@ -347,17 +336,10 @@ Stage& Stage::fuse(const VarOrRVar& inner, const VarOrRVar& outer, const VarOrRV
 Stage& Stage::rename(const VarOrRVar& old_name, const VarOrRVar& new_name) {
   const std::string asked = text("rename ", quoted(old_name.name()), " of ", quoted(name()), " to ",
                                  quoted(new_name.name()));
-  const size_t at = loop_index(old_name, asked);
+  loop_index(old_name, asked);
   check_new_name(new_name, old_name.name(), asked);
   if (old_name.name() == new_name.name()) return *this;
-  ir::StageSchedule& schedule = touch();
-  ir::Split split;
-  split.kind = ir::Split::Kind::Rename;
-  split.old_var = old_name.name();
-  split.outer = new_name.name();
-  split.exact = schedule.dims[at].is_reduction;
-  schedule.splits.push_back(std::move(split));
-  schedule.dims[at].var = new_name.name();
+  ir::apply_directive(ir::RenameLoop{old_name.name(), new_name.name()}, touch());
   return *this;
 }
 

@@ -7,6 +7,7 @@
 
 #include "frontend/func.h"
 #include "graph/define.h"
+#include "graph/directive.h"
 #include "ir/literal.h"
 #include "ir/print.h"
 #include "ir/visit.h"
@@ -18,13 +19,8 @@ namespace {
 using LevelSource = std::shared_ptr<ir::LoopLevelContents> ir::FuncSchedule::*;
 using LevelAssignment = void (*)(ir::FuncSchedule&, const ir::LoopLevel&);
 
-// Storing follows computing, unless it was asked for elsewhere.
 void set_compute_level(ir::FuncSchedule& schedule, const ir::LoopLevel& level) {
-  const bool follows =
-      !schedule.store_from && (schedule.store_level.kind == ir::LoopLevel::Kind::Inlined ||
-                               schedule.store_level == schedule.compute_level);
-  schedule.compute_level = level;
-  if (follows) schedule.store_level = level;
+  ir::apply_directive(ir::ComputeAt{level}, schedule);
 }
 void set_store_level(ir::FuncSchedule& schedule, const ir::LoopLevel& level) {
   schedule.store_level = level;
