@@ -48,7 +48,7 @@ struct Directive {
   }
 
 #define ONE_FUNC (Func f("f"); f(x, y) = x + y)
-#define TWO_FUNCS (Func f("f"), g("g"); g(x, y) = x * y; f(x, y) = g(x, y) + g(x, y + 1))
+#define TWO_FUNCS (Func f("f"), g("g"); g(x, y) = 3 * x - y; f(x, y) = max(g(x, y), g(x, y + 2)))
 #define SUM (Func f("f"), g("g"); RDom r(0, 64, "r"); g(x) = x * x; f() = 0; f() += g(r))
 
 const std::vector<Directive>& loop_directives() {
@@ -95,7 +95,7 @@ const std::vector<Directive>& loop_directives() {
               "An associative update is cut in two; the first half reduces separately for each "
               "value of a new pure variable.",
               Loops,
-              (Func f("f"), g("g"); RDom r(0, 64, 0, 64, "r"); g(x, y) = x * y; f() = 0;
+              (Func f("f"), g("g"); RDom r(0, 64, 0, 64, "r"); g(x, y) = 3 * x - y; f() = 0;
                f() += g(r.x, r.y)),
               (f.update().rfactor(r.y, u).compute_root().update().parallel(u))),
   };
@@ -116,8 +116,8 @@ const std::vector<Directive>& place_directives() {
               "A stage runs in the loops of another one, down to a loop. Where their ranges differ "
               "the loops run over both, and each stage where it would alone.",
               Loops,
-              (Func f("f"), g("g"), h("h"); g(x, y) = x * y; h(x, y) = x - y; g.compute_root();
-               h.compute_root(); f(x, y) = g(x, y) + h(x, y)),
+              (Func f("f"), g("g"), h("h"); g(x, y) = 3 * x - y; h(x, y) = max(x, y);
+               g.compute_root(); h.compute_root(); f(x, y) = select(x < y, g(x, y), h(x, y))),
               (h.compute_with(g, y))),
     DIRECTIVE("async",
               "A thread of its own computes it, while the rest goes on until it needs the values.",
@@ -143,33 +143,33 @@ const std::vector<Directive>& place_directives() {
 const std::vector<Directive>& storage_directives() {
   static const std::vector<Directive> directives = {
     DIRECTIVE("reorder_storage", "Another dimension innermost in memory.", Storage,
-              (Func f("f"), g("g"); g(x, y) = x * y; g.compute_root(); f(x, y) = g(x, y)),
+              (Func f("f"), g("g"); g(x, y) = 3 * x - y; g.compute_root(); f(x, y) = g(x, y)),
               (g.reorder_storage(y, x))),
     DIRECTIVE("align_storage", "The extent in memory grows to a multiple.", Storage,
-              (Func f("f"), g("g"); g(x, y) = x * y; g.compute_root(); f(x, y) = g(x, y)),
+              (Func f("f"), g("g"); g(x, y) = 3 * x - y; g.compute_root(); f(x, y) = g(x, y)),
               (g.align_storage(x, 16))),
     DIRECTIVE("bound_storage",
               "A promise of how large an extent in memory ever is; a call that needs more fails.",
               Storage,
-              (Func f("f"), g("g"); g(x, y) = x * y; g.compute_at(f, y); f(x, y) = g(x, y)),
+              (Func f("f"), g("g"); g(x, y) = 3 * x - y; g.compute_at(f, y); f(x, y) = g(x, y)),
               (g.bound_storage(x, 64))),
     DIRECTIVE(
         "hoist_storage",
         "Memory is allocated further out than the values live, once, as large as it ever gets.",
         Storage,
-        (Func f("f"), g("g"); g(x, y) = x * y; f(x, y) = g(x, y) + g(x + 1, y);
+        (Func f("f"), g("g"); g(x, y) = 3 * x - y; f(x, y) = g(x - 1, y) ^ g(x + 2, y);
          f.split(x, xo, xi, 8); g.compute_at(f, xo)),
         (g.hoist_storage_root())),
     DIRECTIVE("fold_storage", "Coordinates are taken modulo an extent.", Storage,
-              (Func f("f"), g("g"); g(x, y) = x * y; g.store_root().compute_at(f, y);
-               f(x, y) = g(x, y) + g(x, y + 1)),
-              (g.fold_storage(y, 4))),
+              (Func f("f"), g("g"); g(x, y) = 3 * x - y; g.store_root().compute_at(f, y);
+               f(x, y) = max(g(x, y), g(x, y + 2))),
+              (g.fold_storage(y, 8))),
     DIRECTIVE("store_in", "The kind of memory.", Storage,
-              (Func f("f"), g("g"); g(x, y) = x * y; g.compute_at(f, y).bound_extent(x, 64);
+              (Func f("f"), g("g"); g(x, y) = 3 * x - y; g.compute_at(f, y).bound_extent(x, 64);
                f(x, y) = g(x, y)),
               (g.store_in(MemoryType::Stack))),
     DIRECTIVE("prefetch", "What a later iteration reads is fetched into the cache.", Storage,
-              (Func f("f"), g("g"); g(x, y) = x * y; g.compute_root(); f(x, y) = g(x, y)),
+              (Func f("f"), g("g"); g(x, y) = 3 * x - y; g.compute_root(); f(x, y) = g(x, y)),
               (f.prefetch(g, y, y, 2))),
     DIRECTIVE(
         "trace_stores, trace_loads, trace_realizations",

@@ -9,18 +9,19 @@ using namespace Halide;
 int main(int argc, char** argv) {
   const std::string folder = argc > 1 ? argv[1] : ".";
   Var x("x"), y("y");
-  ImageParam input(UInt(8), 2, "input");
-  Param<uint8_t> offset("offset");
-  Func brighter("brighter");
-  brighter(x, y) = input(x, y) + offset;
-  brighter.vectorize(x, 16).parallel(y);
-  const std::vector<Argument> args = {input, offset};
+  ImageParam depth(UInt(16), 2, "depth");
+  Param<uint16_t> nearest("nearest"), farthest("farthest");
+  Func mask("mask");
+  Expr is_seen = depth(x, y) >= nearest && depth(x, y) <= farthest;
+  mask(x, y) = select(is_seen, cast<uint8_t>(255), cast<uint8_t>(depth(x, y) >> 9));
+  mask.parallel(y, 8).vectorize(x, 32);
+  const std::vector<Argument> args = {depth, nearest, farthest};
 
   for (const char* name : {"x86-64-linux-sse41", "x86-64-linux-avx-avx2-fma", "arm-64-linux",
                            "x86-64-linux-no_asserts-no_bounds_query"}) {
     Target target(name);
-    const std::string file = folder + "/brighter_" + name;
-    brighter.compile_to_file(file, args, "brighter", target);
+    const std::string file = folder + "/mask_for_" + name;
+    mask.compile_to_file(file, args, "mask_between", target);
 
     // The object says which machine it is for: bytes 18 and 19 of an ELF file.
     unsigned char header[32] = {};

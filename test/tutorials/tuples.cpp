@@ -5,18 +5,18 @@
 
 using namespace Halide;
 
-// A complex number as a Tuple of two Exprs, with its own arithmetic.
-struct Complex {
-  Expr re, im;
-  Complex(Expr re, Expr im) : re(re), im(im) {}
-  Complex(Tuple t) : re(t[0]), im(t[1]) {}
-  Complex(FuncRef t) : Complex(Tuple(t)) {}
-  operator Tuple() const { return Tuple(re, im); }
-  Complex operator+(const Complex& o) const { return {re + o.re, im + o.im}; }
-  Complex operator*(const Complex& o) const {
-    return {re * o.re - im * o.im, re * o.im + im * o.re};
+// A fraction as a Tuple of two integers, with arithmetic of its own.
+struct Fraction {
+  Expr over, under;
+  Fraction(Expr numerator, Expr denominator) : over(numerator), under(denominator) {}
+  Fraction(Tuple both) : over(both[0]), under(both[1]) {}
+  Fraction(FuncRef at) : Fraction(Tuple(at)) {}
+  operator Tuple() const { return Tuple(over, under); }
+  Fraction operator+(const Fraction& other) const {
+    return {over * other.under + other.over * under, under * other.under};
   }
-  Expr magnitude_squared() const { return re * re + im * im; }
+  Fraction inverse() const { return {under, over}; }
+  Expr operator<(const Fraction& other) const { return over * other.under < other.over * under; }
 };
 
 int main() {
@@ -61,20 +61,36 @@ int main() {
     printf(", by name %d at %d\n", named_value, named_place);
   }
   {
-    // Iterations of z * z + c until it leaves a circle.
-    Func escape("escape"), steps("steps");
-    Var z("z");
-    Complex c(x / 10.0f - 1.5f, y / 6.0f - 1.0f);
-    RDom t(1, 20);
-    escape(x, y, z) = Complex(0.0f, 0.0f);
-    Complex before = escape(x, y, t - 1);
-    escape(x, y, t) = before * before + c;
-    Expr inside = Complex(escape(x, y, t)).magnitude_squared() < 4.0f;
-    steps(x, y) = argmin(t, cast<int>(inside))[0];
-    Buffer<int> out = steps.realize({24, 12});
-    const char* shades = " .:-=+*#%@ABCDEFGHIJ";
-    for (int j = 0; j < 12; j++) {
-      for (int i = 0; i < 24; i++) putchar(shades[out(i, j)]);
+    // A type of one's own: the golden ratio by its continued fraction 1 + 1 / (1 + 1 / (1 + ...)).
+    Func convergent("convergent");
+    RDom next(1, 11);
+    convergent(x) = Fraction(1, 1);
+    convergent(next) = Fraction(convergent(next - 1)).inverse() + Fraction(1, 1);
+    Realization found = convergent.realize({12});
+    Buffer<int> over = found[0], under = found[1];
+    for (int i = 0; i < 12; i++) printf("%d/%d ", over(i), under(i));
+
+    // Which is the first above 1.6 and below 1.62?
+    RDom all(0, 12);
+    Fraction candidate = convergent(all);
+    Expr is_near = Fraction(8, 5) < candidate && candidate < Fraction(81, 50);
+    convergent.compute_root();
+    printf("- number %d\n", evaluate<int>(argmax(cast<int>(is_near))[0]));
+  }
+  {
+    // Euclid's algorithm: pairs (a, b) become (b, a % b) until b is 0. How many steps that takes.
+    Func pair("pair"), steps("steps");
+    Var step("step");
+    RDom later(1, 7);
+    pair(x, y, step) = Tuple(x + 1, y + 1);
+    Expr a = pair(x, y, later - 1)[0], b = pair(x, y, later - 1)[1];
+    pair(x, y, later) = Tuple(select(b == 0, a, b), select(b == 0, 0, a % max(b, 1)));
+    RDom any(0, 8);
+    steps(x, y) = argmin(any, cast<int>(pair(x, y, any)[1] != 0))[0];
+    pair.compute_root();
+    Buffer<int> out = steps.realize({40, 16});
+    for (int j = 0; j < 16; j++) {
+      for (int i = 0; i < 40; i++) putchar(" .:+*#@%"[out(i, j)]);
       putchar('\n');
     }
   }

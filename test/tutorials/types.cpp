@@ -54,15 +54,18 @@ int main() {
   for (int i = 0; i < 11; i++) printf("%d:%d:%d ", d(i), m(i), t(i));
   printf("\n");
 
-  // One function for every type.
-  auto average = [](Expr a, Expr b) {
-    Type wider = a.type().is_float() ? a.type() : a.type().with_bits(a.type().bits() * 2);
-    return cast(a.type(), (cast(wider, a) + cast(wider, b)) / 2);
+  // One function for every type: how far apart two values are. That of signed integers need not fit
+  // them; unsigned ones of as many bits hold it.
+  auto apart = [](Expr a, Expr b) -> Expr {
+    const Type type = a.type();
+    if (type.is_float()) return abs(a - b);
+    const Type fits = UInt(type.bits());
+    return cast(fits, max(a, b)) - cast(fits, min(a, b));
   };
-  printf("average: %d %d %g\n",
-         (int)evaluate<uint8_t>(average(cast<uint8_t>(200), cast<uint8_t>(251))),
-         evaluate<int16_t>(average(cast<int16_t>(-30000), cast<int16_t>(-20000))),
-         evaluate<float>(average(Expr(1.5f), Expr(2.0f))));
+  Expr low = cast<int8_t>(-128), high = cast<int8_t>(127);
+  printf("apart: %d %d %g, as %s\n", (int)evaluate<uint8_t>(apart(low, high)),
+         (int)evaluate<uint16_t>(apart(cast<uint16_t>(65000), cast<uint16_t>(12))),
+         evaluate<double>(apart(Expr(0.25), Expr(2.0))), name(apart(low, high).type()).c_str());
 
   // Bits as they are.
   printf("bits of 1.0f: %x, and back %g\n", evaluate<uint32_t>(reinterpret<uint32_t>(Expr(1.0f))),

@@ -51,23 +51,27 @@ PIPELINE(triangular_domain) {
   return {{f}, {{20, 20}}, {}};
 }
 
-PIPELINE(histogram) {
-  Buffer<uint8_t> in = noise<uint8_t>({50, 30}, 1);
-  RDom r(in);
-  RDom i(1, 255);
-  Func hist("hist"), cdf("cdf"), out("out");
-  hist(x) = 0;
-  hist(clamp(cast<int>(in(r.x, r.y)), 0, 255)) += 1;
-  cdf(x) = hist(0);
-  cdf(i) = cdf(i - 1) + hist(i);
-  out(x, y) = cast<uint8_t>(cdf(in(x, y)) * 255 / (50 * 30));
-  hist.compute_root();
-  cdf.compute_root();
+// Each pixel's rank, 0 to 99, among the pixels of its column block: counts of 16 values, those at
+// least as bright by a scan from the right, and a look-up.
+PIPELINE(ranks_in_blocks) {
+  const int columns = 48, rows = 27, block = 16;
+  Buffer<uint8_t> in = noise<uint8_t>({columns, rows}, 1);
+  RDom pixel(0, columns, 0, rows), right(0, 15);
+  Func count("count"), at_least("at_least"), rank("rank");
+  Expr value = in(pixel.x, pixel.y) / cast<uint8_t>(16);
+  count(x, y) = 0;
+  count(clamp(cast<int>(value), 0, 15), pixel.x / block) += 1;
+  at_least(x, y) = count(x, y);
+  at_least(14 - right, y) += at_least(15 - right, y);
+  rank(x, y) = cast<uint8_t>(at_least(in(x, y) >> 4, x / block) * 99 / (block * rows));
+  count.compute_root();
+  at_least.compute_root();
   if (scheduled) {
-    hist.vectorize(x, 8);
-    out.vectorize(x, 16).parallel(y);
+    count.vectorize(x, 8);
+    at_least.update().vectorize(y, 2, TailStrategy::GuardWithIf);
+    rank.parallel(y).vectorize(x, 16);
   }
-  return {{out, hist}, {{50, 30}, {256}}, {}};
+  return {{rank, at_least}, {{columns, rows}, {16, columns / block}}, {}};
 }
 
 PIPELINE(scans) {
