@@ -46,7 +46,8 @@ struct Formula {
   }
 };
 
-// ln2 in two parts: products of the first, 16 bits long, with exponents are exact.
+// ln2 in two parts (Cody and Waite 1980, "Software manual for the elementary functions", chapter
+// 6): products of the first, 16 bits long, with exponents are exact.
 constexpr double ln2_high = 0x1.62e4p-1, ln2_low = 1.42860682030941723e-6;
 
 // x = n ln2 + r, |r| <= ln2 / 2;  exp(x) = 2^n exp(r).
@@ -97,7 +98,8 @@ Value* fast_pow(Emitter& e, Value* x, Value* y) {
 Value* fast_sin_cos(Emitter& e, Value* x, bool is_cos) {
   Formula f{e, x->getType()};
   Value* n = f.nearest(f.mul(x, 0.63661977236758134308));
-  // pi/2 in three parts, the products with the first two exact for |n| < 2^13.
+  // pi/2 in three parts (Cody and Waite 1980, chapter 8), the products with the first two exact for
+  // |n| < 2^13. The first two are twice those of pi/4 in S. Moshier's Cephes (sinf.c).
   Value* r = f.sub(x, f.mul(n, 1.5703125));
   r = f.sub(r, f.mul(n, 4.837512969970703125e-4));
   r = f.sub(r, f.mul(n, 7.549789948768648e-8));
@@ -117,8 +119,9 @@ Value* fast_sin_cos(Emitter& e, Value* x, bool is_cos) {
 
 Value* fast_inverse(Emitter& e, Value* x) { return e.b.CreateFDiv(float_constant(x, 1.0), x); }
 
-// A first guess from the exponent, then three of Newton's steps y (1.5 - x y^2 / 2). The
-// processors' own estimates differ between makers; this is the same everywhere.
+// A first guess from the exponent, with the constant of C. Lomont (2003, "Fast inverse square
+// root"), then three of Newton's steps y (1.5 - x y^2 / 2). The processors' own estimates differ
+// between makers; this is the same everywhere.
 Value* fast_inverse_sqrt(Emitter& e, Value* x) {
   Formula f{e, x->getType()};
   Value* bits = bits_as_integer(e, x);

@@ -58,8 +58,9 @@ TEST(HalideCompat, WhiteBalanceWithParams) {
 TEST(HalideCompat, ClosingInFusedTiles) {
   const int width = 53, height = 38;
   Buffer<uint16_t> heights(width, height);
-  heights.for_each_element(
-      [&](int i, int j) { heights(i, j) = static_cast<uint16_t>((i * 7919 + j * j * 104729) % 5003); });
+  heights.for_each_element([&](int i, int j) {
+    heights(i, j) = static_cast<uint16_t>((i * 7919 + j * j * 104729) % 5003);
+  });
   Func edge = BoundaryConditions::repeat_edge(heights), dilated("dilated"), closed("closed");
   Var x("x"), y("y"), across("across"), down("down"), tx("tx"), ty("ty"), tile("tile");
   dilated(x, y) = max(edge(x, y), edge(x + 1, y), edge(x, y + 1), edge(x + 1, y + 1));
@@ -77,19 +78,20 @@ TEST(HalideCompat, ClosingInFusedTiles) {
     return std::max({at(i, j), at(i + 1, j), at(i, j + 1), at(i + 1, j + 1)});
   };
   out.for_each_element([&](int i, int j) {
-    const uint16_t expected = std::min(
-        {largest(i, j), largest(i - 1, j), largest(i, j - 1), largest(i - 1, j - 1)});
+    const uint16_t expected =
+        std::min({largest(i, j), largest(i - 1, j), largest(i, j - 1), largest(i - 1, j - 1)});
     ASSERT_EQ(out(i, j), expected) << i << " " << j;
   });
 }
 
-// A picture of labels: how many pixels bear each, where their columns are on average, and where each
-// label begins in a list sorted by label.
+// A picture of labels: how many pixels bear each, where their columns are on average, and where
+// each label begins in a list sorted by label.
 TEST(HalideCompat, AreasAndOffsetsOfLabels) {
   const int labels = 19;
   Buffer<uint8_t> picture(31, 26);
-  picture.for_each_element(
-      [&](int i, int j) { picture(i, j) = static_cast<uint8_t>((i / 4 * 5 + j / 7 * 3) % labels); });
+  picture.for_each_element([&](int i, int j) {
+    picture(i, j) = static_cast<uint8_t>((i / 4 * 5 + j / 7 * 3) % labels);
+  });
   Var label("label");
   RDom pixel(picture), later(1, labels - 1);
   Func area("area"), columns("columns"), begins("begins"), middle("middle");
@@ -135,7 +137,8 @@ TEST(HalideCompat, DistancesBetweenPoints) {
   sum.update().reorder(i, j, axis).unroll(j).vectorize(i);
   Buffer<float> first(points, dimensions), second(dimensions, points);
   first.for_each_element([&](int p, int d) { first(p, d) = static_cast<float>((p * 5 + d) % 13); });
-  second.for_each_element([&](int d, int p) { second(d, p) = static_cast<float>((p + d * d) % 9); });
+  second.for_each_element(
+      [&](int d, int p) { second(d, p) = static_cast<float>((p + d * d) % 9); });
   here.set(first);
   there.set(second);
   Buffer<float> result = squared.realize({points, points});
@@ -170,8 +173,8 @@ TEST(HalideCompat, MomentsInOnePassByATuple) {
   EXPECT_NEAR(deviations(), squares, 1e-3);
 }
 
-// A number and its slope, as a type of the user's: Newton's method for cube roots, whose steps are a
-// dimension of the Func.
+// A number and its slope, as a type of the user's: Newton's method for cube roots, whose steps are
+// a dimension of the Func.
 TEST(HalideCompat, UserTypesThatActLikeTuples) {
   struct Dual {
     Expr value, slope;
