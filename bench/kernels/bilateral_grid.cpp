@@ -1,8 +1,12 @@
-// bilateral_grid -- the edge-preserving blur of Chen, Paris and Durand (2007): pixels are averaged
-// in a coarse grid over x, y and brightness, which is blurred and then read back by interpolation.
+// bilateral_grid -- Chen, Paris and Durand (2007), "Real-time edge-aware image processing with the
+// bilateral grid": pixels are added up in a coarse grid over brightness and place, the grid is
+// smoothed, and read back at each pixel's own brightness and place (sections 3.1 to 3.3).
 //
-// Each row of the grid is gathered by one task, and blurred along brightness while it is warm.
+// Brightness is innermost in memory, so that one cell's pixels fall into one short vector; the grid
+// is a picture of such vectors.
 #include "kernel.h"
+
+#include <cmath>
 
 namespace kernels {
 
@@ -10,66 +14,82 @@ using namespace Halide;
 
 namespace {
 
-// A 5-point binomial blur of both values of a Func along one of its dimensions.
-Tuple blurred(const Func& f, std::vector<Expr> at, int dimension) {
-  const float weights[] = {0.0625f, 0.25f, 0.375f, 0.25f, 0.0625f};
-  const Expr centre = at[dimension];
-  Expr sum = 0.0f, weight = 0.0f;
-  for (int i = -2; i <= 2; i++) {
-    at[dimension] = centre + i;
-    sum = sum + weights[i + 2] * f(at)[0];
-    weight = weight + weights[i + 2] * f(at)[1];
-  }
-  return Tuple(sum, weight);
+// Brightness of all pixels of a cell and bin together, and their number: the paper's homogeneous
+// value, whose quotient is the mean.
+struct Homogeneous {
+  Expr value, weight;
+  Homogeneous(Expr v, Expr w) : value(v), weight(w) {}
+  Homogeneous(FuncRef f) : value(f[0]), weight(f[1]) {}
+  operator Tuple() const { return Tuple(value, weight); }
+  Homogeneous operator+(const Homogeneous& o) const { return {value + o.value, weight + o.weight}; }
+  Homogeneous operator*(Expr k) const { return {value * k, weight * k}; }
+};
+
+Homogeneous between(const Homogeneous& a, const Homogeneous& b, Expr part) {
+  return {lerp(a.value, b.value, part), lerp(a.weight, b.weight, part)};
+}
+
+// A Gaussian one cell wide, cut at two, along one axis of the grid. Its scale cancels in the
+// quotient.
+Func smoothed(const Func& grid, int axis, const std::string& name) {
+  const std::vector<Var> place = grid.args();
+  auto tap = [&](int offset) {
+    std::vector<Expr> at(place.begin(), place.end());
+    at[axis] = at[axis] + offset;
+    return Homogeneous(grid(at)) * std::exp(-0.5f * offset * offset);
+  };
+  Func result(name);
+  result(place) = tap(-2) + tap(-1) + tap(0) + tap(1) + tap(2);
+  return result;
 }
 
 }  // namespace
 
 Kernel bilateral_grid(const Setup& setup) {
   const int width = setup.size(2048, 191), height = setup.size(1536, 133);
-  const int cell = 8, levels = 12;
+  const int cell = 8;        // pixels along a side
+  const float bins = 12.0f;  // of brightness, 0 to 1
   ImageParam input(Float(32), 2, "input");
-  Var x("x"), y("y"), z("z"), yi("yi");
+  Var x("x"), y("y"), bin("bin"), column("column"), row("row"), strip("strip");
 
-  Func clamped = BoundaryConditions::repeat_edge(input);
-  Func grid("grid"), blur_z("blur_z"), blur_x("blur_x"), blur_y("blur_y"), result("result");
-  RDom r(0, cell, 0, cell);
-  Expr value = clamp(clamped(x * cell + r.x - cell / 2, y * cell + r.y - cell / 2), 0.0f, 1.0f);
-  Expr level = cast<int>(value * levels + 0.5f);
-  grid(x, y, z) = Tuple(0.0f, 0.0f);
-  grid(x, y, level) = Tuple(grid(x, y, level)[0] + value, grid(x, y, level)[1] + 1.0f);
-  blur_z(x, y, z) = blurred(grid, {x, y, z}, 2);
-  blur_x(x, y, z) = blurred(blur_z, {x, y, z}, 0);
-  blur_y(x, y, z) = blurred(blur_x, {x, y, z}, 1);
+  // Pixels go to the grid point that they are nearest to.
+  Func extended = BoundaryConditions::repeat_edge(input), splat("splat");
+  RDom pixel(-cell / 2, cell, -cell / 2, cell);
+  Expr brightness = clamp(extended(column * cell + pixel.x, row * cell + pixel.y), 0.0f, 1.0f);
+  Expr nearest = cast<int>(round(brightness * bins));
+  splat(bin, column, row) = Homogeneous(0.0f, 0.0f);
+  splat(nearest, column, row) =
+      Homogeneous(splat(nearest, column, row)) + Homogeneous(brightness, 1.0f);
 
-  Expr brightness = clamp(input(x, y), 0.0f, 1.0f) * levels;
-  Expr below = cast<int>(brightness), fraction = brightness - below;
-  Expr fx = (x % cell) * (1.0f / cell), fy = (y % cell) * (1.0f / cell);
-  auto read = [&](int which) {
-    auto along_x = [&](Expr gy, Expr gz) {
-      return lerp(Expr(blur_y(x / cell, gy, gz)[which]), Expr(blur_y(x / cell + 1, gy, gz)[which]),
-                  fx);
+  Func by_row = smoothed(splat, 2, "by_row");
+  Func by_column = smoothed(by_row, 1, "by_column"), grid = smoothed(by_column, 0, "grid");
+
+  // Trilinear in the eight grid points around.
+  Func result("result");
+  Expr own = clamp(input(x, y), 0.0f, 1.0f) * bins, low = cast<int>(own);
+  Expr i = x / cell, j = y / cell;
+  auto in_bin = [&](Expr b) {
+    auto in_row = [&](Expr r) {
+      return between(grid(b, i, r), grid(b, i + 1, r), cast<float>(x % cell) / cell);
     };
-    auto along_y = [&](Expr gz) {
-      return lerp(along_x(y / cell, gz), along_x(y / cell + 1, gz), fy);
-    };
-    return lerp(along_y(below), along_y(below + 1), fraction);
+    return between(in_row(j), in_row(j + 1), cast<float>(y % cell) / cell);
   };
-  result(x, y) = read(0) / read(1);
+  const Homogeneous mean = between(in_bin(low), in_bin(low + 1), own - low);
+  result(x, y) = mean.value / mean.weight;
 
   const int lanes = setup.lanes<float>();
-  grid.compute_at(blur_z, y).vectorize(x, lanes);
-  grid.update().reorder(r.x, r.y, x, y);
-  blur_z.compute_root().reorder(x, z, y).parallel(y).vectorize(x, lanes);
-  blur_x.compute_at(blur_y, z).vectorize(x, lanes);
-  blur_y.compute_root().parallel(z).vectorize(x, lanes);
-  result.split(y, y, yi, 16).parallel(y).vectorize(x, lanes);
+  splat.compute_root().parallel(row).vectorize(bin, lanes);
+  splat.update().reorder(pixel.x, pixel.y, column, row).parallel(row);
+  grid.compute_root().parallel(row).vectorize(bin, lanes);
+  by_column.compute_at(grid, column).vectorize(bin, lanes);
+  by_row.compute_at(grid, row).vectorize(bin, lanes);
+  result.split(y, strip, y, cell).parallel(strip).vectorize(x, lanes);
 
   Buffer<float> image = make_image<float>({width, height});
   input.set(image);
   Buffer<float> output(width, height);
-  const double cells = static_cast<double>(width / cell) * (height / cell) * levels;
-  return {Pipeline(result), {image}, {output}, (3 + 32.0) * width * height + 60 * cells};
+  const double cells = static_cast<double>(width / cell) * (height / cell) * (bins + 1);
+  return {Pipeline(result), {image}, {output}, (3 + 32.0) * width * height + 54 * cells};
 }
 
 }  // namespace kernels

@@ -1,7 +1,8 @@
-// conv_layer -- a convolutional layer: 3 x 3, 32 channels in, 32 out, bias, ReLU, a batch of 4.
+// conv_layer -- a layer of a convolutional network: 3 x 3 taps around each pixel, zeros beyond the
+// picture, 32 features in and 32 out, an offset for each, negative values cut; a batch of 4.
 //
-// Channels lie innermost. All output channels of 8 pixels in a row stay in registers over the whole
-// reduction.
+// Features lie innermost. A task makes one row of one picture; all features of 8 pixels next to
+// each other stay in registers over the whole sum.
 #include "kernel.h"
 
 namespace kernels {
@@ -10,37 +11,43 @@ using namespace Halide;
 
 Kernel conv_layer(const Setup& setup) {
   const int width = setup.size(128, 21), height = setup.size(96, 11), batch = setup.size(4, 2);
-  const int channels = 32;
-  ImageParam input(Float(32), 4, "input"), filter(Float(32), 4, "filter");
-  ImageParam bias(Float(32), 1, "bias");
-  Var co("co"), x("x"), y("y"), n("n"), xi("xi"), cv("cv");
+  const int features = 32, reach = 1, taps = 2 * reach + 1;
+  ImageParam pictures(Float(32), 4, "pictures"), kernel(Float(32), 4, "kernel");
+  ImageParam offset(Float(32), 1, "offset");
+  Var out("out"), x("x"), y("y"), which("which"), pixel("pixel"), lane("lane");
 
-  Func conv("conv"), relu("relu");
-  RDom r(0, channels, 0, 3, 0, 3);
-  conv(co, x, y, n) = bias(co);
-  conv(co, x, y, n) += filter(co, r.x, r.y, r.z) * input(r.x, x + r.y, y + r.z, n);
-  relu(co, x, y, n) = max(conv(co, x, y, n), 0.0f);
+  Func sums("sums"), layer("layer");
+  RDom tap(0, features, -reach, taps, -reach, taps, "tap");
+  RVar in = tap.x, dx = tap.y, dy = tap.z;
+  sums(out, x, y, which) += pictures(in, x + dx, y + dy, which) * kernel(out, in, dx, dy);
+  layer(out, x, y, which) = max(sums(out, x, y, which) + offset(out), 0.0f);
 
   const int lanes = setup.lanes<float>(), pixels = 8;
-  relu.bound(co, 0, channels).split(x, x, xi, pixels).split(co, co, cv, lanes);
-  relu.reorder(cv, co, xi, x, y, n).vectorize(cv).unroll(co).unroll(xi).parallel(y).parallel(n);
-  conv.compute_at(relu, x).bound(co, 0, channels);
-  conv.split(co, co, cv, lanes).vectorize(cv).unroll(co).unroll(x);
-  conv.update().split(co, co, cv, lanes).reorder(cv, co, x, y, n, r.x, r.y, r.z);
-  conv.update().vectorize(cv).unroll(co).unroll(x);
+  layer.bound(out, 0, features).split(x, x, pixel, pixels);
+  layer.reorder(out, pixel, x, y, which).vectorize(out, lanes).unroll(out).unroll(pixel);
+  layer.fuse(y, which, y).parallel(y);
+  sums.compute_at(layer, x).bound_extent(out, features).vectorize(out, lanes).unroll(out).unroll(x);
+  sums.update().split(out, out, lane, lanes).vectorize(lane);
+  sums.update().reorder(lane, out, x, in, dx, dy, y, which).unroll(out).unroll(x);
 
-  Buffer<float> image = make_image<float>({channels, width + 2, height + 2, batch});
-  Buffer<float> weights = make_image<float>({channels, channels, 3, 3});
+  // The picture lies in a frame of zeros.
+  Buffer<float> image = make_image<float>({features, width + 2, height + 2, batch});
+  image.for_each_element([&](int f, int i, int j, int n) {
+    if (i == 0 || j == 0 || i == width + 1 || j == height + 1) image(f, i, j, n) = 0.0f;
+  });
+  image.set_min(std::vector<int>{0, -reach, -reach, 0});
+  Buffer<float> weights = make_image<float>({features, features, taps, taps});
   weights.for_each_value([](float& w) { w = (w - 0.5f) * 0.2f; });
-  Buffer<float> offsets = make_image<float>({channels});
-  input.set(image);
-  filter.set(weights);
-  bias.set(offsets);
-  Buffer<float> output(channels, width, height, batch);
-  return {Pipeline(relu),
+  weights.set_min(std::vector<int>{0, 0, -reach, -reach});
+  Buffer<float> offsets = make_image<float>({features});
+  pictures.set(image);
+  kernel.set(weights);
+  offset.set(offsets);
+  Buffer<float> output(features, width, height, batch);
+  return {Pipeline(layer),
           {image, weights, offsets},
           {output},
-          2.0 * 9 * channels * channels * width * height * batch};
+          2.0 * taps * taps * features * features * width * height * batch};
 }
 
 }  // namespace kernels

@@ -1,7 +1,7 @@
 // harris_corners -- the corner response of Harris and Stephens (1988) over 3 x 3 windows of Sobel
 // gradients, from a colour image.
 //
-// In strips of rows: luminance and the gradients are kept for the rows that are still to be read.
+// In tiles: luminance and the gradients of a tile and its border, then the response.
 #include "kernel.h"
 
 namespace kernels {
@@ -11,7 +11,7 @@ using namespace Halide;
 Kernel harris_corners(const Setup& setup) {
   const int width = setup.size(2304, 203), height = setup.size(1536, 119);
   ImageParam input(Float(32), 3, "input");
-  Var x("x"), y("y"), yi("yi");
+  Var x("x"), y("y"), tx("tx"), ty("ty");
 
   Func clamped = BoundaryConditions::repeat_edge(input);
   Func grey("grey"), slope_x("slope_x"), slope_y("slope_y"), response("response");
@@ -37,10 +37,8 @@ Kernel harris_corners(const Setup& setup) {
   response(x, y) = xx * yy - xy * xy - 0.04f * trace * trace;
 
   const int lanes = setup.lanes<float>();
-  response.split(y, y, yi, 32).parallel(y).vectorize(x, lanes);
-  grey.store_at(response, y).compute_at(response, yi).vectorize(x, lanes);
-  slope_x.store_at(response, y).compute_at(response, yi).vectorize(x, lanes);
-  slope_y.store_at(response, y).compute_at(response, yi).vectorize(x, lanes);
+  response.tile(x, y, tx, ty, 256, 32).parallel(y).vectorize(tx, lanes);
+  for (Func f : {grey, slope_x, slope_y}) f.compute_at(response, x).vectorize(x, lanes);
 
   Buffer<float> image = make_image<float>({width, height, 3});
   input.set(image);

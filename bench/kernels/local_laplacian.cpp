@@ -21,30 +21,31 @@ FuncRef at(const Func& f, Expr x, Expr y, const std::vector<Var>& rest) {
   return f(args);
 }
 
-struct Halved {
-  Func along_x, result;
+struct Reduced {
+  Func by_row, result;
 };
-// Half the size, by the kernel (1 3 3 1) / 8 in both directions.
-Halved halve(const Func& f, const std::vector<Var>& rest, const std::string& name) {
+// Half the size: each pixel the mean of five in both directions, weighted 1 4 6 4 1 (Burt and
+// Adelson 1983, "The Laplacian pyramid as a compact image code", a = 3/8).
+Reduced reduced(const Func& f, const std::vector<Var>& rest, const std::string& name) {
   Var x("x"), y("y");
-  Halved h{Func(name + "_x"), Func(name)};
-  auto source = [&](Expr px) -> Expr { return at(f, px, y, rest); };
-  at(h.along_x, x, y, rest) =
-      (source(2 * x - 1) + 3.0f * (source(2 * x) + source(2 * x + 1)) + source(2 * x + 2)) * 0.125f;
-  auto row = [&](Expr py) -> Expr { return at(h.along_x, x, py, rest); };
-  at(h.result, x, y, rest) =
-      (row(2 * y - 1) + 3.0f * (row(2 * y) + row(2 * y + 1)) + row(2 * y + 2)) * 0.125f;
-  return h;
+  Reduced half{Func(name + "_by_row"), Func(name)};
+  auto weighted = [](auto pixel) {
+    return pixel(0) * 0.375f + (pixel(-1) + pixel(1)) * 0.25f + (pixel(-2) + pixel(2)) * 0.0625f;
+  };
+  // Down the columns first, while rows of the finer level lie in the cache.
+  at(half.by_row, x, y, rest) = weighted([&](int k) -> Expr { return at(f, x, 2 * y + k, rest); });
+  at(half.result, x, y, rest) =
+      weighted([&](int k) -> Expr { return at(half.by_row, 2 * x + k, y, rest); });
+  return half;
 }
 
-// Twice the size, bilinear.
-Func doubled(const Func& f, const std::vector<Var>& rest, const std::string& name) {
+// Twice the size: pixels of the coarser level, and the means of those next to each other.
+Func expanded(const Func& f, const std::vector<Var>& rest, const std::string& name) {
   Var x("x"), y("y");
-  Func along_x(name + "_x"), result(name);
-  at(along_x, x, y, rest) =
-      0.25f * Expr(at(f, x / 2 - 1 + 2 * (x % 2), y, rest)) + 0.75f * Expr(at(f, x / 2, y, rest));
-  at(result, x, y, rest) = 0.25f * Expr(at(along_x, x, y / 2 - 1 + 2 * (y % 2), rest)) +
-                           0.75f * Expr(at(along_x, x, y / 2, rest));
+  Func by_row(name + "_by_row"), result(name);
+  at(by_row, x, y, rest) = (Expr(at(f, x, y / 2, rest)) + Expr(at(f, x, (y + 1) / 2, rest))) * 0.5f;
+  at(result, x, y, rest) =
+      (Expr(at(by_row, x / 2, y, rest)) + Expr(at(by_row, (x + 1) / 2, y, rest))) * 0.5f;
   return result;
 }
 
@@ -75,44 +76,45 @@ Kernel local_laplacian(const Setup& setup) {
   pyramid[0] = remapped;
   grey.compute_root().split(y, y, yi, 32).parallel(y).vectorize(x, lanes);
   for (int j = 1; j < levels; j++) {
-    Halved g = halve(grey_pyramid[j - 1], {}, "grey_" + std::to_string(j));
-    Halved p = halve(pyramid[j - 1], {k}, "pyramid_" + std::to_string(j));
+    Reduced g = reduced(grey_pyramid[j - 1], {}, "grey_" + std::to_string(j));
+    Reduced p = reduced(pyramid[j - 1], {k}, "pyramid_" + std::to_string(j));
     grey_pyramid[j] = g.result;
     pyramid[j] = p.result;
     const int rows = j < 5 ? 8 : 4;
     in_strips(g.result, rows);
     p.result.compute_root().split(y, y, yi, rows).parallel(y).parallel(k).vectorize(x, lanes);
-    p.along_x.store_at(p.result, y).compute_at(p.result, yi).vectorize(x, lanes);
+    p.by_row.compute_at(p.result, yi).vectorize(x, lanes);
   }
 
+  // A coefficient of the result: of the two pictures remapped around the brightnesses next to the
+  // pixel's own, a mixture.
+  const float just_below_last = brightnesses - 1 - 1e-4f;
   for (int j = levels - 1; j >= 0; j--) {
+    const bool is_coarsest = j == levels - 1;
     const std::string number = std::to_string(j);
-    Func laplacian("laplacian_" + number), level("enhanced_" + number);
-    laplacian(x, y, k) = pyramid[j](x, y, k);
-    if (j + 1 < levels) {
-      Func up = doubled(pyramid[j + 1], {k}, "pyramid_up_" + number);
-      laplacian = Func("laplacian_of_" + number);
-      laplacian(x, y, k) = pyramid[j](x, y, k) - up(x, y, k);
-    }
-    Expr brightness = clamp(grey_pyramid[j](x, y), 0.0f, 1.0f) * cast<float>(brightnesses - 1);
-    Expr below = clamp(cast<int>(brightness), 0, brightnesses - 2);
-    Expr fraction = brightness - below;
-    Expr value = lerp(laplacian(x, y, below), laplacian(x, y, below + 1), fraction);
-    if (j + 1 < levels) value = value + doubled(enhanced[j + 1], {}, "up_" + number)(x, y);
-    level(x, y) = value;
+    Func detail("detail_" + number);
+    Expr own = pyramid[j](x, y, k);
+    detail(x, y, k) =
+        is_coarsest ? own : own - expanded(pyramid[j + 1], {k}, "coarser_" + number)(x, y, k);
+    Func level("enhanced_" + number);
+    Expr place = clamp(grey_pyramid[j](x, y) * (brightnesses - 1.0f), 0.0f, just_below_last);
+    Expr darker = cast<int>(place), share = place - darker;
+    Expr mixture = (1.0f - share) * detail(x, y, darker) + share * detail(x, y, darker + 1);
+    level(x, y) =
+        is_coarsest ? mixture : mixture + expanded(enhanced[j + 1], {}, "up_" + number)(x, y);
     enhanced[j] = level;
     in_strips(level, j < 5 ? 8 : 4);
   }
 
+  // Colours keep their differences from grey.
   Func result("result");
-  result(x, y, c) =
-      clamp(input(x, y, c) * (enhanced[0](x, y) + 0.01f) / (grey(x, y) + 0.01f), 0.0f, 1.0f);
+  result(x, y, c) = clamp(input(x, y, c) + enhanced[0](x, y) - grey(x, y), 0.0f, 1.0f);
   result.bound(c, 0, 3).split(y, y, yi, 32).reorder(x, c, yi, y).parallel(y).vectorize(x, lanes);
 
   Buffer<float> image = make_image<float>({width, height, 3});
   input.set(image);
   Buffer<float> output(width, height, 3);
-  // Levels add up to 4/3 of the first: remapping, halving and doubling for each brightness.
+  // Levels add up to 4/3 of the first: remapping, reducing and expanding for each brightness.
   return {Pipeline(result),
           {image},
           {output},

@@ -6,6 +6,7 @@
 
 namespace kernels {
 
+// C. Wellons' lowbias32 (2018, "Prospecting for hash functions").
 inline uint32_t scrambled(uint32_t n) {
   n = (n ^ (n >> 16)) * 0x7feb352du;
   n = (n ^ (n >> 15)) * 0x846ca68bu;

@@ -1,68 +1,93 @@
-// pyramid_interpolation -- fills the holes of a picture from what is around them: a pyramid of
-// averages, weighted by alpha, then from the coarsest level up each pixel takes from the coarser
-// one what its own alpha leaves.
+// pyramid_interpolation -- fills the holes of a picture: pull and push (Gortler et al. 1996, "The
+// Lumigraph", section 3.4), with the filters of Strengert, Kraus and Ertl (2006).
 //
-// Each level is made once, in parallel strips.
+// A pixel is a colour and how much it is to be trusted, 0 to 1. Pull: each coarser pixel is the
+// mean of four, weighted by their trust; what they trust together is cut at 1. Push: from the
+// coarsest level on, a pixel takes from the coarser picture what its own trust leaves to 1.
+//
+// A level is one Func of four values, colours times trust, made once, in parallel strips of rows.
 #include "kernel.h"
 
 namespace kernels {
 
 using namespace Halide;
 
+namespace {
+
+// What a pixel is: three colours, each times the trust, and the trust.
+struct Pixel {
+  Expr red, green, blue, trust;
+  Pixel(FuncRef f) : red(f[0]), green(f[1]), blue(f[2]), trust(f[3]) {}
+  Pixel(Expr r, Expr g, Expr b, Expr t) : red(r), green(g), blue(b), trust(t) {}
+  operator Tuple() const { return Tuple(red, green, blue, trust); }
+  Pixel operator+(const Pixel& p) const {
+    return {red + p.red, green + p.green, blue + p.blue, trust + p.trust};
+  }
+  Pixel operator*(Expr k) const { return {red * k, green * k, blue * k, trust * k}; }
+};
+
+// The sum of the four, scaled so that no pixel is trusted more than one that is known.
+Pixel pulled(const Func& fine, Var x, Var y) {
+  const Pixel sum = Pixel(fine(2 * x, 2 * y)) + Pixel(fine(2 * x + 1, 2 * y)) +
+                    Pixel(fine(2 * x, 2 * y + 1)) + Pixel(fine(2 * x + 1, 2 * y + 1));
+  return sum * (1.0f / max(sum.trust, 1.0f));
+}
+
+// Centres of coarse pixels lie between those of fine ones: of the two next to a fine one, the
+// nearer counts three times as much (biquadratic B-splines).
+Pixel mixed(const Pixel& nearer, const Pixel& farther) { return nearer * 0.75f + farther * 0.25f; }
+Expr farther(Var x) { return x / 2 + 2 * (x % 2) - 1; }
+
+}  // namespace
+
 Kernel pyramid_interpolation(const Setup& setup) {
   const int width = setup.size(1536, 197), height = setup.size(1024, 141);
   const int levels = 9;
-  ImageParam input(Float(32), 3, "input");  // red, green, blue, alpha
-  Var x("x"), y("y"), c("c"), yi("yi");
-
+  ImageParam picture(Float(32), 3, "picture");  // red, green, blue, trust
+  Var x("x"), y("y"), c("c"), row("row");
   const int lanes = setup.lanes<float>();
-  auto in_strips = [&](Func f, int rows) {
-    f.compute_root().bound(c, 0, 4).split(y, y, yi, rows).reorder(x, c, yi, y);
-    f.parallel(y).vectorize(x, lanes);
+  auto made_in_strips = [&](Func& f, int rows) {
+    f.compute_root().split(y, y, row, rows).parallel(y).vectorize(x, lanes);
   };
 
-  Func clamped = BoundaryConditions::repeat_edge(input);
-  Func down[levels], up[levels];
-  down[0] = Func("down_0");
-  down[0](x, y, c) = select(c < 3, clamped(x, y, c) * clamped(x, y, 3), clamped(x, y, 3));
-  in_strips(down[0], 32);
-  for (int j = 1; j < levels; j++) {
-    const Func& f = down[j - 1];
-    Func along_x("down_x_" + std::to_string(j)), level("down_" + std::to_string(j));
-    along_x(x, y, c) = (f(2 * x - 1, y, c) + 2.0f * f(2 * x, y, c) + f(2 * x + 1, y, c)) * 0.25f;
-    level(x, y, c) =
-        (along_x(x, 2 * y - 1, c) + 2.0f * along_x(x, 2 * y, c) + along_x(x, 2 * y + 1, c)) * 0.25f;
-    down[j] = level;
-    in_strips(level, j < 5 ? 8 : 4);
-    along_x.store_at(level, y).compute_at(level, yi).reorder(x, c, y).vectorize(x, lanes);
+  Func extended = BoundaryConditions::repeat_edge(picture), known[levels];
+  for (int level = 0; level < levels; level++) {
+    Func& f = known[level] = Func("known_" + std::to_string(level));
+    const Expr trust = extended(x, y, 3);
+    f(x, y) = level > 0
+                  ? pulled(known[level - 1], x, y)
+                  : Pixel(extended(x, y, 0), extended(x, y, 1), extended(x, y, 2), 1.0f) * trust;
+    made_in_strips(f, level < 4 ? 16 : 4);
   }
 
-  up[levels - 1] = down[levels - 1];
-  for (int j = levels - 2; j >= 0; j--) {
-    const Func& f = up[j + 1];
-    Func along_x("up_x_" + std::to_string(j)), level("up_" + std::to_string(j));
-    along_x(x, y, c) = 0.5f * (f(x / 2, y, c) + f((x + 1) / 2, y, c));
-    Expr coarser = 0.5f * (along_x(x, y / 2, c) + along_x(x, (y + 1) / 2, c));
-    level(x, y, c) = down[j](x, y, c) + (1.0f - down[j](x, y, 3)) * coarser;
-    up[j] = level;
-    in_strips(level, j < 5 ? 8 : 4);
+  Func filled = known[levels - 1];
+  for (int level = levels - 2; level >= 0; level--) {
+    const std::string number = std::to_string(level);
+    Func wide("wide_" + number), f("filled_" + number);
+    wide(x, y) = mixed(filled(x / 2, y), filled(farther(x), y));
+    const Pixel own = known[level](x, y), around = mixed(wide(x, y / 2), wide(x, farther(y)));
+    f(x, y) = own + around * (1.0f - own.trust);
+    made_in_strips(f, level < 4 ? 16 : 4);
+    filled = f;
   }
 
   Func result("result");
-  result(x, y, c) = up[0](x, y, c) / max(up[0](x, y, 3), 1e-6f);
-  result.bound(c, 0, 3).split(y, y, yi, 32).reorder(x, c, yi, y).parallel(y).vectorize(x, lanes);
+  const Pixel last = filled(x, y);
+  result(x, y, c) = mux(c, {last.red, last.green, last.blue}) / max(last.trust, 1e-6f);
+  result.bound(c, 0, 3).reorder(c, x, y).unroll(c).vectorize(x, lanes);
+  result.split(y, y, row, 32).parallel(y);
+  filled.compute_at(result, row);
 
   Buffer<float> image = make_image<float>({width, height, 4});
-  // Holes of all sizes: alpha is 0 or 1.
+  // Holes of all sizes: a pixel is trusted, or not.
   for (int j = 0; j < height; j++) {
     for (int i = 0; i < width; i++) image(i, j, 3) = image(i, j, 3) > 0.6f ? 1.0f : 0.0f;
   }
-  input.set(image);
+  picture.set(image);
   Buffer<float> output(width, height, 3);
-  return {Pipeline(result),
-          {image},
-          {output},
-          (3 + 4.0 / 3 * (4 * 8.0 / 4 * 2 + 4 * 8) + 3) * width * height};
+  // Of each level: a quarter of a pull (18 operations), two mixtures and a blend (20).
+  const double pixels = static_cast<double>(width) * height;
+  return {Pipeline(result), {image}, {output}, (3 + 4.0 / 3 * (18 / 4.0 + 20 + 9) + 4) * pixels};
 }
 
 }  // namespace kernels
