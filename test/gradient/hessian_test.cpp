@@ -3,7 +3,7 @@
 // differences of the products.
 #include "autodiff/second_order.h"
 #include "frontend/param.h"
-#include "gradient/random_program.h"
+#include "gradient/gradient_check.h"
 #include "support/errors.h"
 
 namespace retrograde::gradient {
@@ -117,35 +117,10 @@ TEST_F(Hessians, AdjointsOfAdjointsAgreeWithTangentsOfAdjoints) {
   for (size_t i = 0; i < left.size(); ++i) EXPECT_NEAR(left[i], right[i], 1e-12);
 }
 
-TEST_F(Hessians, RandomProgramsHaveSymmetricHessians) {
-  int refused = 0;
-  for (unsigned seed = 500; seed < 512; ++seed) {
-    SCOPED_TRACE("seed " + std::to_string(seed));
-    RandomProgram p(seed);
-    Buffer<float> left = random_image({size, size}, -1, 1, seed + 1),
-                  right = random_image({size, size}, -1, 1, seed + 2);
-    const oracle::Region region{{0, 0}, {size, size}};
-    try {
-      auto product = [&](const Buffer<float>& along) {
-        return values_of(
-            evaluate(hessian_vector_product(p.loss, p.image, {{p.image, along}}), region));
-      };
-      std::vector<double> hl = product(left), hr = product(right);
-      double scale = 1 + std::sqrt(dot(hl, hl) * dot(hr, hr));
-      EXPECT_NEAR(dot(hl, values_of(right)), dot(hr, values_of(left)), 1e-11 * scale);
-    } catch (const Unsupported&) {
-      ++refused;
-    }
-  }
-  EXPECT_LT(refused, 4);
-}
-
 TEST_F(Hessians, AnInputWithoutGradientIsAnError) {
   Param<int> count("count");
   Func loss = loss_with_a_stencil();
-  expect_mentions(error_of<CompileError>([&] {
-                    hessian_vector_product(loss, count, {{a, v}});
-                  }),
+  expect_mentions(error_of<CompileError>([&] { hessian_vector_product(loss, count, {{a, v}}); }),
                   {"twice", "no gradient"});
 }
 

@@ -6,7 +6,7 @@
 #include "autodiff/custom_derivative.h"
 #include "autodiff/second_order.h"
 #include "frontend/param.h"
-#include "gradient/random_program.h"
+#include "gradient/gradient_check.h"
 #include "support/errors.h"
 
 namespace retrograde::gradient {
@@ -448,93 +448,6 @@ TEST_F(SparseHessians, BlocksBetweenInputs) {
   EXPECT_NEAR(at(hessian_diagonal(loss, gain).diagonal, {}), twice, 1e-12);
 }
 
-// Random accesses, selects and updates: J v is the tangent along v, w J the adjoint of w, element
-// by element; and H v for the Hessian. Values that a pattern leaves out, or mixes up, would show.
-class RandomJacobians : public Jacobians {
- protected:
-  const oracle::Region square{{0, 0}, {size, size}}, all{{0, 0, 0, 0}, {size, size, size, size}};
-
-  std::vector<double> values_of(const Func& f, const oracle::Region& region) {
-    std::vector<double> result;
-    for (const oracle::Value& v : evaluate(f, region).values)
-      result.push_back(v.scalar.as_double());
-    return result;
-  }
-  static std::vector<double> values_of(const Buffer<float>& b) {
-    std::vector<double> result;
-    b.get()->for_each_value([&](float v) { result.push_back(v); });
-    return result;
-  }
-  static void expect_near(const std::vector<double>& found, const std::vector<double>& expected) {
-    double scale = 1;
-    for (double e : expected) scale = std::max(scale, std::abs(e));
-    for (size_t i = 0; i < found.size(); ++i)
-      ASSERT_NEAR(found[i], expected[i], 1e-11 * scale) << "element " << i;
-  }
-  // Of a matrix whose rows run innermost.
-  static std::vector<double> times(const std::vector<double>& m, const std::vector<double>& v,
-                                   bool transposed) {
-    size_t n = v.size();
-    std::vector<double> result(n, 0.0);
-    for (size_t column = 0; column < n; ++column) {
-      for (size_t row = 0; row < n; ++row) {
-        double entry = m[column * n + row];
-        transposed ? result[column] += entry * v[row] : result[row] += entry * v[column];
-      }
-    }
-    return result;
-  }
-};
-
-TEST_F(RandomJacobians, AgreeWithTangentsAndAdjoints) {
-  int refused = 0, sparse = 0;
-  for (unsigned seed = 700; seed < 708; ++seed) {
-    SCOPED_TRACE("seed " + std::to_string(seed));
-    RandomProgram p(seed);
-    Buffer<float> v = random_image({size, size}, -1, 1, seed + 1),
-                  w = random_image({size, size}, -1, 1, seed + 2);
-    const Region bounds{{0, size}, {0, size}};
-    for (Compression c : {Compression::Columns, Compression::Rows}) {
-      try {
-        Jacobian j = jacobian(p.output(), p.image, bounds, {.compression = c});
-        sparse += j.colours() < size * size;
-        std::vector<double> matrix = values_of(j.dense(), all);
-        Func tangent = propagate_tangents(p.output(), {{p.image, v}})(p.output());
-        expect_near(times(matrix, values_of(v), false), values_of(tangent, square));
-        Func adjoint =
-            propagate_adjoints(p.output(), w, {.overwritten = Overwritten::Store})(p.image);
-        expect_near(times(matrix, values_of(w), true), values_of(adjoint, square));
-      } catch (const Unsupported&) {
-        ++refused;
-      }
-    }
-  }
-  EXPECT_LT(refused, 4);
-  EXPECT_GT(sparse, 4);
-}
-
-TEST_F(RandomJacobians, HessiansAgreeWithProducts) {
-  int refused = 0;
-  for (unsigned seed = 500; seed < 503; ++seed) {
-    SCOPED_TRACE("seed " + std::to_string(seed));
-    RandomProgram p(seed);
-    Buffer<float> v = random_image({size, size}, -1, 1, seed + 1);
-    try {
-      std::vector<double> matrix = values_of(hessian(p.loss, p.image).dense(), all);
-      std::vector<double> product =
-          values_of(hessian_vector_product(p.loss, p.image, {{p.image, v}}), square);
-      expect_near(times(matrix, values_of(v), false), product);
-      expect_near(times(matrix, values_of(v), true), product);  // symmetric
-      std::vector<double> diagonal = values_of(hessian_diagonal(p.loss, p.image).diagonal, square);
-      for (size_t i = 0; i < diagonal.size(); ++i)
-        EXPECT_NEAR(diagonal[i], matrix[i * diagonal.size() + i], 1e-11);
-    } catch (const Unsupported&) {
-      ++refused;
-    }
-  }
-  EXPECT_LT(refused, 2);
-}
-
 // A rule for adjoints alone leaves rows only.
 TEST_F(Jacobians, OfCustomAdjointsGoByRows) {
   Func g("g"), f("f");
@@ -572,9 +485,8 @@ TEST_F(Jacobians, Errors) {
   expect_mentions(error_of([&] { jacobian(f, a, {}); }), {"1 dimensions and 0 bounds"});
   expect_mentions(error_of([&] { jacobian(f, count, {{0, 4}}); }), {"has type int32"});
   expect_mentions(error_of([&] { jacobian(f, undefined, {{0, 4}}); }), {"has no definition"});
-  expect_mentions(error_of<Unsupported>([&] {
-                    jacobian(pair, a, {{0, 4}}, {.compression = Compression::Rows});
-                  }),
+  expect_mentions(error_of<Unsupported>(
+                      [&] { jacobian(pair, a, {{0, 4}}, {.compression = Compression::Rows}); }),
                   {"of one value", "Compression::Columns"});
   Jacobian j = jacobian(f, a, {{0, 4}});
   expect_mentions(error_of([&] { j.colour({x, x}); }), {"2 are given of 1"});
@@ -594,16 +506,12 @@ TEST_F(Jacobians, WithoutBoundsAreRefused) {
   RDom r(0, length);
   f(x) = 0.0f;
   f(x) += image(r) * image(r) * cast<float>(x);
-  expect_mentions(error_of<Unsupported>([&] {
-                    jacobian(f, image, {{0, length}});
-                  }),
+  expect_mentions(error_of<Unsupported>([&] { jacobian(f, image, {{0, length}}); }),
                   {"compress", "constant bounds"});
   RDom s(0, 5000);
   big(x) = 0.0f;
   big(x) += image(s) * image(s) * cast<float>(x + s);
-  expect_mentions(error_of<Unsupported>([&] {
-                    jacobian(big, image, {{0, 5000}});
-                  }),
+  expect_mentions(error_of<Unsupported>([&] { jacobian(big, image, {{0, 5000}}); }),
                   {"4096 seeds", "needs more"});
 }
 

@@ -2,13 +2,10 @@
 // in double, which only the interpreter of the algorithm evaluates; then as machine code. A program
 // that overwrites what its partials need is refused where the compiler may not keep the values.
 //
-// Then every twelfth program, or every one where RETROGRADE_ALL_PROGRAMS is set, by
-// check_gradients: adjoint, tangent and complex step, in machine code, of which no two share their
-// derivatives.
-#include <cstdlib>
-
-#include "checks/check_gradients.h"
+// Then every third program, or every one in the fuzz preset, by check_gradients: adjoint, tangent
+// and complex step, in machine code, of which no two share their derivatives.
 #include "gradient/programs_suite.h"
+#include "checks/check_gradients.h"
 #include "graph/graph.h"
 
 namespace retrograde::gradient {
@@ -51,7 +48,11 @@ TEST_P(CheckedSuite, AdjointTangentAndComplexStepAgree) {
   }
 }
 
-size_t step_of_checked() { return std::getenv("RETROGRADE_ALL_PROGRAMS") ? 1 : 12; }
+#ifdef RETROGRADE_MANY_PROGRAMS
+constexpr size_t step_of_checked = 1;
+#else
+constexpr size_t step_of_checked = 3;
+#endif
 
 std::string name_of(const ::testing::TestParamInfo<size_t>& info) {
   return programs()[info.param].name;
@@ -60,8 +61,7 @@ std::string name_of(const ::testing::TestParamInfo<size_t>& info) {
 INSTANTIATE_TEST_SUITE_P(Programs, Suite, ::testing::Range<size_t>(0, programs().size()), name_of);
 
 INSTANTIATE_TEST_SUITE_P(Programs, CheckedSuite,
-                         ::testing::Range<size_t>(0, programs().size(), step_of_checked()),
-                         name_of);
+                         ::testing::Range<size_t>(0, programs().size(), step_of_checked), name_of);
 
 }  // namespace
 }  // namespace retrograde::gradient

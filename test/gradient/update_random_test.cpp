@@ -131,6 +131,9 @@ void check(unsigned seed, const AdjointOptions& options) {
 }
 
 constexpr unsigned programs_checked = 300;
+// The updates of so many overwrite what a partial needs, which Overwritten::Refuse is there to
+// refuse: 60 %, so 121 programs are differentiated. It may refuse no more.
+constexpr int refused_without_versions = 179;
 
 TEST(RandomUpdates, AreRightWhenValuesAreKeptWithinABudget) {
   for (unsigned seed = 0; seed < programs_checked / 3 && !::testing::Test::HasFailure(); ++seed)
@@ -169,7 +172,7 @@ TEST(RandomUpdates, AreRightOrRefusedWhenValuesMayNotBeKept) {
       ++refused;
     }
   }
-  EXPECT_LT(refused, static_cast<int>(programs_checked * 3 / 4)) << "too few were checked";
+  EXPECT_LE(refused, refused_without_versions) << "of " << programs_checked;
   EXPECT_GT(refused, 0);
 }
 

@@ -13,7 +13,7 @@
 namespace retrograde::gradient {
 namespace {
 
-constexpr unsigned programs_per_shard = 15, shards = 8, one_compiled_of = 8;
+constexpr unsigned programs_per_shard = 15, shards = 16, one_compiled_of = 8;
 
 class Adversary : public ::testing::TestWithParam<unsigned> {};
 

@@ -1,5 +1,5 @@
-// Whole matrices against one product for each column: a Jacobian of the output by an image, and the
-// Hessian of the weighted output.
+// Whole matrices against one product for each column: a Jacobian of the output by an image, by
+// columns and by rows, and the Hessian of the weighted output, whose diagonal is also had alone.
 #include <cmath>
 #include <ctime>
 
@@ -35,9 +35,22 @@ class Dense {
 
   void compare_jacobian() {
     const Func& output = s_.program.output();
-    const Func dense = jacobian(output, input_, s_.bounds()).dense();
     const Func column = propagate_tangents(output, {{input_, unit_}})(output);
-    compare("Jacobian", dense, column, s_.program.region);
+    const auto dense = [&](Compression c) {
+      return jacobian(output, input_, s_.bounds(), {.compression = c}).dense();
+    };
+    compare("Jacobian", dense(Compression::Auto), column, s_.program.region);
+    for (Compression forced : {Compression::Columns, Compression::Rows}) {
+      Func matrix;
+      try {
+        matrix = dense(forced);
+      } catch (const UserError&) {  // one of the two modes has no rule for it
+        continue;
+      } catch (const Unsupported&) {
+        continue;
+      }
+      compare("Jacobian by force", matrix, column, s_.program.region);
+    }
   }
 
   void compare_hessian() {
@@ -53,6 +66,7 @@ class Dense {
     const Func dense = hessian(loss, input_).dense();
     const Func column = hessian_vector_product(loss, input_, {{input_, unit_}});
     compare("Hessian", dense, column, columns_);
+    compare_diagonal(dense, hessian_diagonal(loss, input_).diagonal);
   }
 
  private:
@@ -75,12 +89,26 @@ class Dense {
     one.region.for_each([&](const std::vector<int>& y) {
       std::vector<int> at = y;
       at.insert(at.end(), x.begin(), x.end());
-      const double found = as_double(all.at(at)), expected = as_double(one.at(y));
-      if (!std::isfinite(found) || !std::isfinite(expected)) return;
-      if (std::abs(found - expected) <= 1e-9 * (std::abs(expected) + 1 + s_.largest)) return;
-      decide(Judgement::Wrong,
-             text("an entry of the ", what, " is ", found, " and should be ", expected));
+      compare_entry(what, all.at(at), one.at(y));
     });
+  }
+  void compare_entry(const char* what, const oracle::Value& a, const oracle::Value& b) {
+    const double found = as_double(a), expected = as_double(b);
+    if (!std::isfinite(found) || !std::isfinite(expected)) return;
+    if (std::abs(found - expected) <= 1e-9 * (std::abs(expected) + 1 + s_.largest)) return;
+    decide(Judgement::Wrong,
+           text("an entry of the ", what, " is ", found, " and should be ", expected));
+  }
+  void compare_diagonal(const Func& matrix, const Func& diagonal) {
+    if (!matrix.defined() || !diagonal.defined()) return;
+    const auto all = evaluate(matrix, joined(columns_, columns_)),
+               alone = evaluate(diagonal, columns_);
+    for (size_t k = 0; k < alone.size(); ++k) {
+      columns_.for_each([&](const std::vector<int>& x) {
+        compare_entry("diagonal of the Hessian", alone[k].at(x),
+                      all[k].at(joined({x, x}, {x, x}).mins));
+      });
+    }
   }
   void set_unit(const std::vector<int>& x, float value) {
     unit_.get()->operator()(x.data()) = value;

@@ -4,7 +4,6 @@
 #include <limits>
 #include <random>
 #include <sstream>
-#include <unordered_map>
 
 #include "autodiff/derivative.h"
 #include "autodiff/forward_sweep.h"
@@ -17,6 +16,7 @@
 #include "ir/print.h"
 #include "ir/scalar.h"
 #include "ir/visit.h"
+#include "support/evaluate.h"
 
 namespace retrograde::gradient {
 
@@ -38,31 +38,10 @@ Place place_of(std::mt19937_64& random, Type type) {
 
 // In the declared types.
 double evaluate_at(const Expr& root, const Place& at) {
-  std::unordered_map<const ir::ExprNode*, ir::Scalar> values;
-  const auto of = [&](const Expr& e) { return values.at(e.get()); };
-  for (const Expr& e : ir::post_order({root})) {
-    ir::Scalar& v = values[e.get()];
-    if (const auto* leaf = e.as<ir::Variable>()) {
-      v = ir::Scalar::of_float(e.type(), at[static_cast<size_t>(leaf->name[0] - 'x')]);
-    } else if (const auto constant = ir::as_scalar(e)) {
-      v = *constant;
-    } else if (const auto* b = e.as<ir::Binary>()) {
-      v = ir::eval_binary(e.kind(), of(b->a), of(b->b));
-    } else if (const auto* n = e.as<ir::Not>()) {
-      v = ir::eval_not(of(n->a));
-    } else if (const auto* s = e.as<ir::Select>()) {
-      v = of(s->condition).as_bool() ? of(s->true_value) : of(s->false_value);
-    } else if (const auto* c = e.as<ir::Cast>()) {
-      v = ir::eval_cast(e.type(), of(c->value));
-    } else if (const auto* call = e.as<ir::Call>()) {
-      std::vector<ir::Scalar> args;
-      for (const Expr& arg : call->args) args.push_back(of(arg));
-      v = ir::eval_operator(call->op, args, e.type()).value();
-    } else {
-      internal_error("a gradient of a form has a node that forms have not");
-    }
-  }
-  return values.at(root.get()).as_double();
+  std::map<std::string, ir::Scalar> leaves;
+  for (size_t k = 0; k < leaf_count; ++k)
+    leaves[leaf_names[k]] = ir::Scalar::of_float(root.type(), at[k]);
+  return test::Evaluator(std::move(leaves))(root)[0].as_double();
 }
 
 using Gradient = std::array<Expr, leaf_count>;  // undefined: 0
