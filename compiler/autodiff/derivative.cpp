@@ -184,6 +184,12 @@ std::vector<Explanation> Derivative::costs() const {
   return ir::explain_costs(result_->output, result_->gradients, counts.primal, counts.gradient);
 }
 
+std::string Derivative::explain(Detail detail) const {
+  std::vector<Explanation> all = explanations(), last = costs();
+  all.insert(all.end(), last.begin(), last.end());
+  return to_string(all, detail);
+}
+
 GradientOperations Derivative::operations() const {
   return {ir::count_operations({result_->output}), ir::count_operations(result_->gradients)};
 }

@@ -83,8 +83,9 @@ class Derivative {
   // is not needed, with the schedules that the Funcs have now: the gradients that were asked for,
   // computed together as one pipeline (operation_count.h says what counts).
   std::vector<Explanation> costs() const;
-  // Both, one line a fact.
-  std::string explain() const { return to_string(explanations()) + to_string(costs()); }
+  // Both, for people: what it costs and what is stored, computed again, scattered, zero or left
+  // out, a line each; or every fact with its reason.
+  std::string explain(Detail detail = Detail::Summary) const;
   // Counted with the schedules that the Funcs have now.
   GradientOperations operations() const;
 

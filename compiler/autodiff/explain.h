@@ -25,10 +25,17 @@ struct Explanation {
   Kind kind;
   std::string subject;
   std::string detail;
+  double bytes = 0;  // of what is stored, where that is known
+};
+
+// How much explain() tells.
+enum class Detail {
+  Summary,  // a line for the cost and one for each kind of fact, with the names that it is about
+  All,      // a line for each fact, with its reason
 };
 
 const char* to_string(Explanation::Kind kind);
-// One line a fact.
-std::string to_string(const std::vector<Explanation>& explanations);
+// Names are shown without their numbers (`f`, not `f$3`) where only one of that name is told of.
+std::string to_string(const std::vector<Explanation>& explanations, Detail detail = Detail::All);
 
 }  // namespace retrograde

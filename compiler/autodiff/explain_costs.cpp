@@ -28,7 +28,8 @@ Explanation stored(const FuncOperations& f) {
       f.is_extern ? "operations of a C function" : counted(f.operations(), "operation");
   return {What::Stored, f.func->name,
           text(f.func->made ? "" : "the gradient reads its values; ", counted(f.bytes, "byte"),
-               ", ", work, ", ", reason_to_store(*f.func))};
+               ", ", work, ", ", reason_to_store(*f.func)),
+          f.bytes.value().value_or(0)};
 }
 
 // A Func of the program with updates that nobody scheduled.

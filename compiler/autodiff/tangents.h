@@ -54,7 +54,9 @@ class Tangents {
   std::vector<Func> funcs() const;
   // What was built, what is zero and why, what had to be computed again.
   const std::vector<Explanation>& explanations() const;
-  std::string explain() const { return to_string(explanations()); }
+  std::string explain(Detail detail = Detail::Summary) const {
+    return to_string(explanations(), detail);
+  }
 
  private:
   std::shared_ptr<const ir::TangentResult> result_;

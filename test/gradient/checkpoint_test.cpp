@@ -333,8 +333,9 @@ TEST(Checkpoints, TheGradientCanBeDifferentiatedAgain) {
 TEST(Checkpoints, ExplainSaysWhatIsKeptAndWhatIsComputedAgain) {
   Program p = pushed(10);
   Derivative d = propagate_adjoints(p.loss, {.checkpoint_states = 3});
-  expect_mentions(d.explain(), {"a loop of 10 steps", "3 kept states of 28 bytes",
-                                "15 steps computed again beside the 10 that are reversed"});
+  expect_mentions(d.explain(Detail::All),
+                  {"a loop of 10 steps", "3 kept states of 28 bytes",
+                   "15 steps computed again beside the 10 that are reversed"});
 }
 
 TEST(Checkpoints, ALoopOfOneStepNeedsNoCheckpointAndIsNoError) {
@@ -459,7 +460,8 @@ TEST(Checkpoints, MoreStepsAtRunTimeThanATableMayHaveFailTheCall) {
   n.set(100000);
   expect_mentions(error_of<RuntimeError>([&] { d(start).realize({1}); }),
                   {"room for 1 kept state has at most 5789 steps", "this one has 100000", "larger budget"});
-  expect_mentions(d.explain(), {"a loop of n steps", "1 kept state of 4 bytes", "at run time"});
+  expect_mentions(d.explain(Detail::All),
+                  {"a loop of n steps", "1 kept state of 4 bytes", "at run time"});
 }
 
 // ---- refusals ----

@@ -56,7 +56,8 @@ TEST_F(CustomAdjoints, StandForTheDefinition) {
   Derivative d = propagate_adjoints(sum_of(with_slope(3.0f)));
   for (int n = 0; n < 6; ++n) EXPECT_EQ(at(d(a), n), 3.0 * (n + 1));
   expect_machine_code_agrees(d(a), all);
-  expect_mentions(d.explain(), {"custom \"f", "its custom adjoint contributes", "_from_f"});
+  expect_mentions(d.explain(Detail::All),
+                  {"custom \"f", "its custom adjoint contributes", "_from_f"});
 }
 
 TEST_F(CustomAdjoints, ReplaceOneAnother) {
@@ -67,7 +68,7 @@ TEST_F(CustomAdjoints, ReplaceOneAnother) {
   });
   Derivative d = propagate_adjoints(sum_of(f));
   EXPECT_EQ(at(d(a), 2), 0.0);
-  expect_mentions(d.explain(), {"by the custom adjoint of \"f"});
+  expect_mentions(d.explain(Detail::All), {"by the custom adjoint of \"f"});
 }
 
 TEST_F(CustomAdjoints, OfAStencilReadSeveralTimes) {
@@ -165,7 +166,7 @@ TEST_F(CustomAdjoints, OfSeveralFuncsTogether) {
   for (int n = 0; n < 6; ++n) EXPECT_NEAR(at(d(a), n), at(expected, n), 1e-12);
   EXPECT_TRUE(d(s.f).defined());
   EXPECT_THROW(d(s.total), CompileError);
-  expect_mentions(d.explain(), {"\"total\": inside of the custom adjoint of \"softmax"});
+  expect_mentions(d.explain(Detail::All), {"\"total\": inside of the custom adjoint of \"softmax"});
 }
 
 TEST_F(CustomAdjoints, WhatIsInsideKeepsItsOtherReaders) {
@@ -377,7 +378,7 @@ TEST_F(CustomAdjoints, TangentsOfInputsThatMove) {
     EXPECT_NEAR(at(t(f), n), at(expected, n), 1e-12);
     EXPECT_NEAR(at(found_g, n), at(expected_g, n), 1e-12);
   }
-  expect_mentions(t.explain(), {"custom \"f", "from its custom tangent"});
+  expect_mentions(t.explain(Detail::All), {"custom \"f", "from its custom tangent"});
 }
 
 TEST_F(CustomAdjoints, OfAnInputWhoseBoundsAloneAreReadContributeNothingToIt) {
@@ -398,7 +399,7 @@ TEST_F(CustomAdjoints, OfAnInputWhoseBoundsAloneAreReadContributeNothingToIt) {
     EXPECT_EQ(at(d(a), n), 3.0 * (n + 1));
     EXPECT_EQ(at(d(sized), n), 0.0);
   }
-  expect_mentions(d.explain(), {"zero \"sized\"", "reads no element of it"});
+  expect_mentions(d.explain(Detail::All), {"zero \"sized\"", "reads no element of it"});
 }
 
 // rule: a Func with a custom adjoint needs a rule for tangents, too

@@ -288,10 +288,11 @@ TEST_F(DefaultSchedule, AScanIsNotComputedAgainForEachElement) {
   total() += squares(all.x, all.y) * squares(all.x, all.y);
   const Derivative d = propagate_adjoints(total);
   EXPECT_TRUE(choose(d(a)).contains(scan.function().get()));
-  EXPECT_NE(d.explain().find("performance \"scan\": unless a directive schedules it, it is "
-                             "computed at root"),
+  EXPECT_NE(d.explain(Detail::All)
+                .find("performance \"scan\": unless a directive schedules it, it is "
+                      "computed at root"),
             std::string::npos)
-      << d.explain();
+      << d.explain(Detail::All);
 }
 
 TEST_F(DefaultSchedule, AHandScheduleKeepsSmallReductionsThatAreReadOnceInline) {
@@ -319,7 +320,7 @@ TEST(PrivateParts, TakeNoMoreThanABudget) {
   const Derivative d = propagate_adjoints(total, {.wrt = {image}});
   const double image_bytes = 512.0 * 512 * 64 * 4;  // the gradient, and twice that for its sums
   ASSERT_TRUE(d.operations().gradient.bytes().value().has_value());
-  EXPECT_LE(*d.operations().gradient.bytes().value(), 3.1 * image_bytes) << d.explain();
+  EXPECT_LE(*d.operations().gradient.bytes().value(), 3.1 * image_bytes) << d.explain(Detail::All);
 }
 
 TEST(PrivateParts, AreFewerForLargeTargets) {
@@ -332,7 +333,7 @@ TEST(PrivateParts, AreFewerForLargeTargets) {
     RDom r(0, 4 * side, 0, 4 * side);
     total() = 0.0f;
     total() += warped(r.x, r.y) * warped(r.x, r.y);
-    return propagate_adjoints(total, {.wrt = {image}}).explain();
+    return propagate_adjoints(total, {.wrt = {image}}).explain(Detail::All);
   };
   EXPECT_NE(explained(256).find("32 private parts of 524288 bytes each"), std::string::npos);
   EXPECT_NE(explained(1024).find("8 private parts of 8388608 bytes each, as many as fit 67108864"),
@@ -349,7 +350,8 @@ TEST(PrivateParts, OfSizesKnownAtRunTime) {
   total() = 0.0f;
   total() += read(r) * read(r) * cast<float>(r % 7);
   const Derivative d = propagate_adjoints(total, {.wrt = {image}});
-  EXPECT_NE(d.explain().find("at most 32 private parts"), std::string::npos) << d.explain();
+  EXPECT_NE(d.explain(Detail::All).find("at most 32 private parts"), std::string::npos)
+      << d.explain(Detail::All);
   Buffer<float> values(37), expected(37);
   Buffer<int> places(5000);
   for (int i = 0; i < 37; ++i) values(i) = 0.25f * static_cast<float>(i - 18);

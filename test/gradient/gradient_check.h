@@ -115,17 +115,17 @@ inline void expect_machine_code_agrees(Func gradient, const oracle::Region& regi
 inline void expect_gradient(const Func& loss, const Derivative& d, Buffer<float>& image,
                             double tolerance = 1e-5) {
   Func gradient = d(image);
-  ASSERT_TRUE(gradient.defined()) << d.explain();
+  ASSERT_TRUE(gradient.defined()) << d.explain(Detail::All);
   oracle::Region region = oracle::region_of(*image.raw_buffer()), around = region;
   for (size_t k = 0; k < region.mins.size(); ++k) around.mins[k] -= 2, around.extents[k] += 4;
   oracle::Array found;
-  ASSERT_NO_THROW(found = evaluate(gradient, region)) << d.explain();
+  ASSERT_NO_THROW(found = evaluate(gradient, region)) << d.explain(Detail::All);
   region.for_each([&](const std::vector<int>& point) {
     double expected = difference(loss, image, point), actual = found.at(point).scalar.as_double();
     std::string where;
     for (int p : point) where += std::to_string(p) + " ";
     EXPECT_NEAR(expected, actual, tolerance * (1 + std::abs(expected))) << "at " << where << "\n"
-                                                                        << d.explain();
+                                                                        << d.explain(Detail::All);
   });
   if (::testing::Test::HasFailure()) return;
   expect_machine_code_agrees(gradient, region);

@@ -37,7 +37,7 @@ void expect_reason(const Derivative& d, const std::string& subject, const std::s
   for (const Explanation& e : d.explanations()) {
     if (e.subject == subject && e.detail.find(phrase) != std::string::npos) return;
   }
-  ADD_FAILURE() << "no '" << phrase << "' about " << subject << " in:\n" << d.explain();
+  ADD_FAILURE() << "no '" << phrase << "' about " << subject << " in:\n" << d.explain(Detail::All);
 }
 
 TEST(GradientLookup, FuncsThatReadAnImageStandForIt) {

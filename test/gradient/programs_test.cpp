@@ -158,7 +158,7 @@ TEST_F(Programs, DataDependentGatherScatters) {
   Func loss = weighted_sum(f, {9});
   Derivative d = propagate_adjoints(loss);
   expect_gradient(loss, d, a);
-  EXPECT_NE(d.explain().find("scattered"), std::string::npos) << d.explain();
+  EXPECT_NE(d.explain(Detail::All).find("scattered"), std::string::npos) << d.explain(Detail::All);
 }
 
 // Numbers of these types are taken modulo 2^8, 2^16 and 2^32, or are beyond int32.
@@ -175,7 +175,8 @@ void expect_place_chosen_by_data_of_the_row(Buffer<float>& image) {
     Func loss = weighted_sum(f, {5, 6});
     Derivative d = propagate_adjoints(loss);
     expect_gradient(loss, d, image);
-    EXPECT_EQ(d.explain().find("scattered"), std::string::npos) << d.explain();
+    EXPECT_EQ(d.explain(Detail::All).find("scattered"), std::string::npos)
+        << d.explain(Detail::All);
   }
 }
 TEST_F(Programs, PlaceChosenByUnsignedAndNarrowDataOfTheRow) {
@@ -439,7 +440,7 @@ TEST_F(Programs, ScalarParameterSumsInParts) {
   loss() = 0.0f;
   loss() += f(r.x, r.y);
   Derivative d = propagate_adjoints(loss);
-  EXPECT_NE(d.explain().find("privatised"), std::string::npos) << d.explain();
+  EXPECT_NE(d.explain(Detail::All).find("privatised"), std::string::npos) << d.explain(Detail::All);
   double expected = 0;
   for (int j = 0; j < 48; ++j) {
     for (int i = 0; i < 64; ++i) expected += (i + 2 * j) * 1.5;
@@ -457,7 +458,7 @@ TEST_F(Programs, PrivatisedScatterIsTheSameForEveryNumberOfThreads) {
   loss() = 0.0f;
   loss() += f(r.x, r.y) * f(r.x, r.y);
   Derivative d = propagate_adjoints(loss);
-  EXPECT_NE(d.explain().find("privatised"), std::string::npos) << d.explain();
+  EXPECT_NE(d.explain(Detail::All).find("privatised"), std::string::npos) << d.explain(Detail::All);
   expect_machine_code_agrees(d(table), {{0}, {16}});
 }
 
@@ -539,7 +540,8 @@ TEST_F(Programs, OnlyRequestedGradientsAreBuilt) {
   Derivative d = propagate_adjoints(loss, {.wrt = {a}});
   EXPECT_TRUE(d(a).defined());
   EXPECT_THROW(d(image), CompileError);
-  EXPECT_NE(d.explain().find("not requested"), std::string::npos) << d.explain();
+  EXPECT_NE(d.explain(Detail::All).find("not requested"), std::string::npos)
+      << d.explain(Detail::All);
   expect_gradient(loss, d, a);
 }
 

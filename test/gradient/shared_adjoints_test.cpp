@@ -49,9 +49,9 @@ TEST(SharedAdjoints, AnInnerAdjointThatSeveralInputsNeedIsKept) {
   ASSERT_TRUE(inner.defined());
   EXPECT_EQ(inner.dimensions(), 2);
   EXPECT_EQ(inner.outputs(), 1) << "that of drive()";
-  EXPECT_NE(d.explain().find("keeps 1 inner adjoint of each iteration, from which 3"),
+  EXPECT_NE(d.explain(Detail::All).find("keeps 1 inner adjoint of each iteration, from which 3"),
             std::string::npos)
-      << d.explain();
+      << d.explain(Detail::All);
   const ir::OperationCount count = d.operations().gradient;
   const ir::FuncOperations* kept = count.find(inner.function().get());
   ASSERT_NE(kept, nullptr);

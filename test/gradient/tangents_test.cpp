@@ -56,7 +56,7 @@ void expect_tangent(const Func& f, Buffer<float>& a, const Buffer<float>& v,
   for (size_t i = 0; i < expected.size(); ++i) {
     EXPECT_NEAR(found.values[i].scalar.as_double(), expected[i], 1e-5 * (1 + std::abs(expected[i])))
         << "element " << i << "\n"
-        << t.explain();
+        << t.explain(Detail::All);
     largest = std::max(largest, std::abs(expected[i]));
   }
   EXPECT_GT(largest, 1e-3) << "this program does not move";
@@ -205,8 +205,9 @@ TEST_F(TangentsTest, WhatDoesNotMoveIsZeroAndSaysSo) {
   Tangents t = propagate_tangents(f, {{a, v}});
   EXPECT_EQ(evaluate(t(constant), {{0}, {n}}).at({3}).scalar.as_double(), 0);
   EXPECT_EQ(evaluate(t(rounded), {{0}, {n}}).at({3}).scalar.as_double(), 0);
-  EXPECT_NE(t.explain().find("zero \"rounded\": floor has derivative 0"), std::string::npos)
-      << t.explain();
+  EXPECT_NE(t.explain(Detail::All).find("zero \"rounded\": floor has derivative 0"),
+            std::string::npos)
+      << t.explain(Detail::All);
   EXPECT_FALSE(t(elsewhere).defined());
 }
 

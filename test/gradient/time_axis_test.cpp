@@ -134,7 +134,7 @@ TEST(TimeAxis, GradientsAgreeWithCentralDifferences) {
     SCOPED_TRACE(c.name);
     Program p = c.build(6);
     Derivative d = propagate_adjoints(p.loss, {.checkpoint_states = 2});
-    expect_mentions(d.explain(), {"others read its last steps only", "2 kept states"});
+    expect_mentions(d.explain(Detail::All), {"others read its last steps only", "2 kept states"});
     for (Buffer<float>& input : p.inputs) expect_gradient(p.loss, d, input);
   }
 }
@@ -216,9 +216,9 @@ TEST(TimeAxis, RandomLoopsAgreeWithThoseThatKeepAllSteps) {
     Derivative all = propagate_adjoints(p.loss, {.overwritten = Overwritten::Store});
     Derivative d = propagate_adjoints(
         p.loss, {.overwritten = Overwritten::Store, .checkpoint_states = 1 + int(seed % 3)});
-    folded += d.explain().find("last steps only") != std::string::npos;
+    folded += d.explain(Detail::All).find("last steps only") != std::string::npos;
     for (const Buffer<float>& input : p.inputs) {
-      ASSERT_EQ(d.has(input), all.has(input)) << d.explain() << all.explain();
+      ASSERT_EQ(d.has(input), all.has(input)) << d.explain(Detail::All) << all.explain(Detail::All);
       if (!d.has(input)) continue;  // not read
       oracle::Region region = oracle::region_of(*input.raw_buffer());
       oracle::Array found = evaluate(d(input), region), expected = evaluate(all(input), region);
@@ -271,7 +271,7 @@ TEST(TimeAxis, TheNumberOfStepsMayBeAParam) {
   last(x) = f(x, n);
   Func loss = weighted_sum(last, {5});
   Derivative d = propagate_adjoints(loss, {.checkpoint_states = 2});
-  expect_mentions(d.explain(), {"_folded", "a loop of n steps"});
+  expect_mentions(d.explain(Detail::All), {"_folded", "a loop of n steps"});
   for (int steps : {0, 1, 2, 9}) {
     SCOPED_TRACE(steps);
     n.set(steps);
@@ -305,7 +305,7 @@ TEST(TimeAxis, FuncsBehindTheLoopHaveTheirAdjoints) {
   Derivative d = propagate_adjoints(loss, {.checkpoint_states = 2});
   Derivative all = propagate_adjoints(loss);
   ASSERT_TRUE(d(last).defined());
-  EXPECT_THROW(d(u), CompileError) << d.explain();
+  EXPECT_THROW(d(u), CompileError) << d.explain(Detail::All);
   Buffer<float> found = d(last).realize({7}), expected = all(last).realize({7});
   for (int i = 0; i < 7; ++i) EXPECT_EQ(found(i), expected(i));
   // Who asks for the adjoint of every step gets it, and the memory for it.
@@ -324,7 +324,8 @@ TEST(TimeAxis, WithStepsThatDataSkipIsLeftAsItIs) {
   last(x) = u(x, 6);
   Func loss = weighted_sum(last, {5});
   Derivative d = propagate_adjoints(loss, {.checkpoint_states = 2});
-  EXPECT_EQ(d.explain().find("last steps only"), std::string::npos) << d.explain();
+  EXPECT_EQ(d.explain(Detail::All).find("last steps only"), std::string::npos)
+      << d.explain(Detail::All);
   expect_gradient(loss, d, start);
 }
 
@@ -336,7 +337,7 @@ TEST(TimeAxis, WhoseEveryStepIsReadIsLeftAsItIs) {
   u(x, r + 1) = 0.5f * sin(u(x, r));
   Func loss = weighted_sum(u, {5, 7});
   Derivative d = propagate_adjoints(loss, {.checkpoint_states = 2});
-  expect_mentions(d.explain(), {"the budget for checkpoints is not used"});
+  expect_mentions(d.explain(Detail::All), {"the budget for checkpoints is not used"});
   expect_gradient(loss, d, start);
 }
 

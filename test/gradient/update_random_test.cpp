@@ -127,7 +127,7 @@ void check(unsigned seed, const AdjointOptions& options) {
     reverse += v.scalar.as_double() * direction.back();
     scale += std::abs(v.scalar.as_double());
   }
-  EXPECT_NEAR(reverse, slope_along(p, direction), 1e-5 * scale) << d.explain();
+  EXPECT_NEAR(reverse, slope_along(p, direction), 1e-5 * scale) << d.explain(Detail::All);
 }
 
 constexpr unsigned programs_checked = 300;

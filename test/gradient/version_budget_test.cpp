@@ -91,7 +91,7 @@ TEST_F(VersionBudget, ExplainSaysWhatIsKept) {
   RDom r(0, 4);
   f(x) = 1.0f;
   f(x) *= a(x + r);
-  const std::string words = propagate_adjoints(weighted_sum(f, {6})).explain();
+  const std::string words = propagate_adjoints(weighted_sum(f, {6})).explain(Detail::All);
   EXPECT_NE(words.find("keeps versions within the budget of 268435456 bytes"), std::string::npos);
   EXPECT_NE(words.find("120 bytes, all together 120"), std::string::npos) << words;
 }
@@ -146,7 +146,7 @@ TEST_F(VersionBudget, SizesKnownAtRunTimeOnlyAreCheckedByTheCall) {
   loss() = 0.0f;
   loss() += f(q) * cast<float>(q + 1);
   Derivative d = propagate_adjoints(loss, {.version_bytes = 4 * 3 * 5});
-  EXPECT_NE(d.explain().find("its size is known at run time only"), std::string::npos);
+  EXPECT_NE(d.explain(Detail::All).find("its size is known at run time only"), std::string::npos);
   Func gradient = d(a);
 
   Buffer<float> small = positive({3, 4}), large = positive({3, 5});

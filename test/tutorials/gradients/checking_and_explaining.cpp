@@ -60,7 +60,8 @@ int main(int argc, char** argv) {
 
   // ---- What does it say of itself? ----
   Derivative d = propagate_adjoints(loss);
-  std::printf("\n%s\n", d.explain().c_str());
+  std::printf("\nIn short:\n%s\n", d.explain().c_str());
+  std::printf("Fact by fact:\n%s\n", d.explain(Detail::All).c_str());
   auto says = [&](Explanation::Kind kind, const std::string& subject) {
     const std::vector<Explanation> facts = d.explanations();
     return std::any_of(facts.begin(), facts.end(), [&](const Explanation& fact) {
