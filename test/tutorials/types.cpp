@@ -54,18 +54,15 @@ int main() {
   for (int i = 0; i < 11; i++) printf("%d:%d:%d ", d(i), m(i), t(i));
   printf("\n");
 
-  // One function for every type: how far apart two values are. That of signed integers need not fit
-  // them; unsigned ones of as many bits hold it.
-  auto apart = [](Expr a, Expr b) -> Expr {
-    const Type type = a.type();
-    if (type.is_float()) return abs(a - b);
-    const Type fits = UInt(type.bits());
-    return cast(fits, max(a, b)) - cast(fits, min(a, b));
+  // One function for every type: a product that fits, of integers in twice their bits.
+  auto product = [](Expr a, Expr b) {
+    const Type type = a.type(), fits = type.is_float() ? type : type.with_bits(2 * type.bits());
+    return cast(fits, a) * cast(fits, b);
   };
   Expr low = cast<int8_t>(-128), high = cast<int8_t>(127);
-  printf("apart: %d %d %g, as %s\n", (int)evaluate<uint8_t>(apart(low, high)),
-         (int)evaluate<uint16_t>(apart(cast<uint16_t>(65000), cast<uint16_t>(12))),
-         evaluate<double>(apart(Expr(0.25), Expr(2.0))), name(apart(low, high).type()).c_str());
+  printf("product: %d %d %g, as %s\n", (int)evaluate<int16_t>(product(low, high)),
+         evaluate<int32_t>(product(cast<int16_t>(-32768), cast<int16_t>(-3))),
+         evaluate<double>(product(Expr(0.25), Expr(3.0))), name(product(low, low).type()).c_str());
 
   // Bits as they are.
   printf("bits of 1.0f: %x, and back %g\n", evaluate<uint32_t>(reinterpret<uint32_t>(Expr(1.0f))),
