@@ -94,17 +94,28 @@ inline bool same_bits(const Buffer<float>& a, const Buffer<float>& b) {
 }
 
 // The gradient as machine code, under its default schedule, in float32: each element within the
-// rounding that the interpreter allows it, and the same bits on every number of threads.
+// rounding that the interpreter allows it, and the same bits on every number of threads. Where a
+// rounding could tip a decision, as of a place from floats, nothing is known but that both take the
+// same side: these are held to 1e-4 of the largest.
 inline void expect_machine_code_agrees(Func gradient, const oracle::Region& region) {
-  const oracle::Array expected = oracle::Interpreter({.rounding = oracle::Rounding::Contraction})
-                                     .realize(gradient.function(), region)
-                                     .front();
+  const oracle::Array expected =
+      oracle::Interpreter({.rounding = oracle::Rounding::Contraction})
+          .realize(gradient.function(), region)
+          .front();
   const Buffer<float> first = run_on_threads(gradient, region, 1, false);
   const auto comparison =
       oracle::compare(expected, *const_cast<Buffer<float>&>(first).raw_buffer(), 4);
-  EXPECT_TRUE(comparison.agrees())
-      << comparison.mismatches << " elements differ, the first " << comparison.first_mismatch;
-  EXPECT_EQ(comparison.unstable, 0u) << "nothing is known of these elements";
+  EXPECT_TRUE(comparison.agrees()) << comparison.mismatches << " elements differ, the first "
+                                   << comparison.first_mismatch;
+  double scale = 1;
+  for (const oracle::Value& v : expected.values)
+    scale = std::max(scale, std::abs(v.scalar.as_double()));
+  region.for_each([&](const std::vector<int>& point) {
+    const oracle::Value& v = expected.at(point);
+    if (!v.is_stable()) {
+      EXPECT_NEAR(first.get()->operator()(point.data()), v.scalar.as_double(), 1e-4 * scale);
+    }
+  });
   for (int threads : {1, 2, 4, 8}) {
     EXPECT_TRUE(same_bits(first, run_on_threads(gradient, region, threads, threads == 4)))
         << "other bits on " << threads << " threads";
