@@ -3,11 +3,13 @@
 #include "analysis/bounds_engine.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "analysis/interval_arithmetic.h"
 #include "analysis/nonnegative.h"
-#include "analysis/nonnegative.h"
+#include "diagnostics/error.h"
 #include "ir/build.h"
+#include "ir/scalar.h"
 #include "ir/visit.h"
 
 namespace retrograde::ir {
@@ -409,31 +411,54 @@ Interval BoundsEngine::value_of_func(const Call& call) {
   return it == shared_->values->end() ? type_range(call.type) : it->second;
 }
 
-namespace {
-
-Interval unit_interval(Type type, int min) { return {make_const(type, min), make_const(type, 1)}; }
-
-Interval bounded_unless_nan(const Interval& operand, const Interval& result) {
-  return operand.min.defined() || operand.max.defined() ? result : Interval::everything();
+// Operands that may be NaN, or infinite where that makes a NaN, leave everything open.
+Interval BoundsEngine::bounds_within(const Call& call, const OpInfo& info) {
+  if (info.real.nan == Nan::NanOutside) return Interval::everything();
+  for (const Expr& arg : call.args) {
+    const Interval v = bounds(arg);
+    const bool is_number = v.min.defined() || v.max.defined();
+    if (info.real.nan == Nan::NanAtInfinity ? !v.is_bounded() : !is_number)
+      return Interval::everything();
+  }
+  const auto end = [&](double value) {
+    return std::isfinite(value) ? make_const(call.type, value) : Expr();
+  };
+  return {end(info.values.low), end(info.values.high)};
 }
 
-}  // namespace
+// A function that rises and has a value at the lower end has one above it.
+Interval BoundsEngine::bounds_at_ends(const Call& call, const OpInfo& info) {
+  const Interval v = bounds(call.args[0]);
+  if (info.real.nan == Nan::NanOutside) {
+    const auto low = v.min.defined() ? as_scalar(v.min) : std::nullopt;
+    if (!low || std::isnan(eval_operator(call.op, {*low}, call.type)->f))
+      return Interval::everything();
+  }
+  return interval_monotone(call.op, call.type, v);
+}
 
 Interval BoundsEngine::operator_bounds(const Call& call) {
+  const OpInfo& info = op_info(call.op);
+  switch (info.bounds) {
+    case BoundsRule::OfFirst:
+    case BoundsRule::OfSecond:
+      return bounds(call.args[static_cast<size_t>(passed_operand(call.op))]);
+    case BoundsRule::AtEnds:
+      return bounds_at_ends(call, info);
+    case BoundsRule::Within:
+      return bounds_within(call, info);
+    case BoundsRule::ByRule:
+      return bounds_by_rule(call);
+    case BoundsRule::OfType:
+      break;
+  }
+  return type_range(call.type);
+}
+
+Interval BoundsEngine::bounds_by_rule(const Call& call) {
   Type type = call.type;
   auto arg = [&](int i) { return bounds(call.args[i]); };
   switch (call.op) {
-    case Op::likely:
-    case Op::likely_if_innermost:
-    case Op::stop_gradient:
-    case Op::memoize_tag:
-    case Op::print:
-      return arg(0);
-    case Op::strict_float:  // rounds the same at the ends
-      return interval_monotone(call.op, type, arg(0));
-    case Op::print_when:
-    case Op::require:
-      return arg(1);
     case Op::promise_clamped:
     case Op::unsafe_promise_clamped:
       return interval_clamp(arg(0), arg(1), arg(2));
@@ -450,24 +475,6 @@ Interval BoundsEngine::operator_bounds(const Call& call) {
     case Op::shift_left:
     case Op::shift_right:
       return interval_shift(call.op, type, arg(0), arg(1));
-    case Op::floor:
-    case Op::ceil:
-    case Op::round:
-    case Op::trunc:
-      return interval_monotone(call.op, type, arg(0));
-    case Op::sqrt: {
-      Interval v = arg(0);
-      auto min = v.min.defined() ? as_const_float(v.min) : std::nullopt;
-      return min && *min >= 0 ? interval_monotone(Op::sqrt, type, v) : Interval::everything();
-    }
-    case Op::sin:
-    case Op::cos: {  // of an infinity: NaN
-      Interval v = arg(0);
-      return v.is_bounded() ? unit_interval(type, -1) : Interval::everything();
-    }
-    case Op::tanh:
-    case Op::erf:
-      return bounded_unless_nan(arg(0), unit_interval(type, -1));
     case Op::lerp:
       return type.is_float() ? Interval::everything() : hull(arg(0), arg(1));
     case Op::saturating_cast: {
@@ -481,9 +488,9 @@ Interval BoundsEngine::operator_bounds(const Call& call) {
     case Op::count_trailing_zeros:
       return constant_interval(type, 0, call.args[0].type().bits());
     case Op::random:
-      return type.is_float() ? unit_interval(type, 0) : type_range(type);
+      return type.is_float() ? Interval{make_zero(type), make_one(type)} : type_range(type);
     default:
-      return type_range(type);
+      internal_error(text("no rule for the bounds of ", op_info(call.op).name));
   }
 }
 

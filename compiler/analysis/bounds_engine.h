@@ -60,6 +60,9 @@ class BoundsEngine {
   Interval select_bounds(const Expr& condition, const Expr& true_value, const Expr& false_value);
   Interval call_bounds(const Call& call);
   Interval operator_bounds(const Call& call);
+  Interval bounds_within(const Call& call, const OpInfo& info);
+  Interval bounds_at_ends(const Call& call, const OpInfo& info);
+  Interval bounds_by_rule(const Call& call);
   Interval value_of_func(const Call& call);
   Truth compare_truth(Kind kind, const Expr& a, const Expr& b);
   // What a condition says of the variables of the scope: of each alone, and sums of several, <= 0.

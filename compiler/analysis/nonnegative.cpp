@@ -1,9 +1,11 @@
 #include "analysis/nonnegative.h"
 
+#include <algorithm>
 #include <unordered_map>
 
 #include "ir/build.h"
 #include "ir/equal.h"
+#include "ir/scalar.h"
 #include "ir/visit.h"
 
 namespace retrograde::ir {
@@ -50,22 +52,17 @@ class Signs {
   }
 
   bool decide_call(const Call& call) {
-    switch (call.op) {
-      case Op::abs:
-        return call.type.is_float();
-      case Op::sqrt:
-      case Op::exp:
-        return true;
-      case Op::floor:
-      case Op::ceil:
-      case Op::round:
-      case Op::trunc:
-      case Op::likely:
-      case Op::strict_float:
-        return nonnegative(call.args[0]);
-      default:
-        return false;
-    }
+    if (call.call_type != CallType::Operator) return false;
+    if (op_info(call.op).values.low >= 0) return true;
+    const int passed = passed_operand(call.op);
+    return (passed >= 0 || keeps_sign(call.op)) &&
+           nonnegative(call.args[static_cast<size_t>(std::max(passed, 0))]);
+  }
+
+  // Rises from what it is at 0.
+  static bool keeps_sign(Op op) {
+    return op_info(op).bounds == BoundsRule::AtEnds &&
+           eval_operator(op, {Scalar::of_float(Float(64), 0)}, Float(64))->f >= 0;
   }
 };
 

@@ -167,8 +167,9 @@ Partials mod_partials(Args a, const Expr&) {
   return {plain(make_one(a[0].type())), strong(-op1(Op::floor, a[0] / a[1]))};
 }
 DerivativeRule smooth(PartialsFn partials, const char* domain, const char* convention,
+                      const char* formula, const char* infinities, int max_ulp,
                       const char* source = "[GW] table 2.1") {
-  return {RuleClass::Smooth, partials, -1, domain, convention, source};
+  return {RuleClass::Smooth, partials, -1, domain, convention, source, formula, infinities, max_ulp};
 }
 DerivativeRule constant(const char* convention) {
   return {RuleClass::Constant,           nullptr,    -1,
@@ -182,139 +183,141 @@ DerivativeRule no_rule(const char* reason) {
 }
 
 using OpTable = std::map<Op, DerivativeRule>;
-// What people read: formula, infinities, ULP.
-struct Description {
-  const char* formula;
-  const char* infinities;
-  int max_ulp;
-};
-void describe(DerivativeRule& rule, const Description& d) {
-  rule.formula = d.formula;
-  rule.infinities = d.infinities;
-  rule.max_ulp = d.max_ulp;
+constexpr const char* approximated = "that of the function it approximates";
+
+OpTable smooth_operators() {
+  return {
+      {Op::abs, smooth(abs_partials, "x != 0", "0 at 0", "sign(x)", "-1 and 1", 0)},
+      {Op::absd,
+       smooth(absd_partials, "a != b", "0 where a == b", "sign(x - y), -sign(x - y)",
+              "-1 and 1; 0 for equal infinities", 0)},
+      {Op::lerp,
+       smooth(lerp_partials, "everywhere", "floating weights; integer weights are constants",
+              "1 - w, w, y - x", "infinite or NaN, as the value", 1, "definition")},
+      {Op::sqrt,
+       smooth(sqrt_partials, "x > 0", "+inf at 0 (-inf at -0), times a strong zero; NaN below 0",
+              "1 / (2 v)", "0 at +inf", 2)},
+      {Op::exp,
+       smooth(exp_partials, "everywhere", "inf where exp overflows", "v", "0 at -inf, inf at +inf",
+              1)},
+      {Op::log,
+       smooth(log_partials, "x > 0", "inf at 0 (-inf at -0), 1/x below 0 where the primal is NaN",
+              "1 / x", "0 at +inf", 1)},
+      {Op::pow,
+       smooth(pow_partials, "x > 0, or integer p",
+              "dx is 0 where p == 0; dp is 0 where x == 0 and NaN where x < 0",
+              "y x^(y-1), or y v / x, v log x",
+              "as x^(y-1) and v log x; a pole may have either sign where y - 1 is rounded", 3)},
+      {Op::hypot,
+       smooth(hypot_partials, "(x, y) != (0, 0)", "0 at the origin: the smallest subgradient",
+              "x / v, y / v, scaled by max(|x|, |y|)", "NaN", 2)},
+      {Op::sin,
+       smooth(sin_partials, "everywhere", "NaN at infinities", "cos x", "NaN, as the value", 1)},
+      {Op::cos,
+       smooth(cos_partials, "everywhere", "NaN at infinities", "-sin x", "NaN, as the value", 1)},
+      {Op::tan,
+       smooth(tan_partials, "x != pi/2 + k pi", "1 + tan^2, huge near the poles", "1 + v^2",
+              "NaN, as the value", 4)},
+      {Op::asin,
+       smooth(asin_partials, "|x| < 1", "inf at -1 and 1, NaN outside", "1 / sqrt((1 - x)(1 + x))",
+              "NaN, as the value", 3)},
+      {Op::acos,
+       smooth(acos_partials, "|x| < 1", "-inf at -1 and 1, NaN outside",
+              "-1 / sqrt((1 - x)(1 + x))", "NaN, as the value", 3)},
+      {Op::atan, smooth(atan_partials, "everywhere", "0 at infinities", "1 / (1 + x^2)", "0", 3)},
+      {Op::atan2,
+       smooth(atan2_partials, "(y, x) != (0, 0)", "0 at the origin",
+              "y / r / r, -x / r / r with r = hypot(x, y), scaled",
+              "0 where an operand is infinite", 4, "[DLMF] 4.24")},
+      {Op::sinh,
+       smooth(sinh_partials, "everywhere", "inf where cosh overflows", "cosh x", "inf", 2)},
+      {Op::cosh,
+       smooth(cosh_partials, "everywhere", "inf where sinh overflows", "sinh x", "-inf and inf",
+              2)},
+      {Op::tanh,
+       smooth(tanh_partials, "everywhere", "0 at infinities",
+              "4 e / (1 + e)^2 with e = exp(-2 |x|)", "0", 6)},
+      {Op::asinh,
+       smooth(asinh_partials, "everywhere", "0 at infinities", "1 / hypot(x, 1)", "0", 2,
+              "[DLMF] 4.40")},
+      {Op::acosh,
+       smooth(acosh_partials, "x > 1", "inf at 1, NaN below", "1 / (sqrt(x - 1) sqrt(x + 1))",
+              "0 at +inf", 4, "[DLMF] 4.40")},
+      {Op::atanh,
+       smooth(atanh_partials, "|x| < 1",
+              "inf at -1 and 1; the formula outside, where the value is NaN",
+              "1 / ((1 - x)(1 + x))", "0, where the value is NaN", 3, "[DLMF] 4.40")},
+      {Op::erf,
+       smooth(erf_partials, "everywhere", "0 at infinities", "2 / sqrt(pi) exp(-x^2)", "0", 4,
+              "[DLMF] 7.2")},
+      {Op::fast_exp, smooth(exp_partials, "as exp", approximated, "exp's, with v", "as exp", -1)},
+      {Op::fast_log, smooth(fast_log_partials, "x > 0", approximated, "log's", "as log", 1)},
+      {Op::fast_pow,
+       smooth(fast_pow_partials, "as pow", approximated, "pow's, by fast_pow and fast_log",
+              "as pow", -1)},
+      {Op::fast_sin,
+       smooth(fast_sin_partials, "everywhere", approximated, "fast_cos x", "NaN", -1)},
+      {Op::fast_cos,
+       smooth(fast_cos_partials, "everywhere", approximated, "-fast_sin x", "NaN", -1)},
+      {Op::fast_inverse, smooth(fast_inverse_partials, "x != 0", approximated, "-v^2", "0", -1)},
+      {Op::fast_inverse_sqrt,
+       smooth(fast_inverse_sqrt_partials, "x > 0", approximated, "-v^3 / 2", "0 at +inf", -1)},
+      {Op::saturating_cast,
+       smooth(saturating_cast_partials, "inside the type's range",
+              "0 where the value saturates; to integers: 0", "1 or 0", "0: the value saturates", 0,
+              "definition")},
+      {Op::strong_div,
+       smooth(strong_div_partials, "b != 0", "as a quotient, with strong zeros", "1 / y, -v / y",
+              "as a quotient, with strong zeros", 2, "definition")},
+      {Op::strong_mul,
+       smooth(strong_mul_partials, "everywhere", "as a product, with strong zeros", "y, x",
+              "as a product, with strong zeros", 0, "definition")},
+  };
 }
 
-void describe_operators(OpTable& t) {
-  const std::map<Op, Description> descriptions = {
-      {Op::abs, {"sign(x)", "-1 and 1", 0}},
-      {Op::absd, {"sign(x - y), -sign(x - y)", "-1 and 1; 0 for equal infinities", 0}},
-      {Op::lerp, {"1 - w, w, y - x", "infinite or NaN, as the value", 1}},
-      {Op::sqrt, {"1 / (2 v)", "0 at +inf", 2}},
-      {Op::exp, {"v", "0 at -inf, inf at +inf", 1}},
-      {Op::log, {"1 / x", "0 at +inf", 1}},
-      {Op::pow,
-       {"y x^(y-1), or y v / x, v log x",
-        "as x^(y-1) and v log x; a pole may have either sign where y - 1 is rounded", 3}},
-      {Op::hypot, {"x / v, y / v, scaled by max(|x|, |y|)", "NaN", 2}},
-      {Op::sin, {"cos x", "NaN, as the value", 1}},
-      {Op::cos, {"-sin x", "NaN, as the value", 1}},
-      {Op::tan, {"1 + v^2", "NaN, as the value", 4}},
-      {Op::asin, {"1 / sqrt((1 - x)(1 + x))", "NaN, as the value", 3}},
-      {Op::acos, {"-1 / sqrt((1 - x)(1 + x))", "NaN, as the value", 3}},
-      {Op::atan, {"1 / (1 + x^2)", "0", 3}},
-      {Op::atan2,
-       {"y / r / r, -x / r / r with r = hypot(x, y), scaled", "0 where an operand is infinite", 4}},
-      {Op::sinh, {"cosh x", "inf", 2}},
-      {Op::cosh, {"sinh x", "-inf and inf", 2}},
-      {Op::tanh, {"4 e / (1 + e)^2 with e = exp(-2 |x|)", "0", 6}},
-      {Op::asinh, {"1 / hypot(x, 1)", "0", 2}},
-      {Op::acosh, {"1 / (sqrt(x - 1) sqrt(x + 1))", "0 at +inf", 4}},
-      {Op::atanh, {"1 / ((1 - x)(1 + x))", "0, where the value is NaN", 3}},
-      {Op::erf, {"2 / sqrt(pi) exp(-x^2)", "0", 4}},
-      {Op::fast_exp, {"exp's, with v", "as exp", -1}},
-      {Op::fast_log, {"log's", "as log", 1}},
-      {Op::fast_pow, {"pow's, by fast_pow and fast_log", "as pow", -1}},
-      {Op::fast_sin, {"fast_cos x", "NaN", -1}},
-      {Op::fast_cos, {"-fast_sin x", "NaN", -1}},
-      {Op::fast_inverse, {"-v^2", "0", -1}},
-      {Op::fast_inverse_sqrt, {"-v^3 / 2", "0 at +inf", -1}},
-      {Op::saturating_cast, {"1 or 0", "0: the value saturates", 0}},
-      {Op::strong_div, {"1 / y, -v / y", "as a quotient, with strong zeros", 2}},
-      {Op::strong_mul, {"y, x", "as a product, with strong zeros", 0}},
+// The operators whose derivative is 0, and those that pass on a value by a promise.
+OpTable other_operators() {
+  const char* bits = "integers only: derivative 0";
+  const char* test = "a truth value: derivative 0";
+  const char* steps = "0 everywhere, at the steps too";
+  const char* promise = "the bounds are promises, not values";
+  return {
+      {Op::bitwise_and, constant(bits)},
+      {Op::bitwise_or, constant(bits)},
+      {Op::bitwise_xor, constant(bits)},
+      {Op::bitwise_not, constant(bits)},
+      {Op::shift_left, constant(bits)},
+      {Op::shift_right, constant(bits)},
+      {Op::popcount, constant(bits)},
+      {Op::count_leading_zeros, constant(bits)},
+      {Op::count_trailing_zeros, constant(bits)},
+      {Op::is_nan, constant(test)},
+      {Op::is_inf, constant(test)},
+      {Op::is_finite, constant(test)},
+      {Op::floor, constant(steps)},
+      {Op::ceil, constant(steps)},
+      {Op::round, constant(steps)},
+      {Op::trunc, constant(steps)},
+      {Op::undef, constant("any value: derivative 0")},
+      {Op::random, constant("depends on its seeds only")},
+      {Op::promise_clamped, transparent(0, promise)},
+      {Op::unsafe_promise_clamped, transparent(0, promise)},
+      {Op::stop_gradient,
+       {RuleClass::Blocked, nullptr, -1, "everywhere", "0: the program says so", "definition"}},
   };
-  for (auto& [op, rule] : t) {
-    auto found = descriptions.find(op);
-    if (found != descriptions.end()) describe(rule, found->second);
-  }
 }
 
 OpTable make_op_table() {
-  const char* bits = "integers only: derivative 0";
-  const char* test = "a truth value: derivative 0";
-  const char* lowering = "made by lowering only, after differentiation";
-  OpTable t;
-  for (Op op : {Op::bitwise_and, Op::bitwise_or, Op::bitwise_xor, Op::bitwise_not, Op::shift_left,
-                Op::shift_right, Op::popcount, Op::count_leading_zeros, Op::count_trailing_zeros}) {
-    t.emplace(op, constant(bits));
+  OpTable t = smooth_operators();
+  t.merge(other_operators());
+  for (int i = 0; i < op_count; ++i) {
+    const Op op = static_cast<Op>(i);
+    if (op_info(op).cls == OpClass::Internal) {
+      t.emplace(op, no_rule("made by lowering only, after differentiation"));
+    } else if (passed_operand(op) >= 0) {
+      t.emplace(op, transparent(passed_operand(op)));
+    }
   }
-  for (Op op : {Op::is_nan, Op::is_inf, Op::is_finite}) t.emplace(op, constant(test));
-  for (Op op : {Op::floor, Op::ceil, Op::round, Op::trunc})
-    t.emplace(op, constant("0 everywhere, at the steps too"));
-  t.emplace(Op::abs, smooth(abs_partials, "x != 0", "0 at 0"));
-  t.emplace(Op::absd, smooth(absd_partials, "a != b", "0 where a == b"));
-  t.emplace(Op::lerp, smooth(lerp_partials, "everywhere",
-                             "floating weights; integer weights are constants", "definition"));
-  t.emplace(Op::sqrt, smooth(sqrt_partials, "x > 0",
-                             "+inf at 0 (-inf at -0), times a strong zero; NaN below 0"));
-  t.emplace(Op::exp, smooth(exp_partials, "everywhere", "inf where exp overflows"));
-  t.emplace(Op::log, smooth(log_partials, "x > 0",
-                            "inf at 0 (-inf at -0), 1/x below 0 where the primal is NaN"));
-  t.emplace(Op::pow, smooth(pow_partials, "x > 0, or integer p",
-                            "dx is 0 where p == 0; dp is 0 where x == 0 and NaN where x < 0"));
-  t.emplace(Op::hypot, smooth(hypot_partials, "(x, y) != (0, 0)",
-                              "0 at the origin: the smallest subgradient"));
-  t.emplace(Op::sin, smooth(sin_partials, "everywhere", "NaN at infinities"));
-  t.emplace(Op::cos, smooth(cos_partials, "everywhere", "NaN at infinities"));
-  t.emplace(Op::tan, smooth(tan_partials, "x != pi/2 + k pi", "1 + tan^2, huge near the poles"));
-  t.emplace(Op::asin, smooth(asin_partials, "|x| < 1", "inf at -1 and 1, NaN outside"));
-  t.emplace(Op::acos, smooth(acos_partials, "|x| < 1", "-inf at -1 and 1, NaN outside"));
-  t.emplace(Op::atan, smooth(atan_partials, "everywhere", "0 at infinities"));
-  t.emplace(Op::atan2,
-            smooth(atan2_partials, "(y, x) != (0, 0)", "0 at the origin", "[DLMF] 4.24"));
-  t.emplace(Op::sinh, smooth(sinh_partials, "everywhere", "inf where cosh overflows"));
-  t.emplace(Op::cosh, smooth(cosh_partials, "everywhere", "inf where sinh overflows"));
-  t.emplace(Op::tanh, smooth(tanh_partials, "everywhere", "0 at infinities"));
-  t.emplace(Op::asinh, smooth(asinh_partials, "everywhere", "0 at infinities", "[DLMF] 4.40"));
-  t.emplace(Op::acosh, smooth(acosh_partials, "x > 1", "inf at 1, NaN below", "[DLMF] 4.40"));
-  t.emplace(Op::atanh,
-            smooth(atanh_partials, "|x| < 1",
-                   "inf at -1 and 1; the formula outside, where the value is NaN", "[DLMF] 4.40"));
-  t.emplace(Op::erf, smooth(erf_partials, "everywhere", "0 at infinities", "[DLMF] 7.2"));
-  const char* approximated = "that of the function it approximates";
-  t.emplace(Op::fast_exp, smooth(exp_partials, "as exp", approximated));
-  t.emplace(Op::fast_log, smooth(fast_log_partials, "x > 0", approximated));
-  t.emplace(Op::fast_pow, smooth(fast_pow_partials, "as pow", approximated));
-  t.emplace(Op::fast_sin, smooth(fast_sin_partials, "everywhere", approximated));
-  t.emplace(Op::fast_cos, smooth(fast_cos_partials, "everywhere", approximated));
-  t.emplace(Op::fast_inverse, smooth(fast_inverse_partials, "x != 0", approximated));
-  t.emplace(Op::fast_inverse_sqrt, smooth(fast_inverse_sqrt_partials, "x > 0", approximated));
-  t.emplace(Op::saturating_cast,
-            smooth(saturating_cast_partials, "inside the type's range",
-                   "0 where the value saturates; to integers: 0", "definition"));
-  t.emplace(Op::strong_div, smooth(strong_div_partials, "b != 0",
-                                   "as a quotient, with strong zeros", "definition"));
-  t.emplace(Op::strong_mul, smooth(strong_mul_partials, "everywhere",
-                                   "as a product, with strong zeros", "definition"));
-  t.emplace(Op::likely, transparent(0));
-  t.emplace(Op::likely_if_innermost, transparent(0));
-  t.emplace(Op::promise_clamped, transparent(0, "the bounds are promises, not values"));
-  t.emplace(Op::unsafe_promise_clamped, transparent(0, "the bounds are promises, not values"));
-  t.emplace(Op::strict_float, transparent(0));
-  t.emplace(Op::memoize_tag, transparent(0));
-  t.emplace(Op::stop_gradient, DerivativeRule{RuleClass::Blocked, nullptr, -1, "everywhere",
-                                              "0: the program says so", "definition"});
-  t.emplace(Op::undef, constant("any value: derivative 0"));
-  t.emplace(Op::print, transparent(0));
-  t.emplace(Op::print_when, transparent(1));
-  t.emplace(Op::require, transparent(1));
-  t.emplace(Op::random, constant("depends on its seeds only"));
-  for (Op op : {Op::buffer_host, Op::buffer_min, Op::buffer_extent, Op::buffer_stride,
-                Op::buffer_dimensions, Op::buffer_type, Op::buffer_is_null, Op::buffer_is_query,
-                Op::buffer_set_bounds, Op::address_of, Op::if_then_else, Op::prefetch,
-                Op::runtime_call, Op::pack, Op::trace, Op::error}) {
-    t.emplace(op, no_rule(lowering));
-  }
-  describe_operators(t);
   return t;
 }
 
@@ -330,41 +333,37 @@ Partials max_partials(Args a, const Expr&) { return taken_partials(a, a[0] > a[1
 
 using KindTable = std::map<Kind, DerivativeRule>;
 KindTable make_kind_table() {
-  KindTable t;
-  t.emplace(Kind::Add, smooth(add_partials, "everywhere", "none needed"));
-  t.emplace(Kind::Sub, smooth(sub_partials, "everywhere", "none needed"));
-  t.emplace(Kind::Mul, smooth(mul_partials, "everywhere",
-                              "strong zero where a factor may be infinite or NaN"));
-  t.emplace(Kind::Div,
-            smooth(div_partials, "b != 0", "infinite at b == 0, times a strong zero; integers: 0"));
-  t.emplace(Kind::Mod,
-            smooth(mod_partials, "a / b not an integer",
-                   "da is 1 and db -floor(a / b) at the steps too; integers: 0", "definition"));
-  t.emplace(Kind::Min, smooth(min_partials, "a != b",
-                              "the operand taken gets 1; at a tie that is b", "definition"));
-  t.emplace(Kind::Max, smooth(max_partials, "a != b",
-                              "the operand taken gets 1; at a tie that is b", "definition"));
+  KindTable t = {
+      {Kind::Add, smooth(add_partials, "everywhere", "none needed", "1, 1", "1", 0)},
+      {Kind::Sub, smooth(sub_partials, "everywhere", "none needed", "1, -1", "1 and -1", 0)},
+      {Kind::Mul,
+       smooth(mul_partials, "everywhere", "strong zero where a factor may be infinite or NaN",
+              "y, x", "infinite, but for strong zeros", 0)},
+      {Kind::Div,
+       smooth(div_partials, "b != 0", "infinite at b == 0, times a strong zero; integers: 0",
+              "1 / y, -v / y", "0 where y is infinite", 2)},
+      {Kind::Mod,
+       smooth(mod_partials, "a / b not an integer",
+              "da is 1 and db -floor(a / b) at the steps too; integers: 0", "1, -floor(x / y)",
+              "NaN, as the value", 0, "definition")},
+      {Kind::Min,
+       smooth(min_partials, "a != b", "the operand taken gets 1; at a tie that is b",
+              "1, 0 or 0, 1", "as for finite operands", 0, "definition")},
+      {Kind::Max,
+       smooth(max_partials, "a != b", "the operand taken gets 1; at a tie that is b",
+              "1, 0 or 0, 1", "as for finite operands", 0, "definition")},
+      {Kind::Select,
+       {RuleClass::Smooth, nullptr, -1, "where the condition does not change",
+        "the chosen arm gets all, the other exactly 0", "definition", "1 or 0",
+        "as for finite operands", 0}},
+      {Kind::Cast,
+       transparent(0, "between floats: the adjoint is converted; to or from integers: 0")},
+      {Kind::Reinterpret, no_rule("the bits of a value are no differentiable function of it")},
+  };
   for (Kind k : {Kind::EQ, Kind::NE, Kind::LT, Kind::LE, Kind::GT, Kind::GE, Kind::And, Kind::Or,
                  Kind::Not}) {
     t.emplace(k, constant("a truth value: derivative 0"));
   }
-  t.emplace(Kind::Cast,
-            transparent(0, "between floats: the adjoint is converted; to or from integers: 0"));
-  t.emplace(Kind::Reinterpret, no_rule("the bits of a value are no differentiable function of it"));
-  t.emplace(Kind::Select,
-            DerivativeRule{RuleClass::Smooth, nullptr, -1, "where the condition does not change",
-                           "the chosen arm gets all, the other exactly 0", "definition"});
-  const std::map<Kind, Description> descriptions = {
-      {Kind::Add, {"1, 1", "1", 0}},
-      {Kind::Sub, {"1, -1", "1 and -1", 0}},
-      {Kind::Mul, {"y, x", "infinite, but for strong zeros", 0}},
-      {Kind::Div, {"1 / y, -v / y", "0 where y is infinite", 2}},
-      {Kind::Mod, {"1, -floor(x / y)", "NaN, as the value", 0}},
-      {Kind::Min, {"1, 0 or 0, 1", "as for finite operands", 0}},
-      {Kind::Max, {"1, 0 or 0, 1", "as for finite operands", 0}},
-      {Kind::Select, {"1 or 0", "as for finite operands", 0}},
-  };
-  for (const auto& [kind, d] : descriptions) describe(t.at(kind), d);
   return t;
 }
 
@@ -394,40 +393,13 @@ const DerivativeRule& derivative_rule(Kind kind) {
 bool has_derivative_rule(Kind kind) { return kind_table().contains(kind); }
 
 bool has_poles(const Call& call) {
-  switch (call.op) {
-    case Op::sqrt:
-    case Op::asin:
-    case Op::acos:
-    case Op::acosh:
-      return true;
-    case Op::pow:
-    case Op::fast_pow: {
-      auto exponent = as_const_float(call.args[1]);
-      return !exponent || *exponent < 1;
-    }
-    default:
-      return false;
-  }
+  const PartialPoles poles = op_info(call.op).real.poles;
+  if (poles != PartialPoles::PolesBelowOne) return poles == PartialPoles::Poles;
+  const auto exponent = as_const_float(call.args.back());
+  return !exponent || *exponent < 1;
 }
 
-bool levels_off(Op op) {
-  switch (op) {
-    case Op::exp:
-    case Op::fast_exp:
-    case Op::pow:
-    case Op::fast_pow:
-    case Op::atan:
-    case Op::atan2:
-    case Op::tanh:
-    case Op::erf:
-    case Op::fast_inverse:
-    case Op::fast_inverse_sqrt:
-    case Op::strong_div:
-      return true;
-    default:
-      return false;
-  }
-}
+bool levels_off(Op op) { return op_info(op).real.levels == Levels::LevelsOff; }
 
 Type adjoint_type(Type type) {
   return type.bits() < 32 || type.is_bfloat() ? Float(32, type.lanes()) : type;

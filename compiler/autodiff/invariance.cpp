@@ -122,12 +122,10 @@ Response of_pow(const std::vector<Expr>& args, const std::vector<Response>& a) {
 }
 
 Response of_operator(const Call& call, const std::vector<Response>& a) {
-  switch (call.op) {
+  switch (exact_form(call.op)) {
     case Op::exp:
-    case Op::fast_exp:
       return exponential(a[0], 1);
     case Op::log:
-    case Op::fast_log:
       return logarithm(a[0]);
     case Op::sqrt:
       return power(a[0], 0.5);
@@ -136,7 +134,6 @@ Response of_operator(const Call& call, const std::vector<Response>& a) {
     case Op::fast_inverse_sqrt:
       return power(a[0], -0.5);
     case Op::pow:
-    case Op::fast_pow:
       return of_pow(call.args, a);
     case Op::abs:
       return power(a[0], 1);

@@ -102,32 +102,6 @@ LocalDerivative of_call(const Expr& e, const Call& call, const ExprFacts& facts)
 
 }  // namespace
 
-bool is_risky_op(Op op) {
-  switch (op) {
-    case Op::sqrt:
-    case Op::exp:
-    case Op::log:
-    case Op::pow:
-    case Op::tan:
-    case Op::asin:
-    case Op::acos:
-    case Op::sinh:
-    case Op::cosh:
-    case Op::acosh:
-    case Op::atanh:
-    case Op::fast_exp:
-    case Op::fast_log:
-    case Op::fast_pow:
-    case Op::fast_inverse:
-    case Op::fast_inverse_sqrt:
-    case Op::strong_mul:
-    case Op::strong_div:
-      return true;
-    default:
-      return false;
-  }
-}
-
 std::vector<Expr> post_order(const std::vector<Expr>& roots) {
   std::vector<Expr> order;
   std::unordered_set<const ExprNode*> seen;

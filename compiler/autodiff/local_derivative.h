@@ -83,9 +83,6 @@ struct LocalDerivative {
 // Unsupported where there is no rule.
 LocalDerivative local_derivative(const Expr& e, const ExprFacts& facts);
 
-// Whether the operator's value may be infinite or NaN at finite operands.
-bool is_risky_op(Op op);
-
 // Here or in a Func between here and the output. A seed that the user gives counts as masked.
 AdjointTraits traits_of(const Expr& adjoint);
 

@@ -25,30 +25,10 @@ std::string number_text(double value) {
 }
 
 Operations of_operator(const Call& call) {
-  switch (call.op) {
-    case Op::strong_mul:  // a product, or a quotient, and a choice
-    case Op::strong_div:
-      return {.adds = 1, .mults = 1};
-    case Op::lerp:
-      return {.adds = 2, .mults = 2};
-    case Op::absd:
-      return {.adds = 2};
-    case Op::abs:
-    case Op::floor:
-    case Op::ceil:
-    case Op::round:
-    case Op::trunc:
-    case Op::is_nan:
-    case Op::is_inf:
-    case Op::is_finite:
-    case Op::saturating_cast:
-    case Op::if_then_else:
-      return {.adds = 1};
-    default:
-      break;
-  }
-  OpClass cls = op_info(call.op).cls;
-  return cls == OpClass::Pure || call.op == Op::random ? Operations{.nonlinear = 1} : Operations{};
+  const Work& work = op_info(call.op).work;
+  return {.adds = static_cast<double>(work.adds),
+          .mults = static_cast<double>(work.mults),
+          .nonlinear = static_cast<double>(work.functions)};
 }
 
 // Work of the node itself, where floats take part in it.

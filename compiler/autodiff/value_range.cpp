@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 #include "autodiff/local_derivative.h"
 #include "ir/build.h"
@@ -92,49 +91,31 @@ ValueRange power(const ValueRange& a, const ValueRange& exponent) {
 
 // `infinite`: one of the operands may be.
 ValueRange of_operator(Op op, const std::vector<ValueRange>& a, bool infinite) {
-  switch (op) {
+  if (const int passed = passed_operand(op); passed >= 0) return a[static_cast<size_t>(passed)];
+  switch (exact_form(op)) {
     case Op::abs:
-    case Op::absd:
-      return op == Op::abs ? magnitude(a[0]) : between(0, inf, infinite);
+      return magnitude(a[0]);
     case Op::sqrt:
       return root(a[0]);
     case Op::exp:
-    case Op::fast_exp:
       return exponential(a[0]);
     case Op::log:
-    case Op::fast_log:
       return logarithm(a[0]);
     case Op::hypot:
       return root(sum(square(a[0]), square(a[1])));
     case Op::pow:
-    case Op::fast_pow:
       return power(a[0], a[1]);
-    case Op::sin:
-    case Op::cos:
-    case Op::fast_sin:
-    case Op::fast_cos:
-    case Op::tanh:
-    case Op::erf:
-      return between(-1, 1);
-    case Op::atan:
-    case Op::atan2:
-    case Op::asin:
-    case Op::acos:
-      return between(-std::numbers::pi, std::numbers::pi);
     case Op::strong_mul:
       return product(joined(a[0], constant(0)), a[1]);
     case Op::strong_div:
       return quotient(joined(a[0], constant(0)), a[1]);
     case Op::if_then_else:
       return joined(a[1], a[2]);
-    case Op::strict_float:
-    case Op::stop_gradient:
-    case Op::likely:
-    case Op::likely_if_innermost:
-      return a[0];
     default:
-      return between(-inf, inf, infinite || is_risky_op(op));
+      break;
   }
+  const Values& values = op_info(exact_form(op)).values;
+  return between(values.low, values.high, infinite || is_risky_op(op));
 }
 
 // Of -x * x, which is how -(x * x) is often written.

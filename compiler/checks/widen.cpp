@@ -16,23 +16,6 @@ namespace {
 
 Type wide(Type t) { return t.is_float() ? Float(64, t.lanes()) : t; }
 
-Op exact(Op op) {
-  switch (op) {
-    case Op::fast_exp:
-      return Op::exp;
-    case Op::fast_log:
-      return Op::log;
-    case Op::fast_pow:
-      return Op::pow;
-    case Op::fast_sin:
-      return Op::sin;
-    case Op::fast_cos:
-      return Op::cos;
-    default:
-      return op;
-  }
-}
-
 class Widening {
  public:
   Widening(const std::vector<FuncPtr>& outputs, const Rounding& rounding) : rounding_(rounding) {
@@ -154,7 +137,7 @@ class Widening {
     if (c.op == Op::fast_inverse) return make_one(args[0].type()) / args[0];
     if (c.op == Op::fast_inverse_sqrt)
       return make_one(args[0].type()) / call_op(Op::sqrt, args[0].type(), args);
-    return call_op(exact(c.op), wide(c.type), args);
+    return call_op(exact_form(c.op), wide(c.type), args);
   }
 
   Rounding rounding_;

@@ -155,22 +155,9 @@ Value* fast_float32(Emitter& e, Op op, const Args& args) {
 }
 
 Value* full_float64(Emitter& e, Op op, Type type, const Args& args) {
-  switch (op) {
-    case Op::fast_exp:
-      return math_operator(e, Op::exp, type, args);
-    case Op::fast_log:
-      return math_operator(e, Op::log, type, args);
-    case Op::fast_pow:
-      return math_operator(e, Op::pow, type, args);
-    case Op::fast_sin:
-      return math_operator(e, Op::sin, type, args);
-    case Op::fast_cos:
-      return math_operator(e, Op::cos, type, args);
-    case Op::fast_inverse:
-      return fast_inverse(e, args[0]);
-    default:
-      return fast_inverse(e, e.b.CreateUnaryIntrinsic(llvm::Intrinsic::sqrt, args[0]));
-  }
+  if (const Op exact = ir::exact_form(op); exact != op) return math_operator(e, exact, type, args);
+  if (op == Op::fast_inverse) return fast_inverse(e, args[0]);
+  return fast_inverse(e, e.b.CreateUnaryIntrinsic(llvm::Intrinsic::sqrt, args[0]));
 }
 
 }  // namespace

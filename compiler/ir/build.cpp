@@ -375,31 +375,7 @@ namespace {
 
 // Generated code has functions of its own for these, whose last bit may be another one: code
 // generation folds them (codegen/constant_math.h).
-bool is_rounded_otherwise(Op op) {
-  switch (op) {
-    case Op::exp:
-    case Op::log:
-    case Op::sin:
-    case Op::cos:
-    case Op::tan:
-    case Op::asin:
-    case Op::acos:
-    case Op::atan:
-    case Op::sinh:
-    case Op::cosh:
-    case Op::tanh:
-    case Op::asinh:
-    case Op::acosh:
-    case Op::atanh:
-    case Op::erf:
-    case Op::pow:
-    case Op::hypot:
-    case Op::atan2:
-      return true;
-    default:
-      return false;
-  }
-}
+bool is_rounded_otherwise(Op op) { return op_info(op).real.error.kind == OpError::Kind::Library; }
 
 bool is_zero_or_one(const Scalar& s) { return s.f == 0 || s.f == 1; }
 

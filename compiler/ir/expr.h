@@ -1,5 +1,5 @@
 // Expr and Stmt: handles to immutable, reference-counted nodes; and the node types themselves.
-// Kinds are listed in kinds.def, operators in operators.def. Nodes are built by the functions of
+// Kinds are listed in kinds.def, operators and their facts in operators.h. Nodes are built by the functions of
 // build.h, which check types; a node's children never change. Two handles to one node share it:
 // expressions are DAGs.
 #pragma once
@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "ir/operators.h"
 #include "ir/type.h"
 
 namespace retrograde {
@@ -24,21 +25,6 @@ enum class Kind : uint8_t {
 #include "ir/kinds.def"
 };
 const char* kind_name(Kind kind);
-
-enum class Op : uint8_t {
-#define RETROGRADE_OP(name, arity, cls) name,
-#include "ir/operators.def"
-  none,
-};
-enum class OpClass : uint8_t { Pure, Marker, Effect, Internal };
-struct OpInfo {
-  const char* name;
-  int arity;  // -1: any
-  OpClass cls;
-};
-const OpInfo& op_info(Op op);
-Op op_from_name(const std::string& name);  // Op::none when unknown
-constexpr int op_count = static_cast<int>(Op::none);
 
 struct Node {
   explicit Node(Kind kind) : kind(kind) {}

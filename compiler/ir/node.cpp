@@ -1,7 +1,4 @@
-// The tables of kinds and operators, destruction of nodes, and immediates from C++ values.
-#include <string_view>
-#include <unordered_map>
-
+// The table of kinds, destruction of nodes, and immediates from C++ values.
 #include "ir/build.h"
 #include "ir/expr.h"
 
@@ -17,26 +14,6 @@ const char* kind_name(Kind kind) {
 #include "ir/kinds.def"
   };
   return names[static_cast<int>(kind)];
-}
-
-namespace {
-constexpr OpInfo op_table[] = {
-#define RETROGRADE_OP(name, arity, cls) {#name, arity, OpClass::cls},
-#include "ir/operators.def"
-    {"none", 0, OpClass::Internal},
-};
-}  // namespace
-
-const OpInfo& op_info(Op op) { return op_table[static_cast<int>(op)]; }
-
-Op op_from_name(const std::string& name) {
-  static const std::unordered_map<std::string_view, Op> by_name = [] {
-    std::unordered_map<std::string_view, Op> result;
-    for (int i = 0; i < op_count; ++i) result.emplace(op_table[i].name, static_cast<Op>(i));
-    return result;
-  }();
-  const auto found = by_name.find(name);
-  return found == by_name.end() ? Op::none : found->second;
 }
 
 // A deleted node drops its children, which may end here again: those are queued in the outermost

@@ -1,17 +1,19 @@
-// What the operators of operators.def do to scalars. Floats narrower than 64 bits are computed in
+// The table of operators, and what they do to scalars. Floats narrower than 64 bits are computed in
 // double and rounded once, so these are the exact functions that vector math approximates.
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <limits>
+#include <string_view>
+#include <unordered_map>
 
 #include "diagnostics/error.h"
+#include "ir/operators.h"
 #include "ir/scalar.h"
 
 namespace retrograde::ir {
 
 namespace {
-
-using Args = std::vector<Scalar>;
 
 uint64_t magnitude(const Scalar& a) {
   if (a.type.is_uint() || a.i >= 0) return a.u;
@@ -33,14 +35,14 @@ int64_t shift_amount(const Scalar& b) {
   return b.i > far ? far : b.i < -far ? -far : b.i;
 }
 
-Scalar eval_bitwise(Op op, const Scalar& a, const Scalar& b) {
-  const uint64_t bits = op == Op::bitwise_and  ? a.u & b.u
-                        : op == Op::bitwise_or ? a.u | b.u
-                                               : a.u ^ b.u;
-  return Scalar::of_uint(a.type, bits);
+Scalar bits(const Scalar& a, uint64_t value) { return Scalar::of_uint(a.type, value); }
+
+Scalar absolute(const Scalar& a, Type type) {
+  return a.type.is_float() ? Scalar::of_float(type, std::fabs(a.f))
+                           : Scalar::of_uint(type, magnitude(a));
 }
 
-Scalar eval_absd(const Scalar& a, const Scalar& b, Type type) {
+Scalar difference(const Scalar& a, const Scalar& b, Type type) {
   if (a.type.is_float()) return Scalar::of_float(type, std::fabs(a.f - b.f));
   const bool less = a.type.is_int() ? a.i < b.i : a.u < b.u;
   return Scalar::of_uint(type, less ? b.u - a.u : a.u - b.u);
@@ -80,7 +82,7 @@ Scalar lerp_integers(const Scalar& a, const Scalar& b, const Scalar& weight) {
   return Scalar::of_int(a.type, static_cast<int64_t>(rounded));
 }
 
-Scalar eval_lerp(const Scalar& a, const Scalar& b, const Scalar& weight, Type type) {
+Scalar interpolate(const Scalar& a, const Scalar& b, const Scalar& weight, Type type) {
   if (a.type.is_float()) {
     const double w = unit_weight(weight);
     return Scalar::of_float(type, a.f * (1 - w) + b.f * w);
@@ -91,7 +93,7 @@ Scalar eval_lerp(const Scalar& a, const Scalar& b, const Scalar& weight, Type ty
 
 // ---- others ----
 
-Scalar eval_saturating_cast(Type type, const Scalar& a) {
+Scalar saturated(Type type, const Scalar& a) {
   if (type == a.type) return a;
   if (type == Float(16)) {
     if (std::isnan(a.as_double())) return eval_cast(type, a);
@@ -106,135 +108,119 @@ Scalar eval_saturating_cast(Type type, const Scalar& a) {
   return negative ? Scalar::of_int(type, type.min_int()) : Scalar::of_uint(type, type.max_uint());
 }
 
-Scalar eval_count(Op op, const Scalar& a) {
-  const int bits = a.type.bits();
-  const uint64_t value = bits >= 64 ? a.u : a.u & (~uint64_t{0} >> (64 - bits));
-  int count = 0;
-  if (op == Op::popcount) {
-    count = std::popcount(value);
-  } else if (op == Op::count_leading_zeros) {
-    count = std::countl_zero(value) - (64 - bits);
-  } else {
-    count = value ? std::countr_zero(value) : bits;
-  }
-  return Scalar::of_int(a.type, count);
+uint64_t low_bits(const Scalar& a) {
+  return a.type.bits() >= 64 ? a.u : a.u & (~uint64_t{0} >> (64 - a.type.bits()));
+}
+Scalar count_ones(const Scalar& a) { return Scalar::of_int(a.type, std::popcount(low_bits(a))); }
+Scalar count_high_zeros(const Scalar& a) {
+  return Scalar::of_int(a.type, std::countl_zero(low_bits(a)) - (64 - a.type.bits()));
+}
+Scalar count_low_zeros(const Scalar& a) {
+  return Scalar::of_int(a.type, std::min(std::countr_zero(low_bits(a)), a.type.bits()));
 }
 
-double eval_unary_float(Op op, double x) {
-  switch (op) {
-    case Op::floor:
-      return std::floor(x);
-    case Op::ceil:
-      return std::ceil(x);
-    case Op::round:
-      return std::nearbyint(x);
-    case Op::trunc:
-      return std::trunc(x);
-    case Op::sqrt:
-      return std::sqrt(x);
-    case Op::exp:
-    case Op::fast_exp:
-      return std::exp(x);
-    case Op::log:
-    case Op::fast_log:
-      return std::log(x);
-    case Op::sin:
-    case Op::fast_sin:
-      return std::sin(x);
-    case Op::cos:
-    case Op::fast_cos:
-      return std::cos(x);
-    case Op::tan:
-      return std::tan(x);
-    case Op::asin:
-      return std::asin(x);
-    case Op::acos:
-      return std::acos(x);
-    case Op::atan:
-      return std::atan(x);
-    case Op::sinh:
-      return std::sinh(x);
-    case Op::cosh:
-      return std::cosh(x);
-    case Op::tanh:
-      return std::tanh(x);
-    case Op::asinh:
-      return std::asinh(x);
-    case Op::acosh:
-      return std::acosh(x);
-    case Op::atanh:
-      return std::atanh(x);
-    case Op::erf:
-      return std::erf(x);
-    case Op::fast_inverse:
-      return 1 / x;
-    case Op::fast_inverse_sqrt:
-      return 1 / std::sqrt(x);
-    default:
-      internal_error(text("no scalar meaning for operator ", op_info(op).name));
-  }
+// ---- the table ----
+
+struct NoValue {};
+constexpr NoValue no_value;
+
+Scalar result(Type type, double value) { return Scalar::of_float(type, value); }
+Scalar result(Type, bool value) { return Scalar::of_bool(value); }
+Scalar result(Type, const Scalar& value) { return value; }
+Scalar result(Type, NoValue) { internal_error("an operator without a scalar meaning"); }
+
+using enum OpClass;
+using enum BoundsRule;
+using enum Monotone;
+using enum Infinite;
+using enum Nan;
+using enum Levels;
+using enum PartialPoles;
+using enum Conduct;
+using Real = RealFacts;
+
+constexpr double inf = std::numeric_limits<double>::infinity();
+constexpr Values anything{-inf, inf}, positive{0, inf}, truth{0, 1};  // positive: or 0
+
+constexpr OpError exact{.kind = OpError::Kind::Exact};
+constexpr OpError arithmetic{.kind = OpError::Kind::Arithmetic};
+constexpr OpError library(double ulp_float32, double ulp_float64, int ulp_elsewhere = 4) {
+  return {OpError::Kind::Library, ulp_float32, ulp_float64, ulp_elsewhere};
+}
+constexpr OpError approximates(Op of) {
+  return {.kind = OpError::Kind::Approximates, .of = of};
 }
 
-Scalar eval_unary(Op op, const Scalar& a, Type type) {
-  switch (op) {
-    case Op::bitwise_not:
-      return Scalar::of_uint(a.type, ~a.u);
-    case Op::abs:
-      return a.type.is_float() ? Scalar::of_float(type, std::fabs(a.f))
-                               : Scalar::of_uint(type, magnitude(a));
-    case Op::is_nan:
-      return Scalar::of_bool(std::isnan(a.f));
-    case Op::is_inf:
-      return Scalar::of_bool(std::isinf(a.f));
-    case Op::is_finite:
-      return Scalar::of_bool(std::isfinite(a.f));
-    case Op::popcount:
-    case Op::count_leading_zeros:
-    case Op::count_trailing_zeros:
-      return eval_count(op, a);
-    case Op::saturating_cast:
-      return eval_saturating_cast(type, a);
-    default:
-      return Scalar::of_float(type, eval_unary_float(op, a.f));
-  }
-}
+constexpr Real same{Rises, StaysFinite, NoNan, NeverLevel, NoPoles, exact};
+constexpr Real steps = same;
+constexpr Real discrete{Turns, StaysFinite, NoNan, NeverLevel, NoPoles, exact};
 
-Scalar eval_two(Op op, const Scalar& a, const Scalar& b, Type type) {
-  switch (op) {
-    case Op::shift_left:
-      return shift(a, shift_amount(b));
-    case Op::shift_right:
-      return shift(a, -shift_amount(b));
-    case Op::absd:
-      return eval_absd(a, b, type);
-    case Op::pow:
-    case Op::fast_pow:
-      return Scalar::of_float(type, std::pow(a.f, b.f));
-    case Op::hypot:
-      return Scalar::of_float(type, std::hypot(a.f, b.f));
-    case Op::atan2:
-      return Scalar::of_float(type, std::atan2(a.f, b.f));
-    case Op::strong_mul:
-      return Scalar::of_float(type, a.f == 0 ? 0.0 : a.f * b.f);
-    case Op::strong_div:
-      return Scalar::of_float(type, a.f == 0 ? 0.0 : a.f / b.f);
-    default:
-      return eval_bitwise(op, a, b);
+constexpr Work no_work{0, 0, 0}, one_add{1, 0, 0}, two_adds{2, 0, 0}, function{0, 0, 1};
+
+constexpr OpInfo op_table[] = {
+#define RETROGRADE_OP(name, arity, cls, value, ...)                                     \
+  {#name, arity, cls,                                                                   \
+   []([[maybe_unused]] const Scalar& a, [[maybe_unused]] const Scalar& b,               \
+      [[maybe_unused]] const Scalar& c, [[maybe_unused]] Type type) -> Scalar {         \
+     [[maybe_unused]] const double x = a.f, y = b.f;                                    \
+     return result(type, value);                                                        \
+   },                                                                                   \
+   __VA_ARGS__},
+#include "ir/operators.def"
+    {"none", 0, Internal, [](const Scalar& a, const Scalar&, const Scalar&, Type) { return a; },
+     OfType, anything, discrete, no_work, Silent},
+};
+
+constexpr bool is_total() {
+  for (const OpInfo& row : op_table) {
+    if (unstated_column(row)) return false;
   }
+  return true;
 }
+static_assert(is_total(), "a row of operators.def leaves a column out");
 
 }  // namespace
 
-std::optional<Scalar> eval_operator(Op op, const Args& args, Type type) {
+const OpInfo& op_info(Op op) { return op_table[static_cast<int>(op)]; }
+
+Op op_from_name(const std::string& name) {
+  static const std::unordered_map<std::string_view, Op> by_name = [] {
+    std::unordered_map<std::string_view, Op> result;
+    for (int i = 0; i < op_count; ++i) result.emplace(op_table[i].name, static_cast<Op>(i));
+    return result;
+  }();
+  const auto found = by_name.find(name);
+  return found == by_name.end() ? Op::none : found->second;
+}
+
+int passed_operand(Op op) {
   const OpInfo& info = op_info(op);
-  if (info.cls == OpClass::Marker) return args.at(0);
-  if (info.cls != OpClass::Pure) return std::nullopt;
-  RETROGRADE_ASSERT(static_cast<int>(args.size()) == info.arity, info.name, " of ", args.size(),
-                    " arguments");
-  const Type scalar = type.element_of();
-  if (info.arity == 1) return eval_unary(op, args[0], scalar);
-  if (info.arity == 2) return eval_two(op, args[0], args[1], scalar);
-  return eval_lerp(args[0], args[1], args[2], scalar);
+  if (info.cls == Marker || info.bounds == OfFirst) return 0;
+  return info.bounds == OfSecond ? 1 : -1;
+}
+
+bool is_risky_op(Op op) {
+  const RealFacts& real = op_info(op).real;
+  return real.infinite == Explodes || real.infinite == Somewhere || real.nan == NanOutside;
+}
+
+bool acts(Op op) {
+  const Conduct conduct = op_info(op).conduct;
+  return conduct == Acts || conduct == ActsInPlace;
+}
+
+Op exact_form(Op op) {
+  const Op of = op_info(op).real.error.of;
+  return of == Op::none ? op : of;
+}
+
+std::optional<Scalar> eval_operator(Op op, const std::vector<Scalar>& args, Type type) {
+  const OpInfo& info = op_info(op);
+  if (info.cls != Pure && info.cls != Marker) return std::nullopt;
+  RETROGRADE_ASSERT(info.arity < 0 || static_cast<int>(args.size()) == info.arity, info.name,
+                    " of ", args.size(), " arguments");
+  const auto arg = [&](size_t i) { return i < args.size() ? args[i] : Scalar(); };
+  return info.value(arg(0), arg(1), arg(2), type.element_of());
 }
 
 }  // namespace retrograde::ir

@@ -117,14 +117,9 @@ bool has_effects(const Expr& e) {
   bool found = false;
   walk(e, [&](const Expr& node) {
     const Call* call = node.as<Call>();
-    if (call && call->call_type == CallType::Operator) {
-      OpClass cls = op_info(call->op).cls;
-      bool is_value = call->op == Op::random || call->op == Op::undef ||
-                      call->op == Op::if_then_else ||
-                      call->op == Op::trace;  // its event can be that of a vector
-      bool is_fact = call->op >= Op::buffer_host && call->op <= Op::buffer_is_query;
-      found |= (cls == OpClass::Effect || cls == OpClass::Internal) && !is_value && !is_fact;
-    }
+    // The event of a trace can be that of a vector.
+    found |= call && op_info(call->op).conduct != Conduct::Silent && !call->is_op(Op::undef) &&
+             !call->is_op(Op::trace);
     return !found;
   });
   return found;

@@ -27,9 +27,9 @@ class HashCons : public Rewriter {
 // Reporting an error is no value, and undef is any value.
 bool must_stay(const Expr& e) {
   const auto* call = e.as<Call>();
-  return call &&
-         (call->is_op(Op::error) || call->is_op(Op::runtime_call) || call->is_op(Op::undef) ||
-          call->is_op(Op::address_of) || call->is_op(Op::pack) || call->is_op(Op::trace));
+  if (!call || call->call_type != CallType::Operator) return false;
+  const Conduct conduct = op_info(call->op).conduct;
+  return conduct == Conduct::InPlace || conduct == Conduct::ActsInPlace;
 }
 
 // Cheaper to repeat than to name: leaves, and what costs no instruction on a leaf.

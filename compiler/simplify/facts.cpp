@@ -191,12 +191,6 @@ ConstantRange Facts::range_of_call(const Call& n) {
   const ConstantRange whole = ConstantRange::of(n.type);
   if (n.call_type != CallType::Operator) return whole;
   switch (n.op) {
-    case Op::likely:
-    case Op::likely_if_innermost:
-    case Op::strict_float:
-    case Op::stop_gradient:
-    case Op::memoize_tag:
-      return range(n.args[0]);
     case Op::promise_clamped:
     case Op::unsafe_promise_clamped:
       return intersection(range(n.args[0]), {range(n.args[1]).min, range(n.args[2]).max});
@@ -210,10 +204,8 @@ ConstantRange Facts::range_of_call(const Call& n) {
       return {0, n.type.bits()};
     case Op::if_then_else:
       return hull(range(n.args[1]), range(n.args[2]));
-    case Op::buffer_extent:
-    case Op::buffer_dimensions:
     default:
-      return whole;
+      return op_info(n.op).cls == OpClass::Marker ? range(n.args[0]) : whole;
   }
 }
 

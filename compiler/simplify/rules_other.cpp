@@ -216,12 +216,7 @@ bool has_effect(const Expr& e) {
   bool found = false;
   walk(e, [&](const Expr& node) {
     const auto* call = node.as<Call>();
-    if (call && call->call_type == CallType::Operator) {
-      found |= call->is_op(Op::print) || call->is_op(Op::print_when) || call->is_op(Op::require) ||
-               call->is_op(Op::buffer_set_bounds) || call->is_op(Op::error) ||
-               call->is_op(Op::prefetch) || call->is_op(Op::runtime_call) || call->is_op(Op::trace);
-    }
-    found |= call && call->call_type == CallType::Extern;
+    found |= call && (call->call_type == CallType::Extern || acts(call->op));
     return !found;
   });
   return found;

@@ -153,30 +153,16 @@ bool is_discrete(Op op) {
   return op == Op::floor || op == Op::ceil || op == Op::round || op == Op::trunc;
 }
 
-constexpr int fast_bits = 11;
-
-bool is_fast(Op op) {
-  switch (op) {
-    case Op::fast_exp:
-    case Op::fast_log:
-    case Op::fast_pow:
-    case Op::fast_sin:
-    case Op::fast_cos:
-    case Op::fast_inverse:
-    case Op::fast_inverse_sqrt:
-      return true;
-    default:
-      return false;
-  }
-}
+constexpr int fast_bits = 11;  // of the fast forms
 
 // Errors of the implementation itself, on exact operands.
 double own_error(Op op, Rounding rounding, const std::vector<Value>& args, const Scalar& result) {
   const double r = result.f;
   if (!std::isfinite(r)) return 0;
-  if (is_fast(op)) return std::ldexp(std::max(std::fabs(r), 1.0), -fast_bits);
-  const int ulps = math_ulps(op);
-  if (ulps > 0) return ulps * ulp(result.type, r);
+  const ir::OpError& error = op_info(op).real.error;
+  if (error.kind == ir::OpError::Kind::Approximates)
+    return std::ldexp(std::max(std::fabs(r), 1.0), -fast_bits);
+  if (error.kind == ir::OpError::Kind::Library) return error.ulp_elsewhere * ulp(result.type, r);
   if (op == Op::lerp) {
     return 2 * ulp(result.type, std::max(args[0].scalar.as_double(), args[1].scalar.as_double()));
   }
@@ -196,33 +182,6 @@ double ulp(Type type, double x) {
   if (!std::isfinite(x)) return 0;
   const int exponent = x == 0 ? min_exponent(type) : std::max(std::ilogb(x), min_exponent(type));
   return std::ldexp(1.0, exponent - mantissa_bits(type));
-}
-
-int math_ulps(Op op) {
-  switch (op) {
-    case Op::exp:
-    case Op::log:
-    case Op::hypot:
-    case Op::sin:
-    case Op::cos:
-    case Op::tan:
-    case Op::asin:
-    case Op::acos:
-    case Op::atan:
-    case Op::atan2:
-    case Op::sinh:
-    case Op::cosh:
-    case Op::tanh:
-    case Op::asinh:
-    case Op::acosh:
-    case Op::atanh:
-    case Op::erf:
-      return 4;
-    case Op::pow:
-      return 8;
-    default:
-      return 0;
-  }
 }
 
 Value apply_binary(Rounding rounding, Kind kind, const Value& a, const Value& b) {

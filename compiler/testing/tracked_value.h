@@ -23,7 +23,7 @@ namespace retrograde::oracle {
 enum class Rounding {
   Strict,       // no freedom: error stays 0
   Contraction,  // a * b + c may round once, also across a cast of the product to a narrower float;
-                // math functions differ by math_ulps
+                // math functions differ as their rows say
   Reordering,   // every rounding may happen elsewhere: sums reassociated, x / c as x * (1 / c)
 };
 
@@ -45,10 +45,6 @@ struct Value {
 
 // The distance between neighbouring numbers of a float type at x.
 double ulp(Type type, double x);
-
-// How many ULP a correct implementation of the operator may be off; 0 for exact ones. The fast_*
-// forms are stated as a relative error instead: 2^-fast_bits.
-int math_ulps(ir::Op op);
 
 // The operations of ir/scalar.h with errors carried along.
 Value apply_binary(Rounding rounding, ir::Kind kind, const Value& a, const Value& b);

@@ -88,6 +88,59 @@ TEST(DerivativeRules, EveryOperatorHasARuleOrAReason) {
     EXPECT_TRUE(has_derivative_rule(k));
 }
 
+TEST(DerivativeRules, AnOperatorWithoutARuleIsFound) {
+  EXPECT_THROW(derivative_rule(Op::none), InternalError);
+}
+
+// Partials over every combination of these, one operand or two, with the value.
+void for_each_partial(Op o, const std::vector<double>& samples,
+                      FunctionRef<void(const Env&, double value, double partial)> visit) {
+  const size_t arity = static_cast<size_t>(op_info(o).arity);
+  const Expr a = variable("x", Float(64)), b = variable("y", Float(64));
+  const Expr e = arity == 1 ? call_op(o, {a}) : call_op(o, {a, b});
+  for (double at_x : samples) {
+    for (double at_y : arity == 1 ? std::vector<double>{1} : samples) {
+      const Env env = arity == 1 ? Env{{"x", at_x}} : Env{{"x", at_x}, {"y", at_y}};
+      for (const auto& [name, partial] : gradient(e, env))
+        visit(env, eval(e, env).as_double(), partial);
+    }
+  }
+}
+
+// But the strong products, whose poles are those of other operators.
+bool is_function_of_numbers(Op o) {
+  return derivative_rule(o).cls == RuleClass::Smooth && op_info(o).arity <= 2 &&
+         o != Op::strong_mul && o != Op::strong_div;
+}
+
+TEST(DerivativeRules, PartialsArePolesWhereTheOperatorsRowSays) {
+  for (int i = 0; i < op_count; ++i) {
+    const Op o = static_cast<Op>(i);
+    if (!is_function_of_numbers(o)) continue;
+    bool found = false;
+    for_each_partial(o, {-100, -2.5, -1, -0.5, 0, 0.5, 1, 2.5, 100},
+                     [&](const Env&, double value, double partial) {
+                       found |= std::isfinite(value) && std::isinf(partial);
+                     });
+    EXPECT_EQ(found, op_info(o).real.poles != PartialPoles::NoPoles) << op_info(o).name;
+  }
+}
+
+TEST(DerivativeRules, ValuesLevelOffWhereTheOperatorsRowSays) {
+  for (int i = 0; i < op_count; ++i) {
+    const Op o = static_cast<Op>(i);
+    if (!is_function_of_numbers(o) || o == Op::saturating_cast) continue;  // to a narrower type only
+    bool found = false;
+    for_each_partial(o, {-inf, -2.5, -0.5, 0, 0.5, 2.5, inf},
+                     [&](const Env& env, double value, double partial) {
+                       bool is_infinite = false;
+                       for (const auto& [name, operand] : env) is_infinite |= std::isinf(operand);
+                       found |= is_infinite && std::isfinite(value) && partial == 0;
+                     });
+    EXPECT_EQ(found, levels_off(o)) << op_info(o).name;
+  }
+}
+
 // Points inside each operator's domain; every smooth operator must be listed.
 TEST(DerivativeRules, SmoothOperatorsAgreeWithCentralDifferences) {
   const std::map<Op, std::vector<Env>> points = {

@@ -53,6 +53,14 @@ TEST_F(StrongZeros, ASelectInTheConsumerGuardsAChainOfFuncs) {
   expect(f, a, {3, 1, std::log(4.0f) / 4 + 0.5f, 3});
 }
 
+TEST_F(StrongZeros, AProductThatOverflowsIntoASaturatingCast) {
+  set(a, {1e30f, 1, 2, 3});
+  set(b, {1, 1, 1, 1});
+  Func f("f");
+  f(x) = cast<float>(saturating_cast(Float(16), a(x) * a(x) * b(x)));
+  expect(f, b, {0, 1, 4, 9});
+}
+
 TEST_F(StrongZeros, InfiniteAndNaNInputsOfAnUnselectedFunc) {
   set(a, {inf, nan, 2, -inf});
   Func square("square"), f("f");

@@ -215,13 +215,13 @@ void check_widths(Op op, const std::vector<int>& widths, const Target& target) {
 
 TEST(CodegenMath, ErrorsOfFloat32AreAsTheTableSays) {
   for (const MathFunction& function : codegen::math_functions) {
-    check_errors<float>(function, function.max_ulp_float32);
+    check_errors<float>(function, op_info(function.op).real.error.ulp_float32);
   }
 }
 
 TEST(CodegenMath, ErrorsOfFloat64AreAsTheTableSays) {
   for (const MathFunction& function : codegen::math_functions) {
-    check_errors<double>(function, function.max_ulp_float64);
+    check_errors<double>(function, op_info(function.op).real.error.ulp_float64);
   }
 }
 
@@ -325,6 +325,31 @@ TEST(CodegenMath, EveryOperatorHasCode) {
       args.push_back(make_load(type, "in", k));
     f.body = make_store("out", call_op(op, is_test ? Bool() : type, args), 0);
     EXPECT_NO_THROW(compile_test(f)) << info.name;
+  }
+}
+
+TEST(CodegenMath, AnOperatorWithoutCodeIsRefused) {
+  LoweredFunction f;
+  f.name = "added";
+  f.args = {input("in", Float(32)), output("out", Float(32))};
+  const Expr added(new Call(Float(32), CallType::Operator, Op::none, "added",
+                            {make_load(Float(32), "in", 0)}, 0, {}));
+  f.body = make_store("out", added, 0);
+  EXPECT_THROW(compile_test(f), InternalError);
+}
+
+TEST(CodegenMath, TablesOfFunctionsHoldTheOperatorsWhoseRowsSaySo) {
+  const auto holds = [](const auto& functions, Op op) {
+    return std::any_of(std::begin(functions), std::end(functions),
+                       [&](const auto& function) { return function.op == op; });
+  };
+  for (int i = 0; i < op_count; i++) {
+    const Op op = static_cast<Op>(i);
+    const OpError::Kind kind = op_info(op).real.error.kind;
+    EXPECT_EQ(holds(codegen::math_functions, op), kind == OpError::Kind::Library)
+        << op_info(op).name;
+    EXPECT_EQ(holds(codegen::fast_functions, op), kind == OpError::Kind::Approximates)
+        << op_info(op).name;
   }
 }
 
