@@ -34,7 +34,7 @@ double largest_of(Type type) {
          : type.is_bfloat()  ? 0x1.fep127
                              : 65504;
 }
-Partial strong(Expr e) { return {std::move(e), Strength::Strong}; }
+Partial strong(Expr e) { return {std::move(e)}; }
 Partial plain(Expr e) { return {std::move(e), Strength::Plain}; }
 Partial quotient(Expr e, Expr divisor) {
   return {std::move(e), Strength::Strong, std::move(divisor)};

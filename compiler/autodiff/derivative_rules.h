@@ -17,9 +17,9 @@ enum class RuleClass : uint8_t {
   NoRule,       // no derivative; `convention` says why. Reaching one with an adjoint is an error.
 };
 
-// How a partial meets the adjoint.
+// How a partial meets the adjoint: strongly, unless nothing infinite can meet a zero.
 enum class Strength : uint8_t {
-  Plain,   // finite wherever the operands are
+  Plain,   // finite wherever the operands are, says the rule; the sweeps look at the operands, too
   Strong,  // may be infinite or NaN where the primal is finite: an adjoint of 0 makes the product 0
   Cut,     // the adjoint may be infinite (it passed a pole): a partial of 0 makes the product 0
   Both,    // Strong and Cut
@@ -27,7 +27,7 @@ enum class Strength : uint8_t {
 
 struct Partial {
   Expr factor;  // undefined: this operand gets nothing
-  Strength strength = Strength::Plain;
+  Strength strength = Strength::Strong;
   // The partial is factor / divisor; undefined: 1. The adjoint is divided before it is multiplied:
   // 1 / y may overflow where adjoint / y, an adjoint itself, does not.
   Expr divisor = {};

@@ -52,7 +52,8 @@ LocalDerivative sum_of(const std::vector<Expr>& operands, std::vector<Partial> p
     for (const Expr& part : {p.factor, p.divisor}) {
       if (part.defined()) partial.add(facts.finiteness_of(part));
     }
-    if (partial.risky) p.strength = Strength::Strong;
+    const bool is_weak = p.strength == Strength::Plain && !partial.risky;
+    p.strength = is_weak ? Strength::Plain : Strength::Strong;
     partial.risky |= p.divisor.defined();
     result.factors.push_back(partial);
   }

@@ -11,7 +11,7 @@ namespace {
 constexpr size_t most_terms = 4;
 }
 
-Partial strong(Expr factor) { return {std::move(factor), Strength::Strong}; }
+Partial strong(Expr factor) { return {std::move(factor)}; }
 
 const Call* as_operator(const Expr& e, Op op) {
   const auto* call = e.as<Call>();
