@@ -71,13 +71,12 @@ class Direction {
   }
 
   Monotonic constant_or_unknown(const Expr& e) const {
-    bool reads = false;  // what a Func holds may change from one iteration to the next
-    walk(e, [&](const Expr& node) {
+    // What a Func holds may change from one iteration to the next.
+    const bool reads = any_node(e, [](const Expr& node) {
       const Call* call = node.as<Call>();
-      reads |= (call && call->call_type == CallType::Func) || node.kind() == Kind::Load;
-      return !reads;
+      return (call && call->call_type == CallType::Func) || node.kind() == Kind::Load;
     });
-    bool is_constant = !reads && !uses_variable(e, variable_);
+    const bool is_constant = !reads && !uses_variable(e, variable_);
     return is_constant ? Monotonic::Constant : Monotonic::Unknown;
   }
 

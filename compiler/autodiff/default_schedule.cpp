@@ -7,6 +7,7 @@
 #include "autodiff/cost_estimate.h"
 #include "autodiff/read_estimate.h"
 #include "autodiff/regions.h"
+#include "autodiff/update_context.h"
 #include "diagnostics/large_stack.h"
 #include "frontend/rdom.h"
 #include "frontend/stage.h"
@@ -15,6 +16,7 @@
 #include "graph/wrappers.h"
 #include "ir/build.h"
 #include "ir/equal.h"
+#include "ir/memory_reads.h"
 #include "ir/visit.h"
 
 namespace retrograde::ir {
@@ -211,16 +213,10 @@ class Chooser {
     if (stage.rvars.empty() || stage.args.empty()) return false;
     auto extent = as_const_int(stage.rvars[0].extent);
     if (extent && *extent < lanes) return false;
-    bool by_data = false;
-    walk(stage.args[0], [&](const Expr& e) {
-      const auto* call = e.as<Call>();
-      by_data |= call && call->call_type != CallType::Operator;
-      return !by_data;
-    });
-    if (!by_data) return false;
+    if (!depends_on_data(stage.args[0])) return false;
     return std::all_of(stage.values.begin(), stage.values.end(), [&](const Expr& value) {
       const auto* sum = value.as<Add>();
-      return sum && as_self(sum->a, f, stage) && !reads(sum->b, f);
+      return sum && as_self(sum->a, f, stage) && !calls(sum->b, &f);
     });
   }
   static bool as_self(const Expr& e, const FuncContents& f, const Definition& stage) {
@@ -228,15 +224,6 @@ class Chooser {
     return call && call->symbol.raw() == &f &&
            std::equal(call->args.begin(), call->args.end(), stage.args.begin(), stage.args.end(),
                       [](const Expr& a, const Expr& b) { return equal(a, b); });
-  }
-  static bool reads(const Expr& e, const FuncContents& f) {
-    bool found = false;
-    walk(e, [&](const Expr& node) {
-      const auto* call = node.as<Call>();
-      found |= call && call->symbol.raw() == &f;
-      return !found;
-    });
-    return found;
   }
 
   const std::vector<FuncPtr>& outputs_;

@@ -9,6 +9,7 @@
 #include "autodiff/regions.h"
 #include "diagnostics/error.h"
 #include "ir/build.h"
+#include "ir/memory_reads.h"
 #include "ir/visit.h"
 #include "simplify/simplify.h"
 
@@ -64,16 +65,6 @@ isl::map tidy(const isl::map& m) {
   if (isl_map_n_basic_map(m.get()) <= 1) return m;
   const isl::map result = coalesced_soon(m).value_or(m);
   return isl_map_n_basic_map(result.get()) <= many_pieces ? result : hull_of(m);
-}
-
-bool reads_func(const Expr& e, const Symbol* f) {
-  bool found = false;
-  walk(e, [&](const Expr& node) {
-    const auto* call = node.as<Call>();
-    found |= call && call->call_type == CallType::Func && call->symbol.raw() == f;
-    return !found;
-  });
-  return found;
 }
 
 // One read, with the conditions under which it counts.
@@ -275,8 +266,8 @@ class Composer {
     for_each_self_read(f, update, [&](const Call& call) {
       for (size_t d = 0; d < f.args.size(); ++d) result |= !equal(call.args[d], update.args[d]);
     });
-    for (const Expr& arg : update.args) result |= reads_func(arg, &f);
-    if (update.predicate.defined()) result |= reads_func(update.predicate, &f);
+    for (const Expr& arg : update.args) result |= calls(arg, &f);
+    result |= calls(update.predicate, &f);
     return result;
   }
   static bool keeps(const FuncContents& f, size_t d) {

@@ -55,13 +55,10 @@ isl::pw_aff IslBridge::parameter(const Expr& e) {
 }
 
 bool IslBridge::mentions_dim(const Expr& e) const {
-  bool found = false;
-  walk(e, [&](const Expr& node) {
+  return any_node(e, [&](const Expr& node) {
     const auto* v = node.as<Variable>();
-    found |= v && std::find(dims_.begin(), dims_.end(), v->name) != dims_.end();
-    return !found;
+    return v && std::find(dims_.begin(), dims_.end(), v->name) != dims_.end();
   });
-  return found;
 }
 
 namespace {
@@ -72,14 +69,11 @@ bool wraps(Type t) { return !t.is_int() || t.bits() < 32; }
 // Parameters come back as int32, of which wider data have no counterpart.
 bool is_wide(Type t) { return t.bits() > 32 || (t.is_uint() && t.bits() == 32); }
 bool has_wide_data(const Expr& e) {
-  bool found = false;
-  walk(e, [&](const Expr& node) {
+  return any_node(e, [&](const Expr& node) {
     const auto* call = node.as<Call>();
     const bool is_data = node.as<Variable>() || (call && call->call_type != CallType::Operator);
-    found |= is_data && is_wide(node.type());
-    return !found;
+    return is_data && is_wide(node.type());
   });
-  return found;
 }
 
 // Whether numbers of such operands are those of isl.

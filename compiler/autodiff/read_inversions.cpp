@@ -12,12 +12,9 @@ namespace retrograde::ir {
 namespace {
 
 bool chooses(const Expr& index) {
-  bool found = false;
-  walk(index, [&](const Expr& e) {
-    found |= e.as<Min>() || e.as<Max>() || e.as<Select>();
-    return !found;
+  return any_node(index, [&](const Expr& e) {
+    return e.as<Min>() || e.as<Max>() || e.as<Select>();
   });
-  return found;
 }
 
 // Where the adjoint may be other than 0; undefined: not known.

@@ -11,6 +11,7 @@
 #include "graph/function.h"
 #include "ir/build.h"
 #include "ir/equal.h"
+#include "ir/memory_reads.h"
 #include "ir/variables.h"
 #include "ir/visit.h"
 
@@ -51,24 +52,11 @@ class Finder {
     return std::equal(call.args.begin(), call.args.end(), definition_.args.begin(),
                       [](const Expr& a, const Expr& b) { return equal(a, b); });
   }
-  bool reads_f(const Expr& e) const {
-    bool found = false;
-    walk(e, [&](const Expr& node) {
-      const auto* call = node.as<Call>();
-      found |= call && call->call_type == CallType::Func && call->symbol.raw() == f_.get();
-      return !found;
-    });
-    return found;
-  }
   bool reads_own_point(const Expr& e) const {
-    bool own = true;
-    walk(e, [&](const Expr& node) {
+    return !any_node(e, [&](const Expr& node) {
       const auto* call = node.as<Call>();
-      if (call && call->call_type == CallType::Func && call->symbol.raw() == f_.get())
-        own &= at_write(*call);
-      return own;
+      return call && call->symbol.raw() == f_.get() && !at_write(*call);
     });
-    return own;
   }
 
   std::optional<Choice> as_choice(const Expr& e, int k) const {
@@ -79,8 +67,8 @@ class Finder {
   }
   // condition ? a : b, one of which is the old value.
   std::optional<Choice> pick(const Expr& condition, const Expr& a, const Expr& b, int k) const {
-    if (is_self(a, k) && !reads_f(b)) return Choice{logical_not(condition), b};
-    if (is_self(b, k) && !reads_f(a)) return Choice{condition, a};
+    if (is_self(a, k) && !calls(b, f_.get())) return Choice{logical_not(condition), b};
+    if (is_self(b, k) && !calls(a, f_.get())) return Choice{condition, a};
     return std::nullopt;
   }
 

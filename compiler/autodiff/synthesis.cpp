@@ -130,10 +130,9 @@ class Synthesis {
   bool reads_active(const Definition& definition) const {
     bool found = false;
     for_each_expr(definition, [&](const Expr& root) {
-      walk(root, [&](const Expr& e) {
+      found = found || any_node(root, [&](const Expr& e) {
         Symbol* symbol = e.as<Call>() || e.as<Variable>() ? symbol_of(e) : nullptr;
-        found |= symbol && active_.contains(symbol);
-        return !found;
+        return symbol && active_.contains(symbol);
       });
     });
     return found;

@@ -11,6 +11,7 @@
 #include "graph/define.h"
 #include "graph/function.h"
 #include "ir/build.h"
+#include "ir/memory_reads.h"
 #include "ir/variables.h"
 
 namespace retrograde::ir {
@@ -23,17 +24,6 @@ FuncPtr new_func(const std::string& name) {
   auto f = make_func(Role::Tangent);
   f->name = claim_name(name);
   return f;
-}
-
-bool calls(const Expr& e, const Symbol* f) {
-  bool found = false;
-  if (!e.defined()) return false;
-  walk(e, [&](const Expr& node) {
-    const auto* call = node.as<Call>();
-    found |= call && call->call_type == CallType::Func && call->symbol.raw() == f;
-    return !found;
-  });
-  return found;
 }
 
 // One definition linearised. Reads of the Func's own tangent are reads of `own`.
@@ -272,12 +262,9 @@ class TangentSynthesis {
       case ExternArgument::Kind::Expr:
         break;
     }
-    bool found = false;
-    walk(a.expr, [&](const Expr& e) {
-      found |= is_leaf(e) && e.type().is_float() && tangent_of_leaf(e).defined();
-      return !found;
+    return any_node(a.expr, [&](const Expr& e) {
+      return is_leaf(e) && e.type().is_float() && tangent_of_leaf(e).defined();
     });
-    return found;
   }
 
   void refuse_active(const FuncContents& f) const {

@@ -12,12 +12,9 @@ namespace retrograde::ir {
 namespace {
 
 bool has_operators(const Expr& e) {
-  bool found = false;
-  walk(e, [&](const Expr& node) {
-    found |= node.as<Call>() != nullptr;
-    return !found;
+  return any_node(e, [&](const Expr& node) {
+    return node.as<Call>() != nullptr;
   });
-  return found;
 }
 
 }  // namespace

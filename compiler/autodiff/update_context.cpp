@@ -16,16 +16,6 @@ const Call* as_call_of(const Expr& e, const FuncContents* f) {
   return call && call->call_type == CallType::Func && call->symbol.raw() == f ? call : nullptr;
 }
 
-bool calls(const Expr& e, const FuncContents* f) {
-  bool found = false;
-  if (!e.defined()) return false;
-  walk(e, [&](const Expr& node) {
-    found |= as_call_of(node, f) != nullptr;
-    return !found;
-  });
-  return found;
-}
-
 bool same_args(const std::vector<Expr>& a, const std::vector<Expr>& b) {
   return a.size() == b.size() &&
          std::equal(a.begin(), a.end(), b.begin(),
@@ -33,13 +23,10 @@ bool same_args(const std::vector<Expr>& a, const std::vector<Expr>& b) {
 }
 
 bool depends_on_data(const Expr& e) {
-  bool found = false;
-  walk(e, [&](const Expr& node) {
+  return any_node(e, [&](const Expr& node) {
     const auto* call = node.as<Call>();
-    found |= call && call->call_type != CallType::Operator;
-    return !found;
+    return call && call->call_type != CallType::Operator;
   });
-  return found;
 }
 
 std::string point_text(const std::string& name, const std::vector<Expr>& args) {
@@ -61,12 +48,10 @@ IterationDomain restricted(IterationDomain domain, const Expr& condition) {
 namespace {
 
 bool mentions_undef(const Expr& e) {
-  bool found = false;
-  walk(e, [&](const Expr& node) {
+  return any_node(e, [](const Expr& node) {
     const Call* call = node.as<Call>();
-    return !(found |= call && call->is_op(Op::undef));
+    return call && call->is_op(Op::undef);
   });
-  return found;
 }
 
 // A value, and where it does not come from an undef.

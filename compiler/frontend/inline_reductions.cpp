@@ -117,11 +117,9 @@ Expr smallest(Type type) {
 // The update must run over the whole domain even when the body uses only part of its variables, or
 // none.
 Expr mention_domain(const Expr& e, const Reduction& reduction) {
-  bool mentioned = false;
-  ir::walk(e, [&](const Expr& part) {
+  const bool mentioned = ir::any_node(e, [&](const Expr& part) {
     const ir::Variable* v = part.as<ir::Variable>();
-    mentioned = mentioned || (v && v->symbol.raw() == reduction.domain.get());
-    return !mentioned;
+    return v && v->symbol.raw() == reduction.domain.get();
   });
   if (mentioned) return e;
   const RVar r(reduction.domain, 0);

@@ -16,6 +16,7 @@
 #include "graph/define.h"
 #include "graph/wrappers.h"
 #include "ir/build.h"
+#include "ir/memory_reads.h"
 #include "ir/print.h"
 #include "ir/variables.h"
 #include "ir/visit.h"
@@ -135,15 +136,8 @@ class SeveralPoints {
   }
 
   bool reads_itself(const std::vector<Expr>& exprs) const {
-    bool found = false;
-    for (const Expr& root : exprs) {
-      walk(root, [&](const Expr& e) {
-        const auto* call = e.as<Call>();
-        found = found || (call && call->symbol.raw() == f_.get());
-        return !found;
-      });
-    }
-    return found;
+    return std::any_of(exprs.begin(), exprs.end(),
+                       [&](const Expr& e) { return calls(e, f_.get()); });
   }
 
   void read_what_was_before() {

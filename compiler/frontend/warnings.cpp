@@ -14,6 +14,7 @@
 #include "diagnostics/error.h"
 #include "graph/wrappers.h"
 #include "ir/build.h"
+#include "ir/memory_reads.h"
 #include "ir/print.h"
 #include "ir/visit.h"
 
@@ -25,16 +26,6 @@ bool is_undef(const Expr& e) {
   return call && call->is_op(Op::undef);
 }
 
-bool reads(const Expr& e, const FuncContents& f) {
-  bool found = false;
-  walk(e, [&](const Expr& part) {
-    const auto* call = part.as<Call>();
-    found = found || (call && call->call_type == CallType::Func && func_of(*call).get() == &f);
-    return !found;
-  });
-  return found;
-}
-
 // Whether it stores every element anew, whatever was there.
 bool overwrites_all(const FuncContents& f, const Definition& update) {
   if (update.predicate.defined() || !update.rvars.empty()) return false;
@@ -43,7 +34,7 @@ bool overwrites_all(const FuncContents& f, const Definition& update) {
     if (!variable || variable->name != f.args[d]) return false;
   }
   for (const Expr& value : update.values) {
-    if (is_undef(value) || reads(value, f)) return false;
+    if (is_undef(value) || calls(value, &f)) return false;
   }
   return true;
 }

@@ -178,15 +178,12 @@ Expr bind_random(const Expr& e, const std::vector<Expr>& point) {
 }
 
 bool has_random(const std::vector<Expr>& values) {
-  bool found = false;
-  for (const Expr& value : values) {
-    walk(value, [&](const Expr& e) {
-      const Call* call = e.as<Call>();
-      found = found || (call && call->is_op(Op::random));
-      return !found;
-    });
-  }
-  return found;
+  const auto is_random = [](const Expr& e) {
+    const Call* call = e.as<Call>();
+    return call && call->is_op(Op::random);
+  };
+  return std::any_of(values.begin(), values.end(),
+                     [&](const Expr& value) { return any_node(value, is_random); });
 }
 
 // FNV-1a: equal programs draw equal numbers, whatever was compiled before.

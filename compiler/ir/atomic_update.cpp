@@ -7,13 +7,10 @@
 namespace retrograde::ir {
 
 bool loads_from(const Expr& e, const std::string& buffer) {
-  bool found = false;
-  walk(e, [&](const Expr& node) {
+  return any_node(e, [&](const Expr& node) {
     const auto* load = node.as<Load>();
-    found |= load && load->name == buffer;
-    return !found;
+    return load && load->name == buffer;
   });
-  return found;
 }
 
 bool is_one_word(Type type) { return !type.is_handle() && type.bits() <= 64; }

@@ -22,13 +22,17 @@ MemoryReads kind_of(const Call& call) {
 }  // namespace
 
 bool reads_memory(const Expr& e, MemoryReads what) {
-  bool found = false;
-  walk(e, [&](const Expr& node) {
+  return any_node(e, [&](const Expr& node) {
     const auto* call = node.as<Call>();
-    found |= node.kind() == Kind::Load || (call && kind_of(*call) <= what);
-    return !found;
+    return node.kind() == Kind::Load || (call && kind_of(*call) <= what);
   });
-  return found;
+}
+
+bool calls(const Expr& e, const Symbol* f) {
+  return any_node(e, [&](const Expr& node) {
+    const auto* call = node.as<Call>();
+    return call && call->symbol.raw() == f;
+  });
 }
 
 }  // namespace retrograde::ir

@@ -14,4 +14,7 @@ enum class MemoryReads : uint8_t {
 };
 bool reads_memory(const Expr& e, MemoryReads what);
 
+// Whether it calls the Func, or reads the image. Undefined: no.
+bool calls(const Expr& e, const Symbol* f);
+
 }  // namespace retrograde::ir

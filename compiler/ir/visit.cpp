@@ -330,6 +330,30 @@ void walk(const Stmt& s, FunctionRef<bool(const Expr&)> enter_expr,
   Walker(enter_expr, enter_stmt).run(s);
 }
 
+bool any_node(const Expr& e, FunctionRef<bool(const Expr&)> holds) {
+  bool found = false;
+  if (e.defined()) walk(e, [&](const Expr& node) { return !(found = found || holds(node)); });
+  return found;
+}
+
+bool any_node(const Stmt& s, FunctionRef<bool(const Expr&)> expr_holds,
+              FunctionRef<bool(const Stmt&)> stmt_holds) {
+  bool found = false;
+  if (!s.defined()) return false;
+  walk(
+      s, [&](const Expr& node) { return !(found = found || expr_holds(node)); },
+      [&](const Stmt& node) { return !(found = found || stmt_holds(node)); });
+  return found;
+}
+
+bool any_stmt(const Stmt& s, FunctionRef<bool(const Stmt&)> holds) {
+  bool found = false;
+  const auto no_exprs = [](const Expr&) { return false; };
+  if (s.defined())
+    walk(s, no_exprs, [&](const Stmt& node) { return !(found = found || holds(node)); });
+  return found;
+}
+
 // ---- rewriting ----
 
 Expr Rewriter::operator()(const Expr& e) {
@@ -403,33 +427,24 @@ Stmt substitute(const Stmt& s, const std::string& name, const Expr& value) {
 
 // ---- uses ----
 
-namespace {
-
-template <class Tree, class Matches>
-bool uses_name(const Tree& tree, Matches matches) {
-  bool found = false;
-  const auto enter_expr = [&](const Expr& e) {
-    if (const auto* var = e.as<Variable>()) found |= matches(var->name);
-    return !found;
-  };
-  if constexpr (std::is_same_v<Tree, Expr>) {
-    walk(tree, enter_expr);
-  } else {
-    walk(tree, enter_expr, [&](const Stmt&) { return !found; });
-  }
-  return found;
-}
-
-}  // namespace
-
 bool uses_variable(const Expr& e, const std::string& name) {
-  return uses_name(e, [&](const std::string& other) { return other == name; });
+  return any_node(e, [&](const Expr& node) {
+    const auto* var = node.as<Variable>();
+    return var && var->name == name;
+  });
 }
 bool uses_variable(const Stmt& s, const std::string& name) {
-  return uses_name(s, [&](const std::string& other) { return other == name; });
+  const auto is_use = [&](const Expr& node) {
+    const auto* var = node.as<Variable>();
+    return var && var->name == name;
+  };
+  return any_node(s, is_use, [](const Stmt&) { return false; });
 }
 bool uses_any_variable(const Expr& e, const std::unordered_set<std::string>& names) {
-  return uses_name(e, [&](const std::string& other) { return names.count(other) > 0; });
+  return any_node(e, [&](const Expr& node) {
+    const auto* var = node.as<Variable>();
+    return var && names.contains(var->name);
+  });
 }
 
 std::string unique_name(const std::string& prefix) {

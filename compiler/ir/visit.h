@@ -93,6 +93,12 @@ void walk(const Expr& e, FunctionRef<bool(const Expr&)> enter);
 void walk(const Stmt& s, FunctionRef<bool(const Expr&)> enter_expr,
           FunctionRef<bool(const Stmt&)> enter_stmt);
 
+// Whether it holds of a node. Undefined trees have none.
+bool any_node(const Expr& e, FunctionRef<bool(const Expr&)> holds);
+bool any_node(const Stmt& s, FunctionRef<bool(const Expr&)> expr_holds,
+              FunctionRef<bool(const Stmt&)> stmt_holds);
+bool any_stmt(const Stmt& s, FunctionRef<bool(const Stmt&)> holds);  // looks at no expressions
+
 // A context-free rewriting, memoised by node identity. Derive, and override `rewrite` for the kinds
 // of interest, ending in `return children(e)`. Call the object on children to recurse.
 class Rewriter {

@@ -36,15 +36,8 @@ std::optional<int64_t> ChoiceArms::case_of(const Expr& e) const {
 }
 
 bool ChoiceArms::has_any(const Stmt& s) const {
-  bool found = false;
-  walk(
-      s,
-      [&](const Expr& e) {
-        found = found || case_of(e).has_value();
-        return !found;
-      },
-      [&](const Stmt&) { return !found; });
-  return found;
+  return any_node(
+      s, [&](const Expr& e) { return case_of(e).has_value(); }, [](const Stmt&) { return false; });
 }
 
 ChoiceArms::Table ChoiceArms::table_of(const Expr& choice) const {

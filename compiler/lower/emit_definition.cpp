@@ -88,30 +88,23 @@ Requirements requirements_of(const LoopedFunc& f, int stage, const StageNest& ne
 namespace {
 
 bool reads_memory(const Expr& e) {
-  bool found = false;
-  walk(e, [&](const Expr& part) {
+  return any_node(e, [&](const Expr& part) {
     const Call* call = part.as<Call>();
-    found = found ||
-            (call && (call->call_type == CallType::Func || call->call_type == CallType::Image));
-    return !found;
+    return call && (call->call_type == CallType::Func || call->call_type == CallType::Image);
   });
-  return found;
 }
 
 // Whether values that do not count could do harm: as coordinates, or outside of the pipeline.
 bool depends_on_every_value(const Definition& definition) {
   bool found = false;
   for_each_expr(definition, [&](const Expr& root) {
-    walk(root, [&](const Expr& e) {
+    found = found || any_node(root, [](const Expr& e) {
       const Call* call = e.as<Call>();
-      if (!call) return !found;
-      if (call->call_type == CallType::Operator) {
-        found = found || (op_info(call->op).cls == OpClass::Effect && !call->is_op(Op::random));
-      } else {
-        found = found || call->call_type == CallType::Extern ||
-                std::any_of(call->args.begin(), call->args.end(), reads_memory);
-      }
-      return !found;
+      if (!call) return false;
+      if (call->call_type == CallType::Operator)
+        return op_info(call->op).cls == OpClass::Effect && !call->is_op(Op::random);
+      return call->call_type == CallType::Extern ||
+             std::any_of(call->args.begin(), call->args.end(), reads_memory);
     });
   });
   return found;

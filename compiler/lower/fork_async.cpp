@@ -108,15 +108,10 @@ bool is_producer_of(const Stmt& s, const std::string& func) {
 }
 
 bool produces_any(const Stmt& s, const Names& funcs) {
-  bool found = false;
-  walk(
-      s, [](const Expr&) { return false; },
-      [&](const Stmt& part) {
-        const ProducerConsumer* n = as_producer(part);
-        found |= n && funcs.count(n->name);
-        return !found;
-      });
-  return found;
+  return any_stmt(s, [&](const Stmt& part) {
+    const ProducerConsumer* n = as_producer(part);
+    return n && funcs.count(n->name);
+  });
 }
 
 bool produces(const Stmt& s, const std::string& func) { return produces_any(s, {func}); }
@@ -342,14 +337,7 @@ class AsyncForker : public Rewriter {
     return has_form && is_semaphore_step(s, func);
   }
   static bool has_steps(const Stmt& s, const std::string& func) {
-    bool found = false;
-    walk(
-        s, [](const Expr&) { return false; },
-        [&](const Stmt& part) {
-          found |= is_step(part, func);
-          return !found;
-        });
-    return found;
+    return any_stmt(s, [&](const Stmt& part) { return is_step(part, func); });
   }
 
   // Each wait for the Func and each signal to it replaced; `s.defined()` need not hold of what

@@ -117,14 +117,7 @@ bool is_work(const Stmt& s) {
 }
 
 bool has_work(const Stmt& s) {
-  bool found = false;
-  walk(
-      s, [](const Expr&) { return false; },
-      [&](const Stmt& part) {
-        found |= is_work(part);
-        return !found;
-      });
-  return found;
+  return any_stmt(s, [](const Stmt& part) { return is_work(part); });
 }
 
 // Wraps the smallest statement that holds all work: behind the checks of arguments, where no bounds

@@ -43,30 +43,20 @@ Names stored_in(const Stmt& s) {
 
 // Whether the value changes when the element does: it reads the Func, or a let that does.
 bool depends_on(const Expr& e, const Names& buffers, const Names& lets) {
-  bool found = false;
-  walk(e, [&](const Expr& node) {
+  return any_node(e, [&](const Expr& node) {
     const Load* load = node.as<Load>();
     const Variable* variable = node.as<Variable>();
-    found |= (load && buffers.count(load->name)) || (variable && lets.count(variable->name));
-    return !found;
+    return (load && buffers.count(load->name)) || (variable && lets.count(variable->name));
   });
-  return found;
 }
 
 bool may_leave(const Stmt& s) {
-  bool found = false;
-  walk(
-      s,
-      [&](const Expr& e) {
-        const Call* call = e.as<Call>();
-        found |= call && call->is_op(Op::require);
-        return !found;
-      },
-      [&](const Stmt& part) {
-        found |= part.kind() == Kind::Assert;
-        return !found;
-      });
-  return found;
+  const auto requires_something = [](const Expr& e) {
+    const Call* call = e.as<Call>();
+    return call && call->is_op(Op::require);
+  };
+  return any_node(s, requires_something,
+                  [](const Stmt& part) { return part.kind() == Kind::Assert; });
 }
 
 using Lets = std::vector<std::pair<std::string, Expr>>;

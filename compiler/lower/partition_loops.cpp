@@ -58,15 +58,8 @@ constexpr int costly_border = 200;
 constexpr int nodes_an_operation = 64;
 
 bool contains_likely(const Stmt& s) {
-  bool found = false;
-  walk(
-      s,
-      [&](const Expr& e) {
-        found |= is_likely(e.as<Call>());
-        return !found;
-      },
-      [&](const Stmt&) { return !found; });
-  return found;
+  return any_node(
+      s, [](const Expr& e) { return is_likely(e.as<Call>()); }, [](const Stmt&) { return false; });
 }
 
 int node_count(const Stmt& s) {
@@ -78,15 +71,10 @@ int node_count(const Stmt& s) {
 }
 
 bool contains_loop(const Stmt& s) {
-  bool found = false;
-  walk(
-      s, [](const Expr&) { return false; },
-      [&](const Stmt& child) {
-        const For* loop = child.as<For>();
-        found |= loop && is_serial(*loop);
-        return !found;
-      });
-  return found;
+  return any_stmt(s, [](const Stmt& child) {
+    const For* loop = child.as<For>();
+    return loop && is_serial(*loop);
+  });
 }
 
 // "f" of the loop "f.s0.x" of its pure definition; else nothing.

@@ -20,9 +20,7 @@ bool is_undef(const Expr& e) {
 namespace {
 
 bool mentions_undef(const Expr& e) {
-  bool found = false;
-  walk(e, [&](const Expr& node) { return !(found |= is_undef(node)); });
-  return found;
+  return any_node(e, [](const Expr& node) { return is_undef(node); });
 }
 
 Expr both(const Expr& a, const Expr& b) {

@@ -49,11 +49,10 @@ bool has_room_of_its_own(const LoopedFunc& f) {
 bool reads_nothing(const Definition& definition) {
   bool reads = false;
   for_each_expr(definition, [&](const Expr& root) {
-    walk(root, [&](const Expr& e) {
+    reads = reads || any_node(root, [](const Expr& e) {
       const Call* call = e.as<Call>();
-      reads = reads || (call && (call->call_type != CallType::Operator ||
-                                 op_info(call->op).cls == OpClass::Effect));
-      return !reads;
+      return call && (call->call_type != CallType::Operator ||
+                      op_info(call->op).cls == OpClass::Effect);
     });
   });
   return !reads;

@@ -25,31 +25,24 @@ bool is_short(const For& loop, const Substitution& lets) {
 }
 
 bool contains_serial_loop(const Stmt& s) {
-  bool found = false;
   Substitution lets;
-  walk(
-      s, [](const Expr&) { return false; },
-      [&](const Stmt& part) {
-        if (const auto* let = part.as<LetStmt>(); let && let->value.type() == Int(32))
-          lets[let->name] = let->value;
-        const For* loop = part.as<For>();
-        found |= loop && is_serial(*loop) && !is_short(*loop, lets);
-        return !found;
-      });
-  return found;
+  return any_stmt(s, [&](const Stmt& part) {
+    if (const auto* let = part.as<LetStmt>(); let && let->value.type() == Int(32))
+      lets[let->name] = let->value;
+    const For* loop = part.as<For>();
+    return loop && is_serial(*loop) && !is_short(*loop, lets);
+  });
 }
 
 bool is_pure(const Expr& e) {
   if (!e.type().is_int_or_uint() || !e.type().is_scalar()) return false;
-  bool pure = true;
-  walk(e, [&](const Expr& node) {
+  return !any_node(e, [](const Expr& node) {
     const Call* call = node.as<Call>();
-    pure &= node.kind() != Kind::Load && node.kind() != Kind::Let;
-    pure &= !call ||
-            (call->call_type == CallType::Operator && op_info(call->op).cls != OpClass::Effect);
-    return pure;
+    const bool is_pure_call =
+        !call ||
+        (call->call_type == CallType::Operator && op_info(call->op).cls != OpClass::Effect);
+    return !is_pure_call || node.kind() == Kind::Load || node.kind() == Kind::Let;
   });
-  return pure;
 }
 
 std::unordered_set<std::string> variables_of(const Expr& e) {

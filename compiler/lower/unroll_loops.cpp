@@ -120,14 +120,10 @@ class Unroller : public Rewriter {
 }  // namespace
 
 Stmt unroll_loops(const Stmt& s) {
-  bool has_unrolled = false;
-  walk(
-      s, [](const Expr&) { return false; },
-      [&](const Stmt& node) {
-        const For* loop = node.as<For>();
-        has_unrolled |= loop && loop->for_type == ForType::Unrolled;
-        return !has_unrolled;
-      });
+  const bool has_unrolled = any_stmt(s, [](const Stmt& node) {
+    const For* loop = node.as<For>();
+    return loop && loop->for_type == ForType::Unrolled;
+  });
   return has_unrolled ? Unroller(s)(s) : s;
 }
 

@@ -273,20 +273,16 @@ class LoopVectorizer {
   // In what a branch has become: accesses that did not vary have no predicate, and loops are not
   // worth running for nobody.
   static bool needs_an_active_lane(const Stmt& branch) {
-    bool found = false;
-    walk(
+    return any_node(
         branch,
-        [&](const Expr& e) {
+        [](const Expr& e) {
           const Load* load = e.as<Load>();
-          found |= load && !load->predicate.defined();
-          return !found;
+          return load && !load->predicate.defined();
         },
-        [&](const Stmt& s) {
+        [](const Stmt& s) {
           const Store* store = s.as<Store>();
-          found |= s.kind() == Kind::For || (store && !store->predicate.defined());
-          return !found;
+          return s.kind() == Kind::For || (store && !store->predicate.defined());
         });
-    return found;
   }
 
   Stmt visit_allocate(const Stmt& s, const Allocate& n) {
@@ -298,13 +294,10 @@ class LoopVectorizer {
 
   // An event has no mask.
   bool tells_of_some_lanes(const Expr& e) {
-    bool found = false;
-    walk(e, [&](const Expr& node) {
-      const Call* call = node.as<Call>();
-      found |= call && call->is_op(Op::trace);
-      return !found;
-    });
-    return found && widen_.mask().defined();
+    return widen_.mask().defined() && any_node(e, [](const Expr& node) {
+             const Call* call = node.as<Call>();
+             return call && call->is_op(Op::trace);
+           });
   }
 
   // ---- stores ----
@@ -572,14 +565,10 @@ class Vectorizer : public Rewriter {
 }  // namespace
 
 Stmt vectorize_loops(const Stmt& s) {
-  bool has_vectorized = false;
-  walk(
-      s, [](const Expr&) { return false; },
-      [&](const Stmt& node) {
-        const For* loop = node.as<For>();
-        has_vectorized |= loop && loop->for_type == ForType::Vectorized;
-        return !has_vectorized;
-      });
+  const bool has_vectorized = any_stmt(s, [](const Stmt& node) {
+    const For* loop = node.as<For>();
+    return loop && loop->for_type == ForType::Vectorized;
+  });
   if (!has_vectorized) return s;
   Stmt result = Vectorizer(s)(s);
   return result.defined() ? result : make_evaluate(Expr(0));

@@ -114,15 +114,12 @@ Expr repeat_each(const Expr& v, int times) {
 }
 
 bool has_effects(const Expr& e) {
-  bool found = false;
-  walk(e, [&](const Expr& node) {
+  return any_node(e, [&](const Expr& node) {
     const Call* call = node.as<Call>();
     // The event of a trace can be that of a vector.
-    found |= call && op_info(call->op).conduct != Conduct::Silent && !call->is_op(Op::undef) &&
-             !call->is_op(Op::trace);
-    return !found;
+    return call && op_info(call->op).conduct != Conduct::Silent && !call->is_op(Op::undef) &&
+           !call->is_op(Op::trace);
   });
-  return found;
 }
 
 Widener::Widener(const std::string& variable, const Expr& min, int iterations, FreshNames& fresh)

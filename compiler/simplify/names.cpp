@@ -22,16 +22,13 @@ constexpr size_t max_opened_terms = 8;
 
 // Whether the value is the same wherever its name is in scope, and may be computed again there.
 bool is_steady(const Expr& value) {
-  bool steady = true;
-  walk(value, [&](const Expr& node) {
+  return !any_node(value, [](const Expr& node) {
     const auto* call = node.as<Call>();
     const bool may_change = call && (call->call_type != CallType::Operator ||
                                      op_info(call->op).cls == OpClass::Effect ||
                                      op_info(call->op).cls == OpClass::Internal);
-    steady = steady && !may_change && node.kind() != Kind::Load && node.kind() != Kind::Let;
-    return steady;
+    return may_change || node.kind() == Kind::Load || node.kind() == Kind::Let;
   });
-  return steady;
 }
 
 }  // namespace

@@ -213,13 +213,10 @@ Expr Simplifier::let(const Expr& e) {
 }
 
 bool has_effect(const Expr& e) {
-  bool found = false;
-  walk(e, [&](const Expr& node) {
+  return any_node(e, [&](const Expr& node) {
     const auto* call = node.as<Call>();
-    found |= call && (call->call_type == CallType::Extern || acts(call->op));
-    return !found;
+    return call && (call->call_type == CallType::Extern || acts(call->op));
   });
-  return found;
 }
 
 }  // namespace retrograde::ir

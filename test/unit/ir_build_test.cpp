@@ -189,6 +189,30 @@ TEST(Visit, EveryKindRebuildsWithItsChildren) {
   }
 }
 
+TEST(Visit, AnyNodeStopsAtTheFirst) {
+  Expr e = variable("x");
+  for (int i = 0; i < 64; ++i) e = e * e + 1;  // 2^64 paths
+  int visited = 0;
+  const auto is_sum = [&](const Expr& node) { return ++visited, node.kind() == Kind::Add; };
+  EXPECT_TRUE(any_node(e, is_sum));
+  EXPECT_EQ(visited, 1);
+  EXPECT_FALSE(any_node(e, [](const Expr& node) { return node.kind() == Kind::Load; }));
+  EXPECT_FALSE(any_node(Expr(), is_sum));
+}
+
+TEST(Visit, AnyStmtLooksAtNoExpressions) {
+  const Stmt loop =
+      make_for("i", 0, 8, ForType::Serial, make_store("out", variable("x"), variable("i")));
+  const auto is_store = [](const Stmt& s) { return s.kind() == Kind::Store; };
+  const auto is_x = [](const Expr& e) {
+    return e.as<Variable>() && e.as<Variable>()->name == "x";
+  };
+  EXPECT_TRUE(any_stmt(loop, is_store));
+  EXPECT_FALSE(any_stmt(loop, [](const Stmt& s) { return s.kind() == Kind::Assert; }));
+  EXPECT_TRUE(any_node(loop, is_x, [](const Stmt&) { return false; }));
+  EXPECT_FALSE(any_stmt(Stmt(), is_store));
+}
+
 TEST(Visit, UniqueNamesDiffer) { EXPECT_NE(unique_name("x"), unique_name("x")); }
 
 TEST(Target, RoundTripsThroughText) {
