@@ -9,7 +9,7 @@ namespace kernels {
 using namespace Halide;
 
 Kernel harris_corners(const Setup& setup) {
-  const int width = setup.size(2304, 203), height = setup.size(1536, 119);
+  const int width = setup.size(2304, 331), height = setup.size(1536, 119);
   ImageParam input(Float(32), 3, "input");
   Var x("x"), y("y"), tx("tx"), ty("ty");
 

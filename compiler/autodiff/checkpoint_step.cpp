@@ -9,9 +9,10 @@ namespace retrograde::ir {
 
 namespace {
 
-class Step {
+class CheckpointStep {
  public:
-  Step(const UpdateContext& context, const CheckpointPlan& plan, const CheckpointSlots& slots)
+  CheckpointStep(const UpdateContext& context, const CheckpointPlan& plan,
+                 const CheckpointSlots& slots)
       : c_(context), f_(context.f), plan_(plan), slots_(slots), elements_(slots.elements()) {}
 
   std::vector<SlotWrite> forward() const {
@@ -115,12 +116,12 @@ class Step {
 
 std::vector<SlotWrite> record_writes(const UpdateContext& context, const CheckpointPlan& plan,
                                      const CheckpointSlots& slots) {
-  return Step(context, plan, slots).forward();
+  return CheckpointStep(context, plan, slots).forward();
 }
 
 std::vector<SlotWrite> adjoint_writes(const UpdateContext& context, const CheckpointPlan& plan,
                                       const CheckpointSlots& slots) {
-  return Step(context, plan, slots).backward();
+  return CheckpointStep(context, plan, slots).backward();
 }
 
 }  // namespace retrograde::ir

@@ -124,12 +124,6 @@ void check_contributions(const FuncContents& f, const std::vector<AdjointContrib
   }
 }
 
-FuncPtr new_func(const std::string& name) {
-  auto f = make_func(Role::CustomRule);
-  f->name = claim_name(name);
-  return f;
-}
-
 std::vector<Expr> arguments(int n) {
   std::vector<Expr> args;
   for (int d = 0; d < n; ++d) args.push_back(variable("_" + std::to_string(d)));
@@ -139,7 +133,7 @@ std::vector<Expr> arguments(int n) {
 // `given` as an adjoint. Nothing is known of the rule: what it gives may be exactly 0 where the
 // partials of the input are infinite, and infinite where they are 0.
 FuncPtr as_adjoint(const std::string& name, const FuncPtr& given) {
-  FuncPtr result = new_func(name);
+  FuncPtr result = make_func(Role::CustomRule, name);
   result->made->traits = {.masked = true, .singular = true};
   std::vector<Expr> args = arguments(given->dimensions()), values;
   for (size_t k = 0; k < given->types.size(); ++k)
@@ -262,7 +256,7 @@ FuncPtr run_custom_tangent(const FuncPtr& f, FunctionRef<FuncPtr(const Symbol*)>
 
 FuncPtr zero_derivative(const Symbol& symbol, const std::string& suffix) {
   InputShape shape = shape_of(&symbol);
-  FuncPtr zero = new_func(shape.name + suffix);
+  FuncPtr zero = make_func(Role::CustomRule, shape.name + suffix);
   std::vector<Expr> values;
   for (Type t : shape.types)
     values.push_back(make_zero(t.is_float() ? adjoint_type(t) : Float(32)));

@@ -6,6 +6,7 @@
 #include "autodiff/explain_costs.h"
 #include "autodiff/gradient_lookup.h"
 #include "autodiff/leave_out.h"
+#include "autodiff/regions.h"
 #include "autodiff/synthesis.h"
 #include "graph/define.h"
 #include "ir/build.h"
@@ -16,27 +17,20 @@ namespace retrograde {
 
 namespace {
 
-std::string asked(const Func& output) { return "propagate adjoints from " + quoted(output.name()); }
+std::string asked_of_adjoints(const Func& output) {
+  return "propagate adjoints from " + quoted(output.name());
+}
 
-void check_output(const Func& output) {
+void check_loss(const Func& output) {
   if (!output.defined())
-    user_error(asked(output), "the output must be defined", "it has no definition",
+    user_error(asked_of_adjoints(output), "the output must be defined", "it has no definition",
                "Define it first");
   for (Type t : output.types()) {
     if (t.is_float()) return;
   }
-  user_error(asked(output), "only floating-point values have derivatives",
+  user_error(asked_of_adjoints(output), "only floating-point values have derivatives",
              "its type is " + to_string(output.types()[0]),
              "Convert it to float where the gradient starts");
-}
-
-ir::Box box_of(const Region& bounds) {
-  ir::Box box;
-  for (const Range& r : bounds) {
-    Expr min = ir::cast_to(Int(32), r.min);
-    box.push_back({min, ir::simplify(min + ir::cast_to(Int(32), r.extent) - 1)});
-  }
-  return box;
 }
 
 ir::CheckpointBudget budget_of(const AdjointOptions& options) {
@@ -89,12 +83,12 @@ Derivative run(const ir::Seed& seed, const AdjointOptions& options) {
 void check_dimensions(const Func& output, size_t bounds, int adjoint,
                       const std::string& adjoint_name) {
   if (static_cast<int>(bounds) != output.dimensions()) {
-    user_error(asked(output), "the output needs bounds in each of its dimensions",
+    user_error(asked_of_adjoints(output), "the output needs bounds in each of its dimensions",
                text("it has ", output.dimensions(), " dimensions and ", bounds, " bounds"),
                "Give min and extent of each dimension");
   }
   if (adjoint != output.dimensions()) {
-    user_error(asked(output), "an adjoint has the dimensions of its Func",
+    user_error(asked_of_adjoints(output), "an adjoint has the dimensions of its Func",
                text(quoted(adjoint_name), " has ", adjoint, " and ", quoted(output.name()), " has ",
                     output.dimensions()),
                "Define the adjoint over the same dimensions");
@@ -202,19 +196,19 @@ std::optional<double> GradientOperations::ratio() const {
 
 Derivative propagate_adjoints(const Func& output, const Func& adjoint, const Region& output_bounds,
                               const AdjointOptions& options) {
-  check_output(output);
+  check_loss(output);
   if (!adjoint.defined()) {
-    user_error(asked(output), "the adjoint must be defined",
+    user_error(asked_of_adjoints(output), "the adjoint must be defined",
                quoted(adjoint.name()) + " has no definition", "Define it before it is given");
   }
   check_dimensions(output, output_bounds.size(), adjoint.dimensions(), adjoint.name());
   if (adjoint.outputs() != output.outputs()) {
-    user_error(asked(output), "an adjoint has as many values as its Func",
+    user_error(asked_of_adjoints(output), "an adjoint has as many values as its Func",
                text(quoted(adjoint.name()), " has ", adjoint.outputs(), " and ",
                     quoted(output.name()), " has ", output.outputs()),
                "Define it as a Tuple of as many values, zeros for what does not count");
   }
-  ir::Seed seed{output.function(), box_of(output_bounds), {}};
+  ir::Seed seed{output.function(), ir::box_of(output_bounds), {}};
   for (size_t k = 0; k < output.types().size(); ++k) {
     seed.values.push_back(seed_value(
         output, k,
@@ -225,16 +219,16 @@ Derivative propagate_adjoints(const Func& output, const Func& adjoint, const Reg
 
 Derivative propagate_adjoints(const Func& output, const Buffer<float>& adjoint,
                               const AdjointOptions& options) {
-  check_output(output);
+  check_loss(output);
   if (!adjoint.defined())
-    user_error(asked(output), "the adjoint must be a defined Buffer", "it has no memory",
-               "Give it sizes: Buffer<float> adjoint(width, height)");
+    user_error(asked_of_adjoints(output), "the adjoint must be a defined Buffer",
+               "it has no memory", "Give it sizes: Buffer<float> adjoint(width, height)");
   check_dimensions(output, static_cast<size_t>(output.dimensions()), adjoint.dimensions(),
                    adjoint.name());
   Region region;
   for (int d = 0; d < adjoint.dimensions(); ++d)
     region.push_back({Expr(adjoint.min(d)), Expr(adjoint.extent(d))});
-  ir::Seed seed{output.function(), box_of(region), {}};
+  ir::Seed seed{output.function(), ir::box_of(region), {}};
   auto parameter = adjoint.parameter();
   Expr value = ir::call_image(parameter->name, parameter->type,
                               ir::variables_of(output.function()->args), ir::SymbolRef(parameter));
@@ -244,13 +238,15 @@ Derivative propagate_adjoints(const Func& output, const Buffer<float>& adjoint,
 }
 
 Derivative propagate_adjoints(const Func& output, const AdjointOptions& options) {
-  check_output(output);
+  check_loss(output);
   if (output.outputs() != 1) {
-    user_error(asked(output), "a scalar output has one value", text("it has ", output.outputs()),
+    user_error(asked_of_adjoints(output), "a scalar output has one value",
+               text("it has ", output.outputs()),
                "Give the adjoint of each value as a Tuple-valued Func");
   }
   if (output.dimensions() != 0) {
-    user_error(asked(output), "the gradient is that of a scalar, or of a sum with given weights",
+    user_error(asked_of_adjoints(output),
+               "the gradient is that of a scalar, or of a sum with given weights",
                text(quoted(output.name()), " has ", output.dimensions(), " dimensions"),
                "Sum its elements up in a Func without dimensions, as in loss() += f(r.x, r.y), or "
                "give the adjoint of each element: propagate_adjoints(f, adjoint, bounds)");

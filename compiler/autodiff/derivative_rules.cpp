@@ -20,7 +20,6 @@ using Args = const std::vector<Expr>&;
 using Partials = std::vector<Partial>;
 
 Expr num(const Expr& like, double value) { return make_const(like.type(), value); }
-Expr op1(Op op, const Expr& a) { return call_op(op, a.type(), {a}); }
 Expr square(const Expr& a) { return a * a; }
 Expr infinity(Type type) { return make_const(type, std::numeric_limits<double>::infinity()); }
 double smallest_normal_of(Type type) {
@@ -34,7 +33,6 @@ double largest_of(Type type) {
          : type.is_bfloat()  ? 0x1.fep127
                              : 65504;
 }
-Partial strong(Expr e) { return {std::move(e)}; }
 Partial plain(Expr e) { return {std::move(e), Strength::Plain}; }
 Partial quotient(Expr e, Expr divisor) {
   return {std::move(e), Strength::Strong, std::move(divisor)};
@@ -71,14 +69,14 @@ Partials power_partials(Args a, const Expr& v, Op power, Op logarithm) {
   const Expr &x = a[0], &p = a[1];
   Expr dx = p * call_op(power, x.type(), {x, p - num(p, 1)});
   if (!has_exact_predecessor(p)) {
-    Expr size = op1(Op::abs, v);
+    Expr size = call_op(Op::abs, {v});
     Expr lost = size < num(x, smallest_normal_of(x.type())) || size == infinity(x.type()) ||
-                op1(Op::abs, x) == infinity(x.type());
+                call_op(Op::abs, {x}) == infinity(x.type());
     dx = make_select(lost, dx, p * v / x);
   }
   if (is_zero(p)) dx = num(x, 0);
   if (!is_const(p)) dx = zero_where(p == num(p, 0), dx);
-  Expr dp = zero_where(x == num(x, 0), v * op1(logarithm, x));
+  Expr dp = zero_where(x == num(x, 0), v * call_op(logarithm, {x}));
   return {strong(dx), strong(dp)};
 }
 Partials pow_partials(Args a, const Expr& v) { return power_partials(a, v, Op::pow, Op::log); }
@@ -89,16 +87,16 @@ Partials hypot_partials(Args a, const Expr&) {
   std::vector<Expr> unit = unit_vector(a);
   return {strong(unit[0]), strong(unit[1])};
 }
-Partials sin_partials(Args a, const Expr&) { return {strong(op1(Op::cos, a[0]))}; }
-Partials cos_partials(Args a, const Expr&) { return {strong(-op1(Op::sin, a[0]))}; }
+Partials sin_partials(Args a, const Expr&) { return {strong(call_op(Op::cos, {a[0]}))}; }
+Partials cos_partials(Args a, const Expr&) { return {strong(-call_op(Op::sin, {a[0]}))}; }
 Partials tan_partials(Args a, const Expr& v) { return {strong(num(a[0], 1) + square(v))}; }
 // (1 - x)(1 + x) keeps the digits near the poles that 1 - x^2 loses.
 Expr one_minus_square(const Expr& x) { return (num(x, 1) - x) * (num(x, 1) + x); }
 Partials asin_partials(Args a, const Expr&) {
-  return {strong(num(a[0], 1) / op1(Op::sqrt, one_minus_square(a[0])))};
+  return {strong(num(a[0], 1) / call_op(Op::sqrt, {one_minus_square(a[0])}))};
 }
 Partials acos_partials(Args a, const Expr&) {
-  return {strong(num(a[0], -1) / op1(Op::sqrt, one_minus_square(a[0])))};
+  return {strong(num(a[0], -1) / call_op(Op::sqrt, {one_minus_square(a[0])}))};
 }
 Partials atan_partials(Args a, const Expr&) {
   return {strong(num(a[0], 1) / (num(a[0], 1) + square(a[0])))};
@@ -107,12 +105,12 @@ Partials atan2_partials(Args a, const Expr&) {
   const std::vector<Expr> gradient = angle_gradient(a[0], a[1]);
   return {strong(gradient[0]), strong(gradient[1])};
 }
-Partials sinh_partials(Args a, const Expr&) { return {strong(op1(Op::cosh, a[0]))}; }
-Partials cosh_partials(Args a, const Expr&) { return {strong(op1(Op::sinh, a[0]))}; }
+Partials sinh_partials(Args a, const Expr&) { return {strong(call_op(Op::cosh, {a[0]}))}; }
+Partials cosh_partials(Args a, const Expr&) { return {strong(call_op(Op::sinh, {a[0]}))}; }
 // 1 - v^2 has no digits left where v has rounded to 1: 4 e / (1 + e)^2 with e = exp(-2 |x|) keeps
 // them.
 Partials tanh_partials(Args a, const Expr&) {
-  Expr e = op1(Op::exp, num(a[0], -2) * op1(Op::abs, a[0]));
+  Expr e = call_op(Op::exp, {num(a[0], -2) * call_op(Op::abs, {a[0]})});
   return {strong(num(a[0], 4) * e / square(num(a[0], 1) + e))};
 }
 Partials asinh_partials(Args a, const Expr&) {
@@ -120,7 +118,8 @@ Partials asinh_partials(Args a, const Expr&) {
 }
 Partials acosh_partials(Args a, const Expr&) {
   const Expr& x = a[0];
-  return {strong(num(x, 1) / (op1(Op::sqrt, x - num(x, 1)) * op1(Op::sqrt, x + num(x, 1))))};
+  return {strong(num(x, 1) /
+                 (call_op(Op::sqrt, {x - num(x, 1)}) * call_op(Op::sqrt, {x + num(x, 1)})))};
 }
 Partials atanh_partials(Args a, const Expr&) {
   return {strong(num(a[0], 1) / one_minus_square(a[0]))};
@@ -129,14 +128,14 @@ Partials atanh_partials(Args a, const Expr&) {
 // exact: the rounding error of a large square would be a factor. Beyond 30 both are 0.
 Partials erf_partials(Args a, const Expr&) {
   const Expr& x = a[0];
-  Expr h = op1(Op::floor, x * num(x, 16)) / num(x, 16);
-  Expr rest = make_select(op1(Op::abs, x) < num(x, 30), (x - h) * (x + h), num(x, 0));
-  return {strong(num(x, 2 * std::numbers::inv_sqrtpi) * op1(Op::exp, -square(h)) *
-                 op1(Op::exp, -rest))};
+  Expr h = call_op(Op::floor, {x * num(x, 16)}) / num(x, 16);
+  Expr rest = make_select(call_op(Op::abs, {x}) < num(x, 30), (x - h) * (x + h), num(x, 0));
+  return {strong(num(x, 2 * std::numbers::inv_sqrtpi) * call_op(Op::exp, {-square(h)}) *
+                 call_op(Op::exp, {-rest}))};
 }
 Partials fast_log_partials(Args a, const Expr&) { return {quotient(num(a[0], 1), a[0])}; }
-Partials fast_sin_partials(Args a, const Expr&) { return {strong(op1(Op::fast_cos, a[0]))}; }
-Partials fast_cos_partials(Args a, const Expr&) { return {strong(-op1(Op::fast_sin, a[0]))}; }
+Partials fast_sin_partials(Args a, const Expr&) { return {strong(call_op(Op::fast_cos, {a[0]}))}; }
+Partials fast_cos_partials(Args a, const Expr&) { return {strong(-call_op(Op::fast_sin, {a[0]}))}; }
 Partials fast_inverse_partials(Args, const Expr& v) { return {strong(-square(v))}; }
 Partials fast_inverse_sqrt_partials(Args, const Expr& v) {
   return {strong(num(v, -0.5) * v * square(v))};
@@ -144,7 +143,7 @@ Partials fast_inverse_sqrt_partials(Args, const Expr& v) {
 Partials saturating_cast_partials(Args a, const Expr& v) {
   Expr inside = cast_to(a[0].type(), v) == a[0];
   if (v.type().can_represent(a[0].type())) return {plain(make_one(v.type()))};
-  if (v.type().is_float()) inside = op1(Op::abs, a[0]) <= num(a[0], largest_of(v.type()));
+  if (v.type().is_float()) inside = call_op(Op::abs, {a[0]}) <= num(a[0], largest_of(v.type()));
   return {plain(make_select(inside, make_one(v.type()), make_zero(v.type())))};
 }
 Partials strong_mul_partials(Args a, const Expr&) { return {strong(a[1]), strong(a[0])}; }
@@ -164,14 +163,15 @@ Partials div_partials(Args a, const Expr& v) {
   return {quotient(num(a[0], 1), a[1]), quotient(-v, a[1])};
 }
 Partials mod_partials(Args a, const Expr&) {
-  return {plain(make_one(a[0].type())), strong(-op1(Op::floor, a[0] / a[1]))};
+  return {plain(make_one(a[0].type())), strong(-call_op(Op::floor, {a[0] / a[1]}))};
 }
 DerivativeRule smooth(PartialsFn partials, const char* domain, const char* convention,
                       const char* formula, const char* infinities, int max_ulp,
                       const char* source = "[GW] table 2.1") {
-  return {RuleClass::Smooth, partials, -1, domain, convention, source, formula, infinities, max_ulp};
+  return {RuleClass::Smooth, partials,   -1,     domain, convention, source,
+          formula,           infinities, max_ulp};
 }
-DerivativeRule constant(const char* convention) {
+DerivativeRule constant_rule(const char* convention) {
   return {RuleClass::Constant,           nullptr,    -1,
           "everywhere but at the steps", convention, "definition"};
 }
@@ -188,18 +188,16 @@ constexpr const char* approximated = "that of the function it approximates";
 OpTable smooth_operators() {
   return {
       {Op::abs, smooth(abs_partials, "x != 0", "0 at 0", "sign(x)", "-1 and 1", 0)},
-      {Op::absd,
-       smooth(absd_partials, "a != b", "0 where a == b", "sign(x - y), -sign(x - y)",
-              "-1 and 1; 0 for equal infinities", 0)},
+      {Op::absd, smooth(absd_partials, "a != b", "0 where a == b", "sign(x - y), -sign(x - y)",
+                        "-1 and 1; 0 for equal infinities", 0)},
       {Op::lerp,
        smooth(lerp_partials, "everywhere", "floating weights; integer weights are constants",
               "1 - w, w, y - x", "infinite or NaN, as the value", 1, "definition")},
       {Op::sqrt,
        smooth(sqrt_partials, "x > 0", "+inf at 0 (-inf at -0), times a strong zero; NaN below 0",
               "1 / (2 v)", "0 at +inf", 2)},
-      {Op::exp,
-       smooth(exp_partials, "everywhere", "inf where exp overflows", "v", "0 at -inf, inf at +inf",
-              1)},
+      {Op::exp, smooth(exp_partials, "everywhere", "inf where exp overflows", "v",
+                       "0 at -inf, inf at +inf", 1)},
       {Op::log,
        smooth(log_partials, "x > 0", "inf at 0 (-inf at -0), 1/x below 0 where the primal is NaN",
               "1 / x", "0 at +inf", 1)},
@@ -215,46 +213,35 @@ OpTable smooth_operators() {
        smooth(sin_partials, "everywhere", "NaN at infinities", "cos x", "NaN, as the value", 1)},
       {Op::cos,
        smooth(cos_partials, "everywhere", "NaN at infinities", "-sin x", "NaN, as the value", 1)},
-      {Op::tan,
-       smooth(tan_partials, "x != pi/2 + k pi", "1 + tan^2, huge near the poles", "1 + v^2",
-              "NaN, as the value", 4)},
-      {Op::asin,
-       smooth(asin_partials, "|x| < 1", "inf at -1 and 1, NaN outside", "1 / sqrt((1 - x)(1 + x))",
-              "NaN, as the value", 3)},
-      {Op::acos,
-       smooth(acos_partials, "|x| < 1", "-inf at -1 and 1, NaN outside",
-              "-1 / sqrt((1 - x)(1 + x))", "NaN, as the value", 3)},
+      {Op::tan, smooth(tan_partials, "x != pi/2 + k pi", "1 + tan^2, huge near the poles",
+                       "1 + v^2", "NaN, as the value", 4)},
+      {Op::asin, smooth(asin_partials, "|x| < 1", "inf at -1 and 1, NaN outside",
+                        "1 / sqrt((1 - x)(1 + x))", "NaN, as the value", 3)},
+      {Op::acos, smooth(acos_partials, "|x| < 1", "-inf at -1 and 1, NaN outside",
+                        "-1 / sqrt((1 - x)(1 + x))", "NaN, as the value", 3)},
       {Op::atan, smooth(atan_partials, "everywhere", "0 at infinities", "1 / (1 + x^2)", "0", 3)},
-      {Op::atan2,
-       smooth(atan2_partials, "(y, x) != (0, 0)", "0 at the origin",
-              "y / r / r, -x / r / r with r = hypot(x, y), scaled",
-              "0 where an operand is infinite", 4, "[DLMF] 4.24")},
+      {Op::atan2, smooth(atan2_partials, "(y, x) != (0, 0)", "0 at the origin",
+                         "y / r / r, -x / r / r with r = hypot(x, y), scaled",
+                         "0 where an operand is infinite", 4, "[DLMF] 4.24")},
       {Op::sinh,
        smooth(sinh_partials, "everywhere", "inf where cosh overflows", "cosh x", "inf", 2)},
-      {Op::cosh,
-       smooth(cosh_partials, "everywhere", "inf where sinh overflows", "sinh x", "-inf and inf",
-              2)},
-      {Op::tanh,
-       smooth(tanh_partials, "everywhere", "0 at infinities",
-              "4 e / (1 + e)^2 with e = exp(-2 |x|)", "0", 6)},
-      {Op::asinh,
-       smooth(asinh_partials, "everywhere", "0 at infinities", "1 / hypot(x, 1)", "0", 2,
-              "[DLMF] 4.40")},
-      {Op::acosh,
-       smooth(acosh_partials, "x > 1", "inf at 1, NaN below", "1 / (sqrt(x - 1) sqrt(x + 1))",
-              "0 at +inf", 4, "[DLMF] 4.40")},
-      {Op::atanh,
-       smooth(atanh_partials, "|x| < 1",
-              "inf at -1 and 1; the formula outside, where the value is NaN",
-              "1 / ((1 - x)(1 + x))", "0, where the value is NaN", 3, "[DLMF] 4.40")},
-      {Op::erf,
-       smooth(erf_partials, "everywhere", "0 at infinities", "2 / sqrt(pi) exp(-x^2)", "0", 4,
-              "[DLMF] 7.2")},
+      {Op::cosh, smooth(cosh_partials, "everywhere", "inf where sinh overflows", "sinh x",
+                        "-inf and inf", 2)},
+      {Op::tanh, smooth(tanh_partials, "everywhere", "0 at infinities",
+                        "4 e / (1 + e)^2 with e = exp(-2 |x|)", "0", 6)},
+      {Op::asinh, smooth(asinh_partials, "everywhere", "0 at infinities", "1 / hypot(x, 1)", "0", 2,
+                         "[DLMF] 4.40")},
+      {Op::acosh, smooth(acosh_partials, "x > 1", "inf at 1, NaN below",
+                         "1 / (sqrt(x - 1) sqrt(x + 1))", "0 at +inf", 4, "[DLMF] 4.40")},
+      {Op::atanh, smooth(atanh_partials, "|x| < 1",
+                         "inf at -1 and 1; the formula outside, where the value is NaN",
+                         "1 / ((1 - x)(1 + x))", "0, where the value is NaN", 3, "[DLMF] 4.40")},
+      {Op::erf, smooth(erf_partials, "everywhere", "0 at infinities", "2 / sqrt(pi) exp(-x^2)", "0",
+                       4, "[DLMF] 7.2")},
       {Op::fast_exp, smooth(exp_partials, "as exp", approximated, "exp's, with v", "as exp", -1)},
       {Op::fast_log, smooth(fast_log_partials, "x > 0", approximated, "log's", "as log", 1)},
-      {Op::fast_pow,
-       smooth(fast_pow_partials, "as pow", approximated, "pow's, by fast_pow and fast_log",
-              "as pow", -1)},
+      {Op::fast_pow, smooth(fast_pow_partials, "as pow", approximated,
+                            "pow's, by fast_pow and fast_log", "as pow", -1)},
       {Op::fast_sin,
        smooth(fast_sin_partials, "everywhere", approximated, "fast_cos x", "NaN", -1)},
       {Op::fast_cos,
@@ -262,16 +249,14 @@ OpTable smooth_operators() {
       {Op::fast_inverse, smooth(fast_inverse_partials, "x != 0", approximated, "-v^2", "0", -1)},
       {Op::fast_inverse_sqrt,
        smooth(fast_inverse_sqrt_partials, "x > 0", approximated, "-v^3 / 2", "0 at +inf", -1)},
-      {Op::saturating_cast,
-       smooth(saturating_cast_partials, "inside the type's range",
-              "0 where the value saturates; to integers: 0", "1 or 0", "0: the value saturates", 0,
-              "definition")},
+      {Op::saturating_cast, smooth(saturating_cast_partials, "inside the type's range",
+                                   "0 where the value saturates; to integers: 0", "1 or 0",
+                                   "0: the value saturates", 0, "definition")},
       {Op::strong_div,
        smooth(strong_div_partials, "b != 0", "as a quotient, with strong zeros", "1 / y, -v / y",
               "as a quotient, with strong zeros", 2, "definition")},
-      {Op::strong_mul,
-       smooth(strong_mul_partials, "everywhere", "as a product, with strong zeros", "y, x",
-              "as a product, with strong zeros", 0, "definition")},
+      {Op::strong_mul, smooth(strong_mul_partials, "everywhere", "as a product, with strong zeros",
+                              "y, x", "as a product, with strong zeros", 0, "definition")},
   };
 }
 
@@ -282,24 +267,24 @@ OpTable other_operators() {
   const char* steps = "0 everywhere, at the steps too";
   const char* promise = "the bounds are promises, not values";
   return {
-      {Op::bitwise_and, constant(bits)},
-      {Op::bitwise_or, constant(bits)},
-      {Op::bitwise_xor, constant(bits)},
-      {Op::bitwise_not, constant(bits)},
-      {Op::shift_left, constant(bits)},
-      {Op::shift_right, constant(bits)},
-      {Op::popcount, constant(bits)},
-      {Op::count_leading_zeros, constant(bits)},
-      {Op::count_trailing_zeros, constant(bits)},
-      {Op::is_nan, constant(test)},
-      {Op::is_inf, constant(test)},
-      {Op::is_finite, constant(test)},
-      {Op::floor, constant(steps)},
-      {Op::ceil, constant(steps)},
-      {Op::round, constant(steps)},
-      {Op::trunc, constant(steps)},
-      {Op::undef, constant("any value: derivative 0")},
-      {Op::random, constant("depends on its seeds only")},
+      {Op::bitwise_and, constant_rule(bits)},
+      {Op::bitwise_or, constant_rule(bits)},
+      {Op::bitwise_xor, constant_rule(bits)},
+      {Op::bitwise_not, constant_rule(bits)},
+      {Op::shift_left, constant_rule(bits)},
+      {Op::shift_right, constant_rule(bits)},
+      {Op::popcount, constant_rule(bits)},
+      {Op::count_leading_zeros, constant_rule(bits)},
+      {Op::count_trailing_zeros, constant_rule(bits)},
+      {Op::is_nan, constant_rule(test)},
+      {Op::is_inf, constant_rule(test)},
+      {Op::is_finite, constant_rule(test)},
+      {Op::floor, constant_rule(steps)},
+      {Op::ceil, constant_rule(steps)},
+      {Op::round, constant_rule(steps)},
+      {Op::trunc, constant_rule(steps)},
+      {Op::undef, constant_rule("any value: derivative 0")},
+      {Op::random, constant_rule("depends on its seeds only")},
       {Op::promise_clamped, transparent(0, promise)},
       {Op::unsafe_promise_clamped, transparent(0, promise)},
       {Op::stop_gradient,
@@ -342,16 +327,13 @@ KindTable make_kind_table() {
       {Kind::Div,
        smooth(div_partials, "b != 0", "infinite at b == 0, times a strong zero; integers: 0",
               "1 / y, -v / y", "0 where y is infinite", 2)},
-      {Kind::Mod,
-       smooth(mod_partials, "a / b not an integer",
-              "da is 1 and db -floor(a / b) at the steps too; integers: 0", "1, -floor(x / y)",
-              "NaN, as the value", 0, "definition")},
-      {Kind::Min,
-       smooth(min_partials, "a != b", "the operand taken gets 1; at a tie that is b",
-              "1, 0 or 0, 1", "as for finite operands", 0, "definition")},
-      {Kind::Max,
-       smooth(max_partials, "a != b", "the operand taken gets 1; at a tie that is b",
-              "1, 0 or 0, 1", "as for finite operands", 0, "definition")},
+      {Kind::Mod, smooth(mod_partials, "a / b not an integer",
+                         "da is 1 and db -floor(a / b) at the steps too; integers: 0",
+                         "1, -floor(x / y)", "NaN, as the value", 0, "definition")},
+      {Kind::Min, smooth(min_partials, "a != b", "the operand taken gets 1; at a tie that is b",
+                         "1, 0 or 0, 1", "as for finite operands", 0, "definition")},
+      {Kind::Max, smooth(max_partials, "a != b", "the operand taken gets 1; at a tie that is b",
+                         "1, 0 or 0, 1", "as for finite operands", 0, "definition")},
       {Kind::Select,
        {RuleClass::Smooth, nullptr, -1, "where the condition does not change",
         "the chosen arm gets all, the other exactly 0", "definition", "1 or 0",
@@ -362,7 +344,7 @@ KindTable make_kind_table() {
   };
   for (Kind k : {Kind::EQ, Kind::NE, Kind::LT, Kind::LE, Kind::GT, Kind::GE, Kind::And, Kind::Or,
                  Kind::Not}) {
-    t.emplace(k, constant("a truth value: derivative 0"));
+    t.emplace(k, constant_rule("a truth value: derivative 0"));
   }
   return t;
 }

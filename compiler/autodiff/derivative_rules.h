@@ -33,6 +33,9 @@ struct Partial {
   Expr divisor = {};
 };
 
+// A partial that may be infinite where an adjoint is 0.
+inline Partial strong(Expr factor) { return {std::move(factor)}; }
+
 // Partials for operands `args` with value `value` (the node itself, for rules that reuse it).
 using PartialsFn = std::vector<Partial> (*)(const std::vector<Expr>& args, const Expr& value);
 

@@ -14,10 +14,10 @@ bool is_undef(const Expr& e) {
   return call && call->is_op(Op::undef);
 }
 
-class Sweep {
+class ForwardSweep {
  public:
-  Sweep(const std::vector<Expr>& values, FunctionRef<Expr(const Expr&)> tangent_of,
-        FunctionRef<bool(const Expr&)> is_infinite_leaf)
+  ForwardSweep(const std::vector<Expr>& values, FunctionRef<Expr(const Expr&)> tangent_of,
+               FunctionRef<bool(const Expr&)> is_infinite_leaf)
       : order_(post_order(values)),
         tangent_of_(tangent_of),
         facts_(
@@ -151,7 +151,7 @@ class Sweep {
 ForwardResult sweep_forward(const std::vector<Expr>& values,
                             FunctionRef<Expr(const Expr&)> tangent_of,
                             FunctionRef<bool(const Expr&)> is_infinite_leaf) {
-  return Sweep(values, tangent_of, is_infinite_leaf).run(values);
+  return ForwardSweep(values, tangent_of, is_infinite_leaf).run(values);
 }
 
 }  // namespace retrograde::ir

@@ -198,7 +198,7 @@ Response where(const Expr& condition, const Response& r) {
 }
 
 // Of a constant, or of a node by the responses of its children, which `of` gives.
-Response of_node(const Expr& e, FunctionRef<const Response&(const Expr&)> of) {
+Response response_of_node(const Expr& e, FunctionRef<const Response&(const Expr&)> of) {
   if (auto value = as_const_float(e)) return of_constant(*value);
   if (const auto* binary = e.as<Binary>()) return of_binary(*binary, of(binary->a), of(binary->b));
   if (const auto* choice = e.as<Select>())
@@ -296,7 +296,7 @@ class Propagation {
     for (const Expr& node : post_order({e})) {
       known[node.get()] = !node.type().is_float() ? fixed
                           : is_leaf(node)         ? of_leaf(node)
-                                                  : of_node(node, of_child);
+                                                  : response_of_node(node, of_child);
     }
     return known.at(e.get());
   }

@@ -59,15 +59,6 @@ ir::InputShape checked_input(const std::string& asked, const AdjointInput& input
   return shape;
 }
 
-ir::Box box_of(const Region& region) {
-  ir::Box box;
-  for (const Range& r : region) {
-    Expr min = ir::cast_to(Int(32), r.min);
-    box.push_back({min, ir::simplify(min + ir::cast_to(Int(32), r.extent) - 1)});
-  }
-  return box;
-}
-
 // Elements of the input that a region of the output depends on, and that exist; flat.
 ir::Box box_of_input(const Func& output, const ir::Box& region, const AdjointInput& input,
                      const ir::InputShape& shape) {
@@ -334,7 +325,7 @@ Jacobian jacobian(const Func& output, const AdjointInput& input, const Region& o
                 text("it has ", output.outputs()), "Use Compression::Columns");
   }
   ir::InputShape shape = checked_input(asked, input);
-  ir::Box rows = box_of(output_bounds), columns = box_of_input(output, rows, input, shape);
+  ir::Box rows = ir::box_of(output_bounds), columns = box_of_input(output, rows, input, shape);
   Candidate candidate = best(output, input, shape, rows, columns, output_bounds, options);
   if (!candidate.compressed) {
     user_error(asked, "an input is something that the output depends on",

@@ -32,7 +32,7 @@ Operations of_operator(const Call& call) {
 }
 
 // Work of the node itself, where floats take part in it.
-Operations of_node(const Expr& e) {
+Operations operations_of_node(const Expr& e) {
   bool floating = e.type().is_float();
   for_each_child(e, [&](const Expr& child) { floating |= child.type().is_float(); });
   if (!floating) return {};
@@ -57,7 +57,7 @@ Body body_of(const std::vector<Expr>& roots) {
   const DistinctNodes distinct(plain);
   Body body;
   for (const Expr& node : distinct.nodes()) {
-    body.own += of_node(node);
+    body.own += operations_of_node(node);
     const auto* call = node.as<Call>();
     if (!call || call->call_type == CallType::Operator) continue;
     if (call->call_type == CallType::Func) {

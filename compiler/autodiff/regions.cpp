@@ -156,4 +156,13 @@ IterationDomain Regions::domain(const FuncContents& f, int stage) const {
   return result;
 }
 
+Box box_of(const Region& region) {
+  Box box;
+  for (const Range& r : region) {
+    Expr min = cast_to(Int(32), r.min);
+    box.push_back({min, simplify(min + cast_to(Int(32), r.extent) - 1)});
+  }
+  return box;
+}
+
 }  // namespace retrograde::ir

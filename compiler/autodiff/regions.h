@@ -8,6 +8,7 @@
 
 #include "analysis/interval.h"
 #include "autodiff/access_inversion.h"
+#include "frontend/rdom.h"
 #include "graph/function.h"
 
 namespace retrograde::ir {
@@ -37,6 +38,9 @@ class Regions {
   std::unordered_map<const Symbol*, Box> boxes_;
   std::set<const Symbol*> outputs_;
 };
+
+// A region in whole numbers, min and max of each dimension.
+Box box_of(const Region& region);
 
 // Dimension d of `args` when it is the pure variable of that dimension.
 bool is_pure_position(const FuncContents& f, const Definition& definition, size_t d);

@@ -11,10 +11,11 @@ namespace retrograde::ir {
 
 namespace {
 
-class Sweep {
+class ReverseSweep {
  public:
-  Sweep(const std::vector<Expr>& values, const std::vector<Expr>& seeds,
-        FunctionRef<bool(const Expr&)> is_wanted, FunctionRef<bool(const Expr&)> is_infinite_leaf)
+  ReverseSweep(const std::vector<Expr>& values, const std::vector<Expr>& seeds,
+               FunctionRef<bool(const Expr&)> is_wanted,
+               FunctionRef<bool(const Expr&)> is_infinite_leaf)
       : values_(with_equal_nodes_shared(values)),
         order_(post_order(values_)),
         facts_(order_, is_wanted, is_infinite_leaf) {
@@ -101,7 +102,7 @@ class Sweep {
 SweepResult sweep_reverse(const std::vector<Expr>& values, const std::vector<Expr>& seeds,
                           FunctionRef<bool(const Expr&)> is_wanted,
                           FunctionRef<bool(const Expr&)> is_infinite_leaf) {
-  return Sweep(values, seeds, is_wanted, is_infinite_leaf).run();
+  return ReverseSweep(values, seeds, is_wanted, is_infinite_leaf).run();
 }
 
 }  // namespace retrograde::ir

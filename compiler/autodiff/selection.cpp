@@ -19,9 +19,10 @@ namespace retrograde::ir {
 
 namespace {
 
-class Finder {
+class SelectionFinder {
  public:
-  Finder(const FuncPtr& f, int stage) : f_(f), stage_(stage), definition_(f->stage(stage)) {}
+  SelectionFinder(const FuncPtr& f, int stage)
+      : f_(f), stage_(stage), definition_(f->stage(stage)) {}
 
   std::optional<Selection> find() {
     Expr condition;
@@ -102,7 +103,7 @@ class Finder {
 }  // namespace
 
 std::optional<Selection> find_selection(const FuncPtr& f, int stage) {
-  return Finder(f, stage).find();
+  return SelectionFinder(f, stage).find();
 }
 
 }  // namespace retrograde::ir

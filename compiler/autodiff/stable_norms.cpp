@@ -12,8 +12,6 @@ namespace retrograde::ir {
 
 namespace {
 
-Expr op1(Op op, const Expr& a) { return call_op(op, a.type(), {a}); }
-
 // a where e is a * a or pow(a, 2).
 Expr square_root_of(const Expr& e) {
   if (const auto* product = e.as<Mul>()) return equal(product->a, product->b) ? product->a : Expr();
@@ -54,18 +52,18 @@ Polar polar(const std::vector<Expr>& a) {
   const Expr zero = make_zero(a[0].type());
   Expr scale, squares, at_origin;
   for (const Expr& e : a) {
-    const Expr size = op1(Op::abs, e), is_zero = e == zero;
+    const Expr size = call_op(Op::abs, {e}), is_zero = e == zero;
     scale = scale.defined() ? binary(Kind::Max, scale, size) : size;
     at_origin = at_origin.defined() ? at_origin && is_zero : is_zero;  // not so beside a NaN
   }
-  scale = op1(Op::stop_gradient, scale);
+  scale = call_op(Op::stop_gradient, {scale});
   Polar result{{}, scale, {}};
   for (const Expr& e : a) {
     result.u.push_back(e / scale);
     Expr square = result.u.back() * result.u.back();
     squares = squares.defined() ? squares + square : square;
   }
-  result.inverse = make_one(scale.type()) / op1(Op::sqrt, squares);
+  result.inverse = make_one(scale.type()) / call_op(Op::sqrt, {squares});
   for (Expr& e : result.u) e = make_select(at_origin, zero, e * result.inverse);
   return result;
 }
@@ -165,7 +163,8 @@ std::vector<Expr> unit_vector(const std::vector<Expr>& a) { return polar(a).u; }
 
 // With y and x scaled by the larger of them: neither overflow nor underflow of y^2 + x^2 shows.
 std::vector<Expr> angle_gradient(const Expr& y, const Expr& x) {
-  const Expr zero = make_zero(x.type()), size_x = op1(Op::abs, x), size_y = op1(Op::abs, y);
+  const Expr zero = make_zero(x.type()), size_x = call_op(Op::abs, {x}),
+             size_y = call_op(Op::abs, {y});
   const Expr infinity = make_const(x.type(), std::numeric_limits<double>::infinity());
   Expr scale = binary(Kind::Max, size_x, size_y), along_y = y / scale, along_x = x / scale;
   Expr square_sum = along_x * along_x + along_y * along_y;

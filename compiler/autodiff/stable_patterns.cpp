@@ -11,8 +11,6 @@ namespace {
 constexpr size_t most_terms = 4;
 }
 
-Partial strong(Expr factor) { return {std::move(factor)}; }
-
 const Call* as_operator(const Expr& e, Op op) {
   const auto* call = e.as<Call>();
   return call && call->is_op(op) ? call : nullptr;

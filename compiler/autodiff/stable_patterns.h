@@ -8,9 +8,6 @@
 
 namespace retrograde::ir {
 
-// A partial that may be infinite where an adjoint is 0.
-Partial strong(Expr factor);
-
 // The call of the operator, or null.
 const Call* as_operator(const Expr& e, Op op);
 

@@ -20,12 +20,6 @@ namespace {
 
 Type tangent_type(Type t) { return t.is_float() ? adjoint_type(t) : Float(32); }
 
-FuncPtr new_func(const std::string& name) {
-  auto f = make_func(Role::Tangent);
-  f->name = claim_name(name);
-  return f;
-}
-
 // One definition linearised. Reads of the Func's own tangent are reads of `own`.
 struct StageTangent {
   std::vector<Expr> values;  // one a value; undefined: zero
@@ -43,7 +37,7 @@ class FuncTangent {
   // Null when it is identically zero. With `dual` set, the tangent reads it.
   FuncPtr build() {
     if (!moves()) return nullptr;
-    tangent_ = new_func(f_->name + "_tan");
+    tangent_ = make_func(Role::Tangent, f_->name + "_tan");
     if (!linearise_all(tangent_, 0)) return build_dual();
     for (int s = 0; s < f_->stage_count(); ++s) define(tangent_, s, {}, stages_[s].values);
     return tangent_;
@@ -119,7 +113,7 @@ class FuncTangent {
   }
 
   FuncPtr build_dual() {
-    dual_ = new_func(f_->name + "_dual");
+    dual_ = make_func(Role::Tangent, f_->name + "_dual");
     linearise_all(dual_, count());
     tangent_->made->traits = dual_->made->traits;
     for (int s = 0; s < f_->stage_count(); ++s)
@@ -240,7 +234,7 @@ class TangentSynthesis {
     auto found = directions_.find(&f);
     if (found == directions_.end()) return own;
     if (!own) return found->second;
-    FuncPtr sum = new_func(f.name + "_tan_sum");
+    FuncPtr sum = make_func(Role::Tangent, f.name + "_tan_sum");
     std::vector<Expr> args = variables_of(f.args), values;
     for (size_t k = 0; k < f.types.size(); ++k) {
       values.push_back(
@@ -289,7 +283,7 @@ class TangentSynthesis {
 }  // namespace
 
 FuncPtr zero_tangent(const FuncContents& f) {
-  FuncPtr zero = new_func(f.name + "_tan");
+  FuncPtr zero = make_func(Role::Tangent, f.name + "_tan");
   std::vector<Expr> values;
   for (Type t : f.types) values.push_back(make_zero(tangent_type(t)));
   define_pure(zero, variables_of(f.args), values);

@@ -11,15 +11,17 @@ namespace retrograde {
 
 namespace {
 
-std::string asked(const Func& output) { return "propagate tangents to " + quoted(output.name()); }
+std::string asked_of_tangents(const Func& output) {
+  return "propagate tangents to " + quoted(output.name());
+}
 
-void check_output(const Func& output) {
+void check_moves(const Func& output) {
   if (!output.defined()) {
-    user_error(asked(output), "the output must be defined", "it has no definition",
+    user_error(asked_of_tangents(output), "the output must be defined", "it has no definition",
                "Define it first");
   }
   if (!ir::is_floating(output.types())) {
-    user_error(asked(output), "only floating-point values have derivatives",
+    user_error(asked_of_tangents(output), "only floating-point values have derivatives",
                "its type is " + to_string(output.types()[0]), "Convert it to float");
   }
 }
@@ -27,7 +29,7 @@ void check_output(const Func& output) {
 ir::InputShape shape_of(const Func& output, const ir::Symbol* symbol) {
   ir::InputShape shape = ir::shape_of(symbol);
   if (shape.types.empty()) {
-    user_error(asked(output), "what moves must be defined",
+    user_error(asked_of_tangents(output), "what moves must be defined",
                shape.name.empty() ? "an input has no memory and no type"
                                   : quoted(shape.name) + " has no definition",
                "Define it first");
@@ -37,11 +39,12 @@ ir::InputShape shape_of(const Func& output, const ir::Symbol* symbol) {
 
 void check_direction(const Func& output, const ir::InputShape& shape, const Func& tangent) {
   if (tangent.defined() && !shape.is_floating()) {
-    user_error(asked(output), "only floating-point values have derivatives",
+    user_error(asked_of_tangents(output), "only floating-point values have derivatives",
                text(quoted(shape.name), " has type ", to_string(shape.types[0])),
                "Convert it to float in a Func, and give that a direction");
   }
-  ir::check_shape(asked(output), "a direction", "what moves", shape, *tangent.function());
+  ir::check_shape(asked_of_tangents(output), "a direction", "what moves", shape,
+                  *tangent.function());
 }
 
 }  // namespace
@@ -79,9 +82,9 @@ std::vector<Func> Tangents::funcs() const { return {result_->funcs.begin(), resu
 const std::vector<Explanation>& Tangents::explanations() const { return result_->explanations; }
 
 Tangents propagate_tangents(const Func& output, const std::vector<Direction>& directions) {
-  check_output(output);
+  check_moves(output);
   if (directions.empty()) {
-    user_error(asked(output), "something has to move", "there is no direction",
+    user_error(asked_of_tangents(output), "something has to move", "there is no direction",
                "Give each input that moves with its direction");
   }
   ir::Directions by_symbol;
@@ -90,7 +93,7 @@ Tangents propagate_tangents(const Func& output, const std::vector<Direction>& di
     ir::InputShape shape = shape_of(output, symbol);
     check_direction(output, shape, d.tangent);
     if (!by_symbol.emplace(symbol, d.tangent.function()).second) {
-      user_error(asked(output), "each input has one direction",
+      user_error(asked_of_tangents(output), "each input has one direction",
                  text("there are two for ", quoted(shape.name)), "Add them in one Func");
     }
   }

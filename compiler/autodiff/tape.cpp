@@ -18,7 +18,7 @@ namespace retrograde::ir {
 namespace {
 
 // What happens in one step of an iteration: place <- values.
-struct Step {
+struct TapeStep {
   Expr place;
   std::vector<Expr> values;
 };
@@ -106,7 +106,7 @@ class Tape {
     FuncPtr tape = begin_tape(f_->name + "_tape", before);
 
     std::vector<std::vector<Expr>> places;  // distinct ones; Tuples read several values at one
-    std::vector<Step> steps;
+    std::vector<TapeStep> steps;
     for (const Expr& read : needed_) {
       const Call* call = as_call_of(read, f_);
       auto known = std::find_if(places.begin(), places.end(),
@@ -169,8 +169,8 @@ class Tape {
     return values;
   }
 
-  Step write_step(const FuncPtr& tape) const {
-    Step step{on_tape(layout_.slot_of(c_.write), tape), {}};
+  TapeStep write_step(const FuncPtr& tape) const {
+    TapeStep step{on_tape(layout_.slot_of(c_.write), tape), {}};
     Expr inside = on_tape(layout_.is_inside(c_.write), tape);
     for (size_t k = 0; k < f_->types.size(); ++k) {
       Expr value = on_tape(c_.values[k], tape);
@@ -183,7 +183,7 @@ class Tape {
 
   void append_reverse(const SweepResult& sweep) {
     Expr written = layout_.slot_of(c_.write);
-    std::vector<Step> steps{{layout_.elements() + now_, all_values(adjoint_, written)}};
+    std::vector<TapeStep> steps{{layout_.elements() + now_, all_values(adjoint_, written)}};
     steps.push_back({written, {}});
     for (size_t k = 0; k < f_->types.size(); ++k)
       steps[1].values.push_back(make_zero(c_.query.target.types[k]));
@@ -213,7 +213,7 @@ class Tape {
   }
 
   // One update: in step s of an iteration, step s's place gets its values.
-  void append_steps(const FuncPtr& tape, const std::vector<Step>& steps,
+  void append_steps(const FuncPtr& tape, const std::vector<TapeStep>& steps,
                     const Substitution& reversed, const Expr& predicate) {
     auto rdom = std::make_shared<ReductionDomainContents>();
     rdom->frozen = true;
@@ -229,7 +229,7 @@ class Tape {
       Expr order = reversed.empty() ? e : substitute(e, reversed);
       return with_values(substitute(order, names), c_.query.f, {});
     };
-    auto chosen = [&](const std::function<Expr(const Step&)>& part) {
+    auto chosen = [&](const std::function<Expr(const TapeStep&)>& part) {
       Expr result = part(steps.back());
       for (int s = count - 2; s >= 0; --s)
         result = if_step(step == s, part(steps[static_cast<size_t>(s)]), result);
@@ -238,9 +238,9 @@ class Tape {
     std::vector<Expr> values;
     for (size_t k = 0; k < f_->types.size(); ++k) {
       Type type = tape->types[k];
-      values.push_back(chosen([&](const Step& s) { return cast_to(type, s.values[k]); }));
+      values.push_back(chosen([&](const TapeStep& s) { return cast_to(type, s.values[k]); }));
     }
-    Expr place = chosen([](const Step& s) { return s.place; });
+    Expr place = chosen([](const TapeStep& s) { return s.place; });
     append_update(tape, layout_.with_pure(place), values, rdom->vars,
                   predicate.defined() ? here(kept(predicate)) : Expr());
     note_work(tape, steps);
@@ -249,9 +249,9 @@ class Tape {
   static Expr if_step(const Expr& condition, const Expr& a, const Expr& b) {
     return equal(a, b) ? a : call_op(Op::if_then_else, a.type(), {condition, a, b});
   }
-  void note_work(const FuncPtr& tape, const std::vector<Step>& steps) const {
+  void note_work(const FuncPtr& tape, const std::vector<TapeStep>& steps) const {
     AdjointWork work;
-    for (const Step& s : steps) {
+    for (const TapeStep& s : steps) {
       work.values.push_back(redirect_calls(kept(s.place), tape, tape, true));
       for (const Expr& v : s.values)
         work.values.push_back(redirect_calls(kept(v), tape, tape, true));

@@ -11,9 +11,9 @@ namespace retrograde::ir {
 
 namespace {
 
-class Finder {
+class TimeAxisFinder {
  public:
-  Finder(const UpdateContext& c, const std::vector<FuncPtr>& order)
+  TimeAxisFinder(const UpdateContext& c, const std::vector<FuncPtr>& order)
       : c_(c), f_(c.f), order_(order), relations_(c.domain, c.write, c.pure) {}
 
   std::optional<TimeAxis> find() {
@@ -158,7 +158,7 @@ class Finder {
 std::optional<TimeAxis> find_time_axis(const UpdateContext& c, const std::vector<FuncPtr>& order) {
   if (c.definition.rvars.empty() || !c.reads_self()) return std::nullopt;
   try {
-    return Finder(c, order).find();
+    return TimeAxisFinder(c, order).find();
   } catch (const isl::exception&) {
     return std::nullopt;  // isl gave up
   }

@@ -146,7 +146,7 @@ ValueRange of_binary(const Binary& e, const ValueRange& a, const ValueRange& b) 
 }
 
 // Of a constant, or of a node by the ranges of its children, which `of` gives.
-ValueRange of_node(const Expr& e, FunctionRef<ValueRange(const Expr&)> of) {
+ValueRange range_of_node(const Expr& e, FunctionRef<ValueRange(const Expr&)> of) {
   if (auto value = as_const_float(e)) return constant(*value);
   if (!e.type().is_float()) return {};
   if (const auto* binary = e.as<Binary>()) return of_binary(*binary, of(binary->a), of(binary->b));
@@ -192,9 +192,9 @@ ValueRange ValueRanges::of(const Expr& e) const {
   if (is_leaf(e)) return of_leaf(e);
   std::unordered_map<const ExprNode*, ValueRange> known;
   for (const Expr& node : post_order({e})) {
-    known[node.get()] =
-        is_leaf(node) ? of_leaf(node)
-                      : of_node(node, [&](const Expr& child) { return known.at(child.get()); });
+    known[node.get()] = is_leaf(node) ? of_leaf(node) : range_of_node(node, [&](const Expr& child) {
+      return known.at(child.get());
+    });
   }
   return known.at(e.get());
 }

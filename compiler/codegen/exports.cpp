@@ -18,14 +18,6 @@ using namespace ir;
 constexpr uint64_t context_bytes = 256;
 static_assert(sizeof(retrograde_context) <= context_bytes);
 
-uint32_t type_word(Type type) {
-  return halide_type_t(type.code() == TypeCode::BFloat
-                           ? halide_type_bfloat
-                           : static_cast<halide_type_code_t>(static_cast<int>(type.code())),
-                       static_cast<uint8_t>(type.bits()))
-      .as_u32();
-}
-
 uint64_t bits_of(const Scalar& value) {
   return value.type.is_float() ? eval_reinterpret(UInt(value.type.bits()), value).u : value.u;
 }

@@ -53,12 +53,6 @@ Value* FunctionGenerator::prefetch(const Call& e) {
   return b_.getInt32(0);
 }
 
-static uint32_t type_word(Type type) {
-  const int code = type.code() == TypeCode::BFloat ? 4 : static_cast<int>(type.code());
-  return static_cast<uint32_t>(code) | static_cast<uint32_t>(type.bits()) << 8 |
-         static_cast<uint32_t>(type.lanes()) << 16;
-}
-
 // (value, event, func, value index, parent, coordinates...): a halide_trace_event_t on the stack.
 Value* FunctionGenerator::trace(const Call& e) {
   constexpr size_t first_coordinate = 5;

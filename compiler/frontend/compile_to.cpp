@@ -24,7 +24,7 @@ std::string default_name(const PipelineSpec& pipeline) {
   return name;
 }
 
-bool is_identifier(const std::string& name) {
+bool is_c_identifier(const std::string& name) {
   if (name.empty() || std::isdigit(static_cast<unsigned char>(name[0]))) return false;
   return std::all_of(name.begin(), name.end(), [](char c) {
     return std::isalnum(static_cast<unsigned char>(c)) || c == '_';
@@ -38,7 +38,7 @@ void check_function_name(const std::string& name, const Target& target) {
   bool has_namespace = false, all_valid = true;
   while (true) {
     const size_t end = name.find("::", begin);
-    all_valid = all_valid && is_identifier(name.substr(begin, end - begin));
+    all_valid = all_valid && is_c_identifier(name.substr(begin, end - begin));
     if (end == std::string::npos) break;
     has_namespace = true;
     begin = end + 2;

@@ -122,6 +122,12 @@ FuncPtr make_func(Role role) {
   return f;
 }
 
+FuncPtr make_func(Role role, const std::string& name) {
+  FuncPtr f = make_func(role);
+  f->name = claim_name(name);
+  return f;
+}
+
 const Provenance* provenance_of(const Call& call) {
   if (call.call_type != CallType::Func || !call.symbol.defined()) return nullptr;
   const auto& made = static_cast<const FuncContents*>(call.symbol.raw())->made;

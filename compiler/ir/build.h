@@ -51,7 +51,7 @@ Expr make_shuffle(std::vector<Expr> vectors, std::vector<int> indices);
 Expr make_vector_reduce(ReduceOp op, Expr value, int result_lanes);
 // An operator with its result type given; the one-argument form takes the first argument's type.
 Expr call_op(Op op, Type type, std::vector<Expr> args);
-Expr call_op(Op op, std::vector<Expr> args);
+Expr call_op(Op op, std::vector<Expr> args);  // with the type of the first
 Expr call_extern(const std::string& name, Type type, std::vector<Expr> args);
 Expr call_func(const std::string& name, Type type, std::vector<Expr> args, int value_index,
                SymbolRef symbol);
@@ -150,6 +150,6 @@ Expr& operator/=(Expr& a, Expr b);
 Expr cast(Type type, Expr value);
 Expr select(Expr condition, Expr true_value, Expr false_value);  // promotes the arms
 // Requires: both operands must be defined; a bound is a value of the type that is clamped.
-Expr clamp(Expr value, Expr low, Expr high);                     // low and high take value's type
+Expr clamp(Expr value, Expr low, Expr high);  // low and high take value's type
 
 }  // namespace retrograde

@@ -128,6 +128,14 @@ bool Type::is_min(uint64_t value) const {
   return value <= INT64_MAX && is_min(static_cast<int64_t>(value));
 }
 
+uint32_t type_word(Type type) {
+  // The runtime's handle stands before its bfloat.
+  const uint32_t code = type.is_bfloat()   ? 4
+                        : type.is_handle() ? 3
+                                           : static_cast<uint32_t>(type.code());
+  return code | static_cast<uint32_t>(type.bits()) << 8 | static_cast<uint32_t>(type.lanes()) << 16;
+}
+
 std::string to_string(Type type) {
   static constexpr const char* prefixes[] = {"int", "uint", "float", "bfloat", "handle"};
   std::string name = prefixes[static_cast<int>(type.code())];

@@ -209,5 +209,7 @@ constexpr Type type_of() {
 
 // "int32", "float32x8", "bfloat16", "bool", "handle"
 std::string to_string(Type type);
+// Code, bits and lanes in one word, as the runtime reads its halide_type_t.
+uint32_t type_word(Type type);
 
 }  // namespace retrograde

@@ -25,12 +25,6 @@ Stmt check(Expr holds, int code, Parts&&... message) {
       call_op(Op::error, Int(32), {Expr(int32_t{code}), Expr(std::forward<Parts>(message))...}));
 }
 
-uint32_t type_word(Type type) {
-  return static_cast<uint32_t>(type.code() == TypeCode::BFloat ? 4
-                                                               : static_cast<int>(type.code())) |
-         static_cast<uint32_t>(type.bits()) << 8 | 1u << 16;
-}
-
 class Checks {
  public:
   Checks(const LoopNests& nests, const std::vector<LoweredArgument>& args, const Program& program)
@@ -187,11 +181,11 @@ class Checks {
     Expr has_elements = const_true();
     for (int d = 0; d < arg.dimensions; d++)
       has_elements = has_elements && call_op(Op::buffer_extent, Int(32), {handle, d}) > 0;
-    checks.push_back(check(host != zero || !has_elements, retrograde_error_host_is_null,
-                           text("cannot run: data must be in memory of the host; the host pointer of "
-                                "the buffer ",
-                                quoted(arg.name),
-                                " is null, and it is on a device. Copy it to the host first.")));
+    checks.push_back(check(
+        host != zero || !has_elements, retrograde_error_host_is_null,
+        text("cannot run: data must be in memory of the host; the host pointer of "
+             "the buffer ",
+             quoted(arg.name), " is null, and it is on a device. Copy it to the host first.")));
     if (arg.kind == LoweredArgument::Kind::InputBuffer) {
       const Expr is_dirty =
           call_op(Op::runtime_call, Int(32), {Expr("retrograde_buffer_device_dirty"), handle});
@@ -203,11 +197,11 @@ class Checks {
     auto param = std::dynamic_pointer_cast<ParameterContents>(arg.symbol.lock());
     if (!param || param->host_alignment <= arg.type.bytes()) return;
     const Expr alignment = make_uint_const(UInt(64), static_cast<uint64_t>(param->host_alignment));
-    checks.push_back(check(
-        host % alignment == zero, retrograde_error_unaligned_host_ptr,
-        text("cannot run: the address of the buffer ", quoted(arg.name),
-             " was promised to be a multiple of ", param->host_alignment, ", but its remainder is "),
-        host % alignment, Expr(". Pass aligned memory, or lift the promise.")));
+    checks.push_back(check(host % alignment == zero, retrograde_error_unaligned_host_ptr,
+                           text("cannot run: the address of the buffer ", quoted(arg.name),
+                                " was promised to be a multiple of ", param->host_alignment,
+                                ", but its remainder is "),
+                           host % alignment, Expr(". Pass aligned memory, or lift the promise.")));
   }
 
   // Distances between elements, in elements: extents may be small and strides large.
@@ -219,12 +213,14 @@ class Checks {
       };
       const Expr stride = wide(Op::buffer_stride);
       span = span + max(wide(Op::buffer_extent) - 1, 0) * max(stride, -stride);
-      checks.push_back(check(
-          span <= make_const(Int(64), int64_t{0x7fffffff}), retrograde_error_allocation_too_large,
-          text("cannot run: the elements of a buffer lie at most 2147483647 elements apart; those of ",
-               quoted(arg.name), " lie up to "),
-          span, text(" apart, by its extents and strides up to dimension ", d,
-                     ". Process it in tiles.")));
+      checks.push_back(check(span <= make_const(Int(64), int64_t{0x7fffffff}),
+                             retrograde_error_allocation_too_large,
+                             text("cannot run: the elements of a buffer lie at most 2147483647 "
+                                  "elements apart; those of ",
+                                  quoted(arg.name), " lie up to "),
+                             span,
+                             text(" apart, by its extents and strides up to dimension ", d,
+                                  ". Process it in tiles.")));
     }
   }
 
@@ -325,10 +321,10 @@ class Checks {
       const int dimension = static_cast<int>(d);
       const BufferConstraint promised = constraint_of(arg, dimension);
       const Expr min = promised.min.defined() ? said(promised.min) : box[d].min;
-      const Expr extent = promised.extent.defined() ? said(promised.extent)
-                                                    : simplify(box[d].max - min + 1);
-      sets.push_back(make_evaluate(
-          call_op(Op::buffer_set_bounds, Int(32), {handle, dimension, min, extent})));
+      const Expr extent =
+          promised.extent.defined() ? said(promised.extent) : simplify(box[d].max - min + 1);
+      sets.push_back(
+          make_evaluate(call_op(Op::buffer_set_bounds, Int(32), {handle, dimension, min, extent})));
       if (!promised.stride.defined() || (d == 0 && is_one(promised.stride))) continue;
       sets.push_back(make_evaluate(call_op(
           Op::runtime_call, Int(32),
@@ -350,14 +346,17 @@ class Checks {
       if (promised.extent.defined()) holds = holds && box[d].max < min + promised.extent;
       holds = simplify(holds);
       if (is_const_true(holds)) continue;
-      checks.push_back(check(
-          holds, retrograde_error_constraints_make_required_region_smaller,
-          text("cannot run: what is promised of a buffer must hold what is used of it; ",
-               quoted(arg.name), " is used over ["),
-          box[d].min, Expr(", "), box[d].max, text("] in dimension ", d, ", but its min is promised"
-               " to be "), min, Expr(" and its extent "),
-          promised.extent.defined() ? promised.extent : Expr("whatever it is"),
-          Expr(". Promise a larger region, or lift the promise.")));
+      checks.push_back(
+          check(holds, retrograde_error_constraints_make_required_region_smaller,
+                text("cannot run: what is promised of a buffer must hold what is used of it; ",
+                     quoted(arg.name), " is used over ["),
+                box[d].min, Expr(", "), box[d].max,
+                text("] in dimension ", d,
+                     ", but its min is promised"
+                     " to be "),
+                min, Expr(" and its extent "),
+                promised.extent.defined() ? promised.extent : Expr("whatever it is"),
+                Expr(". Promise a larger region, or lift the promise.")));
     }
   }
 

@@ -47,7 +47,7 @@ std::optional<StridedLoad> as_strided(const Expr& e) {
 }
 
 // Loads of one buffer with one stride and number of lanes, at constant distances.
-struct Family {
+struct StridedFamily {
   std::string buffer;
   Type type;
   std::vector<StridedLoad> loads;
@@ -63,13 +63,13 @@ struct Family {
 };
 
 // What every execution of the statement evaluates.
-std::vector<Family> find_families(const Stmt& s) {
-  std::vector<Family> families;
+std::vector<StridedFamily> find_families(const Stmt& s) {
+  std::vector<StridedFamily> families;
   const auto visit = [&](const Expr& e) {
     const auto* call = e.as<Call>();
     if (auto load = as_strided(e)) {
       bool is_taken = false;
-      for (Family& family : families) {
+      for (StridedFamily& family : families) {
         if (is_taken) break;
         is_taken = family.takes(*load);
         if (is_taken) family.loads.push_back(*load);
@@ -83,7 +83,7 @@ std::vector<Family> find_families(const Stmt& s) {
   return families;
 }
 
-class Sharer : public Rewriter {
+class LoadSharer : public Rewriter {
  protected:
   Expr rewrite(const Expr& e) override {
     const auto found = replacements_.find(e.get());
@@ -94,12 +94,12 @@ class Sharer : public Rewriter {
     // What one statement may read another need not: nothing carries over.
     forget();
     replacements_.clear();
-    for (const Family& family : find_families(s)) share(family);
+    for (const StridedFamily& family : find_families(s)) share(family);
     return children(s);
   }
 
  private:
-  void share(const Family& family) {
+  void share(const StridedFamily& family) {
     const int64_t stride = family.loads[0].stride, lanes = family.type.lanes();
     std::map<int64_t, const StridedLoad*> by_offset;
     for (const StridedLoad& load : family.loads) by_offset.emplace(load.offset, &load);
@@ -146,6 +146,6 @@ class Sharer : public Rewriter {
 
 }  // namespace
 
-Stmt deinterleave_loads(const Stmt& s) { return s.defined() ? Sharer()(s) : s; }
+Stmt deinterleave_loads(const Stmt& s) { return s.defined() ? LoadSharer()(s) : s; }
 
 }  // namespace retrograde::ir

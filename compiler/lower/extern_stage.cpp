@@ -20,12 +20,6 @@ struct Descriptor {
 
 Expr null_handle() { return reinterpret_as(Handle(), make_uint_const(UInt(64), 0)); }
 
-uint32_t type_word(Type type) {
-  return static_cast<uint32_t>(type.code() == TypeCode::BFloat ? 4
-                                                               : static_cast<int>(type.code())) |
-         static_cast<uint32_t>(type.bits()) << 8 | 1u << 16;
-}
-
 // The fields of halide_buffer_t and halide_dimension_t, in their order and without gaps.
 Expr packed(const Descriptor& d) {
   std::vector<Expr> dims;

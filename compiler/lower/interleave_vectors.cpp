@@ -41,7 +41,7 @@ namespace retrograde::ir {
 
 namespace {
 
-constexpr int max_period = 8;
+constexpr int max_store_period = 8;
 
 Expr interleave(const std::vector<Expr>& parts) {
   const int period = static_cast<int>(parts.size()), lanes = parts[0].type().lanes();
@@ -60,7 +60,7 @@ struct Pattern {
 Pattern combine(const Pattern& a, const Pattern& b) {
   const bool has_load = a.has_load || b.has_load;
   const int period = std::lcm(a.period, b.period);
-  if (a.kind == Pattern::Whole || b.kind == Pattern::Whole || period > max_period)
+  if (a.kind == Pattern::Whole || b.kind == Pattern::Whole || period > max_store_period)
     return {Pattern::Whole, 1, has_load};
   return {std::max(a.kind, b.kind), period, has_load};
 }
@@ -146,7 +146,7 @@ class LaneSplitter {
         [&](const Ramp& n) { return n.base.type().is_scalar() ? Pattern{} : whole; },
         [&](const Binary& n) {
           if (const auto index = as_periodic_index(e))
-            return index->period() > max_period
+            return index->period() > max_store_period
                        ? Pattern{}
                        : Pattern{index->period() == 1 ? Pattern::Any : Pattern::Periodic,
                                  index->period(), false};
@@ -372,7 +372,7 @@ class Interleaver : public Rewriter {
     const auto* ramp = store && !store->predicate.defined() ? store->index.as<Ramp>() : nullptr;
     const auto stride =
         ramp && ramp->base.type().is_scalar() ? as_const_int(ramp->stride) : std::nullopt;
-    if (!stride || *stride < 2 || *stride > max_period) return false;
+    if (!stride || *stride < 2 || *stride > max_store_period) return false;
     Expr base = ramp->base;
     for (size_t i = lets.size(); i-- > 0;) {
       if (lets[i].second.type().is_scalar()) base = substitute(base, lets[i].first, lets[i].second);

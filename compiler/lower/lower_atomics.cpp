@@ -28,10 +28,10 @@ namespace retrograde::ir {
 
 namespace {
 
-using Names = std::unordered_set<std::string>;
+using BufferNames = std::unordered_set<std::string>;
 
-Names stored_in(const Stmt& s) {
-  Names names;
+BufferNames stored_in(const Stmt& s) {
+  BufferNames names;
   walk(
       s, [](const Expr&) { return false; },
       [&](const Stmt& part) {
@@ -42,7 +42,7 @@ Names stored_in(const Stmt& s) {
 }
 
 // Whether the value changes when the element does: it reads the Func, or a let that does.
-bool depends_on(const Expr& e, const Names& buffers, const Names& lets) {
+bool depends_on(const Expr& e, const BufferNames& buffers, const BufferNames& lets) {
   return any_node(e, [&](const Expr& node) {
     const Load* load = node.as<Load>();
     const Variable* variable = node.as<Variable>();
@@ -68,8 +68,8 @@ Stmt with_lets(const Lets& lets, Stmt body) {
 
 // The update with everything that does not depend on the element in front of it.
 Stmt narrowed(const Atomic& n) {
-  const Names buffers = stored_in(n.body);
-  Names dependent;
+  const BufferNames buffers = stored_in(n.body);
+  BufferNames dependent;
   Lets outside, inside;
   Stmt rest = n.body;
   for (; rest.defined() && rest.kind() == Kind::LetStmt; rest = rest.as<LetStmt>()->body) {

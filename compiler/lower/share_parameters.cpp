@@ -17,7 +17,7 @@ namespace {
 // Nodes of a tree from which on it gets a name.
 constexpr int large = 24;
 
-class Sharer : public Rewriter {
+class ParameterSharer : public Rewriter {
  public:
   std::vector<std::pair<std::string, Expr>> names;
 
@@ -85,7 +85,7 @@ bool has_memoized(const Program& program) {
 
 std::vector<std::pair<std::string, Expr>> share_parameters(Program& program) {
   if (has_memoized(program)) return {};
-  Sharer sharer;
+  ParameterSharer sharer;
   const auto share = [&](const Expr& e) { return sharer(e); };
   for (LoopedFunc& f : program.funcs) {
     for (Definition& stage : f.stages) stage = map_exprs(stage, share);

@@ -36,7 +36,7 @@ void add_conditions(Site& home, const Expr& value, const Interval& own, const In
   if (!is_known(home, own.max >= all.max)) conditions.push_back(likely(value <= own.max));
 }
 
-Loop& loop_at(std::vector<Loop>& loops, int depth) { return loops[loops.size() - depth]; }
+Loop& loop_from_inside(std::vector<Loop>& loops, int depth) { return loops[loops.size() - depth]; }
 
 // One of the two that are joined.
 struct Side {
@@ -92,7 +92,7 @@ void join(Emitted& code, SharedLoops around, Emitted other, const std::vector<Lo
   RETROGRADE_ASSERT(code.lead == 0 && other.lead == 0, "shared loops that began early inside");
   Side host, guest;
   for (int d = 1; d <= depth; d++) {
-    Loop& loop = loop_at(around.loops, d);
+    Loop& loop = loop_from_inside(around.loops, d);
     const Loop& joining = other_loops[other_loops.size() - d];
     const Interval own = loop.range(), theirs = shifted(joining.range(), shift[d - 1]);
     const Interval all{smaller(around.home, own.min, theirs.min),

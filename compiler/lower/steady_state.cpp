@@ -18,10 +18,11 @@ constexpr int64_t thick_points = 32;
 
 // A loop whose extent varies has at most so many iterations if it follows what is unrolled around
 // it: what is prepared for its copies, say. No more than they does it count as a loop.
-constexpr int few_iterations = 4;
+constexpr int short_iterations = 4;
 
 bool is_short(const For& loop, const Substitution& lets) {
-  return !is_const(loop.extent) && can_prove(substitute(loop.extent, lets) <= Expr(few_iterations));
+  return !is_const(loop.extent) &&
+         can_prove(substitute(loop.extent, lets) <= Expr(short_iterations));
 }
 
 bool contains_serial_loop(const Stmt& s) {
@@ -38,9 +39,8 @@ bool is_pure(const Expr& e) {
   if (!e.type().is_int_or_uint() || !e.type().is_scalar()) return false;
   return !any_node(e, [](const Expr& node) {
     const Call* call = node.as<Call>();
-    const bool is_pure_call =
-        !call ||
-        (call->call_type == CallType::Operator && op_info(call->op).cls != OpClass::Effect);
+    const bool is_pure_call = !call || (call->call_type == CallType::Operator &&
+                                        op_info(call->op).cls != OpClass::Effect);
     return !is_pure_call || node.kind() == Kind::Load || node.kind() == Kind::Let;
   });
 }

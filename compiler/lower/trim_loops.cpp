@@ -41,11 +41,11 @@ namespace retrograde::ir {
 namespace {
 
 // Constant extents up to this one are left alone.
-constexpr int64_t few_iterations = 16;
+constexpr int64_t untrimmed_iterations = 16;
 
 bool may_end_elsewhere(const For& loop) {
   const auto extent = as_const_int(loop.extent);
-  return !extent || *extent > few_iterations;
+  return !extent || *extent > untrimmed_iterations;
 }
 
 // Takes conditions on one loop out of its body.

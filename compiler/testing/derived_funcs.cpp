@@ -10,7 +10,7 @@ namespace retrograde::fuzz {
 
 namespace {
 
-using Kind = DerivedFunc::Kind;
+using DerivedKind = DerivedFunc::Kind;
 
 Index plain_index(int variable) {
   Index index;
@@ -36,8 +36,8 @@ class Extender {
   ExtendedPipeline run() {
     for (const DerivedFunc& derived : derived_) {
       funcs().emplace_back();
-      if (derived.kind == Kind::Wrapper || derived.kind == Kind::Clone) copy(derived);
-      if (derived.kind == Kind::Factored) factor(derived);
+      if (derived.kind == DerivedKind::Wrapper || derived.kind == DerivedKind::Clone) copy(derived);
+      if (derived.kind == DerivedKind::Factored) factor(derived);
     }
     return std::move(result_);
   }
@@ -49,7 +49,7 @@ class Extender {
   void copy(const DerivedFunc& derived) {
     const FuncSpec source = funcs()[derived.source];
     FuncSpec func = source;
-    if (derived.kind == Kind::Wrapper) {
+    if (derived.kind == DerivedKind::Wrapper) {
       func.updates.clear();
       for (size_t v = 0; v < func.values.size(); ++v) {
         func.values[v] = read_of(derived.source, source, static_cast<int>(v));
@@ -177,8 +177,8 @@ class Deriver {
     if (users.empty()) return;
     DerivedFunc derived;
     derived.source = f;
-    derived.kind = random_.chance(30) ? Kind::Clone : Kind::Wrapper;
-    const bool for_all = derived.kind == Kind::Wrapper && random_.chance(40);
+    derived.kind = random_.chance(30) ? DerivedKind::Clone : DerivedKind::Wrapper;
+    const bool for_all = derived.kind == DerivedKind::Wrapper && random_.chance(40);
     if (!for_all) derived.consumer = random_.pick(users);
     derived_.push_back(derived);
   }
@@ -195,7 +195,7 @@ class Deriver {
     const std::vector<ReductionRange>& domain = func.updates[stage - 1].domain;
     if (domain.empty()) return;
     DerivedFunc derived;
-    derived.kind = Kind::Factored;
+    derived.kind = DerivedKind::Factored;
     derived.source = f;
     derived.stage = stage;
     const int variable = random_.below(static_cast<int>(domain.size()));

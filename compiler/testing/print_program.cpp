@@ -8,6 +8,12 @@
 
 namespace retrograde::fuzz {
 
+std::string join(const std::vector<std::string>& parts) {
+  std::string result;
+  for (const std::string& part : parts) result += (result.empty() ? "" : ", ") + part;
+  return result;
+}
+
 namespace {
 
 std::string cpp_type(Type type) {
@@ -15,12 +21,6 @@ std::string cpp_type(Type type) {
   if (type == Float(32)) return "float";
   if (type == Float(64)) return "double";
   return to_string(type) + "_t";
-}
-
-std::string join(const std::vector<std::string>& parts, const std::string& separator = ", ") {
-  std::string result;
-  for (size_t i = 0; i < parts.size(); ++i) result += (i ? separator : "") + parts[i];
-  return result;
 }
 
 std::string list(const std::vector<int>& values) {

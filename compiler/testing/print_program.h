@@ -7,6 +7,9 @@
 
 namespace retrograde::fuzz {
 
+// "a, b, c"
+std::string join(const std::vector<std::string>& parts);
+
 // The definitions, the schedule, and the realization of every output.
 std::string to_cpp(const PipelineSpec& pipeline, const ScheduleSpec& schedule);
 // The schedule alone.

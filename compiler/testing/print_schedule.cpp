@@ -11,12 +11,6 @@ namespace {
 using Kind = Directive::Kind;
 using Where = Placement::Where;
 
-std::string join(const std::vector<std::string>& parts) {
-  std::string result;
-  for (size_t i = 0; i < parts.size(); ++i) result += (i ? ", " : "") + parts[i];
-  return result;
-}
-
 class SchedulePrinter {
  public:
   explicit SchedulePrinter(const ScheduleSpec& schedule)

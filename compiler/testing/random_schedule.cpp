@@ -23,7 +23,7 @@ using Kind = Directive::Kind;
 using Where = Placement::Where;
 using Rule = DimensionRule::Kind;
 
-constexpr int max_inlined_reads = 40;
+constexpr int max_reads_inlined = 40;
 constexpr int ample_storage = 1024;  // more than any dimension ever needs
 
 // A loop by the Func and stage that it belongs to.
@@ -315,10 +315,10 @@ class Scheduler {
     const int choice = random_.below(100);
     // How often the inlined body is repeated grows along chains of inlined Funcs.
     const int cost = reads_of(f) * static_cast<int>(sites_[f].size() + 1);
-    if (choice < 25 && inlined_reads_ * cost <= max_inlined_reads && is_pure(f)) {
+    if (choice < 25 && inlined_reads_ * cost <= max_reads_inlined && is_pure(f)) {
       placement.where = random_.chance(50) ? Where::Inline : Where::Default;
       inlined_reads_ *= cost;
-    } else if (choice < 33 && !is_pure(f) && inlined_reads_ * cost <= max_inlined_reads) {
+    } else if (choice < 33 && !is_pure(f) && inlined_reads_ * cost <= max_reads_inlined) {
       placement.where = Where::Default;
       inlined_reads_ *= cost;
     } else if (choice < 75) {

@@ -363,7 +363,10 @@ TEST(Cse, NamesInArmsAreBoundOnceThoughBothArmsHaveThem) {
                  "if_then_else<int32>(x < 3, (y/x)*(y/x), 1) + 2)"));
   std::set<std::string> names;
   walk(e, [&](const Expr& node) {
-    if (const auto* let = node.as<Let>()) EXPECT_TRUE(names.insert(let->name).second) << let->name;
+    const auto* let = node.as<Let>();
+    if (let) {
+      EXPECT_TRUE(names.insert(let->name).second) << let->name;
+    }
     return true;
   });
   EXPECT_EQ(names.size(), 2U);
