@@ -41,7 +41,7 @@ class ConvLayer : public Halide::Generator<ConvLayer> {
 }  // namespace
 
 PROGRAM(conv_layer_x86, ConvLayer,
-        at_sizes({{16, 16, 15, 11}, {32, 32, 60, 45}, {64, 64, 100, 80}}, [](const Sizes& n) {
+        at_sizes({{16, 32, 15, 11}, {32, 32, 60, 45}, {64, 64, 100, 80}}, [](const Sizes& n) {
           return std::vector{in<float>({n[0], n[2] + 2, n[3] + 2}),
                              in<float>({n[1], 3, 3, n[0]}, -0.1, 0.1).noise(),
                              in<float>({n[1]}, -1, 1).noise(), out<float>({n[1], n[2], n[3]})};

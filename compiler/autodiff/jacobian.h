@@ -67,11 +67,11 @@ class Jacobian {
 // What propagate_tangents and propagate_adjoints require, it requires.
 // Requires: what to differentiate by must be defined; only floating-point values have derivatives;
 // only floating-point values that are defined have derivatives; the output needs bounds in each of
-// its dimensions; an input is something that the output depends on; rows are compressed of an
-// output of one value (Unsupported); which elements depend on which is found by a bounded search
-// over index sets (Unsupported); at most 4096 seeds are evaluated together (Unsupported); elements
-// that one element may depend on must lie within constant bounds (Unsupported); which element
-// depends on which is read off definitions (Unsupported).
+// its dimensions; rows are compressed of an output of one value (Unsupported); which elements
+// depend on which is found by a bounded search over index sets (Unsupported); at most 4096 seeds
+// are evaluated together (Unsupported); elements that one element may depend on must lie within
+// constant bounds (Unsupported); which element depends on which is read off definitions
+// (Unsupported).
 Jacobian jacobian(const Func& output, const AdjointInput& input, const Region& output_bounds,
                   const JacobianOptions& options = {});
 

@@ -312,8 +312,9 @@ Realization Pipeline::realize(JITUserContext* context, const std::vector<int32_t
   const auto call = [&] {
     return ir::call(*code, contents_->handlers, arguments.argv(), asked, context) == 0;
   };
-  // Without memory the call is a query of what the outputs must be.
-  const bool succeeds = contents_->target.has_feature(Target::NoBoundsQuery) || call();
+  // Without memory the call is a query of what the outputs must be; no elements need none.
+  const bool is_empty = std::find(sizes.begin(), sizes.end(), 0) != sizes.end();
+  const bool succeeds = is_empty || contents_->target.has_feature(Target::NoBoundsQuery) || call();
   for (Buffer<>& buffer : buffers) {
     enlarge_to(*buffer.get(), sizes);
     ir::allocate_host(*buffer.get());

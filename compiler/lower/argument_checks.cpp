@@ -281,13 +281,31 @@ class Checks {
       add_memory_checks(arg, run);
       add_span_checks(arg, run);
       add_promise_checks(arg, box, run);
-      add_box_checks(arg, box, run);
       add_constraint_checks(arg, run);
+    }
+    return_if_nothing_is_asked(run);
+    for (const LoweredArgument& arg : args_) {
+      if (arg.is_buffer()) add_box_checks(arg, required_box(arg), run);
     }
     add_requirements(run);
     for (Stmt& sizes : schedule_checks(program_)) run.push_back(std::move(sizes));
     run.push_back(nests_.body);
     return make_if(any_query, make_block(answers), make_block(run));
+  }
+
+  // Where every output is empty nothing runs, and what would be read does not matter: the box read by
+  // loops that do not run may lie anywhere, that of clamp(x, 0, extent - 1) at 0.
+  void return_if_nothing_is_asked(std::vector<Stmt>& checks) const {
+    Expr is_asked = const_false();
+    for (const LoweredArgument& arg : args_) {
+      if (arg.kind != LoweredArgument::Kind::OutputBuffer) continue;
+      Expr has_elements = const_true();
+      for (int d = 0; d < arg.dimensions; d++)
+        has_elements = has_elements && variable(fact(arg.name, "extent", d)) > 0;
+      is_asked = is_asked || has_elements;
+    }
+    is_asked = simplify(is_asked);
+    if (!is_const_true(is_asked)) checks.push_back(make_assert(is_asked, 0));
   }
 
   void add_requirements(std::vector<Stmt>& checks) const {
@@ -360,8 +378,7 @@ class Checks {
     }
   }
 
-  // Nothing is read when another extent is empty, so an empty buffer fits an empty requirement only
-  // by the numbers.
+  // An empty buffer fits an empty box only by the numbers.
   static void add_box_checks(const LoweredArgument& arg, const Box& box,
                              std::vector<Stmt>& checks) {
     const char* verb = arg.kind == LoweredArgument::Kind::OutputBuffer ? "written" : "read";

@@ -8,6 +8,7 @@
 //   }
 //
 //   assert c, message                     =>     (nothing)
+//   assert c, 0                           =>     the same: it returns and reports nothing
 //
 // drop_asserts runs last: until then the checks tell the simplifier what holds. Failing allocations
 // are no Asserts and stay errors. Tests: test/golden/lower/drop_*/.
@@ -65,15 +66,20 @@ class DropBoundsQuery : public Rewriter {
   }
 };
 
+bool may_report(const Stmt& s) {
+  const auto* assert = s.as<Assert>();
+  return assert && !is_zero(assert->error);
+}
+
 class DropAsserts : public Rewriter {
  protected:
   Stmt rewrite(const Stmt& s) override {
-    if (s.kind() == Kind::Assert) return make_evaluate(0);
+    if (may_report(s)) return make_evaluate(0);
     const auto* block = s.as<Block>();
     if (!block) return children(s);
     std::vector<Stmt> kept;
     for (const Stmt& part : block->stmts) {
-      if (part.kind() != Kind::Assert) kept.push_back((*this)(part));
+      if (!may_report(part)) kept.push_back((*this)(part));
     }
     return kept.empty() ? make_evaluate(0) : make_block(kept);
   }

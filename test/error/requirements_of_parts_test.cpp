@@ -52,9 +52,8 @@ TEST_F(RequirementsOfParts, Handles) {
 // ---- compiled functions ----
 
 TEST_F(RequirementsOfParts, CompiledFunctions) {
-  expect("the list of arguments holds inputs, and outputs follow by themselves", [&] {
-    f.compile_to_module({Argument("out", Argument::OutputBuffer, Int(32), 2)}, "f");
-  });
+  expect("the list of arguments holds inputs, and outputs follow by themselves",
+         [&] { f.compile_to_module({Argument("out", Argument::OutputBuffer, Int(32), 2)}, "f"); });
   expect("a C function that it calls must be in this process, or among its JIT externs", [&] {
     Func g("g");
     g(x) = call_c_function<int, int>("nobody_wrote_this", x);
@@ -86,8 +85,9 @@ TEST_F(RequirementsOfParts, WhatIsMemoizedIsComputedWhole) {
   g(x, y) = x + y;
   h(x, y) = g(x, y) + g(x, y + 1);
   g.store_root().compute_at(h, y).memoize();
-  expect("a memoized Func must be computed whole, where its storage begins",
-         [&] { h.realize({4, 4}); });
+  expect("a memoized Func must be computed whole, where its storage begins", [&] {
+    h.realize({4, 4});
+  });
   expect("what an image holds is no part of a memoized Func's key", [&] {
     Func reader("reader"), out("out");
     reader(x) = image(x);
@@ -98,26 +98,30 @@ TEST_F(RequirementsOfParts, WhatIsMemoizedIsComputedWhole) {
 }
 
 TEST_F(RequirementsOfParts, HoistedStorage) {
-  const auto schedule = [&](const std::function<void(Func& g, Func& h)>& given) {
+  const auto schedule = [&](const std::function<void(Func & g, Func & h)>& given) {
     Func g("g"), h("h");
     g(x, y) = x + y;
     h(x, y) = g(x, y) + g(x, y + 1);
     given(g, h);
     h.realize({4, 4});
   };
-  expect("storage is hoisted to a loop that encloses its store level", [&] {
-    schedule([&](Func& g, Func& h) { g.compute_at(h, y).hoist_storage(h, x); });
+  expect("storage is hoisted to a loop that encloses its store level",
+         [&] { schedule([&](Func& g, Func& h) { g.compute_at(h, y).hoist_storage(h, x); }); });
+  expect("the size of hoisted storage is known outside of the loops it is hoisted over", [&] {
+    Func powers("powers"), sums("sums");
+    powers(x) = x;
+    sums(x) = powers(x) + powers(1 << x);
+    powers.compute_at(sums, x).hoist_storage_root();
+    sums.realize({4});
   });
 }
 
 // ---- derivatives ----
 
 TEST_F(RequirementsOfParts, BudgetsOfDerivatives) {
-  expect("a budget is a number of states or of bytes", [&] {
-    propagate_adjoints(loss, {.checkpoint_states = 2, .checkpoint_bytes = 100});
-  });
-  expect("a budget is a number of bytes",
-         [&] { propagate_adjoints(loss, {.version_bytes = -1}); });
+  expect("a budget is a number of states or of bytes",
+         [&] { propagate_adjoints(loss, {.checkpoint_states = 2, .checkpoint_bytes = 100}); });
+  expect("a budget is a number of bytes", [&] { propagate_adjoints(loss, {.version_bytes = -1}); });
 }
 
 TEST_F(RequirementsOfParts, WhatIsDifferentiated) {
@@ -127,8 +131,9 @@ TEST_F(RequirementsOfParts, WhatIsDifferentiated) {
   Param<int> count("count");
   Func along("along");
   along(x) = 1.0f;
-  expect("the input is a float that the loss depends on",
-         [&] { hessian_vector_product(loss, count, {{image, along}}); });
+  expect("the input is a float that the loss depends on", [&] {
+    hessian_vector_product(loss, count, {{image, along}});
+  });
 }
 
 TEST_F(RequirementsOfParts, WhatHasNoDerivative) {
@@ -137,7 +142,9 @@ TEST_F(RequirementsOfParts, WhatHasNoDerivative) {
   scaled(x) = select(x > 3, undef<float>(), image(x)) * 2.0f;
   expect<Unsupported>(
       "the tangent of undef is known where a select chooses it and nothing else is done with it",
-      [&] { propagate_tangents(scaled, {{image, along}}); });
+      [&] {
+        propagate_tangents(scaled, {{image, along}});
+      });
   called(x) = call_c_function<float, float>("sinf", image(x));
   Func sum_of_calls("sum_of_calls");
   RDom r(0, 4);
@@ -161,15 +168,17 @@ TEST_F(RequirementsOfParts, ReportsOnDerivatives) {
   Buffer<float> values(4);
   values.fill(1.0f);
   image.set(values);
-  expect("the output needs a size in each of its dimensions, and a min in each or none",
-         [&] { check_gradients(line, {4, 4}); });
+  expect("the output needs a size in each of its dimensions, and a min in each or none", [&] {
+    check_gradients(line, {4, 4});
+  });
   expect("`wrt` names floating inputs that the output depends on",
          [&] { check_gradients(line, {4}, {.wrt = {other}}); });
   Func whole("whole");
   whole(x) = cast<int>(image(x));
   expect<Unsupported>("derivatives are of floats", [&] { check_gradients(whole, {4}); });
-  expect("a range is one of a floating input that the output depends on",
-         [&] { check_stability(line, {4}, {.ranges = {{other, 0, 1}}}); });
+  expect("a range is one of a floating input that the output depends on", [&] {
+    check_stability(line, {4}, {.ranges = {{other, 0, 1}}});
+  });
 }
 
 // ---- generators ----
@@ -186,9 +195,8 @@ class Scaling : public Generator<Scaling> {
 };
 
 TEST_F(RequirementsOfParts, EstimatesOfInputs) {
-  expect("a dimension goes by the name of the input's argument", [&] {
-    GeneratorContext(get_host_target()).create<Scaling>()->build_module("scaling");
-  });
+  expect("a dimension goes by the name of the input's argument",
+         [&] { GeneratorContext(get_host_target()).create<Scaling>()->build_module("scaling"); });
 }
 
 }  // namespace

@@ -51,6 +51,59 @@ TEST(EmptyImages, AddUpToNothing) {
   }
 }
 
+TEST(EmptyImages, AskForNothing) {
+  for (const TailStrategy tail : {TailStrategy::ShiftInwards, TailStrategy::RoundUp}) {
+    Doubled program;
+    program.f.vectorize(x, 8, tail);
+    EXPECT_EQ(program.extents_over({0, 5}), (std::vector<int>{0, 5}));
+  }
+}
+
+// What a loss over all elements adds up, and its reads at and beyond the borders.
+using Term = Expr (*)(const ImageParam& im, const RDom& r);
+const std::vector<Term> terms = {
+    [](const ImageParam& im, const RDom& r) { return im(r.x, r.y) * im(r.x, r.y); },
+    [](const ImageParam& im, const RDom& r) {
+      const Func f = BoundaryConditions::repeat_edge(im);
+      return f(r.x, r.y) * f(r.x + 1, r.y);
+    },
+    [](const ImageParam& im, const RDom& r) {
+      const Func f = BoundaryConditions::mirror_image(im);
+      return f(r.x, r.y) * f(r.x, r.y - 1);
+    },
+    [](const ImageParam& im, const RDom& r) {
+      const Func f = BoundaryConditions::constant_exterior(im, 1.0f);
+      return f(r.x, r.y) * f(r.x - 1, r.y);
+    },
+    [](const ImageParam& im, const RDom& r) { return im(clamp(r.x + 1, 0, im.width() - 1), r.y); },
+    [](const ImageParam& im, const RDom& r) {
+      Func stage("stage");
+      stage(x, y) = 2.0f * im(x, y);
+      return stage(r.x, r.y) * stage(r.x, r.y);
+    },
+    [](const ImageParam& im, const RDom& r) {
+      Func scan("scan");
+      const RDom along(1, im.width() - 1);
+      scan(x, y) = im(x, y);
+      scan(along, y) += 0.5f * scan(along - 1, y);
+      return scan(r.x, r.y) * scan(r.x, r.y);
+    }};
+
+TEST(EmptyImages, HaveEmptyGradients) {
+  for (const Term& term : terms) {
+    ImageParam im(Float(32), 2, "im");
+    const RDom r(0, im.width(), 0, im.height());
+    Func loss("loss");
+    loss() = 0.0f;
+    loss() += term(im, r);
+    Func gradient = propagate_adjoints(loss)(im);
+    for (const std::vector<int>& sizes : std::vector<std::vector<int>>{{0, 3}, {3, 0}, {0, 0}}) {
+      im.set(Buffer<float>(sizes));
+      EXPECT_NO_THROW(gradient.realize(sizes)) << &term - terms.data();
+    }
+  }
+}
+
 TEST(EmptyImages, PlacesOfDataInAnEmptyOne) {
   using Schedule = void (*)(Func&, const RDom&);
   const Schedule schedules[] = {

@@ -22,6 +22,9 @@ TEST(BufferNames, TypesKnownToTheCompiler) {
   static_assert(std::is_same_v<Plane::ElemType, float>);
   EXPECT_EQ(from_halide_type(Plane::static_halide_type()), Float(32));
   EXPECT_EQ(to_halide_type(UInt(16)), halide_type_of<uint16_t>());
+  for (const Type type : {Int(8), UInt(1), Float(32, 4), BFloat(16), Handle()}) {
+    EXPECT_EQ(type_word(type), to_halide_type(type).as_u32()) << type;
+  }
   const Buffer<> any = Buffer<float>(3, 4);
   EXPECT_TRUE((Buffer<float>::can_convert_from(any)));
   EXPECT_FALSE((Buffer<int>::can_convert_from(any)));

@@ -157,6 +157,7 @@ class Judge {
   bool compare_with_differences() {
     const Differences first = differences_along(*v_, reverse_);
     if (first.is_right() || !first.slope.is_smooth) return first.slope.is_smooth;
+    if (turns_within_a_step(p_.output(), reverse_.magnitude)) return false;
     for (int i = 0; i < 6; ++i) {
       const Motion another(p_, s_.weights, "v_again");
       const Differences second = differences_along(another, product_along(another));

@@ -36,6 +36,23 @@ int narrowest_float(const Func& output) {
 
 }  // namespace
 
+bool turns_within_a_step(const Func& output, double slope) {
+  if (slope * step <= 1) return false;
+  bool has_waves = false;
+  for (const ir::FuncPtr& f : ir::topological_order({output.function()})) {
+    for (int s = 0; s < f->stage_count(); ++s) {
+      ir::for_each_expr(f->stage(s), [&](const Expr& root) {
+        has_waves |= ir::any_node(root, [](const Expr& e) {
+          const auto* call = e.as<ir::Call>();
+          return call && (call->is_op(ir::Op::sin) || call->is_op(ir::Op::cos) ||
+                          call->is_op(ir::Op::tan));
+        });
+      });
+    }
+  }
+  return has_waves;
+}
+
 double precision_of(const Func& output) {
   const int bits = narrowest_float(output);
   return bits == 8 ? 3e-2 : bits == 16 ? 4e-3 : 1e-6;

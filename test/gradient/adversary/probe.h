@@ -92,6 +92,10 @@ struct Subject {
 
 // ---- differences ----
 
+// Whether a sine may turn within one step of differences, where slopes along the direction add up to
+// so much: to them it is noise, whatever its derivative is. sin(9^8 x) was found so.
+bool turns_within_a_step(const Func& output, double slope);
+
 // The slope of f at 0, by sixth-order central differences; smooth: one-sided slopes say the same.
 struct Slope {
   double value, doubt;

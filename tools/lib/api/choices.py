@@ -49,7 +49,3 @@ SHOWN_BY = {
     "ScheduleHandle": r"Stage", "ExternFuncArgument": r"define_extern|ExternFuncArgument", "Module": r"compile_to_module|Module",
     "Tuple": r"Tuple", "Message": r"message\(\)", "Error": r"error", "RVar": r"RDom|RVar", "Expr": r"Expr", "Func": r"Func",
 }
-
-# Rules that guard against what no program is known to do.
-UNBROKEN = {"an input is something that the output depends on",
-            "the size of hoisted storage is known outside of the loops it is hoisted over"}
