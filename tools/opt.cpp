@@ -7,6 +7,8 @@
 //   opt --graph [--pass=schedule_unscheduled] program.graph
 //                                                   the text is an algorithm (graph/graph.h), which
 //                                                   is checked; --stop-after=PASS lowers it so far
+//   opt --graph --log=FILE program.graph            under a schedule (graph/schedule_log.h), which
+//                                                   is given before the passes run
 //   opt --time-passes --dump-after=all ...          how long each took; what each gave
 //   opt --time-passes --dump-after=PASS,... -- PROGRAM ARGS...
 //                                                   of all that a program compiles while it runs
@@ -33,6 +35,7 @@
 #include "autodiff/graph_passes.h"
 #include "diagnostics/error.h"
 #include "graph/graph.h"
+#include "graph/schedule_log.h"
 #include "ir/parse.h"
 #include "ir/print.h"
 #include "lower/lower.h"
@@ -45,7 +48,7 @@ using namespace retrograde;
 
 struct Options {
   std::vector<std::string> passes, dumped;
-  std::string file = "-", stop_after;
+  std::string file = "-", stop_after, log;
   std::vector<char*> program;  // what stands behind "--", null-terminated
   bool lists = false, lists_pipeline = false, is_expr = false, is_graph = false, times = false;
   bool dumps(const std::string& pass) const {
@@ -71,6 +74,8 @@ std::optional<std::string> value_of(const std::string& arg, const std::string& n
 bool read_option(const std::string& arg, Options& options) {
   if (const auto passes = value_of(arg, "pass")) {
     options.passes = split(*passes, ',');
+  } else if (const auto log = value_of(arg, "log")) {
+    options.log = *log;
   } else if (const auto dumped = value_of(arg, "dump-after")) {
     options.dumped = split(*dumped, ',');
   } else if (arg == "--list") {
@@ -165,6 +170,11 @@ void run_expr(const Options& options) {
 void run_graph(const Options& options) {
   ir::Graph graph = ir::parse_graph(read_all(options.file));
   ir::validate(graph, "parse_graph");
+  if (!options.log.empty()) {
+    ir::apply_log(ScheduleLog::parse(read_all(options.log)), graph.outputs);
+    graph = ir::graph_of(graph.outputs);
+    ir::validate(graph, "apply_log");
+  }
   for (const std::string& name : options.passes) {
     const ir::GraphPass* pass = ir::find_graph_pass(name);
     if (!pass) {
@@ -263,8 +273,7 @@ int run_program(const Options& options) {
 int run(const Options& options) {
   if (!options.program.empty()) return run_program(options);
   if (options.lists) {
-    for (const ir::GraphPass& pass : ir::graph_passes())
-      std::cout << pass.name << " (--graph)\n";
+    for (const ir::GraphPass& pass : ir::graph_passes()) std::cout << pass.name << " (--graph)\n";
     for (const ir::StatementPass& pass : ir::statement_passes()) std::cout << pass.name << "\n";
   } else if (options.lists_pipeline) {
     for (const std::string& name : ir::pass_names()) std::cout << name << "\n";
@@ -283,7 +292,7 @@ int main(int argc, char** argv) {
   if (!options) {
     std::cerr << "usage: opt --pass=NAME,... [--expr] [--time-passes] [--dump-after=NAME,...|all] "
                  "[FILE]\n"
-                 "       opt --graph [--pass=NAME,...] [--stop-after=NAME] [FILE]\n"
+                 "       opt --graph [--log=FILE] [--pass=NAME,...] [--stop-after=NAME] [FILE]\n"
                  "       opt [--time-passes] [--dump-after=NAME,...|all] -- PROGRAM ARGS...\n"
                  "       opt --list | --list-pipeline\n";
     return 2;

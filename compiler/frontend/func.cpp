@@ -54,9 +54,7 @@ Func::Func(const Expr& e) : Func() { (*this)(_) = e; }
 // ---- accessors ----
 
 void Func::check_defined(const std::string& asked) const {
-  if (defined()) return;
-  user_error(asked, quoted(name()) + " needs a definition first", "it has none",
-             "Define it: f(x, y) = ...");
+  ir::check_is_defined(*func_, asked);
 }
 
 std::vector<Var> Func::args() const {

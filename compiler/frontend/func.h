@@ -527,14 +527,9 @@ class Func {
 
   Stage pure_stage() const;
   Func& with(const Stage&) { return *this; }
-  ir::FuncSchedule& touch();
+  Func& give(ir::Directive directive);
   void check_defined(const std::string& asked) const;
   const ir::Definition& checked_update(int index, const char* asked) const;
-  void add_bound(std::vector<ir::Bound>& bounds, const std::string& asked, const Var& var, Expr min,
-                 Expr extent);
-  Expr checked_size(Expr e, const char* what, const std::string& asked) const;
-  ir::StorageRule& storage_rule(const Var& dim, const std::string& asked);
-  void check_is_dimension(const Var& var, const std::string& asked) const;
   Func wrap(const std::vector<Func>& users, const std::string& name, bool clone) const;
   Pipeline& pipeline();
 };

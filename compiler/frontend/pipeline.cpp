@@ -137,6 +137,9 @@ Pipeline::Contents& Pipeline::checked() const {
   return *contents_;
 }
 
+ScheduleLog Pipeline::schedule_log() const { return ir::schedule_log(checked().outputs); }
+void Pipeline::apply_schedule(const ScheduleLog& log) { ir::apply_log(log, checked().outputs); }
+
 PipelineSpec Pipeline::spec() const {
   PipelineSpec result{checked().outputs[0]->name, contents_->outputs};
   for (const auto& [name, function] : contents_->externs)

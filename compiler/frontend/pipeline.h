@@ -13,6 +13,7 @@
 #include "frontend/module.h"
 #include "frontend/param_map.h"
 #include "frontend/realization.h"
+#include "graph/schedule_log.h"
 
 namespace retrograde {
 
@@ -204,6 +205,13 @@ class Pipeline {
   static void set_default_autoscheduler_name(const std::string& name) {
     retrograde::set_default_autoscheduler_name(name);
   }
+
+  // ---- schedules as values; see schedule_log.h ----
+  ScheduleLog schedule_log() const;  // what was given to its Funcs, in the order given
+  // Gives all of a log to the Funcs of the same names.
+  // Requires: every Func that it names is one of the program; what a directive is given to is
+  // there.
+  void apply_schedule(const ScheduleLog& log);
 
   PipelineSpec spec() const;
 

@@ -13,7 +13,7 @@
 
 #include "frontend/loop_level.h"
 #include "frontend/var_or_rvar.h"
-#include "graph/function.h"
+#include "graph/give_directive.h"
 #include "ir/target.h"
 
 namespace retrograde {
@@ -28,13 +28,13 @@ class Stage {
   // `specialization`: which of the stage's schedules; see StageSchedule::specializations. Empty:
   // the general one.
   Stage(ir::FuncPtr func, int index, std::vector<int> specialization = {})
-      : func_(std::move(func)), index_(index), specialization_(std::move(specialization)) {}
+      : place_{std::move(func), index, std::move(specialization)} {}
 
   // "blur", "blur.update(0)"
   std::string name() const;
-  const ir::FuncPtr& function() const { return func_; }
-  int index() const { return index_; }
-  const ir::StageSchedule& get_schedule() const { return schedule(); }
+  const ir::FuncPtr& function() const { return place_.f; }
+  int index() const { return place_.stage; }
+  const ir::StageSchedule& get_schedule() const { return place_.schedule(); }
   std::string dump_argument_list() const;     // the loops, innermost first
   std::vector<VarOrRVar> split_vars() const;  // the same as variables
   std::string source_location() const;        // where the Func was declared: "blur.cpp:12"
@@ -305,21 +305,11 @@ class Stage {
   void unscheduled();  // says that no directive was forgotten
 
  private:
-  const ir::Definition& definition() const { return func_->stage(index_); }
-  const ir::StageSchedule& schedule() const;
-  ir::StageSchedule& touch() const;
-  size_t loop_index(const VarOrRVar& var, const std::string& asked) const;
-  void check_new_name(const VarOrRVar& var, const std::string& replaced,
-                      const std::string& asked) const;
-  void check_race_free(const VarOrRVar& var, const std::string& asked) const;
-  Stage& set_for_type(const VarOrRVar& var, ForType type, const char* verb);
+  Stage& give(ir::Directive directive);
+  Stage& set_partitions(const std::vector<VarOrRVar>& vars, Partition partition);
   [[noreturn]] void refuse_device(const std::string& asked, DeviceAPI device) const;
-  Stage& add_prefetch(std::string name, ir::SymbolRef symbol, const VarOrRVar& at,
-                      const VarOrRVar& from, Expr offset, PrefetchBoundStrategy strategy);
 
-  ir::FuncPtr func_;
-  int index_;
-  std::vector<int> specialization_;
+  ir::SchedulePlace place_;
 };
 using ScheduleHandle = Stage;
 

@@ -344,6 +344,41 @@ void make_outputs(FuncContents& f) {
   }
 }
 
+namespace {
+
+// Why an expression has no single value in a call; empty when it has.
+std::string varying_part(const Expr& root) {
+  std::string part;
+  walk(root, [&](const Expr& e) {
+    if (!part.empty()) return false;
+    if (const Variable* v = e.as<Variable>()) {
+      if (!std::dynamic_pointer_cast<ParameterContents>(v->symbol.lock()))
+        part = text(quoted(v->name), " is a variable of loops");
+    }
+    if (const Call* call = e.as<Call>()) {
+      if (call->call_type == CallType::Func)
+        part = text(e, " is a value of the Func ", quoted(call->name));
+      if (call->call_type == CallType::Image)
+        part = text(e, " is an element of the image ", quoted(call->name));
+      if (call->is_op(Op::random)) part = text(e, " is random");
+    }
+    return part.empty();
+  });
+  return part;
+}
+
+}  // namespace
+
+void check_over_parameters(const Expr& e, const char* what, const std::string& asked) {
+  const std::string part = varying_part(e);
+  if (part.empty()) return;
+  user_error(asked,
+             text(what,
+                  " has one value in each call: it is made of parameters and facts "
+                  "about buffers"),
+             part, "Use a Param, or a fact such as in.dim(0).extent()");
+}
+
 std::string source_location_of(const FuncContents& f) {
   return f.declared_at.file.empty() ? "" : text(f.declared_at.file, ":", f.declared_at.line);
 }

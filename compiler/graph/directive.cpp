@@ -46,6 +46,7 @@ void give(const FuseLoops& fuse, StageSchedule& schedule) {
 }
 
 void give(const RenameLoop& rename, StageSchedule& schedule) {
+  if (rename.old == rename.renamed) return;
   Dim& loop = schedule.dims[place_of(schedule, rename.old)];
   schedule.splits.push_back({Split::Kind::Rename,
                              rename.old,
@@ -82,15 +83,28 @@ void give(const MakeAtomic& atomic, StageSchedule& schedule) {
 void give(const AllowRaces&, StageSchedule& schedule) { schedule.allow_races = true; }
 void give(const Unscheduled&, StageSchedule&) {}
 void give(const PrefetchData& prefetch, StageSchedule& schedule) {
-  schedule.prefetches.push_back(
-      {prefetch.source, {}, prefetch.at, prefetch.from, prefetch.offset, prefetch.strategy});
+  schedule.prefetches.push_back({prefetch.source, prefetch.symbol, prefetch.at, prefetch.from,
+                                 prefetch.offset, prefetch.strategy});
 }
 void give(const ComputeWith& with, StageSchedule& schedule) {
   schedule.fuse_level = with.level;
-  schedule.fuse_alignment.clear();
+  schedule.fuse_alignment = {with.align.begin(), with.align.end()};
 }
-void give(const AlignLoop& align, StageSchedule& schedule) {
-  schedule.fuse_alignment[align.loop] = align.how;
+
+// It starts as a copy of the schedule so far.
+void give(const Specialize& specialize, StageSchedule& schedule) {
+  StageSchedule copy = schedule;
+  copy.specializations.clear();
+  copy.condition = specialize.condition;
+  copy.failure.clear();
+  schedule.specializations.push_back(std::move(copy));
+}
+void give(const SpecializeFail& fail, StageSchedule& schedule) {
+  StageSchedule failing;
+  failing.dims = schedule.dims;
+  failing.splits = schedule.splits;
+  failing.failure = fail.message.as<StringImm>()->value;
+  schedule.specializations.push_back(std::move(failing));
 }
 
 // ---- the Func ----
@@ -102,23 +116,12 @@ void give(const ComputeAt& compute, FuncSchedule& schedule) {
                                schedule.store_level == schedule.compute_level);
   schedule.compute_level = compute.level;
   if (follows) schedule.store_level = compute.level;
-  schedule.touched = true;
 }
-void give(const StoreAt& store, FuncSchedule& schedule) {
-  schedule.store_level = store.level;
-  schedule.touched = true;
-}
-void give(const HoistStorage& hoist, FuncSchedule& schedule) {
-  schedule.hoist_level = hoist.level;
-  schedule.touched = true;
-}
-void give(const StoreIn& store, FuncSchedule& schedule) {
-  schedule.memory = store.memory;
-  schedule.touched = true;
-}
+void give(const StoreAt& store, FuncSchedule& schedule) { schedule.store_level = store.level; }
+void give(const HoistStorage& hoist, FuncSchedule& schedule) { schedule.hoist_level = hoist.level; }
+void give(const StoreIn& store, FuncSchedule& schedule) { schedule.memory = store.memory; }
 void give(const ReorderStorage& reorder, FuncSchedule& schedule) {
   schedule.storage_dims = reorder.dimensions;
-  schedule.touched = true;
 }
 
 // The entry for a dimension, made when there is none.
@@ -130,48 +133,58 @@ Entry& entry_of(std::vector<Entry>& entries, const std::string& dimension) {
   entries.emplace_back().var = dimension;
   return entries.back();
 }
-StorageRule& rule_of(FuncSchedule& schedule, const std::string& dimension) {
-  schedule.touched = true;
-  return entry_of(schedule.storage_rules, dimension);
-}
 
 void give(const AlignStorage& align, FuncSchedule& schedule) {
-  rule_of(schedule, align.dimension).alignment = align.alignment;
+  entry_of(schedule.storage_rules, align.dimension).alignment = align.alignment;
 }
 void give(const BoundStorage& bound, FuncSchedule& schedule) {
-  rule_of(schedule, bound.dimension).bound = bound.extent;
+  entry_of(schedule.storage_rules, bound.dimension).bound = bound.extent;
 }
 void give(const FoldStorage& fold, FuncSchedule& schedule) {
-  StorageRule& rule = rule_of(schedule, fold.dimension);
+  StorageRule& rule = entry_of(schedule.storage_rules, fold.dimension);
   rule.fold = fold.extent;
   rule.fold_forward = fold.forward;
 }
 void give(const Memoize& memoize, FuncSchedule& schedule) {
-  schedule.memoized = schedule.touched = true;
+  schedule.memoized = true;
   if (memoize.key.defined()) schedule.eviction_key = memoize.key;
 }
-void give(const Async&, FuncSchedule& schedule) { schedule.async = schedule.touched = true; }
+void give(const Async&, FuncSchedule& schedule) { schedule.async = true; }
 
-// What is known of sizes is no schedule: it leaves a Func untouched.
-void give(const BoundDimension& bound, FuncSchedule& schedule) {
-  Bound& entry = entry_of(schedule.bounds, bound.dimension);
+// What is known of sizes, and what is reported, is no schedule: it leaves a Func untouched.
+void give(const BoundDimension& bound, FuncContents& f) {
+  Bound& entry = entry_of(f.schedule.bounds, bound.dimension);
   entry.min = bound.min;
   entry.extent = bound.extent;
 }
-void give(const AlignBounds& align, FuncSchedule& schedule) {
-  Bound& entry = entry_of(schedule.bounds, align.dimension);
+void give(const AlignBounds& align, FuncContents& f) {
+  Bound& entry = entry_of(f.schedule.bounds, align.dimension);
   entry.modulus = align.modulus;
   entry.remainder = align.remainder;
 }
-void give(const Estimate& estimate, FuncSchedule& schedule) {
-  Bound& entry = entry_of(schedule.estimates, estimate.dimension);
+void give(const Estimate& estimate, FuncContents& f) {
+  Bound& entry = entry_of(f.schedule.estimates, estimate.dimension);
   entry.min = estimate.min;
   entry.extent = estimate.extent;
 }
+void give(const TraceLoads&, FuncContents& f) { f.trace.loads = true; }
+void give(const TraceStores&, FuncContents& f) { f.trace.stores = true; }
+void give(const TraceRealizations&, FuncContents& f) { f.trace.realizations = true; }
+void give(const AddTraceTag& tag, FuncContents& f) {
+  f.trace.tags.push_back(tag.tag.as<StringImm>()->value);
+}
+void give(const DebugToFile& debug, FuncContents& f) {
+  f.debug_file = debug.file.as<StringImm>()->value;
+}
+
+template <typename D, typename Schedule>
+concept GivenTo = requires(const D& directive, Schedule& schedule) {
+  give(directive, schedule);
+};
 
 // ---- and back ----
 
-StageDirective directive_of(const Split& split) {
+Directive directive_of(const Split& split) {
   switch (split.kind) {
     case Split::Kind::Split:
       return SplitLoop{split.old_var, split.outer, split.inner, split.factor, split.tail};
@@ -183,22 +196,22 @@ StageDirective directive_of(const Split& split) {
   return RenameLoop{split.old_var, split.outer};
 }
 
-std::vector<std::string> names_of(const std::vector<Dim>& loops) {
-  std::vector<std::string> names;
+std::vector<NamedLoop> loop_names(const std::vector<Dim>& loops) {
+  std::vector<NamedLoop> names;
   for (const Dim& loop : loops) names.push_back(loop.var);
   return names;
 }
 
 void add_loops(const StageSchedule& schedule, const std::vector<Dim>& first,
-               std::vector<StageDirective>& log) {
+               std::vector<Directive>& log) {
   StageSchedule built;
   built.dims = first;
   for (const Split& split : schedule.splits) {
     log.push_back(directive_of(split));
     apply_directive(log.back(), built);
   }
-  if (names_of(built.dims) != names_of(schedule.dims)) {
-    log.push_back(ReorderLoops{names_of(schedule.dims)});
+  if (loop_names(built.dims) != loop_names(schedule.dims)) {
+    log.push_back(ReorderLoops{loop_names(schedule.dims)});
     apply_directive(log.back(), built);
   }
   for (size_t i = 0; i < schedule.dims.size(); ++i) {
@@ -224,41 +237,84 @@ std::vector<Dim> first_loops(const FuncContents& f, const Definition& definition
   return loops;
 }
 
-void apply_directive(const StageDirective& directive, StageSchedule& schedule) {
+bool is_of_stage(const Directive& directive) {
+  return std::visit(
+      []<typename D>(const D&) {
+        return GivenTo<D, StageSchedule> || std::is_same_v<D, FactorOut>;
+      },
+      directive);
+}
+
+const char* name_of(const Directive& directive) {
+  return std::visit([](const auto& d) { return d.name; }, directive);
+}
+
+std::vector<std::string> directive_names() {
+  return []<typename... D>(const std::variant<D...>*) {
+    return std::vector<std::string>{D::name...};
+  }(static_cast<const Directive*>(nullptr));
+}
+
+std::string made_by(const Directive& directive) {
+  return std::visit(
+      [](const auto& d) -> std::string {
+        if constexpr (requires { d.made; }) return d.made;
+        return "";
+      },
+      directive);
+}
+
+void apply_directive(const Directive& directive, StageSchedule& schedule) {
   schedule.touched = true;
-  std::visit([&](const auto& d) { give(d, schedule); }, directive);
+  std::visit(
+      [&]<typename D>(const D& d) {
+        if constexpr (GivenTo<D, StageSchedule>) return give(d, schedule);
+        RETROGRADE_ASSERT((GivenTo<D, StageSchedule>), D::name, " is given to no stage");
+      },
+      directive);
 }
 
-void apply_directive(const FuncDirective& directive, FuncSchedule& schedule) {
-  std::visit([&](const auto& d) { give(d, schedule); }, directive);
+void apply_directive(const Directive& directive, FuncContents& f) {
+  std::visit(
+      [&]<typename D>(const D& d) {
+        if constexpr (GivenTo<D, FuncSchedule>) {
+          f.schedule.touched = true;
+          give(d, f.schedule);
+        } else if constexpr (GivenTo<D, FuncContents>) {
+          give(d, f);
+        } else {
+          RETROGRADE_ASSERT(false, D::name, " is given to no Func");
+        }
+      },
+      directive);
 }
 
-std::vector<StageDirective> directives_of(const StageSchedule& schedule,
-                                          const std::vector<Dim>& first) {
-  std::vector<StageDirective> log;
+std::vector<Directive> directives_of(const StageSchedule& schedule, const std::vector<Dim>& first) {
+  std::vector<Directive> log;
   add_loops(schedule, first, log);
   if (schedule.atomic) log.push_back(MakeAtomic{schedule.override_associativity});
   if (schedule.allow_races) log.push_back(AllowRaces{});
   for (const PrefetchDirective& p : schedule.prefetches)
-    log.push_back(PrefetchData{p.name, p.at, p.from, p.offset, p.strategy});
-  if (schedule.fuse_level.kind != LoopLevel::Kind::Inlined)
-    log.push_back(ComputeWith{schedule.fuse_level});
-  for (const auto& [loop, how] : schedule.fuse_alignment) log.push_back(AlignLoop{loop, how});
+    log.push_back(PrefetchData{p.name, p.at, p.from, p.offset, p.strategy, p.symbol});
+  if (schedule.fuse_level.kind != LoopLevel::Kind::Inlined) {
+    log.push_back(ComputeWith{{schedule.fuse_level},
+                              {schedule.fuse_alignment.begin(), schedule.fuse_alignment.end()}});
+  }
   if (log.empty() && schedule.touched) log.push_back(Unscheduled{});
   return log;
 }
 
-std::vector<FuncDirective> directives_of(const FuncSchedule& schedule,
-                                         const std::vector<std::string>& dimensions) {
-  std::vector<FuncDirective> log;
+std::vector<Directive> directives_of(const FuncContents& f) {
+  const FuncSchedule& schedule = f.schedule;
+  std::vector<Directive> log;
   const bool is_placed = schedule.compute_level.kind != LoopLevel::Kind::Inlined;
-  if (schedule.touched || is_placed) log.push_back(ComputeAt{schedule.compute_level});
+  if (schedule.touched || is_placed) log.push_back(ComputeAt{{schedule.compute_level}});
   if (!(schedule.store_level == schedule.compute_level))
-    log.push_back(StoreAt{schedule.store_level});
+    log.push_back(StoreAt{{schedule.store_level}});
   if (schedule.hoist_level.kind != LoopLevel::Kind::Inlined)
-    log.push_back(HoistStorage{schedule.hoist_level});
+    log.push_back(HoistStorage{{schedule.hoist_level}});
   if (schedule.memory != MemoryType::Auto) log.push_back(StoreIn{schedule.memory});
-  if (schedule.storage_dims != dimensions) log.push_back(ReorderStorage{schedule.storage_dims});
+  if (schedule.storage_dims != f.args) log.push_back(ReorderStorage{schedule.storage_dims});
   for (const StorageRule& rule : schedule.storage_rules) {
     if (rule.alignment.defined()) log.push_back(AlignStorage{rule.var, rule.alignment});
     if (rule.bound.defined()) log.push_back(BoundStorage{rule.var, rule.bound});
@@ -273,6 +329,11 @@ std::vector<FuncDirective> directives_of(const FuncSchedule& schedule,
   }
   for (const Bound& guess : schedule.estimates)
     log.push_back(Estimate{guess.var, guess.min, guess.extent});
+  if (f.trace.loads) log.push_back(TraceLoads{});
+  if (f.trace.stores) log.push_back(TraceStores{});
+  if (f.trace.realizations) log.push_back(TraceRealizations{});
+  for (const std::string& tag : f.trace.tags) log.push_back(AddTraceTag{tag});
+  if (!f.debug_file.empty()) log.push_back(DebugToFile{f.debug_file});
   return log;
 }
 

@@ -1,9 +1,8 @@
 // Arguments are read as expressions: names and enumerators are variables to that parser.
 #include "graph/directive_text.h"
 
-#include <array>
-
 #include "diagnostics/error.h"
+#include "graph/directive_choices.h"
 #include "ir/build.h"
 #include "ir/equal.h"
 #include "ir/parse.h"
@@ -14,34 +13,6 @@ namespace retrograde::ir {
 
 namespace {
 
-// ---- enumerators, as C++ has them ----
-
-constexpr std::array tail_names{"RoundUp",
-                                "GuardWithIf",
-                                "Predicate",
-                                "PredicateLoads",
-                                "PredicateStores",
-                                "RoundUpAndBlend",
-                                "ShiftInwardsAndBlend",
-                                "ShiftInwards",
-                                "Auto"};
-constexpr std::array loop_names{"Serial", "Parallel", "Vectorized", "Unrolled"};
-constexpr std::array partition_names{"Auto", "Never", "Always"};
-constexpr std::array memory_names{"Auto",       "Heap",        "Stack", "Register", "GPUShared",
-                                  "GPUTexture", "LockedCache", "VTCM",  "AMXTile"};
-constexpr std::array align_names{"AlignStart", "AlignEnd", "NoAlign", "Auto"};
-constexpr std::array prefetch_names{"Clamp", "GuardWithIf", "NonFaulting"};
-
-const auto& names_of(TailStrategy) { return tail_names; }
-const auto& names_of(ForType) { return loop_names; }
-const auto& names_of(Partition) { return partition_names; }
-const auto& names_of(MemoryType) { return memory_names; }
-const auto& names_of(LoopAlignStrategy) { return align_names; }
-const auto& names_of(PrefetchBoundStrategy) { return prefetch_names; }
-
-template <typename T>
-concept Enumeration = std::is_enum_v<T>;
-
 // ---- printing ----
 
 std::string print_field(const std::string& name) { return quote_name(name); }
@@ -49,7 +20,7 @@ std::string print_field(const Expr& e) { return print_argument(e); }
 std::string print_field(bool flag) { return flag ? "true" : "false"; }
 template <Enumeration E>
 std::string print_field(E value) {
-  return names_of(value)[static_cast<size_t>(value)];
+  return choice_name(value);
 }
 std::string print_field(const LoopLevel& level) {
   if (level.kind == LoopLevel::Kind::Inlined) return "inlined";
@@ -57,25 +28,15 @@ std::string print_field(const LoopLevel& level) {
   const std::string stage = level.stage < 0 ? "" : text(", ", level.stage);
   return text("loop(", quote_name(level.func), ", ", quote_name(level.var), stage, ")");
 }
-std::string print_field(const std::vector<std::string>& names) {
-  std::string out;
-  for (const std::string& name : names) out += (out.empty() ? "" : ", ") + quote_name(name);
-  return out;
+template <typename A, typename B>
+std::string print_field(const std::pair<A, B>& both) {
+  return print_field(both.first) + ", " + print_field(both.second);
 }
-
-template <typename Variant>
-std::string print_any(const Variant& directive) {
-  return std::visit(
-      [](auto d) {
-        std::string out;
-        std::apply(
-            [&](const auto&... field) {
-              ((out += (out.empty() ? "" : ", ") + print_field(field)), ...);
-            },
-            d.fields());
-        return text(d.name, "(", out, ")");
-      },
-      directive);
+template <typename T>
+std::string print_field(const std::vector<T>& list) {
+  std::string out;
+  for (const T& one : list) out += (out.empty() ? "" : ", ") + print_field(one);
+  return out;
 }
 
 // ---- parsing ----
@@ -119,7 +80,7 @@ class Reader {
   template <Enumeration E>
   void read(E& value) {
     const std::string word = name_of(take("a choice"), "a choice");
-    const auto& names = names_of(value);
+    const auto& names = Choices<E>::names;
     for (size_t i = 0; i < names.size(); ++i) {
       if (word == names[i]) {
         value = static_cast<E>(i);
@@ -140,8 +101,14 @@ class Reader {
     const std::string word = name_of(e, "root, inlined or loop(f, x)");
     level.kind = word == "root" ? LoopLevel::Kind::Root : LoopLevel::Kind::Inlined;
   }
-  void read(std::vector<std::string>& names) {
-    while (next_ < args_.size()) names.push_back(name_of(take("a name"), "a name"));
+  template <typename A, typename B>
+  void read(std::pair<A, B>& both) {
+    read(both.first);
+    read(both.second);
+  }
+  template <typename T>
+  void read(std::vector<T>& list) {
+    while (next_ < args_.size()) read(list.emplace_back());
   }
 
   std::string line_;
@@ -149,13 +116,13 @@ class Reader {
   size_t next_ = 0;
 };
 
-template <typename Variant, size_t I = 0>
-std::optional<Variant> parse_any(const std::string& line) {
-  if constexpr (I == std::variant_size_v<Variant>) {
+template <size_t I = 0>
+std::optional<Directive> parse_from(const std::string& line) {
+  if constexpr (I == std::variant_size_v<Directive>) {
     return std::nullopt;
   } else {
-    using D = std::variant_alternative_t<I, Variant>;
-    if (line.substr(0, line.find('(')) != D::name) return parse_any<Variant, I + 1>(line);
+    using D = std::variant_alternative_t<I, Directive>;
+    if (line.substr(0, line.find('(')) != D::name) return parse_from<I + 1>(line);
     return Reader(line, parse_arguments(line)).template read<D>();
   }
 }
@@ -168,21 +135,6 @@ bool same(const Expr& a, const Expr& b) {
 template <typename T>
 bool same(const T& a, const T& b) {
   return a == b;
-}
-
-template <typename Variant>
-bool equal_any(const Variant& a, const Variant& b) {
-  if (a.index() != b.index()) return false;
-  return std::visit(
-      [&](auto x) {
-        auto y = std::get<decltype(x)>(b);
-        const auto xs = x.fields(), ys = y.fields();
-        return [&]<size_t... i>(std::index_sequence<i...>) {
-          return (same(std::get<i>(xs), std::get<i>(ys)) && ...);
-        }
-        (std::make_index_sequence<std::tuple_size_v<decltype(x.fields())>>());
-      },
-      a);
 }
 
 }  // namespace
@@ -200,15 +152,33 @@ std::vector<Expr> parse_arguments(const std::string& line) {
   return args;
 }
 
-std::string to_text(const StageDirective& directive) { return print_any(directive); }
-std::string to_text(const FuncDirective& directive) { return print_any(directive); }
-std::optional<StageDirective> parse_stage_directive(const std::string& line) {
-  return parse_any<StageDirective>(line);
+std::string to_text(const Directive& directive) {
+  return std::visit(
+      [](auto d) {
+        std::string out;
+        const auto add = [&](const std::string& field) {
+          if (!field.empty()) out += (out.empty() ? "" : ", ") + field;
+        };
+        std::apply([&](const auto&... field) { (add(print_field(field)), ...); }, d.fields());
+        return text(d.name, "(", out, ")");
+      },
+      directive);
 }
-std::optional<FuncDirective> parse_func_directive(const std::string& line) {
-  return parse_any<FuncDirective>(line);
+
+std::optional<Directive> parse_directive(const std::string& line) { return parse_from(line); }
+
+bool equal(const Directive& a, const Directive& b) {
+  if (a.index() != b.index()) return false;
+  return std::visit(
+      [&](auto x) {
+        auto y = std::get<decltype(x)>(b);
+        const auto xs = x.fields(), ys = y.fields();
+        return [&]<size_t... i>(std::index_sequence<i...>) {
+          return (same(std::get<i>(xs), std::get<i>(ys)) && ...);
+        }
+        (std::make_index_sequence<std::tuple_size_v<decltype(x.fields())>>());
+      },
+      a);
 }
-bool equal(const StageDirective& a, const StageDirective& b) { return equal_any(a, b); }
-bool equal(const FuncDirective& a, const FuncDirective& b) { return equal_any(a, b); }
 
 }  // namespace retrograde::ir

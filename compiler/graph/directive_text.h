@@ -8,16 +8,13 @@
 
 namespace retrograde::ir {
 
-std::string to_text(const StageDirective& directive);
-std::string to_text(const FuncDirective& directive);
+std::string to_text(const Directive& directive);
 
 // The directive in a line such as "split(x, xo, xi, 8, Auto)"; nothing when no directive has that
 // name. Requires: its arguments are those of directive.h.
-std::optional<StageDirective> parse_stage_directive(const std::string& line);
-std::optional<FuncDirective> parse_func_directive(const std::string& line);
+std::optional<Directive> parse_directive(const std::string& line);
 
-bool equal(const StageDirective& a, const StageDirective& b);
-bool equal(const FuncDirective& a, const FuncDirective& b);
+bool equal(const Directive& a, const Directive& b);
 
 // The arguments of a line such as "name(a, b, _)": undefined where it says _.
 std::vector<Expr> parse_arguments(const std::string& line);

@@ -5,6 +5,7 @@
 #include <unordered_set>
 
 #include "diagnostics/error.h"
+#include "graph/names.h"
 #include "graph/wrappers.h"
 #include "ir/print.h"
 #include "ir/visit.h"

@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "graph/directive.h"
 #include "graph/parameter_contents.h"
 #include "graph/provenance.h"
 #include "graph/reduction_domain.h"
@@ -72,6 +73,7 @@ struct FuncContents : Symbol, std::enable_shared_from_this<FuncContents> {
   std::optional<Definition> pure;  // empty until defined
   std::vector<Definition> updates;
   FuncSchedule schedule;
+  std::vector<LoggedDirective> log;  // all that were given to it and its stages, in their order
   std::vector<std::shared_ptr<ParameterContents>>
       outputs;                            // constraints on the buffers when it is an output
   std::vector<Requirement> requirements;  // of calls, when it is an output

@@ -107,10 +107,8 @@ class Comparer {
     check(a.name + ", number of stages", a.stage_count(), b.stage_count());
     for (int s = 0; found_.empty() && s < a.stage_count(); ++s)
       compare(text(a.name, ", stage ", s), a.stage(s), b.stage(s), first_loops(a, a.stage(s)));
-    compare_logs(a.name, directives_of(a.schedule, a.args), directives_of(b.schedule, b.args));
+    compare_logs(a.name, directives_of(a), directives_of(b));
     compare_wrappers(a, b);
-    compare(a.name, a.trace, b.trace);
-    check(a.name + ", debug file", a.debug_file, b.debug_file);
   }
   void compare_wrappers(const FuncContents& a, const FuncContents& b) {
     const auto named = [](const FuncContents& f) {
@@ -174,7 +172,6 @@ class Comparer {
                   compare(place, x, y, first);
                 });
   }
-  template <typename Directive>
   void compare_logs(const std::string& at, const std::vector<Directive>& a,
                     const std::vector<Directive>& b) {
     compare_all(at + ", directives", a, b,

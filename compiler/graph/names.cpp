@@ -53,6 +53,16 @@ std::string claim_parameter_name(const std::string& wanted) {
   return name_table().claim(as_identifier(wanted), NameUse::Parameter);
 }
 
+std::string without_numbers(const std::string& name) {
+  std::string out;
+  for (size_t i = 0; i < name.size(); ++i) {
+    const size_t end = name[i] == '$' ? name.find_first_not_of("0123456789", i + 1) : i + 1;
+    if (name[i] != '$') out += name[i];
+    i = std::min(end, name.size()) - 1;
+  }
+  return out;
+}
+
 std::string implicit_name(int n) { return "_" + std::to_string(n); }
 
 int implicit_index(const std::string& name) {

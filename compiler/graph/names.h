@@ -11,6 +11,9 @@ std::string claim_name(const std::string& wanted);
 // The same for names that callers of compiled code see: `wanted` itself unless a Func has it.
 std::string claim_parameter_name(const std::string& wanted);
 
+// Without the numbers that make names unique: blur for blur$3, r.x for r$4.x.
+std::string without_numbers(const std::string& name);
+
 // The loop of one iteration around all others of a stage.
 inline constexpr const char* outermost_loop = "__outermost";
 

@@ -211,10 +211,8 @@ class GraphReader {
     } else if (line.word == "schedule") {
       finish_definition();
       scheduling_ = true;
-    } else if (line.word == "debug_file") {
-      f_->debug_file = string_of(line);
     } else if (line.word != "wrapper" && line.word != "custom_derivatives") {
-      return reads_made(line) || reads_extern(line) || reads_trace(line, f_->trace);
+      return reads_made(line) || reads_extern(line);
     }
     return true;
   }
@@ -321,15 +319,10 @@ class GraphReader {
       special.touched = now.touched = true;
       now.specializations.push_back(std::move(special));
       specials_.push_back(now.specializations.size() - 1);
-    } else if (line.word == "specialize_fail") {
-      StageSchedule failing;
-      failing.dims = now.dims, failing.splits = now.splits;
-      failing.failure = string_of(line);
-      now.touched = true;
-      now.specializations.push_back(std::move(failing));
     } else if (line.word == "end" && !specials_.empty()) {
       specials_.pop_back();
-    } else if (const auto directive = parse_stage_directive(line.whole)) {
+    } else if (const auto directive = parse_directive(line.whole);
+               directive && is_of_stage(*directive)) {
       apply_directive(*directive, now);
     } else {
       return false;
@@ -388,9 +381,9 @@ class GraphReader {
   }
 
   bool reads_schedule(const Line& line) {
-    const auto directive = parse_func_directive(line.whole);
-    if (!directive) return false;
-    apply_directive(*directive, f_->schedule);
+    const auto directive = parse_directive(line.whole);
+    if (!directive || is_of_stage(*directive)) return false;
+    apply_directive(*directive, *f_);
     const Binder bind(names_, nullptr, nullptr);
     const auto bind_all = [&](std::initializer_list<Expr*> all) {
       for (Expr* e : all) {

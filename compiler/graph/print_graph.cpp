@@ -95,8 +95,6 @@ class GraphPrinter {
       for (const auto& [user, wrapper] : f.wrappers)
         line("wrapper ", user.empty() ? "_" : quote_name(user), " ", quote_name(wrapper->name));
       if (f.custom_derivatives) line("custom_derivatives");
-      print(f.trace);
-      if (!f.debug_file.empty()) line("debug_file ", Expr(f.debug_file));
     });
   }
 
@@ -152,10 +150,10 @@ class GraphPrinter {
   }
 
   void print(const StageSchedule& schedule, const std::vector<Dim>& first) {
-    for (const StageDirective& directive : directives_of(schedule, first)) line(to_text(directive));
+    for (const Directive& directive : directives_of(schedule, first)) line(to_text(directive));
     for (const StageSchedule& special : schedule.specializations) {
       if (!special.failure.empty()) {
-        line("specialize_fail ", Expr(special.failure));
+        line(to_text(SpecializeFail{special.failure}));
         continue;
       }
       line("specialize ", special.condition);
@@ -165,11 +163,11 @@ class GraphPrinter {
   }
 
   void print_schedule(const FuncContents& f) {
-    const std::vector<FuncDirective> log = directives_of(f.schedule, f.args);
+    const std::vector<Directive> log = directives_of(f);
     if (log.empty()) return;
     line("schedule");
     indented([&] {
-      for (const FuncDirective& directive : log) line(to_text(directive));
+      for (const Directive& directive : log) line(to_text(directive));
     });
   }
 

@@ -122,7 +122,7 @@ class GraphValidator {
              const std::vector<Dim>& first) const {
     StageSchedule built;
     built.dims = first;
-    for (const StageDirective& directive : directives_of(schedule, first)) apply_directive(directive, built);
+    for (const Directive& directive : directives_of(schedule, first)) apply_directive(directive, built);
     const bool same = std::equal(built.dims.begin(), built.dims.end(), schedule.dims.begin(),
                                  schedule.dims.end(), [](const Dim& a, const Dim& b) {
                                    return a.var == b.var && a.for_type == b.for_type &&

@@ -7,6 +7,7 @@
 
 #include "diagnostics/error.h"
 #include "graph/define.h"
+#include "graph/give_directive.h"
 #include "graph/names.h"
 #include "ir/build.h"
 #include "ir/print.h"
@@ -307,9 +308,13 @@ FuncPtr wrapper_of(const FuncPtr& handle, const std::vector<FuncPtr>& users,
                "Give each its own");
   }
   FuncPtr wrapper = clone ? clone_of(f, name) : identity_of(f, name);
+  wrapper->log.clear();                // its directive starts it with the schedule so far
   f->frozen = wrapper->frozen = true;  // wrappers change no values, now or later
   for (const std::string& key : keys) f->wrappers[key] = wrapper;
-  f->version++;
+  std::vector<NamedFunc> named;
+  for (const FuncPtr& user : users) named.emplace_back(user->name);
+  log_directive(
+      {f}, clone ? Directive(Clone{wrapper->name, named}) : Directive(Wrap{wrapper->name, named}));
   return owning(handle, wrapper);
 }
 

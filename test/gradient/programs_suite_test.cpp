@@ -6,7 +6,9 @@
 // and complex step, in machine code, of which no two share their derivatives.
 #include "gradient/programs_suite.h"
 #include "checks/check_gradients.h"
+#include "graph/give_directive.h"
 #include "graph/graph.h"
+#include "graph/schedule_log.h"
 
 namespace retrograde::gradient {
 namespace {
@@ -35,6 +37,31 @@ TEST_P(Suite, GraphsAreTheirText) {
   const ir::Graph graph = ir::graph_of(outputs);
   ir::validate(graph, "propagate_adjoints");
   EXPECT_EQ(ir::difference(ir::parse_graph(ir::to_text(graph)), graph), "") << ir::to_text(graph);
+}
+
+// What is given to a gradient is given to its text alike.
+TEST_P(Suite, SchedulesAreReplayed) {
+  std::vector<ir::FuncPtr> outputs{program.loss.function()};
+  Derivative d = propagate_adjoints(program.loss);
+  for (const Buffer<float>& input : program.inputs) outputs.push_back(d(input).function());
+  const ir::Graph graph = ir::graph_of(outputs);
+  const ir::Graph fresh = ir::parse_graph(ir::to_text(graph));
+  const size_t own = ir::schedule_log(outputs).size();
+  for (const ir::FuncPtr& f : graph.funcs) {
+    ir::give_directive({f}, ir::ComputeAt{{{ir::LoopLevel::Kind::Root, "", "", -1}}});
+    for (int s = 0; s < f->stage_count(); ++s) {
+      if (f->stage(s).schedule.dims.empty()) continue;
+      const ir::Dim outermost = f->stage(s).schedule.dims.back();
+      ir::give_directive({f, s}, ir::SplitLoop{outermost.var, "ro", "ri", 4});
+      if (!outermost.is_reduction)
+        ir::give_directive({f, s}, ir::RunLoop{{"ro"}, ForType::Parallel});
+    }
+  }
+  ScheduleLog log = ir::schedule_log(outputs);
+  EXPECT_EQ(ScheduleLog::parse(log.to_text()), log);
+  log.entries.erase(log.entries.begin(), log.entries.begin() + static_cast<long>(own));
+  ir::apply_log(log, fresh.outputs);
+  EXPECT_EQ(ir::difference(ir::graph_of(fresh.outputs), ir::graph_of(outputs)), "");
 }
 
 class CheckedSuite : public Suite {};

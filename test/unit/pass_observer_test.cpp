@@ -78,9 +78,9 @@ class Opt : public testing::Test {
     std::ifstream in(out);
     return {std::istreambuf_iterator<char>(in), {}};
   }
-  std::string text_file(const std::string& text) {
-    std::ofstream(folder / "p.graph") << text;
-    return (folder / "p.graph").string();
+  std::string text_file(const std::string& text, const char* name = "p.graph") {
+    std::ofstream(folder / name) << text;
+    return (folder / name).string();
   }
   std::string program() {
     std::ofstream(folder / "p.ir") << "unrolled for (f.s0.x, 0, 2) {\n  f[f.s0.x] = 1f + 2f\n}\n";
@@ -134,6 +134,8 @@ TEST_F(Opt, ReadsGraphsAndLowersThemSoFar) {
   EXPECT_TRUE(has(opt("--graph --pass=apply_wrappers " + graph), "value (x * 2)\n"));
   EXPECT_TRUE(
       has(opt("--graph --stop-after=build_loop_nests " + graph), "f(f.s0.x) = {(f.s0.x * 2)}"));
+  const std::string log = text_file("f.split(x, xo, xi, 4, RoundUp)\n", "p.log");
+  EXPECT_TRUE(has(opt("--graph --log=" + log + " " + graph), "split(x, xo, xi, 4, RoundUp)\n"));
   EXPECT_TRUE(has(opt("--graph --pass=simplify " + graph, 1), "from graph to graph"));
   EXPECT_TRUE(has(opt("--graph --stop-after=nothing " + graph, 1),
                   "lowering stops after one of its passes"));

@@ -5,15 +5,15 @@ HEADER_FOLDERS = ["frontend", "generator", "checks"]
 MORE_HEADERS = [
     "autodiff/custom_derivative.h", "autodiff/derivative.h", "autodiff/jacobian.h", "autodiff/compressed.h",
     "autodiff/second_order.h", "autodiff/straight_through.h", "autodiff/tangents.h", "diagnostics/error.h", "diagnostics/pass_observer.h",
-    "ir/build.h", "ir/expr.h", "ir/target.h", "ir/type.h"]
+    "graph/schedule_log.h", "ir/build.h", "ir/expr.h", "ir/target.h", "ir/type.h"]
 INTERNAL_HEADERS = {
     "checks/arrays.h", "checks/complex_step.h", "checks/culprit.h", "checks/json_number.h",
     "checks/widen.h", "frontend/argument.h", "frontend/call.h", "frontend/compiler_interface.h",
     "generator/command_line.h", "generator/cpp_stub.h", "generator/members.h",
     "graph/associative_update.h", "graph/binder.h", "graph/copy_graph.h", "graph/define.h",
-    "graph/directive.h", "graph/directive_text.h", "graph/function.h", "graph/graph.h",
-    "graph/graph_lines.h", "graph/names.h", "graph/parameter_contents.h", "graph/provenance.h",
-    "graph/race.h", "graph/reduction_domain.h", "graph/reduction_leaves.h", "graph/schedule.h",
+    "graph/directive.h", "graph/directive_choices.h", "graph/directive_names.h", "graph/directive_text.h",
+    "graph/function.h", "graph/give_directive.h", "graph/graph.h", "graph/graph_lines.h", "graph/names.h", "graph/parameter_contents.h", "graph/provenance.h",
+    "graph/race.h", "graph/reduction_domain.h", "graph/reduction_leaves.h", "graph/rfactor.h", "graph/schedule.h",
     "graph/wrappers.h", "lower/lower.h"}
 # Parts of templates that users name in no other way than by the whole.
 INTERNAL_SCOPES = {"Declared", "ArrayTraits", "ElementTraits", "InputValue", "InputElements", "ScalarElements",
@@ -46,6 +46,6 @@ SHOWN_BY = {
     "AutoSchedulerResults": r"auto_schedule", "InputValue": r"Input<", "StubOutputs": r"stub", "OutputInfo": r"get_output_info",
     "LoweredFunc": r"LoweredFunc|functions\(\)", "ParamMap::Entry": r"ParamMap", "ParamMap::ParamMapping": r"ParamMap|\{\{",
     "Buffer": r"Buffer|realize", "Type": r"type\(|Type|Int\(|Float\(", "CommandLine": r"command_line|run_generators",
-    "ScheduleHandle": r"Stage", "ExternFuncArgument": r"define_extern|ExternFuncArgument", "Module": r"compile_to_module|Module",
+    "ScheduleHandle": r"Stage", "ScheduleLog": r"ScheduleLog|schedule_log", "ScheduleLog::Entry": r"ScheduleLog::Entry|entries", "ExternFuncArgument": r"define_extern|ExternFuncArgument", "Module": r"compile_to_module|Module",
     "Tuple": r"Tuple", "Message": r"message\(\)", "Error": r"error", "RVar": r"RDom|RVar", "Expr": r"Expr", "Func": r"Func",
 }

@@ -1,4 +1,4 @@
-// rfactor.cpp -- cutting an associative update into partial results and their combination.
+// Cutting an associative update into partial results and their combination:
 //
 //   f(x) = init                           f_intm(x, u) = identity
 //   f(args(r, s)) = op(f(args), e(r, s))  f_intm(args(r, u), u) = op(f_intm(args, u), e(r, u))
@@ -17,10 +17,13 @@
 #include <map>
 #include <unordered_set>
 
-#include "frontend/func.h"
+#include "diagnostics/error.h"
 #include "graph/associative_update.h"
 #include "graph/define.h"
+#include "graph/give_directive.h"
+#include "graph/names.h"
 #include "graph/reduction_leaves.h"
+#include "graph/rfactor.h"
 #include "ir/build.h"
 #include "ir/conjuncts.h"
 #include "ir/memory_reads.h"
@@ -28,26 +31,24 @@
 #include "ir/variables.h"
 #include "ir/visit.h"
 
-namespace retrograde {
+namespace retrograde::ir {
 
 namespace {
 
-using ir::Definition;
-using ir::FuncPtr;
-using ir::Leaf;
-using ir::Leaves;
+using Preserved = std::vector<std::pair<NamedLoop, std::string>>;
 
 class Factoring {
  public:
-  Factoring(const FuncPtr& f, int stage, const std::vector<std::pair<RVar, Var>>& preserved,
-            ir::AssociativeOp op, Leaves leaves)
+  Factoring(const FuncPtr& f, int stage, const Preserved& preserved, std::string name,
+            AssociativeOp op, Leaves leaves)
       : f_(f->shared_from_this()),
         update_(f->stage(stage)),
         stage_(stage),
+        name_(std::move(name)),
         op_(std::move(op)),
         leaves_(std::move(leaves)) {
-    for (const auto& [rvar, var] : preserved) kept_[rvar.name()] = var.name();
-    for (const ir::Dim& dim : update_.schedule.dims) {
+    for (const auto& [loop, var] : preserved) kept_[loop] = var;
+    for (const Dim& dim : update_.schedule.dims) {
       if (!dim.is_reduction) continue;
       const auto leaf = std::find_if(leaves_.all.begin(), leaves_.all.end(),
                                      [&](const Leaf& l) { return l.loop == dim.var; });
@@ -55,10 +56,9 @@ class Factoring {
       (kept_.count(dim.var) ? kept_leaves_ : removed_leaves_).push_back(*leaf);
     }
     for (const Leaf& leaf : removed_leaves_) removed_names_.insert(leaf.name);
-    for (const Leaf& leaf : kept_leaves_) kept_vars_.push_back(ir::variable(kept_.at(leaf.loop)));
-    over_leaves_ =
-        ir::map_exprs(update_, [&](const Expr& e) { return ir::substitute(e, leaves_.values); });
-    ir::add_conjuncts(over_leaves_.predicate, conjuncts_);
+    for (const Leaf& leaf : kept_leaves_) kept_vars_.push_back(variable(kept_.at(leaf.loop)));
+    over_leaves_ = map_exprs(update_, [&](const Expr& e) { return substitute(e, leaves_.values); });
+    add_conjuncts(over_leaves_.predicate, conjuncts_);
   }
 
   FuncPtr run() {
@@ -68,17 +68,17 @@ class Factoring {
     intermediate_->updates.push_back(std::move(partial));
     intermediate_->frozen = true;
     f_->stage(stage_) = std::move(merge);
-    f_->version++;
     return intermediate_;
   }
 
  private:
-  using Domain = std::shared_ptr<ir::ReductionDomainContents>;
+  using Domain = std::shared_ptr<ReductionDomainContents>;
 
   const FuncPtr f_;
   const Definition update_;  // as it was
   const int stage_;
-  const ir::AssociativeOp op_;
+  const std::string name_;  // that the new Func is to have
+  const AssociativeOp op_;
   const Leaves leaves_;
   std::map<std::string, std::string> kept_;  // loop -> pure variable of the intermediate Func
   std::vector<Leaf> kept_leaves_, removed_leaves_;
@@ -93,35 +93,35 @@ class Factoring {
   Expr identity(size_t i) const {
     if (op_.identity[i].defined()) return op_.identity[i];
     const Expr& init = f_->pure->values[i];  // any value does; this one keeps ties as they were
-    return ir::is_const(init) ? init : ir::make_zero(f_->types[i]);
+    return is_const(init) ? init : make_zero(f_->types[i]);
   }
 
   void make_intermediate() {
-    intermediate_ = std::make_shared<ir::FuncContents>();
-    intermediate_->name = ir::claim_name(f_->name + "_intm");
+    intermediate_ = std::make_shared<FuncContents>();
+    intermediate_->name = claim_name(name_);
     intermediate_->declared_at = f_->declared_at;
-    std::vector<Expr> args = ir::variables_of(f_->args), values;
+    std::vector<Expr> args = variables_of(f_->args), values;
     args.insert(args.end(), kept_vars_.begin(), kept_vars_.end());
     for (size_t i = 0; i < f_->types.size(); i++) values.push_back(identity(i));
-    ir::define_pure(intermediate_, args, values);
+    define_pure(intermediate_, args, values);
     std::vector<std::string>& storage = intermediate_->schedule.storage_dims;
     storage = f_->schedule.storage_dims;
-    for (const Expr& var : kept_vars_) storage.push_back(var.as<ir::Variable>()->name);
+    for (const Expr& var : kept_vars_) storage.push_back(var.as<Variable>()->name);
   }
 
   // A domain of these leaves, whose loops keep their names.
-  static Domain domain_of(const std::vector<Leaf>& leaves, ir::Substitution& places,
-                          std::vector<ir::Split>& renames) {
+  static Domain domain_of(const std::vector<Leaf>& leaves, Substitution& places,
+                          std::vector<Split>& renames) {
     if (leaves.empty()) return nullptr;
-    auto domain = std::make_shared<ir::ReductionDomainContents>();
+    auto domain = std::make_shared<ReductionDomainContents>();
     domain->frozen = true;
-    const std::string prefix = ir::unique_name("r") + ".";
+    const std::string prefix = unique_name("r") + ".";
     for (const Leaf& leaf : leaves) {
       const std::string name = prefix + leaf.loop.substr(leaf.loop.rfind('.') + 1);
       domain->vars.push_back({name, leaf.min, leaf.extent});
-      places[leaf.name] = ir::variable(name, Int(32), ir::SymbolRef(domain));
-      ir::Split rename;
-      rename.kind = ir::Split::Kind::Rename;
+      places[leaf.name] = variable(name, Int(32), SymbolRef(domain));
+      Split rename;
+      rename.kind = Split::Kind::Rename;
       rename.old_var = name;
       rename.outer = leaf.loop;
       rename.exact = true;
@@ -131,14 +131,14 @@ class Factoring {
   }
 
   static void set_domain(Definition& definition, const Domain& domain) {
-    definition.rvars = domain ? domain->vars : std::vector<ir::ReductionVariable>{};
+    definition.rvars = domain ? domain->vars : std::vector<ReductionVariable>{};
     if (domain && definition.predicate.defined())
-      domain->predicate = ir::rebind_symbol(definition.predicate, ir::SymbolRef::weak(domain));
+      domain->predicate = rebind_symbol(definition.predicate, SymbolRef::weak(domain));
   }
 
   // What the original's schedule says that does not depend on which loops there are.
-  ir::StageSchedule schedule_with(const std::vector<ir::Split>& renames) const {
-    ir::StageSchedule schedule = update_.schedule;
+  StageSchedule schedule_with(const std::vector<Split>& renames) const {
+    StageSchedule schedule = update_.schedule;
     schedule.splits = leaves_.others;
     schedule.splits.insert(schedule.splits.end(), renames.begin(), renames.end());
     schedule.dims.clear();
@@ -146,12 +146,12 @@ class Factoring {
     return schedule;
   }
 
-  void take_prefetches(ir::StageSchedule& schedule) const {
+  void take_prefetches(StageSchedule& schedule) const {
     const auto has = [&](const std::string& loop) {
       return std::any_of(schedule.dims.begin(), schedule.dims.end(),
-                         [&](const ir::Dim& dim) { return dim.var == loop; });
+                         [&](const Dim& dim) { return dim.var == loop; });
     };
-    for (ir::PrefetchDirective prefetch : update_.schedule.prefetches) {
+    for (PrefetchDirective prefetch : update_.schedule.prefetches) {
       for (std::string* loop : {&prefetch.at, &prefetch.from}) {
         if (kept_.count(*loop)) *loop = kept_.at(*loop);
       }
@@ -160,11 +160,11 @@ class Factoring {
   }
 
   Definition partial_update() const {
-    ir::Substitution places;
-    std::vector<ir::Split> renames;
+    Substitution places;
+    std::vector<Split> renames;
     const Domain domain = domain_of(removed_leaves_, places, renames);
     for (size_t i = 0; i < kept_leaves_.size(); i++) places[kept_leaves_[i].name] = kept_vars_[i];
-    const auto place = [&](const Expr& e) { return ir::substitute(e, places); };
+    const auto place = [&](const Expr& e) { return substitute(e, places); };
 
     Definition partial;
     for (const Expr& arg : over_leaves_.args) partial.args.push_back(place(arg));
@@ -177,7 +177,7 @@ class Factoring {
     partial.predicate = reading_last(conditions);
     set_domain(partial, domain);
     partial.schedule = schedule_with(renames);
-    for (ir::Dim dim : update_.schedule.dims) {
+    for (Dim dim : update_.schedule.dims) {
       const auto kept = kept_.find(dim.var);
       if (dim.is_reduction && kept != kept_.end()) {
         dim.var = kept->second;
@@ -194,34 +194,33 @@ class Factoring {
   static Expr reading_last(const std::vector<Expr>& conditions) {
     std::vector<Expr> plain, reading;
     for (const Expr& e : conditions)
-      (ir::reads_memory(e, ir::MemoryReads::Functions) ? reading : plain).push_back(e);
-    if (reading.empty()) return plain.empty() ? Expr() : ir::conjunction(plain);
-    const Expr last = ir::conjunction(reading);
+      (reads_memory(e, MemoryReads::Functions) ? reading : plain).push_back(e);
+    if (reading.empty()) return plain.empty() ? Expr() : conjunction(plain);
+    const Expr last = conjunction(reading);
     if (plain.empty()) return last;
-    return ir::call_op(ir::Op::if_then_else, Bool(),
-                       {ir::conjunction(plain), last, ir::const_false()});
+    return call_op(Op::if_then_else, Bool(), {conjunction(plain), last, const_false()});
   }
 
   // References to f become references to the intermediate Func at `args`.
   Expr with_self_at(const Expr& value, const std::vector<Expr>& args) const {
-    return ir::rewrite(value, [&](const Expr& e, const std::function<Expr(const Expr&)>& recurse) {
-      const ir::Call* call = e.as<ir::Call>();
-      if (!call || call->call_type != ir::CallType::Func || call->symbol.raw() != f_.get())
-        return ir::map_children(e, recurse);
-      return ir::call_func(intermediate_->name, call->type, args, call->value_index,
-                           ir::SymbolRef::weak(intermediate_));
+    return rewrite(value, [&](const Expr& e, const std::function<Expr(const Expr&)>& recurse) {
+      const Call* call = e.as<Call>();
+      if (!call || call->call_type != CallType::Func || call->symbol.raw() != f_.get())
+        return map_children(e, recurse);
+      return call_func(intermediate_->name, call->type, args, call->value_index,
+                       SymbolRef::weak(intermediate_));
     });
   }
 
   // ---- the combination ----
 
-  bool uses_removed(const Expr& e) const { return ir::uses_any_variable(e, removed_names_); }
+  bool uses_removed(const Expr& e) const { return uses_any_variable(e, removed_names_); }
 
   // Conditions that hold for a whole partial result.
   std::vector<Expr> common_conditions() const {
     std::vector<Expr> result;
     for (const Expr& e : conjuncts_) {
-      if (!uses_removed(e) && !ir::reads_memory(e, ir::MemoryReads::Functions)) result.push_back(e);
+      if (!uses_removed(e) && !reads_memory(e, MemoryReads::Functions)) result.push_back(e);
     }
     return result;
   }
@@ -230,47 +229,47 @@ class Factoring {
   // conditions has a partial result there.
   bool keeps_coordinate(const Expr& arg, bool all_conditions_common) const {
     return all_conditions_common && !uses_removed(arg) &&
-           !ir::reads_memory(arg, ir::MemoryReads::Functions);
+           !reads_memory(arg, MemoryReads::Functions);
   }
 
   Definition merged() const {
-    ir::Substitution places;
-    std::vector<ir::Split> renames;
+    Substitution places;
+    std::vector<Split> renames;
     const Domain domain = domain_of(kept_leaves_, places, renames);
-    const auto place = [&](const Expr& e) { return ir::substitute(e, places); };
+    const auto place = [&](const Expr& e) { return substitute(e, places); };
 
     Definition merge;
     const std::vector<Expr> conditions = common_conditions();
     std::vector<std::string> new_loops;
     for (size_t d = 0; d < f_->args.size(); d++) {
       const Expr& arg = over_leaves_.args[d];
-      const ir::Variable* v = arg.as<ir::Variable>();
+      const Variable* v = arg.as<Variable>();
       const bool is_pure = v && !v->symbol.defined() && v->name == f_->args[d];
       if (is_pure || keeps_coordinate(arg, conditions.size() == conjuncts_.size())) {
         merge.args.push_back(place(arg));
       } else {
-        merge.args.push_back(ir::variable(f_->args[d]));
+        merge.args.push_back(variable(f_->args[d]));
         new_loops.push_back(f_->args[d]);
       }
     }
     std::vector<Expr> read_at = merge.args;
     for (const Leaf& leaf : kept_leaves_) read_at.push_back(places.at(leaf.name));
-    ir::Substitution operands;
+    Substitution operands;
     for (size_t i = 0; i < f_->types.size(); i++) {
-      operands[op_.xs[i]] = ir::call_func(f_->name, f_->types[i], merge.args, static_cast<int>(i),
-                                          ir::SymbolRef::weak(f_));
-      operands[op_.ys[i]] = ir::call_func(intermediate_->name, f_->types[i], read_at,
-                                          static_cast<int>(i), ir::SymbolRef(intermediate_));
+      operands[op_.xs[i]] =
+          call_func(f_->name, f_->types[i], merge.args, static_cast<int>(i), SymbolRef::weak(f_));
+      operands[op_.ys[i]] = call_func(intermediate_->name, f_->types[i], read_at,
+                                      static_cast<int>(i), SymbolRef(intermediate_));
     }
-    for (const Expr& value : op_.values) merge.values.push_back(ir::substitute(value, operands));
-    if (!conditions.empty()) merge.predicate = place(ir::conjunction(conditions));
+    for (const Expr& value : op_.values) merge.values.push_back(substitute(value, operands));
+    if (!conditions.empty()) merge.predicate = place(conjunction(conditions));
     set_domain(merge, domain);
     merge.schedule = schedule_with(renames);
-    for (const ir::Dim& dim : update_.schedule.dims) {
+    for (const Dim& dim : update_.schedule.dims) {
       if (!dim.is_reduction || kept_.count(dim.var)) merge.schedule.dims.push_back(dim);
     }
     for (const std::string& loop : new_loops) {
-      ir::Dim dim;
+      Dim dim;
       dim.var = loop;
       merge.schedule.dims.push_back(std::move(dim));
     }
@@ -279,83 +278,84 @@ class Factoring {
 };
 
 // Whether the loops are the outermost among the reduction loops.
-bool are_outermost(const ir::StageSchedule& schedule,
-                   const std::vector<std::pair<RVar, Var>>& preserved) {
+bool are_outermost(const StageSchedule& schedule, const Preserved& preserved) {
   std::vector<std::string> order;  // innermost first
-  for (const ir::Dim& dim : schedule.dims) {
+  for (const Dim& dim : schedule.dims) {
     if (dim.is_reduction) order.push_back(dim.var);
   }
   for (size_t i = order.size() - preserved.size(); i < order.size(); i++) {
     if (std::none_of(preserved.begin(), preserved.end(),
-                     [&](const auto& pair) { return pair.first.name() == order[i]; }))
+                     [&](const auto& pair) { return pair.first == order[i]; }))
       return false;
   }
   return true;
 }
 
-std::string list(const std::vector<std::pair<RVar, Var>>& preserved) {
+std::string as_list(const Preserved& preserved) {
   std::string out;
-  for (const auto& [rvar, var] : preserved)
-    out += text(out.empty() ? "" : ", ", quoted(rvar.name()), " as ", quoted(var.name()));
+  for (const auto& [loop, var] : preserved)
+    out += text(out.empty() ? "" : ", ", quoted(loop), " as ", quoted(var));
   return out;
 }
 
 }  // namespace
 
-Func Stage::rfactor(const RVar& r, const Var& v) {
-  return rfactor(std::vector<std::pair<RVar, Var>>{{r, v}});
-}
-
 // 1. It is an update, not specialized and in no other's loops. 2. Every RVar is a reduction loop,
 // named once. 3. Every Var is new, named once. 4. The update is associative, with an identity. 5.
 // It commutes, unless the loops are the outermost ones.
-Func Stage::rfactor(const std::vector<std::pair<RVar, Var>>& preserved) {
-  const std::string asked = text("factor ", list(preserved), " out of ", quoted(name()));
-  if (index_ == 0) {
+FuncPtr factor_out(const SchedulePlace& place, const Preserved& preserved,
+                   const std::string& wanted) {
+  const FuncContents& f = *place.f;
+  const std::string asked = text("factor ", as_list(preserved), " out of ", place.name());
+  if (place.stage == 0) {
     user_error(asked, "only an update that reduces is factored",
-               quoted(name()) + " is a first definition",
+               place.name() + " is a first definition",
                "Call it on update(): f.update().rfactor(r, u)");
   }
-  if (!specialization_.empty() || !schedule().specializations.empty()) {
+  const StageSchedule& schedule = place.schedule();
+  if (!place.special.empty() || !schedule.specializations.empty()) {
     user_error(asked, "a specialized stage keeps its definition",
-               quoted(name()) + " has specializations", "Call rfactor before specialize");
+               place.name() + " has specializations", "Call rfactor before specialize");
   }
-  if (schedule().fuse_level.kind == ir::LoopLevel::Kind::At) {
+  if (schedule.fuse_level.kind == LoopLevel::Kind::At) {
     user_error(asked, "a stage in the loops of another one keeps its own",
-               text("compute_with put it into the loops of ", quoted(schedule().fuse_level.func)),
+               text("compute_with put it into the loops of ", quoted(schedule.fuse_level.func)),
                "Call rfactor before compute_with");
   }
   std::unordered_set<std::string> loops, variables;
-  for (const auto& [rvar, var] : preserved) {
-    const size_t at = loop_index(VarOrRVar(rvar), asked);
-    if (!schedule().dims[at].is_reduction) {
-      user_error(asked, "only reduction loops are factored", quoted(rvar.name()) + " is pure",
+  for (const auto& [loop, var] : preserved) {
+    if (!schedule.dims[loop_index(place, loop, asked)].is_reduction) {
+      user_error(asked, "only reduction loops are factored", quoted(loop) + " is pure",
                  "Name a variable of its RDom, or one that comes from it");
     }
-    if (!loops.insert(rvar.name()).second)
-      user_error(asked, "each loop is named once", quoted(rvar.name()) + " is named twice",
+    if (!loops.insert(loop).second)
+      user_error(asked, "each loop is named once", quoted(loop) + " is named twice",
                  "Drop one of them");
-    check_new_name(VarOrRVar(var), rvar.name(), asked);
-    const auto& args = func_->args;
-    if (!variables.insert(var.name()).second ||
-        std::find(args.begin(), args.end(), var.name()) != args.end()) {
+    check_new_loop(place, var, loop, asked);
+    if (!variables.insert(var).second ||
+        std::find(f.args.begin(), f.args.end(), var) != f.args.end()) {
       user_error(asked, "the new variables differ from each other and from the Func's",
-                 quoted(var.name()) + " is there already", "Use a new Var");
+                 quoted(var) + " is there already", "Use a new Var");
     }
   }
-  const ir::AssociativityProof proof = ir::prove_associative(*func_, definition());
+  const AssociativityProof proof = prove_associative(f, place.definition());
   if (!proof.op) {
     user_error(asked, "partial results can be combined only of an associative update",
                proof.why_not,
                "Write it as f(x) = op(f(x), e) with an associative op, or keep its loops");
   }
-  if (!proof.op->commutative && !are_outermost(schedule(), preserved)) {
+  if (!proof.op->commutative && !are_outermost(schedule, preserved)) {
     user_error(asked, "partial results over inner loops change the order of the reduction",
                proof.why_not_commutative,
                "Factor the outermost reduction loops: reorder is legal only if it commutes");
   }
-  Leaves leaves = ir::leaves_of(definition(), schedule(), asked);
-  return Func(Factoring(func_, index_, preserved, *proof.op, std::move(leaves)).run());
+  Leaves leaves = leaves_of(place.definition(), schedule, asked);
+  const FuncPtr made =
+      Factoring(place.f, place.stage, preserved, wanted.empty() ? f.name + "_intm" : wanted,
+                *proof.op, std::move(leaves))
+          .run();
+  log_directive(place, FactorOut{made->name, preserved});
+  return made;
 }
 
-}  // namespace retrograde
+}  // namespace retrograde::ir

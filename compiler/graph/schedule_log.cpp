@@ -1,0 +1,375 @@
+#include "graph/schedule_log.h"
+
+#include <algorithm>
+#include <map>
+
+#include "diagnostics/error.h"
+#include "graph/binder.h"
+#include "graph/directive_names.h"
+#include "graph/directive_text.h"
+#include "graph/give_directive.h"
+#include "graph/graph.h"
+#include "graph/graph_lines.h"
+#include "graph/names.h"
+#include "graph/rfactor.h"
+#include "graph/wrappers.h"
+#include "ir/build.h"
+#include "ir/text.h"
+#include "ir/visit.h"
+
+namespace retrograde {
+
+namespace ir {
+
+namespace {
+
+// The one of these that is meant: itself, or the only one with other numbers; null: there is none.
+template <typename Range, typename NameOf>
+auto meant(const Range& all, const std::string& name, const NameOf& name_of)
+    -> decltype(&*all.begin()) {
+  decltype(&*all.begin()) found = nullptr;
+  int count = 0;
+  for (const auto& one : all) {
+    if (name_of(one) == name) return &one;
+    if (without_numbers(name_of(one)) != without_numbers(name)) continue;
+    found = &one;
+    ++count;
+  }
+  return count == 1 ? found : nullptr;
+}
+
+void add_loops(const StageSchedule& schedule, std::vector<std::string>& loops) {
+  const auto add = [&](const std::string& loop) {
+    if (std::find(loops.begin(), loops.end(), loop) == loops.end()) loops.push_back(loop);
+  };
+  for (const Dim& dim : schedule.dims) add(dim.var);
+  for (const StageSchedule& special : schedule.specializations) add_loops(special, loops);
+}
+
+class Replay {
+ public:
+  explicit Replay(const std::vector<FuncPtr>& outputs) {
+    const Graph graph = graph_of(outputs);
+    for (const FuncPtr& f : graph.funcs) {
+      names_.funcs.emplace(f->name, f);
+      for (const auto& output : f->outputs) names_.outputs.emplace(output->name, output);
+    }
+    for (const auto& parameter : graph.parameters)
+      names_.parameters.emplace(parameter->name, parameter);
+  }
+
+  void give(const ScheduleLog::Entry& entry) {
+    const SchedulePlace place{func(entry.func), entry.stage, entry.special};
+    check(place, entry);
+    Directive directive = entry.directive;
+    visit_names(directive,
+                Overloaded{[&](NamedFunc& name) { name = func_or_image(name); },
+                           [&](NamedLoop& name) { name = loop(place, name); },
+                           [&](LoopLevel& level) { find(level); }, [&](Expr& e) { e = bound(e); }});
+    if (auto* prefetch = std::get_if<PrefetchData>(&directive)) find_source(*prefetch);
+    if (const auto* wrap = std::get_if<Wrap>(&directive)) {
+      make(wrap->made, wrapper_of(place.f, funcs(wrap->users), without_numbers(wrap->made), false));
+    } else if (const auto* clone = std::get_if<Clone>(&directive)) {
+      make(clone->made,
+           wrapper_of(place.f, funcs(clone->users), without_numbers(clone->made), true));
+    } else if (const auto* factor = std::get_if<FactorOut>(&directive)) {
+      make(factor->made, factor_out(place, factor->preserved, without_numbers(factor->made)));
+    } else {
+      give_directive(place, std::move(directive));
+    }
+  }
+
+ private:
+  static constexpr const char* asked = "apply a schedule log";
+
+  // 1. It is given to a stage, or to a Func, as it must be. 2. That stage is there.
+  static void check(const SchedulePlace& place, const ScheduleLog::Entry& entry) {
+    const bool fits = is_of_stage(entry.directive)
+                          ? entry.stage >= 0 && entry.stage < place.f->stage_count()
+                          : entry.stage < 0;
+    const StageSchedule* now =
+        fits && entry.stage >= 0 ? &place.f->stage(entry.stage).schedule : nullptr;
+    for (const int step : entry.special) {
+      const bool is_there =
+          now && step >= 0 && step < static_cast<int>(now->specializations.size());
+      now = is_there ? &now->specializations[static_cast<size_t>(step)] : nullptr;
+    }
+    if (fits && (entry.special.empty() || now)) return;
+    user_error(asked, "what a directive is given to is there",
+               text(quoted(ScheduleLog{{entry}}.to_text()), " is given to nothing"),
+               "Apply it to the program that it was taken from");
+  }
+
+  void make(const std::string& name, const FuncPtr& f) { names_.funcs[name] = f; }
+
+  FuncPtr func_or_none(const std::string& name) {
+    if (const auto* found = meant(names_.funcs, name, [](const auto& f) { return f.first; }))
+      return found->second;
+    // What reads an image, where nobody has asked for it yet.
+    for (const auto& [image, contents] : names_.parameters) {
+      if (contents->is_buffer && image + "_im" == without_numbers(name))
+        return names_.funcs[name] = func_of_image(contents);
+    }
+    return nullptr;
+  }
+  FuncPtr func(const std::string& name) {
+    if (const FuncPtr found = func_or_none(name)) return found;
+    user_error(asked, "every Func that it names is one of the program",
+               text("none is called ", quoted(name)),
+               "Apply it to the program that it was taken from, or cut what is said of that Func");
+  }
+  ParameterPtr image(const std::string& name) const {
+    const auto* found = meant(names_.parameters, name, [](const auto& p) { return p.first; });
+    return found && found->second->is_buffer ? found->second : nullptr;
+  }
+  // What is prefetched need not be of the program.
+  NamedFunc func_or_image(const std::string& name) {
+    if (const ParameterPtr found = image(name)) return found->name;
+    const FuncPtr found = func_or_none(name);
+    return found ? found->name : name;
+  }
+  std::vector<FuncPtr> funcs(const std::vector<NamedFunc>& names) {
+    std::vector<FuncPtr> result;
+    for (const NamedFunc& name : names) result.push_back(func(name));
+    return result;
+  }
+  void find_source(PrefetchData& prefetch) {
+    if (const ParameterPtr found = image(prefetch.source)) {
+      prefetch.symbol = SymbolRef(found);
+    } else if (const FuncPtr f = func_or_none(prefetch.source)) {
+      prefetch.symbol = SymbolRef::weak(f->shared_from_this());
+    }
+  }
+
+  static std::string loop_of(const std::vector<std::string>& loops, const std::string& name) {
+    const std::string* found = meant(loops, name, [](const std::string& loop) { return loop; });
+    return found ? *found : name;
+  }
+  static NamedLoop loop(const SchedulePlace& place, const std::string& name) {
+    std::vector<std::string> loops;
+    for (const Dim& dim : place.schedule().dims) loops.push_back(dim.var);
+    return loop_of(loops, name);
+  }
+  void find(LoopLevel& level) {
+    // What is said of a level that is not there is said when the pipeline is compiled.
+    const FuncPtr f = level.kind == LoopLevel::Kind::At ? func_or_none(level.func) : nullptr;
+    if (!f) return;
+    level.func = f->name;
+    std::vector<std::string> loops;
+    for (int s = 0; s < f->stage_count(); ++s) {
+      if (level.stage < 0 || level.stage == s) add_loops(f->stage(s).schedule, loops);
+    }
+    level.var = loop_of(loops, level.var);
+  }
+
+  // Parameters that only the schedule reads are the log's own; from text they are new.
+  Expr bound(const Expr& e) {
+    if (!e.defined()) return e;
+    walk(e, [&](const Expr& part) {
+      const Variable* v = part.as<Variable>();
+      if (!v || v->symbol.defined() || names_.parameters.count(v->name) ||
+          names_.buffer_of_fact(v->name))
+        return true;
+      const auto parameter = std::make_shared<ParameterContents>();
+      parameter->name = v->name;
+      parameter->type = v->type;
+      names_.parameters.emplace(v->name, parameter);
+      return true;
+    });
+    return Binder(names_, nullptr, nullptr)(e);
+  }
+
+  NamedEntities names_;
+};
+
+}  // namespace
+
+ScheduleLog schedule_log(const std::vector<FuncPtr>& outputs) {
+  std::multimap<uint64_t, ScheduleLog::Entry> ordered;
+  for (const FuncPtr& f : functions_of(outputs)) {
+    for (const LoggedDirective& given : f->log) {
+      ScheduleLog::Entry entry{f->name, given.stage, given.special, given.directive};
+      std::visit(
+          []<typename D>(D& d) {
+            if constexpr (std::is_base_of_v<AtLevel, D>) {
+              if (d.from && d.from->defined) d.level = d.from->level;
+              d.from = nullptr;
+            }
+          },
+          entry.directive);
+      ordered.emplace(given.order, std::move(entry));
+    }
+  }
+  ScheduleLog log;
+  for (auto& [order, entry] : ordered) log.entries.push_back(std::move(entry));
+  return log;
+}
+
+void apply_log(const ScheduleLog& log, const std::vector<FuncPtr>& outputs) {
+  Replay replay(outputs);
+  for (const ScheduleLog::Entry& entry : log.entries) replay.give(entry);
+}
+
+}  // namespace ir
+
+// ---- text ----
+
+namespace {
+
+// blur.update(0).specialization(1).
+std::string place_text(const ScheduleLog::Entry& entry) {
+  std::string out = ir::quote_name(entry.func) + ".";
+  if (entry.stage > 0) out += text("update(", entry.stage - 1, ").");
+  for (const int step : entry.special) out += text("specialization(", step, ").");
+  return out;
+}
+
+// Takes "word(7)." off the beginning.
+bool take(std::string& rest, const std::string& word, int& number) {
+  if (rest.rfind(word + "(", 0) != 0) return false;
+  const size_t begin = word.size() + 1, end = rest.find(").", begin);
+  if (end == std::string::npos || end == begin || end > begin + 6 ||
+      rest.find_first_not_of("0123456789", begin) != end)
+    return false;
+  number = std::stoi(rest.substr(begin, end - begin));
+  rest.erase(0, end + 2);
+  return true;
+}
+
+ScheduleLog::Entry parse_entry(const ir::Line& line) {
+  const size_t quote = line.whole[0] == '`' ? line.whole.find('`', 1) : 0;
+  const size_t dot = line.whole.find('.', quote == std::string::npos ? 0 : quote);
+  if (dot != std::string::npos && dot > 0) {
+    const bool is_quoted = line.whole[0] == '`';
+    ScheduleLog::Entry entry{
+        is_quoted ? line.whole.substr(1, dot - 2) : line.whole.substr(0, dot), -1, {}, {}};
+    std::string rest = line.whole.substr(dot + 1);
+    int number = -1;
+    take(rest, "update", number);
+    for (int step = 0; take(rest, "specialization", step);) entry.special.push_back(step);
+    if (const auto directive = ir::parse_directive(rest)) {
+      entry.directive = *directive;
+      if (ir::is_of_stage(*directive) || number >= 0) entry.stage = number + 1;
+      return entry;
+    }
+  }
+  user_error("read the text of a schedule log", "every line is a directive of a Func",
+             text("line ", line.number, " says ", quoted(line.whole)),
+             "Write it as to_text() does");
+}
+
+}  // namespace
+
+bool ScheduleLog::Entry::operator==(const Entry& other) const {
+  return func == other.func && stage == other.stage && special == other.special &&
+         ir::equal(directive, other.directive);
+}
+
+std::string ScheduleLog::to_text() const {
+  std::string out;
+  for (const Entry& entry : entries) out += place_text(entry) + ir::to_text(entry.directive) + "\n";
+  return out;
+}
+
+ScheduleLog ScheduleLog::parse(const std::string& text) {
+  ScheduleLog log;
+  for (const ir::Line& line : ir::lines_of(text)) log.entries.push_back(parse_entry(line));
+  return log;
+}
+
+ScheduleLog ScheduleLog::first(size_t count) const {
+  ScheduleLog log = *this;
+  log.entries.resize(std::min(count, entries.size()));
+  return log;
+}
+ScheduleLog ScheduleLog::of(const std::string& func) const {
+  ScheduleLog log = *this;
+  std::erase_if(log.entries, [&](const Entry& entry) { return entry.func != func; });
+  return log;
+}
+
+namespace {
+
+bool mentions(const ScheduleLog::Entry& entry, const std::string& name) {
+  bool found = entry.func == name;
+  ir::Directive copy = entry.directive;
+  ir::visit_names(copy, ir::Overloaded{[&](ir::NamedFunc& f) { found |= f == name; },
+                                       [&](ir::LoopLevel& level) { found |= level.func == name; }});
+  return found;
+}
+
+bool is_below(const ScheduleLog::Entry& entry, const ScheduleLog::Entry& place) {
+  return entry.func == place.func && entry.stage == place.stage &&
+         entry.special.size() >= place.special.size() &&
+         std::equal(place.special.begin(), place.special.end(), entry.special.begin());
+}
+
+// What becomes of loops whose directive goes: the loop that was there before, or none ("").
+std::map<std::string, std::string> loops_without(const ir::Directive& directive) {
+  std::map<std::string, std::string> loops;
+  if (const auto* split = std::get_if<ir::SplitLoop>(&directive)) {
+    loops = {{split->inner, ""}};
+    loops[split->outer] = split->old;
+  } else if (const auto* fuse = std::get_if<ir::FuseLoops>(&directive)) {
+    loops[fuse->fused] = fuse->inner;
+  } else if (const auto* rename = std::get_if<ir::RenameLoop>(&directive)) {
+    loops[rename->renamed] = rename->old;
+  }
+  return loops;
+}
+
+// Whether all that it names is still there.
+bool rename_loops(ir::Directive& directive, const ScheduleLog::Entry& gone, bool is_stage,
+                  const std::map<std::string, std::string>& loops) {
+  bool is_whole = true;
+  const auto rename = [&](std::string& name) {
+    const auto found = loops.find(name);
+    if (found == loops.end()) return;
+    is_whole &= !found->second.empty();
+    name = found->second;
+  };
+  if (auto* reorder = std::get_if<ir::ReorderLoops>(&directive); reorder && is_stage) {
+    std::erase_if(reorder->loops, [&](const ir::NamedLoop& loop) {
+      const auto found = loops.find(loop);
+      return found != loops.end() && found->second.empty();
+    });
+  }
+  ir::visit_names(directive, ir::Overloaded{[&](ir::NamedLoop& loop) {
+                                              if (is_stage) rename(loop);
+                                            },
+                                            [&](ir::LoopLevel& level) {
+                                              if (level.func == gone.func) rename(level.var);
+                                            }});
+  return is_whole;
+}
+
+}  // namespace
+
+ScheduleLog ScheduleLog::without(size_t index) const {
+  const Entry& gone = entries[index];
+  ScheduleLog log = first(index);
+  const std::string made = ir::made_by(gone.directive);
+  const bool is_factored = std::holds_alternative<ir::FactorOut>(gone.directive);
+  const auto loops = loops_without(gone.directive);
+  int special = -1;  // the number of the specialization that goes
+  if (std::holds_alternative<ir::Specialize>(gone.directive)) {
+    special = static_cast<int>(std::count_if(log.entries.begin(), log.entries.end(), [&](auto& e) {
+      return e.directive.index() == gone.directive.index() && e.func == gone.func &&
+             e.stage == gone.stage && e.special == gone.special;
+    }));
+  }
+  for (size_t i = index + 1; i < entries.size(); ++i) {
+    Entry entry = entries[i];
+    const bool is_stage = is_below(entry, gone);
+    if (!made.empty() && (mentions(entry, made) || (is_factored && is_stage))) continue;
+    if (special >= 0 && is_stage && entry.special.size() > gone.special.size()) {
+      int& step = entry.special[gone.special.size()];
+      if (step == special) continue;
+      if (step > special) --step;
+    }
+    if (rename_loops(entry.directive, gone, is_stage, loops)) log.entries.push_back(entry);
+  }
+  return log;
+}
+
+}  // namespace retrograde
