@@ -141,11 +141,25 @@ int32_t retrograde_default_trace(retrograde_context*, const struct halide_trace_
 int32_t retrograde_debug_to_file(retrograde_context*, const char* path,
                                  const struct halide_buffer_t* buffer);
 
-/* Whether a device has a newer copy of the data. */
-int32_t retrograde_buffer_device_dirty(retrograde_context*, const struct halide_buffer_t* buffer);
-/* Part of the answer to a query: the stride of a dimension, in elements. */
-int32_t retrograde_buffer_set_stride(retrograde_context*, struct halide_buffer_t* buffer,
-                                     int32_t dimension, int32_t stride);
+/* What a function checks of its buffers; they tell the error handler what is wrong and give its code.
+ * Of every buffer, before anything is read of its dimensions: it is not null, has elements of the type
+ * (halide_type_t as a number: code | bits << 8 | lanes << 16) and the dimensions, and at most 2^31 - 1
+ * elements. */
+int32_t retrograde_check_shape(retrograde_context*, const struct halide_buffer_t* buffer,
+                               const char* name, int32_t type, int32_t dimensions);
+/* Of each that is no query: its data are on the host, at a multiple of `alignment` bytes, their
+ * distances fit 31 bits, and it holds what is used: for each dimension whose bit is set in
+ * `dimensions`, `used` has the first and the last coordinate. */
+enum {
+  retrograde_region_is_written = 1, /* else it is read */
+  retrograde_region_is_dense = 2    /* the stride of dimension 0 must be 1 */
+};
+int32_t retrograde_check_region(retrograde_context*, const struct halide_buffer_t* buffer,
+                                const char* name, int32_t rules, int32_t alignment,
+                                int32_t dimensions, const int32_t* used);
+/* The answer to a query: `sides` has min, extent and stride of each dimension. */
+int32_t retrograde_answer_query(retrograde_context*, struct halide_buffer_t* buffer,
+                                int32_t dimensions, const int32_t* sides);
 
 /* The profiler. A run begins with the names of Funcs, one a line; afterwards they are numbers. Null
  * stands for a run that is not profiled. */

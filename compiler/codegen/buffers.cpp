@@ -12,7 +12,7 @@ using namespace ir;
 static_assert(sizeof(halide_type_t) == 4 && sizeof(halide_dimension_t) == 16);
 
 bool FunctionGenerator::is_buffer_operator(Op op) const {
-  return op >= Op::buffer_host && op <= Op::buffer_set_bounds;
+  return op >= Op::buffer_host && op <= Op::buffer_is_query;
 }
 
 // Pixels never overlap the descriptors, so their stores do not force these loads to be repeated.
@@ -47,33 +47,7 @@ Value* FunctionGenerator::host_pointer(Value* buffer) {
   return load;
 }
 
-// (buffer, dimension, min, extent). The stride becomes that of a dense buffer.
-Value* FunctionGenerator::set_bounds(const Call& e) {
-  Value *buffer = value(e.args[0]), *dimension = value(e.args[1]);
-  const auto store = [&](Value* v, int64_t offset) {
-    b_.CreateStore(v, dimension_pointer(buffer, dimension, offset))
-        ->setMetadata(llvm::LLVMContext::MD_tbaa, alias_tag("buffer descriptors"));
-  };
-  store(convert(e_, Int(32), e.args[2].type(), value(e.args[2])),
-        offsetof(halide_dimension_t, min));
-  store(convert(e_, Int(32), e.args[3].type(), value(e.args[3])),
-        offsetof(halide_dimension_t, extent));
-  const auto field_below = [&](int64_t offset) {
-    Value* is_first = b_.CreateICmpEQ(dimension, int_constant(dimension, 0));
-    Value* below =
-        b_.CreateSelect(is_first, dimension, b_.CreateSub(dimension, int_constant(dimension, 1)));
-    auto* load = b_.CreateLoad(b_.getInt32Ty(), dimension_pointer(buffer, below, offset));
-    load->setMetadata(llvm::LLVMContext::MD_tbaa, alias_tag("buffer descriptors"));
-    return b_.CreateSelect(is_first, b_.getInt32(1), load);
-  };
-  store(b_.CreateMul(field_below(offsetof(halide_dimension_t, extent)),
-                     field_below(offsetof(halide_dimension_t, stride))),
-        offsetof(halide_dimension_t, stride));
-  return llvm::Constant::getNullValue(llvm_type(e_, e.type));
-}
-
 Value* FunctionGenerator::buffer_operator(const Call& e) {
-  if (e.op == Op::buffer_set_bounds) return set_bounds(e);
   Value* buffer = value(e.args[0]);
   Value* null = llvm::ConstantPointerNull::get(b_.getPtrTy());
   const auto dimension_field = [&](int64_t offset) -> Value* {

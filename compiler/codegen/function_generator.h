@@ -235,7 +235,6 @@ class FunctionGenerator {
   Value* host_pointer(Value* buffer);
   Value* buffer_field(Value* buffer, llvm::Type* type, int64_t offset);
   Value* dimension_pointer(Value* buffer, Value* dimension, int64_t offset);
-  Value* set_bounds(const ir::Call& e);
 
   llvm::FunctionCallee runtime_function(const std::string& name, llvm::Type* result,
                                         const std::vector<llvm::Type*>& params,

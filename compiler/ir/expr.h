@@ -345,8 +345,10 @@ struct LetStmt : StmtNode {
   const Expr value;
   const Stmt body;
 };
-struct Assert : StmtNode {  // when the condition is false the function returns `error` (an int32,
-                            // see Op::error)
+// When the condition is false the function returns `error` (an int32, see Op::error; 0 leaves early
+// and well). Op::undef says that it cannot be false, which an earlier check has seen to: this is a
+// fact, and no code.
+struct Assert : StmtNode {
   RETROGRADE_NODE(Assert)
   Assert(Expr condition, Expr error)
       : StmtNode(Kind::Assert), condition(std::move(condition)), error(std::move(error)) {}

@@ -37,8 +37,9 @@ void add_runtime(Table& table) {
   table["retrograde_profiler_memory"] = pointer(retrograde_profiler_memory);
   table["retrograde_profiler_end"] = pointer(retrograde_profiler_end);
   table["retrograde_debug_to_file"] = pointer(retrograde_debug_to_file);
-  table["retrograde_buffer_device_dirty"] = pointer(retrograde_buffer_device_dirty);
-  table["retrograde_buffer_set_stride"] = pointer(retrograde_buffer_set_stride);
+  table["retrograde_check_shape"] = pointer(retrograde_check_shape);
+  table["retrograde_check_region"] = pointer(retrograde_check_region);
+  table["retrograde_answer_query"] = pointer(retrograde_answer_query);
   table["retrograde_trace"] = pointer(retrograde_trace);
   table["retrograde_trace_region"] = pointer(retrograde_trace_region);
   table["retrograde_trace_type"] = pointer(retrograde_trace_type);

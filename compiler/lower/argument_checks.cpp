@@ -25,6 +25,9 @@ Stmt check(Expr holds, int code, Parts&&... message) {
       call_op(Op::error, Int(32), {Expr(int32_t{code}), Expr(std::forward<Parts>(message))...}));
 }
 
+constexpr const char *check_shape = "retrograde_check_shape",
+                     *check_region = "retrograde_check_region";
+
 class Checks {
  public:
   Checks(const LoopNests& nests, const std::vector<LoweredArgument>& args, const Program& program)
@@ -40,7 +43,7 @@ class Checks {
     std::vector<Stmt> fact_checks;
     for (const LoweredArgument& arg : args_) {
       if (arg.is_buffer()) {
-        add_extent_checks(arg, fact_checks);
+        add_extent_facts(arg, fact_checks);
       } else {
         add_scalar_checks(arg, fact_checks);
       }
@@ -132,95 +135,29 @@ class Checks {
     return names;
   }
 
+  // Calls a check of the runtime, which tells what is wrong and gives its code, 0 where nothing is.
+  static Stmt ask(const char* function, std::vector<Expr> args) {
+    args.insert(args.begin(), Expr(function));
+    const Expr code = variable("code");
+    return make_let("code", call_op(Op::runtime_call, Int(32), std::move(args)),
+                    make_assert(code == 0, code));
+  }
+
   static void add_shape_checks(const LoweredArgument& arg, std::vector<Stmt>& checks) {
-    Expr handle = handle_of(arg.name);
-    std::string name = quoted(arg.name);
-    checks.push_back(check(
-        !call_op(Op::buffer_is_null, Bool(), {handle}), retrograde_error_buffer_argument_is_null,
-        text("cannot run: the buffer argument ", name,
-             " is null. Pass a halide_buffer_t (with a null host to ask for bounds).")));
-    const Expr type = call_op(Op::buffer_type, UInt(32), {handle});
-    const auto byte = [&](int place) { return cast(Int(32), type / place % 256); };
     checks.push_back(
-        check(type == make_uint_const(UInt(32), type_word(arg.type)), retrograde_error_bad_type,
-              text("cannot run: the buffer ", name, " must have elements of type ",
-                   to_string(arg.type), ", but its elements are of the kind "),
-              byte(1), Expr(" (0: int, 1: uint, 2: float, 3: handle, 4: bfloat) with "), byte(256),
-              text(" bits. Pass a buffer of ", to_string(arg.type), ".")));
-    Expr dimensions = call_op(Op::buffer_dimensions, Int(32), {handle});
-    checks.push_back(check(dimensions == arg.dimensions, retrograde_error_bad_dimensions,
-                           text("cannot run: the buffer ", name, " must have ", arg.dimensions,
-                                " dimensions, but it has "),
-                           dimensions,
-                           Expr(". Pass a buffer with as many dimensions as the pipeline uses.")));
+        ask(check_shape, {handle_of(arg.name), Expr(arg.name),
+                          Expr(static_cast<int32_t>(type_word(arg.type))), Expr(arg.dimensions)}));
   }
 
-  // Index arithmetic is 32 bits: a buffer's elements must be addressable in it.
-  static void add_extent_checks(const LoweredArgument& arg, std::vector<Stmt>& checks) {
-    Expr elements = make_const(Int(64), 1);
+  // The runtime has seen to it already: the simplifier learns it, and no code is made.
+  static Stmt holds_already(const Expr& condition) {
+    return make_assert(condition, call_op(Op::undef, Int(32), {}));
+  }
+
+  static void add_extent_facts(const LoweredArgument& arg, std::vector<Stmt>& checks) {
     for (int d = 0; d < arg.dimensions; d++) {
-      Expr extent = call_op(Op::buffer_extent, Int(32), {handle_of(arg.name), d});
-      checks.push_back(check(extent >= 0, retrograde_error_extents_negative,
-                             text("cannot run: extents must not be negative; dimension ", d,
-                                  " of the buffer ", quoted(arg.name), " has extent "),
-                             extent, Expr(". Pass the extent that the data has.")));
-      elements = elements * cast(Int(64), extent);
-      Expr fits = elements <= make_const(Int(64), int64_t{0x7fffffff});
-      checks.push_back(check(fits, retrograde_error_extents_too_large,
-                             text("cannot run: a buffer may have at most 2147483647 elements; ",
-                                  quoted(arg.name), " has at least "),
-                             elements, Expr(". Process it in tiles.")));
-    }
-  }
-
-  // The data are on the host, where they are promised to be.
-  static void add_memory_checks(const LoweredArgument& arg, std::vector<Stmt>& checks) {
-    const Expr handle = handle_of(arg.name);
-    const Expr host = reinterpret_as(UInt(64), call_op(Op::buffer_host, Handle(), {handle}));
-    const Expr zero = make_zero(UInt(64));
-    Expr has_elements = const_true();
-    for (int d = 0; d < arg.dimensions; d++)
-      has_elements = has_elements && call_op(Op::buffer_extent, Int(32), {handle, d}) > 0;
-    checks.push_back(check(
-        host != zero || !has_elements, retrograde_error_host_is_null,
-        text("cannot run: data must be in memory of the host; the host pointer of "
-             "the buffer ",
-             quoted(arg.name), " is null, and it is on a device. Copy it to the host first.")));
-    if (arg.kind == LoweredArgument::Kind::InputBuffer) {
-      const Expr is_dirty =
-          call_op(Op::runtime_call, Int(32), {Expr("retrograde_buffer_device_dirty"), handle});
-      checks.push_back(check(
-          is_dirty == 0, retrograde_error_device_dirty_with_no_device_support,
-          text("cannot run: data must be in memory of the host; the buffer ", quoted(arg.name),
-               " says that the newer copy is on a device. Copy it to the host first.")));
-    }
-    auto param = std::dynamic_pointer_cast<ParameterContents>(arg.symbol.lock());
-    if (!param || param->host_alignment <= arg.type.bytes()) return;
-    const Expr alignment = make_uint_const(UInt(64), static_cast<uint64_t>(param->host_alignment));
-    checks.push_back(check(host % alignment == zero, retrograde_error_unaligned_host_ptr,
-                           text("cannot run: the address of the buffer ", quoted(arg.name),
-                                " was promised to be a multiple of ", param->host_alignment,
-                                ", but its remainder is "),
-                           host % alignment, Expr(". Pass aligned memory, or lift the promise.")));
-  }
-
-  // Distances between elements, in elements: extents may be small and strides large.
-  static void add_span_checks(const LoweredArgument& arg, std::vector<Stmt>& checks) {
-    Expr span = make_const(Int(64), 0);
-    for (int d = 0; d < arg.dimensions; d++) {
-      const auto wide = [&](Op op) {
-        return cast(Int(64), call_op(op, Int(32), {handle_of(arg.name), d}));
-      };
-      const Expr stride = wide(Op::buffer_stride);
-      span = span + max(wide(Op::buffer_extent) - 1, 0) * max(stride, -stride);
-      checks.push_back(check(span <= make_const(Int(64), int64_t{0x7fffffff}),
-                             retrograde_error_allocation_too_large,
-                             text("cannot run: the elements of a buffer lie at most 2147483647 "
-                                  "elements apart; those of ",
-                                  quoted(arg.name), " lie up to "),
-                             span,
-                             text(" apart, by its extents and strides up to dimension ", d,
-                                  ". Process it in tiles.")));
+      const Expr extent = call_op(Op::buffer_extent, Int(32), {handle_of(arg.name), d});
+      checks.push_back(holds_already(extent >= 0));
     }
   }
 
@@ -278,14 +215,12 @@ class Checks {
       Expr is_query = call_op(Op::buffer_is_query, Bool(), {handle_of(arg.name)});
       any_query = any_query || is_query;
       answers.push_back(make_if(is_query, answer(arg, box)));
-      add_memory_checks(arg, run);
-      add_span_checks(arg, run);
       add_promise_checks(arg, box, run);
       add_constraint_checks(arg, run);
     }
     return_if_nothing_is_asked(run);
     for (const LoweredArgument& arg : args_) {
-      if (arg.is_buffer()) add_box_checks(arg, required_box(arg), run);
+      if (arg.is_buffer()) add_region_checks(arg, required_box(arg), run);
     }
     add_requirements(run);
     for (Stmt& sizes : schedule_checks(program_)) run.push_back(std::move(sizes));
@@ -320,35 +255,36 @@ class Checks {
   }
 
   // What is needed, but where the user promised what it is. A promise that speaks of the buffer
-  // itself means what is needed of it.
+  // itself means what is needed of it. Strides are those of a dense buffer.
   Stmt answer(const LoweredArgument& arg, const Box& box) const {
-    const Expr handle = handle_of(arg.name);
     Substitution needed;
     for (size_t d = 0; d < box.size(); d++) {
       const int dimension = static_cast<int>(d);
       needed[fact(arg.name, "min", dimension)] = box[d].min;
       needed[fact(arg.name, "extent", dimension)] = simplify(box[d].max - box[d].min + 1);
-      needed[fact(arg.name, "stride", dimension)] =
-          call_op(Op::buffer_stride, Int(32), {handle, dimension});
     }
     const auto said = [&](const Expr& promise) {
       return substitute(substitute(promise, needed), actual_);
     };
-    std::vector<Stmt> sets;
+    std::vector<Expr> sides;
+    Expr stride = 1;
     for (size_t d = 0; d < box.size(); d++) {
       const int dimension = static_cast<int>(d);
       const BufferConstraint promised = constraint_of(arg, dimension);
       const Expr min = promised.min.defined() ? said(promised.min) : box[d].min;
       const Expr extent =
           promised.extent.defined() ? said(promised.extent) : simplify(box[d].max - min + 1);
-      sets.push_back(
-          make_evaluate(call_op(Op::buffer_set_bounds, Int(32), {handle, dimension, min, extent})));
-      if (!promised.stride.defined() || (d == 0 && is_one(promised.stride))) continue;
-      sets.push_back(make_evaluate(call_op(
-          Op::runtime_call, Int(32),
-          {Expr("retrograde_buffer_set_stride"), handle, dimension, said(promised.stride)})));
+      needed[fact(arg.name, "stride", dimension)] = stride;
+      if (promised.stride.defined()) stride = said(promised.stride);
+      needed[fact(arg.name, "stride", dimension)] = stride;
+      for (const Expr& side : {min, extent, stride}) sides.push_back(cast(Int(32), side));
+      stride = stride * extent;
     }
-    return sets.empty() ? make_evaluate(0) : make_block(sets);
+    if (sides.empty()) return make_evaluate(0);
+    return make_evaluate(call_op(
+        Op::runtime_call, Int(32),
+        {Expr("retrograde_answer_query"), handle_of(arg.name),
+         Expr(static_cast<int32_t>(box.size())), call_op(Op::pack, Handle(), std::move(sides))}));
   }
 
   // A region that was promised must hold what is used: this is known before any buffer is.
@@ -378,23 +314,66 @@ class Checks {
     }
   }
 
-  // An empty buffer fits an empty box only by the numbers.
-  static void add_box_checks(const LoweredArgument& arg, const Box& box,
-                             std::vector<Stmt>& checks) {
-    const char* verb = arg.kind == LoweredArgument::Kind::OutputBuffer ? "written" : "read";
+  // Where the data are, how far their elements lie apart, and that the buffer holds what is used: an
+  // empty buffer fits an empty box only by the numbers. Where the region is promised, the promise is
+  // what must hold it.
+  void add_region_checks(const LoweredArgument& arg, const Box& box,
+                         std::vector<Stmt>& checks) const {
+    std::vector<Expr> sides;
+    std::vector<Stmt> facts, of_promises;
+    if (is_dense(arg)) facts.push_back(holds_already(actual_fact(arg, "stride", 0) == 1));
+    int32_t dimensions = 0;  // a bit each
     for (size_t d = 0; d < box.size(); d++) {
-      Expr min = variable(fact(arg.name, "min", d)), extent = variable(fact(arg.name, "extent", d));
-      Expr inside = simplify(min <= box[d].min && box[d].max <= min + extent - 1);
+      const int dimension = static_cast<int>(d);
+      const Expr min = variable(fact(arg.name, "min", dimension)),
+                 extent = variable(fact(arg.name, "extent", dimension));
+      const Expr inside = simplify(min <= box[d].min && box[d].max <= min + extent - 1);
       if (is_const_true(inside)) continue;
-      checks.push_back(
-          check(inside, retrograde_error_access_out_of_bounds,
-                text("cannot run: every access must lie inside its buffer; ", quoted(arg.name),
-                     " is ", verb, " over ["),
-                box[d].min, Expr(", "), box[d].max,
-                text("] in dimension ", d, ", but the buffer covers ["), min, Expr(", "),
-                min + extent - 1,
-                Expr("]. Pass a larger buffer, clamp the access, or use a boundary condition.")));
+      const BufferConstraint promised = constraint_of(arg, dimension);
+      if (promised.min.defined() || promised.extent.defined() || d >= 31) {
+        of_promises.push_back(box_check(arg, box[d], dimension, inside));
+        continue;
+      }
+      dimensions |= 1 << d;
+      sides.push_back(cast(Int(32), box[d].min));
+      sides.push_back(cast(Int(32), box[d].max));
+      facts.push_back(holds_already(inside));
     }
+    checks.push_back(
+        ask(check_region, {handle_of(arg.name), Expr(arg.name), Expr(region_rules(arg)),
+                           Expr(promised_alignment(arg)), Expr(dimensions),
+                           call_op(Op::pack, Handle(), std::move(sides))}));
+    checks.insert(checks.end(), facts.begin(), facts.end());
+    checks.insert(checks.end(), of_promises.begin(), of_promises.end());
+  }
+
+  static int32_t region_rules(const LoweredArgument& arg) {
+    const bool is_output = arg.kind == LoweredArgument::Kind::OutputBuffer;
+    return (is_output ? retrograde_region_is_written : 0) |
+           (is_dense(arg) ? retrograde_region_is_dense : 0);
+  }
+  // As buffers are unless someone says otherwise.
+  static bool is_dense(const LoweredArgument& arg) {
+    return arg.dimensions > 0 && is_const_int(constraint_of(arg, 0).stride, 1);
+  }
+
+  static int32_t promised_alignment(const LoweredArgument& arg) {
+    const auto param = std::dynamic_pointer_cast<ParameterContents>(arg.symbol.lock());
+    return param && param->host_alignment > arg.type.bytes() ? param->host_alignment : 1;
+  }
+
+  static Stmt box_check(const LoweredArgument& arg, const Interval& used, int d,
+                        const Expr& inside) {
+    const char* verb = arg.kind == LoweredArgument::Kind::OutputBuffer ? "written" : "read";
+    const Expr min = variable(fact(arg.name, "min", d)),
+               extent = variable(fact(arg.name, "extent", d));
+    return check(inside, retrograde_error_access_out_of_bounds,
+                 text("cannot run: every access must lie inside its buffer; ", quoted(arg.name),
+                      " is ", verb, " over ["),
+                 used.min, Expr(", "), used.max,
+                 text("] in dimension ", d, ", but the buffer covers ["), min, Expr(", "),
+                 min + extent - 1,
+                 Expr("]. Pass a larger buffer, clamp the access, or use a boundary condition."));
   }
 
   void add_constraint_checks(const LoweredArgument& arg, std::vector<Stmt>& checks) const {
@@ -402,14 +381,18 @@ class Checks {
       BufferConstraint promised = promise_of(arg, d);
       add_constraint_check(arg, "min", d, promised.min, checks);
       add_constraint_check(arg, "extent", d, promised.extent, checks);
-      add_constraint_check(arg, "stride", d, promised.stride, checks);
+      if (d > 0 || !is_dense(arg)) add_constraint_check(arg, "stride", d, promised.stride, checks);
     }
+  }
+
+  static Expr actual_fact(const LoweredArgument& arg, const char* what, int d) {
+    return variable(fact(arg.name, what, d) + ".actual");
   }
 
   static void add_constraint_check(const LoweredArgument& arg, const char* what, int d,
                                    const Expr& promised, std::vector<Stmt>& checks) {
     if (!promised.defined()) return;
-    Expr actual = variable(fact(arg.name, what, d) + ".actual");
+    const Expr actual = actual_fact(arg, what, d);
     checks.push_back(check(actual == promised, retrograde_error_constraint_violated,
                            text("cannot run: the ", what, " of dimension ", d, " of ",
                                 quoted(arg.name), " was promised to be "),
@@ -420,6 +403,14 @@ class Checks {
 };
 
 }  // namespace
+
+bool is_check_by_runtime(const Stmt& s) {
+  const auto* let = s.as<LetStmt>();
+  const auto* call = let ? let->value.as<Call>() : nullptr;
+  if (!call || !call->is_op(Op::runtime_call) || !let->body.as<Assert>()) return false;
+  const std::string& function = call->args[0].as<StringImm>()->value;
+  return function == check_shape || function == check_region;
+}
 
 Stmt add_argument_checks(const LoopNests& nests, const std::vector<LoweredArgument>& args,
                          const Program& program) {

@@ -17,6 +17,7 @@
 #include "diagnostics/error.h"
 #include "ir/build.h"
 #include "ir/visit.h"
+#include "lower/argument_checks.h"
 #include "retrograde_runtime.h"
 
 namespace retrograde::ir {
@@ -68,7 +69,7 @@ class DropBoundsQuery : public Rewriter {
 
 bool may_report(const Stmt& s) {
   const auto* assert = s.as<Assert>();
-  return assert && !is_zero(assert->error);
+  return assert ? !is_zero(assert->error) : is_check_by_runtime(s);
 }
 
 class DropAsserts : public Rewriter {

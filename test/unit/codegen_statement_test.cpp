@@ -452,6 +452,18 @@ TEST(CodegenStatement, InputAndOutputMayBeOneBuffer) {
   for (int i = 0; i < 8; i++) EXPECT_EQ(both.data<int32_t>()[i], i);
 }
 
+TEST(CodegenStatement, AFactIsNoCheck) {
+  LoweredFunction f;
+  f.name = "fact";
+  f.args = {output("out", Int(32))};
+  f.body = make_block({make_assert(const_false(), call_op(Op::undef, Int(32), {})),
+                       make_store("out", Expr(7), Expr(0))});
+  Array out(Int(32), 1);
+  Host host;
+  EXPECT_EQ(run(f, {out.raw()}, host), 0);
+  EXPECT_EQ(out.data<int32_t>()[0], 7);
+}
+
 // ---- buffers ----
 
 TEST(CodegenStatement, BufferFieldsAndQueries) {
@@ -463,9 +475,10 @@ TEST(CodegenStatement, BufferFieldsAndQueries) {
     more.insert(more.begin(), in);
     return cast_to(Int(32), call_op(op, type, more));
   };
-  const Stmt answer = make_block(
-      {make_evaluate(call_op(Op::buffer_set_bounds, Int(32), {in, Expr(0), Expr(-4), Expr(20)})),
-       make_evaluate(call_op(Op::buffer_set_bounds, Int(32), {in, Expr(1), Expr(2), Expr(30)}))});
+  const Expr sides =
+      call_op(Op::pack, Handle(), {Expr(-4), Expr(20), Expr(1), Expr(2), Expr(30), Expr(20)});
+  const Stmt answer = make_evaluate(
+      call_op(Op::runtime_call, Int(32), {Expr("retrograde_answer_query"), in, Expr(2), sides}));
   std::vector<Stmt> stores;
   const Expr fields[] = {field(Op::buffer_min, Int(32), {Expr(1)}),
                          field(Op::buffer_extent, Int(32), {Expr(0)}),

@@ -208,6 +208,94 @@ TEST(Memory, ImpossibleRequestsGiveNullAndAReason) {
   EXPECT_NE(reports[0].message.find("\"f\""), std::string::npos);
 }
 
+// ---- what functions check of their buffers ----
+
+struct Image {
+  halide_dimension_t dims[2] = {{3, 4, 1}, {-1, 5, 8}};
+  uint8_t data[64] = {};
+  halide_buffer_t buffer = {};
+  Image() {
+    buffer.host = data;
+    buffer.type = halide_type_of<uint8_t>();
+    buffer.dimensions = 2;
+    buffer.dim = dims;
+  }
+};
+constexpr int32_t uint8_word = 1 | 8 << 8 | 1 << 16, bool_word = 1 | 1 << 8 | 1 << 16;
+
+TEST(BufferChecks, AShapeAsAskedForIsRight) {
+  Image image;
+  EXPECT_EQ(retrograde_check_shape(nullptr, &image.buffer, "im", uint8_word, 2), 0);
+  image.dims[1].extent = 0;
+  EXPECT_EQ(retrograde_check_shape(nullptr, &image.buffer, "im", uint8_word, 2), 0);
+}
+
+TEST(BufferChecks, WrongShapesAreNamed) {
+  std::vector<Report> reports;
+  retrograde_context context = reporting_to(&reports);
+  Image image;
+  const auto check = [&](const halide_buffer_t* buffer, int32_t type, int32_t dimensions) {
+    return retrograde_check_shape(&context, buffer, "im", type, dimensions);
+  };
+  EXPECT_EQ(check(nullptr, uint8_word, 2), retrograde_error_buffer_argument_is_null);
+  EXPECT_EQ(check(&image.buffer, bool_word, 2), retrograde_error_bad_type);
+  EXPECT_NE(reports.back().message.find("of type bool, but its elements are of the kind 1"),
+            std::string::npos)
+      << reports.back().message;
+  EXPECT_EQ(check(&image.buffer, uint8_word, 3), retrograde_error_bad_dimensions);
+  image.dims[0].extent = -1;
+  EXPECT_EQ(check(&image.buffer, uint8_word, 2), retrograde_error_extents_negative);
+  image.dims[0].extent = image.dims[1].extent = 1 << 16;
+  EXPECT_EQ(check(&image.buffer, uint8_word, 2), retrograde_error_extents_too_large);
+  EXPECT_EQ(reports.size(), 5u);
+}
+
+TEST(BufferChecks, RegionsAreComparedWhereABitIsSet) {
+  std::vector<Report> reports;
+  retrograde_context context = reporting_to(&reports);
+  const Image image;  // covers [3, 6] x [-1, 3]
+  const auto check = [&](int32_t rules, int32_t dimensions, std::vector<int32_t> used) {
+    return retrograde_check_region(&context, &image.buffer, "im", rules, 1, dimensions,
+                                   used.data());
+  };
+  EXPECT_EQ(check(0, 0, {}), 0);
+  EXPECT_EQ(check(0, 3, {3, 6, -1, 3}), 0);
+  EXPECT_EQ(check(0, 2, {-1, 3}), 0);
+  EXPECT_TRUE(reports.empty());
+  EXPECT_EQ(check(0, 2, {-1, 4}), retrograde_error_access_out_of_bounds);
+  EXPECT_NE(reports.back().message.find("is read over [-1, 4] in dimension 1"), std::string::npos);
+  EXPECT_EQ(check(retrograde_region_is_written, 3, {2, 6, -1, 3}),
+            retrograde_error_access_out_of_bounds);
+  EXPECT_NE(reports.back().message.find("is written over [2, 6] in dimension 0"),
+            std::string::npos);
+}
+
+TEST(BufferChecks, MemoryAndStridesAreChecked) {
+  std::vector<Report> reports;
+  retrograde_context context = reporting_to(&reports);
+  const auto check = [&](const Image& image, int32_t rules, int32_t alignment) {
+    return retrograde_check_region(&context, &image.buffer, "im", rules, alignment, 0, nullptr);
+  };
+  Image image;
+  image.buffer.host = reinterpret_cast<uint8_t*>(uintptr_t{64});  // never read
+  EXPECT_EQ(check(image, retrograde_region_is_dense, 64), 0);
+  EXPECT_EQ(check(image, 0, 128), retrograde_error_unaligned_host_ptr);
+  image.dims[0].stride = 2;
+  EXPECT_EQ(check(image, 0, 1), 0);
+  EXPECT_EQ(check(image, retrograde_region_is_dense, 1), retrograde_error_constraint_violated);
+  image.dims[1].stride = INT32_MIN;
+  EXPECT_EQ(check(image, 0, 1), retrograde_error_allocation_too_large);
+  image.dims[1].stride = 8;
+  image.buffer.set_device_dirty(true);
+  EXPECT_EQ(check(image, retrograde_region_is_written, 1), 0);
+  EXPECT_EQ(check(image, 0, 1), retrograde_error_device_dirty_with_no_device_support);
+  image.buffer.host = nullptr;
+  EXPECT_EQ(check(image, 0, 1), retrograde_error_host_is_null);
+  image.dims[0].extent = 0;
+  image.buffer.set_device_dirty(false);
+  EXPECT_EQ(check(image, 0, 1), 0);  // no elements, no memory
+}
+
 std::string formatted(size_t size, const char* format, auto... args) {
   std::vector<char> text(size + 1, '#');
   const size_t length = retrograde_format_message(text.data(), size, format, args...);
