@@ -6,6 +6,7 @@
 // Method: W. J. Cody and W. Waite, Software Manual for the Elementary Functions (1980), chapters
 // 5 to 7, without their tables; polynomials of least maximum relative error (Remez).
 // Rejected: log2 in two floats, about as many instructions and in need of FMA for its bits.
+#include <llvm/Analysis/VectorUtils.h>
 #include <llvm/IR/Intrinsics.h>
 
 #include <algorithm>
@@ -25,7 +26,8 @@ class Doubles {
     return e_.b.CreateIntrinsic(llvm::Intrinsic::fma, {a->getType()}, {a, b, c});
   }
   // c[0] + c[1] x + ..., an odd number of terms: Horner's rule over pairs, half as long a chain as
-  // over terms.
+  // over terms. Rejected: two such rules side by side, shorter by a step for one more
+  // multiplication; slower by 4 % where the multipliers are what is busy.
   Value* polynomial(Value* x, const std::vector<double>& c) {
     const auto constant = [&](size_t i) { return float_constant(x, c[i]); };
     Value *square = e_.b.CreateFMul(x, x), *result = constant(c.size() - 1);
@@ -70,17 +72,15 @@ Value* times_log2(Emitter& e, Value* y, Value* x) {
   return d.fma(e.b.CreateFMul(y, s), p, e.b.CreateFMul(y, k));
 }
 
-// u = n + f, |f| <= 1/2;  2^u = 2^n (1 + f Q(f)). Saturates at 2^-1000 and 2^1000. A NaN that was a
-// float stays one: n's bits are the last 12 of its payload, which are 0.
+// u = n + f, |f| <= 1/2;  2^u = 2^n (1 + f Q(f)), of |u| < 1022; of others any number. A NaN that
+// was a float stays one: n's bits are the last 12 of its payload, which are 0.
 Value* exp2_of_double(Emitter& e, Value* u) {
   Doubles d(e);
-  Value *low = float_constant(u, -1000.0), *high = float_constant(u, 1000.0);
-  u = e.b.CreateSelect(e.b.CreateFCmpOGT(low, u), low, u);
-  u = e.b.CreateSelect(e.b.CreateFCmpOLT(high, u), high, u);
   // The sum's last place is 1: it rounds u to n, which stands in its last bits.
-  Value* shift = float_constant(u, 0x1.8p52);
-  Value* sum = e.b.CreateFAdd(u, shift);
-  Value* f = e.b.CreateFSub(u, e.b.CreateFSub(sum, shift));
+  Value *shift = float_constant(u, 0x1.8p52), *sum = e.b.CreateFAdd(u, shift);
+  Value* n = e.machine.has_rounding() ? e.b.CreateUnaryIntrinsic(llvm::Intrinsic::roundeven, u)
+                                      : e.b.CreateFSub(sum, shift);
+  Value* f = e.b.CreateFSub(u, n);
   Value* p = d.polynomial(f, {1.0, 0x1.62e430af26ed2p-1, 0x1.ebfbdc3c2f68ep-3, 0x1.c6aee88eb6649p-5,
                               0x1.3b2d4cf251bbcp-7, 0x1.5f3e52e73118ap-10, 0x1.41fbbbc312428p-13});
   Value* bits = bits_as_integer(e, sum);
@@ -88,15 +88,30 @@ Value* exp2_of_double(Emitter& e, Value* u) {
   return bits_as_float(e, e.b.CreateAdd(bits_as_integer(e, p), power));
 }
 
-// |x|^y where 0 < |x| < infinity, NaN where y is.
-Value* power_of_magnitude(Emitter& e, Value* size, Value* y) {
-  auto* wide = with_lanes(e.b.getDoubleTy(), lanes_of(size));
-  // Beyond 2^100 all is 0, 1 or infinite; infinity itself, times the 0 of log2(1), would be NaN.
-  Value *low = float_constant(y, -0x1p100), *high = float_constant(y, 0x1p100);
-  y = e.b.CreateSelect(e.b.CreateFCmpOGT(low, y), low, y);
-  y = e.b.CreateSelect(e.b.CreateFCmpOLT(high, y), high, y);
-  Value* u = times_log2(e, e.b.CreateFPExt(y, wide), e.b.CreateFPExt(size, wide));
-  return e.b.CreateFPTrunc(exp2_of_double(e, u), size->getType());
+// The sizes |x| between which a power is computed: those below have the power of 0, those above that
+// of infinity.
+struct Ends {
+  Value *low, *high;
+};
+
+constexpr int64_t least_float = 1, largest_float = 0x7f7fffff;  // as bits
+
+// About 2^-t and 2^t, t = 400 / |y|: their bits are t 2^23 from those of 1. That makes t to 1.45 t
+// in log2(x) upward, 0.7 t to t downward. So |y log2(x)| is below 600 between the two, and above 280
+// beyond them, but where the range of float32 ends first. There |y| is below 4.
+Ends ends_of(Emitter& e, Value* y) {
+  constexpr int64_t one = 0x3f800000;
+  Value* most = float_constant(y, 0x1p30);
+  Value* t = e.b.CreateFDiv(float_constant(y, 400 * 0x1p23),
+                            e.b.CreateUnaryIntrinsic(llvm::Intrinsic::fabs, y));
+  t = e.b.CreateSelect(e.b.CreateFCmpOLT(t, most), t, most);
+  Value* steps = e.b.CreateFPToSI(t, with_lanes(e.b.getInt32Ty(), lanes_of(y)));
+  const auto end = [&](llvm::Intrinsic::ID side, Value* bits, int64_t last) {
+    return bits_as_float(e, e.b.CreateBinaryIntrinsic(side, bits, int_constant(bits, last)));
+  };
+  Value* bits = int_constant(steps, one);
+  return {end(llvm::Intrinsic::smax, e.b.CreateSub(bits, steps), least_float),
+          end(llvm::Intrinsic::smin, e.b.CreateAdd(bits, steps), largest_float)};
 }
 
 // What depends on y alone; LLVM moves it out of loops that do not change y. The powers of 0,
@@ -123,16 +138,17 @@ Exponent exponent(Emitter& e, Value* y) {
           by_sign(zero, infinity), of_nan};
 }
 
-// C99 Annex F, 9.4.4, in the order in which later lines overrule earlier ones.
-Value* with_special_cases(Emitter& e, Value* x, Value* y, Value* size, Value* result) {
+// C99 Annex F, 9.4.4, in the order in which later lines overrule earlier ones; but for 1,
+// whose powers are all 1.
+Value* with_special_cases(Emitter& e, Value* x, Value* y, Value* size, const Ends& ends,
+                          Value* result) {
   const Exponent of_y = exponent(e, y);
-  Value *zero = float_constant(x, 0.0), *one = float_constant(x, 1.0),
-        *infinity = llvm::ConstantFP::getInfinity(x->getType());
+  Value *zero = float_constant(x, 0.0), *infinity = llvm::ConstantFP::getInfinity(x->getType());
   const auto choose = [&](Value* when, Value* then) {
     result = e.b.CreateSelect(when, then, result);
   };
-  choose(e.b.CreateFCmpOEQ(size, zero), of_y.of_zero);
-  choose(e.b.CreateFCmpOEQ(size, infinity), of_y.of_infinity);
+  choose(e.b.CreateFCmpOLT(size, ends.low), of_y.of_zero);
+  choose(e.b.CreateFCmpOGT(size, ends.high), of_y.of_infinity);
   Value* sign = e.b.CreateAnd(bits_as_integer(e, x),
                               e.b.CreateSExt(of_y.is_odd, bits_as_integer(e, x)->getType()));
   sign = e.b.CreateAnd(sign, int_constant(sign, INT32_MIN));
@@ -141,13 +157,51 @@ Value* with_special_cases(Emitter& e, Value* x, Value* y, Value* size, Value* re
   choose(e.b.CreateAnd(is_root, e.b.CreateFCmpOLT(size, infinity)),
          llvm::ConstantFP::getNaN(x->getType()));
   choose(e.b.CreateFCmpUNO(x, zero), of_y.of_nan);
-  return e.b.CreateSelect(e.b.CreateFCmpOEQ(x, one), one, result);
+  return result;
 }
 
-Value* piece_of_pow(Emitter& e, Value* x, Value* y) {
-  const Contraction contraction(e, false);
-  Value* size = e.b.CreateUnaryIntrinsic(llvm::Intrinsic::fabs, x);
-  return with_special_cases(e, x, y, size, power_of_magnitude(e, size, y));
+// Beyond 2^100 all powers are 0, 1 or infinite; infinity itself, times the 0 of log2(1), would be
+// NaN.
+constexpr double large_exponent = 0x1p100;
+
+// y log2(size) in double.
+Value* y_log2(Emitter& e, Value* y, Value* size) {
+  auto* wide = with_lanes(e.b.getDoubleTy(), lanes_of(size));
+  return times_log2(e, e.b.CreateFPExt(y, wide), e.b.CreateFPExt(size, wide));
+}
+
+// NaN stays.
+Value* clamped(Emitter& e, Value* value, double most) {
+  Value *low = float_constant(value, -most), *high = float_constant(value, most);
+  value = e.b.CreateSelect(e.b.CreateFCmpOGT(low, value), low, value);
+  return e.b.CreateSelect(e.b.CreateFCmpOLT(high, value), high, value);
+}
+
+// log2(1) is 0, so that all of its powers are 1 by themselves: with y = NaN, too, which becomes so
+// large a number that both ends are 1.
+Value* pow_of_any(Emitter& e, Value* x, Value* y, Value* size) {
+  Value *low = float_constant(y, -large_exponent), *high = float_constant(y, large_exponent);
+  Value* finite = e.b.CreateSelect(e.b.CreateFCmpOGT(y, low), y, low);
+  finite = e.b.CreateSelect(e.b.CreateFCmpOLT(finite, high), finite, high);
+  Value* power = e.b.CreateFPTrunc(exp2_of_double(e, y_log2(e, finite, size)), y->getType());
+  return with_special_cases(e, x, y, size, ends_of(e, finite), power);
+}
+
+// The same bits, for one x of many y: their ends are more work than to clamp y log2(x).
+Value* pow_of_uniform(Emitter& e, Value* x, Value* y, Value* size) {
+  Value* u = clamped(e, y_log2(e, clamped(e, y, large_exponent), size), 1000.0);
+  Value* power = e.b.CreateFPTrunc(exp2_of_double(e, u), y->getType());
+  const auto float_of = [&](int64_t bits) {
+    return bits_as_float(e, int_constant(bits_as_integer(e, x), bits));
+  };
+  power =
+      with_special_cases(e, x, y, size, {float_of(least_float), float_of(largest_float)}, power);
+  Value* one = float_constant(x, 1.0);
+  return e.b.CreateSelect(e.b.CreateFCmpOEQ(x, one), one, power);
+}
+
+bool is_uniform(const Value* value) {
+  return llvm::isa<llvm::Constant>(value) || llvm::getSplatValue(value) != nullptr;
 }
 
 }  // namespace
@@ -156,12 +210,17 @@ Value* piece_of_pow(Emitter& e, Value* x, Value* y) {
 // overlap in time and share the loads of coefficients. One register's chain is as long as what a
 // processor looks ahead, so that chains of different pieces would hardly meet.
 Value* float_pow(Emitter& e, Value* x, Value* y) {
+  const Contraction contraction(e, false);
   const int lanes = lanes_of(x), most = std::max(4, e.machine.vector_bits / 16);
-  if (lanes <= most) return piece_of_pow(e, x, y);
+  const auto pow = is_uniform(x) && !is_uniform(y) ? pow_of_uniform : pow_of_any;
+  Value* size = e.b.CreateUnaryIntrinsic(llvm::Intrinsic::fabs, x);
+  if (lanes <= most) return pow(e, x, y, size);
   std::vector<Value*> pieces;
   for (int start = 0; start < lanes; start += most) {
-    const int count = std::min(most, lanes - start);
-    pieces.push_back(piece_of_pow(e, slice(e, x, start, count), slice(e, y, start, count)));
+    const auto piece = [&](Value* all) {
+      return slice(e, all, start, std::min(most, lanes - start));
+    };
+    pieces.push_back(pow(e, piece(x), piece(y), piece(size)));
   }
   return concat(e, pieces);
 }

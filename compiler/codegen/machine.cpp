@@ -89,6 +89,9 @@ bool Machine::has_avx2() const { return has_avx512() || (is_x86() && target.has_
 bool Machine::has_fma() const {
   return !is_x86() || has_avx512() || (target.has_feature(F::FMA) && target.has_feature(F::AVX2));
 }
+bool Machine::has_rounding() const {
+  return !is_x86() || has_avx2() || has_any(target, {F::SSE41, F::AVX});
+}
 bool Machine::has_f16c() const { return !is_x86() || has_avx512() || target.has_feature(F::F16C); }
 
 int Machine::max_math_lanes(int bits) const { return vector_bits / bits; }

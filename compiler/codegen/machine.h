@@ -24,8 +24,9 @@ struct Machine {
   bool is_x86() const { return target.arch == Target::X86; }
   bool has_avx512() const;  // F at least
   bool has_avx2() const;
-  bool has_fma() const;   // as the vector math sees it: FMA with AVX2, or AArch64
-  bool has_f16c() const;  // half to float conversion as an instruction
+  bool has_fma() const;       // as the vector math sees it: FMA with AVX2, or AArch64
+  bool has_rounding() const;  // of floats to whole numbers, as an instruction
+  bool has_f16c() const;      // half to float conversion as an instruction
   bool has_gather() const { return has_avx2(); }
   bool has_avx512_words() const;  // AVX-512 of integers of 8 and 16 bits (BW)
 

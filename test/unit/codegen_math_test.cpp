@@ -261,6 +261,73 @@ TEST(CodegenMath, PowOfEveryPairOfSpecialValuesFollowsC99) {
   }
 }
 
+// Exponents of all sizes, with bases whose powers are ordinary, denormal, 0 and infinite, by a
+// little and by far.
+TEST(CodegenMath, PowersThatOverflowOrVanishDoSoAtAnyScale) {
+  std::vector<float> x, y;
+  for (int scale = -60; scale <= 60; scale += 2) {
+    for (const double digits : {-1.9, -1.37, 1.0, 1.46}) {
+      for (const double log2 : {0.3, 100.0, 127.9, 128.1, 140.0, 148.8, 151.0, 280.0, 400.0, 420.0,
+                                577.0, 600.0, 1100.0, 5000.0}) {
+        const float exponent = static_cast<float>(std::ldexp(digits, scale));
+        x.push_back(static_cast<float>(std::exp2(log2 / exponent)));
+        y.push_back(x.size() % 2 ? exponent : -exponent);
+      }
+    }
+  }
+  x.resize(count, 1.0f);
+  y.resize(count, 0.0f);
+  std::vector<Target> targets = {test_target()};
+  if (test_target().arch == Target::X86) targets.push_back(Target("x86-64-linux"));
+  for (const Target& target : targets) {
+    const auto got = run(Op::pow, 8, x, y, target);
+    for (size_t i = 0; i < x.size(); i++) {
+      const double exact = std::pow(static_cast<double>(x[i]), static_cast<double>(y[i]));
+      ASSERT_LE(ulp_error<float>(got[i], exact), 0.55)
+          << "pow(" << x[i] << ", " << y[i] << ") = " << got[i] << ", exactly " << exact;
+    }
+  }
+}
+
+// The lanes of argument `uniform` all hold the first one's number.
+std::vector<float> pow_with_uniform(int uniform, int lanes, const std::vector<float>& x,
+                                    const std::vector<float>& y) {
+  LoweredFunction f;
+  f.name = "pow";
+  const Expr start = variable("i") * lanes, index = lanes_at(start, lanes);
+  const auto operand = [&](int k, const char* name) {
+    return k == uniform ? make_broadcast(make_load(Float(32), name, start), lanes)
+                        : make_load(Float(32, lanes), name, index);
+  };
+  f.args = {input("x", Float(32)), input("y", Float(32)), output("out", Float(32))};
+  f.body = make_for(
+      "i", 0, count / lanes, ForType::Serial,
+      make_store("out", call_op(Op::pow, Float(32, lanes), {operand(0, "x"), operand(1, "y")}),
+                 index));
+  Array a(Float(32), count), b(Float(32), count), out(Float(32), count);
+  std::copy_n(x.begin(), count, a.data<float>());
+  std::copy_n(y.begin(), count, b.data<float>());
+  EXPECT_EQ(call(f, {&a, &b, &out}), 0);
+  return {out.data<float>(), out.data<float>() + count};
+}
+
+TEST(CodegenMath, PowsBitsDoNotDependOnWhichArgumentIsUniform) {
+  for (const int lanes : {4, 32}) {
+    for (const int uniform : {0, 1}) {
+      auto x = samples<float>(11), y = samples<float>(12);
+      for (size_t i = 0, n = static_cast<size_t>(lanes); i < count; i++)
+        (uniform == 0 ? x : y)[i] = (uniform == 0 ? x : y)[i / n * n];
+      const auto expected = run(Op::pow, lanes, x, y), got = pow_with_uniform(uniform, lanes, x, y);
+      for (size_t i = 0; i < count; i++) {
+        ASSERT_TRUE(
+            same(Scalar::of_float(Float(32), expected[i]), Scalar::of_float(Float(32), got[i])))
+            << "pow(" << x[i] << ", " << y[i] << "): " << expected[i] << ", with argument "
+            << uniform << " uniform " << got[i];
+      }
+    }
+  }
+}
+
 // The function of constants that only code generation knows, in vectors and alone.
 template <typename Number>
 void check_constants(Op op, const Target& target) {
