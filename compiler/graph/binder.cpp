@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "diagnostics/error.h"
+#include "graph/directive_names.h"
 #include "ir/build.h"
 #include "ir/visit.h"
 
@@ -37,6 +38,18 @@ Expr Binder::operator()(const Expr& root) const {
     const SymbolRef symbol = v ? symbol_of(v->name) : SymbolRef();
     return symbol.defined() ? variable(v->name, v->type, symbol) : mapped;
   });
+}
+
+void Binder::operator()(Directive& directive) const {
+  visit_names(directive, [&](Expr& e) {
+    if (e.defined()) e = (*this)(e);
+  });
+  auto* prefetch = std::get_if<PrefetchData>(&directive);
+  if (!prefetch) return;
+  if (const auto f = names_.funcs.find(prefetch->source); f != names_.funcs.end())
+    prefetch->symbol = SymbolRef::weak(f->second->shared_from_this());
+  if (const auto p = names_.parameters.find(prefetch->source); p != names_.parameters.end())
+    prefetch->symbol = SymbolRef(p->second);
 }
 
 Expr Binder::bound(const Call& call, const Expr& e) const {

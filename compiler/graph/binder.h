@@ -30,6 +30,8 @@ class Binder {
 
   // UserError when a Func or an image is not there (graph.h).
   Expr operator()(const Expr& e) const;
+  // The expressions of a directive, and what it prefetches.
+  void operator()(Directive& directive) const;
 
  private:
   Expr bound(const Call& call, const Expr& e) const;

@@ -51,8 +51,8 @@ std::string to_text(const Graph& graph);
 // the graph.
 Graph parse_graph(const std::string& text);
 
-// What tells two graphs apart: the first place, and what stands there in each; empty when they are
-// equal. Names count, identities do not.
+// What tells two graphs apart: the first place in their texts, and what stands there in each; empty
+// when they are equal. Names count, identities do not.
 std::string difference(const Graph& a, const Graph& b);
 
 // Phase::Algorithm of ir/validate.h: throws InternalError that names the pass and the rule. Every

@@ -315,14 +315,13 @@ class GraphReader {
     if (line.word == "specialize") {
       StageSchedule special;
       special.dims = first_loops(*f_, *definition_);
-      special.condition = parse_expr(line.rest);
+      special.condition = expr(line);
       special.touched = now.touched = true;
       now.specializations.push_back(std::move(special));
       specials_.push_back(now.specializations.size() - 1);
     } else if (line.word == "end" && !specials_.empty()) {
       specials_.pop_back();
-    } else if (const auto directive = parse_directive(line.whole);
-               directive && is_of_stage(*directive)) {
+    } else if (const auto directive = directive_of(line, true)) {
       apply_directive(*directive, now);
     } else {
       return false;
@@ -355,7 +354,6 @@ class GraphReader {
         domain->predicate =
             rebind_symbol(complete.predicate, domain.get(), SymbolRef::weak(domain));
     }
-    bind_schedule(complete.schedule, bind);
     if (is_update_) {
       f_->updates.push_back(std::move(complete));
     } else {
@@ -363,38 +361,17 @@ class GraphReader {
     }
     definition_.reset();
   }
-  void bind_schedule(StageSchedule& schedule, const Binder& bind) const {
-    for (Split& split : schedule.splits) {
-      if (split.factor.defined()) split.factor = bind(split.factor);
-    }
-    for (PrefetchDirective& prefetch : schedule.prefetches) {
-      prefetch.offset = bind(prefetch.offset);
-      if (const auto f = names_.funcs.find(prefetch.name); f != names_.funcs.end())
-        prefetch.symbol = SymbolRef::weak(f->second);
-      if (const auto p = names_.parameters.find(prefetch.name); p != names_.parameters.end())
-        prefetch.symbol = SymbolRef(p->second);
-    }
-    for (StageSchedule& special : schedule.specializations) {
-      if (special.condition.defined()) special.condition = bind(special.condition);
-      bind_schedule(special, bind);
-    }
+  // The directive that the line is, when it is one of stages, or of Funcs, as is asked for.
+  std::optional<Directive> directive_of(const Line& line, bool of_stage) const {
+    std::optional<Directive> directive = parse_directive(line.whole);
+    if (!directive || is_of_stage(*directive) != of_stage) return std::nullopt;
+    Binder(names_, nullptr, nullptr)(*directive);
+    return directive;
   }
-
   bool reads_schedule(const Line& line) {
-    const auto directive = parse_directive(line.whole);
-    if (!directive || is_of_stage(*directive)) return false;
-    apply_directive(*directive, *f_);
-    const Binder bind(names_, nullptr, nullptr);
-    const auto bind_all = [&](std::initializer_list<Expr*> all) {
-      for (Expr* e : all) {
-        if (e->defined()) *e = bind(*e);
-      }
-    };
-    for (Bound& b : f_->schedule.bounds) bind_all({&b.min, &b.extent, &b.modulus, &b.remainder});
-    for (Bound& b : f_->schedule.estimates) bind_all({&b.min, &b.extent});
-    for (StorageRule& r : f_->schedule.storage_rules) bind_all({&r.alignment, &r.bound, &r.fold});
-    bind_all({&f_->schedule.eviction_key});
-    return true;
+    const auto directive = directive_of(line, false);
+    if (directive) apply_directive(*directive, *f_);
+    return directive.has_value();
   }
 
   bool reads_output(const Line& line) {

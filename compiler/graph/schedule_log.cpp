@@ -62,11 +62,11 @@ class Replay {
     const SchedulePlace place{func(entry.func), entry.stage, entry.special};
     check(place, entry);
     Directive directive = entry.directive;
-    visit_names(directive,
-                Overloaded{[&](NamedFunc& name) { name = func_or_image(name); },
-                           [&](NamedLoop& name) { name = loop(place, name); },
-                           [&](LoopLevel& level) { find(level); }, [&](Expr& e) { e = bound(e); }});
-    if (auto* prefetch = std::get_if<PrefetchData>(&directive)) find_source(*prefetch);
+    visit_names(directive, Overloaded{[&](NamedFunc& name) { name = func_or_image(name); },
+                                      [&](NamedLoop& name) { name = loop(place, name); },
+                                      [&](LoopLevel& level) { find(level); },
+                                      [&](Expr& e) { note_parameters(e); }});
+    Binder(names_, nullptr, nullptr)(directive);
     if (const auto* wrap = std::get_if<Wrap>(&directive)) {
       make(wrap->made, wrapper_of(place.f, funcs(wrap->users), without_numbers(wrap->made), false));
     } else if (const auto* clone = std::get_if<Clone>(&directive)) {
@@ -100,7 +100,9 @@ class Replay {
                "Apply it to the program that it was taken from");
   }
 
-  void make(const std::string& name, const FuncPtr& f) { names_.funcs[name] = f; }
+  void make(const std::string& name, const FuncPtr& f) {
+    names_.funcs[name] = names_.funcs[f->name] = f;
+  }
 
   FuncPtr func_or_none(const std::string& name) {
     if (const auto* found = meant(names_.funcs, name, [](const auto& f) { return f.first; }))
@@ -133,14 +135,6 @@ class Replay {
     for (const NamedFunc& name : names) result.push_back(func(name));
     return result;
   }
-  void find_source(PrefetchData& prefetch) {
-    if (const ParameterPtr found = image(prefetch.source)) {
-      prefetch.symbol = SymbolRef(found);
-    } else if (const FuncPtr f = func_or_none(prefetch.source)) {
-      prefetch.symbol = SymbolRef::weak(f->shared_from_this());
-    }
-  }
-
   static std::string loop_of(const std::vector<std::string>& loops, const std::string& name) {
     const std::string* found = meant(loops, name, [](const std::string& loop) { return loop; });
     return found ? *found : name;
@@ -163,8 +157,8 @@ class Replay {
   }
 
   // Parameters that only the schedule reads are the log's own; from text they are new.
-  Expr bound(const Expr& e) {
-    if (!e.defined()) return e;
+  void note_parameters(const Expr& e) {
+    if (!e.defined()) return;
     walk(e, [&](const Expr& part) {
       const Variable* v = part.as<Variable>();
       if (!v || v->symbol.defined() || names_.parameters.count(v->name) ||
@@ -176,7 +170,6 @@ class Replay {
       names_.parameters.emplace(v->name, parameter);
       return true;
     });
-    return Binder(names_, nullptr, nullptr)(e);
   }
 
   NamedEntities names_;

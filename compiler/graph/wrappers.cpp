@@ -162,6 +162,7 @@ FuncPtr clone_of(const FuncPtr& f, const std::string& name) {
   FuncPtr clone = std::make_shared<FuncContents>(*f);
   clone->name = claim_name(name);
   clone->wrappers.clear();
+  clone->log.clear();  // it starts with the schedule so far
   clone->outputs.clear();
   make_outputs(*clone);
   for (int s = 1; s < f->stage_count(); s++) {
@@ -308,7 +309,6 @@ FuncPtr wrapper_of(const FuncPtr& handle, const std::vector<FuncPtr>& users,
                "Give each its own");
   }
   FuncPtr wrapper = clone ? clone_of(f, name) : identity_of(f, name);
-  wrapper->log.clear();                // its directive starts it with the schedule so far
   f->frozen = wrapper->frozen = true;  // wrappers change no values, now or later
   for (const std::string& key : keys) f->wrappers[key] = wrapper;
   std::vector<NamedFunc> named;

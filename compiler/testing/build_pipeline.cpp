@@ -3,6 +3,7 @@
 
 #include "frontend/boundary_conditions.h"
 #include "frontend/inline_reductions.h"
+#include "frontend/param.h"
 #include "testing/interpreter.h"
 
 namespace retrograde::fuzz {
@@ -102,7 +103,6 @@ class Builder {
     Func& func = built_.funcs.back();
     variables_.assign(built_.vars.begin(), built_.vars.begin() + spec.dimensions);
     define(func, std::vector<Expr>(variables_), spec.values);
-    built_.domains.emplace_back();
     for (const UpdateSpec& update : spec.updates) add_update(func, spec, update);
   }
 
@@ -129,7 +129,6 @@ class Builder {
       domain = domain_of(update.domain);
       for (int k = 0; k < domain.dimensions(); ++k) variables_.push_back(domain[k]);
     }
-    built_.domains.back().push_back(domain);
     self_ = &func;
     if (!update.predicate.empty()) domain.where(expr(update.predicate[0]));
     std::vector<Expr> left;

@@ -6,7 +6,6 @@
 
 #include "frontend/buffer.h"
 #include "frontend/func.h"
-#include "frontend/param.h"
 #include "testing/array.h"
 #include "testing/random_pipeline.h"
 
@@ -16,9 +15,6 @@ struct BuiltPipeline {
   std::vector<Buffer<>> images;
   std::vector<Var> vars;  // dimension 0 first: x, y, z
   std::vector<Func> funcs;
-  Param<int> selector;  // no part of the pipeline: schedules choose by it
-  // Of each update of each Func; an undefined one where the update has no reduction variables.
-  std::vector<std::vector<RDom>> domains;
 };
 
 BuiltPipeline build(const PipelineSpec& pipeline);

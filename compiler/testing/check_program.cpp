@@ -6,7 +6,6 @@
 
 #include "diagnostics/error.h"
 #include "frontend/pipeline.h"
-#include "testing/apply_schedule.h"
 #include "testing/build_pipeline.h"
 
 namespace retrograde::fuzz {
@@ -126,11 +125,11 @@ const char* verdict_name(Verdict verdict) {
   return "breaks the compiler";
 }
 
-Outcome check_program(const PipelineSpec& pipeline, const ScheduleSpec& schedule,
+Outcome check_program(const PipelineSpec& pipeline, const ScheduleLog& schedule,
                       const Target& target) {
   Outcome outcome;
   try {
-    BuiltPipeline built = build(pipeline);
+    const BuiltPipeline built = build(pipeline);
     apply(schedule, built);
     Pipeline compiled = outputs_of(pipeline, built);
     compiled.set_custom_trace(ignore_event);

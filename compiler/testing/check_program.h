@@ -25,7 +25,7 @@ const char* verdict_name(Verdict verdict);
 
 // Floats may differ by twice the error that contraction to FMA and the stated ULP of math functions
 // can cause in this very computation (tracked_value.h); everything else is compared bit for bit.
-Outcome check_program(const PipelineSpec& pipeline, const ScheduleSpec& schedule,
+Outcome check_program(const PipelineSpec& pipeline, const ScheduleLog& schedule,
                       const Target& target);
 
 }  // namespace retrograde::fuzz

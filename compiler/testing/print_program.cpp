@@ -4,17 +4,17 @@
 #include <sstream>
 
 #include "diagnostics/error.h"
-#include "ir/type.h"
+#include "ir/print.h"
 
 namespace retrograde::fuzz {
+
+namespace {
 
 std::string join(const std::vector<std::string>& parts) {
   std::string result;
   for (const std::string& part : parts) result += (result.empty() ? "" : ", ") + part;
   return result;
 }
-
-namespace {
 
 std::string cpp_type(Type type) {
   if (type.is_bool()) return "bool";
@@ -204,8 +204,11 @@ class Printer {
 
 }  // namespace
 
-std::string to_cpp(const PipelineSpec& pipeline, const ScheduleSpec& schedule) {
-  std::string result = Printer(pipeline).definitions() + to_cpp(schedule);
+std::string to_cpp(const PipelineSpec& pipeline, const ScheduleLog& schedule) {
+  std::string result = Printer(pipeline).definitions();
+  for (const auto& p : parameters_of(schedule))
+    result += text("Param<int> ", p->name, "; ", p->name, ".set(", ir::to_expr(*p->value), ");\n");
+  result += "{\n" + schedule.to_cpp() + "}\n";  // it has Vars of its own
   for (const OutputSpec& output : pipeline.outputs) {
     result += text("// output f", output.func, " over mins ", list(output.mins), ", extents ",
                    list(output.extents), "\n");

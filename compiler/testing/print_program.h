@@ -7,12 +7,7 @@
 
 namespace retrograde::fuzz {
 
-// "a, b, c"
-std::string join(const std::vector<std::string>& parts);
-
 // The definitions, the schedule, and the realization of every output.
-std::string to_cpp(const PipelineSpec& pipeline, const ScheduleSpec& schedule);
-// The schedule alone.
-std::string to_cpp(const ScheduleSpec& schedule);
+std::string to_cpp(const PipelineSpec& pipeline, const ScheduleLog& schedule);
 
 }  // namespace retrograde::fuzz

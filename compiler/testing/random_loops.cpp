@@ -1,60 +1,39 @@
 // Kept legal by construction:
-// - reduction loops keep their order and run one iteration after the other, unless the iterations
+// - reduction loops keep their order and run one iteration after the other,
+// unless the iterations
 //   are independent or the update is associative and atomic;
-// - outputs are rounded up or shifted inwards only where the extents of all runs allow it;
+// - outputs are rounded up or shifted inwards only where the extents of all
+// runs allow it;
 // - a loop inside a vectorized one has a constant extent.
 #include "testing/random_loops.h"
 
 #include <algorithm>
 #include <functional>
+#include <map>
+
+#include "graph/associative_update.h"
+#include "graph/names.h"
+#include "graph/race.h"
+#include "ir/build.h"
 
 namespace retrograde::fuzz {
 
 namespace {
 
-using Kind = Directive::Kind;
-
 constexpr int max_unrolled = 8;
 constexpr int max_lanes = 64;
 
-bool is_pure_index(const Index& index, int d) {
-  return index.variable == d && index.scale == 1 && index.divisor == 1 && index.offset == 0 &&
-         !index.clamped && index.data.empty();
-}
-
-bool is_same(const Index& a, const Index& b) {
-  return a.variable == b.variable && a.scale == b.scale && a.divisor == b.divisor &&
-         a.offset == b.offset && a.clamped == b.clamped && a.data.empty() && b.data.empty();
-}
-
-// Whether iterations of reduction variable k touch different elements: some coordinate is it plus a
-// constant, and what the update reads of the Func itself has the same coordinate there.
-bool is_independent(const FuncSpec& func, int stage, int k) {
-  const UpdateSpec& update = func.updates[stage - 1];
-  for (int d = 0; d < func.dimensions; ++d) {
-    const Index& left = update.left[d];
-    const bool moves = left.variable == func.dimensions + k && left.scale == 1 &&
-                       left.divisor == 1 && !left.clamped && left.data.empty();
-    if (!moves) continue;
-    bool same = true;
-    for_each_term_of_stage(func, stage, [&](const Term& term) {
-      if (term.action == Action::Self) same &= is_same(term.indices[d], left);
-    });
-    if (same) return true;
-  }
-  return false;
-}
-
 class LoopScheduler {
  public:
-  LoopScheduler(Loops loops, const StageContext& context, int selector, Random& random,
-                LoopNames& names, std::vector<Directive>& directives)
+  LoopScheduler(Loops loops, const StageContext& context, const Selector& selector,
+                ScheduleLog::Entry place, Random& random, LoopNames& names, ScheduleLog& log)
       : loops_(std::move(loops)),
         context_(context),
         selector_(selector),
+        place_(std::move(place)),
         random_(random),
         names_(names),
-        directives_(directives) {}
+        log_(log) {}
 
   StageLoops run() {
     if (loops_.empty()) return {{loops_}};
@@ -63,18 +42,20 @@ class LoopScheduler {
     for (int i = 0; i < splits; ++i) split(random_.below(static_cast<int>(loops_.size())));
     if (random_.chance(20)) fuse();
     if (has_reduction() && context_.is_associative && random_.chance(50)) make_atomic();
-    if (has_reduction() && random_.chance(5)) add({Kind::AllowRaces, {}});
+    if (has_reduction() && random_.chance(5)) add(ir::AllowRaces{});
     if (random_.chance(50)) reorder();
     if (context_.may_specialize && random_.chance(12)) specialize();
     run_kinds();
     if (random_.chance(8)) partition();
-    if (has_failing_specialization_) add({Kind::SpecializeFail, {}});
+    if (has_failing_specialization_) add(ir::SpecializeFail{"no specialization fits"});
     variants_.insert(variants_.begin(), loops_);
     return {variants_};
   }
 
  private:
-  void add(Directive directive) { directives_.push_back(std::move(directive)); }
+  void add(ir::Directive directive) {
+    log_.entries.push_back({place_.func, place_.stage, place_.special, std::move(directive)});
+  }
 
   int random_loop() { return random_.below(static_cast<int>(loops_.size())); }
 
@@ -94,17 +75,18 @@ class LoopScheduler {
   void specialize() {
     const int count = random_.between(1, 2);
     for (int i = 0; i < count; ++i) {
-      Directive directive{Kind::Specialize, {}};
-      directive.condition = random_.below(3);
-      if (i > 0 && directive.condition == variant_condition_) continue;
-      variant_condition_ = directive.condition;
-      has_failing_specialization_ |= directive.condition == selector_ && random_.chance(20);
-      LoopScheduler inner(loops_, context_, selector_, random_, names_, directive.nested);
+      const int condition = random_.below(3);
+      if (i > 0 && condition == variant_condition_) continue;
+      variant_condition_ = condition;
+      has_failing_specialization_ |= condition == selector_.value && random_.chance(20);
+      add(ir::Specialize{selector_.parameter == condition});
+      ScheduleLog::Entry place = place_;
+      place.special.push_back(static_cast<int>(variants_.size()));
+      LoopScheduler inner(loops_, context_, selector_, place, random_, names_, log_);
       if (random_.chance(40)) inner.split(inner.random_loop());
       if (random_.chance(30)) inner.reorder();
       inner.run_kinds();
       variants_.push_back(inner.loops_);
-      add(std::move(directive));
     }
   }
 
@@ -112,13 +94,22 @@ class LoopScheduler {
 
   void split(int at) {
     const Loop old = loops_[at];
-    if (old.name.empty()) return;
-    const int factor = random_factor();
+    split(at, random_factor(), names_.fresh(stem(old) + "o"));
+  }
+
+  // The outer loop may keep the name.
+  void split(int at, int factor, const std::string& outer_name) {
+    const Loop old = loops_[at];
     Loop outer = old, inner = old;
-    outer.name = names_.fresh(stem(old) + "o");
+    outer.name = outer_name;
     inner.name = names_.fresh(stem(old) + "i");
-    add({Kind::Split, {old.name, outer.name, inner.name}, factor, choose_tail(old, factor)});
-    replace_by_split(at, outer, inner, factor);
+    add(ir::SplitLoop{old.name, outer.name, inner.name, factor, choose_tail(old, factor)});
+    outer.is_original = inner.is_original = false;
+    outer.extent =
+        old.extent == unknown_extent ? unknown_extent : (old.extent + factor - 1) / factor;
+    inner.extent = factor;
+    loops_[at] = outer;
+    loops_.insert(loops_.begin() + at, inner);
   }
 
   int random_factor() { return random_.pick(std::vector<int>{2, 3, 4, 4, 5, 8, 8, 16}); }
@@ -126,15 +117,6 @@ class LoopScheduler {
   // Names of reduction loops say so.
   static std::string stem(const Loop& loop) {
     return loop.is_reduction ? "rr" : loop.name.substr(0, 1);
-  }
-
-  void replace_by_split(int at, Loop outer, Loop inner, int factor) {
-    const int extent = loops_[at].extent;
-    outer.is_original = inner.is_original = false;
-    outer.extent = extent == unknown_extent ? unknown_extent : (extent + factor - 1) / factor;
-    inner.extent = factor;
-    loops_[at] = outer;
-    loops_.insert(loops_.begin() + at, inner);
   }
 
   TailStrategy choose_tail(const Loop& loop, int factor) {
@@ -175,7 +157,6 @@ class LoopScheduler {
     if (loops_.size() < 2) return;
     const int at = random_.below(static_cast<int>(loops_.size()) - 1);
     const Loop inner = loops_[at], outer = loops_[at + 1];
-    if (inner.name.empty() || outer.name.empty()) return;
     if (inner.is_reduction != outer.is_reduction) return;
     Loop fused = inner;
     fused.is_original = false;
@@ -184,53 +165,45 @@ class LoopScheduler {
     fused.name = names_.fresh(fused.is_reduction ? "rrt" : "t");
     const bool known = inner.extent != unknown_extent && outer.extent != unknown_extent;
     fused.extent = known ? inner.extent * outer.extent : unknown_extent;
-    add({Kind::Fuse, {inner.name, outer.name, fused.name}});
+    add(ir::FuseLoops{inner.name, outer.name, fused.name});
     loops_[at] = fused;
     loops_.erase(loops_.begin() + at + 1);
   }
 
   void rename() {
     Loop& loop = loops_[random_loop()];
-    if (loop.name.empty()) return;
     const std::string name = names_.fresh(stem(loop) + "n");
-    add({Kind::Rename, {loop.name, name}});
+    add(ir::RenameLoop{loop.name, name});
     loop.name = name;
   }
 
   void reorder() {
-    std::vector<int> slots;  // loops with a name
-    for (size_t i = 0; i < loops_.size(); ++i) {
-      if (!loops_[i].name.empty()) slots.push_back(static_cast<int>(i));
-    }
-    if (slots.size() < 2) return;
-    Loops shuffled;
-    for (const int slot : slots) shuffled.push_back(loops_[slot]);
+    if (loops_.size() < 2) return;
+    Loops shuffled = loops_;
     for (size_t i = shuffled.size() - 1; i > 0; --i) {
       std::swap(shuffled[i], shuffled[random_.below(static_cast<int>(i) + 1)]);
     }
-    if (!context_.is_associative) restore_reduction_order(slots, shuffled);
-    Directive directive{Kind::Reorder, {}};
-    for (size_t i = 0; i < slots.size(); ++i) {
-      loops_[slots[i]] = shuffled[i];
-      directive.loops.push_back(shuffled[i].name);
-    }
-    add(std::move(directive));
+    if (!context_.is_associative) restore_reduction_order(shuffled);
+    loops_ = std::move(shuffled);
+    ir::ReorderLoops order;
+    for (const Loop& loop : loops_) order.loops.emplace_back(loop.name);
+    add(std::move(order));
   }
 
   // The reduction loops go back into their order, in the places where such loops landed.
-  void restore_reduction_order(const std::vector<int>& slots, Loops& shuffled) const {
+  void restore_reduction_order(Loops& shuffled) const {
     size_t next = 0;
     for (Loop& loop : shuffled) {
       if (!loop.is_reduction) continue;
-      while (!loops_[slots[next]].is_reduction) ++next;
-      loop = loops_[slots[next++]];
+      while (!loops_[next].is_reduction) ++next;
+      loop = loops_[next++];
     }
   }
 
   // ---- how a loop runs ----
 
   bool may_run_at_once(const Loop& loop) const {
-    return loop.is_independent && loop.type == ForType::Serial && !loop.name.empty();
+    return loop.is_independent && loop.type == ForType::Serial;
   }
 
   int lanes() const {
@@ -255,46 +228,19 @@ class LoopScheduler {
 
   void set_type(int at, ForType type) {
     loops_[at].type = type;
-    add({kind_of(type), {loops_[at].name}});
+    add(ir::RunLoop{loops_[at].name, type});
   }
 
-  static Kind kind_of(ForType type) {
-    switch (type) {
-      case ForType::Vectorized:
-        return Kind::Vectorize;
-      case ForType::Unrolled:
-        return Kind::Unroll;
-      case ForType::Parallel:
-        return Kind::Parallel;
-      default:
-        return Kind::Serial;
-    }
-  }
-
-  // By a split of its own, or by what vectorize(x, 8) and its like do.
+  // As vectorize(x, 8) and its like do, where the outer loop keeps the name.
   void split_and_set(int at, ForType type, int factor) {
-    if (random_.chance(50)) {
-      const Loop old = loops_[at];
-      Loop inner = old;
-      inner.name.clear();
-      Loop outer = old;
-      add({kind_of(type), {old.name}, factor, choose_tail(old, factor)});
-      replace_by_split(at, outer, inner, factor);
-      loops_[type == ForType::Parallel ? at + 1 : at].type = type;
-      return;
-    }
-    const Loop old = loops_[at];
-    Loop outer = old, inner = old;
-    outer.name = names_.fresh(stem(old) + "o");
-    inner.name = names_.fresh(stem(old) + "i");
-    add({Kind::Split, {old.name, outer.name, inner.name}, factor, choose_tail(old, factor)});
-    replace_by_split(at, outer, inner, factor);
+    const Loop& old = loops_[at];
+    split(at, factor, random_.chance(50) ? old.name : names_.fresh(stem(old) + "o"));
     set_type(type == ForType::Parallel ? at + 1 : at, type);
   }
 
   void unroll() {
     const int at = random_loop();
-    if (loops_[at].type != ForType::Serial || loops_[at].name.empty()) return;
+    if (loops_[at].type != ForType::Serial) return;
     if (loops_[at].extent == unknown_extent) {
       if (loops_[at].is_original) split_and_set(at, ForType::Unrolled, random_.between(2, 4));
     } else if (loops_[at].extent <= max_unrolled) {
@@ -314,92 +260,86 @@ class LoopScheduler {
                        [](const Loop& loop) { return loop.type == ForType::Vectorized; });
   }
 
-  void make_serial() {
-    Loop& loop = loops_[random_loop()];
-    if (loop.name.empty()) return;
-    loop.type = ForType::Serial;
-    add({Kind::Serial, {loop.name}});
-  }
+  void make_serial() { set_type(random_loop(), ForType::Serial); }
 
   void make_atomic() {
-    add({Kind::Atomic, {}});
+    add(ir::MakeAtomic{});
     for (Loop& loop : loops_) loop.is_independent = true;
   }
 
   void partition() {
     const Loop& loop = loops_[random_loop()];
-    if (loop.name.empty()) return;
-    add({random_.chance(50) ? Kind::NeverPartition : Kind::AlwaysPartition, {loop.name}});
+    add(ir::PartitionLoop{loop.name, random_.chance(50) ? Partition::Never : Partition::Always});
   }
 
   Loops loops_;
   const StageContext& context_;
-  const int selector_;
+  const Selector& selector_;
+  const ScheduleLog::Entry place_;
   Random& random_;
   LoopNames& names_;
-  std::vector<Directive>& directives_;
+  ScheduleLog& log_;
   std::vector<Loops> variants_;  // of the specializations
   int variant_condition_ = -1;
   bool has_failing_specialization_ = false;
 };
 
-bool reads_self(const Term& term) {
-  bool found = false;
-  for_each_term(term, [&](const Term& t) { found |= t.action == Action::Self; });
-  return found;
-}
-
-bool is_exact(Action action, Type type) {
-  if (action == Action::Max || action == Action::Min) return true;
-  return type.is_bool() ? action == Action::Or : action == Action::Add && !type.is_float();
+// Of a reduction loop: a variable that it comes from, and its extent where that is constant.
+struct Origin {
+  std::string variable;
+  int extent = unknown_extent;
+};
+std::map<std::string, Origin> origins_of(const ir::Definition& definition) {
+  std::map<std::string, Origin> origins;
+  for (const ir::ReductionVariable& v : definition.rvars) {
+    const auto extent = ir::as_const_int(v.extent);
+    origins[v.var] = {v.var, static_cast<int>(extent.value_or(unknown_extent))};
+  }
+  for (const ir::Split& split : definition.schedule.splits) {
+    const Origin old = origins[split.old_var];
+    const auto factor = split.factor.defined() ? ir::as_const_int(split.factor) : std::nullopt;
+    const int f = static_cast<int>(factor.value_or(1));
+    origins[split.outer] = {old.variable, old.extent < 0 ? old.extent : (old.extent + f - 1) / f};
+    if (factor) origins[split.inner] = {old.variable, f};
+  }
+  return origins;
 }
 
 }  // namespace
 
-Loops initial_loops(const FuncSpec& func, int stage) {
-  static const char* const dimension_names[] = {"x", "y", "z"};
+Loops loops_of(const ir::FuncContents& f, int stage) {
+  const ir::Definition& definition = f.stage(stage);
+  std::map<std::string, Origin> origins = origins_of(definition);
   Loops loops;
-  if (stage > 0) {
-    const auto& domain = func.updates[stage - 1].domain;
-    for (size_t k = 0; k < domain.size(); ++k) {
-      Loop loop{reduction_loop(static_cast<int>(k)), domain[k].extent};
-      loop.is_reduction = true;
-      loop.is_independent = is_independent(func, stage, static_cast<int>(k));
-      loops.push_back(loop);
+  for (const ir::Dim& dim : definition.schedule.dims) {
+    Loop loop{ir::without_numbers(dim.var)};
+    loop.is_reduction = dim.is_reduction;
+    if (dim.is_reduction) {
+      const Origin& origin = origins[dim.var];
+      loop.extent = origin.extent;
+      loop.is_independent = ir::can_prove_race_free(f, definition, origin.variable);
+    } else {
+      loop.dimension =
+          static_cast<int>(std::find(f.args.begin(), f.args.end(), dim.var) - f.args.begin());
     }
-  }
-  for (int d = 0; d < func.dimensions; ++d) {
-    if (stage > 0 && !is_pure_index(func.updates[stage - 1].left[d], d)) continue;
-    Loop loop{dimension_names[d]};
-    loop.dimension = d;
     loops.push_back(loop);
   }
   return loops;
 }
 
-bool is_associative_update(const FuncSpec& func, int stage) {
+bool is_associative_update(const ir::FuncContents& f, int stage) {
   if (stage == 0) return false;
-  const UpdateSpec& update = func.updates[stage - 1];
-  for (size_t v = 0; v < update.values.size(); ++v) {
-    const Term& value = update.values[v];
-    if (value.operands.size() != 2 || !is_exact(value.action, value.type)) return false;
-    const Term& self = value.operands[0];
-    if (self.action != Action::Self || self.element != static_cast<int>(v)) return false;
-    for (size_t d = 0; d < update.left.size(); ++d) {
-      const Index& left = update.left[d];
-      if (left.data.empty() && !is_same(self.indices[d], left)) return false;
-    }
-    if (reads_self(value.operands[1])) return false;
-  }
-  for (const Term& predicate : update.predicate) {
-    if (reads_self(predicate)) return false;
-  }
-  return true;
+  const ir::AssociativityProof proof = ir::prove_associative(f, f.stage(stage));
+  if (!proof.op || !proof.op->commutative || proof.op->breaks_ties) return false;
+  return std::all_of(proof.op->values.begin(), proof.op->values.end(), [](const Expr& value) {
+    return !value.type().is_float() || value.as<ir::Min>() || value.as<ir::Max>();
+  });
 }
 
-StageLoops schedule_loops(Loops loops, const StageContext& context, int selector, Random& random,
-                          LoopNames& names, std::vector<Directive>& directives) {
-  return LoopScheduler(std::move(loops), context, selector, random, names, directives).run();
+StageLoops schedule_loops(Loops loops, const StageContext& context, const Selector& selector,
+                          const ScheduleLog::Entry& place, Random& random, LoopNames& names,
+                          ScheduleLog& log) {
+  return LoopScheduler(std::move(loops), context, selector, place, random, names, log).run();
 }
 
 }  // namespace retrograde::fuzz

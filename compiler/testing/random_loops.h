@@ -4,15 +4,15 @@
 #include <string>
 #include <vector>
 
+#include "graph/schedule_log.h"
 #include "testing/random_pipeline.h"
-#include "testing/schedule_spec.h"
 
 namespace retrograde::fuzz {
 
 constexpr int unknown_extent = -1;
 
 struct Loop {
-  std::string name;             // empty: it has none
+  std::string name;
   int extent = unknown_extent;  // when constant
   int dimension = -1;           // of a pure variable's own loop
   bool is_reduction = false;
@@ -37,12 +37,12 @@ struct StageLoops {
   std::vector<Loops> variants;
 };
 
-// The loops of a stage without directives.
-Loops initial_loops(const FuncSpec& func, int stage);
+// The loops that a stage has now.
+Loops loops_of(const ir::FuncContents& f, int stage);
 
-// Whether update `stage` combines each element with something that does not read the Func, by an
+// Whether an update combines each element with something that does not read the Func, by an
 // operator that is associative and commutative bit for bit.
-bool is_associative_update(const FuncSpec& func, int stage);
+bool is_associative_update(const ir::FuncContents& f, int stage);
 
 // Fresh names for loops.
 class LoopNames {
@@ -53,8 +53,15 @@ class LoopNames {
   int count_ = 0;
 };
 
-// Draws directives for a stage with these loops and appends them.
-StageLoops schedule_loops(Loops loops, const StageContext& context, int selector, Random& random,
-                          LoopNames& names, std::vector<Directive>& directives);
+// What the conditions of specializations compare with, and its value.
+struct Selector {
+  Expr parameter;
+  int value = 0;
+};
+
+// Draws directives for the place, which has these loops, and appends them to the log.
+StageLoops schedule_loops(Loops loops, const StageContext& context, const Selector& selector,
+                          const ScheduleLog::Entry& place, Random& random, LoopNames& names,
+                          ScheduleLog& log);
 
 }  // namespace retrograde::fuzz

@@ -1,9 +1,12 @@
 // Consumers are scheduled before their producers, so that a producer can choose among their loops.
 //
 // Kept legal by construction:
-// - a Func is computed at a loop only when all of its uses, through inlined Funcs too, are inside
-//   of it, and neither that loop nor one around it is vectorized; with specializations, in each;
-// - between the storage level and the compute level no loop is parallel or vectorized;
+// - a Func is computed at a loop only when all of its uses, through inlined
+// Funcs too, are inside
+//   of it, and neither that loop nor one around it is vectorized; with
+//   specializations, in each;
+// - between the storage level and the compute level no loop is parallel or
+// vectorized;
 // - what is known of sizes is said only of outputs, whose sizes are known.
 #include "testing/random_schedule.h"
 
@@ -12,69 +15,123 @@
 #include <set>
 
 #include "diagnostics/error.h"
-#include "testing/apply_schedule.h"
-#include "testing/derived_funcs.h"
+#include "frontend/param.h"
+#include "graph/directive_names.h"
+#include "graph/names.h"
+#include "graph/wrappers.h"
+#include "ir/visit.h"
+#include "testing/random_loops.h"
 
 namespace retrograde::fuzz {
 
 namespace {
 
-using Kind = Directive::Kind;
-using Where = Placement::Where;
-using Rule = DimensionRule::Kind;
-
 constexpr int max_reads_inlined = 40;
 constexpr int ample_storage = 1024;  // more than any dimension ever needs
 
-// A loop by the Func and stage that it belongs to.
+// A loop by the Func and stage that it belongs to; root: no Func.
 struct Level {
-  int func = 0, stage = 0;
+  int func = -1, stage = 0;
   std::string name;
   bool operator==(const Level&) const = default;
 };
 
+// Where a Func is computed; of those at a loop, which.
+enum class Where : uint8_t { Inlined, Root, At };
+struct Placement {
+  Where where = Where::Root;
+  Level compute;
+  bool stored_outside = false;
+};
+
+// A Func whose outer loops, from this one on, are another's.
+struct Companion {
+  int func = 0, with = 0;
+  std::string loop;
+};
+
 class Scheduler {
  public:
-  Scheduler(const PipelineSpec& pipeline, uint64_t seed) : random_(seed + 77) {
-    if (random_.chance(50)) schedule_.derived = random_derived_funcs(pipeline, random_, names_);
-    extended_ = extend(pipeline, schedule_.derived);
-    if (!extended_.loops.empty()) correct_loops(pipeline);
+  Scheduler(const PipelineSpec& pipeline, uint64_t seed) : pipeline_(pipeline), random_(seed + 77) {
+    Param<int> selector("selector");
+    selector_.value = random_.below(3);
+    selector.set(selector_.value);
+    selector_.parameter = selector;
+    find_funcs();
+    if (random_.chance(50)) derive();
   }
 
-  ScheduleSpec run() {
-    schedule_.selector = random_.below(3);
-    schedule_.funcs.resize(count());
-    loops_.resize(count());
-    sites_.resize(count());
-    is_inlined_.assign(count(), false);
-    reachable_ = reachable_funcs(extended_.pipeline);
-    for (int f = 0; f < count(); ++f) {
-      schedule_.funcs[f].stages.resize(1 + func(f).updates.size());
-    }
+  ScheduleLog run() {
+    loops_.resize(funcs_.size());
+    sites_.resize(funcs_.size());
+    placements_.resize(funcs_.size());
     choose_companions();
     for (const int f : consumers_first()) schedule_func(f);
     for (int f = 0; f < count(); ++f) add_prefetches(f);
-    return std::move(schedule_);
+    for (const Companion& c : companions_) join(c);
+    return std::move(log_);
   }
 
  private:
   using Site = std::pair<int, int>;  // a Func and its stage
 
-  int count() const { return static_cast<int>(extended_.pipeline.funcs.size()); }
-  const FuncSpec& func(int f) const { return extended_.pipeline.funcs[f]; }
-  int stages(int f) const { return 1 + static_cast<int>(func(f).updates.size()); }
-  bool is_pure(int f) const { return func(f).updates.empty(); }
-  bool is_output(int f) const {
-    for (const OutputSpec& output : extended_.pipeline.outputs) {
-      if (output.func == f) return true;
+  // ---- the program: as compiled, where users read wrappers ----
+
+  // Those that the outputs need, with the Funcs of boundary conditions and inline reductions left
+  // out: those stand for what they read.
+  void find_funcs() {
+    const BuiltPipeline built = build(pipeline_);
+    apply(log_, built);
+    std::vector<ir::FuncPtr> outputs;
+    for (const OutputSpec& output : pipeline_.outputs)
+      outputs.push_back(built.funcs[output.func].function());
+    compiled_ = ir::apply_wrappers(outputs);
+    std::set<std::string> known;
+    for (const Func& f : built.funcs) known.insert(name_of(*f.function()));
+    for (const ScheduleLog::Entry& entry : log_.entries) known.insert(ir::made_by(entry.directive));
+    funcs_.clear();
+    for (const ir::FuncPtr& f : ir::topological_order(compiled_)) {
+      if (known.count(name_of(*f))) funcs_.push_back(f);
     }
-    return false;
   }
 
+  int count() const { return static_cast<int>(funcs_.size()); }
+  const ir::FuncContents& func(int f) const { return *funcs_[f]; }
+  static std::string name_of(const ir::FuncContents& f) { return ir::without_numbers(f.name); }
+  std::string name(int f) const { return name_of(func(f)); }
+  int stages(int f) const { return func(f).stage_count(); }
+  bool is_pure(int f) const { return func(f).updates.empty(); }
+  int dimensions(int f) const { return func(f).dimensions(); }
+  bool is_output(int f) const {
+    return std::find(compiled_.begin(), compiled_.end(), funcs_[f]) != compiled_.end();
+  }
+
+  // Calls `visit` with each Func, by its number, and each image (-1) that the stage reads;
+  // `direct`: itself.
+  template <typename Visit>
+  void for_each_read(const ir::FuncContents& f, int stage, const Visit& visit,
+                     bool direct = true) const {
+    ir::for_each_expr(f.stage(stage), [&](const Expr& root) {
+      ir::walk(root, [&](const Expr& e) {
+        const ir::Call* call = e.as<ir::Call>();
+        if (!call || call->symbol.raw() == &f) return true;
+        if (call->call_type == ir::CallType::Image) visit(-1, *call, direct);
+        if (call->call_type != ir::CallType::Func) return true;
+        const ir::FuncPtr callee = ir::func_of(*call);
+        const auto known = std::find(funcs_.begin(), funcs_.end(), callee);
+        if (known != funcs_.end()) {
+          visit(static_cast<int>(known - funcs_.begin()), *call, direct);
+        } else {
+          for (int s = 0; s < callee->stage_count(); ++s) for_each_read(*callee, s, visit, false);
+        }
+        return true;
+      });
+    });
+  }
   std::set<int> producers_of_stage(int f, int stage) const {
     std::set<int> producers;
-    for_each_term_of_stage(func(f), stage, [&](const Term& term) {
-      if (term.action == Action::Func) producers.insert(term.source);
+    for_each_read(func(f), stage, [&](int p, const ir::Call&, bool) {
+      if (p >= 0) producers.insert(p);
     });
     return producers;
   }
@@ -87,11 +144,10 @@ class Scheduler {
   std::vector<int> consumers_first() const {
     std::vector<int> order, waiting(count(), 0);
     for (int f = 0; f < count(); ++f) {
-      if (!reachable_[f]) continue;
       for (const int p : producers_of(f)) ++waiting[p];
     }
     for (int f = count() - 1; f >= 0; --f) {
-      if (reachable_[f] && waiting[f] == 0) order.push_back(f);
+      if (waiting[f] == 0) order.push_back(f);
     }
     for (size_t i = 0; i < order.size(); ++i) {
       for (const int p : producers_of(order[i])) {
@@ -101,6 +157,64 @@ class Scheduler {
     return order;
   }
 
+  void add(int f, ir::Directive directive, int stage = -1) {
+    log_.entries.push_back({name(f), stage, {}, std::move(directive)});
+  }
+
+  // ---- Funcs that directives make ----
+
+  void derive() {
+    std::set<std::string> wrapped;
+    for (int f = 0; f < count(); ++f) {
+      if (random_.chance(8)) wrap(f, wrapped);
+    }
+    for (int f = 0; f < count(); ++f) {
+      // Wrappers are made for users by name: those of an update that is cut would go astray.
+      for (int s = 1; s < stages(f) && !wrapped.count(name(f)); ++s) {
+        if (random_.chance(35)) factor(f, s);
+      }
+    }
+    try {
+      find_funcs();
+    } catch (const UserError&) {
+      log_.entries.clear();
+      find_funcs();
+    }
+  }
+
+  void wrap(int f, std::set<std::string>& wrapped) {
+    std::vector<int> users;
+    for (int g = 0; g < count(); ++g) {
+      const auto callees = ir::direct_callees(func(g));
+      if (std::find(callees.begin(), callees.end(), funcs_[f]) != callees.end()) users.push_back(g);
+    }
+    if (users.empty()) return;
+    const bool clones = random_.chance(30), for_all = !clones && random_.chance(40);
+    const int user = random_.pick(users);
+    const std::string made = names_.fresh("w");
+    std::vector<ir::NamedFunc> named;
+    if (!for_all) named.emplace_back(name(user));
+    wrapped.insert({name(f), name(user)});
+    add(f, clones ? ir::Directive(ir::Clone{made, named}) : ir::Directive(ir::Wrap{made, named}));
+  }
+
+  void factor(int f, int stage) {
+    if (!is_associative_update(func(f), stage)) return;
+    Loops loops = loops_of(func(f), stage);
+    std::erase_if(loops, [](const Loop& loop) { return !loop.is_reduction; });
+    if (loops.empty()) return;
+    std::string kept = random_.pick(loops).name;
+    if (random_.chance(50)) {
+      const ir::SplitLoop split{kept, names_.fresh("rro"), names_.fresh("rri"),
+                                random_.between(2, 4)};
+      add(f, split, stage);
+      kept = random_.chance(50) ? split.outer : split.inner;
+    }
+    add(f, ir::FactorOut{names_.fresh("p"), {{kept, names_.fresh("u")}}}, stage);
+  }
+
+  // ---- each Func ----
+
   void schedule_func(int f) {
     find_sites(f);
     choose_placement(f);
@@ -108,131 +222,82 @@ class Scheduler {
     for (int s = 0; s < stages(f); ++s) schedule_stage(f, s);
     if (is_output(f)) {
       choose_output_rules(f);
-    } else if (!is_inlined_[f]) {
+    } else if (!is_inlined(f)) {
       choose_storage(f);
     }
-    schedule_.funcs[f].traced = random_.chance(5);
+    if (!random_.chance(5)) return;
+    add(f, ir::TraceLoads{});
+    add(f, ir::TraceStores{});
+    add(f, ir::TraceRealizations{});
   }
 
-  // ---- loops ----
-
-  // Which loops the two halves of a factored update have, and in which order, the Funcs tell.
-  void correct_loops(const PipelineSpec& pipeline) {
-    ScheduleSpec only_derived = default_schedule(pipeline);
-    only_derived.derived = schedule_.derived;
-    only_derived.funcs.resize(count());
-    BuiltPipeline built = build(pipeline);
-    try {
-      apply(only_derived, built);
-    } catch (const UserError&) {
-      return;  // the program will be refused
-    }
-    const int first = count() - static_cast<int>(schedule_.derived.size());
-    for (size_t i = 0; i < schedule_.derived.size(); ++i) {
-      const DerivedFunc& derived = schedule_.derived[i];
-      if (derived.kind != DerivedFunc::Kind::Factored) continue;
-      const RDom& domain = built.domains[derived.source][derived.stage - 1];
-      const int id = first + static_cast<int>(i);
-      for (const Site& site : {Site{derived.source, derived.stage}, Site{id, 0}, Site{id, 1}}) {
-        const Stage stage = built.funcs[site.first].stage(site.second);
-        extended_.loops[site] = as_ordered(stage, domain, extended_.loops[site]);
-      }
-    }
-  }
-
-  static Loops as_ordered(const Stage& stage, const RDom& domain, const Loops& known) {
-    Loops result;
-    for (const ir::Dim& dim : stage.get_schedule().dims) {
-      for (const Loop& loop : known) {
-        const bool is_variable = is_reduction_variable(loop.name);
-        const std::string name = is_variable ? domain[loop.name[1] - '0'].name() : loop.name;
-        if (name == dim.var) result.push_back(loop);
-      }
-    }
-    return result;
-  }
+  bool is_inlined(int f) const { return placements_[f].where == Where::Inlined; }
 
   void schedule_stage(int f, int stage) {
-    const auto given = extended_.loops.find({f, stage});
-    Loops loops = given != extended_.loops.end() ? given->second : initial_loops(func(f), stage);
-    std::vector<Directive>& directives = schedule_.funcs[f].stages[stage].directives;
-    if (stage == 0 && companions_.count(f)) {
-      loops_[f][stage].variants = {companions_[f].loops};
-      directives = companions_[f].directives;
-    } else if (is_inlined_[f]) {
+    const Loops loops = loops_of(func(f), stage);
+    if (stage == 0 && is_shared(f)) {
+      loops_[f][stage].variants = {shared_loops_};
+      for (ir::Directive& directive : std::vector(shared_directives_)) add(f, directive, 0);
+    } else if (is_inlined(f)) {
       loops_[f][stage].variants = {loops};
     } else {
-      if (given != extended_.loops.end()) directives.push_back(order_of(loops));
-      loops_[f][stage] = schedule_loops(loops, context_of(f, stage), schedule_.selector, random_,
-                                        names_, directives);
+      loops_[f][stage] = schedule_loops(loops, context_of(f, stage), selector_,
+                                        {name(f), stage, {}, {}}, random_, names_, log_);
     }
-  }
-
-  static Directive order_of(const Loops& loops) {
-    Directive directive{Kind::Reorder, {}};
-    for (const Loop& loop : loops) directive.loops.push_back(loop.name);
-    return directive;
   }
 
   StageContext context_of(int f, int stage) const {
     StageContext context;
     context.is_update = stage > 0;
     context.is_associative = is_associative_update(func(f), stage);
-    context.may_specialize = !companions_.count(f);
+    context.may_specialize = !is_shared(f);
     if (!is_output(f)) return context;
-    context.output_extents.resize(func(f).dimensions);
-    for (const auto& run : all_runs(extended_.pipeline)) {
-      for (const OutputSpec& output : run) {
-        if (output.func != f) continue;
-        for (int d = 0; d < func(f).dimensions; ++d) {
-          context.output_extents[d].push_back(output.extents[d]);
-        }
-      }
+    context.output_extents.resize(dimensions(f));
+    for (const OutputSpec& output : regions_of(f)) {
+      for (int d = 0; d < dimensions(f); ++d)
+        context.output_extents[d].push_back(output.extents[d]);
     }
     return context;
   }
 
+  // Those of an output, over all runs.
+  std::vector<OutputSpec> regions_of(int f) const {
+    std::vector<OutputSpec> regions;
+    for (const auto& run : all_runs(pipeline_)) {
+      for (const OutputSpec& output : run) {
+        if ("f" + std::to_string(output.func) == name(f)) regions.push_back(output);
+      }
+    }
+    return regions;
+  }
+
   // Of Funcs that are stored as a whole, and of images.
   void add_prefetches(int f) {
-    if (!reachable_[f] || is_inlined_[f]) return;
-    for (int s = 0; s < stages(f); ++s) {
-      if (companions_.count(f) && s == 0) continue;
-      std::vector<int> sources;
-      for_each_term_of_stage(func(f), s, [&](const Term& term) {
-        if (term.action == Action::Image &&
-            extended_.pipeline.images[term.source].boundary == Boundary::Clamp) {
-          sources.push_back(-1 - term.source);
-        }
-        if (term.action == Action::Func &&
-            schedule_.funcs[term.source].placement.where == Where::Root) {
-          sources.push_back(term.source);
-        }
+    if (is_inlined(f)) return;
+    for (int s = is_shared(f) ? 1 : 0; s < stages(f); ++s) {
+      std::vector<std::string> sources;
+      for_each_read(func(f), s, [&](int p, const ir::Call& call, bool direct) {
+        if (direct && (p < 0 || placements_[p].where == Where::Root))
+          sources.push_back(ir::without_numbers(call.name));
       });
       if (!sources.empty() && random_.chance(12)) prefetch(f, s, random_.pick(sources));
     }
   }
 
-  void prefetch(int f, int stage, int source) {
+  void prefetch(int f, int stage, const std::string& source) {
     std::vector<std::string> candidates;
     for (const Loop& loop : loops_[f][stage].variants[0]) {
-      const bool runs = loop.type == ForType::Serial || loop.type == ForType::Parallel;
-      if (runs && !loop.name.empty()) candidates.push_back(loop.name);
+      if (loop.type == ForType::Serial || loop.type == ForType::Parallel)
+        candidates.push_back(loop.name);
     }
     if (candidates.empty()) return;
     const size_t at = random_.below(static_cast<int>(candidates.size()));
     const size_t from = random_.chance(60) ? at : candidates.size() - 1;
-    Directive directive{Kind::Prefetch, {candidates[at], candidates[from]}};
-    directive.factor = random_.between(1, 3);
-    directive.source = source;
-    schedule_.funcs[f].stages[stage].directives.push_back(std::move(directive));
+    add(f, ir::PrefetchData{source, candidates[at], candidates[from], random_.between(1, 3)},
+        stage);
   }
 
   // ---- stages that share loops ----
-
-  struct SharedLoops {
-    Loops loops;
-    std::vector<Directive> directives;
-  };
 
   bool depends(int f, int on) const {
     for (const int p : producers_of(f)) {
@@ -240,15 +305,17 @@ class Scheduler {
     }
     return false;
   }
+  bool is_shared(int f) const {
+    return std::any_of(companions_.begin(), companions_.end(),
+                       [&](const Companion& c) { return c.func == f || c.with == f; });
+  }
 
   void choose_companions() {
     if (!random_.chance(15)) return;
     for (int f = 0; f < count(); ++f) {
       for (int g = 0; g < f; ++g) {
-        const bool fits = reachable_[f] && reachable_[g] && func(f).dimensions > 0 &&
-                          func(f).dimensions == func(g).dimensions && !depends(f, g) &&
-                          !depends(g, f) && !extended_.loops.count({f, 0}) &&
-                          !extended_.loops.count({g, 0});
+        const bool fits =
+            dimensions(f) > 0 && func(f).args == func(g).args && !depends(f, g) && !depends(g, f);
         if (fits) return share_loops(f, g);
       }
     }
@@ -256,28 +323,29 @@ class Scheduler {
 
   // Both get the same loops, which suit outputs of any extent.
   void share_loops(int f, int g) {
-    SharedLoops shared;
-    shared.loops = initial_loops(func(f), 0);
-    const auto add = [&](Directive directive) { shared.directives.push_back(directive); };
-    Loop& outermost = shared.loops.back();
+    shared_loops_ = loops_of(func(f), 0);
+    Loop& outermost = shared_loops_.back();
     if (random_.chance(40)) {
       const std::string outer = names_.fresh("co"), inner = names_.fresh("ci");
-      add({Kind::Split,
-           {outermost.name, outer, inner},
-           random_.between(2, 5),
-           TailStrategy::GuardWithIf});
+      shared_directives_.push_back(ir::SplitLoop{outermost.name, outer, inner,
+                                                 random_.between(2, 5), TailStrategy::GuardWithIf});
       outermost.name = inner;
-      shared.loops.push_back({outer});
+      shared_loops_.push_back({outer});
     }
     if (random_.chance(40)) {
-      shared.loops.back().type = ForType::Parallel;
-      add({Kind::Parallel, {shared.loops.back().name}});
+      shared_loops_.back().type = ForType::Parallel;
+      shared_directives_.push_back(ir::RunLoop{shared_loops_.back().name, ForType::Parallel});
     }
-    Companion companion{f, g};
-    companion.loop = random_.pick(shared.loops).name;
-    companion.align = static_cast<LoopAlignStrategy>(random_.below(4));
-    schedule_.companions.push_back(companion);
-    companions_[f] = companions_[g] = shared;
+    companions_.push_back({f, g, random_.pick(shared_loops_).name});
+  }
+
+  void join(const Companion& c) {
+    ir::ComputeWith with{{{ir::LoopLevel::Kind::At, name(c.with), c.loop, 0}}};
+    const auto align = static_cast<LoopAlignStrategy>(random_.below(4));
+    if (align != LoopAlignStrategy::Auto) {
+      for (const Loop& loop : shared_loops_) with.align.emplace_back(loop.name, align);
+    }
+    add(c.func, with, 0);
   }
 
   // ---- where ----
@@ -285,10 +353,9 @@ class Scheduler {
   // Stages in whose loops f is wanted. Consumers that are inlined stand for their own consumers.
   void find_sites(int f) {
     for (int g = 0; g < count(); ++g) {
-      if (!reachable_[g]) continue;
       for (int s = 0; s < stages(g); ++s) {
         if (!producers_of_stage(g, s).count(f)) continue;
-        if (is_inlined_[g]) {
+        if (is_inlined(g)) {
           sites_[f].insert(sites_[g].begin(), sites_[g].end());
         } else {
           sites_[f].insert({g, s});
@@ -300,31 +367,27 @@ class Scheduler {
   int reads_of(int f) const {
     int reads = 1;
     for (int s = 0; s < stages(f); ++s) {
-      for_each_term_of_stage(func(f), s, [&](const Term& term) {
-        if (term.action == Action::Func) ++reads;
-      });
+      for_each_read(func(f), s, [&](int p, const ir::Call&, bool) { reads += p >= 0; });
     }
     return reads;
   }
 
   void choose_placement(int f) {
     if (is_output(f)) return;
-    Placement& placement = schedule_.funcs[f].placement;
-    placement.where = Where::Root;
-    if (companions_.count(f)) return;
     const int choice = random_.below(100);
     // How often the inlined body is repeated grows along chains of inlined Funcs.
     const int cost = reads_of(f) * static_cast<int>(sites_[f].size() + 1);
-    if (choice < 25 && inlined_reads_ * cost <= max_reads_inlined && is_pure(f)) {
-      placement.where = random_.chance(50) ? Where::Inline : Where::Default;
+    const bool inlines = choice < (is_pure(f) ? 25 : 8) && !is_shared(f) &&
+                         inlined_reads_ * cost <= max_reads_inlined;
+    if (inlines) {
+      placements_[f].where = Where::Inlined;
       inlined_reads_ *= cost;
-    } else if (choice < 33 && !is_pure(f) && inlined_reads_ * cost <= max_reads_inlined) {
-      placement.where = Where::Default;
-      inlined_reads_ *= cost;
-    } else if (choice < 75) {
-      place_at(f, placement);
+      if (is_pure(f) && random_.chance(50)) add(f, ir::ComputeAt{});
+    } else if (choice < 75 && !is_shared(f) && place_at(f)) {
+      return;
+    } else {
+      add(f, ir::ComputeAt{{root}});
     }
-    is_inlined_[f] = placement.where == Where::Inline || placement.where == Where::Default;
   }
 
   // The loops around a stage, innermost first: its own, then those around where its Func is
@@ -336,17 +399,17 @@ class Scheduler {
       if (shared && loop.name == shared->loop) return with_shared_loops(*shared, levels);
       levels.push_back({f, stage, loop.name});
     }
-    const Placement& placement = schedule_.funcs[f].placement;
+    const Placement& placement = placements_[f];
     if (placement.where != Where::At) return levels;
-    const std::vector<Level> around = levels_around(placement.consumer, placement.stage);
-    const Level at{placement.consumer, placement.stage, placement.compute_loop};
+    const Level& at = placement.compute;
+    const std::vector<Level> around = levels_around(at.func, at.stage);
     levels.insert(levels.end(), std::find(around.begin(), around.end(), at), around.end());
     return levels;
   }
 
   // Of a Func whose outer loops are another's.
   const Companion* companion_of_guest(int f) const {
-    for (const Companion& companion : schedule_.companions) {
+    for (const Companion& companion : companions_) {
       if (companion.func == f) return &companion;
     }
     return nullptr;
@@ -363,7 +426,7 @@ class Scheduler {
 
   // Whether something may be computed there, in each of the stage's schedules.
   bool is_legal_level(const Level& level) const {
-    if (level.name.empty() || !is_unique(level)) return false;
+    if (!is_unique(level)) return false;
     for (const Loops& loops : loops_[level.func][level.stage].variants) {
       bool found = false, vectorized = false;
       for (const Loop& loop : loops) {
@@ -388,8 +451,14 @@ class Scheduler {
     return true;
   }
 
-  void place_at(int f, Placement& placement) {
-    if (sites_[f].empty()) return;
+  static inline const ir::LoopLevel root{ir::LoopLevel::Kind::Root, "", "", -1};
+  ir::LoopLevel loop_level(const Level& level) const {
+    if (level.func < 0) return root;
+    return {ir::LoopLevel::Kind::At, name(level.func), level.name, -1};
+  }
+
+  bool place_at(int f) {
+    if (sites_[f].empty()) return false;
     const Site first = *sites_[f].begin();
     const std::vector<Level> around = levels_around(first.first, first.second);
     std::vector<int> legal;
@@ -398,13 +467,13 @@ class Scheduler {
         legal.push_back(static_cast<int>(i));
       }
     }
-    if (legal.empty()) return;
+    if (legal.empty()) return false;
     const int compute = random_.pick(legal);
-    placement.where = Where::At;
-    placement.consumer = around[compute].func;
-    placement.stage = around[compute].stage;
-    placement.compute_loop = around[compute].name;
-    if (random_.chance(55)) choose_store_level(around, compute, placement);
+    placements_[f].where = Where::At;
+    placements_[f].compute = around[compute];
+    if (random_.chance(55)) choose_store_level(f, around, compute);
+    add(f, ir::ComputeAt{{loop_level(around[compute])}});
+    return true;
   }
 
   bool is_around_all_sites(const Level& level, int f) const {
@@ -414,25 +483,22 @@ class Scheduler {
     });
   }
 
-  void choose_store_level(const std::vector<Level>& around, int compute, Placement& placement) {
-    static const Level root{-1, 0, "root"};
+  void choose_store_level(int f, const std::vector<Level>& around, int compute) {
     std::vector<Level> legal;
     bool open = true;  // out to the first loop that is not serial
     for (size_t i = compute; i < around.size() && open; ++i) {
       if (static_cast<int>(i) > compute && is_legal_level(around[i])) legal.push_back(around[i]);
       open = runs_in_order(around[i]);
     }
-    if (open) legal.push_back(root);
+    if (open) legal.push_back({});
     if (legal.empty()) return;
     const int store = random_.below(static_cast<int>(legal.size()));
-    placement.store_loop = legal[store].name;
-    placement.store_consumer = legal[store].func;
-    placement.store_stage = legal[store].stage;
-    if (!random_.chance(20)) return;
-    const Level& hoist = legal[random_.between(store, static_cast<int>(legal.size()) - 1)];
-    placement.hoist_loop = hoist.name;
-    placement.hoist_consumer = hoist.func;
-    placement.hoist_stage = hoist.stage;
+    placements_[f].stored_outside = true;
+    if (random_.chance(20)) {
+      const int hoist = random_.between(store, static_cast<int>(legal.size()) - 1);
+      add(f, ir::HoistStorage{{loop_level(legal[hoist])}});
+    }
+    add(f, ir::StoreAt{{loop_level(legal[store])}});
   }
 
   // Specializations may order loops in other ways: then not known.
@@ -447,88 +513,101 @@ class Scheduler {
 
   // ---- storage and sizes ----
 
-  int random_dimension(int f) { return random_.below(func(f).dimensions); }
+  std::string random_dimension(int f) { return random_.pick(func(f).args); }
 
   void choose_storage(int f) {
-    FuncScheduleSpec& spec = schedule_.funcs[f];
-    if (random_.chance(10)) spec.memory = MemoryType::Heap;
-    const bool stored_outside = !spec.placement.store_loop.empty();
-    if (!stored_outside && random_.chance(8)) spec.memoized = true;
-    if (!spec.memoized && random_.chance(8)) spec.async = true;
-    if (companions_.count(f)) spec.memoized = spec.async = false;
-    if (func(f).dimensions == 0) return;
-    const auto add = [&](Rule kind, int a, int b = 0) {
-      spec.rules.push_back({kind, random_dimension(f), a, b});
-    };
-    if (!spec.memoized && random_.chance(12))
-      add(Rule::AlignStorage, random_.pick(std::vector<int>{2, 4, 16, 5}));
-    if (!spec.memoized && random_.chance(4)) add(Rule::BoundStorage, ample_storage);
+    if (random_.chance(10)) add(f, ir::StoreIn{MemoryType::Heap});
+    const bool stored_outside = placements_[f].stored_outside;
+    const bool memoized = !stored_outside && random_.chance(8) && !is_shared(f);
+    if (memoized) add(f, ir::Memoize{});
+    if (!memoized && random_.chance(8) && !is_shared(f)) add(f, ir::Async{});
+    if (dimensions(f) == 0) return;
+    if (!memoized && random_.chance(12)) {
+      const int alignment = random_.pick(std::vector<int>{2, 4, 16, 5});
+      add(f, ir::AlignStorage{random_dimension(f), alignment});
+    }
+    if (!memoized && random_.chance(4))
+      add(f, ir::BoundStorage{random_dimension(f), ample_storage});
     if (stored_outside && random_.chance(20)) {
-      add(Rule::FoldStorage, random_.pick(std::vector<int>{64, 128, 256}), 1);
+      const int factor = random_.pick(std::vector<int>{64, 128, 256});
+      add(f, ir::FoldStorage{random_dimension(f), factor});
     }
     if (random_.chance(8)) {
       const int modulus = random_.between(2, 5);
-      add(Rule::AlignBounds, modulus, random_.below(modulus));
+      add(f, ir::AlignBounds{random_dimension(f), modulus, random_.below(modulus)});
     }
-    if (random_.chance(5)) add(Rule::AlignExtent, random_.between(2, 5));
-    if (func(f).dimensions > 1 && random_.chance(15)) reorder_storage(f);
+    if (random_.chance(5)) add(f, ir::AlignBounds{random_dimension(f), random_.between(2, 5), {}});
+    if (dimensions(f) > 1 && random_.chance(15)) reorder_storage(f);
   }
 
   void reorder_storage(int f) {
-    std::vector<int>& order = schedule_.funcs[f].storage_order;
-    for (int d = 0; d < std::min(func(f).dimensions, 3); ++d) order.push_back(d);
+    std::vector<std::string> order = func(f).args;
     for (size_t i = order.size() - 1; i > 0; --i) {
       std::swap(order[i], order[random_.below(static_cast<int>(i) + 1)]);
     }
+    add(f, ir::ReorderStorage{order});
   }
 
   // Promises about an output hold for each region that it is computed over.
   void choose_output_rules(int f) {
-    const auto runs = all_runs(extended_.pipeline);
-    if (runs.size() > 1 || !random_.chance(25)) return;
-    for (const OutputSpec& output : runs[0]) {
-      if (output.func != f) continue;
-      for (int d = 0; d < func(f).dimensions; ++d) {
-        schedule_.funcs[f].rules.push_back(promise(d, output.mins[d], output.extents[d]));
-      }
-    }
+    const std::vector<OutputSpec> regions = regions_of(f);
+    if (regions.size() > 1 || !random_.chance(25)) return;
+    for (int d = 0; d < dimensions(f); ++d)
+      add(f, promise(func(f).args[d], regions[0].mins[d], regions[0].extents[d]));
   }
 
-  DimensionRule promise(int d, int min, int extent) {
-    if (random_.chance(60)) return {Rule::Bound, d, min, extent};
-    if (random_.chance(50)) return {Rule::BoundExtent, d, extent};
+  ir::Directive promise(const std::string& dimension, int min, int extent) {
+    if (random_.chance(60)) return ir::BoundDimension{dimension, min, extent};
+    if (random_.chance(50)) return ir::BoundDimension{dimension, {}, extent};
     for (int modulus = 5; modulus > 1; --modulus) {
       const int remainder = ((min % modulus) + modulus) % modulus;
-      if (extent % modulus == 0) return {Rule::AlignBounds, d, modulus, remainder};
+      if (extent % modulus == 0) return ir::AlignBounds{dimension, modulus, remainder};
     }
-    return {Rule::BoundExtent, d, extent};
+    return ir::BoundDimension{dimension, {}, extent};
   }
 
-  ExtendedPipeline extended_;
+  const PipelineSpec& pipeline_;
   Random random_;
   LoopNames names_;
-  ScheduleSpec schedule_;
-  std::vector<bool> reachable_;
+  ScheduleLog log_;
+  Selector selector_;
+  std::vector<ir::FuncPtr> compiled_,
+      funcs_;  // the outputs; all, producers first
   std::vector<std::vector<StageLoops>> loops_;
   std::vector<std::set<Site>> sites_;
-  std::vector<bool> is_inlined_;
-  std::map<int, SharedLoops> companions_;
+  std::vector<Placement> placements_;
+  std::vector<Companion> companions_;
+  Loops shared_loops_;
+  std::vector<ir::Directive> shared_directives_;
   int inlined_reads_ = 1;
 };
 
 }  // namespace
 
-ScheduleSpec default_schedule(const PipelineSpec& pipeline) {
-  ScheduleSpec schedule;
-  schedule.funcs.resize(pipeline.funcs.size());
-  for (size_t f = 0; f < pipeline.funcs.size(); ++f) {
-    schedule.funcs[f].stages.resize(1 + pipeline.funcs[f].updates.size());
-  }
-  return schedule;
+ScheduleLog random_schedule(const PipelineSpec& pipeline, uint64_t seed) {
+  return Scheduler(pipeline, seed).run();
 }
 
-ScheduleSpec random_schedule(const PipelineSpec& pipeline, uint64_t seed) {
-  return Scheduler(pipeline, seed).run();
+std::vector<std::shared_ptr<ir::ParameterContents>> parameters_of(const ScheduleLog& log) {
+  std::vector<std::shared_ptr<ir::ParameterContents>> found;
+  const auto look = [&](Expr& root) {
+    if (!root.defined()) return;
+    ir::walk(root, [&](const Expr& e) {
+      const ir::Variable* v = e.as<ir::Variable>();
+      if (!v) return true;
+      const auto p = std::dynamic_pointer_cast<ir::ParameterContents>(v->symbol.lock());
+      if (p && std::find(found.begin(), found.end(), p) == found.end()) found.push_back(p);
+      return true;
+    });
+  };
+  for (ScheduleLog::Entry entry : log.entries) ir::visit_names(entry.directive, look);
+  return found;
+}
+
+void apply(const ScheduleLog& log, const BuiltPipeline& built) {
+  std::vector<ir::FuncPtr> funcs;
+  for (const Func& f : built.funcs) funcs.push_back(f.function());
+  ir::apply_log(log, funcs);
 }
 
 }  // namespace retrograde::fuzz

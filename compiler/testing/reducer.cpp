@@ -2,7 +2,9 @@
 // still fails. Passes run until none of them makes progress.
 #include "testing/reducer.h"
 
-#include <algorithm>
+#include <set>
+
+#include "diagnostics/error.h"
 
 namespace retrograde::fuzz {
 
@@ -19,13 +21,10 @@ class Shrinker {
       progress = false;
       progress |= drop_runs();
       progress |= drop_outputs();
-      progress |= drop_derived_funcs();
-      progress |= drop_companions();
-      progress |= simplify_schedules();
+      progress |= drop_schedules();
       progress |= drop_updates();
       progress |= drop_values();
       progress |= drop_directives();
-      progress |= simplify_specializations();
       progress |= simplify_terms();
       progress |= simplify_indices();
       progress |= shrink_regions();
@@ -72,73 +71,37 @@ class Shrinker {
     return progress;
   }
 
-  bool simplify_schedules() {
+  // All that is said of a Func.
+  bool drop_schedules() {
+    std::set<std::string> funcs;
+    for (const ScheduleLog::Entry& entry : best_.schedule.entries) funcs.insert(entry.func);
     bool progress = false;
-    for (int f = 0; f < static_cast<int>(best_.schedule.funcs.size()); ++f) {
-      const std::vector<StageSpec>& stages = best_.schedule.funcs[f].stages;
-      const bool has_loops = std::any_of(stages.begin(), stages.end(),
-                                         [](const StageSpec& s) { return !s.directives.empty(); });
-      if (has_loops) {
-        progress |= attempt([&](Program& p) {
-          for (StageSpec& stage : p.schedule.funcs[f].stages) stage.directives.clear();
-        });
+    for (const std::string& func : funcs) {
+      progress |= attempt([&](Program& p) {
+        for (size_t i = p.schedule.size(); i-- > 0;) {
+          if (i < p.schedule.size() && p.schedule.entries[i].func == func)
+            p.schedule = p.schedule.without(i);
+        }
+      });
+    }
+    return progress;
+  }
+
+  bool drop_directives() {
+    bool progress = false;
+    for (size_t i = best_.schedule.size(); i-- > 0;) {
+      if (i >= best_.schedule.size()) continue;  // it went with another
+      if (attempt([&](Program& p) { p.schedule = p.schedule.without(i); })) {
+        progress = true;
+        continue;
       }
-      progress |= simplify_storage(f);
-      progress |= simplify_placement(f);
+      const auto* at = std::get_if<ir::ComputeAt>(&best_.schedule.entries[i].directive);
+      if (!at || at->level.kind != ir::LoopLevel::Kind::At) continue;
+      progress |= attempt([&](Program& p) {
+        p.schedule.entries[i].directive = ir::ComputeAt{{{ir::LoopLevel::Kind::Root, "", "", -1}}};
+      });
     }
     return progress;
-  }
-
-  bool simplify_storage(int f) {
-    const auto spec = [f](Program& p) -> FuncScheduleSpec& { return p.schedule.funcs[f]; };
-    bool progress = false;
-    for (size_t r = spec(best_).rules.size(); r-- > 0;) {
-      progress |= attempt(
-          [&](Program& p) { spec(p).rules.erase(spec(p).rules.begin() + static_cast<long>(r)); });
-    }
-    if (!spec(best_).storage_order.empty()) {
-      progress |= attempt([&](Program& p) { spec(p).storage_order.clear(); });
-    }
-    if (spec(best_).memory != MemoryType::Auto) {
-      progress |= attempt([&](Program& p) { spec(p).memory = MemoryType::Auto; });
-    }
-    for (bool FuncScheduleSpec::*flag :
-         {&FuncScheduleSpec::memoized, &FuncScheduleSpec::async, &FuncScheduleSpec::traced}) {
-      if (!(spec(best_).*flag)) continue;
-      progress |= attempt([&](Program& p) { spec(p).*flag = false; });
-    }
-    return progress;
-  }
-
-  bool drop_companions() {
-    if (best_.schedule.companions.empty()) return false;
-    return attempt([](Program& p) { p.schedule.companions.clear(); });
-  }
-
-  bool drop_derived_funcs() {
-    bool progress = false;
-    for (size_t i = 0; i < best_.schedule.derived.size(); ++i) {
-      if (best_.schedule.derived[i].kind == DerivedFunc::Kind::None) continue;
-      progress |= attempt([&](Program& p) { drop_derived(p.schedule, static_cast<int>(i)); });
-    }
-    return progress;
-  }
-
-  bool simplify_placement(int f) {
-    using Where = Placement::Where;
-    const Placement placement = best_.schedule.funcs[f].placement;
-    if (placement.where == Where::Default) return false;
-    const auto replace = [&](Placement with) {
-      return attempt([&](Program& p) { p.schedule.funcs[f].placement = with; });
-    };
-    if (replace({})) return true;
-    if (placement.where == Where::At && replace(at_root())) return true;
-    if (placement.store_loop.empty()) return false;
-    Placement simpler = placement;
-    simpler.hoist_loop.clear();
-    if (!placement.hoist_loop.empty() && replace(simpler)) return true;
-    simpler.store_loop.clear();
-    return replace(simpler);
   }
 
   bool drop_updates() {
@@ -148,8 +111,7 @@ class Shrinker {
         progress |= attempt([&](Program& p) {
           auto& updates = p.pipeline.funcs[f].updates;
           updates.erase(updates.begin() + static_cast<long>(u));
-          auto& stages = p.schedule.funcs[f].stages;
-          stages.erase(stages.begin() + static_cast<long>(u) + 1);
+          drop_stage(p.schedule, text("f", f), static_cast<int>(u) + 1);
         });
       }
       for (size_t u = 0; u < best_.pipeline.funcs[f].updates.size(); ++u) {
@@ -158,6 +120,16 @@ class Shrinker {
       }
     }
     return progress;
+  }
+
+  static void drop_stage(ScheduleLog& log, const std::string& func, int stage) {
+    for (size_t i = log.size(); i-- > 0;) {
+      if (i < log.size() && log.entries[i].func == func && log.entries[i].stage == stage)
+        log = log.without(i);
+    }
+    for (ScheduleLog::Entry& entry : log.entries) {
+      if (entry.func == func && entry.stage > stage) --entry.stage;
+    }
   }
 
   // The last value of a Tuple; reads of it turn to the first value when that has its type.
@@ -189,76 +161,6 @@ class Shrinker {
                                [&](Term& term) { f(static_cast<int>(g), term); });
       }
     }
-  }
-
-  bool drop_directives() {
-    bool progress = false;
-    for (size_t f = 0; f < best_.schedule.funcs.size(); ++f) {
-      for (size_t s = 0; s < best_.schedule.funcs[f].stages.size(); ++s) {
-        for (size_t d = best_.schedule.funcs[f].stages[s].directives.size(); d-- > 0;) {
-          progress |= attempt(
-              [&](Program& p) { erase_directive(p.schedule.funcs[f].stages[s].directives, d); });
-        }
-      }
-    }
-    return progress;
-  }
-
-  // A specialization also goes on without some of its own directives.
-  bool simplify_specializations() {
-    bool progress = false;
-    for (size_t f = 0; f < best_.schedule.funcs.size(); ++f) {
-      for (size_t s = 0; s < best_.schedule.funcs[f].stages.size(); ++s) {
-        for (size_t d = 0; d < best_.schedule.funcs[f].stages[s].directives.size(); ++d) {
-          const auto nested = [=](Program& p) -> std::vector<Directive>& {
-            return p.schedule.funcs[f].stages[s].directives[d].nested;
-          };
-          for (size_t n = nested(best_).size(); n-- > 0;) {
-            progress |= attempt([&](Program& p) { erase_directive(nested(p), n); });
-          }
-        }
-      }
-    }
-    return progress;
-  }
-
-  // Later directives that name the loops which a dropped split or fuse made name what it replaced.
-  static void erase_directive(std::vector<Directive>& directives, size_t d) {
-    const Directive dropped = directives[d];
-    directives.erase(directives.begin() + static_cast<long>(d));
-    using Kind = Directive::Kind;
-    if (dropped.kind == Kind::Split) {
-      forget_split(directives, d, dropped);
-    } else if (dropped.kind == Kind::Rename) {
-      for (size_t i = d; i < directives.size(); ++i) {
-        replace_loop(directives[i], dropped.loops[1], dropped.loops[0]);
-      }
-    }
-  }
-
-  static void forget_split(std::vector<Directive>& directives, size_t from,
-                           const Directive& split) {
-    for (size_t i = from; i < directives.size(); ++i) {
-      auto& loops = directives[i].loops;
-      loops.erase(std::remove(loops.begin(), loops.end(), split.loops[2]), loops.end());
-      replace_loop(directives[i], split.loops[1], split.loops[0]);
-      forget_split(directives[i].nested, 0, split);
-    }
-    const auto names_nothing = [](const Directive& directive) {
-      using Kind = Directive::Kind;
-      const bool needs_none = directive.kind == Kind::Specialize ||
-                              directive.kind == Kind::SpecializeFail ||
-                              directive.kind == Kind::Atomic || directive.kind == Kind::AllowRaces;
-      return directive.loops.empty() && !needs_none;
-    };
-    directives.erase(std::remove_if(directives.begin() + static_cast<long>(from), directives.end(),
-                                    names_nothing),
-                     directives.end());
-  }
-
-  static void replace_loop(Directive& directive, const std::string& old, const std::string& with) {
-    std::replace(directive.loops.begin(), directive.loops.end(), old, with);
-    for (Directive& nested : directive.nested) replace_loop(nested, old, with);
   }
 
   // Term number `at` of the program in walking order, or null.

@@ -9,7 +9,7 @@ namespace retrograde::fuzz {
 
 struct Program {
   PipelineSpec pipeline;
-  ScheduleSpec schedule;
+  ScheduleLog schedule;
 };
 
 // Must be true of the program given and of every program kept; false for programs that are illegal.

@@ -20,7 +20,7 @@ constexpr double max_refused_fraction = 0.15;  // of one shard
 constexpr double max_unstable_fraction = 0.1;
 
 // Whether it was refused.
-bool expect_agreement(const PipelineSpec& pipeline, const ScheduleSpec& schedule, int seed,
+bool expect_agreement(const PipelineSpec& pipeline, const ScheduleLog& schedule, int seed,
                       Outcome& total) {
   const Outcome outcome = check_program(pipeline, schedule, get_jit_target_from_environment());
   total.compared += outcome.compared;
