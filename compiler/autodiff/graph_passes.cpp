@@ -3,12 +3,29 @@
 #include <algorithm>
 
 #include "autodiff/default_schedule.h"
+#include "autodiff/derivative.h"
 #include "graph/wrappers.h"
 
 namespace retrograde::ir {
 
+namespace {
+
+// The adjoints of all images and parameters that the first output depends on come to be outputs.
+std::vector<FuncPtr> with_adjoints(const std::vector<FuncPtr>& outputs) {
+  const Derivative d = retrograde::propagate_adjoints(Func(outputs[0]));
+  std::vector<FuncPtr> result = outputs;
+  for (const auto& parameter : parameters_of(outputs)) {
+    const AdjointInput input(parameter);
+    if (d.has(input)) result.push_back(d.of(input).function());
+  }
+  return result;
+}
+
+}  // namespace
+
 const std::vector<GraphPass>& graph_passes() {
-  static const std::vector<GraphPass> passes{{"apply_wrappers", apply_wrappers},
+  static const std::vector<GraphPass> passes{{"propagate_adjoints", with_adjoints},
+                                             {"apply_wrappers", apply_wrappers},
                                              {"schedule_unscheduled", schedule_unscheduled}};
   return passes;
 }

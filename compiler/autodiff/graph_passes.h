@@ -12,7 +12,7 @@ struct GraphPass {
   const char* name;
   std::vector<FuncPtr> (*run)(const std::vector<FuncPtr>& outputs);
 };
-// In the order in which compiling runs them.
+// In the order in which a program meets them.
 const std::vector<GraphPass>& graph_passes();
 const GraphPass* find_graph_pass(const std::string& name);  // null when there is none
 

@@ -227,9 +227,9 @@ std::vector<OutputImageParam> Func::output_buffers() const {
 
 // ---- schedule ----
 
-Stage Func::pure_stage() const {
+ir::SchedulePlace Func::loops() const {
   check_defined("schedule " + quoted(name()));
-  return Stage(func_, 0);
+  return {func_, 0};
 }
 
 Stage Func::update(int index) {

@@ -32,7 +32,7 @@ class EvictionKey {
   Expr key_;
 };
 
-class Func {
+class Func : public LoopDirectives<Func> {
  public:
   Func(std::source_location where = std::source_location::current());
   // Requires: a name is text.
@@ -378,155 +378,17 @@ class Func {
   // end says in which format (Unsupported); its format has the type of the elements (Unsupported).
   void debug_to_file(const std::string& filename);
 
-  // ---- loops: of the first definition here, of updates through update(i); see stage.h ----
+  // ---- loops: of the first definition here, of updates through update(i); see loop_directives.h ----
   Stage update(int index = 0);
-  Stage stage(int index) { return index == 0 ? pure_stage() : update(index - 1); }
-  operator Stage() const { return pure_stage(); }
-  Func& split(const VarOrRVar& old, const VarOrRVar& outer, const VarOrRVar& inner,
-              const Expr& factor, TailStrategy tail = TailStrategy::Auto) {
-    return with(pure_stage().split(old, outer, inner, factor, tail));
-  }
-  Func& fuse(const VarOrRVar& inner, const VarOrRVar& outer, const VarOrRVar& fused) {
-    return with(pure_stage().fuse(inner, outer, fused));
-  }
-  Func& rename(const VarOrRVar& old_name, const VarOrRVar& new_name) {
-    return with(pure_stage().rename(old_name, new_name));
-  }
-  Func& reorder(const std::vector<VarOrRVar>& vars) { return with(pure_stage().reorder(vars)); }
-  template <typename... Rest>
-  requires((std::is_convertible_v<Rest, VarOrRVar> &&
-            ...)) Func& reorder(const VarOrRVar& x, const VarOrRVar& y, Rest&&... rest) {
-    return reorder(std::vector<VarOrRVar>{x, y, VarOrRVar(std::forward<Rest>(rest))...});
-  }
-  Func& serial(const VarOrRVar& var) { return with(pure_stage().serial(var)); }
-  Func& parallel(const VarOrRVar& var) { return with(pure_stage().parallel(var)); }
-  Func& vectorize(const VarOrRVar& var) { return with(pure_stage().vectorize(var)); }
-  Func& unroll(const VarOrRVar& var) { return with(pure_stage().unroll(var)); }
-  Func& parallel(const VarOrRVar& var, const Expr& task_size,
-                 TailStrategy tail = TailStrategy::Auto) {
-    return with(pure_stage().parallel(var, task_size, tail));
-  }
-  Func& vectorize(const VarOrRVar& var, const Expr& factor,
-                  TailStrategy tail = TailStrategy::Auto) {
-    return with(pure_stage().vectorize(var, factor, tail));
-  }
-  Func& unroll(const VarOrRVar& var, const Expr& factor, TailStrategy tail = TailStrategy::Auto) {
-    return with(pure_stage().unroll(var, factor, tail));
-  }
-  Func& tile(const VarOrRVar& x, const VarOrRVar& y, const VarOrRVar& xo, const VarOrRVar& yo,
-             const VarOrRVar& xi, const VarOrRVar& yi, const Expr& xfactor, const Expr& yfactor,
-             TailStrategy tail = TailStrategy::Auto) {
-    return with(pure_stage().tile(x, y, xo, yo, xi, yi, xfactor, yfactor, tail));
-  }
-  Func& tile(const VarOrRVar& x, const VarOrRVar& y, const VarOrRVar& xi, const VarOrRVar& yi,
-             const Expr& xfactor, const Expr& yfactor, TailStrategy tail = TailStrategy::Auto) {
-    return with(pure_stage().tile(x, y, xi, yi, xfactor, yfactor, tail));
-  }
-  Func& tile(const std::vector<VarOrRVar>& previous, const std::vector<VarOrRVar>& outers,
-             const std::vector<VarOrRVar>& inners, const std::vector<Expr>& factors,
-             const std::vector<TailStrategy>& tails) {
-    return with(pure_stage().tile(previous, outers, inners, factors, tails));
-  }
-  Func& tile(const std::vector<VarOrRVar>& previous, const std::vector<VarOrRVar>& outers,
-             const std::vector<VarOrRVar>& inners, const std::vector<Expr>& factors,
-             TailStrategy tail = TailStrategy::Auto) {
-    return with(pure_stage().tile(previous, outers, inners, factors, tail));
-  }
-  Func& tile(const std::vector<VarOrRVar>& previous, const std::vector<VarOrRVar>& inners,
-             const std::vector<Expr>& factors, TailStrategy tail = TailStrategy::Auto) {
-    return with(pure_stage().tile(previous, inners, factors, tail));
-  }
-  Func& partition(const VarOrRVar& var, Partition partition) {
-    return with(pure_stage().partition(var, partition));
-  }
-  Func& never_partition(const std::vector<VarOrRVar>& vars) {
-    return with(pure_stage().never_partition(vars));
-  }
-  Func& always_partition(const std::vector<VarOrRVar>& vars) {
-    return with(pure_stage().always_partition(vars));
-  }
-  template <typename... Rest>
-  requires((std::is_convertible_v<Rest, VarOrRVar> &&
-            ...)) Func& never_partition(const VarOrRVar& x, Rest&&... rest) {
-    return never_partition(std::vector<VarOrRVar>{x, VarOrRVar(std::forward<Rest>(rest))...});
-  }
-  template <typename... Rest>
-  requires((std::is_convertible_v<Rest, VarOrRVar> &&
-            ...)) Func& always_partition(const VarOrRVar& x, Rest&&... rest) {
-    return always_partition(std::vector<VarOrRVar>{x, VarOrRVar(std::forward<Rest>(rest))...});
-  }
-  Func& never_partition_all() { return with(pure_stage().never_partition_all()); }
-  Func& always_partition_all() { return with(pure_stage().always_partition_all()); }
-  Func& atomic(bool override_associativity_test = false) {
-    return with(pure_stage().atomic(override_associativity_test));
-  }
-  Func& allow_race_conditions() { return with(pure_stage().allow_race_conditions()); }
-  Func& compute_with(const LoopLevel& level,
-                     const std::vector<std::pair<VarOrRVar, LoopAlignStrategy>>& align) {
-    return with(pure_stage().compute_with(level, align));
-  }
-  Func& compute_with(const LoopLevel& level, LoopAlignStrategy align = LoopAlignStrategy::Auto) {
-    return with(pure_stage().compute_with(level, align));
-  }
-  Func& compute_with(const Stage& stage, const VarOrRVar& var,
-                     const std::vector<std::pair<VarOrRVar, LoopAlignStrategy>>& align) {
-    return with(pure_stage().compute_with(stage, var, align));
-  }
-  Func& compute_with(const Stage& stage, const VarOrRVar& var,
-                     LoopAlignStrategy align = LoopAlignStrategy::Auto) {
-    return with(pure_stage().compute_with(stage, var, align));
-  }
-  Stage specialize(const Expr& condition) { return pure_stage().specialize(condition); }
-  void specialize_fail(const std::string& message) { pure_stage().specialize_fail(message); }
-  Func& prefetch(const Func& f, const VarOrRVar& at, const VarOrRVar& from, Expr offset = 1,
-                 PrefetchBoundStrategy strategy = PrefetchBoundStrategy::GuardWithIf) {
-    return with(pure_stage().prefetch(f, at, from, std::move(offset), strategy));
-  }
-  Func& prefetch(const std::shared_ptr<ir::ParameterContents>& image, const VarOrRVar& at,
-                 const VarOrRVar& from, Expr offset = 1,
-                 PrefetchBoundStrategy strategy = PrefetchBoundStrategy::GuardWithIf) {
-    return with(pure_stage().prefetch(image, at, from, std::move(offset), strategy));
-  }
-  template <typename T>
-  requires requires(const T& image) { image.parameter(); }
-  Func& prefetch(const T& image, const VarOrRVar& at, const VarOrRVar& from, Expr offset = 1,
-                 PrefetchBoundStrategy strategy = PrefetchBoundStrategy::GuardWithIf) {
-    return with(pure_stage().prefetch(image, at, from, std::move(offset), strategy));
-  }
-  template <typename T>
-  Func& prefetch(const T& source, const VarOrRVar& var, int offset = 1,
-                 PrefetchBoundStrategy strategy = PrefetchBoundStrategy::GuardWithIf) {
-    return with(pure_stage().prefetch(source, var, var, Expr(offset), strategy));
-  }
-  // GPUs and accelerators, as Stage has them: Unsupported.
-  template <typename... Args>
-  requires requires(Stage stage, Args&&... args) { stage.gpu_threads(args...); }
-  Func& gpu_threads(Args&&... args) { return with(pure_stage().gpu_threads(args...)); }
-  template <typename... Args>
-  requires requires(Stage stage, Args&&... args) { stage.gpu_lanes(args...); }
-  Func& gpu_lanes(Args&&... args) { return with(pure_stage().gpu_lanes(args...)); }
-  template <typename... Args>
-  requires requires(Stage stage, Args&&... args) { stage.gpu_blocks(args...); }
-  Func& gpu_blocks(Args&&... args) { return with(pure_stage().gpu_blocks(args...)); }
-  template <typename... Args>
-  requires requires(Stage stage, Args&&... args) { stage.gpu(args...); }
-  Func& gpu(Args&&... args) { return with(pure_stage().gpu(args...)); }
-  template <typename... Args>
-  requires requires(Stage stage, Args&&... args) { stage.gpu_tile(args...); }
-  Func& gpu_tile(Args&&... args) { return with(pure_stage().gpu_tile(args...)); }
-  Func& gpu_single_thread(DeviceAPI device = DeviceAPI::Default_GPU) {
-    return with(pure_stage().gpu_single_thread(device));
-  }
-  Func& hexagon(const VarOrRVar& x = Var::outermost()) { return with(pure_stage().hexagon(x)); }
-  const ir::StageSchedule& get_schedule() const { return pure_stage().get_schedule(); }
-  void unscheduled() { pure_stage().unscheduled(); }  // says that no directive was forgotten
+  Stage stage(int index) { return index == 0 ? Stage(*this) : update(index - 1); }
+  operator Stage() const { return Stage(loops().f, 0); }
 
  private:
   ir::FuncPtr func_;
   Pipeline pipeline_;
 
-  Stage pure_stage() const;
-  Func& with(const Stage&) { return *this; }
+  friend class LoopDirectives<Func>;
+  ir::SchedulePlace loops() const;  // of the first definition
   Func& give(ir::Directive directive);
   void check_defined(const std::string& asked) const;
   const ir::Definition& checked_update(int index, const char* asked) const;

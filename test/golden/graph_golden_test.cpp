@@ -8,11 +8,10 @@
 #include <filesystem>
 #include <fstream>
 #include <iterator>
-#include <map>
-#include <regex>
 
 #include "autodiff/graph_passes.h"
 #include "graph/graph.h"
+#include "support/same_numbers.h"
 
 namespace retrograde::ir {
 namespace {
@@ -34,21 +33,6 @@ std::vector<fs::path> find_cases() {
   return cases;
 }
 
-// Fresh loops are numbered in the process: here in the order in which they appear.
-std::string renumbered(const std::string& text) {
-  static const std::regex fresh("v\\$[0-9]+");
-  std::map<std::string, std::string> numbers;
-  std::string result;
-  auto at = text.begin();
-  for (std::sregex_iterator it(text.begin(), text.end(), fresh), end; it != end; ++it) {
-    result.append(at, text.begin() + it->position());
-    const auto number = numbers.emplace(it->str(), "v$" + std::to_string(numbers.size())).first;
-    result += number->second;
-    at = text.begin() + it->position() + it->length();
-  }
-  return result.append(at, text.end());
-}
-
 class GraphGolden : public ::testing::TestWithParam<fs::path> {};
 
 TEST_P(GraphGolden, GivesWhatItsFileSays) {
@@ -64,7 +48,7 @@ TEST_P(GraphGolden, GivesWhatItsFileSays) {
 
   fs::path expected = GetParam();
   expected.replace_extension(".out");
-  const std::string result = renumbered(to_text(after));
+  const std::string result = same_numbers(to_text(after));
   if (std::getenv("RETROGRADE_UPDATE_GOLDEN")) std::ofstream(expected) << result;
   EXPECT_EQ(result, read_file(expected));
 }

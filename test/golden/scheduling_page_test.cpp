@@ -256,8 +256,14 @@ std::string page() {
       "changes "
       "what is\ncomputed. This page shows every directive by the loops before and after it, as "
       "`print_loop_nest` gives\nthem, or by the statement with its storage. The headers "
-      "`frontend/stage.h` and `frontend/func.h` hold the\nrules. The page is written by "
-      "`test/golden/scheduling_page_test.cpp`: what it shows is what the compiler\ndoes.\n\n";
+      "`frontend/loop_directives.h` and `frontend/func.h` hold the\nrules. The page is written by "
+      "`test/golden/scheduling_page_test.cpp`: what it shows is what the compiler\ndoes.\n\n"
+      "## Schedules as values\n\n"
+      "`Pipeline::schedule_log()` gives all directives of a program in the order in which they "
+      "were "
+      "given:\ntext (`to_text`, `parse`), C++ (`to_cpp`), what is said of one Func (`of`), its "
+      "beginning (`first`), the\nsame without one directive (`without`). "
+      "`Pipeline::apply_schedule()` gives a log to the same program\nwithout a schedule.\n\n";
   const std::pair<const char*, const std::vector<Directive>*> chapters[] = {
       {"Loops of one stage", &loop_directives()},
       {"Where a Func is computed", &place_directives()},
