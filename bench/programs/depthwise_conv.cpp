@@ -44,7 +44,7 @@ class DepthwiseConv : public Halide::Generator<DepthwiseConv> {
 }  // namespace
 
 PROGRAM(depthwise_conv, DepthwiseConv,
-        at_sizes({{16, 16, 21, 17}, {32, 32, 80, 59}, {64, 128, 112, 112}}, [](const Sizes& n) {
+        at_sizes({{16, 32, 21, 17}, {32, 32, 80, 59}, {64, 128, 112, 112}}, [](const Sizes& n) {
           return std::vector{in<float>({n[0], n[2], n[3]}), in<float>({n[0], 3, 3}, -1, 1).noise(),
                              in<float>({n[1], n[0]}, -0.5, 0.5).noise(),
                              out<float>({n[1], n[2], n[3]})};

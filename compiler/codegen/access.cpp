@@ -12,6 +12,7 @@
 #include <bit>
 #include <cstdlib>
 
+#include "codegen/cut_loops.h"
 #include "codegen/function_generator.h"
 #include "diagnostics/error.h"
 #include "ir/build.h"
@@ -348,6 +349,7 @@ Value* FunctionGenerator::scratch(size_t slot, llvm::Type* type) {
   if (!block) {
     block = entry_alloca(type, 1, "scratch");
     block->setAlignment(llvm::Align(64));
+    block->setMetadata(scratch_mark, llvm::MDNode::get(e_.context(), {}));
   } else if (size(block->getAllocatedType()) < size(type)) {
     block->setAllocatedType(type);
   }

@@ -13,6 +13,7 @@
 #include <utility>
 
 #include "codegen/archive.h"
+#include "codegen/cut_loops.h"
 #include "codegen/function_generator.h"
 #include "codegen/make_exports.h"
 #include "codegen/split_module.h"
@@ -50,6 +51,7 @@ void generate(const Program& program, const Machine& machine, Unit& unit) {
   for (const ir::LoweredFunction& function : program.functions)
     FunctionGenerator(emitter, function).generate();
   add_exports(emitter, program);
+  cut_loops(unit.module());
   verify(unit.module());
   unit.times.generate_seconds = watch.lap();
 }

@@ -310,6 +310,7 @@ FunctionGenerator::Storage FunctionGenerator::allocate_on_stack(const Allocate& 
   frame_.stack_bytes += bytes;
   llvm::AllocaInst* block = entry_alloca(b_.getInt8Ty(), bytes, s.name);
   block->setAlignment(llvm::Align(64));
+  b_.CreateLifetimeStart(block, b_.getInt64(static_cast<uint64_t>(bytes)));
   return {block, nullptr, alias_tag(s.name)};
 }
 

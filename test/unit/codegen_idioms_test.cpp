@@ -399,5 +399,42 @@ TEST(CodegenIdioms, LongStraightCodeIsFenced) {
   EXPECT_EQ(fences_of(400), 6u) << "one after each 64 stores";
 }
 
+// Pieces of one function, which threads compile at the same time.
+TEST(CodegenIdioms, LongFunctionsAreCutBetweenTheirLoops) {
+  ImageParam in(Float(32), 2, "in");
+  Var x("x"), y("y"), yi("yi");
+  std::vector<Func> stages;
+  for (int i = 0; i < 4; i++) {
+    const auto source = [&](Expr at) -> Expr { return i == 0 ? in(at, y) : stages.back()(at, y); };
+    Func stage("stage" + std::to_string(i));
+    Expr sum = 0.0f;
+    for (int tap = 0; tap < 24; tap++) sum += source(x + tap) * (1.0f + tap * tap);
+    stage(x, y) = sum;
+    stages.push_back(stage);
+  }
+  for (Func& stage : stages) stage.vectorize(x, 8);
+  stages.back().split(y, y, yi, 16).parallel(y);
+  for (size_t i = 0; i + 1 < stages.size(); i++) stages[i].compute_at(stages.back(), y);
+  const auto code = assembly(stages.back(), avx2);
+  EXPECT_GE(count(code, ".loop0:"), 1u);
+}
+
+// The sums are registers while r runs: its loops stay beside what begins and ends them.
+TEST(CodegenIdioms, LoopsThatShareRegistersStayInOneFunction) {
+  ImageParam in(Float(32), 2, "in");
+  Var x("x"), xo("xo");
+  RDom r(0, 512, "r");
+  Func f("f"), sums[2];
+  for (Func& sum : sums) {
+    Expr terms = 0.0f;
+    for (int tap = 0; tap < 60; tap++) terms += in(x + tap, r) * (1.0f + tap * tap);
+    sum(x) += terms;
+    sum.compute_at(f, xo).vectorize(x, 8).update().reorder(x, r).vectorize(x, 8);
+  }
+  f(x) = sums[0](x) * sums[1](x);
+  f.split(x, xo, x, 8).vectorize(x);
+  EXPECT_EQ(count(assembly(f, avx2), ".loop0:"), 0u);
+}
+
 }  // namespace
 }  // namespace retrograde

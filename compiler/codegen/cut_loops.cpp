@@ -1,0 +1,220 @@
+#include "codegen/cut_loops.h"
+
+#include <llvm/Analysis/CaptureTracking.h>
+#include <llvm/Analysis/LoopInfo.h>
+#include <llvm/IR/Dominators.h>
+#include <llvm/IR/InstIterator.h>
+#include <llvm/IR/Module.h>
+#include <llvm/IR/PatternMatch.h>
+#include <llvm/Transforms/Utils/CodeExtractor.h>
+
+#include <algorithm>
+#include <string>
+#include <vector>
+
+namespace retrograde::codegen {
+namespace {
+
+// In instructions. Shorter functions are not worth a thread each; shorter pieces are no gain.
+constexpr unsigned long_function = 400, least_piece = 100;
+// What a loop must do each time. A call, its arguments and what is no longer hoisted are some twenty
+// instructions, and loops of which little is known may run once: matrix products whose innermost
+// loops were cut at 4,000 took half as long again.
+constexpr uint64_t least_work = 16000;
+constexpr uint64_t unknown_iterations = 16;
+// As many bytes as a processor has in vector registers.
+constexpr uint64_t register_bytes = 2048;
+
+using Blocks = std::vector<llvm::BasicBlock*>;
+
+unsigned length_of(const llvm::Loop& loop) {
+  size_t length = 0;
+  for (const llvm::BasicBlock* block : loop.blocks()) length += block->size();
+  return static_cast<unsigned>(length);
+}
+
+// Of a loop as serial_loop makes it, which counts from `first` while the next is less than `end`.
+uint64_t iterations_of(const llvm::Loop& loop) {
+  using namespace llvm::PatternMatch;
+  const llvm::BasicBlock* latch = loop.getLoopLatch();
+  const auto* counter = llvm::dyn_cast<llvm::PHINode>(&loop.getHeader()->front());
+  llvm::ICmpInst::Predicate predicate;
+  llvm::Value *next, *end;
+  if (!latch || !counter ||
+      !match(latch->getTerminator(),
+             m_Br(m_ICmp(predicate, m_Value(next), m_Value(end)), m_BasicBlock(), m_BasicBlock())))
+    return unknown_iterations;
+  const llvm::ConstantInt *first, *last;
+  const llvm::Value* start = nullptr;
+  for (unsigned i = 0; i < counter->getNumIncomingValues(); i++) {
+    if (counter->getIncomingBlock(i) != latch) start = counter->getIncomingValue(i);
+  }
+  if ((first = llvm::dyn_cast_or_null<llvm::ConstantInt>(start)) &&
+      (last = llvm::dyn_cast<llvm::ConstantInt>(end)))
+    return static_cast<uint64_t>(
+        std::max<int64_t>(last->getSExtValue() - first->getSExtValue(), 1));
+  llvm::ConstantInt* extent;
+  if (start && match(end, m_Add(m_Specific(start), m_ConstantInt(extent))))
+    return static_cast<uint64_t>(std::max<int64_t>(extent->getSExtValue(), 1));
+  return unknown_iterations;
+}
+
+// Instructions that one execution of the loop runs through, about.
+uint64_t work_of(const llvm::Loop& loop) {
+  uint64_t work = length_of(loop);
+  for (const llvm::Loop* inner : loop) work += work_of(*inner) - length_of(*inner);
+  return work * iterations_of(loop);
+}
+
+// The blocks of the loop and those that leave it to end the function.
+Blocks blocks_of(const llvm::Loop& loop) {
+  Blocks blocks(loop.block_begin(), loop.block_end());
+  llvm::SmallVector<llvm::BasicBlock*> exits;
+  loop.getUniqueExitBlocks(exits);
+  for (llvm::BasicBlock* exit : exits) {
+    const llvm::BasicBlock* next = exit->getSingleSuccessor();
+    const bool ends = next && llvm::isa<llvm::PHINode>(next->front()) &&
+                      llvm::isa<llvm::ReturnInst>(next->getTerminator());
+    if (ends && exit->getSinglePredecessor() && !llvm::isa<llvm::PHINode>(exit->front()))
+      blocks.push_back(exit);
+  }
+  return blocks;
+}
+
+bool may_be_registers(const llvm::AllocaInst& block) {
+  const auto size = block.getAllocationSize(block.getModule()->getDataLayout());
+  return size && size->getFixedValue() <= register_bytes &&
+         !llvm::PointerMayBeCaptured(&block, /*ReturnCaptures=*/true, /*StoreCaptures=*/true);
+}
+
+bool is_scratch(const llvm::AllocaInst& block) { return block.hasMetadata(scratch_mark); }
+
+bool begins_anew(const llvm::Value& block) {
+  return llvm::any_of(block.users(), [](const llvm::User* user) {
+    return llvm::cast<llvm::Instruction>(user)->isLifetimeStartOrEnd();
+  });
+}
+
+class Cutter {
+ public:
+  explicit Cutter(llvm::Function& function)
+      : function_(function), dominators_(function), loops_(dominators_) {}
+
+  // The new function, or null.
+  llvm::Function* cut(const std::string& name) {
+    const llvm::Loop* loop = best_loop();
+    if (!loop) return nullptr;
+    const llvm::CodeExtractorAnalysisCache cache(function_);
+    llvm::Function* piece = extractor(blocks_of(*loop), name).extractCodeRegion(cache);
+    if (piece) move_memory(*piece);
+    return piece;
+  }
+
+ private:
+  using ValueSet = llvm::SetVector<llvm::Value*>;
+  llvm::Function& function_;
+  llvm::DominatorTree dominators_;
+  llvm::LoopInfo loops_;
+
+  llvm::CodeExtractor extractor(const Blocks& blocks, const std::string& name) {
+    return llvm::CodeExtractor(blocks, &dominators_, /*AggregateArgs=*/false, nullptr, nullptr,
+                               nullptr, /*AllowVarArgs=*/false, /*AllowAlloca=*/false, nullptr,
+                               name);
+  }
+
+  const llvm::Loop* best_loop() {
+    const unsigned whole = function_.getInstructionCount();
+    const llvm::Loop* best = nullptr;
+    unsigned smaller_piece = std::max(least_piece, whole / 8);
+    for (const llvm::Loop* loop : loops_.getLoopsInPreorder()) {
+      const unsigned length = length_of(*loop);
+      if (length > whole || std::min(length, whole - length) < smaller_piece) continue;
+      if (work_of(*loop) < least_work || !can_cut(*loop)) continue;
+      best = loop;
+      smaller_piece = std::min(length, whole - length) + 1;
+    }
+    return best;
+  }
+
+  bool can_cut(const llvm::Loop& loop) {
+    const Blocks blocks = blocks_of(loop);
+    const llvm::CodeExtractor region = extractor(blocks, "");
+    if (!region.isEligible()) return false;
+    ValueSet inputs, outputs;
+    region.findInputsOutputs(inputs, outputs, {});
+    const bool gives_codes = llvm::all_of(
+        outputs, [](const llvm::Value* value) { return value->getType()->isIntegerTy(32); });
+    return gives_codes &&
+           llvm::none_of(inputs, [&](const llvm::Value* v) { return is_shared(v, blocks); });
+  }
+
+  // Whether it may be a register on both sides of the cut.
+  static bool is_shared(const llvm::Value* input, const Blocks& blocks) {
+    if (input->getType()->isVectorTy()) return true;
+    const auto* block = llvm::dyn_cast<llvm::AllocaInst>(input);
+    if (!block || is_scratch(*block) || !may_be_registers(*block)) return false;
+    const bool is_alone = llvm::all_of(block->users(), [&](const llvm::User* user) {
+      const llvm::BasicBlock* where = llvm::cast<llvm::Instruction>(user)->getParent();
+      return std::find(blocks.begin(), blocks.end(), where) != blocks.end();
+    });
+    return !is_alone || !begins_anew(*block);
+  }
+
+  // Memory on the stack of which nothing but the call of the piece speaks goes to the piece; scratch
+  // memory it gets of its own.
+  static void move_memory(llvm::Function& piece) {
+    auto* call = llvm::cast<llvm::CallInst>(*piece.user_begin());
+    llvm::Instruction* const begin = &*piece.getEntryBlock().getFirstInsertionPt();
+    for (unsigned i = 0; i < call->arg_size(); i++) {
+      auto* block = llvm::dyn_cast<llvm::AllocaInst>(call->getArgOperand(i));
+      if (!block || !may_move(*block, *piece.getArg(i))) continue;
+      call->setArgOperand(i, llvm::PoisonValue::get(block->getType()));
+      llvm::Instruction* own = block;
+      if (block->use_empty())
+        block->moveBefore(begin);
+      else
+        (own = block->clone())->insertBefore(begin);
+      piece.getArg(i)->replaceAllUsesWith(own);
+    }
+  }
+  static bool may_move(const llvm::AllocaInst& block, const llvm::Argument& in_piece) {
+    return is_scratch(block) || (block.hasOneUse() && begins_anew(in_piece));
+  }
+};
+
+void cut(llvm::Function& function, unsigned longest) {
+  std::vector<llvm::Function*> rest{&function};
+  unsigned count = 0;
+  while (!rest.empty()) {
+    llvm::Function* const f = rest.back();
+    rest.pop_back();
+    if (f->getInstructionCount() <= longest) continue;
+    llvm::Function* const piece = Cutter(*f).cut("loop" + std::to_string(count++));
+    if (!piece) continue;
+    rest.push_back(piece);
+    rest.push_back(f);
+  }
+}
+
+// LLVM's passes work without them.
+void drop_marks(llvm::Module& module) {
+  for (llvm::Function& function : module) {
+    for (llvm::Instruction& one : llvm::make_early_inc_range(llvm::instructions(function))) {
+      if (one.isLifetimeStartOrEnd()) one.eraseFromParent();
+    }
+  }
+}
+
+}  // namespace
+
+void cut_loops(llvm::Module& module) {
+  const unsigned longest = std::max(long_function, module.getInstructionCount() / 3);
+  std::vector<llvm::Function*> functions;
+  for (llvm::Function& function : module) {
+    if (!function.isDeclaration()) functions.push_back(&function);
+  }
+  for (llvm::Function* function : functions) cut(*function, longest);
+  drop_marks(module);
+}
+
+}  // namespace retrograde::codegen
