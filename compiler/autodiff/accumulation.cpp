@@ -183,8 +183,9 @@ class Builder {
   }
 
  private:
-  static FuncPtr new_func(const std::string& name, Role role = Role::Adjoint) {
+  FuncPtr new_func(const std::string& name, Role role = Role::Adjoint) const {
     FuncPtr f = make_func(role);
+    f->made->of = target_.name;
     f->name = name;
     return f;
   }

@@ -27,6 +27,7 @@ class CheckpointedLoop {
 
   void run() {
     machine_->name = claim_name(f_->name + "_checkpoints");
+    machine_->made->of = f_->name;
     plan_ = plan_checkpoints(c_, layout_, result_.current.func, machine_);
     table_ = make_table();
     if (table_.made_by) result_.helpers.push_back(table_.made_by);

@@ -42,6 +42,7 @@ class Lifter {
     if (f->is_extern()) internal_error("an extern stage lies on the way of several seeds");
     const FuncPtr result = make_func(Role::Coloured);
     result->name = claim_name(f->name + "_by_colour");
+    result->made->of = f->name;
     if (f->made) result->made->traits = f->made->traits;
     lifted_[f.get()] = result;
     std::vector<Expr> args = variables_of(f->args);

@@ -126,6 +126,7 @@ FuncPtr Compressed::evaluate() const {
   if (isl_map_is_empty(pattern_.get()) == isl_bool_true) return nullptr;
   auto seeds = make_func(Role::Coloured);
   seeds->name = claim_name(query_.seed->name + "_by_colour");
+  seeds->made->of = query_.seed->name;
   seeds->made->traits.masked = true;
   const std::vector<Expr> column = variables_of(query_.seed->args);
   std::vector<Expr> args = column;

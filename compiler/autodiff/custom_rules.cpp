@@ -257,6 +257,7 @@ FuncPtr run_custom_tangent(const FuncPtr& f, FunctionRef<FuncPtr(const Symbol*)>
 FuncPtr zero_derivative(const Symbol& symbol, const std::string& suffix) {
   InputShape shape = shape_of(&symbol);
   FuncPtr zero = make_func(Role::CustomRule, shape.name + suffix);
+  zero->made->of = shape.name;
   std::vector<Expr> values;
   for (Type t : shape.types)
     values.push_back(make_zero(t.is_float() ? adjoint_type(t) : Float(32)));

@@ -49,6 +49,7 @@ class Fold {
   // A Func with a dimension for steps, which has the values of `from` at one of them.
   FuncPtr begin_steps(const std::string& name, const Expr& at, const FuncPtr& from) const {
     FuncPtr steps = make_func(Role::Steps);
+    steps->made->of = f_->name;
     steps->name = claim_name(name);
     std::vector<Expr> zeros, values;
     for (size_t k = 0; k < f_->types.size(); ++k) {

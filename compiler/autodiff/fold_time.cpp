@@ -76,6 +76,7 @@ class Folder {
                       const FuncPtr& pure) const {
     FuncPtr folded = make_func(Role::TimeFold);
     folded->name = claim_name(c.f->name + "_folded");
+    folded->made->of = c.f->name;
     std::vector<Expr> at_start = c.point, initial;
     at_start[axis.dim] = time_at_start(c.point[axis.dim], axis);
     for (size_t k = 0; k < c.values.size(); ++k)
@@ -147,6 +148,7 @@ class Folder {
   // The first stages of f.
   FuncPtr clone(const FuncPtr& f, int stages, const std::string& name) const {
     FuncPtr g = make_func(Role::TimeFold);
+    g->made->of = f->name;
     if (f->made) g->made->traits = f->made->traits;
     g->name = claim_name(name);
     std::vector<Expr> args = variables_of(f->args), values;

@@ -76,6 +76,7 @@ class SelectionFinder {
   FuncPtr make_winner(const Expr& condition) const {
     FuncPtr w = make_func(Role::Winner);
     w->name = claim_name(f_->name + "_winner");
+    w->made->of = f_->name;
     std::vector<Expr> args = variables_of(f_->args), initial;
     FuncPtr before = stage_ > 1 ? clone_prefix(f_, stage_) : nullptr;
     for (size_t k = 0; k < f_->types.size(); ++k) {

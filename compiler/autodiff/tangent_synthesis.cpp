@@ -38,6 +38,7 @@ class FuncTangent {
   FuncPtr build() {
     if (!moves()) return nullptr;
     tangent_ = make_func(Role::Tangent, f_->name + "_tan");
+    tangent_->made->of = f_->name;
     if (!linearise_all(tangent_, 0)) return build_dual();
     for (int s = 0; s < f_->stage_count(); ++s) define(tangent_, s, {}, stages_[s].values);
     return tangent_;
@@ -114,6 +115,7 @@ class FuncTangent {
 
   FuncPtr build_dual() {
     dual_ = make_func(Role::Tangent, f_->name + "_dual");
+    dual_->made->of = f_->name;
     linearise_all(dual_, count());
     tangent_->made->traits = dual_->made->traits;
     for (int s = 0; s < f_->stage_count(); ++s)
@@ -235,6 +237,7 @@ class TangentSynthesis {
     if (found == directions_.end()) return own;
     if (!own) return found->second;
     FuncPtr sum = make_func(Role::Tangent, f.name + "_tan_sum");
+    sum->made->of = f.name;
     std::vector<Expr> args = variables_of(f.args), values;
     for (size_t k = 0; k < f.types.size(); ++k) {
       values.push_back(
@@ -284,6 +287,7 @@ class TangentSynthesis {
 
 FuncPtr zero_tangent(const FuncContents& f) {
   FuncPtr zero = make_func(Role::Tangent, f.name + "_tan");
+  zero->made->of = f.name;
   std::vector<Expr> values;
   for (Type t : f.types) values.push_back(make_zero(tangent_type(t)));
   define_pure(zero, variables_of(f.args), values);

@@ -59,6 +59,7 @@ class Tape {
   // A tape whose elements are those of `from`, and whose other slots are 0.
   FuncPtr begin_tape(const std::string& name, const FuncPtr& from) const {
     FuncPtr tape = make_func(Role::Tape);
+    tape->made->of = f_->name;
     tape->name = claim_name(name);
     auto rdom = std::make_shared<ReductionDomainContents>();
     rdom->frozen = true;

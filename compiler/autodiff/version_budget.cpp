@@ -72,6 +72,7 @@ FuncPtr VersionBudget::take(const KeptVersions& versions, std::vector<Explanatio
 FuncPtr VersionBudget::guard(const KeptVersions& versions, const Expr& bytes) const {
   FuncPtr check = make_func(Role::VersionCheck);
   check->name = claim_name(versions.copy->name + "_fits");
+  check->made->of = versions.primal;
   const Expr fits = bytes <= make_const(Float(64), static_cast<double>(rules_.bytes));
   const std::string asked = text("cannot ", versions.asked, ": ", rule(), ", but with those of ",
                                  quoted(versions.primal), " they are");

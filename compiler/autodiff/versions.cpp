@@ -14,6 +14,7 @@ namespace retrograde::ir {
 
 FuncPtr clone_prefix(const FuncPtr& f, int stages, const std::string& name) {
   FuncPtr g = make_func(Role::Version);
+  g->made->of = f->name;
   if (f->made) g->made->traits = f->made->traits;
   g->name =
       claim_name(name.empty() ? f->name + "_before_update" + std::to_string(stages - 1) : name);

@@ -110,6 +110,7 @@ class Complexifier {
   void add(const FuncPtr& f) {
     auto to = make_func(Role::Widened);
     to->name = claim_name(f->name + "_complex");
+    to->made->of = f->name;
     funcs_[f.get()] = to;
     const std::vector<Expr> args = variables_of(f->args);
     for (int s = 0; s < f->stage_count(); ++s) {

@@ -44,6 +44,7 @@ class Widening {
                   quoted(f->name)));
     auto to = make_func(Role::Widened);
     to->name = claim_name(f->name + "_double");
+    to->made->of = f->name;
     result_.funcs[f.get()] = to;
     const std::vector<Expr> args = variables_of(f->args);
     for (int s = 0; s < f->stage_count(); ++s) {

@@ -37,6 +37,10 @@ TEST_P(Suite, GraphsAreTheirText) {
   const ir::Graph graph = ir::graph_of(outputs);
   ir::validate(graph, "propagate_adjoints");
   EXPECT_EQ(ir::difference(ir::parse_graph(ir::to_text(graph)), graph), "") << ir::to_text(graph);
+  for (const ir::FuncPtr& f : graph.funcs) {
+    // What several adjoints share is of none of them.
+    if (f->made && f->made->role != ir::Role::SharedValue) EXPECT_NE(f->made->of, "") << f->name;
+  }
 }
 
 // What is given to a gradient is given to its text alike.
