@@ -7,6 +7,7 @@
 //   SimplifyCFG    blocks of asserts and scopes that turned out empty
 //   InstCombine    address arithmetic, comparisons with constants, shuffles of shuffles
 //   LICM           loop-invariant loads and address parts, past unrelated stores
+//   SplitAddresses what a loop does not change of an address is added before it
 //   GVN            loads that an earlier iteration's tail or another block already did, where
 //                  EarlyCSE is too local
 //   LoopLoadElim   what a scan stored in the iteration before stays in a register
@@ -46,6 +47,7 @@
 #include <optional>
 
 #include "codegen/fence_long_blocks.h"
+#include "codegen/split_addresses.h"
 
 namespace retrograde::codegen {
 
@@ -135,6 +137,7 @@ static llvm::FunctionPassManager pipeline() {
   passes.addPass(llvm::InstCombinePass());
   passes.addPass(llvm::createFunctionToLoopPassAdaptor(llvm::LICMPass(llvm::LICMOptions()),
                                                        /*UseMemorySSA=*/true));
+  passes.addPass(SplitAddresses());
   passes.addPass(llvm::GVNPass());
   passes.addPass(llvm::LoopLoadEliminationPass());
   passes.addPass(llvm::DSEPass());
