@@ -16,7 +16,7 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
-#include "frontend/pipeline.h"
+#include "frontend/run/pipeline.h"
 #include "gradient/programs_large.h"
 
 namespace {

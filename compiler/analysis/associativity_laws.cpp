@@ -223,7 +223,7 @@ LawValue LawEvaluator::evaluate(const Expr& e) {
         result.truth = !truth(n.a);
         return result;
       },
-      [&](const Select& n) { return truth(n.condition) ? get(n.true_value) : get(n.false_value); },
+      [&](const Select& n) { return truth(n.condition) ? get(n.when_true) : get(n.when_false); },
       [&](const Call& n) { return call(n); },
       [&](const Cast&) -> LawValue { undecided("it converts the old value to another type"); },
       [&](const ExprNode&) -> LawValue { undecided("it is not made of operators it knows"); });

@@ -167,7 +167,7 @@ Interval BoundsEngine::atom_bounds(const Expr& e) {
       },
       [&](const Cast& n) { return cast_bounds(n.type, n.value); },
       [&](const Binary& n) { return binary_bounds(e, n); },
-      [&](const Select& n) { return select_bounds(n.condition, n.true_value, n.false_value); },
+      [&](const Select& n) { return select_bounds(n.condition, n.when_true, n.when_false); },
       [&](const Call& n) { return call_bounds(n); },
       [&](const Let& n) {
         bind(n);
@@ -194,7 +194,7 @@ Interval BoundsEngine::cast_bounds(Type type, const Expr& value) {
   if (!value.type().is_float() || v.min.defined() || !is_nonnegative_or_nan(value))
     return interval_cast(type, value.type(), v);
   if (v.max.defined()) return interval_cast(type, value.type(), {make_zero(value.type()), v.max});
-  // Where it may be NaN, too, the integer is kept from being negative (lower/strict_indices.h).
+  // Where it may be NaN, too, the integer is kept from being negative (lower/nests/strict_indices.h).
   Interval result = type_range(type);
   if (has_linear_form(type)) result.min = make_zero(type);
   return result;
@@ -225,13 +225,12 @@ Interval BoundsEngine::binary_bounds(const Expr& e, const Binary& op) {
   }
 }
 
-Interval BoundsEngine::select_bounds(const Expr& condition, const Expr& true_value,
-                                     const Expr& false_value) {
+Interval BoundsEngine::select_bounds(const Expr& condition, const Expr& when_true,
+                                     const Expr& when_false) {
   Truth decided = truth(condition);
-  if (decided == Truth::True) return bounds(true_value);
-  if (decided == Truth::False) return bounds(false_value);
-  return hull(under(condition, true).bounds(true_value),
-              under(condition, false).bounds(false_value));
+  if (decided == Truth::True) return bounds(when_true);
+  if (decided == Truth::False) return bounds(when_false);
+  return hull(under(condition, true).bounds(when_true), under(condition, false).bounds(when_false));
 }
 
 // ---- conditions ----
@@ -407,7 +406,7 @@ Interval BoundsEngine::call_bounds(const Call& call) {
 
 Interval BoundsEngine::value_of_func(const Call& call) {
   if (!shared_->values) return type_range(call.type);
-  auto it = shared_->values->find({call.name, call.value_index});
+  auto it = shared_->values->find({call.name, call.component});
   return it == shared_->values->end() ? type_range(call.type) : it->second;
 }
 

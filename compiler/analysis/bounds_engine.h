@@ -57,7 +57,7 @@ class BoundsEngine {
   Interval cast_bounds(Type type, const Expr& value);
   Interval ramp_bounds(const Ramp& ramp);
   Interval binary_bounds(const Expr& e, const Binary& op);
-  Interval select_bounds(const Expr& condition, const Expr& true_value, const Expr& false_value);
+  Interval select_bounds(const Expr& condition, const Expr& when_true, const Expr& when_false);
   Interval call_bounds(const Call& call);
   Interval operator_bounds(const Call& call);
   Interval bounds_within(const Call& call, const OpInfo& info);

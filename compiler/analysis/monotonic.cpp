@@ -63,7 +63,7 @@ class Direction {
         [&](const Cast& n) { return of_cast(n); },
         [&](const Binary& n) { return of_binary(e.kind(), n); },
         [&](const Select& n) {
-          Monotonic arms = both(of(n.true_value), of(n.false_value));
+          Monotonic arms = both(of(n.when_true), of(n.when_false));
           return of(n.condition) == Monotonic::Constant ? arms : Monotonic::Unknown;
         },
         [&](const Call& n) { return of_call(e, n); },

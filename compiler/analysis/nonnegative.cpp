@@ -29,7 +29,7 @@ class Signs {
     if (const auto value = as_const_int(e)) return *value >= 0;
     if (const auto* cast = e.as<Cast>()) return nonnegative(cast->value);
     if (const auto* choice = e.as<Select>())
-      return nonnegative(choice->true_value) && nonnegative(choice->false_value);
+      return nonnegative(choice->when_true) && nonnegative(choice->when_false);
     if (const auto* call = e.as<Call>()) return decide_call(*call);
     const auto* op = e.as<Binary>();
     return op && e.type().is_float() && decide_binary(e.kind(), *op);

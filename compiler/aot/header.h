@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "codegen/exports.h"
-#include "frontend/module.h"
+#include "frontend/run/module.h"
 
 namespace retrograde::aot {
 

@@ -2,8 +2,8 @@
 
 #include <algorithm>
 
-#include "autodiff/custom_rules.h"
-#include "autodiff/input_shape.h"
+#include "autodiff/sweeps/custom_rules.h"
+#include "autodiff/sweeps/input_shape.h"
 #include "diagnostics/error.h"
 
 namespace retrograde {

@@ -2,12 +2,12 @@
 
 #include <algorithm>
 
-#include "autodiff/derivative_rules.h"
-#include "autodiff/explain_costs.h"
 #include "autodiff/gradient_lookup.h"
-#include "autodiff/leave_out.h"
-#include "autodiff/regions.h"
-#include "autodiff/synthesis.h"
+#include "autodiff/report/explain_costs.h"
+#include "autodiff/rules/derivative_rules.h"
+#include "autodiff/sweeps/leave_out.h"
+#include "autodiff/sweeps/regions.h"
+#include "autodiff/sweeps/synthesis.h"
 #include "graph/define.h"
 #include "ir/build.h"
 #include "ir/variables.h"

@@ -16,13 +16,13 @@
 #include <utility>
 #include <vector>
 
-#include "autodiff/explain.h"
-#include "autodiff/operation_count.h"
-#include "autodiff/version_budget.h"
-#include "frontend/buffer.h"
-#include "frontend/func.h"
-#include "frontend/image_param.h"
-#include "frontend/param.h"
+#include "autodiff/report/explain.h"
+#include "autodiff/report/operation_count.h"
+#include "autodiff/updates/version_budget.h"
+#include "frontend/data/buffer.h"
+#include "frontend/data/image_param.h"
+#include "frontend/data/param.h"
+#include "frontend/language/func.h"
 
 namespace retrograde {
 
@@ -143,7 +143,7 @@ struct AdjointOptions {
   // at run time only: a Param, an extent of an input. Then a table of about (r + 3) n rows of 12
   // bytes is made as the pipeline runs; a call whose n needs more than 2^24 rows fails. A Func that
   // keeps its steps along a dimension of its own, f(x, t + 1) = g(f(x, t)), is run the same way
-  // where others read its last steps only (fold_time.h): then it has no adjoint of its own, unless
+  // where others read its last steps only (overwrite_time.h): then it has no adjoint of its own, unless
   // it is in `wrt`. Where every step is read it keeps them, and explain() says so. Gradients are
   // the same bits for every budget; other updates follow `overwritten`. Give one: the number of
   // states kept, at least 1, or the bytes that they may take, enough for one.

@@ -1,6 +1,6 @@
 #include "autodiff/gradient_lookup.h"
 
-#include "autodiff/custom_rules.h"
+#include "autodiff/sweeps/custom_rules.h"
 #include "diagnostics/error.h"
 
 namespace retrograde {

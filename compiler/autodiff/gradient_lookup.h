@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "autodiff/explain.h"
+#include "autodiff/report/explain.h"
 #include "graph/function.h"
 
 namespace retrograde {

@@ -1,9 +1,9 @@
 #include "autodiff/jacobian.h"
 
-#include "autodiff/compressed.h"
-#include "autodiff/flat_input.h"
-#include "autodiff/input_shape.h"
-#include "autodiff/regions.h"
+#include "autodiff/matrices/compressed.h"
+#include "autodiff/matrices/flat_input.h"
+#include "autodiff/sweeps/input_shape.h"
+#include "autodiff/sweeps/regions.h"
 #include "autodiff/tangents.h"
 #include "diagnostics/error.h"
 #include "ir/build.h"

@@ -1,7 +1,7 @@
 #include "autodiff/straight_through.h"
 
 #include "diagnostics/error.h"
-#include "frontend/expr_ops.h"
+#include "frontend/language/expr_ops.h"
 #include "ir/build.h"
 
 namespace retrograde {

@@ -2,9 +2,9 @@
 
 #include <algorithm>
 
-#include "autodiff/accumulation.h"
-#include "autodiff/input_shape.h"
-#include "autodiff/tangent_synthesis.h"
+#include "autodiff/sweeps/accumulation.h"
+#include "autodiff/sweeps/input_shape.h"
+#include "autodiff/sweeps/tangent_synthesis.h"
 #include "ir/build.h"
 
 namespace retrograde {

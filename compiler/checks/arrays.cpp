@@ -4,8 +4,8 @@
 #include <cmath>
 
 #include "diagnostics/error.h"
-#include "frontend/image_param.h"
-#include "frontend/param.h"
+#include "frontend/data/image_param.h"
+#include "frontend/data/param.h"
 #include "ir/build.h"
 #include "simplify/simplify.h"
 

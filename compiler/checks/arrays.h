@@ -7,9 +7,9 @@
 #include <vector>
 
 #include "analysis/interval.h"
-#include "frontend/buffer.h"
-#include "frontend/func.h"
-#include "frontend/pipeline.h"
+#include "frontend/data/buffer.h"
+#include "frontend/language/func.h"
+#include "frontend/run/pipeline.h"
 
 namespace retrograde::checks {
 

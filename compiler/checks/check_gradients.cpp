@@ -7,14 +7,14 @@
 #include <map>
 #include <random>
 
-#include "autodiff/custom_rules.h"
-#include "autodiff/regions.h"
+#include "autodiff/sweeps/custom_rules.h"
+#include "autodiff/sweeps/regions.h"
 #include "autodiff/tangents.h"
 #include "checks/arrays.h"
 #include "checks/complex_step.h"
 #include "checks/widen.h"
 #include "diagnostics/error.h"
-#include "frontend/image_param.h"
+#include "frontend/data/image_param.h"
 #include "ir/build.h"
 
 namespace retrograde {

@@ -17,7 +17,7 @@
 #include <vector>
 
 #include "autodiff/derivative.h"
-#include "frontend/func.h"
+#include "frontend/language/func.h"
 
 namespace retrograde {
 

@@ -4,12 +4,12 @@
 #include <limits>
 #include <random>
 
-#include "autodiff/regions.h"
+#include "autodiff/sweeps/regions.h"
 #include "checks/arrays.h"
 #include "checks/culprit.h"
 #include "checks/widen.h"
 #include "diagnostics/error.h"
-#include "frontend/param.h"
+#include "frontend/data/param.h"
 
 namespace retrograde {
 
@@ -60,7 +60,8 @@ using Arrays = std::vector<std::vector<Values>>;  // of each watched Func, of ea
 
 class StabilityChecker {
  public:
-  StabilityChecker(const Func& output, const std::vector<int>& sizes, const StabilityOptions& options)
+  StabilityChecker(const Func& output, const std::vector<int>& sizes,
+                   const StabilityOptions& options)
       : output_(output),
         asked_("check the stability of " + retrograde::quoted(output.name())),
         shape_(shape_of_output(output, options.mins, sizes, asked_, "check_stability")),

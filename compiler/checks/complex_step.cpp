@@ -3,11 +3,11 @@
 #include <functional>
 #include <unordered_map>
 
-#include "autodiff/accumulation.h"
-#include "autodiff/default_schedule.h"
-#include "autodiff/local_derivative.h"
-#include "frontend/image_param.h"
-#include "frontend/param.h"
+#include "autodiff/schedule/default_schedule.h"
+#include "autodiff/sweeps/accumulation.h"
+#include "autodiff/sweeps/local_derivative.h"
+#include "frontend/data/image_param.h"
+#include "frontend/data/param.h"
 #include "graph/define.h"
 #include "ir/build.h"
 #include "ir/print.h"
@@ -152,7 +152,7 @@ class Complexifier {
           return from.im.defined() ? from : real(cast_to(Float(64), from.re));
         },
         [&](const Select& s) {
-          return chosen(operand(s.condition).re, operand(s.true_value), operand(s.false_value));
+          return chosen(operand(s.condition).re, operand(s.when_true), operand(s.when_false));
         },
         [&](const Binary& b) { return of_binary(e.kind(), operand(b.a), operand(b.b)); },
         [&](const ExprNode&) -> Complex { refuse("an expression", e); });
@@ -199,7 +199,7 @@ class Complexifier {
   Complex read(const Call& c) {
     const FuncPtr from = func_of(c);
     const FuncPtr& to = funcs_.at(c.symbol.raw());
-    const int at = position(*from, c.value_index);
+    const int at = position(*from, c.component);
     auto part = [&](int k) {
       return call_func(to->name, c.type, real_args(c), at + k, SymbolRef(to));
     };

@@ -15,7 +15,7 @@
 #include <memory>
 #include <string>
 
-#include "frontend/func.h"
+#include "frontend/language/func.h"
 
 namespace retrograde::checks {
 

@@ -3,8 +3,8 @@
 #include <cmath>
 #include <optional>
 
-#include "autodiff/local_derivative.h"
-#include "autodiff/update_context.h"
+#include "autodiff/sweeps/local_derivative.h"
+#include "autodiff/updates/update_context.h"
 #include "checks/arrays.h"
 #include "ir/build.h"
 #include "ir/print.h"

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "frontend/func.h"
+#include "frontend/language/func.h"
 
 namespace retrograde::checks {
 

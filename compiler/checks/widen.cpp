@@ -1,10 +1,10 @@
 #include "checks/widen.h"
 
-#include "autodiff/accumulation.h"
-#include "autodiff/local_derivative.h"
+#include "autodiff/sweeps/accumulation.h"
+#include "autodiff/sweeps/local_derivative.h"
 #include "diagnostics/error.h"
-#include "frontend/image_param.h"
-#include "frontend/param.h"
+#include "frontend/data/image_param.h"
+#include "frontend/data/param.h"
 #include "graph/define.h"
 #include "graph/function.h"
 #include "ir/build.h"
@@ -98,7 +98,7 @@ class Widening {
         },
         [&](const Binary& b) { return binary(e.kind(), recurse(b.a), recurse(b.b)); },
         [&](const Select& s) {
-          return make_select(recurse(s.condition), recurse(s.true_value), recurse(s.false_value));
+          return make_select(recurse(s.condition), recurse(s.when_true), recurse(s.when_false));
         },
         [&](const Call& c) { return call(c, recurse); },
         [&](const ExprNode&) { return map_children(e, recurse); });
@@ -119,7 +119,7 @@ class Widening {
         return operation(c, args);
       case CallType::Func: {
         const FuncPtr& to = result_.funcs.at(c.symbol.raw());
-        return call_func(to->name, wide(c.type), args, c.value_index, SymbolRef(to));
+        return call_func(to->name, wide(c.type), args, c.component, SymbolRef(to));
       }
       case CallType::Image: {
         auto found = result_.parameters.find(c.symbol.raw());

@@ -120,7 +120,7 @@ Value* FunctionGenerator::make(const Let& e) {
 }
 
 Value* FunctionGenerator::make(const Select& e) {
-  Value *condition = value(e.condition), *a = value(e.true_value), *b = value(e.false_value);
+  Value *condition = value(e.condition), *a = value(e.when_true), *b = value(e.when_false);
   return b_.CreateSelect(condition, a, b);
 }
 

@@ -49,8 +49,7 @@ void FunctionGenerator::finish_function() {
     if (frame_.profiler_slot) {
       const auto end = runtime_function("retrograde_profiler_end", b_.getInt32Ty(),
                                         {b_.getPtrTy(), b_.getPtrTy()});
-      b_.CreateCall(end,
-                    {frame_.context, b_.CreateLoad(b_.getPtrTy(), frame_.profiler_slot)});
+      b_.CreateCall(end, {frame_.context, b_.CreateLoad(b_.getPtrTy(), frame_.profiler_slot)});
     }
     if (frame_.owned_slots) {
       const auto free_all = runtime_function("retrograde_free_all", b_.getVoidTy(),
@@ -203,14 +202,14 @@ void FunctionGenerator::make(const IfThenElse& s) {
     condition = value(s.condition);
   }
   llvm::BasicBlock *then_block = new_block("then"), *after = new_block("after");
-  llvm::BasicBlock* else_block = s.else_case.defined() ? new_block("else") : after;
+  llvm::BasicBlock* else_block = s.when_false.defined() ? new_block("else") : after;
   b_.CreateCondBr(condition, then_block, else_block);
   b_.SetInsertPoint(then_block);
-  statement(s.then_case);
+  statement(s.when_true);
   b_.CreateBr(after);
-  if (s.else_case.defined()) {
+  if (s.when_false.defined()) {
     b_.SetInsertPoint(else_block);
-    statement(s.else_case);
+    statement(s.when_false);
     b_.CreateBr(after);
   }
   b_.SetInsertPoint(after);
@@ -256,7 +255,7 @@ void FunctionGenerator::make(const LetStmt& s) {
 }
 
 void FunctionGenerator::make(const For& s) {
-  switch (s.for_type) {
+  switch (s.runs) {
     case ForType::Serial:
       return serial_loop(s);
     case ForType::Parallel:

@@ -7,7 +7,7 @@
 #include <set>
 
 #include "diagnostics/error.h"
-#include "frontend/autoscheduler.h"
+#include "frontend/schedule/autoscheduler.h"
 #include "generator/generator_base.h"
 #include "generator/registry.h"
 

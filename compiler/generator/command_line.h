@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "frontend/module.h"
+#include "frontend/run/module.h"
 
 namespace retrograde::internal {
 

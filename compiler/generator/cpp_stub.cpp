@@ -3,7 +3,7 @@
 
 #include <sstream>
 
-#include "frontend/compiler_interface.h"
+#include "frontend/run/compiler_interface.h"
 
 namespace retrograde::internal {
 
@@ -32,7 +32,7 @@ std::string joined(const std::vector<std::string>& parts, const std::string& sep
   return out;
 }
 
-std::string element_type(const GIOBase& io, const char* buffer_class) {
+std::string element_type(const GeneratorPort& io, const char* buffer_class) {
   switch (io.kind()) {
     case IOKind::Scalar:
       return io.role_name() == "input" ? "::retrograde::Expr" : "::retrograde::Func";
@@ -46,13 +46,13 @@ std::string element_type(const GIOBase& io, const char* buffer_class) {
               is_known ? cpp_element_name(io.types()[0]) : "", ">");
 }
 
-Member member_of(const GIOBase& io, const char* buffer_class) {
+Member member_of(const GeneratorPort& io, const char* buffer_class) {
   const std::string element = element_type(io, buffer_class);
   return {io.is_array() ? "std::vector<" + element + ">" : element, io.name(), "", "", ""};
 }
 
 // What an output's declaration leaves open: a param "out.type", a member out_type.
-void add_open_parts(const GIOBase& output, std::vector<Member>& params) {
+void add_open_parts(const GeneratorPort& output, std::vector<Member>& params) {
   const auto add = [&](const char* type, const std::string& part, const char* value,
                        const char* function) {
     const std::string name = output.name() + "_" + part;

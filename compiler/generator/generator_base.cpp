@@ -75,11 +75,11 @@ void GeneratorBase::set_generator_param_values(const GeneratorParamsMap& values)
   }
 }
 
-GIOBase* GeneratorBase::find_io(const std::string& name) const {
-  for (GIOBase* input : members_.inputs) {
+GeneratorPort* GeneratorBase::find_io(const std::string& name) const {
+  for (GeneratorPort* input : members_.inputs) {
     if (input->name() == name) return input;
   }
-  for (GIOBase* output : members_.outputs) {
+  for (GeneratorPort* output : members_.outputs) {
     if (output->name() == name) return output;
   }
   return nullptr;
@@ -89,7 +89,7 @@ GIOBase* GeneratorBase::find_io(const std::string& name) const {
 bool GeneratorBase::set_open_part(const std::string& key, const std::string& text) {
   const size_t dot = key.find('.');
   if (dot == std::string::npos) return false;
-  GIOBase* io = find_io(key.substr(0, dot));
+  GeneratorPort* io = find_io(key.substr(0, dot));
   const std::string part = key.substr(dot + 1);
   if (!io || (part != "type" && part != "dim" && part != "size")) return false;
   if (part == "type") {
@@ -122,13 +122,13 @@ bool GeneratorBase::set_open_part(const std::string& key, const std::string& tex
 void GeneratorBase::unknown_param(const std::string& key) const {
   std::set<std::string> known;
   for (const GeneratorParamBase* param : members_.params) known.insert(param->name());
-  const auto add_open_parts = [&](const GIOBase* io) {
+  const auto add_open_parts = [&](const GeneratorPort* io) {
     if (!io->types_defined()) known.insert(io->name() + ".type");
     if (!io->dims_defined()) known.insert(io->name() + ".dim");
     if (!io->array_size_defined()) known.insert(io->name() + ".size");
   };
-  for (const GIOBase* input : members_.inputs) add_open_parts(input);
-  for (const GIOBase* output : members_.outputs) add_open_parts(output);
+  for (const GeneratorPort* input : members_.inputs) add_open_parts(input);
+  for (const GeneratorPort* output : members_.outputs) add_open_parts(output);
   std::string list;
   for (const std::string& name : known) list += (list.empty() ? "" : ", ") + quoted(name);
   user_error("set the GeneratorParam " + quoted(key) + " of the generator " + quoted(name_),
@@ -150,10 +150,10 @@ void GeneratorBase::check_names() const {
     }
   };
   for (const GeneratorParamBase* param : members_.params) check(param->name(), "param");
-  for (const GIOBase* input : members_.inputs) check(input->name(), "input");
-  for (const GIOBase* output : members_.outputs) check(output->name(), "output");
-  for (const GIOBase* input : members_.inputs) input->check_declaration();
-  for (const GIOBase* output : members_.outputs) output->check_declaration();
+  for (const GeneratorPort* input : members_.inputs) check(input->name(), "input");
+  for (const GeneratorPort* output : members_.outputs) check(output->name(), "output");
+  for (const GeneratorPort* input : members_.inputs) input->check_declaration();
+  for (const GeneratorPort* output : members_.outputs) output->check_declaration();
 }
 
 // ---- phases ----
@@ -208,7 +208,7 @@ void GeneratorBase::check_configuring(const char* role, const std::string& name)
       "inputs and outputs are added in configure()", "this is elsewhere", "Do it there");
 }
 
-Expr constant_for_input(const Expr& value, const GIOBase& input) {
+Expr constant_for_input(const Expr& value, const GeneratorPort& input) {
   if (!input.types_defined() || value.type() == input.type()) return value;
   const std::optional<ir::Scalar> constant = ir::as_scalar(value);
   const ir::Scalar converted = ir::eval_cast(input.type(), *constant);

@@ -10,8 +10,8 @@
 #include <utility>
 #include <vector>
 
-#include "frontend/lambda.h"
-#include "frontend/module.h"
+#include "frontend/language/lambda.h"
+#include "frontend/run/module.h"
 #include "generator/generator_context.h"
 #include "generator/generator_input.h"
 #include "generator/generator_output.h"
@@ -189,7 +189,7 @@ class GeneratorBase : public NamesInterface {
   void check_names() const;
   void check_input_count(size_t given);
   void check_configuring(const char* role, const std::string& name) const;
-  void adopt(GIOBase* extra) { extra->generator_ = this; }
+  void adopt(GeneratorPort* extra) { extra->generator_ = this; }
   void add_requirements(Pipeline& pipeline) const;
   void auto_schedule_pipeline(const Pipeline& pipeline) const;
   std::vector<Argument> input_arguments() const;
@@ -200,18 +200,18 @@ class GeneratorBase : public NamesInterface {
                    LinkageType linkage);
   bool set_open_part(const std::string& key, const std::string& text);
   [[noreturn]] void unknown_param(const std::string& key) const;
-  GIOBase* find_io(const std::string& name) const;
+  GeneratorPort* find_io(const std::string& name) const;
 
   template <typename A>
   void set_input(size_t i, const A& arg);
   template <typename A>
   void set_input(size_t i, const std::vector<A>& args);
-  GIOBase* find_input(size_t i) const { return members_.inputs[i]; }
+  GeneratorPort* find_input(size_t i) const { return members_.inputs[i]; }
   void set_input_values(size_t i, std::vector<InputValue> values);
 
   std::string name_ = "generator", stub_name_;
   Phase phase_ = Phase::Created;
-  std::vector<std::unique_ptr<GIOBase>> extras_;
+  std::vector<std::unique_ptr<GeneratorPort>> extras_;
   std::vector<Requirement> requirements_;
   bool is_traced_ = false;
   Pipeline pipeline_;
@@ -221,10 +221,10 @@ class GeneratorBase : public NamesInterface {
 
 // A C++ number for an input of type `type` (undefined: not said yet). CompileError when it does not
 // fit.
-Expr constant_for_input(const Expr& value, const GIOBase& input);
+Expr constant_for_input(const Expr& value, const GeneratorPort& input);
 
 template <typename A>
-InputValue input_value(const GIOBase& input, const A& arg) {
+InputValue input_value(const GeneratorPort& input, const A& arg) {
   const bool wants_func = input.kind() == IOKind::Function;
   if constexpr (std::is_base_of_v<GeneratorInputBase, A>) {
     const InputValue value = arg.values().at(0);

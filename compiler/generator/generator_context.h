@@ -5,10 +5,10 @@
 #include <memory>
 #include <utility>
 
-#include "frontend/autoscheduler.h"
-#include "frontend/expr_ops.h"
-#include "frontend/func.h"
-#include "frontend/param.h"
+#include "frontend/data/param.h"
+#include "frontend/language/expr_ops.h"
+#include "frontend/language/func.h"
+#include "frontend/schedule/autoscheduler.h"
 #include "ir/target.h"
 
 namespace retrograde {

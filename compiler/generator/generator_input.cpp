@@ -36,7 +36,7 @@ int InputValue::dims() const {
 }
 
 GeneratorInputBase::GeneratorInputBase(Declared declared, IOKind kind, Declared said, bool is_array)
-    : GIOBase(std::move(declared), kind, std::move(said), is_array, false) {
+    : GeneratorPort(std::move(declared), kind, std::move(said), is_array, false) {
   if (GeneratorMembers* members = GeneratorMembers::around(this)) members->inputs.push_back(this);
 }
 

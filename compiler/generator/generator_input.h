@@ -32,7 +32,7 @@ struct InputValue {
   int dims() const;
 };
 
-class GeneratorInputBase : public GIOBase {
+class GeneratorInputBase : public GeneratorPort {
  public:
   ~GeneratorInputBase() override = default;
   const std::vector<InputValue>& values() const { return values_; }

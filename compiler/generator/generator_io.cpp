@@ -16,7 +16,8 @@ std::string list_of(const std::vector<Type>& types) {
 
 }  // namespace
 
-GIOBase::GIOBase(Declared declared, IOKind kind, Declared said, bool is_array, bool is_output)
+GeneratorPort::GeneratorPort(Declared declared, IOKind kind, Declared said, bool is_array,
+                             bool is_output)
     : name_(std::move(declared.name)),
       kind_(kind),
       types_(std::move(said.types)),
@@ -36,17 +37,17 @@ GIOBase::GIOBase(Declared declared, IOKind kind, Declared said, bool is_array, b
   }
 }
 
-void GIOBase::check_declaration() const {
+void GeneratorPort::check_declaration() const {
   if (!contradiction_.asked.empty()) throw CompileError(contradiction_);
 }
 
-void GIOBase::refuse(const std::string& asked, const std::string& rule, const std::string& evidence,
-                     const std::string& instead) const {
+void GeneratorPort::refuse(const std::string& asked, const std::string& rule,
+                           const std::string& evidence, const std::string& instead) const {
   std::string whose = generator_ ? " of the generator " + quoted(generator_->name()) : "";
   user_error(asked + " the " + role_name() + " " + quoted(name_) + whose, rule, evidence, instead);
 }
 
-const std::vector<Type>& GIOBase::types() const {
+const std::vector<Type>& GeneratorPort::types() const {
   if (!types_defined()) {
     refuse("take the type of", "it is known once it is declared, set or given",
            "nothing has said it yet",
@@ -55,14 +56,14 @@ const std::vector<Type>& GIOBase::types() const {
   return types_;
 }
 
-Type GIOBase::type() const {
+Type GeneratorPort::type() const {
   if (types().size() != 1) {
     refuse("take the type of", "it has one value", text("it has ", types_.size()), "Use types()");
   }
   return types_[0];
 }
 
-int GIOBase::dims() const {
+int GeneratorPort::dims() const {
   if (!dims_defined()) {
     refuse("take the dimensions of", "they are known once they are declared, set or given",
            "nothing has said them yet",
@@ -71,7 +72,7 @@ int GIOBase::dims() const {
   return dims_;
 }
 
-size_t GIOBase::array_size() const {
+size_t GeneratorPort::array_size() const {
   if (!array_size_defined()) {
     refuse("take the array size of", "it is known once it is declared, set or given",
            "nothing has said it yet",
@@ -80,26 +81,26 @@ size_t GIOBase::array_size() const {
   return static_cast<size_t>(array_size_);
 }
 
-void GIOBase::set_types(const std::vector<Type>& types) {
+void GeneratorPort::set_types(const std::vector<Type>& types) {
   check_not_generated("set the type of");
   agree_on(types, any_size);
 }
 
-void GIOBase::set_dimensions(int dims) {
+void GeneratorPort::set_dimensions(int dims) {
   check_not_generated("set the dimensions of");
   agree_on({}, dims);
 }
 
-void GIOBase::set_array_size(int size) {
+void GeneratorPort::set_array_size(int size) {
   check_not_generated("set the array size of");
   agree_on_size(static_cast<size_t>(size));
 }
 
-std::string GIOBase::element_name(size_t i) const {
+std::string GeneratorPort::element_name(size_t i) const {
   return is_array_ ? name_ + "_" + std::to_string(i) : name_;
 }
 
-void GIOBase::agree_on(const std::vector<Type>& types, int dims) {
+void GeneratorPort::agree_on(const std::vector<Type>& types, int dims) {
   if (!types.empty() && !types_.empty() && types != types_) {
     refuse("use " + list_of(types) + " as the type of", "its type is declared once",
            "it is declared as " + list_of(types_), "Leave one of them open, or convert the value");
@@ -112,7 +113,7 @@ void GIOBase::agree_on(const std::vector<Type>& types, int dims) {
   if (dims != any_size) dims_ = dims;
 }
 
-void GIOBase::agree_on_size(size_t size) {
+void GeneratorPort::agree_on_size(size_t size) {
   const int wanted = static_cast<int>(size);
   if (wanted < 0 || (array_size_defined() && wanted != array_size_)) {
     refuse(text("use ", wanted, " as the array size of"), "its size is said once, and not negative",
@@ -122,12 +123,12 @@ void GIOBase::agree_on_size(size_t size) {
   array_size_ = wanted;
 }
 
-void GIOBase::check_not_generated(const char* asked) const {
+void GeneratorPort::check_not_generated(const char* asked) const {
   if (!generator_ || !generator_->is_generated()) return;
   refuse(asked, "configure() is the place for that", "generate() has run", "Do it in configure()");
 }
 
-void GIOBase::check_index(size_t i) const {
+void GeneratorPort::check_index(size_t i) const {
   if (i < array_size()) return;
   refuse(text("take element ", i, " of"), "elements are counted from 0 to below the array's size",
          text("its size is ", array_size()), "Take an element that it has, or give another size");

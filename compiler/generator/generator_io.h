@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "frontend/func.h"
-#include "frontend/param.h"
+#include "frontend/data/param.h"
+#include "frontend/language/func.h"
 #include "generator/members.h"
 
 namespace retrograde {
@@ -42,11 +42,11 @@ struct Declared {
   int size = any_size;
 };
 
-class GIOBase {
+class GeneratorPort {
  public:
-  virtual ~GIOBase() = default;
-  GIOBase(const GIOBase&) = delete;
-  GIOBase& operator=(const GIOBase&) = delete;
+  virtual ~GeneratorPort() = default;
+  GeneratorPort(const GeneratorPort&) = delete;
+  GeneratorPort& operator=(const GeneratorPort&) = delete;
 
   const std::string& name() const { return name_; }
   IOKind kind() const { return kind_; }
@@ -82,7 +82,7 @@ class GIOBase {
  protected:
   // `declared` holds what its constructor was given, `said` what its C++ type says. CompileError
   // when they contradict each other.
-  GIOBase(Declared declared, IOKind kind, Declared said, bool is_array, bool is_output);
+  GeneratorPort(Declared declared, IOKind kind, Declared said, bool is_array, bool is_output);
 
   [[noreturn]] void refuse(const std::string& asked, const std::string& rule,
                            const std::string& evidence, const std::string& instead) const;

@@ -7,7 +7,7 @@ namespace retrograde::internal {
 
 GeneratorOutputBase::GeneratorOutputBase(Declared declared, IOKind kind, Declared said,
                                          bool is_array)
-    : GIOBase(std::move(declared), kind, std::move(said), is_array, true) {
+    : GeneratorPort(std::move(declared), kind, std::move(said), is_array, true) {
   if (GeneratorMembers* members = GeneratorMembers::around(this)) members->outputs.push_back(this);
 }
 

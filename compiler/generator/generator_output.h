@@ -18,7 +18,7 @@
 namespace retrograde {
 namespace internal {
 
-class GeneratorOutputBase : public GIOBase {
+class GeneratorOutputBase : public GeneratorPort {
  public:
   ~GeneratorOutputBase() override = default;
   virtual std::vector<Func> funcs() const = 0;

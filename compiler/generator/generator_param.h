@@ -16,8 +16,8 @@
 #include <type_traits>
 #include <utility>
 
-#include "frontend/autoscheduler.h"
-#include "frontend/func.h"
+#include "frontend/language/func.h"
+#include "frontend/schedule/autoscheduler.h"
 #include "ir/print.h"
 
 namespace retrograde {

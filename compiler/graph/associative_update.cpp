@@ -53,7 +53,7 @@ AssociativityProof prove_associative(const FuncContents& f, const Definition& up
           const Call* call = e.as<Call>();
           if (!call || call->call_type != CallType::Func || call->symbol.raw() != &f)
             return map_children(e, recurse);
-          return variable(xs[call->value_index], call->type);
+          return variable(xs[call->component], call->type);
         }));
   }
   return prove_associative(values, xs);

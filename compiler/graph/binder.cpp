@@ -58,7 +58,7 @@ Expr Binder::bound(const Call& call, const Expr& e) const {
     if (found == names_.funcs.end()) unknown("Func", call.name);
     const FuncPtr& callee = found->second;
     const SymbolRef symbol = owns_me(*callee) ? SymbolRef::weak(callee) : SymbolRef(callee);
-    return call_func(call.name, call.type, call.args, call.value_index, symbol);
+    return call_func(call.name, call.type, call.args, call.component, symbol);
   }
   if (call.call_type != CallType::Image) return e;
   const auto found = names_.parameters.find(call.name);

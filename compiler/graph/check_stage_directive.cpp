@@ -8,7 +8,7 @@
 #include "graph/associative_update.h"
 #include "graph/define.h"
 #include "graph/give_directive.h"
-#include "graph/race.h"
+#include "graph/race_checks.h"
 #include "ir/build.h"
 #include "ir/equal.h"
 #include "ir/literal.h"
@@ -18,7 +18,7 @@ namespace retrograde::ir {
 
 namespace {
 
-std::string loops_of(const StageSchedule& schedule) {
+std::string loops_of(const StageLoops& schedule) {
   std::string out;
   for (auto dim = schedule.dims.rbegin(); dim != schedule.dims.rend(); ++dim) {
     out += (out.empty() ? "" : ", ") + quoted(dim->var);
@@ -27,7 +27,7 @@ std::string loops_of(const StageSchedule& schedule) {
 }
 
 // What became of a variable that is no loop any more; empty when it never was one.
-std::string fate_of(const StageSchedule& schedule, const std::string& var) {
+std::string fate_of(const StageLoops& schedule, const std::string& var) {
   for (const Split& split : schedule.splits) {
     switch (split.kind) {
       case Split::Kind::Split:
@@ -47,7 +47,7 @@ std::string fate_of(const StageSchedule& schedule, const std::string& var) {
 
 // The reduction variables that a loop was made of.
 std::unordered_set<std::string> reduction_roots(const Definition& definition,
-                                                const StageSchedule& schedule,
+                                                const StageLoops& schedule,
                                                 const std::string& loop) {
   std::unordered_set<std::string> names{loop};
   const auto& splits = schedule.splits;
@@ -101,7 +101,7 @@ void check_tail(TailStrategy tail, bool is_update, bool is_reduction, const std:
 
 // Whether what lies behind the end of a loop belongs to no other iteration. Behind the end of an
 // inner loop lie the points of the next iteration around it.
-bool ends_alone(const StageSchedule& schedule, std::string loop) {
+bool ends_alone(const StageLoops& schedule, std::string loop) {
   for (auto split = schedule.splits.rbegin(); split != schedule.splits.rend(); ++split) {
     if (split->kind == Split::Kind::Fuse) {
       if (split->old_var == loop) loop = split->outer;
@@ -115,7 +115,7 @@ bool ends_alone(const StageSchedule& schedule, std::string loop) {
 }
 
 // Whether the loop is an inner one of constant extent that the factor divides: then it has no tail.
-bool divides_inner(const StageSchedule& schedule, const std::string& loop, const Expr& factor) {
+bool divides_inner(const StageLoops& schedule, const std::string& loop, const Expr& factor) {
   const auto small = as_const_int(factor);
   for (auto split = schedule.splits.rbegin(); split != schedule.splits.rend(); ++split) {
     if (split->kind == Split::Kind::Rename || split->inner != loop) continue;
@@ -126,7 +126,7 @@ bool divides_inner(const StageSchedule& schedule, const std::string& loop, const
   return false;
 }
 
-void check_round_up(const StageSchedule& schedule, const std::string& loop, const Expr& factor,
+void check_round_up(const StageLoops& schedule, const std::string& loop, const Expr& factor,
                     const std::string& asked) {
   if (ends_alone(schedule, loop) || divides_inner(schedule, loop, factor)) return;
   user_error(asked, "an update definition does not run a point twice",
@@ -144,7 +144,7 @@ TailStrategy without_blending(TailStrategy tail) {
 
 // The variable that makes a loop's iterations depend on each other; empty when none does.
 std::string dependent_root(const FuncContents& f, const Definition& definition,
-                           const StageSchedule& schedule, const std::string& loop) {
+                           const StageLoops& schedule, const std::string& loop) {
   for (const std::string& root : reduction_roots(definition, schedule, loop)) {
     if (!can_prove_race_free(f, definition, root)) return root;
   }
@@ -154,7 +154,7 @@ std::string dependent_root(const FuncContents& f, const Definition& definition,
 // Reduction loops keep their order, unless it does not matter: the update is proven to commute. A
 // loop whose iterations touch different elements may go anywhere.
 void check_reduction_order(const FuncContents& f, const Definition& definition,
-                           const StageSchedule& now, const std::vector<Dim>& dims,
+                           const StageLoops& now, const std::vector<Dim>& dims,
                            const std::string& asked) {
   const auto dependent_loops = [&](const std::vector<Dim>& all) {
     std::vector<std::string> order;
@@ -213,7 +213,7 @@ std::string list_of(const std::vector<NamedLoop>& names) {
 // and commutative, atomic(true), or allow_race_conditions().
 void check_race_free(const SchedulePlace& at, const std::string& loop, const std::string& asked) {
   const Definition& stage = at.definition();
-  const StageSchedule& now = at.schedule();
+  const StageLoops& now = at.schedule();
   if (now.allow_races) return;
   for (const std::string& root : reduction_roots(stage, now, loop)) {
     if (can_prove_race_free(*at.f, stage, root)) continue;
@@ -241,7 +241,7 @@ void check_race_free(const SchedulePlace& at, const std::string& loop, const std
   }
 }
 
-void check_not_closed(const StageSchedule& schedule, const std::string& asked) {
+void check_not_closed(const StageLoops& schedule, const std::string& asked) {
   if (schedule.specializations.empty() || schedule.specializations.back().failure.empty()) return;
   user_error(asked, "specialize_fail is the last of a stage's specializations",
              "specialize_fail was called already", "Specialize before specialize_fail");
@@ -306,7 +306,7 @@ void check(ReorderLoops& reorder, const SchedulePlace& at) {
       user_error(asked, "each loop is named once", quoted(loop) + " is named twice",
                  "Drop one of them");
   }
-  StageSchedule after;
+  StageLoops after;
   after.dims = at.schedule().dims;
   apply_directive(reorder, after);
   check_reduction_order(*at.f, at.definition(), at.schedule(), after.dims, asked);
@@ -381,7 +381,7 @@ void check(Specialize& specialize, const SchedulePlace& at) {
                "Compare it with something");
   }
   check_over_parameters(condition, "the condition", asked);
-  const StageSchedule& now = at.schedule();
+  const StageLoops& now = at.schedule();
   if (specialization_for(now, condition) >= 0) return;
   check_not_closed(now, asked);
   if (now.fuse_level.kind != LoopLevel::Kind::At) return;
@@ -404,13 +404,13 @@ void check(SpecializeFail& fail, const SchedulePlace& at) {
 
 std::string SchedulePlace::name() const { return quoted(stage_name(*f, stage)); }
 
-const StageSchedule& SchedulePlace::schedule() const {
-  const StageSchedule* result = &definition().schedule;
+const StageLoops& SchedulePlace::schedule() const {
+  const StageLoops* result = &definition().schedule;
   for (const int step : special) result = &result->specializations[static_cast<size_t>(step)];
   return *result;
 }
 
-int specialization_for(const StageSchedule& schedule, const Expr& condition) {
+int specialization_for(const StageLoops& schedule, const Expr& condition) {
   for (size_t i = 0; i < schedule.specializations.size(); ++i) {
     const Expr& earlier = schedule.specializations[i].condition;
     if (earlier.defined() && equal(earlier, condition)) return static_cast<int>(i);
@@ -419,7 +419,7 @@ int specialization_for(const StageSchedule& schedule, const Expr& condition) {
 }
 
 size_t loop_index(const SchedulePlace& place, const std::string& loop, const std::string& asked) {
-  const StageSchedule& now = place.schedule();
+  const StageLoops& now = place.schedule();
   for (size_t i = 0; i < now.dims.size(); i++) {
     if (now.dims[i].var == loop) return i;
   }
@@ -431,7 +431,7 @@ size_t loop_index(const SchedulePlace& place, const std::string& loop, const std
 void check_new_loop(const SchedulePlace& place, const std::string& name,
                     const std::string& replaced, const std::string& asked) {
   if (name == replaced) return;
-  const StageSchedule& now = place.schedule();
+  const StageLoops& now = place.schedule();
   const bool is_loop = std::any_of(now.dims.begin(), now.dims.end(),
                                    [&](const Dim& dim) { return dim.var == name; });
   if (!is_loop) return;

@@ -25,7 +25,7 @@ class Copier : public Rewriter {
     if (!call || call->call_type != CallType::Func) return mapped;
     const FuncPtr& callee = copies_.of.at(static_cast<const FuncContents*>(call->symbol.raw()));
     const SymbolRef symbol = call->symbol.is_weak() ? SymbolRef::weak(callee) : SymbolRef(callee);
-    return call_func(call->name, call->type, call->args, call->value_index, symbol);
+    return call_func(call->name, call->type, call->args, call->component, symbol);
   }
 
  private:

@@ -396,7 +396,7 @@ Expr redirect_calls(const Expr& e, const FuncPtr& from, const FuncPtr& to, bool 
     std::vector<Expr> args;
     for (const Expr& arg : call->args) args.push_back(recurse(arg));
     SymbolRef symbol = weak ? SymbolRef::weak(to) : SymbolRef(to);
-    return call_func(to->name, call->type, std::move(args), call->value_index, std::move(symbol));
+    return call_func(to->name, call->type, std::move(args), call->component, std::move(symbol));
   });
 }
 

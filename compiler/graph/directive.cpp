@@ -10,7 +10,7 @@ namespace retrograde::ir {
 
 namespace {
 
-size_t place_of(const StageSchedule& schedule, const std::string& loop) {
+size_t place_of(const StageLoops& schedule, const std::string& loop) {
   for (size_t i = 0; i < schedule.dims.size(); ++i) {
     if (schedule.dims[i].var == loop) return i;
   }
@@ -20,7 +20,7 @@ size_t place_of(const StageSchedule& schedule, const std::string& loop) {
 
 // ---- loops ----
 
-void give(const SplitLoop& split, StageSchedule& schedule) {
+void give(const SplitLoop& split, StageLoops& schedule) {
   const size_t at = place_of(schedule, split.old);
   Dim outer = schedule.dims[at], inner = outer;
   outer.var = split.outer;
@@ -33,19 +33,19 @@ void give(const SplitLoop& split, StageSchedule& schedule) {
 }
 
 // The outer loop comes to stand directly around the inner one.
-void give(const FuseLoops& fuse, StageSchedule& schedule) {
+void give(const FuseLoops& fuse, StageLoops& schedule) {
   const Dim inner = schedule.dims[place_of(schedule, fuse.inner)];
   const size_t outer_at = place_of(schedule, fuse.outer);
   const Dim outer = schedule.dims[outer_at];
   schedule.dims.erase(schedule.dims.begin() + static_cast<std::ptrdiff_t>(outer_at));
   const bool reduces = inner.is_reduction || outer.is_reduction;
-  schedule.dims[place_of(schedule, fuse.inner)] = {fuse.fused, outer.for_type, reduces,
+  schedule.dims[place_of(schedule, fuse.inner)] = {fuse.fused, outer.runs, reduces,
                                                    outer.partition};
   schedule.splits.push_back(
       {Split::Kind::Fuse, fuse.fused, fuse.outer, fuse.inner, {}, TailStrategy::Auto, reduces});
 }
 
-void give(const RenameLoop& rename, StageSchedule& schedule) {
+void give(const RenameLoop& rename, StageLoops& schedule) {
   if (rename.old == rename.renamed) return;
   Dim& loop = schedule.dims[place_of(schedule, rename.old)];
   schedule.splits.push_back({Split::Kind::Rename,
@@ -58,7 +58,7 @@ void give(const RenameLoop& rename, StageSchedule& schedule) {
   loop.var = rename.renamed;
 }
 
-void give(const ReorderLoops& reorder, StageSchedule& schedule) {
+void give(const ReorderLoops& reorder, StageLoops& schedule) {
   std::vector<size_t> places;
   for (const std::string& loop : reorder.loops) places.push_back(place_of(schedule, loop));
   std::vector<size_t> sorted = places;
@@ -67,40 +67,40 @@ void give(const ReorderLoops& reorder, StageSchedule& schedule) {
   for (size_t i = 0; i < sorted.size(); ++i) schedule.dims[sorted[i]] = before[places[i]];
 }
 
-void give(const RunLoop& run, StageSchedule& schedule) {
-  schedule.dims[place_of(schedule, run.loop)].for_type = run.kind;
+void give(const RunLoop& run, StageLoops& schedule) {
+  schedule.dims[place_of(schedule, run.loop)].runs = run.kind;
 }
-void give(const PartitionLoop& partition, StageSchedule& schedule) {
+void give(const PartitionLoop& partition, StageLoops& schedule) {
   schedule.dims[place_of(schedule, partition.loop)].partition = partition.how;
 }
 
 // ---- the stage as a whole ----
 
-void give(const MakeAtomic& atomic, StageSchedule& schedule) {
+void give(const MakeAtomic& atomic, StageLoops& schedule) {
   schedule.atomic = true;
   schedule.override_associativity = atomic.vouched;
 }
-void give(const AllowRaces&, StageSchedule& schedule) { schedule.allow_races = true; }
-void give(const Unscheduled&, StageSchedule&) {}
-void give(const PrefetchData& prefetch, StageSchedule& schedule) {
+void give(const AllowRaces&, StageLoops& schedule) { schedule.allow_races = true; }
+void give(const Unscheduled&, StageLoops&) {}
+void give(const PrefetchData& prefetch, StageLoops& schedule) {
   schedule.prefetches.push_back({prefetch.source, prefetch.symbol, prefetch.at, prefetch.from,
                                  prefetch.offset, prefetch.strategy});
 }
-void give(const ComputeWith& with, StageSchedule& schedule) {
+void give(const ComputeWith& with, StageLoops& schedule) {
   schedule.fuse_level = with.level;
   schedule.fuse_alignment = {with.align.begin(), with.align.end()};
 }
 
 // It starts as a copy of the schedule so far.
-void give(const Specialize& specialize, StageSchedule& schedule) {
-  StageSchedule copy = schedule;
+void give(const Specialize& specialize, StageLoops& schedule) {
+  StageLoops copy = schedule;
   copy.specializations.clear();
   copy.condition = specialize.condition;
   copy.failure.clear();
   schedule.specializations.push_back(std::move(copy));
 }
-void give(const SpecializeFail& fail, StageSchedule& schedule) {
-  StageSchedule failing;
+void give(const SpecializeFail& fail, StageLoops& schedule) {
+  StageLoops failing;
   failing.dims = schedule.dims;
   failing.splits = schedule.splits;
   failing.failure = fail.message.as<StringImm>()->value;
@@ -110,17 +110,19 @@ void give(const SpecializeFail& fail, StageSchedule& schedule) {
 // ---- the Func ----
 
 // Storing follows computing, unless it was asked for elsewhere.
-void give(const ComputeAt& compute, FuncSchedule& schedule) {
+void give(const ComputeAt& compute, FuncPlacement& schedule) {
   const bool follows =
       !schedule.store_from && (schedule.store_level.kind == LoopLevel::Kind::Inlined ||
                                schedule.store_level == schedule.compute_level);
   schedule.compute_level = compute.level;
   if (follows) schedule.store_level = compute.level;
 }
-void give(const StoreAt& store, FuncSchedule& schedule) { schedule.store_level = store.level; }
-void give(const HoistStorage& hoist, FuncSchedule& schedule) { schedule.hoist_level = hoist.level; }
-void give(const StoreIn& store, FuncSchedule& schedule) { schedule.memory = store.memory; }
-void give(const ReorderStorage& reorder, FuncSchedule& schedule) {
+void give(const StoreAt& store, FuncPlacement& schedule) { schedule.store_level = store.level; }
+void give(const HoistStorage& hoist, FuncPlacement& schedule) {
+  schedule.hoist_level = hoist.level;
+}
+void give(const StoreIn& store, FuncPlacement& schedule) { schedule.memory = store.memory; }
+void give(const ReorderStorage& reorder, FuncPlacement& schedule) {
   schedule.storage_dims = reorder.dimensions;
 }
 
@@ -134,22 +136,22 @@ Entry& entry_of(std::vector<Entry>& entries, const std::string& dimension) {
   return entries.back();
 }
 
-void give(const AlignStorage& align, FuncSchedule& schedule) {
+void give(const AlignStorage& align, FuncPlacement& schedule) {
   entry_of(schedule.storage_rules, align.dimension).alignment = align.alignment;
 }
-void give(const BoundStorage& bound, FuncSchedule& schedule) {
+void give(const BoundStorage& bound, FuncPlacement& schedule) {
   entry_of(schedule.storage_rules, bound.dimension).bound = bound.extent;
 }
-void give(const FoldStorage& fold, FuncSchedule& schedule) {
+void give(const FoldStorage& fold, FuncPlacement& schedule) {
   StorageRule& rule = entry_of(schedule.storage_rules, fold.dimension);
   rule.fold = fold.extent;
   rule.fold_forward = fold.forward;
 }
-void give(const Memoize& memoize, FuncSchedule& schedule) {
+void give(const Memoize& memoize, FuncPlacement& schedule) {
   schedule.memoized = true;
   if (memoize.key.defined()) schedule.eviction_key = memoize.key;
 }
-void give(const Async&, FuncSchedule& schedule) { schedule.async = true; }
+void give(const Async&, FuncPlacement& schedule) { schedule.async = true; }
 
 // What is known of sizes, and what is reported, is no schedule: it leaves a Func untouched.
 void give(const BoundDimension& bound, FuncContents& f) {
@@ -202,9 +204,9 @@ std::vector<NamedLoop> loop_names(const std::vector<Dim>& loops) {
   return names;
 }
 
-void add_loops(const StageSchedule& schedule, const std::vector<Dim>& first,
+void add_loops(const StageLoops& schedule, const std::vector<Dim>& first,
                std::vector<Directive>& log) {
-  StageSchedule built;
+  StageLoops built;
   built.dims = first;
   for (const Split& split : schedule.splits) {
     log.push_back(directive_of(split));
@@ -216,7 +218,7 @@ void add_loops(const StageSchedule& schedule, const std::vector<Dim>& first,
   }
   for (size_t i = 0; i < schedule.dims.size(); ++i) {
     const Dim &wanted = schedule.dims[i], &now = built.dims[i];
-    if (wanted.for_type != now.for_type) log.push_back(RunLoop{wanted.var, wanted.for_type});
+    if (wanted.runs != now.runs) log.push_back(RunLoop{wanted.var, wanted.runs});
     if (wanted.partition != now.partition)
       log.push_back(PartitionLoop{wanted.var, wanted.partition});
   }
@@ -239,9 +241,7 @@ std::vector<Dim> first_loops(const FuncContents& f, const Definition& definition
 
 bool is_of_stage(const Directive& directive) {
   return std::visit(
-      []<typename D>(const D&) {
-        return GivenTo<D, StageSchedule> || std::is_same_v<D, FactorOut>;
-      },
+      []<typename D>(const D&) { return GivenTo<D, StageLoops> || std::is_same_v<D, FactorOut>; },
       directive);
 }
 
@@ -264,12 +264,12 @@ std::string made_by(const Directive& directive) {
       directive);
 }
 
-void apply_directive(const Directive& directive, StageSchedule& schedule) {
-  schedule.touched = true;
+void apply_directive(const Directive& directive, StageLoops& schedule) {
+  schedule.is_given = true;
   std::visit(
       [&]<typename D>(const D& d) {
-        if constexpr (GivenTo<D, StageSchedule>) return give(d, schedule);
-        RETROGRADE_ASSERT((GivenTo<D, StageSchedule>), D::name, " is given to no stage");
+        if constexpr (GivenTo<D, StageLoops>) return give(d, schedule);
+        RETROGRADE_ASSERT((GivenTo<D, StageLoops>), D::name, " is given to no stage");
       },
       directive);
 }
@@ -277,8 +277,8 @@ void apply_directive(const Directive& directive, StageSchedule& schedule) {
 void apply_directive(const Directive& directive, FuncContents& f) {
   std::visit(
       [&]<typename D>(const D& d) {
-        if constexpr (GivenTo<D, FuncSchedule>) {
-          f.schedule.touched = true;
+        if constexpr (GivenTo<D, FuncPlacement>) {
+          f.schedule.is_given = true;
           give(d, f.schedule);
         } else if constexpr (GivenTo<D, FuncContents>) {
           give(d, f);
@@ -289,7 +289,7 @@ void apply_directive(const Directive& directive, FuncContents& f) {
       directive);
 }
 
-std::vector<Directive> directives_of(const StageSchedule& schedule, const std::vector<Dim>& first) {
+std::vector<Directive> directives_of(const StageLoops& schedule, const std::vector<Dim>& first) {
   std::vector<Directive> log;
   add_loops(schedule, first, log);
   if (schedule.atomic) log.push_back(MakeAtomic{schedule.override_associativity});
@@ -300,15 +300,15 @@ std::vector<Directive> directives_of(const StageSchedule& schedule, const std::v
     log.push_back(ComputeWith{{schedule.fuse_level},
                               {schedule.fuse_alignment.begin(), schedule.fuse_alignment.end()}});
   }
-  if (log.empty() && schedule.touched) log.push_back(Unscheduled{});
+  if (log.empty() && schedule.is_given) log.push_back(Unscheduled{});
   return log;
 }
 
 std::vector<Directive> directives_of(const FuncContents& f) {
-  const FuncSchedule& schedule = f.schedule;
+  const FuncPlacement& schedule = f.schedule;
   std::vector<Directive> log;
   const bool is_placed = schedule.compute_level.kind != LoopLevel::Kind::Inlined;
-  if (schedule.touched || is_placed) log.push_back(ComputeAt{{schedule.compute_level}});
+  if (schedule.is_given || is_placed) log.push_back(ComputeAt{{schedule.compute_level}});
   if (!(schedule.store_level == schedule.compute_level))
     log.push_back(StoreAt{{schedule.store_level}});
   if (schedule.hoist_level.kind != LoopLevel::Kind::Inlined)

@@ -250,11 +250,11 @@ std::vector<Dim> first_loops(const FuncContents& f, const Definition& definition
 
 // What the directive makes of a schedule. InternalError when a loop that it names is not there, and
 // for those that make Funcs.
-void apply_directive(const Directive& directive, StageSchedule& schedule);
+void apply_directive(const Directive& directive, StageLoops& schedule);
 void apply_directive(const Directive& directive, FuncContents& f);
 
 // Directives that make this schedule out of the first loops, specializations aside.
-std::vector<Directive> directives_of(const StageSchedule& schedule, const std::vector<Dim>& first);
+std::vector<Directive> directives_of(const StageLoops& schedule, const std::vector<Dim>& first);
 // Directives that make the schedule of the Func, stages aside, out of none.
 std::vector<Directive> directives_of(const FuncContents& f);
 

@@ -230,10 +230,10 @@ class ParameterCollector {
   std::unordered_set<const Symbol*> seen_, excluded_;
   std::unordered_set<const ExprNode*> seen_exprs_;
 
-  void add_stage(const StageSchedule& schedule) {
+  void add_stage(const StageLoops& schedule) {
     for (const Split& split : schedule.splits) add_expr(split.factor);
     for (const PrefetchDirective& prefetch : schedule.prefetches) add_expr(prefetch.offset);
-    for (const StageSchedule& special : schedule.specializations) {
+    for (const StageLoops& special : schedule.specializations) {
       add_expr(special.condition);
       add_stage(special);
     }

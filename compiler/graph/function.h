@@ -38,7 +38,7 @@ struct Definition {
       values;      // one per Tuple element; all loads of one point happen before its stores
   Expr predicate;  // undefined: always
   std::vector<ReductionVariable> rvars;
-  StageSchedule schedule;
+  StageLoops schedule;
 };
 
 // Func::define_extern: computed by a C function on buffers.
@@ -72,7 +72,7 @@ struct FuncContents : Symbol, std::enable_shared_from_this<FuncContents> {
   std::vector<Type> types;         // of the values
   std::optional<Definition> pure;  // empty until defined
   std::vector<Definition> updates;
-  FuncSchedule schedule;
+  FuncPlacement schedule;
   std::vector<LoggedDirective> log;  // all that were given to it and its stages, in their order
   std::vector<std::shared_ptr<ParameterContents>>
       outputs;                            // constraints on the buffers when it is an output

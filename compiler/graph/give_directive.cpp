@@ -10,30 +10,30 @@ namespace retrograde::ir {
 namespace {
 
 // The schedule that a directive changes; every one on the way to it counts as scheduled.
-StageSchedule& touch(const SchedulePlace& place) {
-  StageSchedule* result = &place.f->stage(place.stage).schedule;
-  result->touched = true;
+StageLoops& touch(const SchedulePlace& place) {
+  StageLoops* result = &place.f->stage(place.stage).schedule;
+  result->is_given = true;
   for (const int step : place.special) {
     result = &result->specializations[static_cast<size_t>(step)];
-    result->touched = true;
+    result->is_given = true;
   }
   return *result;
 }
 
 // ---- levels, which may be set after they were given ----
 
-using LevelSource = std::shared_ptr<LoopLevelContents> FuncSchedule::*;
+using LevelSource = std::shared_ptr<LoopLevelContents> FuncPlacement::*;
 
 // Where the schedule of the Func keeps the object behind a level.
-LevelSource source_of(const ComputeAt&) { return &FuncSchedule::compute_from; }
-LevelSource source_of(const StoreAt&) { return &FuncSchedule::store_from; }
-LevelSource source_of(const HoistStorage&) { return &FuncSchedule::hoist_from; }
+LevelSource source_of(const ComputeAt&) { return &FuncPlacement::compute_from; }
+LevelSource source_of(const StoreAt&) { return &FuncPlacement::store_from; }
+LevelSource source_of(const HoistStorage&) { return &FuncPlacement::hoist_from; }
 
 // What the object says later, the schedule says, unless it was given another level since.
 template <typename D>
 void give_level(D at, const FuncPtr& f) {
   const LevelSource source = source_of(at);
-  f->schedule.touched = true;
+  f->schedule.is_given = true;
   f->schedule.*source = at.from;
   if (at.from->defined) apply_directive(at, *f);
   const LoopLevelContents* raw = at.from.get();

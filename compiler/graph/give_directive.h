@@ -19,7 +19,7 @@ struct SchedulePlace {
   std::vector<int> special = {};  // of the stage's specializations: which, and of that one which
 
   const Definition& definition() const { return f->stage(stage); }
-  const StageSchedule& schedule() const;
+  const StageLoops& schedule() const;
   std::string name() const;  // in quotes: "blur.update(0)"
 };
 
@@ -31,7 +31,7 @@ void give_directive(const SchedulePlace& place, Directive directive);
 void log_directive(const SchedulePlace& place, Directive directive);
 
 // The specialization of this schedule for the condition; -1: there is none.
-int specialization_for(const StageSchedule& schedule, const Expr& condition);
+int specialization_for(const StageLoops& schedule, const Expr& condition);
 // Where the loop stands, innermost first; CompileError when it is none.
 size_t loop_index(const SchedulePlace& place, const std::string& loop, const std::string& asked);
 // CompileError when another loop than `replaced` is called so.

@@ -311,12 +311,12 @@ class GraphReader {
   }
 
   bool reads_stage_schedule(const Line& line) {
-    StageSchedule& now = stage_schedule();
+    StageLoops& now = stage_schedule();
     if (line.word == "specialize") {
-      StageSchedule special;
+      StageLoops special;
       special.dims = first_loops(*f_, *definition_);
       special.condition = expr(line);
-      special.touched = now.touched = true;
+      special.is_given = now.is_given = true;
       now.specializations.push_back(std::move(special));
       specials_.push_back(now.specializations.size() - 1);
     } else if (line.word == "end" && !specials_.empty()) {
@@ -329,8 +329,8 @@ class GraphReader {
     return true;
   }
   // The one that directives go to: of the stage, or of a specialization that is open.
-  StageSchedule& stage_schedule() {
-    StageSchedule* now = &definition_->schedule;
+  StageLoops& stage_schedule() {
+    StageLoops* now = &definition_->schedule;
     if (now->dims.empty()) now->dims = first_loops(*f_, *definition_);
     for (const size_t special : specials_) now = &now->specializations[special];
     return *now;

@@ -149,9 +149,9 @@ class GraphPrinter {
     print(definition.schedule, first_loops(f, definition));
   }
 
-  void print(const StageSchedule& schedule, const std::vector<Dim>& first) {
+  void print(const StageLoops& schedule, const std::vector<Dim>& first) {
     for (const Directive& directive : directives_of(schedule, first)) line(to_text(directive));
-    for (const StageSchedule& special : schedule.specializations) {
+    for (const StageLoops& special : schedule.specializations) {
       if (!special.failure.empty()) {
         line(to_text(SpecializeFail{special.failure}));
         continue;

@@ -10,7 +10,7 @@ namespace {
 
 class LeafFinder {
  public:
-  LeafFinder(const Definition& update, const StageSchedule& schedule, std::string asked)
+  LeafFinder(const Definition& update, const StageLoops& schedule, std::string asked)
       : asked_(std::move(asked)) {
     for (const ReductionVariable& rvar : update.rvars) {
       leaves_.all.push_back({rvar.var, unique_name("leaf"), rvar.min, rvar.extent});
@@ -91,8 +91,7 @@ class LeafFinder {
 
 }  // namespace
 
-Leaves leaves_of(const Definition& update, const StageSchedule& schedule,
-                 const std::string& asked) {
+Leaves leaves_of(const Definition& update, const StageLoops& schedule, const std::string& asked) {
   return LeafFinder(update, schedule, asked).take();
 }
 

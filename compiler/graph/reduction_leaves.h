@@ -31,6 +31,6 @@ struct Leaves {
 };
 
 // CompileError, for what `asked` wants, when a reduction variable is fused with a pure one.
-Leaves leaves_of(const Definition& update, const StageSchedule& schedule, const std::string& asked);
+Leaves leaves_of(const Definition& update, const StageLoops& schedule, const std::string& asked);
 
 }  // namespace retrograde::ir

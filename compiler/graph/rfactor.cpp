@@ -137,8 +137,8 @@ class Factoring {
   }
 
   // What the original's schedule says that does not depend on which loops there are.
-  StageSchedule schedule_with(const std::vector<Split>& renames) const {
-    StageSchedule schedule = update_.schedule;
+  StageLoops schedule_with(const std::vector<Split>& renames) const {
+    StageLoops schedule = update_.schedule;
     schedule.splits = leaves_.others;
     schedule.splits.insert(schedule.splits.end(), renames.begin(), renames.end());
     schedule.dims.clear();
@@ -146,7 +146,7 @@ class Factoring {
     return schedule;
   }
 
-  void take_prefetches(StageSchedule& schedule) const {
+  void take_prefetches(StageLoops& schedule) const {
     const auto has = [&](const std::string& loop) {
       return std::any_of(schedule.dims.begin(), schedule.dims.end(),
                          [&](const Dim& dim) { return dim.var == loop; });
@@ -207,7 +207,7 @@ class Factoring {
       const Call* call = e.as<Call>();
       if (!call || call->call_type != CallType::Func || call->symbol.raw() != f_.get())
         return map_children(e, recurse);
-      return call_func(intermediate_->name, call->type, args, call->value_index,
+      return call_func(intermediate_->name, call->type, args, call->component,
                        SymbolRef::weak(intermediate_));
     });
   }
@@ -278,7 +278,7 @@ class Factoring {
 };
 
 // Whether the loops are the outermost among the reduction loops.
-bool are_outermost(const StageSchedule& schedule, const Preserved& preserved) {
+bool are_outermost(const StageLoops& schedule, const Preserved& preserved) {
   std::vector<std::string> order;  // innermost first
   for (const Dim& dim : schedule.dims) {
     if (dim.is_reduction) order.push_back(dim.var);
@@ -312,7 +312,7 @@ FuncPtr factor_out(const SchedulePlace& place, const Preserved& preserved,
                place.name() + " is a first definition",
                "Call it on update(): f.update().rfactor(r, u)");
   }
-  const StageSchedule& schedule = place.schedule();
+  const StageLoops& schedule = place.schedule();
   if (!place.special.empty() || !schedule.specializations.empty()) {
     user_error(asked, "a specialized stage keeps its definition",
                place.name() + " has specializations", "Call rfactor before specialize");

@@ -50,7 +50,7 @@ struct Split {
 
 struct Dim {
   std::string var;
-  ForType for_type = ForType::Serial;
+  ForType runs = ForType::Serial;
   bool is_reduction =
       false;  // derives from a reduction variable: order matters unless proven otherwise
   Partition partition = Partition::Auto;
@@ -85,10 +85,10 @@ struct PrefetchDirective {
   PrefetchBoundStrategy strategy = PrefetchBoundStrategy::GuardWithIf;
 };
 
-struct StageSchedule {
+struct StageLoops {
   std::vector<Split> splits;  // in the order given
   std::vector<Dim> dims;      // loops innermost first
-  bool touched = false;       // a directive was given for this stage
+  bool is_given = false;      // a directive was given for this stage
   bool atomic = false;        // updates of one element may come from several iterations at once
   bool override_associativity = false;  // atomic(true): the user vouches for it
   bool allow_races = false;
@@ -98,7 +98,7 @@ struct StageSchedule {
   std::map<std::string, LoopAlignStrategy> fuse_alignment;  // by loop
   // Func::specialize: the first whose condition holds replaces this schedule; tried in order. A
   // specialization starts as a copy of the schedule at that time and may be specialized itself.
-  std::vector<StageSchedule> specializations;
+  std::vector<StageLoops> specializations;
   Expr condition;       // of a specialization: over parameters only; undefined in specialize_fail
   std::string failure;  // specialize_fail: what the call reports when it gets here; empty otherwise
 };
@@ -122,7 +122,7 @@ struct StorageRule {
   bool fold_forward = true;  // the coordinate grows from one iteration to the next
 };
 
-struct FuncSchedule {
+struct FuncPlacement {
   LoopLevel compute_level, store_level;
   LoopLevel hoist_level;  // hoist_storage: where memory is allocated; Inlined: at the store level
   // The objects that said so; null where the level can't change any more.
@@ -134,7 +134,7 @@ struct FuncSchedule {
   bool memoized = false;
   Expr eviction_key;  // memoize: undefined when none
   bool async = false;
-  bool touched = false;  // compute_*/store_* was called
+  bool is_given = false;  // compute_*/store_* was called
 };
 
 // Events that generated code reports.

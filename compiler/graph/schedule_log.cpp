@@ -38,12 +38,12 @@ auto meant(const Range& all, const std::string& name, const NameOf& name_of)
   return count == 1 ? found : nullptr;
 }
 
-void add_loops(const StageSchedule& schedule, std::vector<std::string>& loops) {
+void add_loops(const StageLoops& schedule, std::vector<std::string>& loops) {
   const auto add = [&](const std::string& loop) {
     if (std::find(loops.begin(), loops.end(), loop) == loops.end()) loops.push_back(loop);
   };
   for (const Dim& dim : schedule.dims) add(dim.var);
-  for (const StageSchedule& special : schedule.specializations) add_loops(special, loops);
+  for (const StageLoops& special : schedule.specializations) add_loops(special, loops);
 }
 
 class Replay {
@@ -87,7 +87,7 @@ class Replay {
     const bool fits = is_of_stage(entry.directive)
                           ? entry.stage >= 0 && entry.stage < place.f->stage_count()
                           : entry.stage < 0;
-    const StageSchedule* now =
+    const StageLoops* now =
         fits && entry.stage >= 0 ? &place.f->stage(entry.stage).schedule : nullptr;
     for (const int step : entry.special) {
       const bool is_there =

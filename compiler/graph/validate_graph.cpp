@@ -112,25 +112,26 @@ class GraphValidator {
     require(callee.args.size() == call.args.size(), f, "a call has a coordinate for each dimension",
             e);
     const bool has_value =
-        call.value_index >= 0 && call.value_index < static_cast<int>(callee.types.size());
-    require(has_value && callee.types[static_cast<size_t>(call.value_index)] == call.type, f,
+        call.component >= 0 && call.component < static_cast<int>(callee.types.size());
+    require(has_value && callee.types[static_cast<size_t>(call.component)] == call.type, f,
             "a call has the type of the value that it reads", e);
   }
 
   // A schedule's loops are what its directives make of the first ones.
-  void check(const FuncContents& f, const StageSchedule& schedule,
+  void check(const FuncContents& f, const StageLoops& schedule,
              const std::vector<Dim>& first) const {
-    StageSchedule built;
+    StageLoops built;
     built.dims = first;
-    for (const Directive& directive : directives_of(schedule, first)) apply_directive(directive, built);
+    for (const Directive& directive : directives_of(schedule, first))
+      apply_directive(directive, built);
     const bool same = std::equal(built.dims.begin(), built.dims.end(), schedule.dims.begin(),
                                  schedule.dims.end(), [](const Dim& a, const Dim& b) {
-                                   return a.var == b.var && a.for_type == b.for_type &&
+                                   return a.var == b.var && a.runs == b.runs &&
                                           a.is_reduction == b.is_reduction &&
                                           a.partition == b.partition;
                                  });
     require(same, f, "the loops of a stage are what its directives make of its variables");
-    for (const StageSchedule& special : schedule.specializations) {
+    for (const StageLoops& special : schedule.specializations) {
       if (special.failure.empty()) check(f, special, first);
     }
   }

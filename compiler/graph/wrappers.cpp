@@ -103,7 +103,7 @@ class Wrapping {
       if (!target) return mapped;
       const FuncPtr callee = read_by(target, f);
       const bool self = target == &f;
-      return call_func(callee->name, call->type, call->args, call->value_index,
+      return call_func(callee->name, call->type, call->args, call->component,
                        self ? SymbolRef::weak(callee) : SymbolRef(callee));
     });
   }
@@ -153,7 +153,7 @@ std::vector<FuncPtr> image_readers(const FuncContents& f) {
 }
 
 bool is_scheduled(const FuncContents& reader) {
-  return reader.schedule.touched || !reader.wrappers.empty() || reader.pure->schedule.touched;
+  return reader.schedule.is_given || !reader.wrappers.empty() || reader.pure->schedule.is_given;
 }
 
 }  // namespace

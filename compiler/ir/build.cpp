@@ -300,22 +300,22 @@ Expr reinterpret_as(Type type, Expr value) {
   return new Reinterpret(type, std::move(value));
 }
 
-Expr make_select(Expr condition, Expr true_value, Expr false_value) {
-  match_lanes(true_value, false_value);
+Expr make_select(Expr condition, Expr when_true, Expr when_false) {
+  match_lanes(when_true, when_false);
   const int lanes = condition.type().lanes();
-  if (lanes > 1 && true_value.type().is_scalar()) {
-    true_value = make_broadcast(std::move(true_value), lanes);
-    false_value = make_broadcast(std::move(false_value), lanes);
+  if (lanes > 1 && when_true.type().is_scalar()) {
+    when_true = make_broadcast(std::move(when_true), lanes);
+    when_false = make_broadcast(std::move(when_false), lanes);
   }
   RETROGRADE_ASSERT(condition.type().is_bool(), "select on ", condition.type());
-  RETROGRADE_ASSERT(true_value.type() == false_value.type(), "select between ", true_value.type(),
-                    " and ", false_value.type());
-  RETROGRADE_ASSERT(lanes == 1 || lanes == true_value.type().lanes(), "select of ",
-                    true_value.type(), " on ", condition.type());
-  if (is_const_true(condition)) return true_value;
-  if (is_const_false(condition)) return false_value;
-  if (true_value.same_as(false_value)) return true_value;
-  return new Select(std::move(condition), std::move(true_value), std::move(false_value));
+  RETROGRADE_ASSERT(when_true.type() == when_false.type(), "select between ", when_true.type(),
+                    " and ", when_false.type());
+  RETROGRADE_ASSERT(lanes == 1 || lanes == when_true.type().lanes(), "select of ", when_true.type(),
+                    " on ", condition.type());
+  if (is_const_true(condition)) return when_true;
+  if (is_const_false(condition)) return when_false;
+  if (when_true.same_as(when_false)) return when_true;
+  return new Select(std::move(condition), std::move(when_true), std::move(when_false));
 }
 
 Expr make_load(Type type, const std::string& name, Expr index, Expr predicate, SymbolRef symbol) {
@@ -430,9 +430,9 @@ Expr call_extern(const std::string& name, Type type, std::vector<Expr> args) {
   return new Call(type, CallType::Extern, Op::none, name, std::move(args), 0, {});
 }
 
-Expr call_func(const std::string& name, Type type, std::vector<Expr> args, int value_index,
+Expr call_func(const std::string& name, Type type, std::vector<Expr> args, int component,
                SymbolRef symbol) {
-  return new Call(type, CallType::Func, Op::none, name, std::move(args), value_index,
+  return new Call(type, CallType::Func, Op::none, name, std::move(args), component,
                   std::move(symbol));
 }
 
@@ -464,8 +464,8 @@ Stmt make_assert(Expr condition, Expr error) {
   return new Assert(std::move(condition), std::move(error));
 }
 
-Stmt make_producer_consumer(const std::string& name, bool is_producer, Stmt body) {
-  return body.defined() ? Stmt(new ProducerConsumer(name, is_producer, std::move(body))) : Stmt();
+Stmt make_producer_consumer(const std::string& name, bool produces, Stmt body) {
+  return body.defined() ? Stmt(new ProducerConsumer(name, produces, std::move(body))) : Stmt();
 }
 
 Stmt make_for(const std::string& name, Expr min, Expr extent, ForType type, Stmt body,
@@ -515,14 +515,14 @@ Stmt make_block(std::vector<Stmt> stmts) {
   return flat.size() == 1 ? flat[0] : Stmt(new Block(std::move(flat)));
 }
 
-Stmt make_if(Expr condition, Stmt then_case, Stmt else_case) {
-  if (is_const_true(condition)) return then_case;
-  if (is_const_false(condition)) return else_case;
-  if (!then_case.defined()) {
-    return else_case.defined() ? make_if(logical_not(std::move(condition)), std::move(else_case))
-                               : Stmt();
+Stmt make_if(Expr condition, Stmt when_true, Stmt when_false) {
+  if (is_const_true(condition)) return when_true;
+  if (is_const_false(condition)) return when_false;
+  if (!when_true.defined()) {
+    return when_false.defined() ? make_if(logical_not(std::move(condition)), std::move(when_false))
+                                : Stmt();
   }
-  return new IfThenElse(std::move(condition), std::move(then_case), std::move(else_case));
+  return new IfThenElse(std::move(condition), std::move(when_true), std::move(when_false));
 }
 
 Stmt make_evaluate(Expr value) { return new Evaluate(std::move(value)); }

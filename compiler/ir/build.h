@@ -41,7 +41,7 @@ Expr logical_not(Expr a);
 Expr cast_to(Type type,
              Expr value);  // keeps or broadcasts lanes; folds; nothing when already of the type
 Expr reinterpret_as(Type type, Expr value);
-Expr make_select(Expr condition, Expr true_value, Expr false_value);  // arms of one type
+Expr make_select(Expr condition, Expr when_true, Expr when_false);  // arms of one type
 Expr make_load(Type type, const std::string& name, Expr index, Expr predicate = {},
                SymbolRef symbol = {});
 Expr make_ramp(Expr base, Expr stride, int lanes);
@@ -53,7 +53,7 @@ Expr make_vector_reduce(ReduceOp op, Expr value, int result_lanes);
 Expr call_op(Op op, Type type, std::vector<Expr> args);
 Expr call_op(Op op, std::vector<Expr> args);  // with the type of the first
 Expr call_extern(const std::string& name, Type type, std::vector<Expr> args);
-Expr call_func(const std::string& name, Type type, std::vector<Expr> args, int value_index,
+Expr call_func(const std::string& name, Type type, std::vector<Expr> args, int component,
                SymbolRef symbol);
 Expr call_image(const std::string& name, Type type, std::vector<Expr> args, SymbolRef symbol);
 // Requires: every operand must be a defined expression.
@@ -62,7 +62,7 @@ Expr conjunction(const std::vector<Expr>& terms);  // true when empty
 
 Stmt make_let(const std::string& name, Expr value, Stmt body);
 Stmt make_assert(Expr condition, Expr error);
-Stmt make_producer_consumer(const std::string& name, bool is_producer, Stmt body);
+Stmt make_producer_consumer(const std::string& name, bool produces, Stmt body);
 Stmt make_for(const std::string& name, Expr min, Expr extent, ForType type, Stmt body,
               Partition partition = Partition::Auto);
 Stmt make_store(const std::string& name, Expr value, Expr index, Expr predicate = {},
@@ -75,7 +75,7 @@ Stmt make_allocate(const std::string& name, Type type, MemoryType memory, Expr e
 Stmt make_free(const std::string& name);
 Stmt make_block(std::vector<Stmt>
                     stmts);  // flattens, drops undefined; undefined when empty; the one when single
-Stmt make_if(Expr condition, Stmt then_case, Stmt else_case = {});
+Stmt make_if(Expr condition, Stmt when_true, Stmt when_false = {});
 Stmt make_evaluate(Expr value);
 Stmt make_atomic(const std::string& name, Stmt body);
 Stmt make_fork(Stmt first, Stmt rest);
@@ -148,7 +148,7 @@ Expr& operator/=(Expr& a, Expr b);
 // Requires: both operands must be defined; the new type must be a number; integers have 1, 8, 16,
 // 32 or 64 bits, floats 16, 32 or 64.
 Expr cast(Type type, Expr value);
-Expr select(Expr condition, Expr true_value, Expr false_value);  // promotes the arms
+Expr select(Expr condition, Expr when_true, Expr when_false);  // promotes the arms
 // Requires: both operands must be defined; a bound is a value of the type that is clamped.
 Expr clamp(Expr value, Expr low, Expr high);  // low and high take value's type
 

@@ -91,8 +91,8 @@ int Comparer::compare_nodes(const Expr& a, const Expr& b) {
       [&](const Select& n) {
         const Select& m = same_kind(n);
         return first([&] { return compare(n.condition, m.condition); },
-                     [&] { return compare(n.true_value, m.true_value); },
-                     [&] { return compare(n.false_value, m.false_value); });
+                     [&] { return compare(n.when_true, m.when_true); },
+                     [&] { return compare(n.when_false, m.when_false); });
       },
       [&](const Load& n) {
         const Load& m = same_kind(n);
@@ -115,7 +115,7 @@ int Comparer::compare_nodes(const Expr& a, const Expr& b) {
         const Call& m = same_kind(n);
         return first([&] { return order(n.call_type, m.call_type); },
                      [&] { return order(n.op, m.op); }, [&] { return order(n.name, m.name); },
-                     [&] { return order(n.value_index, m.value_index); },
+                     [&] { return order(n.component, m.component); },
                      [&] { return compare_all(n.args, m.args); });
       },
       [&](const Let& n) {
@@ -163,16 +163,15 @@ int Comparer::compare_nodes(const Stmt& a, const Stmt& b) {
       [&](const ProducerConsumer& n) {
         const ProducerConsumer& m = same_kind(n);
         return first([&] { return order(n.name, m.name); },
-                     [&] { return order(n.is_producer, m.is_producer); },
+                     [&] { return order(n.produces, m.produces); },
                      [&] { return compare(n.body, m.body); });
       },
       [&](const For& n) {
         const For& m = same_kind(n);
         return first(
-            [&] { return order(n.name, m.name); }, [&] { return order(n.for_type, m.for_type); },
-            [&] { return order(n.partition, m.partition); },
-            [&] { return compare(n.min, m.min); }, [&] { return compare(n.extent, m.extent); },
-            [&] { return compare(n.body, m.body); });
+            [&] { return order(n.name, m.name); }, [&] { return order(n.runs, m.runs); },
+            [&] { return order(n.partition, m.partition); }, [&] { return compare(n.min, m.min); },
+            [&] { return compare(n.extent, m.extent); }, [&] { return compare(n.body, m.body); });
       },
       [&](const Store& n) {
         const Store& m = same_kind(n);
@@ -208,8 +207,8 @@ int Comparer::compare_nodes(const Stmt& a, const Stmt& b) {
       [&](const IfThenElse& n) {
         const IfThenElse& m = same_kind(n);
         return first([&] { return compare(n.condition, m.condition); },
-                     [&] { return compare(n.then_case, m.then_case); },
-                     [&] { return compare(n.else_case, m.else_case); });
+                     [&] { return compare(n.when_true, m.when_true); },
+                     [&] { return compare(n.when_false, m.when_false); });
       },
       [&](const Evaluate& n) { return compare(n.value, same_kind(n).value); },
       [&](const Atomic& n) {
@@ -255,7 +254,7 @@ uint64_t payload(const Expr& e) {
       [](const Call& n) {
         uint64_t h = mix(static_cast<uint64_t>(n.call_type), static_cast<uint64_t>(n.op));
         if (n.op == Op::none) h = mix(h, text_hash(n.name));
-        return mix(h, static_cast<uint64_t>(n.value_index));
+        return mix(h, static_cast<uint64_t>(n.component));
       },
       [](const Let& n) { return text_hash(n.name); },
       [](const Shuffle& n) {

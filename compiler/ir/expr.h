@@ -240,12 +240,12 @@ struct Not : ExprNode {
 };
 struct Select : ExprNode {
   RETROGRADE_NODE(Select)
-  Select(Expr condition, Expr true_value, Expr false_value)
-      : ExprNode(Kind::Select, true_value.type()),
+  Select(Expr condition, Expr when_true, Expr when_false)
+      : ExprNode(Kind::Select, when_true.type()),
         condition(std::move(condition)),
-        true_value(std::move(true_value)),
-        false_value(std::move(false_value)) {}
-  const Expr condition, true_value, false_value;
+        when_true(std::move(when_true)),
+        when_false(std::move(when_false)) {}
+  const Expr condition, when_true, when_false;
 };
 // FlatStorage phase. Element number `index` of the allocation or buffer `name`.
 struct Load : ExprNode {
@@ -290,20 +290,20 @@ enum class CallType : uint8_t {
 struct Call : ExprNode {
   RETROGRADE_NODE(Call)
   Call(Type type, CallType call_type, Op op, std::string name, std::vector<Expr> args,
-       int value_index, SymbolRef symbol)
+       int component, SymbolRef symbol)
       : ExprNode(Kind::Call, type),
         call_type(call_type),
         op(op),
         name(std::move(name)),
         args(std::move(args)),
-        value_index(value_index),
+        component(component),
         symbol(std::move(symbol)) {}
   bool is_op(Op which) const { return call_type == CallType::Operator && op == which; }
   const CallType call_type;
   const Op op;             // Op::none unless Operator
   const std::string name;  // of the Func, image or C function; the operator's name for operators
   const std::vector<Expr> args;
-  const int value_index;  // which value of a Tuple-valued Func
+  const int component;  // which value of a Tuple-valued Func
   const SymbolRef symbol;
 };
 struct Let : ExprNode {
@@ -356,29 +356,29 @@ struct Assert : StmtNode {
 };
 struct ProducerConsumer : StmtNode {
   RETROGRADE_NODE(ProducerConsumer)
-  ProducerConsumer(std::string name, bool is_producer, Stmt body)
+  ProducerConsumer(std::string name, bool produces, Stmt body)
       : StmtNode(Kind::ProducerConsumer),
         name(std::move(name)),
-        is_producer(is_producer),
+        produces(produces),
         body(std::move(body)) {}
   const std::string name;
-  const bool is_producer;
+  const bool produces;
   const Stmt body;
 };
 struct For : StmtNode {  // name in [min, min + extent)
   RETROGRADE_NODE(For)
-  For(std::string name, Expr min, Expr extent, ForType for_type, Stmt body,
+  For(std::string name, Expr min, Expr extent, ForType runs, Stmt body,
       Partition partition = Partition::Auto)
       : StmtNode(Kind::For),
         name(std::move(name)),
         min(std::move(min)),
         extent(std::move(extent)),
-        for_type(for_type),
+        runs(runs),
         body(std::move(body)),
         partition(partition) {}
   const std::string name;
   const Expr min, extent;
-  const ForType for_type;
+  const ForType runs;
   const Stmt body;
   const Partition partition;
 };
@@ -453,13 +453,13 @@ struct Block : StmtNode {
 };
 struct IfThenElse : StmtNode {
   RETROGRADE_NODE(IfThenElse)
-  IfThenElse(Expr condition, Stmt then_case, Stmt else_case)
+  IfThenElse(Expr condition, Stmt when_true, Stmt when_false)
       : StmtNode(Kind::IfThenElse),
         condition(std::move(condition)),
-        then_case(std::move(then_case)),
-        else_case(std::move(else_case)) {}
+        when_true(std::move(when_true)),
+        when_false(std::move(when_false)) {}
   const Expr condition;
-  const Stmt then_case, else_case;  // else_case may be undefined
+  const Stmt when_true, when_false;  // when_false may be undefined
 };
 struct Evaluate : StmtNode {
   RETROGRADE_NODE(Evaluate)

@@ -396,9 +396,9 @@ Expr Parser::call(CallType call_type) {
   const std::string callee = name();
   expect("(");
   std::vector<Expr> args = expr_list(")");
-  const int value_index = accept(".") ? integer() : 0;
+  const int component = accept(".") ? integer() : 0;
   const Type result = type_suffix();
-  return new Call(result, call_type, Op::none, callee, std::move(args), value_index, {});
+  return new Call(result, call_type, Op::none, callee, std::move(args), component, {});
 }
 
 Expr Parser::shuffle() {
@@ -455,9 +455,9 @@ Stmt Parser::stmt() {
     return make_assert(args[0], args[1]);
   }
   if (is("produce") || is("consume")) {
-    const bool is_producer = take().text == "produce";
+    const bool produces = take().text == "produce";
     const std::string func = name();
-    return make_producer_consumer(func, is_producer, block());
+    return make_producer_consumer(func, produces, block());
   }
   if (is_loop()) return loop();
   if (accept("realize")) return realize();
@@ -494,9 +494,9 @@ Stmt Parser::loop() {
   for (Partition wanted : {Partition::Never, Partition::Always}) {
     if (accept(partition_name(wanted))) partition = wanted;
   }
-  ForType for_type = ForType::Serial;
+  ForType runs = ForType::Serial;
   for (ForType wanted : for_types) {
-    if (accept(for_name(wanted))) for_type = wanted;
+    if (accept(for_name(wanted))) runs = wanted;
   }
   expect("for");
   expect("(");
@@ -506,7 +506,7 @@ Stmt Parser::loop() {
   expect(",");
   Expr extent = expr();
   expect(")");
-  return make_for(variable, min, extent, for_type, block(), partition);
+  return make_for(variable, min, extent, runs, block(), partition);
 }
 
 MemoryType Parser::memory() {
@@ -566,9 +566,9 @@ Stmt Parser::if_stmt() {
   expect("(");
   Expr condition = expr();
   expect(")");
-  Stmt then_case = block(), else_case;
-  if (accept("else")) else_case = block();
-  return make_if(condition, then_case, else_case);
+  Stmt when_true = block(), when_false;
+  if (accept("else")) when_false = block();
+  return make_if(condition, when_true, when_false);
 }
 
 Stmt Parser::store_or_provide() {

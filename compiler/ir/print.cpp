@@ -229,7 +229,7 @@ void Printer::print_call(const Call& n) {
   out_ += quote_name(n.name) + '(';
   list(n.args);
   out_ += ')';
-  if (n.value_index) out_ += '.' + std::to_string(n.value_index);
+  if (n.component) out_ += '.' + std::to_string(n.component);
   type_unless_int32(n.type);
 }
 
@@ -265,7 +265,7 @@ void Printer::print_node(const Expr& e) {
         print(n.a);
       },
       [&](const Select& n) {
-        function("select", {n.condition, n.true_value, n.false_value});
+        function("select", {n.condition, n.when_true, n.when_false});
       },
       [&](const Load& n) {
         out_ += quote_name(n.name) + '[';
@@ -343,10 +343,10 @@ void Printer::print_if(const IfThenElse& n) {
   out_ += "if (";
   print_root(n.condition);
   out_ += ')';
-  body(n.then_case);
-  if (!n.else_case.defined()) return;
+  body(n.when_true);
+  if (!n.when_false.defined()) return;
   out_ += " else";
-  body(n.else_case);
+  body(n.when_false);
 }
 
 void Printer::print(const Stmt& s) {
@@ -366,13 +366,12 @@ void Printer::print(const Stmt& s) {
         out_ += ')';
       },
       [&](const ProducerConsumer& n) {
-        out_ += (n.is_producer ? "produce " : "consume ") + quote_name(n.name);
+        out_ += (n.produces ? "produce " : "consume ") + quote_name(n.name);
         body(n.body);
       },
       [&](const For& n) {
-        if (n.partition != Partition::Auto)
-          out_ += std::string(partition_name(n.partition)) + ' ';
-        if (n.for_type != ForType::Serial) out_ += std::string(for_name(n.for_type)) + ' ';
+        if (n.partition != Partition::Auto) out_ += std::string(partition_name(n.partition)) + ' ';
+        if (n.runs != ForType::Serial) out_ += std::string(for_name(n.runs)) + ' ';
         out_ += "for (" + quote_name(n.name) + ", ";
         root_list({n.min, n.extent});
         out_ += ')';

@@ -179,10 +179,10 @@ void match_literals(Expr& a, Expr& b, const char* what) {
 
 }  // namespace
 
-Expr select(Expr condition, Expr true_value, Expr false_value) {
+Expr select(Expr condition, Expr when_true, Expr when_false) {
   check_bool(condition, "select");
-  match_literals(true_value, false_value, "select");
-  return ir::make_select(std::move(condition), std::move(true_value), std::move(false_value));
+  match_literals(when_true, when_false, "select");
+  return ir::make_select(std::move(condition), std::move(when_true), std::move(when_false));
 }
 
 namespace {

@@ -110,7 +110,7 @@ class Type {
                             BFloat = TypeCode::BFloat, Handle = TypeCode::Handle;
 
   constexpr Type() = default;
-  // The types of the runtime's buffers; defined by frontend/buffer.cpp, which knows them.
+  // The types of the runtime's buffers; defined by frontend/data/buffer.cpp, which knows them.
   Type(const halide_type_t& type);
   operator halide_type_t() const;
   Type(halide_type_code_t code, int bits, int lanes = 1);

@@ -176,7 +176,7 @@ void Validator::check_binary(const Expr& e, const Binary& n) {
 
 void Validator::check_select(const Expr& e, const Select& n) {
   check_children(e);
-  require(n.true_value.type() == n.false_value.type(), e, "both arms of a select have one type");
+  require(n.when_true.type() == n.when_false.type(), e, "both arms of a select have one type");
   require(n.condition.type().is_bool(), e, "the condition of a select is bool");
   const int lanes = n.condition.type().lanes();
   require(lanes == 1 || lanes == n.type.lanes(), e,
@@ -256,7 +256,7 @@ void Validator::check_for(const Stmt& s, const For& n) {
   check(n.min);
   check(n.extent);
   require(n.min.type() == Int(32) && n.extent.type() == Int(32), s, "loop bounds are int32");
-  const bool gone = n.for_type == ForType::Vectorized || n.for_type == ForType::Unrolled;
+  const bool gone = n.runs == ForType::Vectorized || n.runs == ForType::Unrolled;
   require(phase_ != Phase::Vector || !gone, s,
           "no vectorized or unrolled loop is left in the phase Vector");
   const Binding binding(*this, n.name, s);
@@ -337,10 +337,10 @@ void Validator::check_free(const Stmt& s, const Free& n) {
 // A Free on one path ends the allocation for what follows both.
 void Validator::check_branches(const IfThenElse& n) {
   const auto before = live_;
-  check(n.then_case);
+  check(n.when_true);
   const auto after_then = std::exchange(live_, before);
   checked_.clear();
-  check(n.else_case);
+  check(n.when_false);
   std::erase_if(live_, [&](const std::string& name) { return !after_then.count(name); });
 }
 

@@ -37,7 +37,7 @@ void for_each_child(const Expr& e, ExprVisit on) {
   match(
       e, [&](const Cast& n) { on(n.value); }, [&](const Reinterpret& n) { on(n.value); },
       [&](const Binary& n) { on(n.a), on(n.b); }, [&](const Not& n) { on(n.a); },
-      [&](const Select& n) { on(n.condition), on(n.true_value), on(n.false_value); },
+      [&](const Select& n) { on(n.condition), on(n.when_true), on(n.when_false); },
       [&](const Load& n) {
         on(n.index);
         if (n.predicate.defined()) on(n.predicate);
@@ -79,7 +79,7 @@ void for_each_child(const Stmt& s, ExprVisit on, StmtVisit on_stmt) {
         for (const Range& r : n.bounds) on(r.min), on(r.extent);
       },
       [&](const IfThenElse& n) {
-        on(n.condition), maybe_stmt(n.then_case), maybe_stmt(n.else_case);
+        on(n.condition), maybe_stmt(n.when_true), maybe_stmt(n.when_false);
       },
       [&](const Evaluate& n) { on(n.value); }, [](const StmtNode&) {});
 }
@@ -106,8 +106,8 @@ Expr map_children(const Expr& e, ExprMap map) {
         return a.same_as(n.a) ? e : logical_not(std::move(a));
       },
       [&](const Select& n) {
-        Expr c = map(n.condition), t = map(n.true_value), f = map(n.false_value);
-        if (c.same_as(n.condition) && t.same_as(n.true_value) && f.same_as(n.false_value)) return e;
+        Expr c = map(n.condition), t = map(n.when_true), f = map(n.when_false);
+        if (c.same_as(n.condition) && t.same_as(n.when_true) && f.same_as(n.when_false)) return e;
         return make_select(std::move(c), std::move(t), std::move(f));
       },
       [&](const Load& n) {
@@ -131,7 +131,7 @@ Expr map_children(const Expr& e, ExprMap map) {
         if (!changed) return e;
         if (n.call_type == CallType::Operator) return call_op(n.op, n.type, std::move(args));
         return Expr(
-            new Call(n.type, n.call_type, n.op, n.name, std::move(args), n.value_index, n.symbol));
+            new Call(n.type, n.call_type, n.op, n.name, std::move(args), n.component, n.symbol));
       },
       [&](const Let& n) {
         Expr value = map(n.value), body = map(n.body);
@@ -207,15 +207,14 @@ Stmt map_children(const Stmt& s, ExprMap map, StmtMap map_stmt) {
       },
       [&](const ProducerConsumer& n) {
         Stmt body = map_optional(n.body, map_stmt);
-        return body.same_as(n.body)
-                   ? s
-                   : make_producer_consumer(n.name, n.is_producer, std::move(body));
+        return body.same_as(n.body) ? s
+                                    : make_producer_consumer(n.name, n.produces, std::move(body));
       },
       [&](const For& n) {
         Expr min = map(n.min), extent = map(n.extent);
         Stmt body = map_optional(n.body, map_stmt);
         if (min.same_as(n.min) && extent.same_as(n.extent) && body.same_as(n.body)) return s;
-        return make_for(n.name, std::move(min), std::move(extent), n.for_type, std::move(body),
+        return make_for(n.name, std::move(min), std::move(extent), n.runs, std::move(body),
                         n.partition);
       },
       [&](const Store& n) {
@@ -236,13 +235,13 @@ Stmt map_children(const Stmt& s, ExprMap map, StmtMap map_stmt) {
       [&](const Block& n) { return map_block(s, n, map_stmt); },
       [&](const IfThenElse& n) {
         Expr condition = map(n.condition);
-        Stmt then_case = map_optional(n.then_case, map_stmt),
-             else_case = map_optional(n.else_case, map_stmt);
-        if (condition.same_as(n.condition) && then_case.same_as(n.then_case) &&
-            else_case.same_as(n.else_case)) {
+        Stmt when_true = map_optional(n.when_true, map_stmt),
+             when_false = map_optional(n.when_false, map_stmt);
+        if (condition.same_as(n.condition) && when_true.same_as(n.when_true) &&
+            when_false.same_as(n.when_false)) {
           return s;
         }
-        return make_if(std::move(condition), std::move(then_case), std::move(else_case));
+        return make_if(std::move(condition), std::move(when_true), std::move(when_false));
       },
       [&](const Evaluate& n) {
         Expr value = map(n.value);

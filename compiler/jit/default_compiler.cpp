@@ -1,7 +1,7 @@
 // default_compiler.cpp -- what the front end's realize() reaches: lowering, then machine code in
 // this process.
-#include "autodiff/default_schedule.h"
-#include "frontend/compiler_interface.h"
+#include "autodiff/schedule/default_schedule.h"
+#include "frontend/run/compiler_interface.h"
 #include "jit/jit.h"
 #include "lower/lower.h"
 #include "retrograde_runtime.h"

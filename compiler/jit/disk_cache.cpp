@@ -20,7 +20,7 @@
 #include "codegen/machine.h"
 #include "diagnostics/error.h"
 #include "diagnostics/large_stack.h"
-#include "frontend/compile_cache.h"
+#include "frontend/run/compile_cache.h"
 #include "jit/fingerprint.h"
 #include "jit/private_folder.h"
 

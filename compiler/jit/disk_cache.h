@@ -1,5 +1,5 @@
 // Compiled functions kept in a folder, from one run of a program to the next. Off until a folder is
-// named (frontend/compile_cache.h).
+// named (frontend/run/compile_cache.h).
 //
 // An entry's name is the SHA-256 of all that the machine code depends on: the lowered function, the
 // target and the processor, the compiler's own build. The folder and everything in it belong to the

@@ -85,7 +85,7 @@ class Writer {
           for (int index : n.indices) add(index);
         },
         [&](const Call& n) {
-          add(n.call_type, n.op, n.args.size(), n.value_index);
+          add(n.call_type, n.op, n.args.size(), n.component);
           result.add(n.call_type == CallType::Operator ? std::string() : n.name);
         },
         [](const ExprNode&) {});
@@ -106,7 +106,7 @@ class Writer {
   void write_contents(const Stmt& s) {
     match(
         s, [&](const LetStmt& n) { add(name(n.name)); },
-        [&](const For& n) { add(name(n.name), n.for_type); },
+        [&](const For& n) { add(name(n.name), n.runs); },
         [&](const Store& n) { add(name(n.name), n.predicate.defined()); },
         [&](const Allocate& n) {
           add(name(n.name), n.type.key(), n.memory);

@@ -8,37 +8,37 @@
 #include "ir/build.h"
 #include "ir/print.h"
 #include "ir/validate.h"
-#include "lower/accumulate_vectors.h"
-#include "lower/argument_checks.h"
-#include "lower/blend_masked_stores.h"
-#include "lower/build_loop_nests.h"
-#include "lower/copy_statement.h"
-#include "lower/debug_features.h"
-#include "lower/deinterleave_loads.h"
-#include "lower/drop_checks.h"
-#include "lower/drop_guarded_clamps.h"
-#include "lower/flatten_storage.h"
-#include "lower/fork_async.h"
-#include "lower/free_early.h"
-#include "lower/inject_profiling.h"
-#include "lower/inject_tracing.h"
-#include "lower/inline_functions.h"
-#include "lower/insert_prefetches.h"
-#include "lower/interleave_vectors.h"
-#include "lower/join_indices.h"
-#include "lower/loop_nest_text.h"
+#include "lower/instrumentation/debug_features.h"
+#include "lower/instrumentation/inject_profiling.h"
+#include "lower/instrumentation/inject_tracing.h"
+#include "lower/instrumentation/loop_nest_text.h"
+#include "lower/instrumentation/write_debug_files.h"
+#include "lower/loops/drop_checks.h"
+#include "lower/loops/drop_guarded_clamps.h"
+#include "lower/loops/flatten_storage.h"
+#include "lower/loops/fork_async.h"
+#include "lower/loops/free_early.h"
+#include "lower/loops/insert_prefetches.h"
+#include "lower/loops/join_indices.h"
+#include "lower/loops/lower_atomics.h"
+#include "lower/loops/memoize.h"
+#include "lower/loops/partition_loops.h"
+#include "lower/loops/trim_loops.h"
+#include "lower/loops/unroll_loops.h"
 #include "lower/lower.h"
-#include "lower/lower_atomics.h"
-#include "lower/make_names_unique.h"
-#include "lower/memoize.h"
-#include "lower/partition_loops.h"
-#include "lower/share_parameters.h"
-#include "lower/transpose_loads.h"
-#include "lower/trim_loops.h"
-#include "lower/unroll_loops.h"
-#include "lower/vectorize_inner_loops.h"
-#include "lower/vectorize_loops.h"
-#include "lower/write_debug_files.h"
+#include "lower/nests/argument_checks.h"
+#include "lower/nests/build_loop_nests.h"
+#include "lower/nests/copy_statement.h"
+#include "lower/nests/inline_functions.h"
+#include "lower/nests/make_names_unique.h"
+#include "lower/nests/share_parameters.h"
+#include "lower/vectors/accumulate_vectors.h"
+#include "lower/vectors/blend_masked_stores.h"
+#include "lower/vectors/deinterleave_loads.h"
+#include "lower/vectors/interleave_vectors.h"
+#include "lower/vectors/transpose_loads.h"
+#include "lower/vectors/vectorize_inner_loops.h"
+#include "lower/vectors/vectorize_loops.h"
 #include "simplify/simplify.h"
 
 namespace retrograde::ir {
@@ -96,11 +96,11 @@ Stmt nest_loops(Lowering& lowering, const Stmt&) {
 struct LoopKinds {
   bool is_pure = false, is_reduction = false;
 };
-void find_kinds(const StageSchedule& schedule, const std::string& var, LoopKinds& kinds) {
+void find_kinds(const StageLoops& schedule, const std::string& var, LoopKinds& kinds) {
   for (const Dim& dim : schedule.dims) {
     if (dim.var == var) (dim.is_reduction ? kinds.is_reduction : kinds.is_pure) = true;
   }
-  for (const StageSchedule& other : schedule.specializations) find_kinds(other, var, kinds);
+  for (const StageLoops& other : schedule.specializations) find_kinds(other, var, kinds);
 }
 
 // Iterations of a loop over a pure variable touch elements of their own (define.cpp sees to it).

@@ -16,7 +16,7 @@ namespace retrograde::ir {
 // variables, reduction variables, parameters.
 struct LoopedFunc {
   FuncPtr func;
-  FuncSchedule schedule;
+  FuncPlacement schedule;
   std::vector<Definition> stages;  // pure definition first
   bool is_output = false;
 

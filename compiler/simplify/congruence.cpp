@@ -100,7 +100,7 @@ Congruence Facts::congruence_of_variable(const Variable& n) {
 Congruence Facts::congruence_of_node(const Expr& e) {
   if (const auto* n = e.as<Variable>()) return congruence_of_variable(*n);
   if (const auto* n = e.as<Select>()) {
-    return either(congruence(n->true_value), congruence(n->false_value));
+    return either(congruence(n->when_true), congruence(n->when_false));
   }
   const auto* n = e.as<Binary>();
   if (!n) return unknown;

@@ -145,7 +145,7 @@ ConstantRange Facts::range_of_node(const Expr& e) {
                    : whole;
       },
       [&](const Binary& n) { return range_of_binary(n); },
-      [&](const Select& n) { return hull(range(n.true_value), range(n.false_value)); },
+      [&](const Select& n) { return hull(range(n.when_true), range(n.when_false)); },
       [&](const Ramp& n) {
         const ConstantRange steps = multiply(range(n.stride), {0, n.lanes - 1});
         return wrapped(range(n.base) + steps, n.type);
@@ -462,8 +462,8 @@ int64_t Facts::eliminate_structure(const Sum& sum, int& budget) {
       return either ? std::min(a, b) : std::max(a, b);
     }
     if (const auto* n = term.atom.as<Select>()) {
-      const int64_t a = replace(sum, term, n->true_value, budget),
-                    b = replace(sum, term, n->false_value, budget);
+      const int64_t a = replace(sum, term, n->when_true, budget),
+                    b = replace(sum, term, n->when_false, budget);
       return std::max(a, b);
     }
     const auto* call = term.atom.as<Call>();

@@ -63,9 +63,9 @@ Expr Simplifier::equals(const Expr& a, const Expr& b) {
           plus(times(sum_of(arm), sum.terms[0].factor), constant_sum(sum.type, sum.constant));
       return make_const(Bool(), int64_t{value.valid && value.constant == 0});
     };
-    if (choice && is_const(choice->true_value) && is_const(choice->false_value)) {
-      return select(choice->condition, is_zero_with(choice->true_value),
-                    is_zero_with(choice->false_value));
+    if (choice && is_const(choice->when_true) && is_const(choice->when_false)) {
+      return select(choice->condition, is_zero_with(choice->when_true),
+                    is_zero_with(choice->when_false));
     }
   }
   if (sum.may_be_extreme()) return binary(Kind::EQ, a, b);
@@ -146,8 +146,8 @@ Expr Simplifier::distribute_comparison(const Sum& sum) {
       return result;
     };
     if (const auto* n = term.atom.as<Select>();
-        n && is_const(n->true_value) && is_const(n->false_value)) {
-      const Expr t = with(n->true_value), f = with(n->false_value);
+        n && is_const(n->when_true) && is_const(n->when_false)) {
+      const Expr t = with(n->when_true), f = with(n->when_false);
       if (t.defined() && f.defined() && (is_const(t) || is_const(f)))
         return select(n->condition, t, f);
     }

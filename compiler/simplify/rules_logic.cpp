@@ -109,10 +109,10 @@ Expr Simplifier::select(const Expr& condition, const Expr& t, const Expr& f) {
   }
   const auto* inner_t = t.as<Select>();
   if (inner_t && equal(inner_t->condition, condition))
-    return select(condition, inner_t->true_value, f);
+    return select(condition, inner_t->when_true, f);
   const auto* inner_f = f.as<Select>();
   if (inner_f && equal(inner_f->condition, condition))
-    return select(condition, t, inner_f->false_value);
+    return select(condition, t, inner_f->when_false);
   const bool same_lanes = condition.type().lanes() == t.type().lanes();
   if (t.type().is_bool() && same_lanes) {
     if (is_const_true(t)) return logical(Kind::Or, condition, f);

@@ -148,8 +148,8 @@ Expr Simplifier::call(const Expr& e, const Call& n) {
     changed |= !args.back().same_as(arg);
   }
   if (n.call_type != CallType::Operator) {
-    return changed ? Expr(new Call(n.type, n.call_type, n.op, n.name, std::move(args),
-                                   n.value_index, n.symbol))
+    return changed ? Expr(new Call(n.type, n.call_type, n.op, n.name, std::move(args), n.component,
+                                   n.symbol))
                    : e;
   }
   if (n.op == Op::if_then_else && is_const(args[0]))

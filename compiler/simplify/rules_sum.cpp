@@ -180,15 +180,15 @@ Expr Simplifier::fold_select(const Sum& sum) {
   if (sum.terms.size() != 1) return {};
   const auto [atom, factor] = sum.terms[0];
   const auto* n = atom.as<Select>();
-  if (!n || (factor == 1 && sum.constant == 0) || !is_const(n->true_value) ||
-      !is_const(n->false_value))
+  if (!n || (factor == 1 && sum.constant == 0) || !is_const(n->when_true) ||
+      !is_const(n->when_false))
     return {};
   const auto arm = [&, factor = factor](const Expr& value) {
     Sum folded = times(sum_of(value), factor);
     folded.add_constant(sum.constant);
     return folded;
   };
-  const Sum t = arm(n->true_value), f = arm(n->false_value);
+  const Sum t = arm(n->when_true), f = arm(n->when_false);
   if (!t.valid || !f.valid) return {};
   return make_select(n->condition, to_expr(t), to_expr(f));
 }

@@ -65,7 +65,7 @@ Expr Simplifier::node(const Expr& e) {
   return match(
       e, [&](const Binary& n) { return apply(n.kind, s(n.a), s(n.b)); },
       [&](const Not& n) { return negate(s(n.a)); },
-      [&](const Select& n) { return select(s(n.condition), s(n.true_value), s(n.false_value)); },
+      [&](const Select& n) { return select(s(n.condition), s(n.when_true), s(n.when_false)); },
       [&](const Cast& n) { return cast(n.type, s(n.value)); },
       [&](const Ramp& n) { return ramp(s(n.base), s(n.stride), n.lanes); },
       [&](const Broadcast& n) { return broadcast(s(n.value), n.lanes); },

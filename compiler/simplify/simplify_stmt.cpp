@@ -64,7 +64,7 @@ Stmt Simplifier::loop(const Stmt& s, const For& n) {
   }
   --loops_around_;
   if (min.same_as(n.min) && extent.same_as(n.extent) && body.same_as(n.body)) return s;
-  return make_for(n.name, min, extent, n.for_type, std::move(body), n.partition);
+  return make_for(n.name, min, extent, n.runs, std::move(body), n.partition);
 }
 
 // What follows an assert may rely on it, to the end of the block.
@@ -87,20 +87,20 @@ Stmt Simplifier::branches(const Stmt& s, const IfThenElse& n) {
   Expr condition = (*this)(n.condition);
   if (const std::optional<bool> known = facts_.decided(condition))
     condition = make_const(Bool(), int64_t{*known});
-  if (is_const(condition)) return (*this)(is_const_true(condition) ? n.then_case : n.else_case);
-  Stmt then_case, else_case;
+  if (is_const(condition)) return (*this)(is_const_true(condition) ? n.when_true : n.when_false);
+  Stmt when_true, when_false;
   {
     const Given holds(*this, condition);
-    then_case = (*this)(n.then_case);
+    when_true = (*this)(n.when_true);
   }
-  if (n.else_case.defined()) {
+  if (n.when_false.defined()) {
     const Given fails(*this, negate(condition));
-    else_case = (*this)(n.else_case);
+    when_false = (*this)(n.when_false);
   }
-  if (condition.same_as(n.condition) && then_case.same_as(n.then_case) &&
-      else_case.same_as(n.else_case))
+  if (condition.same_as(n.condition) && when_true.same_as(n.when_true) &&
+      when_false.same_as(n.when_false))
     return s;
-  return make_if(condition, std::move(then_case), std::move(else_case));
+  return make_if(condition, std::move(when_true), std::move(when_false));
 }
 
 namespace {

@@ -76,7 +76,7 @@ bool may_be_extreme(const Expr& e, int depth) {
   if (value) return is_extreme(e.type(), *value);
   if (depth == 0) return false;
   if (const auto* n = e.as<Select>()) {
-    return may_be_extreme(n->true_value, depth - 1) || may_be_extreme(n->false_value, depth - 1);
+    return may_be_extreme(n->when_true, depth - 1) || may_be_extreme(n->when_false, depth - 1);
   }
   const Kind kind = e.kind();
   const bool looks_through = kind == Kind::Min || kind == Kind::Max || kind == Kind::Add ||

@@ -1,9 +1,9 @@
 // Terms become Exprs bottom up; every operand already has the type that the action wants.
 #include "testing/build_pipeline.h"
 
-#include "frontend/boundary_conditions.h"
-#include "frontend/inline_reductions.h"
-#include "frontend/param.h"
+#include "frontend/data/param.h"
+#include "frontend/language/boundary_conditions.h"
+#include "frontend/language/inline_reductions.h"
 #include "testing/interpreter.h"
 
 namespace retrograde::fuzz {

@@ -4,8 +4,8 @@
 #include <string>
 #include <vector>
 
-#include "frontend/buffer.h"
-#include "frontend/func.h"
+#include "frontend/data/buffer.h"
+#include "frontend/language/func.h"
 #include "testing/array.h"
 #include "testing/random_pipeline.h"
 

@@ -5,7 +5,7 @@
 #include <cstring>
 
 #include "diagnostics/error.h"
-#include "frontend/pipeline.h"
+#include "frontend/run/pipeline.h"
 #include "testing/build_pipeline.h"
 
 namespace retrograde::fuzz {

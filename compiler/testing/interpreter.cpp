@@ -203,13 +203,13 @@ class Interpreter::Impl {
 
   // ---- values of Funcs ----
 
-  Value read(FuncState& f, const Point& point, int value_index) {
-    if (f.func->is_pure()) return pure_values(f, point)[value_index];
+  Value read(FuncState& f, const Point& point, int component) {
+    if (f.func->is_pure()) return pure_values(f, point)[component];
     const Point slice = pick(point, f.pure_dims);
     const Point place = pick(point, f.scattered_dims);
-    if (f.active) return read_self(f, point, slice, place, value_index);
+    if (f.active) return read_self(f, point, slice, place, component);
     Island& island = island_at(f, slice, place);
-    const Value value = cell(f, island, point, place)[value_index];
+    const Value value = cell(f, island, point, place)[component];
     return island.poisoned ? Value::unstable(value.scalar) : value;
   }
 
@@ -270,14 +270,14 @@ class Interpreter::Impl {
   }
 
   Value read_self(FuncState& f, const Point& point, const Point& slice, const Point& place,
-                  int value_index) {
+                  int component) {
     if (slice != f.active_slice) {
       internal_error(quoted(f.func->name) + " reads itself at " + show(point) +
                      ", across a dimension that is pure in all of its definitions");
     }
     f.active->reached.include(place);
-    if (!inside(f.active->box, place)) return evaluate_pure(f, point)[value_index];
-    return cell(f, *f.active, point, place)[value_index];
+    if (!inside(f.active->box, place)) return evaluate_pure(f, point)[component];
+    return cell(f, *f.active, point, place)[component];
   }
 
   Island& island_at(FuncState& f, const Point& slice, const Point& place) {

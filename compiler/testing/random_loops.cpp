@@ -13,7 +13,7 @@
 
 #include "graph/associative_update.h"
 #include "graph/names.h"
-#include "graph/race.h"
+#include "graph/race_checks.h"
 #include "ir/build.h"
 
 namespace retrograde::fuzz {

@@ -15,7 +15,7 @@
 #include <set>
 
 #include "diagnostics/error.h"
-#include "frontend/param.h"
+#include "frontend/data/param.h"
 #include "graph/directive_names.h"
 #include "graph/names.h"
 #include "graph/wrappers.h"

@@ -117,7 +117,7 @@ class Flattener {
     step.name = call.name;
     step.symbol = call.symbol.raw();
     if (step.code == Step::Code::FuncCall || step.code == Step::Code::ImageCall) {
-      step.index = call.value_index;
+      step.index = call.component;
     }
     for (const Expr& arg : call.args) step.children.push_back(flatten(arg));
     return push(std::move(step));
@@ -147,7 +147,7 @@ class Flattener {
         [&](const ir::Not& n) { return with_children(start(e, Step::Code::Not), {n.a}); },
         [&](const ir::Select& n) {
           return with_children(start(e, Step::Code::Select),
-                               {n.condition, n.true_value, n.false_value});
+                               {n.condition, n.when_true, n.when_false});
         },
         [&](const ir::Call& n) { return call(e, n); }, [&](const ir::Let& n) { return let(n); },
         [&](const ir::ExprNode&) -> int {

@@ -4,7 +4,7 @@
 #include <sstream>
 
 #include "error/rules.h"
-#include "frontend/autoscheduler.h"
+#include "frontend/schedule/autoscheduler.h"
 #include "generator/command_line.h"
 #include "generator/registry.h"
 #include "ir/parse.h"
@@ -131,8 +131,9 @@ TEST_F(Rules, SeedsThroughCFunctions) {
     return std::vector<AdjointContribution>{{in, adjoint}};
   });
   for (const Compression way : {Compression::Rows, Compression::Columns}) {
-    expect<Unsupported>("which element depends on which is read off definitions",
-                        [&] { jacobian(g, image, {{0, 8}}, {.compression = way}); });
+    expect<Unsupported>("which element depends on which is read off definitions", [&] {
+      jacobian(g, image, {{0, 8}}, {.compression = way});
+    });
   }
 }
 

@@ -12,7 +12,7 @@
 #include <sstream>
 #include <string>
 
-#include "autodiff/derivative_rules.h"
+#include "autodiff/rules/derivative_rules.h"
 #include "ir/build.h"
 
 namespace retrograde::ir {
@@ -96,12 +96,15 @@ class DerivativesPage : public testing::Test {
       std::ofstream(path) << page.replace(span->begin, length, table);
       return;
     }
-    EXPECT_EQ(page.substr(span->begin, length), table) << "RETROGRADE_UPDATE_GOLDEN=1 writes " << path;
+    EXPECT_EQ(page.substr(span->begin, length), table)
+        << "RETROGRADE_UPDATE_GOLDEN=1 writes " << path;
   }
   static inline const std::string path = RETROGRADE_TEST_DIR "/../docs/derivatives.md";
 };
 
-TEST_F(DerivativesPage, holds_the_partials_of_the_rule_table) { holds("partials", tables().smooth); }
+TEST_F(DerivativesPage, holds_the_partials_of_the_rule_table) {
+  holds("partials", tables().smooth);
+}
 
 TEST_F(DerivativesPage, holds_the_reasons_of_operators_without_partials) {
   holds("no_partials", tables().others);

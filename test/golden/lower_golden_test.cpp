@@ -17,8 +17,8 @@
 #include "ir/parse.h"
 #include "ir/print.h"
 #include "ir/validate.h"
+#include "lower/loops/unroll_loops.h"
 #include "lower/pass_table.h"
-#include "lower/unroll_loops.h"
 
 namespace retrograde::ir {
 namespace {

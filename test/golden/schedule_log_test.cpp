@@ -252,16 +252,16 @@ TEST(ScheduleLogs, FollowLevelsThatAreSetLater) {
             "f.compute_at(loop(g, x, 1))\ng.compute_at(root)\n");
 }
 
-// Directives that change nothing are no part of it, and a stage without loops stays untouched.
+// Directives that change nothing are no part of it, and a stage without loops stays unis_given.
 TEST(ScheduleLogs, HoldWhatWasGiven) {
   Program p;
   Func scalar("scalar");
   scalar() = 1;
   scalar.never_partition_all();
-  EXPECT_FALSE(scalar.get_schedule().touched);
+  EXPECT_FALSE(scalar.get_schedule().is_given);
   EXPECT_EQ(Pipeline(scalar).schedule_log().size(), 0u);
   p.out.rename(p.x, p.x);
-  EXPECT_TRUE(p.out.get_schedule().touched);
+  EXPECT_TRUE(p.out.get_schedule().is_given);
   p.out.specialize(p.n > 3);
   p.out.specialize(p.n > 3);
   EXPECT_THROW(p.out.split(Var("z"), p.x, p.y, 8), CompileError);

@@ -10,7 +10,7 @@
 #include <regex>
 #include <sstream>
 
-#include "frontend/func.h"
+#include "frontend/language/func.h"
 #include "ir/print.h"
 #include "lower/lower.h"
 #include "retrograde/retrograde.h"
@@ -256,7 +256,8 @@ std::string page() {
       "changes "
       "what is\ncomputed. This page shows every directive by the loops before and after it, as "
       "`print_loop_nest` gives\nthem, or by the statement with its storage. The headers "
-      "`frontend/loop_directives.h` and `frontend/func.h` hold the\nrules. The page is written by "
+      "`frontend/schedule/loop_directives.h` and `frontend/language/func.h` hold the\nrules. The "
+      "page is written by "
       "`test/golden/scheduling_page_test.cpp`: what it shows is what the compiler\ndoes.\n\n"
       "## Schedules as values\n\n"
       "`Pipeline::schedule_log()` gives all directives of a program in the order in which they "

@@ -1,8 +1,8 @@
 // Every gather found for an access is checked by enumeration: over small domains each point of the
 // stage must be visited exactly once, at the element that it reads. Beside that, the shape: how
 // many gathers, how many iterations.
-#include "autodiff/access_inversion.h"
-#include "autodiff/inversion_cost.h"
+#include "autodiff/inversion/access_inversion.h"
+#include "autodiff/inversion/inversion_cost.h"
 
 #include <gtest/gtest.h>
 
@@ -42,7 +42,7 @@ int64_t eval(const Expr& e, const Env& env) {
       },
       [&](const Not& n) -> int64_t { return eval(n.a, env) == 0; },
       [&](const Select& s) {
-        return eval(s.condition, env) ? eval(s.true_value, env) : eval(s.false_value, env);
+        return eval(s.condition, env) ? eval(s.when_true, env) : eval(s.when_false, env);
       },
       [&](const Call& c) -> int64_t {
         if (c.is_op(Op::shift_left)) return eval(c.args[0], env) << eval(c.args[1], env);

@@ -4,8 +4,8 @@
 
 #include "autodiff/custom_derivative.h"
 #include "checks/check_gradients.h"
-#include "frontend/image_param.h"
-#include "frontend/param.h"
+#include "frontend/data/image_param.h"
+#include "frontend/data/param.h"
 #include "gradient/gradient_check.h"
 #include "support/errors.h"
 

@@ -3,7 +3,7 @@
 // interpreter evaluates.
 #include <atomic>
 
-#include "autodiff/revolve.h"
+#include "autodiff/time/revolve.h"
 #include "gradient/programs_suite.h"
 #include "support/errors.h"
 
@@ -458,8 +458,9 @@ TEST(Checkpoints, MoreStepsAtRunTimeThanATableMayHaveFailTheCall) {
   Buffer<float> start = line(1);
   Derivative d = propagate_adjoints(counted(start, n), {.wrt = {start}, .checkpoint_states = 1});
   n.set(100000);
-  expect_mentions(error_of<RuntimeError>([&] { d(start).realize({1}); }),
-                  {"room for 1 kept state has at most 5789 steps", "this one has 100000", "larger budget"});
+  expect_mentions(
+      error_of<RuntimeError>([&] { d(start).realize({1}); }),
+      {"room for 1 kept state has at most 5789 steps", "this one has 100000", "larger budget"});
   expect_mentions(d.explain(Detail::All),
                   {"a loop of n steps", "1 kept state of 4 bytes", "at run time"});
 }

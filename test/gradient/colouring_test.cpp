@@ -2,16 +2,16 @@
 // (graph_colouring.h), checked by their definitions on random patterns, against known optima, and
 // against the fewest that any assignment of colours can do on small graphs. And how long the search
 // for a pattern may take.
-#include "autodiff/colouring.h"
+#include "autodiff/matrices/colouring.h"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <random>
 
-#include "autodiff/compressed.h"
-#include "autodiff/graph_colouring.h"
-#include "frontend/func.h"
+#include "autodiff/matrices/compressed.h"
+#include "autodiff/matrices/graph_colouring.h"
+#include "frontend/language/func.h"
 #include "support/errors.h"
 
 namespace retrograde::ir {

@@ -6,7 +6,7 @@
 #include <thread>
 
 #include "autodiff/second_order.h"
-#include "frontend/param.h"
+#include "frontend/data/param.h"
 #include "gradient/gradient_check.h"
 #include "support/errors.h"
 

@@ -5,7 +5,7 @@
 
 #include "autodiff/custom_derivative.h"
 #include "autodiff/tangents.h"
-#include "frontend/param.h"
+#include "frontend/data/param.h"
 #include "gradient/gradient_check.h"
 #include "support/errors.h"
 

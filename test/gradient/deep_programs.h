@@ -5,10 +5,10 @@
 #include <functional>
 #include <vector>
 
-#include "frontend/boundary_conditions.h"
-#include "frontend/func.h"
-#include "frontend/image_param.h"
-#include "frontend/inline_reductions.h"
+#include "frontend/data/image_param.h"
+#include "frontend/language/boundary_conditions.h"
+#include "frontend/language/func.h"
+#include "frontend/language/inline_reductions.h"
 
 namespace retrograde::deep {
 

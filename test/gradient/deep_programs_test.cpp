@@ -7,9 +7,9 @@
 #include <random>
 #include <sstream>
 
-#include "frontend/compiler_interface.h"
-#include "frontend/module.h"
-#include "frontend/param.h"
+#include "frontend/data/param.h"
+#include "frontend/run/compiler_interface.h"
+#include "frontend/run/module.h"
 #include "gradient/gradient_check.h"
 
 namespace retrograde::deep {

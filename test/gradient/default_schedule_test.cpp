@@ -1,11 +1,11 @@
 // What lowering does with adjoints that nobody scheduled, and with those that somebody did.
-#include "autodiff/default_schedule.h"
+#include "autodiff/schedule/default_schedule.h"
 
 #include <gtest/gtest.h>
 
 #include "autodiff/derivative.h"
-#include "autodiff/read_estimate.h"
-#include "frontend/func.h"
+#include "autodiff/schedule/read_estimate.h"
+#include "frontend/language/func.h"
 #include "gradient/gradient_check.h"
 #include "ir/build.h"
 #include "ir/print.h"
@@ -37,8 +37,8 @@ TEST_F(DefaultSchedule, StoresWhatIsReadOftenAndCosts) {
   ASSERT_TRUE(chosen.contains(heavy.function().get()));
   const ir::ChosenSchedule& schedule = chosen.at(heavy.function().get());
   EXPECT_EQ(schedule.func.compute_level.kind, ir::LoopLevel::Kind::Root);
-  EXPECT_EQ(schedule.stages[0].dims.back().for_type, ForType::Parallel);
-  EXPECT_EQ(schedule.stages[0].dims.front().for_type, ForType::Vectorized);
+  EXPECT_EQ(schedule.stages[0].dims.back().runs, ForType::Parallel);
+  EXPECT_EQ(schedule.stages[0].dims.front().runs, ForType::Vectorized);
   EXPECT_EQ(heavy.function()->schedule.compute_level.kind, ir::LoopLevel::Kind::Inlined)
       << "the Func itself is not changed";
 }
@@ -126,8 +126,8 @@ TEST_F(DefaultSchedule, ScattersRunInVectorsThatKeepTheirOrder) {
   auto chosen = choose(d(rows));
   const auto& stages = chosen.at(d(rows).function().get()).stages;
   ASSERT_EQ(stages.size(), 2u);
-  EXPECT_EQ(stages[1].dims.front().for_type, ForType::Vectorized);
-  EXPECT_EQ(stages[1].dims.back().for_type, ForType::Parallel);
+  EXPECT_EQ(stages[1].dims.front().runs, ForType::Vectorized);
+  EXPECT_EQ(stages[1].dims.back().runs, ForType::Parallel);
 }
 
 TEST_F(DefaultSchedule, ScattersToFewElementsHaveElementsForEachLane) {
@@ -258,8 +258,8 @@ TEST_F(DefaultSchedule, TilesWhatItReadsAcross) {
   const auto chosen = choose(d(a));
   const std::vector<ir::Dim>& loops = chosen.at(d(a).function().get()).stages[0].dims;
   ASSERT_EQ(loops.size(), 4u);
-  EXPECT_EQ(loops[0].for_type, ForType::Vectorized);
-  EXPECT_EQ(loops[3].for_type, ForType::Parallel);
+  EXPECT_EQ(loops[0].runs, ForType::Vectorized);
+  EXPECT_EQ(loops[3].runs, ForType::Parallel);
 }
 
 // The adjoint of `planes` has updates of one plane each, of which z is no loop.
@@ -273,7 +273,7 @@ TEST_F(DefaultSchedule, TilesAPlaneThatIsReadAcross) {
   const auto stages = choose(gradient).at(gradient.function().get()).stages;
   ASSERT_EQ(stages.size(), 3u);
   ASSERT_EQ(stages[1].dims.size(), 4u);
-  EXPECT_EQ(stages[1].dims[3].for_type, ForType::Parallel);
+  EXPECT_EQ(stages[1].dims[3].runs, ForType::Parallel);
 }
 
 // A recursive filter beside a schedule by hand that says nothing of it.

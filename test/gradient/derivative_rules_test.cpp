@@ -1,6 +1,6 @@
 // The rule table: total, right against central differences in double, and as conventional at kinks
 // and poles as it says.
-#include "autodiff/derivative_rules.h"
+#include "autodiff/rules/derivative_rules.h"
 
 #include <gtest/gtest.h>
 
@@ -9,9 +9,9 @@
 #include <map>
 #include <string>
 
-#include "autodiff/reverse_sweep.h"
+#include "autodiff/sweeps/reverse_sweep.h"
 #include "diagnostics/error.h"
-#include "frontend/func.h"
+#include "frontend/language/func.h"
 #include "ir/build.h"
 #include "ir/equal.h"
 #include "ir/print.h"
@@ -129,7 +129,8 @@ TEST(DerivativeRules, PartialsArePolesWhereTheOperatorsRowSays) {
 TEST(DerivativeRules, ValuesLevelOffWhereTheOperatorsRowSays) {
   for (int i = 0; i < op_count; ++i) {
     const Op o = static_cast<Op>(i);
-    if (!is_function_of_numbers(o) || o == Op::saturating_cast) continue;  // to a narrower type only
+    if (!is_function_of_numbers(o) || o == Op::saturating_cast)
+      continue;  // to a narrower type only
     bool found = false;
     for_each_partial(o, {-inf, -2.5, -0.5, 0, 0.5, 2.5, inf},
                      [&](const Env& env, double value, double partial) {

@@ -7,7 +7,7 @@
 #include <numbers>
 #include <set>
 
-#include "autodiff/derivative_rules.h"
+#include "autodiff/rules/derivative_rules.h"
 #include "gradient/gradient_check.h"
 #include "ir/build.h"
 

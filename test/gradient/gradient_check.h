@@ -10,9 +10,9 @@
 #include <random>
 
 #include "autodiff/derivative.h"
-#include "frontend/boundary_conditions.h"
-#include "frontend/func.h"
-#include "frontend/inline_reductions.h"
+#include "frontend/language/boundary_conditions.h"
+#include "frontend/language/func.h"
+#include "frontend/language/inline_reductions.h"
 #include "ir/print.h"
 #include "support/own_threads.h"
 #include "testing/interpreter.h"
@@ -98,15 +98,14 @@ inline bool same_bits(const Buffer<float>& a, const Buffer<float>& b) {
 // rounding could tip a decision, as of a place from floats, nothing is known but that both take the
 // same side: these are held to 1e-4 of the largest.
 inline void expect_machine_code_agrees(Func gradient, const oracle::Region& region) {
-  const oracle::Array expected =
-      oracle::Interpreter({.rounding = oracle::Rounding::Contraction})
-          .realize(gradient.function(), region)
-          .front();
+  const oracle::Array expected = oracle::Interpreter({.rounding = oracle::Rounding::Contraction})
+                                     .realize(gradient.function(), region)
+                                     .front();
   const Buffer<float> first = run_on_threads(gradient, region, 1, false);
   const auto comparison =
       oracle::compare(expected, *const_cast<Buffer<float>&>(first).raw_buffer(), 4);
-  EXPECT_TRUE(comparison.agrees()) << comparison.mismatches << " elements differ, the first "
-                                   << comparison.first_mismatch;
+  EXPECT_TRUE(comparison.agrees())
+      << comparison.mismatches << " elements differ, the first " << comparison.first_mismatch;
   double scale = 1;
   for (const oracle::Value& v : expected.values)
     scale = std::max(scale, std::abs(v.scalar.as_double()));

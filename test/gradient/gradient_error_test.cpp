@@ -3,8 +3,8 @@
 #include <gtest/gtest.h>
 
 #include "autodiff/derivative.h"
-#include "frontend/func.h"
-#include "frontend/inline_reductions.h"
+#include "frontend/language/func.h"
+#include "frontend/language/inline_reductions.h"
 #include "support/errors.h"
 
 namespace retrograde {

@@ -2,7 +2,7 @@
 // double, their symmetry <H v, w> = <v, H w>, over random programs too; third derivatives against
 // differences of the products.
 #include "autodiff/second_order.h"
-#include "frontend/param.h"
+#include "frontend/data/param.h"
 #include "gradient/gradient_check.h"
 #include "support/errors.h"
 
@@ -120,7 +120,9 @@ TEST_F(Hessians, AdjointsOfAdjointsAgreeWithTangentsOfAdjoints) {
 TEST_F(Hessians, AnInputWithoutGradientIsAnError) {
   Param<int> count("count");
   Func loss = loss_with_a_stencil();
-  expect_mentions(error_of<CompileError>([&] { hessian_vector_product(loss, count, {{a, v}}); }),
+  expect_mentions(error_of<CompileError>([&] {
+                    hessian_vector_product(loss, count, {{a, v}});
+                  }),
                   {"twice", "no gradient"});
 }
 

@@ -1,6 +1,6 @@
 // Funcs that cancel are found, and nothing else is: their adjoint is 0, and says why. Forward mode,
 // which follows every path, is the oracle for the gradients.
-#include "autodiff/invariance.h"
+#include "autodiff/rules/invariance.h"
 
 #include "autodiff/tangents.h"
 #include "gradient/gradient_check.h"

@@ -5,7 +5,7 @@
 
 #include "autodiff/custom_derivative.h"
 #include "autodiff/second_order.h"
-#include "frontend/param.h"
+#include "frontend/data/param.h"
 #include "gradient/gradient_check.h"
 #include "support/errors.h"
 
@@ -485,8 +485,9 @@ TEST_F(Jacobians, Errors) {
   expect_mentions(error_of([&] { jacobian(f, a, {}); }), {"1 dimensions and 0 bounds"});
   expect_mentions(error_of([&] { jacobian(f, count, {{0, 4}}); }), {"has type int32"});
   expect_mentions(error_of([&] { jacobian(f, undefined, {{0, 4}}); }), {"has no definition"});
-  expect_mentions(error_of<Unsupported>(
-                      [&] { jacobian(pair, a, {{0, 4}}, {.compression = Compression::Rows}); }),
+  expect_mentions(error_of<Unsupported>([&] {
+                    jacobian(pair, a, {{0, 4}}, {.compression = Compression::Rows});
+                  }),
                   {"of one value", "Compression::Columns"});
   Jacobian j = jacobian(f, a, {{0, 4}});
   expect_mentions(error_of([&] { j.colour({x, x}); }), {"2 are given of 1"});
@@ -506,12 +507,16 @@ TEST_F(Jacobians, WithoutBoundsAreRefused) {
   RDom r(0, length);
   f(x) = 0.0f;
   f(x) += image(r) * image(r) * cast<float>(x);
-  expect_mentions(error_of<Unsupported>([&] { jacobian(f, image, {{0, length}}); }),
+  expect_mentions(error_of<Unsupported>([&] {
+                    jacobian(f, image, {{0, length}});
+                  }),
                   {"compress", "constant bounds"});
   RDom s(0, 5000);
   big(x) = 0.0f;
   big(x) += image(s) * image(s) * cast<float>(x + s);
-  expect_mentions(error_of<Unsupported>([&] { jacobian(big, image, {{0, 5000}}); }),
+  expect_mentions(error_of<Unsupported>([&] {
+                    jacobian(big, image, {{0, 5000}});
+                  }),
                   {"4096 seeds", "needs more"});
 }
 

@@ -8,7 +8,7 @@
 #include <numeric>
 
 #include "autodiff/derivative.h"
-#include "frontend/func.h"
+#include "frontend/language/func.h"
 
 namespace retrograde {
 namespace {

@@ -4,7 +4,7 @@
 #include "autodiff/custom_derivative.h"
 #include "autodiff/jacobian.h"
 #include "autodiff/second_order.h"
-#include "frontend/param.h"
+#include "frontend/data/param.h"
 #include "gradient/gradient_check.h"
 
 namespace retrograde::gradient {

@@ -1,5 +1,5 @@
 // Operations and bytes of small pipelines, against counts done by hand from their definitions.
-#include "autodiff/operation_count.h"
+#include "autodiff/report/operation_count.h"
 
 #include <gtest/gtest.h>
 

@@ -1,11 +1,11 @@
 // Inner adjoints of a step that several inputs have a part in: kept where that pays, and nowhere
 // else. That gradients stay right is for the suite (programs_suite_test.cpp).
-#include "autodiff/shared_adjoints.h"
+#include "autodiff/sweeps/shared_adjoints.h"
 
 #include <gtest/gtest.h>
 
-#include "autodiff/accumulation.h"
 #include "autodiff/derivative.h"
+#include "autodiff/sweeps/accumulation.h"
 #include "gradient/gradient_check.h"
 #include "graph/define.h"
 #include "graph/function.h"

@@ -1,7 +1,7 @@
 // A fixed set of random expressions; fuzz_forms goes on without end.
 #include <gtest/gtest.h>
 
-#include "frontend/expr_ops.h"
+#include "frontend/language/expr_ops.h"
 #include "gradient/forms/check_form.h"
 #include "gradient/forms/expressions.h"
 #include "ir/build.h"

@@ -2,7 +2,7 @@
 // double along the direction; as machine code too. Every kind of update; inputs of every kind;
 // errors.
 #include "autodiff/tangents.h"
-#include "frontend/param.h"
+#include "frontend/data/param.h"
 #include "gradient/gradient_check.h"
 #include "support/errors.h"
 

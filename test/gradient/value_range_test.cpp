@@ -1,5 +1,5 @@
 // Which values may be infinite, and what bounds prove that they are not.
-#include "autodiff/value_range.h"
+#include "autodiff/rules/value_range.h"
 
 #include <cmath>
 

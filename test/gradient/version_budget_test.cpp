@@ -1,8 +1,8 @@
 // Updates that overwrite what their partials need, written as users do: under the defaults their
 // gradients are right, explain() says what is kept, and beyond the budget they are refused.
-#include "autodiff/version_budget.h"
+#include "autodiff/updates/version_budget.h"
 
-#include "frontend/param.h"
+#include "frontend/data/param.h"
 #include "gradient/gradient_check.h"
 
 namespace retrograde::gradient {

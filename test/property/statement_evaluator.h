@@ -42,7 +42,7 @@ class StatementEvaluator : public test::LaneEvaluator {
           buffers[n.name].clear();
         },
         [&](const IfThenElse& n) {
-          run(eval(n.condition)[0].as_bool() ? n.then_case : n.else_case);
+          run(eval(n.condition)[0].as_bool() ? n.when_true : n.when_false);
         },
         [&](const Evaluate& n) { eval(n.value); }, [&](const ProducerConsumer& n) { run(n.body); },
         [&](const Block& n) {

@@ -12,7 +12,7 @@
 #include <string>
 #include <vector>
 
-#include "frontend/func.h"
+#include "frontend/language/func.h"
 #include "stability/traced.h"
 
 namespace retrograde::stability {

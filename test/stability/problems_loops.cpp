@@ -1,6 +1,6 @@
 // Reductions and recurrences: what happens to extremes on their way through sums, products,
 // histograms and scans, stiff and chaotic ones too.
-#include "frontend/inline_reductions.h"
+#include "frontend/language/inline_reductions.h"
 #include "stability/problems.h"
 
 namespace retrograde::stability {

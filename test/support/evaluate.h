@@ -106,7 +106,7 @@ class LaneEvaluator {
   }
 
   Lanes select(const ir::Select& n) {
-    const Lanes c = eval(n.condition), t = eval(n.true_value), f = eval(n.false_value);
+    const Lanes c = eval(n.condition), t = eval(n.when_true), f = eval(n.when_false);
     Lanes result;
     for (size_t i = 0; i < t.size(); ++i)
       result.push_back(c[c.size() == 1 ? 0 : i].as_bool() ? t[i] : f[i]);

@@ -6,7 +6,7 @@
 #include <thread>
 #include <vector>
 
-#include "frontend/jit_handlers.h"
+#include "frontend/run/jit_handlers.h"
 
 namespace retrograde {
 

@@ -4,11 +4,11 @@
 #include <algorithm>
 #include <thread>
 
-#include "frontend/func.h"
 #include "frontend/include/retrograde/retrograde.h"
+#include "frontend/language/func.h"
 #include "ir/parse.h"
 #include "ir/print.h"
-#include "lower/lower_atomics.h"
+#include "lower/loops/lower_atomics.h"
 
 namespace retrograde {
 namespace {
@@ -25,8 +25,8 @@ Buffer<int> indices() {
 void atomic(Func& f, ForType type, int index = 0) {
   ir::Definition& update = f.function()->updates[0];
   update.schedule.atomic = true;
-  update.schedule.touched = true;
-  update.schedule.dims[static_cast<size_t>(index)].for_type = type;
+  update.schedule.is_given = true;
+  update.schedule.dims[static_cast<size_t>(index)].runs = type;
   f.function()->version++;
 }
 
@@ -186,7 +186,7 @@ TEST(Atomic, VectorizedOverPointsAndParallelOverTheReduction) {
     f.update().split(x, xo, xi, 8, TailStrategy::GuardWithIf).reorder(xi, r, xo).vectorize(xi);
     update.schedule.atomic = true;
     for (ir::Dim& dim : update.schedule.dims) {
-      if (dim.is_reduction && !chain) dim.for_type = ForType::Parallel;
+      if (dim.is_reduction && !chain) dim.runs = ForType::Parallel;
     }
     Buffer<int> out = f.realize({width});
     for (int i = 0; i < width; i++) {

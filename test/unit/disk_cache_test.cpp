@@ -12,7 +12,7 @@
 #include <thread>
 
 #include "diagnostics/error.h"
-#include "frontend/compile_cache.h"
+#include "frontend/run/compile_cache.h"
 #include "support/temporary_folder.h"
 #include "unit/codegen_testing.h"
 

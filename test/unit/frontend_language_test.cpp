@@ -84,10 +84,10 @@ TEST(Expressions, SelectChoosesTheFirstThatHolds) {
   Expr e = select(x == 0, 10, x == 1, 20, 30);
   const ir::Select* outer = e.as<ir::Select>();
   ASSERT_TRUE(outer);
-  EXPECT_EQ(*ir::as_const_int(outer->true_value), 10);
-  const ir::Select* inner = outer->false_value.as<ir::Select>();
+  EXPECT_EQ(*ir::as_const_int(outer->when_true), 10);
+  const ir::Select* inner = outer->when_false.as<ir::Select>();
   ASSERT_TRUE(inner);
-  EXPECT_EQ(*ir::as_const_int(inner->false_value), 30);
+  EXPECT_EQ(*ir::as_const_int(inner->when_false), 30);
 }
 
 TEST(Expressions, SelectOfTuplesGoesElementByElement) {
@@ -232,7 +232,7 @@ TEST(Definitions, TuplesHoldSeveralValues) {
   const Tuple values = f.update_values();
   const ir::Call* kept = values[0].as<ir::Call>();
   ASSERT_TRUE(kept);
-  EXPECT_EQ(kept->value_index, 0);
+  EXPECT_EQ(kept->component, 0);
   EXPECT_EQ(kept->symbol.raw(), f.function().get());
 }
 
@@ -480,10 +480,10 @@ TEST(Schedules, VectorizeByAFactorKeepsTheNameForTheOuterLoop) {
   f.vectorize(x, 8).parallel(y);
   const auto& dims = f.get_schedule().dims;
   ASSERT_EQ(dims.size(), 3u);
-  EXPECT_EQ(dims[0].for_type, ForType::Vectorized);
+  EXPECT_EQ(dims[0].runs, ForType::Vectorized);
   EXPECT_EQ(dims[1].var, "x");
-  EXPECT_EQ(dims[1].for_type, ForType::Serial);
-  EXPECT_EQ(dims[2].for_type, ForType::Parallel);
+  EXPECT_EQ(dims[1].runs, ForType::Serial);
+  EXPECT_EQ(dims[2].runs, ForType::Parallel);
 }
 
 TEST(Schedules, FuseMakesOneLoop) {
@@ -516,7 +516,7 @@ TEST(Schedules, IndependentReductionLoopsMayRunInParallel) {
   f(r.x, r.y) = f(r.x, r.y) + 1;
   RVar rxo("rxo"), rxi("rxi");
   f.update().parallel(r.y).split(r.x, rxo, rxi, 4).vectorize(rxi);
-  EXPECT_EQ(f.update().get_schedule().dims[0].for_type, ForType::Vectorized);
+  EXPECT_EQ(f.update().get_schedule().dims[0].runs, ForType::Vectorized);
 }
 
 TEST(Schedules, ReductionLoopsOfASumMayChangeOrder) {

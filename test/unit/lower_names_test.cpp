@@ -3,7 +3,7 @@
 
 #include "ir/parse.h"
 #include "ir/print.h"
-#include "lower/make_names_unique.h"
+#include "lower/nests/make_names_unique.h"
 #include "retrograde/retrograde.h"
 
 namespace retrograde {

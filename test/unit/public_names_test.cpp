@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "frontend/autoscheduler.h"
+#include "frontend/schedule/autoscheduler.h"
 #include "generator/registry.h"
 
 using namespace retrograde;

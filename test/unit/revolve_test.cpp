@@ -1,6 +1,6 @@
 // Schedules of kept states: run on a model of the loop that checks every action, and counted
 // against the optimum, which dynamic programming finds without the closed form.
-#include "autodiff/revolve.h"
+#include "autodiff/time/revolve.h"
 
 #include <gtest/gtest.h>
 

@@ -21,7 +21,7 @@ struct Directives : testing::Test {
     f(x, y) = x + y;
     g(x, y) = f(x, y) + f(x + 1, y);
   }
-  const ir::FuncSchedule& schedule(const Func& func) { return func.function()->schedule; }
+  const ir::FuncPlacement& schedule(const Func& func) { return func.function()->schedule; }
 };
 
 // ---- loop levels ----
@@ -169,8 +169,8 @@ TEST_F(Directives, ASpecializationCopiesTheScheduleSoFar) {
   Stage special = f.specialize(n > 8);
   special.vectorize(xi);
   f.unroll(xi);
-  EXPECT_EQ(special.get_schedule().dims[0].for_type, ForType::Vectorized);
-  EXPECT_EQ(f.get_schedule().dims[0].for_type, ForType::Unrolled);
+  EXPECT_EQ(special.get_schedule().dims[0].runs, ForType::Vectorized);
+  EXPECT_EQ(f.get_schedule().dims[0].runs, ForType::Unrolled);
   EXPECT_EQ(f.get_schedule().specializations.size(), 1u);
 }
 
@@ -181,7 +181,7 @@ TEST_F(Directives, TheSameConditionIsTheSameSpecialization) {
   f.specialize(n > 8).vectorize(x, 4);
   ASSERT_EQ(f.get_schedule().specializations.size(), 2u);
   EXPECT_EQ(f.get_schedule().specializations[0].dims.size(), 3u);
-  EXPECT_EQ(f.get_schedule().specializations[0].dims[2].for_type, ForType::Parallel);
+  EXPECT_EQ(f.get_schedule().specializations[0].dims[2].runs, ForType::Parallel);
 }
 
 TEST_F(Directives, SpecializationsNest) {
@@ -189,7 +189,7 @@ TEST_F(Directives, SpecializationsNest) {
   Stage outer = f.specialize(n > 8);
   outer.specialize(m > 8).parallel(y);
   outer.vectorize(x, 4);
-  const ir::StageSchedule& first = f.get_schedule().specializations[0];
+  const ir::StageLoops& first = f.get_schedule().specializations[0];
   ASSERT_EQ(first.specializations.size(), 1u);
   EXPECT_EQ(first.dims.size(), 3u);
   EXPECT_EQ(first.specializations[0].dims.size(), 2u);
@@ -261,7 +261,7 @@ TEST_F(Directives, ComputeWithNamesALoopOfAnotherFunc) {
   Func h("h");
   h(x, y) = x;
   h.compute_with(f, y, {{y, LoopAlignStrategy::AlignEnd}});
-  const ir::StageSchedule& now = h.get_schedule();
+  const ir::StageLoops& now = h.get_schedule();
   EXPECT_EQ(now.fuse_level.func, f.name());
   EXPECT_EQ(now.fuse_level.stage, 0);
   EXPECT_EQ(now.fuse_alignment.at("y"), LoopAlignStrategy::AlignEnd);

@@ -1,8 +1,8 @@
 // Funcs as coordinates of other Funcs: the range of their values bounds what is read.
 #include <gtest/gtest.h>
 
-#include "lower/inline_functions.h"
-#include "lower/value_bounds.h"
+#include "lower/nests/inline_functions.h"
+#include "lower/nests/value_bounds.h"
 #include "retrograde/retrograde.h"
 
 namespace retrograde {

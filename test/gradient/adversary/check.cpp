@@ -3,7 +3,7 @@
 #include <cmath>
 #include <limits>
 
-#include "autodiff/regions.h"
+#include "autodiff/sweeps/regions.h"
 #include "diagnostics/error.h"
 #include "gradient/adversary/probe.h"
 #include "ir/build.h"

@@ -1,5 +1,5 @@
 // Images, parameters, and reads of them and of Funcs.
-#include "frontend/boundary_conditions.h"
+#include "frontend/language/boundary_conditions.h"
 #include "gradient/adversary/maker.h"
 
 namespace retrograde::gradient {

@@ -6,7 +6,7 @@
 #include <string_view>
 
 #include "diagnostics/error.h"
-#include "frontend/realization.h"
+#include "frontend/data/realization.h"
 #include "gradient/adversary/probe.h"
 #include "gradient/adversary/schedules.h"
 #include "ir/visit.h"

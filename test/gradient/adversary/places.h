@@ -3,8 +3,8 @@
 
 #include <vector>
 
-#include "frontend/buffer.h"
-#include "frontend/param.h"
+#include "frontend/data/buffer.h"
+#include "frontend/data/param.h"
 #include "gradient/adversary/choices.h"
 
 namespace retrograde::gradient {

@@ -18,10 +18,10 @@
 #include <vector>
 
 #include "autodiff/derivative.h"
-#include "frontend/buffer.h"
-#include "frontend/func.h"
-#include "frontend/image_param.h"
-#include "frontend/param.h"
+#include "frontend/data/buffer.h"
+#include "frontend/data/image_param.h"
+#include "frontend/data/param.h"
+#include "frontend/language/func.h"
 #include "gradient/adversary/choices.h"
 #include "testing/array.h"
 

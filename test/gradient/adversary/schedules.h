@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "frontend/func.h"
+#include "frontend/language/func.h"
 
 namespace retrograde::gradient {
 

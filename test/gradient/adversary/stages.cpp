@@ -1,5 +1,5 @@
 // Funcs, their updates and reductions.
-#include "frontend/inline_reductions.h"
+#include "frontend/language/inline_reductions.h"
 #include "gradient/adversary/maker.h"
 
 namespace retrograde::gradient {

@@ -1,8 +1,8 @@
 // Structures that programs of users are made of, over the Func that was defined last: pyramids,
 // histograms that are sliced, convolutions, tables, scans, loops one after the other, the place of
 // a maximum, domains with parametric ends, boundary conditions of boundary conditions.
-#include "frontend/boundary_conditions.h"
-#include "frontend/inline_reductions.h"
+#include "frontend/language/boundary_conditions.h"
+#include "frontend/language/inline_reductions.h"
 #include "gradient/adversary/maker.h"
 
 namespace retrograde::gradient {

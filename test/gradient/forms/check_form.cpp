@@ -6,11 +6,11 @@
 #include <sstream>
 
 #include "autodiff/derivative.h"
-#include "autodiff/forward_sweep.h"
-#include "autodiff/local_derivative.h"
-#include "autodiff/reverse_sweep.h"
+#include "autodiff/sweeps/forward_sweep.h"
+#include "autodiff/sweeps/local_derivative.h"
+#include "autodiff/sweeps/reverse_sweep.h"
 #include "diagnostics/error.h"
-#include "frontend/func.h"
+#include "frontend/language/func.h"
 #include "gradient/forms/dual_oracle.h"
 #include "ir/build.h"
 #include "ir/print.h"

@@ -9,8 +9,8 @@
 #include <quadmath.h>
 #endif
 
-#include "autodiff/distinct_nodes.h"
-#include "autodiff/local_derivative.h"
+#include "autodiff/schedule/distinct_nodes.h"
+#include "autodiff/sweeps/local_derivative.h"
 #include "diagnostics/error.h"
 #include "ir/build.h"
 #include "ir/visit.h"
@@ -111,7 +111,7 @@ class Evaluation {
     if (const auto constant = ir::as_const_float(e)) return {static_cast<Wide>(*constant), {}};
     if (const auto* b = e.as<ir::Binary>()) return binary(e.kind(), operand(b->a), operand(b->b));
     if (const auto* s = e.as<ir::Select>())
-      return operand(s->condition).v != 0 ? operand(s->true_value) : operand(s->false_value);
+      return operand(s->condition).v != 0 ? operand(s->when_true) : operand(s->when_false);
     if (const auto* call = e.as<ir::Call>()) return operation(*call);
     internal_error("the oracle of forms does not know this node");
   }

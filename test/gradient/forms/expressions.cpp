@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "frontend/func.h"
+#include "frontend/language/func.h"
 #include "ir/build.h"
 
 namespace retrograde::gradient {

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "frontend/boundary_conditions.h"
-#include "frontend/inline_reductions.h"
+#include "frontend/language/boundary_conditions.h"
+#include "frontend/language/inline_reductions.h"
 #include "testing/interpreter.h"
 
 namespace retrograde::gradient {

@@ -10,9 +10,9 @@
 #include <vector>
 
 #include "autodiff/derivative.h"
-#include "frontend/buffer.h"
-#include "frontend/func.h"
-#include "frontend/param.h"
+#include "frontend/data/buffer.h"
+#include "frontend/data/param.h"
+#include "frontend/language/func.h"
 #include "gradient/adversary/choices.h"
 
 namespace retrograde::gradient {

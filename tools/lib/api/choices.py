@@ -3,17 +3,17 @@ import re
 
 HEADER_FOLDERS = ["frontend", "generator", "checks"]
 MORE_HEADERS = [
-    "autodiff/custom_derivative.h", "autodiff/derivative.h", "autodiff/jacobian.h", "autodiff/compressed.h",
+    "autodiff/custom_derivative.h", "autodiff/derivative.h", "autodiff/jacobian.h", "autodiff/matrices/compressed.h",
     "autodiff/second_order.h", "autodiff/straight_through.h", "autodiff/tangents.h", "diagnostics/error.h", "diagnostics/pass_observer.h",
     "graph/schedule_log.h", "ir/build.h", "ir/expr.h", "ir/target.h", "ir/type.h"]
 INTERNAL_HEADERS = {
     "checks/arrays.h", "checks/complex_step.h", "checks/culprit.h", "checks/json_number.h",
-    "checks/widen.h", "frontend/argument.h", "frontend/call.h", "frontend/compiler_interface.h",
+    "checks/widen.h", "frontend/data/argument.h", "frontend/run/call.h", "frontend/run/compiler_interface.h",
     "generator/command_line.h", "generator/cpp_stub.h", "generator/members.h",
     "graph/associative_update.h", "graph/binder.h", "graph/copy_graph.h", "graph/define.h",
     "graph/directive.h", "graph/directive_choices.h", "graph/directive_names.h", "graph/directive_text.h",
     "graph/function.h", "graph/give_directive.h", "graph/graph.h", "graph/graph_lines.h", "graph/names.h", "graph/parameter_contents.h", "graph/provenance.h",
-    "graph/race.h", "graph/reduction_domain.h", "graph/reduction_leaves.h", "graph/rfactor.h", "graph/schedule.h",
+    "graph/race_checks.h", "graph/reduction_domain.h", "graph/reduction_leaves.h", "graph/rfactor.h", "graph/schedule.h",
     "graph/wrappers.h", "lower/lower.h"}
 # Parts of templates that users name in no other way than by the whole.
 INTERNAL_SCOPES = {"Declared", "ArrayTraits", "ElementTraits", "InputValue", "InputElements", "ScalarElements",
@@ -31,7 +31,7 @@ INTERNAL_NAMES = re.compile(
 SHOWN_BY = {
     "Dimension": r"\.dim\(", "OutputImageParam": r"ImageParam|output_buffer", "JITHandlers": r"jit_handlers|JITUserContext",
     "FuncTupleElementRef": r"\)\[\d\]", "FuncRef": r"Func", "Realization": r"realize", "Stage": r"update\(|Func",
-    "Pipeline::RealizationArg": r"realize", "GIOBase": r"(Input|Output)<", "GeneratorInputBase": r"Input<",
+    "Pipeline::RealizationArg": r"realize", "GeneratorPort": r"(Input|Output)<", "GeneratorInputBase": r"Input<",
     "GeneratorInput": r"Input<", "GeneratorOutputBase": r"Output<", "GeneratorOutput": r"Output<",
     "GeneratorParamBase": r"GeneratorParam<", "GeneratorBase": r"Generator<|apply\(|GeneratorRegistry",
     "VarOrRVar": r"Var", "ExternSignature": r"JITExtern", "ExternCFunction": r"JITExtern", "ImplicitVar": r"\b_\d?\b",

@@ -62,7 +62,7 @@ class Name:
             last = self.name[len("operator "):].split("<")[0].strip("& ").split()[-1]
             return re.compile(r"\b" + re.escape(last) + r"\b")
         if self.kind == "function":
-            inherited = ("GeneratorBase", "GIOBase", "GeneratorInputBase", "GeneratorOutputBase")
+            inherited = ("GeneratorBase", "GeneratorPort", "GeneratorInputBase", "GeneratorOutputBase")
             front = (r"\b" if self.scope in inherited else r"(?:\.|->|::)" if self.scope
                      else r"(?<![.>\w])(?:\w+::)?")
             return re.compile(front + word + r"(?:<[^;{}()]*>)?\s*[({]")
@@ -330,7 +330,8 @@ class HeaderReader:
 
 def public_headers(root):
     folders = [str(path.relative_to(root / "compiler")) for folder in HEADER_FOLDERS
-               for path in sorted((root / "compiler" / folder).glob("*.h"))]
+               for path in sorted((root / "compiler" / folder).rglob("*.h"))
+               if not {"include", "compat"} & set(path.parts)]
     return [header for header in folders + MORE_HEADERS if header not in INTERNAL_HEADERS]
 
 

@@ -1,0 +1,511 @@
+#include "autodiff/inversion/group_inversion.h"
+
+#include <isl/ilp.h>
+
+#include <algorithm>
+#include <optional>
+
+#include "analysis/interval.h"
+#include "autodiff/inversion/isl_bridge.h"
+#include "autodiff/inversion/isl_maps.h"
+#include "ir/build.h"
+#include "simplify/simplify.h"
+
+namespace retrograde::ir {
+
+namespace {
+
+constexpr int64_t unbounded = -1;
+// Folding a border into the interior may cost this much more iterations before the two are split.
+constexpr double fold_tolerance = 2.5;
+// An interior of fewer iterations an element than this does not choose between its own places and
+// those of a border. A larger one stays one update all the same: its border would be a large update
+// of its own.
+constexpr double short_interior = 4;
+
+isl::pw_aff insert_input(const isl::pw_aff& e) {
+  int n = isl_pw_aff_dim(e.get(), isl_dim_in);
+  return isl::manage(isl_pw_aff_insert_dims(e.copy(), isl_dim_in, static_cast<unsigned>(n), 1));
+}
+isl::map insert_input(const isl::map& m) {
+  int n = isl_map_dim(m.get(), isl_dim_in);
+  return isl::manage(isl_map_insert_dims(m.copy(), isl_dim_in, static_cast<unsigned>(n), 1));
+}
+
+// The largest difference between two outputs of one input; nullopt when it is unbounded (or only by
+// parameters).
+std::optional<int64_t> spread(const isl::map& one_output) {
+  isl::map pairs = one_output.reverse().apply_range(one_output);
+  isl_val* v = isl_set_dim_max_val(isl_map_deltas(pairs.copy()), 0);
+  std::optional<int64_t> result;
+  if (isl_val_is_int(v)) result = isl_val_get_num_si(v);
+  isl_val_free(v);
+  return result;
+}
+
+int64_t stride_of(const isl::map& one_output) {
+  isl_stride_info* info = isl_map_get_range_stride_info(one_output.get(), 0);
+  isl_val* v = isl_stride_info_get_stride(info);
+  int64_t result = isl_val_get_num_si(v);
+  isl_val_free(v);
+  isl_stride_info_free(info);
+  return std::max<int64_t>(result, 1);
+}
+
+std::optional<isl::pw_aff> function_of(const isl::map& one_output) {
+  isl_pw_multi_aff* pma = isl_pw_multi_aff_from_map(isl_map_coalesce(one_output.copy()));
+  isl::pw_aff result = isl::manage(isl_pw_multi_aff_get_pw_aff(pma, 0));
+  isl_pw_multi_aff_free(pma);
+  return result.coalesce();
+}
+isl::pw_aff smallest_output(const isl::map& one_output) {
+  isl_pw_multi_aff* pma = isl_map_lexmin_pw_multi_aff(one_output.copy());
+  isl::pw_aff result = isl::manage(isl_pw_multi_aff_get_pw_aff(pma, 0));
+  isl_pw_multi_aff_free(pma);
+  return result.coalesce();
+}
+unsigned pieces_of(const isl::pw_aff& e) {
+  return static_cast<unsigned>(isl_pw_aff_n_piece(e.get()));
+}
+
+// What a stage variable is in the fibre over an element.
+struct Coordinate {
+  bool is_free = false;
+  isl::pw_aff value;       // over (y, rho...) as far as known then
+  int rho = -1;            // free: which new variable
+  bool is_static = false;  // free: runs over its own domain, whatever y
+  int64_t extent = 1;      // free: number of steps, `unbounded` when parametric
+};
+
+struct Plan {
+  std::vector<Coordinate> coordinates;  // one a stage variable
+  isl::set valid;                       // over (y, rho...)
+  std::vector<int> free_vars;           // stage variable of each rho
+  double cost = 1;                      // iterations for each element; infinite when parametric
+};
+
+class GroupInverter {
+ public:
+  GroupInverter(const Group& group, const std::vector<Expr>& fixed, unsigned long operations)
+      : context_(operations),
+        group_(group),
+        bridge_(context_, names_of(group.vars)),
+        domain_(bridge_.universe()),
+        not_empty_(bridge_.universe()) {
+    for (const Expr& e : fixed) bridge_.make_parameter(e);
+    for (const Expr& index : group.indices) affine_.push_back(*bridge_.affine(index));
+    build_domain();
+  }
+
+  std::vector<GroupPiece> run() {
+    std::vector<GroupPiece> result;
+    for (const isl::map& piece : choose_pieces()) result.push_back(emit(piece));
+    return result;
+  }
+
+ private:
+  static std::vector<std::string> names_of(const std::vector<LoopVariable>& vars) {
+    std::vector<std::string> names;
+    for (const LoopVariable& v : vars) names.push_back(v.name);
+    return names;
+  }
+  int var_count() const { return static_cast<int>(group_.vars.size()); }
+  int index_count() const { return static_cast<int>(group_.indices.size()); }
+
+  void build_domain() {
+    for (int i = 0; i < var_count(); ++i) {
+      const LoopVariable& v = group_.vars[static_cast<size_t>(i)];
+      isl::set range = bridge_.universe();
+      if (v.min.defined()) range = range.intersect(bridge_.dim(i).ge_set(bridge_.bound(v.min)));
+      if (v.max.defined()) range = range.intersect(bridge_.dim(i).le_set(bridge_.bound(v.max)));
+      own_range_.push_back(range);
+      domain_ = domain_.intersect(range);
+    }
+    std::vector<isl::set> conditions;
+    for (const Expr& e : group_.predicate) conditions.push_back(*bridge_.condition(e));
+    for (const LoopVariable& v : group_.region) assume_not_empty(v);
+    domain_ = domain_.intersect(not_empty_);
+    box_ = domain_;
+    for (const isl::set& s : conditions) domain_ = domain_.intersect(s).coalesce();
+  }
+
+  // Where the target has no element there is nothing to do. Ends over parameters of their own, as
+  // those that isl cannot follow, say nothing about the others, and would make the search longer.
+  void assume_not_empty(const LoopVariable& v) {
+    if (!v.min.defined() || !v.max.defined()) return;
+    const size_t known = bridge_.parameters().size();
+    isl::pw_aff min = bridge_.bound(v.min), max = bridge_.bound(v.max);
+    if (bridge_.parameters().size() == known) not_empty_ = not_empty_.intersect(min.le_set(max));
+  }
+
+  // {z -> y} over all of z: the domain is not applied.
+  isl::map relation_of(const std::vector<isl::pw_aff>& indices) const {
+    isl_space* space = isl_space_alloc(bridge_.ctx(), 0, static_cast<unsigned>(var_count()),
+                                       static_cast<unsigned>(index_count()));
+    isl::map result = isl::manage(isl_map_universe(space));
+    for (int d = 0; d < index_count(); ++d) {
+      result = result.intersect(output_equals(indices[static_cast<size_t>(d)], d, index_count()));
+    }
+    return result;
+  }
+
+  // The relation split where the indices' pieces differ, or whole where that costs little.
+  std::vector<isl::map> choose_pieces() {
+    isl::map whole = relation_of(affine_).intersect_domain(domain_).coalesce();
+    std::vector<isl::map> split = split_pieces();
+    if (split.empty()) return {};  // no point of the stage reads anything
+    if (split.size() == 1) return {whole};
+    Plan all = plan(whole);
+    if (all.free_vars.empty()) return {whole};
+    double interior = 0;
+    for (const isl::map& piece : split) {
+      Plan p = plan(piece);
+      if (!has_fixed_index(piece)) interior = std::max(interior, p.cost);
+    }
+    bool folds = interior > 1 && all.cost <= fold_tolerance * interior &&
+                 (interior >= short_interior || in_one_piece(all));
+    return folds ? std::vector<isl::map>{whole} : split;
+  }
+
+  // Whether the places that are read are the same sums all over the domain. Where they are not,
+  // every vector of the interior would choose between those of the borders.
+  static bool in_one_piece(const Plan& plan) {
+    return std::all_of(plan.coordinates.begin(), plan.coordinates.end(),
+                       [](const Coordinate& c) { return pieces_of(c.value) == 1; });
+  }
+
+  std::vector<isl::map> split_pieces() const {
+    struct Part {
+      isl::set where;
+      std::vector<isl::pw_aff> indices;
+    };
+    std::vector<Part> parts{{domain_, {}}};
+    for (const isl::pw_aff& index : affine_) {
+      std::vector<Part> next;
+      for (const Part& part : parts) {
+        index.foreach_piece([&](isl::set where, isl::multi_aff value) {
+          isl::set both = part.where.intersect(where).coalesce();
+          if (both.is_empty()) return;
+          next.push_back({both, part.indices});
+          next.back().indices.push_back(isl::pw_aff(value.at(0)));
+        });
+      }
+      parts = std::move(next);
+    }
+    std::vector<isl::map> result;
+    for (const Part& part : parts) {
+      // A union of disjoint sets (x < 0 or x >= n) is cheaper as two boxes.
+      isl_set* disjoint = isl_set_make_disjoint(part.where.copy());
+      isl::set sets = isl::manage(disjoint).coalesce();
+      isl::map values = relation_of(part.indices);
+      sets.foreach_basic_set(
+          [&](isl::basic_set b) { result.push_back(values.intersect_domain(isl::set(b))); });
+    }
+    return result;
+  }
+
+  bool has_fixed_index(const isl::map& piece) const {
+    for (int d = 0; d < index_count(); ++d) {
+      if (fixed_index(piece, d)) return true;
+    }
+    return false;
+  }
+  // The index in dimension d when it is the same for all points of the piece: a function of the
+  // parameters.
+  std::optional<isl::pw_aff> fixed_index(const isl::map& piece, int d) const {
+    isl::map one = only_output(piece, d);
+    int n = isl_map_dim(one.get(), isl_dim_in);
+    isl::map constant =
+        isl::manage(isl_map_project_out(one.copy(), isl_dim_in, 0, static_cast<unsigned>(n)));
+    if (!is_single_valued(constant)) return std::nullopt;
+    isl::pw_aff value = *function_of(constant);
+    if (pieces_of(value) != 1) return std::nullopt;
+    // Without the conditions on parameters under which the piece has points at all.
+    isl::pw_aff total;
+    value.foreach_piece([&](isl::set, isl::multi_aff a) { total = isl::pw_aff(a.at(0)); });
+    return total;
+  }
+
+  // ---- the fibre, variable by variable ----
+
+  struct Fibre {
+    isl::map exact, loose;  // (y, rho...) -> z; loose: without the domain
+  };
+
+  Plan plan(const isl::map& piece) {
+    Plan result;
+    result.coordinates.resize(group_.vars.size());
+    isl::map loose = isl::manage(isl_map_gist_domain(piece.copy(), box_.copy()));
+    Fibre fibre{piece.reverse(), loose.reverse()};
+    std::vector<int> open;
+    for (int j = 0; j < var_count(); ++j) open.push_back(j);
+    while (!open.empty()) {
+      settle_determined(fibre, open, result);
+      if (!open.empty()) free_cheapest(fibre, open, result);
+    }
+    result.valid = fibre.exact.domain().coalesce();
+    return result;
+  }
+
+  void settle_determined(Fibre& fibre, std::vector<int>& open, Plan& plan) {
+    for (auto it = open.begin(); it != open.end();) {
+      isl::map exact = only_output(fibre.exact, *it), loose = only_output(fibre.loose, *it);
+      if (!is_single_valued(exact)) {
+        ++it;
+        continue;
+      }
+      // Without the domain's borders the expression has fewer pieces.
+      auto& c = plan.coordinates[static_cast<size_t>(*it)];
+      std::optional<isl::pw_aff> value;
+      if (is_single_valued(loose)) value = function_of(loose);
+      if (!value || pieces_of(*value) != 1) value = function_of(exact);
+      c.value = *value;
+      it = open.erase(it);
+    }
+  }
+
+  struct Candidate {
+    int var = -1;
+    int64_t extent = unbounded;
+    int64_t stride = 1;
+    bool is_static = false;
+  };
+
+  void free_cheapest(Fibre& fibre, std::vector<int>& open, Plan& plan) {
+    Candidate best;
+    for (int j : open) {
+      Candidate c = candidate(fibre, j);
+      if (best.var < 0 || is_better(c, best)) best = c;
+    }
+    int rho = static_cast<int>(plan.free_vars.size());
+    isl::pw_aff base = base_of(fibre, best);
+    int inputs = isl_map_dim(fibre.exact.get(), isl_dim_in);
+    base = insert_input(base);
+    isl_local_space* space = isl_local_space_from_space(isl_pw_aff_get_domain_space(base.get()));
+    isl::pw_aff step =
+        isl::manage(isl_pw_aff_var_on_domain(space, isl_dim_set, static_cast<unsigned>(inputs)));
+    isl::pw_aff value =
+        base.add(step.scale(isl::manage(isl_val_int_from_si(bridge_.ctx(), best.stride))));
+    isl::map link = output_equals(value, best.var, var_count());
+    fibre.exact = insert_input(fibre.exact).intersect(link);
+    fibre.loose = insert_input(fibre.loose).intersect(link);
+    plan.coordinates[static_cast<size_t>(best.var)] = {true, value, rho, best.is_static,
+                                                       best.extent};
+    plan.free_vars.push_back(best.var);
+    plan.cost = best.extent == unbounded ? 1e30 : plan.cost * static_cast<double>(best.extent);
+    open.erase(std::find(open.begin(), open.end(), best.var));
+  }
+
+  Candidate candidate(const Fibre& fibre, int j) const {
+    Candidate c;
+    c.var = j;
+    isl::map exact = only_output(fibre.exact, j);
+    c.stride = stride_of(exact);
+    if (auto s = spread(exact)) c.extent = *s / c.stride + 1;
+    if (auto own = own_extent(j); own && c.stride == 1 && c.extent == *own) c.is_static = true;
+    if (c.extent == unbounded) c.is_static = true, c.stride = 1;
+    return c;
+  }
+  // Fewer iterations first, then the stage's own reduction variables, which keep their bounds.
+  bool is_better(const Candidate& a, const Candidate& b) const {
+    auto rank = [&](const Candidate& c) {
+      const LoopVariable& v = group_.vars[static_cast<size_t>(c.var)];
+      return std::tuple(c.extent == unbounded, c.extent, !v.is_reduction, !c.is_static);
+    };
+    return rank(a) < rank(b);
+  }
+  std::optional<int64_t> own_extent(int j) const {
+    const LoopVariable& v = group_.vars[static_cast<size_t>(j)];
+    if (!v.min.defined() || !v.max.defined()) return std::nullopt;
+    auto extent = as_const_int(simplify(v.max - v.min + 1));
+    return extent;
+  }
+
+  // Where the free variable starts: its own minimum, else the smallest point of the fibre.
+  isl::pw_aff base_of(const Fibre& fibre, const Candidate& c) {
+    if (c.is_static) {
+      const LoopVariable& v = group_.vars[static_cast<size_t>(c.var)];
+      if (!v.min.defined()) {
+        user_error("differentiate an access over an unbounded domain",
+                   "every variable needs a range", text(quoted(v.name), " has none"),
+                   "clamp the index that it comes from");
+      }
+      return on_space(bridge_.bound(v.min), fibre.exact);
+    }
+    // With as little of the domain as keeps the extent, the expression has fewer pieces.
+    isl::map own = fibre.loose.intersect_range(own_range_[static_cast<size_t>(c.var)]);
+    for (const isl::map& m : {only_output(fibre.loose, c.var), only_output(own, c.var)}) {
+      auto s = spread(m);
+      if (!s || *s / c.stride + 1 != c.extent || stride_of(m) != c.stride) continue;
+      isl::pw_aff base = smallest_output(m);
+      if (pieces_of(base) == 1) return base;
+    }
+    return smallest_output(only_output(fibre.exact, c.var));
+  }
+  // An expression of the parameters alone, as a function on the fibre's inputs.
+  isl::pw_aff on_space(const isl::pw_aff& e, const isl::map& fibre) const {
+    isl_pw_aff* moved =
+        isl_pw_aff_drop_dims(e.copy(), isl_dim_in, 0, static_cast<unsigned>(var_count()));
+    int inputs = isl_map_dim(fibre.get(), isl_dim_in);
+    return isl::manage(isl_pw_aff_insert_dims(moved, isl_dim_in, 0, static_cast<unsigned>(inputs)));
+  }
+
+  // ---- expressions ----
+
+  GroupPiece emit(const isl::map& piece) {
+    Plan p = plan(piece);
+    GroupPiece g;
+    std::vector<Expr> names = element_names(piece, g);
+    for (int v : p.free_vars) {
+      const LoopVariable& loop = group_.vars[static_cast<size_t>(v)];
+      const Coordinate& c = p.coordinates[static_cast<size_t>(v)];
+      g.free.push_back(
+          {v, c.extent == unbounded ? extent_of(loop) : make_const(Int(32), c.extent)});
+      names.push_back(variable(rho_name(loop.name)));
+    }
+    for (int j = 0; j < var_count(); ++j) {
+      const Coordinate& c = p.coordinates[static_cast<size_t>(j)];
+      g.iteration[group_.vars[static_cast<size_t>(j)].name] =
+          simplify(bridge_.to_expr(c.value, names));
+    }
+    add_predicate(piece, p, g, names);
+    protect(g);
+    return g;
+  }
+
+  // y: names of elements, or the fixed index.
+  std::vector<Expr> element_names(const isl::map& piece, GroupPiece& g) {
+    for (int d = 0; d < index_count(); ++d) {
+      auto fixed = fixed_index(piece, d);
+      g.lhs.push_back(fixed ? simplify(bridge_.to_expr(*fixed))
+                            : variable(element_name(group_.dims[static_cast<size_t>(d)])));
+      g.pure.push_back(!fixed);
+    }
+    return g.lhs;
+  }
+
+  void add_predicate(const isl::map& piece, const Plan& p, GroupPiece& g,
+                     const std::vector<Expr>& names) {
+    isl::set context = rho_box(p).intersect(fixed_elements(piece, p));
+    isl::set needed = p.valid.gist(context).coalesce();
+    needed = isl::manage(isl_set_gist_params(needed.release(), assumed().release()));
+    // Coalescing leaves unions that are one basic set all the same.
+    isl::set hull = isl::manage(isl_set_from_basic_set(isl_set_simple_hull(needed.copy())));
+    if (hull.is_equal(needed)) needed = hull;
+    if (!isl_set_plain_is_universe(needed.get()))
+      g.predicate.push_back(bridge_.to_expr(needed, names));
+  }
+
+  // What holds wherever a gather adds anything: the adjoints that it reads are 0 where a stage's
+  // pure variables have no value. A reduction domain may be empty, and what is read is not 0 then.
+  isl::set assumed() const {
+    isl::set pure = not_empty_;
+    for (size_t i = 0; i < group_.vars.size(); ++i) {
+      if (!group_.vars[i].is_reduction) pure = pure.intersect(own_range_[i]);
+    }
+    return isl::manage(isl_set_params(pure.release()));
+  }
+
+  isl::set rho_box(const Plan& p) const {
+    isl::set box = isl::manage(isl_set_universe(isl_set_get_space(p.valid.get())));
+    for (size_t k = 0; k < p.free_vars.size(); ++k) {
+      const Coordinate& c = p.coordinates[static_cast<size_t>(p.free_vars[k])];
+      unsigned at = static_cast<unsigned>(index_count()) + static_cast<unsigned>(k);
+      isl_set* s = isl_set_lower_bound_si(box.release(), isl_dim_set, at, 0);
+      if (c.extent != unbounded) {
+        s = isl_set_upper_bound_val(s, isl_dim_set, at,
+                                    isl_val_int_from_si(bridge_.ctx(), c.extent - 1));
+      }
+      box = isl::manage(s);
+      if (c.extent == unbounded) {
+        // rho runs over the variable's own range: base + rho <= max.
+        isl::map at_most = output_equals(pad(c.value, box), p.free_vars[k], var_count());
+        isl::map in_range =
+            at_most.intersect_range(own_range_[static_cast<size_t>(p.free_vars[k])]);
+        box = box.intersect(in_range.domain());
+      }
+    }
+    return box;
+  }
+  // The function on a space with more inputs at the end.
+  static isl::pw_aff pad(const isl::pw_aff& e, const isl::set& space) {
+    int have = isl_pw_aff_dim(e.get(), isl_dim_in), want = isl_set_dim(space.get(), isl_dim_set);
+    return isl::manage(isl_pw_aff_insert_dims(e.copy(), isl_dim_in, static_cast<unsigned>(have),
+                                              static_cast<unsigned>(want - have)));
+  }
+
+  // Where the predicate is false the point found may lie outside the domain, and what is read there
+  // outside of buffers: it is clamped into the domain, unless interval arithmetic, which is what
+  // bounds inference will use, shows that it is inside for every element. Where bounds are
+  // constants the simplifier drops these clamps again.
+  void protect(GroupPiece& g) const {
+    Scope<Interval> scope;
+    for (int d : group_.dims) scope.push(element_name(d), Interval::everything());
+    for (const auto& free : g.free) {
+      const std::string& name = group_.vars[static_cast<size_t>(free.var)].name;
+      scope.push(rho_name(name), {make_zero(Int(32)), simplify(free.extent - 1)});
+    }
+    for (const LoopVariable& v : group_.vars) {
+      Expr& e = g.iteration[v.name];
+      if (is_const(e)) continue;
+      Interval range = bounds_of(e, scope);
+      bool above = !v.min.defined() || (range.min.defined() && can_prove(range.min >= v.min));
+      bool below = !v.max.defined() || (range.max.defined() && can_prove(range.max <= v.max));
+      if (above && below) continue;
+      e = likely(e);
+      // The first point of a domain whose run-time extent may be 0: its last one lies before it.
+      const bool may_be_empty = v.min.defined() && v.max.defined() && !can_prove(v.min <= v.max);
+      if (v.min.defined() && !may_be_empty) e = max(e, v.min);
+      if (v.max.defined()) e = min(e, v.max);
+      if (may_be_empty) e = max(e, v.min);
+    }
+  }
+
+  // y_d as a function on the plan's space.
+  static isl::pw_aff element_dim(const isl::set& space, int d) {
+    isl_local_space* local = isl_local_space_from_space(isl_set_get_space(space.get()));
+    return isl::manage(isl_pw_aff_var_on_domain(local, isl_dim_set, static_cast<unsigned>(d)));
+  }
+  // An expression of the parameters alone, as a function on the plan's space.
+  static isl::pw_aff constant_on(const isl::set& space, const isl::pw_aff& e) {
+    int have = isl_pw_aff_dim(e.get(), isl_dim_in), want = isl_set_dim(space.get(), isl_dim_set);
+    isl_pw_aff* moved = isl_pw_aff_drop_dims(e.copy(), isl_dim_in, 0, static_cast<unsigned>(have));
+    return isl::manage(isl_pw_aff_insert_dims(moved, isl_dim_in, 0, static_cast<unsigned>(want)));
+  }
+  static isl::set whole_space(const Plan& p) {
+    return isl::manage(isl_set_universe(isl_set_get_space(p.valid.get())));
+  }
+
+  // {y : y_d is the index that all points of the piece share}
+  isl::set fixed_elements(const isl::map& piece, const Plan& p) const {
+    isl::set result = whole_space(p);
+    for (int d = 0; d < index_count(); ++d) {
+      if (auto fixed = fixed_index(piece, d)) {
+        result = result.intersect(element_dim(result, d).eq_set(constant_on(result, *fixed)));
+      }
+    }
+    return result;
+  }
+
+  static Expr extent_of(const LoopVariable& v) { return simplify(v.max - v.min + 1); }
+
+  IslContext context_;  // outlives every isl object below
+  const Group& group_;
+  IslBridge bridge_;
+  isl::set domain_, box_;            // with and without the predicate
+  isl::set not_empty_;               // where the target has elements
+  std::vector<isl::set> own_range_;  // of each variable alone
+  std::vector<isl::pw_aff> affine_;  // the indices
+};
+
+}  // namespace
+
+std::string element_name(int d) { return "element$" + std::to_string(d); }
+std::string rho_name(const std::string& stage_var) { return "rho$" + stage_var; }
+
+std::vector<GroupPiece> invert_group(const Group& group, const std::vector<Expr>& fixed,
+                                     unsigned long operations) {
+  return GroupInverter(group, fixed, operations).run();
+}
+
+}  // namespace retrograde::ir

@@ -1,0 +1,64 @@
+#include "autodiff/inversion/inversion_cost.h"
+
+#include <optional>
+
+#include "diagnostics/error.h"
+#include "ir/build.h"
+#include "simplify/simplify.h"
+
+namespace retrograde::ir {
+
+namespace {
+
+std::optional<double> extent_of(const LoopVariable& v) {
+  if (!v.min.defined() || !v.max.defined()) return std::nullopt;
+  auto extent = as_const_int(simplify(v.max - v.min + 1));
+  return extent ? std::optional<double>(static_cast<double>(*extent)) : std::nullopt;
+}
+
+std::optional<double> points_of(const IterationDomain& domain) {
+  double points = 1;
+  for (const LoopVariable& v : domain.vars) {
+    auto extent = extent_of(v);
+    if (!extent) return std::nullopt;
+    points *= *extent;
+  }
+  return points;
+}
+
+std::optional<double> iterations_of(const Gather& g, const AccessQuery& query) {
+  double iterations = 1;
+  for (size_t d = 0; d < g.pure.size(); ++d) {
+    if (!g.pure[d]) continue;
+    auto extent = d < query.region.size() ? extent_of(query.region[d]) : std::nullopt;
+    if (!extent) return std::nullopt;
+    iterations *= *extent;
+  }
+  for (const ReductionVariable& r : g.rdom ? g.rdom->vars : std::vector<ReductionVariable>{}) {
+    auto extent = as_const_int(simplify(r.extent));
+    if (!extent) return std::nullopt;
+    iterations *= static_cast<double>(*extent);
+  }
+  return iterations;
+}
+
+}  // namespace
+
+Inversion invert_or_scatter(const AccessQuery& any_query, unsigned long operations) {
+  AccessQuery query = any_query;
+  query.operations = operations;
+  Inversion inversion = invert_access(query);
+  auto points = points_of(query.domain);
+  double total = 0;
+  for (const Gather& g : inversion.gathers) {
+    auto iterations = iterations_of(g, query);
+    if (!points || !iterations) return inversion;
+    total += *iterations;
+  }
+  if (!points || total <= dearer * *points) return inversion;
+  return {{scatter_access(query)},
+          text("a gather would run ", static_cast<int64_t>(total), " iterations for ",
+               static_cast<int64_t>(*points), " points")};
+}
+
+}  // namespace retrograde::ir

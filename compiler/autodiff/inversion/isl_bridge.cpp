@@ -1,0 +1,460 @@
+#include "autodiff/inversion/isl_bridge.h"
+
+#include <isl/constraint.h>
+#include <isl/ilp.h>
+#include <isl/options.h>
+
+#include <algorithm>
+#include <unordered_set>
+
+#include "ir/build.h"
+#include "ir/visit.h"
+
+namespace retrograde::ir {
+
+IslContext::IslContext(unsigned long max_operations) : ctx(isl_ctx_alloc()) {
+  isl_options_set_on_error(ctx, ISL_ON_ERROR_CONTINUE);
+  isl_ctx_set_max_operations(ctx, max_operations);
+}
+IslContext::~IslContext() { isl_ctx_free(ctx); }
+
+void throw_if_failed(isl_ctx* ctx) {
+  if (isl_ctx_last_error(ctx) != isl_error_none) isl::exception::throw_last_error(isl::ctx(ctx));
+}
+
+IslBridge::IslBridge(IslContext& context, std::vector<std::string> dims)
+    : ctx_(context.ctx), dims_(std::move(dims)) {
+  isl_space* space = isl_space_set_alloc(ctx_, 0, static_cast<unsigned>(dims_.size()));
+  universe_ = isl::manage(isl_set_universe(space));
+}
+
+IslBridge IslBridge::with_dims(std::vector<std::string> dims) const {
+  IslBridge result = *this;
+  result.universe_ = isl::manage(
+      isl_set_universe(isl_space_set_alloc(ctx_, 0, static_cast<unsigned>(dims.size()))));
+  result.dims_ = std::move(dims);
+  result.known_.clear();
+  return result;
+}
+
+isl::pw_aff IslBridge::constant(int64_t value) const {
+  return isl::manage(isl_pw_aff_val_on_domain(universe_.copy(), isl_val_int_from_si(ctx_, value)));
+}
+
+isl::pw_aff IslBridge::dim(int position) const {
+  isl_local_space* space = isl_local_space_from_space(isl_set_get_space(universe_.get()));
+  return isl::manage(isl_pw_aff_var_on_domain(space, isl_dim_set, static_cast<unsigned>(position)));
+}
+
+isl::pw_aff IslBridge::parameter(const Expr& e) {
+  auto [it, is_new] =
+      parameter_names_.try_emplace(e, "p" + std::to_string(parameter_names_.size()));
+  if (is_new) parameters_[it->second] = e;
+  isl_id* id = isl_id_alloc(ctx_, it->second.c_str(), nullptr);
+  return isl::manage(isl_pw_aff_param_on_domain_id(universe_.copy(), id));
+}
+
+bool IslBridge::mentions_dim(const Expr& e) const {
+  return any_node(e, [&](const Expr& node) {
+    const auto* v = node.as<Variable>();
+    return v && std::find(dims_.begin(), dims_.end(), v->name) != dims_.end();
+  });
+}
+
+namespace {
+
+// Sums and products of such integers are taken modulo a power of two, which isl's are not.
+bool wraps(Type t) { return !t.is_int() || t.bits() < 32; }
+
+// Parameters come back as int32, of which wider data have no counterpart.
+bool is_wide(Type t) { return t.bits() > 32 || (t.is_uint() && t.bits() == 32); }
+bool has_wide_data(const Expr& e) {
+  return any_node(e, [&](const Expr& node) {
+    const auto* call = node.as<Call>();
+    const bool is_data = node.as<Variable>() || (call && call->call_type != CallType::Operator);
+    return is_data && is_wide(node.type());
+  });
+}
+
+// Whether numbers of such operands are those of isl.
+bool is_followed(const Binary& comparison) {
+  const Type t = comparison.a.type();
+  if (is_wide(t)) return t.is_int() && !has_wide_data(comparison.a) && !has_wide_data(comparison.b);
+  return t.is_int() || t.is_uint();
+}
+
+}  // namespace
+
+std::optional<isl::pw_aff> IslBridge::obstacle(const Expr& e) {
+  if (!mentions_dim(e) || fixed_.contains(e)) return parameter(e);
+  obstacles_.insert(e);
+  return std::nullopt;
+}
+
+// A condition that isl does not follow: a parameter, 0 or 1, where its value is known to be fixed.
+std::optional<isl::set> IslBridge::opaque(const Expr& e) {
+  if (fixed_.contains(e)) return parameter(e).ge_set(constant(1));
+  obstacles_.insert(e);
+  return std::nullopt;
+}
+
+std::optional<isl::pw_aff> IslBridge::binary(const Binary& b, const Expr& e) {
+  if (wraps(e.type())) return obstacle(e);
+  std::optional<int64_t> divisor = as_const_int(b.b);
+  if (b.kind == Kind::Mul) {
+    if (!divisor && !as_const_int(b.a)) return obstacle(e);
+    auto a = affine(b.a), c = affine(b.b);
+    if (!a || !c) return std::nullopt;
+    return a->mul(*c);
+  }
+  if (b.kind == Kind::Div || b.kind == Kind::Mod) {
+    if (!divisor || *divisor == 0) return obstacle(e);
+    auto a = affine(b.a);
+    if (!a) return std::nullopt;
+    isl::val magnitude = isl::manage(isl_val_int_from_si(ctx_, std::abs(*divisor)));
+    if (b.kind == Kind::Mod) return a->mod(magnitude);
+    isl::pw_aff quotient =
+        isl::manage(isl_pw_aff_scale_down_val(a->copy(), magnitude.copy())).floor();
+    return *divisor > 0 ? quotient : quotient.neg();
+  }
+  auto a = affine(b.a), c = affine(b.b);
+  if (!a || !c) return std::nullopt;
+  switch (b.kind) {
+    case Kind::Add:
+      return a->add(*c);
+    case Kind::Sub:
+      return a->sub(*c);
+    case Kind::Min:
+      return a->min(*c).coalesce();
+    case Kind::Max:
+      return a->max(*c).coalesce();
+    default:
+      return obstacle(e);
+  }
+}
+
+// int(abs(a)) and int(absd(a, b)): the unsigned value in between is converted back.
+std::optional<isl::pw_aff> IslBridge::absolute(const Cast& c) {
+  const auto* call = c.value.as<Call>();
+  if (!call || !(call->is_op(Op::abs) || call->is_op(Op::absd))) return std::nullopt;
+  if (!call->args[0].type().is_int() || call->args[0].type().bits() < 32 || !c.type.is_int())
+    return std::nullopt;
+  auto a = affine(call->args[0]);
+  if (a && call->is_op(Op::absd)) {
+    auto b = affine(call->args[1]);
+    if (!b) return std::nullopt;
+    a = a->sub(*b);
+  }
+  if (!a) return std::nullopt;
+  return a->max(a->neg()).coalesce();
+}
+
+// Shifts and masks by constants: multiples, floors and moduli of powers of two.
+std::optional<isl::pw_aff> IslBridge::bits(const Call& c, const Expr& e) {
+  const bool shifts = c.is_op(Op::shift_left) || c.is_op(Op::shift_right);
+  if (!(shifts || c.is_op(Op::bitwise_and)) || !e.type().is_int() || e.type().bits() < 32)
+    return obstacle(e);
+  const std::optional<int64_t> amount = as_const_int(c.args[1]);
+  constexpr int64_t largest = int64_t{1} << 30;  // power of two in an int32
+  if (!amount || *amount < 0 || *amount >= largest || (shifts && *amount > 30)) return obstacle(e);
+  const int64_t power = shifts ? int64_t{1} << *amount : *amount + 1;
+  if ((power & (power - 1)) != 0) return obstacle(e);
+  const Expr factor = make_const(e.type(), power);
+  return affine(c.is_op(Op::shift_left)    ? c.args[0] * factor
+                : c.is_op(Op::shift_right) ? c.args[0] / factor
+                                           : c.args[0] % factor);
+}
+
+std::optional<isl::pw_aff> IslBridge::affine(const Expr& e) {
+  const auto known = known_.find(e.get());
+  if (known != known_.end()) return known->second.second;
+  std::optional<isl::pw_aff> result = affine_form(e);
+  known_.insert_or_assign(e.get(), std::pair(e, result));
+  return result;
+}
+
+std::optional<isl::pw_aff> IslBridge::affine_form(const Expr& e) {
+  if (fixed_.contains(e)) return parameter(e);
+  if (auto value = as_const_int(e)) return constant(*value);
+  if (e.type().is_float() || e.type().is_bool()) return obstacle(e);
+  return match(
+      e,
+      [&](const Variable& v) -> std::optional<isl::pw_aff> {
+        auto it = std::find(dims_.begin(), dims_.end(), v.name);
+        return it == dims_.end() ? parameter(e) : dim(static_cast<int>(it - dims_.begin()));
+      },
+      [&](const Binary& b) { return binary(b, e); },
+      [&](const Select& s) -> std::optional<isl::pw_aff> {
+        auto c = condition(s.condition);
+        if (!c) return obstacle(e);
+        auto t = affine(s.when_true), f = affine(s.when_false);
+        if (!t || !f) return std::nullopt;
+        isl::set otherwise = universe_.subtract(*c);
+        return t->intersect_domain(*c).union_add(f->intersect_domain(otherwise)).coalesce();
+      },
+      [&](const Cast& c) -> std::optional<isl::pw_aff> {
+        if (auto magnitude = absolute(c)) return magnitude;
+        if (c.value.type().is_bool() && c.type.is_int())
+          return affine(make_select(c.value, make_one(c.type), make_zero(c.type)));
+        bool exact = c.value.type().is_int() && c.type.is_int() && c.value.type().bits() >= 32 &&
+                     c.type.bits() >= 32;
+        return exact ? affine(c.value) : obstacle(e);
+      },
+      [&](const Call& c) -> std::optional<isl::pw_aff> {
+        bool marker = c.call_type == CallType::Operator && op_info(c.op).cls == OpClass::Marker;
+        return marker ? affine(c.args[0]) : bits(c, e);
+      },
+      [&](const ExprNode&) { return obstacle(e); });
+}
+
+namespace {
+
+// Nodes of the tree, shared parts counted each time, up to `most`.
+int tree_size(const Expr& e, int most) {
+  int size = 1;
+  for_each_child(e, [&](const Expr& child) {
+    if (size < most) size += tree_size(child, most - size);
+  });
+  return size;
+}
+// From here on a bound has pieces as a rule, or floors in floors, as those of a pyramid's levels:
+// what isl would find out about it is not worth the time.
+constexpr int large_bound = 40;
+
+}  // namespace
+
+isl::pw_aff IslBridge::bound(const Expr& e) {
+  if (tree_size(e, large_bound) >= large_bound && !mentions_dim(e)) return parameter(e);
+  auto result = affine(e);
+  if (result && isl_pw_aff_n_piece(result->get()) == 1) return *result;
+  return parameter(e);
+}
+
+std::optional<isl::set> IslBridge::comparison(const Binary& b, const Expr& e) {
+  if (!is_followed(b)) return opaque(e);
+  auto a = affine(b.a), c = affine(b.b);
+  if (!a || !c) return std::nullopt;
+  switch (b.kind) {
+    case Kind::EQ:
+      return a->eq_set(*c);
+    case Kind::NE:
+      return a->ne_set(*c);
+    case Kind::LT:
+      return a->lt_set(*c);
+    case Kind::LE:
+      return a->le_set(*c);
+    case Kind::GT:
+      return a->gt_set(*c);
+    default:
+      return a->ge_set(*c);
+  }
+}
+
+std::optional<isl::set> IslBridge::condition(const Expr& e) {
+  if (is_const_true(e)) return universe_;
+  if (is_const_false(e)) return isl::manage(isl_set_empty(isl_set_get_space(universe_.get())));
+  if (const auto* n = e.as<Not>()) {
+    auto a = condition(n->a);
+    if (!a) return std::nullopt;
+    return universe_.subtract(*a);
+  }
+  if (const auto* call = e.as<Call>();
+      call && call->call_type == CallType::Operator && op_info(call->op).cls == OpClass::Marker) {
+    return condition(call->args[0]);
+  }
+  const auto* b = e.as<Binary>();
+  if (!b) return opaque(e);
+  if (b->kind == Kind::And || b->kind == Kind::Or) {
+    auto a = condition(b->a), c = condition(b->b);
+    if (!a || !c) return std::nullopt;
+    return (b->kind == Kind::And ? a->intersect(*c) : a->unite(*c)).coalesce();
+  }
+  if (b->kind >= Kind::EQ && b->kind <= Kind::GE) return comparison(*b, e);
+  return opaque(e);
+}
+
+// ---- back to expressions ----
+
+namespace {
+
+int64_t to_int(__isl_take isl_val* v) {
+  int64_t result = isl_val_get_num_si(v);
+  isl_val_free(v);
+  return result;
+}
+
+// Sums with positive terms first, so that differences print as differences.
+class SumBuilder {
+ public:
+  void add(const Expr& term, int64_t coefficient) {
+    if (coefficient == 0) return;
+    Expr scaled =
+        std::abs(coefficient) == 1 ? term : term * make_const(Int(32), std::abs(coefficient));
+    Expr& side = coefficient > 0 ? plus_ : minus_;
+    side = side.defined() ? side + scaled : scaled;
+  }
+  Expr finish(int64_t constant) {
+    if (!plus_.defined()) {
+      if (!minus_.defined()) return make_const(Int(32), constant);
+      return make_const(Int(32), constant) - minus_;
+    }
+    Expr result = minus_.defined() ? plus_ - minus_ : plus_;
+    if (constant == 0) return result;
+    return constant > 0 ? result + make_const(Int(32), constant)
+                        : result - make_const(Int(32), -constant);
+  }
+
+ private:
+  Expr plus_, minus_;
+};
+
+}  // namespace
+
+class IslToExpr {
+ public:
+  IslToExpr(const IslBridge& bridge, const std::vector<Expr>& names)
+      : bridge_(bridge), names_(names) {}
+
+  Expr aff(__isl_keep isl_aff* a) const {
+    int64_t denominator = to_int(isl_aff_get_denominator_val(a));
+    isl_aff* scaled =
+        isl_aff_scale_val(isl_aff_copy(a), isl_val_int_from_si(bridge_.ctx_, denominator));
+    Expr result = integral(scaled);
+    isl_aff_free(scaled);
+    return denominator == 1 ? result : result / make_const(Int(32), denominator);
+  }
+
+  Expr pieces(__isl_keep isl_pw_aff* e) const {
+    struct Piece {
+      Expr condition, value;
+    };
+    std::vector<Piece> list;
+    auto collect = [&](isl_set* s, isl_aff* a) {
+      list.push_back({set(s), aff(a)});
+      isl_set_free(s);
+      isl_aff_free(a);
+    };
+    isl_pw_aff_foreach_piece(
+        e,
+        [](isl_set* s, isl_aff* a, void* user) {
+          (*static_cast<decltype(collect)*>(user))(s, a);
+          return isl_stat_ok;
+        },
+        &collect);
+    if (list.empty()) return make_zero(Int(32));
+    Expr result = list.back().value;
+    for (size_t i = list.size() - 1; i-- > 0;)
+      result = make_select(list[i].condition, list[i].value, result);
+    return result;
+  }
+
+  Expr set(__isl_keep isl_set* s) const {
+    isl_set* explicit_divs = isl_set_compute_divs(isl_set_coalesce(isl_set_copy(s)));
+    Expr result;
+    auto collect = [&](isl_basic_set* b) {
+      Expr term = basic_set(b);
+      result = result.defined() ? result || term : term;
+      isl_basic_set_free(b);
+    };
+    isl_set_foreach_basic_set(
+        explicit_divs,
+        [](isl_basic_set* b, void* user) {
+          (*static_cast<decltype(collect)*>(user))(b);
+          return isl_stat_ok;
+        },
+        &collect);
+    isl_set_free(explicit_divs);
+    return result.defined() ? result : const_false();
+  }
+
+ private:
+  // The sum with denominator 1: dims, parameters and floors of divisions.
+  Expr integral(__isl_keep isl_aff* a) const {
+    SumBuilder sum;
+    for (isl_dim_type type : {isl_dim_in, isl_dim_param}) {
+      int n = isl_aff_dim(a, type);
+      for (int i = 0; i < n; ++i) {
+        int64_t c = to_int(isl_aff_get_coefficient_val(a, type, i));
+        if (c != 0) sum.add(name(a, type, i), c);
+      }
+    }
+    int n = isl_aff_dim(a, isl_dim_div);
+    for (int i = 0; i < n; ++i) {
+      int64_t c = to_int(isl_aff_get_coefficient_val(a, isl_dim_div, i));
+      if (c == 0) continue;
+      isl_aff* div = isl_aff_get_div(a, i);
+      sum.add(aff(div), c);
+      isl_aff_free(div);
+    }
+    return sum.finish(to_int(isl_aff_get_constant_val(a)));
+  }
+
+  Expr name(__isl_keep isl_aff* a, isl_dim_type type, int i) const {
+    if (type == isl_dim_in) return names_.at(static_cast<size_t>(i));
+    return cast_to(Int(32), bridge_.parameters_.at(
+                                isl_aff_get_dim_name(a, isl_dim_param, static_cast<unsigned>(i))));
+  }
+
+  Expr basic_set(__isl_keep isl_basic_set* b) const {
+    std::vector<Expr> terms;
+    auto collect = [&](isl_constraint* c) {
+      isl_aff* a = isl_constraint_get_aff(c);
+      // The divs' own defining inequalities say nothing new.
+      if (!isl_constraint_is_div_constraint(c)) {
+        Expr zero = make_zero(Int(32));
+        terms.push_back(isl_constraint_is_equality(c) ? equality(a) : inequality(a));
+      }
+      isl_aff_free(a);
+      isl_constraint_free(c);
+    };
+    isl_basic_set_foreach_constraint(
+        b,
+        [](isl_constraint* c, void* user) {
+          (*static_cast<decltype(collect)*>(user))(c);
+          return isl_stat_ok;
+        },
+        &collect);
+    return conjunction(terms);
+  }
+
+  // a == 0, written with the terms on the side where they are positive.
+  Expr equality(__isl_keep isl_aff* a) const { return balance(a, Kind::EQ); }
+  Expr inequality(__isl_keep isl_aff* a) const { return balance(a, Kind::GE); }
+  Expr balance(__isl_keep isl_aff* a, Kind kind) const {
+    isl_aff *positive = isl_aff_copy(a), *negative = isl_aff_neg(isl_aff_copy(a));
+    for (isl_aff** side : {&positive, &negative}) *side = without_negative_terms(*side);
+    Expr result = ir::binary(kind, aff(positive), aff(negative));
+    isl_aff_free(positive);
+    isl_aff_free(negative);
+    return result;
+  }
+  static isl_aff* without_negative_terms(__isl_take isl_aff* a) {
+    for (isl_dim_type type : {isl_dim_in, isl_dim_param, isl_dim_div}) {
+      for (int i = 0, n = isl_aff_dim(a, type); i < n; ++i) {
+        isl_val* v = isl_aff_get_coefficient_val(a, type, i);
+        if (isl_val_is_neg(v)) a = isl_aff_set_coefficient_si(a, type, i, 0);
+        isl_val_free(v);
+      }
+    }
+    isl_val* v = isl_aff_get_constant_val(a);
+    if (isl_val_is_neg(v)) a = isl_aff_set_constant_si(a, 0);
+    isl_val_free(v);
+    return a;
+  }
+
+  const IslBridge& bridge_;
+  const std::vector<Expr>& names_;
+};
+
+Expr IslBridge::to_expr(const isl::pw_aff& e, const std::vector<Expr>& names) const {
+  Expr result = IslToExpr(*this, names).pieces(e.get());
+  throw_if_failed(ctx_);
+  return result;
+}
+Expr IslBridge::to_expr(const isl::set& s, const std::vector<Expr>& names) const {
+  Expr result = IslToExpr(*this, names).set(s.get());
+  throw_if_failed(ctx_);
+  return result;
+}
+
+}  // namespace retrograde::ir

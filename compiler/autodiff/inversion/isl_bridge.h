@@ -1,0 +1,101 @@
+// Expressions to isl and back.
+//
+// A space is a tuple of named integer dimensions (loop variables) and parameters. Sub-expressions
+// that isl cannot follow and that mention no dimension become parameters: they are the same for
+// every point of the set.
+#pragma once
+
+#include <isl/cpp.h>
+
+#include <map>
+#include <memory>
+#include <optional>
+#include <set>
+#include <string>
+#include <unordered_map>
+#include <vector>
+
+#include "autodiff/inversion/isl_budget.h"
+#include "ir/equal.h"
+#include "ir/expr.h"
+
+namespace retrograde::ir {
+
+struct IslContext {
+  explicit IslContext(unsigned long max_operations = isl_operations);
+  ~IslContext();
+  IslContext(const IslContext&) = delete;
+  IslContext& operator=(const IslContext&) = delete;
+  isl_ctx* ctx;
+};
+
+// Throws what isl failed by. Its C functions report a failure, the end of the budget as a rule, by
+// a value that passes for an answer, or by stopping half-way through a loop over pieces.
+void throw_if_failed(isl_ctx* ctx);
+
+class IslBridge {
+ public:
+  // Dimensions in tuple order.
+  IslBridge(IslContext& context, std::vector<std::string> dims);
+
+  // The same parameters over another tuple. Parameters met later are not shared.
+  IslBridge with_dims(std::vector<std::string> dims) const;
+
+  isl::set universe() const { return universe_; }
+  isl_ctx* ctx() const { return ctx_; }
+  int rank() const { return static_cast<int>(dims_.size()); }
+
+  // nullopt when `e` is not quasi-affine; what stood in the way is added to `obstacles()`.
+  std::optional<isl::pw_aff> affine(const Expr& e);
+  std::optional<isl::set> condition(const Expr& e);
+  // `e` as one parameter unless it is affine without pieces: bounds of loops should not split sets.
+  isl::pw_aff bound(const Expr& e);
+  isl::pw_aff dim(int position) const;
+
+  // A sub-expression over the dimensions whose value is known to be fixed: from now on a parameter.
+  void make_parameter(const Expr& e) {
+    fixed_.insert(e);
+    known_.clear();
+  }
+  const std::set<Expr, StructuralLess>& obstacles() const { return obstacles_; }
+  void clear_obstacles() {
+    obstacles_.clear();
+    known_.clear();  // those without an affine form are to be noted again
+  }
+
+  // Back. `names` gives an expression for each dimension of the space at hand (sets and domains of
+  // pw_affs).
+  Expr to_expr(const isl::pw_aff& e, const std::vector<Expr>& names) const;
+  Expr to_expr(const isl::set& s, const std::vector<Expr>& names) const;  // true for the universe
+  // An expression over the parameters only (a pw_aff without dimensions).
+  Expr to_expr(const isl::pw_aff& e) const { return to_expr(e, {}); }
+  // Replaces a fixed sub-expression by its value at the point that the caller has found.
+  void set_parameter_value(const std::string& name, const Expr& value) {
+    parameters_[name] = value;
+  }
+  const std::map<std::string, Expr>& parameters() const { return parameters_; }
+
+ private:
+  friend class IslToExpr;
+  isl::pw_aff constant(int64_t value) const;
+  isl::pw_aff parameter(const Expr& e);
+  bool mentions_dim(const Expr& e) const;
+  std::optional<isl::pw_aff> affine_form(const Expr& e);
+  std::optional<isl::pw_aff> obstacle(const Expr& e);
+  std::optional<isl::pw_aff> binary(const Binary& b, const Expr& e);
+  std::optional<isl::pw_aff> absolute(const Cast& c);
+  std::optional<isl::pw_aff> bits(const Call& c, const Expr& e);
+  std::optional<isl::set> comparison(const Binary& b, const Expr& e);
+  std::optional<isl::set> opaque(const Expr& e);
+
+  isl_ctx* ctx_;
+  std::vector<std::string> dims_;
+  isl::set universe_;
+  std::map<Expr, std::string, StructuralLess> parameter_names_;
+  std::map<std::string, Expr> parameters_;
+  std::set<Expr, StructuralLess> fixed_, obstacles_;
+  // Of nodes seen: expressions share them. The Expr keeps its node alive.
+  std::unordered_map<const ExprNode*, std::pair<Expr, std::optional<isl::pw_aff>>> known_;
+};
+
+}  // namespace retrograde::ir

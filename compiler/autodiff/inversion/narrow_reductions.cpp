@@ -1,0 +1,74 @@
+#include "autodiff/inversion/narrow_reductions.h"
+
+#include <optional>
+#include <unordered_set>
+
+#include "analysis/linear.h"
+#include "autodiff/updates/update_context.h"
+#include "ir/build.h"
+#include "ir/conjuncts.h"
+#include "ir/visit.h"
+#include "simplify/simplify.h"
+
+namespace retrograde::ir {
+
+namespace {
+
+class Narrower {
+ public:
+  Narrower(Gather& g, const std::vector<std::string>& target_args) : g_(g) {
+    variables_.insert(target_args.begin(), target_args.end());
+    for (const ReductionVariable& r : g.rdom->vars) variables_.insert(r.var);
+  }
+
+  void run() {
+    std::vector<Expr> terms, rest;
+    add_conjuncts(g_.predicate, terms);
+    for (const Expr& term : terms) {
+      if (!becomes_an_end(term)) rest.push_back(term);
+    }
+    g_.predicate = rest.empty() ? Expr() : conjunction(rest);
+  }
+
+ private:
+  bool becomes_an_end(const Expr& condition) {
+    std::optional<LinearForm> form = nonnegative_where(condition);
+    if (!form) return false;
+    for (ReductionVariable& r : g_.rdom->vars) {
+      const int64_t c = form->coefficient_of(r.var);
+      if (c != 1 && c != -1) continue;
+      Expr end = end_of(*form, r, c);
+      if (as_const_int(r.extent) || !end.defined()) return false;
+      c == 1 ? raise_min(r, end) : lower_max(r, end);
+      return true;
+    }
+    return false;
+  }
+  // Of c * r + rest >= 0; undefined where the rest is not the same for the whole loop.
+  Expr end_of(const LinearForm& form, const ReductionVariable& r, int64_t c) const {
+    LinearForm alone{form.type, {{variable(r.var), c}}, 0};
+    Expr end = to_expr(times(plus(form, alone, -1), -c));
+    return !end.defined() || uses_any_variable(end, variables_) || depends_on_data(end) ? Expr()
+                                                                                        : end;
+  }
+
+  static void raise_min(ReductionVariable& r, const Expr& end) {
+    Expr last = r.min + r.extent - 1;
+    r.min = simplify(max(r.min, end));
+    r.extent = simplify(last - r.min + 1);
+  }
+  static void lower_max(ReductionVariable& r, const Expr& end) {
+    r.extent = simplify(min(r.min + r.extent - 1, end) - r.min + 1);
+  }
+
+  Gather& g_;
+  std::unordered_set<std::string> variables_;  // that a loop's ends may not mention
+};
+
+}  // namespace
+
+void narrow_reductions(Gather& g, const std::vector<std::string>& target_args) {
+  if (g.rdom && g.predicate.defined()) Narrower(g, target_args).run();
+}
+
+}  // namespace retrograde::ir

@@ -1,0 +1,61 @@
+#include "autodiff/inversion/read_inversions.h"
+
+#include <algorithm>
+
+#include "autodiff/updates/update_context.h"
+#include "ir/build.h"
+#include "ir/print.h"
+#include "ir/visit.h"
+
+namespace retrograde::ir {
+
+namespace {
+
+bool chooses(const Expr& index) {
+  return any_node(index,
+                  [&](const Expr& e) { return e.as<Min>() || e.as<Max>() || e.as<Select>(); });
+}
+
+// Where the adjoint may be other than 0; undefined: not known.
+Expr where_it_counts(const Expr& adjoint) {
+  const auto* selection = adjoint.as<Select>();
+  if (!selection) return {};
+  if (is_zero(selection->when_true)) return !selection->condition;
+  return is_zero(selection->when_false) ? selection->condition : Expr();
+}
+
+}  // namespace
+
+const Inversion& ReadInversions::of(const FuncContents& f, const Symbol& symbol,
+                                    const AccessQuery& query, const Expr& adjoint) {
+  const Inversion* selected = where_selected(f, symbol, query, adjoint);
+  return selected ? *selected : find(f, symbol, query);
+}
+
+// Null: no such thing.
+const Inversion* ReadInversions::where_selected(const FuncContents& f, const Symbol& symbol,
+                                                AccessQuery query, const Expr& adjoint) {
+  if (std::none_of(query.indices.begin(), query.indices.end(), chooses)) return nullptr;
+  Expr counts = where_it_counts(adjoint);
+  if (!counts.defined() || calls(counts, &f)) return nullptr;
+  Expr& predicate = query.domain.predicate;
+  predicate = predicate.defined() ? predicate && counts : counts;
+  const Inversion& inversion = find(f, symbol, query);
+  return inversion.note.empty() && inversion.gathers.size() == 1 ? &inversion : nullptr;
+}
+
+const Inversion& ReadInversions::find(const FuncContents& f, const Symbol& symbol,
+                                      const AccessQuery& query) {
+  std::string key = std::to_string(reinterpret_cast<uintptr_t>(&symbol));
+  for (const Expr& e : query.indices) key += "," + print(e);
+  if (query.domain.predicate.defined()) key += "|" + print(query.domain.predicate);
+  for (const LoopVariable& v : query.domain.vars) key += ";" + v.name;
+  key += f.name;
+  auto [it, is_new] = found_.try_emplace(key);
+  if (!is_new) return it->second;
+  it->second = invert_or_scatter(query, operations_);
+  if (it->second.gave_up) operations_ = std::max(operations_ / 2, least_operations);
+  return it->second;
+}
+
+}  // namespace retrograde::ir

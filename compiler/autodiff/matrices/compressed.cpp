@@ -1,0 +1,168 @@
+#include "autodiff/matrices/compressed.h"
+
+#include <algorithm>
+
+#include "autodiff/matrices/colour_dimension.h"
+#include "autodiff/sweeps/accumulation.h"
+#include "diagnostics/error.h"
+#include "frontend/language/var.h"
+#include "graph/define.h"
+#include "graph/function.h"
+#include "ir/build.h"
+#include "ir/variables.h"
+#include "ir/visit.h"
+#include "simplify/simplify.h"
+
+namespace retrograde::ir {
+
+namespace {
+
+// Colours that are still a small dense matrix.
+constexpr int64_t many_colours = 4096;
+// So few that a better colouring gains little.
+constexpr int64_t few_colours = 3;
+// Differences that are looked at one by one.
+constexpr int64_t many_differences = 100'000;
+
+int64_t product(const std::vector<int64_t>& factors) {
+  int64_t result = 1;
+  for (int64_t f : factors) {
+    if (f > many_colours * many_colours || result > many_colours * many_colours) return INT64_MAX;
+    result *= f;
+  }
+  return result;
+}
+
+}  // namespace
+
+Compressed::Compressed(const CompressionQuery& query)
+    : query_(query),
+      dependence_(std::make_unique<Dependence>(query.output, query.seed, query.operations)),
+      pattern_(dependence_->inside(query.rows, query.columns)) {}
+
+std::unique_ptr<Compressed> Compressed::make(const CompressionQuery& query) try {
+  std::unique_ptr<Compressed> result(new Compressed(query));
+  std::optional<Colours> colours = result->colour();
+  if (!colours) return nullptr;
+  result->colours_ = *colours;
+  return result;
+} catch (const isl::exception&) {
+  unsupported(text("compress the derivative in ", quoted(query.output->name)),
+              "which elements depend on which is found by a bounded search over index sets",
+              text("a part of it takes more than ", query.operations, " operations of isl"),
+              "Use products with single directions, or differentiate parts of it");
+}
+
+std::optional<Colours> Compressed::colour() const {
+  size_t dims = query_.seed->args.size();
+  if (dims == 0 || isl_map_is_empty(pattern_.get()) == isl_bool_true)
+    return Colours{{std::vector<int64_t>(dims, 0), 1}, {}};
+  isl::set differences =
+      (query_.diagonal_only ? pattern_ : pattern_.reverse().apply_range(pattern_)).deltas();
+  int64_t most = query_.most_colours > 0 ? query_.most_colours : many_colours;
+  std::optional<Colouring> linear = linear_colours(differences.coalesce(), most);
+  // Irregular patterns of a few elements; tables cost more than they save for the others. For the
+  // diagonal it is enough that neighbours differ, whether M is symmetric or not.
+  if (!linear || linear->count > few_colours) {
+    if (auto table = colour_table(pattern_, query_.symmetric || query_.diagonal_only,
+                                  linear ? linear->count : most + 1))
+      return Colours{{}, table};
+  }
+  if (!linear && query_.most_colours == 0) {
+    unsupported(text("compress the derivative in ", quoted(query_.output->name)),
+                text("at most ", many_colours, " seeds are evaluated together"),
+                text("the pattern needs more"),
+                "Use products with single directions, or differentiate parts of it");
+  }
+  if (!linear) return std::nullopt;
+  return Colours{*linear, {}};
+}
+
+std::optional<Colouring> Compressed::linear_colours(const isl::set& differences,
+                                                    int64_t most) const {
+  auto ranges = ranges_of(differences);
+  if (!ranges) {
+    unsupported(text("compress the derivative in ", quoted(query_.output->name)),
+                "elements that one element may depend on must lie within constant bounds",
+                "the pattern has entries without bounds: a place depends on data, or a reduction "
+                "runs over a range that is not constant",
+                "Give constant bounds, of the output and of Buffers, or use products with "
+                "single directions");
+  }
+  std::vector<int64_t> extents;
+  int64_t all_differences = 1;
+  for (const IntRange& r : *ranges) {
+    extents.push_back(std::max(std::abs(r.min), std::abs(r.max)) + 1);
+    all_differences = std::min(all_differences * (2 * extents.back() - 1), many_differences + 1);
+  }
+  int64_t enough = product(extents);
+  std::optional<Colouring> found;
+  if (auto points =
+          points_of(differences, all_differences > many_differences ? 0 : many_differences)) {
+    // Every difference in a box: the elements of a box conflict each with each.
+    bool is_box = static_cast<int64_t>(points->size()) == all_differences;
+    if (!is_box) found = smallest_colouring(*points, extents.size(), std::min(most, enough));
+  }
+  if (!found && enough <= most) found = one_colour_each(extents);
+  return found;
+}
+
+// 1 for elements of the colour. Those outside of the columns took no part in the pattern.
+Expr Compressed::seed_value(const std::vector<Expr>& column, const Expr& colour) const {
+  Type type = query_.seed->types[0];
+  Expr condition = colours_.of(column) == colour;
+  isl::map reached = dependence_->inside(query_.rows, {});
+  if (isl_map_is_subset(reached.get(), pattern_.get()) != isl_bool_true) {
+    for (size_t d = 0; d < column.size(); ++d) {
+      const Interval& range = query_.columns[d];
+      if (range.min.defined()) condition = condition && column[d] >= range.min;
+      if (range.max.defined()) condition = condition && column[d] <= range.max;
+    }
+  }
+  return make_select(condition, make_one(type), make_zero(type));
+}
+
+FuncPtr Compressed::evaluate() const {
+  if (isl_map_is_empty(pattern_.get()) == isl_bool_true) return nullptr;
+  auto seeds = make_func(Role::Coloured);
+  seeds->name = claim_name(query_.seed->name + "_by_colour");
+  seeds->made->of = query_.seed->name;
+  seeds->made->traits.masked = true;
+  const std::vector<Expr> column = variables_of(query_.seed->args);
+  std::vector<Expr> args = column;
+  args.push_back(variable(unique_name("colour")));
+  define_pure(seeds, args, {seed_value(column, args.back())});
+  return with_seeds(query_.output, query_.seed, seeds);
+}
+
+Expr Compressed::may_be_nonzero(const std::vector<Expr>& row,
+                                const std::vector<Expr>& column) const {
+  std::vector<Expr> names = row;
+  names.insert(names.end(), column.begin(), column.end());
+  std::vector<std::string> dims;
+  for (size_t d = 0; d < names.size(); ++d) dims.push_back("e" + std::to_string(d));
+  isl::set entries = isl::manage(isl_set_flatten(isl_map_wrap(pattern_.copy())));
+  return simplify(IslBridge(dependence_->context(), dims).to_expr(entries, names));
+}
+
+// A star colouring finds an entry in its own row, or that of its transpose in the other.
+Expr Compressed::entry(const FuncPtr& all, const std::vector<Expr>& row,
+                       const std::vector<Expr>& column, int k) const {
+  auto at = [&](std::vector<Expr> place, const std::vector<Expr>& other) {
+    place.push_back(colours_.of(other));
+    return call_value(all, place, k);
+  };
+  Expr direct = at(row, column);
+  if (!colours_.table || !colours_.table->alone.defined()) return direct;
+  return make_select(colours_.table->is_alone(row, colours_.of(column)), direct, at(column, row));
+}
+
+std::optional<std::vector<IntRange>> Compressed::offsets() const {
+  if (query_.seed->args.size() != query_.output->args.size()) return std::nullopt;
+  isl::set deltas = pattern_.deltas();
+  if (isl_set_is_empty(deltas.get()) == isl_bool_true)
+    return std::vector<IntRange>(query_.seed->args.size());
+  return ranges_of(deltas);
+}
+
+}  // namespace retrograde::ir

@@ -1,0 +1,140 @@
+#include "autodiff/report/explain.h"
+
+#include <algorithm>
+#include <map>
+#include <regex>
+#include <set>
+
+#include "diagnostics/error.h"
+
+namespace retrograde {
+
+namespace {
+
+using Kind = Explanation::Kind;
+
+constexpr size_t most_names = 8;  // of one kind in a summary
+
+// In the order in which a person asks.
+constexpr Kind told_first[] = {Kind::Cost,    Kind::Stored,       Kind::Recomputed,
+                               Kind::Version, Kind::Scattered,    Kind::Privatised,
+                               Kind::Zero,    Kind::NotRequested, Kind::LeftOut,
+                               Kind::Custom,  Kind::Built,        Kind::Performance};
+
+std::string line_of(const Explanation& e) {
+  return text(to_string(e.kind), " ", quoted(e.subject), ": ", e.detail, "\n");
+}
+
+// The facts of one kind, the largest first, each subject once.
+std::vector<Explanation> of_kind(const std::vector<Explanation>& all, Kind kind) {
+  std::vector<Explanation> found;
+  std::set<std::string> seen;
+  for (const Explanation& e : all) {
+    if (e.kind == kind && seen.insert(e.subject).second) found.push_back(e);
+  }
+  std::stable_sort(found.begin(), found.end(),
+                   [](const Explanation& a, const Explanation& b) { return a.bytes > b.bytes; });
+  return found;
+}
+
+std::string subject_of(const Explanation& e) {
+  if (e.bytes == 0) return quoted(e.subject);
+  return text(quoted(e.subject), " (", static_cast<int64_t>(e.bytes), " bytes)");
+}
+
+std::string line_of(const char* what, const std::vector<Explanation>& facts) {
+  if (facts.empty()) return "";
+  std::string result = text(what, " (", facts.size(), "): ");
+  for (size_t i = 0; i < std::min(facts.size(), most_names); ++i)
+    result += (i > 0 ? ", " : "") + subject_of(facts[i]);
+  if (facts.size() > most_names) result += text(" and ", facts.size() - most_names, " more");
+  return result + "\n";
+}
+
+// Some of what reaches an adjoint is zero, and it is built all the same; or all of it is.
+std::string zeros_of(const std::vector<Explanation>& all) {
+  std::set<std::string> built;
+  for (const Explanation& e : of_kind(all, Kind::Built)) built.insert(e.subject);
+  std::vector<Explanation> whole, in_part;
+  for (const Explanation& e : of_kind(all, Kind::Zero))
+    (built.count(e.subject) ? in_part : whole).push_back(e);
+  return line_of("zero", whole) + line_of("zero in part", in_part);
+}
+
+std::string summary_of(const std::vector<Explanation>& all, Kind kind) {
+  if (kind == Kind::Zero) return zeros_of(all);
+  const std::vector<Explanation> facts = of_kind(all, kind);
+  if (kind == Kind::Cost && !facts.empty()) return line_of(facts.front());
+  return line_of(to_string(kind), facts);
+}
+
+std::string summary_of(const std::vector<Explanation>& all) {
+  std::string result;
+  for (Kind kind : told_first) result += summary_of(all, kind);
+  return result + "explain(Detail::All) tells why, fact by fact.\n";
+}
+
+std::string without_numbers(const std::string& name) {
+  static const std::regex number("[$][0-9]+");
+  return std::regex_replace(name, number, "");
+}
+
+// Quoted names lose their numbers where that leaves no two alike.
+std::string with_short_names(const std::string& words) {
+  static const std::regex name("\"[^\"\n]*\"");
+  std::map<std::string, std::set<std::string>> alike;
+  for (auto i = std::sregex_iterator(words.begin(), words.end(), name); i != std::sregex_iterator();
+       ++i)
+    alike[without_numbers(i->str())].insert(i->str());
+  std::string result;
+  auto copied = words.cbegin();
+  for (auto i = std::sregex_iterator(words.begin(), words.end(), name); i != std::sregex_iterator();
+       ++i) {
+    const std::string shorter = without_numbers(i->str());
+    result.append(copied, words.cbegin() + i->position());
+    result += alike[shorter].size() == 1 ? shorter : i->str();
+    copied = words.cbegin() + i->position() + i->length();
+  }
+  return result.append(copied, words.cend());
+}
+
+}  // namespace
+
+const char* to_string(Explanation::Kind kind) {
+  switch (kind) {
+    case Explanation::Kind::Built:
+      return "built";
+    case Explanation::Kind::Scattered:
+      return "scattered";
+    case Explanation::Kind::Privatised:
+      return "privatised";
+    case Explanation::Kind::Zero:
+      return "zero";
+    case Explanation::Kind::NotRequested:
+      return "not requested";
+    case Explanation::Kind::Version:
+      return "version";
+    case Explanation::Kind::Performance:
+      return "performance";
+    case Explanation::Kind::Stored:
+      return "stored";
+    case Explanation::Kind::Recomputed:
+      return "recomputed";
+    case Explanation::Kind::LeftOut:
+      return "left out";
+    case Explanation::Kind::Cost:
+      return "cost";
+    case Explanation::Kind::Custom:
+      return "custom";
+  }
+  return "";
+}
+
+std::string to_string(const std::vector<Explanation>& explanations, Detail detail) {
+  if (detail == Detail::Summary) return with_short_names(summary_of(explanations));
+  std::string out;
+  for (const Explanation& e : explanations) out += line_of(e);
+  return with_short_names(out);
+}
+
+}  // namespace retrograde

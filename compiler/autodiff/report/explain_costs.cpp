@@ -1,0 +1,126 @@
+#include "autodiff/report/explain_costs.h"
+
+#include <algorithm>
+#include <cstdio>
+
+#include "diagnostics/error.h"
+#include "graph/function.h"
+
+namespace retrograde::ir {
+
+namespace {
+
+using What = Explanation::Kind;
+
+std::string counted(const Count& count, const char* what) {
+  return count.text() + " " + what + (count.value() == 1.0 ? "" : "s");
+}
+
+const char* reason_to_store(const FuncContents& f) {
+  if (f.schedule.compute_level.kind != LoopLevel::Kind::Inlined) return "by its schedule";
+  if (f.is_extern()) return "as a C function fills it";
+  if (!f.is_pure()) return "as it has updates";
+  return "as it is wanted itself or read often";
+}
+
+Explanation stored(const FuncOperations& f) {
+  std::string work =
+      f.is_extern ? "operations of a C function" : counted(f.operations(), "operation");
+  return {What::Stored, f.func->name,
+          text(f.func->made ? "" : "the gradient reads its values; ", counted(f.bytes, "byte"),
+               ", ", work, ", ", reason_to_store(*f.func)),
+          f.bytes.value().value_or(0)};
+}
+
+// A Func of the program with updates that nobody scheduled.
+bool is_stored_by_default(const FuncOperations& f) {
+  return f.stored && !f.func->made && !f.func->is_pure() && !f.is_extern &&
+         f.func->schedule.compute_level.kind == LoopLevel::Kind::Inlined;
+}
+Explanation computed_once(const FuncOperations& f) {
+  return {
+      What::Performance, f.func->name,
+      "unless a directive schedules it, it is computed at root: inside of the loops of who reads "
+      "it, its updates would run again for each element"};
+}
+
+Explanation recomputed(const FuncOperations& f) {
+  Operations each;
+  for (const StageOperations& s : f.stages) each += s.each;
+  return {What::Recomputed, f.func->name,
+          text(f.func->made ? "" : "the gradient reads its values; ", "in each of ",
+               counted(f.evaluations, "read"), ", ", counted(each.total(), "operation"),
+               " a time, no bytes")};
+}
+
+Explanation totals(const WantedFunc& output, const OperationCount& primal,
+                   const OperationCount& gradient) {
+  Count before = primal.operations(), after = gradient.operations();
+  std::string ratio;
+  if (before.value() && after.value() && *before.value() > 0) {
+    char digits[32];
+    std::snprintf(digits, sizeof digits, "%.2f", *after.value() / *before.value());
+    ratio = text(", ", digits, " times as many");
+  }
+  return {What::Cost, output.func->name,
+          text(counted(before, "operation"), " and ", counted(primal.bytes(), "byte"),
+               "; its gradient alone ", counted(after, "operation"), ratio, ", and ",
+               counted(gradient.bytes(), "byte"))};
+}
+
+// Bytes that `count` keeps beside the results that were asked for.
+std::optional<double> kept_between(const OperationCount& count,
+                                   const std::vector<WantedFunc>& results) {
+  double bytes = 0;
+  for (const FuncOperations& f : count.funcs) {
+    const bool is_result = std::any_of(results.begin(), results.end(),
+                                       [&](const WantedFunc& w) { return w.func == f.func; });
+    if (is_result || !f.stored) continue;
+    if (!f.bytes.value()) return std::nullopt;
+    bytes += *f.bytes.value();
+  }
+  return bytes;
+}
+
+// Where a gradient keeps more than twice what the program itself keeps on its way, and in what
+// most.
+void note_memory(const WantedFunc& output, const std::vector<WantedFunc>& gradients,
+                 const OperationCount& primal, const OperationCount& gradient,
+                 std::vector<Explanation>& result) {
+  const auto own = kept_between(primal, {output}), more = kept_between(gradient, gradients);
+  if (!own || !more || *more <= 2 * *own) return;
+  const FuncOperations* largest = nullptr;
+  for (const FuncOperations& f : gradient.funcs) {
+    const bool is_result = std::any_of(gradients.begin(), gradients.end(),
+                                       [&](const WantedFunc& w) { return w.func == f.func; });
+    if (is_result || !f.stored) continue;
+    if (!largest || *f.bytes.value() > *largest->bytes.value()) largest = &f;
+  }
+  result.push_back(
+      {What::Performance, output.func->name,
+       text("its gradient keeps ", Count(*more).text(), " bytes on the way, the program ",
+            Count(*own).text(), "; most of it in ", quoted(largest->func->name), ", ",
+            largest->bytes.text(), ": schedule it inside of who reads it to keep less")});
+}
+
+}  // namespace
+
+std::vector<Explanation> explain_costs(const WantedFunc& output,
+                                       const std::vector<WantedFunc>& gradients,
+                                       const OperationCount& primal,
+                                       const OperationCount& gradient) {
+  std::vector<Explanation> result;
+  for (const FuncOperations& f : gradient.funcs) {
+    result.push_back(f.stored ? stored(f) : recomputed(f));
+    if (is_stored_by_default(f)) result.push_back(computed_once(f));
+  }
+  for (const FuncOperations& f : primal.funcs) {
+    if (gradient.find(f.func.get())) continue;
+    result.push_back({What::LeftOut, f.func->name, "the gradient needs none of its values"});
+  }
+  result.push_back(totals(output, primal, gradient));
+  note_memory(output, gradients, primal, gradient, result);
+  return result;
+}
+
+}  // namespace retrograde::ir

@@ -1,0 +1,316 @@
+#include "autodiff/report/operation_count.h"
+
+#include <algorithm>
+#include <cmath>
+#include <unordered_map>
+
+#include "autodiff/schedule/default_schedule.h"
+#include "autodiff/schedule/distinct_nodes.h"
+#include "autodiff/sweeps/local_derivative.h"
+#include "autodiff/sweeps/regions.h"
+#include "diagnostics/error.h"
+#include "graph/function.h"
+#include "ir/build.h"
+#include "ir/print.h"
+#include "ir/visit.h"
+#include "simplify/simplify.h"
+
+namespace retrograde::ir {
+
+namespace {
+
+std::string number_text(double value) {
+  bool whole = value == std::floor(value) && std::abs(value) < 1e15;
+  return whole ? std::to_string(static_cast<int64_t>(value)) : text(value);
+}
+
+Operations of_operator(const Call& call) {
+  const Work& work = op_info(call.op).work;
+  return {.adds = static_cast<double>(work.adds),
+          .mults = static_cast<double>(work.mults),
+          .nonlinear = static_cast<double>(work.functions)};
+}
+
+// Work of the node itself, where floats take part in it.
+Operations operations_of_node(const Expr& e) {
+  bool floating = e.type().is_float();
+  for_each_child(e, [&](const Expr& child) { floating |= child.type().is_float(); });
+  if (!floating) return {};
+  if (const auto* call = e.as<Call>())
+    return call->call_type == CallType::Operator ? of_operator(*call) : Operations{};
+  if (e.as<Mul>() || e.as<Div>() || e.as<Mod>()) return {.mults = 1};
+  return e.as<Binary>() || e.as<Select>() || e.as<Cast>() ? Operations{.adds = 1} : Operations{};
+}
+
+// One iteration of a stage, or one value of a Func: its own work, and what it reads.
+struct Body {
+  Operations own;
+  std::vector<const Call*> reads;  // of Funcs
+  std::vector<Expr> kept_alive;
+};
+
+Body body_of(const std::vector<Expr>& roots) {
+  std::vector<Expr> plain;
+  for (const Expr& root : roots) {
+    if (root.defined()) plain.push_back(without_lets(root));
+  }
+  const DistinctNodes distinct(plain);
+  Body body;
+  for (const Expr& node : distinct.nodes()) {
+    body.own += operations_of_node(node);
+    const auto* call = node.as<Call>();
+    if (!call || call->call_type == CallType::Operator) continue;
+    if (call->call_type == CallType::Func) {
+      body.reads.push_back(call);
+    } else {
+      body.own.moves += 1;
+    }
+  }
+  body.kept_alive = distinct.nodes();
+  return body;
+}
+
+class Counter {
+ public:
+  explicit Counter(const std::vector<WantedFunc>& outputs)
+      : outputs_(funcs_of(outputs)),
+        order_(topological_order(outputs_)),
+        regions_(order_, regions_of(outputs)),
+        schedules_(default_schedules(outputs_)) {}
+
+  OperationCount run() {
+    for (const FuncPtr& f : order_) count(f);
+    for (auto f = result_.funcs.rbegin(); f != result_.funcs.rend(); ++f) count_evaluations(*f);
+    return std::move(result_);
+  }
+
+ private:
+  static std::vector<FuncPtr> funcs_of(const std::vector<WantedFunc>& outputs) {
+    std::vector<FuncPtr> result;
+    for (const WantedFunc& wanted : outputs) result.push_back(wanted.func);
+    return result;
+  }
+  static std::map<const Symbol*, Box> regions_of(const std::vector<WantedFunc>& outputs) {
+    std::map<const Symbol*, Box> result;
+    for (const WantedFunc& wanted : outputs) {
+      Box& box = result[wanted.func.get()];
+      box = hull(box, wanted.region);
+    }
+    return result;
+  }
+
+  bool is_stored(const FuncPtr& f) const {
+    return !f->is_pure() || schedules_.contains(f.get()) ||
+           f->schedule.compute_level.kind != LoopLevel::Kind::Inlined ||
+           std::find(outputs_.begin(), outputs_.end(), f) != outputs_.end();
+  }
+
+  void count(const FuncPtr& f) {
+    FuncOperations entry{f, regions_.of(f.get()), is_stored(f), {}, {}, {}, f->is_extern()};
+    if (entry.stored) {
+      int bytes = 0;
+      for (Type t : f->types) bytes += t.bytes();
+      entry.evaluations = elements(entry);
+      entry.bytes = entry.evaluations * bytes;
+    }
+    for (int s = 0; s < f->stage_count(); ++s) entry.stages.push_back(count_stage(entry, s));
+    if (f->made && !f->made->work.empty()) count_work(entry, f->made->work);
+    if (!entry.stored) {
+      for (const Expr& value : f->pure->values)
+        value_costs_[f.get()].push_back(with_reads(body_of({value})));
+    }
+    places_[f.get()] = result_.funcs.size();
+    result_.funcs.push_back(std::move(entry));
+  }
+
+  // None where the region is empty: nobody reads it.
+  static Count elements(const FuncOperations& f) {
+    return f.region.empty() && f.func->dimensions() > 0 ? Count() : Count::points(f.region);
+  }
+
+  StageOperations count_stage(const FuncOperations& entry, int s) {
+    const FuncContents& f = *entry.func;
+    if (f.is_extern()) return {};
+    const Definition& definition = f.stage(s);
+    std::vector<Expr> roots = definition.values;
+    roots.insert(roots.end(), definition.args.begin(), definition.args.end());
+    roots.push_back(definition.predicate);
+    StageOperations stage{with_reads(add_body(f, roots)), {}};
+    if (!entry.stored) return stage;
+    stage.each.moves += static_cast<double>(definition.values.size());
+    if (entry.region.empty() && f.dimensions() > 0) return stage;
+    Box box;
+    for (const LoopVariable& v : regions_.domain(f, s).vars) box.push_back({v.min, v.max});
+    stage.iterations = Count::points(box);
+    return stage;
+  }
+
+  // A last update whose iterations follow a table counts by what they do.
+  void count_work(FuncOperations& entry, const std::vector<AdjointWork>& work) {
+    entry.stages.pop_back();
+    bodies_[entry.func.get()].pop_back();
+    double values = static_cast<double>(entry.func->types.size());
+    for (const AdjointWork& part : work) {
+      StageOperations stage{with_reads(add_body(*entry.func, part.values)), {}};
+      stage.each.moves += static_cast<double>(part.values.size()) * values / (1 + values);
+      Box box = regions_.of(entry.func.get());
+      box.pop_back();  // the slot
+      for (const Expr& extent : part.loops) box.push_back({Expr(0), extent - 1});
+      stage.iterations = Count::points(box);
+      entry.stages.push_back(stage);
+    }
+  }
+
+  const Body& add_body(const FuncContents& f, const std::vector<Expr>& roots) {
+    return bodies_[&f].emplace_back(body_of(roots));
+  }
+
+  Operations with_reads(const Body& body) const {
+    Operations result = body.own;
+    for (const Call* call : body.reads) {
+      auto inlined = value_costs_.find(call->symbol.raw());
+      if (inlined == value_costs_.end()) {
+        result.moves += 1;
+      } else {
+        result += inlined->second.at(static_cast<size_t>(call->component));
+      }
+    }
+    return result;
+  }
+
+  // Consumers first: how often `entry` runs is known, and so how often what it reads does.
+  void count_evaluations(FuncOperations& entry) {
+    const std::vector<Body>& bodies = bodies_[entry.func.get()];
+    for (size_t s = 0; s < bodies.size(); ++s) {
+      const Count& runs = entry.stored ? entry.stages[s].iterations : entry.evaluations;
+      for (const Call* call : bodies[s].reads) {
+        FuncOperations& callee = result_.funcs[places_.at(call->symbol.raw())];
+        if (!callee.stored) callee.evaluations += runs;
+      }
+    }
+  }
+
+  std::vector<FuncPtr> outputs_, order_;
+  Regions regions_;
+  DefaultSchedules schedules_;
+  std::unordered_map<const Symbol*, std::vector<Operations>> value_costs_;  // of what is inlined
+  std::unordered_map<const Symbol*, std::vector<Body>> bodies_;  // one for each entry of stages
+  std::unordered_map<const Symbol*, size_t> places_;
+  OperationCount result_;
+};
+
+}  // namespace
+
+Operations& Operations::operator+=(const Operations& other) {
+  moves += other.moves;
+  adds += other.adds;
+  mults += other.mults;
+  nonlinear += other.nonlinear;
+  return *this;
+}
+
+Count Count::points(const Box& box) {
+  double factor = 1;
+  std::vector<std::string> symbols;
+  Count unknown;
+  unknown.unknown_ = true;
+  for (const Interval& i : box) {
+    if (!i.is_bounded()) return unknown;
+    Expr extent = simplify(i.max - i.min + 1);
+    if (auto constant = as_const_int(extent)) {
+      factor *= static_cast<double>(std::max<int64_t>(*constant, 0));
+    } else {
+      symbols.push_back(print(extent));
+    }
+  }
+  if (symbols.empty()) return factor;
+  std::sort(symbols.begin(), symbols.end());
+  std::string product;
+  for (const std::string& s : symbols) product += (product.empty() ? "" : "*") + s;
+  Count result;
+  if (factor != 0) result.terms_[product] = factor;
+  return result;
+}
+
+Count& Count::operator+=(const Count& other) {
+  constant_ += other.constant_;
+  unknown_ |= other.unknown_;
+  for (const auto& [product, factor] : other.terms_) terms_[product] += factor;
+  return *this;
+}
+
+Count operator*(const Count& count, double factor) {
+  Count result;
+  if (factor == 0) return result;
+  result = count;
+  result.constant_ *= factor;
+  for (auto& [product, f] : result.terms_) f *= factor;
+  return result;
+}
+
+std::optional<double> Count::value() const {
+  if (unknown_ || !terms_.empty()) return std::nullopt;
+  return constant_;
+}
+
+// A product of extents that nobody would read, as of table lookups, is left out.
+static std::string readable(const std::string& product) {
+  constexpr size_t longest = 200;
+  return product.size() <= longest ? product : "(...)";
+}
+
+std::string Count::text() const {
+  if (unknown_) return "unknown";
+  if (terms_.empty()) return number_text(constant_);
+  std::string out = constant_ != 0 ? number_text(constant_) : "";
+  for (const auto& [product, factor] : terms_) {
+    out += out.empty() ? "" : " + ";
+    out += factor == 1 ? readable(product) : number_text(factor) + "*" + readable(product);
+  }
+  return out;
+}
+
+Count FuncOperations::operations() const {
+  Count total;
+  if (!stored) return total;
+  for (const StageOperations& s : stages) total += s.iterations * s.each.total();
+  return total;
+}
+
+Count OperationCount::sum(double Operations::*part) const {
+  Count total;
+  for (const FuncOperations& f : funcs) {
+    if (!f.stored) continue;
+    for (const StageOperations& s : f.stages) total += s.iterations * (s.each.*part);
+  }
+  return total;
+}
+Count OperationCount::moves() const { return sum(&Operations::moves); }
+Count OperationCount::adds() const { return sum(&Operations::adds); }
+Count OperationCount::mults() const { return sum(&Operations::mults); }
+Count OperationCount::nonlinear() const { return sum(&Operations::nonlinear); }
+
+Count OperationCount::operations() const {
+  Count total;
+  for (const FuncOperations& f : funcs) total += f.operations();
+  return total;
+}
+
+Count OperationCount::bytes() const {
+  Count total;
+  for (const FuncOperations& f : funcs) total += f.bytes;
+  return total;
+}
+
+const FuncOperations* OperationCount::find(const FuncContents* f) const {
+  for (const FuncOperations& entry : funcs) {
+    if (entry.func.get() == f) return &entry;
+  }
+  return nullptr;
+}
+
+OperationCount count_operations(const std::vector<WantedFunc>& outputs) {
+  return Counter(outputs).run();
+}
+
+}  // namespace retrograde::ir

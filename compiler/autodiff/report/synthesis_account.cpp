@@ -1,0 +1,71 @@
+#include "autodiff/report/synthesis_account.h"
+
+#include <algorithm>
+
+#include "diagnostics/error.h"
+#include "ir/build.h"
+#include "simplify/simplify.h"
+
+namespace retrograde::ir {
+
+namespace {
+
+// ", 96 elements, 384 bytes when stored"; nothing when the region is known at run time only.
+std::string size_text(const FuncContents& f, const std::vector<LoopVariable>& region) {
+  int64_t elements = 1, bytes = 0;
+  for (const LoopVariable& v : region) {
+    auto extent = v.min.defined() && v.max.defined() ? as_const_int(simplify(v.max - v.min + 1))
+                                                     : std::nullopt;
+    if (!extent) return "";
+    elements *= std::max<int64_t>(*extent, 0);
+  }
+  for (Type t : f.types) bytes += t.bytes();
+  return text(", ", elements, " elements, ", elements * bytes, " bytes when stored");
+}
+
+}  // namespace
+
+void SynthesisAccount::add(Explanation::Kind kind, const std::string& subject,
+                           const std::string& detail) {
+  for (const Explanation& e : lines_) {
+    if (e.kind == kind && e.subject == subject && e.detail == detail) return;
+  }
+  lines_.push_back({kind, subject, detail});
+}
+
+void SynthesisAccount::add(const std::vector<Explanation>& lines) {
+  lines_.insert(lines_.end(), lines.begin(), lines.end());
+}
+
+void SynthesisAccount::built(const AdjointFunc& adjoint, const std::string& primal,
+                             const std::vector<LoopVariable>& region) {
+  const FuncContents& accumulating = adjoint.accumulator ? *adjoint.accumulator : *adjoint.func;
+  auto stages = [&](Accumulation how) {
+    return std::count(adjoint.stages.begin(), adjoint.stages.end(), how);
+  };
+  const auto gathers = stages(Accumulation::Gather), scatters = stages(Accumulation::Scatter),
+             privatised = stages(Accumulation::Privatised);
+  add(Explanation::Kind::Built, primal,
+      text(quoted(adjoint.func->name), ", ", gathers, " gathers over reduction domains, ", scatters,
+           " scatters inside pure dimensions, ", privatised, " privatised sums",
+           size_text(accumulating, region)));
+  if (gathers + scatters + privatised > 0) {
+    add(Explanation::Kind::Performance, primal,
+        text("unless a directive schedules ", quoted(accumulating.name),
+             ", it is computed at root, in parallel over its outermost dimension, in vectors "
+             "along its first"));
+  }
+  if (adjoint.accumulator) {
+    add(Explanation::Kind::Built, primal,
+        text(quoted(accumulating.name), " adds up in double what ", quoted(adjoint.func->name),
+             " rounds once: an element may get many terms"));
+  }
+  for (const std::string& note : adjoint.notes)
+    add(Explanation::Kind::Performance, primal, text(quoted(adjoint.func->name), ": ", note));
+  if (privatised > 0) {
+    add(Explanation::Kind::Privatised, primal,
+        "accumulated in a fixed number of parts, which are summed in order");
+  }
+}
+
+}  // namespace retrograde::ir

@@ -1,0 +1,440 @@
+// One row an operator. Sources: [GW] Griewank & Walther, Evaluating Derivatives, 2nd ed.,
+// tables 2.1 and 14.1; [DLMF] NIST Digital Library of Mathematical Functions. "definition": follows
+// from the operator's definition here.
+#include "autodiff/rules/derivative_rules.h"
+
+#include <cmath>
+#include <limits>
+#include <map>
+#include <numbers>
+
+#include "autodiff/rules/stable_norms.h"
+#include "ir/build.h"
+#include "ir/scalar.h"
+
+namespace retrograde::ir {
+
+namespace {
+
+using Args = const std::vector<Expr>&;
+using Partials = std::vector<Partial>;
+
+Expr num(const Expr& like, double value) { return make_const(like.type(), value); }
+Expr square(const Expr& a) { return a * a; }
+Expr infinity(Type type) { return make_const(type, std::numeric_limits<double>::infinity()); }
+double smallest_normal_of(Type type) {
+  return type.bits() == 64                       ? std::numeric_limits<double>::min()
+         : type.bits() == 32 || type.is_bfloat() ? std::numeric_limits<float>::min()
+                                                 : 0x1p-14;
+}
+double largest_of(Type type) {
+  return type.bits() == 64   ? std::numeric_limits<double>::max()
+         : type.bits() == 32 ? std::numeric_limits<float>::max()
+         : type.is_bfloat()  ? 0x1.fep127
+                             : 65504;
+}
+Partial plain(Expr e) { return {std::move(e), Strength::Plain}; }
+Partial quotient(Expr e, Expr divisor) {
+  return {std::move(e), Strength::Strong, std::move(divisor)};
+}
+Expr zero_where(const Expr& condition, const Expr& e) {
+  return make_select(condition, make_zero(e.type()), e);
+}
+
+// d|u| = sign(u), and 0 at 0.
+Expr sign(const Expr& u) {
+  return make_select(u > num(u, 0), num(u, 1), make_select(u < num(u, 0), num(u, -1), num(u, 0)));
+}
+
+Partials abs_partials(Args a, const Expr&) { return {plain(sign(a[0]))}; }
+Partials absd_partials(Args a, const Expr&) {
+  Expr s = sign(a[0] - a[1]);
+  return {plain(s), plain(-s)};
+}
+Partials lerp_partials(Args a, const Expr&) {
+  return {plain(num(a[2], 1) - a[2]), plain(a[2]), plain(a[1] - a[0])};
+}
+Partials sqrt_partials(Args a, const Expr& v) { return {quotient(num(a[0], 0.5), v)}; }
+Partials exp_partials(Args, const Expr& v) { return {strong(v)}; }
+Partials log_partials(Args a, const Expr&) { return {quotient(num(a[0], 1), a[0])}; }
+// Whether p - 1 is a number of p's type.
+bool has_exact_predecessor(const Expr& p) {
+  auto value = as_const_float(p);
+  return value && round_to_type(p.type(), *value - 1) == *value - 1;
+}
+// dx: p x^(p-1), 0 where p is 0.  dp: x^p log x, 0 where x is 0.
+// Where p - 1 is rounded, x^(p-1) is wrong by that times log x, or is another power altogether:
+// p v / x is not, unless v overflowed or underflowed.
+Partials power_partials(Args a, const Expr& v, Op power, Op logarithm) {
+  const Expr &x = a[0], &p = a[1];
+  Expr dx = p * call_op(power, x.type(), {x, p - num(p, 1)});
+  if (!has_exact_predecessor(p)) {
+    Expr size = call_op(Op::abs, {v});
+    Expr lost = size < num(x, smallest_normal_of(x.type())) || size == infinity(x.type()) ||
+                call_op(Op::abs, {x}) == infinity(x.type());
+    dx = make_select(lost, dx, p * v / x);
+  }
+  if (is_zero(p)) dx = num(x, 0);
+  if (!is_const(p)) dx = zero_where(p == num(p, 0), dx);
+  Expr dp = zero_where(x == num(x, 0), v * call_op(logarithm, {x}));
+  return {strong(dx), strong(dp)};
+}
+Partials pow_partials(Args a, const Expr& v) { return power_partials(a, v, Op::pow, Op::log); }
+Partials fast_pow_partials(Args a, const Expr& v) {
+  return power_partials(a, v, Op::fast_pow, Op::fast_log);
+}
+Partials hypot_partials(Args a, const Expr&) {
+  std::vector<Expr> unit = unit_vector(a);
+  return {strong(unit[0]), strong(unit[1])};
+}
+Partials sin_partials(Args a, const Expr&) { return {strong(call_op(Op::cos, {a[0]}))}; }
+Partials cos_partials(Args a, const Expr&) { return {strong(-call_op(Op::sin, {a[0]}))}; }
+Partials tan_partials(Args a, const Expr& v) { return {strong(num(a[0], 1) + square(v))}; }
+// (1 - x)(1 + x) keeps the digits near the poles that 1 - x^2 loses.
+Expr one_minus_square(const Expr& x) { return (num(x, 1) - x) * (num(x, 1) + x); }
+Partials asin_partials(Args a, const Expr&) {
+  return {strong(num(a[0], 1) / call_op(Op::sqrt, {one_minus_square(a[0])}))};
+}
+Partials acos_partials(Args a, const Expr&) {
+  return {strong(num(a[0], -1) / call_op(Op::sqrt, {one_minus_square(a[0])}))};
+}
+Partials atan_partials(Args a, const Expr&) {
+  return {strong(num(a[0], 1) / (num(a[0], 1) + square(a[0])))};
+}
+Partials atan2_partials(Args a, const Expr&) {
+  const std::vector<Expr> gradient = angle_gradient(a[0], a[1]);
+  return {strong(gradient[0]), strong(gradient[1])};
+}
+Partials sinh_partials(Args a, const Expr&) { return {strong(call_op(Op::cosh, {a[0]}))}; }
+Partials cosh_partials(Args a, const Expr&) { return {strong(call_op(Op::sinh, {a[0]}))}; }
+// 1 - v^2 has no digits left where v has rounded to 1: 4 e / (1 + e)^2 with e = exp(-2 |x|) keeps
+// them.
+Partials tanh_partials(Args a, const Expr&) {
+  Expr e = call_op(Op::exp, {num(a[0], -2) * call_op(Op::abs, {a[0]})});
+  return {strong(num(a[0], 4) * e / square(num(a[0], 1) + e))};
+}
+Partials asinh_partials(Args a, const Expr&) {
+  return {strong(num(a[0], 1) / call_op(Op::hypot, a[0].type(), {a[0], num(a[0], 1)}))};
+}
+Partials acosh_partials(Args a, const Expr&) {
+  const Expr& x = a[0];
+  return {strong(num(x, 1) /
+                 (call_op(Op::sqrt, {x - num(x, 1)}) * call_op(Op::sqrt, {x + num(x, 1)})))};
+}
+Partials atanh_partials(Args a, const Expr&) {
+  return {strong(num(a[0], 1) / one_minus_square(a[0]))};
+}
+// exp(-x^2) as exp(-h^2) exp(-(x - h)(x + h)), where h is x rounded to sixteenths and its square
+// exact: the rounding error of a large square would be a factor. Beyond 30 both are 0.
+Partials erf_partials(Args a, const Expr&) {
+  const Expr& x = a[0];
+  Expr h = call_op(Op::floor, {x * num(x, 16)}) / num(x, 16);
+  Expr rest = make_select(call_op(Op::abs, {x}) < num(x, 30), (x - h) * (x + h), num(x, 0));
+  return {strong(num(x, 2 * std::numbers::inv_sqrtpi) * call_op(Op::exp, {-square(h)}) *
+                 call_op(Op::exp, {-rest}))};
+}
+Partials fast_log_partials(Args a, const Expr&) { return {quotient(num(a[0], 1), a[0])}; }
+Partials fast_sin_partials(Args a, const Expr&) { return {strong(call_op(Op::fast_cos, {a[0]}))}; }
+Partials fast_cos_partials(Args a, const Expr&) { return {strong(-call_op(Op::fast_sin, {a[0]}))}; }
+Partials fast_inverse_partials(Args, const Expr& v) { return {strong(-square(v))}; }
+Partials fast_inverse_sqrt_partials(Args, const Expr& v) {
+  return {strong(num(v, -0.5) * v * square(v))};
+}
+Partials saturating_cast_partials(Args a, const Expr& v) {
+  Expr inside = cast_to(a[0].type(), v) == a[0];
+  if (v.type().can_represent(a[0].type())) return {plain(make_one(v.type()))};
+  if (v.type().is_float()) inside = call_op(Op::abs, {a[0]}) <= num(a[0], largest_of(v.type()));
+  return {plain(make_select(inside, make_one(v.type()), make_zero(v.type())))};
+}
+Partials strong_mul_partials(Args a, const Expr&) { return {strong(a[1]), strong(a[0])}; }
+Partials strong_div_partials(Args a, const Expr& v) {
+  return {quotient(num(a[0], 1), a[1]), quotient(-v, a[1])};
+}
+
+Partials add_partials(Args a, const Expr&) {
+  return {plain(make_one(a[0].type())), plain(make_one(a[0].type()))};
+}
+Partials sub_partials(Args a, const Expr&) {
+  return {plain(make_one(a[0].type())), plain(num(a[0], -1))};
+}
+Partials mul_partials(Args a, const Expr&) { return {plain(a[1]), plain(a[0])}; }
+Partials div_partials(Args a, const Expr& v) {
+  if (is_const(a[1]) && !is_zero(a[1])) return {plain(num(a[0], 1) / a[1]), Partial{}};
+  return {quotient(num(a[0], 1), a[1]), quotient(-v, a[1])};
+}
+Partials mod_partials(Args a, const Expr&) {
+  return {plain(make_one(a[0].type())), strong(-call_op(Op::floor, {a[0] / a[1]}))};
+}
+DerivativeRule smooth(PartialsFn partials, const char* domain, const char* convention,
+                      const char* formula, const char* infinities, int max_ulp,
+                      const char* source = "[GW] table 2.1") {
+  return {RuleClass::Smooth, partials,   -1,     domain, convention, source,
+          formula,           infinities, max_ulp};
+}
+DerivativeRule constant_rule(const char* convention) {
+  return {RuleClass::Constant,           nullptr,    -1,
+          "everywhere but at the steps", convention, "definition"};
+}
+DerivativeRule transparent(int arg, const char* convention = "the value is the argument's") {
+  return {RuleClass::Transparent, nullptr, arg, "everywhere", convention, "definition"};
+}
+DerivativeRule no_rule(const char* reason) {
+  return {RuleClass::NoRule, nullptr, -1, "", reason, "definition"};
+}
+
+using OpTable = std::map<Op, DerivativeRule>;
+constexpr const char* approximated = "that of the function it approximates";
+
+OpTable smooth_operators() {
+  return {
+      {Op::abs, smooth(abs_partials, "x != 0", "0 at 0", "sign(x)", "-1 and 1", 0)},
+      {Op::absd, smooth(absd_partials, "a != b", "0 where a == b", "sign(x - y), -sign(x - y)",
+                        "-1 and 1; 0 for equal infinities", 0)},
+      {Op::lerp,
+       smooth(lerp_partials, "everywhere", "floating weights; integer weights are constants",
+              "1 - w, w, y - x", "infinite or NaN, as the value", 1, "definition")},
+      {Op::sqrt,
+       smooth(sqrt_partials, "x > 0", "+inf at 0 (-inf at -0), times a strong zero; NaN below 0",
+              "1 / (2 v)", "0 at +inf", 2)},
+      {Op::exp, smooth(exp_partials, "everywhere", "inf where exp overflows", "v",
+                       "0 at -inf, inf at +inf", 1)},
+      {Op::log,
+       smooth(log_partials, "x > 0", "inf at 0 (-inf at -0), 1/x below 0 where the primal is NaN",
+              "1 / x", "0 at +inf", 1)},
+      {Op::pow,
+       smooth(pow_partials, "x > 0, or integer p",
+              "dx is 0 where p == 0; dp is 0 where x == 0 and NaN where x < 0",
+              "y x^(y-1), or y v / x, v log x",
+              "as x^(y-1) and v log x; a pole may have either sign where y - 1 is rounded", 3)},
+      {Op::hypot,
+       smooth(hypot_partials, "(x, y) != (0, 0)", "0 at the origin: the smallest subgradient",
+              "x / v, y / v, scaled by max(|x|, |y|)", "NaN", 2)},
+      {Op::sin,
+       smooth(sin_partials, "everywhere", "NaN at infinities", "cos x", "NaN, as the value", 1)},
+      {Op::cos,
+       smooth(cos_partials, "everywhere", "NaN at infinities", "-sin x", "NaN, as the value", 1)},
+      {Op::tan, smooth(tan_partials, "x != pi/2 + k pi", "1 + tan^2, huge near the poles",
+                       "1 + v^2", "NaN, as the value", 4)},
+      {Op::asin, smooth(asin_partials, "|x| < 1", "inf at -1 and 1, NaN outside",
+                        "1 / sqrt((1 - x)(1 + x))", "NaN, as the value", 3)},
+      {Op::acos, smooth(acos_partials, "|x| < 1", "-inf at -1 and 1, NaN outside",
+                        "-1 / sqrt((1 - x)(1 + x))", "NaN, as the value", 3)},
+      {Op::atan, smooth(atan_partials, "everywhere", "0 at infinities", "1 / (1 + x^2)", "0", 3)},
+      {Op::atan2, smooth(atan2_partials, "(y, x) != (0, 0)", "0 at the origin",
+                         "y / r / r, -x / r / r with r = hypot(x, y), scaled",
+                         "0 where an operand is infinite", 4, "[DLMF] 4.24")},
+      {Op::sinh,
+       smooth(sinh_partials, "everywhere", "inf where cosh overflows", "cosh x", "inf", 2)},
+      {Op::cosh, smooth(cosh_partials, "everywhere", "inf where sinh overflows", "sinh x",
+                        "-inf and inf", 2)},
+      {Op::tanh, smooth(tanh_partials, "everywhere", "0 at infinities",
+                        "4 e / (1 + e)^2 with e = exp(-2 |x|)", "0", 6)},
+      {Op::asinh, smooth(asinh_partials, "everywhere", "0 at infinities", "1 / hypot(x, 1)", "0", 2,
+                         "[DLMF] 4.40")},
+      {Op::acosh, smooth(acosh_partials, "x > 1", "inf at 1, NaN below",
+                         "1 / (sqrt(x - 1) sqrt(x + 1))", "0 at +inf", 4, "[DLMF] 4.40")},
+      {Op::atanh, smooth(atanh_partials, "|x| < 1",
+                         "inf at -1 and 1; the formula outside, where the value is NaN",
+                         "1 / ((1 - x)(1 + x))", "0, where the value is NaN", 3, "[DLMF] 4.40")},
+      {Op::erf, smooth(erf_partials, "everywhere", "0 at infinities", "2 / sqrt(pi) exp(-x^2)", "0",
+                       4, "[DLMF] 7.2")},
+      {Op::fast_exp, smooth(exp_partials, "as exp", approximated, "exp's, with v", "as exp", -1)},
+      {Op::fast_log, smooth(fast_log_partials, "x > 0", approximated, "log's", "as log", 1)},
+      {Op::fast_pow, smooth(fast_pow_partials, "as pow", approximated,
+                            "pow's, by fast_pow and fast_log", "as pow", -1)},
+      {Op::fast_sin,
+       smooth(fast_sin_partials, "everywhere", approximated, "fast_cos x", "NaN", -1)},
+      {Op::fast_cos,
+       smooth(fast_cos_partials, "everywhere", approximated, "-fast_sin x", "NaN", -1)},
+      {Op::fast_inverse, smooth(fast_inverse_partials, "x != 0", approximated, "-v^2", "0", -1)},
+      {Op::fast_inverse_sqrt,
+       smooth(fast_inverse_sqrt_partials, "x > 0", approximated, "-v^3 / 2", "0 at +inf", -1)},
+      {Op::saturating_cast, smooth(saturating_cast_partials, "inside the type's range",
+                                   "0 where the value saturates; to integers: 0", "1 or 0",
+                                   "0: the value saturates", 0, "definition")},
+      {Op::strong_div,
+       smooth(strong_div_partials, "b != 0", "as a quotient, with strong zeros", "1 / y, -v / y",
+              "as a quotient, with strong zeros", 2, "definition")},
+      {Op::strong_mul, smooth(strong_mul_partials, "everywhere", "as a product, with strong zeros",
+                              "y, x", "as a product, with strong zeros", 0, "definition")},
+  };
+}
+
+// The operators whose derivative is 0, and those that pass on a value by a promise.
+OpTable other_operators() {
+  const char* bits = "integers only: derivative 0";
+  const char* test = "a truth value: derivative 0";
+  const char* steps = "0 everywhere, at the steps too";
+  const char* promise = "the bounds are promises, not values";
+  return {
+      {Op::bitwise_and, constant_rule(bits)},
+      {Op::bitwise_or, constant_rule(bits)},
+      {Op::bitwise_xor, constant_rule(bits)},
+      {Op::bitwise_not, constant_rule(bits)},
+      {Op::shift_left, constant_rule(bits)},
+      {Op::shift_right, constant_rule(bits)},
+      {Op::popcount, constant_rule(bits)},
+      {Op::count_leading_zeros, constant_rule(bits)},
+      {Op::count_trailing_zeros, constant_rule(bits)},
+      {Op::is_nan, constant_rule(test)},
+      {Op::is_inf, constant_rule(test)},
+      {Op::is_finite, constant_rule(test)},
+      {Op::floor, constant_rule(steps)},
+      {Op::ceil, constant_rule(steps)},
+      {Op::round, constant_rule(steps)},
+      {Op::trunc, constant_rule(steps)},
+      {Op::undef, constant_rule("any value: derivative 0")},
+      {Op::random, constant_rule("depends on its seeds only")},
+      {Op::promise_clamped, transparent(0, promise)},
+      {Op::unsafe_promise_clamped, transparent(0, promise)},
+      {Op::stop_gradient,
+       {RuleClass::Blocked, nullptr, -1, "everywhere", "0: the program says so", "definition"}},
+  };
+}
+
+OpTable make_op_table() {
+  OpTable t = smooth_operators();
+  t.merge(other_operators());
+  for (int i = 0; i < op_count; ++i) {
+    const Op op = static_cast<Op>(i);
+    if (op_info(op).cls == OpClass::Internal) {
+      t.emplace(op, no_rule("made by lowering only, after differentiation"));
+    } else if (passed_operand(op) >= 0) {
+      t.emplace(op, transparent(passed_operand(op)));
+    }
+  }
+  return t;
+}
+
+// d min(a, b): the operand that the primal takes gets all. At a tie that is one of them: the two
+// sum to 1.
+Partials taken_partials(Args a, const Expr& first_taken) {
+  Type type = a[0].type();
+  return {plain(make_select(first_taken, make_one(type), make_zero(type))),
+          plain(make_select(first_taken, make_zero(type), make_one(type)))};
+}
+Partials min_partials(Args a, const Expr&) { return taken_partials(a, a[0] < a[1]); }
+Partials max_partials(Args a, const Expr&) { return taken_partials(a, a[0] > a[1]); }
+
+using KindTable = std::map<Kind, DerivativeRule>;
+KindTable make_kind_table() {
+  KindTable t = {
+      {Kind::Add, smooth(add_partials, "everywhere", "none needed", "1, 1", "1", 0)},
+      {Kind::Sub, smooth(sub_partials, "everywhere", "none needed", "1, -1", "1 and -1", 0)},
+      {Kind::Mul,
+       smooth(mul_partials, "everywhere", "strong zero where a factor may be infinite or NaN",
+              "y, x", "infinite, but for strong zeros", 0)},
+      {Kind::Div,
+       smooth(div_partials, "b != 0", "infinite at b == 0, times a strong zero; integers: 0",
+              "1 / y, -v / y", "0 where y is infinite", 2)},
+      {Kind::Mod, smooth(mod_partials, "a / b not an integer",
+                         "da is 1 and db -floor(a / b) at the steps too; integers: 0",
+                         "1, -floor(x / y)", "NaN, as the value", 0, "definition")},
+      {Kind::Min, smooth(min_partials, "a != b", "the operand taken gets 1; at a tie that is b",
+                         "1, 0 or 0, 1", "as for finite operands", 0, "definition")},
+      {Kind::Max, smooth(max_partials, "a != b", "the operand taken gets 1; at a tie that is b",
+                         "1, 0 or 0, 1", "as for finite operands", 0, "definition")},
+      {Kind::Select,
+       {RuleClass::Smooth, nullptr, -1, "where the condition does not change",
+        "the chosen arm gets all, the other exactly 0", "definition", "1 or 0",
+        "as for finite operands", 0}},
+      {Kind::Cast,
+       transparent(0, "between floats: the adjoint is converted; to or from integers: 0")},
+      {Kind::Reinterpret, no_rule("the bits of a value are no differentiable function of it")},
+  };
+  for (Kind k : {Kind::EQ, Kind::NE, Kind::LT, Kind::LE, Kind::GT, Kind::GE, Kind::And, Kind::Or,
+                 Kind::Not}) {
+    t.emplace(k, constant_rule("a truth value: derivative 0"));
+  }
+  return t;
+}
+
+const OpTable& op_table() {
+  static const OpTable table = make_op_table();
+  return table;
+}
+const KindTable& kind_table() {
+  static const KindTable table = make_kind_table();
+  return table;
+}
+
+}  // namespace
+
+const DerivativeRule& derivative_rule(Op op) {
+  auto it = op_table().find(op);
+  RETROGRADE_ASSERT(it != op_table().end(), "no row for operator ", op_info(op).name);
+  return it->second;
+}
+
+const DerivativeRule& derivative_rule(Kind kind) {
+  auto it = kind_table().find(kind);
+  RETROGRADE_ASSERT(it != kind_table().end(), "no row for ", kind_name(kind));
+  return it->second;
+}
+
+bool has_derivative_rule(Kind kind) { return kind_table().contains(kind); }
+
+bool has_poles(const Call& call) {
+  const PartialPoles poles = op_info(call.op).real.poles;
+  if (poles != PartialPoles::PolesBelowOne) return poles == PartialPoles::Poles;
+  const auto exponent = as_const_float(call.args.back());
+  return !exponent || *exponent < 1;
+}
+
+bool levels_off(Op op) { return op_info(op).real.levels == Levels::LevelsOff; }
+
+Type adjoint_type(Type type) {
+  return type.bits() < 32 || type.is_bfloat() ? Float(32, type.lanes()) : type;
+}
+
+namespace {
+
+bool is_finite_constant(const Expr& e) {
+  auto value = as_const_float(e);
+  return value && std::isfinite(*value);
+}
+
+bool is_cut(Strength strength) { return strength == Strength::Cut || strength == Strength::Both; }
+
+// adjoint / divisor * factor, in that order. A constant factor, at most 1, goes first: it cannot
+// overflow, and one division is all.
+Expr divided_first(const Expr& adjoint, const Partial& partial) {
+  const Expr divisor = cast_to(adjoint.type(), partial.divisor);
+  const bool is_scaled = is_const(partial.factor);
+  const Expr scaled =
+      is_scaled ? times_partial(adjoint, {partial.factor, Strength::Plain}) : adjoint;
+  const Expr divided = partial.strength == Strength::Strong
+                           ? call_op(Op::strong_div, adjoint.type(), {scaled, divisor})
+                           : scaled / divisor;
+  // The quotient may have overflowed where the factor is 0.
+  return is_scaled ? divided : times_partial(divided, {partial.factor, Strength::Both});
+}
+
+}  // namespace
+
+Expr times_partial(const Expr& adjoint, const Partial& partial) {
+  if (is_zero(partial.factor)) return make_zero(adjoint.type());
+  // A choice stays a choice: inf * 0 must not make a NaN of the operand that was not taken.
+  if (const auto* choice = partial.factor.as<Select>()) {
+    return make_select(
+        choice->condition,
+        times_partial(adjoint, {choice->when_true, partial.strength, partial.divisor}),
+        times_partial(adjoint, {choice->when_false, partial.strength, partial.divisor}));
+  }
+  if (partial.divisor.defined()) {
+    if (!is_cut(partial.strength)) return divided_first(adjoint, partial);
+    return times_partial(adjoint, {partial.factor / partial.divisor, partial.strength});
+  }
+  Expr factor = cast_to(adjoint.type(), partial.factor);
+  if (is_one(factor)) return adjoint;
+  if (is_finite_constant(factor) || partial.strength == Strength::Plain) return adjoint * factor;
+  if (partial.strength == Strength::Cut)
+    return call_op(Op::strong_mul, adjoint.type(), {factor, adjoint});
+  Expr product = call_op(Op::strong_mul, adjoint.type(), {adjoint, factor});
+  if (partial.strength != Strength::Both) return product;
+  // A product in both branches: the derivative of this one is that of a product where factor is 0.
+  return make_select(factor == make_zero(factor.type()),
+                     call_op(Op::strong_mul, product.type(), {factor, adjoint}), product);
+}
+
+}  // namespace retrograde::ir

@@ -1,0 +1,40 @@
+#include "autodiff/schedule/graph_passes.h"
+
+#include <algorithm>
+
+#include "autodiff/derivative.h"
+#include "autodiff/schedule/default_schedule.h"
+#include "graph/wrappers.h"
+
+namespace retrograde::ir {
+
+namespace {
+
+// The adjoints of all images and parameters that the first output depends on come to be outputs.
+std::vector<FuncPtr> with_adjoints(const std::vector<FuncPtr>& outputs) {
+  const Derivative d = retrograde::propagate_adjoints(Func(outputs[0]));
+  std::vector<FuncPtr> result = outputs;
+  for (const auto& parameter : parameters_of(outputs)) {
+    const AdjointInput input(parameter);
+    if (d.has(input)) result.push_back(d.of(input).function());
+  }
+  return result;
+}
+
+}  // namespace
+
+const std::vector<GraphPass>& graph_passes() {
+  static const std::vector<GraphPass> passes{{"propagate_adjoints", with_adjoints},
+                                             {"apply_wrappers", apply_wrappers},
+                                             {"schedule_unscheduled", schedule_unscheduled}};
+  return passes;
+}
+
+const GraphPass* find_graph_pass(const std::string& name) {
+  const auto& all = graph_passes();
+  const auto found = std::find_if(all.begin(), all.end(),
+                                  [&](const GraphPass& pass) { return pass.name == name; });
+  return found == all.end() ? nullptr : &*found;
+}
+
+}  // namespace retrograde::ir

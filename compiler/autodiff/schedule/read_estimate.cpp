@@ -1,0 +1,105 @@
+// Iterations over elements. In  f(4 x + r), r < 8,  two iterations read each element: 8 / 4; in
+// f(r.x, r.y) one does; in f(x, r) of a stage over x, y and r as many as y has values.
+#include "autodiff/schedule/read_estimate.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "analysis/linear.h"
+#include "autodiff/sweeps/local_derivative.h"
+#include "autodiff/sweeps/regions.h"
+#include "graph/function.h"
+#include "ir/build.h"
+#include "ir/visit.h"
+#include "simplify/simplify.h"
+
+namespace retrograde::ir {
+
+namespace {
+
+// Iterations of a loop, or reads of a reduction, of which nothing is known.
+constexpr double several = 8;
+
+struct Loop {
+  std::string name;
+  double extent = several;
+  bool is_long = false;  // a pure dimension, as long as what is read
+  bool is_used = false;
+};
+
+std::vector<Loop> loops_of(const FuncContents& f, const Definition& stage) {
+  std::vector<Loop> loops;
+  for (const ReductionVariable& r : stage.rvars) {
+    auto extent = as_const_int(simplify(r.extent));
+    loops.push_back({r.var, extent ? std::max(1.0, static_cast<double>(*extent)) : several});
+  }
+  for (size_t d = 0; d < f.args.size(); ++d) {
+    if (!is_pure_position(f, stage, d)) continue;
+    const bool is_lane = f.made && f.made->lanes > 0 && d == 0;
+    loops.push_back({f.args[d], is_lane ? f.made->lanes : several, !is_lane});
+  }
+  return loops;
+}
+
+bool uses_loops(const Expr& e, const std::vector<Loop>& loops) {
+  return std::any_of(loops.begin(), loops.end(),
+                     [&](const Loop& loop) { return uses_variable(e, loop.name); });
+}
+
+// Without markers, and without clamps to what is the same for all iterations.
+Expr unclamped(const Expr& e, const std::vector<Loop>& loops) {
+  const auto* call = e.as<Call>();
+  if (call && call->call_type == CallType::Operator && op_info(call->op).cls == OpClass::Marker)
+    return unclamped(call->args[0], loops);
+  if (e.kind() != Kind::Min && e.kind() != Kind::Max) return e;
+  const auto* n = e.as<Binary>();
+  if (!uses_loops(n->b, loops)) return unclamped(n->a, loops);
+  return uses_loops(n->a, loops) ? e : unclamped(n->b, loops);
+}
+
+// Iterations for each value of one index; nothing when it is not linear in the loops.
+std::optional<double> iterations_a_value(const Expr& any_index, std::vector<Loop>& loops) {
+  const Expr index = unclamped(any_index, loops);
+  const auto* quotient = index.as<Div>();
+  if (auto divisor = quotient ? as_const_int(quotient->b) : std::nullopt; divisor && *divisor > 0) {
+    auto found = iterations_a_value(quotient->a, loops);
+    return found ? std::optional(*found * static_cast<double>(*divisor)) : std::nullopt;
+  }
+  std::vector<std::string> names;
+  for (const Loop& loop : loops) names.push_back(loop.name);
+  auto form = decompose(index, names);
+  if (!form) return std::nullopt;
+  double iterations = 1, reach = 1, steps = 1;
+  bool is_long = false;
+  for (size_t i = 0; i < loops.size(); ++i) {
+    const double step = std::abs(static_cast<double>(form->coefficients[i].second));
+    if (step == 0) continue;
+    loops[i].is_used = true;
+    is_long |= loops[i].is_long;
+    if (loops[i].is_long) {
+      steps *= step;
+    } else {
+      iterations *= loops[i].extent;
+      reach += step * (loops[i].extent - 1);
+    }
+  }
+  return is_long ? iterations / steps : std::max(1.0, iterations / reach);
+}
+
+}  // namespace
+
+double reads_an_element(const Call& call, const FuncContents& reader, const Definition& stage) {
+  std::vector<Loop> loops = loops_of(reader, stage);
+  double reads = 1;
+  for (const Expr& arg : call.args) {
+    auto found = iterations_a_value(without_lets(arg), loops);
+    if (!found) return stage.rvars.empty() ? 1 : several;
+    reads *= *found;
+  }
+  for (const Loop& loop : loops) {
+    if (!loop.is_used) reads *= loop.extent;
+  }
+  return reads;
+}
+
+}  // namespace retrograde::ir

@@ -1,0 +1,171 @@
+#include "autodiff/sweeps/carried_sums.h"
+
+#include <algorithm>
+#include <cmath>
+#include <unordered_map>
+
+#include "autodiff/sweeps/accumulation.h"
+#include "autodiff/updates/versions.h"
+#include "ir/build.h"
+
+namespace retrograde::ir {
+
+namespace {
+
+// A node that is linear in what is carried: a product with `factor` (undefined: 1), a quotient, a
+// sum, a choice.
+struct Linear {
+  enum class Kind { Carried, Scaled, Divided, Sum, Choice, Unknown } kind = Kind::Unknown;
+  std::vector<Expr> parts;  // those that may hold what is carried
+  Expr factor;              // or divisor, or condition
+};
+
+Linear scaled(const Expr& a, const Expr& b, const FuncContents* carried) {
+  if (calls(a, carried) && calls(b, carried)) return {};
+  bool first = calls(a, carried);
+  return {Linear::Kind::Scaled, {first ? a : b}, first ? b : a};
+}
+
+Linear linear_operator(const Call& n, const FuncContents* carried) {
+  if (n.call_type != CallType::Operator) return {};
+  if (n.op == Op::strong_mul) return scaled(n.args[0], n.args[1], carried);
+  if (n.op == Op::strong_div && !calls(n.args[1], carried))
+    return {Linear::Kind::Divided, {n.args[0]}, n.args[1]};
+  return {};
+}
+
+Linear as_linear(const Expr& e, const FuncContents* carried) {
+  using Kind = Linear::Kind;
+  if (as_call_of(e, carried)) return {Kind::Carried, {}, {}};
+  return match(
+      e,
+      [&](const Add& n) {
+        return Linear{Kind::Sum, {n.a, n.b}, {}};
+      },
+      [&](const Sub& n) {
+        return Linear{Kind::Sum, {n.a, n.b}, {}};
+      },
+      [&](const Mul& n) { return scaled(n.a, n.b, carried); },
+      [&](const Div& n) {
+        return calls(n.b, carried) ? Linear{} : Linear{Kind::Divided, {n.a}, n.b};
+      },
+      [&](const Select& n) {
+        return calls(n.condition, carried)
+                   ? Linear{}
+                   : Linear{Kind::Choice, {n.when_true, n.when_false}, n.condition};
+      },
+      [&](const Cast& n) {
+        return n.value.type().is_float() && n.type.is_float() ? Linear{Kind::Scaled, {n.value}, {}}
+                                                              : Linear{};
+      },
+      [&](const Call& n) { return linear_operator(n, carried); },
+      [&](const ExprNode&) { return Linear{}; });
+}
+
+std::optional<double> magnitude(const Expr& factor) {
+  if (!factor.defined()) return 1;
+  auto value = as_const_float(factor);
+  return value ? std::optional(std::fabs(*value)) : std::nullopt;
+}
+
+// Terms share nodes: each is looked at once.
+class Factors {
+ public:
+  explicit Factors(const FuncContents* carried) : carried_(carried) {}
+
+  std::optional<double> of(const Expr& term) {
+    auto known = known_.find(term.get());
+    if (known != known_.end()) return known->second;
+    return known_[term.get()] = calls(term, carried_) ? of_linear(as_linear(term, carried_)) : 0;
+  }
+
+ private:
+  std::optional<double> of_linear(const Linear& n) {
+    if (n.kind == Linear::Kind::Carried) return 1;
+    if (n.kind == Linear::Kind::Unknown) return std::nullopt;
+    double sum = 0, largest = 0;
+    for (const Expr& part : n.parts) {
+      auto factor = of(part);
+      if (!factor) return std::nullopt;
+      sum += *factor;
+      largest = std::max(largest, *factor);
+    }
+    if (n.kind == Linear::Kind::Choice) return largest;
+    if (n.kind == Linear::Kind::Sum) return sum;
+    auto factor = magnitude(n.factor);
+    if (!factor) return std::nullopt;
+    return n.kind == Linear::Kind::Scaled ? sum * *factor : sum / *factor;
+  }
+
+  const FuncContents* carried_;
+  std::unordered_map<const ExprNode*, std::optional<double>> known_;
+};
+
+class InDouble {
+ public:
+  InDouble(const FuncPtr& rounded, const FuncPtr& exact) : rounded_(rounded), exact_(exact) {}
+
+  Expr of(const Expr& term) {
+    auto known = known_.find(term.get());
+    if (known != known_.end()) return known->second;
+    return known_[term.get()] = calls(term, rounded_.get()) ? of_linear(term) : cast_to(wide, term);
+  }
+
+ private:
+  static constexpr Type wide = Float(64);
+
+  Expr of_linear(const Expr& term) {
+    const Linear n = as_linear(term, rounded_.get());
+    switch (n.kind) {
+      case Linear::Kind::Carried: {
+        const Call* call = as_call_of(term, rounded_.get());
+        return call_value(exact_, call->args, call->component);
+      }
+      case Linear::Kind::Choice:
+        return make_select(n.factor, of(n.parts[0]), of(n.parts[1]));
+      case Linear::Kind::Unknown:
+        return cast_to(wide, of_exact(term));
+      default:
+        break;
+    }
+    if (term.as<Cast>()) return of(n.parts[0]);
+    const auto* call = term.as<Call>();
+    return call ? call_op(call->op, wide, {of(call->args[0]), of(call->args[1])})
+                : map_children(term, [&](const Expr& part) { return of(part); });
+  }
+
+  // The term in its own type, of exact values.
+  Expr of_exact(const Expr& term) const {
+    return rewrite(term, [&](const Expr& node, const auto& recurse) -> Expr {
+      const Call* call = as_call_of(node, rounded_.get());
+      if (!call) return map_children(node, recurse);
+      return cast_to(call->type, call_value(exact_, call->args, call->component));
+    });
+  }
+
+  const FuncPtr &rounded_, &exact_;
+  std::unordered_map<const ExprNode*, Expr> known_;
+};
+
+}  // namespace
+
+std::optional<double> carried_factor(const Expr& term, const FuncContents* carried) {
+  return Factors(carried).of(term);
+}
+
+bool carries_sums(const std::vector<Expr>& terms, const FuncContents* carried) {
+  double sum = 0;
+  for (const Expr& term : terms) {
+    auto factor = carried_factor(term, carried);
+    if (!factor) return true;
+    sum += *factor;
+  }
+  // The terms that are remembered are a geometric series: 1 / (1 - sum) of them count.
+  return !(sum <= 1 - 1.0 / many_carried);
+}
+
+Expr carried_in_double(const Expr& term, const FuncPtr& rounded, const FuncPtr& exact) {
+  return InDouble(rounded, exact).of(term);
+}
+
+}  // namespace retrograde::ir

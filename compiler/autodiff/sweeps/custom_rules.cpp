@@ -1,0 +1,268 @@
+#include "autodiff/sweeps/custom_rules.h"
+
+#include <algorithm>
+#include <unordered_set>
+
+#include "autodiff/rules/derivative_rules.h"
+#include "autodiff/sweeps/accumulation.h"
+#include "autodiff/sweeps/input_shape.h"
+#include "diagnostics/error.h"
+#include "frontend/language/var.h"
+#include "graph/define.h"
+#include "graph/function.h"
+#include "ir/build.h"
+#include "simplify/simplify.h"
+
+namespace retrograde::ir {
+
+namespace {
+
+bool is_among(const std::vector<AdjointInput>& inputs, const Symbol* symbol) {
+  return std::any_of(inputs.begin(), inputs.end(),
+                     [&](const AdjointInput& i) { return i.symbol().get() == symbol; });
+}
+
+// Functions of their arguments' values only: facts of a buffer's shape are no reads of it.
+std::shared_ptr<Symbol> read_symbol(const Expr& e) {
+  if (const auto* call = e.as<Call>())
+    return call->symbol.defined() ? call->symbol.lock() : nullptr;
+  const auto* v = e.as<Variable>();
+  if (!v || !v->symbol.defined()) return nullptr;
+  auto p = std::dynamic_pointer_cast<ParameterContents>(v->symbol.lock());
+  return p && !p->is_buffer ? p : nullptr;
+}
+
+class Readers {
+ public:
+  explicit Readers(const FuncContents& f) : f_(f) {
+    for (int s = 0; s < f.stage_count(); ++s)
+      for_each_expr(f.stage(s), [&](const Expr& e) { add_expr(e); });
+    if (!f.extern_definition) return;
+    for (const ExternArgument& a : f.extern_definition->args) {
+      if (a.func) add(a.func);
+      if (a.buffer) add(a.buffer);
+      if (a.expr.defined()) add_expr(a.expr);
+    }
+  }
+  std::vector<std::shared_ptr<Symbol>> take() { return std::move(found_); }
+
+ private:
+  void add_expr(const Expr& root) {
+    walk(root, [&](const Expr& e) {
+      if (auto symbol = read_symbol(e)) add(symbol);
+      return true;
+    });
+  }
+  void add(const std::shared_ptr<Symbol>& symbol) {
+    if (symbol.get() != &f_ && seen_.insert(symbol.get()).second) found_.push_back(symbol);
+  }
+  const FuncContents& f_;
+  std::unordered_set<const Symbol*> seen_;
+  std::vector<std::shared_ptr<Symbol>> found_;
+};
+
+Region region_of(const Box& box) {
+  Region region;
+  for (const Interval& i : box) {
+    region.push_back(
+        {i.min, i.min.defined() && i.max.defined() ? simplify(i.max - i.min + 1) : Expr()});
+  }
+  return region;
+}
+
+std::string asked_through(const FuncContents& f) {
+  return "propagate adjoints through " + quoted(f.name);
+}
+
+// Every wanted input behind f is one that the rule was made for.
+std::vector<FuncPtr> check_covered(const FuncContents& f,
+                                   FunctionRef<bool(const Symbol*)> is_wanted,
+                                   FunctionRef<bool(const Symbol*)> is_requested) {
+  std::vector<FuncPtr> covered;
+  for (const Inside& inside : inside_of(f, f.custom_derivatives->adjoint_inputs)) {
+    if (!is_wanted(inside.symbol.get())) continue;
+    auto func = std::dynamic_pointer_cast<FuncContents>(inside.symbol);
+    if (!func || is_requested(func.get())) {
+      user_error(asked_through(f),
+                 "its custom adjoint must know every input whose gradient is wanted",
+                 text(quoted(inside.reader), " reads ", quoted(shape_of(inside.symbol.get()).name),
+                      ", which is not among the inputs of the rule"),
+                 "List it in custom_adjoint and give its contribution, if only "
+                 "AdjointContribution::zero; or leave it out of what is differentiated by");
+    }
+    covered.push_back(func);
+  }
+  return covered;
+}
+
+// One contribution, of the right shape, for each wanted input.
+void check_contributions(const FuncContents& f, const std::vector<AdjointContribution>& given,
+                         FunctionRef<bool(const Symbol*)> is_wanted) {
+  const std::vector<AdjointInput>& inputs = f.custom_derivatives->adjoint_inputs;
+  std::unordered_set<const Symbol*> seen;
+  for (const AdjointContribution& c : given) {
+    InputShape shape = shape_of(c.input.symbol().get());
+    if (!is_among(inputs, c.input.symbol().get())) {
+      user_error(asked_through(f), "a rule contributes to the inputs that it was made for",
+                 text("its custom adjoint gives one to ", quoted(shape.name)),
+                 "List it in custom_adjoint");
+    }
+    if (!seen.insert(c.input.symbol().get()).second) {
+      user_error(asked_through(f), "each input gets one contribution",
+                 text("its custom adjoint gives two to ", quoted(shape.name)),
+                 "Add them in one Func");
+    }
+    if (c.is_zero) continue;
+    check_shape(asked_through(f), "a contribution", "its input", shape, *c.adjoint.function());
+  }
+  for (const AdjointInput& input : inputs) {
+    const Symbol* symbol = input.symbol().get();
+    if (!is_wanted(symbol) || seen.contains(symbol)) continue;
+    user_error(asked_through(f), "each wanted input gets a contribution",
+               text("its custom adjoint gives none to ", quoted(shape_of(symbol).name)),
+               "Return one, or AdjointContribution::zero where the derivative is zero");
+  }
+}
+
+std::vector<Expr> arguments(int n) {
+  std::vector<Expr> args;
+  for (int d = 0; d < n; ++d) args.push_back(variable("_" + std::to_string(d)));
+  return args;
+}
+
+// `given` as an adjoint. Nothing is known of the rule: what it gives may be exactly 0 where the
+// partials of the input are infinite, and infinite where they are 0.
+FuncPtr as_adjoint(const std::string& name, const FuncPtr& given) {
+  FuncPtr result = make_func(Role::CustomRule, name);
+  result->made->traits = {.masked = true, .singular = true};
+  std::vector<Expr> args = arguments(given->dimensions()), values;
+  for (size_t k = 0; k < given->types.size(); ++k)
+    values.push_back(
+        cast_to(adjoint_type(given->types[k]), call_value(given, args, static_cast<int>(k))));
+  define_pure(result, args, values);
+  return result;
+}
+
+}  // namespace
+
+bool has_custom_adjoint(const FuncContents& f) {
+  return f.custom_derivatives && f.custom_derivatives->adjoint;
+}
+bool has_custom_tangent(const FuncContents& f) {
+  return f.custom_derivatives && f.custom_derivatives->tangent;
+}
+
+std::vector<std::shared_ptr<Symbol>> read_by(const FuncContents& f) { return Readers(f).take(); }
+
+std::vector<Inside> inside_of(const FuncContents& f, const std::vector<AdjointInput>& inputs) {
+  std::vector<Inside> found;
+  std::unordered_set<const Symbol*> seen = {&f};
+  std::vector<const FuncContents*> open = {&f};
+  while (!open.empty()) {
+    const FuncContents* reader = open.back();
+    open.pop_back();
+    for (const std::shared_ptr<Symbol>& symbol : read_by(*reader)) {
+      if (is_among(inputs, symbol.get()) || !seen.insert(symbol.get()).second) continue;
+      found.push_back({symbol, reader->name});
+      if (const auto* func = dynamic_cast<const FuncContents*>(symbol.get())) open.push_back(func);
+    }
+  }
+  return found;
+}
+
+Box extern_reads(const FuncContents& f, const std::shared_ptr<Symbol>& argument, int dimensions,
+                 const Box& of_func) {
+  Box box(static_cast<size_t>(dimensions));
+  const ExternReads* reads = has_custom_adjoint(f) ? &f.custom_derivatives->reads : nullptr;
+  if (!reads || !*reads) return box;
+  Region region = (*reads)(AdjointInput(argument), region_of(of_func));
+  if (region.empty()) return box;
+  if (region.size() != box.size()) {
+    user_error(asked_through(f), "a region has min and extent in each dimension of the argument",
+               text("what its custom adjoint says of ", quoted(shape_of(argument.get()).name),
+                    " has ", region.size(), " dimensions instead of ", box.size()),
+               "Give each dimension, or an empty Region for all of the argument");
+  }
+  for (size_t d = 0; d < box.size(); ++d) {
+    const Range& r = region[d];
+    if (!r.min.defined()) continue;
+    box[d].min = simplify(r.min);
+    if (r.extent.defined()) box[d].max = simplify(r.min + r.extent - 1);
+  }
+  return box;
+}
+
+CustomAdjointResult run_custom_adjoint(const FuncPtr& f, const FuncPtr& adjoint,
+                                       const Regions& regions,
+                                       FunctionRef<bool(const Symbol*)> is_wanted,
+                                       FunctionRef<bool(const Symbol*)> is_requested) {
+  CustomAdjointResult result;
+  result.covered = check_covered(*f, is_wanted, is_requested);
+  std::vector<AdjointContext::Wanted> wanted;
+  for (const AdjointInput& input : f->custom_derivatives->adjoint_inputs) {
+    const Symbol* symbol = input.symbol().get();
+    if (is_wanted(symbol)) wanted.push_back({symbol, region_of(regions.of(symbol))});
+  }
+  if (wanted.empty()) return result;
+  // The rule may be replaced while it runs.
+  std::shared_ptr<const CustomDerivatives> rules = f->custom_derivatives;
+  std::vector<AdjointContribution> given = rules->adjoint(
+      AdjointContext(Func(f), Func(adjoint), region_of(regions.of(f.get())), wanted));
+  check_contributions(*f, given, is_wanted);
+  for (const AdjointContribution& c : given) {
+    if (!is_wanted(c.input.symbol().get())) continue;
+    std::string name = shape_of(c.input.symbol().get()).name;
+    if (c.is_zero) {
+      result.zeros.push_back(name);
+    } else {
+      result.contributions.push_back(
+          {c.input.symbol(), as_adjoint(name + "_from_" + f->name, c.adjoint.function())});
+    }
+  }
+  return result;
+}
+
+FuncPtr run_custom_tangent(const FuncPtr& f, FunctionRef<FuncPtr(const Symbol*)> tangent_of,
+                           FunctionRef<bool(const Symbol*)> has_direction) {
+  std::string asked = "propagate tangents through " + quoted(f->name);
+  bool moves = false;
+  for (const auto& symbol : read_by(*f)) moves |= tangent_of(symbol.get()) != nullptr;
+  std::shared_ptr<const CustomDerivatives> rules = f->custom_derivatives;
+  TangentContext::Moving moving;
+  for (const AdjointInput& input : rules->tangent_inputs) {
+    if (FuncPtr t = tangent_of(input.symbol().get()))
+      moving.push_back({input.symbol().get(), Func(t)});
+  }
+  if (!moves && moving.empty()) return nullptr;
+  if (!has_custom_tangent(*f)) {
+    unsupported(
+        asked, "a Func with a custom adjoint needs a rule for tangents, too",
+        "an input of it moves, and it has none: its definitions need not agree with the rule",
+        "Give it a custom_tangent, or give its tangent itself as a direction");
+  }
+  for (const Inside& inside : inside_of(*f, rules->tangent_inputs)) {
+    if (!has_direction(inside.symbol.get())) continue;
+    user_error(asked, "its custom tangent must know every input that moves",
+               text(quoted(inside.reader), " reads ", quoted(shape_of(inside.symbol.get()).name),
+                    ", which has a direction and is not among the inputs of the rule"),
+               "List it in custom_tangent");
+  }
+  if (moving.empty()) return nullptr;
+  Func given = rules->tangent(TangentContext(Func(f), rules->tangent_inputs, moving));
+  check_shape(asked, "the tangent that its rule gives", "the Func",
+              {f->name, f->dimensions(), f->types}, *given.function());
+  return as_adjoint(f->name + "_tan", given.function());
+}
+
+FuncPtr zero_derivative(const Symbol& symbol, const std::string& suffix) {
+  InputShape shape = shape_of(&symbol);
+  FuncPtr zero = make_func(Role::CustomRule, shape.name + suffix);
+  zero->made->of = shape.name;
+  std::vector<Expr> values;
+  for (Type t : shape.types)
+    values.push_back(make_zero(t.is_float() ? adjoint_type(t) : Float(32)));
+  define_pure(zero, arguments(shape.dimensions), values);
+  return zero;
+}
+
+}  // namespace retrograde::ir

@@ -1,0 +1,50 @@
+#include "autodiff/sweeps/input_shape.h"
+
+#include <algorithm>
+
+#include "diagnostics/error.h"
+
+namespace retrograde::ir {
+
+bool is_floating(const std::vector<Type>& types) {
+  return std::any_of(types.begin(), types.end(), [](Type t) { return t.is_float(); });
+}
+
+bool InputShape::is_floating() const { return ir::is_floating(types); }
+
+InputShape shape_of(const Symbol* symbol) {
+  if (const auto* p = dynamic_cast<const ParameterContents*>(symbol))
+    return {p->name, p->is_buffer ? p->dimensions : 0, {p->type}};
+  const auto* f = dynamic_cast<const FuncContents*>(symbol);
+  if (!f) return {};
+  if (!f->is_defined()) return {f->name, 0, {}};
+  return {f->name, f->dimensions(), f->types};
+}
+
+void check_shape(const std::string& asked, const std::string& what, const std::string& of,
+                 const InputShape& shape, const FuncContents& given) {
+  if (!given.is_defined()) {
+    user_error(asked, text(what, " must be defined"),
+               text("that of ", quoted(shape.name), " has no definition"),
+               "Define it before it is given");
+  }
+  if (given.dimensions() != shape.dimensions) {
+    user_error(asked, text(what, " has the dimensions of ", of),
+               text(quoted(given.name), " has ", given.dimensions(), " and ", quoted(shape.name),
+                    " has ", shape.dimensions),
+               text("Define ", what, " over the same dimensions"));
+  }
+  if (given.types.size() != shape.types.size()) {
+    user_error(asked, text(what, " has as many values as ", of),
+               text(quoted(given.name), " has ", given.types.size(), " and ", quoted(shape.name),
+                    " has ", shape.types.size()),
+               "Define it as a Tuple of as many values");
+  }
+  for (Type t : given.types) {
+    if (t.is_float()) continue;
+    user_error(asked, text(what, " is made of floating-point values"),
+               text(quoted(given.name), " has type ", to_string(t)), "Convert them to float");
+  }
+}
+
+}  // namespace retrograde::ir

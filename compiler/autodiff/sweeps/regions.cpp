@@ -1,0 +1,168 @@
+#include "autodiff/sweeps/regions.h"
+
+#include <algorithm>
+#include <set>
+
+#include "autodiff/sweeps/custom_rules.h"
+#include "autodiff/sweeps/reverse_sweep.h"
+#include "ir/build.h"
+#include "ir/equal.h"
+#include "simplify/simplify.h"
+
+namespace retrograde::ir {
+
+namespace {
+
+Scope<Interval> scope_of(const FuncContents& f, const Definition& definition, const Box& box) {
+  Scope<Interval> scope;
+  for (size_t d = 0; d < f.args.size(); ++d) {
+    if (is_pure_position(f, definition, d)) scope.push(f.args[d], box.at(d));
+  }
+  for (const ReductionVariable& r : definition.rvars)
+    scope.push(r.var, {r.min, simplify(r.min + r.extent - 1)});
+  return scope;
+}
+
+// Whether an update reads an element of its Func other than the one that it writes.
+bool reads_elsewhere(const FuncContents& f, const Definition& definition) {
+  bool found = false;
+  for_each_expr(definition, [&](const Expr& e) {
+    walk(e, [&](const Expr& part) {
+      const auto* read = part.as<Call>();
+      if (!read || read->symbol.raw() != &f) return true;
+      for (size_t d = 0; d < read->args.size(); ++d)
+        found |= !equal(read->args[d], definition.args[d]);
+      return true;
+    });
+  });
+  return found;
+}
+
+// Where the place of an update depends on data, only what others read counts.
+Box or_else(const Box& box, const Box& other) {
+  Box result = box;
+  for (size_t d = 0; d < box.size(); ++d) {
+    if (!result[d].min.defined()) result[d].min = other[d].min;
+    if (!result[d].max.defined()) result[d].max = other[d].max;
+  }
+  return result;
+}
+
+}  // namespace
+
+bool is_pure_position(const FuncContents& f, const Definition& definition, size_t d) {
+  const auto* v = definition.args[d].as<Variable>();
+  return v && !v->symbol.defined() && v->name == f.args[d];
+}
+
+Regions::Regions(const std::vector<FuncPtr>& order, const Box& output) {
+  if (order.empty()) return;
+  boxes_[order.back().get()] = output;
+  outputs_.insert(order.back().get());
+  for (auto f = order.rbegin(); f != order.rend(); ++f) add_func(*f);
+}
+
+Regions::Regions(const std::vector<FuncPtr>& order, const std::map<const Symbol*, Box>& outputs)
+    : boxes_(outputs.begin(), outputs.end()) {
+  for (const auto& [symbol, box] : outputs) outputs_.insert(symbol);
+  for (auto f = order.rbegin(); f != order.rend(); ++f) add_func(*f);
+}
+
+void Regions::add(const FuncPtr& f, const Box& box) {
+  grow(f.get(), box);
+  add_func(f);
+}
+
+void Regions::grow(const Symbol* symbol, const Box& box) {
+  Box& mine = boxes_[symbol];
+  mine = hull(mine, box);
+  for (Interval& i : mine) {
+    if (i.min.defined()) i.min = simplify(i.min);
+    if (i.max.defined()) i.max = simplify(i.max);
+  }
+}
+
+void Regions::add_func(const FuncPtr& f) {
+  auto found = boxes_.find(f.get());
+  if (found == boxes_.end() || (found->second.empty() && !f->args.empty()))
+    return;  // nothing of it is read
+  // An output's elements are given: beyond them it has none.
+  const bool is_output = outputs_.contains(f.get());
+  std::map<const Symbol*, Box> callees;
+  // From the last stage back: what an update reads of the Func itself, the stages before it must
+  // hold.
+  for (int s = f->stage_count() - 1; s >= 0; --s) {
+    const Definition& definition = f->stage(s);
+    Scope<Interval> scope = scope_of(*f, definition, boxes_[f.get()]);
+    Box written;
+    for (size_t d = 0; d < f->args.size(); ++d) {
+      const Interval mine = boxes_[f.get()][d];
+      written.push_back(is_pure_position(*f, definition, d) ? mine
+                                                            : bounds_of(definition.args[d], scope));
+    }
+    if (s > 0) grow(f.get(), or_else(written, boxes_[f.get()]));
+    const bool has_known_reads = is_output || !reads_elsewhere(*f, definition);
+    for_each_expr(definition, [&](const Expr& e) {
+      for (const auto& [name, footprint] : footprints(without_lets(e), scope)) {
+        Symbol* symbol = footprint.symbol.raw();
+        if (symbol == f.get())
+          grow(f.get(), has_known_reads ? or_else(footprint.box, boxes_[f.get()]) : footprint.box);
+        else
+          callees[symbol] = hull(callees[symbol], footprint.box);
+      }
+    });
+  }
+  for (const auto& [symbol, box] : callees) grow(symbol, box);
+  add_extern_arguments(*f);
+}
+
+// The definitions do not say what a C function reads.
+void Regions::add_extern_arguments(const FuncContents& f) {
+  if (!f.is_extern()) return;
+  for (const ExternArgument& a : f.extern_definition->args) {
+    if (a.func) grow(a.func.get(), extern_reads(f, a.func, a.func->dimensions(), of(&f)));
+    if (a.buffer) grow(a.buffer.get(), extern_reads(f, a.buffer, a.buffer->dimensions, of(&f)));
+  }
+}
+
+const Box& Regions::of(const Symbol* symbol) const {
+  static const Box nothing;
+  auto found = boxes_.find(symbol);
+  return found == boxes_.end() ? nothing : found->second;
+}
+
+std::vector<LoopVariable> Regions::loop_variables(const Symbol* symbol,
+                                                  const std::vector<std::string>& names) const {
+  const Box& box = of(symbol);
+  std::vector<LoopVariable> result;
+  for (size_t d = 0; d < names.size() && d < box.size(); ++d) {
+    result.push_back({names[d], box[d].min, box[d].max, false});
+  }
+  return result;
+}
+
+IterationDomain Regions::domain(const FuncContents& f, int stage) const {
+  const Definition& definition = f.stage(stage);
+  const Box& box = of(&f);
+  IterationDomain result;
+  for (size_t d = 0; d < f.args.size(); ++d) {
+    if (is_pure_position(f, definition, d))
+      result.vars.push_back({f.args[d], box.at(d).min, box.at(d).max, false});
+  }
+  for (const ReductionVariable& r : definition.rvars) {
+    result.vars.push_back({r.var, r.min, simplify(r.min + r.extent - 1), true});
+  }
+  if (definition.predicate.defined()) result.predicate = without_lets(definition.predicate);
+  return result;
+}
+
+Box box_of(const Region& region) {
+  Box box;
+  for (const Range& r : region) {
+    Expr min = cast_to(Int(32), r.min);
+    box.push_back({min, simplify(min + cast_to(Int(32), r.extent) - 1)});
+  }
+  return box;
+}
+
+}  // namespace retrograde::ir

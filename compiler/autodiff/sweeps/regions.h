@@ -1,0 +1,48 @@
+// The region of every Func that a region of the outputs needs: what the adjoint sums over.
+#pragma once
+
+#include <map>
+#include <set>
+#include <unordered_map>
+#include <vector>
+
+#include "analysis/interval.h"
+#include "autodiff/inversion/access_inversion.h"
+#include "frontend/language/rdom.h"
+#include "graph/function.h"
+
+namespace retrograde::ir {
+
+class Regions {
+ public:
+  // `order`: producers before consumers, the output last. `output`: its region.
+  Regions(const std::vector<FuncPtr>& order, const Box& output);
+  // The same for several outputs, anywhere in the order.
+  Regions(const std::vector<FuncPtr>& order, const std::map<const Symbol*, Box>& outputs);
+
+  // One more Func and its region, and what it reads.
+  void add(const FuncPtr& f, const Box& box);
+  // Elements of a Func or image that are read or computed; undefined ends are unbounded. Empty:
+  // never read.
+  const Box& of(const Symbol* symbol) const;
+  // The variables of a stage with their ranges: pure variables, then reduction variables, innermost
+  // first.
+  IterationDomain domain(const FuncContents& f, int stage) const;
+  std::vector<LoopVariable> loop_variables(const Symbol* symbol,
+                                           const std::vector<std::string>& names) const;
+
+ private:
+  void add_func(const FuncPtr& f);
+  void add_extern_arguments(const FuncContents& f);
+  void grow(const Symbol* symbol, const Box& box);
+  std::unordered_map<const Symbol*, Box> boxes_;
+  std::set<const Symbol*> outputs_;
+};
+
+// A region in whole numbers, min and max of each dimension.
+Box box_of(const Region& region);
+
+// Dimension d of `args` when it is the pure variable of that dimension.
+bool is_pure_position(const FuncContents& f, const Definition& definition, size_t d);
+
+}  // namespace retrograde::ir

@@ -1,0 +1,239 @@
+// Contributions to one place are a group: one iteration of a gather computes them together. An
+// inner adjoint is shared when two groups need it. Of those that are shared the outermost are kept:
+// the first ones on the way from a contribution down.
+#include "autodiff/sweeps/shared_adjoints.h"
+
+#include <algorithm>
+#include <map>
+#include <set>
+
+#include "analysis/interval.h"
+#include "autodiff/schedule/cost_estimate.h"
+#include "autodiff/schedule/distinct_nodes.h"
+#include "autodiff/sweeps/accumulation.h"
+#include "frontend/language/var.h"
+#include "graph/define.h"
+#include "graph/function.h"
+#include "ir/build.h"
+#include "ir/print.h"
+#include "simplify/simplify.h"
+
+namespace retrograde::ir {
+
+namespace {
+
+// Values of an iteration: memory stays a small multiple of what the steps themselves take.
+constexpr size_t most_kept = 8;
+
+using Numbers = std::set<size_t>;
+
+std::vector<Expr> adjoints_of(const std::vector<LeafAdjoint>& leaves) {
+  std::vector<Expr> result;
+  for (const LeafAdjoint& leaf : leaves) result.push_back(leaf.adjoint);
+  return result;
+}
+
+// What is read, and where; values of a Tuple have their place in common.
+std::string place_of(const Expr& leaf) {
+  const auto* call = leaf.as<Call>();
+  if (!call) return print(leaf);
+  std::string place = std::to_string(reinterpret_cast<uintptr_t>(call->symbol.raw()));
+  for (const Expr& arg : call->args) place += "," + print(arg);
+  return place;
+}
+
+class Sharing {
+ public:
+  Sharing(const std::vector<LeafAdjoint>& leaves, const std::vector<Expr>& seeds)
+      : leaves_(leaves), distinct_(adjoints_of(leaves)), nodes_(distinct_.nodes()) {
+    std::map<std::string, size_t> by_place;
+    for (const LeafAdjoint& leaf : leaves) {
+      auto [group, is_new] = by_place.try_emplace(place_of(leaf.leaf), groups_.size());
+      if (is_new) groups_.emplace_back();
+      groups_[group->second].insert(distinct_.number_of(leaf.adjoint));
+    }
+    find_shared(adjoints_in(seeds));
+    for (const Numbers& group : groups_) {
+      below(group, [&](size_t n) {
+        if (is_shared_[n]) kept_.insert(n);
+        return !is_shared_[n];
+      });
+    }
+  }
+
+  bool is_worth_it() const {
+    if (kept_.empty() || kept_.size() > most_kept) return false;
+    double saved = -operations(kept_, {});
+    for (const Numbers& group : groups_) saved += operations(group, {}) - operations(group, kept_);
+    return saved > way_to_memory * static_cast<double>(kept_.size());
+  }
+
+  std::vector<Expr> kept() const {
+    std::vector<Expr> result;
+    for (size_t n : kept_) result.push_back(nodes_[n]);
+    return result;
+  }
+
+  // The adjoints of the leaves, where `reads` stand for what is kept.
+  std::vector<Expr> with_reads(const std::vector<Expr>& reads) const {
+    std::map<size_t, Expr> read_of;
+    for (size_t n : kept_) read_of.emplace(n, reads[read_of.size()]);
+    std::vector<Expr> result;
+    for (const LeafAdjoint& leaf : leaves_) {
+      result.push_back(rewrite(leaf.adjoint, [&](const Expr& e, const auto& recurse) -> Expr {
+        auto read = read_of.find(distinct_.number_of(e));
+        return read == read_of.end() ? map_children(e, recurse) : read->second;
+      }));
+    }
+    return result;
+  }
+
+ private:
+  // Each node below `roots` once; goes on where `enter` says so.
+  void below(const Numbers& roots, FunctionRef<bool(size_t)> enter) const {
+    std::vector<size_t> open(roots.begin(), roots.end());
+    std::vector<bool> seen(nodes_.size());
+    while (!open.empty()) {
+      const size_t n = open.back();
+      open.pop_back();
+      if (seen[n]) continue;
+      seen[n] = true;
+      if (!enter(n)) continue;
+      for_each_child(nodes_[n], [&](const Expr& e) { open.push_back(distinct_.number_of(e)); });
+    }
+  }
+
+  // In one iteration, where `loaded` is loaded.
+  double operations(const Numbers& roots, const Numbers& loaded) const {
+    double total = 0;
+    below(roots, [&](size_t n) {
+      const bool computes = !loaded.contains(n);
+      total += computes ? operations_of(nodes_[n]) : 1;
+      return computes;
+    });
+    return total;
+  }
+
+  static std::set<const Symbol*> adjoints_in(const std::vector<Expr>& seeds) {
+    std::set<const Symbol*> result;
+    for (const Expr& seed : seeds) {
+      if (!seed.defined()) continue;
+      walk(seed, [&](const Expr& e) {
+        const auto* call = e.as<Call>();
+        if (call && provenance_of(*call)) result.insert(call->symbol.raw());
+        return true;
+      });
+    }
+    return result;
+  }
+
+  void find_shared(const std::set<const Symbol*>& adjoints) {
+    std::vector<int> users(nodes_.size());
+    for (const Numbers& group : groups_) {
+      below(group, [&](size_t n) {
+        ++users[n];
+        return true;
+      });
+    }
+    is_shared_.resize(nodes_.size());
+    const std::vector<bool> is_adjoint = readers_of(adjoints);
+    for (size_t n = 0; n < nodes_.size(); ++n)
+      is_shared_[n] = users[n] > 1 && is_adjoint[n] && !is_cheap(n);
+  }
+  bool is_cheap(size_t root) const {
+    double total = 0;
+    below({root}, [&](size_t n) {
+      total += operations_of(nodes_[n]);
+      return total <= cheap;
+    });
+    return total <= cheap;
+  }
+
+  std::vector<bool> readers_of(const std::set<const Symbol*>& adjoints) const {
+    std::vector<bool> result(nodes_.size());
+    for (size_t n = 0; n < nodes_.size(); ++n) {
+      const auto* call = nodes_[n].as<Call>();
+      bool found = call && adjoints.contains(call->symbol.raw());
+      for_each_child(nodes_[n], [&](const Expr& e) { found |= result[distinct_.number_of(e)]; });
+      result[n] = found && nodes_[n].type().is_float();
+    }
+    return result;
+  }
+
+  const std::vector<LeafAdjoint>& leaves_;
+  DistinctNodes distinct_;
+  const std::vector<Expr>& nodes_;
+  std::vector<Numbers> groups_;
+  std::vector<bool> is_shared_;
+  Numbers kept_;
+};
+
+bool is_inside(const Box& part, const Box& whole) {
+  if (part.size() != whole.size()) return false;
+  for (size_t d = 0; d < part.size(); ++d) {
+    const auto& [min, max] = whole[d];
+    if (min.defined() && !(part[d].min.defined() && can_prove(part[d].min >= min))) return false;
+    if (max.defined() && !(part[d].max.defined() && can_prove(part[d].max <= max))) return false;
+  }
+  return true;
+}
+
+// Whether all that the values read over the domain is there: an access of the primal may stand
+// under a condition.
+bool reads_what_is_there(const std::vector<Expr>& values, const IterationDomain& domain,
+                         const Regions& regions) {
+  Scope<Interval> scope;
+  for (const LoopVariable& v : domain.vars) scope.push(v.name, {v.min, v.max});
+  for (const Expr& value : values) {
+    for (const auto& [name, footprint] : footprints(value, scope)) {
+      const Box& there = regions.of(footprint.symbol.raw());  // empty: differentiation made it
+      if (!there.empty() && !is_inside(footprint.box, there)) return false;
+    }
+  }
+  return true;
+}
+
+bool is_bounded_box(const IterationDomain& domain) {
+  return !domain.predicate.defined() &&
+         std::all_of(domain.vars.begin(), domain.vars.end(),
+                     [](const LoopVariable& v) { return v.min.defined() && v.max.defined(); });
+}
+
+FuncPtr define_over(const IterationDomain& domain, const std::string& name,
+                    const std::vector<Expr>& values) {
+  auto f = make_func(Role::SharedValue);
+  f->name = claim_name(name);
+  Substitution names;
+  std::vector<Expr> args, here;
+  for (const LoopVariable& v : domain.vars) {
+    args.push_back(variable(unique_name("iteration")));
+    names[v.name] = args.back();
+  }
+  for (const Expr& value : values) {
+    here.push_back(substitute(value, names));
+    f->made->traits.add(traits_of(value));
+  }
+  define_pure(f, args, here);
+  return f;
+}
+
+}  // namespace
+
+SharedAdjoints share_adjoints(const std::string& name, const IterationDomain& domain,
+                              const std::vector<LeafAdjoint>& leaves,
+                              const std::vector<Expr>& seeds, const Regions& regions) {
+  SharedAdjoints result{nullptr, adjoints_of(leaves)};
+  if (leaves.size() < 2 || !is_bounded_box(domain)) return result;
+  const Sharing sharing(leaves, seeds);
+  if (!sharing.is_worth_it() || !reads_what_is_there(sharing.kept(), domain, regions))
+    return result;
+  result.func = define_over(domain, name, sharing.kept());
+  std::vector<Expr> point, reads;
+  for (const LoopVariable& v : domain.vars) point.push_back(variable(v.name));
+  for (size_t k = 0; k < result.func->types.size(); ++k)
+    reads.push_back(call_value(result.func, point, static_cast<int>(k)));
+  result.adjoints = sharing.with_reads(reads);
+  return result;
+}
+
+}  // namespace retrograde::ir

@@ -1,0 +1,540 @@
+#include "autodiff/sweeps/synthesis.h"
+
+#include <algorithm>
+
+#include "autodiff/inversion/read_inversions.h"
+#include "autodiff/report/synthesis_account.h"
+#include "autodiff/report/zero_reasons.h"
+#include "autodiff/rules/derivative_rules.h"
+#include "autodiff/rules/invariance.h"
+#include "autodiff/sweeps/custom_rules.h"
+#include "autodiff/sweeps/input_shape.h"
+#include "autodiff/sweeps/reverse_sweep.h"
+#include "autodiff/sweeps/shared_adjoints.h"
+#include "autodiff/updates/update.h"
+#include "autodiff/updates/update_context.h"
+#include "autodiff/updates/versions.h"
+#include "diagnostics/error.h"
+#include "graph/define.h"
+#include "ir/build.h"
+#include "ir/print.h"
+#include "ir/variables.h"
+#include "simplify/simplify.h"
+
+namespace retrograde::ir {
+
+namespace {
+
+const ParameterContents* as_parameter(const Symbol* symbol) {
+  return dynamic_cast<const ParameterContents*>(symbol);
+}
+
+// What a wanted leaf refers to; null for variables that are no parameter.
+Symbol* symbol_of(const Expr& leaf) {
+  if (const auto* call = leaf.as<Call>()) return call->symbol.raw();
+  const auto* v = leaf.as<Variable>();
+  return v && as_parameter(v->symbol.raw()) && !as_parameter(v->symbol.raw())->is_buffer
+             ? v->symbol.raw()
+             : nullptr;
+}
+
+std::vector<std::string> implicit_args(int n) {
+  std::vector<std::string> names;
+  for (int d = 0; d < n; ++d) names.push_back("_" + std::to_string(d));
+  return names;
+}
+
+class Synthesis {
+ public:
+  Synthesis(const Seed& seed, const SynthesisOptions& options)
+      : seed_(seed),
+        options_(options),
+        order_(topological_order({seed.output})),
+        regions_(order_, seed.region),
+        ranges_(order_),
+        cancelling_(cancelling_funcs(order_)),
+        versions_(options.versions) {
+    find_active();
+  }
+
+  SynthesisResult run() {
+    add_seed();
+    for (auto f = order_.rbegin(); f != order_.rend(); ++f) {
+      if (active_.contains(f->get())) differentiate(*f);
+    }
+    for (const auto& parameter : parameters_of({seed_.output})) finish_parameter(parameter);
+    forget_covered();
+    explain_absent();
+    explain_strangers();
+    result_.output = {seed_.output, seed_.region};
+    list_gradients();
+    result_.explanations = account_.take();
+    return std::move(result_);
+  }
+
+ private:
+  // Derivatives come from definitions, or from a rule.
+  void refuse_without_rule(const FuncContents& f) const {
+    if (f.custom_derivatives) {
+      unsupported(text("propagate adjoints through ", quoted(f.name)),
+                  "a Func with a custom tangent needs a rule for adjoints, too",
+                  "the output depends on it, and it has none: its definitions need not agree with "
+                  "the rule",
+                  "Give it a custom_adjoint");
+    }
+    unsupported(text("differentiate ", quoted(seed_.output->name)),
+                "derivatives come from definitions",
+                text("it depends on ", quoted(f.name), ", which the C function ",
+                     quoted(f.extern_definition->function), " computes"),
+                text("Give ", quoted(f.name),
+                     " a custom_adjoint, leave its inputs out of what is "
+                     "differentiated by, or differentiate what comes after it, with its values in "
+                     "an ImageParam"));
+  }
+
+  // ---- which symbols lie between the requested inputs and the output ----
+
+  bool is_requested(const Symbol* symbol) const {
+    if (options_.left_out.contains(symbol)) return false;
+    return !options_.only_requested || options_.requested.contains(symbol);
+  }
+
+  void find_active() {
+    for (const auto& parameter : parameters_of({seed_.output})) {
+      if (parameter->type.is_float() && is_requested(parameter.get()))
+        active_.insert(parameter.get());
+    }
+    for (const FuncPtr& f : order_) {
+      if (!is_floating(f->types) || cancelling_.contains(f.get())) continue;
+      bool passes = passes_on(*f);
+      if (passes) passing_.insert(f.get());
+      if (passes || is_requested(f.get())) active_.insert(f.get());
+    }
+  }
+  // Whether derivatives go on from f to something wanted.
+  bool passes_on(const FuncContents& f) const {
+    if (has_custom_adjoint(f)) {
+      for (const AdjointInput& input : f.custom_derivatives->adjoint_inputs) {
+        if (active_.contains(input.symbol().get())) return true;
+      }
+    }
+    if (f.custom_derivatives || f.is_extern()) {
+      for (const auto& symbol : read_by(f)) {
+        if (active_.contains(symbol.get())) return true;
+      }
+    }
+    bool found = false;
+    for (int s = 0; s < f.stage_count() && !found; ++s) found = reads_active(f.stage(s));
+    return found;
+  }
+  bool reads_active(const Definition& definition) const {
+    bool found = false;
+    for_each_expr(definition, [&](const Expr& root) {
+      found = found || any_node(root, [&](const Expr& e) {
+                Symbol* symbol = e.as<Call>() || e.as<Variable>() ? symbol_of(e) : nullptr;
+                return symbol && active_.contains(symbol);
+              });
+    });
+    return found;
+  }
+
+  // ---- contributions ----
+
+  // Over the bounds that were given: updates of the output may reach further, where the seed is 0.
+  void add_seed() {
+    const FuncPtr& f = seed_.output;
+    add_pointwise(f.get(), f->args, seed_.region, regions_.loop_variables(f.get(), f->args),
+                  seed_.values);
+  }
+
+  // values(args), one for each value of the symbol, inside of a box; undefined ones are zero.
+  // `read`: elements that anybody looks at; may be empty (unknown).
+  void add_pointwise(const Symbol* symbol, const std::vector<std::string>& args, const Box& box,
+                     const std::vector<LoopVariable>& read, const std::vector<Expr>& values) {
+    AccessQuery query{{}, {}, args, read};
+    for (size_t d = 0; d < args.size(); ++d)
+      query.domain.vars.push_back({args[d], box[d].min, box[d].max});
+    query.indices = variables_of(args);
+    Inversion inversion = invert_access(query);
+    for (size_t k = 0; k < values.size(); ++k) {
+      if (!values[k].defined()) continue;
+      for (const Gather& g : inversion.gathers)
+        pending_[symbol].push_back({static_cast<int>(k), g, substitute(values[k], g.iteration)});
+    }
+  }
+
+  AdjointTarget target_of(const FuncContents& f) const {
+    AdjointTarget target{f.name, f.args, {}, regions_.loop_variables(&f, f.args)};
+    for (Type t : f.types) target.types.push_back(t.is_float() ? adjoint_type(t) : Float(32));
+    return target;
+  }
+  AdjointTarget target_of(const ParameterContents& p) const {
+    AdjointTarget target{
+        p.name, implicit_args(p.is_buffer ? p.dimensions : 0), {adjoint_type(p.type)}, {}};
+    target.region = regions_.loop_variables(&p, target.args);
+    return target;
+  }
+
+  void differentiate(const FuncPtr& f) {
+    auto found = pending_.find(f.get());
+    if (found == pending_.end() || found->second.empty()) return;
+    AdjointTarget target = target_of(*f);
+    AdjointFunc adjoint = make_adjoint(target, f->name + "_adj", found->second);
+    bool extendable = true;  // nothing has read it yet
+    record(*f, f->stage_count() - 1, adjoint);
+    register_func(adjoint, f->name, target.region);
+    if (f->custom_derivatives || f->is_extern()) {
+      if (passing_.contains(f.get())) contribute_by_rule(f, adjoint.func);
+      return;
+    }
+    for (int s = f->stage_count() - 1; s >= 1; --s) {
+      const int own_stages = adjoint.func->stage_count();
+      UpdateAdjoint update = differentiate_update(
+          {f, s, regions_, target, adjoint, extendable, versions_, options_.checkpoints,
+           [&](const Expr& leaf) { return is_wanted(leaf); }, ranges_});
+      if (adjoint.func->stage_count() > own_stages) keep_unextended(*f, s, adjoint, own_stages);
+      if (update.current.func != adjoint.func)
+        register_func(update.current, f->name, target.region);
+      for (const FuncPtr& helper : update.helpers) result_.funcs.push_back(helper);
+      std::vector<Expr> seeds =
+          update.seeds.empty() ? adjoints_at_write(*f, s, update.current.func) : update.seeds;
+      for (const IterationDomain& domain : update.domains)
+        contribute_stage(f, update.values, seeds, domain, update.self_values, update.keeps_steps);
+      for (const GivenAdjoint& g : update.given) {
+        if (is_wanted(g.leaf.leaf)) add_contribution(f, g.leaf, g.domain);
+      }
+      account_.add(update.explanations);
+      if (update.previous.func && is_zero_over(*update.previous.func, target.region)) {
+        stop_at_update(*f, s, target);
+        return;
+      }
+      if (update.previous.func) register_func(update.previous, f->name, target.region);
+      adjoint = update.previous.func ? update.previous : update.current;
+      extendable = update.previous.func != nullptr;
+      record(*f, s - 1, adjoint);
+    }
+    contribute_pure(f, adjoint.func);
+    pending_.erase(f.get());
+  }
+
+  static bool is_zero_over(const FuncContents& f, const std::vector<LoopVariable>& region) {
+    BoundsMap bounds;
+    for (const LoopVariable& v : region) bounds[v.name] = {v.min, v.max};
+    return f.is_pure() && std::all_of(f.pure->values.begin(), f.pure->values.end(),
+                                      [&](const Expr& v) { return is_zero(simplify(v, bounds)); });
+  }
+  // Nothing of the stages before the update is left where anybody reads.
+  void stop_at_update(const FuncContents& f, int stage, const AdjointTarget& target) {
+    explain(Explanation::Kind::Zero, f.name,
+            text("before update ", stage - 1, ", which overwrites every element that is read"));
+    AdjointFunc zero = make_adjoint(target, text(f.name, "_adj_before_update", stage - 1), {});
+    for (int s = 0; s < stage; ++s) record(f, s, zero);
+    pending_.erase(&f);
+  }
+
+  // The reverse of a recurrence goes on in the adjoint of what comes after it, which then also
+  // holds what later iterations read of earlier ones. Who asks for the adjoint after the update
+  // gets one without.
+  void keep_unextended(const FuncContents& f, int stage, AdjointFunc adjoint, int own_stages) {
+    if (!is_requested(&f)) return;
+    adjoint.func =
+        clone_prefix(adjoint.func, own_stages, text(f.name, "_adj_after_update", stage - 1));
+    record(f, stage, adjoint);
+  }
+
+  void contribute_by_rule(const FuncPtr& f, const FuncPtr& adjoint) {
+    if (!has_custom_adjoint(*f)) refuse_without_rule(*f);
+    CustomAdjointResult rule = run_custom_adjoint(
+        f, adjoint, regions_, [&](const Symbol* s) { return active_.contains(s); },
+        [&](const Symbol* s) { return options_.only_requested && options_.requested.contains(s); });
+    for (const CustomContribution& c : rule.contributions) add_custom(*f, c);
+    for (const std::string& name : rule.zeros) {
+      explain(Explanation::Kind::Zero, name, text("by the custom adjoint of ", quoted(f->name)));
+    }
+    for (const FuncPtr& inner : rule.covered) {
+      covered_.insert(inner.get());
+      explain(Explanation::Kind::Custom, inner->name,
+              text("inside of the custom adjoint of ", quoted(f->name),
+                   ": it has no adjoint of its own"));
+    }
+  }
+  void add_custom(const FuncContents& f, const CustomContribution& c) {
+    const auto* p = as_parameter(c.input.get());
+    AdjointTarget target =
+        p ? target_of(*p) : target_of(dynamic_cast<const FuncContents&>(*c.input));
+    std::vector<Expr> args = variables_of(target.args), values;
+    for (size_t k = 0; k < target.types.size(); ++k) {
+      bool floating = p || dynamic_cast<const FuncContents&>(*c.input).types[k].is_float();
+      Expr value = call_value(c.adjoint, args, static_cast<int>(k));
+      values.push_back(floating ? cast_to(target.types[k], value) : Expr());
+    }
+    const Box& box = regions_.of(c.input.get());
+    if (box.size() != args.size()) {
+      explain(Explanation::Kind::Zero, target.name,
+              text("the output reads no element of it, at most its bounds: what the custom adjoint "
+                   "of ",
+                   quoted(f.name), " contributes does not count"));
+      return;
+    }
+    add_pointwise(c.input.get(), target.args, box, {}, values);
+    result_.funcs.push_back(c.adjoint);
+    explain(Explanation::Kind::Custom, f.name,
+            text("its custom adjoint contributes ", quoted(c.adjoint->name), " to ",
+                 quoted(target.name)));
+  }
+
+  void record(const FuncContents& f, int stage, const AdjointFunc& adjoint) {
+    result_.after_stage[{&f, stage}] = adjoint.func;
+  }
+
+  bool is_wanted(const Expr& leaf) const {
+    Symbol* symbol = symbol_of(leaf);
+    return symbol && active_.contains(symbol);
+  }
+
+  void contribute_pure(const FuncPtr& f, const FuncPtr& adjoint) {
+    std::vector<Expr> values;
+    for (const Expr& v : f->pure->values) values.push_back(without_lets(v));
+    contribute_stage(f, values, adjoints_at_write(*f, 0, adjoint), regions_.domain(*f, 0), {},
+                     false);
+  }
+
+  std::vector<Expr> adjoints_at_write(const FuncContents& f, int stage,
+                                      const FuncPtr& adjoint) const {
+    std::vector<Expr> seeds;
+    for (size_t k = 0; k < f.types.size(); ++k) {
+      seeds.push_back(f.types[k].is_float() ? adjoint_at(f, stage, adjoint, static_cast<int>(k))
+                                            : Expr());
+    }
+    return seeds;
+  }
+
+  void contribute_stage(const FuncPtr& f, const std::vector<Expr>& values,
+                        const std::vector<Expr>& seeds, const IterationDomain& domain,
+                        const SelfValues& self_values, bool keeps_steps) {
+    SweepResult sweep = sweep_reverse(
+        values, seeds,
+        [&](const Expr& leaf) { return is_wanted(leaf) && symbol_of(leaf) != f.get(); },
+        [&](const Expr& leaf) { return ranges_.may_be_infinite(leaf); });
+    for (const std::string& note : sweep.notes) explain(Explanation::Kind::Zero, f->name, note);
+    for (LeafAdjoint& leaf : sweep.leaves) {
+      leaf = {with_values_in_indices(leaf.leaf, f, self_values),
+              with_values(leaf.adjoint, f, self_values)};
+    }
+    if (keeps_steps) {
+      add_sharing(f, sweep.leaves, seeds, domain);
+    } else {
+      for (const LeafAdjoint& leaf : sweep.leaves) add_contribution(f, leaf, domain);
+    }
+  }
+  // What the contributions share is computed once an iteration.
+  void add_sharing(const FuncPtr& f, const std::vector<LeafAdjoint>& leaves,
+                   const std::vector<Expr>& seeds, const IterationDomain& domain) {
+    SharedAdjoints shared = share_adjoints(f->name + "_adj_inner", domain, leaves, seeds, regions_);
+    if (shared.func) {
+      const size_t kept = shared.func->types.size();
+      result_.funcs.push_back(shared.func);
+      explain(Explanation::Kind::Version, f->name,
+              text(quoted(shared.func->name), " keeps ", kept,
+                   kept == 1 ? " inner adjoint" : " inner adjoints",
+                   " of each iteration, from which ", leaves.size(), " contributions go on"));
+    }
+    for (size_t i = 0; i < leaves.size(); ++i)
+      add_contribution(f, leaves[i], shared.adjoints[i], domain);
+  }
+
+  bool is_inside(const Expr& index, const FuncContents& f, int stage, const Interval& range) const {
+    Scope<Interval> scope;
+    for (const LoopVariable& v : regions_.domain(f, stage).vars) scope.push(v.name, {v.min, v.max});
+    Interval found = bounds_of(index, scope);
+    return found.is_bounded() && can_prove(found.min >= range.min) &&
+           can_prove(found.max <= range.max);
+  }
+
+  // The adjoint where the stage writes. A place that depends on data may lie outside of all that is
+  // read: 0 there.
+  Expr adjoint_at(const FuncContents& f, int stage, const FuncPtr& adjoint, int k) const {
+    std::vector<Expr> place;
+    Expr inside = const_true();
+    const Box& box = regions_.of(&f);
+    for (size_t d = 0; d < f.args.size(); ++d) {
+      Expr index = without_lets(f.stage(stage).args[d]);
+      if (depends_on_data(index) && box[d].is_bounded() && !is_inside(index, f, stage, box[d])) {
+        inside = inside && index >= box[d].min && index <= box[d].max;
+        index = clamp(index, box[d].min, box[d].max);
+      }
+      place.push_back(index);
+    }
+    Expr value = call_value(adjoint, place, k);
+    return is_const_true(inside) ? value : make_select(inside, value, make_zero(value.type()));
+  }
+
+  void add_contribution(const FuncPtr& f, const LeafAdjoint& leaf, const IterationDomain& domain) {
+    add_contribution(f, leaf, leaf.adjoint, domain);
+  }
+  // `adjoint`: that of the leaf, in other words.
+  void add_contribution(const FuncPtr& f, const LeafAdjoint& leaf, const Expr& adjoint,
+                        const IterationDomain& domain) {
+    Symbol* symbol = symbol_of(leaf.leaf);
+    const auto* call = leaf.leaf.as<Call>();
+    AdjointTarget target =
+        as_parameter(symbol) ? target_of(*as_parameter(symbol)) : target_of(*func_of(*call));
+    AccessQuery query{domain, call ? call->args : std::vector<Expr>{}, target.args, target.region};
+    const Inversion& inversion = inversions_.of(*f, *symbol, query, leaf.adjoint);
+    if (!inversion.note.empty())
+      explain(Explanation::Kind::Scattered, target.name,
+              text("read by ", quoted(f->name), ": ", inversion.note));
+    for (const Gather& g : inversion.gathers) {
+      pending_[symbol].push_back({call ? call->component : 0, g, substitute(adjoint, g.iteration)});
+    }
+  }
+
+  // Where something is read may depend on values of f, too.
+  static Expr with_values_in_indices(const Expr& leaf, const FuncPtr& f,
+                                     const SelfValues& self_values) {
+    return map_children(leaf, [&](const Expr& e) { return with_values(e, f, self_values); });
+  }
+
+  // ---- results ----
+
+  void finish_parameter(const std::shared_ptr<ParameterContents>& p) {
+    auto found = pending_.find(p.get());
+    if (found == pending_.end()) return;
+    AdjointFunc adjoint = make_adjoint(target_of(*p), p->name + "_adj", found->second);
+    result_.parameters[p.get()] = adjoint.func;
+    register_func(adjoint, p->name, target_of(*p).region);
+  }
+
+  void register_func(const AdjointFunc& adjoint, const std::string& primal,
+                     const std::vector<LoopVariable>& region) {
+    for (const FuncPtr& helper : adjoint.helpers) result_.funcs.push_back(helper);
+    result_.funcs.push_back(adjoint.func);
+    if (adjoint.accumulator) result_.accumulators[adjoint.func.get()] = adjoint.accumulator;
+    account_.built(adjoint, primal, region);
+  }
+
+  void explain(Explanation::Kind kind, const std::string& subject, const std::string& detail) {
+    account_.add(kind, subject, detail);
+  }
+
+  void list_gradients() {
+    for (const auto& p : parameters_of({seed_.output})) {
+      auto found = result_.parameters.find(p.get());
+      if (found == result_.parameters.end() || !is_requested(p.get())) continue;
+      result_.gradients.push_back({found->second, box_of(target_of(*p).region)});
+    }
+    if (result_.gradients.empty() || options_.only_requested) list_func_gradients();
+  }
+  void list_func_gradients() {
+    for (const FuncPtr& f : order_) {
+      auto found = result_.after_stage.find({f.get(), f->stage_count() - 1});
+      if (found == result_.after_stage.end() || !is_requested(f.get())) continue;
+      result_.gradients.push_back({found->second, box_of(target_of(*f).region)});
+    }
+  }
+  static Box box_of(const std::vector<LoopVariable>& region) {
+    Box box;
+    for (const LoopVariable& v : region) box.push_back({v.min, v.max});
+    return box;
+  }
+
+  // What reaches them past the rule alone is no gradient of the output by them.
+  void forget_covered() {
+    std::erase_if(result_.after_stage,
+                  [&](const auto& entry) { return covered_.contains(entry.first.first); });
+  }
+
+  // What was asked for and got no contribution is zero, and says why.
+  void explain_absent() {
+    for (const FuncPtr& f : order_) {
+      if (covered_.contains(f.get()) ||
+          result_.after_stage.contains({f.get(), f->stage_count() - 1}) ||
+          !explain_absent(f.get(), f->name, is_floating(f->types), f->types[0]))
+        continue;
+      AdjointFunc zero = make_adjoint(target_of(*f), f->name + "_adj", {});
+      for (int s = 0; s < f->stage_count(); ++s) record(*f, s, zero);
+    }
+    for (const auto& p : parameters_of({seed_.output})) {
+      if (result_.parameters.contains(p.get()) ||
+          !explain_absent(p.get(), p->name, p->type.is_float(), p->type))
+        continue;
+      result_.parameters[p.get()] = make_adjoint(target_of(*p), p->name + "_adj", {}).func;
+    }
+  }
+  // What was asked for and has nothing to do with the output.
+  void explain_strangers() {
+    std::unordered_set<const Symbol*> reached;
+    for (const FuncPtr& f : order_) reached.insert(f.get());
+    for (const auto& p : parameters_of({seed_.output})) reached.insert(p.get());
+    std::map<std::string, const Symbol*> strangers;  // by name: in an order that is always the same
+    for (const Symbol* symbol : options_.requested) {
+      if (symbol && !reached.contains(symbol)) strangers[shape_of(symbol).name] = symbol;
+    }
+    for (const auto& [name, symbol] : strangers) {
+      const InputShape shape = shape_of(symbol);
+      explain(Explanation::Kind::Zero, shape.name, "the output does not depend on it");
+      if (!shape.is_floating()) continue;
+      const auto* f = dynamic_cast<const FuncContents*>(symbol);
+      if (!f) result_.parameters[symbol] = zero_derivative(*symbol, "_adj");
+      for (int s = 0; f && s < f->stage_count(); ++s)
+        result_.after_stage[{f, s}] = zero_derivative(*symbol, "_adj");
+    }
+  }
+  std::string without_path(const Symbol* symbol) const {
+    std::string result = "the output does not depend on its value by a differentiable path";
+    const char* separator = ": ";
+    for (const std::string& reason : zero_reasons(symbol, order_, [&](const FuncContents& f) {
+           return result_.after_stage.contains({&f, f.stage_count() - 1}) && !zero_.contains(&f);
+         })) {
+      result += separator + reason;
+      separator = "; ";
+    }
+    return result;
+  }
+  // Whether its gradient is a zero that somebody may ask for.
+  bool explain_absent(const Symbol* symbol, const std::string& name, bool floating, Type type) {
+    if (!floating) {
+      explain(Explanation::Kind::Zero, name,
+              "its type is " + to_string(type) + ": integers have no derivative");
+    } else if (cancelling_.contains(symbol)) {
+      explain(
+          Explanation::Kind::Zero, name,
+          "the output is the same for all of its values: it is what a softmax, a log-sum-exp or "
+          "a norm is shifted or scaled by, which cancels");
+      return true;
+    } else if (auto left = options_.left_out.find(symbol); left != options_.left_out.end()) {
+      explain(Explanation::Kind::NotRequested, name, "left out: " + left->second);
+    } else if (!active_.contains(symbol)) {
+      explain(Explanation::Kind::NotRequested, name, "nothing that was requested depends on it");
+    } else {
+      explain(Explanation::Kind::Zero, name, without_path(symbol));
+      zero_.insert(symbol);
+      return true;
+    }
+    return false;
+  }
+
+  const Seed& seed_;
+  const SynthesisOptions& options_;
+  std::vector<FuncPtr> order_;
+  Regions regions_;
+  ValueRanges ranges_;
+  std::unordered_set<const Symbol*> cancelling_;
+  std::unordered_set<const Symbol*> active_;
+  std::unordered_set<const Symbol*> passing_;  // Funcs that depend on something else active
+  std::unordered_set<const Symbol*> zero_;     // by no path
+  std::unordered_set<const Symbol*> covered_;  // inside of a custom adjoint that was used
+  std::unordered_map<const Symbol*, std::vector<Contribution>> pending_;
+  VersionBudget versions_;
+  ReadInversions inversions_;
+  SynthesisAccount account_;
+  SynthesisResult result_;
+};
+
+}  // namespace
+
+SynthesisResult synthesize_adjoints(const Seed& seed, const SynthesisOptions& options) {
+  return Synthesis(seed, options).run();
+}
+
+}  // namespace retrograde::ir

@@ -1,0 +1,45 @@
+// The slots of a checkpointed Func, which is one array beside its pure dimensions:
+//   [ state P | adjoint P | a | values of one step | sums | kept states ]
+#pragma once
+
+#include <vector>
+
+#include "autodiff/time/checkpoint_plan.h"
+
+namespace retrograde::ir {
+
+class CheckpointSlots {
+ public:
+  // `machine` is the Func with these slots.
+  CheckpointSlots(const UpdateContext& context, const TapeLayout& layout,
+                  const CheckpointPlan& plan, const FuncPtr& machine);
+
+  const TapeLayout& elements() const { return layout_; }
+  const Expr& count() const { return count_; }
+  // First slots. The state starts at 0.
+  const Expr& at_hand() const { return at_hand_; }
+  const Expr& kept() const { return kept_; }
+  Expr adjoint(const Expr& element) const;
+  // Of the place, in the iteration at hand of the inner loops.
+  Expr note(size_t place) const;
+  // Of contribution number i of the plan, in the iteration at hand.
+  Expr given(size_t i) const;
+
+  // What a slot holds: as it is; a value of f; its adjoint; a sum.
+  Expr at(const Expr& slot, size_t k) const;
+  Expr value_at(const Expr& slot, size_t k) const;
+  Expr adjoint_at(const Expr& slot, size_t k) const;
+  Expr sum_at(const Expr& slot) const;
+  std::vector<Expr> all_values(const Expr& slot) const;
+
+ private:
+  double least_slots() const;
+  const UpdateContext& c_;
+  const TapeLayout& layout_;
+  const CheckpointPlan& plan_;
+  FuncPtr machine_;
+  Expr at_hand_, noted_, kept_, count_;
+  std::vector<Expr> given_;
+};
+
+}  // namespace retrograde::ir

@@ -1,0 +1,210 @@
+#include "autodiff/time/overwrite_time.h"
+
+#include "autodiff/time/time_axis.h"
+#include "diagnostics/error.h"
+#include "frontend/language/var.h"
+#include "graph/define.h"
+#include "graph/function.h"
+#include "ir/build.h"
+#include "ir/print.h"
+#include "ir/variables.h"
+#include "simplify/simplify.h"
+
+namespace retrograde::ir {
+
+namespace {
+
+Expr slot_of(const Expr& time, const TimeAxis& axis) {
+  return simplify(binary(Kind::Mod, time, make_const(Int(32), axis.slots)));
+}
+
+class Folder {
+ public:
+  Folder(const Seed& seed, const SynthesisOptions& options)
+      : order_(topological_order({seed.output})),
+        regions_(order_, seed.region),
+        ranges_(order_),
+        options_(options) {}
+
+  const std::vector<FuncPtr>& order() const { return order_; }
+  std::map<const Symbol*, FuncPtr> copies;  // of Funcs that read folded ones
+  std::vector<Explanation> explanations;
+
+  void run() {
+    for (const FuncPtr& f : order_) {
+      if (f->custom_derivatives || f->is_extern()) return;  // rules name the Funcs they are for
+    }
+    for (const FuncPtr& f : order_) {
+      if (!fold(f)) copy_if_changed(f);
+    }
+  }
+
+ private:
+  using Read = std::function<Expr(const Call& call, const std::vector<Expr>& args)>;
+
+  // ---- one loop ----
+
+  bool fold(const FuncPtr& f) {
+    bool wanted = options_.only_requested && options_.requested.contains(f.get());
+    if (wanted || f == order_.back() || f->updates.empty()) return false;
+    const int stage = f->stage_count() - 1;
+    const AdjointTarget target{f->name, f->args, {}, {}};
+    const AdjointFunc none;
+    VersionBudget nothing({.keep = VersionRules::Keep::Never});
+    const UpdateQuery query{f,       stage, regions_,
+                            target,  none,  false,
+                            nothing, {},    [](const Expr&) { return false; },
+                            ranges_};
+    const UpdateContext c(query);
+    auto axis = find_time_axis(c, order_);
+    if (!axis) return false;
+    FuncPtr start = clone(f, stage, f->name + "_start");
+    FuncPtr pure = stage > 1 ? clone(f, 1, f->name + "_unwritten") : start;
+    FuncPtr folded = make_folded(c, *axis, start, pure);
+    replaced_[f.get()] = [=](const Call& call, const std::vector<Expr>& args) {
+      return read_at_end(call, args, *f, *axis, folded, pure);
+    };
+    explanations.push_back(
+        {Explanation::Kind::Version, f->name,
+         text("others read its last steps only: ", quoted(folded->name), " keeps ", axis->slots,
+              axis->slots == 1 ? " of them" : " of them in turn", " and has the adjoint; that of ",
+              quoted(f->name), " is not made")});
+    return true;
+  }
+
+  FuncPtr make_folded(const UpdateContext& c, const TimeAxis& axis, const FuncPtr& start,
+                      const FuncPtr& pure) const {
+    FuncPtr folded = make_func(Role::TimeFold);
+    folded->name = claim_name(c.f->name + "_folded");
+    folded->made->of = c.f->name;
+    std::vector<Expr> at_start = c.point, initial;
+    at_start[axis.dim] = time_at_start(c.point[axis.dim], axis);
+    for (size_t k = 0; k < c.values.size(); ++k)
+      initial.push_back(call_value(start, at_start, static_cast<int>(k)));
+    define_pure(folded, c.point, initial);
+
+    const std::vector<Expr> reads = c.self_reads();
+    const Read in_loop = [&](const Call& call, const std::vector<Expr>& args) {
+      auto same = [&](const Expr& read) {
+        return same_args(as_call_of(read, c.f)->args, call.args);
+      };
+      auto i = std::find_if(reads.begin(), reads.end(), same) - reads.begin();
+      return chosen(axis.in_slot[static_cast<size_t>(i)], call.component, args, axis, folded, pure);
+    };
+    std::vector<Expr> place, values;
+    for (const Expr& e : c.write) place.push_back(mapped(e, c.f, in_loop));
+    place[axis.dim] = slot_of(place[axis.dim], axis);
+    for (const Expr& v : c.values) values.push_back(mapped(v, c.f, in_loop));
+    Expr predicate = c.definition.predicate;
+    if (predicate.defined()) predicate = mapped(predicate, c.f, in_loop);
+    append_update(folded, place, values, c.definition.rvars, predicate);
+    return folded;
+  }
+
+  // Of the times before the first step that the slot may stand for, the last; none further back
+  // than a step reads.
+  static Expr time_at_start(const Expr& slot, const TimeAxis& axis) {
+    Expr last = axis.first - axis.sign;
+    Expr back = slot_of(axis.sign > 0 ? last - slot : slot - last, axis);
+    return simplify(last - min(back, axis.lag - 1) * axis.sign);
+  }
+
+  // f at `args`: from its slot where `in_slot`, else from the pure definition.
+  static Expr chosen(const Expr& in_slot, int k, std::vector<Expr> args, const TimeAxis& axis,
+                     const FuncPtr& folded, const FuncPtr& pure) {
+    Expr unwritten = call_value(pure, args, k);
+    args[axis.dim] = slot_of(args[axis.dim], axis);
+    Expr kept = call_value(folded, args, k);
+    if (is_const_true(in_slot)) return kept;
+    return is_const_false(in_slot) ? unwritten : make_select(in_slot, kept, unwritten);
+  }
+  static Expr read_at_end(const Call& call, const std::vector<Expr>& args, const FuncContents& f,
+                          const TimeAxis& axis, const FuncPtr& folded, const FuncPtr& pure) {
+    Substitution place;
+    for (size_t d = 0; d < args.size(); ++d) place[f.args[d]] = args[d];
+    Expr before = axis.sign > 0 ? args[axis.dim] < axis.first : args[axis.dim] > axis.first;
+    Expr in_slot = simplify(substitute(axis.ever_written, place));
+    if (!is_const_true(in_slot)) in_slot = simplify(before) || in_slot;
+    return chosen(in_slot, call.component, args, axis, folded, pure);
+  }
+
+  // ---- its readers ----
+
+  // Reads of folded and copied Funcs replaced; those of `own` by `read`.
+  Expr mapped(const Expr& e, const FuncContents* own = nullptr, const Read& read = {}) const {
+    return rewrite(e, [&](const Expr& node, const auto& recurse) -> Expr {
+      const auto* call = node.as<Call>();
+      if (!call || call->call_type != CallType::Func) return map_children(node, recurse);
+      auto found = replaced_.find(call->symbol.raw());
+      bool is_own = own && call->symbol.raw() == own;
+      if (!is_own && found == replaced_.end()) return map_children(node, recurse);
+      std::vector<Expr> args;
+      for (const Expr& arg : call->args) args.push_back(recurse(arg));
+      return is_own ? read(*call, args) : found->second(*call, args);
+    });
+  }
+
+  // The first stages of f.
+  FuncPtr clone(const FuncPtr& f, int stages, const std::string& name) const {
+    FuncPtr g = make_func(Role::TimeFold);
+    g->made->of = f->name;
+    if (f->made) g->made->traits = f->made->traits;
+    g->name = claim_name(name);
+    std::vector<Expr> args = variables_of(f->args), values;
+    for (const Expr& v : f->pure->values) values.push_back(mapped(v));
+    define_pure(g, args, values);
+    for (int s = 1; s < stages; ++s) {
+      Definition stage = map_exprs(
+          f->stage(s), [&](const Expr& e) { return redirect_calls(mapped(e), f, g, false); });
+      append_update(g, stage.args, stage.values, stage.rvars, stage.predicate);
+    }
+    return g;
+  }
+
+  void copy_if_changed(const FuncPtr& f) {
+    bool changed = false;
+    for (int s = 0; s < f->stage_count(); ++s)
+      for_each_expr(f->stage(s), [&](const Expr& e) { changed |= !mapped(e).same_as(e); });
+    if (!changed) return;
+    FuncPtr g = clone(f, f->stage_count(), f->name);
+    copies[f.get()] = g;
+    replaced_[f.get()] = [g](const Call& call, const std::vector<Expr>& args) {
+      return call_value(g, args, call.component);
+    };
+  }
+
+  std::vector<FuncPtr> order_;
+  Regions regions_;
+  ValueRanges ranges_;
+  const SynthesisOptions& options_;
+  std::unordered_map<const Symbol*, Read> replaced_;
+};
+
+}  // namespace
+
+SynthesisResult synthesize_folded(const Seed& seed, SynthesisOptions options) {
+  Folder folder(seed, options);
+  folder.run();
+  auto copy_of = [&](const Symbol* f) {
+    auto found = folder.copies.find(f);
+    return found == folder.copies.end() ? nullptr : found->second;
+  };
+  FuncPtr output = copy_of(seed.output.get());
+  if (!output) return synthesize_adjoints(seed, options);
+  for (const auto& [f, copy] : folder.copies) {
+    if (options.requested.erase(f) > 0) options.requested.insert(copy.get());
+  }
+  SynthesisResult result = synthesize_adjoints({output, seed.region, seed.values}, options);
+  for (const auto& [f, copy] : folder.copies) {
+    for (int s = 0; s < copy->stage_count(); ++s) {
+      auto found = result.after_stage.find({copy.get(), s});
+      if (found != result.after_stage.end()) result.after_stage[{f, s}] = found->second;
+    }
+  }
+  result.output.func = seed.output;
+  result.explanations.insert(result.explanations.begin(), folder.explanations.begin(),
+                             folder.explanations.end());
+  return result;
+}
+
+}  // namespace retrograde::ir

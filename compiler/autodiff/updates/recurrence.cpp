@@ -1,0 +1,388 @@
+// An update that overwrites: values that are lost, values that are passed on.
+#include "autodiff/updates/recurrence.h"
+
+#include <algorithm>
+#include <set>
+
+#include "autodiff/sweeps/carried_sums.h"
+#include "autodiff/time/checkpoint.h"
+#include "autodiff/updates/update_relations.h"
+#include "autodiff/updates/versions.h"
+#include "frontend/language/var.h"
+#include "graph/define.h"
+#include "ir/build.h"
+#include "simplify/simplify.h"
+
+namespace retrograde::ir {
+
+namespace {
+
+class Recurrence {
+ public:
+  Recurrence(const UpdateContext& context, UpdateAdjoint& result)
+      : c_(context), f_(context.f), result_(result), relations_(c_.domain, c_.write, c_.pure) {}
+
+  // Whether the update has one of the shapes; `result` is only changed then.
+  bool run() {
+    if (!relations_.write_is_affine()) return false;
+    if (!relations_.write_is_injective()) return last_writers();
+    auto reads = self_reads();
+    if (!reads) return false;
+    SweepResult sweep = c_.sweep_at_write(result_.current.func);
+    mark(*reads, sweep);
+    bool has_recurrence = false;
+    for (const SelfRead& r : *reads) has_recurrence |= r.carries_adjoint && !r.relation.never_new;
+    if (has_recurrence && !find_order(*reads)) return false;
+    Expr written = written_elements();
+    if (!written.defined()) return false;
+    if (!find_values(*reads)) return false;
+    if (has_recurrence) {
+      if (carries_long_sums(self_contributions(*reads, sweep, true))) {
+        carry_in_double();
+      } else {
+        own_current();
+      }
+      sweep = c_.sweep_iterations(result_.current.func,
+                                  [&] { return c_.adjoints_at_write(result_.current.func); });
+      append_reverse_loop(self_contributions(*reads, sweep, true));
+    }
+    start_previous(written, self_contributions(*reads, sweep, false));
+    result_.values = c_.values;
+    result_.domains = {c_.domain};
+    result_.keeps_steps = true;
+    return true;
+  }
+
+ private:
+  struct SelfRead {
+    Expr call;
+    UpdateRelations::Read relation;
+    bool carries_adjoint = false;  // reached by the sweep
+    bool is_needed = false;        // a partial, or a place, needs its value
+  };
+
+  // Elements that several iterations write, and none reads: the last of them counts.
+  bool last_writers() {
+    if (c_.reads_self() || !relations_.predicate_is_affine()) return false;
+    result_.values = c_.values;
+    result_.domains = {restricted(c_.domain, relations_.last_writers())};
+    start_previous(relations_.written(c_.point), {});
+    return true;
+  }
+
+  // nullopt: one reads at a place that depends on data.
+  std::optional<std::vector<SelfRead>> self_reads() {
+    std::vector<SelfRead> reads;
+    for (const Expr& call : c_.self_reads()) {
+      auto relation = relations_.read(as_call_of(call, f_)->args);
+      if (!relation) return std::nullopt;
+      reads.push_back({call, *relation});
+    }
+    return reads;
+  }
+
+  void mark(std::vector<SelfRead>& reads, const SweepResult& sweep) const {
+    std::set<Expr, StructuralLess> carrying, needed;
+    auto need = [&](const Expr& e) {
+      walk(e, [&](const Expr& node) {
+        if (as_call_of(node, f_)) needed.insert(node);
+        return true;
+      });
+    };
+    for (const LeafAdjoint& leaf : sweep.leaves) {
+      if (as_call_of(leaf.leaf, f_)) carrying.insert(leaf.leaf);
+      need(leaf.adjoint);
+      // Where something is read may be computed from values of f.
+      for_each_child(leaf.leaf, need);
+    }
+    for (SelfRead& r : reads) {
+      r.carries_adjoint = carrying.contains(r.call);
+      r.is_needed = needed.contains(r.call);
+    }
+  }
+
+  // A needed value must be the final one, or a kept version; false: one that a budget for
+  // checkpoints is to bring back.
+  bool find_values(const std::vector<SelfRead>& reads) {
+    for (const SelfRead& r : reads) {
+      if (!r.is_needed) continue;
+      const auto* call = r.call.as<Call>();
+      bool later = is_written_later(c_, relations_, r.relation);
+      if (!later && !r.relation.overwritten) continue;
+      if (wants_checkpoints(c_)) return false;
+      c_.check_versions_are_kept(r.call);
+      Expr after = later ? call_value(prefix(c_.query.stage + 1), call->args, call->component)
+                         : call_value(c_.query.f, call->args, call->component);
+      Expr before = call_value(prefix(c_.query.stage), call->args, call->component);
+      result_.self_values[r.call] = r.relation.never_new ? before
+                                    : r.relation.always_new
+                                        ? after
+                                        : make_select(r.relation.sees_new_condition, after, before);
+      explain(Explanation::Kind::Version,
+              text("update ", c_.query.stage - 1, ": the value of ",
+                   point_text(f_->name, call->args), " is kept in a copy"));
+    }
+    for (const auto& [stages, copy] : prefixes_) c_.take_room(copy, c_.extents(), result_);
+    return true;
+  }
+  const FuncPtr& prefix(int stages) {
+    FuncPtr& copy = prefixes_[stages];
+    if (!copy) copy = clone_prefix(c_.query.f, stages);
+    return copy;
+  }
+
+  // The recurrence writes into the adjoint after the stage: a copy, when somebody reads that one
+  // already.
+  void own_current() {
+    if (c_.query.extendable) return;
+    std::vector<Expr> initial;
+    for (size_t k = 0; k < c_.values.size(); ++k)
+      initial.push_back(call_value(result_.current.func, c_.point, static_cast<int>(k)));
+    result_.current =
+        make_adjoint(c_.query.target, f_->name + "_adj_update" + std::to_string(c_.query.stage - 1),
+                     {}, initial);
+  }
+
+  // ---- what is carried from element to element ----
+
+  bool carries_long_sums(const std::vector<Contribution>& contributions) const {
+    const auto& types = c_.query.target.types;
+    if (std::all_of(types.begin(), types.end(), [](Type t) { return t.bits() == 64; }))
+      return false;
+    double elements = 1;
+    for (const ReverseLoop& loop : order_) {
+      const LoopVariable& range = c_.query.target.region[static_cast<size_t>(loop.dim)];
+      auto extent = as_const_int(simplify(range.max - range.min + 1));
+      elements *= extent ? static_cast<double>(*extent) : many_carried;
+    }
+    std::vector<Expr> terms;
+    for (const Contribution& c : contributions) terms.push_back(c.adjoint);
+    return elements >= many_carried && carries_sums(terms, result_.current.func.get());
+  }
+
+  void carry_in_double() {
+    AdjointTarget wide = c_.query.target;
+    std::vector<Expr> initial, rounded;
+    for (size_t k = 0; k < c_.values.size(); ++k) {
+      wide.types[k] = Float(64);
+      initial.push_back(call_value(result_.current.func, c_.point, static_cast<int>(k)));
+    }
+    const std::string name = text(f_->name, "_adj_update", c_.query.stage - 1);
+    exact_ = make_adjoint(wide, name + "_carried", {}, initial).func;
+    for (size_t k = 0; k < c_.values.size(); ++k)
+      rounded.push_back(call_value(exact_, c_.point, static_cast<int>(k)));
+    result_.current = make_adjoint(c_.query.target, name, {}, rounded);
+    result_.current.helpers = {exact_};
+    result_.current.accumulator = exact_;
+    explain(Explanation::Kind::Version,
+            text("update ", c_.query.stage - 1,
+                 ": its adjoint carries sums along many elements, in double"));
+  }
+  // The Func that runs backward.
+  const FuncPtr& carrying() const { return exact_ ? exact_ : result_.current.func; }
+  Expr as_carried(const Expr& term) const {
+    return exact_ ? carried_in_double(term, result_.current.func, exact_) : term;
+  }
+
+  // Equal reads are one, with the sum of their adjoints: it has one domain to sum over.
+  std::vector<LeafAdjoint> self_leaves(const SweepResult& sweep) const {
+    std::vector<LeafAdjoint> result;
+    for (const LeafAdjoint& leaf : sweep.leaves) {
+      if (!as_call_of(leaf.leaf, f_)) continue;
+      auto known = std::find_if(result.begin(), result.end(),
+                                [&](const LeafAdjoint& l) { return equal(l.leaf, leaf.leaf); });
+      if (known == result.end()) {
+        result.push_back(leaf);
+      } else {
+        known->adjoint = known->adjoint + leaf.adjoint;
+      }
+    }
+    return result;
+  }
+
+  // Contributions of self reads: to newer values (`to_new`) or to those before the stage.
+  std::vector<Contribution> self_contributions(const std::vector<SelfRead>& reads,
+                                               const SweepResult& sweep, bool to_new) {
+    std::vector<Contribution> result;
+    for (const LeafAdjoint& leaf : self_leaves(sweep)) {
+      const Call* call = as_call_of(leaf.leaf, f_);
+      auto read = std::find_if(reads.begin(), reads.end(),
+                               [&](const SelfRead& r) { return equal(r.call, leaf.leaf); });
+      const UpdateRelations::Read& relation = read->relation;
+      if (to_new ? relation.never_new : relation.always_new) continue;
+      Expr adjoint = with_values(leaf.adjoint, c_.query.f, result_.self_values);
+      for (const Gather& g : inverted(*call, relation, to_new).gathers)
+        result.push_back({call->component, g, substitute(adjoint, g.iteration)});
+    }
+    return result;
+  }
+  Inversion inverted(const Call& call, const UpdateRelations::Read& relation, bool to_new) const {
+    Expr condition = relation.sees_new_condition;
+    if (!to_new) condition = logical_not(condition);
+    if (to_new ? relation.always_new : relation.never_new) condition = const_true();
+    AccessQuery query{restricted(c_.domain, condition), call.args, c_.query.target.args,
+                      c_.query.target.region};
+    query.narrows = !to_new;  // other terms are added in the first iteration of a sum
+    return invert_access(query);
+  }
+
+  // A(p) += sum over reads of A(W(i)) dV/df, p running against the order in which it was written.
+  bool find_order(const std::vector<SelfRead>& reads) {
+    if (!relations_.predicate_is_affine()) return false;
+    std::vector<UpdateRelations::Read> relevant;
+    std::vector<std::shared_ptr<ReductionDomainContents>> sums;
+    for (const SelfRead& r : reads) {
+      if (!r.carries_adjoint || r.relation.never_new) continue;
+      relevant.push_back(r.relation);
+      // The terms of several sums would have to run inside of one element.
+      for (const Gather& g : inverted(*as_call_of(r.call, f_), r.relation, true).gathers) {
+        if (g.scatters) return false;
+        if (g.rdom) sums.push_back(g.rdom);
+      }
+    }
+    auto order = relations_.reverse_order(relevant);
+    if (!order || sums.size() > 1) return false;
+    order_ = *order;
+    return true;
+  }
+
+  void append_reverse_loop(const std::vector<Contribution>& contributions) {
+    auto rdom = std::make_shared<ReductionDomainContents>();
+    rdom->frozen = true;
+    Substitution place;
+    // Terms that sum over a domain of their own: its variables run inside the element.
+    const Gather* summed = nullptr;
+    for (const Contribution& c : contributions) {
+      if (c.gather.rdom) summed = &c.gather;
+    }
+    Expr first = const_true();
+    if (summed) {
+      for (const ReductionVariable& r : summed->rdom->vars) {
+        rdom->vars.push_back({unique_name(r.var), r.min, r.extent});
+        Expr v = variable(rdom->vars.back().var, Int(32), SymbolRef(rdom));
+        place[r.var] = v;
+        first = first && v == r.min;
+      }
+    }
+    std::vector<Expr> lhs = reverse_place(rdom, place);
+    std::vector<Expr> sums(c_.values.size());
+    for (const Contribution& c : contributions) {
+      Expr condition = element_condition(c.gather);
+      if (c.gather.predicate.defined()) condition = condition && c.gather.predicate;
+      condition = substitute(condition, place);
+      if (summed && !c.gather.rdom) condition = condition && first;
+      Expr term = as_carried(substitute(c.adjoint, place));
+      term = make_select(condition, term, make_zero(term.type()));
+      Expr& sum = sums[static_cast<size_t>(c.component)];
+      sum = sum.defined() ? sum + term : term;
+    }
+    std::vector<Expr> values;
+    for (size_t k = 0; k < c_.values.size(); ++k) {
+      Expr self = call_value(carrying(), lhs, static_cast<int>(k));
+      values.push_back(sums[k].defined() ? self + cast_to(self.type(), sums[k]) : self);
+    }
+    append_update(carrying(), lhs, values, rdom->vars, {});
+    result_.current.stages.push_back(Accumulation::Scatter);
+    explain(Explanation::Kind::Version,
+            text("update ", c_.query.stage - 1, " is a recurrence: its adjoint runs backward"));
+  }
+
+  // The element that the reverse loops are at; `place` learns it.
+  std::vector<Expr> reverse_place(const std::shared_ptr<ReductionDomainContents>& rdom,
+                                  Substitution& place) const {
+    std::vector<Expr> lhs = c_.point;
+    for (const ReverseLoop& loop : order_) {
+      size_t d = static_cast<size_t>(loop.dim);
+      const LoopVariable& range = c_.query.target.region[d];
+      Expr extent = simplify(range.max - range.min + 1);
+      rdom->vars.push_back({unique_name("reverse"), make_zero(Int(32)), extent});
+      Expr v = variable(rdom->vars.back().var, Int(32), SymbolRef(rdom));
+      lhs[d] = simplify(loop.descending ? range.max - v : range.min + v);
+      place[f_->args[d]] = lhs[d];
+    }
+    return lhs;
+  }
+
+  // The element is the one that the gather's fixed indices name.
+  Expr element_condition(const Gather& g) const {
+    Expr condition = const_true();
+    for (size_t d = 0; d < g.lhs.size(); ++d) {
+      if (!g.pure[d]) condition = condition && c_.point[d] == g.lhs[d];
+    }
+    return condition;
+  }
+
+  // The adjoint before the stage: 0 where the stage writes, plus what the stage read of older
+  // values. Values of a Tuple that the stage leaves alone keep their adjoint.
+  void start_previous(const Expr& written, const std::vector<Contribution>& contributions) {
+    std::vector<Expr> initial;
+    for (size_t k = 0; k < c_.values.size(); ++k) {
+      Expr a = call_value(result_.current.func, c_.point, static_cast<int>(k));
+      initial.push_back(make_select(simplify(written), make_zero(a.type()), a));
+    }
+    result_.previous =
+        make_adjoint(c_.query.target, name_before(*f_, c_.query.stage), contributions, initial);
+  }
+
+  // Which elements the stage writes, over `point`; undefined: not known. With a predicate on data:
+  // those where the predicate holds for the only iteration that may.
+  Expr written_elements() const {
+    if (relations_.predicate_is_affine()) return relations_.written(c_.point);
+    Expr written = const_false();
+    AccessQuery query{c_.domain, c_.write, c_.query.target.args, c_.query.target.region};
+    for (const Gather& g : invert_access(query).gathers) {
+      if (g.scatters || g.rdom) return {};
+      Expr condition = element_condition(g);
+      if (g.predicate.defined()) condition = condition && g.predicate;
+      written = written || condition;
+    }
+    return written;
+  }
+
+  void explain(Explanation::Kind kind, const std::string& detail) {
+    result_.explanations.push_back({kind, f_->name, detail});
+  }
+
+  const UpdateContext& c_;
+  FuncContents* f_;
+  UpdateAdjoint& result_;
+  UpdateRelations relations_;
+  std::vector<ReverseLoop> order_;
+  FuncPtr exact_;  // in double, what the current adjoint rounds; null: that one itself
+  std::map<int, FuncPtr> prefixes_;
+};
+
+}  // namespace
+
+bool differentiate_recurrence(const UpdateContext& context, UpdateAdjoint& result) {
+  return Recurrence(context, result).run();
+}
+
+bool is_written_later(const UpdateContext& c, const UpdateRelations& relations,
+                      const UpdateRelations::Read& read) {
+  for (int s = c.query.stage + 1; s < c.f->stage_count(); ++s) {
+    IterationDomain domain = c.query.regions.domain(*c.query.f, s);
+    if (relations.may_write(read, domain, c.f->stage(s).args)) return true;
+  }
+  return false;
+}
+
+FinalValues::FinalValues(const UpdateContext& context) : c_(context) {
+  try {
+    relations_ = std::make_unique<UpdateRelations>(c_.domain, c_.write, c_.pure);
+  } catch (const isl::exception&) {
+    relations_ = nullptr;
+  }
+}
+
+bool FinalValues::contains(const Expr& e) {
+  if (!relations_ || !relations_->write_is_affine()) return false;
+  try {
+    auto read = relations_->read(as_call_of(e, c_.f)->args);
+    return read && !read->overwritten && !is_written_later(c_, *relations_, *read);
+  } catch (const isl::exception&) {
+    return false;
+  }
+}
+
+}  // namespace retrograde::ir

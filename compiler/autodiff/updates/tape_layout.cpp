@@ -1,0 +1,90 @@
+#include "autodiff/updates/tape_layout.h"
+
+#include "autodiff/updates/numbering.h"
+#include "diagnostics/error.h"
+#include "frontend/language/var.h"
+#include "ir/build.h"
+#include "ir/visit.h"
+#include "simplify/simplify.h"
+
+namespace retrograde::ir {
+
+namespace {
+
+bool has_operators(const Expr& e) {
+  return any_node(e, [&](const Expr& node) { return node.as<Call>() != nullptr; });
+}
+
+}  // namespace
+
+TapeLayout::TapeLayout(const UpdateContext& context)
+    : c_(context),
+      box_(context.query.regions.of(context.f)),
+      slot_(variable(unique_name("slot"))),
+      elements_(make_one(Int(32))) {
+  for (size_t d = 0; d < c_.pure.size(); ++d) {
+    extents_.emplace_back();
+    strides_.emplace_back();
+    if (c_.pure[d]) continue;
+    if (!box_.at(d).is_bounded()) {
+      unsupported(c_.asked(),
+                  "an update that runs backward needs to know the elements it may reach",
+                  text("the region of ", quoted(c_.f->name), " has no bounds in dimension ", d),
+                  "Clamp the index");
+    }
+    extents_.back() = simplify(box_[d].max - box_[d].min + 1);
+    strides_.back() = elements_;
+    check_numbers(c_, least_product(extents_), "the elements that an update may reach");
+    elements_ = simplify(elements_ * extents_.back());
+  }
+  for (const LoopVariable& v : c_.domain.vars) scope_.push(v.name, {v.min, v.max});
+}
+
+std::vector<Expr> TapeLayout::with_pure(const Expr& slot) const {
+  std::vector<Expr> point;
+  for (size_t d = 0; d < c_.pure.size(); ++d) {
+    if (c_.pure[d]) point.push_back(c_.point[d]);
+  }
+  point.push_back(slot);
+  return point;
+}
+
+bool TapeLayout::is_always_inside(const Expr& index, size_t d) const {
+  Interval found = bounds_of(index, scope_);
+  return found.is_bounded() && can_prove(found.min >= box_[d].min) &&
+         can_prove(found.max <= box_[d].max);
+}
+
+Expr TapeLayout::slot_of(const std::vector<Expr>& args) const {
+  Expr slot = make_zero(Int(32));
+  for (size_t d = 0; d < args.size(); ++d) {
+    if (c_.pure[d]) continue;
+    Expr index = cast_to(Int(32), args[d]);
+    // What operators give has bounds here, where all loops are known, but none inside of some.
+    if (has_operators(index) || !is_always_inside(index, d))
+      index = clamp(index, box_[d].min, box_[d].max);
+    slot = slot + (index - box_[d].min) * strides_[d];
+  }
+  return simplify(slot);
+}
+
+Expr TapeLayout::is_inside(const std::vector<Expr>& args) const {
+  std::vector<Expr> terms;
+  for (size_t d = 0; d < args.size(); ++d) {
+    if (c_.pure[d] || is_always_inside(args[d], d)) continue;
+    terms.push_back(args[d] >= box_[d].min && args[d] <= box_[d].max);
+  }
+  return conjunction(terms);
+}
+
+std::vector<Expr> TapeLayout::element(const Expr& any_number) const {
+  Expr number = clamp(any_number, make_zero(Int(32)), elements_ - 1);
+  std::vector<Expr> point;
+  for (size_t d = 0; d < c_.pure.size(); ++d) {
+    point.push_back(c_.pure[d] ? c_.point[d]
+                               : simplify(number / strides_[d] % extents_[d] + box_[d].min));
+  }
+  return point;
+}
+
+}  // namespace retrograde::ir

@@ -1,0 +1,172 @@
+#include "autodiff/updates/update.h"
+
+#include <algorithm>
+
+#include "autodiff/time/checkpoint.h"
+#include "autodiff/updates/fold_into_element.h"
+#include "autodiff/updates/numbering.h"
+#include "autodiff/updates/recurrence.h"
+#include "autodiff/updates/selection.h"
+#include "autodiff/updates/tape.h"
+#include "autodiff/updates/update_context.h"
+#include "autodiff/updates/update_relations.h"
+#include "autodiff/updates/versions.h"
+#include "diagnostics/error.h"
+#include "ir/build.h"
+#include "ir/print.h"
+
+namespace retrograde::ir {
+
+namespace {
+
+class UpdateDifferentiation {
+ public:
+  explicit UpdateDifferentiation(const UpdateQuery& q) : c_(q), f_(q.f.get()) {
+    result_.current = q.adjoint;
+  }
+
+  UpdateAdjoint run() {
+    check_predicate();
+    bool fixed_places =
+        std::none_of(c_.write.begin(), c_.write.end(), [&](const Expr& e) { return calls(e, f_); });
+    if (fixed_places && (accumulates() || selects() || is_recurrence())) return std::move(result_);
+    if (wants_checkpoints(c_)) {
+      differentiate_by_checkpoints(c_, result_);
+    } else if (is_fold(c_)) {
+      differentiate_fold(c_, result_);
+    } else {
+      differentiate_by_tape(c_, result_);
+    }
+    return std::move(result_);
+  }
+
+ private:
+  void check_predicate() const {
+    if (!calls(c_.domain.predicate, f_)) return;
+    user_error(c_.asked(),
+               "whether an update writes may not depend on the values of the Func that it updates",
+               text(quoted(f_->name), " is read in the predicate"),
+               "Move the condition into a select on the right-hand side");
+  }
+
+  // ---- accumulation ----
+
+  // The part of `e` that is added to the call `self`, when e is self + part: E of the header;
+  // undefined when it is not.
+  Expr added_to(const Expr& e, int k) const {
+    if (!calls(e, f_)) return {};
+    if (const Call* call = as_call_of(e, f_)) {
+      return call->component == k && same_args(call->args, c_.write) ? make_zero(e.type()) : Expr();
+    }
+    return match(
+        e, [&](const Add& n) { return added_in_sum(n.a, n.b, k); },
+        [&](const Sub& n) -> Expr {
+          if (calls(n.b, f_)) return {};
+          Expr rest = added_to(n.a, k);
+          return rest.defined() ? rest - n.b : Expr();
+        },
+        [&](const Select& n) -> Expr {
+          if (calls(n.condition, f_)) return {};
+          Expr t = added_to(n.when_true, k), f = added_to(n.when_false, k);
+          return t.defined() && f.defined() ? make_select(n.condition, t, f) : Expr();
+        },
+        [&](const Call& n) -> Expr {
+          bool marker = n.call_type == CallType::Operator && op_info(n.op).cls == OpClass::Marker;
+          return marker && n.op != Op::stop_gradient ? added_to(n.args[0], k) : Expr();
+        },
+        [&](const ExprNode&) { return Expr(); });
+  }
+  Expr added_in_sum(const Expr& a, const Expr& b, int k) const {
+    if (calls(a, f_) && calls(b, f_)) return {};
+    Expr rest = added_to(calls(a, f_) ? a : b, k);
+    return rest.defined() ? rest + (calls(a, f_) ? b : a) : Expr();
+  }
+
+  bool accumulates() {
+    std::vector<Expr> added;
+    for (size_t k = 0; k < c_.values.size(); ++k) {
+      added.push_back(added_to(c_.values[k], static_cast<int>(k)));
+      if (!added.back().defined() && f_->types[k].is_float()) return false;
+      // Integers carry no adjoint, but must not steer the floating values; they cannot: those are
+      // free of f.
+    }
+    result_.values = added;
+    result_.domains = {c_.domain};
+    return true;
+  }
+
+  // ---- selection ----
+
+  bool selects() {
+    auto selection = find_selection(c_.query.f, c_.query.stage);
+    if (!selection) return false;
+    check_numbers(c_, least_iterations(c_.definition.rvars),
+                  "the iterations of an update that selects");
+    Expr mine = iteration_number(c_.definition.rvars);
+    FuncPtr winner = selection->winner;
+    int index = selection->index_value;
+    Expr is_winner = call_value(winner, c_.write, index) == mine;
+    Expr untouched = call_value(winner, c_.point, index) < 0;
+    std::vector<Expr> initial;
+    for (size_t k = 0; k < c_.values.size(); ++k) {
+      const Expr& taken = selection->taken[k];
+      Expr a = call_value(result_.current.func, c_.point, static_cast<int>(k));
+      result_.values.push_back(
+          taken.defined() ? make_select(is_winner, taken, make_zero(taken.type())) : Expr());
+      initial.push_back(taken.defined() ? make_select(untouched, a, make_zero(a.type())) : a);
+    }
+    result_.domains = {c_.domain};
+    result_.previous = make_adjoint(c_.query.target, name_before(*f_, c_.query.stage), {}, initial);
+    result_.helpers.push_back(winner);
+    explain(Explanation::Kind::Version,
+            text("update ", c_.query.stage - 1, " selects: ", quoted(winner->name),
+                 " computes again which iteration wrote each element last"));
+    return true;
+  }
+
+  // ---- overwriting and recurrences ----
+
+  bool is_recurrence() {
+    UpdateAdjoint trial = result_;
+    const VersionBudget untouched = c_.query.versions;
+    try {
+      if (!differentiate_recurrence(c_, trial)) {
+        c_.query.versions = untouched;
+        return false;
+      }
+      result_ = std::move(trial);
+      if (c_.reads_self() && wants_checkpoints(c_)) explain_unused_budget();
+      return true;
+    } catch (const isl::exception& e) {
+      c_.query.versions = untouched;
+      explain(Explanation::Kind::Version,
+              text("update ", c_.query.stage - 1, ": isl gave up on its index sets: ", e.what()));
+      return false;
+    }
+  }
+
+  void explain_unused_budget() {
+    explain(Explanation::Kind::Performance,
+            text("update ", c_.query.stage - 1,
+                 " overwrites nothing that is needed: ", quoted(f_->name),
+                 " keeps its steps along a dimension of its own, and the budget for checkpoints is "
+                 "not used; written in place, as f(x) = g(f(x), t), it is run backward from kept "
+                 "states"));
+  }
+
+  void explain(Explanation::Kind kind, const std::string& detail) {
+    result_.explanations.push_back({kind, f_->name, detail});
+  }
+
+  UpdateContext c_;
+  FuncContents* f_;
+  UpdateAdjoint result_;
+};
+
+}  // namespace
+
+UpdateAdjoint differentiate_update(const UpdateQuery& query) {
+  return UpdateDifferentiation(query).run();
+}
+
+}  // namespace retrograde::ir

@@ -1,0 +1,230 @@
+#include "autodiff/updates/update_context.h"
+
+#include <algorithm>
+#include <set>
+
+#include "diagnostics/error.h"
+#include "graph/define.h"
+#include "ir/build.h"
+#include "ir/print.h"
+#include "simplify/simplify.h"
+
+namespace retrograde::ir {
+
+const Call* as_call_of(const Expr& e, const FuncContents* f) {
+  const auto* call = e.as<Call>();
+  return call && call->call_type == CallType::Func && call->symbol.raw() == f ? call : nullptr;
+}
+
+bool same_args(const std::vector<Expr>& a, const std::vector<Expr>& b) {
+  return a.size() == b.size() &&
+         std::equal(a.begin(), a.end(), b.begin(),
+                    [](const Expr& x, const Expr& y) { return equal(x, y); });
+}
+
+bool depends_on_data(const Expr& e) {
+  return any_node(e, [&](const Expr& node) {
+    const auto* call = node.as<Call>();
+    return call && call->call_type != CallType::Operator;
+  });
+}
+
+std::string point_text(const std::string& name, const std::vector<Expr>& args) {
+  std::string out = quoted(name) + "(";
+  for (size_t i = 0; i < args.size(); ++i) out += (i ? ", " : "") + print(args[i]);
+  return out + ")";
+}
+
+std::string name_before(const FuncContents& f, int stage) {
+  return f.name + "_adj_before_update" + std::to_string(stage - 1);
+}
+
+IterationDomain restricted(IterationDomain domain, const Expr& condition) {
+  if (is_const_true(condition)) return domain;
+  domain.predicate = domain.predicate.defined() ? domain.predicate && condition : condition;
+  return domain;
+}
+
+namespace {
+
+bool mentions_undef(const Expr& e) {
+  return any_node(e, [](const Expr& node) {
+    const Call* call = node.as<Call>();
+    return call && call->is_op(Op::undef);
+  });
+}
+
+// A value, and where it does not come from an undef.
+struct PartlyDefined {
+  Expr where, value;
+};
+
+PartlyDefined defined_part(const Expr& e);
+
+PartlyDefined chosen_part(const Expr& condition, const Expr& if_true, const Expr& if_false) {
+  PartlyDefined a = defined_part(if_true), b = defined_part(if_false);
+  if (mentions_undef(condition)) return {const_false(), a.value};
+  if (is_const_false(a.where)) return {logical_not(condition) && b.where, b.value};
+  if (is_const_false(b.where)) return {condition && a.where, a.value};
+  return {make_select(condition, a.where, b.where), make_select(condition, a.value, b.value)};
+}
+
+PartlyDefined defined_part(const Expr& e) {
+  if (!mentions_undef(e)) return {const_true(), e};
+  if (const auto* s = e.as<Select>()) return chosen_part(s->condition, s->when_true, s->when_false);
+  const Call* call = e.as<Call>();
+  if (call && call->is_op(Op::if_then_else))
+    return chosen_part(call->args[0], call->args[1], call->args[2]);
+  if (call && call->is_op(Op::undef)) return {const_false(), e};
+  Expr where = const_true();
+  Expr value = map_children(e, [&](const Expr& child) {
+    PartlyDefined part = defined_part(child);
+    where = where && part.where;
+    return part.value;
+  });
+  return {where, value};
+}
+
+// Where an update's value is undef the old value stays: it says so then.
+Expr with_old_value(const Expr& value, const Expr& old) {
+  PartlyDefined part = defined_part(value);
+  if (is_const_true(part.where)) return value;
+  return is_const_false(part.where) ? old : make_select(simplify(part.where), part.value, old);
+}
+
+}  // namespace
+
+UpdateContext::UpdateContext(const UpdateQuery& query)
+    : query(query),
+      f(query.f.get()),
+      definition(query.f->stage(query.stage)),
+      domain(query.regions.domain(*query.f, query.stage)) {
+  for (const Expr& a : definition.args) write.push_back(without_lets(a));
+  for (size_t k = 0; k < definition.values.size(); ++k) {
+    Expr old = call_value(query.f, write, static_cast<int>(k));
+    values.push_back(with_old_value(without_lets(definition.values[k]), old));
+  }
+  for (size_t d = 0; d < f->args.size(); ++d) {
+    pure.push_back(is_pure_position(*f, definition, d));
+    point.push_back(variable(f->args[d]));
+  }
+}
+
+std::string UpdateContext::asked() const {
+  std::string right;
+  for (const Expr& v : definition.values) right += (right.empty() ? "" : ", ") + print(v);
+  if (right.size() > 200) right = right.substr(0, 200) + "...";
+  return "differentiate the update " + point_text(f->name, write) + " = " + right;
+}
+
+namespace {
+void collect_self_reads(const Expr& e, const FuncContents* f, std::set<Expr, StructuralLess>& seen,
+                        std::vector<Expr>& reads) {
+  walk(e, [&](const Expr& node) {
+    const Call* call = as_call_of(node, f);
+    if (!call) return true;
+    if (seen.contains(node)) return false;
+    for (const Expr& arg : call->args) collect_self_reads(arg, f, seen, reads);
+    seen.insert(node);
+    reads.push_back(node);
+    return false;
+  });
+}
+}  // namespace
+
+std::vector<Expr> UpdateContext::self_reads() const {
+  std::set<Expr, StructuralLess> seen;
+  std::vector<Expr> reads;
+  for (const Expr& v : values) collect_self_reads(v, f, seen, reads);
+  for (const Expr& w : write) collect_self_reads(w, f, seen, reads);
+  return reads;
+}
+
+std::vector<Expr> UpdateContext::needed_reads(const SweepResult& sweep) const {
+  std::set<Expr, StructuralLess> found;
+  const auto need = [&](const Expr& e) {
+    walk(e, [&](const Expr& node) {
+      if (as_call_of(node, f)) found.insert(node);
+      return true;
+    });
+  };
+  for (const LeafAdjoint& leaf : sweep.leaves) {
+    need(leaf.adjoint);
+    for_each_child(leaf.leaf, need);
+  }
+  for (const Expr& w : write) need(w);
+  std::vector<Expr> reads = self_reads();
+  std::erase_if(reads, [&](const Expr& read) { return !found.contains(read); });
+  return reads;
+}
+
+SweepResult UpdateContext::sweep(const std::vector<Expr>& seeds) const {
+  return sweep_reverse(
+      values, seeds, [&](const Expr& leaf) { return as_call_of(leaf, f) || query.is_wanted(leaf); },
+      [&](const Expr& leaf) { return query.ranges.may_be_infinite(leaf); });
+}
+
+std::vector<Expr> UpdateContext::adjoints_at_write(const FuncPtr& adjoint) const {
+  std::vector<Expr> seeds;
+  for (size_t k = 0; k < values.size(); ++k) {
+    seeds.push_back(f->types[k].is_float() ? call_value(adjoint, write, static_cast<int>(k))
+                                           : Expr());
+  }
+  return seeds;
+}
+
+SweepResult UpdateContext::sweep_at_write(const FuncPtr& adjoint) const {
+  return sweep(adjoints_at_write(adjoint));
+}
+
+SweepResult UpdateContext::sweep_iterations(const FuncPtr& adjoint,
+                                            FunctionRef<std::vector<Expr>()> seeds) const {
+  AdjointTraits& traits = adjoint->made->traits;
+  AdjointTraits before;
+  SweepResult result;
+  do {
+    before = traits;
+    result = sweep(seeds());
+    for (const LeafAdjoint& leaf : result.leaves) {
+      if (as_call_of(leaf.leaf, f)) traits.add(traits_of(leaf.adjoint));
+    }
+  } while (traits != before);
+  return result;
+}
+
+void UpdateContext::check_versions_are_kept(const Expr& read) const {
+  if (query.versions.keeps_any()) return;
+  const auto* call = read.as<Call>();
+  user_error(
+      asked(),
+      "a partial derivative may need only values that are still there when the Func is complete",
+      text("it needs ", point_text(f->name, call->args),
+           " as it was before an update overwrote it"),
+      text("Give ", quoted(f->name),
+           " one more dimension that keeps the versions, or pass "
+           "AdjointOptions{.overwritten = Overwritten::Store} to let the compiler keep them"));
+}
+
+void UpdateContext::take_room(const FuncPtr& copy, const std::vector<Expr>& extents,
+                              UpdateAdjoint& result) const {
+  FuncPtr check = query.versions.take({copy, extents, f->name, asked()}, result.explanations);
+  if (check) result.helpers.push_back(check);
+}
+
+std::vector<Expr> UpdateContext::extents() const {
+  std::vector<Expr> result;
+  for (const Interval& side : query.regions.of(f))
+    result.push_back(side.is_bounded() ? side.max - side.min + 1 : Expr());
+  return result;
+}
+
+Expr with_values(const Expr& e, const FuncPtr& f, const SelfValues& self_values) {
+  if (!e.defined() || f->updates.empty()) return e;
+  Expr replaced = self_values.empty() ? e : rewrite(e, [&](const Expr& node, const auto& recurse) {
+    auto it = self_values.find(node);
+    return it != self_values.end() ? it->second : map_children(node, recurse);
+  });
+  return redirect_calls(replaced, f, f, false);
+}
+
+}  // namespace retrograde::ir

@@ -1,0 +1,197 @@
+#include "autodiff/updates/update_relations.h"
+
+#include <algorithm>
+
+#include "ir/build.h"
+#include "ir/variables.h"
+#include "ir/visit.h"
+
+namespace retrograde::ir {
+
+namespace {
+
+std::vector<std::string> names_of(const std::vector<LoopVariable>& vars) {
+  std::vector<std::string> names;
+  for (const LoopVariable& v : vars) names.push_back(v.name);
+  return names;
+}
+
+isl::map empty_like(const isl::map& m) {
+  return isl::manage(isl_map_empty(isl_map_get_space(m.get())));
+}
+
+}  // namespace
+
+UpdateRelations::UpdateRelations(const IterationDomain& domain, const std::vector<Expr>& write,
+                                 const std::vector<bool>& pure)
+    : domain_expr_(domain),
+      write_indices_(write),
+      pure_(pure),
+      bridge_(context_, names_of(domain.vars)) {
+  domain_ = domain_set(bridge_, domain, predicate_is_affine_);
+  write_ = access(bridge_, write);
+  if (write_) write_ = write_->intersect_domain(domain_);
+}
+
+isl::set UpdateRelations::domain_set(IslBridge& bridge, const IterationDomain& domain,
+                                     bool& exact) const {
+  isl::set result = bridge.universe();
+  for (int i = 0; i < bridge.rank(); ++i) {
+    const LoopVariable& v = domain.vars[static_cast<size_t>(i)];
+    if (v.min.defined()) result = result.intersect(bridge.dim(i).ge_set(bridge.bound(v.min)));
+    if (v.max.defined()) result = result.intersect(bridge.dim(i).le_set(bridge.bound(v.max)));
+  }
+  std::vector<Expr> open;
+  if (domain.predicate.defined()) open.push_back(domain.predicate);
+  while (!open.empty()) {
+    Expr e = open.back();
+    open.pop_back();
+    if (const auto* both = e.as<And>()) {
+      open.push_back(both->a);
+      open.push_back(both->b);
+    } else if (auto s = bridge.condition(e)) {
+      result = result.intersect(*s);
+    } else {
+      exact = false;
+    }
+  }
+  return result.coalesce();
+}
+
+std::optional<isl::map> UpdateRelations::access(IslBridge& bridge,
+                                                const std::vector<Expr>& indices) const {
+  isl::map result = isl::manage(
+      isl_map_universe(isl_space_alloc(bridge.ctx(), 0, static_cast<unsigned>(bridge.rank()),
+                                       static_cast<unsigned>(indices.size()))));
+  for (size_t d = 0; d < indices.size(); ++d) {
+    auto e = bridge.affine(indices[d]);
+    if (!e) return std::nullopt;
+    isl_map* one = isl_map_from_pw_aff(e->copy());
+    one = isl_map_insert_dims(one, isl_dim_out, 1, static_cast<unsigned>(indices.size() - d - 1));
+    one = isl_map_insert_dims(one, isl_dim_out, 0, static_cast<unsigned>(d));
+    result = result.intersect(isl::manage(one));
+  }
+  return result;
+}
+
+bool UpdateRelations::write_is_injective() const {
+  const bool result = isl_map_is_injective(write_->get()) == isl_bool_true;
+  throw_if_failed(context_.ctx);
+  return result;
+}
+
+Expr UpdateRelations::written(const std::vector<Expr>& names) const {
+  return bridge_.to_expr(write_->range().coalesce(), names);
+}
+
+// Reduction variables are ordered, the last one outermost; points that differ in pure variables
+// never meet.
+isl::map UpdateRelations::earlier() const {
+  isl::map same = isl::manage(
+      isl_map_universe(isl_space_map_from_set(isl_set_get_space(bridge_.universe().get()))));
+  isl::map result = empty_like(same);
+  for (int l = bridge_.rank() - 1; l >= 0; --l) {
+    if (!domain_expr_.vars[static_cast<size_t>(l)].is_reduction) continue;
+    unsigned at = static_cast<unsigned>(l);
+    result =
+        result.unite(isl::manage(isl_map_order_gt(same.copy(), isl_dim_in, l, isl_dim_out, l)));
+    same = isl::manage(isl_map_equate(same.copy(), isl_dim_in, static_cast<int>(at), isl_dim_out,
+                                      static_cast<int>(at)));
+  }
+  return result;
+}
+
+Expr UpdateRelations::last_writers() const {
+  isl::map same_element = write_->apply_range(write_->reverse());
+  isl::set overwritten = same_element.intersect(earlier().reverse()).domain();
+  isl::set last = domain_.subtract(overwritten).coalesce().gist(domain_);
+  return bridge_.to_expr(last, variables_of(names_of(domain_expr_.vars)));
+}
+
+std::optional<UpdateRelations::Read> UpdateRelations::read(const std::vector<Expr>& indices) {
+  auto map = access(bridge_, indices);
+  if (!map) return std::nullopt;
+  Read r;
+  r.map = map->intersect_domain(domain_);
+  isl::map writer = r.map.apply_range(write_->reverse());  // {i -> j : j writes what i reads}
+  isl::map before = writer.intersect(earlier());
+  r.sees_new = before.domain().coalesce();
+  r.never_new = r.sees_new.is_empty();
+  r.always_new = domain_.is_subset(r.sees_new);
+  r.overwritten = !writer.subtract(before).is_empty();
+  r.sees_new_condition =
+      bridge_.to_expr(r.sees_new.gist(domain_), variables_of(names_of(domain_expr_.vars)));
+  return r;
+}
+
+bool UpdateRelations::sees_new_unless(const Read& read, const Expr& condition) {
+  auto excepted = bridge_.condition(condition);
+  return domain_.subtract(read.sees_new)
+      .is_subset(excepted ? *excepted : domain_.subtract(domain_));
+}
+
+bool UpdateRelations::may_write(const Read& read, const IterationDomain& other,
+                                const std::vector<Expr>& other_write) const {
+  IslBridge bridge = bridge_.with_dims(names_of(other.vars));
+  bool exact = true;
+  isl::set domain = domain_set(bridge, other, exact);
+  auto write = access(bridge, other_write);
+  return !write || !read.map.range().intersect(write->intersect_domain(domain).range()).is_empty();
+}
+
+std::vector<ReverseLoop> UpdateRelations::first_guess() const {
+  std::vector<ReverseLoop> loops;
+  auto add = [&](size_t d, bool descending) { loops.push_back({static_cast<int>(d), descending}); };
+  std::vector<bool> done(write_indices_.size());
+  for (const LoopVariable& v : domain_expr_.vars) {
+    for (size_t d = 0; d < write_indices_.size(); ++d) {
+      if (pure_[d] || done[d] || !v.is_reduction || !uses_variable(write_indices_[d], v.name))
+        continue;
+      done[d] = true;
+      // Descending where the index grows with the variable.
+      Expr step = substitute(write_indices_[d], v.name, make_const(Int(32), 1)) -
+                  substitute(write_indices_[d], v.name, make_const(Int(32), 0));
+      auto value = as_const_int(step);
+      add(d, !value || *value >= 0);
+    }
+  }
+  for (size_t d = 0; d < write_indices_.size(); ++d) {
+    if (!pure_[d] && !done[d]) add(d, true);
+  }
+  return loops;
+}
+
+bool UpdateRelations::is_valid_order(const std::vector<ReverseLoop>& loops,
+                                     const std::vector<Read>& reads) const {
+  int n = static_cast<int>(write_indices_.size());
+  isl::map same = isl::manage(isl_map_universe(
+      isl_space_alloc(bridge_.ctx(), 0, static_cast<unsigned>(n), static_cast<unsigned>(n))));
+  isl::map order = empty_like(same);  // {element read -> element written, which is visited earlier}
+  for (auto l = loops.rbegin(); l != loops.rend(); ++l) {
+    isl_map* step = l->descending
+                        ? isl_map_order_lt(same.copy(), isl_dim_in, l->dim, isl_dim_out, l->dim)
+                        : isl_map_order_gt(same.copy(), isl_dim_in, l->dim, isl_dim_out, l->dim);
+    order = order.unite(isl::manage(step));
+    same = isl::manage(isl_map_equate(same.copy(), isl_dim_in, l->dim, isl_dim_out, l->dim));
+  }
+  for (const Read& r : reads) {
+    isl::map pairs = r.map.intersect_domain(r.sees_new).reverse().apply_range(*write_);
+    if (!pairs.is_subset(order)) return false;
+  }
+  return true;
+}
+
+std::optional<std::vector<ReverseLoop>> UpdateRelations::reverse_order(
+    const std::vector<Read>& reads) const {
+  std::vector<ReverseLoop> guess = first_guess();
+  for (unsigned flips = 0; flips < (1u << guess.size()); ++flips) {
+    std::vector<ReverseLoop> loops = guess;
+    for (size_t l = 0; l < loops.size(); ++l) {
+      if (flips >> l & 1u) loops[l].descending = !loops[l].descending;
+    }
+    if (is_valid_order(loops, reads)) return loops;
+  }
+  return std::nullopt;
+}
+
+}  // namespace retrograde::ir

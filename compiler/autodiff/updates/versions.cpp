@@ -1,0 +1,61 @@
+#include "autodiff/updates/versions.h"
+
+#include "autodiff/sweeps/accumulation.h"
+#include "autodiff/sweeps/reverse_sweep.h"
+#include "frontend/language/var.h"
+#include "graph/define.h"
+#include "graph/function.h"
+#include "ir/build.h"
+#include "ir/variables.h"
+#include "ir/visit.h"
+#include "simplify/simplify.h"
+
+namespace retrograde::ir {
+
+FuncPtr clone_prefix(const FuncPtr& f, int stages, const std::string& name) {
+  FuncPtr g = make_func(Role::Version);
+  g->made->of = f->name;
+  if (f->made) g->made->traits = f->made->traits;
+  g->name =
+      claim_name(name.empty() ? f->name + "_before_update" + std::to_string(stages - 1) : name);
+  define_pure(g, variables_of(f->args), f->pure->values);
+  for (int s = 1; s < stages; ++s) {
+    Definition stage =
+        map_exprs(f->stage(s), [&](const Expr& e) { return redirect_calls(e, f, g, false); });
+    append_update(g, stage.args, stage.values, stage.rvars, stage.predicate);
+  }
+  return g;
+}
+
+Expr call_instead(const Expr& e, const FuncPtr& f, const FuncPtr& g,
+                  const std::vector<Expr>& extra) {
+  return rewrite(e, [&](const Expr& part, const std::function<Expr(const Expr&)>& recurse) {
+    const auto* call = part.as<Call>();
+    if (!call || call->call_type != CallType::Func || call->symbol.raw() != f.get())
+      return map_children(part, recurse);
+    std::vector<Expr> args;
+    for (const Expr& arg : call->args) args.push_back(recurse(arg));
+    args.insert(args.end(), extra.begin(), extra.end());
+    return call_value(g, args, call->component);
+  });
+}
+
+Expr iteration_number(const std::vector<ReductionVariable>& rvars) {
+  auto rdom = std::make_shared<ReductionDomainContents>();
+  rdom->vars = rvars;
+  rdom->frozen = true;
+  Expr result = make_zero(Int(32)), stride = make_one(Int(32));
+  for (const ReductionVariable& r : rvars) {
+    result = result + (variable(r.var, Int(32), SymbolRef(rdom)) - r.min) * stride;
+    stride = stride * r.extent;
+  }
+  return simplify(result);
+}
+
+Expr iteration_count(const std::vector<ReductionVariable>& rvars) {
+  Expr result = make_one(Int(32));
+  for (const ReductionVariable& r : rvars) result = result * r.extent;
+  return simplify(result);
+}
+
+}  // namespace retrograde::ir

@@ -1,0 +1,148 @@
+// param.h -- scalars that a compiled pipeline takes as arguments.
+//
+// Param<float> gain("gain", 1.0f, 0.0f, 10.0f); f(x) = gain * in(x); gain.set(2.0f);
+// f.realize({n});
+#pragma once
+
+#include <memory>
+#include <string>
+#include <type_traits>
+
+#include "frontend/data/argument.h"
+#include "frontend/language/var.h"
+#include "graph/function.h"
+
+namespace retrograde {
+
+namespace ir {
+std::shared_ptr<ParameterContents> make_scalar_parameter(Type type, const std::string& name);
+// The value as the parameter's type holds it; CompileError when that cannot.
+Scalar converted_scalar(const ParameterContents& parameter, const Scalar& value);
+void set_scalar(ParameterContents& parameter, const Scalar& value);
+void set_limit(ParameterContents& parameter, Expr ParameterContents::*field, const Expr& value);
+Scalar get_scalar(const ParameterContents& parameter, Type type);
+
+template <typename T>
+Scalar to_scalar(T value) {
+  if constexpr (std::is_same_v<T, float16_t> || std::is_same_v<T, bfloat16_t>) {
+    return Scalar::of_float(type_of<T>(), static_cast<double>(value));
+  } else if constexpr (std::is_pointer_v<T>) {
+    Scalar result;
+    result.type = Handle();
+    result.u = reinterpret_cast<uintptr_t>(value);
+    return result;
+  } else if constexpr (std::is_floating_point_v<T>) {
+    return Scalar::of_float(type_of<T>(), static_cast<double>(value));
+  } else if constexpr (std::is_signed_v<T>) {
+    return Scalar::of_int(type_of<T>(), value);
+  } else {
+    return Scalar::of_uint(type_of<T>(), static_cast<uint64_t>(value));
+  }
+}
+template <typename T>
+T from_scalar(const Scalar& value) {
+  if constexpr (std::is_same_v<T, float16_t> || std::is_same_v<T, bfloat16_t>) {
+    return T(value.f);
+  } else if constexpr (std::is_pointer_v<T>) {
+    return reinterpret_cast<T>(static_cast<uintptr_t>(value.u));
+  } else if constexpr (std::is_floating_point_v<T>) {
+    return static_cast<T>(value.f);
+  } else if constexpr (std::is_signed_v<T>) {
+    return static_cast<T>(value.i);
+  } else {
+    return static_cast<T>(value.u);
+  }
+}
+}  // namespace ir
+
+template <typename T = void>
+class Param {
+  struct None;  // the value type of Param<void>: it has constructors without a value only
+  using Value = std::conditional_t<std::is_void_v<T>, None*, T>;
+  template <typename Other>
+  friend class Param;
+
+ public:
+  static constexpr bool has_static_type = !std::is_void_v<T>;
+  static Type static_type() { return type_of<T>(); }
+
+  // Requires: its type is a scalar.
+  Param() requires has_static_type : parameter_(ir::make_scalar_parameter(type_of<T>(), "")) {}
+  explicit Param(const std::string& name) requires has_static_type
+      : parameter_(ir::make_scalar_parameter(type_of<T>(), name)) {}
+  template <ir::TextPointer Text>
+  requires has_static_type explicit Param(const Text& name)
+      : Param(ir::name_from(name, "a Param")) {}
+  explicit Param(std::nullptr_t) requires(std::is_pointer_v<T>) = delete;
+  explicit Param(Type type, const std::string& name = "") requires(!has_static_type)
+      : parameter_(ir::make_scalar_parameter(type, name)) {}
+  Param(Type type, std::nullptr_t) = delete;
+  explicit Param(Value value) requires(has_static_type && !std::is_pointer_v<T>) : Param() {
+    set(value);
+  }
+  Param(const std::string& name, Value value) requires has_static_type : Param(name) { set(value); }
+  Param(Value value, const Expr& min, const Expr& max) requires has_static_type : Param() {
+    set(value);
+    set_range(min, max);
+  }
+  Param(const std::string& name, Value value, const Expr& min,
+        const Expr& max) requires has_static_type : Param(name) {
+    set(value);
+    set_range(min, max);
+  }
+  // Requires: the types must agree.
+  template <typename Other>
+  Param(const Param<Other>& other) : parameter_(other.parameter_) {
+    check_type(other.type());
+  }
+  Param(const Param&) = default;
+  Param& operator=(const Param&) = default;
+
+  const std::string& name() const { return parameter_->name; }
+  Type type() const { return parameter_->type; }  // of its values
+  // Requires: a value must have been set; the types must agree.
+  template <typename V = Value>
+  V get() const {
+    return ir::from_scalar<V>(ir::get_scalar(*parameter_, type_of<V>()));
+  }
+  // Requires: the value must fit the parameter's type.
+  template <typename V>
+  void set(const V& value) {
+    ir::set_scalar(*parameter_, ir::to_scalar(value));
+  }
+  // Limits that every call is checked against, and that the compiler relies on.
+  // Requires: limits are numbers; a limit is a value of the parameter's type; a limit has one value
+  // in each call: it is made of parameters and facts about buffers.
+  void set_range(const Expr& min, const Expr& max) {
+    set_min_value(min);
+    set_max_value(max);
+  }
+  void set_min_value(const Expr& min) {
+    ir::set_limit(*parameter_, &ir::ParameterContents::min_value, min);
+  }
+  void set_max_value(const Expr& max) {
+    ir::set_limit(*parameter_, &ir::ParameterContents::max_value, max);
+  }
+  Expr min_value() const { return parameter_->min_value; }  // undefined: no limit
+  Expr max_value() const { return parameter_->max_value; }  // undefined: no limit
+  template <typename V>
+  void set_estimate(const V& value) {
+    ir::set_limit(*parameter_, &ir::ParameterContents::estimate, Expr(value));
+  }
+  operator Expr() const { return ir::variable(name(), type(), ir::SymbolRef(parameter_)); }
+  operator Argument() const { return ir::argument_of(*parameter_); }
+  const std::shared_ptr<ir::ParameterContents>& parameter() const { return parameter_; }
+
+ private:
+  void check_type(Type other) const {
+    if constexpr (has_static_type) {
+      if (other == type_of<T>()) return;
+      user_error("use the Param " + retrograde::quoted(name()) + " as a Param of " +
+                     to_string(type_of<T>()),
+                 "the types must agree", "it is of type " + to_string(other));
+    }
+  }
+  std::shared_ptr<ir::ParameterContents> parameter_;
+};
+
+}  // namespace retrograde

@@ -1,0 +1,41 @@
+// realization.h -- the buffers that hold the values of a realized Func, one for each.
+#pragma once
+
+#include <utility>
+#include <vector>
+
+#include "frontend/data/buffer.h"
+
+namespace retrograde {
+
+class Realization {
+ public:
+  // Requires: it holds at least one Buffer; its Buffers must be defined.
+  explicit Realization(std::vector<Buffer<>> buffers);
+  Realization(std::initializer_list<Buffer<>> buffers)
+      : Realization(std::vector<Buffer<>>(buffers)) {}
+  template <typename T, int Dims, typename... Rest>
+  requires((std::is_convertible_v<Rest, Buffer<>> && ...))
+      Realization(Buffer<T, Dims>& first, Rest&&... rest)
+      : Realization(std::vector<Buffer<>>{first, Buffer<>(std::forward<Rest>(rest))...}) {}
+
+  size_t size() const { return buffers_.size(); }  // how many Buffers
+  // Requires: its Buffers are numbered from 0.
+  const Buffer<>& operator[](size_t i) const { return buffers_[checked(i)]; }
+  Buffer<>& operator[](size_t i) { return buffers_[checked(i)]; }
+  // Of a Func with one value.
+  // Requires: it must hold exactly one.
+  template <typename T, int Dims>
+  operator Buffer<T, Dims>() const {
+    check_one_value();
+    return buffers_[0].template as<T, Dims>();
+  }
+  int device_sync() { return 0; }  // all memory is the host's
+
+ private:
+  size_t checked(size_t i) const;
+  void check_one_value() const;
+  std::vector<Buffer<>> buffers_;
+};
+
+}  // namespace retrograde

@@ -1,0 +1,432 @@
+// expr_ops.cpp -- type rules of the operators that are calls.
+#include "frontend/language/expr_ops.h"
+
+#include <atomic>
+
+#include "ir/literal.h"
+#include "ir/print.h"
+
+namespace retrograde {
+
+namespace {
+
+using ir::call_op;
+using ir::Op;
+
+void check_defined(const Expr& e, const char* what) {
+  if (!e.defined()) {
+    user_error(text("apply ", what), "every operand must be a defined expression",
+               "one of them was never assigned", "Assign the Expr before its use");
+  }
+}
+
+[[noreturn]] void type_error(const char* what, const std::string& rule, const Expr& e,
+                             const std::string& instead = "Convert it with cast<>()") {
+  user_error(text("apply ", what, " to ", e), rule, "its type is " + to_string(e.type()), instead);
+}
+
+void check_integer(const Expr& e, const char* what) {
+  check_defined(e, what);
+  if (!e.type().is_int_or_uint()) type_error(what, "it takes integers", e);
+}
+
+Expr as_float(Expr x, const char* what) {
+  check_defined(x, what);
+  const Type type = x.type();
+  if (type.is_handle()) type_error(what, "it takes a number", x);
+  if (type.is_float() && !type.is_bfloat()) return x;
+  return ir::cast_to(Float(32, type.lanes()), std::move(x));
+}
+
+Expr unary_float(Op op, Expr x) {
+  const char* name = ir::op_info(op).name;
+  return call_op(op, {as_float(std::move(x), name)});
+}
+
+Expr binary_float(Op op, Expr a, Expr b) {
+  const char* name = ir::op_info(op).name;
+  a = as_float(std::move(a), name);
+  b = as_float(std::move(b), name);
+  ir::match_types(a, b, name);
+  return call_op(op, {a, b});
+}
+
+Expr unary_float32(Op op, Expr x) {
+  const char* name = ir::op_info(op).name;
+  x = as_float(std::move(x), name);
+  if (x.type().element_of() != Float(32))
+    type_error(name, "it takes float32", x, "Use the exact form");
+  return call_op(op, {x});
+}
+
+Expr classify_float(Op op, Expr x) {
+  const char* name = ir::op_info(op).name;
+  x = as_float(std::move(x), name);
+  return call_op(op, Bool(x.type().lanes()), {x});
+}
+
+Expr bitwise(Op op, Expr a, Expr b) {
+  const char* name = ir::op_info(op).name;
+  check_integer(a, name);
+  check_integer(b, name);
+  ir::match_types(a, b, name);
+  return call_op(op, {a, b});
+}
+
+Expr shift(Op op, Expr a, Expr b) {
+  const char* name = ir::op_info(op).name;
+  check_integer(a, name);
+  check_integer(b, name);
+  // The amount keeps its sign, and one too large to be held in the width of `a` stays at least that
+  // width.
+  b = saturating_cast(b.type().with_bits(a.type().bits()), b);
+  if (a.type().lanes() != b.type().lanes()) {
+    if (a.type().is_scalar()) a = ir::make_broadcast(a, b.type().lanes());
+    if (b.type().is_scalar()) b = ir::make_broadcast(b, a.type().lanes());
+  }
+  return call_op(op, a.type(), {a, b});
+}
+
+Type unsigned_form(Type type) { return type.is_int() ? type.with_code(TypeCode::UInt) : type; }
+
+Expr power_by_squaring(const Expr& x, int64_t exponent) {
+  if (exponent == 0) return ir::make_one(x.type());
+  if (exponent == 1) return x;
+  Expr half = power_by_squaring(x, exponent / 2);
+  return exponent % 2 ? half * half * x : half * half;
+}
+
+Expr integer_power(const Expr& x, int64_t exponent) {
+  return exponent >= 0 ? power_by_squaring(x, exponent)
+                       : ir::make_one(x.type()) / power_by_squaring(x, -exponent);
+}
+
+// Every call without a seed is another stream.
+Expr random(Type type, Expr seed) {
+  static std::atomic<int32_t> streams{0};
+  if (!seed.defined()) {
+    seed = Expr(int32_t{-1} - streams.fetch_add(1));
+  } else if (!seed.type().is_int_or_uint() || !seed.type().is_scalar()) {
+    type_error("random", "its seed is an integer", seed);
+  }
+  return call_op(Op::random, type, {ir::cast_to(Int(32), seed)});
+}
+
+void check_condition(const Expr& condition, const char* what) {
+  check_defined(condition, what);
+  if (!condition.type().is_bool())
+    type_error(what, "its condition is of type bool", condition, "Compare it with something");
+}
+
+}  // namespace
+
+Expr operator&(Expr a, Expr b) { return bitwise(Op::bitwise_and, std::move(a), std::move(b)); }
+Expr operator|(Expr a, Expr b) { return bitwise(Op::bitwise_or, std::move(a), std::move(b)); }
+Expr operator^(Expr a, Expr b) { return bitwise(Op::bitwise_xor, std::move(a), std::move(b)); }
+Expr operator~(Expr a) {
+  check_integer(a, "bitwise_not");
+  return call_op(Op::bitwise_not, {a});
+}
+Expr operator<<(Expr a, Expr b) { return shift(Op::shift_left, std::move(a), std::move(b)); }
+Expr operator<<(Expr a, int b) { return shift(Op::shift_left, std::move(a), Expr(b)); }
+Expr operator>>(Expr a, Expr b) { return shift(Op::shift_right, std::move(a), std::move(b)); }
+Expr operator>>(Expr a, int b) { return shift(Op::shift_right, std::move(a), Expr(b)); }
+
+Expr saturating_cast(Type type, Expr value) {
+  check_defined(value, "saturating_cast");
+  if (type.is_handle() || value.type().is_handle())
+    type_error("saturating_cast", "it takes and gives numbers", value);
+  type = type.with_lanes(value.type().lanes());
+  if (type == value.type()) return value;
+  return call_op(Op::saturating_cast, type, {value});
+}
+
+Expr reinterpret(Type type, Expr value) {
+  check_defined(value, "reinterpret");
+  if (type.bits() * type.lanes() != value.type().bits() * value.type().lanes()) {
+    user_error(text("reinterpret ", value, " as ", to_string(type)), "both types are equally wide",
+               text("its type is ", to_string(value.type())), "Use cast<>() to convert the value");
+  }
+  return ir::reinterpret_as(type, std::move(value));
+}
+
+Tuple select(const Tuple& condition, const Tuple& when_true, const Tuple& when_false) {
+  if (condition.size() != when_true.size() || when_true.size() != when_false.size()) {
+    user_error("select between Tuples", "all Tuples have one size",
+               text("they have ", condition.size(), ", ", when_true.size(), " and ",
+                    when_false.size(), " elements"),
+               "Give Tuples of one size");
+  }
+  std::vector<Expr> result;
+  for (size_t i = 0; i < condition.size(); i++)
+    result.push_back(select(condition[i], when_true[i], when_false[i]));
+  return Tuple(result);
+}
+
+Tuple select(const Expr& condition, const Tuple& when_true, const Tuple& when_false) {
+  return select(Tuple(std::vector<Expr>(when_true.size(), condition)), when_true, when_false);
+}
+
+Expr mux(const Expr& id, const std::vector<Expr>& values) {
+  if (values.empty())
+    user_error("apply mux", "it chooses among at least one value", "the list is empty",
+               "Give the values");
+  Expr result = values.back();
+  for (size_t i = values.size() - 1; i-- > 0;)
+    result = select(id == static_cast<int>(i), values[i], result);
+  return result;
+}
+
+Expr mux(const Expr& id, const std::initializer_list<Expr>& values) {
+  return mux(id, std::vector<Expr>(values));
+}
+Expr mux(const Expr& id, const Tuple& values) { return mux(id, values.as_vector()); }
+
+Expr abs(Expr x) {
+  check_defined(x, "abs");
+  if (x.type().is_handle()) type_error("abs", "it takes a number", x);
+  if (x.type().is_uint()) return x;
+  return call_op(Op::abs, unsigned_form(x.type()), {x});
+}
+
+Expr absd(Expr a, Expr b) {
+  check_defined(a, "absd");
+  check_defined(b, "absd");
+  ir::match_types(a, b, "absd");
+  return call_op(Op::absd, unsigned_form(a.type()), {a, b});
+}
+
+namespace {
+
+// A constant takes the type of the other end.
+void match_ends(Expr& zero, Expr& one) {
+  const std::string asked = text("apply lerp to ", zero, " and ", one);
+  const std::string rule = "a constant end takes the type of the other and must fit it";
+  if (ir::is_const(zero) && !ir::is_const(one)) {
+    zero = ir::literal_in(one.type(), zero, asked, rule);
+  } else if (ir::is_const(one)) {
+    one = ir::literal_in(zero.type(), one, asked, rule);
+  }
+  if (zero.type() != one.type()) {
+    user_error(asked, "both values have one type",
+               text("they are ", to_string(zero.type()), " and ", to_string(one.type())),
+               "Cast one of them");
+  }
+  if (!zero.type().is_int_or_uint() || zero.type().bits() < 64) return;
+  user_error(asked, "integers are of at most 32 bits", "their type is " + to_string(zero.type()),
+             "Cast them to double, or write zero + (one - zero) * weight");
+}
+
+// The literals 0 and 1 are weights too, whatever their type.
+Expr checked_weight(const Expr& zero, Expr weight) {
+  const auto constant = ir::as_const_int(weight);
+  const bool is_end = constant && weight.type().is_int() && (*constant == 0 || *constant == 1);
+  if (is_end) weight = ir::cast_to(Float(32), weight);
+  if (!weight.type().is_uint() && !weight.type().is_float()) {
+    type_error("lerp", "its weight is a float or an unsigned integer", weight);
+  }
+  const auto value = ir::as_const_float(weight);
+  if (value && !zero.type().is_float() && !(*value >= 0 && *value <= 1)) {
+    user_error(text("apply lerp with the weight ", *value),
+               "integers are interpolated with weights in [0, 1]",
+               text("the ends are ", to_string(zero.type()), ", and the weight is ", *value),
+               "Give a weight in [0, 1], or interpolate floats");
+  }
+  if (!zero.type().is_float()) return weight;
+  if (weight.type().is_float()) return ir::cast_to(zero.type(), weight);
+  const auto whole = static_cast<double>(weight.type().max_uint());
+  return ir::cast_to(zero.type(), weight) / ir::make_const(zero.type(), whole);
+}
+
+}  // namespace
+
+// Of integers the result is rounded to the nearest, after the weight was brought to their width,
+// rounding down: for n bits to w / (2^n - 1), where a float weight times 2^n - 1 is rounded as floats
+// are (as doubles are for 32 bits).
+Expr lerp(Expr zero, Expr one, Expr weight) {
+  check_defined(zero, "lerp");
+  check_defined(one, "lerp");
+  check_defined(weight, "lerp");
+  match_ends(zero, one);
+  weight = checked_weight(zero, std::move(weight));
+  const Type type = zero.type();
+  return call_op(Op::lerp, type, {zero, one, weight});
+}
+
+Expr div_round_to_zero(Expr a, Expr b) {
+  check_integer(a, "div_round_to_zero");
+  check_integer(b, "div_round_to_zero");
+  ir::match_types(a, b, "div_round_to_zero");
+  if (a.type().is_uint()) return a / b;
+  // Floor division of magnitudes, then the sign.
+  Expr magnitude = cast(a.type(), abs(a) / abs(b));
+  return select((a < 0) != (b < 0), -magnitude, magnitude);
+}
+
+Expr mod_round_to_zero(Expr a, Expr b) {
+  check_integer(a, "mod_round_to_zero");
+  check_integer(b, "mod_round_to_zero");
+  ir::match_types(a, b, "mod_round_to_zero");
+  if (a.type().is_uint()) return a % b;
+  Expr magnitude = cast(a.type(), abs(a) % abs(b));
+  return select(a < 0, -magnitude, magnitude);
+}
+
+#define RETROGRADE_COUNT_BITS(name) \
+  Expr name(Expr x) {               \
+    check_integer(x, #name);        \
+    return call_op(Op::name, {x});  \
+  }
+RETROGRADE_COUNT_BITS(popcount)
+RETROGRADE_COUNT_BITS(count_leading_zeros)
+RETROGRADE_COUNT_BITS(count_trailing_zeros)
+#undef RETROGRADE_COUNT_BITS
+
+#define RETROGRADE_UNARY_FLOAT(name) \
+  Expr name(Expr x) { return unary_float(Op::name, std::move(x)); }
+RETROGRADE_UNARY_FLOAT(floor)
+RETROGRADE_UNARY_FLOAT(ceil)
+RETROGRADE_UNARY_FLOAT(round)
+RETROGRADE_UNARY_FLOAT(trunc)
+RETROGRADE_UNARY_FLOAT(sqrt)
+RETROGRADE_UNARY_FLOAT(exp)
+RETROGRADE_UNARY_FLOAT(log)
+RETROGRADE_UNARY_FLOAT(sin)
+RETROGRADE_UNARY_FLOAT(cos)
+RETROGRADE_UNARY_FLOAT(tan)
+RETROGRADE_UNARY_FLOAT(asin)
+RETROGRADE_UNARY_FLOAT(acos)
+RETROGRADE_UNARY_FLOAT(atan)
+RETROGRADE_UNARY_FLOAT(sinh)
+RETROGRADE_UNARY_FLOAT(cosh)
+RETROGRADE_UNARY_FLOAT(tanh)
+RETROGRADE_UNARY_FLOAT(asinh)
+RETROGRADE_UNARY_FLOAT(acosh)
+RETROGRADE_UNARY_FLOAT(atanh)
+RETROGRADE_UNARY_FLOAT(erf)
+#undef RETROGRADE_UNARY_FLOAT
+
+Expr fract(Expr x) {
+  x = as_float(std::move(x), "fract");
+  return x - trunc(x);
+}
+
+Expr pow(Expr x, Expr y) {
+  check_defined(x, "pow");
+  check_defined(y, "pow");
+  if (y.type().is_int_or_uint()) {
+    if (auto exponent = ir::as_const_int(y)) return integer_power(x, *exponent);
+  }
+  return binary_float(Op::pow, std::move(x), std::move(y));
+}
+
+Expr hypot(Expr x, Expr y) { return binary_float(Op::hypot, std::move(x), std::move(y)); }
+Expr atan2(Expr y, Expr x) { return binary_float(Op::atan2, std::move(y), std::move(x)); }
+
+Expr is_nan(Expr x) { return classify_float(Op::is_nan, std::move(x)); }
+Expr is_inf(Expr x) { return classify_float(Op::is_inf, std::move(x)); }
+Expr is_finite(Expr x) { return classify_float(Op::is_finite, std::move(x)); }
+
+Expr fast_exp(Expr x) { return unary_float32(Op::fast_exp, std::move(x)); }
+Expr fast_log(Expr x) { return unary_float32(Op::fast_log, std::move(x)); }
+Expr fast_sin(Expr x) { return unary_float32(Op::fast_sin, std::move(x)); }
+Expr fast_cos(Expr x) { return unary_float32(Op::fast_cos, std::move(x)); }
+Expr fast_inverse(Expr x) { return unary_float32(Op::fast_inverse, std::move(x)); }
+Expr fast_inverse_sqrt(Expr x) { return unary_float32(Op::fast_inverse_sqrt, std::move(x)); }
+
+Expr fast_pow(Expr x, Expr y) {
+  check_defined(y, "fast_pow");
+  if (y.type().is_int_or_uint()) {
+    check_defined(x, "fast_pow");
+    if (auto exponent = ir::as_const_int(y)) return integer_power(x, *exponent);
+  }
+  x = as_float(std::move(x), "fast_pow");
+  y = as_float(std::move(y), "fast_pow");
+  if (x.type().element_of() != Float(32)) type_error("fast_pow", "it takes float32", x, "Use pow");
+  if (y.type().element_of() != Float(32)) type_error("fast_pow", "it takes float32", y, "Use pow");
+  return call_op(Op::fast_pow, {x, y});
+}
+
+Expr random_float(Expr seed) { return random(Float(32), std::move(seed)); }
+Expr random_uint(Expr seed) { return random(UInt(32), std::move(seed)); }
+Expr random_int(Expr seed) { return random(Int(32), std::move(seed)); }
+
+Expr likely_if_innermost(Expr e) {
+  check_defined(e, "likely_if_innermost");
+  return call_op(Op::likely_if_innermost, {e});
+}
+
+Expr unsafe_promise_clamped(const Expr& value, const Expr& min, const Expr& max) {
+  check_defined(value, "unsafe_promise_clamped");
+  auto limit = [&](const Expr& e, bool is_min) {
+    if (e.defined()) return cast(value.type(), e);
+    const Type type = value.type();
+    if (type.is_float())
+      return ir::make_const(type, is_min ? -std::numeric_limits<double>::infinity()
+                                         : std::numeric_limits<double>::infinity());
+    if (type.is_uint())
+      return is_min ? ir::make_zero(type) : ir::make_uint_const(type, type.max_uint());
+    return ir::make_const(type, is_min ? type.min_int() : type.max_int());
+  };
+  return call_op(Op::unsafe_promise_clamped, value.type(),
+                 {value, limit(min, true), limit(max, false)});
+}
+
+Expr strict_float(Expr e) {
+  check_defined(e, "strict_float");
+  return call_op(Op::strict_float, {e});
+}
+
+Expr memoize_tag(Expr value, const std::vector<Expr>& key) {
+  check_defined(value, "memoize_tag");
+  std::vector<Expr> args = {std::move(value)};
+  for (const Expr& part : key) {
+    check_defined(part, "memoize_tag");
+    args.push_back(part);
+  }
+  const Type type = args[0].type();
+  return call_op(Op::memoize_tag, type, std::move(args));
+}
+
+Expr stop_gradient(Expr e) {
+  check_defined(e, "stop_gradient");
+  return call_op(Op::stop_gradient, {e});
+}
+
+Expr undef(Type type) { return call_op(Op::undef, type, {}); }
+
+namespace ir {
+
+namespace {
+void check_parts(const std::vector<Expr>& values, const char* what) {
+  if (values.empty())
+    user_error(text("apply ", what), "it gives the value of its first argument",
+               "it was given none", "Give it a value");
+  for (const Expr& value : values) check_defined(value, what);
+}
+}  // namespace
+
+Expr print_values(std::vector<Expr> values) {
+  check_parts(values, "print");
+  const Type type = values[0].type();
+  return call_op(Op::print, type, std::move(values));
+}
+
+Expr print_values_when(Expr condition, std::vector<Expr> values) {
+  check_condition(condition, "print_when");
+  check_parts(values, "print_when");
+  const Type type = values[0].type();
+  values.insert(values.begin(), std::move(condition));
+  return call_op(Op::print_when, type, std::move(values));
+}
+
+Expr require_values(Expr condition, std::vector<Expr> values) {
+  check_condition(condition, "require");
+  check_parts(values, "require");
+  const Type type = values[0].type();
+  values.insert(values.begin(), std::move(condition));
+  return call_op(Op::require, type, std::move(values));
+}
+
+}  // namespace ir
+}  // namespace retrograde

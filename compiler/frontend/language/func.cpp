@@ -1,0 +1,238 @@
+// func.cpp -- the handle of a Func: accessors, and the directives about where it is computed and
+// stored.
+#include "frontend/language/func.h"
+
+#include <algorithm>
+
+#include "graph/define.h"
+#include "ir/print.h"
+#include "ir/visit.h"
+
+namespace retrograde {
+
+namespace {
+
+ir::FuncPtr make_func(const std::string& unique_name, std::source_location where = {}) {
+  auto contents = std::make_shared<ir::FuncContents>();
+  contents->name = unique_name;
+  contents->declared_at = {where.file_name(), static_cast<int>(where.line())};
+  return contents;
+}
+
+void check_not_extern(const ir::FuncContents& f, const std::string& asked) {
+  if (!f.is_extern()) return;
+  user_error(asked, "its values are expressions",
+             "the C function " + quoted(f.extern_definition->function) + " computes them",
+             "Ask is_extern() first");
+}
+
+}  // namespace
+
+// ---- construction ----
+
+Func::Func(std::source_location where) : func_(make_func(ir::unique_name("f"), where)) {}
+
+Func::Func(const std::string& name, std::source_location where)
+    : func_(make_func(name.empty() ? ir::unique_name("f") : ir::claim_name(name), where)) {}
+
+Func::Func(Type required_type, int required_dimensions, const std::string& name)
+    : Func(std::vector<Type>{required_type}, required_dimensions, name) {}
+
+Func::Func(const std::vector<Type>& required_types, int required_dimensions,
+           const std::string& name)
+    : Func(name) {
+  if (required_dimensions < 0) {
+    user_error("declare " + quoted(func_->name), "dimensions are not negative",
+               text("they are ", required_dimensions), "Give 0 or more");
+  }
+  func_->required_types = required_types;
+  func_->required_dimensions = required_dimensions;
+}
+
+Func::Func(const Expr& e) : Func() { (*this)(_) = e; }
+
+// ---- accessors ----
+
+void Func::check_defined(const std::string& asked) const { ir::check_is_defined(*func_, asked); }
+
+std::vector<Var> Func::args() const {
+  return std::vector<Var>(func_->args.begin(), func_->args.end());
+}
+
+Expr Func::value() const {
+  check_defined("take the value of " + quoted(name()));
+  check_not_extern(*func_, "take the value of " + quoted(name()));
+  if (outputs() != 1) {
+    user_error("take the value of " + quoted(name()), "it has one value only if it is no Tuple",
+               text("it has ", outputs()), "Use values()");
+  }
+  return func_->pure->values[0];
+}
+
+Tuple Func::values() const {
+  check_defined("take the values of " + quoted(name()));
+  check_not_extern(*func_, "take the values of " + quoted(name()));
+  return Tuple(func_->pure->values);
+}
+
+const Type& Func::type() const {
+  check_defined("take the type of " + quoted(name()));
+  return func_->types[0];
+}
+
+std::string Func::source_location() const { return ir::source_location_of(*func_); }
+
+const ir::Definition& Func::checked_update(int index, const char* asked) const {
+  if (index >= 0 && index < num_update_definitions()) return func_->updates[index];
+  user_error(text(asked, " ", index, " of ", quoted(name())), "updates are numbered from 0",
+             text("it has ", num_update_definitions(), " update definitions"), "Name one of them");
+}
+
+// What leaves the Func may outlive it: references to it are strong again.
+std::vector<Expr> Func::update_args(int index) const {
+  std::vector<Expr> result;
+  for (const Expr& arg : checked_update(index, "take the arguments of update").args) {
+    result.push_back(ir::redirect_calls(arg, func_, func_, false));
+  }
+  return result;
+}
+
+Expr Func::update_value(int index) const {
+  if (outputs() != 1) {
+    user_error(text("take the value of update ", index, " of ", quoted(name())),
+               "it has one value only if it is no Tuple", text("it has ", outputs()),
+               "Use update_values()");
+  }
+  return update_values(index)[0];
+}
+
+Tuple Func::update_values(int index) const {
+  std::vector<Expr> result;
+  for (const Expr& value : checked_update(index, "take the values of update").values) {
+    result.push_back(ir::redirect_calls(value, func_, func_, false));
+  }
+  return Tuple(result);
+}
+
+std::vector<RVar> Func::rvars(int index) const {
+  const ir::Definition& update = checked_update(index, "take the reduction variables of update");
+  std::shared_ptr<ir::ReductionDomainContents> domain;
+  ir::for_each_expr(update, [&](const Expr& root) {
+    ir::walk(root, [&](const Expr& e) {
+      const ir::Variable* v = e.as<ir::Variable>();
+      if (v && !domain) domain = ir::domain_of(*v);
+      return !domain;
+    });
+  });
+  std::vector<RVar> result;
+  for (size_t i = 0; i < update.rvars.size(); i++)
+    result.push_back(RVar(domain, static_cast<int>(i)));
+  return result;
+}
+
+// ---- running it ----
+
+Pipeline& Func::pipeline() {
+  if (!pipeline_.defined()) pipeline_ = Pipeline(*this);
+  return pipeline_;
+}
+
+Realization Func::realize(JITUserContext* context, const std::vector<int32_t>& sizes,
+                          const Target& target, const ParamMap& map) {
+  check_defined("realize " + quoted(name()));
+  return pipeline().realize(context, sizes, target, map);
+}
+
+void Func::realize(JITUserContext* context, Pipeline::RealizationArg outputs, const Target& target,
+                   const ParamMap& map) {
+  check_defined("realize " + quoted(name()));
+  pipeline().realize(context, std::move(outputs), target, map);
+}
+
+Realization Func::realize(const std::vector<int32_t>& sizes, const Target& target,
+                          const ParamMap& map) {
+  return realize(nullptr, sizes, target, map);
+}
+
+void Func::realize(Pipeline::RealizationArg outputs, const Target& target, const ParamMap& map) {
+  realize(nullptr, std::move(outputs), target, map);
+}
+
+void Func::infer_input_bounds(JITUserContext* context, const std::vector<int32_t>& sizes,
+                              const Target& target, const ParamMap& map) {
+  check_defined("infer the input bounds of " + quoted(name()));
+  pipeline().infer_input_bounds(context, sizes, target, map);
+}
+
+void Func::infer_input_bounds(JITUserContext* context, Pipeline::RealizationArg outputs,
+                              const Target& target, const ParamMap& map) {
+  check_defined("infer the input bounds of " + quoted(name()));
+  pipeline().infer_input_bounds(context, std::move(outputs), target, map);
+}
+
+void Func::infer_input_bounds(const std::vector<int32_t>& sizes, const Target& target,
+                              const ParamMap& map) {
+  infer_input_bounds(nullptr, sizes, target, map);
+}
+
+void Func::infer_input_bounds(Pipeline::RealizationArg outputs, const Target& target,
+                              const ParamMap& map) {
+  infer_input_bounds(nullptr, std::move(outputs), target, map);
+}
+
+void Func::compile_jit(const Target& target) {
+  check_defined("compile " + quoted(name()));
+  pipeline().compile_jit(target);
+}
+
+Callable Func::compile_to_callable(const std::vector<Argument>& args, const Target& target) {
+  check_defined("compile " + quoted(name()));
+  return pipeline().compile_to_callable(args, target);
+}
+
+std::string Func::loop_nest(const Target& target) {
+  check_defined("show the loops of " + quoted(name()));
+  return pipeline().loop_nest(target);
+}
+
+void Func::print_loop_nest() {
+  check_defined("show the loops of " + quoted(name()));
+  pipeline().print_loop_nest();
+}
+
+std::vector<Argument> Func::infer_arguments() const {
+  check_defined("list the arguments of " + quoted(name()));
+  return Pipeline(*this).infer_arguments();
+}
+
+JITHandlers& Func::jit_handlers() { return pipeline().jit_handlers(); }
+
+OutputImageParam Func::output_buffer() const {
+  check_defined("use the output buffer of " + quoted(name()));
+  if (outputs() != 1) {
+    user_error("use the output buffer of " + quoted(name()), "it has one only if it is no Tuple",
+               text("it has ", outputs()), "Use output_buffers()");
+  }
+  return OutputImageParam(func_->outputs[0]);
+}
+
+std::vector<OutputImageParam> Func::output_buffers() const {
+  check_defined("use the output buffers of " + quoted(name()));
+  std::vector<OutputImageParam> result;
+  for (const auto& output : func_->outputs) result.push_back(OutputImageParam(output));
+  return result;
+}
+
+// ---- schedule ----
+
+ir::SchedulePlace Func::loops() const {
+  check_defined("schedule " + quoted(name()));
+  return {func_, 0};
+}
+
+Stage Func::update(int index) {
+  checked_update(index, "schedule update");
+  return Stage(func_, index + 1);
+}
+
+}  // namespace retrograde

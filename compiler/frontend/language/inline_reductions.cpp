@@ -1,0 +1,212 @@
+// inline_reductions.cpp -- finds what an inline reduction runs over, and what its Func depends on.
+#include "frontend/language/inline_reductions.h"
+
+#include <algorithm>
+#include <limits>
+#include <unordered_set>
+
+#include "frontend/language/integer_ops.h"
+#include "ir/print.h"
+#include "ir/visit.h"
+
+namespace retrograde {
+
+namespace {
+
+using DomainPtr = std::shared_ptr<ir::ReductionDomainContents>;
+
+// An inline reduction, taken apart.
+struct Reduction {
+  DomainPtr domain;
+  Expr body;               // over `args` and the variables of the domain
+  std::vector<Expr> args;  // of the Func that is made
+  std::vector<Expr> at;    // what the enclosing expression passes for them
+};
+
+class Finder {
+ public:
+  Finder(DomainPtr domain, std::string name) : domain_(std::move(domain)), name_(std::move(name)) {}
+
+  Reduction find(const Expr& e) {
+    if (!e.defined())
+      user_error("reduce with " + name_, "the expression must be defined", "it was never assigned",
+                 "Assign the Expr before its use");
+    collect(e);
+    if (!domain_) choose_domain();
+    if (domain_->predicate.defined()) collect(domain_->predicate);
+    Reduction result;
+    result.domain = domain_;
+    for (const ir::Variable* v : free_) add_argument(*v, result);
+    result.body = ir::substitute(e, renamed_);
+    return result;
+  }
+
+ private:
+  DomainPtr domain_;
+  std::string name_;
+  std::vector<const ir::Variable*> free_;
+  std::unordered_set<std::string> seen_;
+  std::unordered_set<std::string> let_bound_;
+  ir::Substitution renamed_;
+
+  void collect(const Expr& root) {
+    ir::walk(root, [&](const Expr& e) {
+      if (const ir::Let* let = e.as<ir::Let>()) let_bound_.insert(let->name);
+      const ir::Variable* v = e.as<ir::Variable>();
+      if (v && seen_.insert(v->name).second) free_.push_back(v);
+      return true;
+    });
+  }
+
+  void choose_domain() {
+    for (const ir::Variable* v : free_) {
+      DomainPtr domain = ir::domain_of(*v);
+      if (!domain) continue;
+      if (domain_ && domain != domain_) {
+        user_error("reduce with " + name_, "it runs over one RDom",
+                   text("the expression uses ", quoted(domain_->vars[0].var), " and ",
+                        quoted(domain->vars[0].var), " of different RDoms"),
+                   "Name the one to reduce over: " + name_ + "(r, ...)");
+      }
+      domain_ = domain;
+    }
+    if (!domain_) {
+      user_error("reduce with " + name_, "the expression must use a reduction variable",
+                 "it uses none", "Use an RDom inside, or name one: " + name_ + "(r, ...)");
+    }
+  }
+
+  void add_argument(const ir::Variable& v, Reduction& result) {
+    if (let_bound_.count(v.name)) return;
+    const DomainPtr domain = ir::domain_of(v);
+    if (domain == domain_ && domain) return;
+    if (!v.symbol.defined()) {
+      result.args.push_back(ir::variable(v.name));
+      result.at.push_back(ir::variable(v.name));
+    } else if (domain) {
+      // A variable of an enclosing reduction is one value for us.
+      const Var fresh;
+      renamed_[v.name] = fresh;
+      result.args.push_back(fresh);
+      result.at.push_back(ir::variable(v.name, v.type, v.symbol));
+    }
+  }
+};
+
+Reduction find_reduction(const DomainPtr& domain, const Expr& e, const char* name) {
+  return Finder(domain, name).find(e);
+}
+
+void check_undefined(const Func& f, const char* name) {
+  if (!f.defined()) return;
+  user_error(text("reduce with ", name, " into ", quoted(f.name())),
+             "the Func that is given must have no definition", "it has one", "Give a new Func");
+}
+
+Expr largest(Type type) {
+  if (type.is_float()) return ir::make_const(type, std::numeric_limits<double>::infinity());
+  if (type.is_uint()) return ir::make_uint_const(type, type.max_uint());
+  return ir::make_const(type, type.max_int());
+}
+
+Expr smallest(Type type) {
+  if (type.is_float()) return ir::make_const(type, -std::numeric_limits<double>::infinity());
+  return type.is_uint() ? ir::make_zero(type) : ir::make_const(type, type.min_int());
+}
+
+// The update must run over the whole domain even when the body uses only part of its variables, or
+// none.
+Expr mention_domain(const Expr& e, const Reduction& reduction) {
+  const bool mentioned = ir::any_node(e, [&](const Expr& part) {
+    const ir::Variable* v = part.as<ir::Variable>();
+    return v && v->symbol.raw() == reduction.domain.get();
+  });
+  if (mentioned) return e;
+  const RVar r(reduction.domain, 0);
+  return select(Expr(r) >= r.min(), e, ir::make_zero(e.type()));
+}
+
+enum class Fold { Sum, SaturatingSum, Product, Maximum, Minimum };
+
+Expr initial_value(Fold fold, Type type) {
+  switch (fold) {
+    case Fold::Sum:
+    case Fold::SaturatingSum:
+      return ir::make_zero(type);
+    case Fold::Product:
+      return ir::make_one(type);
+    case Fold::Maximum:
+      return smallest(type);
+    case Fold::Minimum:
+      return largest(type);
+  }
+  internal_error("a fold of unknown kind");
+}
+
+Expr combine(Fold fold, Expr a, Expr b) {
+  switch (fold) {
+    case Fold::Sum:
+      return a + b;
+    case Fold::SaturatingSum:
+      return saturating_add(a, b);
+    case Fold::Product:
+      return a * b;
+    case Fold::Maximum:
+      return max(a, b);
+    case Fold::Minimum:
+      return min(a, b);
+  }
+  internal_error("a fold of unknown kind");
+}
+
+Expr reduce(Fold fold, const DomainPtr& domain, const Expr& e, const Func& f, const char* name) {
+  check_undefined(f, name);
+  const Reduction reduction = find_reduction(domain, e, name);
+  f(reduction.args) = initial_value(fold, e.type());
+  f(reduction.args) = combine(fold, f(reduction.args), mention_domain(reduction.body, reduction));
+  return f(reduction.at);
+}
+
+// Coordinates first, then the value. Only a strictly better element replaces the best one so far.
+Tuple reduce_place(bool is_max, const DomainPtr& domain, const Expr& e, const Func& f,
+                   const char* name) {
+  check_undefined(f, name);
+  const Reduction reduction = find_reduction(domain, e, name);
+  std::vector<Expr> initial, found;
+  for (size_t i = 0; i < reduction.domain->vars.size(); i++) {
+    initial.push_back(0);
+    found.push_back(RVar(reduction.domain, static_cast<int>(i)));
+  }
+  initial.push_back(is_max ? smallest(e.type()) : largest(e.type()));
+  found.push_back(reduction.body);
+  f(reduction.args) = Tuple(initial);
+  const Tuple best = f(reduction.args);
+  const Expr best_value = best[best.size() - 1];
+  const Expr better = is_max ? reduction.body > best_value : reduction.body < best_value;
+  f(reduction.args) = select(better, Tuple(found), best);
+  return f(reduction.at);
+}
+
+}  // namespace
+
+#define RETROGRADE_DEFINE_REDUCTION(Result, name, function, kind)                           \
+  Result name(Expr e, const std::string& func_name) {                                       \
+    return function(kind, nullptr, e, Func(func_name), #name);                              \
+  }                                                                                         \
+  Result name(const RDom& domain, Expr e, const std::string& func_name) {                   \
+    return function(kind, domain.domain(), e, Func(func_name), #name);                      \
+  }                                                                                         \
+  Result name(Expr e, const Func& func) { return function(kind, nullptr, e, func, #name); } \
+  Result name(const RDom& domain, Expr e, const Func& func) {                               \
+    return function(kind, domain.domain(), e, func, #name);                                 \
+  }
+RETROGRADE_DEFINE_REDUCTION(Expr, sum, reduce, Fold::Sum)
+RETROGRADE_DEFINE_REDUCTION(Expr, saturating_sum, reduce, Fold::SaturatingSum)
+RETROGRADE_DEFINE_REDUCTION(Expr, product, reduce, Fold::Product)
+RETROGRADE_DEFINE_REDUCTION(Expr, maximum, reduce, Fold::Maximum)
+RETROGRADE_DEFINE_REDUCTION(Expr, minimum, reduce, Fold::Minimum)
+RETROGRADE_DEFINE_REDUCTION(Tuple, argmax, reduce_place, true)
+RETROGRADE_DEFINE_REDUCTION(Tuple, argmin, reduce_place, false)
+#undef RETROGRADE_DEFINE_REDUCTION
+
+}  // namespace retrograde

@@ -1,0 +1,212 @@
+#include "frontend/language/integer_ops.h"
+
+#include <algorithm>
+
+#include "ir/literal.h"
+#include "ir/print.h"
+
+namespace retrograde {
+
+Expr user_context_value() {
+  return ir::call_op(ir::Op::runtime_call, Handle(), {Expr("retrograde_user_context")});
+}
+
+namespace {
+
+// The operands of a division in a signed type that holds both, the divisor from 1 to 256.
+struct Division {
+  Type type;  // of the result
+  Expr numerator, divisor;
+
+  Division(const Expr& n, const Expr& d, const char* what) {
+    if (!n.defined() || !d.defined()) {
+      user_error(text("apply ", what), "every operand must be a defined expression",
+                 "one of them was never assigned", "Assign the Expr before its use");
+    }
+    const std::string asked = text("apply ", what, " to ", n, " and ", d);
+    if (!n.type().is_int_or_uint() || n.type().bits() < 8 || n.type().bits() > 32) {
+      user_error(asked, "the numerator is an integer of 8, 16 or 32 bits",
+                 "its type is " + to_string(n.type()), "Use operator/ and operator%");
+    }
+    const Type byte = UInt(8);
+    if (!ir::is_const(d) && d.type().element_of() != byte) {
+      user_error(asked, "the divisor is of type uint8", "its type is " + to_string(d.type()),
+                 "Cast it to uint8");
+    }
+    const Expr small = ir::literal_in(byte, d, asked, "the divisor is of type uint8");
+    type = n.type().element_of();
+    const Type wide = Int(type.bits() == 32 ? 64 : 32);
+    numerator = cast(wide, n);
+    divisor = select(small == 0, ir::make_const(wide, 256), cast(wide, small));
+  }
+
+  Expr result(const Expr& e) const { return cast(type, e); }
+};
+
+}  // namespace
+
+Expr fast_integer_divide(const Expr& numerator, const Expr& divisor) {
+  const Division d(numerator, divisor, "fast_integer_divide");
+  return d.result(d.numerator / d.divisor);
+}
+
+Expr fast_integer_modulo(const Expr& numerator, const Expr& divisor) {
+  const Division d(numerator, divisor, "fast_integer_modulo");
+  return d.result(d.numerator % d.divisor);
+}
+
+Expr fast_integer_divide_round_to_zero(const Expr& numerator, const Expr& divisor) {
+  const Division d(numerator, divisor, "fast_integer_divide_round_to_zero");
+  return d.result(div_round_to_zero(d.numerator, d.divisor));
+}
+
+namespace {
+
+// A literal beside an expression of another type must fit it, as in a + 300.
+Type match_operands(Expr& a, Expr& b, const char* what) {
+  const bool is_literal_a = ir::is_const(a), is_literal_b = ir::is_const(b);
+  if (is_literal_a != is_literal_b && a.defined() && b.defined()) {
+    Expr& literal = is_literal_a ? a : b;
+    const Type type = is_literal_a ? b.type() : a.type();
+    if (literal.type() == Int(32)) {
+      literal = ir::literal_in(type, literal, text("apply ", what, " to ", a, " and ", b),
+                               "a constant takes the type of the other operand and must fit it");
+    }
+  }
+  ir::match_types(a, b, what);
+  return a.type();
+}
+
+}  // namespace
+
+// ---- twice the bits ----
+
+namespace {
+
+void check_defined(const Expr& a, const Expr& b, const char* what) {
+  if (a.defined() && b.defined()) return;
+  user_error(text("apply ", what), "every operand must be a defined expression",
+             "one of them was never assigned", "Assign the Expr before its use");
+}
+
+void check_integers(const Expr& a, const Expr& b, const char* what) {
+  for (const Expr& e : {a, b}) {
+    if (e.type().is_int_or_uint()) continue;
+    user_error(text("apply ", what, " to ", e), "it takes integers",
+               "its type is " + to_string(e.type()), "Convert it with cast<>()");
+  }
+}
+
+int widest(const Expr& a, const Expr& b) { return std::max(a.type().bits(), b.type().bits()); }
+
+Type wide_type(const Expr& a, const Expr& b, const char* what) {
+  check_defined(a, b, what);
+  const int bits = 2 * widest(a, b);
+  if (bits > 64) {
+    user_error(text("apply ", what, " to ", a, " and ", b), "its result has at most 64 bits",
+               text("their types are ", to_string(a.type()), " and ", to_string(b.type())),
+               "Cast them to 32 bits");
+  }
+  const bool is_signed = a.type().is_int() || b.type().is_int();
+  return a.type().is_float() || b.type().is_float() ? Float(bits)
+         : is_signed                                ? Int(bits)
+                                                    : UInt(bits);
+}
+
+}  // namespace
+
+Expr widening_mul(const Expr& a, const Expr& b) {
+  const Type wide = wide_type(a, b, "widening_mul");
+  return cast(wide, a) * cast(wide, b);
+}
+
+Expr widening_add(const Expr& a, const Expr& b) {
+  const Type wide = wide_type(a, b, "widening_add");
+  return cast(wide, a) + cast(wide, b);
+}
+
+Expr widening_sub(const Expr& a, const Expr& b) {
+  Type wide = wide_type(a, b, "widening_sub");
+  if (wide.is_uint()) wide = wide.with_code(TypeCode::Int);
+  return cast(wide, a) - cast(wide, b);
+}
+
+// ---- clamped ----
+
+Expr saturating_add(const Expr& a, const Expr& b) {
+  check_defined(a, b, "saturating_add");
+  check_integers(a, b, "saturating_add");
+  return saturating_cast(a.type(), widening_add(a, b));
+}
+
+Expr saturating_sub(const Expr& a, const Expr& b) {
+  check_defined(a, b, "saturating_sub");
+  check_integers(a, b, "saturating_sub");
+  return saturating_cast(a.type(), widening_sub(a, b));
+}
+
+// ---- means. Of 64 bits bit by bit: a = 2 (a >> 1) + (a & 1), so that no sum overflows ----
+
+Expr halving_add(Expr a, Expr b) {
+  const Type type = match_operands(a, b, "halving_add");
+  check_integers(a, b, "halving_add");
+  if (type.bits() < 64) return cast(type, widening_add(a, b) / 2);
+  return (a & b) + ((a ^ b) >> 1);
+}
+
+Expr rounding_halving_add(Expr a, Expr b) {
+  const Type type = match_operands(a, b, "rounding_halving_add");
+  check_integers(a, b, "rounding_halving_add");
+  if (type.bits() < 64) return cast(type, (widening_add(a, b) + 1) / 2);
+  return (a | b) - ((a ^ b) >> 1);
+}
+
+Expr halving_sub(Expr a, Expr b) {
+  const Type type = match_operands(a, b, "halving_sub");
+  check_integers(a, b, "halving_sub");
+  if (type.bits() < 64) return cast(type, widening_sub(a, b) / 2);
+  return (a >> 1) - (b >> 1) - (~a & b & 1);
+}
+
+// ---- parts of a number ----
+
+Expr extract_bits(Type type, const Expr& e, const Expr& lowest) {
+  check_defined(e, lowest, "extract_bits");
+  check_integers(lowest, lowest, "extract_bits");
+  const Type bits = e.type().with_code(TypeCode::UInt);
+  return reinterpret(
+      type, cast(type.with_code(TypeCode::UInt), reinterpret(bits, e) >> cast(bits, lowest)));
+}
+
+Expr concat_bits(const std::vector<Expr>& parts) {
+  const std::string asked = "concatenate bits";
+  if (parts.empty())
+    user_error(asked, "there is at least one part", "none was given",
+               "Give the parts, the lowest first");
+  int total = 0;
+  for (const Expr& part : parts) {
+    if (!part.defined())
+      user_error(asked, "every part is a defined expression", "one was never assigned",
+                 "Assign every Expr before it is used");
+    if (part.type() != parts[0].type()) {
+      user_error(asked, "all parts have one type",
+                 to_string(parts[0].type()) + " and " + to_string(part.type()) + " were given",
+                 "Cast them");
+    }
+    total += part.type().bits();
+  }
+  if (total != 8 && total != 16 && total != 32 && total != 64) {
+    user_error(asked, "the result has 8, 16, 32 or 64 bits", text("it would have ", total),
+               "Give another number of parts");
+  }
+  const Type whole = UInt(total), part_bits = parts[0].type().with_code(TypeCode::UInt);
+  Expr result;
+  for (size_t i = 0; i < parts.size(); i++) {
+    const Expr bits = cast(whole, reinterpret(part_bits, parts[i]));
+    const Expr placed = bits << cast(whole, static_cast<int>(i) * part_bits.bits());
+    result = result.defined() ? result | placed : placed;
+  }
+  return result;
+}
+
+}  // namespace retrograde

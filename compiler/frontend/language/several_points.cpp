@@ -1,0 +1,194 @@
+// Several points become one more variable of the reduction domain, innermost and unrolled:
+//
+//   f(scatter(a, b), y) = gather(u, v)
+//       =>   RDom k(0, 2);  f(select(k == 0, a, b), y) = select(k == 0, u, v)
+//
+// What is read of f itself is what was there before the update: of a copy of f as it was. Where the
+// update runs over an RDom, its iterations may read what earlier ones stored, which no copy has:
+// that is refused.
+#include "frontend/language/several_points.h"
+
+#include <algorithm>
+
+#include "frontend/language/integer_ops.h"
+#include "frontend/language/rdom.h"
+#include "frontend/schedule/stage.h"
+#include "graph/define.h"
+#include "graph/wrappers.h"
+#include "ir/build.h"
+#include "ir/memory_reads.h"
+#include "ir/print.h"
+#include "ir/variables.h"
+#include "ir/visit.h"
+
+namespace retrograde {
+
+namespace {
+
+constexpr const char *scatter_name = "scatter", *gather_name = "gather";
+
+Expr pack(const char* name, const std::vector<Expr>& points) {
+  const std::string asked = std::string("name several points by ") + name + "()";
+  if (points.empty())
+    user_error(asked, "at least one point is named", "the list is empty", "Give it Exprs");
+  for (const Expr& e : points) {
+    if (!e.defined())
+      user_error(asked, "each point is a defined Expr", "one of them was never assigned",
+                 "Assign every Expr before it is used");
+    if (e.type() == points[0].type()) continue;
+    user_error(asked, "all points are of one type",
+               text(to_string(points[0].type()), " and ", to_string(e.type()), " are among them"),
+               "Convert them: cast<int>(...)");
+  }
+  return ir::call_extern(name, points[0].type(), points);
+}
+
+}  // namespace
+
+Expr scatter(const std::vector<Expr>& points) { return pack(scatter_name, points); }
+Expr gather(const std::vector<Expr>& points) { return pack(gather_name, points); }
+
+namespace ir {
+
+namespace {
+
+const Call* as_pack(const Expr& e) {
+  const auto* call = e.as<Call>();
+  const bool is_pack = call && call->call_type == CallType::Extern &&
+                       (call->name == scatter_name || call->name == gather_name);
+  return is_pack ? call : nullptr;
+}
+
+std::vector<const Call*> packs_in(const std::vector<Expr>& exprs) {
+  std::vector<const Call*> result;
+  for (const Expr& root : exprs) {
+    if (!root.defined()) continue;
+    walk(root, [&](const Expr& e) {
+      if (const Call* call = as_pack(e)) result.push_back(call);
+      return true;
+    });
+  }
+  return result;
+}
+
+class SeveralPoints {
+ public:
+  SeveralPoints(const FuncPtr& f, const std::vector<Expr>& args, const std::vector<Expr>& values)
+      : f_(f),
+        asked_("update " + quoted(f->name) + " at several points"),
+        args_(args),
+        values_(values) {}
+
+  void define() {
+    check_points();
+    if (!f_->is_defined())
+      user_error(asked_, "a first definition is for all points", "it has no definition",
+                 "Define it first, as in f(x) = 0");
+    choose_domain();
+    read_what_was_before();
+    const std::vector<Expr> args = at_point(args_), values = at_point(values_);
+    define_update(f_, args, values);
+    Stage(f_, f_->stage_count() - 1).unroll(VarOrRVar(domain_->vars[0].var, true));
+  }
+
+ private:
+  void check_points() {
+    const std::vector<const Call*> places = packs_in(args_);
+    std::vector<const Call*> all = places, read = packs_in(values_);
+    all.insert(all.end(), read.begin(), read.end());
+    const bool is_named = std::all_of(places.begin(), places.end(),
+                                      [](const Call* call) { return call->name == scatter_name; });
+    if (places.empty() || !is_named) {
+      user_error(
+          asked_, "scatter() names the places on the left-hand side",
+          places.empty() ? "only gather() stands there, on the right" : "gather() stands there",
+          "Write f(scatter(a, b)) = gather(u, v)");
+    }
+    for (const Call* call : all) {
+      const int points = static_cast<int>(call->args.size());
+      if (points_ == 0) points_ = points;
+      if (points == points_) continue;
+      user_error(asked_, "all of an update's scatter() and gather() have as many points",
+                 text("one has ", points_, " and one has ", points), "Give as many to each");
+    }
+  }
+
+  // The user's domain with the point in front.
+  void choose_domain() {
+    std::vector<Expr> all = args_;
+    all.insert(all.end(), values_.begin(), values_.end());
+    for (const Expr& e : all) {
+      walk(e, [&](const Expr& node) {
+        const auto* v = node.as<Variable>();
+        if (v && !old_) old_ = domain_of(*v);
+        return true;
+      });
+    }
+    domain_ = std::make_shared<ReductionDomainContents>();
+    domain_->vars.push_back({unique_name("points") + ".k", Expr(0), Expr(points_)});
+    if (!old_) return;
+    old_->frozen = true;
+    domain_->vars.insert(domain_->vars.end(), old_->vars.begin(), old_->vars.end());
+    if (old_->predicate.defined()) domain_->predicate = rebound(old_->predicate);
+  }
+  Expr rebound(const Expr& e) const {
+    return old_ ? rebind_symbol(e, old_.get(), SymbolRef(domain_)) : e;
+  }
+
+  bool reads_itself(const std::vector<Expr>& exprs) const {
+    return std::any_of(exprs.begin(), exprs.end(),
+                       [&](const Expr& e) { return calls(e, f_.get()); });
+  }
+
+  void read_what_was_before() {
+    if (!reads_itself(args_) && !reads_itself(values_)) return;
+    if (old_)
+      unsupported(asked_, "over an RDom, what is stored does not depend on what stood there",
+                  quoted(f_->name) + " reads itself",
+                  "Read another Func, or give the iterations a dimension of their own");
+    const FuncPtr before = clone_of(f_, f_->name + "_before");
+    before->schedule.compute_level.kind = LoopLevel::Kind::Root;
+    before->schedule.store_level = before->schedule.compute_level;
+    for (std::vector<Expr>* exprs : {&args_, &values_}) {
+      for (Expr& e : *exprs) e = redirect_calls(e, f_, before, false);
+    }
+  }
+
+  std::vector<Expr> at_point(const std::vector<Expr>& exprs) const {
+    std::vector<Expr> result;
+    for (const Expr& e : exprs) result.push_back(rebound(chosen(e)));
+    return result;
+  }
+  // The points of e; one for all where it names none.
+  Expr chosen(const Expr& e) const {
+    if (packs_in({e}).empty()) return e;
+    const Expr point = variable(domain_->vars[0].var, Int(32), SymbolRef(domain_));
+    Expr result = element(e, points_ - 1);
+    for (int i = points_ - 2; i >= 0; --i) result = make_select(point == i, element(e, i), result);
+    return result;
+  }
+  static Expr element(const Expr& e, int i) {
+    return rewrite(e, [&](const Expr& part, const std::function<Expr(const Expr&)>& recurse) {
+      const Call* call = as_pack(part);
+      return call ? recurse(call->args[static_cast<size_t>(i)]) : map_children(part, recurse);
+    });
+  }
+
+  const FuncPtr f_;
+  const std::string asked_;
+  std::vector<Expr> args_, values_;
+  int points_ = 0;
+  std::shared_ptr<ReductionDomainContents> old_, domain_;
+};
+
+}  // namespace
+
+bool names_several_points(const std::vector<Expr>& exprs) { return !packs_in(exprs).empty(); }
+
+void define_several_points(const FuncPtr& f, const std::vector<Expr>& args,
+                           const std::vector<Expr>& values) {
+  SeveralPoints(f, args, values).define();
+}
+
+}  // namespace ir
+}  // namespace retrograde

@@ -1,0 +1,17 @@
+// compiler_interface.cpp -- the compiler of programs that link the front end alone: none.
+#include "frontend/run/compiler_interface.h"
+
+#include "diagnostics/error.h"
+
+namespace retrograde {
+
+[[noreturn]] static void no_compiler() {
+  unsupported("compile a pipeline", "this program must be linked with the compiler",
+              "it is linked with the front end alone", "Link libretrograde");
+}
+
+// Weak: the definitions of compiler/jit and compiler/aot win wherever they are linked in.
+__attribute__((weak)) Compiler& default_compiler() { no_compiler(); }
+__attribute__((weak)) ModuleCompiler& module_compiler() { no_compiler(); }
+
+}  // namespace retrograde

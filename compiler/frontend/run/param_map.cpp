@@ -1,0 +1,27 @@
+// param_map.cpp -- what a value must be to stand for a parameter.
+#include "frontend/run/param_map.h"
+
+namespace retrograde {
+
+const ParamMap& ParamMap::empty_map() {
+  static const ParamMap empty;
+  return empty;
+}
+
+const ParamMap::Entry* ParamMap::find(
+    const std::shared_ptr<ir::ParameterContents>& parameter) const {
+  const auto found = entries_.find(parameter);
+  return found == entries_.end() ? nullptr : &found->second;
+}
+
+ir::Scalar ParamMap::checked(const ir::ParameterContents& parameter, const ir::Scalar& value) {
+  return ir::converted_scalar(parameter, value);
+}
+
+Buffer<> ParamMap::checked(const ImageParam& image, const Buffer<>& buffer) {
+  image.name();  // an error where it has none
+  if (buffer.defined()) ir::check_image(*image.parameter(), buffer);
+  return buffer;
+}
+
+}  // namespace retrograde

@@ -1,0 +1,397 @@
+// pipeline.cpp -- compiling on demand, the buffers of the outputs, bounds queries.
+#include "frontend/run/pipeline.h"
+
+#include <iostream>
+#include <mutex>
+#include <unordered_set>
+
+#include "frontend/language/func.h"
+#include "frontend/run/call.h"
+#include "frontend/run/warnings.h"
+#include "graph/wrappers.h"
+
+namespace retrograde {
+
+namespace {
+
+using ParameterPtr = std::shared_ptr<ir::ParameterContents>;
+
+// What compiled code was made from. Equal stamps: nothing that it depends on has changed.
+struct Stamp {
+  std::vector<std::pair<ir::FuncPtr, uint64_t>> funcs;
+  std::vector<std::pair<ParameterPtr, uint64_t>> parameters;
+
+  static Stamp of(const std::vector<ir::FuncPtr>& outputs) {
+    Stamp result;
+    for (const ir::FuncPtr& f : ir::functions_of(outputs)) result.funcs.emplace_back(f, f->version);
+    for (const ParameterPtr& p : ir::parameters_of(outputs))
+      result.parameters.emplace_back(p, p->version);
+    for (const ir::FuncPtr& f : outputs) {
+      for (const ParameterPtr& p : f->outputs) result.parameters.emplace_back(p, p->version);
+    }
+    return result;
+  }
+  bool is_current() const {
+    for (const auto& [f, version] : funcs) {
+      if (f->version != version) return false;
+    }
+    for (const auto& [p, version] : parameters) {
+      if (p->version != version) return false;
+    }
+    return true;
+  }
+};
+
+std::string names_of(const std::vector<ir::FuncPtr>& outputs) {
+  std::string out;
+  for (const ir::FuncPtr& f : outputs) out += (out.empty() ? "" : ", ") + quoted(f->name);
+  return out;
+}
+
+bool same_shape(const halide_buffer_t& a, const std::vector<halide_dimension_t>& shape) {
+  for (int d = 0; d < a.dimensions; d++) {
+    if (a.dim[d].min != shape[d].min || a.dim[d].extent != shape[d].extent ||
+        a.dim[d].stride != shape[d].stride) {
+      return false;
+    }
+  }
+  return true;
+}
+
+// The answer to a query, and at least [0, size) in each dimension: then the call itself says what
+// is wrong with that. Its strides are the answer's, unless it is larger, or they put elements onto
+// each other.
+void enlarge_to(Runtime::Buffer<>& buffer, const std::vector<int32_t>& sizes) {
+  bool is_answer = true;
+  for (size_t d = 0; d < sizes.size(); d++) {
+    halide_dimension_t& dim = buffer.raw_buffer()->dim[d];
+    const int32_t min = std::min(dim.min, 0), end = std::max(dim.min + dim.extent, sizes[d]);
+    is_answer = is_answer && min == dim.min && end == dim.min + dim.extent &&
+                (dim.stride != 0 || dim.extent <= 1);
+    dim.min = min;
+    dim.extent = end - min;
+  }
+  int32_t stride = 1;
+  for (size_t d = 0; d < sizes.size() && !is_answer; d++) {
+    buffer.raw_buffer()->dim[d].stride = stride;
+    stride *= buffer.raw_buffer()->dim[d].extent;
+  }
+}
+
+void crop_to(Runtime::Buffer<>& buffer, const std::vector<int32_t>& sizes) {
+  for (size_t d = 0; d < sizes.size(); d++) buffer.crop(static_cast<int>(d), 0, sizes[d]);
+}
+
+}  // namespace
+
+struct Pipeline::Contents {
+  std::vector<ir::FuncPtr> outputs;
+  JITHandlers handlers;
+  std::map<std::string, JITExtern> externs;
+  bool is_traced = false;
+  std::mutex mutex;
+  // The latest compilation.
+  std::shared_ptr<CompiledPipeline> compiled;
+  Target target;
+  Stamp stamp;
+};
+
+// ---- arguments for outputs ----
+
+Pipeline::RealizationArg::RealizationArg(Realization& realization) {
+  for (size_t i = 0; i < realization.size(); i++) owners_.push_back(realization[i]);
+  for (Buffer<>& buffer : owners_) raw_.push_back(buffer.raw_buffer());
+}
+
+Pipeline::RealizationArg::RealizationArg(std::vector<Buffer<>> buffers)
+    : owners_(std::move(buffers)) {
+  for (Buffer<>& buffer : owners_) raw_.push_back(buffer.defined() ? buffer.raw_buffer() : nullptr);
+}
+
+// ---- construction ----
+
+Pipeline::Pipeline(const Func& output) : Pipeline(std::vector<Func>{output}) {}
+
+Pipeline::Pipeline(const std::vector<Func>& outputs) : contents_(std::make_shared<Contents>()) {
+  if (outputs.empty())
+    user_error("make a Pipeline", "a Pipeline has at least one output", "it was given none",
+               "Give the Funcs that are wanted");
+  std::unordered_set<const ir::FuncContents*> seen;
+  for (const Func& f : outputs) {
+    if (!f.defined()) {
+      user_error("make a Pipeline of " + quoted(f.name()), "an output needs a definition",
+                 "it has none", "Define it: f(x, y) = ...");
+    }
+    if (!seen.insert(f.function().get()).second) {
+      user_error("make a Pipeline", "its outputs are different Funcs",
+                 quoted(f.name()) + " is given twice", "Name each output once");
+    }
+    contents_->outputs.push_back(f.function());
+  }
+}
+
+Pipeline::Contents& Pipeline::checked() const {
+  if (!contents_)
+    user_error("use a Pipeline", "it needs outputs", "it was constructed without any",
+               "Construct it: Pipeline p(f)");
+  return *contents_;
+}
+
+ScheduleLog Pipeline::schedule_log() const { return ir::schedule_log(checked().outputs); }
+void Pipeline::apply_schedule(const ScheduleLog& log) { ir::apply_log(log, checked().outputs); }
+
+PipelineSpec Pipeline::spec() const {
+  PipelineSpec result{checked().outputs[0]->name, contents_->outputs};
+  for (const auto& [name, function] : contents_->externs)
+    result.externs[name] = function.extern_c_function().address();
+  result.is_traced = contents_->is_traced;
+  return result;
+}
+
+std::vector<Func> Pipeline::outputs() const {
+  std::vector<Func> result;
+  for (const ir::FuncPtr& f : checked().outputs) result.push_back(Func(f));
+  return result;
+}
+
+Func Pipeline::get_func(size_t index) const {
+  const std::vector<ir::FuncPtr> order = ir::topological_order(checked().outputs);
+  if (index >= order.size()) {
+    user_error(text("take Func ", index, " of a Pipeline"), "Funcs are numbered from 0",
+               text("it has ", order.size(), " Funcs"), "Give a smaller number");
+  }
+  return Func(order[index]);
+}
+
+JITHandlers& Pipeline::jit_handlers() { return checked().handlers; }
+
+void Pipeline::set_jit_externs(const std::map<std::string, JITExtern>& externs) {
+  std::lock_guard lock(checked().mutex);
+  contents_->externs = externs;
+  contents_->compiled.reset();
+}
+
+const std::map<std::string, JITExtern>& Pipeline::get_jit_externs() { return checked().externs; }
+
+std::vector<Argument> Pipeline::infer_arguments() const {
+  std::vector<Argument> result;
+  for (const ParameterPtr& p : ir::parameters_of(checked().outputs)) {
+    if (p->is_literal) continue;  // part of the program, not of its interface
+    result.push_back(ir::argument_of(*p));
+  }
+  return result;
+}
+
+// ---- compiling ----
+
+std::shared_ptr<CompiledPipeline> Pipeline::compiled(const Target& wanted) const {
+  Contents& contents = checked();
+  std::lock_guard lock(contents.mutex);
+  Target target = wanted;
+  if (target.has_unknowns())
+    target = contents.compiled ? contents.target : get_jit_target_from_environment();
+  if (!contents.compiled || !(contents.target == target) || !contents.stamp.is_current()) {
+    contents.compiled.reset();
+    contents.stamp = Stamp::of(contents.outputs);
+    contents.compiled = default_compiler().compile(spec(), target);
+    contents.target = target;
+    ir::tell_warnings(contents.outputs);
+  }
+  return contents.compiled;
+}
+
+void Pipeline::compile_jit(const Target& target) { compiled(target); }
+
+void Pipeline::invalidate_cache() {
+  std::lock_guard lock(checked().mutex);
+  contents_->compiled.reset();
+}
+
+void Pipeline::trace_pipeline() {
+  invalidate_cache();
+  contents_->is_traced = true;
+}
+
+std::string Pipeline::loop_nest(const Target& target) const {
+  const PipelineSpec pipeline = spec();
+  return default_compiler().loop_nest(
+      pipeline, target.has_unknowns() ? get_jit_target_from_environment() : target);
+}
+
+void Pipeline::print_loop_nest() const { std::cerr << loop_nest(); }
+
+// ---- outputs of a call ----
+
+std::vector<Buffer<>> Pipeline::make_outputs(const std::vector<int32_t>& sizes,
+                                             bool with_memory) const {
+  const std::string asked = "realize " + names_of(checked().outputs);
+  std::vector<Buffer<>> result;
+  for (const ir::FuncPtr& f : contents_->outputs) {
+    if (static_cast<int>(sizes.size()) != f->dimensions()) {
+      call_error(asked, "it takes one size for each dimension",
+                 text(quoted(f->name), " has ", f->dimensions(), " dimensions and was given ",
+                      sizes.size(), " sizes"),
+                 "Give that many sizes, or buffers");
+    }
+    for (size_t d = 0; d < sizes.size(); d++) {
+      if (sizes[d] >= 0) continue;
+      call_error(asked, "sizes are not negative",
+                 text("the size of dimension ", d, " is ", sizes[d]), "Give sizes of at least 0");
+    }
+    for (const Type& type : f->types) {
+      ir::check_sizes(to_halide_type(type), sizes, asked);
+      Runtime::Buffer<> buffer(to_halide_type(type), nullptr, sizes);
+      if (with_memory) ir::allocate_host(buffer);
+      result.push_back(Buffer<>(buffer));
+    }
+  }
+  return result;
+}
+
+// The values of a Tuple are computed point by point.
+static void check_one_shape(const halide_buffer_t& first, const halide_buffer_t& other,
+                            const ir::FuncContents& f, const std::string& asked) {
+  for (int d = 0; d < f.dimensions(); d++) {
+    const halide_dimension_t &a = first.dim[d], &b = other.dim[d];
+    if (a.min == b.min && a.extent == b.extent) continue;
+    const auto range = [](const halide_dimension_t& dim) {
+      return text("[", dim.min, ", ", dim.min + dim.extent - 1, "]");
+    };
+    call_error(asked, "the buffers of one Func cover one region",
+               text("in dimension ", d, " of ", quoted(f.name), " one covers ", range(a),
+                    " and another ", range(b)),
+               "Give buffers of one shape");
+  }
+}
+
+std::vector<halide_buffer_t*> Pipeline::checked_outputs(const RealizationArg& given,
+                                                        bool with_memory) const {
+  const std::string asked = "realize " + names_of(checked().outputs);
+  const std::vector<halide_buffer_t*>& buffers = given.buffers();
+  size_t count = 0;
+  for (const ir::FuncPtr& f : contents_->outputs) count += f->types.size();
+  if (buffers.size() != count) {
+    call_error(asked, "it takes one buffer for each value of each output",
+               text("there are ", count, " and ", buffers.size(), " were given"),
+               "Give that many buffers");
+  }
+  size_t i = 0;
+  for (const ir::FuncPtr& f : contents_->outputs) {
+    const halide_buffer_t* first = buffers[i];
+    for (const ParameterPtr& value : f->outputs) {
+      ir::check_buffer(buffers[i], value->name, value->type, f->dimensions(), with_memory, asked);
+      check_one_shape(*first, *buffers[i++], *f, asked);
+    }
+  }
+  return buffers;
+}
+
+// ---- calling ----
+
+void Pipeline::run(const std::vector<halide_buffer_t*>& outputs, const Target& target,
+                   JITUserContext* context, const ParamMap& map) const {
+  const auto code = compiled(target);
+  const std::string asked = "realize " + names_of(contents_->outputs);
+  ir::Arguments arguments(*code, outputs, false, asked, map);
+  ir::call(*code, contents_->handlers, arguments.argv(), asked, context);
+}
+
+Realization Pipeline::realize(const std::vector<int32_t>& sizes, const Target& target,
+                              const ParamMap& map) {
+  return realize(nullptr, sizes, target, map);
+}
+
+void Pipeline::realize(RealizationArg outputs, const Target& target, const ParamMap& map) {
+  realize(nullptr, std::move(outputs), target, map);
+}
+
+Realization Pipeline::realize(JITUserContext* context, const std::vector<int32_t>& sizes,
+                              const Target& target, const ParamMap& map) {
+  std::vector<Buffer<>> buffers = make_outputs(sizes, false);
+  RealizationArg outputs(buffers);
+  const auto code = compiled(target);
+  const std::string asked = "realize " + names_of(contents_->outputs);
+  ir::Arguments arguments(*code, outputs.buffers(), false, asked, map);
+  const auto call = [&] {
+    return ir::call(*code, contents_->handlers, arguments.argv(), asked, context) == 0;
+  };
+  // Without memory the call is a query of what the outputs must be; no elements need none.
+  const bool is_empty = std::find(sizes.begin(), sizes.end(), 0) != sizes.end();
+  const bool succeeds = is_empty || contents_->target.has_feature(Target::NoBoundsQuery) || call();
+  for (Buffer<>& buffer : buffers) {
+    enlarge_to(*buffer.get(), sizes);
+    ir::allocate_host(*buffer.get());
+  }
+  if (succeeds) call();
+  for (Buffer<>& buffer : buffers) crop_to(*buffer.get(), sizes);
+  return Realization(std::move(buffers));
+}
+
+void Pipeline::realize(JITUserContext* context, RealizationArg outputs, const Target& target,
+                       const ParamMap& map) {
+  run(checked_outputs(outputs, true), target, context, map);
+}
+
+// Asks the code for the regions again until they agree: a region may depend on the shape of another
+// buffer.
+void Pipeline::infer(const std::vector<halide_buffer_t*>& outputs, const Target& target,
+                     JITUserContext* context, const ParamMap& map) const {
+  constexpr int max_rounds = 16;
+  const auto code = compiled(target);
+  const std::string asked = "infer the input bounds of " + names_of(contents_->outputs);
+  ir::Arguments arguments(*code, outputs, true, asked, map);
+  if (arguments.queries().empty()) return;
+  for (int round = 0;; round++) {
+    std::vector<std::vector<halide_dimension_t>> before;
+    for (auto& [parameter, buffer] : arguments.queries()) {
+      before.emplace_back(buffer.raw_buffer()->dim, buffer.raw_buffer()->dim + buffer.dimensions());
+    }
+    ir::call(*code, contents_->handlers, arguments.argv(), asked, context);
+    bool settled = true;
+    for (size_t i = 0; i < before.size(); i++) {
+      settled = settled && same_shape(*arguments.queries()[i].buffer.raw_buffer(), before[i]);
+    }
+    if (settled) break;
+    if (round == max_rounds) {
+      call_error(asked, "the regions of the inputs must settle",
+                 text("they still changed after ", max_rounds, " rounds"),
+                 "Set the inputs by hand");
+    }
+  }
+  for (auto& [parameter, buffer] : arguments.queries()) {
+    ir::check_buffer(buffer.raw_buffer(), parameter->name, parameter->type, parameter->dimensions,
+                     false, asked);
+    std::vector<int> extents;
+    for (int d = 0; d < buffer.dimensions(); d++) extents.push_back(buffer.dim(d).extent());
+    ir::check_sizes(buffer.type(), extents, asked);
+    ir::allocate_host(buffer);
+    if (const ParamMap::Entry* entry = map.find(parameter))
+      entry->receive(Buffer<>(buffer));
+    else
+      ImageParam(parameter).set(Buffer<>(buffer));
+  }
+}
+
+void Pipeline::infer_input_bounds(JITUserContext* context, const std::vector<int32_t>& sizes,
+                                  const Target& target, const ParamMap& map) {
+  std::vector<Buffer<>> buffers = make_outputs(sizes, false);
+  RealizationArg outputs(buffers);
+  infer(outputs.buffers(), target, context, map);
+}
+
+void Pipeline::infer_input_bounds(JITUserContext* context, RealizationArg outputs,
+                                  const Target& target, const ParamMap& map) {
+  infer(checked_outputs(outputs, false), target, context, map);
+}
+
+void Pipeline::infer_input_bounds(const std::vector<int32_t>& sizes, const Target& target,
+                                  const ParamMap& map) {
+  infer_input_bounds(nullptr, sizes, target, map);
+}
+
+void Pipeline::infer_input_bounds(RealizationArg outputs, const Target& target,
+                                  const ParamMap& map) {
+  infer_input_bounds(nullptr, std::move(outputs), target, map);
+}
+
+}  // namespace retrograde

@@ -1,0 +1,172 @@
+// warnings.cpp -- looks at definitions and schedules as they stand: nothing is compiled, and a
+// program without findings means the same as one with them.
+//
+//   f(x) = g(x);  f(x) = h(x)              the first definition is computed and thrown away
+//   f.vectorize(x, 8), f.update() bare     the update was forgotten
+//   f.vectorize(x, 1)                      a vector of one lane
+//   f.update().atomic() alone              nothing runs at the same time
+//   RDom r(0, 0)                           the update never runs
+//   f.specialize(true)                     a condition that no call decides
+#include "frontend/run/warnings.h"
+
+#include <utility>
+
+#include "diagnostics/error.h"
+#include "graph/wrappers.h"
+#include "ir/build.h"
+#include "ir/memory_reads.h"
+#include "ir/print.h"
+#include "ir/visit.h"
+
+namespace retrograde::ir {
+namespace {
+
+bool is_undef(const Expr& e) {
+  const auto* call = e.as<Call>();
+  return call && call->is_op(Op::undef);
+}
+
+// Whether it stores every element anew, whatever was there.
+bool overwrites_all(const FuncContents& f, const Definition& update) {
+  if (update.predicate.defined() || !update.rvars.empty()) return false;
+  for (size_t d = 0; d < f.args.size(); d++) {
+    const auto* variable = update.args[d].as<Variable>();
+    if (!variable || variable->name != f.args[d]) return false;
+  }
+  for (const Expr& value : update.values) {
+    if (is_undef(value) || calls(value, &f)) return false;
+  }
+  return true;
+}
+
+std::string words_for_stage(const FuncContents& f, int stage) {
+  return stage == 0 ? quoted(f.name) : text("update ", stage - 1, " of ", quoted(f.name));
+}
+
+class Findings {
+ public:
+  explicit Findings(std::vector<std::string>& messages) : messages_(messages) {}
+
+  void look_at(const FuncContents& f) {
+    if (f.is_extern()) return;
+    find_hidden(f);
+    find_forgotten(f);
+    for (int s = 0; s < f.stage_count(); s++) {
+      find_empty_domain(f, s);
+      find_idle(f, s, f.stage(s).schedule);
+    }
+  }
+
+ private:
+  std::vector<std::string>& messages_;
+
+  void add(const std::string& what, const std::string& evidence, const std::string& instead) {
+    messages_.push_back(what + ": " + evidence + ". " + instead + ".");
+  }
+
+  void find_hidden(const FuncContents& f) {
+    for (int s = f.stage_count() - 1; s > 0; s--) {
+      if (!overwrites_all(f, f.stage(s))) continue;
+      if (s == 1 && is_undef(f.pure->values[0])) return;
+      const std::string earlier =
+          s == 1 ? "its first definition" : text("its first ", s, " definitions");
+      add(words_for_stage(f, s) + " hides what is defined before",
+          "it stores every element and reads none of " + quoted(f.name) + ", so that " + earlier +
+              " decide nothing",
+          "Leave them out, or give the new values a Func of their own");
+      return;
+    }
+  }
+
+  void find_forgotten(const FuncContents& f) {
+    bool any = false;
+    for (int s = 0; s < f.stage_count(); s++) any = any || f.stage(s).schedule.is_given;
+    for (int s = 1; any && s < f.stage_count(); s++) {
+      if (f.stage(s).schedule.is_given) continue;
+      add(words_for_stage(f, s) + " has no schedule",
+          "other definitions of " + quoted(f.name) + " have one, and it holds for them alone",
+          text("Schedule it through update(", s - 1, "), or say update(", s - 1,
+               ").unscheduled()"));
+    }
+  }
+
+  void find_empty_domain(const FuncContents& f, int s) {
+    for (const ReductionVariable& var : f.stage(s).rvars) {
+      const auto extent = as_const_int(var.extent);
+      if (!extent || *extent > 0) continue;
+      add(words_for_stage(f, s) + " never runs",
+          text("the extent of ", quoted(var.var), " is ", *extent),
+          "Give the reduction domain a positive extent, or leave the update out");
+    }
+  }
+
+  void find_idle(const FuncContents& f, int s, const StageLoops& schedule) {
+    find_single_lanes(f, s, schedule);
+    find_idle_atomic(f, s, schedule);
+    for (const StageLoops& special : schedule.specializations) {
+      if (special.condition.defined() && as_const_int(special.condition)) {
+        add("a specialization of " + words_for_stage(f, s) + " does not depend on the call",
+            text("its condition is ", special.condition),
+            "Give a condition on parameters, or schedule the stage itself");
+      }
+      find_idle(f, s, special);
+    }
+  }
+
+  void find_single_lanes(const FuncContents& f, int s, const StageLoops& schedule) {
+    for (const Dim& dim : schedule.dims) {
+      const bool is_vector = dim.runs == ForType::Vectorized;
+      if (!is_vector && dim.runs != ForType::Unrolled) continue;
+      for (const Split& split : schedule.splits) {
+        if (split.kind != Split::Kind::Split || split.inner != dim.var) continue;
+        if (as_const_int(split.factor) != 1) continue;
+        add(text(is_vector ? "vectorizing " : "unrolling ", quoted(split.old_var), " of ",
+                 words_for_stage(f, s), " by 1 changes nothing"),
+            "the loop runs once", "Give a larger factor, or leave the directive out");
+      }
+    }
+  }
+
+  void find_idle_atomic(const FuncContents& f, int s, const StageLoops& schedule) {
+    if (!schedule.atomic || !schedule.specializations.empty()) return;
+    for (const Dim& dim : schedule.dims) {
+      if (dim.is_reduction && dim.runs != ForType::Serial && dim.runs != ForType::Unrolled) return;
+    }
+    add("atomic() of " + words_for_stage(f, s) + " changes nothing",
+        "none of its reduction loops is parallel or vectorized",
+        "Make one parallel or vectorized, or leave atomic() out");
+  }
+};
+
+}  // namespace
+
+std::vector<std::string> warnings_of(const std::vector<FuncPtr>& outputs) {
+  std::vector<std::string> messages;
+  Findings findings(messages);
+  for (const FuncPtr& f : functions_of(outputs)) findings.look_at(*f);
+  return messages;
+}
+
+namespace {
+// Not shared: a scope is of the thread that opened it.
+thread_local std::function<void(const std::string&)> listener;
+}  // namespace
+
+void tell_warnings(const std::vector<FuncPtr>& outputs) {
+  if (!listener) return;
+  for (const std::string& warning : warnings_of(outputs)) listener(warning);
+}
+
+}  // namespace retrograde::ir
+
+namespace retrograde {
+
+std::vector<std::string> warnings_of(const Pipeline& pipeline) {
+  return ir::warnings_of(pipeline.spec().outputs);
+}
+
+WarningScope::WarningScope(std::function<void(const std::string&)> tell)
+    : tell_(std::move(tell)), outer_(std::exchange(ir::listener, tell_)) {}
+WarningScope::~WarningScope() { ir::listener = std::move(outer_); }
+
+}  // namespace retrograde

@@ -1,0 +1,136 @@
+// autoscheduler.cpp -- the schedulers that this process has loaded.
+#include "frontend/schedule/autoscheduler.h"
+
+#include <dlfcn.h>
+
+#include <charconv>
+#include <map>
+#include <mutex>
+#include <set>
+
+#include "diagnostics/error.h"
+#include "frontend/run/pipeline.h"
+
+namespace retrograde {
+
+namespace {
+
+struct Loaded {
+  std::mutex mutex;
+  std::map<std::string, AutoSchedulerFn> by_name;
+  std::set<std::string> claimed_twice;
+  std::string default_name;
+};
+Loaded& loaded() {
+  static Loaded result;
+  return result;
+}
+
+// One number and the comma behind it.
+template <typename T>
+bool take_number(const char*& at, const char* end, bool last, T& value) {
+  const auto [stop, error] = std::from_chars(at, end, value);
+  if (error != std::errc() || (last ? stop != end : stop == end || *stop != ',')) return false;
+  at = last ? end : stop + 1;
+  return true;
+}
+
+// "blur" means libblur.so; anything with a slash or a dot is a file as it stands.
+std::string library_file(const std::string& library) {
+  return library.find_first_of("/.") == std::string::npos ? "lib" + library + ".so" : library;
+}
+
+}  // namespace
+
+MachineParams::MachineParams(const std::string& text) {
+  const char* at = text.data();
+  const char* end = at + text.size();
+  if (take_number(at, end, false, parallelism) &&
+      take_number(at, end, false, last_level_cache_size) && take_number(at, end, true, balance)) {
+    return;
+  }
+  user_error("read the machine parameters " + quoted(text),
+             "they are the threads, the bytes of the last-level cache and the cost of a load",
+             "these are not three numbers with commas between them",
+             "Write for example 16,16777216,40");
+}
+
+std::string MachineParams::to_string() const {
+  return text(parallelism, ",", last_level_cache_size, ",", balance);
+}
+
+// Plugins call it as they are loaded, where nothing may be thrown: find_autoscheduler tells of it.
+void add_autoscheduler(const std::string& name, const AutoSchedulerFn& scheduler) {
+  std::lock_guard lock(loaded().mutex);
+  if (!scheduler) {
+    loaded().by_name.erase(name);
+    loaded().claimed_twice.erase(name);
+  } else if (!loaded().by_name.emplace(name, scheduler).second) {
+    loaded().claimed_twice.insert(name);
+  }
+}
+
+std::vector<std::string> autoscheduler_names() {
+  std::lock_guard lock(loaded().mutex);
+  std::vector<std::string> names;
+  for (const auto& [name, scheduler] : loaded().by_name) names.push_back(name);
+  return names;
+}
+
+void set_default_autoscheduler_name(const std::string& name) {
+  if (!name.empty()) find_autoscheduler(name);
+  std::lock_guard lock(loaded().mutex);
+  loaded().default_name = name;
+}
+
+std::string default_autoscheduler_name() {
+  std::lock_guard lock(loaded().mutex);
+  return loaded().default_name;
+}
+
+AutoSchedulerFn find_autoscheduler(const std::string& name) {
+  std::string present;
+  for (const std::string& known : autoscheduler_names()) {
+    present += (present.empty() ? "" : ", ") + quoted(known);
+  }
+  std::lock_guard lock(loaded().mutex);
+  if (loaded().claimed_twice.count(name)) {
+    user_error("schedule automatically with " + quoted(name), "autoschedulers have different names",
+               "two of that name were added",
+               "Take one away: add_autoscheduler(name, nullptr), or rename it");
+  }
+  if (auto found = loaded().by_name.find(name); found != loaded().by_name.end())
+    return found->second;
+  user_error("schedule automatically with " + quoted(name),
+             "an autoscheduler is loaded from a plugin before it is used",
+             present.empty() ? "none is loaded" : "loaded are " + present,
+             "Load its plugin, or schedule by hand");
+}
+
+void load_plugin(const std::string& library) {
+  const std::string file = library_file(library);
+  if (dlopen(file.c_str(), RTLD_LAZY)) return;
+  const char* reason = dlerror();
+  user_error("load the plugin " + quoted(library), "it is a shared library that can be opened",
+             reason ? reason : "it cannot", "Give its path");
+}
+
+// ---- of a pipeline ----
+
+AutoSchedulerResults Pipeline::auto_schedule(const std::string& name, const Target& target,
+                                             const MachineParams& machine) const {
+  const AutoSchedulerFn scheduler = find_autoscheduler(name);
+  AutoSchedulerResults results;
+  results.scheduler_name = name;
+  results.target = target;
+  results.machine_params_string = machine.to_string();
+  scheduler(*this, target, machine, &results);
+  return results;
+}
+
+AutoSchedulerResults Pipeline::auto_schedule(const Target& target,
+                                             const MachineParams& machine) const {
+  return auto_schedule(default_autoscheduler_name(), target, machine);
+}
+
+}  // namespace retrograde

@@ -1,0 +1,42 @@
+// func_wrappers.cpp -- Func::in and clone_in, and copies to devices, which there are none of.
+#include "frontend/language/func.h"
+#include "graph/wrappers.h"
+
+namespace retrograde {
+
+Func Func::wrap(const std::vector<Func>& users, const std::string& name, bool clone) const {
+  std::vector<ir::FuncPtr> contents;
+  for (const Func& user : users) contents.push_back(user.function());
+  return Func(ir::wrapper_of(func_, contents, name, clone));
+}
+
+Func Func::in(const Func& f) { return wrap({f}, name() + "_in_" + f.name(), false); }
+Func Func::in() { return wrap({}, name() + "_global_wrapper", false); }
+Func Func::clone_in(const Func& f) { return wrap({f}, name() + "_clone_in_" + f.name(), true); }
+
+Func Func::in(const std::vector<Func>& fs) {
+  if (fs.empty()) {
+    user_error("wrap " + quoted(name()), "at least one user is named", "the list is empty",
+               "Call in() for all users");
+  }
+  return wrap(fs, name() + "_wrapper", false);
+}
+
+Func Func::clone_in(const std::vector<Func>& fs) {
+  if (fs.empty())
+    user_error("clone " + quoted(name()), "at least one user is named", "the list is empty",
+               "Name the Funcs that read it, or leave the list out");
+  return wrap(fs, name() + "_clone", true);
+}
+
+Func Func::copy_to_device(DeviceAPI) {
+  unsupported("copy " + quoted(name()) + " to a device", "storage lies in the memory of the CPU",
+              "no code is generated for devices", "Leave it out");
+}
+
+Func Func::copy_to_host() {
+  unsupported("copy " + quoted(name()) + " from a device", "storage lies in the memory of the CPU",
+              "no code is generated for devices", "Leave it out");
+}
+
+}  // namespace retrograde

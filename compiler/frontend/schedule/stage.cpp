@@ -1,0 +1,106 @@
+// stage.cpp -- what schedules of loops are made of; graph/give_directive.h has the rules.
+#include "frontend/schedule/stage.h"
+
+#include "frontend/language/func.h"
+#include "graph/define.h"
+#include "graph/rfactor.h"
+
+namespace retrograde {
+
+namespace {
+
+std::string as_list(const std::vector<VarOrRVar>& vars) {
+  std::string out;
+  for (const VarOrRVar& var : vars) out += (out.empty() ? "" : ", ") + quoted(var.name());
+  return out;
+}
+
+}  // namespace
+
+namespace ir {
+
+ReorderLoops reorder_of(const std::vector<VarOrRVar>& vars) {
+  ReorderLoops order;
+  for (const VarOrRVar& var : vars) order.loops.emplace_back(var.name());
+  return order;
+}
+
+std::vector<VarOrRVar> loops_at(const SchedulePlace& place) {
+  std::vector<VarOrRVar> loops;
+  for (const Dim& dim : place.schedule().dims) loops.emplace_back(dim.var, dim.is_reduction);
+  return loops;
+}
+
+VarOrRVar fresh_like(const VarOrRVar& var) {
+  return var.is_rvar ? VarOrRVar(RVar()) : VarOrRVar(Var());
+}
+
+retrograde::LoopLevel level_of(const Stage& stage, const VarOrRVar& var) {
+  return retrograde::LoopLevel(Func(stage.function()), var, stage.index());
+}
+
+void check_tile(const SchedulePlace& place, const std::vector<VarOrRVar>& loops,
+                const std::vector<size_t>& sizes) {
+  if (sizes == std::vector<size_t>(sizes.size(), loops.size())) return;
+  user_error(text("tile ", as_list(loops), " of ", place.name()), "all lists have one length",
+             text("they have ", loops.size(), " loops, ", sizes[0], " outer and ", sizes[1],
+                  " inner names, ", sizes[2], " factors and ", sizes[3], " tail strategies"),
+             "Give lists of one length");
+}
+
+PrefetchData prefetch_of(const SchedulePlace& place, const Func& f, PrefetchData prefetch) {
+  if (!f.defined()) {
+    user_error(text("prefetch ", quoted(f.name()), " for ", place.name()),
+               "it needs a definition first", "it has none", "Define it: f(x, y) = ...");
+  }
+  prefetch.source = f.name();
+  // Weak: what is prefetched may be any Func of the pipeline.
+  prefetch.symbol = SymbolRef::weak(f.function()->shared_from_this());
+  return prefetch;
+}
+
+PrefetchData prefetch_of(const SchedulePlace& place,
+                         const std::shared_ptr<ParameterContents>& image, PrefetchData prefetch) {
+  if (!image || !image->is_buffer) {
+    user_error("prefetch for " + place.name(), "it is a Func or an image that is prefetched",
+               image ? quoted(image->name) + " is a scalar" : std::string("it is undefined"),
+               "Name a Func or an ImageParam");
+  }
+  prefetch.source = image->name;
+  prefetch.symbol = SymbolRef(image);
+  return prefetch;
+}
+
+// Directives for GPUs and accelerators are declared so that programs written for them build.
+void refuse_device(const SchedulePlace& place, const char* verb,
+                   const std::vector<VarOrRVar>& loops, const char* where, DeviceAPI device) {
+  unsupported(text(verb, " ", loops.empty() ? place.name() : as_list(loops), " ", where),
+              "loops run on the CPU",
+              text("stage ", place.name(), " is to run on ",
+                   device == DeviceAPI::Hexagon ? "a Hexagon accelerator" : "a GPU",
+                   ", and no code is generated for it"),
+              "Use parallel, vectorize and tile instead");
+}
+
+}  // namespace ir
+
+std::string Stage::name() const { return ir::stage_name(*place_.f, place_.stage); }
+std::string Stage::source_location() const { return ir::source_location_of(*place_.f); }
+std::vector<VarOrRVar> Stage::split_vars() const { return ir::loops_at(place_); }
+
+std::string Stage::dump_argument_list() const {
+  std::string out;
+  for (const ir::Dim& dim : get_schedule().dims) out += (out.empty() ? "" : ", ") + dim.var;
+  return out;
+}
+
+Func Stage::rfactor(const RVar& r, const Var& v) {
+  return rfactor(std::vector<std::pair<RVar, Var>>{{r, v}});
+}
+Func Stage::rfactor(const std::vector<std::pair<RVar, Var>>& preserved) {
+  std::vector<std::pair<ir::NamedLoop, std::string>> names;
+  for (const auto& [rvar, var] : preserved) names.emplace_back(rvar.name(), var.name());
+  return Func(ir::factor_out(place_, names));
+}
+
+}  // namespace retrograde

@@ -1,0 +1,63 @@
+// debug_features -- code that finds faults, for targets that ask for it.
+//
+// check_promises. In: Loops, regions known. Out: Loops; the promises stay, around checked values.
+//
+//   f(unsafe_promise_clamped(g(x), 0, 9))   =>
+//     f(unsafe_promise_clamped(require(0 <= g(x) && g(x) <= 9, g(x), "..."), 0, 9))
+//
+// fuzz_float_stores. In: Vector. Out: Vector.
+//
+//   f[x] = v   =>   f[x] = reinterpret<float>(reinterpret<uint32>(v) & ~1)
+//
+// A NaN is stored as it is: without its last bit it may be an infinity. Inside Atomic nothing
+// changes: what is read there is compared with what was stored. Tests: unit/debug_features_test.
+#include "lower/instrumentation/debug_features.h"
+
+#include "ir/build.h"
+#include "ir/print.h"
+#include "ir/visit.h"
+
+namespace retrograde::ir {
+namespace {
+
+class CheckPromises : public Rewriter {
+ protected:
+  Expr rewrite(const Expr& e) override {
+    const auto* call = e.as<Call>();
+    if (!call || !call->is_op(Op::unsafe_promise_clamped)) return children(e);
+    const Expr value = (*this)(call->args[0]), min = (*this)(call->args[1]),
+               max = (*this)(call->args[2]);
+    const Expr checked = call_op(
+        Op::require, value.type(),
+        {min <= value && value <= max, value,
+         Expr("cannot run: unsafe_promise_clamped() promises a value between"), min, Expr("and"),
+         max, Expr("but it is"), value, Expr("here. Use clamp(), or mend what computes it.")});
+    return call_op(Op::unsafe_promise_clamped, e.type(), {checked, min, max});
+  }
+};
+
+Expr without_last_bit(const Expr& value) {
+  const Type type = value.type(), bits = type.with_code(TypeCode::UInt);
+  const Expr mask = make_uint_const(bits, ~uint64_t{1} >> (64 - type.bits()) & ~uint64_t{1});
+  const Expr cleared =
+      reinterpret_as(type, call_op(Op::bitwise_and, bits, {reinterpret_as(bits, value), mask}));
+  return make_select(value == value, cleared, value);
+}
+
+class FuzzFloatStores : public Rewriter {
+ protected:
+  Stmt rewrite(const Stmt& s) override {
+    if (s.as<Atomic>()) return s;
+    const auto* store = s.as<Store>();
+    if (!store || !store->value.type().is_float()) return children(s);
+    return make_store(store->name, without_last_bit(store->value), store->index, store->predicate,
+                      store->symbol);
+  }
+};
+
+}  // namespace
+
+Stmt check_promises(const Stmt& s) { return CheckPromises()(s); }
+Stmt fuzz_float_stores(const Stmt& s) { return FuzzFloatStores()(s); }
+
+}  // namespace retrograde::ir

@@ -1,0 +1,15 @@
+// inject_profiling -- tell the profiler which Func is being computed, by how many threads, in how
+// much memory.
+#pragma once
+
+#include <string>
+
+#include "lower/loops/memoize.h"
+#include "lower/program.h"
+
+namespace retrograde::ir {
+
+Stmt inject_profiling(const Stmt& s, const Program& program, const RenamedFuncs& renamed,
+                      const std::string& pipeline);
+
+}  // namespace retrograde::ir

@@ -1,0 +1,363 @@
+// inject_tracing -- code that tells of loads, stores and regions.
+// In:  Loops, as build_loop_nests gives it.
+// Out: Loops; the same stores in the same order, and events between them.
+//
+//   realize f [a, n] {              let f.trace_id = begin_realization f [a, n] in
+//     produce f { f(x) = v }          realize f [a, n] {
+//     consume f { g(x) = f(x) } =>      let f.trace_id = produce f ... in
+//   }                                     f(x) = trace(v, store, f, x)
+//                                       end_produce f
+//                                       let f.trace_id = consume f ... in
+//                                         g(x) = trace(f(x), load, f, x)
+//                                       ...
+//
+// Method: a load or a stored value is wrapped in Op::trace, which gives its first argument: so an
+//         event happens where, when and as often as the access does, also in vectors and branches.
+//         Regions are told by calls around statements. Events name the innermost one around them of
+//         their Func as parent, the pipeline's beginning where there is none.
+// Source: HalideRuntime.h on halide_trace. Tests: test/unit/tracing_test.cpp.
+#include "lower/instrumentation/inject_tracing.h"
+
+#include <HalideRuntime.h>
+
+#include <set>
+
+#include "diagnostics/error.h"
+#include "ir/build.h"
+#include "ir/visit.h"
+#include "simplify/simplify.h"
+
+namespace retrograde::ir {
+
+namespace {
+
+const char* const pipeline_id = "pipeline.trace_id";
+
+// What target and schedule ask for together.
+TraceSchedule asked_of(TraceSchedule trace, const Target& target) {
+  trace.loads |= target.has_feature(Target::TraceLoads);
+  trace.stores |= target.has_feature(Target::TraceStores);
+  trace.realizations |= target.has_feature(Target::TraceRealizations);
+  return trace;
+}
+bool is_any(const TraceSchedule& trace) {
+  return trace.loads || trace.stores || trace.realizations;
+}
+
+Expr region_event(const std::string& func, int event, const Expr& parent,
+                  const std::vector<Range>& region, const Expr& tag = {}) {
+  std::vector<Expr> coordinates;
+  for (const Range& range : region) {
+    coordinates.push_back(cast(Int(32), range.min));
+    coordinates.push_back(cast(Int(32), range.extent));
+  }
+  const Expr none = reinterpret_as(Handle(), make_uint_const(UInt(64), 0));
+  return call_op(Op::runtime_call, Int(32),
+                 {Expr("retrograde_trace_region"), Expr(func), Expr(event), parent,
+                  coordinates.empty() ? none : call_op(Op::pack, Handle(), coordinates),
+                  Expr(static_cast<int32_t>(coordinates.size())), tag.defined() ? tag : none});
+}
+
+// The box of all points of a Func that a statement stores to.
+class StoreRegion {
+ public:
+  explicit StoreRegion(const std::string& func) : func_(func) {}
+  Box of(const Stmt& s) {
+    visit(s);
+    return box_;
+  }
+
+ private:
+  const std::string& func_;
+  Scope<Interval> scope_;
+  Box box_;
+
+  void visit(const Stmt& s) {
+    if (!s.defined()) return;
+    if (const For* n = s.as<For>()) {
+      const Interval min = bounds_of(n->min, scope_);
+      const Interval max = bounds_of(n->min + n->extent - 1, scope_);
+      scope_.push(n->name, {min.min, max.max});
+      visit(n->body);
+      scope_.pop(n->name);
+    } else if (const LetStmt* n = s.as<LetStmt>()) {
+      const bool is_index = n->value.type() == Int(32);
+      scope_.push(n->name, is_index ? bounds_of(n->value, scope_) : Interval::everything());
+      visit(n->body);
+      scope_.pop(n->name);
+    } else if (const Provide* n = s.as<Provide>(); n && n->name == func_) {
+      Box point;
+      for (const Expr& arg : n->args) point.push_back(bounds_of(arg, scope_));
+      box_ = hull(box_, point);
+    } else {
+      for_each_child(
+          s, [](const Expr&) {}, [&](const Stmt& part) { visit(part); });
+    }
+  }
+};
+
+class Tracer : public Rewriter {
+ public:
+  Tracer(const Program& program, const Target& target) : target_(target) {
+    for (const LoopedFunc& f : program.funcs) {
+      const TraceSchedule trace = asked_of(f.func->trace, target);
+      if (is_any(trace)) traces_[f.name()] = trace;
+    }
+  }
+  std::set<std::string> traced;  // names that events were made for
+
+  Stmt realization(const std::string& func, const std::vector<Range>& region, const Stmt& body) {
+    return told(func, halide_trace_begin_realization, halide_trace_end_realization, region, body);
+  }
+  bool traces_realizations(const std::string& func) const {
+    const auto it = traces_.find(func);
+    return it != traces_.end() && it->second.realizations;
+  }
+  bool traces(const std::string& func) const { return traces_.count(func) > 0; }
+
+ protected:
+  Expr rewrite(const Expr& e) override {
+    const Call* call = e.as<Call>();
+    if (call && call->is_op(Op::address_of)) return e;
+    const Expr result = children(e);
+    call = result.as<Call>();
+    if (!call) return result;
+    const bool is_access =
+        (call->call_type == CallType::Func && loads_of(call->name)) || is_traced_image(*call);
+    if (!is_access) return result;
+    return event(result, halide_trace_load, call->name, call->component, call->args);
+  }
+
+  Stmt rewrite(const Stmt& s) override {
+    if (const Provide* n = s.as<Provide>()) return store(s, *n);
+    if (const Realize* n = s.as<Realize>(); n && traces_realizations(n->name)) return realize(*n);
+    if (const ProducerConsumer* n = s.as<ProducerConsumer>(); n && traces_realizations(n->name))
+      return produce_or_consume(*n);
+    return children(s);
+  }
+
+ private:
+  const Target& target_;
+  std::map<std::string, TraceSchedule> traces_;
+  std::map<std::string, std::vector<Range>> produced_;  // the latest region of each Func
+  std::set<std::string> with_id_;                       // Funcs inside of a region that was told
+
+  bool loads_of(const std::string& func) const {
+    const auto it = traces_.find(func);
+    return it != traces_.end() && it->second.loads;
+  }
+
+  bool is_traced_image(const Call& call) const {
+    if (call.call_type != CallType::Image) return false;
+    const auto param = std::dynamic_pointer_cast<ParameterContents>(call.symbol.lock());
+    return asked_of(param ? param->trace : TraceSchedule(), target_).loads;
+  }
+
+  std::string id_of(const std::string& func) const {
+    return with_id_.count(func) ? func + ".trace_id" : pipeline_id;
+  }
+
+  Expr event(const Expr& value, int code, const std::string& func, int component,
+             const std::vector<Expr>& coordinates) {
+    traced.insert(func);
+    std::vector<Expr> args = {value, Expr(code), Expr(func), Expr(component),
+                              variable(id_of(func))};
+    for (const Expr& coordinate : coordinates) args.push_back(cast(Int(32), coordinate));
+    return call_op(Op::trace, value.type(), std::move(args));
+  }
+
+  // Of a Tuple all values are computed, and their loads told, before the first store is.
+  Stmt store(const Stmt& s, const Provide& n) {
+    const auto it = traces_.find(n.name);
+    if (it == traces_.end() || !it->second.stores) return children(s);
+    std::vector<Expr> values, args;
+    for (const Expr& arg : n.args) args.push_back((*this)(arg));
+    std::vector<std::pair<std::string, Expr>> lets;
+    for (size_t i = 0; i < n.values.size(); i++) {
+      Expr value = (*this)(n.values[i]);
+      const Call* call = value.as<Call>();
+      if (call && call->is_op(Op::undef)) {
+        values.push_back(value);
+        continue;
+      }
+      if (n.values.size() > 1) {
+        lets.emplace_back(text(n.name, ".traced.", i), value);
+        value = variable(lets.back().first, value.type());
+      }
+      values.push_back(event(value, halide_trace_store, n.name, static_cast<int>(i), args));
+    }
+    Stmt result = make_provide(n.name, values, args, (*this)(n.predicate));
+    for (size_t i = lets.size(); i-- > 0;) result = make_let(lets[i].first, lets[i].second, result);
+    return result;
+  }
+
+  // begin; body; end -- the beginning's number is the parent of what happens inside.
+  Stmt told(const std::string& func, int begin, int end, const std::vector<Range>& region,
+            const Stmt& body) {
+    traced.insert(func);
+    const std::string id = func + ".trace_id";
+    return make_let(
+        id, region_event(func, begin, variable(id_of(func)), region),
+        make_block({body, make_evaluate(region_event(func, end, variable(id), region))}));
+  }
+
+  Stmt realize(const Realize& n) {
+    std::vector<Range> region;
+    for (const Range& range : n.bounds)
+      region.push_back({(*this)(range.min), (*this)(range.extent)});
+    const Stmt inside = within(n.name, [&] { return (*this)(n.body); });
+    return make_realize(n.name, n.types, n.memory, n.bounds, realization(n.name, region, inside));
+  }
+
+  Stmt produce_or_consume(const ProducerConsumer& n) {
+    if (n.produces) produced_[n.name] = region_of(n);
+    const auto found = produced_.find(n.name);
+    const std::vector<Range> region =
+        found == produced_.end() ? std::vector<Range>{} : found->second;
+    const bool had_id = with_id_.count(n.name) > 0;
+    const Stmt body = within(n.name, [&] { return (*this)(n.body); });
+    RETROGRADE_ASSERT(had_id, "a region of ", n.name, " outside of its realization");
+    return make_producer_consumer(
+        n.name, n.produces,
+        told(n.name, n.produces ? halide_trace_produce : halide_trace_consume,
+             n.produces ? halide_trace_end_produce : halide_trace_end_consume, region, body));
+  }
+
+  std::vector<Range> region_of(const ProducerConsumer& n) {
+    std::vector<Range> region;
+    for (const Interval& side : StoreRegion(n.name).of(n.body)) {
+      const bool known = side.is_bounded();
+      region.push_back({known ? simplify(side.min) : Expr(0),
+                        known ? simplify(side.max - side.min + 1) : Expr(0)});
+    }
+    return region;
+  }
+
+  template <class Make>
+  Stmt within(const std::string& func, Make&& make) {
+    const bool is_new = with_id_.insert(func).second;
+    forget();
+    Stmt result = make();
+    if (is_new) with_id_.erase(func);
+    forget();
+    return result;
+  }
+
+ public:
+  // The same around everything, of an output.
+  template <class Make>
+  Stmt output(const std::string& func, const std::vector<Range>& region, Make&& make) {
+    const Stmt inside = within(func, make);
+    return realization(func, region, inside);
+  }
+};
+
+std::vector<Range> buffer_region(const LoopedFunc& f) {
+  std::vector<Range> region;
+  const std::string buffer = value_buffer_name(*f.func, 0);
+  for (int d = 0; d < f.func->dimensions(); d++)
+    region.push_back({variable(text(buffer, ".min.", d)), variable(text(buffer, ".extent.", d))});
+  return region;
+}
+
+// What readers of a trace want to know of a Func in advance.
+Stmt type_tag(const LoopedFunc& f, const Box& box) {
+  std::vector<Expr> parts;
+  std::string text = "func_type_and_dim: " + std::to_string(f.func->types.size());
+  for (const Type& type : f.func->types) {
+    const int code = type.code() == TypeCode::BFloat ? 4 : static_cast<int>(type.code());
+    text += " " + std::to_string(code) + " " + std::to_string(type.bits()) + " 1";
+  }
+  text += " " + std::to_string(f.func->dimensions());
+  std::vector<Range> region;
+  for (const Interval& side : box) {
+    if (side.is_bounded()) region.push_back({side.min, side.max - side.min + 1});
+  }
+  std::vector<Expr> numbers;
+  for (const Range& range : region) {
+    numbers.push_back(cast(Int(32), range.min));
+    numbers.push_back(cast(Int(32), range.extent));
+  }
+  const Expr none = reinterpret_as(Handle(), make_uint_const(UInt(64), 0));
+  return make_evaluate(
+      call_op(Op::runtime_call, Int(32),
+              {Expr("retrograde_trace_type"), Expr(f.name()), variable(pipeline_id), Expr(text),
+               numbers.empty() ? none : call_op(Op::pack, Handle(), numbers),
+               Expr(static_cast<int32_t>(numbers.size()))}));
+}
+
+// Regions of all Funcs at root, where they are known there.
+std::map<std::string, Box> regions_at_root(const Stmt& s) {
+  std::map<std::string, Box> regions;
+  Scope<Interval> scope;
+  const std::function<void(const Stmt&)> visit = [&](const Stmt& part) {
+    if (!part.defined()) return;
+    if (const For* n = part.as<For>()) {
+      scope.push(n->name,
+                 {bounds_of(n->min, scope).min, bounds_of(n->min + n->extent - 1, scope).max});
+      visit(n->body);
+      scope.pop(n->name);
+      return;
+    }
+    if (const LetStmt* n = part.as<LetStmt>()) {
+      scope.push(n->name,
+                 n->value.type() == Int(32) ? bounds_of(n->value, scope) : Interval::everything());
+      visit(n->body);
+      scope.pop(n->name);
+      return;
+    }
+    if (const Realize* n = part.as<Realize>()) {
+      Box box;
+      for (const Range& range : n->bounds)
+        box.push_back(
+            {bounds_of(range.min, scope).min, bounds_of(range.min + range.extent - 1, scope).max});
+      for (Interval& side : box) {
+        if (side.is_bounded()) side = {simplify(side.min), simplify(side.max)};
+      }
+      regions[n->name] = hull(regions[n->name], box);
+    }
+    for_each_child(
+        part, [](const Expr&) {}, visit);
+  };
+  visit(s);
+  return regions;
+}
+
+}  // namespace
+
+void inject_tracing(LoopNests& nests, const Program& program, const std::string& pipeline,
+                    const Target& target) {
+  Tracer tracer(program, target);
+  const std::map<std::string, Box> regions = regions_at_root(nests.body);
+  std::function<Stmt()> body = [&] { return tracer(nests.body); };
+  for (auto it = program.funcs.begin(); it != program.funcs.end(); ++it) {
+    if (!it->is_output || !tracer.traces_realizations(it->name())) continue;
+    body = [&tracer, f = &*it, inner = body] {
+      return tracer.output(f->name(), buffer_region(*f), inner);
+    };
+  }
+  const Stmt traced = body();
+  if (tracer.traced.empty() && !target.has_feature(Target::TracePipeline)) return;
+  std::vector<Stmt> types, tags;
+  for (const LoopedFunc& f : program.funcs) {
+    if (!tracer.traces(f.name())) continue;
+    const auto known = regions.find(f.name());
+    const Box box = f.is_output ? buffer_box(value_buffer_name(*f.func, 0), f.func->dimensions())
+                    : known == regions.end() ? Box{}
+                                             : known->second;
+    types.push_back(type_tag(f, box));
+    for (const std::string& tag : f.func->trace.tags)
+      tags.push_back(make_evaluate(
+          region_event(f.name(), halide_trace_tag, variable(pipeline_id), {}, Expr(tag))));
+  }
+  std::vector<Stmt> all = types;
+  all.insert(all.end(), tags.begin(), tags.end());
+  all.push_back(traced);
+  all.push_back(
+      make_evaluate(region_event(pipeline, halide_trace_end_pipeline, variable(pipeline_id), {})));
+  nests.body =
+      make_let(pipeline_id, region_event(pipeline, halide_trace_begin_pipeline, Expr(0), {}),
+               make_block(std::move(all)));
+}
+
+}  // namespace retrograde::ir

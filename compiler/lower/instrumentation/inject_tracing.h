@@ -1,0 +1,16 @@
+// inject_tracing -- code that tells of loads, stores and regions.
+#pragma once
+
+#include <string>
+
+#include "ir/target.h"
+#include "lower/nests/build_loop_nests.h"
+#include "lower/program.h"
+
+namespace retrograde::ir {
+
+// Changes nests.body; names need not be unique yet.
+void inject_tracing(LoopNests& nests, const Program& program, const std::string& pipeline,
+                    const Target& target);
+
+}  // namespace retrograde::ir

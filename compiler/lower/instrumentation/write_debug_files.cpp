@@ -1,0 +1,98 @@
+// write_debug_files -- Func::debug_to_file.
+// In:  Loops; names unique.
+// Out: Loops; after a Func is produced its memory goes to a file.
+//
+//   produce f { P }   =>   produce f { P }  assert(debug_to_file("f.tmp", buffer of f) == 0)
+//
+// Errors: Tuples, names that end in no format that can be written, types that the format lacks.
+// Source: Halide's documentation of debug_to_file. Tests: test/unit/debug_file_test.cpp.
+#include "lower/instrumentation/write_debug_files.h"
+
+#include "diagnostics/error.h"
+#include "ir/build.h"
+#include "ir/visit.h"
+#include "lower/nests/extern_stage.h"
+
+namespace retrograde::ir {
+
+namespace {
+
+bool ends_with(const std::string& text, const std::string& end) {
+  return text.size() >= end.size() && text.compare(text.size() - end.size(), end.size(), end) == 0;
+}
+
+void check(const LoopedFunc& f) {
+  const std::string asked =
+      text("write ", quoted(f.name()), " to the file ", quoted(f.func->debug_file));
+  if (f.func->types.size() != 1) {
+    unsupported(asked, "a file holds one value of each point",
+                text(quoted(f.name()), " has ", f.func->types.size()),
+                "Write a Func that is one element of the Tuple");
+  }
+  const std::string& path = f.func->debug_file;
+  if (!ends_with(path, ".tmp") && !ends_with(path, ".npy")) {
+    unsupported(asked, "the name's end says in which format", "it is neither .tmp nor .npy",
+                "End it in .npy, which NumPy reads");
+  }
+  const Type type = f.func->types[0];
+  const bool is_known =
+      !type.is_handle() && !type.is_bfloat() && !(type.is_float() && type.bits() == 16);
+  if (is_known) return;
+  unsupported(asked, "its format has the type of the elements",
+              text("they are of type ", to_string(type)),
+              "Cast them to float in a Func of its own");
+}
+
+class Writer : public Rewriter {
+ public:
+  Writer(const Program& program, const RenamedFuncs& renamed)
+      : program_(program), renamed_(renamed) {}
+
+ protected:
+  Expr rewrite(const Expr& e) override { return e; }
+
+  Stmt rewrite(const Stmt& s) override {
+    const ProducerConsumer* n = s.as<ProducerConsumer>();
+    if (!n || !n->produces) return children(s);
+    const auto renamed = renamed_.find(n->name);
+    const LoopedFunc* f = program_.find(renamed == renamed_.end() ? n->name : renamed->second);
+    if (!f || f->func->debug_file.empty()) return children(s);
+    check(*f);
+    return make_block({children(s), write(*f, n->name)});
+  }
+
+ private:
+  const Program& program_;
+  const RenamedFuncs& renamed_;
+  int written_ = 0;
+
+  Stmt write(const LoopedFunc& f, const std::string& name) {
+    std::vector<Range> region;
+    std::vector<Expr> first, strides;
+    for (int d = 0; d < f.func->dimensions(); d++) {
+      const auto fact = [&](const char* what) { return variable(text(name, what, d)); };
+      region.push_back({fact(".min."), fact(".extent.")});
+      first.push_back(fact(".min."));
+      strides.push_back(fact(".stride."));
+    }
+    const Type type = f.func->types[0];
+    const Expr host =
+        call_op(Op::address_of, Handle(), {call_func(name, type, first, 0, SymbolRef(f.func))});
+    const std::string code = text(name, ".written.", written_++);
+    const Expr call = call_op(Op::runtime_call, Int(32),
+                              {Expr("retrograde_debug_to_file"), Expr(f.func->debug_file),
+                               packed_buffer(type, host, region, strides)});
+    return make_let(code, call, make_assert(variable(code) == 0, variable(code)));
+  }
+};
+
+}  // namespace
+
+Stmt write_debug_files(const Stmt& s, const Program& program, const RenamedFuncs& renamed) {
+  for (const LoopedFunc& f : program.funcs) {
+    if (!f.func->debug_file.empty()) return Writer(program, renamed)(s);
+  }
+  return s;
+}
+
+}  // namespace retrograde::ir

@@ -1,0 +1,69 @@
+#include "lower/loops/choice_arms.h"
+
+#include <functional>
+
+#include "ir/build.h"
+#include "ir/visit.h"
+
+namespace retrograde::ir {
+
+namespace {
+
+class Chooser : public Rewriter {
+ public:
+  explicit Chooser(const std::function<Expr(const Expr&)>& arm) : arm_(arm) {}
+
+ protected:
+  using Rewriter::rewrite;
+  Expr rewrite(const Expr& e) override {
+    const Expr arm = arm_(e);
+    return arm.defined() ? (*this)(arm) : children(e);
+  }
+
+ private:
+  const std::function<Expr(const Expr&)>& arm_;
+};
+
+}  // namespace
+
+// The value for which a select takes its first arm, where its condition is about the variable.
+std::optional<int64_t> ChoiceArms::case_of(const Expr& e) const {
+  const auto* select = e.as<Select>();
+  if (!select || select->condition.kind() != Kind::EQ) return std::nullopt;
+  const auto* equality = select->condition.as<Binary>();
+  const auto* variable = equality->a.as<Variable>();
+  return variable && variable->name == variable_ ? as_const_int(equality->b) : std::nullopt;
+}
+
+bool ChoiceArms::has_any(const Stmt& s) const {
+  return any_node(
+      s, [&](const Expr& e) { return case_of(e).has_value(); }, [](const Stmt&) { return false; });
+}
+
+ChoiceArms::Table ChoiceArms::table_of(const Expr& choice) const {
+  Table table;
+  table.otherwise = choice;
+  while (const auto value = case_of(table.otherwise)) {
+    const Expr select = table.otherwise;
+    table.arms.emplace(*value, select.as<Select>()->when_true);  // the first that fits is taken
+    table.otherwise = select.as<Select>()->when_false;
+  }
+  return table;
+}
+
+// What the choice that e begins is for a value; undefined where e begins none.
+Expr ChoiceArms::arm(const Expr& e, int64_t value) {
+  if (!case_of(e)) return {};
+  auto found = tables_.find(e.get());
+  if (found == tables_.end()) found = tables_.emplace(e.get(), table_of(e)).first;
+  const Table& table = found->second;
+  const auto own = table.arms.find(value);
+  return own == table.arms.end() ? table.otherwise : own->second;
+}
+
+Stmt ChoiceArms::choose(const Stmt& body, int64_t value) {
+  const std::function<Expr(const Expr&)> own = [&](const Expr& e) { return arm(e, value); };
+  return Chooser(own)(body);
+}
+
+}  // namespace retrograde::ir

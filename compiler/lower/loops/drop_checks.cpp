@@ -1,0 +1,94 @@
+// drop_checks -- leaves out what the target does without.
+// In:  any phase. Out: the same phase.
+//
+//   if (is_query(in) || is_query(out)) {         assert !is_query(in), "... \"in\" ..."
+//     answers                             =>     assert !is_query(out), "... \"out\" ..."
+//   } else {                                     body
+//     body
+//   }
+//
+//   assert c, message                     =>     (nothing)
+//   assert c, 0                           =>     the same: it returns and reports nothing
+//
+// drop_asserts runs last: until then the checks tell the simplifier what holds. Failing allocations
+// are no Asserts and stay errors. Tests: test/golden/lower/drop_*/.
+#include "lower/loops/drop_checks.h"
+
+#include "diagnostics/error.h"
+#include "ir/build.h"
+#include "ir/visit.h"
+#include "lower/nests/argument_checks.h"
+#include "retrograde_runtime.h"
+
+namespace retrograde::ir {
+namespace {
+
+bool is_query(const Expr& e) {
+  const auto* call = e.as<Call>();
+  return call && call->call_type == CallType::Operator && call->op == Op::buffer_is_query;
+}
+
+std::vector<Expr> queries_in(const Expr& condition) {
+  std::vector<Expr> found;
+  walk(condition, [&](const Expr& e) {
+    if (is_query(e)) found.push_back(e);
+    return true;
+  });
+  return found;
+}
+
+// "in" of is_query(in.buffer)
+std::string buffer_name(const Expr& query) {
+  const auto* handle = query.as<Call>()->args[0].as<Variable>();
+  RETROGRADE_ASSERT(handle != nullptr, "a bounds query of something that is no buffer");
+  return handle->name.substr(0, handle->name.rfind(".buffer"));
+}
+
+Stmt refuse(const Expr& query) {
+  const std::string message =
+      "cannot run: the buffer " + quoted(buffer_name(query)) +
+      " must have memory, because the target says no_bounds_query; its host pointer is null. "
+      "Allocate it, or compile without no_bounds_query.";
+  return make_assert(
+      !query,
+      call_op(Op::error, Int(32), {Expr(int32_t{retrograde_error_host_is_null}), Expr(message)}));
+}
+
+class DropBoundsQuery : public Rewriter {
+ protected:
+  Stmt rewrite(const Stmt& s) override {
+    const auto* branch = s.as<IfThenElse>();
+    const std::vector<Expr> queries = branch ? queries_in(branch->condition) : std::vector<Expr>();
+    if (queries.empty()) return children(s);
+    std::vector<Stmt> parts;
+    for (const Expr& query : queries) parts.push_back(refuse(query));
+    if (branch->when_false.defined()) parts.push_back(branch->when_false);
+    return make_block(parts);
+  }
+};
+
+bool may_report(const Stmt& s) {
+  const auto* assert = s.as<Assert>();
+  return assert ? !is_zero(assert->error) : is_check_by_runtime(s);
+}
+
+class DropAsserts : public Rewriter {
+ protected:
+  Stmt rewrite(const Stmt& s) override {
+    if (may_report(s)) return make_evaluate(0);
+    const auto* block = s.as<Block>();
+    if (!block) return children(s);
+    std::vector<Stmt> kept;
+    for (const Stmt& part : block->stmts) {
+      if (!may_report(part)) kept.push_back((*this)(part));
+    }
+    return kept.empty() ? make_evaluate(0) : make_block(kept);
+  }
+};
+
+}  // namespace
+
+Stmt drop_bounds_query(const Stmt& s) { return DropBoundsQuery()(s); }
+Stmt drop_asserts(const Stmt& s) { return DropAsserts()(s); }
+
+}  // namespace retrograde::ir

@@ -1,0 +1,262 @@
+// flatten_storage -- replace points of Funcs and images by elements of allocations and buffers.
+// In:  Loops; names unique.
+// Out: FlatStorage; the same stores in the same order, except that the values of a Tuple are all
+//      computed before the first of them is stored.
+//
+//   realize f(float32) auto [a, n], [b, m] {       let f.min.0 = a
+//     f(x, y) = f(x - 1, y) + in(x, y)       =>    let f.min.1 = b
+//   }                                              let f.stride.1 = n
+//                                                  allocate f[int64(n) * int64(m)]:float32 auto {
+//                                                    f[x - f.min.0 + (y - f.min.1)*f.stride.1] = ..
+//                                                  }
+//
+// Method: one rewriting walk; each Realize puts its strides in scope. Constant minima and strides
+//         are substituted right away, so that indices of Funcs with constant bounds are free of
+//         them.
+// A dimension that folds is addressed modulo its factor, from 0 on, and as large.
+// Source: folklore. Tests: test/golden/lower/flatten_storage/.
+#include "lower/loops/flatten_storage.h"
+
+#include <numeric>
+#include <unordered_map>
+#include <unordered_set>
+
+#include "diagnostics/error.h"
+#include "graph/function.h"
+#include "ir/build.h"
+#include "ir/memory_reads.h"
+#include "ir/visit.h"
+#include "lower/nests/copy_statement.h"
+#include "lower/nests/resolve_undef.h"
+
+namespace retrograde::ir {
+
+namespace {
+
+std::string fact(const std::string& name, const char* what, size_t dimension) {
+  return name + "." + what + "." + std::to_string(dimension);
+}
+
+std::string element_name(const std::string& func, size_t value_count, size_t component) {
+  return value_count == 1 ? func : func + "." + std::to_string(component);
+}
+
+// What addressing needs to know of a buffer: an Expr per dimension.
+struct Layout {
+  std::vector<Expr> mins, strides, folds;
+};
+
+// What the whole statement says about names, found before any rewriting.
+struct Usage {
+  std::unordered_map<std::string, size_t> value_counts;  // of Funcs that are provided or realized
+  std::unordered_set<std::string> variables;             // mentioned anywhere
+};
+
+Usage find_usage(const Stmt& s) {
+  Usage usage;
+  walk(
+      s,
+      [&](const Expr& e) {
+        if (const Variable* v = e.as<Variable>()) usage.variables.insert(v->name);
+        const Call* call = e.as<Call>();  // an output that a C function fills: no Provide names it
+        if (call && call->call_type == CallType::Func && call->symbol.defined()) {
+          const auto f = std::dynamic_pointer_cast<FuncContents>(call->symbol.lock());
+          if (f && f->is_extern()) usage.value_counts.emplace(call->name, f->types.size());
+        }
+        return true;
+      },
+      [&](const Stmt& node) {
+        if (const Provide* p = node.as<Provide>()) usage.value_counts[p->name] = p->values.size();
+        if (const Realize* r = node.as<Realize>()) usage.value_counts[r->name] = r->types.size();
+        return true;
+      });
+  return usage;
+}
+
+class Flattener : public Rewriter {
+ public:
+  Flattener(const Stmt& s, const StorageLayouts& layouts)
+      : asked_(layouts), usage_(find_usage(s)), fresh_(s) {}
+
+ protected:
+  Expr rewrite(const Expr& e) override {
+    const Call* call = e.as<Call>();
+    if (!call || (call->call_type != CallType::Func && call->call_type != CallType::Image))
+      return children(e);
+    bool is_func = call->call_type == CallType::Func;
+    std::string buffer = is_func ? element_of(call->name, call->component) : call->name;
+    Expr index = index_of(is_func ? call->name : "", buffer, mapped(call->args));
+    return make_load(call->type, buffer, index, {}, is_func ? SymbolRef() : call->symbol);
+  }
+
+  Stmt rewrite(const Stmt& s) override {
+    if (const Realize* n = s.as<Realize>()) return allocate(*n);
+    if (const Provide* n = s.as<Provide>()) return store(*n);
+    return children(s);
+  }
+
+ private:
+  std::vector<Expr> mapped(const std::vector<Expr>& es) {
+    std::vector<Expr> result;
+    for (const Expr& e : es) result.push_back((*this)(e));
+    return result;
+  }
+
+  std::string element_of(const std::string& func, int component) const {
+    auto it = usage_.value_counts.find(func);
+    auto place = memory_of_.find(func);
+    return element_name(place == memory_of_.end() ? func : place->second,
+                        it == usage_.value_counts.end() ? 1 : it->second, component);
+  }
+
+  // `func` is empty for images.
+  Expr index_of(const std::string& func, const std::string& buffer, const std::vector<Expr>& args) {
+    auto realized = layouts_.find(func);
+    Expr index = Expr(0);
+    for (size_t d = 0; d < args.size(); ++d) {
+      bool known = realized != layouts_.end();
+      Expr min = known ? realized->second.mins[d] : variable(fact(buffer, "min", d));
+      Expr stride = known ? realized->second.strides[d] : variable(fact(buffer, "stride", d));
+      Expr offset = binary(Kind::Sub, cast_to(Int(32), args[d]), min);
+      if (known && realized->second.folds[d].defined())
+        offset = binary(Kind::Mod, offset, realized->second.folds[d]);
+      index = binary(Kind::Add, index, binary(Kind::Mul, offset, stride));
+    }
+    return index;
+  }
+
+  // ---- Realize ----
+
+  std::vector<int> storage_order(const std::string& func, size_t dimensions) const {
+    auto it = asked_.find(func);
+    if (it != asked_.end() && !it->second.order.empty()) {
+      RETROGRADE_ASSERT(it->second.order.size() == dimensions, "storage order of ", func, " has ",
+                        it->second.order.size(), " of ", dimensions, " dimensions");
+      return it->second.order;
+    }
+    std::vector<int> order(dimensions);
+    std::iota(order.begin(), order.end(), 0);
+    return order;
+  }
+
+  std::vector<Expr> folds_of(const std::string& func, size_t dimensions) const {
+    auto it = asked_.find(func);
+    std::vector<Expr> folds;
+    if (it != asked_.end()) folds = it->second.folds;
+    folds.resize(dimensions);
+    return folds;
+  }
+
+  struct Binding {
+    std::string name;
+    Expr value;
+  };
+
+  // A constant stands for itself; anything else is bound to a name.
+  Expr bind(const std::string& name, const Expr& value, std::vector<Binding>& bindings) const {
+    if (!is_const(value) || usage_.variables.count(name)) bindings.push_back({name, value});
+    return is_const(value) ? value : variable(name);
+  }
+
+  // What a predicate leaves nothing of has a negative extent: no element at all.
+  static Expr count_of(const Expr& extent) {
+    const auto constant = as_const_int(extent);
+    if (!constant) return binary(Kind::Max, extent, Expr(0));
+    return *constant < 0 ? Expr(0) : extent;
+  }
+
+  Stmt allocate(const Realize& n) {
+    std::vector<Binding> bindings;
+    Layout layout;
+    layout.strides.resize(n.bounds.size());
+    std::vector<Expr> extents;
+    layout.folds = folds_of(n.name, n.bounds.size());
+    for (size_t d = 0; d < n.bounds.size(); ++d) {
+      const Expr& fold = layout.folds[d];
+      Expr min = fold.defined() ? Expr(0) : (*this)(n.bounds[d].min);
+      layout.mins.push_back(bind(fact(n.name, "min", d), min, bindings));
+      Expr extent = fold.defined() ? fold : (*this)(n.bounds[d].extent);
+      bool is_named = usage_.variables.count(fact(n.name, "extent", d)) > 0;
+      extents.push_back(is_named ? bind(fact(n.name, "extent", d), extent, bindings) : extent);
+    }
+    Expr stride = Expr(1), elements = make_const(Int(64), 1);
+    for (int d : storage_order(n.name, n.bounds.size())) {
+      layout.strides[d] = stride = bind(fact(n.name, "stride", d), stride, bindings);
+      stride = binary(Kind::Mul, stride, extents[d]);
+      elements = binary(Kind::Mul, elements, cast_to(Int(64), count_of(extents[d])));
+    }
+    layouts_[n.name] = std::move(layout);
+    const auto places_around = places_;
+    const bool has_memory = !find_place(n.name);
+    Stmt body = (*this)(n.body);
+    places_ = places_around;
+    for (size_t i = n.types.size(); has_memory && i-- > 0;) {
+      body = make_allocate(element_name(n.name, n.types.size(), i), n.types[i], n.memory, elements,
+                           body);
+    }
+    for (size_t i = bindings.size(); i-- > 0;)
+      body = make_let(bindings[i].name, bindings[i].value, body);
+    return body;
+  }
+
+  // Notes a place that begins here, or where in one the Func lies.
+  bool find_place(const std::string& name) {
+    auto it = asked_.find(name);
+    if (it == asked_.end()) return false;
+    if (!it->second.is_place.empty()) places_[it->second.is_place] = name;
+    if (it->second.lies_in.empty()) return false;
+    memory_of_[name] = places_.at(it->second.lies_in);
+    return true;
+  }
+
+  // ---- Provide ----
+
+  Stmt store(const Provide& n) {
+    std::vector<Expr> values = mapped(n.values), args = mapped(n.args);
+    Expr predicate = (*this)(n.predicate);
+    std::vector<Binding> bindings;
+    if (values.size() > 1) bind_operands(n, values, args, predicate, bindings);
+    std::vector<Stmt> stores;
+    for (size_t i = 0; i < values.size(); ++i) {
+      if (is_undef(values[i])) continue;
+      std::string buffer = element_of(n.name, static_cast<int>(i));
+      stores.push_back(make_store(buffer, values[i], index_of(n.name, buffer, args), predicate));
+    }
+    Stmt result = make_block(std::move(stores));
+    for (size_t i = bindings.size(); i-- > 0;)
+      result = make_let(bindings[i].name, bindings[i].value, result);
+    return result.defined() ? result : make_evaluate(Expr(0));
+  }
+
+  // Values of a Tuple are stored one after the other: what reads storage is read before the first
+  // store.
+  void bind_operands(const Provide& n, std::vector<Expr>& values, std::vector<Expr>& args,
+                     Expr& predicate, std::vector<Binding>& bindings) {
+    auto bind_if_loading = [&](Expr& e, const std::string& part) {
+      if (!e.defined() || !reads_memory(e, MemoryReads::Loads)) return;
+      std::string name = fresh_(n.name + "." + part);
+      bindings.push_back({name, e});
+      e = variable(name, e.type());
+    };
+    for (size_t i = 0; i < values.size(); ++i) {
+      if (!is_undef(values[i])) bind_if_loading(values[i], "value." + std::to_string(i));
+    }
+    for (size_t d = 0; d < args.size(); ++d) bind_if_loading(args[d], "arg." + std::to_string(d));
+    bind_if_loading(predicate, "predicate");
+  }
+
+  const StorageLayouts& asked_;
+  const Usage usage_;
+  FreshNames fresh_;
+  std::unordered_map<std::string, Layout> layouts_;
+  std::unordered_map<std::string, std::string> places_;  // by name before renaming, the innermost
+  std::unordered_map<std::string, std::string> memory_of_;  // Func -> place
+};
+
+}  // namespace
+
+Stmt flatten_storage(const Stmt& s, const StorageLayouts& layouts) {
+  return Flattener(s, layouts)(s);
+}
+
+}  // namespace retrograde::ir

@@ -1,0 +1,582 @@
+// fork_async -- producers that run at the same time as their consumers.
+// In:  Loops; names unique.
+// Out: Loops; every async Func is produced in one branch of a Fork and consumed in the other.
+//
+//   realize f {                      realize f { realize f.semaphores {
+//     produce f { P }                  fork { produce f { P }  release ready }
+//     consume f { A; B(f) }      =>         { A; acquire ready; B(f) }
+//   }                                } }
+//
+//   realize f { for y {              realize f { realize f.semaphores {
+//     produce f { P(y) }               fork { for y { acquire space; P(y); release ready } }
+//     consume f { B(f, y) }      =>         { for y { acquire ready; B(f, y); release space } }
+//   } }                              } }
+//
+// Method: in the second form both branches keep the loops between the storage and the computation,
+//         each without the other's work; `space` starts with the number of iterations that the
+//         producer may be ahead, which build_loop_nests knows from the folding, or is left out
+//         where nothing that is still read is ever overwritten. Storage of several async Funcs
+//         nests, and so do the Forks: outermost first, each next one splits the branch that
+//         consumes. When both of its parts read the Func of a Fork around, each has semaphores of
+//         its own to that producer. What else the producer reads and is computed in the same loops
+//         is computed in its branch, and in the other as well where that reads it too.
+// Errors: such a value that both branches read, and whose storage lasts longer than theirs; loops
+//         between storage and computation that are not serial.
+// Source: Halide's documentation of async; the handshake is a bounded buffer's (Dijkstra 1965).
+// Tests: test/unit/async_test.cpp.
+#include "lower/loops/fork_async.h"
+
+#include <algorithm>
+#include <set>
+#include <utility>
+
+#include "diagnostics/error.h"
+#include "ir/build.h"
+#include "ir/visit.h"
+#include "lower/nests/copy_statement.h"
+#include "lower/nests/make_names_unique.h"
+
+namespace retrograde::ir {
+
+namespace {
+
+std::string semaphores_of(const std::string& func) { return func + ".semaphores"; }
+
+// Of one reader; those of the next follow.
+enum Semaphore { Ready = 0, Space = 1 };
+constexpr int per_reader = 2;
+
+bool is_semaphore_step(const Stmt& s, const std::string& func) {
+  bool found = false;
+  walk(
+      s,
+      [&](const Expr& e) {
+        const Call* call = e.as<Call>();
+        found |= call && call->call_type == CallType::Func && call->name == semaphores_of(func);
+        return !found;
+      },
+      [](const Stmt& part) {
+        return part.kind() == Kind::LetStmt || part.kind() == Kind::Evaluate ||
+               part.kind() == Kind::Assert;
+      });
+  return found;
+}
+
+// Whether the expression or statement reads or writes the Func.
+struct UseFinder {
+  const std::string& func;
+  bool found = false;
+
+  bool visit(const Expr& e) {
+    const Call* call = e.as<Call>();
+    const Variable* variable = e.as<Variable>();
+    found |= call && call->call_type == CallType::Func && call->name == func;
+    found |= variable && variable->name.rfind(func + ".stride.", 0) == 0;
+    return !found;
+  }
+  bool visit(const Stmt& s) {
+    const Provide* provide = s.as<Provide>();
+    const Prefetch* prefetch = s.as<Prefetch>();
+    found |= (provide && provide->name == func) || (prefetch && prefetch->name == func);
+    return !found;
+  }
+};
+
+template <class Tree>
+bool uses_func(const Tree& tree, const std::string& func) {
+  UseFinder finder{func};
+  if constexpr (std::is_same_v<Tree, Expr>) {
+    walk(tree, [&](const Expr& e) { return finder.visit(e); });
+  } else {
+    walk(
+        tree, [&](const Expr& e) { return finder.visit(e); },
+        [&](const Stmt& s) { return finder.visit(s); });
+  }
+  return finder.found;
+}
+
+using Names = std::set<std::string>;
+
+const ProducerConsumer* as_producer(const Stmt& s) {
+  const ProducerConsumer* n = s.as<ProducerConsumer>();
+  return n && n->produces ? n : nullptr;
+}
+
+bool is_producer_of(const Stmt& s, const std::string& func) {
+  const ProducerConsumer* n = as_producer(s);
+  return n && n->name == func;
+}
+
+bool produces_any(const Stmt& s, const Names& funcs) {
+  return any_stmt(s, [&](const Stmt& part) {
+    const ProducerConsumer* n = as_producer(part);
+    return n && funcs.count(n->name);
+  });
+}
+
+bool produces(const Stmt& s, const std::string& func) { return produces_any(s, {func}); }
+
+Names realized_in(const Stmt& s) {
+  Names names;
+  walk(
+      s, [](const Expr&) { return false; },
+      [&](const Stmt& part) {
+        if (const Realize* n = part.as<Realize>()) names.insert(n->name);
+        return true;
+      });
+  return names;
+}
+
+// Whether anything but the computation of the Func itself reads it.
+bool is_read_outside(const Stmt& s, const std::string& func) {
+  UseFinder finder{func};
+  walk(
+      s, [&](const Expr& e) { return finder.visit(e); },
+      [&](const Stmt& part) { return !is_producer_of(part, func) && !finder.found; });
+  return finder.found;
+}
+
+// A loop around the producer, inside of `s`.
+bool has_loop_around(const Stmt& s, const std::string& func) {
+  bool found = false;
+  walk(
+      s, [](const Expr&) { return false; },
+      [&](const Stmt& part) {
+        if (is_producer_of(part, func)) return false;
+        found |= part.kind() == Kind::For && produces(part, func);
+        return !found;
+      });
+  return found;
+}
+
+class AsyncForker : public Rewriter {
+ public:
+  AsyncForker(const Stmt& s, const Program& program, const RenamedFuncs& renamed,
+              const AsyncRoom& room)
+      : program_(program), renamed_(renamed), room_(room), fresh_(s) {}
+
+ protected:
+  Expr rewrite(const Expr& e) override { return e; }
+
+  Stmt rewrite(const Stmt& given) override {
+    const Stmt s = producers_outermost(given);
+    const Realize* n = s.as<Realize>();
+    if (n) around_[original(n->name)] = s;
+    if (!n || !is_async(n->name) || !produces(n->body, n->name)) return children(s);
+    const Stmt body = has_loop_around(n->body, n->name) ? fork_loops(*n) : fork_once(*n);
+    return make_realize(n->name, n->types, n->memory, n->bounds, body);
+  }
+
+ private:
+  const Program& program_;
+  const RenamedFuncs& renamed_;
+  const AsyncRoom& room_;
+  FreshNames fresh_;
+  std::vector<std::string> forked_;     // async Funcs around whose consumers this is
+  std::map<std::string, int> readers_;  // of those, with semaphores of their own
+  std::map<std::string, Stmt> around_;  // by original name, the last one entered
+
+  const std::string& original(const std::string& name) const {
+    const auto it = renamed_.find(name);
+    return it == renamed_.end() ? name : it->second;
+  }
+  bool is_async(const std::string& name) const {
+    const LoopedFunc* f = program_.find(original(name));
+    return f && f->schedule.async;
+  }
+
+  // Realizes directly inside each other: those of async Funcs first, producers around what reads
+  // them. The others are then inside of the Forks, where each branch can have its own.
+  Stmt producers_outermost(const Stmt& s) const {
+    std::vector<const Realize*> chain;
+    for (const Realize* n = s.as<Realize>(); n; n = n->body.as<Realize>()) chain.push_back(n);
+    if (chain.size() < 2) return s;
+    const Stmt body = chain.back()->body;
+    const auto position = [&](const Realize* n) {
+      const auto it = program_.index_of.find(original(n->name));
+      const bool is_func = it != program_.index_of.end();
+      return std::pair(is_func && !is_async(n->name), is_func ? it->second : -1);
+    };
+    std::stable_sort(chain.begin(), chain.end(),
+                     [&](const Realize* a, const Realize* b) { return position(a) < position(b); });
+    Stmt result = body;
+    for (size_t i = chain.size(); i-- > 0;)
+      result =
+          make_realize(chain[i]->name, chain[i]->types, chain[i]->memory, chain[i]->bounds, result);
+    return result;
+  }
+
+  // ---- the two branches ----
+
+  struct Branches {
+    Stmt producer, consumer;
+  };
+
+  Branches branches_of(const Realize& n, bool loops, int room) {
+    Names made = {n.name};
+    Stmt producer = only_producer(n.body, n.name, made, loops, room);
+    while (add_what_is_read(n, producer, made))
+      producer = only_producer(n.body, n.name, made, loops, room);
+    Stmt consumer = without_producer(n.body, n.name, loops, room);
+    made.erase(n.name);
+    consumer = without_unread(consumer, made);
+    check_is_apart(n, made, consumer);
+    share_waits(producer, consumer);
+    return {with_own_places(producer, consumer), consumer};
+  }
+
+  // Funcs that are computed beside `n` and that its producer reads.
+  static bool add_what_is_read(const Realize& n, const Stmt& producer, Names& made) {
+    const size_t before = made.size();
+    walk(
+        n.body, [](const Expr&) { return false; },
+        [&](const Stmt& part) {
+          const ProducerConsumer* other = as_producer(part);
+          if (!other || (other->name != n.name && produces(part, n.name))) return true;
+          if (uses_func(producer, other->name)) made.insert(other->name);
+          return false;
+        });
+    return made.size() > before;
+  }
+
+  // Without the computation of those that nothing reads.
+  Stmt without_unread(Stmt s, Names funcs) {
+    for (auto it = funcs.begin(); s.defined() && it != funcs.end();) {
+      if (!produces(s, *it) || is_read_outside(s, *it)) {
+        ++it;
+        continue;
+      }
+      s = without_producer(s, *it, false);
+      funcs.erase(it);
+      it = funcs.begin();
+    }
+    return s;
+  }
+
+  // Both branches may compute a Func only where each has storage for it.
+  void check_is_apart(const Realize& n, const Names& made, const Stmt& consumer) const {
+    const Names inside = realized_in(n.body);
+    for (const std::string& other : made) {
+      const LoopedFunc* f = program_.find(original(other));
+      const bool is_output = f && f->is_output;
+      if (inside.count(other) || (!is_output && !produces(consumer, other))) continue;
+      user_error(text("compute ", quoted(original(n.name)), " async"),
+                 "what an async Func and its consumer both read is stored no further out than the "
+                 "async Func, or computed outside of the loops that they share",
+                 text(quoted(original(other)), " is computed in these loops and stored around ",
+                      quoted(original(n.name))),
+                 text("Compute ", quoted(original(other)), " at root, store it where ",
+                      quoted(original(n.name)), " is stored, or call async() on it"));
+    }
+  }
+
+  // Memory that both branches would hoist theirs to.
+  Stmt with_own_places(Stmt producer, const Stmt& consumer) const {
+    const Names here = places_of(producer), there = places_of(consumer);
+    for (const std::string& place : here) {
+      const auto around = around_.find(place);
+      if (!there.count(place) || around == around_.end()) continue;
+      const Realize& n = *around->second.as<Realize>();
+      producer = make_realize(n.name, n.types, n.memory, n.bounds, producer);
+    }
+    return producer;
+  }
+
+  // Places outside of the statement in which its Funcs lie, by their original names.
+  Names places_of(const Stmt& s) const {
+    Names places, inside;
+    if (!s.defined()) return places;
+    for (const std::string& name : realized_in(s)) inside.insert(original(name));
+    for (const std::string& name : inside) {
+      const LoopedFunc* f = program_.find(name);
+      if (f && is_hoisted(*f) && !inside.count(place_name(name))) places.insert(place_name(name));
+    }
+    return places;
+  }
+
+  // Whether the statement has to do with what was realized under this name: a Func or a place.
+  bool needs(const Stmt& s, const std::string& name) const {
+    return s.defined() && (uses_func(s, name) || places_of(s).count(original(name)));
+  }
+
+  // ---- semaphores ----
+
+  static Expr call(const char* function, const std::string& func, int which, int count) {
+    const Expr place = call_op(
+        Op::address_of, Handle(),
+        {call_func(semaphores_of(func), UInt(64), {Expr(static_cast<int32_t>(which))}, 0, {})});
+    return call_op(Op::runtime_call, Int(32), {Expr(function), place, Expr(count)});
+  }
+
+  Stmt acquire(const std::string& func, int which) {
+    const std::string code = fresh_(func + ".waited");
+    return make_let(code, call("retrograde_semaphore_acquire", func, which, 1),
+                    make_assert(variable(code) == 0, variable(code)));
+  }
+
+  static Stmt release(const std::string& func, int which) {
+    return make_evaluate(call("retrograde_semaphore_release", func, which, 1));
+  }
+
+  static Stmt with_semaphores(const std::string& func, int room, int readers, const Stmt& fork) {
+    std::vector<Stmt> stmts;
+    for (int i = 0; i < readers; i++) {
+      stmts.push_back(
+          make_evaluate(call("retrograde_semaphore_init", func, per_reader * i + Ready, 0)));
+      stmts.push_back(
+          make_evaluate(call("retrograde_semaphore_init", func, per_reader * i + Space, room)));
+    }
+    stmts.push_back(fork);
+    return make_realize(semaphores_of(func), {UInt(64)}, MemoryType::Stack,
+                        {Range{0, per_reader * readers}}, make_block(stmts));
+  }
+
+  static bool is_step(const Stmt& s, const std::string& func) {
+    const LetStmt* let = s.as<LetStmt>();
+    const bool has_form = let ? let->body.kind() == Kind::Assert : s.kind() == Kind::Evaluate;
+    return has_form && is_semaphore_step(s, func);
+  }
+  static bool has_steps(const Stmt& s, const std::string& func) {
+    return any_stmt(s, [&](const Stmt& part) { return is_step(part, func); });
+  }
+
+  // Each wait for the Func and each signal to it replaced; `s.defined()` need not hold of what
+  // comes in.
+  template <class Replace>
+  static Stmt replace_steps(const Stmt& s, const std::string& func, const Replace& replace) {
+    struct Replacer : Rewriter {
+      Replacer(const std::string& func, const Replace& replace) : func(func), replace(replace) {}
+      const std::string& func;
+      const Replace& replace;
+      Expr rewrite(const Expr& e) override { return e; }
+      Stmt rewrite(const Stmt& s) override { return is_step(s, func) ? replace(s) : children(s); }
+    };
+    return Replacer(func, replace)(s);
+  }
+
+  Stmt step_of_reader(const Stmt& step, const std::string& func, int reader) {
+    int which = -1;
+    walk(
+        step,
+        [&](const Expr& e) {
+          const Call* call = e.as<Call>();
+          if (call && call->call_type == CallType::Func)
+            which = static_cast<int>(*as_const_int(call->args[0])) % per_reader;
+          return true;
+        },
+        [](const Stmt&) { return true; });
+    const int semaphore = per_reader * reader + which;
+    return step.kind() == Kind::LetStmt ? acquire(func, semaphore) : release(func, semaphore);
+  }
+
+  // Waits of the Func that each of its readers makes with the producer.
+  Stmt with_all_readers(const Stmt& producer, const std::string& func) {
+    const int readers = readers_.at(func);
+    if (readers == 1) return producer;
+    return replace_steps(producer, func, [&](const Stmt& step) {
+      std::vector<Stmt> stmts;
+      for (int i = 0; i < readers; i++) stmts.push_back(step_of_reader(step, func, i));
+      return make_block(stmts);
+    });
+  }
+
+  Stmt forked(const Realize& n, int room, const Branches& branches) {
+    readers_[n.name] = 1;
+    forked_.push_back(n.name);
+    const Stmt consumer = (*this)(branches.consumer);
+    forked_.pop_back();
+    const Stmt producer = with_all_readers((*this)(branches.producer), n.name);
+    return with_semaphores(n.name, room, readers_.at(n.name), make_fork(producer, consumer));
+  }
+
+  // ---- produced once ----
+
+  Stmt fork_once(const Realize& n) {
+    Branches branches = branches_of(n, false, 0);
+    if (!branches.consumer.defined()) return children(n.body);
+    branches.producer = make_block({branches.producer, release(n.name, Ready)});
+    branches.consumer = acquired_late(branches.consumer, n.name);
+    return forked(n, 0, branches);
+  }
+
+  // A producer that does not run when its result is in the cache.
+  bool may_be_skipped(const ProducerConsumer& n) const {
+    const LoopedFunc* f = program_.find(original(n.name));
+    return n.produces && f && f->schedule.memoized;
+  }
+
+  // Waits as late as possible: what does not need the Func runs before.
+  Stmt acquired_late(const Stmt& s, const std::string& func) {
+    if (const ProducerConsumer* n = s.as<ProducerConsumer>(); n && !may_be_skipped(*n))
+      return make_producer_consumer(n->name, n->produces, acquired_late(n->body, func));
+    if (const LetStmt* n = s.as<LetStmt>(); n && !uses_func(n->value, func))
+      return make_let(n->name, n->value, acquired_late(n->body, func));
+    if (const Realize* n = s.as<Realize>(); n && !bounds_use(*n, func))
+      return make_realize(n->name, n->types, n->memory, n->bounds, acquired_late(n->body, func));
+    if (const Block* n = s.as<Block>()) {
+      std::vector<Stmt> stmts = n->stmts;
+      for (Stmt& part : stmts) {
+        if (!uses_func(part, func)) continue;
+        part = acquired_late(part, func);
+        return make_block(std::move(stmts));
+      }
+    }
+    return make_block({acquire(func, Ready), s});
+  }
+
+  static bool bounds_use(const Realize& n, const std::string& func) {
+    for (const Range& range : n.bounds) {
+      if (uses_func(range.min, func) || uses_func(range.extent, func)) return true;
+    }
+    return false;
+  }
+
+  // ---- produced in a loop ----
+
+  Stmt fork_loops(const Realize& n) {
+    const auto found = room_.find(original(n.name));
+    const int room = found == room_.end() ? 1 : found->second;
+    return forked(n, room, branches_of(n, true, room));
+  }
+
+  // The handshake of an async Func around belongs to the branch that reads it. Where both do, the
+  // producer's has one of its own.
+  void share_waits(Stmt& producer, Stmt& consumer) {
+    for (const std::string& outer : forked_) {
+      if (!has_steps(producer, outer) || !consumer.defined() || !has_steps(consumer, outer))
+        continue;
+      const bool in_producer = uses_func(producer, outer), in_consumer = uses_func(consumer, outer);
+      if (in_producer && in_consumer) {
+        const int reader = readers_.at(outer)++;
+        producer = replace_steps(
+            producer, outer, [&](const Stmt& step) { return step_of_reader(step, outer, reader); });
+        continue;
+      }
+      Stmt& other = in_producer ? consumer : producer;
+      other = replace_steps(other, outer, [](const Stmt&) { return make_evaluate(0); });
+    }
+  }
+
+  // The body of the innermost loop around the producer, with its waits.
+  Stmt shake_hands(const Stmt& body, const std::string& func, bool produces, int room) {
+    const Semaphore before = produces ? Space : Ready, after = produces ? Ready : Space;
+    std::vector<Stmt> stmts;
+    if (before == Ready || room > 0) stmts.push_back(acquire(func, before));
+    if (body.defined()) stmts.push_back(body);
+    if (after == Ready || room > 0) stmts.push_back(release(func, after));
+    return make_block(std::move(stmts));
+  }
+
+  bool is_innermost_around(const For& n, const std::string& func) const {
+    return produces(n.body, func) && !has_loop_around(n.body, func);
+  }
+
+  void check_serial(const For& n, const std::string& func) const {
+    if (n.runs == ForType::Serial) return;
+    unsupported(text("compute ", quoted(original(func)), " async"),
+                "the loops between storage and computation of an async Func are serial",
+                text("the loop ", describe_loop(n.name), " is not"),
+                "Store the Func inside of that loop");
+  }
+
+  // Just the work of the producer and of what it needs, and the control around. Undefined where
+  // there is none.
+  Stmt only_producer(const Stmt& s, const std::string& func, const Names& made, bool loops,
+                     int room = 0) {
+    if (!s.defined() || !produces_any(s, made)) return {};
+    if (const ProducerConsumer* n = as_producer(s); n && made.count(n->name)) return s;
+    const auto part = [&](const Stmt& child) {
+      return only_producer(child, func, made, loops, room);
+    };
+    return match(
+        s,
+        [&](const For& n) {
+          const bool is_shared = produces(n.body, func);
+          if (is_shared) check_serial(n, func);
+          Stmt body = part(n.body);
+          if (loops && is_innermost_around(n, func)) body = shake_hands(body, func, true, room);
+          return make_for(n.name, n.min, n.extent, n.runs, body, n.partition);
+        },
+        [&](const LetStmt& n) { return make_let(n.name, n.value, part(n.body)); },
+        [&](const IfThenElse& n) {
+          Stmt when_true = part(n.when_true), when_false = part(n.when_false);
+          if (!when_true.defined()) return make_if(!n.condition, when_false);
+          return make_if(n.condition, when_true, when_false);
+        },
+        [&](const Block& n) {
+          std::vector<Stmt> stmts;
+          for (const Stmt& child : n.stmts) stmts.push_back(is_wait(child) ? child : part(child));
+          return make_block(std::move(stmts));
+        },
+        [&](const ProducerConsumer& n) { return part(n.body); },
+        [&](const Realize& n) {
+          Stmt body = part(n.body);
+          if (!needs(body, n.name)) return body;
+          return make_realize(n.name, n.types, n.memory, n.bounds, body);
+        },
+        [&](const StmtNode&) { return s; });
+  }
+
+  bool is_wait(const Stmt& s) const {
+    return std::any_of(forked_.begin(), forked_.end(),
+                       [&](const std::string& func) { return is_step(s, func); });
+  }
+
+  // Everything but the work of the producer.
+  Stmt without_producer(const Stmt& s, const std::string& func, bool loops, int room = 0) {
+    if (!s.defined() || !produces(s, func)) return s;
+    if (is_producer_of(s, func)) return {};
+    return match(
+        s,
+        [&](const For& n) {
+          Stmt body = without_producer(n.body, func, loops, room);
+          if (loops && is_innermost_around(n, func)) body = shake_hands(body, func, false, room);
+          return make_for(n.name, n.min, n.extent, n.runs, body, n.partition);
+        },
+        [&](const LetStmt& n) {
+          Stmt body = without_producer(n.body, func, loops, room);
+          return body.defined() ? make_let(n.name, n.value, body) : body;
+        },
+        [&](const IfThenElse& n) {
+          Stmt when_true = without_producer(n.when_true, func, loops, room);
+          Stmt when_false = without_producer(n.when_false, func, loops, room);
+          if (!when_true.defined() && !when_false.defined()) return when_true;
+          if (!when_true.defined()) return make_if(!n.condition, when_false);
+          return make_if(n.condition, when_true, when_false);
+        },
+        [&](const Block& n) {
+          std::vector<Stmt> stmts;
+          for (const Stmt& part : n.stmts)
+            stmts.push_back(without_producer(part, func, loops, room));
+          return make_block(std::move(stmts));
+        },
+        [&](const ProducerConsumer& n) {
+          Stmt body = without_producer(n.body, func, loops, room);
+          return body.defined() ? make_producer_consumer(n.name, n.produces, body) : body;
+        },
+        [&](const Realize& n) {
+          Stmt body = without_producer(n.body, func, loops, room);
+          if (!needs(body, n.name)) return body;
+          return make_realize(n.name, n.types, n.memory, n.bounds, body);
+        },
+        [&](const StmtNode&) { return s; });
+  }
+};
+
+}  // namespace
+
+Stmt fork_async(const Stmt& s, const Program& program, RenamedFuncs& renamed,
+                const AsyncRoom& room) {
+  const bool any = std::any_of(program.funcs.begin(), program.funcs.end(),
+                               [](const LoopedFunc& f) { return f.schedule.async; });
+  if (!any) return s;
+  // Both branches have the loops around them, and may compute the same Func.
+  UniqueNames unique = make_names_unique(AsyncForker(s, program, renamed, room)(s));
+  for (const auto& [name, copied] : unique.original) {
+    const auto it = renamed.find(copied);
+    renamed[name] = it == renamed.end() ? copied : it->second;
+  }
+  return unique.stmt;
+}
+
+}  // namespace retrograde::ir

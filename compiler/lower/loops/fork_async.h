@@ -1,0 +1,20 @@
+// fork_async -- producers that run at the same time as their consumers.
+#pragma once
+
+#include <map>
+#include <string>
+
+#include "lower/loops/memoize.h"
+#include "lower/program.h"
+
+namespace retrograde::ir {
+
+// By Func: how many iterations its producer may be ahead of its consumer; 0: any number. Only of
+// async Funcs that are stored outside of where they are computed.
+using AsyncRoom = std::map<std::string, int>;
+
+// Funcs that both branches compute get new names, which are added to `renamed`.
+Stmt fork_async(const Stmt& s, const Program& program, RenamedFuncs& renamed,
+                const AsyncRoom& room);
+
+}  // namespace retrograde::ir

@@ -1,0 +1,153 @@
+// free_early -- end the life of an allocation right after its last use.
+// In:  FlatStorage or Vector; names unique.
+// Out: the same phase, with a Free after the last statement that uses an allocation; at most one on
+//      every path.
+//
+//   allocate a[n] {                    allocate a[n] {
+//     for ... { a[..] = .. }             for ... { a[..] = .. }
+//     allocate b[n] {                    allocate b[n] {
+//       for ... { b[..] = a[..] }  =>      for ... { b[..] = a[..] }
+//       for ... { out[..] = b[..] }        free a
+//     }                                    for ... { out[..] = b[..] }
+//   }                                      free b
+//                                        }
+//                                      }
+//
+// Method: a region is a stretch of straight-line code: the body of the function, of a loop or of a
+//         branch, looking through lets, allocations, producers and blocks. What remains in it
+//         (loops, stores, branches) are its steps. One walk numbers the steps and notes the last
+//         one that uses each allocation of the region; a second walk puts the Frees there. Both are
+//         linear, however deep the allocations nest.
+// Not done: allocations that are never used; moving an allocation to its first use.
+// Source: folklore. Tests: test/golden/lower/free_early/.
+#include "lower/loops/free_early.h"
+
+#include <unordered_map>
+#include <utility>
+#include <vector>
+
+#include "ir/build.h"
+#include "ir/visit.h"
+
+namespace retrograde::ir {
+
+namespace {
+
+// What a region's straight-line code looks through.
+bool is_transparent(const Stmt& s) {
+  return s.kind() == Kind::LetStmt || s.kind() == Kind::ProducerConsumer ||
+         s.kind() == Kind::Allocate || s.kind() == Kind::Block;
+}
+
+// Statements by their place in the order of execution: one node may stand in several places.
+using Place = size_t;
+
+struct LastUses {
+  std::unordered_map<Place, std::vector<std::string>>
+      frees;  // what to free after the statement at a place
+};
+
+// Walks in the order of execution.
+class LastUseFinder {
+ public:
+  LastUses find(const Stmt& s) {
+    visit_region(s);
+    LastUses result;
+    for (const std::string& name : allocations_) {  // inner allocations last: they are freed first
+      const Life& life = lives_.at(name);
+      if (life.is_used && !life.is_freed) result.frees[life.last_step].push_back(name);
+    }
+    return result;
+  }
+
+ private:
+  struct Life {
+    size_t region;
+    Place last_step = 0;
+    bool is_used = false;
+    bool is_freed = false;  // the program says so already
+  };
+
+  void visit_region(const Stmt& s) {
+    steps_.push_back(next_);
+    visit(s);
+    steps_.pop_back();
+  }
+
+  void visit(const Stmt& s) {
+    if (!s.defined()) return;
+    Place place = next_++;
+    bool is_step = !is_transparent(s);
+    if (is_step) steps_.back() = place;
+    if (const Allocate* a = s.as<Allocate>()) {
+      allocations_.push_back(a->name);
+      lives_[a->name] = {steps_.size() - 1};
+    }
+    if (const Free* free = s.as<Free>()) lives_[free->name].is_freed = true;
+    if (const Store* store = s.as<Store>()) use(store->name);
+    for_each_child(
+        s, [&](const Expr& e) { visit(e, is_step ? steps_.back() : place); },
+        [&](const Stmt& child) { is_step ? visit_region(child) : visit(child); });
+  }
+
+  // Loads in the value of a let lie before the let's body: the step is the let itself.
+  void visit(const Expr& e, Place place) {
+    Place step = std::exchange(steps_.back(), place);
+    walk(e, [&](const Expr& node) {
+      if (const Load* load = node.as<Load>()) use(load->name);
+      return true;
+    });
+    steps_.back() = step;
+  }
+
+  void use(const std::string& name) {
+    auto it = lives_.find(name);
+    if (it == lives_.end()) return;
+    it->second.last_step = steps_[it->second.region];
+    it->second.is_used = true;
+  }
+
+  Place next_ = 0;
+  std::vector<Place> steps_;  // the current step of each region, outermost first
+  std::vector<std::string> allocations_;
+  std::unordered_map<std::string, Life> lives_;
+};
+
+class FreeInserter : public Rewriter {
+ public:
+  explicit FreeInserter(const LastUses& uses) : uses_(uses) {}
+
+ protected:
+  Expr rewrite(const Expr& e) override { return e; }
+
+  Stmt rewrite(const Stmt& s) override {
+    auto it = uses_.frees.find(next_++);
+    if (it == uses_.frees.end()) return children(s);
+    std::vector<Stmt> frees;
+    for (size_t i = it->second.size(); i-- > 0;) frees.push_back(make_free(it->second[i]));
+    if (const LetStmt* let = s.as<LetStmt>()) {  // last used by the value: free before the body
+      frees.push_back((*this)(let->body));
+      return make_let(let->name, let->value, make_block(std::move(frees)));
+    }
+    if (const Allocate* a = s.as<Allocate>()) {
+      frees.push_back((*this)(a->body));
+      return make_allocate(a->name, a->type, a->memory, a->elements, make_block(std::move(frees)));
+    }
+    frees.insert(frees.begin(), children(s));
+    return make_block(std::move(frees));
+  }
+
+ private:
+  const LastUses& uses_;
+  Place next_ = 0;
+};
+
+}  // namespace
+
+Stmt free_early(const Stmt& s) {
+  if (!s.defined()) return s;
+  LastUses uses = LastUseFinder().find(s);
+  return uses.frees.empty() ? s : FreeInserter(uses)(s);
+}
+
+}  // namespace retrograde::ir

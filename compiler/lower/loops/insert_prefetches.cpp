@@ -1,0 +1,283 @@
+// insert_prefetches -- ask for what later iterations read.
+// In:  Loops; names unique.
+// Out: Loops; the same stores.
+//
+//   for y { out(x, y) = in(x, y) ... }
+//     =>   for y { prefetch in [.., ..], [y + 2, 1]; out(x, y) = in(x, y) ... }
+//     =>   for y { for line { prefetch(&in(16 line, y + 2)) }; out(x, y) = in(x, y) ... }
+//
+// Method: the box that one iteration of the loop `at` reads, with the loop variable `from` moved by
+//         the offset; lets between the two loops are written out first. What the bound strategy
+//         says about data that does not exist: the box is clamped to it, or fetched only when it
+//         lies inside, or fetched regardless, which no machine faults for.
+// Not done: boxes larger than a cache are fetched whole.
+// Source: Halide's documentation of prefetch. Tests: test/unit/prefetch_test.cpp.
+#include "lower/loops/insert_prefetches.h"
+
+#include "analysis/interval.h"
+#include "ir/build.h"
+#include "ir/visit.h"
+#include "lower/nests/copy_statement.h"
+#include "simplify/simplify.h"
+
+namespace retrograde::ir {
+
+namespace {
+
+constexpr int line_bytes = 64;
+
+// The box that a statement reads of a Func or image.
+class ReadRegion {
+ public:
+  explicit ReadRegion(const std::string& name) : name_(name) {}
+  Box of(const Stmt& s) {
+    visit(s);
+    return box_;
+  }
+
+ private:
+  const std::string& name_;
+  Scope<Interval> scope_;
+  Box box_;
+
+  void visit(const Expr& e) {
+    const auto uses = footprints(e, scope_);
+    if (const auto it = uses.find(name_); it != uses.end()) box_ = hull(box_, it->second.box);
+  }
+
+  void visit(const Stmt& s) {
+    if (!s.defined()) return;
+    if (const For* n = s.as<For>()) {
+      visit(n->min), visit(n->extent);
+      within(n->name,
+             {bounds_of(n->min, scope_).min, bounds_of(n->min + n->extent - 1, scope_).max},
+             n->body);
+    } else if (const LetStmt* n = s.as<LetStmt>()) {
+      visit(n->value);
+      const bool is_index = n->value.type() == Int(32);
+      within(n->name, is_index ? bounds_of(n->value, scope_) : Interval::everything(), n->body);
+    } else {
+      for_each_child(
+          s, [&](const Expr& e) { visit(e); }, [&](const Stmt& part) { visit(part); });
+    }
+  }
+
+  void within(const std::string& name, const Interval& range, const Stmt& body) {
+    scope_.push(name, range);
+    visit(body);
+    scope_.pop(name);
+  }
+};
+
+class Inserter : public Rewriter {
+ public:
+  Inserter(const Program& program, const RenamedFuncs& renamed)
+      : program_(program), renamed_(renamed) {}
+
+ protected:
+  Expr rewrite(const Expr& e) override { return e; }
+
+  Stmt rewrite(const Stmt& s) override {
+    if (const Realize* n = s.as<Realize>()) {
+      realized_[original(n->name)] = n->name;
+      Stmt result = children(s);
+      realized_.erase(original(n->name));
+      return result;
+    }
+    if (const LetStmt* n = s.as<LetStmt>()) {
+      lets_.emplace_back(n->name, n->value);
+      Stmt result = children(s);
+      lets_.pop_back();
+      return result;
+    }
+    const For* n = s.as<For>();
+    if (!n) return children(s);
+    loops_.push_back({n->name, lets_.size()});
+    Stmt body = (*this)(n->body);
+    body = with_prefetches(*n, body);
+    loops_.pop_back();
+    return make_for(n->name, n->min, n->extent, n->runs, body, n->partition);
+  }
+
+ private:
+  struct OuterLoop {
+    std::string name;
+    size_t lets;  // how many are bound around it
+  };
+  const Program& program_;
+  const RenamedFuncs& renamed_;
+  std::vector<std::pair<std::string, Expr>> lets_;
+  std::vector<OuterLoop> loops_;
+  std::map<std::string, std::string> realized_;
+
+  const std::string& original(const std::string& name) const {
+    const auto it = renamed_.find(name);
+    return it == renamed_.end() ? name : it->second;
+  }
+
+  Stmt with_prefetches(const For& n, Stmt body) {
+    const LoopName loop = decode_loop_name(n.name);
+    const LoopedFunc* f = program_.find(original(loop.func));
+    if (!f || loop.stage.empty()) return body;
+    const auto stage = static_cast<size_t>(std::stoi(loop.stage));
+    if (stage >= f->stages.size()) return body;
+    const auto& directives = f->stages[stage].schedule.prefetches;
+    for (auto it = directives.rbegin(); it != directives.rend(); ++it) {
+      if (it->at != loop.var) continue;
+      const Stmt fetch = prefetch(*it, loop, n.body);
+      if (fetch.defined()) body = make_block({fetch, body});
+    }
+    return body;
+  }
+
+  // Undefined when the loop reads nothing of it, or no loop has the name.
+  Stmt prefetch(const PrefetchDirective& directive, const LoopName& at, const Stmt& body) {
+    const auto image = std::dynamic_pointer_cast<ParameterContents>(directive.symbol.lock());
+    const auto found = realized_.find(directive.name);
+    const std::string name = image                      ? image->name
+                             : found == realized_.end() ? directive.name
+                                                        : found->second;
+    Box box = ReadRegion(name).of(body);
+    const OuterLoop* from = find_loop(directive.from, at);
+    if (box.empty() || !from) return {};
+    const Substitution later = moved(*from, directive.offset);
+    std::vector<Range> region, data;
+    for (size_t d = 0; d < box.size(); d++) {
+      if (!box[d].is_bounded()) return {};
+      const Expr min = simplify(substitute(box[d].min, later));
+      const Expr max = simplify(substitute(box[d].max, later));
+      region.push_back({min, simplify(max - min + 1)});
+      data.push_back(extent_of_data(name, d));
+    }
+    const Type type = image ? image->type : type_of_func(directive.name);
+    return bounded(directive.strategy, name, type, region, data,
+                   image ? directive.symbol : SymbolRef());
+  }
+
+  Range extent_of_data(const std::string& name, size_t d) const {
+    const LoopedFunc* f = program_.find(original(name));
+    const std::string buffer = f && f->is_output ? value_buffer_name(*f->func, 0) : name;
+    return {variable(text(buffer, ".min.", d)), variable(text(buffer, ".extent.", d))};
+  }
+
+  Type type_of_func(const std::string& name) const {
+    const LoopedFunc* f = program_.find(name);
+    return f ? f->func->types[0] : Int(32);
+  }
+
+  const OuterLoop* find_loop(const std::string& var, const LoopName& at) const {
+    for (auto it = loops_.rbegin(); it != loops_.rend(); ++it) {
+      const LoopName loop = decode_loop_name(it->name);
+      if (loop.func == at.func && loop.stage == at.stage && loop.var == var) return &*it;
+    }
+    return nullptr;
+  }
+
+  // The loop's variable, and every let inside of the loop, as they are `offset` iterations later.
+  Substitution moved(const OuterLoop& loop, const Expr& offset) const {
+    Substitution later;
+    later[loop.name] = variable(loop.name) + cast(Int(32), offset);
+    for (size_t i = loop.lets; i < lets_.size(); i++)
+      later[lets_[i].first] = substitute(lets_[i].second, later);
+    return later;
+  }
+
+  static Stmt bounded(PrefetchBoundStrategy strategy, const std::string& name, Type type,
+                      std::vector<Range> region, const std::vector<Range>& data,
+                      const SymbolRef& symbol) {
+    Expr inside = const_true();
+    for (size_t d = 0; d < region.size(); d++) {
+      Range& part = region[d];
+      const Expr last = part.min + part.extent - 1, last_data = data[d].min + data[d].extent - 1;
+      inside = inside && data[d].min <= part.min && last <= last_data;
+      if (strategy != PrefetchBoundStrategy::Clamp) continue;
+      const Expr min = clamp(part.min, data[d].min, last_data);
+      part = {min, clamp(last, data[d].min, last_data) - min + 1};
+    }
+    const Stmt fetch = make_prefetch(name, type, region, symbol);
+    return strategy == PrefetchBoundStrategy::GuardWithIf ? make_if(inside, fetch) : fetch;
+  }
+};
+
+class PrefetchLowering : public Rewriter {
+ public:
+  PrefetchLowering(const Stmt& s, const Program& program, const RenamedFuncs& renamed)
+      : program_(program), renamed_(renamed), fresh_(s) {}
+
+ protected:
+  Expr rewrite(const Expr& e) override { return e; }
+  Stmt rewrite(const Stmt& s) override {
+    const Prefetch* n = s.as<Prefetch>();
+    return n ? lines(*n) : children(s);
+  }
+
+ private:
+  const Program& program_;
+  const RenamedFuncs& renamed_;
+  FreshNames fresh_;
+
+  Stmt lines(const Prefetch& n) {
+    if (n.symbol.defined()) {
+      return lines(n, n.type, [&](const std::vector<Expr>& point) {
+        return call_image(n.name, n.type, point, n.symbol);
+      });
+    }
+    const auto renamed = renamed_.find(n.name);
+    const LoopedFunc* f = program_.find(renamed == renamed_.end() ? n.name : renamed->second);
+    const std::vector<Type> types = f ? f->func->types : std::vector<Type>{n.type};
+    std::vector<Stmt> stmts;
+    for (size_t i = 0; i < types.size(); i++) {
+      stmts.push_back(lines(n, types[i], [&](const std::vector<Expr>& point) {
+        return call_func(n.name, types[i], point, static_cast<int>(i),
+                         f ? SymbolRef(f->func) : SymbolRef());
+      }));
+    }
+    return make_block(std::move(stmts));
+  }
+
+  // The first element of each line of dimension 0, and its last element.
+  template <class Element>
+  Stmt lines(const Prefetch& n, Type type, const Element& element) {
+    const int step = std::max(1, line_bytes / type.bytes());
+    std::vector<Expr> point;
+    std::vector<std::pair<std::string, Range>> loops;
+    for (size_t d = 0; d < n.bounds.size(); d++) {
+      const Range& range = n.bounds[d];
+      const std::string name = fresh_(text(n.name, ".prefetch.", d));
+      const Expr at = variable(name);
+      if (d == 0) {
+        loops.push_back({name, {0, simplify((range.extent + (step - 1)) / step + 1)}});
+        point.push_back(range.min + min(at * step, max(range.extent - 1, 0)));
+      } else {
+        loops.push_back({name, range});
+        point.push_back(at);
+      }
+    }
+    const Expr address = call_op(Op::address_of, Handle(), {element(point)});
+    Stmt body = make_evaluate(call_op(Op::prefetch, Int(32), {address}));
+    for (const auto& [name, range] : loops)
+      body = make_for(name, range.min, range.extent, ForType::Serial, body);
+    return body;
+  }
+};
+
+bool any_prefetch(const Program& program) {
+  for (const LoopedFunc& f : program.funcs) {
+    for (const Definition& stage : f.stages) {
+      if (!stage.schedule.prefetches.empty()) return true;
+    }
+  }
+  return false;
+}
+
+}  // namespace
+
+Stmt insert_prefetches(const Stmt& s, const Program& program, const RenamedFuncs& renamed) {
+  return any_prefetch(program) ? Inserter(program, renamed)(s) : s;
+}
+
+Stmt lower_prefetches(const Stmt& s, const Program& program, const RenamedFuncs& renamed) {
+  return any_prefetch(program) ? PrefetchLowering(s, program, renamed)(s) : s;
+}
+
+}  // namespace retrograde::ir

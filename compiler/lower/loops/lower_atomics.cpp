@@ -1,0 +1,131 @@
+// lower_atomics -- keep only what must be indivisible, and only where iterations may meet.
+// In:  FlatStorage; names unique; an Atomic holds one update of one point of a Func.
+// Out: FlatStorage. What does not read the Func is computed before the Atomic. An Atomic with one
+//      store is that store alone. Storage that no parallel loop and no Fork shares needs no Atomic.
+//
+//   parallel for (r, 0, n) {                  parallel for (r, 0, n) {
+//     atomic f {                                let t = in[r] * k
+//       let t = in[r] * k                =>     atomic f { h[in[r]] = h[in[r]] + t }
+//       h[in[r]] = h[in[r]] + t               }
+//     }
+//   }
+//
+// Method: one walk that counts the parallel loops around; an allocation remembers the count.
+// Errors: a require() that reads the element of a Tuple: it would leave with the lock held.
+// Source: folklore. Tests: test/unit/atomic_test.cpp.
+#include "lower/loops/lower_atomics.h"
+
+#include <unordered_map>
+#include <unordered_set>
+#include <vector>
+
+#include "diagnostics/error.h"
+#include "ir/atomic_update.h"
+#include "ir/build.h"
+#include "ir/visit.h"
+
+namespace retrograde::ir {
+
+namespace {
+
+using BufferNames = std::unordered_set<std::string>;
+
+BufferNames stored_in(const Stmt& s) {
+  BufferNames names;
+  walk(
+      s, [](const Expr&) { return false; },
+      [&](const Stmt& part) {
+        if (const Store* store = part.as<Store>()) names.insert(store->name);
+        return true;
+      });
+  return names;
+}
+
+// Whether the value changes when the element does: it reads the Func, or a let that does.
+bool depends_on(const Expr& e, const BufferNames& buffers, const BufferNames& lets) {
+  return any_node(e, [&](const Expr& node) {
+    const Load* load = node.as<Load>();
+    const Variable* variable = node.as<Variable>();
+    return (load && buffers.count(load->name)) || (variable && lets.count(variable->name));
+  });
+}
+
+bool may_leave(const Stmt& s) {
+  const auto requires_something = [](const Expr& e) {
+    const Call* call = e.as<Call>();
+    return call && call->is_op(Op::require);
+  };
+  return any_node(s, requires_something,
+                  [](const Stmt& part) { return part.kind() == Kind::Assert; });
+}
+
+using Lets = std::vector<std::pair<std::string, Expr>>;
+
+Stmt with_lets(const Lets& lets, Stmt body) {
+  for (size_t i = lets.size(); i-- > 0;) body = make_let(lets[i].first, lets[i].second, body);
+  return body;
+}
+
+// The update with everything that does not depend on the element in front of it.
+Stmt narrowed(const Atomic& n) {
+  const BufferNames buffers = stored_in(n.body);
+  BufferNames dependent;
+  Lets outside, inside;
+  Stmt rest = n.body;
+  for (; rest.defined() && rest.kind() == Kind::LetStmt; rest = rest.as<LetStmt>()->body) {
+    const LetStmt* let = rest.as<LetStmt>();
+    const bool stays = depends_on(let->value, buffers, dependent);
+    if (stays) dependent.insert(let->name);
+    (stays ? inside : outside).emplace_back(let->name, let->value);
+  }
+  if (!rest.defined()) return rest;
+  const Store* store = rest.as<Store>();
+  if (store && is_one_word(store->value.type())) {
+    Substitution values;
+    for (const auto& [name, value] : inside) values[name] = substitute(value, values);
+    return with_lets(outside, make_atomic(n.name, substitute(rest, values)));
+  }
+  const Stmt body = with_lets(inside, rest);
+  if (may_leave(body)) {
+    unsupported("update " + quoted(n.name) + " atomically",
+                "the values of a Tuple are updated under a lock, which must not be left",
+                "its update calls require() on what it reads of " + quoted(n.name),
+                "Check the condition outside of the update");
+  }
+  return with_lets(outside, make_atomic(n.name, body));
+}
+
+class AtomicLowering : public Rewriter {
+ protected:
+  Expr rewrite(const Expr& e) override { return e; }
+
+  Stmt rewrite(const Stmt& s) override {
+    if (const Atomic* n = s.as<Atomic>()) return is_shared(n->body) ? narrowed(*n) : n->body;
+    const Allocate* allocate = s.as<Allocate>();
+    if (allocate) depth_of_[allocate->name] = depth_;
+    const For* loop = s.as<For>();
+    const bool is_parallel = s.kind() == Kind::Fork || (loop && loop->runs == ForType::Parallel);
+    depth_ += is_parallel;
+    Stmt result = children(s);
+    depth_ -= is_parallel;
+    return result;
+  }
+
+ private:
+  bool is_shared(const Stmt& body) const {
+    for (const std::string& name : stored_in(body)) {
+      const auto found = depth_of_.find(name);
+      if (depth_ > (found == depth_of_.end() ? 0 : found->second)) return true;
+    }
+    return false;
+  }
+
+  int depth_ = 0;  // parallel loops around
+  std::unordered_map<std::string, int> depth_of_;
+};
+
+}  // namespace
+
+Stmt lower_atomics(const Stmt& s) { return s.defined() ? AtomicLowering()(s) : s; }
+
+}  // namespace retrograde::ir

@@ -1,0 +1,284 @@
+// memoize -- look the results of memoized Funcs up before they are computed.
+// In:  Loops; names unique.
+// Out: Loops.
+//
+//   realize f [min, extent] {         realize f [min, extent] {
+//     produce f { P }                   let key = pack("pipeline", "f", target, k, min, extent ...)
+//     consume f { C }           =>      let missing = lookup(key, &f(min), 4 extent)
+//   }                                   if (missing) { produce f { P }  store(key, ...) }
+//                                       consume f { C }
+//                                     }
+//
+// Method: the key names the compiled function, the Func, and holds the values of the Params that it
+//         depends on (found through all Funcs that it calls), what memoize_tag puts in place of an
+//         expression, and the region that is computed. What is kept is the whole storage.
+// Errors: a memoized Func that reads an ImageParam without memoize_tag; one that is stored outside
+//         of where it is computed; a tag or eviction key that depends on Vars.
+// Source: Halide's documentation of memoize and memoize_tag. Tests: test/unit/memoize_test.cpp.
+#include "lower/loops/memoize.h"
+
+#include <unordered_set>
+
+#include "diagnostics/error.h"
+#include "ir/build.h"
+#include "ir/visit.h"
+
+namespace retrograde::ir {
+
+namespace {
+
+const LoopedFunc* find_func(const Program& program, const RenamedFuncs& renamed,
+                            const std::string& name) {
+  const auto it = renamed.find(name);
+  return program.find(it == renamed.end() ? name : it->second);
+}
+
+bool is_memoized(const LoopedFunc* f) { return f && f->schedule.memoized; }
+
+constexpr const char* computed_extent_mark = ".computed.extent.";
+
+// ---- what a key is made of ----
+
+class Dependencies {
+ public:
+  explicit Dependencies(const LoopedFunc& f) : f_(f) { visit(*f.func); }
+  std::vector<Expr> parts;  // scalar Params and tags, in first-use order
+
+ private:
+  void visit(const FuncContents& f) {
+    if (!funcs_.insert(&f).second) return;
+    for (int s = 0; s < f.stage_count(); s++)
+      for_each_expr(f.stage(s), [&](const Expr& e) { visit(e); });
+    if (!f.extern_definition) return;
+    for (const ExternArgument& arg : f.extern_definition->args) {
+      if (arg.func) visit(*arg.func);
+      if (arg.expr.defined()) visit(arg.expr);
+      if (arg.buffer) check_image(*arg.buffer);
+    }
+  }
+
+  void visit(const Expr& e) {
+    walk(e, [&](const Expr& node) {
+      const Call* call = node.as<Call>();
+      if (call && call->is_op(Op::memoize_tag)) {
+        for (size_t i = 1; i < call->args.size(); i++) add_tag(call->args[i]);
+        return false;
+      }
+      if (call && call->call_type == CallType::Func) visit(*func_of(*call));
+      if (call && call->call_type == CallType::Image) visit_image(*call);
+      if (const Variable* variable = node.as<Variable>()) visit_variable(node, *variable);
+      return true;
+    });
+  }
+
+  void visit_image(const Call& call) {
+    const auto param = std::dynamic_pointer_cast<ParameterContents>(call.symbol.lock());
+    if (param) check_image(*param);
+  }
+
+  void check_image(const ParameterContents& param) const {
+    if (param.is_literal) return;
+    user_error(text("memoize ", quoted(f_.name())),
+               "what an image holds is no part of a memoized Func's key",
+               text(quoted(f_.name()), " depends on the ImageParam ", quoted(param.name)),
+               "Wrap what is read in memoize_tag(value, key...), with keys that change whenever "
+               "the image does");
+  }
+
+  void visit_variable(const Expr& e, const Variable& variable) {
+    const auto param = std::dynamic_pointer_cast<ParameterContents>(variable.symbol.lock());
+    if (!param || !names_.insert(variable.name).second) return;
+    if (param->is_buffer) return parts.push_back(e);  // a fact of its shape
+    parts.push_back(e);
+  }
+
+  void add_tag(const Expr& tag) {
+    check_is_constant(f_, tag, "the key of memoize_tag");
+    parts.push_back(tag);
+  }
+
+ public:
+  static void check_is_constant(const LoopedFunc& f, const Expr& e, const char* what) {
+    walk(e, [&](const Expr& node) {
+      const Variable* variable = node.as<Variable>();
+      const Call* call = node.as<Call>();
+      const bool is_param =
+          variable && std::dynamic_pointer_cast<ParameterContents>(variable->symbol.lock());
+      const bool reads = call && call->call_type != CallType::Operator;
+      if ((!variable || is_param) && !reads) return true;
+      user_error(text("memoize ", quoted(f.name())),
+                 text(what, " must be made of Params and constants"),
+                 text("it mentions ", quoted(variable ? variable->name : call->name)),
+                 "Use values that are the same for the whole call");
+      return false;
+    });
+  }
+
+ private:
+  const LoopedFunc& f_;
+  std::unordered_set<const FuncContents*> funcs_;
+  std::unordered_set<std::string> names_;
+};
+
+std::vector<Expr> bytes_of(const std::string& text) {
+  std::vector<Expr> bytes = {Expr(static_cast<int32_t>(text.size()))};
+  for (char c : text) bytes.push_back(Expr(static_cast<uint8_t>(c)));
+  return bytes;
+}
+
+void check_schedule(const LoopedFunc& f) {
+  const LoopLevel &compute = f.schedule.compute_level, &store = f.schedule.store_level;
+  const bool together =
+      store.kind == LoopLevel::Kind::Inlined ||
+      (store.kind == compute.kind && store.func == compute.func && store.var == compute.var);
+  if (f.is_output) {
+    user_error(text("memoize ", quoted(f.name())), "an output is computed by every call",
+               "it is an output of the pipeline", "Memoize a Func that the output reads");
+  }
+  if (together) return;
+  user_error(text("memoize ", quoted(f.name())),
+             "a memoized Func must be computed whole, where its storage begins",
+             "its storage level lies outside of its compute level",
+             "Leave store_at and store_root out");
+}
+
+// The region that storage is larger than, if it is: see `NestStorage::realize`.
+class ComputedExtents {
+ public:
+  void note(const std::string& let) {
+    const size_t at = let.find(computed_extent_mark);
+    if (at != std::string::npos) lets_[let.substr(0, let.find(".$", at))] = let;
+  }
+  Expr of(const LoopedFunc& f, size_t dimension, const Expr& stored) const {
+    const auto it = lets_.find(computed_extent_name(f.name(), dimension));
+    return it == lets_.end() ? stored : variable(it->second);
+  }
+
+ private:
+  std::map<std::string, std::string> lets_;  // the innermost, by name before renaming
+};
+
+class Memoizer : public Rewriter {
+ public:
+  Memoizer(const Program& program, const RenamedFuncs& renamed, const std::string& function,
+           const Target& target, const StorageFolds& folds)
+      : program_(program), renamed_(renamed), function_(function), target_(target), folds_(folds) {}
+
+ protected:
+  Expr rewrite(const Expr& e) override {
+    const Call* call = e.as<Call>();
+    return call && call->is_op(Op::memoize_tag) ? (*this)(call->args[0]) : children(e);
+  }
+
+  Stmt rewrite(const Stmt& s) override {
+    if (const Realize* n = s.as<Realize>()) bounds_[n->name] = n->bounds;
+    if (const LetStmt* n = s.as<LetStmt>()) computed_.note(n->name);
+    const ProducerConsumer* n = s.as<ProducerConsumer>();
+    const LoopedFunc* f = n && n->produces ? find_func(program_, renamed_, n->name) : nullptr;
+    if (!is_memoized(f)) return children(s);
+    check_schedule(*f);
+    return lookup(*f, n->name, children(s));
+  }
+
+ private:
+  std::vector<Expr> key_of(const LoopedFunc& f, const std::vector<Range>& bounds) {
+    std::vector<Expr> key = bytes_of(function_ + "\n" + f.name() + "\n" + target_.to_string());
+    for (const Expr& part : Dependencies(f).parts) key.push_back(part);
+    for (size_t d = 0; d < bounds.size(); d++) {
+      key.push_back((*this)(bounds[d].min));
+      key.push_back((*this)(computed_.of(f, d, bounds[d].extent)));
+    }
+    return key;
+  }
+
+  // Where storage wraps around, its first element is that of 0.
+  Expr fold_of(const LoopedFunc& f, size_t dimension) const {
+    const auto it = folds_.find(f.name());
+    return it == folds_.end() || it->second.size() <= dimension ? Expr() : it->second[dimension];
+  }
+
+  Stmt lookup(const LoopedFunc& f, const std::string& name, const Stmt& produce) {
+    const auto found = bounds_.find(name);
+    RETROGRADE_ASSERT(found != bounds_.end(), "no storage of ", name);
+    const std::vector<Range>& bounds = found->second;
+    std::vector<Expr> first;
+    Expr elements = make_const(Int(64), 1);
+    for (size_t d = 0; d < bounds.size(); d++) {
+      const Expr fold = fold_of(f, d);
+      first.push_back(fold.defined() ? Expr(0) : bounds[d].min);
+      const Expr extent = fold.defined() ? fold : max(bounds[d].extent, Expr(0));
+      elements = elements * cast(Int(64), extent);
+    }
+    std::vector<Expr> blocks, sizes;
+    for (size_t i = 0; i < f.func->types.size(); i++) {
+      const Type type = f.func->types[i];
+      blocks.push_back(call_op(Op::address_of, Handle(),
+                               {call_func(name, type, first, static_cast<int>(i), {})}));
+      sizes.push_back(elements * make_const(Int(64), type.bytes()));
+    }
+    const Expr key = call_op(Op::pack, Handle(), key_of(f, bounds));
+    const std::string prefix = name + ".memoization";
+    const std::vector<Expr> what = {variable(prefix + "_key", Handle()), Expr(key_bytes(key)),
+                                    Expr(static_cast<int32_t>(blocks.size())),
+                                    variable(prefix + "_blocks", Handle()),
+                                    variable(prefix + "_bytes", Handle())};
+    Stmt body = make_if(variable(prefix + "_missing") != 0, make_block({produce, store(f, what)}));
+    body = make_let(prefix + "_missing", call("retrograde_memoization_lookup", what), body);
+    body = make_let(prefix + "_bytes", call_op(Op::pack, Handle(), sizes), body);
+    body = make_let(prefix + "_blocks", call_op(Op::pack, Handle(), blocks), body);
+    return make_let(prefix + "_key", key, body);
+  }
+
+  static Stmt store(const LoopedFunc& f, std::vector<Expr> what) {
+    const Expr& key = f.schedule.eviction_key;
+    if (key.defined()) Dependencies::check_is_constant(f, key, "the eviction key");
+    what.push_back(Expr(key.defined() ? 1 : 0));
+    what.push_back(key.defined() ? eviction_bits(key) : make_uint_const(UInt(64), 0));
+    return make_evaluate(call("retrograde_memoization_store", what));
+  }
+
+  // Pointers and numbers of any width, as the 64 bits that evicting is asked for.
+  static Expr eviction_bits(const Expr& key) {
+    if (key.type().is_handle()) return reinterpret_as(UInt(64), key);
+    return cast(UInt(64), key);
+  }
+
+  static Expr call(const char* function, std::vector<Expr> args) {
+    args.insert(args.begin(), Expr(function));
+    return call_op(Op::runtime_call, Int(32), std::move(args));
+  }
+
+  static int32_t key_bytes(const Expr& pack) {
+    int32_t bytes = 0;
+    for (const Expr& part : pack.as<Call>()->args) bytes += part.type().bytes();
+    return bytes;
+  }
+
+  const Program& program_;
+  const RenamedFuncs& renamed_;
+  const std::string& function_;
+  const Target& target_;
+  const StorageFolds& folds_;
+  std::map<std::string, std::vector<Range>> bounds_;
+  ComputedExtents computed_;
+};
+
+bool any_memoized(const Program& program) {
+  for (const LoopedFunc& f : program.funcs) {
+    if (is_memoized(&f)) return true;
+  }
+  return false;
+}
+
+}  // namespace
+
+std::string computed_extent_name(const std::string& func, size_t dimension) {
+  return func + computed_extent_mark + std::to_string(dimension);
+}
+
+Stmt memoize(const Stmt& s, const Program& program, const RenamedFuncs& renamed,
+             const std::string& function, const Target& target, const StorageFolds& folds) {
+  return any_memoized(program) ? Memoizer(program, renamed, function, target, folds)(s) : s;
+}
+
+}  // namespace retrograde::ir

@@ -1,0 +1,263 @@
+// partition_loops -- split loops so that likely() conditions vanish from most of their iterations.
+// In:  Loops or FlatStorage, before unrolling and vectorization; names unique.
+// Out: the same phase without likely markers; the same stores in the same order; names unique.
+//
+//   for (x, 0, w) {                            for (x.$1, 0, begin) {
+//     out[x] = in[max(likely(x - 1), 0)]         out[x.$1] = in[max(x.$1 - 1, 0)]
+//   }                                    =>    }
+//                                              for (x, begin, end - begin) { out[x] = in[x - 1] }
+//
+// with  let begin = clamp(1, 0, w), let end = w,  and an epilogue where there is an upper limit. A
+// parallel loop, and one whose borders are as large as tiles, stays one loop, with an if inside.
+// Where the order of iterations is free, as in a pure definition that nothing slides in, both
+// borders of a large body are one loop before the steady state: what LLVM compiles of it is mostly
+// borders. Where it is not, a large body with loops in it stays one loop with an if inside, too.
+//
+// What likely says:  likely(c)                     c is true
+//                    min(likely(a), b), max        the marked operand is the result
+//                    select(c, likely(a), b)       the marked arm is the result
+// A marked value stays marked through lets, arithmetic, min, max and select, so that
+// max(min(likely(x), hi), lo) is x. Once a min, max or select was decided by a mark, arithmetic
+// ends it: that a split's min(likely(xo*8), n - 8) is xo*8 says nothing of what is computed from
+// there.
+//
+// Method: outermost loop first. One walk over the body of a loop rewrites it as if its likely
+//         conditions held, and asks analysis/linear.h where each of them holds: an interval of the
+//         loop variable, for all values of inner vectorized and unrolled loops and of loops with
+//         constant extents. Conditions without such an interval stay. The intersection of the
+//         intervals is the steady state. Inner loops are then partitioned in the steady state
+//         only; in the rest too where the rest may be large (a border of whole tiles) and the body
+//         is small.
+//         A loop is cut only if that saves something that is worth the copies (`Saving` in
+//         steady_state.h), or if the schedule says always.
+// Not done: a condition that both this loop and an inner loop of unknown extent decide: it is left
+//         to the inner loop. Ends that depend on the lane of an enclosing vectorized loop: the
+//         worst lane decides.
+// Source: folklore (index-set splitting).
+// Tests: test/golden/lower/partition_loops/, test/property/loop_passes_test.cpp.
+#include "lower/loops/partition_loops.h"
+
+#include <string>
+#include <unordered_set>
+
+#include "ir/build.h"
+#include "ir/visit.h"
+#include "lower/loops/steady_state.h"
+#include "lower/nests/copy_statement.h"
+#include "simplify/simplify.h"
+
+namespace retrograde::ir {
+
+namespace {
+
+// Border bodies with more nodes than this are not partitioned further.
+constexpr int small_body = 1500;
+// Both borders of bodies with more nodes than this are one loop, where the order allows it.
+constexpr int costly_border = 200;
+// An operation less an iteration is worth a copy of a body that has up to this many nodes.
+constexpr int nodes_an_operation = 64;
+
+bool contains_likely(const Stmt& s) {
+  return any_node(
+      s, [](const Expr& e) { return is_likely(e.as<Call>()); }, [](const Stmt&) { return false; });
+}
+
+int node_count(const Stmt& s) {
+  int count = 0;
+  auto visit = [&](const auto&) { return ++count, true; };
+  walk(
+      s, [&](const Expr& e) { return visit(e); }, [&](const Stmt& child) { return visit(child); });
+  return count;
+}
+
+bool contains_loop(const Stmt& s) {
+  return any_stmt(s, [](const Stmt& child) {
+    const For* loop = child.as<For>();
+    return loop && is_serial(*loop);
+  });
+}
+
+// "f" of the loop "f.s0.x" of its pure definition; else nothing.
+std::string func_of_pure_loop(const std::string& loop) {
+  const size_t stage = loop.find(".s0.");
+  return stage == std::string::npos ? "" : loop.substr(0, stage);
+}
+
+// Whether the loop is one of a pure definition, each of whose points is written once, and nothing
+// in it stores anywhere else for later iterations to find.
+bool runs_in_any_order(const For& loop) {
+  const std::string func = func_of_pure_loop(loop.name);
+  if (func.empty()) return false;
+  std::unordered_set<std::string> own;
+  bool result = true;
+  const auto is_of_func = [&](const std::string& name) {
+    return name == func || name.compare(0, func.size() + 1, func + ".") == 0;
+  };
+  walk(
+      loop.body, [](const Expr&) { return true; },
+      [&](const Stmt& s) {
+        if (const auto* a = s.as<Allocate>()) own.insert(a->name);
+        if (const auto* store = s.as<Store>())
+          result &= is_of_func(store->name) || own.contains(store->name);
+        result &= !s.as<Evaluate>() && !s.as<Provide>();
+        return result;
+      });
+  return result;
+}
+
+class Partitioner : public Rewriter {
+ public:
+  explicit Partitioner(const Stmt& s) : fresh_(s) {}
+
+ protected:
+  Expr rewrite(const Expr& e) override { return e; }
+
+  Stmt rewrite(const Stmt& s) override {
+    if (const For* loop = s.as<For>()) return contains_likely(s) ? partition(s, *loop) : s;
+    const LetStmt* let = s.as<LetStmt>();
+    if (let && in_vectorized_ > 0) context_.add_let(let->name, let->value);
+    return children(s);
+  }
+
+ private:
+  Stmt partition(const Stmt& s, const For& loop) {
+    if (!is_serial(loop)) return inside_lanes(s, loop);
+    if (loop.partition == Partition::Never) return children(s);
+    SteadyRewriter rewriter(loop, context_, in_vectorized_ > 0);
+    Stmt body = rewriter(loop.body);
+    const SteadyState& steady = rewriter.steady();
+    if (steady.solved == 0 || !is_worth_copies(loop, steady.saving)) return children(s);
+    Stmt rest = loop.body;
+    if (steady.has_thick_border && node_count(rest) <= small_body) rest = (*this)(rest);
+    return assemble(loop, (*this)(body), rest, steady);
+  }
+
+  static bool is_worth_copies(const For& loop, const Saving& saving) {
+    if (saving.always_pays || loop.partition == Partition::Always) return true;
+    if (saving.operations == 0) return false;
+    return saving.divides || node_count(loop.body) <= nodes_an_operation * saving.operations;
+  }
+
+  // Loops inside a vectorized one have the same bounds in all lanes.
+  Stmt inside_lanes(const Stmt& s, const For& loop) {
+    context_.add_loop(loop);
+    ++in_vectorized_;
+    Stmt result = children(s);
+    --in_vectorized_;
+    return result;
+  }
+
+  struct Ends {
+    Expr begin, end;  // of the steady state; undefined where it begins or ends with the loop
+  };
+
+  static Ends find_ends(const For& loop, const SteadyState& steady) {
+    Expr loop_end = simplify(binary(Kind::Add, loop.min, loop.extent));
+    Ends ends;
+    const Interval& range = steady.range;
+    if (range.min.defined()) ends.begin = simplify(range.min);
+    if (range.max.defined())
+      ends.end = simplify(binary(Kind::Add, range.max, make_one(range.max.type())));
+    if (ends.begin.defined() && can_prove(ends.begin <= loop.min)) ends.begin = {};
+    if (ends.end.defined() && can_prove(ends.end >= loop_end)) ends.end = {};
+    return ends;
+  }
+
+  Stmt assemble(const For& loop, const Stmt& steady_body, const Stmt& rest,
+                const SteadyState& steady) {
+    Ends ends = find_ends(loop, steady);
+    if (!ends.begin.defined() && !ends.end.defined() && !steady.needed.defined()) {
+      return make_for(loop.name, loop.min, loop.extent, loop.runs, steady_body);
+    }
+    const bool stays_one = loop.runs == ForType::Parallel || steady.has_thick_border ||
+                           has_costly_borders_in_order(loop, rest, ends);
+    return stays_one ? branch_inside(loop, steady_body, rest, ends, steady.needed)
+                     : three_loops(loop, steady_body, rest, ends, steady.needed);
+  }
+
+  // Two borders that must stay on their sides would be two copies; a branch around a large body
+  // costs nothing beside it.
+  static bool has_costly_borders_in_order(const For& loop, const Stmt& rest, const Ends& ends) {
+    return ends.begin.defined() && ends.end.defined() && contains_loop(rest) &&
+           node_count(rest) > costly_border && !runs_in_any_order(loop);
+  }
+
+  Stmt branch_inside(const For& loop, const Stmt& steady_body, const Stmt& rest, const Ends& ends,
+                     const Expr& needed) {
+    Expr var = variable(loop.name, loop.min.type());
+    std::vector<Expr> conditions;
+    std::vector<std::pair<std::string, Expr>> lets;
+    auto bind = [&](const char* what, const Expr& value) -> Expr {
+      if (is_const(value) || value.as<Variable>()) return value;
+      lets.emplace_back(fresh_(loop.name + what), value);
+      return variable(lets.back().first, value.type());
+    };
+    if (ends.begin.defined()) conditions.push_back(var >= bind(".begin", ends.begin));
+    if (ends.end.defined()) conditions.push_back(var < bind(".end", ends.end));
+    if (needed.defined()) conditions.push_back(bind(".steady", needed));
+    Stmt body = make_if(conjunction(conditions), steady_body, copy_statement(rest, fresh_));
+    Stmt result = make_for(loop.name, loop.min, loop.extent, loop.runs, body);
+    for (size_t i = lets.size(); i-- > 0;) result = make_let(lets[i].first, lets[i].second, result);
+    return result;
+  }
+
+  // loop.min <= begin <= end <= loop_end, whatever the loop's extent.
+  Stmt three_loops(const For& loop, const Stmt& steady_body, const Stmt& rest, const Ends& ends,
+                   const Expr& needed) {
+    Expr loop_end = simplify(binary(Kind::Add, loop.min, loop.extent));
+    std::string begin_name = fresh_(loop.name + ".begin"), end_name = fresh_(loop.name + ".end");
+    bool has_prologue = ends.begin.defined();
+    Expr begin = has_prologue ? variable(begin_name, loop.min.type()) : loop.min;
+    Expr end = ends.end.defined() ? simplify(min(ends.end, loop_end)) : loop_end;
+    if (needed.defined()) end = make_select(needed, end, begin);
+    bool has_epilogue = ends.end.defined() || needed.defined();
+    Expr end_value = simplify(max(end, begin));
+    if (has_epilogue) end = variable(end_name, loop.min.type());
+
+    std::vector<Stmt> loops;
+    if (has_prologue && has_epilogue && node_count(rest) > costly_border &&
+        runs_in_any_order(loop)) {
+      loops.push_back(both_borders(loop, begin, end, loop_end, rest));
+      has_prologue = has_epilogue = false;
+    }
+    if (has_prologue) loops.push_back(border_loop(loop, loop.min, begin, rest));
+    loops.push_back(make_for(loop.name, begin, simplify(end - begin), loop.runs, steady_body));
+    if (has_epilogue) loops.push_back(border_loop(loop, end, loop_end, rest));
+    Stmt result = make_block(std::move(loops));
+    if (end.as<Variable>() && uses_variable(result, end_name))
+      result = make_let(end_name, end_value, result);
+    if (!ends.begin.defined()) return result;
+    return make_let(begin_name, simplify(max(min(ends.begin, loop_end), loop.min)), result);
+  }
+
+  Stmt border_loop(const For& loop, const Expr& begin, const Expr& end, const Stmt& body) {
+    return copy_statement(make_for(loop.name, begin, simplify(end - begin), loop.runs, body),
+                          fresh_);
+  }
+
+  // border 0, 1, ... of [loop.min, begin) and then of [end, loop_end)
+  Stmt both_borders(const For& loop, const Expr& begin, const Expr& end, const Expr& loop_end,
+                    const Stmt& body) {
+    const Type type = loop.min.type();
+    const Expr before = simplify(begin - loop.min);
+    const Expr border = variable(loop.name + ".border", type);
+    const Expr place = make_select(border < before, border + loop.min, border + (end - before));
+    return copy_statement(
+        make_for(loop.name + ".border", make_zero(type), simplify(before + (loop_end - end)),
+                 loop.runs, make_let(loop.name, simplify(place), body)),
+        fresh_);
+  }
+
+  FreshNames fresh_;
+  PartitionContext context_;
+  int in_vectorized_ = 0;
+};
+
+}  // namespace
+
+Stmt partition_loops(const Stmt& s) {
+  if (!s.defined() || !contains_likely(s)) return s;
+  return MarkerRemover()(Partitioner(s)(s));
+}
+
+}  // namespace retrograde::ir

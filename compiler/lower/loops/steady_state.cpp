@@ -1,0 +1,255 @@
+#include "lower/loops/steady_state.h"
+
+#include <algorithm>
+
+#include "analysis/linear.h"
+#include "ir/build.h"
+#include "simplify/simplify.h"
+
+namespace retrograde::ir {
+
+namespace {
+
+// A border is thick when the inner loops that a condition is about run a serial loop of at least
+// this extent, ...
+constexpr int64_t thick_loop = 8;
+// ... and at least this many points in all: a tile then, and not a stencil or a vector.
+constexpr int64_t thick_points = 32;
+
+// A loop whose extent varies has at most so many iterations if it follows what is unrolled around
+// it: what is prepared for its copies, say. No more than they does it count as a loop.
+constexpr int short_iterations = 4;
+
+bool is_short(const For& loop, const Substitution& lets) {
+  return !is_const(loop.extent) &&
+         can_prove(substitute(loop.extent, lets) <= Expr(short_iterations));
+}
+
+bool contains_serial_loop(const Stmt& s) {
+  Substitution lets;
+  return any_stmt(s, [&](const Stmt& part) {
+    if (const auto* let = part.as<LetStmt>(); let && let->value.type() == Int(32))
+      lets[let->name] = let->value;
+    const For* loop = part.as<For>();
+    return loop && is_serial(*loop) && !is_short(*loop, lets);
+  });
+}
+
+bool is_pure(const Expr& e) {
+  if (!e.type().is_int_or_uint() || !e.type().is_scalar()) return false;
+  return !any_node(e, [](const Expr& node) {
+    const Call* call = node.as<Call>();
+    const bool is_pure_call = !call || (call->call_type == CallType::Operator &&
+                                        op_info(call->op).cls != OpClass::Effect);
+    return !is_pure_call || node.kind() == Kind::Load || node.kind() == Kind::Let;
+  });
+}
+
+std::unordered_set<std::string> variables_of(const Expr& e) {
+  std::unordered_set<std::string> names;
+  walk(e, [&](const Expr& node) {
+    if (const Variable* v = node.as<Variable>()) names.insert(v->name);
+    return true;
+  });
+  return names;
+}
+
+}  // namespace
+
+bool is_likely(const Call* call) {
+  return call && (call->is_op(Op::likely) || call->is_op(Op::likely_if_innermost));
+}
+
+bool is_serial(const For& loop) {
+  return loop.runs == ForType::Serial || loop.runs == ForType::Parallel;
+}
+
+Expr MarkerRemover::rewrite(const Expr& e) {
+  Expr copy = children(e);
+  const Call* call = copy.as<Call>();
+  return is_likely(call) ? call->args[0] : copy;
+}
+
+void PartitionContext::add_let(const std::string& name, const Expr& value) {
+  if (is_pure(value)) {
+    lets_[name] = expand(value);
+  } else {
+    ranges_.push(name, Interval::everything());
+  }
+}
+
+void PartitionContext::add_loop(const For& loop) {
+  Expr last =
+      binary(Kind::Sub, binary(Kind::Add, loop.min, loop.extent), make_one(loop.min.type()));
+  add_range(loop.name,
+            {bounds_of(expand(loop.min), ranges_).min, bounds_of(expand(last), ranges_).max});
+}
+
+SteadyRewriter::SteadyRewriter(const For& loop, const PartitionContext& outer, bool inside_lanes)
+    : loop_(loop),
+      context_(outer),
+      inside_lanes_(inside_lanes),
+      has_inner_loops_(contains_serial_loop(loop.body)),
+      dependent_{loop.name} {}
+
+Expr SteadyRewriter::rewrite(const Expr& e) {
+  if (const Let* n = e.as<Let>()) return rewrite_let(e, *n);
+  if (const Variable* v = e.as<Variable>()) {
+    auto it = decided_lets_.find(v->name);
+    return it == decided_lets_.end() ? e : it->second;
+  }
+  Expr copy = children(e);
+  if (const Call* n = e.as<Call>(); is_likely(n) && e.type().is_bool() && is_mark(*n)) {
+    return holds(copy.as<Call>()->args[0], true, true) ? const_true() : copy;
+  }
+  if (e.kind() == Kind::Min || e.kind() == Kind::Max) return rewrite_extreme(*e.as<Binary>(), copy);
+  if (const Select* n = e.as<Select>()) return rewrite_select(*n, copy);
+  if (e.kind() == Kind::Div || e.kind() == Kind::Mod)
+    steady_.saving.divides |= uses_any_variable(context_.expand(e), dependent_);
+  return copy;
+}
+
+Stmt SteadyRewriter::rewrite(const Stmt& s) {
+  if (const LetStmt* n = s.as<LetStmt>()) {
+    Expr value = bind(n->name, n->value);
+    Stmt body = (*this)(n->body);
+    return value.same_as(n->value) && body.same_as(n->body) ? s : make_let(n->name, value, body);
+  }
+  if (const For* n = s.as<For>()) return rewrite_loop(s, *n);
+  Stmt copy = children(s);
+  const IfThenElse* n = copy.defined() ? copy.as<IfThenElse>() : nullptr;
+  if (n && is_const_true(n->condition)) return n->when_true;
+  if (n && is_const_false(n->condition)) return n->when_false;
+  return copy;
+}
+
+Expr SteadyRewriter::rewrite_let(const Expr& e, const Let& n) {
+  Expr value = bind(n.name, n.value);
+  Expr body = (*this)(n.body);
+  if (is_const(body)) return body;
+  return value.same_as(n.value) && body.same_as(n.body) ? e : make_let(n.name, value, body);
+}
+
+// The value of a let. Marks and decided conditions go on into the body.
+Expr SteadyRewriter::bind(const std::string& name, const Expr& original) {
+  Expr value = (*this)(original);
+  context_.add_let(name, value);
+  marked_lets_[name] = mark(original);
+  if (is_const(value) && !value.same_as(original)) decided_lets_[name] = value;
+  return value;
+}
+
+// Inner loops of unknown extent keep their variables to themselves.
+Stmt SteadyRewriter::rewrite_loop(const Stmt& s, const For& n) {
+  auto extent = as_const_int(simplify(n.extent));
+  if (!is_serial(n) || extent) {
+    inner_extents_[n.name] = extent.value_or(1);
+    context_.add_loop(n);
+    if (uses_any_variable(context_.expand(n.min), dependent_)) dependent_.insert(n.name);
+  } else {
+    context_.add_range(n.name, Interval::everything());
+  }
+  if (n.runs == ForType::Vectorized) lanes_.insert(n.name);
+  if (!is_serial(n)) return children(s);
+  inner_serial_.insert(n.name);
+  enclosing_.push_back(n.name);
+  Stmt copy = children(s);
+  enclosing_.pop_back();
+  return copy;
+}
+
+Expr SteadyRewriter::rewrite_extreme(const Binary& n, const Expr& copy) {
+  const Binary* op = copy.as<Binary>();
+  const Mark a_mark = mark(n.a), b_mark = mark(n.b);
+  if (a_mark == b_mark || !op || copy.kind() != n.kind) return copy;
+  const Expr& kept = a_mark > b_mark ? op->a : op->b;
+  const Expr& other = a_mark > b_mark ? op->b : op->a;
+  const Kind comparison = n.kind == Kind::Min ? Kind::LE : Kind::GE;
+  return holds(binary(comparison, kept, other), true, false) ? kept : copy;
+}
+
+Expr SteadyRewriter::rewrite_select(const Select& n, const Expr& copy) {
+  const Select* op = copy.as<Select>();
+  const Mark t_mark = mark(n.when_true), f_mark = mark(n.when_false);
+  if (t_mark == f_mark || !op) return copy;
+  if (!holds(op->condition, t_mark > f_mark, true)) return copy;
+  return t_mark > f_mark ? op->when_true : op->when_false;
+}
+
+// Whether e is computed from something marked, not counting what it loads.
+SteadyRewriter::Mark SteadyRewriter::mark(const Expr& e) {
+  if (auto it = marks_.find(e.get()); it != marks_.end()) return it->second;
+  const auto decided = [&](const Expr& a, const Expr& b) {
+    return std::max(mark(a), mark(b)) == Mark::None ? Mark::None : Mark::Decided;
+  };
+  const auto arithmetic = [&](const Binary& n) {
+    if (n.type.is_bool()) return Mark::None;
+    if (n.kind == Kind::Min || n.kind == Kind::Max) return decided(n.a, n.b);
+    const Mark strongest = std::max(mark(n.a), mark(n.b));
+    return n.kind == Kind::Mod && strongest == Mark::Decided ? Mark::None : strongest;
+  };
+  const Mark result = match(
+      e,
+      [&](const Variable& n) {
+        auto it = marked_lets_.find(n.name);
+        return it == marked_lets_.end() ? Mark::None : it->second;
+      },
+      [&](const Call& n) {
+        if (is_likely(&n)) return is_mark(n) ? Mark::Likely : mark(n.args[0]);
+        bool is_promise = n.is_op(Op::promise_clamped) || n.is_op(Op::unsafe_promise_clamped);
+        return is_promise ? mark(n.args[0]) : Mark::None;
+      },
+      [&](const Cast& n) { return mark(n.value); }, [&](const Let& n) { return mark(n.body); },
+      [&](const Select& n) { return decided(n.when_true, n.when_false); }, arithmetic,
+      [&](const ExprNode&) { return Mark::None; });
+  marks_.emplace(e.get(), result);
+  return result;
+}
+
+// Whether the steady state can be where the condition is `is_true`; then it is from now on. A
+// choice skips what it does not choose, where an extreme is but an operation.
+bool SteadyRewriter::holds(const Expr& condition, bool is_true, bool is_choice) {
+  Expr expanded = context_.expand(is_true ? condition : logical_not(condition));
+  if (!uses_any_variable(expanded, dependent_)) return false;
+  auto solution = solve_for(expanded, loop_.name, context_.ranges());
+  if (!solution) return false;
+  ++steady_.solved;
+  steady_.range = intersection(steady_.range, solution->interval);
+  if (solution->needed.defined()) {
+    steady_.needed = steady_.needed.defined() ? binary(Kind::And, steady_.needed, solution->needed)
+                                              : solution->needed;
+  }
+  const std::unordered_set<std::string> names = variables_of(expanded);
+  steady_.has_thick_border |= is_about_tiles(names);
+  count_saving(names, is_choice);
+  return true;
+}
+
+void SteadyRewriter::count_saving(const std::unordered_set<std::string>& names, bool is_choice) {
+  const bool over_lanes = std::any_of(lanes_.begin(), lanes_.end(), [&](const std::string& lane) {
+    return names.count(lane) != 0;
+  });
+  if (inside_lanes_ || over_lanes) {
+    steady_.saving.always_pays = true;
+    return;
+  }
+  if (enclosing_.empty() && has_inner_loops_) return;
+  if (is_choice) {
+    steady_.saving.always_pays = true;
+  } else if (enclosing_.empty() || names.count(enclosing_.back())) {
+    ++steady_.saving.operations;
+  }
+}
+
+bool SteadyRewriter::is_about_tiles(const std::unordered_set<std::string>& names) const {
+  int64_t points = 1, longest = 0;
+  for (const std::string& name : names) {
+    auto it = inner_extents_.find(name);
+    if (it == inner_extents_.end()) continue;
+    points *= it->second;
+    if (inner_serial_.count(name)) longest = std::max(longest, it->second);
+  }
+  return longest >= thick_loop && points >= thick_points;
+}
+
+}  // namespace retrograde::ir

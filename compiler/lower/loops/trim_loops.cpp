@@ -1,0 +1,192 @@
+// trim_loops -- a condition that holds in one stretch of a loop becomes the ends of the loop.
+// In:  Loops or FlatStorage, before unrolling and vectorization; names unique.
+// Out: the same phase; the same stores in the same order; names unique.
+//
+//   for (r, 0, 130) {                         let r.end = min(n - 130*y, 130)
+//     if (130*y + r < n && x < 62) {    =>    for (r, 0, max(r.end, 0)) {
+//       out[x] = out[x] + in[r]                if (x < 62) { out[x] = out[x] + in[r] }
+//     }                                      }
+//   }
+//
+// and (x < 62) ends the loop over x in turn. Gathers over domains that are no boxes, and where() of
+// a user's RDom, look like this. A condition that is the same in all iterations goes around the
+// loop.
+//
+// Method: a loop is trimmed where all of its body stands under the condition (looking through lets,
+//         inner loops and further conditions without an else). Each conjunct is brought into the
+//         form  c*v + rest >= 0  with a constant c, rest free of the loop's variable v and of
+//         what is bound inside the loop: then v >= -floor(rest / c), or v <= floor(rest / -c), says
+//         exactly the same, and the conjunct goes away. A conjunct without v and what is bound
+//         inside goes around the loop. Loops with a constant extent of a few iterations keep their
+//         ends: they are unrolled with their conditions.
+// Not done: ends that depend on the lane of an enclosing vectorized loop; several
+//           statements, each under a condition of its own.
+// Source: folklore (loop bounds from guards). Tests: test/golden/lower/trim_loops/,
+// test/property/loop_passes_test.cpp.
+#include "lower/loops/trim_loops.h"
+
+#include <unordered_set>
+
+#include "analysis/linear.h"
+#include "ir/build.h"
+#include "ir/lets.h"
+#include "ir/memory_reads.h"
+#include "ir/visit.h"
+#include "lower/loops/steady_state.h"
+#include "lower/nests/copy_statement.h"
+#include "simplify/simplify.h"
+
+namespace retrograde::ir {
+
+namespace {
+
+// Constant extents up to this one are left alone.
+constexpr int64_t untrimmed_iterations = 16;
+
+bool may_end_elsewhere(const For& loop) {
+  const auto extent = as_const_int(loop.extent);
+  return !extent || *extent > untrimmed_iterations;
+}
+
+// Takes conditions on one loop out of its body.
+class Trimmer {
+ public:
+  // `lanes`: names with a value of their own in each lane around the loop.
+  Trimmer(const For& loop, const std::unordered_set<std::string>& lanes)
+      : loop_(loop), unusable_(lanes) {}
+
+  Stmt trim(const Stmt& s) {
+    return match(
+        s,
+        [&](const LetStmt& n) {
+          Expr value = substitute(without_lets(n.value), lets_);
+          if (reads_memory(value, MemoryReads::Functions)) {
+            unusable_.insert(n.name);
+          } else {
+            lets_[n.name] = value;
+          }
+          return with_body(s, n.body);
+        },
+        [&](const For& n) {
+          unusable_.insert(n.name);
+          return with_body(s, n.body);
+        },
+        [&](const IfThenElse& n) {
+          if (n.when_false.defined()) return s;
+          Expr rest = without_ends(n.condition);
+          Stmt body = trim(n.when_true);
+          if (is_const_true(rest)) return body;
+          return rest.same_as(n.condition) && body.same_as(n.when_true) ? s : make_if(rest, body);
+        },
+        [&](const StmtNode&) { return s; });
+  }
+
+  // The loop with a trimmed body between its new ends.
+  Stmt assemble(const Stmt& body, FreshNames& fresh) const {
+    Expr begin = loop_.min, end = binary(Kind::Add, loop_.min, loop_.extent);
+    for (const Expr& e : begins_) begin = binary(Kind::Max, begin, e);
+    for (const Expr& e : lasts_)
+      end = binary(Kind::Min, end, binary(Kind::Add, e, make_one(e.type())));
+    begin = simplify(begin);
+    const Type type = begin.type();
+    const bool is_simple = is_const(begin) || begin.as<Variable>();
+    Expr from = is_simple ? begin : variable(fresh(loop_.name + ".begin"), type);
+    Expr extent = simplify(max(binary(Kind::Sub, end, from), make_zero(type)));
+    Stmt loop = make_for(loop_.name, from, extent, loop_.runs, body);
+    if (!around_.empty()) loop = make_if(conjunction(around_), loop);
+    return is_simple ? loop : make_let(from.as<Variable>()->name, begin, loop);
+  }
+
+  bool found() const { return !begins_.empty() || !lasts_.empty() || !around_.empty(); }
+
+ private:
+  Stmt with_body(const Stmt& s, const Stmt& body) {
+    Stmt trimmed = trim(body);
+    if (trimmed.same_as(body)) return s;
+    return map_children(
+        s, [](const Expr& e) { return e; },
+        [&](const Stmt& child) { return child.same_as(body) ? trimmed : child; });
+  }
+
+  // The condition less the conjuncts that became ends or go around the loop.
+  Expr without_ends(const Expr& condition) {
+    if (condition.kind() == Kind::And) {
+      const auto* both = condition.as<Binary>();
+      Expr a = without_ends(both->a), b = without_ends(both->b);
+      if (a.same_as(both->a) && b.same_as(both->b)) return condition;
+      return is_const_true(a) ? b : is_const_true(b) ? a : binary(Kind::And, a, b);
+    }
+    if (const auto* let = condition.as<Let>())
+      return without_ends(substitute(let->body, let->name, let->value));
+    const Expr open = substitute(without_lets(condition), lets_);
+    return goes_around(open) || becomes_end(open) ? const_true() : condition;
+  }
+
+  bool is_known_outside(const Expr& condition) const {
+    return !reads_memory(condition, MemoryReads::Functions) &&
+           !uses_any_variable(condition, unusable_);
+  }
+
+  bool goes_around(const Expr& condition) {
+    if (!is_known_outside(condition) || uses_any_variable(condition, {loop_.name})) return false;
+    around_.push_back(condition);
+    return true;
+  }
+
+  bool becomes_end(const Expr& condition) {
+    if (!may_end_elsewhere(loop_) || !is_known_outside(condition)) return false;
+    auto form = nonnegative_where(condition);
+    if (!form || form->type != loop_.min.type()) return false;
+    const int64_t c = form->coefficient_of(loop_.name);
+    if (c == 0) return false;
+    LinearForm own{form->type, {{variable(loop_.name, form->type), 1}}, 0};
+    Expr rest = to_expr(plus(*form, own, -c));
+    if (!rest.defined() || uses_any_variable(rest, {loop_.name})) return false;
+    Expr quotient = canonical_div(rest, c > 0 ? c : -c);
+    if (c > 0) {
+      begins_.push_back(simplify(binary(Kind::Sub, make_zero(quotient.type()), quotient)));
+    } else {
+      lasts_.push_back(simplify(quotient));
+    }
+    return true;
+  }
+
+  const For& loop_;
+  std::unordered_set<std::string> unusable_;
+  Substitution lets_;
+  std::vector<Expr> begins_, lasts_;  // the variable lies between them
+  std::vector<Expr> around_;          // without the variable
+};
+
+class LoopTrimmer : public Rewriter {
+ public:
+  explicit LoopTrimmer(const Stmt& s) : fresh_(s) {}
+
+ protected:
+  Expr rewrite(const Expr& e) override { return e; }
+
+  Stmt rewrite(const Stmt& s) override {
+    if (const auto* let = s.as<LetStmt>()) {
+      if (uses_any_variable(let->value, lanes_)) lanes_.insert(let->name);
+      return children(s);
+    }
+    const auto* loop = s.as<For>();
+    if (!loop) return children(s);
+    if (loop->runs == ForType::Vectorized) lanes_.insert(loop->name);
+    if (!is_serial(*loop)) return children(s);
+    Trimmer trimmer(*loop, lanes_);
+    Stmt body = trimmer.trim(loop->body);
+    if (!trimmer.found()) return children(s);
+    return trimmer.assemble((*this)(body), fresh_);
+  }
+
+ private:
+  FreshNames fresh_;
+  std::unordered_set<std::string> lanes_;  // names are unique: none is ever taken away
+};
+
+}  // namespace
+
+Stmt trim_loops(const Stmt& s) { return LoopTrimmer(s)(s); }
+
+}  // namespace retrograde::ir

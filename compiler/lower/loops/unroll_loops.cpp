@@ -1,0 +1,130 @@
+// unroll_loops -- copy the body of every Unrolled loop once per iteration.
+// In:  any phase; names unique; extents of Unrolled loops are constants, or have constants above
+//      them: by what they are, or by the conditions around the loop.
+// Out: the same phase without Unrolled loops; the same stores in the same order; names unique.
+//
+//   unrolled for (x, a, 2) {          f[a] = g[a]
+//     f[x] = g[x]               =>    f[a + 1] = g[a + 1]
+//   }
+//
+//   unrolled for (x, a, min(n, 2)) {  if (0 < min(n, 2)) f[a] = g[a]
+//     f[x] = g[x]               =>    if (1 < min(n, 2)) f[a + 1] = g[a + 1]
+//   }
+//
+// Method: inner loops first; copies after the first get fresh names for everything that they bind.
+//         Of select(x == 0, .., select(x == 1, ..)) a copy has its own arm, which is looked up: n
+//         copies of a choice from n arms take n steps.
+// Not done: a limit on the size of the result: the user asked for the copies.
+// Source: folklore. Tests: test/golden/lower/unroll_loops/.
+#include "lower/loops/unroll_loops.h"
+
+#include <algorithm>
+#include <optional>
+
+#include "diagnostics/error.h"
+#include "ir/build.h"
+#include "ir/print.h"
+#include "ir/visit.h"
+#include "lower/loops/choice_arms.h"
+#include "lower/nests/copy_statement.h"
+#include "simplify/facts.h"
+#include "simplify/simplify.h"
+
+namespace retrograde::ir {
+
+namespace {
+
+constexpr int64_t most_guarded = 256;  // copies of a loop whose extent is not known
+
+class Unroller : public Rewriter {
+ public:
+  explicit Unroller(const Stmt& s) : fresh_(s) {}
+
+ protected:
+  Expr rewrite(const Expr& e) override { return e; }  // statements only
+
+  Stmt rewrite(const Stmt& s) override {
+    if (const IfThenElse* choice = s.as<IfThenElse>()) return chosen(*choice, s);
+    if (const LetStmt* let = s.as<LetStmt>()) values_[let->name] = let->value;
+    Stmt inner = children(s);
+    const For* loop = inner.as<For>();
+    if (!loop || loop->runs != ForType::Unrolled) return inner;
+    if (auto extent = as_const_int(simplify(loop->extent))) return unrolled(*loop, *extent, false);
+    if (auto most = largest(loop->extent)) return unrolled(*loop, *most, true);
+    user_error(
+        "unroll " + describe_loop(loop->name),
+        "the extent of an unrolled loop must be a constant, or have a constant above it",
+        text("its extent is ", loop->extent),
+        "Unroll the inner variable of a split by a constant, promise the extent with bound(), or "
+        "say under which condition it is small: specialize(extent <= 4)");
+  }
+
+ private:
+  FreshNames fresh_;
+  Substitution values_;           // of names around the statement at hand, as they are written
+  std::vector<Expr> conditions_;  // that hold there
+
+  Stmt chosen(const IfThenElse& choice, const Stmt& s) {
+    const auto under = [&](const Expr& condition, const Stmt& branch) {
+      if (!branch.defined()) return branch;
+      conditions_.push_back(condition);
+      Stmt result = (*this)(branch);
+      conditions_.pop_back();
+      return result;
+    };
+    const Stmt when_true = under(choice.condition, choice.when_true);
+    const Stmt when_false = under(!choice.condition, choice.when_false);
+    if (when_true.same_as(choice.when_true) && when_false.same_as(choice.when_false)) return s;
+    return make_if(choice.condition, when_true, when_false);
+  }
+
+  // In terms of names that are not bound by lets.
+  Expr in_full(const Expr& e) const {
+    Substitution needed;
+    walk(e, [&](const Expr& part) {
+      const Variable* v = part.as<Variable>();
+      const auto value = v ? values_.find(v->name) : values_.end();
+      if (value != values_.end() && !needed.count(v->name))
+        needed[v->name] = in_full(value->second);
+      return true;
+    });
+    return needed.empty() ? e : substitute(e, needed);
+  }
+
+  // A constant that the extent does not exceed where the loop runs.
+  std::optional<int64_t> largest(const Expr& extent) const {
+    Facts facts;
+    for (const Expr& condition : conditions_) facts.assume(simplify(in_full(condition)));
+    const Expr value = simplify(in_full(extent));
+    const int64_t most = std::min(facts.range(value).max, facts.upper_bound(sum_of(value)));
+    return most <= most_guarded ? std::optional(std::max<int64_t>(most, 0)) : std::nullopt;
+  }
+
+  Stmt unrolled(const For& loop, int64_t extent, bool is_guarded) {
+    std::vector<Stmt> copies;
+    ChoiceArms arms(loop.name);
+    const bool chooses = arms.has_any(loop.body);
+    for (int64_t i = 0; i < extent; ++i) {
+      Expr value = binary(Kind::Add, loop.min, make_const(loop.min.type(), i));
+      const auto number = chooses ? as_const_int(value) : std::nullopt;
+      const Stmt body = number ? arms.choose(loop.body, *number) : loop.body;
+      Substitution iteration{{loop.name, value}};
+      Stmt copy = i == 0 ? substitute(body, iteration) : copy_statement(body, fresh_, iteration);
+      const Expr runs = make_const(loop.extent.type(), i) < loop.extent;
+      copies.push_back(is_guarded ? make_if(runs, copy) : copy);
+    }
+    return copies.empty() ? make_evaluate(0) : make_block(std::move(copies));
+  }
+};
+
+}  // namespace
+
+Stmt unroll_loops(const Stmt& s) {
+  const bool has_unrolled = any_stmt(s, [](const Stmt& node) {
+    const For* loop = node.as<For>();
+    return loop && loop->runs == ForType::Unrolled;
+  });
+  return has_unrolled ? Unroller(s)(s) : s;
+}
+
+}  // namespace retrograde::ir

@@ -1,0 +1,78 @@
+#include "lower/nests/compute_place.h"
+
+#include "ir/build.h"
+#include "simplify/simplify.h"
+
+namespace retrograde::ir {
+
+Expr ComputePlace::name(const std::string& name, const Expr& value, bool always) {
+  if (!always && (is_const(value) || value.as<Variable>())) return value;
+  bindings.emplace_back(name, value);
+  return variable(name);
+}
+
+Range ComputePlace::bind(const std::string& name, Interval& range) {
+  Expr extent = simplify(range.max - range.min + 1);
+  range.min = this->name(name + ".min", simplify(range.min), false);
+  if (is_const(extent)) {
+    range.max = simplify(range.min + extent - 1);
+  } else {
+    range.max = this->name(name + ".max", simplify(range.max), false);
+    extent = simplify(range.max - range.min + 1);
+  }
+  return {range.min, extent};
+}
+
+Range ComputePlace::bind_part(const std::string& name, const Slide& slide, Interval& range) {
+  Expr extent = simplify(slide.part.max - slide.part.min + 1);
+  Interval whole = slide.whole;
+  range.min = this->name(name + ".min", slide.part.min, true);
+  if (is_const(extent)) {
+    range.max = simplify(range.min + extent - 1);
+    whole.max = simplify(whole.max - extent + 1);
+    note_part(range.min, whole, slide.starts_whole ? whole : Interval::point(slide.part.min));
+  } else {
+    range.max = this->name(name + ".max", slide.part.max, true);
+    extent = simplify(range.max - range.min + 1);
+    note_part(range.min, whole, slide.starts_whole ? whole : Interval::point(slide.part.min));
+    note_part(range.max, whole, slide.starts_whole ? whole : Interval::point(slide.part.max));
+  }
+  return {range.min, extent};
+}
+
+void ComputePlace::note_part(const Expr& end, const Interval& whole, const Interval& touched) {
+  const std::string& name = end.as<Variable>()->name;
+  parts_.push_back(name);
+  whole_.push(name, whole);
+  touched_.push(name, touched);
+}
+
+void ComputePlace::learn_names() {
+  for (; known_ < bindings.size(); known_++) {
+    const auto& [name, value] = bindings[known_];
+    if (!whole_.contains(name)) values_[name] = simplify(substitute(value, values_));
+  }
+}
+
+Expr ComputePlace::without_names(const Expr& e) {
+  learn_names();
+  return simplify(substitute(e, values_));
+}
+
+Box ComputePlace::expand(const Box& box, const Scope<Interval>& parts) {
+  learn_names();
+  Box result = box;
+  for (Interval& side : result) {
+    for (Expr* end : {&side.min, &side.max}) {
+      if (!end->defined()) continue;
+      *end = simplify(substitute(*end, values_));
+      if (parts_.empty()) continue;
+      Interval range = bounds_of(*end, parts);
+      *end = end == &side.min ? range.min : range.max;
+      if (end->defined()) *end = simplify(*end);
+    }
+  }
+  return result;
+}
+
+}  // namespace retrograde::ir

@@ -1,0 +1,169 @@
+#include "lower/nests/copy_statement.h"
+
+#include <cctype>
+#include <map>
+
+#include "diagnostics/error.h"
+#include "ir/build.h"
+
+namespace retrograde::ir {
+
+namespace {
+
+// Without the number of a copy.
+std::string original_name(const std::string& name) {
+  size_t mark = name.rfind(".$");
+  bool is_copy = mark != std::string::npos && mark + 2 < name.size() &&
+                 name.find_first_not_of("0123456789", mark + 2) == std::string::npos;
+  return is_copy ? name.substr(0, mark) : name;
+}
+
+template <class Found>
+void for_each_name(const Stmt& s, Found found) {
+  walk(
+      s,
+      [&](const Expr& e) {
+        if (const Variable* v = e.as<Variable>()) found(v->name);
+        if (const Let* let = e.as<Let>()) found(let->name);
+        if (const Load* load = e.as<Load>()) found(load->name);
+        const Call* call = e.as<Call>();
+        if (call && call->call_type != CallType::Operator) found(call->name);
+        return true;
+      },
+      [&](const Stmt& node) {
+        match(
+            node, [&](const LetStmt& n) { found(n.name); }, [&](const For& n) { found(n.name); },
+            [&](const Store& n) { found(n.name); }, [&](const Provide& n) { found(n.name); },
+            [&](const Realize& n) { found(n.name); }, [&](const Allocate& n) { found(n.name); },
+            [](const StmtNode&) {});
+        return true;
+      });
+}
+
+// One flat map of new names suffices, since names are unique.
+class Copier : public Rewriter {
+ public:
+  Copier(const Stmt& s, FreshNames& fresh, const Substitution& values) : values_(values) {
+    walk(
+        s,
+        [&](const Expr& e) {
+          if (const Let* let = e.as<Let>()) rename(let->name, fresh);
+          return true;
+        },
+        [&](const Stmt& node) {
+          match(
+              node, [&](const LetStmt& n) { rename(n.name, fresh); },
+              [&](const For& n) { rename(n.name, fresh); },
+              [&](const Allocate& n) { rename(n.name, fresh); },
+              [&](const Realize& n) { rename(n.name, fresh); }, [](const StmtNode&) {});
+          return true;
+        });
+  }
+
+ protected:
+  Expr rewrite(const Expr& e) override {
+    if (const Variable* v = e.as<Variable>()) {
+      if (auto it = values_.find(v->name); it != values_.end()) return it->second;
+      auto it = names_.find(v->name);
+      return it == names_.end() ? e : Expr(new Variable(v->type, it->second, v->symbol));
+    }
+    Expr copy = children(e);
+    if (const Let* n = copy.as<Let>()) return make_let(name_of(n->name), n->value, n->body);
+    if (const Load* n = copy.as<Load>()) {
+      return is_renamed(n->name)
+                 ? make_load(n->type, name_of(n->name), n->index, n->predicate, n->symbol)
+                 : copy;
+    }
+    const Call* n = copy.as<Call>();
+    if (!n || n->call_type != CallType::Func || !is_renamed(n->name)) return copy;
+    return call_func(name_of(n->name), n->type, n->args, n->component, n->symbol);
+  }
+
+  Stmt rewrite(const Stmt& s) override {
+    Stmt copy = children(s);
+    if (!copy.defined()) return copy;
+    return match(
+        copy, [&](const LetStmt& n) { return make_let(name_of(n.name), n.value, n.body); },
+        [&](const For& n) {
+          return make_for(name_of(n.name), n.min, n.extent, n.runs, n.body, n.partition);
+        },
+        [&](const Allocate& n) {
+          return make_allocate(name_of(n.name), n.type, n.memory, n.elements, n.body);
+        },
+        [&](const Realize& n) {
+          return make_realize(name_of(n.name), n.types, n.memory, n.bounds, n.body);
+        },
+        [&](const Store& n) {
+          return is_renamed(n.name)
+                     ? make_store(name_of(n.name), n.value, n.index, n.predicate, n.symbol)
+                     : copy;
+        },
+        [&](const Provide& n) {
+          return is_renamed(n.name) ? make_provide(name_of(n.name), n.values, n.args, n.predicate)
+                                    : copy;
+        },
+        [&](const Free& n) { return is_renamed(n.name) ? make_free(name_of(n.name)) : copy; },
+        [&](const Atomic& n) { return make_atomic(name_of(n.name), n.body); },
+        [&](const Prefetch& n) {
+          return make_prefetch(name_of(n.name), n.type, n.bounds, n.symbol);
+        },
+        [&](const StmtNode&) { return copy; });
+  }
+
+ private:
+  void rename(const std::string& name, FreshNames& fresh) {
+    auto [it, is_new] = names_.emplace(name, "");
+    if (is_new) it->second = fresh(name);
+  }
+  bool is_renamed(const std::string& name) const { return names_.count(name) > 0; }
+  const std::string& name_of(const std::string& name) const {
+    auto it = names_.find(name);
+    return it == names_.end() ? name : it->second;
+  }
+
+  const Substitution& values_;
+  std::unordered_map<std::string, std::string> names_;
+};
+
+}  // namespace
+
+void FreshNames::read_program() {
+  if (!program_.defined()) return;
+  for_each_name(program_, [&](const std::string& name) { taken_.insert(name); });
+  program_ = Stmt();
+}
+
+std::string FreshNames::operator()(const std::string& model) {
+  read_program();
+  std::string base = original_name(model), name;
+  do {
+    name = base + ".$" + std::to_string(++next_[base]);
+  } while (!taken_.insert(name).second);
+  return name;
+}
+
+Stmt copy_statement(const Stmt& s, FreshNames& fresh, const Substitution& values) {
+  return s.defined() ? Copier(s, fresh, values)(s) : s;
+}
+
+LoopName decode_loop_name(const std::string& name) {
+  std::string loop = original_name(name);
+  for (size_t dot = loop.find(".s"); dot != std::string::npos; dot = loop.find(".s", dot + 1)) {
+    size_t end = dot + 2;
+    while (end < loop.size() && std::isdigit(static_cast<unsigned char>(loop[end]))) ++end;
+    if (end > dot + 2 && end < loop.size() && loop[end] == '.') {
+      return {loop.substr(0, dot), loop.substr(dot + 2, end - dot - 2), loop.substr(end + 1)};
+    }
+  }
+  return {"", "", loop};
+}
+
+std::string describe_loop(const std::string& loop) {
+  LoopName name = decode_loop_name(loop);
+  if (name.func.empty()) return quoted(name.var);
+  std::string text = quoted(name.var) + " of " + quoted(name.func);
+  return name.stage == "0" ? text
+                           : text + " (update " + std::to_string(std::stoi(name.stage) - 1) + ")";
+}
+
+}  // namespace retrograde::ir

@@ -1,0 +1,212 @@
+// Funcs that are computed at one place: consumers first, each group of Funcs that share loops once.
+#include <algorithm>
+
+#include "ir/build.h"
+#include "ir/visit.h"
+#include "lower/nests/nest_checks.h"
+#include "lower/nests/nest_emitter.h"
+#include "lower/nests/promised_bounds.h"
+#include "simplify/simplify.h"
+
+namespace retrograde::ir {
+
+// A Func whose values nothing reads here is not computed, also when others run with it elsewhere.
+std::vector<int> NestEmitter::needed_of(const FusedGroup& group, const Emitted& code) const {
+  std::vector<int> needed;
+  for (const int f : group.funcs) {
+    if (program_.funcs[f].is_output || code.uses.count(program_.funcs[f].name()))
+      needed.push_back(f);
+  }
+  return needed;
+}
+
+Emitted NestEmitter::emit_place(const std::vector<int>& children, Emitted code,
+                                ComputePlace& site) {
+  std::vector<Piece> pieces;
+  WantedFuncs wanted;
+  Stmt inner = code.stmt;
+  for (const auto& [name, use] : code.uses) wanted[name] = {};
+  for (auto it = children.rbegin(); it != children.rend(); ++it) {
+    const FusedGroup& group = groups_[group_of_[*it]];
+    if (*it != group.funcs.back()) continue;  // the group is dealt with as a whole
+    const std::vector<int> needed = needed_of(group, code);
+    if (needed.empty()) continue;
+    const bool is_whole = needed.size() == group.funcs.size();
+    pieces.push_back(emit_piece(is_whole ? group : part_of(group, needed), code, wanted, site));
+  }
+  for (const Piece& piece : pieces) code.lead = std::max(code.lead, piece.lead);
+  code.stmt = assemble(pieces, inner, code, site);
+  return code;
+}
+
+namespace {
+
+// What starts later than the loop around does.
+Stmt running_from(int lead, const Stmt& stmt, const Emitted& code, const ComputePlace& site) {
+  if (lead == code.lead || !stmt.defined()) return stmt;
+  const Loop& loop = site.around[0];
+  Expr runs = variable(loop.name) >= simplify(loop.min - lead);
+  return make_if(code.has_loops ? runs : likely(runs), stmt);
+}
+
+}  // namespace
+
+Stmt NestEmitter::assemble(const std::vector<Piece>& pieces, Stmt stmt, const Emitted& code,
+                           const ComputePlace& site) {
+  stmt = running_from(0, stmt, code, site);
+  for (const Piece& piece : pieces) {
+    Stmt produce = piece.produce;
+    for (auto f = piece.funcs.rbegin(); f != piece.funcs.rend(); ++f) {
+      produce = make_producer_consumer((*f)->name(), true, produce);
+      if (stmt.defined()) stmt = make_producer_consumer((*f)->name(), false, stmt);
+    }
+    stmt = make_block({running_from(piece.lead, produce, code, site), stmt});
+    for (const auto& [f, box] : piece.realized) stmt = storage_.realize(*f, box, stmt);
+  }
+  return stmt;
+}
+
+Box NestEmitter::take_required(const LoopedFunc& f, Emitted& code, Box& touched,
+                               std::vector<Stmt>& checks) {
+  Box required;
+  if (auto use = code.uses.find(f.name()); use != code.uses.end()) {
+    required = use->second.box;
+    code.uses.erase(use);
+    code.read_rounded.erase(f.name());
+  }
+  if (auto more = code.touched.extract(f.name())) {
+    const bool has_own_storage =
+        !f.is_output && !f.func->is_extern() && !f.schedule.memoized && !f.schedule.async;
+    if (has_own_storage)
+      touched = more.mapped();
+    else
+      required = hull(required, more.mapped());
+  }
+  if (f.is_output) required = output_box(f, required);
+  check_bounded(program_, f, required);
+  apply_promised_bounds(f, required, checks);
+  return required;
+}
+
+namespace {
+
+int slide_lead(const std::vector<Slide>& slides, int lead, const ComputePlace& site) {
+  for (const Slide& slide : slides) {
+    if (slide.loop.name == site.around[0].name) return slide.lead;
+  }
+  return lead;
+}
+
+// Iterations before the first of a loop run for some consumers only; what the others would read
+// in them may lie outside of all that is ever needed. (A part that slides begins where it must.)
+void clamp_to_needed(Box& required, const std::vector<Slide>& slides, ComputePlace& site) {
+  const std::string& loop = site.around[0].name;
+  const Box whole = site.whole(required), ever = ranged_over({site.around[0]}, whole);
+  for (size_t d = 0; d < required.size(); d++) {
+    bool slid = std::any_of(slides.begin(), slides.end(), [&](const Slide& slide) {
+      return slide.dimension == static_cast<int>(d) && slide.loop.name == loop;
+    });
+    if (slid) continue;
+    if (uses_variable(whole[d].min, loop)) required[d].min = max(required[d].min, ever[d].min);
+    if (uses_variable(whole[d].max, loop)) required[d].max = min(required[d].max, ever[d].max);
+  }
+}
+
+}  // namespace
+
+// Funcs that share loops begin in the same iteration of the loop around: in the first in which any
+// of them must. What that gives to one may let another one begin earlier still.
+NestEmitter::Wanted NestEmitter::slide_together(std::vector<Member>& members,
+                                                const WantedFuncs& wanted,
+                                                ComputePlace& site) const {
+  Wanted all{0, 0};
+  for (size_t i = 0; i < members.size(); i++) {
+    const auto found = wanted.find(members[i].f->name());
+    const Wanted own = found == wanted.end() ? Wanted() : found->second;
+    all.first = std::max(all.first, own.first);
+    all.last = i == 0 ? own.last : std::min(all.last, own.last);
+  }
+  const bool slides = options_.slide && !site.around.empty();
+  for (size_t round = 0; slides && round <= members.size() + 1; round++) {
+    const int lead = all.first;
+    for (Member& member : members) {
+      member.slides.clear();
+      const bool is_last_round = round > members.size();  // they do not agree
+      if (!member.loops.empty() && !is_last_round)
+        member.slides =
+            slides_of(*member.f, site.whole(member.need), member.loops, site.around, lead);
+      all.first = std::max(all.first, slide_lead(member.slides, lead, site));
+    }
+    if (all.first == lead || members.size() == 1) break;
+  }
+  return all;
+}
+
+// Computes a group: takes it out of what `code` uses, and adds what the group itself needs.
+NestEmitter::Piece NestEmitter::emit_piece(const FusedGroup& group, Emitted& code,
+                                           WantedFuncs& wanted, ComputePlace& site) {
+  Piece piece;
+  std::vector<Stmt> checks;
+  std::vector<Member> members;
+  for (const int index : group.funcs) {
+    const LoopedFunc& f = program_.funcs[index];
+    piece.funcs.push_back(&f);
+    Box touched;
+    Box required = take_required(f, code, touched, checks);
+    members.push_back(
+        {&f, std::move(required), loops_to_storage(f, site), {}, {}, std::move(touched)});
+  }
+  const Wanted want = slide_together(members, wanted, site);
+  piece.lead = want.first;
+  for (Member& member : members) {
+    if (want.first != want.last) clamp_to_needed(member.need, member.slides, site);
+  }
+  for (Member& member : members) member.required = member.need;
+  Emitted made = emit_members(group, members, site, std::move(checks));
+  std::map<std::string, Box> allocated = std::move(made.storage);
+  made.storage.clear();
+  for (Member& member : members) {
+    auto own = allocated.extract(member.f->name());
+    member.need = hull(own.mapped(), member.touched);
+  }
+  made.storage = std::move(allocated);
+  for (const auto& [name, use] : made.uses) {
+    auto [it, is_first] = wanted.emplace(name, Wanted{piece.lead, piece.lead});
+    if (is_first || !code.uses.count(name)) it->second = {piece.lead, piece.lead};
+    it->second.first = std::max(it->second.first, piece.lead);
+    it->second.last = std::min(it->second.last, piece.lead);
+  }
+  merge_code(code, made);
+  for (Member& member : members) keep(member, member.need, code, made, piece, site);
+  piece.produce = made.stmt;
+  return piece;
+}
+
+// Finds storage for what was computed of a Func.
+void NestEmitter::keep(Member& member, Box allocated, Emitted& code, Emitted& made, Piece& piece,
+                       ComputePlace& site) {
+  const LoopedFunc& f = *member.f;
+  if (f.is_output) {
+    outputs_[f.name()] = allocated;
+    return;
+  }
+  Box touched = hull(member.required, allocated);
+  made.stmt =
+      storage_.fold(f, touched, member.loops, member.slides, code.has_vectors, site, made.stmt);
+  if (f.schedule.async && !member.loops.empty())
+    storage_.note_async_room(f, member.slides, site.touched(touched));
+  if (is_stored_where_computed(f)) {
+    piece.realized.emplace_back(&f, allocated);
+    storage_.note_place(f, allocated, code.storage);
+  } else {
+    code.storage[f.name()] = hull(code.storage[f.name()], allocated);
+  }
+}
+
+Box NestEmitter::output_box(const LoopedFunc& f, const Box& read) {
+  check_storage_of_output(f);
+  outputs_[f.name()] = read;  // what others read of it must lie inside, too
+  return buffer_box(value_buffer_name(*f.func, 0), f.func->dimensions());
+}
+
+}  // namespace retrograde::ir

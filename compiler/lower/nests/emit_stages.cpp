@@ -1,0 +1,241 @@
+// The stages of a group: their regions, last nest first, and the loops of each nest, from the
+// innermost body of every stage up to the place where the group is computed.
+#include <algorithm>
+
+#include "diagnostics/error.h"
+#include "ir/build.h"
+#include "ir/visit.h"
+#include "lower/nests/emit_definition.h"
+#include "lower/nests/extern_stage.h"
+#include "lower/nests/nest_checks.h"
+#include "lower/nests/nest_emitter.h"
+#include "lower/nests/shared_loops.h"
+#include "lower/nests/specialize.h"
+#include "simplify/simplify.h"
+
+namespace retrograde::ir {
+
+namespace {
+
+// Names the region of a stage, and gives it in terms of the names. `need` becomes the same.
+Domain bind_domain(const LoopedFunc& f, int s, Box& need, const std::vector<Slide>& slides,
+                   ComputePlace& site) {
+  Domain domain;
+  const std::string prefix = stage_prefix(f.name(), s);
+  for (size_t d = 0; d < need.size(); d++) {
+    auto slide = std::find_if(slides.begin(), slides.end(), [&](const Slide& candidate) {
+      return candidate.dimension == static_cast<int>(d);
+    });
+    const std::string& arg = f.func->args[d];
+    domain[arg] = slide == slides.end() ? site.bind(prefix + arg, need[d])
+                                        : site.bind_part(prefix + arg, *slide, need[d]);
+  }
+  for (const ReductionVariable& r : f.stages[s].rvars) {
+    Expr min = cast(Int(32), r.min), extent = cast(Int(32), r.extent);
+    Interval range{min, simplify(min + extent - 1)};
+    domain[r.var] = site.bind(prefix + r.var, range);
+  }
+  return domain;
+}
+
+}  // namespace
+
+Emitted NestEmitter::emit_members(const FusedGroup& group, std::vector<Member>& members,
+                                  ComputePlace& site, std::vector<Stmt> stmts) {
+  Emitted result;
+  std::vector<Stmt> nests(group.nests.size());
+  const auto member_of = [&](const FusedStage& stage) -> Member& {
+    const auto it = std::find(group.funcs.begin(), group.funcs.end(), stage.func);
+    return members[it - group.funcs.begin()];
+  };
+  for (size_t n = group.nests.size(); n-- > 0;) {
+    std::vector<NestStage> stages;
+    for (const FusedStage& stage : group.nests[n].stages) {
+      Member& member = member_of(stage);
+      const bool is_last = stage.stage + 1 == static_cast<int>(member.f->stages.size());
+      Domain domain = bind_domain(*member.f, stage.stage, member.need,
+                                  is_last ? member.slides : std::vector<Slide>(), site);
+      stages.push_back({member.f, stage.stage, std::move(domain)});
+    }
+    Emitted code = stages[0].f->func->is_extern()
+                       ? emit_extern(*stages[0].f, stages[0].domain, site)
+                       : emit_variants(group.nests[n], stages, site);
+    leave_rounded(stages[0], code);
+    for (const FusedStage& stage : group.nests[n].stages)
+      widen_by_own_reads(member_of(stage), code);
+    nests[n] = code.stmt;
+    merge_code(result, code);
+  }
+  stmts.insert(stmts.end(), nests.begin(), nests.end());
+  result.stmt = make_block(std::move(stmts));
+  for (Member& member : members) {
+    Box box = simplified(member.need);
+    if (member.f->is_output) box = hull(box, outputs_[member.f->name()]);
+    result.storage[member.f->name()] = std::move(box);
+  }
+  return result;
+}
+
+// Outside of its loops, a stage needs what the points of its domain read. What loops that round up
+// read beyond that must be there, and no more.
+void NestEmitter::leave_rounded(const NestStage& stage, Emitted& code) const {
+  for (const std::string& name : code.read_rounded) {
+    Box& needed = code.uses.at(name).box;
+    Box& touched = code.touched[name];
+    touched = hull(touched, needed);
+    needed = read_inside(*stage.f, stage.stage, stage.domain, values_, name);
+  }
+  code.read_rounded.clear();
+}
+
+// What an update reads of its own Func, the stages before it compute.
+void NestEmitter::widen_by_own_reads(Member& member, Emitted& code) const {
+  const auto self = code.uses.find(member.f->name());
+  if (self == code.uses.end()) return;
+  Box wider = hull(member.need, self->second.box);
+  // Along a slide every stage stays inside of the part, and must: of a part that is empty a
+  // hull would have one end, where an earlier stage alone would run again.
+  for (const Slide& slide : member.slides) wider[slide.dimension] = member.need[slide.dimension];
+  member.need = std::move(wider);
+  check_bounded(program_, *member.f, member.need);
+  code.uses.erase(self);
+}
+
+Emitted NestEmitter::emit_extern(const LoopedFunc& f, const Domain& domain,
+                                 ComputePlace& site) const {
+  ExternStage stage = emit_extern_stage(program_, f, domain);
+  for (auto& binding : stage.bindings) site.bindings.push_back(std::move(binding));
+  Emitted code;
+  code.stmt = stage.call;
+  code.uses = std::move(stage.uses);
+  code.has_loops = true;
+  return code;
+}
+
+namespace {
+
+// Where a condition over parameters chooses between two boxes, so does what needs to be there.
+void choose_box(const Expr& condition, Box& chosen, Box& other) {
+  for (size_t d = 0; d < std::min(chosen.size(), other.size()); d++) {
+    for (auto end : {&Interval::min, &Interval::max}) {
+      Expr &a = chosen[d].*end, &b = other[d].*end;
+      if (!a.defined() || !b.defined() || is_zero(simplify(a - b))) continue;
+      a = b = select(condition, a, b);
+    }
+  }
+}
+
+}  // namespace
+
+// The nest as each specialization of its first stage has it: if (condition) this one else the next.
+Emitted NestEmitter::emit_variants(const FusedNest& nest, std::vector<NestStage> stages,
+                                   ComputePlace& home) {
+  const NestStage& first = stages[0];
+  if (first.f->stages[first.stage].schedule.specializations.empty())
+    return emit_nest(nest, std::move(stages), home);
+  const std::vector<Variant> variants = variants_of(*first.f, first.stage);
+  Emitted result;
+  for (auto it = variants.rbegin(); it != variants.rend(); ++it) {
+    Emitted code;
+    if (it->failure.empty()) {
+      std::vector<NestStage> variant = stages;
+      variant[0].f = &it->func;
+      code = emit_variants(nest, std::move(variant), home);
+    } else {
+      code.stmt = fail_specialized(*first.f, it->failure);
+    }
+    if (!it->condition.defined()) {
+      result = std::move(code);
+      continue;
+    }
+    code.stmt = make_if(it->condition, code.stmt, result.stmt);
+    for (auto& [name, use] : result.uses) choose_box(it->condition, code.uses[name].box, use.box);
+    for (auto& [name, box] : result.storage) choose_box(it->condition, code.storage[name], box);
+    merge_code(code, result);
+    result = std::move(code);
+  }
+  return result;
+}
+
+namespace {
+
+Loop& loop_at(std::vector<Loop>& loops, int depth) { return loops[loops.size() - depth]; }
+
+// By how much the loop variable of a stage exceeds that of the stage it is aligned to, which it
+// shares the loop with.
+Expr shift_of(LoopAlignStrategy align, const Interval& own, const Interval& other) {
+  switch (align) {
+    case LoopAlignStrategy::AlignStart:
+      return own.min - other.min;
+    case LoopAlignStrategy::AlignEnd:
+      return own.max - other.max;
+    case LoopAlignStrategy::NoAlign:
+    case LoopAlignStrategy::Auto:
+      return 0;
+  }
+  internal_error("an unknown way to align loops");
+}
+
+}  // namespace
+
+Emitted NestEmitter::emit_nest(const FusedNest& nest, std::vector<NestStage> stages,
+                               ComputePlace& home) {
+  for (size_t i = 0; i < stages.size(); i++) {
+    NestStage& stage = stages[i];
+    const FusedStage& plan = nest.stages[i];
+    stage.nest = build_stage_nest(*stage.f, stage.stage, stage.domain);
+    if (plan.joins < 0) continue;
+    NestStage& host = stages[plan.joins];
+    NestStage& other = stages[plan.aligned_to];
+    host.guests.push_back(static_cast<int>(i));
+    for (int d = 1; d <= plan.depth; d++) {
+      Loop& loop = loop_at(stage.nest.loops, d);
+      loop.runs_in = loop_at(host.nest.loops, d).known_as();
+      const auto more = static_cast<size_t>(d) <= other.shift.size() ? other.shift[d - 1] : Expr(0);
+      const Expr shift =
+          shift_of(plan.align[d - 1], loop.range(), loop_at(other.nest.loops, d).range());
+      const bool aligned = plan.align[d - 1] == LoopAlignStrategy::AlignStart ||
+                           plan.align[d - 1] == LoopAlignStrategy::AlignEnd;
+      stage.shift.push_back(simplify(aligned ? shift + more : shift));
+    }
+  }
+  Emitted code = emit_stage(nest, stages, 0, home);
+  merge_strands(code);
+  return code;
+}
+
+// One stage with those that join its loops, inside of the loops that it shares itself.
+Emitted NestEmitter::emit_stage(const FusedNest& nest, std::vector<NestStage>& stages, int index,
+                                ComputePlace& home) {
+  NestStage& own = stages[index];
+  const LoopedFunc& f = *own.f;
+  std::vector<Loop>& loops = own.nest.loops;
+  Emitted code;
+  code.stmt = emit_definition(f, own.stage, own.nest);
+  code.uses = requirements_of(f, own.stage, own.nest, values_);
+  if (never_stores(f, own.stage, code.uses)) code.stmt = make_evaluate(0);
+  const bool is_alone =
+      nest.stages.size() == 1 && f.stages[own.stage].schedule.specializations.empty();
+  if (is_alone) code.read_rounded = funcs_read_rounded(f, own.stage, own.nest, code.uses);
+  code = emit_children(computed_innermost_in(f), std::move(code), loops, 0, home);
+  for (size_t i = 0; i < loops.size(); i++) {
+    const int depth = static_cast<int>(loops.size() - i);
+    if (depth <= nest.stages[index].depth) return code;
+    for (const int guest : own.guests) {
+      const FusedStage& plan = nest.stages[guest];
+      if (plan.depth != depth) continue;
+      std::vector<Expr> shift = stages[guest].shift;
+      for (int d = 0; d < depth && d < static_cast<int>(own.shift.size()); d++)
+        shift[d] = simplify(shift[d] - own.shift[d]);
+      Emitted joining = emit_stage(nest, stages, guest, home);
+      join(code, {loops, home}, std::move(joining), stages[guest].nest.loops, shift, depth);
+    }
+    code = emit_children(children_at(f, own.stage, loops[i]), std::move(code), loops, i, home);
+    code = store_here(f, own.stage, std::move(code), loops, i, home);
+    check_parallel(f, loops[i], code);
+    wrap(loops[i], code);
+  }
+  return code;
+}
+
+}  // namespace retrograde::ir

@@ -1,0 +1,68 @@
+#include "lower/nests/emitted.h"
+
+#include "ir/build.h"
+#include "simplify/simplify.h"
+
+namespace retrograde::ir {
+
+void map_boxes(Needs& needs, const std::function<Box(const Box&)>& map) {
+  for (auto& [name, use] : needs.uses) use.box = map(use.box);
+  for (auto& [name, box] : needs.storage) box = map(box);
+  for (auto& [name, box] : needs.touched) box = map(box);
+}
+
+Box ranged_over(const std::vector<Loop>& loops, Box box) {
+  if (loops.empty()) return box;
+  Scope<Interval> ranges;
+  for (const Loop& loop : loops) ranges.push(loop.name, loop.range());
+  for (Interval& side : box) {
+    if (side.min.defined()) side.min = bounds_of(side.min, ranges).min;
+    if (side.max.defined()) side.max = bounds_of(side.max, ranges).max;
+  }
+  return box;
+}
+
+void range_over_loops(Needs& needs) {
+  if (needs.unranged.empty()) return;
+  map_boxes(needs, [&](const Box& box) { return ranged_over(needs.unranged, box); });
+  needs.unranged.clear();
+}
+
+Box simplified(Box box) {
+  for (Interval& side : box) {
+    if (side.min.defined()) side.min = simplify(side.min);
+    if (side.max.defined()) side.max = simplify(side.max);
+  }
+  return box;
+}
+
+void merge_needs(Needs& into, const Needs& from) {
+  for (const auto& [name, use] : from.uses) into.read_rounded.erase(name);
+  merge_footprints(into.uses, from.uses);
+  for (const auto& [name, box] : from.storage) into.storage[name] = hull(into.storage[name], box);
+  for (const auto& [name, box] : from.touched) into.touched[name] = hull(into.touched[name], box);
+}
+
+void merge_code(Emitted& into, const Emitted& from) {
+  merge_needs(into, from);
+  into.has_loops |= from.has_loops;
+  into.has_vectors |= from.has_vectors;
+}
+
+void wrap(const Loop& loop, Emitted& code) {
+  Expr min = code.lead > 0 ? simplify(loop.min - code.lead) : loop.min;
+  Expr extent = code.lead > 0 ? simplify(loop.extent + code.lead) : loop.extent;
+  code.stmt = make_for(loop.name, min, extent, loop.runs, code.stmt, loop.partition);
+  code.lead = 0;
+  code.unranged.push_back(loop);
+  for (Strand& strand : code.strands) {
+    strand.unranged.push_back(strand.loops.back());
+    strand.loops.pop_back();
+    strand.at.pop_back();
+  }
+  code.has_loops |=
+      loop.runs == ForType::Parallel || (loop.runs == ForType::Serial && !is_one(loop.extent));
+  code.has_vectors |= loop.runs == ForType::Vectorized;
+}
+
+}  // namespace retrograde::ir

@@ -1,0 +1,148 @@
+#include "lower/nests/make_names_unique.h"
+
+#include <unordered_map>
+#include <unordered_set>
+
+#include "ir/build.h"
+#include "lower/nests/copy_statement.h"
+
+namespace retrograde::ir {
+namespace {
+
+using Renamings = std::unordered_map<std::string, std::string>;  // those in force
+
+const std::string& current(const Renamings& renamings, const std::string& name) {
+  auto it = renamings.find(name);
+  return it == renamings.end() ? name : it->second;
+}
+
+// Uses of renamed variables and Funcs in one expression.
+class UseRenamer : public Rewriter {
+ public:
+  explicit UseRenamer(const Renamings& renamings) : renamings_(renamings) {}
+
+ protected:
+  using Rewriter::rewrite;
+  Expr rewrite(const Expr& e) override {
+    if (const Variable* v = e.as<Variable>()) {
+      if (renamings_.count(v->name)) return variable(renamings_.at(v->name), v->type, v->symbol);
+      const std::string fact = renamed_fact(v->name);
+      return fact.empty() ? e : variable(fact, v->type, v->symbol);
+    }
+    Expr result = children(e);
+    const Call* call = result.as<Call>();
+    if (!call || call->call_type != CallType::Func || !renamings_.count(call->name)) return result;
+    return call_func(renamings_.at(call->name), call->type, call->args, call->component,
+                     call->symbol);
+  }
+
+ private:
+  // "f.stride.1" of a Func that is "f.$1" here.
+  std::string renamed_fact(const std::string& name) const {
+    for (const char* fact : {".stride.", ".min.", ".extent."}) {
+      const size_t at = name.rfind(fact);
+      if (at == std::string::npos) continue;
+      const auto it = renamings_.find(name.substr(0, at));
+      if (it != renamings_.end()) return it->second + name.substr(at);
+    }
+    return {};
+  }
+
+  const Renamings& renamings_;
+};
+
+class Uniquifier {
+ public:
+  explicit Uniquifier(const Stmt& s) : fresh_(s) {}
+
+  Stmt rename(const Stmt& s) {
+    return match(
+        s,
+        [&](const LetStmt& let) {
+          Expr value = rename(let.value);
+          Binding name(*this, let.name);
+          return make_let(name.unique, value, rename(let.body));
+        },
+        [&](const For& loop) {
+          Expr min = rename(loop.min), extent = rename(loop.extent);
+          Binding name(*this, loop.name);
+          return make_for(name.unique, min, extent, loop.runs, rename(loop.body), loop.partition);
+        },
+        [&](const Realize& realize) {
+          std::vector<Range> bounds;
+          for (const Range& range : realize.bounds)
+            bounds.push_back({rename(range.min), rename(range.extent)});
+          Binding name(*this, realize.name);
+          if (name.unique != realize.name) original[name.unique] = realize.name;
+          return make_realize(name.unique, realize.types, realize.memory, bounds,
+                              rename(realize.body));
+        },
+        [&](const ProducerConsumer& part) {
+          return make_producer_consumer(current(renamings_, part.name), part.produces,
+                                        rename(part.body));
+        },
+        [&](const Atomic& atomic) {
+          return make_atomic(current(renamings_, atomic.name), rename(atomic.body));
+        },
+        [&](const Prefetch& prefetch) {
+          std::vector<Range> bounds;
+          for (const Range& range : prefetch.bounds)
+            bounds.push_back({rename(range.min), rename(range.extent)});
+          return make_prefetch(current(renamings_, prefetch.name), prefetch.type, bounds,
+                               prefetch.symbol);
+        },
+        [&](const Provide& provide) {
+          return make_provide(current(renamings_, provide.name), rename(provide.values),
+                              rename(provide.args), rename(provide.predicate));
+        },
+        [&](const StmtNode&) {
+          return map_children(
+              s, [&](const Expr& e) { return rename(e); },
+              [&](const Stmt& child) { return rename(child); });
+        });
+  }
+
+  std::map<std::string, std::string> original;
+
+ private:
+  FreshNames fresh_;
+  std::unordered_set<std::string> bound_;  // so far, anywhere
+  Renamings renamings_;
+
+  // A name from here to the end of its scope.
+  struct Binding {
+    Binding(Uniquifier& owner, const std::string& name) : owner(owner), name(name), unique(name) {
+      auto outer_entry = owner.renamings_.find(name);
+      if (outer_entry != owner.renamings_.end()) outer = outer_entry->second;
+      owner.renamings_.erase(name);
+      if (owner.bound_.insert(name).second) return;
+      unique = owner.fresh_(name);
+      owner.renamings_[name] = unique;
+    }
+    ~Binding() {
+      owner.renamings_.erase(name);
+      if (!outer.empty()) owner.renamings_[name] = outer;
+    }
+    Uniquifier& owner;
+    std::string name, unique, outer;
+  };
+
+  Expr rename(const Expr& e) {
+    return e.defined() && !renamings_.empty() ? UseRenamer(renamings_)(e) : e;
+  }
+  std::vector<Expr> rename(const std::vector<Expr>& es) {
+    std::vector<Expr> result;
+    for (const Expr& e : es) result.push_back(rename(e));
+    return result;
+  }
+};
+
+}  // namespace
+
+UniqueNames make_names_unique(const Stmt& s) {
+  Uniquifier uniquifier(s);
+  Stmt stmt = uniquifier.rename(s);
+  return {stmt, std::move(uniquifier.original)};
+}
+
+}  // namespace retrograde::ir

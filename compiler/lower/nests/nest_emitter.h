@@ -1,0 +1,117 @@
+// nest_emitter.h -- the walk of build_loop_nests: sites, and the stages computed there.
+//
+// build_loop_nests.cpp has the root and what is found at a loop, emit_compute_place.cpp how Funcs of one
+// site are put together, emit_stages.cpp the loops of their stages.
+#pragma once
+
+#include <map>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "lower/nests/build_loop_nests.h"
+#include "lower/nests/compute_place.h"
+#include "lower/nests/emitted.h"
+#include "lower/nests/fused_groups.h"
+#include "lower/nests/nest_storage.h"
+#include "lower/nests/stage_nest.h"
+#include "lower/nests/value_bounds.h"
+
+namespace retrograde::ir {
+
+class NestEmitter {
+ public:
+  NestEmitter(const Program& program, const LoopNestOptions& options);
+  LoopNests emit();
+
+ private:
+  const Program& program_;
+  const LoopNestOptions options_;
+  const ValueBounds values_;
+  NestStorage storage_;
+  const std::vector<FusedGroup> groups_;
+  std::vector<int> group_of_;          // index in groups_, of each Func
+  std::vector<int> root_, innermost_;  // indices into program_.funcs, producers first
+  std::map<std::pair<std::string, std::string>, std::vector<int>>
+      at_;  // (consumer, loop) -> Funcs computed there
+  std::map<std::string, Box> outputs_;
+
+  // ---- what is computed and stored at a loop (build_loop_nests.cpp) ----
+
+  void note_site(int index);
+  std::vector<int> computed_innermost_in(const LoopedFunc& f) const;
+  std::vector<int> children_at(const LoopedFunc& f, int s, const Loop& loop) const;
+  // Funcs computed just outside `code` and inside loops[i]; their bounds are bound around them.
+  Emitted emit_children(const std::vector<int>& children, Emitted code, std::vector<Loop>& loops,
+                        size_t i, ComputePlace& home);
+  Emitted store_here(const LoopedFunc& f, int s, Emitted code, std::vector<Loop>& loops, size_t i,
+                     ComputePlace& home);
+  void check_parallel(const LoopedFunc& f, const Loop& loop, const Emitted& code) const;
+  void check_everything_found_its_place(const Emitted& all) const;
+
+  // ---- one site: Funcs that are computed together, just outside `inner` (emit_compute_place.cpp) ----
+
+  // One of the Funcs of a group, and how it is computed here.
+  struct Member {
+    const LoopedFunc* f;
+    Box need;  // what is still to be computed of it, by the stages that are not emitted yet
+    std::vector<Loop> loops;  // to its storage
+    std::vector<Slide> slides;
+    Box required = {};
+    Box touched = {};  // of its storage, beside what is computed
+  };
+
+  // A group's part of the site:
+  //   realize { if (lead) produce f; consume f { what came before } }
+  struct Piece {
+    Stmt produce;
+    int lead = 0;
+    std::vector<const LoopedFunc*> funcs;
+    std::vector<std::pair<const LoopedFunc*, Box>> realized;
+  };
+
+  // From how many iterations before the loop's first on a Func is wanted: by the first and by the
+  // last of its consumers.
+  struct Wanted {
+    int first = 0, last = 0;
+  };
+  using WantedFuncs = std::map<std::string, Wanted>;
+
+  Emitted emit_place(const std::vector<int>& children, Emitted code, ComputePlace& site);
+  Stmt assemble(const std::vector<Piece>& pieces, Stmt stmt, const Emitted& code,
+                const ComputePlace& site);
+  std::vector<int> needed_of(const FusedGroup& group, const Emitted& code) const;
+  Piece emit_piece(const FusedGroup& group, Emitted& code, WantedFuncs& wanted, ComputePlace& site);
+  Box take_required(const LoopedFunc& f, Emitted& code, Box& touched, std::vector<Stmt>& checks);
+  Wanted slide_together(std::vector<Member>& members, const WantedFuncs& wanted,
+                        ComputePlace& site) const;
+  void keep(Member& member, Box allocated, Emitted& code, Emitted& made, Piece& piece,
+            ComputePlace& site);
+  Box output_box(const LoopedFunc& f, const Box& read);
+
+  // ---- stages (emit_stages.cpp) ----
+
+  // A stage among those that share loops.
+  struct NestStage {
+    const LoopedFunc* f;
+    int stage;
+    Domain domain;
+    StageNest nest = {};
+    std::vector<Expr> shift = {};  // what its loop variables are more than those of the first stage
+    std::vector<int> guests = {};  // that join its loops
+  };
+
+  // All stages of the members over what is needed of each. The boxes that their storage must have
+  // come back in `storage`.
+  Emitted emit_members(const FusedGroup& group, std::vector<Member>& members, ComputePlace& site,
+                       std::vector<Stmt> stmts);
+  void leave_rounded(const NestStage& stage, Emitted& code) const;
+  void widen_by_own_reads(Member& member, Emitted& code) const;
+  Emitted emit_extern(const LoopedFunc& f, const Domain& domain, ComputePlace& site) const;
+  Emitted emit_variants(const FusedNest& nest, std::vector<NestStage> stages, ComputePlace& home);
+  Emitted emit_nest(const FusedNest& nest, std::vector<NestStage> stages, ComputePlace& home);
+  Emitted emit_stage(const FusedNest& nest, std::vector<NestStage>& stages, int index,
+                     ComputePlace& home);
+};
+
+}  // namespace retrograde::ir

@@ -1,0 +1,57 @@
+#include "lower/nests/schedule_checks.h"
+
+#include "ir/build.h"
+#include "retrograde_runtime.h"
+
+namespace retrograde::ir {
+namespace {
+
+class SizeChecks {
+ public:
+  void add(const LoopedFunc& f) {
+    for (const Definition& stage : f.stages) add_factors(f, stage.schedule, const_true());
+    for (const StorageRule& rule : f.schedule.storage_rules)
+      check(rule.alignment, const_true(),
+            text("align the storage of ", quoted(f.name()), " in ", quoted(rule.var)),
+            "the alignment");
+    for (const Bound& bound : f.schedule.bounds)
+      check(bound.modulus, const_true(),
+            text("align the bounds of ", quoted(bound.var), " of ", quoted(f.name())),
+            "the modulus");
+  }
+
+  std::vector<Stmt> checks;
+
+ private:
+  // A schedule runs where its condition holds and none before it; only then its factors count.
+  void add_factors(const LoopedFunc& f, const StageLoops& schedule, Expr runs) {
+    for (const StageLoops& special : schedule.specializations) {
+      if (!special.condition.defined()) continue;
+      add_factors(f, special, runs && special.condition);
+      runs = runs && !special.condition;
+    }
+    for (const Split& split : schedule.splits) {
+      if (split.kind != Split::Kind::Split) continue;
+      check(split.factor, runs, text("split ", quoted(split.old_var), " of ", quoted(f.name())),
+            "a factor");
+    }
+  }
+
+  void check(const Expr& size, const Expr& runs, const std::string& asked, const char* what) {
+    if (!size.defined() || is_const(size)) return;
+    const std::string broken = text("cannot ", asked, ": ", what, " is at least 1; it is ");
+    const std::vector<Expr> error = {Expr(int32_t{retrograde_error_requirement_failed}),
+                                     Expr(broken), size, Expr(". Pass a positive value.")};
+    checks.push_back(make_assert(!runs || size >= 1, call_op(Op::error, Int(32), error)));
+  }
+};
+
+}  // namespace
+
+std::vector<Stmt> schedule_checks(const Program& program) {
+  SizeChecks all;
+  for (const LoopedFunc& f : program.funcs) all.add(f);
+  return std::move(all.checks);
+}
+
+}  // namespace retrograde::ir

@@ -1,0 +1,96 @@
+#include "lower/nests/share_parameters.h"
+
+#include <algorithm>
+#include <map>
+#include <unordered_map>
+#include <unordered_set>
+
+#include "ir/build.h"
+#include "ir/equal.h"
+#include "ir/visit.h"
+#include "simplify/simplify.h"
+
+namespace retrograde::ir {
+
+namespace {
+
+// Nodes of a tree from which on it gets a name.
+constexpr int large = 24;
+
+class ParameterSharer : public Rewriter {
+ public:
+  std::vector<std::pair<std::string, Expr>> names;
+
+ protected:
+  using Rewriter::rewrite;
+  Expr rewrite(const Expr& e) override {
+    const Expr result = children(e);
+    if (result.type() != Int(32) || !is_arithmetic(result)) return result;
+    const int size = tree_size(result);
+    return size >= large ? named(result) : result;
+  }
+
+ private:
+  std::map<Expr, Expr, StructuralLess> known_;
+  std::unordered_set<std::string> made_;
+  std::unordered_map<const ExprNode*, int> sizes_;  // 0: not of parameters alone
+  std::vector<Expr> kept_;                          // whose addresses stand in sizes_
+
+  static bool is_arithmetic(const Expr& e) { return e.as<Binary>() || e.as<Select>(); }
+
+  bool is_parameter(const Variable& v) const {
+    return made_.contains(v.name) ||
+           dynamic_cast<const ParameterContents*>(v.symbol.raw()) != nullptr;
+  }
+
+  // Of integers and conditions of parameters alone; 0 for any other expression.
+  int tree_size(const Expr& e) {
+    if (const auto found = sizes_.find(e.get()); found != sizes_.end()) return found->second;
+    int size = 1;
+    if (const auto* v = e.as<Variable>()) {
+      size = is_parameter(*v) ? 1 : 0;
+    } else if (!is_const(e)) {
+      const bool followed = is_arithmetic(e) || e.as<Not>() || e.as<Cast>();
+      bool uniform = followed && !e.type().is_float();
+      for_each_child(e, [&](const Expr& child) {
+        const int below = uniform ? tree_size(child) : 0;
+        uniform &= below > 0;
+        size = std::min(size + below, 1 << 20);
+      });
+      if (!uniform) size = 0;
+    }
+    kept_.push_back(e);
+    return sizes_[e.get()] = size;
+  }
+
+  Expr named(const Expr& e) {
+    const Expr value = simplify(e);
+    if (tree_size(value) < large) return value;
+    auto [it, is_new] = known_.try_emplace(value);
+    if (is_new) {
+      names.emplace_back("shared." + std::to_string(names.size()), value);
+      made_.insert(names.back().first);
+      it->second = variable(names.back().first);
+    }
+    return it->second;
+  }
+};
+
+bool has_memoized(const Program& program) {
+  return std::any_of(program.funcs.begin(), program.funcs.end(),
+                     [](const LoopedFunc& f) { return f.schedule.memoized; });
+}
+
+}  // namespace
+
+std::vector<std::pair<std::string, Expr>> share_parameters(Program& program) {
+  if (has_memoized(program)) return {};
+  ParameterSharer sharer;
+  const auto share = [&](const Expr& e) { return sharer(e); };
+  for (LoopedFunc& f : program.funcs) {
+    for (Definition& stage : f.stages) stage = map_exprs(stage, share);
+  }
+  return std::move(sharer.names);
+}
+
+}  // namespace retrograde::ir

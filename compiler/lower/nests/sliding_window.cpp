@@ -1,0 +1,206 @@
+#include "lower/nests/sliding_window.h"
+
+#include <optional>
+
+#include "analysis/linear.h"
+#include "analysis/monotonic.h"
+#include "ir/build.h"
+#include "ir/visit.h"
+#include "simplify/simplify.h"
+
+namespace retrograde::ir {
+
+BoundsMap facts_of(const std::vector<Loop>& loops) {
+  BoundsMap facts;
+  for (const Loop& loop : loops) {
+    Interval range = loop.range();
+    facts[loop.name] = {range.min, range.max};
+  }
+  return facts;
+}
+
+Expr without_markers(const Expr& e) {
+  return rewrite(e, [](const Expr& node, const std::function<Expr(const Expr&)>& recurse) {
+    const Call* call = node.as<Call>();
+    bool is_marker = call && (call->is_op(Op::likely) || call->is_op(Op::likely_if_innermost));
+    return is_marker ? recurse(call->args[0]) : map_children(node, recurse);
+  });
+}
+
+namespace {
+
+constexpr int longest_warm_up = 256;
+constexpr int undecided_steps = 4;  // of a warm-up whose length is not a constant so far
+
+bool can_slide_over(const Loop& loop) {
+  return loop.runs == ForType::Serial || loop.runs == ForType::Unrolled;
+}
+
+// Every update writes, and reads of f itself, at the dimension's own variable.
+bool is_pure_in(const LoopedFunc& f, int d) {
+  const std::string& var = f.func->args[d];
+  auto is_var = [&](const Expr& e) { return e.as<Variable>() && e.as<Variable>()->name == var; };
+  bool pure = true;
+  for (size_t s = 1; s < f.stages.size(); s++) {
+    pure = pure && is_var(f.stages[s].args[d]);
+    for_each_expr(f.stages[s], [&](const Expr& e) {
+      walk(e, [&](const Expr& node) {
+        const Call* call = node.as<Call>();
+        if (call && call->call_type == CallType::Func && call->name == f.name())
+          pure = pure && is_var(call->args[d]);
+        return pure;
+      });
+    });
+  }
+  return pure;
+}
+
+class Slider {
+ public:
+  Slider(const LoopedFunc& f, const Box& box, const std::vector<Loop>& around)
+      : f_(f), box_(box), slid_(box.size(), false), facts_(facts_of(around)) {}
+
+  std::optional<Slide> over(const Loop& loop, bool is_directly_around, int lead) {
+    int d = only_moving_dimension(loop.name);
+    if (d < 0 || slid_[d] || !is_pure_in(f_, d)) return {};
+    Slide slide{d, loop, 0, false, box_[d], {}};
+    if (!moves_one_way(slide)) return {};
+    if (!(is_directly_around && start_early(slide, lead)) && !start_whole(slide, lead)) return {};
+    if (!stays_inside(slide)) return {};
+    slid_[d] = true;
+    return slide;
+  }
+
+ private:
+  const LoopedFunc& f_;
+  const Box& box_;
+  std::vector<bool> slid_;
+  const BoundsMap facts_;
+
+  // The ends in the direction of movement: an iteration adds what lies beyond the front that the
+  // one before had.
+  bool is_upwards_ = true;
+  Expr front_, back_;
+
+  int only_moving_dimension(const std::string& loop) const {
+    int found = -1;
+    for (size_t d = 0; d < box_.size(); d++) {
+      if (!uses_variable(box_[d].min, loop) && !uses_variable(box_[d].max, loop)) continue;
+      if (found >= 0) return -1;
+      found = static_cast<int>(d);
+    }
+    return found;
+  }
+
+  bool moves_one_way(const Slide& slide) {
+    Monotonic min = monotonic(slide.whole.min, slide.loop.name);
+    Monotonic max = monotonic(slide.whole.max, slide.loop.name);
+    auto is = [&](Monotonic way) {
+      return (min == way || min == Monotonic::Constant) &&
+             (max == way || max == Monotonic::Constant);
+    };
+    is_upwards_ = is(Monotonic::Increasing);
+    front_ = is_upwards_ ? slide.whole.max : slide.whole.min;
+    back_ = is_upwards_ ? slide.whole.min : slide.whole.max;
+    return is_upwards_ || is(Monotonic::Decreasing);
+  }
+
+  // First coordinate that the iterations before `iteration` have not computed.
+  Expr fresh_at(const Slide& slide, const Expr& iteration) const {
+    Expr before = substitute(front_, slide.loop.name, simplify(iteration - 1));
+    return is_upwards_ ? before + 1 : before - 1;
+  }
+  std::optional<int64_t> difference(const Expr& a, const Expr& b) const {
+    Expr ahead = is_upwards_ ? a - b : b - a;
+    return as_const_int(simplify(without_markers(ahead), facts_));
+  }
+
+  // No values in common with the iteration before: nothing to gain.
+  bool never_overlaps(const Expr& fresh) const {
+    Expr apart = is_upwards_ ? back_ >= fresh : back_ <= fresh;
+    return can_prove(without_markers(apart), facts_);
+  }
+  bool has_no_gaps(const Expr& fresh) const {
+    Expr touches = is_upwards_ ? back_ <= fresh : back_ >= fresh;
+    return can_prove(without_markers(touches), facts_);
+  }
+
+  Interval from(const Expr& fresh) const {
+    return is_upwards_ ? Interval{fresh, front_} : Interval{front_, fresh};
+  }
+
+  std::optional<Expr> fresh_part(const Slide& slide) const {
+    Expr fresh = simplify(fresh_at(slide, variable(slide.loop.name)));
+    if (never_overlaps(fresh)) return {};
+    if (has_no_gaps(fresh)) return fresh;
+    return simplify(is_upwards_ ? max(back_, fresh) : min(back_, fresh));
+  }
+
+  // Finds the lead with which the parts begin exactly where the first iteration's box does.
+  bool start_early(Slide& slide, int lead) const {
+    auto fresh = fresh_part(slide);
+    if (!fresh) return false;
+    const Expr first = substitute(back_, slide.loop.name, slide.loop.min);
+    int undecided = 0;
+    for (int k = lead; k <= lead + longest_warm_up; k++) {
+      auto ahead = difference(fresh_at(slide, slide.loop.min - k), first);
+      if (!ahead && ++undecided > undecided_steps) return false;
+      if (ahead && *ahead < 0) return false;
+      if (!ahead || *ahead > 0) continue;
+      slide.lead = k;
+      slide.part = from(*fresh);
+      return true;
+    }
+    return false;
+  }
+
+  bool start_whole(Slide& slide, int lead) const {
+    auto fresh = fresh_part(slide);
+    if (!fresh) return false;
+    const Expr start = simplify(slide.loop.min - lead);
+    Expr first = back_;
+    if (lead > 0) {
+      first = simplify(substitute(back_, slide.loop.name, slide.loop.min));
+      Expr reached = substitute(front_, slide.loop.name, start);
+      auto beyond = difference(reached, first);
+      if (!beyond || *beyond < -1) return false;
+    }
+    slide.lead = lead;
+    slide.starts_whole = true;
+    slide.part = from(select(variable(slide.loop.name) <= start, first, *fresh));
+    return true;
+  }
+
+  Expr alignment(int d) const {  // of align_bounds, which parts have, too
+    for (const Bound& bound : f_.schedule.bounds) {
+      if (bound.var == f_.func->args[d] && bound.modulus.defined() && bound.remainder.defined())
+        return bound.modulus;
+    }
+    return 1;
+  }
+
+  // The loops of every stage, over a part like this one, write nothing outside of it.
+  bool stays_inside(const Slide& slide) const {
+    Expr extent = simplify(slide.part.max - slide.part.min + 1);
+    for (size_t s = 0; s < f_.stages.size(); s++) {
+      Expr known = is_const(extent) ? extent : variable("part.extent") * alignment(slide.dimension);
+      if (!covers_exactly(f_, static_cast<int>(s), f_.func->args[slide.dimension], known))
+        return false;
+    }
+    return true;
+  }
+};
+
+}  // namespace
+
+std::vector<Slide> slides_of(const LoopedFunc& f, const Box& box, const std::vector<Loop>& loops,
+                             const std::vector<Loop>& around, int lead) {
+  std::vector<Slide> slides;
+  Slider slider(f, box, around);
+  for (size_t i = 0; i < loops.size() && can_slide_over(loops[i]); i++) {
+    if (auto slide = slider.over(loops[i], i == 0, i == 0 ? lead : 0)) slides.push_back(*slide);
+  }
+  return slides;
+}
+
+}  // namespace retrograde::ir

@@ -1,0 +1,117 @@
+#include "lower/nests/specialize.h"
+
+#include "diagnostics/error.h"
+#include "ir/build.h"
+#include "ir/equal.h"
+#include "ir/visit.h"
+#include "retrograde_runtime.h"
+#include "simplify/simplify.h"
+
+namespace retrograde::ir {
+namespace {
+
+// A condition that is known, taken apart.
+struct Known {
+  Expr condition;
+  bool value;
+};
+
+void take_apart(const Expr& condition, bool value, std::vector<Known>& known,
+                Substitution& constants) {
+  known.push_back({condition, value});
+  if (const Not* n = condition.as<Not>()) return take_apart(n->a, !value, known, constants);
+  const Binary* op = condition.as<Binary>();
+  if (!op) {
+    if (const Variable* v = condition.as<Variable>()) constants[v->name] = Expr(value);
+    return;
+  }
+  if (condition.kind() == (value ? Kind::And : Kind::Or)) {
+    take_apart(op->a, value, known, constants);
+    take_apart(op->b, value, known, constants);
+  } else if (condition.kind() == (value ? Kind::EQ : Kind::NE)) {
+    const Variable* v = op->a.as<Variable>();
+    if (v && is_const(op->b)) constants[v->name] = op->b;
+    const Variable* w = op->b.as<Variable>();
+    if (w && is_const(op->a)) constants[w->name] = op->a;
+  }
+}
+
+class Assuming : public Rewriter {
+ public:
+  Assuming(const Expr& condition, bool value) { take_apart(condition, value, known_, constants_); }
+  Expr under(const Expr& e) { return e.defined() ? simplify((*this)(e)) : e; }
+
+ protected:
+  using Rewriter::rewrite;
+  Expr rewrite(const Expr& e) override {
+    if (const Variable* v = e.as<Variable>()) {
+      auto it = constants_.find(v->name);
+      if (it != constants_.end()) return it->second;
+    }
+    if (e.type().is_bool() && e.type().is_scalar()) {
+      for (const Known& known : known_) {
+        if (equal(e, known.condition)) return Expr(known.value);
+      }
+    }
+    return children(e);
+  }
+
+ private:
+  std::vector<Known> known_;
+  Substitution constants_;
+};
+
+Definition assuming(const Definition& definition, const Expr& condition, bool value) {
+  Assuming assuming(condition, value);
+  Definition result = map_exprs(definition, [&](const Expr& e) { return assuming.under(e); });
+  if (is_const_true(result.predicate.defined() ? result.predicate : const_false()))
+    result.predicate = Expr();
+  return result;
+}
+
+}  // namespace
+
+std::vector<Variant> variants_of(const LoopedFunc& f, int stage) {
+  std::vector<Variant> variants;
+  Definition left = f.stages[stage];  // for what no condition so far holds
+  const std::vector<StageLoops> specializations = std::move(left.schedule.specializations);
+  left.schedule.specializations.clear();
+  auto with = [&](const Definition& definition) {
+    LoopedFunc copy = f;
+    copy.stages[stage] = definition;
+    return copy;
+  };
+  for (const StageLoops& special : specializations) {
+    if (!special.failure.empty()) {
+      variants.push_back({special.condition, special.failure, with(left)});
+      if (!special.condition.defined()) return variants;
+      continue;
+    }
+    Definition definition = assuming(left, special.condition, true);
+    definition.schedule = special;
+    definition.schedule.condition = Expr();
+    variants.push_back({special.condition, "", with(definition)});
+    left = assuming(left, special.condition, false);
+  }
+  variants.push_back({{}, "", with(left)});
+  return variants;
+}
+
+std::vector<const StageLoops*> schedules_of(const StageLoops& schedule) {
+  std::vector<const StageLoops*> all = {&schedule};
+  for (const StageLoops& special : schedule.specializations) {
+    for (const StageLoops* nested : schedules_of(special)) all.push_back(nested);
+  }
+  return all;
+}
+
+Stmt fail_specialized(const LoopedFunc& f, const std::string& message) {
+  std::vector<Expr> error = {
+      Expr(int32_t{retrograde_error_specialize_fail}),
+      Expr(text("cannot run ", quoted(f.name()),
+                ": one of its specializations must fit; none did: ", message,
+                ". Pass arguments that one of them fits, or drop specialize_fail."))};
+  return make_assert(const_false(), call_op(Op::error, Int(32), error));
+}
+
+}  // namespace retrograde::ir

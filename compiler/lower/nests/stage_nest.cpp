@@ -1,0 +1,257 @@
+#include "lower/nests/stage_nest.h"
+
+#include <optional>
+
+#include "diagnostics/error.h"
+#include "ir/build.h"
+#include "ir/visit.h"
+#include "lower/nests/nest_storage.h"
+#include "simplify/simplify.h"
+
+namespace retrograde::ir {
+
+Interval Loop::range() const { return {min, simplify(min + extent - 1)}; }
+
+namespace {
+
+// How the value of a variable that was split or fused away follows from those that replaced it. One
+// of these may have its name: vectorize(x, 8) replaces x by an outer x and an inner loop.
+struct Fused {
+  std::string fused;  // the variable that took the place of outer and inner
+  Range outer, inner;
+  bool is_outer = false;  // which of the two this is about
+};
+
+// A split whose last part is guarded: no iteration of the outer loop begins past the end.
+struct Tail {
+  std::string outer, inner;
+  Expr outer_extent;
+  Expr first, last;  // what an iteration of the outer loop stays between
+};
+
+struct Derived {
+  std::string var;
+  Expr value;          // over the variables that replaced it
+  Expr guarded_value;  // the same, clamped where a guard applies
+  Expr guard;          // over them, too; undefined when there is none
+  std::optional<Fused> fused;
+  std::optional<Tail> tail = {};
+};
+
+// Whether storage of the Func grows with what its loops touch, and holds nothing else.
+bool has_room_of_its_own(const LoopedFunc& f) {
+  return !f.is_output && !f.func->is_extern() && !f.schedule.memoized && !f.schedule.async &&
+         is_stored_where_computed(f);
+}
+
+// Tiles of what needs nothing may run past the end. So they begin where the tiles of what is added
+// to it later do, and a tile in registers has constant places, at the border, too.
+bool reads_nothing(const Definition& definition) {
+  bool reads = false;
+  for_each_expr(definition, [&](const Expr& root) {
+    reads = reads || any_node(root, [](const Expr& e) {
+              const Call* call = e.as<Call>();
+              return call && (call->call_type != CallType::Operator ||
+                              op_info(call->op).cls == OpClass::Effect);
+            });
+  });
+  return !reads;
+}
+
+class NestBuilder {
+ public:
+  NestBuilder(const LoopedFunc& f, int stage, const Domain& domain)
+      : definition_(f.stages[stage]),
+        prefix_(stage_prefix(f.name(), stage)),
+        is_update_(stage > 0),
+        may_run_past_the_end_(stage == 0 && has_room_of_its_own(f) && reads_nothing(definition_)),
+        ranges_(domain) {}
+
+  StageNest build() {
+    for (const Split& split : definition_.schedule.splits) apply(split);
+    StageNest nest;
+    for (const Dim& dim : definition_.schedule.dims) nest.loops.push_back(loop_of(dim));
+    nest.rounds_up = rounds_up_;
+    resolve(nest);
+    return nest;
+  }
+
+ private:
+  const Definition& definition_;
+  const std::string prefix_;
+  const bool is_update_, may_run_past_the_end_;
+  bool rounds_up_ = false;
+  Domain ranges_;  // of every variable that exists after the splits so far
+  std::vector<std::vector<Derived>> derived_;  // by split; what one of them derives is one step
+
+  Expr loop_variable(const std::string& var) const { return variable(prefix_ + var); }
+
+  Loop loop_of(const Dim& dim) const {
+    auto it = ranges_.find(dim.var);
+    RETROGRADE_ASSERT(it != ranges_.end(), "loop over a variable that does not exist: " + dim.var);
+    return {dim.var, prefix_ + dim.var, it->second.min, it->second.extent, dim.runs, dim.partition,
+            {}};
+  }
+
+  void apply(const Split& split) {
+    switch (split.kind) {
+      case Split::Kind::Split:
+        return apply_split(split);
+      case Split::Kind::Fuse:
+        return apply_fuse(split);
+      case Split::Kind::Rename:
+        ranges_[split.outer] = ranges_.at(split.old_var);
+        return derive(split.old_var, loop_variable(split.outer));
+    }
+  }
+
+  void derive(const std::string& var, const Expr& value) {
+    derived_.push_back({{var, value, value, {}, {}}});
+  }
+
+  TailStrategy tail_of(const Split& split, const Expr& extent) const {
+    if (is_zero(simplify(extent % split.factor))) return TailStrategy::RoundUp;  // there is no tail
+    if (split.tail != TailStrategy::Auto) return split.tail;
+    if (may_run_past_the_end_) return TailStrategy::RoundUp;
+    // An update may read what it writes, so no point of it may run twice.
+    return is_update_ || split.exact ? TailStrategy::GuardWithIf : TailStrategy::ShiftInwards;
+  }
+
+  void apply_split(const Split& split) {
+    const Range old = ranges_.at(split.old_var);
+    Expr factor = cast(Int(32), split.factor);
+    ranges_[split.outer] = {0, simplify((old.extent + factor - 1) / factor)};
+    ranges_[split.inner] = {0, factor};
+    Expr base = loop_variable(split.outer) * factor;
+    Expr inner = loop_variable(split.inner);
+    switch (tail_of(split, old.extent)) {
+      case TailStrategy::RoundUp:
+        rounds_up_ = rounds_up_ || !is_zero(simplify(old.extent % factor));
+        return derive(split.old_var, base + inner + old.min);
+      case TailStrategy::ShiftInwards:
+        base = min(likely(base), old.extent - factor);
+        return derive(split.old_var, base + inner + old.min);
+      default: {  // GuardWithIf and its predicated forms
+        const Expr last = old.extent - 1;
+        const Tail tail{split.outer, split.inner, ranges_[split.outer].extent, base + old.min,
+                        last + old.min};
+        derived_.push_back({{split.old_var,
+                             base + inner + old.min,
+                             min(base + inner, last) + old.min,
+                             likely(base + inner < old.extent),
+                             {},
+                             tail}});
+      }
+    }
+  }
+
+  // The outer variable is recovered by division, the inner by remainder.
+  void apply_fuse(const Split& split) {
+    const Range outer = ranges_.at(split.outer), inner = ranges_.at(split.inner);
+    ranges_[split.old_var] = {0, simplify(outer.extent * inner.extent)};
+    Expr fused = loop_variable(split.old_var);
+    Expr inner_value = fused % inner.extent + inner.min,
+         outer_value = fused / inner.extent + outer.min;
+    derived_.push_back(
+        {{split.outer, outer_value, outer_value, {}, Fused{split.old_var, outer, inner, true}},
+         {split.inner, inner_value, inner_value, {}, Fused{split.old_var, outer, inner, false}}});
+  }
+
+  // Interval arithmetic does not know that a part begins inside the range, when outer and inner
+  // variable stay inside theirs. So what the part needs of others begins where it does: at a
+  // multiple of the factor. (A variable that is split again, and shifted inwards, may begin before
+  // its range.)
+  Expr within_tail(const Tail& tail, const Expr& value, const Substitution& guarded) const {
+    Scope<Interval> loops;
+    for (const Dim& dim : definition_.schedule.dims)
+      loops.push(prefix_ + dim.var, loop_of(dim).range());
+    const auto reached = [&](const std::string& var) {
+      return bounds_of(substitute(loop_variable(var), guarded), loops);
+    };
+    const Interval outer = reached(tail.outer), inner = reached(tail.inner);
+    if (!outer.is_bounded() || !inner.is_bounded()) return value;
+    if (!can_prove(outer.max < tail.outer_extent) || !can_prove(inner.min >= 0)) return value;
+    return call_op(Op::promise_clamped, Int(32),
+                   {value, simplify(substitute(tail.first, guarded)), simplify(tail.last)});
+  }
+
+  // Interval arithmetic cannot divide by an extent that is a symbol. But a fused variable that
+  // stays inside its range recovers variables that stay inside theirs; one that a tail takes
+  // outside does so in proportion.
+  Expr within_fused_range(const Fused& from, const Expr& value, const Substitution& guarded) const {
+    Scope<Interval> loops;
+    for (const Dim& dim : definition_.schedule.dims)
+      loops.push(prefix_ + dim.var, loop_of(dim).range());
+    Interval fused = bounds_of(substitute(loop_variable(from.fused), guarded), loops);
+    const Range& own = from.is_outer ? from.outer : from.inner;
+    Expr first = own.min, last = own.min + own.extent - 1;
+    if (from.is_outer && fused.is_bounded()) {
+      if (!can_prove(fused.min >= 0)) first = own.min + fused.min / from.inner.extent;
+      if (!can_prove(fused.max < from.outer.extent * from.inner.extent))
+        last = own.min + fused.max / from.inner.extent;
+    }
+    return call_op(Op::promise_clamped, Int(32), {value, simplify(first), simplify(last)});
+  }
+
+  // Later derivations replace variables that earlier ones introduced: resolve from the last to the
+  // first. At each step `values` holds what the variables stand for that exist after that split: a
+  // fused variable may have the name of one that it replaced, which only what was before it means.
+  void resolve(StageNest& nest) {
+    Substitution values, guarded;
+    for (auto step = derived_.rbegin(); step != derived_.rend(); ++step) {
+      Substitution values_before = values, guarded_before = guarded;
+      for (const Derived& d : *step) {
+        if (d.guard.defined()) nest.guards.push_back(simplify(substitute(d.guard, values)));
+        values_before[prefix_ + d.var] = simplify(substitute(d.value, values));
+        Expr value = simplify(substitute(d.guarded_value, guarded));
+        if (d.fused) value = within_fused_range(*d.fused, value, guarded);
+        if (d.tail) value = within_tail(*d.tail, value, guarded);
+        guarded_before[prefix_ + d.var] = value;
+      }
+      values = std::move(values_before);
+      guarded = std::move(guarded_before);
+    }
+    auto value_in = [&](const Substitution& map, const std::string& var) {
+      auto it = map.find(prefix_ + var);
+      return it == map.end() ? loop_variable(var) : it->second;
+    };
+    for (const auto& [var, range] : ranges_) {
+      nest.coordinate[var] = value_in(values, var);
+      nest.guarded_coordinate[var] = value_in(guarded, var);
+    }
+  }
+};
+
+}  // namespace
+
+StageNest build_stage_nest(const LoopedFunc& f, int stage, const Domain& domain) {
+  return NestBuilder(f, stage, domain).build();
+}
+
+bool covers_exactly(const LoopedFunc& f, int stage, const std::string& var, const Expr& extent) {
+  for (const StageLoops& special : f.stages[stage].schedule.specializations) {
+    LoopedFunc variant = f;
+    variant.stages[stage].schedule = special;
+    if (!covers_exactly(variant, stage, var, extent)) return false;
+  }
+  Domain domain;
+  for (const std::string& arg : f.func->args)
+    domain[arg] = {variable(arg + ".first"), variable(arg + ".extent")};
+  for (const ReductionVariable& r : f.stages[stage].rvars)
+    domain[r.var] = {cast(Int(32), r.min), cast(Int(32), r.extent)};
+  const Expr first = domain[var].min;
+  domain[var].extent = extent;
+  StageNest nest = build_stage_nest(f, stage, domain);
+  Scope<Interval> loops;
+  for (const Loop& loop : nest.loops) loops.push(loop.name, loop.range());
+  Interval reached = bounds_of(nest.guarded_coordinate.at(var), loops);
+  BoundsMap facts;
+  walk(extent, [&](const Expr& e) {
+    if (const Variable* name = e.as<Variable>()) facts[name->name] = {1, {}};
+    return true;
+  });
+  return reached.is_bounded() && can_prove(reached.min >= first, facts) &&
+         can_prove(reached.max < first + extent, facts);
+}
+
+}  // namespace retrograde::ir

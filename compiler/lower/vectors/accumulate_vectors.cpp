@@ -1,0 +1,329 @@
+// accumulate_vectors -- combine the lanes of a reduction once after its loop.
+// In:  Vector; names unique.
+// Out: Vector; names unique. The operands of a reduction are combined in another order, which
+//      depends on the program alone.
+//
+//   for (r, 0, n) {                          allocate t[16] {
+//     f[i] = f[i] + reduce(add, x, 1)          t[ramp(0, 1, 16)] = broadcast(-0, 16)
+//   }                                  =>      for (r, 0, n) { t[...] = t[...] + x }
+//                                              if (0 < n) { f[i] = f[i] + reduce(add, t[...], 1) }
+//                                            }
+//
+// The vector t has a constant size, so that it lives in registers. Sums of products of 16-bit
+// numbers keep half as many lanes: machines add such products in pairs (ir/narrow_product.h).
+//
+// Method: outermost loop first. A store belongs to the loop when its index, and whatever decides
+//         that it runs at all, is the same in every iteration. It must be a chain of one operator
+//         from its own element over reductions of vectors, and the loop must not read the buffer
+//         elsewhere. The element is not touched when the loop does not run.
+// Not done: stores under conditions that vary; loops that run as tasks; several operators.
+// Source: folklore (reduction variable expansion). Tests: test/golden/lower/accumulate_vectors/,
+// loop_passes_test, vector_reduction_test.
+#include "lower/vectors/accumulate_vectors.h"
+
+#include <algorithm>
+#include <numeric>
+#include <unordered_map>
+#include <unordered_set>
+
+#include "ir/atomic_update.h"
+#include "ir/build.h"
+#include "ir/equal.h"
+#include "ir/memory_reads.h"
+#include "ir/narrow_product.h"
+#include "ir/visit.h"
+#include "lower/nests/copy_statement.h"
+#include "lower/vectors/reductions.h"
+
+namespace retrograde::ir {
+
+namespace {
+
+// f[i] op reduce(x) op reduce(y) ...
+struct Chain {
+  Kind kind;
+  Expr own;  // f[i]
+  struct Term {
+    const VectorReduce* reduce;
+    bool is_subtracted;
+  };
+  std::vector<Term> terms;  // the last first
+};
+
+bool is_load_of(const Store& store, const Expr& e) {
+  const auto* load = e.as<Load>();
+  return load && load->name == store.name && !load->predicate.defined() &&
+         equal(load->index, store.index);
+}
+
+std::optional<Chain> as_chain(const Store& store) {
+  Chain chain{store.value.kind() == Kind::Sub ? Kind::Add : store.value.kind(), {}, {}};
+  Expr e = store.value;
+  while (!is_load_of(store, e)) {
+    const auto* op = e.as<Binary>();
+    const bool is_sub = chain.kind == Kind::Add && e.kind() == Kind::Sub;
+    const auto* reduce = op ? op->b.as<VectorReduce>() : nullptr;
+    if (!reduce || (e.kind() != chain.kind && !is_sub) || reduce->op != reduce_op(chain.kind))
+      return std::nullopt;
+    if (loads_from(op->b, store.name)) return std::nullopt;
+    chain.terms.push_back({reduce, is_sub});
+    e = op->a;
+  }
+  chain.own = e;
+  const auto has_other_lanes = [&](const Chain::Term& term) {
+    return term.reduce->value.type() != chain.terms[0].reduce->value.type();
+  };
+  if (chain.terms.empty() || std::any_of(chain.terms.begin(), chain.terms.end(), has_other_lanes))
+    return std::nullopt;
+  return chain;
+}
+
+// ---- what a loop does to its buffers ----
+
+struct Candidate {
+  const Store* store;
+  Chain chain;
+  Stmt whole;                    // the store, or the Atomic around it
+  std::vector<Expr> conditions;  // under which it runs at least once
+};
+
+class LoopReductions {
+ public:
+  explicit LoopReductions(const For& loop) {
+    bound_.insert(loop.name);
+    conditions_.push_back(binary(Kind::LT, make_zero(loop.extent.type()), loop.extent));
+    visit(loop.body, true);
+  }
+
+  // Those that nothing else in the loop could see.
+  std::vector<Candidate> found() const {
+    std::vector<Candidate> result;
+    for (const Candidate& candidate : candidates_) {
+      if (!others_.count(candidate.store->name)) result.push_back(candidate);
+    }
+    return result;
+  }
+
+ private:
+  // `runs_alike`: whether the statement runs in every iteration of the loop, or in none.
+  void visit(const Stmt& s, bool runs_alike) {
+    if (!s.defined()) return;
+    match(
+        s, [&](const Store& n) { visit_store(s, n, runs_alike); },
+        [&](const Atomic& n) { visit_atomic(s, n, runs_alike); },
+        [&](const LetStmt& n) {
+          note(n.value);
+          bound_.insert(n.name);
+          visit(n.body, runs_alike);
+        },
+        [&](const For& n) {
+          note(n.min);
+          note(n.extent);
+          bound_.insert(n.name);
+          const Expr runs = binary(Kind::LT, make_zero(n.extent.type()), n.extent);
+          under(runs, n.body, runs_alike && n.runs == ForType::Serial);
+        },
+        [&](const IfThenElse& n) {
+          note(n.condition);
+          under(n.condition, n.when_true, runs_alike);
+          under(logical_not(n.condition), n.when_false, runs_alike);
+        },
+        [&](const Block& n) {
+          for (const Stmt& part : n.stmts) visit(part, runs_alike);
+        },
+        [&](const ProducerConsumer& n) { visit(n.body, runs_alike); },
+        [&](const Allocate& n) {
+          note(n.elements);
+          bound_.insert(n.name);
+          visit(n.body, runs_alike);
+        },
+        [&](const StmtNode&) {
+          for_each_child(
+              s, [&](const Expr& e) { note(e); }, [&](const Stmt& part) { visit(part, false); });
+        });
+  }
+
+  void under(const Expr& condition, const Stmt& s, bool runs_alike) {
+    conditions_.push_back(condition);
+    visit(s, runs_alike && is_invariant(condition));
+    conditions_.pop_back();
+  }
+
+  void visit_atomic(const Stmt& s, const Atomic& n, bool runs_alike) {
+    const auto* store = n.body.as<Store>();
+    store ? visit_store(s, *store, runs_alike) : visit(n.body, false);
+  }
+
+  void visit_store(const Stmt& whole, const Store& n, bool runs_alike) {
+    auto chain =
+        runs_alike && !n.predicate.defined() && is_invariant(n.index) ? as_chain(n) : std::nullopt;
+    note(n.index);
+    if (!chain) {
+      note(n.value);
+      if (n.predicate.defined()) note(n.predicate);
+      others_.insert(n.name);
+      return;
+    }
+    for (const Chain::Term& term : chain->terms) note(term.reduce->value);
+    candidates_.push_back({&n, std::move(*chain), whole, conditions_});
+  }
+
+  bool is_invariant(const Expr& e) const {
+    return !reads_memory(e, MemoryReads::Calls) && !uses_any_variable(e, bound_);
+  }
+
+  // Buffers that the expression reads, or hands on.
+  void note(const Expr& e) {
+    walk(e, [&](const Expr& node) {
+      if (const auto* load = node.as<Load>()) others_.insert(load->name);
+      const auto* name = node.as<Variable>();
+      if (name && name->type.is_handle())
+        others_.insert(name->name.substr(0, name->name.rfind('.')));
+      return true;
+    });
+  }
+
+  std::unordered_set<std::string> bound_, others_;
+  std::vector<Expr> conditions_;
+  std::vector<Candidate> candidates_;
+};
+
+// ---- the vector of partial results ----
+
+// A vector whose lanes are put in another order before they are combined: the vector itself is
+// what can be accumulated.
+const Shuffle* as_reordering(const Expr& e) {
+  const auto* shuffle = e.as<Shuffle>();
+  if (!shuffle || shuffle->vectors.size() != 1 ||
+      shuffle->vectors[0].type().lanes() != e.type().lanes())
+    return nullptr;
+  std::vector<int> lanes = shuffle->indices;
+  std::sort(lanes.begin(), lanes.end());
+  for (size_t i = 0; i < lanes.size(); ++i) {
+    if (lanes[i] != static_cast<int>(i)) return nullptr;
+  }
+  return shuffle;
+}
+
+class Accumulator {
+ public:
+  Accumulator(const Candidate& candidate, const std::string& name)
+      : name_(name), chain_(candidate.chain), store_(*candidate.store), candidate_(candidate) {
+    const Expr& value = chain_.terms[0].reduce->value;
+    reordering_ = as_reordering(value);
+    for (const Chain::Term& term : chain_.terms) {
+      const auto* other = as_reordering(term.reduce->value);
+      if (!reordering_ || !other || other->indices != reordering_->indices) reordering_ = nullptr;
+      in_pairs_ &= as_narrow_product(term.reduce->value).has_value();
+    }
+    const int lanes = value.type().lanes(), group = lanes / store_.value.type().lanes();
+    in_pairs_ &= chain_.kind == Kind::Add && group % 2 == 0;
+    if (in_pairs_) reordering_ = nullptr;
+    type_ = value.type().with_lanes(in_pairs_ ? lanes / 2 : lanes);
+  }
+
+  // Whether lanes are combined at all.
+  bool is_of_use() const { return type_.lanes() > store_.value.type().lanes(); }
+
+  Stmt start() const { return store(identity_of(op(), type_)); }
+
+  Stmt step() const {
+    Expr value = load();
+    for (size_t i = chain_.terms.size(); i-- > 0;) {
+      const Chain::Term& term = chain_.terms[i];
+      value = binary(term.is_subtracted ? Kind::Sub : chain_.kind, value, operand(term));
+    }
+    return store(value);
+  }
+
+  // After the loop.
+  Stmt finish() const {
+    const Expr all = reordering_ ? make_shuffle({load()}, reordering_->indices) : load();
+    const Expr sum = make_vector_reduce(op(), all, store_.value.type().lanes());
+    Stmt result = make_store(store_.name, binary(chain_.kind, chain_.own, sum), store_.index, {},
+                             store_.symbol);
+    if (const auto* atomic = candidate_.whole.as<Atomic>())
+      result = make_atomic(atomic->name, result);
+    std::vector<Expr> conditions;
+    for (const Expr& condition : candidate_.conditions) {
+      if (!is_const_true(condition)) conditions.push_back(condition);
+    }
+    return conditions.empty() ? result : make_if(conjunction(conditions), result);
+  }
+
+  Stmt around(const Stmt& body) const {
+    return make_allocate(name_, type_.element_of(), MemoryType::Stack,
+                         make_const(Int(64), type_.lanes()), body);
+  }
+
+ private:
+  ReduceOp op() const { return reduce_op(chain_.kind); }
+  Expr index() const { return make_ramp(make_zero(Int(32)), make_one(Int(32)), type_.lanes()); }
+  Expr load() const { return make_load(type_, name_, index()); }
+  Stmt store(const Expr& value) const { return make_store(name_, value, index()); }
+
+  Expr operand(const Chain::Term& term) const {
+    const Expr& value = term.reduce->value;
+    if (in_pairs_) return make_vector_reduce(op(), value, type_.lanes());
+    return reordering_ ? value.as<Shuffle>()->vectors[0] : value;
+  }
+
+  std::string name_;
+  const Chain& chain_;
+  const Store& store_;
+  const Candidate& candidate_;
+  const Shuffle* reordering_ = nullptr;
+  bool in_pairs_ = true;
+  Type type_;
+};
+
+class StoreReplacer : public Rewriter {
+ public:
+  std::unordered_map<const StmtNode*, Stmt> replacements;
+
+ protected:
+  Expr rewrite(const Expr& e) override { return e; }
+  Stmt rewrite(const Stmt& s) override {
+    const auto found = replacements.find(s.get());
+    return found == replacements.end() ? children(s) : found->second;
+  }
+};
+
+class AccumulateVectors : public Rewriter {
+ public:
+  explicit AccumulateVectors(const Stmt& s) : fresh_(s) {}
+
+ protected:
+  Expr rewrite(const Expr& e) override { return e; }
+
+  Stmt rewrite(const Stmt& s) override {
+    const auto* loop = s.as<For>();
+    if (!loop || loop->runs != ForType::Serial) return children(s);
+    std::vector<Candidate> candidates = LoopReductions(*loop).found();
+    StoreReplacer replacer;
+    std::vector<Accumulator> accumulators;
+    for (const Candidate& candidate : candidates) {
+      Accumulator accumulator(candidate, fresh_(candidate.store->name + ".partial"));
+      if (!accumulator.is_of_use()) continue;
+      replacer.replacements[candidate.whole.get()] = accumulator.step();
+      accumulators.push_back(std::move(accumulator));
+    }
+    if (accumulators.empty()) return children(s);
+    std::vector<Stmt> parts;
+    for (const Accumulator& accumulator : accumulators) parts.push_back(accumulator.start());
+    parts.push_back(children(replacer(s)));
+    for (const Accumulator& accumulator : accumulators) parts.push_back(accumulator.finish());
+    Stmt result = make_block(std::move(parts));
+    for (size_t i = accumulators.size(); i-- > 0;) result = accumulators[i].around(result);
+    return result;
+  }
+
+ private:
+  FreshNames fresh_;
+};
+
+}  // namespace
+
+Stmt accumulate_vectors(const Stmt& s) { return s.defined() ? AccumulateVectors(s)(s) : s; }
+
+}  // namespace retrograde::ir

@@ -1,0 +1,268 @@
+// blend_masked_stores -- storage of one's own is read and written by whole vectors under masks,
+// too. In:  Vector; names unique. Out: Vector; names unique. What a store leaves alone it writes
+// back; what a load reads beyond its
+//      mask is not used.
+//
+//   allocate t[8] {                             allocate t[8] {
+//     t[ramp(4, 1, 4) if m] =             =>      t[ramp(4, 1, 4)] =
+//         t[ramp(4, 1, 4) if m] + x                   select(m, t[ramp(4, 1, 4)] + x,
+//                                                            t[ramp(4, 1, 4)])
+//   }                                           }
+//
+// So an accumulator stays in a register at the border of its domain, too: LLVM takes masked stores
+// for calls, and a processor that loads what one has just stored waits for the cache. Masked loads
+// of bytes go lane by lane where no instruction does them.
+//
+// Method: a vector with constant places in storage of constant size is read or written as it is.
+//         Elsewhere the mask must hold in its first lanes if anywhere (a tail's does): then its
+//         first lane lies inside the storage, which gets room for the others. A store is checked,
+//         and neighbours under one check share it; a load that is for nobody reads from the
+//         beginning. Stores must not be seen by other threads: between the allocation and the store
+//         no loop or branch is a task.
+// Not done: masks that begin later; strided accesses; stores with places of run-time size that do
+//         not read what they replace, which gain nothing.
+// Source: folklore. Tests: test/golden/lower/blend_masked_stores/, loop_passes_test.
+#include "lower/vectors/blend_masked_stores.h"
+
+#include <algorithm>
+#include <functional>
+#include <optional>
+#include <unordered_map>
+#include <unordered_set>
+
+#include "ir/atomic_update.h"
+#include "ir/build.h"
+#include "ir/equal.h"
+#include "ir/memory_reads.h"
+#include "ir/visit.h"
+#include "lower/vectors/widen_expr.h"
+#include "simplify/simplify.h"
+
+namespace retrograde::ir {
+
+namespace {
+
+// Neighbours, perhaps as a ramp of ramps.
+struct Dense {
+  Expr first;
+  int lanes;
+};
+std::optional<Dense> as_dense(const Expr& index) {
+  const auto* ramp = index.as<Ramp>();
+  if (!ramp) return std::nullopt;
+  if (ramp->base.type().is_scalar())
+    return is_const_int(ramp->stride, 1) ? std::optional(Dense{ramp->base, ramp->lanes})
+                                         : std::nullopt;
+  const auto inner = as_dense(ramp->base);
+  if (!inner || as_const_int(ramp->stride) != inner->lanes) return std::nullopt;
+  return Dense{inner->first, inner->lanes * ramp->lanes};
+}
+
+Expr scalar_of(const Expr& e) {
+  const auto* splat = e.as<Broadcast>();
+  return splat && splat->value.type().is_scalar() ? splat->value : Expr();
+}
+
+// Of a mask that holds in the first lanes or in none: whether it holds in the first.
+Expr first_of_prefix(const Expr& mask) {
+  if (const Expr all = scalar_of(mask); all.defined()) return all;
+  const auto* lanes = mask.as<Shuffle>();
+  if (lanes && lanes->vectors.size() == 1 && lanes->indices[0] == 0 &&
+      std::is_sorted(lanes->indices.begin(), lanes->indices.end()))
+    return first_of_prefix(lanes->vectors[0]);
+  const auto* op = mask.as<Binary>();
+  if (!op) return {};
+  if (mask.kind() == Kind::And) {
+    const Expr a = first_of_prefix(op->a), b = first_of_prefix(op->b);
+    return a.defined() && b.defined() ? binary(Kind::And, a, b) : Expr();
+  }
+  const bool is_below = mask.kind() == Kind::LT || mask.kind() == Kind::LE;
+  const auto lane = is_below ? as_dense(op->a) : std::nullopt;
+  const Expr end = is_below ? scalar_of(op->b) : Expr();
+  return lane && end.defined() ? binary(mask.kind(), lane->first, end) : Expr();
+}
+
+// The same, simplified; undefined also where it could change in between.
+Expr check_of(const Expr& mask) {
+  const Expr first = first_of_prefix(mask);
+  return first.defined() && !reads_memory(first, MemoryReads::Calls) ? simplify(first) : Expr();
+}
+
+struct Storage {
+  std::optional<int64_t> elements;
+  bool is_own;  // of the task
+  int padding = 0;
+
+  bool surely_holds(const Dense& places) const {
+    const auto first = as_const_int(places.first);
+    return first && elements && *first >= 0 && *first + places.lanes <= *elements;
+  }
+  void make_room(const Dense& places) { padding = std::max(padding, places.lanes); }
+};
+
+class BlendMaskedStores : public Rewriter {
+ protected:
+  Expr rewrite(const Expr& e) override {
+    const Expr result = children(e);
+    const auto* load = result.as<Load>();
+    return load && load->predicate.defined() ? visit_load(result, *load) : result;
+  }
+
+  Stmt rewrite(const Stmt& s) override {
+    return match(
+        s, [&](const Allocate& n) { return visit_allocate(s, n); },
+        [&](const Store& n) { return n.predicate.defined() ? visit_store(s, n) : children(s); },
+        [&](const For& n) { return n.runs == ForType::Parallel ? in_task(s) : children(s); },
+        [&](const Fork&) { return in_task(s); }, [&](const Atomic&) { return s; },
+        [&](const IfThenElse& n) { return visit_if(s, n); },
+        [&](const Block& n) { return visit_block(s, n); },
+        [&](const LetStmt&) { return check_before_let(children(s)); },
+        [&](const StmtNode&) { return children(s); });
+  }
+
+ private:
+  // Other threads may run it at the same time as what surrounds it.
+  Stmt in_task(const Stmt& s) {
+    std::unordered_map<std::string, Storage> around = storage_;
+    for (auto& [name, storage] : storage_) storage.is_own = false;
+    Stmt result = children(s);
+    for (auto& [name, storage] : storage_) storage.is_own = around.at(name).is_own;
+    return result;
+  }
+
+  Stmt visit_allocate(const Stmt& s, const Allocate& n) {
+    storage_[n.name] = {as_const_int(n.elements), true};
+    const Stmt body = (*this)(n.body);
+    const int padding = storage_[n.name].padding;
+    storage_.erase(n.name);
+    if (padding == 0 && body.same_as(n.body)) return s;
+    const Expr elements =
+        binary(Kind::Add, n.elements, make_const(n.elements.type(), int64_t{padding}));
+    return make_allocate(n.name, n.type, n.memory, elements, body);
+  }
+
+  Stmt visit_if(const Stmt& s, const IfThenElse& n) {
+    const Stmt when_true = knowing(n.condition, [&] { return (*this)(n.when_true); });
+    const Expr condition = (*this)(n.condition);
+    const Stmt when_false = (*this)(n.when_false);
+    const bool is_same = condition.same_as(n.condition) && when_true.same_as(n.when_true) &&
+                         when_false.same_as(n.when_false);
+    return is_same ? s : make_if(condition, when_true, when_false);
+  }
+
+  Stmt knowing(const Expr& condition, const std::function<Stmt()>& f) {
+    const size_t before = known_.size();
+    note(condition);
+    forget();
+    Stmt result = f();
+    known_.resize(before);
+    forget();
+    return result;
+  }
+
+  void note(const Expr& condition) {
+    const auto* both = condition.kind() == Kind::And ? condition.as<Binary>() : nullptr;
+    if (both) note(both->a);
+    if (both) note(both->b);
+    if (!both) known_.push_back(condition);
+  }
+
+  bool is_known(const Expr& condition) const {
+    const auto* both = condition.kind() == Kind::And ? condition.as<Binary>() : nullptr;
+    if (both) return is_known(both->a) && is_known(both->b);
+    return is_const_true(condition) ||
+           std::any_of(known_.begin(), known_.end(),
+                       [&](const Expr& other) { return equal(condition, other); });
+  }
+
+  Expr visit_load(const Expr& e, const Load& n) {
+    const auto storage = storage_.find(n.name);
+    const auto places = as_dense(n.index);
+    if (storage == storage_.end() || !places) return e;
+    if (storage->second.surely_holds(*places))
+      return make_load(n.type, n.name, n.index, {}, n.symbol);
+    const Expr check = check_of(n.predicate);
+    if (!check.defined()) return e;
+    storage->second.make_room(*places);
+    const Expr first = is_known(check)
+                           ? places->first
+                           : make_select(check, places->first, make_zero(places->first.type()));
+    return make_load(n.type, n.name, moved(n.index, first), {}, n.symbol);
+  }
+
+  static Expr moved(const Expr& index, const Expr& first) {
+    const auto* ramp = index.as<Ramp>();
+    return ramp ? make_ramp(moved(ramp->base, first), ramp->stride, ramp->lanes) : first;
+  }
+
+  Stmt visit_store(const Stmt& s, const Store& n) {
+    const auto storage = storage_.find(n.name);
+    const auto places = as_dense(n.index);
+    if (storage == storage_.end() || !storage->second.is_own || !places) return children(s);
+    if (storage->second.surely_holds(*places)) return blended(n);
+    const Expr check = check_of(n.predicate);
+    if (!check.defined() || !loads_from(n.value, n.name)) return children(s);
+    storage->second.make_room(*places);
+    if (is_known(check)) return blended(n);
+    return checked(check, knowing(check, [&] { return blended(n); }));
+  }
+
+  Stmt blended(const Store& n) {
+    const Expr old = make_load(n.value.type(), n.name, n.index, {}, n.symbol);
+    return make_store(n.name, make_select((*this)(n.predicate), (*this)(n.value), old), n.index, {},
+                      n.symbol);
+  }
+
+  // ---- checks of several stores become one ----
+
+  Stmt checked(const Expr& condition, const Stmt& body) {
+    Stmt result = make_if(condition, body);
+    if (result.as<IfThenElse>()) checks_.insert(result);
+    return result;
+  }
+
+  const IfThenElse* as_check(const Stmt& s) const {
+    return checks_.count(s) ? s.as<IfThenElse>() : nullptr;
+  }
+
+  Stmt check_before_let(const Stmt& s) {
+    const auto* let = s.as<LetStmt>();
+    const IfThenElse* check = let ? as_check(let->body) : nullptr;
+    if (!check || uses_variable(check->condition, let->name) || has_effects(let->value)) return s;
+    return checked(check->condition, make_let(let->name, let->value, check->when_true));
+  }
+
+  Stmt visit_block(const Stmt& s, const Block& n) {
+    std::vector<Stmt> parts;
+    bool changed = false;
+    for (const Stmt& part : n.stmts) {
+      parts.push_back((*this)(part));
+      changed |= !parts.back().same_as(part);
+      if (parts.size() < 2) continue;
+      const IfThenElse *before = as_check(parts[parts.size() - 2]), *last = as_check(parts.back());
+      if (!before || !last || !equal(before->condition, last->condition)) continue;
+      const Stmt both =
+          checked(before->condition, make_block({before->when_true, last->when_true}));
+      parts.pop_back();
+      parts.back() = both;
+    }
+    return changed ? make_block(std::move(parts)) : s;
+  }
+
+  struct SameNode {
+    bool operator()(const Stmt& a, const Stmt& b) const { return a.same_as(b); }
+  };
+  struct HashNode {
+    size_t operator()(const Stmt& s) const { return std::hash<const StmtNode*>()(s.get()); }
+  };
+
+  std::unordered_map<std::string, Storage> storage_;
+  std::vector<Expr> known_;                              // conditions around
+  std::unordered_set<Stmt, HashNode, SameNode> checks_;  // those that this pass has made
+};
+
+}  // namespace
+
+Stmt blend_masked_stores(const Stmt& s) { return s.defined() ? BlendMaskedStores()(s) : s; }
+
+}  // namespace retrograde::ir

@@ -1,0 +1,69 @@
+// Minus zero is the identity of floating-point sums: 0 + -0 is 0, and -0 + -0 is -0.
+#include "lower/vectors/reductions.h"
+
+#include <limits>
+
+#include "diagnostics/error.h"
+#include "ir/build.h"
+
+namespace retrograde::ir {
+
+namespace {
+
+Expr infinity(Type type, int sign) {
+  return make_const(type, sign * std::numeric_limits<double>::infinity());
+}
+
+Expr largest(Type type) {
+  if (type.is_float()) return infinity(type, 1);
+  return type.is_int() ? make_const(type, type.max_int()) : make_uint_const(type, type.max_uint());
+}
+
+Expr smallest(Type type) {
+  if (type.is_float()) return infinity(type, -1);
+  return type.is_int() ? make_const(type, type.min_int()) : make_zero(type);
+}
+
+Expr scalar_identity(ReduceOp op, Type type) {
+  switch (op) {
+    case ReduceOp::Add:
+      return type.is_float() ? make_const(type, -0.0) : make_zero(type);
+    case ReduceOp::Min:
+      return largest(type);
+    case ReduceOp::Max:
+      return smallest(type);
+    case ReduceOp::Or:
+      return make_zero(type);
+    case ReduceOp::Mul:
+    case ReduceOp::And:
+      return make_one(type);
+  }
+  internal_error("unknown reduction");
+}
+
+}  // namespace
+
+ReduceOp reduce_op(Kind kind) {
+  switch (kind) {
+    case Kind::Add:
+      return ReduceOp::Add;
+    case Kind::Mul:
+      return ReduceOp::Mul;
+    case Kind::Min:
+      return ReduceOp::Min;
+    case Kind::Max:
+      return ReduceOp::Max;
+    case Kind::And:
+      return ReduceOp::And;
+    case Kind::Or:
+      return ReduceOp::Or;
+    default:
+      internal_error(text("no vector is reduced by ", kind_name(kind)));
+  }
+}
+
+Expr identity_of(ReduceOp op, Type type) {
+  return make_broadcast(scalar_identity(op, type.element_of()), type.lanes());
+}
+
+}  // namespace retrograde::ir

@@ -1,0 +1,85 @@
+// Expressions of a loop body, for all iterations at once: the vector of the values that an
+// expression takes.
+//
+// Layout: an expression of L lanes becomes one of N*L lanes, iteration-major: lanes [i*L, (i+1)*L)
+// are its value in iteration i. In the program's terms a Ramp or Broadcast around a vector
+// concatenates: Ramp(b, s, N) is b, b + s, ...
+#pragma once
+
+#include <string>
+#include <unordered_map>
+
+#include "ir/build.h"
+#include "ir/expr.h"
+#include "lower/nests/copy_statement.h"
+
+namespace retrograde::ir {
+
+// Lanes [iteration*L, iteration*L + L) of a vector of N*L lanes.
+Expr extract_iteration(const Expr& wide, int iteration, int narrow_lanes);
+// Every lane of `v` repeated `times` in place: a b -> a a b b.
+Expr repeat_each(const Expr& v, int times);
+// Calls that do more than compute a value: print, require, error, ... (random and undef are
+// values).
+bool has_effects(const Expr& e);
+
+class Widener {
+ public:
+  Widener(const std::string& variable, const Expr& min, int iterations, FreshNames& fresh);
+
+  // For all iterations; the same handle when the value is the same in all of them (then with L
+  // lanes still).
+  Expr operator()(const Expr& e);
+  // Always with N*L lanes.
+  Expr spread(const Expr& e);
+  int iterations() const { return iterations_; }
+
+  // A name bound outside of expressions: from now on `e` stands for the variable in all iterations.
+  void bind(const std::string& name, const Expr& wide) { wide_values_[name] = wide; }
+  const std::unordered_map<std::string, Expr>& bound() const { return wide_values_; }
+
+  // An allocation that every iteration has its own copy of: element e of iteration i is element e*N
+  // + i.
+  void bind_allocation(const std::string& name) { wide_allocations_.insert(name); }
+  bool is_wide_allocation(const std::string& name) const {
+    return wide_allocations_.count(name) > 0;
+  }
+  const std::unordered_set<std::string>& wide_allocations() const { return wide_allocations_; }
+  Expr index_in_wide_allocation(const Expr& index);
+
+  // Bool of N lanes: the iterations that run; undefined when all do. Loads that vary are predicated
+  // by it. What does not vary is loaded as it was, so some iteration must run.
+  const Expr& mask() const { return mask_; }
+  void set_mask(const Expr& mask);
+  // A predicate of N*L lanes: `predicate` (may be undefined) and the mask.
+  Expr masked(const Expr& predicate, int narrow_lanes);
+
+ private:
+  Expr widen(const Expr& e);
+  Expr widen_binary(const Expr& e, const Binary& n);
+  Expr widen_select(const Expr& e, const Select& n);
+  Expr widen_load(const Expr& e, const Load& n);
+  Expr widen_ramp(const Expr& e, const Ramp& n);
+  Expr widen_broadcast(const Expr& e, const Broadcast& n);
+  Expr widen_call(const Expr& e, const Call& n);
+  Expr widen_branches(const Expr& e, const Call& n);
+  Expr widen_extern(const Call& n);
+  Expr widen_let(const Expr& e, const Let& n);
+  Expr widen_shuffle(const Expr& e, const Shuffle& n);
+  Expr under_mask(const Expr& mask, const Expr& e);
+
+  const std::string variable_;
+  const int iterations_;
+  FreshNames& fresh_;
+  Expr mask_;
+  bool may_run_nowhere_ =
+      false;  // inside an arm of if_then_else: even what does not vary is loaded under the mask
+  struct Entry {
+    Expr key, value;
+  };
+  std::unordered_map<const ExprNode*, Entry> memo_;
+  std::unordered_map<std::string, Expr> wide_values_;
+  std::unordered_set<std::string> wide_allocations_, widened_lets_;
+};
+
+}  // namespace retrograde::ir
