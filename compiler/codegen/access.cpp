@@ -8,7 +8,7 @@
 //   arbitrary                             gather or scatter where the machine has it, else scalars
 //
 // No access touches memory outside of the span from its lowest to its highest lane, and lanes whose
-// predicate is off touch none.
+// predicate is off touch none but that of lanes whose predicate is on.
 #include <bit>
 #include <cstdlib>
 
@@ -182,9 +182,13 @@ Value* FunctionGenerator::load_vector(const Storage& from, Type type, const Expr
     return load_apart(from, type, index64(ramp->base), index64(ramp->stride));
   const std::vector<Expr> pieces = pieces_of(index);
   const Coordinate at = coordinate(index);
-  if (pieces.empty() && !predicate && at.is_plain && at.is_held && type.lanes() >= min_loop_lanes &&
-      !machine_gathers(e_.machine, type))
-    return gather_in_loop(from, type, index_vector(index));
+  if (pieces.empty() && at.is_plain && at.is_held && type.lanes() >= min_loop_lanes &&
+      !machine_gathers(e_.machine, type)) {
+    Value* indices = index_vector(index);
+    if (!predicate) return gather_in_loop(from, type, indices);
+    return where_any(type, indices, predicate,
+                     [&](Value* safe) { return gather_in_loop(from, type, safe); });
+  }
   if (pieces.empty()) return gather(from, type, index_vector(index), predicate);
   std::vector<Value*> parts;
   int start = 0;
@@ -295,7 +299,31 @@ Value* FunctionGenerator::gather_filled_up(const Storage& from, Type type, Value
   return slice(e_, gathered, 0, lanes);
 }
 
+// Lanes that are off take the index of the first that is on, so that each may load: one branch instead
+// of one a lane.
+Value* FunctionGenerator::where_any(Type type, Value* indices, Value* predicate,
+                                    const std::function<Value*(Value* safe)>& load) {
+  llvm::BasicBlock *before = b_.GetInsertBlock(), *end = nullptr;
+  Value* loaded = nullptr;
+  if_true(b_.CreateOrReduce(predicate), [&] {
+    Value* bits = b_.CreateBitCast(predicate, b_.getIntNTy(static_cast<unsigned>(type.lanes())));
+    Value* first = b_.CreateBinaryIntrinsic(llvm::Intrinsic::cttz, bits, b_.getTrue());
+    Value* index = splat(e_, b_.CreateExtractElement(indices, first), type.lanes());
+    loaded = load(b_.CreateSelect(predicate, indices, index));
+    loaded = b_.CreateSelect(predicate, loaded, llvm::Constant::getNullValue(loaded->getType()));
+    end = b_.GetInsertBlock();
+  });
+  llvm::PHINode* result = b_.CreatePHI(loaded->getType(), 2);
+  result->addIncoming(loaded, end);
+  result->addIncoming(llvm::Constant::getNullValue(loaded->getType()), before);
+  return result;
+}
+
 Value* FunctionGenerator::gather(const Storage& from, Type type, Value* indices, Value* predicate) {
+  if (predicate && !machine_gathers(e_.machine, type)) {
+    return where_any(type, indices, predicate,
+                     [&](Value* safe) { return gather(from, type, safe, nullptr); });
+  }
   if (predicate || (machine_gathers(e_.machine, type) && e_.machine.gathers_fast)) {
     if (!std::has_single_bit(unsigned(type.lanes()))) {
       Value* all = splat(e_, b_.getTrue(), type.lanes());

@@ -198,6 +198,8 @@ class FunctionGenerator {
   Value* lane_index(Value* first, Value* stride, int lane);
   Value* load_apart(const Storage& from, Type type, Value* first, Value* stride);
   Value* gather(const Storage& from, Type type, Value* indices, Value* predicate);
+  Value* where_any(Type type, Value* indices, Value* predicate,
+                   const std::function<Value*(Value* safe)>& load);
   Value* gather_filled_up(const Storage& from, Type type, Value* indices, Value* mask);
   Coordinate coordinate(const Expr& index) const;
   Value* gather_in_loop(const Storage& from, Type type, Value* indices);
