@@ -41,7 +41,10 @@ namespace retrograde::ir {
 
 namespace {
 
-constexpr int max_store_period = 8;
+constexpr int max_pattern_period = 8;
+// A vector of floats with AVX-512 has as many lanes: what is stored to columns of a square is its
+// transpose, in four steps of shuffles instead of 256 elements.
+constexpr int max_store_period = 16;
 
 Expr interleave(const std::vector<Expr>& parts) {
   const int period = static_cast<int>(parts.size()), lanes = parts[0].type().lanes();
@@ -60,7 +63,7 @@ struct Pattern {
 Pattern combine(const Pattern& a, const Pattern& b) {
   const bool has_load = a.has_load || b.has_load;
   const int period = std::lcm(a.period, b.period);
-  if (a.kind == Pattern::Whole || b.kind == Pattern::Whole || period > max_store_period)
+  if (a.kind == Pattern::Whole || b.kind == Pattern::Whole || period > max_pattern_period)
     return {Pattern::Whole, 1, has_load};
   return {std::max(a.kind, b.kind), period, has_load};
 }
@@ -146,7 +149,7 @@ class LaneSplitter {
         [&](const Ramp& n) { return n.base.type().is_scalar() ? Pattern{} : whole; },
         [&](const Binary& n) {
           if (const auto index = as_periodic_index(e))
-            return index->period() > max_store_period
+            return index->period() > max_pattern_period
                        ? Pattern{}
                        : Pattern{index->period() == 1 ? Pattern::Any : Pattern::Periodic,
                                  index->period(), false};
