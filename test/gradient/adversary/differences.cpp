@@ -18,19 +18,24 @@ double extrapolated(const double (&slopes)[3], double first, double second) {
   return (second * bc - ab) / (second - 1);
 }
 
-int narrowest_float(const Func& output) {
-  int bits = 64;  // of the mantissa, about
+void for_each_node(const Func& output, ir::FunctionRef<void(const Expr&)> visit) {
   for (const ir::FuncPtr& f : ir::topological_order({output.function()})) {
     for (int s = 0; s < f->stage_count(); ++s) {
       ir::for_each_expr(f->stage(s), [&](const Expr& root) {
         ir::walk(root, [&](const Expr& e) {
-          if (e.type().is_float())
-            bits = std::min(bits, e.type().is_bfloat() ? 8 : e.type().bits());
+          visit(e);
           return true;
         });
       });
     }
   }
+}
+
+int narrowest_float(const Func& output) {
+  int bits = 64;  // of the mantissa, about
+  for_each_node(output, [&](const Expr& e) {
+    if (e.type().is_float()) bits = std::min(bits, e.type().is_bfloat() ? 8 : e.type().bits());
+  });
   return bits;
 }
 
@@ -39,17 +44,11 @@ int narrowest_float(const Func& output) {
 bool turns_within_a_step(const Func& output, double slope) {
   if (slope * step <= 1) return false;
   bool has_waves = false;
-  for (const ir::FuncPtr& f : ir::topological_order({output.function()})) {
-    for (int s = 0; s < f->stage_count(); ++s) {
-      ir::for_each_expr(f->stage(s), [&](const Expr& root) {
-        has_waves |= ir::any_node(root, [](const Expr& e) {
-          const auto* call = e.as<ir::Call>();
-          return call && (call->is_op(ir::Op::sin) || call->is_op(ir::Op::cos) ||
-                          call->is_op(ir::Op::tan));
-        });
-      });
-    }
-  }
+  for_each_node(output, [&](const Expr& e) {
+    const auto* call = e.as<ir::Call>();
+    has_waves |=
+        call && (call->is_op(ir::Op::sin) || call->is_op(ir::Op::cos) || call->is_op(ir::Op::tan));
+  });
   return has_waves;
 }
 
