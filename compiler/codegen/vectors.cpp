@@ -14,6 +14,8 @@ std::vector<int> sequence(int start, int count, int stride = 1) {
   return result;
 }
 
+bool is_power_of_two(int n) { return n > 0 && (n & (n - 1)) == 0; }
+
 // A scalar as a vector of one lane; vectors stay.
 Value* as_vector(Emitter& e, Value* value) {
   if (value->getType()->isVectorTy()) return value;
@@ -104,10 +106,89 @@ Value* pick_lanes(Emitter& e, const std::vector<Value*>& vectors, const std::vec
   return result;
 }
 
+namespace {
+
+constexpr int chunk_bits = 128;  // instructions that unpack lanes do not look across this many
+
+// The lanes of two vectors by turns, within each chunk: of its lower half, or of its upper half.
+Value* unpack(Emitter& e, Value* a, Value* b, int chunk, bool upper) {
+  const int lanes = lanes_of(a);
+  std::vector<int> indices;
+  for (int i = 0; i < lanes; i++) {
+    const int source = i / chunk * chunk + (upper ? chunk / 2 : 0) + i % chunk / 2;
+    indices.push_back(i % 2 ? lanes + source : source);
+  }
+  return shuffle(e, a, b, indices);
+}
+
+// `rows` has a power of two many vectors, at most the lanes of a chunk. Lane by lane, chunk by chunk:
+// part k of n has in each chunk lanes k * chunk / n and on of that chunk of all rows, interleaved.
+std::vector<Value*> interleave_chunks(Emitter& e, const std::vector<Value*>& rows, int chunk) {
+  if (rows.size() == 1) return rows;
+  std::vector<Value*> even, odd, result;
+  for (size_t i = 0; i < rows.size(); i++) (i % 2 ? odd : even).push_back(rows[i]);
+  even = interleave_chunks(e, even, chunk), odd = interleave_chunks(e, odd, chunk);
+  for (size_t i = 0; i < even.size(); i++) {
+    for (bool upper : {false, true}) result.push_back(unpack(e, even[i], odd[i], chunk, upper));
+  }
+  return result;
+}
+
+// The chunks of all vectors in a row, as a matrix with a row for each vector, transposed: as often as
+// a vector's chunks can be halved, the even chunks of all come before the odd ones.
+std::vector<Value*> transpose_chunks(Emitter& e, std::vector<Value*> vectors, int chunk) {
+  const int lanes = lanes_of(vectors[0]);
+  for (int step = chunk; step < lanes && vectors.size() > 1; step *= 2) {
+    std::vector<Value*> halves[2];
+    for (int odd : {0, 1}) {
+      std::vector<int> indices;
+      for (int i = 0; i < lanes; i++) indices.push_back((i / chunk * 2 + odd) * chunk + i % chunk);
+      for (size_t i = 0; i < vectors.size(); i += 2)
+        halves[odd].push_back(shuffle(e, vectors[i], vectors[i + 1], indices));
+    }
+    halves[0].insert(halves[0].end(), halves[1].begin(), halves[1].end());
+    vectors = std::move(halves[0]);
+  }
+  return vectors;
+}
+
+// Rows that are at least as many as their lanes, both powers of two: a matrix is transposed within
+// the chunks of registers first and by whole chunks then. Each step has an instruction without a
+// table of indices, where lanes that cross chunks would need one.
+bool is_transposed_by_chunks(int rows, int lanes, int chunk) {
+  return chunk > 1 && is_power_of_two(rows) && is_power_of_two(lanes) && lanes >= chunk &&
+         rows >= lanes;
+}
+
+Value* interleave_by_chunks(Emitter& e, const std::vector<Value*>& rows, int chunk) {
+  std::vector<std::vector<Value*>>
+      groups;  // by the first row: columns k, k + chunk, ... of a group
+  for (size_t i = 0; i < rows.size(); i += static_cast<size_t>(chunk))
+    groups.push_back(interleave_chunks(e, {rows.begin() + i, rows.begin() + i + chunk}, chunk));
+  std::vector<std::vector<Value*>> columns;  // by k: columns k, then k + chunk, ... whole
+  for (int k = 0; k < chunk; k++) {
+    std::vector<Value*> column;
+    for (const auto& group : groups) column.push_back(group[static_cast<size_t>(k)]);
+    columns.push_back(transpose_chunks(e, column, chunk));
+  }
+  const size_t pieces = groups.size() * static_cast<size_t>(chunk) / lanes_of(rows[0]);
+  std::vector<Value*> result;
+  for (size_t i = 0; i < groups.size(); i += pieces) {
+    for (const auto& column : columns)
+      result.insert(result.end(), column.begin() + i, column.begin() + i + pieces);
+  }
+  return concat(e, result);
+}
+
+}  // namespace
+
 // By halves while their number is even: unpack instructions do pairs, and nothing does more.
 Value* interleave(Emitter& e, const std::vector<Value*>& vectors) {
   const int count = static_cast<int>(vectors.size()), lanes = lanes_of(vectors[0]);
   if (count == 1) return vectors[0];
+  const int chunk =
+      chunk_bits / std::max(1, static_cast<int>(vectors[0]->getType()->getScalarSizeInBits()));
+  if (is_transposed_by_chunks(count, lanes, chunk)) return interleave_by_chunks(e, vectors, chunk);
   std::vector<int> indices;
   for (int i = 0; i < count * lanes; i++) indices.push_back(i % count * lanes + i / count);
   if (count == 2) return shuffle(e, vectors[0], vectors[1], indices);

@@ -149,6 +149,23 @@ TEST(CodegenIdioms, BlocksAreTransposedInRegisters) {
   EXPECT_EQ(count(code, "gather"), 0u);
 }
 
+// By unpacking lanes within chunks of 16 bytes and moving such chunks: no tables of indices.
+TEST(CodegenIdioms, SquaresAreTransposedChunkByChunk) {
+  for (const auto& [target, lanes] : {std::pair{avx2, 8}, std::pair{avx512, 16}}) {
+    ImageParam in(Float(32), 2, "in");
+    Var x("x"), y("y"), xi("xi"), yi("yi");
+    Func f("f"), block("block");
+    block(x, y) = in(y, x);
+    f(x, y) = block(x, y);
+    f.tile(x, y, xi, yi, lanes, lanes).vectorize(xi).unroll(yi);
+    block.compute_at(f, x).vectorize(y, lanes).unroll(x);
+    const auto code = assembly(f, target);
+    EXPECT_EQ(count(code, "vunpck") % (lanes * 2), 0u) << target;
+    EXPECT_GT(count(code, "vunpck"), 0u) << target;
+    EXPECT_EQ(count(code, "vperm") - count(code, "vperm2f128"), 0u) << target;
+  }
+}
+
 TEST(CodegenIdioms, AccumulatorsOfAMatrixProductStayInRegisters) {
   ImageParam a(Float(32), 2, "a"), b(Float(32), 2, "b");
   Var x("x"), y("y"), xi("xi"), yi("yi");
