@@ -18,8 +18,8 @@ int order(const T& a, const T& b) {
   return a < b ? -1 : b < a ? 1 : 0;
 }
 
-// Compares two trees, remembering the pairs of nodes that were equal: linear in the product of
-// sharing.
+// Compares two trees, remembering the pairs of expressions that were equal: linear in the product
+// of sharing.
 class Comparer {
  public:
   int compare(const Expr& a, const Expr& b) {
@@ -32,32 +32,55 @@ class Comparer {
     if (result == 0) equal_pairs_.insert({a.get(), b.get()});
     return result;
   }
-  int compare(const Stmt& a, const Stmt& b);
+  int compare(const Stmt& a, const Stmt& b) {
+    if (a.same_as(b)) return 0;
+    if (!a.defined() || !b.defined()) return a.defined() ? 1 : -1;
+    const int result = order(a->kind, b->kind);
+    return result ? result : compare_nodes(a, b);
+  }
+
+ private:
+  // Of one kind.
+  template <class Handle>
+  int compare_nodes(const Handle& a, const Handle& b) {
+    return match(a, [&]<class N>(const N& n) {
+      if constexpr (requires { n.fields(); }) {
+        return std::apply(
+            [&](const auto&... of_a) {
+              return std::apply(
+                  [&](const auto&... of_b) {
+                    int result = 0;
+                    ((result = compare(of_a, of_b)) || ...);
+                    return result;
+                  },
+                  static_cast<const N*>(b.get())->fields());
+            },
+            n.fields());
+      } else {
+        return 0;
+      }
+    });
+  }
 
   template <class T>
-  int compare_all(const std::vector<T>& a, const std::vector<T>& b) {
+  int compare(const T& a, const T& b) {
+    return order(a, b);
+  }
+  int compare(double a, double b) {
+    return order(std::bit_cast<int64_t>(a), std::bit_cast<int64_t>(b));
+  }
+  int compare(const Range& a, const Range& b) {
+    const int result = compare(a.min, b.min);
+    return result ? result : compare(a.extent, b.extent);
+  }
+  template <class T>
+  int compare(const std::vector<T>& a, const std::vector<T>& b) {
     if (const int result = order(a.size(), b.size())) return result;
     for (size_t i = 0; i < a.size(); ++i) {
       if (const int result = compare(a[i], b[i])) return result;
     }
     return 0;
   }
-  int compare(const Range& a, const Range& b) {
-    const int result = compare(a.min, b.min);
-    return result ? result : compare(a.extent, b.extent);
-  }
-  int compare(const Type& a, const Type& b) { return order(a, b); }
-
- private:
-  // The first non-zero of several comparisons, evaluated lazily.
-  template <class... Fs>
-  static int first(Fs... fs) {
-    int result = 0;
-    ((result = fs()) || ...);
-    return result;
-  }
-  int compare_nodes(const Expr& a, const Expr& b);
-  int compare_nodes(const Stmt& a, const Stmt& b);
 
   struct PairHash {
     size_t operator()(const std::pair<const Node*, const Node*>& p) const {
@@ -66,168 +89,6 @@ class Comparer {
   };
   std::unordered_set<std::pair<const Node*, const Node*>, PairHash> equal_pairs_;
 };
-
-int Comparer::compare_nodes(const Expr& a, const Expr& b) {
-  // Other kinds than `a`'s were ruled out before.
-  const auto same_kind = [&]<class N>(const N&) -> const N& {
-    return *static_cast<const N*>(b.get());
-  };
-  return match(
-      a, [&](const IntImm& n) { return order(n.value, same_kind(n).value); },
-      [&](const UIntImm& n) { return order(n.value, same_kind(n).value); },
-      [&](const FloatImm& n) {
-        return order(std::bit_cast<int64_t>(n.value), std::bit_cast<int64_t>(same_kind(n).value));
-      },
-      [&](const StringImm& n) { return order(n.value, same_kind(n).value); },
-      [&](const Variable& n) { return order(n.name, same_kind(n).name); },
-      [&](const Cast& n) { return compare(n.value, same_kind(n).value); },
-      [&](const Reinterpret& n) { return compare(n.value, same_kind(n).value); },
-      [&](const Binary& n) {
-        const auto& m = static_cast<const Binary&>(*b.get());
-        const int result = compare(n.a, m.a);
-        return result ? result : compare(n.b, m.b);
-      },
-      [&](const Not& n) { return compare(n.a, same_kind(n).a); },
-      [&](const Select& n) {
-        const Select& m = same_kind(n);
-        return first([&] { return compare(n.condition, m.condition); },
-                     [&] { return compare(n.when_true, m.when_true); },
-                     [&] { return compare(n.when_false, m.when_false); });
-      },
-      [&](const Load& n) {
-        const Load& m = same_kind(n);
-        return first([&] { return order(n.name, m.name); },
-                     [&] { return compare(n.index, m.index); },
-                     [&] { return compare(n.predicate, m.predicate); });
-      },
-      [&](const Ramp& n) {
-        const Ramp& m = same_kind(n);
-        return first([&] { return order(n.lanes, m.lanes); },
-                     [&] { return compare(n.base, m.base); },
-                     [&] { return compare(n.stride, m.stride); });
-      },
-      [&](const Broadcast& n) {
-        const Broadcast& m = same_kind(n);
-        return first([&] { return order(n.lanes, m.lanes); },
-                     [&] { return compare(n.value, m.value); });
-      },
-      [&](const Call& n) {
-        const Call& m = same_kind(n);
-        return first([&] { return order(n.call_type, m.call_type); },
-                     [&] { return order(n.op, m.op); }, [&] { return order(n.name, m.name); },
-                     [&] { return order(n.component, m.component); },
-                     [&] { return compare_all(n.args, m.args); });
-      },
-      [&](const Let& n) {
-        const Let& m = same_kind(n);
-        return first([&] { return order(n.name, m.name); },
-                     [&] { return compare(n.value, m.value); },
-                     [&] { return compare(n.body, m.body); });
-      },
-      [&](const Shuffle& n) {
-        const Shuffle& m = same_kind(n);
-        return first([&] { return order(n.indices, m.indices); },
-                     [&] { return compare_all(n.vectors, m.vectors); });
-      },
-      [&](const VectorReduce& n) {
-        const VectorReduce& m = same_kind(n);
-        return first([&] { return order(n.op, m.op); }, [&] { return compare(n.value, m.value); });
-      },
-      [](const ExprNode&) { return 0; });
-}
-
-int Comparer::compare(const Stmt& a, const Stmt& b) {
-  if (a.same_as(b)) return 0;
-  if (!a.defined() || !b.defined()) return a.defined() ? 1 : -1;
-  const int result = order(a->kind, b->kind);
-  return result ? result : compare_nodes(a, b);
-}
-
-int Comparer::compare_nodes(const Stmt& a, const Stmt& b) {
-  const auto same_kind = [&]<class N>(const N&) -> const N& {
-    return *static_cast<const N*>(b.get());
-  };
-  return match(
-      a,
-      [&](const LetStmt& n) {
-        const LetStmt& m = same_kind(n);
-        return first([&] { return order(n.name, m.name); },
-                     [&] { return compare(n.value, m.value); },
-                     [&] { return compare(n.body, m.body); });
-      },
-      [&](const Assert& n) {
-        const Assert& m = same_kind(n);
-        return first([&] { return compare(n.condition, m.condition); },
-                     [&] { return compare(n.error, m.error); });
-      },
-      [&](const ProducerConsumer& n) {
-        const ProducerConsumer& m = same_kind(n);
-        return first([&] { return order(n.name, m.name); },
-                     [&] { return order(n.produces, m.produces); },
-                     [&] { return compare(n.body, m.body); });
-      },
-      [&](const For& n) {
-        const For& m = same_kind(n);
-        return first(
-            [&] { return order(n.name, m.name); }, [&] { return order(n.runs, m.runs); },
-            [&] { return order(n.partition, m.partition); }, [&] { return compare(n.min, m.min); },
-            [&] { return compare(n.extent, m.extent); }, [&] { return compare(n.body, m.body); });
-      },
-      [&](const Store& n) {
-        const Store& m = same_kind(n);
-        return first([&] { return order(n.name, m.name); },
-                     [&] { return compare(n.value, m.value); },
-                     [&] { return compare(n.index, m.index); },
-                     [&] { return compare(n.predicate, m.predicate); });
-      },
-      [&](const Provide& n) {
-        const Provide& m = same_kind(n);
-        return first([&] { return order(n.name, m.name); },
-                     [&] { return compare_all(n.values, m.values); },
-                     [&] { return compare_all(n.args, m.args); },
-                     [&] { return compare(n.predicate, m.predicate); });
-      },
-      [&](const Realize& n) {
-        const Realize& m = same_kind(n);
-        return first([&] { return order(n.name, m.name); },
-                     [&] { return compare_all(n.types, m.types); },
-                     [&] { return order(n.memory, m.memory); },
-                     [&] { return compare_all(n.bounds, m.bounds); },
-                     [&] { return compare(n.body, m.body); });
-      },
-      [&](const Allocate& n) {
-        const Allocate& m = same_kind(n);
-        return first([&] { return order(n.name, m.name); }, [&] { return order(n.type, m.type); },
-                     [&] { return order(n.memory, m.memory); },
-                     [&] { return compare(n.elements, m.elements); },
-                     [&] { return compare(n.body, m.body); });
-      },
-      [&](const Free& n) { return order(n.name, same_kind(n).name); },
-      [&](const Block& n) { return compare_all(n.stmts, same_kind(n).stmts); },
-      [&](const IfThenElse& n) {
-        const IfThenElse& m = same_kind(n);
-        return first([&] { return compare(n.condition, m.condition); },
-                     [&] { return compare(n.when_true, m.when_true); },
-                     [&] { return compare(n.when_false, m.when_false); });
-      },
-      [&](const Evaluate& n) { return compare(n.value, same_kind(n).value); },
-      [&](const Atomic& n) {
-        const Atomic& m = same_kind(n);
-        return first([&] { return order(n.name, m.name); },
-                     [&] { return compare(n.body, m.body); });
-      },
-      [&](const Fork& n) {
-        const Fork& m = same_kind(n);
-        return first([&] { return compare(n.first, m.first); },
-                     [&] { return compare(n.rest, m.rest); });
-      },
-      [&](const Prefetch& n) {
-        const Prefetch& m = same_kind(n);
-        return first([&] { return order(n.name, m.name); }, [&] { return order(n.type, m.type); },
-                     [&] { return compare_all(n.bounds, m.bounds); });
-      },
-      [](const StmtNode&) { return 0; });
-}
 
 // ---- hash ----
 

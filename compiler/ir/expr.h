@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <memory>
 #include <string>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -172,26 +173,31 @@ class SymbolRef {
 
 // ---- expressions ----
 
-#define RETROGRADE_NODE(Name) \
-  static constexpr bool is_kind(Kind kind) { return kind == Kind::Name; }
+// What a node says besides its kind and type is listed once, as its fields: names and numbers, then
+// children in evaluation order. Comparison and walks stand on the list. Symbols only go along.
+#define RETROGRADE_FIELDS(...) \
+  auto fields() const { return std::tie(__VA_ARGS__); }
+#define RETROGRADE_NODE(Name, ...)                                        \
+  static constexpr bool is_kind(Kind kind) { return kind == Kind::Name; } \
+  RETROGRADE_FIELDS(__VA_ARGS__)
 
 struct IntImm : ExprNode {
-  RETROGRADE_NODE(IntImm)
+  RETROGRADE_NODE(IntImm, value)
   IntImm(Type type, int64_t value) : ExprNode(Kind::IntImm, type), value(value) {}
   const int64_t value;
 };
 struct UIntImm : ExprNode {
-  RETROGRADE_NODE(UIntImm)
+  RETROGRADE_NODE(UIntImm, value)
   UIntImm(Type type, uint64_t value) : ExprNode(Kind::UIntImm, type), value(value) {}
   const uint64_t value;
 };
 struct FloatImm : ExprNode {  // value already rounded to the type
-  RETROGRADE_NODE(FloatImm)
+  RETROGRADE_NODE(FloatImm, value)
   FloatImm(Type type, double value) : ExprNode(Kind::FloatImm, type), value(value) {}
   const double value;
 };
 struct StringImm : ExprNode {
-  RETROGRADE_NODE(StringImm)
+  RETROGRADE_NODE(StringImm, value)
   explicit StringImm(std::string value)
       : ExprNode(Kind::StringImm, Handle()), value(std::move(value)) {}
   const std::string value;
@@ -199,7 +205,7 @@ struct StringImm : ExprNode {
 // A pure variable, loop variable, let-bound name, scalar parameter, reduction variable, or a fact
 // of a buffer ("input.min.0", "input.extent.1", "input.stride.0").
 struct Variable : ExprNode {
-  RETROGRADE_NODE(Variable)
+  RETROGRADE_NODE(Variable, name)
   Variable(Type type, std::string name, SymbolRef symbol)
       : ExprNode(Kind::Variable, type), name(std::move(name)), symbol(std::move(symbol)) {}
   const std::string name;
@@ -207,17 +213,18 @@ struct Variable : ExprNode {
 };
 struct Cast
     : ExprNode {  // integers wrap; float to integer truncates toward zero; to bool means != 0
-  RETROGRADE_NODE(Cast)
+  RETROGRADE_NODE(Cast, value)
   Cast(Type type, Expr value) : ExprNode(Kind::Cast, type), value(std::move(value)) {}
   const Expr value;
 };
 struct Reinterpret : ExprNode {  // same bits, other type
-  RETROGRADE_NODE(Reinterpret)
+  RETROGRADE_NODE(Reinterpret, value)
   Reinterpret(Type type, Expr value) : ExprNode(Kind::Reinterpret, type), value(std::move(value)) {}
   const Expr value;
 };
 struct Binary : ExprNode {
   static constexpr bool is_kind(Kind kind) { return kind >= Kind::Add && kind <= Kind::Or; }
+  RETROGRADE_FIELDS(a, b)
   const Expr a, b;
 
  protected:
@@ -234,12 +241,12 @@ struct BinaryOf : Binary {
 #include "ir/kinds.def"
 
 struct Not : ExprNode {
-  RETROGRADE_NODE(Not)
+  RETROGRADE_NODE(Not, a)
   explicit Not(Expr a) : ExprNode(Kind::Not, a.type()), a(std::move(a)) {}
   const Expr a;
 };
 struct Select : ExprNode {
-  RETROGRADE_NODE(Select)
+  RETROGRADE_NODE(Select, condition, when_true, when_false)
   Select(Expr condition, Expr when_true, Expr when_false)
       : ExprNode(Kind::Select, when_true.type()),
         condition(std::move(condition)),
@@ -249,7 +256,7 @@ struct Select : ExprNode {
 };
 // FlatStorage phase. Element number `index` of the allocation or buffer `name`.
 struct Load : ExprNode {
-  RETROGRADE_NODE(Load)
+  RETROGRADE_NODE(Load, name, index, predicate)
   Load(Type type, std::string name, Expr index, Expr predicate, SymbolRef symbol)
       : ExprNode(Kind::Load, type),
         name(std::move(name)),
@@ -263,7 +270,7 @@ struct Load : ExprNode {
 };
 struct Ramp
     : ExprNode {  // base, base + stride, ...; base may be a vector: then lanes are base-major
-  RETROGRADE_NODE(Ramp)
+  RETROGRADE_NODE(Ramp, lanes, base, stride)
   Ramp(Expr base, Expr stride, int lanes)
       : ExprNode(Kind::Ramp, base.type().with_lanes(base.type().lanes() * lanes)),
         base(std::move(base)),
@@ -273,7 +280,7 @@ struct Ramp
   const int lanes;
 };
 struct Broadcast : ExprNode {  // value repeated `lanes` times; value may be a vector (concatenated)
-  RETROGRADE_NODE(Broadcast)
+  RETROGRADE_NODE(Broadcast, lanes, value)
   Broadcast(Expr value, int lanes)
       : ExprNode(Kind::Broadcast, value.type().with_lanes(value.type().lanes() * lanes)),
         value(std::move(value)),
@@ -288,7 +295,7 @@ enum class CallType : uint8_t {
   Extern,    // a C function `name` by value, pure
 };
 struct Call : ExprNode {
-  RETROGRADE_NODE(Call)
+  RETROGRADE_NODE(Call, call_type, op, name, component, args)
   Call(Type type, CallType call_type, Op op, std::string name, std::vector<Expr> args,
        int component, SymbolRef symbol)
       : ExprNode(Kind::Call, type),
@@ -307,7 +314,7 @@ struct Call : ExprNode {
   const SymbolRef symbol;
 };
 struct Let : ExprNode {
-  RETROGRADE_NODE(Let)
+  RETROGRADE_NODE(Let, name, value, body)
   Let(std::string name, Expr value, Expr body)
       : ExprNode(Kind::Let, body.type()),
         name(std::move(name)),
@@ -317,7 +324,7 @@ struct Let : ExprNode {
   const Expr value, body;
 };
 struct Shuffle : ExprNode {  // lane i = lane indices[i] of the concatenated vectors
-  RETROGRADE_NODE(Shuffle)
+  RETROGRADE_NODE(Shuffle, indices, vectors)
   Shuffle(Type type, std::vector<Expr> vectors, std::vector<int> indices)
       : ExprNode(Kind::Shuffle, type), vectors(std::move(vectors)), indices(std::move(indices)) {}
   const std::vector<Expr> vectors;
@@ -325,7 +332,7 @@ struct Shuffle : ExprNode {  // lane i = lane indices[i] of the concatenated vec
 };
 enum class ReduceOp : uint8_t { Add, Mul, Min, Max, And, Or };
 struct VectorReduce : ExprNode {  // groups of neighbouring lanes combined, to type.lanes() lanes
-  RETROGRADE_NODE(VectorReduce)
+  RETROGRADE_NODE(VectorReduce, op, value)
   VectorReduce(Type type, ReduceOp op, Expr value)
       : ExprNode(Kind::VectorReduce, type), op(op), value(std::move(value)) {}
   const ReduceOp op;
@@ -335,7 +342,7 @@ struct VectorReduce : ExprNode {  // groups of neighbouring lanes combined, to t
 // ---- statements ----
 
 struct LetStmt : StmtNode {
-  RETROGRADE_NODE(LetStmt)
+  RETROGRADE_NODE(LetStmt, name, value, body)
   LetStmt(std::string name, Expr value, Stmt body)
       : StmtNode(Kind::LetStmt),
         name(std::move(name)),
@@ -349,13 +356,13 @@ struct LetStmt : StmtNode {
 // and well). Op::undef says that it cannot be false, which an earlier check has seen to: this is a
 // fact, and no code.
 struct Assert : StmtNode {
-  RETROGRADE_NODE(Assert)
+  RETROGRADE_NODE(Assert, condition, error)
   Assert(Expr condition, Expr error)
       : StmtNode(Kind::Assert), condition(std::move(condition)), error(std::move(error)) {}
   const Expr condition, error;
 };
 struct ProducerConsumer : StmtNode {
-  RETROGRADE_NODE(ProducerConsumer)
+  RETROGRADE_NODE(ProducerConsumer, name, produces, body)
   ProducerConsumer(std::string name, bool produces, Stmt body)
       : StmtNode(Kind::ProducerConsumer),
         name(std::move(name)),
@@ -366,7 +373,7 @@ struct ProducerConsumer : StmtNode {
   const Stmt body;
 };
 struct For : StmtNode {  // name in [min, min + extent)
-  RETROGRADE_NODE(For)
+  RETROGRADE_NODE(For, name, runs, partition, min, extent, body)
   For(std::string name, Expr min, Expr extent, ForType runs, Stmt body,
       Partition partition = Partition::Auto)
       : StmtNode(Kind::For),
@@ -383,7 +390,7 @@ struct For : StmtNode {  // name in [min, min + extent)
   const Partition partition;
 };
 struct Store : StmtNode {
-  RETROGRADE_NODE(Store)
+  RETROGRADE_NODE(Store, name, value, index, predicate)
   Store(std::string name, Expr value, Expr index, Expr predicate, SymbolRef symbol)
       : StmtNode(Kind::Store),
         name(std::move(name)),
@@ -397,7 +404,7 @@ struct Store : StmtNode {
 };
 struct Provide : StmtNode {  // Loops phase: store to a point of a Func; one value per Tuple
                              // element, stored together
-  RETROGRADE_NODE(Provide)
+  RETROGRADE_NODE(Provide, name, values, args, predicate)
   Provide(std::string name, std::vector<Expr> values, std::vector<Expr> args, Expr predicate)
       : StmtNode(Kind::Provide),
         name(std::move(name)),
@@ -409,7 +416,7 @@ struct Provide : StmtNode {  // Loops phase: store to a point of a Func; one val
   const Expr predicate;
 };
 struct Realize : StmtNode {  // Loops phase: storage for a Func over a box, alive during body
-  RETROGRADE_NODE(Realize)
+  RETROGRADE_NODE(Realize, name, types, memory, bounds, body)
   Realize(std::string name, std::vector<Type> types, MemoryType memory, std::vector<Range> bounds,
           Stmt body)
       : StmtNode(Kind::Realize),
@@ -426,7 +433,7 @@ struct Realize : StmtNode {  // Loops phase: storage for a Func over a box, aliv
 };
 struct Allocate
     : StmtNode {  // FlatStorage phase: `elements` (int64) elements of `type`, alive during body
-  RETROGRADE_NODE(Allocate)
+  RETROGRADE_NODE(Allocate, name, type, memory, elements, body)
   Allocate(std::string name, Type type, MemoryType memory, Expr elements, Stmt body)
       : StmtNode(Kind::Allocate),
         name(std::move(name)),
@@ -442,17 +449,17 @@ struct Allocate
 };
 struct Free : StmtNode {  // no use of the allocation follows; at most one on every path of its
                           // Allocate's body
-  RETROGRADE_NODE(Free)
+  RETROGRADE_NODE(Free, name)
   explicit Free(std::string name) : StmtNode(Kind::Free), name(std::move(name)) {}
   const std::string name;
 };
 struct Block : StmtNode {
-  RETROGRADE_NODE(Block)
+  RETROGRADE_NODE(Block, stmts)
   explicit Block(std::vector<Stmt> stmts) : StmtNode(Kind::Block), stmts(std::move(stmts)) {}
   const std::vector<Stmt> stmts;
 };
 struct IfThenElse : StmtNode {
-  RETROGRADE_NODE(IfThenElse)
+  RETROGRADE_NODE(IfThenElse, condition, when_true, when_false)
   IfThenElse(Expr condition, Stmt when_true, Stmt when_false)
       : StmtNode(Kind::IfThenElse),
         condition(std::move(condition)),
@@ -462,26 +469,26 @@ struct IfThenElse : StmtNode {
   const Stmt when_true, when_false;  // when_false may be undefined
 };
 struct Evaluate : StmtNode {
-  RETROGRADE_NODE(Evaluate)
+  RETROGRADE_NODE(Evaluate, value)
   explicit Evaluate(Expr value) : StmtNode(Kind::Evaluate), value(std::move(value)) {}
   const Expr value;
 };
 
 struct Atomic : StmtNode {  // what body reads and writes of one element of `name` is indivisible
-  RETROGRADE_NODE(Atomic)
+  RETROGRADE_NODE(Atomic, name, body)
   Atomic(std::string name, Stmt body)
       : StmtNode(Kind::Atomic), name(std::move(name)), body(std::move(body)) {}
   const std::string name;
   const Stmt body;
 };
 struct Fork : StmtNode {  // both may run at once; ends when both have ended
-  RETROGRADE_NODE(Fork)
+  RETROGRADE_NODE(Fork, first, rest)
   Fork(Stmt first, Stmt rest)
       : StmtNode(Kind::Fork), first(std::move(first)), rest(std::move(rest)) {}
   const Stmt first, rest;
 };
 struct Prefetch : StmtNode {  // Loops phase: fetch a box of a Func or image into the cache
-  RETROGRADE_NODE(Prefetch)
+  RETROGRADE_NODE(Prefetch, name, type, bounds)
   Prefetch(std::string name, Type type, std::vector<Range> bounds, SymbolRef symbol)
       : StmtNode(Kind::Prefetch),
         name(std::move(name)),
@@ -495,6 +502,7 @@ struct Prefetch : StmtNode {  // Loops phase: fetch a box of a Func or image int
 };
 
 #undef RETROGRADE_NODE
+#undef RETROGRADE_FIELDS
 
 }  // namespace ir
 }  // namespace retrograde

@@ -14,252 +14,207 @@ namespace {
 
 bool is_leaf(const Expr& e) { return e.kind() == Kind::Variable || e.kind() <= Kind::StringImm; }
 
-// Maps a list; says whether anything changed.
-std::vector<Expr> map_all(const std::vector<Expr>& es, ExprMap map, bool& changed) {
-  std::vector<Expr> result;
-  result.reserve(es.size());
-  for (const Expr& e : es) {
-    result.push_back(map(e));
-    changed |= !result.back().same_as(e);
-  }
-  return result;
-}
+// Finds the children among the fields of a node.
+struct ChildVisit {
+  ExprVisit on_expr;
+  StmtVisit on_stmt;
 
-Expr map_optional(const Expr& e, ExprMap map) { return e.defined() ? map(e) : e; }
-Stmt map_optional(const Stmt& s, StmtMap map) { return s.defined() ? map(s) : s; }
+  void operator()(const Expr& e) const {
+    if (e.defined()) on_expr(e);
+  }
+  void operator()(const Stmt& s) const {
+    if (s.defined()) on_stmt(s);
+  }
+  void operator()(const Range& r) const { (*this)(r.min), (*this)(r.extent); }
+  template <class T>
+  void operator()(const std::vector<T>& fields) const {
+    for (const T& field : fields) (*this)(field);
+  }
+  template <class T>
+  void operator()(const T&) const {}
+
+  template <class Handle>
+  void of(const Handle& node) const {
+    match(node, [&](const auto& n) {
+      if constexpr (requires { n.fields(); })
+        std::apply([&](const auto&... fields) { ((*this)(fields), ...); }, n.fields());
+    });
+  }
+};
+
+// Replaces children, and says whether any changed.
+struct ChildMap {
+  ExprMap map_expr;
+  StmtMap map_stmt;
+  bool changed = false;
+
+  Expr operator()(const Expr& e) { return replaced(e, map_expr); }
+  Stmt operator()(const Stmt& s) { return replaced(s, map_stmt); }
+  Range operator()(const Range& r) {
+    Expr min = (*this)(r.min);
+    return {min, (*this)(r.extent)};
+  }
+  template <class T>
+  std::vector<T> operator()(const std::vector<T>& children) {
+    std::vector<T> result;
+    result.reserve(children.size());
+    for (const T& child : children) result.push_back((*this)(child));
+    return result;
+  }
+
+  // What `make` makes of the children replaced, in the order of evaluation; `node` if none changed.
+  template <class Handle, class Make, class... Children>
+  Handle of(const Handle& node, const Make& make, const Children&... children) {
+    std::tuple<Children...> replaced{(*this)(children)...};
+    return changed ? Handle(std::apply(make, std::move(replaced))) : node;
+  }
+
+ private:
+  template <class Handle, class Map>
+  Handle replaced(const Handle& child, Map map) {
+    if (!child.defined()) return child;
+    Handle result = map(child);
+    changed |= !result.same_as(child);
+    return result;
+  }
+};
 
 }  // namespace
 
-void for_each_child(const Expr& e, ExprVisit on) {
-  const auto all = [&](const std::vector<Expr>& es) {
-    for (const Expr& child : es) on(child);
-  };
-  match(
-      e, [&](const Cast& n) { on(n.value); }, [&](const Reinterpret& n) { on(n.value); },
-      [&](const Binary& n) { on(n.a), on(n.b); }, [&](const Not& n) { on(n.a); },
-      [&](const Select& n) { on(n.condition), on(n.when_true), on(n.when_false); },
-      [&](const Load& n) {
-        on(n.index);
-        if (n.predicate.defined()) on(n.predicate);
-      },
-      [&](const Ramp& n) { on(n.base), on(n.stride); }, [&](const Broadcast& n) { on(n.value); },
-      [&](const Call& n) { all(n.args); }, [&](const Let& n) { on(n.value), on(n.body); },
-      [&](const Shuffle& n) { all(n.vectors); }, [&](const VectorReduce& n) { on(n.value); },
-      [](const ExprNode&) {});
+void for_each_child(const Expr& e, ExprVisit on_expr) {
+  const auto no_stmt = [](const Stmt&) {};
+  ChildVisit{on_expr, no_stmt}.of(e);
 }
 
-void for_each_child(const Stmt& s, ExprVisit on, StmtVisit on_stmt) {
-  const auto all = [&](const std::vector<Expr>& es) {
-    for (const Expr& child : es) on(child);
-  };
-  const auto maybe = [&](const Expr& e) {
-    if (e.defined()) on(e);
-  };
-  const auto maybe_stmt = [&](const Stmt& child) {
-    if (child.defined()) on_stmt(child);
-  };
-  match(
-      s, [&](const LetStmt& n) { on(n.value), maybe_stmt(n.body); },
-      [&](const Assert& n) { on(n.condition), on(n.error); },
-      [&](const ProducerConsumer& n) { maybe_stmt(n.body); },
-      [&](const For& n) { on(n.min), on(n.extent), maybe_stmt(n.body); },
-      [&](const Store& n) { on(n.value), on(n.index), maybe(n.predicate); },
-      [&](const Provide& n) { all(n.values), all(n.args), maybe(n.predicate); },
-      [&](const Realize& n) {
-        for (const Range& r : n.bounds) on(r.min), on(r.extent);
-        maybe_stmt(n.body);
-      },
-      [&](const Allocate& n) { on(n.elements), maybe_stmt(n.body); },
-      [&](const Block& n) {
-        for (const Stmt& child : n.stmts) maybe_stmt(child);
-      },
-      [&](const Atomic& n) { maybe_stmt(n.body); },
-      [&](const Fork& n) { maybe_stmt(n.first), maybe_stmt(n.rest); },
-      [&](const Prefetch& n) {
-        for (const Range& r : n.bounds) on(r.min), on(r.extent);
-      },
-      [&](const IfThenElse& n) {
-        on(n.condition), maybe_stmt(n.when_true), maybe_stmt(n.when_false);
-      },
-      [&](const Evaluate& n) { on(n.value); }, [](const StmtNode&) {});
+void for_each_child(const Stmt& s, ExprVisit on_expr, StmtVisit on_stmt) {
+  ChildVisit{on_expr, on_stmt}.of(s);
 }
 
 Expr map_children(const Expr& e, ExprMap map) {
+  const auto no_stmt = [](const Stmt& s) { return s; };
+  ChildMap mapped{map, no_stmt};
+  const auto with_lanes_of = [](const ExprNode& n, const Expr& child) {
+    return n.type.with_lanes(child.type().lanes());
+  };
   return match(
       e,
       [&](const Cast& n) {
-        Expr value = map(n.value);
-        return value.same_as(n.value) ? e : cast_to(n.type.with_lanes(value.type().lanes()), value);
+        const auto make = [&](const Expr& v) { return cast_to(with_lanes_of(n, v), v); };
+        return mapped.of(e, make, n.value);
       },
       [&](const Reinterpret& n) {
-        Expr value = map(n.value);
-        return value.same_as(n.value)
-                   ? e
-                   : reinterpret_as(n.type.with_lanes(value.type().lanes()), value);
+        const auto make = [&](const Expr& v) { return reinterpret_as(with_lanes_of(n, v), v); };
+        return mapped.of(e, make, n.value);
       },
       [&](const Binary& n) {
-        Expr a = map(n.a), b = map(n.b);
-        return a.same_as(n.a) && b.same_as(n.b) ? e : binary(n.kind, std::move(a), std::move(b));
+        return mapped.of(
+            e, [&](Expr a, Expr b) { return binary(n.kind, a, b); }, n.a, n.b);
       },
-      [&](const Not& n) {
-        Expr a = map(n.a);
-        return a.same_as(n.a) ? e : logical_not(std::move(a));
-      },
+      [&](const Not& n) { return mapped.of(e, logical_not, n.a); },
       [&](const Select& n) {
-        Expr c = map(n.condition), t = map(n.when_true), f = map(n.when_false);
-        if (c.same_as(n.condition) && t.same_as(n.when_true) && f.same_as(n.when_false)) return e;
-        return make_select(std::move(c), std::move(t), std::move(f));
+        return mapped.of(e, make_select, n.condition, n.when_true, n.when_false);
       },
       [&](const Load& n) {
-        Expr index = map(n.index), predicate = map_optional(n.predicate, map);
-        if (index.same_as(n.index) && predicate.same_as(n.predicate)) return e;
-        const Type type = n.type.with_lanes(index.type().lanes());
-        return make_load(type, n.name, std::move(index), std::move(predicate), n.symbol);
+        const auto make = [&](Expr index, Expr predicate) {
+          return make_load(with_lanes_of(n, index), n.name, index, predicate, n.symbol);
+        };
+        return mapped.of(e, make, n.index, n.predicate);
       },
       [&](const Ramp& n) {
-        Expr base = map(n.base), stride = map(n.stride);
-        if (base.same_as(n.base) && stride.same_as(n.stride)) return e;
-        return make_ramp(std::move(base), std::move(stride), n.lanes);
+        const auto make = [&](Expr base, Expr stride) { return make_ramp(base, stride, n.lanes); };
+        return mapped.of(e, make, n.base, n.stride);
       },
       [&](const Broadcast& n) {
-        Expr value = map(n.value);
-        return value.same_as(n.value) ? e : make_broadcast(std::move(value), n.lanes);
+        return mapped.of(
+            e, [&](Expr value) { return make_broadcast(value, n.lanes); }, n.value);
       },
       [&](const Call& n) {
-        bool changed = false;
-        std::vector<Expr> args = map_all(n.args, map, changed);
-        if (!changed) return e;
-        if (n.call_type == CallType::Operator) return call_op(n.op, n.type, std::move(args));
-        return Expr(
-            new Call(n.type, n.call_type, n.op, n.name, std::move(args), n.component, n.symbol));
+        const auto make = [&](std::vector<Expr> args) {
+          if (n.call_type == CallType::Operator) return call_op(n.op, n.type, std::move(args));
+          return Expr(
+              new Call(n.type, n.call_type, n.op, n.name, std::move(args), n.component, n.symbol));
+        };
+        return mapped.of(e, make, n.args);
       },
       [&](const Let& n) {
-        Expr value = map(n.value), body = map(n.body);
-        if (value.same_as(n.value) && body.same_as(n.body)) return e;
-        return make_let(n.name, std::move(value), std::move(body));
+        const auto make = [&](Expr value, Expr body) { return make_let(n.name, value, body); };
+        return mapped.of(e, make, n.value, n.body);
       },
       [&](const Shuffle& n) {
-        bool changed = false;
-        std::vector<Expr> vectors = map_all(n.vectors, map, changed);
-        return changed ? make_shuffle(std::move(vectors), n.indices) : e;
+        const auto make = [&](std::vector<Expr> vectors) {
+          return make_shuffle(std::move(vectors), n.indices);
+        };
+        return mapped.of(e, make, n.vectors);
       },
       [&](const VectorReduce& n) {
-        Expr value = map(n.value);
-        return value.same_as(n.value) ? e
-                                      : make_vector_reduce(n.op, std::move(value), n.type.lanes());
+        const auto make = [&](Expr value) {
+          return make_vector_reduce(n.op, value, n.type.lanes());
+        };
+        return mapped.of(e, make, n.value);
       },
       [&](const ExprNode&) { return e; });
 }
 
-namespace {
-
-std::vector<Range> map_ranges(const std::vector<Range>& ranges, ExprMap map, bool& changed) {
-  std::vector<Range> result;
-  for (const Range& r : ranges) {
-    result.push_back({map(r.min), map(r.extent)});
-    changed |= !result.back().min.same_as(r.min) || !result.back().extent.same_as(r.extent);
-  }
-  return result;
-}
-
-Stmt map_realize(const Stmt& s, const Realize& n, ExprMap map, StmtMap map_stmt) {
-  bool changed = false;
-  std::vector<Range> bounds = map_ranges(n.bounds, map, changed);
-  Stmt body = map_optional(n.body, map_stmt);
-  if (!changed && body.same_as(n.body)) return s;
-  return make_realize(n.name, n.types, n.memory, std::move(bounds), std::move(body));
-}
-
-Stmt map_provide(const Stmt& s, const Provide& n, ExprMap map) {
-  bool changed = false;
-  std::vector<Expr> values = map_all(n.values, map, changed), args = map_all(n.args, map, changed);
-  Expr predicate = map_optional(n.predicate, map);
-  if (!changed && predicate.same_as(n.predicate)) return s;
-  return make_provide(n.name, std::move(values), std::move(args), std::move(predicate));
-}
-
-Stmt map_block(const Stmt& s, const Block& n, StmtMap map_stmt) {
-  bool changed = false;
-  std::vector<Stmt> stmts;
-  stmts.reserve(n.stmts.size());
-  for (const Stmt& child : n.stmts) {
-    stmts.push_back(map_optional(child, map_stmt));
-    changed |= !stmts.back().same_as(child);
-  }
-  return changed ? make_block(std::move(stmts)) : s;
-}
-
-}  // namespace
-
 Stmt map_children(const Stmt& s, ExprMap map, StmtMap map_stmt) {
+  ChildMap mapped{map, map_stmt};
   return match(
       s,
       [&](const LetStmt& n) {
-        Expr value = map(n.value);
-        Stmt body = map_optional(n.body, map_stmt);
-        if (value.same_as(n.value) && body.same_as(n.body)) return s;
-        return make_let(n.name, std::move(value), std::move(body));
+        const auto make = [&](Expr value, Stmt body) { return make_let(n.name, value, body); };
+        return mapped.of(s, make, n.value, n.body);
       },
-      [&](const Assert& n) {
-        Expr condition = map(n.condition), error = map(n.error);
-        if (condition.same_as(n.condition) && error.same_as(n.error)) return s;
-        return make_assert(std::move(condition), std::move(error));
-      },
+      [&](const Assert& n) { return mapped.of(s, make_assert, n.condition, n.error); },
       [&](const ProducerConsumer& n) {
-        Stmt body = map_optional(n.body, map_stmt);
-        return body.same_as(n.body) ? s
-                                    : make_producer_consumer(n.name, n.produces, std::move(body));
+        const auto make = [&](Stmt body) {
+          return make_producer_consumer(n.name, n.produces, body);
+        };
+        return mapped.of(s, make, n.body);
       },
       [&](const For& n) {
-        Expr min = map(n.min), extent = map(n.extent);
-        Stmt body = map_optional(n.body, map_stmt);
-        if (min.same_as(n.min) && extent.same_as(n.extent) && body.same_as(n.body)) return s;
-        return make_for(n.name, std::move(min), std::move(extent), n.runs, std::move(body),
-                        n.partition);
+        const auto make = [&](Expr min, Expr extent, Stmt body) {
+          return make_for(n.name, min, extent, n.runs, body, n.partition);
+        };
+        return mapped.of(s, make, n.min, n.extent, n.body);
       },
       [&](const Store& n) {
-        Expr value = map(n.value), index = map(n.index), predicate = map_optional(n.predicate, map);
-        if (value.same_as(n.value) && index.same_as(n.index) && predicate.same_as(n.predicate))
-          return s;
-        return make_store(n.name, std::move(value), std::move(index), std::move(predicate),
-                          n.symbol);
+        const auto make = [&](Expr value, Expr index, Expr predicate) {
+          return make_store(n.name, value, index, predicate, n.symbol);
+        };
+        return mapped.of(s, make, n.value, n.index, n.predicate);
       },
-      [&](const Provide& n) { return map_provide(s, n, map); },
-      [&](const Realize& n) { return map_realize(s, n, map, map_stmt); },
+      [&](const Provide& n) {
+        const auto make = [&](auto values, auto args, Expr predicate) {
+          return make_provide(n.name, std::move(values), std::move(args), predicate);
+        };
+        return mapped.of(s, make, n.values, n.args, n.predicate);
+      },
+      [&](const Realize& n) {
+        const auto make = [&](std::vector<Range> bounds, Stmt body) {
+          return make_realize(n.name, n.types, n.memory, std::move(bounds), body);
+        };
+        return mapped.of(s, make, n.bounds, n.body);
+      },
       [&](const Allocate& n) {
-        Expr elements = map(n.elements);
-        Stmt body = map_optional(n.body, map_stmt);
-        if (elements.same_as(n.elements) && body.same_as(n.body)) return s;
-        return make_allocate(n.name, n.type, n.memory, std::move(elements), std::move(body));
+        const auto make = [&](Expr elements, Stmt body) {
+          return make_allocate(n.name, n.type, n.memory, elements, body);
+        };
+        return mapped.of(s, make, n.elements, n.body);
       },
-      [&](const Block& n) { return map_block(s, n, map_stmt); },
+      [&](const Block& n) { return mapped.of(s, make_block, n.stmts); },
       [&](const IfThenElse& n) {
-        Expr condition = map(n.condition);
-        Stmt when_true = map_optional(n.when_true, map_stmt),
-             when_false = map_optional(n.when_false, map_stmt);
-        if (condition.same_as(n.condition) && when_true.same_as(n.when_true) &&
-            when_false.same_as(n.when_false)) {
-          return s;
-        }
-        return make_if(std::move(condition), std::move(when_true), std::move(when_false));
+        return mapped.of(s, make_if, n.condition, n.when_true, n.when_false);
       },
-      [&](const Evaluate& n) {
-        Expr value = map(n.value);
-        return value.same_as(n.value) ? s : make_evaluate(std::move(value));
-      },
+      [&](const Evaluate& n) { return mapped.of(s, make_evaluate, n.value); },
       [&](const Atomic& n) {
-        Stmt body = map_optional(n.body, map_stmt);
-        return body.same_as(n.body) ? s : make_atomic(n.name, std::move(body));
+        return mapped.of(
+            s, [&](Stmt body) { return make_atomic(n.name, body); }, n.body);
       },
-      [&](const Fork& n) {
-        Stmt first = map_optional(n.first, map_stmt), rest = map_optional(n.rest, map_stmt);
-        if (first.same_as(n.first) && rest.same_as(n.rest)) return s;
-        return make_fork(std::move(first), std::move(rest));
-      },
+      [&](const Fork& n) { return mapped.of(s, make_fork, n.first, n.rest); },
       [&](const Prefetch& n) {
-        bool changed = false;
-        std::vector<Range> bounds = map_ranges(n.bounds, map, changed);
-        return !changed ? s : make_prefetch(n.name, n.type, std::move(bounds), n.symbol);
+        const auto make = [&](std::vector<Range> bounds) {
+          return make_prefetch(n.name, n.type, std::move(bounds), n.symbol);
+        };
+        return mapped.of(s, make, n.bounds);
       },
       [&](const StmtNode&) { return s; });
 }

@@ -248,7 +248,7 @@ class HeaderReader:
     def macro_names(self):
         """What a macro of the header declares: RETROGRADE_BIT_OPERATOR(operator&)."""
         for match in re.finditer(r"^[ \t]*RETROGRADE_(\w+)\((.*)\)\s*(?://.*)?$", self.text, re.M):
-            if "ERROR" in match.group(1):
+            if re.match("ERROR|NODE|FIELDS", match.group(1)):
                 continue
             for word in match.group(2).split(","):
                 word = word.strip()
