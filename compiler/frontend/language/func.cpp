@@ -132,80 +132,26 @@ std::vector<RVar> Func::rvars(int index) const {
 
 // ---- running it ----
 
-Pipeline& Func::pipeline() {
+Pipeline& Func::pipeline_to(const char* asked) {
+  check_defined(asked + quoted(name()));
   if (!pipeline_.defined()) pipeline_ = Pipeline(*this);
   return pipeline_;
 }
 
-Realization Func::realize(JITUserContext* context, const std::vector<int32_t>& sizes,
-                          const Target& target, const ParamMap& map) {
-  check_defined("realize " + quoted(name()));
-  return pipeline().realize(context, sizes, target, map);
-}
-
-void Func::realize(JITUserContext* context, Pipeline::RealizationArg outputs, const Target& target,
-                   const ParamMap& map) {
-  check_defined("realize " + quoted(name()));
-  pipeline().realize(context, std::move(outputs), target, map);
-}
-
-Realization Func::realize(const std::vector<int32_t>& sizes, const Target& target,
-                          const ParamMap& map) {
-  return realize(nullptr, sizes, target, map);
-}
-
-void Func::realize(Pipeline::RealizationArg outputs, const Target& target, const ParamMap& map) {
-  realize(nullptr, std::move(outputs), target, map);
-}
-
-void Func::infer_input_bounds(JITUserContext* context, const std::vector<int32_t>& sizes,
-                              const Target& target, const ParamMap& map) {
-  check_defined("infer the input bounds of " + quoted(name()));
-  pipeline().infer_input_bounds(context, sizes, target, map);
-}
-
-void Func::infer_input_bounds(JITUserContext* context, Pipeline::RealizationArg outputs,
-                              const Target& target, const ParamMap& map) {
-  check_defined("infer the input bounds of " + quoted(name()));
-  pipeline().infer_input_bounds(context, std::move(outputs), target, map);
-}
-
-void Func::infer_input_bounds(const std::vector<int32_t>& sizes, const Target& target,
-                              const ParamMap& map) {
-  infer_input_bounds(nullptr, sizes, target, map);
-}
-
-void Func::infer_input_bounds(Pipeline::RealizationArg outputs, const Target& target,
-                              const ParamMap& map) {
-  infer_input_bounds(nullptr, std::move(outputs), target, map);
-}
-
-void Func::compile_jit(const Target& target) {
-  check_defined("compile " + quoted(name()));
-  pipeline().compile_jit(target);
-}
-
-Callable Func::compile_to_callable(const std::vector<Argument>& args, const Target& target) {
-  check_defined("compile " + quoted(name()));
-  return pipeline().compile_to_callable(args, target);
-}
-
 std::string Func::loop_nest(const Target& target) {
-  check_defined("show the loops of " + quoted(name()));
-  return pipeline().loop_nest(target);
+  return pipeline_to("show the loops of ").loop_nest(target);
 }
 
-void Func::print_loop_nest() {
-  check_defined("show the loops of " + quoted(name()));
-  pipeline().print_loop_nest();
+void Func::print_loop_nest() { pipeline_to("show the loops of ").print_loop_nest(); }
+
+JITHandlers& Func::jit_handlers() {
+  return pipeline_to("set what is called back by ").jit_handlers();
 }
 
 std::vector<Argument> Func::infer_arguments() const {
   check_defined("list the arguments of " + quoted(name()));
   return Pipeline(*this).infer_arguments();
 }
-
-JITHandlers& Func::jit_handlers() { return pipeline().jit_handlers(); }
 
 OutputImageParam Func::output_buffer() const {
   check_defined("use the output buffer of " + quoted(name()));

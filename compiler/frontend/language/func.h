@@ -32,7 +32,7 @@ class EvictionKey {
   Expr key_;
 };
 
-class Func : public LoopDirectives<Func> {
+class Func : public LoopDirectives<Func>, public Runnable<Func> {
  public:
   Func(std::source_location where = std::source_location::current());
   // Requires: a name is text.
@@ -97,101 +97,15 @@ class Func : public LoopDirectives<Func> {
   // One function, two handles.
   bool same_as(const Func& other) const { return func_ == other.func_; }
 
-  // ---- running it ----
-  Realization realize(const std::vector<int32_t>& sizes = {}, const Target& target = Target(),
-                      const ParamMap& map = ParamMap::empty_map());
-  // Of braces, so that {0} is a size and no pointer.
-  Realization realize(std::initializer_list<int32_t> sizes, const Target& target = Target(),
-                      const ParamMap& map = ParamMap::empty_map()) {
-    return realize(std::vector<int32_t>(sizes), target, map);
-  }
-  void realize(Pipeline::RealizationArg outputs, const Target& target = Target(),
-               const ParamMap& map = ParamMap::empty_map());
-  Realization realize(JITUserContext* context, const std::vector<int32_t>& sizes = {},
-                      const Target& target = Target(), const ParamMap& map = ParamMap::empty_map());
-  void realize(JITUserContext* context, Pipeline::RealizationArg outputs,
-               const Target& target = Target(), const ParamMap& map = ParamMap::empty_map());
-  void infer_input_bounds(const std::vector<int32_t>& sizes, const Target& target = Target(),
-                          const ParamMap& map = ParamMap::empty_map());
-  void infer_input_bounds(Pipeline::RealizationArg outputs, const Target& target = Target(),
-                          const ParamMap& map = ParamMap::empty_map());
-  void infer_input_bounds(JITUserContext* context, const std::vector<int32_t>& sizes,
-                          const Target& target = Target(),
-                          const ParamMap& map = ParamMap::empty_map());
-  void infer_input_bounds(JITUserContext* context, Pipeline::RealizationArg outputs,
-                          const Target& target = Target(),
-                          const ParamMap& map = ParamMap::empty_map());
-  void compile_jit(const Target& target = Target());  // now, not at the first realize()
-  Callable compile_to_callable(const std::vector<Argument>& args,
-                               const Target& target = get_jit_target_from_environment());
+  // ---- running it, and compiling it ahead of time: see runnable.h ----
   std::string loop_nest(const Target& target = Target());  // its loops as text, after scheduling
   void print_loop_nest();                                  // the same to the standard error stream
   std::vector<Argument> infer_arguments() const;           // Params and ImageParams that it uses
   JITHandlers& jit_handlers();
-  // See pipeline.h.
-  void set_error_handler(void (*handler)(void*, const char*));
-  void set_custom_allocator(void* (*malloc)(void*, size_t), void (*free)(void*, void*));
-  void set_custom_do_task(int (*handler)(void*, int (*)(void*, int, uint8_t*), int, uint8_t*));
-  void set_custom_do_par_for(int (*handler)(void*, int (*)(void*, int, uint8_t*), int, int,
-                                            uint8_t*));
-  void set_custom_trace(int (*handler)(void*, const halide_trace_event_t*));
-  void set_custom_print(void (*handler)(void*, const char*));
-  void set_jit_externs(const std::map<std::string, JITExtern>& externs);
-  const std::map<std::string, JITExtern>& get_jit_externs();
   // Promises about the buffer that this Func is realized into.
   // Requires: it has one only if it is no Tuple.
   OutputImageParam output_buffer() const;
   std::vector<OutputImageParam> output_buffers() const;
-
-  // ---- ahead of time: see pipeline.h. An empty function name stands for the Func's own ----
-  Module compile_to_module(const std::vector<Argument>& args, const std::string& function_name = "",
-                           const Target& target = get_target_from_environment());
-  void compile_to(const std::map<OutputFileType, std::string>& output_files,
-                  const std::vector<Argument>& args, const std::string& function_name,
-                  const Target& target = get_target_from_environment());
-  void compile_to_object(const std::string& filename, const std::vector<Argument>& args,
-                         const std::string& function_name,
-                         const Target& target = get_target_from_environment());
-  void compile_to_object(const std::string& filename, const std::vector<Argument>& args,
-                         const Target& target = get_target_from_environment());
-  void compile_to_bitcode(const std::string& filename, const std::vector<Argument>& args,
-                          const std::string& function_name,
-                          const Target& target = get_target_from_environment());
-  void compile_to_bitcode(const std::string& filename, const std::vector<Argument>& args,
-                          const Target& target = get_target_from_environment());
-  void compile_to_llvm_assembly(const std::string& filename, const std::vector<Argument>& args,
-                                const std::string& function_name,
-                                const Target& target = get_target_from_environment());
-  void compile_to_llvm_assembly(const std::string& filename, const std::vector<Argument>& args,
-                                const Target& target = get_target_from_environment());
-  void compile_to_assembly(const std::string& filename, const std::vector<Argument>& args,
-                           const std::string& function_name,
-                           const Target& target = get_target_from_environment());
-  void compile_to_assembly(const std::string& filename, const std::vector<Argument>& args,
-                           const Target& target = get_target_from_environment());
-  void compile_to_header(const std::string& filename, const std::vector<Argument>& args,
-                         const std::string& function_name = "",
-                         const Target& target = get_target_from_environment());
-  void compile_to_c(const std::string& filename, const std::vector<Argument>& args,
-                    const std::string& function_name = "",
-                    const Target& target = get_target_from_environment());
-  void compile_to_lowered_stmt(const std::string& filename, const std::vector<Argument>& args,
-                               StmtOutputFormat format = Text,
-                               const Target& target = get_target_from_environment());
-  void compile_to_file(const std::string& filename_prefix, const std::vector<Argument>& args,
-                       const std::string& function_name = "",
-                       const Target& target = get_target_from_environment());
-  void compile_to_static_library(const std::string& filename_prefix,
-                                 const std::vector<Argument>& args,
-                                 const std::string& function_name = "",
-                                 const Target& target = get_target_from_environment());
-  void compile_to_multitarget_static_library(const std::string& filename_prefix,
-                                             const std::vector<Argument>& args,
-                                             const std::vector<Target>& targets);
-  void compile_to_multitarget_object_files(const std::string& filename_prefix,
-                                           const std::vector<Argument>& args,
-                                           const std::vector<Target>& targets,
-                                           const std::vector<std::string>& suffixes);
 
   // ---- computed outside ----
 
@@ -388,12 +302,13 @@ class Func : public LoopDirectives<Func> {
   Pipeline pipeline_;
 
   friend class LoopDirectives<Func>;
+  friend class Runnable<Func>;
   ir::SchedulePlace loops() const;  // of the first definition
   Func& give(ir::Directive directive);
   void check_defined(const std::string& asked) const;
   const ir::Definition& checked_update(int index, const char* asked) const;
   Func wrap(const std::vector<Func>& users, const std::string& name, bool clone) const;
-  Pipeline& pipeline();
+  Pipeline& pipeline_to(const char* asked);
 };
 
 }  // namespace retrograde

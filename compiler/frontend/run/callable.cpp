@@ -2,6 +2,7 @@
 #include "frontend/run/callable.h"
 
 #include "frontend/run/call.h"
+#include "frontend/run/pipeline.h"
 #include "ir/print.h"
 
 namespace retrograde {
@@ -47,7 +48,7 @@ struct Callable::Contents {
 
 // Every argument is one of the code's, or one that the outputs do not need, which is taken and left
 // alone.
-Callable Pipeline::compile_to_callable(const std::vector<Argument>& args, const Target& target) {
+Callable Pipeline::callable(const std::vector<Argument>& args, const Target& target) {
   auto contents = std::make_shared<Callable::Contents>();
   contents->name = spec().name;
   contents->code = compiled(target);

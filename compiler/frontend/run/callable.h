@@ -14,7 +14,9 @@
 #include <utility>
 #include <vector>
 
-#include "frontend/run/pipeline.h"
+#include "frontend/data/buffer.h"
+#include "frontend/data/param.h"
+#include "frontend/run/jit_handlers.h"
 
 namespace retrograde {
 

@@ -1,5 +1,5 @@
-// compile_to.cpp -- Pipeline::compile_to_* and Func::compile_to_*: arguments matched by name, then
-// everything goes through a Module.
+// compile_to.cpp -- what compile_to_* are made of: arguments matched by name, then everything goes
+// through a Module.
 #include <algorithm>
 #include <cctype>
 #include <set>
@@ -153,9 +153,8 @@ void add_estimates(const std::vector<ir::FuncPtr>& outputs, std::vector<Argument
 
 // ---- Pipeline ----
 
-Module Pipeline::compile_to_module(const std::vector<Argument>& args,
-                                   const std::string& function_name, const Target& wanted,
-                                   LinkageType linkage) {
+Module Pipeline::module(const std::vector<Argument>& args, const std::string& function_name,
+                        const Target& wanted, LinkageType linkage) const {
   const PipelineSpec pipeline = spec();
   const Target target = wanted.without_feature(Target::JIT);
   const std::string name = function_name.empty() ? default_name(pipeline) : function_name;
@@ -179,171 +178,23 @@ Module Pipeline::compile_to_module(const std::vector<Argument>& args,
   return module;
 }
 
-void Pipeline::compile_to(const Files& output_files, const std::vector<Argument>& args,
-                          const std::string& function_name, const Target& target) {
-  compile_to_module(args, function_name, target).compile(output_files);
+// ---- files ----
+
+namespace ir {
+
+Files file_and_header(OutputFileType type, const std::string& prefix, const Target& target) {
+  const std::string extension = internal::get_output_info(target).at(type).extension;
+  return {{type, prefix + extension}, {OutputFileType::c_header, prefix + ".h"}};
 }
 
-void Pipeline::compile_to_object(const std::string& filename, const std::vector<Argument>& args,
-                                 const std::string& function_name, const Target& target) {
-  compile_to({{OutputFileType::object, filename}}, args, function_name, target);
+void compile_multitarget(OutputFileType type, const std::string& prefix,
+                         const std::vector<Target>& targets,
+                         const std::vector<std::string>& suffixes, const ModuleFactory& make) {
+  const Target& baseline = targets.empty() ? Target("x86-64-linux") : targets.back();
+  retrograde::compile_multitarget(prefix.substr(prefix.rfind('/') + 1),
+                                  file_and_header(type, prefix, baseline), targets, suffixes, make);
 }
 
-void Pipeline::compile_to_bitcode(const std::string& filename, const std::vector<Argument>& args,
-                                  const std::string& function_name, const Target& target) {
-  compile_to({{OutputFileType::bitcode, filename}}, args, function_name, target);
-}
-
-void Pipeline::compile_to_llvm_assembly(const std::string& filename,
-                                        const std::vector<Argument>& args,
-                                        const std::string& function_name, const Target& target) {
-  compile_to({{OutputFileType::llvm_assembly, filename}}, args, function_name, target);
-}
-
-void Pipeline::compile_to_assembly(const std::string& filename, const std::vector<Argument>& args,
-                                   const std::string& function_name, const Target& target) {
-  compile_to({{OutputFileType::assembly, filename}}, args, function_name, target);
-}
-
-void Pipeline::compile_to_header(const std::string& filename, const std::vector<Argument>& args,
-                                 const std::string& function_name, const Target& target) {
-  compile_to({{OutputFileType::c_header, filename}}, args, function_name, target);
-}
-
-void Pipeline::compile_to_c(const std::string& filename, const std::vector<Argument>& args,
-                            const std::string& function_name, const Target& target) {
-  compile_to({{OutputFileType::c_source, filename}}, args, function_name, target);
-}
-
-void Pipeline::compile_to_lowered_stmt(const std::string& filename,
-                                       const std::vector<Argument>& args, StmtOutputFormat format,
-                                       const Target& target) {
-  const OutputFileType type = format == HTML ? OutputFileType::stmt_html : OutputFileType::stmt;
-  compile_to({{type, filename}}, args, "", target);
-}
-
-void Pipeline::compile_to_file(const std::string& filename_prefix,
-                               const std::vector<Argument>& args, const std::string& function_name,
-                               const Target& target) {
-  const auto info = internal::get_output_info(target);
-  compile_to({{OutputFileType::object, filename_prefix + info.at(OutputFileType::object).extension},
-              {OutputFileType::c_header, filename_prefix + ".h"}},
-             args, function_name, target);
-}
-
-void Pipeline::compile_to_static_library(const std::string& filename_prefix,
-                                         const std::vector<Argument>& args,
-                                         const std::string& function_name, const Target& target) {
-  const auto info = internal::get_output_info(target);
-  compile_to({{OutputFileType::static_library,
-               filename_prefix + info.at(OutputFileType::static_library).extension},
-              {OutputFileType::c_header, filename_prefix + ".h"}},
-             args, function_name, target);
-}
-
-// Like Halide's: the function is called as the last part of the prefix.
-static std::string name_in_prefix(const std::string& filename_prefix) {
-  return filename_prefix.substr(filename_prefix.rfind('/') + 1);
-}
-
-void Pipeline::compile_to_multitarget_static_library(const std::string& filename_prefix,
-                                                     const std::vector<Argument>& args,
-                                                     const std::vector<Target>& targets) {
-  const auto make = [&](const std::string& name, const Target& target) {
-    return compile_to_module(args, name, target);
-  };
-  const std::string extension =
-      targets.empty()
-          ? ".a"
-          : internal::get_output_info(targets.back()).at(OutputFileType::static_library).extension;
-  compile_multitarget(name_in_prefix(filename_prefix),
-                      {{OutputFileType::static_library, filename_prefix + extension},
-                       {OutputFileType::c_header, filename_prefix + ".h"}},
-                      targets, {}, make);
-}
-
-void Pipeline::compile_to_multitarget_object_files(const std::string& filename_prefix,
-                                                   const std::vector<Argument>& args,
-                                                   const std::vector<Target>& targets,
-                                                   const std::vector<std::string>& suffixes) {
-  const auto make = [&](const std::string& name, const Target& target) {
-    return compile_to_module(args, name, target);
-  };
-  const std::string extension =
-      targets.empty()
-          ? ".o"
-          : internal::get_output_info(targets.back()).at(OutputFileType::object).extension;
-  compile_multitarget(name_in_prefix(filename_prefix),
-                      {{OutputFileType::object, filename_prefix + extension},
-                       {OutputFileType::c_header, filename_prefix + ".h"}},
-                      targets, suffixes, make);
-}
-
-// ---- Func ----
-
-Module Func::compile_to_module(const std::vector<Argument>& args, const std::string& function_name,
-                               const Target& target) {
-  return pipeline().compile_to_module(args, function_name, target);
-}
-
-void Func::compile_to(const Files& output_files, const std::vector<Argument>& args,
-                      const std::string& function_name, const Target& target) {
-  pipeline().compile_to(output_files, args, function_name, target);
-}
-
-// The functions that come with and without a function name.
-#define RETROGRADE_FORWARD(function)                                                  \
-  void Func::function(const std::string& filename, const std::vector<Argument>& args, \
-                      const std::string& function_name, const Target& target) {       \
-    pipeline().function(filename, args, function_name, target);                       \
-  }                                                                                   \
-  void Func::function(const std::string& filename, const std::vector<Argument>& args, \
-                      const Target& target) {                                         \
-    pipeline().function(filename, args, "", target);                                  \
-  }
-RETROGRADE_FORWARD(compile_to_object)
-RETROGRADE_FORWARD(compile_to_bitcode)
-RETROGRADE_FORWARD(compile_to_llvm_assembly)
-RETROGRADE_FORWARD(compile_to_assembly)
-#undef RETROGRADE_FORWARD
-
-void Func::compile_to_header(const std::string& filename, const std::vector<Argument>& args,
-                             const std::string& function_name, const Target& target) {
-  pipeline().compile_to_header(filename, args, function_name, target);
-}
-
-void Func::compile_to_c(const std::string& filename, const std::vector<Argument>& args,
-                        const std::string& function_name, const Target& target) {
-  pipeline().compile_to_c(filename, args, function_name, target);
-}
-
-void Func::compile_to_lowered_stmt(const std::string& filename, const std::vector<Argument>& args,
-                                   StmtOutputFormat format, const Target& target) {
-  pipeline().compile_to_lowered_stmt(filename, args, format, target);
-}
-
-void Func::compile_to_file(const std::string& filename_prefix, const std::vector<Argument>& args,
-                           const std::string& function_name, const Target& target) {
-  pipeline().compile_to_file(filename_prefix, args, function_name, target);
-}
-
-void Func::compile_to_static_library(const std::string& filename_prefix,
-                                     const std::vector<Argument>& args,
-                                     const std::string& function_name, const Target& target) {
-  pipeline().compile_to_static_library(filename_prefix, args, function_name, target);
-}
-
-void Func::compile_to_multitarget_static_library(const std::string& filename_prefix,
-                                                 const std::vector<Argument>& args,
-                                                 const std::vector<Target>& targets) {
-  pipeline().compile_to_multitarget_static_library(filename_prefix, args, targets);
-}
-
-void Func::compile_to_multitarget_object_files(const std::string& filename_prefix,
-                                               const std::vector<Argument>& args,
-                                               const std::vector<Target>& targets,
-                                               const std::vector<std::string>& suffixes) {
-  pipeline().compile_to_multitarget_object_files(filename_prefix, args, targets, suffixes);
-}
+}  // namespace ir
 
 }  // namespace retrograde

@@ -98,13 +98,12 @@ struct Pipeline::Contents {
 
 // ---- arguments for outputs ----
 
-Pipeline::RealizationArg::RealizationArg(Realization& realization) {
+RealizationArg::RealizationArg(Realization& realization) {
   for (size_t i = 0; i < realization.size(); i++) owners_.push_back(realization[i]);
   for (Buffer<>& buffer : owners_) raw_.push_back(buffer.raw_buffer());
 }
 
-Pipeline::RealizationArg::RealizationArg(std::vector<Buffer<>> buffers)
-    : owners_(std::move(buffers)) {
+RealizationArg::RealizationArg(std::vector<Buffer<>> buffers) : owners_(std::move(buffers)) {
   for (Buffer<>& buffer : owners_) raw_.push_back(buffer.defined() ? buffer.raw_buffer() : nullptr);
 }
 
@@ -165,13 +164,13 @@ Func Pipeline::get_func(size_t index) const {
 
 JITHandlers& Pipeline::jit_handlers() { return checked().handlers; }
 
-void Pipeline::set_jit_externs(const std::map<std::string, JITExtern>& externs) {
+void Pipeline::set_externs(const std::map<std::string, JITExtern>& externs) {
   std::lock_guard lock(checked().mutex);
   contents_->externs = externs;
   contents_->compiled.reset();
 }
 
-const std::map<std::string, JITExtern>& Pipeline::get_jit_externs() { return checked().externs; }
+const std::map<std::string, JITExtern>& Pipeline::externs() const { return checked().externs; }
 
 std::vector<Argument> Pipeline::infer_arguments() const {
   std::vector<Argument> result;
@@ -199,8 +198,6 @@ std::shared_ptr<CompiledPipeline> Pipeline::compiled(const Target& wanted) const
   }
   return contents.compiled;
 }
-
-void Pipeline::compile_jit(const Target& target) { compiled(target); }
 
 void Pipeline::invalidate_cache() {
   std::lock_guard lock(checked().mutex);
@@ -288,25 +285,17 @@ std::vector<halide_buffer_t*> Pipeline::checked_outputs(const RealizationArg& gi
 
 // ---- calling ----
 
-void Pipeline::run(const std::vector<halide_buffer_t*>& outputs, const Target& target,
-                   JITUserContext* context, const ParamMap& map) const {
+void Pipeline::run(JITUserContext* context, const RealizationArg& given, const Target& target,
+                   const ParamMap& map) const {
+  const std::vector<halide_buffer_t*> outputs = checked_outputs(given, true);
   const auto code = compiled(target);
   const std::string asked = "realize " + names_of(contents_->outputs);
   ir::Arguments arguments(*code, outputs, false, asked, map);
   ir::call(*code, contents_->handlers, arguments.argv(), asked, context);
 }
 
-Realization Pipeline::realize(const std::vector<int32_t>& sizes, const Target& target,
-                              const ParamMap& map) {
-  return realize(nullptr, sizes, target, map);
-}
-
-void Pipeline::realize(RealizationArg outputs, const Target& target, const ParamMap& map) {
-  realize(nullptr, std::move(outputs), target, map);
-}
-
-Realization Pipeline::realize(JITUserContext* context, const std::vector<int32_t>& sizes,
-                              const Target& target, const ParamMap& map) {
+Realization Pipeline::run(JITUserContext* context, const std::vector<int32_t>& sizes,
+                          const Target& target, const ParamMap& map) const {
   std::vector<Buffer<>> buffers = make_outputs(sizes, false);
   RealizationArg outputs(buffers);
   const auto code = compiled(target);
@@ -327,15 +316,10 @@ Realization Pipeline::realize(JITUserContext* context, const std::vector<int32_t
   return Realization(std::move(buffers));
 }
 
-void Pipeline::realize(JITUserContext* context, RealizationArg outputs, const Target& target,
-                       const ParamMap& map) {
-  run(checked_outputs(outputs, true), target, context, map);
-}
-
 // Asks the code for the regions again until they agree: a region may depend on the shape of another
 // buffer.
-void Pipeline::infer(const std::vector<halide_buffer_t*>& outputs, const Target& target,
-                     JITUserContext* context, const ParamMap& map) const {
+void Pipeline::infer(JITUserContext* context, const std::vector<halide_buffer_t*>& outputs,
+                     const Target& target, const ParamMap& map) const {
   constexpr int max_rounds = 16;
   const auto code = compiled(target);
   const std::string asked = "infer the input bounds of " + names_of(contents_->outputs);
@@ -372,26 +356,15 @@ void Pipeline::infer(const std::vector<halide_buffer_t*>& outputs, const Target&
   }
 }
 
-void Pipeline::infer_input_bounds(JITUserContext* context, const std::vector<int32_t>& sizes,
-                                  const Target& target, const ParamMap& map) {
+void Pipeline::infer(JITUserContext* context, const std::vector<int32_t>& sizes,
+                     const Target& target, const ParamMap& map) const {
   std::vector<Buffer<>> buffers = make_outputs(sizes, false);
-  RealizationArg outputs(buffers);
-  infer(outputs.buffers(), target, context, map);
+  infer(context, RealizationArg(buffers).buffers(), target, map);
 }
 
-void Pipeline::infer_input_bounds(JITUserContext* context, RealizationArg outputs,
-                                  const Target& target, const ParamMap& map) {
-  infer(checked_outputs(outputs, false), target, context, map);
-}
-
-void Pipeline::infer_input_bounds(const std::vector<int32_t>& sizes, const Target& target,
-                                  const ParamMap& map) {
-  infer_input_bounds(nullptr, sizes, target, map);
-}
-
-void Pipeline::infer_input_bounds(RealizationArg outputs, const Target& target,
-                                  const ParamMap& map) {
-  infer_input_bounds(nullptr, std::move(outputs), target, map);
+void Pipeline::infer(JITUserContext* context, const RealizationArg& outputs, const Target& target,
+                     const ParamMap& map) const {
+  infer(context, checked_outputs(outputs, false), target, map);
 }
 
 }  // namespace retrograde

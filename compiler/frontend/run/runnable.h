@@ -1,0 +1,280 @@
+// runnable.h -- what runs and is compiled: a Pipeline, and a Func, which is a pipeline of one output.
+#pragma once
+
+#include <functional>
+#include <initializer_list>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "frontend/data/argument.h"
+#include "frontend/data/realization.h"
+#include "frontend/run/callable.h"
+#include "frontend/run/jit_handlers.h"
+#include "frontend/run/module.h"
+#include "frontend/run/param_map.h"
+
+namespace retrograde {
+
+struct JITExtern;
+
+// Buffers to compute into: one, several in braces, a Realization, or one of the runtime.
+class RealizationArg {
+ public:
+  RealizationArg(Realization& realization);
+  RealizationArg(Realization&& realization) : RealizationArg(realization) {}
+  RealizationArg(halide_buffer_t* buffer) : raw_{buffer} {}
+  RealizationArg(std::vector<Buffer<>> buffers);
+  template <typename T, int Dims, int Storage>
+  RealizationArg(Runtime::Buffer<T, Dims, Storage>& buffer) : raw_{buffer.raw_buffer()} {
+    static_assert(!std::is_const_v<T>, "an output cannot be a Buffer of const elements");
+  }
+  template <typename T, int Dims>
+  RealizationArg(const Buffer<T, Dims>& buffer) : RealizationArg(std::vector<Buffer<>>{buffer}) {
+    static_assert(!std::is_const_v<T>, "an output cannot be a Buffer of const elements");
+  }
+  template <typename T, int Dims, typename... Rest>
+  requires(sizeof...(Rest) >= 1 && (std::is_convertible_v<Rest, Buffer<>> && ...))
+      RealizationArg(const Buffer<T, Dims>& first, Rest&&... rest)
+      : RealizationArg(std::vector<Buffer<>>{first, Buffer<>(std::forward<Rest>(rest))...}) {}
+  const std::vector<halide_buffer_t*>& buffers() const { return raw_; }
+
+ private:
+  std::vector<Buffer<>> owners_;
+  std::vector<halide_buffer_t*> raw_;
+};
+
+namespace ir {
+
+// Handlers of Halide's older interface take the context as a void*: the same call.
+template <typename To, typename From>
+void set_handler(To& handler, From* given) {
+  handler = reinterpret_cast<To>(given);
+}
+void check_allocator(bool allocates, bool frees);
+
+// `prefix` with the extension of such a file, and the header beside it.
+std::map<OutputFileType, std::string> file_and_header(OutputFileType type,
+                                                      const std::string& prefix,
+                                                      const Target& target);
+// Like Halide's: the function is called as the last part of the prefix.
+void compile_multitarget(OutputFileType type, const std::string& prefix,
+                         const std::vector<Target>& targets,
+                         const std::vector<std::string>& suffixes, const ModuleFactory& make);
+
+}  // namespace ir
+
+template <class Self>
+class Runnable {
+  using Files = std::map<OutputFileType, std::string>;
+  using Args = std::vector<Argument>;
+
+ public:
+  // Computes all outputs over [0, size) in each dimension, into new buffers. Parameters have their
+  // values from the map before those that were set.
+  // Requires: it takes one size for each dimension (RuntimeError); sizes are not negative
+  // (RuntimeError); custom_malloc and custom_free come together.
+  Realization realize(const std::vector<int32_t>& sizes = {}, const Target& target = Target(),
+                      const ParamMap& map = ParamMap::empty_map()) {
+    return realize(nullptr, sizes, target, map);
+  }
+  // Of braces, so that {0} is a size and no pointer.
+  Realization realize(std::initializer_list<int32_t> sizes, const Target& target = Target(),
+                      const ParamMap& map = ParamMap::empty_map()) {
+    return realize(std::vector<int32_t>(sizes), target, map);
+  }
+  // Computes all outputs over the given buffers.
+  // Requires: the buffers of one Func cover one region (RuntimeError); it takes one buffer for each
+  // value of each output (RuntimeError); the Param must keep its limits (RuntimeError); the Param
+  // needs a value (RuntimeError); the ImageParam needs a buffer (RuntimeError); a buffer must not
+  // be null (RuntimeError); it must have the right element type (RuntimeError); it must have the
+  // right number of dimensions (RuntimeError); it must not have negative extents (RuntimeError); it
+  // must have memory (RuntimeError); the compiled code must succeed (RuntimeError); the JIT runs
+  // code on this machine (Unsupported); a C function that it calls must be in this process, or
+  // among its JIT externs.
+  void realize(RealizationArg outputs, const Target& target = Target(),
+               const ParamMap& map = ParamMap::empty_map()) {
+    realize(nullptr, std::move(outputs), target, map);
+  }
+  // The same; the handlers of `context` go before those of jit_handlers().
+  Realization realize(JITUserContext* context, const std::vector<int32_t>& sizes = {},
+                      const Target& target = Target(),
+                      const ParamMap& map = ParamMap::empty_map()) {
+    return pipeline_to("realize ").run(context, sizes, target, map);
+  }
+  void realize(JITUserContext* context, RealizationArg outputs, const Target& target = Target(),
+               const ParamMap& map = ParamMap::empty_map()) {
+    pipeline_to("realize ").run(context, outputs, target, map);
+  }
+  // Gives every ImageParam without a buffer one of exactly the region that the outputs need; those
+  // of the map, whose Buffers it makes, keep their own.
+  // Requires: the regions of the inputs must settle (RuntimeError); the region that a pipeline
+  // reads of its input must be bounded.
+  void infer_input_bounds(const std::vector<int32_t>& sizes, const Target& target = Target(),
+                          const ParamMap& map = ParamMap::empty_map()) {
+    infer_input_bounds(nullptr, sizes, target, map);
+  }
+  void infer_input_bounds(RealizationArg outputs, const Target& target = Target(),
+                          const ParamMap& map = ParamMap::empty_map()) {
+    infer_input_bounds(nullptr, std::move(outputs), target, map);
+  }
+  void infer_input_bounds(JITUserContext* context, const std::vector<int32_t>& sizes,
+                          const Target& target = Target(),
+                          const ParamMap& map = ParamMap::empty_map()) {
+    pipeline_to("infer the input bounds of ").infer(context, sizes, target, map);
+  }
+  void infer_input_bounds(JITUserContext* context, RealizationArg outputs,
+                          const Target& target = Target(),
+                          const ParamMap& map = ParamMap::empty_map()) {
+    pipeline_to("infer the input bounds of ").infer(context, outputs, target, map);
+  }
+  // Compiles now what realize would compile on its first call.
+  // Requires: this program must be linked with the compiler (Unsupported).
+  void compile_jit(const Target& target = Target()) { pipeline_to("compile ").compiled(target); }
+  // A function of `args`, in their order, then the output buffers; see callable.h.
+  // Requires: its arguments are all that the outputs need.
+  Callable compile_to_callable(const Args& args,
+                               const Target& target = get_jit_target_from_environment()) {
+    return pipeline_to("compile ").callable(args, target);
+  }
+
+  // ---- what compiled code calls back ----
+  void set_error_handler(void (*handler)(void*, const char*)) {
+    ir::set_handler(handlers().custom_error, handler);
+  }
+  // Requires: allocation and release come together.
+  void set_custom_allocator(void* (*malloc)(void*, size_t), void (*free)(void*, void*)) {
+    ir::check_allocator(malloc, free);
+    ir::set_handler(handlers().custom_malloc, malloc);
+    ir::set_handler(handlers().custom_free, free);
+  }
+  void set_custom_do_task(int (*handler)(void*, int (*)(void*, int, uint8_t*), int, uint8_t*)) {
+    ir::set_handler(handlers().custom_do_task, handler);
+  }
+  void set_custom_do_par_for(int (*handler)(void*, int (*)(void*, int, uint8_t*), int, int,
+                                            uint8_t*)) {
+    ir::set_handler(handlers().custom_do_par_for, handler);
+  }
+  void set_custom_trace(int (*handler)(void*, const halide_trace_event_t*)) {
+    ir::set_handler(handlers().custom_trace, handler);
+  }
+  void set_custom_print(void (*handler)(void*, const char*)) {
+    ir::set_handler(handlers().custom_print, handler);
+  }
+  // What the C functions that the pipeline calls by name are; others are looked up in the process.
+  // Requires: what a pipeline calls by name is a C function (Unsupported).
+  void set_jit_externs(const std::map<std::string, JITExtern>& externs) {
+    pipeline_to("call C functions from ").set_externs(externs);
+  }
+  const std::map<std::string, JITExtern>& get_jit_externs() {
+    return pipeline_to("call C functions from ").externs();
+  }
+
+  // ---- ahead of time ----
+  // What the function takes is `args`, in their order, then the output buffers. An empty name
+  // stands for the first output's own.
+  // Requires: a function's name is an identifier of C; C functions have no namespace; the list of
+  // arguments holds inputs, and outputs follow by themselves; every argument is listed once; an
+  // argument is what the pipeline uses under its name; the list of arguments holds every Param and
+  // ImageParam that it uses; a Buffer that is no argument is embedded with its data.
+  Module compile_to_module(const Args& args, const std::string& function_name = "",
+                           const Target& target = get_target_from_environment(),
+                           LinkageType linkage = LinkageType::ExternalPlusMetadata) {
+    return pipeline_to("compile ").module(args, function_name, target, linkage);
+  }
+  void compile_to(const Files& output_files, const Args& args, const std::string& function_name,
+                  const Target& target = get_target_from_environment()) {
+    compile_to_module(args, function_name, target).compile(output_files);
+  }
+  void compile_to_object(const std::string& filename, const Args& args,
+                         const std::string& function_name,
+                         const Target& target = get_target_from_environment()) {
+    compile_to({{OutputFileType::object, filename}}, args, function_name, target);
+  }
+  void compile_to_object(const std::string& filename, const Args& args,
+                         const Target& target = get_target_from_environment()) {
+    compile_to_object(filename, args, "", target);
+  }
+  void compile_to_bitcode(const std::string& filename, const Args& args,
+                          const std::string& function_name,
+                          const Target& target = get_target_from_environment()) {
+    compile_to({{OutputFileType::bitcode, filename}}, args, function_name, target);
+  }
+  void compile_to_bitcode(const std::string& filename, const Args& args,
+                          const Target& target = get_target_from_environment()) {
+    compile_to_bitcode(filename, args, "", target);
+  }
+  void compile_to_llvm_assembly(const std::string& filename, const Args& args,
+                                const std::string& function_name,
+                                const Target& target = get_target_from_environment()) {
+    compile_to({{OutputFileType::llvm_assembly, filename}}, args, function_name, target);
+  }
+  void compile_to_llvm_assembly(const std::string& filename, const Args& args,
+                                const Target& target = get_target_from_environment()) {
+    compile_to_llvm_assembly(filename, args, "", target);
+  }
+  void compile_to_assembly(const std::string& filename, const Args& args,
+                           const std::string& function_name,
+                           const Target& target = get_target_from_environment()) {
+    compile_to({{OutputFileType::assembly, filename}}, args, function_name, target);
+  }
+  void compile_to_assembly(const std::string& filename, const Args& args,
+                           const Target& target = get_target_from_environment()) {
+    compile_to_assembly(filename, args, "", target);
+  }
+  void compile_to_header(const std::string& filename, const Args& args,
+                         const std::string& function_name = "",
+                         const Target& target = get_target_from_environment()) {
+    compile_to({{OutputFileType::c_header, filename}}, args, function_name, target);
+  }
+  void compile_to_c(const std::string& filename, const Args& args,
+                    const std::string& function_name = "",
+                    const Target& target = get_target_from_environment()) {  // Unsupported
+    compile_to({{OutputFileType::c_source, filename}}, args, function_name, target);
+  }
+  // HTML: schedule, loops and machine code side by side.
+  void compile_to_lowered_stmt(const std::string& filename, const Args& args,
+                               StmtOutputFormat format = Text,
+                               const Target& target = get_target_from_environment()) {
+    const OutputFileType type = format == HTML ? OutputFileType::stmt_html : OutputFileType::stmt;
+    compile_to({{type, filename}}, args, "", target);
+  }
+  // prefix.o, with the runtime unless the target says no_runtime, and prefix.h
+  void compile_to_file(const std::string& filename_prefix, const Args& args,
+                       const std::string& function_name = "",
+                       const Target& target = get_target_from_environment()) {
+    compile_to(ir::file_and_header(OutputFileType::object, filename_prefix, target), args,
+               function_name, target);
+  }
+  // prefix.a, with the runtime unless the target says no_runtime, and prefix.h
+  void compile_to_static_library(const std::string& filename_prefix, const Args& args,
+                                 const std::string& function_name = "",
+                                 const Target& target = get_target_from_environment()) {
+    compile_to(ir::file_and_header(OutputFileType::static_library, filename_prefix, target), args,
+               function_name, target);
+  }
+  // The first target that the machine can run decides at run time; see compile_multitarget.
+  void compile_to_multitarget_static_library(const std::string& filename_prefix, const Args& args,
+                                             const std::vector<Target>& targets) {
+    ir::compile_multitarget(OutputFileType::static_library, filename_prefix, targets, {},
+                            modules_of(args));
+  }
+  void compile_to_multitarget_object_files(const std::string& filename_prefix, const Args& args,
+                                           const std::vector<Target>& targets,
+                                           const std::vector<std::string>& suffixes) {
+    ir::compile_multitarget(OutputFileType::object, filename_prefix, targets, suffixes,
+                            modules_of(args));
+  }
+
+ private:
+  // As a Pipeline; `asked` and its name stand in the message when it cannot be one.
+  auto& pipeline_to(const char* asked) { return static_cast<Self&>(*this).pipeline_to(asked); }
+  JITHandlers& handlers() { return static_cast<Self&>(*this).jit_handlers(); }
+  auto modules_of(const Args& args) {
+    return [this, args](const std::string& name, const Target& target) {
+      return compile_to_module(args, name, target);
+    };
+  }
+};
+
+}  // namespace retrograde
