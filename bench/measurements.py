@@ -75,6 +75,36 @@ def pytorch(report):
             f"\nGeometric mean: {report['geometric_mean']:.2f}.\n")
 
 
+def operators(report):
+    def cell(value):
+        return "–" if value is None else f"{value:.3g}"
+
+    def beside(r):
+        return [r["halide_best_ms"], r["pytorch_ms"], r["pytorch_compiled_ms"]]
+
+    rows, ratios = [], []
+    for r in report["operators"]:
+        if r["retrograde_ms"] is None:
+            rows.append([r["operator"], "failed", *[""] * 8])
+            continue
+        peers = [ms for ms in beside(r) if ms]
+        if peers:
+            ratios.append(r["retrograde_ms"] / min(peers))
+        megabytes = (r["peak_mb"], r["halide_best_peak_mb"], r["pytorch_peak_mb"])
+        rows.append([r["operator"], cell(r["retrograde_ms"]), *map(cell, beside(r)),
+                     r["halide_best"] or "–", cell(r["bound_ms"]),
+                     " / ".join("–" if mb is None else f"{mb:.0f}" for mb in megabytes),
+                     f"{r['compile_s'] + r['search_s']:.2f} s",
+                     "–" if r["max_relative_error"] is None else f"{r['max_relative_error']:.0e}"])
+    machine, versions = report["machine"], report["versions"]
+    head = ["operator, ms", "Retrograde", f"Halide {versions.get('halide', '')}",
+            f"PyTorch {versions.get('pytorch', '')}", "torch.compile", "best of Halide's", "bound",
+            "peak MB, Retrograde / Halide / PyTorch", "compiled in", "error"]
+    return (f"{machine['threads']} threads, {machine['bytes_per_second'] / 1e9:.1f} GB/s, "
+            f"{machine['flops'] / 1e9:.0f} GFLOP/s.\n\n" + table(head, rows) +
+            f"\nGeometric mean of our time over that of the best other: {geometric_mean(ratios):.2f}.\n")
+
+
 def demo(report):
     halide = report["halide_ms_per_step"]
     rows = [["one training step", ms(report["ms_per_step"])],
@@ -97,7 +127,7 @@ def compile_time(report):
 
 SECTIONS = {"demo": demo, "kernels": pairs, "gradient_peers": pairs, "programs": programs,
             "programs_second": programs, "programs_gradients": programs, "gradients": gradients,
-            "pytorch_peers": pytorch, "compile_time": compile_time}
+            "pytorch_peers": pytorch, "operators": operators, "compile_time": compile_time}
 
 
 def this_machine():

@@ -20,6 +20,15 @@ PAIR = {"kernel": "blur", "threads": 2, "retrograde_ms": 1.5, "halide_ms": 3.0, 
         "compile_ratio": 0.2, "retrograde_peak_mb": 80.4, "halide_peak_mb": 90.6,
         "percent_of_bound": 41.7}
 
+OPERATORS = {
+    "machine": {"threads": 2, "bytes_per_second": 4e10, "flops": 1e11}, "versions": {"halide": "21.0.0"},
+    "operators": [
+        {"operator": "conv", "retrograde_ms": 8.0, "halide_best_ms": 2.0, "halide_best": "root",
+         "pytorch_ms": 4.0, "pytorch_compiled_ms": None, "bound_ms": 1.0, "peak_mb": 90.0,
+         "halide_best_peak_mb": 50.0, "pytorch_peak_mb": None, "compile_s": 0.5, "search_s": 0.25,
+         "max_relative_error": 2e-6},
+        {"operator": "warp", "retrograde_ms": None}]}
+
 
 class Measurements(unittest.TestCase):
     def record(self, section, report, page=PAGE):
@@ -56,6 +65,12 @@ class Measurements(unittest.TestCase):
     def test_pairs_have_their_memory_and_bound(self):
         page = self.record("kernels", [PAIR], PAGE.replace("programs", "kernels"))
         self.assertIn("| blur (2) | 1.50 ms | 3.00 ms | 0.50 | 0.20 | 80 / 91 | 42 % |", page)
+
+    def test_operators_count_beside_the_best_other_and_say_what_is_missing(self):
+        page = self.record("operators", OPERATORS, PAGE.replace("programs", "operators"))
+        self.assertIn("| conv | 8 | 2 | 4 | – | root | 1 | 90 / 50 / – | 0.75 s | 2e-06 |", page)
+        self.assertIn("| warp | failed |", page)
+        self.assertIn("best other: 4.00.", page)
 
     def test_a_section_that_the_page_lacks_is_an_error_that_changes_nothing(self):
         self.assertEqual(self.record("kernels", [PAIR]), PAGE)

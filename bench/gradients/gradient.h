@@ -8,12 +8,21 @@
 
 namespace kernels {
 
-// The gradients of the sum of seed * output by each of `by`, in that order; inputs are `by` and the
-// seed. `operations` are those of the gradients alone. Source of Li2018: Li et al., Differentiable
+// Called once for a pipeline whose outputs have estimates; linked in: li2018.cpp, or
+// ../operators/schedules.cpp.
+void schedule(Halide::Pipeline& pipeline, const Setup& setup);
+
+// The gradients of the sum of seed * output by each of `by`, in that order; inputs are `by`, what is
+// `fixed` (no gradient is asked by it) and the seed. `operations` are those of all that is computed. Source of Li2018: Li et al., Differentiable
 // Programming for Image Processing and Deep Learning in Halide, SIGGRAPH 2018, section 5.
 Kernel gradients_of(const Setup& setup, const Halide::Func& output,
                     const std::vector<int>& output_sizes,
-                    const std::vector<Halide::Buffer<float>>& by, double operations);
+                    const std::vector<Halide::Buffer<float>>& by, double operations,
+                    const std::vector<Halide::Buffer<float>>& fixed = {});
+
+// From -1 to 1, with no relation to any other input: a seed like the input of a normalisation has a
+// gradient of rounding errors.
+Halide::Buffer<float> make_noise(const std::vector<int>& sizes, uint32_t which = 12345);
 
 // Values from `low` to just below `high`.
 Halide::Buffer<float> make_values(const std::vector<int>& sizes, float low, float high);

@@ -30,12 +30,18 @@ void along(const std::vector<Halide::Buffer<>>& buffers, size_t count, uint32_t 
   }
 }
 
+std::vector<Halide::Buffer<>> copies(const std::vector<Halide::Buffer<>>& buffers) {
+  std::vector<Halide::Buffer<>> result;
+  for (const auto& buffer : buffers) result.emplace_back(buffer.copy());
+  return result;
+}
+
 double weighted_sum(Kernel& primal, const Halide::Target& target) {
   primal.pipeline.realize(Halide::Realization(primal.outputs), target);
   const float* seed = floats_of(primal.inputs.back());
-  const float* output = floats_of(primal.outputs[0]);
+  const float* output = floats_of(primal.outputs.back());
   double sum = 0;
-  for (size_t k = 0; k < primal.outputs[0].number_of_elements(); k++)
+  for (size_t k = 0; k < primal.outputs.back().number_of_elements(); k++)
     sum += static_cast<double>(seed[k]) * output[k];
   return sum;
 }
@@ -43,11 +49,12 @@ double weighted_sum(Kernel& primal, const Halide::Target& target) {
 }  // namespace
 
 double slope_error(const Kernel& gradients, Kernel& primal, const Halide::Target& target) {
-  const size_t inputs = gradients.outputs.size();
+  const std::vector<Halide::Buffer<>> slopes = copies(gradients.outputs);
+  const size_t inputs = gradients.by;
   double worst = 0;
   for (uint32_t direction = 0; direction < directions; direction++) {
     double product = 0, squares = 0;
-    along(gradients.outputs, inputs, direction, [&](float g, float v) {
+    along(slopes, inputs, direction, [&](float g, float v) {
       product += static_cast<double>(g) * v;
       squares += static_cast<double>(g) * g;
     });

@@ -6,9 +6,9 @@
 namespace kernels {
 
 // The largest |<gradient, v> - (L(x + h v) - L(x - h v)) / 2h| over a few directions v of signs,
-// relative to |gradient|, the deviation of <gradient, v>. L is the sum of seed * output that
-// `primal` computes (its inputs, the seed last, are moved and put back); `gradients`
-// has run. Rounding and kinks within h = 2^-13 leave some thousandths.
+// relative to |gradient|, the deviation of <gradient, v>. L is the sum of seed * output, the last
+// that `primal` computes (its inputs, the seed last, are moved and put back); `gradients` has run.
+// Both may be the same, which then holds the gradients at moved inputs. Rounding and kinks within h = 2^-13 leave some thousandths.
 double slope_error(const Kernel& gradients, Kernel& primal, const Halide::Target& target);
 
 }  // namespace kernels

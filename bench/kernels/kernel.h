@@ -8,7 +8,9 @@
 
 #include <Halide.h>
 
+#include <chrono>
 #include <cstdint>
+#include <string>
 #include <vector>
 
 #include "picture.h"
@@ -19,7 +21,9 @@ struct Setup {
   Halide::Target target;
   bool small = false;  // sizes for a check of the results: odd, and quick
   int threads = 1;
-  bool primal = false;  // of a gradient: the program itself, without a schedule
+  bool primal = false;       // of a gradient: the program itself, without a schedule
+  bool is_operator = false;  // a gradient, and the program's output as the last
+  std::string schedule;      // of an operator, by Halide: see ../operators/schedules.cpp
 
   // Lanes of a full vector register.
   template <typename T>
@@ -35,11 +39,25 @@ struct Kernel {
   Halide::Pipeline pipeline;
   std::vector<Halide::Buffer<>> inputs, outputs;
   double operations = 0;
+  size_t by = 0;  // of a gradient: so many outputs are gradients, by as many first inputs
+  double derive_seconds = 0, search_seconds = 0;  // of a gradient: making it, and its schedule
+};
+
+// What is measured of compilers.
+class Stopwatch {
+ public:
+  double seconds() const { return std::chrono::duration<double>(Clock::now() - start_).count(); }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  Clock::time_point start_ = Clock::now();
 };
 
 #define KERNEL(name) Kernel name(const Setup& setup);
 #define GRADIENT(name) Kernel name(const Setup& setup);
 #include "../list.def"
+#define OPERATOR(name) Kernel name(const Setup& setup);
+#include "../operators/list.def"
 
 // Values from 0 to just below `limit`.
 template <typename T>

@@ -109,9 +109,10 @@ double measure_flops(int threads) {
 
 }  // namespace
 
-Machine measure_machine() {
+Machine measure_machine(int threads) {
   Machine machine;
-  machine.threads = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+  const int all = static_cast<int>(std::thread::hardware_concurrency());
+  machine.threads = std::max(1, threads > 0 ? threads : all);
   machine.bytes_per_second = measure_bandwidth(machine.threads);
   machine.flops_one_thread = measure_flops(1);
   machine.flops_all_threads = measure_flops(machine.threads);

@@ -4,7 +4,7 @@
 namespace bench {
 
 struct Machine {
-  int threads = 1;              // as many as run at once
+  int threads = 1;
   double bytes_per_second = 0;  // all threads: McCalpin's STREAM triad, its way of counting
   double flops_one_thread = 0;  // single precision, a fused multiply-add being two
   double flops_all_threads = 0;
@@ -14,7 +14,8 @@ struct Machine {
   }
 };
 
-Machine measure_machine();
+// On as many threads as the machine runs at once when none are asked for.
+Machine measure_machine(int threads = 0);
 
 // The least time that so much work can take.
 double bound_seconds(const Machine& machine, int threads, double bytes, double operations);

@@ -68,7 +68,7 @@ Worker::Worker(Side side, const WorkerCommand& command, int threads)
     : side_(side),
       process_(command.program, command.arguments, {{"HL_NUM_THREADS", std::to_string(threads)}}) {
   const std::vector<double> ready = answer("ready");
-  if (ready.size() != 4) fail("its first answer has not four numbers");
+  if (ready.size() < 4) fail("its first answer has not four numbers");
   compile_seconds = ready[0];
   start_seconds = ready[1];
   bytes = ready[2];

@@ -1,9 +1,9 @@
-// worker_main.cpp -- compiles one kernel and runs it on request. Built twice from the same text:
-// with Halide 14, and with Retrograde (BENCH_RETROGRADE). See worker_protocol.h.
+// worker_main.cpp -- compiles one kernel and runs it on request. Built from the same text
+// with Halide and with Retrograde (BENCH_RETROGRADE), for kernels and for operators
+// (BENCH_OPERATORS). See worker_protocol.h.
 #include <unistd.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cstdio>
 #include <exception>
 #include <fstream>
@@ -18,17 +18,16 @@
 
 namespace {
 
-using Clock = std::chrono::steady_clock;
-
-double seconds_since(Clock::time_point start) {
-  return std::chrono::duration<double>(Clock::now() - start).count();
-}
-
 kernels::Kernel make_kernel(const std::string& name, const kernels::Setup& setup) {
 #define KERNEL(known) \
   if (name == #known) return kernels::known(setup);
 #define GRADIENT(known) KERNEL(known)
+#define OPERATOR(known) KERNEL(known)
+#ifdef BENCH_OPERATORS
+#include "../operators/list.def"
+#else
 #include "../list.def"
+#endif
   throw std::runtime_error("there is no kernel \"" + name + "\"");
 }
 
@@ -41,15 +40,22 @@ Halide::Target target() {
 
 class Worker {
  public:
-  Worker(const std::string& name, bool small, int threads) : name_(name), threads_(threads) {
-    const Clock::time_point start = Clock::now();
+  Worker(const std::string& name, bool small, int threads, const std::string& schedule)
+      : name_(name), threads_(threads) {
+    const kernels::Stopwatch starting;
     Halide::Func first("first");
     Halide::Var x("x");
     first(x) = x;
     Halide::Buffer<int> values(16);
     first.realize(values, target_);
-    start_seconds_ = seconds_since(start);
-    setup_ = {target_, small, threads};
+    start_seconds_ = starting.seconds();
+    setup_.target = target_;
+    setup_.small = small;
+    setup_.threads = threads;
+    setup_.schedule = schedule;
+#ifdef BENCH_OPERATORS
+    setup_.is_operator = true;
+#endif
     kernel_ = make_kernel(name, setup_);
   }
 
@@ -57,11 +63,12 @@ class Worker {
 #ifdef BENCH_RETROGRADE
     kernel_.pipeline.jit_handlers().thread_limit = threads_;  // Halide 14 reads HL_NUM_THREADS
 #endif
-    const Clock::time_point start = Clock::now();
+    const kernels::Stopwatch compiling;
     kernel_.pipeline.compile_jit(target_);
-    const double seconds = seconds_since(start);
+    const double seconds = compiling.seconds();
     std::cout << "ready " << seconds << " " << start_seconds_ << " " << bytes() << " "
-              << kernel_.operations << std::endl;
+              << kernel_.operations << " " << kernel_.derive_seconds << " "
+              << kernel_.search_seconds << std::endl;
     compile_peak_mb_ = bench::status_mb("VmHWM");
     bench::forget_peak();
     resident_mb_ = bench::status_mb("VmRSS");
@@ -69,26 +76,31 @@ class Worker {
 
   void run() {
     Halide::Realization outputs(kernel_.outputs);
-    const Clock::time_point start = Clock::now();
+    const kernels::Stopwatch running;
     kernel_.pipeline.realize(outputs, target_);
-    std::cout << "ran " << seconds_since(start) << std::endl;
+    std::cout << "ran " << running.seconds() << std::endl;
   }
 
   void save(const std::string& path) const {
-    std::ofstream file(path, std::ios::binary);
-    for (const auto& output : kernel_.outputs) {
-      const auto& raw = *output.raw_buffer();
-      const bench::OutputHeader header{raw.type.code, raw.type.bits,
-                                       static_cast<int64_t>(output.number_of_elements())};
-      file.write(reinterpret_cast<const char*>(&header), sizeof header);
-      file.write(reinterpret_cast<const char*>(raw.host),
-                 static_cast<std::streamsize>(header.count * raw.type.bytes()));
-    }
-    if (!file.flush()) throw std::runtime_error("cannot write \"" + path + "\"");
+    write(path, kernel_.outputs);
     std::cout << "saved" << std::endl;
   }
 
+  void save_inputs(const std::string& path) const {
+    write(path, kernel_.inputs);
+    std::cout << "saved";
+    for (const auto& input : kernel_.inputs) {
+      std::cout << " " << input.dimensions();
+      for (int d = 0; d < input.dimensions(); d++) std::cout << " " << input.dim(d).extent();
+    }
+    std::cout << std::endl;
+  }
+
   void tell_slope() {
+    if (setup_.is_operator) {  // the program is computed beside its gradients
+      std::cout << "slope " << kernels::slope_error(kernel_, kernel_, target_) << std::endl;
+      return;
+    }
     setup_.primal = true;
     kernels::Kernel primal = make_kernel(name_, setup_);
     std::cout << "slope " << kernels::slope_error(kernel_, primal, target_) << std::endl;
@@ -101,6 +113,19 @@ class Worker {
   }
 
  private:
+  static void write(const std::string& path, const std::vector<Halide::Buffer<>>& buffers) {
+    std::ofstream file(path, std::ios::binary);
+    for (const auto& buffer : buffers) {
+      const auto& raw = *buffer.raw_buffer();
+      const bench::OutputHeader header{raw.type.code, raw.type.bits,
+                                       static_cast<int64_t>(buffer.number_of_elements())};
+      file.write(reinterpret_cast<const char*>(&header), sizeof header);
+      file.write(reinterpret_cast<const char*>(raw.host),
+                 static_cast<std::streamsize>(header.count * raw.type.bytes()));
+    }
+    if (!file.flush()) throw std::runtime_error("cannot write \"" + path + "\"");
+  }
+
   double bytes() const {
     double sum = 0;
     for (const auto& buffer : kernel_.inputs) sum += static_cast<double>(buffer.size_in_bytes());
@@ -123,6 +148,7 @@ void serve(Worker& worker) {
     words >> order >> path;
     if (order == "run") worker.run();
     if (order == "save") worker.save(path);
+    if (order == "inputs") worker.save_inputs(path);
     if (order == "slope") worker.tell_slope();
     if (order == "memory") worker.tell_memory();
   }
@@ -136,14 +162,15 @@ std::string one_line(std::string text) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  if (argc != 4) {
-    std::fprintf(stderr, "usage: %s KERNEL small|full THREADS\n", argv[0]);
+  if (argc != 4 && argc != 5) {
+    std::fprintf(stderr, "usage: %s KERNEL small|full THREADS [SCHEDULE]\n", argv[0]);
     return 2;
   }
   ::alarm(bench::worker_deadline_seconds);
   std::cout.precision(9);
   try {
-    Worker worker(argv[1], argv[2] == std::string("small"), std::stoi(argv[3]));
+    Worker worker(argv[1], argv[2] == std::string("small"), std::stoi(argv[3]),
+                  argc > 4 ? argv[4] : "");
     worker.compile();
     serve(worker);
   } catch (const std::exception& error) {

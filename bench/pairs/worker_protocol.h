@@ -1,9 +1,12 @@
 // worker_protocol.h -- what the benchmark and its workers say to each other: lines of words through
-// pipes. A worker is started as `worker KERNEL small|full THREADS`.
+// pipes. A worker is started as `worker KERNEL small|full THREADS [SCHEDULE]`.
 //
-//   worker  ready COMPILE_SECONDS START_SECONDS BYTES OPERATIONS    or   failed MESSAGE
+//   worker  ready COMPILE_SECONDS START_SECONDS BYTES OPERATIONS [DERIVE_SECONDS SEARCH_SECONDS]
+//                                                                   or   failed MESSAGE
 //   driver  run           worker  ran SECONDS                       or   failed MESSAGE
 //   driver  save PATH     worker  saved            the outputs, as OutputHeader and elements, each
+//   driver  inputs PATH   worker  saved RANK SIZES... RANK SIZES...    likewise; first those that
+//                                                  gradients are by, the seed last
 //   driver  slope [PATH]  worker  slope ERROR      of a gradient that has run, see slope.h; PATH is
 //                                                  the library of its program, if that is another
 //   driver  memory        worker  memory PEAK_MB RUN_MB

@@ -1,0 +1,353 @@
+#!/usr/bin/env python3
+"""operators.py -- operators with all their gradients beside the newest Halide and PyTorch, in one run.
+
+    operators.py PROGRAMS [--operator NAME]... [--quick] [--rounds N] [--threads N]
+                 [--peers none|halide|pytorch|all] [--output FILE] [--add] [--small]
+
+PROGRAMS is the folder of bench_operators_retrograde and bench_machine. The others come from the Python
+package index into a virtual environment, out/bench/peers, made when it is not there: the wheel of
+Halide, against which the worker of Halide is built from the same text as ours, and PyTorch. All
+workers of an operator are processes of their own, spoken to as ../pairs/worker_protocol.h says, and
+run in turn. What a peer cannot do is in the report, under `failures`, and ends nothing. See
+../README.md for the figures.
+"""
+import argparse
+import glob
+import json
+import os
+import re
+import selectors
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+
+HERE = os.path.dirname(os.path.abspath(__file__))
+ROOT = os.path.dirname(os.path.dirname(HERE))
+PEERS = os.path.join(ROOT, "out", "bench", "peers")
+PYTORCH = "torch==2.13.0"
+SCHEDULES = ["Adams2019", "Li2018", "Mullapudi2016", "root"]  # of Halide
+SEARCH_SECONDS = 60  # for a schedule of Halide's, compilation included
+RUN_SECONDS = 120  # for one run of a worker, and for torch.compile
+PEER_SECONDS = 8  # for all rounds of a worker that is slow; it runs at least thrice
+
+
+def operator_names():
+    with open(os.path.join(HERE, "list.def"), encoding="utf-8") as file:
+        return re.findall(r"^OPERATOR\((\w+)\)", file.read(), re.M)
+
+
+# ---- workers ----
+
+class Failed(Exception):
+    pass
+
+
+class Worker:
+    """Its name is "retrograde", "pytorch", "pytorch_compiled", or that of a schedule of Halide's."""
+
+    def __init__(self, name, command, threads, seconds):
+        self.name, self.line, self.times, self.failure = name, b"", [], None
+        self.said = tempfile.TemporaryFile()
+        self.process = subprocess.Popen(
+            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self.said, bufsize=0,
+            env={**os.environ, "HL_NUM_THREADS": str(threads), "OMP_NUM_THREADS": str(threads),
+                 "TORCHINDUCTOR_FORCE_DISABLE_CACHES": "1"})
+        try:
+            self.ready = self.answer("ready", seconds)
+        except Failed as failed:
+            self.fail(failed)
+
+    def answer(self, expected, seconds=RUN_SECONDS):
+        """The numbers after `expected` in its next line."""
+        end = time.monotonic() + seconds
+        with selectors.DefaultSelector() as selector:
+            selector.register(self.process.stdout, selectors.EVENT_READ)
+            while b"\n" not in self.line:
+                if not selector.select(end - time.monotonic()):
+                    raise Failed(f"no answer within {seconds} s")
+                read = os.read(self.process.stdout.fileno(), 65536)
+                if not read:
+                    raise Failed(self.last_words() or "it ended without a word")
+                self.line += read
+        line, self.line = self.line.split(b"\n", 1)
+        word, *rest = line.decode().split()
+        if word != expected:
+            raise Failed(" ".join(rest))
+        return [float(number) for number in rest]
+
+    def last_words(self):
+        self.said.seek(0)
+        return " ".join(self.said.read().decode(errors="replace").split())[-600:]
+
+    def ask(self, order, expected):
+        if self.failure:
+            raise Failed(self.failure)
+        try:
+            self.process.stdin.write(order.encode() + b"\n")
+            return self.answer(expected)
+        except (Failed, OSError) as failed:
+            self.fail(failed)
+            raise Failed(self.failure) from failed
+
+    def fail(self, why):
+        self.failure = str(why)[:600]
+        self.close()
+
+    def run(self):
+        self.times.append(self.ask("run", "ran")[0] * 1e3)
+
+    def has_enough(self):
+        return self.failure or len(self.times) >= 3 and sum(self.times) > PEER_SECONDS * 1e3
+
+    def median(self):
+        return statistics.median(self.times) if self.times and not self.failure else None
+
+    def close(self):
+        self.process.kill()
+        self.process.wait()
+        for pipe in (self.process.stdin, self.process.stdout, self.said):
+            pipe.close()
+
+
+# ---- what the peers need ----
+
+def site_packages():
+    return glob.glob(os.path.join(PEERS, "lib", "python3*", "site-packages"))[0]
+
+
+def make_peers(kinds):
+    wanted = {"halide": ["halide"], "pytorch": [PYTORCH, "numpy"]}
+    if not os.path.exists(os.path.join(PEERS, "bin", "pip")):
+        subprocess.run(["/usr/bin/python3", "-m", "venv", PEERS], check=True)
+    for kind in kinds:
+        if not version(kind):
+            pip = os.path.join(PEERS, "bin", "pip")
+            subprocess.run([pip, "install", "--quiet", *wanted[kind]], check=True)
+
+
+def version(kind):
+    name = {"halide": "halide", "pytorch": "torch"}[kind]
+    found = glob.glob(os.path.join(site_packages(), name + "-*.dist-info"))
+    return os.path.basename(found[0]).split("-")[1].removesuffix(".dist") if found else None
+
+
+def build_halide_worker():
+    """From one text that includes all others: most of its compilation is that of Halide.h."""
+    halide = os.path.join(site_packages(), "halide")
+    libraries = os.path.join(halide, "lib64")
+    sources = ["gradients/gradient.cpp", "gradients/slope.cpp", "operators/schedules.cpp",
+               *(f"operators/{name}.cpp" for name in operator_names()), "pairs/worker_main.cpp"]
+    text = "".join(f'#include "{os.path.dirname(HERE)}/{source}"\n' for source in sources)
+    unit, worker = (os.path.join(PEERS, "operators_halide" + end) for end in (".cpp", ""))
+    with open(unit, "w", encoding="utf-8") as file:
+        file.write(text)
+    if os.path.exists(worker):
+        newest = max(os.path.getmtime(file) for folder in ("gradients", "operators", "pairs", "kernels")
+                     for file in glob.glob(os.path.join(os.path.dirname(HERE), folder, "*.*")))
+        if newest < os.path.getmtime(worker):
+            return worker
+    subprocess.run(["g++", "-std=c++20", "-O1", "-DBENCH_OPERATORS",
+                    f'-DBENCH_HALIDE_PLUGINS="{libraries}"', f"-I{halide}/include", unit, "-o", worker,
+                    f"-L{libraries}", "-lHalide", f"-Wl,-rpath,{libraries}"], check=True)
+    return worker
+
+
+# ---- one operator ----
+
+def start_workers(name, options, scratch):
+    size, threads = "small" if options.small else "full", str(options.threads)
+
+    def start(worker, command, seconds=RUN_SECONDS):
+        print(f"\r{name}: {worker}".ljust(50), end="\r", file=sys.stderr, flush=True)
+        return Worker(worker, command, options.threads, seconds)
+
+    workers = [start("retrograde", [os.path.join(options.programs, "bench_operators_retrograde"),
+                                    name, size, threads])]
+    path = os.path.join(scratch, "inputs")
+    shapes = [str(int(n)) for n in workers[0].ask("inputs " + path, "saved")]
+    if options.halide_worker:
+        workers += [start(schedule, [options.halide_worker, name, size, threads, schedule],
+                          SEARCH_SECONDS) for schedule in SCHEDULES]
+    torch = [os.path.join(PEERS, "bin", "python"), os.path.join(HERE, "pytorch_worker.py"), name]
+    if "pytorch" in options.kinds:
+        workers += [start(worker, [*torch, mode, threads, path, *shapes]) for worker, mode in
+                    (("pytorch", "eager"), ("pytorch_compiled", "compiled"))]
+    return workers, [*torch, "float64", threads, path, *shapes]
+
+
+def run_in_turn(workers, rounds):
+    """The first run of a process makes its threads and touches its memory: it does not count."""
+    for at in range(-1, rounds):
+        for i in range(len(workers)):
+            worker = workers[(i + at) % len(workers)]
+            if worker.has_enough():
+                continue
+            time.sleep(0.001)  # threads of the one before keep looking for work for a moment
+            try:
+                worker.run()
+                if at < 0:
+                    worker.times.clear()
+            except Failed:
+                pass  # it says why in the report
+
+
+def compare(workers, reference, options, scratch):
+    """Of each worker in C++ that has run, by name: errors against float64."""
+    if "pytorch" not in options.kinds:
+        return {}
+    double = Worker("float64", reference, options.threads, 5 * RUN_SECONDS)
+    if double.failure:
+        return {"reference": double.failure}
+    result, path = {}, os.path.join(scratch, "outputs")
+    for worker in workers:
+        if worker.failure or worker.name.startswith("pytorch"):
+            continue
+        worker.ask("save " + path, "saved")
+        numbers = double.ask("errors " + path, "errors")
+        result[worker.name] = {"largest": numbers[::2], "norm": numbers[1::2]}
+    double.close()
+    return result
+
+
+def memory_of(worker, inputs_mb):
+    """What a run adds, and the inputs."""
+    try:
+        return worker.ask("memory", "memory")[1] + inputs_mb
+    except Failed:
+        return None
+
+
+def figures(name, workers, errors, machine, scratch):
+    by_name = {worker.name: worker for worker in workers}
+    ours = by_name["retrograde"]
+    done = {w.name: w.median() for w in workers if w.median() is not None}
+    halide = {s: done.get(s) for s in SCHEDULES if s in by_name}
+    best = min((s for s in halide if halide[s]), key=halide.get, default=None)
+    inputs_mb = os.path.getsize(os.path.join(scratch, "inputs")) / 2**20
+    row = {"operator": name, "threads": machine["threads"],
+           "rounds": {w.name: len(w.times) for w in workers},
+           "retrograde_ms": done.get("retrograde"), "halide_ms": halide, "halide_best": best,
+           "halide_best_ms": halide.get(best), "pytorch_ms": done.get("pytorch"),
+           "pytorch_compiled_ms": done.get("pytorch_compiled"),
+           "spread_ms": {w.name: spread(w.times) for w in workers if w.times},
+           "failures": {w.name: w.failure for w in workers if w.failure}}
+    if not ours.failure:
+        compile_s, _, moved, operations, derive_s, search_s = ours.ready
+        row |= {"compile_s": compile_s + derive_s, "search_s": search_s, "bytes": moved,
+                "operations": operations,
+                "bound_ms": 1e3 * max(moved / machine["bytes_per_second"], operations / machine["flops"])}
+    row["halide_compile_s"] = {s: w.ready[0] + w.ready[4] for s in halide
+                               if not (w := by_name[s]).failure}
+    row["halide_search_s"] = {s: w.ready[5] for s in halide if not (w := by_name[s]).failure}
+    if "pytorch_compiled" in done:
+        row["pytorch_compile_s"] = by_name["pytorch_compiled"].ready[0]
+    for key, who in (("peak_mb", "retrograde"), ("halide_best_peak_mb", best),
+                     ("pytorch_peak_mb", "pytorch"), ("pytorch_compiled_peak_mb", "pytorch_compiled")):
+        row[key] = memory_of(by_name[who], inputs_mb) if who in done else None
+    row["errors"] = errors
+    if not ours.failure and "retrograde" not in errors:
+        row["slope_error"] = ours.ask("slope", "slope")[0]
+    for key, kind in (("max_relative_error", "largest"), ("norm_error", "norm")):
+        row[key] = max(errors["retrograde"][kind]) if "retrograde" in errors else None
+    return row
+
+
+def spread(times):
+    """The width of the middle half."""
+    if len(times) < 4:
+        return max(times) - min(times)
+    low, _, high = statistics.quantiles(times, n=4)
+    return high - low
+
+
+def measure(name, options, machine):
+    with tempfile.TemporaryDirectory(dir=options.scratch) as scratch:
+        workers, reference = start_workers(name, options, scratch)
+        try:
+            run_in_turn(workers, options.rounds)
+            errors = compare(workers, reference, options, scratch)
+            return figures(name, workers, errors, machine, scratch)
+        finally:
+            for worker in workers:
+                if not worker.failure:
+                    worker.close()
+
+
+# ---- the report ----
+
+def is_wrong(row):
+    """A pipeline of ours that fails, or whose gradient is neither float64's nor that of differences."""
+    if row["retrograde_ms"] is None:
+        return True
+    error = row["norm_error"]
+    return row["slope_error"] > 0.02 if error is None else not error <= 1e-3
+
+
+def line(row):
+    def cell(value, form="9.2f"):
+        return format(value, form) if value is not None else "-".rjust(int(form.split(".")[0]))
+
+    halide = " ".join(f"{s} {cell(t, '.2f') if t else 'failed'}" for s, t in row["halide_ms"].items())
+    return (f"{row['operator']:22}{cell(row['retrograde_ms'])}{cell(row['halide_best_ms'])}"
+            f"{cell(row['pytorch_ms'])}{cell(row['pytorch_compiled_ms'])}{cell(row.get('bound_ms'))}"
+            f"{cell(row['peak_mb'], '8.0f')}{cell(row['norm_error'], '10.1e')}  {halide}"
+            f"{'  WRONG' if is_wrong(row) else ''}")
+
+
+def write(path, report):
+    with open(path + ".new", "w", encoding="utf-8") as file:
+        json.dump(report, file, indent=1)
+    os.replace(path + ".new", path)
+
+
+def read_options():
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("programs")
+    parser.add_argument("--operator", action="append", choices=operator_names(), dest="operators")
+    parser.add_argument("--quick", action="store_true", help="few rounds: numbers for guidance only")
+    parser.add_argument("--rounds", type=int, help="timed runs of each, 15 when not given")
+    parser.add_argument("--threads", type=int, default=2)
+    parser.add_argument("--peers", choices=["none", "halide", "pytorch", "all"], default="all")
+    parser.add_argument("--small", action="store_true", help="sizes for a check of the results")
+    parser.add_argument("--add", action="store_true", help="keep other operators of an earlier report")
+    parser.add_argument("--output", default="operators.json")
+    options = parser.parse_args()
+    options.rounds = options.rounds or (5 if options.quick else 15)
+    options.kinds = {"none": [], "all": ["halide", "pytorch"]}.get(options.peers, [options.peers])
+    options.scratch = os.path.dirname(os.path.abspath(options.output))
+    options.halide_worker = None
+    return options
+
+
+def main():
+    options = read_options()
+    versions = {}
+    if options.kinds:
+        make_peers(options.kinds)
+        versions = {kind: version(kind) for kind in options.kinds}
+    if "halide" in options.kinds:
+        options.halide_worker = build_halide_worker()
+    machine = json.loads(subprocess.check_output(
+        [os.path.join(options.programs, "bench_machine"), str(options.threads)]))
+    report = {"machine": machine, "versions": versions, "operators": []}
+    if options.add and os.path.exists(options.output):
+        with open(options.output, encoding="utf-8") as file:
+            report["operators"] = json.load(file)["operators"]
+    print(f"{machine['threads']} threads, {machine['bytes_per_second'] / 1e9:.1f} GB/s, "
+          f"{machine['flops'] / 1e9:.0f} GFLOP/s; {versions}")
+    print(f"{'ms':22}{'ours':>9}{'Halide':>9}{'eager':>9}{'compiled':>9}{'bound':>9}{'MB':>8}{'error':>10}")
+    wrong = False
+    for name in options.operators or operator_names():
+        row = measure(name, options, machine)
+        report["operators"] = [r for r in report["operators"] if r["operator"] != name] + [row]
+        write(options.output, report)  # an interrupted run keeps what it has
+        print(line(row), flush=True)
+        wrong |= is_wrong(row)
+    print("report:", options.output)
+    sys.exit(1 if wrong else 0)
+
+
+if __name__ == "__main__":
+    main()
