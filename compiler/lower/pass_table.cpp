@@ -5,6 +5,7 @@
 #include "lower/loops/flatten_storage.h"
 #include "lower/loops/free_early.h"
 #include "lower/loops/join_indices.h"
+#include "lower/loops/keep_accumulators.h"
 #include "lower/loops/lower_atomics.h"
 #include "lower/loops/partition_loops.h"
 #include "lower/loops/trim_loops.h"
@@ -27,6 +28,11 @@ const std::vector<StatementPass>& statement_passes() {
       {"deinterleave_loads", deinterleave_loads},
       {"drop_asserts", drop_asserts},
       {"drop_bounds_query", drop_bounds_query},
+      {"keep_accumulators",  // loops over pure variables: by names without "r$"
+       [](const Stmt& s) {
+         return keep_accumulators(
+             s, [](const For& loop) { return loop.name.find(".r$") == std::string::npos; });
+       }},
       {"flatten_storage", [](const Stmt& s) { return flatten_storage(s); }},
       {"free_early", free_early},
       {"join_indices", join_indices},

@@ -20,6 +20,7 @@
 #include "lower/loops/free_early.h"
 #include "lower/loops/insert_prefetches.h"
 #include "lower/loops/join_indices.h"
+#include "lower/loops/keep_accumulators.h"
 #include "lower/loops/lower_atomics.h"
 #include "lower/loops/memoize.h"
 #include "lower/loops/partition_loops.h"
@@ -157,6 +158,10 @@ constexpr Pass passes[] = {
      [](Lowering& lowering, const Stmt& s) {
        return memoize(s, lowering.program, lowering.renamed_funcs, lowering.name,
                       lowering.options.target, lowering.folds);
+     }},
+    {"keep_accumulators", Phase::Loops,
+     [](Lowering& lowering, const Stmt& s) {
+       return keep_accumulators(s, [&](const For& loop) { return is_pure_loop(lowering, loop); });
      }},
     {"flatten_storage", Phase::FlatStorage,
      [](Lowering& lowering, const Stmt& s) {

@@ -185,6 +185,24 @@ TEST(CodegenIdioms, AccumulatorsOfAMatrixProductStayInRegisters) {
 
 // Tiles with guarded tails begin at multiples of their size, so that panels of that size are read
 // as vectors.
+// Of a tile of an output, whose strides nobody knows.
+TEST(CodegenIdioms, AccumulatorsOfAnUpdateStayInRegisters) {
+  ImageParam in(Float(32), 3, "in"), weights(Float(32), 2, "weights");
+  Var x("x"), y("y"), c("c"), xi("xi"), ci("ci");
+  Func f("f");
+  RDom r(0, 16, "r");
+  f(x, y, c) += weights(r, c) * in(x, y, r);
+  f.update()
+      .tile(x, c, xi, ci, 16, 4, TailStrategy::GuardWithIf)
+      .reorder(xi, ci, r, x, c, y)
+      .vectorize(xi, 8)
+      .unroll(xi)
+      .unroll(ci);
+  const auto inner = block_with_most(assembly(f, avx2), "vfmadd");
+  EXPECT_GE(count(inner, "vfmadd"), 8u);
+  EXPECT_EQ(count(inner, "vmovups\t%ymm"), 0u) << "a store of an accumulator";
+}
+
 TEST(CodegenIdioms, GuardedTilesReadPackedPanelsDensely) {
   ImageParam a(Float(64), 2, "a"), b(Float(64), 2, "b");
   Var x("x"), y("y"), z("z"), xi("xi"), yi("yi"), xo("xo"), yo("yo"), t("t");

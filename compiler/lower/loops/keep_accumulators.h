@@ -1,0 +1,13 @@
+// keep_accumulators -- what a reduction adds to stays in registers while its loops run.
+#pragma once
+
+#include <functional>
+
+#include "ir/expr.h"
+
+namespace retrograde::ir {
+
+// Loops to Loops. `is_pure`: whether the iterations of a loop store to different elements.
+Stmt keep_accumulators(const Stmt& s, const std::function<bool(const For&)>& is_pure);
+
+}  // namespace retrograde::ir
