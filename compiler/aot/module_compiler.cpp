@@ -264,7 +264,9 @@ class AheadOfTime : public ModuleCompiler {
     ir::LowerOptions options;
     options.target = pipeline.traced(target);
     options.validate = validate_passes;
-    return ir::lower(pipeline.name, ir::schedule_unscheduled(pipeline.outputs), inputs, options);
+    return ir::lower(pipeline.name,
+                     ir::schedule_unscheduled(pipeline.outputs, ir::vector_unit_of(options.target)),
+                     inputs, options);
   }
 
   std::vector<uint8_t> object(const Module& module) override {

@@ -120,9 +120,9 @@ class JitCompiler : public Compiler {
     ir::LowerOptions options;
     options.target = pipeline.traced(target);
     options.validate = validate_passes;
-    ir::LoweredFunction function =
-        ir::lower(pipeline.name, ir::schedule_unscheduled(pipeline.outputs),
-                  ir::infer_arguments(pipeline.outputs), options);
+    ir::LoweredFunction function = ir::lower(
+        pipeline.name, ir::schedule_unscheduled(pipeline.outputs, ir::vector_unit_of(target)),
+        ir::infer_arguments(pipeline.outputs), options);
     jit::Options code_options;
     code_options.externs = pipeline.externs;
     auto code = jit::compile(function, target, code_options);
@@ -130,8 +130,9 @@ class JitCompiler : public Compiler {
                                          target.has_feature(Target::Profile));
   }
 
-  std::string loop_nest(const PipelineSpec& pipeline, const Target&) override {
-    return ir::loop_nest_text(ir::schedule_unscheduled(pipeline.outputs));
+  std::string loop_nest(const PipelineSpec& pipeline, const Target& target) override {
+    return ir::loop_nest_text(
+        ir::schedule_unscheduled(pipeline.outputs, ir::vector_unit_of(target)));
   }
 };
 

@@ -43,8 +43,8 @@ struct Use {
 
 class Chooser {
  public:
-  explicit Chooser(const std::vector<FuncPtr>& outputs)
-      : outputs_(outputs), order_(topological_order(outputs)) {}
+  Chooser(const std::vector<FuncPtr>& outputs, const VectorUnit& unit)
+      : outputs_(outputs), unit_(unit), order_(topological_order(outputs)) {}
 
   DefaultSchedules choose() {
     bool differentiated = std::any_of(order_.begin(), order_.end(), is_adjoint);
@@ -138,7 +138,7 @@ class Chooser {
     return stored || found == uses_.end() ? 1 : found->second.operations;
   }
 
-  static ChosenSchedule stored_schedule(const FuncContents& f) {
+  ChosenSchedule stored_schedule(const FuncContents& f) const {
     auto scratch = std::make_shared<FuncContents>(f);
     ChosenSchedule result{f.schedule, {}};
     result.func.compute_level.kind = result.func.store_level.kind = LoopLevel::Kind::Root;
@@ -150,7 +150,7 @@ class Chooser {
   }
 
   // Pure dimensions only: their iterations are independent whatever the stage does.
-  static void schedule_stage(const FuncPtr& f, int s, bool scatters) {
+  void schedule_stage(const FuncPtr& f, int s, bool scatters) const {
     Stage stage(f, s);
     std::vector<size_t> pure;
     for (size_t d = 0; d < f->args.size(); ++d) {
@@ -163,6 +163,7 @@ class Chooser {
     if (pure.empty()) return;
     if (auto d = pure[0] == 0 ? transposed_dimension(*f, f->stage(s)) : std::nullopt)
       return tile_stage(f, s, *d, pure.back());
+    if (!scatters && pure[0] == 0 && tile_in_registers(f, s, pure)) return;
     Var outermost(f->args[pure.back()]);
     bool reduces = !f->stage(s).rvars.empty();
     if (pure.size() > 1 || (reduces && pure[0] != 0)) stage.parallel(outermost);
@@ -173,6 +174,42 @@ class Chooser {
     Var innermost(f->args[0]);
     stage.vectorize(innermost, lanes, TailStrategy::GuardWithIf);
     if (pure.size() == 1 && reduces) stage.parallel(innermost);  // of the vectors
+  }
+
+  // Whether there is a tile. Its loops stand inside of those of the reduction; those over tiles
+  // outside, of the sides first, so that what the last dimensions run over stays in the cache.
+  bool tile_in_registers(const FuncPtr& f, int s, const std::vector<size_t>& pure) const {
+    const bool has_lanes = f->made && f->made->lanes > 0;
+    const auto tile = register_tile(*f, f->stage(s), lanes, has_lanes ? 1 : 4, unit_);
+    if (!tile) return false;
+    Stage stage(f, s);
+    std::vector<VarOrRVar> inner, outer;
+    const auto cut = [&](size_t d, int64_t size) {
+      const Var all(f->args[d]), part(unique_name("tile"));
+      stage.split(all, all, part, Expr(static_cast<int>(size)), TailStrategy::GuardWithIf);
+      inner.push_back(part);
+      outer.push_back(all);
+    };
+    cut(0, tile->vectors * lanes);
+    for (const RegisterTile::Side& side : tile->sides) cut(side.dimension, side.size);
+    std::vector<VarOrRVar> order = inner;
+    for (const ReductionVariable& r : f->stage(s).rvars) order.push_back(RVar(r.var));
+    for (size_t d : pure) {
+      const Var all(f->args[d]);
+      if (std::none_of(outer.begin(), outer.end(),
+                       [&](const VarOrRVar& cut) { return cut.name() == all.name(); }))
+        outer.push_back(all);
+    }
+    order.insert(order.end(), outer.begin(), outer.end());
+    stage.reorder(order);
+    if (tile->vectors > 1)
+      stage.vectorize(inner[0], lanes).unroll(inner[0]);
+    else
+      stage.vectorize(inner[0]);
+    for (size_t i = 1; i < inner.size(); ++i) stage.unroll(inner[i]);
+    stage.parallel(outer.back());
+    if (outer.size() > 2) stage.parallel(outer[outer.size() - 2]);  // the last may be short
+    return true;
   }
 
   // A dimension beyond the first that runs along the rows of what a pure stage reads, while the
@@ -227,6 +264,7 @@ class Chooser {
   }
 
   const std::vector<FuncPtr>& outputs_;
+  const VectorUnit unit_;
   std::vector<FuncPtr> order_;
   std::unordered_map<const Symbol*, Use> uses_;
   DefaultSchedules result_;
@@ -234,8 +272,8 @@ class Chooser {
 
 }  // namespace
 
-DefaultSchedules default_schedules(const std::vector<FuncPtr>& outputs) {
-  return Chooser(outputs).choose();
+DefaultSchedules default_schedules(const std::vector<FuncPtr>& outputs, const VectorUnit& unit) {
+  return Chooser(outputs, unit).choose();
 }
 
 namespace {
@@ -254,11 +292,12 @@ std::vector<FuncPtr> with_schedules(const std::vector<FuncPtr>& outputs,
 
 }  // namespace
 
-std::vector<FuncPtr> schedule_unscheduled(const std::vector<FuncPtr>& outputs) {
+std::vector<FuncPtr> schedule_unscheduled(const std::vector<FuncPtr>& outputs,
+                                          const VectorUnit& unit) {
   std::vector<FuncPtr> result;
   run_on_large_stack([&] {
     result = apply_wrappers(outputs);
-    const DefaultSchedules chosen = default_schedules(result);
+    const DefaultSchedules chosen = default_schedules(result, unit);
     if (!chosen.empty()) result = with_schedules(result, chosen);
   });
   return result;

@@ -4,7 +4,8 @@
 // k^n. So, in a pipeline that contains adjoints, an untouched Func is computed at root when it
 // reduces, scatters, or costs more to compute again at its reads (read_estimate.h) than a way to
 // memory and back does. Its innermost dimension is vectorized, its outermost run in parallel; a
-// stage that reads across rows is tiled; a scatter along its reduction domain computes places and
+// stage that reads across rows is tiled; a reduction keeps a tile of its sums in registers
+// (register_tile.h); a scatter along its reduction domain computes places and
 // terms in vectors. That goes for primal Funcs too, which both directions read. A directive of the
 // user on a Func or one of its stages switches this off for that Func. Where the user scheduled
 // part of the primal, its other pure Funcs stay inline unless that explodes; but a scan, and a
@@ -15,6 +16,7 @@
 #include <unordered_map>
 #include <vector>
 
+#include "autodiff/schedule/register_tile.h"
 #include "graph/function.h"
 
 namespace retrograde::ir {
@@ -25,10 +27,12 @@ struct ChosenSchedule {
 };
 // Chosen schedules by Func; a Func that is not here keeps its own. The Funcs are not changed.
 using DefaultSchedules = std::unordered_map<const FuncContents*, ChosenSchedule>;
-DefaultSchedules default_schedules(const std::vector<FuncPtr>& outputs);
+DefaultSchedules default_schedules(const std::vector<FuncPtr>& outputs,
+                                   const VectorUnit& unit = {});
 
 // The pass: the outputs with their wrappers applied, or, where schedules are chosen, of a copy of
 // the graph that has them. What lowering is given.
-std::vector<FuncPtr> schedule_unscheduled(const std::vector<FuncPtr>& outputs);
+std::vector<FuncPtr> schedule_unscheduled(const std::vector<FuncPtr>& outputs,
+                                          const VectorUnit& unit = {});
 
 }  // namespace retrograde::ir

@@ -24,9 +24,11 @@ std::vector<FuncPtr> with_adjoints(const std::vector<FuncPtr>& outputs) {
 }  // namespace
 
 const std::vector<GraphPass>& graph_passes() {
-  static const std::vector<GraphPass> passes{{"propagate_adjoints", with_adjoints},
-                                             {"apply_wrappers", apply_wrappers},
-                                             {"schedule_unscheduled", schedule_unscheduled}};
+  static const std::vector<GraphPass> passes{
+      {"propagate_adjoints", with_adjoints},
+      {"apply_wrappers", apply_wrappers},
+      {"schedule_unscheduled",
+       [](const std::vector<FuncPtr>& outputs) { return schedule_unscheduled(outputs); }}};
   return passes;
 }
 

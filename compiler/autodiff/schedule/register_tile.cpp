@@ -1,0 +1,125 @@
+#include "autodiff/schedule/register_tile.h"
+
+#include <algorithm>
+#include <unordered_set>
+
+#include "autodiff/sweeps/regions.h"
+#include "autodiff/updates/update_context.h"
+#include "ir/build.h"
+#include "ir/visit.h"
+
+namespace retrograde::ir {
+
+namespace {
+
+constexpr int64_t most_values = 4;  // of a dimension: extents are not known, and rests run slower
+constexpr double loads_a_cycle = 2, products_a_cycle = 2, latency = 4;
+constexpr double worth_while = 0.8;  // of the cycles without a tile
+
+// What an iteration of a reduction loads, by the dimensions that the place depends on.
+struct Operand {
+  std::vector<bool> depends_on;  // by dimension
+};
+
+// nullopt: the update reads other elements of its own.
+std::optional<std::vector<Operand>> operands_of(const FuncContents& f, const Definition& stage) {
+  std::vector<Operand> operands;
+  bool is_plain = true;
+  std::unordered_set<const ExprNode*> seen;
+  const auto note = [&](const Expr& e) {
+    if (!seen.insert(e.get()).second) return false;
+    const auto* call = e.as<Call>();
+    const bool loads =
+        call && (call->call_type == CallType::Func || call->call_type == CallType::Image);
+    if (!loads) return true;
+    if (call->symbol.raw() == &f) {
+      is_plain &= same_args(call->args, stage.args);
+      return false;
+    }
+    Operand operand;
+    for (const std::string& arg : f.args)
+      operand.depends_on.push_back(
+          std::any_of(call->args.begin(), call->args.end(),
+                      [&](const Expr& index) { return uses_variable(index, arg); }));
+    operands.push_back(std::move(operand));
+    return true;
+  };
+  for (const Expr& value : stage.values) walk(value, note);
+  return is_plain ? std::optional(operands) : std::nullopt;
+}
+
+int64_t sums_of(const RegisterTile& tile) {
+  int64_t sums = tile.vectors;
+  for (const RegisterTile::Side& side : tile.sides) sums *= side.size;
+  return sums;
+}
+
+// In one iteration of the reduction: an operand once for all of the tile that it does not depend on.
+double loads_of(const RegisterTile& tile, const std::vector<Operand>& operands) {
+  double loads = 0;
+  for (const Operand& operand : operands) {
+    double count = operand.depends_on[0] ? static_cast<double>(tile.vectors) : 1;
+    for (const RegisterTile::Side& side : tile.sides)
+      count *= operand.depends_on[side.dimension] ? static_cast<double>(side.size) : 1;
+    loads += count;
+  }
+  return loads;
+}
+
+// For each product of a vector.
+double cycles(const RegisterTile& tile, const std::vector<Operand>& operands) {
+  const auto sums = static_cast<double>(sums_of(tile));
+  return std::max(
+      {loads_of(tile, operands) / sums / loads_a_cycle, 1 / products_a_cycle, latency / sums});
+}
+
+}  // namespace
+
+VectorUnit vector_unit_of(const Target& target) {
+  const bool has_many = target.arch == Target::ARM || target.has_feature(Target::AVX512);
+  const int64_t registers = has_many ? 32 : 16;
+  return {registers * target.natural_vector_size(UInt(8)) * 3 / 4};
+}
+
+std::optional<RegisterTile> register_tile(const FuncContents& f, const Definition& stage, int lanes,
+                                          int64_t vectors, const VectorUnit& unit) {
+  const auto moves = [&](const Expr& arg) {
+    return std::any_of(stage.rvars.begin(), stage.rvars.end(),
+                       [&](const ReductionVariable& r) { return uses_variable(arg, r.var); });
+  };
+  if (stage.rvars.empty() || std::any_of(stage.args.begin(), stage.args.end(), moves))
+    return std::nullopt;
+  const auto operands = operands_of(f, stage);
+  if (!operands || operands->empty()) return std::nullopt;
+  int64_t bytes = 0;
+  for (const Type& type : f.types) bytes += type.bytes() * lanes;
+  std::vector<size_t> sides;  // the last first: channels are, where they are no lanes
+  for (size_t d = f.args.size(); d-- > 1;) {
+    if (is_pure_position(f, stage, d)) sides.push_back(d);
+  }
+  RegisterTile best;
+  double least = cycles(best, *operands) * worth_while;
+  const auto consider = [&](RegisterTile tile) {
+    const double needed = cycles(tile, *operands);
+    const bool is_better = needed < least || (needed == least && sums_of(best) > sums_of(tile));
+    const bool reuses = loads_of(tile, *operands) <
+                        static_cast<double>(sums_of(tile)) * static_cast<double>(operands->size());
+    if (sums_of(tile) * bytes > unit.accumulator_bytes || !is_better || !reuses) return;
+    best = std::move(tile);
+    least = needed;
+  };
+  for (int64_t n = 1; n <= std::min<int64_t>(vectors, most_values); n *= 2) {
+    for (size_t i = 0; i < sides.size(); ++i) {
+      for (int64_t a = 2; a <= most_values; a *= 2) {
+        consider({n, {{sides[i], a}}});
+        for (size_t k = i + 1; k < sides.size(); ++k) {
+          for (int64_t b = 2; b <= most_values; b *= 2)
+            consider({n, {{sides[i], a}, {sides[k], b}}});
+        }
+      }
+    }
+  }
+  return best.sides.empty() ? std::nullopt : std::optional(best);
+}
+
+}  // namespace retrograde::ir

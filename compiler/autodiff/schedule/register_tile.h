@@ -1,0 +1,39 @@
+// register_tile.h -- how much of a reduction's result is computed at once, in registers.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "graph/function.h"
+#include "ir/target.h"
+
+namespace retrograde::ir {
+
+// What the machine's vector unit has. Default: 32 registers of 64 bytes.
+struct VectorUnit {
+  int64_t accumulator_bytes = 1536;  // of the registers that hold sums; the others hold operands
+};
+VectorUnit vector_unit_of(const Target& target);
+
+// Of a stage  f(x, ..., c, ...) = f(x, ..., c, ...) op e  over a reduction domain: so many vectors
+// of the first dimension, and so many values of others, whose sums are kept while the reduction
+// runs, so that what is loaded is used several times.
+struct RegisterTile {
+  int64_t vectors = 1;
+  struct Side {
+    size_t dimension;
+    int64_t size;
+  };
+  std::vector<Side> sides;
+};
+
+// The tile with the fewest cycles for each product; nullopt: none is better than one vector, or the
+// stage is no such update. `lanes` in a vector of the first dimension; `vectors`: how many of them
+// the dimension has at most.
+// Model: two loads and two multiply-adds a cycle, of which each sum takes one every four cycles
+// (vector units of x86-64 since 2015).
+std::optional<RegisterTile> register_tile(const FuncContents& f, const Definition& stage, int lanes,
+                                          int64_t vectors, const VectorUnit& unit);
+
+}  // namespace retrograde::ir
