@@ -5,7 +5,9 @@
 
 #include "autodiff/derivative.h"
 #include "autodiff/schedule/read_estimate.h"
+#include "autodiff/schedule/register_tile.h"
 #include "frontend/language/func.h"
+#include "frontend/run/pipeline.h"
 #include "gradient/gradient_check.h"
 #include "ir/build.h"
 #include "ir/print.h"
@@ -175,6 +177,72 @@ TEST_F(DefaultSchedule, SmallKernelsOfManyChannelsAreSummedInLanes) {
 // Too few terms for sums in double, and enough for lanes.
 TEST_F(DefaultSchedule, SmallKernelsOfSmallPicturesAreSummedInLanes) {
   expect_sums_in_lanes(40, Float(32));
+}
+
+// Of a convolution: sums of several channels, so that what is loaded is used for all of them.
+TEST_F(DefaultSchedule, ReductionsKeepATileOfTheirSumsInRegisters) {
+  Buffer<float> image(66, 66, 8), kernels(3, 3, 8, 8), seed(64, 64, 8);
+  Var c("c");
+  Func layer("layer");
+  RDom r(0, 3, 0, 3, 0, 8);
+  layer(x, y, c) = 0.0f;
+  layer(x, y, c) += kernels(r.x, r.y, r.z, c) * image(x + r.x, y + r.y, r.z);
+  Derivative d = propagate_adjoints(layer, seed);
+  const ir::FuncPtr adjoint = d(image).function();
+  const std::vector<ir::Dim>& loops = choose(d(image)).at(adjoint.get()).stages.back().dims;
+  ASSERT_GE(loops.size(), 5u);
+  EXPECT_EQ(loops[0].runs, ForType::Vectorized);
+  EXPECT_EQ(loops[1].runs, ForType::Unrolled);
+  EXPECT_EQ(loops[2].runs, ForType::Unrolled);
+  EXPECT_TRUE(loops[3].is_reduction);
+  EXPECT_EQ(loops.back().runs, ForType::Parallel);
+}
+
+TEST_F(DefaultSchedule, TilesFitTheRegisters) {
+  Func product("product");
+  RDom k(0, 64);
+  Buffer<float> left(64, 64), right(64, 64);
+  product(x, y) += left(k, y) * right(x, k);
+  const ir::FuncContents& f = *product.function();
+  const auto sums = [&](int64_t bytes) {
+    const auto tile = ir::register_tile(f, f.stage(1), 16, 4, {bytes});
+    int64_t count = tile ? tile->vectors : 0;
+    if (tile) {
+      for (const ir::RegisterTile::Side& side : tile->sides) count *= side.size;
+    }
+    return count * 64;
+  };
+  for (int64_t bytes : {384, 512, 1536}) {
+    EXPECT_GT(sums(bytes), bytes / 4) << bytes;
+    EXPECT_LE(sums(bytes), bytes);
+  }
+  EXPECT_EQ(sums(64), 0) << "no tile of one vector";
+}
+
+// One chain of additions in float32 is off by 1e-3 here.
+TEST_F(DefaultSchedule, LossesAreSummedInLanesAndRows) {
+  for (bool is_flat : {false, true}) {
+    const int width = is_flat ? 3'000'001 : 3001, height = is_flat ? 1 : 1001;
+    Buffer<float> image(width, height);
+    image.for_each_element(
+        [&](int i, int j) { image(i, j) = static_cast<float>((i * 7 + j * 13) % 101) * 0.01f; });
+    Func sum("sum");
+    RDom flat(0, width), r(0, width, 0, height);
+    sum() = 0.5f;
+    if (is_flat)
+      sum() += image(flat, 0) * image(flat, 0);
+    else
+      sum() += image(r.x, r.y) * image(r.x, r.y);
+    double expected = 0.5;
+    image.for_each_element(
+        [&](int i, int j) { expected += static_cast<double>(image(i, j)) * image(i, j); });
+    Derivative d = propagate_adjoints(sum);
+    Buffer<float> gradient(width, height);
+    Buffer<float> loss = Buffer<float>::make_scalar();
+    Pipeline({sum, d(image)}).realize({loss, gradient});
+    EXPECT_NEAR(loss(), expected, 1e-6 * expected) << is_flat;
+    EXPECT_EQ(gradient(5, 0), 2 * image(5, 0));
+  }
 }
 
 bool has_select(const Expr& e) {

@@ -5,6 +5,7 @@
 #include <unordered_set>
 
 #include "autodiff/schedule/cost_estimate.h"
+#include "autodiff/schedule/cut_reductions.h"
 #include "autodiff/schedule/read_estimate.h"
 #include "autodiff/sweeps/regions.h"
 #include "autodiff/updates/update_context.h"
@@ -47,8 +48,7 @@ class Chooser {
       : outputs_(outputs), unit_(unit), order_(topological_order(outputs)) {}
 
   DefaultSchedules choose() {
-    bool differentiated = std::any_of(order_.begin(), order_.end(), is_adjoint);
-    if (!differentiated) return {};
+    if (std::none_of(order_.begin(), order_.end(), is_adjoint)) return {};
     for (const FuncPtr& f : order_) count_reads(*f);
     bool by_hand = std::any_of(order_.begin(), order_.end(),
                                [](const FuncPtr& f) { return !is_adjoint(f) && is_touched(*f); });
@@ -278,6 +278,12 @@ DefaultSchedules default_schedules(const std::vector<FuncPtr>& outputs, const Ve
 
 namespace {
 
+bool is_differentiated(const std::vector<FuncPtr>& outputs) {
+  const std::vector<FuncPtr> order = topological_order(outputs);
+  return std::any_of(order.begin(), order.end(),
+                     [](const FuncPtr& f) { return f->made.has_value(); });
+}
+
 std::vector<FuncPtr> with_schedules(const std::vector<FuncPtr>& outputs,
                                     const DefaultSchedules& chosen) {
   const GraphCopy copy = copy_graph(outputs);
@@ -297,6 +303,7 @@ std::vector<FuncPtr> schedule_unscheduled(const std::vector<FuncPtr>& outputs,
   std::vector<FuncPtr> result;
   run_on_large_stack([&] {
     result = apply_wrappers(outputs);
+    if (is_differentiated(result)) result = cut_reductions(result);
     const DefaultSchedules chosen = default_schedules(result, unit);
     if (!chosen.empty()) result = with_schedules(result, chosen);
   });

@@ -1,0 +1,102 @@
+#include "autodiff/schedule/cut_reductions.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "frontend/language/func.h"
+#include "frontend/language/rdom.h"
+#include "frontend/schedule/stage.h"
+#include "graph/associative_update.h"
+#include "graph/copy_graph.h"
+#include "graph/names.h"
+#include "ir/build.h"
+#include "ir/visit.h"
+#include "simplify/simplify.h"
+
+namespace retrograde::ir {
+
+namespace {
+
+constexpr int lanes_of_a_sum = 16;
+constexpr int terms = 256;          // that a lane adds up, where there is one dimension
+constexpr int groups = 32;          // of rows, summed apart before all are
+constexpr int64_t long_sum = 4096;  // iterations
+constexpr int64_t short_loop = 8;   // iterations that make no tasks
+constexpr int64_t unknown_extent = 1024;
+
+int64_t extent_of(const ReductionVariable& r) {
+  return as_const_int(simplify(r.extent)).value_or(unknown_extent);
+}
+
+bool is_given(const FuncContents& f) {
+  bool given = f.schedule.is_given;
+  for (int s = 0; s < f.stage_count(); ++s) given |= f.stage(s).schedule.is_given;
+  return given;
+}
+
+// Whether the update adds everything to one element, and may do so in another order.
+bool is_long_sum(const FuncContents& f, const Definition& update) {
+  double iterations = update.rvars.empty() ? 0 : 1;
+  for (const ReductionVariable& r : update.rvars) iterations *= static_cast<double>(extent_of(r));
+  const bool is_one_element = std::all_of(update.args.begin(), update.args.end(),
+                                          [](const Expr& arg) { return is_const(arg); });
+  if (!is_one_element || iterations < long_sum) return false;
+  const AssociativityProof proof = prove_associative(f, update);
+  return proof.op && proof.op->commutative && !proof.op->breaks_ties;
+}
+
+// Partial results of the update for each value of two of its loops, of which the first is lanes.
+void factor(Stage update, const RVar& lane, const RVar& row) {
+  const Var u(unique_name("lane")), v(unique_name("row"));
+  Func parts = update.rfactor({{lane, u}, {row, v}});
+  std::vector<VarOrRVar> order{u};
+  for (const VarOrRVar& loop : parts.update().split_vars()) {
+    if (loop.name() != u.name()) order.push_back(loop);
+  }
+  parts.compute_root().vectorize(u, lanes_of_a_sum).parallel(v);
+  parts.update().reorder(order).vectorize(u, lanes_of_a_sum, TailStrategy::GuardWithIf).parallel(v);
+}
+
+// The loop that is cut into lanes, and the one whose iterations are tasks: itself, in blocks, where
+// no other is long.
+void cut(const FuncPtr& f, int stage) {
+  const std::vector<ReductionVariable> rvars = f->stage(stage).rvars;
+  size_t lanes = 0, rows = 0;
+  while (lanes + 1 < rvars.size() && extent_of(rvars[lanes]) < lanes_of_a_sum) ++lanes;
+  for (size_t i = 0; i < rvars.size(); ++i) {
+    const bool is_longer = rows == lanes || extent_of(rvars[i]) > extent_of(rvars[rows]);
+    if (i != lanes && is_longer && extent_of(rvars[i]) >= short_loop) rows = i;
+  }
+  Stage update(f, stage);
+  const RVar all(rvars[lanes].var), lane(unique_name("lane")), group(unique_name("group"));
+  RVar row(rvars[rows].var);
+  if (rows == lanes) {
+    row = RVar(unique_name("block"));
+    update.split(all, row, all, lanes_of_a_sum * terms, TailStrategy::GuardWithIf);
+    update.split(all, all, lane, lanes_of_a_sum);
+  } else {
+    update.split(all, all, lane, lanes_of_a_sum, TailStrategy::GuardWithIf);
+  }
+  factor(update, lane, row);
+  update.split(row, row, group, groups, TailStrategy::GuardWithIf);
+  factor(update, lane, group);
+  if (f->schedule.compute_level.kind == LoopLevel::Kind::Inlined) Func(f).compute_root();
+}
+
+}  // namespace
+
+std::vector<FuncPtr> cut_reductions(const std::vector<FuncPtr>& outputs) {
+  std::vector<std::pair<const FuncContents*, int>> found;
+  for (const FuncPtr& f : topological_order(outputs)) {
+    if (is_given(*f) || f->is_extern()) continue;
+    for (int s = 1; s < f->stage_count(); ++s) {
+      if (is_long_sum(*f, f->stage(s))) found.emplace_back(f.get(), s);
+    }
+  }
+  if (found.empty()) return outputs;
+  const GraphCopy copy = copy_graph(outputs);
+  for (const auto& [f, stage] : found) cut(copy.of.at(f), stage);
+  return copy.outputs;
+}
+
+}  // namespace retrograde::ir

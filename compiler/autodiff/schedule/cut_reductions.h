@@ -1,0 +1,22 @@
+// cut_reductions.h -- sums over a whole domain in lanes and parts.
+//
+//   loss() += e(r.x, r.y)     =>    parts(lane, row) += e(16 t + lane, row)
+//                                   sums(lane, i) += parts(lane, 32 s + i)
+//                                   loss() += sums(lane, i)
+//
+// A reduction to one element has no loop that could be vectorized or run in parallel, and one chain
+// of float32 additions loses digits with its length: of 12 million terms it is off by 2 %. The cut
+// depends on the program alone, so that results are the same bits for every number of threads.
+#pragma once
+
+#include <vector>
+
+#include "graph/function.h"
+
+namespace retrograde::ir {
+
+// The outputs, or, where something is cut, those of a copy of the graph: long associative updates
+// of one element, of Funcs that nobody scheduled, are factored (rfactor.h).
+std::vector<FuncPtr> cut_reductions(const std::vector<FuncPtr>& outputs);
+
+}  // namespace retrograde::ir
