@@ -7,11 +7,27 @@ using namespace Halide;
 
 namespace {
 
-std::vector<int> sizes_of(const Buffer<float>& values) {
+std::vector<int> sizes_of(const Buffer<real>& values) {
   std::vector<int> sizes;
   for (int d = 0; d < values.dimensions(); d++) sizes.push_back(values.dim(d).extent());
   return sizes;
 }
+
+#ifdef BENCH_FLOAT64
+// An adjoint in memory is one of floats.
+Derivative derivative_of(const Func& output, const Buffer<real>& seed) {
+  Region bounds;
+  for (int size : sizes_of(seed)) bounds.push_back({0, size});
+  const std::vector<Var> vars(bounds.size());
+  Func adjoint("adjoint");
+  adjoint(vars) = seed(std::vector<Expr>(vars.begin(), vars.end()));
+  return propagate_adjoints(output, adjoint, bounds);
+}
+#else
+Derivative derivative_of(const Func& output, const Buffer<real>& seed) {
+  return propagate_adjoints(output, seed);
+}
+#endif
 
 // An operator's sizes are known when it is compiled.
 void add_output(Kernel& kernel, std::vector<Func>& funcs, const Setup& setup, Func func,
@@ -23,17 +39,17 @@ void add_output(Kernel& kernel, std::vector<Func>& funcs, const Setup& setup, Fu
   }
   func.set_estimates(all);
   funcs.push_back(func);
-  kernel.outputs.push_back(Buffer<float>(sizes));
+  kernel.outputs.push_back(Buffer<real>(sizes));
 }
 
 }  // namespace
 
 Kernel gradients_of(const Setup& setup, const Func& output, const std::vector<int>& output_sizes,
-                    const std::vector<Buffer<float>>& by, double operations,
-                    const std::vector<Buffer<float>>& fixed) {
-  const Buffer<float> seed = make_noise(output_sizes);
+                    const std::vector<Buffer<real>>& by, double operations,
+                    const std::vector<Buffer<real>>& fixed) {
+  const Buffer<real> seed = make_noise(output_sizes);
   if (setup.primal) {
-    Kernel primal{Pipeline(output), {}, {Buffer<float>(output_sizes)}, operations};
+    Kernel primal{Pipeline(output), {}, {Buffer<real>(output_sizes)}, operations};
     primal.inputs.insert(primal.inputs.end(), by.begin(), by.end());
     primal.inputs.push_back(seed);
     return primal;
@@ -42,10 +58,10 @@ Kernel gradients_of(const Setup& setup, const Func& output, const std::vector<in
   kernel.operations = operations;
   kernel.by = by.size();
   const Stopwatch deriving;
-  Derivative derivative = propagate_adjoints(output, seed);
+  Derivative derivative = derivative_of(output, seed);
   kernel.derive_seconds = deriving.seconds();
   std::vector<Func> funcs;
-  for (const Buffer<float>& input : by) {
+  for (const Buffer<real>& input : by) {
     add_output(kernel, funcs, setup, derivative(input), sizes_of(input));
     kernel.inputs.push_back(input);
   }
@@ -59,8 +75,8 @@ Kernel gradients_of(const Setup& setup, const Func& output, const std::vector<in
   return kernel;
 }
 
-Buffer<float> make_noise(const std::vector<int>& sizes, uint32_t which) {
-  Buffer<float> noise(sizes);
+Buffer<real> make_noise(const std::vector<int>& sizes, uint32_t which) {
+  Buffer<real> noise(sizes);
   for (size_t i = 0; i < noise.number_of_elements(); i++) {
     noise.data()[i] =
         static_cast<float>(scrambled(static_cast<uint32_t>(i) + which) >> 8) / 8388608 - 1;
@@ -68,9 +84,11 @@ Buffer<float> make_noise(const std::vector<int>& sizes, uint32_t which) {
   return noise;
 }
 
-Buffer<float> make_values(const std::vector<int>& sizes, float low, float high) {
-  Buffer<float> values = make_image<float>(sizes);
-  values.for_each_value([=](float& v) { v = low + (high - low) * v; });
+Buffer<real> make_values(const std::vector<int>& sizes, float low, float high) {
+  const Buffer<float> image = make_image<float>(sizes);
+  Buffer<real> values(sizes);
+  for (size_t i = 0; i < values.number_of_elements(); i++)
+    values.data()[i] = low + (high - low) * image.data()[i];
   return values;
 }
 

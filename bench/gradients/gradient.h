@@ -17,14 +17,14 @@ void schedule(Halide::Pipeline& pipeline, const Setup& setup);
 // Programming for Image Processing and Deep Learning in Halide, SIGGRAPH 2018, section 5.
 Kernel gradients_of(const Setup& setup, const Halide::Func& output,
                     const std::vector<int>& output_sizes,
-                    const std::vector<Halide::Buffer<float>>& by, double operations,
-                    const std::vector<Halide::Buffer<float>>& fixed = {});
+                    const std::vector<Halide::Buffer<real>>& by, double operations,
+                    const std::vector<Halide::Buffer<real>>& fixed = {});
 
 // From -1 to 1, with no relation to any other input: a seed like the input of a normalisation has a
 // gradient of rounding errors.
-Halide::Buffer<float> make_noise(const std::vector<int>& sizes, uint32_t which = 12345);
+Halide::Buffer<real> make_noise(const std::vector<int>& sizes, uint32_t which = 12345);
 
 // Values from `low` to just below `high`.
-Halide::Buffer<float> make_values(const std::vector<int>& sizes, float low, float high);
+Halide::Buffer<real> make_values(const std::vector<int>& sizes, float low, float high);
 
 }  // namespace kernels

@@ -8,11 +8,11 @@ namespace kernels {
 
 namespace {
 
-constexpr float step = 1.0f / 8192;
+constexpr real step = sizeof(real) == 8 ? 1.0f / (1 << 20) : 1.0f / 8192;
 constexpr uint32_t directions = 3;
 
-float* floats_of(const Halide::Buffer<>& buffer) {
-  return reinterpret_cast<float*>(buffer.raw_buffer()->host);
+real* values_of(const Halide::Buffer<>& buffer) {
+  return reinterpret_cast<real*>(buffer.raw_buffer()->host);
 }
 
 float sign(uint32_t direction, size_t input, size_t element) {
@@ -24,7 +24,7 @@ float sign(uint32_t direction, size_t input, size_t element) {
 template <typename F>
 void along(const std::vector<Halide::Buffer<>>& buffers, size_t count, uint32_t direction, F f) {
   for (size_t i = 0; i < count; i++) {
-    float* values = floats_of(buffers[i]);
+    real* values = values_of(buffers[i]);
     for (size_t k = 0; k < buffers[i].number_of_elements(); k++)
       f(values[k], sign(direction, i, k));
   }
@@ -38,8 +38,8 @@ std::vector<Halide::Buffer<>> copies(const std::vector<Halide::Buffer<>>& buffer
 
 double weighted_sum(Kernel& primal, const Halide::Target& target) {
   primal.pipeline.realize(Halide::Realization(primal.outputs), target);
-  const float* seed = floats_of(primal.inputs.back());
-  const float* output = floats_of(primal.outputs.back());
+  const real* seed = values_of(primal.inputs.back());
+  const real* output = values_of(primal.outputs.back());
   double sum = 0;
   for (size_t k = 0; k < primal.outputs.back().number_of_elements(); k++)
     sum += static_cast<double>(seed[k]) * output[k];
@@ -54,12 +54,12 @@ double slope_error(const Kernel& gradients, Kernel& primal, const Halide::Target
   double worst = 0;
   for (uint32_t direction = 0; direction < directions; direction++) {
     double product = 0, squares = 0;
-    along(slopes, inputs, direction, [&](float g, float v) {
+    along(slopes, inputs, direction, [&](real g, float v) {
       product += static_cast<double>(g) * v;
       squares += static_cast<double>(g) * g;
     });
-    const auto move = [&](float by) {
-      along(primal.inputs, inputs, direction, [&](float& x, float v) { x += by * v; });
+    const auto move = [&](real by) {
+      along(primal.inputs, inputs, direction, [&](real& x, float v) { x += by * v; });
     };
     move(step);
     const double up = weighted_sum(primal, target);

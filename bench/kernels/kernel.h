@@ -17,6 +17,14 @@
 
 namespace kernels {
 
+// Of the values of gradients. In double where a check needs more than float has: the same numbers as
+// inputs.
+#ifdef BENCH_FLOAT64
+using real = double;
+#else
+using real = float;
+#endif
+
 struct Setup {
   Halide::Target target;
   bool small = false;  // sizes for a check of the results: odd, and quick

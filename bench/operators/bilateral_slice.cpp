@@ -23,9 +23,9 @@ Cells cells_at(const Expr& place, int count) {
 Kernel bilateral_slice(const Setup& setup) {
   const int width = setup.size(1024, 37), height = setup.size(1024, 29);
   const int cells = setup.size(64, 5), levels = setup.size(8, 4);
-  const Buffer<float> image = make_values({width, height, 3}, 0, 1);
-  const Buffer<float> guide = off_grid(make_waves({width, height}, -0.05f, 1.05f, 61), 2048);
-  const Buffer<float> grid = make_noise({cells, cells, levels, 4, 3}, 1);
+  const Buffer<real> image = make_values({width, height, 3}, 0, 1);
+  const Buffer<real> guide = off_grid(make_waves({width, height}, -0.05f, 1.05f, 61), 2048);
+  const Buffer<real> grid = make_noise({cells, cells, levels, 4, 3}, 1);
   Var x("x"), y("y"), k("k"), c("c");
   auto place = [&](const Var& at, int size) -> Expr {
     return clamp((at + 0.5f) * (static_cast<float>(cells) / size) - 0.5f, 0.0f, cells - 1.0f);

@@ -8,11 +8,11 @@ using namespace Halide;
 Kernel conv2d(const Setup& setup) {
   const int width = setup.size(256, 13), height = setup.size(256, 11);
   const int channels = setup.size(16, 3), images = setup.size(4, 2);
-  const Buffer<float> input = make_noise({width, height, channels, images}, 1);
-  const Buffer<float> weights = make_values({3, 3, channels, channels}, -0.2f, 0.2f);
-  const Buffer<float> bias = make_values({channels}, -1, 1);
+  const Buffer<real> input = make_noise({width, height, channels, images}, 1);
+  const Buffer<real> weights = make_values({3, 3, channels, channels}, -0.2f, 0.2f);
+  const Buffer<real> bias = make_values({channels}, -1, 1);
   Var x("x"), y("y"), c("c"), n("n");
-  Func padded = BoundaryConditions::constant_exterior(input, 0.0f);
+  Func padded = BoundaryConditions::constant_exterior(input, real(0));
   Func convolved("convolved");
   RDom r(0, 3, 0, 3, 0, channels);
   convolved(x, y, c, n) = bias(c);

@@ -8,8 +8,8 @@ using namespace Halide;
 Kernel flow_warp(const Setup& setup) {
   const int width = setup.size(512, 25), height = setup.size(512, 19);
   const int channels = setup.size(64, 3);
-  const Buffer<float> image = make_waves({width, height, channels}, -1, 1, 23);
-  const Buffer<float> flow = off_grid(make_waves({width, height, 2}, -9, 9, 97), 64);
+  const Buffer<real> image = make_waves({width, height, channels}, -1, 1, 23);
+  const Buffer<real> flow = off_grid(make_waves({width, height, 2}, -9, 9, 97), 64);
   Var x("x"), y("y"), c("c");
   Func u("u"), v("v"), warped("warped");
   u(x, y) = clamp(x + flow(x, y, 0), 0.0f, width - 1.0f);

@@ -58,10 +58,10 @@ Func pressure_of(const Func& divergence, int size) {
 
 Kernel fluid_step(const Setup& setup) {
   const int size = setup.size(256, 21);
-  const Buffer<float> velocity = make_waves({size, size, 2}, -3, 3, 31);
-  const Buffer<float> force = make_waves({size, size, 2}, -2, 2, 53);
-  const Buffer<float> density = make_values({size, size}, 0.5f, 1.5f);
-  const Buffer<float> target = make_waves({size, size}, 0.5f, 1.5f, 41);
+  const Buffer<real> velocity = make_waves({size, size, 2}, -3, 3, 31);
+  const Buffer<real> force = make_waves({size, size, 2}, -2, 2, 53);
+  const Buffer<real> density = make_values({size, size}, 0.5f, 1.5f);
+  const Buffer<real> target = make_waves({size, size}, 0.5f, 1.5f, 41);
   Var x("x"), y("y"), c("c");
   Func driven("driven"), moved("moved"), divergence("divergence"), place("place");
   driven(x, y, c) = velocity(x, y, c) + time_step * force(x, y, c);
@@ -78,7 +78,7 @@ Kernel fluid_step(const Setup& setup) {
   const Origin before = origin(x, y, final_x(x, y), final_y(x, y), size, end);
   carried(x, y) = bilinear(density, before.u, before.v, size, size, {});
   RDom r(0, size, 0, size);
-  loss() = 0.0f;
+  loss() = real(0);
   loss() += pow(carried(r.x, r.y) - target(r.x, r.y), 2);
   const double cells = static_cast<double>(size) * size;
   return gradients_of(setup, loss, {}, {velocity, force, density},

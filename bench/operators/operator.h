@@ -8,9 +8,9 @@
 namespace kernels {
 
 // Smooth along the first two dimensions: waves of about that length, in pixels, from low to high.
-inline Halide::Buffer<float> make_waves(const std::vector<int>& sizes, float low, float high,
-                                        float length) {
-  Halide::Buffer<float> waves(sizes);
+inline Halide::Buffer<real> make_waves(const std::vector<int>& sizes, float low, float high,
+                                       float length) {
+  Halide::Buffer<real> waves(sizes);
   for (size_t i = 0; i < waves.number_of_elements(); i++) {
     const size_t x = i % sizes[0], y = i / sizes[0] % sizes[1], c = i / sizes[0] / sizes[1];
     const double turn = 6.283185307179586 / length, phase = 2.4 * static_cast<double>(c);
@@ -24,8 +24,8 @@ inline Halide::Buffer<float> make_waves(const std::vector<int>& sizes, float low
 
 // Odd multiples of half a step of 1 / steps, of which float32 and float64 find the same neighbours:
 // at an integer the gradient by a place jumps.
-inline Halide::Buffer<float> off_grid(Halide::Buffer<float> values, float steps) {
-  values.for_each_value([=](float& v) { v = (std::floor(v * steps) + 0.5f) / steps; });
+inline Halide::Buffer<real> off_grid(Halide::Buffer<real> values, float steps) {
+  values.for_each_value([=](real& v) { v = (std::floor(v * steps) + 0.5f) / steps; });
   return values;
 }
 

@@ -4,13 +4,8 @@
     pytorch_worker.py OPERATOR eager|compiled|float64 THREADS INPUTS RANK SIZES... RANK SIZES...
 
 A worker as ../pairs/worker_protocol.h says, in PyTorch's eager mode or through torch.compile, on the
-inputs that a worker of the benchmark has saved. In float64 it is the reference:
-
-    driver  errors PATH    worker  errors LARGEST NORM LARGEST NORM...    for each output saved there
-
-LARGEST is the largest |a - b| / max(|b|, root mean square of b), NORM is |a - b| / |b|. Programs are
-what users of PyTorch write: the operators of torch.nn.functional where there is one, autograd for
-the gradients.
+inputs that a worker of the benchmark has saved. In float64 it is the reference. Programs are what users
+of PyTorch write: the operators of torch.nn.functional where there is one, autograd for the gradients.
 """
 import ctypes
 import gc
@@ -35,9 +30,132 @@ def program(by):
 
 # ---- the operators; dimensions are in the reverse order of the .cpp files ----
 
+def centres(size, kind):
+    """Of pixels from -1 to 1, as grid_sample counts them."""
+    return (torch.arange(size, dtype=kind) + 0.5) * (2 / size) - 1
+
+
+@program(by=3)
+def bilateral_slice(image, guide, grid):
+    _, height, width = image.shape
+    x = centres(width, image.dtype).expand(height, width)
+    y = centres(height, image.dtype)[:, None].expand(height, width)
+    places = torch.stack([x, y, guide * 2 - 1], -1)[None, None]
+    affine = F.grid_sample(grid.flatten(0, 1)[None], places, padding_mode="border",
+                           align_corners=False).view(3, 4, height, width)
+    return (affine[:, :3] * image).sum(1) + affine[:, 3]
+
+
+@program(by=2)
+def spatial_transformer(images, transforms):
+    places = F.affine_grid(transforms, images.shape, align_corners=False)
+    return F.grid_sample(images, places, align_corners=False)
+
+
+def moved(image, by):
+    """What stands where each pixel says, at most at the edge."""
+    _, height, width = image.shape
+    x = torch.arange(width, dtype=image.dtype) + by[0]
+    y = torch.arange(height, dtype=image.dtype)[:, None] + by[1]
+    places = torch.stack([x * (2 / (width - 1)) - 1, y * (2 / (height - 1)) - 1], -1)
+    return F.grid_sample(image[None], places[None], padding_mode="border", align_corners=True)[0]
+
+
+@program(by=2)
+def flow_warp(image, flow):
+    return moved(image, flow)
+
+
 @program(by=3)
 def conv2d(image, weights, bias):
     return F.conv2d(image, weights, bias, padding=1)
+
+
+@program(by=2)
+def gamma_mse(image, gamma, target):
+    return F.mse_loss(image ** gamma, target)
+
+
+@program(by=4)
+def deconvolution_step(image, kernel, weights, bank, blurred):
+    explained = F.conv2d(image[None, None], kernel[None, None], padding=5)[0, 0]
+    filtered = F.conv2d(image[None, None], bank[:, None], padding=1)[0]
+    return ((explained - blurred) ** 2).sum() + (weights * (filtered ** 2).sum((1, 2))).sum()
+
+
+def neighbours(image):
+    """East, west, south and north of each pixel."""
+    padded = F.pad(image[None], [1, 1, 1, 1], mode="replicate")[0]
+    return padded[:, 1:-1, 2:], padded[:, 1:-1, :-2], padded[:, 2:, 1:-1], padded[:, :-2, 1:-1]
+
+
+@program(by=3)
+def fluid_step(velocity, force, density, target):
+    driven = diffused = velocity + 0.5 * force
+    for _ in range(20):
+        diffused = (driven + 0.2 * sum(neighbours(diffused))) * (1 / (1 + 4 * 0.2))
+    carried = moved(diffused, -0.5 * diffused)
+    east, west, south, north = neighbours(carried)
+    divergence = 0.5 * ((east - west)[0:1] + (south - north)[1:2])
+    pressure = -0.25 * divergence
+    for _ in range(19):
+        pressure = 0.25 * (sum(neighbours(pressure)) - divergence)
+    east, west, south, north = neighbours(pressure)
+    final = carried - 0.5 * torch.cat([east - west, south - north])
+    return ((moved(density[None], -0.5 * final)[0] - target) ** 2).sum()
+
+
+@program(by=5)
+def separable_block(image, depthwise, depthwise_bias, pointwise, pointwise_bias):
+    channels = len(depthwise)
+    inner = F.relu(F.conv2d(image, depthwise[:, None], depthwise_bias, padding=1, groups=channels))
+    return F.relu(F.conv2d(inner, pointwise[:, :, None, None], pointwise_bias))
+
+
+@program(by=3)
+def attention(query, key, value):
+    return F.scaled_dot_product_attention(query[None], key[None], value[None], is_causal=True)[0]
+
+
+@program(by=1)
+def laplacian_loss(image, target):
+    taps = torch.tensor([1.0, 3.0, 3.0, 1.0], dtype=image.dtype) / 8
+    kernel = (taps[:, None] * taps)[None, None]
+    rest, loss = (image - target)[None, None], 0
+    for level in range(8):
+        detail = rest
+        if level < 7:
+            rest = F.conv2d(F.pad(rest, [1, 1, 1, 1], mode="replicate"), kernel, stride=2)
+            detail = detail - F.interpolate(rest, scale_factor=2, mode="bilinear")
+        loss = loss + 2 ** level * torch.sqrt(detail ** 2 + 1e-4).mean()
+    return loss
+
+
+@program(by=3)
+def bilateral_smoothing(values, confidence, strength):
+    state = values
+    weight = 1 / (confidence + 6 * strength)
+    for _ in range(30):
+        p = F.pad(state[None, None], [1] * 6, mode="replicate")[0, 0]
+        around = (p[1:-1, 1:-1, 2:] + p[1:-1, 1:-1, :-2] + p[1:-1, 2:, 1:-1] + p[1:-1, :-2, 1:-1] +
+                  p[2:, 1:-1, 1:-1] + p[:-2, 1:-1, 1:-1])
+        state = (confidence * values + strength * around) * weight
+    return state
+
+
+@program(by=2)
+def non_local_means(image, strength):
+    height, width = image.shape
+    padded = F.pad(image[None, None], [8] * 4, mode="replicate")[0, 0]  # 5 of the search, 3 of patches
+    weights = values = 0
+    for dy in range(11):
+        for dx in range(11):
+            difference = padded[5:-5, 5:-5] - padded[dy:dy + height + 6, dx:dx + width + 6]
+            distance = F.avg_pool2d((difference ** 2)[None], 7, 1)[0]
+            weight = torch.exp(-strength * distance)
+            weights = weights + weight
+            values = values + weight * padded[dy + 3:dy + 3 + height, dx + 3:dx + 3 + width]
+    return values / weights
 
 
 # ---- the worker ----
@@ -62,14 +180,6 @@ def shapes(numbers):
 def status_mb(field):
     with open("/proc/self/status", encoding="utf-8") as file:
         return next(int(line.split()[1]) / 1024 for line in file if line.startswith(field + ":"))
-
-
-def errors(a, b):
-    difference = np.abs(a.astype(np.float64) - b)
-    size = np.linalg.norm(b)
-    scale = size / np.sqrt(b.size)
-    largest = np.max(difference / np.maximum(np.maximum(np.abs(b), scale), np.finfo(float).tiny))
-    return largest, np.linalg.norm(difference) / max(size, np.finfo(float).tiny)
 
 
 class Worker:
@@ -104,10 +214,13 @@ class Worker:
         self.results = self.step()
         print("memory", max(peak, status_mb("VmHWM")), status_mb("VmHWM") - before, flush=True)
 
-    def errors(self, path):
-        pairs = zip(arrays(path), self.results)
-        each = (e for a, b in pairs for e in errors(a, b.detach().numpy().ravel()))
-        print("errors", *each, flush=True)
+    def save(self, path):
+        with open(path, "wb") as file:
+            for result in self.results:
+                values = result.numpy()
+                file.write(struct.pack("<iiq", 2, 8 * values.itemsize, values.size))
+                file.write(values.tobytes())
+        print("saved", flush=True)
 
 
 def main():
@@ -118,7 +231,7 @@ def main():
     print("ready", time.perf_counter() - start, 0, 0, 0, flush=True)
     for line in sys.stdin:
         order, *words = line.split()
-        {"run": worker.run, "memory": worker.memory, "errors": worker.errors}[order](*words)
+        {"run": worker.run, "memory": worker.memory, "save": worker.save}[order](*words)
 
 
 if __name__ == "__main__":

@@ -8,12 +8,13 @@ using namespace Halide;
 
 namespace {
 
-Buffer<float> make_transforms(int images) {
-  Buffer<float> transforms(3, 2, images);
+Buffer<real> make_transforms(int images) {
+  Buffer<real> transforms(3, 2, images);
   for (int n = 0; n < images; n++) {
     const float angle = 0.1f + 0.35f * n, scale = 0.9f + 0.07f * n;
-    const float rows[2][3] = {{scale * std::cos(angle), -scale * std::sin(angle), 0.05f * n},
-                              {scale * std::sin(angle), scale * std::cos(angle), -0.03f * n}};
+    const float rows[2][3] = {
+        {scale * std::cos(angle), -scale * std::sin(angle), 0.013f + 0.05f * n},
+        {scale * std::sin(angle), scale * std::cos(angle), 0.007f - 0.03f * n}};
     for (int row = 0; row < 2; row++) {
       for (int column = 0; column < 3; column++) transforms(column, row, n) = rows[row][column];
     }
@@ -26,8 +27,8 @@ Buffer<float> make_transforms(int images) {
 Kernel spatial_transformer(const Setup& setup) {
   const int width = setup.size(512, 25), height = setup.size(512, 19);
   const int channels = setup.size(16, 3), images = setup.size(4, 2);
-  const Buffer<float> input = make_waves({width, height, channels, images}, -1, 1, 23);
-  const Buffer<float> theta = make_transforms(images);
+  const Buffer<real> input = make_waves({width, height, channels, images}, -1, 1, 23);
+  const Buffer<real> theta = make_transforms(images);
   Var x("x"), y("y"), c("c"), n("n");
   Expr across = (2 * x + 1) * (1.0f / width) - 1, down = (2 * y + 1) * (1.0f / height) - 1;
   auto place = [&](int row, int size) -> Expr {  // pixels from -1/2 to size - 1/2 are -1 to 1
@@ -37,7 +38,7 @@ Kernel spatial_transformer(const Setup& setup) {
   Func u("u"), v("v"), transformed("transformed");
   u(x, y, n) = place(0, width);
   v(x, y, n) = place(1, height);
-  Func padded = BoundaryConditions::constant_exterior(input, 0.0f, {{0, width}, {0, height}});
+  Func padded = BoundaryConditions::constant_exterior(input, real(0), {{0, width}, {0, height}});
   Expr i = clamp(cast<int>(floor(u(x, y, n))), -2, width);
   Expr j = clamp(cast<int>(floor(v(x, y, n))), -2, height);
   Expr wx = u(x, y, n) - floor(u(x, y, n)), wy = v(x, y, n) - floor(v(x, y, n));
