@@ -10,10 +10,13 @@
 //
 // and (x < 62) ends the loop over x in turn. Gathers over domains that are no boxes, and where() of
 // a user's RDom, look like this. A condition that is the same in all iterations goes around the
-// loop.
+// loop. What fills memory that each iteration has anew may stand before the condition: it is for
+// what stands under it. So the last tile of a split with a guard computes no more of its producers
+// than it needs.
 //
 // Method: a loop is trimmed where all of its body stands under the condition (looking through lets,
-//         inner loops and further conditions without an else). Each conjunct is brought into the
+//         allocations, inner loops and further conditions without an else), but for what does
+//         nothing else than to fill those allocations. Each conjunct is brought into the
 //         form  c*v + rest >= 0  with a constant c, rest free of the loop's variable v and of
 //         what is bound inside the loop: then v >= -floor(rest / c), or v <= floor(rest / -c), says
 //         exactly the same, and the conjunct goes away. A conjunct without v and what is bound
@@ -43,6 +46,24 @@ namespace {
 // Constant extents up to this one are left alone.
 constexpr int64_t untrimmed_iterations = 16;
 
+// Whether it does nothing but fill memory of the names, and of its own.
+bool only_fills(const Stmt& s, std::unordered_set<std::string> own) {
+  const auto acts = [](const Expr& e) {
+    const auto* call = e.as<Call>();
+    return call &&
+           (call->call_type != CallType::Operator || op_info(call->op).cls == OpClass::Effect);
+  };
+  return !any_node(s, acts, [&](const Stmt& part) {
+    return match(
+        part, [&](const Allocate& n) { return own.insert(n.name), false; },
+        [&](const Store& n) { return !own.contains(n.name); },
+        [&](const Free& n) { return !own.contains(n.name); }, [](const Block&) { return false; },
+        [](const LetStmt&) { return false; }, [](const For&) { return false; },
+        [](const IfThenElse&) { return false; }, [](const ProducerConsumer&) { return false; },
+        [](const StmtNode&) { return true; });
+  });
+}
+
 bool may_end_elsewhere(const For& loop) {
   const auto extent = as_const_int(loop.extent);
   return !extent || *extent > untrimmed_iterations;
@@ -70,6 +91,20 @@ class Trimmer {
         [&](const For& n) {
           unusable_.insert(n.name);
           return with_body(s, n.body);
+        },
+        [&](const Allocate& n) {
+          own_.insert(n.name);
+          return with_body(s, n.body);
+        },
+        [&](const ProducerConsumer& n) { return with_body(s, n.body); },
+        [&](const Block& n) {
+          Stmt acting;
+          for (const Stmt& part : n.stmts) {
+            if (only_fills(part, own_)) continue;
+            if (acting.defined()) return s;
+            acting = part;
+          }
+          return acting.defined() ? with_body(s, acting) : s;
         },
         [&](const IfThenElse& n) {
           if (n.when_false.defined()) return s;
@@ -153,6 +188,7 @@ class Trimmer {
 
   const For& loop_;
   std::unordered_set<std::string> unusable_;
+  std::unordered_set<std::string> own_;  // memory that each iteration has anew
   Substitution lets_;
   std::vector<Expr> begins_, lasts_;  // the variable lies between them
   std::vector<Expr> around_;          // without the variable
