@@ -71,7 +71,7 @@ constexpr unsigned counting = 3;
 // The most that a loop without a loop in it, copied as often as it runs, may grow to. Loops over
 // the lanes of a vector of bytes, as borders have them, stay compact; those that store nothing, as
 // sums over the lanes of partial sums, may run as often: their operands become registers.
-constexpr unsigned most_unrolled = 160, few_iterations = 16, few_without_stores = 32;
+constexpr unsigned most_unrolled = 160, few_iterations = 16, few_without_stores = 64;
 
 static bool stores(const llvm::Loop& loop) {
   return llvm::any_of(loop.blocks(), [](const llvm::BasicBlock* block) {
