@@ -474,6 +474,25 @@ TEST(CodegenIdioms, LongFunctionsAreCutBetweenTheirLoops) {
   EXPECT_GE(count(code, ".loop0:"), 1u);
 }
 
+// A call and what is computed for it anew would be half the time of loops that may run once.
+TEST(CodegenIdioms, LoopsOfUnknownLengthInsideOfOthersAreNotCut) {
+  ImageParam in(Float(32), 3, "in"), filter(Float(32), 3, "filter");
+  Var c("c"), x("x"), xi("xi");
+  RDom k(0, 3, 0, 3, "k");
+  Func f("f"), sums[2];
+  for (Func& sum : sums) {
+    sum(c, x) += filter(c, k.x, k.y) * in(c, x + k.x, k.y);
+    sum.compute_at(f, x).vectorize(c, 8, TailStrategy::RoundUp);
+    sum.update().reorder(k.x, k.y, c, x).unroll(k.x).unroll(k.y);
+    sum.update().vectorize(c, 8, TailStrategy::RoundUp);
+  }
+  RDom channels(0, filter.width(), "channels");
+  f(x) += sums[0](channels, x) * sums[1](channels, x);
+  f.update().split(x, x, xi, 4).reorder(channels, xi, x).parallel(x);
+  for (Func& sum : sums) sum.compute_at(f, x);
+  EXPECT_EQ(count(assembly(f, avx2), ".loop0:"), 0u);
+}
+
 // The sums are registers while r runs: its loops stay beside what begins and ends them.
 TEST(CodegenIdioms, LoopsThatShareRegistersStayInOneFunction) {
   ImageParam in(Float(32), 2, "in");
