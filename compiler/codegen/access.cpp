@@ -96,14 +96,10 @@ static std::vector<Expr> pieces_of(const Expr& index) {
   return pieces;
 }
 
-static bool machine_gathers(const Machine& machine, Type type) {
-  return machine.has_gather() && (type.bits() == 32 || type.bits() == 64);
-}
-
 // Coordinates held inside of an image, and nothing that depends on data: what loop partitioning
 // leaves to the borders, which run seldom.
 FunctionGenerator::Coordinate FunctionGenerator::coordinate(const Expr& index) const {
-  Coordinate result{true, false};
+  Coordinate result{true, false, index};
   walk(index, [&](const Expr& e) {
     if (e.type().is_scalar() || !result.is_plain) return false;
     const auto* name = e.as<Variable>();
@@ -182,12 +178,10 @@ Value* FunctionGenerator::load_vector(const Storage& from, Type type, const Expr
     return load_apart(from, type, index64(ramp->base), index64(ramp->stride));
   const std::vector<Expr> pieces = pieces_of(index);
   const Coordinate at = coordinate(index);
-  if (pieces.empty() && at.is_plain && at.is_held && type.lanes() >= min_loop_lanes &&
-      !machine_gathers(e_.machine, type)) {
-    Value* indices = index_vector(index);
-    if (!predicate) return gather_in_loop(from, type, indices);
-    return where_any(type, indices, predicate,
-                     [&](Value* safe) { return gather_in_loop(from, type, safe); });
+  if (pieces.empty() && at.is_plain && at.is_held && type.lanes() >= min_loop_lanes) {
+    if (Value* loaded = load_held(from, type, index, predicate)) return loaded;
+    if (!e_.machine.gathers(type))
+      return gather_compactly(from, type, index_vector(index), predicate);
   }
   if (pieces.empty()) return gather(from, type, index_vector(index), predicate);
   std::vector<Value*> parts;
@@ -320,11 +314,11 @@ Value* FunctionGenerator::where_any(Type type, Value* indices, Value* predicate,
 }
 
 Value* FunctionGenerator::gather(const Storage& from, Type type, Value* indices, Value* predicate) {
-  if (predicate && !machine_gathers(e_.machine, type)) {
+  if (predicate && !e_.machine.gathers(type)) {
     return where_any(type, indices, predicate,
                      [&](Value* safe) { return gather(from, type, safe, nullptr); });
   }
-  if (predicate || (machine_gathers(e_.machine, type) && e_.machine.gathers_fast)) {
+  if (predicate || (e_.machine.gathers(type) && e_.machine.gathers_fast)) {
     if (!std::has_single_bit(unsigned(type.lanes()))) {
       Value* all = splat(e_, b_.getTrue(), type.lanes());
       return gather_filled_up(from, type, indices, predicate ? predicate : all);
@@ -368,6 +362,13 @@ Value* FunctionGenerator::gather_in_loop(const Storage& from, Type type, Value* 
   b_.SetInsertPoint(after);
   return from_memory(type,
                      b_.CreateAlignedLoad(with_lanes(element, type.lanes()), picked, aligned));
+}
+
+Value* FunctionGenerator::gather_compactly(const Storage& from, Type type, Value* indices,
+                                           Value* predicate) {
+  if (!predicate) return gather_in_loop(from, type, indices);
+  return where_any(type, indices, predicate,
+                   [&](Value* safe) { return gather_in_loop(from, type, safe); });
 }
 
 // Memory of the function for values that live in it for a moment; as large as the largest.
@@ -451,7 +452,7 @@ void FunctionGenerator::store_vector(const Storage& to, Type type, const Expr& i
 // In the order of the lanes, so that of equal indices the last lane stays.
 void FunctionGenerator::scatter(const Storage& to, Type type, Value* indices, Value* stored,
                                 Value* predicate) {
-  if (e_.machine.has_avx512() && machine_gathers(e_.machine, type)) {
+  if (e_.machine.has_avx512() && e_.machine.gathers(type)) {
     Value* mask = predicate ? predicate : splat(e_, b_.getTrue(), type.lanes());
     Value* pointers = element_pointer(to, type, indices);
     tagged(b_.CreateMaskedScatter(to_memory(type, stored), pointers, alignment_of(type), mask), to);

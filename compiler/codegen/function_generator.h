@@ -68,7 +68,9 @@ class FunctionGenerator {
   // What an index vector is made of: only sums, minima and maxima of ramps; some held by a bound.
   struct Coordinate {
     bool is_plain, is_held;
+    Expr index;
   };
+  static constexpr int most_coordinate_nodes = 64;  // larger ones are looked at as a whole
 
   struct LinearIndex {  // lane i is base + i * stride, the base a scalar
     Expr base;
@@ -184,6 +186,19 @@ class FunctionGenerator {
   Value* reduced_in_part(const ir::VectorReduce& e);
   Value* sum_of_products(const Expr& e);
 
+  // held_loads.cpp
+  std::optional<bool> climbs(const Expr& e, int& room) const;
+  Value* at_lane(const Expr& e, Value* lane);
+  Expr climbing_part(const Expr& e) const;
+  Value* load_held(const Storage& from, Type type, const Expr& index, Value* predicate);
+  Value* load_spread(const Storage& from, Type type, const Expr& index, int start,
+                     Value* predicate);
+  struct Ends {
+    Value *first, *last;
+  };
+  Ends ends_of(Value* predicate, int lanes);
+  Value* load_dense_or_gather(const Storage& from, Type type, const Expr& index, Value* predicate);
+
   // access.cpp
   std::optional<LinearIndex> as_linear(const Expr& index);
   Storage& storage(const std::string& name);
@@ -203,6 +218,7 @@ class FunctionGenerator {
   Value* gather_filled_up(const Storage& from, Type type, Value* indices, Value* mask);
   Coordinate coordinate(const Expr& index) const;
   Value* gather_in_loop(const Storage& from, Type type, Value* indices);
+  Value* gather_compactly(const Storage& from, Type type, Value* indices, Value* predicate);
   Value* scratch(size_t slot, llvm::Type* type);
   void make(const ir::Store& s);
   void store_scalar(const Storage& to, Type type, Value* index, Value* value, Value* predicate);

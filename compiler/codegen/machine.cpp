@@ -28,6 +28,10 @@ bool has_skylake(const Target& t) {
   return has_any(t, {F::AVX512_Skylake, F::AVX512_Cannonlake, F::AVX512_SapphireRapids});
 }
 
+bool has_cannonlake(const Target& t) {
+  return has_any(t, {F::AVX512_Cannonlake, F::AVX512_SapphireRapids});
+}
+
 std::string x86_features(const Target& t) {
   std::string text = "+sse2";
   const auto add = [&](bool has, const char* names) {
@@ -43,7 +47,7 @@ std::string x86_features(const Target& t) {
   add(avx2, "+avx2,+popcnt,+lzcnt,+bmi,+bmi2");
   add(avx512, "+avx512f,+avx512cd");
   add(has_skylake(t), "+avx512vl,+avx512bw,+avx512dq");
-  add(has_any(t, {F::AVX512_Cannonlake, F::AVX512_SapphireRapids}), "+avx512ifma,+avx512vbmi");
+  add(has_cannonlake(t), "+avx512ifma,+avx512vbmi");
   add(t.has_feature(F::AVX512_SapphireRapids),
       "+avx512vnni,+avx512vbmi2,+avx512bitalg,+avx512vpopcntdq");
   return text;
@@ -85,6 +89,10 @@ bool Machine::has_avx512() const {
   return is_x86() && (has_any(target, {F::AVX512}) || has_skylake(target));
 }
 bool Machine::has_avx512_words() const { return is_x86() && has_skylake(target); }
+bool Machine::has_avx512_bytes() const { return is_x86() && has_cannonlake(target); }
+bool Machine::gathers(Type type) const {
+  return has_avx2() && (type.bits() == 32 || type.bits() == 64);
+}
 bool Machine::has_avx2() const { return has_avx512() || (is_x86() && target.has_feature(F::AVX2)); }
 bool Machine::has_fma() const {
   return !is_x86() || has_avx512() || (target.has_feature(F::FMA) && target.has_feature(F::AVX2));

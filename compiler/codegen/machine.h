@@ -27,8 +27,10 @@ struct Machine {
   bool has_fma() const;       // as the vector math sees it: FMA with AVX2, or AArch64
   bool has_rounding() const;  // of floats to whole numbers, as an instruction
   bool has_f16c() const;      // half to float conversion as an instruction
-  bool has_gather() const { return has_avx2(); }
   bool has_avx512_words() const;  // AVX-512 of integers of 8 and 16 bits (BW)
+  bool has_avx512_bytes() const;  // shuffles of bytes by numbers (VBMI)
+  // Whether it has an instruction for loads from anywhere.
+  bool gathers(Type type) const;
 
   // Lanes of the widest vector math function for floats of `bits`.
   int max_math_lanes(int bits) const;

@@ -38,6 +38,20 @@ std::vector<Shape> shapes(int lanes, Expr base) {
                             binary(Kind::Mod, binary(Kind::Mul, ramp(1), make_broadcast(3, lanes)),
                                    make_broadcast(11, lanes))),
                     [](int i) { return (3 * i) % 11; }});
+  // Held inside of an image, as at its borders: from the third lane on, up to it, between the two.
+  const auto held = [&](int low, int high) {
+    const auto bound = [&](int to) { return make_broadcast(base + to, lanes); };
+    const Expr inside = binary(Kind::Max, binary(Kind::Min, ramp(1), bound(high)), bound(low));
+    const Expr row = make_broadcast(base * 3, lanes);
+    result.push_back({text("held in ", low, " to ", high),
+                      binary(Kind::Sub, binary(Kind::Add, inside, row), row),
+                      [=](int i) { return std::max(std::min(i, high), low); }});
+  };
+  held(2, lanes);
+  held(-1, 2);
+  held(1, lanes - 2);
+  held(lanes, lanes + 1);
+  held(-1, lanes);
   if (lanes % 2 == 0) {
     const int half = lanes / 2;
     const auto nested = [&](int inner, int outer) {
@@ -52,11 +66,15 @@ std::vector<Shape> shapes(int lanes, Expr base) {
 }
 
 struct Span {
-  int64_t low = 0, high = 0;
+  int64_t low, high;
 };
-Span span_of(const Shape& shape, int lanes) {
-  Span span;
+bool is_on(int lane) { return lane % 3 != 1; }
+
+// Of the lanes that are on.
+Span span_of(const Shape& shape, int lanes, bool masked) {
+  Span span{shape.at(0), shape.at(0)};
   for (int i = 0; i < lanes; i++) {
+    if (masked && !is_on(i)) continue;
     span.low = std::min(span.low, shape.at(i));
     span.high = std::max(span.high, shape.at(i));
   }
@@ -70,7 +88,6 @@ Scalar nth_value(Type type, int64_t n) {
 
 // A mask with lanes on and off, loaded so that no pass can see through it.
 Expr mask_of(int lanes) { return make_load(Bool(lanes), "mask", make_ramp(0, 1, lanes)); }
-bool is_on(int lane) { return lane % 3 != 1; }
 
 void fill_mask(Array& mask) {
   for (size_t i = 0; i < mask.size(); i++) mask.set(i, Scalar::of_bool(is_on(static_cast<int>(i))));
@@ -78,7 +95,7 @@ void fill_mask(Array& mask) {
 
 void check_load(const Shape& shape, Type type, int lanes, bool masked, const Target& target,
                 Array::Guard guard) {
-  const Span span = span_of(shape, lanes);
+  const Span span = span_of(shape, lanes, masked);
   LoweredFunction f;
   f.name = "loads";
   f.args = {input("in", type), input("mask", Bool()), output("out", type),
@@ -104,7 +121,7 @@ void check_load(const Shape& shape, Type type, int lanes, bool masked, const Tar
 
 void check_store(const Shape& shape, Type type, int lanes, bool masked, const Target& target,
                  Array::Guard guard) {
-  const Span span = span_of(shape, lanes);
+  const Span span = span_of(shape, lanes, masked);
   LoweredFunction f;
   f.name = "stores";
   f.args = {input("in", type), input("mask", Bool()), output("out", type),
@@ -139,7 +156,7 @@ struct Setup {
 
 std::vector<Setup> setups() {
   std::vector<Setup> result;
-  for (int lanes : {2, 3, 8, 20}) result.push_back({test_target(), lanes});
+  for (int lanes : {2, 3, 8, 20, 32}) result.push_back({test_target(), lanes});
   if (test_target().arch == Target::X86) result.push_back({Target("x86-64-linux"), 5});
   return result;
 }

@@ -366,6 +366,29 @@ TEST(CodegenIdioms, BordersOfBytesAreCompact) {
   EXPECT_EQ(count(assembly(f, avx2), "vpinsrb"), 0u);
 }
 
+// What bounds hold inside of an image lies within one vector of memory, wherever the border is.
+TEST(CodegenIdioms, HeldCoordinatesAreLoadedDensely) {
+  const auto code_for = [](Type type, int lanes, const std::string& target) {
+    ImageParam in(type, 1, "in");
+    Var x("x");
+    Func f("f");
+    f(x) = in(clamp(x - 3, 0, in.width() - 1));
+    f.vectorize(x, lanes, TailStrategy::RoundUp);
+    return assembly(f, target);
+  };
+  const std::string cannonlake = std::string(avx512) + "-avx512_cannonlake";
+  EXPECT_GE(count(code_for(UInt(8), 64, cannonlake), "vpermb"), 1u);
+  EXPECT_EQ(count(code_for(UInt(8), 64, cannonlake), "vpinsrb"), 0u);
+  EXPECT_GE(count(code_for(Int(16), 32, avx512), "vpermw"), 1u);
+  EXPECT_GE(count(code_for(Float(32), 16, avx512), "vpermd"), 1u);
+  EXPECT_EQ(count(code_for(Float(32), 16, avx512), "gather"), 0u);
+  EXPECT_GE(count(code_for(Float(32), 8, avx2), "vpermd"), 1u);
+  EXPECT_GE(
+      count(code_for(UInt(8), 32, avx2), "vmovups") + count(code_for(UInt(8), 32, avx2), "vmovdqu"),
+      1u)
+      << "where no lane is held";
+}
+
 // What a scan computed in the iteration before is not read back from memory.
 TEST(CodegenIdioms, ScansCarryTheirLastValueInARegister) {
   ImageParam in(Float(32), 1, "in");
