@@ -159,6 +159,11 @@ std::string one_line(std::string text) {
   return text;
 }
 
+int tell_failure(const char* what) {
+  std::cout << "failed " << one_line(what) << std::endl;
+  return 1;
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -173,8 +178,9 @@ int main(int argc, char** argv) {
                   argc > 4 ? argv[4] : "");
     worker.compile();
     serve(worker);
+  } catch (const Halide::Error& error) {  // a std::exception in some versions of Halide only
+    return tell_failure(error.what());
   } catch (const std::exception& error) {
-    std::cout << "failed " << one_line(error.what()) << std::endl;
-    return 1;
+    return tell_failure(error.what());
   }
 }
