@@ -17,6 +17,7 @@ import json
 import os
 import re
 import selectors
+import signal
 import statistics
 import struct
 import subprocess
@@ -33,7 +34,7 @@ PYTORCH = "torch==2.13.0"
 SCHEDULES = ["Adams2019", "Li2018", "Mullapudi2016", "root"]  # of Halide
 SEARCH_SECONDS = 60  # for a schedule of Halide's, compilation included
 RUN_SECONDS = 240  # for one run of a worker, and for torch.compile
-PEER_SECONDS = 8  # for all rounds of a worker that is slow; it runs at least thrice
+PEER_SECONDS = 8  # for all rounds of a worker that is slow; it runs at least once
 
 
 def operator_names():
@@ -119,7 +120,7 @@ class Worker:
         self.times.append(self.ask("run", "ran")[0] * 1e3)
 
     def has_enough(self):
-        return self.failure or len(self.times) >= 3 and sum(self.times) > PEER_SECONDS * 1e3
+        return self.failure or sum(self.times) > PEER_SECONDS * 1e3
 
     def median(self):
         return statistics.median(self.times) if self.times and not self.failure else None
@@ -199,7 +200,8 @@ def start_workers(name, options, scratch):
 
 
 def run_in_turn(workers, rounds):
-    """The first run of a process makes its threads and touches its memory: it does not count."""
+    """The first run of a process makes its threads and touches its memory: it counts only when there
+    is no time for another."""
     for at in range(-1, rounds):
         for i in range(len(workers)):
             worker = workers[(i + at) % len(workers)]
@@ -208,7 +210,7 @@ def run_in_turn(workers, rounds):
             time.sleep(0.001)  # threads of the one before keep looking for work for a moment
             try:
                 worker.run()
-                if at < 0:
+                if at < 0 and not worker.has_enough():
                     worker.times.clear()
             except Failed:
                 pass  # it says why in the report
@@ -287,8 +289,11 @@ def measure(name, options, machine):
     with tempfile.TemporaryDirectory(dir=options.scratch) as scratch:
         workers, reference = start_workers(name, options, scratch)
         try:
-            run_in_turn(workers, options.rounds)
-            errors = compare(workers, reference, options, scratch)
+            try:
+                run_in_turn(workers, options.rounds)
+                errors = compare(workers, reference, options, scratch)
+            except KeyboardInterrupt:  # what has been timed stays
+                options.interrupted, errors = True, {}
             return figures(name, workers, errors, machine, scratch)
         finally:
             for worker in workers:
@@ -337,7 +342,8 @@ def read_options():
     options.rounds = options.rounds or (5 if options.quick else 15)
     options.kinds = {"none": [], "all": ["halide", "pytorch"]}.get(options.peers, [options.peers])
     options.scratch = os.path.dirname(os.path.abspath(options.output))
-    options.halide_worker = None
+    options.halide_worker, options.interrupted = None, False
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
     return options
 
 
@@ -365,6 +371,8 @@ def main():
         write(options.output, report)  # an interrupted run keeps what it has
         print(line(row), flush=True)
         wrong |= is_wrong(row)
+        if options.interrupted:
+            break
     print("report:", options.output)
     sys.exit(1 if wrong else 0)
 
