@@ -56,16 +56,6 @@ class GeneratorInputBase : public GeneratorPort {
   std::vector<InputValue> values_;
 };
 
-template <typename Handle>
-Handle handle_of(const InputValue& value) {
-  if constexpr (std::is_same_v<Handle, ImageParam>)
-    return ImageParam(value.parameter);
-  else if constexpr (std::is_same_v<Handle, Func>)
-    return value.func;
-  else
-    return value.expr;
-}
-
 template <typename T>
 class InputElements : public GeneratorInputBase {
  protected:
@@ -78,7 +68,14 @@ class InputElements : public GeneratorInputBase {
             IsArrayIO<T>) {}
   void values_changed() override {
     handles_.clear();
-    for (const InputValue& value : values()) handles_.push_back(handle_of<Handle>(value));
+    for (const InputValue& value : values()) {
+      if constexpr (std::is_same_v<Handle, ImageParam>)
+        handles_.push_back(ImageParam(value.parameter));
+      else if constexpr (std::is_same_v<Handle, Func>)
+        handles_.push_back(value.func);
+      else
+        handles_.push_back(value.expr);
+    }
   }
   const std::vector<Handle>& handles() const {
     check_ready();

@@ -3,29 +3,19 @@
 
 #include <HalideRuntime.h>
 
+#include <bit>
 #include <cmath>
 #include <cstring>
 #include <sstream>
 
 #include "diagnostics/error.h"
+#include "frontend/data/buffer.h"
 
 namespace retrograde::oracle {
 
 using ir::Scalar;
 
 namespace {
-
-template <typename T>
-T get(const void* at) {
-  T value;
-  std::memcpy(&value, at, sizeof(T));
-  return value;
-}
-
-template <typename T>
-void put(void* at, T value) {
-  std::memcpy(at, &value, sizeof(T));
-}
 
 uint8_t* address_of(const halide_buffer_t& buffer, const std::vector<int>& point) {
   int64_t offset = 0;
@@ -44,15 +34,11 @@ bool matches(const Value& expected, const Scalar& actual, double slack) {
 }
 
 std::string show(const Scalar& value) {
+  if (!value.type.is_float())
+    return value.type.is_int() ? std::to_string(value.i) : std::to_string(value.u);
   std::ostringstream out;
   out.precision(17);
-  if (value.type.is_float()) {
-    out << value.f;
-  } else if (value.type.is_int()) {
-    out << value.i;
-  } else {
-    out << value.u;
-  }
+  out << value.f;
   return out.str();
 }
 
@@ -96,32 +82,7 @@ size_t Array::index_of(const std::vector<int>& point) const {
   return index;
 }
 
-void Array::copy_to(halide_buffer_t& buffer) const {
-  const Region target = region_of(buffer);
-  region.for_each([&](const std::vector<int>& point) {
-    for (int d = 0; d < target.dimensions(); ++d) {
-      if (point[d] < target.mins[d] || point[d] >= target.mins[d] + target.extents[d]) return;
-    }
-    const Value& value = at(point);
-    if (!value.is_undef()) write_element(buffer, point, value.scalar);
-  });
-}
-
-Type type_of_buffer(const halide_buffer_t& buffer) {
-  const int bits = buffer.type.bits;
-  switch (buffer.type.code) {
-    case halide_type_int:
-      return Int(bits);
-    case halide_type_uint:
-      return UInt(bits);
-    case halide_type_float:
-      return Float(bits);
-    case halide_type_bfloat:
-      return BFloat(bits);
-    default:
-      return Handle();
-  }
-}
+Type type_of_buffer(const halide_buffer_t& buffer) { return from_halide_type(buffer.type); }
 
 Region region_of(const halide_buffer_t& buffer) {
   Region region;
@@ -134,51 +95,31 @@ Region region_of(const halide_buffer_t& buffer) {
 
 Scalar read_element(const halide_buffer_t& buffer, const std::vector<int>& point) {
   const Type type = type_of_buffer(buffer);
-  const void* at = address_of(buffer, point);
-  if (type.is_float()) {
-    if (type.is_bfloat()) {
-      return Scalar::of_float(type, double(bfloat16_t::make_from_bits(get<uint16_t>(at))));
-    }
-    if (type.bits() == 16) {
-      return Scalar::of_float(type, double(float16_t::make_from_bits(get<uint16_t>(at))));
-    }
-    return Scalar::of_float(type, type.bits() == 32 ? get<float>(at) : get<double>(at));
-  }
-  switch (type.bytes()) {
-    case 1:
-      return type.is_int() ? Scalar::of_int(type, get<int8_t>(at))
-                           : Scalar::of_uint(type, get<uint8_t>(at));
-    case 2:
-      return type.is_int() ? Scalar::of_int(type, get<int16_t>(at))
-                           : Scalar::of_uint(type, get<uint16_t>(at));
-    case 4:
-      return type.is_int() ? Scalar::of_int(type, get<int32_t>(at))
-                           : Scalar::of_uint(type, get<uint32_t>(at));
-    default:
-      return type.is_int() ? Scalar::of_int(type, get<int64_t>(at))
-                           : Scalar::of_uint(type, get<uint64_t>(at));
-  }
+  uint64_t bits = 0;
+  std::memcpy(&bits, address_of(buffer, point), static_cast<size_t>(type.bytes()));
+  if (type.is_bfloat())
+    return Scalar::of_float(type, double(bfloat16_t::make_from_bits(static_cast<uint16_t>(bits))));
+  if (type.is_float() && type.bits() == 16)
+    return Scalar::of_float(type, double(float16_t::make_from_bits(static_cast<uint16_t>(bits))));
+  if (type.is_float() && type.bits() == 32)
+    return Scalar::of_float(type, std::bit_cast<float>(static_cast<uint32_t>(bits)));
+  if (type.is_float()) return Scalar::of_float(type, std::bit_cast<double>(bits));
+  const int unused = 64 - 8 * type.bytes();
+  return type.is_int() ? Scalar::of_int(type, static_cast<int64_t>(bits << unused) >> unused)
+                       : Scalar::of_uint(type, bits);
 }
 
 void write_element(halide_buffer_t& buffer, const std::vector<int>& point, const Scalar& value) {
   const Type type = type_of_buffer(buffer);
-  void* at = address_of(buffer, point);
+  uint64_t bits = value.u;
   if (type.is_float()) {
     const double x = value.as_double();
-    if (type.is_bfloat()) return put(at, bfloat16_t(x).bits);
-    if (type.bits() == 16) return put(at, float16_t(x).bits);
-    return type.bits() == 32 ? put(at, static_cast<float>(x)) : put(at, x);
+    bits = type.is_bfloat()    ? bfloat16_t(x).bits
+           : type.bits() == 16 ? float16_t(x).bits
+           : type.bits() == 32 ? std::bit_cast<uint32_t>(static_cast<float>(x))
+                               : std::bit_cast<uint64_t>(x);
   }
-  switch (type.bytes()) {
-    case 1:
-      return put(at, static_cast<uint8_t>(value.u));
-    case 2:
-      return put(at, static_cast<uint16_t>(value.u));
-    case 4:
-      return put(at, static_cast<uint32_t>(value.u));
-    default:
-      return put(at, value.u);
-  }
+  std::memcpy(address_of(buffer, point), &bits, static_cast<size_t>(type.bytes()));
 }
 
 Comparison compare(const Array& expected, const halide_buffer_t& actual, double slack) {

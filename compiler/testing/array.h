@@ -30,8 +30,6 @@ struct Array {
   size_t index_of(const std::vector<int>& point) const;
   const Value& at(const std::vector<int>& point) const { return values[index_of(point)]; }
   Value& at(const std::vector<int>& point) { return values[index_of(point)]; }
-  // Writes the values into a host buffer of the same type, where the regions overlap.
-  void copy_to(halide_buffer_t& buffer) const;
 };
 
 // One element of a host buffer of any type and layout.

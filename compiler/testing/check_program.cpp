@@ -6,7 +6,7 @@
 
 #include "diagnostics/error.h"
 #include "frontend/run/pipeline.h"
-#include "testing/build_pipeline.h"
+#include "testing/interpreter.h"
 
 namespace retrograde::fuzz {
 
@@ -20,7 +20,9 @@ struct GuardedOutput {
   Runtime::Buffer<> whole, inner;  // of the same memory
 };
 
-GuardedOutput make_output(Type type, const OutputSpec& output) {
+using Regions = std::vector<oracle::Region>;  // of each output
+
+GuardedOutput make_output(Type type, const oracle::Region& output) {
   std::vector<int> mins, extents;
   for (size_t d = 0; d < output.mins.size(); ++d) {
     mins.push_back(output.mins[d] - margin);
@@ -37,14 +39,14 @@ GuardedOutput make_output(Type type, const OutputSpec& output) {
   return result;
 }
 
-bool is_intact(const GuardedOutput& output, const OutputSpec& spec) {
+bool is_intact(const GuardedOutput& output, const oracle::Region& region) {
   const halide_buffer_t& raw = *output.whole.raw_buffer();
   bool intact = true;
   oracle::region_of(raw).for_each([&](const std::vector<int>& point) {
     bool inside = true;
     int64_t offset = 0;
     for (size_t d = 0; d < point.size(); ++d) {
-      inside &= point[d] >= spec.mins[d] && point[d] < spec.mins[d] + spec.extents[d];
+      inside &= point[d] >= region.mins[d] && point[d] < region.mins[d] + region.extents[d];
       offset += static_cast<int64_t>(point[d] - raw.dim[d].min) * raw.dim[d].stride;
     }
     if (inside) return;
@@ -56,13 +58,13 @@ bool is_intact(const GuardedOutput& output, const OutputSpec& spec) {
 }
 
 // One for each value of each output.
-std::vector<GuardedOutput> run(Pipeline& compiled, const std::vector<OutputSpec>& regions,
-                               const BuiltPipeline& built, const Target& target) {
+std::vector<GuardedOutput> run(Pipeline& compiled, const Regions& regions,
+                               const RandomProgram& program, const Target& target) {
   std::vector<GuardedOutput> outputs;
   std::vector<Buffer<>> buffers;
-  for (const OutputSpec& output : regions) {
-    for (const Type& type : built.funcs[output.func].output_types()) {
-      outputs.push_back(make_output(type, output));
+  for (size_t o = 0; o < regions.size(); ++o) {
+    for (const Type& type : program.outputs[o].types()) {
+      outputs.push_back(make_output(type, regions[o]));
       buffers.push_back(Buffer<>(outputs.back().inner));
     }
   }
@@ -70,80 +72,58 @@ std::vector<GuardedOutput> run(Pipeline& compiled, const std::vector<OutputSpec>
   return outputs;
 }
 
-std::string describe(const OutputSpec& output, int value) {
+std::string describe(const Func& f, int value, const oracle::Region& over) {
   std::string region;
-  for (size_t d = 0; d < output.mins.size(); ++d) {
-    region += text(d ? ", " : "", "[", output.mins[d], " + ", output.extents[d], "]");
-  }
-  return text("f", output.func, "[", value, "] over ", region);
+  for (size_t d = 0; d < over.mins.size(); ++d)
+    region += text(d ? ", " : "", "[", over.mins[d], " + ", over.extents[d], "]");
+  return text(f.name(), "[", value, "] over ", region);
 }
 
-void compare_outputs(const std::vector<OutputSpec>& regions, const BuiltPipeline& built,
-                     const std::vector<GuardedOutput>& actual, Outcome& outcome) {
-  const auto expected = interpret(regions, built, oracle::Rounding::Contraction);
+void compare_outputs(const Regions& regions, const RandomProgram& program,
+                     const std::vector<GuardedOutput>& actual, Judged& judged) {
+  oracle::Interpreter interpreter({.rounding = oracle::Rounding::Contraction});
+  const auto expected = interpreter.realize(outputs_of(program), regions);
   size_t value = 0;
-  for (const OutputSpec& output : regions) {
-    for (int v = 0; v < built.funcs[output.func].outputs(); ++v, ++value) {
+  for (size_t o = 0; o < regions.size(); ++o) {
+    for (int v = 0; v < program.outputs[o].outputs(); ++v, ++value) {
       const auto comparison = oracle::compare(expected[value], *actual[value].inner.raw_buffer());
-      outcome.compared += comparison.compared;
-      outcome.unstable += comparison.unstable;
-      const std::string where = describe(output, v);
+      judged.counts["values"] += comparison.compared;
+      judged.counts["unstable"] += comparison.unstable;
+      const std::string where = describe(program.outputs[o], v, regions[o]);
       if (!comparison.agrees()) {
-        outcome.verdict = Verdict::Differs;
-        outcome.detail += text(where, ": ", comparison.mismatches, " of ", comparison.compared,
-                               " differ, first ", comparison.first_mismatch, "\n");
+        judged.judgement = Judgement::Wrong;
+        judged.detail += text("differs in ", where, ": ", comparison.mismatches, " of ",
+                              comparison.compared, ", first ", comparison.first_mismatch, "\n");
       }
-      if (!is_intact(actual[value], output)) {
-        outcome.verdict = Verdict::Differs;
-        outcome.detail += where + ": stores outside of the output\n";
+      if (!is_intact(actual[value], regions[o])) {
+        judged.judgement = Judgement::Wrong;
+        judged.detail += "stores outside of " + where + "\n";
       }
     }
   }
-}
-
-Pipeline outputs_of(const PipelineSpec& pipeline, const BuiltPipeline& built) {
-  std::vector<Func> funcs;
-  for (const OutputSpec& output : pipeline.outputs) funcs.push_back(built.funcs[output.func]);
-  return Pipeline(funcs);
 }
 
 int ignore_event(void*, const halide_trace_event_t*) { return 0; }
 
 }  // namespace
 
-const char* verdict_name(Verdict verdict) {
-  switch (verdict) {
-    case Verdict::Agrees:
-      return "agrees";
-    case Verdict::Differs:
-      return "differs";
-    case Verdict::Refused:
-      return "is refused";
-    case Verdict::Broken:
-      break;
-  }
-  return "breaks the compiler";
-}
-
-Outcome check_program(const PipelineSpec& pipeline, const ScheduleLog& schedule,
-                      const Target& target) {
-  Outcome outcome;
+Judged check_program(const RandomProgram& program, const ScheduleLog& schedule,
+                     const Target& target) {
+  Judged judged;
   try {
-    const BuiltPipeline built = build(pipeline);
-    apply(schedule, built);
-    Pipeline compiled = outputs_of(pipeline, built);
+    apply(schedule, program);
+    Pipeline compiled(program.outputs);
     compiled.set_custom_trace(ignore_event);
-    for (const std::vector<OutputSpec>& regions : all_runs(pipeline)) {
-      compare_outputs(regions, built, run(compiled, regions, built, target), outcome);
-    }
+    for (const Regions& regions : program.runs)
+      compare_outputs(regions, program, run(compiled, regions, program, target), judged);
   } catch (const UserError& error) {
-    outcome = {Verdict::Refused, error.what()};
+    judged = {Judgement::Refused, error.what()};
   } catch (const Unsupported& error) {
-    outcome = {Verdict::Refused, error.what()};
+    judged = {Judgement::Refused, error.what()};
   } catch (const std::exception& error) {
-    outcome = {Verdict::Broken, std::string(error.what()).substr(0, longest_detail)};
+    judged = {Judgement::Broken, std::string(error.what()).substr(0, longest_detail)};
   }
-  return outcome;
+  return judged;
 }
 
 }  // namespace retrograde::fuzz

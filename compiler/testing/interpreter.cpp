@@ -128,9 +128,6 @@ class Interpreter::Impl {
   explicit Impl(InterpreterOptions options) : options_(options) {}
 
   InterpreterOptions options_;
-  std::map<const ir::Symbol*, Scalar> scalars_;
-  std::map<const ir::Symbol*, const halide_buffer_t*> buffers_;
-  std::map<std::string, ExternFunction> externs_;
   std::map<const ir::Symbol*, Hull> touched_;
   uint64_t operations_ = 0;
 
@@ -424,7 +421,8 @@ class Interpreter::Impl {
       case Step::Code::ImageCall:
         return image_call(frame, step);
       case Step::Code::ExternCall:
-        return extern_call(frame, step);
+        unsupported("interpret a call of " + quoted(step.name),
+                    "a value is computed by operators, not by C functions");
       case Step::Code::Text:
         break;
     }
@@ -506,21 +504,15 @@ class Interpreter::Impl {
 
   Value parameter(const Step& step) {
     const ParameterContents& p = parameter_of(step);
-    const auto bound = scalars_.find(&p);
-    if (bound == scalars_.end() && !p.value) {
+    if (!p.value)
       call_error("interpret with parameter " + quoted(p.name), "every parameter needs a value");
-    }
-    return apply_cast(Rounding::Strict, step.type,
-                      {bound != scalars_.end() ? bound->second : *p.value});
+    return apply_cast(Rounding::Strict, step.type, {*p.value});
   }
 
   const halide_buffer_t& buffer_of(const ParameterContents& p) const {
-    const auto bound = buffers_.find(&p);
-    const halide_buffer_t* buffer = bound != buffers_.end() ? bound->second : p.buffer;
-    if (!buffer || !buffer->host) {
+    if (!p.buffer || !p.buffer->host)
       call_error("interpret with image " + quoted(p.name), "every image needs a host buffer");
-    }
-    return *buffer;
+    return *p.buffer;
   }
 
   Value buffer_fact(const Step& step) {
@@ -566,37 +558,11 @@ class Interpreter::Impl {
     return stable ? value : Value::unstable(value.scalar);
   }
 
-  Value extern_call(Frame& frame, const Step& step) {
-    const auto it = externs_.find(step.name);
-    if (it == externs_.end()) {
-      unsupported("interpret a call of " + quoted(step.name),
-                  "the interpreter knows C functions by Interpreter::define_extern only");
-    }
-    ++operations_;
-    std::vector<Scalar> args;
-    for (const Value& arg : children(frame, step)) args.push_back(arg.scalar);
-    return apply_cast(Rounding::Strict, step.type, {it->second(args)});
-  }
-
   std::unordered_map<const FuncContents*, std::unique_ptr<FuncState>> states_;
 };
 
 Interpreter::Interpreter(InterpreterOptions options) : impl_(std::make_unique<Impl>(options)) {}
 Interpreter::~Interpreter() = default;
-Interpreter::Interpreter(Interpreter&&) noexcept = default;
-Interpreter& Interpreter::operator=(Interpreter&&) noexcept = default;
-
-void Interpreter::bind(const ParameterContents& parameter, const Scalar& value) {
-  impl_->scalars_[&parameter] = value;
-}
-
-void Interpreter::bind(const ParameterContents& parameter, const halide_buffer_t* buffer) {
-  impl_->buffers_[&parameter] = buffer;
-}
-
-void Interpreter::define_extern(const std::string& name, ExternFunction function) {
-  impl_->externs_[name] = std::move(function);
-}
 
 std::vector<Array> Interpreter::realize(const FuncPtr& func, const Region& region) {
   return realize(std::vector<FuncPtr>{func}, std::vector<Region>{region});
@@ -608,8 +574,6 @@ std::vector<Array> Interpreter::realize(const std::vector<FuncPtr>& funcs,
   run_on_large_stack([&] { result = impl_->realize(funcs, regions); });
   return result;
 }
-
-uint64_t Interpreter::operations() const { return impl_->operations_; }
 
 Region Interpreter::touched(const ParameterContents& image) const {
   const auto it = impl_->touched_.find(&image);

@@ -2,7 +2,6 @@
 // schedules, bounds inference or lowering.
 //
 //   Interpreter interpreter;
-//   interpreter.bind(*image, buffer);            // else what the parameter is bound to already
 //   std::vector<Array> out = interpreter.realize(func, {{0, 0}, {64, 48}});
 //
 // Order: the pure definition, then the updates in turn, each over its reduction domain with the
@@ -15,7 +14,6 @@
 #pragma once
 
 #include <cstdint>
-#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -36,15 +34,6 @@ class Interpreter {
  public:
   explicit Interpreter(InterpreterOptions options = {});
   ~Interpreter();
-  Interpreter(Interpreter&&) noexcept;
-  Interpreter& operator=(Interpreter&&) noexcept;
-
-  // These take precedence over the value or buffer that the parameter itself holds.
-  void bind(const ir::ParameterContents& parameter, const ir::Scalar& value);
-  void bind(const ir::ParameterContents& parameter, const halide_buffer_t* buffer);
-  // The meaning of a call of the C function `name`.
-  using ExternFunction = std::function<ir::Scalar(const std::vector<ir::Scalar>&)>;
-  void define_extern(const std::string& name, ExternFunction function);
 
   // One Array for each value of the Func. RuntimeError: an image read outside of its bounds, an
   // unbound parameter, a require that fails.
@@ -52,8 +41,6 @@ class Interpreter {
   std::vector<Array> realize(const std::vector<ir::FuncPtr>& funcs,
                              const std::vector<Region>& regions);
 
-  // Arithmetic evaluated so far: binary operators, casts, selects, other operators.
-  uint64_t operations() const;
   // The smallest box around the elements of an image that were read so far; no extents when none.
   Region touched(const ir::ParameterContents& image) const;
 

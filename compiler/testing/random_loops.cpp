@@ -1,9 +1,7 @@
 // Kept legal by construction:
-// - reduction loops keep their order and run one iteration after the other,
-// unless the iterations
+// - reduction loops keep their order and run one iteration after the other, unless the iterations
 //   are independent or the update is associative and atomic;
-// - outputs are rounded up or shifted inwards only where the extents of all
-// runs allow it;
+// - outputs are rounded up or shifted inwards only where the extents of all runs allow it;
 // - a loop inside a vectorized one has a constant extent.
 #include "testing/random_loops.h"
 
@@ -26,7 +24,7 @@ constexpr int max_lanes = 64;
 class LoopScheduler {
  public:
   LoopScheduler(Loops loops, const StageContext& context, const Selector& selector,
-                ScheduleLog::Entry place, Random& random, LoopNames& names, ScheduleLog& log)
+                ScheduleLog::Entry place, Choices& random, LoopNames& names, ScheduleLog& log)
       : loops_(std::move(loops)),
         context_(context),
         selector_(selector),
@@ -35,8 +33,8 @@ class LoopScheduler {
         names_(names),
         log_(log) {}
 
-  StageLoops run() {
-    if (loops_.empty()) return {{loops_}};
+  LoopVariants run() {
+    if (loops_.empty()) return {loops_};
     if (random_.chance(5)) rename();
     const int splits = random_.below(4);
     for (int i = 0; i < splits; ++i) split(random_.below(static_cast<int>(loops_.size())));
@@ -49,7 +47,7 @@ class LoopScheduler {
     if (random_.chance(8)) partition();
     if (has_failing_specialization_) add(ir::SpecializeFail{"no specialization fits"});
     variants_.insert(variants_.begin(), loops_);
-    return {variants_};
+    return variants_;
   }
 
  private:
@@ -276,7 +274,7 @@ class LoopScheduler {
   const StageContext& context_;
   const Selector& selector_;
   const ScheduleLog::Entry place_;
-  Random& random_;
+  Choices& random_;
   LoopNames& names_;
   ScheduleLog& log_;
   std::vector<Loops> variants_;  // of the specializations
@@ -336,9 +334,9 @@ bool is_associative_update(const ir::FuncContents& f, int stage) {
   });
 }
 
-StageLoops schedule_loops(Loops loops, const StageContext& context, const Selector& selector,
-                          const ScheduleLog::Entry& place, Random& random, LoopNames& names,
-                          ScheduleLog& log) {
+LoopVariants schedule_loops(Loops loops, const StageContext& context, const Selector& selector,
+                            const ScheduleLog::Entry& place, Choices& random, LoopNames& names,
+                            ScheduleLog& log) {
   return LoopScheduler(std::move(loops), context, selector, place, random, names, log).run();
 }
 

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "graph/schedule_log.h"
-#include "testing/random_pipeline.h"
+#include "testing/choices.h"
 
 namespace retrograde::fuzz {
 
@@ -31,11 +31,8 @@ struct StageContext {
   bool may_specialize = true;
 };
 
-// The loops that the schedule of a stage has in the end: the general ones, then those of each
-// specialization.
-struct StageLoops {
-  std::vector<Loops> variants;
-};
+// The loops of a stage in the end: the general ones, then those of each specialization.
+using LoopVariants = std::vector<Loops>;
 
 // The loops that a stage has now.
 Loops loops_of(const ir::FuncContents& f, int stage);
@@ -45,12 +42,9 @@ Loops loops_of(const ir::FuncContents& f, int stage);
 bool is_associative_update(const ir::FuncContents& f, int stage);
 
 // Fresh names for loops.
-class LoopNames {
- public:
-  std::string fresh(const std::string& stem) { return stem + std::to_string(++count_); }
-
- private:
-  int count_ = 0;
+struct LoopNames {
+  int count = 0;
+  std::string fresh(const std::string& stem) { return stem + std::to_string(++count); }
 };
 
 // What the conditions of specializations compare with, and its value.
@@ -60,8 +54,8 @@ struct Selector {
 };
 
 // Draws directives for the place, which has these loops, and appends them to the log.
-StageLoops schedule_loops(Loops loops, const StageContext& context, const Selector& selector,
-                          const ScheduleLog::Entry& place, Random& random, LoopNames& names,
-                          ScheduleLog& log);
+LoopVariants schedule_loops(Loops loops, const StageContext& context, const Selector& selector,
+                            const ScheduleLog::Entry& place, Choices& random, LoopNames& names,
+                            ScheduleLog& log);
 
 }  // namespace retrograde::fuzz

@@ -1,12 +1,9 @@
 // Consumers are scheduled before their producers, so that a producer can choose among their loops.
 //
 // Kept legal by construction:
-// - a Func is computed at a loop only when all of its uses, through inlined
-// Funcs too, are inside
-//   of it, and neither that loop nor one around it is vectorized; with
-//   specializations, in each;
-// - between the storage level and the compute level no loop is parallel or
-// vectorized;
+// - a Func is computed at a loop only when all of its uses, through inlined Funcs too, are inside of
+//   it, and neither that loop nor one around it is vectorized; with specializations, in each;
+// - between the storage level and the compute level no loop is parallel or vectorized;
 // - what is known of sizes is said only of outputs, whose sizes are known.
 #include "testing/random_schedule.h"
 
@@ -16,6 +13,7 @@
 
 #include "diagnostics/error.h"
 #include "frontend/data/param.h"
+#include "graph/copy_graph.h"
 #include "graph/directive_names.h"
 #include "graph/names.h"
 #include "graph/wrappers.h"
@@ -52,7 +50,7 @@ struct Companion {
 
 class Scheduler {
  public:
-  Scheduler(const PipelineSpec& pipeline, uint64_t seed) : pipeline_(pipeline), random_(seed + 77) {
+  Scheduler(const RandomProgram& program, Choices& choices) : program_(program), random_(choices) {
     Param<int> selector("selector");
     selector_.value = random_.below(3);
     selector.set(selector_.value);
@@ -80,18 +78,18 @@ class Scheduler {
   // Those that the outputs need, with the Funcs of boundary conditions and inline reductions left
   // out: those stand for what they read.
   void find_funcs() {
-    const BuiltPipeline built = build(pipeline_);
-    apply(log_, built);
-    std::vector<ir::FuncPtr> outputs;
-    for (const OutputSpec& output : pipeline_.outputs)
-      outputs.push_back(built.funcs[output.func].function());
-    compiled_ = ir::apply_wrappers(outputs);
+    const ir::GraphCopy copy = ir::copy_graph(outputs_of(program_));
+    ir::apply_log(log_, copy.outputs);
+    compiled_ = ir::apply_wrappers(copy.outputs);
     std::set<std::string> known;
-    for (const Func& f : built.funcs) known.insert(name_of(*f.function()));
+    for (const Func& f : program_.funcs) known.insert(name_of(*f.function()));
     for (const ScheduleLog::Entry& entry : log_.entries) known.insert(ir::made_by(entry.directive));
     funcs_.clear();
-    for (const ir::FuncPtr& f : ir::topological_order(compiled_)) {
-      if (known.count(name_of(*f))) funcs_.push_back(f);
+    std::map<std::string, int> alike;  // a log cannot tell them apart
+    const std::vector<ir::FuncPtr> all = ir::topological_order(compiled_);
+    for (const ir::FuncPtr& f : all) ++alike[name_of(*f)];
+    for (const ir::FuncPtr& f : all) {
+      if (known.count(name_of(*f)) && alike[name_of(*f)] == 1) funcs_.push_back(f);
     }
   }
 
@@ -236,10 +234,10 @@ class Scheduler {
   void schedule_stage(int f, int stage) {
     const Loops loops = loops_of(func(f), stage);
     if (stage == 0 && is_shared(f)) {
-      loops_[f][stage].variants = {shared_loops_};
+      loops_[f][stage] = {shared_loops_};
       for (ir::Directive& directive : std::vector(shared_directives_)) add(f, directive, 0);
     } else if (is_inlined(f)) {
-      loops_[f][stage].variants = {loops};
+      loops_[f][stage] = {loops};
     } else {
       loops_[f][stage] = schedule_loops(loops, context_of(f, stage), selector_,
                                         {name(f), stage, {}, {}}, random_, names_, log_);
@@ -253,20 +251,19 @@ class Scheduler {
     context.may_specialize = !is_shared(f);
     if (!is_output(f)) return context;
     context.output_extents.resize(dimensions(f));
-    for (const OutputSpec& output : regions_of(f)) {
+    for (const oracle::Region& region : regions_of(f)) {
       for (int d = 0; d < dimensions(f); ++d)
-        context.output_extents[d].push_back(output.extents[d]);
+        context.output_extents[d].push_back(region.extents[d]);
     }
     return context;
   }
 
   // Those of an output, over all runs.
-  std::vector<OutputSpec> regions_of(int f) const {
-    std::vector<OutputSpec> regions;
-    for (const auto& run : all_runs(pipeline_)) {
-      for (const OutputSpec& output : run) {
-        if ("f" + std::to_string(output.func) == name(f)) regions.push_back(output);
-      }
+  std::vector<oracle::Region> regions_of(int f) const {
+    std::vector<oracle::Region> regions;
+    for (size_t o = 0; o < program_.outputs.size(); ++o) {
+      if (name_of(*program_.outputs[o].function()) != name(f)) continue;
+      for (const auto& run : program_.runs) regions.push_back(run[o]);
     }
     return regions;
   }
@@ -286,7 +283,7 @@ class Scheduler {
 
   void prefetch(int f, int stage, const std::string& source) {
     std::vector<std::string> candidates;
-    for (const Loop& loop : loops_[f][stage].variants[0]) {
+    for (const Loop& loop : loops_[f][stage][0]) {
       if (loop.type == ForType::Serial || loop.type == ForType::Parallel)
         candidates.push_back(loop.name);
     }
@@ -395,7 +392,7 @@ class Scheduler {
   std::vector<Level> levels_around(int f, int stage) const {
     std::vector<Level> levels;
     const Companion* shared = stage == 0 ? companion_of_guest(f) : nullptr;
-    for (const Loop& loop : loops_[f][stage].variants[0]) {
+    for (const Loop& loop : loops_[f][stage][0]) {
       if (shared && loop.name == shared->loop) return with_shared_loops(*shared, levels);
       levels.push_back({f, stage, loop.name});
     }
@@ -427,7 +424,7 @@ class Scheduler {
   // Whether something may be computed there, in each of the stage's schedules.
   bool is_legal_level(const Level& level) const {
     if (!is_unique(level)) return false;
-    for (const Loops& loops : loops_[level.func][level.stage].variants) {
+    for (const Loops& loops : loops_[level.func][level.stage]) {
       bool found = false, vectorized = false;
       for (const Loop& loop : loops) {
         found |= loop.name == level.name;
@@ -442,7 +439,7 @@ class Scheduler {
   bool is_unique(const Level& level) const {
     for (int s = 0; s < stages(level.func); ++s) {
       if (s == level.stage) continue;
-      for (const Loops& loops : loops_[level.func][s].variants) {
+      for (const Loops& loops : loops_[level.func][s]) {
         for (const Loop& loop : loops) {
           if (loop.name == level.name) return false;
         }
@@ -503,7 +500,7 @@ class Scheduler {
 
   // Specializations may order loops in other ways: then not known.
   bool runs_in_order(const Level& level) const {
-    const std::vector<Loops>& variants = loops_[level.func][level.stage].variants;
+    const std::vector<Loops>& variants = loops_[level.func][level.stage];
     if (variants.size() > 1) return false;
     return std::all_of(variants[0].begin(), variants[0].end(), [&](const Loop& loop) {
       return loop.name != level.name || loop.type == ForType::Serial ||
@@ -513,12 +510,20 @@ class Scheduler {
 
   // ---- storage and sizes ----
 
+  // What they hold is no part of a memoized Func's key.
+  bool reads_image_parameters() const {
+    const auto parameters = ir::parameters_of({funcs_.begin(), funcs_.end()});
+    return std::any_of(parameters.begin(), parameters.end(),
+                       [](const auto& p) { return p->is_buffer && !p->is_literal; });
+  }
+
   std::string random_dimension(int f) { return random_.pick(func(f).args); }
 
   void choose_storage(int f) {
     if (random_.chance(10)) add(f, ir::StoreIn{MemoryType::Heap});
     const bool stored_outside = placements_[f].stored_outside;
-    const bool memoized = !stored_outside && random_.chance(8) && !is_shared(f);
+    const bool memoized =
+        !stored_outside && random_.chance(8) && !is_shared(f) && !reads_image_parameters();
     if (memoized) add(f, ir::Memoize{});
     if (!memoized && random_.chance(8) && !is_shared(f)) add(f, ir::Async{});
     if (dimensions(f) == 0) return;
@@ -550,7 +555,7 @@ class Scheduler {
 
   // Promises about an output hold for each region that it is computed over.
   void choose_output_rules(int f) {
-    const std::vector<OutputSpec> regions = regions_of(f);
+    const std::vector<oracle::Region> regions = regions_of(f);
     if (regions.size() > 1 || !random_.chance(25)) return;
     for (int d = 0; d < dimensions(f); ++d)
       add(f, promise(func(f).args[d], regions[0].mins[d], regions[0].extents[d]));
@@ -566,14 +571,13 @@ class Scheduler {
     return ir::BoundDimension{dimension, {}, extent};
   }
 
-  const PipelineSpec& pipeline_;
-  Random random_;
+  const RandomProgram& program_;
+  Choices& random_;
   LoopNames names_;
   ScheduleLog log_;
   Selector selector_;
-  std::vector<ir::FuncPtr> compiled_,
-      funcs_;  // the outputs; all, producers first
-  std::vector<std::vector<StageLoops>> loops_;
+  std::vector<ir::FuncPtr> compiled_, funcs_;  // the outputs; all, producers first
+  std::vector<std::vector<LoopVariants>> loops_;
   std::vector<std::set<Site>> sites_;
   std::vector<Placement> placements_;
   std::vector<Companion> companions_;
@@ -584,30 +588,8 @@ class Scheduler {
 
 }  // namespace
 
-ScheduleLog random_schedule(const PipelineSpec& pipeline, uint64_t seed) {
-  return Scheduler(pipeline, seed).run();
-}
-
-std::vector<std::shared_ptr<ir::ParameterContents>> parameters_of(const ScheduleLog& log) {
-  std::vector<std::shared_ptr<ir::ParameterContents>> found;
-  const auto look = [&](Expr& root) {
-    if (!root.defined()) return;
-    ir::walk(root, [&](const Expr& e) {
-      const ir::Variable* v = e.as<ir::Variable>();
-      if (!v) return true;
-      const auto p = std::dynamic_pointer_cast<ir::ParameterContents>(v->symbol.lock());
-      if (p && std::find(found.begin(), found.end(), p) == found.end()) found.push_back(p);
-      return true;
-    });
-  };
-  for (ScheduleLog::Entry entry : log.entries) ir::visit_names(entry.directive, look);
-  return found;
-}
-
-void apply(const ScheduleLog& log, const BuiltPipeline& built) {
-  std::vector<ir::FuncPtr> funcs;
-  for (const Func& f : built.funcs) funcs.push_back(f.function());
-  ir::apply_log(log, funcs);
+ScheduleLog random_schedule(const RandomProgram& program, Choices& choices) {
+  return Scheduler(program, choices).run();
 }
 
 }  // namespace retrograde::fuzz

@@ -3,18 +3,17 @@
 #pragma once
 
 #include "graph/schedule_log.h"
-#include "testing/build_pipeline.h"
+#include "testing/programs/program.h"
 
 namespace retrograde::fuzz {
 
 // Names are those of the Funcs without the numbers that the process gives them: f0, r.x. What
-// specializations compare with is a Param of the log's own.
-ScheduleLog random_schedule(const PipelineSpec& pipeline, uint64_t seed);
+// specializations compare with is a Param of the log's own. The program stays as it is.
+ScheduleLog random_schedule(const RandomProgram& program, Choices& choices);
 
-// The Params that only a log reads.
-std::vector<std::shared_ptr<ir::ParameterContents>> parameters_of(const ScheduleLog& log);
-
-// Gives it to the Funcs of a pipeline, outputs or not.
-void apply(const ScheduleLog& log, const BuiltPipeline& built);
+// Gives it to the Funcs of a program.
+inline void apply(const ScheduleLog& log, const RandomProgram& program) {
+  ir::apply_log(log, outputs_of(program));
+}
 
 }  // namespace retrograde::fuzz

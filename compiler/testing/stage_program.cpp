@@ -9,7 +9,6 @@
 
 namespace retrograde::oracle {
 
-using ir::Kind;
 using ir::Op;
 
 namespace {

@@ -17,7 +17,6 @@
 #include "graph/graph.h"
 #include "support/errors.h"
 #include "support/same_numbers.h"
-#include "testing/build_pipeline.h"
 #include "testing/random_schedule.h"
 
 namespace retrograde {
@@ -287,13 +286,11 @@ TEST(ScheduleLogs, SayWhatIsWrong) {
 TEST(ScheduleLogs, RandomSchedulesAreReplayed) {
   for (uint64_t seed = 1; seed <= 150; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
-    const fuzz::PipelineSpec pipeline = fuzz::random_pipeline(seed);
-    const fuzz::BuiltPipeline built = fuzz::build(pipeline);
-    std::vector<ir::FuncPtr> outputs;
-    for (const fuzz::OutputSpec& output : pipeline.outputs)
-      outputs.push_back(built.funcs[output.func].function());
+    fuzz::Choices choices(seed);
+    const auto program = fuzz::make_program(choices, fuzz::Style::pipelines());
+    const std::vector<ir::FuncPtr> outputs = fuzz::outputs_of(program);
     const ir::Graph fresh = ir::parse_graph(ir::to_text(ir::graph_of(outputs)));
-    fuzz::apply(fuzz::random_schedule(pipeline, seed), built);
+    fuzz::apply(fuzz::random_schedule(program, choices), program);
     const ScheduleLog log = ir::schedule_log(outputs);
     SCOPED_TRACE(log.to_text());
     EXPECT_EQ(ScheduleLog::parse(log.to_text()), log);

@@ -119,9 +119,9 @@ class CustomExternStages : public ::testing::Test {
           to_adj(i) = 2.0f * in(i)*c.adjoint()(i) + c.adjoint()(i - 1) / 2.0f;
           return Contributions{{in, to_in}, {out_adj, to_adj}};
         },
-        [=](const AdjointInput&, const Region& r) -> Region {
+        ExternReads([](const AdjointInput&, const Region& r) -> Region {
           return {{r[0].min, r[0].extent + 1}};
-        });
+        }));
   }
   Func weighed(const Func& f) {
     Func loss("loss");

@@ -302,6 +302,7 @@ TEST(Definitions, LoopsAreReductionVariablesInsidePureOnes) {
   f(x, y) += r.x * r.y;
   EXPECT_EQ(Stage(f).dump_argument_list(), "x, y");
   EXPECT_EQ(f.update().dump_argument_list(), r.x.name() + ", " + r.y.name() + ", x, y");
+  EXPECT_EQ(r.x.domain(), r.domain());
 }
 
 TEST(Definitions, RandomNumbersDependOnThePoint) {

@@ -7,7 +7,6 @@
 #include "diagnostics/error.h"
 #include "graph/graph.h"
 #include "support/errors.h"
-#include "testing/build_pipeline.h"
 #include "testing/random_schedule.h"
 
 namespace retrograde {
@@ -130,13 +129,10 @@ TEST(GraphText, ExternStagesAndRequirementsAreItsText) {
 TEST(GraphText, RandomPipelinesUnderRandomSchedulesAreTheirText) {
   for (uint64_t seed = 1; seed <= 150; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
-    const fuzz::PipelineSpec pipeline = fuzz::random_pipeline(seed);
-    const fuzz::BuiltPipeline built = fuzz::build(pipeline);
-    fuzz::apply(fuzz::random_schedule(pipeline, seed), built);
-    std::vector<ir::FuncPtr> outputs;
-    for (const fuzz::OutputSpec& output : pipeline.outputs)
-      outputs.push_back(built.funcs[output.func].function());
-    expect_round_trip(outputs);
+    fuzz::Choices choices(seed);
+    const auto program = fuzz::make_program(choices, fuzz::Style::pipelines());
+    fuzz::apply(fuzz::random_schedule(program, choices), program);
+    expect_round_trip(fuzz::outputs_of(program));
     if (HasFailure()) return;
   }
 }

@@ -41,10 +41,10 @@ Judged judge_of_equal(const std::function<Expr(const Buffer<float>&)>& value, fl
   image.fill(element);
   p.images.push_back(image);
   p.scale.set(1.0f);
-  p.region = {{0}, {natural_size}};
+  p.runs = {{{{0}, {natural_size}}}};
   Func out("out");
   out(x) = value(image) * p.scale;
-  p.funcs = {out};
+  p.outputs = p.funcs = {out};
   return judge(p, 1, false);
 }
 
@@ -100,7 +100,7 @@ TEST(AdversaryChoices, ShrinkToTheSmallestListThatFails) {
   const auto has_large_pair = [](const std::vector<uint32_t>& l) {
     return l.size() >= 2 && l[0] >= 5 && l[1] >= 7;
   };
-  EXPECT_EQ(shrink_choices(list, has_large_pair), (std::vector<uint32_t>{5, 7}));
+  EXPECT_EQ(fuzz::shrink_choices(list, has_large_pair), (std::vector<uint32_t>{5, 7}));
 }
 
 // A sanitizer ends a process by an exit code, which is no result.

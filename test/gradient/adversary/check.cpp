@@ -18,35 +18,37 @@ constexpr size_t longest_detail = 600;  // internal errors carry whole programs
 class Judge {
  public:
   Judge(const AdversaryProgram& program, const AdversaryProgram* twin, uint64_t seed,
-        bool machine_code, unsigned& checked)
+        bool machine_code, std::map<std::string, uint64_t>& counts)
       : p_(program),
         twin_(twin),
         s_{program, Weights(seed)},
         machine_code_(machine_code),
-        checked_(checked) {}
+        counts_(counts) {}
 
   void run() {
     for (int k = 0; k < p_.output().outputs(); ++k)
-      s_.w.push_back(s_.weights.over(p_.region, "w" + std::to_string(k)));
-    s_.seed = p_.checks.wild ? reading_inside(s_.w, p_.region, std::nanf("")) : reading(s_.w, "w");
+      s_.w.push_back(s_.weights.over(p_.region(), "w" + std::to_string(k)));
+    s_.seed =
+        p_.checks.wild ? reading_inside(s_.w, p_.region(), std::nanf("")) : reading(s_.w, "w");
     v_.emplace(p_, s_.weights, "v");
     at_rest_ = primal("it");
     if (!std::isfinite(at_rest_)) decide(Judgement::Illegal, "its value is not finite");
     differentiate();
     compare(forward(v_->directions()), reverse_, "along the inputs");
-    if (!p_.only_inputs && p_.checks.along) compare_along_func();
+    if (!p_.only_inputs && !p_.has_rule) compare_along_func();
     const bool is_smooth = compare_with_differences();
     if (p_.checks.order > 1 && !s_.is_late()) {
       compare_higher(s_, *v_, *derivative_);
-      checked_ |= HigherOrders;
+      ++counts_["with higher derivatives"];
     }
     if (p_.checks.dense && !s_.is_late()) {
       compare_dense(s_);
-      checked_ |= DenseMatrices;
+      ++counts_["with dense matrices"];
     }
     if (machine_code_) {
-      checked_ |= MachineCode;
-      compare_machine_code(s_, *derivative_, gradients_, twin_);
+      ++counts_["as machine code"];
+      counts_["gradients scheduled"] +=
+          static_cast<uint64_t>(compare_machine_code(s_, *derivative_, gradients_, twin_));
     }
     if (!is_smooth) decide(Judgement::Kink, "");
   }
@@ -57,7 +59,7 @@ class Judge {
   // sum w * output in double. A program that cannot be evaluated is not legal.
   double primal(const char* what) {
     try {
-      const Product sum = weighted(interpret(p_.output(), p_.region), p_.region, s_.w);
+      const Product sum = weighted(interpret(p_.output(), p_.region()), p_.region(), s_.w);
       s_.largest = std::max(s_.largest, sum.magnitude);
       return sum.sum;
     } catch (const InternalError&) {
@@ -101,7 +103,7 @@ class Judge {
 
   double forward(const std::vector<Direction>& directions) {
     const Func t = propagate_tangents(p_.output(), directions)(p_.output());
-    return t.defined() ? weighted(evaluate(t, p_.region), p_.region, s_.w).sum : 0;
+    return t.defined() ? weighted(evaluate(t, p_.region()), p_.region(), s_.w).sum : 0;
   }
   void compare(double jv, const Product& jtw, const std::string& where) {
     const double slack = 1e-11 * (jtw.magnitude + std::abs(jv) + 1 + s_.largest);
@@ -194,7 +196,7 @@ class Judge {
   const AdversaryProgram* twin_;
   Subject s_;
   const bool machine_code_;
-  unsigned& checked_;
+  std::map<std::string, uint64_t>& counts_;
   std::optional<Motion> v_;
   double at_rest_ = 0;
   std::optional<Derivative> derivative_;
@@ -221,29 +223,23 @@ Judged guard(const F& f) {
 
 }  // namespace
 
-const char* name_of(Judgement judgement) {
-  static const char* const names[] = {"is right",   "is at a kink", "is refused",
-                                      "is illegal", "is wrong",     "breaks the compiler"};
-  return names[static_cast<int>(judgement)];
-}
-
 Judged judge(const AdversaryProgram& program, uint64_t seed, bool machine_code,
              const AdversaryProgram* twin) {
-  unsigned checked = 0;
+  std::map<std::string, uint64_t> counts;
   Judged result = guard([&] {
-    Judge(program, twin, seed, machine_code, checked).run();
+    Judge(program, twin, seed, machine_code, counts).run();
     return Judged{};
   });
-  result.checked = checked;
+  result.counts = counts;
   return result;
 }
 
 Judged judge(Choices& choices, bool machine_code) {
   std::optional<AdversaryProgram> program, twin;
   Judged made = guard([&] {
-    program.emplace(make_program(choices));
+    program.emplace(make_adversary(choices));
     Choices again(choices.taken());
-    if (machine_code && program->checks.stage) twin.emplace(make_program(again, true));
+    if (machine_code && program->has_stage) twin.emplace(make_adversary(again, true));
     return Judged{};
   });
   if (made.judgement == Judgement::Refused) made.judgement = Judgement::Illegal;

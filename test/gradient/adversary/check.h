@@ -1,31 +1,13 @@
 // The oracle of one program: its gradient is right, or it is refused.
 #pragma once
 
-#include <string>
-
 #include "gradient/adversary/program.h"
+#include "testing/judgement.h"
 
 namespace retrograde::gradient {
 
-enum class Judgement : uint8_t {
-  Right,    // against central differences, and forward against reverse
-  Kink,     // no differences at a kink or a jump; forward agrees with reverse
-  Refused,  // UserError or Unsupported
-  Illegal,  // the program itself is refused, or its value is not finite
-  Wrong,    // the gradient is
-  Broken,   // InternalError or another exception
-};
-
-// What was done beside the gradient, one bit each.
-enum Checked : unsigned { HigherOrders = 1, DenseMatrices = 2, MachineCode = 4 };
-
-struct Judged {
-  Judgement judgement = Judgement::Right;
-  std::string detail;
-  unsigned checked = 0;  // bits of Checked
-};
-
-const char* name_of(Judgement judgement);
+using fuzz::Judged;
+using fuzz::Judgement;
 
 // Differences: of sum w * output along a random direction of all inputs, in double by the
 // interpreter, of sixth order in the step, with the differences between one-sided and two-sided
@@ -34,6 +16,7 @@ const char* name_of(Judgement judgement);
 // the gradient. Jacobians and Hessians: one product for each column. Machine code, when asked for:
 // the gradients in their declared types, within the rounding that the interpreter allows for, with
 // and without a schedule, and the same bits on any number of threads.
+// Right: against differences, and forward against reverse. Counts: what was done beside that.
 // twin: null, or the same program with an extern stage, whose gradients run as machine code.
 Judged judge(const AdversaryProgram& program, uint64_t seed, bool machine_code,
              const AdversaryProgram* twin = nullptr);

@@ -39,7 +39,7 @@ class Dense {
     const auto dense = [&](Compression c) {
       return jacobian(output, input_, s_.bounds(), {.compression = c}).dense();
     };
-    compare("Jacobian", dense(Compression::Auto), column, s_.program.region);
+    compare("Jacobian", dense(Compression::Auto), column, s_.program.region());
     for (Compression forced : {Compression::Columns, Compression::Rows}) {
       Func matrix;
       try {
@@ -49,7 +49,7 @@ class Dense {
       } catch (const Unsupported&) {
         continue;
       }
-      compare("Jacobian by force", matrix, column, s_.program.region);
+      compare("Jacobian by force", matrix, column, s_.program.region());
     }
   }
 

@@ -4,8 +4,6 @@
 
 #include <cmath>
 
-#include "gradient/adversary/maker.h"
-
 namespace {
 
 bool is_query(const halide_buffer_t* b) { return !b->host && !b->device; }
@@ -42,17 +40,10 @@ extern "C" __attribute__((visibility("default"))) int adversary_sine(halide_buff
 
 namespace retrograde::gradient {
 
-void define_sine(const Func& f, const Func& source, bool as_extern) {
-  const std::vector<Var> vars = first_variables(source.dimensions());
-  if (!as_extern) {
-    std::vector<Expr> values;
-    for (int k = 0; k < source.outputs(); ++k) values.push_back(sin(source(vars).element(k)));
-    f(vars) = Tuple(values);
-    return;
-  }
+void define_sine(Func f, const Func& source) {
   Func(source).compute_root();
-  Func(f).define_extern("adversary_sine", {source}, Float(32), vars);
-  Func(f).compute_root();
+  f.define_extern("adversary_sine", {source}, Float(32), Func(source).args());
+  f.compute_root();
 }
 
 }  // namespace retrograde::gradient

@@ -5,7 +5,7 @@
 
 namespace retrograde::gradient {
 
-// f = sin(source) by a C function when `as_extern`, else as a definition.
-void define_sine(const Func& f, const Func& source, bool as_extern);
+// f = sin(source), by a C function.
+void define_sine(Func f, const Func& source);
 
 }  // namespace retrograde::gradient

@@ -41,7 +41,7 @@ class Higher {
   Func tangent_twice() const { return along(tangent(), u_.directions()); }
   Product weighted_output(const Func& f) const {
     if (!f.defined()) return {};
-    return weighted(evaluate(f, s_.program.region), s_.program.region, s_.w);
+    return weighted(evaluate(f, s_.program.region()), s_.program.region(), s_.w);
   }
   Product adjoint_of_tangent() const {
     const Derivative d = propagate_adjoints(tangent(), s_.seed, s_.bounds(), s_.options());
@@ -76,7 +76,7 @@ class Higher {
                                   ", tangents of adjoints ", b.sum));
   }
   void compare_with_differences() const {
-    if (!s_.program.checks.higher) return;
+    if (s_.program.stops_gradients) return;
     const auto moved = [&](double by) {
       u_.move(by);
       const Product result = v_.along([&](const AdjointInput& x) { return d_.of(x); });

@@ -8,10 +8,11 @@
 #include "diagnostics/error.h"
 #include "frontend/data/realization.h"
 #include "gradient/adversary/probe.h"
-#include "gradient/adversary/schedules.h"
+#include "graph/copy_graph.h"
 #include "ir/visit.h"
 #include "support/own_threads.h"
 #include "testing/interpreter.h"
+#include "testing/random_schedule.h"
 
 namespace retrograde::gradient {
 
@@ -71,17 +72,23 @@ class Compiled {
     return true;
   }
 
-  void compare_scheduled(const Derivative& derivative) {
+  // How many of them have machine code under a schedule of their own.
+  int compare_scheduled(const Derivative& derivative) {
     std::vector<Func> funcs = derivative.funcs();
     if (s_.program.checks.primal)
       funcs.insert(funcs.begin(), s_.program.funcs.begin(), s_.program.funcs.end());
-    schedule_at_random(funcs, static_cast<uint64_t>(s_.program.checks.schedule));
+    int compared = 0;
     for (size_t i = 0; i < gradients_.size(); ++i) {
+      if (!gradients_[i].first.defined()) continue;
+      Choices choices(static_cast<uint64_t>(s_.program.checks.schedule) + i);
       try {
-        if (gradients_[i].first.defined()) compare(i, ", scheduled");
+        compare(i, scheduled(gradients_[i], funcs, choices), ", scheduled");
+        ++compared;
       } catch (const UserError&) {  // of the schedule
+      } catch (const Unsupported&) {
       }
     }
+    return compared;
   }
 
   // The same gradients of the same program with an extern stage in it.
@@ -102,12 +109,31 @@ class Compiled {
     try {
       Func output = s_.program.output();
       std::vector<Buffer<>> results;
-      for (const Type& t : output.types()) results.push_back(room_for(t, s_.program.region));
+      for (const Type& t : output.types()) results.push_back(room_for(t, s_.program.region()));
       output.realize(Realization(results));
       return true;
     } catch (const UserError&) {
       return false;
     }
+  }
+
+  // A copy of the gradient, with a schedule for those of the Funcs that it is made of.
+  static Func scheduled(const std::pair<Func, oracle::Region>& gradient,
+                        const std::vector<Func>& funcs, Choices& choices) {
+    const ir::GraphCopy copy = ir::copy_graph({gradient.first.function()});
+    fuzz::RandomProgram program;
+    program.outputs = {Func(copy.outputs[0])};
+    program.runs = {{gradient.second}};
+    for (const Func& f : funcs) {
+      const auto found = copy.of.find(f.function().get());
+      if (found != copy.of.end()) program.funcs.emplace_back(found->second);
+    }
+    ScheduleLog log = fuzz::random_schedule(program, choices);
+    std::erase_if(log.entries, [](const ScheduleLog::Entry& entry) {
+      return std::string_view(name_of(entry.directive)).starts_with("trace_");
+    });
+    fuzz::apply(log, program);
+    return program.output();
   }
 
   void compare(size_t i, const std::string& how) { compare(i, gradients_[i].first, how); }
@@ -150,16 +176,16 @@ class Compiled {
 
 }  // namespace
 
-void compare_machine_code(Subject& s, const Derivative& derivative, const Gradients& gradients,
-                          const AdversaryProgram* twin) {
+int compare_machine_code(Subject& s, const Derivative& derivative, const Gradients& gradients,
+                         const AdversaryProgram* twin) {
   Compiled code(s, gradients);
-  if (!code.compare_unscheduled()) return;
+  if (!code.compare_unscheduled()) return 0;
   try {
     if (twin) code.compare_twin(*twin);
   } catch (const UserError&) {  // what a C function reads must have bounds, and no versions
   } catch (const Unsupported&) {
   }
-  if (s.program.checks.schedule > 0) code.compare_scheduled(derivative);
+  return s.program.checks.schedule > 0 ? code.compare_scheduled(derivative) : 0;
 }
 
 }  // namespace retrograde::gradient

@@ -160,8 +160,8 @@ Product Motion::along(const std::function<Func(const AdjointInput&)>& of) const 
 
 Region Subject::bounds() const {
   Region result;
-  for (size_t d = 0; d < program.region.mins.size(); ++d)
-    result.push_back({Expr(program.region.mins[d]), Expr(program.region.extents[d])});
+  for (size_t d = 0; d < program.region().mins.size(); ++d)
+    result.push_back({Expr(program.region().mins[d]), Expr(program.region().extents[d])});
   return result;
 }
 

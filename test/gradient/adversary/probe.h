@@ -114,7 +114,8 @@ void compare_dense(Subject& s);
 // By each input; undefined where it is not read.
 using Gradients = std::vector<std::pair<Func, oracle::Region>>;
 // twin: null, or the same program with a stage that a C function computes.
-void compare_machine_code(Subject& s, const Derivative& derivative, const Gradients& gradients,
-                          const AdversaryProgram* twin);
+// How many gradients have machine code under a random schedule too.
+int compare_machine_code(Subject& s, const Derivative& derivative, const Gradients& gradients,
+                         const AdversaryProgram* twin);
 
 }  // namespace retrograde::gradient

@@ -4,10 +4,12 @@
 
 #include <string>
 
-#include "gradient/adversary/choices.h"
 #include "ir/expr.h"
+#include "testing/choices.h"
 
 namespace retrograde::gradient {
+
+using fuzz::Choices;
 
 struct FormResult {
   int checked = 0;          // places and leaves at which the gradient was compared

@@ -75,95 +75,64 @@ class FormMaker {
   Expr power() { return keep(exp(exponent())); }
 
   Expr form() {
-    switch (c_.below(16)) {
-      case 0:
-        return simple();
-      case 1:
-        return logistic();
-      case 2:
-        return share();
-      case 3:
-        return softmax();
-      case 4:
-      case 5:
-        return ratio();
-      case 6:
-        return log_sum();
-      case 7:
-      case 8:
-        return smooth_maximum();
-      case 9:
-        return entropy();
-      case 10:
-        return angle();
-      case 11:
-      case 12:
-        return norm();
-      case 13:
-        return quotient();
-      case 14:
-        return arithmetic();
-      default:
-        return choice();
-    }
+    return c_.one_of<Expr>({
+        [&] { return simple(); },
+        [&] { return logistic(); },
+        [&] { return share(); },
+        [&] { return softmax(); },
+        [&] { return ratio(); },
+        [&] { return ratio(); },
+        [&] { return log_sum(); },
+        [&] { return smooth_maximum(); },
+        [&] { return smooth_maximum(); },
+        [&] { return entropy(); },
+        [&] { return angle(); },
+        [&] { return norm(); },
+        [&] { return norm(); },
+        [&] { return quotient(); },
+        [&] { return arithmetic(); },
+        [&] { return choice(); },
+    });
   }
 
   Expr logistic() {
     const Expr e = power(), s = c_.chance(50) ? one() : any();
-    switch (c_.below(5)) {
-      case 0:
-        return s / (one() + e);
-      case 1:
-        return s / (e + one());
-      case 2:
-        return s / (one() + one() + e);
-      case 3:
-        return s / (one() + e * e);
-      default:
-        return s / (one() + e + size());
-    }
+    return c_.one_of<Expr>({
+        [&] { return s / (one() + e); },
+        [&] { return s / (e + one()); },
+        [&] { return s / (one() + one() + e); },
+        [&] { return s / (one() + e * e); },
+        [&] { return s / (one() + e + size()); },
+    });
   }
 
   Expr share() {
     const Expr a = c_.chance(30) ? power() : any(), b = positive();
-    switch (c_.below(8)) {
-      case 0:
-        return a / (one() + abs(a));
-      case 1:
-        return b / (b + size());
-      case 2:
-        return a / (b + abs(a));
-      case 3:
-        return b / (b + b + size());
-      case 4:  // near: another magnitude, the other sign, a multiple
-        return a / (b + abs(any()));
-      case 5:
-        return a / (abs(-a) + b);
-      case 6:
-        return b / (num(2) * b + size());
-      default:
-        return size() / (size() + b);
-    }
+    return c_.one_of<Expr>({
+        [&] { return a / (one() + abs(a)); },
+        [&] { return b / (b + size()); },
+        [&] { return a / (b + abs(a)); },
+        [&] { return b / (b + b + size()); },
+        // near: another magnitude, the other sign, a multiple
+        [&] { return a / (b + abs(any())); },
+        [&] { return a / (abs(-a) + b); },
+        [&] { return b / (num(2) * b + size()); },
+        [&] { return size() / (size() + b); },
+    });
   }
 
   Expr softmax() {
     const Expr a = power(), b = power(), c = power();
-    switch (c_.below(7)) {
-      case 0:
-        return a / (a + b);
-      case 1:
-        return b / (a + b + c);
-      case 2:
-        return a / (b + a + one());
-      case 3:
-        return a / (b + c);
-      case 4:
-        return (a + b) / (a + b + c);
-      case 5:
-        return a / (a + positive());
-      default:  // nested
-        return a / (b + keep(a / (a + c)));
-    }
+    return c_.one_of<Expr>({
+        [&] { return a / (a + b); },
+        [&] { return b / (a + b + c); },
+        [&] { return a / (b + a + one()); },
+        [&] { return a / (b + c); },
+        [&] { return (a + b) / (a + b + c); },
+        [&] { return a / (a + positive()); },
+        // nested
+        [&] { return a / (b + keep(a / (a + c))); },
+    });
   }
 
   // Sums of the same terms, with either sign.
@@ -189,20 +158,14 @@ class FormMaker {
 
   Expr log_sum() {
     const Expr a = power(), b = power();
-    switch (c_.below(6)) {
-      case 0:
-        return log(one() + a);
-      case 1:
-        return log(a + b);
-      case 2:
-        return log(a + b + num(constant()));
-      case 3:
-        return log(a + positive());
-      case 4:
-        return log(a * b + one());
-      default:
-        return log(positive() / positive());
-    }
+    return c_.one_of<Expr>({
+        [&] { return log(one() + a); },
+        [&] { return log(a + b); },
+        [&] { return log(a + b + num(constant())); },
+        [&] { return log(a + positive()); },
+        [&] { return log(a * b + one()); },
+        [&] { return log(positive() / positive()); },
+    });
   }
 
   // max(a, b) + log(1 + exp(-|a - b|)) and what looks like it.
@@ -211,106 +174,69 @@ class FormMaker {
     const Expr c = c_.chance(70) ? a : any(), d = c_.chance(70) ? b : any();
     const Expr difference = c_.chance(50) ? c - d : c_.chance(80) ? d - c : c + d;
     const Expr decay = log(one() + exp(-abs(difference)));
-    switch (c_.below(8)) {
-      case 0:
-      case 1:
-        return max(a, b) + decay;
-      case 2:
-        return decay - min(a, b);
-      case 3:
-        return decay + max(a, b) - any();
-      case 4:
-        return any() + max(b, a) + decay;
-      case 5:
-        return min(a, b) + decay;
-      case 6:
-        return max(a, b) - decay;
-      default:
-        return keep(max(a, b)) + keep(decay) + max(any(), any());
-    }
+    return c_.one_of<Expr>({
+        [&] { return max(a, b) + decay; },
+        [&] { return max(a, b) + decay; },
+        [&] { return decay - min(a, b); },
+        [&] { return decay + max(a, b) - any(); },
+        [&] { return any() + max(b, a) + decay; },
+        [&] { return min(a, b) + decay; },
+        [&] { return max(a, b) - decay; },
+        [&] { return keep(max(a, b)) + keep(decay) + max(any(), any()); },
+    });
   }
 
   Expr entropy() {
     const Expr a = positive(), b = positive(), c = positive();
-    switch (c_.below(9)) {
-      case 0:
-        return a * log(a);
-      case 1:
-        return a * log(a / b);
-      case 2:
-        return -a * log(a);
-      case 3:
-        return log(a / b) * (a * num(constant()));
-      case 4:
-        return b * log(a / b);
-      case 5:
-        return a * log(b);
-      case 6:
-        return a / b * log(a / b);
-      case 7:
-        return (a + b) * log(a / c);
-      default:
-        return keep(log(a / b)) * keep(log(a / b));
-    }
+    return c_.one_of<Expr>({
+        [&] { return a * log(a); },
+        [&] { return a * log(a / b); },
+        [&] { return -a * log(a); },
+        [&] { return log(a / b) * (a * num(constant())); },
+        [&] { return b * log(a / b); },
+        [&] { return a * log(b); },
+        [&] { return a / b * log(a / b); },
+        [&] { return (a + b) * log(a / c); },
+        [&] { return keep(log(a / b)) * keep(log(a / b)); },
+    });
   }
 
   Expr angle() {
     const Expr a = any(), b = simple();
-    switch (c_.below(4)) {
-      case 0:
-        return atan(a / b);
-      case 1:
-        return atan2(a, b);
-      case 2:
-        return atan(a / (b + a));
-      default:
-        return atan(a * b);
-    }
+    return c_.one_of<Expr>({
+        [&] { return atan(a / b); },
+        [&] { return atan2(a, b); },
+        [&] { return atan(a / (b + a)); },
+        [&] { return atan(a * b); },
+    });
   }
 
   Expr squares(const Expr& a, const Expr& b) {
-    switch (c_.below(7)) {
-      case 0:
-        return a * a + b * b;
-      case 1:
-        return pow(a, num(2)) + b * b;
-      case 2:
-        return a * a + b * b + num(constant());
-      case 3:
-        return a * a + b * b + keep(simple()) * pool_.back();
-      case 4:
-        return a * a + b * (b + num(constant())) + num(40);
-      case 5:
-        return a * a + abs(b);
-      default:
-        return a * a + a * a;
-    }
+    return c_.one_of<Expr>({
+        [&] { return a * a + b * b; },
+        [&] { return pow(a, num(2)) + b * b; },
+        [&] { return a * a + b * b + num(constant()); },
+        [&] { return a * a + b * b + keep(simple()) * pool_.back(); },
+        [&] { return a * a + b * (b + num(constant())) + num(40); },
+        [&] { return a * a + abs(b); },
+        [&] { return a * a + a * a; },
+    });
   }
   Expr norm() {
     const Expr a = any(), b = simple(), sum = squares(a, b), length = keep(sqrt(sum));
     const Expr top = c_.chance(50) ? a : c_.chance(50) ? b : any();
-    switch (c_.below(10)) {
-      case 0:
-        return length;
-      case 1:
-        return top / length;
-      case 2:
-        return top * (one() / length);
-      case 3:
-        return one() / length;
-      case 4:
-        return top / max(length, num(constant()));
-      case 5:
-        return top * pow(sum, num(-0.5));
-      case 6:
-        return top / hypot(a, b);
-      case 7:
-        return max(top, one() / length);
-      case 8:
-        return keep(a / length) * keep(b / length);
-      default:
-        return top / max(num(constant()), length);
-    }
+    return c_.one_of<Expr>({
+        [&] { return length; },
+        [&] { return top / length; },
+        [&] { return top * (one() / length); },
+        [&] { return one() / length; },
+        [&] { return top / max(length, num(constant())); },
+        [&] { return top * pow(sum, num(-0.5)); },
+        [&] { return top / hypot(a, b); },
+        [&] { return max(top, one() / length); },
+        [&] { return keep(a / length) * keep(b / length); },
+        [&] { return top / max(num(constant()), length); },
+    });
   }
 
   Expr quotient() {
@@ -346,33 +272,23 @@ class FormMaker {
 
   Expr arithmetic() {
     const Expr a = any(), b = any();
-    switch (c_.below(6)) {
-      case 0:
-        return a * b;
-      case 1:
-        return a + b;
-      case 2:
-        return a - b;
-      case 3:
-        return a / positive();
-      case 4:
-        return (a - b) / (a + b);
-      default:
-        return one() / positive();
-    }
+    return c_.one_of<Expr>({
+        [&] { return a * b; },
+        [&] { return a + b; },
+        [&] { return a - b; },
+        [&] { return a / positive(); },
+        [&] { return (a - b) / (a + b); },
+        [&] { return one() / positive(); },
+    });
   }
   Expr choice() {
     const Expr a = any(), b = any();
-    switch (c_.below(4)) {
-      case 0:
-        return max(a, b);
-      case 1:
-        return select(a > b, simple(), simple());
-      case 2:
-        return abs(a) - b;
-      default:
-        return min(a, simple());
-    }
+    return c_.one_of<Expr>({
+        [&] { return max(a, b); },
+        [&] { return select(a > b, simple(), simple()); },
+        [&] { return abs(a) - b; },
+        [&] { return min(a, simple()); },
+    });
   }
 
   Choices& c_;

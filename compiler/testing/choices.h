@@ -13,7 +13,7 @@
 #include <random>
 #include <vector>
 
-namespace retrograde::gradient {
+namespace retrograde::fuzz {
 
 class Choices {
  public:
@@ -22,10 +22,19 @@ class Choices {
 
   int below(int n);
   int between(int low, int high) { return low + below(high - low + 1); }
+  // What one of the functions gives; the first one is the simplest.
+  template <typename Result>
+  Result one_of(std::initializer_list<std::function<Result()>> alternatives) {
+    return alternatives.begin()[below(static_cast<int>(alternatives.size()))]();
+  }
   // False is the simpler answer.
   bool chance(int percent) { return below(100) >= 100 - percent; }
   // A small number of either sign; 0 is the simplest, then 1, -1, 2 ...
   int around_zero(int most);
+  template <typename T>
+  T pick(const std::vector<T>& from) {
+    return from[static_cast<size_t>(below(static_cast<int>(from.size())))];
+  }
   const std::vector<uint32_t>& taken() const { return taken_; }
 
  private:
@@ -40,4 +49,4 @@ std::vector<uint32_t> shrink_choices(std::vector<uint32_t> choices,
                                      const std::function<bool(const std::vector<uint32_t>&)>& fails,
                                      int max_trials = 1500);
 
-}  // namespace retrograde::gradient
+}  // namespace retrograde::fuzz

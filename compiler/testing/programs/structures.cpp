@@ -1,33 +1,10 @@
 // Structures that programs of users are made of, over the Func that was defined last: pyramids,
 // histograms that are sliced, convolutions, tables, scans, loops one after the other, the place of
 // a maximum, domains with parametric ends, boundary conditions of boundary conditions.
-#include "frontend/language/boundary_conditions.h"
 #include "frontend/language/inline_reductions.h"
-#include "gradient/adversary/maker.h"
+#include "testing/programs/maker.h"
 
-namespace retrograde::gradient {
-
-namespace {
-
-const Var x("x"), y("y");
-
-Func bounded(int kind, const Func& f, const Region& region) {
-  using namespace BoundaryConditions;
-  switch (kind) {
-    case 0:
-      return repeat_edge(f, region);
-    case 1:
-      return constant_exterior(f, 0.5f, region);
-    case 2:
-      return repeat_image(f, region);
-    case 3:
-      return mirror_image(f, region);
-    default:
-      return mirror_interior(f, region);
-  }
-}
-
-}  // namespace
+namespace retrograde::fuzz {
 
 // At (u, v), as far as the last Func has such dimensions.
 Expr Maker::last_at(const Expr& u, const Expr& v) {
@@ -40,7 +17,7 @@ Expr Maker::last_at(const Expr& u, const Expr& v) {
 Func Maker::define(const std::string& name, const std::vector<Var>& vars, const Tuple& values) {
   Func f(name + std::to_string(p_.funcs.size()));
   f(vars) = values;
-  p_.funcs.push_back(f);
+  finish(f);
   return f;
 }
 
@@ -75,14 +52,14 @@ void Maker::add_pyramid() {
 Func Maker::with_mirrored_border(const Func& f) {
   Region region;
   for (int d = 0; d < 2; ++d) region.push_back({Expr(0), p_.count + c_.between(1, 3)});
-  return bounded(c_.between(2, 4), f, region);
+  return bounded(c_.between(2, 4), 0.5f, f, region);
 }
 
 // A bilateral grid in small: sums and counts of what is alike, blurred, read between its planes.
 void Maker::add_grid() {
   const Func guide = define("guide", {x}, clamp(last_at(x, 1), 0.0f, 1.0f));
   RDom r(0, natural_size);
-  if (c_.chance(30)) r.where(places_.condition({r.x}));
+  if (c_.chance(30)) r.where(place_condition({r.x}));
   const Expr bin = cast<int>(guide(r.x) * 3.0f),
              value = guide(r.x) * read_image({{r.x}, {}, Func(), {}});
   Func grid = define("grid", {x, y}, Tuple(0.0f, 0.0f));
@@ -106,9 +83,14 @@ void Maker::add_convolution() {
   const Buffer<>& weights = p_.images[i];
   const int stride = c_.between(1, 2);
   RDom r(-1, 3, 0, c_.between(1, 3), 0, c_.between(1, 2));
-  if (c_.chance(20)) r.where(places_.condition({r.x, r.y}));
-  std::vector<Expr> place{(r.x + 1 + 3 * y) % weights.extent(0), (r.y + y + r.z) % natural_size};
+  if (c_.chance(20)) r.where(place_condition({r.x, r.y}));
+  std::vector<Expr> place{(r.x + 1 + 3 * y) % weights.extent(0), (r.y + y + r.z) % natural_size,
+                          r.z % 2};
   place.resize(static_cast<size_t>(weights.dimensions()));
+  for (size_t d = 0; d < place.size(); ++d) {
+    const int min = weights.dim(static_cast<int>(d)).min();
+    if (min != 0) place[d] = place[d] + min;
+  }
   const Expr weight = p_.handles[i].defined() ? p_.handles[i](place) : Expr(weights(place));
   Func sums = define("conv", {x, y}, c_.chance(50) ? last_at(x, 0) : Expr(0.0f));
   const Func source = p_.funcs[p_.funcs.size() - 2];
@@ -135,16 +117,12 @@ void Maker::add_scans() {
   Func s = define("scan", {x, y}, last_at(x, y));
   RDom r(1, natural_size - 1);
   const auto step = [&](const Expr& now, const Expr& before) {
-    switch (c_.below(4)) {
-      case 0:
-        return now + before;
-      case 1:
-        return now * 0.5f + before * 0.75f;
-      case 2:
-        return sin(now + before);
-      default:
-        return max(now, before);
-    }
+    return c_.one_of<Expr>({
+        [&] { return now + before; },
+        [&] { return now * 0.5f + before * 0.75f; },
+        [&] { return sin(now + before); },
+        [&] { return max(now, before); },
+    });
   };
   s(r, y) = step(s(r, y), s(r - 1, y));
   s(x, r) = step(s(x, r), s(x, r - 1));
@@ -182,19 +160,12 @@ void Maker::add_parametric_sum() {
   const Func f = define("source", {x, y}, last_at(x, y));
   const Expr rows = c_.chance(30) ? max(p_.count - c_.between(1, 4), 0) : Expr(p_.count);
   RDom r(0, c_.chance(50) ? p_.count + 1 : Expr(natural_size), c_.around_zero(1), rows);
-  switch (c_.below(4)) {
-    case 0:
-      r.where(r.x + r.y < p_.count);
-      break;
-    case 1:
-      r.where(r.x <= r.y && r.y < 2 * p_.count - r.x);
-      break;
-    case 2:
-      r.where(abs(r.x - r.y) < p_.count && r.x % 2 == 0);
-      break;
-    default:
-      r.where(f(r.x, r.y) > 0.5f);
-  }
+  r.where(c_.one_of<Expr>({
+      [&] { return r.x + r.y < p_.count; },
+      [&] { return r.x <= r.y && r.y < 2 * p_.count - r.x; },
+      [&] { return abs(r.x - r.y) < p_.count && r.x % 2 == 0; },
+      [&] { return f(r.x, r.y) > 0.5f; },
+  }));
   Func s = define("band", {x}, Expr(f(x, 0)));
   if (c_.chance(50)) {
     s(x) += f(x + r.x, r.y) * f(x, p_.count);
@@ -210,7 +181,7 @@ void Maker::add_boundaries() {
     for (int d = 0; d < 2; ++d)
       region.push_back({Expr(c_.around_zero(1)),
                         c_.chance(40) ? p_.count + 1 : Expr(c_.between(2, natural_size))});
-    const Func around = bounded(c_.below(5), f, region);
+    const Func around = bounded(c_.below(5), 0.5f, f, region);
     RDom taps(0, c_.between(2, 3));
     const Expr sides = c_.chance(30) ? sum(taps, around(x + taps - 1, y) * p_.scale)
                                      : around(x + c_.around_zero(2), y);
@@ -219,26 +190,16 @@ void Maker::add_boundaries() {
 }
 
 void Maker::add_structure() {
-  switch (c_.below(9)) {
-    case 0:
-      return add_pyramid();
-    case 1:
-      return add_grid();
-    case 2:
-      return add_convolution();
-    case 3:
-      return add_table();
-    case 4:
-      return add_scans();
-    case 5:
-      return add_two_loops();
-    case 6:
-      return add_place_of_maximum();
-    case 7:
-      return add_parametric_sum();
-    default:
-      return add_boundaries();
-  }
+  static constexpr void (Maker::*adds[])() = {&Maker::add_pyramid,
+                                              &Maker::add_grid,
+                                              &Maker::add_convolution,
+                                              &Maker::add_table,
+                                              &Maker::add_scans,
+                                              &Maker::add_two_loops,
+                                              &Maker::add_place_of_maximum,
+                                              &Maker::add_parametric_sum,
+                                              &Maker::add_boundaries};
+  (this->*adds[c_.below(9)])();
 }
 
-}  // namespace retrograde::gradient
+}  // namespace retrograde::fuzz

@@ -2,11 +2,10 @@
 #include "autodiff/custom_derivative.h"
 #include "autodiff/straight_through.h"
 #include "autodiff/tangents.h"
-#include "gradient/adversary/extern_stage.h"
-#include "gradient/adversary/maker.h"
 #include "ir/visit.h"
+#include "testing/programs/maker.h"
 
-namespace retrograde::gradient {
+namespace retrograde::fuzz {
 
 namespace {
 
@@ -80,22 +79,18 @@ void give_closed_rule(const Func& f, const Func& source) {
 // Values that are `a`, written so that rules of derivatives act in them.
 Expr Maker::ruled(const Type& type, const Point& at, int depth) {
   const Expr a = value(type, at, depth - 1);
-  switch (c_.below(5)) {
-    case 0:
-      return straight_through(a, a * converted(type, Expr(2.0f)) - a);
-    case 1:  // a product, one factor at a time
-    {
-      const Expr b = leaf(type, at);
-      p_.checks.higher = false;
-      return stop_gradient(a) * b + a * stop_gradient(b) - stop_gradient(a * b);
-    }
-    case 2:
-      return a + stop_gradient(floor(a));
-    case 3:
-      return straight_through(a + converted(type, floor(leaf(type, at))), a);
-    default:
-      return select(stop_gradient(a) > converted(type, Expr(0.5f)), a, leaf(type, at));
-  }
+  const auto one_factor_at_a_time = [&] {
+    const Expr b = leaf(type, at);
+    p_.stops_gradients = true;
+    return stop_gradient(a) * b + a * stop_gradient(b) - stop_gradient(a * b);
+  };
+  return c_.one_of<Expr>({
+      [&] { return straight_through(a, a * converted(type, Expr(2.0f)) - a); },
+      one_factor_at_a_time,
+      [&] { return a + stop_gradient(floor(a)); },
+      [&] { return straight_through(a + converted(type, floor(leaf(type, at))), a); },
+      [&] { return select(stop_gradient(a) > converted(type, Expr(0.5f)), a, leaf(type, at)); },
+  });
 }
 
 // A Func that reads the last one, with rules: by all inputs of the program, or by the Func read.
@@ -104,15 +99,20 @@ void Maker::add_custom() {
   if (!is_floating(source)) return;
   Func f("ruled" + std::to_string(p_.funcs.size()));
   const std::vector<Var> vars = first_variables(source.dimensions());
-  p_.funcs.push_back(f);
-  if (c_.chance(50)) {
-    p_.checks.stage = source.outputs() == 1 && source.type() == Float(32);
-    define_sine(f, source, p_.checks.stage && as_extern_);
+  finish(f);
+  const bool is_sine = c_.chance(50);
+  p_.has_stage = is_sine && source.outputs() == 1 && source.type() == Float(32);
+  if (p_.has_stage && s_.extern_sine) {
+    s_.extern_sine(f, source);
     return give_closed_rule(f, source);
   }
   std::vector<Expr> values;
-  for (int k = 0; k < source.outputs(); ++k) values.push_back(source(vars).element(k));
+  for (int k = 0; k < source.outputs(); ++k) {
+    const Expr value = source(vars).element(k);
+    values.push_back(is_sine ? sin(value) : value);
+  }
   f(vars) = Tuple(values);
+  if (is_sine) return give_closed_rule(f, source);
   std::vector<AdjointInput> inputs;
   const auto parameters = ir::parameters_of({source.function()});
   auto add = [&](const AdjointInput& input) {
@@ -124,7 +124,7 @@ void Maker::add_custom() {
   for (size_t i = 0; i < p_.images.size(); ++i) add(p_.image(i));
   add(p_.scale);
   if (inputs.empty()) return;
-  p_.checks.along = false;  // what lies between is the rule's own
+  p_.has_rule = true;
   custom_adjoint(f, inputs, [source, inputs](const AdjointContext& c) {
     return by_synthesis(source, inputs, c);
   });
@@ -133,4 +133,4 @@ void Maker::add_custom() {
   });
 }
 
-}  // namespace retrograde::gradient
+}  // namespace retrograde::fuzz

@@ -1,0 +1,38 @@
+// What fuzzers share. Each program runs in a process of its own under limits of processor time and
+// memory, so that a crash or a hang is a finding like a wrong result. A finding is shrunk (testing/
+// choices.h) and printed with its choices. Refusals are counted by their rule.
+//
+//   --seed N | --from N, --count N | --seconds N    one program, or so many from one on
+//   --choices LIST       the program that a finding was shrunk to
+//   --compile PERCENT    of how many programs what takes machine code is checked, too
+//   --no-shrink, --print, --refusals                print the programs, print refusals
+//   --want TEXT          a refusal whose message has this text is a finding, to see what is refused
+//
+// Exit code: 0 nothing found, 1 something found, too much refused or nothing tried, 2 bad arguments.
+#pragma once
+
+#include <functional>
+#include <optional>
+
+#include "support/run_apart.h"
+#include "testing/choices.h"
+#include "testing/judgement.h"
+
+namespace retrograde::fuzz {
+
+struct Fuzzer {
+  std::function<Judged(Choices& choices, bool machine_code)> judge;
+  std::function<std::string(Choices& choices)> text;
+  ApartLimits limits = {};
+  double most_refused = 0.1;  // of the legal ones; then little is tested
+  double most_slow = 0;       // of all; up to that, one that takes too long is no finding
+  unsigned compile = 100;
+  // Takes another argument and its value.
+  std::function<bool(const std::string& name, const std::string& value)> take = {};
+  // A program that is not meant: it is not counted.
+  std::function<bool(Choices& choices)> passes_over = {};
+};
+
+int fuzz_main(Fuzzer fuzzer, int argc, char** argv);
+
+}  // namespace retrograde::fuzz
