@@ -39,7 +39,7 @@ Style Style::updates() {
   s.image_types = s.value_types = {Float(32)};
   s.dimensions = {2};
   s.least_updates = 1;
-  s.self_reads = 60;
+  s.self_reads = 40;
   return s;
 }
 
