@@ -62,7 +62,7 @@ Interval BoundsEngine::compute(const Expr& e) {
   if (!e.type().is_scalar()) return type_range(e.type());
   if (!varies(e)) return Interval::point(canonical(e));
   if (!has_linear_form(e.type())) return atom_bounds(e);
-  LinearForm form = with_remainders(linear_form(e));
+  Sum form = with_remainders(linear_form(e));
   bool is_atom = form.terms.size() == 1 && form.terms[0].atom.same_as(e);
   return is_atom ? bounds_of_atom(e) : sum_bounds(form);
 }
@@ -84,18 +84,19 @@ Interval BoundsEngine::ramp_bounds(const Ramp& ramp) {
   return hull(base, interval_add(type, base, last));
 }
 
-Interval BoundsEngine::sum_bounds(const LinearForm& form) {
+Interval BoundsEngine::sum_bounds(const Sum& form) {
+  if (!form.valid) return Interval::everything();
   const std::optional<Interval> known = bounds_by_facts(form);
   return known ? *known : sum_of_bounds(form);
 }
 
 // Where x + y <= 29 is known, x + y + z lies below 29 + z. The ends of x and y apart, 29 - y and
 // 29 - x, would add up to more than that as soon as the loops over x and y are looked at.
-std::optional<Interval> BoundsEngine::bounds_by_facts(const LinearForm& form) {
+std::optional<Interval> BoundsEngine::bounds_by_facts(const Sum& form) {
   std::optional<Interval> result;
-  for (const LinearForm& fact : facts_) {
+  for (const Sum& fact : facts_) {
     if (!(fact.type == form.type)) continue;
-    const LinearForm below = plus(form, fact, -1), above = plus(form, fact);  // form <= below
+    const Sum below = plus(form, fact, -1), above = plus(form, fact);  // form <= below
     const size_t left = form.terms.size() - std::min(form.terms.size(), fact.terms.size());
     const bool is_below = below.terms.size() == left, is_above = above.terms.size() == left;
     if (form.terms.size() < fact.terms.size() || (!is_below && !is_above)) continue;
@@ -109,18 +110,18 @@ std::optional<Interval> BoundsEngine::bounds_by_facts(const LinearForm& form) {
 }
 
 // Every end adds up on its own; the part that does not vary goes into both.
-Interval BoundsEngine::sum_of_bounds(const LinearForm& form) {
-  LinearForm fixed{form.type, {}, form.constant};
+Interval BoundsEngine::sum_of_bounds(const Sum& form) {
+  Sum fixed = linear_sum(form.type, form.constant);
   std::vector<std::pair<Interval, int64_t>> varying;
-  for (const LinearTerm& term : form.terms) {
+  for (const Term& term : form.terms) {
     if (varies(term.atom)) {
-      varying.emplace_back(bounds_of_atom(term.atom), term.coefficient);
+      varying.emplace_back(bounds_of_atom(term.atom), term.factor);
     } else {
-      fixed = plus(fixed, linear_form(term.atom), term.coefficient);
+      fixed = plus(fixed, linear_form(term.atom), term.factor);
     }
   }
   auto end = [&](bool upper) -> Expr {
-    LinearForm sum = fixed;
+    Sum sum = fixed;
     for (const auto& [interval, coefficient] : varying) {
       const Expr& part = upper == (coefficient > 0) ? interval.max : interval.min;
       if (!part.defined()) return {};
@@ -136,23 +137,23 @@ Interval BoundsEngine::sum_of_bounds(const LinearForm& form) {
 }
 
 // c*y - c*k*(y / k)  is  c*(y % k): two correlated terms become one.
-LinearForm BoundsEngine::with_remainders(LinearForm form) {
-  for (const LinearTerm& term : std::vector<LinearTerm>(form.terms)) {
+Sum BoundsEngine::with_remainders(Sum form) {
+  for (const Term& term : std::vector<Term>(form.terms)) {
     const Div* div = term.atom.as<Div>();
     auto k = div ? as_const_int(div->b) : std::nullopt;
-    if (!k || *k <= 0 || term.coefficient % *k != 0) continue;
-    int64_t c = -term.coefficient / *k;
-    LinearForm y = linear_form(div->a);
+    if (!k || *k <= 0 || term.factor % *k != 0) continue;
+    int64_t c = -term.factor / *k;
+    Sum y = linear_form(div->a);
     bool contains = !y.terms.empty();
-    for (const LinearTerm& part : y.terms) {
+    for (const Term& part : y.terms) {
       bool found = false;
-      for (const LinearTerm& t : form.terms)
-        found |= t.atom.same_as(part.atom) && t.coefficient == c * part.coefficient;
+      for (const Term& t : form.terms)
+        found |= t.atom.same_as(part.atom) && t.factor == __int128{c} * part.factor;
       contains &= found;
     }
     if (!contains) continue;
     form = plus(form, y, -c);
-    form = plus(form, linear_form(term.atom), -term.coefficient);
+    form = plus(form, linear_form(term.atom), -term.factor);
     form = plus(form, linear_form(binary(Kind::Mod, div->a, div->b)), c);
   }
   return form;
@@ -341,16 +342,16 @@ void BoundsEngine::narrow(const Expr& condition, bool is_true, Narrowed& narrowe
 void BoundsEngine::narrow_by_comparison(Kind kind, const Expr& a, const Expr& b,
                                         Narrowed& narrowed) {
   if (!has_linear_form(a.type())) return;
-  LinearForm d = plus(linear_form(a), linear_form(b), -1);
-  LinearForm reversed = times(d, -1);
+  Sum d = plus(linear_form(a), linear_form(b), -1);
+  Sum reversed = times(d, -1);
   switch (kind) {
     case Kind::LT:
-      d.constant += 1;
+      d.add_constant(1);
       return narrow_nonpositive(d, narrowed);
     case Kind::LE:
       return narrow_nonpositive(d, narrowed);
     case Kind::GT:
-      reversed.constant += 1;
+      reversed.add_constant(1);
       return narrow_nonpositive(reversed, narrowed);
     case Kind::GE:
       return narrow_nonpositive(reversed, narrowed);
@@ -363,24 +364,25 @@ void BoundsEngine::narrow_by_comparison(Kind kind, const Expr& a, const Expr& b,
 }
 
 // form <= 0 bounds each variable v of the scope in it: c*v <= -rest, and -rest <= -(min of rest).
-void BoundsEngine::narrow_nonpositive(const LinearForm& form, Narrowed& narrowed) {
+void BoundsEngine::narrow_nonpositive(const Sum& form, Narrowed& narrowed) {
+  if (!form.valid) return;
   size_t loose = 0;
-  for (const LinearTerm& term : form.terms) {
+  for (const Term& term : form.terms) {
     const Variable* v = term.atom.as<Variable>();
     const Interval* old = v ? scope_.find(v->name) : nullptr;
     if (!old) continue;
     ++loose;
-    LinearForm rest = plus(form, linear_form(term.atom), -term.coefficient);
+    Sum rest = plus(form, linear_form(term.atom), -term.factor);
     Expr least = sum_bounds(with_remainders(rest)).min;
     if (!least.defined()) continue;
-    int64_t c = term.coefficient;
-    LinearForm limit = linear_form(least);  // c*v + limit <= 0
+    int64_t c = term.factor;
+    Sum limit = linear_form(least);  // c*v + limit <= 0
     Interval implied;
     if (c > 0) {
       Expr numerator = to_expr(times(limit, -1));
       if (numerator.defined()) implied.max = canonical_div(numerator, c);
     } else {  // v >= limit / |c|, rounded up
-      limit.constant += -c - 1;
+      limit.add_constant(-c - 1);
       Expr numerator = to_expr(limit);
       if (numerator.defined()) implied.min = canonical_div(numerator, -c);
     }

@@ -48,10 +48,10 @@ class BoundsEngine {
   explicit BoundsEngine(BoundsEngine& outer);
 
   Interval compute(const Expr& e);
-  Interval sum_bounds(const LinearForm& form);
-  Interval sum_of_bounds(const LinearForm& form);
-  std::optional<Interval> bounds_by_facts(const LinearForm& form);
-  LinearForm with_remainders(LinearForm form);
+  Interval sum_bounds(const Sum& form);
+  Interval sum_of_bounds(const Sum& form);
+  std::optional<Interval> bounds_by_facts(const Sum& form);
+  Sum with_remainders(Sum form);
   Interval bounds_of_atom(const Expr& atom);
   Interval atom_bounds(const Expr& e);
   Interval cast_bounds(Type type, const Expr& value);
@@ -68,16 +68,16 @@ class BoundsEngine {
   // What a condition says of the variables of the scope: of each alone, and sums of several, <= 0.
   struct Narrowed {
     std::map<std::string, Interval> variables;
-    std::vector<LinearForm> facts;
+    std::vector<Sum> facts;
   };
   void narrow(const Expr& condition, bool is_true, Narrowed& narrowed);
   void narrow_by_comparison(Kind kind, const Expr& a, const Expr& b, Narrowed& narrowed);
-  void narrow_nonpositive(const LinearForm& form, Narrowed& narrowed);
+  void narrow_nonpositive(const Sum& form, Narrowed& narrowed);
 
   std::shared_ptr<Shared> shared_;
   Scope<Interval> scope_;
   BoundsEngine* outer_ = nullptr;  // without the condition
-  std::vector<LinearForm> facts_;  // of the condition
+  std::vector<Sum> facts_;  // of the condition
   struct Entry {
     Expr key;
     Interval value;

@@ -1,7 +1,6 @@
-// Integer expressions as sums: e = c1 * atom1 + c2 * atom2 + ... + constant, and what follows from
-// that form: canonical text, differences that are constant, and linear conditions solved for a
-// variable. Signed integers of 32 bits and more only (they are assumed not to overflow); everything
-// else is an atom.
+// Index expressions as linear sums (ir/sum.h), and what follows from that form: canonical text,
+// differences that are constant, and linear conditions solved for a variable. Scalars of Int(32) and
+// Int(64) only (they are assumed not to overflow); everything else is an atom.
 #pragma once
 
 #include <cstdint>
@@ -12,32 +11,17 @@
 #include "analysis/interval.h"
 #include "analysis/scope.h"
 #include "ir/expr.h"
+#include "ir/sum.h"
 
 namespace retrograde::ir {
 
-struct LinearTerm {
-  Expr atom;  // not a sum, not a difference, not a product with a constant
-  int64_t coefficient = 0;
-};
-struct LinearForm {
-  Type type = Int(32);
-  std::vector<LinearTerm> terms;  // atoms in structural order, each once, no coefficient 0
-  int64_t constant = 0;
-  bool is_constant() const { return terms.empty(); }
-  int64_t coefficient_of(
-      const std::string& variable) const;  // of the atom that is this Variable, else 0
-};
-
 // The type is Int of 32 or 64 bits, scalar.
 bool has_linear_form(Type type);
-LinearForm linear_form(const Expr& e);
-Expr to_expr(const LinearForm& form);  // undefined when a coefficient does not fit the type
-LinearForm plus(const LinearForm& a, const LinearForm& b, int64_t factor_of_b = 1);
-LinearForm times(const LinearForm& a, int64_t factor);
+Sum linear_form(const Expr& e);
 
 // The sum that is at least 0 where the comparison holds, and nowhere else; nullopt for anything that
 // is no <, <=, >, >= of sums.
-std::optional<LinearForm> nonnegative_where(const Expr& comparison);
+std::optional<Sum> nonnegative_where(const Expr& comparison);
 
 // a - b when it is the same for all values of all variables.
 std::optional<int64_t> constant_difference(const Expr& a, const Expr& b);

@@ -38,12 +38,12 @@ class Direction {
   std::vector<Expr> alive_;  // keys of memo_ that were made here
 
   Monotonic of_sum(const Expr& e) {
-    const LinearForm form = linear_form(e);
+    const Sum form = linear_form(e);
     Monotonic result = Monotonic::Constant;
-    for (const LinearTerm& term : form.terms) {
+    for (const Term& term : form.terms) {
       alive_.push_back(term.atom);
       Monotonic part = term.atom.same_as(e) ? of_atom(e) : of_term(term.atom);
-      result = both(result, term.coefficient < 0 ? reversed(part) : part);
+      result = both(result, term.factor < 0 ? reversed(part) : part);
     }
     return result;
   }

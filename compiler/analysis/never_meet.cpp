@@ -25,41 +25,34 @@ namespace retrograde::ir {
 namespace {
 
 constexpr unsigned long most_operations = 1'000'000;  // of isl, about a second
-constexpr int most_unknowns = 40;
+constexpr size_t most_unknowns = 40;
 constexpr int max_depth = 16;  // of divisions and minima inside one another
 
-// c0 * unknown0 + c1 * unknown1 + ... + constant
-struct Sum {
-  std::map<int, int64_t> terms;
-  int64_t constant = 0;
-};
-
-Sum sum_of(const Sum& a, const Sum& b, int64_t factor) {
-  Sum result = a;
-  for (const auto& [unknown, coefficient] : b.terms) {
-    int64_t& term = result.terms[unknown];
-    term += factor * coefficient;
-    if (term == 0) result.terms.erase(unknown);
-  }
-  result.constant += factor * b.constant;
-  return result;
-}
-Sum constant_sum(int64_t value) { return {{}, value}; }
+Sum number(int64_t value) { return linear_sum(Int(64), value); }
 
 // Conditions on whole numbers, all of which hold.
 class Conditions {
  public:
-  int unknown() { return count_++; }
-  void is_zero(Sum sum) { equalities_.push_back(std::move(sum)); }
-  void at_least_zero(Sum sum) { inequalities_.push_back(std::move(sum)); }
+  Sum unknown() {
+    const std::string name = text("u", numbers_.size());
+    numbers_.emplace(name, static_cast<int>(numbers_.size()));
+    return linear_sum(variable(name, Int(64)));
+  }
+  // What does not fit a sum is not known.
+  void is_zero(const Sum& sum) {
+    if (sum.valid) equalities_.push_back(sum);
+  }
+  void at_least_zero(const Sum& sum) {
+    if (sum.valid) inequalities_.push_back(sum);
+  }
 
   // Whether there is certainly no solution.
   bool contradict() const {
-    if (count_ > most_unknowns) return false;
+    if (numbers_.size() > most_unknowns) return false;
     std::unique_ptr<isl_ctx, void (*)(isl_ctx*)> ctx(isl_ctx_alloc(), isl_ctx_free);
     isl_options_set_on_error(ctx.get(), ISL_ON_ERROR_CONTINUE);
     isl_ctx_set_max_operations(ctx.get(), most_operations);
-    isl_space* space = isl_space_set_alloc(ctx.get(), 0, static_cast<unsigned>(count_));
+    isl_space* space = isl_space_set_alloc(ctx.get(), 0, static_cast<unsigned>(numbers_.size()));
     isl_basic_set* set = isl_basic_set_universe(isl_space_copy(space));
     isl_local_space* local = isl_local_space_from_space(space);
     for (const Sum& sum : equalities_)
@@ -73,15 +66,15 @@ class Conditions {
   }
 
  private:
-  int count_ = 0;
+  std::unordered_map<std::string, int> numbers_;  // of the unknowns
   std::vector<Sum> equalities_, inequalities_;
 
-  static isl_basic_set* constrained(isl_basic_set* set, isl_constraint* constraint,
-                                    const Sum& sum) {
+  isl_basic_set* constrained(isl_basic_set* set, isl_constraint* constraint, const Sum& sum) const {
     isl_ctx* ctx = isl_basic_set_get_ctx(set);
-    for (const auto& [unknown, coefficient] : sum.terms) {
-      constraint = isl_constraint_set_coefficient_val(constraint, isl_dim_set, unknown,
-                                                      isl_val_int_from_si(ctx, coefficient));
+    for (const auto& [unknown, factor] : sum.terms) {
+      constraint = isl_constraint_set_coefficient_val(constraint, isl_dim_set,
+                                                      numbers_.at(unknown.as<Variable>()->name),
+                                                      isl_val_int_from_si(ctx, factor));
     }
     constraint =
         isl_constraint_set_constant_val(constraint, isl_val_int_from_si(ctx, sum.constant));
@@ -103,18 +96,17 @@ class Point {
     }
     for (const auto& v : points.variables) {
       const Sum here = of(variable(v.name));
-      if (v.min.defined()) conditions_.at_least_zero(sum_of(here, of(v.min), -1));
-      if (v.max.defined()) conditions_.at_least_zero(sum_of(of(v.max), here, -1));
+      if (v.min.defined()) conditions_.at_least_zero(plus(here, of(v.min), -1));
+      if (v.max.defined()) conditions_.at_least_zero(plus(of(v.max), here, -1));
     }
     for (const Expr& condition : points.conditions) require(condition);
   }
 
   Sum of(const Expr& e) {
-    const LinearForm form = linear_form(e);
-    Sum result = constant_sum(form.constant);
     if (!has_linear_form(e.type())) return atom(e);
-    for (const LinearTerm& term : form.terms)
-      result = sum_of(result, atom(term.atom), term.coefficient);
+    const Sum form = linear_form(e);
+    Sum result = number(form.constant);
+    for (const Term& term : form.terms) result.add(atom(term.atom), term.factor);
     return result;
   }
 
@@ -135,7 +127,7 @@ class Point {
   }
 
   Sum new_atom(const Expr& e) {
-    if (depth_ == max_depth) return unknown();
+    if (depth_ == max_depth) return conditions_.unknown();
     depth_++;
     const Sum sum = taken_apart(e);
     depth_--;
@@ -155,18 +147,16 @@ class Point {
     const bool divides = e.kind() == Kind::Div || e.kind() == Kind::Mod;
     if (!divides || !divisor || *divisor <= 0 || *divisor > INT32_MAX) return of_type(e.type());
     if (e.kind() == Kind::Div) return divided(op->a, *divisor);
-    return sum_of(of(op->a), atom(binary(Kind::Div, op->a, op->b)), -*divisor);
+    return plus(of(op->a), atom(binary(Kind::Div, op->a, op->b)), -*divisor);
   }
 
-  Sum unknown() { return {{{conditions_.unknown(), 1}}, 0}; }
-
   Sum of_type(Type type) {
-    const Sum sum = unknown();
+    const Sum sum = conditions_.unknown();
     if (!type.is_int_or_uint() || type.bits() > 32) return sum;
     const int64_t low = type.is_uint() ? 0 : type.min_int();
     const int64_t high = type.is_uint() ? static_cast<int64_t>(type.max_uint()) : type.max_int();
-    conditions_.at_least_zero(sum_of(sum, constant_sum(low), -1));
-    conditions_.at_least_zero(sum_of(constant_sum(high), sum, -1));
+    conditions_.at_least_zero(plus(sum, number(low), -1));
+    conditions_.at_least_zero(plus(number(high), sum, -1));
     return sum;
   }
 
@@ -179,17 +169,17 @@ class Point {
 
   // divisor * quotient <= e < divisor * (quotient + 1)
   Sum divided(const Expr& e, int64_t divisor) {
-    const Sum quotient = unknown(), rest = sum_of(of(e), quotient, -divisor);
+    const Sum quotient = conditions_.unknown(), rest = plus(of(e), quotient, -divisor);
     conditions_.at_least_zero(rest);
-    conditions_.at_least_zero(sum_of(constant_sum(divisor - 1), rest, -1));
+    conditions_.at_least_zero(plus(number(divisor - 1), rest, -1));
     return quotient;
   }
 
   Sum extreme(const Binary& op, Kind kind) {
-    const Sum result = unknown();
+    const Sum result = conditions_.unknown();
     for (const Expr& side : {op.a, op.b}) {
-      conditions_.at_least_zero(kind == Kind::Min ? sum_of(of(side), result, -1)
-                                                  : sum_of(result, of(side), -1));
+      conditions_.at_least_zero(kind == Kind::Min ? plus(of(side), result, -1)
+                                                  : plus(result, of(side), -1));
     }
     return result;
   }
@@ -210,13 +200,13 @@ class Point {
   }
 
   void compare(Kind kind, const Sum& a, const Sum& b) {
-    const Sum a_minus_b = sum_of(a, b, -1), b_minus_a = sum_of(b, a, -1);
-    const Sum one = constant_sum(1);
+    const Sum a_minus_b = plus(a, b, -1), b_minus_a = plus(b, a, -1);
+    const Sum one = number(1);
     if (kind == Kind::EQ) conditions_.is_zero(a_minus_b);
     if (kind == Kind::LE) conditions_.at_least_zero(b_minus_a);
-    if (kind == Kind::LT) conditions_.at_least_zero(sum_of(b_minus_a, one, -1));
+    if (kind == Kind::LT) conditions_.at_least_zero(plus(b_minus_a, one, -1));
     if (kind == Kind::GE) conditions_.at_least_zero(a_minus_b);
-    if (kind == Kind::GT) conditions_.at_least_zero(sum_of(a_minus_b, one, -1));
+    if (kind == Kind::GT) conditions_.at_least_zero(plus(a_minus_b, one, -1));
   }
 };
 
@@ -242,10 +232,10 @@ bool can_prove_never_meet(const MeetingPoints& points, const std::string& loop,
     Conditions conditions;
     Known shared;
     Point first(conditions, shared, points, fixed), second(conditions, shared, points, fixed);
-    Sum steps = sum_of(second.of(variable(loop)), first.of(variable(loop)), -1);
-    conditions.at_least_zero(sum_of(constant_sum(-1), steps, later));
+    Sum steps = plus(second.of(variable(loop)), first.of(variable(loop)), -1);
+    conditions.at_least_zero(plus(number(-1), steps, later));
     for (size_t d = 0; d < a.size(); d++)
-      conditions.is_zero(sum_of(first.of(a[d]), second.of(b[d]), -1));
+      conditions.is_zero(plus(first.of(a[d]), second.of(b[d]), -1));
     if (!conditions.contradict()) return false;
   }
   return true;

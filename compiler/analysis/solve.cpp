@@ -23,12 +23,12 @@ namespace {
 constexpr int most_levels =
     8;  // of min, max and division inside one another; each level may try two forms
 
-LinearForm without(const LinearForm& form, const LinearTerm& term) {
-  return plus(form, linear_form(term.atom), -term.coefficient);
+Sum without(const Sum& form, const Term& term) {
+  return plus(form, linear_form(term.atom), -term.factor);
 }
 
-LinearForm with_replaced(const LinearForm& form, const LinearTerm& term, const Expr& replacement) {
-  return plus(without(form, term), linear_form(replacement), term.coefficient);
+Sum with_replaced(const Sum& form, const Term& term, const Expr& replacement) {
+  return plus(without(form, term), linear_form(replacement), term.factor);
 }
 
 class Solver {
@@ -85,11 +85,11 @@ class Solver {
   }
 
   std::optional<Solution> solve_comparison(Kind kind, const Expr& a, const Expr& b, bool is_true) {
-    LinearForm d = plus(linear_form(a), linear_form(b), -1);
-    LinearForm less = d, greater = times(d, -1);  // a < b and a > b as "<= 0"
-    less.constant += 1;
-    greater.constant += 1;
-    auto nonpositive = [&](const LinearForm& form) { return solve_nonpositive(form); };
+    Sum d = plus(linear_form(a), linear_form(b), -1);
+    Sum less = d, greater = times(d, -1);  // a < b and a > b as "<= 0"
+    less.add_constant(1);
+    greater.add_constant(1);
+    auto nonpositive = [&](const Sum& form) { return solve_nonpositive(form); };
     switch (kind) {
       case Kind::LT:
         return is_true ? nonpositive(less) : nonpositive(times(d, -1));
@@ -108,7 +108,7 @@ class Solver {
     }
   }
 
-  std::optional<Solution> solve_nonpositive(const LinearForm& form) {
+  std::optional<Solution> solve_nonpositive(const Sum& form) {
     Expr whole = to_expr(form);
     if (!whole.defined()) return std::nullopt;
     Expr largest = engine_.bounds(whole).max;
@@ -117,11 +117,11 @@ class Solver {
   }
 
   // form <= 0, free of inner names.
-  std::optional<Solution> isolate(const LinearForm& form, int depth) {
-    if (depth == 0) return std::nullopt;
-    const LinearTerm* direct = nullptr;
-    const LinearTerm* compound = nullptr;
-    for (const LinearTerm& term : form.terms) {
+  std::optional<Solution> isolate(const Sum& form, int depth) {
+    if (depth == 0 || !form.valid) return std::nullopt;
+    const Term* direct = nullptr;
+    const Term* compound = nullptr;
+    for (const Term& term : form.terms) {
       if (!uses_variable(term.atom, variable_)) continue;
       (term.atom.as<Variable>() ? direct : compound) = &term;
     }
@@ -129,7 +129,7 @@ class Solver {
     return direct ? isolate_variable(form, *direct) : if_nonpositive(form);
   }
 
-  static std::optional<Solution> if_nonpositive(const LinearForm& form) {
+  static std::optional<Solution> if_nonpositive(const Sum& form) {
     if (form.is_constant()) return form.constant <= 0 ? anywhere() : std::nullopt;
     Expr e = to_expr(form);
     if (!e.defined()) return std::nullopt;
@@ -137,27 +137,26 @@ class Solver {
   }
 
   // The largest m with c*m + rest <= 0 for c > 0; the smallest for c < 0.
-  static Expr limit(const LinearForm& rest, int64_t c) {
-    LinearForm numerator = c > 0 ? times(rest, -1) : rest;
-    if (c < 0) numerator.constant += -c - 1;
+  static Expr limit(const Sum& rest, int64_t c) {
+    Sum numerator = c > 0 ? times(rest, -1) : rest;
+    if (c < 0) numerator.add_constant(-c - 1);
     Expr e = to_expr(numerator);
     return e.defined() ? canonical_div(e, c > 0 ? c : -c) : e;
   }
 
-  std::optional<Solution> isolate_variable(const LinearForm& form, const LinearTerm& term) {
-    Expr m = limit(without(form, term), term.coefficient);
+  std::optional<Solution> isolate_variable(const Sum& form, const Term& term) {
+    Expr m = limit(without(form, term), term.factor);
     if (!m.defined()) return std::nullopt;
-    return term.coefficient > 0 ? Solution{{{}, m}, {}} : Solution{{m, {}}, {}};
+    return term.factor > 0 ? Solution{{{}, m}, {}} : Solution{{m, {}}, {}};
   }
 
-  std::optional<Solution> isolate_compound(const LinearForm& form, const LinearTerm& term,
-                                           int depth) {
+  std::optional<Solution> isolate_compound(const Sum& form, const Term& term, int depth) {
     const Binary* op = term.atom.as<Binary>();
     Kind kind = term.atom.kind();
     if (op && (kind == Kind::Min || kind == Kind::Max)) {
       auto a = isolate(with_replaced(form, term, op->a), depth - 1);
       auto b = isolate(with_replaced(form, term, op->b), depth - 1);
-      bool needs_both = (kind == Kind::Max) == (term.coefficient > 0);
+      bool needs_both = (kind == Kind::Max) == (term.factor > 0);
       return needs_both ? all_of(a, b) : one_of(a, b);
     }
     if (op && kind == Kind::Div) {
@@ -166,24 +165,24 @@ class Solver {
     Scope<Interval> any_value;
     any_value.push(variable_, Interval::everything());
     Interval range = bounds_of(term.atom, any_value);
-    const Expr& worst = term.coefficient > 0 ? range.max : range.min;
+    const Expr& worst = term.factor > 0 ? range.max : range.min;
     if (!worst.defined()) return std::nullopt;
     return isolate(with_replaced(form, term, worst), depth - 1);
   }
 
-  std::optional<Solution> isolate_division(const LinearForm& form, const LinearTerm& term,
-                                           const Binary& op, int depth) {
+  std::optional<Solution> isolate_division(const Sum& form, const Term& term, const Binary& op,
+                                           int depth) {
     auto k = as_const_int(op.b);
-    LinearForm rest = without(form, term);
-    auto mentions = [&](const LinearTerm& t) { return uses_variable(t.atom, variable_); };
+    Sum rest = without(form, term);
+    auto mentions = [&](const Term& t) { return uses_variable(t.atom, variable_); };
     if (!k || *k <= 0 || std::any_of(rest.terms.begin(), rest.terms.end(), mentions))
       return std::nullopt;
-    Expr m = limit(rest, term.coefficient);
+    Expr m = limit(rest, term.factor);
     if (!m.defined()) return std::nullopt;
-    LinearForm p = linear_form(op.a);
-    if (term.coefficient > 0) {
-      LinearForm above = plus(p, linear_form(m), -*k);
-      above.constant -= *k - 1;
+    Sum p = linear_form(op.a);
+    if (term.factor > 0) {
+      Sum above = plus(p, linear_form(m), -*k);
+      above.add_constant(1 - *k);
       return isolate(above, depth - 1);
     }
     return isolate(plus(times(p, -1), linear_form(m), *k), depth - 1);
@@ -203,18 +202,18 @@ std::optional<Solution> solve_for(const Expr& condition, const std::string& vari
 std::optional<LinearDecomposition> decompose(const Expr& e,
                                              const std::vector<std::string>& variables) {
   if (!has_linear_form(e.type())) return std::nullopt;
-  LinearForm form = linear_form(e);
+  Sum form = linear_form(e);
   LinearDecomposition result;
   std::unordered_set<std::string> names(variables.begin(), variables.end());
-  LinearForm rest{form.type, {}, form.constant};
-  for (const LinearTerm& term : form.terms) {
+  Sum rest = linear_sum(form.type, form.constant);
+  for (const Term& term : form.terms) {
     const Variable* v = term.atom.as<Variable>();
     if (v && names.count(v->name)) continue;
     if (uses_any_variable(term.atom, names)) return std::nullopt;
-    rest.terms.push_back(term);
+    rest.add(term.atom, term.factor);
   }
   for (const std::string& name : variables)
-    result.coefficients.emplace_back(name, form.coefficient_of(name));
+    result.coefficients.emplace_back(name, form.factor_of(name));
   result.rest = to_expr(rest);
   if (!result.rest.defined()) return std::nullopt;
   return result;

@@ -9,21 +9,9 @@
 
 namespace retrograde::ir {
 
-namespace {
-
 int64_t wrap_int(int bits, int64_t value) {
   if (bits >= 64) return value;
   return static_cast<int64_t>(static_cast<uint64_t>(value) << (64 - bits)) >> (64 - bits);
-}
-
-// Wraps modulo 2^64 first: signed overflow in C++ is undefined.
-uint64_t wrap_uint(int bits, uint64_t value) {
-  return bits >= 64 ? value : value & (~uint64_t{0} >> (64 - bits));
-}
-
-Scalar of_pattern(Type type, uint64_t bits) {
-  return type.is_int() ? Scalar::of_int(type, static_cast<int64_t>(bits))
-                       : Scalar::of_uint(type, bits);
 }
 
 int64_t euclidean_div(int64_t a, int64_t b) {
@@ -40,6 +28,18 @@ int64_t euclidean_mod(int64_t a, int64_t b) {
   if (remainder >= 0) return remainder;
   return static_cast<int64_t>(static_cast<uint64_t>(remainder) +
                               (b > 0 ? static_cast<uint64_t>(b) : -static_cast<uint64_t>(b)));
+}
+
+namespace {
+
+// Wraps modulo 2^64 first: signed overflow in C++ is undefined.
+uint64_t wrap_uint(int bits, uint64_t value) {
+  return bits >= 64 ? value : value & (~uint64_t{0} >> (64 - bits));
+}
+
+Scalar of_pattern(Type type, uint64_t bits) {
+  return type.is_int() ? Scalar::of_int(type, static_cast<int64_t>(bits))
+                       : Scalar::of_uint(type, bits);
 }
 
 template <class T>

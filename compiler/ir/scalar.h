@@ -27,6 +27,10 @@ struct Scalar {
 };
 
 double round_to_type(Type type, double value);
+int64_t wrap_int(int bits, int64_t value);  // to a signed integer
+// Rounds so that the remainder is never negative; by 0: 0.
+int64_t euclidean_div(int64_t a, int64_t b);
+int64_t euclidean_mod(int64_t a, int64_t b);
 
 // Both operands of one scalar type. Comparisons give bool.
 Scalar eval_binary(Kind kind, const Scalar& a, const Scalar& b);

@@ -25,7 +25,7 @@ constexpr int64_t limit = int64_t{1} << 31;  // products of two stay inside int6
 Congruence reduced(int64_t modulus, int64_t remainder) {
   if (modulus < 0) modulus = -modulus;
   if (modulus >= limit || remainder >= limit || remainder <= -limit) return unknown;
-  return {modulus, modulus == 0 ? remainder : floor_mod(remainder, modulus)};
+  return {modulus, modulus == 0 ? remainder : euclidean_mod(remainder, modulus)};
 }
 
 Congruence plus(const Congruence& a, const Congruence& b) {
@@ -40,7 +40,7 @@ Congruence product(const Congruence& a, const Congruence& b) {
 
 Congruence quotient(const Congruence& a, int64_t divisor) {
   if (a.modulus % divisor != 0) return unknown;
-  return reduced(a.modulus / divisor, floor_div(a.remainder, divisor));
+  return reduced(a.modulus / divisor, euclidean_div(a.remainder, divisor));
 }
 
 Congruence either(const Congruence& a, const Congruence& b) {
@@ -52,7 +52,7 @@ Congruence either(const Congruence& a, const Congruence& b) {
 
 std::optional<int64_t> Congruence::modulo(int64_t divisor) const {
   if (modulus % divisor != 0) return std::nullopt;
-  return floor_mod(remainder, divisor);
+  return euclidean_mod(remainder, divisor);
 }
 
 Congruence Facts::congruence(const Expr& e) {
@@ -81,7 +81,8 @@ void Facts::assume_congruent(const Expr& remainder, const Expr& value) {
   if (sum.terms.size() != 1 || sum.terms[0].factor != 1) return;
   const auto* variable = sum.terms[0].atom.as<Variable>();
   if (!variable) return;
-  congruent_.push_back({variable->name, {*divisor, floor_mod(*known - sum.constant, *divisor)}});
+  congruent_.push_back(
+      {variable->name, {*divisor, euclidean_mod(*known - sum.constant, *divisor)}});
 }
 
 // What a condition says of a variable is also true of what lets around the condition made of it.

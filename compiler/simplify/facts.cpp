@@ -41,7 +41,7 @@ int64_t multiply_ends(int64_t a, int64_t b) {
   return saturate(__int128{a} * b);
 }
 
-int64_t divide_ends(int64_t a, int64_t b) { return is_infinite(a) ? a : floor_div(a, b); }
+int64_t divide_ends(int64_t a, int64_t b) { return is_infinite(a) ? a : euclidean_div(a, b); }
 
 }  // namespace
 
@@ -266,7 +266,7 @@ void Facts::add(uint64_t key, Known known) {
 void Facts::assume_at_most(Sum sum, int64_t bound) {
   if (!sum.valid || sum.is_constant()) return;
   const int64_t divisor = common_factor(sum);
-  bound = floor_div(saturate(__int128{bound} - sum.constant), divisor);
+  bound = euclidean_div(saturate(__int128{bound} - sum.constant), divisor);
   const uint64_t key = terms_key(sum.terms, divisor);
   for (Term& term : sum.terms) term.factor /= divisor;
   add(key, Known{std::move(sum.terms), bound, {}, true});

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "ir/expr.h"
-#include "simplify/sum.h"
+#include "ir/sum.h"
 
 namespace retrograde::ir {
 
@@ -16,6 +16,7 @@ namespace retrograde::ir {
 struct ConstantRange {
   int64_t min = INT64_MIN, max = INT64_MAX;
   bool is_point() const { return min == max; }
+  int64_t extent() const { return max - min + 1; }  // of a bounded one
   bool within(int64_t low, int64_t high) const { return min >= low && max <= high; }
   static ConstantRange of(Type type);
   static ConstantRange point(int64_t value) { return {value, value}; }

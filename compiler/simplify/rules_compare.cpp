@@ -1,5 +1,6 @@
 // Comparisons. Of index types everything becomes a question about one sum: sum < 0 or sum == 0.
 #include "ir/build.h"
+#include "ir/scalar.h"
 #include "ir/equal.h"
 #include "simplify/simplifier.h"
 
@@ -30,7 +31,7 @@ void divide_by_common_factor(Sum& sum) {
   const int64_t g = common_factor(sum);
   if (g <= 1) return;
   for (Term& term : sum.terms) term.factor /= g;
-  sum.constant = floor_div(sum.constant, g);
+  sum.constant = euclidean_div(sum.constant, g);
 }
 
 }  // namespace

@@ -3,6 +3,7 @@
 #include <numeric>
 
 #include "ir/build.h"
+#include "ir/scalar.h"
 #include "simplify/simplifier.h"
 
 namespace retrograde::ir {
@@ -14,8 +15,8 @@ struct Split {
   Sum quotient, rest;
 };
 Split split_by(const Sum& x, int64_t c) {
-  Split split{constant_sum(x.type, floor_div(x.constant, c)),
-              constant_sum(x.type, floor_mod(x.constant, c))};
+  Split split{constant_sum(x.type, euclidean_div(x.constant, c)),
+              constant_sum(x.type, euclidean_mod(x.constant, c))};
   for (const Term& term : x.terms) {
     if (term.factor % c == 0) {
       split.quotient.add(term.atom, term.factor / c);
@@ -50,8 +51,8 @@ Expr Simplifier::mod(const Expr& a, const Expr& b) {
 Expr Simplifier::div_by(const Expr& a, int64_t c) {
   const ConstantRange range = facts_.range(a);
   if (range.min != INT64_MIN && range.max != INT64_MAX &&
-      floor_div(range.min, c) == floor_div(range.max, c)) {
-    return constant(a, floor_div(range.min, c));
+      euclidean_div(range.min, c) == euclidean_div(range.max, c)) {
+    return constant(a, euclidean_div(range.min, c));
   }
   const auto* inner = a.as<Div>();
   const std::optional<int64_t> inner_divisor = inner ? as_const_int(inner->b) : std::nullopt;
@@ -70,7 +71,7 @@ Expr Simplifier::div_by(const Expr& a, int64_t c) {
   Sum terms = split.rest;
   terms.constant = 0;
   if (const std::optional<int64_t> r = facts_.congruence(terms).modulo(c)) {
-    split.quotient.add_constant(floor_div(*r + split.rest.constant, c));
+    split.quotient.add_constant(euclidean_div(*r + split.rest.constant, c));
     split.rest.constant = 0;
   }
   const Sum rest = sum_of(div_atom(split.rest, c));
@@ -103,15 +104,15 @@ Expr Simplifier::div_atom(const Sum& rest, int64_t c) {
   const auto as_constant = [&](int64_t value) { return make_const(rest.type, value); };
   if (rest.is_constant()) return as_constant(0);
   const int64_t low = facts_.lower_bound(rest), high = facts_.upper_bound(rest);
-  if (low != INT64_MIN && high != INT64_MAX && floor_div(low, c) == floor_div(high, c)) {
-    return as_constant(floor_div(low, c));
+  if (low != INT64_MIN && high != INT64_MAX && euclidean_div(low, c) == euclidean_div(high, c)) {
+    return as_constant(euclidean_div(low, c));
   }
   if (const std::optional<Sum> base = multiple_below(rest, c))
     return apply(Kind::Div, rebuild(*base), as_constant(c));
   // (g x + k) / (g c) => (x + k / g) / c
   const int64_t g = std::gcd(common_factor(rest), c);
   if (g > 1) {
-    Sum reduced = constant_sum(rest.type, floor_div(rest.constant, g));
+    Sum reduced = constant_sum(rest.type, euclidean_div(rest.constant, g));
     for (const Term& term : rest.terms) reduced.add(term.atom, term.factor / g);
     return apply(Kind::Div, rebuild(reduced), as_constant(c / g));
   }
@@ -166,21 +167,21 @@ Expr Simplifier::mod_by(const Expr& a, int64_t c) {
     return apply(Kind::Mod, rebuild(split_by(opened, c).rest), constant(a, c));
   }
   for (Term& term : rest.terms) {  // factors into (-c, c): -1 stays, 5 % 4 becomes 1
-    if (term.factor >= c || term.factor <= -c) term.factor = floor_mod(term.factor, c);
+    if (term.factor >= c || term.factor <= -c) term.factor = euclidean_mod(term.factor, c);
   }
   if (rest.is_constant()) return constant(a, rest.constant);
   const int64_t low = facts_.lower_bound(rest), high = facts_.upper_bound(rest);
-  if (low != INT64_MIN && high != INT64_MAX && floor_div(low, c) == floor_div(high, c)) {
-    rest.add_constant(-floor_div(low, c) * c);
+  if (low != INT64_MIN && high != INT64_MAX && euclidean_div(low, c) == euclidean_div(high, c)) {
+    rest.add_constant(-euclidean_div(low, c) * c);
     if (rest.valid) return rebuild(rest);
   }
   // (g x + g k + j) % (g c) => g ((x + k) % c) + j, with 0 <= j < g
   const int64_t g = std::gcd(common_factor(rest), c);
   if (g > 1 && g < c) {
-    Sum reduced = constant_sum(rest.type, floor_div(rest.constant, g));
+    Sum reduced = constant_sum(rest.type, euclidean_div(rest.constant, g));
     for (const Term& term : rest.terms) reduced.add(term.atom, term.factor / g);
     Sum result = times(sum_of(apply(Kind::Mod, rebuild(reduced), constant(a, c / g))), g);
-    result.add_constant(floor_mod(rest.constant, g));
+    result.add_constant(euclidean_mod(rest.constant, g));
     if (result.valid) return rebuild(result);
   }
   return binary(Kind::Mod, to_expr(rest), constant(a, c));

@@ -17,7 +17,7 @@
 #include "ir/expr.h"
 #include "simplify/facts.h"
 #include "simplify/simplify.h"
-#include "simplify/sum.h"
+#include "ir/sum.h"
 
 namespace retrograde::ir {
 

@@ -171,6 +171,22 @@ TEST_F(IntervalTest, LinearFormsGatherTerms) {
   EXPECT_FALSE(decompose(x * x, {"x"}));
 }
 
+// Where a number would not fit 64 bits nothing is known, and nothing overflows.
+TEST_F(IntervalTest, NumbersAtTheEndOfInt64) {
+  constexpr int64_t most = INT64_MAX;
+  const Expr a = variable("a", Int(64)), b = variable("b", Int(64));
+  EXPECT_EQ(constant_difference(a + most, a + (most - 1)), 1);
+  EXPECT_FALSE(constant_difference(a + most, a - 2));
+  EXPECT_FALSE(nonnegative_where(a + most > b - 5));
+  EXPECT_TRUE(solve_for(a + most <= b, "a", Scope<Interval>()));
+  EXPECT_FALSE(solve_for(a + most < b, "a", Scope<Interval>()));
+  const Expr shifted = min(a + 10, b) + most;
+  EXPECT_EQ(print(canonical_min(shifted, b)), print(min(shifted, b)));
+  EXPECT_EQ(print(canonical(a * 3 * most)), print(a * 3 * most));
+  scope.push("a", {variable("low", Int(64)), {}});
+  EXPECT_EQ(bounds(select(a + most < b, a, cast(Int(64), 0))), "[min(low:int64, 0_i64), ?]");
+}
+
 TEST_F(IntervalTest, ConditionsAreSolved) {
   Scope<Interval> inner;
   inner.push("i", {0, 7});

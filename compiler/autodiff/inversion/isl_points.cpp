@@ -31,10 +31,10 @@ isl_stat collect(__isl_take isl_point* p, void* user) {
 
 }  // namespace
 
-std::optional<std::vector<IntRange>> ranges_of(const isl::set& s) {
+std::optional<std::vector<ConstantRange>> ranges_of(const isl::set& s) {
   if (isl_set_is_empty(s.get()) == isl_bool_true || isl_set_is_bounded(s.get()) != isl_bool_true)
     return std::nullopt;
-  std::vector<IntRange> result;
+  std::vector<ConstantRange> result;
   for (int d = 0, n = isl_set_dim(s.get(), isl_dim_set); d < n; ++d) {
     auto min = to_int64(isl_set_dim_min_val(s.copy(), d));
     auto max = to_int64(isl_set_dim_max_val(s.copy(), d));

@@ -7,15 +7,12 @@
 #include <optional>
 #include <vector>
 
+#include "simplify/facts.h"
+
 namespace retrograde::ir {
 
-struct IntRange {
-  int64_t min = 0, max = 0;
-  int64_t extent() const { return max - min + 1; }
-};
-
 // Least and largest of each coordinate; nullopt when one has no bound, or the set is empty.
-std::optional<std::vector<IntRange>> ranges_of(const isl::set& s);
+std::optional<std::vector<ConstantRange>> ranges_of(const isl::set& s);
 
 // All elements in lexicographic order; nullopt when there are more than `most`.
 std::optional<std::vector<std::vector<int64_t>>> points_of(const isl::set& s, int64_t most);

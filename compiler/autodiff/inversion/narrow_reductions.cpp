@@ -32,10 +32,10 @@ class Narrower {
 
  private:
   bool becomes_an_end(const Expr& condition) {
-    std::optional<LinearForm> form = nonnegative_where(condition);
+    std::optional<Sum> form = nonnegative_where(condition);
     if (!form) return false;
     for (ReductionVariable& r : g_.rdom->vars) {
-      const int64_t c = form->coefficient_of(r.var);
+      const int64_t c = form->factor_of(r.var);
       if (c != 1 && c != -1) continue;
       Expr end = end_of(*form, r, c);
       if (as_const_int(r.extent) || !end.defined()) return false;
@@ -45,9 +45,8 @@ class Narrower {
     return false;
   }
   // Of c * r + rest >= 0; undefined where the rest is not the same for the whole loop.
-  Expr end_of(const LinearForm& form, const ReductionVariable& r, int64_t c) const {
-    LinearForm alone{form.type, {{variable(r.var), c}}, 0};
-    Expr end = to_expr(times(plus(form, alone, -1), -c));
+  Expr end_of(const Sum& form, const ReductionVariable& r, int64_t c) const {
+    Expr end = to_expr(times(plus(form, linear_sum(variable(r.var), c), -1), -c));
     return !end.defined() || uses_any_variable(end, variables_) || depends_on_data(end) ? Expr()
                                                                                         : end;
   }

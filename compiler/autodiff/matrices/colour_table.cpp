@@ -15,10 +15,10 @@ constexpr int64_t many_entries = 20'000;
 
 // Elements of a box by number, dimension 0 innermost.
 struct Numbering {
-  std::vector<IntRange> ranges;
+  std::vector<ConstantRange> ranges;
   int64_t size() const {
     int64_t result = 1;
-    for (const IntRange& r : ranges) result = std::min(result * r.extent(), many_entries + 1);
+    for (const ConstantRange& r : ranges) result = std::min(result * r.extent(), many_entries + 1);
     return result;
   }
   int number(const int64_t* point) const {
@@ -31,7 +31,7 @@ struct Numbering {
 
 Buffer<int> table_over(const Numbering& box, const std::vector<int64_t>& more) {
   std::vector<int> sizes, mins;
-  for (const IntRange& r : box.ranges) {
+  for (const ConstantRange& r : box.ranges) {
     sizes.push_back(static_cast<int>(r.extent()));
     mins.push_back(static_cast<int>(r.min));
   }
@@ -112,12 +112,9 @@ void add_alone(ColourTable& table, const Numbering& box, const Adjacency& graph,
   }
 }
 
-Numbering around(const std::vector<IntRange>& a, const std::vector<IntRange>& b) {
+Numbering around(const std::vector<ConstantRange>& a, const std::vector<ConstantRange>& b) {
   Numbering result{a};
-  for (size_t d = 0; d < a.size(); ++d) {
-    result.ranges[d].min = std::min(a[d].min, b[d].min);
-    result.ranges[d].max = std::max(a[d].max, b[d].max);
-  }
+  for (size_t d = 0; d < a.size(); ++d) result.ranges[d] = hull(a[d], b[d]);
   return result;
 }
 

@@ -91,7 +91,7 @@ std::optional<Colouring> Compressed::linear_colours(const isl::set& differences,
   }
   std::vector<int64_t> extents;
   int64_t all_differences = 1;
-  for (const IntRange& r : *ranges) {
+  for (const ConstantRange& r : *ranges) {
     extents.push_back(std::max(std::abs(r.min), std::abs(r.max)) + 1);
     all_differences = std::min(all_differences * (2 * extents.back() - 1), many_differences + 1);
   }
@@ -157,11 +157,11 @@ Expr Compressed::entry(const FuncPtr& all, const std::vector<Expr>& row,
   return make_select(colours_.table->is_alone(row, colours_.of(column)), direct, at(column, row));
 }
 
-std::optional<std::vector<IntRange>> Compressed::offsets() const {
+std::optional<std::vector<ConstantRange>> Compressed::offsets() const {
   if (query_.seed->args.size() != query_.output->args.size()) return std::nullopt;
   isl::set deltas = pattern_.deltas();
   if (isl_set_is_empty(deltas.get()) == isl_bool_true)
-    return std::vector<IntRange>(query_.seed->args.size());
+    return std::vector<ConstantRange>(query_.seed->args.size(), ConstantRange::point(0));
   return ranges_of(deltas);
 }
 

@@ -40,7 +40,7 @@ class Compressed {
   Expr may_be_nonzero(const std::vector<Expr>& row, const std::vector<Expr>& column) const;
   // Least and largest x - y of entries, one a dimension; nullopt where they have no bounds, or rows
   // and columns differ in dimensions.
-  std::optional<std::vector<IntRange>> offsets() const;
+  std::optional<std::vector<ConstantRange>> offsets() const;
 
  private:
   explicit Compressed(const CompressionQuery& query);

@@ -112,22 +112,22 @@ class ClampDropper : public Rewriter {
   // The operand that min or max is, where a fact says so.
   Expr decided(const Binary& n, const Expr& e) const {
     if (!has_linear_form(n.type) || !is_small(e)) return e;
-    const LinearForm difference =
+    const Sum difference =
         plus(linear_form(opened(without_lets(n.a))), linear_form(opened(without_lets(n.b))), -1);
     const bool is_min = n.kind == Kind::Min;
     if (is_nonnegative(difference)) return is_min ? n.b : n.a;
     if (is_nonnegative(times(difference, -1))) return is_min ? n.a : n.b;
     return e;
   }
-  bool is_nonnegative(const LinearForm& form) const {
-    return std::any_of(facts_.begin(), facts_.end(), [&](const LinearForm& fact) {
+  bool is_nonnegative(const Sum& form) const {
+    return std::any_of(facts_.begin(), facts_.end(), [&](const Sum& fact) {
       if (fact.type != form.type) return false;
-      const LinearForm rest = plus(form, fact, -1);
-      return rest.is_constant() && rest.constant >= 0;
+      const Sum rest = plus(form, fact, -1);
+      return rest.valid && rest.is_constant() && rest.constant >= 0;
     });
   }
 
-  std::vector<LinearForm> facts_;  // sums that are at least 0
+  std::vector<Sum> facts_;  // sums that are at least 0
   Substitution lets_;
   int loops_ = 0;
 };

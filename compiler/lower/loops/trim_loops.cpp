@@ -172,10 +172,9 @@ class Trimmer {
     if (!may_end_elsewhere(loop_) || !is_known_outside(condition)) return false;
     auto form = nonnegative_where(condition);
     if (!form || form->type != loop_.min.type()) return false;
-    const int64_t c = form->coefficient_of(loop_.name);
+    const int64_t c = form->factor_of(loop_.name);
     if (c == 0) return false;
-    LinearForm own{form->type, {{variable(loop_.name, form->type), 1}}, 0};
-    Expr rest = to_expr(plus(*form, own, -c));
+    Expr rest = to_expr(plus(*form, linear_sum(variable(loop_.name, form->type)), -c));
     if (!rest.defined() || uses_any_variable(rest, {loop_.name})) return false;
     Expr quotient = canonical_div(rest, c > 0 ? c : -c);
     if (c > 0) {

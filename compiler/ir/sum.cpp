@@ -1,29 +1,16 @@
 // Gathering and rebuilding sums.
-#include "simplify/sum.h"
+#include "ir/sum.h"
 
 #include <algorithm>
 #include <numeric>
 
 #include "ir/build.h"
 #include "ir/equal.h"
+#include "ir/scalar.h"
 
 namespace retrograde::ir {
 
 namespace {
-
-int64_t sign_extend(int bits, int64_t value) {
-  if (bits >= 64) return value;
-  return static_cast<int64_t>(static_cast<uint64_t>(value) << (64 - bits)) >> (64 - bits);
-}
-
-// Puts `value` into the type: wraps, or makes the sum of an index type invalid when it becomes
-// extreme.
-int64_t fit(Sum& sum, __int128 value) {
-  const int64_t wrapped = sign_extend(sum.type.bits(), static_cast<int64_t>(value));
-  if (is_index_type(sum.type) && (wrapped != value || is_extreme(sum.type, wrapped)))
-    sum.valid = false;
-  return wrapped;
-}
 
 // Adds factor * e; false when that takes too many steps or terms.
 class Gatherer {
@@ -33,7 +20,7 @@ class Gatherer {
   bool gather(const Expr& e, int64_t factor) {
     if (++steps_ > 3 * max_terms) return false;
     if (const std::optional<int64_t> value = as_const_int(e)) {
-      sum_.constant = fit(sum_, __int128{sum_.constant} + __int128{*value} * factor);
+      sum_.add_constant(__int128{*value} * factor);
       return true;
     }
     if (const auto* add = e.as<Add>()) return gather(add->a, factor) && gather(add->b, factor);
@@ -108,9 +95,6 @@ std::vector<Expr> operands_of(Kind kind, const Expr& e) {
   return operands;
 }
 
-int64_t floor_div(int64_t a, int64_t b) { return a / b - (a % b < 0 ? 1 : 0); }
-int64_t floor_mod(int64_t a, int64_t b) { return a % b + (a % b < 0 ? b : 0); }
-
 const Term* Sum::find(const Expr& atom) const {
   for (const Term& term : terms) {
     if (equal(term.atom, atom)) return &term;
@@ -118,27 +102,66 @@ const Term* Sum::find(const Expr& atom) const {
   return nullptr;
 }
 
-void Sum::add(const Expr& atom, int64_t factor) {
-  for (size_t i = 0; i < terms.size(); ++i) {
-    if (!equal(terms[i].atom, atom)) continue;
-    terms[i].factor = fit(*this, __int128{terms[i].factor} + factor);
-    if (terms[i].factor == 0) terms.erase(terms.begin() + static_cast<std::ptrdiff_t>(i));
-    return;
+int64_t Sum::factor_of(const std::string& variable) const {
+  for (const Term& term : terms) {
+    const auto* v = term.atom.as<Variable>();
+    if (v && v->name == variable) return term.factor;
   }
-  const int64_t fitted = fit(*this, factor);
-  if (fitted != 0) terms.push_back({atom, fitted});
+  return 0;
 }
 
-void Sum::add_constant(int64_t value) { constant = fit(*this, __int128{constant} + value); }
+// Puts `value` into the type: wraps, or makes the sum invalid. Every number of a linear sum has a
+// negation.
+int64_t Sum::fit(__int128 value) {
+  const int64_t wrapped = wrap_int(is_linear ? 64 : type.bits(), static_cast<int64_t>(value));
+  if (is_linear) {
+    valid = valid && wrapped == value && wrapped != INT64_MIN;
+  } else if (is_index_type(type)) {
+    valid = valid && wrapped == value && !is_extreme(type, wrapped);
+  }
+  return wrapped;
+}
+
+void Sum::add(const Expr& atom, int64_t factor) {
+  const auto place = is_linear ? std::lower_bound(terms.begin(), terms.end(), atom,
+                                                  [](const Term& term, const Expr& sought) {
+                                                    return compare(term.atom, sought) < 0;
+                                                  })
+                               : std::find_if(terms.begin(), terms.end(), [&](const Term& term) {
+                                   return equal(term.atom, atom);
+                                 });
+  const bool is_known = place != terms.end() && equal(place->atom, atom);
+  const int64_t fitted = fit(__int128{is_known ? place->factor : 0} + factor);
+  if (!is_known) {
+    if (fitted != 0) terms.insert(place, {atom, fitted});
+  } else if (fitted != 0) {
+    place->factor = fitted;
+  } else {
+    terms.erase(place);
+  }
+}
+
+void Sum::add_constant(__int128 value) { constant = fit(constant + value); }
 
 void Sum::add(const Sum& other, int64_t factor) {
   valid = valid && other.valid;
   for (const Term& term : other.terms) {
-    const __int128 product = __int128{term.factor} * factor;
-    const int64_t fitted = fit(*this, product);
+    const int64_t fitted = fit(__int128{term.factor} * factor);
     if (fitted != 0) add(term.atom, fitted);
   }
-  constant = fit(*this, __int128{constant} + __int128{other.constant} * factor);
+  add_constant(__int128{other.constant} * factor);
+}
+
+Sum linear_sum(Type type, int64_t constant) {
+  Sum result{type, {}, 0, true, true};
+  result.add_constant(constant);
+  return result;
+}
+
+Sum linear_sum(const Expr& atom, int64_t factor) {
+  Sum result = linear_sum(atom.type(), 0);
+  result.add(atom, factor);
+  return result;
 }
 
 Sum sum_of(const Expr& e) {
@@ -158,8 +181,7 @@ Sum plus(const Sum& a, const Sum& b, int64_t factor_of_b) {
 }
 
 Sum times(const Sum& a, int64_t factor) {
-  Sum result;
-  result.type = a.type;
+  Sum result{a.type, {}, 0, true, a.is_linear};
   result.add(a, factor);
   return result;
 }
@@ -177,40 +199,60 @@ int64_t common_factor(const Sum& sum) {
   return result;
 }
 
-Expr to_expr(const Sum& sum) {
+namespace {
+
+bool fits_type(const Sum& sum) {
+  const Type type = sum.type;
+  return sum.valid && type.can_represent(sum.constant) &&
+         std::all_of(sum.terms.begin(), sum.terms.end(), [&](const Term& term) {
+           return type.can_represent(term.factor) && type.can_represent(-term.factor);
+         });
+}
+
+std::vector<Term> in_order_of_text(const Sum& sum) {
   std::vector<Term> terms = sum.terms;
-  std::sort(terms.begin(), terms.end(), [](const Term& a, const Term& b) {
-    if ((a.factor > 0) != (b.factor > 0)) return a.factor > 0;
-    return canonical_less(a.atom, b.atom);
-  });
+  if (!sum.is_linear) {
+    std::sort(terms.begin(), terms.end(),
+              [](const Term& a, const Term& b) { return canonical_less(a.atom, b.atom); });
+  }
+  std::stable_partition(terms.begin(), terms.end(), [](const Term& t) { return t.factor > 0; });
+  return terms;
+}
+
+}  // namespace
+
+Expr to_expr(const Sum& sum) {
+  const bool is_atom = sum.terms.size() == 1 && sum.terms[0].factor == 1 && sum.constant == 0;
+  if (sum.is_linear && is_atom && sum.valid) return sum.terms[0].atom;
+  if (sum.is_linear && !fits_type(sum)) return {};
   const auto scaled = [&](const Expr& atom, int64_t factor) {
     return binary(Kind::Mul, atom, make_const(sum.type, factor));
   };
+  const auto negatable = [&](int64_t value) {
+    return value != INT64_MIN && !(sum.type.is_int() && value == sum.type.min_int());
+  };
   int64_t constant = sum.constant;
   Expr result;
-  for (const auto& [atom, factor] : terms) {
+  for (const auto& [atom, factor] : in_order_of_text(sum)) {
     if (factor > 0) {
       result =
           result.defined() ? binary(Kind::Add, result, scaled(atom, factor)) : scaled(atom, factor);
       continue;
     }
-    if (!result.defined() && (constant > 0 || factor == -1))
-      result = make_const(sum.type, std::exchange(constant, 0));
-    const bool negatable =
-        factor != INT64_MIN && !(sum.type.is_int() && factor == sum.type.min_int());
+    const bool leads = sum.is_linear ? constant != 0 : constant > 0 || factor == -1;
+    if (!result.defined() && leads) result = make_const(sum.type, std::exchange(constant, 0));
     if (!result.defined())
       result = scaled(atom, factor);
-    else if (negatable)
+    else if (negatable(factor))
       result = new Sub(sum.type, result, scaled(atom, -factor));
     else
       result = binary(Kind::Add, result, scaled(atom, factor));
   }
   if (!result.defined()) return make_const(sum.type, constant);
   // The most negative constant has no negation in a signed type.
-  const bool negatable = constant < 0 && constant != INT64_MIN &&
-                         !(sum.type.is_int() && constant == sum.type.min_int());
-  return negatable ? binary(Kind::Sub, result, make_const(sum.type, -constant))
-                   : binary(Kind::Add, result, make_const(sum.type, constant));
+  return constant < 0 && negatable(constant)
+             ? binary(Kind::Sub, result, make_const(sum.type, -constant))
+             : binary(Kind::Add, result, make_const(sum.type, constant));
 }
 
 }  // namespace retrograde::ir

@@ -1,10 +1,17 @@
-// Integer expressions as sums: factor1 * atom1 + factor2 * atom2 + ... + constant.
-// All integer types: sums are exact modulo 2^bits. Index types (Int(32), Int(64)) do not overflow;
-// there a factor or constant beyond half of the type's range makes the sum invalid: moving a
-// sentinel like INT_MAX to the other side of a comparison would overflow where the program did not.
+// Integer expressions as sums: factor1 * atom1 + factor2 * atom2 + ... + constant. Of two kinds:
+//
+// Sums as they stand (sum_of), of all integer types: exact modulo 2^bits. Index types (Int(32),
+// Int(64)) do not overflow; there a factor or constant beyond half of the type's range makes the sum
+// invalid: moving a sentinel like INT_MAX to the other side of a comparison would overflow where the
+// program did not. Terms are in the order in which they were found.
+//
+// Linear sums (analysis/linear.h), of index types, which take divisions apart: numbers are those of
+// 64 bits whatever the type; one that does not fit makes the sum invalid. Terms are in structural
+// order: equal sums have equal text.
 #pragma once
 
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "ir/expr.h"
@@ -19,16 +26,22 @@ struct Term {
 struct Sum {
   Type type = Int(32);
   std::vector<Term> terms;  // atoms structurally different, no factor 0
-  int64_t constant =
-      0;  // factors and constant are sign-extended from the type's width, unsigned types too
+  // Factors and constant are sign-extended from the type's width, unsigned types too.
+  int64_t constant = 0;
   bool valid = true;
+  bool is_linear = false;
 
   bool is_constant() const { return terms.empty(); }
   bool may_be_extreme() const;  // some atom is
   const Term* find(const Expr& atom) const;
+  // Of the atom that is this Variable, else 0.
+  int64_t factor_of(const std::string& variable) const;
   void add(const Expr& atom, int64_t factor);
-  void add_constant(int64_t value);
+  void add_constant(__int128 value);
   void add(const Sum& other, int64_t factor);
+
+ private:
+  int64_t fit(__int128 value);
 };
 
 // Larger sums are left alone, so that a chain of n additions costs O(n).
@@ -44,10 +57,14 @@ bool may_be_extreme(const Expr& e, int depth);
 
 // Of an expression whose sums are already gathered, as simplified ones are.
 Sum sum_of(const Expr& e);
+// `constant`, and factor * atom, to be added to.
+Sum linear_sum(Type type, int64_t constant);
+Sum linear_sum(const Expr& atom, int64_t factor = 1);
 Sum plus(const Sum& a, const Sum& b, int64_t factor_of_b = 1);
 Sum times(const Sum& a, int64_t factor);
 Sum constant_sum(Type type, int64_t value);
-// The terms in structural order, positive ones first, then the constant.
+// Positive terms first, then the constant; of linear sums in structural order, else in that of
+// canonical_less. Undefined when a number of a linear sum does not fit the type.
 Expr to_expr(const Sum& sum);
 // The greatest common divisor of the factors; 0 when there are none.
 int64_t common_factor(const Sum& sum);
@@ -56,8 +73,5 @@ int64_t common_factor(const Sum& sum);
 bool canonical_less(const Expr& a, const Expr& b);
 // The operands of a nest of the same associative operator; e itself when the nest is large.
 std::vector<Expr> operands_of(Kind kind, const Expr& e);
-
-int64_t floor_div(int64_t a, int64_t b);  // b > 0
-int64_t floor_mod(int64_t a, int64_t b);  // b > 0
 
 }  // namespace retrograde::ir
