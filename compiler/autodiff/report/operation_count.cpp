@@ -4,6 +4,7 @@
 #include <cmath>
 #include <unordered_map>
 
+#include "autodiff/schedule/cost_estimate.h"
 #include "autodiff/schedule/default_schedule.h"
 #include "autodiff/schedule/distinct_nodes.h"
 #include "autodiff/sweeps/local_derivative.h"
@@ -24,24 +25,6 @@ std::string number_text(double value) {
   return whole ? std::to_string(static_cast<int64_t>(value)) : text(value);
 }
 
-Operations of_operator(const Call& call) {
-  const Work& work = op_info(call.op).work;
-  return {.adds = static_cast<double>(work.adds),
-          .mults = static_cast<double>(work.mults),
-          .nonlinear = static_cast<double>(work.functions)};
-}
-
-// Work of the node itself, where floats take part in it.
-Operations operations_of_node(const Expr& e) {
-  bool floating = e.type().is_float();
-  for_each_child(e, [&](const Expr& child) { floating |= child.type().is_float(); });
-  if (!floating) return {};
-  if (const auto* call = e.as<Call>())
-    return call->call_type == CallType::Operator ? of_operator(*call) : Operations{};
-  if (e.as<Mul>() || e.as<Div>() || e.as<Mod>()) return {.mults = 1};
-  return e.as<Binary>() || e.as<Select>() || e.as<Cast>() ? Operations{.adds = 1} : Operations{};
-}
-
 // One iteration of a stage, or one value of a Func: its own work, and what it reads.
 struct Body {
   Operations own;
@@ -57,7 +40,10 @@ Body body_of(const std::vector<Expr>& roots) {
   const DistinctNodes distinct(plain);
   Body body;
   for (const Expr& node : distinct.nodes()) {
-    body.own += operations_of_node(node);
+    const Work work = work_of(node);
+    body.own += {.adds = static_cast<double>(work.adds),
+                 .mults = static_cast<double>(work.mults),
+                 .nonlinear = static_cast<double>(work.functions)};
     const auto* call = node.as<Call>();
     if (!call || call->call_type == CallType::Operator) continue;
     if (call->call_type == CallType::Func) {

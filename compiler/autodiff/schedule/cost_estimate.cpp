@@ -1,17 +1,28 @@
 #include "autodiff/schedule/cost_estimate.h"
 
+#include <algorithm>
+
 #include "ir/build.h"
+#include "ir/visit.h"
 
 namespace retrograde::ir {
 
+Work work_of(const Expr& node) {
+  bool floating = node.type().is_float();
+  for_each_child(node, [&](const Expr& child) { floating |= child.type().is_float(); });
+  const auto* call = node.as<Call>();
+  if (!floating) return {0, 0, 0};
+  if (call && call->call_type == CallType::Operator) return op_info(call->op).work;
+  if (node.as<Mul>() || node.as<Div>() || node.as<Mod>()) return {0, 1, 0};
+  return {node.as<Binary>() || node.as<Select>() || node.as<Cast>() ? 1 : 0, 0, 0};
+}
+
 double operations_of(const Expr& node) {
   const auto* call = node.as<Call>();
-  if (!call) {
-    const bool computes = node.as<Binary>() || node.as<Select>() || node.as<Cast>();
-    return node.type().is_float() && computes ? 1 : 0;
-  }
-  if (call->call_type != CallType::Operator) return 1;
-  return op_info(call->op).cls == OpClass::Marker ? 0 : call->op == Op::strong_mul ? 1 : 4;
+  if (call && call->call_type != CallType::Operator) return 1;
+  if (!node.type().is_float()) return 0;
+  const Work work = work_of(node);
+  return std::max(work.adds, work.mults) + 4 * work.functions;
 }
 
 }  // namespace retrograde::ir

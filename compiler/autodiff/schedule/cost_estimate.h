@@ -1,4 +1,4 @@
-// What it costs to compute a value again, beside keeping it: for default schedules, and for Funcs
+// What it costs to compute a value: for counting operations, for default schedules, and for Funcs
 // that differentiation makes only where they pay.
 #pragma once
 
@@ -12,8 +12,12 @@ inline constexpr double cheap = 6;
 // at the bandwidth of a core, against an operation a lane and cycle.
 inline constexpr double way_to_memory = 24;
 
-// Operations of the node itself, without those of what it reads. Integers are indices and borders:
-// mostly simplified away.
+// Of the node itself, without what it reads; what operators take is in their table
+// (ir/operators.def). Integers are indices and borders, mostly simplified away: only where floats
+// take part is there work.
+Work work_of(const Expr& node);
+// The same in operations of a vectorized loop: a read is one and a function four; multiplications
+// come with an addition each, and comparisons with the choice that they decide.
 double operations_of(const Expr& node);
 
 }  // namespace retrograde::ir
