@@ -45,35 +45,38 @@ std::optional<Operation> operation(const Expr& e) {
   return Operation{is_sub ? Kind::Add : kind, Op::none, node->a, node->b, is_sub};
 }
 
-Expr combined(const Operation& by, const Expr& a, const Expr& b) {
-  return by.op != Op::none ? call_op(by.op, {a, b}) : binary(by.kind, a, b);
-}
-
 }  // namespace
 
-std::optional<AtomicUpdate> find_atomic_update(const Store& store) {
+std::optional<UpdateChain> find_update_chain(const Store& store) {
   const auto top = operation(store.value);
   if (!top) return std::nullopt;
-  AtomicUpdate update{top->kind, top->op, {}, false};
-  for (Expr e = store.value; !is_own_load(e, store);) {
-    const auto step = operation(e);
+  UpdateChain chain{top->kind, top->op, store.value, {}};
+  while (!is_own_load(chain.own, store)) {
+    const auto step = operation(chain.own);
     if (!step || step->kind != top->kind || step->op != top->op) return std::nullopt;
     const bool in_a = loads_from(step->a, store.name), in_b = loads_from(step->b, store.name);
     if (in_a == in_b || (in_b && step->is_sub)) return std::nullopt;
-    const Expr term = in_a ? step->b : step->a;
-    const bool is_first = !update.operand.defined();
-    if (!is_first && store.value.type().is_float()) return std::nullopt;
-    if (is_first) {
-      update.operand = term;
-      update.is_negated = step->is_sub;
-    } else if (update.is_negated == step->is_sub) {
-      update.operand = combined(*step, update.operand, term);
-    } else {  // f + a - b: a - b, or -(b - a)
-      update.operand = binary(Kind::Sub, update.operand, term);
-    }
-    e = in_a ? step->a : step->b;
+    chain.terms.push_back({in_a ? step->b : step->a, step->is_sub});
+    chain.own = in_a ? step->a : step->b;
   }
-  return update.operand.defined() ? std::optional(update) : std::nullopt;
+  return chain;
+}
+
+std::optional<AtomicUpdate> find_atomic_update(const Store& store) {
+  const auto chain = find_update_chain(store);
+  if (!chain || (chain->terms.size() > 1 && store.value.type().is_float())) return std::nullopt;
+  AtomicUpdate update{chain->kind, chain->op, chain->terms[0].value, chain->terms[0].is_negated};
+  for (size_t i = 1; i < chain->terms.size(); ++i) {
+    const auto& [value, is_negated] = chain->terms[i];
+    if (is_negated != update.is_negated) {  // f + a - b: a - b, or -(b - a)
+      update.operand = binary(Kind::Sub, update.operand, value);
+    } else if (chain->op != Op::none) {
+      update.operand = call_op(chain->op, {update.operand, value});
+    } else {
+      update.operand = binary(chain->kind, update.operand, value);
+    }
+  }
+  return update;
 }
 
 Expr updated(const AtomicUpdate& update, const Expr& old, const Expr& operand) {

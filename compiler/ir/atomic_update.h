@@ -3,15 +3,31 @@
 #pragma once
 
 #include <optional>
+#include <vector>
 
 #include "ir/expr.h"
 
 namespace retrograde::ir {
 
+// f[i] = f[i] op term1 op term2 ...
+struct UpdateChain {
+  Kind kind;         // Add, Mul, Min, Max, And, Or; Call for a bitwise operator
+  Op op = Op::none;  // bitwise_and, bitwise_or, bitwise_xor
+  Expr own;          // f[i]
+  struct Term {
+    Expr value;       // reads nothing of f
+    bool is_negated;  // Add: subtracted
+  };
+  std::vector<Term> terms;  // the last first
+};
+// Follows the operand that loads f[i] down; everything beside the way is a term. None when the
+// store has another form.
+std::optional<UpdateChain> find_update_chain(const Store& store);
+
 // f[i] = f[i] op operand
 struct AtomicUpdate {
-  Kind kind;                // Add, Mul, Min, Max, And, Or; Call for a bitwise operator
-  Op op = Op::none;         // bitwise_and, bitwise_or, bitwise_xor
+  Kind kind;  // as of a chain
+  Op op = Op::none;
   Expr operand;             // reads nothing of f
   bool is_negated = false;  // f[i] - operand
 };

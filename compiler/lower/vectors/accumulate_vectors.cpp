@@ -39,50 +39,30 @@ namespace retrograde::ir {
 
 namespace {
 
-// f[i] op reduce(x) op reduce(y) ...
-struct Chain {
-  Kind kind;
-  Expr own;  // f[i]
-  struct Term {
-    const VectorReduce* reduce;
-    bool is_subtracted;
-  };
-  std::vector<Term> terms;  // the last first
-};
-
-bool is_load_of(const Store& store, const Expr& e) {
-  const auto* load = e.as<Load>();
-  return load && load->name == store.name && !load->predicate.defined() &&
-         equal(load->index, store.index);
+const VectorReduce& reduce_of(const UpdateChain::Term& term) {
+  return *term.value.as<VectorReduce>();
 }
 
-std::optional<Chain> as_chain(const Store& store) {
-  Chain chain{store.value.kind() == Kind::Sub ? Kind::Add : store.value.kind(), {}, {}};
-  Expr e = store.value;
-  while (!is_load_of(store, e)) {
-    const auto* op = e.as<Binary>();
-    const bool is_sub = chain.kind == Kind::Add && e.kind() == Kind::Sub;
-    const auto* reduce = op ? op->b.as<VectorReduce>() : nullptr;
-    if (!reduce || (e.kind() != chain.kind && !is_sub) || reduce->op != reduce_op(chain.kind))
-      return std::nullopt;
-    if (loads_from(op->b, store.name)) return std::nullopt;
-    chain.terms.push_back({reduce, is_sub});
-    e = op->a;
-  }
-  chain.own = e;
-  const auto has_other_lanes = [&](const Chain::Term& term) {
-    return term.reduce->value.type() != chain.terms[0].reduce->value.type();
-  };
-  if (chain.terms.empty() || std::any_of(chain.terms.begin(), chain.terms.end(), has_other_lanes))
+// f[i] op reduce(x) op reduce(y) ..., of vectors of one type
+std::optional<UpdateChain> as_chain(const Store& store) {
+  auto chain = find_update_chain(store);
+  if (!chain || chain->kind == Kind::Call || chain->own.as<Load>()->predicate.defined())
     return std::nullopt;
-  return chain;
+  const auto* first = chain->terms[0].value.as<VectorReduce>();
+  const bool is_reduced =
+      std::all_of(chain->terms.begin(), chain->terms.end(), [&](const UpdateChain::Term& term) {
+        const auto* reduce = term.value.as<VectorReduce>();
+        return reduce && first && reduce->op == reduce_op(chain->kind) &&
+               reduce->value.type() == first->value.type();
+      });
+  return is_reduced ? chain : std::nullopt;
 }
 
 // ---- what a loop does to its buffers ----
 
 struct Candidate {
   const Store* store;
-  Chain chain;
+  UpdateChain chain;
   Stmt whole;                    // the store, or the Atomic around it
   std::vector<Expr> conditions;  // under which it runs at least once
 };
@@ -164,7 +144,7 @@ class LoopReductions {
       others_.insert(n.name);
       return;
     }
-    for (const Chain::Term& term : chain->terms) note(term.reduce->value);
+    for (const UpdateChain::Term& term : chain->terms) note(reduce_of(term).value);
     candidates_.push_back({&n, std::move(*chain), whole, conditions_});
   }
 
@@ -209,12 +189,12 @@ class Accumulator {
  public:
   Accumulator(const Candidate& candidate, const std::string& name)
       : name_(name), chain_(candidate.chain), store_(*candidate.store), candidate_(candidate) {
-    const Expr& value = chain_.terms[0].reduce->value;
+    const Expr& value = reduce_of(chain_.terms[0]).value;
     reordering_ = as_reordering(value);
-    for (const Chain::Term& term : chain_.terms) {
-      const auto* other = as_reordering(term.reduce->value);
+    for (const UpdateChain::Term& term : chain_.terms) {
+      const auto* other = as_reordering(reduce_of(term).value);
       if (!reordering_ || !other || other->indices != reordering_->indices) reordering_ = nullptr;
-      in_pairs_ &= as_narrow_product(term.reduce->value).has_value();
+      in_pairs_ &= as_narrow_product(reduce_of(term).value).has_value();
     }
     const int lanes = value.type().lanes(), group = lanes / store_.value.type().lanes();
     in_pairs_ &= chain_.kind == Kind::Add && group % 2 == 0;
@@ -230,8 +210,8 @@ class Accumulator {
   Stmt step() const {
     Expr value = load();
     for (size_t i = chain_.terms.size(); i-- > 0;) {
-      const Chain::Term& term = chain_.terms[i];
-      value = binary(term.is_subtracted ? Kind::Sub : chain_.kind, value, operand(term));
+      const UpdateChain::Term& term = chain_.terms[i];
+      value = binary(term.is_negated ? Kind::Sub : chain_.kind, value, operand(term));
     }
     return store(value);
   }
@@ -262,14 +242,14 @@ class Accumulator {
   Expr load() const { return make_load(type_, name_, index()); }
   Stmt store(const Expr& value) const { return make_store(name_, value, index()); }
 
-  Expr operand(const Chain::Term& term) const {
-    const Expr& value = term.reduce->value;
+  Expr operand(const UpdateChain::Term& term) const {
+    const Expr& value = reduce_of(term).value;
     if (in_pairs_) return make_vector_reduce(op(), value, type_.lanes());
     return reordering_ ? value.as<Shuffle>()->vectors[0] : value;
   }
 
   std::string name_;
-  const Chain& chain_;
+  const UpdateChain& chain_;
   const Store& store_;
   const Candidate& candidate_;
   const Shuffle* reordering_ = nullptr;

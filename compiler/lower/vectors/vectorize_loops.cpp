@@ -108,44 +108,12 @@ bool recomputes_shared_updates(const BodyFacts& facts) {
   return false;
 }
 
-// f[i] = f[i] op term1 op term2 ...
-struct Reduction {
-  Kind kind;
-  Expr load;  // f[i]
-  struct Term {
-    Expr value;
-    bool is_negated;  // Add only
-  };
-  std::vector<Term> terms;
-};
-
-bool is_associative(Kind kind) {
-  return kind == Kind::Add || kind == Kind::Mul || kind == Kind::Min || kind == Kind::Max ||
-         kind == Kind::And || kind == Kind::Or;
-}
-
-// Follows the operand that loads f[i] down; everything beside the way is a term.
-std::optional<Reduction> find_reduction(const Store& store) {
-  auto is_own_load = [&](const Expr& e) {
-    const Load* load = e.as<Load>();
-    return load && load->name == store.name && !load->predicate.defined() &&
-           equal(load->index, store.index);
-  };
-  Kind kind = store.value.kind() == Kind::Sub ? Kind::Add : store.value.kind();
-  if (!is_associative(kind) || is_own_load(store.value)) return std::nullopt;
-  Reduction reduction{kind, {}, {}};
-  Expr e = store.value;
-  while (!is_own_load(e)) {
-    const Binary* op = e.as<Binary>();
-    bool is_sub = kind == Kind::Add && e.kind() == Kind::Sub;
-    if (!op || (e.kind() != kind && !is_sub)) return std::nullopt;
-    bool in_a = loads_from(op->a, store.name), in_b = loads_from(op->b, store.name);
-    if (in_a == in_b || (in_b && is_sub)) return std::nullopt;
-    reduction.terms.push_back({in_a ? op->b : op->a, is_sub});
-    e = in_a ? op->a : op->b;
-  }
-  reduction.load = e;
-  return reduction;
+// Of scalars, by an operator that vectors are reduced by.
+std::optional<UpdateChain> find_reduction(const Store& store) {
+  auto chain = find_update_chain(store);
+  const bool is_reduced =
+      chain && chain->kind != Kind::Call && !chain->own.as<Load>()->predicate.defined();
+  return is_reduced ? chain : std::nullopt;
 }
 
 // ---- one loop ----
@@ -392,15 +360,15 @@ class LoopVectorizer {
            std::abs(*inner_step) >= std::abs(*outer_step) * ramp->lanes;
   }
 
-  Stmt store_reduction(const Stmt& s, const Store& n, const Reduction& reduction) {
+  Stmt store_reduction(const Stmt& s, const Store& n, const UpdateChain& reduction) {
     std::unordered_map<std::string, int> own;
     count_loads(n.value, own);
     count_loads(n.index, own);
     require_no_load(n.name, own[n.name]);
     if (must_stay_serial_) return s;
     Expr active = widen_.masked(varies(n.predicate) ? n.predicate : Expr(), n.value.type().lanes());
-    Expr result = reduction.load;
-    for (const Reduction::Term& term : reduction.terms) {
+    Expr result = reduction.own;
+    for (const UpdateChain::Term& term : reduction.terms) {
       Expr reduced = reduce(reduction.kind, term.value, active);
       result = binary(term.is_negated ? Kind::Sub : reduction.kind, result, reduced);
     }
