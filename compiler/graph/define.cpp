@@ -13,6 +13,7 @@
 #include "diagnostics/error.h"
 #include "graph/directive.h"
 #include "graph/names.h"
+#include "graph/own_reads.h"
 #include "ir/build.h"
 #include "ir/literal.h"
 #include "ir/print.h"
@@ -388,15 +389,9 @@ std::string stage_name(const FuncContents& f, int stage) {
 }
 
 Expr redirect_calls(const Expr& e, const FuncPtr& from, const FuncPtr& to, bool weak) {
-  return rewrite(e, [&](const Expr& part, const std::function<Expr(const Expr&)>& recurse) {
-    const Call* call = part.as<Call>();
-    if (!call || call->call_type != CallType::Func || call->symbol.raw() != from.get()) {
-      return map_children(part, recurse);
-    }
-    std::vector<Expr> args;
-    for (const Expr& arg : call->args) args.push_back(recurse(arg));
+  return map_calls_of(e, from.get(), [&](const Call& call, const std::vector<Expr>& args) {
     SymbolRef symbol = weak ? SymbolRef::weak(to) : SymbolRef(to);
-    return call_func(to->name, call->type, std::move(args), call->component, std::move(symbol));
+    return call_func(to->name, call.type, args, call.component, std::move(symbol));
   });
 }
 

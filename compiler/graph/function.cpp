@@ -6,6 +6,7 @@
 
 #include "diagnostics/error.h"
 #include "graph/names.h"
+#include "graph/own_reads.h"
 #include "graph/wrappers.h"
 #include "ir/print.h"
 #include "ir/visit.h"
@@ -13,18 +14,6 @@
 namespace retrograde::ir {
 
 namespace {
-
-// All nodes of a definition, each once.
-void walk_definition(const Definition& definition, FunctionRef<void(const Expr&)> visit) {
-  std::unordered_set<const ExprNode*> seen;
-  for_each_expr(definition, [&](const Expr& root) {
-    walk(root, [&](const Expr& e) {
-      if (!seen.insert(e.get()).second) return false;
-      visit(e);
-      return true;
-    });
-  });
-}
 
 void add_callees(const Definition& definition, const FuncContents* self,
                  std::vector<FuncPtr>& callees, std::unordered_set<const Symbol*>& seen) {

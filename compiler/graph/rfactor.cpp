@@ -22,6 +22,7 @@
 #include "graph/define.h"
 #include "graph/give_directive.h"
 #include "graph/names.h"
+#include "graph/own_reads.h"
 #include "graph/reduction_leaves.h"
 #include "graph/rfactor.h"
 #include "ir/build.h"
@@ -203,11 +204,8 @@ class Factoring {
 
   // References to f become references to the intermediate Func at `args`.
   Expr with_self_at(const Expr& value, const std::vector<Expr>& args) const {
-    return rewrite(value, [&](const Expr& e, const std::function<Expr(const Expr&)>& recurse) {
-      const Call* call = e.as<Call>();
-      if (!call || call->call_type != CallType::Func || call->symbol.raw() != f_.get())
-        return map_children(e, recurse);
-      return call_func(intermediate_->name, call->type, args, call->component,
+    return map_calls_of(value, f_.get(), [&](const Call& call, const std::vector<Expr>&) {
+      return call_func(intermediate_->name, call.type, args, call.component,
                        SymbolRef::weak(intermediate_));
     });
   }

@@ -9,6 +9,7 @@
 #include "graph/define.h"
 #include "graph/give_directive.h"
 #include "graph/names.h"
+#include "graph/own_reads.h"
 #include "ir/build.h"
 #include "ir/print.h"
 #include "ir/variables.h"
@@ -135,18 +136,13 @@ class Wrapping {
 // The Funcs that stand for images which f reads.
 std::vector<FuncPtr> image_readers(const FuncContents& f) {
   std::vector<FuncPtr> readers;
-  std::unordered_set<const ExprNode*> seen;
   for (int s = 0; s < f.stage_count(); s++) {
-    for_each_expr(f.stage(s), [&](const Expr& root) {
-      walk(root, [&](const Expr& e) {
-        if (!seen.insert(e.get()).second) return false;
-        const Call* call = e.as<Call>();
-        if (!call || call->call_type != CallType::Image || !reader_of_image(*call, f)) return true;
-        const auto& reader = static_cast<const ParameterContents*>(call->symbol.raw())->func;
-        if (std::find(readers.begin(), readers.end(), reader) == readers.end())
-          readers.push_back(reader);
-        return true;
-      });
+    walk_definition(f.stage(s), [&](const Expr& e) {
+      const Call* call = e.as<Call>();
+      if (!call || call->call_type != CallType::Image || !reader_of_image(*call, f)) return;
+      const auto& reader = static_cast<const ParameterContents*>(call->symbol.raw())->func;
+      if (std::find(readers.begin(), readers.end(), reader) == readers.end())
+        readers.push_back(reader);
     });
   }
   return readers;

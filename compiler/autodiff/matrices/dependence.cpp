@@ -8,6 +8,7 @@
 #include "autodiff/sweeps/local_derivative.h"
 #include "autodiff/sweeps/regions.h"
 #include "diagnostics/error.h"
+#include "graph/own_reads.h"
 #include "ir/build.h"
 #include "ir/memory_reads.h"
 #include "ir/visit.h"
@@ -285,8 +286,7 @@ class Composer {
                                  FunctionRef<void(const Call&)> visit) {
     for_each_expr(update, [&](const Expr& root) {
       walk(without_lets(root), [&](const Expr& e) {
-        const auto* call = e.as<Call>();
-        if (call && call->call_type == CallType::Func && call->symbol.raw() == &f) visit(*call);
+        if (const Call* call = as_call_of(e, &f)) visit(*call);
         return true;
       });
     });

@@ -14,6 +14,7 @@
 #include "frontend/schedule/stage.h"
 #include "graph/copy_graph.h"
 #include "graph/function.h"
+#include "graph/own_reads.h"
 #include "graph/wrappers.h"
 #include "ir/build.h"
 #include "ir/equal.h"
@@ -91,16 +92,10 @@ class Chooser {
 
   void count_reads(const FuncContents& f) {
     for (int s = 0; s < f.stage_count(); ++s) {
-      std::unordered_set<const ExprNode*> seen;
-      for_each_expr(f.stage(s), [&](const Expr& root) {
-        walk(root, [&](const Expr& e) {
-          if (!seen.insert(e.get()).second) return false;
-          const auto* call = e.as<Call>();
-          if (call && call->call_type == CallType::Func && call->symbol.raw() != &f) {
-            uses_[call->symbol.raw()].reads += reads_an_element(*call, f, f.stage(s));
-          }
-          return true;
-        });
+      walk_definition(f.stage(s), [&](const Expr& e) {
+        const auto* call = e.as<Call>();
+        if (call && call->call_type == CallType::Func && call->symbol.raw() != &f)
+          uses_[call->symbol.raw()].reads += reads_an_element(*call, f, f.stage(s));
       });
     }
   }
@@ -253,16 +248,9 @@ class Chooser {
     if (!depends_on_data(stage.args[0])) return false;
     return std::all_of(stage.values.begin(), stage.values.end(), [&](const Expr& value) {
       const auto* sum = value.as<Add>();
-      return sum && as_self(sum->a, f, stage) && !calls(sum->b, &f);
+      return sum && is_old_value(sum->a, f, stage) && !calls(sum->b, &f);
     });
   }
-  static bool as_self(const Expr& e, const FuncContents& f, const Definition& stage) {
-    const auto* call = e.as<Call>();
-    return call && call->symbol.raw() == &f &&
-           std::equal(call->args.begin(), call->args.end(), stage.args.begin(), stage.args.end(),
-                      [](const Expr& a, const Expr& b) { return equal(a, b); });
-  }
-
   const std::vector<FuncPtr>& outputs_;
   const VectorUnit unit_;
   std::vector<FuncPtr> order_;

@@ -6,6 +6,7 @@
 
 #include "autodiff/sweeps/accumulation.h"
 #include "autodiff/updates/versions.h"
+#include "graph/own_reads.h"
 #include "ir/build.h"
 
 namespace retrograde::ir {
@@ -136,10 +137,8 @@ class InDouble {
 
   // The term in its own type, of exact values.
   Expr of_exact(const Expr& term) const {
-    return rewrite(term, [&](const Expr& node, const auto& recurse) -> Expr {
-      const Call* call = as_call_of(node, rounded_.get());
-      if (!call) return map_children(node, recurse);
-      return cast_to(call->type, call_value(exact_, call->args, call->component));
+    return map_calls_of(term, rounded_.get(), [&](const Call& call, const std::vector<Expr>&) {
+      return cast_to(call.type, call_value(exact_, call.args, call.component));
     });
   }
 

@@ -5,6 +5,7 @@
 
 #include "autodiff/sweeps/custom_rules.h"
 #include "autodiff/sweeps/reverse_sweep.h"
+#include "graph/own_reads.h"
 #include "ir/build.h"
 #include "ir/equal.h"
 #include "simplify/simplify.h"
@@ -21,21 +22,6 @@ Scope<Interval> scope_of(const FuncContents& f, const Definition& definition, co
   for (const ReductionVariable& r : definition.rvars)
     scope.push(r.var, {r.min, simplify(r.min + r.extent - 1)});
   return scope;
-}
-
-// Whether an update reads an element of its Func other than the one that it writes.
-bool reads_elsewhere(const FuncContents& f, const Definition& definition) {
-  bool found = false;
-  for_each_expr(definition, [&](const Expr& e) {
-    walk(e, [&](const Expr& part) {
-      const auto* read = part.as<Call>();
-      if (!read || read->symbol.raw() != &f) return true;
-      for (size_t d = 0; d < read->args.size(); ++d)
-        found |= !equal(read->args[d], definition.args[d]);
-      return true;
-    });
-  });
-  return found;
 }
 
 // Where the place of an update depends on data, only what others read counts.
@@ -101,7 +87,7 @@ void Regions::add_func(const FuncPtr& f) {
                                                             : bounds_of(definition.args[d], scope));
     }
     if (s > 0) grow(f.get(), or_else(written, boxes_[f.get()]));
-    const bool has_known_reads = is_output || !reads_elsewhere(*f, definition);
+    const bool has_known_reads = is_output || !read_elsewhere(*f, definition).defined();
     for_each_expr(definition, [&](const Expr& e) {
       for (const auto& [name, footprint] : footprints(without_lets(e), scope)) {
         Symbol* symbol = footprint.symbol.raw();

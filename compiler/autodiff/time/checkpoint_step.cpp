@@ -43,12 +43,8 @@ class CheckpointStep {
  private:
   // Reads of f as they are in the current state.
   Expr in_state(const Expr& e) const {
-    return rewrite(e, [&](const Expr& node, const auto& recurse) -> Expr {
-      const Call* call = as_call_of(node, f_);
-      if (!call) return map_children(node, recurse);
-      std::vector<Expr> args;
-      for (const Expr& arg : call->args) args.push_back(recurse(arg));
-      return slots_.value_at(elements_.slot_of(args), static_cast<size_t>(call->component));
+    return map_calls_of(e, f_, [&](const Call& call, const std::vector<Expr>& args) {
+      return slots_.value_at(elements_.slot_of(args), static_cast<size_t>(call.component));
     });
   }
   // Reads of f as the step noted them.

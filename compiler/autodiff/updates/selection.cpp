@@ -9,6 +9,7 @@
 #include "frontend/language/var.h"
 #include "graph/define.h"
 #include "graph/function.h"
+#include "graph/own_reads.h"
 #include "ir/build.h"
 #include "ir/equal.h"
 #include "ir/memory_reads.h"
@@ -44,19 +45,10 @@ class SelectionFinder {
   // {condition under which the new value is taken, new value}
   using Choice = std::pair<Expr, Expr>;
 
-  bool is_self(const Expr& e, int k) const {
-    const auto* call = e.as<Call>();
-    return call && call->call_type == CallType::Func && call->symbol.raw() == f_.get() &&
-           call->component == k && at_write(*call);
-  }
-  bool at_write(const Call& call) const {
-    return std::equal(call.args.begin(), call.args.end(), definition_.args.begin(),
-                      [](const Expr& a, const Expr& b) { return equal(a, b); });
-  }
+  bool is_self(const Expr& e, int k) const { return is_old_value(e, *f_, definition_, k); }
   bool reads_own_point(const Expr& e) const {
     return !any_node(e, [&](const Expr& node) {
-      const auto* call = node.as<Call>();
-      return call && call->symbol.raw() == f_.get() && !at_write(*call);
+      return as_call_of(node, f_.get()) && !is_old_value(node, *f_, definition_);
     });
   }
 

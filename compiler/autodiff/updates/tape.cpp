@@ -156,12 +156,8 @@ class Tape {
 
   // Reads of f become reads of its elements on the tape.
   Expr on_tape(const Expr& e, const FuncPtr& tape) const {
-    return rewrite(e, [&](const Expr& node, const auto& recurse) -> Expr {
-      const Call* call = as_call_of(node, f_);
-      if (!call) return map_children(node, recurse);
-      std::vector<Expr> args;
-      for (const Expr& arg : call->args) args.push_back(recurse(arg));
-      return at(tape, layout_.slot_of(args), static_cast<size_t>(call->component));
+    return map_calls_of(e, f_, [&](const Call& call, const std::vector<Expr>& args) {
+      return at(tape, layout_.slot_of(args), static_cast<size_t>(call.component));
     });
   }
   std::vector<Expr> all_values(const FuncPtr& tape, const Expr& slot) const {

@@ -11,17 +11,6 @@
 
 namespace retrograde::ir {
 
-const Call* as_call_of(const Expr& e, const FuncContents* f) {
-  const auto* call = e.as<Call>();
-  return call && call->call_type == CallType::Func && call->symbol.raw() == f ? call : nullptr;
-}
-
-bool same_args(const std::vector<Expr>& a, const std::vector<Expr>& b) {
-  return a.size() == b.size() &&
-         std::equal(a.begin(), a.end(), b.begin(),
-                    [](const Expr& x, const Expr& y) { return equal(x, y); });
-}
-
 bool depends_on_data(const Expr& e) {
   return any_node(e, [&](const Expr& node) {
     const auto* call = node.as<Call>();

@@ -7,13 +7,11 @@
 
 #include "autodiff/sweeps/reverse_sweep.h"
 #include "autodiff/updates/update.h"
+#include "graph/own_reads.h"
 #include "ir/memory_reads.h"
 
 namespace retrograde::ir {
 
-// One read by the update of its own Func.
-const Call* as_call_of(const Expr& e, const FuncContents* f);
-bool same_args(const std::vector<Expr>& a, const std::vector<Expr>& b);
 bool depends_on_data(const Expr& e);  // calls a Func or reads an image
 std::string point_text(const std::string& name, const std::vector<Expr>& args);
 // `domain` where `condition` holds, too.

@@ -5,6 +5,7 @@
 #include "frontend/language/var.h"
 #include "graph/define.h"
 #include "graph/function.h"
+#include "graph/own_reads.h"
 #include "ir/build.h"
 #include "ir/variables.h"
 #include "ir/visit.h"
@@ -29,14 +30,9 @@ FuncPtr clone_prefix(const FuncPtr& f, int stages, const std::string& name) {
 
 Expr call_instead(const Expr& e, const FuncPtr& f, const FuncPtr& g,
                   const std::vector<Expr>& extra) {
-  return rewrite(e, [&](const Expr& part, const std::function<Expr(const Expr&)>& recurse) {
-    const auto* call = part.as<Call>();
-    if (!call || call->call_type != CallType::Func || call->symbol.raw() != f.get())
-      return map_children(part, recurse);
-    std::vector<Expr> args;
-    for (const Expr& arg : call->args) args.push_back(recurse(arg));
+  return map_calls_of(e, f.get(), [&](const Call& call, std::vector<Expr> args) {
     args.insert(args.end(), extra.begin(), extra.end());
-    return call_value(g, args, call->component);
+    return call_value(g, args, call.component);
   });
 }
 

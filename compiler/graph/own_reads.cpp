@@ -1,0 +1,62 @@
+#include "graph/own_reads.h"
+
+#include <algorithm>
+#include <unordered_set>
+
+#include "ir/equal.h"
+
+namespace retrograde::ir {
+
+const Call* as_call_of(const Expr& e, const Symbol* f) {
+  const auto* call = e.as<Call>();
+  return call && call->call_type == CallType::Func && call->symbol.raw() == f ? call : nullptr;
+}
+
+Expr map_calls_of(const Expr& e, const Symbol* f,
+                  FunctionRef<Expr(const Call&, const std::vector<Expr>& args)> read) {
+  return rewrite(e, [&](const Expr& node, const auto& recurse) -> Expr {
+    const Call* call = as_call_of(node, f);
+    if (!call) return map_children(node, recurse);
+    std::vector<Expr> args;
+    for (const Expr& arg : call->args) args.push_back(recurse(arg));
+    return read(*call, args);
+  });
+}
+
+bool same_args(const std::vector<Expr>& a, const std::vector<Expr>& b) {
+  return std::equal(a.begin(), a.end(), b.begin(), b.end(),
+                    [](const Expr& x, const Expr& y) { return equal(x, y); });
+}
+
+void walk_definition(const Definition& definition, FunctionRef<void(const Expr&)> visit) {
+  std::unordered_set<const ExprNode*> seen;
+  for_each_expr(definition, [&](const Expr& root) {
+    walk(root, [&](const Expr& e) {
+      if (!seen.insert(e.get()).second) return false;
+      visit(e);
+      return true;
+    });
+  });
+}
+
+std::vector<Expr> own_reads(const FuncContents& f, const Definition& update) {
+  std::vector<Expr> reads;
+  walk_definition(update, [&](const Expr& e) {
+    if (as_call_of(e, &f)) reads.push_back(e);
+  });
+  return reads;
+}
+
+bool is_old_value(const Expr& e, const FuncContents& f, const Definition& update, int k) {
+  const Call* call = as_call_of(e, &f);
+  return call && (k < 0 || call->component == k) && same_args(call->args, update.args);
+}
+
+Expr read_elsewhere(const FuncContents& f, const Definition& update) {
+  for (const Expr& read : own_reads(f, update)) {
+    if (!is_old_value(read, f, update)) return read;
+  }
+  return {};
+}
+
+}  // namespace retrograde::ir
