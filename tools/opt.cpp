@@ -39,7 +39,7 @@
 #include "ir/parse.h"
 #include "ir/print.h"
 #include "lower/lower.h"
-#include "lower/pass_table.h"
+#include "lower/statement_passes.h"
 #include "simplify/simplify.h"
 
 namespace {

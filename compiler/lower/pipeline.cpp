@@ -8,24 +8,15 @@
 #include "ir/build.h"
 #include "ir/print.h"
 #include "ir/validate.h"
-#include "lower/instrumentation/debug_features.h"
 #include "lower/instrumentation/inject_profiling.h"
 #include "lower/instrumentation/inject_tracing.h"
 #include "lower/instrumentation/loop_nest_text.h"
 #include "lower/instrumentation/write_debug_files.h"
-#include "lower/loops/drop_checks.h"
-#include "lower/loops/drop_guarded_clamps.h"
 #include "lower/loops/flatten_storage.h"
 #include "lower/loops/fork_async.h"
-#include "lower/loops/free_early.h"
 #include "lower/loops/insert_prefetches.h"
-#include "lower/loops/join_indices.h"
 #include "lower/loops/keep_accumulators.h"
-#include "lower/loops/lower_atomics.h"
 #include "lower/loops/memoize.h"
-#include "lower/loops/partition_loops.h"
-#include "lower/loops/trim_loops.h"
-#include "lower/loops/unroll_loops.h"
 #include "lower/lower.h"
 #include "lower/nests/argument_checks.h"
 #include "lower/nests/build_loop_nests.h"
@@ -33,13 +24,8 @@
 #include "lower/nests/inline_functions.h"
 #include "lower/nests/make_names_unique.h"
 #include "lower/nests/share_parameters.h"
-#include "lower/vectors/accumulate_vectors.h"
-#include "lower/vectors/blend_masked_stores.h"
-#include "lower/vectors/deinterleave_loads.h"
-#include "lower/vectors/interleave_vectors.h"
-#include "lower/vectors/transpose_loads.h"
+#include "lower/statement_passes.h"
 #include "lower/vectors/vectorize_inner_loops.h"
-#include "lower/vectors/vectorize_loops.h"
 #include "simplify/simplify.h"
 
 namespace retrograde::ir {
@@ -126,18 +112,19 @@ Stmt vectorize_unscheduled(const Lowering& lowering, const Stmt& s) {
 
 Stmt run_simplify(Lowering&, const Stmt& s) { return simplify(s); }
 
+template <Stmt (*pass)(const Stmt&)>
+Stmt alone(Lowering&, const Stmt& s) {
+  return pass(s);
+}
+template <Target::Feature feature, Stmt (*pass)(const Stmt&)>
+Stmt wanted(Lowering& lowering, const Stmt& s) {
+  return lowering.options.target.has_feature(feature) ? pass(s) : s;
+}
+
 constexpr Pass passes[] = {
     {"build_loop_nests", Phase::Loops, nest_loops},
-    {"drop_bounds_query", Phase::Loops,
-     [](Lowering& lowering, const Stmt& s) {
-       const bool drops = lowering.options.target.has_feature(Target::NoBoundsQuery);
-       return drops ? drop_bounds_query(s) : s;
-     }},
-    {"check_promises", Phase::Loops,
-     [](Lowering& lowering, const Stmt& s) {
-       const bool checks = lowering.options.target.has_feature(Target::CheckUnsafePromises);
-       return checks ? check_promises(s) : s;
-     }},
+    {"drop_bounds_query", Phase::Loops, wanted<Target::NoBoundsQuery, drop_bounds_query>},
+    {"check_promises", Phase::Loops, wanted<Target::CheckUnsafePromises, check_promises>},
     {"write_debug_files", Phase::Loops,
      [](Lowering& lowering, const Stmt& s) {
        return write_debug_files(s, lowering.program, lowering.renamed_funcs);
@@ -168,44 +155,29 @@ constexpr Pass passes[] = {
        return flatten_storage(s, storage_layouts(lowering));
      }},
     {"simplify_storage", Phase::FlatStorage, run_simplify},
-    {"lower_atomics", Phase::FlatStorage,
-     [](Lowering&, const Stmt& s) { return lower_atomics(s); }},
-    {"partition_loops", Phase::FlatStorage,
-     [](Lowering&, const Stmt& s) { return partition_loops(s); }},
-    {"drop_guarded_clamps", Phase::FlatStorage,
-     [](Lowering&, const Stmt& s) { return drop_guarded_clamps(s); }},
-    {"trim_loops", Phase::FlatStorage, [](Lowering&, const Stmt& s) { return trim_loops(s); }},
-    {"unroll_loops", Phase::FlatStorage, [](Lowering&, const Stmt& s) { return unroll_loops(s); }},
-    {"join_indices", Phase::FlatStorage, [](Lowering&, const Stmt& s) { return join_indices(s); }},
+    {"lower_atomics", Phase::FlatStorage, alone<lower_atomics>},
+    {"partition_loops", Phase::FlatStorage, alone<partition_loops>},
+    {"drop_guarded_clamps", Phase::FlatStorage, alone<drop_guarded_clamps>},
+    {"trim_loops", Phase::FlatStorage, alone<trim_loops>},
+    {"unroll_loops", Phase::FlatStorage, alone<unroll_loops>},
+    {"join_indices", Phase::FlatStorage, alone<join_indices>},
     {"vectorize_inner_loops", Phase::FlatStorage,
      [](Lowering& lowering, const Stmt& s) { return vectorize_unscheduled(lowering, s); }},
-    {"vectorize_loops", Phase::Vector, [](Lowering&, const Stmt& s) { return vectorize_loops(s); }},
-    {"accumulate_vectors", Phase::Vector,
-     [](Lowering&, const Stmt& s) { return accumulate_vectors(s); }},
-    {"interleave_vectors", Phase::Vector,
-     [](Lowering&, const Stmt& s) { return interleave_vectors(s); }},
-    {"transpose_loads", Phase::Vector, [](Lowering&, const Stmt& s) { return transpose_loads(s); }},
-    {"deinterleave_loads", Phase::Vector,
-     [](Lowering&, const Stmt& s) { return deinterleave_loads(s); }},
+    {"vectorize_loops", Phase::Vector, alone<vectorize_loops>},
+    {"accumulate_vectors", Phase::Vector, alone<accumulate_vectors>},
+    {"interleave_vectors", Phase::Vector, alone<interleave_vectors>},
+    {"transpose_loads", Phase::Vector, alone<transpose_loads>},
+    {"deinterleave_loads", Phase::Vector, alone<deinterleave_loads>},
     {"simplify_vectors", Phase::Vector, run_simplify},
-    {"blend_masked_stores", Phase::Vector,
-     [](Lowering&, const Stmt& s) { return blend_masked_stores(s); }},
-    {"fuzz_float_stores", Phase::Vector,
-     [](Lowering& lowering, const Stmt& s) {
-       const bool fuzzes = lowering.options.target.has_feature(Target::FuzzFloatStores);
-       return fuzzes ? fuzz_float_stores(s) : s;
-     }},
+    {"blend_masked_stores", Phase::Vector, alone<blend_masked_stores>},
+    {"fuzz_float_stores", Phase::Vector, wanted<Target::FuzzFloatStores, fuzz_float_stores>},
     {"inject_profiling", Phase::Vector,
      [](Lowering& lowering, const Stmt& s) {
        if (!lowering.options.target.has_feature(Target::Profile)) return s;
        return inject_profiling(s, lowering.program, lowering.renamed_funcs, lowering.name);
      }},
-    {"free_early", Phase::Vector, [](Lowering&, const Stmt& s) { return free_early(s); }},
-    {"drop_asserts", Phase::Vector,
-     [](Lowering& lowering, const Stmt& s) {
-       const bool drops = lowering.options.target.has_feature(Target::NoAsserts);
-       return drops ? drop_asserts(s) : s;
-     }},
+    {"free_early", Phase::Vector, alone<free_early>},
+    {"drop_asserts", Phase::Vector, wanted<Target::NoAsserts, drop_asserts>},
 };
 
 std::vector<std::string> names_of(const std::vector<LoweredArgument>& args) {

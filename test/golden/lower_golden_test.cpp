@@ -17,8 +17,7 @@
 #include "ir/parse.h"
 #include "ir/print.h"
 #include "ir/validate.h"
-#include "lower/loops/unroll_loops.h"
-#include "lower/pass_table.h"
+#include "lower/statement_passes.h"
 
 namespace retrograde::ir {
 namespace {

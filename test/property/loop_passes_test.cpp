@@ -9,19 +9,8 @@
 #include <set>
 
 #include "ir/validate.h"
-#include "lower/loops/drop_guarded_clamps.h"
-#include "lower/loops/free_early.h"
-#include "lower/loops/join_indices.h"
-#include "lower/loops/partition_loops.h"
-#include "lower/loops/trim_loops.h"
-#include "lower/loops/unroll_loops.h"
-#include "lower/vectors/accumulate_vectors.h"
-#include "lower/vectors/blend_masked_stores.h"
-#include "lower/vectors/deinterleave_loads.h"
-#include "lower/vectors/interleave_vectors.h"
-#include "lower/vectors/transpose_loads.h"
+#include "lower/statement_passes.h"
 #include "lower/vectors/vectorize_inner_loops.h"
-#include "lower/vectors/vectorize_loops.h"
 #include "property/statement_evaluator.h"
 
 namespace retrograde::ir {

@@ -8,7 +8,7 @@
 #include "frontend/language/func.h"
 #include "ir/parse.h"
 #include "ir/print.h"
-#include "lower/loops/lower_atomics.h"
+#include "lower/statement_passes.h"
 
 namespace retrograde {
 namespace {

@@ -240,7 +240,7 @@ class Chooser {
 
   // f(places) += terms, where data decide the place along the first dimension, over a loop that is
   // worth vectors. Vectors of places and terms are computed; lowering adds them in the order of the
-  // iterations (vectorize_loops.h), so that this is no race.
+  // iterations (vectorize_loops.cpp), so that this is no race.
   static bool scatters_in_order(const FuncContents& f, const Definition& stage) {
     if (stage.rvars.empty() || stage.args.empty()) return false;
     auto extent = as_const_int(stage.rvars[0].extent);

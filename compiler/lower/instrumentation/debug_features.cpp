@@ -11,7 +11,7 @@
 //
 // A NaN is stored as it is: without its last bit it may be an infinity. Inside Atomic nothing
 // changes: what is read there is compared with what was stored. Tests: unit/debug_features_test.
-#include "lower/instrumentation/debug_features.h"
+#include "lower/statement_passes.h"
 
 #include "ir/build.h"
 #include "ir/print.h"

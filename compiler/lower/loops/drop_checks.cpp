@@ -12,7 +12,7 @@
 //
 // drop_asserts runs last: until then the checks tell the simplifier what holds. Failing allocations
 // are no Asserts and stay errors. Tests: test/golden/lower/drop_*/.
-#include "lower/loops/drop_checks.h"
+#include "lower/statement_passes.h"
 
 #include "diagnostics/error.h"
 #include "ir/build.h"

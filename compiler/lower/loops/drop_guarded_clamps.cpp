@@ -18,7 +18,7 @@
 //           conjuncts together; arms of a select, both of which are evaluated over lanes.
 // Source: folklore. Tests: test/golden/lower/drop_guarded_clamps/,
 // test/property/loop_passes_test.cpp.
-#include "lower/loops/drop_guarded_clamps.h"
+#include "lower/statement_passes.h"
 
 #include <algorithm>
 #include <vector>

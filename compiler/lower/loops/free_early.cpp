@@ -20,7 +20,7 @@
 //         linear, however deep the allocations nest.
 // Not done: allocations that are never used; moving an allocation to its first use.
 // Source: folklore. Tests: test/golden/lower/free_early/.
-#include "lower/loops/free_early.h"
+#include "lower/statement_passes.h"
 
 #include <unordered_map>
 #include <utility>

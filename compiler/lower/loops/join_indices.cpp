@@ -13,7 +13,7 @@
 //         both put in, and kept where fewer divisions are left in it.
 // Not done: names inside of other names than these.
 // Source: folklore. Tests: test/golden/lower/join_indices/, loop_passes_test.
-#include "lower/loops/join_indices.h"
+#include "lower/statement_passes.h"
 
 #include "ir/build.h"
 #include "ir/visit.h"

@@ -13,7 +13,7 @@
 // Method: one walk that counts the parallel loops around; an allocation remembers the count.
 // Errors: a require() that reads the element of a Tuple: it would leave with the lock held.
 // Source: folklore. Tests: test/unit/atomic_test.cpp.
-#include "lower/loops/lower_atomics.h"
+#include "lower/statement_passes.h"
 
 #include <unordered_map>
 #include <unordered_set>

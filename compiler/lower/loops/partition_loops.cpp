@@ -35,7 +35,7 @@
 //         worst lane decides.
 // Source: folklore (index-set splitting).
 // Tests: test/golden/lower/partition_loops/, test/property/loop_passes_test.cpp.
-#include "lower/loops/partition_loops.h"
+#include "lower/statement_passes.h"
 
 #include <string>
 #include <unordered_set>

@@ -26,7 +26,7 @@
 //           statements, each under a condition of its own.
 // Source: folklore (loop bounds from guards). Tests: test/golden/lower/trim_loops/,
 // test/property/loop_passes_test.cpp.
-#include "lower/loops/trim_loops.h"
+#include "lower/statement_passes.h"
 
 #include <unordered_set>
 

@@ -16,7 +16,7 @@
 //         copies of a choice from n arms take n steps.
 // Not done: a limit on the size of the result: the user asked for the copies.
 // Source: folklore. Tests: test/golden/lower/unroll_loops/.
-#include "lower/loops/unroll_loops.h"
+#include "lower/statement_passes.h"
 
 #include <algorithm>
 #include <optional>

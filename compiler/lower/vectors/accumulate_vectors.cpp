@@ -19,7 +19,7 @@
 // Not done: stores under conditions that vary; loops that run as tasks; several operators.
 // Source: folklore (reduction variable expansion). Tests: test/golden/lower/accumulate_vectors/,
 // loop_passes_test, vector_reduction_test.
-#include "lower/vectors/accumulate_vectors.h"
+#include "lower/statement_passes.h"
 
 #include <algorithm>
 #include <numeric>

@@ -22,7 +22,7 @@
 // Not done: masks that begin later; strided accesses; stores with places of run-time size that do
 //         not read what they replace, which gain nothing.
 // Source: folklore. Tests: test/golden/lower/blend_masked_stores/, loop_passes_test.
-#include "lower/vectors/blend_masked_stores.h"
+#include "lower/statement_passes.h"
 
 #include <algorithm>
 #include <functional>

@@ -14,7 +14,7 @@
 //         vectors for it.
 // Not done: sharing between statements; predicated loads.
 // Source: folklore. Tests: test/golden/lower/deinterleave_loads/, loop_passes_test.
-#include "lower/vectors/deinterleave_loads.h"
+#include "lower/statement_passes.h"
 
 #include <map>
 #include <optional>

@@ -24,7 +24,7 @@
 //         the element that it stores to stays whole, next to a store that does.
 // Not done: nested ramps; stores apart from each other.
 // Source: folklore. Tests: test/golden/lower/interleave_vectors/, loop_passes_test.
-#include "lower/vectors/interleave_vectors.h"
+#include "lower/statement_passes.h"
 
 #include <algorithm>
 #include <numeric>

@@ -13,7 +13,7 @@
 //         not fewer than min_columns. Interleaved, the rows are the columns one after the other.
 // Not done: strides up to 4, which deinterleave_loads shares; strides unknown until run time.
 // Source: folklore. Tests: test/golden/lower/transpose_loads/, loop_passes_test.
-#include "lower/vectors/transpose_loads.h"
+#include "lower/statement_passes.h"
 
 #include <map>
 #include <numeric>

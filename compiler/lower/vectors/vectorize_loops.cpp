@@ -24,7 +24,7 @@
 // Source: folklore; the mask of a branch is Allen, Kennedy, Porterfield & Warren 1983
 //         (if-conversion).
 // Tests: test/golden/lower/vectorize_loops/, test/property/loop_passes_test.cpp.
-#include "lower/vectors/vectorize_loops.h"
+#include "lower/statement_passes.h"
 
 #include <cstdlib>
 #include <optional>
