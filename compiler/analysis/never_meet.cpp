@@ -12,7 +12,6 @@
 #include <map>
 #include <memory>
 #include <unordered_set>
-#include <utility>
 
 #include "analysis/linear.h"
 #include "ir/build.h"

@@ -9,7 +9,6 @@
 // be differentiated again.
 #pragma once
 
-#include <map>
 #include <memory>
 #include <optional>
 #include <string>

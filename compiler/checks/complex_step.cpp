@@ -1,6 +1,5 @@
 #include "checks/complex_step.h"
 
-#include <functional>
 #include <unordered_map>
 
 #include "autodiff/schedule/default_schedule.h"

@@ -7,8 +7,6 @@
 #include <llvm/ADT/APFloat.h>
 #include <llvm/IR/Constants.h>
 
-#include <string>
-
 #include "codegen/sleef_library.h"
 
 namespace retrograde::codegen {

@@ -10,7 +10,6 @@
 #include <llvm/IR/Module.h>
 
 #include <functional>
-#include <string>
 #include <vector>
 
 #include "codegen/machine.h"

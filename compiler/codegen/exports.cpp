@@ -2,8 +2,6 @@
 
 #include <HalideRuntime.h>
 
-#include <cstring>
-
 #include "codegen/emitter.h"
 #include "codegen/make_exports.h"
 #include "diagnostics/error.h"

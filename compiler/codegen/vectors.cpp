@@ -1,6 +1,5 @@
 // Vectors of any number of lanes: slices, concatenations, shuffles, reductions.
 #include <algorithm>
-#include <numeric>
 
 #include "codegen/emitter.h"
 #include "diagnostics/error.h"

@@ -4,7 +4,6 @@
 #include <malloc.h>
 
 #include <iostream>
-#include <set>
 
 #include "diagnostics/error.h"
 #include "frontend/schedule/autoscheduler.h"

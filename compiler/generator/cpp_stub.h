@@ -9,7 +9,6 @@
 // configure() adds has no place in it.
 #pragma once
 
-#include <string>
 #include <type_traits>
 
 #include "generator/generator_base.h"

@@ -3,7 +3,6 @@
 // in.size=2) or the value itself says it.
 #pragma once
 
-#include <memory>
 #include <string>
 #include <vector>
 

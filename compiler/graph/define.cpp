@@ -7,7 +7,6 @@
 #include "graph/define.h"
 
 #include <algorithm>
-#include <unordered_map>
 #include <unordered_set>
 
 #include "diagnostics/error.h"

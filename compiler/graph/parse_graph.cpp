@@ -1,6 +1,5 @@
 // Two passes over the lines: the first makes what has a name, so that the second may mention
 // anything from anywhere.
-#include <functional>
 #include <map>
 #include <optional>
 

@@ -13,7 +13,6 @@
 // The left-hand side of the combination keeps the coordinates that depend on kept variables only;
 // the others (a histogram's bin) become the pure variables: all elements are combined.
 #include <algorithm>
-#include <functional>
 #include <map>
 #include <unordered_set>
 

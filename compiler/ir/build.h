@@ -3,7 +3,6 @@
 // users and passes alike).
 #pragma once
 
-#include <initializer_list>
 #include <optional>
 
 #include "diagnostics/error.h"

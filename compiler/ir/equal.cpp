@@ -3,7 +3,6 @@
 #include "ir/equal.h"
 
 #include <bit>
-#include <cstring>
 #include <string_view>
 #include <unordered_set>
 

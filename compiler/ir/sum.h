@@ -10,7 +10,6 @@
 // order: equal sums have equal text.
 #pragma once
 
-#include <optional>
 #include <string>
 #include <vector>
 

@@ -3,7 +3,6 @@
 
 #include <compare>
 #include <cstdint>
-#include <limits>
 #include <string>
 #include <type_traits>
 

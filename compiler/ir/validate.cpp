@@ -1,7 +1,6 @@
 // The rules of each phase, checked in one walk over the statement.
 #include "ir/validate.h"
 
-#include <optional>
 #include <unordered_set>
 
 #include "diagnostics/error.h"

@@ -4,7 +4,6 @@
 // written first and then made executable, never both, and is unmapped with the last handle to it.
 #pragma once
 
-#include <cstdint>
 #include <functional>
 #include <map>
 #include <memory>

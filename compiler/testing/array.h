@@ -2,7 +2,6 @@
 // with a buffer that machine code filled.
 #pragma once
 
-#include <cstdint>
 #include <functional>
 #include <string>
 #include <vector>

@@ -8,7 +8,6 @@
 #include "testing/random_schedule.h"
 
 #include <algorithm>
-#include <map>
 #include <set>
 
 #include "diagnostics/error.h"

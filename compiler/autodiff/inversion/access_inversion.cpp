@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <functional>
-#include <optional>
 
 #include "autodiff/inversion/group_inversion.h"
 #include "autodiff/inversion/isl_bridge.h"

@@ -5,7 +5,6 @@
 #include <isl/options.h>
 
 #include <algorithm>
-#include <unordered_set>
 
 #include "ir/build.h"
 #include "ir/visit.h"

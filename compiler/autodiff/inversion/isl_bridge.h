@@ -8,7 +8,6 @@
 #include <isl/cpp.h>
 
 #include <map>
-#include <memory>
 #include <optional>
 #include <set>
 #include <string>

@@ -6,7 +6,6 @@
 
 #include <memory>
 #include <optional>
-#include <string>
 
 #include "autodiff/inversion/isl_points.h"
 #include "autodiff/matrices/colour_table.h"

@@ -13,10 +13,6 @@
 
 #include <isl/cpp.h>
 
-#include <memory>
-#include <unordered_map>
-#include <vector>
-
 #include "analysis/interval.h"
 #include "autodiff/inversion/isl_bridge.h"
 #include "graph/function.h"

@@ -6,7 +6,6 @@
 // by falling degree, then by number, each gets the smallest colour that is allowed.
 #pragma once
 
-#include <cstdint>
 #include <vector>
 
 namespace retrograde::ir {

@@ -1,7 +1,6 @@
 #include "autodiff/rules/stable_forms.h"
 
 #include <algorithm>
-#include <cmath>
 #include <optional>
 
 #include "autodiff/rules/stable_norms.h"

@@ -1,7 +1,5 @@
 #include "autodiff/rules/stable_patterns.h"
 
-#include <utility>
-
 #include "ir/build.h"
 #include "ir/equal.h"
 

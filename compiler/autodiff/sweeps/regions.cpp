@@ -1,8 +1,5 @@
 #include "autodiff/sweeps/regions.h"
 
-#include <algorithm>
-#include <set>
-
 #include "autodiff/sweeps/custom_rules.h"
 #include "autodiff/sweeps/reverse_sweep.h"
 #include "graph/own_reads.h"

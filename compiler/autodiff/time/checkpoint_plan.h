@@ -1,7 +1,6 @@
 // What a loop over time needs of its steps, what its steps give, and how many states are kept.
 #pragma once
 
-#include <memory>
 #include <optional>
 #include <string>
 #include <vector>

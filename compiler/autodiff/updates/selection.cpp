@@ -1,7 +1,5 @@
 #include "autodiff/updates/selection.h"
 
-#include <algorithm>
-
 #include "autodiff/sweeps/accumulation.h"
 #include "autodiff/sweeps/regions.h"
 #include "autodiff/sweeps/reverse_sweep.h"

@@ -1,7 +1,5 @@
 #include "autodiff/updates/update_relations.h"
 
-#include <algorithm>
-
 #include "ir/build.h"
 #include "ir/variables.h"
 #include "ir/visit.h"

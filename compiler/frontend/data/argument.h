@@ -4,9 +4,7 @@
 // (A Buffer in the list comes at run time; one that is not in the list is embedded in the code.)
 #pragma once
 
-#include <memory>
 #include <string>
-#include <vector>
 
 #include "frontend/language/rdom.h"
 #include "graph/function.h"

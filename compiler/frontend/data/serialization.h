@@ -5,7 +5,6 @@
 
 #include <map>
 #include <string>
-#include <vector>
 
 #include "frontend/data/parameter.h"
 #include "frontend/run/pipeline.h"

@@ -13,10 +13,8 @@
 // bounds. Loops are cut so that the inside costs nothing extra.
 #pragma once
 
-#include <string>
 #include <type_traits>
 #include <utility>
-#include <vector>
 
 #include "frontend/language/func.h"
 

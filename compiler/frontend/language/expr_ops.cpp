@@ -2,6 +2,7 @@
 #include "frontend/language/expr_ops.h"
 
 #include <atomic>
+#include <limits>
 
 #include "ir/literal.h"
 #include "ir/print.h"

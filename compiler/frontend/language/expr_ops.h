@@ -4,7 +4,6 @@
 // Functions of real numbers take float arguments as they are and convert any other type to float32.
 #pragma once
 
-#include <string>
 #include <type_traits>
 #include <vector>
 

@@ -3,7 +3,6 @@
 #pragma once
 
 #include <memory>
-#include <type_traits>
 
 #include "frontend/data/buffer.h"
 #include "frontend/data/image_param.h"

@@ -2,8 +2,6 @@
 // stored.
 #include "frontend/language/func.h"
 
-#include <algorithm>
-
 #include "graph/define.h"
 #include "ir/print.h"
 #include "ir/visit.h"

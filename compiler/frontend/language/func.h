@@ -7,7 +7,6 @@
 #pragma once
 
 #include <concepts>
-#include <initializer_list>
 #include <source_location>
 #include <string>
 #include <type_traits>

@@ -1,7 +1,6 @@
 // pipeline.h -- one or more output Funcs, compiled and run together.
 #pragma once
 
-#include <functional>
 #include <memory>
 #include <string>
 #include <vector>

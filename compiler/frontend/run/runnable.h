@@ -1,7 +1,6 @@
 // runnable.h -- what runs and is compiled: a Pipeline, and a Func, which is a pipeline of one output.
 #pragma once
 
-#include <functional>
 #include <initializer_list>
 #include <map>
 #include <string>

@@ -1,7 +1,6 @@
 #include "lower/nests/copy_statement.h"
 
 #include <cctype>
-#include <map>
 
 #include "diagnostics/error.h"
 #include "ir/build.h"

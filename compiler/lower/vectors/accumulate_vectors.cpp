@@ -22,7 +22,6 @@
 #include "lower/statement_passes.h"
 
 #include <algorithm>
-#include <numeric>
 #include <unordered_map>
 #include <unordered_set>
 
