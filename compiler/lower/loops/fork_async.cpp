@@ -33,66 +33,32 @@
 #include "diagnostics/error.h"
 #include "ir/build.h"
 #include "ir/visit.h"
-#include "lower/nests/copy_statement.h"
+#include "lower/loops/semaphores.h"
 #include "lower/nests/make_names_unique.h"
 
 namespace retrograde::ir {
 
 namespace {
 
-std::string semaphores_of(const std::string& func) { return func + ".semaphores"; }
-
-// Of one reader; those of the next follow.
-enum Semaphore { Ready = 0, Space = 1 };
-constexpr int per_reader = 2;
-
-bool is_semaphore_step(const Stmt& s, const std::string& func) {
-  bool found = false;
-  walk(
-      s,
-      [&](const Expr& e) {
-        const Call* call = e.as<Call>();
-        found |= call && call->call_type == CallType::Func && call->name == semaphores_of(func);
-        return !found;
-      },
-      [](const Stmt& part) {
-        return part.kind() == Kind::LetStmt || part.kind() == Kind::Evaluate ||
-               part.kind() == Kind::Assert;
-      });
-  return found;
-}
-
 // Whether the expression or statement reads or writes the Func.
-struct UseFinder {
-  const std::string& func;
-  bool found = false;
-
-  bool visit(const Expr& e) {
-    const Call* call = e.as<Call>();
-    const Variable* variable = e.as<Variable>();
-    found |= call && call->call_type == CallType::Func && call->name == func;
-    found |= variable && variable->name.rfind(func + ".stride.", 0) == 0;
-    return !found;
-  }
-  bool visit(const Stmt& s) {
-    const Provide* provide = s.as<Provide>();
-    const Prefetch* prefetch = s.as<Prefetch>();
-    found |= (provide && provide->name == func) || (prefetch && prefetch->name == func);
-    return !found;
-  }
-};
-
-template <class Tree>
-bool uses_func(const Tree& tree, const std::string& func) {
-  UseFinder finder{func};
-  if constexpr (std::is_same_v<Tree, Expr>) {
-    walk(tree, [&](const Expr& e) { return finder.visit(e); });
-  } else {
-    walk(
-        tree, [&](const Expr& e) { return finder.visit(e); },
-        [&](const Stmt& s) { return finder.visit(s); });
-  }
-  return finder.found;
+bool reads_func(const Expr& e, const std::string& func) {
+  const Call* call = e.as<Call>();
+  const Variable* variable = e.as<Variable>();
+  return (call && call->call_type == CallType::Func && call->name == func) ||
+         (variable && variable->name.rfind(func + ".stride.", 0) == 0);
+}
+bool writes_func(const Stmt& s, const std::string& func) {
+  const Provide* provide = s.as<Provide>();
+  const Prefetch* prefetch = s.as<Prefetch>();
+  return (provide && provide->name == func) || (prefetch && prefetch->name == func);
+}
+bool uses_func(const Expr& e, const std::string& func) {
+  return any_node(e, [&](const Expr& node) { return reads_func(node, func); });
+}
+bool uses_func(const Stmt& s, const std::string& func) {
+  return any_node(
+      s, [&](const Expr& node) { return reads_func(node, func); },
+      [&](const Stmt& part) { return writes_func(part, func); });
 }
 
 using Names = std::set<std::string>;
@@ -129,11 +95,13 @@ Names realized_in(const Stmt& s) {
 
 // Whether anything but the computation of the Func itself reads it.
 bool is_read_outside(const Stmt& s, const std::string& func) {
-  UseFinder finder{func};
+  bool found = false;
   walk(
-      s, [&](const Expr& e) { return finder.visit(e); },
-      [&](const Stmt& part) { return !is_producer_of(part, func) && !finder.found; });
-  return finder.found;
+      s, [&](const Expr& e) { return !(found = found || reads_func(e, func)); },
+      [&](const Stmt& part) {
+        return !is_producer_of(part, func) && !(found = found || writes_func(part, func));
+      });
+  return found;
 }
 
 // A loop around the producer, inside of `s`.
@@ -153,7 +121,7 @@ class AsyncForker : public Rewriter {
  public:
   AsyncForker(const Stmt& s, const Program& program, const RenamedFuncs& renamed,
               const AsyncRoom& room)
-      : program_(program), renamed_(renamed), room_(room), fresh_(s) {}
+      : program_(program), renamed_(renamed), room_(room), semaphores_(s) {}
 
  protected:
   Expr rewrite(const Expr& e) override { return e; }
@@ -171,7 +139,7 @@ class AsyncForker : public Rewriter {
   const Program& program_;
   const RenamedFuncs& renamed_;
   const AsyncRoom& room_;
-  FreshNames fresh_;
+  Semaphores semaphores_;
   std::vector<std::string> forked_;     // async Funcs around whose consumers this is
   std::map<std::string, int> readers_;  // of those, with semaphores of their own
   std::map<std::string, Stmt> around_;  // by original name, the last one entered
@@ -299,94 +267,14 @@ class AsyncForker : public Rewriter {
     return s.defined() && (uses_func(s, name) || places_of(s).count(original(name)));
   }
 
-  // ---- semaphores ----
-
-  static Expr call(const char* function, const std::string& func, int which, int count) {
-    const Expr place = call_op(
-        Op::address_of, Handle(),
-        {call_func(semaphores_of(func), UInt(64), {Expr(static_cast<int32_t>(which))}, 0, {})});
-    return call_op(Op::runtime_call, Int(32), {Expr(function), place, Expr(count)});
-  }
-
-  Stmt acquire(const std::string& func, int which) {
-    const std::string code = fresh_(func + ".waited");
-    return make_let(code, call("retrograde_semaphore_acquire", func, which, 1),
-                    make_assert(variable(code) == 0, variable(code)));
-  }
-
-  static Stmt release(const std::string& func, int which) {
-    return make_evaluate(call("retrograde_semaphore_release", func, which, 1));
-  }
-
-  static Stmt with_semaphores(const std::string& func, int room, int readers, const Stmt& fork) {
-    std::vector<Stmt> stmts;
-    for (int i = 0; i < readers; i++) {
-      stmts.push_back(
-          make_evaluate(call("retrograde_semaphore_init", func, per_reader * i + Ready, 0)));
-      stmts.push_back(
-          make_evaluate(call("retrograde_semaphore_init", func, per_reader * i + Space, room)));
-    }
-    stmts.push_back(fork);
-    return make_realize(semaphores_of(func), {UInt(64)}, MemoryType::Stack,
-                        {Range{0, per_reader * readers}}, make_block(stmts));
-  }
-
-  static bool is_step(const Stmt& s, const std::string& func) {
-    const LetStmt* let = s.as<LetStmt>();
-    const bool has_form = let ? let->body.kind() == Kind::Assert : s.kind() == Kind::Evaluate;
-    return has_form && is_semaphore_step(s, func);
-  }
-  static bool has_steps(const Stmt& s, const std::string& func) {
-    return any_stmt(s, [&](const Stmt& part) { return is_step(part, func); });
-  }
-
-  // Each wait for the Func and each signal to it replaced; `s.defined()` need not hold of what
-  // comes in.
-  template <class Replace>
-  static Stmt replace_steps(const Stmt& s, const std::string& func, const Replace& replace) {
-    struct Replacer : Rewriter {
-      Replacer(const std::string& func, const Replace& replace) : func(func), replace(replace) {}
-      const std::string& func;
-      const Replace& replace;
-      Expr rewrite(const Expr& e) override { return e; }
-      Stmt rewrite(const Stmt& s) override { return is_step(s, func) ? replace(s) : children(s); }
-    };
-    return Replacer(func, replace)(s);
-  }
-
-  Stmt step_of_reader(const Stmt& step, const std::string& func, int reader) {
-    int which = -1;
-    walk(
-        step,
-        [&](const Expr& e) {
-          const Call* call = e.as<Call>();
-          if (call && call->call_type == CallType::Func)
-            which = static_cast<int>(*as_const_int(call->args[0])) % per_reader;
-          return true;
-        },
-        [](const Stmt&) { return true; });
-    const int semaphore = per_reader * reader + which;
-    return step.kind() == Kind::LetStmt ? acquire(func, semaphore) : release(func, semaphore);
-  }
-
-  // Waits of the Func that each of its readers makes with the producer.
-  Stmt with_all_readers(const Stmt& producer, const std::string& func) {
-    const int readers = readers_.at(func);
-    if (readers == 1) return producer;
-    return replace_steps(producer, func, [&](const Stmt& step) {
-      std::vector<Stmt> stmts;
-      for (int i = 0; i < readers; i++) stmts.push_back(step_of_reader(step, func, i));
-      return make_block(stmts);
-    });
-  }
-
   Stmt forked(const Realize& n, int room, const Branches& branches) {
     readers_[n.name] = 1;
     forked_.push_back(n.name);
     const Stmt consumer = (*this)(branches.consumer);
     forked_.pop_back();
-    const Stmt producer = with_all_readers((*this)(branches.producer), n.name);
-    return with_semaphores(n.name, room, readers_.at(n.name), make_fork(producer, consumer));
+    const Stmt producer =
+        semaphores_.for_readers((*this)(branches.producer), n.name, readers_.at(n.name));
+    return Semaphores::around(make_fork(producer, consumer), n.name, room, readers_.at(n.name));
   }
 
   // ---- produced once ----
@@ -394,7 +282,7 @@ class AsyncForker : public Rewriter {
   Stmt fork_once(const Realize& n) {
     Branches branches = branches_of(n, false, 0);
     if (!branches.consumer.defined()) return children(n.body);
-    branches.producer = make_block({branches.producer, release(n.name, Ready)});
+    branches.producer = make_block({branches.producer, Semaphores::release(n.name, Ready)});
     branches.consumer = acquired_late(branches.consumer, n.name);
     return forked(n, 0, branches);
   }
@@ -421,7 +309,7 @@ class AsyncForker : public Rewriter {
         return make_block(std::move(stmts));
       }
     }
-    return make_block({acquire(func, Ready), s});
+    return make_block({semaphores_.acquire(func, Ready), s});
   }
 
   static bool bounds_use(const Realize& n, const std::string& func) {
@@ -443,17 +331,19 @@ class AsyncForker : public Rewriter {
   // producer's has one of its own.
   void share_waits(Stmt& producer, Stmt& consumer) {
     for (const std::string& outer : forked_) {
-      if (!has_steps(producer, outer) || !consumer.defined() || !has_steps(consumer, outer))
+      if (!Semaphores::has_steps(producer, outer) || !consumer.defined() ||
+          !Semaphores::has_steps(consumer, outer))
         continue;
       const bool in_producer = uses_func(producer, outer), in_consumer = uses_func(consumer, outer);
       if (in_producer && in_consumer) {
         const int reader = readers_.at(outer)++;
-        producer = replace_steps(
-            producer, outer, [&](const Stmt& step) { return step_of_reader(step, outer, reader); });
+        producer = Semaphores::replace_steps(producer, outer, [&](const Stmt& step) {
+          return semaphores_.of_reader(step, outer, reader);
+        });
         continue;
       }
       Stmt& other = in_producer ? consumer : producer;
-      other = replace_steps(other, outer, [](const Stmt&) { return make_evaluate(0); });
+      other = Semaphores::replace_steps(other, outer, [](const Stmt&) { return make_evaluate(0); });
     }
   }
 
@@ -461,9 +351,9 @@ class AsyncForker : public Rewriter {
   Stmt shake_hands(const Stmt& body, const std::string& func, bool produces, int room) {
     const Semaphore before = produces ? Space : Ready, after = produces ? Ready : Space;
     std::vector<Stmt> stmts;
-    if (before == Ready || room > 0) stmts.push_back(acquire(func, before));
+    if (before == Ready || room > 0) stmts.push_back(semaphores_.acquire(func, before));
     if (body.defined()) stmts.push_back(body);
-    if (after == Ready || room > 0) stmts.push_back(release(func, after));
+    if (after == Ready || room > 0) stmts.push_back(Semaphores::release(func, after));
     return make_block(std::move(stmts));
   }
 
@@ -488,27 +378,49 @@ class AsyncForker : public Rewriter {
     const auto part = [&](const Stmt& child) {
       return only_producer(child, func, made, loops, room);
     };
+    if (const Block* n = s.as<Block>()) {
+      std::vector<Stmt> stmts;
+      for (const Stmt& child : n->stmts) stmts.push_back(is_wait(child) ? child : part(child));
+      return make_block(std::move(stmts));
+    }
+    if (const For* n = s.as<For>()) {
+      if (produces(n->body, func)) check_serial(*n, func);
+      return around_loop(*n, part(n->body), func, true, loops, room);
+    }
+    if (const ProducerConsumer* n = s.as<ProducerConsumer>()) return part(n->body);
+    return around(s, part);
+  }
+
+  // A loop around what is left of its body, with the waits of a branch where it has them.
+  Stmt around_loop(const For& n, Stmt body, const std::string& func, bool of_producer, bool loops,
+                   int room) {
+    if (loops && is_innermost_around(n, func)) body = shake_hands(body, func, of_producer, room);
+    return make_for(n.name, n.min, n.extent, n.runs, body, n.partition);
+  }
+
+  // The control of a statement around what `part` leaves of its parts; undefined without any.
+  Stmt around(const Stmt& s, FunctionRef<Stmt(const Stmt&)> part) const {
     return match(
         s,
-        [&](const For& n) {
-          const bool is_shared = produces(n.body, func);
-          if (is_shared) check_serial(n, func);
+        [&](const LetStmt& n) {
           Stmt body = part(n.body);
-          if (loops && is_innermost_around(n, func)) body = shake_hands(body, func, true, room);
-          return make_for(n.name, n.min, n.extent, n.runs, body, n.partition);
+          return body.defined() ? make_let(n.name, n.value, body) : body;
         },
-        [&](const LetStmt& n) { return make_let(n.name, n.value, part(n.body)); },
         [&](const IfThenElse& n) {
           Stmt when_true = part(n.when_true), when_false = part(n.when_false);
+          if (!when_true.defined() && !when_false.defined()) return when_true;
           if (!when_true.defined()) return make_if(!n.condition, when_false);
           return make_if(n.condition, when_true, when_false);
         },
         [&](const Block& n) {
           std::vector<Stmt> stmts;
-          for (const Stmt& child : n.stmts) stmts.push_back(is_wait(child) ? child : part(child));
+          for (const Stmt& child : n.stmts) stmts.push_back(part(child));
           return make_block(std::move(stmts));
         },
-        [&](const ProducerConsumer& n) { return part(n.body); },
+        [&](const ProducerConsumer& n) {
+          Stmt body = part(n.body);
+          return body.defined() ? make_producer_consumer(n.name, n.produces, body) : body;
+        },
         [&](const Realize& n) {
           Stmt body = part(n.body);
           if (!needs(body, n.name)) return body;
@@ -519,47 +431,16 @@ class AsyncForker : public Rewriter {
 
   bool is_wait(const Stmt& s) const {
     return std::any_of(forked_.begin(), forked_.end(),
-                       [&](const std::string& func) { return is_step(s, func); });
+                       [&](const std::string& func) { return Semaphores::is_step(s, func); });
   }
 
   // Everything but the work of the producer.
   Stmt without_producer(const Stmt& s, const std::string& func, bool loops, int room = 0) {
     if (!s.defined() || !produces(s, func)) return s;
     if (is_producer_of(s, func)) return {};
-    return match(
-        s,
-        [&](const For& n) {
-          Stmt body = without_producer(n.body, func, loops, room);
-          if (loops && is_innermost_around(n, func)) body = shake_hands(body, func, false, room);
-          return make_for(n.name, n.min, n.extent, n.runs, body, n.partition);
-        },
-        [&](const LetStmt& n) {
-          Stmt body = without_producer(n.body, func, loops, room);
-          return body.defined() ? make_let(n.name, n.value, body) : body;
-        },
-        [&](const IfThenElse& n) {
-          Stmt when_true = without_producer(n.when_true, func, loops, room);
-          Stmt when_false = without_producer(n.when_false, func, loops, room);
-          if (!when_true.defined() && !when_false.defined()) return when_true;
-          if (!when_true.defined()) return make_if(!n.condition, when_false);
-          return make_if(n.condition, when_true, when_false);
-        },
-        [&](const Block& n) {
-          std::vector<Stmt> stmts;
-          for (const Stmt& part : n.stmts)
-            stmts.push_back(without_producer(part, func, loops, room));
-          return make_block(std::move(stmts));
-        },
-        [&](const ProducerConsumer& n) {
-          Stmt body = without_producer(n.body, func, loops, room);
-          return body.defined() ? make_producer_consumer(n.name, n.produces, body) : body;
-        },
-        [&](const Realize& n) {
-          Stmt body = without_producer(n.body, func, loops, room);
-          if (!needs(body, n.name)) return body;
-          return make_realize(n.name, n.types, n.memory, n.bounds, body);
-        },
-        [&](const StmtNode&) { return s; });
+    const auto part = [&](const Stmt& child) { return without_producer(child, func, loops, room); };
+    if (const For* n = s.as<For>()) return around_loop(*n, part(n->body), func, false, loops, room);
+    return around(s, part);
   }
 };
 
