@@ -8,18 +8,18 @@ namespace retrograde {
 namespace {
 
 // A binary interchange format of 16 bits: sign, exponent, fraction.
-struct SmallFloat {
+struct FloatFormat {
   int exponent_bits, fraction_bits;
   int bias() const { return (1 << (exponent_bits - 1)) - 1; }
   int min_exponent() const { return 1 - bias(); }
   int infinity() const { return ((1 << exponent_bits) - 1) << fraction_bits; }
 };
-constexpr SmallFloat half_format{5, 10};
-constexpr SmallFloat brain_format{8, 7};
+constexpr FloatFormat half_format{5, 10};
+constexpr FloatFormat brain_format{8, 7};
 
 // One rounding, to nearest even, whatever the distance between the formats. Relies on the default
 // rounding mode.
-uint16_t encode(const SmallFloat& format, double value) {
+uint16_t encode(const FloatFormat& format, double value) {
   const int sign = std::signbit(value) ? 0x8000 : 0;
   if (std::isnan(value)) return sign | format.infinity() | 1 << (format.fraction_bits - 1);
   if (std::isinf(value)) return sign | format.infinity();
@@ -38,7 +38,7 @@ uint16_t encode(const SmallFloat& format, double value) {
   return sign | ((biased << format.fraction_bits) + steps);
 }
 
-double decode(const SmallFloat& format, uint16_t bits) {
+double decode(const FloatFormat& format, uint16_t bits) {
   const double sign = bits & 0x8000 ? -1.0 : 1.0;
   const int magnitude = bits & 0x7fff;
   const int fraction = magnitude & ((1 << format.fraction_bits) - 1);
@@ -65,10 +65,10 @@ int significant_bits(Type type) {
 
 }  // namespace
 
-float16_t::float16_t(double value) : bits(encode(half_format, value)) {}
+float16_t::float16_t(double value) { bits = encode(half_format, value); }
 float16_t::float16_t(float value) : float16_t(static_cast<double>(value)) {}
 float16_t::operator float() const { return static_cast<float>(decode(half_format, bits)); }
-bfloat16_t::bfloat16_t(double value) : bits(encode(brain_format, value)) {}
+bfloat16_t::bfloat16_t(double value) { bits = encode(brain_format, value); }
 bfloat16_t::bfloat16_t(float value) : bfloat16_t(static_cast<double>(value)) {}
 bfloat16_t::operator float() const { return static_cast<float>(decode(brain_format, bits)); }
 

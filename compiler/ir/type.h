@@ -15,62 +15,51 @@ class Expr;
 
 enum class TypeCode : uint8_t { Int, UInt, Float, BFloat, Handle };
 
-// A 16-bit IEEE half; arithmetic happens in float32 and rounds to nearest even at each operation.
-struct float16_t {
-  static constexpr int mantissa_bits = 10;
-  static constexpr uint16_t sign_mask = 0x8000, exponent_mask = 0x7c00, mantissa_mask = 0x03ff;
+// A float of 16 bits with a sign, an exponent and so many bits of mantissa.
+template <class Self, int mantissa>
+struct SmallFloat {
+  static constexpr int mantissa_bits = mantissa;
+  static constexpr uint16_t sign_mask = 0x8000, mantissa_mask = (1 << mantissa) - 1,
+                            exponent_mask = 0x7fff & ~mantissa_mask;
   uint16_t bits = 0;
+  static Self make_from_bits(uint16_t bits) {
+    Self result;
+    result.bits = bits;
+    return result;
+  }
+  static Self make_zero() { return make_from_bits(0); }
+  static Self make_negative_zero() { return make_from_bits(sign_mask); }
+  static Self make_infinity() { return make_from_bits(exponent_mask); }
+  static Self make_negative_infinity() { return make_from_bits(sign_mask | exponent_mask); }
+  static Self make_nan() { return make_from_bits(exponent_mask | 1 << (mantissa - 1)); }
+  uint16_t to_bits() const { return bits; }
+  bool is_nan() const { return (bits & 0x7fff) > exponent_mask; }
+  bool is_infinity() const { return (bits & 0x7fff) == exponent_mask; }
+  bool is_negative() const { return (bits & sign_mask) != 0; }
+  bool is_zero() const { return (bits & 0x7fff) == 0; }
+  explicit operator int() const { return static_cast<int>(as_float()); }
+  explicit operator double() const { return static_cast<double>(as_float()); }
+
+ private:
+  float as_float() const { return static_cast<float>(static_cast<const Self&>(*this)); }
+};
+
+// A 16-bit IEEE half; arithmetic happens in float32 and rounds to nearest even at each operation.
+struct float16_t : SmallFloat<float16_t, 10> {
   float16_t() = default;
   explicit float16_t(float value);
   explicit float16_t(double value);
   explicit float16_t(int value) : float16_t(static_cast<float>(value)) {}
   explicit operator float() const;
-  explicit operator int() const { return static_cast<int>(static_cast<float>(*this)); }
-  explicit operator double() const { return static_cast<double>(static_cast<float>(*this)); }
-  static float16_t make_from_bits(uint16_t bits) {
-    float16_t result;
-    result.bits = bits;
-    return result;
-  }
-  static float16_t make_zero() { return make_from_bits(0); }
-  static float16_t make_negative_zero() { return make_from_bits(0x8000); }
-  static float16_t make_infinity() { return make_from_bits(0x7c00); }
-  static float16_t make_negative_infinity() { return make_from_bits(0x8000 | 0x7c00); }
-  static float16_t make_nan() { return make_from_bits(0x7e00); }
-  uint16_t to_bits() const { return bits; }
-  bool is_nan() const { return (bits & 0x7fff) > 0x7c00; }
-  bool is_infinity() const { return (bits & 0x7fff) == 0x7c00; }
-  bool is_negative() const { return (bits & 0x8000) != 0; }
-  bool is_zero() const { return (bits & 0x7fff) == 0; }
 };
 
 // The upper half of a float32, rounded to nearest even.
-struct bfloat16_t {
-  static constexpr int mantissa_bits = 7;
-  static constexpr uint16_t sign_mask = 0x8000, exponent_mask = 0x7f80, mantissa_mask = 0x007f;
-  uint16_t bits = 0;
+struct bfloat16_t : SmallFloat<bfloat16_t, 7> {
   bfloat16_t() = default;
   explicit bfloat16_t(float value);
   explicit bfloat16_t(double value);
   explicit bfloat16_t(int value) : bfloat16_t(static_cast<float>(value)) {}
   explicit operator float() const;
-  explicit operator int() const { return static_cast<int>(static_cast<float>(*this)); }
-  explicit operator double() const { return static_cast<double>(static_cast<float>(*this)); }
-  static bfloat16_t make_from_bits(uint16_t bits) {
-    bfloat16_t result;
-    result.bits = bits;
-    return result;
-  }
-  static bfloat16_t make_zero() { return make_from_bits(0); }
-  static bfloat16_t make_negative_zero() { return make_from_bits(0x8000); }
-  static bfloat16_t make_infinity() { return make_from_bits(0x7f80); }
-  static bfloat16_t make_negative_infinity() { return make_from_bits(0x8000 | 0x7f80); }
-  static bfloat16_t make_nan() { return make_from_bits(0x7fc0); }
-  uint16_t to_bits() const { return bits; }
-  bool is_nan() const { return (bits & 0x7fff) > 0x7f80; }
-  bool is_infinity() const { return (bits & 0x7fff) == 0x7f80; }
-  bool is_negative() const { return (bits & 0x8000) != 0; }
-  bool is_zero() const { return (bits & 0x7fff) == 0; }
 };
 
 // Arithmetic on the 16-bit floats: in float32, rounded after each operation.

@@ -311,76 +311,31 @@ class LoopDirectives {
 
   // ---- GPUs and accelerators: Unsupported ----
   // Requires: loops run on the CPU (Unsupported).
-  Self& gpu_threads(const VarOrRVar& x, DeviceAPI device = DeviceAPI::Default_GPU) {
-    refuse("map", {x}, "to GPU threads", device);
+  template <typename... Rest>
+  Self& gpu_threads(const VarOrRVar& x, const Rest&... rest) {
+    refuse_gpu("map", "to GPU threads", x, rest...);
   }
-  Self& gpu_threads(const VarOrRVar& x, const VarOrRVar& y,
-                    DeviceAPI device = DeviceAPI::Default_GPU) {
-    refuse("map", {x, y}, "to GPU threads", device);
-  }
-  Self& gpu_threads(const VarOrRVar& x, const VarOrRVar& y, const VarOrRVar& z,
-                    DeviceAPI device = DeviceAPI::Default_GPU) {
-    refuse("map", {x, y, z}, "to GPU threads", device);
-  }
-  Self& gpu_lanes(const VarOrRVar& x, DeviceAPI device = DeviceAPI::Default_GPU) {
-    refuse("map", {x}, "to GPU lanes", device);
+  template <typename... Rest>
+  Self& gpu_lanes(const VarOrRVar& x, const Rest&... rest) {
+    refuse_gpu("map", "to GPU lanes", x, rest...);
   }
   Self& gpu_single_thread(DeviceAPI device = DeviceAPI::Default_GPU) {
-    refuse("run", {}, "on a single GPU thread", device);
+    refuse_gpu("run", "on a single GPU thread", device);
   }
-  Self& gpu_blocks(const VarOrRVar& x, DeviceAPI device = DeviceAPI::Default_GPU) {
-    refuse("map", {x}, "to GPU blocks", device);
+  template <typename... Rest>
+  Self& gpu_blocks(const VarOrRVar& x, const Rest&... rest) {
+    refuse_gpu("map", "to GPU blocks", x, rest...);
   }
-  Self& gpu_blocks(const VarOrRVar& x, const VarOrRVar& y,
-                   DeviceAPI device = DeviceAPI::Default_GPU) {
-    refuse("map", {x, y}, "to GPU blocks", device);
+  template <typename... Rest>
+  Self& gpu(const VarOrRVar& block, const VarOrRVar& thread, const Rest&... rest) {
+    refuse_gpu("map", "to a GPU", block, thread, rest...);
   }
-  Self& gpu_blocks(const VarOrRVar& x, const VarOrRVar& y, const VarOrRVar& z,
-                   DeviceAPI device = DeviceAPI::Default_GPU) {
-    refuse("map", {x, y, z}, "to GPU blocks", device);
-  }
-  Self& gpu(const VarOrRVar& bx, const VarOrRVar& tx, DeviceAPI device = DeviceAPI::Default_GPU) {
-    refuse("map", {bx, tx}, "to a GPU", device);
-  }
-  Self& gpu(const VarOrRVar& bx, const VarOrRVar& by, const VarOrRVar& tx, const VarOrRVar& ty,
-            DeviceAPI device = DeviceAPI::Default_GPU) {
-    refuse("map", {bx, by, tx, ty}, "to a GPU", device);
-  }
-  Self& gpu(const VarOrRVar& bx, const VarOrRVar& by, const VarOrRVar& bz, const VarOrRVar& tx,
-            const VarOrRVar& ty, const VarOrRVar& tz, DeviceAPI device = DeviceAPI::Default_GPU) {
-    refuse("map", {bx, by, bz, tx, ty, tz}, "to a GPU", device);
-  }
-  Self& gpu_tile(const VarOrRVar& x, const VarOrRVar&, const VarOrRVar&, const Expr&,
-                 TailStrategy = TailStrategy::Auto, DeviceAPI device = DeviceAPI::Default_GPU) {
-    refuse("tile", {x}, "for a GPU", device);
-  }
-  Self& gpu_tile(const VarOrRVar& x, const VarOrRVar&, const Expr&,
-                 TailStrategy = TailStrategy::Auto, DeviceAPI device = DeviceAPI::Default_GPU) {
-    refuse("tile", {x}, "for a GPU", device);
-  }
-  Self& gpu_tile(const VarOrRVar& x, const VarOrRVar& y, const VarOrRVar&, const VarOrRVar&,
-                 const VarOrRVar&, const VarOrRVar&, const Expr&, const Expr&,
-                 TailStrategy = TailStrategy::Auto, DeviceAPI device = DeviceAPI::Default_GPU) {
-    refuse("tile", {x, y}, "for a GPU", device);
-  }
-  Self& gpu_tile(const VarOrRVar& x, const VarOrRVar& y, const VarOrRVar&, const VarOrRVar&,
-                 const Expr&, const Expr&, TailStrategy = TailStrategy::Auto,
-                 DeviceAPI device = DeviceAPI::Default_GPU) {
-    refuse("tile", {x, y}, "for a GPU", device);
-  }
-  Self& gpu_tile(const VarOrRVar& x, const VarOrRVar& y, const VarOrRVar& z, const VarOrRVar&,
-                 const VarOrRVar&, const VarOrRVar&, const VarOrRVar&, const VarOrRVar&,
-                 const VarOrRVar&, const Expr&, const Expr&, const Expr&,
-                 TailStrategy = TailStrategy::Auto, DeviceAPI device = DeviceAPI::Default_GPU) {
-    refuse("tile", {x, y, z}, "for a GPU", device);
-  }
-  Self& gpu_tile(const VarOrRVar& x, const VarOrRVar& y, const VarOrRVar& z, const VarOrRVar&,
-                 const VarOrRVar&, const VarOrRVar&, const Expr&, const Expr&, const Expr&,
-                 TailStrategy = TailStrategy::Auto, DeviceAPI device = DeviceAPI::Default_GPU) {
-    refuse("tile", {x, y, z}, "for a GPU", device);
+  template <typename... Rest>
+  Self& gpu_tile(const VarOrRVar& x, const VarOrRVar& inner, const Rest&... rest) {
+    refuse_gpu("tile", "for a GPU", x, inner, rest...);
   }
   Self& hexagon(const VarOrRVar& x = Var::outermost()) {
-    refuse("run the loop", {x}, "on a Hexagon accelerator", DeviceAPI::Hexagon);
+    ir::refuse_device(place(), "run the loop", {x}, "on a Hexagon accelerator", DeviceAPI::Hexagon);
   }
 
   void unscheduled() { give(ir::Unscheduled{}); }  // says that no directive was forgotten
@@ -402,8 +357,16 @@ class LoopDirectives {
     ir::Directive run = ir::RunLoop{var.name(), kind};
     ir::check_directive(place(), run);
   }
-  [[noreturn]] void refuse(const char* verb, const std::vector<VarOrRVar>& loops, const char* where,
-                           DeviceAPI device) const {
+  // Of what such a directive is given, the loops and the device are named.
+  template <typename... Given>
+  [[noreturn]] void refuse_gpu(const char* verb, const char* where, const Given&... given) const {
+    std::vector<VarOrRVar> loops;
+    DeviceAPI device = DeviceAPI::Default_GPU;
+    const auto note = [&]<typename T>(const T& argument) {
+      if constexpr (std::is_convertible_v<T, VarOrRVar>) loops.push_back(argument);
+      if constexpr (std::is_same_v<T, DeviceAPI>) device = argument;
+    };
+    (note(given), ...);
     ir::refuse_device(place(), verb, loops, where, device);
   }
 };

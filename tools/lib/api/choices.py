@@ -46,6 +46,6 @@ SHOWN_BY = {
     "AutoSchedulerResults": r"auto_schedule", "InputValue": r"Input<", "StubOutputs": r"stub", "OutputInfo": r"get_output_info",
     "LoweredFunc": r"LoweredFunc|functions\(\)", "ParamMap::Entry": r"ParamMap", "ParamMap::ParamMapping": r"ParamMap|\{\{",
     "Buffer": r"Buffer|realize", "Type": r"type\(|Type|Int\(|Float\(", "CommandLine": r"command_line|run_generators",
-    "ScheduleHandle": r"Stage", "LoopDirectives": r"update\(|Func", "Runnable": r"Pipeline|Func", "RealizationArg": r"realize", "ScheduleLog": r"ScheduleLog|schedule_log", "ScheduleLog::Entry": r"ScheduleLog::Entry|entries", "ExternFuncArgument": r"define_extern|ExternFuncArgument", "Module": r"compile_to_module|Module",
+    "ScheduleHandle": r"Stage", "LoopDirectives": r"update\(|Func", "Runnable": r"Pipeline|Func", "SmallFloat": r"float16_t", "RealizationArg": r"realize", "ScheduleLog": r"ScheduleLog|schedule_log", "ScheduleLog::Entry": r"ScheduleLog::Entry|entries", "ExternFuncArgument": r"define_extern|ExternFuncArgument", "Module": r"compile_to_module|Module",
     "Tuple": r"Tuple", "Message": r"message\(\)", "Error": r"error", "RVar": r"RDom|RVar", "Expr": r"Expr", "Func": r"Func",
 }
