@@ -6,7 +6,7 @@
 #include "autodiff/report/synthesis_account.h"
 #include "autodiff/report/zero_reasons.h"
 #include "autodiff/rules/derivative_rules.h"
-#include "autodiff/rules/invariance.h"
+#include "autodiff/sweeps/active_symbols.h"
 #include "autodiff/sweeps/custom_rules.h"
 #include "autodiff/sweeps/input_shape.h"
 #include "autodiff/sweeps/reverse_sweep.h"
@@ -25,19 +25,6 @@ namespace retrograde::ir {
 
 namespace {
 
-const ParameterContents* as_parameter(const Symbol* symbol) {
-  return dynamic_cast<const ParameterContents*>(symbol);
-}
-
-// What a wanted leaf refers to; null for variables that are no parameter.
-Symbol* symbol_of(const Expr& leaf) {
-  if (const auto* call = leaf.as<Call>()) return call->symbol.raw();
-  const auto* v = leaf.as<Variable>();
-  return v && as_parameter(v->symbol.raw()) && !as_parameter(v->symbol.raw())->is_buffer
-             ? v->symbol.raw()
-             : nullptr;
-}
-
 std::vector<std::string> implicit_args(int n) {
   std::vector<std::string> names;
   for (int d = 0; d < n; ++d) names.push_back("_" + std::to_string(d));
@@ -52,10 +39,8 @@ class Synthesis {
         order_(topological_order({seed.output})),
         regions_(order_, seed.region),
         ranges_(order_),
-        cancelling_(cancelling_funcs(order_)),
-        versions_(options.versions) {
-    find_active();
-  }
+        active_(seed.output, order_, options),
+        versions_(options.versions) {}
 
   SynthesisResult run() {
     add_seed();
@@ -90,52 +75,6 @@ class Synthesis {
                      " a custom_adjoint, leave its inputs out of what is "
                      "differentiated by, or differentiate what comes after it, with its values in "
                      "an ImageParam"));
-  }
-
-  // ---- which symbols lie between the requested inputs and the output ----
-
-  bool is_requested(const Symbol* symbol) const {
-    if (options_.left_out.contains(symbol)) return false;
-    return !options_.only_requested || options_.requested.contains(symbol);
-  }
-
-  void find_active() {
-    for (const auto& parameter : parameters_of({seed_.output})) {
-      if (parameter->type.is_float() && is_requested(parameter.get()))
-        active_.insert(parameter.get());
-    }
-    for (const FuncPtr& f : order_) {
-      if (!is_floating(f->types) || cancelling_.contains(f.get())) continue;
-      bool passes = passes_on(*f);
-      if (passes) passing_.insert(f.get());
-      if (passes || is_requested(f.get())) active_.insert(f.get());
-    }
-  }
-  // Whether derivatives go on from f to something wanted.
-  bool passes_on(const FuncContents& f) const {
-    if (has_custom_adjoint(f)) {
-      for (const AdjointInput& input : f.custom_derivatives->adjoint_inputs) {
-        if (active_.contains(input.symbol().get())) return true;
-      }
-    }
-    if (f.custom_derivatives || f.is_extern()) {
-      for (const auto& symbol : read_by(f)) {
-        if (active_.contains(symbol.get())) return true;
-      }
-    }
-    bool found = false;
-    for (int s = 0; s < f.stage_count() && !found; ++s) found = reads_active(f.stage(s));
-    return found;
-  }
-  bool reads_active(const Definition& definition) const {
-    bool found = false;
-    for_each_expr(definition, [&](const Expr& root) {
-      found = found || any_node(root, [&](const Expr& e) {
-                Symbol* symbol = e.as<Call>() || e.as<Variable>() ? symbol_of(e) : nullptr;
-                return symbol && active_.contains(symbol);
-              });
-    });
-    return found;
   }
 
   // ---- contributions ----
@@ -184,14 +123,14 @@ class Synthesis {
     record(*f, f->stage_count() - 1, adjoint);
     register_func(adjoint, f->name, target.region);
     if (f->custom_derivatives || f->is_extern()) {
-      if (passing_.contains(f.get())) contribute_by_rule(f, adjoint.func);
+      if (active_.is_passed_by(f.get())) contribute_by_rule(f, adjoint.func);
       return;
     }
     for (int s = f->stage_count() - 1; s >= 1; --s) {
       const int own_stages = adjoint.func->stage_count();
       UpdateAdjoint update = differentiate_update(
           {f, s, regions_, target, adjoint, extendable, versions_, options_.checkpoints,
-           [&](const Expr& leaf) { return is_wanted(leaf); }, ranges_});
+           [&](const Expr& leaf) { return active_.contains(leaf); }, ranges_});
       if (adjoint.func->stage_count() > own_stages) keep_unextended(*f, s, adjoint, own_stages);
       if (update.current.func != adjoint.func)
         register_func(update.current, f->name, target.region);
@@ -201,7 +140,7 @@ class Synthesis {
       for (const IterationDomain& domain : update.domains)
         contribute_stage(f, update.values, seeds, domain, update.self_values, update.keeps_steps);
       for (const GivenAdjoint& g : update.given) {
-        if (is_wanted(g.leaf.leaf)) add_contribution(f, g.leaf, g.domain);
+        if (active_.contains(g.leaf.leaf)) add_contribution(f, g.leaf, g.domain);
       }
       account_.add(update.explanations);
       if (update.previous.func && is_zero_over(*update.previous.func, target.region)) {
@@ -236,7 +175,7 @@ class Synthesis {
   // holds what later iterations read of earlier ones. Who asks for the adjoint after the update
   // gets one without.
   void keep_unextended(const FuncContents& f, int stage, AdjointFunc adjoint, int own_stages) {
-    if (!is_requested(&f)) return;
+    if (!active_.is_requested(&f)) return;
     adjoint.func =
         clone_prefix(adjoint.func, own_stages, text(f.name, "_adj_after_update", stage - 1));
     record(f, stage, adjoint);
@@ -287,11 +226,6 @@ class Synthesis {
     result_.after_stage[{&f, stage}] = adjoint.func;
   }
 
-  bool is_wanted(const Expr& leaf) const {
-    Symbol* symbol = symbol_of(leaf);
-    return symbol && active_.contains(symbol);
-  }
-
   void contribute_pure(const FuncPtr& f, const FuncPtr& adjoint) {
     std::vector<Expr> values;
     for (const Expr& v : f->pure->values) values.push_back(without_lets(v));
@@ -314,7 +248,7 @@ class Synthesis {
                         const SelfValues& self_values, bool keeps_steps) {
     SweepResult sweep = sweep_reverse(
         values, seeds,
-        [&](const Expr& leaf) { return is_wanted(leaf) && symbol_of(leaf) != f.get(); },
+        [&](const Expr& leaf) { return active_.contains(leaf) && symbol_of(leaf) != f.get(); },
         [&](const Expr& leaf) { return ranges_.may_be_infinite(leaf); });
     for (const std::string& note : sweep.notes) explain(Explanation::Kind::Zero, f->name, note);
     for (LeafAdjoint& leaf : sweep.leaves) {
@@ -420,7 +354,7 @@ class Synthesis {
   void list_gradients() {
     for (const auto& p : parameters_of({seed_.output})) {
       auto found = result_.parameters.find(p.get());
-      if (found == result_.parameters.end() || !is_requested(p.get())) continue;
+      if (found == result_.parameters.end() || !active_.is_requested(p.get())) continue;
       result_.gradients.push_back({found->second, box_of(target_of(*p).region)});
     }
     if (result_.gradients.empty() || options_.only_requested) list_func_gradients();
@@ -428,7 +362,7 @@ class Synthesis {
   void list_func_gradients() {
     for (const FuncPtr& f : order_) {
       auto found = result_.after_stage.find({f.get(), f->stage_count() - 1});
-      if (found == result_.after_stage.end() || !is_requested(f.get())) continue;
+      if (found == result_.after_stage.end() || !active_.is_requested(f.get())) continue;
       result_.gradients.push_back({found->second, box_of(target_of(*f).region)});
     }
   }
@@ -496,7 +430,7 @@ class Synthesis {
     if (!floating) {
       explain(Explanation::Kind::Zero, name,
               "its type is " + to_string(type) + ": integers have no derivative");
-    } else if (cancelling_.contains(symbol)) {
+    } else if (active_.cancels(symbol)) {
       explain(
           Explanation::Kind::Zero, name,
           "the output is the same for all of its values: it is what a softmax, a log-sum-exp or "
@@ -519,9 +453,7 @@ class Synthesis {
   std::vector<FuncPtr> order_;
   Regions regions_;
   ValueRanges ranges_;
-  std::unordered_set<const Symbol*> cancelling_;
-  std::unordered_set<const Symbol*> active_;
-  std::unordered_set<const Symbol*> passing_;  // Funcs that depend on something else active
+  ActiveSymbols active_;
   std::unordered_set<const Symbol*> zero_;     // by no path
   std::unordered_set<const Symbol*> covered_;  // inside of a custom adjoint that was used
   std::unordered_map<const Symbol*, std::vector<Contribution>> pending_;
