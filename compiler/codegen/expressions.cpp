@@ -174,28 +174,10 @@ Value* FunctionGenerator::make(const Shuffle& e) {
   return e.indices.size() == 1 ? lane(e_, all, e.indices[0]) : shuffle(e_, all, all, e.indices);
 }
 
-static Kind binary_kind(ReduceOp op) {
-  switch (op) {
-    case ReduceOp::Add:
-      return Kind::Add;
-    case ReduceOp::Mul:
-      return Kind::Mul;
-    case ReduceOp::Min:
-      return Kind::Min;
-    case ReduceOp::Max:
-      return Kind::Max;
-    case ReduceOp::And:
-      return Kind::And;
-    case ReduceOp::Or:
-      return Kind::Or;
-  }
-  internal_error("unknown reduction");
-}
-
 Value* FunctionGenerator::make(const VectorReduce& e) {
   const Type element = e.type.element_of();
   return reduce_groups(e_, reduced_in_part(e), e.type.lanes(), [&](Value* a, Value* b) {
-    return binary(e_, binary_kind(e.op), element.with_lanes(lanes_of(a)), a, b);
+    return binary(e_, e.op, element.with_lanes(lanes_of(a)), a, b);
   });
 }
 

@@ -21,7 +21,7 @@ constexpr size_t max_terms = 64;
 // What is to be reduced, some of it done already.
 Value* FunctionGenerator::reduced_in_part(const VectorReduce& e) {
   const bool has_pairs = e.value.type().lanes() / e.type.lanes() % 2 == 0;
-  if (e.op == ReduceOp::Add && has_pairs && e_.machine.is_x86()) {
+  if (e.op == Kind::Add && has_pairs && e_.machine.is_x86()) {
     if (const auto product = as_narrow_product(e.value))
       return add_products_in_pairs(e_, value(product->a), value(product->b));
   }

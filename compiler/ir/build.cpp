@@ -362,7 +362,7 @@ Expr make_shuffle(std::vector<Expr> vectors, std::vector<int> indices) {
   return new Shuffle(type, std::move(vectors), std::move(indices));
 }
 
-Expr make_vector_reduce(ReduceOp op, Expr value, int result_lanes) {
+Expr make_vector_reduce(Kind op, Expr value, int result_lanes) {
   const int lanes = value.type().lanes();
   RETROGRADE_ASSERT(result_lanes >= 1 && lanes % result_lanes == 0, "reducing ", lanes,
                     " lanes to ", result_lanes);

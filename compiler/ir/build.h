@@ -47,7 +47,7 @@ Expr make_ramp(Expr base, Expr stride, int lanes);
 Expr make_broadcast(Expr value, int lanes);
 Expr make_let(const std::string& name, Expr value, Expr body);
 Expr make_shuffle(std::vector<Expr> vectors, std::vector<int> indices);
-Expr make_vector_reduce(ReduceOp op, Expr value, int result_lanes);
+Expr make_vector_reduce(Kind op, Expr value, int result_lanes);
 // An operator with its result type given; the one-argument form takes the first argument's type.
 Expr call_op(Op op, Type type, std::vector<Expr> args);
 Expr call_op(Op op, std::vector<Expr> args);  // with the type of the first

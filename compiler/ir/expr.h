@@ -330,12 +330,12 @@ struct Shuffle : ExprNode {  // lane i = lane indices[i] of the concatenated vec
   const std::vector<Expr> vectors;
   const std::vector<int> indices;
 };
-enum class ReduceOp : uint8_t { Add, Mul, Min, Max, And, Or };
-struct VectorReduce : ExprNode {  // groups of neighbouring lanes combined, to type.lanes() lanes
+// Groups of neighbouring lanes combined, to type.lanes() lanes, by Add, Mul, Min, Max, And or Or.
+struct VectorReduce : ExprNode {
   RETROGRADE_NODE(VectorReduce, op, value)
-  VectorReduce(Type type, ReduceOp op, Expr value)
+  VectorReduce(Type type, Kind op, Expr value)
       : ExprNode(Kind::VectorReduce, type), op(op), value(std::move(value)) {}
-  const ReduceOp op;
+  const Kind op;
   const Expr value;
 };
 

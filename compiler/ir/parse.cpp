@@ -418,10 +418,9 @@ Expr Parser::shuffle() {
 Expr Parser::reduce() {
   const Token at = take();
   expect("(");
-  std::optional<ReduceOp> op;
-  for (ReduceOp candidate :
-       {ReduceOp::Add, ReduceOp::Mul, ReduceOp::Min, ReduceOp::Max, ReduceOp::And, ReduceOp::Or}) {
-    if (is(reduce_name(candidate))) op = candidate;
+  std::optional<Kind> op;
+  for (Kind candidate : {Kind::Add, Kind::Mul, Kind::Min, Kind::Max, Kind::And, Kind::Or}) {
+    if (is(reduce_name(candidate).c_str())) op = candidate;
   }
   if (!op) fail("add, mul, min, max, and, or");
   take();

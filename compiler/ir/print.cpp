@@ -297,7 +297,7 @@ void Printer::print_node(const Expr& e) {
         out_ += ')';
       },
       [&](const VectorReduce& n) {
-        out_ += std::string("reduce(") + reduce_name(n.op) + ", ";
+        out_ += "reduce(" + reduce_name(n.op) + ", ";
         print(n.value);
         out_ += ", " + std::to_string(n.type.lanes()) + ')';
       },

@@ -23,9 +23,10 @@ const char* memory_name(MemoryType memory) {
   return names[static_cast<int>(memory)];
 }
 
-const char* reduce_name(ReduceOp op) {
-  static constexpr const char* names[] = {"add", "mul", "min", "max", "and", "or"};
-  return names[static_cast<int>(op)];
+std::string reduce_name(Kind op) {
+  std::string name = kind_name(op);
+  name[0] = static_cast<char>(std::tolower(name[0]));
+  return name;
 }
 
 bool read_type(const std::string& word, Type& type) {

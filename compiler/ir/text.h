@@ -10,7 +10,7 @@ namespace retrograde::ir {
 const char* for_name(ForType type);
 const char* partition_name(Partition partition);
 const char* memory_name(MemoryType memory);
-const char* reduce_name(ReduceOp op);
+std::string reduce_name(Kind op);
 bool is_reserved(const std::string& word);  // a keyword, a type or an operator
 // The type of that name ("float32x8"); nothing when it is none.
 bool read_type(const std::string& word, Type& type);

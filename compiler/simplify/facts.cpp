@@ -153,7 +153,7 @@ ConstantRange Facts::range_of_node(const Expr& e) {
       [&](const Broadcast& n) { return range(n.value); },
       [&](const Let& n) { return range(n.body); },
       [&](const VectorReduce& n) {
-        return n.op == ReduceOp::Min || n.op == ReduceOp::Max ? range(n.value) : whole;
+        return n.op == Kind::Min || n.op == Kind::Max ? range(n.value) : whole;
       },
       [&](const Shuffle& n) {
         ConstantRange result = range(n.vectors[0]);

@@ -66,7 +66,7 @@ Expr holds_anywhere(const Expr& mask) {
   if (mask.kind() == Kind::And && (a || b)) {
     const Expr& one = a ? a->value : b->value;
     return one.type().is_scalar()
-               ? binary(Kind::And, one, make_vector_reduce(ReduceOp::Or, a ? op->b : op->a, 1))
+               ? binary(Kind::And, one, make_vector_reduce(Kind::Or, a ? op->b : op->a, 1))
                : Expr();
   }
   if (mask.kind() != Kind::LT && mask.kind() != Kind::LE) return {};
@@ -86,14 +86,14 @@ Expr holds_anywhere(const Expr& mask) {
 
 Expr Simplifier::vector_reduce(const VectorReduce& n) {
   Expr value = (*this)(n.value);
-  if (n.op == ReduceOp::Or && n.type.is_scalar()) {
+  if (n.op == Kind::Or && n.type.is_scalar()) {
     if (const Expr one = holds_anywhere(value); one.defined()) return (*this)(one);
   }
   const auto* splat = value.as<Broadcast>();
-  const bool idempotent = n.op != ReduceOp::Add && n.op != ReduceOp::Mul;
+  const bool idempotent = n.op != Kind::Add && n.op != Kind::Mul;
   if (splat && splat->value.type().is_scalar()) {
     if (idempotent) return broadcast(splat->value, n.type.lanes());
-    if (n.op == ReduceOp::Add && has_sums(n.type)) {
+    if (n.op == Kind::Add && has_sums(n.type)) {
       const int group = n.value.type().lanes() / n.type.lanes();
       return broadcast(
           apply(Kind::Mul, splat->value, make_const(splat->value.type(), int64_t{group})),

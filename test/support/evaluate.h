@@ -143,16 +143,12 @@ class LaneEvaluator {
   }
 
   Lanes reduce(const ir::VectorReduce& n) {
-    using ir::Kind, ir::ReduceOp;
-    static const std::map<ReduceOp, Kind> kinds = {
-        {ReduceOp::Add, Kind::Add}, {ReduceOp::Mul, Kind::Mul}, {ReduceOp::Min, Kind::Min},
-        {ReduceOp::Max, Kind::Max}, {ReduceOp::And, Kind::And}, {ReduceOp::Or, Kind::Or}};
     const Lanes value = eval(n.value);
     const size_t lanes = static_cast<size_t>(n.type.lanes()), group = value.size() / lanes;
     Lanes result;
     for (size_t i = 0; i < lanes; ++i) {
       ir::Scalar sum = value[i * group];
-      for (size_t j = 1; j < group; ++j) sum = operate(kinds.at(n.op), sum, value[i * group + j]);
+      for (size_t j = 1; j < group; ++j) sum = operate(n.op, sum, value[i * group + j]);
       result.push_back(sum);
     }
     return result;

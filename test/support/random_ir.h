@@ -156,7 +156,7 @@ class RandomIr {
       return ir::make_shuffle({expr(type, depth - 1), expr(type, depth - 1)}, lanes);
     }
     if (scalar.is_bool() || scalar.is_float()) return expr(type, depth - 1);
-    const auto op = pick<ir::ReduceOp>({ir::ReduceOp::Add, ir::ReduceOp::Min, ir::ReduceOp::Max});
+    const auto op = pick<ir::Kind>({ir::Kind::Add, ir::Kind::Min, ir::Kind::Max});
     return ir::make_vector_reduce(op, expr(type.with_lanes(2 * type.lanes()), depth - 1),
                                   type.lanes());
   }

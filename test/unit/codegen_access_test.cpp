@@ -257,10 +257,10 @@ TEST(CodegenAccess, ShuffleAndReduce) {
               {7, 4, 0}),
           8),
       put(make_shuffle({b}, {2}), 11),
-      put(make_vector_reduce(ReduceOp::Add, all, 1), 12),
-      put(make_vector_reduce(ReduceOp::Max, all, 4), 13),
-      put(make_vector_reduce(ReduceOp::Mul, all, 6), 17),
-      put(make_vector_reduce(ReduceOp::Min, all, 3), 23),
+      put(make_vector_reduce(Kind::Add, all, 1), 12),
+      put(make_vector_reduce(Kind::Max, all, 4), 13),
+      put(make_vector_reduce(Kind::Mul, all, 6), 17),
+      put(make_vector_reduce(Kind::Min, all, 3), 23),
   });
   Array in(Int(32), 12), out(Int(32), 26);
   for (int k = 0; k < 12; k++) in.data<int32_t>()[k] = k + 1;

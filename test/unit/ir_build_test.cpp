@@ -179,7 +179,7 @@ TEST(Visit, EveryKindRebuildsWithItsChildren) {
                       call_image("im", Float(32), {x, x}, {}),
                       make_let("t", x, variable("t") + x),
                       make_shuffle({v, v}, {0, 5}),
-                      make_vector_reduce(ReduceOp::Add, v, 1)};
+                      make_vector_reduce(Kind::Add, v, 1)};
   for (const Expr& e : all) {
     const Expr renamed = substitute(e, "x", variable("w"));
     EXPECT_EQ(renamed.kind(), e.kind());

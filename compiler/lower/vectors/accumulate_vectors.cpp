@@ -51,7 +51,7 @@ std::optional<UpdateChain> as_chain(const Store& store) {
   const bool is_reduced =
       std::all_of(chain->terms.begin(), chain->terms.end(), [&](const UpdateChain::Term& term) {
         const auto* reduce = term.value.as<VectorReduce>();
-        return reduce && first && reduce->op == reduce_op(chain->kind) &&
+        return reduce && first && reduce->op == chain->kind &&
                reduce->value.type() == first->value.type();
       });
   return is_reduced ? chain : std::nullopt;
@@ -236,7 +236,7 @@ class Accumulator {
   }
 
  private:
-  ReduceOp op() const { return reduce_op(chain_.kind); }
+  Kind op() const { return chain_.kind; }
   Expr index() const { return make_ramp(make_zero(Int(32)), make_one(Int(32)), type_.lanes()); }
   Expr load() const { return make_load(type_, name_, index()); }
   Stmt store(const Expr& value) const { return make_store(name_, value, index()); }

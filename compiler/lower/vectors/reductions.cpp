@@ -24,45 +24,27 @@ Expr smallest(Type type) {
   return type.is_int() ? make_const(type, type.min_int()) : make_zero(type);
 }
 
-Expr scalar_identity(ReduceOp op, Type type) {
+Expr scalar_identity(Kind op, Type type) {
   switch (op) {
-    case ReduceOp::Add:
+    case Kind::Add:
       return type.is_float() ? make_const(type, -0.0) : make_zero(type);
-    case ReduceOp::Min:
+    case Kind::Min:
       return largest(type);
-    case ReduceOp::Max:
+    case Kind::Max:
       return smallest(type);
-    case ReduceOp::Or:
+    case Kind::Or:
       return make_zero(type);
-    case ReduceOp::Mul:
-    case ReduceOp::And:
+    case Kind::Mul:
+    case Kind::And:
       return make_one(type);
+    default:
+      internal_error(text("no vector is reduced by ", kind_name(op)));
   }
-  internal_error("unknown reduction");
 }
 
 }  // namespace
 
-ReduceOp reduce_op(Kind kind) {
-  switch (kind) {
-    case Kind::Add:
-      return ReduceOp::Add;
-    case Kind::Mul:
-      return ReduceOp::Mul;
-    case Kind::Min:
-      return ReduceOp::Min;
-    case Kind::Max:
-      return ReduceOp::Max;
-    case Kind::And:
-      return ReduceOp::And;
-    case Kind::Or:
-      return ReduceOp::Or;
-    default:
-      internal_error(text("no vector is reduced by ", kind_name(kind)));
-  }
-}
-
-Expr identity_of(ReduceOp op, Type type) {
+Expr identity_of(Kind op, Type type) {
   return make_broadcast(scalar_identity(op, type.element_of()), type.lanes());
 }
 

@@ -5,9 +5,7 @@
 
 namespace retrograde::ir {
 
-// Add, Mul, Min, Max, And, Or.
-ReduceOp reduce_op(Kind kind);
 // x op identity == x, bit for bit; a broadcast when the type has lanes.
-Expr identity_of(ReduceOp op, Type type);
+Expr identity_of(Kind op, Type type);
 
 }  // namespace retrograde::ir

@@ -235,7 +235,7 @@ class LoopVectorizer {
     widen_.set_mask(outer);
     conditions_.pop_back();
     if (!body.defined() || !needs_an_active_lane(body)) return body;
-    return make_if(make_vector_reduce(ReduceOp::Or, mask, 1), body);
+    return make_if(make_vector_reduce(Kind::Or, mask, 1), body);
   }
 
   // In what a branch has become: accesses that did not vary have no predicate, and loops are not
@@ -380,8 +380,7 @@ class LoopVectorizer {
   Expr reduce(Kind kind, const Expr& term, const Expr& active) {
     int lanes = term.type().lanes();
     Expr wide = widen_.spread(term);
-    if (active.defined())
-      wide = make_select(active, wide, identity_of(reduce_op(kind), wide.type()));
+    if (active.defined()) wide = make_select(active, wide, identity_of(kind, wide.type()));
     if (lanes > 1) {  // iteration-major to lane-major: the groups that are reduced lie side by side
       std::vector<int> indices;
       for (int lane = 0; lane < lanes; ++lane) {
@@ -390,7 +389,7 @@ class LoopVectorizer {
       }
       wide = make_shuffle({wide}, indices);
     }
-    return make_vector_reduce(reduce_op(kind), wide, lanes);
+    return make_vector_reduce(kind, wide, lanes);
   }
 
   // ---- lane by lane ----
