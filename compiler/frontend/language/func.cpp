@@ -174,6 +174,25 @@ ir::SchedulePlace Func::loops() const {
   return {func_, 0};
 }
 
+Func& Func::reorder_storage(const std::vector<Var>& dims) {
+  std::vector<std::string> names;
+  for (const Var& dim : dims) names.push_back(dim.name());
+  return give(ir::ReorderStorage{std::move(names)});
+}
+
+Func& Func::set_estimates(const Region& estimates) {
+  if (static_cast<int>(estimates.size()) != dimensions()) {
+    user_error(
+        "set estimates of " + quoted(name()), "there is one for each dimension",
+        text("it has ", dimensions(), " dimensions and was given ", estimates.size(), " estimates"),
+        "Give that many");
+  }
+  const std::vector<Var> variables = args();
+  for (int d = 0; d < dimensions(); d++)
+    set_estimate(variables[d], estimates[d].min, estimates[d].extent);
+  return *this;
+}
+
 Stage Func::update(int index) {
   checked_update(index, "schedule update");
   return Stage(func_, index + 1);

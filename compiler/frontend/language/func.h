@@ -171,11 +171,11 @@ class Func : public LoopDirectives<Func>, public Runnable<Func> {
   // Substituted into its users (the default). Of a Func with updates: computed in the innermost
   // loop of each user.
   //   for x: f(x) = g(x) + 1    =>    for x: f(x) = (x * x) + 1
-  Func& compute_inline();
+  Func& compute_inline() { return compute_at(LoopLevel::inlined()); }
   // All of it, before anything that uses it.
   //   for x: f(x) = g(x) + g(x + 1)    =>    for x in [0, n + 1): g(x) = ...
   //                                          for x in [0, n): f(x) = g(x) + g(x + 1)
-  Func& compute_root();
+  Func& compute_root() { return compute_at(LoopLevel::root()); }
   // What one iteration of the loop `var` of `f` needs of it, inside that loop. g.compute_at(f, y):
   //   for y:                       for y:
   //     for x:                =>     for x in [0, n + 1): g(x, y) = ...
@@ -185,7 +185,7 @@ class Func : public LoopDirectives<Func>, public Runnable<Func> {
   // Requires: a Func must be stored and computed at a loop that encloses every use of it, and its
   // compute level; the level is set before the pipeline is compiled; the region of a Func that its
   // consumers read must be bounded.
-  Func& compute_at(const LoopLevel& level);
+  Func& compute_at(const LoopLevel& level) { return give(ir::ComputeAt{{{}, level.contents()}}); }
   // Its storage lives for the whole of that loop, which is around the compute level; what is there
   // already is not computed again, and storage is folded where that suffices.
   // g.store_root().compute_at(f, y), with f(x, y) = g(x, y) + g(x, y + 1):
@@ -193,12 +193,12 @@ class Func : public LoopDirectives<Func>, public Runnable<Func> {
   //     for y:
   //       for x: g(x, y + 1) = ...     (and row 0 when y == 0)
   //       for x: f(x, y) = g(x, y) + g(x, y + 1)
-  Func& store_root();
+  Func& store_root() { return store_at(LoopLevel::root()); }
   Func& store_at(const Func& f, const Var& var) { return store_at(LoopLevel(f, var)); }
   Func& store_at(const Func& f, const RVar& var) { return store_at(LoopLevel(f, var)); }
   // Requires: only what is computed somewhere has storage of its own; iterations of a parallel loop
   // must not share the storage of what each of them computes.
-  Func& store_at(const LoopLevel& level);
+  Func& store_at(const LoopLevel& level) { return give(ir::StoreAt{{{}, level.contents()}}); }
   // Where its memory is allocated: at this level, around the store level, once for all iterations
   // in between. What is computed does not change.
   //   for y:                            allocate g
@@ -208,11 +208,13 @@ class Func : public LoopDirectives<Func>, public Runnable<Func> {
   Func& hoist_storage(const Func& f, const RVar& var) { return hoist_storage(LoopLevel(f, var)); }
   // Requires: storage is hoisted to a loop that encloses its store level; the size of hoisted
   // storage is known outside of the loops it is hoisted over.
-  Func& hoist_storage(const LoopLevel& level);
-  Func& hoist_storage_root();
+  Func& hoist_storage(const LoopLevel& level) {
+    return give(ir::HoistStorage{{{}, level.contents()}});
+  }
+  Func& hoist_storage_root() { return hoist_storage(LoopLevel::root()); }
   // In which memory.
   // Requires: storage lies in memory that the CPU has (Unsupported).
-  Func& store_in(MemoryType memory);
+  Func& store_in(MemoryType memory) { return give(ir::StoreIn{memory}); }
   // Dimensions innermost in memory first. reorder_storage(c, x, y):
   //   g[x + w * y + w * h * c]    =>    g[c + 3 * x + 3 * w * y]
   // Requires: each must be one of its dimensions; each dimension is named once.
@@ -228,32 +230,40 @@ class Func : public LoopDirectives<Func>, public Runnable<Func> {
   // a defined expression; the alignment is an integer; the alignment is at least 1 and fits an
   // int32; the alignment has one value in each call: it is made of parameters and facts about
   // buffers.
-  Func& align_storage(const Var& dim, const Expr& alignment);
+  Func& align_storage(const Var& dim, const Expr& alignment) {
+    return give(ir::AlignStorage{dim.name(), alignment});
+  }
   // Storage of this extent, coordinates taken modulo it: right when no more is alive at a time,
   // which is checked. fold_storage(y, 2):   g[x, y]  =>  g[x, y % 2]
   // `fold_forward`: the coordinate grows from iteration to iteration; false: it falls.
   // Requires: the extent is at least 1 and fits an int32; the extent has one value in each call: it
   // is made of parameters and facts about buffers; storage that the compiler lays out can be folded
   // or bounded.
-  Func& fold_storage(const Var& dim, const Expr& extent, bool fold_forward = true);
+  Func& fold_storage(const Var& dim, const Expr& extent, bool fold_forward = true) {
+    return give(ir::FoldStorage{dim.name(), extent, fold_forward});
+  }
   // Storage of this extent whatever the bounds say; a call that needs more fails.
   //   allocate g[n']   =>   assert(n' <= bound); allocate g[bound]
   // Requires: the bound is at least 1 and fits an int32; storage that the compiler lays out can be
   // folded or bounded.
-  Func& bound_storage(const Var& dim, const Expr& bound);
+  Func& bound_storage(const Var& dim, const Expr& bound) {
+    return give(ir::BoundStorage{dim.name(), bound});
+  }
   // Keeps results in the runtime's cache, under the values of all parameters it depends on.
   //   produce g   =>   if not in cache: produce g, put it in
   // Requires: an eviction key is an integer or a pointer; a Func has one eviction key; what an
   // image holds is no part of a memoized Func's key; the key must be made of Params and constants;
   // an output is computed by every call; a memoized Func must be computed whole, where its storage
   // begins.
-  Func& memoize(const EvictionKey& eviction_key = EvictionKey());
+  Func& memoize(const EvictionKey& eviction_key = EvictionKey()) {
+    return give(ir::Memoize{eviction_key.key()});
+  }
   // Computed by a thread of its own, at most as far ahead of its users as storage allows.
   //   produce g; consume g   =>   fork { produce g, signal } and { wait, consume g }
   // Requires: what an async Func and its consumer both read is stored no further out than the async
   // Func, or computed outside of the loops that they share; the loops between storage and
   // computation of an async Func are serial (Unsupported).
-  Func& async();
+  Func& async() { return give(ir::Async{}); }
 
   // ---- what is known of its size ----
 
@@ -263,18 +273,26 @@ class Func : public LoopDirectives<Func>, public Runnable<Func> {
   // Requires: the variable must be a pure variable of the first definition; the extent must be a
   // defined expression; bounds are integers; an extent is not negative; a bound has one value in
   // each call: it is made of parameters and facts about buffers.
-  Func& bound(const Var& var, Expr min, Expr extent);
+  Func& bound(const Var& var, Expr min, Expr extent) {
+    return give(ir::BoundDimension{var.name(), std::move(min), std::move(extent)});
+  }
   // A promise about the extent only: loops are of this constant extent.
-  Func& bound_extent(const Var& var, Expr extent);
+  Func& bound_extent(const Var& var, Expr extent) { return bound(var, {}, std::move(extent)); }
   // Computes more than is needed, so that min % modulus == remainder and the extent is a multiple.
   //   for x in [x0, x1): ...   =>   for x in [x0 rounded down, x1 rounded up): ...
   // Requires: the modulus is at least 1 and fits an int32; the remainder is an integer; the extent
   // is a multiple of the modulus; min % modulus is the remainder.
-  Func& align_bounds(const Var& var, Expr modulus, Expr remainder = 0);
+  Func& align_bounds(const Var& var, Expr modulus, Expr remainder = 0) {
+    return give(ir::AlignBounds{var.name(), std::move(modulus), std::move(remainder)});
+  }
   // The same for the extent only: the min stays.
-  Func& align_extent(const Var& var, Expr modulus);
+  Func& align_extent(const Var& var, Expr modulus) {
+    return align_bounds(var, std::move(modulus), {});
+  }
   // A guess, for schedulers.
-  Func& set_estimate(const Var& var, const Expr& min, const Expr& extent);
+  Func& set_estimate(const Var& var, const Expr& min, const Expr& extent) {
+    return give(ir::Estimate{var.name(), min, extent});
+  }
   // Requires: there is one for each dimension.
   Func& set_estimates(const Region& estimates);
 
@@ -282,14 +300,14 @@ class Func : public LoopDirectives<Func>, public Runnable<Func> {
 
   // Reports to the trace handler: each load of a value, each store, and when it begins and ends to
   // be produced and consumed. Tags come with each report.
-  Func& trace_loads();
-  Func& trace_stores();
-  Func& trace_realizations();
-  Func& add_trace_tag(const std::string& tag);
+  Func& trace_loads() { return give(ir::TraceLoads{}); }
+  Func& trace_stores() { return give(ir::TraceStores{}); }
+  Func& trace_realizations() { return give(ir::TraceRealizations{}); }
+  Func& add_trace_tag(const std::string& tag) { return give(ir::AddTraceTag{tag}); }
   // Writes what was computed to a file, in NumPy's format (.npy) or raw (.tmp).
   // Requires: the file has a name; a file holds one value of each point (Unsupported); the name's
   // end says in which format (Unsupported); its format has the type of the elements (Unsupported).
-  void debug_to_file(const std::string& filename);
+  void debug_to_file(const std::string& filename) { give(ir::DebugToFile{filename}); }
 
   // ---- loops: of the first definition here, of updates through update(i); see loop_directives.h ----
   Stage update(int index = 0);
@@ -303,7 +321,10 @@ class Func : public LoopDirectives<Func>, public Runnable<Func> {
   friend class LoopDirectives<Func>;
   friend class Runnable<Func>;
   ir::SchedulePlace loops() const;  // of the first definition
-  Func& give(ir::Directive directive);
+  Func& give(ir::Directive directive) {
+    ir::give_directive({func_}, std::move(directive));
+    return *this;
+  }
   void check_defined(const std::string& asked) const;
   const ir::Definition& checked_update(int index, const char* asked) const;
   Func wrap(const std::vector<Func>& users, const std::string& name, bool clone) const;
