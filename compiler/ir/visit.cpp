@@ -42,10 +42,13 @@ struct ChildVisit {
   }
 };
 
-// Replaces children, and says whether any changed.
+// Replaces children, and names where asked to, and says whether any changed.
 struct ChildMap {
   ExprMap map_expr;
   StmtMap map_stmt;
+  const NameMap* names = nullptr;
+  Kind kind = Kind::IntImm;  // of the node at hand
+  std::string own_name = {};
   bool changed = false;
 
   Expr operator()(const Expr& e) { return replaced(e, map_expr); }
@@ -54,6 +57,12 @@ struct ChildMap {
     Expr min = (*this)(r.min);
     return {min, (*this)(r.extent)};
   }
+  const std::string& operator()(const std::string& name) {
+    if (!names) return name;
+    own_name = (*names)(kind, name);
+    changed |= own_name != name;
+    return own_name;
+  }
   template <class T>
   std::vector<T> operator()(const std::vector<T>& children) {
     std::vector<T> result;
@@ -61,11 +70,17 @@ struct ChildMap {
     for (const T& child : children) result.push_back((*this)(child));
     return result;
   }
+  template <class T>
+  const T& operator()(const T& other) {
+    return other;
+  }
 
-  // What `make` makes of the children replaced, in the order of evaluation; `node` if none changed.
-  template <class Handle, class Make, class... Children>
-  Handle of(const Handle& node, const Make& make, const Children&... children) {
-    std::tuple<Children...> replaced{(*this)(children)...};
+  // What `make` makes of the fields with children replaced, in the order of evaluation; `node` if
+  // nothing changed.
+  template <class Handle, class Make, class... Fields>
+  Handle of(const Handle& node, const Make& make, const Fields&... fields) {
+    kind = node.kind();
+    std::tuple<decltype((*this)(fields))...> replaced{(*this)(fields)...};
     return changed ? Handle(std::apply(make, std::move(replaced))) : node;
   }
 
@@ -90,9 +105,9 @@ void for_each_child(const Stmt& s, ExprVisit on_expr, StmtVisit on_stmt) {
   ChildVisit{on_expr, on_stmt}.of(s);
 }
 
-Expr map_children(const Expr& e, ExprMap map) {
-  const auto no_stmt = [](const Stmt& s) { return s; };
-  ChildMap mapped{map, no_stmt};
+namespace {
+
+Expr map_children(const Expr& e, ChildMap mapped) {
   const auto with_lanes_of = [](const ExprNode& n, const Expr& child) {
     return n.type.with_lanes(child.type().lanes());
   };
@@ -106,28 +121,19 @@ Expr map_children(const Expr& e, ExprMap map) {
         const auto make = [&](const Expr& v) { return reinterpret_as(with_lanes_of(n, v), v); };
         return mapped.of(e, make, n.value);
       },
-      [&](const Binary& n) {
-        return mapped.of(
-            e, [&](Expr a, Expr b) { return binary(n.kind, a, b); }, n.a, n.b);
-      },
+      [&](const Binary& n) { return mapped.of(e, binary, n.kind, n.a, n.b); },
       [&](const Not& n) { return mapped.of(e, logical_not, n.a); },
       [&](const Select& n) {
         return mapped.of(e, make_select, n.condition, n.when_true, n.when_false);
       },
       [&](const Load& n) {
-        const auto make = [&](Expr index, Expr predicate) {
-          return make_load(with_lanes_of(n, index), n.name, index, predicate, n.symbol);
+        const auto make = [&](const std::string& name, Expr index, Expr predicate) {
+          return make_load(with_lanes_of(n, index), name, index, predicate, n.symbol);
         };
-        return mapped.of(e, make, n.index, n.predicate);
+        return mapped.of(e, make, n.name, n.index, n.predicate);
       },
-      [&](const Ramp& n) {
-        const auto make = [&](Expr base, Expr stride) { return make_ramp(base, stride, n.lanes); };
-        return mapped.of(e, make, n.base, n.stride);
-      },
-      [&](const Broadcast& n) {
-        return mapped.of(
-            e, [&](Expr value) { return make_broadcast(value, n.lanes); }, n.value);
-      },
+      [&](const Ramp& n) { return mapped.of(e, make_ramp, n.base, n.stride, n.lanes); },
+      [&](const Broadcast& n) { return mapped.of(e, make_broadcast, n.value, n.lanes); },
       [&](const Call& n) {
         const auto make = [&](std::vector<Expr> args) {
           if (n.call_type == CallType::Operator) return call_op(n.op, n.type, std::move(args));
@@ -137,86 +143,73 @@ Expr map_children(const Expr& e, ExprMap map) {
         return mapped.of(e, make, n.args);
       },
       [&](const Let& n) {
-        const auto make = [&](Expr value, Expr body) { return make_let(n.name, value, body); };
-        return mapped.of(e, make, n.value, n.body);
-      },
-      [&](const Shuffle& n) {
-        const auto make = [&](std::vector<Expr> vectors) {
-          return make_shuffle(std::move(vectors), n.indices);
+        const auto make = [&](auto name, Expr value, Expr body) {
+          return make_let(name, value, body);
         };
-        return mapped.of(e, make, n.vectors);
+        return mapped.of(e, make, n.name, n.value, n.body);
       },
+      [&](const Shuffle& n) { return mapped.of(e, make_shuffle, n.vectors, n.indices); },
       [&](const VectorReduce& n) {
-        const auto make = [&](Expr value) {
-          return make_vector_reduce(n.op, value, n.type.lanes());
-        };
-        return mapped.of(e, make, n.value);
+        return mapped.of(e, make_vector_reduce, n.op, n.value, n.type.lanes());
       },
       [&](const ExprNode&) { return e; });
 }
 
-Stmt map_children(const Stmt& s, ExprMap map, StmtMap map_stmt) {
-  ChildMap mapped{map, map_stmt};
+Stmt map_children(const Stmt& s, ChildMap mapped) {
   return match(
       s,
       [&](const LetStmt& n) {
-        const auto make = [&](Expr value, Stmt body) { return make_let(n.name, value, body); };
-        return mapped.of(s, make, n.value, n.body);
+        const auto make = [&](auto name, Expr value, Stmt body) {
+          return make_let(name, value, body);
+        };
+        return mapped.of(s, make, n.name, n.value, n.body);
       },
       [&](const Assert& n) { return mapped.of(s, make_assert, n.condition, n.error); },
       [&](const ProducerConsumer& n) {
-        const auto make = [&](Stmt body) {
-          return make_producer_consumer(n.name, n.produces, body);
-        };
-        return mapped.of(s, make, n.body);
+        return mapped.of(s, make_producer_consumer, n.name, n.produces, n.body);
       },
       [&](const For& n) {
-        const auto make = [&](Expr min, Expr extent, Stmt body) {
-          return make_for(n.name, min, extent, n.runs, body, n.partition);
-        };
-        return mapped.of(s, make, n.min, n.extent, n.body);
+        return mapped.of(s, make_for, n.name, n.min, n.extent, n.runs, n.body, n.partition);
       },
       [&](const Store& n) {
-        const auto make = [&](Expr value, Expr index, Expr predicate) {
-          return make_store(n.name, value, index, predicate, n.symbol);
-        };
-        return mapped.of(s, make, n.value, n.index, n.predicate);
+        return mapped.of(s, make_store, n.name, n.value, n.index, n.predicate, n.symbol);
       },
       [&](const Provide& n) {
-        const auto make = [&](auto values, auto args, Expr predicate) {
-          return make_provide(n.name, std::move(values), std::move(args), predicate);
-        };
-        return mapped.of(s, make, n.values, n.args, n.predicate);
+        return mapped.of(s, make_provide, n.name, n.values, n.args, n.predicate);
       },
       [&](const Realize& n) {
-        const auto make = [&](std::vector<Range> bounds, Stmt body) {
-          return make_realize(n.name, n.types, n.memory, std::move(bounds), body);
-        };
-        return mapped.of(s, make, n.bounds, n.body);
+        return mapped.of(s, make_realize, n.name, n.types, n.memory, n.bounds, n.body);
       },
       [&](const Allocate& n) {
-        const auto make = [&](Expr elements, Stmt body) {
-          return make_allocate(n.name, n.type, n.memory, elements, body);
-        };
-        return mapped.of(s, make, n.elements, n.body);
+        return mapped.of(s, make_allocate, n.name, n.type, n.memory, n.elements, n.body);
       },
+      [&](const Free& n) { return mapped.of(s, make_free, n.name); },
       [&](const Block& n) { return mapped.of(s, make_block, n.stmts); },
       [&](const IfThenElse& n) {
         return mapped.of(s, make_if, n.condition, n.when_true, n.when_false);
       },
       [&](const Evaluate& n) { return mapped.of(s, make_evaluate, n.value); },
-      [&](const Atomic& n) {
-        return mapped.of(
-            s, [&](Stmt body) { return make_atomic(n.name, body); }, n.body);
-      },
+      [&](const Atomic& n) { return mapped.of(s, make_atomic, n.name, n.body); },
       [&](const Fork& n) { return mapped.of(s, make_fork, n.first, n.rest); },
       [&](const Prefetch& n) {
-        const auto make = [&](std::vector<Range> bounds) {
-          return make_prefetch(n.name, n.type, std::move(bounds), n.symbol);
-        };
-        return mapped.of(s, make, n.bounds);
+        return mapped.of(s, make_prefetch, n.name, n.type, n.bounds, n.symbol);
       },
       [&](const StmtNode&) { return s; });
+}
+
+constexpr auto same_stmt = [](const Stmt& s) { return s; };
+
+}  // namespace
+
+Expr map_children(const Expr& e, ExprMap map) { return map_children(e, ChildMap{map, same_stmt}); }
+Stmt map_children(const Stmt& s, ExprMap map, StmtMap map_stmt) {
+  return map_children(s, ChildMap{map, map_stmt});
+}
+Expr map_children(const Expr& e, ExprMap map, NameMap names) {
+  return map_children(e, ChildMap{map, same_stmt, &names});
+}
+Stmt map_children(const Stmt& s, ExprMap map, StmtMap map_stmt, NameMap names) {
+  return map_children(s, ChildMap{map, map_stmt, &names});
 }
 
 // ---- walks: an explicit stack, so that their depth is not bounded by the C++ stack ----

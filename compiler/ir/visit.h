@@ -79,6 +79,7 @@ using ExprVisit = FunctionRef<void(const Expr&)>;
 using StmtVisit = FunctionRef<void(const Stmt&)>;
 using ExprMap = FunctionRef<Expr(const Expr&)>;
 using StmtMap = FunctionRef<Stmt(const Stmt&)>;
+using NameMap = FunctionRef<std::string(Kind, const std::string&)>;
 
 // The direct children, in evaluation order; undefined optional children are skipped.
 void for_each_child(const Expr& e, ExprVisit on_expr);
@@ -87,6 +88,9 @@ void for_each_child(const Stmt& s, ExprVisit on_expr, StmtVisit on_stmt);
 // The same node with its children replaced; the same handle when none changed.
 Expr map_children(const Expr& e, ExprMap map);
 Stmt map_children(const Stmt& s, ExprMap map, StmtMap map_stmt);
+// And with its own name replaced, which it binds, stores to or loads from. Calls keep theirs.
+Expr map_children(const Expr& e, ExprMap map, NameMap names);
+Stmt map_children(const Stmt& s, ExprMap map, StmtMap map_stmt, NameMap names);
 
 // Visits every node once, parents before children; descends where the lambda returns true.
 void walk(const Expr& e, FunctionRef<bool(const Expr&)> enter);

@@ -66,47 +66,21 @@ class Copier : public Rewriter {
       auto it = names_.find(v->name);
       return it == names_.end() ? e : Expr(new Variable(v->type, it->second, v->symbol));
     }
-    Expr copy = children(e);
-    if (const Let* n = copy.as<Let>()) return make_let(name_of(n->name), n->value, n->body);
-    if (const Load* n = copy.as<Load>()) {
-      return is_renamed(n->name)
-                 ? make_load(n->type, name_of(n->name), n->index, n->predicate, n->symbol)
-                 : copy;
-    }
+    const Expr copy = map_children(
+        e, [this](const Expr& child) { return (*this)(child); },
+        [this](Kind, const std::string& name) { return name_of(name); });
     const Call* n = copy.as<Call>();
-    if (!n || n->call_type != CallType::Func || !is_renamed(n->name)) return copy;
+    if (!n || n->call_type != CallType::Func || !names_.count(n->name)) return copy;
     return call_func(name_of(n->name), n->type, n->args, n->component, n->symbol);
   }
 
   Stmt rewrite(const Stmt& s) override {
-    Stmt copy = children(s);
-    if (!copy.defined()) return copy;
-    return match(
-        copy, [&](const LetStmt& n) { return make_let(name_of(n.name), n.value, n.body); },
-        [&](const For& n) {
-          return make_for(name_of(n.name), n.min, n.extent, n.runs, n.body, n.partition);
-        },
-        [&](const Allocate& n) {
-          return make_allocate(name_of(n.name), n.type, n.memory, n.elements, n.body);
-        },
-        [&](const Realize& n) {
-          return make_realize(name_of(n.name), n.types, n.memory, n.bounds, n.body);
-        },
-        [&](const Store& n) {
-          return is_renamed(n.name)
-                     ? make_store(name_of(n.name), n.value, n.index, n.predicate, n.symbol)
-                     : copy;
-        },
-        [&](const Provide& n) {
-          return is_renamed(n.name) ? make_provide(name_of(n.name), n.values, n.args, n.predicate)
-                                    : copy;
-        },
-        [&](const Free& n) { return is_renamed(n.name) ? make_free(name_of(n.name)) : copy; },
-        [&](const Atomic& n) { return make_atomic(name_of(n.name), n.body); },
-        [&](const Prefetch& n) {
-          return make_prefetch(name_of(n.name), n.type, n.bounds, n.symbol);
-        },
-        [&](const StmtNode&) { return copy; });
+    return map_children(
+        s, [this](const Expr& child) { return (*this)(child); },
+        [this](const Stmt& child) { return (*this)(child); },
+        [this](Kind kind, const std::string& name) {
+          return kind == Kind::ProducerConsumer ? name : name_of(name);
+        });
   }
 
  private:
@@ -114,7 +88,6 @@ class Copier : public Rewriter {
     auto [it, is_new] = names_.emplace(name, "");
     if (is_new) it->second = fresh(name);
   }
-  bool is_renamed(const std::string& name) const { return names_.count(name) > 0; }
   const std::string& name_of(const std::string& name) const {
     auto it = names_.find(name);
     return it == names_.end() ? name : it->second;

@@ -77,28 +77,11 @@ class Uniquifier {
           return make_realize(name.unique, realize.types, realize.memory, bounds,
                               rename(realize.body));
         },
-        [&](const ProducerConsumer& part) {
-          return make_producer_consumer(current(renamings_, part.name), part.produces,
-                                        rename(part.body));
-        },
-        [&](const Atomic& atomic) {
-          return make_atomic(current(renamings_, atomic.name), rename(atomic.body));
-        },
-        [&](const Prefetch& prefetch) {
-          std::vector<Range> bounds;
-          for (const Range& range : prefetch.bounds)
-            bounds.push_back({rename(range.min), rename(range.extent)});
-          return make_prefetch(current(renamings_, prefetch.name), prefetch.type, bounds,
-                               prefetch.symbol);
-        },
-        [&](const Provide& provide) {
-          return make_provide(current(renamings_, provide.name), rename(provide.values),
-                              rename(provide.args), rename(provide.predicate));
-        },
         [&](const StmtNode&) {
           return map_children(
               s, [&](const Expr& e) { return rename(e); },
-              [&](const Stmt& child) { return rename(child); });
+              [&](const Stmt& child) { return rename(child); },
+              [&](Kind, const std::string& name) { return current(renamings_, name); });
         });
   }
 
@@ -129,11 +112,6 @@ class Uniquifier {
 
   Expr rename(const Expr& e) {
     return e.defined() && !renamings_.empty() ? UseRenamer(renamings_)(e) : e;
-  }
-  std::vector<Expr> rename(const std::vector<Expr>& es) {
-    std::vector<Expr> result;
-    for (const Expr& e : es) result.push_back(rename(e));
-    return result;
   }
 };
 
