@@ -35,8 +35,7 @@ struct Lowering {
   const std::vector<FuncPtr>& outputs;
   const std::vector<LoweredArgument>& args;
   Program program;
-  std::map<std::string, std::string> renamed_funcs;  // new name -> name in the program
-  std::map<std::string, std::vector<Expr>> folds;    // see LoopNests
+  std::map<std::string, std::vector<Expr>> folds;  // see LoopNests
   AsyncRoom async_room;
   const std::string& name;
   const LowerOptions& options;
@@ -61,7 +60,7 @@ StorageLayouts storage_layouts(const Lowering& lowering) {
     layout.lies_in = place_name(f.name());
     layouts[layout.lies_in].is_place = layout.lies_in;
   }
-  for (const auto& [name, original] : lowering.renamed_funcs) layouts[name] = layouts[original];
+  for (const auto& [name, original] : lowering.program.renamed) layouts[name] = layouts[original];
   return layouts;
 }
 
@@ -75,7 +74,7 @@ Stmt nest_loops(Lowering& lowering, const Stmt&) {
   inject_tracing(nests, lowering.program, lowering.name, lowering.options.target);
   UniqueNames unique =
       make_names_unique(add_argument_checks(nests, lowering.args, lowering.program));
-  lowering.renamed_funcs = std::move(unique.original);
+  lowering.program.renamed = std::move(unique.original);
   return unique.stmt;
 }
 
@@ -93,9 +92,7 @@ void find_kinds(const StageLoops& schedule, const std::string& var, LoopKinds& k
 // Iterations of a loop over a pure variable touch elements of their own (define.cpp sees to it).
 bool is_pure_loop(const Lowering& lowering, const For& loop) {
   const LoopName name = decode_loop_name(loop.name);
-  const auto renamed = lowering.renamed_funcs.find(name.func);
-  const LoopedFunc* func =
-      lowering.program.find(renamed == lowering.renamed_funcs.end() ? name.func : renamed->second);
+  const LoopedFunc* func = lowering.program.find(name.func);
   if (!func) return false;
   const auto stage = static_cast<size_t>(std::stoi(name.stage));
   LoopKinds kinds;
@@ -126,25 +123,18 @@ constexpr Pass passes[] = {
     {"drop_bounds_query", Phase::Loops, wanted<Target::NoBoundsQuery, drop_bounds_query>},
     {"check_promises", Phase::Loops, wanted<Target::CheckUnsafePromises, check_promises>},
     {"write_debug_files", Phase::Loops,
-     [](Lowering& lowering, const Stmt& s) {
-       return write_debug_files(s, lowering.program, lowering.renamed_funcs);
-     }},
+     [](Lowering& lowering, const Stmt& s) { return write_debug_files(s, lowering.program); }},
     {"insert_prefetches", Phase::Loops,
-     [](Lowering& lowering, const Stmt& s) {
-       return insert_prefetches(s, lowering.program, lowering.renamed_funcs);
-     }},
+     [](Lowering& lowering, const Stmt& s) { return insert_prefetches(s, lowering.program); }},
     {"lower_prefetches", Phase::Loops,
-     [](Lowering& lowering, const Stmt& s) {
-       return lower_prefetches(s, lowering.program, lowering.renamed_funcs);
-     }},
+     [](Lowering& lowering, const Stmt& s) { return lower_prefetches(s, lowering.program); }},
     {"fork_async", Phase::Loops,
      [](Lowering& lowering, const Stmt& s) {
-       return fork_async(s, lowering.program, lowering.renamed_funcs, lowering.async_room);
+       return fork_async(s, lowering.program, lowering.async_room);
      }},
     {"memoize", Phase::Loops,
      [](Lowering& lowering, const Stmt& s) {
-       return memoize(s, lowering.program, lowering.renamed_funcs, lowering.name,
-                      lowering.options.target, lowering.folds);
+       return memoize(s, lowering.program, lowering.name, lowering.options.target, lowering.folds);
      }},
     {"keep_accumulators", Phase::Loops,
      [](Lowering& lowering, const Stmt& s) {
@@ -174,7 +164,7 @@ constexpr Pass passes[] = {
     {"inject_profiling", Phase::Vector,
      [](Lowering& lowering, const Stmt& s) {
        if (!lowering.options.target.has_feature(Target::Profile)) return s;
-       return inject_profiling(s, lowering.program, lowering.renamed_funcs, lowering.name);
+       return inject_profiling(s, lowering.program, lowering.name);
      }},
     {"free_early", Phase::Vector, alone<free_early>},
     {"drop_asserts", Phase::Vector, wanted<Target::NoAsserts, drop_asserts>},
@@ -238,7 +228,7 @@ LoweredFunction lower(const std::string& name, const std::vector<FuncPtr>& outpu
   LoweredFunction function{name, inputs, {}, {}};
   run_on_large_stack([&] {
     append_outputs(outputs, function.args);
-    Lowering lowering{outputs, function.args, {}, {}, {}, {}, name, options};
+    Lowering lowering{outputs, function.args, {}, {}, {}, name, options};
     function.body = run_passes(lowering, options);
     function.loop_nest = [program = std::move(lowering.program)] {
       return loop_nest_text(program);

@@ -4,6 +4,7 @@
 // inlines what is scheduled inline, and builds loops from what is left.
 #pragma once
 
+#include <map>
 #include <string>
 #include <unordered_map>
 #include <vector>
@@ -32,8 +33,16 @@ struct Program {
   std::vector<LoopedFunc> funcs;  // producers before consumers; no pure inlined Func is left
   std::unordered_map<std::string, int> index_of;
 
+  // Where Funcs have other names in the statement than their own, as several copies of one have:
+  // by that name, their own.
+  std::map<std::string, std::string> renamed;
+
+  const std::string& original(const std::string& name) const {
+    auto it = renamed.find(name);
+    return it == renamed.end() ? name : it->second;
+  }
   const LoopedFunc* find(const std::string& name) const {
-    auto it = index_of.find(name);
+    auto it = index_of.find(original(name));
     return it == index_of.end() ? nullptr : &funcs[it->second];
   }
 };

@@ -36,9 +36,9 @@ Expr run() { return variable(run_name, Handle()); }
 
 class Profiling : public Rewriter {
  public:
-  Profiling(const Program& program, const RenamedFuncs& renamed) {
+  explicit Profiling(const Program& program) {
     for (const LoopedFunc& f : program.funcs) add(f, f.name());
-    for (const auto& [name, original] : renamed) {
+    for (const auto& [name, original] : program.renamed) {
       if (const LoopedFunc* f = program.find(original)) add(*f, name);
     }
     names = "overhead";
@@ -142,9 +142,8 @@ Stmt wrap_work(const Stmt& s, FunctionRef<Stmt(const Stmt&)> wrap) {
 
 }  // namespace
 
-Stmt inject_profiling(const Stmt& s, const Program& program, const RenamedFuncs& renamed,
-                      const std::string& pipeline) {
-  Profiling profiling(program, renamed);
+Stmt inject_profiling(const Stmt& s, const Program& program, const std::string& pipeline) {
+  Profiling profiling(program);
   const auto wrap = [&](const Stmt& work) {
     const Expr begin =
         call("retrograde_profiler_begin", {Expr(pipeline), Expr(profiling.names)}, Handle());

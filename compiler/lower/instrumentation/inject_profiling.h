@@ -4,12 +4,10 @@
 
 #include <string>
 
-#include "lower/loops/memoize.h"
 #include "lower/program.h"
 
 namespace retrograde::ir {
 
-Stmt inject_profiling(const Stmt& s, const Program& program, const RenamedFuncs& renamed,
-                      const std::string& pipeline);
+Stmt inject_profiling(const Stmt& s, const Program& program, const std::string& pipeline);
 
 }  // namespace retrograde::ir

@@ -45,8 +45,7 @@ void check(const LoopedFunc& f) {
 
 class Writer : public Rewriter {
  public:
-  Writer(const Program& program, const RenamedFuncs& renamed)
-      : program_(program), renamed_(renamed) {}
+  explicit Writer(const Program& program) : program_(program) {}
 
  protected:
   Expr rewrite(const Expr& e) override { return e; }
@@ -54,8 +53,7 @@ class Writer : public Rewriter {
   Stmt rewrite(const Stmt& s) override {
     const ProducerConsumer* n = s.as<ProducerConsumer>();
     if (!n || !n->produces) return children(s);
-    const auto renamed = renamed_.find(n->name);
-    const LoopedFunc* f = program_.find(renamed == renamed_.end() ? n->name : renamed->second);
+    const LoopedFunc* f = program_.find(n->name);
     if (!f || f->func->debug_file.empty()) return children(s);
     check(*f);
     return make_block({children(s), write(*f, n->name)});
@@ -63,7 +61,6 @@ class Writer : public Rewriter {
 
  private:
   const Program& program_;
-  const RenamedFuncs& renamed_;
   int written_ = 0;
 
   Stmt write(const LoopedFunc& f, const std::string& name) {
@@ -88,9 +85,9 @@ class Writer : public Rewriter {
 
 }  // namespace
 
-Stmt write_debug_files(const Stmt& s, const Program& program, const RenamedFuncs& renamed) {
+Stmt write_debug_files(const Stmt& s, const Program& program) {
   for (const LoopedFunc& f : program.funcs) {
-    if (!f.func->debug_file.empty()) return Writer(program, renamed)(s);
+    if (!f.func->debug_file.empty()) return Writer(program)(s);
   }
   return s;
 }

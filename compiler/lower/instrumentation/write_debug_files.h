@@ -1,11 +1,10 @@
 // write_debug_files -- Func::debug_to_file.
 #pragma once
 
-#include "lower/loops/memoize.h"
 #include "lower/program.h"
 
 namespace retrograde::ir {
 
-Stmt write_debug_files(const Stmt& s, const Program& program, const RenamedFuncs& renamed);
+Stmt write_debug_files(const Stmt& s, const Program& program);
 
 }  // namespace retrograde::ir

@@ -119,9 +119,8 @@ bool has_loop_around(const Stmt& s, const std::string& func) {
 
 class AsyncForker : public Rewriter {
  public:
-  AsyncForker(const Stmt& s, const Program& program, const RenamedFuncs& renamed,
-              const AsyncRoom& room)
-      : program_(program), renamed_(renamed), room_(room), semaphores_(s) {}
+  AsyncForker(const Stmt& s, const Program& program, const AsyncRoom& room)
+      : program_(program), room_(room), semaphores_(s) {}
 
  protected:
   Expr rewrite(const Expr& e) override { return e; }
@@ -137,19 +136,15 @@ class AsyncForker : public Rewriter {
 
  private:
   const Program& program_;
-  const RenamedFuncs& renamed_;
   const AsyncRoom& room_;
   Semaphores semaphores_;
   std::vector<std::string> forked_;     // async Funcs around whose consumers this is
   std::map<std::string, int> readers_;  // of those, with semaphores of their own
   std::map<std::string, Stmt> around_;  // by original name, the last one entered
 
-  const std::string& original(const std::string& name) const {
-    const auto it = renamed_.find(name);
-    return it == renamed_.end() ? name : it->second;
-  }
+  const std::string& original(const std::string& name) const { return program_.original(name); }
   bool is_async(const std::string& name) const {
-    const LoopedFunc* f = program_.find(original(name));
+    const LoopedFunc* f = program_.find(name);
     return f && f->schedule.async;
   }
 
@@ -225,7 +220,7 @@ class AsyncForker : public Rewriter {
   void check_is_apart(const Realize& n, const Names& made, const Stmt& consumer) const {
     const Names inside = realized_in(n.body);
     for (const std::string& other : made) {
-      const LoopedFunc* f = program_.find(original(other));
+      const LoopedFunc* f = program_.find(other);
       const bool is_output = f && f->is_output;
       if (inside.count(other) || (!is_output && !produces(consumer, other))) continue;
       user_error(text("compute ", quoted(original(n.name)), " async"),
@@ -289,7 +284,7 @@ class AsyncForker : public Rewriter {
 
   // A producer that does not run when its result is in the cache.
   bool may_be_skipped(const ProducerConsumer& n) const {
-    const LoopedFunc* f = program_.find(original(n.name));
+    const LoopedFunc* f = program_.find(n.name);
     return n.produces && f && f->schedule.memoized;
   }
 
@@ -446,17 +441,14 @@ class AsyncForker : public Rewriter {
 
 }  // namespace
 
-Stmt fork_async(const Stmt& s, const Program& program, RenamedFuncs& renamed,
-                const AsyncRoom& room) {
+Stmt fork_async(const Stmt& s, Program& program, const AsyncRoom& room) {
   const bool any = std::any_of(program.funcs.begin(), program.funcs.end(),
                                [](const LoopedFunc& f) { return f.schedule.async; });
   if (!any) return s;
   // Both branches have the loops around them, and may compute the same Func.
-  UniqueNames unique = make_names_unique(AsyncForker(s, program, renamed, room)(s));
-  for (const auto& [name, copied] : unique.original) {
-    const auto it = renamed.find(copied);
-    renamed[name] = it == renamed.end() ? copied : it->second;
-  }
+  UniqueNames unique = make_names_unique(AsyncForker(s, program, room)(s));
+  for (const auto& [name, copied] : unique.original)
+    program.renamed[name] = program.original(copied);
   return unique.stmt;
 }
 

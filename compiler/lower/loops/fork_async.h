@@ -4,7 +4,6 @@
 #include <map>
 #include <string>
 
-#include "lower/loops/memoize.h"
 #include "lower/program.h"
 
 namespace retrograde::ir {
@@ -13,8 +12,7 @@ namespace retrograde::ir {
 // async Funcs that are stored outside of where they are computed.
 using AsyncRoom = std::map<std::string, int>;
 
-// Funcs that both branches compute get new names, which are added to `renamed`.
-Stmt fork_async(const Stmt& s, const Program& program, RenamedFuncs& renamed,
-                const AsyncRoom& room);
+// Funcs that both branches compute get new names, which are added to those of the program.
+Stmt fork_async(const Stmt& s, Program& program, const AsyncRoom& room);
 
 }  // namespace retrograde::ir

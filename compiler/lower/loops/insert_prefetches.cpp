@@ -71,17 +71,16 @@ class ReadRegion {
 
 class Inserter : public Rewriter {
  public:
-  Inserter(const Program& program, const RenamedFuncs& renamed)
-      : program_(program), renamed_(renamed) {}
+  explicit Inserter(const Program& program) : program_(program) {}
 
  protected:
   Expr rewrite(const Expr& e) override { return e; }
 
   Stmt rewrite(const Stmt& s) override {
     if (const Realize* n = s.as<Realize>()) {
-      realized_[original(n->name)] = n->name;
+      realized_[program_.original(n->name)] = n->name;
       Stmt result = children(s);
-      realized_.erase(original(n->name));
+      realized_.erase(program_.original(n->name));
       return result;
     }
     if (const LetStmt* n = s.as<LetStmt>()) {
@@ -105,19 +104,13 @@ class Inserter : public Rewriter {
     size_t lets;  // how many are bound around it
   };
   const Program& program_;
-  const RenamedFuncs& renamed_;
   std::vector<std::pair<std::string, Expr>> lets_;
   std::vector<OuterLoop> loops_;
   std::map<std::string, std::string> realized_;
 
-  const std::string& original(const std::string& name) const {
-    const auto it = renamed_.find(name);
-    return it == renamed_.end() ? name : it->second;
-  }
-
   Stmt with_prefetches(const For& n, Stmt body) {
     const LoopName loop = decode_loop_name(n.name);
-    const LoopedFunc* f = program_.find(original(loop.func));
+    const LoopedFunc* f = program_.find(loop.func);
     if (!f || loop.stage.empty()) return body;
     const auto stage = static_cast<size_t>(std::stoi(loop.stage));
     if (stage >= f->stages.size()) return body;
@@ -155,7 +148,7 @@ class Inserter : public Rewriter {
   }
 
   Range extent_of_data(const std::string& name, size_t d) const {
-    const LoopedFunc* f = program_.find(original(name));
+    const LoopedFunc* f = program_.find(name);
     const std::string buffer = f && f->is_output ? value_buffer_name(*f->func, 0) : name;
     return {variable(text(buffer, ".min.", d)), variable(text(buffer, ".extent.", d))};
   }
@@ -201,8 +194,7 @@ class Inserter : public Rewriter {
 
 class PrefetchLowering : public Rewriter {
  public:
-  PrefetchLowering(const Stmt& s, const Program& program, const RenamedFuncs& renamed)
-      : program_(program), renamed_(renamed), fresh_(s) {}
+  PrefetchLowering(const Stmt& s, const Program& program) : program_(program), fresh_(s) {}
 
  protected:
   Expr rewrite(const Expr& e) override { return e; }
@@ -213,7 +205,6 @@ class PrefetchLowering : public Rewriter {
 
  private:
   const Program& program_;
-  const RenamedFuncs& renamed_;
   FreshNames fresh_;
 
   Stmt lines(const Prefetch& n) {
@@ -222,8 +213,7 @@ class PrefetchLowering : public Rewriter {
         return call_image(n.name, n.type, point, n.symbol);
       });
     }
-    const auto renamed = renamed_.find(n.name);
-    const LoopedFunc* f = program_.find(renamed == renamed_.end() ? n.name : renamed->second);
+    const LoopedFunc* f = program_.find(n.name);
     const std::vector<Type> types = f ? f->func->types : std::vector<Type>{n.type};
     std::vector<Stmt> stmts;
     for (size_t i = 0; i < types.size(); i++) {
@@ -272,12 +262,12 @@ bool any_prefetch(const Program& program) {
 
 }  // namespace
 
-Stmt insert_prefetches(const Stmt& s, const Program& program, const RenamedFuncs& renamed) {
-  return any_prefetch(program) ? Inserter(program, renamed)(s) : s;
+Stmt insert_prefetches(const Stmt& s, const Program& program) {
+  return any_prefetch(program) ? Inserter(program)(s) : s;
 }
 
-Stmt lower_prefetches(const Stmt& s, const Program& program, const RenamedFuncs& renamed) {
-  return any_prefetch(program) ? PrefetchLowering(s, program, renamed)(s) : s;
+Stmt lower_prefetches(const Stmt& s, const Program& program) {
+  return any_prefetch(program) ? PrefetchLowering(s, program)(s) : s;
 }
 
 }  // namespace retrograde::ir

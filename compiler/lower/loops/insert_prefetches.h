@@ -1,14 +1,13 @@
 // insert_prefetches -- ask for what later iterations read.
 #pragma once
 
-#include "lower/loops/memoize.h"
 #include "lower/program.h"
 
 namespace retrograde::ir {
 
 // Loops to Loops: a Prefetch of a box in the loops that schedules name.
-Stmt insert_prefetches(const Stmt& s, const Program& program, const RenamedFuncs& renamed);
+Stmt insert_prefetches(const Stmt& s, const Program& program);
 // Loops to Loops: Prefetches become loops over the cache lines of their boxes.
-Stmt lower_prefetches(const Stmt& s, const Program& program, const RenamedFuncs& renamed);
+Stmt lower_prefetches(const Stmt& s, const Program& program);
 
 }  // namespace retrograde::ir

@@ -27,12 +27,6 @@ namespace retrograde::ir {
 
 namespace {
 
-const LoopedFunc* find_func(const Program& program, const RenamedFuncs& renamed,
-                            const std::string& name) {
-  const auto it = renamed.find(name);
-  return program.find(it == renamed.end() ? name : it->second);
-}
-
 bool is_memoized(const LoopedFunc* f) { return f && f->schedule.memoized; }
 
 constexpr const char* computed_extent_mark = ".computed.extent.";
@@ -160,9 +154,9 @@ class ComputedExtents {
 
 class Memoizer : public Rewriter {
  public:
-  Memoizer(const Program& program, const RenamedFuncs& renamed, const std::string& function,
-           const Target& target, const StorageFolds& folds)
-      : program_(program), renamed_(renamed), function_(function), target_(target), folds_(folds) {}
+  Memoizer(const Program& program, const std::string& function, const Target& target,
+           const StorageFolds& folds)
+      : program_(program), function_(function), target_(target), folds_(folds) {}
 
  protected:
   Expr rewrite(const Expr& e) override {
@@ -174,7 +168,7 @@ class Memoizer : public Rewriter {
     if (const Realize* n = s.as<Realize>()) bounds_[n->name] = n->bounds;
     if (const LetStmt* n = s.as<LetStmt>()) computed_.note(n->name);
     const ProducerConsumer* n = s.as<ProducerConsumer>();
-    const LoopedFunc* f = n && n->produces ? find_func(program_, renamed_, n->name) : nullptr;
+    const LoopedFunc* f = n && n->produces ? program_.find(n->name) : nullptr;
     if (!is_memoized(f)) return children(s);
     check_schedule(*f);
     return lookup(*f, n->name, children(s));
@@ -255,7 +249,6 @@ class Memoizer : public Rewriter {
   }
 
   const Program& program_;
-  const RenamedFuncs& renamed_;
   const std::string& function_;
   const Target& target_;
   const StorageFolds& folds_;
@@ -276,9 +269,9 @@ std::string computed_extent_name(const std::string& func, size_t dimension) {
   return func + computed_extent_mark + std::to_string(dimension);
 }
 
-Stmt memoize(const Stmt& s, const Program& program, const RenamedFuncs& renamed,
-             const std::string& function, const Target& target, const StorageFolds& folds) {
-  return any_memoized(program) ? Memoizer(program, renamed, function, target, folds)(s) : s;
+Stmt memoize(const Stmt& s, const Program& program, const std::string& function,
+             const Target& target, const StorageFolds& folds) {
+  return any_memoized(program) ? Memoizer(program, function, target, folds)(s) : s;
 }
 
 }  // namespace retrograde::ir

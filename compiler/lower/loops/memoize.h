@@ -9,9 +9,6 @@
 
 namespace retrograde::ir {
 
-// Original names of Funcs that have others in the statement.
-using RenamedFuncs = std::map<std::string, std::string>;
-
 // By original name: what each dimension of its storage folds by, undefined where it does not.
 using StorageFolds = std::map<std::string, std::vector<Expr>>;
 
@@ -20,7 +17,7 @@ using StorageFolds = std::map<std::string, std::vector<Expr>>;
 std::string computed_extent_name(const std::string& func, size_t dimension);
 
 // `function`: what is compiled.
-Stmt memoize(const Stmt& s, const Program& program, const RenamedFuncs& renamed,
-             const std::string& function, const Target& target, const StorageFolds& folds);
+Stmt memoize(const Stmt& s, const Program& program, const std::string& function,
+             const Target& target, const StorageFolds& folds);
 
 }  // namespace retrograde::ir
