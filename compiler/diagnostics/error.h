@@ -17,6 +17,7 @@
 // tools/api_table holds them against each other, and names the test of each in docs/api.md.
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <source_location>
 #include <sstream>
@@ -123,6 +124,14 @@ std::string text(const Parts&... parts) {
   std::ostringstream out;
   ((out << parts), ...);
   return std::move(out).str();
+}
+// "a, b, c": what `text_of` makes of each.
+template <class List, class TextOf = std::identity>
+requires requires(const List& list, const TextOf& text_of) { text_of(*list.begin()); }
+std::string listed(const List& list, const TextOf& text_of = {}) {
+  std::string out;
+  for (const auto& one : list) out += (out.empty() ? "" : ", ") + text_of(one);
+  return out;
 }
 
 namespace detail {

@@ -26,11 +26,7 @@ std::vector<std::string> words_between_commas(const std::string& text) {
   return words;
 }
 
-std::string names_of(const std::vector<std::string>& names) {
-  std::string list;
-  for (const std::string& name : names) list += (list.empty() ? "" : ", ") + quoted(name);
-  return list;
-}
+std::string names_of(const std::vector<std::string>& names) { return listed(names, quoted); }
 
 std::vector<std::string> emit_names() {
   std::vector<std::string> names;

@@ -129,8 +129,7 @@ void GeneratorBase::unknown_param(const std::string& key) const {
   };
   for (const GeneratorPort* input : members_.inputs) add_open_parts(input);
   for (const GeneratorPort* output : members_.outputs) add_open_parts(output);
-  std::string list;
-  for (const std::string& name : known) list += (list.empty() ? "" : ", ") + quoted(name);
+  const std::string list = listed(known, quoted);
   user_error("set the GeneratorParam " + quoted(key) + " of the generator " + quoted(name_),
              "only what the generator declares can be set", "it declares " + list,
              "Name one of these");

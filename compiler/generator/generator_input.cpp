@@ -84,8 +84,7 @@ void GeneratorInputBase::set_estimate_of(const Var& var, const Expr& min,
     size_t d = 0;
     while (d < names.size() && names[d].name() != var.name()) d++;
     if (d == names.size()) {
-      std::string list;
-      for (const Var& name : names) list += (list.empty() ? "" : ", ") + quoted(name.name());
+      const std::string list = listed(names, [](const Var& name) { return quoted(name.name()); });
       refuse("set an estimate of " + quoted(var.name()) + " of",
              "a dimension goes by the name of the input's argument", "these are " + list,
              "Use one of them, or dim(i).set_estimate()");

@@ -9,9 +9,7 @@ namespace retrograde::internal {
 namespace {
 
 std::string list_of(const std::vector<Type>& types) {
-  std::string list;
-  for (const Type& type : types) list += (list.empty() ? "" : ", ") + to_string(type);
-  return list;
+  return listed(types, [](const Type& type) { return to_string(type); });
 }
 
 }  // namespace

@@ -81,9 +81,7 @@ std::optional<Type> read_type(const std::string& text) {
 }
 
 std::string type_choices() {
-  std::string list;
-  for (const Type& type : param_types) list += (list.empty() ? "" : ", ") + to_string(type);
-  return list;
+  return listed(param_types, [](const Type& type) { return to_string(type); });
 }
 
 std::optional<LoopLevel> read_loop_level(const std::string& text) {

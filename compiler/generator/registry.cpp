@@ -23,9 +23,7 @@ Registered& registered() {
 }
 
 std::string list_of_names() {
-  std::string list;
-  for (const std::string& name : GeneratorRegistry::enumerate())
-    list += (list.empty() ? "" : ", ") + quoted(name);
+  const std::string list = listed(GeneratorRegistry::enumerate(), quoted);
   return list.empty() ? "none is linked into this program" : "there are " + list;
 }
 

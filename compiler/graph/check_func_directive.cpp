@@ -14,8 +14,7 @@ namespace retrograde::ir {
 namespace {
 
 std::string dimensions_of(const FuncContents& f) {
-  std::string args;
-  for (const std::string& arg : f.args) args += (args.empty() ? "" : ", ") + quoted(arg);
+  const std::string args = listed(f.args, quoted);
   return args.empty() ? "it has no dimensions" : "its variables are " + args;
 }
 

@@ -204,9 +204,7 @@ void check_fuse_level(const std::string& stage, const std::string& func, const L
 }
 
 std::string list_of(const std::vector<NamedLoop>& names) {
-  std::string out;
-  for (const NamedLoop& name : names) out += (out.empty() ? "" : ", ") + quoted(name);
-  return out;
+  return listed(names, [](const NamedLoop& name) { return quoted(name); });
 }
 
 // Iterations that may touch the same element need atomic() of an update that is proven associative

@@ -34,9 +34,7 @@ std::string print_field(const std::pair<A, B>& both) {
 }
 template <typename T>
 std::string print_field(const std::vector<T>& list) {
-  std::string out;
-  for (const T& one : list) out += (out.empty() ? "" : ", ") + print_field(one);
-  return out;
+  return listed(list, [](const T& one) { return print_field(one); });
 }
 
 // ---- parsing ----

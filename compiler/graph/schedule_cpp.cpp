@@ -19,12 +19,6 @@ namespace {
 
 using Entry = ScheduleLog::Entry;
 
-std::string joined(const std::vector<std::string>& parts) {
-  std::string out;
-  for (const std::string& part : parts) out += (out.empty() ? "" : ", ") + part;
-  return out;
-}
-
 // Names as identifiers, each of its own.
 class Identifiers {
  public:
@@ -120,7 +114,7 @@ class CppPrinter {
   }
 
   std::string call(const char* method, const std::vector<std::string>& arguments) {
-    return text(receiver(), ".", method, "(", joined(arguments), ")");
+    return text(receiver(), ".", method, "(", listed(arguments), ")");
   }
   // Most directives are called as in text.
   template <typename D>
@@ -175,7 +169,7 @@ class CppPrinter {
       const std::string rvar = is_reduction(kept) ? cpp(kept) : text("RVar(\"", kept, "\")");
       pairs.push_back(text("{", rvar, ", ", cpp(variable), "}"));
     }
-    return text("Func ", identifiers_(d.made), " = ", call(d.name, {"{" + joined(pairs) + "}"}));
+    return text("Func ", identifiers_(d.made), " = ", call(d.name, {"{" + listed(pairs) + "}"}));
   }
 
   // ---- arguments ----
@@ -203,7 +197,7 @@ class CppPrinter {
   std::string cpp(const std::vector<T>& list) {
     std::vector<std::string> parts;
     for (const T& one : list) parts.push_back(cpp(one));
-    return "{" + joined(parts) + "}";
+    return "{" + listed(parts) + "}";
   }
 
   static const char* infix(Kind kind) {
@@ -233,13 +227,13 @@ class CppPrinter {
       case Kind::Cast:
         return text("cast(", type_of(e.type()), ", ", parts[0], ")");
       case Kind::Min:
-        return text("min(", joined(parts), ")");
+        return text("min(", listed(parts), ")");
       case Kind::Max:
-        return text("max(", joined(parts), ")");
+        return text("max(", listed(parts), ")");
       case Kind::Select:
-        return text("select(", joined(parts), ")");
+        return text("select(", listed(parts), ")");
       case Kind::Call:
-        return text(e.as<Call>()->name, "(", joined(parts), ")");
+        return text(e.as<Call>()->name, "(", listed(parts), ")");
       default:
         return constant(e);
     }

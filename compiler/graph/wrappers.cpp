@@ -228,11 +228,7 @@ bool is_identity(const FuncContents& wrapper, const FuncContents& f) {
   return wrapper.updates.empty() && call && call->symbol.raw() == &f;
 }
 
-std::string names_of(const std::vector<std::string>& users) {
-  std::string out;
-  for (const std::string& user : users) out += (out.empty() ? "" : ", ") + quoted(user);
-  return out;
-}
+std::string names_of(const std::vector<std::string>& users) { return listed(users, quoted); }
 
 bool reads(const FuncContents& user, const FuncContents& f) {
   bool found = false;

@@ -214,8 +214,7 @@ void check_stop(const std::string& stop_after) {
   const std::vector<std::string> names = pass_names();
   if (stop_after.empty() || std::find(names.begin(), names.end(), stop_after) != names.end())
     return;
-  std::string known;
-  for (const std::string& pass : names) known += (known.empty() ? "" : ", ") + pass;
+  const std::string known = listed(names);
   user_error("stop lowering after " + quoted(stop_after), "lowering stops after one of its passes",
              "they are " + known, "Name one of them, or none to run them all");
 }

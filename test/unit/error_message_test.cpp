@@ -8,6 +8,13 @@
 namespace retrograde {
 namespace {
 
+TEST(Messages, ListsHaveCommas) {
+  const std::vector<std::string> names = {"x", "y"};
+  EXPECT_EQ(listed(names), "x, y");
+  EXPECT_EQ(listed(names, quoted), "\"x\", \"y\"");
+  EXPECT_EQ(listed(std::vector<std::string>()), "");
+}
+
 TEST(Message, RendersAllFourParts) {
   const Message message{"vectorize \"blur_x\" over \"r\"",
                         "iterations of a vectorized loop must be independent",

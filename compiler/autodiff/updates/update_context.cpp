@@ -100,8 +100,7 @@ UpdateContext::UpdateContext(const UpdateQuery& query)
 }
 
 std::string UpdateContext::asked() const {
-  std::string right;
-  for (const Expr& v : definition.values) right += (right.empty() ? "" : ", ") + print(v);
+  std::string right = listed(definition.values, [](const Expr& v) { return print(v); });
   if (right.size() > 200) right = right.substr(0, 200) + "...";
   return "differentiate the update " + point_text(f->name, write) + " = " + right;
 }

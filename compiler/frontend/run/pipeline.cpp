@@ -43,9 +43,7 @@ struct Stamp {
 };
 
 std::string names_of(const std::vector<ir::FuncPtr>& outputs) {
-  std::string out;
-  for (const ir::FuncPtr& f : outputs) out += (out.empty() ? "" : ", ") + quoted(f->name);
-  return out;
+  return listed(outputs, [](const ir::FuncPtr& f) { return quoted(f->name); });
 }
 
 bool same_shape(const halide_buffer_t& a, const std::vector<halide_dimension_t>& shape) {

@@ -10,9 +10,7 @@ namespace retrograde {
 namespace {
 
 std::string as_list(const std::vector<VarOrRVar>& vars) {
-  std::string out;
-  for (const VarOrRVar& var : vars) out += (out.empty() ? "" : ", ") + quoted(var.name());
-  return out;
+  return listed(vars, [](const VarOrRVar& var) { return quoted(var.name()); });
 }
 
 }  // namespace
@@ -89,9 +87,7 @@ std::string Stage::source_location() const { return ir::source_location_of(*plac
 std::vector<VarOrRVar> Stage::split_vars() const { return ir::loops_at(place_); }
 
 std::string Stage::dump_argument_list() const {
-  std::string out;
-  for (const ir::Dim& dim : get_schedule().dims) out += (out.empty() ? "" : ", ") + dim.var;
-  return out;
+  return listed(get_schedule().dims, [](const ir::Dim& dim) { return dim.var; });
 }
 
 Func Stage::rfactor(const RVar& r, const Var& v) {
