@@ -42,72 +42,54 @@ Scalar of_pattern(Type type, uint64_t bits) {
                        : Scalar::of_uint(type, bits);
 }
 
+// What the order of numbers decides.
 template <class T>
-Scalar compare_scalars(Kind kind, T a, T b) {
+Scalar by_order(Kind kind, const Scalar& a, const Scalar& b, T Scalar::*number) {
+  const T x = a.*number, y = b.*number;
   switch (kind) {
+    case Kind::Min:
+      return x < y ? a : b;
+    case Kind::Max:
+      return x > y ? a : b;
     case Kind::EQ:
-      return Scalar::of_bool(a == b);
+      return Scalar::of_bool(x == y);
     case Kind::NE:
-      return Scalar::of_bool(a != b);
+      return Scalar::of_bool(x != y);
     case Kind::LT:
-      return Scalar::of_bool(a < b);
+      return Scalar::of_bool(x < y);
     case Kind::LE:
-      return Scalar::of_bool(a <= b);
+      return Scalar::of_bool(x <= y);
     case Kind::GT:
-      return Scalar::of_bool(a > b);
+      return Scalar::of_bool(x > y);
     case Kind::GE:
-      return Scalar::of_bool(a >= b);
+      return Scalar::of_bool(x >= y);
     default:
       internal_error(text(kind_name(kind), " of scalars"));
   }
 }
 
-Scalar int_binary(Kind kind, const Scalar& a, const Scalar& b) {
-  const auto wrap = [&](uint64_t value) {
-    return Scalar::of_int(a.type, static_cast<int64_t>(value));
-  };
+Scalar integer_binary(Kind kind, const Scalar& a, const Scalar& b) {
+  const bool is_int = a.type.is_int();
+  const auto bits = [&](uint64_t value) { return of_pattern(a.type, value); };
   switch (kind) {
     case Kind::Add:
-      return wrap(a.u + b.u);
+      return bits(a.u + b.u);
     case Kind::Sub:
-      return wrap(a.u - b.u);
+      return bits(a.u - b.u);
     case Kind::Mul:
-      return wrap(a.u * b.u);
+      return bits(a.u * b.u);
     case Kind::Div:
-      return Scalar::of_int(a.type, euclidean_div(a.i, b.i));
+      if (is_int) return Scalar::of_int(a.type, euclidean_div(a.i, b.i));
+      return bits(b.u ? a.u / b.u : 0);
     case Kind::Mod:
-      return Scalar::of_int(a.type, euclidean_mod(a.i, b.i));
-    case Kind::Min:
-      return a.i < b.i ? a : b;
-    case Kind::Max:
-      return a.i > b.i ? a : b;
-    default:
-      return compare_scalars(kind, a.i, b.i);
-  }
-}
-
-Scalar uint_binary(Kind kind, const Scalar& a, const Scalar& b) {
-  switch (kind) {
-    case Kind::Add:
-      return Scalar::of_uint(a.type, a.u + b.u);
-    case Kind::Sub:
-      return Scalar::of_uint(a.type, a.u - b.u);
-    case Kind::Mul:
-      return Scalar::of_uint(a.type, a.u * b.u);
-    case Kind::Div:
-      return Scalar::of_uint(a.type, b.u ? a.u / b.u : 0);
-    case Kind::Mod:
-      return Scalar::of_uint(a.type, b.u ? a.u % b.u : 0);
-    case Kind::Min:
-      return a.u < b.u ? a : b;
-    case Kind::Max:
-      return a.u > b.u ? a : b;
+      if (is_int) return Scalar::of_int(a.type, euclidean_mod(a.i, b.i));
+      return bits(b.u ? a.u % b.u : 0);
     case Kind::And:
-      return Scalar::of_uint(a.type, a.u & b.u);
+      return bits(a.u & b.u);
     case Kind::Or:
-      return Scalar::of_uint(a.type, a.u | b.u);
+      return bits(a.u | b.u);
     default:
-      return compare_scalars(kind, a.u, b.u);
+      return is_int ? by_order(kind, a, b, &Scalar::i) : by_order(kind, a, b, &Scalar::u);
   }
 }
 
@@ -128,12 +110,8 @@ Scalar float_binary(Kind kind, const Scalar& a, const Scalar& b) {
       const Scalar whole = round(b.f * std::floor(round(a.f / b.f).f));
       return round(a.f - whole.f);
     }
-    case Kind::Min:
-      return a.f < b.f ? a : b;
-    case Kind::Max:
-      return a.f > b.f ? a : b;
     default:
-      return compare_scalars(kind, a.f, b.f);
+      return by_order(kind, a, b, &Scalar::f);
   }
 }
 
@@ -196,8 +174,7 @@ Scalar Scalar::of_float(Type type, double value) {
 Scalar eval_binary(Kind kind, const Scalar& a, const Scalar& b) {
   RETROGRADE_ASSERT(a.type == b.type, kind_name(kind), " of ", to_string(a.type), " and ",
                     to_string(b.type));
-  if (a.type.is_float()) return float_binary(kind, a, b);
-  return a.type.is_int() ? int_binary(kind, a, b) : uint_binary(kind, a, b);
+  return a.type.is_float() ? float_binary(kind, a, b) : integer_binary(kind, a, b);
 }
 
 Scalar eval_not(const Scalar& a) { return Scalar::of_bool(!a.as_bool()); }
