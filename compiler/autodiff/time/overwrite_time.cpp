@@ -1,6 +1,7 @@
 #include "autodiff/time/overwrite_time.h"
 
 #include "autodiff/time/time_axis.h"
+#include "autodiff/updates/versions.h"
 #include "diagnostics/error.h"
 #include "frontend/language/var.h"
 #include "graph/define.h"
@@ -146,19 +147,7 @@ class Folder {
 
   // The first stages of f.
   FuncPtr clone(const FuncPtr& f, int stages, const std::string& name) const {
-    FuncPtr g = make_func(Role::TimeFold);
-    g->made->of = f->name;
-    if (f->made) g->made->traits = f->made->traits;
-    g->name = claim_name(name);
-    std::vector<Expr> args = variables_of(f->args), values;
-    for (const Expr& v : f->pure->values) values.push_back(mapped(v));
-    define_pure(g, args, values);
-    for (int s = 1; s < stages; ++s) {
-      Definition stage = map_exprs(
-          f->stage(s), [&](const Expr& e) { return redirect_calls(mapped(e), f, g, false); });
-      append_update(g, stage.args, stage.values, stage.rvars, stage.predicate);
-    }
-    return g;
+    return clone_prefix(f, stages, name, Role::TimeFold, [&](const Expr& e) { return mapped(e); });
   }
 
   void copy_if_changed(const FuncPtr& f) {

@@ -13,16 +13,19 @@
 
 namespace retrograde::ir {
 
-FuncPtr clone_prefix(const FuncPtr& f, int stages, const std::string& name) {
-  FuncPtr g = make_func(Role::Version);
+FuncPtr clone_prefix(const FuncPtr& f, int stages, const std::string& name, Role role,
+                     ExprMap map) {
+  FuncPtr g = make_func(role);
   g->made->of = f->name;
   if (f->made) g->made->traits = f->made->traits;
   g->name =
       claim_name(name.empty() ? f->name + "_before_update" + std::to_string(stages - 1) : name);
-  define_pure(g, variables_of(f->args), f->pure->values);
+  std::vector<Expr> values;
+  for (const Expr& v : f->pure->values) values.push_back(map(v));
+  define_pure(g, variables_of(f->args), values);
   for (int s = 1; s < stages; ++s) {
     Definition stage =
-        map_exprs(f->stage(s), [&](const Expr& e) { return redirect_calls(e, f, g, false); });
+        map_exprs(f->stage(s), [&](const Expr& e) { return redirect_calls(map(e), f, g, false); });
     append_update(g, stage.args, stage.values, stage.rvars, stage.predicate);
   }
   return g;

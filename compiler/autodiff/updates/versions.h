@@ -5,12 +5,16 @@
 #include <vector>
 
 #include "graph/function.h"
+#include "ir/visit.h"
 
 namespace retrograde::ir {
 
+constexpr auto same_expr = [](const Expr& e) { return e; };
+
 // f with its first `stages` stages only: the values before stage number `stages`. Without a name:
-// that of f and "_before_update" with its number.
-FuncPtr clone_prefix(const FuncPtr& f, int stages, const std::string& name = "");
+// that of f and "_before_update" with its number. `map`: of what the stages say.
+FuncPtr clone_prefix(const FuncPtr& f, int stages, const std::string& name = "",
+                     Role role = Role::Version, ExprMap map = same_expr);
 
 // Calls of `f` replaced by calls of `g` at the same arguments, followed by `extra` arguments.
 Expr call_instead(const Expr& e, const FuncPtr& f, const FuncPtr& g,
