@@ -6,7 +6,6 @@
 
 #include "ir/build.h"
 #include "ir/equal.h"
-#include "ir/scalar.h"
 
 namespace retrograde::ir {
 
@@ -17,24 +16,6 @@ namespace {
 constexpr size_t most_terms = 32;
 // Operands of nested min (max) that are compared with each other.
 constexpr size_t max_operands = 8;
-
-// The multiples of `divisor` in `f`, divided by it, and what is left (its constant in [0,
-// divisor)).
-struct Quotient {
-  Sum whole, rest;
-};
-Quotient divide(const Sum& f, int64_t divisor) {
-  Quotient q{linear_sum(f.type, euclidean_div(f.constant, divisor)),
-             linear_sum(f.type, euclidean_mod(f.constant, divisor))};
-  for (const Term& term : f.terms) {
-    if (term.factor % divisor == 0) {
-      q.whole.add(term.atom, term.factor / divisor);
-    } else {
-      q.rest.add(term.atom, term.factor);
-    }
-  }
-  return q;
-}
 
 bool is_nothing(const Sum& f) { return f.terms.empty() && f.constant == 0; }
 
@@ -85,7 +66,7 @@ class Collector {
     auto divisor = as_const_int(binary.b);
     if (!divisor || *divisor <= 0) return linear_sum(e);
     Sum numerator = form(binary.a);
-    Quotient q = divide(numerator, *divisor);
+    SplitSum q = split_by(numerator, *divisor);
     bool is_div = e.kind() == Kind::Div;
     if (q.rest.terms.empty()) return is_div ? q.whole : q.rest;
     Sum rest = linear_sum(e);

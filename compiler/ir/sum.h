@@ -65,6 +65,12 @@ Sum constant_sum(Type type, int64_t value);
 // Positive terms first, then the constant; of linear sums in structural order, else in that of
 // canonical_less. Undefined when a number of a linear sum does not fit the type.
 Expr to_expr(const Sum& sum);
+// sum = divisor * whole + rest, divisor > 0: terms and the multiples in the constant that it divides
+// in `whole`, the constant of the rest in [0, divisor).
+struct SplitSum {
+  Sum whole, rest;
+};
+SplitSum split_by(const Sum& sum, int64_t divisor);
 // The greatest common divisor of the factors; 0 when there are none.
 int64_t common_factor(const Sum& sum);
 

@@ -8,27 +8,6 @@
 
 namespace retrograde::ir {
 
-namespace {
-
-// x = c * quotient + rest, with 0 <= rest.constant < c.
-struct Split {
-  Sum quotient, rest;
-};
-Split split_by(const Sum& x, int64_t c) {
-  Split split{constant_sum(x.type, euclidean_div(x.constant, c)),
-              constant_sum(x.type, euclidean_mod(x.constant, c))};
-  for (const Term& term : x.terms) {
-    if (term.factor % c == 0) {
-      split.quotient.add(term.atom, term.factor / c);
-    } else {
-      split.rest.add(term.atom, term.factor);
-    }
-  }
-  return split;
-}
-
-}  // namespace
-
 Expr Simplifier::div(const Expr& a, const Expr& b) {
   const std::optional<int64_t> c = as_const_int(b);
   if (!has_sums(a.type()) || !c || is_const(a)) return binary(Kind::Div, a, b);
@@ -65,17 +44,17 @@ Expr Simplifier::div_by(const Expr& a, int64_t c) {
   if (const auto* line = a.as<Ramp>()) {
     if (Expr result = div_vector(*line, c); result.defined()) return result;
   }
-  Split split = split_by(sum_of(a), c);
-  if (!split.quotient.valid || !split.rest.valid) return binary(Kind::Div, a, constant(a, c));
+  SplitSum split = split_by(sum_of(a), c);
+  if (!split.whole.valid || !split.rest.valid) return binary(Kind::Div, a, constant(a, c));
   // (x + k) / c => x / c + (r + k) / c, when x is congruent to r
   Sum terms = split.rest;
   terms.constant = 0;
   if (const std::optional<int64_t> r = facts_.congruence(terms).modulo(c)) {
-    split.quotient.add_constant(euclidean_div(*r + split.rest.constant, c));
+    split.whole.add_constant(euclidean_div(*r + split.rest.constant, c));
     split.rest.constant = 0;
   }
   const Sum rest = sum_of(div_atom(split.rest, c));
-  return rebuild(plus(split.quotient, rest), Kind::Div, a, constant(a, c));
+  return rebuild(plus(split.whole, rest), Kind::Div, a, constant(a, c));
 }
 
 // The multiple of c at or below x, when the lower end of a variable in x gives it: of x between
