@@ -18,6 +18,7 @@
 #include "ir/build.h"
 #include "ir/visit.h"
 #include "lower/nests/argument_checks.h"
+#include "lower/nests/run_time_check.h"
 #include "retrograde_runtime.h"
 
 namespace retrograde::ir {
@@ -49,9 +50,7 @@ Stmt refuse(const Expr& query) {
       "cannot run: the buffer " + quoted(buffer_name(query)) +
       " must have memory, because the target says no_bounds_query; its host pointer is null. "
       "Allocate it, or compile without no_bounds_query.";
-  return make_assert(
-      !query,
-      call_op(Op::error, Int(32), {Expr(int32_t{retrograde_error_host_is_null}), Expr(message)}));
+  return run_time_check(!query, retrograde_error_host_is_null, message);
 }
 
 class DropBoundsQuery : public Rewriter {

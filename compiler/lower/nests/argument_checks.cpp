@@ -5,6 +5,7 @@
 #include "diagnostics/error.h"
 #include "ir/build.h"
 #include "ir/visit.h"
+#include "lower/nests/run_time_check.h"
 #include "lower/nests/schedule_checks.h"
 #include "retrograde_runtime.h"
 #include "simplify/simplify.h"
@@ -16,13 +17,6 @@ Expr handle_of(const std::string& buffer) { return variable(buffer + ".buffer", 
 
 std::string fact(const std::string& buffer, const char* what, int d) {
   return buffer + "." + what + "." + std::to_string(d);
-}
-
-template <class... Parts>
-Stmt check(Expr holds, int code, Parts&&... message) {
-  return make_assert(
-      std::move(holds),
-      call_op(Op::error, Int(32), {Expr(int32_t{code}), Expr(std::forward<Parts>(message))...}));
 }
 
 constexpr const char *check_shape = "retrograde_check_shape",
@@ -166,16 +160,16 @@ class Checks {
     if (!param) return;
     Expr value = variable(arg.name, arg.type);
     if (param->min_value.defined()) {
-      checks.push_back(check(value >= param->min_value, retrograde_error_param_too_small,
-                             text("cannot run: the parameter ", quoted(arg.name), " is "), value,
-                             Expr(", below its minimum "), param->min_value,
-                             Expr(". Pass a value in its range.")));
+      checks.push_back(run_time_check(value >= param->min_value, retrograde_error_param_too_small,
+                                      text("cannot run: the parameter ", quoted(arg.name), " is "),
+                                      value, Expr(", below its minimum "), param->min_value,
+                                      Expr(". Pass a value in its range.")));
     }
     if (param->max_value.defined()) {
-      checks.push_back(check(value <= param->max_value, retrograde_error_param_too_large,
-                             text("cannot run: the parameter ", quoted(arg.name), " is "), value,
-                             Expr(", above its maximum "), param->max_value,
-                             Expr(". Pass a value in its range.")));
+      checks.push_back(run_time_check(value <= param->max_value, retrograde_error_param_too_large,
+                                      text("cannot run: the parameter ", quoted(arg.name), " is "),
+                                      value, Expr(", above its maximum "), param->max_value,
+                                      Expr(". Pass a value in its range.")));
     }
   }
 
@@ -300,17 +294,17 @@ class Checks {
       if (promised.extent.defined()) holds = holds && box[d].max < min + promised.extent;
       holds = simplify(holds);
       if (is_const_true(holds)) continue;
-      checks.push_back(
-          check(holds, retrograde_error_constraints_make_required_region_smaller,
-                text("cannot run: what is promised of a buffer must hold what is used of it; ",
-                     quoted(arg.name), " is used over ["),
-                box[d].min, Expr(", "), box[d].max,
-                text("] in dimension ", d,
-                     ", but its min is promised"
-                     " to be "),
-                min, Expr(" and its extent "),
-                promised.extent.defined() ? promised.extent : Expr("whatever it is"),
-                Expr(". Promise a larger region, or lift the promise.")));
+      checks.push_back(run_time_check(
+          holds, retrograde_error_constraints_make_required_region_smaller,
+          text("cannot run: what is promised of a buffer must hold what is used of it; ",
+               quoted(arg.name), " is used over ["),
+          box[d].min, Expr(", "), box[d].max,
+          text("] in dimension ", d,
+               ", but its min is promised"
+               " to be "),
+          min, Expr(" and its extent "),
+          promised.extent.defined() ? promised.extent : Expr("whatever it is"),
+          Expr(". Promise a larger region, or lift the promise.")));
     }
   }
 
@@ -367,13 +361,13 @@ class Checks {
     const char* verb = arg.kind == LoweredArgument::Kind::OutputBuffer ? "written" : "read";
     const Expr min = variable(fact(arg.name, "min", d)),
                extent = variable(fact(arg.name, "extent", d));
-    return check(inside, retrograde_error_access_out_of_bounds,
-                 text("cannot run: every access must lie inside its buffer; ", quoted(arg.name),
-                      " is ", verb, " over ["),
-                 used.min, Expr(", "), used.max,
-                 text("] in dimension ", d, ", but the buffer covers ["), min, Expr(", "),
-                 min + extent - 1,
-                 Expr("]. Pass a larger buffer, clamp the access, or use a boundary condition."));
+    return run_time_check(
+        inside, retrograde_error_access_out_of_bounds,
+        text("cannot run: every access must lie inside its buffer; ", quoted(arg.name), " is ",
+             verb, " over ["),
+        used.min, Expr(", "), used.max, text("] in dimension ", d, ", but the buffer covers ["),
+        min, Expr(", "), min + extent - 1,
+        Expr("]. Pass a larger buffer, clamp the access, or use a boundary condition."));
   }
 
   void add_constraint_checks(const LoweredArgument& arg, std::vector<Stmt>& checks) const {
@@ -393,12 +387,12 @@ class Checks {
                                    const Expr& promised, std::vector<Stmt>& checks) {
     if (!promised.defined()) return;
     const Expr actual = actual_fact(arg, what, d);
-    checks.push_back(check(actual == promised, retrograde_error_constraint_violated,
-                           text("cannot run: the ", what, " of dimension ", d, " of ",
-                                quoted(arg.name), " was promised to be "),
-                           promised, Expr(", but it is "), actual,
-                           text(". Pass such a buffer, or lift the promise with dim(", d, ").set_",
-                                what, "(Expr()).")));
+    checks.push_back(run_time_check(actual == promised, retrograde_error_constraint_violated,
+                                    text("cannot run: the ", what, " of dimension ", d, " of ",
+                                         quoted(arg.name), " was promised to be "),
+                                    promised, Expr(", but it is "), actual,
+                                    text(". Pass such a buffer, or lift the promise with dim(", d,
+                                         ").set_", what, "(Expr()).")));
   }
 };
 

@@ -1,7 +1,7 @@
 #include "lower/nests/nest_checks.h"
 
 #include "diagnostics/error.h"
-#include "ir/build.h"
+#include "lower/nests/run_time_check.h"
 #include "retrograde_runtime.h"
 #include "simplify/simplify.h"
 
@@ -107,42 +107,29 @@ void check_storage_of_output(const LoopedFunc& f) {
 }
 
 Stmt bound_check(const LoopedFunc& f, int d, const Interval& required, const Interval& promised) {
-  Expr holds = simplify(promised.min <= required.min && required.max <= promised.max);
-  std::vector<Expr> error = {Expr(int32_t{retrograde_error_explicit_bounds_too_small}),
-                             Expr(text("cannot compute ", quoted(f.name()), ": its ",
-                                       dimension_of(f, d), " was bounded to [")),
-                             promised.min,
-                             Expr(", "),
-                             promised.max,
-                             Expr("], but its consumers need ["),
-                             required.min,
-                             Expr(", "),
-                             required.max,
-                             Expr("]. Bound it to what they read.")};
-  return make_assert(holds, call_op(Op::error, Int(32), error));
+  return run_time_check(
+      simplify(promised.min <= required.min && required.max <= promised.max),
+      retrograde_error_explicit_bounds_too_small,
+      text("cannot compute ", quoted(f.name()), ": its ", dimension_of(f, d), " was bounded to ["),
+      promised.min, ", ", promised.max, "], but its consumers need [", required.min, ", ",
+      required.max, "]. Bound it to what they read.");
 }
 
 Stmt fold_check(const LoopedFunc& f, int d, const Expr& touched, const Expr& factor) {
-  std::vector<Expr> error = {
-      Expr(int32_t{retrograde_error_fold_factor_too_small}),
-      Expr(text("cannot fold the storage of ", quoted(f.name()), ": ", dimension_of(f, d),
-                " wraps around after ")),
-      factor,
-      Expr(" coordinates, but "),
-      touched,
-      Expr(" of them are alive at once. Fold by at least that many, or drop fold_storage.")};
-  return make_assert(simplify(touched <= factor), call_op(Op::error, Int(32), error));
+  return run_time_check(
+      simplify(touched <= factor), retrograde_error_fold_factor_too_small,
+      text("cannot fold the storage of ", quoted(f.name()), ": ", dimension_of(f, d),
+           " wraps around after "),
+      factor, " coordinates, but ", touched,
+      " of them are alive at once. Fold by at least that many, or drop fold_storage.");
 }
 
 Stmt storage_check(const LoopedFunc& f, int d, const Expr& needed, const Expr& promised) {
-  std::vector<Expr> error = {Expr(int32_t{retrograde_error_storage_bound_too_small}),
-                             Expr(text("cannot store ", quoted(f.name()), ": the storage of its ",
-                                       dimension_of(f, d), " was bounded to ")),
-                             promised,
-                             Expr(" coordinates, but "),
-                             needed,
-                             Expr(" are needed. Pass a larger extent to bound_storage.")};
-  return make_assert(simplify(needed <= promised), call_op(Op::error, Int(32), error));
+  return run_time_check(simplify(needed <= promised), retrograde_error_storage_bound_too_small,
+                        text("cannot store ", quoted(f.name()), ": the storage of its ",
+                             dimension_of(f, d), " was bounded to "),
+                        promised, " coordinates, but ", needed,
+                        " are needed. Pass a larger extent to bound_storage.");
 }
 
 }  // namespace retrograde::ir

@@ -1,6 +1,7 @@
 #include "lower/nests/schedule_checks.h"
 
 #include "ir/build.h"
+#include "lower/nests/run_time_check.h"
 #include "retrograde_runtime.h"
 
 namespace retrograde::ir {
@@ -40,9 +41,8 @@ class SizeChecks {
   void check(const Expr& size, const Expr& runs, const std::string& asked, const char* what) {
     if (!size.defined() || is_const(size)) return;
     const std::string broken = text("cannot ", asked, ": ", what, " is at least 1; it is ");
-    const std::vector<Expr> error = {Expr(int32_t{retrograde_error_requirement_failed}),
-                                     Expr(broken), size, Expr(". Pass a positive value.")};
-    checks.push_back(make_assert(!runs || size >= 1, call_op(Op::error, Int(32), error)));
+    checks.push_back(run_time_check(!runs || size >= 1, retrograde_error_requirement_failed, broken,
+                                    size, ". Pass a positive value."));
   }
 };
 

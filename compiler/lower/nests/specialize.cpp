@@ -4,6 +4,7 @@
 #include "ir/build.h"
 #include "ir/equal.h"
 #include "ir/visit.h"
+#include "lower/nests/run_time_check.h"
 #include "retrograde_runtime.h"
 #include "simplify/simplify.h"
 
@@ -106,12 +107,10 @@ std::vector<const StageLoops*> schedules_of(const StageLoops& schedule) {
 }
 
 Stmt fail_specialized(const LoopedFunc& f, const std::string& message) {
-  std::vector<Expr> error = {
-      Expr(int32_t{retrograde_error_specialize_fail}),
-      Expr(text("cannot run ", quoted(f.name()),
-                ": one of its specializations must fit; none did: ", message,
-                ". Pass arguments that one of them fits, or drop specialize_fail."))};
-  return make_assert(const_false(), call_op(Op::error, Int(32), error));
+  return run_time_check(const_false(), retrograde_error_specialize_fail,
+                        text("cannot run ", quoted(f.name()),
+                             ": one of its specializations must fit; none did: ", message,
+                             ". Pass arguments that one of them fits, or drop specialize_fail."));
 }
 
 }  // namespace retrograde::ir
