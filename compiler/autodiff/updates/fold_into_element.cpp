@@ -130,13 +130,7 @@ class Fold {
   }
 
   // Reads of f are those of the values kept.
-  Expr kept(const Expr& e) const {
-    if (kept_.empty()) return e;
-    return rewrite(e, [&](const Expr& node, const auto& recurse) {
-      const auto it = kept_.find(node);
-      return it != kept_.end() ? it->second : map_children(node, recurse);
-    });
-  }
+  Expr kept(const Expr& e) const { return replaced(e, kept_); }
 
   void hand_over(const std::vector<Expr>& seeds) {
     std::vector<Expr> before;

@@ -256,13 +256,7 @@ class Tape {
     for (const ReductionVariable& r : c_.definition.rvars) work.loops.push_back(r.extent);
     tape->made->work = {std::move(work)};
   }
-  Expr kept(const Expr& e) const {
-    if (result_.self_values.empty()) return e;
-    return rewrite(e, [&](const Expr& node, const auto& recurse) {
-      auto it = result_.self_values.find(node);
-      return it != result_.self_values.end() ? it->second : map_children(node, recurse);
-    });
-  }
+  Expr kept(const Expr& e) const { return replaced(e, result_.self_values); }
 
   // ---- what others see ----
 

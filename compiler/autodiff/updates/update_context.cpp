@@ -206,13 +206,17 @@ std::vector<Expr> UpdateContext::extents() const {
   return result;
 }
 
+Expr replaced(const Expr& e, const SelfValues& values) {
+  if (values.empty()) return e;
+  return rewrite(e, [&](const Expr& node, const auto& recurse) {
+    auto it = values.find(node);
+    return it != values.end() ? it->second : map_children(node, recurse);
+  });
+}
+
 Expr with_values(const Expr& e, const FuncPtr& f, const SelfValues& self_values) {
   if (!e.defined() || f->updates.empty()) return e;
-  Expr replaced = self_values.empty() ? e : rewrite(e, [&](const Expr& node, const auto& recurse) {
-    auto it = self_values.find(node);
-    return it != self_values.end() ? it->second : map_children(node, recurse);
-  });
-  return redirect_calls(replaced, f, f, false);
+  return redirect_calls(replaced(e, self_values), f, f, false);
 }
 
 }  // namespace retrograde::ir

@@ -58,6 +58,8 @@ struct UpdateContext {
   std::vector<Expr> extents() const;
 };
 
+// What `values` has other expressions for becomes these.
+Expr replaced(const Expr& e, const SelfValues& values);
 // Reads of f in an expression that belongs to another Func become what `self_values` says, else the
 // final values; f is then owned by that Func.
 Expr with_values(const Expr& e, const FuncPtr& f, const SelfValues& self_values);
