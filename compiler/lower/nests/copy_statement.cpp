@@ -30,11 +30,9 @@ void for_each_name(const Stmt& s, Found found) {
         return true;
       },
       [&](const Stmt& node) {
-        match(
-            node, [&](const LetStmt& n) { found(n.name); }, [&](const For& n) { found(n.name); },
-            [&](const Store& n) { found(n.name); }, [&](const Provide& n) { found(n.name); },
-            [&](const Realize& n) { found(n.name); }, [&](const Allocate& n) { found(n.name); },
-            [](const StmtNode&) {});
+        match(node, [&](const auto& n) {
+          if constexpr (requires { n.name; }) found(n.name);
+        });
         return true;
       });
 }
