@@ -14,6 +14,7 @@ namespace {
 
 constexpr int64_t most_values = 4;  // of a dimension: extents are not known, and rests run slower
 constexpr double loads_a_cycle = 2, products_a_cycle = 2, latency = 4;
+constexpr double split_lines = 2;    // loads for a vector at any place: it crosses cache lines
 constexpr double worth_while = 0.8;  // of the cycles without a tile
 
 // What an iteration of a reduction loads, by the dimensions that the place depends on.
@@ -32,7 +33,7 @@ std::optional<std::vector<Operand>> operands_of(const FuncContents& f, const Def
     const bool loads =
         call && (call->call_type == CallType::Func || call->call_type == CallType::Image);
     if (!loads) return true;
-    if (call->symbol.raw() == &f) {
+    if (call->call_type == CallType::Func && call->name == f.name) {  // or a copy of it
       is_plain &= same_args(call->args, stage.args);
       return false;
     }
@@ -58,7 +59,7 @@ int64_t sums_of(const RegisterTile& tile) {
 double loads_of(const RegisterTile& tile, const std::vector<Operand>& operands) {
   double loads = 0;
   for (const Operand& operand : operands) {
-    double count = operand.depends_on[0] ? static_cast<double>(tile.vectors) : 1;
+    double count = operand.depends_on[0] ? split_lines * static_cast<double>(tile.vectors) : 1;
     for (const RegisterTile::Side& side : tile.sides)
       count *= operand.depends_on[side.dimension] ? static_cast<double>(side.size) : 1;
     loads += count;
@@ -103,7 +104,7 @@ std::optional<RegisterTile> register_tile(const FuncContents& f, const Definitio
     const double needed = cycles(tile, *operands);
     const bool is_better = needed < least || (needed == least && sums_of(best) > sums_of(tile));
     const bool reuses = loads_of(tile, *operands) <
-                        static_cast<double>(sums_of(tile)) * static_cast<double>(operands->size());
+                        static_cast<double>(sums_of(tile)) * loads_of(RegisterTile(), *operands);
     if (sums_of(tile) * bytes > unit.accumulator_bytes || !is_better || !reuses) return;
     best = std::move(tile);
     least = needed;
