@@ -225,6 +225,33 @@ TEST_P(Async, AFuncStoredBesideTheAsyncOneHasStorageInBothBranches) {
   program.expect();
 }
 
+// In one loop nest: `first` is read by the async Func alone, `second` by what is computed after it,
+// or the other way round.
+TEST_P(Async, FuncsComputedTogetherOfWhichEachBranchReadsOne) {
+  for (bool turned : {false, true}) {
+    Var x("x"), y("y");
+    Func first("first"), second("second"), ahead("ahead"), out("out"), copy("copy");
+    first(x) = x * 2;
+    second(x) = x + 1;
+    Func& ours = turned ? second : first;
+    Func& theirs = turned ? first : second;
+    ahead(x, y) = ours(x) + y;
+    out(x, y) = ahead(x, y);
+    copy(x) = theirs(x);
+    first.compute_root();
+    second.compute_root().compute_with(first, x);
+    ahead.compute_at(out, y).store_root().async();
+    Pipeline both({out, copy});
+    both.jit_handlers().thread_limit = GetParam();
+    Buffer<int> rows(16, 8), line(16);
+    both.realize({rows, line});
+    for (int i = 0; i < 16; ++i) {
+      EXPECT_EQ(line(i), turned ? i * 2 : i + 1) << turned;
+      for (int j = 0; j < 8; ++j) EXPECT_EQ(rows(i, j), (turned ? i + 1 : i * 2) + j) << turned;
+    }
+  }
+}
+
 TEST_P(Async, AFuncComputedInTheSharedLoopsMayBeHoistedOutOfThem) {
   SharedInput program;
   program.f.compute_at(program.out, program.y).hoist_storage_root();

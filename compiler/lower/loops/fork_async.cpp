@@ -19,7 +19,8 @@
 //         nests, and so do the Forks: outermost first, each next one splits the branch that
 //         consumes. When both of its parts read the Func of a Fork around, each has semaphores of
 //         its own to that producer. What else the producer reads and is computed in the same loops
-//         is computed in its branch, and in the other as well where that reads it too.
+//         is computed in its branch, and in the other as well where that reads it too, or what is
+//         computed together with it (compute_with).
 // Errors: such a value that both branches read, and whose storage lasts longer than theirs; loops
 //         between storage and computation that are not serial.
 // Source: Halide's documentation of async; the handshake is a bounded buffer's (Dijkstra 1965).
@@ -81,6 +82,23 @@ bool produces_any(const Stmt& s, const Names& funcs) {
 }
 
 bool produces(const Stmt& s, const std::string& func) { return produces_any(s, {func}); }
+
+// The Funcs that are computed together in the loops of a producer (compute_with): those of
+// producers directly inside each other.
+Names group_of(const ProducerConsumer& producer) {
+  Names names = {producer.name};
+  for (Stmt s = producer.body; s.defined();) {
+    if (const auto* let = s.as<LetStmt>()) {
+      s = let->body;
+    } else if (const ProducerConsumer* n = as_producer(s)) {
+      names.insert(n->name);
+      s = n->body;
+    } else {
+      break;
+    }
+  }
+  return names;
+}
 
 Names realized_in(const Stmt& s) {
   Names names;
@@ -183,7 +201,7 @@ class AsyncForker : public Rewriter {
     Stmt consumer = without_producer(n.body, n.name, loops, room);
     made.erase(n.name);
     consumer = without_unread(consumer, made);
-    check_is_apart(n, made, consumer);
+    check_is_apart(n, made, producer, consumer);
     share_waits(producer, consumer);
     return {with_own_places(producer, consumer), consumer};
   }
@@ -196,16 +214,34 @@ class AsyncForker : public Rewriter {
         [&](const Stmt& part) {
           const ProducerConsumer* other = as_producer(part);
           if (!other || (other->name != n.name && produces(part, n.name))) return true;
-          if (uses_func(producer, other->name)) made.insert(other->name);
+          const Names group = group_of(*other);
+          if (std::any_of(group.begin(), group.end(),
+                          [&](const std::string& func) { return uses_func(producer, func); }))
+            made.insert(group.begin(), group.end());
           return false;
         });
     return made.size() > before;
   }
 
+  // Whether anything reads a Func that is computed together with this one.
+  static bool is_group_read(const Stmt& s, const std::string& func) {
+    Names group = {func};
+    walk(
+        s, [](const Expr&) { return false; },
+        [&](const Stmt& part) {
+          const ProducerConsumer* n = as_producer(part);
+          const Names names = n ? group_of(*n) : Names();
+          if (names.count(func)) group.insert(names.begin(), names.end());
+          return !names.count(func);
+        });
+    return std::any_of(group.begin(), group.end(),
+                       [&](const std::string& other) { return is_read_outside(s, other); });
+  }
+
   // Without the computation of those that nothing reads.
   Stmt without_unread(Stmt s, Names funcs) {
     for (auto it = funcs.begin(); s.defined() && it != funcs.end();) {
-      if (!produces(s, *it) || is_read_outside(s, *it)) {
+      if (!produces(s, *it) || is_group_read(s, *it)) {
         ++it;
         continue;
       }
@@ -217,11 +253,12 @@ class AsyncForker : public Rewriter {
   }
 
   // Both branches may compute a Func only where each has storage for it.
-  void check_is_apart(const Realize& n, const Names& made, const Stmt& consumer) const {
+  void check_is_apart(const Realize& n, const Names& made, const Stmt& producer,
+                      const Stmt& consumer) const {
     const Names inside = realized_in(n.body);
     for (const std::string& other : made) {
       const LoopedFunc* f = program_.find(other);
-      const bool is_output = f && f->is_output;
+      const bool is_output = f && f->is_output && is_read_outside(producer, other);
       if (inside.count(other) || (!is_output && !produces(consumer, other))) continue;
       user_error(text("compute ", quoted(original(n.name)), " async"),
                  "what an async Func and its consumer both read is stored no further out than the "
