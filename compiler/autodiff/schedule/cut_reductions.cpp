@@ -3,12 +3,12 @@
 #include <algorithm>
 #include <utility>
 
+#include "autodiff/schedule/default_schedule.h"
 #include "frontend/language/func.h"
 #include "frontend/language/rdom.h"
 #include "frontend/schedule/stage.h"
 #include "graph/associative_update.h"
 #include "graph/copy_graph.h"
-#include "graph/names.h"
 #include "ir/build.h"
 #include "ir/visit.h"
 #include "simplify/simplify.h"
@@ -26,12 +26,6 @@ constexpr int64_t unknown_extent = 1024;
 
 int64_t extent_of(const ReductionVariable& r) {
   return as_const_int(simplify(r.extent)).value_or(unknown_extent);
-}
-
-bool is_given(const FuncContents& f) {
-  bool given = f.schedule.is_given;
-  for (int s = 0; s < f.stage_count(); ++s) given |= f.stage(s).schedule.is_given;
-  return given;
 }
 
 // Whether the update adds everything to one element, and may do so in another order.
@@ -88,7 +82,7 @@ void cut(const FuncPtr& f, int stage) {
 std::vector<FuncPtr> cut_reductions(const std::vector<FuncPtr>& outputs) {
   std::vector<std::pair<const FuncContents*, int>> found;
   for (const FuncPtr& f : topological_order(outputs)) {
-    if (is_given(*f) || f->is_extern()) continue;
+    if (is_touched(*f) || f->is_extern()) continue;
     for (int s = 1; s < f->stage_count(); ++s) {
       if (is_long_sum(*f, f->stage(s))) found.emplace_back(f.get(), s);
     }

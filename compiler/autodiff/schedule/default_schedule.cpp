@@ -23,13 +23,6 @@
 
 namespace retrograde::ir {
 
-namespace {
-
-constexpr int lanes = 16;
-// Operations up to which a Func that the user left alone in a schedule by hand is inlined.
-constexpr double explosion = 500;
-constexpr int64_t unknown_iterations = 8;
-
 bool is_touched(const FuncContents& f) {
   if (f.schedule.is_given) return true;
   for (int s = 0; s < f.stage_count(); ++s) {
@@ -37,6 +30,13 @@ bool is_touched(const FuncContents& f) {
   }
   return false;
 }
+
+namespace {
+
+constexpr int lanes = 16;
+// Operations up to which a Func that the user left alone in a schedule by hand is inlined.
+constexpr double explosion = 500;
+constexpr int64_t unknown_iterations = 8;
 
 struct Use {
   double reads = 0;

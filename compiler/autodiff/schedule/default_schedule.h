@@ -21,6 +21,9 @@
 
 namespace retrograde::ir {
 
+// Whether a directive was given to it or to one of its stages.
+bool is_touched(const FuncContents& f);
+
 struct ChosenSchedule {
   FuncPlacement func;
   std::vector<StageLoops> stages;

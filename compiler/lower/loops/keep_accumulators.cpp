@@ -38,7 +38,6 @@
 #include "ir/equal.h"
 #include "ir/visit.h"
 #include "lower/nests/copy_statement.h"
-#include "simplify/simplify.h"
 
 namespace retrograde::ir {
 
