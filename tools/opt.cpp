@@ -32,7 +32,7 @@
 #include <string>
 #include <vector>
 
-#include "autodiff/schedule/graph_passes.h"
+#include "autodiff/graph_passes.h"
 #include "diagnostics/error.h"
 #include "graph/graph.h"
 #include "graph/schedule_log.h"

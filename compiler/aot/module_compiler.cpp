@@ -11,7 +11,7 @@
 #include "aot/merge_objects.h"
 #include "aot/program.h"
 #include "aot/runtime_object.h"
-#include "autodiff/schedule/default_schedule.h"
+#include "autoschedule/default_schedule.h"
 #include "codegen/archive.h"
 #include "codegen/machine.h"
 #include "diagnostics/error.h"

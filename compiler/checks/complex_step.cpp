@@ -2,7 +2,6 @@
 
 #include <unordered_map>
 
-#include "autodiff/schedule/default_schedule.h"
 #include "autodiff/sweeps/accumulation.h"
 #include "autodiff/sweeps/local_derivative.h"
 #include "frontend/data/image_param.h"

@@ -47,6 +47,11 @@ std::vector<Expr> own_reads(const FuncContents& f, const Definition& update) {
   return reads;
 }
 
+bool is_pure_position(const FuncContents& f, const Definition& definition, size_t d) {
+  const auto* v = definition.args[d].as<Variable>();
+  return v && !v->symbol.defined() && v->name == f.args[d];
+}
+
 bool is_old_value(const Expr& e, const FuncContents& f, const Definition& update, int k) {
   const Call* call = as_call_of(e, &f);
   return call && (k < 0 || call->component == k) && same_args(call->args, update.args);

@@ -23,6 +23,8 @@ void walk_definition(const Definition& definition, FunctionRef<void(const Expr&)
 std::vector<Expr> own_reads(const FuncContents& f, const Definition& update);
 // The first of them that is not of the element written; undefined when there is none.
 Expr read_elsewhere(const FuncContents& f, const Definition& update);
+// Whether argument d of the definition is the Func's own variable of that dimension.
+bool is_pure_position(const FuncContents& f, const Definition& definition, size_t d);
 // Whether `e` is the old value of the element written: its value number k, or (-1) any.
 bool is_old_value(const Expr& e, const FuncContents& f, const Definition& update, int k = -1);
 

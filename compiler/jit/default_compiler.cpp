@@ -1,6 +1,6 @@
 // default_compiler.cpp -- what the front end's realize() reaches: lowering, then machine code in
 // this process.
-#include "autodiff/schedule/default_schedule.h"
+#include "autoschedule/default_schedule.h"
 #include "frontend/run/compiler_interface.h"
 #include "jit/jit.h"
 #include "lower/lower.h"

@@ -9,7 +9,7 @@
 #include <fstream>
 #include <iterator>
 
-#include "autodiff/schedule/graph_passes.h"
+#include "autodiff/graph_passes.h"
 #include "graph/graph.h"
 #include "support/same_numbers.h"
 

@@ -1,11 +1,11 @@
 // What lowering does with adjoints that nobody scheduled, and with those that somebody did.
-#include "autodiff/schedule/default_schedule.h"
+#include "autoschedule/default_schedule.h"
 
 #include <gtest/gtest.h>
 
 #include "autodiff/derivative.h"
-#include "autodiff/schedule/read_estimate.h"
-#include "autodiff/schedule/register_tile.h"
+#include "autoschedule/read_estimate.h"
+#include "autoschedule/register_tile.h"
 #include "frontend/language/func.h"
 #include "frontend/run/pipeline.h"
 #include "gradient/gradient_check.h"
@@ -24,23 +24,32 @@ struct DefaultSchedule : ::testing::Test {
     loss() = 0.0f;
     loss() += blur(r.x, r.y) * blur(r.x, r.y);
   }
-  ir::DefaultSchedules choose(const Func& f) { return ir::default_schedules({f.function()}); }
+  // `f` as it is compiled in the pipeline of `output`.
+  static ir::FuncContents scheduled(const Func& output, const Func& f) {
+    const auto funcs = ir::topological_order(ir::schedule_unscheduled({output.function()}));
+    const auto found = std::find_if(funcs.begin(), funcs.end(),
+                                    [&](const ir::FuncPtr& g) { return g->name == f.name(); });
+    return found == funcs.end() ? ir::FuncContents() : **found;
+  }
+  static bool is_stored(const Func& output, const Func& f) {
+    return scheduled(output, f).schedule.compute_level.kind == ir::LoopLevel::Kind::Root;
+  }
 
   Buffer<float> a{32, 32};
   Var x{"x"}, y{"y"};
   Func heavy{"heavy"}, blur{"blur"}, loss{"loss"};
 };
 
-TEST_F(DefaultSchedule, LeavesPipelinesWithoutAdjointsAlone) { EXPECT_TRUE(choose(loss).empty()); }
+TEST_F(DefaultSchedule, LeavesPipelinesWithoutAdjointsAlone) {
+  EXPECT_EQ(ir::schedule_unscheduled({loss.function()})[0], loss.function());
+}
 
 TEST_F(DefaultSchedule, StoresWhatIsReadOftenAndCosts) {
   Derivative d = propagate_adjoints(loss);
-  auto chosen = choose(d(a));
-  ASSERT_TRUE(chosen.contains(heavy.function().get()));
-  const ir::ChosenSchedule& schedule = chosen.at(heavy.function().get());
-  EXPECT_EQ(schedule.func.compute_level.kind, ir::LoopLevel::Kind::Root);
-  EXPECT_EQ(schedule.stages[0].dims.back().runs, ForType::Parallel);
-  EXPECT_EQ(schedule.stages[0].dims.front().runs, ForType::Vectorized);
+  ASSERT_TRUE(is_stored(d(a), heavy));
+  const std::vector<ir::Dim> loops = scheduled(d(a), heavy).pure->schedule.dims;
+  EXPECT_EQ(loops.back().runs, ForType::Parallel);
+  EXPECT_EQ(loops.front().runs, ForType::Vectorized);
   EXPECT_EQ(heavy.function()->schedule.compute_level.kind, ir::LoopLevel::Kind::Inlined)
       << "the Func itself is not changed";
 }
@@ -49,14 +58,13 @@ TEST_F(DefaultSchedule, ADirectiveOnAFuncSwitchesItOff) {
   Derivative d = propagate_adjoints(loss);
   Func adjoint = d(heavy);
   adjoint.compute_root();
-  auto chosen = choose(d(a));
-  EXPECT_FALSE(chosen.contains(adjoint.function().get()));
+  EXPECT_FALSE(scheduled(d(a), adjoint).pure->schedule.is_given);
 }
 
 TEST_F(DefaultSchedule, AHandScheduleOfThePrimalKeepsItsInlinedFuncsInlined) {
   blur.compute_root();
   Derivative d = propagate_adjoints(loss);
-  EXPECT_FALSE(choose(d(a)).contains(heavy.function().get()));
+  EXPECT_FALSE(is_stored(d(a), heavy));
 }
 
 void expect_all_likely(const Expr& condition) {
@@ -125,11 +133,10 @@ TEST_F(DefaultSchedule, ScattersRunInVectorsThatKeepTheirOrder) {
   sum() = 0.0f;
   sum() += rows(clamp(place(r.x, r.y), 0, 639), r.y);
   Derivative d = propagate_adjoints(sum);
-  auto chosen = choose(d(rows));
-  const auto& stages = chosen.at(d(rows).function().get()).stages;
-  ASSERT_EQ(stages.size(), 2u);
-  EXPECT_EQ(stages[1].dims.front().runs, ForType::Vectorized);
-  EXPECT_EQ(stages[1].dims.back().runs, ForType::Parallel);
+  const ir::FuncContents gradient = scheduled(d(rows), d(rows));
+  ASSERT_EQ(gradient.stage_count(), 2);
+  EXPECT_EQ(gradient.stage(1).schedule.dims.front().runs, ForType::Vectorized);
+  EXPECT_EQ(gradient.stage(1).schedule.dims.back().runs, ForType::Parallel);
 }
 
 TEST_F(DefaultSchedule, ScattersToFewElementsHaveElementsForEachLane) {
@@ -188,8 +195,7 @@ TEST_F(DefaultSchedule, ReductionsKeepATileOfTheirSumsInRegisters) {
   layer(x, y, c) = 0.0f;
   layer(x, y, c) += kernels(r.x, r.y, r.z, c) * image(x + r.x, y + r.y, r.z);
   Derivative d = propagate_adjoints(layer, seed);
-  const ir::FuncPtr adjoint = d(image).function();
-  const std::vector<ir::Dim>& loops = choose(d(image)).at(adjoint.get()).stages.back().dims;
+  const std::vector<ir::Dim> loops = scheduled(d(image), d(image)).updates.back().schedule.dims;
   ASSERT_GE(loops.size(), 5u);
   EXPECT_EQ(loops[0].runs, ForType::Vectorized);
   EXPECT_EQ(loops[1].runs, ForType::Unrolled);
@@ -323,8 +329,7 @@ TEST_F(DefaultSchedule, TilesWhatItReadsAcross) {
   sum() = 0.0f;
   sum() += a(r.y, r.x) * b(r.x, r.y);
   Derivative d = propagate_adjoints(sum);
-  const auto chosen = choose(d(a));
-  const std::vector<ir::Dim>& loops = chosen.at(d(a).function().get()).stages[0].dims;
+  const std::vector<ir::Dim> loops = scheduled(d(a), d(a)).pure->schedule.dims;
   ASSERT_EQ(loops.size(), 4u);
   EXPECT_EQ(loops[0].runs, ForType::Vectorized);
   EXPECT_EQ(loops[3].runs, ForType::Parallel);
@@ -338,10 +343,10 @@ TEST_F(DefaultSchedule, TilesAPlaneThatIsReadAcross) {
   sum() = 0.0f;
   sum() += planes(r.y, r.x, 0) * planes(r.y, r.x, 20) * a(r.x, r.y);
   Func gradient = propagate_adjoints(sum)(planes);
-  const auto stages = choose(gradient).at(gradient.function().get()).stages;
-  ASSERT_EQ(stages.size(), 3u);
-  ASSERT_EQ(stages[1].dims.size(), 4u);
-  EXPECT_EQ(stages[1].dims[3].runs, ForType::Parallel);
+  const ir::FuncContents adjoint = scheduled(gradient, gradient);
+  ASSERT_EQ(adjoint.stage_count(), 3);
+  ASSERT_EQ(adjoint.stage(1).schedule.dims.size(), 4u);
+  EXPECT_EQ(adjoint.stage(1).schedule.dims[3].runs, ForType::Parallel);
 }
 
 // A recursive filter beside a schedule by hand that says nothing of it.
@@ -355,7 +360,7 @@ TEST_F(DefaultSchedule, AScanIsNotComputedAgainForEachElement) {
   total() = 0.0f;
   total() += squares(all.x, all.y) * squares(all.x, all.y);
   const Derivative d = propagate_adjoints(total);
-  EXPECT_TRUE(choose(d(a)).contains(scan.function().get()));
+  EXPECT_TRUE(is_stored(d(a), scan));
   EXPECT_NE(d.explain(Detail::All)
                 .find("performance \"scan\": unless a directive schedules it, it is "
                       "computed at root"),
@@ -372,7 +377,7 @@ TEST_F(DefaultSchedule, AHandScheduleKeepsSmallReductionsThatAreReadOnceInline) 
   squares.compute_root();
   total() = 0.0f;
   total() += squares(all.x, all.y) * squares(all.x, all.y);
-  EXPECT_FALSE(choose(propagate_adjoints(total)(a)).contains(window.function().get()));
+  EXPECT_FALSE(is_stored(propagate_adjoints(total)(a), window));
 }
 
 // A warp whose private parts would take as much as 32 images.

@@ -3,12 +3,13 @@
 #include <algorithm>
 #include <cmath>
 #include <unordered_map>
+#include <unordered_set>
 
-#include "autodiff/schedule/cost_estimate.h"
-#include "autodiff/schedule/default_schedule.h"
-#include "autodiff/schedule/distinct_nodes.h"
+#include "autodiff/sweeps/distinct_nodes.h"
 #include "autodiff/sweeps/local_derivative.h"
 #include "autodiff/sweeps/regions.h"
+#include "autoschedule/cost_estimate.h"
+#include "autoschedule/stored_funcs.h"
 #include "diagnostics/error.h"
 #include "graph/function.h"
 #include "ir/build.h"
@@ -61,8 +62,9 @@ class Counter {
   explicit Counter(const std::vector<WantedFunc>& outputs)
       : outputs_(funcs_of(outputs)),
         order_(topological_order(outputs_)),
-        regions_(order_, regions_of(outputs)),
-        schedules_(default_schedules(outputs_)) {}
+        regions_(order_, regions_of(outputs)) {
+    for (const FuncPtr& f : stored_by_default(outputs_)) stored_by_default_.insert(f.get());
+  }
 
   OperationCount run() {
     for (const FuncPtr& f : order_) count(f);
@@ -86,7 +88,7 @@ class Counter {
   }
 
   bool is_stored(const FuncPtr& f) const {
-    return !f->is_pure() || schedules_.contains(f.get()) ||
+    return !f->is_pure() || stored_by_default_.contains(f.get()) ||
            f->schedule.compute_level.kind != LoopLevel::Kind::Inlined ||
            std::find(outputs_.begin(), outputs_.end(), f) != outputs_.end();
   }
@@ -178,7 +180,7 @@ class Counter {
 
   std::vector<FuncPtr> outputs_, order_;
   Regions regions_;
-  DefaultSchedules schedules_;
+  std::unordered_set<const FuncContents*> stored_by_default_;
   std::unordered_map<const Symbol*, std::vector<Operations>> value_costs_;  // of what is inlined
   std::unordered_map<const Symbol*, std::vector<Body>> bodies_;  // one for each entry of stages
   std::unordered_map<const Symbol*, size_t> places_;

@@ -7,7 +7,7 @@
 // What is counted: floating-point work of every stage over the region that the outputs need, each
 // distinct sub-expression of a stage once, both arms of a select, all points of a reduction domain
 // whatever its predicate says. A Func is stored or computed again at each read as its schedule says
-// (that of default_schedule.h where nobody scheduled), and a stored element is computed once: what
+// (stored_funcs.h where nobody scheduled), and a stored element is computed once: what
 // tiles compute twice is not seen. Integers are places and borders: not counted. With Tuples that
 // are computed again at each read, the work that their values share counts once a value.
 #pragma once

@@ -33,11 +33,6 @@ Box or_else(const Box& box, const Box& other) {
 
 }  // namespace
 
-bool is_pure_position(const FuncContents& f, const Definition& definition, size_t d) {
-  const auto* v = definition.args[d].as<Variable>();
-  return v && !v->symbol.defined() && v->name == f.args[d];
-}
-
 Regions::Regions(const std::vector<FuncPtr>& order, const Box& output) {
   if (order.empty()) return;
   boxes_[order.back().get()] = output;

@@ -42,7 +42,4 @@ class Regions {
 // A region in whole numbers, min and max of each dimension.
 Box box_of(const Region& region);
 
-// Dimension d of `args` when it is the pure variable of that dimension.
-bool is_pure_position(const FuncContents& f, const Definition& definition, size_t d);
-
 }  // namespace retrograde::ir

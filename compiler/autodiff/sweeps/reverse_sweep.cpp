@@ -3,7 +3,7 @@
 #include <unordered_map>
 
 #include "autodiff/rules/derivative_rules.h"
-#include "autodiff/schedule/distinct_nodes.h"
+#include "autodiff/sweeps/distinct_nodes.h"
 #include "diagnostics/error.h"
 #include "ir/build.h"
 

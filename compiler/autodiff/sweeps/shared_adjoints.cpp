@@ -8,9 +8,9 @@
 #include <set>
 
 #include "analysis/interval.h"
-#include "autodiff/schedule/cost_estimate.h"
-#include "autodiff/schedule/distinct_nodes.h"
 #include "autodiff/sweeps/accumulation.h"
+#include "autodiff/sweeps/distinct_nodes.h"
+#include "autoschedule/cost_estimate.h"
 #include "frontend/language/var.h"
 #include "graph/define.h"
 #include "graph/function.h"

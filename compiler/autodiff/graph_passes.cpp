@@ -1,9 +1,11 @@
-#include "autodiff/schedule/graph_passes.h"
+#include "autodiff/graph_passes.h"
 
 #include <algorithm>
 
 #include "autodiff/derivative.h"
-#include "autodiff/schedule/default_schedule.h"
+#include "autoschedule/cut_reductions.h"
+#include "autoschedule/default_schedule.h"
+#include "graph/copy_graph.h"
 #include "graph/wrappers.h"
 
 namespace retrograde::ir {
@@ -21,12 +23,19 @@ std::vector<FuncPtr> with_adjoints(const std::vector<FuncPtr>& outputs) {
   return result;
 }
 
+std::vector<FuncPtr> with_cut_reductions(const std::vector<FuncPtr>& outputs) {
+  const std::vector<FuncPtr> copy = copy_graph(outputs).outputs;
+  cut_reductions(copy);
+  return copy;
+}
+
 }  // namespace
 
 const std::vector<GraphPass>& graph_passes() {
   static const std::vector<GraphPass> passes{
       {"propagate_adjoints", with_adjoints},
       {"apply_wrappers", apply_wrappers},
+      {"cut_reductions", with_cut_reductions},
       {"schedule_unscheduled",
        [](const std::vector<FuncPtr>& outputs) { return schedule_unscheduled(outputs); }}};
   return passes;

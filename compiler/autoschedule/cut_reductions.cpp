@@ -1,14 +1,14 @@
-#include "autodiff/schedule/cut_reductions.h"
+#include "autoschedule/cut_reductions.h"
 
 #include <algorithm>
 #include <utility>
 
-#include "autodiff/schedule/default_schedule.h"
+#include "autoschedule/new_loop.h"
+#include "autoschedule/stored_funcs.h"
 #include "frontend/language/func.h"
 #include "frontend/language/rdom.h"
 #include "frontend/schedule/stage.h"
 #include "graph/associative_update.h"
-#include "graph/copy_graph.h"
 #include "ir/build.h"
 #include "ir/visit.h"
 #include "simplify/simplify.h"
@@ -41,14 +41,17 @@ bool is_long_sum(const FuncContents& f, const Definition& update) {
 
 // Partial results of the update for each value of two of its loops, of which the first is lanes.
 void factor(Stage update, const RVar& lane, const RVar& row) {
-  const Var u(unique_name("lane")), v(unique_name("row"));
+  const FuncContents& f = *update.function();
+  const Var u(new_loop(f, update.index(), "lanes")), v(new_loop(f, update.index(), "parts"));
   Func parts = update.rfactor({{lane, u}, {row, v}});
   std::vector<VarOrRVar> order{u};
   for (const VarOrRVar& loop : parts.update().split_vars()) {
     if (loop.name() != u.name()) order.push_back(loop);
   }
-  parts.compute_root().vectorize(u, lanes_of_a_sum).parallel(v);
-  parts.update().reorder(order).vectorize(u, lanes_of_a_sum, TailStrategy::GuardWithIf).parallel(v);
+  parts.compute_root().parallel(v);
+  vectorize(Stage(parts.function(), 0), u, lanes_of_a_sum, TailStrategy::Auto);
+  parts.update().reorder(order).parallel(v);
+  vectorize(parts.update(), u, lanes_of_a_sum, TailStrategy::GuardWithIf);
 }
 
 // The loop that is cut into lanes, and the one whose iterations are tasks: itself, in blocks, where
@@ -62,10 +65,11 @@ void cut(const FuncPtr& f, int stage) {
     if (i != lanes && is_longer && extent_of(rvars[i]) >= short_loop) rows = i;
   }
   Stage update(f, stage);
-  const RVar all(rvars[lanes].var), lane(unique_name("lane")), group(unique_name("group"));
+  const RVar all(rvars[lanes].var), lane(new_loop(*f, stage, "lane")),
+      group(new_loop(*f, stage, "group"));
   RVar row(rvars[rows].var);
   if (rows == lanes) {
-    row = RVar(unique_name("block"));
+    row = RVar(new_loop(*f, stage, "block"));
     update.split(all, row, all, lanes_of_a_sum * terms, TailStrategy::GuardWithIf);
     update.split(all, all, lane, lanes_of_a_sum);
   } else {
@@ -79,18 +83,13 @@ void cut(const FuncPtr& f, int stage) {
 
 }  // namespace
 
-std::vector<FuncPtr> cut_reductions(const std::vector<FuncPtr>& outputs) {
-  std::vector<std::pair<const FuncContents*, int>> found;
+void cut_reductions(const std::vector<FuncPtr>& outputs) {
   for (const FuncPtr& f : topological_order(outputs)) {
     if (is_touched(*f) || f->is_extern()) continue;
     for (int s = 1; s < f->stage_count(); ++s) {
-      if (is_long_sum(*f, f->stage(s))) found.emplace_back(f.get(), s);
+      if (is_long_sum(*f, f->stage(s))) cut(f, s);
     }
   }
-  if (found.empty()) return outputs;
-  const GraphCopy copy = copy_graph(outputs);
-  for (const auto& [f, stage] : found) cut(copy.of.at(f), stage);
-  return copy.outputs;
 }
 
 }  // namespace retrograde::ir

@@ -1,4 +1,4 @@
-#include "autodiff/schedule/cost_estimate.h"
+#include "autoschedule/cost_estimate.h"
 
 #include <algorithm>
 

@@ -1,15 +1,14 @@
 // Iterations over elements. In  f(4 x + r), r < 8,  two iterations read each element: 8 / 4; in
 // f(r.x, r.y) one does; in f(x, r) of a stage over x, y and r as many as y has values.
-#include "autodiff/schedule/read_estimate.h"
+#include "autoschedule/read_estimate.h"
 
 #include <algorithm>
 #include <cmath>
 
 #include "analysis/linear.h"
-#include "autodiff/sweeps/local_derivative.h"
-#include "autodiff/sweeps/regions.h"
-#include "graph/function.h"
+#include "graph/own_reads.h"
 #include "ir/build.h"
+#include "ir/lets.h"
 #include "ir/visit.h"
 #include "simplify/simplify.h"
 

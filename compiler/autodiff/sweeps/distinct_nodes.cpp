@@ -1,4 +1,4 @@
-#include "autodiff/schedule/distinct_nodes.h"
+#include "autodiff/sweeps/distinct_nodes.h"
 
 #include "autodiff/sweeps/local_derivative.h"
 #include "ir/build.h"

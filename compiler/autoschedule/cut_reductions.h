@@ -15,8 +15,8 @@
 
 namespace retrograde::ir {
 
-// The outputs, or, where something is cut, those of a copy of the graph: long associative updates
-// of one element, of Funcs that nobody scheduled, are factored (rfactor.h).
-std::vector<FuncPtr> cut_reductions(const std::vector<FuncPtr>& outputs);
+// Factors long associative updates of one element (rfactor.h), of Funcs of this graph that nobody
+// scheduled.
+void cut_reductions(const std::vector<FuncPtr>& outputs);
 
 }  // namespace retrograde::ir

@@ -1,10 +1,9 @@
-#include "autodiff/schedule/register_tile.h"
+#include "autoschedule/register_tile.h"
 
 #include <algorithm>
 #include <unordered_set>
 
-#include "autodiff/sweeps/regions.h"
-#include "autodiff/updates/update_context.h"
+#include "graph/own_reads.h"
 #include "ir/build.h"
 #include "ir/visit.h"
 

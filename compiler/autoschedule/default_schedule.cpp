@@ -1,0 +1,174 @@
+#include "autoschedule/default_schedule.h"
+
+#include <algorithm>
+#include <optional>
+
+#include "autoschedule/cut_reductions.h"
+#include "autoschedule/new_loop.h"
+#include "autoschedule/stored_funcs.h"
+#include "diagnostics/large_stack.h"
+#include "frontend/language/func.h"
+#include "frontend/language/rdom.h"
+#include "frontend/schedule/stage.h"
+#include "graph/copy_graph.h"
+#include "graph/own_reads.h"
+#include "graph/wrappers.h"
+#include "ir/build.h"
+#include "ir/memory_reads.h"
+#include "ir/visit.h"
+
+namespace retrograde::ir {
+
+namespace {
+
+constexpr int lanes = 16;
+
+// A dimension beyond the first that runs along the rows of what a pure stage reads, while the
+// first one runs across them.
+std::optional<size_t> transposed_dimension(const FuncContents& f, const Definition& stage) {
+  std::optional<size_t> result;
+  if (!stage.rvars.empty() || f.args.size() < 2) return result;
+  for_each_expr(stage, [&](const Expr& root) {
+    walk(root, [&](const Expr& e) {
+      const auto* call = e.as<Call>();
+      if (!call || call->call_type == CallType::Operator || call->args.size() < 2) return true;
+      const bool across =
+          !uses_variable(call->args[0], f.args[0]) &&
+          std::any_of(call->args.begin() + 1, call->args.end(),
+                      [&](const Expr& arg) { return uses_variable(arg, f.args[0]); });
+      for (size_t d = 1; across && d < f.args.size(); ++d) {
+        if (is_pure_position(f, stage, d) && uses_variable(call->args[0], f.args[d])) result = d;
+      }
+      return true;
+    });
+  });
+  return result;
+}
+
+// f(places) += terms, where data decide the place along the first dimension, over a loop that is
+// worth vectors. Vectors of places and terms are computed; lowering adds them in the order of the
+// iterations (vectorize_loops.cpp), so that this is no race.
+bool scatters_in_order(const FuncContents& f, const Definition& stage) {
+  if (stage.rvars.empty() || stage.args.empty()) return false;
+  auto extent = as_const_int(stage.rvars[0].extent);
+  if (extent && *extent < lanes) return false;
+  if (!reads_memory(stage.args[0], MemoryReads::Functions)) return false;
+  return std::all_of(stage.values.begin(), stage.values.end(), [&](const Expr& value) {
+    const auto* sum = value.as<Add>();
+    return sum && is_old_value(sum->a, f, stage) && !calls(sum->b, &f);
+  });
+}
+
+// The directives of one stage of a Func that is computed at root. Pure dimensions only: their
+// iterations are independent whatever the stage does.
+class LoopChooser {
+ public:
+  LoopChooser(const FuncPtr& f, int stage, const VectorUnit& unit)
+      : f_(*f), index_(stage), stage_(f, stage), unit_(unit) {
+    for (size_t d = 0; d < f_.args.size(); ++d) {
+      if (is_pure_position(f_, definition(), d)) pure_.push_back(d);
+    }
+  }
+
+  void give() {
+    const bool scatters = scatters_in_order(f_, definition());
+    if (scatters) {
+      stage_.allow_race_conditions();
+      vectorize(stage_, RVar(definition().rvars[0].var), lanes, TailStrategy::GuardWithIf);
+    }
+    if (pure_.empty()) return;
+    if (auto d = pure_[0] == 0 ? transposed_dimension(f_, definition()) : std::nullopt)
+      return tile(*d);
+    if (!scatters && pure_[0] == 0 && tile_in_registers()) return;
+    const bool reduces = !definition().rvars.empty();
+    if (pure_.size() > 1 || (reduces && pure_[0] != 0)) stage_.parallel(variable_of(pure_.back()));
+    // Few private parts may be left where the target is large.
+    if (f_.made && f_.made->has_parts && pure_.size() > 1 && pure_[pure_.size() - 2] != 0)
+      stage_.parallel(variable_of(pure_[pure_.size() - 2]));
+    if (pure_[0] != 0) return;
+    vectorize(stage_, variable_of(0), lanes, TailStrategy::GuardWithIf);
+    if (pure_.size() == 1 && reduces) stage_.parallel(variable_of(0));  // of the vectors
+  }
+
+ private:
+  const Definition& definition() const { return f_.stage(index_); }
+  Var variable_of(size_t dimension) const { return Var(f_.args[dimension]); }
+  Var inside(const Var& loop) const { return Var(inner_loop(f_, index_, loop.name())); }
+
+  // Whether there is a tile. Its loops stand inside of those of the reduction; those over tiles
+  // outside, of the sides first, so that what the last dimensions run over stays in the cache.
+  bool tile_in_registers() {
+    const bool has_lanes = f_.made && f_.made->lanes > 0;
+    const auto tile = register_tile(f_, definition(), lanes, has_lanes ? 1 : 4, unit_);
+    if (!tile) return false;
+    std::vector<VarOrRVar> inner, outer;
+    const auto cut = [&](size_t d, int64_t size) {
+      const Var all = variable_of(d), part = inside(all);
+      stage_.split(all, all, part, Expr(static_cast<int>(size)), TailStrategy::GuardWithIf);
+      inner.push_back(part);
+      outer.push_back(all);
+    };
+    cut(0, tile->vectors * lanes);
+    for (const RegisterTile::Side& side : tile->sides) cut(side.dimension, side.size);
+    std::vector<VarOrRVar> order = inner;
+    for (const ReductionVariable& r : definition().rvars) order.push_back(RVar(r.var));
+    for (size_t d : pure_) {
+      const Var all = variable_of(d);
+      if (std::none_of(outer.begin(), outer.end(),
+                       [&](const VarOrRVar& cut) { return cut.name() == all.name(); }))
+        outer.push_back(all);
+    }
+    order.insert(order.end(), outer.begin(), outer.end());
+    stage_.reorder(order);
+    if (tile->vectors > 1) {
+      const Var vector(new_loop(f_, index_, "vector"));
+      stage_.split(inner[0], inner[0], vector, lanes).vectorize(vector).unroll(inner[0]);
+    } else {
+      stage_.vectorize(inner[0]);
+    }
+    for (size_t i = 1; i < inner.size(); ++i) stage_.unroll(inner[i]);
+    stage_.parallel(outer.back());
+    if (outer.size() > 2) stage_.parallel(outer[outer.size() - 2]);  // the last may be short
+    return true;
+  }
+
+  // Squares, whose rows stay in the cache until their columns are read.
+  void tile(size_t dimension) {
+    const Var x = variable_of(0), y = variable_of(dimension), xi = inside(x);
+    stage_.split(x, x, xi, lanes, TailStrategy::GuardWithIf);
+    const Var yi = inside(y);
+    stage_.split(y, y, yi, lanes, TailStrategy::GuardWithIf).reorder(xi, yi, x, y).vectorize(xi);
+    stage_.parallel(variable_of(pure_.back()));
+  }
+
+  const FuncContents& f_;
+  const int index_;
+  Stage stage_;
+  const VectorUnit& unit_;
+  std::vector<size_t> pure_;  // dimensions
+};
+
+}  // namespace
+
+void give_default_schedule(const std::vector<FuncPtr>& outputs, const VectorUnit& unit) {
+  if (!is_differentiated(outputs)) return;
+  cut_reductions(outputs);
+  for (const FuncPtr& f : stored_by_default(outputs)) {
+    Func(f).compute_root();
+    for (int s = 0; s < f->stage_count(); ++s) LoopChooser(f, s, unit).give();
+  }
+}
+
+std::vector<FuncPtr> schedule_unscheduled(const std::vector<FuncPtr>& outputs,
+                                          const VectorUnit& unit) {
+  std::vector<FuncPtr> result;
+  run_on_large_stack([&] {
+    result = apply_wrappers(outputs);
+    if (!is_differentiated(result)) return;
+    result = copy_graph(result).outputs;
+    give_default_schedule(result, unit);
+  });
+  return result;
+}
+
+}  // namespace retrograde::ir

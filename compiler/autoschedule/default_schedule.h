@@ -1,0 +1,27 @@
+// default_schedule.h -- a sane schedule for Funcs that differentiation made and that nobody
+// scheduled: directives such as a user would give, each in its Func's log (graph/schedule_log.h).
+//
+// Sums to one element are cut into lanes and rows (cut_reductions.h). What is stored
+// (stored_funcs.h) is computed at root, its innermost dimension vectorized, its outermost run in
+// parallel; a stage that reads across rows is tiled; a reduction keeps a tile of its sums in
+// registers (register_tile.h); a scatter along its reduction domain computes places and terms in
+// vectors.
+#pragma once
+
+#include <vector>
+
+#include "autoschedule/register_tile.h"
+#include "graph/function.h"
+
+namespace retrograde::ir {
+
+// Gives the directives to the Funcs of this graph, whose wrappers have been applied. A pipeline
+// without adjoints is left as it is.
+void give_default_schedule(const std::vector<FuncPtr>& outputs, const VectorUnit& unit = {});
+
+// The pass: the outputs with their wrappers applied, or, where there are adjoints, those of a copy
+// of the graph that has its schedule. What lowering is given.
+std::vector<FuncPtr> schedule_unscheduled(const std::vector<FuncPtr>& outputs,
+                                          const VectorUnit& unit = {});
+
+}  // namespace retrograde::ir

@@ -1,0 +1,147 @@
+#include "autoschedule/stored_funcs.h"
+
+#include <algorithm>
+#include <unordered_map>
+#include <unordered_set>
+
+#include "autoschedule/cost_estimate.h"
+#include "autoschedule/read_estimate.h"
+#include "graph/own_reads.h"
+#include "ir/build.h"
+#include "ir/visit.h"
+
+namespace retrograde::ir {
+
+namespace {
+
+// Operations up to which a Func that the user left alone in a schedule by hand is inlined.
+constexpr double explosion = 500;
+constexpr int64_t unknown_iterations = 8;
+
+struct Use {
+  double reads = 0;
+  double operations = 0;  // of one value, with what is inlined into it
+};
+
+// Beyond the first, each read computes the value again: more than a few operations, and all
+// together more than it takes to bring the value to memory and back.
+bool is_worth_storing(const Use& use, double free_operations) {
+  return use.reads > 1.5 && use.operations > free_operations &&
+         (use.reads - 1) * use.operations > way_to_memory;
+}
+
+// Whether an element takes others of the Func: an update writes where its reduction variables or
+// data say. Inside of the loops of who reads it, all of them would be computed for each read.
+bool computes_more_than_is_read(const FuncContents& f) {
+  return std::any_of(f.updates.begin(), f.updates.end(), [&](const Definition& update) {
+    for (size_t d = 0; d < f.args.size(); ++d) {
+      if (!is_pure_position(f, update, d) && !is_const(update.args[d])) return true;
+    }
+    return false;
+  });
+}
+
+bool is_adjoint(const FuncPtr& f) { return f->made.has_value(); }
+
+class StorageChooser {
+ public:
+  explicit StorageChooser(const std::vector<FuncPtr>& outputs)
+      : outputs_(outputs), order_(topological_order(outputs)) {}
+
+  std::vector<FuncPtr> choose() {
+    if (std::none_of(order_.begin(), order_.end(), is_adjoint)) return {};
+    for (const FuncPtr& f : order_) count_reads(*f);
+    const bool by_hand = std::any_of(order_.begin(), order_.end(), [](const FuncPtr& f) {
+      return !is_adjoint(f) && is_touched(*f);
+    });
+    std::vector<FuncPtr> result;
+    for (const FuncPtr& f : order_) {  // producers first: the cost of what is inlined is known
+      uses_[f.get()].operations = operations(*f);
+      if (is_touched(*f)) continue;
+      // Who schedules the primal means an untouched primal Func to be inlined, unless that
+      // explodes.
+      const bool left_inline = by_hand && !is_adjoint(f);
+      bool stored =
+          is_worth_storing(uses_[f.get()], left_inline && f->is_pure() ? explosion : cheap);
+      stored |= left_inline ? computes_more_than_is_read(*f) : is_output(f) || !f->is_pure();
+      if (!stored) continue;
+      stored_.insert(f.get());
+      result.push_back(f);
+    }
+    return result;
+  }
+
+ private:
+  bool is_output(const FuncPtr& f) const {
+    return std::find(outputs_.begin(), outputs_.end(), f) != outputs_.end();
+  }
+
+  void count_reads(const FuncContents& f) {
+    for (int s = 0; s < f.stage_count(); ++s) {
+      walk_definition(f.stage(s), [&](const Expr& e) {
+        const auto* call = e.as<Call>();
+        if (call && call->call_type == CallType::Func && call->symbol.raw() != &f)
+          uses_[call->symbol.raw()].reads += reads_an_element(*call, f, f.stage(s));
+      });
+    }
+  }
+
+  // Of an element, when nothing is stored.
+  double operations(const FuncContents& f) const {
+    double total = f.is_extern() ? 0 : operations(*f.pure);
+    for (const Definition& update : f.updates) {
+      double iterations = 1;
+      for (const ReductionVariable& r : update.rvars)
+        iterations *= static_cast<double>(as_const_int(r.extent).value_or(unknown_iterations));
+      total += operations(update) * iterations;
+    }
+    return total;
+  }
+  double operations(const Definition& stage) const {
+    double total = 0;
+    std::unordered_set<const ExprNode*> seen;
+    for (const Expr& value : stage.values) {
+      walk(value, [&](const Expr& e) {
+        if (!seen.insert(e.get()).second) return false;
+        total += cost_of(e);
+        return true;
+      });
+    }
+    return total;
+  }
+  double cost_of(const Expr& e) const {
+    const auto* call = e.as<Call>();
+    if (!call || call->call_type != CallType::Func) return operations_of(e);
+    auto found = uses_.find(call->symbol.raw());
+    auto callee = std::dynamic_pointer_cast<FuncContents>(call->symbol.lock());
+    bool stored = !callee || !callee->is_pure() || stored_.contains(callee.get()) ||
+                  callee->schedule.compute_level.kind != LoopLevel::Kind::Inlined;
+    return stored || found == uses_.end() ? 1 : found->second.operations;
+  }
+
+  const std::vector<FuncPtr>& outputs_;
+  const std::vector<FuncPtr> order_;
+  std::unordered_map<const Symbol*, Use> uses_;
+  std::unordered_set<const FuncContents*> stored_;
+};
+
+}  // namespace
+
+bool is_touched(const FuncContents& f) {
+  if (f.schedule.is_given) return true;
+  for (int s = 0; s < f.stage_count(); ++s) {
+    if (f.stage(s).schedule.is_given) return true;
+  }
+  return false;
+}
+
+bool is_differentiated(const std::vector<FuncPtr>& outputs) {
+  const std::vector<FuncPtr> order = topological_order(outputs);
+  return std::any_of(order.begin(), order.end(), is_adjoint);
+}
+
+std::vector<FuncPtr> stored_by_default(const std::vector<FuncPtr>& outputs) {
+  return StorageChooser(outputs).choose();
+}
+
+}  // namespace retrograde::ir

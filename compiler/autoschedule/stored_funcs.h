@@ -1,0 +1,26 @@
+// stored_funcs.h -- which of the Funcs that nobody scheduled are computed at root, not inlined.
+//
+// Inlining an adjoint into every reader multiplies work: a chain of n stencils with k taps costs
+// k^n. So, in a pipeline that contains adjoints, an untouched Func is computed at root when it
+// reduces, scatters, or costs more to compute again at its reads (read_estimate.h) than a way to
+// memory and back does. That goes for primal Funcs too, which both directions read. A directive of
+// the user on a Func or one of its stages switches this off for that Func. Where the user scheduled
+// part of the primal, its other pure Funcs stay inline unless that explodes; but a scan, and a
+// reduction that is read again and again, is stored: inside of the loops of who reads it, all of it
+// would run for each element.
+#pragma once
+
+#include <vector>
+
+#include "graph/function.h"
+
+namespace retrograde::ir {
+
+// Whether a directive was given to it or to one of its stages.
+bool is_touched(const FuncContents& f);
+bool is_differentiated(const std::vector<FuncPtr>& outputs);  // whether an adjoint is among them
+
+// Producers before consumers. None in a pipeline without adjoints: it is left as it is.
+std::vector<FuncPtr> stored_by_default(const std::vector<FuncPtr>& outputs);
+
+}  // namespace retrograde::ir
