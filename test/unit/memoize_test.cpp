@@ -261,6 +261,23 @@ TEST_F(Memoize, StorageLargerThanWhatIsComputed) {
   }
 }
 
+// What RoundUp computes beyond what is read are no values of the Func: its producer is not computed there.
+TEST_F(Memoize, StorageThatASplitRoundsUp) {
+  Var x("x"), xo("xo"), xi("xi");
+  Func source("source"), f("f"), g("g");
+  source(x) = x * 3;
+  f(x) = counted(source(x));
+  const int before = calls;
+  g(x) = f(x) + 1;
+  source.compute_root();
+  f.compute_root().split(x, xo, xi, 16, TailStrategy::RoundUp).memoize();
+  for (const int width : {3, 13, 16, 3}) {
+    Buffer<int> result = g.realize({width});
+    for (int i = 0; i < width; i++) ASSERT_EQ(result(i), 3 * i + 1) << width << " " << i;
+  }
+  EXPECT_EQ(calls - before, 3 * 16);
+}
+
 TEST_F(Memoize, BoundsThatAreAligned) {
   for (const bool extent_only : {false, true}) {
     Var x("x");

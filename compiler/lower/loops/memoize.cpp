@@ -3,7 +3,7 @@
 // Out: Loops.
 //
 //   realize f [min, extent] {         realize f [min, extent] {
-//     produce f { P }                   let key = pack("pipeline", "f", target, k, min, extent ...)
+//     produce f { P }                   let key = pack("pipeline", "f", target, k, min, max ...)
 //     consume f { C }           =>      let missing = lookup(key, &f(min), 4 extent)
 //   }                                   if (missing) { produce f { P }  store(key, ...) }
 //                                       consume f { C }
@@ -11,7 +11,7 @@
 //
 // Method: the key names the compiled function, the Func, and holds the values of the Params that it
 //         depends on (found through all Funcs that it calls), what memoize_tag puts in place of an
-//         expression, and the region that is computed. What is kept is the whole storage.
+//         expression, and the region that is read. What is kept is the whole storage.
 // Errors: a memoized Func that reads an ImageParam without memoize_tag; one that is stored outside
 //         of where it is computed; a tag or eviction key that depends on Vars.
 // Source: Halide's documentation of memoize and memoize_tag. Tests: test/unit/memoize_test.cpp.
@@ -29,7 +29,11 @@ namespace {
 
 bool is_memoized(const LoopedFunc* f) { return f && f->schedule.memoized; }
 
-constexpr const char* computed_extent_mark = ".computed.extent.";
+constexpr const char* key_mark = ".key.";
+
+std::string key_name(const std::string& func, const char* side, size_t dimension) {
+  return text(func, key_mark, side, dimension);
+}
 
 // ---- what a key is made of ----
 
@@ -136,16 +140,16 @@ void check_schedule(const LoopedFunc& f) {
              "Leave store_at and store_root out");
 }
 
-// The region that storage is larger than, if it is: see `NestStorage::realize`.
-class ComputedExtents {
+// The lets of `with_key_region`.
+class KeyRegions {
  public:
   void note(const std::string& let) {
-    const size_t at = let.find(computed_extent_mark);
-    if (at != std::string::npos) lets_[let.substr(0, let.find(".$", at))] = let;
+    if (let.find(key_mark) != std::string::npos) lets_[let.substr(0, let.find(".$"))] = let;
   }
-  Expr of(const LoopedFunc& f, size_t dimension, const Expr& stored) const {
-    const auto it = lets_.find(computed_extent_name(f.name(), dimension));
-    return it == lets_.end() ? stored : variable(it->second);
+  Expr of(const LoopedFunc& f, const char* side, size_t dimension) const {
+    const auto it = lets_.find(key_name(f.name(), side, dimension));
+    RETROGRADE_ASSERT(it != lets_.end(), "no key of ", f.name());
+    return variable(it->second);
   }
 
  private:
@@ -166,7 +170,7 @@ class Memoizer : public Rewriter {
 
   Stmt rewrite(const Stmt& s) override {
     if (const Realize* n = s.as<Realize>()) bounds_[n->name] = n->bounds;
-    if (const LetStmt* n = s.as<LetStmt>()) computed_.note(n->name);
+    if (const LetStmt* n = s.as<LetStmt>()) regions_.note(n->name);
     const ProducerConsumer* n = s.as<ProducerConsumer>();
     const LoopedFunc* f = n && n->produces ? program_.find(n->name) : nullptr;
     if (!is_memoized(f)) return children(s);
@@ -175,12 +179,12 @@ class Memoizer : public Rewriter {
   }
 
  private:
-  std::vector<Expr> key_of(const LoopedFunc& f, const std::vector<Range>& bounds) {
+  std::vector<Expr> key_of(const LoopedFunc& f) {
     std::vector<Expr> key = bytes_of(function_ + "\n" + f.name() + "\n" + target_.to_string());
     for (const Expr& part : Dependencies(f).parts) key.push_back(part);
-    for (size_t d = 0; d < bounds.size(); d++) {
-      key.push_back((*this)(bounds[d].min));
-      key.push_back((*this)(computed_.of(f, d, bounds[d].extent)));
+    for (size_t d = 0; d < f.func->args.size(); d++) {
+      key.push_back(regions_.of(f, "min.", d));
+      key.push_back(regions_.of(f, "max.", d));
     }
     return key;
   }
@@ -210,7 +214,7 @@ class Memoizer : public Rewriter {
                                {call_func(name, type, first, static_cast<int>(i), {})}));
       sizes.push_back(elements * make_const(Int(64), type.bytes()));
     }
-    const Expr key = call_op(Op::pack, Handle(), key_of(f, bounds));
+    const Expr key = call_op(Op::pack, Handle(), key_of(f));
     const std::string prefix = name + ".memoization";
     const std::vector<Expr> what = {variable(prefix + "_key", Handle()), Expr(key_bytes(key)),
                                     Expr(static_cast<int32_t>(blocks.size())),
@@ -253,7 +257,7 @@ class Memoizer : public Rewriter {
   const Target& target_;
   const StorageFolds& folds_;
   std::map<std::string, std::vector<Range>> bounds_;
-  ComputedExtents computed_;
+  KeyRegions regions_;
 };
 
 bool any_memoized(const Program& program) {
@@ -265,8 +269,12 @@ bool any_memoized(const Program& program) {
 
 }  // namespace
 
-std::string computed_extent_name(const std::string& func, size_t dimension) {
-  return func + computed_extent_mark + std::to_string(dimension);
+Stmt with_key_region(const std::string& func, const Box& read, Stmt storage) {
+  for (size_t d = read.size(); d-- > 0;) {
+    storage = make_let(key_name(func, "max.", d), read[d].max, storage);
+    storage = make_let(key_name(func, "min.", d), read[d].min, storage);
+  }
+  return storage;
 }
 
 Stmt memoize(const Stmt& s, const Program& program, const std::string& function,

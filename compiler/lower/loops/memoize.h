@@ -4,6 +4,7 @@
 #include <map>
 #include <string>
 
+#include "analysis/interval.h"
 #include "ir/target.h"
 #include "lower/program.h"
 
@@ -12,9 +13,9 @@ namespace retrograde::ir {
 // By original name: what each dimension of its storage folds by, undefined where it does not.
 using StorageFolds = std::map<std::string, std::vector<Expr>>;
 
-// The let around the storage of a memoized Func that holds how much of it is computed, where
-// bound_storage or align_storage make it larger.
-std::string computed_extent_name(const std::string& func, size_t dimension);
+// `storage` of a memoized Func, with the region that its consumers read of it, which a key names.
+// Storage may be larger: what a rounded split computes beyond holds no values of the Func.
+Stmt with_key_region(const std::string& func, const Box& read, Stmt storage);
 
 // `function`: what is compiled.
 Stmt memoize(const Stmt& s, const Program& program, const std::string& function,

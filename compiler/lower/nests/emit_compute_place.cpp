@@ -3,6 +3,7 @@
 
 #include "ir/build.h"
 #include "ir/visit.h"
+#include "lower/loops/memoize.h"
 #include "lower/nests/nest_checks.h"
 #include "lower/nests/nest_emitter.h"
 #include "lower/nests/promised_bounds.h"
@@ -61,7 +62,10 @@ Stmt NestEmitter::assemble(const std::vector<Piece>& pieces, Stmt stmt, const Em
       if (stmt.defined()) stmt = make_producer_consumer((*f)->name(), false, stmt);
     }
     stmt = make_block({running_from(piece.lead, produce, code, site), stmt});
-    for (const auto& [f, box] : piece.realized) stmt = storage_.realize(*f, box, stmt);
+    for (const auto& [f, required, allocated] : piece.realized) {
+      stmt = storage_.realize(*f, allocated, stmt);
+      if (f->schedule.memoized) stmt = with_key_region(f->name(), required, stmt);
+    }
   }
   return stmt;
 }
@@ -196,7 +200,7 @@ void NestEmitter::keep(Member& member, Box allocated, Emitted& code, Emitted& ma
   if (f.schedule.async && !member.loops.empty())
     storage_.note_async_room(f, member.slides, site.touched(touched));
   if (is_stored_where_computed(f)) {
-    piece.realized.emplace_back(&f, allocated);
+    piece.realized.push_back({&f, member.required, allocated});
     storage_.note_place(f, allocated, code.storage);
   } else {
     code.storage[f.name()] = hull(code.storage[f.name()], allocated);

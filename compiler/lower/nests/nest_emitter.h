@@ -61,13 +61,18 @@ class NestEmitter {
     Box touched = {};  // of its storage, beside what is computed
   };
 
+  struct Realized {
+    const LoopedFunc* f;
+    Box required, allocated;
+  };
+
   // A group's part of the site:
   //   realize { if (lead) produce f; consume f { what came before } }
   struct Piece {
     Stmt produce;
     int lead = 0;
     std::vector<const LoopedFunc*> funcs;
-    std::vector<std::pair<const LoopedFunc*, Box>> realized;
+    std::vector<Realized> realized;
   };
 
   // From how many iterations before the loop's first on a Func is wanted: by the first and by the

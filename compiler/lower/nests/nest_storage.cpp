@@ -3,7 +3,6 @@
 #include <algorithm>
 
 #include "ir/build.h"
-#include "lower/loops/memoize.h"
 #include "lower/nests/copy_statement.h"
 #include "lower/nests/nest_checks.h"
 #include "simplify/simplify.h"
@@ -156,21 +155,15 @@ void NestStorage::note_folds(const LoopedFunc& f, std::vector<Fold> folds) {
 Stmt NestStorage::realize(const LoopedFunc& f, const Box& box, Stmt stmt) {
   std::vector<Range> ranges;
   std::vector<Stmt> checks;
-  std::vector<std::pair<std::string, Expr>> extents;  // of what a key says
   for (size_t d = 0; d < box.size(); d++) {
     Range range{box[d].min, simplify(box[d].max - box[d].min + 1)};
     Expr& factor = folds_.at(f.name())[d].factor;
     auto extent = as_const_int(range.extent), fold = as_const_int(factor.defined() ? factor : 0);
     if (extent && fold && *extent <= *fold) factor = Expr();  // nothing to gain
-    const Expr computed = range.extent;
     if (const StorageRule* rule = rule_of(f, d)) apply(*rule, f, d, range, factor, checks);
-    if (f.schedule.memoized && !computed.same_as(range.extent))
-      extents.emplace_back(computed_extent_name(f.name(), d), computed);
     ranges.push_back(range);
   }
-  Stmt storage = make_realize(f.name(), f.func->types, f.schedule.memory, ranges, stmt);
-  for (const auto& [name, extent] : extents) storage = make_let(name, extent, storage);
-  checks.push_back(storage);
+  checks.push_back(make_realize(f.name(), f.func->types, f.schedule.memory, ranges, stmt));
   return make_block(checks);
 }
 
