@@ -5,6 +5,7 @@
 
 #include "autoschedule/cut_reductions.h"
 #include "autoschedule/new_loop.h"
+#include "autoschedule/scatter_schedule.h"
 #include "autoschedule/stored_funcs.h"
 #include "diagnostics/large_stack.h"
 #include "frontend/language/func.h"
@@ -23,6 +24,15 @@ namespace {
 
 constexpr int lanes = 16;
 
+// The dimension along which what is read lies next to each other in memory.
+size_t innermost_dimension(const Call& call) {
+  const FuncPtr callee = call.call_type == CallType::Func ? func_of(call) : nullptr;
+  if (!callee || callee->schedule.storage_dims.empty()) return 0;
+  const auto& args = callee->args;
+  const auto found = std::find(args.begin(), args.end(), callee->schedule.storage_dims[0]);
+  return static_cast<size_t>(found - args.begin()) % args.size();
+}
+
 // A dimension beyond the first that runs along the rows of what a pure stage reads, while the
 // first one runs across them.
 std::optional<size_t> transposed_dimension(const FuncContents& f, const Definition& stage) {
@@ -32,31 +42,18 @@ std::optional<size_t> transposed_dimension(const FuncContents& f, const Definiti
     walk(root, [&](const Expr& e) {
       const auto* call = e.as<Call>();
       if (!call || call->call_type == CallType::Operator || call->args.size() < 2) return true;
-      const bool across =
-          !uses_variable(call->args[0], f.args[0]) &&
-          std::any_of(call->args.begin() + 1, call->args.end(),
-                      [&](const Expr& arg) { return uses_variable(arg, f.args[0]); });
+      const Expr& row = call->args[innermost_dimension(*call)];
+      const bool across = !uses_variable(row, f.args[0]) &&
+                          std::any_of(call->args.begin(), call->args.end(), [&](const Expr& arg) {
+                            return uses_variable(arg, f.args[0]);
+                          });
       for (size_t d = 1; across && d < f.args.size(); ++d) {
-        if (is_pure_position(f, stage, d) && uses_variable(call->args[0], f.args[d])) result = d;
+        if (is_pure_position(f, stage, d) && uses_variable(row, f.args[d])) result = d;
       }
       return true;
     });
   });
   return result;
-}
-
-// f(places) += terms, where data decide the place along the first dimension, over a loop that is
-// worth vectors. Vectors of places and terms are computed; lowering adds them in the order of the
-// iterations (vectorize_loops.cpp), so that this is no race.
-bool scatters_in_order(const FuncContents& f, const Definition& stage) {
-  if (stage.rvars.empty() || stage.args.empty()) return false;
-  auto extent = as_const_int(stage.rvars[0].extent);
-  if (extent && *extent < lanes) return false;
-  if (!reads_memory(stage.args[0], MemoryReads::Functions)) return false;
-  return std::all_of(stage.values.begin(), stage.values.end(), [&](const Expr& value) {
-    const auto* sum = value.as<Add>();
-    return sum && is_old_value(sum->a, f, stage) && !calls(sum->b, &f);
-  });
 }
 
 // The directives of one stage of a Func that is computed at root. Pure dimensions only: their
@@ -72,10 +69,7 @@ class LoopChooser {
 
   void give() {
     const bool scatters = scatters_in_order(f_, definition());
-    if (scatters) {
-      stage_.allow_race_conditions();
-      vectorize(stage_, RVar(definition().rvars[0].var), lanes, TailStrategy::GuardWithIf);
-    }
+    if (scatters) schedule_scatter_in_order(f_, index_, stage_);
     if (pure_.empty()) return;
     if (auto d = pure_[0] == 0 ? transposed_dimension(f_, definition()) : std::nullopt)
       return tile(*d);
@@ -155,6 +149,10 @@ void give_default_schedule(const std::vector<FuncPtr>& outputs, const VectorUnit
   cut_reductions(outputs);
   for (const FuncPtr& f : stored_by_default(outputs)) {
     Func(f).compute_root();
+    if (const auto lanes = scatter_lanes(*f)) {
+      schedule_scatter_lanes(f, *lanes);
+      continue;
+    }
     for (int s = 0; s < f->stage_count(); ++s) LoopChooser(f, s, unit).give();
   }
 }

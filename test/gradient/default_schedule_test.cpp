@@ -178,6 +178,71 @@ void expect_sums_in_lanes(int side, Type in) {
   });
 }
 
+// A warp: each pixel reads four corners of a cell that a flow names, in every channel.
+struct Warp {
+  static constexpr int width = 37, height = 29;
+  Buffer<float> image, flow{width, height, 2};
+  Var x{"x"}, y{"y"}, c{"c"};
+  Func warped{"warped"}, loss{"loss"};
+
+  explicit Warp(int channels) : image(width, height, channels) {
+    int seed = 0;
+    const auto fill = [&](float& v) { v = static_cast<float>(++seed * 7919 % 1009) / 127 - 4; };
+    image.for_each_value(fill);
+    flow.for_each_value(fill);
+    const Expr u = clamp(x + flow(x, y, 0), 0.0f, width - 1.0f);
+    const Expr v = clamp(y + flow(x, y, 1), 0.0f, height - 1.0f);
+    const Expr i = min(cast<int>(u), width - 2), j = min(cast<int>(v), height - 2);
+    warped(x, y, c) = lerp(lerp(image(i, j, c), image(i + 1, j, c), u - i),
+                           lerp(image(i, j + 1, c), image(i + 1, j + 1, c), u - i), v - j);
+    RDom r(0, width, 0, height, 0, channels);
+    loss() += warped(r.x, r.y, r.z) * (r.x + 2 * r.y - r.z);
+  }
+  // By the image, added up in double.
+  std::vector<double> expected() const {
+    std::vector<double> sums(image.number_of_elements());
+    const size_t plane = width * height;
+    for (int channel = 0; channel < image.channels(); channel++) {
+      for (int py = 0; py < height; py++) {
+        for (int px = 0; px < width; px++) {
+          const double u = std::clamp(px + flow(px, py, 0), 0.0f, width - 1.0f);
+          const double v = std::clamp(py + flow(px, py, 1), 0.0f, height - 1.0f);
+          const int i = std::min(static_cast<int>(u), width - 2);
+          const int j = std::min(static_cast<int>(v), height - 2);
+          for (const int corner : {0, 1, 2, 3}) {
+            const double across = corner % 2 ? u - i : 1 - (u - i);
+            const double down = corner / 2 ? v - j : 1 - (v - j);
+            sums[channel * plane + (j + corner / 2) * width + i + corner % 2] +=
+                across * down * (px + 2 * py - channel);
+          }
+        }
+      }
+    }
+    return sums;
+  }
+};
+
+TEST_F(DefaultSchedule, CornersOfACellAreTapsOfOneScatter) {
+  for (const int channels : {1, 3, 4, 17, 24, 70}) {
+    SCOPED_TRACE(channels);
+    Warp warp(channels);
+    Derivative d = propagate_adjoints(warp.loss);
+    Func adjoint = d(warp.image);
+    size_t scatters = 0;
+    for (const ir::FuncPtr& f : ir::topological_order({adjoint.function()})) {
+      for (const ir::Definition& update : f->updates)
+        scatters += update.rvars.size() > 2 && update.rvars.back().var.rfind("tap", 0) == 0;
+    }
+    EXPECT_EQ(scatters, 1u);
+    const std::vector<double> expected = warp.expected();
+    Buffer<float> found = adjoint.realize({Warp::width, Warp::height, channels});
+    for (size_t i = 0; i < expected.size(); i++) {
+      ASSERT_NEAR(found.data()[i], expected[i], 1e-4 * std::max(std::fabs(expected[i]), 100.0))
+          << "element " << i;
+    }
+  }
+}
+
 TEST_F(DefaultSchedule, SmallKernelsOfManyChannelsAreSummedInLanes) {
   expect_sums_in_lanes(70, Float(64));
 }

@@ -11,6 +11,7 @@
 #include "graph/directive.h"
 #include "graph/function.h"
 #include "ir/build.h"
+#include "ir/equal.h"
 #include "ir/print.h"
 #include "ir/variables.h"
 #include "simplify/simplify.h"
@@ -38,6 +39,8 @@ constexpr double private_bytes = 64 << 20;
 constexpr double few_elements = 64, many_iterations = 4096, unknown_elements = 1e9;
 // Iterations from which on lanes of their own are worth setting to zero and adding up.
 constexpr double lanes_pay = 16 * lane_count;
+// Taps of one update: the schedule unrolls them.
+constexpr size_t most_taps = 16;
 
 bool is_pointwise(const Gather& g) {
   return !g.rdom && !g.scatters &&
@@ -84,10 +87,17 @@ Expr masked(const Expr& predicate, const Expr& value) {
   return make_select(condition, value, make_zero(value.type()));
 }
 
+// One place of an update, as one corner of a cell between which a pixel is read.
+struct Tap {
+  std::vector<Expr> place;
+  Expr predicate;
+  std::vector<Expr> sums;  // one a value; undefined: nothing is added
+};
+
 // Contributions that can share one update definition.
 struct UpdateGroup {
-  Gather gather;
-  std::vector<Expr> sums;  // one a value; undefined: nothing is added
+  Gather gather;          // of the first tap
+  std::vector<Tap> taps;  // several in scatters only
 };
 
 // Whether elements between those that it reaches stay 0.
@@ -120,7 +130,7 @@ std::string shape_of(const Gather& g) {
 }
 
 Expr rename_rdom(const Expr& e, const Gather& from, const Gather& to) {
-  if (!from.rdom || from.rdom == to.rdom) return e;
+  if (!e.defined() || !from.rdom || from.rdom == to.rdom) return e;
   Substitution names;
   for (size_t i = 0; i < from.rdom->vars.size(); ++i) {
     names[from.rdom->vars[i].var] = variable(to.rdom->vars[i].var, Int(32), SymbolRef(to.rdom));
@@ -134,22 +144,119 @@ std::vector<UpdateGroup> group_updates(const std::vector<Contribution>& contribu
   std::map<std::string, size_t> index;
   for (const Contribution& c : contributions) {
     if (is_pointwise(c.gather)) continue;
-    auto [it, is_new] = index.try_emplace(shape_of(c.gather), groups.size());
-    if (is_new) groups.push_back({c.gather, std::vector<Expr>(values)});
+    const Gather& g = c.gather;
+    auto [it, is_new] = index.try_emplace(shape_of(g), groups.size());
+    if (is_new) groups.push_back({g, {{g.lhs, g.predicate, std::vector<Expr>(values)}}});
     UpdateGroup& group = groups[it->second];
-    Expr& sum = group.sums[static_cast<size_t>(c.component)];
-    Expr term = rename_rdom(c.adjoint, c.gather, group.gather);
+    Expr& sum = group.taps[0].sums[static_cast<size_t>(c.component)];
+    Expr term = rename_rdom(c.adjoint, g, group.gather);
     sum = sum.defined() ? sum + term : term;
   }
   return groups;
 }
 
-bool has_pure_dimension(const Gather& g) {
-  return std::find(g.pure.begin(), g.pure.end(), true) != g.pure.end();
+// What scatters must agree on to be taps of one update: the domain, and which dimensions are pure.
+std::string domain_of(const Gather& g) {
+  std::string key;
+  for (const ReductionVariable& r : g.rdom->vars) key += print(r.min) + ":" + print(r.extent) + ";";
+  for (size_t d = 0; d < g.pure.size(); ++d) key += g.pure[d] ? print(g.lhs[d]) + "," : "?,";
+  return key;
 }
 
-std::vector<ReductionVariable> rvars_of(const Gather& g) {
-  return g.rdom ? g.rdom->vars : std::vector<ReductionVariable>{};
+// Scatters over one domain become one update over its iterations and their taps, which share
+// storage, the places' coordinates and what the terms have in common.
+std::vector<UpdateGroup> join_taps(const std::vector<UpdateGroup>& groups) {
+  std::vector<UpdateGroup> joined;
+  std::map<std::string, size_t> open;
+  for (const UpdateGroup& group : groups) {
+    if (!group.gather.scatters || !group.gather.rdom) {
+      joined.push_back(group);
+      continue;
+    }
+    auto [it, is_new] = open.try_emplace(domain_of(group.gather), joined.size());
+    if (!is_new && joined[it->second].taps.size() >= most_taps) {
+      it->second = joined.size();
+      is_new = true;
+    }
+    if (is_new) {
+      joined.push_back(group);
+      continue;
+    }
+    UpdateGroup& all = joined[it->second];
+    Tap tap = group.taps[0];
+    const auto rename = [&](Expr& e) { e = rename_rdom(e, group.gather, all.gather); };
+    std::for_each(tap.place.begin(), tap.place.end(), rename);
+    std::for_each(tap.sums.begin(), tap.sums.end(), rename);
+    rename(tap.predicate);
+    all.taps.push_back(std::move(tap));
+  }
+  return joined;
+}
+
+// The value of the tap that `tap` numbers; one for all where they agree.
+Expr of_tap(const Expr& tap, const std::vector<Expr>& values) {
+  Expr result = values.back();
+  for (size_t i = values.size() - 1; i-- > 0;) {
+    if (!equal(values[i], values.back())) {
+      for (size_t j = values.size() - 1; j-- > 0;)
+        result = make_select(tap == static_cast<int>(j), values[j], result);
+      return result;
+    }
+  }
+  return result;
+}
+
+// One update: its iterations, with the taps as the last loop where there are several, and what each
+// does. `over` is the gather, or scatter, of the first tap.
+struct Iterations {
+  Gather over;
+  std::vector<ReductionVariable> rvars;
+  bool has_taps = false;
+  Tap all;
+};
+
+Iterations over_taps(const UpdateGroup& group) {
+  const Gather& g = group.gather;
+  Iterations result{g, g.rdom ? g.rdom->vars : std::vector<ReductionVariable>(), false,
+                    group.taps[0]};
+  if (group.taps.size() == 1) return result;
+  const auto rdom = std::make_shared<ReductionDomainContents>();
+  const Expr count = make_const(Int(32), static_cast<int64_t>(group.taps.size()));
+  result.has_taps = true;
+  result.rvars.push_back({unique_name("tap"), make_zero(Int(32)), count});
+  rdom->vars = result.rvars;
+  rdom->frozen = true;
+  Substitution here;
+  for (const ReductionVariable& r : g.rdom->vars)
+    here[r.var] = variable(r.var, Int(32), SymbolRef(rdom));
+  const Expr number = variable(rdom->vars.back().var, Int(32), SymbolRef(rdom));
+  const auto choose = [&](const auto& part) {
+    std::vector<Expr> values;
+    for (const Tap& tap : group.taps) values.push_back(part(tap));
+    return substitute(of_tap(number, values), here);
+  };
+  for (size_t d = 0; d < result.all.place.size(); ++d)
+    result.all.place[d] = choose([&](const Tap& tap) { return tap.place[d]; });
+  for (size_t k = 0; k < result.all.sums.size(); ++k) {
+    const auto some = std::find_if(group.taps.begin(), group.taps.end(),
+                                   [&](const Tap& tap) { return tap.sums[k].defined(); });
+    if (some == group.taps.end()) continue;
+    const Expr nothing = make_zero(some->sums[k].type());
+    result.all.sums[k] =
+        choose([&](const Tap& tap) { return tap.sums[k].defined() ? tap.sums[k] : nothing; });
+  }
+  const bool any_predicate = std::any_of(group.taps.begin(), group.taps.end(),
+                                         [](const Tap& tap) { return tap.predicate.defined(); });
+  const Expr always = make_one(Bool());
+  if (any_predicate) {
+    result.all.predicate =
+        choose([&](const Tap& tap) { return tap.predicate.defined() ? tap.predicate : always; });
+  }
+  return result;
+}
+
+bool has_pure_dimension(const Gather& g) {
+  return std::find(g.pure.begin(), g.pure.end(), true) != g.pure.end();
 }
 
 class Builder {
@@ -171,12 +278,14 @@ class Builder {
                             is_wide_ ? Role::Accumulator : Role::Adjoint);
     define_pointwise(contributions, initial);
     note_traits(result_.func, initial);
+    estimate(result_.func);
     for (const Contribution& c : contributions) {
       note_traits(result_.func, {c.adjoint});
       if (leaves_zeros(c)) result_.func->made->traits.masked = true;
     }
-    for (const UpdateGroup& group : groups) {
-      is_worth_splitting(group.gather) ? add_privatised(group) : add_update(group);
+    for (const UpdateGroup& group : join_taps(groups)) {
+      const Iterations update = over_taps(group);
+      is_worth_splitting(group.gather) ? add_privatised(update) : add_update(update);
     }
     if (is_wide_) round_once();
     return std::move(result_);
@@ -188,6 +297,19 @@ class Builder {
     f->made->of = target_.name;
     f->name = name;
     return f;
+  }
+
+  // How far the dimensions of the target run, where that is known: a guess as users give them.
+  void estimate(const FuncPtr& f) const {
+    if (target_.region.size() != target_.args.size()) return;
+    for (size_t d = 0; d < target_.args.size(); ++d) {
+      const LoopVariable& v = target_.region[d];
+      const bool is_known = v.min.defined() && v.max.defined() && extent_of(v) < unknown_elements;
+      if (!is_known || std::find(f->args.begin(), f->args.end(), target_.args[d]) == f->args.end())
+        continue;
+      f->schedule.estimates.push_back(
+          {target_.args[d], simplify(v.min), simplify(v.max - v.min + 1), {}, {}});
+    }
   }
 
   // ---- long sums ----
@@ -235,19 +357,20 @@ class Builder {
     result_.stages.push_back(Accumulation::Pointwise);
   }
 
-  void add_update(const UpdateGroup& group) {
-    const Gather& g = group.gather;
+  void add_update(const Iterations& update) {
+    const auto& [place, given, sums] = update.all;
+    const bool is_loop = !update.rvars.empty();
     std::vector<Expr> values;
     for (size_t k = 0; k < types_.size(); ++k) {
-      Expr self = call_value(result_.func, g.lhs, static_cast<int>(k));
-      Expr term = group.sums[k];
-      if (term.defined() && !g.rdom) term = masked(g.predicate, term);
+      Expr self = call_value(result_.func, place, static_cast<int>(k));
+      Expr term = sums[k];
+      if (term.defined() && !is_loop) term = masked(given, term);
       values.push_back(term.defined() ? self + cast_to(self.type(), term) : self);
     }
     Expr predicate;
-    if (g.rdom && g.predicate.defined()) predicate = with_likely_parts(g.predicate, g.rdom->vars);
-    append_update(result_.func, g.lhs, values, rvars_of(g), predicate);
-    result_.stages.push_back(g.scatters ? Accumulation::Scatter : Accumulation::Gather);
+    if (is_loop && given.defined()) predicate = with_likely_parts(given, update.rvars);
+    append_update(result_.func, place, values, update.rvars, predicate);
+    result_.stages.push_back(update.over.scatters ? Accumulation::Scatter : Accumulation::Gather);
   }
 
   // Whether the elements alone give too little to do in parallel, and each sums over many
@@ -354,12 +477,13 @@ class Builder {
   // no lanes, without `part` no parts. Beyond the end the place is clamped: what it reads must
   // exist even where the condition is false. Both are cut off the steady state, whose accumulators
   // stay in registers.
-  static Slice slice_of(const Gather& g, const Expr& lane, const Expr& part, const Expr& parts) {
+  static Slice slice_of(const Iterations& update, const Expr& lane, const Expr& part,
+                        const Expr& parts) {
     Slice slice;
-    slice.rvars = rvars_of(g);
+    slice.rvars = update.rvars;
     auto rdom = std::make_shared<ReductionDomainContents>();
-    size_t last = slice.rvars.size() - 1;
-    for (size_t i = 0; i <= last; ++i) {
+    const size_t last = slice.rvars.size() - (update.has_taps ? 2 : 1);
+    for (size_t i = 0; i < slice.rvars.size(); ++i) {
       ReductionVariable& r = slice.rvars[i];
       std::string old = r.var;
       Expr all = r.extent, min = r.min;
@@ -385,29 +509,29 @@ class Builder {
 
   // parts(lane, y..., part) accumulates a slice of the reduction domain; then adj(y...) sums over
   // lanes and parts. Elements fixed on the left-hand side need no y.
-  void add_privatised(const UpdateGroup& group) {
-    const Gather& g = group.gather;
+  void add_privatised(const Iterations& update) {
+    const Gather& g = update.over;
     FuncPtr parts = new_func(claim_name(name_ + "_parts"), Role::Accumulator);
     Expr part = parts_of(g) > 1 ? variable(unique_name("part")) : Expr(),
          lane = has_lanes(g) ? variable(unique_name("lane")) : Expr();
     std::vector<Expr> zeros;
     for (Type t : types_) zeros.push_back(make_zero(t));
     define_pure(parts, parts_point(g, args_, lane, part), zeros);
+    estimate(parts);
     if (lane.defined()) parts->made->lanes = lane_count;
 
     const Expr count = part_count_of(g);
     parts->made->has_parts = part.defined();
-    Slice slice = slice_of(g, lane, part, count);
-    if (g.predicate.defined()) {
-      slice.conditions.push_back(
-          substitute(with_likely_parts(g.predicate, g.rdom->vars), slice.place));
-    }
+    Slice slice = slice_of(update, lane, part, count);
+    const auto& [place, given, sums] = update.all;
+    if (given.defined())
+      slice.conditions.push_back(substitute(with_likely_parts(given, update.rvars), slice.place));
     std::vector<Expr> element;
-    for (const Expr& e : g.lhs) element.push_back(substitute(e, slice.place));
+    for (const Expr& e : place) element.push_back(substitute(e, slice.place));
     std::vector<Expr> lhs = parts_point(g, element, lane, part), values;
     for (size_t k = 0; k < types_.size(); ++k) {
       Expr self = call_value(parts, lhs, static_cast<int>(k));
-      const Expr& term = group.sums[k];
+      const Expr& term = sums[k];
       values.push_back(term.defined() ? self + cast_to(self.type(), substitute(term, slice.place))
                                       : self);
     }

@@ -1,0 +1,198 @@
+#include "autoschedule/scatter_schedule.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "autoschedule/new_loop.h"
+#include "frontend/language/func.h"
+#include "frontend/language/rdom.h"
+#include "frontend/schedule/stage.h"
+#include "graph/own_reads.h"
+#include "ir/memory_reads.h"
+#include "ir/visit.h"
+
+namespace retrograde::ir {
+
+namespace {
+
+constexpr int most_lanes = 16;
+constexpr int64_t least_lanes = 4;  // of a dimension that is worth vectors
+constexpr int64_t few_values = 4;   // iterations that are unrolled
+constexpr int64_t most_taps = 16;
+
+int64_t estimated_extent(const FuncContents& f, size_t d) {
+  for (const Bound& estimate : f.schedule.estimates) {
+    if (estimate.var == f.args[d]) return as_const_int(estimate.extent).value_or(0);
+  }
+  return 0;
+}
+
+bool adds_to_itself(const FuncContents& f, const Definition& update) {
+  return std::all_of(update.values.begin(), update.values.end(), [&](const Expr& value) {
+    const auto* sum = value.as<Add>();
+    return sum && is_old_value(sum->a, f, update) && !calls(sum->b, &f);
+  });
+}
+
+bool scatters(const FuncContents& f, const Definition& update) {
+  return !update.rvars.empty() && adds_to_itself(f, update) &&
+         std::any_of(update.args.begin(), update.args.end(),
+                     [](const Expr& place) { return reads_memory(place, MemoryReads::Functions); });
+}
+
+bool is_part(const FuncContents& f, size_t d) {
+  return f.made && f.made->has_parts && d + 1 == f.args.size();
+}
+
+// Whether the value of a loop variable picks one of a few places to write to.
+bool is_tap(const Definition& update, const ReductionVariable& r) {
+  const auto extent = as_const_int(r.extent);
+  if (!extent || *extent > most_taps) return false;
+  return std::any_of(update.args.begin(), update.args.end(), [&](const Expr& place) {
+    return any_node(place, [&](const Expr& e) {
+      const auto* is = e.as<EQ>();
+      const auto* picks = is ? is->a.as<Variable>() : nullptr;
+      return picks && picks->name == r.var && is_const(is->b);
+    });
+  });
+}
+
+// Those that are taps, or those that are none, in their order.
+std::vector<VarOrRVar> loops_of(const Definition& update, bool taps) {
+  std::vector<VarOrRVar> loops;
+  for (const ReductionVariable& r : update.rvars) {
+    if (is_tap(update, r) == taps) loops.push_back(RVar(r.var));
+  }
+  return loops;
+}
+
+void append(std::vector<VarOrRVar>& loops, const std::vector<VarOrRVar>& more) {
+  loops.insert(loops.end(), more.begin(), more.end());
+}
+
+// ---- lanes of independent elements ----
+
+bool is_independent(const FuncContents& f, size_t d) {
+  return std::all_of(f.updates.begin(), f.updates.end(),
+                     [&](const Definition& update) { return is_pure_position(f, update, d); });
+}
+
+// Whether a place is another one for another value of the independent dimension.
+bool moves_places(const FuncContents& f, size_t d) {
+  return is_part(f, d) ||
+         std::any_of(f.updates.begin(), f.updates.end(), [&](const Definition& update) {
+           for (size_t i = 0; i < f.args.size(); ++i) {
+             if (i != d && uses_variable(update.args[i], f.args[d])) return true;
+           }
+           return false;
+         });
+}
+
+// Dimensions by what they are to a scatter.
+struct Roles {
+  std::vector<size_t> independent;  // of its places: that of the lanes first
+  std::vector<size_t> scattered;
+  std::vector<size_t> apart;  // each value has places of its own
+};
+
+Roles roles_of(const FuncContents& f, size_t lanes) {
+  Roles roles{{lanes}, {}, {}};
+  for (size_t d = 0; d < f.args.size(); ++d) {
+    if (d == lanes) continue;
+    if (!is_independent(f, d))
+      roles.scattered.push_back(d);
+    else
+      (moves_places(f, d) ? roles.apart : roles.independent).push_back(d);
+  }
+  return roles;
+}
+
+// Elements in the order of memory, in parallel over the last dimension.
+void schedule_zeros(const FuncPtr& f, const std::vector<Var>& dims, int width) {
+  Stage zeros(f, 0);
+  zeros.reorder(std::vector<VarOrRVar>(dims.begin(), dims.end())).parallel(dims.back());
+  vectorize(zeros, dims[0], width, TailStrategy::GuardWithIf);
+}
+
+void schedule_update(const FuncPtr& f, int s, const Roles& roles, int width) {
+  const Definition& update = f->stage(s);
+  Stage stage(f, s);
+  std::vector<VarOrRVar> inner, outer;
+  for (const size_t d : roles.independent) {
+    const int64_t extent = estimated_extent(*f, d);
+    const bool is_lanes = inner.empty(), is_short = extent > 1 && extent <= few_values;
+    const Var all(f->args[d]);
+    outer.push_back(all);
+    if (!is_lanes && !is_short) continue;
+    const Var part(inner_loop(*f, s, all.name()));
+    stage.split(all, all, part, is_lanes ? width : static_cast<int>(extent),
+                TailStrategy::GuardWithIf);
+    inner.push_back(part);
+  }
+  for (const size_t d : roles.apart) outer.push_back(Var(f->args[d]));
+  const std::vector<VarOrRVar> taps = loops_of(update, true);
+  std::vector<VarOrRVar> order = inner;
+  append(order, taps);
+  append(order, loops_of(update, false));
+  append(order, outer);
+  stage.reorder(order).vectorize(inner[0]);
+  for (size_t i = 1; i < inner.size(); ++i) stage.unroll(inner[i]);
+  for (const VarOrRVar& tap : taps) stage.unroll(tap);
+  for (const VarOrRVar& loop : outer) stage.parallel(loop);
+}
+
+}  // namespace
+
+std::optional<ScatterLanes> scatter_lanes(const FuncContents& f) {
+  if (f.is_extern() || (f.made && f.made->lanes > 0)) return {};
+  if (!std::any_of(f.updates.begin(), f.updates.end(),
+                   [&](const Definition& update) { return scatters(f, update); }))
+    return {};
+  int64_t most = 0;
+  size_t lanes = 0;
+  for (size_t d = 0; d < f.args.size(); ++d) {
+    if (!is_independent(f, d) || moves_places(f, d) || estimated_extent(f, d) <= most) continue;
+    most = estimated_extent(f, d);
+    lanes = d;
+  }
+  if (most < least_lanes) return {};
+  int width = most_lanes;
+  while (width > most) width /= 2;
+  return ScatterLanes{lanes, width};
+}
+
+void schedule_scatter_lanes(const FuncPtr& f, const ScatterLanes& lanes) {
+  const Roles roles = roles_of(*f, lanes.dimension);
+  std::vector<Var> dims;
+  for (const std::vector<size_t>& some : {roles.independent, roles.scattered, roles.apart}) {
+    for (const size_t d : some) dims.push_back(Var(f->args[d]));
+  }
+  Func(f).reorder_storage(dims);
+  schedule_zeros(f, dims, lanes.width);
+  for (int s = 1; s < f->stage_count(); ++s) schedule_update(f, s, roles, lanes.width);
+}
+
+// ---- vectors of iterations ----
+
+bool scatters_in_order(const FuncContents& f, const Definition& stage) {
+  if (stage.rvars.empty() || stage.args.empty()) return false;
+  auto extent = as_const_int(stage.rvars[0].extent);
+  if (extent && *extent < most_lanes) return false;
+  return reads_memory(stage.args[0], MemoryReads::Functions) && adds_to_itself(f, stage);
+}
+
+void schedule_scatter_in_order(const FuncContents& f, int index, Stage& stage) {
+  const Definition& update = f.stage(index);
+  const RVar all(update.rvars[0].var), lane(inner_loop(f, index, all.name()));
+  const std::vector<VarOrRVar> taps = loops_of(update, true);
+  std::vector<VarOrRVar> order{lane};
+  append(order, taps);
+  append(order, loops_of(update, false));
+  stage.allow_race_conditions()
+      .split(all, all, lane, most_lanes, TailStrategy::GuardWithIf)
+      .reorder(order)
+      .vectorize(lane);
+  for (const VarOrRVar& tap : taps) stage.unroll(tap);
+}
+
+}  // namespace retrograde::ir

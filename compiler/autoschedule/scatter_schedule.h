@@ -1,0 +1,36 @@
+// scatter_schedule.h -- loops and layout of sums at places that data decide.
+//
+//   f(i(r), j(r), c) += term(r, c)
+//
+// A place is the same for all values of c, the dimensions that are no scatter's. Where these are
+// many, they are the lanes of vectors: f has them innermost in memory, so that a place takes one
+// load, one addition and one store, and the place itself is computed once for all of them. Where
+// they are few, a vector holds iterations; lowering adds its elements in order.
+// Taps: a loop whose variable only picks one of a few places is unrolled around each iteration or
+// vector of iterations, which share what their places and terms have in common.
+// Every order is fixed, and with it every bit, whatever the number of threads.
+#pragma once
+
+#include <optional>
+
+#include "frontend/schedule/stage.h"
+#include "graph/function.h"
+
+namespace retrograde::ir {
+
+struct ScatterLanes {
+  size_t dimension;
+  int width;
+};
+
+// The dimension that is worth vectors, of a Func whose updates scatter along others.
+std::optional<ScatterLanes> scatter_lanes(const FuncContents& f);
+// All of f, computed at root.
+void schedule_scatter_lanes(const FuncPtr& f, const ScatterLanes& lanes);
+
+// Whether the stage adds to places along the first dimension, where data say, over a loop that is
+// worth vectors of iterations.
+bool scatters_in_order(const FuncContents& f, const Definition& stage);
+void schedule_scatter_in_order(const FuncContents& f, int index, Stage& stage);
+
+}  // namespace retrograde::ir
