@@ -329,20 +329,21 @@ Expr Widener::widen_extern(const Call& n) {
   return result;
 }
 
-// A let under several masks is widened several times, each time under another name.
+// A let under several masks is widened several times, each time under another name. Parts of the
+// body are remembered by node: a name that stays narrow is replaced in what the body has become,
+// and not before, which would make new nodes of some parts, with old names in the others.
 Expr Widener::widen_let(const Expr& e, const Let& n) {
   Expr value = (*this)(n.value);
-  bool varies = !value.same_as(n.value);
+  const bool varies = !value.same_as(n.value);
   if (!varies && (*this)(n.body).same_as(n.body)) return e;
-  bool is_first = widened_lets_.insert(n.name).second;
-  std::string name = is_first ? n.name : fresh_(n.name);
-  if (varies) {
-    bind(n.name, variable(name, value.type()));
-    Expr body = (*this)(n.body);
-    return body.same_as(n.body) ? make_broadcast(body, iterations_) : make_let(name, value, body);
-  }
-  Expr body = is_first ? n.body : substitute(n.body, n.name, variable(name, value.type()));
-  return make_let(name, value, (*this)(body));
+  const bool is_first = widened_lets_.insert(n.name).second;
+  const std::string name = is_first ? n.name : fresh_(n.name);
+  if (varies) bind(n.name, variable(name, value.type()));
+  Expr body = (*this)(n.body);
+  if (varies) wide_values_.erase(n.name);  // outside of the body it stands for nothing
+  if (varies && body.same_as(n.body)) return make_broadcast(body, iterations_);
+  if (!varies && !is_first) body = substitute(body, n.name, variable(name, value.type()));
+  return make_let(name, value, body);
 }
 
 Expr Widener::widen_shuffle(const Expr& e, const Shuffle& n) {
