@@ -155,6 +155,10 @@ void give_default_schedule(const std::vector<FuncPtr>& outputs, const VectorUnit
     }
     for (int s = 0; s < f->stage_count(); ++s) LoopChooser(f, s, unit).give();
   }
+  for (const FuncPtr& f : topological_order(outputs)) {  // so that the log tells of every Func
+    const bool is_output = std::find(outputs.begin(), outputs.end(), f) != outputs.end();
+    if (!is_touched(*f) && f->is_pure() && !is_output) Func(f).compute_inline();
+  }
 }
 
 std::vector<FuncPtr> schedule_unscheduled(const std::vector<FuncPtr>& outputs,

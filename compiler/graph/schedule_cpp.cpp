@@ -73,20 +73,28 @@ class CppPrinter {
     const std::string& id = identifiers_(name);
     if (!declared_.insert(name).second) return id;
     const size_t dot = name.rfind('.');
-    if (dot == std::string::npos) {
+    if (dot == std::string::npos && log_.places.count(name)) {
+      declarations_ << "Var " << id << " = " << identifiers_(source_of(of).func) << ".args()["
+                    << log_.places.at(name) << "];\n";
+    } else if (dot == std::string::npos) {
       declarations_ << (reductions_.count(name) ? "RVar " : "Var ") << id << "(\"" << name
                     << "\");\n";
-    } else if (const Source source = source_of(of); source.stage > 0) {
+    } else if (const Source source = source_of(of); source.stage > 0 && !index_of(name).empty()) {
       declarations_ << "RVar " << id << " = " << identifiers_(source.func) << ".rvars("
-                    << source.stage - 1 << ")[" << variable_index(name.substr(dot + 1)) << "];\n";
+                    << source.stage - 1 << ")[" << index_of(name) << "];\n";
     } else {
       declarations_ << "RVar " << id << "(\"" << name << "\");\n";
     }
     return id;
   }
-  static std::string variable_index(const std::string& variable) {
+  // In its domain; empty: unknown.
+  std::string index_of(const std::string& name) const {
+    if (const auto place = log_.places.find(name); place != log_.places.end())
+      return std::to_string(place->second);
+    const std::string variable = name.substr(name.rfind('.') + 1);
     const size_t letter = std::string("xyzw").find(variable);
-    return letter == std::string::npos ? variable : std::to_string(letter);
+    if (variable.size() == 1 && letter != std::string::npos) return std::to_string(letter);
+    return variable.find_first_not_of("0123456789") == std::string::npos ? variable : "";
   }
   bool is_reduction(const std::string& name) const {
     return name.find('.') != std::string::npos || reductions_.count(name);

@@ -1,7 +1,10 @@
 #include "graph/schedule_log.h"
 
 #include <algorithm>
+#include <cstdlib>
+#include <iterator>
 #include <map>
+#include <set>
 
 #include "diagnostics/error.h"
 #include "graph/binder.h"
@@ -38,6 +41,36 @@ auto meant(const Range& all, const std::string& name, const NameOf& name_of)
   return count == 1 ? found : nullptr;
 }
 
+// Those that the process put into it, in the order in which it made names.
+std::vector<uint64_t> numbers_of(const std::string& name) {
+  std::vector<uint64_t> numbers;
+  for (size_t at = name.find('$'); at != std::string::npos; at = name.find('$', at + 1))
+    numbers.push_back(std::strtoull(name.c_str() + at + 1, nullptr, 10));
+  return numbers;
+}
+
+// Names by what they are without numbers, those that differ by these alone in their order.
+class NameGroups {
+ public:
+  void add(const std::string& name) {
+    groups_[without_numbers(name)].emplace(numbers_of(name), name);
+  }
+  // Of `others`, the one that stands where `name` stands here; null unless there are as many.
+  const std::string* same_place(const std::string& name, const NameGroups& others) const {
+    const std::string plain = without_numbers(name);
+    const auto mine = groups_.find(plain), theirs = others.groups_.find(plain);
+    if (mine == groups_.end() || theirs == others.groups_.end() ||
+        mine->second.size() != theirs->second.size())
+      return nullptr;
+    const auto place = mine->second.find(numbers_of(name));
+    if (place == mine->second.end()) return nullptr;
+    return &std::next(theirs->second.begin(), std::distance(mine->second.begin(), place))->second;
+  }
+
+ private:
+  std::map<std::string, std::map<std::vector<uint64_t>, std::string>> groups_;
+};
+
 void add_loops(const StageLoops& schedule, std::vector<std::string>& loops) {
   const auto add = [&](const std::string& loop) {
     if (std::find(loops.begin(), loops.end(), loop) == loops.end()) loops.push_back(loop);
@@ -48,20 +81,27 @@ void add_loops(const StageLoops& schedule, std::vector<std::string>& loops) {
 
 class Replay {
  public:
-  explicit Replay(const std::vector<FuncPtr>& outputs) {
+  Replay(const ScheduleLog& log, const std::vector<FuncPtr>& outputs) {
     const Graph graph = graph_of(outputs);
     for (const FuncPtr& f : graph.funcs) {
       names_.funcs.emplace(f->name, f);
+      in_program_.add(f->name);
       for (const auto& output : f->outputs) names_.outputs.emplace(output->name, output);
     }
     for (const auto& parameter : graph.parameters)
       names_.parameters.emplace(parameter->name, parameter);
+    std::set<std::string> made;
+    for (const ScheduleLog::Entry& entry : log.entries) {
+      if (!made.count(entry.func)) in_log_.add(entry.func);
+      made.insert(made_by(entry.directive));
+    }
   }
 
   void give(const ScheduleLog::Entry& entry) {
     const SchedulePlace place{func(entry.func), entry.stage, entry.special};
     check(place, entry);
     Directive directive = entry.directive;
+    keep_names(place, directive);
     visit_names(directive, Overloaded{[&](NamedFunc& name) { name = func_or_image(name); },
                                       [&](NamedLoop& name) { name = loop(place, name); },
                                       [&](LoopLevel& level) { find(level); },
@@ -101,10 +141,29 @@ class Replay {
   }
 
   void make(const std::string& name, const FuncPtr& f) {
-    names_.funcs[name] = names_.funcs[f->name] = f;
+    made_[name] = names_.funcs[name] = names_.funcs[f->name] = f;
+  }
+
+  // A loop that has the name of one that it is made of keeps that name here.
+  static void keep_names(const SchedulePlace& place, Directive& directive) {
+    const auto keep = [&](std::string& made, const std::string& old) {
+      if (made == old) made = loop(place, old);
+    };
+    if (auto* split = std::get_if<SplitLoop>(&directive)) {
+      keep(split->outer, split->old);
+      keep(split->inner, split->old);
+    } else if (auto* fuse = std::get_if<FuseLoops>(&directive)) {
+      const std::string fused = fuse->fused;
+      for (const std::string& old : {fuse->inner, fuse->outer}) {
+        if (fused == old) fuse->fused = loop(place, old);
+      }
+    }
   }
 
   FuncPtr func_or_none(const std::string& name) {
+    if (const auto made = made_.find(name); made != made_.end()) return made->second;
+    if (const std::string* same = in_log_.same_place(name, in_program_))
+      return names_.funcs.at(*same);
     if (const auto* found = meant(names_.funcs, name, [](const auto& f) { return f.first; }))
       return found->second;
     // What reads an image, where nobody has asked for it yet.
@@ -173,13 +232,26 @@ class Replay {
   }
 
   NamedEntities names_;
+  std::map<std::string, FuncPtr> made_;  // by directives of the log
+  NameGroups in_log_, in_program_;
 };
+
+void add_places(const FuncContents& f, std::map<std::string, size_t>& places) {
+  for (size_t d = 0; d < f.args.size(); ++d) {
+    if (f.args[d].find('$') != std::string::npos) places.emplace(f.args[d], d);
+  }
+  for (const Definition& update : f.updates) {
+    for (size_t i = 0; i < update.rvars.size(); ++i) places.emplace(update.rvars[i].var, i);
+  }
+}
 
 }  // namespace
 
 ScheduleLog schedule_log(const std::vector<FuncPtr>& outputs) {
+  ScheduleLog log;
   std::multimap<uint64_t, ScheduleLog::Entry> ordered;
   for (const FuncPtr& f : functions_of(outputs)) {
+    add_places(*f, log.places);
     for (const LoggedDirective& given : f->log) {
       ScheduleLog::Entry entry{f->name, given.stage, given.special, given.directive};
       std::visit(
@@ -193,13 +265,12 @@ ScheduleLog schedule_log(const std::vector<FuncPtr>& outputs) {
       ordered.emplace(given.order, std::move(entry));
     }
   }
-  ScheduleLog log;
   for (auto& [order, entry] : ordered) log.entries.push_back(std::move(entry));
   return log;
 }
 
 void apply_log(const ScheduleLog& log, const std::vector<FuncPtr>& outputs) {
-  Replay replay(outputs);
+  Replay replay(log, outputs);
   for (const ScheduleLog::Entry& entry : log.entries) replay.give(entry);
 }
 

@@ -9,9 +9,11 @@
 //
 // Applied to the same program without a schedule, a log gives the same schedule. Numbers that a
 // process puts behind names do not count there: where there is no blur$3, it is the one Func that
-// is called blur, or blur$8.
+// is called blur, or blur$8; and of the Funcs that differ by their numbers alone, when the log names
+// as many as there are, the first is the first.
 #pragma once
 
+#include <map>
 #include <string>
 #include <vector>
 
@@ -29,6 +31,9 @@ class ScheduleLog {
     bool operator==(const Entry& other) const;
   };
   std::vector<Entry> entries;
+  // For to_cpp(), where the name does not say it: the places of reduction variables in their domains
+  // and of numbered variables among those of their Funcs. Not part of the text.
+  std::map<std::string, size_t> places = {};
 
   // Requires: every line is a directive of a Func.
   static ScheduleLog parse(const std::string& text);

@@ -10,9 +10,11 @@
 namespace retrograde {
 
 // In the order in which they appear: the first v$31 or v is v, the next other one is v$1. Of
-// reduction variables the domain counts: r$7.x and r$7.y are r.x and r.y.
+// reduction variables the domain counts, r$7.x and r$7.y are r.x and r.y; behind it, what has a
+// number: rho$8.r$7.x is rho.r.x.
 inline std::string same_numbers(const std::string& text) {
-  static const std::regex name("(^|[^A-Za-z_0-9$.])([A-Za-z_][A-Za-z_0-9$]*)");
+  static const std::regex name(
+      "(^|[^A-Za-z_0-9$.]|\\.(?=[A-Za-z_0-9]+\\$))([A-Za-z_][A-Za-z_0-9$]*)");
   std::map<std::string, std::map<std::string, size_t>> numbers;  // of each name without: those seen
   std::string result;
   auto at = text.begin();
