@@ -48,7 +48,7 @@ void factor(Stage update, const RVar& lane, const RVar& row) {
   for (const VarOrRVar& loop : parts.update().split_vars()) {
     if (loop.name() != u.name()) order.push_back(loop);
   }
-  parts.compute_root().parallel(v);
+  parts.compute_root().reorder(u, v).parallel(v);
   vectorize(Stage(parts.function(), 0), u, lanes_of_a_sum, TailStrategy::Auto);
   parts.update().reorder(order).parallel(v);
   vectorize(parts.update(), u, lanes_of_a_sum, TailStrategy::GuardWithIf);
@@ -83,9 +83,10 @@ void cut(const FuncPtr& f, int stage) {
 
 }  // namespace
 
-void cut_reductions(const std::vector<FuncPtr>& outputs) {
+void cut_reductions(const std::vector<FuncPtr>& outputs,
+                    const std::unordered_set<const Symbol*>& but) {
   for (const FuncPtr& f : topological_order(outputs)) {
-    if (is_touched(*f) || f->is_extern()) continue;
+    if (is_touched(*f) || f->is_extern() || but.contains(f.get())) continue;
     for (int s = 1; s < f->stage_count(); ++s) {
       if (is_long_sum(*f, f->stage(s))) cut(f, s);
     }

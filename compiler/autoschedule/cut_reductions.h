@@ -9,6 +9,7 @@
 // depends on the program alone, so that results are the same bits for every number of threads.
 #pragma once
 
+#include <unordered_set>
 #include <vector>
 
 #include "graph/function.h"
@@ -16,7 +17,8 @@
 namespace retrograde::ir {
 
 // Factors long associative updates of one element (rfactor.h), of Funcs of this graph that nobody
-// scheduled.
-void cut_reductions(const std::vector<FuncPtr>& outputs);
+// scheduled. `but`: not of these.
+void cut_reductions(const std::vector<FuncPtr>& outputs,
+                    const std::unordered_set<const Symbol*>& but = {});
 
 }  // namespace retrograde::ir

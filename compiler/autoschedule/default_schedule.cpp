@@ -2,9 +2,11 @@
 
 #include <algorithm>
 #include <optional>
+#include <unordered_set>
 
 #include "autoschedule/cut_reductions.h"
 #include "autoschedule/new_loop.h"
+#include "autoschedule/placement_limits.h"
 #include "autoschedule/scatter_schedule.h"
 #include "autoschedule/stored_funcs.h"
 #include "diagnostics/large_stack.h"
@@ -144,18 +146,25 @@ class LoopChooser {
 
 }  // namespace
 
-void give_default_schedule(const std::vector<FuncPtr>& outputs, const VectorUnit& unit) {
-  if (!is_differentiated(outputs)) return;
-  cut_reductions(outputs);
-  for (const FuncPtr& f : stored_by_default(outputs)) {
+void give_default_schedule(const std::vector<FuncPtr>& outputs, const VectorUnit& unit,
+                           Scheduling what) {
+  const std::vector<FuncPtr> order = topological_order(outputs);
+  PlacementLimits limits;
+  if (what == Scheduling::Everything) limits = placement_limits(order);
+  std::unordered_set<const Symbol*> whole = limits.stay;
+  whole.insert(limits.levels.begin(), limits.levels.end());
+  cut_reductions(outputs, whole);
+  for (const FuncPtr& f : what == Scheduling::Everything ? stored_in_all(outputs, limits)
+                                                         : stored_by_default(outputs)) {
     Func(f).compute_root();
+    if (f->is_extern() || limits.levels.contains(f.get())) continue;
     if (const auto lanes = scatter_lanes(*f)) {
       schedule_scatter_lanes(f, *lanes);
       continue;
     }
     for (int s = 0; s < f->stage_count(); ++s) LoopChooser(f, s, unit).give();
   }
-  for (const FuncPtr& f : topological_order(outputs)) {  // so that the log tells of every Func
+  for (const FuncPtr& f : order) {  // so that the log tells of every Func
     const bool is_output = std::find(outputs.begin(), outputs.end(), f) != outputs.end();
     if (!is_touched(*f) && f->is_pure() && !is_output) Func(f).compute_inline();
   }
@@ -168,7 +177,7 @@ std::vector<FuncPtr> schedule_unscheduled(const std::vector<FuncPtr>& outputs,
     result = apply_wrappers(outputs);
     if (!is_differentiated(result)) return;
     result = copy_graph(result).outputs;
-    give_default_schedule(result, unit);
+    give_default_schedule(result, unit, Scheduling::Gradients);
   });
   return result;
 }

@@ -1,5 +1,6 @@
-// default_schedule.h -- a sane schedule for Funcs that differentiation made and that nobody
-// scheduled: directives such as a user would give, each in its Func's log (graph/schedule_log.h).
+// default_schedule.h -- a sane schedule for Funcs that nobody scheduled: directives such as a user
+// would give, each in its Func's log (graph/schedule_log.h). Pipelines that contain adjoints get it
+// whenever they are compiled, others when they ask for it (Pipeline::auto_schedule).
 //
 // Sums to one element are cut into lanes and rows (cut_reductions.h). What is stored
 // (stored_funcs.h) is computed at root, its innermost dimension vectorized, its outermost run in
@@ -15,9 +16,12 @@
 
 namespace retrograde::ir {
 
-// Gives the directives to the Funcs of this graph, whose wrappers have been applied. A pipeline
-// without adjoints is left as it is.
-void give_default_schedule(const std::vector<FuncPtr>& outputs, const VectorUnit& unit = {});
+// Of which Funcs of a graph: adjoints and what is computed with them, or all.
+enum class Scheduling : uint8_t { Gradients, Everything };
+
+// Gives the directives to the Funcs of this graph, whose wrappers have been applied.
+void give_default_schedule(const std::vector<FuncPtr>& outputs, const VectorUnit& unit,
+                           Scheduling what);
 
 // The pass: the outputs with their wrappers applied, or, where there are adjoints, those of a copy
 // of the graph that has its schedule. What lowering is given.

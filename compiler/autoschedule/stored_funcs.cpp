@@ -6,6 +6,7 @@
 
 #include "autoschedule/cost_estimate.h"
 #include "autoschedule/read_estimate.h"
+#include "graph/give_directive.h"
 #include "graph/own_reads.h"
 #include "ir/build.h"
 #include "ir/visit.h"
@@ -45,15 +46,15 @@ bool is_adjoint(const FuncPtr& f) { return f->made.has_value(); }
 
 class StorageChooser {
  public:
-  explicit StorageChooser(const std::vector<FuncPtr>& outputs)
-      : outputs_(outputs), order_(topological_order(outputs)) {}
+  // `limits`: null where the pipeline is compiled as it is.
+  StorageChooser(const std::vector<FuncPtr>& outputs, const PlacementLimits* limits)
+      : outputs_(outputs), order_(topological_order(outputs)), limits_(limits) {}
 
   std::vector<FuncPtr> choose() {
-    if (std::none_of(order_.begin(), order_.end(), is_adjoint)) return {};
     for (const FuncPtr& f : order_) count_reads(*f);
-    const bool by_hand = std::any_of(order_.begin(), order_.end(), [](const FuncPtr& f) {
-      return !is_adjoint(f) && is_touched(*f);
-    });
+    const bool by_hand =
+        !limits_ && std::any_of(order_.begin(), order_.end(),
+                                [](const FuncPtr& f) { return !is_adjoint(f) && is_touched(*f); });
     std::vector<FuncPtr> result;
     for (const FuncPtr& f : order_) {  // producers first: the cost of what is inlined is known
       uses_[f.get()].operations = operations(*f);
@@ -64,6 +65,10 @@ class StorageChooser {
       bool stored =
           is_worth_storing(uses_[f.get()], left_inline && f->is_pure() ? explosion : cheap);
       stored |= left_inline ? computes_more_than_is_read(*f) : is_output(f) || !f->is_pure();
+      if (limits_) {
+        stored |= limits_->need_root.contains(f.get()) || limits_->levels.contains(f.get());
+        stored &= !limits_->stay.contains(f.get());
+      }
       if (!stored) continue;
       stored_.insert(f.get());
       result.push_back(f);
@@ -121,19 +126,12 @@ class StorageChooser {
 
   const std::vector<FuncPtr>& outputs_;
   const std::vector<FuncPtr> order_;
+  const PlacementLimits* const limits_;
   std::unordered_map<const Symbol*, Use> uses_;
   std::unordered_set<const FuncContents*> stored_;
 };
 
 }  // namespace
-
-bool is_touched(const FuncContents& f) {
-  if (f.schedule.is_given) return true;
-  for (int s = 0; s < f.stage_count(); ++s) {
-    if (f.stage(s).schedule.is_given) return true;
-  }
-  return false;
-}
 
 bool is_differentiated(const std::vector<FuncPtr>& outputs) {
   const std::vector<FuncPtr> order = topological_order(outputs);
@@ -141,7 +139,13 @@ bool is_differentiated(const std::vector<FuncPtr>& outputs) {
 }
 
 std::vector<FuncPtr> stored_by_default(const std::vector<FuncPtr>& outputs) {
-  return StorageChooser(outputs).choose();
+  if (!is_differentiated(outputs)) return {};
+  return StorageChooser(outputs, nullptr).choose();
+}
+
+std::vector<FuncPtr> stored_in_all(const std::vector<FuncPtr>& outputs,
+                                   const PlacementLimits& limits) {
+  return StorageChooser(outputs, &limits).choose();
 }
 
 }  // namespace retrograde::ir

@@ -12,15 +12,17 @@
 
 #include <vector>
 
+#include "autoschedule/placement_limits.h"
 #include "graph/function.h"
 
 namespace retrograde::ir {
 
-// Whether a directive was given to it or to one of its stages.
-bool is_touched(const FuncContents& f);
 bool is_differentiated(const std::vector<FuncPtr>& outputs);  // whether an adjoint is among them
 
 // Producers before consumers. None in a pipeline without adjoints: it is left as it is.
 std::vector<FuncPtr> stored_by_default(const std::vector<FuncPtr>& outputs);
+// Where all of the pipeline is to be scheduled: what a user left alone is not meant to be inlined.
+std::vector<FuncPtr> stored_in_all(const std::vector<FuncPtr>& outputs,
+                                   const PlacementLimits& limits);
 
 }  // namespace retrograde::ir

@@ -42,10 +42,6 @@ void AutoScheduleParam::set_from_string(const std::string& text) {
     return;
   }
   const std::string scheduler = on ? default_autoscheduler_name() : text;
-  if (scheduler.empty()) {
-    refuse(text, "the default scheduler is named first", "none was",
-           "Name one here: auto_schedule=<name>, or with -s");
-  }
   find_autoscheduler(scheduler);
   scheduler_ = scheduler;
 }

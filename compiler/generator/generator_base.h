@@ -42,8 +42,7 @@ class AutoScheduleParam : public GeneratorParamBase {
   void set(bool on) { set_from_string(on ? "true" : "false"); }
   void set(const std::string& text) { set_from_string(text); }
   void set(const char* text) { set_from_string(text); }
-  // Requires: the default scheduler is named first; an autoscheduler is loaded from a plugin before
-  // it is used.
+  // Requires: an autoscheduler is loaded from a plugin before it is used.
   void set_from_string(const std::string& text) override;
   std::string to_string() const override { return value() ? scheduler_ : "false"; }
   InCpp in_cpp() const override { return {}; }

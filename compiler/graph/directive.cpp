@@ -274,11 +274,16 @@ void apply_directive(const Directive& directive, StageLoops& schedule) {
       directive);
 }
 
+// What is promised or guessed of sizes leaves open how they are computed.
+template <typename D>
+constexpr bool is_of_sizes = std::is_same_v<D, BoundDimension> || std::is_same_v<D, AlignBounds> ||
+                             std::is_same_v<D, Estimate>;
+
 void apply_directive(const Directive& directive, FuncContents& f) {
   std::visit(
       [&]<typename D>(const D& d) {
         if constexpr (GivenTo<D, FuncPlacement>) {
-          f.schedule.is_given = true;
+          f.schedule.is_given |= !is_of_sizes<D>;
           give(d, f.schedule);
         } else if constexpr (GivenTo<D, FuncContents>) {
           give(d, f);

@@ -112,4 +112,12 @@ void give_directive(const SchedulePlace& place, Directive directive) {
   log_directive(place, std::move(directive));
 }
 
+bool is_touched(const FuncContents& f) {
+  if (f.schedule.is_given) return true;
+  for (int s = 0; s < f.stage_count(); ++s) {
+    if (f.stage(s).schedule.is_given) return true;
+  }
+  return false;
+}
+
 }  // namespace retrograde::ir

@@ -30,6 +30,9 @@ void give_directive(const SchedulePlace& place, Directive directive);
 // Appends it to the log: of what makes Funcs, by who made them.
 void log_directive(const SchedulePlace& place, Directive directive);
 
+// Whether a directive was given to it or to one of its stages, other than of sizes.
+bool is_touched(const FuncContents& f);
+
 // The specialization of this schedule for the condition; -1: there is none.
 int specialization_for(const StageLoops& schedule, const Expr& condition);
 // Where the loop stands, innermost first; CompileError when it is none.

@@ -134,7 +134,7 @@ struct FuncPlacement {
   bool memoized = false;
   Expr eviction_key;  // memoize: undefined when none
   bool async = false;
-  bool is_given = false;  // compute_*/store_* was called
+  bool is_given = false;  // a directive was given that is not of sizes (bound, set_estimate ...)
 };
 
 // Events that generated code reports.

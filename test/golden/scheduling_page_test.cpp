@@ -264,7 +264,10 @@ std::string page() {
       "were "
       "given:\ntext (`to_text`, `parse`), C++ (`to_cpp`), what is said of one Func (`of`), its "
       "beginning (`first`), the\nsame without one directive (`without`). "
-      "`Pipeline::apply_schedule()` gives a log to the same program\nwithout a schedule.\n\n";
+      "`Pipeline::apply_schedule()` gives a log to the same program\nwithout a schedule.\n\n"
+      "`Pipeline::auto_schedule(target)` gives directives to the Funcs that have none; they stand "
+      "in the log, and\nas C++ in the result's `schedule_source`. Compiling does so by itself for "
+      "gradients, on a copy; after\n`Pipeline::unscheduled()` it does not.\n\n";
   const std::pair<const char*, const std::vector<Directive>*> chapters[] = {
       {"Loops of one stage", &loop_directives()},
       {"Where a Func is computed", &place_directives()},

@@ -341,6 +341,15 @@ TEST(Generator, AutoScheduleRunsTheSchedulerItNames) {
   Pipeline::add_autoscheduler("ByRows", nullptr);
 }
 
+TEST(Generator, AutoScheduleNeedsNoPlugin) {
+  const GeneratorContext context(Target("x86-64-linux"));
+  auto sum = context.create<Sum>();
+  sum->set_generator_param_values({{"auto_schedule", "true"}});
+  EXPECT_TRUE(sum->using_autoscheduler());
+  sum->build_module("sum");
+  EXPECT_GT(sum->get_pipeline().schedule_log().size(), 0u);
+}
+
 class Guarded : public Generator<Guarded> {
  public:
   Input<Buffer<float, 1>> in{"in"};

@@ -228,7 +228,8 @@ TEST_F(FuncNames, AnAutoschedulerOfTheProgram) {
     results->featurization = {1};
   };
   add_autoscheduler("mine", scheduler);
-  EXPECT_EQ(autoscheduler_names(), std::vector<std::string>{"mine"});
+  EXPECT_EQ(autoscheduler_names(), (std::vector<std::string>{built_in_autoscheduler, "mine"}));
+  EXPECT_EQ(default_autoscheduler_name(), built_in_autoscheduler);
   Pipeline::set_default_autoscheduler_name("mine");
   EXPECT_EQ(default_autoscheduler_name(), "mine");
   MachineParams machine = MachineParams::generic();

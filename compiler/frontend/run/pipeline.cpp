@@ -8,6 +8,7 @@
 #include "frontend/language/func.h"
 #include "frontend/run/call.h"
 #include "frontend/run/warnings.h"
+#include "graph/give_directive.h"
 #include "graph/wrappers.h"
 
 namespace retrograde {
@@ -132,6 +133,12 @@ Pipeline::Contents& Pipeline::checked() const {
     user_error("use a Pipeline", "it needs outputs", "it was constructed without any",
                "Construct it: Pipeline p(f)");
   return *contents_;
+}
+
+void Pipeline::unscheduled() {
+  for (const ir::FuncPtr& f : ir::topological_order(checked().outputs)) {
+    if (!ir::is_touched(*f)) ir::give_directive({f, 0}, ir::Unscheduled{});
+  }
 }
 
 ScheduleLog Pipeline::schedule_log() const { return ir::schedule_log(checked().outputs); }

@@ -63,6 +63,8 @@ class Pipeline : public Runnable<Pipeline> {
   AutoSchedulerResults auto_schedule(const std::string& name, const Target& target,
                                      const MachineParams& machine = {}) const;
   AutoSchedulerResults auto_schedule(const Target& target, const MachineParams& machine = {}) const;
+  // Its Funcs that got no directive stay without: gradients are computed where they are read, too.
+  void unscheduled();
   static void add_autoscheduler(const std::string& name, const AutoSchedulerFn& scheduler) {
     retrograde::add_autoscheduler(name, scheduler);
   }

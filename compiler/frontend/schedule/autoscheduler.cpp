@@ -85,7 +85,7 @@ void set_default_autoscheduler_name(const std::string& name) {
 
 std::string default_autoscheduler_name() {
   std::lock_guard lock(loaded().mutex);
-  return loaded().default_name;
+  return loaded().default_name.empty() ? built_in_autoscheduler : loaded().default_name;
 }
 
 AutoSchedulerFn find_autoscheduler(const std::string& name) {

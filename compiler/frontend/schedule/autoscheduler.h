@@ -1,6 +1,8 @@
 // autoscheduler.h -- functions that schedule a whole pipeline, by name.
 //
-// A scheduler lives in a library of its own, a plugin, which registers it when it is loaded:
+// One is built in: pipeline.auto_schedule(target). It computes at root, in parallel and vectorized,
+// what is dear to compute again, inlines the rest, and keeps what a user scheduled. Others live in
+// libraries of their own, plugins, which register them when they are loaded:
 // load_plugin("libgreedy.so"); pipeline.auto_schedule("Greedy", target).
 #pragma once
 
@@ -44,9 +46,11 @@ using AutoSchedulerFn =
 
 // A null function takes the name away.
 void add_autoscheduler(const std::string& name, const AutoSchedulerFn& scheduler);
-// Names of all that are loaded.
+// Names of all that are there.
 std::vector<std::string> autoscheduler_names();
-// The one that auto_schedule() without a name means; "" when none was set.
+inline constexpr const char* built_in_autoscheduler = "Retrograde";
+// The one that auto_schedule() without a name means: the built-in one, unless another was set; ""
+// means that again.
 // Requires: an autoscheduler is loaded from a plugin before it is used.
 void set_default_autoscheduler_name(const std::string& name);
 std::string default_autoscheduler_name();

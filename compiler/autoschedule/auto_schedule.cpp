@@ -1,0 +1,38 @@
+// auto_schedule.cpp -- the scheduler of Pipeline::auto_schedule() where no plugin was asked for.
+//
+// It gives the default schedule (default_schedule.h) to a copy of the graph. What the log of the
+// copy holds beyond that of the pipeline is then given to the pipeline, and is the source.
+#include "autoschedule/default_schedule.h"
+#include "diagnostics/large_stack.h"
+#include "frontend/run/pipeline.h"
+#include "frontend/schedule/autoscheduler.h"
+#include "graph/copy_graph.h"
+#include "graph/schedule_log.h"
+#include "graph/wrappers.h"
+
+namespace retrograde::ir {
+
+namespace {
+
+void schedule_all(const Pipeline& pipeline, const Target& target, const MachineParams&,
+                  AutoSchedulerResults* results) {
+  const std::vector<FuncPtr> outputs = pipeline.spec().outputs;
+  run_on_large_stack([&] {
+    const std::vector<FuncPtr> copy = copy_graph(apply_wrappers(outputs)).outputs;
+    const auto given = static_cast<std::ptrdiff_t>(schedule_log(copy).size());
+    give_default_schedule(copy, vector_unit_of(target), Scheduling::Everything);
+    ScheduleLog log = schedule_log(copy);
+    log.entries.erase(log.entries.begin(), log.entries.begin() + given);
+    apply_log(log, outputs);
+    results->schedule_source = log.to_cpp();
+  });
+}
+
+[[maybe_unused]] const bool is_added = [] {
+  add_autoscheduler(built_in_autoscheduler, schedule_all);
+  return true;
+}();
+
+}  // namespace
+
+}  // namespace retrograde::ir

@@ -1,0 +1,79 @@
+// Random pipelines under Pipeline::auto_schedule: always legal, and right. What is refused is
+// refused without a schedule, too.
+#include <gtest/gtest.h>
+
+#include <set>
+
+#include "frontend/run/pipeline.h"
+#include "ir/target.h"
+#include "testing/check_program.h"
+#include "testing/random_schedule.h"
+
+namespace retrograde::fuzz {
+namespace {
+
+constexpr uint64_t first_seed = 7000;
+constexpr int programs_per_shard = 40;
+constexpr int shards = 4;  // 160 programs, with nothing scheduled and with a part
+
+// What is said of half of the Funcs, and of those that are made of them.
+ScheduleLog part_of(const ScheduleLog& log, Choices& choices) {
+  ScheduleLog part;
+  std::set<std::string> seen, kept;
+  for (const ScheduleLog::Entry& entry : log.entries) {
+    if (seen.insert(entry.func).second && choices.below(2) == 0) kept.insert(entry.func);
+    if (!kept.count(entry.func)) continue;
+    part.entries.push_back(entry);
+    if (const std::string made = ir::made_by(entry.directive); !made.empty()) {
+      seen.insert(made);
+      kept.insert(made);
+    }
+  }
+  return part;
+}
+
+struct Built {
+  RandomProgram program;
+  ScheduleLog schedule;  // of a part, or none
+};
+Built build(uint64_t seed, bool has_schedule) {
+  Choices choices(seed);
+  Built built{make_program(choices, Style::pipelines()), {}};
+  if (has_schedule) built.schedule = part_of(random_schedule(built.program, choices), choices);
+  return built;
+}
+
+// How many values were compared.
+uint64_t check(uint64_t seed, bool has_schedule) {
+  const Target target = get_jit_target_from_environment();
+  const Built alone = build(seed, has_schedule);
+  const Judgement as_it_is = check_program(alone.program, alone.schedule, target).judgement;
+  if (has_schedule && as_it_is != Judgement::Right) return 0;
+  const Built built = build(seed, has_schedule);
+  apply(built.schedule, built.program);
+  const std::string text = to_text(built.program, built.schedule);
+  const std::string source = Pipeline(built.program.outputs).auto_schedule(target).schedule_source;
+  Judged judged = check_program(built.program, {}, target);
+  EXPECT_LE(judged.judgement, as_it_is)
+      << "seed " << seed << " is " << name_of(judged.judgement) << ": " << judged.detail << "\n"
+      << text << "auto_schedule gave\n"
+      << source;
+  return judged.counts["values"];
+}
+
+class AutoSchedule : public ::testing::TestWithParam<int> {};
+
+TEST_P(AutoSchedule, IsLegalAndRight) {
+  uint64_t compared = 0;
+  for (int i = 0; i < programs_per_shard; ++i) {
+    const auto seed = first_seed + static_cast<uint64_t>(GetParam() * programs_per_shard + i);
+    compared += check(seed, false);
+    compared += check(seed, true);
+  }
+  EXPECT_GT(compared, 100u * programs_per_shard);
+}
+
+INSTANTIATE_TEST_SUITE_P(Shard, AutoSchedule, ::testing::Range(0, shards));
+
+}  // namespace
+}  // namespace retrograde::fuzz
