@@ -189,18 +189,51 @@ TEST(ColumnColouring, ColumnsOfOneRowDiffer) {
   }
 }
 
+struct PatternQuery {
+  Var x{"x"};
+  Func seed{"seed"}, g{"g"};
+  CompressionQuery query;
+  PatternQuery() {
+    seed(x) = 1.0f;
+    g(x) = seed(clamp(3 * x / 2, 0, 6)) + seed(x % 3);
+    const Box box{{Expr(0), Expr(6)}};
+    query = {.output = g.function(), .seed = seed.function(), .rows = box, .columns = box};
+  }
+};
+
 TEST(Compression, PatternsThatTakeTooLongToFindAreRefused) {
-  Var x("x");
-  Func seed("seed"), g("g");
-  seed(x) = 1.0f;
-  g(x) = seed(clamp(3 * x / 2, 0, 6)) + seed(x % 3);
-  Box box{{Expr(0), Expr(6)}};
-  CompressionQuery query{
-      .output = g.function(), .seed = seed.function(), .rows = box, .columns = box};
+  CompressionQuery query = PatternQuery().query;
   EXPECT_NE(Compressed::make(query), nullptr);
   query.operations = 20;
-  expect_mentions(error_of<Unsupported>([&] { Compressed::make(query); }),
-                  {"\"g\"", "bounded search", "20 operations", "single directions"});
+  expect_mentions(
+      error_of<Unsupported>([&] { Compressed::make(query); }),
+      {query.output->name.c_str(), "bounded search", "20 operations", "single directions"});
+}
+
+// Wherever the operations end, between the pattern and its last entry.
+TEST(Compression, IsFoundOrRefusedForAnyNumberOfOperations) {
+  const Expr place = variable("p");
+  int found = 0, refused = 0;
+  for (unsigned long operations = 20; operations < 6000; operations += 20) {
+    CompressionQuery query = PatternQuery().query;
+    query.operations = operations;
+    try {
+      const auto matrix = Compressed::make(query);
+      const FuncPtr all = matrix->evaluate();
+      ASSERT_NE(all, nullptr);
+      EXPECT_FALSE(is_const_true(matrix->may_be_nonzero({place}, {place})));
+      const auto offsets = matrix->offsets();
+      ASSERT_TRUE(offsets.has_value());
+      EXPECT_EQ(offsets->at(0).min, -6);
+      EXPECT_EQ(offsets->at(0).max, 2);
+      found++;
+    } catch (const Unsupported& e) {
+      EXPECT_NE(std::string(e.what()).find("bounded search"), std::string::npos) << e.what();
+      refused++;
+    }
+  }
+  EXPECT_GT(found, 0);
+  EXPECT_GT(refused, 0);
 }
 
 }  // namespace

@@ -26,20 +26,15 @@ isl::map insert_input(const isl::map& m) {
 // parameters).
 std::optional<int64_t> spread(const isl::map& one_output) {
   isl::map pairs = one_output.reverse().apply_range(one_output);
-  isl_val* v = isl_set_dim_max_val(isl_map_deltas(pairs.copy()), 0);
-  std::optional<int64_t> result;
-  if (isl_val_is_int(v)) result = isl_val_get_num_si(v);
-  isl_val_free(v);
-  return result;
+  const isl::val largest = pairs.deltas().dim_max_val(0);
+  return largest.is_int() ? std::optional<int64_t>(largest.num_si()) : std::nullopt;
 }
 
 int64_t stride_of(const isl::map& one_output) {
   isl_stride_info* info = isl_map_get_range_stride_info(one_output.get(), 0);
   isl_val* v = isl_stride_info_get_stride(info);
-  int64_t result = isl_val_get_num_si(v);
-  isl_val_free(v);
   isl_stride_info_free(info);
-  return std::max<int64_t>(result, 1);
+  return std::max<int64_t>(isl::manage(v).num_si(), 1);
 }
 
 isl::pw_aff smallest_output(const isl::map& one_output) {

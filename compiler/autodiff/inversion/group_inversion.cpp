@@ -209,7 +209,7 @@ class GroupInverter {
     // Coalescing leaves unions that are one basic set all the same.
     isl::set hull = isl::manage(isl_set_from_basic_set(isl_set_simple_hull(needed.copy())));
     if (hull.is_equal(needed)) needed = hull;
-    if (!isl_set_plain_is_universe(needed.get()))
+    if (isl_set_plain_is_universe(needed.get()) != isl_bool_true)
       g.predicate.push_back(bridge_.to_expr(needed, names));
   }
 

@@ -7,6 +7,7 @@
 
 #include <isl/cpp.h>
 
+#include <algorithm>
 #include <map>
 #include <optional>
 #include <set>
@@ -31,6 +32,27 @@ struct IslContext {
 // Throws what isl failed by. Its C functions report a failure, the end of the budget as a rule, by
 // a value that passes for an answer, or by stopping half-way through a loop over pieces.
 void throw_if_failed(isl_ctx* ctx);
+
+// What `search` gives, for at most so many operations; nullopt when it takes more. The others of the
+// context count from 0 again.
+template <class Search>
+auto found_within(isl_ctx* ctx, unsigned long operations, const Search& search) {
+  throw_if_failed(ctx);
+  const unsigned long most = isl_ctx_get_max_operations(ctx);
+  isl_ctx_reset_operations(ctx);
+  isl_ctx_set_max_operations(ctx, std::min(operations, most));
+  std::optional<decltype(search())> result;
+  try {
+    result = search();
+    throw_if_failed(ctx);
+  } catch (const isl::exception&) {
+    result.reset();
+    isl_ctx_reset_error(ctx);
+  }
+  isl_ctx_reset_operations(ctx);
+  isl_ctx_set_max_operations(ctx, most);
+  return result;
+}
 
 class IslBridge {
  public:

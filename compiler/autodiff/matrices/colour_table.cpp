@@ -137,8 +137,7 @@ std::optional<ColourTable> colour_table(const isl::map& pattern, bool symmetric,
   Numbering rows{*row_ranges}, columns{*column_ranges};
   if (symmetric) rows = columns = around(*row_ranges, *column_ranges);
   if (rows.size() > many_entries || columns.size() > many_entries) return std::nullopt;
-  isl::set entries = isl::manage(isl_set_flatten(isl_map_wrap(pattern.copy())));
-  auto points = points_of(entries, many_entries);
+  auto points = points_of(pattern.wrap().flatten(), many_entries);
   if (!points) return std::nullopt;
   Entries list = numbered(*points, rows, columns);
   if (!symmetric) {

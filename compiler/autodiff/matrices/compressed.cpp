@@ -23,6 +23,8 @@ constexpr int64_t many_colours = 4096;
 constexpr int64_t few_colours = 3;
 // Differences that are looked at one by one.
 constexpr int64_t many_differences = 100'000;
+// Of isl, to leave a condition out that costs little.
+constexpr unsigned long covering_operations = 200'000;
 
 int64_t product(const std::vector<int64_t>& factors) {
   int64_t result = 1;
@@ -33,6 +35,19 @@ int64_t product(const std::vector<int64_t>& factors) {
   return result;
 }
 
+// Unsupported where isl gives up.
+template <class Search>
+auto found_or_refused(const CompressionQuery& query, const Search& search) {
+  try {
+    return search();
+  } catch (const isl::exception&) {
+    unsupported(text("compress the derivative in ", quoted(query.output->name)),
+                "which elements depend on which is found by a bounded search over index sets",
+                text("a part of it takes more than ", query.operations, " operations of isl"),
+                "Use products with single directions, or differentiate parts of it");
+  }
+}
+
 }  // namespace
 
 Compressed::Compressed(const CompressionQuery& query)
@@ -40,23 +55,26 @@ Compressed::Compressed(const CompressionQuery& query)
       dependence_(std::make_unique<Dependence>(query.output, query.seed, query.operations)),
       pattern_(dependence_->inside(query.rows, query.columns)) {}
 
-std::unique_ptr<Compressed> Compressed::make(const CompressionQuery& query) try {
-  std::unique_ptr<Compressed> result(new Compressed(query));
-  std::optional<Colours> colours = result->colour();
-  if (!colours) return nullptr;
-  result->colours_ = *colours;
-  return result;
-} catch (const isl::exception&) {
-  unsupported(text("compress the derivative in ", quoted(query.output->name)),
-              "which elements depend on which is found by a bounded search over index sets",
-              text("a part of it takes more than ", query.operations, " operations of isl"),
-              "Use products with single directions, or differentiate parts of it");
+std::unique_ptr<Compressed> Compressed::make(const CompressionQuery& query) {
+  return found_or_refused(query, [&]() -> std::unique_ptr<Compressed> {
+    std::unique_ptr<Compressed> result(new Compressed(query));
+    std::optional<Colours> colours = result->colour();
+    if (!colours) return nullptr;
+    result->colours_ = *colours;
+    return result;
+  });
+}
+
+// What is asked of the pattern later has all the operations to itself.
+template <class Search>
+auto Compressed::searched(const Search& search) const {
+  isl_ctx_reset_operations(dependence_->context().ctx);
+  return found_or_refused(query_, search);
 }
 
 std::optional<Colours> Compressed::colour() const {
   size_t dims = query_.seed->args.size();
-  if (dims == 0 || isl_map_is_empty(pattern_.get()) == isl_bool_true)
-    return Colours{{std::vector<int64_t>(dims, 0), 1}, {}};
+  if (dims == 0 || pattern_.is_empty()) return Colours{{std::vector<int64_t>(dims, 0), 1}, {}};
   isl::set differences =
       (query_.diagonal_only ? pattern_ : pattern_.reverse().apply_range(pattern_)).deltas();
   int64_t most = query_.most_colours > 0 ? query_.most_colours : many_colours;
@@ -111,8 +129,10 @@ std::optional<Colouring> Compressed::linear_colours(const isl::set& differences,
 Expr Compressed::seed_value(const std::vector<Expr>& column, const Expr& colour) const {
   Type type = query_.seed->types[0];
   Expr condition = colours_.of(column) == colour;
-  isl::map reached = dependence_->inside(query_.rows, {});
-  if (isl_map_is_subset(reached.get(), pattern_.get()) != isl_bool_true) {
+  const auto covers = found_within(dependence_->context().ctx, covering_operations, [&] {
+    return dependence_->inside(query_.rows, {}).is_subset(pattern_);
+  });
+  if (!covers.value_or(false)) {
     for (size_t d = 0; d < column.size(); ++d) {
       const Interval& range = query_.columns[d];
       if (range.min.defined()) condition = condition && column[d] >= range.min;
@@ -123,7 +143,7 @@ Expr Compressed::seed_value(const std::vector<Expr>& column, const Expr& colour)
 }
 
 FuncPtr Compressed::evaluate() const {
-  if (isl_map_is_empty(pattern_.get()) == isl_bool_true) return nullptr;
+  if (searched([&] { return pattern_.is_empty(); })) return nullptr;
   auto seeds = make_func(Role::Coloured);
   seeds->name = claim_name(query_.seed->name + "_by_colour");
   seeds->made->of = query_.seed->name;
@@ -141,8 +161,10 @@ Expr Compressed::may_be_nonzero(const std::vector<Expr>& row,
   names.insert(names.end(), column.begin(), column.end());
   std::vector<std::string> dims;
   for (size_t d = 0; d < names.size(); ++d) dims.push_back("e" + std::to_string(d));
-  isl::set entries = isl::manage(isl_set_flatten(isl_map_wrap(pattern_.copy())));
-  return simplify(IslBridge(dependence_->context(), dims).to_expr(entries, names));
+  return searched([&] {
+    return simplify(
+        IslBridge(dependence_->context(), dims).to_expr(pattern_.wrap().flatten(), names));
+  });
 }
 
 // A star colouring finds an entry in its own row, or that of its transpose in the other.
@@ -159,10 +181,12 @@ Expr Compressed::entry(const FuncPtr& all, const std::vector<Expr>& row,
 
 std::optional<std::vector<ConstantRange>> Compressed::offsets() const {
   if (query_.seed->args.size() != query_.output->args.size()) return std::nullopt;
-  isl::set deltas = pattern_.deltas();
-  if (isl_set_is_empty(deltas.get()) == isl_bool_true)
-    return std::vector<ConstantRange>(query_.seed->args.size(), ConstantRange::point(0));
-  return ranges_of(deltas);
+  return searched([&]() -> std::optional<std::vector<ConstantRange>> {
+    isl::set deltas = pattern_.deltas();
+    if (deltas.is_empty())
+      return std::vector<ConstantRange>(query_.seed->args.size(), ConstantRange::point(0));
+    return ranges_of(deltas);
+  });
 }
 
 }  // namespace retrograde::ir

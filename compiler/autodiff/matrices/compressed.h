@@ -45,6 +45,8 @@ class Compressed {
   explicit Compressed(const CompressionQuery& query);
   std::optional<Colours> colour() const;
   std::optional<Colouring> linear_colours(const isl::set& differences, int64_t most) const;
+  template <class Search>
+  auto searched(const Search& search) const;
   Expr seed_value(const std::vector<Expr>& column, const Expr& colour) const;
   CompressionQuery query_;
   std::unique_ptr<Dependence> dependence_;

@@ -46,20 +46,8 @@ isl::map hull_of(const isl::map& m) {
 
 // Fewer pieces of the same, when they are found soon.
 std::optional<isl::map> coalesced_soon(const isl::map& m) {
-  isl_ctx* ctx = isl_map_get_ctx(m.get());
-  throw_if_failed(ctx);
-  const unsigned long operations = isl_ctx_get_max_operations(ctx);
-  isl_ctx_reset_operations(ctx);
-  isl_ctx_set_max_operations(ctx, std::min(coalescing_operations, operations));
-  std::optional<isl::map> result;
-  try {
-    result = m.coalesce();
-  } catch (const isl::exception&) {
-    isl_ctx_reset_error(ctx);
-  }
-  isl_ctx_reset_operations(ctx);
-  isl_ctx_set_max_operations(ctx, operations);
-  return result;
+  return found_within(isl_map_get_ctx(m.get()), coalescing_operations,
+                      [&] { return m.coalesce(); });
 }
 
 isl::map tidy(const isl::map& m) {
@@ -199,7 +187,7 @@ class Composer {
     auto found = relations_.find(f);
     return found != relations_.end() &&
            std::any_of(found->second.begin(), found->second.end(),
-                       [](const isl::map& m) { return !isl_map_is_empty(m.get()); });
+                       [](const isl::map& m) { return !m.is_empty(); });
   }
 
   // One for each value of a Tuple, or one for all where updates may couple them.
@@ -220,7 +208,7 @@ class Composer {
     }
     isl::map result = empty_map(context_.ctx, f.args.size(), dims());
     for (int s = 0; s < f.stage_count(); ++s) result = result.unite(of_stage(f, s, std::nullopt));
-    if (!isl_map_is_empty(result.get())) result = coupling(f).apply_range(result);
+    if (!result.is_empty()) result = coupling(f).apply_range(result);
     return {tidy(result)};
   }
 
