@@ -46,8 +46,9 @@ void factor(Stage update, const RVar& lane, const RVar& row) {
   Func parts = update.rfactor({{lane, u}, {row, v}});
   std::vector<VarOrRVar> order{u};
   for (const VarOrRVar& loop : parts.update().split_vars()) {
-    if (loop.name() != u.name()) order.push_back(loop);
+    if (loop.name() != u.name() && loop.name() != v.name()) order.push_back(loop);
   }
+  order.push_back(v);
   parts.compute_root().reorder(u, v).parallel(v);
   vectorize(Stage(parts.function(), 0), u, lanes_of_a_sum, TailStrategy::Auto);
   parts.update().reorder(order).parallel(v);
