@@ -321,6 +321,24 @@ TEST_P(Async, AMemoizedAsyncFuncWaitsForWhatItReads) {
   }
 }
 
+// Its second call finds g in the cache: nobody would take what f makes.
+TEST(AsyncErrors, LoopsOfAMemoizedFunc) {
+  Var x("x"), y("y");
+  Func f("f"), g("g"), out("out");
+  f(x, y) = x + y;
+  g(x, y) = f(x, y) * 2;
+  out(x, y) = g(x, y) + 1;
+  f.store_root().compute_at(g, y).async();
+  g.compute_root().memoize();
+  expect_mentions(error_of<Unsupported>([&] { out.realize({8, 8}); }),
+                  {"\"f\" async", "always run", "\"g\", which is memoized", "Store"});
+  f.store_at(g, y);
+  for (int round = 0; round < 2; ++round) {
+    Buffer<int> result = out.realize({8, 8});
+    EXPECT_EQ(result(3, 4), 15);
+  }
+}
+
 TEST_P(Async, StorageMayBeHoisted) {
   for (const bool slides : {false, true}) {
     Var x("x"), y("y"), yo("yo"), yi("yi");

@@ -262,7 +262,7 @@ class Func : public LoopDirectives<Func>, public Runnable<Func> {
   //   produce g; consume g   =>   fork { produce g, signal } and { wait, consume g }
   // Requires: what an async Func and its consumer both read is stored no further out than the async
   // Func, or computed outside of the loops that they share; the loops between storage and
-  // computation of an async Func are serial (Unsupported).
+  // computation of an async Func are serial and always run (Unsupported).
   Func& async() { return give(ir::Async{}); }
 
   // ---- what is known of its size ----

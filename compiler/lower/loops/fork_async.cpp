@@ -22,7 +22,7 @@
 //         is computed in its branch, and in the other as well where that reads it too, or what is
 //         computed together with it (compute_with).
 // Errors: such a value that both branches read, and whose storage lasts longer than theirs; loops
-//         between storage and computation that are not serial.
+//         between storage and computation that are not serial, or belong to a memoized Func.
 // Source: Halide's documentation of async; the handshake is a bounded buffer's (Dijkstra 1965).
 // Tests: test/unit/async_test.cpp.
 #include "lower/loops/fork_async.h"
@@ -353,7 +353,32 @@ class AsyncForker : public Rewriter {
 
   // ---- produced in a loop ----
 
+  [[noreturn]] void refuse_loops(const std::string& func, const std::string& evidence,
+                                 const char* instead) const {
+    unsupported(
+        text("compute ", quoted(original(func)), " async"),
+        "the loops between storage and computation of an async Func are serial and always run",
+        evidence, instead);
+  }
+
+  // The branch that produces would wait for ever for a consumer that is in the cache.
+  void check_is_consumed(const Realize& n) const {
+    walk(
+        n.body, [](const Expr&) { return false; },
+        [&](const Stmt& s) {
+          const ProducerConsumer* around = as_producer(s);
+          if (!around || !may_be_skipped(*around) || group_of(*around).count(n.name) ||
+              !produces(around->body, n.name))
+            return true;
+          refuse_loops(
+              n.name,
+              text("they are those of ", quoted(original(around->name)), ", which is memoized"),
+              "Store the Func inside of that loop, or do not memoize the other");
+        });
+  }
+
   Stmt fork_loops(const Realize& n) {
+    check_is_consumed(n);
     const auto found = room_.find(original(n.name));
     const int room = found == room_.end() ? 1 : found->second;
     return forked(n, room, branches_of(n, true, room));
@@ -395,10 +420,8 @@ class AsyncForker : public Rewriter {
 
   void check_serial(const For& n, const std::string& func) const {
     if (n.runs == ForType::Serial) return;
-    unsupported(text("compute ", quoted(original(func)), " async"),
-                "the loops between storage and computation of an async Func are serial",
-                text("the loop ", describe_loop(n.name), " is not"),
-                "Store the Func inside of that loop");
+    refuse_loops(func, text("the loop ", describe_loop(n.name), " is not serial"),
+                 "Store the Func inside of that loop");
   }
 
   // Just the work of the producer and of what it needs, and the control around. Undefined where
