@@ -166,7 +166,8 @@ void give_default_schedule(const std::vector<FuncPtr>& outputs, const VectorUnit
   }
   for (const FuncPtr& f : order) {  // so that the log tells of every Func
     const bool is_output = std::find(outputs.begin(), outputs.end(), f) != outputs.end();
-    if (!is_touched(*f) && f->is_pure() && !is_output) Func(f).compute_inline();
+    const bool is_inlined = f->schedule.compute_level.kind == LoopLevel::Kind::Inlined;
+    if (is_inlined && !is_touched(*f) && f->is_pure() && !is_output) Func(f).compute_inline();
   }
 }
 
