@@ -58,12 +58,27 @@ std::optional<size_t> transposed_dimension(const FuncContents& f, const Definiti
   return result;
 }
 
+// The blocks that a stage adds up, where they are computed for it alone.
+FuncPtr block_of(const Definition& stage) {
+  FuncPtr result;
+  for_each_expr(stage, [&](const Expr& root) {
+    walk(root, [&](const Expr& e) {
+      const auto* call = e.as<Call>();
+      const FuncPtr callee = call && call->call_type == CallType::Func ? func_of(*call) : nullptr;
+      const bool is_block = callee && callee->made && callee->made->blocks > 0;
+      if (is_block && !is_touched(*callee)) result = callee;
+      return true;
+    });
+  });
+  return result;
+}
+
 // The directives of one stage of a Func that is computed at root. Pure dimensions only: their
 // iterations are independent whatever the stage does.
 class LoopChooser {
  public:
   LoopChooser(const FuncPtr& f, int stage, const VectorUnit& unit)
-      : f_(*f), index_(stage), stage_(f, stage), unit_(unit) {
+      : function_(f), f_(*f), index_(stage), stage_(f, stage), unit_(unit) {
     for (size_t d = 0; d < f_.args.size(); ++d) {
       if (is_pure_position(f_, definition(), d)) pure_.push_back(d);
     }
@@ -72,6 +87,7 @@ class LoopChooser {
   void give() {
     const bool scatters = scatters_in_order(f_, definition());
     if (scatters) schedule_scatter_in_order(f_, index_, stage_);
+    if (const FuncPtr block = block_of(definition())) return give_blocks(block);
     if (pure_.empty()) return;
     if (auto d = pure_[0] == 0 ? transposed_dimension(f_, definition()) : std::nullopt)
       return tile(*d);
@@ -91,12 +107,24 @@ class LoopChooser {
   Var variable_of(size_t dimension) const { return Var(f_.args[dimension]); }
   Var inside(const Var& loop) const { return Var(inner_loop(f_, index_, loop.name())); }
 
-  // Whether there is a tile. Its loops stand inside of those of the reduction; those over tiles
-  // outside, of the sides first, so that what the last dimensions run over stays in the cache.
+  // Whether there is a tile.
   bool tile_in_registers() {
-    const bool has_lanes = f_.made && f_.made->lanes > 0;
-    const auto tile = register_tile(f_, definition(), lanes, has_lanes ? 1 : 4, unit_);
+    const auto tile = tile_of(f_, definition());
     if (!tile) return false;
+    const std::vector<VarOrRVar> outer = cut(*tile);
+    stage_.parallel(outer.back());
+    if (outer.size() > 2) stage_.parallel(outer[outer.size() - 2]);  // the last may be short
+    return true;
+  }
+
+  std::optional<RegisterTile> tile_of(const FuncContents& f, const Definition& reduction) const {
+    const bool has_lanes = f.made && f.made->lanes > 0;
+    return register_tile(f, reduction, lanes, has_lanes ? 1 : 4, unit_);
+  }
+
+  // Its loops stand inside of those of the reduction; those over tiles outside, of the sides first,
+  // so that what the last dimensions run over stays in the cache. The result: these.
+  std::vector<VarOrRVar> cut(const RegisterTile& tile) {
     std::vector<VarOrRVar> inner, outer;
     const auto cut = [&](size_t d, int64_t size) {
       const Var all = variable_of(d), part = inside(all);
@@ -104,8 +132,8 @@ class LoopChooser {
       inner.push_back(part);
       outer.push_back(all);
     };
-    cut(0, tile->vectors * lanes);
-    for (const RegisterTile::Side& side : tile->sides) cut(side.dimension, side.size);
+    cut(0, tile.vectors * lanes);
+    for (const RegisterTile::Side& side : tile.sides) cut(side.dimension, side.size);
     std::vector<VarOrRVar> order = inner;
     for (const ReductionVariable& r : definition().rvars) order.push_back(RVar(r.var));
     for (size_t d : pure_) {
@@ -116,16 +144,36 @@ class LoopChooser {
     }
     order.insert(order.end(), outer.begin(), outer.end());
     stage_.reorder(order);
-    if (tile->vectors > 1) {
+    if (tile.vectors > 1) {
       const Var vector(new_loop(f_, index_, "vector"));
       stage_.split(inner[0], inner[0], vector, lanes).vectorize(vector).unroll(inner[0]);
     } else {
       stage_.vectorize(inner[0]);
     }
     for (size_t i = 1; i < inner.size(); ++i) stage_.unroll(inner[i]);
+    return outer;
+  }
+
+  // A tile of another Func by the same variables' dimensions of this one.
+  RegisterTile renumbered(RegisterTile tile, const FuncContents& other) const {
+    for (RegisterTile::Side& side : tile.sides) {
+      const auto found = std::find(f_.args.begin(), f_.args.end(), other.args[side.dimension]);
+      side.dimension = static_cast<size_t>(found - f_.args.begin());
+    }
+    return tile;
+  }
+
+  // The sums of a tile: a block of each after the other, in registers, is added to what memory
+  // holds.
+  void give_blocks(const FuncPtr& block) {
+    const RVar each(definition().rvars[0].var);
+    Func(block).compute_at(Func(function_), each);
+    if (pure_.empty() || pure_[0] != 0) return;
+    const RegisterTile tile = tile_of(*block, block->updates[0]).value_or(RegisterTile());
+    const std::vector<VarOrRVar> outer = cut(renumbered(tile, *block));
     stage_.parallel(outer.back());
-    if (outer.size() > 2) stage_.parallel(outer[outer.size() - 2]);  // the last may be short
-    return true;
+    if (outer.size() > 2) stage_.parallel(outer[outer.size() - 2]);
+    for (int s = 0; s < block->stage_count(); ++s) LoopChooser(block, s, unit_).cut(tile);
   }
 
   // Squares, whose rows stay in the cache until their columns are read.
@@ -137,6 +185,7 @@ class LoopChooser {
     stage_.parallel(variable_of(pure_.back()));
   }
 
+  const FuncPtr function_;
   const FuncContents& f_;
   const int index_;
   Stage stage_;

@@ -94,7 +94,8 @@ std::optional<RegisterTile> register_tile(const FuncContents& f, const Definitio
   int64_t bytes = 0;
   for (const Type& type : f.types) bytes += type.bytes() * lanes;
   std::vector<size_t> sides;  // the last first: channels are, where they are no lanes
-  for (size_t d = f.args.size(); d-- > 1;) {
+  const size_t numbers = f.made ? f.made->blocks : 0;  // of blocks, of which one is at hand
+  for (size_t d = f.args.size() - numbers; d-- > 1;) {
     if (is_pure_position(f, stage, d)) sides.push_back(d);
   }
   RegisterTile best;

@@ -69,7 +69,7 @@ class StorageChooser {
         stored |= limits_->need_root.contains(f.get()) || limits_->levels.contains(f.get());
         stored &= !limits_->stay.contains(f.get());
       }
-      if (!stored) continue;
+      if (!stored || is_block_of_one(f)) continue;
       stored_.insert(f.get());
       result.push_back(f);
     }
@@ -81,12 +81,21 @@ class StorageChooser {
     return std::find(outputs_.begin(), outputs_.end(), f) != outputs_.end();
   }
 
+  // A block of a sum is computed where it is added up: see default_schedule.cpp.
+  bool is_block_of_one(const FuncPtr& f) const {
+    if (!f->made || f->made->blocks == 0 || is_output(f)) return false;
+    const auto found = readers_.find(f.get());
+    return found != readers_.end() && found->second.size() == 1;
+  }
+
   void count_reads(const FuncContents& f) {
     for (int s = 0; s < f.stage_count(); ++s) {
       walk_definition(f.stage(s), [&](const Expr& e) {
         const auto* call = e.as<Call>();
-        if (call && call->call_type == CallType::Func && call->symbol.raw() != &f)
+        if (call && call->call_type == CallType::Func && call->symbol.raw() != &f) {
           uses_[call->symbol.raw()].reads += reads_an_element(*call, f, f.stage(s));
+          readers_[call->symbol.raw()].insert(&f);
+        }
       });
     }
   }
@@ -128,6 +137,7 @@ class StorageChooser {
   const std::vector<FuncPtr> order_;
   const PlacementLimits* const limits_;
   std::unordered_map<const Symbol*, Use> uses_;
+  std::unordered_map<const Symbol*, std::unordered_set<const FuncContents*>> readers_;
   std::unordered_set<const FuncContents*> stored_;
 };
 

@@ -238,6 +238,8 @@ class GraphReader {
       *flag->second = true;
     } else if (line.word == "lanes") {
       made.lanes = integer(line, {parse_expr(line.rest)}, 0);
+    } else if (line.word == "blocks") {
+      made.blocks = integer(line, {parse_expr(line.rest)}, 0);
     } else if (line.word == "work") {
       made.work.emplace_back();
     } else if ((line.word == "work_value" || line.word == "work_loop") && !made.work.empty()) {

@@ -109,6 +109,7 @@ class GraphPrinter {
       if (t.infinite) line("infinite");
       if (made.lanes > 0) line("lanes ", made.lanes);
       if (made.has_parts) line("parts");
+      if (made.blocks > 0) line("blocks ", made.blocks);
       for (const AdjointWork& work : made.work) {
         line("work");
         for (const Expr& value : work.values) line("work_value ", value);

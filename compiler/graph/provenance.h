@@ -57,6 +57,8 @@ struct Provenance {
   std::vector<AdjointWork> work;  // of its last update, where a table says what iterations do
   int lanes = 0;  // of private parts: extent of the first dimension, in which lanes add apart
   bool has_parts = false;  // of private parts: its last dimension numbers them
+  int blocks = 0;  // of a block, which adds few of the terms of a long sum: its last dimensions,
+                   // which number blocks
 };
 
 }  // namespace retrograde::ir

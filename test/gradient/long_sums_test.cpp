@@ -14,7 +14,7 @@ namespace retrograde {
 namespace {
 
 constexpr int many = 12'000'000;
-constexpr float huge = 3e38f;
+constexpr float huge = 1e37f;  // of which a block can add up its terms
 
 struct Nature {
   const char* name;

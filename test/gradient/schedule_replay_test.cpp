@@ -124,7 +124,7 @@ TEST(ScheduleOfAGradient, IsStatements) {
   Func layer = called("layer"), seed_im = called("seed_im"), out_adj = called("out_adj"),
        layer_adj = called("layer_adj"), image_adj = called("image_adj"),
        filter_adj_parts = called("filter_adj_parts"), filter_adj = called("filter_adj"),
-       bias_adj = called("bias_adj");
+       bias_adj_parts = called("bias_adj_parts"), bias_adj = called("bias_adj");
 #include "golden/schedule_log/gradient.inc"
   EXPECT_EQ(same_numbers(ir::to_text(ir::graph_of(functions(program)))),
             same_numbers(ir::to_text(ir::graph_of(scheduled))));

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <map>
 
+#include "autodiff/sweeps/blocked_sums.h"
 #include "autodiff/sweeps/gather_places.h"
 #include "autodiff/sweeps/local_derivative.h"
 #include "autodiff/sweeps/regions.h"
@@ -285,7 +286,7 @@ class Builder {
     }
     for (const UpdateGroup& group : join_taps(groups)) {
       const Iterations update = over_taps(group);
-      is_worth_splitting(group.gather) ? add_privatised(update) : add_update(update);
+      is_worth_splitting(update) ? add_privatised(update) : add_update(update);
     }
     if (is_wide_) round_once();
     return std::move(result_);
@@ -357,9 +358,35 @@ class Builder {
     result_.stages.push_back(Accumulation::Pointwise);
   }
 
+  // Whether the terms are added in float32 blocks before they come to a sum in double. Data may
+  // send whatever they like to an element of a scatter.
+  bool has_blocks(const Iterations& update) const {
+    return is_wide_ && !update.over.scatters && sums_many_terms(update.over) &&
+           std::all_of(target_.types.begin(), target_.types.end(),
+                       [](Type t) { return t == Float(32); });
+  }
+  // The rest of an update whose terms are added up by a block; false: there is none.
+  bool take_blocks(const std::vector<Expr>& point, int lanes, std::vector<ReductionVariable>& rvars,
+                   std::vector<Expr>& terms, Expr& predicate) {
+    const auto sum = sum_in_blocks(name_, target_.name, point, rvars, terms, predicate);
+    if (!sum) return false;
+    sum->block->made->lanes = lanes;
+    estimate(sum->block);
+    result_.helpers.push_back(sum->block);
+    rvars = sum->rvars;
+    terms = sum->values;
+    predicate = Expr();
+    return true;
+  }
+
   void add_update(const Iterations& update) {
-    const auto& [place, given, sums] = update.all;
-    const bool is_loop = !update.rvars.empty();
+    auto [place, given, sums] = update.all;
+    std::vector<ReductionVariable> rvars = update.rvars;
+    const bool is_loop = !rvars.empty();
+    if (has_blocks(update)) {
+      if (given.defined()) given = with_likely_parts(given, rvars);
+      take_blocks(parts_point(update.over, args_, {}, {}), 0, rvars, sums, given);
+    }
     std::vector<Expr> values;
     for (size_t k = 0; k < types_.size(); ++k) {
       Expr self = call_value(result_.func, place, static_cast<int>(k));
@@ -368,15 +395,16 @@ class Builder {
       values.push_back(term.defined() ? self + cast_to(self.type(), term) : self);
     }
     Expr predicate;
-    if (is_loop && given.defined()) predicate = with_likely_parts(given, update.rvars);
-    append_update(result_.func, place, values, update.rvars, predicate);
+    if (is_loop && given.defined()) predicate = with_likely_parts(given, rvars);
+    append_update(result_.func, place, values, rvars, predicate);
     result_.stages.push_back(update.over.scatters ? Accumulation::Scatter : Accumulation::Gather);
   }
 
   // Whether the elements alone give too little to do in parallel, and each sums over many
   // iterations.
-  bool is_worth_splitting(const Gather& g) const {
-    return g.rdom && (leaves_lanes_idle(g) || is_few_elements(g));
+  bool is_worth_splitting(const Iterations& update) const {
+    const Gather& g = update.over;
+    return g.rdom && (leaves_lanes_idle(update) || is_few_elements(g));
   }
   bool is_few_elements(const Gather& g) const {
     if (elements_of(g) > few_elements) return false;
@@ -384,14 +412,35 @@ class Builder {
     double iterations = iterations_of(g, many_iterations);
     return iterations >= (has_pure_dimension(g) ? many_iterations : part_count * lane_count);
   }
-  // Whether rows of elements are shorter than a vector, as in a small kernel with many channels,
-  // while each element sums over long rows.
-  bool leaves_lanes_idle(const Gather& g) const {
+  // Whether vectors of elements are worse than vectors of terms: rows of elements are shorter than
+  // one, as in a small kernel with many channels, or lie across what is read, as in a layer that
+  // mixes channels; while each element sums over long rows.
+  bool leaves_lanes_idle(const Iterations& update) const {
+    const Gather& g = update.over;
     if (g.scatters || g.pure.empty() || target_.region.size() != g.pure.size()) return false;
     const auto row = as_const_int(g.rdom->vars[0].extent);
-    return g.pure[0] && extent_of(target_.region[0]) * 2 <= lane_count &&
-           (!row || *row >= lane_count) && elements_of(g) <= near_elements &&
-           iterations_of(g, many_iterations) >= lanes_pay;
+    const bool is_short = extent_of(target_.region[0]) * 2 <= lane_count;
+    return g.pure[0] && (is_short || reads_across(update)) && (!row || *row >= lane_count) &&
+           elements_of(g) <= near_elements && iterations_of(g, many_iterations) >= lanes_pay;
+  }
+  // Whether all that is read for neighbouring elements lies apart, and that for neighbouring terms
+  // together.
+  bool reads_across(const Iterations& update) const {
+    const std::string &row = target_.args[0], &term = update.rvars[0].var;
+    bool along = false, across = false;
+    const auto note = [&](const Expr& e) {
+      const auto* call = e.as<Call>();
+      if (!call || call->call_type == CallType::Operator || call->args.empty()) return true;
+      along |= uses_variable(call->args[0], row);
+      across |= uses_variable(call->args[0], term) &&
+                std::any_of(call->args.begin() + 1, call->args.end(),
+                            [&](const Expr& arg) { return uses_variable(arg, row); });
+      return true;
+    };
+    for (const Expr& sum : update.all.sums) {
+      if (sum.defined()) walk(sum, note);
+    }
+    return across && !along;
   }
   // Each part of a scatter holds every element that it may reach: the more elements for the
   // iterations, the fewer parts. A power of two. One: there are only lanes. Where sizes are known
@@ -477,8 +526,8 @@ class Builder {
   // no lanes, without `part` no parts. Beyond the end the place is clamped: what it reads must
   // exist even where the condition is false. Both are cut off the steady state, whose accumulators
   // stay in registers.
-  static Slice slice_of(const Iterations& update, const Expr& lane, const Expr& part,
-                        const Expr& parts) {
+  Slice slice_of(const Iterations& update, const Expr& lane, const Expr& part,
+                 const Expr& parts) const {
     Slice slice;
     slice.rvars = update.rvars;
     auto rdom = std::make_shared<ReductionDomainContents>();
@@ -491,6 +540,7 @@ class Builder {
       const bool in_parts = i == last && part.defined(), in_lanes = i == 0 && lane.defined();
       if (in_lanes) r.extent = simplify((r.extent + (lane_count - 1)) / lane_count);
       if (in_parts) r.extent = simplify((r.extent + (parts - 1)) / parts);
+      if ((in_parts || in_lanes) && has_blocks(update)) r.extent = in_whole_blocks(r.extent);
       Expr at = variable(r.var, Int(32), SymbolRef(rdom));
       if (in_parts) at = part * r.extent + at;
       if (in_lanes) at = at * lane_count + lane;
@@ -526,16 +576,19 @@ class Builder {
     const auto& [place, given, sums] = update.all;
     if (given.defined())
       slice.conditions.push_back(substitute(with_likely_parts(given, update.rvars), slice.place));
-    std::vector<Expr> element;
+    std::vector<Expr> element, terms;
     for (const Expr& e : place) element.push_back(substitute(e, slice.place));
-    std::vector<Expr> lhs = parts_point(g, element, lane, part), values;
+    for (const Expr& sum : sums)
+      terms.push_back(sum.defined() ? substitute(sum, slice.place) : sum);
+    Expr predicate = conjunction(slice.conditions);
+    const std::vector<Expr> lhs = parts_point(g, element, lane, part);
+    if (has_blocks(update)) take_blocks(lhs, parts->made->lanes, slice.rvars, terms, predicate);
+    std::vector<Expr> values;
     for (size_t k = 0; k < types_.size(); ++k) {
       Expr self = call_value(parts, lhs, static_cast<int>(k));
-      const Expr& term = sums[k];
-      values.push_back(term.defined() ? self + cast_to(self.type(), substitute(term, slice.place))
-                                      : self);
+      values.push_back(terms[k].defined() ? self + cast_to(self.type(), terms[k]) : self);
     }
-    append_update(parts, lhs, values, slice.rvars, conjunction(slice.conditions));
+    append_update(parts, lhs, values, slice.rvars, predicate);
     result_.helpers.push_back(parts);
     sum_parts(g, parts, lane.defined(), count);
     note_parts(g, count);

@@ -19,10 +19,12 @@
 // is wrong by a tenth. An adjoint in float32 that sums many_terms iterations or more for an element
 // (or an unknown number, or whatever a scatter brings to it) is accumulated in double, private
 // parts included, by a Func of its own, f_adj_sum, and is rounded once: f_adj(y) =
-// float(f_adj_sum(y)). So its error is that of its terms, under every schedule, and only the result
-// can overflow. Compensated sums in float32 would cost four dependent additions a term and break
-// under reassociation by rfactor; a tree costs storage. Shorter sums stay in float32: gathers over
-// stencils and small kernels, at most many_terms * 2^-24 of the sum of absolute values wrong.
+// float(f_adj_sum(y)). Gathers bring it their terms in short blocks of float32 (blocked_sums.h). So
+// the error is that of the terms and at most 1e-6 of the sum of their absolute values, under every
+// schedule, and but for a block only the result can overflow. Compensated sums in float32 would cost
+// four dependent additions a term and break under reassociation by rfactor; a tree costs storage.
+// Shorter sums stay in float32: gathers over stencils and small kernels, at most many_terms * 2^-24
+// of the sum of absolute values wrong.
 #pragma once
 
 #include <string>
