@@ -86,7 +86,10 @@ class LoopChooser {
 
   void give() {
     const bool scatters = scatters_in_order(f_, definition());
-    if (scatters) schedule_scatter_in_order(f_, index_, stage_);
+    if (scatters)
+      schedule_scatter_in_order(f_, index_, stage_);
+    else
+      unroll_taps(definition(), stage_);
     if (const FuncPtr block = block_of(definition())) return give_blocks(block);
     if (pure_.empty()) return;
     if (auto d = pure_[0] == 0 ? transposed_dimension(f_, definition()) : std::nullopt)

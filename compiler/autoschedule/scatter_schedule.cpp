@@ -178,7 +178,7 @@ bool scatters_in_order(const FuncContents& f, const Definition& stage) {
   if (stage.rvars.empty() || stage.args.empty()) return false;
   auto extent = as_const_int(stage.rvars[0].extent);
   if (extent && *extent < most_lanes) return false;
-  return reads_memory(stage.args[0], MemoryReads::Functions) && adds_to_itself(f, stage);
+  return !is_pure_position(f, stage, 0) && scatters(f, stage);
 }
 
 void schedule_scatter_in_order(const FuncContents& f, int index, Stage& stage) {
@@ -193,6 +193,10 @@ void schedule_scatter_in_order(const FuncContents& f, int index, Stage& stage) {
       .reorder(order)
       .vectorize(lane);
   for (const VarOrRVar& tap : taps) stage.unroll(tap);
+}
+
+void unroll_taps(const Definition& update, Stage& stage) {
+  for (const VarOrRVar& tap : loops_of(update, true)) stage.unroll(tap);
 }
 
 }  // namespace retrograde::ir

@@ -28,9 +28,12 @@ std::optional<ScatterLanes> scatter_lanes(const FuncContents& f);
 // All of f, computed at root.
 void schedule_scatter_lanes(const FuncPtr& f, const ScatterLanes& lanes);
 
-// Whether the stage adds to places along the first dimension, where data say, over a loop that is
-// worth vectors of iterations.
+// Whether the stage adds to places that data decide, along the first dimension too, over a loop that
+// is worth vectors of iterations.
 bool scatters_in_order(const FuncContents& f, const Definition& stage);
 void schedule_scatter_in_order(const FuncContents& f, int index, Stage& stage);
+
+// Elsewhere: one sweep for each tap, which then knows its place.
+void unroll_taps(const Definition& update, Stage& stage);
 
 }  // namespace retrograde::ir
