@@ -115,8 +115,9 @@ void note_traits(const FuncPtr& f, const std::vector<Expr>& adjoints) {
   }
 }
 
-// What two gathers must agree on, with the reduction variables numbered.
-std::string shape_of(const Gather& g) {
+// What two gathers must agree on to share an update, with the reduction variables numbered. To be
+// taps of one, scatters need not agree on the places that are no pure dimensions.
+std::string shape_of(const Gather& g, bool with_places = true) {
   Substitution canonical;
   std::string key;
   if (g.rdom) {
@@ -125,7 +126,8 @@ std::string shape_of(const Gather& g) {
       key += print(g.rdom->vars[i].min) + ":" + print(g.rdom->vars[i].extent) + ";";
     }
   }
-  for (const Expr& e : g.lhs) key += print(substitute(e, canonical)) + ",";
+  for (size_t d = 0; d < g.lhs.size(); ++d)
+    key += with_places || g.pure[d] ? print(substitute(g.lhs[d], canonical)) + "," : "?,";
   if (g.predicate.defined()) key += "|" + print(substitute(g.predicate, canonical));
   return key;
 }
@@ -156,14 +158,6 @@ std::vector<UpdateGroup> group_updates(const std::vector<Contribution>& contribu
   return groups;
 }
 
-// What scatters must agree on to be taps of one update: the domain, and which dimensions are pure.
-std::string domain_of(const Gather& g) {
-  std::string key;
-  for (const ReductionVariable& r : g.rdom->vars) key += print(r.min) + ":" + print(r.extent) + ";";
-  for (size_t d = 0; d < g.pure.size(); ++d) key += g.pure[d] ? print(g.lhs[d]) + "," : "?,";
-  return key;
-}
-
 // Scatters over one domain become one update over its iterations and their taps, which share
 // storage, the places' coordinates and what the terms have in common.
 std::vector<UpdateGroup> join_taps(const std::vector<UpdateGroup>& groups) {
@@ -174,7 +168,7 @@ std::vector<UpdateGroup> join_taps(const std::vector<UpdateGroup>& groups) {
       joined.push_back(group);
       continue;
     }
-    auto [it, is_new] = open.try_emplace(domain_of(group.gather), joined.size());
+    auto [it, is_new] = open.try_emplace(shape_of(group.gather, false), joined.size());
     if (!is_new && joined[it->second].taps.size() >= most_taps) {
       it->second = joined.size();
       is_new = true;
