@@ -114,10 +114,13 @@ class LoopChooser {
   bool tile_in_registers() {
     const auto tile = tile_of(f_, definition());
     if (!tile) return false;
-    const std::vector<VarOrRVar> outer = cut(*tile);
-    stage_.parallel(outer.back());
-    if (outer.size() > 2) stage_.parallel(outer[outer.size() - 2]);  // the last may be short
+    run_in_parallel(cut(*tile));
     return true;
+  }
+
+  void run_in_parallel(const std::vector<VarOrRVar>& loops) {
+    stage_.parallel(loops.back());
+    if (loops.size() > 2) stage_.parallel(loops[loops.size() - 2]);  // the last may be short
   }
 
   std::optional<RegisterTile> tile_of(const FuncContents& f, const Definition& reduction) const {
@@ -173,9 +176,7 @@ class LoopChooser {
     Func(block).compute_at(Func(function_), each);
     if (pure_.empty() || pure_[0] != 0) return;
     const RegisterTile tile = tile_of(*block, block->updates[0]).value_or(RegisterTile());
-    const std::vector<VarOrRVar> outer = cut(renumbered(tile, *block));
-    stage_.parallel(outer.back());
-    if (outer.size() > 2) stage_.parallel(outer[outer.size() - 2]);
+    run_in_parallel(cut(renumbered(tile, *block)));
     for (int s = 0; s < block->stage_count(); ++s) LoopChooser(block, s, unit_).cut(tile);
   }
 

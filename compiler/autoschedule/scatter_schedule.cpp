@@ -18,7 +18,6 @@ namespace {
 constexpr int most_lanes = 16;
 constexpr int64_t least_lanes = 4;  // of a dimension that is worth vectors
 constexpr int64_t few_values = 4;   // iterations that are unrolled
-constexpr int64_t most_taps = 16;
 
 int64_t estimated_extent(const FuncContents& f, size_t d) {
   for (const Bound& estimate : f.schedule.estimates) {

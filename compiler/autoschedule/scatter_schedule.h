@@ -18,6 +18,9 @@
 
 namespace retrograde::ir {
 
+// Taps of one loop: it is unrolled.
+inline constexpr int most_taps = 16;
+
 struct ScatterLanes {
   size_t dimension;
   int width;

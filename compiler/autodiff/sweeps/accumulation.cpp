@@ -7,6 +7,7 @@
 #include "autodiff/sweeps/gather_places.h"
 #include "autodiff/sweeps/local_derivative.h"
 #include "autodiff/sweeps/regions.h"
+#include "autoschedule/scatter_schedule.h"
 #include "frontend/language/var.h"
 #include "graph/define.h"
 #include "graph/directive.h"
@@ -40,8 +41,6 @@ constexpr double private_bytes = 64 << 20;
 constexpr double few_elements = 64, many_iterations = 4096, unknown_elements = 1e9;
 // Iterations from which on lanes of their own are worth setting to zero and adding up.
 constexpr double lanes_pay = 16 * lane_count;
-// Taps of one update: the schedule unrolls them.
-constexpr size_t most_taps = 16;
 
 bool is_pointwise(const Gather& g) {
   return !g.rdom && !g.scatters &&
@@ -91,13 +90,12 @@ Expr masked(const Expr& predicate, const Expr& value) {
 // One place of an update, as one corner of a cell between which a pixel is read.
 struct Tap {
   std::vector<Expr> place;
-  Expr predicate;
   std::vector<Expr> sums;  // one a value; undefined: nothing is added
 };
 
 // Contributions that can share one update definition.
 struct UpdateGroup {
-  Gather gather;          // of the first tap
+  Gather gather;          // of the first tap; all have its domain and predicate
   std::vector<Tap> taps;  // several in scatters only
 };
 
@@ -149,7 +147,7 @@ std::vector<UpdateGroup> group_updates(const std::vector<Contribution>& contribu
     if (is_pointwise(c.gather)) continue;
     const Gather& g = c.gather;
     auto [it, is_new] = index.try_emplace(shape_of(g), groups.size());
-    if (is_new) groups.push_back({g, {{g.lhs, g.predicate, std::vector<Expr>(values)}}});
+    if (is_new) groups.push_back({g, {{g.lhs, std::vector<Expr>(values)}}});
     UpdateGroup& group = groups[it->second];
     Expr& sum = group.taps[0].sums[static_cast<size_t>(c.component)];
     Expr term = rename_rdom(c.adjoint, g, group.gather);
@@ -182,7 +180,6 @@ std::vector<UpdateGroup> join_taps(const std::vector<UpdateGroup>& groups) {
     const auto rename = [&](Expr& e) { e = rename_rdom(e, group.gather, all.gather); };
     std::for_each(tap.place.begin(), tap.place.end(), rename);
     std::for_each(tap.sums.begin(), tap.sums.end(), rename);
-    rename(tap.predicate);
     all.taps.push_back(std::move(tap));
   }
   return joined;
@@ -208,12 +205,13 @@ struct Iterations {
   std::vector<ReductionVariable> rvars;
   bool has_taps = false;
   Tap all;
+  Expr predicate;
 };
 
 Iterations over_taps(const UpdateGroup& group) {
   const Gather& g = group.gather;
   Iterations result{g, g.rdom ? g.rdom->vars : std::vector<ReductionVariable>(), false,
-                    group.taps[0]};
+                    group.taps[0], g.predicate};
   if (group.taps.size() == 1) return result;
   const auto rdom = std::make_shared<ReductionDomainContents>();
   const Expr count = make_const(Int(32), static_cast<int64_t>(group.taps.size()));
@@ -240,13 +238,7 @@ Iterations over_taps(const UpdateGroup& group) {
     result.all.sums[k] =
         choose([&](const Tap& tap) { return tap.sums[k].defined() ? tap.sums[k] : nothing; });
   }
-  const bool any_predicate = std::any_of(group.taps.begin(), group.taps.end(),
-                                         [](const Tap& tap) { return tap.predicate.defined(); });
-  const Expr always = make_one(Bool());
-  if (any_predicate) {
-    result.all.predicate =
-        choose([&](const Tap& tap) { return tap.predicate.defined() ? tap.predicate : always; });
-  }
+  if (result.predicate.defined()) result.predicate = substitute(result.predicate, here);
   return result;
 }
 
@@ -359,37 +351,37 @@ class Builder {
            std::all_of(target_.types.begin(), target_.types.end(),
                        [](Type t) { return t == Float(32); });
   }
-  // The rest of an update whose terms are added up by a block; false: there is none.
-  bool take_blocks(const std::vector<Expr>& point, int lanes, std::vector<ReductionVariable>& rvars,
+  // Has terms added up by a block, where there is one, so that the rest of the update adds blocks.
+  void take_blocks(const std::vector<Expr>& point, int lanes, std::vector<ReductionVariable>& rvars,
                    std::vector<Expr>& terms, Expr& predicate) {
     const auto sum = sum_in_blocks(name_, target_.name, point, rvars, terms, predicate);
-    if (!sum) return false;
+    if (!sum) return;
     sum->block->made->lanes = lanes;
     estimate(sum->block);
     result_.helpers.push_back(sum->block);
     rvars = sum->rvars;
     terms = sum->values;
     predicate = Expr();
-    return true;
   }
 
   void add_update(const Iterations& update) {
-    auto [place, given, sums] = update.all;
+    auto [place, sums] = update.all;
     std::vector<ReductionVariable> rvars = update.rvars;
-    const bool is_loop = !rvars.empty();
-    if (has_blocks(update)) {
-      if (given.defined()) given = with_likely_parts(given, rvars);
-      take_blocks(parts_point(update.over, args_, {}, {}), 0, rvars, sums, given);
+    Expr predicate;
+    if (rvars.empty()) {
+      for (Expr& term : sums) {
+        if (term.defined()) term = masked(update.predicate, term);
+      }
+    } else if (update.predicate.defined()) {
+      predicate = with_likely_parts(update.predicate, rvars);
     }
+    if (has_blocks(update))
+      take_blocks(parts_point(update.over, args_, {}, {}), 0, rvars, sums, predicate);
     std::vector<Expr> values;
     for (size_t k = 0; k < types_.size(); ++k) {
       Expr self = call_value(result_.func, place, static_cast<int>(k));
-      Expr term = sums[k];
-      if (term.defined() && !is_loop) term = masked(given, term);
-      values.push_back(term.defined() ? self + cast_to(self.type(), term) : self);
+      values.push_back(sums[k].defined() ? self + cast_to(self.type(), sums[k]) : self);
     }
-    Expr predicate;
-    if (is_loop && given.defined()) predicate = with_likely_parts(given, rvars);
     append_update(result_.func, place, values, rvars, predicate);
     result_.stages.push_back(update.over.scatters ? Accumulation::Scatter : Accumulation::Gather);
   }
@@ -567,9 +559,11 @@ class Builder {
     const Expr count = part_count_of(g);
     parts->made->has_parts = part.defined();
     Slice slice = slice_of(update, lane, part, count);
-    const auto& [place, given, sums] = update.all;
-    if (given.defined())
-      slice.conditions.push_back(substitute(with_likely_parts(given, update.rvars), slice.place));
+    const auto& [place, sums] = update.all;
+    if (update.predicate.defined()) {
+      slice.conditions.push_back(
+          substitute(with_likely_parts(update.predicate, update.rvars), slice.place));
+    }
     std::vector<Expr> element, terms;
     for (const Expr& e : place) element.push_back(substitute(e, slice.place));
     for (const Expr& sum : sums)

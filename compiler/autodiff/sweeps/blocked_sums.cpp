@@ -1,13 +1,11 @@
 #include "autodiff/sweeps/blocked_sums.h"
 
-#include <utility>
+#include <algorithm>
 
 #include "autodiff/sweeps/accumulation.h"
 #include "graph/define.h"
 #include "graph/names.h"
 #include "ir/build.h"
-#include "ir/conjuncts.h"
-#include "ir/variables.h"
 #include "simplify/simplify.h"
 
 namespace retrograde::ir {
