@@ -206,9 +206,13 @@ void give_default_schedule(const std::vector<FuncPtr>& outputs, const VectorUnit
   if (what == Scheduling::Everything) limits = placement_limits(order);
   std::unordered_set<const Symbol*> whole = limits.stay;
   whole.insert(limits.levels.begin(), limits.levels.end());
+  // Before sums are cut: what that schedules would pass for the user's.
+  const std::vector<FuncPtr> stored = what == Scheduling::Everything
+                                          ? stored_in_all(outputs, limits)
+                                          : stored_by_default(outputs);
   cut_reductions(outputs, whole);
-  for (const FuncPtr& f : what == Scheduling::Everything ? stored_in_all(outputs, limits)
-                                                         : stored_by_default(outputs)) {
+  for (const FuncPtr& f : stored) {
+    if (is_touched(*f)) continue;
     Func(f).compute_root();
     if (f->is_extern() || limits.levels.contains(f.get())) continue;
     if (const auto lanes = scatter_lanes(*f)) {

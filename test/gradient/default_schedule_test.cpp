@@ -67,6 +67,24 @@ TEST_F(DefaultSchedule, AHandScheduleOfThePrimalKeepsItsInlinedFuncsInlined) {
   EXPECT_FALSE(is_stored(d(a), heavy));
 }
 
+// The schedule cuts it; what that gives it is no directive of the user's.
+TEST_F(DefaultSchedule, ALossThatIsCutLeavesTheRestOfThePrimalToTheSchedule) {
+  Func sum("sum");
+  RDom r(0, 80, 0, 80);
+  Buffer<float> wide(90, 90);
+  Func costly("costly");
+  costly(x, y) = exp(wide(x, y)) * sin(wide(x, y)) + cos(wide(x, y));
+  sum() = 0.0f;
+  sum() += costly(r.x, r.y) * costly(r.x + 1, r.y);
+  Derivative d = propagate_adjoints(sum);
+  const auto funcs =
+      ir::topological_order(ir::schedule_unscheduled({sum.function(), d(wide).function()}));
+  const auto found = std::find_if(funcs.begin(), funcs.end(),
+                                  [&](const ir::FuncPtr& g) { return g->name == costly.name(); });
+  ASSERT_NE(found, funcs.end());
+  EXPECT_EQ((*found)->schedule.compute_level.kind, ir::LoopLevel::Kind::Root);
+}
+
 void expect_all_likely(const Expr& condition) {
   if (const auto* both = condition.as<ir::And>()) {
     expect_all_likely(both->a);
