@@ -144,6 +144,13 @@ static llvm::Align alignment_of(Type type) {
   return llvm::Align(static_cast<uint64_t>(type.bytes()));
 }
 
+// Lanes of one register. Wider vectors are read and written register by register: LLVM keeps an array
+// in registers only where its loads are as wide as its stores, and else cuts whole vectors as one
+// integer of thousands of bits.
+static int native_lanes(const Machine& machine, Type type) {
+  return std::max(1, machine.vector_bits / 8 / type.bytes());
+}
+
 // ---- loads ----
 
 Value* FunctionGenerator::make(const Load& e) {
@@ -230,7 +237,17 @@ Value* FunctionGenerator::load_linear(const Storage& from, Type type, const Line
 
 Value* FunctionGenerator::load_dense(const Storage& from, Type type, Value* first,
                                      Value* predicate) {
-  auto* vector = with_lanes(memory_type(e_, type), type.lanes());
+  const int native = native_lanes(e_.machine, type), lanes = type.lanes();
+  if (!predicate && lanes > native) {
+    std::vector<Value*> parts;
+    for (int at = 0; at < lanes; at += native) {
+      const Type part = type.with_lanes(std::min(native, lanes - at));
+      parts.push_back(load_dense(
+          from, part, b_.CreateAdd(first, b_.getInt64(static_cast<uint64_t>(at))), nullptr));
+    }
+    return concat(e_, parts);
+  }
+  auto* vector = with_lanes(memory_type(e_, type), lanes);
   Value* pointer = element_pointer(from, type, first);
   if (!predicate)
     return from_memory(type,
@@ -408,6 +425,16 @@ void FunctionGenerator::store_scalar(const Storage& to, Type type, Value* index,
 
 void FunctionGenerator::store_dense(const Storage& to, Type type, Value* first, Value* stored,
                                     Value* predicate) {
+  const int native = native_lanes(e_.machine, type), lanes = type.lanes();
+  if (!predicate && lanes > native) {
+    for (int at = 0; at < lanes; at += native) {
+      const int count = std::min(native, lanes - at);
+      store_dense(to, type.with_lanes(count),
+                  b_.CreateAdd(first, b_.getInt64(static_cast<uint64_t>(at))),
+                  slice(e_, stored, at, count), nullptr);
+    }
+    return;
+  }
   Value *pointer = element_pointer(to, type, first), *bytes = to_memory(type, stored);
   if (predicate) {
     tagged(b_.CreateMaskedStore(bytes, pointer, alignment_of(type), predicate), to);
