@@ -210,6 +210,20 @@ TEST(Compression, PatternsThatTakeTooLongToFindAreRefused) {
       {query.output->name.c_str(), "bounded search", "20 operations", "single directions"});
 }
 
+// Pieces in steps, which isl joins by their hull: it crashes when its operations end there.
+TEST(Compression, PiecesAreJoinedWhateverIsLeftOfTheOperations) {
+  for (unsigned long operations : {1, 50, 400}) {
+    IslContext context;
+    const isl::set steps(isl::ctx(context.ctx),
+                         "{ [x, y] : 0 <= x <= 3 and 0 <= y <= 3; [x, y] : 4 <= x <= 5 and "
+                         "1 <= y <= 2; [x, y] : x = 6 and y = 1 }");
+    isl_ctx_reset_operations(context.ctx);
+    isl_ctx_set_max_operations(context.ctx, operations);
+    EXPECT_LE(isl_set_n_basic_set(coalesced(steps).get()), 3);
+    EXPECT_EQ(isl_ctx_get_max_operations(context.ctx), operations);
+  }
+}
+
 // Wherever the operations end, between the pattern and its last entry.
 TEST(Compression, IsFoundOrRefusedForAnyNumberOfOperations) {
   const Expr place = variable("p");

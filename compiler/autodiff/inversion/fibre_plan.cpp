@@ -41,7 +41,7 @@ isl::pw_aff smallest_output(const isl::map& one_output) {
   isl_pw_multi_aff* pma = isl_map_lexmin_pw_multi_aff(one_output.copy());
   isl::pw_aff result = isl::manage(isl_pw_multi_aff_get_pw_aff(pma, 0));
   isl_pw_multi_aff_free(pma);
-  return result.coalesce();
+  return coalesced(result);
 }
 
 // The variables that are settled, one after the other, with the fibre that is left.
@@ -60,7 +60,7 @@ class FibrePlanner {
       settle_determined(fibre, open, result);
       if (!open.empty()) free_cheapest(fibre, open, result);
     }
-    result.valid = fibre.exact.domain().coalesce();
+    result.valid = coalesced(fibre.exact.domain());
     return result;
   }
 
@@ -183,7 +183,7 @@ std::optional<isl::pw_aff> function_of(const isl::map& one_output) {
   isl_pw_multi_aff* pma = isl_pw_multi_aff_from_map(isl_map_coalesce(one_output.copy()));
   isl::pw_aff result = isl::manage(isl_pw_multi_aff_get_pw_aff(pma, 0));
   isl_pw_multi_aff_free(pma);
-  return result.coalesce();
+  return coalesced(result);
 }
 unsigned pieces_of(const isl::pw_aff& e) {
   return static_cast<unsigned>(isl_pw_aff_n_piece(e.get()));

@@ -63,7 +63,7 @@ class GroupInverter {
     for (const LoopVariable& v : group_.region) assume_not_empty(v);
     domain_ = domain_.intersect(not_empty_);
     box_ = domain_;
-    for (const isl::set& s : conditions) domain_ = domain_.intersect(s).coalesce();
+    for (const isl::set& s : conditions) domain_ = coalesced(domain_.intersect(s));
   }
 
   // Where the target has no element there is nothing to do. Ends over parameters of their own, as
@@ -92,7 +92,7 @@ class GroupInverter {
 
   // The relation split where the indices' pieces differ, or whole where that costs little.
   std::vector<isl::map> choose_pieces() {
-    isl::map whole = relation_of(affine_).intersect_domain(domain_).coalesce();
+    isl::map whole = coalesced(relation_of(affine_).intersect_domain(domain_));
     std::vector<isl::map> split = split_pieces();
     if (split.empty()) return {};  // no point of the stage reads anything
     if (split.size() == 1) return {whole};
@@ -125,7 +125,7 @@ class GroupInverter {
       std::vector<Part> next;
       for (const Part& part : parts) {
         index.foreach_piece([&](isl::set where, isl::multi_aff value) {
-          isl::set both = part.where.intersect(where).coalesce();
+          isl::set both = coalesced(part.where.intersect(where));
           if (both.is_empty()) return;
           next.push_back({both, part.indices});
           next.back().indices.push_back(isl::pw_aff(value.at(0)));
@@ -137,7 +137,7 @@ class GroupInverter {
     for (const Part& part : parts) {
       // A union of disjoint sets (x < 0 or x >= n) is cheaper as two boxes.
       isl_set* disjoint = isl_set_make_disjoint(part.where.copy());
-      isl::set sets = isl::manage(disjoint).coalesce();
+      isl::set sets = coalesced(isl::manage(disjoint));
       isl::map values = relation_of(part.indices);
       sets.foreach_basic_set(
           [&](isl::basic_set b) { result.push_back(values.intersect_domain(isl::set(b))); });
@@ -204,7 +204,7 @@ class GroupInverter {
   void add_predicate(const isl::map& piece, const FibrePlan& p, GroupPiece& g,
                      const std::vector<Expr>& names) {
     isl::set context = rho_box(p).intersect(fixed_elements(piece, p));
-    isl::set needed = p.valid.gist(context).coalesce();
+    isl::set needed = coalesced(p.valid.gist(context));
     needed = isl::manage(isl_set_gist_params(needed.release(), assumed().release()));
     // Coalescing leaves unions that are one basic set all the same.
     isl::set hull = isl::manage(isl_set_from_basic_set(isl_set_simple_hull(needed.copy())));

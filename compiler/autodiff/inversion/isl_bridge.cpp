@@ -124,9 +124,9 @@ std::optional<isl::pw_aff> IslBridge::binary(const Binary& b, const Expr& e) {
     case Kind::Sub:
       return a->sub(*c);
     case Kind::Min:
-      return a->min(*c).coalesce();
+      return coalesced(a->min(*c));
     case Kind::Max:
-      return a->max(*c).coalesce();
+      return coalesced(a->max(*c));
     default:
       return obstacle(e);
   }
@@ -145,7 +145,7 @@ std::optional<isl::pw_aff> IslBridge::absolute(const Cast& c) {
     a = a->sub(*b);
   }
   if (!a) return std::nullopt;
-  return a->max(a->neg()).coalesce();
+  return coalesced(a->max(a->neg()));
 }
 
 // Shifts and masks by constants: multiples, floors and moduli of powers of two.
@@ -189,7 +189,7 @@ std::optional<isl::pw_aff> IslBridge::affine_form(const Expr& e) {
         auto t = affine(s.when_true), f = affine(s.when_false);
         if (!t || !f) return std::nullopt;
         isl::set otherwise = universe_.subtract(*c);
-        return t->intersect_domain(*c).union_add(f->intersect_domain(otherwise)).coalesce();
+        return coalesced(t->intersect_domain(*c).union_add(f->intersect_domain(otherwise)));
       },
       [&](const Cast& c) -> std::optional<isl::pw_aff> {
         if (auto magnitude = absolute(c)) return magnitude;
@@ -266,7 +266,7 @@ std::optional<isl::set> IslBridge::condition(const Expr& e) {
   if (b->kind == Kind::And || b->kind == Kind::Or) {
     auto a = condition(b->a), c = condition(b->b);
     if (!a || !c) return std::nullopt;
-    return (b->kind == Kind::And ? a->intersect(*c) : a->unite(*c)).coalesce();
+    return coalesced(b->kind == Kind::And ? a->intersect(*c) : a->unite(*c));
   }
   if (b->kind >= Kind::EQ && b->kind <= Kind::GE) return comparison(*b, e);
   return opaque(e);

@@ -78,7 +78,7 @@ std::optional<Colours> Compressed::colour() const {
   isl::set differences =
       (query_.diagonal_only ? pattern_ : pattern_.reverse().apply_range(pattern_)).deltas();
   int64_t most = query_.most_colours > 0 ? query_.most_colours : many_colours;
-  std::optional<Colouring> linear = linear_colours(differences.coalesce(), most);
+  std::optional<Colouring> linear = linear_colours(coalesced(differences), most);
   // Irregular patterns of a few elements; tables cost more than they save for the others. For the
   // diagonal it is enough that neighbours differ, whether M is symmetric or not.
   if (!linear || linear->count > few_colours) {

@@ -22,8 +22,8 @@ namespace {
 // others do not count: both stay supersets.
 constexpr int many_pieces = 24;
 constexpr size_t many_conditions = 64;
-// The search for pieces that are one: some hundredths of a second.
-constexpr unsigned long coalescing_operations = 20'000;
+// Each piece is compared with each other, to find those that are one.
+constexpr int most_compared = 64;
 
 unsigned size_of(size_t n) { return static_cast<unsigned>(n); }
 
@@ -44,15 +44,12 @@ isl::map hull_of(const isl::map& m) {
   return isl::manage(isl_map_from_basic_map(isl_map_simple_hull(m.copy())));
 }
 
-// Fewer pieces of the same, when they are found soon.
-std::optional<isl::map> coalesced_soon(const isl::map& m) {
-  return found_within(isl_map_get_ctx(m.get()), coalescing_operations,
-                      [&] { return m.coalesce(); });
-}
-
+// Few pieces, which together hold the same, or more.
 isl::map tidy(const isl::map& m) {
-  if (isl_map_n_basic_map(m.get()) <= 1) return m;
-  const isl::map result = coalesced_soon(m).value_or(m);
+  const int pieces = isl_map_n_basic_map(m.get());
+  if (pieces <= 1) return m;
+  const isl::map result = pieces <= most_compared ? coalesced(m) : m;
+  isl_ctx_reset_operations(isl_map_get_ctx(m.get()));  // what is economy does not count
   return isl_map_n_basic_map(result.get()) <= many_pieces ? result : hull_of(m);
 }
 
@@ -303,9 +300,8 @@ Dependence::Dependence(const FuncPtr& f, const FuncPtr& source, unsigned long op
 
 isl::map Dependence::inside(const Box& of_f, const Box& of_source) const {
   auto dims = [&](isl_dim_type type) { return static_cast<size_t>(isl_map_dim(map_.get(), type)); };
-  return map_.intersect_domain(box_set(context_.ctx, of_f, dims(isl_dim_in)))
-      .intersect_range(box_set(context_.ctx, of_source, dims(isl_dim_out)))
-      .coalesce();
+  return coalesced(map_.intersect_domain(box_set(context_.ctx, of_f, dims(isl_dim_in)))
+                       .intersect_range(box_set(context_.ctx, of_source, dims(isl_dim_out))));
 }
 
 }  // namespace retrograde::ir

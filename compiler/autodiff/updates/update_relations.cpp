@@ -53,7 +53,7 @@ isl::set UpdateRelations::domain_set(IslBridge& bridge, const IterationDomain& d
       exact = false;
     }
   }
-  return result.coalesce();
+  return coalesced(result);
 }
 
 std::optional<isl::map> UpdateRelations::access(IslBridge& bridge,
@@ -79,7 +79,7 @@ bool UpdateRelations::write_is_injective() const {
 }
 
 Expr UpdateRelations::written(const std::vector<Expr>& names) const {
-  return bridge_.to_expr(write_->range().coalesce(), names);
+  return bridge_.to_expr(coalesced(write_->range()), names);
 }
 
 // Reduction variables are ordered, the last one outermost; points that differ in pure variables
@@ -102,7 +102,7 @@ isl::map UpdateRelations::earlier() const {
 Expr UpdateRelations::last_writers() const {
   isl::map same_element = write_->apply_range(write_->reverse());
   isl::set overwritten = same_element.intersect(earlier().reverse()).domain();
-  isl::set last = domain_.subtract(overwritten).coalesce().gist(domain_);
+  isl::set last = coalesced(domain_.subtract(overwritten)).gist(domain_);
   return bridge_.to_expr(last, variables_of(names_of(domain_expr_.vars)));
 }
 
@@ -113,7 +113,7 @@ std::optional<UpdateRelations::Read> UpdateRelations::read(const std::vector<Exp
   r.map = map->intersect_domain(domain_);
   isl::map writer = r.map.apply_range(write_->reverse());  // {i -> j : j writes what i reads}
   isl::map before = writer.intersect(earlier());
-  r.sees_new = before.domain().coalesce();
+  r.sees_new = coalesced(before.domain());
   r.never_new = r.sees_new.is_empty();
   r.always_new = domain_.is_subset(r.sees_new);
   r.overwritten = !writer.subtract(before).is_empty();
