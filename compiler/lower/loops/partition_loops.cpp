@@ -143,7 +143,7 @@ class Partitioner : public Rewriter {
     context_.add_loop(loop);
     ++in_vectorized_;
     Stmt result = children(s);
-    --in_vectorized_;
+    if (--in_vectorized_ == 0) context_ = {};  // its names are known inside only
     return result;
   }
 

@@ -74,7 +74,7 @@ class Trimmer {
  public:
   // `lanes`: names with a value of their own in each lane around the loop.
   Trimmer(const For& loop, const std::unordered_set<std::string>& lanes)
-      : loop_(loop), unusable_(lanes) {}
+      : loop_(loop), lanes_(lanes) {}
 
   Stmt trim(const Stmt& s) {
     return match(
@@ -159,7 +159,7 @@ class Trimmer {
 
   bool is_known_outside(const Expr& condition) const {
     return !reads_memory(condition, MemoryReads::Functions) &&
-           !uses_any_variable(condition, unusable_);
+           !uses_any_variable(condition, unusable_) && !uses_any_variable(condition, lanes_);
   }
 
   bool goes_around(const Expr& condition) {
@@ -186,7 +186,8 @@ class Trimmer {
   }
 
   const For& loop_;
-  std::unordered_set<std::string> unusable_;
+  const std::unordered_set<std::string>& lanes_;  // of the whole program: not to be copied
+  std::unordered_set<std::string> unusable_;  // bound inside
   std::unordered_set<std::string> own_;  // memory that each iteration has anew
   Substitution lets_;
   std::vector<Expr> begins_, lasts_;  // the variable lies between them

@@ -90,7 +90,7 @@ Expr check_of(const Expr& mask) {
 
 struct Storage {
   std::optional<int64_t> elements;
-  bool is_own;  // of the task
+  int task;  // how many tasks around it
   int padding = 0;
 
   bool surely_holds(const Dense& places) const {
@@ -123,15 +123,14 @@ class BlendMaskedStores : public Rewriter {
  private:
   // Other threads may run it at the same time as what surrounds it.
   Stmt in_task(const Stmt& s) {
-    std::unordered_map<std::string, Storage> around = storage_;
-    for (auto& [name, storage] : storage_) storage.is_own = false;
+    ++task_;
     Stmt result = children(s);
-    for (auto& [name, storage] : storage_) storage.is_own = around.at(name).is_own;
+    --task_;
     return result;
   }
 
   Stmt visit_allocate(const Stmt& s, const Allocate& n) {
-    storage_[n.name] = {as_const_int(n.elements), true};
+    storage_[n.name] = {as_const_int(n.elements), task_};
     const Stmt body = (*this)(n.body);
     const int padding = storage_[n.name].padding;
     storage_.erase(n.name);
@@ -198,7 +197,7 @@ class BlendMaskedStores : public Rewriter {
   Stmt visit_store(const Stmt& s, const Store& n) {
     const auto storage = storage_.find(n.name);
     const auto places = as_dense(n.index);
-    if (storage == storage_.end() || !storage->second.is_own || !places) return children(s);
+    if (storage == storage_.end() || storage->second.task != task_ || !places) return children(s);
     if (storage->second.surely_holds(*places)) return blended(n);
     const Expr check = check_of(n.predicate);
     if (!check.defined() || !loads_from(n.value, n.name)) return children(s);
@@ -257,6 +256,7 @@ class BlendMaskedStores : public Rewriter {
   };
 
   std::unordered_map<std::string, Storage> storage_;
+  int task_ = 0;
   std::vector<Expr> known_;                              // conditions around
   std::unordered_set<Stmt, HashNode, SameNode> checks_;  // those that this pass has made
 };

@@ -1,0 +1,85 @@
+// How the work of the compiler grows with the number of stages: a chain of stencils with its
+// gradient, from the program to the statement that LLVM is given. Work is counted, not timed: in
+// bytes that are allocated, which whatever copies or builds something has to ask for.
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <cmath>
+#include <cstdlib>
+#include <map>
+#include <new>
+#include <string>
+
+#include "autodiff/derivative.h"
+#include "autoschedule/default_schedule.h"
+#include "frontend/run/pipeline.h"
+#include "lower/lower.h"
+
+namespace {
+std::atomic<uint64_t> allocated_bytes{0};
+}
+
+void* operator new(std::size_t bytes) {
+  allocated_bytes += bytes;
+  if (void* memory = std::malloc(bytes ? bytes : 1)) return memory;
+  throw std::bad_alloc();
+}
+void operator delete(void* memory) noexcept { std::free(memory); }
+void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
+
+namespace retrograde {
+namespace {
+
+// Bytes by part of the compiler.
+using Work = std::map<std::string, double>;
+
+Work work_of_chain(int stages) {
+  uint64_t before = allocated_bytes;
+  const auto lap = [&] {
+    const uint64_t now = allocated_bytes, bytes = now - before;
+    before = now;
+    return static_cast<double>(bytes);
+  };
+  constexpr int side = 256;
+  Buffer<float> image(side, side);
+  Var x("x"), y("y");
+  Func last("stage");
+  last(x, y) = image(clamp(x, 0, side - 1), clamp(y, 0, side - 1)) * 2.0f;
+  for (int i = 1; i < stages; i++) {
+    Func next("stage");
+    next(x, y) = (last(x - 1, y) + last(x, y) * 2.0f + last(x + 1, y) + last(x, y + 1)) * 0.2f;
+    last = next;
+  }
+  Func loss("loss");
+  RDom r(0, side, 0, side);
+  loss() = 0.0f;
+  loss() += last(r.x, r.y) * last(r.x, r.y);
+  Work work;
+  work["program"] = lap();
+  const Func gradient = propagate_adjoints(loss)(image);
+  work["propagate_adjoints"] = lap();
+  Pipeline({loss, gradient}).auto_schedule(get_jit_target_from_environment());
+  work["auto_schedule"] = lap();
+  const std::vector<ir::FuncPtr> outputs =
+      ir::schedule_unscheduled({loss.function(), gradient.function()});
+  work["schedule_unscheduled"] = lap();
+  ir::LowerOptions options;
+  options.observe = [&](const std::string& pass, double, const Stmt&) { work[pass] = lap(); };
+  ir::lower("chain", outputs, ir::infer_arguments(outputs), options);
+  return work;
+}
+
+TEST(ChainGrowth, EachStageCostsEveryPartOfTheCompilerAsMuch) {
+  work_of_chain(8);  // what is set up once
+  const Work some = work_of_chain(120), many = work_of_chain(480);
+  double all = 0;
+  for (const auto& [part, bytes] : many) all += bytes;
+  for (const auto& [part, bytes] : many) {
+    if (bytes < all / 1000) continue;
+    // n log n would be 1.18.
+    EXPECT_LT(std::log(bytes / some.at(part)) / std::log(4), 1.2) << part;
+  }
+}
+
+}  // namespace
+}  // namespace retrograde
