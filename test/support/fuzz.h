@@ -1,4 +1,4 @@
-// What fuzzers share. Each program runs in a process of its own under limits of processor time and
+// What fuzzers share. Each program runs in a process of its own under limits of time and
 // memory, so that a crash or a hang is a finding like a wrong result. A finding is shrunk (testing/
 // choices.h) and printed with its choices. Refusals are counted by their rule.
 //

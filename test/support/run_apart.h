@@ -1,10 +1,12 @@
 // Runs a function in a process of its own: a crash or a hang there is a result like any other.
 #pragma once
 
+#include <poll.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <chrono>
 #include <csignal>
 #include <cstdlib>
 #include <cstring>
@@ -15,11 +17,11 @@ namespace retrograde::fuzz {
 
 struct ApartResult {
   int code = 0;             // what the function returned
-  int signal = 0;           // what ended it instead; SIGXCPU and SIGALRM: it took too long
+  int signal = 0;           // what ended it instead; SIGXCPU and SIGKILL: it took too long
   bool has_exited = false;  // before the function returned, as sanitizers do
   std::string detail;
 
-  bool is_slow() const { return signal == SIGXCPU || signal == SIGALRM || signal == SIGKILL; }
+  bool is_slow() const { return signal == SIGXCPU || signal == SIGKILL; }
   bool is_crash() const { return signal != 0 || has_exited; }
   std::string crash() const {
     return has_exited ? "exits with code " + std::to_string(code)
@@ -36,6 +38,20 @@ struct ApartLimits {
 // Ends what a process sends whose function returned.
 constexpr char has_returned = '\n';
 
+// Whether the other end was closed in time.
+inline bool read_all(int from, std::chrono::steady_clock::time_point end, std::string& text) {
+  char chunk[4096];
+  while (true) {
+    const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(
+        end - std::chrono::steady_clock::now());
+    pollfd ready = {from, POLLIN, 0};
+    if (left.count() <= 0 || poll(&ready, 1, static_cast<int>(left.count())) == 0) return false;
+    const ssize_t n = read(from, chunk, sizeof(chunk));
+    if (n <= 0) return true;
+    text.append(chunk, static_cast<size_t>(n));
+  }
+}
+
 // `f` returns an exit code below 256 and fills in the detail.
 inline ApartResult run_apart(const ApartLimits& limits, const std::function<int(std::string&)>& f) {
   int ends[2];
@@ -50,7 +66,7 @@ inline ApartResult run_apart(const ApartLimits& limits, const std::function<int(
       const rlimit memory = {limits.memory_bytes, limits.memory_bytes};
       setrlimit(RLIMIT_AS, &memory);
     }
-    alarm(limits.seconds);
+    alarm(limits.seconds + 10);  // should the harness be gone
     std::string detail;
     const int code = f(detail);
     detail += has_returned;
@@ -59,9 +75,8 @@ inline ApartResult run_apart(const ApartLimits& limits, const std::function<int(
   }
   close(ends[1]);
   ApartResult result;
-  char chunk[4096];
-  for (ssize_t n; (n = read(ends[0], chunk, sizeof(chunk))) > 0;)
-    result.detail.append(chunk, static_cast<size_t>(n));
+  const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(limits.seconds);
+  if (!read_all(ends[0], end, result.detail)) kill(child, SIGKILL);
   close(ends[0]);
   int status = 0;
   waitpid(child, &status, 0);

@@ -7,6 +7,7 @@
 #include <functional>
 #include <numeric>
 
+#include "gradient/adversary/auto_scheduled.h"
 #include "gradient/adversary/check.h"
 #include "support/run_apart.h"
 
@@ -14,6 +15,7 @@ namespace retrograde::gradient {
 namespace {
 
 constexpr unsigned programs_per_shard = 15, shards = 16, one_compiled_of = 8;
+constexpr unsigned scheduled_per_shard = 10, shards_scheduled = 6;
 
 class Adversary : public ::testing::TestWithParam<unsigned> {};
 
@@ -117,6 +119,35 @@ TEST(RunApart, AProcessThatExitsOnItsOwnIsACrash) {
   EXPECT_EQ(returned.code, 3);
   EXPECT_EQ(returned.detail, "seen");
 }
+
+// Nothing that the process blocks or waits for keeps it beyond its time.
+TEST(RunApart, AProcessThatStandsStillIsEnded) {
+  const fuzz::ApartResult still = fuzz::run_apart({.seconds = 1}, [](std::string&) -> int {
+    sigset_t all;
+    sigfillset(&all);
+    sigprocmask(SIG_BLOCK, &all, nullptr);
+    while (true) pause();
+  });
+  EXPECT_TRUE(still.is_slow());
+}
+
+// Gradients as the compiler schedules them; fuzz_schedules runs many more.
+class AutoScheduled : public ::testing::TestWithParam<unsigned> {};
+
+TEST_P(AutoScheduled, IsLegalRightAndTheSameForAnyThreads) {
+  uint64_t scheduled = 0;
+  for (unsigned i = 0; i < scheduled_per_shard; ++i) {
+    const unsigned seed = GetParam() * scheduled_per_shard + i + 1;
+    Choices choices(seed);
+    const Judged judged = judge_auto_scheduled(choices, i == 0);
+    EXPECT_LT(judged.judgement, Judgement::Wrong)
+        << "fuzz_schedules --seed " << seed << ": " << judged.detail;
+    scheduled += judged.judgement == Judgement::Right;
+  }
+  EXPECT_GT(scheduled, scheduled_per_shard / 2);
+}
+
+INSTANTIATE_TEST_SUITE_P(Shard, AutoScheduled, ::testing::Range(0u, shards_scheduled));
 
 }  // namespace
 }  // namespace retrograde::gradient

@@ -18,34 +18,6 @@ namespace retrograde::gradient {
 
 namespace {
 
-Buffer<> room_for(const Type& type, const oracle::Region& region) {
-  Buffer<> result(type, region.extents);
-  result.set_min(region.mins);
-  return result;
-}
-
-bool uses_fast_functions(const Func& output) {
-  bool found = false;
-  for (const ir::FuncPtr& f : ir::topological_order({output.function()})) {
-    for (int s = 0; s < f->stage_count(); ++s) {
-      ir::for_each_expr(f->stage(s), [&](const Expr& root) {
-        ir::walk(root, [&](const Expr& e) {
-          const auto* call = e.as<ir::Call>();
-          found |= call && call->call_type == ir::CallType::Operator &&
-                   std::string_view(ir::op_info(call->op).name).starts_with("fast_");
-          return !found;
-        });
-      });
-    }
-  }
-  return found;
-}
-
-bool is_finite(const oracle::Array& values) {
-  return std::all_of(values.values.begin(), values.values.end(),
-                     [](const oracle::Value& v) { return std::isfinite(as_double(v)); });
-}
-
 class Compiled {
  public:
   Compiled(Subject& s, const Gradients& gradients)

@@ -1,9 +1,12 @@
 #include "gradient/adversary/probe.h"
 
+#include <algorithm>
 #include <cmath>
 #include <ctime>
+#include <string_view>
 
 #include "diagnostics/error.h"
+#include "ir/visit.h"
 #include "testing/interpreter.h"
 
 namespace retrograde::gradient {
@@ -156,6 +159,34 @@ Product Motion::along(const std::function<Func(const AdjointInput&)>& of) const 
     });
   }
   return result;
+}
+
+Buffer<> room_for(const Type& type, const oracle::Region& region) {
+  Buffer<> result(type, region.extents);
+  result.set_min(region.mins);
+  return result;
+}
+
+bool uses_fast_functions(const Func& output) {
+  bool found = false;
+  for (const ir::FuncPtr& f : ir::topological_order({output.function()})) {
+    for (int s = 0; s < f->stage_count(); ++s) {
+      ir::for_each_expr(f->stage(s), [&](const Expr& root) {
+        ir::walk(root, [&](const Expr& e) {
+          const auto* call = e.as<ir::Call>();
+          found |= call && call->call_type == ir::CallType::Operator &&
+                   std::string_view(ir::op_info(call->op).name).starts_with("fast_");
+          return !found;
+        });
+      });
+    }
+  }
+  return found;
+}
+
+bool is_finite(const oracle::Array& values) {
+  return std::all_of(values.values.begin(), values.values.end(),
+                     [](const oracle::Value& v) { return std::isfinite(as_double(v)); });
 }
 
 Region Subject::bounds() const {

@@ -107,6 +107,13 @@ Slope slope_of(const std::function<double(double)>& f, double at_rest, double sc
 // Of the narrowest floats of a program: partials have their digits, in double too.
 double precision_of(const Func& output);
 
+// ---- machine code ----
+
+Buffer<> room_for(const Type& type, const oracle::Region& region);
+// They approximate, and are finite where the functions that they stand for have long overflowed.
+bool uses_fast_functions(const Func& output);
+bool is_finite(const oracle::Array& values);
+
 // ---- the checks ----
 
 void compare_higher(Subject& s, const Motion& v, const Derivative& derivative);

@@ -7,6 +7,10 @@ namespace retrograde::gradient {
 AdversaryProgram make_adversary(Choices& choices, bool as_extern) {
   fuzz::Style style = fuzz::Style::gradients();
   if (as_extern) style.extern_sine = define_sine;
+  return make_adversary(choices, style);
+}
+
+AdversaryProgram make_adversary(Choices& choices, const fuzz::Style& style) {
   AdversaryProgram p{fuzz::make_program(choices, style), {}, false, {}};
   const int overwritten = choices.below(10);
   p.options.overwritten = overwritten == 9  ? Overwritten::Refuse

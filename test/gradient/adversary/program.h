@@ -26,6 +26,7 @@ struct AdversaryProgram : fuzz::RandomProgram {
 // UserError: the program is no legal one. as_extern: a C function computes the Func that may be a
 // stage.
 AdversaryProgram make_adversary(Choices& choices, bool as_extern = false);
+AdversaryProgram make_adversary(Choices& choices, const fuzz::Style& style);
 
 std::string to_text(const AdversaryProgram& program);
 

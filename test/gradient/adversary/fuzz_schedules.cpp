@@ -1,0 +1,14 @@
+// fuzz_schedules -- looks for programs whose gradients the compiler schedules wrongly; its
+// arguments: support/fuzz.h.
+#include "gradient/adversary/auto_scheduled.h"
+#include "support/fuzz.h"
+
+int main(int argc, char** argv) {
+  using namespace retrograde::gradient;
+  return retrograde::fuzz::fuzz_main({.judge = judge_auto_scheduled,
+                                      .text = auto_scheduled_text,
+                                      .limits = {60, 240, 0},
+                                      .most_refused = 1.0 / 3,
+                                      .compile = 25},
+                                     argc, argv);
+}
