@@ -8,6 +8,7 @@
 #include "autoschedule/new_loop.h"
 #include "autoschedule/placement_limits.h"
 #include "autoschedule/scatter_schedule.h"
+#include "autoschedule/slices.h"
 #include "autoschedule/stored_funcs.h"
 #include "diagnostics/large_stack.h"
 #include "frontend/language/func.h"
@@ -221,6 +222,7 @@ void give_default_schedule(const std::vector<FuncPtr>& outputs, const VectorUnit
     }
     for (int s = 0; s < f->stage_count(); ++s) LoopChooser(f, s, unit).give();
   }
+  compute_in_slices(outputs, stored, whole);
   for (const FuncPtr& f : order) {  // so that the log tells of every Func
     const bool is_output = std::find(outputs.begin(), outputs.end(), f) != outputs.end();
     const bool is_inlined = f->schedule.compute_level.kind == LoopLevel::Kind::Inlined;

@@ -42,6 +42,60 @@ TEST_F(BuiltInScheduler, InlinesWhatIsCheapAndStoresTheRest) {
   EXPECT_EQ(innermost(heavy), ForType::Vectorized);
 }
 
+// Sums over windows for each of several shifts, of which only their sum is wanted.
+struct Shifted {
+  explicit Shifted(int shifts, int read_at_once = 1) {
+    RDom r(-1, 3), each(0, shifts), near(-1, 3, 0, read_at_once);
+    const Expr at = clamp(x, 0, 63);
+    rows(x, y, d) = 0.0f;
+    rows(x, y, d) += picture(clamp(x + r + d, 0, 63), clamp(y, 0, 31)) * picture(at, y % 32);
+    windows(x, y, d) = 0.0f;
+    if (read_at_once > 1)
+      windows(x, y, d) += rows(x, y + near.x, d + near.y);
+    else
+      windows(x, y, d) += rows(x, y + r, d);
+    out(x, y) = 0.0f;
+    out(x, y) += windows(x, y, each);
+    for (int py = 0; py < 32; py++) {
+      for (int px = 0; px < 64; px++) picture(px, py) = static_cast<float>((px * 7 + py * 13) % 11);
+    }
+  }
+  ir::LoopLevel place_of_rows() {
+    Pipeline(out).auto_schedule(get_host_target());
+    return rows.function()->schedule.compute_level;
+  }
+  Var x{"x"}, y{"y"}, d{"d"};
+  Buffer<float> picture{64, 32};
+  Func rows{"rows"}, windows{"windows"}, out{"out"};
+};
+
+TEST(SlicesOfAFunc, AreComputedInTheLoopsOfTheirOnlyReader) {
+  Shifted scheduled(11), plain(11);
+  const ir::LoopLevel place = scheduled.place_of_rows();
+  ASSERT_EQ(place.kind, ir::LoopLevel::Kind::At);
+  EXPECT_EQ(place.func, scheduled.windows.name());
+  EXPECT_EQ(place.var, "d");
+  const Buffer<float> found = scheduled.out.realize({50, 30}),
+                      expected = plain.out.realize({50, 30});
+  for (int y = 0; y < 30; y++) {
+    for (int x = 0; x < 50; x++) EXPECT_EQ(found(x, y), expected(x, y)) << x << ", " << y;
+  }
+}
+
+TEST(SlicesOfAFunc, AreNotWhereThereAreTooFewForTheThreads) {
+  EXPECT_EQ(Shifted(4).place_of_rows().kind, ir::LoopLevel::Kind::Root);
+}
+
+TEST(SlicesOfAFunc, AreNotWhereSeveralReadThem) {
+  Shifted program(11);
+  program.out(program.x, program.y) += program.rows(program.x, program.y, 3);
+  EXPECT_EQ(program.place_of_rows().kind, ir::LoopLevel::Kind::Root);
+}
+
+TEST(SlicesOfAFunc, AreNotWhereAnIterationReadsTwo) {
+  EXPECT_EQ(Shifted(11, 2).place_of_rows().kind, ir::LoopLevel::Kind::Root);
+}
+
 TEST_F(BuiltInScheduler, KeepsWhatAUserScheduled) {
   heavy.compute_at(blur, y).vectorize(x, 4);
   blur.compute_root().reorder(y, x);

@@ -1,0 +1,27 @@
+// slices.h -- what one Func alone reads, slice by slice, is computed slice by slice.
+//
+//   distance(x, y, dx, dy) += across(x, y + r, dx, dy)
+//
+//   for dy, dx, y, x: across = ...          parallel for dy:
+//   for dy, dx, y, x: distance += ...   =>    for dx:
+//                                               for y, x: across = ...
+//                                               for y, x: distance += ...
+//
+// No element is computed twice, and of `across` there is an image for each thread instead of one for
+// each dx and dy.
+#pragma once
+
+#include <unordered_set>
+#include <vector>
+
+#include "graph/function.h"
+
+namespace retrograde::ir {
+
+// Moves those of the Funcs, all of which this scheduler has computed at root and given loops, into
+// the loops of their only reader, if that is one of them, too. `but`: none of these, as a reader
+// neither.
+void compute_in_slices(const std::vector<FuncPtr>& outputs, const std::vector<FuncPtr>& stored,
+                       const std::unordered_set<const Symbol*>& but);
+
+}  // namespace retrograde::ir
