@@ -72,10 +72,9 @@ class Direction {
 
   Monotonic constant_or_unknown(const Expr& e) const {
     // What a Func holds may change from one iteration to the next.
-    const bool reads = any_node(e, [](const Expr& node) {
-      const Call* call = node.as<Call>();
-      return (call && call->call_type == CallType::Func) || node.kind() == Kind::Load;
-    });
+    const bool reads = any_node(
+        e, [](const Call& call) { return call.call_type == CallType::Func; },
+        [](const Load&) { return true; });
     const bool is_constant = !reads && !uses_variable(e, variable_);
     return is_constant ? Monotonic::Constant : Monotonic::Unknown;
   }

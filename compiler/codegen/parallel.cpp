@@ -27,16 +27,9 @@ struct Uses {
 Uses names_in(const Stmt& s) {
   Uses uses;
   walk(
-      s,
-      [&](const Expr& e) {
-        if (const auto* variable = e.as<Variable>()) uses.variables.insert(variable->name);
-        if (const auto* load = e.as<Load>()) uses.storages.insert(load->name);
-        return true;
-      },
-      [&](const Stmt& part) {
-        if (const auto* store = part.as<Store>()) uses.storages.insert(store->name);
-        return true;
-      });
+      s, [&](const Variable& n) { uses.variables.insert(n.name); },
+      [&](const Load& n) { uses.storages.insert(n.name); },
+      [&](const Store& n) { uses.storages.insert(n.name); });
   return uses;
 }
 

@@ -15,7 +15,7 @@
 #include "graph/provenance.h"
 #include "graph/reduction_domain.h"
 #include "graph/schedule.h"
-#include "ir/expr.h"
+#include "ir/visit.h"
 
 namespace retrograde {
 
@@ -121,6 +121,21 @@ std::vector<FuncPtr> direct_callees(const FuncContents& f);
 // Visits every expression of a definition: args, values, predicate, rvar bounds.
 void for_each_expr(const Definition& definition, const std::function<void(const Expr&)>& visit);
 Definition map_exprs(const Definition& definition, const std::function<Expr(const Expr&)>& map);
+// As of one expression (ir/visit.h), for all of a definition, and of a Func.
+template <class... Fs>
+void walk(const Definition& definition, Fs&&... fs) {
+  for_each_expr(definition, [&](const Expr& root) { walk(root, fs...); });
+}
+template <class... Fs>
+void walk(const FuncContents& f, Fs&&... fs) {
+  for (int s = 0; s < f.stage_count(); ++s) walk(f.stage(s), fs...);
+}
+template <class... Fs>
+bool any_node(const Definition& definition, Fs&&... fs) {
+  bool found = false;
+  for_each_expr(definition, [&](const Expr& root) { found = found || any_node(root, fs...); });
+  return found;
+}
 
 // Scalar and buffer parameters reached from the outputs, in first-use order.
 std::vector<std::shared_ptr<ParameterContents>> parameters_of(const std::vector<FuncPtr>& outputs);

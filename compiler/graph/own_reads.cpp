@@ -7,9 +7,13 @@
 
 namespace retrograde::ir {
 
+bool is_call_of(const Call& call, const Symbol* f) {
+  return call.call_type == CallType::Func && call.symbol.raw() == f;
+}
+
 const Call* as_call_of(const Expr& e, const Symbol* f) {
   const auto* call = e.as<Call>();
-  return call && call->call_type == CallType::Func && call->symbol.raw() == f ? call : nullptr;
+  return call && is_call_of(*call, f) ? call : nullptr;
 }
 
 Expr map_calls_of(const Expr& e, const Symbol* f,

@@ -9,6 +9,7 @@
 
 namespace retrograde::ir {
 
+bool is_call_of(const Call& call, const Symbol* f);
 // The call of the Func that `e` is; null when it is none.
 const Call* as_call_of(const Expr& e, const Symbol* f);
 // Calls of the Func become what `read` makes of them and of their arguments, mapped before.

@@ -218,16 +218,13 @@ class Replay {
   // Parameters that only the schedule reads are the log's own; from text they are new.
   void note_parameters(const Expr& e) {
     if (!e.defined()) return;
-    walk(e, [&](const Expr& part) {
-      const Variable* v = part.as<Variable>();
-      if (!v || v->symbol.defined() || names_.parameters.count(v->name) ||
-          names_.buffer_of_fact(v->name))
-        return true;
+    walk(e, [&](const Variable& v) {
+      if (v.symbol.defined() || names_.parameters.count(v.name) || names_.buffer_of_fact(v.name))
+        return;
       const auto parameter = std::make_shared<ParameterContents>();
-      parameter->name = v->name;
-      parameter->type = v->type;
-      names_.parameters.emplace(v->name, parameter);
-      return true;
+      parameter->name = v.name;
+      parameter->type = v.type;
+      names_.parameters.emplace(v.name, parameter);
     });
   }
 

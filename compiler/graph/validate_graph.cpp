@@ -83,10 +83,7 @@ class GraphValidator {
   // Every variable is bound by its definition or a let, or stands for a parameter or a fact.
   void check_names(const FuncContents& f, const Expr& root,
                    std::unordered_set<std::string> bound) const {
-    walk(root, [&](const Expr& e) {
-      if (const Let* let = e.as<Let>()) bound.insert(let->name);
-      return true;
-    });
+    walk(root, [&](const Let& let) { bound.insert(let.name); });
     std::unordered_set<const ExprNode*> seen;
     walk(root, [&](const Expr& e) {
       if (!seen.insert(e.get()).second) return false;

@@ -7,10 +7,7 @@
 namespace retrograde::ir {
 
 bool loads_from(const Expr& e, const std::string& buffer) {
-  return any_node(e, [&](const Expr& node) {
-    const auto* load = node.as<Load>();
-    return load && load->name == buffer;
-  });
+  return any_node(e, [&](const Load& load) { return load.name == buffer; });
 }
 
 bool is_one_word(Type type) { return !type.is_handle() && type.bits() <= 64; }

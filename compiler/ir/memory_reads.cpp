@@ -22,17 +22,12 @@ MemoryReads kind_of(const Call& call) {
 }  // namespace
 
 bool reads_memory(const Expr& e, MemoryReads what) {
-  return any_node(e, [&](const Expr& node) {
-    const auto* call = node.as<Call>();
-    return node.kind() == Kind::Load || (call && kind_of(*call) <= what);
-  });
+  return any_node(
+      e, [](const Load&) { return true; }, [&](const Call& call) { return kind_of(call) <= what; });
 }
 
 bool calls(const Expr& e, const Symbol* f) {
-  return any_node(e, [&](const Expr& node) {
-    const auto* call = node.as<Call>();
-    return call && call->symbol.raw() == f;
-  });
+  return any_node(e, [&](const Call& call) { return call.symbol.raw() == f; });
 }
 
 }  // namespace retrograde::ir

@@ -375,23 +375,16 @@ Stmt substitute(const Stmt& s, const std::string& name, const Expr& value) {
 // ---- uses ----
 
 bool uses_variable(const Expr& e, const std::string& name) {
-  return any_node(e, [&](const Expr& node) {
-    const auto* var = node.as<Variable>();
-    return var && var->name == name;
-  });
+  return any_node(e, [&](const Variable& var) { return var.name == name; });
 }
 bool uses_variable(const Stmt& s, const std::string& name) {
-  const auto is_use = [&](const Expr& node) {
-    const auto* var = node.as<Variable>();
-    return var && var->name == name;
-  };
-  return any_node(s, is_use, [](const Stmt&) { return false; });
+  return any_node(s, [&](const Variable& var) { return var.name == name; });
 }
 bool uses_any_variable(const Expr& e, const std::unordered_set<std::string>& names) {
-  return any_node(e, [&](const Expr& node) {
-    const auto* var = node.as<Variable>();
-    return var && names.contains(var->name);
-  });
+  return any_node(e, [&](const Variable& var) { return names.contains(var.name); });
+}
+bool has_loops(const Stmt& s, ForType runs) {
+  return any_node(s, [&](const For& loop) { return loop.runs == runs; });
 }
 
 std::string unique_name(const std::string& prefix) {

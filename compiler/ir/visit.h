@@ -103,6 +103,50 @@ bool any_node(const Stmt& s, FunctionRef<bool(const Expr&)> expr_holds,
               FunctionRef<bool(const Stmt&)> stmt_holds);
 bool any_stmt(const Stmt& s, FunctionRef<bool(const Stmt&)> holds);  // looks at no expressions
 
+// The same with lambdas of nodes, as those of `match`, which all nodes of their types are given:
+//
+//   walk(s, [&](const Variable& v) { names.insert(v.name); }, [&](const Let& n) {...});
+//   any_node(s, [&](const Load& n) { return n.name == buffer; });
+template <class F>
+concept NodeVisit = !std::is_invocable_v<F&, const Expr&> && !std::is_invocable_v<F&, const Stmt&>;
+template <class F>
+constexpr bool visits_exprs =
+#define RETROGRADE_EXPR(K) std::is_invocable_v<F&, const K&> ||
+#define RETROGRADE_BINARY(K) RETROGRADE_EXPR(K)
+#include "ir/kinds.def"
+    false;
+
+template <NodeVisit... Fs>
+void walk(const Expr& e, Fs&&... fs) {
+  walk(e, [&](const Expr& node) { return match(node, fs..., [](const ExprNode&) {}), true; });
+}
+template <NodeVisit... Fs>
+void walk(const Stmt& s, Fs&&... fs) {
+  constexpr bool exprs = (visits_exprs<Fs> || ...);
+  walk(
+      s,
+      [&](const Expr& node) {
+        if constexpr (exprs) match(node, fs..., [](const ExprNode&) {});
+        return exprs;
+      },
+      [&](const Stmt& node) { return match(node, fs..., [](const StmtNode&) {}), true; });
+}
+template <NodeVisit... Fs>
+bool any_node(const Expr& e, Fs&&... fs) {
+  const auto holds = [](const ExprNode&) { return false; };
+  return any_node(e, [&](const Expr& node) -> bool { return match(node, fs..., holds); });
+}
+template <NodeVisit... Fs>
+bool any_node(const Stmt& s, Fs&&... fs) {
+  constexpr bool exprs = (visits_exprs<Fs> || ...);
+  const auto no_stmt = [](const StmtNode&) { return false; };
+  const auto stmt_holds = [&](const Stmt& node) -> bool { return match(node, fs..., no_stmt); };
+  if constexpr (!exprs) return any_stmt(s, stmt_holds);
+  const auto no_expr = [](const ExprNode&) { return false; };
+  return any_node(
+      s, [&](const Expr& node) -> bool { return match(node, fs..., no_expr); }, stmt_holds);
+}
+
 // A context-free rewriting, memoised by node identity. Derive, and override `rewrite` for the kinds
 // of interest, ending in `return children(e)`. Call the object on children to recurse.
 class Rewriter {
@@ -142,6 +186,7 @@ Stmt substitute(const Stmt& s, const std::string& name, const Expr& value);
 bool uses_variable(const Expr& e, const std::string& name);
 bool uses_variable(const Stmt& s, const std::string& name);
 bool uses_any_variable(const Expr& e, const std::unordered_set<std::string>& names);
+bool has_loops(const Stmt& s, ForType runs);
 
 // A fresh name "prefix$N", unique in the process (thread-safe). unique_name("x") may give "x$3".
 std::string unique_name(const std::string& prefix);

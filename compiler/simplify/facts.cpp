@@ -273,14 +273,10 @@ void Facts::assume_at_most(Sum sum, int64_t bound) {
 }
 
 bool Facts::is_older(const Expr& e, int order) const {
-  bool result = true;
-  walk(e, [&](const Expr& part) {
-    const auto* name = part.as<Variable>();
-    const auto found = name ? variables_.find(name->name) : variables_.end();
-    result &= found == variables_.end() || found->second.order < order;
-    return result;
+  return !any_node(e, [&](const Variable& name) {
+    const auto found = variables_.find(name.name);
+    return found != variables_.end() && found->second.order >= order;
   });
-  return result;
 }
 
 // low + gap <= high, where low is a loop's variable: a new upper end. The old one stays beside it,

@@ -213,10 +213,8 @@ Expr Simplifier::let(const Expr& e) {
 }
 
 bool has_effect(const Expr& e) {
-  return any_node(e, [&](const Expr& node) {
-    const auto* call = node.as<Call>();
-    return call && (call->call_type == CallType::Extern || acts(call->op));
-  });
+  return any_node(
+      e, [&](const Call& call) { return call.call_type == CallType::Extern || acts(call.op); });
 }
 
 }  // namespace retrograde::ir

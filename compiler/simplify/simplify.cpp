@@ -31,10 +31,7 @@ Simplifier::Simplifier(const BoundsMap& bounds) {
     if (found == bounds.end() || !done.insert(name).second) return;
     for (const Expr& end : {found->second.min, found->second.max}) {
       if (!end.defined()) continue;
-      walk(end, [&](const Expr& e) {
-        if (const auto* var = e.as<Variable>()) bind(var->name);
-        return true;
-      });
+      walk(end, [&](const Variable& var) { bind(var.name); });
     }
     const auto simplified = [&](const Expr& end) { return end.defined() ? (*this)(end) : end; };
     const Expr min = simplified(found->second.min), max = simplified(found->second.max);

@@ -108,21 +108,17 @@ class Scheduler {
   template <typename Visit>
   void for_each_read(const ir::FuncContents& f, int stage, const Visit& visit,
                      bool direct = true) const {
-    ir::for_each_expr(f.stage(stage), [&](const Expr& root) {
-      ir::walk(root, [&](const Expr& e) {
-        const ir::Call* call = e.as<ir::Call>();
-        if (!call || call->symbol.raw() == &f) return true;
-        if (call->call_type == ir::CallType::Image) visit(-1, *call, direct);
-        if (call->call_type != ir::CallType::Func) return true;
-        const ir::FuncPtr callee = ir::func_of(*call);
-        const auto known = std::find(funcs_.begin(), funcs_.end(), callee);
-        if (known != funcs_.end()) {
-          visit(static_cast<int>(known - funcs_.begin()), *call, direct);
-        } else {
-          for (int s = 0; s < callee->stage_count(); ++s) for_each_read(*callee, s, visit, false);
-        }
-        return true;
-      });
+    walk(f.stage(stage), [&](const ir::Call& call) {
+      if (call.symbol.raw() == &f) return;
+      if (call.call_type == ir::CallType::Image) visit(-1, call, direct);
+      if (call.call_type != ir::CallType::Func) return;
+      const ir::FuncPtr callee = ir::func_of(call);
+      const auto known = std::find(funcs_.begin(), funcs_.end(), callee);
+      if (known != funcs_.end()) {
+        visit(static_cast<int>(known - funcs_.begin()), call, direct);
+      } else {
+        for (int s = 0; s < callee->stage_count(); ++s) for_each_read(*callee, s, visit, false);
+      }
     });
   }
   std::set<int> producers_of_stage(int f, int stage) const {

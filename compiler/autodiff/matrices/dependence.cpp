@@ -270,9 +270,8 @@ class Composer {
   static void for_each_self_read(const FuncContents& f, const Definition& update,
                                  FunctionRef<void(const Call&)> visit) {
     for_each_expr(update, [&](const Expr& root) {
-      walk(without_lets(root), [&](const Expr& e) {
-        if (const Call* call = as_call_of(e, &f)) visit(*call);
-        return true;
+      walk(without_lets(root), [&](const Call& call) {
+        if (is_call_of(call, &f)) visit(call);
       });
     });
   }

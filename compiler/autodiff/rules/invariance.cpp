@@ -318,13 +318,9 @@ void note_suspects(const Definition& stage, size_t dimensions, Suspects& result)
     if (call && call->call_type == CallType::Func && call->args.size() < dimensions)
       where.insert(call->symbol.raw());
   };
-  for_each_expr(stage, [&](const Expr& root) {
-    walk(root, [&](const Expr& e) {
-      if (const auto* difference = e.as<Sub>()) note(difference->b, result.subtracted);
-      if (const auto* quotient = e.as<Div>()) note(quotient->b, result.divisors);
-      return true;
-    });
-  });
+  walk(
+      stage, [&](const Sub& difference) { note(difference.b, result.subtracted); },
+      [&](const Div& quotient) { note(quotient.b, result.divisors); });
 }
 
 Suspects suspects_among(const std::vector<FuncPtr>& order) {

@@ -644,14 +644,9 @@ namespace {
 
 // Of this definition only: an adjoint may get hundreds of them.
 void freeze_callees(const Definition& d, const FuncContents& f) {
-  for_each_expr(d, [&](const Expr& root) {
-    walk(root, [&](const Expr& e) {
-      const auto* call = e.as<Call>();
-      if (!call || call->call_type != CallType::Func) return true;
-      const FuncPtr callee = func_of(*call);
-      if (callee.get() != &f) callee->frozen = true;
-      return true;
-    });
+  walk(d, [&](const Call& call) {
+    const FuncPtr callee = call.call_type == CallType::Func ? func_of(call) : nullptr;
+    if (callee && callee.get() != &f) callee->frozen = true;
   });
 }
 

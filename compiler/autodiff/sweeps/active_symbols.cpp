@@ -63,13 +63,8 @@ bool ActiveSymbols::passes_on(const FuncContents& f) const {
 }
 
 bool ActiveSymbols::reads_active(const Definition& definition) const {
-  bool found = false;
-  for_each_expr(definition, [&](const Expr& root) {
-    found = found || any_node(root, [&](const Expr& e) {
-              return (e.as<Call>() || e.as<Variable>()) && contains(e);
-            });
-  });
-  return found;
+  return any_node(definition,
+                  [&](const Expr& e) { return (e.as<Call>() || e.as<Variable>()) && contains(e); });
 }
 
 }  // namespace retrograde::ir

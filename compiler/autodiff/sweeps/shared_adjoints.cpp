@@ -118,10 +118,8 @@ class Sharing {
     std::set<const Symbol*> result;
     for (const Expr& seed : seeds) {
       if (!seed.defined()) continue;
-      walk(seed, [&](const Expr& e) {
-        const auto* call = e.as<Call>();
-        if (call && provenance_of(*call)) result.insert(call->symbol.raw());
-        return true;
+      walk(seed, [&](const Call& call) {
+        if (provenance_of(call)) result.insert(call.symbol.raw());
       });
     }
     return result;

@@ -115,12 +115,8 @@ Tuple Func::update_values(int index) const {
 std::vector<RVar> Func::rvars(int index) const {
   const ir::Definition& update = checked_update(index, "take the reduction variables of update");
   std::shared_ptr<ir::ReductionDomainContents> domain;
-  ir::for_each_expr(update, [&](const Expr& root) {
-    ir::walk(root, [&](const Expr& e) {
-      const ir::Variable* v = e.as<ir::Variable>();
-      if (v && !domain) domain = ir::domain_of(*v);
-      return !domain;
-    });
+  walk(update, [&](const ir::Variable& v) {
+    if (!domain) domain = ir::domain_of(v);
   });
   std::vector<RVar> result;
   for (size_t i = 0; i < update.rvars.size(); i++)

@@ -50,12 +50,11 @@ class Finder {
   ir::Substitution renamed_;
 
   void collect(const Expr& root) {
-    ir::walk(root, [&](const Expr& e) {
-      if (const ir::Let* let = e.as<ir::Let>()) let_bound_.insert(let->name);
-      const ir::Variable* v = e.as<ir::Variable>();
-      if (v && seen_.insert(v->name).second) free_.push_back(v);
-      return true;
-    });
+    ir::walk(
+        root, [&](const ir::Let& let) { let_bound_.insert(let.name); },
+        [&](const ir::Variable& v) {
+          if (seen_.insert(v.name).second) free_.push_back(&v);
+        });
   }
 
   void choose_domain() {
@@ -117,10 +116,8 @@ Expr smallest(Type type) {
 // The update must run over the whole domain even when the body uses only part of its variables, or
 // none.
 Expr mention_domain(const Expr& e, const Reduction& reduction) {
-  const bool mentioned = ir::any_node(e, [&](const Expr& part) {
-    const ir::Variable* v = part.as<ir::Variable>();
-    return v && v->symbol.raw() == reduction.domain.get();
-  });
+  const bool mentioned = ir::any_node(
+      e, [&](const ir::Variable& v) { return v.symbol.raw() == reduction.domain.get(); });
   if (mentioned) return e;
   const RVar r(reduction.domain, 0);
   return select(Expr(r) >= r.min(), e, ir::make_zero(e.type()));

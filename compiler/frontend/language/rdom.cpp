@@ -28,14 +28,12 @@ Expr checked_bound(const Expr& e, const std::string& domain, const char* which) 
     user_error(asked, text("its ", which, " must be an integer"),
                text(e, " has type ", to_string(e.type())), "Convert it with cast<int>");
   }
-  walk(e, [&](const Expr& part) {
-    const ir::Variable* v = part.as<ir::Variable>();
-    if (v && (!v->symbol.defined() || ir::domain_of(*v))) {
+  walk(e, [&](const ir::Variable& v) {
+    if (!v.symbol.defined() || ir::domain_of(v)) {
       user_error(asked, "its bounds must be known before any loop starts",
-                 text("its ", which, " uses ", quoted(v->name)),
+                 text("its ", which, " uses ", quoted(v.name)),
                  "Make the domain as large as it can get and leave points out with where()");
     }
-    return true;
   });
   return ir::int32_literal(e, asked);
 }

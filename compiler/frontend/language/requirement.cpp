@@ -14,15 +14,15 @@ void check_uses_parameters_only(const Expr& part, const std::string& asked) {
     user_error(asked, "a requirement is checked once, before anything is computed", evidence,
                "Use require() inside a definition");
   };
-  ir::walk(part, [&](const Expr& e) {
-    const ir::Variable* variable = e.as<ir::Variable>();
-    if (variable && !variable->symbol.defined())
-      refuse("it uses the Var " + quoted(variable->name));
-    const ir::Call* call = e.as<ir::Call>();
-    if (call && (call->call_type == ir::CallType::Func || call->call_type == ir::CallType::Image))
-      refuse("it reads " + quoted(call->name));
-    return true;
-  });
+  ir::walk(
+      part,
+      [&](const ir::Variable& variable) {
+        if (!variable.symbol.defined()) refuse("it uses the Var " + quoted(variable.name));
+      },
+      [&](const ir::Call& call) {
+        if (call.call_type == ir::CallType::Func || call.call_type == ir::CallType::Image)
+          refuse("it reads " + quoted(call.name));
+      });
 }
 
 }  // namespace

@@ -118,10 +118,8 @@ class SeveralPoints {
     std::vector<Expr> all = args_;
     all.insert(all.end(), values_.begin(), values_.end());
     for (const Expr& e : all) {
-      walk(e, [&](const Expr& node) {
-        const auto* v = node.as<Variable>();
-        if (v && !old_) old_ = domain_of(*v);
-        return true;
+      walk(e, [&](const Variable& v) {
+        if (!old_) old_ = domain_of(v);
       });
     }
     domain_ = std::make_shared<ReductionDomainContents>();

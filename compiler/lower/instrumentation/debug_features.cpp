@@ -16,6 +16,7 @@
 #include "ir/build.h"
 #include "ir/print.h"
 #include "ir/visit.h"
+#include "lower/statement_rewriter.h"
 
 namespace retrograde::ir {
 namespace {
@@ -44,20 +45,18 @@ Expr without_last_bit(const Expr& value) {
   return make_select(value == value, cleared, value);
 }
 
-class FuzzFloatStores : public Rewriter {
- protected:
-  Stmt rewrite(const Stmt& s) override {
-    if (s.as<Atomic>()) return s;
-    const auto* store = s.as<Store>();
-    if (!store || !store->value.type().is_float()) return children(s);
-    return make_store(store->name, without_last_bit(store->value), store->index, store->predicate,
-                      store->symbol);
-  }
-};
-
 }  // namespace
 
 Stmt check_promises(const Stmt& s) { return CheckPromises()(s); }
-Stmt fuzz_float_stores(const Stmt& s) { return FuzzFloatStores()(s); }
+
+Stmt fuzz_float_stores(const Stmt& all) {
+  return rewrite_statements(all, [](const Stmt& s, auto& rewriter) {
+    if (s.as<Atomic>()) return s;
+    const auto* store = s.as<Store>();
+    if (!store || !store->value.type().is_float()) return rewriter.children(s);
+    return make_store(store->name, without_last_bit(store->value), store->index, store->predicate,
+                      store->symbol);
+  });
+}
 
 }  // namespace retrograde::ir

@@ -21,6 +21,7 @@
 
 #include "ir/build.h"
 #include "ir/visit.h"
+#include "lower/statement_rewriter.h"
 
 namespace retrograde::ir {
 
@@ -34,7 +35,7 @@ Expr call(const char* function, std::vector<Expr> args, Type type = Int(32)) {
 }
 Expr run() { return variable(run_name, Handle()); }
 
-class Profiling : public Rewriter {
+class Profiling : public StatementRewriter {
  public:
   explicit Profiling(const Program& program) {
     for (const LoopedFunc& f : program.funcs) add(f, f.name());
@@ -47,8 +48,6 @@ class Profiling : public Rewriter {
   std::string names;  // by number
 
  protected:
-  Expr rewrite(const Expr& e) override { return e; }
-
   Stmt rewrite(const Stmt& s) override {
     if (const ProducerConsumer* n = s.as<ProducerConsumer>(); n && n->produces) return produce(*n);
     if (const For* n = s.as<For>(); n && n->runs == ForType::Parallel) {

@@ -83,12 +83,9 @@ class LoopNames {
 
 bool is_over_parameters(const Expr& condition) {
   bool result = true, any = false;
-  walk(condition, [&](const Expr& e) {
-    const Variable* v = e.as<Variable>();
-    if (!v) return true;
+  walk(condition, [&](const Variable& v) {
     any = true;
-    result &= dynamic_cast<const ParameterContents*>(v->symbol.raw()) != nullptr;
-    return true;
+    result &= dynamic_cast<const ParameterContents*>(v.symbol.raw()) != nullptr;
   });
   return any && result;
 }

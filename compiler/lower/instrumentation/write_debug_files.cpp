@@ -12,6 +12,7 @@
 #include "ir/build.h"
 #include "ir/visit.h"
 #include "lower/nests/extern_stage.h"
+#include "lower/statement_rewriter.h"
 
 namespace retrograde::ir {
 
@@ -43,13 +44,11 @@ void check(const LoopedFunc& f) {
               "Cast them to float in a Func of its own");
 }
 
-class Writer : public Rewriter {
+class Writer : public StatementRewriter {
  public:
   explicit Writer(const Program& program) : program_(program) {}
 
  protected:
-  Expr rewrite(const Expr& e) override { return e; }
-
   Stmt rewrite(const Stmt& s) override {
     const ProducerConsumer* n = s.as<ProducerConsumer>();
     if (!n || !n->produces) return children(s);

@@ -19,6 +19,7 @@
 #include "ir/visit.h"
 #include "lower/nests/argument_checks.h"
 #include "lower/nests/run_time_check.h"
+#include "lower/statement_rewriter.h"
 #include "retrograde_runtime.h"
 
 namespace retrograde::ir {
@@ -53,41 +54,36 @@ Stmt refuse(const Expr& query) {
   return run_time_check(!query, retrograde_error_host_is_null, message);
 }
 
-class DropBoundsQuery : public Rewriter {
- protected:
-  Stmt rewrite(const Stmt& s) override {
-    const auto* branch = s.as<IfThenElse>();
-    const std::vector<Expr> queries = branch ? queries_in(branch->condition) : std::vector<Expr>();
-    if (queries.empty()) return children(s);
-    std::vector<Stmt> parts;
-    for (const Expr& query : queries) parts.push_back(refuse(query));
-    if (branch->when_false.defined()) parts.push_back(branch->when_false);
-    return make_block(parts);
-  }
-};
-
 bool may_report(const Stmt& s) {
   const auto* assert = s.as<Assert>();
   return assert ? !is_zero(assert->error) : is_check_by_runtime(s);
 }
 
-class DropAsserts : public Rewriter {
- protected:
-  Stmt rewrite(const Stmt& s) override {
-    if (may_report(s)) return make_evaluate(0);
-    const auto* block = s.as<Block>();
-    if (!block) return children(s);
-    std::vector<Stmt> kept;
-    for (const Stmt& part : block->stmts) {
-      if (!may_report(part)) kept.push_back((*this)(part));
-    }
-    return kept.empty() ? make_evaluate(0) : make_block(kept);
-  }
-};
-
 }  // namespace
 
-Stmt drop_bounds_query(const Stmt& s) { return DropBoundsQuery()(s); }
-Stmt drop_asserts(const Stmt& s) { return DropAsserts()(s); }
+Stmt drop_bounds_query(const Stmt& all) {
+  return rewrite_statements(all, [](const Stmt& s, auto& rewriter) {
+    const auto* branch = s.as<IfThenElse>();
+    const std::vector<Expr> queries = branch ? queries_in(branch->condition) : std::vector<Expr>();
+    if (queries.empty()) return rewriter.children(s);
+    std::vector<Stmt> parts;
+    for (const Expr& query : queries) parts.push_back(refuse(query));
+    if (branch->when_false.defined()) parts.push_back(branch->when_false);
+    return make_block(parts);
+  });
+}
+
+Stmt drop_asserts(const Stmt& all) {
+  return rewrite_statements(all, [](const Stmt& s, auto& rewriter) {
+    if (may_report(s)) return make_evaluate(0);
+    const auto* block = s.as<Block>();
+    if (!block) return rewriter.children(s);
+    std::vector<Stmt> kept;
+    for (const Stmt& part : block->stmts) {
+      if (!may_report(part)) kept.push_back(rewriter(part));
+    }
+    return kept.empty() ? make_evaluate(0) : make_block(kept);
+  });
+}
 
 }  // namespace retrograde::ir

@@ -55,21 +55,14 @@ struct Usage {
 Usage find_usage(const Stmt& s) {
   Usage usage;
   walk(
-      s,
-      [&](const Expr& e) {
-        if (const Variable* v = e.as<Variable>()) usage.variables.insert(v->name);
-        const Call* call = e.as<Call>();  // an output that a C function fills: no Provide names it
-        if (call && call->call_type == CallType::Func && call->symbol.defined()) {
-          const auto f = std::dynamic_pointer_cast<FuncContents>(call->symbol.lock());
-          if (f && f->is_extern()) usage.value_counts.emplace(call->name, f->types.size());
-        }
-        return true;
+      s, [&](const Variable& n) { usage.variables.insert(n.name); },
+      [&](const Call& n) {  // an output that a C function fills: no Provide names it
+        if (n.call_type != CallType::Func || !n.symbol.defined()) return;
+        const auto f = std::dynamic_pointer_cast<FuncContents>(n.symbol.lock());
+        if (f && f->is_extern()) usage.value_counts.emplace(n.name, f->types.size());
       },
-      [&](const Stmt& node) {
-        if (const Provide* p = node.as<Provide>()) usage.value_counts[p->name] = p->values.size();
-        if (const Realize* r = node.as<Realize>()) usage.value_counts[r->name] = r->types.size();
-        return true;
-      });
+      [&](const Provide& n) { usage.value_counts[n.name] = n.values.size(); },
+      [&](const Realize& n) { usage.value_counts[n.name] = n.types.size(); });
   return usage;
 }
 

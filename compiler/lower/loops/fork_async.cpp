@@ -36,6 +36,7 @@
 #include "ir/visit.h"
 #include "lower/loops/semaphores.h"
 #include "lower/nests/make_names_unique.h"
+#include "lower/statement_rewriter.h"
 
 namespace retrograde::ir {
 
@@ -102,12 +103,7 @@ Names group_of(const ProducerConsumer& producer) {
 
 Names realized_in(const Stmt& s) {
   Names names;
-  walk(
-      s, [](const Expr&) { return false; },
-      [&](const Stmt& part) {
-        if (const Realize* n = part.as<Realize>()) names.insert(n->name);
-        return true;
-      });
+  walk(s, [&](const Realize& n) { names.insert(n.name); });
   return names;
 }
 
@@ -135,14 +131,12 @@ bool has_loop_around(const Stmt& s, const std::string& func) {
   return found;
 }
 
-class AsyncForker : public Rewriter {
+class AsyncForker : public StatementRewriter {
  public:
   AsyncForker(const Stmt& s, const Program& program, const AsyncRoom& room)
       : program_(program), room_(room), semaphores_(s) {}
 
  protected:
-  Expr rewrite(const Expr& e) override { return e; }
-
   Stmt rewrite(const Stmt& given) override {
     const Stmt s = producers_outermost(given);
     const Realize* n = s.as<Realize>();

@@ -28,6 +28,7 @@
 
 #include "ir/build.h"
 #include "ir/visit.h"
+#include "lower/statement_rewriter.h"
 
 namespace retrograde::ir {
 
@@ -93,10 +94,7 @@ class LastUseFinder {
   // Loads in the value of a let lie before the let's body: the step is the let itself.
   void visit(const Expr& e, Place place) {
     Place step = std::exchange(steps_.back(), place);
-    walk(e, [&](const Expr& node) {
-      if (const Load* load = node.as<Load>()) use(load->name);
-      return true;
-    });
+    walk(e, [&](const Load& load) { use(load.name); });
     steps_.back() = step;
   }
 
@@ -113,41 +111,29 @@ class LastUseFinder {
   std::unordered_map<std::string, Life> lives_;
 };
 
-class FreeInserter : public Rewriter {
- public:
-  explicit FreeInserter(const LastUses& uses) : uses_(uses) {}
-
- protected:
-  Expr rewrite(const Expr& e) override { return e; }
-
-  Stmt rewrite(const Stmt& s) override {
-    auto it = uses_.frees.find(next_++);
-    if (it == uses_.frees.end()) return children(s);
-    std::vector<Stmt> frees;
-    for (size_t i = it->second.size(); i-- > 0;) frees.push_back(make_free(it->second[i]));
-    if (const LetStmt* let = s.as<LetStmt>()) {  // last used by the value: free before the body
-      frees.push_back((*this)(let->body));
-      return make_let(let->name, let->value, make_block(std::move(frees)));
-    }
-    if (const Allocate* a = s.as<Allocate>()) {
-      frees.push_back((*this)(a->body));
-      return make_allocate(a->name, a->type, a->memory, a->elements, make_block(std::move(frees)));
-    }
-    frees.insert(frees.begin(), children(s));
-    return make_block(std::move(frees));
-  }
-
- private:
-  const LastUses& uses_;
-  Place next_ = 0;
-};
-
 }  // namespace
 
 Stmt free_early(const Stmt& s) {
   if (!s.defined()) return s;
-  LastUses uses = LastUseFinder().find(s);
-  return uses.frees.empty() ? s : FreeInserter(uses)(s);
+  const LastUses uses = LastUseFinder().find(s);
+  if (uses.frees.empty()) return s;
+  Place next = 0;
+  return rewrite_statements(s, [&](const Stmt& node, auto& all) {
+    const auto here = uses.frees.find(next++);
+    if (here == uses.frees.end()) return all.children(node);
+    std::vector<Stmt> frees;
+    for (size_t i = here->second.size(); i-- > 0;) frees.push_back(make_free(here->second[i]));
+    if (const LetStmt* let = node.as<LetStmt>()) {  // last used by the value: free before the body
+      frees.push_back(all(let->body));
+      return make_let(let->name, let->value, make_block(std::move(frees)));
+    }
+    if (const Allocate* a = node.as<Allocate>()) {
+      frees.push_back(all(a->body));
+      return make_allocate(a->name, a->type, a->memory, a->elements, make_block(std::move(frees)));
+    }
+    frees.insert(frees.begin(), all.children(node));
+    return make_block(std::move(frees));
+  });
 }
 
 }  // namespace retrograde::ir

@@ -18,6 +18,7 @@
 #include "ir/build.h"
 #include "ir/visit.h"
 #include "lower/nests/copy_statement.h"
+#include "lower/statement_rewriter.h"
 #include "simplify/simplify.h"
 
 namespace retrograde::ir {
@@ -69,13 +70,11 @@ class ReadRegion {
   }
 };
 
-class Inserter : public Rewriter {
+class Inserter : public StatementRewriter {
  public:
   explicit Inserter(const Program& program) : program_(program) {}
 
  protected:
-  Expr rewrite(const Expr& e) override { return e; }
-
   Stmt rewrite(const Stmt& s) override {
     if (const Realize* n = s.as<Realize>()) {
       realized_[program_.original(n->name)] = n->name;
@@ -192,12 +191,11 @@ class Inserter : public Rewriter {
   }
 };
 
-class PrefetchLowering : public Rewriter {
+class PrefetchLowering : public StatementRewriter {
  public:
   PrefetchLowering(const Stmt& s, const Program& program) : program_(program), fresh_(s) {}
 
  protected:
-  Expr rewrite(const Expr& e) override { return e; }
   Stmt rewrite(const Stmt& s) override {
     const Prefetch* n = s.as<Prefetch>();
     return n ? lines(*n) : children(s);

@@ -38,6 +38,7 @@
 #include "ir/equal.h"
 #include "ir/visit.h"
 #include "lower/nests/copy_statement.h"
+#include "lower/statement_rewriter.h"
 
 namespace retrograde::ir {
 
@@ -207,14 +208,12 @@ class Kept : public Rewriter {
   std::vector<Expr> args_;
 };
 
-class KeepAccumulators : public Rewriter {
+class KeepAccumulators : public StatementRewriter {
  public:
   KeepAccumulators(const Stmt& s, const std::function<bool(const For&)>& is_pure)
       : is_pure_(is_pure), fresh_(s) {}
 
  protected:
-  Expr rewrite(const Expr& e) override { return e; }
-
   Stmt rewrite(const Stmt& s) override {
     if (const auto* realize = s.as<Realize>()) return in_storage(*realize, s);
     const auto* loop = s.as<For>();

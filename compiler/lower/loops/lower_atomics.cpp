@@ -23,6 +23,7 @@
 #include "ir/atomic_update.h"
 #include "ir/build.h"
 #include "ir/visit.h"
+#include "lower/statement_rewriter.h"
 
 namespace retrograde::ir {
 
@@ -32,22 +33,15 @@ using BufferNames = std::unordered_set<std::string>;
 
 BufferNames stored_in(const Stmt& s) {
   BufferNames names;
-  walk(
-      s, [](const Expr&) { return false; },
-      [&](const Stmt& part) {
-        if (const Store* store = part.as<Store>()) names.insert(store->name);
-        return true;
-      });
+  walk(s, [&](const Store& store) { names.insert(store.name); });
   return names;
 }
 
 // Whether the value changes when the element does: it reads the Func, or a let that does.
 bool depends_on(const Expr& e, const BufferNames& buffers, const BufferNames& lets) {
-  return any_node(e, [&](const Expr& node) {
-    const Load* load = node.as<Load>();
-    const Variable* variable = node.as<Variable>();
-    return (load && buffers.count(load->name)) || (variable && lets.count(variable->name));
-  });
+  return any_node(
+      e, [&](const Load& load) { return buffers.count(load.name) > 0; },
+      [&](const Variable& variable) { return lets.count(variable.name) > 0; });
 }
 
 bool may_leave(const Stmt& s) {
@@ -95,37 +89,28 @@ Stmt narrowed(const Atomic& n) {
   return with_lets(outside, make_atomic(n.name, body));
 }
 
-class AtomicLowering : public Rewriter {
- protected:
-  Expr rewrite(const Expr& e) override { return e; }
-
-  Stmt rewrite(const Stmt& s) override {
-    if (const Atomic* n = s.as<Atomic>()) return is_shared(n->body) ? narrowed(*n) : n->body;
-    const Allocate* allocate = s.as<Allocate>();
-    if (allocate) depth_of_[allocate->name] = depth_;
-    const For* loop = s.as<For>();
-    const bool is_parallel = s.kind() == Kind::Fork || (loop && loop->runs == ForType::Parallel);
-    depth_ += is_parallel;
-    Stmt result = children(s);
-    depth_ -= is_parallel;
-    return result;
-  }
-
- private:
-  bool is_shared(const Stmt& body) const {
-    for (const std::string& name : stored_in(body)) {
-      const auto found = depth_of_.find(name);
-      if (depth_ > (found == depth_of_.end() ? 0 : found->second)) return true;
-    }
-    return false;
-  }
-
-  int depth_ = 0;  // parallel loops around
-  std::unordered_map<std::string, int> depth_of_;
-};
-
 }  // namespace
 
-Stmt lower_atomics(const Stmt& s) { return s.defined() ? AtomicLowering()(s) : s; }
+Stmt lower_atomics(const Stmt& s) {
+  int depth = 0;  // parallel loops around
+  std::unordered_map<std::string, int> depth_of;
+  const auto is_shared = [&](const Stmt& body) {
+    for (const std::string& name : stored_in(body)) {
+      const auto found = depth_of.find(name);
+      if (depth > (found == depth_of.end() ? 0 : found->second)) return true;
+    }
+    return false;
+  };
+  return rewrite_statements(s, [&](const Stmt& node, auto& all) {
+    if (const Atomic* n = node.as<Atomic>()) return is_shared(n->body) ? narrowed(*n) : n->body;
+    if (const Allocate* n = node.as<Allocate>()) depth_of[n->name] = depth;
+    const For* loop = node.as<For>();
+    const bool is_parallel = node.kind() == Kind::Fork || (loop && loop->runs == ForType::Parallel);
+    depth += is_parallel;
+    Stmt result = all.children(node);
+    depth -= is_parallel;
+    return result;
+  });
+}
 
 }  // namespace retrograde::ir

@@ -44,6 +44,7 @@
 #include "ir/visit.h"
 #include "lower/loops/steady_state.h"
 #include "lower/nests/copy_statement.h"
+#include "lower/statement_rewriter.h"
 #include "simplify/simplify.h"
 
 namespace retrograde::ir {
@@ -58,8 +59,7 @@ constexpr int costly_border = 200;
 constexpr int nodes_an_operation = 64;
 
 bool contains_likely(const Stmt& s) {
-  return any_node(
-      s, [](const Expr& e) { return is_likely(e.as<Call>()); }, [](const Stmt&) { return false; });
+  return any_node(s, [](const Call& call) { return is_likely(&call); });
 }
 
 int node_count(const Stmt& s) {
@@ -71,10 +71,7 @@ int node_count(const Stmt& s) {
 }
 
 bool contains_loop(const Stmt& s) {
-  return any_stmt(s, [](const Stmt& child) {
-    const For* loop = child.as<For>();
-    return loop && is_serial(*loop);
-  });
+  return any_node(s, [](const For& loop) { return is_serial(loop); });
 }
 
 // "f" of the loop "f.s0.x" of its pure definition; else nothing.
@@ -105,13 +102,11 @@ bool runs_in_any_order(const For& loop) {
   return result;
 }
 
-class Partitioner : public Rewriter {
+class Partitioner : public StatementRewriter {
  public:
   explicit Partitioner(const Stmt& s) : fresh_(s) {}
 
  protected:
-  Expr rewrite(const Expr& e) override { return e; }
-
   Stmt rewrite(const Stmt& s) override {
     if (const For* loop = s.as<For>()) return contains_likely(s) ? partition(s, *loop) : s;
     const LetStmt* let = s.as<LetStmt>();

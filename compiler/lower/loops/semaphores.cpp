@@ -1,6 +1,7 @@
 #include "lower/loops/semaphores.h"
 
 #include "ir/build.h"
+#include "lower/statement_rewriter.h"
 
 namespace retrograde::ir {
 
@@ -35,22 +36,6 @@ Expr semaphore_in(const Stmt& step, const std::string& func) {
   return found;
 }
 
-class StepReplacer : public Rewriter {
- public:
-  StepReplacer(const std::string& func, FunctionRef<Stmt(const Stmt&)> replace)
-      : func_(func), replace_(replace) {}
-
- protected:
-  Expr rewrite(const Expr& e) override { return e; }
-  Stmt rewrite(const Stmt& s) override {
-    return Semaphores::is_step(s, func_) ? replace_(s) : children(s);
-  }
-
- private:
-  const std::string& func_;
-  FunctionRef<Stmt(const Stmt&)> replace_;
-};
-
 }  // namespace
 
 Stmt Semaphores::acquire(const std::string& func, int which) {
@@ -75,7 +60,9 @@ bool Semaphores::has_steps(const Stmt& s, const std::string& func) {
 
 Stmt Semaphores::replace_steps(const Stmt& s, const std::string& func,
                                FunctionRef<Stmt(const Stmt&)> replace) {
-  return StepReplacer(func, replace)(s);
+  return rewrite_statements(s, [&](const Stmt& part, auto& all) {
+    return is_step(part, func) ? replace(part) : all.children(part);
+  });
 }
 
 Stmt Semaphores::of_reader(const Stmt& step, const std::string& func, int reader) {

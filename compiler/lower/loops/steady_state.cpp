@@ -47,10 +47,7 @@ bool is_pure(const Expr& e) {
 
 std::unordered_set<std::string> variables_of(const Expr& e) {
   std::unordered_set<std::string> names;
-  walk(e, [&](const Expr& node) {
-    if (const Variable* v = node.as<Variable>()) names.insert(v->name);
-    return true;
-  });
+  walk(e, [&](const Variable& v) { names.insert(v.name); });
   return names;
 }
 

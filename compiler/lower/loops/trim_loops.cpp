@@ -37,6 +37,7 @@
 #include "ir/visit.h"
 #include "lower/loops/steady_state.h"
 #include "lower/nests/copy_statement.h"
+#include "lower/statement_rewriter.h"
 #include "simplify/simplify.h"
 
 namespace retrograde::ir {
@@ -187,42 +188,29 @@ class Trimmer {
 
   const For& loop_;
   const std::unordered_set<std::string>& lanes_;  // of the whole program: not to be copied
-  std::unordered_set<std::string> unusable_;  // bound inside
-  std::unordered_set<std::string> own_;  // memory that each iteration has anew
+  std::unordered_set<std::string> unusable_;      // bound inside
+  std::unordered_set<std::string> own_;           // memory that each iteration has anew
   Substitution lets_;
   std::vector<Expr> begins_, lasts_;  // the variable lies between them
   std::vector<Expr> around_;          // without the variable
 };
 
-class LoopTrimmer : public Rewriter {
- public:
-  explicit LoopTrimmer(const Stmt& s) : fresh_(s) {}
-
- protected:
-  Expr rewrite(const Expr& e) override { return e; }
-
-  Stmt rewrite(const Stmt& s) override {
-    if (const auto* let = s.as<LetStmt>()) {
-      if (uses_any_variable(let->value, lanes_)) lanes_.insert(let->name);
-      return children(s);
-    }
-    const auto* loop = s.as<For>();
-    if (!loop) return children(s);
-    if (loop->runs == ForType::Vectorized) lanes_.insert(loop->name);
-    if (!is_serial(*loop)) return children(s);
-    Trimmer trimmer(*loop, lanes_);
-    Stmt body = trimmer.trim(loop->body);
-    if (!trimmer.found()) return children(s);
-    return trimmer.assemble((*this)(body), fresh_);
-  }
-
- private:
-  FreshNames fresh_;
-  std::unordered_set<std::string> lanes_;  // names are unique: none is ever taken away
-};
-
 }  // namespace
 
-Stmt trim_loops(const Stmt& s) { return LoopTrimmer(s)(s); }
+Stmt trim_loops(const Stmt& s) {
+  FreshNames fresh(s);
+  std::unordered_set<std::string> lanes;  // names are unique: none is ever taken away
+  return rewrite_statements(s, [&](const Stmt& node, auto& all) {
+    const auto* let = node.as<LetStmt>();
+    if (let && uses_any_variable(let->value, lanes)) lanes.insert(let->name);
+    const auto* loop = node.as<For>();
+    if (!loop) return all.children(node);
+    if (loop->runs == ForType::Vectorized) lanes.insert(loop->name);
+    if (!is_serial(*loop)) return all.children(node);
+    Trimmer trimmer(*loop, lanes);
+    const Stmt body = trimmer.trim(loop->body);
+    return trimmer.found() ? trimmer.assemble(all(body), fresh) : all.children(node);
+  });
+}
 
 }  // namespace retrograde::ir

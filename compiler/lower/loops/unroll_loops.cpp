@@ -27,6 +27,7 @@
 #include "ir/visit.h"
 #include "lower/loops/choice_arms.h"
 #include "lower/nests/copy_statement.h"
+#include "lower/statement_rewriter.h"
 #include "simplify/facts.h"
 #include "simplify/simplify.h"
 
@@ -36,13 +37,11 @@ namespace {
 
 constexpr int64_t most_guarded = 256;  // copies of a loop whose extent is not known
 
-class Unroller : public Rewriter {
+class Unroller : public StatementRewriter {
  public:
   explicit Unroller(const Stmt& s) : fresh_(s) {}
 
  protected:
-  Expr rewrite(const Expr& e) override { return e; }  // statements only
-
   Stmt rewrite(const Stmt& s) override {
     if (const IfThenElse* choice = s.as<IfThenElse>()) return chosen(*choice, s);
     if (const LetStmt* let = s.as<LetStmt>()) values_[let->name] = let->value;
@@ -81,12 +80,9 @@ class Unroller : public Rewriter {
   // In terms of names that are not bound by lets.
   Expr in_full(const Expr& e) const {
     Substitution needed;
-    walk(e, [&](const Expr& part) {
-      const Variable* v = part.as<Variable>();
-      const auto value = v ? values_.find(v->name) : values_.end();
-      if (value != values_.end() && !needed.count(v->name))
-        needed[v->name] = in_full(value->second);
-      return true;
+    walk(e, [&](const Variable& v) {
+      const auto value = values_.find(v.name);
+      if (value != values_.end() && !needed.count(v.name)) needed[v.name] = in_full(value->second);
     });
     return needed.empty() ? e : substitute(e, needed);
   }
@@ -119,12 +115,6 @@ class Unroller : public Rewriter {
 
 }  // namespace
 
-Stmt unroll_loops(const Stmt& s) {
-  const bool has_unrolled = any_stmt(s, [](const Stmt& node) {
-    const For* loop = node.as<For>();
-    return loop && loop->runs == ForType::Unrolled;
-  });
-  return has_unrolled ? Unroller(s)(s) : s;
-}
+Stmt unroll_loops(const Stmt& s) { return has_loops(s, ForType::Unrolled) ? Unroller(s)(s) : s; }
 
 }  // namespace retrograde::ir

@@ -42,19 +42,11 @@ class Copier : public Rewriter {
  public:
   Copier(const Stmt& s, FreshNames& fresh, const Substitution& values) : values_(values) {
     walk(
-        s,
-        [&](const Expr& e) {
-          if (const Let* let = e.as<Let>()) rename(let->name, fresh);
-          return true;
-        },
-        [&](const Stmt& node) {
-          match(
-              node, [&](const LetStmt& n) { rename(n.name, fresh); },
-              [&](const For& n) { rename(n.name, fresh); },
-              [&](const Allocate& n) { rename(n.name, fresh); },
-              [&](const Realize& n) { rename(n.name, fresh); }, [](const StmtNode&) {});
-          return true;
-        });
+        s, [&](const Let& n) { rename(n.name, fresh); },
+        [&](const LetStmt& n) { rename(n.name, fresh); },
+        [&](const For& n) { rename(n.name, fresh); },
+        [&](const Allocate& n) { rename(n.name, fresh); },
+        [&](const Realize& n) { rename(n.name, fresh); });
   }
 
  protected:

@@ -88,26 +88,19 @@ Requirements requirements_of(const LoopedFunc& f, int stage, const StageNest& ne
 namespace {
 
 bool reads_memory(const Expr& e) {
-  return any_node(e, [&](const Expr& part) {
-    const Call* call = part.as<Call>();
-    return call && (call->call_type == CallType::Func || call->call_type == CallType::Image);
+  return any_node(e, [&](const Call& call) {
+    return call.call_type == CallType::Func || call.call_type == CallType::Image;
   });
 }
 
 // Whether values that do not count could do harm: as coordinates, or outside of the pipeline.
 bool depends_on_every_value(const Definition& definition) {
-  bool found = false;
-  for_each_expr(definition, [&](const Expr& root) {
-    found = found || any_node(root, [](const Expr& e) {
-              const Call* call = e.as<Call>();
-              if (!call) return false;
-              if (call->call_type == CallType::Operator)
-                return op_info(call->op).cls == OpClass::Effect && !call->is_op(Op::random);
-              return call->call_type == CallType::Extern ||
-                     std::any_of(call->args.begin(), call->args.end(), reads_memory);
-            });
+  return any_node(definition, [](const Call& call) {
+    if (call.call_type == CallType::Operator)
+      return op_info(call.op).cls == OpClass::Effect && !call.is_op(Op::random);
+    return call.call_type == CallType::Extern ||
+           std::any_of(call.args.begin(), call.args.end(), reads_memory);
   });
-  return found;
 }
 
 }  // namespace

@@ -247,12 +247,8 @@ std::vector<int> callees_of(const Program& program, int f) {
     if (it != program.index_of.end() && seen.insert(name).second) callees.push_back(it->second);
   };
   for (const Definition& stage : program.funcs[f].stages) {
-    for_each_expr(stage, [&](const Expr& e) {
-      walk(e, [&](const Expr& node) {
-        const Call* call = node.as<Call>();
-        if (call && call->call_type == CallType::Func) note(call->name);
-        return true;
-      });
+    walk(stage, [&](const Call& call) {
+      if (call.call_type == CallType::Func) note(call.name);
     });
   }
   if (!program.funcs[f].func->is_extern()) return callees;

@@ -40,19 +40,12 @@ bool can_slide_over(const Loop& loop) {
 bool is_pure_in(const LoopedFunc& f, int d) {
   const std::string& var = f.func->args[d];
   auto is_var = [&](const Expr& e) { return e.as<Variable>() && e.as<Variable>()->name == var; };
-  bool pure = true;
-  for (size_t s = 1; s < f.stages.size(); s++) {
-    pure = pure && is_var(f.stages[s].args[d]);
-    for_each_expr(f.stages[s], [&](const Expr& e) {
-      walk(e, [&](const Expr& node) {
-        const Call* call = node.as<Call>();
-        if (call && call->call_type == CallType::Func && call->name == f.name())
-          pure = pure && is_var(call->args[d]);
-        return pure;
-      });
-    });
-  }
-  return pure;
+  const auto reads_elsewhere = [&](const Call& call) {
+    return call.call_type == CallType::Func && call.name == f.name() && !is_var(call.args[d]);
+  };
+  return std::all_of(f.stages.begin() + 1, f.stages.end(), [&](const Definition& update) {
+    return is_var(update.args[d]) && !any_node(update, reads_elsewhere);
+  });
 }
 
 class Slider {

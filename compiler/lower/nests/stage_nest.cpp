@@ -47,15 +47,9 @@ bool has_room_of_its_own(const LoopedFunc& f) {
 // Tiles of what needs nothing may run past the end. So they begin where the tiles of what is added
 // to it later do, and a tile in registers has constant places, at the border, too.
 bool reads_nothing(const Definition& definition) {
-  bool reads = false;
-  for_each_expr(definition, [&](const Expr& root) {
-    reads = reads || any_node(root, [](const Expr& e) {
-              const Call* call = e.as<Call>();
-              return call && (call->call_type != CallType::Operator ||
-                              op_info(call->op).cls == OpClass::Effect);
-            });
+  return !any_node(definition, [](const Call& call) {
+    return call.call_type != CallType::Operator || op_info(call.op).cls == OpClass::Effect;
   });
-  return !reads;
 }
 
 class NestBuilder {
@@ -246,10 +240,7 @@ bool covers_exactly(const LoopedFunc& f, int stage, const std::string& var, cons
   for (const Loop& loop : nest.loops) loops.push(loop.name, loop.range());
   Interval reached = bounds_of(nest.guarded_coordinate.at(var), loops);
   BoundsMap facts;
-  walk(extent, [&](const Expr& e) {
-    if (const Variable* name = e.as<Variable>()) facts[name->name] = {1, {}};
-    return true;
-  });
+  walk(extent, [&](const Variable& name) { facts[name.name] = {1, {}}; });
   return reached.is_bounded() && can_prove(reached.min >= first, facts) &&
          can_prove(reached.max < first + extent, facts);
 }

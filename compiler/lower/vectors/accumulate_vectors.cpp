@@ -32,6 +32,7 @@
 #include "ir/narrow_product.h"
 #include "ir/visit.h"
 #include "lower/nests/copy_statement.h"
+#include "lower/statement_rewriter.h"
 #include "lower/vectors/reductions.h"
 
 namespace retrograde::ir {
@@ -153,13 +154,11 @@ class LoopReductions {
 
   // Buffers that the expression reads, or hands on.
   void note(const Expr& e) {
-    walk(e, [&](const Expr& node) {
-      if (const auto* load = node.as<Load>()) others_.insert(load->name);
-      const auto* name = node.as<Variable>();
-      if (name && name->type.is_handle())
-        others_.insert(name->name.substr(0, name->name.rfind('.')));
-      return true;
-    });
+    walk(
+        e, [&](const Load& load) { others_.insert(load.name); },
+        [&](const Variable& name) {
+          if (name.type.is_handle()) others_.insert(name.name.substr(0, name.name.rfind('.')));
+        });
   }
 
   std::unordered_set<std::string> bound_, others_;
@@ -256,53 +255,35 @@ class Accumulator {
   Type type_;
 };
 
-class StoreReplacer : public Rewriter {
- public:
-  std::unordered_map<const StmtNode*, Stmt> replacements;
+}  // namespace
 
- protected:
-  Expr rewrite(const Expr& e) override { return e; }
-  Stmt rewrite(const Stmt& s) override {
-    const auto found = replacements.find(s.get());
-    return found == replacements.end() ? children(s) : found->second;
-  }
-};
-
-class AccumulateVectors : public Rewriter {
- public:
-  explicit AccumulateVectors(const Stmt& s) : fresh_(s) {}
-
- protected:
-  Expr rewrite(const Expr& e) override { return e; }
-
-  Stmt rewrite(const Stmt& s) override {
+Stmt accumulate_vectors(const Stmt& all) {
+  FreshNames fresh(all);
+  return rewrite_statements(all, [&](const Stmt& s, auto& rewriter) {
     const auto* loop = s.as<For>();
-    if (!loop || loop->runs != ForType::Serial) return children(s);
-    std::vector<Candidate> candidates = LoopReductions(*loop).found();
-    StoreReplacer replacer;
+    if (!loop || loop->runs != ForType::Serial) return rewriter.children(s);
+    const std::vector<Candidate> candidates = LoopReductions(*loop).found();
+    std::unordered_map<const StmtNode*, Stmt> steps;
     std::vector<Accumulator> accumulators;
     for (const Candidate& candidate : candidates) {
-      Accumulator accumulator(candidate, fresh_(candidate.store->name + ".partial"));
+      Accumulator accumulator(candidate, fresh(candidate.store->name + ".partial"));
       if (!accumulator.is_of_use()) continue;
-      replacer.replacements[candidate.whole.get()] = accumulator.step();
+      steps[candidate.whole.get()] = accumulator.step();
       accumulators.push_back(std::move(accumulator));
     }
-    if (accumulators.empty()) return children(s);
+    if (accumulators.empty()) return rewriter.children(s);
+    const Stmt stepping = rewrite_statements(s, [&](const Stmt& part, auto& parts) {
+      const auto found = steps.find(part.get());
+      return found == steps.end() ? parts.children(part) : found->second;
+    });
     std::vector<Stmt> parts;
     for (const Accumulator& accumulator : accumulators) parts.push_back(accumulator.start());
-    parts.push_back(children(replacer(s)));
+    parts.push_back(rewriter.children(stepping));
     for (const Accumulator& accumulator : accumulators) parts.push_back(accumulator.finish());
     Stmt result = make_block(std::move(parts));
     for (size_t i = accumulators.size(); i-- > 0;) result = accumulators[i].around(result);
     return result;
-  }
-
- private:
-  FreshNames fresh_;
-};
-
-}  // namespace
-
-Stmt accumulate_vectors(const Stmt& s) { return s.defined() ? AccumulateVectors(s)(s) : s; }
+  });
+}
 
 }  // namespace retrograde::ir

@@ -25,6 +25,7 @@
 #include "ir/memory_reads.h"
 #include "ir/visit.h"
 #include "lower/nests/copy_statement.h"
+#include "lower/statement_rewriter.h"
 #include "simplify/simplify.h"
 
 namespace retrograde::ir {
@@ -128,13 +129,11 @@ class Replacer : public Rewriter {
   }
 };
 
-class Transposer : public Rewriter {
+class Transposer : public StatementRewriter {
  public:
   explicit Transposer(const Stmt& s) : fresh_(s) {}
 
  protected:
-  Expr rewrite(const Expr& e) override { return e; }
-
   Stmt rewrite(const Stmt& s) override {
     const Stmt copy = children(s);
     const auto* block = copy.as<Block>();

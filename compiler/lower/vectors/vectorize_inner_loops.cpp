@@ -31,6 +31,7 @@
 #include "ir/build.h"
 #include "ir/visit.h"
 #include "lower/nests/copy_statement.h"
+#include "lower/statement_rewriter.h"
 #include "simplify/simplify.h"
 
 namespace retrograde::ir {
@@ -232,13 +233,11 @@ class BodyCheck {
   bool has_form_ = false;
 };
 
-class InnerVectorizer : public Rewriter {
+class InnerVectorizer : public StatementRewriter {
  public:
   InnerVectorizer(const Stmt& s, const InnerLoops& loops) : fresh_(s), loops_(loops) {}
 
  protected:
-  Expr rewrite(const Expr& e) override { return e; }
-
   Stmt rewrite(const Stmt& s) override {
     const auto* loop = s.as<For>();
     if (!loop) return children(s);

@@ -40,6 +40,7 @@
 #include "ir/print.h"
 #include "ir/visit.h"
 #include "lower/nests/copy_statement.h"
+#include "lower/statement_rewriter.h"
 #include "lower/vectors/reductions.h"
 #include "lower/vectors/widen_expr.h"
 #include "simplify/simplify.h"
@@ -64,10 +65,7 @@ struct BodyFacts {
 };
 
 void count_loads(const Expr& e, std::unordered_map<std::string, int>& loads) {
-  walk(e, [&](const Expr& node) {
-    if (const Load* load = node.as<Load>()) ++loads[load->name];
-    return true;
-  });
+  walk(e, [&](const Load& load) { ++loads[load.name]; });
 }
 
 int own_loads(const Store& n) {
@@ -242,15 +240,8 @@ class LoopVectorizer {
   // worth running for nobody.
   static bool needs_an_active_lane(const Stmt& branch) {
     return any_node(
-        branch,
-        [](const Expr& e) {
-          const Load* load = e.as<Load>();
-          return load && !load->predicate.defined();
-        },
-        [](const Stmt& s) {
-          const Store* store = s.as<Store>();
-          return s.kind() == Kind::For || (store && !store->predicate.defined());
-        });
+        branch, [](const Load& n) { return !n.predicate.defined(); },
+        [](const Store& n) { return !n.predicate.defined(); }, [](const For&) { return true; });
   }
 
   Stmt visit_allocate(const Stmt& s, const Allocate& n) {
@@ -262,10 +253,8 @@ class LoopVectorizer {
 
   // An event has no mask.
   bool tells_of_some_lanes(const Expr& e) {
-    return widen_.mask().defined() && any_node(e, [](const Expr& node) {
-             const Call* call = node.as<Call>();
-             return call && call->is_op(Op::trace);
-           });
+    return widen_.mask().defined() &&
+           any_node(e, [](const Call& call) { return call.is_op(Op::trace); });
   }
 
   // ---- stores ----
@@ -486,58 +475,40 @@ class LoopVectorizer {
 int widest_vector(const Stmt& s) {
   int lanes = 1;
   walk(
-      s,
-      [&](const Expr& e) {
-        lanes = std::max(lanes, e.type().lanes());
-        return true;
-      },
+      s, [&](const Expr& e) { return lanes = std::max(lanes, e.type().lanes()), true; },
       [](const Stmt&) { return true; });
   return lanes;
 }
 
-class Vectorizer : public Rewriter {
- public:
-  explicit Vectorizer(const Stmt& s) : fresh_(s) {}
-
- protected:
-  Expr rewrite(const Expr& e) override { return e; }
-
-  Stmt rewrite(const Stmt& s) override {
-    Stmt inner = children(s);
-    const For* loop = inner.as<For>();
-    if (!loop || loop->runs != ForType::Vectorized) return inner;
-    auto extent = as_const_int(simplify(loop->extent));
-    std::string what = "vectorize " + describe_loop(loop->name);
-    if (!extent) {
-      user_error(what, "the extent of a vectorized loop must be a constant",
-                 text("its extent is ", loop->extent),
-                 "Vectorize the inner variable of a split by a constant, or promise the extent "
-                 "with bound()");
-    }
-    if (*extent <= 0) return {};
-    if (*extent == 1) return substitute(loop->body, loop->name, loop->min);
-    int64_t lanes = *extent * widest_vector(loop->body);
-    if (lanes > max_lanes) {
-      user_error(what, text("vectors have at most ", max_lanes, " lanes"),
-                 text("this loop needs ", lanes),
-                 "Split the variable, and vectorize the inner part");
-    }
-    return LoopVectorizer(*loop, static_cast<int>(*extent), fresh_).run();
+Stmt vectorized(const For& loop, FreshNames& fresh) {
+  auto extent = as_const_int(simplify(loop.extent));
+  std::string what = "vectorize " + describe_loop(loop.name);
+  if (!extent) {
+    user_error(what, "the extent of a vectorized loop must be a constant",
+               text("its extent is ", loop.extent),
+               "Vectorize the inner variable of a split by a constant, or promise the extent "
+               "with bound()");
   }
-
- private:
-  FreshNames fresh_;
-};
+  if (*extent <= 0) return {};
+  if (*extent == 1) return substitute(loop.body, loop.name, loop.min);
+  int64_t lanes = *extent * widest_vector(loop.body);
+  if (lanes > max_lanes) {
+    user_error(what, text("vectors have at most ", max_lanes, " lanes"),
+               text("this loop needs ", lanes), "Split the variable, and vectorize the inner part");
+  }
+  return LoopVectorizer(loop, static_cast<int>(*extent), fresh).run();
+}
 
 }  // namespace
 
 Stmt vectorize_loops(const Stmt& s) {
-  const bool has_vectorized = any_stmt(s, [](const Stmt& node) {
-    const For* loop = node.as<For>();
-    return loop && loop->runs == ForType::Vectorized;
+  if (!has_loops(s, ForType::Vectorized)) return s;
+  FreshNames fresh(s);
+  const Stmt result = rewrite_statements(s, [&](const Stmt& node, auto& all) {
+    const Stmt inner = all.children(node);
+    const For* loop = inner.as<For>();
+    return loop && loop->runs == ForType::Vectorized ? vectorized(*loop, fresh) : inner;
   });
-  if (!has_vectorized) return s;
-  Stmt result = Vectorizer(s)(s);
   return result.defined() ? result : make_evaluate(Expr(0));
 }
 

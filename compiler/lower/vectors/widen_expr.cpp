@@ -114,11 +114,10 @@ Expr repeat_each(const Expr& v, int times) {
 }
 
 bool has_effects(const Expr& e) {
-  return any_node(e, [&](const Expr& node) {
-    const Call* call = node.as<Call>();
+  return any_node(e, [&](const Call& call) {
     // The event of a trace can be that of a vector.
-    return call && op_info(call->op).conduct != Conduct::Silent && !call->is_op(Op::undef) &&
-           !call->is_op(Op::trace);
+    return op_info(call.op).conduct != Conduct::Silent && !call.is_op(Op::undef) &&
+           !call.is_op(Op::trace);
   });
 }
 
