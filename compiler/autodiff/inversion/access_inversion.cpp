@@ -14,6 +14,12 @@
 
 namespace retrograde::ir {
 
+std::vector<std::string> names_of(const std::vector<LoopVariable>& vars) {
+  std::vector<std::string> names;
+  for (const LoopVariable& v : vars) names.push_back(v.name);
+  return names;
+}
+
 namespace {
 
 // Finds which indices take part, forms the groups, and multiplies their pieces out.
@@ -63,9 +69,7 @@ class Inverter {
   // relation.
   void resolve_indices() {
     IslContext context(query_.operations);
-    std::vector<std::string> names;
-    for (const LoopVariable& v : query_.domain.vars) names.push_back(v.name);
-    IslBridge bridge(context, names);
+    IslBridge bridge(context, names_of(query_.domain.vars));
     for (bool progress = true; progress;) {
       progress = false;
       takes_part_.assign(query_.indices.size(), false);
@@ -118,10 +122,8 @@ class Inverter {
   void note_obstacles(const std::set<Expr, StructuralLess>& obstacles) {
     for (const Expr& e : obstacles) {
       std::set<std::string> data;
-      walk(e, [&](const Expr& node) {
-        const auto* call = node.as<Call>();
-        if (call && call->call_type != CallType::Operator) data.insert(quoted(call->name));
-        return true;
+      walk(e, [&](const Call& call) {
+        if (call.call_type != CallType::Operator) data.insert(quoted(call.name));
       });
       std::string reason = data.empty() ? quoted(print(e)) + " in an index is not affine" : "";
       for (const std::string& name : data)
@@ -330,9 +332,7 @@ AccessQuery restricted(AccessQuery query, size_t d, const Expr& index, const Exp
 // the interior. Empty: nothing to split.
 std::vector<AccessQuery> split_at_select(const AccessQuery& query) {
   IslContext context;
-  std::vector<std::string> names;
-  for (const LoopVariable& v : query.domain.vars) names.push_back(v.name);
-  IslBridge bridge(context, names);
+  IslBridge bridge(context, names_of(query.domain.vars));
   for (size_t d = 0; d < query.indices.size(); ++d) {
     const auto* s = query.indices[d].as<Select>();
     if (!s || bridge.affine(query.indices[d]) || !bridge.condition(s->condition)) continue;

@@ -27,6 +27,7 @@ struct LoopVariable {
   Expr min, max;
   bool is_reduction = false;
 };
+std::vector<std::string> names_of(const std::vector<LoopVariable>& vars);
 struct IterationDomain {
   std::vector<LoopVariable> vars;  // innermost first
   Expr predicate;                  // undefined: none

@@ -41,11 +41,6 @@ class GroupInverter {
   }
 
  private:
-  static std::vector<std::string> names_of(const std::vector<LoopVariable>& vars) {
-    std::vector<std::string> names;
-    for (const LoopVariable& v : vars) names.push_back(v.name);
-    return names;
-  }
   int var_count() const { return static_cast<int>(group_.vars.size()); }
   int index_count() const { return static_cast<int>(group_.indices.size()); }
 

@@ -54,9 +54,8 @@ isl::pw_aff IslBridge::parameter(const Expr& e) {
 }
 
 bool IslBridge::mentions_dim(const Expr& e) const {
-  return any_node(e, [&](const Expr& node) {
-    const auto* v = node.as<Variable>();
-    return v && std::find(dims_.begin(), dims_.end(), v->name) != dims_.end();
+  return any_node(e, [&](const Variable& v) {
+    return std::find(dims_.begin(), dims_.end(), v.name) != dims_.end();
   });
 }
 

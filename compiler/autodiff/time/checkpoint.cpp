@@ -91,7 +91,7 @@ class CheckpointedLoop {
     for (size_t i = 0; i < plan_.inner.size(); ++i) {
       const ReductionVariable& r = plan_.inner[i];
       forward_[r.var] = loop(i + 1);
-      backward_[r.var] = r.min + (r.min + (r.extent - 1) - loop(i + 1));
+      backward_[r.var] = mirrored(r, loop(i + 1));
     }
     Expr row = loop(rdom->vars.size() - 1);
     Expr step = clamp(table_.entry(1, row), 0, plan_.steps - 1);
@@ -155,7 +155,7 @@ class CheckpointedLoop {
     Branch all = branches.back();
     for (size_t i = branches.size() - 1; i-- > 0;) {
       const Branch& b = branches[i];
-      all.runs = choose(b.is_chosen, b.runs, all.runs);
+      all.runs = choose_step(b.is_chosen, b.runs, all.runs);
       all.write = choose(b.is_chosen, b.write, all.write);
     }
     return all;
@@ -167,14 +167,10 @@ class CheckpointedLoop {
       result = choose(write == static_cast<int>(i), placed(writes[i], places), result);
     return result;
   }
-  // Actions differ in what they cost: only the one at hand is evaluated.
-  static Expr choose(const Expr& condition, const Expr& a, const Expr& b) {
-    return equal(a, b) ? a : call_op(Op::if_then_else, a.type(), {condition, a, b});
-  }
   static SlotWrite choose(const Expr& condition, const SlotWrite& a, const SlotWrite& b) {
-    SlotWrite result{choose(condition, a.place, b.place), {}};
+    SlotWrite result{choose_step(condition, a.place, b.place), {}};
     for (size_t k = 0; k < a.values.size(); ++k)
-      result.values.push_back(choose(condition, a.values[k], b.values[k]));
+      result.values.push_back(choose_step(condition, a.values[k], b.values[k]));
     return result;
   }
   Expr placed(const Expr& e, const Substitution& places) const {
@@ -192,14 +188,8 @@ class CheckpointedLoop {
     std::vector<Expr> inner;
     for (const ReductionVariable& r : plan_.inner) inner.push_back(r.extent);
     auto note = [&](const std::vector<SlotWrite>& writes, Action action, std::vector<Expr> loops) {
-      AdjointWork work{{}, std::move(loops)};
-      work.loops.push_back(table_.count(action));
-      for (const SlotWrite& w : writes) {
-        work.values.push_back(redirect_calls(w.place, machine_, machine_, true));
-        for (const Expr& v : w.values)
-          work.values.push_back(redirect_calls(v, machine_, machine_, true));
-      }
-      machine_->made->work.push_back(std::move(work));
+      loops.push_back(table_.count(action));
+      machine_->made->work.push_back(work_of(writes, machine_, std::move(loops)));
     };
     note(adjoint_, Action::Adjoint, inner);
     if (!plan_.needs_values()) return;

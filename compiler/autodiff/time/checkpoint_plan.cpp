@@ -155,13 +155,8 @@ class Planner {
     for (const Expr& read : c_.needed_reads(sweep)) add_needed(read);
   }
   void add_needed(const Expr& read) {
-    auto& places = plan_.places;
-    const std::vector<Expr>& args = as_call_of(read, f_)->args;
-    auto known = std::find_if(places.begin(), places.end(),
-                              [&](const auto& p) { return same_args(p, args); });
-    if (known == places.end()) known = places.insert(places.end(), args);
     plan_.needed.push_back(read);
-    plan_.place_of.push_back(static_cast<size_t>(known - places.begin()));
+    plan_.place_of.push_back(place_number(plan_.places, as_call_of(read, f_)->args));
   }
 
   const UpdateContext& c_;

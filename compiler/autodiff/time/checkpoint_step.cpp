@@ -64,11 +64,8 @@ class CheckpointStep {
     std::vector<std::vector<Expr>> places{c_.write};  // of the writes after the first
     for (const LeafAdjoint& leaf : plan_.passed_on) {
       const Call* call = as_call_of(leaf.leaf, f_);
-      auto known = std::find_if(places.begin(), places.end(),
-                                [&](const auto& p) { return same_args(p, call->args); });
-      size_t i = static_cast<size_t>(known - places.begin()) + 1;
-      if (known == places.end()) {
-        places.push_back(call->args);
+      const size_t i = place_number(places, call->args) + 1;
+      if (i == writes.size()) {
         Expr slot = slots_.adjoint(noted(elements_.slot_of(call->args)));
         writes.push_back({slot, slots_.all_values(slot)});
       }

@@ -7,12 +7,6 @@
 
 namespace retrograde::ir {
 
-// place <- values
-struct SlotWrite {
-  Expr place;
-  std::vector<Expr> values;
-};
-
 // Forward: the values that are needed later are noted; the last one is the step's own write.
 std::vector<SlotWrite> record_writes(const UpdateContext& context, const CheckpointPlan& plan,
                                      const CheckpointSlots& slots);

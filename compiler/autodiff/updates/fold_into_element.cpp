@@ -101,7 +101,7 @@ class Fold {
     }
     Substitution reversed;
     for (const ReductionVariable& r : c_.definition.rvars)
-      reversed[r.var] = r.min + (r.min + (r.extent - 1) - variable(r.var));
+      reversed[r.var] = mirrored(r, variable(r.var));
     append_loop(adjoint_, now_, values, now_ + 1, reversed);
   }
 
@@ -110,11 +110,7 @@ class Fold {
                    const Expr& from, const Substitution& order) {
     auto rdom = std::make_shared<ReductionDomainContents>();
     rdom->frozen = true;
-    Substitution names;
-    for (const ReductionVariable& r : c_.definition.rvars) {
-      rdom->vars.push_back({unique_name(r.var), r.min, r.extent});
-      names[r.var] = variable(rdom->vars.back().var, Int(32), SymbolRef(rdom));
-    }
+    const Substitution names = add_copies(rdom, c_.definition.rvars);
     const auto here = [&](const Expr& e) {
       return with_values(substitute(substitute(e, order), names), c_.query.f, {});
     };

@@ -17,12 +17,6 @@ namespace retrograde::ir {
 
 namespace {
 
-// What happens in one step of an iteration: place <- values.
-struct TapeStep {
-  Expr place;
-  std::vector<Expr> values;
-};
-
 class Tape {
  public:
   Tape(const UpdateContext& context, UpdateAdjoint& result)
@@ -106,15 +100,10 @@ class Tape {
     FuncPtr before = clone_prefix(c_.query.f, c_.query.stage);
     FuncPtr tape = begin_tape(f_->name + "_tape", before);
 
-    std::vector<std::vector<Expr>> places;  // distinct ones; Tuples read several values at one
-    std::vector<TapeStep> steps;
-    for (const Expr& read : needed_) {
-      const Call* call = as_call_of(read, f_);
-      auto known = std::find_if(places.begin(), places.end(),
-                                [&](const auto& p) { return same_args(p, call->args); });
-      if (known == places.end()) known = places.insert(places.end(), call->args);
-      kept_at_.push_back(static_cast<int>(known - places.begin()));
-    }
+    std::vector<std::vector<Expr>> places;
+    std::vector<SlotWrite> steps;
+    for (const Expr& read : needed_)
+      kept_at_.push_back(static_cast<int>(place_number(places, as_call_of(read, f_)->args)));
     int width = static_cast<int>(places.size());
     check_slots(width);
     auto kept_slot = [&](int i) { return layout_.elements() + now_ * width + i; };
@@ -166,8 +155,8 @@ class Tape {
     return values;
   }
 
-  TapeStep write_step(const FuncPtr& tape) const {
-    TapeStep step{on_tape(layout_.slot_of(c_.write), tape), {}};
+  SlotWrite write_step(const FuncPtr& tape) const {
+    SlotWrite step{on_tape(layout_.slot_of(c_.write), tape), {}};
     Expr inside = on_tape(layout_.is_inside(c_.write), tape);
     for (size_t k = 0; k < f_->types.size(); ++k) {
       Expr value = on_tape(c_.values[k], tape);
@@ -180,7 +169,7 @@ class Tape {
 
   void append_reverse(const SweepResult& sweep) {
     Expr written = layout_.slot_of(c_.write);
-    std::vector<TapeStep> steps{{layout_.elements() + now_, all_values(adjoint_, written)}};
+    std::vector<SlotWrite> steps{{layout_.elements() + now_, all_values(adjoint_, written)}};
     steps.push_back({written, {}});
     for (size_t k = 0; k < f_->types.size(); ++k)
       steps[1].values.push_back(make_zero(c_.query.target.types[k]));
@@ -188,11 +177,8 @@ class Tape {
     for (const LeafAdjoint& leaf : sweep.leaves) {
       const Call* call = as_call_of(leaf.leaf, f_);
       if (!call) continue;
-      auto known = std::find_if(places.begin(), places.end(),
-                                [&](const auto& p) { return same_args(p, call->args); });
-      size_t i = static_cast<size_t>(known - places.begin()) + 1;
-      if (known == places.end()) {
-        places.push_back(call->args);
+      const size_t i = place_number(places, call->args) + 1;
+      if (i == steps.size()) {
         Expr slot = layout_.slot_of(call->args);
         steps.push_back({slot, all_values(adjoint_, slot)});
       }
@@ -203,58 +189,43 @@ class Tape {
     }
     Substitution reversed;
     for (const ReductionVariable& r : c_.definition.rvars)
-      reversed[r.var] = r.min + (r.min + (r.extent - 1) - variable(r.var));
+      reversed[r.var] = mirrored(r, variable(r.var));
     Expr predicate = layout_.is_inside(c_.write);
     if (c_.domain.predicate.defined()) predicate = c_.domain.predicate && predicate;
     append_steps(adjoint_, steps, reversed, predicate);
   }
 
   // One update: in step s of an iteration, step s's place gets its values.
-  void append_steps(const FuncPtr& tape, const std::vector<TapeStep>& steps,
+  void append_steps(const FuncPtr& tape, const std::vector<SlotWrite>& steps,
                     const Substitution& reversed, const Expr& predicate) {
     auto rdom = std::make_shared<ReductionDomainContents>();
     rdom->frozen = true;
     int count = static_cast<int>(steps.size());
     rdom->vars.push_back({unique_name("step"), make_zero(Int(32)), make_const(Int(32), count)});
     Expr step = variable(rdom->vars[0].var, Int(32), SymbolRef(rdom));
-    Substitution names;
-    for (const ReductionVariable& r : c_.definition.rvars) {
-      rdom->vars.push_back({unique_name(r.var), r.min, r.extent});
-      names[r.var] = variable(rdom->vars.back().var, Int(32), SymbolRef(rdom));
-    }
+    const Substitution names = add_copies(rdom, c_.definition.rvars);
     auto here = [&](const Expr& e) {
       Expr order = reversed.empty() ? e : substitute(e, reversed);
       return with_values(substitute(order, names), c_.query.f, {});
     };
-    auto chosen = [&](const std::function<Expr(const TapeStep&)>& part) {
+    auto chosen = [&](const std::function<Expr(const SlotWrite&)>& part) {
       Expr result = part(steps.back());
       for (int s = count - 2; s >= 0; --s)
-        result = if_step(step == s, part(steps[static_cast<size_t>(s)]), result);
+        result = choose_step(step == s, part(steps[static_cast<size_t>(s)]), result);
       return here(kept(result));
     };
     std::vector<Expr> values;
     for (size_t k = 0; k < f_->types.size(); ++k) {
       Type type = tape->types[k];
-      values.push_back(chosen([&](const TapeStep& s) { return cast_to(type, s.values[k]); }));
+      values.push_back(chosen([&](const SlotWrite& s) { return cast_to(type, s.values[k]); }));
     }
-    Expr place = chosen([](const TapeStep& s) { return s.place; });
+    Expr place = chosen([](const SlotWrite& s) { return s.place; });
     append_update(tape, layout_.with_pure(place), values, rdom->vars,
                   predicate.defined() ? here(kept(predicate)) : Expr());
-    note_work(tape, steps);
-  }
-  // Steps differ in what they cost: only the one at hand is evaluated.
-  static Expr if_step(const Expr& condition, const Expr& a, const Expr& b) {
-    return equal(a, b) ? a : call_op(Op::if_then_else, a.type(), {condition, a, b});
-  }
-  void note_work(const FuncPtr& tape, const std::vector<TapeStep>& steps) const {
-    AdjointWork work;
-    for (const TapeStep& s : steps) {
-      work.values.push_back(redirect_calls(kept(s.place), tape, tape, true));
-      for (const Expr& v : s.values)
-        work.values.push_back(redirect_calls(kept(v), tape, tape, true));
-    }
-    for (const ReductionVariable& r : c_.definition.rvars) work.loops.push_back(r.extent);
-    tape->made->work = {std::move(work)};
+    std::vector<Expr> loops;
+    for (const ReductionVariable& r : c_.definition.rvars) loops.push_back(r.extent);
+    tape->made->work = {
+        work_of(steps, tape, std::move(loops), [&](const Expr& e) { return kept(e); })};
   }
   Expr kept(const Expr& e) const { return replaced(e, result_.self_values); }
 

@@ -3,6 +3,7 @@
 #include "autodiff/updates/numbering.h"
 #include "diagnostics/error.h"
 #include "frontend/language/var.h"
+#include "graph/define.h"
 #include "ir/build.h"
 #include "ir/visit.h"
 #include "simplify/simplify.h"
@@ -12,7 +13,7 @@ namespace retrograde::ir {
 namespace {
 
 bool has_operators(const Expr& e) {
-  return any_node(e, [&](const Expr& node) { return node.as<Call>() != nullptr; });
+  return any_node(e, [](const Call&) { return true; });
 }
 
 }  // namespace
@@ -85,6 +86,19 @@ std::vector<Expr> TapeLayout::element(const Expr& any_number) const {
                                : simplify(number / strides_[d] % extents_[d] + box_[d].min));
   }
   return point;
+}
+
+AdjointWork work_of(const std::vector<SlotWrite>& writes, const FuncPtr& func,
+                    std::vector<Expr> loops, ExprMap map) {
+  AdjointWork work{{}, std::move(loops)};
+  const auto add = [&](const Expr& e) {
+    work.values.push_back(redirect_calls(map(e), func, func, true));
+  };
+  for (const SlotWrite& w : writes) {
+    add(w.place);
+    for (const Expr& v : w.values) add(v);
+  }
+  return work;
 }
 
 }  // namespace retrograde::ir

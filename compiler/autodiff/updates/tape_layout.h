@@ -4,8 +4,18 @@
 #include <vector>
 
 #include "autodiff/updates/numbering.h"
+#include "autodiff/updates/versions.h"
 
 namespace retrograde::ir {
+
+// place <- values
+struct SlotWrite {
+  Expr place;
+  std::vector<Expr> values;
+};
+// What the writes of an iteration of `func` do, in so many iterations; `map`: of what they say.
+AdjointWork work_of(const std::vector<SlotWrite>& writes, const FuncPtr& func,
+                    std::vector<Expr> loops, ExprMap map = same_expr);
 
 class TapeLayout {
  public:

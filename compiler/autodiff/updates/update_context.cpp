@@ -12,16 +12,21 @@
 namespace retrograde::ir {
 
 bool depends_on_data(const Expr& e) {
-  return any_node(e, [&](const Expr& node) {
-    const auto* call = node.as<Call>();
-    return call && call->call_type != CallType::Operator;
-  });
+  return any_node(e, [&](const Call& call) { return call.call_type != CallType::Operator; });
 }
 
 std::string point_text(const std::string& name, const std::vector<Expr>& args) {
   std::string out = quoted(name) + "(";
   for (size_t i = 0; i < args.size(); ++i) out += (i ? ", " : "") + print(args[i]);
   return out + ")";
+}
+
+size_t place_number(std::vector<std::vector<Expr>>& places, const std::vector<Expr>& place) {
+  const auto known = std::find_if(places.begin(), places.end(),
+                                  [&](const auto& p) { return same_args(p, place); });
+  const size_t number = static_cast<size_t>(known - places.begin());
+  if (known == places.end()) places.push_back(place);
+  return number;
 }
 
 std::string name_before(const FuncContents& f, int stage) {
@@ -37,10 +42,7 @@ IterationDomain restricted(IterationDomain domain, const Expr& condition) {
 namespace {
 
 bool mentions_undef(const Expr& e) {
-  return any_node(e, [](const Expr& node) {
-    const Call* call = node.as<Call>();
-    return call && call->is_op(Op::undef);
-  });
+  return any_node(e, [](const Call& call) { return call.is_op(Op::undef); });
 }
 
 // A value, and where it does not come from an undef.

@@ -17,6 +17,9 @@ std::string point_text(const std::string& name, const std::vector<Expr>& args);
 // `domain` where `condition` holds, too.
 IterationDomain restricted(IterationDomain domain, const Expr& condition);
 
+// The number of a place among those known, which a new one joins: Tuples read several values at one.
+size_t place_number(std::vector<std::vector<Expr>>& places, const std::vector<Expr>& place);
+
 // Name of the adjoint of f before update definition number `stage` - 1.
 std::string name_before(const FuncContents& f, int stage);
 

@@ -8,12 +8,6 @@ namespace retrograde::ir {
 
 namespace {
 
-std::vector<std::string> names_of(const std::vector<LoopVariable>& vars) {
-  std::vector<std::string> names;
-  for (const LoopVariable& v : vars) names.push_back(v.name);
-  return names;
-}
-
 isl::map empty_like(const isl::map& m) {
   return isl::manage(isl_map_empty(isl_map_get_space(m.get())));
 }

@@ -7,6 +7,7 @@
 #include "graph/function.h"
 #include "graph/own_reads.h"
 #include "ir/build.h"
+#include "ir/equal.h"
 #include "ir/variables.h"
 #include "ir/visit.h"
 #include "simplify/simplify.h"
@@ -55,6 +56,24 @@ Expr iteration_count(const std::vector<ReductionVariable>& rvars) {
   Expr result = make_one(Int(32));
   for (const ReductionVariable& r : rvars) result = result * r.extent;
   return simplify(result);
+}
+
+Expr mirrored(const ReductionVariable& loop, const Expr& at) {
+  return loop.min + (loop.min + (loop.extent - 1) - at);
+}
+
+Substitution add_copies(const std::shared_ptr<ReductionDomainContents>& domain,
+                        const std::vector<ReductionVariable>& rvars) {
+  Substitution names;
+  for (const ReductionVariable& r : rvars) {
+    domain->vars.push_back({unique_name(r.var), r.min, r.extent});
+    names[r.var] = variable(domain->vars.back().var, Int(32), SymbolRef(domain));
+  }
+  return names;
+}
+
+Expr choose_step(const Expr& condition, const Expr& a, const Expr& b) {
+  return equal(a, b) ? a : call_op(Op::if_then_else, a.type(), {condition, a, b});
 }
 
 }  // namespace retrograde::ir

@@ -24,5 +24,12 @@ Expr call_instead(const Expr& e, const FuncPtr& f, const FuncPtr& g,
 // out by a predicate count.
 Expr iteration_number(const std::vector<ReductionVariable>& rvars);
 Expr iteration_count(const std::vector<ReductionVariable>& rvars);
+// What the loop is at when it runs backward, in the iteration that was `at` forward.
+Expr mirrored(const ReductionVariable& loop, const Expr& at);
+// Adds loops over the same ranges to a domain: their variables, by those that they stand for.
+Substitution add_copies(const std::shared_ptr<ReductionDomainContents>& domain,
+                        const std::vector<ReductionVariable>& rvars);
+// Steps of a loop differ in what they cost: only the one at hand is evaluated.
+Expr choose_step(const Expr& condition, const Expr& a, const Expr& b);
 
 }  // namespace retrograde::ir
