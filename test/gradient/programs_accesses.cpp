@@ -11,40 +11,31 @@ Program squared(const Func& f, const std::vector<int>& sizes, const Buffer<float
   return {weighted_sum(f, sizes), {input}};
 }
 
-PROGRAM(chain_of_stencils) {
-  Buffer<float> a = line();
-  Func f("f"), g("g"), h("h");
+PROGRAM_OF(chain_of_stencils, line()) {
+  Func g("g"), h("h");
   f(x) = a(x) * 1.5f;
   g(x) = f(x) * f(x + 1) - f(x + 2);
   h(x) = g(x) + g(x + 2) * g(x + 1);
   return squared(h, {5}, a);
 }
 
-PROGRAM(strided_and_dilated_reads) {
-  Buffer<float> a = line(20);
-  Func f("f");
+PROGRAM_OF(strided_and_dilated_reads, line(20)) {
   f(x) = a(3 * x) * a(2 * x + 5) + a(x + 4);
   return squared(f, {6}, a);
 }
 
-PROGRAM(divided_and_wrapped_reads) {
-  Buffer<float> a = line();
-  Func f("f");
+PROGRAM_OF(divided_and_wrapped_reads, line()) {
   f(x) = a(x / 3) * a((x + 5) % 4) + a(x % 2 + x / 4);
   return squared(f, {12}, a);
 }
 
-PROGRAM(upsampling_by_interpolation) {
-  Buffer<float> a = line(6);
-  Func f("f");
+PROGRAM_OF(upsampling_by_interpolation, line(6)) {
   Expr w = cast<float>(x % 2) * 0.5f;
   f(x) = a(x / 2) * (1.0f - w) + a(x / 2 + 1) * w;
   return squared(f, {10}, a);
 }
 
-PROGRAM(bilinear_resize) {
-  Buffer<float> a = plane();
-  Func f("f");
+PROGRAM_OF(bilinear_resize, plane()) {
   auto at = [](const Expr& v, int n) { return clamp(v, 0, n - 1); };
   Expr u = cast<float>(x) * 0.5f, v = cast<float>(y) * 0.75f;
   Expr iu = cast<int>(floor(u)), iv = cast<int>(floor(v)), wu = u - floor(u), wv = v - floor(v);
@@ -53,31 +44,24 @@ PROGRAM(bilinear_resize) {
   return squared(f, {10, 6}, a);
 }
 
-PROGRAM(warp_by_a_learned_flow) {
-  Buffer<float> a = line(9), flow = random_image({6}, 0.25, 2, 14);
-  Func f("f");
+PROGRAM_OF(warp_by_a_learned_flow, line(9)) {
+  Buffer<float> flow = random_image({6}, 0.25, 2, 14);
   Expr u = cast<float>(x) + flow(x), i = cast<int>(floor(u)), w = u - floor(u);
   f(x) = lerp(a(clamp(i, 0, 8)), a(clamp(i + 1, 0, 8)), w);
   return {weighted_sum(f, {6}), {a, flow}};
 }
 
-PROGRAM(rotation_and_transpose) {
-  Buffer<float> a = plane(6, 6);
-  Func f("f");
+PROGRAM_OF(rotation_and_transpose, plane(6, 6)) {
   f(x, y) = a(y, 5 - x) * a(x, y) + a(y, x);
   return squared(f, {6, 6}, a);
 }
 
-PROGRAM(shear) {
-  Buffer<float> a = plane(9, 6);
-  Func f("f");
+PROGRAM_OF(shear, plane(9, 6)) {
   f(x, y) = a(x + y, y) * a(x, 5 - y) + a(x + 2, x / 2 + y / 3);
   return squared(f, {4, 5}, a);
 }
 
-PROGRAM(diagonals) {
-  Buffer<float> a = plane(6, 6);
-  Func f("f");
+PROGRAM_OF(diagonals, plane(6, 6)) {
   f(x) = a(x, x) * a(x, 5 - x) + a(x, (x + 1) % 6);
   return squared(f, {6}, a);
 }
@@ -91,73 +75,55 @@ PROGRAM(diagonal_of_a_matrix_of_funcs) {
 }
 
 // x is known from the second index only: the first says x = e0 - (a truth value of x).
-PROGRAM(diagonal_that_a_condition_bends) {
-  Buffer<float> a = plane(7, 6);
-  Func f("f");
+PROGRAM_OF(diagonal_that_a_condition_bends, plane(7, 6)) {
   f(x) = a(x + cast<int>(x == 0), x);
   return squared(f, {6}, a);
 }
 
-PROGRAM(toeplitz) {
-  Buffer<float> a = line(9);
-  Func f("f");
+PROGRAM_OF(toeplitz, line(9)) {
   f(x, y) = a(x - y + 4);
   return squared(f, {5, 5}, a);
 }
 
-PROGRAM(hankel) {
-  Buffer<float> a = line(9);
-  Func f("f");
+PROGRAM_OF(hankel, line(9)) {
   f(x, y) = a(x + y);
   return squared(f, {5, 5}, a);
 }
 
-PROGRAM(symmetric_matrix_from_its_half) {
-  Buffer<float> a = plane(5, 5);
-  Func f("f");
+PROGRAM_OF(symmetric_matrix_from_its_half, plane(5, 5)) {
   f(x, y) = a(min(x, y), max(x, y));
   return squared(f, {5, 5}, a);
 }
 
-PROGRAM(pixel_shuffle_and_back) {
-  Buffer<float> a = plane(12, 4);
-  Func f("f"), g("g");
+PROGRAM_OF(pixel_shuffle_and_back, plane(12, 4)) {
+  Func g("g");
   f(x, y, c) = a(4 * x + c, y) * a(4 * x + c, y);
   g(x, y) = f(x / 4, y, x % 4) * 0.5f;
   return squared(g, {12, 4}, a);
 }
 
-PROGRAM(bayer_mosaic) {
-  Buffer<float> a = random_image({4, 3, 4}, 0.25, 2, 15);
-  Func f("f");
+PROGRAM_OF(bayer_mosaic, random_image({4, 3, 4}, 0.25, 2, 15)) {
   f(x, y) = a(x / 2, y / 2, x % 2 + 2 * (y % 2));
   return squared(f, {8, 6}, a);
 }
 
-PROGRAM(channels_by_mux) {
-  Buffer<float> a = line(), b = line(9, 4);
-  Func f("f");
+PROGRAM_OF(channels_by_mux, line()) {
+  Buffer<float> b = line(9, 4);
   f(x, c) = mux(c, {a(x) * 2.0f, b(x), a(x) * b(8 - x)});
   return {weighted_sum(f, {9, 3}), {a, b}};
 }
 
-PROGRAM(piecewise_index) {
-  Buffer<float> a = line(12);
-  Func f("f");
+PROGRAM_OF(piecewise_index, line(12)) {
   f(x) = a(clamp(select(x < 5, x + 5, 9 - x), 0, 11));
   return squared(f, {10}, a);
 }
 
-PROGRAM(absolute_difference_as_an_index) {
-  Buffer<float> a = line();
-  Func f("f");
+PROGRAM_OF(absolute_difference_as_an_index, line()) {
   f(x, y) = a(clamp(cast<int>(abs(x - y)), 0, 8));
   return squared(f, {6, 6}, a);
 }
 
-PROGRAM(clamped_window) {
-  Buffer<float> a = line(6);
-  Func f("f");
+PROGRAM_OF(clamped_window, line(6)) {
   RDom r(-3, 7);
   f(x) = 0.0f;
   f(x) += a(clamp(x + r, 0, 5)) * cast<float>(r + 4);
@@ -191,10 +157,8 @@ PROGRAM(border_mirror_interior) {
   return blurred(BoundaryConditions::mirror_interior(a), a);
 }
 
-PROGRAM(place_shifted_by_data_of_the_row) {
-  Buffer<float> a = plane(9, 5);
+PROGRAM_OF(place_shifted_by_data_of_the_row, plane(9, 5)) {
   Buffer<int> shift = places(5, 4);
-  Func f("f");
   f(x, y) = a(x + clamp(shift(y), 0, 3), y);
   return squared(f, {6, 5}, a);
 }
@@ -230,6 +194,42 @@ PROGRAM(haar_wavelet_and_back) {
   w(x, c) = mux(c, {a(2 * x) + a(2 * x + 1), a(2 * x) - a(2 * x + 1)});
   v(x) = select(x % 2 == 0, w(x / 2, 0) * w(x / 2, 1), w(x / 2, 0) - w(x / 2, 1));
   return squared(v, {12}, a);
+}
+
+PROGRAM_OF(convolution_with_learned_kernel, line()) {
+  Buffer<float> kernel = random_image({3}, -1, 1, 7);
+  RDom r(0, 3);
+  f(x) = 0.0f;
+  f(x) += a(x + r) * kernel(r);
+  return {weighted_sum(f, {7}), {a, kernel}};
+}
+
+PROGRAM(strided_convolution_and_upsampling) {
+  Buffer<float> a = line();
+  Buffer<float> kernel = random_image({3}, -1, 1, 7);
+  Func down("down"), up("up");
+  RDom r(0, 3);
+  down(x) = sum(a(2 * x + r) * kernel(r));
+  up(x) = down(x / 2) * (0.5f + cast<float>(x % 2));
+  return {weighted_sum(up, {8}), {a, kernel}};
+}
+
+PROGRAM(histogram_of_data_dependent_places) {
+  Buffer<float> a = plane();
+  Func h("h");
+  RDom r(0, 7, 0, 6);
+  h(x) = 0.0f;
+  h(clamp(cast<int>(a(r.x, r.y) * 4.0f), 0, 7)) += a(r.x, r.y) * a(r.x, r.y);
+  return {weighted_sum(h, {8}), {a}};
+}
+
+PROGRAM_OF(lookup_table_at_data_dependent_place, line()) {
+  Buffer<float> table = random_image({8}, 0.25, 2, 3);
+  Expr u = a(x) * 3.0f;
+  Expr cell = clamp(cast<int>(floor(u)), 0, 6);
+  Expr w = u - cast<float>(cell);
+  f(x) = lerp(table(cell), table(cell + 1), w);
+  return {weighted_sum(f, {9}), {table, a}};
 }
 
 }  // namespace

@@ -7,10 +7,8 @@ namespace {
 Var x("x"), y("y");
 
 // 0 * infinity in the branch that was not taken.
-PROGRAM(select_whose_other_branch_has_an_infinite_partial) {
-  Buffer<float> a = line();
+PROGRAM_OF(select_whose_other_branch_has_an_infinite_partial, line()) {
   a(3) = 0.0f;
-  Func f("f");
   f(x) = select(a(x) > 0.125f, sqrt(a(x)), 2.0f * a(x));
   return {weighted_sum(f, {9}), {a}};
 }
@@ -23,25 +21,21 @@ PROGRAM(select_whose_other_branch_is_nan_in_a_func_of_its_own) {
   return {weighted_sum(f, {9}), {a}};
 }
 
-PROGRAM(division_guarded_by_select) {
-  Buffer<float> a = line();
+PROGRAM_OF(division_guarded_by_select, line()) {
   a(4) = 0.0f;
-  Func f("f");
   f(x) = select(a(x) == 0.0f, 1.0f, sin(a(x)) / a(x));
   return {weighted_sum(f, {4}), {a}};
 }
 
-PROGRAM(diagonal_read_twice) {
-  Buffer<float> a = plane(6, 6);
-  Func f("f"), g("g");
+PROGRAM_OF(diagonal_read_twice, plane(6, 6)) {
+  Func g("g");
   f(x, y) = a(x, y) * a(x, y);
   g(x) = f(x, x) * f(x, x) + f(x, 0);
   return {weighted_sum(g, {6}), {a}};
 }
 
-PROGRAM(read_then_overwrite) {
-  Buffer<float> a = line();
-  Func f("f"), g("g");
+PROGRAM_OF(read_then_overwrite, line()) {
+  Func g("g");
   f(x) = a(x) * a(x);
   f(2) = f(2) * 3.0f + f(4);
   f(4) = a(7);
@@ -49,59 +43,46 @@ PROGRAM(read_then_overwrite) {
   return {weighted_sum(g, {9}), {a}};
 }
 
-PROGRAM(shifted_read_after_write) {
-  Buffer<float> a = line();
-  Func f("f");
+PROGRAM_OF(shifted_read_after_write, line()) {
   RDom r(0, 8);
   f(x) = a(x) * a(x);
   f(r + 1) = f(r) * 0.5f + a(r);
   return {weighted_sum(f, {9}), {a}};
 }
 
-PROGRAM(shifted_read_before_write) {
-  Buffer<float> a = line();
-  Func f("f");
+PROGRAM_OF(shifted_read_before_write, line()) {
   RDom r(0, 8);
   f(x) = a(x) * a(x);
   f(r) = f(r + 1) * 0.5f + a(r);
   return {weighted_sum(f, {9}), {a}};
 }
 
-PROGRAM(in_place_product) {
-  Buffer<float> a = line();
-  Func f("f");
+PROGRAM_OF(in_place_product, line()) {
   f(x) = a(x) + 1.0f;
   f(x) = f(x) * f(x) * a(x);
   f(x) += f(x) * f(x);
   return {weighted_sum(f, {9}), {a}, true};
 }
 
-PROGRAM(in_place_normalisation) {
-  Buffer<float> a = line();
-  Func f("f");
+PROGRAM_OF(in_place_normalisation, line()) {
   RDom r(0, 9);
   f(x) = a(x);
   f(r) = f(r) / (f(0) + f(8));
   return {weighted_sum(f, {9}), {a}, true};
 }
 
-PROGRAM(gradient_that_cancels_to_zero) {
-  Buffer<float> a = line();
-  Func f("f");
+PROGRAM_OF(gradient_that_cancels_to_zero, line()) {
   f(x) = (a(x) - a(8 - x)) + (a(8 - x) - a(x));
   return {weighted_sum(f, {9}), {a}};
 }
 
-PROGRAM(gradient_that_rounding_stops) {
-  Buffer<float> a = line();
-  Func f("f");
+PROGRAM_OF(gradient_that_rounding_stops, line()) {
   f(x) = floor(a(x) * 4.0f) + round(a(x) * 2.0f - 0.25f) + ceil(a(x) * 8.0f);
   return {weighted_sum(f, {9}), {a}};
 }
 
-PROGRAM(scan_that_reads_its_own_end) {
-  Buffer<float> a = line();
-  Func f("f"), g("g");
+PROGRAM_OF(scan_that_reads_its_own_end, line()) {
+  Func g("g");
   RDom r(1, 8);
   f(x) = a(x);
   f(r) = f(r - 1) * 0.5f + f(r);
@@ -122,9 +103,7 @@ PROGRAM(same_func_read_by_two_scans) {
   return {weighted_sum(h, {9}), {a}};
 }
 
-PROGRAM(many_writers_of_one_element) {
-  Buffer<float> a = line();
-  Func f("f");
+PROGRAM_OF(many_writers_of_one_element, line()) {
   RDom r(0, 5);
   f(x) = a(x);
   f(2) = a(r) * a(r);
@@ -144,9 +123,8 @@ PROGRAM(infinite_factor_where_nothing_is_read) {
   return {weighted_sum(g, {9}), {a}, true};
 }
 
-PROGRAM(gather_of_integers_that_were_floats) {
-  Buffer<float> a = line(), b = line(9, 6);
-  Func f("f");
+PROGRAM_OF(gather_of_integers_that_were_floats, line()) {
+  Buffer<float> b = line(9, 6);
   f(x) = b(clamp(cast<int>(a(x) * 4.0f), 0, 8)) * a(x);
   return {weighted_sum(f, {9}), {a, b}};
 }

@@ -103,25 +103,32 @@ PROGRAM(marked_values) {
   Buffer<float> a = line();
   return of(likely(a(x) * a(x)) + likely_if_innermost(sin(a(x))) + strict_float(a(x) / 3.0f), {a});
 }
-PROGRAM(tuple_of_four) {
-  Buffer<float> a = line();
-  Func f("f"), g("g");
+PROGRAM_OF(tuple_of_four, line()) {
+  Func g("g");
   f(x) = Tuple(a(x), a(x) * a(x), sin(a(x)), exp(-a(x)));
   g(x) = f(x)[0] * f(x)[3] + f(x)[1] * f(8 - x)[2];
   return {weighted_sum(g, {9}), {a}};
 }
-PROGRAM(tuple_with_an_integer) {
-  Buffer<float> a = line();
-  Func f("f"), g("g");
+PROGRAM_OF(tuple_with_an_integer, line()) {
+  Func g("g");
   f(x) = Tuple(a(x) * a(x), cast<int>(a(x) * 4.0f));
   g(x) = f(x)[0] * cast<float>(f(x)[1]);
   return {weighted_sum(g, {9}), {a}};
 }
-PROGRAM(gradient_of_a_gradient) {
-  Buffer<float> a = line();
-  Func f("f");
+PROGRAM_OF(gradient_of_a_gradient, line()) {
   f(x) = a(x) * a(x) * a(8 - x);
   return {weighted_sum(propagate_adjoints(weighted_sum(f, {9}))(a), {9}), {a}};
+}
+
+PROGRAM_OF(pointwise, line()) {
+  f(x) = a(x) * a(x) + exp(-a(x)) * 2.0f;
+  return {weighted_sum(f, {9}), {a}};
+}
+
+PROGRAM_OF(select_and_min_max, line()) {
+  f(x) = select(a(x) > 1.0f, a(x) * 3.0f, a(x) * a(x)) + max(a(x), 1.25f * a(x + 1)) +
+         clamp(a(x), 0.5f, 1.5f);
+  return {weighted_sum(f, {8}), {a}};
 }
 
 }  // namespace

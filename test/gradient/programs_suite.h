@@ -1,5 +1,5 @@
 // The gradient suite: small programs by name. A file of programs is a list of PROGRAM(name) { ...
-// }; the driver (programs_suite_test.cpp) checks each one.
+// } and PROGRAM_OF(name, image) { ... }; the driver (programs_suite_test.cpp) checks each one.
 #pragma once
 
 #include <string>
@@ -32,6 +32,12 @@ struct RegisteredProgram {
   static Program name();                                         \
   static const RegisteredProgram registered_##name(#name, name); \
   static Program name()
+// Most programs have one image, `a`, and build on a Func `f`.
+#define PROGRAM_OF(name, ...)                                                                    \
+  static Program name(const Buffer<float>& a, Func f);                                           \
+  static const RegisteredProgram registered_##name(#name,                                        \
+                                                   [] { return name(__VA_ARGS__, Func("f")); }); \
+  static Program name(const Buffer<float>& a, Func f)
 
 // Inputs that most programs use: values between 0.25 and 2.
 inline Buffer<float> line(int n = 9, unsigned seed = 1) { return random_image({n}, 0.25, 2, seed); }

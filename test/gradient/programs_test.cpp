@@ -1,5 +1,6 @@
 // Whole programs against central differences.
 #include "gradient/gradient_check.h"
+#include "support/errors.h"
 
 namespace retrograde::gradient {
 namespace {
@@ -11,44 +12,6 @@ class Programs : public ::testing::Test {
   Buffer<float> a = random_image({9}, 0.25, 2, 1);
   Buffer<float> image = random_image({7, 6}, 0.25, 2, 2);
 };
-
-TEST_F(Programs, Pointwise) {
-  Func f("f");
-  f(x) = a(x) * a(x) + exp(-a(x)) * 2.0f;
-  Func loss = weighted_sum(f, {9});
-  expect_gradient(loss, a);
-}
-
-TEST_F(Programs, ChainOfStencils) {
-  Func f("f"), g("g"), h("h");
-  f(x) = a(x) * 1.5f;
-  g(x) = f(x) * f(x + 1) - f(x + 2);
-  h(x) = g(x) + g(x + 2) * g(x + 1);
-  Func loss = weighted_sum(h, {5});
-  expect_gradient(loss, a);
-}
-
-TEST_F(Programs, ConvolutionWithLearnedKernel) {
-  Buffer<float> kernel = random_image({3}, -1, 1, 7);
-  Func f("f");
-  RDom r(0, 3);
-  f(x) = 0.0f;
-  f(x) += a(x + r) * kernel(r);
-  Func loss = weighted_sum(f, {7});
-  expect_gradient(loss, a);
-  expect_gradient(loss, kernel);
-}
-
-TEST_F(Programs, StridedConvolutionAndUpsampling) {
-  Buffer<float> kernel = random_image({3}, -1, 1, 7);
-  Func down("down"), up("up");
-  RDom r(0, 3);
-  down(x) = sum(a(2 * x + r) * kernel(r));
-  up(x) = down(x / 2) * (0.5f + cast<float>(x % 2));
-  Func loss = weighted_sum(up, {8});
-  expect_gradient(loss, a);
-  expect_gradient(loss, kernel);
-}
 
 // Cells are found from float coordinates, as those of an image are when it is scaled.
 TEST_F(Programs, BilateralSliceOfCellsByFloatCoordinates) {
@@ -65,6 +28,14 @@ TEST_F(Programs, BilateralSliceOfCellsByFloatCoordinates) {
       lerp(plane(clamp(k, 0, 1)), plane(clamp(k, 0, 1) + 1), gz - floor(gz)) * image(x, y);
   Func loss = weighted_sum(sliced, {7, 6});
   expect_gradient(loss, grid);
+  expect_gradient(loss, image);
+}
+
+TEST_F(Programs, RotationDiagonalAndTranspose) {
+  Func f("f"), g("g");
+  f(x, y) = image(y, 5 - x) * image(x, y);
+  g(x) = f(x, x) + image(x, x) * image(x + 1, x);
+  Func loss = weighted_sum(g, {5});
   expect_gradient(loss, image);
 }
 
@@ -110,22 +81,6 @@ TEST_F(Programs, BoundaryConditionsOfParametricSize) {
   }
 }
 
-TEST_F(Programs, RotationDiagonalAndTranspose) {
-  Func f("f"), g("g");
-  f(x, y) = image(y, 5 - x) * image(x, y);
-  g(x) = f(x, x) + image(x, x) * image(x + 1, x);
-  Func loss = weighted_sum(g, {5});
-  expect_gradient(loss, image);
-}
-
-TEST_F(Programs, SelectAndMinMax) {
-  Func f("f");
-  f(x) = select(a(x) > 1.0f, a(x) * 3.0f, a(x) * a(x)) + max(a(x), 1.25f * a(x + 1)) +
-         clamp(a(x), 0.5f, 1.5f);
-  Func loss = weighted_sum(f, {8});
-  expect_gradient(loss, a);
-}
-
 TEST_F(Programs, ParamsAndTuples) {
   Param<float> gain("gain", 1.5f);
   Func f("f"), g("g");
@@ -142,15 +97,6 @@ TEST_F(Programs, ParamsAndTuples) {
   EXPECT_NEAR(found / ((up - down) * 128), 1, 1e-4);
 }
 
-TEST_F(Programs, HistogramOfDataDependentPlaces) {
-  Func h("h");
-  RDom r(0, 7, 0, 6);
-  h(x) = 0.0f;
-  h(clamp(cast<int>(image(r.x, r.y) * 4.0f), 0, 7)) += image(r.x, r.y) * image(r.x, r.y);
-  Func loss = weighted_sum(h, {8});
-  expect_gradient(loss, image);
-}
-
 TEST_F(Programs, DataDependentGatherScatters) {
   Func index("index"), f("f");
   index(x) = cast<int>(floor(a(x) * 3.5f));
@@ -158,7 +104,7 @@ TEST_F(Programs, DataDependentGatherScatters) {
   Func loss = weighted_sum(f, {9});
   Derivative d = propagate_adjoints(loss);
   expect_gradient(loss, d, a);
-  EXPECT_NE(d.explain(Detail::All).find("scattered"), std::string::npos) << d.explain(Detail::All);
+  expect_mentions(d.explain(Detail::All), {"scattered"});
 }
 
 // Numbers of these types are taken modulo 2^8, 2^16 and 2^32, or are beyond int32.
@@ -185,18 +131,6 @@ TEST_F(Programs, PlaceChosenByUnsignedAndNarrowDataOfTheRow) {
   expect_place_chosen_by_data_of_the_row<uint16_t>(image);
   expect_place_chosen_by_data_of_the_row<uint32_t>(image);
   expect_place_chosen_by_data_of_the_row<int64_t>(image);
-}
-
-TEST_F(Programs, LookupTableAtDataDependentPlace) {
-  Buffer<float> table = random_image({8}, 0.25, 2, 3);
-  Func f("f");
-  Expr u = a(x) * 3.0f;
-  Expr cell = clamp(cast<int>(floor(u)), 0, 6);
-  Expr w = u - cast<float>(cell);
-  f(x) = lerp(table(cell), table(cell + 1), w);
-  Func loss = weighted_sum(f, {9});
-  expect_gradient(loss, table);
-  expect_gradient(loss, a);
 }
 
 TEST_F(Programs, BilateralSlice) {
@@ -228,121 +162,6 @@ TEST_F(Programs, BilateralSlice) {
 }
 
 // ---- updates ----
-
-TEST_F(Programs, OverwrittenElementGetsNoGradientFromBefore) {
-  Func f("f");
-  f(x) = a(x) * a(x);
-  f(3) = a(0) * 2.0f;
-  f(x) += a(x);
-  Func loss = weighted_sum(f, {9});
-  expect_gradient(loss, a);
-}
-
-TEST_F(Programs, LastWriterOfAnElementGetsTheGradient) {
-  Func f("f");
-  RDom r(0, 5);
-  f(x) = a(x);
-  f(2) = a(r) * a(r);
-  Func loss = weighted_sum(f, {9});
-  expect_gradient(loss, a);
-}
-
-TEST_F(Programs, ScanForward) {
-  Func f("f");
-  RDom r(1, 8);
-  f(x) = a(x);
-  f(r) = f(r) * 0.5f + f(r - 1) * a(r);
-  Func loss = weighted_sum(f, {9});
-  expect_gradient(loss, a);
-}
-
-TEST_F(Programs, ScanBackwardWithTwoTaps) {
-  Func f("f");
-  RDom r(0, 7);
-  f(x) = a(x);
-  f(6 - r) = a(6 - r) + 0.25f * f(7 - r) * f(8 - r);
-  Func loss = weighted_sum(f, {9});
-  expect_gradient(loss, a);
-}
-
-TEST_F(Programs, ScanNotStartingAtZero) {
-  Func f("f");
-  RDom r(3, 4);
-  f(x) = a(x) * a(x);
-  f(r) = sin(f(r - 1)) + a(r - 2);
-  Func loss = weighted_sum(f, {9});
-  expect_gradient(loss, a);
-}
-
-TEST_F(Programs, SummedAreaTable) {
-  Func f("f");
-  RDom rx(1, 6), ry(1, 5);
-  f(x, y) = image(x, y) * image(x, y);
-  f(rx, y) += f(rx - 1, y);
-  f(x, ry) += f(x, ry - 1);
-  Func loss = weighted_sum(f, {7, 6});
-  expect_gradient(loss, image);
-}
-
-TEST_F(Programs, RecurrenceInTime) {
-  Func u("u");
-  RDom r(0, 4);
-  u(x, t) = 0.0f;
-  u(x, 0) = a(clamp(x, 0, 8));
-  u(x, r + 1) = u(x, r) + 0.25f * sin(u(x, r)) * cast<float>(r + 1);
-  Func loss = weighted_sum(u, {9, 5});
-  expect_gradient(loss, a);
-}
-
-TEST_F(Programs, DiffusionInTimeOverAStencil) {
-  Func u("u");
-  RDom r(0, 9, 0, 4);
-  u(x, t) = 0.0f;
-  u(x, 0) = a(clamp(x, 0, 8));
-  Expr left = u(clamp(r.x - 1, 0, 8), r.y), right = u(clamp(r.x + 1, 0, 8), r.y), mid = u(r.x, r.y);
-  u(r.x, r.y + 1) = mid + 0.25f * (left - 2.0f * mid + right) + 0.125f * mid * left;
-  Func loss = weighted_sum(u, {9, 5});
-  expect_gradient(loss, a);
-}
-
-TEST_F(Programs, CoupledTupleRecurrence) {
-  Func s("s");
-  RDom r(0, 6);
-  s(t) = Tuple(0.5f, a(0));
-  s(r + 1) = Tuple(s(r)[0] + 0.25f * s(r)[1], s(r)[1] - 0.25f * sin(s(r)[0]) * a(r));
-  Func last("last");
-  last(x) = s(x)[0] * s(x)[1] + s(x)[1];
-  Func loss = weighted_sum(last, {7});
-  expect_gradient(loss, a);
-}
-
-TEST_F(Programs, MovingAverageInPlaceReadsOldAndNewValues) {
-  Func f("f");
-  RDom r(1, 7);
-  f(x) = a(x) * a(x);
-  f(r) = 0.5f * f(r - 1) + 0.25f * f(r) + 0.25f * f(r + 1);
-  Func loss = weighted_sum(f, {8});
-  expect_gradient(loss, a);
-}
-
-TEST_F(Programs, MaskedOverwrite) {
-  Func f("f");
-  RDom r(0, 9);
-  r.where(a(r) > 1.0f);
-  f(x) = a(x) * 2.0f;
-  f(r) = a(8 - r) * 3.0f;
-  Func loss = weighted_sum(f, {9});
-  expect_gradient(loss, a);
-}
-
-TEST_F(Programs, UpdateOfOneColumn) {
-  Func f("f");
-  f(x, y) = image(x, y);
-  f(2, y) += image(1, y) * image(2, y);
-  f(x, 3) = 2.0f * f(x, 3);
-  Func loss = weighted_sum(f, {7, 6});
-  expect_gradient(loss, image);
-}
 
 // Sizes are known when the pipeline is called only.
 TEST_F(Programs, ParametricSizes) {
@@ -440,7 +259,7 @@ TEST_F(Programs, ScalarParameterSumsInParts) {
   loss() = 0.0f;
   loss() += f(r.x, r.y);
   Derivative d = propagate_adjoints(loss);
-  EXPECT_NE(d.explain(Detail::All).find("privatised"), std::string::npos) << d.explain(Detail::All);
+  expect_mentions(d.explain(Detail::All), {"privatised"});
   double expected = 0;
   for (int j = 0; j < 48; ++j) {
     for (int i = 0; i < 64; ++i) expected += (i + 2 * j) * 1.5;
@@ -458,24 +277,8 @@ TEST_F(Programs, PrivatisedScatterIsTheSameForEveryNumberOfThreads) {
   loss() = 0.0f;
   loss() += f(r.x, r.y) * f(r.x, r.y);
   Derivative d = propagate_adjoints(loss);
-  EXPECT_NE(d.explain(Detail::All).find("privatised"), std::string::npos) << d.explain(Detail::All);
+  expect_mentions(d.explain(Detail::All), {"privatised"});
   expect_machine_code_agrees(d(table), {{0}, {16}});
-}
-
-TEST_F(Programs, MaximumAndMinimumSelectTheirWinner) {
-  Func f("f");
-  RDom r(0, 4);
-  f(x) = maximum(a(x + r)) * minimum(a(x + r) * 2.0f);
-  Func loss = weighted_sum(f, {6});
-  expect_gradient(loss, a);
-}
-
-TEST_F(Programs, ArgmaxCarriesItsValue) {
-  Func f("f");
-  RDom r(0, 4);
-  f(x) = argmax(a(x + r))[1] * 3.0f;
-  Func loss = weighted_sum(f, {6});
-  expect_gradient(loss, a);
 }
 
 TEST_F(Programs, ProductNeedsStoredVersions) {
@@ -540,8 +343,7 @@ TEST_F(Programs, OnlyRequestedGradientsAreBuilt) {
   Derivative d = propagate_adjoints(loss, {.wrt = {a}});
   EXPECT_TRUE(d(a).defined());
   EXPECT_THROW(d(image), CompileError);
-  EXPECT_NE(d.explain(Detail::All).find("not requested"), std::string::npos)
-      << d.explain(Detail::All);
+  expect_mentions(d.explain(Detail::All), {"not requested"});
   expect_gradient(loss, d, a);
 }
 

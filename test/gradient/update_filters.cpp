@@ -9,9 +9,8 @@ Var x("x"), y("y"), t("t");
 
 // Second order, forward and backward along both axes, as image filters do (I. Young, L. van Vliet,
 // Recursive implementation of the Gaussian filter, Signal Processing 44, 1995).
-PROGRAM(recursive_filter_of_second_order_along_both_axes) {
-  Buffer<float> a = plane(6, 5), c = random_image({2}, 0.25, 0.5, 8);
-  Func f("f");
+PROGRAM_OF(recursive_filter_of_second_order_along_both_axes, plane(6, 5)) {
+  Buffer<float> c = random_image({2}, 0.25, 0.5, 8);
   RDom rx(2, 4), ry(2, 3);
   Expr b0 = 1.0f - c(Expr(0)) + c(Expr(1)) * 0.5f, b1 = c(Expr(0)), b2 = -0.5f * c(Expr(1));
   f(x, y) = a(x, y);
@@ -49,9 +48,9 @@ PROGRAM(recursive_bilateral_filter) {
 }
 
 // Numerator and denominator of a weighted mean, decayed by what the data say.
-PROGRAM(normalised_recursive_mean_in_a_tuple) {
-  Buffer<float> a = line(), w = line(9, 4);
-  Func f("f"), g("g");
+PROGRAM_OF(normalised_recursive_mean_in_a_tuple, line()) {
+  Buffer<float> w = line(9, 4);
+  Func g("g");
   RDom r(1, 8);
   f(x) = Tuple(a(x) * w(x), w(x));
   Expr keep = exp(-w(r));

@@ -6,9 +6,7 @@ namespace {
 
 Var x("x"), y("y"), c("c");
 
-PROGRAM(sum_of_all) {
-  Buffer<float> a = plane();
-  Func f("f");
+PROGRAM_OF(sum_of_all, plane()) {
   RDom r(0, 7, 0, 6);
   f() = 0.0f;
   f() += a(r.x, r.y) * a(r.x, r.y);
@@ -26,63 +24,54 @@ PROGRAM(mean_and_variance) {
   return {loss, {a}};
 }
 
-PROGRAM(sums_along_rows) {
-  Buffer<float> a = plane();
-  Func f("f");
+PROGRAM_OF(sums_along_rows, plane()) {
   RDom r(0, 7);
   f(y) = 0.0f;
   f(y) += a(r, y) * a(6 - r, y);
   return {weighted_sum(f, {6}), {a}};
 }
 
-PROGRAM(matrix_product) {
-  Buffer<float> a = plane(4, 3), b = plane(5, 4, 8);
-  Func f("f");
+PROGRAM_OF(matrix_product, plane(4, 3)) {
+  Buffer<float> b = plane(5, 4, 8);
   RDom k(0, 4);
   f(x, y) = 0.0f;
   f(x, y) += a(k, y) * b(x, k);
   return {weighted_sum(f, {5, 3}), {a, b}};
 }
 
-PROGRAM(convolution_with_a_learned_kernel) {
-  Buffer<float> a = plane(), k = random_image({3, 3}, -1, 1, 8);
-  Func f("f");
+PROGRAM_OF(convolution_with_a_learned_kernel, plane()) {
+  Buffer<float> k = random_image({3, 3}, -1, 1, 8);
   RDom r(0, 3, 0, 3);
   f(x, y) = 0.0f;
   f(x, y) += a(x + r.x, y + r.y) * k(r.x, r.y);
   return {weighted_sum(f, {5, 4}), {a, k}};
 }
 
-PROGRAM(strided_convolution_with_a_learned_kernel) {
-  Buffer<float> a = plane(9, 7), k = random_image({3, 3}, -1, 1, 8);
-  Func f("f");
+PROGRAM_OF(strided_convolution_with_a_learned_kernel, plane(9, 7)) {
+  Buffer<float> k = random_image({3, 3}, -1, 1, 8);
   RDom r(0, 3, 0, 3);
   f(x, y) = 0.0f;
   f(x, y) += a(2 * x + r.x, 2 * y + r.y) * k(r.x, r.y);
   return {weighted_sum(f, {4, 3}), {a, k}};
 }
 
-PROGRAM(depthwise_convolution) {
-  Buffer<float> a = random_image({5, 4, 3}, -1, 1, 8), k = random_image({2, 2, 3}, -1, 1, 9);
-  Func f("f");
+PROGRAM_OF(depthwise_convolution, random_image({5, 4, 3}, -1, 1, 8)) {
+  Buffer<float> k = random_image({2, 2, 3}, -1, 1, 9);
   RDom r(0, 2, 0, 2);
   f(x, y, c) = 0.0f;
   f(x, y, c) += a(x + r.x, y + r.y, c) * k(r.x, r.y, c);
   return {weighted_sum(f, {4, 3, 3}), {a, k}};
 }
 
-PROGRAM(transposed_convolution_scatters_in_the_primal) {
-  Buffer<float> a = line(5), k = random_image({3}, -1, 1, 8);
-  Func f("f");
+PROGRAM_OF(transposed_convolution_scatters_in_the_primal, line(5)) {
+  Buffer<float> k = random_image({3}, -1, 1, 8);
   RDom r(0, 3, 0, 5);
   f(x) = 0.0f;
   f(2 * r.y + r.x) += a(r.y) * k(r.x);
   return {weighted_sum(f, {11}), {a, k}};
 }
 
-PROGRAM(sum_over_a_triangle) {
-  Buffer<float> a = plane(6, 6);
-  Func f("f");
+PROGRAM_OF(sum_over_a_triangle, plane(6, 6)) {
   RDom r(0, 6, 0, 6);
   r.where(r.x <= r.y && r.x + r.y < 8);
   f(x) = 0.0f;
@@ -90,9 +79,7 @@ PROGRAM(sum_over_a_triangle) {
   return {weighted_sum(f, {6}), {a}};
 }
 
-PROGRAM(sum_where_data_say) {
-  Buffer<float> a = line();
-  Func f("f");
+PROGRAM_OF(sum_where_data_say, line()) {
   RDom r(0, 9);
   r.where(a(r) > 1.0f);
   f() = 0.0f;
@@ -100,46 +87,36 @@ PROGRAM(sum_where_data_say) {
   return {f, {a}};
 }
 
-PROGRAM(reduction_domain_that_starts_at_minus_two) {
-  Buffer<float> a = line();
-  Func f("f");
+PROGRAM_OF(reduction_domain_that_starts_at_minus_two, line()) {
   RDom r(-2, 5);
   f(x) = 0.0f;
   f(x) += a(clamp(x + r, 0, 8)) * cast<float>(r + 3);
   return {weighted_sum(f, {9}), {a}};
 }
 
-PROGRAM(product_of_all) {
-  Buffer<float> a = line(6);
-  Func f("f");
+PROGRAM_OF(product_of_all, line(6)) {
   RDom r(0, 6);
   f() = 1.0f;
   f() *= a(r);
   return {f, {a}, true};
 }
 
-PROGRAM(product_with_one_zero) {
-  Buffer<float> a = line(6);
+PROGRAM_OF(product_with_one_zero, line(6)) {
   a(2) = 0.0f;
-  Func f("f");
   RDom r(0, 6);
   f() = 1.0f;
   f() *= a(r);
   return {f, {a}, true};
 }
 
-PROGRAM(products_along_rows) {
-  Buffer<float> a = plane();
-  Func f("f");
+PROGRAM_OF(products_along_rows, plane()) {
   RDom r(0, 7);
   f(y) = 1.0f;
   f(y) *= a(r, y);
   return {weighted_sum(f, {6}), {a}, true};
 }
 
-PROGRAM(product_where_data_say) {
-  Buffer<float> a = plane();
-  Func f("f");
+PROGRAM_OF(product_where_data_say, plane()) {
   RDom r(0, 7);
   r.where(a(r, 2) > 1.0f);
   f(y) = a(3, y);
@@ -147,18 +124,15 @@ PROGRAM(product_where_data_say) {
   return {weighted_sum(f, {6}), {a}, true};
 }
 
-PROGRAM(product_over_two_dimensions) {
-  Buffer<float> a = random_image({3, 4}, 0.75, 1.25, 2);
-  Func f("f");
+PROGRAM_OF(product_over_two_dimensions, random_image({3, 4}, 0.75, 1.25, 2)) {
   RDom r(0, 3, 1, 3);
   f() = a(0, 0);
   f() *= a(r.x, r.y);
   return {f, {a}, true};
 }
 
-PROGRAM(decay_in_place_of_what_a_counter_has_reached) {
-  Buffer<float> a = plane();
-  Func f("f"), g("g");
+PROGRAM_OF(decay_in_place_of_what_a_counter_has_reached, plane()) {
+  Func g("g");
   RDom r(0, 7);
   f(y) = Tuple(a(0, y), 0, 1.0f);
   f(y) = Tuple(0.5f * f(y)[0] + a(r, y) * a(r, y), f(y)[1] + 1, a(r, y) + 0.25f * f(y)[0]);
@@ -166,26 +140,20 @@ PROGRAM(decay_in_place_of_what_a_counter_has_reached) {
   return {weighted_sum(g, {6}), {a}};
 }
 
-PROGRAM(maximum_and_minimum) {
-  Buffer<float> a = line();
-  Func f("f");
+PROGRAM_OF(maximum_and_minimum, line()) {
   RDom r(0, 4);
   f(x) = maximum(a(x + r)) * minimum(a(x + r) * 2.0f);
   return {weighted_sum(f, {6}), {a}};
 }
 
-PROGRAM(maximum_of_a_product) {
-  Buffer<float> a = plane();
-  Func f("f");
+PROGRAM_OF(maximum_of_a_product, plane()) {
   RDom r(0, 7);
   f(y) = -10.0f;
   f(y) = max(a(r, y) * a(r, 5 - y), f(y));
   return {weighted_sum(f, {6}), {a}};
 }
 
-PROGRAM(argmax_carries_its_value) {
-  Buffer<float> a = line();
-  Func f("f");
+PROGRAM_OF(argmax_carries_its_value, line()) {
   RDom r(0, 4);
   f(x) = argmax(a(x + r))[1] * 3.0f;
   return {weighted_sum(f, {6}), {a}};
@@ -209,18 +177,15 @@ PROGRAM(log_sum_exp_after_the_maximum) {
   return {f, {a}};
 }
 
-PROGRAM(log_sum_exp_as_an_operator) {
-  Buffer<float> a = line(6);
-  Func f("f");
+PROGRAM_OF(log_sum_exp_as_an_operator, line(6)) {
   RDom r(1, 5);
   f() = a(Expr(0));
   f() = log(exp(f()) + exp(a(r)));
   return {f, {a}, true};
 }
 
-PROGRAM(streaming_log_sum_exp_in_a_tuple) {
-  Buffer<float> a = line(6);
-  Func f("f"), g("g");
+PROGRAM_OF(streaming_log_sum_exp_in_a_tuple, line(6)) {
+  Func g("g");
   RDom r(0, 6);
   f() = Tuple(-4.0f, 0.0f);
   Expr top = max(f()[0], a(r));
@@ -250,9 +215,8 @@ PROGRAM(complex_product_in_a_tuple) {
   return {g, {re, im}, true};
 }
 
-PROGRAM(two_sums_in_a_tuple) {
-  Buffer<float> a = line();
-  Func f("f"), g("g");
+PROGRAM_OF(two_sums_in_a_tuple, line()) {
+  Func g("g");
   RDom r(0, 4);
   f(x) = Tuple(0.0f, 1.0f);
   f(x) = Tuple(f(x)[0] + a(x + r), f(x)[1] + a(x + r) * a(x + r));

@@ -7,18 +7,14 @@ namespace {
 
 Var x("x"), y("y"), t("t");
 
-PROGRAM(cumulative_sum) {
-  Buffer<float> a = line();
-  Func f("f");
+PROGRAM_OF(cumulative_sum, line()) {
   RDom r(1, 8);
   f(x) = a(x);
   f(r) += f(r - 1);
   return {weighted_sum(f, {9}), {a}};
 }
 
-PROGRAM(cumulative_sum_from_the_right) {
-  Buffer<float> a = line();
-  Func f("f");
+PROGRAM_OF(cumulative_sum_from_the_right, line()) {
   RDom r(0, 8);
   f(x) = a(x) * a(x);
   f(7 - r) += f(8 - r);
@@ -26,29 +22,23 @@ PROGRAM(cumulative_sum_from_the_right) {
 }
 
 // The iteration that reads a(0) is the first: there is none.
-PROGRAM(shift_of_no_elements) {
-  Buffer<float> a = line();
+PROGRAM_OF(shift_of_no_elements, line()) {
   Param<int> n("n");
   n.set(0);
-  Func f("f");
   RDom r(0, n);
   f(x) = a(x);
   f(r) = f(clamp(r - 1, 0, 8));
   return {weighted_sum(f, {9}), {a}};
 }
 
-PROGRAM(exponential_filter) {
-  Buffer<float> a = line();
-  Func f("f");
+PROGRAM_OF(exponential_filter, line()) {
   RDom r(1, 8);
   f(x) = a(x);
   f(r) = 0.25f * f(r) + 0.75f * f(r - 1);
   return {weighted_sum(f, {9}), {a}};
 }
 
-PROGRAM(filter_forward_then_backward) {
-  Buffer<float> a = line();
-  Func f("f");
+PROGRAM_OF(filter_forward_then_backward, line()) {
   RDom r(1, 8);
   f(x) = a(x) * a(x);
   f(r) = 0.25f * f(r) + 0.75f * f(r - 1);
@@ -56,9 +46,9 @@ PROGRAM(filter_forward_then_backward) {
   return {weighted_sum(f, {9}), {a}};
 }
 
-PROGRAM(filter_with_learned_decay) {
-  Buffer<float> a = line(), decay = random_image({2}, 0.25, 0.75, 8);
-  Func f("f"), g("g");
+PROGRAM_OF(filter_with_learned_decay, line()) {
+  Buffer<float> decay = random_image({2}, 0.25, 0.75, 8);
+  Func g("g");
   RDom r(0, 9);
   f(t) = 0.0f;
   f(r + 1) = decay(Expr(0)) * f(r) + decay(Expr(1)) * a(r);
@@ -66,54 +56,43 @@ PROGRAM(filter_with_learned_decay) {
   return {weighted_sum(g, {9}), {a, decay}};
 }
 
-PROGRAM(two_pole_filter) {
-  Buffer<float> a = line();
-  Func f("f");
+PROGRAM_OF(two_pole_filter, line()) {
   RDom r(2, 7);
   f(x) = a(x);
   f(r) = f(r) + 0.5f * f(r - 1) - 0.25f * f(r - 2);
   return {weighted_sum(f, {9}), {a}};
 }
 
-PROGRAM(two_pole_filter_backward_nonlinear) {
-  Buffer<float> a = line();
-  Func f("f");
+PROGRAM_OF(two_pole_filter_backward_nonlinear, line()) {
   RDom r(0, 7);
   f(x) = a(x);
   f(6 - r) = a(6 - r) + 0.25f * f(7 - r) * f(8 - r);
   return {weighted_sum(f, {9}), {a}};
 }
 
-PROGRAM(fibonacci_of_products) {
-  Buffer<float> a = line();
-  Func f("f");
+PROGRAM_OF(fibonacci_of_products, line()) {
   RDom r(0, 7);
   f(t) = 1.0f;
   f(r + 2) = f(r + 1) * a(r) + f(r) * a(r + 1);
   return {weighted_sum(f, {9}), {a}};
 }
 
-PROGRAM(scan_of_every_second_element) {
-  Buffer<float> a = line();
-  Func f("f");
+PROGRAM_OF(scan_of_every_second_element, line()) {
   RDom r(1, 4);
   f(x) = a(x);
   f(2 * r) = f(2 * r - 2) * a(r) + f(2 * r);
   return {weighted_sum(f, {9}), {a}};
 }
 
-PROGRAM(scan_from_three_whose_steps_are_all_read) {
-  Buffer<float> a = line();
-  Func f("f");
+PROGRAM_OF(scan_from_three_whose_steps_are_all_read, line()) {
   RDom r(3, 4);
   f(x) = a(x) * a(x);
   f(r) = sin(f(r - 1)) + a(r - 2);
   return {weighted_sum(f, {9}), {a}};
 }
 
-PROGRAM(scan_from_a_negative_start) {
-  Buffer<float> a = line();
-  Func f("f"), g("g");
+PROGRAM_OF(scan_from_a_negative_start, line()) {
+  Func g("g");
   RDom r(-3, 6);
   f(x) = a(clamp(x + 4, 0, 8));
   f(r) = f(r - 1) * a(r + 3) + 0.5f * f(r);
@@ -197,9 +176,7 @@ PROGRAM(wave_with_two_steps_of_memory) {
   return {weighted_sum(u, {9, 5}), {a}};
 }
 
-PROGRAM(summed_area_table) {
-  Buffer<float> a = plane();
-  Func f("f");
+PROGRAM_OF(summed_area_table, plane()) {
   RDom rx(1, 6), ry(1, 5);
   f(x, y) = a(x, y) * a(x, y);
   f(rx, y) += f(rx - 1, y);
@@ -207,27 +184,21 @@ PROGRAM(summed_area_table) {
   return {weighted_sum(f, {7, 6}), {a}};
 }
 
-PROGRAM(summed_area_table_in_one_update) {
-  Buffer<float> a = plane(5, 4);
-  Func f("f");
+PROGRAM_OF(summed_area_table_in_one_update, plane(5, 4)) {
   RDom r(1, 4, 1, 3);
   f(x, y) = a(x, y) * a(x, y);
   f(r.x, r.y) = f(r.x, r.y) + f(r.x - 1, r.y) + f(r.x, r.y - 1) - f(r.x - 1, r.y - 1);
   return {weighted_sum(f, {5, 4}), {a}};
 }
 
-PROGRAM(dynamic_programming_along_diagonals) {
-  Buffer<float> a = plane(5, 4);
-  Func f("f");
+PROGRAM_OF(dynamic_programming_along_diagonals, plane(5, 4)) {
   RDom r(1, 4, 1, 3);
   f(x, y) = a(x, y);
   f(r.x, r.y) = a(r.x, r.y) + 0.5f * f(r.x - 1, r.y - 1) + 0.25f * sin(f(r.x, r.y - 1));
   return {weighted_sum(f, {5, 4}), {a}};
 }
 
-PROGRAM(shortest_path_by_min) {
-  Buffer<float> a = plane(5, 4);
-  Func f("f");
+PROGRAM_OF(shortest_path_by_min, plane(5, 4)) {
   RDom r(1, 3, 1, 3);
   f(x, y) = a(x, y);
   f(r.x, r.y) = a(r.x, r.y) + min(f(r.x - 1, r.y - 1), min(f(r.x, r.y - 1), f(r.x + 1, r.y - 1)));
@@ -244,36 +215,28 @@ PROGRAM(soft_alignment) {
   return {weighted_sum(d, {5, 5}), {cost}};
 }
 
-PROGRAM(gauss_seidel_sweep) {
-  Buffer<float> a = line();
-  Func f("f");
+PROGRAM_OF(gauss_seidel_sweep, line()) {
   RDom r(1, 7);
   f(x) = a(x) * a(x);
   f(r) = 0.5f * f(r - 1) + 0.25f * f(r) + 0.25f * f(r + 1);
   return {weighted_sum(f, {9}), {a}};
 }
 
-PROGRAM(gauss_seidel_sweeps_repeated) {
-  Buffer<float> a = line();
-  Func f("f");
+PROGRAM_OF(gauss_seidel_sweeps_repeated, line()) {
   RDom r(1, 7, 0, 3);
   f(x) = a(x) * a(x);
   f(r.x) = 0.5f * f(r.x - 1) + 0.25f * f(r.x) + 0.25f * f(r.x + 1);
   return {weighted_sum(f, {9}), {a}};
 }
 
-PROGRAM(nonlinear_gauss_seidel_in_columns) {
-  Buffer<float> a = plane(7, 3);
-  Func f("f");
+PROGRAM_OF(nonlinear_gauss_seidel_in_columns, plane(7, 3)) {
   RDom r(1, 5, 0, 2);
   f(x, y) = a(x, y);
   f(r.x, y) = 0.5f * sin(f(r.x - 1, y)) + 0.25f * f(r.x, y) * f(r.x + 1, y);
   return {weighted_sum(f, {7, 3}), {a}, true};
 }
 
-PROGRAM(newton_iterations_in_place) {
-  Buffer<float> a = line(5);
-  Func f("f");
+PROGRAM_OF(newton_iterations_in_place, line(5)) {
   RDom r(0, 5);
   f(x) = 1.0f;
   f(x) = 0.5f * (f(x) + a(x) / f(x)) + 0.0f * cast<float>(r);
@@ -289,9 +252,7 @@ PROGRAM(horner) {
   return {weighted_sum(f, {5}), {a, c}, true};
 }
 
-PROGRAM(running_maximum) {
-  Buffer<float> a = line();
-  Func f("f");
+PROGRAM_OF(running_maximum, line()) {
   RDom r(1, 8);
   f(x) = a(x);
   f(r) = max(f(r), f(r - 1) * 0.9375f);
@@ -307,9 +268,7 @@ PROGRAM(matrix_power_in_columns) {
   return {weighted_sum(v, {3, 4}), {m}};
 }
 
-PROGRAM(masked_scan) {
-  Buffer<float> a = line();
-  Func f("f");
+PROGRAM_OF(masked_scan, line()) {
   RDom r(1, 8);
   r.where(a(r) > 1.0f);
   f(x) = a(x);
@@ -328,9 +287,7 @@ PROGRAM(triangular_solve) {
 }
 
 // Each row reads its diagonal twice, before and after it is overwritten.
-PROGRAM(diagonal_read_twice_while_rows_are_overwritten) {
-  Buffer<float> a = random_image({5, 5}, 0.25, 2, 14);
-  Func f("f");
+PROGRAM_OF(diagonal_read_twice_while_rows_are_overwritten, random_image({5, 5}, 0.25, 2, 14)) {
   RDom r(0, 3);
   f(x, y) = a(x, y);
   f(r, y) = f(y, y) * 0.0625f + sin(f(y, y));
