@@ -21,7 +21,6 @@ struct JacobianResult {
   size_t coloured_dimensions = 0;  // of what has colours
   Func compressed, dense, band;    // band: undefined when there is none
   Region band_offsets;
-  std::string no_band;  // why
 };
 
 }  // namespace ir
@@ -174,12 +173,7 @@ void define(Func f, const std::vector<Var>& vars, const std::vector<Expr>& value
 void make_band(ir::JacobianResult& result, const Entries& entries, size_t dims,
                const std::string& name) {
   auto offsets = entries.candidate.compressed->offsets();
-  if (!offsets) {
-    result.no_band =
-        "output and input differ in dimensions, or the pattern has entries at offsets "
-        "without constant bounds";
-    return;
-  }
+  if (!offsets) return;
   std::vector<Var> y = variables("y", dims), k = variables("k", dims);
   std::vector<Expr> x;
   for (size_t d = 0; d < dims; ++d) {
@@ -261,16 +255,7 @@ bool is_a_gradient(const Func& loss) {
   bool result = true;
   for (const ir::FuncPtr& f : ir::topological_order({loss.function()})) {
     result &= f->custom_derivatives == nullptr;
-    for (int s = 0; s < f->stage_count(); ++s) {
-      ir::for_each_expr(f->stage(s), [&](const Expr& root) {
-        ir::walk(root, [&](const Expr& e) {
-          const auto* call = e.as<ir::Call>();
-          result &= !(call && call->call_type == ir::CallType::Operator &&
-                      call->op == ir::Op::stop_gradient);
-          return result;
-        });
-      });
-    }
+    walk(*f, [&](const ir::Call& call) { result &= !call.is_op(ir::Op::stop_gradient); });
   }
   return result;
 }
@@ -294,7 +279,9 @@ Func Jacobian::dense() const { return result_->dense; }
 Func Jacobian::band() const {
   if (!result_->band.defined()) {
     user_error(result_->asked, "a band is made of constant offsets between output and input",
-               result_->no_band, "Use dense(), or compressed() and colour()");
+               "output and input differ in dimensions, or the pattern has entries at offsets "
+               "without constant bounds",
+               "Use dense(), or compressed() and colour()");
   }
   return result_->band;
 }

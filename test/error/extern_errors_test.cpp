@@ -70,8 +70,8 @@ TEST_F(ExternErrors, ArgumentsAreMadeOfParameters) {
 
 TEST_F(ExternErrors, TheNameOfTheFunctionOfAnOrdinaryFunc) {
   f(x) = x;
-  expect_mentions(error_of([&] { f.extern_function_name(); }),
-                  {"take the name of the C function of \"f", "define_extern"});
+  expect_error({"take the name of the C function of \"f", "define_extern"},
+               [&] { f.extern_function_name(); });
 }
 
 // rule: the function's symbol is its plain name
@@ -97,11 +97,10 @@ TEST_F(ExternErrors, StorageOutsideOfTheComputation) {
 
 TEST_F(ExternErrors, TheInterpreterCallsNothing) {
   build();
-  expect_mentions(error_of<Unsupported>([&] {
-                    oracle::Interpreter interpreter;
-                    interpreter.realize(out.function(), {{0}, {4}});
-                  }),
-                  {"interpret \"f", "a Func is evaluated by its definitions"});
+  expect_error<Unsupported>({"interpret \"f", "a Func is evaluated by its definitions"}, [&] {
+    oracle::Interpreter interpreter;
+    interpreter.realize(out.function(), {{0}, {4}});
+  });
 }
 
 }  // namespace

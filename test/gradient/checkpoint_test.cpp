@@ -362,8 +362,8 @@ TEST(Checkpoints, SpaceMayHaveExtentsOfRunTime) {
   double by_gain = evaluate_scalar(d(gain));
   EXPECT_NEAR(by_gain, evaluate_scalar(stored(gain)), 1e-12 * std::abs(by_gain));
   EXPECT_NEAR(Buffer<float>(d(gain).realize())(), by_gain, 1e-5 * std::abs(by_gain));
-  expect_mentions(error_of([&] { propagate_adjoints(loss, {.checkpoint_bytes = 1000}); }),
-                  {"size of a state", "run time only", "checkpoint_states"});
+  expect_error({"size of a state", "run time only", "checkpoint_states"},
+               [&] { propagate_adjoints(loss, {.checkpoint_bytes = 1000}); });
 }
 
 // ---- a number of steps that is known at run time only ----
@@ -458,9 +458,9 @@ TEST(Checkpoints, MoreStepsAtRunTimeThanATableMayHaveFailTheCall) {
   Buffer<float> start = line(1);
   Derivative d = propagate_adjoints(counted(start, n), {.wrt = {start}, .checkpoint_states = 1});
   n.set(100000);
-  expect_mentions(
-      error_of<RuntimeError>([&] { d(start).realize({1}); }),
-      {"room for 1 kept state has at most 5789 steps", "this one has 100000", "larger budget"});
+  expect_error<RuntimeError>(
+      {"room for 1 kept state has at most 5789 steps", "this one has 100000", "larger budget"},
+      [&] { d(start).realize({1}); });
   expect_mentions(d.explain(Detail::All),
                   {"a loop of n steps", "1 kept state of 4 bytes", "at run time"});
 }
@@ -475,8 +475,8 @@ TEST(Checkpoints, SchedulesOfTooManyStepsAreErrors) {
   u(x) = start(x);
   u(x) = u(x) + 0.125f * sin(u(x) + cast<float>(t));
   const Func loss = weighted_sum(u, {7});
-  expect_mentions(error_of([&] { propagate_adjoints(loss, {.checkpoint_states = 2}); }),
-                  {"a schedule has at most", "4194304 steps", "larger budget"});
+  expect_error({"a schedule has at most", "4194304 steps", "larger budget"},
+               [&] { propagate_adjoints(loss, {.checkpoint_states = 2}); });
 }
 
 TEST(Checkpoints, BudgetsThatCannotBeMetAreErrors) {
@@ -488,9 +488,8 @@ TEST(Checkpoints, BudgetsThatCannotBeMetAreErrors) {
   expect_mentions(message({.checkpoint_bytes = -4}), {"at least one kept state", "-4 bytes"});
   expect_mentions(message({.checkpoint_states = 2, .checkpoint_bytes = 100}), {"Set one of them"});
   expect_mentions(message({.checkpoint_bytes = 27}), {"28 bytes", "the budget is 27"});
-  expect_mentions(
-      error_of([] { propagate_adjoints(pushed(100000).loss, {.checkpoint_states = 1}); }),
-      {"100000 steps with room for 1 state ", "larger budget"});
+  expect_error({"100000 steps with room for 1 state ", "larger budget"},
+               [] { propagate_adjoints(pushed(100000).loss, {.checkpoint_states = 1}); });
 }
 
 TEST(Checkpoints, PlacesThatDependOnForgottenValuesAreRefused) {
@@ -499,9 +498,9 @@ TEST(Checkpoints, PlacesThatDependOnForgottenValuesAreRefused) {
   RDom t(0, 4);
   u(x) = start(x);
   u(x) = u(x) * 0.5f + table(clamp(cast<int>(u(x) * 2.0f) + t, 0, 7));
-  expect_mentions(error_of<Unsupported>(
-                      [&] { propagate_adjoints(weighted_sum(u, {5}), {.checkpoint_states = 2}); }),
-                  {"forgets the values", "Leave out the budget"});
+  expect_error<Unsupported>({"forgets the values", "Leave out the budget"}, [&] {
+    propagate_adjoints(weighted_sum(u, {5}), {.checkpoint_states = 2});
+  });
 }
 
 }  // namespace

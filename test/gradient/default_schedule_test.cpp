@@ -12,6 +12,7 @@
 #include "ir/build.h"
 #include "ir/print.h"
 #include "ir/visit.h"
+#include "support/errors.h"
 
 namespace retrograde {
 namespace {
@@ -335,9 +336,7 @@ TEST_F(DefaultSchedule, LossesAreSummedInLanesAndRows) {
 }
 
 bool has_select(const Expr& e) {
-  bool found = false;
-  ir::walk(e, [&](const Expr& node) { return found |= node.kind() == ir::Kind::Select, !found; });
-  return found;
+  return ir::any_node(e, [](const ir::Select&) { return true; });
 }
 
 // Twice as large, the nearest inside: the first element is read four times, the others twice, at
@@ -365,13 +364,8 @@ double reads(const Func& reader, const Func& read) {
   const ir::FuncContents& f = *reader.function();
   const ir::Definition& stage = f.stage(f.stage_count() - 1);
   double total = 0;
-  ir::for_each_expr(stage, [&](const Expr& root) {
-    ir::walk(root, [&](const Expr& e) {
-      const auto* call = e.as<ir::Call>();
-      if (call && call->symbol.raw() == read.function().get())
-        total += ir::reads_an_element(*call, f, stage);
-      return true;
-    });
+  walk(stage, [&](const ir::Call& call) {
+    if (call.symbol.raw() == read.function().get()) total += ir::reads_an_element(call, f, stage);
   });
   return total;
 }
@@ -444,11 +438,9 @@ TEST_F(DefaultSchedule, AScanIsNotComputedAgainForEachElement) {
   total() += squares(all.x, all.y) * squares(all.x, all.y);
   const Derivative d = propagate_adjoints(total);
   EXPECT_TRUE(is_stored(d(a), scan));
-  EXPECT_NE(d.explain(Detail::All)
-                .find("performance \"scan\": unless a directive schedules it, it is "
-                      "computed at root"),
-            std::string::npos)
-      << d.explain(Detail::All);
+  expect_mentions(d.explain(Detail::All),
+                  {"performance \"scan\": unless a directive schedules it, it is "
+                   "computed at root"});
 }
 
 TEST_F(DefaultSchedule, AHandScheduleKeepsSmallReductionsThatAreReadOnceInline) {
@@ -491,9 +483,9 @@ TEST(PrivateParts, AreFewerForLargeTargets) {
     total() += warped(r.x, r.y) * warped(r.x, r.y);
     return propagate_adjoints(total, {.wrt = {image}}).explain(Detail::All);
   };
-  EXPECT_NE(explained(256).find("32 private parts of 524288 bytes each"), std::string::npos);
-  EXPECT_NE(explained(1024).find("8 private parts of 8388608 bytes each, as many as fit 67108864"),
-            std::string::npos);
+  expect_mentions(explained(256), {"32 private parts of 524288 bytes each"});
+  expect_mentions(explained(1024),
+                  {"8 private parts of 8388608 bytes each, as many as fit 67108864"});
 }
 
 // As many as fit is known when the pipeline runs; the bits are those of any number of threads.
@@ -506,8 +498,7 @@ TEST(PrivateParts, OfSizesKnownAtRunTime) {
   total() = 0.0f;
   total() += read(r) * read(r) * cast<float>(r % 7);
   const Derivative d = propagate_adjoints(total, {.wrt = {image}});
-  EXPECT_NE(d.explain(Detail::All).find("at most 32 private parts"), std::string::npos)
-      << d.explain(Detail::All);
+  expect_mentions(d.explain(Detail::All), {"at most 32 private parts"});
   Buffer<float> values(37), expected(37);
   Buffer<int> places(5000);
   for (int i = 0; i < 37; ++i) values(i) = 0.25f * static_cast<float>(i - 18);

@@ -12,26 +12,6 @@ namespace {
 
 Var x("x"), y("y");
 
-template <class Kind, class Action>
-void expect_error(Action action, const std::vector<std::string>& phrases) {
-  try {
-    action();
-  } catch (const Kind& e) {
-    for (const std::string& phrase : phrases) {
-      EXPECT_NE(std::string(e.what()).find(phrase), std::string::npos)
-          << phrase << " is not in: " << e.what();
-    }
-    EXPECT_FALSE(e.message().asked.empty());
-    EXPECT_FALSE(e.message().rule.empty());
-    EXPECT_FALSE(e.message().evidence.empty()) << e.what();
-    EXPECT_FALSE(e.message().instead.empty()) << e.what();
-    return;
-  } catch (const Error& e) {
-    FAIL() << "another kind of error: " << e.what();
-  }
-  FAIL() << "no error";
-}
-
 struct Gradients : ::testing::Test {
   Buffer<float> a{8};
   Func f{"f"}, loss{"loss"};
@@ -47,8 +27,8 @@ TEST_F(Gradients, OverwrittenValueThatAPartialNeeds) {
   f(x) = a(x);
   f(x) = f(x) * f(x);
   sum_up();
-  expect_error<UserError>([&] { propagate_adjoints(loss, strict); },
-                          {"differentiate the update \"f", "Overwritten::Store"});
+  expect_error<UserError>({"differentiate the update \"f", "Overwritten::Store"},
+                          [&] { propagate_adjoints(loss, strict); });
 }
 
 TEST_F(Gradients, ProductInPlace) {
@@ -56,7 +36,7 @@ TEST_F(Gradients, ProductInPlace) {
   f(x) = 1.0f;
   f(x) *= a(r);
   sum_up();
-  expect_error<UserError>([&] { propagate_adjoints(loss, strict); }, {"\"f", "Overwritten::Store"});
+  expect_error<UserError>({"\"f", "Overwritten::Store"}, [&] { propagate_adjoints(loss, strict); });
 }
 
 // rule: a partial derivative may need only values that are still there
@@ -66,7 +46,7 @@ TEST_F(Gradients, ValueOverwrittenByALaterUpdate) {
   f(r) = f(r) + f(r - 1) * f(r - 1);
   f(q) = f(q) * 2.0f;
   sum_up();
-  expect_error<UserError>([&] { propagate_adjoints(loss, strict); }, {"overwrote"});
+  expect_error<UserError>({"overwrote"}, [&] { propagate_adjoints(loss, strict); });
   EXPECT_NO_THROW(propagate_adjoints(loss, {.overwritten = Overwritten::Store}));
 }
 
@@ -75,7 +55,7 @@ TEST_F(Gradients, PlaceThatDependsOnAnOverwrittenValueOfTheFuncItself) {
   RDom r(0, 8);
   f(clamp(cast<int>(f(r)), 0, 7)) += a(r);
   sum_up();
-  expect_error<UserError>([&] { propagate_adjoints(loss, strict); }, {"\"f", "Overwritten::Store"});
+  expect_error<UserError>({"\"f", "Overwritten::Store"}, [&] { propagate_adjoints(loss, strict); });
 }
 
 TEST_F(Gradients, PredicateThatDependsOnTheFuncItself) {
@@ -84,8 +64,8 @@ TEST_F(Gradients, PredicateThatDependsOnTheFuncItself) {
   r.where(f(r) > 1.0f);
   f(r) = a(r) * 2.0f;
   sum_up();
-  expect_error<UserError>([&] { propagate_adjoints(loss); },
-                          {"\"f", "whether an update writes", "select"});
+  expect_error<UserError>({"\"f", "whether an update writes", "select"},
+                          [&] { propagate_adjoints(loss); });
 }
 
 TEST_F(Gradients, UpdateThatReachesElementsWithoutBounds) {
@@ -97,7 +77,7 @@ TEST_F(Gradients, UpdateThatReachesElementsWithoutBounds) {
   RDom q(0, 8);
   loss() = 0.0f;
   loss() += g(q);
-  expect_error<Unsupported>([&] { propagate_adjoints(loss); }, {"\"f", "bounds", "Clamp"});
+  expect_error<Unsupported>({"\"f", "bounds", "Clamp"}, [&] { propagate_adjoints(loss); });
 }
 
 // What others read has bounds: the elements beyond them count where the update reads them.
@@ -113,34 +93,32 @@ TEST_F(Gradients, UpdateThatReadsElementsWithoutBounds) {
       reads(r) = read;
     Func sum("sum");
     sum() = reads(0) + reads(1);
-    expect_error<Unsupported>([&] { propagate_adjoints(sum); }, {"\"reads", "bounds", "Clamp"});
+    expect_error<Unsupported>({"\"reads", "bounds", "Clamp"}, [&] { propagate_adjoints(sum); });
   }
 }
 
 TEST_F(Gradients, IntegerOutput) {
   f(x) = cast<int>(a(x));
-  expect_error<UserError>([&] { propagate_adjoints(f); }, {"\"f", "int32", "float"});
+  expect_error<UserError>({"\"f", "int32", "float"}, [&] { propagate_adjoints(f); });
 }
 
 TEST_F(Gradients, UndefinedOutput) {
-  expect_error<UserError>([&] { propagate_adjoints(f); }, {"\"f", "defined"});
+  expect_error<UserError>({"\"f", "defined"}, [&] { propagate_adjoints(f); });
 }
 
 TEST_F(Gradients, BoundsOfWrongRank) {
   f(x) = a(x);
   Func seed("seed");
   seed(x) = 1.0f;
-  expect_error<UserError>(
-      [&] {
-        propagate_adjoints(f, seed, Region{{0, 8}, {0, 8}});
-      },
-      {"1 dimensions", "2 bounds"});
+  expect_error<UserError>({"1 dimensions", "2 bounds"}, [&] {
+    propagate_adjoints(f, seed, Region{{0, 8}, {0, 8}});
+  });
 }
 
 TEST_F(Gradients, AdjointOfWrongRank) {
   f(x) = a(x);
   Buffer<float> seed(4, 4);
-  expect_error<UserError>([&] { propagate_adjoints(f, seed); }, {"dimensions"});
+  expect_error<UserError>({"dimensions"}, [&] { propagate_adjoints(f, seed); });
 }
 
 TEST_F(Gradients, ZeroGradientsSayWhy) {
@@ -150,9 +128,7 @@ TEST_F(Gradients, ZeroGradientsSayWhy) {
   f(x) = g(x) * 2.0f;
   sum_up();
   Derivative d = propagate_adjoints(loss);
-  EXPECT_NE(d.explain(Detail::All).find("floor has derivative 0"), std::string::npos)
-      << d.explain(Detail::All);
-  EXPECT_NE(d.explain(Detail::All).find("uint8"), std::string::npos) << d.explain(Detail::All);
+  expect_mentions(d.explain(Detail::All), {"floor has derivative 0", "uint8"});
   EXPECT_EQ(Buffer<float>(d(bytes).realize({8}))(3), 0.0f);
   ASSERT_TRUE(d(a).defined()) << "a float that the output reads has a gradient, here zero";
   EXPECT_EQ(d(a).num_update_definitions(), 0);
@@ -166,8 +142,8 @@ TEST(GradientErrors, SizesBeyondThirtyTwoBitsAreRefused) {
   auto expect_refused = [&](const Func& f, const AdjointOptions& options, const char* what) {
     Func loss("loss");
     loss() = f(Expr(0)) * 2.0f;
-    expect_mentions(error_of<Unsupported>([&] { propagate_adjoints(loss, options); }),
-                    {what, "2147483647", "Split its loops"});
+    expect_error<Unsupported>({what, "2147483647", "Split its loops"},
+                              [&] { propagate_adjoints(loss, options); });
   };
   const AdjointOptions store{.overwritten = Overwritten::Store};
   {

@@ -4,6 +4,7 @@
 
 #include "autodiff/tangents.h"
 #include "gradient/gradient_check.h"
+#include "support/errors.h"
 
 namespace retrograde::gradient {
 namespace {
@@ -63,10 +64,8 @@ TEST_F(Invariance, OfSoftmaxShiftedByTheMaximum) {
   expect_cancels(p);
   Buffer<float> zero = propagate_adjoints(loss_of(p))(m).realize({rows});
   for (int j = 0; j < rows; ++j) EXPECT_EQ(zero(j), 0);
-  EXPECT_NE(propagate_adjoints(loss_of(p))
-                .explain(Detail::All)
-                .find("zero \"m\": the output is the same"),
-            std::string::npos);
+  expect_mentions(propagate_adjoints(loss_of(p)).explain(Detail::All),
+                  {"zero \"m\": the output is the same"});
 }
 
 TEST_F(Invariance, OfSoftmaxWithATemperatureAndInAnotherBase) {

@@ -9,6 +9,7 @@
 
 #include "autodiff/derivative.h"
 #include "frontend/language/func.h"
+#include "support/errors.h"
 
 namespace retrograde {
 namespace {
@@ -85,7 +86,7 @@ void check_scatter(int elements, Terms& terms) {
   loss() = 0.0f;
   loss() += table(clamp(place(r % elements), 0, elements - 1)) * all(r);
   Derivative d = propagate_adjoints(loss);
-  EXPECT_NE(d.explain(Detail::All).find("depend"), std::string::npos) << d.explain(Detail::All);
+  expect_mentions(d.explain(Detail::All), {"depend"});
   expect_sums(d(table).realize({elements}), terms);
 }
 
@@ -229,7 +230,7 @@ TEST(CarriedSums, OfStepsThatUseTheirValuesTwiceAreFoundInTime) {
   loss() = 0.0f;
   loss() += f(all);
   Derivative d = propagate_adjoints(loss);
-  EXPECT_NE(d.explain(Detail::All).find("carried"), std::string::npos) << d.explain(Detail::All);
+  expect_mentions(d.explain(Detail::All), {"carried"});
   Buffer<float> found = d(input).realize({n});
   for (int i = 0; i < n; ++i) EXPECT_EQ(found(i), static_cast<float>(n - i)) << i;
 }
@@ -238,8 +239,7 @@ TEST(CarriedSums, ThatAreShortStayInFloat32) {
   Buffer<float> a(100'000);
   EXPECT_EQ(filter_gradient(a, 0.9f, 100'000).explain(Detail::All).find("in double"),
             std::string::npos);
-  EXPECT_NE(filter_gradient(a, 0.99f, 100'000).explain(Detail::All).find("in double"),
-            std::string::npos);
+  expect_mentions(filter_gradient(a, 0.99f, 100'000).explain(Detail::All), {"in double"});
   EXPECT_EQ(filter_gradient(a, 0.99f, 63).explain(Detail::All).find("in double"),
             std::string::npos);
 }
@@ -257,8 +257,7 @@ TEST(LongSums, ShortOnesStayInFloat32) {
   EXPECT_EQ(d.accumulator(d(a)).name(), d(a).name());
   EXPECT_EQ(d.accumulator(d(b)).types()[0], Float(64));
   EXPECT_EQ(d(b).types()[0], Float(32));
-  EXPECT_NE(d.explain(Detail::All).find("adds up in double"), std::string::npos)
-      << d.explain(Detail::All);
+  expect_mentions(d.explain(Detail::All), {"adds up in double"});
 }
 
 // loss = sum of p h(i), computed in 16 bits: the gradient by p and by a sum of three values each

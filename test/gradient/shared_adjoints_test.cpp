@@ -10,6 +10,7 @@
 #include "graph/define.h"
 #include "graph/function.h"
 #include "ir/build.h"
+#include "support/errors.h"
 
 namespace retrograde::gradient {
 namespace {
@@ -49,9 +50,8 @@ TEST(SharedAdjoints, AnInnerAdjointThatSeveralInputsNeedIsKept) {
   ASSERT_TRUE(inner.defined());
   EXPECT_EQ(inner.dimensions(), 2);
   EXPECT_EQ(inner.outputs(), 1) << "that of drive()";
-  EXPECT_NE(d.explain(Detail::All).find("keeps 1 inner adjoint of each iteration, from which 3"),
-            std::string::npos)
-      << d.explain(Detail::All);
+  expect_mentions(d.explain(Detail::All),
+                  {"keeps 1 inner adjoint of each iteration, from which 3"});
   const ir::OperationCount count = d.operations().gradient;
   const ir::FuncOperations* kept = count.find(inner.function().get());
   ASSERT_NE(kept, nullptr);

@@ -205,9 +205,7 @@ TEST_F(TangentsTest, WhatDoesNotMoveIsZeroAndSaysSo) {
   Tangents t = propagate_tangents(f, {{a, v}});
   EXPECT_EQ(evaluate(t(constant), {{0}, {n}}).at({3}).scalar.as_double(), 0);
   EXPECT_EQ(evaluate(t(rounded), {{0}, {n}}).at({3}).scalar.as_double(), 0);
-  EXPECT_NE(t.explain(Detail::All).find("zero \"rounded\": floor has derivative 0"),
-            std::string::npos)
-      << t.explain(Detail::All);
+  expect_mentions(t.explain(Detail::All), {"zero \"rounded\": floor has derivative 0"});
   EXPECT_FALSE(t(elsewhere).defined());
 }
 
@@ -217,37 +215,15 @@ TEST_F(TangentsTest, ErrorsNameWhatIsWrong) {
   integer(x) = cast<int>(a(x));
   wide(x, y) = 1.0f;
   pair(x) = {1.0f, 2.0f};
-  auto message = [](const auto& run) { return error_of<CompileError>(run); };
-  EXPECT_NE(message([&] { propagate_tangents(f, {}); }).find("there is no direction"),
-            std::string::npos);
-  EXPECT_NE(message([&] {
-              propagate_tangents(integer, {{a, v}});
-            }).find("int32"),
-            std::string::npos);
-  EXPECT_NE(message([&] {
-              propagate_tangents(f, {{a, wide}});
-            }).find("\"wide\" has 2"),
-            std::string::npos);
-  EXPECT_NE(message([&] {
-              propagate_tangents(f, {{a, empty}});
-            }).find("no definition"),
-            std::string::npos);
-  EXPECT_NE(message([&] {
-              propagate_tangents(f, {{a, pair}});
-            }).find("\"pair\" has 2"),
-            std::string::npos);
-  EXPECT_NE(message([&] {
-              propagate_tangents(f, {{a, integer}});
-            }).find("has type int32"),
-            std::string::npos);
-  EXPECT_NE(message([&] {
-              propagate_tangents(f, {{a, v}, {a, v}});
-            }).find("there are two"),
-            std::string::npos);
-  EXPECT_NE(message([&] {
-              propagate_tangents(empty, {{a, v}});
-            }).find("no definition"),
-            std::string::npos);
+  auto message = [](const auto& run) { return error_of(run); };
+  expect_mentions(message([&] { propagate_tangents(f, {}); }), {"there is no direction"});
+  expect_mentions(message([&] { propagate_tangents(integer, {{a, v}}); }), {"int32"});
+  expect_mentions(message([&] { propagate_tangents(f, {{a, wide}}); }), {"\"wide\" has 2"});
+  expect_mentions(message([&] { propagate_tangents(f, {{a, empty}}); }), {"no definition"});
+  expect_mentions(message([&] { propagate_tangents(f, {{a, pair}}); }), {"\"pair\" has 2"});
+  expect_mentions(message([&] { propagate_tangents(f, {{a, integer}}); }), {"has type int32"});
+  expect_mentions(message([&] { propagate_tangents(f, {{a, v}, {a, v}}); }), {"there are two"});
+  expect_mentions(message([&] { propagate_tangents(empty, {{a, v}}); }), {"no definition"});
 }
 
 TEST_F(TangentsTest, UndefInsideAnOperationIsRefused) {

@@ -346,15 +346,8 @@ bool is_surely_independent(const For& loop) {
   std::map<std::string, int> stores;
   std::set<std::string> loads;
   walk(
-      loop.body,
-      [&](const Expr& e) {
-        if (const auto* load = e.as<Load>()) loads.insert(load->name);
-        return true;
-      },
-      [&](const Stmt& s) {
-        if (const auto* store = s.as<Store>()) ++stores[store->name];
-        return true;
-      });
+      loop.body, [&](const Load& load) { loads.insert(load.name); },
+      [&](const Store& store) { ++stores[store.name]; });
   return std::all_of(stores.begin(), stores.end(), [&](const auto& entry) {
     return entry.second == 1 && loads.count(entry.first) == 0;
   });

@@ -31,10 +31,8 @@ Scalar random_value(RandomIr& random, Type type, Inputs inputs) {
 
 std::map<std::string, Scalar> random_inputs(RandomIr& random, const Expr& e, Inputs inputs) {
   std::map<std::string, Scalar> values;
-  ir::walk(e, [&](const Expr& node) {
-    if (const auto* var = node.as<ir::Variable>())
-      values[var->name] = random_value(random, var->type, inputs);
-    return true;
+  ir::walk(e, [&](const ir::Variable& var) {
+    values[var.name] = random_value(random, var.type, inputs);
   });
   return values;
 }

@@ -77,9 +77,7 @@ TEST_P(Async, ParallelLoopsRunInBothBranches) {
   limit(out);
   for (int round = 0; round < 20; round++) {
     Buffer<int> result = out.realize({16, 32});
-    for (int j = 0; j < 32; j++) {
-      for (int i = 0; i < 16; i++) ASSERT_EQ(result(i, j), i + j + i * j);
-    }
+    result.for_each_element([&](int i, int j) { ASSERT_EQ(result(i, j), i + j + i * j); });
   }
 }
 
@@ -93,9 +91,7 @@ TEST_P(Async, InsideAParallelLoop) {
   async(f);
   limit(out);
   Buffer<int> result = out.realize({16, 64});
-  for (int j = 0; j < 64; j++) {
-    for (int i = 0; i < 16; i++) ASSERT_EQ(result(i, j), 2 * (i + j) + 1);
-  }
+  result.for_each_element([&](int i, int j) { ASSERT_EQ(result(i, j), 2 * (i + j) + 1); });
 }
 
 struct Stencil {
@@ -109,9 +105,8 @@ struct Stencil {
   }
   void expect(int width, int height) {
     Buffer<int> result = out.realize({width, height});
-    for (int j = 0; j < height; j++) {
-      for (int i = 0; i < width; i++) ASSERT_EQ(result(i, j), 9 * i + 15 * j + 3) << i << " " << j;
-    }
+    result.for_each_element(
+        [&](int i, int j) { ASSERT_EQ(result(i, j), 9 * i + 15 * j + 3) << i << " " << j; });
   }
 };
 
@@ -148,9 +143,7 @@ TEST_P(Async, AChainOfThreeAsyncFuncs) {
   }
   limit(out);
   Buffer<int> result = out.realize({20, 40});
-  for (int j = 0; j < 40; j++) {
-    for (int i = 0; i < 20; i++) ASSERT_EQ(result(i, j), 8 * (i + j));
-  }
+  result.for_each_element([&](int i, int j) { ASSERT_EQ(result(i, j), 8 * (i + j)); });
 }
 
 // The storage of f lies in the loops that both branches keep; only the branch of g needs it.
@@ -166,9 +159,7 @@ TEST_P(Async, StorageThatOnlyTheProducerNeedsIsAllocatedThereAlone) {
   async(g);
   limit(out);
   Buffer<int> result = out.realize({20, 40});
-  for (int j = 0; j < 40; j++) {
-    for (int i = 0; i < 20; i++) ASSERT_EQ(result(i, j), 2 * (i + j + 1));
-  }
+  result.for_each_element([&](int i, int j) { ASSERT_EQ(result(i, j), 2 * (i + j + 1)); });
 }
 
 TEST_P(Async, AnAsyncFuncThatReadsAnotherOfTheSameLoopsInOrder) {
@@ -182,9 +173,7 @@ TEST_P(Async, AnAsyncFuncThatReadsAnotherOfTheSameLoopsInOrder) {
   async(f);
   limit(out);
   Buffer<int> result = out.realize({9, 30});
-  for (int j = 0; j < 30; j++) {
-    for (int i = 0; i < 9; i++) ASSERT_EQ(result(i, j), 2 + 6 * i + 6 * j + 6);
-  }
+  result.for_each_element([&](int i, int j) { ASSERT_EQ(result(i, j), 2 + 6 * i + 6 * j + 6); });
 }
 
 // ---- what both branches read ----
@@ -204,9 +193,8 @@ struct SharedInput {
   void expect() {
     for (int height : {1, 2, 33}) {
       Buffer<int> result = out.realize({17, height});
-      for (int j = 0; j < height; j++) {
-        for (int i = 0; i < 17; i++) ASSERT_EQ(result(i, j), shared_value(i, j)) << i << " " << j;
-      }
+      result.for_each_element(
+          [&](int i, int j) { ASSERT_EQ(result(i, j), shared_value(i, j)) << i << " " << j; });
     }
   }
 };
@@ -288,9 +276,8 @@ TEST_P(Async, ThreeBranchesReadAFoldedAsyncFunc) {
   limit(out);
   for (int round = 0; round < 5; round++) {
     Buffer<int> result = out.realize({19, 60});
-    for (int j = 0; j < 60; j++) {
-      for (int i = 0; i < 19; i++) ASSERT_EQ(result(i, j), 8 * (i + j) + 2) << i << " " << j;
-    }
+    result.for_each_element(
+        [&](int i, int j) { ASSERT_EQ(result(i, j), 8 * (i + j) + 2) << i << " " << j; });
   }
 }
 
@@ -330,8 +317,10 @@ TEST(AsyncErrors, LoopsOfAMemoizedFunc) {
   out(x, y) = g(x, y) + 1;
   f.store_root().compute_at(g, y).async();
   g.compute_root().memoize();
-  expect_mentions(error_of<Unsupported>([&] { out.realize({8, 8}); }),
-                  {"\"f\" async", "always run", "\"g\", which is memoized", "Store"});
+  expect_error<Unsupported>({"\"f\" async", "always run", "\"g\", which is memoized", "Store"},
+                            [&] {
+                              out.realize({8, 8});
+                            });
   f.store_at(g, y);
   for (int round = 0; round < 2; ++round) {
     Buffer<int> result = out.realize({8, 8});
@@ -354,9 +343,8 @@ TEST_P(Async, StorageMayBeHoisted) {
     f.hoist_storage_root().async();
     limit(out);
     Buffer<int> result = out.realize({13, 23});
-    for (int j = 0; j < 23; j++) {
-      for (int i = 0; i < 13; i++) ASSERT_EQ(result(i, j), 2 * i + 4 * j + 2) << i << " " << j;
-    }
+    result.for_each_element(
+        [&](int i, int j) { ASSERT_EQ(result(i, j), 2 * i + 4 * j + 2) << i << " " << j; });
   }
 }
 
@@ -376,9 +364,8 @@ TEST(AsyncErrors, AFuncThatBothBranchesReadAndThatIsStoredFurtherOut) {
     FAIL() << "nothing was thrown";
   } catch (const UserError& error) {
     const std::string message = error.what();
-    EXPECT_NE(message.find("compute \"g\" async"), std::string::npos) << message;
-    EXPECT_NE(message.find("\"f\" is computed in these loops and stored around"), std::string::npos)
-        << message;
+    expect_mentions(message,
+                    {"compute \"g\" async", "\"f\" is computed in these loops and stored around"});
   }
 }
 
@@ -389,11 +376,11 @@ TEST(AsyncErrors, LoopsBetweenStorageAndComputationThatAreNotSerial) {
   out(x, y) = f(x, y) + f(x, y + 1);
   out.split(y, yo, yi, 4).unroll(yi);
   f.store_at(out, yo).compute_at(out, yi).async();
-  expect_mentions(error_of<Unsupported>([&] {
-                    out.realize({8, 16});
-                  }),
-                  {"compute \"f", "async", "are serial", "the loop \"yi\" of \"out", "is not",
-                   "Store the Func inside of that loop"});
+  expect_error<Unsupported>({"compute \"f", "async", "are serial", "the loop \"yi\" of \"out",
+                             "is not", "Store the Func inside of that loop"},
+                            [&] {
+                              out.realize({8, 16});
+                            });
 }
 
 // ---- failures ----
@@ -434,13 +421,7 @@ TEST_P(Async, AnErrorOfTheProducerReleasesTheConsumer) {
     async(f);
     limit(out);
     bad.set(17);
-    try {
-      out.realize({8, 40});
-      FAIL() << "no error";
-    } catch (const RuntimeError& error) {
-      EXPECT_NE(std::string(error.what()).find("row 17 is broken"), std::string::npos)
-          << error.what();
-    }
+    expect_error<RuntimeError>({"row 17 is broken"}, [&] { out.realize({8, 40}); });
   }
 }
 
@@ -456,12 +437,7 @@ TEST_P(Async, AnErrorOfTheConsumerReleasesTheProducer) {
   f.function()->schedule.storage_rules.push_back(rule);
   async(f);
   limit(out);
-  try {
-    out.realize({8, 400});
-    FAIL() << "no error";
-  } catch (const RuntimeError& error) {
-    EXPECT_NE(std::string(error.what()).find("too large"), std::string::npos) << error.what();
-  }
+  expect_error<RuntimeError>({"too large"}, [&] { out.realize({8, 400}); });
 }
 
 }  // namespace

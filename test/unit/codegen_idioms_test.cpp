@@ -13,6 +13,7 @@
 #include "codegen/codegen.h"
 #include "ir/build.h"
 #include "lower/lower.h"
+#include "support/errors.h"
 
 namespace retrograde {
 namespace {
@@ -83,7 +84,7 @@ TEST(CodegenIdioms, MathOfConstantsCallsNothing) {
   f.body = stores(Expr(0.3f));
   EXPECT_EQ(codegen::compile_assembly(f, options).find("Sleef"), std::string::npos);
   f.body = stores(ir::make_load(type, "out", Expr(0)));
-  EXPECT_NE(codegen::compile_assembly(f, options).find("Sleef"), std::string::npos);
+  expect_mentions(codegen::compile_assembly(f, options), {"Sleef"});
 }
 
 TEST(CodegenIdioms, FusedChannelsOfAnInterleavedImageAreDense) {

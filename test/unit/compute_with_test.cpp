@@ -8,6 +8,7 @@
 #include "ir/visit.h"
 #include "lower/lower.h"
 #include "retrograde/retrograde.h"
+#include "support/errors.h"
 
 namespace retrograde {
 namespace {
@@ -22,9 +23,8 @@ class ComputeWith : public testing::Test {
   // `make(true)` computes together what `make(false)` computes apart.
   static void expect_same(const std::function<Func(bool)>& make, int w = width, int h = height) {
     Buffer<int> apart = make(false).realize({w, h}), together = make(true).realize({w, h});
-    for (int j = 0; j < h; ++j) {
-      for (int i = 0; i < w; ++i) ASSERT_EQ(together(i, j), apart(i, j)) << "at " << i << ", " << j;
-    }
+    together.for_each_element(
+        [&](int i, int j) { ASSERT_EQ(together(i, j), apart(i, j)) << i << " " << j; });
   }
 
   // Names as in the test, without what makes them unique.
@@ -82,29 +82,25 @@ TEST_F(ComputeWith, ChainsShareEachWhatTheySay) {
   out.split(y, yo, yi, 4);
   g.compute_with(f, y);
   h.compute_with(g, x);
-  EXPECT_NE(nest_of(out).find(R"(
+  expect_mentions(nest_of(out), {R"(
           for y:
             for x:
               f(...) = ...
             for x:
               g(...) = ...
               h(...) = ...
-)"),
-            std::string::npos)
-      << nest_of(out);
+)"});
   // What g does not share with f it cannot hand on.
   g.compute_with(f, x);
   h.compute_with(g, y);
-  EXPECT_NE(nest_of(out).find(R"(
+  expect_mentions(nest_of(out), {R"(
           for y:
             for x:
               f(...) = ...
               g(...) = ...
             for x:
               h(...) = ...
-)"),
-            std::string::npos)
-      << nest_of(out);
+)"});
 }
 
 TEST_F(ComputeWith, UpdatesRunTogetherInTheOrderOfTheirFuncs) {
@@ -359,8 +355,7 @@ TEST_F(ComputeWith, OutputsShareLoops) {
   Pipeline pipeline({f, k});
   Buffer<int> a(9, 7), b(4, 12);
   pipeline.realize({a, b});
-  for (int j = 0; j < 7; ++j)
-    for (int i = 0; i < 9; ++i) ASSERT_EQ(a(i, j), i + j);
+  a.for_each_element([&](int i, int j) { ASSERT_EQ(a(i, j), i + j); });
   for (int j = 0; j < 12; ++j)
     for (int i = 0; i < 4; ++i) ASSERT_EQ(b(i, j), i * j);
 }
@@ -374,12 +369,9 @@ TEST_F(ComputeWith, TheLevelMayBeSetLater) {
   f.compute_root();
   g.compute_root().compute_with(level);
   level.set(LoopLevel(f, x));
-  EXPECT_NE(nest_of(h).find("      for x:\n        f(...) = ...\n        g(...)"),
-            std::string::npos)
-      << nest_of(h);
+  expect_mentions(nest_of(h), {"      for x:\n        f(...) = ...\n        g(...)"});
   level.set(LoopLevel(f, y));
-  EXPECT_NE(nest_of(h).find("      for x:\n        f(...) = ...\n      for x:"), std::string::npos)
-      << nest_of(h);
+  expect_mentions(nest_of(h), {"      for x:\n        f(...) = ...\n      for x:"});
 }
 
 TEST_F(ComputeWith, TheFirstStageMayBeSpecialized) {

@@ -13,6 +13,7 @@
 
 #include "diagnostics/error.h"
 #include "frontend/run/compile_cache.h"
+#include "support/errors.h"
 #include "support/temporary_folder.h"
 #include "unit/codegen_testing.h"
 
@@ -234,8 +235,7 @@ void expect_refused(const std::string& path, const std::string& why) {
     set_compile_cache_directory(path);
     FAIL() << "was accepted";
   } catch (const CompileError& e) {
-    EXPECT_NE(std::string(e.what()).find("belongs to the user alone"), std::string::npos);
-    EXPECT_NE(std::string(e.what()).find(why), std::string::npos) << e.what();
+    expect_mentions(e.what(), {"belongs to the user alone", why});
   }
 }
 
@@ -323,12 +323,8 @@ TEST_F(DiskCache, WhatAWriterLeftHalfDoneIsRemovedInTime) {
 
 TEST_F(DiskCache, ItsSizeIsPositive) {
   for (const int64_t bytes : {int64_t{0}, int64_t{-5}}) {
-    try {
-      set_compile_cache_directory(folder(), bytes);
-      FAIL() << "nothing was thrown";
-    } catch (const UserError& error) {
-      EXPECT_NE(std::string(error.what()).find("its size in bytes is positive"), std::string::npos);
-    }
+    expect_error<UserError>({"its size in bytes is positive"},
+                            [&] { set_compile_cache_directory(folder(), bytes); });
   }
 }
 

@@ -4,6 +4,7 @@
 #include <retrograde/retrograde.h>
 
 #include <cstring>
+#include "support/errors.h"
 
 using namespace retrograde;
 
@@ -216,19 +217,9 @@ TEST_F(Calls, MissingInputsAreNamed) {
   Param<int> k("missing_k");
   Func f;
   f(x) = in(x) + k;
-  try {
-    f.realize({3});
-    FAIL() << "no error";
-  } catch (const RuntimeError& error) {
-    EXPECT_NE(std::string(error.what()).find("missing_in"), std::string::npos);
-  }
+  expect_error<RuntimeError>({"missing_in"}, [&] { f.realize({3}); });
   in.set(Buffer<float>(10));
-  try {
-    f.realize({3});
-    FAIL() << "no error";
-  } catch (const RuntimeError& error) {
-    EXPECT_NE(std::string(error.what()).find("missing_k"), std::string::npos);
-  }
+  expect_error<RuntimeError>({"missing_k"}, [&] { f.realize({3}); });
 }
 
 TEST_F(Calls, LimitsOfParametersAreChecked) {

@@ -274,10 +274,7 @@ TEST(Definitions, AnUpdateTakenOutOfItsFuncKeepsTheFuncAlive) {
     value = f.update_value();
   }
   bool alive = true;
-  ir::walk(value, [&](const Expr& e) {
-    if (const ir::Call* call = e.as<ir::Call>()) alive = alive && call->symbol.lock() != nullptr;
-    return true;
-  });
+  ir::walk(value, [&](const ir::Call& call) { alive = alive && call.symbol.lock() != nullptr; });
   EXPECT_TRUE(alive);
 }
 

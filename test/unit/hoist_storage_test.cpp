@@ -16,10 +16,8 @@ class HoistStorage : public testing::Test {
 
   static void expect_values(Func f, int (*value)(int, int)) {
     Buffer<int> found = f.realize({width, height});
-    for (int j = 0; j < height; ++j) {
-      for (int i = 0; i < width; ++i)
-        ASSERT_EQ(found(i, j), value(i, j)) << "at " << i << ", " << j;
-    }
+    found.for_each_element(
+        [&](int i, int j) { ASSERT_EQ(found(i, j), value(i, j)) << i << " " << j; });
   }
 
   // Loops around the only allocation, and its elements when constant.

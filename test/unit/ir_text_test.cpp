@@ -6,6 +6,7 @@
 #include "ir/equal.h"
 #include "ir/parse.h"
 #include "ir/print.h"
+#include "support/errors.h"
 #include "support/random_ir.h"
 
 namespace retrograde {
@@ -136,28 +137,23 @@ TEST(IrText, AStatementReadsAsItWasWritten) {
   EXPECT_EQ(print(parse_stmt(text)), text);
 }
 
-void expect_error(const std::string& text, const std::string& place) {
-  try {
-    parse_stmt(text);
-    FAIL() << "no error for: " << text;
-  } catch (const UserError& error) {
-    EXPECT_NE(std::string(error.what()).find(place), std::string::npos) << error.what();
-  }
+void expect_syntax_error(const std::string& text, const std::string& place) {
+  expect_error<UserError>({place}, [&] { parse_stmt(text); });
 }
 
 TEST(IrText, ErrorsSayWhere) {
-  expect_error("evaluate (x + 1", "line 1, column 16");
-  expect_error("free a\nfor (x, 0) {}", "line 2, column 10");
-  expect_error("evaluate x + 1f", "line 1, column 12");
-  expect_error("evaluate 300_u8", "fits its type");
-  expect_error("evaluate floor(1f, 2f)", "line 1, column 10");
-  expect_error("evaluate \"abc", "closing quote");
-  expect_error("evaluate `abc", "closing back quote");
-  expect_error("a[1] = ~", "line 1, column 8");
-  expect_error("evaluate #3", "shared node");
-  expect_error("}", "a statement");
+  expect_syntax_error("evaluate (x + 1", "line 1, column 16");
+  expect_syntax_error("free a\nfor (x, 0) {}", "line 2, column 10");
+  expect_syntax_error("evaluate x + 1f", "line 1, column 12");
+  expect_syntax_error("evaluate 300_u8", "fits its type");
+  expect_syntax_error("evaluate floor(1f, 2f)", "line 1, column 10");
+  expect_syntax_error("evaluate \"abc", "closing quote");
+  expect_syntax_error("evaluate `abc", "closing back quote");
+  expect_syntax_error("a[1] = ~", "line 1, column 8");
+  expect_syntax_error("evaluate #3", "shared node");
+  expect_syntax_error("}", "a statement");
   run_on_large_stack(
-      [] { expect_error("evaluate " + std::string(100000, '('), "nests less deeply"); });
+      [] { expect_syntax_error("evaluate " + std::string(100000, '('), "nests less deeply"); });
 }
 
 }  // namespace

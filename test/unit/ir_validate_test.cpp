@@ -6,6 +6,7 @@
 #include "ir/build.h"
 #include "ir/parse.h"
 #include "ir/print.h"
+#include "support/errors.h"
 
 namespace retrograde {
 namespace {
@@ -22,7 +23,7 @@ void expect_broken(const Stmt& s, Phase phase, const std::string& rule) {
     FAIL() << "the validator accepts: " << rule;
   } catch (const InternalError& error) {
     EXPECT_EQ(error.pass(), "some_pass");
-    EXPECT_NE(std::string(error.what()).find(rule), std::string::npos) << error.what();
+    expect_mentions(error.what(), {rule});
     EXPECT_EQ(error.ir_before(), print(before));
   }
 }

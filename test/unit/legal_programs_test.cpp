@@ -90,7 +90,7 @@ TEST(RealizedSizes, KeepTheStridesThatWerePromised) {
 TEST(RealizedSizes, SmallerPromisesAreRefused) {
   Func f = twice();
   f.output_buffer().dim(0).set_bounds(0, 8);
-  expect_mentions(error_of<RuntimeError>([&] { f.realize({10}); }), {"promised to be 8", "it is 10"});
+  expect_error<RuntimeError>({"promised to be 8", "it is 10"}, [&] { f.realize({10}); });
 }
 
 // ---- updates whose iterations never touch the same element ----
@@ -217,7 +217,7 @@ TEST(BoundedLoops, AreUnrolledUnderTheirBound) {
   g(x) += x * r;
   g.update().unroll(r);
   n.set(3);
-  expect_mentions(error_of<CompileError>([&] { g.realize({5}); }), {"constant above it"});
+  expect_error({"constant above it"}, [&] { g.realize({5}); });
 }
 
 // ---- stages that share the outermost loop only ----

@@ -15,10 +15,9 @@ constexpr int width = 37, height = 29;
 class LoopSchedules : public testing::Test {
  protected:
   LoopSchedules() : input(width, height) {
-    for (int j = 0; j < height; ++j) {
-      for (int i = 0; i < width; ++i)
-        input(i, j) = static_cast<float>((i * 37 + j * 11) % 53) * 0.25f - 3;
-    }
+    input.for_each_element([&](int i, int j) {
+      input(i, j) = static_cast<float>((i * 37 + j * 11) % 53) * 0.25f - 3;
+    });
   }
 
   Func edge() { return BoundaryConditions::repeat_edge(input); }
@@ -27,9 +26,8 @@ class LoopSchedules : public testing::Test {
   template <class T>
   static void expect_same(const std::function<Func(bool)>& make, int w = width, int h = height) {
     Buffer<T> expected = make(false).realize({w, h}), found = make(true).realize({w, h});
-    for (int j = 0; j < h; ++j) {
-      for (int i = 0; i < w; ++i) ASSERT_EQ(expected(i, j), found(i, j)) << "at " << i << ", " << j;
-    }
+    expected.for_each_element(
+        [&](int i, int j) { ASSERT_EQ(expected(i, j), found(i, j)) << i << " " << j; });
   }
 
   Buffer<float> input;

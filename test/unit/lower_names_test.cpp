@@ -5,6 +5,7 @@
 #include "ir/print.h"
 #include "lower/nests/make_names_unique.h"
 #include "retrograde/retrograde.h"
+#include "support/errors.h"
 
 namespace retrograde {
 namespace {
@@ -17,11 +18,8 @@ TEST(MakeNamesUnique, RenamesAllButTheFirstBinding) {
       "}");
   ir::UniqueNames unique = ir::make_names_unique(s);
   std::string text = ir::print(unique.stmt);
-  EXPECT_NE(text.find("for (x.$1, 0, 4)"), std::string::npos) << text;
-  EXPECT_NE(text.find("f(x.$1) = {x.$1}"), std::string::npos) << text;
-  EXPECT_NE(text.find("f.$1(1) = {3}"), std::string::npos) << text;
-  EXPECT_NE(text.find("out(0) = {f.$1(1)"), std::string::npos) << text;
-  EXPECT_NE(text.find("out(1) = {f(2)"), std::string::npos) << text;
+  expect_mentions(text, {"for (x.$1, 0, 4)", "f(x.$1) = {x.$1}", "f.$1(1) = {3}",
+                         "out(0) = {f.$1(1)", "out(1) = {f(2)"});
   ASSERT_EQ(unique.original.size(), 1u);
   EXPECT_EQ(unique.original.at("f.$1"), "f");
 }

@@ -4,6 +4,7 @@
 #include "frontend/include/retrograde/retrograde.h"
 #include "ir/print.h"
 #include "lower/lower.h"
+#include "support/errors.h"
 
 namespace retrograde {
 namespace {
@@ -28,15 +29,11 @@ struct Blur {
   Blur() { out(x, y) = in(x, y) + in(x + 1, y + 1); }
   void expect_right() {
     Buffer<float> data(65, 33);
-    for (int j = 0; j < 33; j++) {
-      for (int i = 0; i < 65; i++) data(i, j) = static_cast<float>(i + 100 * j);
-    }
+    data.for_each_element([&](int i, int j) { data(i, j) = static_cast<float>(i + 100 * j); });
     in.set(data);
     Buffer<float> result = out.realize({64, 32});
-    for (int j = 0; j < 32; j++) {
-      for (int i = 0; i < 64; i++)
-        ASSERT_EQ(result(i, j), static_cast<float>(2 * i + 200 * j + 101));
-    }
+    result.for_each_element(
+        [&](int i, int j) { ASSERT_EQ(result(i, j), static_cast<float>(2 * i + 200 * j + 101)); });
   }
 };
 
@@ -47,7 +44,7 @@ TEST(Prefetch, TheBoxOfALaterIterationIsAskedFor) {
   const size_t at = text.find("prefetch in");
   ASSERT_NE(at, std::string::npos) << text;
   const std::string line = text.substr(at, text.find('\n', at) - at);
-  EXPECT_NE(line.find(".s0.y + 2), 2]"), std::string::npos) << line;
+  expect_mentions(line, {".s0.y + 2), 2]"});
   blur.expect_right();
 }
 
@@ -75,7 +72,7 @@ TEST(Prefetch, OneRequestForEachCacheLine) {
   Blur blur;
   blur.out.prefetch(blur.in, blur.y, blur.y, 1, PrefetchBoundStrategy::NonFaulting);
   const std::string text = lowered(blur.out, "lower_prefetches");
-  EXPECT_NE(text.find("prefetch<int32>(address_of"), std::string::npos) << text;
+  expect_mentions(text, {"prefetch<int32>(address_of"});
   EXPECT_NE(text.find("* 16"), std::string::npos) << "16 floats a line:\n" << text;
 }
 
@@ -87,11 +84,9 @@ TEST(Prefetch, AFuncAndInsideOfATile) {
   f.compute_root();
   out.tile(x, y, xo, yo, xi, yi, 16, 8).parallel(yo);
   out.prefetch(f, xo, yo, 1);
-  EXPECT_NE(lowered(out, "insert_prefetches").find("prefetch f"), std::string::npos);
+  expect_mentions(lowered(out, "insert_prefetches"), {"prefetch f"});
   Buffer<int> result = out.realize({100, 50});
-  for (int j = 0; j < 50; j++) {
-    for (int i = 0; i < 100; i++) ASSERT_EQ(result(i, j), 2 * i + j);
-  }
+  result.for_each_element([&](int i, int j) { ASSERT_EQ(result(i, j), 2 * i + j); });
 }
 
 }  // namespace

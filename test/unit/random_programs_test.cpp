@@ -38,17 +38,12 @@ Counts counts_of(const RandomProgram& program) {
     ++counts["Func " + name];
     counts["update"] += f->stage_count() - 1;
     counts["Tuple"] += f->stage(0).values.size() > 1;
-    for (int s = 0; s < f->stage_count(); ++s) {
-      counts["where"] += f->stage(s).predicate.defined();
-      ir::for_each_expr(f->stage(s), [&](const Expr& root) {
-        ir::walk(root, [&](const Expr& e) {
-          const auto* call = e.as<ir::Call>();
-          const bool is_op = call && call->call_type == ir::CallType::Operator;
-          ++counts[is_op ? ir::op_info(call->op).name : ir::kind_name(e.kind())];
-          return true;
-        });
-      });
-    }
+    for (int s = 0; s < f->stage_count(); ++s) counts["where"] += f->stage(s).predicate.defined();
+    walk(*f, [&](const Expr& e) {
+      const auto* call = e.as<ir::Call>();
+      const bool is_op = call && call->call_type == ir::CallType::Operator;
+      return ++counts[is_op ? ir::op_info(call->op).name : ir::kind_name(e.kind())], true;
+    });
   }
   return counts;
 }

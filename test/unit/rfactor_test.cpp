@@ -14,9 +14,8 @@ namespace {
 class Rfactor : public testing::Test {
  protected:
   Rfactor() : input(width, height) {
-    for (int j = 0; j < height; ++j) {
-      for (int i = 0; i < width; ++i) input(i, j) = (i * 37 + j * 11 + i * i * j) % 101;
-    }
+    input.for_each_element(
+        [&](int i, int j) { input(i, j) = (i * 37 + j * 11 + i * i * j) % 101; });
   }
 
   // The program with and without its schedule: interpreted, compiled, all equal.
@@ -254,7 +253,7 @@ TEST_F(Rfactor, NoncommutingMapsOverOuterLoops) {
     };
   };
   expect_same(make(true), {6});
-  expect_mentions(error_of([&] { make(false)(true); }), {"change the order", "outermost"});
+  expect_error({"change the order", "outermost"}, [&] { make(false)(true); });
 }
 
 TEST_F(Rfactor, FusedVariables) {
@@ -304,11 +303,11 @@ TEST_F(Rfactor, RefusesWhatIsNoReduction) {
   Func f("f");
   RDom r(0, 8, 0, 8);
   f(x) = 0;
-  expect_mentions(error_of([&] { Stage(f.function(), 0).rfactor(r.x, u); }),
-                  {"update that reduces", "first definition"});
+  expect_error({"update that reduces", "first definition"},
+               [&] { Stage(f.function(), 0).rfactor(r.x, u); });
   f(x) = f(x) * 2 + r.x + r.y;
-  expect_mentions(error_of([&] { f.update().rfactor(r.x, u); }),
-                  {"associative update", "form x = ", "keep its loops"});
+  expect_error({"associative update", "form x = ", "keep its loops"},
+               [&] { f.update().rfactor(r.x, u); });
 }
 
 TEST_F(Rfactor, RefusesReadsOfOtherElements) {
@@ -316,8 +315,8 @@ TEST_F(Rfactor, RefusesReadsOfOtherElements) {
   RDom r(1, 8, 0, 8);
   f(x) = x;
   f(r.x) += f(r.x - 1);
-  expect_mentions(error_of([&] { f.update().rfactor(r.x, u); }),
-                  {"it reads f", "not the element that it writes"});
+  expect_error({"it reads f", "not the element that it writes"},
+               [&] { f.update().rfactor(r.x, u); });
 }
 
 // rule: the new variables differ from each other and from the Func's
@@ -327,10 +326,10 @@ TEST_F(Rfactor, RefusesWrongNames) {
   f(x) = 0;
   f(x) += r.x * r.y;
   Stage update = f.update();
-  expect_mentions(error_of([&] { update.rfactor(RVar("nowhere"), u); }), {"must be a loop"});
-  expect_mentions(error_of([&] { update.rfactor({{r.x, u}, {r.x, v}}); }), {"named twice"});
-  expect_mentions(error_of([&] { update.rfactor({{r.x, u}, {r.y, u}}); }), {"there already"});
-  expect_mentions(error_of([&] { update.rfactor(r.x, x); }), {"\"x\""});
+  expect_error({"must be a loop"}, [&] { update.rfactor(RVar("nowhere"), u); });
+  expect_error({"named twice"}, [&] { update.rfactor({{r.x, u}, {r.x, v}}); });
+  expect_error({"there already"}, [&] { update.rfactor({{r.x, u}, {r.y, u}}); });
+  expect_error({"\"x\""}, [&] { update.rfactor(r.x, x); });
 }
 
 TEST_F(Rfactor, RefusesSpecializedStages) {
@@ -340,8 +339,7 @@ TEST_F(Rfactor, RefusesSpecializedStages) {
   f(x) = 0;
   f(x) += r.x * r.y;
   f.update().specialize(p);
-  expect_mentions(error_of([&] { f.update().rfactor(r.x, u); }),
-                  {"specialized", "before specialize"});
+  expect_error({"specialized", "before specialize"}, [&] { f.update().rfactor(r.x, u); });
 }
 
 }  // namespace

@@ -362,13 +362,7 @@ TEST(Cse, NamesInArmsAreBoundOnceThoughBothArmsHaveThem) {
       parse_expr("if_then_else<int32>(y < 3, if_then_else<int32>(x < 3, (y/x)*(y/x), 1) + 1, "
                  "if_then_else<int32>(x < 3, (y/x)*(y/x), 1) + 2)"));
   std::set<std::string> names;
-  walk(e, [&](const Expr& node) {
-    const auto* let = node.as<Let>();
-    if (let) {
-      EXPECT_TRUE(names.insert(let->name).second) << let->name;
-    }
-    return true;
-  });
+  walk(e, [&](const Let& let) { EXPECT_TRUE(names.insert(let.name).second) << let.name; });
   EXPECT_EQ(names.size(), 2U);
 }
 

@@ -11,6 +11,7 @@
 #include "ir/visit.h"
 #include "lower/lower.h"
 #include "retrograde/retrograde.h"
+#include "support/errors.h"
 
 namespace retrograde {
 namespace {
@@ -59,9 +60,8 @@ class SlidingWindow : public testing::Test {
     scheduled.set_custom_print(count_line);
     computed.clear();
     Buffer<int> found = scheduled.realize({w, h});
-    for (int j = 0; j < h; ++j) {
-      for (int i = 0; i < w; ++i) EXPECT_EQ(expected(i, j), found(i, j)) << "at " << i << ", " << j;
-    }
+    expected.for_each_element(
+        [&](int i, int j) { EXPECT_EQ(expected(i, j), found(i, j)) << i << " " << j; });
     return scheduled;
   }
 
@@ -354,19 +354,13 @@ class StorageDirectives : public SlidingWindow {
 
   static void expect_values(Func g) {
     Buffer<int> found = g.realize({width, height});
-    for (int j = 0; j < height; ++j) {
-      for (int i = 0; i < width; ++i)
-        ASSERT_EQ(found(i, j), i * 9 + (j - 1) * (j - 1) + 2 * (j + 1) * (j + 1));
-    }
+    found.for_each_element([&](int i, int j) {
+      ASSERT_EQ(found(i, j), i * 9 + (j - 1) * (j - 1) + 2 * (j + 1) * (j + 1));
+    });
   }
 
-  static void expect_error(Func g, const std::string& phrase) {
-    try {
-      g.realize({width, height});
-      FAIL() << "nothing was thrown";
-    } catch (const Error& e) {
-      EXPECT_NE(std::string(e.what()).find(phrase), std::string::npos) << e.what();
-    }
+  static void expect_refused(Func g, const std::string& phrase) {
+    expect_error<Error>({phrase}, [&] { g.realize({width, height}); });
   }
 };
 
@@ -377,27 +371,28 @@ TEST_F(StorageDirectives, FoldsAsAsked) {
 }
 
 TEST_F(StorageDirectives, AFoldThatIsTooSmallIsReported) {
-  expect_error(rows([&](Func& f, Func& g) { f.store_root().compute_at(g, y).fold_storage(y, 2); }),
-               "cannot fold the storage");
+  expect_refused(
+      rows([&](Func& f, Func& g) { f.store_root().compute_at(g, y).fold_storage(y, 2); }),
+      "cannot fold the storage");
 }
 
 TEST_F(StorageDirectives, AFoldThatNoLoopCarriesMustHoldAll) {
   expect_values(rows([&](Func& f, Func& g) { f.compute_at(g, y).fold_storage(y, 4); }));
-  expect_error(rows([&](Func& f, Func&) { f.compute_root().fold_storage(y, 4); }),
-               "cannot fold the storage");
+  expect_refused(rows([&](Func& f, Func&) { f.compute_root().fold_storage(y, 4); }),
+                 "cannot fold the storage");
 }
 
 // rule: storage that the compiler lays out can be folded or bounded
 TEST_F(StorageDirectives, OutputsAreNotFolded) {
-  expect_error(rows([&](Func&, Func& g) { g.fold_storage(y, 4); }), "is an output");
+  expect_refused(rows([&](Func&, Func& g) { g.fold_storage(y, 4); }), "is an output");
 }
 
 TEST_F(StorageDirectives, BoundsTheStorage) {
   Func g = rows([&](Func& f, Func&) { f.compute_root().bound_storage(y, height + 10); });
   EXPECT_EQ(stored_elements(g, "f"), width * (height + 10));
   expect_values(g);
-  expect_error(rows([&](Func& f, Func&) { f.compute_root().bound_storage(y, height); }),
-               "bounded to");
+  expect_refused(rows([&](Func& f, Func&) { f.compute_root().bound_storage(y, height); }),
+                 "bounded to");
 }
 
 TEST_F(StorageDirectives, AlignsTheStorage) {

@@ -17,10 +17,8 @@ constexpr int width = 45, height = 6;
 template <typename T>
 Buffer<T> numbers(int w = width, int h = height) {
   Buffer<T> result(w, h);
-  for (int y = 0; y < h; ++y) {
-    for (int x = 0; x < w; ++x)
-      result(x, y) = static_cast<T>((x * 37 + y * 11 + x * x * y) % 23 - 4);
-  }
+  result.for_each_element(
+      [&](int x, int y) { result(x, y) = static_cast<T>((x * 37 + y * 11 + x * x * y) % 23 - 4); });
   return result;
 }
 

@@ -427,7 +427,10 @@ class Buffer {
     if (runtime().type() != source.runtime().type() || dimensions() != source.dimensions()) {
       user_error(
           text("copy ", retrograde::quoted(source.name()), " into ", retrograde::quoted(name())),
-          "both Buffers have one type and as many dimensions");
+          "both Buffers have one type and as many dimensions",
+          text("they have ", source.dimensions(), " dimensions of ", to_string(source.type()),
+               " and ", dimensions(), " of ", to_string(type())),
+          "Copy into a Buffer of the same type and dimensions");
     }
     get()->copy_from(*source.get());
   }

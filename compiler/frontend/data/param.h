@@ -139,7 +139,8 @@ class Param {
       if (other == type_of<T>()) return;
       user_error("use the Param " + retrograde::quoted(name()) + " as a Param of " +
                      to_string(type_of<T>()),
-                 "the types must agree", "it is of type " + to_string(other));
+                 "the types must agree", "it is of type " + to_string(other),
+                 "Use it as what it is");
     }
   }
   std::shared_ptr<ir::ParameterContents> parameter_;

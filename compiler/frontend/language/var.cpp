@@ -23,8 +23,8 @@ bool is_identifier(const std::string& name) {
 const std::string& checked_name(const std::string& name) {
   if (!is_identifier(name)) {
     user_error("make a Var named " + quoted(name),
-               "the name of a Var is an identifier: letters, digits, _ and $", "",
-               "Choose a name such as \"x\" or \"x_outer\"");
+               "the name of a Var is an identifier: letters, digits, _ and $",
+               quoted(name) + " is none", "Choose a name such as \"x\" or \"x_outer\"");
   }
   return name;  // NOLINT(bugprone-return-const-ref-from-parameter): used within the full expression
 }
@@ -108,11 +108,8 @@ int implicit_count(const std::vector<Expr>& values) {
   int count = 0;
   for (const Expr& value : values) {
     if (!value.defined()) continue;
-    walk(value, [&](const Expr& e) {
-      if (const Variable* v = e.as<Variable>())
-        count = std::max(count, Var::implicit_index(v->name) + 1);
-      return true;
-    });
+    walk(value,
+         [&](const Variable& v) { count = std::max(count, Var::implicit_index(v.name) + 1); });
   }
   return count;
 }

@@ -19,16 +19,8 @@ double extrapolated(const double (&slopes)[3], double first, double second) {
 }
 
 void for_each_node(const Func& output, ir::FunctionRef<void(const Expr&)> visit) {
-  for (const ir::FuncPtr& f : ir::topological_order({output.function()})) {
-    for (int s = 0; s < f->stage_count(); ++s) {
-      ir::for_each_expr(f->stage(s), [&](const Expr& root) {
-        ir::walk(root, [&](const Expr& e) {
-          visit(e);
-          return true;
-        });
-      });
-    }
-  }
+  for (const ir::FuncPtr& f : ir::topological_order({output.function()}))
+    walk(*f, [&](const Expr& e) { return visit(e), true; });
 }
 
 int narrowest_float(const Func& output) {
