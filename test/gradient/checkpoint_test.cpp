@@ -135,18 +135,14 @@ Program number(int n) {
   return {loss, {start, factors, gain}};
 }
 
-struct Case {
-  const char* name;
-  Program (*build)(int n);
-};
-const Case cases[] = {
+const NamedLoop cases[] = {
     {"pushed", pushed},       {"swept", swept},           {"pendulums", pendulums},
     {"diffusion", diffusion}, {"predicated", predicated}, {"linear", linear},
     {"field", field},         {"steered", steered},       {"wide", wide},
     {"twice", twice},         {"number", number}};
 
 TEST(Checkpoints, GradientsAgreeWithCentralDifferences) {
-  for (const Case& c : cases) {
+  for (const NamedLoop& c : cases) {
     SCOPED_TRACE(c.name);
     Program p = c.build(6);
     for (Buffer<float>& input : p.inputs) expect_gradient(p.loss, input, {.checkpoint_states = 2});
@@ -167,7 +163,7 @@ std::vector<double> values_of(const Func& gradient, const Buffer<float>& like, b
 // summed from the last step to the first, and without a budget in another order: only rounded
 // alike.
 TEST(Checkpoints, GradientsAreTheBitsOfTheStoredOnes) {
-  for (const Case& c : cases) {
+  for (const NamedLoop& c : cases) {
     for (int n : {3, 7}) {
       Program p = c.build(n);
       Derivative stored = propagate_adjoints(p.loss, {.overwritten = Overwritten::Store});
@@ -191,7 +187,7 @@ TEST(Checkpoints, GradientsAreTheBitsOfTheStoredOnes) {
 }
 
 TEST(Checkpoints, MachineCodeGivesTheSameBitsForEveryBudget) {
-  for (const Case& c : cases) {
+  for (const NamedLoop& c : cases) {
     Program p = c.build(8);
     std::vector<Buffer<float>> expected;
     for (int s : {1, 3}) {
@@ -248,17 +244,6 @@ TEST(Checkpoints, StepsAreComputedAgainAsOftenAsTheBinomialBoundSays) {
 }
 
 // Bytes that were allocated at one time, as the profiler reports them.
-int64_t peak_memory(const Derivative& d, const Buffer<float>& input) {
-  Func gradient = d(input);
-  std::string report;
-  gradient.jit_handlers().print = [&](const char* text) { report += text; };
-  gradient.realize({input.width()},
-                   get_jit_target_from_environment().with_feature(Target::Profile));
-  size_t at = report.find("peak memory: ");
-  EXPECT_NE(at, std::string::npos) << report;
-  return at == std::string::npos ? 0 : std::stoll(report.substr(at + 13));
-}
-
 TEST(Checkpoints, MemoryGrowsWithTheStatesAndNotWithTheSteps) {
   Buffer<float> start = line(100);
   auto peak = [&](int n, const AdjointOptions& options) {

@@ -19,6 +19,11 @@ struct NamedProgram {
   const char* name;
   Program (*build)();
 };
+// A loop of n steps.
+struct NamedLoop {
+  const char* name;
+  Program (*build)(int n);
+};
 
 inline std::vector<NamedProgram>& programs() {
   static std::vector<NamedProgram> all;
@@ -51,6 +56,18 @@ inline Buffer<int> places(int n, int bound, unsigned seed = 3) {
   result.get()->for_each_value(
       [&](int& v) { v = static_cast<int>(random() % static_cast<unsigned>(bound)); });
   return result;
+}
+
+// In bytes, as the profiler sees it.
+inline int64_t peak_memory(const Derivative& d, const Buffer<float>& input) {
+  Func gradient = d(input);
+  std::string report;
+  gradient.jit_handlers().print = [&](const char* text) { report += text; };
+  gradient.realize({input.width()},
+                   get_jit_target_from_environment().with_feature(Target::Profile));
+  size_t at = report.find("peak memory: ");
+  EXPECT_NE(at, std::string::npos) << report;
+  return at == std::string::npos ? 0 : std::stoll(report.substr(at + 13));
 }
 
 }  // namespace retrograde::gradient

@@ -115,22 +115,18 @@ Program power_of_a_matrix(int n) {
   return {weighted_sum(last, {3}), {start, m}};
 }
 
-struct Case {
-  const char* name;
-  Program (*build)(int n);
-};
-const Case cases[] = {{"at_own_place", at_own_place},
-                      {"filter_along_an_image", filter_along_an_image},
-                      {"two_steps_back", two_steps_back},
-                      {"stencil_with_a_border", stencil_with_a_border},
-                      {"tuple_and_its_last_difference", tuple_and_its_last_difference},
-                      {"backward_in_time", backward_in_time},
-                      {"sweep_within_a_step", sweep_within_a_step},
-                      {"one_loop_after_another", one_loop_after_another},
-                      {"power_of_a_matrix", power_of_a_matrix}};
+const NamedLoop cases[] = {{"at_own_place", at_own_place},
+                           {"filter_along_an_image", filter_along_an_image},
+                           {"two_steps_back", two_steps_back},
+                           {"stencil_with_a_border", stencil_with_a_border},
+                           {"tuple_and_its_last_difference", tuple_and_its_last_difference},
+                           {"backward_in_time", backward_in_time},
+                           {"sweep_within_a_step", sweep_within_a_step},
+                           {"one_loop_after_another", one_loop_after_another},
+                           {"power_of_a_matrix", power_of_a_matrix}};
 
 TEST(TimeAxis, GradientsAgreeWithCentralDifferences) {
-  for (const Case& c : cases) {
+  for (const NamedLoop& c : cases) {
     SCOPED_TRACE(c.name);
     Program p = c.build(6);
     Derivative d = propagate_adjoints(p.loss, {.checkpoint_states = 2});
@@ -153,7 +149,7 @@ std::vector<float> gradient_of(const Derivative& d, const Buffer<float>& input) 
 // In float32, operation by operation, as the gradient that keeps all steps; what every step reads
 // is summed in another order.
 TEST(TimeAxis, GradientsAreThoseOfAllStepsKept) {
-  for (const Case& c : cases) {
+  for (const NamedLoop& c : cases) {
     for (int n : {1, 2, 3, 12}) {
       Program p = c.build(n);
       Derivative all = propagate_adjoints(p.loss, {.overwritten = Overwritten::Store});
@@ -229,17 +225,6 @@ TEST(TimeAxis, RandomLoopsAgreeWithThoseThatKeepAllSteps) {
     }
   }
   EXPECT_GT(folded, 30);
-}
-
-int64_t peak_memory(const Derivative& d, const Buffer<float>& input) {
-  Func gradient = d(input);
-  std::string report;
-  gradient.jit_handlers().print = [&](const char* text) { report += text; };
-  gradient.realize({input.width()},
-                   get_jit_target_from_environment().with_feature(Target::Profile));
-  size_t at = report.find("peak memory: ");
-  EXPECT_NE(at, std::string::npos) << report;
-  return at == std::string::npos ? 0 : std::stoll(report.substr(at + 13));
 }
 
 // One slice a state, however many steps: the loss, which is not linear, reads the last step too.
