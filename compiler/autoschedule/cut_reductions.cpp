@@ -9,6 +9,7 @@
 #include "frontend/language/rdom.h"
 #include "frontend/schedule/stage.h"
 #include "graph/associative_update.h"
+#include "graph/own_reads.h"
 #include "ir/build.h"
 #include "ir/visit.h"
 #include "simplify/simplify.h"
@@ -18,23 +19,38 @@ namespace retrograde::ir {
 namespace {
 
 constexpr int lanes_of_a_sum = 16;
-constexpr int terms = 256;          // that a lane adds up, where there is one dimension
-constexpr int groups = 32;          // of rows, summed apart before all are
-constexpr int64_t long_sum = 4096;  // iterations
-constexpr int64_t short_loop = 8;   // iterations that make no tasks
+constexpr int terms = 256;            // that a lane adds up, where there is one dimension
+constexpr int groups = 32;            // of rows, summed apart before all are
+constexpr int64_t long_sum = 4096;    // iterations
+constexpr int64_t short_loop = 8;     // iterations that make no tasks
+constexpr int64_t few_elements = 16;  // fewer than fill the lanes and the threads of a machine
 constexpr int64_t unknown_extent = 1024;
 
 int64_t extent_of(const ReductionVariable& r) {
   return as_const_int(simplify(r.extent)).value_or(unknown_extent);
 }
 
-// Whether the update adds everything to one element, and may do so in another order.
-bool is_long_sum(const FuncContents& f, const Definition& update) {
+// Elements that the pure loops of an update run over; nothing where they may be many, or places are
+// other than pure variables and constants.
+std::optional<int64_t> elements_of(const FuncContents& f, const Definition& update,
+                                   const SizeEstimate& sizes) {
+  int64_t elements = 1;
+  for (size_t d = 0; d < f.args.size(); ++d) {
+    if (is_const(update.args[d])) continue;
+    const auto extent =
+        is_pure_position(f, update, d) ? sizes.extent(f, d) : std::optional<int64_t>();
+    if (!extent || *extent > few_elements) return std::nullopt;
+    elements *= *extent;
+  }
+  return elements;
+}
+
+// Whether the update adds much to few elements, and may do so in another order.
+bool is_long_sum(const FuncContents& f, const Definition& update, const SizeEstimate& sizes) {
   double iterations = update.rvars.empty() ? 0 : 1;
   for (const ReductionVariable& r : update.rvars) iterations *= static_cast<double>(extent_of(r));
-  const bool is_one_element = std::all_of(update.args.begin(), update.args.end(),
-                                          [](const Expr& arg) { return is_const(arg); });
-  if (!is_one_element || iterations < long_sum) return false;
+  if (iterations < long_sum || elements_of(f, update, sizes).value_or(INT64_MAX) > few_elements)
+    return false;
   const AssociativityProof proof = prove_associative(f, update);
   return proof.op && proof.op->commutative && !proof.op->breaks_ties;
 }
@@ -49,7 +65,13 @@ void factor(Stage update, const RVar& lane, const RVar& row) {
     if (loop.name() != u.name() && loop.name() != v.name()) order.push_back(loop);
   }
   order.push_back(v);
-  parts.compute_root().reorder(u, v).parallel(v);
+  std::vector<Var> layout{u};  // lanes lie together
+  for (const Var& arg : parts.args()) {
+    if (arg.name() != u.name()) layout.push_back(arg);
+  }
+  parts.compute_root().parallel(v);
+  parts.reorder(std::vector<VarOrRVar>(layout.begin(), layout.end()));
+  if (layout.size() > 2) parts.reorder_storage(layout);
   vectorize(Stage(parts.function(), 0), u, lanes_of_a_sum, TailStrategy::Auto);
   parts.update().reorder(order).parallel(v);
   vectorize(parts.update(), u, lanes_of_a_sum, TailStrategy::GuardWithIf);
@@ -84,12 +106,12 @@ void cut(const FuncPtr& f, int stage) {
 
 }  // namespace
 
-void cut_reductions(const std::vector<FuncPtr>& outputs,
+void cut_reductions(const std::vector<FuncPtr>& outputs, const SizeEstimate& sizes,
                     const std::unordered_set<const Symbol*>& but) {
   for (const FuncPtr& f : topological_order(outputs)) {
     if (is_touched(*f) || f->is_extern() || but.contains(f.get())) continue;
     for (int s = 1; s < f->stage_count(); ++s) {
-      if (is_long_sum(*f, f->stage(s))) cut(f, s);
+      if (is_long_sum(*f, f->stage(s), sizes)) cut(f, s);
     }
   }
 }

@@ -78,8 +78,8 @@ FuncPtr block_of(const Definition& stage) {
 // iterations are independent whatever the stage does.
 class LoopChooser {
  public:
-  LoopChooser(const FuncPtr& f, int stage, const VectorUnit& unit)
-      : function_(f), f_(*f), index_(stage), stage_(f, stage), unit_(unit) {
+  LoopChooser(const FuncPtr& f, int stage, const VectorUnit& unit, const SizeEstimate& sizes)
+      : function_(f), f_(*f), index_(stage), stage_(f, stage), unit_(unit), sizes_(sizes) {
     for (size_t d = 0; d < f_.args.size(); ++d) {
       if (is_pure_position(f_, definition(), d)) pure_.push_back(d);
     }
@@ -126,7 +126,7 @@ class LoopChooser {
 
   std::optional<RegisterTile> tile_of(const FuncContents& f, const Definition& reduction) const {
     const bool has_lanes = f.made && f.made->lanes > 0;
-    return register_tile(f, reduction, lanes, has_lanes ? 1 : 4, unit_);
+    return register_tile(f, reduction, lanes, has_lanes ? 1 : 4, unit_, sizes_);
   }
 
   // Its loops stand inside of those of the reduction; those over tiles outside, of the sides first,
@@ -178,7 +178,7 @@ class LoopChooser {
     if (pure_.empty() || pure_[0] != 0) return;
     const RegisterTile tile = tile_of(*block, block->updates[0]).value_or(RegisterTile());
     run_in_parallel(cut(renumbered(tile, *block)));
-    for (int s = 0; s < block->stage_count(); ++s) LoopChooser(block, s, unit_).cut(tile);
+    for (int s = 0; s < block->stage_count(); ++s) LoopChooser(block, s, unit_, sizes_).cut(tile);
   }
 
   // Squares, whose rows stay in the cache until their columns are read.
@@ -195,6 +195,7 @@ class LoopChooser {
   const int index_;
   Stage stage_;
   const VectorUnit& unit_;
+  const SizeEstimate& sizes_;
   std::vector<size_t> pure_;  // dimensions
 };
 
@@ -208,10 +209,10 @@ void give_default_schedule(const std::vector<FuncPtr>& outputs, const VectorUnit
   std::unordered_set<const Symbol*> whole = limits.stay;
   whole.insert(limits.levels.begin(), limits.levels.end());
   // Before sums are cut: what that schedules would pass for the user's.
-  const std::vector<FuncPtr> stored = what == Scheduling::Everything
-                                          ? stored_in_all(outputs, limits)
-                                          : stored_by_default(outputs);
-  cut_reductions(outputs, whole);
+  const std::vector<FuncPtr> stored =
+      what == Scheduling::Everything ? stored_in_all(outputs, limits) : stored_by_default(outputs);
+  const SizeEstimate sizes(outputs);
+  cut_reductions(outputs, sizes, whole);
   for (const FuncPtr& f : stored) {
     if (is_touched(*f)) continue;
     Func(f).compute_root();
@@ -220,7 +221,7 @@ void give_default_schedule(const std::vector<FuncPtr>& outputs, const VectorUnit
       schedule_scatter_lanes(f, *lanes);
       continue;
     }
-    for (int s = 0; s < f->stage_count(); ++s) LoopChooser(f, s, unit).give();
+    for (int s = 0; s < f->stage_count(); ++s) LoopChooser(f, s, unit, sizes).give();
   }
   compute_in_slices(outputs, stored, whole);
   for (const FuncPtr& f : order) {  // so that the log tells of every Func

@@ -11,7 +11,8 @@ namespace retrograde::ir {
 
 namespace {
 
-constexpr int64_t most_values = 4;  // of a dimension: extents are not known, and rests run slower
+constexpr int64_t most_values = 4;  // of a long dimension, or an unknown one: rests run slower
+constexpr int64_t few_values = 16;  // a dimension that may lie in registers whole
 constexpr double loads_a_cycle = 2, products_a_cycle = 2, latency = 4;
 constexpr double split_lines = 2;    // loads for a vector at any place: it crosses cache lines
 constexpr double worth_while = 0.8;  // of the cycles without a tile
@@ -73,6 +74,32 @@ double cycles(const RegisterTile& tile, const std::vector<Operand>& operands) {
       {loads_of(tile, operands) / sums / loads_a_cycle, 1 / products_a_cycle, latency / sums});
 }
 
+// Iterations of the tile for each that has an element.
+double iterations_an_element(const RegisterTile& tile, int lanes, const FuncContents& f,
+                             const SizeEstimate& sizes) {
+  const auto lost = [&](size_t dimension, int64_t size) {
+    const auto extent = sizes.extent(f, dimension);
+    if (!extent || *extent <= 0) return 1.0;
+    return static_cast<double>((*extent + size - 1) / size * size) / static_cast<double>(*extent);
+  };
+  double result = lost(0, tile.vectors * lanes);
+  for (const RegisterTile::Side& side : tile.sides) result *= lost(side.dimension, side.size);
+  return result;
+}
+
+// How much of a dimension a tile may have.
+std::vector<int64_t> sizes_of_side(const FuncContents& f, size_t dimension,
+                                   const SizeEstimate& sizes) {
+  std::vector<int64_t> result;
+  const auto extent = sizes.extent(f, dimension);
+  if (extent && *extent <= few_values) {
+    for (int64_t size = 2; size <= *extent; ++size) result.push_back(size);
+  } else {
+    for (int64_t size = 2; size <= most_values; size *= 2) result.push_back(size);
+  }
+  return result;
+}
+
 }  // namespace
 
 VectorUnit vector_unit_of(const Target& target) {
@@ -82,7 +109,8 @@ VectorUnit vector_unit_of(const Target& target) {
 }
 
 std::optional<RegisterTile> register_tile(const FuncContents& f, const Definition& stage, int lanes,
-                                          int64_t vectors, const VectorUnit& unit) {
+                                          int64_t vectors, const VectorUnit& unit,
+                                          const SizeEstimate& sizes) {
   const auto moves = [&](const Expr& arg) {
     return std::any_of(stage.rvars.begin(), stage.rvars.end(),
                        [&](const ReductionVariable& r) { return uses_variable(arg, r.var); });
@@ -99,9 +127,12 @@ std::optional<RegisterTile> register_tile(const FuncContents& f, const Definitio
     if (is_pure_position(f, stage, d)) sides.push_back(d);
   }
   RegisterTile best;
-  double least = cycles(best, *operands) * worth_while;
+  const auto cost = [&](const RegisterTile& tile) {
+    return cycles(tile, *operands) * iterations_an_element(tile, lanes, f, sizes);
+  };
+  double least = cost(best) * worth_while;
   const auto consider = [&](RegisterTile tile) {
-    const double needed = cycles(tile, *operands);
+    const double needed = cost(tile);
     const bool is_better = needed < least || (needed == least && sums_of(best) > sums_of(tile));
     const bool reuses = loads_of(tile, *operands) <
                         static_cast<double>(sums_of(tile)) * loads_of(RegisterTile(), *operands);
@@ -111,10 +142,10 @@ std::optional<RegisterTile> register_tile(const FuncContents& f, const Definitio
   };
   for (int64_t n = 1; n <= std::min<int64_t>(vectors, most_values); n *= 2) {
     for (size_t i = 0; i < sides.size(); ++i) {
-      for (int64_t a = 2; a <= most_values; a *= 2) {
+      for (const int64_t a : sizes_of_side(f, sides[i], sizes)) {
         consider({n, {{sides[i], a}}});
         for (size_t k = i + 1; k < sides.size(); ++k) {
-          for (int64_t b = 2; b <= most_values; b *= 2)
+          for (const int64_t b : sizes_of_side(f, sides[k], sizes))
             consider({n, {{sides[i], a}, {sides[k], b}}});
         }
       }

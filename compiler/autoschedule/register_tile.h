@@ -5,6 +5,7 @@
 #include <optional>
 #include <vector>
 
+#include "autoschedule/size_estimate.h"
 #include "graph/function.h"
 #include "ir/target.h"
 
@@ -30,10 +31,12 @@ struct RegisterTile {
 
 // The tile with the fewest cycles for each product; nullopt: none is better than one vector, or the
 // stage is no such update. `lanes` in a vector of the first dimension; `vectors`: how many of them
-// the dimension has at most.
+// the dimension has at most. Where sizes are known, the tile fits them: what of its registers lies
+// beyond the end counts as lost.
 // Model: two loads and two multiply-adds a cycle, of which each sum takes one every four cycles; a
 // vector, whose place is any, counts as two loads (vector units of x86-64 since 2015).
 std::optional<RegisterTile> register_tile(const FuncContents& f, const Definition& stage, int lanes,
-                                          int64_t vectors, const VectorUnit& unit);
+                                          int64_t vectors, const VectorUnit& unit,
+                                          const SizeEstimate& sizes = {});
 
 }  // namespace retrograde::ir

@@ -104,10 +104,15 @@ class Scheduler {
   }
 
   // Calls `visit` with each Func, by its number, and each image (-1) that the stage reads;
-  // `direct`: itself.
+  // `direct`: itself, not through a Func that nobody schedules, each of which is looked into once.
   template <typename Visit>
-  void for_each_read(const ir::FuncContents& f, int stage, const Visit& visit,
-                     bool direct = true) const {
+  void for_each_read(const ir::FuncContents& f, int stage, const Visit& visit) const {
+    std::set<const ir::FuncContents*> seen;
+    for_each_read(f, stage, visit, true, seen);
+  }
+  template <typename Visit>
+  void for_each_read(const ir::FuncContents& f, int stage, const Visit& visit, bool direct,
+                     std::set<const ir::FuncContents*>& seen) const {
     walk(f.stage(stage), [&](const ir::Call& call) {
       if (call.symbol.raw() == &f) return;
       if (call.call_type == ir::CallType::Image) visit(-1, call, direct);
@@ -116,8 +121,9 @@ class Scheduler {
       const auto known = std::find(funcs_.begin(), funcs_.end(), callee);
       if (known != funcs_.end()) {
         visit(static_cast<int>(known - funcs_.begin()), call, direct);
-      } else {
-        for (int s = 0; s < callee->stage_count(); ++s) for_each_read(*callee, s, visit, false);
+      } else if (seen.insert(callee.get()).second) {
+        for (int s = 0; s < callee->stage_count(); ++s)
+          for_each_read(*callee, s, visit, false, seen);
       }
     });
   }

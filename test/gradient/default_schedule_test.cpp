@@ -184,7 +184,7 @@ void expect_sums_in_lanes(int side, Type in) {
   Derivative d = propagate_adjoints(layer, seed);
   const Func parts = parts_of_adjoint(d, kernels);
   ASSERT_TRUE(parts.defined());
-  EXPECT_EQ(parts.dimensions(), 5) << "lane and element";
+  EXPECT_EQ(parts.dimensions(), 6) << "lane, element and part";
   EXPECT_EQ(parts.type(), in);
   const Buffer<float> gradient = d(kernels).realize({3, 3, channels, channels});
   gradient.for_each_element([&](int i, int j, int from, int to) {
@@ -307,6 +307,60 @@ TEST_F(DefaultSchedule, TilesFitTheRegisters) {
     EXPECT_LE(sums(bytes), bytes);
   }
   EXPECT_EQ(sums(64), 0) << "no tile of one vector";
+}
+
+// A kernel of 11 x 11: no side of the tile has rests, and sums to few elements have lanes and tasks.
+TEST_F(DefaultSchedule, TilesFitTheSizesThatAreKnown) {
+  Buffer<float> left(11, 64), right(64, 64);
+  Func product("product");
+  RDom k(0, 64);
+  product(x, y) += left(y, k) * right(x, k);
+  product.set_estimates({{0, 64}, {0, 11}});
+  const auto tile = ir::register_tile(*product.function(), product.function()->stage(1), 16, 4, {},
+                                      ir::SizeEstimate({product.function()}));
+  ASSERT_TRUE(tile.has_value());
+  ASSERT_EQ(tile->sides.size(), 1u);
+  EXPECT_EQ(tile->sides[0].size, 11) << "no rest";
+}
+
+TEST_F(DefaultSchedule, SizesFollowFromThoseOfTheOutputs) {
+  const Buffer<float> image(100, 80);
+  Param<int> shift("shift");
+  shift.set_estimate(5);
+  Func edge("edge"), first("first"), second("second");
+  edge(x, y) = image(clamp(x, 0, 99), clamp(y, 0, 79));
+  first(x, y) = edge(2 * x, y + shift);
+  RDom r(-1, 3);
+  second(x, y) = 0.0f;
+  second(x, y) += first(x + r, y);
+  second.set_estimate(x, 0, 40);
+  const ir::SizeEstimate sizes({second.function()});
+  EXPECT_EQ(sizes.extent(*second.function(), 0), 40);
+  EXPECT_EQ(sizes.extent(*second.function(), 1), std::nullopt);
+  EXPECT_EQ(sizes.extent(*first.function(), 0), 42);
+  EXPECT_EQ(sizes.extent(*edge.function(), 0), 83);
+  EXPECT_EQ(sizes.extent(*edge.function(), 1), std::nullopt);
+  second.set_estimate(y, 0, 30);
+  EXPECT_EQ(ir::SizeEstimate({second.function()}).extent(*edge.function(), 1), 30);
+}
+
+TEST_F(DefaultSchedule, SumsToAFewElementsAreCut) {
+  Buffer<float> image = gradient::random_image({300, 200, 5}, 0, 1, 3);
+  Func energy("energy");
+  RDom r(0, 300, 0, 200);
+  energy(x) = 0.0f;
+  energy(x) += image(r.x, r.y, x) * image(r.x, r.y, x);
+  energy.set_estimate(x, 0, 5);
+  const AutoSchedulerResults found = Pipeline(energy).auto_schedule(get_host_target());
+  EXPECT_NE(found.schedule_source.find("rfactor"), std::string::npos) << found.schedule_source;
+  const Buffer<float> sums = energy.realize({5});
+  for (int c = 0; c < 5; ++c) {
+    double sum = 0;
+    image.for_each_element([&](int i, int j, int k) {
+      if (k == c) sum += static_cast<double>(image(i, j, k)) * image(i, j, k);
+    });
+    EXPECT_NEAR(sums(c), sum, 5e-6 * sum);
+  }
 }
 
 // One chain of additions in float32 is off by 1e-3 here.

@@ -37,8 +37,10 @@ constexpr double near_elements = 1 << 14;
 // in place, in parallel over its pure dimensions only.
 constexpr double private_bytes = 64 << 20;
 // Below so many elements, with so many iterations each, the pure dimensions alone do not fill a
-// machine.
-constexpr double few_elements = 64, many_iterations = 4096, unknown_elements = 1e9;
+// machine: one tile of registers holds them, or a few do.
+constexpr double one_tile = 64, few_elements = 1024, many_iterations = 4096, unknown_elements = 1e9;
+// That a lane of a part adds up where there are several tiles, so that parts cost little beside it.
+constexpr double terms_a_lane = 8;
 // Iterations from which on lanes of their own are worth setting to zero and adding up.
 constexpr double lanes_pay = 16 * lane_count;
 
@@ -433,6 +435,7 @@ class Builder {
   // at run time only, the most there may be.
   int parts_of(const Gather& g) const {
     if (!g.scatters && elements_of(g) > few_elements) return 1;
+    if (!g.scatters && elements_of(g) > one_tile) return parts_of_a_tile(g);
     if (!g.scatters || target_.region.size() != g.pure.size()) return part_count;
     const double elements = elements_of_target();
     if (elements >= unknown_elements) return part_count;
@@ -440,6 +443,14 @@ class Builder {
                         std::max(elements, 1.0);
     int parts = part_count;
     while ((parts > most || parts * elements * bytes_an_element() > private_bytes) && parts > 1)
+      parts /= 2;
+    return parts;
+  }
+  // Parts for the threads of elements that a few tiles of registers hold: each has lanes of its own
+  // for every element, which are set to zero and added up.
+  int parts_of_a_tile(const Gather& g) const {
+    int parts = part_count;
+    while (parts > 1 && iterations_of(g, many_iterations) < parts * lane_count * terms_a_lane)
       parts /= 2;
     return parts;
   }

@@ -1,0 +1,27 @@
+// size_estimate.h -- how far the dimensions of Funcs reach, as far as that is known: from bounds and
+// estimates of the outputs, sizes of images and estimates of parameters, through what each Func
+// reads of the others.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <unordered_map>
+#include <vector>
+
+#include "analysis/interval.h"
+#include "graph/function.h"
+
+namespace retrograde::ir {
+
+class SizeEstimate {
+ public:
+  SizeEstimate() = default;  // nothing is known
+  explicit SizeEstimate(const std::vector<FuncPtr>& outputs);
+  // Elements of a dimension that are computed; nullopt: not known.
+  std::optional<int64_t> extent(const FuncContents& f, size_t dimension) const;
+
+ private:
+  std::unordered_map<const Symbol*, Box> boxes_;  // with constant ends; undefined: not known
+};
+
+}  // namespace retrograde::ir
