@@ -264,6 +264,36 @@ TEST_P(Async, TwoBranchesReadAThirdAsyncFunc) {
   for (int round = 0; round < 5; round++) program.expect();
 }
 
+// Reads that came after the wait before they had a thread of their own: those of `out` after those of
+// `g`, and those of `g` after those of `between`.
+TEST_P(Async, EachBranchThatReadsAnAsyncFuncWaitsForIt) {
+  for (bool is_between : {false, true}) {
+    Var x("x"), y("y");
+    RDom r(0, 200), i(0, 40);
+    Func f("f"), between("between"), g("g"), out("out");
+    f(x) = 0;
+    f(x) += (x * r) % 7;
+    between(x) = f(x) + 1;
+    g(x) = f(x) + 2;
+    out(x) = 0;
+    if (is_between) out(x) += between(x);
+    out(x) += 3 * f(x);
+    out(i) += g(i);
+    for (Func* func : {&f, &between, &g}) func->compute_root();
+    async(f);
+    async(g);
+    limit(out);
+    for (int run = 0; run < 30; ++run) {
+      const Buffer<int> result = out.realize({40});
+      for (int v = 0; v < 40; ++v) {
+        int sum = 0;
+        for (int k = 0; k < 200; ++k) sum += v * k % 7;
+        ASSERT_EQ(result(v), is_between ? 5 * sum + 3 : 4 * sum + 2) << v << " " << is_between;
+      }
+    }
+  }
+}
+
 TEST_P(Async, ThreeBranchesReadAFoldedAsyncFunc) {
   Var x("x"), y("y");
   Func f("f"), g("g"), h("h"), out("out");

@@ -378,24 +378,30 @@ class AsyncForker : public StatementRewriter {
     return forked(n, room, branches_of(n, true, room));
   }
 
-  // The handshake of an async Func around belongs to the branch that reads it. Where both do, the
-  // producer's has one of its own.
+  // The handshake of an async Func around belongs to the branch that reads it. Where both do, one of
+  // them has semaphores of its own; that it waited in the other, by the order of one thread, is then
+  // not enough.
   void share_waits(Stmt& producer, Stmt& consumer) {
     for (const std::string& outer : forked_) {
-      if (!Semaphores::has_steps(producer, outer) || !consumer.defined() ||
-          !Semaphores::has_steps(consumer, outer))
-        continue;
+      const bool producer_waits = Semaphores::has_steps(producer, outer),
+                 consumer_waits = consumer.defined() && Semaphores::has_steps(consumer, outer);
+      if (!consumer.defined() || (!producer_waits && !consumer_waits)) continue;
       const bool in_producer = uses_func(producer, outer), in_consumer = uses_func(consumer, outer);
       if (in_producer && in_consumer) {
-        const int reader = readers_.at(outer)++;
-        producer = Semaphores::replace_steps(producer, outer, [&](const Stmt& step) {
-          return semaphores_.of_reader(step, outer, reader);
-        });
-        continue;
+        Stmt& other = producer_waits && !consumer_waits ? consumer : producer;
+        if (!producer_waits || !consumer_waits) other = acquired_late(other, outer);
+        other = for_one_reader(other, outer, readers_.at(outer)++);
+      } else if (producer_waits && consumer_waits) {
+        Stmt& other = in_producer ? consumer : producer;
+        other =
+            Semaphores::replace_steps(other, outer, [](const Stmt&) { return make_evaluate(0); });
       }
-      Stmt& other = in_producer ? consumer : producer;
-      other = Semaphores::replace_steps(other, outer, [](const Stmt&) { return make_evaluate(0); });
     }
+  }
+
+  Stmt for_one_reader(const Stmt& s, const std::string& func, int reader) {
+    return Semaphores::replace_steps(
+        s, func, [&](const Stmt& step) { return semaphores_.of_reader(step, func, reader); });
   }
 
   // The body of the innermost loop around the producer, with its waits.
