@@ -5,6 +5,7 @@
 #include <unordered_set>
 
 #include "autoschedule/cut_reductions.h"
+#include "autoschedule/join_sweeps.h"
 #include "autoschedule/new_loop.h"
 #include "autoschedule/placement_limits.h"
 #include "autoschedule/scatter_schedule.h"
@@ -213,6 +214,7 @@ void give_default_schedule(const std::vector<FuncPtr>& outputs, const VectorUnit
       what == Scheduling::Everything ? stored_in_all(outputs, limits) : stored_by_default(outputs);
   const SizeEstimate sizes(outputs);
   cut_reductions(outputs, sizes, whole);
+  std::vector<FuncPtr> given;  // loops, at root
   for (const FuncPtr& f : stored) {
     if (is_touched(*f)) continue;
     Func(f).compute_root();
@@ -222,8 +224,10 @@ void give_default_schedule(const std::vector<FuncPtr>& outputs, const VectorUnit
       continue;
     }
     for (int s = 0; s < f->stage_count(); ++s) LoopChooser(f, s, unit, sizes).give();
+    given.push_back(f);
   }
   compute_in_slices(outputs, stored, whole);
+  join_sweeps(outputs, given, sizes);
   for (const FuncPtr& f : order) {  // so that the log tells of every Func
     const bool is_output = std::find(outputs.begin(), outputs.end(), f) != outputs.end();
     const bool is_inlined = f->schedule.compute_level.kind == LoopLevel::Kind::Inlined;

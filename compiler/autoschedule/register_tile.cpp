@@ -12,7 +12,7 @@ namespace retrograde::ir {
 namespace {
 
 constexpr int64_t most_values = 4;  // of a long dimension, or an unknown one: rests run slower
-constexpr int64_t few_values = 16;  // a dimension that may lie in registers whole
+constexpr int64_t small_side = 16;  // a dimension that may lie in registers whole
 constexpr double loads_a_cycle = 2, products_a_cycle = 2, latency = 4;
 constexpr double split_lines = 2;    // loads for a vector at any place: it crosses cache lines
 constexpr double worth_while = 0.8;  // of the cycles without a tile
@@ -92,7 +92,7 @@ std::vector<int64_t> sizes_of_side(const FuncContents& f, size_t dimension,
                                    const SizeEstimate& sizes) {
   std::vector<int64_t> result;
   const auto extent = sizes.extent(f, dimension);
-  if (extent && *extent <= few_values) {
+  if (extent && *extent <= small_side) {
     for (int64_t size = 2; size <= *extent; ++size) result.push_back(size);
   } else {
     for (int64_t size = 2; size <= most_values; size *= 2) result.push_back(size);

@@ -8,6 +8,7 @@
 #include "autoschedule/register_tile.h"
 #include "frontend/language/func.h"
 #include "frontend/run/pipeline.h"
+#include "graph/copy_graph.h"
 #include "gradient/gradient_check.h"
 #include "ir/build.h"
 #include "ir/print.h"
@@ -307,6 +308,37 @@ TEST_F(DefaultSchedule, TilesFitTheRegisters) {
     EXPECT_LE(sums(bytes), bytes);
   }
   EXPECT_EQ(sums(64), 0) << "no tile of one vector";
+}
+
+// By the two coordinates at which an image is read: both sum over what four corners hold.
+TEST_F(DefaultSchedule, SumsThatLookTheSamePlacesUpShareTheirLoops) {
+  const int size = 40, channels = 6;
+  const Buffer<float> image = gradient::random_image({size, size, channels}, -1, 1, 1);
+  const Buffer<float> flow = gradient::random_image({size, size, 2}, -5, 5, 2);
+  const Buffer<float> seed = gradient::random_image({size, size, channels}, -1, 1, 3);
+  Var c("c");
+  Func u("u"), v("v"), warped("warped");
+  u(x, y) = clamp(x + flow(x, y, 0), 0.0f, size - 1.0f);
+  v(x, y) = clamp(y + flow(x, y, 1), 0.0f, size - 1.0f);
+  const Expr i = min(cast<int>(u(x, y)), size - 2), j = min(cast<int>(v(x, y)), size - 2);
+  warped(x, y, c) = lerp(lerp(image(i, j, c), image(i + 1, j, c), u(x, y) - i),
+                         lerp(image(i, j + 1, c), image(i + 1, j + 1, c), u(x, y) - i),
+                         v(x, y) - j);
+  const Derivative d = propagate_adjoints(warped, seed);
+  Func by_flow = d(flow);
+  const Buffer<float> apart = [&] {
+    const ir::GraphCopy copy = ir::copy_graph({by_flow.function()});
+    Pipeline pipeline(Func(copy.outputs[0]));
+    pipeline.unscheduled();
+    return Buffer<float>(pipeline.realize({size, size, 2})[0]);
+  }();
+  const Buffer<float> together = by_flow.realize({size, size, 2});
+  together.for_each_element([&](int a, int b, int k) {
+    EXPECT_NEAR(together(a, b, k), apart(a, b, k), 1e-5 * (1 + std::abs(apart(a, b, k))));
+  });
+  Pipeline(by_flow).auto_schedule(get_host_target());
+  const std::string log = Pipeline(by_flow).schedule_log().to_text();
+  EXPECT_NE(log.find("u_adj.update(0).compute_with(loop(v_adj"), std::string::npos) << log;
 }
 
 // A kernel of 11 x 11: no side of the tile has rests, and sums to few elements have lanes and tasks.

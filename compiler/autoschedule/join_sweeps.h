@@ -1,0 +1,22 @@
+// join_sweeps.h -- reductions that look the same places up run in the same loops.
+//
+//   u_adj(x, y) += seed(x, y, r) * along_u(image(i(x, y) + ..., j(x, y) + ..., r))
+//   v_adj(x, y) += seed(x, y, r) * along_v(image(i(x, y) + ..., j(x, y) + ..., r))
+//
+// A vector at places that data decide is loaded lane by lane. What two such reductions over the same
+// domain load, they load once where they run together (compute_with).
+#pragma once
+
+#include <vector>
+
+#include "autoschedule/size_estimate.h"
+#include "graph/function.h"
+
+namespace retrograde::ir {
+
+// Of those of the Funcs, all of which this scheduler has given loops, that are at root and have
+// nothing computed in their loops. Producers first.
+void join_sweeps(const std::vector<FuncPtr>& outputs, const std::vector<FuncPtr>& funcs,
+                 const SizeEstimate& sizes);
+
+}  // namespace retrograde::ir
