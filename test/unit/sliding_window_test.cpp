@@ -81,6 +81,35 @@ TEST_F(SlidingWindow, ComputesEachRowOnce) {
   EXPECT_EQ(stored_elements(g, "f"), width * 4);  // three rows are alive
 }
 
+// The loop of a split that stays within 5 of its 8 iterations: those before them, in which the window
+// is filled, know nothing of where the others lie.
+TEST_F(SlidingWindow, FillsTheWindowBeforeASplitThatStaysInside) {
+  for (const auto& [extent, is_twice] :
+       {std::pair(5, false), {9, false}, {16, false}, {5, true}, {9, true}, {16, true}}) {
+    Buffer<int> image(extent, 3);
+    image.for_each_element([&](int i, int j) { image(i, j) = 7 * i * i + 3 + j; });
+    const auto summed = [&, extent = extent, is_twice = is_twice](bool is_scheduled) {
+      Var x("x"), y("y");
+      RVar outer("outer"), inner("inner"), lane("lane"), both("both");
+      RDom r(0, extent, 0, 3);
+      Func f("f"), g("g"), sum("sum");
+      f(x, y) = select(x < extent, image(clamp(x, 0, extent - 1), y), 0);
+      g(x, y) = f(x, y) + 10 * f(x + 3, y);
+      sum() = 0;
+      sum() += g(r.x, r.y);
+      if (is_scheduled) {
+        sum.update().split(r.x, outer, inner, 8, TailStrategy::GuardWithIf);
+        if (is_twice) sum.update().split(inner, inner, lane, 8, TailStrategy::GuardWithIf);
+        sum.update().fuse(outer, r.y, both);
+        g.compute_at(sum, inner);
+        f.store_root().compute_at(sum, inner);
+      }
+      return Buffer<int>(sum.realize())();
+    };
+    EXPECT_EQ(summed(true), summed(false)) << extent;
+  }
+}
+
 TEST_F(SlidingWindow, SlidesInBothDimensions) {
   expect_same([&](bool scheduled) {
     Func f("f"), g("g");

@@ -29,6 +29,16 @@ Expr without_markers(const Expr& e) {
 
 namespace {
 
+// A split promises where its loop variable lies. It does not speak of the iterations of a warm-up,
+// nor of the one before the first, whose front is where the first part begins.
+Expr without_promises(const Expr& e) {
+  return rewrite(e, [](const Expr& node, const std::function<Expr(const Expr&)>& recurse) {
+    const Call* call = node.as<Call>();
+    return call && call->is_op(Op::promise_clamped) ? recurse(call->args[0])
+                                                    : map_children(node, recurse);
+  });
+}
+
 constexpr int longest_warm_up = 256;
 constexpr int undecided_steps = 4;  // of a warm-up whose length is not a constant so far
 
@@ -105,7 +115,7 @@ class Slider {
   }
   std::optional<int64_t> difference(const Expr& a, const Expr& b) const {
     Expr ahead = is_upwards_ ? a - b : b - a;
-    return as_const_int(simplify(without_markers(ahead), facts_));
+    return as_const_int(simplify(without_promises(without_markers(ahead)), facts_));
   }
 
   // No values in common with the iteration before: nothing to gain.
@@ -142,6 +152,7 @@ class Slider {
       if (!ahead || *ahead > 0) continue;
       slide.lead = k;
       slide.part = from(*fresh);
+      slide.part = {without_promises(slide.part.min), without_promises(slide.part.max)};
       return true;
     }
     return false;
@@ -161,6 +172,7 @@ class Slider {
     slide.lead = lead;
     slide.starts_whole = true;
     slide.part = from(select(variable(slide.loop.name) <= start, first, *fresh));
+    if (lead > 0) slide.part = {without_promises(slide.part.min), without_promises(slide.part.max)};
     return true;
   }
 
