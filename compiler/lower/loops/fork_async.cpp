@@ -107,6 +107,14 @@ Names realized_in(const Stmt& s) {
   return names;
 }
 
+Names produced_in(const Stmt& s) {
+  Names names;
+  walk(s, [&](const ProducerConsumer& n) {
+    if (n.produces) names.insert(n.name);
+  });
+  return names;
+}
+
 // Whether anything but the computation of the Func itself reads it.
 bool is_read_outside(const Stmt& s, const std::string& func) {
   bool found = false;
@@ -246,11 +254,15 @@ class AsyncForker : public StatementRewriter {
     return s;
   }
 
-  // Both branches may compute a Func only where each has storage for it.
+  // Both branches may compute a Func, in its own loops or in those of another, only where each has
+  // storage for it.
   void check_is_apart(const Realize& n, const Names& made, const Stmt& producer,
                       const Stmt& consumer) const {
     const Names inside = realized_in(n.body);
-    for (const std::string& other : made) {
+    Names computed = produced_in(producer);
+    computed.insert(made.begin(), made.end());
+    computed.erase(n.name);
+    for (const std::string& other : computed) {
       const LoopedFunc* f = program_.find(other);
       const bool is_output = f && f->is_output && is_read_outside(producer, other);
       if (inside.count(other) || (!is_output && !produces(consumer, other))) continue;

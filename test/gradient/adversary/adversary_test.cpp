@@ -34,6 +34,19 @@ TEST_P(Adversary, IsRightOrRefused) {
 
 INSTANTIATE_TEST_SUITE_P(Shard, Adversary, ::testing::Range(0u, shards));
 
+// Under random schedules: what two threads computed in memory of both (4402864), read before it was
+// there (4300969), and never computed (4400916).
+TEST(AdversaryFindings, ProgramsWhoseMachineCodeWasWrongAreRight) {
+  for (const unsigned seed : {4300969u, 4400916u, 4402864u}) {
+    for (int run = 0; run < 3; ++run) {
+      Choices choices(seed);
+      const Judged judged = judge(choices, true);
+      EXPECT_LT(judged.judgement, Judgement::Wrong)
+          << "fuzz_adjoints --seed " << seed << ": " << judged.detail;
+    }
+  }
+}
+
 Var x("x");
 
 // out(x) = value(image) over an image of `natural_size` equal elements.
