@@ -197,6 +197,19 @@ TEST_F(Jacobians, OfBordersStayNarrow) {
   expect_right(f, {n}, a, j);
 }
 
+// Which reads which has pieces without integer points: isl 0.25 ends by a signal when it joins them.
+TEST_F(Jacobians, OfMirroredBorders) {
+  Buffer<float> wide = random_image({10}, 0.25, 1.5, 3);
+  wide.set_min({-2});
+  Func around("around"), f("f");
+  around(x) = wide(x - 2) + wide(x);
+  f(x) = BoundaryConditions::mirror_image(around, {{0, 4}})(x + 3) * around(x + 3);
+  expect_right(f, {5}, wide, jacobian(f, wide, {{0, 5}}));
+  Func narrow("narrow");
+  narrow(x) = BoundaryConditions::mirror_image(around, {{0, 3}})(x + 3) + around(x + 3);
+  expect_right(narrow, {5}, wide, jacobian(narrow, wide, {{0, 5}}));
+}
+
 TEST_F(Jacobians, TakeRowsWhereOutputsAreFewer) {
   Func f("f");
   RDom r(0, n);

@@ -12,6 +12,7 @@
 #include <optional>
 #include <set>
 #include <string>
+#include <type_traits>
 #include <unordered_map>
 #include <vector>
 
@@ -54,15 +55,18 @@ auto found_within(isl_ctx* ctx, unsigned long operations, const Search& search) 
   return result;
 }
 
-// The same with fewer pieces: those that are one are joined. Never cut short by the budget: isl 0.25
-// reads through the null pointers that a failure within coalesce leaves.
+// The same with fewer pieces: those that are one are joined. isl 0.25 reads through the null pointers
+// that a failure within coalesce leaves, so it is not cut short by the budget, and gets no pieces of
+// sets and maps that hold rational points, but no integer ones.
 template <class Pieces>
 Pieces coalesced(const Pieces& pieces) {
   isl_ctx* const ctx = pieces.ctx().get();
   throw_if_failed(ctx);
   const unsigned long most = isl_ctx_get_max_operations(ctx);
   isl_ctx_set_max_operations(ctx, 0);
-  Pieces result = pieces.coalesce();
+  Pieces result = pieces;
+  if constexpr (!std::is_same_v<Pieces, isl::pw_aff>) result = result.detect_equalities();
+  result = result.coalesce();
   isl_ctx_set_max_operations(ctx, most);
   return result;
 }
