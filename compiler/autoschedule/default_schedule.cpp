@@ -219,14 +219,14 @@ void give_default_schedule(const std::vector<FuncPtr>& outputs, const VectorUnit
     if (is_touched(*f)) continue;
     Func(f).compute_root();
     if (f->is_extern() || limits.levels.contains(f.get())) continue;
-    if (const auto lanes = scatter_lanes(*f)) {
-      schedule_scatter_lanes(f, *lanes);
+    if (const auto lanes = scatter_lanes(*f, sizes)) {
+      schedule_scatter_lanes(f, *lanes, sizes);
       continue;
     }
     for (int s = 0; s < f->stage_count(); ++s) LoopChooser(f, s, unit, sizes).give();
     given.push_back(f);
   }
-  compute_in_slices(outputs, stored, whole);
+  compute_in_slices(outputs, stored, whole, sizes);
   join_sweeps(outputs, given, sizes);
   for (const FuncPtr& f : order) {  // so that the log tells of every Func
     const bool is_output = std::find(outputs.begin(), outputs.end(), f) != outputs.end();

@@ -19,13 +19,6 @@ constexpr int most_lanes = 16;
 constexpr int64_t least_lanes = 4;  // of a dimension that is worth vectors
 constexpr int64_t few_values = 4;   // iterations that are unrolled
 
-int64_t estimated_extent(const FuncContents& f, size_t d) {
-  for (const Bound& estimate : f.schedule.estimates) {
-    if (estimate.var == f.args[d]) return as_const_int(estimate.extent).value_or(0);
-  }
-  return 0;
-}
-
 bool adds_to_itself(const FuncContents& f, const Definition& update) {
   return std::all_of(update.values.begin(), update.values.end(), [&](const Expr& value) {
     const auto* sum = value.as<Add>();
@@ -113,12 +106,13 @@ void schedule_zeros(const FuncPtr& f, const std::vector<Var>& dims, int width) {
   vectorize(zeros, dims[0], width, TailStrategy::GuardWithIf);
 }
 
-void schedule_update(const FuncPtr& f, int s, const Roles& roles, int width) {
+void schedule_update(const FuncPtr& f, int s, const Roles& roles, int width,
+                     const SizeEstimate& sizes) {
   const Definition& update = f->stage(s);
   Stage stage(f, s);
   std::vector<VarOrRVar> inner, outer;
   for (const size_t d : roles.independent) {
-    const int64_t extent = estimated_extent(*f, d);
+    const int64_t extent = sizes.extent(*f, d).value_or(0);
     const bool is_lanes = inner.empty(), is_short = extent > 1 && extent <= few_values;
     const Var all(f->args[d]);
     outer.push_back(all);
@@ -142,7 +136,7 @@ void schedule_update(const FuncPtr& f, int s, const Roles& roles, int width) {
 
 }  // namespace
 
-std::optional<ScatterLanes> scatter_lanes(const FuncContents& f) {
+std::optional<ScatterLanes> scatter_lanes(const FuncContents& f, const SizeEstimate& sizes) {
   if (f.is_extern() || (f.made && f.made->lanes > 0)) return {};
   if (!std::any_of(f.updates.begin(), f.updates.end(),
                    [&](const Definition& update) { return scatters(f, update); }))
@@ -150,8 +144,9 @@ std::optional<ScatterLanes> scatter_lanes(const FuncContents& f) {
   int64_t most = 0;
   size_t lanes = 0;
   for (size_t d = 0; d < f.args.size(); ++d) {
-    if (!is_independent(f, d) || moves_places(f, d) || estimated_extent(f, d) <= most) continue;
-    most = estimated_extent(f, d);
+    const int64_t extent = sizes.extent(f, d).value_or(0);
+    if (!is_independent(f, d) || moves_places(f, d) || extent <= most) continue;
+    most = extent;
     lanes = d;
   }
   if (most < least_lanes) return {};
@@ -160,7 +155,8 @@ std::optional<ScatterLanes> scatter_lanes(const FuncContents& f) {
   return ScatterLanes{lanes, width};
 }
 
-void schedule_scatter_lanes(const FuncPtr& f, const ScatterLanes& lanes) {
+void schedule_scatter_lanes(const FuncPtr& f, const ScatterLanes& lanes,
+                            const SizeEstimate& sizes) {
   const Roles roles = roles_of(*f, lanes.dimension);
   std::vector<Var> dims;
   for (const std::vector<size_t>& some : {roles.independent, roles.scattered, roles.apart}) {
@@ -168,7 +164,7 @@ void schedule_scatter_lanes(const FuncPtr& f, const ScatterLanes& lanes) {
   }
   Func(f).reorder_storage(dims);
   schedule_zeros(f, dims, lanes.width);
-  for (int s = 1; s < f->stage_count(); ++s) schedule_update(f, s, roles, lanes.width);
+  for (int s = 1; s < f->stage_count(); ++s) schedule_update(f, s, roles, lanes.width, sizes);
 }
 
 // ---- vectors of iterations ----

@@ -13,6 +13,7 @@
 
 #include <optional>
 
+#include "autoschedule/size_estimate.h"
 #include "frontend/schedule/stage.h"
 #include "graph/function.h"
 
@@ -27,9 +28,9 @@ struct ScatterLanes {
 };
 
 // The dimension that is worth vectors, of a Func whose updates scatter along others.
-std::optional<ScatterLanes> scatter_lanes(const FuncContents& f);
+std::optional<ScatterLanes> scatter_lanes(const FuncContents& f, const SizeEstimate& sizes);
 // All of f, computed at root.
-void schedule_scatter_lanes(const FuncPtr& f, const ScatterLanes& lanes);
+void schedule_scatter_lanes(const FuncPtr& f, const ScatterLanes& lanes, const SizeEstimate& sizes);
 
 // Whether the stage adds to places that data decide, along the first dimension too, over a loop that
 // is worth vectors of iterations.

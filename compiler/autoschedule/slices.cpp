@@ -1,18 +1,15 @@
 #include "autoschedule/slices.h"
 
 #include <algorithm>
-#include <map>
 #include <optional>
 #include <string>
 #include <unordered_map>
 
-#include "analysis/interval.h"
 #include "frontend/language/func.h"
 #include "frontend/schedule/loop_level.h"
 #include "graph/own_reads.h"
 #include "ir/build.h"
 #include "ir/lets.h"
-#include "simplify/simplify.h"
 
 namespace retrograde::ir {
 
@@ -21,54 +18,6 @@ namespace {
 constexpr int64_t tasks = 8;  // iterations of the outermost loop, which runs in parallel
 constexpr size_t slice_dimensions =
     2;  // at least: rows alone are too little work for an allocation
-
-// Ends that are constants; others are unknown.
-Interval constant_part(const Interval& range) {
-  Interval result = Interval::everything();
-  if (range.min.defined() && as_const_int(simplify(range.min))) result.min = simplify(range.min);
-  if (range.max.defined() && as_const_int(simplify(range.max))) result.max = simplify(range.max);
-  return result;
-}
-
-// Which part of each Func others read, as far as that is constant: consumers first.
-class ConstantRegions {
- public:
-  ConstantRegions(const std::vector<FuncPtr>& order, const std::vector<FuncPtr>& outputs) {
-    for (const FuncPtr& f : outputs) boxes_[f.get()].assign(f->args.size(), Interval::everything());
-    for (auto f = order.rbegin(); f != order.rend(); ++f) {
-      for (int s = 0; s < (*f)->stage_count(); ++s) note_reads(**f, (*f)->stage(s));
-    }
-  }
-  std::optional<int64_t> extent(const FuncContents& f, size_t d) const {
-    const auto found = boxes_.find(&f);
-    if (found == boxes_.end() || found->second.empty() || !found->second[d].is_bounded())
-      return std::nullopt;
-    return as_const_int(simplify(found->second[d].max - found->second[d].min + 1));
-  }
-
- private:
-  void note_reads(const FuncContents& f, const Definition& stage) {
-    Scope<Interval> scope;
-    const Box& own = boxes_[&f];
-    for (size_t d = 0; d < f.args.size(); ++d) {
-      if (is_pure_position(f, stage, d))
-        scope.push(f.args[d], own.empty() ? Interval::everything() : own[d]);
-    }
-    for (const ReductionVariable& r : stage.rvars)
-      scope.push(r.var, constant_part({r.min, r.min + r.extent - 1}));
-    walk_definition(stage, [&](const Expr& e) {
-      const auto* call = e.as<Call>();
-      if (!call || call->call_type != CallType::Func || call->symbol.raw() == &f) return;
-      Box box;
-      for (const Expr& arg : call->args)
-        box.push_back(constant_part(bounds_of(without_lets(arg), scope)));
-      Box& all = boxes_[call->symbol.raw()];
-      all = hull(all, box);
-    });
-  }
-
-  std::unordered_map<const Symbol*, Box> boxes_;
-};
 
 // Without markers and clamps to constants.
 Expr unclamped(const Expr& e) {
@@ -80,6 +29,13 @@ Expr unclamped(const Expr& e) {
   return is_const(n->b) ? unclamped(n->a) : is_const(n->a) ? unclamped(n->b) : e;
 }
 
+bool is_split(const Definition& stage, const std::string& var) {
+  const auto& splits = stage.schedule.splits;
+  return std::any_of(splits.begin(), splits.end(), [&](const Split& split) {
+    return split.old_var == var || split.outer == var || split.inner == var;
+  });
+}
+
 // The only stage that reads a Func.
 struct Reader {
   FuncPtr func;
@@ -89,10 +45,11 @@ struct Reader {
 
 class Slicer {
  public:
-  Slicer(const std::vector<FuncPtr>& outputs, const std::vector<FuncPtr>& stored)
-      : order_(topological_order(outputs)), regions_(order_, outputs), outputs_(outputs) {
+  Slicer(const std::vector<FuncPtr>& outputs, const std::vector<FuncPtr>& stored,
+         const SizeEstimate& sizes)
+      : sizes_(sizes), outputs_(outputs) {
     for (const FuncPtr& f : stored) stored_.insert(f.get());
-    for (const FuncPtr& f : order_) {
+    for (const FuncPtr& f : topological_order(outputs)) {
       for (const FuncPtr& callee : direct_callees(*f)) readers_[callee.get()].push_back(f);
       const bool is_block = f->made && f->made->blocks > 0;  // see default_schedule.cpp
       for (const LoopLevel& level : {f->schedule.compute_level, f->schedule.store_level}) {
@@ -149,18 +106,14 @@ class Slicer {
   std::optional<int64_t> extent_of(const Reader& reader, const Dim& dim) const {
     const FuncContents& g = *reader.func;
     const Definition& stage = g.stage(reader.stage);
-    const auto& splits = stage.schedule.splits;
     const auto arg = std::find(g.args.begin(), g.args.end(), dim.var);
-    const bool is_split = std::any_of(splits.begin(), splits.end(), [&](const Split& split) {
-      return split.old_var == dim.var || split.outer == dim.var || split.inner == dim.var;
-    });
-    if (arg == g.args.end() || dim.is_reduction || is_split) return std::nullopt;
+    if (arg == g.args.end() || dim.is_reduction || is_split(stage, dim.var)) return std::nullopt;
     const auto d = static_cast<size_t>(arg - g.args.begin());
-    return is_pure_position(g, stage, d) ? regions_.extent(g, d) : std::nullopt;
+    return is_pure_position(g, stage, d) ? sizes_.extent(g, d) : std::nullopt;
   }
 
   // Every read has the variable as one and the same index, and in no other; along it each element is
-  // computed for itself.
+  // computed for itself, not in tiles that share what they read.
   static bool is_sliced(const FuncContents& f, const Reader& reader, const std::string& var) {
     std::optional<size_t> dimension;
     for (const Call* read : reader.reads) {
@@ -174,13 +127,14 @@ class Slicer {
       const bool is_used = dimension && uses_variable(read->args[*dimension], var);
       if (!is_used) return false;
     }
-    return dimension && std::all_of(f.updates.begin(), f.updates.end(), [&](const Definition& u) {
-             return is_pure_position(f, u, *dimension);
-           });
+    for (int s = 0; dimension && s < f.stage_count(); ++s) {
+      const bool is_apart = is_pure_position(f, f.stage(s), *dimension);
+      if (!is_apart || is_split(f.stage(s), f.args[*dimension])) return false;
+    }
+    return dimension.has_value();
   }
 
-  const std::vector<FuncPtr> order_;
-  const ConstantRegions regions_;
+  const SizeEstimate& sizes_;
   const std::vector<FuncPtr>& outputs_;
   std::unordered_set<const Symbol*> stored_;
   std::unordered_map<const Symbol*, std::vector<FuncPtr>> readers_;
@@ -190,12 +144,12 @@ class Slicer {
 }  // namespace
 
 void compute_in_slices(const std::vector<FuncPtr>& outputs, const std::vector<FuncPtr>& stored,
-                       const std::unordered_set<const Symbol*>& but) {
+                       const std::unordered_set<const Symbol*>& but, const SizeEstimate& sizes) {
   const auto may_have_slices = [&](const FuncPtr& f) {
     return f->args.size() > slice_dimensions && !f->is_extern() && !but.contains(f.get());
   };
   if (std::none_of(stored.begin(), stored.end(), may_have_slices)) return;
-  const Slicer slicer(outputs, stored);  // before anything is moved
+  const Slicer slicer(outputs, stored, sizes);  // before anything is moved
   for (const FuncPtr& f : stored) {
     if (!may_have_slices(f) || !slicer.is_inside(f) || slicer.is_output(f)) continue;
     const auto reader = slicer.only_reader(f);

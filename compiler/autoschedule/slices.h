@@ -14,6 +14,7 @@
 #include <unordered_set>
 #include <vector>
 
+#include "autoschedule/size_estimate.h"
 #include "graph/function.h"
 
 namespace retrograde::ir {
@@ -22,6 +23,6 @@ namespace retrograde::ir {
 // the loops of their only reader, if that is one of them, too. `but`: none of these, as a reader
 // neither.
 void compute_in_slices(const std::vector<FuncPtr>& outputs, const std::vector<FuncPtr>& stored,
-                       const std::unordered_set<const Symbol*>& but);
+                       const std::unordered_set<const Symbol*>& but, const SizeEstimate& sizes);
 
 }  // namespace retrograde::ir
