@@ -1,6 +1,6 @@
 // gradient_local_laplacian -- local Laplacian filters of 8 levels and 4 greys (Paris, Hasinoff and
 // Kautz 2011), each level with a gain: by picture and gains.
-#include "gradient.h"
+#include "pyramid.h"
 
 namespace {
 
@@ -18,17 +18,19 @@ class GradientLocalLaplacian : public Halide::Generator<GradientLocalLaplacian> 
     Func picture = programs::values_of(image, "picture", {512, 384});
     Func gain = programs::values_of(detail, "gain", {8});
 
+    programs::Pyramid pyramid;
     const int levels = 8, greys = 4;
     std::vector<Func> remapped(levels), own(levels);
     std::vector<std::vector<int>> size = {{512, 384, greys}};
     Expr difference = picture(x, y) - cast<float>(c) / (greys - 1);
     remapped[0](x, y, c) = picture(x, y) + 0.5f * difference * exp(-4.0f * difference * difference);
     own[0](x, y, c) = picture(x, y);
-    stages.push_back(remapped[0]);
+    pyramid.stages.push_back(remapped[0]);
     for (int j = 1; j < levels; j++) {
-      remapped[j] = smaller(remapped[j - 1], size[j - 1], "remapped_" + std::to_string(j));
-      own[j] = smaller(own[j - 1], {size[j - 1][0], size[j - 1][1], 1}, "own_" + std::to_string(j));
-      size.push_back({half(size[j - 1][0]), half(size[j - 1][1]), greys});
+      remapped[j] = pyramid.smaller(remapped[j - 1], size[j - 1], "remapped_" + std::to_string(j));
+      own[j] = pyramid.smaller(own[j - 1], {size[j - 1][0], size[j - 1][1], 1},
+                               "own_" + std::to_string(j));
+      size.push_back({programs::half(size[j - 1][0]), programs::half(size[j - 1][1]), greys});
     }
     Func result;
     for (int j = levels - 1; j >= 0; j--) {
@@ -38,18 +40,19 @@ class GradientLocalLaplacian : public Halide::Generator<GradientLocalLaplacian> 
       Func band("band_" + number), mixed("mixed_" + number);
       Expr detail_of = remapped[j](x, y, c);
       if (j < levels - 1)
-        detail_of -= larger(remapped[j + 1], size[j + 1], "base_" + number)(x, y, c);
+        detail_of -= pyramid.larger(remapped[j + 1], size[j + 1], "base_" + number)(x, y, c);
       band(x, y, c) = detail_of;
       Expr value = gain(j) * lerp(band(x, y, low), band(x, y, low + 1), share);
       if (j < levels - 1)
-        value += larger(result, {size[j + 1][0], size[j + 1][1], 1}, "up_" + number)(x, y, 0);
+        value +=
+            pyramid.larger(result, {size[j + 1][0], size[j + 1][1], 1}, "up_" + number)(x, y, 0);
       mixed(x, y, c) = value;
-      stages.insert(stages.end(), {band, mixed});
+      pyramid.stages.insert(pyramid.stages.end(), {band, mixed});
       result = mixed;
     }
     Func grey("grey");
     grey(x, y) = result(x, y, 0);
-    programs::store(stages, primal);
+    programs::store(pyramid.stages, primal);
     programs::Weighed weighed(grey, seed, {512, 384}, primal);
     sum() = weighed.sum();
     d_image = weighed.by(picture);
@@ -64,33 +67,6 @@ class GradientLocalLaplacian : public Halide::Generator<GradientLocalLaplacian> 
 
  private:
   Var x{"x"}, y{"y"}, c{"c"};
-
-  // Half the size, and twice: 1 3 3 1 along both axes, and what undoes it best.
-  static int half(int n) { return (n + 1) / 2; }
-  Func smaller(Func f, std::vector<int> size, const std::string& name) {
-    auto smooth = [](auto at) { return (at(-1) + 3.0f * (at(0) + at(1)) + at(2)) * 0.125f; };
-    Func rows(name + "_rows"), small(name);
-    rows(x, y, c) = smooth([&](int d) { return programs::nearest(f, size, {x, 2 * y + d, c}); });
-    const std::vector<int> narrow = {size[0], half(size[1]), size[2]};
-    small(x, y, c) = smooth([&](int d) {
-      return programs::nearest(rows, narrow, {2 * x + d, y, c});
-    });
-    stages.insert(stages.end(), {rows, small});
-    return small;
-  }
-  Func larger(Func f, std::vector<int> size, const std::string& name) {
-    Func rows(name + "_rows"), large(name);
-    auto mix = [](Expr near, Expr far) { return 0.75f * near + 0.25f * far; };
-    rows(x, y, c) = mix(programs::nearest(f, size, {x, y / 2, c}),
-                        programs::nearest(f, size, {x, y / 2 - 1 + 2 * (y % 2), c}));
-    const std::vector<int> tall = {size[0], 2 * size[1], size[2]};
-    large(x, y, c) = mix(programs::nearest(rows, tall, {x / 2, y, c}),
-                         programs::nearest(rows, tall, {x / 2 - 1 + 2 * (x % 2), y, c}));
-    stages.insert(stages.end(), {rows, large});
-    return large;
-  }
-
-  std::vector<Func> stages;
 };
 
 }  // namespace

@@ -45,20 +45,9 @@ bool uses_loops(const Expr& e, const std::vector<Loop>& loops) {
                      [&](const Loop& loop) { return uses_variable(e, loop.name); });
 }
 
-// Without markers, and without clamps to what is the same for all iterations.
-Expr unclamped(const Expr& e, const std::vector<Loop>& loops) {
-  const auto* call = e.as<Call>();
-  if (call && call->call_type == CallType::Operator && op_info(call->op).cls == OpClass::Marker)
-    return unclamped(call->args[0], loops);
-  if (e.kind() != Kind::Min && e.kind() != Kind::Max) return e;
-  const auto* n = e.as<Binary>();
-  if (!uses_loops(n->b, loops)) return unclamped(n->a, loops);
-  return uses_loops(n->a, loops) ? e : unclamped(n->b, loops);
-}
-
 // Iterations for each value of one index; nothing when it is not linear in the loops.
 std::optional<double> iterations_a_value(const Expr& any_index, std::vector<Loop>& loops) {
-  const Expr index = unclamped(any_index, loops);
+  const Expr index = unclamped(any_index, [&](const Expr& e) { return uses_loops(e, loops); });
   const auto* quotient = index.as<Div>();
   if (auto divisor = quotient ? as_const_int(quotient->b) : std::nullopt; divisor && *divisor > 0) {
     auto found = iterations_a_value(quotient->a, loops);
@@ -99,6 +88,16 @@ double reads_an_element(const Call& call, const FuncContents& reader, const Defi
     if (!loop.is_used) reads *= loop.extent;
   }
   return reads;
+}
+
+Expr unclamped(const Expr& e, const std::function<bool(const Expr&)>& moves) {
+  const auto* call = e.as<Call>();
+  if (call && call->call_type == CallType::Operator && op_info(call->op).cls == OpClass::Marker)
+    return unclamped(call->args[0], moves);
+  if (e.kind() != Kind::Min && e.kind() != Kind::Max) return e;
+  const auto* n = e.as<Binary>();
+  if (!moves(n->b)) return unclamped(n->a, moves);
+  return moves(n->a) ? e : unclamped(n->b, moves);
 }
 
 }  // namespace retrograde::ir

@@ -2,6 +2,8 @@
 // is weighed against.
 #pragma once
 
+#include <functional>
+
 #include "graph/function.h"
 
 namespace retrograde::ir {
@@ -9,5 +11,8 @@ namespace retrograde::ir {
 // `reader` has the stage. A guess where data decide the place, or extents are known at run time
 // only.
 double reads_an_element(const Call& call, const FuncContents& reader, const Definition& stage);
+
+// An index without markers, and without clamps to what does not move.
+Expr unclamped(const Expr& e, const std::function<bool(const Expr&)>& moves);
 
 }  // namespace retrograde::ir

@@ -5,6 +5,7 @@
 #include <string>
 #include <unordered_map>
 
+#include "autoschedule/read_estimate.h"
 #include "frontend/language/func.h"
 #include "frontend/schedule/loop_level.h"
 #include "graph/own_reads.h"
@@ -16,18 +17,8 @@ namespace retrograde::ir {
 namespace {
 
 constexpr int64_t tasks = 8;  // iterations of the outermost loop, which runs in parallel
-constexpr size_t slice_dimensions =
-    2;  // at least: rows alone are too little work for an allocation
-
-// Without markers and clamps to constants.
-Expr unclamped(const Expr& e) {
-  const auto* call = e.as<Call>();
-  if (call && call->call_type == CallType::Operator && op_info(call->op).cls == OpClass::Marker)
-    return unclamped(call->args[0]);
-  if (e.kind() != Kind::Min && e.kind() != Kind::Max) return e;
-  const auto* n = e.as<Binary>();
-  return is_const(n->b) ? unclamped(n->a) : is_const(n->a) ? unclamped(n->b) : e;
-}
+// At least; rows alone are too little work for an allocation.
+constexpr size_t slice_dimensions = 2;
 
 bool is_split(const Definition& stage, const std::string& var) {
   const auto& splits = stage.schedule.splits;
@@ -113,23 +104,23 @@ class Slicer {
   }
 
   // Every read has the variable as one and the same index, and in no other; along it each element is
-  // computed for itself, not in tiles that share what they read.
+  // computed for itself.
   static bool is_sliced(const FuncContents& f, const Reader& reader, const std::string& var) {
+    const auto moves = [&](const Expr& e) { return uses_variable(e, var); };
     std::optional<size_t> dimension;
     for (const Call* read : reader.reads) {
       for (size_t d = 0; d < read->args.size(); ++d) {
         const Expr index = without_lets(read->args[d]);
-        if (!uses_variable(index, var)) continue;
-        const auto* variable = unclamped(index).as<Variable>();
+        if (!moves(index)) continue;
+        const auto* variable = unclamped(index, moves).as<Variable>();
         if (!variable || variable->name != var || dimension.value_or(d) != d) return false;
         dimension = d;
       }
-      const bool is_used = dimension && uses_variable(read->args[*dimension], var);
+      const bool is_used = dimension && moves(read->args[*dimension]);
       if (!is_used) return false;
     }
     for (int s = 0; dimension && s < f.stage_count(); ++s) {
-      const bool is_apart = is_pure_position(f, f.stage(s), *dimension);
-      if (!is_apart || is_split(f.stage(s), f.args[*dimension])) return false;
+      if (!is_pure_position(f, f.stage(s), *dimension)) return false;
     }
     return dimension.has_value();
   }
@@ -145,8 +136,11 @@ class Slicer {
 
 void compute_in_slices(const std::vector<FuncPtr>& outputs, const std::vector<FuncPtr>& stored,
                        const std::unordered_set<const Symbol*>& but, const SizeEstimate& sizes) {
+  // Partial sums are computed in tiles, which share what they read: once for all of them.
   const auto may_have_slices = [&](const FuncPtr& f) {
-    return f->args.size() > slice_dimensions && !f->is_extern() && !but.contains(f.get());
+    const bool is_partial = f->made && (f->made->lanes > 0 || f->made->has_parts);
+    return f->args.size() > slice_dimensions && !f->is_extern() && !is_partial &&
+           !but.contains(f.get());
   };
   if (std::none_of(stored.begin(), stored.end(), may_have_slices)) return;
   const Slicer slicer(outputs, stored, sizes);  // before anything is moved

@@ -11,6 +11,17 @@ class Programs : public ::testing::Test {
  protected:
   Buffer<float> a = random_image({9}, 0.25, 2, 1);
   Buffer<float> image = random_image({7, 6}, 0.25, 2, 2);
+
+  // The gradient by what the image is, of its size.
+  void expect_right(const Func& loss, const Func& gradient) {
+    const oracle::Region region = oracle::region_of(*image.raw_buffer());
+    const oracle::Array found = evaluate(gradient, region);
+    region.for_each([&](const std::vector<int>& point) {
+      const double expected = difference(loss, image, point);
+      EXPECT_NEAR(found.at(point).scalar.as_double(), expected, 1e-5 * (1 + std::abs(expected)));
+    });
+    expect_machine_code_agrees(gradient, region);
+  }
 };
 
 // Cells are found from float coordinates, as those of an image are when it is scaled.
@@ -70,14 +81,7 @@ TEST_F(Programs, BoundaryConditionsOfParametricSize) {
     Func blur("blur");
     blur(x, y) = bounded(x - 2, y) * 0.5f + bounded(x + 1, y - 1) * bounded(x, y + 2);
     Func loss = weighted_sum(blur, {7, 6});
-    Func gradient = propagate_adjoints(loss)(in);
-    oracle::Region region{{0, 0}, {7, 6}};
-    oracle::Array found = evaluate(gradient, region);
-    region.for_each([&](const std::vector<int>& point) {
-      double expected = difference(loss, image, point);
-      EXPECT_NEAR(found.at(point).scalar.as_double(), expected, 1e-5 * (1 + std::abs(expected)));
-    });
-    expect_machine_code_agrees(gradient, region);
+    expect_right(loss, propagate_adjoints(loss)(in));
   }
 }
 
@@ -177,14 +181,7 @@ TEST_F(Programs, ParametricSizes) {
   loss() += down(all.x, all.y) * cast<float>(all.x + 2 * all.y + 1);
   Derivative d = propagate_adjoints(loss);
   expect_gradient(loss, d, kernel);
-  Func gradient = d(in);
-  oracle::Region region{{0, 0}, {7, 6}};
-  oracle::Array found = evaluate(gradient, region);
-  region.for_each([&](const std::vector<int>& point) {
-    double expected = difference(loss, image, point);
-    EXPECT_NEAR(found.at(point).scalar.as_double(), expected, 1e-5 * (1 + std::abs(expected)));
-  });
-  expect_machine_code_agrees(gradient, region);
+  expect_right(loss, d(in));
 }
 
 // Of a recurrence whose steps are counted at run time, those that read the end of the clamp may be

@@ -323,17 +323,6 @@ PROGRAM(recurrence_in_time) {
   return {weighted_sum(u, {9, 5}), {a}};
 }
 
-PROGRAM(diffusion_in_time_over_a_stencil) {
-  Buffer<float> a = line();
-  Func u("u");
-  RDom r(0, 9, 0, 4);
-  u(x, t) = 0.0f;
-  u(x, 0) = a(clamp(x, 0, 8));
-  Expr left = u(clamp(r.x - 1, 0, 8), r.y), right = u(clamp(r.x + 1, 0, 8), r.y), mid = u(r.x, r.y);
-  u(r.x, r.y + 1) = mid + 0.25f * (left - 2.0f * mid + right) + 0.125f * mid * left;
-  return {weighted_sum(u, {9, 5}), {a}};
-}
-
 PROGRAM(coupled_tuple_recurrence) {
   Buffer<float> a = line();
   Func s("s");

@@ -144,26 +144,35 @@ PROGRAM(symplectic_euler_in_two_updates) {
   return {weighted_sum(g, {7}), {a}};
 }
 
-PROGRAM(diffusion_over_a_stencil) {
+// u(x, t + 1) = step(u(x - 1, t), u(x, t), u(x + 1, t)), with the ends of the line as they are.
+template <class Step>
+Program steps_over_a_stencil(int steps, const Step& step) {
   Buffer<float> a = line();
   Func u("u");
-  RDom r(0, 9, 0, 3);
+  RDom r(0, 9, 0, steps);
   u(x, t) = 0.0f;
   u(x, 0) = a(clamp(x, 0, 8));
-  Expr left = u(clamp(r.x - 1, 0, 8), r.y), right = u(clamp(r.x + 1, 0, 8), r.y);
-  u(r.x, r.y + 1) = u(r.x, r.y) + 0.25f * (left - 2.0f * u(r.x, r.y) + right);
-  return {weighted_sum(u, {9, 4}), {a}};
+  const auto now = [&](const Expr& at) { return Expr(u(at, r.y)); };
+  u(r.x, r.y + 1) = step(now(clamp(r.x - 1, 0, 8)), now(r.x), now(clamp(r.x + 1, 0, 8)));
+  return {weighted_sum(u, {9, steps + 1}), {a}};
+}
+
+PROGRAM(diffusion_over_a_stencil) {
+  return steps_over_a_stencil(3, [](const Expr& left, const Expr& mid, const Expr& right) {
+    return mid + 0.25f * (left - 2.0f * mid + right);
+  });
+}
+
+PROGRAM(reaction_and_diffusion_over_a_stencil) {
+  return steps_over_a_stencil(4, [](const Expr& left, const Expr& mid, const Expr& right) {
+    return mid + 0.25f * (left - 2.0f * mid + right) + 0.125f * mid * left;
+  });
 }
 
 PROGRAM(burgers_over_a_stencil) {
-  Buffer<float> a = line();
-  Func u("u");
-  RDom r(0, 9, 0, 3);
-  u(x, t) = 0.0f;
-  u(x, 0) = a(clamp(x, 0, 8));
-  Expr left = u(clamp(r.x - 1, 0, 8), r.y), mid = u(r.x, r.y);
-  u(r.x, r.y + 1) = mid - 0.125f * mid * (mid - left);
-  return {weighted_sum(u, {9, 4}), {a}};
+  return steps_over_a_stencil(3, [](const Expr& left, const Expr& mid, const Expr&) {
+    return mid - 0.125f * mid * (mid - left);
+  });
 }
 
 PROGRAM(wave_with_two_steps_of_memory) {

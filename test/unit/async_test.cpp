@@ -121,10 +121,7 @@ TEST_P(Async, ASlidingWindowIsHandedOverRowByRow) {
 TEST_P(Async, FoldedStorageIsARingBuffer) {
   for (int rows : {3, 4, 5, 8, 16}) {
     Stencil program;
-    ir::StorageRule rule;
-    rule.var = program.f.function()->args[1];
-    rule.fold = rows;
-    program.f.function()->schedule.storage_rules.push_back(rule);
+    program.f.fold_storage(program.y, rows);
     limit(program.out);
     for (int round = 0; round < 3; round++) program.expect(33, 61);
   }
@@ -442,12 +439,7 @@ TEST_P(Async, AnErrorOfTheProducerReleasesTheConsumer) {
     f(x, y) = require(y != bad, x + y, "row", y, "is broken");
     out(x, y) = f(x, y) + f(x, y + 1);
     f.store_root().compute_at(out, y);
-    if (folded) {
-      ir::StorageRule rule;
-      rule.var = f.function()->args[1];
-      rule.fold = 2;
-      f.function()->schedule.storage_rules.push_back(rule);
-    }
+    if (folded) f.fold_storage(y, 2);
     async(f);
     limit(out);
     bad.set(17);
@@ -461,10 +453,7 @@ TEST_P(Async, AnErrorOfTheConsumerReleasesTheProducer) {
   f(x, y) = x + y;
   out(x, y) = require(f(x, y) + f(x, y + 1) < 50, f(x, y), "too large");
   f.store_root().compute_at(out, y);
-  ir::StorageRule rule;
-  rule.var = f.function()->args[1];
-  rule.fold = 2;
-  f.function()->schedule.storage_rules.push_back(rule);
+  f.fold_storage(y, 2);
   async(f);
   limit(out);
   expect_error<RuntimeError>({"too large"}, [&] { out.realize({8, 400}); });

@@ -10,6 +10,7 @@
 #include "graph/define.h"
 #include "ir/build.h"
 #include "ir/equal.h"
+#include "ir/markers.h"
 #include "ir/variables.h"
 #include "simplify/simplify.h"
 
@@ -177,18 +178,10 @@ Response of_binary(const Binary& e, const Response& a, const Response& b) {
   }
 }
 
-Expr without_hints(const Expr& e) {
-  return rewrite(e, [](const Expr& node, const auto& recurse) {
-    const auto* call = node.as<Call>();
-    const bool is_hint = call && (call->is_op(Op::likely) || call->is_op(Op::likely_if_innermost));
-    return is_hint ? recurse(call->args[0]) : map_children(node, recurse);
-  });
-}
-
 // With the place as it is there: gathers of adjoints clamp what they read, inside of its bounds.
 Response where(const Expr& condition, const Response& r) {
   Response result = r;
-  const Expr given = result.place.empty() ? condition : simplify(without_hints(condition));
+  const Expr given = result.place.empty() ? condition : simplify(without_likely(condition));
   for (Expr& index : result.place) {
     const Expr choice = simplify(make_select(given, index, index + 1));
     const auto* select = choice.as<Select>();
@@ -284,7 +277,7 @@ class Propagation {
     const auto& f = dynamic_cast<const FuncContents&>(*call->symbol.raw());
     Substitution arguments;
     for (size_t d = 0; d < f.args.size(); ++d) arguments[f.args[d]] = call->args[d];
-    for (Expr& index : result.place) index = without_hints(substitute(index, arguments));
+    for (Expr& index : result.place) index = without_likely(substitute(index, arguments));
     return result;
   }
 

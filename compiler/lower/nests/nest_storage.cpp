@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "ir/build.h"
+#include "ir/markers.h"
 #include "lower/nests/copy_statement.h"
 #include "lower/nests/nest_checks.h"
 #include "simplify/simplify.h"
@@ -127,7 +128,7 @@ void NestStorage::note_async_room(const LoopedFunc& f, const std::vector<Slide>&
       return candidate.dimension == static_cast<int>(d);
     });
     const auto extent = [](const Interval& side) {
-      return as_const_int(simplify(without_markers(side.max - side.min + 1)));
+      return as_const_int(simplify(without_likely(side.max - side.min + 1)));
     };
     const auto fold = as_const_int(folds[d].factor), window = extent(touched[d]);
     const auto step = slide == slides.end() ? window : extent(slide->part);

@@ -5,6 +5,7 @@
 #include "analysis/linear.h"
 #include "analysis/monotonic.h"
 #include "ir/build.h"
+#include "ir/markers.h"
 #include "ir/visit.h"
 #include "simplify/simplify.h"
 
@@ -19,25 +20,11 @@ BoundsMap facts_of(const std::vector<Loop>& loops) {
   return facts;
 }
 
-Expr without_markers(const Expr& e) {
-  return rewrite(e, [](const Expr& node, const std::function<Expr(const Expr&)>& recurse) {
-    const Call* call = node.as<Call>();
-    bool is_marker = call && (call->is_op(Op::likely) || call->is_op(Op::likely_if_innermost));
-    return is_marker ? recurse(call->args[0]) : map_children(node, recurse);
-  });
-}
-
 namespace {
 
-// A split promises where its loop variable lies. It does not speak of the iterations of a warm-up,
-// nor of the one before the first, whose front is where the first part begins.
-Expr without_promises(const Expr& e) {
-  return rewrite(e, [](const Expr& node, const std::function<Expr(const Expr&)>& recurse) {
-    const Call* call = node.as<Call>();
-    return call && call->is_op(Op::promise_clamped) ? recurse(call->args[0])
-                                                    : map_children(node, recurse);
-  });
-}
+// without_promises below: a split promises where its loop variable lies, but it does not speak of the
+// iterations of a warm-up, nor of the one before the first, whose front is where the first part
+// begins.
 
 constexpr int longest_warm_up = 256;
 constexpr int undecided_steps = 4;  // of a warm-up whose length is not a constant so far
@@ -115,17 +102,17 @@ class Slider {
   }
   std::optional<int64_t> difference(const Expr& a, const Expr& b) const {
     Expr ahead = is_upwards_ ? a - b : b - a;
-    return as_const_int(simplify(without_promises(without_markers(ahead)), facts_));
+    return as_const_int(simplify(without_promises(without_likely(ahead)), facts_));
   }
 
   // No values in common with the iteration before: nothing to gain.
   bool never_overlaps(const Expr& fresh) const {
     Expr apart = is_upwards_ ? back_ >= fresh : back_ <= fresh;
-    return can_prove(without_markers(apart), facts_);
+    return can_prove(without_likely(apart), facts_);
   }
   bool has_no_gaps(const Expr& fresh) const {
     Expr touches = is_upwards_ ? back_ <= fresh : back_ >= fresh;
-    return can_prove(without_markers(touches), facts_);
+    return can_prove(without_likely(touches), facts_);
   }
 
   Interval from(const Expr& fresh) const {

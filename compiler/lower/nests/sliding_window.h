@@ -26,7 +26,6 @@ namespace retrograde::ir {
 
 // What is known of the variables of `loops`.
 BoundsMap facts_of(const std::vector<Loop>& loops);
-Expr without_markers(const Expr& e);  // likely() gone
 
 struct Slide {
   int dimension = 0;

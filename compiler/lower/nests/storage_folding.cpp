@@ -5,6 +5,7 @@
 #include "analysis/monotonic.h"
 #include "diagnostics/error.h"
 #include "ir/build.h"
+#include "ir/markers.h"
 #include "ir/visit.h"
 #include "simplify/simplify.h"
 
@@ -65,7 +66,7 @@ class Folder {
     const std::string& loop = at.loop.name;
     if (!uses_variable(window.min, loop) && !uses_variable(window.max, loop)) return;
     if (hands_on && !moves_one_way(window, loop)) return;
-    Expr touched = simplify(without_markers(window.max - window.min + 1), facts_);
+    Expr touched = simplify(without_likely(window.max - window.min + 1), facts_);
     if (Expr asked = asked_factor(d); asked.defined()) {
       bool fits = can_prove(touched <= asked, facts_);
       folds_[d] = {asked, fits ? Expr() : touched};

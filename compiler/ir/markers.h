@@ -1,0 +1,11 @@
+// Expressions without calls that only say something of their first argument.
+#pragma once
+
+#include "ir/expr.h"
+
+namespace retrograde::ir {
+
+Expr without_likely(const Expr& e);    // likely, likely_if_innermost
+Expr without_promises(const Expr& e);  // promise_clamped
+
+}  // namespace retrograde::ir
