@@ -22,9 +22,11 @@ BoundsMap facts_of(const std::vector<Loop>& loops) {
 
 namespace {
 
-// without_promises below: a split promises where its loop variable lies, but it does not speak of the
-// iterations of a warm-up, nor of the one before the first, whose front is where the first part
-// begins.
+// A split promises where its loop variable lies. It does not speak of the iterations of a warm-up, nor
+// of the one before the first, whose front is where the first part begins.
+Interval without_promises(const Interval& part) {
+  return {ir::without_promises(part.min), ir::without_promises(part.max)};
+}
 
 constexpr int longest_warm_up = 256;
 constexpr int undecided_steps = 4;  // of a warm-up whose length is not a constant so far
@@ -102,7 +104,7 @@ class Slider {
   }
   std::optional<int64_t> difference(const Expr& a, const Expr& b) const {
     Expr ahead = is_upwards_ ? a - b : b - a;
-    return as_const_int(simplify(without_promises(without_likely(ahead)), facts_));
+    return as_const_int(simplify(ir::without_promises(without_likely(ahead)), facts_));
   }
 
   // No values in common with the iteration before: nothing to gain.
@@ -138,8 +140,7 @@ class Slider {
       if (ahead && *ahead < 0) return false;
       if (!ahead || *ahead > 0) continue;
       slide.lead = k;
-      slide.part = from(*fresh);
-      slide.part = {without_promises(slide.part.min), without_promises(slide.part.max)};
+      slide.part = without_promises(from(*fresh));
       return true;
     }
     return false;
@@ -159,7 +160,7 @@ class Slider {
     slide.lead = lead;
     slide.starts_whole = true;
     slide.part = from(select(variable(slide.loop.name) <= start, first, *fresh));
-    if (lead > 0) slide.part = {without_promises(slide.part.min), without_promises(slide.part.max)};
+    if (lead > 0) slide.part = without_promises(slide.part);
     return true;
   }
 
