@@ -24,6 +24,7 @@ namespace retrograde::fuzz {
 namespace {
 
 constexpr int max_reads_inlined = 40;
+constexpr int max_nesting = 3;       // of Funcs computed in loops of each other
 constexpr int ample_storage = 1024;  // more than any dimension ever needs
 
 // A loop by the Func and stage that it belongs to; root: no Func.
@@ -461,9 +462,9 @@ class Scheduler {
     const std::vector<Level> around = levels_around(first.first, first.second);
     std::vector<int> legal;
     for (size_t i = 0; i < around.size(); ++i) {
-      if (is_legal_level(around[i]) && is_around_all_sites(around[i], f)) {
+      const bool is_legal = is_legal_level(around[i]) && is_around_all_sites(around[i], f);
+      if (is_legal && share_of_nesting(f) + nesting_of(around[i]) <= max_nesting)
         legal.push_back(static_cast<int>(i));
-      }
     }
     if (legal.empty()) return false;
     const int compute = random_.pick(legal);
@@ -472,6 +473,15 @@ class Scheduler {
     if (random_.chance(55)) choose_store_level(f, around, compute);
     add(f, ir::ComputeAt{{loop_level(around[compute])}});
     return true;
+  }
+
+  // Each Func around is computed again in every iteration of the next one's loops, and one with
+  // updates may read all of what it needs each time.
+  int share_of_nesting(int f) const { return is_pure(f) ? 1 : 2; }
+  int nesting_of(const Level& level) const {
+    const Placement& around = placements_[level.func];
+    if (around.where != Where::At) return 0;
+    return share_of_nesting(level.func) + nesting_of(around.compute);
   }
 
   bool is_around_all_sites(const Level& level, int f) const {
