@@ -62,6 +62,22 @@ const std::vector<std::string> structures{"Func f",         "Func level",  "Func
                                           "Func looked_up", "Func scan",   "Func wave", "Func best",
                                           "Func band",      "Func around", "Func loop"};
 
+// How many Funcs are each computed in loops of the next.
+size_t longest_nesting(const ScheduleLog& schedule) {
+  std::map<std::string, std::string> around;  // the Func in whose loops one is computed
+  for (const ScheduleLog::Entry& entry : schedule.entries) {
+    const auto* at = std::get_if<ir::ComputeAt>(&entry.directive);
+    if (at && at->level.kind == ir::LoopLevel::Kind::At) around[entry.func] = at->level.func;
+  }
+  size_t longest = 0;
+  for (const auto& [func, next] : around) {
+    size_t length = 1;
+    for (auto it = around.find(next); it != around.end(); it = around.find(it->second)) ++length;
+    longest = std::max(longest, length);
+  }
+  return longest;
+}
+
 TEST(RandomPrograms, OfPipelinesCoverEveryOperator) {
   std::vector<std::string> wanted{"Add",
                                   "Sub",
@@ -169,6 +185,15 @@ int stage_directives(const ScheduleLog& log) {
   return static_cast<int>(
       std::count_if(log.entries.begin(), log.entries.end(),
                     [](const ScheduleLog::Entry& e) { return is_of_stage(e.directive); }));
+}
+
+// Deeper ones take minutes: a chain of six scans of 5 x 6 pixels, each computed in the innermost
+// loops of the next, ran for 197 seconds.
+TEST(RandomPrograms, SchedulesNestFewFuncsInLoopsOfEachOther) {
+  size_t longest = 0;
+  for (uint64_t seed = 0; seed < 600; ++seed)
+    longest = std::max(longest, longest_nesting(draw(Choices(seed)).schedule));
+  EXPECT_EQ(longest, 3u);
 }
 
 TEST(RandomPrograms, ShrinkToThePropertyAndLittleElse) {
