@@ -22,8 +22,8 @@ BoundsMap facts_of(const std::vector<Loop>& loops) {
 
 namespace {
 
-// A split promises where its loop variable lies. It does not speak of the iterations of a warm-up, nor
-// of the one before the first, whose front is where the first part begins.
+// A split promises where its loop variable lies. It does not speak of the iterations of a warm-up,
+// nor of the one before the first, whose front is where the first part begins.
 Interval without_promises(const Interval& part) {
   return {ir::without_promises(part.min), ir::without_promises(part.max)};
 }
