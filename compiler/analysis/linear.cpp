@@ -156,25 +156,23 @@ bool makes_redundant(Kind kind, const Sum& kept, const Sum& dropped) {
   });
 }
 
-std::vector<Sum> without_redundant(Kind kind, const std::vector<Sum>& operands) {
-  std::vector<Sum> kept;
-  for (const Sum& candidate : operands) {
-    auto covers = [&](const Sum& k) { return makes_redundant(kind, k, candidate); };
-    if (std::any_of(kept.begin(), kept.end(), covers)) continue;
-    std::erase_if(kept, [&](const Sum& k) { return makes_redundant(kind, candidate, k); });
-    kept.push_back(candidate);
-  }
-  return kept;
+void add_unless_redundant(Kind kind, const Sum& candidate, std::vector<Sum>& kept) {
+  auto covers = [&](const Sum& k) { return makes_redundant(kind, k, candidate); };
+  if (std::any_of(kept.begin(), kept.end(), covers)) return;
+  std::erase_if(kept, [&](const Sum& k) { return makes_redundant(kind, candidate, k); });
+  kept.push_back(candidate);
 }
 
 Expr canonical_extreme(Kind kind, const Expr& a, const Expr& b) {
   if (a.same_as(b)) return a;
   if (!has_linear_form(a.type())) return binary(kind, a, b);
-  std::vector<Sum> operands;
+  // Those of one side have met when it was made: the union of n boxes takes n^2 steps, not n^3.
+  std::vector<Sum> operands, more;
   add_operands(kind, linear_form(a), operands);
-  add_operands(kind, linear_form(b), operands);
+  add_operands(kind, linear_form(b), more);
+  for (const Sum& candidate : more) add_unless_redundant(kind, candidate, operands);
   Expr result;
-  for (const Sum& operand : without_redundant(kind, operands)) {
+  for (const Sum& operand : operands) {
     Expr e = to_expr(operand);
     if (!e.defined()) return binary(kind, a, b);
     result = result.defined() ? binary(kind, result, e) : e;

@@ -200,6 +200,14 @@ class LoopChooser {
   std::vector<size_t> pure_;  // dimensions
 };
 
+// Pure Funcs.
+void compute_at_root(const std::vector<FuncPtr>& funcs, const VectorUnit& unit) {
+  for (const FuncPtr& f : funcs) {
+    Func(f).compute_root();
+    LoopChooser(f, 0, unit, SizeEstimate()).give();
+  }
+}
+
 }  // namespace
 
 void give_default_schedule(const std::vector<FuncPtr>& outputs, const VectorUnit& unit,
@@ -240,9 +248,13 @@ std::vector<FuncPtr> schedule_unscheduled(const std::vector<FuncPtr>& outputs,
   std::vector<FuncPtr> result;
   run_on_large_stack([&] {
     result = apply_wrappers(outputs);
-    if (!is_differentiated(result)) return;
-    result = copy_graph(result).outputs;
-    give_default_schedule(result, unit, Scheduling::Gradients);
+    if (is_differentiated(result)) {
+      result = copy_graph(result).outputs;
+      give_default_schedule(result, unit, Scheduling::Gradients);
+    } else if (!stored_by_default(result).empty()) {
+      result = copy_graph(result).outputs;
+      compute_at_root(stored_by_default(result), unit);
+    }
   });
   return result;
 }

@@ -5,6 +5,7 @@
 #include <unordered_set>
 
 #include "autoschedule/cost_estimate.h"
+#include "autoschedule/large_bodies.h"
 #include "autoschedule/read_estimate.h"
 #include "graph/give_directive.h"
 #include "graph/own_reads.h"
@@ -141,6 +142,13 @@ class StorageChooser {
   std::unordered_set<const FuncContents*> stored_;
 };
 
+std::vector<FuncPtr> with_large_bodies(const std::vector<FuncPtr>& outputs,
+                                       std::vector<FuncPtr> stored) {
+  const std::vector<FuncPtr> large = large_bodies(outputs, stored);
+  stored.insert(stored.end(), large.begin(), large.end());
+  return stored;
+}
+
 }  // namespace
 
 bool is_differentiated(const std::vector<FuncPtr>& outputs) {
@@ -149,13 +157,14 @@ bool is_differentiated(const std::vector<FuncPtr>& outputs) {
 }
 
 std::vector<FuncPtr> stored_by_default(const std::vector<FuncPtr>& outputs) {
-  if (!is_differentiated(outputs)) return {};
-  return StorageChooser(outputs, nullptr).choose();
+  std::vector<FuncPtr> pays;
+  if (is_differentiated(outputs)) pays = StorageChooser(outputs, nullptr).choose();
+  return with_large_bodies(outputs, std::move(pays));
 }
 
 std::vector<FuncPtr> stored_in_all(const std::vector<FuncPtr>& outputs,
                                    const PlacementLimits& limits) {
-  return StorageChooser(outputs, &limits).choose();
+  return with_large_bodies(outputs, StorageChooser(outputs, &limits).choose());
 }
 
 }  // namespace retrograde::ir

@@ -19,7 +19,8 @@ namespace retrograde::ir {
 
 bool is_differentiated(const std::vector<FuncPtr>& outputs);  // whether an adjoint is among them
 
-// Producers before consumers. None in a pipeline without adjoints: it is left as it is.
+// In a pipeline without adjoints, which is left as it is, only what inlining would copy without end
+// (large_bodies.h).
 std::vector<FuncPtr> stored_by_default(const std::vector<FuncPtr>& outputs);
 // Where all of the pipeline is to be scheduled: what a user left alone is not meant to be inlined.
 std::vector<FuncPtr> stored_in_all(const std::vector<FuncPtr>& outputs,

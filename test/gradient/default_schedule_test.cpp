@@ -8,8 +8,8 @@
 #include "autoschedule/register_tile.h"
 #include "frontend/language/func.h"
 #include "frontend/run/pipeline.h"
-#include "graph/copy_graph.h"
 #include "gradient/gradient_check.h"
+#include "graph/copy_graph.h"
 #include "ir/build.h"
 #include "ir/print.h"
 #include "ir/visit.h"
@@ -44,6 +44,81 @@ struct DefaultSchedule : ::testing::Test {
 
 TEST_F(DefaultSchedule, LeavesPipelinesWithoutAdjointsAlone) {
   EXPECT_EQ(ir::schedule_unscheduled({loss.function()})[0], loss.function());
+}
+
+// Levels, each of half the sides of the one before, put together again: f3 is copied 27 times into
+// f0 by way of the levels in between, and so on.
+std::vector<Func> pyramid_of(const Func& image, int levels) {
+  Var x("x"), y("y");
+  std::vector<Func> down{image}, up;
+  for (int i = 1; i < levels; ++i) {
+    Func f("down");
+    const Func& last = down.back();
+    f(x, y) = (last(2 * x - 1, 2 * y) + 2.0f * last(2 * x, 2 * y) + last(2 * x + 1, 2 * y)) / 4.0f;
+    down.push_back(f);
+  }
+  up.push_back(down.back());
+  for (int i = levels - 2; i >= 0; --i) {
+    Func f("up");
+    const Func& last = up.back();
+    f(x, y) = (last(x / 2, y / 2) + last((x + 1) / 2, y / 2) + 2.0f * down[i](x, y)) / 4.0f;
+    up.push_back(f);
+  }
+  down.insert(down.end(), up.begin() + 1, up.end());
+  return down;
+}
+
+struct UnscheduledPyramid : DefaultSchedule {
+  UnscheduledPyramid() {
+    image(x, y) = a(clamp(x, 0, 31), clamp(y, 0, 31));
+    funcs = pyramid_of(image, 7);
+    a.for_each_element([&](int i, int j) { a(i, j) = static_cast<float>((7 * i + 13 * j) % 31); });
+  }
+  size_t stored() const {
+    const auto all = ir::topological_order(ir::schedule_unscheduled({funcs.back().function()}));
+    return std::count_if(all.begin(), all.end(), [](const ir::FuncPtr& f) {
+      return f->schedule.compute_level.kind == ir::LoopLevel::Kind::Root;
+    });
+  }
+
+  Func image{"image"};
+  std::vector<Func> funcs;
+};
+
+TEST_F(UnscheduledPyramid, IsStoredWhereInliningWouldCopyWithoutEnd) {
+  EXPECT_GE(stored(), 1u);
+  EXPECT_LE(stored(), 6u);
+  const Buffer<float> found = funcs.back().realize({32, 32});
+  for (Func& f : funcs) f.compute_root();
+  const Buffer<float> expected = funcs.back().realize({32, 32});
+  expected.for_each_element([&](int i, int j) { EXPECT_FLOAT_EQ(found(i, j), expected(i, j)); });
+}
+
+TEST_F(UnscheduledPyramid, OfAFewLevelsIsInlined) {
+  funcs = pyramid_of(image, 3);
+  EXPECT_EQ(stored(), 0u);
+}
+
+TEST_F(UnscheduledPyramid, OfWhichAllIsToBeInlinedIsRefused) {
+  funcs = pyramid_of(image, 10);
+  for (Func& f : funcs) f.compute_inline();
+  expect_error<CompileError>(
+      {"cannot inline \"", "that a code generator finishes", "more than 200000", "at root"}, [&] {
+        funcs.back().realize({32, 32});
+      });
+}
+
+// Where the place is decided by data, no region is known that could be computed before.
+TEST_F(UnscheduledPyramid, ThatIsReadAnywhereStaysInline) {
+  Buffer<int> place(32);
+  place.fill(3);
+  Func anywhere("anywhere");
+  const Func small = pyramid_of(image, 4).back();
+  anywhere(x, y) = small(place(x), y) + small(place(x) + 1, y);
+  funcs = {anywhere};
+  EXPECT_EQ(stored(), 0u);
+  const Buffer<float> found = anywhere.realize({32, 4});
+  EXPECT_FLOAT_EQ(found(1, 1), found(5, 1));
 }
 
 TEST_F(DefaultSchedule, StoresWhatIsReadOftenAndCosts) {
@@ -321,9 +396,9 @@ TEST_F(DefaultSchedule, SumsThatLookTheSamePlacesUpShareTheirLoops) {
   u(x, y) = clamp(x + flow(x, y, 0), 0.0f, size - 1.0f);
   v(x, y) = clamp(y + flow(x, y, 1), 0.0f, size - 1.0f);
   const Expr i = min(cast<int>(u(x, y)), size - 2), j = min(cast<int>(v(x, y)), size - 2);
-  warped(x, y, c) = lerp(lerp(image(i, j, c), image(i + 1, j, c), u(x, y) - i),
-                         lerp(image(i, j + 1, c), image(i + 1, j + 1, c), u(x, y) - i),
-                         v(x, y) - j);
+  warped(x, y, c) =
+      lerp(lerp(image(i, j, c), image(i + 1, j, c), u(x, y) - i),
+           lerp(image(i, j + 1, c), image(i + 1, j + 1, c), u(x, y) - i), v(x, y) - j);
   const Derivative d = propagate_adjoints(warped, seed);
   Func by_flow = d(flow);
   const Buffer<float> apart = [&] {

@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <functional>
+#include <unordered_set>
 
 #include "diagnostics/error.h"
+#include "graph/inlined_size.h"
 #include "graph/wrappers.h"
 #include "ir/visit.h"
 #include "lower/nests/fused_groups.h"
@@ -69,6 +71,29 @@ bool is_inlined(const FuncContents& f, const FuncPlacement& schedule, bool is_ou
   return !is_output && f.is_pure() && schedule.compute_level.kind == LoopLevel::Kind::Inlined;
 }
 
+// Nodes of an expression beyond which no code generator ends within minutes.
+constexpr double most_nodes = 200000;
+
+double distinct_nodes(const std::vector<Expr>& values) {
+  std::unordered_set<const ExprNode*> seen;
+  for (const Expr& value : values)
+    walk(value, [&](const Expr& e) { return seen.insert(e.get()).second; });
+  return static_cast<double>(seen.size());
+}
+
+void check_size(const FuncContents& f, const InlinedSizes& sizes) {
+  const double nodes = sizes.nodes(f);
+  const FuncPtr part = nodes > most_nodes ? sizes.largest_part(f) : nullptr;
+  if (!part) return;
+  user_error(
+      text("inline ", quoted(part->name), " into ", quoted(f.name)),
+      "what is inlined makes an expression that a code generator finishes",
+      text("it is called ", func_calls(f).at(part.get()), " times, and the expression would have ",
+           static_cast<int64_t>(nodes), " nodes, more than ", static_cast<int64_t>(most_nodes)),
+      text("Compute ", quoted(part->name),
+           ", or a Func that it reads, at root or at a loop of its consumer"));
+}
+
 }  // namespace
 
 Program inline_functions(const std::vector<FuncPtr>& unwrapped) {
@@ -76,14 +101,17 @@ Program inline_functions(const std::vector<FuncPtr>& unwrapped) {
   Program program;
   InlinedFuncs inlined;
   Inliner inliner(inlined);
+  InlinedSizes sizes;
   for (const FuncPtr& f : topological_order(outputs)) {
     bool is_output = std::find(outputs.begin(), outputs.end(), f) != outputs.end();
+    check_size(*f, sizes);
     std::vector<Definition> stages;
     for (int i = 0; i < f->stage_count(); i++)
       stages.push_back(map_exprs(f->stage(i), std::ref(inliner)));
     if (is_inlined(*f, f->schedule, is_output)) {
       check_inlined(*f, f->schedule);
       inlined[f.get()] = {f->args, stages[0].values};
+      sizes.inline_calls_of(*f, distinct_nodes(stages[0].values));
       continue;
     }
     program.index_of[f->name] = static_cast<int>(program.funcs.size());
