@@ -170,9 +170,8 @@ class Func : public LoopDirectives<Func>, public Runnable<Func> {
 
   // Substituted into its users: the default, but for Funcs whose copies would make the bodies of
   // their users explode. Of a Func with updates: computed in the innermost loop of each user.
-  // Requires: what is inlined makes an expression that a code generator finishes, of at most 200,000
-  // nodes.
   //   for x: f(x) = g(x) + 1    =>    for x: f(x) = (x * x) + 1
+  // Requires: what is inlined makes an expression that a code generator finishes.
   Func& compute_inline() { return compute_at(LoopLevel::inlined()); }
   // All of it, before anything that uses it.
   //   for x: f(x) = g(x) + g(x + 1)    =>    for x in [0, n + 1): g(x) = ...
