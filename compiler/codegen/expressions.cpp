@@ -30,6 +30,7 @@ Value* FunctionGenerator::make_value(const Expr& e) {
       [&](const Reinterpret& r) { return reinterpret(e_, r.type, r.value.type(), value(r.value)); },
       [&](const Binary& node) {
         if (Value* sum = sum_of_products(e)) return sum;
+        if (Value* sum = sum_with_strong_product(node)) return sum;
         Value *a = value(node.a), *b = value(node.b);
         return binary(e_, node.kind, node.a.type(), a, b);
       },

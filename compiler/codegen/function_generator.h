@@ -185,6 +185,9 @@ class FunctionGenerator {
   Value* reduced_in_part(const ir::VectorReduce& e);
   Value* sum_of_products(const Expr& e);
 
+  // strong_products.cpp
+  Value* sum_with_strong_product(const ir::Binary& e);
+
   // held_loads.cpp
   std::optional<bool> climbs(const Expr& e, int& room) const;
   Value* at_lane(const Expr& e, Value* lane);

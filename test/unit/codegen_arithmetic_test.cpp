@@ -154,6 +154,49 @@ TEST(CodegenArithmetic, BooleansAndSelect) {
   }
 }
 
+// A sum with a strong product may fuse, so its value is compared where the zero decides: nothing is
+// added then, whatever the other factor is, but to the sign of a zero. Elsewhere it is no number
+// only where a part is none.
+TEST(CodegenArithmetic, SumsOfStrongProducts) {
+  const auto is_zero = [](const Expr& e) { return binary(Kind::EQ, e, make_zero(e.type())); };
+  std::vector<Target> targets = older_targets();
+  targets.push_back(test_target());
+  for (const Target& target : targets) {
+    for (int lanes : {1, 3, 16}) {
+      for (Type type : {Float(32), Float(64)}) {
+        Cases cases;
+        for (Kind kind : {Kind::Add, Kind::Sub}) {
+          const auto sum = [=](const auto& args) {
+            return binary(kind, args[2], call_op(Op::strong_mul, {args[0], args[1]}));
+          };
+          cases.push_back(
+              {"where the first factor is zero", type,
+               [=](const auto& args) { return make_select(is_zero(args[0]), sum(args), args[2]); },
+               [](const auto& args) { return args[2]; }});
+          cases.push_back({"is no number", Bool(),
+                           [=](const auto& args) {
+                             const Type mask = Bool().with_lanes(lanes);
+                             return binary(Kind::And, call_op(Op::is_nan, mask, {sum(args)}),
+                                           call_op(Op::is_finite, mask, {args[2]}));
+                           },
+                           [](const auto& args) {
+                             const bool is_nan = std::isnan(args[0].f) ||
+                                                 (args[0].f != 0 && std::isnan(args[1].f)) ||
+                                                 (std::isinf(args[0].f) && args[1].f == 0);
+                             return Scalar::of_int(Bool(), is_nan && std::isfinite(args[2].f));
+                           }});
+        }
+        Operands operands = random_operands({type, type, type}, 3);
+        for (size_t i = 0; i < count; i++) {
+          if (i % 3 == 0) operands[0]->set(i, Scalar::of_float(type, i % 2 ? 0.0 : -0.0));
+          if (operands[2]->get(i).f == 0) operands[2]->set(i, Scalar::of_float(type, 0.0));
+        }
+        check(std::move(operands), lanes, cases, target);
+      }
+    }
+  }
+}
+
 TEST(CodegenArithmetic, DivisionByConstants) {
   for (Type type : {Int(8), Int(16), Int(32), Int(64), UInt(8), UInt(16), UInt(32), UInt(64)}) {
     std::vector<int64_t> divisors = {0, 1, 2, 3, 5, 7, 8, 10, 64, 100, 127};

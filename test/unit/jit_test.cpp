@@ -288,6 +288,39 @@ TEST(Codegen, StrongMultiplicationIsMasked) {
   expect_mentions(assembly, {"{z}"});
 }
 
+// acc + strong_mul(a, b) and acc - strong_mul(a, b): no multiplication of its own.
+TEST(Codegen, SumsOfStrongProductsFuse) {
+  LoweredFunction f = vector_sum();
+  const Expr index = make_ramp(variable("x") * 16, 1, 16);
+  const Expr in = make_load(Float(32, 16), "in", index);
+  const Expr product = call_op(Op::strong_mul, {in, in + 1.0f});
+  f.body =
+      make_for("x", 0, 16, ForType::Serial,
+               make_store("out", in + product - call_op(Op::strong_mul, {in + 3.0f, in}), index));
+  for (const std::string target :
+       {"x86-64-linux-avx512_skylake", "x86-64-linux-sse41-avx-fma-avx2"}) {
+    const std::string assembly = codegen::compile_assembly(f, options_for(target));
+    expect_mentions(assembly, {"vfmadd", "vfnmadd"});
+    EXPECT_EQ(assembly.find("vmulps"), std::string::npos) << target;
+    EXPECT_NE(codegen::compile_assembly(f, options_for(target + "-strict_float")).find("vmulps"),
+              std::string::npos);
+  }
+}
+
+// Of two products that are equal nothing may remain, not even the rounding of one of them.
+TEST(Codegen, DifferencesOfStrongProductsDoNotFuse) {
+  LoweredFunction f = vector_sum();
+  const Expr index = make_ramp(variable("x") * 16, 1, 16);
+  const Expr in = make_load(Float(32, 16), "in", index);
+  const Expr product = call_op(Op::strong_mul, {in, in + 1.0f});
+  f.body = make_for("x", 0, 16, ForType::Serial,
+                    make_store("out", product - call_op(Op::strong_mul, {in + 1.0f, in}), index));
+  const std::string assembly =
+      codegen::compile_assembly(f, options_for("x86-64-linux-avx512_skylake"));
+  EXPECT_EQ(assembly.find("vfmsub"), std::string::npos);
+  EXPECT_EQ(assembly.find("vfnmadd"), std::string::npos);
+}
+
 TEST(Codegen, OutputIsDeterministic) {
   const auto object = [] {
     return codegen::compile_object(vector_sum(), options_for("x86-64-linux")).object;

@@ -1,0 +1,57 @@
+// Sums with strong products, whose first factor decides: 0 * anything is 0. As they stand they take
+// a multiplication, a mask and an addition, for the mask keeps the two from fusing. Here they fuse:
+//
+//   acc + strong_mul(a, b)  =  a != 0 ? fma(a, b, acc) : acc      one instruction under a mask
+//                           =  fma(a, a != 0 ? b : 0, acc)        where there are no masks
+//
+// A factor that several products share is compared once. As for other products that fuse, the last
+// bit of the sum and the sign of a zero depend on the machine.
+//
+// Only what is added to a stored value fuses. A difference of two products of the same size, such as
+// the partials of a normalised vector, has to come out as an exact 0 where the two are equal: with one
+// of them unrounded, its rounding error would be left (Higham, Accuracy and Stability of Numerical
+// Algorithms, 2nd ed., section 2.6).
+#include <llvm/IR/Intrinsics.h>
+
+#include "codegen/function_generator.h"
+
+namespace retrograde::codegen {
+
+using namespace ir;
+
+static const Call* as_strong_product(const Expr& e) {
+  const auto* call = e.as<Call>();
+  return call && call->is_op(Op::strong_mul) ? call : nullptr;
+}
+
+// Whether `e` is a stored value, or a sum of one and strong products.
+static bool is_running_sum(const Expr& e) {
+  if (e.as<Load>()) return true;
+  const auto* sum = e.as<Binary>();
+  if (!sum || (sum->kind != Kind::Add && sum->kind != Kind::Sub)) return false;
+  return (as_strong_product(sum->b) && is_running_sum(sum->a)) ||
+         (sum->kind == Kind::Add && as_strong_product(sum->a) && is_running_sum(sum->b));
+}
+
+// The sum when it is one with a strong product that may fuse, else null.
+Value* FunctionGenerator::sum_with_strong_product(const Binary& e) {
+  const bool is_sum = e.kind == Kind::Add || e.kind == Kind::Sub;
+  const Type type = e.a.type();
+  if (!is_sum || !type.is_float() || is_half(type) || !b_.getFastMathFlags().allowContract())
+    return nullptr;
+  const Call* product = as_strong_product(e.b);
+  const bool is_second = product != nullptr;
+  if (!is_second && e.kind == Kind::Add) product = as_strong_product(e.a);
+  if (!product || !is_running_sum(is_second ? e.a : e.b)) return nullptr;
+  Value* sum = value(is_second ? e.a : e.b);
+  Value *a = value(product->args[0]), *b = value(product->args[1]);
+  Value *zero = float_constant(a, 0.0), *counts = b_.CreateFCmpUNE(a, zero);
+  const auto fused = [&](Value* factor) -> Value* {
+    Value* first = e.kind == Kind::Sub ? b_.CreateFNeg(a) : a;
+    return b_.CreateIntrinsic(llvm::Intrinsic::fmuladd, {a->getType()}, {first, factor, sum});
+  };
+  if (e_.machine.has_avx512()) return b_.CreateSelect(counts, fused(b), sum);
+  return fused(b_.CreateSelect(counts, b, zero));
+}
+
+}  // namespace retrograde::codegen
