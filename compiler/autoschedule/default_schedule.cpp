@@ -6,6 +6,7 @@
 
 #include "autoschedule/cut_reductions.h"
 #include "autoschedule/join_sweeps.h"
+#include "autoschedule/loop_order.h"
 #include "autoschedule/new_loop.h"
 #include "autoschedule/placement_limits.h"
 #include "autoschedule/scatter_schedule.h"
@@ -27,6 +28,8 @@ namespace retrograde::ir {
 namespace {
 
 constexpr int lanes = 16;
+constexpr int64_t small_shift = 16;  // values of a dimension, such as the taps of a filter
+constexpr int64_t enough_tasks = 8;
 
 // The dimension along which what is read lies next to each other in memory.
 size_t innermost_dimension(const Call& call) {
@@ -131,8 +134,9 @@ class LoopChooser {
   }
 
   // Its loops stand inside of those of the reduction; those over tiles outside, of the sides first,
-  // so that what the last dimensions run over stays in the cache. The result: these.
-  std::vector<VarOrRVar> cut(const RegisterTile& tile) {
+  // so that what the last dimensions run over stays in the cache; `between` just inside of those of
+  // the reduction. The result: those outside.
+  std::vector<VarOrRVar> cut(const RegisterTile& tile, const std::vector<size_t>& between = {}) {
     std::vector<VarOrRVar> inner, outer;
     const auto cut = [&](size_t d, int64_t size) {
       const Var all = variable_of(d), part = inside(all);
@@ -143,11 +147,14 @@ class LoopChooser {
     cut(0, tile.vectors * lanes);
     for (const RegisterTile::Side& side : tile.sides) cut(side.dimension, side.size);
     std::vector<VarOrRVar> order = inner;
-    for (const ReductionVariable& r : definition().rvars) order.push_back(RVar(r.var));
+    for (size_t d : between) order.push_back(variable_of(d));
+    for (const ReductionVariable& r : reduction_loops(f_, definition()))
+      order.push_back(RVar(r.var));
     for (size_t d : pure_) {
       const Var all = variable_of(d);
-      if (std::none_of(outer.begin(), outer.end(),
-                       [&](const VarOrRVar& cut) { return cut.name() == all.name(); }))
+      const auto is_it = [&](const VarOrRVar& loop) { return loop.name() == all.name(); };
+      if (std::none_of(outer.begin(), outer.end(), is_it) &&
+          std::none_of(order.begin(), order.end(), is_it))
         outer.push_back(all);
     }
     order.insert(order.end(), outer.begin(), outer.end());
@@ -171,15 +178,50 @@ class LoopChooser {
     return tile;
   }
 
+  // Small dimensions along which a step moves what a block reads by a little only: all of one part
+  // of the reduction is done for each of them, while it is in the cache. The other tiles must be
+  // tasks enough.
+  std::vector<size_t> shifts_of(const FuncContents& block, const RegisterTile& tile) const {
+    std::vector<size_t> shifts;
+    int64_t tasks = 1;
+    for (size_t d : pure_) {
+      int64_t size = d == 0 ? tile.vectors * lanes : 1;
+      for (const RegisterTile::Side& side : tile.sides)
+        size = side.dimension == d ? side.size : size;
+      const auto arg = std::find(block.args.begin(), block.args.end(), f_.args[d]);
+      const auto in_block = static_cast<size_t>(arg - block.args.begin());
+      const int64_t extent = sizes_.extent(f_, d).value_or(enough_tasks * size);
+      const bool is_shift = size == 1 && extent <= small_shift && sizes_.extent(f_, d) &&
+                            arg != block.args.end() &&
+                            shifts_reads(block, block.updates[0], in_block);
+      if (is_shift)
+        shifts.push_back(d);
+      else
+        tasks *= (extent + size - 1) / size;
+    }
+    return tasks >= enough_tasks ? shifts : std::vector<size_t>();
+  }
+
   // The sums of a tile: a block of each after the other, in registers, is added to what memory
   // holds.
   void give_blocks(const FuncPtr& block) {
-    const RVar each(definition().rvars[0].var);
-    Func(block).compute_at(Func(function_), each);
-    if (pure_.empty() || pure_[0] != 0) return;
+    if (pure_.empty() || pure_[0] != 0) return compute_block(block, {});
     const RegisterTile tile = tile_of(*block, block->updates[0]).value_or(RegisterTile());
-    run_in_parallel(cut(renumbered(tile, *block)));
+    const RegisterTile own = renumbered(tile, *block);
+    const std::vector<size_t> shifts = shifts_of(*block, own);
+    compute_block(block, shifts);
+    run_in_parallel(cut(own, shifts));
     for (int s = 0; s < block->stage_count(); ++s) LoopChooser(block, s, unit_, sizes_).cut(tile);
+  }
+
+  // For each iteration of the innermost loop outside of the tile.
+  void compute_block(const FuncPtr& block, const std::vector<size_t>& shifts) {
+    if (shifts.empty()) {
+      const RVar each(reduction_loops(f_, definition())[0].var);
+      Func(block).compute_at(Func(function_), each);
+    } else {
+      Func(block).compute_at(Func(function_), variable_of(shifts[0]));
+    }
   }
 
   // Squares, whose rows stay in the cache until their columns are read.

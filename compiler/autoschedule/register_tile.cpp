@@ -14,13 +14,29 @@ namespace {
 constexpr int64_t most_values = 4;  // of a long dimension, or an unknown one: rests run slower
 constexpr int64_t small_side = 16;  // a dimension that may lie in registers whole
 constexpr double loads_a_cycle = 2, products_a_cycle = 2, latency = 4;
-constexpr double split_lines = 2;    // loads for a vector at any place: it crosses cache lines
-constexpr double worth_while = 0.8;  // of the cycles without a tile
+constexpr int64_t most_of_known = 8;  // of a dimension that it divides: there are no rests
+constexpr double split_lines = 2;     // loads for a vector at any place: it crosses cache lines
+constexpr double far_lines = 4;       // of a row of its own in each iteration: none is at hand yet
+constexpr double worth_while = 0.8;   // of the cycles without a tile
 
 // What an iteration of a reduction loads, by the dimensions that the place depends on.
 struct Operand {
   std::vector<bool> depends_on;  // by dimension
+  bool is_far = false;           // each iteration reads other rows
 };
+
+// Whether what moves the read moves it from row to row, not along one.
+bool walks_afar(const Call& call, const Definition& stage) {
+  bool moves = false, is_far = true;
+  for (const ReductionVariable& r : stage.rvars) {
+    for (size_t d = call.args.size(); d-- > 0;) {
+      if (!uses_variable(call.args[d], r.var)) continue;
+      moves = true;
+      is_far &= d > 0;
+    }
+  }
+  return moves && is_far;
+}
 
 // nullopt: the update reads other elements of its own.
 std::optional<std::vector<Operand>> operands_of(const FuncContents& f, const Definition& stage) {
@@ -37,7 +53,7 @@ std::optional<std::vector<Operand>> operands_of(const FuncContents& f, const Def
       is_plain &= same_args(call->args, stage.args);
       return false;
     }
-    Operand operand;
+    Operand operand{{}, walks_afar(*call, stage)};
     for (const std::string& arg : f.args)
       operand.depends_on.push_back(
           std::any_of(call->args.begin(), call->args.end(),
@@ -59,7 +75,8 @@ int64_t sums_of(const RegisterTile& tile) {
 double loads_of(const RegisterTile& tile, const std::vector<Operand>& operands) {
   double loads = 0;
   for (const Operand& operand : operands) {
-    double count = operand.depends_on[0] ? split_lines * static_cast<double>(tile.vectors) : 1;
+    const double lines = operand.is_far ? far_lines : split_lines;
+    double count = operand.depends_on[0] ? lines * static_cast<double>(tile.vectors) : 1;
     for (const RegisterTile::Side& side : tile.sides)
       count *= operand.depends_on[side.dimension] ? static_cast<double>(side.size) : 1;
     loads += count;
@@ -95,7 +112,9 @@ std::vector<int64_t> sizes_of_side(const FuncContents& f, size_t dimension,
   if (extent && *extent <= small_side) {
     for (int64_t size = 2; size <= *extent; ++size) result.push_back(size);
   } else {
-    for (int64_t size = 2; size <= most_values; size *= 2) result.push_back(size);
+    const bool divides = extent && *extent % most_of_known == 0;
+    const int64_t most = divides ? most_of_known : most_values;
+    for (int64_t size = 2; size <= most; size *= 2) result.push_back(size);
   }
   return result;
 }

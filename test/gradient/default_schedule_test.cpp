@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "autodiff/derivative.h"
+#include "autoschedule/loop_order.h"
 #include "autoschedule/read_estimate.h"
 #include "autoschedule/register_tile.h"
 #include "frontend/language/func.h"
@@ -362,6 +363,51 @@ TEST_F(DefaultSchedule, ReductionsKeepATileOfTheirSumsInRegisters) {
   EXPECT_EQ(loops[2].runs, ForType::Unrolled);
   EXPECT_TRUE(loops[3].is_reduction);
   EXPECT_EQ(loops.back().runs, ForType::Parallel);
+}
+
+// Taps inside of channels, whatever the order that the user wrote; a recurrence keeps its own.
+TEST_F(DefaultSchedule, SumsOfShiftedRowsAreTakenRowByRow) {
+  Buffer<float> image(66, 66, 8), kernels(3, 3, 8, 8), seed(64, 64, 8);
+  Var c("c");
+  RDom r(0, 8, 0, 3, 0, 3);
+  Func layer("layer"), decayed("decayed");
+  layer(x, y, c) = 0.0f;
+  layer(x, y, c) += kernels(r.y, r.z, r.x, c) * image(x + r.y, y + r.z, r.x);
+  decayed(x, y, c) = 0.0f;
+  decayed(x, y, c) = 0.5f * decayed(x, y, c) + image(x + r.y, y + r.z, r.x);
+  const auto order = [](const Func& f) {
+    std::vector<std::string> names;
+    for (const ir::ReductionVariable& loop :
+         ir::reduction_loops(*f.function(), f.function()->stage(1)))
+      names.push_back(loop.var);
+    return names;
+  };
+  EXPECT_EQ(order(layer), (std::vector<std::string>{r.y.name(), r.z.name(), r.x.name()}));
+  EXPECT_EQ(order(decayed), (std::vector<std::string>{r.x.name(), r.y.name(), r.z.name()}));
+  const auto shifts = [&](size_t d) {
+    return ir::shifts_reads(*layer.function(), layer.function()->stage(1), d);
+  };
+  EXPECT_TRUE(shifts(0));
+  EXPECT_TRUE(shifts(1));
+  EXPECT_FALSE(shifts(2));
+}
+
+// The rows of the matrix on the right, each from a place of its own, are used for eight rows of the
+// result; where they lie side by side, for four.
+TEST_F(DefaultSchedule, TilesUseWhatComesFromAfarMoreOften) {
+  Buffer<float> matrix(64, 64), line(256);
+  RDom k(0, 64);
+  const auto rows_of = [&](const Func& f) {
+    const auto tile = ir::register_tile(*f.function(), f.function()->stage(1), 16, 4, {},
+                                        ir::SizeEstimate({f.function()}));
+    return tile && tile->sides.size() == 1 ? tile->sides[0].size : 0;
+  };
+  Func far("far"), near("near");
+  far(x, y) += matrix(k, y) * matrix(x, k);
+  near(x, y) += matrix(k, y) * line(x + k);
+  for (Func f : {far, near}) f.set_estimates({{0, 64}, {0, 64}});
+  EXPECT_EQ(rows_of(far), 8);
+  EXPECT_EQ(rows_of(near), 4);
 }
 
 TEST_F(DefaultSchedule, TilesFitTheRegisters) {
