@@ -1,5 +1,6 @@
 // Evaluation by demand. Recursion goes from Func to Func, so it is as deep as the pipeline; it runs
-// on a stack of its own (diagnostics/large_stack.h).
+// on a stack of its own (diagnostics/large_stack.h). An arm of a select that is not chosen is never
+// evaluated, so it may read outside of its producer's domain.
 #include "testing/interpreter.h"
 
 #include <HalideRuntime.h>
@@ -10,14 +11,17 @@
 
 #include "diagnostics/error.h"
 #include "diagnostics/large_stack.h"
+#include "ir/lets.h"
+#include "ir/print.h"
 #include "ir/random.h"
-#include "testing/stage_program.h"
+#include "ir/visit.h"
 
 namespace retrograde::oracle {
 
 using ir::FuncContents;
 using ir::FuncPtr;
 using ir::Kind;
+using ir::Op;
 using ir::ParameterContents;
 using ir::Scalar;
 
@@ -76,15 +80,34 @@ struct Hull {
   }
 };
 
-// A stage ready to run: its program and the values of the steps at the current point. No Func calls
-// itself except through its own storage, so one frame per stage is enough.
+// A stage ready to run, and the values of its nodes at the current point: of those that expressions
+// share, one. No Func calls itself except through its own storage, so one frame per stage is enough.
 struct Frame {
-  StageProgram program;
-  std::vector<Value> slots;
-  std::vector<uint64_t> stamps;  // slots[i] is valid when stamps[i] == epoch
+  struct Slot {
+    Value value;
+    uint64_t epoch = 0;  // when it was computed
+  };
+  ir::Definition definition;                       // without lets
+  std::vector<bool> is_pure_arg;                   // args[d] is the pure variable d itself
+  std::unordered_map<std::string, size_t> places;  // of its variables in the point
+  std::unordered_map<const ir::ExprNode*, Slot> slots;
   uint64_t epoch = 0;
   Point point;  // pure args, then rvars
 };
+
+Frame frame_of(const FuncContents& func, int stage) {
+  Frame frame;
+  frame.definition = map_exprs(func.stage(stage), ir::without_lets);
+  for (const std::string& arg : func.args) frame.places.emplace(arg, frame.places.size());
+  for (const auto& rvar : frame.definition.rvars)
+    frame.places.emplace(rvar.var, frame.places.size());
+  for (size_t d = 0; d < func.args.size(); ++d) {
+    const auto* variable = frame.definition.args[d].as<ir::Variable>();
+    frame.is_pure_arg.push_back(variable && variable->name == func.args[d]);
+  }
+  frame.point.resize(frame.places.size());
+  return frame;
+}
 
 // Storage of one slice of a Func with updates, over a box of its scattered dimensions. Cells are
 // initialised from the pure definition when they are first read.
@@ -150,10 +173,8 @@ class Interpreter::Impl {
   void realize_one(const FuncContents& func, const Region& region, std::vector<Array>& result) {
     FuncState& state = state_of(func);
     const size_t first = result.size();
-    for (Type type : func.types) {
-      if (options_.widen && type.is_float()) type = Float(64);
-      result.push_back({type, region, std::vector<Value>(region.points())});
-    }
+    for (const Type& type : func.types)
+      result.push_back({widened(type), region, std::vector<Value>(region.points())});
     size_t index = 0;
     region.for_each([&](const Point& point) {
       for (size_t v = 0; v < func.types.size(); ++v) {
@@ -182,17 +203,10 @@ class Interpreter::Impl {
     }
     auto state = std::make_unique<FuncState>();
     state->func = &func;
-    for (int s = 0; s < func.stage_count(); ++s) {
-      Frame frame;
-      frame.program = flatten_stage(func, s, options_.widen);
-      frame.slots.resize(frame.program.steps.size());
-      frame.stamps.resize(frame.program.steps.size());
-      frame.point.resize(func.args.size() + frame.program.rvars.size());
-      state->stages.push_back(std::move(frame));
-    }
+    for (int s = 0; s < func.stage_count(); ++s) state->stages.push_back(frame_of(func, s));
     for (int d = 0; d < func.dimensions(); ++d) {
       const bool pure = std::all_of(state->stages.begin(), state->stages.end(),
-                                    [&](const Frame& f) { return f.program.is_pure_arg[d]; });
+                                    [&](const Frame& f) { return f.is_pure_arg[d]; });
       (pure ? state->pure_dims : state->scattered_dims).push_back(d);
     }
     return state;
@@ -222,9 +236,7 @@ class Interpreter::Impl {
     Frame& frame = f.stages[0];
     std::copy(point.begin(), point.end(), frame.point.begin());
     ++frame.epoch;
-    std::vector<Value> values;
-    for (const int root : frame.program.values) values.push_back(get(frame, root));
-    return values;
+    return all_of(frame, frame.definition.values);
   }
 
   void check_size(const FuncState& f, size_t points) const {
@@ -316,7 +328,7 @@ class Interpreter::Impl {
     std::vector<int> positions;  // in frame.point
     add_reduction_loops(f, frame, loops, positions);
     for (size_t i = 0; i < f.scattered_dims.size(); ++i) {
-      if (!frame.program.is_pure_arg[f.scattered_dims[i]]) continue;
+      if (!frame.is_pure_arg[f.scattered_dims[i]]) continue;
       loops.mins.push_back(island.box.mins[i]);
       loops.extents.push_back(island.box.extents[i]);
       positions.push_back(f.scattered_dims[i]);
@@ -331,7 +343,7 @@ class Interpreter::Impl {
   void add_reduction_loops(FuncState& f, Frame& frame, Region& loops, std::vector<int>& positions) {
     ++frame.epoch;
     int position = f.func->dimensions();
-    for (const auto& rvar : frame.program.rvars) {
+    for (const auto& rvar : frame.definition.rvars) {
       loops.mins.push_back(static_cast<int>(get(frame, rvar.min).scalar.i));
       loops.extents.push_back(static_cast<int>(get(frame, rvar.extent).scalar.i));
       positions.push_back(position++);
@@ -340,19 +352,15 @@ class Interpreter::Impl {
 
   void update_point(FuncState& f, Frame& frame, Island& island) {
     bool unsure = false;
-    if (frame.program.predicate >= 0) {
-      const Value& condition = get(frame, frame.program.predicate);
+    if (frame.definition.predicate.defined()) {
+      const Value& condition = get(frame, frame.definition.predicate);
       unsure = !condition.is_stable();
       if (!unsure && !condition.scalar.as_bool()) return;
     }
-    std::vector<Value> values;
-    for (const int root : frame.program.values) values.push_back(get(frame, root));
-    Point point;
-    for (const int root : frame.program.args) {
-      const Value& coordinate = get(frame, root);
-      if (!coordinate.is_stable()) island.poisoned = true;
-      point.push_back(static_cast<int>(coordinate.scalar.i));
-    }
+    const std::vector<Value> values = all_of(frame, frame.definition.values);
+    bool stable = true;
+    const Point point = coordinates(frame, frame.definition.args, stable);
+    if (!stable) island.poisoned = true;
     store(f, island, point, values, unsure);
   }
 
@@ -373,189 +381,197 @@ class Interpreter::Impl {
 
   // ---- expressions ----
 
-  const Value& get(Frame& frame, int step) {
-    if (frame.stamps[step] != frame.epoch) {
-      frame.slots[step] = evaluate(frame, frame.program.steps[step]);
-      frame.stamps[step] = frame.epoch;
+  Type widened(Type type) const { return options_.widen && type.is_float() ? Float(64) : type; }
+
+  const Value& get(Frame& frame, const Expr& e) {
+    Frame::Slot& slot = frame.slots[e.get()];
+    if (slot.epoch != frame.epoch) {
+      slot.value = evaluate(frame, e);
+      slot.epoch = frame.epoch;
     }
-    return frame.slots[step];
+    return slot.value;
   }
 
-  Value evaluate(Frame& frame, const Step& step) {
-    check_work();
-    const auto child = [&](int i) -> const Value& { return get(frame, step.children[i]); };
-    switch (step.code) {
-      case Step::Code::Constant:
-        return step.constant;
-      case Step::Code::Coordinate:
-        return {Scalar::of_int(Int(32), frame.point[step.index])};
-      case Step::Code::Parameter:
-        return parameter(step);
-      case Step::Code::BufferFact:
-        return buffer_fact(step);
-      case Step::Code::Cast:
-        ++operations_;
-        return apply_cast(options_.rounding, step.type, child(0));
-      case Step::Code::Reinterpret:
-        return reinterpret(frame, step);
-      case Step::Code::Binary:
-        return binary(frame, step);
-      case Step::Code::Not:
-        ++operations_;
-        return apply_not(child(0));
-      case Step::Code::Select:
-        return select(frame, step);
-      case Step::Code::Operator:
-        ++operations_;
-        return apply_operator(options_.rounding, step.op, children(frame, step), step.type);
-      case Step::Code::Random:
-        return random(frame, step);
-      case Step::Code::Require:
-        return require(frame, step);
-      case Step::Code::Print:
-        return child(step.index);
-      case Step::Code::Undef:
-        return Value::undef();
-      case Step::Code::FuncCall:
-        return func_call(frame, step);
-      case Step::Code::ImageCall:
-        return image_call(frame, step);
-      case Step::Code::ExternCall:
-        unsupported("interpret a call of " + quoted(step.name),
-                    "a value is computed by operators, not by C functions");
-      case Step::Code::Text:
-        break;
-    }
-    internal_error("a string has no value");
-  }
-
-  std::vector<Value> children(Frame& frame, const Step& step) {
+  std::vector<Value> all_of(Frame& frame, const std::vector<Expr>& exprs) {
     std::vector<Value> result;
-    for (const int child : step.children) result.push_back(get(frame, child));
+    for (const Expr& e : exprs) result.push_back(get(frame, e));
     return result;
   }
 
+  Value evaluate(Frame& frame, const Expr& e) {
+    check_work();
+    return match(
+        e, [&](const ir::Variable& n) { return variable(frame, e, n); },
+        [&](const ir::Cast& n) {
+          ++operations_;
+          return apply_cast(options_.rounding, widened(n.type), get(frame, n.value));
+        },
+        [&](const ir::Reinterpret& n) { return reinterpret(frame, n); },
+        [&](const ir::Binary& n) { return binary(frame, n); },
+        [&](const ir::Not& n) {
+          ++operations_;
+          return apply_not(get(frame, n.a));
+        },
+        [&](const ir::Select& n) { return select(frame, n.condition, n.when_true, n.when_false); },
+        [&](const ir::Call& n) { return call(frame, n); },
+        [&](const ir::ExprNode&) { return constant(e); });
+  }
+
+  Value constant(const Expr& e) const {
+    const auto scalar = e.type().is_scalar() ? ir::as_scalar(e) : std::nullopt;
+    if (!scalar) internal_error("not part of an algorithm: " + ir::print(e));
+    Value result{*scalar};
+    result.scalar.type = widened(e.type());
+    return result;
+  }
+
+  Value variable(const Frame& frame, const Expr& e, const ir::Variable& n) const {
+    const auto place = frame.places.find(n.name);
+    if (place != frame.places.end()) return {Scalar::of_int(Int(32), frame.point[place->second])};
+    const auto* parameter = dynamic_cast<const ParameterContents*>(n.symbol.raw());
+    if (!parameter) internal_error("unbound variable " + quoted(n.name));
+    return parameter->is_buffer ? buffer_fact(*parameter, n) : value_of(*parameter, e.type());
+  }
+
   // An arm of && and || that decides alone keeps the other from being evaluated.
-  Value binary(Frame& frame, const Step& step) {
+  Value binary(Frame& frame, const ir::Binary& n) {
     ++operations_;
-    const Value a = get(frame, step.children[0]);
-    if ((step.kind == Kind::And || step.kind == Kind::Or) && !a.is_undef()) {
-      const bool deciding = step.kind == Kind::Or;
+    const Value& a = get(frame, n.a);
+    if ((n.kind == Kind::And || n.kind == Kind::Or) && !a.is_undef()) {
+      const bool deciding = n.kind == Kind::Or;
       if (a.is_stable() && a.scalar.as_bool() == deciding) return a;
-      const Value& b = get(frame, step.children[1]);
+      const Value& b = get(frame, n.b);
       if (!b.is_undef() && b.is_stable() && b.scalar.as_bool() == deciding) return b;
     }
-    return apply_binary(options_.rounding, step.kind, a, get(frame, step.children[1]));
+    return apply_binary(options_.rounding, n.kind, a, get(frame, n.b));
   }
 
-  Value select(Frame& frame, const Step& step) {
+  Value select(Frame& frame, const Expr& if_true, const Expr& a, const Expr& b) {
     ++operations_;
-    const Value& condition = get(frame, step.children[0]);
+    const Value& condition = get(frame, if_true);
     if (condition.is_undef()) return condition;
-    const bool stable = condition.is_stable();
-    const Value& chosen = get(frame, step.children[condition.scalar.as_bool() ? 1 : 2]);
-    return stable || chosen.is_undef() ? chosen : Value::unstable(chosen.scalar);
+    return steady(get(frame, condition.scalar.as_bool() ? a : b), condition.is_stable());
   }
 
-  Value reinterpret(Frame& frame, const Step& step) {
+  static Value steady(const Value& value, bool stable) {
+    return stable || value.is_undef() ? value : Value::unstable(value.scalar);
+  }
+
+  Value reinterpret(Frame& frame, const ir::Reinterpret& n) {
     ++operations_;
-    const int child = step.children[0];
-    const Value exact =
-        apply_cast(options_.rounding, frame.program.steps[child].declared, get(frame, child));
-    return apply_cast(options_.rounding, step.type, apply_reinterpret(step.declared, exact));
+    const Value exact = apply_cast(options_.rounding, n.value.type(), get(frame, n.value));
+    return apply_cast(options_.rounding, widened(n.type), apply_reinterpret(n.type, exact));
   }
 
-  Value random(Frame& frame, const Step& step) {
+  Value call(Frame& frame, const ir::Call& n) {
+    switch (n.call_type) {
+      case ir::CallType::Func:
+        return func_call(frame, n);
+      case ir::CallType::Image:
+        return image_call(frame, n);
+      case ir::CallType::Extern:
+        unsupported("interpret a call of " + quoted(n.name),
+                    "a value is computed by operators, not by C functions");
+      case ir::CallType::Operator:
+        break;
+    }
+    switch (n.op) {
+      case Op::undef:
+        return Value::undef();
+      case Op::random:
+        return random(frame, n);
+      case Op::require:
+        return require(frame, n);
+      case Op::if_then_else:
+        return select(frame, n.args[0], n.args[1], n.args[2]);
+      case Op::print:
+      case Op::print_when:
+        return get(frame, n.args[n.op == Op::print ? 0 : 1]);
+      default:
+        ++operations_;
+        return apply_operator(options_.rounding, n.op, all_of(frame, n.args), widened(n.type));
+    }
+  }
+
+  Value random(Frame& frame, const ir::Call& n) {
     std::vector<uint32_t> words;
     bool stable = true;
-    for (const Value& word : children(frame, step)) {
+    for (const Value& word : all_of(frame, n.args)) {
       words.push_back(static_cast<uint32_t>(word.scalar.u));
       stable &= word.is_stable();
     }
     const uint32_t bits = ir::random_bits(words.data(), static_cast<int>(words.size()));
-    const Scalar number = step.declared.is_float()
-                              ? Scalar::of_float(step.declared, ir::random_float(bits))
-                              : Scalar::of_uint(UInt(32), bits);
-    const Value value = apply_cast(Rounding::Strict, step.type, {number});
-    return stable ? value : Value::unstable(value.scalar);
+    const Scalar number = n.type.is_float() ? Scalar::of_float(n.type, ir::random_float(bits))
+                                            : Scalar::of_uint(UInt(32), bits);
+    return steady(apply_cast(Rounding::Strict, widened(n.type), {number}), stable);
   }
 
-  Value require(Frame& frame, const Step& step) {
-    const Value& condition = get(frame, step.children[0]);
-    if (condition.scalar.as_bool()) return get(frame, step.children[1]);
+  Value require(Frame& frame, const ir::Call& n) {
+    if (get(frame, n.args[0]).scalar.as_bool()) return get(frame, n.args[1]);
     std::string message;
-    for (size_t i = 2; i < step.children.size(); ++i) {
-      const Step& part = frame.program.steps[step.children[i]];
-      if (!message.empty()) message += " ";
-      if (part.code == Step::Code::Text) {
-        message += part.name;
-      } else {
-        message += text(get(frame, step.children[i]).scalar.as_double());
-      }
+    for (size_t i = 2; i < n.args.size(); ++i) {
+      const auto* words = n.args[i].as<ir::StringImm>();
+      message += text(message.empty() ? "" : " ",
+                      words ? words->value : text(get(frame, n.args[i]).scalar.as_double()));
     }
     call_error("interpret", "the condition of a require holds", message);
   }
 
   // ---- what lies outside of the pipeline ----
 
-  static const ParameterContents& parameter_of(const Step& step) {
-    return *static_cast<const ParameterContents*>(step.symbol);
-  }
-
-  Value parameter(const Step& step) {
-    const ParameterContents& p = parameter_of(step);
+  Value value_of(const ParameterContents& p, Type type) const {
     if (!p.value)
       call_error("interpret with parameter " + quoted(p.name), "every parameter needs a value");
-    return apply_cast(Rounding::Strict, step.type, {*p.value});
+    return apply_cast(Rounding::Strict, widened(type), {*p.value});
   }
 
-  const halide_buffer_t& buffer_of(const ParameterContents& p) const {
+  static const halide_buffer_t& buffer_of(const ParameterContents& p) {
     if (!p.buffer || !p.buffer->host)
       call_error("interpret with image " + quoted(p.name), "every image needs a host buffer");
     return *p.buffer;
   }
 
-  Value buffer_fact(const Step& step) {
-    const ParameterContents& p = parameter_of(step);
-    const std::string fact = step.name.substr(p.name.size());  // ".extent.1"
+  // "in.extent.1"
+  static Value buffer_fact(const ParameterContents& p, const ir::Variable& n) {
+    const std::string fact = n.name.substr(p.name.size());
     const size_t dot = fact.rfind('.');
     const int d = std::stoi(fact.substr(dot + 1));
     const halide_dimension_t& dim = buffer_of(p).dim[d];
     const std::string kind = fact.substr(1, dot - 1);
     const int value = kind == "min" ? dim.min : kind == "extent" ? dim.extent : dim.stride;
-    return {Scalar::of_int(step.type, value)};
+    return {Scalar::of_int(n.type, value)};
   }
 
-  Value func_call(Frame& frame, const Step& step) {
-    bool stable = true;
-    const Point point = coordinates(frame, step, stable);
-    FuncState& callee = state_of(*static_cast<const FuncContents*>(step.symbol));
-    const Value value = read(callee, point, step.index);
-    return stable || value.is_undef() ? value : Value::unstable(value.scalar);
-  }
-
-  Point coordinates(Frame& frame, const Step& step, bool& stable) {
+  Point coordinates(Frame& frame, const std::vector<Expr>& args, bool& stable) {
     Point point;
-    for (const int child : step.children) {
-      const Value& coordinate = get(frame, child);
+    for (const Expr& arg : args) {
+      const Value& coordinate = get(frame, arg);
       stable &= coordinate.is_stable();
       point.push_back(static_cast<int>(coordinate.scalar.i));
     }
     return point;
   }
 
-  Value image_call(Frame& frame, const Step& step) {
+  Value func_call(Frame& frame, const ir::Call& n) {
     bool stable = true;
-    const Point point = coordinates(frame, step, stable);
-    const ParameterContents& p = parameter_of(step);
+    const Point point = coordinates(frame, n.args, stable);
+    FuncState& callee = state_of(*static_cast<const FuncContents*>(n.symbol.raw()));
+    return steady(read(callee, point, n.component), stable);
+  }
+
+  Value image_call(Frame& frame, const ir::Call& n) {
+    bool stable = true;
+    const Point point = coordinates(frame, n.args, stable);
+    const auto& p = *static_cast<const ParameterContents*>(n.symbol.raw());
     const halide_buffer_t& buffer = buffer_of(p);
     if (!inside(region_of(buffer), point)) {
       call_error("interpret", "an image is read inside of its bounds",
                  quoted(p.name) + " is read at " + show(point));
     }
     touched_[&p].include(point);
-    const Value value = apply_cast(Rounding::Strict, step.type, {read_element(buffer, point)});
-    return stable ? value : Value::unstable(value.scalar);
+    const Value value =
+        apply_cast(Rounding::Strict, widened(n.type), {read_element(buffer, point)});
+    return steady(value, stable);
   }
 
   std::unordered_map<const FuncContents*, std::unique_ptr<FuncState>> states_;
