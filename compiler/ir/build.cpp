@@ -460,6 +460,16 @@ Stmt make_let(const std::string& name, Expr value, Stmt body) {
   return body.defined() ? Stmt(new LetStmt(name, std::move(value), std::move(body))) : Stmt();
 }
 
+Expr make_lets(const Lets& lets, Expr body) {
+  for (size_t i = lets.size(); i-- > 0;) body = make_let(lets[i].first, lets[i].second, body);
+  return body;
+}
+
+Stmt make_lets(const Lets& lets, Stmt body) {
+  for (size_t i = lets.size(); i-- > 0;) body = make_let(lets[i].first, lets[i].second, body);
+  return body;
+}
+
 Stmt make_assert(Expr condition, Expr error) {
   return new Assert(std::move(condition), std::move(error));
 }
@@ -523,6 +533,13 @@ Stmt make_if(Expr condition, Stmt when_true, Stmt when_false) {
                                 : Stmt();
   }
   return new IfThenElse(std::move(condition), std::move(when_true), std::move(when_false));
+}
+
+Stmt with_parts(const IfThenElse& old, Expr condition, Stmt when_true, Stmt when_false) {
+  const bool is_same = condition.same_as(old.condition) && when_true.same_as(old.when_true) &&
+                       when_false.same_as(old.when_false);
+  return is_same ? Stmt(&old)
+                 : make_if(std::move(condition), std::move(when_true), std::move(when_false));
 }
 
 Stmt make_evaluate(Expr value) { return new Evaluate(std::move(value)); }

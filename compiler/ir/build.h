@@ -4,6 +4,9 @@
 #pragma once
 
 #include <optional>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "diagnostics/error.h"
 #include "ir/expr.h"
@@ -60,6 +63,10 @@ Expr likely(Expr e);
 Expr conjunction(const std::vector<Expr>& terms);  // true when empty
 
 Stmt make_let(const std::string& name, Expr value, Stmt body);
+// Names and what they are bound to, the outermost first, around the body.
+using Lets = std::vector<std::pair<std::string, Expr>>;
+Expr make_lets(const Lets& lets, Expr body);
+Stmt make_lets(const Lets& lets, Stmt body);
 Stmt make_assert(Expr condition, Expr error);
 Stmt make_producer_consumer(const std::string& name, bool produces, Stmt body);
 Stmt make_for(const std::string& name, Expr min, Expr extent, ForType type, Stmt body,
@@ -75,6 +82,8 @@ Stmt make_free(const std::string& name);
 Stmt make_block(std::vector<Stmt>
                     stmts);  // flattens, drops undefined; undefined when empty; the one when single
 Stmt make_if(Expr condition, Stmt when_true, Stmt when_false = {});
+// `old` with other parts; itself when they are its own.
+Stmt with_parts(const IfThenElse& old, Expr condition, Stmt when_true, Stmt when_false);
 Stmt make_evaluate(Expr value);
 Stmt make_atomic(const std::string& name, Stmt body);
 Stmt make_fork(Stmt first, Stmt rest);

@@ -205,6 +205,10 @@ Expr map_children(const Expr& e, ExprMap map) { return map_children(e, ChildMap{
 Stmt map_children(const Stmt& s, ExprMap map, StmtMap map_stmt) {
   return map_children(s, ChildMap{map, map_stmt});
 }
+Stmt map_children(const Stmt& s, StmtMap map_stmt) {
+  return map_children(
+      s, [](const Expr& e) { return e; }, map_stmt);
+}
 Expr map_children(const Expr& e, ExprMap map, NameMap names) {
   return map_children(e, ChildMap{map, same_stmt, &names});
 }

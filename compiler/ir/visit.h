@@ -88,6 +88,7 @@ void for_each_child(const Stmt& s, ExprVisit on_expr, StmtVisit on_stmt);
 // The same node with its children replaced; the same handle when none changed.
 Expr map_children(const Expr& e, ExprMap map);
 Stmt map_children(const Stmt& s, ExprMap map, StmtMap map_stmt);
+Stmt map_children(const Stmt& s, StmtMap map_stmt);  // its statements alone
 // And with its own name replaced, which it binds, stores to or loads from. Calls keep theirs.
 Expr map_children(const Expr& e, ExprMap map, NameMap names);
 Stmt map_children(const Stmt& s, ExprMap map, StmtMap map_stmt, NameMap names);

@@ -21,6 +21,7 @@
 
 #include "ir/build.h"
 #include "ir/visit.h"
+#include "lower/runtime_call.h"
 #include "lower/statement_rewriter.h"
 
 namespace retrograde::ir {
@@ -29,10 +30,6 @@ namespace {
 
 const char* const run_name = "profiler.run";
 
-Expr call(const char* function, std::vector<Expr> args, Type type = Int(32)) {
-  args.insert(args.begin(), Expr(function));
-  return call_op(Op::runtime_call, type, std::move(args));
-}
 Expr run() { return variable(run_name, Handle()); }
 
 class Profiling : public StatementRewriter {
@@ -50,10 +47,8 @@ class Profiling : public StatementRewriter {
  protected:
   Stmt rewrite(const Stmt& s) override {
     if (const ProducerConsumer* n = s.as<ProducerConsumer>(); n && n->produces) return produce(*n);
-    if (const For* n = s.as<For>(); n && n->runs == ForType::Parallel) {
-      return make_for(n->name, n->min, n->extent, n->runs, on_a_thread((*this)(n->body)),
-                      n->partition);
-    }
+    if (const For* n = s.as<For>(); n && n->runs == ForType::Parallel)
+      return map_children(s, [&](const Stmt& body) { return on_a_thread((*this)(body)); });
     if (const Fork* n = s.as<Fork>())
       return make_fork(on_a_thread((*this)(n->first)), (*this)(n->rest));
     if (const Allocate* n = s.as<Allocate>()) return allocate(*n);
@@ -74,10 +69,10 @@ class Profiling : public StatementRewriter {
   int next_ = 1;
 
   static Stmt enter(int number) {
-    return make_evaluate(call("retrograde_profiler_enter", {run(), Expr(number)}));
+    return make_evaluate(call_runtime("retrograde_profiler_enter", {run(), Expr(number)}));
   }
   static Stmt thread(int change) {
-    return make_evaluate(call("retrograde_profiler_thread", {run(), Expr(change)}));
+    return make_evaluate(call_runtime("retrograde_profiler_thread", {run(), Expr(change)}));
   }
 
   int number_of(const std::string& name) const {
@@ -101,7 +96,7 @@ class Profiling : public StatementRewriter {
     const Expr bytes = n.elements * make_const(Int(64), n.type.bytes());
     const auto memory = [&](const Expr& change) {
       return make_evaluate(
-          call("retrograde_profiler_memory", {run(), Expr(number_of(n.name)), change}));
+          call_runtime("retrograde_profiler_memory", {run(), Expr(number_of(n.name)), change}));
     };
     const Stmt body =
         make_block({memory(bytes), (*this)(n.body), memory(make_const(Int(64), 0) - bytes)});
@@ -127,9 +122,7 @@ Stmt wrap_work(const Stmt& s, FunctionRef<Stmt(const Stmt&)> wrap) {
   for_each_child(
       s, [](const Expr&) {}, [&](const Stmt& part) { parts += has_work(part); });
   if (parts == 1) {
-    return map_children(
-        s, [](const Expr& e) { return e; },
-        [&](const Stmt& part) { return wrap_work(part, wrap); });
+    return map_children(s, [&](const Stmt& part) { return wrap_work(part, wrap); });
   }
   const Block* block = s.as<Block>();
   if (!block) return wrap(s);
@@ -144,11 +137,11 @@ Stmt wrap_work(const Stmt& s, FunctionRef<Stmt(const Stmt&)> wrap) {
 Stmt inject_profiling(const Stmt& s, const Program& program, const std::string& pipeline) {
   Profiling profiling(program);
   const auto wrap = [&](const Stmt& work) {
-    const Expr begin =
-        call("retrograde_profiler_begin", {Expr(pipeline), Expr(profiling.names)}, Handle());
-    return make_let(
-        run_name, begin,
-        make_block({profiling(work), make_evaluate(call("retrograde_profiler_end", {run()}))}));
+    const Expr begin = call_runtime("retrograde_profiler_begin",
+                                    {Expr(pipeline), Expr(profiling.names)}, Handle());
+    return make_let(run_name, begin,
+                    make_block({profiling(work),
+                                make_evaluate(call_runtime("retrograde_profiler_end", {run()}))}));
   };
   return wrap_work(s, wrap);
 }

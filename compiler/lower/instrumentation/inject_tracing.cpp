@@ -25,6 +25,8 @@
 #include "diagnostics/error.h"
 #include "ir/build.h"
 #include "ir/visit.h"
+#include "lower/runtime_call.h"
+#include "lower/walk_in_bounds.h"
 #include "simplify/simplify.h"
 
 namespace retrograde::ir {
@@ -44,57 +46,39 @@ bool is_any(const TraceSchedule& trace) {
   return trace.loads || trace.stores || trace.realizations;
 }
 
-Expr region_event(const std::string& func, int event, const Expr& parent,
-                  const std::vector<Range>& region, const Expr& tag = {}) {
-  std::vector<Expr> coordinates;
+// Appends min and extent of each dimension, and how many numbers these are.
+void add_region(const std::vector<Range>& region, std::vector<Expr>& args) {
+  std::vector<Expr> numbers;
   for (const Range& range : region) {
-    coordinates.push_back(cast(Int(32), range.min));
-    coordinates.push_back(cast(Int(32), range.extent));
+    numbers.push_back(cast(Int(32), range.min));
+    numbers.push_back(cast(Int(32), range.extent));
   }
-  const Expr none = reinterpret_as(Handle(), make_uint_const(UInt(64), 0));
-  return call_op(Op::runtime_call, Int(32),
-                 {Expr("retrograde_trace_region"), Expr(func), Expr(event), parent,
-                  coordinates.empty() ? none : call_op(Op::pack, Handle(), coordinates),
-                  Expr(static_cast<int32_t>(coordinates.size())), tag.defined() ? tag : none});
+  args.push_back(numbers.empty() ? null_handle() : pack(numbers));
+  args.push_back(Expr(static_cast<int32_t>(numbers.size())));
+}
+
+Expr region_event(const std::string& func, int event, const Expr& parent,
+                  const std::vector<Range>& region, const Expr& tag = null_handle()) {
+  std::vector<Expr> args = {Expr(func), Expr(event), parent};
+  add_region(region, args);
+  args.push_back(tag);
+  return call_runtime("retrograde_trace_region", std::move(args));
 }
 
 // The box of all points of a Func that a statement stores to.
-class StoreRegion {
- public:
-  explicit StoreRegion(const std::string& func) : func_(func) {}
-  Box of(const Stmt& s) {
-    visit(s);
-    return box_;
-  }
-
- private:
-  const std::string& func_;
-  Scope<Interval> scope_;
-  Box box_;
-
-  void visit(const Stmt& s) {
-    if (!s.defined()) return;
-    if (const For* n = s.as<For>()) {
-      const Interval min = bounds_of(n->min, scope_);
-      const Interval max = bounds_of(n->min + n->extent - 1, scope_);
-      scope_.push(n->name, {min.min, max.max});
-      visit(n->body);
-      scope_.pop(n->name);
-    } else if (const LetStmt* n = s.as<LetStmt>()) {
-      const bool is_index = n->value.type() == Int(32);
-      scope_.push(n->name, is_index ? bounds_of(n->value, scope_) : Interval::everything());
-      visit(n->body);
-      scope_.pop(n->name);
-    } else if (const Provide* n = s.as<Provide>(); n && n->name == func_) {
-      Box point;
-      for (const Expr& arg : n->args) point.push_back(bounds_of(arg, scope_));
-      box_ = hull(box_, point);
-    } else {
-      for_each_child(
-          s, [](const Expr&) {}, [&](const Stmt& part) { visit(part); });
-    }
-  }
-};
+Box region_stored(const Stmt& s, const std::string& func) {
+  Box box;
+  walk_in_bounds(
+      s, [](const Expr&, const Scope<Interval>&) {},
+      [&](const Stmt& part, const Scope<Interval>& scope) {
+        const auto* n = part.as<Provide>();
+        if (!n || n->name != func) return;
+        Box point;
+        for (const Expr& arg : n->args) point.push_back(bounds_of(arg, scope));
+        box = hull(box, point);
+      });
+  return box;
+}
 
 class Tracer : public Rewriter {
  public:
@@ -172,7 +156,7 @@ class Tracer : public Rewriter {
     if (it == traces_.end() || !it->second.stores) return children(s);
     std::vector<Expr> values, args;
     for (const Expr& arg : n.args) args.push_back((*this)(arg));
-    std::vector<std::pair<std::string, Expr>> lets;
+    Lets lets;
     for (size_t i = 0; i < n.values.size(); i++) {
       Expr value = (*this)(n.values[i]);
       const Call* call = value.as<Call>();
@@ -186,9 +170,7 @@ class Tracer : public Rewriter {
       }
       values.push_back(event(value, halide_trace_store, n.name, static_cast<int>(i), args));
     }
-    Stmt result = make_provide(n.name, values, args, (*this)(n.predicate));
-    for (size_t i = lets.size(); i-- > 0;) result = make_let(lets[i].first, lets[i].second, result);
-    return result;
+    return make_lets(lets, make_provide(n.name, values, args, (*this)(n.predicate)));
   }
 
   // begin; body; end -- the beginning's number is the parent of what happens inside.
@@ -225,7 +207,7 @@ class Tracer : public Rewriter {
 
   std::vector<Range> region_of(const ProducerConsumer& n) {
     std::vector<Range> region;
-    for (const Interval& side : StoreRegion(n.name).of(n.body)) {
+    for (const Interval& side : region_stored(n.body, n.name)) {
       const bool known = side.is_bounded();
       region.push_back({known ? simplify(side.min) : Expr(0),
                         known ? simplify(side.max - side.min + 1) : Expr(0)});
@@ -262,7 +244,6 @@ std::vector<Range> buffer_region(const LoopedFunc& f) {
 
 // What readers of a trace want to know of a Func in advance.
 Stmt type_tag(const LoopedFunc& f, const Box& box) {
-  std::vector<Expr> parts;
   std::string text = "func_type_and_dim: " + std::to_string(f.func->types.size());
   for (const Type& type : f.func->types) {
     const int code = type.code() == TypeCode::BFloat ? 4 : static_cast<int>(type.code());
@@ -273,53 +254,28 @@ Stmt type_tag(const LoopedFunc& f, const Box& box) {
   for (const Interval& side : box) {
     if (side.is_bounded()) region.push_back({side.min, side.max - side.min + 1});
   }
-  std::vector<Expr> numbers;
-  for (const Range& range : region) {
-    numbers.push_back(cast(Int(32), range.min));
-    numbers.push_back(cast(Int(32), range.extent));
-  }
-  const Expr none = reinterpret_as(Handle(), make_uint_const(UInt(64), 0));
-  return make_evaluate(
-      call_op(Op::runtime_call, Int(32),
-              {Expr("retrograde_trace_type"), Expr(f.name()), variable(pipeline_id), Expr(text),
-               numbers.empty() ? none : call_op(Op::pack, Handle(), numbers),
-               Expr(static_cast<int32_t>(numbers.size()))}));
+  std::vector<Expr> args = {Expr(f.name()), variable(pipeline_id), Expr(text)};
+  add_region(region, args);
+  return make_evaluate(call_runtime("retrograde_trace_type", std::move(args)));
 }
 
 // Regions of all Funcs at root, where they are known there.
 std::map<std::string, Box> regions_at_root(const Stmt& s) {
   std::map<std::string, Box> regions;
-  Scope<Interval> scope;
-  const std::function<void(const Stmt&)> visit = [&](const Stmt& part) {
-    if (!part.defined()) return;
-    if (const For* n = part.as<For>()) {
-      scope.push(n->name,
-                 {bounds_of(n->min, scope).min, bounds_of(n->min + n->extent - 1, scope).max});
-      visit(n->body);
-      scope.pop(n->name);
-      return;
-    }
-    if (const LetStmt* n = part.as<LetStmt>()) {
-      scope.push(n->name,
-                 n->value.type() == Int(32) ? bounds_of(n->value, scope) : Interval::everything());
-      visit(n->body);
-      scope.pop(n->name);
-      return;
-    }
-    if (const Realize* n = part.as<Realize>()) {
-      Box box;
-      for (const Range& range : n->bounds)
-        box.push_back(
-            {bounds_of(range.min, scope).min, bounds_of(range.min + range.extent - 1, scope).max});
-      for (Interval& side : box) {
-        if (side.is_bounded()) side = {simplify(side.min), simplify(side.max)};
-      }
-      regions[n->name] = hull(regions[n->name], box);
-    }
-    for_each_child(
-        part, [](const Expr&) {}, visit);
-  };
-  visit(s);
+  walk_in_bounds(
+      s, [](const Expr&, const Scope<Interval>&) {},
+      [&](const Stmt& part, const Scope<Interval>& scope) {
+        const auto* n = part.as<Realize>();
+        if (!n) return;
+        Box box;
+        for (const Range& range : n->bounds) {
+          Interval side{bounds_of(range.min, scope).min,
+                        bounds_of(range.min + range.extent - 1, scope).max};
+          if (side.is_bounded()) side = {simplify(side.min), simplify(side.max)};
+          box.push_back(side);
+        }
+        regions[n->name] = hull(regions[n->name], box);
+      });
   return regions;
 }
 
@@ -328,7 +284,6 @@ std::map<std::string, Box> regions_at_root(const Stmt& s) {
 void inject_tracing(LoopNests& nests, const Program& program, const std::string& pipeline,
                     const Target& target) {
   Tracer tracer(program, target);
-  const std::map<std::string, Box> regions = regions_at_root(nests.body);
   std::function<Stmt()> body = [&] { return tracer(nests.body); };
   for (auto it = program.funcs.begin(); it != program.funcs.end(); ++it) {
     if (!it->is_output || !tracer.traces_realizations(it->name())) continue;
@@ -338,6 +293,7 @@ void inject_tracing(LoopNests& nests, const Program& program, const std::string&
   }
   const Stmt traced = body();
   if (tracer.traced.empty() && !target.has_feature(Target::TracePipeline)) return;
+  const std::map<std::string, Box> regions = regions_at_root(nests.body);
   std::vector<Stmt> types, tags;
   for (const LoopedFunc& f : program.funcs) {
     if (!tracer.traces(f.name())) continue;

@@ -12,6 +12,7 @@
 #include "ir/build.h"
 #include "ir/visit.h"
 #include "lower/nests/extern_stage.h"
+#include "lower/runtime_call.h"
 #include "lower/statement_rewriter.h"
 
 namespace retrograde::ir {
@@ -74,11 +75,10 @@ class Writer : public StatementRewriter {
     const Type type = f.func->types[0];
     const Expr host =
         call_op(Op::address_of, Handle(), {call_func(name, type, first, 0, SymbolRef(f.func))});
-    const std::string code = text(name, ".written.", written_++);
-    const Expr call = call_op(Op::runtime_call, Int(32),
-                              {Expr("retrograde_debug_to_file"), Expr(f.func->debug_file),
-                               packed_buffer(type, host, region, strides)});
-    return make_let(code, call, make_assert(variable(code) == 0, variable(code)));
+    return checked_call(
+        text(name, ".written.", written_++),
+        call_runtime("retrograde_debug_to_file",
+                     {Expr(f.func->debug_file), packed_buffer(type, host, region, strides)}));
   }
 };
 

@@ -46,21 +46,20 @@ bool is_small(const Expr& e) {
 class ClampDropper : public Rewriter {
  protected:
   Expr rewrite(const Expr& e) override {
-    if (const auto* let = e.as<Let>()) return rewrite_let(e, *let);
+    if (const auto* let = e.as<Let>())
+      return map_children(e, [&](const Expr& part) {
+        return part.same_as(let->value) ? opened_value(let->name, part) : (*this)(part);
+      });
     const Expr copy = children(e);
     const bool is_extreme = copy.kind() == Kind::Min || copy.kind() == Kind::Max;
     return is_extreme && !facts_.empty() ? decided(*copy.as<Binary>(), copy) : copy;
   }
 
   Stmt rewrite(const Stmt& s) override {
-    if (const auto* branch = s.as<IfThenElse>()) return rewrite_branch(s, *branch);
-    if (const auto* let = s.as<LetStmt>()) {
-      const Expr value = (*this)(let->value);
-      open(let->name, value);
-      const Stmt body = (*this)(let->body);
-      const bool is_same = value.same_as(let->value) && body.same_as(let->body);
-      return is_same ? s : make_let(let->name, value, body);
-    }
+    if (const auto* branch = s.as<IfThenElse>()) return rewrite_branch(*branch);
+    if (const auto* let = s.as<LetStmt>())
+      return map_children(
+          s, [&](const Expr& value) { return opened_value(let->name, value); }, *this);
     if (!s.as<For>()) return children(s);
     ++loops_;
     Stmt result = children(s);
@@ -69,15 +68,13 @@ class ClampDropper : public Rewriter {
   }
 
  private:
-  Expr rewrite_let(const Expr& e, const Let& let) {
-    const Expr value = (*this)(let.value);
-    open(let.name, value);
-    const Expr body = (*this)(let.body);
-    const bool is_same = value.same_as(let.value) && body.same_as(let.body);
-    return is_same ? e : make_let(let.name, value, body);
+  Expr opened_value(const std::string& name, const Expr& value) {
+    const Expr result = (*this)(value);
+    open(name, result);
+    return result;
   }
 
-  Stmt rewrite_branch(const Stmt& s, const IfThenElse& branch) {
+  Stmt rewrite_branch(const IfThenElse& branch) {
     const Expr condition = (*this)(branch.condition);
     const size_t known = facts_.size();
     add_facts(condition);
@@ -85,11 +82,7 @@ class ClampDropper : public Rewriter {
     const Stmt when_true = (*this)(branch.when_true);
     facts_.resize(known);
     forget();
-    const Stmt when_false = (*this)(branch.when_false);
-    const bool is_same = condition.same_as(branch.condition) &&
-                         when_true.same_as(branch.when_true) &&
-                         when_false.same_as(branch.when_false);
-    return is_same ? s : make_if(condition, when_true, when_false);
+    return with_parts(branch, condition, when_true, (*this)(branch.when_false));
   }
 
   void add_facts(const Expr& condition) {

@@ -467,33 +467,9 @@ class AsyncForker : public StatementRewriter {
 
   // The control of a statement around what `part` leaves of its parts; undefined without any.
   Stmt around(const Stmt& s, FunctionRef<Stmt(const Stmt&)> part) const {
-    return match(
-        s,
-        [&](const LetStmt& n) {
-          Stmt body = part(n.body);
-          return body.defined() ? make_let(n.name, n.value, body) : body;
-        },
-        [&](const IfThenElse& n) {
-          Stmt when_true = part(n.when_true), when_false = part(n.when_false);
-          if (!when_true.defined() && !when_false.defined()) return when_true;
-          if (!when_true.defined()) return make_if(!n.condition, when_false);
-          return make_if(n.condition, when_true, when_false);
-        },
-        [&](const Block& n) {
-          std::vector<Stmt> stmts;
-          for (const Stmt& child : n.stmts) stmts.push_back(part(child));
-          return make_block(std::move(stmts));
-        },
-        [&](const ProducerConsumer& n) {
-          Stmt body = part(n.body);
-          return body.defined() ? make_producer_consumer(n.name, n.produces, body) : body;
-        },
-        [&](const Realize& n) {
-          Stmt body = part(n.body);
-          if (!needs(body, n.name)) return body;
-          return make_realize(n.name, n.types, n.memory, n.bounds, body);
-        },
-        [&](const StmtNode&) { return s; });
+    const Stmt result = map_children(s, part);
+    const Realize* n = result.defined() ? result.as<Realize>() : nullptr;
+    return n && !needs(n->body, n->name) ? n->body : result;
   }
 
   bool is_wait(const Stmt& s) const {

@@ -14,11 +14,11 @@
 // Source: Halide's documentation of prefetch. Tests: test/unit/prefetch_test.cpp.
 #include "lower/loops/insert_prefetches.h"
 
-#include "analysis/interval.h"
 #include "ir/build.h"
 #include "ir/visit.h"
 #include "lower/nests/copy_statement.h"
 #include "lower/statement_rewriter.h"
+#include "lower/walk_in_bounds.h"
 #include "simplify/simplify.h"
 
 namespace retrograde::ir {
@@ -28,47 +28,17 @@ namespace {
 constexpr int line_bytes = 64;
 
 // The box that a statement reads of a Func or image.
-class ReadRegion {
- public:
-  explicit ReadRegion(const std::string& name) : name_(name) {}
-  Box of(const Stmt& s) {
-    visit(s);
-    return box_;
-  }
-
- private:
-  const std::string& name_;
-  Scope<Interval> scope_;
-  Box box_;
-
-  void visit(const Expr& e) {
-    const auto uses = footprints(e, scope_);
-    if (const auto it = uses.find(name_); it != uses.end()) box_ = hull(box_, it->second.box);
-  }
-
-  void visit(const Stmt& s) {
-    if (!s.defined()) return;
-    if (const For* n = s.as<For>()) {
-      visit(n->min), visit(n->extent);
-      within(n->name,
-             {bounds_of(n->min, scope_).min, bounds_of(n->min + n->extent - 1, scope_).max},
-             n->body);
-    } else if (const LetStmt* n = s.as<LetStmt>()) {
-      visit(n->value);
-      const bool is_index = n->value.type() == Int(32);
-      within(n->name, is_index ? bounds_of(n->value, scope_) : Interval::everything(), n->body);
-    } else {
-      for_each_child(
-          s, [&](const Expr& e) { visit(e); }, [&](const Stmt& part) { visit(part); });
-    }
-  }
-
-  void within(const std::string& name, const Interval& range, const Stmt& body) {
-    scope_.push(name, range);
-    visit(body);
-    scope_.pop(name);
-  }
-};
+Box region_read(const Stmt& s, const std::string& name) {
+  Box box;
+  walk_in_bounds(
+      s,
+      [&](const Expr& e, const Scope<Interval>& scope) {
+        const auto uses = footprints(e, scope);
+        if (const auto it = uses.find(name); it != uses.end()) box = hull(box, it->second.box);
+      },
+      [](const Stmt&, const Scope<Interval>&) {});
+  return box;
+}
 
 class Inserter : public StatementRewriter {
  public:
@@ -91,10 +61,10 @@ class Inserter : public StatementRewriter {
     const For* n = s.as<For>();
     if (!n) return children(s);
     loops_.push_back({n->name, lets_.size()});
-    Stmt body = (*this)(n->body);
-    body = with_prefetches(*n, body);
+    Stmt result =
+        map_children(s, [&](const Stmt& body) { return with_prefetches(*n, (*this)(body)); });
     loops_.pop_back();
-    return make_for(n->name, n->min, n->extent, n->runs, body, n->partition);
+    return result;
   }
 
  private:
@@ -103,7 +73,7 @@ class Inserter : public StatementRewriter {
     size_t lets;  // how many are bound around it
   };
   const Program& program_;
-  std::vector<std::pair<std::string, Expr>> lets_;
+  Lets lets_;
   std::vector<OuterLoop> loops_;
   std::map<std::string, std::string> realized_;
 
@@ -129,7 +99,7 @@ class Inserter : public StatementRewriter {
     const std::string name = image                      ? image->name
                              : found == realized_.end() ? directive.name
                                                         : found->second;
-    Box box = ReadRegion(name).of(body);
+    Box box = region_read(body, name);
     const OuterLoop* from = find_loop(directive.from, at);
     if (box.empty() || !from) return {};
     const Substitution later = moved(*from, directive.offset);

@@ -53,13 +53,6 @@ bool may_leave(const Stmt& s) {
                   [](const Stmt& part) { return part.kind() == Kind::Assert; });
 }
 
-using Lets = std::vector<std::pair<std::string, Expr>>;
-
-Stmt with_lets(const Lets& lets, Stmt body) {
-  for (size_t i = lets.size(); i-- > 0;) body = make_let(lets[i].first, lets[i].second, body);
-  return body;
-}
-
 // The update with everything that does not depend on the element in front of it.
 Stmt narrowed(const Atomic& n) {
   const BufferNames buffers = stored_in(n.body);
@@ -77,16 +70,16 @@ Stmt narrowed(const Atomic& n) {
   if (store && is_one_word(store->value.type())) {
     Substitution values;
     for (const auto& [name, value] : inside) values[name] = substitute(value, values);
-    return with_lets(outside, make_atomic(n.name, substitute(rest, values)));
+    return make_lets(outside, make_atomic(n.name, substitute(rest, values)));
   }
-  const Stmt body = with_lets(inside, rest);
+  const Stmt body = make_lets(inside, rest);
   if (may_leave(body)) {
     unsupported("update " + quoted(n.name) + " atomically",
                 "the values of a Tuple are updated under a lock, which must not be left",
                 "its update calls require() on what it reads of " + quoted(n.name),
                 "Check the condition outside of the update");
   }
-  return with_lets(outside, make_atomic(n.name, body));
+  return make_lets(outside, make_atomic(n.name, body));
 }
 
 }  // namespace

@@ -17,11 +17,13 @@
 // Source: Halide's documentation of memoize and memoize_tag. Tests: test/unit/memoize_test.cpp.
 #include "lower/loops/memoize.h"
 
+#include <algorithm>
 #include <unordered_set>
 
 #include "diagnostics/error.h"
 #include "ir/build.h"
 #include "ir/visit.h"
+#include "lower/runtime_call.h"
 
 namespace retrograde::ir {
 
@@ -86,7 +88,6 @@ class Dependencies {
   void visit_variable(const Expr& e, const Variable& variable) {
     const auto param = std::dynamic_pointer_cast<ParameterContents>(variable.symbol.lock());
     if (!param || !names_.insert(variable.name).second) return;
-    if (param->is_buffer) return parts.push_back(e);  // a fact of its shape
     parts.push_back(e);
   }
 
@@ -214,16 +215,16 @@ class Memoizer : public Rewriter {
                                {call_func(name, type, first, static_cast<int>(i), {})}));
       sizes.push_back(elements * make_const(Int(64), type.bytes()));
     }
-    const Expr key = call_op(Op::pack, Handle(), key_of(f));
+    const Expr key = pack(key_of(f));
     const std::string prefix = name + ".memoization";
     const std::vector<Expr> what = {variable(prefix + "_key", Handle()), Expr(key_bytes(key)),
                                     Expr(static_cast<int32_t>(blocks.size())),
                                     variable(prefix + "_blocks", Handle()),
                                     variable(prefix + "_bytes", Handle())};
     Stmt body = make_if(variable(prefix + "_missing") != 0, make_block({produce, store(f, what)}));
-    body = make_let(prefix + "_missing", call("retrograde_memoization_lookup", what), body);
-    body = make_let(prefix + "_bytes", call_op(Op::pack, Handle(), sizes), body);
-    body = make_let(prefix + "_blocks", call_op(Op::pack, Handle(), blocks), body);
+    body = make_let(prefix + "_missing", call_runtime("retrograde_memoization_lookup", what), body);
+    body = make_let(prefix + "_bytes", pack(sizes), body);
+    body = make_let(prefix + "_blocks", pack(blocks), body);
     return make_let(prefix + "_key", key, body);
   }
 
@@ -232,18 +233,13 @@ class Memoizer : public Rewriter {
     if (key.defined()) Dependencies::check_is_constant(f, key, "the eviction key");
     what.push_back(Expr(key.defined() ? 1 : 0));
     what.push_back(key.defined() ? eviction_bits(key) : make_uint_const(UInt(64), 0));
-    return make_evaluate(call("retrograde_memoization_store", what));
+    return make_evaluate(call_runtime("retrograde_memoization_store", what));
   }
 
   // Pointers and numbers of any width, as the 64 bits that evicting is asked for.
   static Expr eviction_bits(const Expr& key) {
     if (key.type().is_handle()) return reinterpret_as(UInt(64), key);
     return cast(UInt(64), key);
-  }
-
-  static Expr call(const char* function, std::vector<Expr> args) {
-    args.insert(args.begin(), Expr(function));
-    return call_op(Op::runtime_call, Int(32), std::move(args));
   }
 
   static int32_t key_bytes(const Expr& pack) {
@@ -260,13 +256,6 @@ class Memoizer : public Rewriter {
   KeyRegions regions_;
 };
 
-bool any_memoized(const Program& program) {
-  for (const LoopedFunc& f : program.funcs) {
-    if (is_memoized(&f)) return true;
-  }
-  return false;
-}
-
 }  // namespace
 
 Stmt with_key_region(const std::string& func, const Box& read, Stmt storage) {
@@ -279,7 +268,9 @@ Stmt with_key_region(const std::string& func, const Box& read, Stmt storage) {
 
 Stmt memoize(const Stmt& s, const Program& program, const std::string& function,
              const Target& target, const StorageFolds& folds) {
-  return any_memoized(program) ? Memoizer(program, function, target, folds)(s) : s;
+  const bool any = std::any_of(program.funcs.begin(), program.funcs.end(),
+                               [](const LoopedFunc& f) { return is_memoized(&f); });
+  return any ? Memoizer(program, function, target, folds)(s) : s;
 }
 
 }  // namespace retrograde::ir

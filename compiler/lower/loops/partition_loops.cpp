@@ -181,7 +181,7 @@ class Partitioner : public StatementRewriter {
                      const Expr& needed) {
     Expr var = variable(loop.name, loop.min.type());
     std::vector<Expr> conditions;
-    std::vector<std::pair<std::string, Expr>> lets;
+    Lets lets;
     auto bind = [&](const char* what, const Expr& value) -> Expr {
       if (is_const(value) || value.as<Variable>()) return value;
       lets.emplace_back(fresh_(loop.name + what), value);
@@ -191,9 +191,7 @@ class Partitioner : public StatementRewriter {
     if (ends.end.defined()) conditions.push_back(var < bind(".end", ends.end));
     if (needed.defined()) conditions.push_back(bind(".steady", needed));
     Stmt body = make_if(conjunction(conditions), steady_body, copy_statement(rest, fresh_));
-    Stmt result = make_for(loop.name, loop.min, loop.extent, loop.runs, body);
-    for (size_t i = lets.size(); i-- > 0;) result = make_let(lets[i].first, lets[i].second, result);
-    return result;
+    return make_lets(lets, make_for(loop.name, loop.min, loop.extent, loop.runs, body));
   }
 
   // loop.min <= begin <= end <= loop_end, whatever the loop's extent.

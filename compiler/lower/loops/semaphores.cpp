@@ -1,6 +1,7 @@
 #include "lower/loops/semaphores.h"
 
 #include "ir/build.h"
+#include "lower/runtime_call.h"
 #include "lower/statement_rewriter.h"
 
 namespace retrograde::ir {
@@ -15,7 +16,7 @@ Stmt call(const char* function, const std::string& func, int which, int count) {
   const Expr place = call_op(
       Op::address_of, Handle(),
       {call_func(semaphores_of(func), UInt(64), {Expr(static_cast<int32_t>(which))}, 0, {})});
-  return make_evaluate(call_op(Op::runtime_call, Int(32), {Expr(function), place, Expr(count)}));
+  return make_evaluate(call_runtime(function, {place, Expr(count)}));
 }
 
 // The first call that has the semaphores of the Func; undefined when there is none.
@@ -39,9 +40,8 @@ Expr semaphore_in(const Stmt& step, const std::string& func) {
 }  // namespace
 
 Stmt Semaphores::acquire(const std::string& func, int which) {
-  const std::string code = fresh_(func + ".waited");
-  const Expr wait = call("retrograde_semaphore_acquire", func, which, 1).as<Evaluate>()->value;
-  return make_let(code, wait, make_assert(variable(code) == 0, variable(code)));
+  return checked_call(fresh_(func + ".waited"),
+                      call("retrograde_semaphore_acquire", func, which, 1).as<Evaluate>()->value);
 }
 
 Stmt Semaphores::release(const std::string& func, int which) {

@@ -108,9 +108,8 @@ Expr SteadyRewriter::rewrite(const Expr& e) {
 
 Stmt SteadyRewriter::rewrite(const Stmt& s) {
   if (const LetStmt* n = s.as<LetStmt>()) {
-    Expr value = bind(n->name, n->value);
-    Stmt body = (*this)(n->body);
-    return value.same_as(n->value) && body.same_as(n->body) ? s : make_let(n->name, value, body);
+    return map_children(
+        s, [&](const Expr& value) { return bind(n->name, value); }, *this);
   }
   if (const For* n = s.as<For>()) return rewrite_loop(s, *n);
   Stmt copy = children(s);

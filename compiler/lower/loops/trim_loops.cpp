@@ -111,8 +111,7 @@ class Trimmer {
           if (n.when_false.defined()) return s;
           Expr rest = without_ends(n.condition);
           Stmt body = trim(n.when_true);
-          if (is_const_true(rest)) return body;
-          return rest.same_as(n.condition) && body.same_as(n.when_true) ? s : make_if(rest, body);
+          return with_parts(n, rest, body, {});
         },
         [&](const StmtNode&) { return s; });
   }
@@ -139,9 +138,8 @@ class Trimmer {
   Stmt with_body(const Stmt& s, const Stmt& body) {
     Stmt trimmed = trim(body);
     if (trimmed.same_as(body)) return s;
-    return map_children(
-        s, [](const Expr& e) { return e; },
-        [&](const Stmt& child) { return child.same_as(body) ? trimmed : child; });
+    return map_children(s,
+                        [&](const Stmt& child) { return child.same_as(body) ? trimmed : child; });
   }
 
   // The condition less the conjuncts that became ends or go around the loop.

@@ -43,7 +43,7 @@ class Unroller : public StatementRewriter {
 
  protected:
   Stmt rewrite(const Stmt& s) override {
-    if (const IfThenElse* choice = s.as<IfThenElse>()) return chosen(*choice, s);
+    if (const IfThenElse* choice = s.as<IfThenElse>()) return chosen(*choice);
     if (const LetStmt* let = s.as<LetStmt>()) values_[let->name] = let->value;
     Stmt inner = children(s);
     const For* loop = inner.as<For>();
@@ -63,7 +63,7 @@ class Unroller : public StatementRewriter {
   Substitution values_;           // of names around the statement at hand, as they are written
   std::vector<Expr> conditions_;  // that hold there
 
-  Stmt chosen(const IfThenElse& choice, const Stmt& s) {
+  Stmt chosen(const IfThenElse& choice) {
     const auto under = [&](const Expr& condition, const Stmt& branch) {
       if (!branch.defined()) return branch;
       conditions_.push_back(condition);
@@ -72,9 +72,8 @@ class Unroller : public StatementRewriter {
       return result;
     };
     const Stmt when_true = under(choice.condition, choice.when_true);
-    const Stmt when_false = under(!choice.condition, choice.when_false);
-    if (when_true.same_as(choice.when_true) && when_false.same_as(choice.when_false)) return s;
-    return make_if(choice.condition, when_true, when_false);
+    return with_parts(choice, choice.condition, when_true,
+                      under(!choice.condition, choice.when_false));
   }
 
   // In terms of names that are not bound by lets.

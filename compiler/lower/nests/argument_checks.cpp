@@ -7,6 +7,7 @@
 #include "ir/visit.h"
 #include "lower/nests/run_time_check.h"
 #include "lower/nests/schedule_checks.h"
+#include "lower/runtime_call.h"
 #include "retrograde_runtime.h"
 #include "simplify/simplify.h"
 
@@ -33,7 +34,7 @@ class Checks {
       if (arg.is_buffer()) add_shape_checks(arg, shape_checks);
     }
     Stmt body = make_block({query_or_run()});
-    body = bind(nests_.bounds, body);
+    body = make_lets(nests_.bounds, body);
     std::vector<Stmt> fact_checks;
     for (const LoweredArgument& arg : args_) {
       if (arg.is_buffer()) {
@@ -43,7 +44,7 @@ class Checks {
       }
     }
     fact_checks.push_back(body);
-    body = bind(buffer_facts(), make_block(fact_checks));
+    body = make_lets(buffer_facts(), make_block(fact_checks));
     shape_checks.push_back(body);
     return make_block(shape_checks);
   }
@@ -53,18 +54,11 @@ class Checks {
   const std::vector<LoweredArgument>& args_;
   const Program& program_;
   const Substitution actual_;
-  using Bindings = std::vector<std::pair<std::string, Expr>>;
-
-  static Stmt bind(const Bindings& bindings, Stmt body) {
-    for (auto it = bindings.rbegin(); it != bindings.rend(); ++it)
-      body = make_let(it->first, it->second, body);
-    return body;
-  }
 
   // Where a fact was promised, the code below uses the promise, and the check compares it with the
   // ".actual" fact.
-  Bindings buffer_facts() const {
-    Bindings facts, promises;
+  Lets buffer_facts() const {
+    Lets facts, promises;
     for (const LoweredArgument& arg : args_) {
       if (!arg.is_buffer()) continue;
       for (int d = 0; d < arg.dimensions; d++) {
@@ -79,7 +73,7 @@ class Checks {
   }
 
   static void add_fact(const LoweredArgument& arg, const char* what, Op op, int d,
-                       const Expr& promised, Bindings& facts, Bindings& promises) {
+                       const Expr& promised, Lets& facts, Lets& promises) {
     std::string name = fact(arg.name, what, d);
     Expr actual = call_op(op, Int(32), {handle_of(arg.name), d});
     facts.emplace_back(promised.defined() ? name + ".actual" : name, actual);
@@ -131,10 +125,7 @@ class Checks {
 
   // Calls a check of the runtime, which tells what is wrong and gives its code, 0 where nothing is.
   static Stmt ask(const char* function, std::vector<Expr> args) {
-    args.insert(args.begin(), Expr(function));
-    const Expr code = variable("code");
-    return make_let("code", call_op(Op::runtime_call, Int(32), std::move(args)),
-                    make_assert(code == 0, code));
+    return checked_call("code", call_runtime(function, std::move(args)));
   }
 
   static void add_shape_checks(const LoweredArgument& arg, std::vector<Stmt>& checks) {
@@ -275,10 +266,9 @@ class Checks {
       stride = stride * extent;
     }
     if (sides.empty()) return make_evaluate(0);
-    return make_evaluate(call_op(
-        Op::runtime_call, Int(32),
-        {Expr("retrograde_answer_query"), handle_of(arg.name),
-         Expr(static_cast<int32_t>(box.size())), call_op(Op::pack, Handle(), std::move(sides))}));
+    return make_evaluate(call_runtime(
+        "retrograde_answer_query",
+        {handle_of(arg.name), Expr(static_cast<int32_t>(box.size())), pack(std::move(sides))}));
   }
 
   // A region that was promised must hold what is used: this is known before any buffer is.
@@ -333,10 +323,9 @@ class Checks {
       sides.push_back(cast(Int(32), box[d].max));
       facts.push_back(holds_already(inside));
     }
-    checks.push_back(
-        ask(check_region, {handle_of(arg.name), Expr(arg.name), Expr(region_rules(arg)),
-                           Expr(promised_alignment(arg)), Expr(dimensions),
-                           call_op(Op::pack, Handle(), std::move(sides))}));
+    checks.push_back(ask(
+        check_region, {handle_of(arg.name), Expr(arg.name), Expr(region_rules(arg)),
+                       Expr(promised_alignment(arg)), Expr(dimensions), pack(std::move(sides))}));
     checks.insert(checks.end(), facts.begin(), facts.end());
     checks.insert(checks.end(), of_promises.begin(), of_promises.end());
   }

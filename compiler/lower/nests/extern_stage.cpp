@@ -5,6 +5,7 @@
 #include "diagnostics/error.h"
 #include "ir/build.h"
 #include "ir/visit.h"
+#include "lower/runtime_call.h"
 
 namespace retrograde::ir {
 
@@ -18,8 +19,6 @@ struct Descriptor {
   std::vector<Expr> strides;
 };
 
-Expr null_handle() { return reinterpret_as(Handle(), make_uint_const(UInt(64), 0)); }
-
 // The fields of halide_buffer_t and halide_dimension_t, in their order and without gaps.
 Expr packed(const Descriptor& d) {
   std::vector<Expr> dims;
@@ -30,11 +29,10 @@ Expr packed(const Descriptor& d) {
     dims.push_back(make_uint_const(UInt(32), 0));  // flags
   }
   const Expr zero = make_uint_const(UInt(64), 0);
-  return call_op(Op::pack, Handle(),
-                 {/*device*/ zero, /*device_interface*/ null_handle(), d.host, /*flags*/ zero,
-                  make_uint_const(UInt(32), type_word(d.type)),
-                  Expr(static_cast<int32_t>(d.region.size())), call_op(Op::pack, Handle(), dims),
-                  /*padding*/ null_handle()});
+  return pack({/*device*/ zero, /*device_interface*/ null_handle(), d.host, /*flags*/ zero,
+               make_uint_const(UInt(32), type_word(d.type)),
+               Expr(static_cast<int32_t>(d.region.size())), pack(dims),
+               /*padding*/ null_handle()});
 }
 
 std::vector<Expr> dense_strides(const std::vector<Range>& region) {

@@ -114,7 +114,7 @@ class BlendMaskedStores : public Rewriter {
         [&](const Store& n) { return n.predicate.defined() ? visit_store(s, n) : children(s); },
         [&](const For& n) { return n.runs == ForType::Parallel ? in_task(s) : children(s); },
         [&](const Fork&) { return in_task(s); }, [&](const Atomic&) { return s; },
-        [&](const IfThenElse& n) { return visit_if(s, n); },
+        [&](const IfThenElse& n) { return visit_if(n); },
         [&](const Block& n) { return visit_block(s, n); },
         [&](const LetStmt&) { return check_before_let(children(s)); },
         [&](const StmtNode&) { return children(s); });
@@ -140,13 +140,10 @@ class BlendMaskedStores : public Rewriter {
     return make_allocate(n.name, n.type, n.memory, elements, body);
   }
 
-  Stmt visit_if(const Stmt& s, const IfThenElse& n) {
+  Stmt visit_if(const IfThenElse& n) {
     const Stmt when_true = knowing(n.condition, [&] { return (*this)(n.when_true); });
     const Expr condition = (*this)(n.condition);
-    const Stmt when_false = (*this)(n.when_false);
-    const bool is_same = condition.same_as(n.condition) && when_true.same_as(n.when_true) &&
-                         when_false.same_as(n.when_false);
-    return is_same ? s : make_if(condition, when_true, when_false);
+    return with_parts(n, condition, when_true, (*this)(n.when_false));
   }
 
   Stmt knowing(const Expr& condition, const std::function<Stmt()>& f) {

@@ -273,7 +273,7 @@ struct StoreGroup {
   std::string buffer;
   int64_t stride = 0;
   std::vector<Stmt> members;  // as they stood
-  std::vector<std::pair<std::string, Expr>> lets;
+  Lets lets;
   std::vector<const Store*> stores;
   std::vector<int64_t> offsets;  // from the first store's base
   Expr first_base;               // with the lets substituted
@@ -311,16 +311,14 @@ class Interleaver : public Rewriter {
       splitter_.bind(n.name, n.value, p.has_load ? whole : p);
       return children(s);
     }
-    std::vector<Expr> values = splitter_.parts(n.value, p.period), variables;
-    std::vector<std::string> names;
-    for (const Expr& value : values) {
-      names.push_back(fresh_(n.name));
-      variables.push_back(variable(names.back(), value.type()));
+    Lets parts;
+    std::vector<Expr> variables;
+    for (const Expr& value : splitter_.parts(n.value, p.period)) {
+      parts.emplace_back(fresh_(n.name), value);
+      variables.push_back(variable(parts.back().first, value.type()));
     }
     splitter_.bind(n.name, variables);
-    Stmt result = make_let(n.name, interleave(variables), (*this)(n.body));
-    for (size_t i = names.size(); i-- > 0;) result = make_let(names[i], values[i], result);
-    return result;
+    return make_lets(parts, make_let(n.name, interleave(variables), (*this)(n.body)));
   }
 
   // ---- stores ----
@@ -365,7 +363,7 @@ class Interleaver : public Rewriter {
 
   // Adds the statement to the group, unless it does not belong there.
   static bool joins(StoreGroup& group, const Stmt& s) {
-    std::vector<std::pair<std::string, Expr>> lets;
+    Lets lets;
     Stmt inner = s;
     while (const auto* let = inner.as<LetStmt>()) {
       lets.emplace_back(let->name, let->value);
@@ -413,10 +411,8 @@ class Interleaver : public Rewriter {
     }
     const int lanes = values[0].type().lanes() * static_cast<int>(count);
     const Expr index = make_ramp(base, make_one(base.type()), lanes);
-    Stmt result = make_store(group.buffer, interleave(values), index, {}, group.stores[0]->symbol);
-    for (size_t i = group.lets.size(); i-- > 0;)
-      result = make_let(group.lets[i].first, group.lets[i].second, result);
-    return result;
+    return make_lets(group.lets, make_store(group.buffer, interleave(values), index, {},
+                                            group.stores[0]->symbol));
   }
 
   FreshNames fresh_;

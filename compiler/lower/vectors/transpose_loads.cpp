@@ -151,18 +151,12 @@ class Transposer : public StatementRewriter {
   }
 
  private:
-  using Lets = std::vector<std::pair<std::string, Expr>>;
-
   Stmt transposed(const Run& run) {
     Lets blocks;
     Replacer replacer;
     for (const Family& family : find_families(run)) add_blocks(family, blocks, replacer);
-    Stmt result = make_block(run.stmts);
-    if (blocks.empty()) return result;
-    result = replacer(result);
-    for (size_t i = blocks.size(); i-- > 0;)
-      result = make_let(blocks[i].first, blocks[i].second, result);
-    return result;
+    const Stmt stores = make_block(run.stmts);
+    return blocks.empty() ? stores : make_lets(blocks, replacer(stores));
   }
 
   // Columns side by side, taken from the left in powers of two.

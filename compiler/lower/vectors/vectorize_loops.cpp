@@ -26,6 +26,7 @@
 // Tests: test/golden/lower/vectorize_loops/, test/property/loop_passes_test.cpp.
 #include "lower/statement_passes.h"
 
+#include <algorithm>
 #include <cstdlib>
 #include <optional>
 #include <set>
@@ -153,23 +154,17 @@ class LoopVectorizer {
           return has_effects(n.value) ? lane_by_lane(s) : make_evaluate(Expr(0));
         },
         [&](const StmtNode&) {
-          return map_children(
-              s, [](const Expr& e) { return e; }, [&](const Stmt& child) { return visit(child); });
+          return map_children(s, [&](const Stmt& child) { return visit(child); });
         });
   }
 
   // ---- lets ----
 
-  struct OuterLet {
-    std::string name;
-    Expr value;  // one iteration's
-  };
-
   Stmt visit_let(const Stmt& s, const LetStmt& n) {
     if (has_effects(n.value) || tells_of_some_lanes(n.value)) return lane_by_lane(s);
     Expr value = widen_(n.value);
     if (value.same_as(n.value)) return make_let(n.name, n.value, visit(n.body));
-    lets_.push_back({n.name, n.value});
+    lets_.emplace_back(n.name, n.value);
     Stmt result = is_affine(value) ? bind_ramp(n, *value.as<Ramp>()) : bind_vector(n, value);
     lets_.pop_back();
     return result;
@@ -391,18 +386,13 @@ class LoopVectorizer {
     auto is_pure = [](const Expr& e) {
       return !has_effects(e) && !reads_memory(e, MemoryReads::Loads);
     };
-    for (const OuterLet& let : lets_) {
-      if (!is_pure(let.value)) return false;
-    }
-    for (const Expr& condition : conditions_) {
-      if (!is_pure(condition)) return false;
-    }
-    return true;
+    return std::all_of(lets_.begin(), lets_.end(),
+                       [&](const auto& let) { return is_pure(let.second); }) &&
+           std::all_of(conditions_.begin(), conditions_.end(), is_pure);
   }
 
   Stmt lane_loop(const Stmt& s) {
-    Stmt body = make_if(conjunction(conditions_), s);
-    for (size_t i = lets_.size(); i-- > 0;) body = make_let(lets_[i].name, lets_[i].value, body);
+    Stmt body = make_lets(lets_, make_if(conjunction(conditions_), s));
     std::string lane = fresh_(loop_.name);
     Expr number = binary(Kind::Sub, variable(lane), loop_.min);
     body = with_own_elements(body, number);
@@ -465,7 +455,7 @@ class LoopVectorizer {
   FreshNames& fresh_;
   Widener widen_;
   BodyFacts facts_;
-  std::vector<OuterLet> lets_;    // around the current statement, those that vary
+  Lets lets_;  // around the current statement, those that vary, as one iteration has them
   std::vector<Expr> conditions_;  // of one iteration, that make up the mask
   bool must_stay_serial_ = false;
 };

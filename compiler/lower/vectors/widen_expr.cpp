@@ -309,7 +309,7 @@ Expr Widener::widen_branches(const Expr& e, const Call& n) {
 
 // C functions take scalars: one call for each lane.
 Expr Widener::widen_extern(const Call& n) {
-  std::vector<std::pair<std::string, Expr>> lets;
+  Lets lets;
   std::vector<Expr> args, results;
   for (const Expr& arg : n.args) {
     Expr wide = spread(arg);
@@ -323,9 +323,7 @@ Expr Widener::widen_extern(const Call& n) {
     for (const Expr& arg : args) scalars.push_back(extract_iteration(arg, lane, 1));
     results.push_back(call_extern(n.name, n.type.element_of(), std::move(scalars)));
   }
-  Expr result = make_shuffle(std::move(results), std::move(indices));
-  for (size_t i = lets.size(); i-- > 0;) result = make_let(lets[i].first, lets[i].second, result);
-  return result;
+  return make_lets(lets, make_shuffle(std::move(results), std::move(indices)));
 }
 
 // A let under several masks is widened several times, each time under another name. Parts of the
