@@ -5,6 +5,7 @@
 
 #include "autodiff/sweeps/blocked_sums.h"
 #include "autodiff/sweeps/gather_places.h"
+#include "autodiff/sweeps/join_borders.h"
 #include "autodiff/sweeps/local_derivative.h"
 #include "autodiff/sweeps/regions.h"
 #include "autoschedule/scatter_schedule.h"
@@ -682,6 +683,7 @@ void append_update(const FuncPtr& f, std::vector<Expr> args, std::vector<Expr> v
 AdjointFunc make_adjoint(const AdjointTarget& target, const std::string& name,
                          const std::vector<Contribution>& given, const std::vector<Expr>& initial) {
   std::vector<Contribution> contributions = given;
+  join_borders(contributions, target);
   for (Contribution& c : contributions) c.gather = with_safe_places(c.gather, target);
   return Builder(target, name).build(contributions, initial);
 }

@@ -9,6 +9,7 @@
 #include "autodiff/sweeps/active_symbols.h"
 #include "autodiff/sweeps/custom_rules.h"
 #include "autodiff/sweeps/input_shape.h"
+#include "autodiff/sweeps/passed_reads.h"
 #include "autodiff/sweeps/reverse_sweep.h"
 #include "autodiff/sweeps/shared_adjoints.h"
 #include "autodiff/updates/update.h"
@@ -90,6 +91,7 @@ class Synthesis {
   // `read`: elements that anybody looks at; may be empty (unknown).
   void add_pointwise(const Symbol* symbol, const std::vector<std::string>& args, const Box& box,
                      const std::vector<LoopVariable>& read, const std::vector<Expr>& values) {
+    passed_.close(symbol);
     AccessQuery query{{}, {}, args, read};
     for (size_t d = 0; d < args.size(); ++d)
       query.domain.vars.push_back({args[d], box[d].min, box[d].max});
@@ -152,8 +154,26 @@ class Synthesis {
       extendable = update.previous.func != nullptr;
       record(*f, s - 1, adjoint);
     }
-    contribute_pure(f, adjoint.func);
+    if (!pass_on(*f)) contribute_pure(f, adjoint.func);
     pending_.erase(f.get());
+  }
+
+  // Whether the readers of a Func that only looks another one up have contributed to that one
+  // themselves. The Func keeps its own adjoint, for who asks for it.
+  bool pass_on(const FuncContents& f) {
+    std::vector<PassedRead> further;
+    for (const PassedRead& read : passed_.of(&f)) {
+      const SweepResult sweep = sweep_reverse(
+          {looked_up(f, *read.read.leaf.as<Call>())}, {read.read.adjoint},
+          [&](const Expr& leaf) { return active_.contains(leaf); },
+          [&](const Expr& leaf) { return ranges_.may_be_infinite(leaf); });
+      for (const LeafAdjoint& leaf : sweep.leaves) {
+        if (!is_short(inversion_of(*read.reader, leaf, read.domain))) return false;
+        further.push_back({read.reader, leaf, read.domain});
+      }
+    }
+    for (const PassedRead& read : further) add_contribution(read.reader, read.read, read.domain);
+    return !further.empty();
   }
 
   static bool is_zero_over(const FuncContents& f, const std::vector<LoopVariable>& region) {
@@ -310,17 +330,31 @@ class Synthesis {
   void add_contribution(const FuncPtr& f, const LeafAdjoint& leaf, const Expr& adjoint,
                         const IterationDomain& domain) {
     Symbol* symbol = symbol_of(leaf.leaf);
+    const Inversion& inversion = inversion_of(*f, leaf, domain);
+    if (may_pass_on(symbol)) passed_.note(symbol, {f, {leaf.leaf, adjoint}, domain});
+    if (!inversion.note.empty())
+      explain(Explanation::Kind::Scattered, shape_of(symbol).name,
+              text("read by ", quoted(f->name), ": ", inversion.note));
+    for (const Gather& g : inversion.gathers)
+      pending_[symbol].push_back(contribution_of(leaf, adjoint, g));
+  }
+  bool may_pass_on(const Symbol* symbol) const {
+    const auto* f = dynamic_cast<const FuncContents*>(symbol);
+    return f && is_look_up(*f) && !(options_.only_requested && options_.requested.contains(symbol));
+  }
+  const Inversion& inversion_of(const FuncContents& reader, const LeafAdjoint& leaf,
+                                const IterationDomain& domain) {
+    const Symbol* symbol = symbol_of(leaf.leaf);
     const auto* call = leaf.leaf.as<Call>();
-    AdjointTarget target =
+    const AdjointTarget target =
         as_parameter(symbol) ? target_of(*as_parameter(symbol)) : target_of(*func_of(*call));
     AccessQuery query{domain, call ? call->args : std::vector<Expr>{}, target.args, target.region};
-    const Inversion& inversion = inversions_.of(*f, *symbol, query, leaf.adjoint);
-    if (!inversion.note.empty())
-      explain(Explanation::Kind::Scattered, target.name,
-              text("read by ", quoted(f->name), ": ", inversion.note));
-    for (const Gather& g : inversion.gathers) {
-      pending_[symbol].push_back({call ? call->component : 0, g, substitute(adjoint, g.iteration)});
-    }
+    return inversions_.of(reader, *symbol, query, leaf.adjoint);
+  }
+  static Contribution contribution_of(const LeafAdjoint& leaf, const Expr& adjoint,
+                                      const Gather& g) {
+    const auto* call = leaf.leaf.as<Call>();
+    return {call ? call->component : 0, g, substitute(adjoint, g.iteration)};
   }
 
   // Where something is read may depend on values of f, too.
@@ -459,6 +493,7 @@ class Synthesis {
   std::unordered_map<const Symbol*, std::vector<Contribution>> pending_;
   VersionBudget versions_;
   ReadInversions inversions_;
+  PassedReads passed_;
   SynthesisAccount account_;
   SynthesisResult result_;
 };
