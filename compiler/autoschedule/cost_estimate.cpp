@@ -17,12 +17,23 @@ Work work_of(const Expr& node) {
   return {node.as<Binary>() || node.as<Select>() || node.as<Cast>() ? 1 : 0, 0, 0};
 }
 
+namespace {
+
+// By what is no constant: that would be a multiplication.
+bool divides(const Expr& node) {
+  if (const auto* quotient = node.as<Div>()) return !is_const(quotient->b);
+  const auto* call = node.as<Call>();
+  return call && call->is_op(Op::strong_div);
+}
+
+}  // namespace
+
 double operations_of(const Expr& node) {
   const auto* call = node.as<Call>();
   if (call && call->call_type != CallType::Operator) return 1;
   if (!node.type().is_float()) return 0;
   const Work work = work_of(node);
-  return std::max(work.adds, work.mults) + 4 * work.functions;
+  return std::max(work.adds, work.mults) + 4 * (work.functions + (divides(node) ? 1 : 0));
 }
 
 }  // namespace retrograde::ir

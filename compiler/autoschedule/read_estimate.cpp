@@ -1,5 +1,6 @@
 // Iterations over elements. In  f(4 x + r), r < 8,  two iterations read each element: 8 / 4; in
-// f(r.x, r.y) one does; in f(x, r) of a stage over x, y and r as many as y has values.
+// f(r.x, r.y) one does, and in f(x - r, r), where the second index says which; in f(x, r) of a stage
+// over x, y and r as many as y has values.
 #include "autoschedule/read_estimate.h"
 
 #include <algorithm>
@@ -24,6 +25,7 @@ struct Loop {
   double extent = several;
   bool is_long = false;  // a pure dimension, as long as what is read
   bool is_used = false;
+  bool is_decided = false;  // by an index: the same for all iterations that read an element
 };
 
 std::vector<Loop> loops_of(const FuncContents& f, const Definition& stage) {
@@ -45,6 +47,25 @@ bool uses_loops(const Expr& e, const std::vector<Loop>& loops) {
                      [&](const Loop& loop) { return uses_variable(e, loop.name); });
 }
 
+std::vector<std::string> names_of(const std::vector<Loop>& loops) {
+  std::vector<std::string> names;
+  for (const Loop& loop : loops) names.push_back(loop.name);
+  return names;
+}
+
+// The only loop that moves an index; null where several do, or none.
+Loop* only_loop(const Expr& any_index, std::vector<Loop>& loops) {
+  const Expr index = unclamped(any_index, [&](const Expr& e) { return uses_loops(e, loops); });
+  const auto form = decompose(index, names_of(loops));
+  Loop* only = nullptr;
+  for (size_t i = 0; form && i < loops.size(); ++i) {
+    if (form->coefficients[i].second == 0) continue;
+    if (only) return nullptr;
+    only = &loops[i];
+  }
+  return only;
+}
+
 // Iterations for each value of one index; nothing when it is not linear in the loops.
 std::optional<double> iterations_a_value(const Expr& any_index, std::vector<Loop>& loops) {
   const Expr index = unclamped(any_index, [&](const Expr& e) { return uses_loops(e, loops); });
@@ -53,15 +74,13 @@ std::optional<double> iterations_a_value(const Expr& any_index, std::vector<Loop
     auto found = iterations_a_value(quotient->a, loops);
     return found ? std::optional(*found * static_cast<double>(*divisor)) : std::nullopt;
   }
-  std::vector<std::string> names;
-  for (const Loop& loop : loops) names.push_back(loop.name);
-  auto form = decompose(index, names);
+  auto form = decompose(index, names_of(loops));
   if (!form) return std::nullopt;
   double iterations = 1, reach = 1, steps = 1;
   bool is_long = false;
   for (size_t i = 0; i < loops.size(); ++i) {
     const double step = std::abs(static_cast<double>(form->coefficients[i].second));
-    if (step == 0) continue;
+    if (step == 0 || loops[i].is_decided) continue;
     loops[i].is_used = true;
     is_long |= loops[i].is_long;
     if (loops[i].is_long) {
@@ -78,11 +97,17 @@ std::optional<double> iterations_a_value(const Expr& any_index, std::vector<Loop
 
 double reads_an_element(const Call& call, const FuncContents& reader, const Definition& stage) {
   std::vector<Loop> loops = loops_of(reader, stage);
+  std::vector<Expr> args;
+  for (const Expr& arg : call.args) args.push_back(without_lets(arg));
+  // Indices that decide a loop first.
+  std::stable_partition(args.begin(), args.end(),
+                        [&](const Expr& arg) { return only_loop(arg, loops) != nullptr; });
   double reads = 1;
-  for (const Expr& arg : call.args) {
-    auto found = iterations_a_value(without_lets(arg), loops);
+  for (const Expr& arg : args) {
+    auto found = iterations_a_value(arg, loops);
     if (!found) return stage.rvars.empty() ? 1 : several;
     reads *= *found;
+    if (Loop* decided = only_loop(arg, loops)) decided->is_decided = true;
   }
   for (const Loop& loop : loops) {
     if (!loop.is_used) reads *= loop.extent;
@@ -94,6 +119,8 @@ Expr unclamped(const Expr& e, const std::function<bool(const Expr&)>& moves) {
   const auto* call = e.as<Call>();
   if (call && call->call_type == CallType::Operator && op_info(call->op).cls == OpClass::Marker)
     return unclamped(call->args[0], moves);
+  if (e.kind() == Kind::Add || e.kind() == Kind::Sub)
+    return map_children(e, [&](const Expr& part) { return unclamped(part, moves); });
   if (e.kind() != Kind::Min && e.kind() != Kind::Max) return e;
   const auto* n = e.as<Binary>();
   if (!moves(n->b)) return unclamped(n->a, moves);

@@ -12,7 +12,7 @@ namespace retrograde::ir {
 // only.
 double reads_an_element(const Call& call, const FuncContents& reader, const Definition& stage);
 
-// An index without markers, and without clamps to what does not move.
+// An index, or the terms of one, without markers and without clamps to what does not move.
 Expr unclamped(const Expr& e, const std::function<bool(const Expr&)>& moves);
 
 }  // namespace retrograde::ir

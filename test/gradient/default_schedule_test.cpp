@@ -579,7 +579,8 @@ double reads(const Func& reader, const Func& read) {
 
 TEST_F(DefaultSchedule, KnowsHowOftenAnElementIsRead) {
   Func pointwise("pointwise"), twice("twice"), halves("halves"), up("up"), stencil("stencil"),
-      strided("strided"), image_sum("image_sum"), along("along"), clamped("clamped");
+      strided("strided"), image_sum("image_sum"), along("along"), clamped("clamped"),
+      shifted("shifted"), inside("inside");
   RDom r(0, 5), strip(0, 8), image(0, 30, 0, 40);
   pointwise(x, y) = heavy(y, x + 3);
   twice(x, y) = heavy(x, y) + heavy(x + 1, y);
@@ -595,6 +596,10 @@ TEST_F(DefaultSchedule, KnowsHowOftenAnElementIsRead) {
   along(x) += heavy(image.x, image.y);
   clamped(x, y) = 0.0f;
   clamped(x, y) += heavy(clamp(likely(x + r), 0, 31), y);
+  shifted(x) = 0.0f;
+  shifted(x) += heavy(x - image.x + 1, image.x - 5) * heavy(2 * x + image.y, image.y);
+  inside(x, y) = 0.0f;
+  inside(x, y) += heavy(clamp(x + r, 0, 31) - 3, y);
   EXPECT_EQ(reads(pointwise, heavy), 1);
   EXPECT_EQ(reads(twice, heavy), 2);
   EXPECT_EQ(reads(halves, heavy), 1);
@@ -604,6 +609,22 @@ TEST_F(DefaultSchedule, KnowsHowOftenAnElementIsRead) {
   EXPECT_EQ(reads(image_sum, heavy), 1);
   EXPECT_EQ(reads(along, heavy), 8) << "x has several values";
   EXPECT_EQ(reads(clamped, heavy), 5);
+  EXPECT_EQ(reads(shifted, heavy), 40 + 15) << "one index says which, the other loop is idle";
+  EXPECT_EQ(reads(inside, heavy), 5);
+}
+
+TEST_F(DefaultSchedule, StoresADivisionThatIsReadOften) {
+  Func inverse("inverse"), shifted("shifted");
+  inverse(x, y) = 1.0f / (a(x, y) + 2.0f);
+  shifted(x, y) = a(x, y) + 2.0f;
+  for (const Func& f : {inverse, shifted}) {
+    Func around("around"), total("total");
+    around(x, y) = f(x, y) + f(x + 1, y) + f(x + 2, y) + f(x, y + 1) + f(x, y + 2);
+    RDom r(0, 30, 0, 30);
+    total() = 0.0f;
+    total() += around(r.x, r.y) * around(r.x, r.y) * around(r.x, r.y);
+    EXPECT_EQ(is_stored(propagate_adjoints(total)(a), f), f.name() == inverse.name());
+  }
 }
 
 TEST_F(DefaultSchedule, TilesWhatItReadsAcross) {
