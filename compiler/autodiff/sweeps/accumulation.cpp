@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <map>
+#include <set>
 
 #include "autodiff/sweeps/blocked_sums.h"
 #include "autodiff/sweeps/gather_places.h"
@@ -14,6 +15,7 @@
 #include "graph/directive.h"
 #include "graph/function.h"
 #include "ir/build.h"
+#include "ir/conjuncts.h"
 #include "ir/equal.h"
 #include "ir/print.h"
 #include "ir/variables.h"
@@ -140,6 +142,41 @@ Expr rename_rdom(const Expr& e, const Gather& from, const Gather& to) {
     names[from.rdom->vars[i].var] = variable(to.rdom->vars[i].var, Int(32), SymbolRef(to.rdom));
   }
   return substitute(e, names);
+}
+
+// Whether a gather sums a few terms, which its condition leaves out in borders alone.
+bool has_borders(const Gather& g) {
+  if (!g.rdom || g.scatters || !g.predicate.defined()) return false;
+  double iterations = 1;
+  for (const ReductionVariable& r : g.rdom->vars)
+    iterations *= static_cast<double>(as_const_int(r.extent).value_or(many_terms));
+  std::vector<Expr> conditions;
+  add_conjuncts(g.predicate, conditions);
+  return iterations < many_terms &&
+         std::all_of(conditions.begin(), conditions.end(),
+                     [&](const Expr& e) { return fails_in_a_border(e, g.rdom->vars); });
+}
+
+// Gathers over one domain that differ in their borders share an update: beyond its border each adds
+// 0. Then what they sum is gone through once. Only a few: one body has all that they read.
+constexpr size_t most_borders = 4;
+std::vector<Contribution> share_domains(std::vector<Contribution> contributions) {
+  const auto domain_of = [](Gather g) {
+    g.predicate = Expr();
+    return shape_of(g);
+  };
+  std::map<std::string, std::set<std::string>> borders;  // by domain
+  for (const Contribution& c : contributions) {
+    if (has_borders(c.gather)) borders[domain_of(c.gather)].insert(shape_of(c.gather));
+  }
+  for (Contribution& c : contributions) {
+    if (!has_borders(c.gather)) continue;
+    const size_t different = borders[domain_of(c.gather)].size();
+    if (different < 2 || different > most_borders) continue;
+    c.adjoint = masked(c.gather.predicate, c.adjoint);
+    c.gather.predicate = Expr();
+  }
+  return contributions;
 }
 
 std::vector<UpdateGroup> group_updates(const std::vector<Contribution>& contributions,
@@ -684,6 +721,7 @@ AdjointFunc make_adjoint(const AdjointTarget& target, const std::string& name,
                          const std::vector<Contribution>& given, const std::vector<Expr>& initial) {
   std::vector<Contribution> contributions = given;
   join_borders(contributions, target);
+  contributions = share_domains(std::move(contributions));
   for (Contribution& c : contributions) c.gather = with_safe_places(c.gather, target);
   return Builder(target, name).build(contributions, initial);
 }

@@ -2,7 +2,7 @@
 //
 // Contributions that reach each element at most once make the pure definition, a sum. The others
 // become update definitions; those with the same left-hand side, reduction domain and predicate
-// share one. Scatters over one domain, as those to the corners of the cell in which a pixel is read,
+// share one. So do short gathers whose predicates differ in borders alone: these become selects. Scatters over one domain, as those to the corners of the cell in which a pixel is read,
 // are the taps of one update, over its domain and then over them. Who owns an element:
 //   gather      each element is written by the iterations of its own pure variables only: race-free
 //               in parallel.
