@@ -8,6 +8,7 @@
 #include "autoschedule/join_sweeps.h"
 #include "autoschedule/loop_order.h"
 #include "autoschedule/new_loop.h"
+#include "autoschedule/only_reader.h"
 #include "autoschedule/placement_limits.h"
 #include "autoschedule/scatter_schedule.h"
 #include "autoschedule/slices.h"
@@ -276,7 +277,8 @@ void give_default_schedule(const std::vector<FuncPtr>& outputs, const VectorUnit
     for (int s = 0; s < f->stage_count(); ++s) LoopChooser(f, s, unit, sizes).give();
     given.push_back(f);
   }
-  compute_in_slices(outputs, stored, whole, sizes);
+  const Readers readers(outputs, stored);  // before anything is moved
+  compute_in_slices(readers, stored, whole, sizes);
   join_sweeps(outputs, given, sizes);
   for (const FuncPtr& f : order) {  // so that the log tells of every Func
     const bool is_output = std::find(outputs.begin(), outputs.end(), f) != outputs.end();

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <optional>
 #include <string>
-#include <unordered_map>
 
 #include "autoschedule/read_estimate.h"
 #include "frontend/language/func.h"
@@ -20,62 +19,9 @@ constexpr int64_t tasks = 8;  // iterations of the outermost loop, which runs in
 // At least; rows alone are too little work for an allocation.
 constexpr size_t slice_dimensions = 2;
 
-bool is_split(const Definition& stage, const std::string& var) {
-  const auto& splits = stage.schedule.splits;
-  return std::any_of(splits.begin(), splits.end(), [&](const Split& split) {
-    return split.old_var == var || split.outer == var || split.inner == var;
-  });
-}
-
-// The only stage that reads a Func.
-struct Reader {
-  FuncPtr func;
-  int stage = 0;
-  std::vector<const Call*> reads;
-};
-
 class Slicer {
  public:
-  Slicer(const std::vector<FuncPtr>& outputs, const std::vector<FuncPtr>& stored,
-         const SizeEstimate& sizes)
-      : sizes_(sizes), outputs_(outputs) {
-    for (const FuncPtr& f : stored) stored_.insert(f.get());
-    for (const FuncPtr& f : topological_order(outputs)) {
-      for (const FuncPtr& callee : direct_callees(*f)) readers_[callee.get()].push_back(f);
-      const bool is_block = f->made && f->made->blocks > 0;  // see default_schedule.cpp
-      for (const LoopLevel& level : {f->schedule.compute_level, f->schedule.store_level}) {
-        if (level.kind == LoopLevel::Kind::At && !is_block) hosts_.insert(level.func);
-      }
-    }
-  }
-
-  // Inside of a Func of which a user has something computed nothing moves, nor does it move itself.
-  bool is_inside(const FuncPtr& f) const {
-    return stored_.contains(f.get()) && !f->is_extern() && !hosts_.contains(f->name);
-  }
-  bool is_output(const FuncPtr& f) const {
-    return std::find(outputs_.begin(), outputs_.end(), f) != outputs_.end();
-  }
-
-  std::optional<Reader> only_reader(const FuncPtr& f) const {
-    const auto found = readers_.find(f.get());
-    if (found == readers_.end() || found->second.size() != 1 || !is_inside(found->second[0]))
-      return std::nullopt;
-    Reader reader{found->second[0], -1, {}};
-    for (int s = 0; s < reader.func->stage_count(); ++s) {
-      std::vector<const Call*> reads;
-      walk_definition(reader.func->stage(s), [&](const Expr& e) {
-        const auto* call = e.as<Call>();
-        if (call && call->call_type == CallType::Func && call->symbol.raw() == f.get())
-          reads.push_back(call);
-      });
-      if (reads.empty()) continue;
-      if (reader.stage >= 0) return std::nullopt;
-      reader.stage = s;
-      reader.reads = std::move(reads);
-    }
-    return reader.stage >= 0 ? std::optional(std::move(reader)) : std::nullopt;
-  }
+  explicit Slicer(const SizeEstimate& sizes) : sizes_(sizes) {}
 
   // The innermost of the reader's outer loops of which each iteration reads a slice of its own.
   std::optional<std::string> loop(const FuncPtr& f, const Reader& reader) const {
@@ -126,15 +72,11 @@ class Slicer {
   }
 
   const SizeEstimate& sizes_;
-  const std::vector<FuncPtr>& outputs_;
-  std::unordered_set<const Symbol*> stored_;
-  std::unordered_map<const Symbol*, std::vector<FuncPtr>> readers_;
-  std::unordered_set<std::string> hosts_;
 };
 
 }  // namespace
 
-void compute_in_slices(const std::vector<FuncPtr>& outputs, const std::vector<FuncPtr>& stored,
+void compute_in_slices(const Readers& readers, const std::vector<FuncPtr>& stored,
                        const std::unordered_set<const Symbol*>& but, const SizeEstimate& sizes) {
   // Partial sums are computed in tiles, which share what they read: once for all of them.
   const auto may_have_slices = [&](const FuncPtr& f) {
@@ -142,11 +84,10 @@ void compute_in_slices(const std::vector<FuncPtr>& outputs, const std::vector<Fu
     return f->args.size() > slice_dimensions && !f->is_extern() && !is_partial &&
            !but.contains(f.get());
   };
-  if (std::none_of(stored.begin(), stored.end(), may_have_slices)) return;
-  const Slicer slicer(outputs, stored, sizes);  // before anything is moved
+  const Slicer slicer(sizes);
   for (const FuncPtr& f : stored) {
-    if (!may_have_slices(f) || !slicer.is_inside(f) || slicer.is_output(f)) continue;
-    const auto reader = slicer.only_reader(f);
+    if (!may_have_slices(f) || !readers.is_inside(f) || readers.is_output(f)) continue;
+    const auto reader = readers.only_reader(f);
     if (!reader || but.contains(reader->func.get())) continue;
     if (const auto loop = slicer.loop(f, *reader))
       Func(f).compute_at(retrograde::LoopLevel(Func(reader->func), Var(*loop), reader->stage));

@@ -14,6 +14,7 @@
 #include <unordered_set>
 #include <vector>
 
+#include "autoschedule/only_reader.h"
 #include "autoschedule/size_estimate.h"
 #include "graph/function.h"
 
@@ -22,7 +23,7 @@ namespace retrograde::ir {
 // Moves those of the Funcs, all of which this scheduler has computed at root and given loops, into
 // the loops of their only reader, if that is one of them, too. `but`: none of these, as a reader
 // neither.
-void compute_in_slices(const std::vector<FuncPtr>& outputs, const std::vector<FuncPtr>& stored,
+void compute_in_slices(const Readers& readers, const std::vector<FuncPtr>& stored,
                        const std::unordered_set<const Symbol*>& but, const SizeEstimate& sizes);
 
 }  // namespace retrograde::ir

@@ -1,0 +1,49 @@
+#include "autoschedule/only_reader.h"
+
+#include <algorithm>
+
+#include "graph/own_reads.h"
+#include "ir/visit.h"
+
+namespace retrograde::ir {
+
+Readers::Readers(const std::vector<FuncPtr>& outputs, const std::vector<FuncPtr>& stored) {
+  for (const FuncPtr& f : outputs) outputs_.insert(f.get());
+  for (const FuncPtr& f : stored) stored_.insert(f.get());
+  for (const FuncPtr& f : topological_order(outputs)) {
+    for (const FuncPtr& callee : direct_callees(*f)) readers_[callee.get()].push_back(f);
+    const bool is_block = f->made && f->made->blocks > 0;  // see default_schedule.cpp
+    for (const LoopLevel& level : {f->schedule.compute_level, f->schedule.store_level}) {
+      if (level.kind == LoopLevel::Kind::At && !is_block) hosts_.insert(level.func);
+    }
+  }
+}
+
+std::optional<Reader> Readers::only_reader(const FuncPtr& f) const {
+  const auto found = readers_.find(f.get());
+  if (found == readers_.end() || found->second.size() != 1 || !is_inside(found->second[0]))
+    return std::nullopt;
+  Reader reader{found->second[0], -1, {}};
+  for (int s = 0; s < reader.func->stage_count(); ++s) {
+    std::vector<const Call*> reads;
+    walk_definition(reader.func->stage(s), [&](const Expr& e) {
+      const auto* call = e.as<Call>();
+      if (call && call->call_type == CallType::Func && call->symbol.raw() == f.get())
+        reads.push_back(call);
+    });
+    if (reads.empty()) continue;
+    if (reader.stage >= 0) return std::nullopt;
+    reader.stage = s;
+    reader.reads = std::move(reads);
+  }
+  return reader.stage >= 0 ? std::optional(std::move(reader)) : std::nullopt;
+}
+
+bool is_split(const Definition& stage, const std::string& var) {
+  const auto& splits = stage.schedule.splits;
+  return std::any_of(splits.begin(), splits.end(), [&](const Split& split) {
+    return split.old_var == var || split.outer == var || split.inner == var;
+  });
+}
+
+}  // namespace retrograde::ir
