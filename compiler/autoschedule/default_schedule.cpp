@@ -10,6 +10,7 @@
 #include "autoschedule/new_loop.h"
 #include "autoschedule/only_reader.h"
 #include "autoschedule/placement_limits.h"
+#include "autoschedule/reduction_slices.h"
 #include "autoschedule/scatter_schedule.h"
 #include "autoschedule/slices.h"
 #include "autoschedule/stored_funcs.h"
@@ -279,6 +280,7 @@ void give_default_schedule(const std::vector<FuncPtr>& outputs, const VectorUnit
   }
   const Readers readers(outputs, stored);  // before anything is moved
   compute_in_slices(readers, stored, whole, sizes);
+  compute_in_reductions(readers, stored, whole, sizes);
   join_sweeps(outputs, given, sizes);
   for (const FuncPtr& f : order) {  // so that the log tells of every Func
     const bool is_output = std::find(outputs.begin(), outputs.end(), f) != outputs.end();

@@ -6,7 +6,8 @@
 // (stored_funcs.h) is computed at root, its innermost dimension vectorized, its outermost run in
 // parallel; a stage that reads across rows is tiled; a reduction keeps a tile of its sums in
 // registers (register_tile.h); a scatter along its reduction domain computes places and terms in
-// vectors. What one Func alone reads slice by slice moves into its loops (slices.h).
+// vectors. What one Func alone reads slice by slice moves into its loops (slices.h,
+// reduction_slices.h).
 #pragma once
 
 #include <vector>

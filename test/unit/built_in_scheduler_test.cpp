@@ -97,6 +97,67 @@ TEST(SlicesOfAFunc, AreNotWhereAnIterationReadsTwo) {
   EXPECT_EQ(Shifted(11, 2).place_of_rows().kind, ir::LoopLevel::Kind::Root);
 }
 
+// A window around each pixel for each of many shifts, of which the sum at two places is wanted.
+struct ShiftedWindows {
+  explicit ShiftedWindows(int shifts, int apart = 1) {
+    RDom near(-1, 3), each(0, shifts, 0, shifts);
+    const auto at = [&](const Expr& px, const Expr& py) {
+      return picture(clamp(px, 0, side - 1), clamp(py, 0, side - 1));
+    };
+    windows(x, y, u, v) = 0.0f;
+    windows(x, y, u, v) += at(x + near, y) * at(x + near + u, y + v);
+    out(x, y) = 0.0f;
+    out(x, y) += windows(x, y, each.x, each.y) -
+                 0.5f * windows(x - each.x, y - apart * each.y, each.x, each.y);
+    out.bound(x, 0, side).bound(y, 0, side);
+    for (int py = 0; py < side; py++) {
+      for (int px = 0; px < side; px++)
+        picture(px, py) = static_cast<float>((px * 7 + py * 13) % 11);
+    }
+  }
+  ir::LoopLevel place_of_windows() {
+    Pipeline(out).auto_schedule(get_host_target());
+    return windows.function()->schedule.compute_level;
+  }
+  static constexpr int side = 264;
+  Var x{"x"}, y{"y"}, u{"u"}, v{"v"};
+  Buffer<float> picture{side, side};
+  Func windows{"windows"}, out{"out"};
+};
+
+TEST(SlicesOfAReduction, AreComputedInItsLoopsForStripsOfTheResult) {
+  ShiftedWindows scheduled(8), plain(8);
+  const ir::LoopLevel place = scheduled.place_of_windows();
+  ASSERT_EQ(place.kind, ir::LoopLevel::Kind::At);
+  EXPECT_EQ(place.func, scheduled.out.name());
+  EXPECT_EQ(place.stage, 1);
+  const std::vector<ir::Dim> loops = scheduled.out.update().get_schedule().dims;
+  EXPECT_EQ(loops.back().runs, ForType::Parallel);
+  EXPECT_TRUE(loops[loops.size() - 2].is_reduction && loops[loops.size() - 3].is_reduction);
+  constexpr int side = ShiftedWindows::side;
+  plain.windows.compute_root();
+  const Buffer<float> found = scheduled.out.realize({side, side}),
+                      expected = plain.out.realize({side, side});
+  for (int y = 0; y < side; y++) {
+    for (int x = 0; x < side; x++) ASSERT_EQ(found(x, y), expected(x, y)) << x << ", " << y;
+  }
+}
+
+TEST(SlicesOfAReduction, AreNotWhereTheyAreFewOrFit) {
+  EXPECT_EQ(ShiftedWindows(2).place_of_windows().kind, ir::LoopLevel::Kind::Root);
+  EXPECT_EQ(ShiftedWindows(4).place_of_windows().kind, ir::LoopLevel::Kind::Root);
+}
+
+TEST(SlicesOfAReduction, AreNotWhereAStripReadsManyMoreRows) {
+  EXPECT_EQ(ShiftedWindows(8, 9).place_of_windows().kind, ir::LoopLevel::Kind::Root);
+}
+
+TEST(SlicesOfAReduction, AreNotWhereSeveralReadThem) {
+  ShiftedWindows program(8);
+  program.out(program.x, program.y) += program.windows(program.x, program.y, 3, 3);
+  EXPECT_EQ(program.place_of_windows().kind, ir::LoopLevel::Kind::Root);
+}
+
 TEST_F(BuiltInScheduler, KeepsWhatAUserScheduled) {
   heavy.compute_at(blur, y).vectorize(x, 4);
   blur.compute_root().reorder(y, x);
