@@ -23,14 +23,24 @@ constexpr size_t sweeps_back = 8;  // sweeps before this one
 struct Sweep {
   FuncPtr func;
   int stage;
-  std::vector<Expr> looked_up;  // calls, at places that data decide
+  std::vector<Expr> looked_up;  // calls: what is dear to load
   bool is_joined = false;
 
   const Definition& definition() const { return func->stage(stage); }
   const std::vector<Dim>& loops() const { return definition().schedule.dims; }
 };
 
-std::vector<Expr> looked_up_in(const FuncContents& f, const Definition& stage) {
+// Whether loading it takes longer than what is done with it: from places that data decide, lane by
+// lane, or from memory.
+bool is_dear(const Call& call, const SizeEstimate& sizes) {
+  const FuncPtr callee = call.call_type == CallType::Func ? func_of(call) : nullptr;
+  return (callee && sizes.bytes(*callee) >= more_than_caches) ||
+         std::any_of(call.args.begin(), call.args.end(),
+                     [](const Expr& place) { return reads_memory(place, MemoryReads::Functions); });
+}
+
+std::vector<Expr> looked_up_in(const FuncContents& f, const Definition& stage,
+                               const SizeEstimate& sizes) {
   std::vector<Expr> result;
   for_each_expr(stage, [&](const Expr& root) {
     walk(without_lets(root), [&](const Expr& e) {
@@ -38,10 +48,7 @@ std::vector<Expr> looked_up_in(const FuncContents& f, const Definition& stage) {
       if (!call || call->call_type == CallType::Operator || call->symbol.raw() == &f) return true;
       const bool is_known = std::any_of(result.begin(), result.end(),
                                         [&](const Expr& other) { return equal(e, other); });
-      if (!is_known && std::any_of(call->args.begin(), call->args.end(), [](const Expr& place) {
-            return reads_memory(place, MemoryReads::Functions);
-          }))
-        result.push_back(e);
+      if (!is_known && is_dear(*call, sizes)) result.push_back(e);
       return true;
     });
   });
@@ -119,7 +126,7 @@ void join_sweeps(const std::vector<FuncPtr>& outputs, const std::vector<FuncPtr>
     const bool is_at_root = f->schedule.compute_level.kind == LoopLevel::Kind::Root;
     if (!is_at_root || hosts.contains(f->name)) continue;
     if (f->stage_count() != 2 || f->updates[0].rvars.empty()) continue;
-    Sweep sweep{f, 1, looked_up_in(*f, f->updates[0])};
+    Sweep sweep{f, 1, looked_up_in(*f, f->updates[0], sizes)};
     if (!sweep.looked_up.empty()) sweeps.push_back(std::move(sweep));
   }
   for (size_t i = 1; i < sweeps.size(); ++i) {

@@ -1,10 +1,11 @@
-// join_sweeps.h -- reductions that look the same places up run in the same loops.
+// join_sweeps.h -- reductions that load the same run in the same loops, where loads are dear.
 //
 //   u_adj(x, y) += seed(x, y, r) * along_u(image(i(x, y) + ..., j(x, y) + ..., r))
 //   v_adj(x, y) += seed(x, y, r) * along_v(image(i(x, y) + ..., j(x, y) + ..., r))
 //
-// A vector at places that data decide is loaded lane by lane. What two such reductions over the same
-// domain load, they load once where they run together (compute_with).
+// A vector at places that data decide is loaded lane by lane, and one of a Func larger than caches
+// comes from memory, or is computed again. What two such reductions over the same domain load, they
+// load once where they run together (compute_with).
 #pragma once
 
 #include <vector>

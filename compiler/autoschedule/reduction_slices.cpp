@@ -22,7 +22,6 @@ namespace retrograde::ir {
 
 namespace {
 
-constexpr int64_t many_bytes = 16 << 20;  // of what does not stay in a cache
 constexpr int64_t enough_slices = 8;
 constexpr int64_t strip_rows = 32, least_rows = 8;
 constexpr int64_t enough_strips = 16;   // each is a task
@@ -51,7 +50,7 @@ class ReductionSlicer {
       slices *= *extent;
     }
     if (slices < enough_slices || f_.args.size() < move.slices.size() + image_dimensions ||
-        bytes() < many_bytes || !has_plain_loops())
+        sizes_.bytes(f_) < more_than_caches || !has_plain_loops())
       return std::nullopt;
     move.along = stage_.schedule.dims.back().var;
     const auto along = std::find(reader_.func->args.begin(), reader_.func->args.end(), move.along);
@@ -63,13 +62,6 @@ class ReductionSlicer {
   }
 
  private:
-  int64_t bytes() const {
-    int64_t result = 0;
-    for (const Type& type : f_.types) result += type.bytes();
-    for (size_t d = 0; d < f_.args.size(); ++d) result *= sizes_.extent(f_, d).value_or(0);
-    return result;
-  }
-
   // Only the vectors have been cut off, and the outermost loop is one over elements.
   bool has_plain_loops() const {
     const std::vector<Dim>& loops = stage_.schedule.dims;

@@ -119,4 +119,11 @@ std::optional<int64_t> SizeEstimate::extent(const FuncContents& f, size_t dimens
   return *as_const_int(i.max) - *as_const_int(i.min) + 1;
 }
 
+int64_t SizeEstimate::bytes(const FuncContents& f) const {
+  int64_t result = 0;
+  for (const Type& type : f.types) result += type.bytes();
+  for (size_t d = 0; d < f.args.size(); ++d) result *= extent(f, d).value_or(0);
+  return result;
+}
+
 }  // namespace retrograde::ir

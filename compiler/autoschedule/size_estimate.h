@@ -13,12 +13,17 @@
 
 namespace retrograde::ir {
 
+// More bytes than stay in the caches near a core.
+inline constexpr int64_t more_than_caches = 16 << 20;
+
 class SizeEstimate {
  public:
   SizeEstimate() = default;  // nothing is known
   explicit SizeEstimate(const std::vector<FuncPtr>& outputs);
   // Elements of a dimension that are computed; nullopt: not known.
   std::optional<int64_t> extent(const FuncContents& f, size_t dimension) const;
+  // Of all that is computed; 0 where some extent is not known.
+  int64_t bytes(const FuncContents& f) const;
 
  private:
   std::unordered_map<const Symbol*, Box> boxes_;  // with constant ends; undefined: not known

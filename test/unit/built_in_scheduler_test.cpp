@@ -158,6 +158,48 @@ TEST(SlicesOfAReduction, AreNotWhereSeveralReadThem) {
   EXPECT_EQ(program.place_of_windows().kind, ir::LoopLevel::Kind::Root);
 }
 
+// Two sums over what both would load from memory, or compute again.
+struct TwoSums {
+  explicit TwoSums(int shifts) {
+    RDom each(0, shifts, 0, shifts);
+    const Expr there = picture(clamp(x + u, 0, side - 1), clamp(y + v, 0, side - 1));
+    terms(x, y, u, v) = there * picture(x, y);
+    plain(x, y) = 0.0f;
+    plain(x, y) += terms(x, y, each.x, each.y);
+    weighted(x, y) = 0.0f;
+    weighted(x, y) += terms(x, y, each.x, each.y) * cast<float>(each.x - each.y);
+    out(x, y) = plain(x, y) - weighted(x, y);
+    out.bound(x, 0, side).bound(y, 0, side);
+    for (int py = 0; py < side; py++) {
+      for (int px = 0; px < side; px++)
+        picture(px, py) = static_cast<float>((px * 5 + py * 3) % 13);
+    }
+  }
+  bool run_together() {
+    Pipeline(out).auto_schedule(get_host_target());
+    return weighted.function()->stage(1).schedule.fuse_level.kind == ir::LoopLevel::Kind::At;
+  }
+  static constexpr int side = 264;
+  Var x{"x"}, y{"y"}, u{"u"}, v{"v"};
+  Buffer<float> picture{side, side};
+  Func terms{"terms"}, plain{"plain"}, weighted{"weighted"}, out{"out"};
+};
+
+TEST(SumsOverALargeFunc, RunTogether) {
+  TwoSums scheduled(8), apart(8);
+  EXPECT_TRUE(scheduled.run_together());
+  constexpr int side = TwoSums::side;
+  apart.plain.compute_root();
+  apart.weighted.compute_root();
+  const Buffer<float> found = scheduled.out.realize({side, side}),
+                      expected = apart.out.realize({side, side});
+  for (int y = 0; y < side; y++) {
+    for (int x = 0; x < side; x++) ASSERT_EQ(found(x, y), expected(x, y)) << x << ", " << y;
+  }
+}
+
+TEST(SumsOverALargeFunc, RunApartWhereItIsSmall) { EXPECT_FALSE(TwoSums(3).run_together()); }
+
 TEST_F(BuiltInScheduler, KeepsWhatAUserScheduled) {
   heavy.compute_at(blur, y).vectorize(x, 4);
   blur.compute_root().reorder(y, x);
