@@ -24,6 +24,31 @@ Expr where_it_counts(const Expr& adjoint) {
   return is_zero(selection->when_false) ? selection->condition : Expr();
 }
 
+// All that the inversion depends on.
+std::string text_of(const AccessQuery& query) {
+  std::string text;
+  const auto add = [&](const Expr& e) { text += (e.defined() ? print(e) : "_") + ","; };
+  const auto add_all = [&](const std::vector<LoopVariable>& vars) {
+    for (const LoopVariable& v : vars) {
+      text += v.name + (v.is_reduction ? ":" : "=");
+      add(v.min);
+      add(v.max);
+    }
+    text += ";";
+  };
+  add_all(query.domain.vars);
+  add(query.domain.predicate);
+  for (const Expr& index : query.indices) add(index);
+  for (const std::string& arg : query.target_args) text += arg + ",";
+  add_all(query.region);
+  return text;
+}
+
+bool has_domains(const Inversion& inversion) {
+  return std::any_of(inversion.gathers.begin(), inversion.gathers.end(),
+                     [](const Gather& g) { return g.rdom != nullptr; });
+}
+
 }  // namespace
 
 const Inversion& ReadInversions::of(const FuncContents& f, const Symbol& symbol,
@@ -53,7 +78,11 @@ const Inversion& ReadInversions::find(const FuncContents& f, const Symbol& symbo
   key += f.name;
   auto [it, is_new] = found_.try_emplace(key);
   if (!is_new) return it->second;
+  const std::string text = text_of(query);
+  if (const auto known = without_domains_.find(text); known != without_domains_.end())
+    return it->second = known->second;
   it->second = invert_or_scatter(query, operations_);
+  if (!has_domains(it->second)) without_domains_[text] = it->second;
   if (it->second.gave_up) operations_ = std::max(operations_ / 2, least_operations);
   return it->second;
 }

@@ -23,6 +23,9 @@ class ReadInversions {
                                   const Expr& adjoint);
   const Inversion& find(const FuncContents& f, const Symbol& symbol, const AccessQuery& query);
   std::map<std::string, Inversion> found_;
+  // By all that they depend on: the steps of a loop that is written out read in the same way. Not
+  // those with reduction domains, which are of one adjoint each.
+  std::map<std::string, Inversion> without_domains_;
   unsigned long operations_ = worthwhile_operations;  // for the next
 };
 
