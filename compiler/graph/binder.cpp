@@ -31,7 +31,7 @@ ParameterPtr NamedEntities::buffer_of_fact(const std::string& name) const {
 }
 
 Expr Binder::operator()(const Expr& root) const {
-  return rewrite(root, [&](const Expr& e, const std::function<Expr(const Expr&)>& recurse) {
+  return rewrite(root, [&](const Expr& e, const auto& recurse) {
     const Expr mapped = map_children(e, recurse);
     if (const Call* call = mapped.as<Call>()) return bound(*call, mapped);
     const Variable* v = mapped.as<Variable>();

@@ -167,10 +167,9 @@ void freeze(const Names& names) {
 
 // A random number depends on the Func, the stage and the point where it is evaluated.
 Expr bind_random(const Expr& e, const std::vector<Expr>& point) {
-  return rewrite(e, [&](const Expr& part, const std::function<Expr(const Expr&)>& recurse) {
+  return rewrite(e, [&](const Expr& part, const auto& recurse) -> Expr {
     const Call* call = part.as<Call>();
-    if (!call || !call->is_op(Op::random) || call->args.size() != 1)
-      return map_children(part, recurse);
+    if (!call || !call->is_op(Op::random) || call->args.size() != 1) return {};
     std::vector<Expr> words{recurse(call->args[0])};
     words.insert(words.end(), point.begin(), point.end());
     return call_op(Op::random, call->type, std::move(words));

@@ -20,7 +20,7 @@ Expr map_calls_of(const Expr& e, const Symbol* f,
                   FunctionRef<Expr(const Call&, const std::vector<Expr>& args)> read) {
   return rewrite(e, [&](const Expr& node, const auto& recurse) -> Expr {
     const Call* call = as_call_of(node, f);
-    if (!call) return map_children(node, recurse);
+    if (!call) return {};
     std::vector<Expr> args;
     for (const Expr& arg : call->args) args.push_back(recurse(arg));
     return read(*call, args);

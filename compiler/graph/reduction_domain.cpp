@@ -15,10 +15,9 @@ Expr rebind_symbol(const Expr& e, const SymbolRef& symbol) {
 }
 
 Expr rebind_symbol(const Expr& e, const Symbol* from, const SymbolRef& to) {
-  return rewrite(e, [&](const Expr& part, const std::function<Expr(const Expr&)>& recurse) -> Expr {
+  return rewrite(e, [&](const Expr& part, const auto&) {
     const Variable* v = part.as<Variable>();
-    if (!v || v->symbol.raw() != from) return map_children(part, recurse);
-    return variable(v->name, v->type, to);
+    return v && v->symbol.raw() == from ? variable(v->name, v->type, to) : Expr();
   });
 }
 

@@ -289,10 +289,9 @@ bool are_outermost(const StageLoops& schedule, const Preserved& preserved) {
 }
 
 std::string as_list(const Preserved& preserved) {
-  std::string out;
-  for (const auto& [loop, var] : preserved)
-    out += text(out.empty() ? "" : ", ", quoted(loop), " as ", quoted(var));
-  return out;
+  return listed(preserved, [](const auto& kept) {
+    return text(quoted(kept.first), " as ", quoted(kept.second));
+  });
 }
 
 }  // namespace

@@ -93,7 +93,7 @@ class Wrapping {
   }
 
   Expr redirect(const Expr& root, const FuncContents& f) {
-    return rewrite(root, [&](const Expr& e, const std::function<Expr(const Expr&)>& recurse) {
+    return rewrite(root, [&](const Expr& e, const auto& recurse) {
       const Expr mapped = map_children(e, recurse);
       const Call* call = mapped.as<Call>();
       if (!call) return mapped;

@@ -362,6 +362,13 @@ Expr make_shuffle(std::vector<Expr> vectors, std::vector<int> indices) {
   return new Shuffle(type, std::move(vectors), std::move(indices));
 }
 
+Expr make_interleaved(const std::vector<Expr>& vectors) {
+  const int count = static_cast<int>(vectors.size()), lanes = vectors[0].type().lanes();
+  std::vector<int> indices;
+  for (int i = 0; i < lanes * count; ++i) indices.push_back(i % count * lanes + i / count);
+  return make_shuffle(vectors, std::move(indices));
+}
+
 Expr make_vector_reduce(Kind op, Expr value, int result_lanes) {
   const int lanes = value.type().lanes();
   RETROGRADE_ASSERT(result_lanes >= 1 && lanes % result_lanes == 0, "reducing ", lanes,

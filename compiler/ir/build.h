@@ -50,6 +50,7 @@ Expr make_ramp(Expr base, Expr stride, int lanes);
 Expr make_broadcast(Expr value, int lanes);
 Expr make_let(const std::string& name, Expr value, Expr body);
 Expr make_shuffle(std::vector<Expr> vectors, std::vector<int> indices);
+Expr make_interleaved(const std::vector<Expr>& vectors);  // of one width: a0 b0 ... a1 b1 ...
 Expr make_vector_reduce(Kind op, Expr value, int result_lanes);
 // An operator with its result type given; the one-argument form takes the first argument's type.
 Expr call_op(Op op, Type type, std::vector<Expr> args);

@@ -313,6 +313,12 @@ struct Call : ExprNode {
   const int component;  // which value of a Tuple-valued Func
   const SymbolRef symbol;
 };
+// The call of this operator; null when `e` is none.
+inline const Call* as_op(const Expr& e, Op op) {
+  const Call* call = e.as<Call>();
+  return call && call->is_op(op) ? call : nullptr;
+}
+inline bool is_undef(const Expr& e) { return as_op(e, Op::undef) != nullptr; }
 struct Let : ExprNode {
   RETROGRADE_NODE(Let, name, value, body)
   Let(std::string name, Expr value, Expr body)

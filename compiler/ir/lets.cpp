@@ -4,19 +4,11 @@
 
 namespace retrograde::ir {
 
-namespace {
-
-class LetRemover : public Rewriter {
- protected:
-  using Rewriter::rewrite;
-  Expr rewrite(const Expr& e) override {
+Expr without_lets(const Expr& root) {
+  return rewrite(root, [](const Expr& e, const auto& recurse) {
     const auto* let = e.as<Let>();
-    return let ? (*this)(substitute(let->body, let->name, let->value)) : children(e);
-  }
-};
-
-}  // namespace
-
-Expr without_lets(const Expr& e) { return LetRemover()(e); }
+    return let ? recurse(substitute(let->body, let->name, let->value)) : Expr();
+  });
+}
 
 }  // namespace retrograde::ir

@@ -5,7 +5,8 @@
 
 namespace retrograde::ir {
 
-Expr without_likely(const Expr& e);    // likely, likely_if_innermost
+Expr without_likely(const Expr& e);  // likely, likely_if_innermost
+Stmt without_likely(const Stmt& s);
 Expr without_promises(const Expr& e);  // promise_clamped
 
 }  // namespace retrograde::ir

@@ -326,49 +326,30 @@ Stmt Rewriter::children(const Stmt& s) {
       [this](const Stmt& child) { return (*this)(child); });
 }
 
+Expr StepRewriter::rewrite(const Expr& e) {
+  Expr result = step_(e, recurse_);
+  return result.defined() ? result : children(e);
+}
+
+Expr rewrite(const Expr& e, RewriteStep step) { return StepRewriter(std::move(step))(e); }
+Stmt rewrite(const Stmt& s, RewriteStep step) { return StepRewriter(std::move(step))(s); }
+
 namespace {
 
-class StepRewriter : public Rewriter {
- public:
-  explicit StepRewriter(const RewriteStep& step) : step_(step) {}
-
- protected:
-  using Rewriter::rewrite;
-  Expr rewrite(const Expr& e) override { return step_(e, recurse_); }
-
- private:
-  const RewriteStep& step_;
-  // Rewrites its argument, a child of the node at hand.
-  const std::function<Expr(const Expr&)> recurse_ = [this](const Expr& e) { return (*this)(e); };
-};
-
-class Substituter : public Rewriter {
- public:
-  explicit Substituter(const Substitution& values) : values_(values) {}
-
- protected:
-  using Rewriter::rewrite;
-  Expr rewrite(const Expr& e) override {
+template <class Tree>
+Tree substituted(const Tree& tree, const Substitution& values) {
+  if (values.empty()) return tree;
+  return rewrite(tree, [&](const Expr& e, const auto&) {
     const auto* var = e.as<Variable>();
-    if (!var) return children(e);
-    const auto found = values_.find(var->name);
-    return found == values_.end() ? e : found->second;
-  }
-
- private:
-  const Substitution& values_;
-};
+    const auto found = var ? values.find(var->name) : values.end();
+    return found == values.end() ? Expr() : found->second;
+  });
+}
 
 }  // namespace
 
-Expr rewrite(const Expr& e, const RewriteStep& step) { return StepRewriter(step)(e); }
-
-Expr substitute(const Expr& e, const Substitution& values) {
-  return values.empty() ? e : Substituter(values)(e);
-}
-Stmt substitute(const Stmt& s, const Substitution& values) {
-  return values.empty() ? s : Substituter(values)(s);
-}
+Expr substitute(const Expr& e, const Substitution& values) { return substituted(e, values); }
+Stmt substitute(const Stmt& s, const Substitution& values) { return substituted(s, values); }
 Expr substitute(const Expr& e, const std::string& name, const Expr& value) {
   return substitute(e, Substitution{{name, value}});
 }

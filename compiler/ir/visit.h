@@ -13,6 +13,7 @@
 #include <string>
 #include <unordered_map>
 #include <unordered_set>
+#include <utility>
 
 #include "ir/expr.h"
 
@@ -171,11 +172,26 @@ class Rewriter {
   std::unordered_map<const ExprNode*, Entry> memo_;
 };
 
-// Rewriting with a lambda: f(e, recurse) gives the new node; `recurse` rewrites a child, so that
-// `map_children(e, recurse)` is e with all children rewritten.
+// Rewriting with a lambda: f(e, recurse) gives the new node, or none where only the children are
+// rewritten; `recurse` rewrites a child, so that `map_children(e, recurse)` is e with all children
+// rewritten.
 using RewriteStep =
     std::function<Expr(const Expr&, const std::function<Expr(const Expr&)>& recurse)>;
-Expr rewrite(const Expr& e, const RewriteStep& step);
+class StepRewriter : public Rewriter {
+ public:
+  explicit StepRewriter(RewriteStep step) : step_(std::move(step)) {}
+  StepRewriter(const StepRewriter&) = delete;
+
+ protected:
+  Expr rewrite(const Expr& e) override;
+  Stmt rewrite(const Stmt& s) override { return children(s); }
+
+ private:
+  const RewriteStep step_;
+  const std::function<Expr(const Expr&)> recurse_ = [this](const Expr& e) { return (*this)(e); };
+};
+Expr rewrite(const Expr& e, RewriteStep step);
+Stmt rewrite(const Stmt& s, RewriteStep step);
 
 // Names are unique: a let or loop inside `e` never rebinds a name of the map.
 using Substitution = std::map<std::string, Expr>;

@@ -50,6 +50,7 @@ struct Program {
 // "f" alone, or "f.0", "f.1" ... for Tuples: the buffer that holds value `index` of a Func.
 std::string value_buffer_name(const FuncContents& f, int index);
 
+bool is_stored_where_computed(const LoopedFunc& f);
 // Whether the memory of f is allocated further out than it is stored, and the name of its place.
 bool is_hoisted(const LoopedFunc& f);
 std::string place_name(const std::string& func);

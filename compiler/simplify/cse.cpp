@@ -76,13 +76,7 @@ class UseCounter {
 };
 
 // The first value, inside its Lets.
-Expr wrap(const SharedLets& shared) {
-  Expr result = shared.values[0];
-  for (auto it = shared.lets.rbegin(); it != shared.lets.rend(); ++it) {
-    result = make_let(it->first, it->second, std::move(result));
-  }
-  return result;
-}
+Expr wrap(const SharedLets& shared) { return make_lets(shared.lets, shared.values[0]); }
 
 SharedLets make_lets(const std::vector<Expr>& es);
 

@@ -9,11 +9,6 @@ namespace retrograde::ir {
 
 namespace {
 
-bool is_undef(const Expr& e) {
-  const auto* call = e.as<Call>();
-  return call && call->is_op(Op::undef);
-}
-
 class ForwardSweep {
  public:
   ForwardSweep(const std::vector<Expr>& values, FunctionRef<Expr(const Expr&)> tangent_of,

@@ -166,9 +166,9 @@ class SeveralPoints {
     return result;
   }
   static Expr element(const Expr& e, int i) {
-    return rewrite(e, [&](const Expr& part, const std::function<Expr(const Expr&)>& recurse) {
+    return rewrite(e, [&](const Expr& part, const auto& recurse) {
       const Call* call = as_pack(part);
-      return call ? recurse(call->args[static_cast<size_t>(i)]) : map_children(part, recurse);
+      return call ? recurse(call->args[static_cast<size_t>(i)]) : Expr();
     });
   }
 

@@ -21,11 +21,6 @@
 namespace retrograde::ir {
 namespace {
 
-bool is_undef(const Expr& e) {
-  const auto* call = e.as<Call>();
-  return call && call->is_op(Op::undef);
-}
-
 // Whether it stores every element anew, whatever was there.
 bool overwrites_all(const FuncContents& f, const Definition& update) {
   if (update.predicate.defined() || !update.rvars.empty()) return false;

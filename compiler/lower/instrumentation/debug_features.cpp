@@ -10,7 +10,8 @@
 //   f[x] = v   =>   f[x] = reinterpret<float>(reinterpret<uint32>(v) & ~1)
 //
 // A NaN is stored as it is: without its last bit it may be an infinity. Inside Atomic nothing
-// changes: what is read there is compared with what was stored. Tests: unit/debug_features_test.
+// changes: what is read there is compared with what was stored.
+// Tests: test/golden/lower/check_promises/, fuzz_float_stores/.
 #include "lower/statement_passes.h"
 
 #include "ir/build.h"
@@ -20,22 +21,6 @@
 
 namespace retrograde::ir {
 namespace {
-
-class CheckPromises : public Rewriter {
- protected:
-  Expr rewrite(const Expr& e) override {
-    const auto* call = e.as<Call>();
-    if (!call || !call->is_op(Op::unsafe_promise_clamped)) return children(e);
-    const Expr value = (*this)(call->args[0]), min = (*this)(call->args[1]),
-               max = (*this)(call->args[2]);
-    const Expr checked = call_op(
-        Op::require, value.type(),
-        {min <= value && value <= max, value,
-         Expr("cannot run: unsafe_promise_clamped() promises a value between"), min, Expr("and"),
-         max, Expr("but it is"), value, Expr("here. Use clamp(), or mend what computes it.")});
-    return call_op(Op::unsafe_promise_clamped, e.type(), {checked, min, max});
-  }
-};
 
 Expr without_last_bit(const Expr& value) {
   const Type type = value.type(), bits = type.with_code(TypeCode::UInt);
@@ -47,7 +32,20 @@ Expr without_last_bit(const Expr& value) {
 
 }  // namespace
 
-Stmt check_promises(const Stmt& s) { return CheckPromises()(s); }
+Stmt check_promises(const Stmt& s) {
+  return rewrite(s, [](const Expr& e, const auto& recurse) -> Expr {
+    const auto* call = as_op(e, Op::unsafe_promise_clamped);
+    if (!call) return {};
+    const Expr value = recurse(call->args[0]), min = recurse(call->args[1]),
+               max = recurse(call->args[2]);
+    const Expr checked = call_op(
+        Op::require, value.type(),
+        {min <= value && value <= max, value,
+         Expr("cannot run: unsafe_promise_clamped() promises a value between"), min, Expr("and"),
+         max, Expr("but it is"), value, Expr("here. Use clamp(), or mend what computes it.")});
+    return call_op(Op::unsafe_promise_clamped, e.type(), {checked, min, max});
+  });
+}
 
 Stmt fuzz_float_stores(const Stmt& all) {
   return rewrite_statements(all, [](const Stmt& s, auto& rewriter) {

@@ -14,7 +14,7 @@
 //         call and a store. Bodies of parallel loops enter again, since their threads may come from
 //         elsewhere. Code generation ends the run when the function leaves early.
 // Source: the sampling profiler that Halide's documentation describes. Tests:
-//         test/unit/profiler_test.cpp.
+//         test/golden/pipeline/inject_profiling/, test/unit/profiler_test.cpp.
 #include "lower/instrumentation/inject_profiling.h"
 
 #include <algorithm>

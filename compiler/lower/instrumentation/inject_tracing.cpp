@@ -101,10 +101,9 @@ class Tracer : public Rewriter {
 
  protected:
   Expr rewrite(const Expr& e) override {
-    const Call* call = e.as<Call>();
-    if (call && call->is_op(Op::address_of)) return e;
+    if (as_op(e, Op::address_of)) return e;
     const Expr result = children(e);
-    call = result.as<Call>();
+    const Call* call = result.as<Call>();
     if (!call) return result;
     const bool is_access =
         (call->call_type == CallType::Func && loads_of(call->name)) || is_traced_image(*call);
@@ -159,8 +158,7 @@ class Tracer : public Rewriter {
     Lets lets;
     for (size_t i = 0; i < n.values.size(); i++) {
       Expr value = (*this)(n.values[i]);
-      const Call* call = value.as<Call>();
-      if (call && call->is_op(Op::undef)) {
+      if (is_undef(value)) {
         values.push_back(value);
         continue;
       }
@@ -193,9 +191,7 @@ class Tracer : public Rewriter {
 
   Stmt produce_or_consume(const ProducerConsumer& n) {
     if (n.produces) produced_[n.name] = region_of(n);
-    const auto found = produced_.find(n.name);
-    const std::vector<Range> region =
-        found == produced_.end() ? std::vector<Range>{} : found->second;
+    const std::vector<Range> region = produced_[n.name];
     const bool had_id = with_id_.count(n.name) > 0;
     const Stmt body = within(n.name, [&] { return (*this)(n.body); });
     RETROGRADE_ASSERT(had_id, "a region of ", n.name, " outside of its realization");

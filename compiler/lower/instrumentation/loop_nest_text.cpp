@@ -124,8 +124,7 @@ class LoopNestPrinter {
 
   bool is_stored_further_out(const std::string& name) const {
     const LoopedFunc* f = program_.find(name);
-    return f && f->schedule.store_level.kind != LoopLevel::Kind::Inlined &&
-           !(f->schedule.store_level == f->schedule.compute_level);
+    return f && !is_stored_where_computed(*f);
   }
 
   std::ostream& line() { return out_ << std::string(2 * depth_, ' '); }

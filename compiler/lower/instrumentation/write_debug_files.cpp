@@ -5,8 +5,11 @@
 //   produce f { P }   =>   produce f { P }  assert(debug_to_file("f.tmp", buffer of f) == 0)
 //
 // Errors: Tuples, names that end in no format that can be written, types that the format lacks.
-// Source: Halide's documentation of debug_to_file. Tests: test/unit/debug_file_test.cpp.
+// Source: Halide's documentation of debug_to_file. Tests:
+//         test/golden/pipeline/write_debug_files/, test/unit/debug_file_test.cpp.
 #include "lower/instrumentation/write_debug_files.h"
+
+#include <algorithm>
 
 #include "diagnostics/error.h"
 #include "ir/build.h"
@@ -45,50 +48,39 @@ void check(const LoopedFunc& f) {
               "Cast them to float in a Func of its own");
 }
 
-class Writer : public StatementRewriter {
- public:
-  explicit Writer(const Program& program) : program_(program) {}
-
- protected:
-  Stmt rewrite(const Stmt& s) override {
-    const ProducerConsumer* n = s.as<ProducerConsumer>();
-    if (!n || !n->produces) return children(s);
-    const LoopedFunc* f = program_.find(n->name);
-    if (!f || f->func->debug_file.empty()) return children(s);
-    check(*f);
-    return make_block({children(s), write(*f, n->name)});
+Stmt write(const LoopedFunc& f, const std::string& name, int number) {
+  std::vector<Range> region;
+  std::vector<Expr> first, strides;
+  for (int d = 0; d < f.func->dimensions(); d++) {
+    const auto fact = [&](const char* what) { return variable(text(name, what, d)); };
+    region.push_back({fact(".min."), fact(".extent.")});
+    first.push_back(fact(".min."));
+    strides.push_back(fact(".stride."));
   }
-
- private:
-  const Program& program_;
-  int written_ = 0;
-
-  Stmt write(const LoopedFunc& f, const std::string& name) {
-    std::vector<Range> region;
-    std::vector<Expr> first, strides;
-    for (int d = 0; d < f.func->dimensions(); d++) {
-      const auto fact = [&](const char* what) { return variable(text(name, what, d)); };
-      region.push_back({fact(".min."), fact(".extent.")});
-      first.push_back(fact(".min."));
-      strides.push_back(fact(".stride."));
-    }
-    const Type type = f.func->types[0];
-    const Expr host =
-        call_op(Op::address_of, Handle(), {call_func(name, type, first, 0, SymbolRef(f.func))});
-    return checked_call(
-        text(name, ".written.", written_++),
-        call_runtime("retrograde_debug_to_file",
-                     {Expr(f.func->debug_file), packed_buffer(type, host, region, strides)}));
-  }
-};
+  const Type type = f.func->types[0];
+  const Expr host =
+      call_op(Op::address_of, Handle(), {call_func(name, type, first, 0, SymbolRef(f.func))});
+  return checked_call(
+      text(name, ".written.", number),
+      call_runtime("retrograde_debug_to_file",
+                   {Expr(f.func->debug_file), packed_buffer(type, host, region, strides)}));
+}
 
 }  // namespace
 
-Stmt write_debug_files(const Stmt& s, const Program& program) {
-  for (const LoopedFunc& f : program.funcs) {
-    if (!f.func->debug_file.empty()) return Writer(program)(s);
-  }
-  return s;
+Stmt write_debug_files(const Stmt& all, const Program& program) {
+  const bool any = std::any_of(program.funcs.begin(), program.funcs.end(),
+                               [](const LoopedFunc& f) { return !f.func->debug_file.empty(); });
+  if (!any) return all;
+  int written = 0;
+  return rewrite_statements(all, [&](const Stmt& s, auto& rewriter) {
+    const ProducerConsumer* n = s.as<ProducerConsumer>();
+    const LoopedFunc* f = n && n->produces ? program.find(n->name) : nullptr;
+    if (!f || f->func->debug_file.empty()) return rewriter.children(s);
+    check(*f);
+    const Stmt inner = rewriter.children(s);
+    return make_block({inner, write(*f, n->name, written++)});
+  });
 }
 
 }  // namespace retrograde::ir

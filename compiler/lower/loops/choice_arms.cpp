@@ -7,25 +7,6 @@
 
 namespace retrograde::ir {
 
-namespace {
-
-class Chooser : public Rewriter {
- public:
-  explicit Chooser(const std::function<Expr(const Expr&)>& arm) : arm_(arm) {}
-
- protected:
-  using Rewriter::rewrite;
-  Expr rewrite(const Expr& e) override {
-    const Expr arm = arm_(e);
-    return arm.defined() ? (*this)(arm) : children(e);
-  }
-
- private:
-  const std::function<Expr(const Expr&)>& arm_;
-};
-
-}  // namespace
-
 // The value for which a select takes its first arm, where its condition is about the variable.
 std::optional<int64_t> ChoiceArms::case_of(const Expr& e) const {
   const auto* select = e.as<Select>();
@@ -62,8 +43,7 @@ Expr ChoiceArms::arm(const Expr& e, int64_t value) {
 }
 
 Stmt ChoiceArms::choose(const Stmt& body, int64_t value) {
-  const std::function<Expr(const Expr&)> own = [&](const Expr& e) { return arm(e, value); };
-  return Chooser(own)(body);
+  return rewrite(body, [&](const Expr& e, const auto& recurse) { return recurse(arm(e, value)); });
 }
 
 }  // namespace retrograde::ir

@@ -140,14 +140,9 @@ class Flattener : public Rewriter {
     return folds;
   }
 
-  struct Binding {
-    std::string name;
-    Expr value;
-  };
-
   // A constant stands for itself; anything else is bound to a name.
-  Expr bind(const std::string& name, const Expr& value, std::vector<Binding>& bindings) const {
-    if (!is_const(value) || usage_.variables.count(name)) bindings.push_back({name, value});
+  Expr bind(const std::string& name, const Expr& value, Lets& bindings) const {
+    if (!is_const(value) || usage_.variables.count(name)) bindings.emplace_back(name, value);
     return is_const(value) ? value : variable(name);
   }
 
@@ -159,7 +154,7 @@ class Flattener : public Rewriter {
   }
 
   Stmt allocate(const Realize& n) {
-    std::vector<Binding> bindings;
+    Lets bindings;
     Layout layout;
     layout.strides.resize(n.bounds.size());
     std::vector<Expr> extents;
@@ -187,9 +182,7 @@ class Flattener : public Rewriter {
       body = make_allocate(element_name(n.name, n.types.size(), i), n.types[i], n.memory, elements,
                            body);
     }
-    for (size_t i = bindings.size(); i-- > 0;)
-      body = make_let(bindings[i].name, bindings[i].value, body);
-    return body;
+    return make_lets(bindings, body);
   }
 
   // Notes a place that begins here, or where in one the Func lies.
@@ -207,7 +200,7 @@ class Flattener : public Rewriter {
   Stmt store(const Provide& n) {
     std::vector<Expr> values = mapped(n.values), args = mapped(n.args);
     Expr predicate = (*this)(n.predicate);
-    std::vector<Binding> bindings;
+    Lets bindings;
     if (values.size() > 1) bind_operands(n, values, args, predicate, bindings);
     std::vector<Stmt> stores;
     for (size_t i = 0; i < values.size(); ++i) {
@@ -215,20 +208,18 @@ class Flattener : public Rewriter {
       std::string buffer = element_of(n.name, static_cast<int>(i));
       stores.push_back(make_store(buffer, values[i], index_of(n.name, buffer, args), predicate));
     }
-    Stmt result = make_block(std::move(stores));
-    for (size_t i = bindings.size(); i-- > 0;)
-      result = make_let(bindings[i].name, bindings[i].value, result);
+    const Stmt result = make_lets(bindings, make_block(std::move(stores)));
     return result.defined() ? result : make_evaluate(Expr(0));
   }
 
   // Values of a Tuple are stored one after the other: what reads storage is read before the first
   // store.
   void bind_operands(const Provide& n, std::vector<Expr>& values, std::vector<Expr>& args,
-                     Expr& predicate, std::vector<Binding>& bindings) {
+                     Expr& predicate, Lets& bindings) {
     auto bind_if_loading = [&](Expr& e, const std::string& part) {
       if (!e.defined() || !reads_memory(e, MemoryReads::Loads)) return;
       std::string name = fresh_(n.name + "." + part);
-      bindings.push_back({name, e});
+      bindings.emplace_back(name, e);
       e = variable(name, e.type());
     };
     for (size_t i = 0; i < values.size(); ++i) {

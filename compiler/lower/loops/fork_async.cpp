@@ -24,7 +24,7 @@
 // Errors: such a value that both branches read, and whose storage lasts longer than theirs; loops
 //         between storage and computation that are not serial, or belong to a memoized Func.
 // Source: Halide's documentation of async; the handshake is a bounded buffer's (Dijkstra 1965).
-// Tests: test/unit/async_test.cpp.
+// Tests: test/golden/pipeline/fork_async/, test/unit/async_test.cpp.
 #include "lower/loops/fork_async.h"
 
 #include <algorithm>
@@ -333,12 +333,11 @@ class AsyncForker : public StatementRewriter {
 
   // Waits as late as possible: what does not need the Func runs before.
   Stmt acquired_late(const Stmt& s, const std::string& func) {
-    if (const ProducerConsumer* n = s.as<ProducerConsumer>(); n && !may_be_skipped(*n))
-      return make_producer_consumer(n->name, n->produces, acquired_late(n->body, func));
-    if (const LetStmt* n = s.as<LetStmt>(); n && !uses_func(n->value, func))
-      return make_let(n->name, n->value, acquired_late(n->body, func));
-    if (const Realize* n = s.as<Realize>(); n && !bounds_use(*n, func))
-      return make_realize(n->name, n->types, n->memory, n->bounds, acquired_late(n->body, func));
+    const ProducerConsumer* computation = s.as<ProducerConsumer>();
+    const bool runs_body =
+        computation ? !may_be_skipped(*computation) : s.as<LetStmt>() || s.as<Realize>();
+    if (runs_body && !own_parts_use(s, func))
+      return map_children(s, [&](const Stmt& body) { return acquired_late(body, func); });
     if (const Block* n = s.as<Block>()) {
       std::vector<Stmt> stmts = n->stmts;
       for (Stmt& part : stmts) {
@@ -350,11 +349,11 @@ class AsyncForker : public StatementRewriter {
     return make_block({semaphores_.acquire(func, Ready), s});
   }
 
-  static bool bounds_use(const Realize& n, const std::string& func) {
-    for (const Range& range : n.bounds) {
-      if (uses_func(range.min, func) || uses_func(range.extent, func)) return true;
-    }
-    return false;
+  static bool own_parts_use(const Stmt& s, const std::string& func) {
+    bool found = false;
+    for_each_child(
+        s, [&](const Expr& e) { found = found || uses_func(e, func); }, [](const Stmt&) {});
+    return found;
   }
 
   // ---- produced in a loop ----

@@ -11,7 +11,8 @@
 //         says about data that does not exist: the box is clamped to it, or fetched only when it
 //         lies inside, or fetched regardless, which no machine faults for.
 // Not done: boxes larger than a cache are fetched whole.
-// Source: Halide's documentation of prefetch. Tests: test/unit/prefetch_test.cpp.
+// Source: Halide's documentation of prefetch. Tests: test/golden/pipeline/insert_prefetches/,
+//         test/golden/pipeline/lower_prefetches/, test/unit/prefetch_test.cpp.
 #include "lower/loops/insert_prefetches.h"
 
 #include "ir/build.h"
@@ -161,63 +162,48 @@ class Inserter : public StatementRewriter {
   }
 };
 
-class PrefetchLowering : public StatementRewriter {
- public:
-  PrefetchLowering(const Stmt& s, const Program& program) : program_(program), fresh_(s) {}
-
- protected:
-  Stmt rewrite(const Stmt& s) override {
-    const Prefetch* n = s.as<Prefetch>();
-    return n ? lines(*n) : children(s);
-  }
-
- private:
-  const Program& program_;
-  FreshNames fresh_;
-
-  Stmt lines(const Prefetch& n) {
-    if (n.symbol.defined()) {
-      return lines(n, n.type, [&](const std::vector<Expr>& point) {
-        return call_image(n.name, n.type, point, n.symbol);
-      });
+// The first element of each line of dimension 0, and its last element.
+template <class Element>
+Stmt lines(const Prefetch& n, Type type, FreshNames& fresh, const Element& element) {
+  const int step = std::max(1, line_bytes / type.bytes());
+  std::vector<Expr> point;
+  std::vector<std::pair<std::string, Range>> loops;
+  for (size_t d = 0; d < n.bounds.size(); d++) {
+    const Range& range = n.bounds[d];
+    const std::string name = fresh(text(n.name, ".prefetch.", d));
+    const Expr at = variable(name);
+    if (d == 0) {
+      loops.push_back({name, {0, simplify((range.extent + (step - 1)) / step + 1)}});
+      point.push_back(range.min + min(at * step, max(range.extent - 1, 0)));
+    } else {
+      loops.push_back({name, range});
+      point.push_back(at);
     }
-    const LoopedFunc* f = program_.find(n.name);
-    const std::vector<Type> types = f ? f->func->types : std::vector<Type>{n.type};
-    std::vector<Stmt> stmts;
-    for (size_t i = 0; i < types.size(); i++) {
-      stmts.push_back(lines(n, types[i], [&](const std::vector<Expr>& point) {
-        return call_func(n.name, types[i], point, static_cast<int>(i),
-                         f ? SymbolRef(f->func) : SymbolRef());
-      }));
-    }
-    return make_block(std::move(stmts));
   }
+  const Expr address = call_op(Op::address_of, Handle(), {element(point)});
+  Stmt body = make_evaluate(call_op(Op::prefetch, Int(32), {address}));
+  for (const auto& [name, range] : loops)
+    body = make_for(name, range.min, range.extent, ForType::Serial, body);
+  return body;
+}
 
-  // The first element of each line of dimension 0, and its last element.
-  template <class Element>
-  Stmt lines(const Prefetch& n, Type type, const Element& element) {
-    const int step = std::max(1, line_bytes / type.bytes());
-    std::vector<Expr> point;
-    std::vector<std::pair<std::string, Range>> loops;
-    for (size_t d = 0; d < n.bounds.size(); d++) {
-      const Range& range = n.bounds[d];
-      const std::string name = fresh_(text(n.name, ".prefetch.", d));
-      const Expr at = variable(name);
-      if (d == 0) {
-        loops.push_back({name, {0, simplify((range.extent + (step - 1)) / step + 1)}});
-        point.push_back(range.min + min(at * step, max(range.extent - 1, 0)));
-      } else {
-        loops.push_back({name, range});
-        point.push_back(at);
-      }
-    }
-    const Expr address = call_op(Op::address_of, Handle(), {element(point)});
-    Stmt body = make_evaluate(call_op(Op::prefetch, Int(32), {address}));
-    for (const auto& [name, range] : loops)
-      body = make_for(name, range.min, range.extent, ForType::Serial, body);
-    return body;
+Stmt lines(const Prefetch& n, const Program& program, FreshNames& fresh) {
+  if (n.symbol.defined()) {
+    return lines(n, n.type, fresh, [&](const std::vector<Expr>& point) {
+      return call_image(n.name, n.type, point, n.symbol);
+    });
   }
-};
+  const LoopedFunc* f = program.find(n.name);
+  const std::vector<Type> types = f ? f->func->types : std::vector<Type>{n.type};
+  std::vector<Stmt> stmts;
+  for (size_t i = 0; i < types.size(); i++) {
+    stmts.push_back(lines(n, types[i], fresh, [&](const std::vector<Expr>& point) {
+      return call_func(n.name, types[i], point, static_cast<int>(i),
+                       f ? SymbolRef(f->func) : SymbolRef());
+    }));
+  }
+  return make_block(std::move(stmts));
+}
 
 bool any_prefetch(const Program& program) {
   for (const LoopedFunc& f : program.funcs) {
@@ -235,7 +221,12 @@ Stmt insert_prefetches(const Stmt& s, const Program& program) {
 }
 
 Stmt lower_prefetches(const Stmt& s, const Program& program) {
-  return any_prefetch(program) ? PrefetchLowering(s, program)(s) : s;
+  if (!any_prefetch(program)) return s;
+  FreshNames fresh(s);
+  return rewrite_statements(s, [&](const Stmt& part, auto& all) {
+    const Prefetch* n = part.as<Prefetch>();
+    return n ? lines(*n, program, fresh) : all.children(part);
+  });
 }
 
 }  // namespace retrograde::ir

@@ -12,7 +12,7 @@
 //
 // Method: one walk that counts the parallel loops around; an allocation remembers the count.
 // Errors: a require() that reads the element of a Tuple: it would leave with the lock held.
-// Source: folklore. Tests: test/unit/atomic_test.cpp.
+// Source: folklore. Tests: test/golden/lower/lower_atomics/, test/unit/atomic_test.cpp.
 #include "lower/statement_passes.h"
 
 #include <unordered_map>
@@ -45,12 +45,9 @@ bool depends_on(const Expr& e, const BufferNames& buffers, const BufferNames& le
 }
 
 bool may_leave(const Stmt& s) {
-  const auto requires_something = [](const Expr& e) {
-    const Call* call = e.as<Call>();
-    return call && call->is_op(Op::require);
-  };
-  return any_node(s, requires_something,
-                  [](const Stmt& part) { return part.kind() == Kind::Assert; });
+  return any_node(
+      s, [](const Expr& e) { return as_op(e, Op::require) != nullptr; },
+      [](const Stmt& part) { return part.kind() == Kind::Assert; });
 }
 
 // The update with everything that does not depend on the element in front of it.

@@ -14,7 +14,8 @@
 //         expression, and the region that is read. What is kept is the whole storage.
 // Errors: a memoized Func that reads an ImageParam without memoize_tag; one that is stored outside
 //         of where it is computed; a tag or eviction key that depends on Vars.
-// Source: Halide's documentation of memoize and memoize_tag. Tests: test/unit/memoize_test.cpp.
+// Source: Halide's documentation of memoize and memoize_tag. Tests: test/golden/pipeline/memoize/,
+//         test/unit/memoize_test.cpp.
 #include "lower/loops/memoize.h"
 
 #include <algorithm>
@@ -126,15 +127,11 @@ std::vector<Expr> bytes_of(const std::string& text) {
 }
 
 void check_schedule(const LoopedFunc& f) {
-  const LoopLevel &compute = f.schedule.compute_level, &store = f.schedule.store_level;
-  const bool together =
-      store.kind == LoopLevel::Kind::Inlined ||
-      (store.kind == compute.kind && store.func == compute.func && store.var == compute.var);
   if (f.is_output) {
     user_error(text("memoize ", quoted(f.name())), "an output is computed by every call",
                "it is an output of the pipeline", "Memoize a Func that the output reads");
   }
-  if (together) return;
+  if (is_stored_where_computed(f)) return;
   user_error(text("memoize ", quoted(f.name())),
              "a memoized Func must be computed whole, where its storage begins",
              "its storage level lies outside of its compute level",
@@ -165,8 +162,8 @@ class Memoizer : public Rewriter {
 
  protected:
   Expr rewrite(const Expr& e) override {
-    const Call* call = e.as<Call>();
-    return call && call->is_op(Op::memoize_tag) ? (*this)(call->args[0]) : children(e);
+    const Call* tag = as_op(e, Op::memoize_tag);
+    return tag ? (*this)(tag->args[0]) : children(e);
   }
 
   Stmt rewrite(const Stmt& s) override {

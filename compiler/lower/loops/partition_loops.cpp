@@ -250,7 +250,7 @@ class Partitioner : public StatementRewriter {
 
 Stmt partition_loops(const Stmt& s) {
   if (!s.defined() || !contains_likely(s)) return s;
-  return MarkerRemover()(Partitioner(s)(s));
+  return without_likely(Partitioner(s)(s));
 }
 
 }  // namespace retrograde::ir

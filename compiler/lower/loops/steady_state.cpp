@@ -61,12 +61,6 @@ bool is_serial(const For& loop) {
   return loop.runs == ForType::Serial || loop.runs == ForType::Parallel;
 }
 
-Expr MarkerRemover::rewrite(const Expr& e) {
-  Expr copy = children(e);
-  const Call* call = copy.as<Call>();
-  return is_likely(call) ? call->args[0] : copy;
-}
-
 void PartitionContext::add_let(const std::string& name, const Expr& value) {
   if (is_pure(value)) {
     lets_[name] = expand(value);

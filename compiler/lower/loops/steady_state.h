@@ -8,19 +8,13 @@
 
 #include "analysis/interval.h"
 #include "ir/expr.h"
+#include "ir/markers.h"
 #include "ir/visit.h"
 
 namespace retrograde::ir {
 
 bool is_likely(const Call* call);
 bool is_serial(const For& loop);  // or parallel: it runs one iteration after the other
-
-// Takes the likely markers away.
-class MarkerRemover : public Rewriter {
- protected:
-  Expr rewrite(const Expr& e) override;
-  Stmt rewrite(const Stmt& s) override { return children(s); }
-};
 
 // Names whose values a solution may not mention: what a let stands for, and between what a loop
 // variable lies.
@@ -30,7 +24,7 @@ class PartitionContext {
   void add_range(const std::string& name, const Interval& range) { ranges_.push(name, range); }
   void add_loop(const For& loop);
   // Without lets and markers.
-  Expr expand(const Expr& e) const { return MarkerRemover()(substitute(e, lets_)); }
+  Expr expand(const Expr& e) const { return without_likely(substitute(e, lets_)); }
   const Scope<Interval>& ranges() const { return ranges_; }
 
  private:

@@ -389,8 +389,8 @@ class Checks {
 
 bool is_check_by_runtime(const Stmt& s) {
   const auto* let = s.as<LetStmt>();
-  const auto* call = let ? let->value.as<Call>() : nullptr;
-  if (!call || !call->is_op(Op::runtime_call) || !let->body.as<Assert>()) return false;
+  const auto* call = let ? as_op(let->value, Op::runtime_call) : nullptr;
+  if (!call || !let->body.as<Assert>()) return false;
   const std::string& function = call->args[0].as<StringImm>()->value;
   return function == check_shape || function == check_region;
 }

@@ -93,8 +93,7 @@ Emitted NestEmitter::emit_children(const std::vector<int>& children, Emitted cod
   range_over_loops(code);
   ComputePlace site({loops.begin() + i, loops.end()});
   code = emit_place(children, std::move(code), site);
-  for (auto it = site.bindings.rbegin(); it != site.bindings.rend(); ++it)
-    code.stmt = make_let(it->first, it->second, code.stmt);
+  code.stmt = make_lets(site.bindings, code.stmt);
   if (site.has_names()) map_boxes(code, [&](const Box& box) { return site.whole(box); });
   return code;
 }

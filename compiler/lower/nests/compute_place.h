@@ -8,23 +8,21 @@
 #pragma once
 
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "analysis/interval.h"
+#include "ir/build.h"
 #include "ir/visit.h"
 #include "lower/nests/sliding_window.h"
 
 namespace retrograde::ir {
-
-using Bindings = std::vector<std::pair<std::string, Expr>>;
 
 class ComputePlace {
  public:
   explicit ComputePlace(std::vector<Loop> around) : around(std::move(around)) {}
 
   const std::vector<Loop> around;  // loops of the consumer, innermost first; none at root
-  Bindings bindings;               // to be bound around the site, each may use those before it
+  Lets bindings;                   // to be bound around the site, each may use those before it
 
   // Gives the range a name where it is no name or constant yet, and the range in terms of it.
   Range bind(const std::string& name, Interval& range);

@@ -50,10 +50,8 @@ Stmt emit_definition(const LoopedFunc& f, int stage, const StageNest& nest) {
 
   SharedLets shared = introduce_lets(exprs);
   auto args_begin = shared.values.begin() + definition.values.size();
-  Stmt stmt = make_provide(f.name(), {shared.values.begin(), args_begin},
-                           {args_begin, shared.values.end()});
-  for (auto it = shared.lets.rbegin(); it != shared.lets.rend(); ++it)
-    stmt = make_let(it->first, it->second, stmt);
+  Stmt stmt = make_lets(shared.lets, make_provide(f.name(), {shared.values.begin(), args_begin},
+                                                  {args_begin, shared.values.end()}));
   if (definition.schedule.atomic) stmt = make_atomic(f.name(), stmt);
 
   if (definition.predicate.defined())

@@ -102,9 +102,7 @@ class Emitter {
                  text("the storage of ", quoted(f.name()), " is folded over ", quoted(rule.var)),
                  "Leave fold_storage out");
     }
-    const LoopLevel &compute = f.schedule.compute_level, &store = f.schedule.store_level;
-    const bool together = store.kind == LoopLevel::Kind::Inlined || store == compute;
-    if (together || f.is_output) return;
+    if (is_stored_where_computed(f) || f.is_output) return;
     unsupported(asked, "what a C function reads or writes is stored where it is computed",
                 text(quoted(f.name()), " is stored outside of its compute level"),
                 "Leave store_at and store_root out");

@@ -42,10 +42,9 @@ const Dim& loop_at(const StageLoops& schedule, int depth) {
 }
 
 std::string loops_text(const StageLoops& schedule) {
-  std::string names;
-  for (auto it = schedule.dims.rbegin(); it != schedule.dims.rend(); ++it)
-    names += (names.empty() ? "" : ", ") + quoted(it->var);
-  return names.empty() ? "none" : names;
+  if (schedule.dims.empty()) return "none";
+  const std::vector<Dim> outermost_first(schedule.dims.rbegin(), schedule.dims.rend());
+  return listed(outermost_first, [](const Dim& dim) { return quoted(dim.var); });
 }
 
 class JoiningCheck {
@@ -309,10 +308,9 @@ void check_group(const Program& program, const FusedGroup& group) {
 
 void check_order_of_stages(const Program& program, const std::vector<FusedStage>& stages) {
   const FusedStage& first = stages.front();
-  std::string names;
-  for (const FusedStage& stage : stages)
-    names += (names.empty() ? "" : ", ") +
-             quoted(stage_name(*program.funcs[stage.func].func, stage.stage));
+  const std::string names = listed(stages, [&](const FusedStage& stage) {
+    return quoted(stage_name(*program.funcs[stage.func].func, stage.stage));
+  });
   const FusedStage& last = stages.back();
   user_error(text("compute ", quoted(stage_name(*program.funcs[last.func].func, last.stage)),
                   " with ", quoted(stage_name(*program.funcs[first.func].func, first.stage))),

@@ -19,13 +19,21 @@ std::string value_buffer_name(const FuncContents& f, int index) {
   return f.types.size() == 1 ? f.name : f.name + "." + std::to_string(index);
 }
 
+static bool is_given(const LoopLevel& level) { return level.kind != LoopLevel::Kind::Inlined; }
+static bool is_same_loop(const LoopLevel& a, const LoopLevel& b) {
+  return a.kind == b.kind && a.func == b.func && a.var == b.var;
+}
+
+bool is_stored_where_computed(const LoopedFunc& f) {
+  const LoopLevel& store = f.schedule.store_level;
+  return !is_given(store) || is_same_loop(store, f.schedule.compute_level);
+}
+
 bool is_hoisted(const LoopedFunc& f) {
-  const LoopLevel& hoist = f.schedule.hoist_level;
-  const LoopLevel& store = f.schedule.store_level.kind == LoopLevel::Kind::Inlined
-                               ? f.schedule.compute_level
-                               : f.schedule.store_level;
-  if (f.is_output || hoist.kind == LoopLevel::Kind::Inlined) return false;
-  return hoist.kind != store.kind || hoist.func != store.func || hoist.var != store.var;
+  const FuncPlacement& at = f.schedule;
+  return !f.is_output && is_given(at.hoist_level) &&
+         !is_same_loop(at.hoist_level,
+                       is_given(at.store_level) ? at.store_level : at.compute_level);
 }
 
 std::string place_name(const std::string& func) { return func + ".place"; }
@@ -42,30 +50,12 @@ struct InlinedFunc {
 };
 using InlinedFuncs = std::unordered_map<const Symbol*, InlinedFunc>;
 
-class Inliner : public Rewriter {
- public:
-  explicit Inliner(const InlinedFuncs& inlined) : inlined_(inlined) {}
-
- protected:
-  using Rewriter::rewrite;
-  Expr rewrite(const Expr& e) override {
-    Expr result = children(e);
-    const Call* call = result.as<Call>();
-    if (!call || call->call_type != CallType::Func) return result;
-    auto it = inlined_.find(call->symbol.raw());
-    return it == inlined_.end() ? result : value_at(it->second, *call);
-  }
-
- private:
-  static Expr value_at(const InlinedFunc& f, const Call& call) {
-    RETROGRADE_ASSERT(call.args.size() == f.args.size(), "call with a wrong number of arguments");
-    Substitution at_point;
-    for (size_t i = 0; i < f.args.size(); i++) at_point[f.args[i]] = call.args[i];
-    return substitute(f.values[call.component], at_point);
-  }
-
-  const InlinedFuncs& inlined_;
-};
+Expr value_at(const InlinedFunc& f, const std::vector<Expr>& args, int component) {
+  RETROGRADE_ASSERT(args.size() == f.args.size(), "call with a wrong number of arguments");
+  Substitution at_point;
+  for (size_t i = 0; i < f.args.size(); i++) at_point[f.args[i]] = args[i];
+  return substitute(f.values[component], at_point);
+}
 
 bool is_inlined(const FuncContents& f, const FuncPlacement& schedule, bool is_output) {
   return !is_output && f.is_pure() && schedule.compute_level.kind == LoopLevel::Kind::Inlined;
@@ -100,7 +90,14 @@ Program inline_functions(const std::vector<FuncPtr>& unwrapped) {
   const std::vector<FuncPtr> outputs = apply_wrappers(unwrapped);
   Program program;
   InlinedFuncs inlined;
-  Inliner inliner(inlined);
+  StepRewriter inliner([&](const Expr& e, const auto& recurse) -> Expr {
+    const Call* call = e.as<Call>();
+    if (!call || call->call_type != CallType::Func) return {};
+    const Expr mapped = map_children(e, recurse);
+    const auto it = inlined.find(call->symbol.raw());
+    return it == inlined.end() ? mapped
+                               : value_at(it->second, mapped.as<Call>()->args, call->component);
+  });
   InlinedSizes sizes;
   for (const FuncPtr& f : topological_order(outputs)) {
     bool is_output = std::find(outputs.begin(), outputs.end(), f) != outputs.end();

@@ -16,40 +16,32 @@ const std::string& current(const Renamings& renamings, const std::string& name) 
   return it == renamings.end() ? name : it->second;
 }
 
-// Uses of renamed variables and Funcs in one expression.
-class UseRenamer : public Rewriter {
- public:
-  explicit UseRenamer(const Renamings& renamings) : renamings_(renamings) {}
+// "f.stride.1" of a Func that is "f.$1" here.
+std::string renamed_fact(const Renamings& renamings, const std::string& name) {
+  for (const char* fact : {".stride.", ".min.", ".extent."}) {
+    const size_t at = name.rfind(fact);
+    if (at == std::string::npos) continue;
+    const auto it = renamings.find(name.substr(0, at));
+    if (it != renamings.end()) return it->second + name.substr(at);
+  }
+  return {};
+}
 
- protected:
-  using Rewriter::rewrite;
-  Expr rewrite(const Expr& e) override {
+// Uses of renamed variables and Funcs.
+Expr with_uses_renamed(const Expr& root, const Renamings& renamings) {
+  return rewrite(root, [&](const Expr& e, const auto& recurse) -> Expr {
     if (const Variable* v = e.as<Variable>()) {
-      if (renamings_.count(v->name)) return variable(renamings_.at(v->name), v->type, v->symbol);
-      const std::string fact = renamed_fact(v->name);
+      if (renamings.count(v->name)) return variable(renamings.at(v->name), v->type, v->symbol);
+      const std::string fact = renamed_fact(renamings, v->name);
       return fact.empty() ? e : variable(fact, v->type, v->symbol);
     }
-    Expr result = children(e);
-    const Call* call = result.as<Call>();
-    if (!call || call->call_type != CallType::Func || !renamings_.count(call->name)) return result;
-    return call_func(renamings_.at(call->name), call->type, call->args, call->component,
+    const Call* call = e.as<Call>();
+    if (!call || call->call_type != CallType::Func || !renamings.count(call->name)) return {};
+    const Expr mapped = map_children(e, recurse);
+    return call_func(renamings.at(call->name), call->type, mapped.as<Call>()->args, call->component,
                      call->symbol);
-  }
-
- private:
-  // "f.stride.1" of a Func that is "f.$1" here.
-  std::string renamed_fact(const std::string& name) const {
-    for (const char* fact : {".stride.", ".min.", ".extent."}) {
-      const size_t at = name.rfind(fact);
-      if (at == std::string::npos) continue;
-      const auto it = renamings_.find(name.substr(0, at));
-      if (it != renamings_.end()) return it->second + name.substr(at);
-    }
-    return {};
-  }
-
-  const Renamings& renamings_;
-};
+  });
+}
 
 class Uniquifier {
  public:
@@ -111,7 +103,7 @@ class Uniquifier {
   };
 
   Expr rename(const Expr& e) {
-    return e.defined() && !renamings_.empty() ? UseRenamer(renamings_)(e) : e;
+    return e.defined() && !renamings_.empty() ? with_uses_renamed(e, renamings_) : e;
   }
 };
 

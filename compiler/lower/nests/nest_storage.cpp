@@ -10,13 +10,6 @@
 
 namespace retrograde::ir {
 
-bool is_stored_where_computed(const LoopedFunc& f) {
-  const LoopLevel& compute = f.schedule.compute_level;
-  const LoopLevel& store = f.schedule.store_level;
-  if (store.kind == LoopLevel::Kind::Inlined) return true;
-  return store.kind == compute.kind && store.func == compute.func && store.var == compute.var;
-}
-
 namespace {
 
 // Whether a directive that names a loop of a Func, in any of its stages, means this one.

@@ -14,7 +14,6 @@
 
 namespace retrograde::ir {
 
-bool is_stored_where_computed(const LoopedFunc& f);
 // Loops between the site and the storage of f, innermost first.
 std::vector<Loop> loops_to_storage(const LoopedFunc& f, const ComputePlace& site);
 

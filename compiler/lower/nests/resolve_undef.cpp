@@ -12,11 +12,6 @@
 
 namespace retrograde::ir {
 
-bool is_undef(const Expr& e) {
-  const Call* call = e.as<Call>();
-  return call && call->is_op(Op::undef);
-}
-
 namespace {
 
 bool mentions_undef(const Expr& e) {
@@ -49,8 +44,8 @@ struct Choice {
 std::optional<Choice> as_choice(const Expr& e) {
   if (const Select* s = e.as<Select>())
     return Choice{s->condition, s->when_true, s->when_false, false};
-  const Call* call = e.as<Call>();
-  if (!call || !call->is_op(Op::if_then_else)) return std::nullopt;
+  const Call* call = as_op(e, Op::if_then_else);
+  if (!call) return std::nullopt;
   return Choice{call->args[0], call->args[1], call->args[2], true};
 }
 
@@ -97,12 +92,12 @@ class WhereDefined {
 
 // An equal value where it is defined; what is never defined is never chosen.
 Expr without_undef(const Expr& value, WhereDefined& where_defined) {
-  return rewrite(value, [&](const Expr& e, const std::function<Expr(const Expr&)>& recurse) {
+  return rewrite(value, [&](const Expr& e, const auto& recurse) -> Expr {
     if (auto choice = as_choice(e)) {
       if (is_const_false(where_defined(choice->if_false))) return recurse(choice->if_true);
       if (is_const_false(where_defined(choice->if_true))) return recurse(choice->if_false);
     }
-    return map_children(e, recurse);
+    return {};
   });
 }
 

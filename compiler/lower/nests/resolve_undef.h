@@ -11,9 +11,6 @@
 
 namespace retrograde::ir {
 
-// undef() itself.
-bool is_undef(const Expr& e);
-
 void resolve_undef(Program& program);
 
 }  // namespace retrograde::ir

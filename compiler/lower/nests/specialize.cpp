@@ -37,34 +37,22 @@ void take_apart(const Expr& condition, bool value, std::vector<Known>& known,
   }
 }
 
-class Assuming : public Rewriter {
- public:
-  Assuming(const Expr& condition, bool value) { take_apart(condition, value, known_, constants_); }
-  Expr under(const Expr& e) { return e.defined() ? simplify((*this)(e)) : e; }
-
- protected:
-  using Rewriter::rewrite;
-  Expr rewrite(const Expr& e) override {
-    if (const Variable* v = e.as<Variable>()) {
-      auto it = constants_.find(v->name);
-      if (it != constants_.end()) return it->second;
-    }
-    if (e.type().is_bool() && e.type().is_scalar()) {
-      for (const Known& known : known_) {
-        if (equal(e, known.condition)) return Expr(known.value);
-      }
-    }
-    return children(e);
-  }
-
- private:
-  std::vector<Known> known_;
-  Substitution constants_;
-};
-
 Definition assuming(const Definition& definition, const Expr& condition, bool value) {
-  Assuming assuming(condition, value);
-  Definition result = map_exprs(definition, [&](const Expr& e) { return assuming.under(e); });
+  std::vector<Known> known;
+  Substitution constants;
+  take_apart(condition, value, known, constants);
+  StepRewriter under([&](const Expr& e, const auto&) -> Expr {
+    if (const Variable* v = e.as<Variable>()) {
+      if (const auto it = constants.find(v->name); it != constants.end()) return it->second;
+    }
+    if (!e.type().is_bool() || !e.type().is_scalar()) return {};
+    for (const Known& fact : known) {
+      if (equal(e, fact.condition)) return Expr(fact.value);
+    }
+    return {};
+  });
+  Definition result =
+      map_exprs(definition, [&](const Expr& e) { return e.defined() ? simplify(under(e)) : e; });
   if (is_const_true(result.predicate.defined() ? result.predicate : const_false()))
     result.predicate = Expr();
   return result;

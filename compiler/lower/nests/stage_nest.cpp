@@ -5,7 +5,7 @@
 #include "diagnostics/error.h"
 #include "ir/build.h"
 #include "ir/visit.h"
-#include "lower/nests/nest_storage.h"
+#include "lower/program.h"
 #include "simplify/simplify.h"
 
 namespace retrograde::ir {
@@ -151,18 +151,19 @@ class NestBuilder {
          {split.inner, inner_value, inner_value, {}, Fused{split.old_var, outer, inner, false}}});
   }
 
+  Interval reached(const std::string& var, const Substitution& guarded) const {
+    Scope<Interval> loops;
+    for (const Dim& dim : definition_.schedule.dims)
+      loops.push(prefix_ + dim.var, loop_of(dim).range());
+    return bounds_of(substitute(loop_variable(var), guarded), loops);
+  }
+
   // Interval arithmetic does not know that a part begins inside the range, when outer and inner
   // variable stay inside theirs. So what the part needs of others begins where it does: at a
   // multiple of the factor. (A variable that is split again, and shifted inwards, may begin before
   // its range.)
   Expr within_tail(const Tail& tail, const Expr& value, const Substitution& guarded) const {
-    Scope<Interval> loops;
-    for (const Dim& dim : definition_.schedule.dims)
-      loops.push(prefix_ + dim.var, loop_of(dim).range());
-    const auto reached = [&](const std::string& var) {
-      return bounds_of(substitute(loop_variable(var), guarded), loops);
-    };
-    const Interval outer = reached(tail.outer), inner = reached(tail.inner);
+    const Interval outer = reached(tail.outer, guarded), inner = reached(tail.inner, guarded);
     if (!outer.is_bounded() || !inner.is_bounded()) return value;
     if (!can_prove(outer.max < tail.outer_extent) || !can_prove(inner.min >= 0)) return value;
     return call_op(Op::promise_clamped, Int(32),
@@ -173,10 +174,7 @@ class NestBuilder {
   // stays inside its range recovers variables that stay inside theirs; one that a tail takes
   // outside does so in proportion.
   Expr within_fused_range(const Fused& from, const Expr& value, const Substitution& guarded) const {
-    Scope<Interval> loops;
-    for (const Dim& dim : definition_.schedule.dims)
-      loops.push(prefix_ + dim.var, loop_of(dim).range());
-    Interval fused = bounds_of(substitute(loop_variable(from.fused), guarded), loops);
+    const Interval fused = reached(from.fused, guarded);
     const Range& own = from.is_outer ? from.outer : from.inner;
     Expr first = own.min, last = own.min + own.extent - 1;
     if (from.is_outer && fused.is_bounded()) {

@@ -17,12 +17,11 @@
 #include "lower/statement_passes.h"
 
 #include <map>
-#include <optional>
 #include <unordered_map>
 
 #include "ir/build.h"
 #include "ir/visit.h"
-#include "simplify/simplify.h"
+#include "lower/vectors/strided_loads.h"
 
 namespace retrograde::ir {
 
@@ -30,53 +29,13 @@ namespace {
 
 constexpr int max_stride = 4;
 
-struct StridedLoad {
-  Expr load;
-  Expr base;
-  int64_t stride;
-  int64_t offset = 0;  // from the base of its family
-};
-
-std::optional<StridedLoad> as_strided(const Expr& e) {
-  const auto* load = e.as<Load>();
-  const auto* ramp = load && !load->predicate.defined() ? load->index.as<Ramp>() : nullptr;
-  if (!ramp || !ramp->base.type().is_scalar()) return std::nullopt;
-  const auto stride = as_const_int(ramp->stride);
-  if (!stride || *stride < 2 || *stride > max_stride) return std::nullopt;
-  return StridedLoad{e, ramp->base, *stride};
-}
-
-// Loads of one buffer with one stride and number of lanes, at constant distances.
-struct StridedFamily {
-  std::string buffer;
-  Type type;
-  std::vector<StridedLoad> loads;
-
-  bool takes(StridedLoad& load) const {
-    const auto* node = load.load.as<Load>();
-    if (node->name != buffer || node->type != type || load.stride != loads[0].stride) return false;
-    const auto offset = as_const_int(simplify(binary(Kind::Sub, load.base, loads[0].base)));
-    if (!offset) return false;
-    load.offset = *offset;
-    return true;
-  }
-};
-
 // What every execution of the statement evaluates.
 std::vector<StridedFamily> find_families(const Stmt& s) {
   std::vector<StridedFamily> families;
   const auto visit = [&](const Expr& e) {
-    const auto* call = e.as<Call>();
-    if (auto load = as_strided(e)) {
-      bool is_taken = false;
-      for (StridedFamily& family : families) {
-        if (is_taken) break;
-        is_taken = family.takes(*load);
-        if (is_taken) family.loads.push_back(*load);
-      }
-      if (!is_taken) families.push_back({load->load.as<Load>()->name, load->load.type(), {*load}});
-    }
-    return !call || !call->is_op(Op::if_then_else);
+    const auto load = as_strided(e);
+    if (load && load->stride >= 2 && load->stride <= max_stride) add_to_family(*load, families);
+    return !as_op(e, Op::if_then_else);
   };
   for_each_child(
       s, [&](const Expr& e) { walk(e, visit); }, [](const Stmt&) {});
@@ -100,9 +59,9 @@ class LoadSharer : public Rewriter {
 
  private:
   void share(const StridedFamily& family) {
-    const int64_t stride = family.loads[0].stride, lanes = family.type.lanes();
+    const int64_t stride = family[0].stride, lanes = family[0].load.type().lanes();
     std::map<int64_t, const StridedLoad*> by_offset;
-    for (const StridedLoad& load : family.loads) by_offset.emplace(load.offset, &load);
+    for (const StridedLoad& load : family) by_offset.emplace(load.offset, &load);
     const int64_t lowest = by_offset.begin()->first;
     const int64_t last = by_offset.rbegin()->first + stride * (lanes - 1);
     std::map<int64_t, std::vector<const StridedLoad*>> groups;  // by start
@@ -112,7 +71,7 @@ class LoadSharer : public Rewriter {
     for (const auto& [start, members] : groups) {
       if (members.size() < 2 || start + stride * lanes - 1 > last) continue;
       const std::vector<Expr> whole = dense_loads(*by_offset.begin()->second, start - lowest);
-      for (const StridedLoad& load : family.loads) {
+      for (const StridedLoad& load : family) {
         const int64_t first = load.offset - start;
         if (first >= 0 && first < stride) replacements_[load.load.get()] = pick(whole, load, first);
       }
@@ -121,14 +80,14 @@ class LoadSharer : public Rewriter {
 
   // The stride * lanes elements from `distance` after the first of `lowest`.
   static std::vector<Expr> dense_loads(const StridedLoad& lowest, int64_t distance) {
-    const auto* node = lowest.load.as<Load>();
-    const int lanes = node->type.lanes();
+    const Load& node = lowest.node();
+    const int lanes = node.type.lanes();
     std::vector<Expr> result;
     for (int64_t i = 0; i < lowest.stride; ++i) {
       const Type type = lowest.base.type();
       const Expr base = binary(Kind::Add, lowest.base, make_const(type, distance + i * lanes));
       const Expr index = make_ramp(base, make_one(type), lanes);
-      result.push_back(make_load(node->type, node->name, index, {}, node->symbol));
+      result.push_back(make_load(node.type, node.name, index, {}, node.symbol));
     }
     return result;
   }

@@ -46,13 +46,6 @@ constexpr int max_pattern_period = 8;
 // transpose, in four steps of shuffles instead of 256 elements.
 constexpr int max_store_period = 16;
 
-Expr interleave(const std::vector<Expr>& parts) {
-  const int period = static_cast<int>(parts.size()), lanes = parts[0].type().lanes();
-  std::vector<int> indices;
-  for (int i = 0; i < lanes * period; ++i) indices.push_back(i % period * lanes + i / period);
-  return make_shuffle(parts, std::move(indices));
-}
-
 // How an expression behaves when only every k-th of its lanes is wanted.
 struct Pattern {
   enum Kind { Any, Periodic, Whole } kind = Any;  // Whole: splitting it costs more than it saves
@@ -289,7 +282,8 @@ class Interleaver : public Rewriter {
   Expr rewrite(const Expr& e) override {
     if (e.type().is_scalar() && is_const(e)) return e;
     const Pattern p = splitter_.pattern(e);
-    if (p.kind == Pattern::Periodic && p.has_load) return interleave(splitter_.parts(e, p.period));
+    if (p.kind == Pattern::Periodic && p.has_load)
+      return make_interleaved(splitter_.parts(e, p.period));
     return children(e);
   }
 
@@ -318,7 +312,7 @@ class Interleaver : public Rewriter {
       variables.push_back(variable(parts.back().first, value.type()));
     }
     splitter_.bind(n.name, variables);
-    return make_lets(parts, make_let(n.name, interleave(variables), (*this)(n.body)));
+    return make_lets(parts, make_let(n.name, make_interleaved(variables), (*this)(n.body)));
   }
 
   // ---- stores ----
@@ -411,7 +405,7 @@ class Interleaver : public Rewriter {
     }
     const int lanes = values[0].type().lanes() * static_cast<int>(count);
     const Expr index = make_ramp(base, make_one(base.type()), lanes);
-    return make_lets(group.lets, make_store(group.buffer, interleave(values), index, {},
+    return make_lets(group.lets, make_store(group.buffer, make_interleaved(values), index, {},
                                             group.stores[0]->symbol));
   }
 

@@ -1,8 +1,6 @@
 // Minus zero is the identity of floating-point sums: 0 + -0 is 0, and -0 + -0 is -0.
 #include "lower/vectors/reductions.h"
 
-#include <limits>
-
 #include "diagnostics/error.h"
 #include "ir/build.h"
 
@@ -10,28 +8,14 @@ namespace retrograde::ir {
 
 namespace {
 
-Expr infinity(Type type, int sign) {
-  return make_const(type, sign * std::numeric_limits<double>::infinity());
-}
-
-Expr largest(Type type) {
-  if (type.is_float()) return infinity(type, 1);
-  return type.is_int() ? make_const(type, type.max_int()) : make_uint_const(type, type.max_uint());
-}
-
-Expr smallest(Type type) {
-  if (type.is_float()) return infinity(type, -1);
-  return type.is_int() ? make_const(type, type.min_int()) : make_zero(type);
-}
-
 Expr scalar_identity(Kind op, Type type) {
   switch (op) {
     case Kind::Add:
       return type.is_float() ? make_const(type, -0.0) : make_zero(type);
     case Kind::Min:
-      return largest(type);
+      return type.max();
     case Kind::Max:
-      return smallest(type);
+      return type.min();
     case Kind::Or:
       return make_zero(type);
     case Kind::Mul:

@@ -17,7 +17,6 @@
 
 #include <map>
 #include <numeric>
-#include <optional>
 #include <unordered_map>
 #include <unordered_set>
 
@@ -26,7 +25,7 @@
 #include "ir/visit.h"
 #include "lower/nests/copy_statement.h"
 #include "lower/statement_rewriter.h"
-#include "simplify/simplify.h"
+#include "lower/vectors/strided_loads.h"
 
 namespace retrograde::ir {
 
@@ -37,32 +36,12 @@ constexpr size_t min_columns = 4, max_columns = 16;
 
 bool is_power_of_two(int64_t n) { return n > 0 && (n & (n - 1)) == 0; }
 
-struct Column {
-  Expr load;
-  Expr base;  // with the lets around the store substituted
-};
-
-// Loads of one buffer with one stride and number of lanes, by their distance from the first.
-struct Family {
-  const Load* first;
-  int64_t stride;
-  Expr base;
-  std::map<int64_t, std::vector<Expr>> columns;
-};
-
 // Stores one after the other, with the lets around each.
 struct Run {
   std::vector<Stmt> stmts;
-  std::vector<Column> columns;
+  std::vector<StridedLoad> columns;  // with the lets around the store substituted in their bases
   std::unordered_set<std::string> stored;
 };
-
-std::optional<int64_t> stride_of(const Load& load) {
-  const auto* ramp = load.predicate.defined() ? nullptr : load.index.as<Ramp>();
-  if (!ramp || !ramp->base.type().is_scalar() || !is_power_of_two(ramp->lanes)) return std::nullopt;
-  const auto stride = as_const_int(ramp->stride);
-  return stride && *stride >= min_stride ? stride : std::nullopt;
-}
 
 // Adds the statement to the run, unless it is no store.
 bool joins(Run& run, const Stmt& s) {
@@ -85,49 +64,26 @@ bool joins(Run& run, const Stmt& s) {
   run.stmts.push_back(s);
   run.stored.insert(store->name);
   walk(store->value, [&](const Expr& e) {
-    const auto* load = e.as<Load>();
-    if (load && stride_of(*load)) {
-      const Expr base = substitute(load->index.as<Ramp>()->base, lets);
-      if (!reads_memory(base, MemoryReads::Calls) && !uses_any_variable(base, inside))
-        run.columns.push_back({e, base});
+    auto load = as_strided(e);
+    if (load && load->stride >= min_stride && is_power_of_two(e.type().lanes())) {
+      load->base = substitute(load->base, lets);
+      if (!reads_memory(load->base, MemoryReads::Calls) && !uses_any_variable(load->base, inside))
+        run.columns.push_back(*load);
     }
-    const auto* call = e.as<Call>();
-    return e.kind() != Kind::Let && !(call && call->is_op(Op::if_then_else));
+    return e.kind() != Kind::Let && !as_op(e, Op::if_then_else);
   });
   return true;
 }
 
-std::vector<Family> find_families(const Run& run) {
-  std::vector<Family> families;
-  const auto join = [](Family& family, const Load& load, const Column& column) {
-    const bool is_alike = family.first->name == load.name && family.first->type == load.type &&
-                          family.stride == stride_of(load);
-    if (!is_alike) return false;
-    const auto distance = as_const_int(simplify(binary(Kind::Sub, column.base, family.base)));
-    if (distance) family.columns[*distance].push_back(column.load);
-    return distance.has_value();
-  };
-  for (const Column& column : run.columns) {
-    const auto* load = column.load.as<Load>();
-    if (run.stored.count(load->name)) continue;
-    bool is_taken = false;
-    for (size_t i = 0; i < families.size() && !is_taken; ++i)
-      is_taken = join(families[i], *load, column);
-    if (!is_taken) families.push_back({load, *stride_of(*load), column.base, {{0, {column.load}}}});
+std::vector<StridedFamily> find_families(const Run& run) {
+  std::vector<StridedFamily> families;
+  for (const StridedLoad& column : run.columns) {
+    if (!run.stored.count(column.node().name)) add_to_family(column, families);
   }
   return families;
 }
 
-class Replacer : public Rewriter {
- public:
-  std::unordered_map<const ExprNode*, Expr> replacements;
-
- protected:
-  Expr rewrite(const Expr& e) override {
-    const auto found = replacements.find(e.get());
-    return found == replacements.end() ? children(e) : found->second;
-  }
-};
+using Replacements = std::unordered_map<const ExprNode*, Expr>;
 
 class Transposer : public StatementRewriter {
  public:
@@ -151,54 +107,59 @@ class Transposer : public StatementRewriter {
   }
 
  private:
+  using Columns = std::map<int64_t, std::vector<Expr>>;  // by their distance from the first
+
   Stmt transposed(const Run& run) {
     Lets blocks;
-    Replacer replacer;
-    for (const Family& family : find_families(run)) add_blocks(family, blocks, replacer);
+    Replacements replacements;
+    for (const StridedFamily& family : find_families(run)) add_blocks(family, blocks, replacements);
     const Stmt stores = make_block(run.stmts);
-    return blocks.empty() ? stores : make_lets(blocks, replacer(stores));
+    if (blocks.empty()) return stores;
+    return make_lets(blocks, ir::rewrite(stores, [&](const Expr& e, const auto&) {
+                       const auto found = replacements.find(e.get());
+                       return found == replacements.end() ? Expr() : found->second;
+                     }));
   }
 
   // Columns side by side, taken from the left in powers of two.
-  void add_blocks(const Family& family, Lets& blocks, Replacer& replacer) {
-    auto at = family.columns.begin();
-    while (at != family.columns.end()) {
+  void add_blocks(const StridedFamily& family, Lets& blocks, Replacements& replacements) {
+    Columns columns;
+    for (const StridedLoad& load : family) columns[load.offset].push_back(load.load);
+    auto at = columns.begin();
+    while (at != columns.end()) {
       size_t count = 1;
       auto end = std::next(at);
-      while (end != family.columns.end() && count < max_columns &&
+      while (end != columns.end() && count < max_columns &&
              end->first == at->first + static_cast<int64_t>(count)) {
         ++count;
         ++end;
       }
       while (!is_power_of_two(static_cast<int64_t>(count))) --count;
-      if (count >= min_columns) add_block(family, at->first, count, blocks, replacer);
+      if (count >= min_columns) add_block(family[0], columns, at, count, blocks, replacements);
       std::advance(at, count);
     }
   }
 
-  void add_block(const Family& family, int64_t first, size_t count, Lets& blocks,
-                 Replacer& replacer) {
-    const Load& model = *family.first;
+  void add_block(const StridedLoad& family, const Columns& columns, Columns::const_iterator first,
+                 size_t count, Lets& blocks, Replacements& replacements) {
+    const Load& model = family.node();
     const int height = model.type.lanes(), width = static_cast<int>(count);
     const Type index_type = family.base.type();
     std::vector<Expr> rows;
     for (int row = 0; row < height; ++row) {
-      const Expr base =
-          binary(Kind::Add, family.base, make_const(index_type, first + row * family.stride));
+      const Expr base = binary(Kind::Add, family.base,
+                               make_const(index_type, first->first + row * family.stride));
       rows.push_back(make_load(model.type.with_lanes(width), model.name,
                                make_ramp(base, make_one(index_type), width), {}, model.symbol));
     }
-    std::vector<int> order;
-    for (int i = 0; i < width * height; ++i) order.push_back(i % height * width + i / height);
-    const Expr block = make_shuffle(std::move(rows), std::move(order));
+    const Expr block = make_interleaved(rows);
     blocks.emplace_back(fresh_(model.name + ".block"), block);
     const Expr whole = variable(blocks.back().first, block.type());
     for (int column = 0; column < width; ++column) {
       std::vector<int> lanes(static_cast<size_t>(height));
       std::iota(lanes.begin(), lanes.end(), column * height);
       const Expr part = make_shuffle({whole}, std::move(lanes));
-      for (const Expr& load : family.columns.at(first + column))
-        replacer.replacements[load.get()] = part;
+      for (const Expr& load : columns.at(first->first + column)) replacements[load.get()] = part;
     }
   }
 

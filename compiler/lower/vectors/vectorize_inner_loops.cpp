@@ -233,49 +233,39 @@ class BodyCheck {
   bool has_form_ = false;
 };
 
-class InnerVectorizer : public StatementRewriter {
- public:
-  InnerVectorizer(const Stmt& s, const InnerLoops& loops) : fresh_(s), loops_(loops) {}
-
- protected:
-  Stmt rewrite(const Stmt& s) override {
-    const auto* loop = s.as<For>();
-    if (!loop) return children(s);
-    if (loop->runs == ForType::Vectorized) return s;
-    if (loop->runs != ForType::Serial || !loops_.is_independent(*loop)) return children(s);
-    const int lanes = BodyCheck(*loop).lanes(loops_.vector_bytes);
-    const auto extent = as_const_int(loop->extent);
-    const bool pays = lanes > 1 && (!extent || *extent >= lanes);
-    return pays ? in_vectors(*loop, lanes) : children(s);
-  }
-
- private:
-  Stmt in_vectors(const For& loop, int lanes) {
-    const Type type = loop.min.type();
-    const auto constant = [&](int64_t n) { return make_const(type, n); };
-    const Expr count =
-        simplify(binary(Kind::Div, max(loop.extent, make_zero(type)), constant(lanes)));
-    const std::string counter = fresh_(loop.name), count_name = fresh_(loop.name + ".vectors");
-    const Expr vectors = is_const(count) ? count : variable(count_name, type);
-    const auto lanes_of = [&](const Expr& n) { return binary(Kind::Mul, n, constant(lanes)); };
-    const Expr first = binary(Kind::Add, loop.min, lanes_of(variable(counter, type)));
-    const Stmt vector = make_for(loop.name, first, constant(lanes), ForType::Vectorized, loop.body);
-    const Stmt whole = make_for(counter, make_zero(type), vectors, ForType::Serial, vector);
-    const Expr done = lanes_of(vectors), left = simplify(binary(Kind::Sub, loop.extent, done));
-    const Stmt tail = make_for(loop.name, simplify(binary(Kind::Add, loop.min, done)), left,
-                               ForType::Serial, loop.body);
-    const Stmt both = is_zero(left) ? whole : make_block({whole, copy_statement(tail, fresh_)});
-    return is_const(count) ? both : make_let(count_name, count, both);
-  }
-
-  FreshNames fresh_;
-  const InnerLoops& loops_;
-};
+Stmt in_vectors(const For& loop, int lanes, FreshNames& fresh) {
+  const Type type = loop.min.type();
+  const auto constant = [&](int64_t n) { return make_const(type, n); };
+  const Expr count =
+      simplify(binary(Kind::Div, max(loop.extent, make_zero(type)), constant(lanes)));
+  const std::string counter = fresh(loop.name), count_name = fresh(loop.name + ".vectors");
+  const Expr vectors = is_const(count) ? count : variable(count_name, type);
+  const auto lanes_of = [&](const Expr& n) { return binary(Kind::Mul, n, constant(lanes)); };
+  const Expr first = binary(Kind::Add, loop.min, lanes_of(variable(counter, type)));
+  const Stmt vector = make_for(loop.name, first, constant(lanes), ForType::Vectorized, loop.body);
+  const Stmt whole = make_for(counter, make_zero(type), vectors, ForType::Serial, vector);
+  const Expr done = lanes_of(vectors), left = simplify(binary(Kind::Sub, loop.extent, done));
+  const Stmt tail = make_for(loop.name, simplify(binary(Kind::Add, loop.min, done)), left,
+                             ForType::Serial, loop.body);
+  const Stmt both = is_zero(left) ? whole : make_block({whole, copy_statement(tail, fresh)});
+  return is_const(count) ? both : make_let(count_name, count, both);
+}
 
 }  // namespace
 
-Stmt vectorize_inner_loops(const Stmt& s, const InnerLoops& loops) {
-  return s.defined() ? InnerVectorizer(s, loops)(s) : s;
+Stmt vectorize_inner_loops(const Stmt& all, const InnerLoops& loops) {
+  if (!all.defined()) return all;
+  FreshNames fresh(all);
+  return rewrite_statements(all, [&](const Stmt& s, auto& rewriter) {
+    const auto* loop = s.as<For>();
+    if (loop && loop->runs == ForType::Vectorized) return s;
+    if (!loop || loop->runs != ForType::Serial || !loops.is_independent(*loop))
+      return rewriter.children(s);
+    const int lanes = BodyCheck(*loop).lanes(loops.vector_bytes);
+    const auto extent = as_const_int(loop->extent);
+    const bool pays = lanes > 1 && (!extent || *extent >= lanes);
+    return pays ? in_vectors(*loop, lanes, fresh) : rewriter.children(s);
+  });
 }
 
 }  // namespace retrograde::ir

@@ -314,10 +314,7 @@ class LoopVectorizer {
     if (store && widen_.is_wide_allocation(store->name)) return visit_store(n.body, *store);
     if (!store || !find_atomic_update(*store) || has_effects(store->value)) return lane_by_lane(s);
     if (!varies(store->index)) return make_atomic(n.name, visit_store(n.body, *store));
-    std::unordered_map<std::string, int> own;
-    count_loads(store->value, own);
-    count_loads(store->index, own);
-    require_no_load(store->name, own[store->name]);
+    require_no_load(store->name, own_loads(*store));
     const int lanes = store->index.type().lanes();
     return make_atomic(n.name,
                        make_store(store->name, widen_.spread(store->value), widen_(store->index),
@@ -345,10 +342,7 @@ class LoopVectorizer {
   }
 
   Stmt store_reduction(const Stmt& s, const Store& n, const UpdateChain& reduction) {
-    std::unordered_map<std::string, int> own;
-    count_loads(n.value, own);
-    count_loads(n.index, own);
-    require_no_load(n.name, own[n.name]);
+    require_no_load(n.name, own_loads(n));
     if (must_stay_serial_) return s;
     Expr active = widen_.masked(varies(n.predicate) ? n.predicate : Expr(), n.value.type().lanes());
     Expr result = reduction.own;
@@ -418,36 +412,24 @@ class LoopVectorizer {
   int narrow_lanes(const Expr& wide) const { return wide.type().lanes() / iterations_; }
 
   // Accesses of allocations that exist once per lane, as seen by one lane.
-  Stmt with_own_elements(const Stmt& s, const Expr& lane) {
-    class Rewrite : public Rewriter {
-     public:
-      Rewrite(const Widener& widener, const Expr& lane) : widener_(widener), lane_(lane) {}
-
-     protected:
-      Expr rewrite(const Expr& e) override {
-        Expr copy = children(e);
-        const Load* n = copy.as<Load>();
-        if (!n || !widener_.is_wide_allocation(n->name)) return copy;
-        return make_load(n->type, n->name, own_index(n->index), n->predicate, n->symbol);
-      }
-      Stmt rewrite(const Stmt& s) override {
-        Stmt copy = children(s);
-        const Store* n = copy.as<Store>();
-        if (!n || !widener_.is_wide_allocation(n->name)) return copy;
-        return make_store(n->name, n->value, own_index(n->index), n->predicate, n->symbol);
-      }
-
-     private:
-      Expr own_index(const Expr& index) {
-        Expr scaled = binary(Kind::Mul, index, make_const(index.type(), widener_.iterations()));
-        return binary(
-            Kind::Add, scaled,
-            make_broadcast(cast_to(index.type().element_of(), lane_), index.type().lanes()));
-      }
-      const Widener& widener_;
-      const Expr lane_;
+  Stmt with_own_elements(const Stmt& s, const Expr& lane) const {
+    if (widen_.wide_allocations().empty()) return s;
+    const auto own = [&](const Expr& index) {
+      Expr scaled = binary(Kind::Mul, index, make_const(index.type(), iterations_));
+      return binary(Kind::Add, scaled,
+                    make_broadcast(cast_to(index.type().element_of(), lane), index.type().lanes()));
     };
-    return widen_.wide_allocations().empty() ? s : Rewrite(widen_, lane)(s);
+    const Stmt loads = rewrite(s, [&](const Expr& e, const auto& recurse) {
+      const Expr copy = map_children(e, recurse);
+      const Load* n = copy.as<Load>();
+      if (!n || !widen_.is_wide_allocation(n->name)) return copy;
+      return make_load(n->type, n->name, own(n->index), n->predicate, n->symbol);
+    });
+    return rewrite_statements(loads, [&](const Stmt& part, auto& all) {
+      const Store* n = part.as<Store>();
+      if (!n || !widen_.is_wide_allocation(n->name)) return all.children(part);
+      return make_store(n->name, n->value, own(n->index), n->predicate, n->symbol);
+    });
   }
 
   const For& loop_;
