@@ -28,12 +28,6 @@ namespace {
 using codegen::Format;
 using Files = std::map<OutputFileType, std::string>;
 
-#ifdef RETROGRADE_VALIDATE
-constexpr bool validate_passes = true;
-#else
-constexpr bool validate_passes = false;
-#endif
-
 codegen::Options options_for(const Target& target) {
   codegen::Options options;
   options.target = target;
@@ -94,6 +88,14 @@ std::string page_text(const Module& module, const std::string& assembly) {
   return aot::html_page(module.name() + " for " + module.target().to_string(), functions, assembly);
 }
 
+bool has_runtime(const Target& target) { return !target.has_feature(Target::NoRuntime); }
+
+// These objects, and the runtime unless the target says no_runtime.
+std::string library_of(std::vector<codegen::Member> members, const Target& target) {
+  if (has_runtime(target)) members.push_back({"retrograde_runtime.o", aot::runtime_object(target)});
+  return codegen::archive(members);
+}
+
 // The texts and bytes of one module, machine code as far as some output needs it.
 class Outputs {
  public:
@@ -126,7 +128,8 @@ class Outputs {
       case OutputFileType::object:
         return object_with_runtime();
       case OutputFileType::static_library:
-        return library();
+        return library_of({{aot::name_parts(module_.name()).back() + ".o", object()}},
+                          module_.target());
       case OutputFileType::assembly:
         return texts_.at(Format::Assembly);
       case OutputFileType::llvm_assembly:
@@ -151,18 +154,11 @@ class Outputs {
   std::string object_;
   std::map<Format, std::string> texts_;
 
-  bool has_runtime() const { return !module_.target().has_feature(Target::NoRuntime); }
   // Where this build has no runtime for the target, an object leaves it to its user.
   std::string object_with_runtime() const {
-    if (!has_runtime() || !aot::has_runtime_object(module_.target())) return object();
+    if (!has_runtime(module_.target()) || !aot::has_runtime_object(module_.target()))
+      return object();
     return aot::merge_objects(object(), aot::runtime_object(module_.target()));
-  }
-  std::string library() const {
-    std::vector<codegen::Member> members = {
-        {aot::name_parts(module_.name()).back() + ".o", object()}};
-    if (has_runtime())
-      members.push_back({"retrograde_runtime.o", aot::runtime_object(module_.target())});
-    return codegen::archive(members);
   }
 };
 
@@ -205,7 +201,6 @@ class MultitargetOutputs {
   std::vector<codegen::Member> members_;
 
   const Module& baseline() const { return modules_.back(); }
-  bool has_runtime() const { return !baseline().target().has_feature(Target::NoRuntime); }
 
   void add_variants(const Files& multi,
                     const std::map<OutputFileType, const internal::OutputInfo>& info,
@@ -233,7 +228,7 @@ class MultitargetOutputs {
   void add_objects(const std::string& path, const std::string& extension,
                    std::vector<aot::File>& result) {
     result.push_back({with_suffix(path, "_wrapper", extension), wrapper_object()});
-    if (has_runtime()) {
+    if (has_runtime(baseline().target())) {
       result.push_back(
           {with_suffix(path, "_runtime", extension), aot::runtime_object(baseline().target())});
     }
@@ -249,9 +244,7 @@ class MultitargetOutputs {
     RETROGRADE_ASSERT(type == OutputFileType::static_library, "an output without a writer");
     std::vector<codegen::Member> members = members_;
     members.push_back({aot::name_parts(name_).back() + "_wrapper.o", wrapper_object()});
-    if (has_runtime())
-      members.push_back({"retrograde_runtime.o", aot::runtime_object(baseline().target())});
-    return codegen::archive(members);
+    return library_of(std::move(members), baseline().target());
   }
 };
 
@@ -263,7 +256,6 @@ class AheadOfTime : public ModuleCompiler {
     codegen::machine_for(target, false);  // says what cannot be compiled for before any work
     ir::LowerOptions options;
     options.target = pipeline.traced(target);
-    options.validate = validate_passes;
     return ir::lower(pipeline.name,
                      ir::schedule_unscheduled(pipeline.outputs, ir::vector_unit_of(options.target)),
                      inputs, options);

@@ -9,12 +9,6 @@
 namespace retrograde {
 namespace {
 
-#ifdef RETROGRADE_VALIDATE
-constexpr bool validate_passes = true;
-#else
-constexpr bool validate_passes = false;
-#endif
-
 // The runtime's handlers get the context back: it stands first in this.
 struct CallState {
   retrograde_context context = {};
@@ -119,7 +113,6 @@ class JitCompiler : public Compiler {
                                             const Target& target) override {
     ir::LowerOptions options;
     options.target = pipeline.traced(target);
-    options.validate = validate_passes;
     ir::LoweredFunction function = ir::lower(
         pipeline.name, ir::schedule_unscheduled(pipeline.outputs, ir::vector_unit_of(target)),
         ir::infer_arguments(pipeline.outputs), options);

@@ -11,9 +11,15 @@
 
 namespace retrograde::ir {
 
+#ifdef RETROGRADE_VALIDATE
+constexpr bool validates_passes = true;
+#else
+constexpr bool validates_passes = false;
+#endif
+
 struct LowerOptions {
   Target target;
-  bool validate = false;  // after every pass, blaming it by name
+  bool validate = validates_passes;  // after every pass, blaming it by name
   // Told of every pass that ran: its name, seconds, and the statement it gave. May be empty.
   std::function<void(const std::string& pass, double seconds, const Stmt& after)> observe;
   std::string stop_after;  // name of a pass; empty: all of them
