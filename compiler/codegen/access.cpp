@@ -167,15 +167,10 @@ Value* FunctionGenerator::load_scalar(const Storage& from, Type type, Value* ind
   if (!predicate)
     return from_memory(type,
                        tagged(b_.CreateAlignedLoad(memory, pointer, alignment_of(type)), from));
-  llvm::BasicBlock* before = b_.GetInsertBlock();
-  Value* loaded = nullptr;
-  if_true(predicate, [&] {
-    loaded = tagged(b_.CreateAlignedLoad(memory, pointer, alignment_of(type)), from);
-  });
-  llvm::PHINode* result = b_.CreatePHI(memory, 2);
-  result->addIncoming(loaded, llvm::cast<llvm::Instruction>(loaded)->getParent());
-  result->addIncoming(llvm::Constant::getNullValue(memory), before);
-  return from_memory(type, result);
+  return from_memory(type, value_if(predicate, [&]() -> Value* {
+                       return tagged(b_.CreateAlignedLoad(memory, pointer, alignment_of(type)),
+                                     from);
+                     }));
 }
 
 Value* FunctionGenerator::load_vector(const Storage& from, Type type, const Expr& index,
@@ -213,7 +208,7 @@ Value* FunctionGenerator::load_linear(const Storage& from, Type type, const Line
   }
   if (stride == 1) return load_dense(from, type, first, predicate);
   if (stride < 0 && stride >= -4 && (!predicate || stride == -1)) {
-    Value* lowest = b_.CreateAdd(first, b_.getInt64(static_cast<uint64_t>(last)));
+    Value* lowest = b_.CreateAdd(first, int64(last));
     Value* upward =
         stride == -1 ? load_dense(from, type, lowest, predicate ? reverse(e_, predicate) : nullptr)
                      : load_strided(from, type, lowest, -stride);
@@ -230,9 +225,8 @@ Value* FunctionGenerator::load_linear(const Storage& from, Type type, const Line
     return gather(shifted, type, b_.CreateMul(iota(e_, distance, lanes), splat(e_, step, lanes)),
                   predicate);
   }
-  return stride > 0 && stride <= 4
-             ? load_strided(from, type, first, stride)
-             : load_apart(from, type, first, b_.getInt64(static_cast<uint64_t>(stride)));
+  return stride > 0 && stride <= 4 ? load_strided(from, type, first, stride)
+                                   : load_apart(from, type, first, int64(stride));
 }
 
 Value* FunctionGenerator::load_dense(const Storage& from, Type type, Value* first,
@@ -242,8 +236,7 @@ Value* FunctionGenerator::load_dense(const Storage& from, Type type, Value* firs
     std::vector<Value*> parts;
     for (int at = 0; at < lanes; at += native) {
       const Type part = type.with_lanes(std::min(native, lanes - at));
-      parts.push_back(load_dense(
-          from, part, b_.CreateAdd(first, b_.getInt64(static_cast<uint64_t>(at))), nullptr));
+      parts.push_back(load_dense(from, part, b_.CreateAdd(first, int64(at)), nullptr));
     }
     return concat(e_, parts);
   }
@@ -266,7 +259,7 @@ Value* FunctionGenerator::load_strided(const Storage& from, Type type, Value* fi
   Value* result = nullptr;
   for (int part = 0; part < s; part++) {
     const int start = std::min(part * n, last_start);
-    Value* index = b_.CreateAdd(first, b_.getInt64(static_cast<uint64_t>(start)));
+    Value* index = b_.CreateAdd(first, int64(start));
     Value* loaded = load_dense(from, type, index, nullptr);
     std::vector<int> picks;
     for (int i = 0; i < n; i++) {
@@ -280,7 +273,7 @@ Value* FunctionGenerator::load_strided(const Storage& from, Type type, Value* fi
 }
 
 Value* FunctionGenerator::lane_index(Value* first, Value* stride, int lane) {
-  Value* number = b_.getInt64(static_cast<uint64_t>(lane));
+  Value* number = int64(lane);
   return b_.CreateAdd(first, b_.CreateMul(stride, number));
 }
 
@@ -314,20 +307,13 @@ Value* FunctionGenerator::gather_filled_up(const Storage& from, Type type, Value
 // of one a lane.
 Value* FunctionGenerator::where_any(Type type, Value* indices, Value* predicate,
                                     const std::function<Value*(Value* safe)>& load) {
-  llvm::BasicBlock *before = b_.GetInsertBlock(), *end = nullptr;
-  Value* loaded = nullptr;
-  if_true(b_.CreateOrReduce(predicate), [&] {
+  return value_if(b_.CreateOrReduce(predicate), [&] {
     Value* bits = b_.CreateBitCast(predicate, b_.getIntNTy(static_cast<unsigned>(type.lanes())));
     Value* first = b_.CreateBinaryIntrinsic(llvm::Intrinsic::cttz, bits, b_.getTrue());
     Value* index = splat(e_, b_.CreateExtractElement(indices, first), type.lanes());
-    loaded = load(b_.CreateSelect(predicate, indices, index));
-    loaded = b_.CreateSelect(predicate, loaded, llvm::Constant::getNullValue(loaded->getType()));
-    end = b_.GetInsertBlock();
+    Value* loaded = load(b_.CreateSelect(predicate, indices, index));
+    return b_.CreateSelect(predicate, loaded, llvm::Constant::getNullValue(loaded->getType()));
   });
-  llvm::PHINode* result = b_.CreatePHI(loaded->getType(), 2);
-  result->addIncoming(loaded, end);
-  result->addIncoming(llvm::Constant::getNullValue(loaded->getType()), before);
-  return result;
 }
 
 Value* FunctionGenerator::gather(const Storage& from, Type type, Value* indices, Value* predicate) {
@@ -429,8 +415,7 @@ void FunctionGenerator::store_dense(const Storage& to, Type type, Value* first, 
   if (!predicate && lanes > native) {
     for (int at = 0; at < lanes; at += native) {
       const int count = std::min(native, lanes - at);
-      store_dense(to, type.with_lanes(count),
-                  b_.CreateAdd(first, b_.getInt64(static_cast<uint64_t>(at))),
+      store_dense(to, type.with_lanes(count), b_.CreateAdd(first, int64(at)),
                   slice(e_, stored, at, count), nullptr);
     }
     return;
@@ -450,8 +435,7 @@ void FunctionGenerator::store_vector(const Storage& to, Type type, const Expr& i
   if (linear && linear->stride == 1)
     return store_dense(to, type, index64(linear->base), stored, predicate);
   if (linear && linear->stride == -1) {
-    Value* lowest =
-        b_.CreateSub(index64(linear->base), b_.getInt64(static_cast<uint64_t>(lanes - 1)));
+    Value* lowest = b_.CreateSub(index64(linear->base), int64(lanes - 1));
     return store_dense(to, type, lowest, reverse(e_, stored),
                        predicate ? reverse(e_, predicate) : nullptr);
   }
@@ -468,8 +452,7 @@ void FunctionGenerator::store_vector(const Storage& to, Type type, const Expr& i
   if (!linear && (!ramp || predicate))
     return scatter(to, type, index_vector(index), stored, predicate);
   Value* first = index64(linear ? linear->base : ramp->base);
-  Value* stride =
-      linear ? b_.getInt64(static_cast<uint64_t>(linear->stride)) : index64(ramp->stride);
+  Value* stride = linear ? int64(linear->stride) : index64(ramp->stride);
   for (int i = 0; i < lanes; i++) {
     store_scalar(to, type.element_of(), lane_index(first, stride, i), lane(e_, stored, i),
                  predicate ? lane(e_, predicate, i) : nullptr);

@@ -183,7 +183,6 @@ void FunctionGenerator::locked(const Atomic& s, const Store& first) {
   Substitution lets;
   for (const auto* let = s.body.as<LetStmt>(); let; let = let->body.as<LetStmt>())
     lets[let->name] = substitute(let->value, lets);
-  auto* pointer = b_.getPtrTy();
   Value* element;
   {
     const MemoScope scope(*this, false);
@@ -191,13 +190,9 @@ void FunctionGenerator::locked(const Atomic& s, const Store& first) {
     RETROGRADE_ASSERT(index.type().is_scalar(), "a lock for a vector of ", quoted(s.name));
     element = element_pointer(storage(first.name), first.value.type().element_of(), index64(index));
   }
-  const auto call = [&](const char* function) {
-    b_.CreateCall(runtime_function(function, b_.getVoidTy(), {pointer, pointer}),
-                  {frame_.context, element});
-  };
-  call("retrograde_lock_element");
+  call_runtime("retrograde_lock_element", b_.getVoidTy(), {element});
   statement(s.body);
-  call("retrograde_unlock_element");
+  call_runtime("retrograde_unlock_element", b_.getVoidTy(), {element});
 }
 
 }  // namespace retrograde::codegen

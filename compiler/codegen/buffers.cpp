@@ -26,30 +26,28 @@ Value* FunctionGenerator::buffer_field(Value* buffer, llvm::Type* type, int64_t 
 Value* FunctionGenerator::dimension_pointer(Value* buffer, Value* dimension, int64_t offset) {
   Value* dims = buffer_field(buffer, b_.getPtrTy(), offsetof(halide_buffer_t, dim));
   Value* index = b_.CreateIntCast(dimension, b_.getInt64Ty(), true);
-  Value* bytes = b_.CreateAdd(b_.CreateMul(index, b_.getInt64(sizeof(halide_dimension_t))),
-                              b_.getInt64(static_cast<uint64_t>(offset)));
+  Value* bytes =
+      b_.CreateAdd(b_.CreateMul(index, int64(sizeof(halide_dimension_t))), int64(offset));
   return b_.CreateGEP(b_.getInt8Ty(), dims, bytes);
 }
 
 // Null for a null buffer, without a branch: the address that is read is then that of a constant.
 Value* FunctionGenerator::host_pointer(Value* buffer) {
   auto* type = b_.getPtrTy();
-  Value* null = llvm::ConstantPointerNull::get(type);
   auto* zero = e_.module.getGlobalVariable("no_host", true);
   if (!zero) {
     zero = new llvm::GlobalVariable(e_.module, type, true, llvm::GlobalValue::PrivateLinkage,
-                                    llvm::ConstantPointerNull::get(type), "no_host");
+                                    null_pointer(), "no_host");
   }
   Value* field = b_.CreateConstGEP1_64(b_.getInt8Ty(), buffer, offsetof(halide_buffer_t, host));
-  auto* load =
-      b_.CreateLoad(type, b_.CreateSelect(b_.CreateICmpEQ(buffer, null), zero, field), "host");
+  auto* load = b_.CreateLoad(
+      type, b_.CreateSelect(b_.CreateICmpEQ(buffer, null_pointer()), zero, field), "host");
   load->setMetadata(llvm::LLVMContext::MD_tbaa, alias_tag("buffer descriptors"));
   return load;
 }
 
 Value* FunctionGenerator::buffer_operator(const Call& e) {
   Value* buffer = value(e.args[0]);
-  Value* null = llvm::ConstantPointerNull::get(b_.getPtrTy());
   const auto dimension_field = [&](int64_t offset) -> Value* {
     auto* load =
         b_.CreateLoad(b_.getInt32Ty(), dimension_pointer(buffer, value(e.args[1]), offset));
@@ -73,10 +71,10 @@ Value* FunctionGenerator::buffer_operator(const Call& e) {
     case Op::buffer_type:
       return int_field(offsetof(halide_buffer_t, type));
     case Op::buffer_is_null:
-      return b_.CreateICmpEQ(buffer, null);
+      return b_.CreateICmpEQ(buffer, null_pointer());
     case Op::buffer_is_query: {
       Value* device = buffer_field(buffer, b_.getInt64Ty(), offsetof(halide_buffer_t, device));
-      return b_.CreateAnd(b_.CreateICmpEQ(host_pointer(buffer), null),
+      return b_.CreateAnd(b_.CreateICmpEQ(host_pointer(buffer), null_pointer()),
                           b_.CreateICmpEQ(device, b_.getInt64(0)));
     }
     default:

@@ -106,24 +106,8 @@ Value* FunctionGenerator::branch_value(const Expr& condition, const Expr& then_v
     Value *a = value(then_value), *b = value(else_value);
     return b_.CreateSelect(test, a, b);
   }
-  llvm::BasicBlock *then_block = new_block("then"), *else_block = new_block("else"),
-                   *after = new_block("after");
-  b_.CreateCondBr(test, then_block, else_block);
-  const auto arm = [&](llvm::BasicBlock* block, const Expr& e) {
-    b_.SetInsertPoint(block);
-    const MemoScope scope(*this, true);
-    Value* result = value(e);
-    llvm::BasicBlock* end = b_.GetInsertBlock();
-    b_.CreateBr(after);
-    return std::make_pair(result, end);
-  };
-  const auto [a, a_end] = arm(then_block, then_value);
-  const auto [b, b_end] = arm(else_block, else_value);
-  b_.SetInsertPoint(after);
-  llvm::PHINode* result = b_.CreatePHI(a->getType(), 2);
-  result->addIncoming(a, a_end);
-  result->addIncoming(b, b_end);
-  return result;
+  return chosen(
+      test, [&] { return value(then_value); }, [&] { return value(else_value); });
 }
 
 // (condition, value, message...). All lanes must hold.

@@ -29,10 +29,7 @@ void verify(const llvm::Module& module) {
   std::string problem;
   llvm::raw_string_ostream out(problem);
   if (!llvm::verifyModule(module, &out)) return;
-  std::string program;
-  llvm::raw_string_ostream program_out(program);
-  module.print(program_out, nullptr);
-  throw InternalError("LLVM rejects the generated code: " + problem, "codegen", program);
+  throw InternalError("LLVM rejects the generated code: " + problem, "codegen", text_of(module));
 }
 
 // The function itself is called through its export; its argv form is not needed.
@@ -72,9 +69,8 @@ auto with_generated(const Program& program, const Options& options, bool keep_na
 }
 
 template <typename Use>
-auto with_optimized(const Program& program, const Options& options, bool keep_names,
-                    const Use& use) {
-  return with_generated(program, options, keep_names, [&](Unit& unit, const Machine&) {
+auto with_optimized(const Program& program, const Options& options, const Use& use) {
+  return with_generated(program, options, /*keep_names=*/true, [&](Unit& unit, const Machine&) {
     if (options.optimization_level > 0) unit.optimize();
     return use(unit);
   });
@@ -150,7 +146,7 @@ void join_times(const std::vector<Part>& parts, Times& times) {
 std::vector<Part> compile_unit(Unit& unit, const Machine& machine, const Options& options,
                                unsigned most) {
   const unsigned count = options.parts ? possible_parts(unit.module(), options.parts)
-                                 : worthwhile_parts(unit.module(), most);
+                                       : worthwhile_parts(unit.module(), most);
   std::vector<Part> parts(1);
   if (count == 1) {
     finish(unit, options, parts[0]);
@@ -192,7 +188,7 @@ std::vector<std::string> compile_parts(const Program& program, const Options& op
 
 std::map<Format, std::string> compile_texts(const Program& program, const Options& options,
                                             const std::vector<Format>& formats) {
-  return with_optimized(program, options, /*keep_names=*/true, [&](Unit& unit) {
+  return with_optimized(program, options, [&](Unit& unit) {
     std::map<Format, std::string> result;
     for (Format format : formats) result[format] = unit.emit(format);
     return result;
@@ -200,12 +196,11 @@ std::map<Format, std::string> compile_texts(const Program& program, const Option
 }
 
 std::string compile_llvm_ir(const ir::LoweredFunction& function, const Options& options) {
-  return with_optimized({{function}, {}, {}}, options, /*keep_names=*/true,
-                        [](Unit& unit) { return unit.emit(Format::LlvmIr); });
+  return compile_texts({{function}, {}, {}}, options, {Format::LlvmIr})[Format::LlvmIr];
 }
 
 std::string compile_assembly(const ir::LoweredFunction& function, const Options& options) {
-  return with_optimized({{function}, {}, {}}, options, /*keep_names=*/true, [](Unit& unit) {
+  return with_optimized({{function}, {}, {}}, options, [](Unit& unit) {
     return unit.emit_last(llvm::CodeGenFileType::AssemblyFile);
   });
 }

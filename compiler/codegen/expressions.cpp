@@ -11,16 +11,26 @@ namespace retrograde::codegen {
 
 using namespace ir;
 
-Value* FunctionGenerator::value(const Expr& e) {
-  auto& memo = frame_.memo;
-  for (size_t i = memo.size(); i-- > 0;) {
-    const auto found = memo[i].values.find(e.get());
-    if (found != memo[i].values.end()) return found->second.value;
-    if (!memo[i].sees_outer) break;
+Value* FunctionGenerator::remembered(Memo MemoFrame::*memo, const Expr& e,
+                                     Value* (FunctionGenerator::*make)(const Expr&)) {
+  std::vector<MemoFrame>& frames = frame_.memo;
+  for (size_t i = frames.size(); i-- > 0;) {
+    const auto found = (frames[i].*memo).find(e.get());
+    if (found != (frames[i].*memo).end()) return found->second.value;
+    if (!frames[i].sees_outer) break;
   }
-  Value* result = make_value(e);
-  if (e.kind() != Kind::Variable) memo.back().values[e.get()] = {e, result};
+  Value* result = (this->*make)(e);
+  if (e.kind() != Kind::Variable) (frames.back().*memo)[e.get()] = {e, result};
   return result;
+}
+
+Value* FunctionGenerator::value(const Expr& e) {
+  return remembered(&MemoFrame::values, e, &FunctionGenerator::make_value);
+}
+
+Value* FunctionGenerator::value_alone(const Expr& e) {
+  const MemoScope scope(*this, false);
+  return value(e);
 }
 
 Value* FunctionGenerator::make_value(const Expr& e) {
@@ -185,15 +195,7 @@ Value* FunctionGenerator::make(const VectorReduce& e) {
 // ---- indices ----
 
 Value* FunctionGenerator::index64(const Expr& e) {
-  auto& memo = frame_.memo;
-  for (size_t i = memo.size(); i-- > 0;) {
-    const auto found = memo[i].indices.find(e.get());
-    if (found != memo[i].indices.end()) return found->second.value;
-    if (!memo[i].sees_outer) break;
-  }
-  Value* result = make_index64(e);
-  if (e.kind() != Kind::Variable) memo.back().indices[e.get()] = {e, result};
-  return result;
+  return remembered(&MemoFrame::indices, e, &FunctionGenerator::make_index64);
 }
 
 Value* FunctionGenerator::make_index64(const Expr& e) {

@@ -24,13 +24,11 @@ std::vector<const Load*> semaphores_in(const Fork& s) {
   std::vector<const Load*> found;
   std::set<std::pair<std::string, int64_t>> seen;
   const auto visit = [&](const Expr& e) {
-    const auto* call = e.as<Call>();
-    if (!call || !call->is_op(Op::runtime_call)) return true;
-    const auto* name = call->args[0].as<StringImm>();
+    const auto* call = as_op(e, Op::runtime_call);
+    const auto* name = call ? call->args[0].as<StringImm>() : nullptr;
     if (!name || name->value != "retrograde_semaphore_acquire") return true;
-    const auto* address = call->args[1].as<Call>();
-    const auto* load =
-        address && address->is_op(Op::address_of) ? address->args[0].as<Load>() : nullptr;
+    const auto* address = as_op(call->args[1], Op::address_of);
+    const auto* load = address ? address->args[0].as<Load>() : nullptr;
     const auto index = load ? as_const_int(load->index) : std::nullopt;
     if (index && seen.emplace(load->name, *index).second) found.push_back(load);
     return true;
@@ -45,7 +43,6 @@ std::vector<const Load*> semaphores_in(const Fork& s) {
 
 void FunctionGenerator::make(const Fork& s) {
   auto* pointer = b_.getPtrTy();
-  auto* int32 = b_.getInt32Ty();
   std::vector<Value*> semaphores;
   {
     const MemoScope scope(*this, false);
@@ -60,10 +57,9 @@ void FunctionGenerator::make(const Fork& s) {
   for (unsigned i = 0; i < semaphores.size(); i++)
     b_.CreateStore(semaphores[i], b_.CreateConstGEP1_64(pointer, list, i));
   const Task first = outline(s.first, "fork"), rest = outline(s.rest, "join");
-  const auto fork = runtime_function("retrograde_fork", int32,
-                                     {pointer, pointer, pointer, pointer, pointer, pointer, int32});
-  Value* code = b_.CreateCall(fork, {frame_.context, first.function, first.closure, rest.function,
-                                     rest.closure, list, b_.getInt32(semaphores.size())});
+  Value* code = call_runtime("retrograde_fork", b_.getInt32Ty(),
+                             {first.function, first.closure, rest.function, rest.closure, list,
+                              b_.getInt32(semaphores.size())});
   fail_unless(b_.CreateICmpEQ(code, b_.getInt32(0)), [&] { return code; });
 }
 

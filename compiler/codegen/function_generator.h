@@ -155,6 +155,10 @@ class FunctionGenerator {
 
   // expressions.cpp
   Value* value(const Expr& e);
+  Value* value_alone(const Expr& e);  // in a scope of its own
+  // Of a node that has one already, or what `make` gives.
+  Value* remembered(Memo MemoFrame::*memo, const Expr& e,
+                    Value* (FunctionGenerator::*make)(const Expr&));
   // A scalar index as a 64-bit integer, computed in 64 bits as far as it is made of + - *: modulo
   // 2^32 that is its int32 value, and an index that fits int32 is exactly it. Addresses then need
   // no sign extension that hides their structure from LLVM, and large buffers work.
@@ -256,12 +260,20 @@ class FunctionGenerator {
   Value* buffer_field(Value* buffer, llvm::Type* type, int64_t offset);
   Value* dimension_pointer(Value* buffer, Value* dimension, int64_t offset);
 
-  llvm::FunctionCallee runtime_function(const std::string& name, llvm::Type* result,
-                                        const std::vector<llvm::Type*>& params,
-                                        bool variadic = false);
+  // Calls a function of the runtime with the context and `args`, and `more` where it is variadic.
+  llvm::CallInst* call_runtime(const std::string& name, llvm::Type* result,
+                               const std::vector<Value*>& args,
+                               const std::vector<Value*>* more = nullptr);
+  llvm::Constant* null_pointer() { return llvm::ConstantPointerNull::get(b_.getPtrTy()); }
+  llvm::ConstantInt* int64(int64_t number) { return b_.getInt64(static_cast<uint64_t>(number)); }
 
   // Runs `body` only where the scalar condition holds.
   void if_true(Value* condition, const std::function<void()>& body);
+  // What `body` gives where the condition holds, 0 elsewhere.
+  Value* value_if(Value* condition, const std::function<Value*()>& body);
+  // One of two values, computed where it is chosen.
+  Value* chosen(Value* condition, const std::function<Value*()>& then,
+                const std::function<Value*()>& otherwise);
 
   Emitter& e_;
   llvm::IRBuilder<>& b_;

@@ -175,23 +175,11 @@ Value* FunctionGenerator::load_dense_or_gather(const Storage& from, Type type, c
   Value* indices = value(index);
   Value *first = at_lane(index, b_.getInt32(0)),
         *last = at_lane(index, b_.getInt32(static_cast<uint32_t>(lanes - 1)));
-  llvm::BasicBlock *dense = new_block("dense"), *held = new_block("held"),
-                   *after = new_block("after");
   Value* steps = b_.CreateSub(last, first);
-  b_.CreateCondBr(b_.CreateICmpEQ(steps, int_constant(steps, lanes - 1)), dense, held);
-  b_.SetInsertPoint(after);
-  llvm::PHINode* result = b_.CreatePHI(llvm_type(e_, type), 2);
-  const auto arm = [&](llvm::BasicBlock* block, const std::function<Value*()>& load) {
-    b_.SetInsertPoint(block);
-    Value* loaded = load();
-    result->addIncoming(loaded, b_.GetInsertBlock());
-    b_.CreateBr(after);
-  };
-  arm(dense,
-      [&] { return load_dense(from, type, b_.CreateSExt(first, b_.getInt64Ty()), predicate); });
-  arm(held, [&] { return gather_compactly(from, type, indices, predicate); });
-  b_.SetInsertPoint(after);
-  return result;
+  return chosen(
+      b_.CreateICmpEQ(steps, int_constant(steps, lanes - 1)),
+      [&] { return load_dense(from, type, b_.CreateSExt(first, b_.getInt64Ty()), predicate); },
+      [&] { return gather_compactly(from, type, indices, predicate); });
 }
 
 }  // namespace retrograde::codegen

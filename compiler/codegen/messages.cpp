@@ -45,11 +45,8 @@ Value* FunctionGenerator::report_error(Value* code, const std::vector<Expr>& par
     if (i > first) format.text += separator;
     add_part(format, parts[i], 0, false);
   }
-  const auto report = runtime_function("retrograde_report_error", b_.getInt32Ty(),
-                                       {b_.getPtrTy(), b_.getInt32Ty(), b_.getPtrTy()}, true);
-  std::vector<Value*> args = {frame_.context, code, string_constant(format.text)};
-  args.insert(args.end(), format.args.begin(), format.args.end());
-  return b_.CreateCall(report, args);
+  return call_runtime("retrograde_report_error", b_.getInt32Ty(),
+                      {code, string_constant(format.text)}, &format.args);
 }
 
 void FunctionGenerator::print(const std::vector<Expr>& parts, size_t first, int which) {
@@ -59,11 +56,7 @@ void FunctionGenerator::print(const std::vector<Expr>& parts, size_t first, int 
     add_part(format, parts[i], which, true);
   }
   format.text += "\n";
-  const auto print =
-      runtime_function("retrograde_print", b_.getVoidTy(), {b_.getPtrTy(), b_.getPtrTy()}, true);
-  std::vector<Value*> args = {frame_.context, string_constant(format.text)};
-  args.insert(args.end(), format.args.begin(), format.args.end());
-  b_.CreateCall(print, args);
+  call_runtime("retrograde_print", b_.getVoidTy(), {string_constant(format.text)}, &format.args);
 }
 
 // print(value, parts...) or print_when(condition, value, parts...): a line for each lane.

@@ -99,12 +99,8 @@ void FunctionGenerator::parallel_loop(const For& s) {
     extent = b_.CreateIntCast(value(s.extent), b_.getInt32Ty(), true);
   }
   const Task task = outline(s.body, s.name, s.name, s.min.type());
-  auto* pointer = b_.getPtrTy();
-  auto* int32 = b_.getInt32Ty();
-  const auto parallel_for =
-      runtime_function("retrograde_parallel_for", int32, {pointer, pointer, int32, int32, pointer});
-  Value* code =
-      b_.CreateCall(parallel_for, {frame_.context, task.function, min, extent, task.closure});
+  Value* code = call_runtime("retrograde_parallel_for", b_.getInt32Ty(),
+                             {task.function, min, extent, task.closure});
   fail_unless(b_.CreateICmpEQ(code, b_.getInt32(0)), [&] { return code; });
 }
 

@@ -13,19 +13,17 @@ using namespace ir;
 Value* FunctionGenerator::runtime_call(const Call& e) {
   const auto* name = e.args[0].as<StringImm>();
   RETROGRADE_ASSERT(name != nullptr, "a runtime call of no name");
-  std::vector<Value*> args = {frame_.context};
-  std::vector<llvm::Type*> params = {b_.getPtrTy()};
+  std::vector<Value*> args;
   for (size_t i = 1; i < e.args.size(); i++) {
     RETROGRADE_ASSERT(e.args[i].type().is_scalar(), "a vector goes to ", name->value);
     args.push_back(value(e.args[i]));
-    params.push_back(args.back()->getType());
   }
-  Value* result = b_.CreateCall(runtime_function(name->value, llvm_type(e_, e.type), params), args);
+  Value* result = call_runtime(name->value, llvm_type(e_, e.type), args);
   if (name->value == "retrograde_profiler_begin") {
     frame_.profiler_slot = entry_alloca(b_.getPtrTy(), 1, "profiled");
     b_.CreateStore(result, frame_.profiler_slot);
   } else if (name->value == "retrograde_profiler_end" && frame_.profiler_slot) {
-    b_.CreateStore(llvm::ConstantPointerNull::get(b_.getPtrTy()), frame_.profiler_slot);
+    b_.CreateStore(null_pointer(), frame_.profiler_slot);
   }
   return result;
 }
@@ -56,13 +54,12 @@ Value* FunctionGenerator::prefetch(const Call& e) {
 // (value, event, func, value index, parent, coordinates...): a halide_trace_event_t on the stack.
 Value* FunctionGenerator::trace(const Call& e) {
   constexpr size_t first_coordinate = 5;
-  const auto scalar = [&](const Expr& arg) { return lane(e_, value(arg), 0); };
-  const auto constant = [&](const Expr& arg) {
-    const Expr element = arg.as<Broadcast>() ? arg.as<Broadcast>()->value : arg;
-    return static_cast<uint32_t>(as_const_int(element).value_or(0));
+  const auto element = [](const Expr& arg) {
+    const auto* splat = arg.as<Broadcast>();
+    return splat ? splat->value : arg;
   };
-  const auto text_of = [&](const Expr& arg) {
-    return value(arg.as<Broadcast>() ? arg.as<Broadcast>()->value : arg);
+  const auto constant = [&](const Expr& arg) {
+    return b_.getInt32(static_cast<uint32_t>(as_const_int(element(arg)).value_or(0)));
   };
   const std::vector<Expr> coordinates(e.args.begin() + first_coordinate, e.args.end());
   uint32_t dimensions = 0;
@@ -74,18 +71,16 @@ Value* FunctionGenerator::trace(const Call& e) {
   const auto set = [&](size_t offset, Value* field) {
     b_.CreateStore(field, b_.CreateConstGEP1_64(b_.getInt8Ty(), event, offset));
   };
-  set(offsetof(halide_trace_event_t, func), text_of(e.args[2]));
+  set(offsetof(halide_trace_event_t, func), value(element(e.args[2])));
   set(offsetof(halide_trace_event_t, value), pack({e.args[0]}));
   set(offsetof(halide_trace_event_t, coordinates), pack(coordinates));
-  set(offsetof(halide_trace_event_t, trace_tag), llvm::ConstantPointerNull::get(b_.getPtrTy()));
+  set(offsetof(halide_trace_event_t, trace_tag), null_pointer());
   set(offsetof(halide_trace_event_t, type), b_.getInt32(type_word(e.type)));
-  set(offsetof(halide_trace_event_t, event), b_.getInt32(constant(e.args[1])));
-  set(offsetof(halide_trace_event_t, parent_id), scalar(e.args[4]));
-  set(offsetof(halide_trace_event_t, value_index), b_.getInt32(constant(e.args[3])));
+  set(offsetof(halide_trace_event_t, event), constant(e.args[1]));
+  set(offsetof(halide_trace_event_t, parent_id), lane(e_, value(e.args[4]), 0));
+  set(offsetof(halide_trace_event_t, value_index), constant(e.args[3]));
   set(offsetof(halide_trace_event_t, dimensions), b_.getInt32(dimensions));
-  const auto tell =
-      runtime_function("retrograde_trace", b_.getInt32Ty(), {b_.getPtrTy(), b_.getPtrTy()});
-  b_.CreateCall(tell, {frame_.context, event});
+  call_runtime("retrograde_trace", b_.getInt32Ty(), {event});
   return value(e.args[0]);
 }
 

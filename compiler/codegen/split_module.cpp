@@ -1,12 +1,12 @@
 #include "codegen/split_module.h"
 
-#include <llvm/Bitcode/BitcodeWriter.h>
 #include <llvm/IR/Module.h>
-#include <llvm/Support/raw_ostream.h>
 #include <llvm/Transforms/Utils/Cloning.h>
 
 #include <algorithm>
 #include <map>
+
+#include "codegen/unit.h"
 
 namespace retrograde::codegen {
 namespace {
@@ -59,13 +59,6 @@ void erase_unused_constants(llvm::Module& module) {
   for (llvm::GlobalVariable& variable : llvm::make_early_inc_range(module.globals())) {
     if (is_local_constant(variable) && variable.use_empty()) variable.eraseFromParent();
   }
-}
-
-std::string bitcode_of(const llvm::Module& module) {
-  std::string bytes;
-  llvm::raw_string_ostream out(bytes);
-  llvm::WriteBitcodeToFile(module, out);
-  return bytes;
 }
 
 // With at least so many instructions.

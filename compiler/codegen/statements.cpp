@@ -43,19 +43,14 @@ void FunctionGenerator::begin_function(llvm::Function* function) {
 
 void FunctionGenerator::finish_function() {
   b_.CreateRet(b_.getInt32(0));
-  Value* count = b_.getInt64(static_cast<uint64_t>(frame_.owned_count));
+  Value* count = int64(frame_.owned_count);
   if (frame_.error_exit) {
     b_.SetInsertPoint(frame_.error_exit);
-    if (frame_.profiler_slot) {
-      const auto end = runtime_function("retrograde_profiler_end", b_.getInt32Ty(),
-                                        {b_.getPtrTy(), b_.getPtrTy()});
-      b_.CreateCall(end, {frame_.context, b_.CreateLoad(b_.getPtrTy(), frame_.profiler_slot)});
-    }
-    if (frame_.owned_slots) {
-      const auto free_all = runtime_function("retrograde_free_all", b_.getVoidTy(),
-                                             {b_.getPtrTy(), b_.getPtrTy(), b_.getInt64Ty()});
-      b_.CreateCall(free_all, {frame_.context, frame_.owned_slots, count});
-    }
+    if (frame_.profiler_slot)
+      call_runtime("retrograde_profiler_end", b_.getInt32Ty(),
+                   {b_.CreateLoad(b_.getPtrTy(), frame_.profiler_slot)});
+    if (frame_.owned_slots)
+      call_runtime("retrograde_free_all", b_.getVoidTy(), {frame_.owned_slots, count});
     b_.CreateRet(frame_.error_code);
   }
   b_.SetInsertPoint(frame_.entry);
@@ -64,8 +59,7 @@ void FunctionGenerator::finish_function() {
     b_.CreateMemSet(frame_.owned_slots, b_.getInt8(0),
                     static_cast<uint64_t>(8 * frame_.owned_count), llvm::Align(8));
   }
-  if (frame_.profiler_slot)
-    b_.CreateStore(llvm::ConstantPointerNull::get(b_.getPtrTy()), frame_.profiler_slot);
+  if (frame_.profiler_slot) b_.CreateStore(null_pointer(), frame_.profiler_slot);
   b_.CreateBr(&*std::next(frame_.function->begin()));
 }
 
@@ -121,14 +115,18 @@ void FunctionGenerator::make_argv_wrapper(llvm::Function* function) {
   b_.CreateBr(&*std::next(wrapper->begin()));
 }
 
-llvm::FunctionCallee FunctionGenerator::runtime_function(const std::string& name,
-                                                         llvm::Type* result,
-                                                         const std::vector<llvm::Type*>& params,
-                                                         bool variadic) {
-  auto callee =
-      e_.module.getOrInsertFunction(name, llvm::FunctionType::get(result, params, variadic));
+llvm::CallInst* FunctionGenerator::call_runtime(const std::string& name, llvm::Type* result,
+                                                const std::vector<Value*>& args,
+                                                const std::vector<Value*>* more) {
+  std::vector<Value*> all = {frame_.context};
+  all.insert(all.end(), args.begin(), args.end());
+  std::vector<llvm::Type*> params;
+  for (Value* arg : all) params.push_back(arg->getType());
+  if (more) all.insert(all.end(), more->begin(), more->end());
+  auto* type = llvm::FunctionType::get(result, params, more != nullptr);
+  auto callee = e_.module.getOrInsertFunction(name, type);
   llvm::cast<llvm::Function>(callee.getCallee())->setDoesNotThrow();
-  return callee;
+  return b_.CreateCall(callee, all);
 }
 
 llvm::BasicBlock* FunctionGenerator::new_block(const std::string& name) {
@@ -139,7 +137,7 @@ llvm::AllocaInst* FunctionGenerator::entry_alloca(llvm::Type* type, int64_t coun
                                                   const std::string& name) {
   const llvm::IRBuilderBase::InsertPointGuard guard(b_);
   b_.SetInsertPoint(frame_.entry);
-  return b_.CreateAlloca(type, b_.getInt64(static_cast<uint64_t>(count)), name);
+  return b_.CreateAlloca(type, int64(count), name);
 }
 
 // Tags are types of LLVM's type-based alias analysis: siblings in its tree never overlap.
@@ -187,20 +185,49 @@ void FunctionGenerator::if_true(Value* condition, const std::function<void()>& b
   b_.SetInsertPoint(after);
 }
 
+Value* FunctionGenerator::value_if(Value* condition, const std::function<Value*()>& body) {
+  llvm::BasicBlock *before = b_.GetInsertBlock(), *end = nullptr;
+  Value* given = nullptr;
+  if_true(condition, [&] {
+    given = body();
+    end = b_.GetInsertBlock();
+  });
+  llvm::PHINode* result = b_.CreatePHI(given->getType(), 2);
+  result->addIncoming(given, end);
+  result->addIncoming(llvm::Constant::getNullValue(given->getType()), before);
+  return result;
+}
+
+Value* FunctionGenerator::chosen(Value* condition, const std::function<Value*()>& then,
+                                 const std::function<Value*()>& otherwise) {
+  llvm::BasicBlock *then_block = new_block("then"), *else_block = new_block("else"),
+                   *after = new_block("after");
+  b_.CreateCondBr(condition, then_block, else_block);
+  const auto arm = [&](llvm::BasicBlock* block, const std::function<Value*()>& make) {
+    b_.SetInsertPoint(block);
+    const MemoScope scope(*this, true);
+    Value* given = make();
+    b_.CreateBr(after);
+    return std::pair(given, b_.GetInsertBlock());
+  };
+  const auto [a, a_end] = arm(then_block, then);
+  const auto [b, b_end] = arm(else_block, otherwise);
+  b_.SetInsertPoint(after);
+  llvm::PHINode* result = b_.CreatePHI(a->getType(), 2);
+  result->addIncoming(a, a_end);
+  result->addIncoming(b, b_end);
+  return result;
+}
+
 void FunctionGenerator::make(const Assert& s) {
-  const auto* error = s.error.as<Call>();
-  if (error && error->is_op(Op::undef)) return;  // known to hold
+  if (is_undef(s.error)) return;  // known to hold
   const MemoScope scope(*this, false);
   Value* condition = value(s.condition);
   fail_unless(condition, [&] { return value(s.error); });
 }
 
 void FunctionGenerator::make(const IfThenElse& s) {
-  Value* condition;
-  {
-    const MemoScope scope(*this, false);
-    condition = value(s.condition);
-  }
+  Value* condition = value_alone(s.condition);
   llvm::BasicBlock *then_block = new_block("then"), *after = new_block("after");
   llvm::BasicBlock* else_block = s.when_false.defined() ? new_block("else") : after;
   b_.CreateCondBr(condition, then_block, else_block);
@@ -227,11 +254,7 @@ void FunctionGenerator::statement(const Stmt& s) {
         for (const Stmt& part : block.stmts) statement(part);
       },
       [&](const IfThenElse& branch) { make(branch); }, [&](const Fork& f) { make(f); },
-      [&](const Atomic& a) { make(a); },
-      [&](const Evaluate& e) {
-        const MemoScope scope(*this, false);
-        value(e.value);
-      },
+      [&](const Atomic& a) { make(a); }, [&](const Evaluate& e) { value_alone(e.value); },
       [&](const StmtNode& node) {
         throw InternalError(
             text(kind_name(node.kind), " reached code generation: lowering replaces it"), "codegen",
@@ -309,27 +332,21 @@ FunctionGenerator::Storage FunctionGenerator::allocate_on_stack(const Allocate& 
   frame_.stack_bytes += bytes;
   llvm::AllocaInst* block = entry_alloca(b_.getInt8Ty(), bytes, s.name);
   block->setAlignment(llvm::Align(64));
-  b_.CreateLifetimeStart(block, b_.getInt64(static_cast<uint64_t>(bytes)));
+  b_.CreateLifetimeStart(block, int64(bytes));
   return {block, nullptr, alias_tag(s.name)};
 }
 
 FunctionGenerator::Storage FunctionGenerator::allocate_on_heap(const Allocate& s) {
-  auto* pointer = b_.getPtrTy();
-  auto* int64 = b_.getInt64Ty();
-  Value* null = llvm::ConstantPointerNull::get(pointer);
-  auto allocate = runtime_function("retrograde_allocate", pointer, {pointer, int64, int64});
-  llvm::cast<llvm::Function>(allocate.getCallee())->setReturnDoesNotAlias();
-  Value* elements;
-  {
-    const MemoScope scope(*this, false);
-    elements = b_.CreateIntCast(value(s.elements), int64, s.elements.type().is_int());
-  }
-  Value* element_bytes = b_.getInt64(static_cast<uint64_t>(s.type.bytes()) * s.type.lanes());
-  Value* block = b_.CreateCall(allocate, {frame_.context, elements, element_bytes}, s.name);
-  fail_unless(b_.CreateICmpNE(block, null), [&] {
-    const auto error = runtime_function("retrograde_allocation_error", b_.getInt32Ty(),
-                                        {pointer, pointer, int64, int64});
-    return b_.CreateCall(error, {frame_.context, string_constant(s.name), elements, element_bytes});
+  Value* elements =
+      b_.CreateIntCast(value_alone(s.elements), b_.getInt64Ty(), s.elements.type().is_int());
+  Value* element_bytes = int64(int64_t{s.type.bytes()} * s.type.lanes());
+  llvm::CallInst* block =
+      call_runtime("retrograde_allocate", b_.getPtrTy(), {elements, element_bytes});
+  block->setName(s.name);
+  block->getCalledFunction()->setReturnDoesNotAlias();
+  fail_unless(b_.CreateICmpNE(block, null_pointer()), [&] {
+    return call_runtime("retrograde_allocation_error", b_.getInt32Ty(),
+                        {string_constant(s.name), elements, element_bytes});
   });
   Value* slot = new_owned_slot();
   b_.CreateStore(block, slot);
@@ -344,10 +361,8 @@ Value* FunctionGenerator::new_owned_slot() {
 
 void FunctionGenerator::free_owned(Storage& owned) {
   if (!owned.owned) return;
-  const auto free =
-      runtime_function("retrograde_free", b_.getVoidTy(), {b_.getPtrTy(), b_.getPtrTy()});
-  b_.CreateCall(free, {frame_.context, b_.CreateLoad(b_.getPtrTy(), owned.owned)});
-  b_.CreateStore(llvm::ConstantPointerNull::get(b_.getPtrTy()), owned.owned);
+  call_runtime("retrograde_free", b_.getVoidTy(), {b_.CreateLoad(b_.getPtrTy(), owned.owned)});
+  b_.CreateStore(null_pointer(), owned.owned);
 }
 
 void FunctionGenerator::make(const Allocate& s) {

@@ -19,10 +19,7 @@ namespace retrograde::codegen {
 
 using namespace ir;
 
-static const Call* as_strong_product(const Expr& e) {
-  const auto* call = e.as<Call>();
-  return call && call->is_op(Op::strong_mul) ? call : nullptr;
-}
+static const Call* as_strong_product(const Expr& e) { return as_op(e, Op::strong_mul); }
 
 // Whether `e` is a stored value, or a sum of one and strong products.
 static bool is_running_sum(const Expr& e) {

@@ -14,6 +14,20 @@
 
 namespace retrograde::codegen {
 
+std::string bitcode_of(const llvm::Module& module) {
+  std::string bytes;
+  llvm::raw_string_ostream out(bytes);
+  llvm::WriteBitcodeToFile(module, out);
+  return bytes;
+}
+
+std::string text_of(const llvm::Module& module) {
+  std::string text;
+  llvm::raw_string_ostream out(text);
+  module.print(out, nullptr);
+  return text;
+}
+
 Unit::Unit(const Machine& machine, const std::string& name, bool keep_names)
     : target_machine_(make_target_machine(machine)),
       module_(std::make_unique<llvm::Module>(name, context_)) {
@@ -51,27 +65,13 @@ std::string Unit::emit(llvm::CodeGenFileType type, llvm::Module& source) {
 std::string Unit::emit(Format format) {
   switch (format) {
     case Format::LlvmIr:
-      return print();
+      return text_of(*module_);
     case Format::Bitcode:
-      return bitcode();
+      return bitcode_of(*module_);
     default:
       target_machine_->Options.MCOptions.AsmVerbose = true;  // comments name blocks and spills
       return emit(llvm::CodeGenFileType::AssemblyFile, *llvm::CloneModule(*module_));
   }
-}
-
-std::string Unit::bitcode() const {
-  std::string bytes;
-  llvm::raw_string_ostream out(bytes);
-  llvm::WriteBitcodeToFile(*module_, out);
-  return bytes;
-}
-
-std::string Unit::print() const {
-  std::string program;
-  llvm::raw_string_ostream out(program);
-  module_->print(out, nullptr);
-  return program;
 }
 
 std::vector<std::string> Unit::externals() const {

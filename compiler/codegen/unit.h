@@ -14,6 +14,9 @@
 
 namespace retrograde::codegen {
 
+std::string bitcode_of(const llvm::Module& module);
+std::string text_of(const llvm::Module& module);
+
 // Nothing in it is shared with another: units are worked on by different threads at once.
 class Unit {
  public:
@@ -32,8 +35,6 @@ class Unit {
 
  private:
   std::string emit(llvm::CodeGenFileType type, llvm::Module& source);
-  std::string bitcode() const;
-  std::string print() const;
 
   std::unique_ptr<llvm::TargetMachine> target_machine_;
   llvm::LLVMContext context_;
