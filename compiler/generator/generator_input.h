@@ -62,10 +62,7 @@ class InputElements : public GeneratorInputBase {
   using Traits = ElementTraits<ElementOf<T>>;
   using Handle = typename Traits::Handle;
   explicit InputElements(Declared declared)
-      : GeneratorInputBase(
-            std::move(declared), Traits::kind,
-            Declared(static_cast<size_t>(ArrayTraits<T>::size), "", Traits::types(), Traits::dims),
-            IsArrayIO<T>) {}
+      : GeneratorInputBase(std::move(declared), Traits::kind, said_by<T>(), IsArrayIO<T>) {}
   void values_changed() override {
     handles_.clear();
     for (const InputValue& value : values()) {

@@ -161,6 +161,11 @@ struct ElementTraits<Buffer<T, Dims>> {
   }
 };
 template <typename T>
+Declared said_by() {
+  using Traits = ElementTraits<ElementOf<T>>;
+  return Declared(static_cast<size_t>(ArrayTraits<T>::size), "", Traits::types(), Traits::dims);
+}
+template <typename T>
 concept IsScalarIO = ElementTraits<ElementOf<T>>::kind == IOKind::Scalar;
 template <typename T>
 concept IsArrayIO = ArrayTraits<T>::is_array;

@@ -39,13 +39,16 @@ class GeneratorOutputBase : public GeneratorPort {
 
 template <typename T>
 class OutputElements : public GeneratorOutputBase {
- protected:
-  using Traits = ElementTraits<ElementOf<T>>;
-  explicit OutputElements(Declared declared)
-      : GeneratorOutputBase(
-            std::move(declared), Traits::kind,
-            Declared(static_cast<size_t>(ArrayTraits<T>::size), "", Traits::types(), Traits::dims),
-            IsArrayIO<T>) {}
+ public:
+  template <typename... Args>
+  requires std::is_constructible_v<Declared, Args...>
+  explicit OutputElements(Args&&... args)
+      : GeneratorOutputBase(Declared(std::forward<Args>(args)...),
+                            ElementTraits<ElementOf<T>>::kind, said_by<T>(), IsArrayIO<T>) {}
+  OutputElements(const std::string& name, const std::vector<Type>& types)
+      : OutputElements(Declared(name, types)) {}
+  OutputElements(const std::string& name, const std::vector<Type>& types, int dims)
+      : OutputElements(Declared(name, types, dims)) {}
 };
 
 }  // namespace internal
@@ -54,18 +57,11 @@ class OutputElements : public GeneratorOutputBase {
 template <typename T>
 class GeneratorOutput : public internal::OutputElements<T>, public Func {
   using Base = internal::OutputElements<T>;
-  using Declared = internal::Declared;
   static constexpr bool is_image = internal::ElementTraits<T>::kind == internal::IOKind::Buffer;
 
  public:
-  template <typename... Args>
-  requires std::is_constructible_v<Declared, Args...>
-  explicit GeneratorOutput(Args&&... args) : Base(Declared(std::forward<Args>(args)...)) {}
-  GeneratorOutput(const std::string& name, const std::vector<Type>& types)
-      : Base(Declared(name, types)) {}
-  GeneratorOutput(const std::string& name, const std::vector<Type>& types, int dims)
-      : Base(Declared(name, types, dims)) {}
   using Base::name;
+  using Base::OutputElements;
   using Base::type;
   using Base::types;
   int dimensions() const { return Base::dims(); }
@@ -109,16 +105,9 @@ template <typename T>
 requires internal::IsArrayIO<T>
 class GeneratorOutput<T> : public internal::OutputElements<T> {
   using Base = internal::OutputElements<T>;
-  using Declared = internal::Declared;
 
  public:
-  template <typename... Args>
-  requires std::is_constructible_v<Declared, Args...>
-  explicit GeneratorOutput(Args&&... args) : Base(Declared(std::forward<Args>(args)...)) {}
-  GeneratorOutput(const std::string& name, const std::vector<Type>& types)
-      : Base(Declared(name, types)) {}
-  GeneratorOutput(const std::string& name, const std::vector<Type>& types, int dims)
-      : Base(Declared(name, types, dims)) {}
+  using Base::OutputElements;
 
   size_t size() const { return Base::array_size(); }
   // Of an array declared without a size, in generate().

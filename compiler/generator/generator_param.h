@@ -9,6 +9,7 @@
 // CompileError that lists what is allowed.
 #pragma once
 
+#include <algorithm>
 #include <charconv>
 #include <map>
 #include <optional>
@@ -208,8 +209,6 @@ template <typename T>
 std::string GeneratorParam<T>::to_string() const {
   if constexpr (is_text) {
     return value_;
-  } else if constexpr (std::is_same_v<T, bool>) {
-    return value_ ? "true" : "false";
   } else if constexpr (std::is_enum_v<T>) {
     for (const auto& [text, value] : choices_) {
       if (value == value_) return text;
@@ -217,8 +216,8 @@ std::string GeneratorParam<T>::to_string() const {
     refuse_value("its default value", "the map of its names does not hold it");
   } else if constexpr (std::is_same_v<T, Type>) {
     return retrograde::to_string(value_);
-  } else if constexpr (is_number) {
-    return internal::number_text(value_);
+  } else if constexpr (std::is_arithmetic_v<T>) {
+    return internal::param_text(value_);
   } else {
     return value_.to_string();
   }
@@ -253,10 +252,7 @@ std::string GeneratorParam<T>::allowed() const {
   if constexpr (std::is_same_v<T, bool>) {
     return "\"true\" and \"false\"";
   } else if constexpr (std::is_enum_v<T>) {
-    std::string list;
-    for (const auto& [text, value] : choices_)
-      list += (list.empty() ? "" : ", ") + retrograde::quoted(text);
-    return list;
+    return listed(choices_, [](const auto& choice) { return retrograde::quoted(choice.first); });
   } else if constexpr (std::is_same_v<T, Type>) {
     return internal::type_choices();
   } else if constexpr (std::is_same_v<T, LoopLevel>) {
@@ -315,50 +311,31 @@ auto operator!(const GeneratorParam<T>& a) -> decltype(!a.value()) {
   return !a.value();
 }
 
-namespace internal {
-// min and max of numbers are std's, of Exprs ours.
-template <typename A, typename B>
-auto smaller(const A& a, const B& b) {
-  if constexpr (std::is_arithmetic_v<A> && std::is_arithmetic_v<B>) {
-    return b < a ? static_cast<std::common_type_t<A, B>>(b)
-                 : static_cast<std::common_type_t<A, B>>(a);
-  } else {
-    return retrograde::min(Expr(a), Expr(b));
+#define RETROGRADE_PARAM_EXTREME(name)                                  \
+  namespace internal {                                                  \
+  template <typename A, typename B>                                     \
+  auto name##_of(const A& a, const B& b) {                              \
+    if constexpr (std::is_arithmetic_v<A> && std::is_arithmetic_v<B>) { \
+      return std::name<std::common_type_t<A, B>>(a, b);                 \
+    } else {                                                            \
+      return retrograde::name(Expr(a), Expr(b));                        \
+    }                                                                   \
+  }                                                                     \
+  }                                                                     \
+  template <typename T, typename U>                                     \
+  auto name(const GeneratorParam<T>& a, const U& b) {                   \
+    return internal::name##_of(a.value(), b);                           \
+  }                                                                     \
+  template <typename T, typename U>                                     \
+  auto name(const GeneratorParam<T>& a, const GeneratorParam<U>& b) {   \
+    return internal::name##_of(a.value(), b.value());                   \
+  }                                                                     \
+  template <typename T, typename U>                                     \
+  auto name(const U& a, const GeneratorParam<T>& b) {                   \
+    return internal::name##_of(a, b.value());                           \
   }
-}
-template <typename A, typename B>
-auto larger(const A& a, const B& b) {
-  if constexpr (std::is_arithmetic_v<A> && std::is_arithmetic_v<B>) {
-    return a < b ? static_cast<std::common_type_t<A, B>>(b)
-                 : static_cast<std::common_type_t<A, B>>(a);
-  } else {
-    return retrograde::max(Expr(a), Expr(b));
-  }
-}
-}  // namespace internal
-template <typename T, typename U>
-auto min(const GeneratorParam<T>& a, const U& b) {
-  return internal::smaller(a.value(), b);
-}
-template <typename T, typename U>
-auto min(const GeneratorParam<T>& a, const GeneratorParam<U>& b) {
-  return internal::smaller(a.value(), b.value());
-}
-template <typename T, typename U>
-auto min(const U& a, const GeneratorParam<T>& b) {
-  return internal::smaller(a, b.value());
-}
-template <typename T, typename U>
-auto max(const GeneratorParam<T>& a, const U& b) {
-  return internal::larger(a.value(), b);
-}
-template <typename T, typename U>
-auto max(const GeneratorParam<T>& a, const GeneratorParam<U>& b) {
-  return internal::larger(a.value(), b.value());
-}
-template <typename T, typename U>
-auto max(const U& a, const GeneratorParam<T>& b) {
-  return internal::larger(a, b.value());
-}
+RETROGRADE_PARAM_EXTREME(min)  // of numbers std's, of Exprs ours
+RETROGRADE_PARAM_EXTREME(max)  // of numbers std's, of Exprs ours
+#undef RETROGRADE_PARAM_EXTREME
 
 }  // namespace retrograde

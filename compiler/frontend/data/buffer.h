@@ -88,15 +88,16 @@ void check_in_bounds(const Runtime::Buffer<>& buffer, const std::string& name, c
 Expr buffer_access(const std::shared_ptr<BufferContents>& contents, const std::vector<Expr>& args);
 
 // Buffer(3, 4, "name"): sizes, then possibly a name.
-inline void collect_sizes(std::vector<int>&, std::string&) {}
-inline void collect_sizes(std::vector<int>&, std::string& name, const std::string& last) {
-  name = last;
-}
-template <typename... Rest>
-void collect_sizes(std::vector<int>& sizes, std::string& name, int first, Rest&&... rest) {
-  sizes.push_back(first);
-  collect_sizes(sizes, name, std::forward<Rest>(rest)...);
-}
+struct NamedSizes {
+  std::vector<int> sizes;
+  std::string name;
+  template <typename... Args>
+  explicit NamedSizes(Args&&... args) {
+    (add(std::forward<Args>(args)), ...);
+  }
+  void add(int size) { sizes.push_back(size); }
+  void add(const std::string& last) { name = last; }
+};
 template <typename... Args>
 struct AreSizes : std::true_type {};
 template <typename Last>
@@ -151,17 +152,13 @@ class Buffer {
   template <typename... Args>
   requires(ir::AreSizes<Args...>::value && !std::is_void_v<T>) explicit Buffer(int first,
                                                                                Args&&... rest) {
-    std::vector<int> sizes{first};
-    std::string name;
-    ir::collect_sizes(sizes, name, std::forward<Args>(rest)...);
-    *this = adopt(ir::allocate_buffer(static_halide_type(), sizes), name);
+    const ir::NamedSizes given(first, std::forward<Args>(rest)...);
+    *this = adopt(ir::allocate_buffer(static_halide_type(), given.sizes), given.name);
   }
   template <typename... Args>
   requires(ir::AreSizes<Args...>::value) explicit Buffer(Type type, int first, Args&&... rest) {
-    std::vector<int> sizes{first};
-    std::string name;
-    ir::collect_sizes(sizes, name, std::forward<Args>(rest)...);
-    *this = adopt(ir::allocate_buffer(to_halide_type(type), sizes), name);
+    const ir::NamedSizes given(first, std::forward<Args>(rest)...);
+    *this = adopt(ir::allocate_buffer(to_halide_type(type), given.sizes), given.name);
   }
   // Requires: an extent is not negative; its elements must fit the address space; its elements must
   // fit the memory of this machine.
@@ -185,10 +182,8 @@ class Buffer {
   template <typename... Args>
   requires(ir::AreSizes<Args...>::value && !std::is_void_v<T>) explicit Buffer(T* data, int first,
                                                                                Args&&... rest) {
-    std::vector<int> sizes{first};
-    std::string name;
-    ir::collect_sizes(sizes, name, std::forward<Args>(rest)...);
-    *this = adopt(ir::wrap_memory(static_halide_type(), data, sizes), name);
+    const ir::NamedSizes given(first, std::forward<Args>(rest)...);
+    *this = adopt(ir::wrap_memory(static_halide_type(), data, given.sizes), given.name);
   }
   explicit Buffer(T* data, const std::vector<int>& sizes,
                   const std::string& name = "") requires(!std::is_void_v<T>)
@@ -196,10 +191,8 @@ class Buffer {
   template <typename... Args>
   requires(ir::AreSizes<Args...>::value) explicit Buffer(Type type, VoidLikeT* data, int first,
                                                          Args&&... rest) {
-    std::vector<int> sizes{first};
-    std::string name;
-    ir::collect_sizes(sizes, name, std::forward<Args>(rest)...);
-    *this = adopt(ir::wrap_memory(to_halide_type(type), data, sizes), name);
+    const ir::NamedSizes given(first, std::forward<Args>(rest)...);
+    *this = adopt(ir::wrap_memory(to_halide_type(type), data, given.sizes), given.name);
   }
   explicit Buffer(Type type, VoidLikeT* data, const std::vector<int>& sizes,
                   const std::string& name = "")

@@ -123,13 +123,16 @@ Dimension OutputImageParam::dim(int i) const {
   return Dimension(parameter_, i);
 }
 
+void ir::check_estimates(const std::string& name, int dimensions, const Region& estimates) {
+  if (static_cast<int>(estimates.size()) == dimensions) return;
+  user_error(
+      "set estimates of " + quoted(name), "there is one for each dimension",
+      text("it has ", dimensions, " dimensions and was given ", estimates.size(), " estimates"),
+      "Give that many");
+}
+
 OutputImageParam& OutputImageParam::set_estimates(const Region& estimates) {
-  if (static_cast<int>(estimates.size()) != dimensions()) {
-    user_error(
-        "set estimates of " + quoted(name()), "there is one for each dimension",
-        text("it has ", dimensions(), " dimensions and was given ", estimates.size(), " estimates"),
-        "Give that many");
-  }
+  ir::check_estimates(name(), dimensions(), estimates);
   for (int d = 0; d < dimensions(); d++) dim(d).set_estimate(estimates[d].min, estimates[d].extent);
   return *this;
 }

@@ -87,6 +87,7 @@ class OutputImageParam {
 namespace ir {
 // CompileError when the buffer's type or dimensions are not the parameter's.
 void check_image(const ParameterContents& parameter, const Buffer<>& buffer);
+void check_estimates(const std::string& name, int dimensions, const Region& estimates);
 }  // namespace ir
 
 class ImageParam : public OutputImageParam {

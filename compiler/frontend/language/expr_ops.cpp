@@ -2,34 +2,34 @@
 #include "frontend/language/expr_ops.h"
 
 #include <atomic>
-#include <limits>
 
 #include "ir/literal.h"
 #include "ir/print.h"
 
 namespace retrograde {
 
-namespace {
-
 using ir::call_op;
+using ir::check_defined;
+using ir::check_integer;
 using ir::Op;
 
-void check_defined(const Expr& e, const char* what) {
-  if (!e.defined()) {
-    user_error(text("apply ", what), "every operand must be a defined expression",
-               "one of them was never assigned", "Assign the Expr before its use");
-  }
-}
-
-[[noreturn]] void type_error(const char* what, const std::string& rule, const Expr& e,
-                             const std::string& instead = "Convert it with cast<>()") {
+[[noreturn]] static void type_error(const char* what, const std::string& rule, const Expr& e,
+                                    const std::string& instead = "Convert it with cast<>()") {
   user_error(text("apply ", what, " to ", e), rule, "its type is " + to_string(e.type()), instead);
 }
 
-void check_integer(const Expr& e, const char* what) {
+void ir::check_defined(const Expr& e, const char* what) {
+  if (e.defined()) return;
+  user_error(text("apply ", what), "every operand must be a defined expression",
+             "one of them was never assigned", "Assign the Expr before its use");
+}
+
+void ir::check_integer(const Expr& e, const char* what) {
   check_defined(e, what);
   if (!e.type().is_int_or_uint()) type_error(what, "it takes integers", e);
 }
+
+namespace {
 
 Expr as_float(Expr x, const char* what) {
   check_defined(x, what);
@@ -66,11 +66,14 @@ Expr classify_float(Op op, Expr x) {
   return call_op(op, Bool(x.type().lanes()), {x});
 }
 
+void match_integers(Expr& a, Expr& b, const char* what) {
+  check_integer(a, what);
+  check_integer(b, what);
+  ir::match_types(a, b, what);
+}
+
 Expr bitwise(Op op, Expr a, Expr b) {
-  const char* name = ir::op_info(op).name;
-  check_integer(a, name);
-  check_integer(b, name);
-  ir::match_types(a, b, name);
+  match_integers(a, b, ir::op_info(op).name);
   return call_op(op, {a, b});
 }
 
@@ -86,6 +89,11 @@ Expr shift(Op op, Expr a, Expr b) {
     if (b.type().is_scalar()) b = ir::make_broadcast(b, a.type().lanes());
   }
   return call_op(op, a.type(), {a, b});
+}
+
+Expr marked(Op op, const Expr& e) {
+  check_defined(e, ir::op_info(op).name);
+  return call_op(op, {e});
 }
 
 Type unsigned_form(Type type) { return type.is_int() ? type.with_code(TypeCode::UInt) : type; }
@@ -255,9 +263,7 @@ Expr lerp(Expr zero, Expr one, Expr weight) {
 }
 
 Expr div_round_to_zero(Expr a, Expr b) {
-  check_integer(a, "div_round_to_zero");
-  check_integer(b, "div_round_to_zero");
-  ir::match_types(a, b, "div_round_to_zero");
+  match_integers(a, b, "div_round_to_zero");
   if (a.type().is_uint()) return a / b;
   // Floor division of magnitudes, then the sign.
   Expr magnitude = cast(a.type(), abs(a) / abs(b));
@@ -265,9 +271,7 @@ Expr div_round_to_zero(Expr a, Expr b) {
 }
 
 Expr mod_round_to_zero(Expr a, Expr b) {
-  check_integer(a, "mod_round_to_zero");
-  check_integer(b, "mod_round_to_zero");
-  ir::match_types(a, b, "mod_round_to_zero");
+  match_integers(a, b, "mod_round_to_zero");
   if (a.type().is_uint()) return a % b;
   Expr magnitude = cast(a.type(), abs(a) % abs(b));
   return select(a < 0, -magnitude, magnitude);
@@ -352,31 +356,17 @@ Expr random_float(Expr seed) { return random(Float(32), std::move(seed)); }
 Expr random_uint(Expr seed) { return random(UInt(32), std::move(seed)); }
 Expr random_int(Expr seed) { return random(Int(32), std::move(seed)); }
 
-Expr likely_if_innermost(Expr e) {
-  check_defined(e, "likely_if_innermost");
-  return call_op(Op::likely_if_innermost, {e});
-}
+Expr likely_if_innermost(Expr e) { return marked(Op::likely_if_innermost, e); }
 
 Expr unsafe_promise_clamped(const Expr& value, const Expr& min, const Expr& max) {
   check_defined(value, "unsafe_promise_clamped");
-  auto limit = [&](const Expr& e, bool is_min) {
-    if (e.defined()) return cast(value.type(), e);
-    const Type type = value.type();
-    if (type.is_float())
-      return ir::make_const(type, is_min ? -std::numeric_limits<double>::infinity()
-                                         : std::numeric_limits<double>::infinity());
-    if (type.is_uint())
-      return is_min ? ir::make_zero(type) : ir::make_uint_const(type, type.max_uint());
-    return ir::make_const(type, is_min ? type.min_int() : type.max_int());
-  };
-  return call_op(Op::unsafe_promise_clamped, value.type(),
-                 {value, limit(min, true), limit(max, false)});
+  const Type type = value.type();
+  return call_op(Op::unsafe_promise_clamped, type,
+                 {value, min.defined() ? cast(type, min) : type.min(),
+                  max.defined() ? cast(type, max) : type.max()});
 }
 
-Expr strict_float(Expr e) {
-  check_defined(e, "strict_float");
-  return call_op(Op::strict_float, {e});
-}
+Expr strict_float(Expr e) { return marked(Op::strict_float, e); }
 
 Expr memoize_tag(Expr value, const std::vector<Expr>& key) {
   check_defined(value, "memoize_tag");
@@ -389,44 +379,36 @@ Expr memoize_tag(Expr value, const std::vector<Expr>& key) {
   return call_op(Op::memoize_tag, type, std::move(args));
 }
 
-Expr stop_gradient(Expr e) {
-  check_defined(e, "stop_gradient");
-  return call_op(Op::stop_gradient, {e});
-}
+Expr stop_gradient(Expr e) { return marked(Op::stop_gradient, e); }
 
 Expr undef(Type type) { return call_op(Op::undef, type, {}); }
 
 namespace ir {
 
 namespace {
-void check_parts(const std::vector<Expr>& values, const char* what) {
+
+// The call with these arguments behind those that stand first; it gives the first of them.
+Expr call_with(Op op, std::vector<Expr> first, const std::vector<Expr>& values) {
+  const char* what = op_info(op).name;
+  for (const Expr& condition : first) check_condition(condition, what);
   if (values.empty())
     user_error(text("apply ", what), "it gives the value of its first argument",
                "it was given none", "Give it a value");
   for (const Expr& value : values) check_defined(value, what);
+  first.insert(first.end(), values.begin(), values.end());
+  return call_op(op, values[0].type(), std::move(first));
 }
+
 }  // namespace
 
-Expr print_values(std::vector<Expr> values) {
-  check_parts(values, "print");
-  const Type type = values[0].type();
-  return call_op(Op::print, type, std::move(values));
-}
+Expr print_values(std::vector<Expr> values) { return call_with(Op::print, {}, values); }
 
 Expr print_values_when(Expr condition, std::vector<Expr> values) {
-  check_condition(condition, "print_when");
-  check_parts(values, "print_when");
-  const Type type = values[0].type();
-  values.insert(values.begin(), std::move(condition));
-  return call_op(Op::print_when, type, std::move(values));
+  return call_with(Op::print_when, {std::move(condition)}, values);
 }
 
 Expr require_values(Expr condition, std::vector<Expr> values) {
-  check_condition(condition, "require");
-  check_parts(values, "require");
-  const Type type = values[0].type();
-  values.insert(values.begin(), std::move(condition));
-  return call_op(Op::require, type, std::move(values));
+  return call_with(Op::require, {std::move(condition)}, values);
 }
 
 }  // namespace ir

@@ -219,6 +219,9 @@ void collect_parts(std::vector<Expr>& parts, Expr first, Rest&&... rest) {
 Expr print_values(std::vector<Expr> values);
 Expr print_values_when(Expr condition, std::vector<Expr> values);
 Expr require_values(Expr condition, std::vector<Expr> values);
+// Of an operand of `what`.
+void check_defined(const Expr& e, const char* what);
+void check_integer(const Expr& e, const char* what);
 }  // namespace ir
 // The first value; prints all of them, a line for each evaluation.
 // Requires: it gives the value of its first argument; every operand must be a defined expression.

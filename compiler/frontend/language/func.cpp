@@ -177,12 +177,7 @@ Func& Func::reorder_storage(const std::vector<Var>& dims) {
 }
 
 Func& Func::set_estimates(const Region& estimates) {
-  if (static_cast<int>(estimates.size()) != dimensions()) {
-    user_error(
-        "set estimates of " + quoted(name()), "there is one for each dimension",
-        text("it has ", dimensions(), " dimensions and was given ", estimates.size(), " estimates"),
-        "Give that many");
-  }
+  ir::check_estimates(name(), dimensions(), estimates);
   const std::vector<Var> variables = args();
   for (int d = 0; d < dimensions(); d++)
     set_estimate(variables[d], estimates[d].min, estimates[d].extent);

@@ -2,7 +2,6 @@
 #include "frontend/language/inline_reductions.h"
 
 #include <algorithm>
-#include <limits>
 #include <unordered_set>
 
 #include "frontend/language/integer_ops.h"
@@ -102,17 +101,6 @@ void check_undefined(const Func& f, const char* name) {
              "the Func that is given must have no definition", "it has one", "Give a new Func");
 }
 
-Expr largest(Type type) {
-  if (type.is_float()) return ir::make_const(type, std::numeric_limits<double>::infinity());
-  if (type.is_uint()) return ir::make_uint_const(type, type.max_uint());
-  return ir::make_const(type, type.max_int());
-}
-
-Expr smallest(Type type) {
-  if (type.is_float()) return ir::make_const(type, -std::numeric_limits<double>::infinity());
-  return type.is_uint() ? ir::make_zero(type) : ir::make_const(type, type.min_int());
-}
-
 // The update must run over the whole domain even when the body uses only part of its variables, or
 // none.
 Expr mention_domain(const Expr& e, const Reduction& reduction) {
@@ -133,9 +121,9 @@ Expr initial_value(Fold fold, Type type) {
     case Fold::Product:
       return ir::make_one(type);
     case Fold::Maximum:
-      return smallest(type);
+      return type.min();
     case Fold::Minimum:
-      return largest(type);
+      return type.max();
   }
   internal_error("a fold of unknown kind");
 }
@@ -174,7 +162,7 @@ Tuple reduce_place(bool is_max, const DomainPtr& domain, const Expr& e, const Fu
     initial.push_back(0);
     found.push_back(RVar(reduction.domain, static_cast<int>(i)));
   }
-  initial.push_back(is_max ? smallest(e.type()) : largest(e.type()));
+  initial.push_back(is_max ? e.type().min() : e.type().max());
   found.push_back(reduction.body);
   f(reduction.args) = Tuple(initial);
   const Tuple best = f(reduction.args);

@@ -19,10 +19,8 @@ struct Division {
   Expr numerator, divisor;
 
   Division(const Expr& n, const Expr& d, const char* what) {
-    if (!n.defined() || !d.defined()) {
-      user_error(text("apply ", what), "every operand must be a defined expression",
-                 "one of them was never assigned", "Assign the Expr before its use");
-    }
+    ir::check_defined(n, what);
+    ir::check_defined(d, what);
     const std::string asked = text("apply ", what, " to ", n, " and ", d);
     if (!n.type().is_int_or_uint() || n.type().bits() < 8 || n.type().bits() > 32) {
       user_error(asked, "the numerator is an integer of 8, 16 or 32 bits",
@@ -83,24 +81,18 @@ Type match_operands(Expr& a, Expr& b, const char* what) {
 
 namespace {
 
-void check_defined(const Expr& a, const Expr& b, const char* what) {
-  if (a.defined() && b.defined()) return;
-  user_error(text("apply ", what), "every operand must be a defined expression",
-             "one of them was never assigned", "Assign the Expr before its use");
-}
-
 void check_integers(const Expr& a, const Expr& b, const char* what) {
-  for (const Expr& e : {a, b}) {
-    if (e.type().is_int_or_uint()) continue;
-    user_error(text("apply ", what, " to ", e), "it takes integers",
-               "its type is " + to_string(e.type()), "Convert it with cast<>()");
-  }
+  ir::check_defined(a, what);
+  ir::check_defined(b, what);
+  ir::check_integer(a, what);
+  ir::check_integer(b, what);
 }
 
 int widest(const Expr& a, const Expr& b) { return std::max(a.type().bits(), b.type().bits()); }
 
 Type wide_type(const Expr& a, const Expr& b, const char* what) {
-  check_defined(a, b, what);
+  ir::check_defined(a, what);
+  ir::check_defined(b, what);
   const int bits = 2 * widest(a, b);
   if (bits > 64) {
     user_error(text("apply ", what, " to ", a, " and ", b), "its result has at most 64 bits",
@@ -134,13 +126,11 @@ Expr widening_sub(const Expr& a, const Expr& b) {
 // ---- clamped ----
 
 Expr saturating_add(const Expr& a, const Expr& b) {
-  check_defined(a, b, "saturating_add");
   check_integers(a, b, "saturating_add");
   return saturating_cast(a.type(), widening_add(a, b));
 }
 
 Expr saturating_sub(const Expr& a, const Expr& b) {
-  check_defined(a, b, "saturating_sub");
   check_integers(a, b, "saturating_sub");
   return saturating_cast(a.type(), widening_sub(a, b));
 }
@@ -171,8 +161,8 @@ Expr halving_sub(Expr a, Expr b) {
 // ---- parts of a number ----
 
 Expr extract_bits(Type type, const Expr& e, const Expr& lowest) {
-  check_defined(e, lowest, "extract_bits");
-  check_integers(lowest, lowest, "extract_bits");
+  ir::check_defined(e, "extract_bits");
+  ir::check_integer(lowest, "extract_bits");
   const Type bits = e.type().with_code(TypeCode::UInt);
   return reinterpret(
       type, cast(type.with_code(TypeCode::UInt), reinterpret(bits, e) >> cast(bits, lowest)));

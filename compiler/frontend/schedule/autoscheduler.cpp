@@ -89,10 +89,7 @@ std::string default_autoscheduler_name() {
 }
 
 AutoSchedulerFn find_autoscheduler(const std::string& name) {
-  std::string present;
-  for (const std::string& known : autoscheduler_names()) {
-    present += (present.empty() ? "" : ", ") + quoted(known);
-  }
+  const std::string present = listed(autoscheduler_names(), quoted);
   std::lock_guard lock(loaded().mutex);
   if (loaded().claimed_twice.count(name)) {
     user_error("schedule automatically with " + quoted(name), "autoschedulers have different names",

@@ -18,13 +18,13 @@ INTERNAL_HEADERS = {
 # Parts of templates that users name in no other way than by the whole.
 INTERNAL_SCOPES = {"Declared", "ArrayTraits", "ElementTraits", "InputValue", "InputElements", "ScalarElements",
                    "OutputElements", "GeneratorParamBase::InCpp", "RegisterGenerator", "tell_pass_observers",
-                   "GeneratorInputBase::values", "ParamMap::Entry", "AutoScheduleParam"}
+                   "GeneratorInputBase::values", "GeneratorOutput::OutputElements", "ParamMap::Entry", "AutoScheduleParam"}
 INTERNAL_NAMES = re.compile(
     r"contents|function|parameter|symbol|raw|handle|make_funcs|make_parameters|in_cpp|set_from_string|set_values|"
     r"set_from_loop_level|check_\w+|role_name|element_name|cpp_\w+|read_\w+|type_choices|number_text|param_text|"
     r"keeps_value|ElementOf|IsScalarIO|IsArrayIO|any_size|get_schedule|spec|entry|Ref|key|constant_for_input|"
     r"input_value|set_input|operator=|init_from_context|generate_all|schedule_all|is_generated|set_stub_name|"
-    r"allowed|smaller|larger|Var|generator|GeneratorFactory|RegisterGenerator|NamesInterface|IOKind|kind|"
+    r"allowed|said_by|Var|generator|GeneratorFactory|RegisterGenerator|NamesInterface|IOKind|kind|"
     r"GeneratorParamsMap|set_inputs|emit_cpp_stub")
 
 # How programs show an object whose class they seldom name.
