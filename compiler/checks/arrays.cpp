@@ -47,6 +47,15 @@ size_t count(const Shape& shape) {
   return n;
 }
 
+Shape shape_of_bound(const ir::ParameterContents& p) {
+  Shape shape;
+  for (int d = 0; p.buffer && d < p.dimensions; ++d) {
+    shape.mins.push_back(Buffer<>(*p.buffer).dim(d).min());
+    shape.extents.push_back(Buffer<>(*p.buffer).dim(d).extent());
+  }
+  return shape;
+}
+
 Shape shape_of_output(const Func& output, const std::vector<int>& mins,
                       const std::vector<int>& sizes, const std::string& asked,
                       const std::string& function) {
@@ -128,13 +137,13 @@ void fill(Buffer<>& buffer, const Values& values) {
   });
 }
 
-Values realize(Func f, const Shape& shape) {
-  Buffer<> out = new_buffer(f.types()[0], shape);
-  f.realize(Realization(std::vector<Buffer<>>{out}));
-  return values_of(out);
+bool is_checkable(Type type) { return type.is_float() && type.lanes() == 1; }
+
+double held_by(Type type, double v) {
+  return ir::Scalar::of_float(type.bits() < 32 ? type : Float(32), v).as_double();
 }
 
-bool is_checkable(Type type) { return type.is_float() && type.lanes() == 1; }
+Values realize(Func f, const Shape& shape) { return realize_values(std::move(f), shape)[0]; }
 
 std::vector<Values> realize_values(Func f, const Shape& shape) {
   std::vector<Buffer<>> out;
@@ -214,18 +223,13 @@ void Input::set_own(const Values& to) {
 
 Input bind_wide(const std::shared_ptr<ir::ParameterContents>& own,
                 const std::shared_ptr<ir::ParameterContents>& wide, const std::string& asked) {
-  Input input{own, wide, {}, {}, {}};
+  Input input{own, wide, shape_of_bound(*own), {}, {}};
   if (own->is_buffer ? own->buffer == nullptr : !own->value) {
     call_error(asked, "every input must be bound", retrograde::quoted(own->name) + " is not",
                "Set it before the check");
   }
   if (own->is_buffer) {
-    Buffer<> bound(*own->buffer);
-    for (int d = 0; d < own->dimensions; ++d) {
-      input.shape.mins.push_back(bound.dim(d).min());
-      input.shape.extents.push_back(bound.dim(d).extent());
-    }
-    input.values = values_of(bound);
+    input.values = values_of(Buffer<>(*own->buffer));
     input.buffer = new_buffer(Float(64), input.shape);
     ImageParam(wide).set(input.buffer);
   } else {

@@ -31,6 +31,7 @@ struct Shape {
   std::vector<int> mins, extents;
 };
 size_t count(const Shape& shape);
+Shape shape_of_bound(const ir::ParameterContents& p);  // none of a scalar, or where none is bound
 // `mins` may be empty: zeros. CompileError, with an example of the call `function`, when one does
 // not fit the output.
 Shape shape_of_output(const Func& output, const std::vector<int>& mins,
@@ -73,7 +74,8 @@ class Batch {
   Pipeline pipeline_;
 };
 
-bool is_checkable(Type type);  // a float
+bool is_checkable(Type type);         // a float
+double held_by(Type type, double v);  // v as float32 and the type can hold it
 // The place of the i-th element of an array.
 std::vector<int> place_of(size_t i, const Shape& shape);
 

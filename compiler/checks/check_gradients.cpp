@@ -107,7 +107,7 @@ class Checker {
   }
   // So that both precisions see the same numbers.
   static Values own_precision(Values values, Type type = Float(32)) {
-    for (double& v : values) v = ir::Scalar::of_float(type, v).as_double();
+    for (double& v : values) v = held_by(type, v);
     return values;
   }
   // Of each value of the output; none for integers.
@@ -115,9 +115,7 @@ class Checker {
     bool any = false;
     for (Type t : output_.types()) {
       any |= t.is_float();
-      const Type type = t.bits() < 32 ? t : Float(32);
-      weights_.push_back(t.is_float() ? own_precision(random_values(count(shape_)), type)
-                                      : Values());
+      weights_.push_back(t.is_float() ? own_precision(random_values(count(shape_)), t) : Values());
     }
     if (!any)
       unsupported(asked(), "derivatives are of floats", "the output has integers only",

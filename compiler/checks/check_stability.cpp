@@ -127,9 +127,8 @@ class StabilityChecker {
     watched_.insert(watched_.end(), adjoints.rbegin(), adjoints.rend());
     for (const auto& p : ir::parameters_of({output_.function()})) {
       if (!p->type.is_float()) continue;
-      Shape shape = shape_of_bound(*p);
       if (derivative.has(AdjointInput(p)))
-        watched_.push_back({p->name, true, derivative.of(AdjointInput(p)), shape});
+        watched_.push_back({p->name, true, derivative.of(AdjointInput(p)), shape_of_bound(*p)});
     }
     widen_watched();
   }
@@ -145,17 +144,6 @@ class StabilityChecker {
     auto shape = constant_shape(regions.of(&f));
     if (!shape || shape->extents.size() != f.args.size())
       return leave_out("its region is not known before it runs, or is too large");
-    return shape;
-  }
-
-  Shape shape_of_bound(const ir::ParameterContents& p) const {
-    Shape shape;
-    if (!p.is_buffer || !p.buffer) return shape;
-    Buffer<> bound(*p.buffer);
-    for (int d = 0; d < p.dimensions; ++d) {
-      shape.mins.push_back(bound.dim(d).min());
-      shape.extents.push_back(bound.dim(d).extent());
-    }
     return shape;
   }
 
@@ -218,9 +206,7 @@ class StabilityChecker {
       for (size_t k = 0; k < inputs_.size(); ++k) {
         if (inputs_[k].own != range.input.symbol()) continue;
         Values values = inputs_[k].values;
-        // What both precisions can hold.
-        const Type own = inputs_[k].own->type, type = own.bits() < 32 ? own : Float(32);
-        for (double& v : values) v = ir::Scalar::of_float(type, pick(range)).as_double();
+        for (double& v : values) v = held_by(inputs_[k].own->type, pick(range));
         set(k, values);
       }
     }
