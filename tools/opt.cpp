@@ -171,9 +171,8 @@ void run_graph(const Options& options) {
   ir::Graph graph = ir::parse_graph(read_all(options.file));
   ir::validate(graph, "parse_graph");
   if (!options.log.empty()) {
-    ir::apply_log(ScheduleLog::parse(read_all(options.log)), graph.outputs);
-    graph = ir::graph_of(graph.outputs);
-    ir::validate(graph, "apply_log");
+    graph = ir::graph_of(ir::with_log(ScheduleLog::parse(read_all(options.log)), graph.outputs));
+    ir::validate(graph, "with_log");
   }
   for (const std::string& name : options.passes) {
     const ir::GraphPass* pass = ir::find_graph_pass(name);

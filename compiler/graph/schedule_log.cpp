@@ -8,6 +8,7 @@
 
 #include "diagnostics/error.h"
 #include "graph/binder.h"
+#include "graph/copy_graph.h"
 #include "graph/directive_names.h"
 #include "graph/directive_text.h"
 #include "graph/give_directive.h"
@@ -269,6 +270,12 @@ ScheduleLog schedule_log(const std::vector<FuncPtr>& outputs) {
 void apply_log(const ScheduleLog& log, const std::vector<FuncPtr>& outputs) {
   Replay replay(log, outputs);
   for (const ScheduleLog::Entry& entry : log.entries) replay.give(entry);
+}
+
+std::vector<FuncPtr> with_log(const ScheduleLog& log, const std::vector<FuncPtr>& outputs) {
+  std::vector<FuncPtr> copies = copy_graph(outputs).outputs;
+  apply_log(log, copies);
+  return copies;
 }
 
 }  // namespace ir

@@ -56,6 +56,8 @@ namespace ir {
 ScheduleLog schedule_log(const std::vector<FuncPtr>& outputs);
 // Gives all of it to the Funcs of this graph.
 void apply_log(const ScheduleLog& log, const std::vector<FuncPtr>& outputs);
+// A pass from graph to graph: a copy of it with all of that given.
+std::vector<FuncPtr> with_log(const ScheduleLog& log, const std::vector<FuncPtr>& outputs);
 
 }  // namespace ir
 }  // namespace retrograde

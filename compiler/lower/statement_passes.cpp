@@ -11,6 +11,7 @@ const std::vector<StatementPass>& statement_passes() {
   static const std::vector<StatementPass> passes = {
       {"accumulate_vectors", accumulate_vectors},
       {"blend_masked_stores", blend_masked_stores},
+      {"check_promises", check_promises},
       {"deinterleave_loads", deinterleave_loads},
       {"drop_asserts", drop_asserts},
       {"drop_bounds_query", drop_bounds_query},
@@ -21,6 +22,7 @@ const std::vector<StatementPass>& statement_passes() {
        }},
       {"flatten_storage", [](const Stmt& s) { return flatten_storage(s); }},
       {"free_early", free_early},
+      {"fuzz_float_stores", fuzz_float_stores},
       {"join_indices", join_indices},
       {"lower_atomics", lower_atomics},
       {"partition_loops", partition_loops},

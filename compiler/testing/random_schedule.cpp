@@ -12,7 +12,6 @@
 
 #include "diagnostics/error.h"
 #include "frontend/data/param.h"
-#include "graph/copy_graph.h"
 #include "graph/directive_names.h"
 #include "graph/names.h"
 #include "graph/wrappers.h"
@@ -78,9 +77,7 @@ class Scheduler {
   // Those that the outputs need, with the Funcs of boundary conditions and inline reductions left
   // out: those stand for what they read.
   void find_funcs() {
-    const ir::GraphCopy copy = ir::copy_graph(outputs_of(program_));
-    ir::apply_log(log_, copy.outputs);
-    compiled_ = ir::apply_wrappers(copy.outputs);
+    compiled_ = ir::apply_wrappers(ir::with_log(log_, outputs_of(program_)));
     std::set<std::string> known;
     for (const Func& f : program_.funcs) known.insert(name_of(*f.function()));
     for (const ScheduleLog::Entry& entry : log_.entries) known.insert(ir::made_by(entry.directive));
@@ -106,14 +103,10 @@ class Scheduler {
 
   // Calls `visit` with each Func, by its number, and each image (-1) that the stage reads;
   // `direct`: itself, not through a Func that nobody schedules, each of which is looked into once.
+  using Seen = std::set<const ir::FuncContents*>;
   template <typename Visit>
-  void for_each_read(const ir::FuncContents& f, int stage, const Visit& visit) const {
-    std::set<const ir::FuncContents*> seen;
-    for_each_read(f, stage, visit, true, seen);
-  }
-  template <typename Visit>
-  void for_each_read(const ir::FuncContents& f, int stage, const Visit& visit, bool direct,
-                     std::set<const ir::FuncContents*>& seen) const {
+  void for_each_read(const ir::FuncContents& f, int stage, const Visit& visit, bool direct = true,
+                     Seen&& seen = {}) const {
     walk(f.stage(stage), [&](const ir::Call& call) {
       if (call.symbol.raw() == &f) return;
       if (call.call_type == ir::CallType::Image) visit(-1, call, direct);
@@ -124,7 +117,7 @@ class Scheduler {
         visit(static_cast<int>(known - funcs_.begin()), call, direct);
       } else if (seen.insert(callee.get()).second) {
         for (int s = 0; s < callee->stage_count(); ++s)
-          for_each_read(*callee, s, visit, false, seen);
+          for_each_read(*callee, s, visit, false, std::move(seen));
       }
     });
   }
@@ -423,28 +416,17 @@ class Scheduler {
     return levels;
   }
 
-  // Whether something may be computed there, in each of the stage's schedules.
+  // Whether something may be computed there, in each of the stage's schedules. A loop level names a
+  // Func and a loop, not a stage: no other stage may have such a loop.
   bool is_legal_level(const Level& level) const {
-    if (!is_unique(level)) return false;
-    for (const Loops& loops : loops_[level.func][level.stage]) {
-      bool found = false, vectorized = false;
-      for (const Loop& loop : loops) {
-        found |= loop.name == level.name;
-        vectorized |= found && loop.type == ForType::Vectorized;
-      }
-      if (!found || vectorized) return false;
-    }
-    return true;
-  }
-
-  // A loop level names a Func and a loop, not a stage.
-  bool is_unique(const Level& level) const {
     for (int s = 0; s < stages(level.func); ++s) {
-      if (s == level.stage) continue;
       for (const Loops& loops : loops_[level.func][s]) {
-        for (const Loop& loop : loops) {
-          if (loop.name == level.name) return false;
-        }
+        const auto at = std::find_if(loops.begin(), loops.end(),
+                                     [&](const Loop& loop) { return loop.name == level.name; });
+        if ((s == level.stage) == (at == loops.end())) return false;
+        if (std::any_of(at, loops.end(),
+                        [](const Loop& loop) { return loop.type == ForType::Vectorized; }))
+          return false;
       }
     }
     return true;

@@ -1,0 +1,91 @@
+// Every golden/pipeline/<pass>/<case>.in, the text of a graph, lowered up to its pass: <case>.out has
+// the program before the pass and after it. A first line "target ..." says for what it is lowered.
+// RETROGRADE_UPDATE_GOLDEN=1 writes the .out files instead; read the difference before you commit
+// it.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+
+#include "graph/graph.h"
+#include "ir/print.h"
+#include "lower/lower.h"
+#include "lower/statement_passes.h"
+#include "support/same_numbers.h"
+
+namespace retrograde::ir {
+namespace {
+
+namespace fs = std::filesystem;
+
+const fs::path golden = fs::path(RETROGRADE_TEST_DIR) / "golden";
+
+std::string read_file(const fs::path& path) {
+  std::ifstream in(path);
+  return {std::istreambuf_iterator<char>(in), {}};
+}
+
+std::vector<fs::path> find_cases() {
+  std::vector<fs::path> cases;
+  for (const auto& entry : fs::recursive_directory_iterator(golden / "pipeline")) {
+    if (entry.path().extension() == ".in") cases.push_back(entry.path());
+  }
+  std::sort(cases.begin(), cases.end());
+  return cases;
+}
+
+// Before the pass and after it.
+std::string lowered_by(const std::string& pass, std::string source) {
+  LowerOptions options{Target("x86-64-linux-avx2"), true, {}, pass};
+  if (source.rfind("target ", 0) == 0) {
+    const size_t end = source.find('\n');
+    options.target = Target(source.substr(7, end - 7));
+    source = source.substr(end + 1);
+  }
+  Stmt before, after;
+  options.observe = [&](const std::string&, double, const Stmt& s) {
+    before = after;
+    after = s;
+  };
+  const Graph graph = parse_graph(source);
+  validate(graph, "parse_graph");
+  lower("golden", graph.outputs, infer_arguments(graph.outputs), options);
+  const std::string first =
+      before.defined() ? "---- before\n" + print(before) + "---- after\n" : "";
+  return same_numbers(first + print(after));
+}
+
+class PipelineGolden : public testing::TestWithParam<fs::path> {};
+
+TEST_P(PipelineGolden, GivesWhatItsFileSays) {
+  const std::string pass = GetParam().parent_path().filename().string();
+  const std::string result = lowered_by(pass, read_file(GetParam()));
+  fs::path expected = fs::path(GetParam()).replace_extension(".out");
+  if (std::getenv("RETROGRADE_UPDATE_GOLDEN")) std::ofstream(expected) << result;
+  EXPECT_EQ(result, read_file(expected));
+}
+
+INSTANTIATE_TEST_SUITE_P(Cases, PipelineGolden, testing::ValuesIn(find_cases()),
+                         [](const auto& info) {
+                           return info.param.parent_path().filename().string() + "_" +
+                                  info.param.stem().string();
+                         });
+
+// Each pass of the compiler, and each that opt runs by itself, has a case: as one from statement to
+// statement, or of what it makes of a graph.
+TEST(PassesOfThePipeline, AreAllTested) {
+  std::vector<std::string> names = pass_names();
+  for (const StatementPass& pass : statement_passes()) names.push_back(pass.name);
+  for (const std::string& name : names) {
+    const bool is_simplify = name.rfind("simplify", 0) == 0;  // of storage, of vectors: the same
+    const std::string folder = is_simplify ? "simplify" : name;
+    EXPECT_TRUE(fs::exists(golden / "lower" / folder) || fs::exists(golden / "pipeline" / folder))
+        << name << " has no golden test";
+  }
+}
+
+}  // namespace
+}  // namespace retrograde::ir
