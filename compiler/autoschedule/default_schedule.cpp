@@ -5,6 +5,7 @@
 #include <unordered_set>
 
 #include "autoschedule/cut_reductions.h"
+#include "autoschedule/inlined_reads.h"
 #include "autoschedule/join_sweeps.h"
 #include "autoschedule/loop_order.h"
 #include "autoschedule/new_loop.h"
@@ -12,6 +13,7 @@
 #include "autoschedule/placement_limits.h"
 #include "autoschedule/reduction_slices.h"
 #include "autoschedule/scatter_schedule.h"
+#include "autoschedule/scatter_slices.h"
 #include "autoschedule/slices.h"
 #include "autoschedule/stored_funcs.h"
 #include "diagnostics/large_stack.h"
@@ -42,12 +44,12 @@ size_t innermost_dimension(const Call& call) {
   return static_cast<size_t>(found - args.begin()) % args.size();
 }
 
-// A dimension beyond the first that runs along the rows of what a pure stage reads, while the
-// first one runs across them.
+// A dimension beyond the first that runs along the rows of what a pure stage reads, through what is
+// computed inline too, while the first one runs across them.
 std::optional<size_t> transposed_dimension(const FuncContents& f, const Definition& stage) {
   std::optional<size_t> result;
   if (!stage.rvars.empty() || f.args.size() < 2) return result;
-  for_each_expr(stage, [&](const Expr& root) {
+  for (const Expr& root : roots_with_inlined(stage)) {
     walk(root, [&](const Expr& e) {
       const auto* call = e.as<Call>();
       if (!call || call->call_type == CallType::Operator || call->args.size() < 2) return true;
@@ -61,7 +63,7 @@ std::optional<size_t> transposed_dimension(const FuncContents& f, const Definiti
       }
       return true;
     });
-  });
+  }
   return result;
 }
 
@@ -226,12 +228,16 @@ class LoopChooser {
     }
   }
 
-  // Squares, whose rows stay in the cache until their columns are read.
+  // Squares, whose rows stay in the cache until their columns are read, one row of them after the
+  // other.
   void tile(size_t dimension) {
     const Var x = variable_of(0), y = variable_of(dimension), xi = inside(x);
     stage_.split(x, x, xi, lanes, TailStrategy::GuardWithIf);
     const Var yi = inside(y);
-    stage_.split(y, y, yi, lanes, TailStrategy::GuardWithIf).reorder(xi, yi, x, y).vectorize(xi);
+    stage_.split(y, y, yi, lanes, TailStrategy::GuardWithIf);
+    std::vector<VarOrRVar> order{xi, yi};
+    for (const size_t d : pure_) order.push_back(variable_of(d));
+    stage_.reorder(order).vectorize(xi);
     stage_.parallel(variable_of(pure_.back()));
   }
 
@@ -252,6 +258,23 @@ void compute_at_root(const std::vector<FuncPtr>& funcs, const VectorUnit& unit) 
   }
 }
 
+// A scatter, or what reads slices of one or adds parts of one up: all of its loops; false: none of
+// these.
+bool schedule_scatter(const FuncPtr& f, const SlicedScatters& slices, const SizeEstimate& sizes) {
+  if (const ScatterSlices* sliced = slices.of_scatter(*f)) {
+    schedule_scatter_lanes(f, sliced->lanes, sizes, true);
+  } else if (const ScatterSlices* read = slices.of_reader(*f)) {
+    schedule_slices(*read);
+  } else if (const auto lanes = scatter_lanes(*f, sizes)) {
+    schedule_scatter_lanes(f, *lanes, sizes);
+  } else if (const auto layout = layout_of_parts(*f)) {
+    schedule_sum_of_parts(f, *layout, sizes);
+  } else {
+    return false;
+  }
+  return true;
+}
+
 }  // namespace
 
 void give_default_schedule(const std::vector<FuncPtr>& outputs, const VectorUnit& unit,
@@ -266,15 +289,13 @@ void give_default_schedule(const std::vector<FuncPtr>& outputs, const VectorUnit
       what == Scheduling::Everything ? stored_in_all(outputs, limits) : stored_by_default(outputs);
   const SizeEstimate sizes(outputs);
   cut_reductions(outputs, sizes, whole);
+  const SlicedScatters slices(outputs, stored, whole, sizes);
   std::vector<FuncPtr> given;  // loops, at root
   for (const FuncPtr& f : stored) {
     if (is_touched(*f)) continue;
     Func(f).compute_root();
     if (f->is_extern() || limits.levels.contains(f.get())) continue;
-    if (const auto lanes = scatter_lanes(*f, sizes)) {
-      schedule_scatter_lanes(f, *lanes, sizes);
-      continue;
-    }
+    if (schedule_scatter(f, slices, sizes)) continue;
     for (int s = 0; s < f->stage_count(); ++s) LoopChooser(f, s, unit, sizes).give();
     given.push_back(f);
   }

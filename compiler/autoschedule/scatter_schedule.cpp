@@ -8,6 +8,7 @@
 #include "frontend/language/rdom.h"
 #include "frontend/schedule/stage.h"
 #include "graph/own_reads.h"
+#include "ir/equal.h"
 #include "ir/memory_reads.h"
 #include "ir/visit.h"
 
@@ -18,6 +19,13 @@ namespace {
 constexpr int most_lanes = 16;
 constexpr int64_t least_lanes = 4;  // of a dimension that is worth vectors
 constexpr int64_t few_values = 4;   // iterations that are unrolled
+
+// Of a dimension of so many elements.
+int lanes_for(int64_t extent) {
+  int width = most_lanes;
+  while (width > std::max<int64_t>(extent, 1)) width /= 2;
+  return width;
+}
 
 bool adds_to_itself(const FuncContents& f, const Definition& update) {
   return std::all_of(update.values.begin(), update.values.end(), [&](const Expr& value) {
@@ -100,13 +108,14 @@ Roles roles_of(const FuncContents& f, size_t lanes) {
 }
 
 // Elements in the order of memory, in parallel over the last dimension.
-void schedule_zeros(const FuncPtr& f, const std::vector<Var>& dims, int width) {
+void schedule_zeros(const FuncPtr& f, const std::vector<Var>& dims, int width, bool in_slices) {
   Stage zeros(f, 0);
-  zeros.reorder(std::vector<VarOrRVar>(dims.begin(), dims.end())).parallel(dims.back());
+  zeros.reorder(std::vector<VarOrRVar>(dims.begin(), dims.end()));
+  if (!in_slices) zeros.parallel(dims.back());
   vectorize(zeros, dims[0], width, TailStrategy::GuardWithIf);
 }
 
-void schedule_update(const FuncPtr& f, int s, const Roles& roles, int width,
+void schedule_update(const FuncPtr& f, int s, const Roles& roles, int width, bool in_slices,
                      const SizeEstimate& sizes) {
   const Definition& update = f->stage(s);
   Stage stage(f, s);
@@ -131,6 +140,7 @@ void schedule_update(const FuncPtr& f, int s, const Roles& roles, int width,
   stage.reorder(order).vectorize(inner[0]);
   for (size_t i = 1; i < inner.size(); ++i) stage.unroll(inner[i]);
   for (const VarOrRVar& tap : taps) stage.unroll(tap);
+  if (in_slices) return;
   for (const VarOrRVar& loop : outer) stage.parallel(loop);
 }
 
@@ -150,21 +160,86 @@ std::optional<ScatterLanes> scatter_lanes(const FuncContents& f, const SizeEstim
     lanes = d;
   }
   if (most < least_lanes) return {};
-  int width = most_lanes;
-  while (width > most) width /= 2;
-  return ScatterLanes{lanes, width};
+  return ScatterLanes{lanes, lanes_for(most)};
 }
 
-void schedule_scatter_lanes(const FuncPtr& f, const ScatterLanes& lanes,
-                            const SizeEstimate& sizes) {
+std::vector<size_t> dimensions_apart(const FuncContents& f, const ScatterLanes& lanes) {
+  return roles_of(f, lanes.dimension).apart;
+}
+
+void schedule_scatter_lanes(const FuncPtr& f, const ScatterLanes& lanes, const SizeEstimate& sizes,
+                            bool in_slices) {
   const Roles roles = roles_of(*f, lanes.dimension);
   std::vector<Var> dims;
   for (const std::vector<size_t>& some : {roles.independent, roles.scattered, roles.apart}) {
     for (const size_t d : some) dims.push_back(Var(f->args[d]));
   }
   Func(f).reorder_storage(dims);
-  schedule_zeros(f, dims, lanes.width);
-  for (int s = 1; s < f->stage_count(); ++s) schedule_update(f, s, roles, lanes.width, sizes);
+  schedule_zeros(f, dims, lanes.width, in_slices);
+  for (int s = 1; s < f->stage_count(); ++s)
+    schedule_update(f, s, roles, lanes.width, in_slices, sizes);
+}
+
+// ---- sums of parts ----
+
+namespace {
+
+// The parts that an update adds to its own element, number after number.
+FuncPtr parts_of(const FuncContents& f, const Definition& update) {
+  if (update.predicate.defined() || update.rvars.size() != 1) return nullptr;
+  FuncPtr parts;
+  for (const Expr& value : update.values) {
+    const auto* sum = value.as<Add>();
+    const auto* call = sum && is_old_value(sum->a, f, update) ? sum->b.as<Call>() : nullptr;
+    parts = call && call->call_type == CallType::Func ? func_of(*call) : nullptr;
+    const bool has_parts = parts && parts->made && parts->made->has_parts &&
+                           parts->made->lanes == 0 && call->args.size() == f.args.size() + 1;
+    if (!has_parts) return nullptr;
+    for (size_t d = 0; d < f.args.size(); ++d) {
+      if (!is_pure_position(f, update, d) || !equal(call->args[d], update.args[d])) return nullptr;
+    }
+  }
+  return parts;
+}
+
+// Dimensions, innermost first; empty where they lie as they stand.
+std::vector<size_t> storage_order(const FuncContents& f) {
+  std::vector<size_t> order;
+  for (const std::string& dim : f.schedule.storage_dims) {
+    const auto found = std::find(f.args.begin(), f.args.end(), dim);
+    order.push_back(static_cast<size_t>(found - f.args.begin()));
+  }
+  return std::is_sorted(order.begin(), order.end()) ? std::vector<size_t>() : order;
+}
+
+}  // namespace
+
+std::optional<std::vector<size_t>> layout_of_parts(const FuncContents& f) {
+  std::optional<std::vector<size_t>> layout;
+  for (const Definition& update : f.updates) {
+    const FuncPtr parts = parts_of(f, update);
+    std::vector<size_t> order = parts ? storage_order(*parts) : std::vector<size_t>();
+    if (order.empty() || order.back() != f.args.size()) return std::nullopt;
+    order.pop_back();
+    if (layout && *layout != order) return std::nullopt;
+    layout = order;
+  }
+  return layout;
+}
+
+void schedule_sum_of_parts(const FuncPtr& f, const std::vector<size_t>& layout,
+                           const SizeEstimate& sizes) {
+  std::vector<Var> dims;
+  for (const size_t d : layout) dims.push_back(Var(f->args[d]));
+  const int width = lanes_for(sizes.extent(*f, layout[0]).value_or(most_lanes));
+  Func(f).reorder_storage(dims);
+  for (int s = 0; s < f->stage_count(); ++s) {
+    Stage stage(f, s);
+    std::vector<VarOrRVar> order(dims.begin(), dims.end());
+    if (s > 0) order.insert(order.begin() + 1, RVar(f->stage(s).rvars[0].var));
+    stage.reorder(order).parallel(dims.back());
+    vectorize(stage, dims[0], width, TailStrategy::GuardWithIf);
+  }
 }
 
 // ---- vectors of iterations ----

@@ -12,6 +12,7 @@
 #pragma once
 
 #include <optional>
+#include <vector>
 
 #include "autoschedule/size_estimate.h"
 #include "frontend/schedule/stage.h"
@@ -29,8 +30,20 @@ struct ScatterLanes {
 
 // The dimension that is worth vectors, of a Func whose updates scatter along others.
 std::optional<ScatterLanes> scatter_lanes(const FuncContents& f, const SizeEstimate& sizes);
-// All of f, computed at root.
-void schedule_scatter_lanes(const FuncPtr& f, const ScatterLanes& lanes, const SizeEstimate& sizes);
+// Dimensions each of whose values has places of its own.
+std::vector<size_t> dimensions_apart(const FuncContents& f, const ScatterLanes& lanes);
+// All of f, computed at root, or slice by slice in loops that run in parallel.
+void schedule_scatter_lanes(const FuncPtr& f, const ScatterLanes& lanes, const SizeEstimate& sizes,
+                            bool in_slices = false);
+
+// Parts of a scatter, laid out for its lanes, are summed as they lie: the layout of the parts, but the
+// number of the part, for a Func that adds them up and nothing else.
+//
+//   sum(x, y, c) += parts(x, y, c, part)      for y, x: for part: for c in vectors
+std::optional<std::vector<size_t>> layout_of_parts(const FuncContents& f);
+// All of f, computed at root, with its dimensions innermost first.
+void schedule_sum_of_parts(const FuncPtr& f, const std::vector<size_t>& layout,
+                           const SizeEstimate& sizes);
 
 // Whether the stage adds to places that data decide, along the first dimension too, over a loop that
 // is worth vectors of iterations.

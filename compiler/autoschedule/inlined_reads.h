@@ -1,0 +1,16 @@
+// inlined_reads.h -- what a stage reads of what is stored, through the Funcs that are computed inline.
+#pragma once
+
+#include <vector>
+
+#include "graph/function.h"
+
+namespace retrograde::ir {
+
+// The places, the condition and the values of a stage with the calls of Funcs that are computed
+// inline replaced by their values, without lets; of many such calls the first ones only. `stored`:
+// those that will be at root, whether they are scheduled yet or not.
+std::vector<Expr> roots_with_inlined(const Definition& stage,
+                                     const std::vector<FuncPtr>& stored = {});
+
+}  // namespace retrograde::ir

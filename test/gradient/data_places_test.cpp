@@ -1,0 +1,190 @@
+// How adjoints of look-ups at places that data decide are scheduled when nobody does it: slices of
+// large scatters, sums of private parts.
+#include <gtest/gtest.h>
+
+#include <regex>
+
+#include "autodiff/derivative.h"
+#include "autoschedule/default_schedule.h"
+#include "frontend/language/func.h"
+#include "frontend/run/pipeline.h"
+#include "gradient/gradient_check.h"
+#include "graph/copy_graph.h"
+#include "graph/schedule_log.h"
+#include "support/errors.h"
+
+namespace retrograde {
+namespace {
+
+// An image of so many channels, read between its pixels where a flow says.
+struct Warp {
+  Warp(int size, int channels)
+      : size(size),
+        channels(channels),
+        image(gradient::random_image({size, size, channels}, -1, 1, 1)),
+        flow(gradient::random_image({size, size, 2}, -5, 5, 2)),
+        seed(gradient::random_image({size, size, channels}, -1, 1, 3)) {
+    Var x("x"), y("y"), c("c");
+    u(x, y) = clamp(x + flow(x, y, 0), 0.0f, size - 1.0f);
+    v(x, y) = clamp(y + flow(x, y, 1), 0.0f, size - 1.0f);
+    const Expr i = clamp(cast<int>(u(x, y)), 0, size - 2);
+    const Expr j = clamp(cast<int>(v(x, y)), 0, size - 2);
+    warped(x, y, c) =
+        lerp(lerp(image(i, j, c), image(i + 1, j, c), u(x, y) - i),
+             lerp(image(i, j + 1, c), image(i + 1, j + 1, c), u(x, y) - i), v(x, y) - j);
+  }
+  // By the image, by the flow, and the warped image.
+  std::vector<Func> outputs() {
+    const Derivative d = propagate_adjoints(warped, seed);
+    std::vector<Func> funcs{d(image), d(flow), warped};
+    const std::vector<std::vector<int>> sizes{
+        {size, size, channels}, {size, size, 2}, {size, size, channels}};
+    for (size_t k = 0; k < funcs.size(); ++k) {
+      Region all;
+      for (const int extent : sizes[k]) all.push_back({0, extent});
+      funcs[k].set_estimates(all);
+    }
+    return funcs;
+  }
+  std::vector<Buffer<float>> run(Pipeline pipeline, int threads) const {
+    std::vector<Buffer<float>> results{Buffer<float>(size, size, channels),
+                                       Buffer<float>(size, size, 2),
+                                       Buffer<float>(size, size, channels)};
+    pipeline.jit_handlers().thread_limit = threads;
+    pipeline.realize(Realization({results[0], results[1], results[2]}));
+    return results;
+  }
+
+  int size, channels;
+  Buffer<float> image, flow, seed;
+  Func u{"u"}, v{"v"}, warped{"warped"};
+};
+
+// Without the numbers that a process puts behind names.
+std::string plain(const std::string& text) {
+  return std::regex_replace(text, std::regex("\\$[0-9]+"), "");
+}
+
+std::string log_of(const std::vector<Func>& outputs) {
+  std::vector<ir::FuncPtr> funcs;
+  for (const Func& f : outputs) funcs.push_back(f.function());
+  return plain(ir::schedule_log(ir::schedule_unscheduled(funcs)).to_text());
+}
+
+// A copy in which every sum is at root, in plain loops.
+Pipeline in_plain_loops(const std::vector<Func>& outputs) {
+  std::vector<ir::FuncPtr> funcs;
+  for (const Func& f : outputs) funcs.push_back(f.function());
+  const std::vector<ir::FuncPtr> copies = ir::copy_graph(funcs).outputs;
+  for (const ir::FuncPtr& f : ir::topological_order(copies)) {
+    if (!f->is_pure()) Func(f).compute_root();
+  }
+  Pipeline pipeline(std::vector<Func>(copies.begin(), copies.end()));
+  pipeline.unscheduled();
+  return pipeline;
+}
+
+void expect_close(const Buffer<float>& found, const Buffer<float>& expected) {
+  for (size_t i = 0; i < expected.number_of_elements(); ++i) {
+    const float e = expected.data()[i];
+    ASSERT_NEAR(found.data()[i], e, 1e-5 * (1 + std::abs(e))) << "element " << i;
+  }
+}
+
+void expect_same_values(Warp& warp) {
+  const std::vector<Func> outputs = warp.outputs();
+  const auto expected = warp.run(in_plain_loops(outputs), 1);
+  const auto one = warp.run(Pipeline(outputs), 1);
+  const auto many = warp.run(Pipeline(outputs), 3);
+  for (size_t k = 0; k < outputs.size(); ++k) {
+    SCOPED_TRACE(k);
+    expect_close(one[k], expected[k]);
+    for (size_t i = 0; i < one[k].number_of_elements(); ++i)
+      ASSERT_EQ(one[k].data()[i], many[k].data()[i]) << "element " << i;
+  }
+}
+
+// 18 MiB in double: too much for private parts.
+TEST(ScatterSlices, AreComputedInTheLoopsOfTheirOnlyReader) {
+  Warp warp(136, 128);
+  const std::vector<Func> outputs = warp.outputs();
+  const std::string log = log_of(outputs), adjoint = plain(outputs[0].name());
+  EXPECT_NE(log.find(".compute_at(loop(" + adjoint + ", "), std::string::npos) << log;
+  EXPECT_NE(log.find("_sum"), std::string::npos) << log;
+  expect_same_values(warp);
+}
+
+// Channels that make no whole slice.
+TEST(ScatterSlices, MayBeIncomplete) {
+  Warp warp(139, 127);
+  const std::vector<Func> outputs = warp.outputs();
+  const std::string log = log_of(outputs);
+  EXPECT_NE(log.find(".compute_at(loop(" + plain(outputs[0].name()) + ", "), std::string::npos)
+      << log;
+  expect_same_values(warp);
+}
+
+TEST(ScatterSlices, AreNotOfWhatFitsACache) {
+  Warp warp(40, 24);
+  const std::vector<Func> outputs = warp.outputs();
+  const std::string log = log_of(outputs);
+  EXPECT_EQ(log.find(".compute_at(loop(" + plain(outputs[0].name()) + ", "), std::string::npos)
+      << log;
+}
+
+TEST(ScatterSlices, AreNotWhereSeveralReadThem) {
+  Warp warp(136, 128);
+  std::vector<Func> outputs = warp.outputs();
+  Func sum = Func(ir::direct_callees(*outputs[0].function())[0]);
+  ASSERT_NE(sum.name().find("_sum"), std::string::npos);
+  Var x("x"), y("y"), c("c");
+  Func other("other");
+  other(x, y, c) = sum(x, y, c) * 2.0f;
+  other.set_estimates({{0, 136}, {0, 136}, {0, 128}});
+  outputs.push_back(other);
+  EXPECT_EQ(log_of(outputs).find(".compute_at(loop("), std::string::npos);
+}
+
+// A grid of a few coefficients: few elements, in many parts.
+TEST(SumsOfParts, LieAsTheParts) {
+  const int size = 400, cells = 20;
+  const Buffer<float> guide = gradient::random_image({size, size}, 0, 7, 1);
+  const Buffer<float> grid = gradient::random_image({cells, cells, 8, 12}, -1, 1, 2);
+  const Buffer<float> seed = gradient::random_image({size, size, 12}, -1, 1, 3);
+  Var x("x"), y("y"), k("k");
+  Func sliced("sliced");
+  const Expr i = clamp(cast<int>(guide(x, y) * 2.5f), 0, cells - 1);
+  const Expr j = clamp(cast<int>(guide(y, x) * 2.5f), 0, cells - 1);
+  sliced(x, y, k) = grid(i, j, clamp(cast<int>(guide(x, y)), 0, 7), k);
+  const Derivative d = propagate_adjoints(sliced, seed);
+  Func adjoint = d(grid);
+  adjoint.set_estimates({{0, cells}, {0, cells}, {0, 8}, {0, 12}});
+  std::vector<std::string> layouts;
+  for (const ir::FuncPtr& f : ir::topological_order(ir::schedule_unscheduled({adjoint.function()})))
+    if (!f->schedule.storage_dims.empty() && f->schedule.storage_dims[0] != f->args[0])
+      layouts.push_back(f->name);
+  ASSERT_EQ(layouts.size(), 2u) << log_of({adjoint});
+  EXPECT_NE(layouts[0].find("_parts"), std::string::npos) << layouts[0];
+  EXPECT_NE(layouts[1].find("_sum"), std::string::npos) << layouts[1];
+  const Buffer<float> expected = in_plain_loops({adjoint}).realize({cells, cells, 8, 12})[0];
+  expect_close(adjoint.realize({cells, cells, 8, 12}), expected);
+}
+
+// Two Funcs between what is read across and its reader are computed inline.
+TEST(TransposedReads, AreSeenThroughWhatIsInline) {
+  const Buffer<float> image = gradient::random_image({64, 64}, -1, 1, 1);
+  const Buffer<float> other = gradient::random_image({64, 64}, -1, 1, 2);
+  Var x("x"), y("y");
+  Func turned("turned"), scaled("scaled"), sum("sum");
+  RDom r(0, 64, 0, 64);
+  turned(x, y) = image(y, x);
+  scaled(x, y) = turned(x, y) * 2.0f;
+  sum() = 0.0f;
+  sum() += scaled(r.x, r.y) * other(r.x, r.y);
+  const Derivative d = propagate_adjoints(sum);
+  const ir::FuncPtr adjoint = ir::schedule_unscheduled({d(image).function()})[0];
+  ASSERT_EQ(adjoint->pure->schedule.dims.size(), 4u) << log_of({d(image)});
+}
+
+}  // namespace
+}  // namespace retrograde
