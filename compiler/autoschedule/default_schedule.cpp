@@ -7,6 +7,7 @@
 #include "autoschedule/cut_reductions.h"
 #include "autoschedule/inlined_reads.h"
 #include "autoschedule/join_sweeps.h"
+#include "autoschedule/look_ups.h"
 #include "autoschedule/loop_order.h"
 #include "autoschedule/new_loop.h"
 #include "autoschedule/only_reader.h"
@@ -103,6 +104,7 @@ class LoopChooser {
     if (pure_.empty()) return;
     if (auto d = pure_[0] == 0 ? transposed_dimension(f_, definition()) : std::nullopt)
       return tile(*d);
+    if (!scatters && schedule_look_ups(f_, index_, stage_, lanes, sizes_)) return;
     if (!scatters && pure_[0] == 0 && tile_in_registers()) return;
     const bool reduces = !definition().rvars.empty();
     if (pure_.size() > 1 || (reduces && pure_[0] != 0)) stage_.parallel(variable_of(pure_.back()));

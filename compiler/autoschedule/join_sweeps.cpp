@@ -106,11 +106,14 @@ bool depends_on(const FuncPtr& f, const FuncPtr& other) {
   return std::find(order.begin(), order.end(), other) != order.end();
 }
 
-// The innermost loop of a reduction, inside of which are vectors and what is unrolled.
-std::optional<RVar> innermost_reduction(const Sweep& sweep) {
+// The innermost loop that is none: inside of it are vectors and what is unrolled. It must be one of a
+// reduction, or have one inside of it.
+std::optional<VarOrRVar> innermost_loop(const Sweep& sweep) {
+  bool reduces = false;
   for (const Dim& loop : sweep.loops()) {
-    if (loop.is_reduction) return RVar(loop.var);
-    if (loop.runs != ForType::Vectorized && loop.runs != ForType::Unrolled) return std::nullopt;
+    reduces |= loop.is_reduction;
+    if (loop.runs == ForType::Vectorized || loop.runs == ForType::Unrolled) continue;
+    return reduces ? std::optional(VarOrRVar(loop.var, loop.is_reduction)) : std::nullopt;
   }
   return std::nullopt;
 }
@@ -135,7 +138,7 @@ void join_sweeps(const std::vector<FuncPtr>& outputs, const std::vector<FuncPtr>
       if (with.is_joined || !has_same_loops(with, joining) ||
           !has_same_domain(with, joining, sizes) || !look_up_the_same(with, joining))
         continue;
-      const auto level = innermost_reduction(with);
+      const auto level = innermost_loop(with);
       if (!level || depends_on(joining.func, with.func)) continue;
       Stage(joining.func, joining.stage).compute_with(Stage(with.func, with.stage), *level);
       with.is_joined = joining.is_joined = true;

@@ -1,5 +1,5 @@
 // How adjoints of look-ups at places that data decide are scheduled when nobody does it: slices of
-// large scatters, sums of private parts.
+// large scatters, sums of private parts, planes that share their places.
 #include <gtest/gtest.h>
 
 #include <regex>
@@ -143,6 +143,41 @@ TEST(ScatterSlices, AreNotWhereSeveralReadThem) {
   other.set_estimates({{0, 136}, {0, 136}, {0, 128}});
   outputs.push_back(other);
   EXPECT_EQ(log_of(outputs).find(".compute_at(loop("), std::string::npos);
+}
+
+TEST(LookUps, OfSeveralPlanesShareTheirPlaces) {
+  for (const int channels : {3, 4, 9}) {
+    SCOPED_TRACE(channels);
+    Warp warp(37, channels);
+    const std::string log = log_of(warp.outputs());
+    const std::string planes = std::to_string(channels <= 4 ? channels : 2);
+    EXPECT_NE(log.find("warped.split(c, c, ci, " + planes + ", GuardWithIf)"), std::string::npos)
+        << log;
+    EXPECT_NE(log.find("warped.run(ci, Unrolled)"), std::string::npos) << log;
+    expect_same_values(warp);
+  }
+}
+
+// Planes outside of a block of rows, and what both coordinates read, read once.
+TEST(LookUps, ThatAreSummedRunPlaneAfterPlane) {
+  Warp warp(67, 21);
+  const std::string log = log_of(warp.outputs());
+  EXPECT_NE(log.find("v_adj.update(0).split(y, y, yi, 8, GuardWithIf)"), std::string::npos) << log;
+  EXPECT_NE(log.find("u_adj.update(0).compute_with(loop(v_adj, x, 1))"), std::string::npos) << log;
+  expect_same_values(warp);
+}
+
+// What reads one place only has no use for it.
+TEST(LookUps, OfATableKeepTheirLoops) {
+  const Buffer<float> table = gradient::random_image({256, 3}, 0, 1, 1);
+  const Buffer<float> seed = gradient::random_image({40, 30, 3}, -1, 1, 3);
+  const Buffer<float> at = gradient::random_image({40, 30}, 0, 255, 2);
+  Var x("x"), y("y"), c("c");
+  Func mapped("mapped");
+  mapped(x, y, c) = table(clamp(cast<int>(at(x, y)), 0, 255), c);
+  const Derivative d = propagate_adjoints(mapped, seed);
+  const std::string log = log_of({d(table), mapped});
+  EXPECT_EQ(log.find("ci, Unrolled"), std::string::npos) << log;
 }
 
 // A grid of a few coefficients: few elements, in many parts.
