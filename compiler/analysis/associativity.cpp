@@ -176,7 +176,7 @@ class Prover {
     std::vector<int> result;
     for (const size_t group : queue)
       result.insert(result.end(), groups[group].begin(), groups[group].end());
-    std::sort(result.begin(), result.end());
+    std::ranges::sort(result);
     return result;
   }
 

@@ -26,34 +26,27 @@ void BoundsEngine::bind(const Let& let) {
 }
 
 bool BoundsEngine::varies(const Expr& e) {
-  auto it = varies_.find(e.get());
-  if (it != varies_.end()) return it->second.value;
-  bool result = match(
+  return varies_.get(e, [&] { return finds_varying(e); });
+}
+
+bool BoundsEngine::finds_varying(const Expr& e) {
+  return match(
       e, [&](const Variable& v) { return scope_.contains(v.name); },
       [](const Load&) { return true; }, [](const Let&) { return true; },
       [&](const Call& call) {
         if (call.call_type == CallType::Func || call.call_type == CallType::Image) return true;
         if (call.op != Op::none && op_info(call.op).cls == OpClass::Effect) return true;
-        for (const Expr& arg : call.args) {
-          if (varies(arg)) return true;
-        }
-        return false;
+        return std::ranges::any_of(call.args, [&](const Expr& arg) { return varies(arg); });
       },
       [&](const ExprNode&) {
         bool any = false;
         for_each_child(e, [&](const Expr& child) { any = any || varies(child); });
         return any;
       });
-  varies_.emplace(e.get(), Flag{e, result});
-  return result;
 }
 
 Interval BoundsEngine::bounds(const Expr& e) {
-  auto it = memo_.find(e.get());
-  if (it != memo_.end()) return it->second.value;
-  Interval result = compute(e);
-  memo_.emplace(e.get(), Entry{e, result});
-  return result;
+  return memo_.get(e, [&] { return compute(e); });
 }
 
 Interval BoundsEngine::compute(const Expr& e) {
@@ -69,11 +62,7 @@ Interval BoundsEngine::compute(const Expr& e) {
 
 // What linear_form called an atom is never taken apart again, so the recursion always descends.
 Interval BoundsEngine::bounds_of_atom(const Expr& atom) {
-  auto it = atoms_.find(atom.get());
-  if (it != atoms_.end()) return it->second.value;
-  Interval result = atom_bounds(atom);
-  atoms_.emplace(atom.get(), Entry{atom, result});
-  return result;
+  return atoms_.get(atom, [&] { return atom_bounds(atom); });
 }
 
 Interval BoundsEngine::ramp_bounds(const Ramp& ramp) {
@@ -250,10 +239,8 @@ BoundsEngine::Truth BoundsEngine::truth(const Expr& condition) {
   if (is_const_false(condition)) return Truth::False;
   if (!condition.type().is_scalar()) return Truth::Unknown;
   if (const Not* n = condition.as<Not>()) return negated(truth(n->a));
-  if (const Call* call = condition.as<Call>()) {
-    bool is_marker = call->op != Op::none && op_info(call->op).cls == OpClass::Marker;
-    return is_marker ? truth(call->args[0]) : Truth::Unknown;
-  }
+  if (const Call* call = condition.as<Call>())
+    return call->is_marker() ? truth(call->args[0]) : Truth::Unknown;
   const Binary* op = condition.as<Binary>();
   if (!op) return Truth::Unknown;
   if (condition.kind() == Kind::And || condition.kind() == Kind::Or) {
@@ -315,8 +302,7 @@ void BoundsEngine::narrow(const Expr& condition, bool is_true, Narrowed& narrowe
   if (!condition.type().is_scalar()) return;
   if (const Not* n = condition.as<Not>()) return narrow(n->a, !is_true, narrowed);
   if (const Call* call = condition.as<Call>()) {
-    if (call->is_op(Op::likely) || call->is_op(Op::likely_if_innermost))
-      narrow(call->args[0], is_true, narrowed);
+    if (call->is_likely()) narrow(call->args[0], is_true, narrowed);
     bool is_lazy_and = call->is_op(Op::if_then_else) && is_const_false(call->args[2]);
     for (int i = 0; is_lazy_and && is_true && i < 2; ++i) narrow(call->args[i], true, narrowed);
     return;

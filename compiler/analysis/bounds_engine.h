@@ -19,6 +19,7 @@
 #include "analysis/linear.h"
 #include "analysis/scope.h"
 #include "ir/expr.h"
+#include "ir/node_memo.h"
 
 namespace retrograde::ir {
 
@@ -48,6 +49,7 @@ class BoundsEngine {
   explicit BoundsEngine(BoundsEngine& outer);
 
   Interval compute(const Expr& e);
+  bool finds_varying(const Expr& e);
   Interval sum_bounds(const Sum& form);
   Interval sum_of_bounds(const Sum& form);
   std::optional<Interval> bounds_by_facts(const Sum& form);
@@ -77,18 +79,10 @@ class BoundsEngine {
   std::shared_ptr<Shared> shared_;
   Scope<Interval> scope_;
   BoundsEngine* outer_ = nullptr;  // without the condition
-  std::vector<Sum> facts_;  // of the condition
-  struct Entry {
-    Expr key;
-    Interval value;
-  };
-  std::unordered_map<const ExprNode*, Entry> memo_;
-  std::unordered_map<const ExprNode*, Entry> atoms_;  // the same for what is no sum
-  struct Flag {
-    Expr key;
-    bool value;
-  };
-  std::unordered_map<const ExprNode*, Flag> varies_;
+  std::vector<Sum> facts_;         // of the condition
+  NodeMemo<Interval> memo_;
+  NodeMemo<Interval> atoms_;  // the same for what is no sum
+  NodeMemo<bool> varies_;
   struct Child {
     Expr condition;
     bool is_true;

@@ -8,20 +8,10 @@
 #include <vector>
 
 #include "analysis/scope.h"
-#include "ir/expr.h"
+#include "ir/interval.h"
 
 namespace retrograde::ir {
 
-// Closed. An undefined end is unbounded.
-struct Interval {
-  Expr min, max;
-  static Interval everything() { return {}; }
-  static Interval point(Expr e) { return {e, e}; }
-  bool is_bounded() const { return min.defined() && max.defined(); }
-  bool has_lower_bound() const { return min.defined(); }
-  bool has_upper_bound() const { return max.defined(); }
-  bool is_point() const { return is_bounded() && min.same_as(max); }
-};
 Interval hull(const Interval& a, const Interval& b);  // smallest interval around both
 Interval intersection(const Interval& a, const Interval& b);
 

@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <optional>
 
 #include "analysis/linear.h"
 #include "ir/build.h"
@@ -109,26 +108,17 @@ Interval float_corners(Kind kind, const Interval& a, const Interval& b) {
   return result;
 }
 
-// v * factor or v / factor, where factor is one value, for floats: rounded, it is still monotone.
-Interval float_scaled(Kind kind, const Interval& v, const Expr& factor) {
-  Interval result{end_op(kind, v.min, factor), end_op(kind, v.max, factor)};
-  if (auto c = as_const_float(factor)) {
-    if (*c == 0 || !std::isfinite(*c)) return Interval::everything();
-    return *c > 0 ? result : Interval{result.max, result.min};
+// v * factor or v / factor, where factor is one value: monotone, of floats as they are rounded, too.
+Interval scaled(Kind kind, const Interval& v, const Expr& factor) {
+  const Interval result{end_op(kind, v.min, factor), end_op(kind, v.max, factor)};
+  if (const auto c = as_scalar(factor)) {
+    const double number = c->as_double();
+    if (number == 0 && !c->type.is_float()) return Interval::point(make_zero(factor.type()));
+    if (number == 0 || !std::isfinite(number)) return Interval::everything();
+    return number > 0 ? result : Interval{result.max, result.min};
   }
   if (!result.is_bounded()) return Interval::everything();
   return {canonical_min(result.min, result.max), canonical_max(result.min, result.max)};
-}
-
-// v * factor, where factor is one value, for wide signed integers.
-Interval scaled(Type type, const Interval& v, const Expr& factor) {
-  Interval product{end_op(Kind::Mul, v.min, factor), end_op(Kind::Mul, v.max, factor)};
-  if (auto c = as_const_int(factor)) {
-    if (*c == 0) return Interval::point(make_zero(type));
-    return *c > 0 ? product : Interval{product.max, product.min};
-  }
-  if (!product.is_bounded()) return Interval::everything();
-  return {canonical_min(product.min, product.max), canonical_max(product.min, product.max)};
 }
 
 }  // namespace
@@ -175,19 +165,19 @@ Interval interval_sub(Type type, const Interval& a, const Interval& b) {
 Interval interval_mul(Type type, const Interval& a, const Interval& b) {
   if (type.is_float()) {
     if (float_ends(a) && float_ends(b)) return float_corners(Kind::Mul, a, b);
-    if (b.is_point()) return float_scaled(Kind::Mul, a, b.min);
-    return a.is_point() ? float_scaled(Kind::Mul, b, a.min) : Interval::everything();
+    if (b.is_point()) return scaled(Kind::Mul, a, b.min);
+    return a.is_point() ? scaled(Kind::Mul, b, a.min) : Interval::everything();
   }
   auto x = wide_ends(a), y = wide_ends(b);
   if (x && y) return combine_corners(type, *x, *y, [](Wide p, Wide q) { return p * q; });
   if (!has_linear_form(type)) return type_range(type);
-  if (b.is_point()) return scaled(type, a, b.min);
-  if (a.is_point()) return scaled(type, b, a.min);
+  if (b.is_point()) return scaled(Kind::Mul, a, b.min);
+  if (a.is_point()) return scaled(Kind::Mul, b, a.min);
   if (is_nonnegative(a) && is_nonnegative(b)) {
     return {end_op(Kind::Mul, a.min, b.min), end_op(Kind::Mul, a.max, b.max)};
   }
   if (!a.is_bounded() || !b.is_bounded()) return Interval::everything();
-  return hull(scaled(type, a, b.min), scaled(type, a, b.max));
+  return hull(scaled(Kind::Mul, a, b.min), scaled(Kind::Mul, a, b.max));
 }
 
 Interval interval_div(Type type, const Interval& a, const Interval& b) {
@@ -195,7 +185,7 @@ Interval interval_div(Type type, const Interval& a, const Interval& b) {
     auto divisor = float_ends(b);
     if (divisor && divisor->min <= 0 && divisor->max >= 0) return Interval::everything();
     if (divisor && float_ends(a)) return float_corners(Kind::Div, a, b);
-    return b.is_point() ? float_scaled(Kind::Div, a, b.min) : Interval::everything();
+    return b.is_point() ? scaled(Kind::Div, a, b.min) : Interval::everything();
   }
   auto low = wide_end(b.min), high = wide_end(b.max);
   if (low && high && *low == *high &&
@@ -348,8 +338,7 @@ Interval interval_cast(Type to, Type from, const Interval& v) {
 Interval interval_abs(Type result, Type operand, const Interval& v) {
   if (operand.is_float()) {
     auto ends = float_ends(v);
-    if (!ends && v.is_bounded())
-      return {make_zero(result), canonical_max(v.max, negate(v.min))};
+    if (!ends && v.is_bounded()) return {make_zero(result), canonical_max(v.max, negate(v.min))};
     if (!ends)
       return may_be_nan(operand, v) ? Interval::everything() : Interval{make_zero(result), {}};
     double largest = std::max(std::abs(ends->min), std::abs(ends->max));

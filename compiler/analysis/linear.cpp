@@ -5,7 +5,7 @@
 #include <unordered_map>
 
 #include "ir/build.h"
-#include "ir/equal.h"
+#include "ir/node_memo.h"
 
 namespace retrograde::ir {
 
@@ -23,12 +23,10 @@ class Collector {
  public:
   Sum form(const Expr& e) {
     if (!has_linear_form(e.type())) return linear_sum(e);
-    auto it = memo_.find(e.get());
-    if (it != memo_.end()) return it->second;
-    Sum result = collect(e);
-    if (result.terms.size() > most_terms) result = linear_sum(e);
-    memo_.emplace(e.get(), result);
-    return result;
+    return memo_.get(e, [&] {
+      Sum result = collect(e);
+      return result.terms.size() > most_terms ? linear_sum(e) : result;
+    });
   }
 
  private:
@@ -93,7 +91,7 @@ class Collector {
     return sum;
   }
 
-  std::unordered_map<const ExprNode*, Sum> memo_;
+  NodeMemo<Sum> memo_;
 };
 
 // ---- min and max ----
@@ -150,7 +148,7 @@ bool makes_redundant(Kind kind, const Sum& kept, const Sum& dropped) {
   std::vector<Sum> inner;
   add_operands(kind == Kind::Min ? Kind::Max : Kind::Min, dropped, inner);
   if (inner.size() < 2) return false;
-  return std::any_of(inner.begin(), inner.end(), [&](const Sum& operand) {
+  return std::ranges::any_of(inner, [&](const Sum& operand) {
     auto d = difference(kept, operand);
     return d && wins(*d);
   });
@@ -158,7 +156,7 @@ bool makes_redundant(Kind kind, const Sum& kept, const Sum& dropped) {
 
 void add_unless_redundant(Kind kind, const Sum& candidate, std::vector<Sum>& kept) {
   auto covers = [&](const Sum& k) { return makes_redundant(kind, k, candidate); };
-  if (std::any_of(kept.begin(), kept.end(), covers)) return;
+  if (std::ranges::any_of(kept, covers)) return;
   std::erase_if(kept, [&](const Sum& k) { return makes_redundant(kind, candidate, k); });
   kept.push_back(candidate);
 }

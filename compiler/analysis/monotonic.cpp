@@ -5,6 +5,7 @@
 
 #include "analysis/linear.h"
 #include "ir/build.h"
+#include "ir/node_memo.h"
 #include "ir/visit.h"
 
 namespace retrograde::ir {
@@ -26,22 +27,17 @@ class Direction {
   explicit Direction(const std::string& variable) : variable_(variable) {}
 
   Monotonic of(const Expr& e) {
-    auto it = memo_.find(e.get());
-    if (it != memo_.end()) return it->second;
-    Monotonic result = has_linear_form(e.type()) ? of_sum(e) : of_atom(e);
-    return memo_[e.get()] = result;
+    return memo_.get(e, [&] { return has_linear_form(e.type()) ? of_sum(e) : of_atom(e); });
   }
 
  private:
   const std::string& variable_;
-  std::unordered_map<const ExprNode*, Monotonic> memo_;
-  std::vector<Expr> alive_;  // keys of memo_ that were made here
+  NodeMemo<Monotonic> memo_;
 
   Monotonic of_sum(const Expr& e) {
     const Sum form = linear_form(e);
     Monotonic result = Monotonic::Constant;
     for (const Term& term : form.terms) {
-      alive_.push_back(term.atom);
       Monotonic part = term.atom.same_as(e) ? of_atom(e) : of_term(term.atom);
       result = both(result, term.factor < 0 ? reversed(part) : part);
     }
@@ -50,8 +46,7 @@ class Direction {
 
   // What linear_form called an atom is not taken apart again.
   Monotonic of_term(const Expr& atom) {
-    auto it = memo_.find(atom.get());
-    return it != memo_.end() ? it->second : memo_[atom.get()] = of_atom(atom);
+    return memo_.get(atom, [&] { return of_atom(atom); });
   }
 
   Monotonic of_atom(const Expr& e) {
@@ -103,7 +98,7 @@ class Direction {
   }
 
   Monotonic of_call(const Expr& e, const Call& n) {
-    if (n.is_op(Op::likely) || n.is_op(Op::likely_if_innermost)) return of(n.args[0]);
+    if (n.is_likely()) return of(n.args[0]);
     if (n.is_op(Op::promise_clamped) || n.is_op(Op::unsafe_promise_clamped))
       return both(of(n.args[0]), both(of(n.args[1]), of(n.args[2])));
     return constant_or_unknown(e);

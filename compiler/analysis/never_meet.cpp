@@ -8,7 +8,6 @@
 #include <isl/space.h>
 #include <isl/val.h>
 
-#include <algorithm>
 #include <map>
 #include <memory>
 #include <unordered_set>
@@ -134,10 +133,8 @@ class Point {
   }
 
   Sum taken_apart(const Expr& e) {
-    if (const Call* call = e.as<Call>()) {
-      const bool is_marker = call->op != Op::none && op_info(call->op).cls == OpClass::Marker;
-      return is_marker ? of(call->args[0]) : of_type(e.type());
-    }
+    if (const Call* call = e.as<Call>())
+      return call->is_marker() ? of(call->args[0]) : of_type(e.type());
     if (const Cast* cast = e.as<Cast>()) return converted(*cast);
     const Binary* op = e.as<Binary>();
     if (!op || !has_linear_form(e.type())) return of_type(e.type());
@@ -152,10 +149,8 @@ class Point {
   Sum of_type(Type type) {
     const Sum sum = conditions_.unknown();
     if (!type.is_int_or_uint() || type.bits() > 32) return sum;
-    const int64_t low = type.is_uint() ? 0 : type.min_int();
-    const int64_t high = type.is_uint() ? static_cast<int64_t>(type.max_uint()) : type.max_int();
-    conditions_.at_least_zero(plus(sum, number(low), -1));
-    conditions_.at_least_zero(plus(number(high), sum, -1));
+    conditions_.at_least_zero(plus(sum, number(type.min_int()), -1));
+    conditions_.at_least_zero(plus(number(type.max_int()), sum, -1));
     return sum;
   }
 
@@ -188,8 +183,7 @@ class Point {
     std::vector<Expr> conjuncts;
     add_conjuncts(condition, conjuncts);
     for (const Expr& conjunct : conjuncts) {
-      if (const Call* call = conjunct.as<Call>();
-          call && call->op != Op::none && op_info(call->op).cls == OpClass::Marker) {
+      if (const Call* call = conjunct.as<Call>(); call && call->is_marker()) {
         require(call->args[0]);
         continue;
       }

@@ -5,6 +5,7 @@
 
 #include "ir/build.h"
 #include "ir/equal.h"
+#include "ir/node_memo.h"
 #include "ir/scalar.h"
 #include "ir/visit.h"
 
@@ -15,13 +16,11 @@ namespace {
 class Signs {
  public:
   bool nonnegative(const Expr& e) {
-    if (const auto found = known_.find(e.get()); found != known_.end()) return found->second;
-    const bool result = decide(e);
-    return known_[e.get()] = result;
+    return known_.get(e, [&] { return decide(e); });
   }
 
  private:
-  std::unordered_map<const ExprNode*, bool> known_;
+  NodeMemo<bool> known_;
 
   bool decide(const Expr& e) {
     if (e.type().is_uint()) return true;

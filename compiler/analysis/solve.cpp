@@ -41,10 +41,8 @@ class Solver {
     if (is_const_false(condition)) return is_true ? std::nullopt : anywhere();
     if (!condition.type().is_scalar()) return std::nullopt;
     if (const Not* n = condition.as<Not>()) return solve(n->a, !is_true);
-    if (const Call* call = condition.as<Call>()) {
-      bool is_marker = call->op != Op::none && op_info(call->op).cls == OpClass::Marker;
-      return is_marker ? solve(call->args[0], is_true) : if_fixed(condition, is_true);
-    }
+    if (const Call* call = condition.as<Call>())
+      return call->is_marker() ? solve(call->args[0], is_true) : if_fixed(condition, is_true);
     const Binary* op = condition.as<Binary>();
     if (!op) return if_fixed(condition, is_true);
     if (condition.kind() == Kind::And || condition.kind() == Kind::Or) {
@@ -175,8 +173,7 @@ class Solver {
     auto k = as_const_int(op.b);
     Sum rest = without(form, term);
     auto mentions = [&](const Term& t) { return uses_variable(t.atom, variable_); };
-    if (!k || *k <= 0 || std::any_of(rest.terms.begin(), rest.terms.end(), mentions))
-      return std::nullopt;
+    if (!k || *k <= 0 || std::ranges::any_of(rest.terms, mentions)) return std::nullopt;
     Expr m = limit(rest, term.factor);
     if (!m.defined()) return std::nullopt;
     Sum p = linear_form(op.a);

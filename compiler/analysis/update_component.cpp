@@ -15,20 +15,16 @@ bool is_bitwise(const Expr& e) {
 // ---- the update as a function of x and of unknowns g ----
 
 Expr Abstraction::operator()(const Expr& e) {
-  const auto found = done_.find(e.get());
-  if (found != done_.end()) return found->second.second;
-  Expr result = abstract(e);
-  done_[e.get()] = {e, result};
-  return result;
+  return done_.get(e, [&] { return abstract(e); });
 }
 
 bool Abstraction::depends(const Expr& e) {
-  const auto found = depends_.find(e.get());
-  if (found != depends_.end()) return found->second;
-  bool result = false;
-  if (const Variable* v = e.as<Variable>()) result = xs_.count(v->name) != 0;
-  for_each_child(e, [&](const Expr& child) { result = depends(child) || result; });
-  return depends_[e.get()] = result;
+  return depends_.get(e, [&] {
+    const Variable* v = e.as<Variable>();
+    bool result = v && xs_.count(v->name) != 0;
+    for_each_child(e, [&](const Expr& child) { result = depends(child) || result; });
+    return result;
+  });
 }
 
 Expr Abstraction::unknown(const Expr& e) {

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "ir/expr.h"
+#include "ir/node_memo.h"
 
 namespace retrograde::ir {
 
@@ -28,8 +29,8 @@ class Abstraction {
 
  private:
   std::unordered_set<std::string> xs_;
-  std::unordered_map<const ExprNode*, std::pair<Expr, Expr>> done_;
-  std::unordered_map<const ExprNode*, bool> depends_;
+  NodeMemo<Expr> done_;
+  NodeMemo<bool> depends_;
 
   bool depends(const Expr& e);
   Expr unknown(const Expr& e);

@@ -96,6 +96,12 @@ class Sorter {
 
 }  // namespace
 
+int total_bytes(const std::vector<Type>& types) {
+  int bytes = 0;
+  for (Type type : types) bytes += type.bytes();
+  return bytes;
+}
+
 const char* role_name(Role role) {
   switch (role) {
 #define RETROGRADE_ROLE(Name, text) \

@@ -25,6 +25,9 @@ enum class NameMangling : uint8_t { Default, C, CPlusPlus };
 
 namespace ir {
 
+// Of one value of each type.
+int total_bytes(const std::vector<Type>& types);
+
 struct SourceLocation {
   std::string file;
   int line = 0;

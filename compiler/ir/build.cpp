@@ -35,21 +35,25 @@ namespace retrograde::ir {
 
 namespace {
 
-Expr splat(Expr scalar, int lanes) {
-  return lanes == 1 ? scalar : Expr(new Broadcast(std::move(scalar), lanes));
+Type times_lanes(Type type, int lanes) { return type.with_lanes(type.lanes() * lanes); }
+
+Expr splat(Expr value, int lanes) {
+  if (lanes == 1) return value;
+  const Type type = times_lanes(value.type(), lanes);
+  return make_node<Broadcast>(type, std::move(value), lanes);
 }
 
 // Every NaN becomes the one quiet NaN that the printer knows.
 Expr float_const(Type scalar, double value) {
   if (std::isnan(value)) value = std::numeric_limits<double>::quiet_NaN();
-  return new FloatImm(scalar, round_to_type(scalar, value));
+  return make_node<FloatImm>(scalar, round_to_type(scalar, value));
 }
 
 Expr scalar_const(const Scalar& s) {
   if (s.type.is_float()) return float_const(s.type, s.f);
-  if (s.type.is_int()) return new IntImm(s.type, s.i);
-  if (s.type.is_uint()) return new UIntImm(s.type, s.u);
-  return new Reinterpret(s.type, new UIntImm(UInt(64), s.u));
+  if (s.type.is_int()) return make_node<IntImm>(s.type, s.i);
+  if (s.type.is_uint()) return make_node<UIntImm>(s.type, s.u);
+  return make_node<Reinterpret>(s.type, make_node<UIntImm>(UInt(64), s.u));
 }
 
 Expr constant(const Scalar& s, int lanes) { return splat(scalar_const(s), lanes); }
@@ -108,7 +112,7 @@ bool is_const_false(const Expr& e) { return e.defined() && e.type().is_bool() &&
 bool is_const_int(const Expr& e, int64_t value) { return as_const_int(e) == value; }
 
 Expr variable(const std::string& name, Type type, SymbolRef symbol) {
-  return new Variable(type, name, std::move(symbol));
+  return make_node<Variable>(type, name, std::move(symbol));
 }
 
 // ---- binary nodes ----
@@ -256,7 +260,7 @@ Expr logical_not(Expr a) {
   RETROGRADE_ASSERT(a.type().is_bool(), "Not of ", a.type());
   if (const std::optional<Scalar> s = as_scalar(a)) return constant(eval_not(*s), a.type().lanes());
   if (const auto* inner = a.as<Not>()) return inner->a;
-  return new Not(std::move(a));
+  return make_node<Not>(a.type(), std::move(a));
 }
 
 namespace {
@@ -284,7 +288,7 @@ Expr cast_to(Type type, Expr value) {
   const std::optional<Scalar> s = may_round ? value_over_constants(value) : as_scalar(value);
   if (s && cast_is_defined(type.element_of(), *s))
     return constant(eval_cast(type.element_of(), *s), type.lanes());
-  return new Cast(type, std::move(value));
+  return make_node<Cast>(type, std::move(value));
 }
 
 Expr reinterpret_as(Type type, Expr value) {
@@ -297,7 +301,7 @@ Expr reinterpret_as(Type type, Expr value) {
     if (!type.is_float() || !std::isnan(result.f))
       return constant(result, type.lanes());  // NaNs carry payloads
   }
-  return new Reinterpret(type, std::move(value));
+  return make_node<Reinterpret>(type, std::move(value));
 }
 
 Expr make_select(Expr condition, Expr when_true, Expr when_false) {
@@ -315,12 +319,13 @@ Expr make_select(Expr condition, Expr when_true, Expr when_false) {
   if (is_const_true(condition)) return when_true;
   if (is_const_false(condition)) return when_false;
   if (when_true.same_as(when_false)) return when_true;
-  return new Select(std::move(condition), std::move(when_true), std::move(when_false));
+  return make_node<Select>(when_true.type(), std::move(condition), std::move(when_true),
+                           std::move(when_false));
 }
 
 Expr make_load(Type type, const std::string& name, Expr index, Expr predicate, SymbolRef symbol) {
   if (predicate.defined() && is_const_true(predicate)) predicate = {};
-  return new Load(type, name, std::move(index), std::move(predicate), std::move(symbol));
+  return make_node<Load>(type, name, std::move(index), std::move(predicate), std::move(symbol));
 }
 
 Expr make_ramp(Expr base, Expr stride, int lanes) {
@@ -328,19 +333,18 @@ Expr make_ramp(Expr base, Expr stride, int lanes) {
   if (lanes == 1) return base;
   match_lanes(base, stride);
   RETROGRADE_ASSERT(base.type() == stride.type(), "ramp from ", base.type(), " by ", stride.type());
-  return new Ramp(std::move(base), std::move(stride), lanes);
+  return make_node<Ramp>(times_lanes(base.type(), lanes), std::move(base), std::move(stride),
+                         lanes);
 }
 
 Expr make_broadcast(Expr value, int lanes) {
   RETROGRADE_ASSERT(lanes >= 1, "a broadcast to ", lanes, " lanes");
-  if (lanes == 1) return value;
-  if (const auto* inner = value.as<Broadcast>())
-    return new Broadcast(inner->value, inner->lanes * lanes);
-  return new Broadcast(std::move(value), lanes);
+  if (const auto* inner = value.as<Broadcast>()) return splat(inner->value, inner->lanes * lanes);
+  return splat(std::move(value), lanes);
 }
 
 Expr make_let(const std::string& name, Expr value, Expr body) {
-  return new Let(name, std::move(value), std::move(body));
+  return make_node<Let>(body.type(), name, std::move(value), std::move(body));
 }
 
 Expr make_shuffle(std::vector<Expr> vectors, std::vector<int> indices) {
@@ -359,7 +363,7 @@ Expr make_shuffle(std::vector<Expr> vectors, std::vector<int> indices) {
   }
   if (identity) return vectors[0];
   const Type type = vectors[0].type().with_lanes(static_cast<int>(indices.size()));
-  return new Shuffle(type, std::move(vectors), std::move(indices));
+  return make_node<Shuffle>(type, std::move(vectors), std::move(indices));
 }
 
 Expr make_interleaved(const std::vector<Expr>& vectors) {
@@ -375,7 +379,7 @@ Expr make_vector_reduce(Kind op, Expr value, int result_lanes) {
                     " lanes to ", result_lanes);
   if (lanes == result_lanes) return value;
   const Type type = value.type().with_lanes(result_lanes);
-  return new VectorReduce(type, op, std::move(value));
+  return make_node<VectorReduce>(type, op, std::move(value));
 }
 
 namespace {
@@ -395,9 +399,8 @@ Expr fold_operator(Op op, Type type, const std::vector<Expr>& args) {
   }
   const Scalar result = *eval_operator(op, values, type.element_of());
   // cos(0), log(1) and their kin are exact.
-  const bool is_exact =
-      !is_rounded_otherwise(op) ||
-      (is_zero_or_one(result) && std::all_of(values.begin(), values.end(), is_zero_or_one));
+  const bool is_exact = !is_rounded_otherwise(op) ||
+                        (is_zero_or_one(result) && std::ranges::all_of(values, is_zero_or_one));
   return is_exact ? constant(result, type.lanes()) : Expr();
 }
 
@@ -424,7 +427,7 @@ Expr call_op(Op op, Type type, std::vector<Expr> args) {
   if (info.cls == OpClass::Pure) {
     if (Expr folded = fold_operator(op, type, args); folded.defined()) return folded;
   }
-  return new Call(type, CallType::Operator, op, info.name, std::move(args), 0, {});
+  return make_node<Call>(type, CallType::Operator, op, info.name, std::move(args), 0, SymbolRef());
 }
 
 Expr call_op(Op op, std::vector<Expr> args) {
@@ -434,17 +437,18 @@ Expr call_op(Op op, std::vector<Expr> args) {
 }
 
 Expr call_extern(const std::string& name, Type type, std::vector<Expr> args) {
-  return new Call(type, CallType::Extern, Op::none, name, std::move(args), 0, {});
+  return make_node<Call>(type, CallType::Extern, Op::none, name, std::move(args), 0, SymbolRef());
 }
 
 Expr call_func(const std::string& name, Type type, std::vector<Expr> args, int component,
                SymbolRef symbol) {
-  return new Call(type, CallType::Func, Op::none, name, std::move(args), component,
-                  std::move(symbol));
+  return make_node<Call>(type, CallType::Func, Op::none, name, std::move(args), component,
+                         std::move(symbol));
 }
 
 Expr call_image(const std::string& name, Type type, std::vector<Expr> args, SymbolRef symbol) {
-  return new Call(type, CallType::Image, Op::none, name, std::move(args), 0, std::move(symbol));
+  return make_node<Call>(type, CallType::Image, Op::none, name, std::move(args), 0,
+                         std::move(symbol));
 }
 
 Expr likely(Expr e) {
@@ -461,10 +465,13 @@ Expr conjunction(const std::vector<Expr>& terms) {
   return result.defined() ? result : const_true();
 }
 
+void add_term(Expr& sum, const Expr& term) { sum = sum.defined() ? sum + term : term; }
+
 // ---- statements. An undefined body is the empty statement; what wraps it is empty too. ----
 
 Stmt make_let(const std::string& name, Expr value, Stmt body) {
-  return body.defined() ? Stmt(new LetStmt(name, std::move(value), std::move(body))) : Stmt();
+  return body.defined() ? Stmt(make_node<LetStmt>(name, std::move(value), std::move(body)))
+                        : Stmt();
 }
 
 Expr make_lets(const Lets& lets, Expr body) {
@@ -478,45 +485,46 @@ Stmt make_lets(const Lets& lets, Stmt body) {
 }
 
 Stmt make_assert(Expr condition, Expr error) {
-  return new Assert(std::move(condition), std::move(error));
+  return make_node<Assert>(std::move(condition), std::move(error));
 }
 
 Stmt make_producer_consumer(const std::string& name, bool produces, Stmt body) {
-  return body.defined() ? Stmt(new ProducerConsumer(name, produces, std::move(body))) : Stmt();
+  return body.defined() ? Stmt(make_node<ProducerConsumer>(name, produces, std::move(body)))
+                        : Stmt();
 }
 
 Stmt make_for(const std::string& name, Expr min, Expr extent, ForType type, Stmt body,
               Partition partition) {
   if (!body.defined()) return {};
-  return new For(name, std::move(min), std::move(extent), type, std::move(body), partition);
+  return make_node<For>(name, std::move(min), std::move(extent), type, std::move(body), partition);
 }
 
 Stmt make_store(const std::string& name, Expr value, Expr index, Expr predicate, SymbolRef symbol) {
   if (value.type().is_scalar()) value = make_broadcast(std::move(value), index.type().lanes());
   if (predicate.defined() && is_const_true(predicate)) predicate = {};
-  return new Store(name, std::move(value), std::move(index), std::move(predicate),
-                   std::move(symbol));
+  return make_node<Store>(name, std::move(value), std::move(index), std::move(predicate),
+                          std::move(symbol));
 }
 
 Stmt make_provide(const std::string& name, std::vector<Expr> values, std::vector<Expr> args,
                   Expr predicate) {
   if (predicate.defined() && is_const_true(predicate)) predicate = {};
-  return new Provide(name, std::move(values), std::move(args), std::move(predicate));
+  return make_node<Provide>(name, std::move(values), std::move(args), std::move(predicate));
 }
 
 Stmt make_realize(const std::string& name, std::vector<Type> types, MemoryType memory,
                   std::vector<Range> bounds, Stmt body) {
   if (!body.defined()) return {};
-  return new Realize(name, std::move(types), memory, std::move(bounds), std::move(body));
+  return make_node<Realize>(name, std::move(types), memory, std::move(bounds), std::move(body));
 }
 
 Stmt make_allocate(const std::string& name, Type type, MemoryType memory, Expr elements,
                    Stmt body) {
   if (!body.defined()) return {};
-  return new Allocate(name, type, memory, std::move(elements), std::move(body));
+  return make_node<Allocate>(name, type, memory, std::move(elements), std::move(body));
 }
 
-Stmt make_free(const std::string& name) { return new Free(name); }
+Stmt make_free(const std::string& name) { return make_node<Free>(name); }
 
 Stmt make_block(std::vector<Stmt> stmts) {
   std::vector<Stmt> flat;
@@ -529,7 +537,7 @@ Stmt make_block(std::vector<Stmt> stmts) {
     }
   }
   if (flat.empty()) return {};
-  return flat.size() == 1 ? flat[0] : Stmt(new Block(std::move(flat)));
+  return flat.size() == 1 ? flat[0] : Stmt(make_node<Block>(std::move(flat)));
 }
 
 Stmt make_if(Expr condition, Stmt when_true, Stmt when_false) {
@@ -539,7 +547,7 @@ Stmt make_if(Expr condition, Stmt when_true, Stmt when_false) {
     return when_false.defined() ? make_if(logical_not(std::move(condition)), std::move(when_false))
                                 : Stmt();
   }
-  return new IfThenElse(std::move(condition), std::move(when_true), std::move(when_false));
+  return make_node<IfThenElse>(std::move(condition), std::move(when_true), std::move(when_false));
 }
 
 Stmt with_parts(const IfThenElse& old, Expr condition, Stmt when_true, Stmt when_false) {
@@ -549,20 +557,20 @@ Stmt with_parts(const IfThenElse& old, Expr condition, Stmt when_true, Stmt when
                  : make_if(std::move(condition), std::move(when_true), std::move(when_false));
 }
 
-Stmt make_evaluate(Expr value) { return new Evaluate(std::move(value)); }
+Stmt make_evaluate(Expr value) { return make_node<Evaluate>(std::move(value)); }
 
 Stmt make_atomic(const std::string& name, Stmt body) {
-  return body.defined() ? Stmt(new Atomic(name, std::move(body))) : Stmt();
+  return body.defined() ? Stmt(make_node<Atomic>(name, std::move(body))) : Stmt();
 }
 
 Stmt make_fork(Stmt first, Stmt rest) {
   if (!first.defined()) return rest;
-  return rest.defined() ? Stmt(new Fork(std::move(first), std::move(rest))) : first;
+  return rest.defined() ? Stmt(make_node<Fork>(std::move(first), std::move(rest))) : first;
 }
 
 Stmt make_prefetch(const std::string& name, Type type, std::vector<Range> bounds,
                    SymbolRef symbol) {
-  return new Prefetch(name, type, std::move(bounds), std::move(symbol));
+  return make_node<Prefetch>(name, type, std::move(bounds), std::move(symbol));
 }
 
 }  // namespace retrograde::ir

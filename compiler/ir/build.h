@@ -62,6 +62,8 @@ Expr call_image(const std::string& name, Type type, std::vector<Expr> args, Symb
 // Requires: every operand must be a defined expression.
 Expr likely(Expr e);
 Expr conjunction(const std::vector<Expr>& terms);  // true when empty
+// One more term of a sum, which is undefined as long as it has none.
+void add_term(Expr& sum, const Expr& term);
 
 Stmt make_let(const std::string& name, Expr value, Stmt body);
 // Names and what they are bound to, the outermost first, around the body.

@@ -5,6 +5,7 @@
 #pragma once
 
 #include <atomic>
+#include <concepts>
 #include <cstdint>
 #include <memory>
 #include <string>
@@ -28,8 +29,7 @@ enum class Kind : uint8_t {
 const char* kind_name(Kind kind);
 
 struct Node {
-  explicit Node(Kind kind) : kind(kind) {}
-  virtual ~Node() = default;
+  Node(Kind kind) : kind(kind) {}
   Node(const Node&) = delete;
   Node& operator=(const Node&) = delete;
   mutable std::atomic<int> references{0};
@@ -44,7 +44,7 @@ struct StmtNode : Node {
   using Node::Node;
 };
 
-// Deletes without recursing on the C++ stack: chains of a million nodes are legal.
+// Deletes as what it is, without recursing on the C++ stack: chains of a million nodes are legal.
 void release(const Node* node) noexcept;
 
 template <class T>
@@ -175,51 +175,44 @@ class SymbolRef {
 
 // What a node says besides its kind and type is listed once, as its fields: names and numbers, then
 // children in evaluation order. Comparison and walks stand on the list. Symbols only go along.
+// Nodes have no constructors: make_node gives the members in the order of the struct.
 #define RETROGRADE_FIELDS(...) \
   auto fields() const { return std::tie(__VA_ARGS__); }
-#define RETROGRADE_NODE(Name, ...)                                        \
-  static constexpr bool is_kind(Kind kind) { return kind == Kind::Name; } \
+#define RETROGRADE_NODE(Name, ...)                                      \
+  static constexpr Kind own_kind = Kind::Name;                          \
+  static constexpr bool is_kind(Kind kind) { return kind == own_kind; } \
   RETROGRADE_FIELDS(__VA_ARGS__)
 
 struct IntImm : ExprNode {
   RETROGRADE_NODE(IntImm, value)
-  IntImm(Type type, int64_t value) : ExprNode(Kind::IntImm, type), value(value) {}
   const int64_t value;
 };
 struct UIntImm : ExprNode {
   RETROGRADE_NODE(UIntImm, value)
-  UIntImm(Type type, uint64_t value) : ExprNode(Kind::UIntImm, type), value(value) {}
   const uint64_t value;
 };
 struct FloatImm : ExprNode {  // value already rounded to the type
   RETROGRADE_NODE(FloatImm, value)
-  FloatImm(Type type, double value) : ExprNode(Kind::FloatImm, type), value(value) {}
   const double value;
 };
 struct StringImm : ExprNode {
   RETROGRADE_NODE(StringImm, value)
-  explicit StringImm(std::string value)
-      : ExprNode(Kind::StringImm, Handle()), value(std::move(value)) {}
   const std::string value;
 };
 // A pure variable, loop variable, let-bound name, scalar parameter, reduction variable, or a fact
 // of a buffer ("input.min.0", "input.extent.1", "input.stride.0").
 struct Variable : ExprNode {
   RETROGRADE_NODE(Variable, name)
-  Variable(Type type, std::string name, SymbolRef symbol)
-      : ExprNode(Kind::Variable, type), name(std::move(name)), symbol(std::move(symbol)) {}
   const std::string name;
   const SymbolRef symbol;
 };
 struct Cast
     : ExprNode {  // integers wrap; float to integer truncates toward zero; to bool means != 0
   RETROGRADE_NODE(Cast, value)
-  Cast(Type type, Expr value) : ExprNode(Kind::Cast, type), value(std::move(value)) {}
   const Expr value;
 };
 struct Reinterpret : ExprNode {  // same bits, other type
   RETROGRADE_NODE(Reinterpret, value)
-  Reinterpret(Type type, Expr value) : ExprNode(Kind::Reinterpret, type), value(std::move(value)) {}
   const Expr value;
 };
 struct Binary : ExprNode {
@@ -242,27 +235,15 @@ struct BinaryOf : Binary {
 
 struct Not : ExprNode {
   RETROGRADE_NODE(Not, a)
-  explicit Not(Expr a) : ExprNode(Kind::Not, a.type()), a(std::move(a)) {}
   const Expr a;
 };
 struct Select : ExprNode {
   RETROGRADE_NODE(Select, condition, when_true, when_false)
-  Select(Expr condition, Expr when_true, Expr when_false)
-      : ExprNode(Kind::Select, when_true.type()),
-        condition(std::move(condition)),
-        when_true(std::move(when_true)),
-        when_false(std::move(when_false)) {}
   const Expr condition, when_true, when_false;
 };
 // FlatStorage phase. Element number `index` of the allocation or buffer `name`.
 struct Load : ExprNode {
   RETROGRADE_NODE(Load, name, index, predicate)
-  Load(Type type, std::string name, Expr index, Expr predicate, SymbolRef symbol)
-      : ExprNode(Kind::Load, type),
-        name(std::move(name)),
-        index(std::move(index)),
-        predicate(std::move(predicate)),
-        symbol(std::move(symbol)) {}
   const std::string name;
   const Expr index,
       predicate;  // predicate: bool with the load's lanes; lanes that are off give any value
@@ -271,20 +252,11 @@ struct Load : ExprNode {
 struct Ramp
     : ExprNode {  // base, base + stride, ...; base may be a vector: then lanes are base-major
   RETROGRADE_NODE(Ramp, lanes, base, stride)
-  Ramp(Expr base, Expr stride, int lanes)
-      : ExprNode(Kind::Ramp, base.type().with_lanes(base.type().lanes() * lanes)),
-        base(std::move(base)),
-        stride(std::move(stride)),
-        lanes(lanes) {}
   const Expr base, stride;
   const int lanes;
 };
 struct Broadcast : ExprNode {  // value repeated `lanes` times; value may be a vector (concatenated)
   RETROGRADE_NODE(Broadcast, lanes, value)
-  Broadcast(Expr value, int lanes)
-      : ExprNode(Kind::Broadcast, value.type().with_lanes(value.type().lanes() * lanes)),
-        value(std::move(value)),
-        lanes(lanes) {}
   const Expr value;
   const int lanes;
 };
@@ -296,16 +268,9 @@ enum class CallType : uint8_t {
 };
 struct Call : ExprNode {
   RETROGRADE_NODE(Call, call_type, op, name, component, args)
-  Call(Type type, CallType call_type, Op op, std::string name, std::vector<Expr> args,
-       int component, SymbolRef symbol)
-      : ExprNode(Kind::Call, type),
-        call_type(call_type),
-        op(op),
-        name(std::move(name)),
-        args(std::move(args)),
-        component(component),
-        symbol(std::move(symbol)) {}
   bool is_op(Op which) const { return call_type == CallType::Operator && op == which; }
+  bool is_marker() const { return op_info(op).cls == OpClass::Marker; }
+  bool is_likely() const { return is_op(Op::likely) || is_op(Op::likely_if_innermost); }
   const CallType call_type;
   const Op op;             // Op::none unless Operator
   const std::string name;  // of the Func, image or C function; the operator's name for operators
@@ -321,26 +286,17 @@ inline const Call* as_op(const Expr& e, Op op) {
 inline bool is_undef(const Expr& e) { return as_op(e, Op::undef) != nullptr; }
 struct Let : ExprNode {
   RETROGRADE_NODE(Let, name, value, body)
-  Let(std::string name, Expr value, Expr body)
-      : ExprNode(Kind::Let, body.type()),
-        name(std::move(name)),
-        value(std::move(value)),
-        body(std::move(body)) {}
   const std::string name;
   const Expr value, body;
 };
 struct Shuffle : ExprNode {  // lane i = lane indices[i] of the concatenated vectors
   RETROGRADE_NODE(Shuffle, indices, vectors)
-  Shuffle(Type type, std::vector<Expr> vectors, std::vector<int> indices)
-      : ExprNode(Kind::Shuffle, type), vectors(std::move(vectors)), indices(std::move(indices)) {}
   const std::vector<Expr> vectors;
   const std::vector<int> indices;
 };
 // Groups of neighbouring lanes combined, to type.lanes() lanes, by Add, Mul, Min, Max, And or Or.
 struct VectorReduce : ExprNode {
   RETROGRADE_NODE(VectorReduce, op, value)
-  VectorReduce(Type type, Kind op, Expr value)
-      : ExprNode(Kind::VectorReduce, type), op(op), value(std::move(value)) {}
   const Kind op;
   const Expr value;
 };
@@ -349,11 +305,6 @@ struct VectorReduce : ExprNode {
 
 struct LetStmt : StmtNode {
   RETROGRADE_NODE(LetStmt, name, value, body)
-  LetStmt(std::string name, Expr value, Stmt body)
-      : StmtNode(Kind::LetStmt),
-        name(std::move(name)),
-        value(std::move(value)),
-        body(std::move(body)) {}
   const std::string name;
   const Expr value;
   const Stmt body;
@@ -363,32 +314,16 @@ struct LetStmt : StmtNode {
 // fact, and no code.
 struct Assert : StmtNode {
   RETROGRADE_NODE(Assert, condition, error)
-  Assert(Expr condition, Expr error)
-      : StmtNode(Kind::Assert), condition(std::move(condition)), error(std::move(error)) {}
   const Expr condition, error;
 };
 struct ProducerConsumer : StmtNode {
   RETROGRADE_NODE(ProducerConsumer, name, produces, body)
-  ProducerConsumer(std::string name, bool produces, Stmt body)
-      : StmtNode(Kind::ProducerConsumer),
-        name(std::move(name)),
-        produces(produces),
-        body(std::move(body)) {}
   const std::string name;
   const bool produces;
   const Stmt body;
 };
 struct For : StmtNode {  // name in [min, min + extent)
   RETROGRADE_NODE(For, name, runs, partition, min, extent, body)
-  For(std::string name, Expr min, Expr extent, ForType runs, Stmt body,
-      Partition partition = Partition::Auto)
-      : StmtNode(Kind::For),
-        name(std::move(name)),
-        min(std::move(min)),
-        extent(std::move(extent)),
-        runs(runs),
-        body(std::move(body)),
-        partition(partition) {}
   const std::string name;
   const Expr min, extent;
   const ForType runs;
@@ -397,13 +332,6 @@ struct For : StmtNode {  // name in [min, min + extent)
 };
 struct Store : StmtNode {
   RETROGRADE_NODE(Store, name, value, index, predicate)
-  Store(std::string name, Expr value, Expr index, Expr predicate, SymbolRef symbol)
-      : StmtNode(Kind::Store),
-        name(std::move(name)),
-        value(std::move(value)),
-        index(std::move(index)),
-        predicate(std::move(predicate)),
-        symbol(std::move(symbol)) {}
   const std::string name;
   const Expr value, index, predicate;
   const SymbolRef symbol;
@@ -411,26 +339,12 @@ struct Store : StmtNode {
 struct Provide : StmtNode {  // Loops phase: store to a point of a Func; one value per Tuple
                              // element, stored together
   RETROGRADE_NODE(Provide, name, values, args, predicate)
-  Provide(std::string name, std::vector<Expr> values, std::vector<Expr> args, Expr predicate)
-      : StmtNode(Kind::Provide),
-        name(std::move(name)),
-        values(std::move(values)),
-        args(std::move(args)),
-        predicate(std::move(predicate)) {}
   const std::string name;
   const std::vector<Expr> values, args;
   const Expr predicate;
 };
 struct Realize : StmtNode {  // Loops phase: storage for a Func over a box, alive during body
   RETROGRADE_NODE(Realize, name, types, memory, bounds, body)
-  Realize(std::string name, std::vector<Type> types, MemoryType memory, std::vector<Range> bounds,
-          Stmt body)
-      : StmtNode(Kind::Realize),
-        name(std::move(name)),
-        types(std::move(types)),
-        memory(memory),
-        bounds(std::move(bounds)),
-        body(std::move(body)) {}
   const std::string name;
   const std::vector<Type> types;
   const MemoryType memory;
@@ -440,13 +354,6 @@ struct Realize : StmtNode {  // Loops phase: storage for a Func over a box, aliv
 struct Allocate
     : StmtNode {  // FlatStorage phase: `elements` (int64) elements of `type`, alive during body
   RETROGRADE_NODE(Allocate, name, type, memory, elements, body)
-  Allocate(std::string name, Type type, MemoryType memory, Expr elements, Stmt body)
-      : StmtNode(Kind::Allocate),
-        name(std::move(name)),
-        type(type),
-        memory(memory),
-        elements(std::move(elements)),
-        body(std::move(body)) {}
   const std::string name;
   const Type type;
   const MemoryType memory;
@@ -456,51 +363,33 @@ struct Allocate
 struct Free : StmtNode {  // no use of the allocation follows; at most one on every path of its
                           // Allocate's body
   RETROGRADE_NODE(Free, name)
-  explicit Free(std::string name) : StmtNode(Kind::Free), name(std::move(name)) {}
   const std::string name;
 };
 struct Block : StmtNode {
   RETROGRADE_NODE(Block, stmts)
-  explicit Block(std::vector<Stmt> stmts) : StmtNode(Kind::Block), stmts(std::move(stmts)) {}
   const std::vector<Stmt> stmts;
 };
 struct IfThenElse : StmtNode {
   RETROGRADE_NODE(IfThenElse, condition, when_true, when_false)
-  IfThenElse(Expr condition, Stmt when_true, Stmt when_false)
-      : StmtNode(Kind::IfThenElse),
-        condition(std::move(condition)),
-        when_true(std::move(when_true)),
-        when_false(std::move(when_false)) {}
   const Expr condition;
   const Stmt when_true, when_false;  // when_false may be undefined
 };
 struct Evaluate : StmtNode {
   RETROGRADE_NODE(Evaluate, value)
-  explicit Evaluate(Expr value) : StmtNode(Kind::Evaluate), value(std::move(value)) {}
   const Expr value;
 };
 
 struct Atomic : StmtNode {  // what body reads and writes of one element of `name` is indivisible
   RETROGRADE_NODE(Atomic, name, body)
-  Atomic(std::string name, Stmt body)
-      : StmtNode(Kind::Atomic), name(std::move(name)), body(std::move(body)) {}
   const std::string name;
   const Stmt body;
 };
 struct Fork : StmtNode {  // both may run at once; ends when both have ended
   RETROGRADE_NODE(Fork, first, rest)
-  Fork(Stmt first, Stmt rest)
-      : StmtNode(Kind::Fork), first(std::move(first)), rest(std::move(rest)) {}
   const Stmt first, rest;
 };
 struct Prefetch : StmtNode {  // Loops phase: fetch a box of a Func or image into the cache
   RETROGRADE_NODE(Prefetch, name, type, bounds)
-  Prefetch(std::string name, Type type, std::vector<Range> bounds, SymbolRef symbol)
-      : StmtNode(Kind::Prefetch),
-        name(std::move(name)),
-        type(type),
-        bounds(std::move(bounds)),
-        symbol(std::move(symbol)) {}
   const std::string name;
   const Type type;
   const std::vector<Range> bounds;
@@ -509,6 +398,15 @@ struct Prefetch : StmtNode {  // Loops phase: fetch a box of a Func or image int
 
 #undef RETROGRADE_NODE
 #undef RETROGRADE_FIELDS
+
+template <std::derived_from<ExprNode> N, class... Members>
+const N* make_node(Type type, Members&&... members) {
+  return new N{{N::own_kind, type}, std::forward<Members>(members)...};
+}
+template <std::derived_from<StmtNode> N, class... Members>
+const N* make_node(Members&&... members) {
+  return new N{{N::own_kind}, std::forward<Members>(members)...};
+}
 
 }  // namespace ir
 }  // namespace retrograde

@@ -16,6 +16,21 @@ const char* kind_name(Kind kind) {
   return names[static_cast<int>(kind)];
 }
 
+namespace {
+
+void destroy(const Node* node) {
+  switch (node->kind) {
+#define RETROGRADE_EXPR(K) \
+  case Kind::K:            \
+    return delete static_cast<const K*>(node);
+#define RETROGRADE_BINARY(K) RETROGRADE_EXPR(K)
+#define RETROGRADE_STMT(K) RETROGRADE_EXPR(K)
+#include "ir/kinds.def"
+  }
+}
+
+}  // namespace
+
 // A deleted node drops its children, which may end here again: those are queued in the outermost
 // call, on whose stack the queue lives. (A thread_local queue with a destructor would be gone
 // before the last static Expr is.)
@@ -27,11 +42,11 @@ void release(const Node* node) noexcept {
   }
   std::vector<const Node*> queue;
   pending = &queue;
-  delete node;
+  destroy(node);
   while (!queue.empty()) {
     const Node* next = queue.back();
     queue.pop_back();
-    delete next;
+    destroy(next);
   }
   pending = nullptr;
 }
@@ -51,7 +66,7 @@ Expr::Expr(float16_t value) : Expr(ir::make_const(Float(16), static_cast<double>
 Expr::Expr(bfloat16_t value) : Expr(ir::make_const(BFloat(16), static_cast<double>(value))) {}
 Expr::Expr(float value) : Expr(ir::make_const(Float(32), static_cast<double>(value))) {}
 Expr::Expr(double value) : Expr(ir::make_const(Float(64), value)) {}
-Expr::Expr(const std::string& text) : Ref(new ir::StringImm(text)) {}
+Expr::Expr(const std::string& text) : Ref(ir::make_node<ir::StringImm>(Handle(), text)) {}
 Expr::Expr(const char* text) {
   if (!text) {
     user_error("make an Expr of a text", "a text is not null", "the pointer to it is null",

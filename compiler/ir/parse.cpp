@@ -5,6 +5,7 @@
 #include <charconv>
 #include <limits>
 #include <optional>
+#include <type_traits>
 #include <unordered_map>
 
 #include "diagnostics/error.h"
@@ -21,6 +22,31 @@ constexpr int max_depth = 2000;
 
 constexpr ForType for_types[] = {ForType::Serial, ForType::Parallel, ForType::Vectorized,
                                  ForType::Unrolled};
+
+// The type that a suffix names: "_u8", "_f64", or "f" for float32.
+std::optional<Type> suffix_type(const std::string& suffix) {
+  if (suffix == "f") return Float(32);
+  static const std::pair<const char*, const char*> prefixes[] = {
+      {"_i", "int"}, {"_u", "uint"}, {"_f", "float"}, {"_bf", "bfloat"}};
+  for (const auto& [short_name, long_name] : prefixes) {
+    Type type;
+    const std::string prefix = short_name;
+    if (suffix.rfind(prefix, 0) == 0 && read_type(long_name + suffix.substr(prefix.size()), type))
+      return type;
+  }
+  return std::nullopt;
+}
+
+Expr special_float(const std::string& word, bool negative) {
+  const bool is_nan = word.rfind("nan_", 0) == 0;
+  if (!is_nan && word.rfind("inf_", 0) != 0) return {};
+  const std::optional<Type> type = suffix_type(word.substr(3));
+  if (!type || !type->is_float()) return {};
+  const double infinity = std::numeric_limits<double>::infinity();
+  return make_const(*type, is_nan     ? std::numeric_limits<double>::quiet_NaN()
+                           : negative ? -infinity
+                                      : infinity);
+}
 
 class Parser {
  public:
@@ -107,23 +133,230 @@ class Parser {
     Parser& parser;
   };
   Expr expr() { return infix(0); }
-  Expr infix(int min_precedence);
-  Expr prefix();
-  Expr number(bool negative);
-  Expr shared_block();
-  Expr let_expr();
-  Expr named();
-  Expr keyword_call(const Token& at);
-  Expr operator_call(Op op);
-  Expr call(CallType call_type);
-  Expr load(const std::string& name);
-  Expr shuffle();
-  Expr reduce();
-  std::vector<Expr> expr_list(const char* close) {
-    std::vector<Expr> result;
-    if (accept(close)) return result;
-    do result.push_back(expr());
+  const InfixOperator* infix_ahead() const {
+    return token_.kind == Token::Kind::Punctuation ? infix_operator(token_.text) : nullptr;
+  }
+  Expr infix(int min_precedence) {
+    const Depth depth(*this);
+    Expr left = prefix();
+    for (const InfixOperator* op = infix_ahead(); op && op->precedence >= min_precedence;
+         op = infix_ahead()) {
+      const Token at = take();
+      Expr right = infix(op->precedence + 1);
+      left = build(at, [&] { return binary(op->kind, left, right); });
+    }
+    return left;
+  }
+  Expr prefix() {
+    const Depth depth(*this);
+    const Token at = token_;
+    if (accept("-")) return number(true);
+    if (accept("!")) {
+      Expr a = prefix();
+      return build(at, [&] { return logical_not(a); });
+    }
+    if (is("{")) return shared_block();
+    if (is("(")) {
+      take();
+      return is("let") ? let_expr() : expr_before(")");
+    }
+    switch (token_.kind) {
+      case Token::Kind::Number:
+        return number(false);
+      case Token::Kind::String:
+        return Expr(take().text);
+      case Token::Kind::Shared: {
+        const auto found = shared_.find(token_.text);
+        if (found == shared_.end()) fail("a shared node defined before");
+        take();
+        return found->second;
+      }
+      case Token::Kind::Name:
+        return named();
+      default:
+        fail("an expression");
+    }
+  }
+  Expr number(bool negative) {
+    if (token_.kind == Token::Kind::Name) {
+      Expr special = special_float(token_.text, negative);
+      if (!special.defined()) fail("a number");
+      take();
+      return special;
+    }
+    if (token_.kind != Token::Kind::Number) fail("a number");
+    const std::string literal = (negative ? "-" : "") + token_.text;
+    const char* const end = literal.data() + literal.size();
+    size_t digits = literal.find_first_of("_f");
+    if (digits == std::string::npos) digits = literal.size();
+    const std::optional<Type> type =
+        digits == literal.size() ? Int(32) : suffix_type(literal.substr(digits));
+    if (!type) fail("a number with a known suffix");
+    Expr result;
+    const char* stop = nullptr;
+    const auto read = [&](auto value) {
+      stop = std::from_chars(literal.data(), end, value).ptr;
+      return value;
+    };
+    if (type->is_float()) {
+      result = make_const(*type, read(0.0));
+    } else if (type->is_uint()) {
+      const auto value = read(uint64_t{0});
+      if (type->can_represent(value)) result = make_uint_const(*type, value);
+    } else {
+      const auto value = read(int64_t{0});
+      if (type->can_represent(value)) result = make_const(*type, value);
+    }
+    if (stop != literal.data() + digits || !result.defined()) fail("a number that fits its type");
+    take();
+    return result;
+  }
+  Expr shared_block() {
+    const auto outer = shared_;
+    expect("{");
+    while (token_.kind == Token::Kind::Shared && ahead_is("=")) {
+      const std::string name = take().text;
+      take();
+      shared_[name] = expr_before(";");
+    }
+    Expr result = expr_before("}");
+    shared_ = outer;
+    return result;
+  }
+  Expr let_expr() {
+    expect("let");
+    const std::string bound = name();
+    expect("=");
+    Expr value = expr_before("in");
+    return make_let(bound, value, expr_before(")"));
+  }
+  Expr named() {
+    if (token_.quoted) return ahead_is("(") ? call(CallType::Func) : load(take().text);
+    if (is("true") || is("false")) return make_uint_const(Bool(), take().text == "true");
+    if (Expr special = special_float(token_.text, false); special.defined()) {
+      take();
+      return special;
+    }
+    if (accept("image")) return call(CallType::Image);
+    if (accept("extern")) return call(CallType::Extern);
+    if (is_reserved(token_.text)) return keyword_call(token_);
+    return ahead_is("(") ? call(CallType::Func) : load(take().text);
+  }
+  Expr keyword_call(const Token& keyword) {
+    // A copy: the current token, which `keyword` may refer to, moves on.
+    const Token at = keyword;  // NOLINT(performance-unnecessary-copy-initialization)
+    Type type_name;
+    if (read_type(at.text, type_name)) {
+      take();
+      const std::vector<Expr> args = arguments(1);
+      return build(at, [&] { return cast_to(type_name, args[0]); });
+    }
+    if (accept("min") || accept("max")) {
+      const std::vector<Expr> args = arguments(2);
+      return build(
+          at, [&] { return binary(at.text == "min" ? Kind::Min : Kind::Max, args[0], args[1]); });
+    }
+    if (accept("select")) {
+      const std::vector<Expr> args = arguments(3);
+      return build(at, [&] { return make_select(args[0], args[1], args[2]); });
+    }
+    if (accept("reinterpret")) {
+      const Type to = type_in("<", ">");
+      const std::vector<Expr> args = arguments(1);
+      return build(at, [&] { return reinterpret_as(to, args[0]); });
+    }
+    if (is("ramp") || is("broadcast")) {
+      const bool is_ramp = take().text == "ramp";
+      expect("(");
+      Expr first = expr_before(","), stride = is_ramp ? expr_before(",") : Expr();
+      const int lanes = integer();
+      expect(")");
+      return build(at, [&] {
+        return is_ramp ? make_ramp(first, stride, lanes) : make_broadcast(first, lanes);
+      });
+    }
+    if (is("shuffle")) return shuffle();
+    if (is("reduce")) return reduce();
+    const Op op = op_from_name(at.text);
+    if (op == Op::none) fail("an expression");
+    return operator_call(op);
+  }
+  Expr operator_call(Op op) {
+    const Token at = take();
+    std::optional<Type> result;
+    if (is("<")) result = type_in("<", ">");
+    expect("(");
+    std::vector<Expr> args = expr_list(")");
+    return build(at, [&] { return result ? call_op(op, *result, args) : call_op(op, args); });
+  }
+  Expr call(CallType call_type) {
+    const std::string callee = name();
+    expect("(");
+    std::vector<Expr> args = expr_list(")");
+    const int component = accept(".") ? integer() : 0;
+    const Type result = type_suffix();
+    return make_node<Call>(result, call_type, Op::none, callee, std::move(args), component,
+                           SymbolRef());
+  }
+  // A load, or a variable when no bracket follows.
+  Expr load(const std::string& name) {
+    const Token at = token_;
+    if (!accept("[")) return variable(name, type_suffix());
+    Expr index = expr(), predicate;
+    if (accept("if")) predicate = expr();
+    expect("]");
+    return make_load(type_suffix(), name, index, predicate);
+  }
+  Expr shuffle() {
+    const Token at = take();
+    expect("(");
+    const std::vector<Expr> vectors = several([&] { return expr(); });
+    expect(";");
+    const std::vector<int> indices = several([&] { return integer(); });
+    expect(")");
+    return build(at, [&] { return make_shuffle(vectors, indices); });
+  }
+  Expr reduce() {
+    const Token at = take();
+    expect("(");
+    std::optional<Kind> op;
+    for (Kind candidate : {Kind::Add, Kind::Mul, Kind::Min, Kind::Max, Kind::And, Kind::Or}) {
+      if (is(kind_word(candidate).c_str())) op = candidate;
+    }
+    if (!op) fail("add, mul, min, max, and, or");
+    take();
+    expect(",");
+    Expr value = expr_before(",");
+    const int lanes = integer();
+    expect(")");
+    return build(at, [&] { return make_vector_reduce(*op, value, lanes); });
+  }
+  // What stands before, or behind, a mark.
+  Expr expr_before(const char* mark) {
+    Expr e = expr();
+    expect(mark);
+    return e;
+  }
+  Expr expr_behind(const char* mark) {
+    expect(mark);
+    return expr();
+  }
+  Type type_in(const char* open, const char* close) {
+    expect(open);
+    const Type result = type();
+    expect(close);
+    return result;
+  }
+  template <class Read>
+  std::vector<std::invoke_result_t<const Read&>> several(const Read& read) {
+    std::vector<decltype(read())> result;
+    do result.push_back(read());
     while (accept(","));
+    return result;
+  }
+  std::vector<Expr> expr_list(const char* close) {
+    if (accept(close)) return {};
+    std::vector<Expr> result = several([&] { return expr(); });
     expect(close);
     return result;
   }
@@ -136,7 +369,11 @@ class Parser {
   }
 
   // ---- statements ----
-  Stmt block_rest();
+  Stmt block_rest() {
+    std::vector<Stmt> stmts;
+    while (!at_end() && !is("}")) stmts.push_back(stmt());
+    return make_block(std::move(stmts));
+  }
   Stmt block() {
     const Depth depth(*this);
     expect("{");
@@ -144,457 +381,142 @@ class Parser {
     expect("}");
     return s;
   }
-  Stmt stmt();
-  bool is_loop() const;
-  Stmt loop();
-  Stmt realize();
-  Stmt prefetch();
-  std::vector<Range> ranges();
-  Stmt allocate();
-  Stmt if_stmt();
-  Stmt store_or_provide();
-  MemoryType memory();
+  Stmt stmt() {
+    const Depth depth(*this);
+    if (is("{")) return block();
+    if (accept("let")) {
+      const std::string bound = name();
+      Expr value = expr_behind("=");
+      return make_let(bound, value, block_rest());
+    }
+    if (accept("assert")) {
+      const std::vector<Expr> args = arguments(2);
+      return make_assert(args[0], args[1]);
+    }
+    if (is("produce") || is("consume")) {
+      const bool produces = take().text == "produce";
+      const std::string func = name();
+      return make_producer_consumer(func, produces, block());
+    }
+    if (is_loop()) return loop();
+    if (accept("realize")) return realize();
+    if (accept("allocate")) return allocate();
+    if (accept("free")) return make_free(name());
+    if (accept("if")) return if_stmt();
+    if (accept("evaluate")) return make_evaluate(expr());
+    if (accept("atomic")) {
+      const std::string target = name();
+      return make_atomic(target, block());
+    }
+    if (accept("fork")) {
+      Stmt first = block();
+      expect("and");
+      return make_fork(first, block());
+    }
+    if (accept("prefetch")) return prefetch();
+    return store_or_provide();
+  }
+  bool is_loop() const {
+    if (is("for")) return true;
+    for (Partition partition : {Partition::Never, Partition::Always}) {
+      if (is(partition_name(partition))) return true;
+    }
+    for (ForType type : for_types) {
+      if (is(for_name(type))) return true;
+    }
+    return false;
+  }
+  Stmt loop() {
+    Partition partition = Partition::Auto;
+    for (Partition wanted : {Partition::Never, Partition::Always}) {
+      if (accept(partition_name(wanted))) partition = wanted;
+    }
+    ForType runs = ForType::Serial;
+    for (ForType wanted : for_types) {
+      if (accept(for_name(wanted))) runs = wanted;
+    }
+    expect("for");
+    expect("(");
+    const std::string variable = name();
+    expect(",");
+    Expr min = expr_before(","), extent = expr_before(")");
+    return make_for(variable, min, extent, runs, block(), partition);
+  }
+  Stmt realize() {
+    const std::string func = name();
+    expect("(");
+    std::vector<Type> types = several([&] { return type(); });
+    expect(")");
+    const MemoryType where = memory();
+    std::vector<Range> bounds = ranges();
+    return make_realize(func, std::move(types), where, std::move(bounds), block());
+  }
+  Stmt prefetch() {
+    const std::string target = name();
+    const Type element = type_in("(", ")");
+    return make_prefetch(target, element, ranges());
+  }
+  std::vector<Range> ranges() {
+    if (!is("[")) return {};
+    return several([&] {
+      expect("[");
+      Expr min = expr_before(",");
+      return Range{min, expr_before("]")};
+    });
+  }
+  Stmt allocate() {
+    const std::string buffer = name();
+    expect("[");
+    Expr elements = expr_before("]");
+    expect(":");
+    const Type element = type();
+    const MemoryType where = memory();
+    return make_allocate(buffer, element, where, elements, block());
+  }
+  Stmt if_stmt() {
+    expect("(");
+    Expr condition = expr_before(")");
+    Stmt when_true = block(), when_false;
+    if (accept("else")) when_false = block();
+    return make_if(condition, when_true, when_false);
+  }
+  Stmt store_or_provide() {
+    const Token at = token_;
+    const std::string target = name();
+    if (accept("[")) {
+      Expr index = expr(), predicate;
+      if (accept("if")) predicate = expr();
+      expect("]");
+      Expr value = expr_behind("=");
+      return build(at, [&] { return make_store(target, value, index, predicate); });
+    }
+    if (!accept("(")) Lexer::fail(at, "a statement");
+    std::vector<Expr> args;
+    Expr predicate;
+    while (!is(")") && !is("if")) {
+      args.push_back(expr());
+      if (!accept(",")) break;
+    }
+    if (accept("if")) predicate = expr();
+    expect(")");
+    expect("=");
+    expect("{");
+    std::vector<Expr> values = expr_list("}");
+    return make_provide(target, std::move(values), std::move(args), predicate);
+  }
+  MemoryType memory() {
+    for (int i = 0; i <= static_cast<int>(MemoryType::AMXTile); ++i) {
+      const auto type = static_cast<MemoryType>(i);
+      if (accept(memory_name(type))) return type;
+    }
+    fail("auto, heap, stack or another memory type");
+  }
 
   Lexer lexer_;
   Token token_, ahead_;
   int depth_ = 0;
   std::unordered_map<std::string, Expr> shared_;
 };
-
-struct Infix {
-  Kind kind;
-  int precedence;
-};
-
-std::optional<Infix> infix_operator(const Token& token) {
-  static const std::unordered_map<std::string, Infix> table = {
-      {"||", {Kind::Or, 0}}, {"&&", {Kind::And, 1}}, {"==", {Kind::EQ, 2}}, {"!=", {Kind::NE, 2}},
-      {"<", {Kind::LT, 3}},  {"<=", {Kind::LE, 3}},  {">", {Kind::GT, 3}},  {">=", {Kind::GE, 3}},
-      {"+", {Kind::Add, 4}}, {"-", {Kind::Sub, 4}},  {"*", {Kind::Mul, 5}}, {"/", {Kind::Div, 5}},
-      {"%", {Kind::Mod, 5}}};
-  if (token.kind != Token::Kind::Punctuation) return std::nullopt;
-  const auto found = table.find(token.text);
-  if (found == table.end()) return std::nullopt;
-  return found->second;
-}
-
-Expr Parser::infix(int min_precedence) {
-  const Depth depth(*this);
-  Expr left = prefix();
-  for (auto op = infix_operator(token_); op && op->precedence >= min_precedence;
-       op = infix_operator(token_)) {
-    const Token at = take();
-    Expr right = infix(op->precedence + 1);
-    left = build(at, [&] { return binary(op->kind, left, right); });
-  }
-  return left;
-}
-
-Expr Parser::prefix() {
-  const Depth depth(*this);
-  const Token at = token_;
-  if (accept("-")) return number(true);
-  if (accept("!")) {
-    Expr a = prefix();
-    return build(at, [&] { return logical_not(a); });
-  }
-  if (is("{")) return shared_block();
-  if (is("(")) {
-    take();
-    if (is("let")) return let_expr();
-    Expr e = expr();
-    expect(")");
-    return e;
-  }
-  switch (token_.kind) {
-    case Token::Kind::Number:
-      return number(false);
-    case Token::Kind::String:
-      return Expr(take().text);
-    case Token::Kind::Shared: {
-      const auto found = shared_.find(token_.text);
-      if (found == shared_.end()) fail("a shared node defined before");
-      take();
-      return found->second;
-    }
-    case Token::Kind::Name:
-      return named();
-    default:
-      fail("an expression");
-  }
-}
-
-// The type that a suffix names: "_u8", "_f64", or "f" for float32.
-std::optional<Type> suffix_type(const std::string& suffix) {
-  if (suffix == "f") return Float(32);
-  static const std::pair<const char*, const char*> prefixes[] = {
-      {"_i", "int"}, {"_u", "uint"}, {"_f", "float"}, {"_bf", "bfloat"}};
-  for (const auto& [short_name, long_name] : prefixes) {
-    Type type;
-    const std::string prefix = short_name;
-    if (suffix.rfind(prefix, 0) == 0 && read_type(long_name + suffix.substr(prefix.size()), type))
-      return type;
-  }
-  return std::nullopt;
-}
-
-Expr special_float(const std::string& word, bool negative) {
-  const bool is_nan = word.rfind("nan_", 0) == 0;
-  if (!is_nan && word.rfind("inf_", 0) != 0) return {};
-  const std::optional<Type> type = suffix_type(word.substr(3));
-  if (!type || !type->is_float()) return {};
-  const double infinity = std::numeric_limits<double>::infinity();
-  return make_const(*type, is_nan     ? std::numeric_limits<double>::quiet_NaN()
-                           : negative ? -infinity
-                                      : infinity);
-}
-
-Expr Parser::number(bool negative) {
-  if (token_.kind == Token::Kind::Name) {
-    Expr special = special_float(token_.text, negative);
-    if (!special.defined()) fail("a number");
-    take();
-    return special;
-  }
-  if (token_.kind != Token::Kind::Number) fail("a number");
-  const std::string literal = (negative ? "-" : "") + token_.text;
-  const char* const end = literal.data() + literal.size();
-  size_t digits = literal.find_first_of("_f");
-  if (digits == std::string::npos) digits = literal.size();
-  const std::optional<Type> type =
-      digits == literal.size() ? Int(32) : suffix_type(literal.substr(digits));
-  if (!type) fail("a number with a known suffix");
-  Expr result;
-  const char* stop = nullptr;
-  if (type->is_float()) {
-    double value = 0;
-    stop = std::from_chars(literal.data(), end, value).ptr;
-    result = make_const(*type, value);
-  } else if (type->is_uint()) {
-    uint64_t value = 0;
-    stop = std::from_chars(literal.data(), end, value).ptr;
-    if (type->can_represent(value)) result = make_uint_const(*type, value);
-  } else {
-    int64_t value = 0;
-    stop = std::from_chars(literal.data(), end, value).ptr;
-    if (type->can_represent(value)) result = make_const(*type, value);
-  }
-  if (stop != literal.data() + digits || !result.defined()) fail("a number that fits its type");
-  take();
-  return result;
-}
-
-Expr Parser::shared_block() {
-  const auto outer = shared_;
-  expect("{");
-  while (token_.kind == Token::Kind::Shared && ahead_is("=")) {
-    const std::string name = take().text;
-    take();
-    shared_[name] = expr();
-    expect(";");
-  }
-  Expr result = expr();
-  expect("}");
-  shared_ = outer;
-  return result;
-}
-
-Expr Parser::let_expr() {
-  expect("let");
-  const std::string bound = name();
-  expect("=");
-  Expr value = expr();
-  expect("in");
-  Expr body = expr();
-  expect(")");
-  return make_let(bound, value, body);
-}
-
-Expr Parser::named() {
-  if (token_.quoted) return ahead_is("(") ? call(CallType::Func) : load(take().text);
-  if (is("true") || is("false")) return make_uint_const(Bool(), take().text == "true");
-  if (Expr special = special_float(token_.text, false); special.defined()) {
-    take();
-    return special;
-  }
-  if (accept("image")) return call(CallType::Image);
-  if (accept("extern")) return call(CallType::Extern);
-  if (is_reserved(token_.text)) return keyword_call(token_);
-  return ahead_is("(") ? call(CallType::Func) : load(take().text);
-}
-
-// A load, or a variable when no bracket follows.
-Expr Parser::load(const std::string& name) {
-  const Token at = token_;
-  if (!accept("[")) return variable(name, type_suffix());
-  Expr index = expr(), predicate;
-  if (accept("if")) predicate = expr();
-  expect("]");
-  return make_load(type_suffix(), name, index, predicate);
-}
-
-Expr Parser::keyword_call(const Token& keyword) {
-  // A copy: the current token, which `keyword` may refer to, moves on.
-  const Token at = keyword;  // NOLINT(performance-unnecessary-copy-initialization)
-  Type type_name;
-  if (read_type(at.text, type_name)) {
-    take();
-    const std::vector<Expr> args = arguments(1);
-    return build(at, [&] { return cast_to(type_name, args[0]); });
-  }
-  if (accept("min") || accept("max")) {
-    const std::vector<Expr> args = arguments(2);
-    return build(
-        at, [&] { return binary(at.text == "min" ? Kind::Min : Kind::Max, args[0], args[1]); });
-  }
-  if (accept("select")) {
-    const std::vector<Expr> args = arguments(3);
-    return build(at, [&] { return make_select(args[0], args[1], args[2]); });
-  }
-  if (accept("reinterpret")) {
-    expect("<");
-    const Type to = type();
-    expect(">");
-    const std::vector<Expr> args = arguments(1);
-    return build(at, [&] { return reinterpret_as(to, args[0]); });
-  }
-  if (is("ramp") || is("broadcast")) {
-    const bool is_ramp = take().text == "ramp";
-    expect("(");
-    Expr first = expr(), stride;
-    expect(",");
-    if (is_ramp) {
-      stride = expr();
-      expect(",");
-    }
-    const int lanes = integer();
-    expect(")");
-    return build(at, [&] {
-      return is_ramp ? make_ramp(first, stride, lanes) : make_broadcast(first, lanes);
-    });
-  }
-  if (is("shuffle")) return shuffle();
-  if (is("reduce")) return reduce();
-  const Op op = op_from_name(at.text);
-  if (op == Op::none) fail("an expression");
-  return operator_call(op);
-}
-
-Expr Parser::operator_call(Op op) {
-  const Token at = take();
-  std::optional<Type> result;
-  if (accept("<")) {
-    result = type();
-    expect(">");
-  }
-  expect("(");
-  std::vector<Expr> args = expr_list(")");
-  return build(at, [&] { return result ? call_op(op, *result, args) : call_op(op, args); });
-}
-
-Expr Parser::call(CallType call_type) {
-  const std::string callee = name();
-  expect("(");
-  std::vector<Expr> args = expr_list(")");
-  const int component = accept(".") ? integer() : 0;
-  const Type result = type_suffix();
-  return new Call(result, call_type, Op::none, callee, std::move(args), component, {});
-}
-
-Expr Parser::shuffle() {
-  const Token at = take();
-  expect("(");
-  std::vector<Expr> vectors;
-  do vectors.push_back(expr());
-  while (accept(","));
-  expect(";");
-  std::vector<int> indices;
-  do indices.push_back(integer());
-  while (accept(","));
-  expect(")");
-  return build(at, [&] { return make_shuffle(vectors, indices); });
-}
-
-Expr Parser::reduce() {
-  const Token at = take();
-  expect("(");
-  std::optional<Kind> op;
-  for (Kind candidate : {Kind::Add, Kind::Mul, Kind::Min, Kind::Max, Kind::And, Kind::Or}) {
-    if (is(reduce_name(candidate).c_str())) op = candidate;
-  }
-  if (!op) fail("add, mul, min, max, and, or");
-  take();
-  expect(",");
-  Expr value = expr();
-  expect(",");
-  const int lanes = integer();
-  expect(")");
-  return build(at, [&] { return make_vector_reduce(*op, value, lanes); });
-}
-
-// ---- statements ----
-
-Stmt Parser::block_rest() {
-  std::vector<Stmt> stmts;
-  while (!at_end() && !is("}")) stmts.push_back(stmt());
-  return make_block(std::move(stmts));
-}
-
-Stmt Parser::stmt() {
-  const Depth depth(*this);
-  if (is("{")) return block();
-  if (accept("let")) {
-    const std::string bound = name();
-    expect("=");
-    Expr value = expr();
-    return make_let(bound, value, block_rest());
-  }
-  if (accept("assert")) {
-    const std::vector<Expr> args = arguments(2);
-    return make_assert(args[0], args[1]);
-  }
-  if (is("produce") || is("consume")) {
-    const bool produces = take().text == "produce";
-    const std::string func = name();
-    return make_producer_consumer(func, produces, block());
-  }
-  if (is_loop()) return loop();
-  if (accept("realize")) return realize();
-  if (accept("allocate")) return allocate();
-  if (accept("free")) return make_free(name());
-  if (accept("if")) return if_stmt();
-  if (accept("evaluate")) return make_evaluate(expr());
-  if (accept("atomic")) {
-    const std::string target = name();
-    return make_atomic(target, block());
-  }
-  if (accept("fork")) {
-    Stmt first = block();
-    expect("and");
-    return make_fork(first, block());
-  }
-  if (accept("prefetch")) return prefetch();
-  return store_or_provide();
-}
-
-bool Parser::is_loop() const {
-  if (is("for")) return true;
-  for (Partition partition : {Partition::Never, Partition::Always}) {
-    if (is(partition_name(partition))) return true;
-  }
-  for (ForType type : for_types) {
-    if (is(for_name(type))) return true;
-  }
-  return false;
-}
-
-Stmt Parser::loop() {
-  Partition partition = Partition::Auto;
-  for (Partition wanted : {Partition::Never, Partition::Always}) {
-    if (accept(partition_name(wanted))) partition = wanted;
-  }
-  ForType runs = ForType::Serial;
-  for (ForType wanted : for_types) {
-    if (accept(for_name(wanted))) runs = wanted;
-  }
-  expect("for");
-  expect("(");
-  const std::string variable = name();
-  expect(",");
-  Expr min = expr();
-  expect(",");
-  Expr extent = expr();
-  expect(")");
-  return make_for(variable, min, extent, runs, block(), partition);
-}
-
-MemoryType Parser::memory() {
-  for (int i = 0; i <= static_cast<int>(MemoryType::AMXTile); ++i) {
-    const auto type = static_cast<MemoryType>(i);
-    if (accept(memory_name(type))) return type;
-  }
-  fail("auto, heap, stack or another memory type");
-}
-
-std::vector<Range> Parser::ranges() {
-  std::vector<Range> bounds;
-  while (is("[")) {
-    take();
-    Expr min = expr();
-    expect(",");
-    Expr extent = expr();
-    expect("]");
-    bounds.push_back({min, extent});
-    if (!accept(",")) break;
-  }
-  return bounds;
-}
-
-Stmt Parser::prefetch() {
-  const std::string target = name();
-  expect("(");
-  const Type element = type();
-  expect(")");
-  return make_prefetch(target, element, ranges());
-}
-
-Stmt Parser::realize() {
-  const std::string func = name();
-  expect("(");
-  std::vector<Type> types;
-  do types.push_back(type());
-  while (accept(","));
-  expect(")");
-  const MemoryType where = memory();
-  std::vector<Range> bounds = ranges();
-  return make_realize(func, std::move(types), where, std::move(bounds), block());
-}
-
-Stmt Parser::allocate() {
-  const std::string buffer = name();
-  expect("[");
-  Expr elements = expr();
-  expect("]");
-  expect(":");
-  const Type element = type();
-  const MemoryType where = memory();
-  return make_allocate(buffer, element, where, elements, block());
-}
-
-Stmt Parser::if_stmt() {
-  expect("(");
-  Expr condition = expr();
-  expect(")");
-  Stmt when_true = block(), when_false;
-  if (accept("else")) when_false = block();
-  return make_if(condition, when_true, when_false);
-}
-
-Stmt Parser::store_or_provide() {
-  const Token at = token_;
-  const std::string target = name();
-  if (accept("[")) {
-    Expr index = expr(), predicate;
-    if (accept("if")) predicate = expr();
-    expect("]");
-    expect("=");
-    Expr value = expr();
-    return build(at, [&] { return make_store(target, value, index, predicate); });
-  }
-  if (!accept("(")) Lexer::fail(at, "a statement");
-  std::vector<Expr> args;
-  Expr predicate;
-  while (!is(")") && !is("if")) {
-    args.push_back(expr());
-    if (!accept(",")) break;
-  }
-  if (accept("if")) predicate = expr();
-  expect(")");
-  expect("=");
-  expect("{");
-  std::vector<Expr> values = expr_list("}");
-  return make_provide(target, std::move(values), std::move(args), predicate);
-}
 
 }  // namespace
 

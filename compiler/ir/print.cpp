@@ -25,6 +25,7 @@
 #include <ostream>
 #include <unordered_map>
 
+#include "diagnostics/error.h"
 #include "ir/text.h"
 #include "ir/visit.h"
 
@@ -67,39 +68,6 @@ std::string string_text(const std::string& value) {
   return out + '"';
 }
 
-const char* infix(Kind kind) {
-  switch (kind) {
-    case Kind::Add:
-      return "+";
-    case Kind::Sub:
-      return "-";
-    case Kind::Mul:
-      return "*";
-    case Kind::Div:
-      return "/";
-    case Kind::Mod:
-      return "%";
-    case Kind::EQ:
-      return "==";
-    case Kind::NE:
-      return "!=";
-    case Kind::LT:
-      return "<";
-    case Kind::LE:
-      return "<=";
-    case Kind::GT:
-      return ">";
-    case Kind::GE:
-      return ">=";
-    case Kind::And:
-      return "&&";
-    case Kind::Or:
-      return "||";
-    default:
-      return nullptr;
-  }
-}
-
 // Small trees are printed as trees, however shared. In a large one every node used twice gets a
 // name, lest the text be exponential in the size of the DAG.
 class Sharing {
@@ -137,304 +105,228 @@ class Sharing {
   std::vector<Expr> order_;
 };
 
-class Printer {
+// Appends text and expressions, one after the other.
+class ExprPrinter {
  public:
-  explicit Printer(std::string& out) : out_(out) {}
+  explicit ExprPrinter(std::string& out) : out_(out) {}
 
   void print_root(const Expr& e) {
     const std::vector<Expr> named = Sharing::find(e);
-    if (named.empty()) return print(e);
-    out_ += '{';
+    if (named.empty()) return put(e);
+    put("{");
     for (const Expr& shared : named) {
       const std::string name = "#" + std::to_string(names_.size());
-      out_ += name + " = ";
-      print(shared);
-      out_ += "; ";
+      write(name, " = ", shared, "; ");
       names_.emplace(shared.get(), name);
     }
-    print(e);
-    out_ += '}';
+    write(e, "}");
     names_.clear();
   }
-  void print(const Stmt& s);
 
  private:
-  void print(const Expr& e) {
+  void put(const char* text) { out_ += text; }
+  void put(const std::string& text) { out_ += text; }
+  void put(const std::vector<Expr>& list) {
+    for (size_t i = 0; i < list.size(); ++i) write(i ? ", " : "", list[i]);
+  }
+  void put(const Expr& e) {
     if (const auto named = names_.find(e.get()); named != names_.end()) {
-      out_ += named->second;
+      put(named->second);
     } else {
       print_node(e);
     }
   }
-  void print_node(const Expr& e);
-  void print_call(const Call& n);
-
-  void list(const std::vector<Expr>& es) {
-    for (size_t i = 0; i < es.size(); ++i) {
-      if (i) out_ += ", ";
-      print(es[i]);
+  void put(Type type_unless_int32) {
+    if (type_unless_int32 != Int(32)) put(':' + to_string(type_unless_int32));
+  }
+  template <class... Parts>
+  void write(const Parts&... parts) {
+    (put(parts), ...);
+  }
+  void print_node(const Expr& e) {
+    match(
+        e,
+        [&](const IntImm& n) {
+          write(std::to_string(n.value), n.type == Int(32) ? "" : "_" + suffix(n.type));
+        },
+        [&](const UIntImm& n) {
+          put(n.type.is_bool() ? (n.value ? "true" : "false")
+                               : std::to_string(n.value) + "_" + suffix(n.type));
+        },
+        [&](const FloatImm& n) { put(float_text(n.type, n.value)); },
+        [&](const StringImm& n) { put(string_text(n.value)); },
+        [&](const Variable& n) { write(quote_name(n.name), n.type); },
+        [&](const Cast& n) { write(to_string(n.type), "(", n.value, ")"); },
+        [&](const Reinterpret& n) { write("reinterpret<", to_string(n.type), ">(", n.value, ")"); },
+        [&](const Binary& n) {
+          if (const InfixOperator* op = infix_operator(n.kind))
+            return write("(", n.a, " ", op->symbol, " ", n.b, ")");
+          write(kind_word(n.kind), "(", n.a, ", ", n.b, ")");
+        },
+        [&](const Not& n) { write("!", n.a); },
+        [&](const Select& n) {
+          write("select(", n.condition, ", ", n.when_true, ", ", n.when_false, ")");
+        },
+        [&](const Load& n) {
+          write(quote_name(n.name), "[", n.index);
+          if (n.predicate.defined()) write(" if ", n.predicate);
+          write("]", n.type);
+        },
+        [&](const Ramp& n) {
+          write("ramp(", n.base, ", ", n.stride, ", ", std::to_string(n.lanes), ")");
+        },
+        [&](const Broadcast& n) {
+          write("broadcast(", n.value, ", ", std::to_string(n.lanes), ")");
+        },
+        [&](const Call& n) { print_call(n); },
+        [&](const Let& n) {
+          write("(let ", quote_name(n.name), " = ", n.value, " in ", n.body, ")");
+        },
+        [&](const Shuffle& n) {
+          write("shuffle(", n.vectors, "; ",
+                listed(n.indices, [](int i) { return std::to_string(i); }), ")");
+        },
+        [&](const VectorReduce& n) {
+          write("reduce(", kind_word(n.op), ", ", n.value, ", ", std::to_string(n.type.lanes()),
+                ")");
+        },
+        [&](const ExprNode& n) { put(kind_name(n.kind)); });
+  }
+  void print_call(const Call& n) {
+    if (n.call_type == CallType::Operator) {
+      const bool implied = !n.args.empty() && n.args[0].type() == n.type;
+      return write(n.name, implied ? "" : "<" + to_string(n.type) + ">", "(", n.args, ")");
     }
+    if (n.call_type == CallType::Image) put("image ");
+    if (n.call_type == CallType::Extern) put("extern ");
+    write(quote_name(n.name), "(", n.args, ")");
+    if (n.component) put('.' + std::to_string(n.component));
+    put(n.type);
   }
-  void root_list(const std::vector<Expr>& es) {
-    for (size_t i = 0; i < es.size(); ++i) {
-      if (i) out_ += ", ";
-      print_root(es[i]);
-    }
-  }
-  void function(const std::string& name, std::initializer_list<Expr> args,
-                const std::string& tail = "") {
-    out_ += name + '(';
-    list(args);
-    out_ += tail + ')';
-  }
-  void type_unless_int32(Type type) {
-    if (type != Int(32)) out_ += ':' + to_string(type);
-  }
-
-  // ---- statements ----
-  void line_start() { out_.append(2 * indent_, ' '); }
-  void body(const Stmt& s) {
-    out_ += " {\n";
-    ++indent_;
-    if (s.defined()) print(s);
-    --indent_;
-    line_start();
-    out_ += '}';
-  }
-  void store_predicate(const Expr& predicate) {
-    if (!predicate.defined()) return;
-    out_ += " if ";
-    print_root(predicate);
-  }
-  void print_block(const Block& n);
-  void print_realize(const Realize& n);
-  void print_bounds(const std::vector<Range>& bounds);
-  void print_if(const IfThenElse& n);
 
   std::string& out_;
-  int indent_ = 0;
   std::unordered_map<const ExprNode*, std::string> names_;
 };
 
-void Printer::print_call(const Call& n) {
-  if (n.call_type == CallType::Operator) {
-    const bool implied = !n.args.empty() && n.args[0].type() == n.type;
-    out_ += n.name + (implied ? "" : "<" + to_string(n.type) + ">") + '(';
-    list(n.args);
-    out_ += ')';
-    return;
+// The same for statements, line by line.
+class StmtPrinter {
+ public:
+  explicit StmtPrinter(std::string& out) : out_(out) {}
+
+  void print(const Stmt& s) {
+    if (const auto* block = s.as<Block>()) return print_block(*block);
+    put(margin());
+    match(
+        s,
+        [&](const LetStmt& n) {
+          write("let ", quote_name(n.name), " = ", n.value, "\n");
+          print(n.body);
+        },
+        [&](const Assert& n) { write("assert(", n.condition, ", ", n.error, ")"); },
+        [&](const ProducerConsumer& n) {
+          write(n.produces ? "produce " : "consume ", quote_name(n.name), Body{n.body});
+        },
+        [&](const For& n) {
+          if (n.partition != Partition::Auto) write(partition_name(n.partition), " ");
+          if (n.runs != ForType::Serial) write(for_name(n.runs), " ");
+          write("for (", quote_name(n.name), ", ", n.min, ", ", n.extent, ")", Body{n.body});
+        },
+        [&](const Store& n) {
+          write(quote_name(n.name), "[", n.index, If{n.predicate}, "] = ", n.value);
+        },
+        [&](const Provide& n) {
+          write(quote_name(n.name), "(", n.args, If{n.predicate}, ") = {", n.values, "}");
+        },
+        [&](const Realize& n) {
+          write("realize ", quote_name(n.name), "(",
+                listed(n.types, [](Type type) { return to_string(type); }), ") ",
+                memory_name(n.memory), n.bounds, Body{n.body});
+        },
+        [&](const Allocate& n) {
+          write("allocate ", quote_name(n.name), "[", n.elements, "]:", to_string(n.type), " ",
+                memory_name(n.memory), Body{n.body});
+        },
+        [&](const Free& n) { write("free ", quote_name(n.name)); },
+        [&](const IfThenElse& n) {
+          write("if (", n.condition, ")", Body{n.when_true});
+          if (n.when_false.defined()) write(" else", Body{n.when_false});
+        },
+        [&](const Evaluate& n) { write("evaluate ", n.value); },
+        [&](const Atomic& n) { write("atomic ", quote_name(n.name), Body{n.body}); },
+        [&](const Fork& n) { write("fork", Body{n.first}, " and", Body{n.rest}); },
+        [&](const Prefetch& n) {
+          write("prefetch ", quote_name(n.name), "(", to_string(n.type), ")", n.bounds);
+        },
+        [&](const StmtNode& n) { put(kind_name(n.kind)); });
+    if (s.kind() != Kind::LetStmt) put("\n");
   }
-  if (n.call_type == CallType::Image) out_ += "image ";
-  if (n.call_type == CallType::Extern) out_ += "extern ";
-  out_ += quote_name(n.name) + '(';
-  list(n.args);
-  out_ += ')';
-  if (n.component) out_ += '.' + std::to_string(n.component);
-  type_unless_int32(n.type);
-}
 
-void Printer::print_node(const Expr& e) {
-  match(
-      e,
-      [&](const IntImm& n) {
-        out_ += std::to_string(n.value) + (n.type == Int(32) ? "" : "_" + suffix(n.type));
-      },
-      [&](const UIntImm& n) {
-        out_ += n.type.is_bool() ? (n.value ? "true" : "false")
-                                 : std::to_string(n.value) + "_" + suffix(n.type);
-      },
-      [&](const FloatImm& n) { out_ += float_text(n.type, n.value); },
-      [&](const StringImm& n) { out_ += string_text(n.value); },
-      [&](const Variable& n) {
-        out_ += quote_name(n.name);
-        type_unless_int32(n.type);
-      },
-      [&](const Cast& n) { function(to_string(n.type), {n.value}); },
-      [&](const Reinterpret& n) { function("reinterpret<" + to_string(n.type) + ">", {n.value}); },
-      [&](const Binary& n) {
-        if (n.kind == Kind::Min || n.kind == Kind::Max)
-          return function(n.kind == Kind::Min ? "min" : "max", {n.a, n.b});
-        out_ += '(';
-        print(n.a);
-        out_ += std::string(" ") + infix(n.kind) + ' ';
-        print(n.b);
-        out_ += ')';
-      },
-      [&](const Not& n) {
-        out_ += '!';
-        print(n.a);
-      },
-      [&](const Select& n) {
-        function("select", {n.condition, n.when_true, n.when_false});
-      },
-      [&](const Load& n) {
-        out_ += quote_name(n.name) + '[';
-        print(n.index);
-        if (n.predicate.defined()) {
-          out_ += " if ";
-          print(n.predicate);
-        }
-        out_ += ']';
-        type_unless_int32(n.type);
-      },
-      [&](const Ramp& n) {
-        function("ramp", {n.base, n.stride}, ", " + std::to_string(n.lanes));
-      },
-      [&](const Broadcast& n) { function("broadcast", {n.value}, ", " + std::to_string(n.lanes)); },
-      [&](const Call& n) { print_call(n); },
-      [&](const Let& n) {
-        out_ += "(let " + quote_name(n.name) + " = ";
-        print(n.value);
-        out_ += " in ";
-        print(n.body);
-        out_ += ')';
-      },
-      [&](const Shuffle& n) {
-        out_ += "shuffle(";
-        list(n.vectors);
-        for (size_t i = 0; i < n.indices.size(); ++i)
-          out_ += (i ? ", " : "; ") + std::to_string(n.indices[i]);
-        out_ += ')';
-      },
-      [&](const VectorReduce& n) {
-        out_ += "reduce(" + reduce_name(n.op) + ", ";
-        print(n.value);
-        out_ += ", " + std::to_string(n.type.lanes()) + ')';
-      },
-      [&](const ExprNode& n) { out_ += kind_name(n.kind); });
-}
-
-// A let that is not last would swallow what follows it: it gets braces.
-void Printer::print_block(const Block& n) {
-  for (size_t i = 0; i < n.stmts.size(); ++i) {
-    if (n.stmts[i].kind() == Kind::LetStmt && i + 1 < n.stmts.size()) {
-      line_start();
-      out_ += "{\n";
-      ++indent_;
-      print(n.stmts[i]);
-      --indent_;
-      line_start();
-      out_ += "}\n";
-    } else {
-      print(n.stmts[i]);
+ private:
+  // The body of a statement, in braces.
+  struct Body {
+    const Stmt& stmt;
+  };
+  struct If {
+    const Expr& predicate;
+  };
+  void put(const char* text) { out_ += text; }
+  void put(const std::string& text) { out_ += text; }
+  void put(const Expr& e) { ExprPrinter(out_).print_root(e); }
+  void put(const std::vector<Expr>& list) {
+    for (size_t i = 0; i < list.size(); ++i) write(i ? ", " : "", list[i]);
+  }
+  void put(const std::vector<Range>& bounds) {
+    for (size_t i = 0; i < bounds.size(); ++i)
+      write(i ? ", [" : " [", bounds[i].min, ", ", bounds[i].extent, "]");
+  }
+  void put(If store) {
+    if (store.predicate.defined()) write(" if ", store.predicate);
+  }
+  void put(Body body) {
+    put(" ");
+    put_braces(body.stmt);
+  }
+  void put_braces(const Stmt& s) {
+    put("{\n");
+    ++indent_;
+    if (s.defined()) print(s);
+    --indent_;
+    write(margin(), "}");
+  }
+  template <class... Parts>
+  void write(const Parts&... parts) {
+    (put(parts), ...);
+  }
+  std::string margin() const { return std::string(2 * indent_, ' '); }
+  // A let that is not last would swallow what follows it: it gets braces.
+  void print_block(const Block& n) {
+    for (size_t i = 0; i < n.stmts.size(); ++i) {
+      if (n.stmts[i].kind() == Kind::LetStmt && i + 1 < n.stmts.size()) {
+        put(margin());
+        put_braces(n.stmts[i]);
+        put("\n");
+      } else {
+        print(n.stmts[i]);
+      }
     }
   }
-}
 
-void Printer::print_realize(const Realize& n) {
-  out_ += "realize " + quote_name(n.name) + '(';
-  for (size_t i = 0; i < n.types.size(); ++i) out_ += (i ? ", " : "") + to_string(n.types[i]);
-  out_ += std::string(") ") + memory_name(n.memory);
-  print_bounds(n.bounds);
-  body(n.body);
-}
-
-void Printer::print_bounds(const std::vector<Range>& bounds) {
-  for (size_t i = 0; i < bounds.size(); ++i) {
-    out_ += i ? ", [" : " [";
-    print_root(bounds[i].min);
-    out_ += ", ";
-    print_root(bounds[i].extent);
-    out_ += ']';
-  }
-}
-
-void Printer::print_if(const IfThenElse& n) {
-  out_ += "if (";
-  print_root(n.condition);
-  out_ += ')';
-  body(n.when_true);
-  if (!n.when_false.defined()) return;
-  out_ += " else";
-  body(n.when_false);
-}
-
-void Printer::print(const Stmt& s) {
-  if (const auto* block = s.as<Block>()) return print_block(*block);
-  line_start();
-  match(
-      s,
-      [&](const LetStmt& n) {
-        out_ += "let " + quote_name(n.name) + " = ";
-        print_root(n.value);
-        out_ += '\n';
-        print(n.body);
-      },
-      [&](const Assert& n) {
-        out_ += "assert(";
-        root_list({n.condition, n.error});
-        out_ += ')';
-      },
-      [&](const ProducerConsumer& n) {
-        out_ += (n.produces ? "produce " : "consume ") + quote_name(n.name);
-        body(n.body);
-      },
-      [&](const For& n) {
-        if (n.partition != Partition::Auto) out_ += std::string(partition_name(n.partition)) + ' ';
-        if (n.runs != ForType::Serial) out_ += std::string(for_name(n.runs)) + ' ';
-        out_ += "for (" + quote_name(n.name) + ", ";
-        root_list({n.min, n.extent});
-        out_ += ')';
-        body(n.body);
-      },
-      [&](const Store& n) {
-        out_ += quote_name(n.name) + '[';
-        print_root(n.index);
-        store_predicate(n.predicate);
-        out_ += "] = ";
-        print_root(n.value);
-      },
-      [&](const Provide& n) {
-        out_ += quote_name(n.name) + '(';
-        root_list(n.args);
-        store_predicate(n.predicate);
-        out_ += ") = {";
-        root_list(n.values);
-        out_ += '}';
-      },
-      [&](const Realize& n) { print_realize(n); },
-      [&](const Allocate& n) {
-        out_ += "allocate " + quote_name(n.name) + '[';
-        print_root(n.elements);
-        out_ += "]:" + to_string(n.type) + ' ' + memory_name(n.memory);
-        body(n.body);
-      },
-      [&](const Free& n) { out_ += "free " + quote_name(n.name); },
-      [&](const IfThenElse& n) { print_if(n); },
-      [&](const Evaluate& n) {
-        out_ += "evaluate ";
-        print_root(n.value);
-      },
-      [&](const Atomic& n) {
-        out_ += "atomic " + quote_name(n.name);
-        body(n.body);
-      },
-      [&](const Fork& n) {
-        out_ += "fork";
-        body(n.first);
-        out_ += " and";
-        body(n.rest);
-      },
-      [&](const Prefetch& n) {
-        out_ += "prefetch " + quote_name(n.name) + '(' + to_string(n.type) + ')';
-        print_bounds(n.bounds);
-      },
-      [&](const StmtNode& n) { out_ += kind_name(n.kind); });
-  if (s.kind() != Kind::LetStmt) out_ += '\n';
-}
+  std::string& out_;
+  size_t indent_ = 0;
+};
 
 }  // namespace
 
 std::string PrintFunction::operator()(const Expr& e) const {
   std::string out;
   if (!e.defined()) return "<undefined>";
-  Printer(out).print_root(e);
+  ExprPrinter(out).print_root(e);
   return out;
 }
 
 std::string PrintFunction::operator()(const Stmt& s) const {
   std::string out;
-  if (s.defined()) Printer(out).print(s);
+  if (s.defined()) StmtPrinter(out).print(s);
   return out;
 }
 

@@ -74,8 +74,8 @@ bool may_be_extreme(const Expr& e, int depth) {
 }
 
 bool Sum::may_be_extreme() const {
-  return std::any_of(terms.begin(), terms.end(),
-                     [](const Term& term) { return ir::may_be_extreme(term.atom, 5); });
+  return std::ranges::any_of(terms,
+                             [](const Term& term) { return ir::may_be_extreme(term.atom, 5); });
 }
 
 std::vector<Expr> operands_of(Kind kind, const Expr& e) {
@@ -219,7 +219,7 @@ namespace {
 bool fits_type(const Sum& sum) {
   const Type type = sum.type;
   return sum.valid && type.can_represent(sum.constant) &&
-         std::all_of(sum.terms.begin(), sum.terms.end(), [&](const Term& term) {
+         std::ranges::all_of(sum.terms, [&](const Term& term) {
            return type.can_represent(term.factor) && type.can_represent(-term.factor);
          });
 }
@@ -227,10 +227,10 @@ bool fits_type(const Sum& sum) {
 std::vector<Term> in_order_of_text(const Sum& sum) {
   std::vector<Term> terms = sum.terms;
   if (!sum.is_linear) {
-    std::sort(terms.begin(), terms.end(),
-              [](const Term& a, const Term& b) { return canonical_less(a.atom, b.atom); });
+    std::ranges::sort(terms,
+                      [](const Term& a, const Term& b) { return canonical_less(a.atom, b.atom); });
   }
-  std::stable_partition(terms.begin(), terms.end(), [](const Term& t) { return t.factor > 0; });
+  std::ranges::stable_partition(terms, [](const Term& t) { return t.factor > 0; });
   return terms;
 }
 

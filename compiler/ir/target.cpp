@@ -249,17 +249,11 @@ Target Target::without_feature(Feature feature) const {
 }
 
 bool Target::features_any_of(const std::vector<Feature>& features) const {
-  for (Feature feature : features) {
-    if (has_feature(feature)) return true;
-  }
-  return false;
+  return std::ranges::any_of(features, [&](Feature feature) { return has_feature(feature); });
 }
 
 bool Target::features_all_of(const std::vector<Feature>& features) const {
-  for (Feature feature : features) {
-    if (!has_feature(feature)) return false;
-  }
-  return true;
+  return std::ranges::all_of(features, [&](Feature feature) { return has_feature(feature); });
 }
 
 namespace {
@@ -350,7 +344,7 @@ std::string Target::to_string() const {
   for (const auto& entry : feature_names) {
     if (has_feature(entry.value)) features.push_back(entry.name);
   }
-  std::sort(features.begin(), features.end());
+  std::ranges::sort(features);
   for (const std::string& feature : features) result += "-" + feature;
   if (processor_tune != ProcessorGeneric)
     result += "-tune_" + std::string(name_of(processor_names, processor_tune));

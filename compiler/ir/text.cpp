@@ -1,6 +1,7 @@
 // Words that the printer and the parser share.
 #include "ir/text.h"
 
+#include <algorithm>
 #include <cctype>
 #include <unordered_set>
 
@@ -23,10 +24,34 @@ const char* memory_name(MemoryType memory) {
   return names[static_cast<int>(memory)];
 }
 
-std::string reduce_name(Kind op) {
+std::string kind_word(Kind op) {
   std::string name = kind_name(op);
   name[0] = static_cast<char>(std::tolower(name[0]));
   return name;
+}
+
+namespace {
+
+// With C's precedence.
+constexpr InfixOperator infix_operators[] = {
+    {Kind::Or, "||", 0}, {Kind::And, "&&", 1}, {Kind::EQ, "==", 2}, {Kind::NE, "!=", 2},
+    {Kind::LT, "<", 3},  {Kind::LE, "<=", 3},  {Kind::GT, ">", 3},  {Kind::GE, ">=", 3},
+    {Kind::Add, "+", 4}, {Kind::Sub, "-", 4},  {Kind::Mul, "*", 5}, {Kind::Div, "/", 5},
+    {Kind::Mod, "%", 5}};
+
+template <class Holds>
+const InfixOperator* find_infix(Holds holds) {
+  const auto* found = std::ranges::find_if(infix_operators, holds);
+  return found == std::end(infix_operators) ? nullptr : found;
+}
+
+}  // namespace
+
+const InfixOperator* infix_operator(Kind kind) {
+  return find_infix([&](const InfixOperator& op) { return op.kind == kind; });
+}
+const InfixOperator* infix_operator(const std::string& symbol) {
+  return find_infix([&](const InfixOperator& op) { return op.symbol == symbol; });
 }
 
 bool read_type(const std::string& word, Type& type) {

@@ -1,13 +1,12 @@
 #include "ir/variables.h"
 
 #include "ir/build.h"
+#include "ir/lists.h"
 
 namespace retrograde::ir {
 
 std::vector<Expr> variables_of(const std::vector<std::string>& names) {
-  std::vector<Expr> result;
-  for (const std::string& name : names) result.push_back(variable(name));
-  return result;
+  return mapped(names, [](const std::string& name) { return variable(name); });
 }
 
 }  // namespace retrograde::ir

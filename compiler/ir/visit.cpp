@@ -137,8 +137,8 @@ Expr map_children(const Expr& e, ChildMap mapped) {
       [&](const Call& n) {
         const auto make = [&](std::vector<Expr> args) {
           if (n.call_type == CallType::Operator) return call_op(n.op, n.type, std::move(args));
-          return Expr(
-              new Call(n.type, n.call_type, n.op, n.name, std::move(args), n.component, n.symbol));
+          return Expr(make_node<Call>(n.type, n.call_type, n.op, n.name, std::move(args),
+                                      n.component, n.symbol));
         };
         return mapped.of(e, make, n.args);
       },
@@ -310,10 +310,7 @@ bool any_stmt(const Stmt& s, FunctionRef<bool(const Stmt&)> holds) {
 Expr Rewriter::operator()(const Expr& e) {
   if (!e.defined()) return e;
   if (is_leaf(e)) return rewrite(e);
-  if (const auto found = memo_.find(e.get()); found != memo_.end()) return found->second.value;
-  Expr result = rewrite(e);
-  memo_.emplace(e.get(), Entry{e, result});
-  return result;
+  return memo_.get(e, [&] { return rewrite(e); });
 }
 
 Expr Rewriter::children(const Expr& e) {

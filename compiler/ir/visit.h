@@ -16,6 +16,7 @@
 #include <utility>
 
 #include "ir/expr.h"
+#include "ir/node_memo.h"
 
 namespace retrograde::ir {
 
@@ -166,10 +167,7 @@ class Rewriter {
   void forget() { memo_.clear(); }
 
  private:
-  struct Entry {
-    Expr key, value;  // the key is kept alive so that its address stays its own
-  };
-  std::unordered_map<const ExprNode*, Entry> memo_;
+  NodeMemo<Expr> memo_;
 };
 
 // Rewriting with a lambda: f(e, recurse) gives the new node, or none where only the children are

@@ -58,11 +58,7 @@ std::optional<int64_t> Congruence::modulo(int64_t divisor) const {
 Congruence Facts::congruence(const Expr& e) {
   if (const std::optional<int64_t> value = as_const_int(e)) return reduced(0, *value);
   if (!is_index_type(e.type())) return unknown;
-  if (const auto found = congruences_.find(e.get()); found != congruences_.end())
-    return found->second.value;
-  const Congruence result = congruence_of_node(e);
-  congruences_.emplace(e.get(), RememberedCongruence{e, result});
-  return result;
+  return congruences_.get(e, [&] { return congruence_of_node(e); });
 }
 
 Congruence Facts::congruence(const Sum& sum) {
@@ -88,7 +84,7 @@ void Facts::assume_congruent(const Expr& remainder, const Expr& value) {
 // What a condition says of a variable is also true of what lets around the condition made of it.
 Congruence Facts::congruence_of_variable(const Variable& n) {
   const auto is_it = [&](const Congruent& c) { return c.name == n.name; };
-  const auto assumed = std::find_if(congruent_.begin(), congruent_.end(), is_it);
+  const auto assumed = std::ranges::find_if(congruent_, is_it);
   if (assumed != congruent_.end()) return assumed->congruence;
   const auto found = variables_.find(n.name);
   if (found == variables_.end()) return unknown;

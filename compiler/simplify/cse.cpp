@@ -7,6 +7,7 @@
 
 #include "ir/build.h"
 #include "ir/equal.h"
+#include "ir/lists.h"
 #include "ir/visit.h"
 
 namespace retrograde::ir {
@@ -157,8 +158,7 @@ class LetExpander : public Rewriter {
 // Of expressions without Lets.
 SharedLets make_lets(const std::vector<Expr>& es) {
   HashCons unique;
-  std::vector<Expr> shared;
-  for (const Expr& e : es) shared.push_back(unique(e));
+  const auto shared = mapped(es, [&](const Expr& e) { return unique(e); });
   const UseCounter uses(shared);
   SharedLets result;
   LetMaker maker(uses, result.lets);
@@ -170,9 +170,7 @@ SharedLets make_lets(const std::vector<Expr>& es) {
 
 SharedLets introduce_lets(const std::vector<Expr>& es) {
   LetExpander expand;
-  std::vector<Expr> expanded;
-  for (const Expr& e : es) expanded.push_back(expand(e));
-  return make_lets(expanded);
+  return make_lets(mapped(es, [&](const Expr& e) { return expand(e); }));
 }
 
 Expr introduce_lets(const Expr& e) { return wrap(introduce_lets(std::vector<Expr>{e})); }

@@ -7,7 +7,6 @@
 #include "simplify/facts.h"
 
 #include <algorithm>
-#include <bit>
 
 #include "ir/build.h"
 #include "ir/equal.h"
@@ -45,18 +44,10 @@ int64_t divide_ends(int64_t a, int64_t b) { return is_infinite(a) ? a : euclidea
 
 }  // namespace
 
-ConstantRange ConstantRange::of(Type type) {
-  if (!type.is_int_or_uint()) return {};
-  if (type.is_int()) return {type.min_int(), type.max_int()};
-  return {0, type.bits() >= 64 ? INT64_MAX : static_cast<int64_t>(type.max_uint())};
+ConstantRange range_of(Type type) {
+  return type.is_int_or_uint() ? ConstantRange{type.min_int(), type.max_int()} : ConstantRange();
 }
 
-ConstantRange hull(const ConstantRange& a, const ConstantRange& b) {
-  return {std::min(a.min, b.min), std::max(a.max, b.max)};
-}
-ConstantRange intersection(const ConstantRange& a, const ConstantRange& b) {
-  return {std::max(a.min, b.min), std::min(a.max, b.max)};
-}
 ConstantRange operator+(const ConstantRange& a, const ConstantRange& b) {
   return {add_ends(a.min, b.min), add_ends(a.max, b.max)};
 }
@@ -97,12 +88,12 @@ ConstantRange modulo(const ConstantRange& a, const ConstantRange& b) {
 }
 
 ConstantRange wrapped(const ConstantRange& r, Type type) {
-  const ConstantRange whole = ConstantRange::of(type);
+  const ConstantRange whole = range_of(type);
   if (is_index_type(type)) return intersection(r, whole);  // does not overflow
   // The largest value of uint64 is not an int64: its range has no upper end, and sums of it may
   // wrap.
   if (type.is_uint() && type.bits() == 64 && r.max == infinity) return whole;
-  return r.within(whole.min, whole.max) ? r : whole;
+  return r.is_within(whole) ? r : whole;
 }
 
 }  // namespace
@@ -113,12 +104,11 @@ ConstantRange Facts::range(const Expr& e) {
     return {*value == INT64_MAX ? *value - 1 : *value, *value == INT64_MIN ? *value + 1 : *value};
   }
   if (!e.type().is_int_or_uint()) return {};
-  if (const auto found = ranges_.find(e.get()); found != ranges_.end()) return found->second.range;
-  ConstantRange result = intersection(range_of_node(e), ConstantRange::of(e.type()));
-  if (result.min > result.max)
-    result = ConstantRange::of(e.type());  // contradictory facts: unreachable code
-  ranges_.emplace(e.get(), Remembered{e, result});
-  return result;
+  return ranges_.get(e, [&] {
+    const ConstantRange whole = range_of(e.type());
+    const ConstantRange result = intersection(range_of_node(e), whole);
+    return result.min > result.max ? whole : result;  // contradictory facts: unreachable code
+  });
 }
 
 ConstantRange Facts::range_of_variable(const Expr& e, const Variable& n) {
@@ -133,14 +123,13 @@ ConstantRange Facts::range_of_variable(const Expr& e, const Variable& n) {
 }
 
 ConstantRange Facts::range_of_node(const Expr& e) {
-  const ConstantRange whole = ConstantRange::of(e.type());
+  const ConstantRange whole = range_of(e.type());
   return match(
       e, [&](const Variable& n) { return range_of_variable(e, n); },
       [&](const Cast& n) {
         if (!n.value.type().is_int_or_uint() || n.type.is_bool()) return whole;
         const ConstantRange source = range(n.value);
-        return source.within(whole.min, whole.max) &&
-                       !(n.value.type() == UInt(64) && source.max == infinity)
+        return source.is_within(whole) && !(n.value.type() == UInt(64) && source.max == infinity)
                    ? source
                    : whole;
       },
@@ -164,7 +153,7 @@ ConstantRange Facts::range_of_node(const Expr& e) {
 }
 
 ConstantRange Facts::range_of_binary(const Binary& n) {
-  const ConstantRange whole = ConstantRange::of(n.type);
+  const ConstantRange whole = range_of(n.type);
   if (!n.a.type().is_int_or_uint() || n.type.is_bool()) return whole;
   const ConstantRange a = range(n.a), b = range(n.b);
   switch (n.kind) {
@@ -188,7 +177,7 @@ ConstantRange Facts::range_of_binary(const Binary& n) {
 }
 
 ConstantRange Facts::range_of_call(const Call& n) {
-  const ConstantRange whole = ConstantRange::of(n.type);
+  const ConstantRange whole = range_of(n.type);
   if (n.call_type != CallType::Operator) return whole;
   switch (n.op) {
     case Op::promise_clamped:
@@ -205,7 +194,7 @@ ConstantRange Facts::range_of_call(const Call& n) {
     case Op::if_then_else:
       return hull(range(n.args[1]), range(n.args[2]));
     default:
-      return op_info(n.op).cls == OpClass::Marker ? range(n.args[0]) : whole;
+      return n.is_marker() ? range(n.args[0]) : whole;
   }
 }
 
@@ -217,7 +206,7 @@ void Facts::bind(const std::string& name, Expr min, Expr max) {
   if (max.defined()) range.max = this->range(max).max;
   Congruence congruence;
   if (min.defined() && min.same_as(max)) congruence = this->congruence(min);
-  variables_[name] = Bounds{std::move(min), std::move(max), range, congruence, next_order_++};
+  variables_[name] = Bounds{{std::move(min), std::move(max)}, range, congruence, next_order_++};
 }
 
 void Facts::unbind(const std::string& name) { variables_.erase(name); }
@@ -251,7 +240,7 @@ bool same_terms(const std::vector<Term>& terms, const Sum& sum, int64_t divisor)
     const auto matches = [&](const Term& other) {
       return other.factor == term.factor / divisor && equal(other.atom, term.atom);
     };
-    if (std::none_of(terms.begin(), terms.end(), matches)) return false;
+    if (std::ranges::none_of(terms, matches)) return false;
   }
   return true;
 }
@@ -324,10 +313,8 @@ void Facts::assume(const Expr& condition, bool value) {
     return;
   }
   if (const auto* negation = condition.as<Not>()) return assume(negation->a, !value);
-  if (const auto* call = condition.as<Call>();
-      call && (call->is_op(Op::likely) || call->is_op(Op::likely_if_innermost))) {
+  if (const auto* call = condition.as<Call>(); call && call->is_likely())
     return assume(call->args[0], value);
-  }
   if (is_const(condition)) return;
   add(hash(condition), Known{{}, 0, condition, value});
   if (const auto* comparison = condition.as<Binary>()) assume_comparison(*comparison, value);
@@ -463,9 +450,7 @@ int64_t Facts::eliminate_structure(const Sum& sum, int& budget) {
       return std::max(a, b);
     }
     const auto* call = term.atom.as<Call>();
-    if (call && (call->is_op(Op::likely) || call->is_op(Op::likely_if_innermost))) {
-      return replace(sum, term, call->args[0], budget);
-    }
+    if (call && call->is_likely()) return replace(sum, term, call->args[0], budget);
     if (call && (call->is_op(Op::promise_clamped) || call->is_op(Op::unsafe_promise_clamped))) {
       return std::min(replace(sum, term, call->args[0], budget),
                       replace(sum, term, call->args[term.factor > 0 ? 2 : 1], budget));

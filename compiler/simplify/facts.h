@@ -7,22 +7,14 @@
 #include <unordered_map>
 #include <vector>
 
-#include "ir/expr.h"
+#include "ir/interval.h"
+#include "ir/node_memo.h"
 #include "ir/sum.h"
 
 namespace retrograde::ir {
 
-// Closed; the extremes of int64 mean unbounded.
-struct ConstantRange {
-  int64_t min = INT64_MIN, max = INT64_MAX;
-  bool is_point() const { return min == max; }
-  int64_t extent() const { return max - min + 1; }  // of a bounded one
-  bool within(int64_t low, int64_t high) const { return min >= low && max <= high; }
-  static ConstantRange of(Type type);
-  static ConstantRange point(int64_t value) { return {value, value}; }
-};
-ConstantRange hull(const ConstantRange& a, const ConstantRange& b);
-ConstantRange intersection(const ConstantRange& a, const ConstantRange& b);
+// Of the values of a type.
+ConstantRange range_of(Type type);
 ConstantRange operator+(const ConstantRange& a, const ConstantRange& b);
 ConstantRange operator*(const ConstantRange& a, int64_t factor);
 
@@ -76,8 +68,7 @@ class Facts {
   }
 
  private:
-  struct Bounds {
-    Expr min, max;
+  struct Bounds : Interval {
     ConstantRange range;
     Congruence congruence;  // of a variable with one value
     int order;              // of binding: inner variables are eliminated first
@@ -98,14 +89,6 @@ class Facts {
   struct Congruent {
     std::string name;
     Congruence congruence;
-  };
-  struct Remembered {
-    Expr key;
-    ConstantRange range;
-  };
-  struct RememberedCongruence {
-    Expr key;
-    Congruence value;
   };
 
   void assume(const Expr& condition, bool value);
@@ -138,8 +121,8 @@ class Facts {
   std::vector<Narrowed> narrowed_;
   std::unordered_multimap<uint64_t, size_t>
       index_;  // hash of the terms or condition -> position in known_
-  std::unordered_map<const ExprNode*, Remembered> ranges_;
-  std::unordered_map<const ExprNode*, RememberedCongruence> congruences_;
+  NodeMemo<ConstantRange> ranges_;
+  NodeMemo<Congruence> congruences_;
   int next_order_ = 0;
 };
 

@@ -1,5 +1,4 @@
 // Conditions: conjunctions, disjunctions, negations, selects.
-#include <algorithm>
 
 #include "ir/build.h"
 #include "ir/equal.h"

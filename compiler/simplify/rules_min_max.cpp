@@ -13,7 +13,7 @@ namespace {
 constexpr size_t max_compared_terms = 8;
 
 Expr nest(Kind kind, std::vector<Expr> operands) {
-  std::stable_sort(operands.begin(), operands.end(), [](const Expr& a, const Expr& b) {
+  std::ranges::stable_sort(operands, [](const Expr& a, const Expr& b) {
     if (is_const(a) != is_const(b)) return is_const(b);  // the constant last
     return canonical_less(a, b);
   });
@@ -30,10 +30,10 @@ Sum take_common(std::vector<Sum>& sums) {
       const Term* found = s.find(term.atom);
       return found && found->factor == term.factor;
     };
-    if (std::all_of(sums.begin(), sums.end(), has_it)) common.add(term.atom, term.factor);
+    if (std::ranges::all_of(sums, has_it)) common.add(term.atom, term.factor);
   }
   const auto same_constant = [&](const Sum& s) { return s.constant == sums[0].constant; };
-  if (std::all_of(sums.begin(), sums.end(), same_constant)) common.add_constant(sums[0].constant);
+  if (std::ranges::all_of(sums, same_constant)) common.add_constant(sums[0].constant);
   for (Sum& sum : sums) sum.add(common, -1);
   return common;
 }
@@ -64,7 +64,7 @@ Expr Simplifier::min_max(Kind kind, const Expr& a, const Expr& b) {
   };
   for (const Expr& other : others) {
     const auto hidden = [&](const Expr& x) { return dominated(other, x); };
-    if (std::any_of(operands.begin(), operands.end(), hidden)) continue;
+    if (std::ranges::any_of(operands, hidden)) continue;
     std::erase_if(operands, [&](const Expr& x) { return dominated(x, other); });
     operands.push_back(other);
   }
@@ -74,7 +74,7 @@ Expr Simplifier::min_max(Kind kind, const Expr& a, const Expr& b) {
   for (const Expr& operand : operands) sums.push_back(sum_of(operand));
   const Sum common = take_common(sums);
   const bool valid =
-      common.valid && std::all_of(sums.begin(), sums.end(), [](const Sum& s) { return s.valid; });
+      common.valid && std::ranges::all_of(sums, [](const Sum& s) { return s.valid; });
   if (!valid || (common.is_constant() && common.constant == 0)) return nest(kind, operands);
   for (size_t i = 0; i < operands.size(); ++i) operands[i] = rebuild(sums[i]);
   return apply(Kind::Add, nest(kind, operands), rebuild(common));

@@ -3,8 +3,6 @@
 #include <memory>
 
 #include "ir/build.h"
-#include "ir/equal.h"
-#include "ir/scalar.h"
 #include "ir/visit.h"
 #include "simplify/simplifier.h"
 
@@ -148,13 +146,13 @@ Expr Simplifier::call(const Expr& e, const Call& n) {
     changed |= !args.back().same_as(arg);
   }
   if (n.call_type != CallType::Operator) {
-    return changed ? Expr(new Call(n.type, n.call_type, n.op, n.name, std::move(args), n.component,
-                                   n.symbol))
+    return changed ? Expr(make_node<Call>(n.type, n.call_type, n.op, n.name, std::move(args),
+                                          n.component, n.symbol))
                    : e;
   }
   if (n.op == Op::if_then_else && is_const(args[0]))
     return is_const_true(args[0]) ? args[1] : args[2];
-  const bool hint = n.op == Op::likely || n.op == Op::likely_if_innermost;
+  const bool hint = n.is_likely();
   if (hint && is_const(args[0])) return args[0];
   if (hint && args[0].kind() == Kind::Call && args[0].as<Call>()->is_op(n.op)) return args[0];
   const bool promise = n.op == Op::promise_clamped || n.op == Op::unsafe_promise_clamped;

@@ -3,7 +3,6 @@
 #include <cmath>
 
 #include "ir/build.h"
-#include "ir/equal.h"
 #include "simplify/simplifier.h"
 
 namespace retrograde::ir {

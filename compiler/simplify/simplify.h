@@ -11,16 +11,12 @@
 #include <string>
 #include <unordered_map>
 
-#include "ir/expr.h"
+#include "ir/interval.h"
 
 namespace retrograde::ir {
 
-// What a variable lies between, both ends included; an undefined end is unknown. Ends may mention
-// other variables.
-struct VariableBounds {
-  Expr min, max;
-};
-using BoundsMap = std::unordered_map<std::string, VariableBounds>;
+// What variables lie between. Ends may mention other variables.
+using BoundsMap = std::unordered_map<std::string, Interval>;
 
 Expr simplify(const Expr& e, const BoundsMap& bounds = {});
 

@@ -53,7 +53,7 @@ Stmt Simplifier::let_stmt(const Stmt& s) {
 Stmt Simplifier::loop(const Stmt& s, const For& n) {
   const Expr min = (*this)(n.min), extent = (*this)(n.extent);
   if (is_const_true(less(Kind::LE, extent, make_zero(extent.type())))) return {};
-  if (is_const_int(extent, 1)) return let_stmt(Stmt(new LetStmt(n.name, min, n.body)));
+  if (is_const_int(extent, 1)) return let_stmt(Stmt(make_node<LetStmt>(n.name, min, n.body)));
   Stmt body;
   ++loops_around_;
   {

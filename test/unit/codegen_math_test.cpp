@@ -399,8 +399,9 @@ TEST(CodegenMath, AnOperatorWithoutCodeIsRefused) {
   LoweredFunction f;
   f.name = "added";
   f.args = {input("in", Float(32)), output("out", Float(32))};
-  const Expr added(new Call(Float(32), CallType::Operator, Op::none, "added",
-                            {make_load(Float(32), "in", 0)}, 0, {}));
+  const Expr added(make_node<Call>(Float(32), CallType::Operator, Op::none, "added",
+                                   std::vector<Expr>{make_load(Float(32), "in", 0)}, 0,
+                                   SymbolRef()));
   f.body = make_store("out", added, 0);
   EXPECT_THROW(compile_test(f), InternalError);
 }

@@ -94,17 +94,19 @@ TEST(Validate, TypesAgree) {
   broken(new Add(type, n, f), "both operands have one type");
   broken(new LT(type, n, n), "type of a binary node");
   broken(new And(type, n, n), "And and Or take bool");
-  broken(new Not(n), "Not takes bool");
-  broken(new Select(n, n, n), "condition of a select is bool");
-  broken(new Select(n < 3, n, f), "both arms");
-  broken(new Select(make_broadcast(n, 2) < 3, n, n), "condition of a select is scalar");
-  broken(new Ramp(n, f, 4), "base and stride");
-  broken(new Cast(Int(8), make_broadcast(n, 2)), "a cast keeps");
-  broken(new Call(type, CallType::Operator, Op::floor, "floor", {n, n}, 0, {}),
+  broken(make_node<Not>(n.type(), n), "Not takes bool");
+  broken(make_node<Select>(type, n, n, n), "condition of a select is bool");
+  broken(make_node<Select>(type, n < 3, n, f), "both arms");
+  broken(make_node<Select>(type, make_broadcast(n, 2) < 3, n, n),
+         "condition of a select is scalar");
+  broken(make_node<Ramp>(Int(32, 4), n, f, 4), "base and stride");
+  broken(make_node<Cast>(Int(8), make_broadcast(n, 2)), "a cast keeps");
+  broken(make_node<Call>(type, CallType::Operator, Op::floor, "floor", std::vector<Expr>{n, n}, 0,
+                         SymbolRef()),
          "arguments of its arity");
-  broken(new Load(type, "a", f, {}, {}), "indices are integers");
-  broken(new Load(Int(32, 2), "a", n, {}, {}), "lanes of its index");
-  broken(new Load(type, "a", n, n, {}), "a predicate is bool");
+  broken(make_node<Load>(type, "a", f, Expr(), SymbolRef()), "indices are integers");
+  broken(make_node<Load>(Int(32, 2), "a", n, Expr(), SymbolRef()), "lanes of its index");
+  broken(make_node<Load>(type, "a", n, n, SymbolRef()), "a predicate is bool");
 }
 
 TEST(Validate, StatementsTakeTheirTypes) {

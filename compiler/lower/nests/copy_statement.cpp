@@ -54,7 +54,7 @@ class Copier : public Rewriter {
     if (const Variable* v = e.as<Variable>()) {
       if (auto it = values_.find(v->name); it != values_.end()) return it->second;
       auto it = names_.find(v->name);
-      return it == names_.end() ? e : Expr(new Variable(v->type, it->second, v->symbol));
+      return it == names_.end() ? e : Expr(make_node<Variable>(v->type, it->second, v->symbol));
     }
     const Expr copy = map_children(
         e, [this](const Expr& child) { return (*this)(child); },

@@ -1,0 +1,68 @@
+// Closed intervals, one form for every kind of end.
+//
+// Ends are expressions where an interval is computed with the program (analysis/interval.h), whole
+// numbers where it is what the simplifier knows of a node (simplify/facts.h), and doubles where it
+// is what a value can be (autodiff/rules/value_range.h). One template, and not expressions for all:
+// the simplifier asks for the range of every node, where numbers cost nothing. What intervals are is
+// here; what arithmetic makes of their ends differs (numbers saturate, doubles round, expressions
+// fold) and stands beside each kind.
+#pragma once
+
+#include <algorithm>
+#include <limits>
+#include <type_traits>
+
+#include "ir/expr.h"
+
+namespace retrograde::ir {
+
+// Where there is no end, and whether two are one.
+template <class End>
+struct EndOf {
+  using Limits = std::numeric_limits<End>;
+  static End lowest() { return Limits::has_infinity ? -Limits::infinity() : Limits::min(); }
+  static End highest() { return Limits::has_infinity ? Limits::infinity() : Limits::max(); }
+  static bool are_same(End a, End b) { return a == b; }
+  static bool is_bound(End end) { return end != lowest() && end != highest(); }
+};
+template <>
+struct EndOf<Expr> {
+  static Expr lowest() { return {}; }
+  static Expr highest() { return {}; }
+  static bool are_same(const Expr& a, const Expr& b) { return a.defined() && a.same_as(b); }
+  static bool is_bound(const Expr& end) { return end.defined(); }
+};
+
+template <class End>
+struct IntervalOf {
+  End min = EndOf<End>::lowest(), max = EndOf<End>::highest();
+  static IntervalOf everything() { return {}; }
+  static IntervalOf point(End e) { return {e, e}; }
+  bool has_lower_bound() const { return EndOf<End>::is_bound(min); }
+  bool has_upper_bound() const { return EndOf<End>::is_bound(max); }
+  bool is_bounded() const { return has_lower_bound() && has_upper_bound(); }
+  bool is_point() const { return EndOf<End>::are_same(min, max); }
+  End extent() const { return max - min + 1; }  // of a bounded one
+  bool contains(End value) const { return min <= value && value <= max; }
+  bool is_within(const IntervalOf& whole) const { return min >= whole.min && max <= whole.max; }
+  bool operator==(const IntervalOf&) const = default;
+};
+
+// An undefined end is unbounded.
+using Interval = IntervalOf<Expr>;
+// The extremes of int64 mean unbounded.
+using ConstantRange = IntervalOf<int64_t>;
+
+// The smallest interval around both, and what is in both; of expressions: analysis/interval.h.
+template <class End>
+requires std::is_arithmetic_v<End> IntervalOf<End> hull(const IntervalOf<End>& a,
+                                                        const IntervalOf<End>& b) {
+  return {std::min(a.min, b.min), std::max(a.max, b.max)};
+}
+template <class End>
+requires std::is_arithmetic_v<End> IntervalOf<End> intersection(const IntervalOf<End>& a,
+                                                                const IntervalOf<End>& b) {
+  return {std::max(a.min, b.min), std::min(a.max, b.max)};
+}
+
+}  // namespace retrograde::ir
