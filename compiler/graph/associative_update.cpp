@@ -3,6 +3,7 @@
 #include "diagnostics/error.h"
 #include "graph/own_reads.h"
 #include "ir/build.h"
+#include "ir/lists.h"
 #include "ir/print.h"
 
 namespace retrograde::ir {
@@ -26,15 +27,13 @@ AssociativityProof prove_associative(const FuncContents& f, const Definition& up
     proof.why_not = text("it reads ", other, ", which is not the element that it writes");
     return proof;
   }
-  std::vector<std::string> xs;
-  for (size_t i = 0; i < update.values.size(); i++) xs.push_back(unique_name("x"));
-  std::vector<Expr> values;
-  for (const Expr& value : update.values) {
-    values.push_back(map_calls_of(value, &f, [&](const Call& call, const std::vector<Expr>&) {
+  const auto xs = numbered(update.values.size(), [](size_t) { return unique_name("x"); });
+  const auto over_xs = [&](const Expr& value) {
+    return map_calls_of(value, &f, [&](const Call& call, const std::vector<Expr>&) {
       return variable(xs[call.component], call.type);
-    }));
-  }
-  return prove_associative(values, xs);
+    });
+  };
+  return prove_associative(mapped(update.values, over_xs), xs);
 }
 
 }  // namespace retrograde::ir

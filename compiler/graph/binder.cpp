@@ -71,10 +71,7 @@ Expr Binder::bound(const Call& call, const Expr& e) const {
 // A Func owns its definitions and its wrappers, which must not own it in turn.
 bool Binder::owns_me(const FuncContents& callee) const {
   if (&callee == f_.get()) return true;
-  for (const auto& entry : callee.wrappers) {
-    if (entry.second == f_) return true;
-  }
-  return false;
+  return std::ranges::any_of(callee.wrappers, [&](const auto& w) { return w.second == f_; });
 }
 
 SymbolRef Binder::symbol_of(const std::string& name) const {
@@ -83,7 +80,7 @@ SymbolRef Binder::symbol_of(const std::string& name) const {
       if (v.var == name) return SymbolRef(domain_);
     }
   }
-  if (f_ && std::find(f_->args.begin(), f_->args.end(), name) != f_->args.end()) return {};
+  if (f_ && std::ranges::find(f_->args, name) != f_->args.end()) return {};
   if (const auto found = names_.parameters.find(name); found != names_.parameters.end())
     return SymbolRef(found->second);
   const ParameterPtr buffer = names_.buffer_of_fact(name);

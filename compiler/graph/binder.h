@@ -10,7 +10,6 @@
 namespace retrograde::ir {
 
 using ParameterPtr = std::shared_ptr<ParameterContents>;
-using DomainPtr = std::shared_ptr<ReductionDomainContents>;
 
 // The entities of a text.
 struct NamedEntities {

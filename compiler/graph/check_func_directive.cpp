@@ -20,7 +20,7 @@ std::string dimensions_of(const FuncContents& f) {
 
 void check_is_dimension(const FuncContents& f, const std::string& var, const std::string& asked) {
   check_is_defined(f, asked);
-  if (std::find(f.args.begin(), f.args.end(), var) != f.args.end()) return;
+  if (std::ranges::find(f.args, var) != f.args.end()) return;
   user_error(asked, quoted(var) + " must be a pure variable of the first definition",
              dimensions_of(f), "Name one of them");
 }
@@ -106,18 +106,18 @@ void check(ReorderStorage& reorder, const FuncContents& f) {
   std::vector<std::string> storage = f.schedule.storage_dims;
   std::vector<size_t> places;
   for (const std::string& dim : reorder.dimensions) {
-    const auto it = std::find(storage.begin(), storage.end(), dim);
+    const auto it = std::ranges::find(storage, dim);
     if (it == storage.end())
       user_error(asked, quoted(dim) + " must be one of its dimensions", dimensions_of(f),
                  "Name one of them");
     const size_t place = static_cast<size_t>(it - storage.begin());
-    if (std::find(places.begin(), places.end(), place) != places.end()) {
+    if (std::ranges::find(places, place) != places.end()) {
       user_error(asked, "each dimension is named once", quoted(dim) + " is named twice",
                  "Drop one of them");
     }
     places.push_back(place);
   }
-  std::sort(places.begin(), places.end());
+  std::ranges::sort(places);
   for (size_t i = 0; i < places.size(); i++) storage[places[i]] = reorder.dimensions[i];
   reorder.dimensions = std::move(storage);
 }

@@ -300,7 +300,7 @@ void check(ReorderLoops& reorder, const SchedulePlace& at) {
   const std::string asked = text("reorder ", list_of(reorder.loops), " of ", at.name());
   for (const std::string& loop : reorder.loops) loop_index(at, loop, asked);
   for (const std::string& loop : reorder.loops) {
-    if (std::count(reorder.loops.begin(), reorder.loops.end(), loop) > 1)
+    if (std::ranges::count(reorder.loops, loop) > 1)
       user_error(asked, "each loop is named once", quoted(loop) + " is named twice",
                  "Drop one of them");
   }
@@ -430,8 +430,8 @@ void check_new_loop(const SchedulePlace& place, const std::string& name,
                     const std::string& replaced, const std::string& asked) {
   if (name == replaced) return;
   const StageLoops& now = place.schedule();
-  const bool is_loop = std::any_of(now.dims.begin(), now.dims.end(),
-                                   [&](const Dim& dim) { return dim.var == name; });
+  const bool is_loop =
+      std::ranges::any_of(now.dims, [&](const Dim& dim) { return dim.var == name; });
   if (!is_loop) return;
   user_error(asked, "the loops of a stage have different names",
              text(quoted(name), " is a loop already; ", loops_of(now)), "Use another Var");

@@ -14,6 +14,7 @@
 #include "graph/names.h"
 #include "graph/own_reads.h"
 #include "ir/build.h"
+#include "ir/lists.h"
 #include "ir/literal.h"
 #include "ir/print.h"
 #include "ir/variables.h"
@@ -119,8 +120,8 @@ const Variable* as_plain_var(const Expr& e) {
 }
 
 // The reduction domain of a definition, null when it has none.
-std::shared_ptr<ReductionDomainContents> domain_in(const Site& site, const Names& names) {
-  std::shared_ptr<ReductionDomainContents> result;
+DomainPtr domain_in(const Site& site, const Names& names) {
+  DomainPtr result;
   for (const Variable* v : names.free) {
     auto domain = domain_of(*v);
     if (!domain) continue;
@@ -138,7 +139,7 @@ std::shared_ptr<ReductionDomainContents> domain_in(const Site& site, const Names
 void check_free_variables(const Site& site, const Names& names,
                           const std::vector<std::string>& args) {
   for (const Variable* v : names.free) {
-    const bool is_arg = std::find(args.begin(), args.end(), v->name) != args.end();
+    const bool is_arg = std::ranges::find(args, v->name) != args.end();
     if (v->symbol.defined()) {
       if (is_arg && !domain_of(*v)) {
         user_error(site.asked,
@@ -171,7 +172,7 @@ Expr bind_random(const Expr& e, const std::vector<Expr>& point) {
     const Call* call = part.as<Call>();
     if (!call || !call->is_op(Op::random) || call->args.size() != 1) return {};
     std::vector<Expr> words{recurse(call->args[0])};
-    words.insert(words.end(), point.begin(), point.end());
+    append(words, point);
     return call_op(Op::random, call->type, std::move(words));
   });
 }
@@ -181,8 +182,7 @@ bool has_random(const std::vector<Expr>& values) {
     const Call* call = e.as<Call>();
     return call && call->is_op(Op::random);
   };
-  return std::any_of(values.begin(), values.end(),
-                     [&](const Expr& value) { return any_node(value, is_random); });
+  return std::ranges::any_of(values, [&](const Expr& value) { return any_node(value, is_random); });
 }
 
 // FNV-1a: equal programs draw equal numbers, whatever was compiled before.
@@ -211,7 +211,7 @@ std::vector<std::string> pure_names(const Site& site, const std::vector<Expr>& a
                  text(arg, " is not a Var"),
                  "Define all points first, as in f(x) = 0, then update some of them");
     }
-    if (std::find(names.begin(), names.end(), v->name) != names.end()) {
+    if (std::ranges::find(names, v->name) != names.end()) {
       user_error(site.asked, "the arguments of a first definition are different Vars",
                  quoted(v->name) + " stands there twice",
                  "Use a Var of its own for each dimension");
@@ -232,7 +232,7 @@ void check_declared(const Site& site, size_t dimensions, const std::vector<Expr>
 }
 
 std::vector<Expr> with(std::vector<Expr> all, const std::vector<Expr>& more) {
-  all.insert(all.end(), more.begin(), more.end());
+  append(all, more);
   return all;
 }
 
@@ -283,8 +283,6 @@ void check_self_calls(const Site& site, const Names& names, const std::vector<st
     }
   }
 }
-
-using DomainPtr = std::shared_ptr<ReductionDomainContents>;
 
 // The domain as an update of f may own it: one with a predicate that reads f would own f in turn,
 // so that neither ever went away. Then a copy that does not.

@@ -5,6 +5,7 @@
 #include "diagnostics/error.h"
 #include "graph/function.h"
 #include "ir/build.h"
+#include "ir/lists.h"
 
 namespace retrograde::ir {
 
@@ -59,10 +60,10 @@ void give(const RenameLoop& rename, StageLoops& schedule) {
 }
 
 void give(const ReorderLoops& reorder, StageLoops& schedule) {
-  std::vector<size_t> places;
-  for (const std::string& loop : reorder.loops) places.push_back(place_of(schedule, loop));
+  const auto places =
+      mapped(reorder.loops, [&](const std::string& loop) { return place_of(schedule, loop); });
   std::vector<size_t> sorted = places;
-  std::sort(sorted.begin(), sorted.end());
+  std::ranges::sort(sorted);
   const std::vector<Dim> before = schedule.dims;
   for (size_t i = 0; i < sorted.size(); ++i) schedule.dims[sorted[i]] = before[places[i]];
 }
@@ -129,8 +130,8 @@ void give(const ReorderStorage& reorder, FuncPlacement& schedule) {
 // The entry for a dimension, made when there is none.
 template <typename Entry>
 Entry& entry_of(std::vector<Entry>& entries, const std::string& dimension) {
-  const auto found = std::find_if(entries.begin(), entries.end(),
-                                  [&](const Entry& e) { return e.var == dimension; });
+  const auto found =
+      std::ranges::find_if(entries, [&](const Entry& e) { return e.var == dimension; });
   if (found != entries.end()) return *found;
   entries.emplace_back().var = dimension;
   return entries.back();

@@ -32,66 +32,61 @@ struct NamedFunc : std::string {  // of a Func or an image
   NamedFunc(std::string name = "") : std::string(std::move(name)) {}
 };
 
+// Its name, and its fields.
+#define RETROGRADE_DIRECTIVE(name_, ...)     \
+  static constexpr const char* name = name_; \
+  auto fields() { return std::tie(__VA_ARGS__); }
+
 // ---- of a stage ----
 
 struct SplitLoop {
-  static constexpr const char* name = "split";
+  RETROGRADE_DIRECTIVE("split", old, outer, inner, factor, tail)
   NamedLoop old;
   std::string outer, inner;
   Expr factor;
   TailStrategy tail = TailStrategy::Auto;
-  auto fields() { return std::tie(old, outer, inner, factor, tail); }
 };
 struct FuseLoops {
-  static constexpr const char* name = "fuse";
+  RETROGRADE_DIRECTIVE("fuse", inner, outer, fused)
   NamedLoop inner, outer;
   std::string fused;
-  auto fields() { return std::tie(inner, outer, fused); }
 };
 struct RenameLoop {
-  static constexpr const char* name = "rename";
+  RETROGRADE_DIRECTIVE("rename", old, renamed)
   NamedLoop old;
   std::string renamed;
-  auto fields() { return std::tie(old, renamed); }
 };
 struct ReorderLoops {  // innermost first; loops that are not named keep their places
-  static constexpr const char* name = "reorder";
+  RETROGRADE_DIRECTIVE("reorder", loops)
   std::vector<NamedLoop> loops;
-  auto fields() { return std::tie(loops); }
 };
 struct RunLoop {  // serial, parallel, vectorized or unrolled
-  static constexpr const char* name = "run";
+  RETROGRADE_DIRECTIVE("run", loop, kind)
   NamedLoop loop;
   ForType kind = ForType::Serial;
-  auto fields() { return std::tie(loop, kind); }
 };
 struct PartitionLoop {
-  static constexpr const char* name = "partition";
+  RETROGRADE_DIRECTIVE("partition", loop, how)
   NamedLoop loop;
   Partition how = Partition::Auto;
-  auto fields() { return std::tie(loop, how); }
 };
 struct MakeAtomic {
-  static constexpr const char* name = "atomic";
+  RETROGRADE_DIRECTIVE("atomic", vouched)
   bool vouched = false;  // the user answers for its being associative
-  auto fields() { return std::tie(vouched); }
 };
 struct AllowRaces {
-  static constexpr const char* name = "allow_race_conditions";
-  auto fields() { return std::tie(); }
+  RETROGRADE_DIRECTIVE("allow_race_conditions")
 };
 struct Unscheduled {
-  static constexpr const char* name = "unscheduled";
-  auto fields() { return std::tie(); }
+  RETROGRADE_DIRECTIVE("unscheduled")
 };
 struct PrefetchData {
-  static constexpr const char* name = "prefetch";
+  RETROGRADE_DIRECTIVE("prefetch", source, at, from, offset, strategy)
   NamedFunc source;
   NamedLoop at, from;
   Expr offset;
   PrefetchBoundStrategy strategy = PrefetchBoundStrategy::GuardWithIf;
   SymbolRef symbol = {};  // of the source
-  auto fields() { return std::tie(source, at, from, offset, strategy); }
 };
 // A loop of a Func, root, or inlined.
 struct AtLevel {
@@ -101,25 +96,21 @@ struct AtLevel {
   auto fields() { return std::tie(level); }
 };
 struct ComputeWith : AtLevel {
-  static constexpr const char* name = "compute_with";
+  RETROGRADE_DIRECTIVE("compute_with", level, align)
   std::vector<std::pair<NamedLoop, LoopAlignStrategy>> align = {};
-  auto fields() { return std::tie(level, align); }
 };
 struct Specialize {
-  static constexpr const char* name = "specialize";
+  RETROGRADE_DIRECTIVE("specialize", condition)
   Expr condition;
-  auto fields() { return std::tie(condition); }
 };
 struct SpecializeFail {
-  static constexpr const char* name = "specialize_fail";
+  RETROGRADE_DIRECTIVE("specialize_fail", message)
   Expr message;
-  auto fields() { return std::tie(message); }
 };
 struct FactorOut {  // rfactor: `made` keeps these loops as these variables
-  static constexpr const char* name = "rfactor";
+  RETROGRADE_DIRECTIVE("rfactor", made, preserved)
   std::string made;
   std::vector<std::pair<NamedLoop, std::string>> preserved;
-  auto fields() { return std::tie(made, preserved); }
 };
 
 // ---- of a Func ----
@@ -134,96 +125,81 @@ struct HoistStorage : AtLevel {
   static constexpr const char* name = "hoist_storage";
 };
 struct StoreIn {
-  static constexpr const char* name = "store_in";
+  RETROGRADE_DIRECTIVE("store_in", memory)
   MemoryType memory = MemoryType::Auto;
-  auto fields() { return std::tie(memory); }
 };
 struct ReorderStorage {  // all dimensions, innermost first
-  static constexpr const char* name = "reorder_storage";
+  RETROGRADE_DIRECTIVE("reorder_storage", dimensions)
   std::vector<std::string> dimensions;
-  auto fields() { return std::tie(dimensions); }
 };
 struct AlignStorage {
-  static constexpr const char* name = "align_storage";
+  RETROGRADE_DIRECTIVE("align_storage", dimension, alignment)
   std::string dimension;
   Expr alignment;
-  auto fields() { return std::tie(dimension, alignment); }
 };
 struct BoundStorage {
-  static constexpr const char* name = "bound_storage";
+  RETROGRADE_DIRECTIVE("bound_storage", dimension, extent)
   std::string dimension;
   Expr extent;
-  auto fields() { return std::tie(dimension, extent); }
 };
 struct FoldStorage {
-  static constexpr const char* name = "fold_storage";
+  RETROGRADE_DIRECTIVE("fold_storage", dimension, extent, forward)
   std::string dimension;
   Expr extent;
   bool forward = true;
-  auto fields() { return std::tie(dimension, extent, forward); }
 };
 struct Memoize {
-  static constexpr const char* name = "memoize";
+  RETROGRADE_DIRECTIVE("memoize", key)
   Expr key;  // undefined: none
-  auto fields() { return std::tie(key); }
 };
 struct Async {
-  static constexpr const char* name = "async";
-  auto fields() { return std::tie(); }
+  RETROGRADE_DIRECTIVE("async")
 };
 struct BoundDimension {
-  static constexpr const char* name = "bound";
+  RETROGRADE_DIRECTIVE("bound", dimension, min, extent)
   std::string dimension;
   Expr min, extent;  // min may be undefined
-  auto fields() { return std::tie(dimension, min, extent); }
 };
 struct AlignBounds {
-  static constexpr const char* name = "align_bounds";
+  RETROGRADE_DIRECTIVE("align_bounds", dimension, modulus, remainder)
   std::string dimension;
   Expr modulus, remainder;  // remainder undefined: the min stays
-  auto fields() { return std::tie(dimension, modulus, remainder); }
 };
 struct Estimate {
-  static constexpr const char* name = "set_estimate";
+  RETROGRADE_DIRECTIVE("set_estimate", dimension, min, extent)
   std::string dimension;
   Expr min, extent;
-  auto fields() { return std::tie(dimension, min, extent); }
 };
 
 struct TraceLoads {
-  static constexpr const char* name = "trace_loads";
-  auto fields() { return std::tie(); }
+  RETROGRADE_DIRECTIVE("trace_loads")
 };
 struct TraceStores {
-  static constexpr const char* name = "trace_stores";
-  auto fields() { return std::tie(); }
+  RETROGRADE_DIRECTIVE("trace_stores")
 };
 struct TraceRealizations {
-  static constexpr const char* name = "trace_realizations";
-  auto fields() { return std::tie(); }
+  RETROGRADE_DIRECTIVE("trace_realizations")
 };
 struct AddTraceTag {
-  static constexpr const char* name = "add_trace_tag";
+  RETROGRADE_DIRECTIVE("add_trace_tag", tag)
   Expr tag;
-  auto fields() { return std::tie(tag); }
 };
 struct DebugToFile {
-  static constexpr const char* name = "debug_to_file";
+  RETROGRADE_DIRECTIVE("debug_to_file", file)
   Expr file;
-  auto fields() { return std::tie(file); }
 };
 struct Wrap {  // no users: all that have no other wrapper
-  static constexpr const char* name = "in";
+  RETROGRADE_DIRECTIVE("in", made, users)
   std::string made;
   std::vector<NamedFunc> users;
-  auto fields() { return std::tie(made, users); }
 };
 struct Clone {
-  static constexpr const char* name = "clone_in";
+  RETROGRADE_DIRECTIVE("clone_in", made, users)
   std::string made;
   std::vector<NamedFunc> users;
-  auto fields() { return std::tie(made, users); }
 };
+
+#undef RETROGRADE_DIRECTIVE
 
 using Directive =
     std::variant<SplitLoop, FuseLoops, RenameLoop, ReorderLoops, RunLoop, PartitionLoop, MakeAtomic,

@@ -9,7 +9,6 @@
 #include "graph/own_reads.h"
 #include "graph/wrappers.h"
 #include "ir/print.h"
-#include "ir/visit.h"
 
 namespace retrograde::ir {
 
@@ -118,8 +117,9 @@ FuncPtr make_func(Role role) {
   return f;
 }
 
-FuncPtr make_func(Role role, const std::string& name) {
+FuncPtr make_func(Role role, const std::string& name, const std::string& of) {
   FuncPtr f = make_func(role);
+  f->made->of = of;
   f->name = claim_name(name);
   return f;
 }
@@ -153,31 +153,32 @@ std::vector<FuncPtr> direct_callees(const FuncContents& f) {
   return callees;
 }
 
-void for_each_expr(const Definition& definition, const std::function<void(const Expr&)>& visit) {
-  const auto visit_defined = [&](const Expr& e) {
+namespace {
+
+// The expressions of a definition that are defined, to be changed where it may be.
+template <class AnyDefinition, class Visit>
+void visit_exprs(AnyDefinition& definition, const Visit& visit) {
+  const auto visit_defined = [&](auto& e) {
     if (e.defined()) visit(e);
   };
-  for (const Expr& arg : definition.args) visit_defined(arg);
-  for (const Expr& value : definition.values) visit_defined(value);
+  for (auto& arg : definition.args) visit_defined(arg);
+  for (auto& value : definition.values) visit_defined(value);
   visit_defined(definition.predicate);
-  for (const ReductionVariable& rvar : definition.rvars) {
+  for (auto& rvar : definition.rvars) {
     visit_defined(rvar.min);
     visit_defined(rvar.extent);
   }
 }
 
+}  // namespace
+
+void for_each_expr(const Definition& definition, const std::function<void(const Expr&)>& visit) {
+  visit_exprs(definition, visit);
+}
+
 Definition map_exprs(const Definition& definition, const std::function<Expr(const Expr&)>& map) {
   Definition result = definition;
-  const auto map_defined = [&](Expr& e) {
-    if (e.defined()) e = map(e);
-  };
-  for (Expr& arg : result.args) map_defined(arg);
-  for (Expr& value : result.values) map_defined(value);
-  map_defined(result.predicate);
-  for (ReductionVariable& rvar : result.rvars) {
-    map_defined(rvar.min);
-    map_defined(rvar.extent);
-  }
+  visit_exprs(result, [&](Expr& e) { e = map(e); });
   return result;
 }
 

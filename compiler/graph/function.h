@@ -107,8 +107,8 @@ using FuncPtr = std::shared_ptr<FuncContents>;
 
 // A Func that the compiler makes; its name and definitions are to come.
 FuncPtr make_func(Role role);
-// The same with a name like `name` that no other Func has.
-FuncPtr make_func(Role role, const std::string& name);
+// The same with a name like `name` that no other Func has, made for the Func `of`.
+FuncPtr make_func(Role role, const std::string& name, const std::string& of = "");
 
 // Where the Func that is called comes from; null when its user wrote it, or no Func is called.
 const Provenance* provenance_of(const Call& call);

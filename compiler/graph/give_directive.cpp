@@ -2,9 +2,6 @@
 
 #include <atomic>
 
-#include "diagnostics/error.h"
-#include "graph/define.h"
-
 namespace retrograde::ir {
 
 namespace {

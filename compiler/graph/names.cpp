@@ -5,6 +5,7 @@
 #include <mutex>
 #include <unordered_map>
 
+#include "ir/lists.h"
 #include "ir/visit.h"
 
 namespace retrograde::ir {
@@ -64,6 +65,10 @@ std::string without_numbers(const std::string& name) {
 }
 
 std::string implicit_name(int n) { return "_" + std::to_string(n); }
+std::vector<std::string> implicit_names(int count) {
+  return numbered(static_cast<size_t>(count),
+                  [](size_t n) { return implicit_name(static_cast<int>(n)); });
+}
 
 int implicit_index(const std::string& name) {
   if (name.size() < 2 || name.size() > 4 || name[0] != '_') return -1;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 namespace retrograde::ir {
 
@@ -20,6 +21,7 @@ inline constexpr const char* outermost_loop = "__outermost";
 // The placeholder "_" and what it stands for, dimension by dimension: "_0", "_1" ...
 inline bool is_placeholder(const std::string& name) { return name == "_"; }
 std::string implicit_name(int n);
+std::vector<std::string> implicit_names(int count);
 int implicit_index(const std::string& name);  // -1: not implicit
 
 }  // namespace retrograde::ir

@@ -4,6 +4,7 @@
 #include <unordered_set>
 
 #include "ir/equal.h"
+#include "ir/lists.h"
 
 namespace retrograde::ir {
 
@@ -16,14 +17,18 @@ const Call* as_call_of(const Expr& e, const Symbol* f) {
   return call && is_call_of(*call, f) ? call : nullptr;
 }
 
-Expr map_calls_of(const Expr& e, const Symbol* f,
-                  FunctionRef<Expr(const Call&, const std::vector<Expr>& args)> read) {
+Expr map_func_calls(const Expr& e, MapCall read) {
   return rewrite(e, [&](const Expr& node, const auto& recurse) -> Expr {
-    const Call* call = as_call_of(node, f);
-    if (!call) return {};
-    std::vector<Expr> args;
-    for (const Expr& arg : call->args) args.push_back(recurse(arg));
+    const auto* call = node.as<Call>();
+    if (!call || call->call_type != CallType::Func) return {};
+    const std::vector<Expr> args = mapped(call->args, recurse);
     return read(*call, args);
+  });
+}
+
+Expr map_calls_of(const Expr& e, const Symbol* f, MapCall read) {
+  return map_func_calls(e, [&](const Call& call, const std::vector<Expr>& args) {
+    return call.symbol.raw() == f ? read(call, args) : Expr();
   });
 }
 

@@ -12,9 +12,12 @@ namespace retrograde::ir {
 bool is_call_of(const Call& call, const Symbol* f);
 // The call of the Func that `e` is; null when it is none.
 const Call* as_call_of(const Expr& e, const Symbol* f);
-// Calls of the Func become what `read` makes of them and of their arguments, mapped before.
-Expr map_calls_of(const Expr& e, const Symbol* f,
-                  FunctionRef<Expr(const Call&, const std::vector<Expr>& args)> read);
+// Calls of Funcs become what `read` makes of them and of their arguments, mapped before; where it
+// gives nothing they stay.
+using MapCall = FunctionRef<Expr(const Call&, const std::vector<Expr>& args)>;
+Expr map_func_calls(const Expr& e, MapCall read);
+// The same of one Func.
+Expr map_calls_of(const Expr& e, const Symbol* f, MapCall read);
 bool same_args(const std::vector<Expr>& a, const std::vector<Expr>& b);
 
 // Each node of a definition once, parents first.

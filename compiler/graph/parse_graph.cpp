@@ -341,11 +341,7 @@ class GraphReader {
     if (!definition_) return;
     stage_schedule();
     DomainPtr domain;
-    if (!definition_->rvars.empty()) {
-      domain = std::make_shared<ReductionDomainContents>();
-      domain->vars = definition_->rvars;
-      domain->frozen = true;
-    }
+    if (!definition_->rvars.empty()) domain = make_domain(definition_->rvars);
     const Binder bind(names_, f_, domain);
     Definition complete = map_exprs(*definition_, bind);
     if (domain) {

@@ -1,11 +1,12 @@
 #include "graph/race_checks.h"
 
+#include <algorithm>
+
 #include "analysis/interval.h"
 #include "analysis/never_meet.h"
 #include "graph/associative_update.h"
 #include "graph/own_reads.h"
 #include "ir/build.h"
-#include "ir/equal.h"
 #include "ir/visit.h"
 #include "simplify/simplify.h"
 
@@ -52,10 +53,9 @@ Expr read_of_other_element(const FuncContents& f, const Definition& update) {
 bool can_prove_race_free(const FuncContents& f, const Definition& update, const std::string& rvar) {
   const MeetingPoints points = points_of(update);
   if (!can_prove_never_meet(points, rvar, update.args, update.args)) return false;
-  for (const Expr& read : own_reads(f, update)) {
-    if (!can_prove_never_meet(points, rvar, update.args, read.as<Call>()->args)) return false;
-  }
-  return true;
+  return std::ranges::all_of(own_reads(f, update), [&](const Expr& read) {
+    return can_prove_never_meet(points, rvar, update.args, read.as<Call>()->args);
+  });
 }
 
 bool can_prove_commutative(const FuncContents& f, const Definition& update) {

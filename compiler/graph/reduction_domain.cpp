@@ -5,7 +5,24 @@
 
 namespace retrograde::ir {
 
-std::shared_ptr<ReductionDomainContents> domain_of(const Variable& variable) {
+DomainPtr make_domain(std::vector<ReductionVariable> loops) {
+  const auto domain = std::make_shared<ReductionDomainContents>();
+  domain->vars = std::move(loops);
+  domain->frozen = true;
+  return domain;
+}
+
+Expr add_loop(const DomainPtr& domain, const std::string& name, const Expr& min,
+              const Expr& extent) {
+  domain->vars.push_back({unique_name(name), min, extent});
+  return loop_variable(domain, domain->vars.back().var);
+}
+
+Expr loop_variable(const DomainPtr& domain, const std::string& name) {
+  return variable(name, Int(32), SymbolRef(domain));
+}
+
+DomainPtr domain_of(const Variable& variable) {
   if (!variable.symbol.defined()) return nullptr;
   return std::dynamic_pointer_cast<ReductionDomainContents>(variable.symbol.lock());
 }

@@ -21,8 +21,17 @@ struct ReductionDomainContents : Symbol {
   bool frozen = false;  // used in a definition: where() is an error from now on
 };
 
+using DomainPtr = std::shared_ptr<ReductionDomainContents>;
+// A domain that is used: of these loops, and of those that add_loop gives it.
+DomainPtr make_domain(std::vector<ReductionVariable> loops = {});
+// One more loop around the others, called after `name`: its variable.
+Expr add_loop(const DomainPtr& domain, const std::string& name, const Expr& min,
+              const Expr& extent);
+// The variable of a loop of the domain.
+Expr loop_variable(const DomainPtr& domain, const std::string& name);
+
 // The reduction domain that a variable belongs to; null for any other variable.
-std::shared_ptr<ReductionDomainContents> domain_of(const Variable& variable);
+DomainPtr domain_of(const Variable& variable);
 // `e` with every mention of `symbol`'s entity made through this very reference (weak or strong).
 Expr rebind_symbol(const Expr& e, const SymbolRef& symbol);
 // With the variables of the symbol `from` referring to another.

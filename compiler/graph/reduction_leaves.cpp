@@ -1,7 +1,5 @@
 #include "graph/reduction_leaves.h"
 
-#include <algorithm>
-
 #include "diagnostics/error.h"
 
 namespace retrograde::ir {

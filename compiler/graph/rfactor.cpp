@@ -19,13 +19,13 @@
 #include "diagnostics/error.h"
 #include "graph/associative_update.h"
 #include "graph/define.h"
-#include "graph/give_directive.h"
 #include "graph/names.h"
 #include "graph/own_reads.h"
 #include "graph/reduction_leaves.h"
 #include "graph/rfactor.h"
 #include "ir/build.h"
 #include "ir/conjuncts.h"
+#include "ir/lists.h"
 #include "ir/memory_reads.h"
 #include "ir/print.h"
 #include "ir/variables.h"
@@ -50,8 +50,8 @@ class Factoring {
     for (const auto& [loop, var] : preserved) kept_[loop] = var;
     for (const Dim& dim : update_.schedule.dims) {
       if (!dim.is_reduction) continue;
-      const auto leaf = std::find_if(leaves_.all.begin(), leaves_.all.end(),
-                                     [&](const Leaf& l) { return l.loop == dim.var; });
+      const auto leaf =
+          std::ranges::find_if(leaves_.all, [&](const Leaf& l) { return l.loop == dim.var; });
       RETROGRADE_ASSERT(leaf != leaves_.all.end(), "a reduction loop without a variable");
       (kept_.count(dim.var) ? kept_leaves_ : removed_leaves_).push_back(*leaf);
     }
@@ -72,8 +72,6 @@ class Factoring {
   }
 
  private:
-  using Domain = std::shared_ptr<ReductionDomainContents>;
-
   const FuncPtr f_;
   const Definition update_;  // as it was
   const int stage_;
@@ -101,7 +99,7 @@ class Factoring {
     intermediate_->name = claim_name(name_);
     intermediate_->declared_at = f_->declared_at;
     std::vector<Expr> args = variables_of(f_->args), values;
-    args.insert(args.end(), kept_vars_.begin(), kept_vars_.end());
+    append(args, kept_vars_);
     for (size_t i = 0; i < f_->types.size(); i++) values.push_back(identity(i));
     define_pure(intermediate_, args, values);
     std::vector<std::string>& storage = intermediate_->schedule.storage_dims;
@@ -110,16 +108,15 @@ class Factoring {
   }
 
   // A domain of these leaves, whose loops keep their names.
-  static Domain domain_of(const std::vector<Leaf>& leaves, Substitution& places,
-                          std::vector<Split>& renames) {
+  static DomainPtr domain_of(const std::vector<Leaf>& leaves, Substitution& places,
+                             std::vector<Split>& renames) {
     if (leaves.empty()) return nullptr;
-    auto domain = std::make_shared<ReductionDomainContents>();
-    domain->frozen = true;
+    const DomainPtr domain = make_domain();
     const std::string prefix = unique_name("r") + ".";
     for (const Leaf& leaf : leaves) {
       const std::string name = prefix + leaf.loop.substr(leaf.loop.rfind('.') + 1);
       domain->vars.push_back({name, leaf.min, leaf.extent});
-      places[leaf.name] = variable(name, Int(32), SymbolRef(domain));
+      places[leaf.name] = loop_variable(domain, name);
       Split rename;
       rename.kind = Split::Kind::Rename;
       rename.old_var = name;
@@ -130,7 +127,7 @@ class Factoring {
     return domain;
   }
 
-  static void set_domain(Definition& definition, const Domain& domain) {
+  static void set_domain(Definition& definition, const DomainPtr& domain) {
     definition.rvars = domain ? domain->vars : std::vector<ReductionVariable>{};
     if (domain && definition.predicate.defined())
       domain->predicate = rebind_symbol(definition.predicate, SymbolRef::weak(domain));
@@ -140,7 +137,7 @@ class Factoring {
   StageLoops schedule_with(const std::vector<Split>& renames) const {
     StageLoops schedule = update_.schedule;
     schedule.splits = leaves_.others;
-    schedule.splits.insert(schedule.splits.end(), renames.begin(), renames.end());
+    append(schedule.splits, renames);
     schedule.dims.clear();
     schedule.prefetches.clear();
     return schedule;
@@ -148,8 +145,7 @@ class Factoring {
 
   void take_prefetches(StageLoops& schedule) const {
     const auto has = [&](const std::string& loop) {
-      return std::any_of(schedule.dims.begin(), schedule.dims.end(),
-                         [&](const Dim& dim) { return dim.var == loop; });
+      return std::ranges::any_of(schedule.dims, [&](const Dim& dim) { return dim.var == loop; });
     };
     for (PrefetchDirective prefetch : update_.schedule.prefetches) {
       for (std::string* loop : {&prefetch.at, &prefetch.from}) {
@@ -162,18 +158,17 @@ class Factoring {
   Definition partial_update() const {
     Substitution places;
     std::vector<Split> renames;
-    const Domain domain = domain_of(removed_leaves_, places, renames);
+    const DomainPtr domain = domain_of(removed_leaves_, places, renames);
     for (size_t i = 0; i < kept_leaves_.size(); i++) places[kept_leaves_[i].name] = kept_vars_[i];
     const auto place = [&](const Expr& e) { return substitute(e, places); };
 
     Definition partial;
-    for (const Expr& arg : over_leaves_.args) partial.args.push_back(place(arg));
-    partial.args.insert(partial.args.end(), kept_vars_.begin(), kept_vars_.end());
+    partial.args = mapped(over_leaves_.args, place);
+    append(partial.args, kept_vars_);
     for (const Expr& value : over_leaves_.values)
       partial.values.push_back(place(with_self_at(value, partial.args)));
-    std::vector<Expr> conditions;
-    for (const Expr& e : leaves_.tails) conditions.push_back(place(e));
-    for (const Expr& e : conjuncts_) conditions.push_back(place(e));
+    std::vector<Expr> conditions = mapped(leaves_.tails, place);
+    append(conditions, mapped(conjuncts_, place));
     partial.predicate = reading_last(conditions);
     set_domain(partial, domain);
     partial.schedule = schedule_with(renames);
@@ -232,7 +227,7 @@ class Factoring {
   Definition merged() const {
     Substitution places;
     std::vector<Split> renames;
-    const Domain domain = domain_of(kept_leaves_, places, renames);
+    const DomainPtr domain = domain_of(kept_leaves_, places, renames);
     const auto place = [&](const Expr& e) { return substitute(e, places); };
 
     Definition merge;
@@ -281,8 +276,7 @@ bool are_outermost(const StageLoops& schedule, const Preserved& preserved) {
     if (dim.is_reduction) order.push_back(dim.var);
   }
   for (size_t i = order.size() - preserved.size(); i < order.size(); i++) {
-    if (std::none_of(preserved.begin(), preserved.end(),
-                     [&](const auto& pair) { return pair.first == order[i]; }))
+    if (std::ranges::none_of(preserved, [&](const auto& pair) { return pair.first == order[i]; }))
       return false;
   }
   return true;
@@ -328,8 +322,7 @@ FuncPtr factor_out(const SchedulePlace& place, const Preserved& preserved,
       user_error(asked, "each loop is named once", quoted(loop) + " is named twice",
                  "Drop one of them");
     check_new_loop(place, var, loop, asked);
-    if (!variables.insert(var).second ||
-        std::find(f.args.begin(), f.args.end(), var) != f.args.end()) {
+    if (!variables.insert(var).second || std::ranges::find(f.args, var) != f.args.end()) {
       user_error(asked, "the new variables differ from each other and from the Func's",
                  quoted(var) + " is there already", "Use a new Var");
     }

@@ -8,7 +8,9 @@
 #include "graph/directive_choices.h"
 #include "graph/names.h"
 #include "graph/schedule_log.h"
+#include "ir/lists.h"
 #include "ir/print.h"
+#include "ir/text.h"
 #include "ir/visit.h"
 
 namespace retrograde {
@@ -203,19 +205,9 @@ class CppPrinter {
   }
   template <typename T>
   std::string cpp(const std::vector<T>& list) {
-    std::vector<std::string> parts;
-    for (const T& one : list) parts.push_back(cpp(one));
-    return "{" + listed(parts) + "}";
+    return "{" + listed(mapped(list, [&](const T& one) { return cpp(one); })) + "}";
   }
 
-  static const char* infix(Kind kind) {
-    static const std::map<Kind, const char*> all{
-        {Kind::Add, "+"}, {Kind::Sub, "-"},  {Kind::Mul, "*"}, {Kind::Div, "/"}, {Kind::Mod, "%"},
-        {Kind::EQ, "=="}, {Kind::NE, "!="},  {Kind::LT, "<"},  {Kind::LE, "<="}, {Kind::GT, ">"},
-        {Kind::GE, ">="}, {Kind::And, "&&"}, {Kind::Or, "||"}};
-    const auto found = all.find(kind);
-    return found == all.end() ? nullptr : found->second;
-  }
   static std::string type_of(Type type) {
     if (type.is_bool()) return "Bool()";
     if (type.is_float()) return text("Float(", type.bits(), ")");
@@ -227,19 +219,17 @@ class CppPrinter {
     if (const Variable* v = e.as<Variable>()) return parameter(v->name);
     std::vector<std::string> parts;
     for_each_child(e, [&](const Expr& child) { parts.push_back(cpp(child)); });
-    if (const char* symbol = infix(e.kind()))
-      return text("(", parts[0], " ", symbol, " ", parts[1], ")");
+    if (const InfixOperator* op = infix_operator(e.kind()))
+      return text("(", parts[0], " ", op->symbol, " ", parts[1], ")");
     switch (e.kind()) {
       case Kind::Not:
         return "!" + parts[0];
       case Kind::Cast:
         return text("cast(", type_of(e.type()), ", ", parts[0], ")");
       case Kind::Min:
-        return text("min(", listed(parts), ")");
       case Kind::Max:
-        return text("max(", listed(parts), ")");
       case Kind::Select:
-        return text("select(", listed(parts), ")");
+        return text(kind_word(e.kind()), "(", listed(parts), ")");
       case Kind::Call:
         return text(e.as<Call>()->name, "(", listed(parts), ")");
       default:

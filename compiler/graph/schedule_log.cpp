@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cstdlib>
 #include <iterator>
-#include <map>
 #include <set>
 
 #include "diagnostics/error.h"
@@ -18,6 +17,7 @@
 #include "graph/rfactor.h"
 #include "graph/wrappers.h"
 #include "ir/build.h"
+#include "ir/lists.h"
 #include "ir/text.h"
 #include "ir/visit.h"
 
@@ -74,7 +74,7 @@ class NameGroups {
 
 void add_loops(const StageLoops& schedule, std::vector<std::string>& loops) {
   const auto add = [&](const std::string& loop) {
-    if (std::find(loops.begin(), loops.end(), loop) == loops.end()) loops.push_back(loop);
+    if (std::ranges::find(loops, loop) == loops.end()) loops.push_back(loop);
   };
   for (const Dim& dim : schedule.dims) add(dim.var);
   for (const StageLoops& special : schedule.specializations) add_loops(special, loops);
@@ -191,18 +191,14 @@ class Replay {
     return found ? found->name : name;
   }
   std::vector<FuncPtr> funcs(const std::vector<NamedFunc>& names) {
-    std::vector<FuncPtr> result;
-    for (const NamedFunc& name : names) result.push_back(func(name));
-    return result;
+    return mapped(names, [&](const std::string& name) { return func(name); });
   }
   static std::string loop_of(const std::vector<std::string>& loops, const std::string& name) {
     const std::string* found = meant(loops, name, [](const std::string& loop) { return loop; });
     return found ? *found : name;
   }
   static NamedLoop loop(const SchedulePlace& place, const std::string& name) {
-    std::vector<std::string> loops;
-    for (const Dim& dim : place.schedule().dims) loops.push_back(dim.var);
-    return loop_of(loops, name);
+    return loop_of(mapped(place.schedule().dims, &Dim::var), name);
   }
   void find(LoopLevel& level) {
     // What is said of a level that is not there is said when the pipeline is compiled.
@@ -421,7 +417,7 @@ ScheduleLog ScheduleLog::without(size_t index) const {
   const auto loops = loops_without(gone.directive);
   int special = -1;  // the number of the specialization that goes
   if (std::holds_alternative<ir::Specialize>(gone.directive)) {
-    special = static_cast<int>(std::count_if(log.entries.begin(), log.entries.end(), [&](auto& e) {
+    special = static_cast<int>(std::ranges::count_if(log.entries, [&](auto& e) {
       return e.directive.index() == gone.directive.index() && e.func == gone.func &&
              e.stage == gone.stage && e.special == gone.special;
     }));

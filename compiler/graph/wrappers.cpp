@@ -11,6 +11,7 @@
 #include "graph/names.h"
 #include "graph/own_reads.h"
 #include "ir/build.h"
+#include "ir/lists.h"
 #include "ir/print.h"
 #include "ir/variables.h"
 #include "ir/visit.h"
@@ -22,8 +23,8 @@ namespace ir {
 namespace {
 
 bool is_wrapper_of(const FuncContents* candidate, const FuncContents& f) {
-  return std::any_of(f.wrappers.begin(), f.wrappers.end(),
-                     [&](const auto& entry) { return entry.second.get() == candidate; });
+  return std::ranges::any_of(f.wrappers,
+                             [&](const auto& entry) { return entry.second.get() == candidate; });
 }
 
 // What `user` reads where it is written as f: follows wrappers of wrappers. `visit` is told each
@@ -50,8 +51,8 @@ const FuncContents* reader_of_image(const Call& call, const FuncContents& user) 
 class Wrapping {
  public:
   std::vector<FuncPtr> apply(const std::vector<FuncPtr>& outputs) {
-    std::vector<FuncPtr> result;
-    for (const FuncPtr& output : outputs) result.push_back(copy_of(output.get()));
+    const auto result =
+        mapped(outputs, [&](const FuncPtr& output) { return copy_of(output.get()); });
     for (size_t i = 0; i < queue_.size(); i++) redirect(*queue_[i]);
     check_used();
     for (const FuncContents* f : queue_) copies_[f]->wrappers.clear();
@@ -141,8 +142,7 @@ std::vector<FuncPtr> image_readers(const FuncContents& f) {
       const Call* call = e.as<Call>();
       if (!call || call->call_type != CallType::Image || !reader_of_image(*call, f)) return;
       const auto& reader = static_cast<const ParameterContents*>(call->symbol.raw())->func;
-      if (std::find(readers.begin(), readers.end(), reader) == readers.end())
-        readers.push_back(reader);
+      if (std::ranges::find(readers, reader) == readers.end()) readers.push_back(reader);
     });
   }
   return readers;
@@ -171,8 +171,8 @@ FuncPtr clone_of(const FuncPtr& f, const std::string& name) {
 std::vector<FuncPtr> apply_wrappers(const std::vector<FuncPtr>& outputs) {
   for (const FuncPtr& f : topological_order(outputs)) {
     const auto readers = image_readers(*f);
-    if (!f->wrappers.empty() || std::any_of(readers.begin(), readers.end(),
-                                            [](const FuncPtr& r) { return is_scheduled(*r); })) {
+    if (!f->wrappers.empty() ||
+        std::ranges::any_of(readers, [](const FuncPtr& r) { return is_scheduled(*r); })) {
       return Wrapping().apply(outputs);
     }
   }
@@ -265,7 +265,7 @@ void check_shared(const FuncContents& f, const FuncPtr& wrapper,
     if (other == wrapper) sharing.push_back(user);
   }
   std::vector<std::string> wanted = users;
-  std::sort(wanted.begin(), wanted.end());
+  std::ranges::sort(wanted);
   if (wanted == sharing) return;
   user_error(asked, "Funcs that share a wrapper share it in every request",
              text(quoted(wrapper->name), " is the wrapper in ", names_of(sharing)),
@@ -277,8 +277,7 @@ void check_shared(const FuncContents& f, const FuncPtr& wrapper,
 FuncPtr wrapper_of(const FuncPtr& handle, const std::vector<FuncPtr>& users,
                    const std::string& name, bool clone) {
   const FuncPtr f = handle->shared_from_this();
-  std::vector<std::string> keys;
-  for (const FuncPtr& user : users) keys.push_back(user->name);
+  auto keys = mapped(users, [](const FuncPtr& user) { return user->name; });
   if (users.empty()) keys.push_back("");
   const std::string asked =
       text(clone ? "clone " : "wrap ", quoted(f->name),
@@ -303,8 +302,7 @@ FuncPtr wrapper_of(const FuncPtr& handle, const std::vector<FuncPtr>& users,
   FuncPtr wrapper = clone ? clone_of(f, name) : identity_of(f, name);
   f->frozen = wrapper->frozen = true;  // wrappers change no values, now or later
   for (const std::string& key : keys) f->wrappers[key] = wrapper;
-  std::vector<NamedFunc> named;
-  for (const FuncPtr& user : users) named.emplace_back(user->name);
+  const auto named = mapped(users, [](const FuncPtr& user) { return NamedFunc(user->name); });
   log_directive(
       {f}, clone ? Directive(Clone{wrapper->name, named}) : Directive(Wrap{wrapper->name, named}));
   return owning(handle, wrapper);
@@ -314,8 +312,7 @@ FuncPtr func_of_image(const std::shared_ptr<ParameterContents>& image) {
   if (!image->func) {
     auto reader = std::make_shared<FuncContents>();
     reader->name = claim_name(image->name + "_im");
-    std::vector<Expr> args;
-    for (int d = 0; d < image->dimensions; d++) args.push_back(variable(implicit_name(d)));
+    const std::vector<Expr> args = variables_of(implicit_names(image->dimensions));
     define_pure(reader, args, {call_image(image->name, image->type, args, SymbolRef::weak(image))});
     reader->frozen = true;
     image->func = reader;
