@@ -30,10 +30,7 @@ void check_func(const std::string& asked, const Func& func, bool has_rule) {
     user_error(asked, "a rule belongs to a Func that is defined",
                quoted(func.name()) + " has no definition", "Define it first");
   }
-  if (!ir::is_floating(func.types())) {
-    user_error(asked, "only floating-point values have derivatives",
-               "its type is " + to_string(func.types()[0]), "Convert it to float");
-  }
+  ir::check_is_floating(asked, func.types(), "its type is", "Convert it to float");
   if (!has_rule) {
     user_error(asked, "a rule is a function", "there is none",
                "Give a function of the context that returns what the derivative is");
@@ -50,11 +47,8 @@ void check_inputs(const std::string& asked, const Func& func,
                  text("input ", i, " has no ", shape.name.empty() ? "memory" : "definition"),
                  "Define them first");
     }
-    if (!shape.is_floating()) {
-      user_error(asked, "only floating-point values have derivatives",
-                 text("the input ", quoted(shape.name), " has type ", to_string(shape.types[0])),
-                 "Leave it out: nothing is propagated to integers");
-    }
+    ir::check_is_floating(asked, shape.types, text("the input ", quoted(shape.name), " has type"),
+                          "Leave it out: nothing is propagated to integers");
     if (is_given_twice(inputs, i)) {
       user_error(asked, "each input is listed once", text(quoted(shape.name), " is there twice"),
                  "Leave one out");
@@ -83,8 +77,8 @@ void set_rules(const Func& func, ir::CustomDerivatives rules) {
 }  // namespace
 
 bool AdjointContext::wants(const AdjointInput& input) const {
-  return std::any_of(wanted_.begin(), wanted_.end(),
-                     [&](const Wanted& w) { return w.input == input.symbol().get(); });
+  return std::ranges::any_of(wanted_,
+                             [&](const Wanted& w) { return w.input == input.symbol().get(); });
 }
 
 Region AdjointContext::region_of(const AdjointInput& input) const {
@@ -102,23 +96,20 @@ AdjointContribution AdjointContribution::zero(AdjointInput input) {
 
 bool TangentContext::moves(const AdjointInput& input) const {
   const ir::Symbol* symbol = input.symbol().get();
-  if (std::none_of(inputs_.begin(), inputs_.end(),
-                   [&](const AdjointInput& i) { return i.symbol().get() == symbol; })) {
+  if (std::ranges::none_of(inputs_,
+                           [&](const AdjointInput& i) { return i.symbol().get() == symbol; })) {
     ir::InputShape shape = ir::shape_of(symbol);
     user_error("propagate tangents through " + quoted(func_.name()),
                "a rule asks for the tangents of its inputs",
                text(quoted(shape.name), " is not listed"), "List it in custom_tangent");
   }
-  return std::any_of(moving_.begin(), moving_.end(),
-                     [&](const auto& m) { return m.first == symbol; });
+  return std::ranges::any_of(moving_, [&](const auto& m) { return m.first == symbol; });
 }
 
 Func TangentContext::tangent(const AdjointInput& input) const {
   const ir::Symbol* symbol = input.symbol().get();
   if (!moves(input)) return Func(ir::zero_derivative(*symbol, "_tan"));
-  return std::find_if(moving_.begin(), moving_.end(),
-                      [&](const auto& m) { return m.first == symbol; })
-      ->second;
+  return std::ranges::find_if(moving_, [&](const auto& m) { return m.first == symbol; })->second;
 }
 
 void custom_adjoint(const Func& func, const std::vector<AdjointInput>& inputs, CustomAdjoint rule,

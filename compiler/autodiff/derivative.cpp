@@ -5,11 +5,12 @@
 #include "autodiff/gradient_lookup.h"
 #include "autodiff/report/explain_costs.h"
 #include "autodiff/rules/derivative_rules.h"
+#include "autodiff/sweeps/input_shape.h"
 #include "autodiff/sweeps/leave_out.h"
 #include "autodiff/sweeps/regions.h"
 #include "autodiff/sweeps/synthesis.h"
-#include "graph/define.h"
 #include "ir/build.h"
+#include "ir/lists.h"
 #include "ir/variables.h"
 #include "simplify/simplify.h"
 
@@ -25,12 +26,8 @@ void check_loss(const Func& output) {
   if (!output.defined())
     user_error(asked_of_adjoints(output), "the output must be defined", "it has no definition",
                "Define it first");
-  for (Type t : output.types()) {
-    if (t.is_float()) return;
-  }
-  user_error(asked_of_adjoints(output), "only floating-point values have derivatives",
-             "its type is " + to_string(output.types()[0]),
-             "Convert it to float where the gradient starts");
+  ir::check_is_floating(asked_of_adjoints(output), output.types(), "its type is",
+                        "Convert it to float where the gradient starts");
 }
 
 ir::CheckpointBudget budget_of(const AdjointOptions& options) {
@@ -107,8 +104,7 @@ Func Derivative::absent(const std::shared_ptr<const ir::Symbol>& symbol,
 
 bool Derivative::output_uses(const ir::FuncContents& f) const {
   const std::vector<ir::FuncPtr> order = ir::topological_order({result_->output.func});
-  return std::any_of(order.begin(), order.end(),
-                     [&](const ir::FuncPtr& used) { return used.get() == &f; });
+  return std::ranges::any_of(order, [&](const ir::FuncPtr& used) { return used.get() == &f; });
 }
 
 bool Derivative::has(const AdjointInput& input) const {
@@ -168,8 +164,8 @@ std::vector<Func> Derivative::funcs() const {
 }
 
 std::vector<Explanation> Derivative::explanations() const {
-  std::vector<Explanation> all = result_->explanations, later = zeros_->explanations();
-  all.insert(all.end(), later.begin(), later.end());
+  std::vector<Explanation> all = result_->explanations;
+  ir::append(all, zeros_->explanations());
   return all;
 }
 
@@ -179,8 +175,8 @@ std::vector<Explanation> Derivative::costs() const {
 }
 
 std::string Derivative::explain(Detail detail) const {
-  std::vector<Explanation> all = explanations(), last = costs();
-  all.insert(all.end(), last.begin(), last.end());
+  std::vector<Explanation> all = explanations();
+  ir::append(all, costs());
   return to_string(all, detail);
 }
 

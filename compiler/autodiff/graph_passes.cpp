@@ -43,8 +43,8 @@ const std::vector<GraphPass>& graph_passes() {
 
 const GraphPass* find_graph_pass(const std::string& name) {
   const auto& all = graph_passes();
-  const auto found = std::find_if(all.begin(), all.end(),
-                                  [&](const GraphPass& pass) { return pass.name == name; });
+  const auto found =
+      std::ranges::find_if(all, [&](const GraphPass& pass) { return pass.name == name; });
   return found == all.end() ? nullptr : &*found;
 }
 

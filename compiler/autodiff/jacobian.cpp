@@ -2,11 +2,13 @@
 
 #include "autodiff/matrices/compressed.h"
 #include "autodiff/matrices/flat_input.h"
+#include "autodiff/rules/derivative_rules.h"
 #include "autodiff/sweeps/input_shape.h"
 #include "autodiff/sweeps/regions.h"
 #include "autodiff/tangents.h"
 #include "diagnostics/error.h"
 #include "ir/build.h"
+#include "ir/lists.h"
 #include "ir/visit.h"
 #include "simplify/simplify.h"
 
@@ -50,11 +52,8 @@ ir::InputShape checked_input(const std::string& asked, const AdjointInput& input
                                   : quoted(shape.name) + " has no definition",
                "Define it first");
   }
-  if (!shape.is_floating()) {
-    user_error(asked, "only floating-point values have derivatives",
-               text(quoted(shape.name), " has type ", to_string(shape.types[0])),
-               "Convert it to float in a Func, and differentiate by that");
-  }
+  ir::check_is_floating(asked, shape.types, quoted(shape.name) + " has type",
+                        "Convert it to float in a Func, and differentiate by that");
   return shape;
 }
 
@@ -212,9 +211,7 @@ std::shared_ptr<ir::JacobianResult> result_of(const std::string& asked, const Ca
 }
 
 std::vector<Type> derivative_types(const Func& f) {
-  std::vector<Type> types;
-  for (Type t : f.types()) types.push_back(t.is_float() && t.bits() > 32 ? t : Float(32));
-  return types;
+  return ir::mapped(f.types(), ir::adjoint_type);
 }
 
 // ---- second derivatives ----

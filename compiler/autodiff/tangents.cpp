@@ -2,7 +2,6 @@
 
 #include <algorithm>
 
-#include "autodiff/sweeps/accumulation.h"
 #include "autodiff/sweeps/input_shape.h"
 #include "autodiff/sweeps/tangent_synthesis.h"
 #include "ir/build.h"
@@ -20,10 +19,8 @@ void check_moves(const Func& output) {
     user_error(asked_of_tangents(output), "the output must be defined", "it has no definition",
                "Define it first");
   }
-  if (!ir::is_floating(output.types())) {
-    user_error(asked_of_tangents(output), "only floating-point values have derivatives",
-               "its type is " + to_string(output.types()[0]), "Convert it to float");
-  }
+  ir::check_is_floating(asked_of_tangents(output), output.types(), "its type is",
+                        "Convert it to float");
 }
 
 ir::InputShape shape_of(const Func& output, const ir::Symbol* symbol) {
@@ -38,10 +35,9 @@ ir::InputShape shape_of(const Func& output, const ir::Symbol* symbol) {
 }
 
 void check_direction(const Func& output, const ir::InputShape& shape, const Func& tangent) {
-  if (tangent.defined() && !shape.is_floating()) {
-    user_error(asked_of_tangents(output), "only floating-point values have derivatives",
-               text(quoted(shape.name), " has type ", to_string(shape.types[0])),
-               "Convert it to float in a Func, and give that a direction");
+  if (tangent.defined()) {
+    ir::check_is_floating(asked_of_tangents(output), shape.types, quoted(shape.name) + " has type",
+                          "Convert it to float in a Func, and give that a direction");
   }
   ir::check_shape(asked_of_tangents(output), "a direction", "what moves", shape,
                   *tangent.function());
@@ -70,7 +66,7 @@ Tangents::Tangents(std::shared_ptr<const ir::TangentResult> result) : result_(st
 
 Func Tangents::operator()(const Func& func) const {
   const auto& order = result_->order;
-  if (std::find(order.begin(), order.end(), func.function()) == order.end())
+  if (std::ranges::find(order, func.function()) == order.end())
     return Func(std::make_shared<ir::FuncContents>());
   auto found = result_->tangents.find(func.function().get());
   return found == result_->tangents.end() ? Func(ir::zero_tangent(*func.function()))

@@ -2,8 +2,8 @@
 
 #include <unordered_map>
 
-#include "autodiff/sweeps/accumulation.h"
 #include "autodiff/sweeps/local_derivative.h"
+#include "autodiff/sweeps/made_definitions.h"
 #include "frontend/data/image_param.h"
 #include "frontend/data/param.h"
 #include "graph/define.h"

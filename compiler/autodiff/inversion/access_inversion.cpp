@@ -8,16 +8,32 @@
 #include "autodiff/inversion/isl_maps.h"
 #include "autodiff/inversion/narrow_reductions.h"
 #include "ir/build.h"
+#include "ir/lists.h"
 #include "ir/print.h"
-#include "ir/visit.h"
 #include "simplify/simplify.h"
 
 namespace retrograde::ir {
 
 std::vector<std::string> names_of(const std::vector<LoopVariable>& vars) {
-  std::vector<std::string> names;
-  for (const LoopVariable& v : vars) names.push_back(v.name);
-  return names;
+  return mapped(vars, &LoopVariable::name);
+}
+
+Scope<Interval> scope_of(const std::vector<LoopVariable>& vars) {
+  Scope<Interval> scope;
+  for (const LoopVariable& v : vars) scope.push(v.name, v.range());
+  return scope;
+}
+
+Expr extent_of(const Interval& range) { return simplify(range.max - range.min + 1); }
+
+std::optional<int64_t> constant_extent(const Interval& range) {
+  return range.is_bounded() ? as_const_int(extent_of(range)) : std::nullopt;
+}
+
+bool can_prove_inside(const Interval& part, const Interval& whole) {
+  const auto& [min, max] = whole;
+  return (!min.defined() || (part.min.defined() && can_prove(part.min >= min))) &&
+         (!max.defined() || (part.max.defined() && can_prove(part.max <= max)));
 }
 
 namespace {
@@ -87,17 +103,10 @@ class Inverter {
   }
 
   isl::map relation(IslBridge& bridge, std::set<Expr, StructuralLess>& obstacles) {
-    int vars = static_cast<int>(query_.domain.vars.size()),
-        dims = static_cast<int>(query_.indices.size());
-    isl::map result = isl::manage(isl_map_universe(isl_space_alloc(
-        bridge.ctx(), 0, static_cast<unsigned>(vars), static_cast<unsigned>(dims))));
-    for (int i = 0; i < vars; ++i) {
-      const LoopVariable& v = query_.domain.vars[static_cast<size_t>(i)];
-      if (v.min.defined())
-        result = result.intersect_domain(bridge.dim(i).ge_set(bridge.bound(v.min)));
-      if (v.max.defined())
-        result = result.intersect_domain(bridge.dim(i).le_set(bridge.bound(v.max)));
-    }
+    int dims = static_cast<int>(query_.indices.size());
+    isl::map result = universe_map(bridge.ctx(), query_.domain.vars.size(), query_.indices.size());
+    for (const isl::set& range : bridge.ranges_of(query_.domain.vars))
+      result = result.intersect_domain(range);
     for (int d = 0; d < dims; ++d) {
       bridge.clear_obstacles();
       auto index = bridge.affine(query_.indices[static_cast<size_t>(d)]);
@@ -177,8 +186,7 @@ class Inverter {
     std::set<std::string> found;
     walk(e, [&](const Expr& node) {
       if (const auto* v = node.as<Variable>()) found.insert(v->name);
-      return std::none_of(fixed_.begin(), fixed_.end(),
-                          [&](const Expr& f) { return equal(f, node); });
+      return std::ranges::none_of(fixed_, [&](const Expr& f) { return equal(f, node); });
     });
     std::vector<size_t> result;
     for (size_t j = 0; j < query_.domain.vars.size(); ++j) {
@@ -215,7 +223,7 @@ class Inverter {
         g.pure[static_cast<size_t>(groups[k].dims[d])] = piece.pure[d];
       }
       g.iteration.insert(piece.iteration.begin(), piece.iteration.end());
-      predicate.insert(predicate.end(), piece.predicate.begin(), piece.predicate.end());
+      append(predicate, piece.predicate);
       for (const auto& free : piece.free)
         extents[groups[k].vars[static_cast<size_t>(free.var)].name] = free.extent;
     }
@@ -226,7 +234,7 @@ class Inverter {
       for (auto& [name, e] : g.iteration) e = substitute(e, now);
     }
     note_circular(g.iteration);
-    predicate.insert(predicate.end(), residual_.begin(), residual_.end());
+    append(predicate, residual_);
     for (Expr& e : predicate) e = substitute(e, g.iteration);
     for (size_t d = 0; d < g.lhs.size(); ++d) {
       if (!takes_part_[d]) g.scatters = true;
@@ -251,14 +259,13 @@ class Inverter {
       names[element_name(static_cast<int>(d))] = variable(query_.target_args[d]);
     }
     if (!extents.empty()) {
-      g.rdom = std::make_shared<ReductionDomainContents>();
-      g.rdom->frozen = true;
+      g.rdom = make_domain();
       std::string base = unique_name("rho");
       for (const LoopVariable& v : query_.domain.vars) {  // innermost first, as in the stage
         auto it = extents.find(v.name);
         if (it == extents.end()) continue;
         g.rdom->vars.push_back({base + "." + v.name, make_zero(Int(32)), it->second});
-        names[rho_name(v.name)] = variable(g.rdom->vars.back().var, Int(32), SymbolRef(g.rdom));
+        names[rho_name(v.name)] = loop_variable(g.rdom, g.rdom->vars.back().var);
       }
     }
     for (auto& [name, e] : g.iteration) e = simplify(substitute(e, names));
@@ -285,8 +292,8 @@ Gather scatter_access(const AccessQuery& query) {
   std::string base = unique_name("rho");
   if (!query.domain.vars.empty()) g.rdom = std::make_shared<ReductionDomainContents>();
   for (const LoopVariable& v : query.domain.vars) {
-    ReductionVariable rho{base + "." + v.name, v.min, simplify(v.max - v.min + 1)};
-    g.iteration[v.name] = variable(rho.var, Int(32), SymbolRef(g.rdom));
+    ReductionVariable rho{base + "." + v.name, v.min, extent_of(v.range())};
+    g.iteration[v.name] = loop_variable(g.rdom, rho.var);
     g.rdom->vars.push_back(rho);
   }
   for (const Expr& index : query.indices) {
@@ -388,7 +395,7 @@ Inversion invert_access(const AccessQuery& query) {
     for (AccessQuery& part : parts) {
       tighten(part.domain, part.domain.predicate);
       Inversion one = invert_access(part);
-      result.gathers.insert(result.gathers.end(), one.gathers.begin(), one.gathers.end());
+      append(result.gathers, one.gathers);
       if (!one.note.empty()) result.note = one.note;
       result.gave_up |= one.gave_up;
     }

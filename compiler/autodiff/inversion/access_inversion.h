@@ -11,9 +11,12 @@
 // determined dimensions.
 #pragma once
 
+#include <algorithm>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "analysis/interval.h"
 #include "autodiff/inversion/isl_budget.h"
 #include "graph/function.h"
 #include "ir/expr.h"
@@ -26,8 +29,17 @@ struct LoopVariable {
   std::string name;
   Expr min, max;
   bool is_reduction = false;
+  Interval range() const { return {min, max}; }
 };
 std::vector<std::string> names_of(const std::vector<LoopVariable>& vars);
+Scope<Interval> scope_of(const std::vector<LoopVariable>& vars);
+
+// Of a bounded one.
+Expr extent_of(const Interval& range);
+// nullopt: without bounds, or known at run time only.
+std::optional<int64_t> constant_extent(const Interval& range);
+// An end that the part has not is inside of none but the missing end of the whole.
+bool can_prove_inside(const Interval& part, const Interval& whole);
 struct IterationDomain {
   std::vector<LoopVariable> vars;  // innermost first
   Expr predicate;                  // undefined: none
@@ -56,6 +68,9 @@ struct Gather {
   Substitution iteration;  // stage variable -> expression of the target's variables and rdom
   Expr predicate;          // undefined: all points
   bool scatters = false;   // an index depends on data
+
+  bool is_everywhere() const { return std::ranges::find(pure, false) == pure.end(); }
+  bool is_pointwise() const { return !rdom && !scatters && is_everywhere(); }
 };
 
 struct Inversion {

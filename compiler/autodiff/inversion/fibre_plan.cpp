@@ -117,7 +117,7 @@ class FibrePlanner {
                                                        best.extent};
     plan.free_vars.push_back(best.var);
     plan.cost = best.extent == unbounded ? 1e30 : plan.cost * static_cast<double>(best.extent);
-    open.erase(std::find(open.begin(), open.end(), best.var));
+    open.erase(std::ranges::find(open, best.var));
   }
 
   Candidate candidate(const Fibre& fibre, int j) const {
@@ -126,7 +126,9 @@ class FibrePlanner {
     isl::map exact = only_output(fibre.exact, j);
     c.stride = stride_of(exact);
     if (auto s = spread(exact)) c.extent = *s / c.stride + 1;
-    if (auto own = own_extent(j); own && c.stride == 1 && c.extent == *own) c.is_static = true;
+    if (auto own = constant_extent(space_.vars[static_cast<size_t>(j)].range());
+        own && c.stride == 1 && c.extent == *own)
+      c.is_static = true;
     if (c.extent == unbounded) c.is_static = true, c.stride = 1;
     return c;
   }
@@ -137,12 +139,6 @@ class FibrePlanner {
       return std::tuple(c.extent == unbounded, c.extent, !v.is_reduction, !c.is_static);
     };
     return rank(a) < rank(b);
-  }
-  std::optional<int64_t> own_extent(int j) const {
-    const LoopVariable& v = space_.vars[static_cast<size_t>(j)];
-    if (!v.min.defined() || !v.max.defined()) return std::nullopt;
-    auto extent = as_const_int(simplify(v.max - v.min + 1));
-    return extent;
   }
 
   // Where the free variable starts: its own minimum, else the smallest point of the fibre.

@@ -8,6 +8,7 @@
 #include "autodiff/inversion/isl_bridge.h"
 #include "autodiff/inversion/isl_maps.h"
 #include "ir/build.h"
+#include "ir/lists.h"
 #include "simplify/simplify.h"
 
 namespace retrograde::ir {
@@ -35,9 +36,7 @@ class GroupInverter {
   }
 
   std::vector<GroupPiece> run() {
-    std::vector<GroupPiece> result;
-    for (const isl::map& piece : choose_pieces()) result.push_back(emit(piece));
-    return result;
+    return mapped(choose_pieces(), [&](const isl::map& piece) { return emit(piece); });
   }
 
  private:
@@ -45,14 +44,8 @@ class GroupInverter {
   int index_count() const { return static_cast<int>(group_.indices.size()); }
 
   void build_domain() {
-    for (int i = 0; i < var_count(); ++i) {
-      const LoopVariable& v = group_.vars[static_cast<size_t>(i)];
-      isl::set range = bridge_.universe();
-      if (v.min.defined()) range = range.intersect(bridge_.dim(i).ge_set(bridge_.bound(v.min)));
-      if (v.max.defined()) range = range.intersect(bridge_.dim(i).le_set(bridge_.bound(v.max)));
-      own_range_.push_back(range);
-      domain_ = domain_.intersect(range);
-    }
+    own_range_ = bridge_.ranges_of(group_.vars);
+    for (const isl::set& range : own_range_) domain_ = domain_.intersect(range);
     std::vector<isl::set> conditions;
     for (const Expr& e : group_.predicate) conditions.push_back(*bridge_.condition(e));
     for (const LoopVariable& v : group_.region) assume_not_empty(v);
@@ -72,9 +65,7 @@ class GroupInverter {
 
   // {z -> y} over all of z: the domain is not applied.
   isl::map relation_of(const std::vector<isl::pw_aff>& indices) const {
-    isl_space* space = isl_space_alloc(bridge_.ctx(), 0, static_cast<unsigned>(var_count()),
-                                       static_cast<unsigned>(index_count()));
-    isl::map result = isl::manage(isl_map_universe(space));
+    isl::map result = universe_map(bridge_.ctx(), group_.vars.size(), group_.indices.size());
     for (int d = 0; d < index_count(); ++d) {
       result = result.intersect(output_equals(indices[static_cast<size_t>(d)], d, index_count()));
     }
@@ -106,8 +97,8 @@ class GroupInverter {
   // Whether the places that are read are the same sums all over the domain. Where they are not,
   // every vector of the interior would choose between those of the borders.
   static bool in_one_piece(const FibrePlan& plan) {
-    return std::all_of(plan.coordinates.begin(), plan.coordinates.end(),
-                       [](const FibreCoordinate& c) { return pieces_of(c.value) == 1; });
+    return std::ranges::all_of(plan.coordinates,
+                               [](const FibreCoordinate& c) { return pieces_of(c.value) == 1; });
   }
 
   std::vector<isl::map> split_pieces() const {
@@ -172,7 +163,7 @@ class GroupInverter {
       const LoopVariable& loop = group_.vars[static_cast<size_t>(v)];
       const FibreCoordinate& c = p.coordinates[static_cast<size_t>(v)];
       g.free.push_back(
-          {v, c.extent == unbounded ? extent_of(loop) : make_const(Int(32), c.extent)});
+          {v, c.extent == unbounded ? extent_of(loop.range()) : make_const(Int(32), c.extent)});
       names.push_back(variable(rho_name(loop.name)));
     }
     for (int j = 0; j < var_count(); ++j) {
@@ -298,8 +289,6 @@ class GroupInverter {
     }
     return result;
   }
-
-  static Expr extent_of(const LoopVariable& v) { return simplify(v.max - v.min + 1); }
 
   IslContext context_;  // outlives every isl object below
   const Group& group_;

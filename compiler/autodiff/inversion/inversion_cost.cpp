@@ -10,18 +10,12 @@ namespace retrograde::ir {
 
 namespace {
 
-std::optional<double> extent_of(const LoopVariable& v) {
-  if (!v.min.defined() || !v.max.defined()) return std::nullopt;
-  auto extent = as_const_int(simplify(v.max - v.min + 1));
-  return extent ? std::optional<double>(static_cast<double>(*extent)) : std::nullopt;
-}
-
 std::optional<double> points_of(const IterationDomain& domain) {
   double points = 1;
   for (const LoopVariable& v : domain.vars) {
-    auto extent = extent_of(v);
+    auto extent = constant_extent(v.range());
     if (!extent) return std::nullopt;
-    points *= *extent;
+    points *= static_cast<double>(*extent);
   }
   return points;
 }
@@ -30,9 +24,9 @@ std::optional<double> iterations_of(const Gather& g, const AccessQuery& query) {
   double iterations = 1;
   for (size_t d = 0; d < g.pure.size(); ++d) {
     if (!g.pure[d]) continue;
-    auto extent = d < query.region.size() ? extent_of(query.region[d]) : std::nullopt;
+    auto extent = d < query.region.size() ? constant_extent(query.region[d].range()) : std::nullopt;
     if (!extent) return std::nullopt;
-    iterations *= *extent;
+    iterations *= static_cast<double>(*extent);
   }
   for (const ReductionVariable& r : g.rdom ? g.rdom->vars : std::vector<ReductionVariable>{}) {
     auto extent = as_const_int(simplify(r.extent));

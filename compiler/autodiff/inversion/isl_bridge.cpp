@@ -4,9 +4,8 @@
 #include <isl/ilp.h>
 #include <isl/options.h>
 
-#include <algorithm>
-
 #include "ir/build.h"
+#include "ir/lists.h"
 #include "ir/visit.h"
 
 namespace retrograde::ir {
@@ -54,9 +53,8 @@ isl::pw_aff IslBridge::parameter(const Expr& e) {
 }
 
 bool IslBridge::mentions_dim(const Expr& e) const {
-  return any_node(e, [&](const Variable& v) {
-    return std::find(dims_.begin(), dims_.end(), v.name) != dims_.end();
-  });
+  return any_node(
+      e, [&](const Variable& v) { return std::ranges::find(dims_, v.name) != dims_.end(); });
 }
 
 namespace {
@@ -164,11 +162,7 @@ std::optional<isl::pw_aff> IslBridge::bits(const Call& c, const Expr& e) {
 }
 
 std::optional<isl::pw_aff> IslBridge::affine(const Expr& e) {
-  const auto known = known_.find(e.get());
-  if (known != known_.end()) return known->second.second;
-  std::optional<isl::pw_aff> result = affine_form(e);
-  known_.insert_or_assign(e.get(), std::pair(e, result));
-  return result;
+  return known_.get(e, [&] { return affine_form(e); });
 }
 
 std::optional<isl::pw_aff> IslBridge::affine_form(const Expr& e) {
@@ -178,7 +172,7 @@ std::optional<isl::pw_aff> IslBridge::affine_form(const Expr& e) {
   return match(
       e,
       [&](const Variable& v) -> std::optional<isl::pw_aff> {
-        auto it = std::find(dims_.begin(), dims_.end(), v.name);
+        auto it = std::ranges::find(dims_, v.name);
         return it == dims_.end() ? parameter(e) : dim(static_cast<int>(it - dims_.begin()));
       },
       [&](const Binary& b) { return binary(b, e); },
@@ -199,8 +193,7 @@ std::optional<isl::pw_aff> IslBridge::affine_form(const Expr& e) {
         return exact ? affine(c.value) : obstacle(e);
       },
       [&](const Call& c) -> std::optional<isl::pw_aff> {
-        bool marker = c.call_type == CallType::Operator && op_info(c.op).cls == OpClass::Marker;
-        return marker ? affine(c.args[0]) : bits(c, e);
+        return c.is_marker() ? affine(c.args[0]) : bits(c, e);
       },
       [&](const ExprNode&) { return obstacle(e); });
 }
@@ -226,6 +219,16 @@ isl::pw_aff IslBridge::bound(const Expr& e) {
   auto result = affine(e);
   if (result && isl_pw_aff_n_piece(result->get()) == 1) return *result;
   return parameter(e);
+}
+
+std::vector<isl::set> IslBridge::ranges_of(const std::vector<LoopVariable>& dims) {
+  return numbered(dims.size(), [&](size_t i) {
+    const isl::pw_aff at = dim(static_cast<int>(i));
+    isl::set range = universe_;
+    if (dims[i].min.defined()) range = range.intersect(at.ge_set(bound(dims[i].min)));
+    if (dims[i].max.defined()) range = range.intersect(at.le_set(bound(dims[i].max)));
+    return range;
+  });
 }
 
 std::optional<isl::set> IslBridge::comparison(const Binary& b, const Expr& e) {
@@ -256,10 +259,7 @@ std::optional<isl::set> IslBridge::condition(const Expr& e) {
     if (!a) return std::nullopt;
     return universe_.subtract(*a);
   }
-  if (const auto* call = e.as<Call>();
-      call && call->call_type == CallType::Operator && op_info(call->op).cls == OpClass::Marker) {
-    return condition(call->args[0]);
-  }
+  if (const auto* call = e.as<Call>(); call && call->is_marker()) return condition(call->args[0]);
   const auto* b = e.as<Binary>();
   if (!b) return opaque(e);
   if (b->kind == Kind::And || b->kind == Kind::Or) {
@@ -281,6 +281,13 @@ int64_t to_int(__isl_take isl_val* v) {
   return result;
 }
 
+// As isl's C functions call a lambda for each of what they take apart.
+template <class Visit, class... Parts>
+isl_stat visit_each(Parts*... parts, void* visit) {
+  (*static_cast<Visit*>(visit))(parts...);
+  return isl_stat_ok;
+}
+
 // Sums with positive terms first, so that differences print as differences.
 class SumBuilder {
  public:
@@ -289,7 +296,7 @@ class SumBuilder {
     Expr scaled =
         std::abs(coefficient) == 1 ? term : term * make_const(Int(32), std::abs(coefficient));
     Expr& side = coefficient > 0 ? plus_ : minus_;
-    side = side.defined() ? side + scaled : scaled;
+    add_term(side, scaled);
   }
   Expr finish(int64_t constant) {
     if (!plus_.defined()) {
@@ -332,13 +339,7 @@ class IslToExpr {
       isl_set_free(s);
       isl_aff_free(a);
     };
-    isl_pw_aff_foreach_piece(
-        e,
-        [](isl_set* s, isl_aff* a, void* user) {
-          (*static_cast<decltype(collect)*>(user))(s, a);
-          return isl_stat_ok;
-        },
-        &collect);
+    isl_pw_aff_foreach_piece(e, visit_each<decltype(collect), isl_set, isl_aff>, &collect);
     if (list.empty()) return make_zero(Int(32));
     Expr result = list.back().value;
     for (size_t i = list.size() - 1; i-- > 0;)
@@ -354,13 +355,8 @@ class IslToExpr {
       result = result.defined() ? result || term : term;
       isl_basic_set_free(b);
     };
-    isl_set_foreach_basic_set(
-        explicit_divs,
-        [](isl_basic_set* b, void* user) {
-          (*static_cast<decltype(collect)*>(user))(b);
-          return isl_stat_ok;
-        },
-        &collect);
+    isl_set_foreach_basic_set(explicit_divs, visit_each<decltype(collect), isl_basic_set>,
+                              &collect);
     isl_set_free(explicit_divs);
     return result.defined() ? result : const_false();
   }
@@ -399,19 +395,12 @@ class IslToExpr {
       isl_aff* a = isl_constraint_get_aff(c);
       // The divs' own defining inequalities say nothing new.
       if (!isl_constraint_is_div_constraint(c)) {
-        Expr zero = make_zero(Int(32));
         terms.push_back(isl_constraint_is_equality(c) ? equality(a) : inequality(a));
       }
       isl_aff_free(a);
       isl_constraint_free(c);
     };
-    isl_basic_set_foreach_constraint(
-        b,
-        [](isl_constraint* c, void* user) {
-          (*static_cast<decltype(collect)*>(user))(c);
-          return isl_stat_ok;
-        },
-        &collect);
+    isl_basic_set_foreach_constraint(b, visit_each<decltype(collect), isl_constraint>, &collect);
     return conjunction(terms);
   }
 

@@ -16,9 +16,11 @@
 #include <unordered_map>
 #include <vector>
 
+#include "autodiff/inversion/access_inversion.h"
 #include "autodiff/inversion/isl_budget.h"
 #include "ir/equal.h"
 #include "ir/expr.h"
+#include "ir/node_memo.h"
 
 namespace retrograde::ir {
 
@@ -89,6 +91,8 @@ class IslBridge {
   // `e` as one parameter unless it is affine without pieces: bounds of loops should not split sets.
   isl::pw_aff bound(const Expr& e);
   isl::pw_aff dim(int position) const;
+  // Where each of the dimensions is in its range.
+  std::vector<isl::set> ranges_of(const std::vector<LoopVariable>& dims);
 
   // A sub-expression over the dimensions whose value is known to be fixed: from now on a parameter.
   void make_parameter(const Expr& e) {
@@ -132,8 +136,7 @@ class IslBridge {
   std::map<Expr, std::string, StructuralLess> parameter_names_;
   std::map<std::string, Expr> parameters_;
   std::set<Expr, StructuralLess> fixed_, obstacles_;
-  // Of nodes seen: expressions share them. The Expr keeps its node alive.
-  std::unordered_map<const ExprNode*, std::pair<Expr, std::optional<isl::pw_aff>>> known_;
+  NodeMemo<std::optional<isl::pw_aff>> known_;  // of nodes seen: expressions share them
 };
 
 }  // namespace retrograde::ir

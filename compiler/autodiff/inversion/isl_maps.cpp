@@ -4,6 +4,21 @@
 
 namespace retrograde::ir {
 
+namespace {
+
+isl_space* space_of(isl_ctx* ctx, size_t in, size_t out) {
+  return isl_space_alloc(ctx, 0, static_cast<unsigned>(in), static_cast<unsigned>(out));
+}
+
+}  // namespace
+
+isl::map universe_map(isl_ctx* ctx, size_t in, size_t out) {
+  return isl::manage(isl_map_universe(space_of(ctx, in, out)));
+}
+isl::map empty_map(isl_ctx* ctx, size_t in, size_t out) {
+  return isl::manage(isl_map_empty(space_of(ctx, in, out)));
+}
+
 isl::map only_output(const isl::map& m, int which) {
   int n = isl_map_dim(m.get(), isl_dim_out);
   isl_map* result = m.copy();

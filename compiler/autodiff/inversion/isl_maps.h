@@ -5,6 +5,9 @@
 
 namespace retrograde::ir {
 
+// All pairs of tuples of such lengths, and none of them.
+isl::map universe_map(isl_ctx* ctx, size_t in, size_t out);
+isl::map empty_map(isl_ctx* ctx, size_t in, size_t out);
 // The map with output `which` alone.
 isl::map only_output(const isl::map& m, int which);
 // {in -> (z0..zn-1) : z_which = e(in)}

@@ -54,7 +54,7 @@ std::optional<Points> points_of(const isl::set& s, int64_t most) {
     return isl_set_foreach_point(s.get(), collect, &into) == isl_stat_ok;
   });
   if (!all.value_or(false)) return std::nullopt;
-  std::sort(into.points.begin(), into.points.end());
+  std::ranges::sort(into.points);
   return std::move(into.points);
 }
 

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 
-#include "autodiff/updates/update_context.h"
 #include "ir/build.h"
 #include "ir/print.h"
 #include "ir/visit.h"
@@ -60,7 +59,7 @@ const Inversion& ReadInversions::of(const FuncContents& f, const Symbol& symbol,
 // Null: no such thing.
 const Inversion* ReadInversions::where_selected(const FuncContents& f, const Symbol& symbol,
                                                 AccessQuery query, const Expr& adjoint) {
-  if (std::none_of(query.indices.begin(), query.indices.end(), chooses)) return nullptr;
+  if (std::ranges::none_of(query.indices, chooses)) return nullptr;
   Expr counts = where_it_counts(adjoint);
   if (!counts.defined() || calls(counts, &f)) return nullptr;
   Expr& predicate = query.domain.predicate;

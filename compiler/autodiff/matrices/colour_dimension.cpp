@@ -1,13 +1,15 @@
 #include "autodiff/matrices/colour_dimension.h"
 
+#include <algorithm>
 #include <unordered_map>
 
-#include "autodiff/sweeps/accumulation.h"
+#include "autodiff/sweeps/made_definitions.h"
 #include "diagnostics/error.h"
 #include "frontend/language/var.h"
 #include "graph/define.h"
-#include "graph/function.h"
+#include "graph/own_reads.h"
 #include "ir/build.h"
+#include "ir/lists.h"
 #include "ir/variables.h"
 #include "ir/visit.h"
 
@@ -31,18 +33,14 @@ class Lifter {
 
  private:
   bool depends(const FuncContents& f) const {
-    for (const FuncPtr& callee : direct_callees(f)) {
-      if (lifted_.contains(callee.get())) return true;
-    }
-    return false;
+    return std::ranges::any_of(direct_callees(f),
+                               [&](const FuncPtr& g) { return lifted_.contains(g.get()); });
   }
 
   void lift(const FuncPtr& f) {
     // The pattern of derivatives, which is found before, refuses extern stages.
     if (f->is_extern()) internal_error("an extern stage lies on the way of several seeds");
-    const FuncPtr result = make_func(Role::Coloured);
-    result->name = claim_name(f->name + "_by_colour");
-    result->made->of = f->name;
+    const FuncPtr result = make_func(Role::Coloured, f->name + "_by_colour", f->name);
     if (f->made) result->made->traits = f->made->traits;
     lifted_[f.get()] = result;
     std::vector<Expr> args = variables_of(f->args);
@@ -56,22 +54,14 @@ class Lifter {
   }
 
   std::vector<Expr> map_all(const std::vector<Expr>& list) const {
-    std::vector<Expr> result;
-    for (const Expr& e : list) result.push_back(map(e));
-    return result;
+    return mapped(list, [&](const Expr& e) { return map(e); });
   }
   Expr map(const Expr& root) const {
-    if (!root.defined()) return root;
-    return rewrite(root, [&](const Expr& e, const std::function<Expr(const Expr&)>& recurse) {
-      Expr mapped = map_children(e, recurse);
-      const auto* call = mapped.as<Call>();
-      if (!call || call->call_type != CallType::Func) return mapped;
-      auto found = lifted_.find(call->symbol.raw());
-      if (found == lifted_.end()) return mapped;
-      std::vector<Expr> args = call->args;
+    return map_func_calls(root, [&](const Call& call, std::vector<Expr> args) {
+      auto found = lifted_.find(call.symbol.raw());
+      if (found == lifted_.end()) return Expr();
       args.push_back(colour_);
-      return call_func(found->second->name, call->type, args, call->component,
-                       SymbolRef(found->second));
+      return call_value(found->second, args, call.component);
     });
   }
 

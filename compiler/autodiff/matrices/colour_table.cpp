@@ -5,6 +5,7 @@
 #include "autodiff/inversion/isl_points.h"
 #include "autodiff/matrices/graph_colouring.h"
 #include "ir/build.h"
+#include "ir/lists.h"
 
 namespace retrograde::ir {
 
@@ -67,7 +68,7 @@ Entries numbered(const std::vector<std::vector<int64_t>>& points, const Numberin
 }
 
 void sort_unique(std::vector<int>& list) {
-  std::sort(list.begin(), list.end());
+  std::ranges::sort(list);
   list.erase(std::unique(list.begin(), list.end()), list.end());
 }
 

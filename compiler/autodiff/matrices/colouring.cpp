@@ -14,7 +14,7 @@ constexpr int64_t many_steps = 20'000'000;
 int64_t modulo(int64_t a, int64_t n) { return ((a % n) + n) % n; }
 
 bool is_zero(const std::vector<int64_t>& v) {
-  return std::all_of(v.begin(), v.end(), [](int64_t c) { return c == 0; });
+  return std::ranges::all_of(v, [](int64_t c) { return c == 0; });
 }
 
 class Search {
@@ -23,7 +23,7 @@ class Search {
     for (const auto& d : differences) {
       if (is_zero(d)) continue;
       // d and -d say the same.
-      auto first = std::find_if(d.begin(), d.end(), [](int64_t c) { return c != 0; });
+      auto first = std::ranges::find_if(d, [](int64_t c) { return c != 0; });
       if (*first > 0) differences_.push_back(d);
     }
   }
@@ -31,7 +31,7 @@ class Search {
   // The factors for n colours, in lexicographic order; false when there are none.
   bool find(int64_t n, Colouring& result) {
     result.count = n;
-    std::fill(result.factors.begin(), result.factors.end(), 0);
+    std::ranges::fill(result.factors, 0);
     do {
       if (is_valid(result)) return true;
     } while (steps_ < many_steps && next(result));

@@ -3,12 +3,12 @@
 #include <algorithm>
 
 #include "autodiff/matrices/colour_dimension.h"
-#include "autodiff/sweeps/accumulation.h"
+#include "autodiff/sweeps/made_definitions.h"
 #include "diagnostics/error.h"
 #include "frontend/language/var.h"
 #include "graph/define.h"
-#include "graph/function.h"
 #include "ir/build.h"
+#include "ir/lists.h"
 #include "ir/variables.h"
 #include "ir/visit.h"
 #include "simplify/simplify.h"
@@ -144,9 +144,8 @@ Expr Compressed::seed_value(const std::vector<Expr>& column, const Expr& colour)
 
 FuncPtr Compressed::evaluate() const {
   if (searched([&] { return pattern_.is_empty(); })) return nullptr;
-  auto seeds = make_func(Role::Coloured);
-  seeds->name = claim_name(query_.seed->name + "_by_colour");
-  seeds->made->of = query_.seed->name;
+  const FuncPtr seeds =
+      make_func(Role::Coloured, query_.seed->name + "_by_colour", query_.seed->name);
   seeds->made->traits.masked = true;
   const std::vector<Expr> column = variables_of(query_.seed->args);
   std::vector<Expr> args = column;
@@ -158,9 +157,8 @@ FuncPtr Compressed::evaluate() const {
 Expr Compressed::may_be_nonzero(const std::vector<Expr>& row,
                                 const std::vector<Expr>& column) const {
   std::vector<Expr> names = row;
-  names.insert(names.end(), column.begin(), column.end());
-  std::vector<std::string> dims;
-  for (size_t d = 0; d < names.size(); ++d) dims.push_back("e" + std::to_string(d));
+  append(names, column);
+  const auto dims = numbered(names.size(), [](size_t d) { return "e" + std::to_string(d); });
   return searched([&] {
     return simplify(
         IslBridge(dependence_->context(), dims).to_expr(pattern_.wrap().flatten(), names));

@@ -5,11 +5,10 @@
 #include <set>
 
 #include "autodiff/inversion/isl_maps.h"
-#include "autodiff/sweeps/local_derivative.h"
-#include "autodiff/sweeps/regions.h"
 #include "diagnostics/error.h"
 #include "graph/own_reads.h"
 #include "ir/build.h"
+#include "ir/lets.h"
 #include "ir/memory_reads.h"
 #include "ir/visit.h"
 #include "simplify/simplify.h"
@@ -26,13 +25,6 @@ constexpr size_t many_conditions = 64;
 constexpr int most_compared = 64;
 
 unsigned size_of(size_t n) { return static_cast<unsigned>(n); }
-
-isl::map universe_map(isl_ctx* ctx, size_t in, size_t out) {
-  return isl::manage(isl_map_universe(isl_space_alloc(ctx, 0, size_of(in), size_of(out))));
-}
-isl::map empty_map(isl_ctx* ctx, size_t in, size_t out) {
-  return isl::manage(isl_map_empty(isl_space_alloc(ctx, 0, size_of(in), size_of(out))));
-}
 
 // For any value of the parameters.
 isl::map without_parameters(const isl::map& m) {
@@ -183,8 +175,7 @@ class Composer {
   bool depends(const Symbol* f) const {
     auto found = relations_.find(f);
     return found != relations_.end() &&
-           std::any_of(found->second.begin(), found->second.end(),
-                       [](const isl::map& m) { return !m.is_empty(); });
+           std::ranges::any_of(found->second, [](const isl::map& m) { return !m.is_empty(); });
   }
 
   // One for each value of a Tuple, or one for all where updates may couple them.
@@ -195,8 +186,7 @@ class Composer {
     }
     if (f.is_extern()) refuse_dependent(f);
     std::vector<FuncPtr> callees = direct_callees(f);
-    if (std::none_of(callees.begin(), callees.end(),
-                     [&](const FuncPtr& callee) { return depends(callee.get()); }))
+    if (std::ranges::none_of(callees, [&](const FuncPtr& callee) { return depends(callee.get()); }))
       return {empty_map(context_.ctx, f.args.size(), dims())};
     if (f.is_pure() && f.types.size() > 1) {
       std::vector<isl::map> result;

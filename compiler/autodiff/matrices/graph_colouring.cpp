@@ -11,7 +11,7 @@ namespace {
 std::vector<int> largest_first(const std::vector<size_t>& degrees) {
   std::vector<int> order(degrees.size());
   std::iota(order.begin(), order.end(), 0);
-  std::stable_sort(order.begin(), order.end(), [&](int a, int b) {
+  std::ranges::stable_sort(order, [&](int a, int b) {
     return degrees[static_cast<size_t>(a)] > degrees[static_cast<size_t>(b)];
   });
   return order;

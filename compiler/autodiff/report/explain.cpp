@@ -32,8 +32,8 @@ std::vector<Explanation> of_kind(const std::vector<Explanation>& all, Kind kind)
   for (const Explanation& e : all) {
     if (e.kind == kind && seen.insert(e.subject).second) found.push_back(e);
   }
-  std::stable_sort(found.begin(), found.end(),
-                   [](const Explanation& a, const Explanation& b) { return a.bytes > b.bytes; });
+  std::ranges::stable_sort(
+      found, [](const Explanation& a, const Explanation& b) { return a.bytes > b.bytes; });
   return found;
 }
 
@@ -101,33 +101,10 @@ std::string with_short_names(const std::string& words) {
 }  // namespace
 
 const char* to_string(Explanation::Kind kind) {
-  switch (kind) {
-    case Explanation::Kind::Built:
-      return "built";
-    case Explanation::Kind::Scattered:
-      return "scattered";
-    case Explanation::Kind::Privatised:
-      return "privatised";
-    case Explanation::Kind::Zero:
-      return "zero";
-    case Explanation::Kind::NotRequested:
-      return "not requested";
-    case Explanation::Kind::Version:
-      return "version";
-    case Explanation::Kind::Performance:
-      return "performance";
-    case Explanation::Kind::Stored:
-      return "stored";
-    case Explanation::Kind::Recomputed:
-      return "recomputed";
-    case Explanation::Kind::LeftOut:
-      return "left out";
-    case Explanation::Kind::Cost:
-      return "cost";
-    case Explanation::Kind::Custom:
-      return "custom";
-  }
-  return "";
+  static constexpr const char* words[] = {"built",         "scattered", "privatised",  "zero",
+                                          "not requested", "version",   "performance", "stored",
+                                          "recomputed",    "left out",  "cost",        "custom"};
+  return words[static_cast<int>(kind)];
 }
 
 std::string to_string(const std::vector<Explanation>& explanations, Detail detail) {

@@ -73,8 +73,8 @@ std::optional<double> kept_between(const OperationCount& count,
                                    const std::vector<WantedFunc>& results) {
   double bytes = 0;
   for (const FuncOperations& f : count.funcs) {
-    const bool is_result = std::any_of(results.begin(), results.end(),
-                                       [&](const WantedFunc& w) { return w.func == f.func; });
+    const bool is_result =
+        std::ranges::any_of(results, [&](const WantedFunc& w) { return w.func == f.func; });
     if (is_result || !f.stored) continue;
     if (!f.bytes.value()) return std::nullopt;
     bytes += *f.bytes.value();
@@ -91,8 +91,8 @@ void note_memory(const WantedFunc& output, const std::vector<WantedFunc>& gradie
   if (!own || !more || *more <= 2 * *own) return;
   const FuncOperations* largest = nullptr;
   for (const FuncOperations& f : gradient.funcs) {
-    const bool is_result = std::any_of(gradients.begin(), gradients.end(),
-                                       [&](const WantedFunc& w) { return w.func == f.func; });
+    const bool is_result =
+        std::ranges::any_of(gradients, [&](const WantedFunc& w) { return w.func == f.func; });
     if (is_result || !f.stored) continue;
     if (!largest || *f.bytes.value() > *largest->bytes.value()) largest = &f;
   }

@@ -11,8 +11,8 @@
 #include "autoschedule/cost_estimate.h"
 #include "autoschedule/stored_funcs.h"
 #include "diagnostics/error.h"
-#include "graph/function.h"
 #include "ir/build.h"
+#include "ir/lists.h"
 #include "ir/print.h"
 #include "ir/visit.h"
 #include "simplify/simplify.h"
@@ -60,7 +60,7 @@ Body body_of(const std::vector<Expr>& roots) {
 class Counter {
  public:
   explicit Counter(const std::vector<WantedFunc>& outputs)
-      : outputs_(funcs_of(outputs)),
+      : outputs_(mapped(outputs, &WantedFunc::func)),
         order_(topological_order(outputs_)),
         regions_(order_, regions_of(outputs)) {
     for (const FuncPtr& f : stored_by_default(outputs_)) stored_by_default_.insert(f.get());
@@ -73,11 +73,6 @@ class Counter {
   }
 
  private:
-  static std::vector<FuncPtr> funcs_of(const std::vector<WantedFunc>& outputs) {
-    std::vector<FuncPtr> result;
-    for (const WantedFunc& wanted : outputs) result.push_back(wanted.func);
-    return result;
-  }
   static std::map<const Symbol*, Box> regions_of(const std::vector<WantedFunc>& outputs) {
     std::map<const Symbol*, Box> result;
     for (const WantedFunc& wanted : outputs) {
@@ -90,16 +85,14 @@ class Counter {
   bool is_stored(const FuncPtr& f) const {
     return !f->is_pure() || stored_by_default_.contains(f.get()) ||
            f->schedule.compute_level.kind != LoopLevel::Kind::Inlined ||
-           std::find(outputs_.begin(), outputs_.end(), f) != outputs_.end();
+           std::ranges::find(outputs_, f) != outputs_.end();
   }
 
   void count(const FuncPtr& f) {
     FuncOperations entry{f, regions_.of(f.get()), is_stored(f), {}, {}, {}, f->is_extern()};
     if (entry.stored) {
-      int bytes = 0;
-      for (Type t : f->types) bytes += t.bytes();
       entry.evaluations = elements(entry);
-      entry.bytes = entry.evaluations * bytes;
+      entry.bytes = entry.evaluations * total_bytes(f->types);
     }
     for (int s = 0; s < f->stage_count(); ++s) entry.stages.push_back(count_stage(entry, s));
     if (f->made && !f->made->work.empty()) count_work(entry, f->made->work);
@@ -121,15 +114,13 @@ class Counter {
     if (f.is_extern()) return {};
     const Definition& definition = f.stage(s);
     std::vector<Expr> roots = definition.values;
-    roots.insert(roots.end(), definition.args.begin(), definition.args.end());
+    append(roots, definition.args);
     roots.push_back(definition.predicate);
     StageOperations stage{with_reads(add_body(f, roots)), {}};
     if (!entry.stored) return stage;
     stage.each.moves += static_cast<double>(definition.values.size());
     if (entry.region.empty() && f.dimensions() > 0) return stage;
-    Box box;
-    for (const LoopVariable& v : regions_.domain(f, s).vars) box.push_back({v.min, v.max});
-    stage.iterations = Count::points(box);
+    stage.iterations = Count::points(mapped(regions_.domain(f, s).vars, &LoopVariable::range));
     return stage;
   }
 
@@ -204,7 +195,7 @@ Count Count::points(const Box& box) {
   unknown.unknown_ = true;
   for (const Interval& i : box) {
     if (!i.is_bounded()) return unknown;
-    Expr extent = simplify(i.max - i.min + 1);
+    Expr extent = extent_of(i);
     if (auto constant = as_const_int(extent)) {
       factor *= static_cast<double>(std::max<int64_t>(*constant, 0));
     } else {
@@ -212,7 +203,7 @@ Count Count::points(const Box& box) {
     }
   }
   if (symbols.empty()) return factor;
-  std::sort(symbols.begin(), symbols.end());
+  std::ranges::sort(symbols);
   std::string product;
   for (const std::string& s : symbols) product += (product.empty() ? "" : "*") + s;
   Count result;

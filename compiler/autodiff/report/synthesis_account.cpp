@@ -4,6 +4,7 @@
 
 #include "diagnostics/error.h"
 #include "ir/build.h"
+#include "ir/lists.h"
 #include "simplify/simplify.h"
 
 namespace retrograde::ir {
@@ -12,15 +13,13 @@ namespace {
 
 // ", 96 elements, 384 bytes when stored"; nothing when the region is known at run time only.
 std::string size_text(const FuncContents& f, const std::vector<LoopVariable>& region) {
-  int64_t elements = 1, bytes = 0;
+  int64_t elements = 1;
   for (const LoopVariable& v : region) {
-    auto extent = v.min.defined() && v.max.defined() ? as_const_int(simplify(v.max - v.min + 1))
-                                                     : std::nullopt;
+    auto extent = constant_extent(v.range());
     if (!extent) return "";
     elements *= std::max<int64_t>(*extent, 0);
   }
-  for (Type t : f.types) bytes += t.bytes();
-  return text(", ", elements, " elements, ", elements * bytes, " bytes when stored");
+  return text(", ", elements, " elements, ", elements * total_bytes(f.types), " bytes when stored");
 }
 
 }  // namespace
@@ -33,16 +32,12 @@ void SynthesisAccount::add(Explanation::Kind kind, const std::string& subject,
   lines_.push_back({kind, subject, detail});
 }
 
-void SynthesisAccount::add(const std::vector<Explanation>& lines) {
-  lines_.insert(lines_.end(), lines.begin(), lines.end());
-}
+void SynthesisAccount::add(const std::vector<Explanation>& lines) { append(lines_, lines); }
 
 void SynthesisAccount::built(const AdjointFunc& adjoint, const std::string& primal,
                              const std::vector<LoopVariable>& region) {
   const FuncContents& accumulating = adjoint.accumulator ? *adjoint.accumulator : *adjoint.func;
-  auto stages = [&](Accumulation how) {
-    return std::count(adjoint.stages.begin(), adjoint.stages.end(), how);
-  };
+  auto stages = [&](Accumulation how) { return std::ranges::count(adjoint.stages, how); };
   const auto gathers = stages(Accumulation::Gather), scatters = stages(Accumulation::Scatter),
              privatised = stages(Accumulation::Privatised);
   add(Explanation::Kind::Built, primal,

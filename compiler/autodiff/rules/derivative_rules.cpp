@@ -384,7 +384,8 @@ bool has_poles(const Call& call) {
 bool levels_off(Op op) { return op_info(op).real.levels == Levels::LevelsOff; }
 
 Type adjoint_type(Type type) {
-  return type.bits() < 32 || type.is_bfloat() ? Float(32, type.lanes()) : type;
+  const bool is_kept = type.is_float() && type.bits() >= 32;
+  return is_kept ? type : Float(32, type.lanes());
 }
 
 namespace {

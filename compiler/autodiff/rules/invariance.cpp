@@ -7,7 +7,6 @@
 #include "autodiff/custom_derivative.h"
 #include "autodiff/sweeps/custom_rules.h"
 #include "autodiff/sweeps/local_derivative.h"
-#include "graph/define.h"
 #include "ir/build.h"
 #include "ir/equal.h"
 #include "ir/markers.h"
@@ -153,7 +152,7 @@ Response of_operator(const Call& call, const std::vector<Response>& a) {
     case Op::likely_if_innermost:
       return a[0];
     default:
-      return std::all_of(a.begin(), a.end(), is_constant_kind) ? fixed : unknown;
+      return std::ranges::all_of(a, is_constant_kind) ? fixed : unknown;
   }
 }
 
@@ -201,7 +200,7 @@ Response response_of_node(const Expr& e, FunctionRef<const Response&(const Expr&
   for_each_child(e, [&](const Expr& child) { operands.push_back(of(child)); });
   const auto* call = e.as<Call>();
   if (call && call->call_type == CallType::Operator) return of_operator(*call, operands);
-  return std::all_of(operands.begin(), operands.end(), is_constant_kind) ? fixed : unknown;
+  return std::ranges::all_of(operands, is_constant_kind) ? fixed : unknown;
 }
 
 // What happens to all Funcs when one of them is shifted or scaled.
@@ -222,9 +221,9 @@ class Propagation {
 
  private:
   bool responds(size_t i) const {
-    return std::any_of(
-        reads_[i].begin(), reads_[i].end(),
-        [&](const std::shared_ptr<Symbol>& symbol) { return responses_.contains(symbol.get()); });
+    return std::ranges::any_of(reads_[i], [&](const std::shared_ptr<Symbol>& symbol) {
+      return responses_.contains(symbol.get());
+    });
   }
 
   // False: unknown.
@@ -239,7 +238,7 @@ class Propagation {
       }
       changes = !std::equal(own.begin(), own.end(), before.begin(), same);
     }
-    if (std::all_of(own.begin(), own.end(), is_constant_kind)) responses_.erase(f.get());
+    if (std::ranges::all_of(own, is_constant_kind)) responses_.erase(f.get());
     return true;
   }
 

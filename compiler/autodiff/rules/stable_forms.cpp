@@ -75,7 +75,7 @@ StableForm log_sum_exp(const Expr& sum) {
 // v = log(a / b):  d/da = 1 / a, d/db = -1 / b
 StableForm log_of_quotient(const Expr& e) {
   const auto* quotient = e.as<Div>();
-  if (!quotient || is_const(quotient->b) || !stable_form(e).operands.empty()) return {};
+  if (!quotient || is_const(quotient->b) || stable_form(e).is_found()) return {};
   const Expr one = make_one(e.type());
   return {{quotient->a, quotient->b},
           {{one, Strength::Strong, quotient->a}, {-one, Strength::Strong, quotient->b}}};
@@ -86,7 +86,7 @@ StableForm log_of_quotient(const Expr& e) {
 StableForm share(const Expr& v, const Div& quotient) {
   const Expr &a = quotient.a, &sum = quotient.b;
   std::vector<Expr> terms = terms_of(sum);
-  auto own = std::find_if(terms.begin(), terms.end(), [&](const Expr& t) {
+  auto own = std::ranges::find_if(terms, [&](const Expr& t) {
     const Call* magnitude = as_operator(t, Op::abs);
     return equal(t, a) || (magnitude && equal(magnitude->args[0], a));
   });
@@ -95,12 +95,12 @@ StableForm share(const Expr& v, const Div& quotient) {
   StableForm result;
   auto add = [&](const Expr& e, const Expr& by_argument, const Expr& by_value) {
     const Call* exponential = as_operator(e, Op::exp);
-    result.operands.push_back(exponential ? exponential->args[0] : e);
-    result.partials.push_back(strong(exponential ? by_argument : by_value));
+    result.add(exponential ? exponential->args[0] : e,
+               strong(exponential ? by_argument : by_value));
   };
   Expr rest;
   for (const Expr& t : terms) {
-    rest = rest.defined() ? rest + t : t;
+    add_term(rest, t);
     if (!is_const(t)) add(t, -(v * ratio(t, sum)), -(v / sum));
   }
   add(a, v * ratio(rest, sum), ratio(rest, sum) / sum);
@@ -119,14 +119,14 @@ std::vector<Coefficients> coefficients_of(const Div& quotient) {
   auto add = [&](const SignedTerm& t, double Coefficients::*side) {
     const auto constant = as_const_float(t.value);
     const Expr term = constant ? make_one(t.value.type()) : t.value;
-    auto known = std::find_if(result.begin(), result.end(),
-                              [&](const Coefficients& c) { return equal(c.term, term); });
+    auto known =
+        std::ranges::find_if(result, [&](const Coefficients& c) { return equal(c.term, term); });
     if (known == result.end()) known = result.insert(result.end(), {term, 0, 0});
     (*known).*side += t.sign * constant.value_or(1);
   };
   for (const SignedTerm& t : signed_terms_of(quotient.a)) add(t, &Coefficients::above);
   for (const SignedTerm& t : signed_terms_of(quotient.b)) add(t, &Coefficients::below);
-  const bool is_common = std::any_of(result.begin(), result.end(), [](const Coefficients& c) {
+  const bool is_common = std::ranges::any_of(result, [](const Coefficients& c) {
     return !is_const(c.term) && c.above != 0 && c.below != 0;
   });
   return is_common ? result : std::vector<Coefficients>{};
@@ -143,13 +143,12 @@ StableForm ratio_of_sums(const Div& quotient) {
     for (const Coefficients& u : terms) {
       const double c = t.above * u.below - t.below * u.above;
       if (c == 0) continue;
-      Expr share = make_const(t.term.type(), c) * ratio(u.term, quotient.b);
-      sum = sum.defined() ? sum + share : share;
+      add_term(sum, make_const(t.term.type(), c) * ratio(u.term, quotient.b));
     }
     if (!sum.defined()) continue;
     const Call* e = as_operator(t.term, Op::exp);
-    result.operands.push_back(e ? e->args[0] : t.term);
-    result.partials.push_back(strong(e ? sum * ratio(t.term, quotient.b) : sum / quotient.b));
+    result.add(e ? e->args[0] : t.term,
+               strong(e ? sum * ratio(t.term, quotient.b) : sum / quotient.b));
   }
   return result;
 }
@@ -157,7 +156,7 @@ StableForm ratio_of_sums(const Div& quotient) {
 StableForm of_quotient(const Expr& e, const Div& quotient) {
   for (const StableForm& form : {share(e, quotient), ratio_of_sums(quotient), logistic(e, quotient),
                                  normalised_form(e), quotient_form(e, quotient)}) {
-    if (!form.operands.empty()) return form;
+    if (form.is_found()) return form;
   }
   return {};
 }
@@ -196,14 +195,13 @@ StableForm entropy(const Expr& factor, const Expr& logarithm) {
   const Expr scale = make_const(p.type(), *c);
   StableForm result{{p}, {strong(scale * (logarithm + make_one(p.type())))}};
   if (is_relative && !is_const(quotient->b)) {
-    result.operands.push_back(quotient->b);
-    result.partials.push_back(strong(-(scale * log->args[0])));
+    result.add(quotient->b, strong(-(scale * log->args[0])));
   }
   return result;
 }
 StableForm of_product(const Mul& product) {
   const StableForm form = entropy(product.a, product.b);
-  return form.operands.empty() ? entropy(product.b, product.a) : form;
+  return !form.is_found() ? entropy(product.b, product.a) : form;
 }
 
 // ---- max(a, b) + log(1 + exp(-|a - b|)) ----
@@ -232,13 +230,12 @@ bool is_decay_by(const Expr& e, const Expr& a, const Expr& b) {
 // -min(a, b) for the maximum: of -a and -b.
 StableForm smooth_maximum(const Expr& sum) {
   std::vector<SignedTerm> terms = signed_terms_of(sum);
-  const auto logarithm = std::find_if(terms.begin(), terms.end(), [](const SignedTerm& t) {
-    return t.sign > 0 && decay_of(t.value).defined();
-  });
+  const auto logarithm = std::ranges::find_if(
+      terms, [](const SignedTerm& t) { return t.sign > 0 && decay_of(t.value).defined(); });
   if (logarithm == terms.end()) return {};
   const Expr decay = decay_of(logarithm->value);
   terms.erase(logarithm);
-  const auto extreme = std::find_if(terms.begin(), terms.end(), [&](const SignedTerm& t) {
+  const auto extreme = std::ranges::find_if(terms, [&](const SignedTerm& t) {
     const auto* pair = t.value.as<Binary>();
     return pair && pair->kind == (t.sign > 0 ? Kind::Max : Kind::Min) &&
            is_decay_by(decay, pair->a, pair->b);
@@ -248,9 +245,7 @@ StableForm smooth_maximum(const Expr& sum) {
   terms.erase(extreme);
   StableForm result;
   auto add = [&](const Expr& operand, const Partial& partial) {
-    if (is_const(operand)) return;
-    result.operands.push_back(operand);
-    result.partials.push_back(partial);
+    if (!is_const(operand)) result.add(operand, partial);
   };
   const Expr one = make_one(sum.type()), sign = make_const(sum.type(), pair.sign);
   auto add_logistic = [&](const Expr& x, const Expr& y) {
@@ -270,8 +265,8 @@ StableForm sum_that_cancels(const Expr& sum) {
   bool cancels = false;
   for (const SignedTerm& t : signed_terms_of(sum)) {
     if (is_const(t.value)) continue;
-    auto known = std::find_if(distinct.begin(), distinct.end(),
-                              [&](const SignedTerm& d) { return equal(d.value, t.value); });
+    auto known = std::ranges::find_if(distinct,
+                                      [&](const SignedTerm& d) { return equal(d.value, t.value); });
     if (known == distinct.end()) known = distinct.insert(distinct.end(), {t.value, 0});
     known->sign += t.sign;
     cancels |= known->sign == 0;
@@ -279,8 +274,7 @@ StableForm sum_that_cancels(const Expr& sum) {
   StableForm result;
   if (!cancels) return result;
   for (const SignedTerm& t : distinct) {
-    result.operands.push_back(t.value);
-    result.partials.push_back({t.sign == 0 ? Expr() : make_const(sum.type(), t.sign)});
+    result.add(t.value, {t.sign == 0 ? Expr() : make_const(sum.type(), t.sign)});
   }
   return result;
 }
@@ -292,19 +286,19 @@ StableForm stable_form(const Expr& e) {
   if (const auto* quotient = e.as<Div>()) return of_quotient(e, *quotient);
   if (e.as<Add>() || e.as<Sub>()) {
     const StableForm form = smooth_maximum(e);
-    return form.operands.empty() ? sum_that_cancels(e) : form;
+    return !form.is_found() ? sum_that_cancels(e) : form;
   }
   if (const Call* log = as_operator(e, Op::log)) {
     const StableForm quotient = log_of_quotient(log->args[0]);
-    return quotient.operands.empty() ? log_sum_exp(log->args[0]) : quotient;
+    return !quotient.is_found() ? log_sum_exp(log->args[0]) : quotient;
   }
   if (const auto* product = e.as<Mul>()) {
     const StableForm form = of_product(*product);
-    if (!form.operands.empty()) return form;
+    if (form.is_found()) return form;
   }
   if (const Call* arctangent = as_operator(e, Op::atan)) return angle(arctangent->args[0]);
   const StableForm norm = norm_form(e);
-  return norm.operands.empty() ? normalised_form(e) : norm;
+  return !norm.is_found() ? normalised_form(e) : norm;
 }
 
 }  // namespace retrograde::ir

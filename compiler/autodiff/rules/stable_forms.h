@@ -31,6 +31,12 @@ namespace retrograde::ir {
 struct StableForm {
   std::vector<Expr> operands;  // inner expressions; empty: `e` has none of the shapes
   std::vector<Partial> partials;
+
+  bool is_found() const { return !operands.empty(); }
+  void add(const Expr& operand, const Partial& partial) {
+    operands.push_back(operand);
+    partials.push_back(partial);
+  }
 };
 StableForm stable_form(const Expr& e);
 

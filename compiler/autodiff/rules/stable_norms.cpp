@@ -60,8 +60,7 @@ Polar polar(const std::vector<Expr>& a) {
   Polar result{{}, scale, {}};
   for (const Expr& e : a) {
     result.u.push_back(e / scale);
-    Expr square = result.u.back() * result.u.back();
-    squares = squares.defined() ? squares + square : square;
+    add_term(squares, result.u.back() * result.u.back());
   }
   result.inverse = make_one(scale.type()) / call_op(Op::sqrt, {squares});
   for (Expr& e : result.u) e = make_select(at_origin, zero, e * result.inverse);
@@ -84,15 +83,14 @@ StableForm form_of(const Normalised& v) {
   const Polar p = polar(v.a);
   StableForm result;
   auto add = [&](size_t j, const Expr& above, const Expr& below) {
-    result.operands.push_back(v.a[j]);
-    result.partials.push_back(
-        strong(v.floor.defined() ? make_select(v.norm > v.floor, above, below) : above));
+    result.add(v.a[j],
+               strong(v.floor.defined() ? make_select(v.norm > v.floor, above, below) : above));
   };
   Expr others, zero = make_zero(v.component.type());
   for (size_t j = 0; j < v.a.size(); ++j) {
     if (j == own) continue;
     Expr scaled = p.over_length(p.u[j]);
-    others = others.defined() ? others + scaled * p.u[j] : scaled * p.u[j];
+    add_term(others, scaled * p.u[j]);
     if (!is_const(v.a[j])) add(j, -(scaled * p.u[own]), zero);
   }
   add(own, others, v.floor.defined() ? make_one(zero.type()) / v.floor : zero);
@@ -127,8 +125,7 @@ StableForm of_reciprocal(const Expr& e) {
   for (size_t i = 0; i < a.size(); ++i) {
     if (is_const(a[i])) continue;
     const Expr partial = -p.over_length(p.over_length(p.u[i]));
-    result.operands.push_back(a[i]);
-    result.partials.push_back(strong(make_select(infinite, make_zero(e.type()), partial)));
+    result.add(a[i], strong(make_select(infinite, make_zero(e.type()), partial)));
   }
   return result;
 }
@@ -139,10 +136,8 @@ StableForm of_reciprocal(const Expr& e) {
 StableForm norm_form(const Expr& e) {
   const Call* root = as_operator(e, Op::sqrt);
   StableForm result{root ? components_of(root->args[0]) : std::vector<Expr>{}, {}};
-  if (std::any_of(result.operands.begin(), result.operands.end(),
-                  [](const Expr& a) { return is_const(a); }))
-    return {};
-  if (result.operands.empty()) return {};
+  if (std::ranges::any_of(result.operands, [](const Expr& a) { return is_const(a); })) return {};
+  if (!result.is_found()) return {};
   for (const Expr& component : unit_vector(result.operands))
     result.partials.push_back(strong(component));
   return result;
@@ -153,10 +148,10 @@ StableForm normalised_form(const Expr& e) {
   if (const auto* quotient = e.as<Div>()) result = of_quotient(*quotient);
   if (const auto* product = e.as<Mul>()) {
     result = form_of({product->a, components_of_reciprocal(product->b), {}, {}});
-    if (result.operands.empty())
+    if (!result.is_found())
       result = form_of({product->b, components_of_reciprocal(product->a), {}, {}});
   }
-  return result.operands.empty() ? of_reciprocal(e) : result;
+  return !result.is_found() ? of_reciprocal(e) : result;
 }
 
 std::vector<Expr> unit_vector(const std::vector<Expr>& a) { return polar(a).u; }

@@ -112,7 +112,7 @@ StableForm sine_quotient(const Expr& v, const Div& quotient) {
 
 StableForm quotient_form(const Expr& e, const Div& quotient) {
   const StableForm sine = sine_quotient(e, quotient);
-  return sine.operands.empty() ? vanishing_quotient(e, quotient) : sine;
+  return !sine.is_found() ? vanishing_quotient(e, quotient) : sine;
 }
 
 }  // namespace retrograde::ir

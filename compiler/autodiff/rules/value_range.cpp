@@ -6,6 +6,7 @@
 #include "autodiff/sweeps/local_derivative.h"
 #include "ir/build.h"
 #include "ir/equal.h"
+#include "ir/lists.h"
 
 namespace retrograde::ir {
 
@@ -15,15 +16,15 @@ constexpr double inf = std::numeric_limits<double>::infinity();
 constexpr double largest_exponent = 88;  // of exp in float32
 
 ValueRange between(double min, double max, bool infinite = false) {
-  return {min, max, infinite && (min == -inf || max == inf)};
+  return {{min, max}, infinite && (min == -inf || max == inf)};
 }
 ValueRange constant(double value) {
   return std::isnan(value) ? ValueRange{} : between(value, value, std::isinf(value));
 }
 ValueRange joined(const ValueRange& a, const ValueRange& b) {
-  return {std::min(a.min, b.min), std::max(a.max, b.max), a.infinite || b.infinite};
+  return {hull<double>(a, b), a.infinite || b.infinite};
 }
-bool excludes_zero(const ValueRange& a) { return a.min > 0 || a.max < 0; }
+bool excludes_zero(const ValueRange& a) { return !a.contains(0); }
 
 // The ends where an operation has them; NaN: no bound.
 ValueRange from_ends(double low, double high, bool infinite) {
@@ -33,7 +34,7 @@ ValueRange from_ends(double low, double high, bool infinite) {
 ValueRange sum(const ValueRange& a, const ValueRange& b) {
   return from_ends(a.min + b.min, a.max + b.max, a.infinite || b.infinite);
 }
-ValueRange negated(const ValueRange& a) { return {-a.max, -a.min, a.infinite}; }
+ValueRange negated(const ValueRange& a) { return {{-a.max, -a.min}, a.infinite}; }
 
 ValueRange product(const ValueRange& a, const ValueRange& b) {
   double low = inf, high = -inf;
@@ -53,7 +54,7 @@ ValueRange square(const ValueRange& a) {
 }
 // 0 may be -0: a quotient by it has either sign.
 ValueRange quotient(const ValueRange& a, const ValueRange& b) {
-  if (!excludes_zero(b)) return {-inf, inf, true};
+  if (!excludes_zero(b)) return {{}, true};
   return product(a, between(1 / b.max, 1 / b.min));
 }
 
@@ -199,9 +200,7 @@ ValueRange ValueRanges::of(const Expr& e) const {
 }
 
 std::vector<ValueRange> ValueRanges::of_stage(const Definition& stage) const {
-  std::vector<ValueRange> result;
-  for (const Expr& value : stage.values) result.push_back(of(without_lets(value)));
-  return result;
+  return mapped(stage.values, [&](const Expr& value) { return of(without_lets(value)); });
 }
 
 void ValueRanges::add(const FuncPtr& f) {

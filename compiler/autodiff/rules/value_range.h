@@ -9,17 +9,15 @@
 // again until nothing grows, where a bound that grows goes to 0, then to infinity.
 #pragma once
 
-#include <limits>
 #include <unordered_map>
 #include <vector>
 
 #include "graph/function.h"
+#include "ir/interval.h"
 
 namespace retrograde::ir {
 
-struct ValueRange {
-  double min = -std::numeric_limits<double>::infinity();
-  double max = std::numeric_limits<double>::infinity();
+struct ValueRange : IntervalOf<double> {
   bool infinite = false;  // -inf if `min` is -inf, inf if `max` is inf
   bool operator==(const ValueRange& other) const = default;
 };

@@ -1,9 +1,8 @@
 // From contributions to a Func: the adjoint of one target.
 //
 // Contributions that reach each element at most once make the pure definition, a sum. The others
-// become update definitions; those with the same left-hand side, reduction domain and predicate
-// share one. So do short gathers whose predicates differ in borders alone: these become selects. Scatters over one domain, as those to the corners of the cell in which a pixel is read,
-// are the taps of one update, over its domain and then over them. Who owns an element:
+// become update definitions, which those share that can (taps.h); so do short gathers whose
+// predicates differ in borders alone: these become selects. Who owns an element:
 //   gather      each element is written by the iterations of its own pure variables only: race-free
 //               in parallel.
 //   scatter     an index depends on data: serial inside each element of the pure dimensions; places
@@ -13,7 +12,8 @@
 //               Func of their own, and are then summed in order. Lanes alone where the elements are
 //               more, in rows shorter than a vector. A scatter has lanes where its elements are
 //               few. The parts are as many as fit a budget of bytes, whatever the number of
-//               threads, on which the result does not depend. Where fewer than four fit, a scatter.
+//               threads, on which the result does not depend. Where fewer than four fit, a scatter
+//               (private_parts.h).
 //
 // Long sums. Adding n float32 terms one after the other may lose log2(n) bits: 12 million times 0.1
 // is wrong by a tenth. An adjoint in float32 that sums many_terms iterations or more for an element
@@ -65,12 +65,5 @@ struct AdjointFunc {
 AdjointFunc make_adjoint(const AdjointTarget& target, const std::string& name,
                          const std::vector<Contribution>& contributions,
                          const std::vector<Expr>& initial = {});
-
-// f(args) <- values over the reduction variables, where predicate. As an update written by a user,
-// but the domain need not be mentioned. Calls of `f` in it become weak.
-void append_update(const FuncPtr& f, std::vector<Expr> args, std::vector<Expr> values,
-                   const std::vector<ReductionVariable>& rvars, Expr predicate);
-// A call of value `index` of f.
-Expr call_value(const FuncPtr& f, const std::vector<Expr>& args, int index);
 
 }  // namespace retrograde::ir

@@ -55,7 +55,7 @@ bool ActiveSymbols::passes_on(const FuncContents& f) const {
   }
   if (f.custom_derivatives || f.is_extern()) {
     const auto read = read_by(f);
-    if (std::any_of(read.begin(), read.end(), is_active)) return true;
+    if (std::ranges::any_of(read, is_active)) return true;
   }
   bool found = false;
   for (int s = 0; s < f.stage_count() && !found; ++s) found = reads_active(f.stage(s));

@@ -2,10 +2,11 @@
 
 #include <algorithm>
 
-#include "autodiff/sweeps/accumulation.h"
+#include "autodiff/sweeps/made_definitions.h"
 #include "graph/define.h"
 #include "graph/names.h"
 #include "ir/build.h"
+#include "ir/lists.h"
 #include "simplify/simplify.h"
 
 namespace retrograde::ir {
@@ -42,43 +43,28 @@ class Cutter {
         keep_outside(r);
       }
     }
-    freeze(inner_, inside_);
-    freeze(outer_, outside_);
   }
 
-  bool is_worth_while() const { return !outer_.empty() && terms_ >= least_terms; }
-  const std::vector<ReductionVariable>& inner() const { return inner_; }
-  const std::vector<ReductionVariable>& outer() const { return outer_; }
+  bool is_worth_while() const { return !outer().empty() && terms_ >= least_terms; }
+  const std::vector<ReductionVariable>& inner() const { return inside_->vars; }
+  const std::vector<ReductionVariable>& outer() const { return outside_->vars; }
   const std::vector<Expr>& conditions() const { return conditions_; }
   const std::vector<Expr>& numbers() const { return numbers_; }  // of blocks: Vars of the block's
   const Substitution& place() const { return place_; }
   std::vector<Expr> places_outside() const {
-    std::vector<Expr> places;
-    for (const ReductionVariable& r : outer_)
-      places.push_back(variable(r.var, Int(32), SymbolRef(outside_)));
-    return places;
+    return mapped(outer(), [&](const auto& r) { return loop_variable(outside_, r.var); });
   }
 
  private:
-  using Domain = std::shared_ptr<ReductionDomainContents>;
-
-  static void freeze(const std::vector<ReductionVariable>& rvars, const Domain& domain) {
-    domain->vars = rvars;
-    domain->frozen = true;
-  }
-  Expr add_inside(const std::string& name, const Expr& min, const Expr& extent) {
-    inner_.push_back({unique_name(name), min, extent});
-    return variable(inner_.back().var, Int(32), SymbolRef(inside_));
-  }
   Expr add_outside(const std::string& name, const Expr& min, const Expr& extent) {
-    outer_.push_back({unique_name(name), min, extent});
+    add_loop(outside_, name, min, extent);
     const std::string loop = without_numbers(name);
     numbers_.push_back(variable(unique_name(loop.substr(loop.rfind('.') + 1) + "_block")));
     return numbers_.back();
   }
 
   void keep_inside(const ReductionVariable& r, int64_t extent) {
-    place_[r.var] = add_inside(r.var, r.min, r.extent);
+    place_[r.var] = add_loop(inside_, r.var, r.min, r.extent);
     terms_ *= extent;
   }
   void keep_outside(const ReductionVariable& r) {
@@ -89,7 +75,7 @@ class Cutter {
     const Expr all = make_const(Int(32), extent), each = make_const(Int(32), size);
     const Expr number =
         add_outside(r.var, make_zero(Int(32)), make_const(Int(32), (extent + size - 1) / size));
-    Expr at = number * each + add_inside(r.var, make_zero(Int(32)), each);
+    Expr at = number * each + add_loop(inside_, r.var, make_zero(Int(32)), each);
     if (extent % size != 0) {
       conditions_.push_back(likely(at < all));
       at = binary(Kind::Min, likely(at), all - 1);
@@ -98,9 +84,7 @@ class Cutter {
     terms_ *= size;
   }
 
-  const Domain inside_ = std::make_shared<ReductionDomainContents>();
-  const Domain outside_ = std::make_shared<ReductionDomainContents>();
-  std::vector<ReductionVariable> inner_, outer_;
+  const DomainPtr inside_ = make_domain(), outside_ = make_domain();
   std::vector<Expr> numbers_, conditions_;
   Substitution place_;
   int64_t terms_ = 1;
@@ -120,29 +104,22 @@ std::optional<SumOfBlocks> sum_in_blocks(const std::string& name, const std::str
                                          const std::vector<Expr>& terms, const Expr& predicate) {
   const Cutter cut(rvars);
   if (!cut.is_worth_while()) return {};
-  SumOfBlocks result{make_func(Role::Accumulator), cut.outer(), {}};
-  const FuncPtr& block = result.block;
-  block->made->of = of;
+  const FuncPtr block = make_func(Role::Accumulator, name + "_block", of);
   block->made->blocks = static_cast<int>(cut.numbers().size());
-  block->name = claim_name(name + "_block");
-  std::vector<Expr> args = point, zeros, values;
-  args.insert(args.end(), cut.numbers().begin(), cut.numbers().end());
-  for (const Expr& term : terms)
-    zeros.push_back(make_zero(term.defined() ? term.type() : Float(32)));
-  define_pure(block, args, zeros);
-  for (size_t k = 0; k < terms.size(); ++k) {
-    const Expr self = call_value(block, args, static_cast<int>(k));
-    values.push_back(terms[k].defined() ? self + substitute(terms[k], cut.place()) : self);
-  }
+  std::vector<Expr> args = point, place = point;
+  append(args, cut.numbers());
+  append(place, cut.places_outside());
+  define_pure(block, args, mapped(terms, [](const Expr& term) {
+                return make_zero(term.defined() ? term.type() : Float(32));
+              }));
+  const auto here = [&](const Expr& e) { return e.defined() ? substitute(e, cut.place()) : e; };
   std::vector<Expr> conditions = cut.conditions();
-  if (predicate.defined()) conditions.push_back(substitute(predicate, cut.place()));
-  append_update(block, args, values, cut.inner(), conjunction(conditions));
-  std::vector<Expr> place = point;
-  const std::vector<Expr> numbers = cut.places_outside();
-  place.insert(place.end(), numbers.begin(), numbers.end());
-  for (size_t k = 0; k < terms.size(); ++k)
-    result.values.push_back(terms[k].defined() ? call_value(block, place, static_cast<int>(k))
-                                               : Expr());
+  if (predicate.defined()) conditions.push_back(here(predicate));
+  append_sums(block, args, mapped(terms, here), cut.inner(), conjunction(conditions));
+  SumOfBlocks result{block, cut.outer(), values_of(block, place)};
+  for (size_t k = 0; k < terms.size(); ++k) {
+    if (!terms[k].defined()) result.values[k] = Expr();
+  }
   return result;
 }
 

@@ -4,10 +4,10 @@
 #include <cmath>
 #include <unordered_map>
 
-#include "autodiff/sweeps/accumulation.h"
-#include "autodiff/updates/versions.h"
+#include "autodiff/sweeps/made_definitions.h"
 #include "graph/own_reads.h"
 #include "ir/build.h"
+#include "ir/node_memo.h"
 
 namespace retrograde::ir {
 
@@ -75,9 +75,8 @@ class Factors {
   explicit Factors(const FuncContents* carried) : carried_(carried) {}
 
   std::optional<double> of(const Expr& term) {
-    auto known = known_.find(term.get());
-    if (known != known_.end()) return known->second;
-    return known_[term.get()] = calls(term, carried_) ? of_linear(as_linear(term, carried_)) : 0;
+    return known_.get(
+        term, [&] { return calls(term, carried_) ? of_linear(as_linear(term, carried_)) : 0; });
   }
 
  private:
@@ -99,7 +98,7 @@ class Factors {
   }
 
   const FuncContents* carried_;
-  std::unordered_map<const ExprNode*, std::optional<double>> known_;
+  NodeMemo<std::optional<double>> known_;
 };
 
 class InDouble {
@@ -107,9 +106,8 @@ class InDouble {
   InDouble(const FuncPtr& rounded, const FuncPtr& exact) : rounded_(rounded), exact_(exact) {}
 
   Expr of(const Expr& term) {
-    auto known = known_.find(term.get());
-    if (known != known_.end()) return known->second;
-    return known_[term.get()] = calls(term, rounded_.get()) ? of_linear(term) : cast_to(wide, term);
+    return known_.get(
+        term, [&] { return calls(term, rounded_.get()) ? of_linear(term) : cast_to(wide, term); });
   }
 
  private:
@@ -143,7 +141,7 @@ class InDouble {
   }
 
   const FuncPtr &rounded_, &exact_;
-  std::unordered_map<const ExprNode*, Expr> known_;
+  NodeMemo<Expr> known_;
 };
 
 }  // namespace

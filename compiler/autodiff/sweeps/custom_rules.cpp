@@ -4,13 +4,16 @@
 #include <unordered_set>
 
 #include "autodiff/rules/derivative_rules.h"
-#include "autodiff/sweeps/accumulation.h"
 #include "autodiff/sweeps/input_shape.h"
+#include "autodiff/sweeps/made_definitions.h"
 #include "diagnostics/error.h"
 #include "frontend/language/var.h"
 #include "graph/define.h"
 #include "graph/function.h"
+#include "graph/names.h"
 #include "ir/build.h"
+#include "ir/lists.h"
+#include "ir/variables.h"
 #include "simplify/simplify.h"
 
 namespace retrograde::ir {
@@ -18,8 +21,8 @@ namespace retrograde::ir {
 namespace {
 
 bool is_among(const std::vector<AdjointInput>& inputs, const Symbol* symbol) {
-  return std::any_of(inputs.begin(), inputs.end(),
-                     [&](const AdjointInput& i) { return i.symbol().get() == symbol; });
+  return std::ranges::any_of(inputs,
+                             [&](const AdjointInput& i) { return i.symbol().get() == symbol; });
 }
 
 // Functions of their arguments' values only: facts of a buffer's shape are no reads of it.
@@ -62,12 +65,9 @@ class Readers {
 };
 
 Region region_of(const Box& box) {
-  Region region;
-  for (const Interval& i : box) {
-    region.push_back(
-        {i.min, i.min.defined() && i.max.defined() ? simplify(i.max - i.min + 1) : Expr()});
-  }
-  return region;
+  return mapped(box, [](const Interval& i) {
+    return Range{i.min, i.is_bounded() ? extent_of(i) : Expr()};
+  });
 }
 
 std::string asked_through(const FuncContents& f) {
@@ -124,22 +124,15 @@ void check_contributions(const FuncContents& f, const std::vector<AdjointContrib
   }
 }
 
-std::vector<Expr> arguments(int n) {
-  std::vector<Expr> args;
-  for (int d = 0; d < n; ++d) args.push_back(variable("_" + std::to_string(d)));
-  return args;
-}
-
 // `given` as an adjoint. Nothing is known of the rule: what it gives may be exactly 0 where the
 // partials of the input are infinite, and infinite where they are 0.
 FuncPtr as_adjoint(const std::string& name, const FuncPtr& given) {
   FuncPtr result = make_func(Role::CustomRule, name);
   result->made->traits = {.masked = true, .singular = true};
-  std::vector<Expr> args = arguments(given->dimensions()), values;
-  for (size_t k = 0; k < given->types.size(); ++k)
-    values.push_back(
-        cast_to(adjoint_type(given->types[k]), call_value(given, args, static_cast<int>(k))));
-  define_pure(result, args, values);
+  const std::vector<Expr> args = variables_of(implicit_names(given->dimensions()));
+  define_pure(result, args, mapped(values_of(given, args), [](const Expr& value) {
+                return cast_to(adjoint_type(value.type()), value);
+              }));
   return result;
 }
 
@@ -256,12 +249,9 @@ FuncPtr run_custom_tangent(const FuncPtr& f, FunctionRef<FuncPtr(const Symbol*)>
 
 FuncPtr zero_derivative(const Symbol& symbol, const std::string& suffix) {
   InputShape shape = shape_of(&symbol);
-  FuncPtr zero = make_func(Role::CustomRule, shape.name + suffix);
-  zero->made->of = shape.name;
-  std::vector<Expr> values;
-  for (Type t : shape.types)
-    values.push_back(make_zero(t.is_float() ? adjoint_type(t) : Float(32)));
-  define_pure(zero, arguments(shape.dimensions), values);
+  FuncPtr zero = make_func(Role::CustomRule, shape.name + suffix, shape.name);
+  define_pure(zero, variables_of(implicit_names(shape.dimensions)),
+              mapped(shape.types, [](Type t) { return make_zero(adjoint_type(t)); }));
   return zero;
 }
 

@@ -98,7 +98,7 @@ class ForwardSweep {
       if (!t.defined() || !local.partials[i].factor.defined()) continue;
       Expr term = cast_to(type, times_partial(t, partial_of(local, i, e)));
       if (is_zero(term)) continue;
-      sum = sum.defined() ? sum + term : term;
+      add_term(sum, term);
     }
     return sum;
   }

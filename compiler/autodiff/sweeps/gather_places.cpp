@@ -17,9 +17,7 @@ Gather with_few_elements_pure(Gather g, const AdjointTarget& target) {
   if (g.rdom || g.scatters || target.region.size() != g.lhs.size()) return g;
   for (size_t d = 0; d < g.lhs.size(); ++d) {
     if (g.pure[d]) continue;
-    const LoopVariable& v = target.region[d];
-    if (!v.min.defined() || !v.max.defined()) continue;
-    auto extent = as_const_int(simplify(v.max - v.min + 1));
+    auto extent = constant_extent(target.region[d].range());
     if (!extent || *extent > few) continue;
     Expr arg = variable(target.args[d]);
     Expr here = arg == g.lhs[d];
@@ -33,10 +31,9 @@ Gather with_few_elements_pure(Gather g, const AdjointTarget& target) {
 // Of parameters only: the same all over the stage.
 bool is_fixed_place(const Expr& e, const Gather& g, const AdjointTarget& target) {
   auto varies = [&](const std::string& name) { return uses_variable(e, name); };
-  if (depends_on_data(e) || std::any_of(target.args.begin(), target.args.end(), varies))
-    return false;
-  return !g.rdom || std::none_of(g.rdom->vars.begin(), g.rdom->vars.end(),
-                                 [&](const ReductionVariable& r) { return varies(r.var); });
+  if (depends_on_data(e) || std::ranges::any_of(target.args, varies)) return false;
+  return !g.rdom || std::ranges::none_of(g.rdom->vars,
+                                         [&](const ReductionVariable& r) { return varies(r.var); });
 }
 
 // A piece of an inverted access may add to one place, as image_adj(p), under a predicate that is

@@ -7,10 +7,17 @@
 namespace retrograde::ir {
 
 bool is_floating(const std::vector<Type>& types) {
-  return std::any_of(types.begin(), types.end(), [](Type t) { return t.is_float(); });
+  return std::ranges::any_of(types, [](Type t) { return t.is_float(); });
 }
 
 bool InputShape::is_floating() const { return ir::is_floating(types); }
+
+void check_is_floating(const std::string& asked, const std::vector<Type>& types,
+                       const std::string& whose, const std::string& what_to_do) {
+  if (is_floating(types)) return;
+  user_error(asked, "only floating-point values have derivatives",
+             text(whose, " ", to_string(types[0])), what_to_do);
+}
 
 InputShape shape_of(const Symbol* symbol) {
   if (const auto* p = dynamic_cast<const ParameterContents*>(symbol))

@@ -18,6 +18,9 @@ struct InputShape {
 InputShape shape_of(const Symbol* symbol);
 
 bool is_floating(const std::vector<Type>& types);
+// CompileError unless some value is a float. `whose`: the message's subject, as "its type".
+void check_is_floating(const std::string& asked, const std::vector<Type>& types,
+                       const std::string& whose, const std::string& what_to_do);
 
 // CompileError unless `given` is defined, with the dimensions and the number of values of `shape`,
 // all of them floats. `what`: "a direction"; `of`: what the message calls the input.

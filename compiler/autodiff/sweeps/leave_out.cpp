@@ -1,7 +1,5 @@
 #include "autodiff/sweeps/leave_out.h"
 
-#include <algorithm>
-
 #include "autodiff/time/overwrite_time.h"
 #include "diagnostics/error.h"
 

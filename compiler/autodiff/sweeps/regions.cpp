@@ -1,24 +1,28 @@
 #include "autodiff/sweeps/regions.h"
 
+#include <algorithm>
+
 #include "autodiff/sweeps/custom_rules.h"
-#include "autodiff/sweeps/reverse_sweep.h"
 #include "graph/own_reads.h"
 #include "ir/build.h"
-#include "ir/equal.h"
+#include "ir/lets.h"
 #include "simplify/simplify.h"
 
 namespace retrograde::ir {
 
 namespace {
 
-Scope<Interval> scope_of(const FuncContents& f, const Definition& definition, const Box& box) {
-  Scope<Interval> scope;
+// Pure variables, then reduction variables.
+std::vector<LoopVariable> loops_of(const FuncContents& f, const Definition& definition,
+                                   const Box& box) {
+  std::vector<LoopVariable> loops;
   for (size_t d = 0; d < f.args.size(); ++d) {
-    if (is_pure_position(f, definition, d)) scope.push(f.args[d], box.at(d));
+    if (is_pure_position(f, definition, d))
+      loops.push_back({f.args[d], box.at(d).min, box.at(d).max, false});
   }
   for (const ReductionVariable& r : definition.rvars)
-    scope.push(r.var, {r.min, simplify(r.min + r.extent - 1)});
-  return scope;
+    loops.push_back({r.var, r.min, simplify(r.min + r.extent - 1), true});
+  return loops;
 }
 
 // Where the place of an update depends on data, only what others read counts.
@@ -71,7 +75,7 @@ void Regions::add_func(const FuncPtr& f) {
   // hold.
   for (int s = f->stage_count() - 1; s >= 0; --s) {
     const Definition& definition = f->stage(s);
-    Scope<Interval> scope = scope_of(*f, definition, boxes_[f.get()]);
+    Scope<Interval> scope = scope_of(loops_of(*f, definition, boxes_[f.get()]));
     Box written;
     for (size_t d = 0; d < f->args.size(); ++d) {
       const Interval mine = boxes_[f.get()][d];
@@ -112,24 +116,14 @@ const Box& Regions::of(const Symbol* symbol) const {
 std::vector<LoopVariable> Regions::loop_variables(const Symbol* symbol,
                                                   const std::vector<std::string>& names) const {
   const Box& box = of(symbol);
-  std::vector<LoopVariable> result;
-  for (size_t d = 0; d < names.size() && d < box.size(); ++d) {
-    result.push_back({names[d], box[d].min, box[d].max, false});
-  }
-  return result;
+  return numbered(std::min(names.size(), box.size()), [&](size_t d) {
+    return LoopVariable{names[d], box[d].min, box[d].max};
+  });
 }
 
 IterationDomain Regions::domain(const FuncContents& f, int stage) const {
   const Definition& definition = f.stage(stage);
-  const Box& box = of(&f);
-  IterationDomain result;
-  for (size_t d = 0; d < f.args.size(); ++d) {
-    if (is_pure_position(f, definition, d))
-      result.vars.push_back({f.args[d], box.at(d).min, box.at(d).max, false});
-  }
-  for (const ReductionVariable& r : definition.rvars) {
-    result.vars.push_back({r.var, r.min, simplify(r.min + r.extent - 1), true});
-  }
+  IterationDomain result{loops_of(f, definition, of(&f)), {}};
   if (definition.predicate.defined()) result.predicate = without_lets(definition.predicate);
   return result;
 }

@@ -4,7 +4,6 @@
 
 #include "autodiff/rules/derivative_rules.h"
 #include "autodiff/sweeps/distinct_nodes.h"
-#include "diagnostics/error.h"
 #include "ir/build.h"
 
 namespace retrograde::ir {
@@ -50,7 +49,7 @@ class ReverseSweep {
     if (!facts_.is_active(e) || is_zero(adjoint)) return;
     Expr converted = cast_to(adjoint_type(e.type()), adjoint);
     State& state = adjoints_[e.get()];
-    state.sum = state.sum.defined() ? state.sum + converted : converted;
+    add_term(state.sum, converted);
     state.traits.add(traits);
   }
 

@@ -8,14 +8,16 @@
 #include <set>
 
 #include "analysis/interval.h"
-#include "autodiff/sweeps/accumulation.h"
 #include "autodiff/sweeps/distinct_nodes.h"
+#include "autodiff/sweeps/made_definitions.h"
 #include "autoschedule/cost_estimate.h"
 #include "frontend/language/var.h"
 #include "graph/define.h"
 #include "graph/function.h"
 #include "ir/build.h"
+#include "ir/lists.h"
 #include "ir/print.h"
+#include "ir/variables.h"
 #include "simplify/simplify.h"
 
 namespace retrograde::ir {
@@ -28,9 +30,7 @@ constexpr size_t most_kept = 8;
 using Numbers = std::set<size_t>;
 
 std::vector<Expr> adjoints_of(const std::vector<LeafAdjoint>& leaves) {
-  std::vector<Expr> result;
-  for (const LeafAdjoint& leaf : leaves) result.push_back(leaf.adjoint);
-  return result;
+  return mapped(leaves, &LeafAdjoint::adjoint);
 }
 
 // What is read, and where; values of a Tuple have their place in common.
@@ -69,23 +69,19 @@ class Sharing {
   }
 
   std::vector<Expr> kept() const {
-    std::vector<Expr> result;
-    for (size_t n : kept_) result.push_back(nodes_[n]);
-    return result;
+    return mapped(kept_, [&](size_t n) { return nodes_[n]; });
   }
 
   // The adjoints of the leaves, where `reads` stand for what is kept.
   std::vector<Expr> with_reads(const std::vector<Expr>& reads) const {
     std::map<size_t, Expr> read_of;
     for (size_t n : kept_) read_of.emplace(n, reads[read_of.size()]);
-    std::vector<Expr> result;
-    for (const LeafAdjoint& leaf : leaves_) {
-      result.push_back(rewrite(leaf.adjoint, [&](const Expr& e, const auto& recurse) -> Expr {
+    return mapped(leaves_, [&](const LeafAdjoint& leaf) {
+      return rewrite(leaf.adjoint, [&](const Expr& e, const auto& recurse) -> Expr {
         auto read = read_of.find(distinct_.number_of(e));
         return read == read_of.end() ? map_children(e, recurse) : read->second;
-      }));
-    }
-    return result;
+      });
+    });
   }
 
  private:
@@ -167,21 +163,14 @@ class Sharing {
 };
 
 bool is_inside(const Box& part, const Box& whole) {
-  if (part.size() != whole.size()) return false;
-  for (size_t d = 0; d < part.size(); ++d) {
-    const auto& [min, max] = whole[d];
-    if (min.defined() && !(part[d].min.defined() && can_prove(part[d].min >= min))) return false;
-    if (max.defined() && !(part[d].max.defined() && can_prove(part[d].max <= max))) return false;
-  }
-  return true;
+  return std::ranges::equal(part, whole, can_prove_inside);
 }
 
 // Whether all that the values read over the domain is there: an access of the primal may stand
 // under a condition.
 bool reads_what_is_there(const std::vector<Expr>& values, const IterationDomain& domain,
                          const Regions& regions) {
-  Scope<Interval> scope;
-  for (const LoopVariable& v : domain.vars) scope.push(v.name, {v.min, v.max});
+  const Scope<Interval> scope = scope_of(domain.vars);
   for (const Expr& value : values) {
     for (const auto& [name, footprint] : footprints(value, scope)) {
       const Box& there = regions.of(footprint.symbol.raw());  // empty: differentiation made it
@@ -192,26 +181,22 @@ bool reads_what_is_there(const std::vector<Expr>& values, const IterationDomain&
 }
 
 bool is_bounded_box(const IterationDomain& domain) {
-  return !domain.predicate.defined() &&
-         std::all_of(domain.vars.begin(), domain.vars.end(),
-                     [](const LoopVariable& v) { return v.min.defined() && v.max.defined(); });
+  return !domain.predicate.defined() && std::ranges::all_of(domain.vars, [](const LoopVariable& v) {
+    return v.min.defined() && v.max.defined();
+  });
 }
 
 FuncPtr define_over(const IterationDomain& domain, const std::string& name,
                     const std::vector<Expr>& values) {
-  auto f = make_func(Role::SharedValue);
-  f->name = claim_name(name);
+  const FuncPtr f = make_func(Role::SharedValue, name);
   Substitution names;
-  std::vector<Expr> args, here;
+  std::vector<Expr> args;
   for (const LoopVariable& v : domain.vars) {
     args.push_back(variable(unique_name("iteration")));
     names[v.name] = args.back();
   }
-  for (const Expr& value : values) {
-    here.push_back(substitute(value, names));
-    f->made->traits.add(traits_of(value));
-  }
-  define_pure(f, args, here);
+  note_traits(f, values);
+  define_pure(f, args, mapped(values, [&](const Expr& e) { return substitute(e, names); }));
   return f;
 }
 
@@ -226,11 +211,7 @@ SharedAdjoints share_adjoints(const std::string& name, const IterationDomain& do
   if (!sharing.is_worth_it() || !reads_what_is_there(sharing.kept(), domain, regions))
     return result;
   result.func = define_over(domain, name, sharing.kept());
-  std::vector<Expr> point, reads;
-  for (const LoopVariable& v : domain.vars) point.push_back(variable(v.name));
-  for (size_t k = 0; k < result.func->types.size(); ++k)
-    reads.push_back(call_value(result.func, point, static_cast<int>(k)));
-  result.adjoints = sharing.with_reads(reads);
+  result.adjoints = sharing.with_reads(values_of(result.func, variables_of(names_of(domain.vars))));
   return result;
 }
 

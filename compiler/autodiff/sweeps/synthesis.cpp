@@ -3,8 +3,8 @@
 #include <algorithm>
 
 #include "autodiff/inversion/read_inversions.h"
+#include "autodiff/report/absent_gradients.h"
 #include "autodiff/report/synthesis_account.h"
-#include "autodiff/report/zero_reasons.h"
 #include "autodiff/rules/derivative_rules.h"
 #include "autodiff/sweeps/active_symbols.h"
 #include "autodiff/sweeps/custom_rules.h"
@@ -12,12 +12,12 @@
 #include "autodiff/sweeps/passed_reads.h"
 #include "autodiff/sweeps/reverse_sweep.h"
 #include "autodiff/sweeps/shared_adjoints.h"
-#include "autodiff/updates/update.h"
 #include "autodiff/updates/update_context.h"
 #include "autodiff/updates/versions.h"
 #include "diagnostics/error.h"
-#include "graph/define.h"
+#include "graph/names.h"
 #include "ir/build.h"
+#include "ir/lists.h"
 #include "ir/print.h"
 #include "ir/variables.h"
 #include "simplify/simplify.h"
@@ -25,12 +25,6 @@
 namespace retrograde::ir {
 
 namespace {
-
-std::vector<std::string> implicit_args(int n) {
-  std::vector<std::string> names;
-  for (int d = 0; d < n; ++d) names.push_back("_" + std::to_string(d));
-  return names;
-}
 
 class Synthesis {
  public:
@@ -50,8 +44,9 @@ class Synthesis {
     }
     for (const auto& parameter : parameters_of({seed_.output})) finish_parameter(parameter);
     forget_covered();
-    explain_absent();
-    explain_strangers();
+    explain_absent({seed_.output, order_, options_, active_, covered_,
+                    [&](const Symbol* symbol) { return target_of(symbol); }},
+                   result_, account_);
     result_.output = {seed_.output, seed_.region};
     list_gradients();
     result_.explanations = account_.take();
@@ -104,22 +99,18 @@ class Synthesis {
     }
   }
 
-  AdjointTarget target_of(const FuncContents& f) const {
-    AdjointTarget target{f.name, f.args, {}, regions_.loop_variables(&f, f.args)};
-    for (Type t : f.types) target.types.push_back(t.is_float() ? adjoint_type(t) : Float(32));
-    return target;
-  }
-  AdjointTarget target_of(const ParameterContents& p) const {
-    AdjointTarget target{
-        p.name, implicit_args(p.is_buffer ? p.dimensions : 0), {adjoint_type(p.type)}, {}};
-    target.region = regions_.loop_variables(&p, target.args);
-    return target;
+  AdjointTarget target_of(const Symbol* symbol) const {
+    const auto* f = dynamic_cast<const FuncContents*>(symbol);
+    const InputShape shape = shape_of(symbol);
+    const std::vector<std::string> args = f ? f->args : implicit_names(shape.dimensions);
+    return {shape.name, args, mapped(shape.types, adjoint_type),
+            regions_.loop_variables(symbol, args)};
   }
 
   void differentiate(const FuncPtr& f) {
     auto found = pending_.find(f.get());
     if (found == pending_.end() || found->second.empty()) return;
-    AdjointTarget target = target_of(*f);
+    AdjointTarget target = target_of(f.get());
     AdjointFunc adjoint = make_adjoint(target, f->name + "_adj", found->second);
     bool extendable = true;  // nothing has read it yet
     record(*f, f->stage_count() - 1, adjoint);
@@ -136,7 +127,7 @@ class Synthesis {
       if (adjoint.func->stage_count() > own_stages) keep_unextended(*f, s, adjoint, own_stages);
       if (update.current.func != adjoint.func)
         register_func(update.current, f->name, target.region);
-      for (const FuncPtr& helper : update.helpers) result_.funcs.push_back(helper);
+      append(result_.funcs, update.helpers);
       std::vector<Expr> seeds =
           update.seeds.empty() ? adjoints_at_write(*f, s, update.current.func) : update.seeds;
       for (const IterationDomain& domain : update.domains)
@@ -179,8 +170,9 @@ class Synthesis {
   static bool is_zero_over(const FuncContents& f, const std::vector<LoopVariable>& region) {
     BoundsMap bounds;
     for (const LoopVariable& v : region) bounds[v.name] = {v.min, v.max};
-    return f.is_pure() && std::all_of(f.pure->values.begin(), f.pure->values.end(),
-                                      [&](const Expr& v) { return is_zero(simplify(v, bounds)); });
+    return f.is_pure() && std::ranges::all_of(f.pure->values, [&](const Expr& v) {
+             return is_zero(simplify(v, bounds));
+           });
   }
   // Nothing of the stages before the update is left where anybody reads.
   void stop_at_update(const FuncContents& f, int stage, const AdjointTarget& target) {
@@ -218,15 +210,12 @@ class Synthesis {
     }
   }
   void add_custom(const FuncContents& f, const CustomContribution& c) {
-    const auto* p = as_parameter(c.input.get());
-    AdjointTarget target =
-        p ? target_of(*p) : target_of(dynamic_cast<const FuncContents&>(*c.input));
-    std::vector<Expr> args = variables_of(target.args), values;
-    for (size_t k = 0; k < target.types.size(); ++k) {
-      bool floating = p || dynamic_cast<const FuncContents&>(*c.input).types[k].is_float();
-      Expr value = call_value(c.adjoint, args, static_cast<int>(k));
-      values.push_back(floating ? cast_to(target.types[k], value) : Expr());
-    }
+    const AdjointTarget target = target_of(c.input.get());
+    const std::vector<Expr> args = variables_of(target.args);
+    const std::vector<Type> types = shape_of(c.input.get()).types;
+    std::vector<Expr> values = values_of(c.adjoint, args);
+    for (size_t k = 0; k < types.size(); ++k)
+      values[k] = types[k].is_float() ? cast_to(target.types[k], values[k]) : Expr();
     const Box& box = regions_.of(c.input.get());
     if (box.size() != args.size()) {
       explain(Explanation::Kind::Zero, target.name,
@@ -247,20 +236,15 @@ class Synthesis {
   }
 
   void contribute_pure(const FuncPtr& f, const FuncPtr& adjoint) {
-    std::vector<Expr> values;
-    for (const Expr& v : f->pure->values) values.push_back(without_lets(v));
-    contribute_stage(f, values, adjoints_at_write(*f, 0, adjoint), regions_.domain(*f, 0), {},
-                     false);
+    contribute_stage(f, mapped(f->pure->values, without_lets), adjoints_at_write(*f, 0, adjoint),
+                     regions_.domain(*f, 0), {}, false);
   }
 
   std::vector<Expr> adjoints_at_write(const FuncContents& f, int stage,
                                       const FuncPtr& adjoint) const {
-    std::vector<Expr> seeds;
-    for (size_t k = 0; k < f.types.size(); ++k) {
-      seeds.push_back(f.types[k].is_float() ? adjoint_at(f, stage, adjoint, static_cast<int>(k))
-                                            : Expr());
-    }
-    return seeds;
+    return numbered(f.types.size(), [&](size_t k) {
+      return f.types[k].is_float() ? adjoint_at(f, stage, adjoint, static_cast<int>(k)) : Expr();
+    });
   }
 
   void contribute_stage(const FuncPtr& f, const std::vector<Expr>& values,
@@ -298,11 +282,7 @@ class Synthesis {
   }
 
   bool is_inside(const Expr& index, const FuncContents& f, int stage, const Interval& range) const {
-    Scope<Interval> scope;
-    for (const LoopVariable& v : regions_.domain(f, stage).vars) scope.push(v.name, {v.min, v.max});
-    Interval found = bounds_of(index, scope);
-    return found.is_bounded() && can_prove(found.min >= range.min) &&
-           can_prove(found.max <= range.max);
+    return can_prove_inside(bounds_of(index, scope_of(regions_.domain(f, stage).vars)), range);
   }
 
   // The adjoint where the stage writes. A place that depends on data may lie outside of all that is
@@ -346,8 +326,7 @@ class Synthesis {
                                 const IterationDomain& domain) {
     const Symbol* symbol = symbol_of(leaf.leaf);
     const auto* call = leaf.leaf.as<Call>();
-    const AdjointTarget target =
-        as_parameter(symbol) ? target_of(*as_parameter(symbol)) : target_of(*func_of(*call));
+    const AdjointTarget target = target_of(symbol);
     AccessQuery query{domain, call ? call->args : std::vector<Expr>{}, target.args, target.region};
     return inversions_.of(reader, *symbol, query, leaf.adjoint);
   }
@@ -368,14 +347,14 @@ class Synthesis {
   void finish_parameter(const std::shared_ptr<ParameterContents>& p) {
     auto found = pending_.find(p.get());
     if (found == pending_.end()) return;
-    AdjointFunc adjoint = make_adjoint(target_of(*p), p->name + "_adj", found->second);
+    AdjointFunc adjoint = make_adjoint(target_of(p.get()), p->name + "_adj", found->second);
     result_.parameters[p.get()] = adjoint.func;
-    register_func(adjoint, p->name, target_of(*p).region);
+    register_func(adjoint, p->name, target_of(p.get()).region);
   }
 
   void register_func(const AdjointFunc& adjoint, const std::string& primal,
                      const std::vector<LoopVariable>& region) {
-    for (const FuncPtr& helper : adjoint.helpers) result_.funcs.push_back(helper);
+    append(result_.funcs, adjoint.helpers);
     result_.funcs.push_back(adjoint.func);
     if (adjoint.accumulator) result_.accumulators[adjoint.func.get()] = adjoint.accumulator;
     account_.built(adjoint, primal, region);
@@ -389,7 +368,7 @@ class Synthesis {
     for (const auto& p : parameters_of({seed_.output})) {
       auto found = result_.parameters.find(p.get());
       if (found == result_.parameters.end() || !active_.is_requested(p.get())) continue;
-      result_.gradients.push_back({found->second, box_of(target_of(*p).region)});
+      result_.gradients.push_back({found->second, box_of(target_of(p.get()).region)});
     }
     if (result_.gradients.empty() || options_.only_requested) list_func_gradients();
   }
@@ -397,13 +376,11 @@ class Synthesis {
     for (const FuncPtr& f : order_) {
       auto found = result_.after_stage.find({f.get(), f->stage_count() - 1});
       if (found == result_.after_stage.end() || !active_.is_requested(f.get())) continue;
-      result_.gradients.push_back({found->second, box_of(target_of(*f).region)});
+      result_.gradients.push_back({found->second, box_of(target_of(f.get()).region)});
     }
   }
   static Box box_of(const std::vector<LoopVariable>& region) {
-    Box box;
-    for (const LoopVariable& v : region) box.push_back({v.min, v.max});
-    return box;
+    return mapped(region, &LoopVariable::range);
   }
 
   // What reaches them past the rule alone is no gradient of the output by them.
@@ -412,83 +389,12 @@ class Synthesis {
                   [&](const auto& entry) { return covered_.contains(entry.first.first); });
   }
 
-  // What was asked for and got no contribution is zero, and says why.
-  void explain_absent() {
-    for (const FuncPtr& f : order_) {
-      if (covered_.contains(f.get()) ||
-          result_.after_stage.contains({f.get(), f->stage_count() - 1}) ||
-          !explain_absent(f.get(), f->name, is_floating(f->types), f->types[0]))
-        continue;
-      AdjointFunc zero = make_adjoint(target_of(*f), f->name + "_adj", {});
-      for (int s = 0; s < f->stage_count(); ++s) record(*f, s, zero);
-    }
-    for (const auto& p : parameters_of({seed_.output})) {
-      if (result_.parameters.contains(p.get()) ||
-          !explain_absent(p.get(), p->name, p->type.is_float(), p->type))
-        continue;
-      result_.parameters[p.get()] = make_adjoint(target_of(*p), p->name + "_adj", {}).func;
-    }
-  }
-  // What was asked for and has nothing to do with the output.
-  void explain_strangers() {
-    std::unordered_set<const Symbol*> reached;
-    for (const FuncPtr& f : order_) reached.insert(f.get());
-    for (const auto& p : parameters_of({seed_.output})) reached.insert(p.get());
-    std::map<std::string, const Symbol*> strangers;  // by name: in an order that is always the same
-    for (const Symbol* symbol : options_.requested) {
-      if (symbol && !reached.contains(symbol)) strangers[shape_of(symbol).name] = symbol;
-    }
-    for (const auto& [name, symbol] : strangers) {
-      const InputShape shape = shape_of(symbol);
-      explain(Explanation::Kind::Zero, shape.name, "the output does not depend on it");
-      if (!shape.is_floating()) continue;
-      const auto* f = dynamic_cast<const FuncContents*>(symbol);
-      if (!f) result_.parameters[symbol] = zero_derivative(*symbol, "_adj");
-      for (int s = 0; f && s < f->stage_count(); ++s)
-        result_.after_stage[{f, s}] = zero_derivative(*symbol, "_adj");
-    }
-  }
-  std::string without_path(const Symbol* symbol) const {
-    std::string result = "the output does not depend on its value by a differentiable path";
-    const char* separator = ": ";
-    for (const std::string& reason : zero_reasons(symbol, order_, [&](const FuncContents& f) {
-           return result_.after_stage.contains({&f, f.stage_count() - 1}) && !zero_.contains(&f);
-         })) {
-      result += separator + reason;
-      separator = "; ";
-    }
-    return result;
-  }
-  // Whether its gradient is a zero that somebody may ask for.
-  bool explain_absent(const Symbol* symbol, const std::string& name, bool floating, Type type) {
-    if (!floating) {
-      explain(Explanation::Kind::Zero, name,
-              "its type is " + to_string(type) + ": integers have no derivative");
-    } else if (active_.cancels(symbol)) {
-      explain(
-          Explanation::Kind::Zero, name,
-          "the output is the same for all of its values: it is what a softmax, a log-sum-exp or "
-          "a norm is shifted or scaled by, which cancels");
-      return true;
-    } else if (auto left = options_.left_out.find(symbol); left != options_.left_out.end()) {
-      explain(Explanation::Kind::NotRequested, name, "left out: " + left->second);
-    } else if (!active_.contains(symbol)) {
-      explain(Explanation::Kind::NotRequested, name, "nothing that was requested depends on it");
-    } else {
-      explain(Explanation::Kind::Zero, name, without_path(symbol));
-      zero_.insert(symbol);
-      return true;
-    }
-    return false;
-  }
-
   const Seed& seed_;
   const SynthesisOptions& options_;
   std::vector<FuncPtr> order_;
   Regions regions_;
   ValueRanges ranges_;
   ActiveSymbols active_;
-  std::unordered_set<const Symbol*> zero_;     // by no path
   std::unordered_set<const Symbol*> covered_;  // inside of a custom adjoint that was used
   std::unordered_map<const Symbol*, std::vector<Contribution>> pending_;
   VersionBudget versions_;

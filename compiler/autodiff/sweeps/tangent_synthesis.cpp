@@ -3,22 +3,20 @@
 #include <algorithm>
 
 #include "autodiff/rules/value_range.h"
-#include "autodiff/sweeps/accumulation.h"
 #include "autodiff/sweeps/custom_rules.h"
 #include "autodiff/sweeps/forward_sweep.h"
+#include "autodiff/sweeps/made_definitions.h"
 #include "diagnostics/error.h"
 #include "frontend/language/var.h"
 #include "graph/define.h"
-#include "graph/function.h"
 #include "ir/build.h"
+#include "ir/lists.h"
 #include "ir/memory_reads.h"
 #include "ir/variables.h"
 
 namespace retrograde::ir {
 
 namespace {
-
-Type tangent_type(Type t) { return t.is_float() ? adjoint_type(t) : Float(32); }
 
 // One definition linearised. Reads of the Func's own tangent are reads of `own`.
 struct StageTangent {
@@ -37,8 +35,7 @@ class FuncTangent {
   // Null when it is identically zero. With `dual` set, the tangent reads it.
   FuncPtr build() {
     if (!moves()) return nullptr;
-    tangent_ = make_func(Role::Tangent, f_->name + "_tan");
-    tangent_->made->of = f_->name;
+    tangent_ = make_func(Role::Tangent, f_->name + "_tan", f_->name);
     if (!linearise_all(tangent_, 0)) return build_dual();
     for (int s = 0; s < f_->stage_count(); ++s) define(tangent_, s, {}, stages_[s].values);
     return tangent_;
@@ -90,12 +87,10 @@ class FuncTangent {
       if (!call || call->symbol.raw() != f_.get()) return tangent_of_(leaf);
       if (!own) return Expr();
       auto index = static_cast<size_t>(call->component);
-      return call_func(own->name, tangent_type(f_->types[index]), call->args,
+      return call_func(own->name, adjoint_type(f_->types[index]), call->args,
                        static_cast<int>(offset + index), SymbolRef(own));
     };
-    std::vector<Expr> values;
-    for (const Expr& v : f_->stage(s).values) values.push_back(without_lets(v));
-    ForwardResult swept = sweep(s, values, tangent_of);
+    ForwardResult swept = sweep(s, mapped(f_->stage(s).values, without_lets), tangent_of);
     StageTangent result{swept.tangents, swept.moves, swept.traits};
     notes_.insert(swept.notes.begin(), swept.notes.end());
     return result;
@@ -114,16 +109,13 @@ class FuncTangent {
   }
 
   FuncPtr build_dual() {
-    dual_ = make_func(Role::Tangent, f_->name + "_dual");
-    dual_->made->of = f_->name;
+    dual_ = make_func(Role::Tangent, f_->name + "_dual", f_->name);
     linearise_all(dual_, count());
     tangent_->made->traits = dual_->made->traits;
     for (int s = 0; s < f_->stage_count(); ++s)
       define(dual_, s, f_->stage(s).values, stages_[s].values);
-    std::vector<Expr> values, args = variables_of(f_->args);
-    for (size_t k = 0; k < count(); ++k)
-      values.push_back(call_value(dual_, args, static_cast<int>(count() + k)));
-    define_pure(tangent_, args, values);
+    const std::vector<Expr> args = variables_of(f_->args), all = values_of(dual_, args);
+    define_pure(tangent_, args, {all.end() - static_cast<std::ptrdiff_t>(count()), all.end()});
     return tangent_;
   }
 
@@ -132,7 +124,7 @@ class FuncTangent {
               const std::vector<Expr>& tangents) const {
     const Definition& definition = f_->stage(s);
     for (size_t k = 0; k < count(); ++k) {
-      Type type = tangent_type(f_->types[k]);
+      Type type = adjoint_type(f_->types[k]);
       values.push_back(tangents[k].defined() ? cast_to(type, tangents[k]) : make_zero(type));
     }
     auto redirected = [&](const Expr& e) {
@@ -140,9 +132,8 @@ class FuncTangent {
     };
     for (Expr& e : values) e = redirected(e);
     if (s == 0) return define_pure(to, variables_of(f_->args), values);
-    std::vector<Expr> args;
-    for (const Expr& e : definition.args) args.push_back(redirected(e));
-    append_update(to, args, values, definition.rvars, redirected(definition.predicate));
+    append_update(to, mapped(definition.args, redirected), values, definition.rvars,
+                  redirected(definition.predicate));
   }
 
   const FuncPtr& f_;
@@ -178,7 +169,7 @@ class TangentSynthesis {
     FuncPtr tangent = with_direction(*f, own);
     if (tangent) {
       result_.tangents[f.get()] = tangent;
-    } else if (std::any_of(f->types.begin(), f->types.end(), [](Type t) { return t.is_float(); })) {
+    } else if (std::ranges::any_of(f->types, [](Type t) { return t.is_float(); })) {
       explain(Explanation::Kind::Zero, *f,
               "it does not depend on an input that moves by a differentiable path");
     }
@@ -236,14 +227,11 @@ class TangentSynthesis {
     auto found = directions_.find(&f);
     if (found == directions_.end()) return own;
     if (!own) return found->second;
-    FuncPtr sum = make_func(Role::Tangent, f.name + "_tan_sum");
-    sum->made->of = f.name;
-    std::vector<Expr> args = variables_of(f.args), values;
-    for (size_t k = 0; k < f.types.size(); ++k) {
-      values.push_back(
-          call_value(own, args, static_cast<int>(k)) +
-          cast_to(tangent_type(f.types[k]), call_value(found->second, args, static_cast<int>(k))));
-    }
+    FuncPtr sum = make_func(Role::Tangent, f.name + "_tan_sum", f.name);
+    const std::vector<Expr> args = variables_of(f.args);
+    std::vector<Expr> values = values_of(own, args), given = values_of(found->second, args);
+    for (size_t k = 0; k < f.types.size(); ++k)
+      values[k] = values[k] + cast_to(adjoint_type(f.types[k]), given[k]);
     define_pure(sum, args, values);
     sum->made->traits = own->made->traits;
     result_.funcs.push_back(sum);
@@ -266,7 +254,7 @@ class TangentSynthesis {
 
   void refuse_active(const FuncContents& f) const {
     const auto& args = f.extern_definition->args;
-    if (std::none_of(args.begin(), args.end(), [&](const auto& a) { return moves(a); })) return;
+    if (std::ranges::none_of(args, [&](const auto& a) { return moves(a); })) return;
     unsupported(text("propagate tangents through ", quoted(f.name)),
                 "derivatives come from definitions",
                 text("the C function ", quoted(f.extern_definition->function),
@@ -286,11 +274,9 @@ class TangentSynthesis {
 }  // namespace
 
 FuncPtr zero_tangent(const FuncContents& f) {
-  FuncPtr zero = make_func(Role::Tangent, f.name + "_tan");
-  zero->made->of = f.name;
-  std::vector<Expr> values;
-  for (Type t : f.types) values.push_back(make_zero(tangent_type(t)));
-  define_pure(zero, variables_of(f.args), values);
+  FuncPtr zero = make_func(Role::Tangent, f.name + "_tan", f.name);
+  define_pure(zero, variables_of(f.args),
+              mapped(f.types, [](Type t) { return make_zero(adjoint_type(t)); }));
   return zero;
 }
 

@@ -9,6 +9,7 @@
 #include "frontend/language/var.h"
 #include "graph/define.h"
 #include "ir/build.h"
+#include "ir/lists.h"
 #include "ir/print.h"
 #include "simplify/simplify.h"
 
@@ -23,11 +24,9 @@ class CheckpointedLoop {
         f_(context.f),
         result_(result),
         layout_(context),
-        machine_(make_func(Role::Checkpoints)) {}
+        machine_(make_func(Role::Checkpoints, f_->name + "_checkpoints", f_->name)) {}
 
   void run() {
-    machine_->name = claim_name(f_->name + "_checkpoints");
-    machine_->made->of = f_->name;
     plan_ = plan_checkpoints(c_, layout_, result_.current.func, machine_);
     table_ = make_table();
     if (table_.made_by) result_.helpers.push_back(table_.made_by);
@@ -64,8 +63,7 @@ class CheckpointedLoop {
     }
     machine_->types.clear();  // the definition says them again
     define_pure(machine_, layout_.with_pure(slot), initial);
-    result_.helpers.push_back(before);
-    result_.helpers.push_back(machine_);
+    append(result_.helpers, {before, machine_});
   }
 
   // ---- the loop over actions ----
@@ -76,40 +74,27 @@ class CheckpointedLoop {
   };
 
   void append_loop() {
-    auto rdom = std::make_shared<ReductionDomainContents>();
-    auto add_loop = [&](const std::string& name, const Expr& min, const Expr& extent) {
-      rdom->vars.push_back({unique_name(name), min, extent});
-      return rdom->vars.back().var;
-    };
-    // All loops first: variables refer to the finished domain.
-    add_loop("write", make_zero(Int(32)), writes_per_iteration());
-    for (const ReductionVariable& r : plan_.inner) add_loop(r.var, r.min, r.extent);
-    add_loop("action", make_zero(Int(32)), table_.rows);
-    rdom->frozen = true;
-    auto loop = [&](size_t i) { return variable(rdom->vars[i].var, Int(32), SymbolRef(rdom)); };
-
-    for (size_t i = 0; i < plan_.inner.size(); ++i) {
-      const ReductionVariable& r = plan_.inner[i];
-      forward_[r.var] = loop(i + 1);
-      backward_[r.var] = mirrored(r, loop(i + 1));
+    const DomainPtr rdom = make_domain();
+    Expr write = add_loop(rdom, "write", make_zero(Int(32)), writes_per_iteration());
+    for (const ReductionVariable& r : plan_.inner) {
+      forward_[r.var] = add_loop(rdom, r.var, r.min, r.extent);
+      backward_[r.var] = mirrored(r, forward_[r.var]);
     }
-    Expr row = loop(rdom->vars.size() - 1);
+    Expr row = add_loop(rdom, "action", make_zero(Int(32)), table_.rows);
     Expr step = clamp(table_.entry(1, row), 0, plan_.steps - 1);
     forward_[plan_.time.var] = backward_[plan_.time.var] = plan_.time.min + step;
     forward_[plan_.at_hand] = backward_[plan_.at_hand] = slots_->at_hand();
 
     std::vector<ReductionVariable> pass(rdom->vars.begin(), rdom->vars.end() - 1);
     Expr number = substitute(iteration_number(pass), names_of(pass, rdom));
-    Branch all = one_of(branches(table_.entry(0, row), loop(0), number,
+    Branch all = one_of(branches(table_.entry(0, row), write, number,
                                  clamp(table_.entry(2, row), 0, std::max(plan_.states - 1, 0))));
     append_update(machine_, layout_.with_pure(clamp(all.write.place, 0, slots_->count() - 1)),
                   all.write.values, rdom->vars, all.runs);
   }
-  static Substitution names_of(const std::vector<ReductionVariable>& loops,
-                               const std::shared_ptr<ReductionDomainContents>& rdom) {
+  static Substitution names_of(const std::vector<ReductionVariable>& loops, const DomainPtr& rdom) {
     Substitution names;
-    for (const ReductionVariable& r : loops)
-      names[r.var] = variable(r.var, Int(32), SymbolRef(rdom));
+    for (const ReductionVariable& r : loops) names[r.var] = loop_variable(rdom, r.var);
     return names;
   }
   // Copies of a state go through the same loops: enough for all elements.
@@ -177,16 +162,14 @@ class CheckpointedLoop {
     return with_values(substitute(e, places), c_.query.f, {});
   }
   SlotWrite placed(const SlotWrite& w, const Substitution& places) const {
-    SlotWrite result{placed(w.place, places), {}};
-    for (const Expr& v : w.values) result.values.push_back(placed(v, places));
-    return result;
+    return {placed(w.place, places),
+            mapped(w.values, [&](const Expr& v) { return placed(v, places); })};
   }
 
   // ---- what others see ----
 
   void note_work() {
-    std::vector<Expr> inner;
-    for (const ReductionVariable& r : plan_.inner) inner.push_back(r.extent);
+    const std::vector<Expr> inner = mapped(plan_.inner, &ReductionVariable::extent);
     auto note = [&](const std::vector<SlotWrite>& writes, Action action, std::vector<Expr> loops) {
       loops.push_back(table_.count(action));
       machine_->made->work.push_back(work_of(writes, machine_, std::move(loops)));
@@ -209,7 +192,7 @@ class CheckpointedLoop {
                    : make_zero(c_.query.target.types[k]);
       before.push_back(make_select(inside, a, make_zero(a.type())));
     }
-    result_.previous = make_adjoint(c_.query.target, name_before(*f_, c_.query.stage), {}, before);
+    result_.previous = c_.adjoint_before(before);
     for (size_t i = 0; i < plan_.given.size(); ++i) {
       const CheckpointPlan::Given& g = plan_.given[i];
       Expr slot = slots_->given(i), sum = slots_->sum_at(slot);
@@ -230,10 +213,9 @@ class CheckpointedLoop {
     if (plan_.needs_values())
       what = text("from ", kept_text(), ", ", again_text(), " computed again beside the ",
                   print(plan_.steps), " that are reversed");
-    result_.explanations.push_back(
-        {Explanation::Kind::Version, f_->name,
-         text("update ", c_.query.stage - 1, " is a loop of ", print(plan_.steps), " steps that ",
-              quoted(machine_->name), " runs backward: ", what)});
+    c_.note(text(" is a loop of ", print(plan_.steps), " steps that ", quoted(machine_->name),
+                 " runs backward: ", what),
+            result_);
   }
   std::string kept_text() const {
     const auto& bytes = plan_.bytes_of_state;

@@ -64,7 +64,7 @@ ActionTable action_table(int steps, int states) {
   ActionTable result;
   result.rows = make_const(Int(32), static_cast<int64_t>(rows.size()));
   for (size_t kind = 0; kind < action_kinds; ++kind) {
-    result.counts[kind] = make_const(Int(32), std::count_if(rows.begin(), rows.end(), [&](auto& r) {
+    result.counts[kind] = make_const(Int(32), std::ranges::count_if(rows, [&](auto& r) {
                                        return r[0] == static_cast<int>(kind);
                                      }));
   }

@@ -1,7 +1,7 @@
 // The table of checkpoint_actions.h, made by a Func.
 #include <algorithm>
 
-#include "autodiff/sweeps/accumulation.h"
+#include "autodiff/sweeps/made_definitions.h"
 #include "autodiff/time/checkpoint_actions.h"
 #include "autodiff/time/revolve.h"
 #include "diagnostics/error.h"
@@ -9,7 +9,6 @@
 #include "graph/define.h"
 #include "graph/function.h"
 #include "ir/build.h"
-#include "simplify/simplify.h"
 
 namespace retrograde::ir {
 
@@ -125,12 +124,9 @@ class ActionsFunc {
   // In iteration i, after row i: when its step is the last before the cut, the steps behind are a
   // frame of their own, one deeper; then row i + 1.
   void append_loop() {
-    auto rdom = std::make_shared<ReductionDomainContents>();
-    rdom->vars = {{unique_name("write"), make_zero(Int(32)), make_const(Int(32), 3)},
-                  {unique_name("row"), make_zero(Int(32)), max(rows_ - 1, 0)}};
-    rdom->frozen = true;
-    Expr write = variable(rdom->vars[0].var, Int(32), SymbolRef(rdom));
-    Expr i = variable(rdom->vars[1].var, Int(32), SymbolRef(rdom));
+    const DomainPtr rdom = make_domain();
+    Expr write = add_loop(rdom, "write", make_zero(Int(32)), make_const(Int(32), 3));
+    Expr i = add_loop(rdom, "row", make_zero(Int(32)), max(rows_ - 1, 0));
 
     Triple row = at(i + frames());
     const Expr &depth = row.c, &step = row.b;

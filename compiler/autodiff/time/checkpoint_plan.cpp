@@ -37,7 +37,7 @@ class Planner {
         add_given(leaf);
       }
     }
-    find_needed(sweep);
+    for (const Expr& read : c_.needed_reads(sweep)) add_needed(read);
     plan_.bytes_of_state = bytes_of_state();
     plan_.states = number_of_states();
     return std::move(plan_);
@@ -70,14 +70,11 @@ class Planner {
     const Box& box = c_.query.regions.of(f_);
     for (size_t d = 0; d < c_.pure.size(); ++d) {
       if (!c_.pure[d]) continue;
-      auto extent =
-          box[d].is_bounded() ? as_const_int(simplify(box[d].max - box[d].min + 1)) : std::nullopt;
+      auto extent = constant_extent(box[d]);
       if (!extent) return std::nullopt;
       bytes *= *extent;
     }
-    int width = 0;
-    for (Type t : plan_.types) width += t.bytes();
-    return bytes * width;
+    return bytes * total_bytes(plan_.types);
   }
 
   int64_t states_in_bytes(int64_t budget) const {
@@ -124,11 +121,9 @@ class Planner {
   }
 
   std::vector<Expr> seeds() const {
-    std::vector<Expr> result;
-    for (size_t k = 0; k < plan_.types.size(); ++k) {
-      Expr a =
-          call_value(machine_, layout_.with_pure(variable(plan_.at_hand)), static_cast<int>(k));
-      result.push_back(f_->types[k].is_float() ? cast_to(c_.query.target.types[k], a) : Expr());
+    std::vector<Expr> result = c_.adjoints_at(machine_, layout_.with_pure(variable(plan_.at_hand)));
+    for (size_t k = 0; k < result.size(); ++k) {
+      if (result[k].defined()) result[k] = cast_to(c_.query.target.types[k], result[k]);
     }
     return result;
   }
@@ -151,9 +146,6 @@ class Planner {
     plan_.given.push_back(given);
   }
 
-  void find_needed(const SweepResult& sweep) {
-    for (const Expr& read : c_.needed_reads(sweep)) add_needed(read);
-  }
   void add_needed(const Expr& read) {
     plan_.needed.push_back(read);
     plan_.place_of.push_back(place_number(plan_.places, as_call_of(read, f_)->args));

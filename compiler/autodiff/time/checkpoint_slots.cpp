@@ -61,9 +61,7 @@ Expr CheckpointSlots::sum_at(const Expr& slot) const {
   return at(slot, static_cast<size_t>(plan_.sum_value));
 }
 std::vector<Expr> CheckpointSlots::all_values(const Expr& slot) const {
-  std::vector<Expr> values;
-  for (size_t k = 0; k < plan_.types.size(); ++k) values.push_back(at(slot, k));
-  return values;
+  return values_of(machine_, layout_.with_pure(slot));
 }
 
 }  // namespace retrograde::ir

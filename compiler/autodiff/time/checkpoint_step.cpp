@@ -1,7 +1,5 @@
 #include "autodiff/time/checkpoint_step.h"
 
-#include <algorithm>
-
 #include "frontend/language/expr_ops.h"
 #include "ir/build.h"
 

@@ -6,9 +6,10 @@
 #include "frontend/language/var.h"
 #include "graph/define.h"
 #include "graph/function.h"
+#include "graph/own_reads.h"
 #include "ir/build.h"
+#include "ir/lists.h"
 #include "ir/print.h"
-#include "ir/variables.h"
 #include "simplify/simplify.h"
 
 namespace retrograde::ir {
@@ -75,30 +76,24 @@ class Folder {
 
   FuncPtr make_folded(const UpdateContext& c, const TimeAxis& axis, const FuncPtr& start,
                       const FuncPtr& pure) const {
-    FuncPtr folded = make_func(Role::TimeFold);
-    folded->name = claim_name(c.f->name + "_folded");
-    folded->made->of = c.f->name;
-    std::vector<Expr> at_start = c.point, initial;
+    FuncPtr folded = make_func(Role::TimeFold, c.f->name + "_folded", c.f->name);
+    std::vector<Expr> at_start = c.point;
     at_start[axis.dim] = time_at_start(c.point[axis.dim], axis);
-    for (size_t k = 0; k < c.values.size(); ++k)
-      initial.push_back(call_value(start, at_start, static_cast<int>(k)));
-    define_pure(folded, c.point, initial);
+    define_pure(folded, c.point, values_of(start, at_start));
 
     const std::vector<Expr> reads = c.self_reads();
     const Read in_loop = [&](const Call& call, const std::vector<Expr>& args) {
       auto same = [&](const Expr& read) {
         return same_args(as_call_of(read, c.f)->args, call.args);
       };
-      auto i = std::find_if(reads.begin(), reads.end(), same) - reads.begin();
+      auto i = std::ranges::find_if(reads, same) - reads.begin();
       return chosen(axis.in_slot[static_cast<size_t>(i)], call.component, args, axis, folded, pure);
     };
-    std::vector<Expr> place, values;
-    for (const Expr& e : c.write) place.push_back(mapped(e, c.f, in_loop));
+    const auto here = [&](const Expr& e) { return redirected(e, c.f, in_loop); };
+    std::vector<Expr> place = mapped(c.write, here);
     place[axis.dim] = slot_of(place[axis.dim], axis);
-    for (const Expr& v : c.values) values.push_back(mapped(v, c.f, in_loop));
-    Expr predicate = c.definition.predicate;
-    if (predicate.defined()) predicate = mapped(predicate, c.f, in_loop);
-    append_update(folded, place, values, c.definition.rvars, predicate);
+    append_update(folded, place, mapped(c.values, here), c.definition.rvars,
+                  here(c.definition.predicate));
     return folded;
   }
 
@@ -132,28 +127,24 @@ class Folder {
   // ---- its readers ----
 
   // Reads of folded and copied Funcs replaced; those of `own` by `read`.
-  Expr mapped(const Expr& e, const FuncContents* own = nullptr, const Read& read = {}) const {
-    return rewrite(e, [&](const Expr& node, const auto& recurse) -> Expr {
-      const auto* call = node.as<Call>();
-      if (!call || call->call_type != CallType::Func) return map_children(node, recurse);
-      auto found = replaced_.find(call->symbol.raw());
-      bool is_own = own && call->symbol.raw() == own;
-      if (!is_own && found == replaced_.end()) return map_children(node, recurse);
-      std::vector<Expr> args;
-      for (const Expr& arg : call->args) args.push_back(recurse(arg));
-      return is_own ? read(*call, args) : found->second(*call, args);
+  Expr redirected(const Expr& e, const FuncContents* own = nullptr, const Read& read = {}) const {
+    return map_func_calls(e, [&](const Call& call, const std::vector<Expr>& args) {
+      if (own && call.symbol.raw() == own) return read(call, args);
+      auto found = replaced_.find(call.symbol.raw());
+      return found == replaced_.end() ? Expr() : found->second(call, args);
     });
   }
 
   // The first stages of f.
   FuncPtr clone(const FuncPtr& f, int stages, const std::string& name) const {
-    return clone_prefix(f, stages, name, Role::TimeFold, [&](const Expr& e) { return mapped(e); });
+    return clone_prefix(f, stages, name, Role::TimeFold,
+                        [&](const Expr& e) { return redirected(e); });
   }
 
   void copy_if_changed(const FuncPtr& f) {
     bool changed = false;
     for (int s = 0; s < f->stage_count(); ++s)
-      for_each_expr(f->stage(s), [&](const Expr& e) { changed |= !mapped(e).same_as(e); });
+      for_each_expr(f->stage(s), [&](const Expr& e) { changed |= !redirected(e).same_as(e); });
     if (!changed) return;
     FuncPtr g = clone(f, f->stage_count(), f->name);
     copies[f.get()] = g;

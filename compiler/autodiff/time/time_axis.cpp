@@ -31,9 +31,9 @@ class TimeAxisFinder {
 
   const ReductionVariable& time() const { return c_.definition.rvars.back(); }
   bool uses_loops(const Expr& e) const {
-    return depends_on_data(e) ||
-           std::any_of(c_.domain.vars.begin(), c_.domain.vars.end(),
-                       [&](const LoopVariable& v) { return uses_variable(e, v.name); });
+    return depends_on_data(e) || std::ranges::any_of(c_.domain.vars, [&](const LoopVariable& v) {
+             return uses_variable(e, v.name);
+           });
   }
   // sign * (a - b), when constant.
   std::optional<int64_t> steps_between(const Expr& a, const Expr& b) const {

@@ -8,6 +8,7 @@
 #include "graph/define.h"
 #include "graph/function.h"
 #include "ir/build.h"
+#include "ir/lists.h"
 #include "ir/visit.h"
 
 namespace retrograde::ir {
@@ -28,7 +29,7 @@ class Fold {
     adjoint_ = begin_steps(f_->name + "_adj_steps", iteration_count(c_.definition.rvars),
                            result_.current.func);
     if (c_.domain.predicate.defined()) adjoint_->made->traits.masked = true;
-    const std::vector<Expr> seeds = seeds_after();
+    const std::vector<Expr> seeds = c_.adjoints_at(adjoint_, at_step(now_ + 1));  // A[x, i + 1]
     const SweepResult sweep = c_.sweep_iterations(adjoint_, [&] { return seeds; });
     const std::vector<Expr> needed = c_.needed_reads(sweep);
     if (!needed.empty()) keep_values(needed);
@@ -42,56 +43,34 @@ class Fold {
     point.push_back(step);
     return point;
   }
-  static Expr value_of(const FuncPtr& steps, const std::vector<Expr>& point, size_t k) {
-    return call_value(steps, point, static_cast<int>(k));
-  }
 
   // A Func with a dimension for steps, which has the values of `from` at one of them.
   FuncPtr begin_steps(const std::string& name, const Expr& at, const FuncPtr& from) const {
-    FuncPtr steps = make_func(Role::Steps);
-    steps->made->of = f_->name;
-    steps->name = claim_name(name);
-    std::vector<Expr> zeros, values;
-    for (size_t k = 0; k < f_->types.size(); ++k) {
-      values.push_back(value_of(from, c_.point, k));
-      zeros.push_back(make_zero(values.back().type()));
-    }
-    define_pure(steps, at_step(variable(step_)), zeros);
-    append_update(steps, at_step(at), values, {}, {});
+    FuncPtr steps = make_func(Role::Steps, name, f_->name);
+    define_pure(steps, at_step(variable(step_)), mapped(from->types, make_zero));
+    append_update(steps, at_step(at), values_of(from, c_.point), {}, {});
     return steps;
-  }
-
-  // A[x, i + 1]
-  std::vector<Expr> seeds_after() const {
-    std::vector<Expr> seeds;
-    for (size_t k = 0; k < f_->types.size(); ++k)
-      seeds.push_back(f_->types[k].is_float() ? value_of(adjoint_, at_step(now_ + 1), k) : Expr());
-    return seeds;
   }
 
   void keep_values(const std::vector<Expr>& needed) {
     c_.check_versions_are_kept(needed.front());
     const FuncPtr before = clone_prefix(c_.query.f, c_.query.stage);
     const FuncPtr steps = begin_steps(f_->name + "_steps", make_zero(Int(32)), before);
-    int bytes = 0;
-    for (Type t : f_->types) bytes += t.bytes();
     for (const Expr& read : c_.self_reads())
-      kept_[read] =
-          value_of(steps, at_step(now_), static_cast<size_t>(as_call_of(read, f_)->component));
+      kept_[read] = call_value(steps, at_step(now_), as_call_of(read, f_)->component);
     append_loop(steps, now_ + 1, c_.values, now_, {});
     std::vector<Expr> extents = c_.extents();
     extents.push_back(iteration_count(c_.definition.rvars) + 1);
     c_.take_room(steps, extents, result_);
     for (const Expr& read : needed) result_.self_values[read] = kept_.at(read);
-    result_.helpers.push_back(before);
-    result_.helpers.push_back(steps);
-    explain(text("update ", c_.query.stage - 1, " overwrites values that its partials need: ",
-                 quoted(steps->name), " keeps ", bytes, " bytes in each iteration"));
+    append(result_.helpers, {before, steps});
+    c_.note(text(" overwrites values that its partials need: ", quoted(steps->name), " keeps ",
+                 total_bytes(f_->types), " bytes in each iteration"),
+            result_);
   }
 
   void append_reverse(const SweepResult& sweep) {
-    std::vector<Expr> values;
-    for (Type t : adjoint_->types) values.push_back(make_zero(t));
+    std::vector<Expr> values = mapped(adjoint_->types, make_zero);
     for (const LeafAdjoint& leaf : sweep.leaves) {
       const Call* call = as_call_of(leaf.leaf, f_);
       if (!call) continue;
@@ -99,51 +78,35 @@ class Fold {
       const Expr term = cast_to(value.type(), leaf.adjoint);
       value = is_zero(value) ? term : value + term;
     }
-    Substitution reversed;
-    for (const ReductionVariable& r : c_.definition.rvars)
-      reversed[r.var] = mirrored(r, variable(r.var));
-    append_loop(adjoint_, now_, values, now_ + 1, reversed);
+    append_loop(adjoint_, now_, values, now_ + 1, mirrored(c_.definition.rvars));
   }
 
   // steps[x, to] <- values where an iteration writes, else steps[x, from]; in the order given.
   void append_loop(const FuncPtr& steps, const Expr& to, const std::vector<Expr>& values,
                    const Expr& from, const Substitution& order) {
-    auto rdom = std::make_shared<ReductionDomainContents>();
-    rdom->frozen = true;
-    const Substitution names = add_copies(rdom, c_.definition.rvars);
+    const DomainPtr domain = make_domain();
+    const Substitution names = add_copies(domain, c_.definition.rvars);
     const auto here = [&](const Expr& e) {
       return with_values(substitute(substitute(e, order), names), c_.query.f, {});
     };
-    std::vector<Expr> chosen, place;
+    std::vector<Expr> chosen = values_of(steps, at_step(from));
     for (size_t k = 0; k < values.size(); ++k) {
       Expr value = cast_to(steps->types[k], kept(values[k]));
       if (c_.domain.predicate.defined())
-        value = make_select(kept(c_.domain.predicate), value, value_of(steps, at_step(from), k));
-      chosen.push_back(here(value));
+        value = make_select(kept(c_.domain.predicate), value, chosen[k]);
+      chosen[k] = here(value);
     }
-    for (const Expr& e : at_step(to)) place.push_back(here(e));
-    append_update(steps, place, chosen, rdom->vars, {});
+    append_update(steps, mapped(at_step(to), here), chosen, domain->vars, {});
   }
 
   // Reads of f are those of the values kept.
   Expr kept(const Expr& e) const { return replaced(e, kept_); }
 
   void hand_over(const std::vector<Expr>& seeds) {
-    std::vector<Expr> before;
-    for (size_t k = 0; k < f_->types.size(); ++k)
-      before.push_back(value_of(adjoint_, at_step(make_zero(Int(32))), k));
-    result_.previous = make_adjoint(c_.query.target, name_before(*f_, c_.query.stage), {}, before);
-    result_.helpers.push_back(adjoint_);
-    result_.values = c_.values;
-    result_.keeps_steps = true;
-    result_.seeds = seeds;
-    result_.domains = {c_.domain};
-    explain(text("update ", c_.query.stage - 1, " folds its domain into each element: ",
-                 quoted(adjoint_->name), " keeps the adjoint before each iteration"));
-  }
-
-  void explain(const std::string& detail) {
-    result_.explanations.push_back({Explanation::Kind::Version, f_->name, detail});
+    c_.hand_over(adjoint_, seeds, values_of(adjoint_, at_step(make_zero(Int(32)))), result_);
+    c_.note(text(" folds its domain into each element: ", quoted(adjoint_->name),
+                 " keeps the adjoint before each iteration"),
+            result_);
   }
 
   const UpdateContext& c_;
@@ -158,10 +121,10 @@ class Fold {
 }  // namespace
 
 bool is_fold(const UpdateContext& c) {
-  const bool everywhere = std::all_of(c.pure.begin(), c.pure.end(), [](bool p) { return p; });
+  const bool everywhere = std::ranges::all_of(c.pure, [](bool p) { return p; });
   const std::vector<Expr> reads = c.self_reads();
   return everywhere && !c.definition.rvars.empty() &&
-         std::all_of(reads.begin(), reads.end(), [&](const Expr& read) {
+         std::ranges::all_of(reads, [&](const Expr& read) {
            return same_args(as_call_of(read, c.f)->args, c.write);
          });
 }

@@ -4,6 +4,7 @@
 
 #include "diagnostics/error.h"
 #include "ir/build.h"
+#include "ir/lists.h"
 #include "simplify/simplify.h"
 
 namespace retrograde::ir {
@@ -18,9 +19,7 @@ double least_product(const std::vector<Expr>& extents) {
 }
 
 double least_iterations(const std::vector<ReductionVariable>& loops) {
-  std::vector<Expr> extents;
-  for (const ReductionVariable& r : loops) extents.push_back(r.extent);
-  return least_product(extents);
+  return least_product(mapped(loops, &ReductionVariable::extent));
 }
 
 void check_numbers(const UpdateContext& context, double count, const std::string& what) {

@@ -6,11 +6,10 @@
 
 #include "autodiff/sweeps/carried_sums.h"
 #include "autodiff/time/checkpoint.h"
-#include "autodiff/updates/update_relations.h"
 #include "autodiff/updates/versions.h"
 #include "frontend/language/var.h"
-#include "graph/define.h"
 #include "ir/build.h"
+#include "ir/lists.h"
 #include "simplify/simplify.h"
 
 namespace retrograde::ir {
@@ -82,22 +81,14 @@ class Recurrence {
   }
 
   void mark(std::vector<SelfRead>& reads, const SweepResult& sweep) const {
-    std::set<Expr, StructuralLess> carrying, needed;
-    auto need = [&](const Expr& e) {
-      walk(e, [&](const Expr& node) {
-        if (as_call_of(node, f_)) needed.insert(node);
-        return true;
-      });
-    };
+    std::set<Expr, StructuralLess> carrying;
     for (const LeafAdjoint& leaf : sweep.leaves) {
       if (as_call_of(leaf.leaf, f_)) carrying.insert(leaf.leaf);
-      need(leaf.adjoint);
-      // Where something is read may be computed from values of f.
-      for_each_child(leaf.leaf, need);
     }
+    const std::vector<Expr> needed = c_.needed_reads(sweep);
     for (SelfRead& r : reads) {
       r.carries_adjoint = carrying.contains(r.call);
-      r.is_needed = needed.contains(r.call);
+      r.is_needed = std::ranges::any_of(needed, [&](const Expr& e) { return equal(e, r.call); });
     }
   }
 
@@ -118,9 +109,8 @@ class Recurrence {
                                     : r.relation.always_new
                                         ? after
                                         : make_select(r.relation.sees_new_condition, after, before);
-      explain(Explanation::Kind::Version,
-              text("update ", c_.query.stage - 1, ": the value of ",
-                   point_text(f_->name, call->args), " is kept in a copy"));
+      c_.note(text(": the value of ", point_text(f_->name, call->args), " is kept in a copy"),
+              result_);
     }
     for (const auto& [stages, copy] : prefixes_) c_.take_room(copy, c_.extents(), result_);
     return true;
@@ -135,48 +125,37 @@ class Recurrence {
   // already.
   void own_current() {
     if (c_.query.extendable) return;
-    std::vector<Expr> initial;
-    for (size_t k = 0; k < c_.values.size(); ++k)
-      initial.push_back(call_value(result_.current.func, c_.point, static_cast<int>(k)));
     result_.current =
-        make_adjoint(c_.query.target, f_->name + "_adj_update" + std::to_string(c_.query.stage - 1),
-                     {}, initial);
+        make_adjoint(c_.query.target, name_of_own(), {}, values_of(result_.current.func, c_.point));
   }
+
+  std::string name_of_own() const { return text(f_->name, "_adj_update", c_.query.stage - 1); }
 
   // ---- what is carried from element to element ----
 
   bool carries_long_sums(const std::vector<Contribution>& contributions) const {
     const auto& types = c_.query.target.types;
-    if (std::all_of(types.begin(), types.end(), [](Type t) { return t.bits() == 64; }))
-      return false;
+    if (std::ranges::all_of(types, [](Type t) { return t.bits() == 64; })) return false;
     double elements = 1;
     for (const ReverseLoop& loop : order_) {
       const LoopVariable& range = c_.query.target.region[static_cast<size_t>(loop.dim)];
-      auto extent = as_const_int(simplify(range.max - range.min + 1));
+      auto extent = constant_extent(range.range());
       elements *= extent ? static_cast<double>(*extent) : many_carried;
     }
-    std::vector<Expr> terms;
-    for (const Contribution& c : contributions) terms.push_back(c.adjoint);
-    return elements >= many_carried && carries_sums(terms, result_.current.func.get());
+    return elements >= many_carried &&
+           carries_sums(mapped(contributions, &Contribution::adjoint), result_.current.func.get());
   }
 
   void carry_in_double() {
     AdjointTarget wide = c_.query.target;
-    std::vector<Expr> initial, rounded;
-    for (size_t k = 0; k < c_.values.size(); ++k) {
-      wide.types[k] = Float(64);
-      initial.push_back(call_value(result_.current.func, c_.point, static_cast<int>(k)));
-    }
-    const std::string name = text(f_->name, "_adj_update", c_.query.stage - 1);
-    exact_ = make_adjoint(wide, name + "_carried", {}, initial).func;
-    for (size_t k = 0; k < c_.values.size(); ++k)
-      rounded.push_back(call_value(exact_, c_.point, static_cast<int>(k)));
-    result_.current = make_adjoint(c_.query.target, name, {}, rounded);
+    std::ranges::fill(wide.types, Float(64));
+    exact_ = make_adjoint(wide, name_of_own() + "_carried", {},
+                          values_of(result_.current.func, c_.point))
+                 .func;
+    result_.current = make_adjoint(c_.query.target, name_of_own(), {}, values_of(exact_, c_.point));
     result_.current.helpers = {exact_};
     result_.current.accumulator = exact_;
-    explain(Explanation::Kind::Version,
-            text("update ", c_.query.stage - 1,
-                 ": its adjoint carries sums along many elements, in double"));
+    c_.note(": its adjoint carries sums along many elements, in double", result_);
   }
   // The Func that runs backward.
   const FuncPtr& carrying() const { return exact_ ? exact_ : result_.current.func; }
@@ -189,8 +168,8 @@ class Recurrence {
     std::vector<LeafAdjoint> result;
     for (const LeafAdjoint& leaf : sweep.leaves) {
       if (!as_call_of(leaf.leaf, f_)) continue;
-      auto known = std::find_if(result.begin(), result.end(),
-                                [&](const LeafAdjoint& l) { return equal(l.leaf, leaf.leaf); });
+      auto known = std::ranges::find_if(
+          result, [&](const LeafAdjoint& l) { return equal(l.leaf, leaf.leaf); });
       if (known == result.end()) {
         result.push_back(leaf);
       } else {
@@ -206,8 +185,8 @@ class Recurrence {
     std::vector<Contribution> result;
     for (const LeafAdjoint& leaf : self_leaves(sweep)) {
       const Call* call = as_call_of(leaf.leaf, f_);
-      auto read = std::find_if(reads.begin(), reads.end(),
-                               [&](const SelfRead& r) { return equal(r.call, leaf.leaf); });
+      auto read =
+          std::ranges::find_if(reads, [&](const SelfRead& r) { return equal(r.call, leaf.leaf); });
       const UpdateRelations::Read& relation = read->relation;
       if (to_new ? relation.never_new : relation.always_new) continue;
       Expr adjoint = with_values(leaf.adjoint, c_.query.f, result_.self_values);
@@ -230,7 +209,7 @@ class Recurrence {
   bool find_order(const std::vector<SelfRead>& reads) {
     if (!relations_.predicate_is_affine()) return false;
     std::vector<UpdateRelations::Read> relevant;
-    std::vector<std::shared_ptr<ReductionDomainContents>> sums;
+    std::vector<DomainPtr> sums;
     for (const SelfRead& r : reads) {
       if (!r.carries_adjoint || r.relation.never_new) continue;
       relevant.push_back(r.relation);
@@ -247,8 +226,7 @@ class Recurrence {
   }
 
   void append_reverse_loop(const std::vector<Contribution>& contributions) {
-    auto rdom = std::make_shared<ReductionDomainContents>();
-    rdom->frozen = true;
+    const DomainPtr rdom = make_domain();
     Substitution place;
     // Terms that sum over a domain of their own: its variables run inside the element.
     const Gather* summed = nullptr;
@@ -258,8 +236,7 @@ class Recurrence {
     Expr first = const_true();
     if (summed) {
       for (const ReductionVariable& r : summed->rdom->vars) {
-        rdom->vars.push_back({unique_name(r.var), r.min, r.extent});
-        Expr v = variable(rdom->vars.back().var, Int(32), SymbolRef(rdom));
+        Expr v = add_loop(rdom, r.var, r.min, r.extent);
         place[r.var] = v;
         first = first && v == r.min;
       }
@@ -273,30 +250,20 @@ class Recurrence {
       if (summed && !c.gather.rdom) condition = condition && first;
       Expr term = as_carried(substitute(c.adjoint, place));
       term = make_select(condition, term, make_zero(term.type()));
-      Expr& sum = sums[static_cast<size_t>(c.component)];
-      sum = sum.defined() ? sum + term : term;
+      add_term(sums[static_cast<size_t>(c.component)], term);
     }
-    std::vector<Expr> values;
-    for (size_t k = 0; k < c_.values.size(); ++k) {
-      Expr self = call_value(carrying(), lhs, static_cast<int>(k));
-      values.push_back(sums[k].defined() ? self + cast_to(self.type(), sums[k]) : self);
-    }
-    append_update(carrying(), lhs, values, rdom->vars, {});
+    append_sums(carrying(), lhs, sums, rdom->vars, {});
     result_.current.stages.push_back(Accumulation::Scatter);
-    explain(Explanation::Kind::Version,
-            text("update ", c_.query.stage - 1, " is a recurrence: its adjoint runs backward"));
+    c_.note(" is a recurrence: its adjoint runs backward", result_);
   }
 
   // The element that the reverse loops are at; `place` learns it.
-  std::vector<Expr> reverse_place(const std::shared_ptr<ReductionDomainContents>& rdom,
-                                  Substitution& place) const {
+  std::vector<Expr> reverse_place(const DomainPtr& rdom, Substitution& place) const {
     std::vector<Expr> lhs = c_.point;
     for (const ReverseLoop& loop : order_) {
       size_t d = static_cast<size_t>(loop.dim);
       const LoopVariable& range = c_.query.target.region[d];
-      Expr extent = simplify(range.max - range.min + 1);
-      rdom->vars.push_back({unique_name("reverse"), make_zero(Int(32)), extent});
-      Expr v = variable(rdom->vars.back().var, Int(32), SymbolRef(rdom));
+      Expr v = add_loop(rdom, "reverse", make_zero(Int(32)), extent_of(range.range()));
       lhs[d] = simplify(loop.descending ? range.max - v : range.min + v);
       place[f_->args[d]] = lhs[d];
     }
@@ -315,13 +282,9 @@ class Recurrence {
   // The adjoint before the stage: 0 where the stage writes, plus what the stage read of older
   // values. Values of a Tuple that the stage leaves alone keep their adjoint.
   void start_previous(const Expr& written, const std::vector<Contribution>& contributions) {
-    std::vector<Expr> initial;
-    for (size_t k = 0; k < c_.values.size(); ++k) {
-      Expr a = call_value(result_.current.func, c_.point, static_cast<int>(k));
-      initial.push_back(make_select(simplify(written), make_zero(a.type()), a));
-    }
-    result_.previous =
-        make_adjoint(c_.query.target, name_before(*f_, c_.query.stage), contributions, initial);
+    std::vector<Expr> initial = values_of(result_.current.func, c_.point);
+    for (Expr& a : initial) a = make_select(simplify(written), make_zero(a.type()), a);
+    result_.previous = c_.adjoint_before(initial, contributions);
   }
 
   // Which elements the stage writes, over `point`; undefined: not known. With a predicate on data:
@@ -337,10 +300,6 @@ class Recurrence {
       written = written || condition;
     }
     return written;
-  }
-
-  void explain(Explanation::Kind kind, const std::string& detail) {
-    result_.explanations.push_back({kind, f_->name, detail});
   }
 
   const UpdateContext& c_;

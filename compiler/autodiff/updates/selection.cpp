@@ -1,15 +1,14 @@
 #include "autodiff/updates/selection.h"
 
-#include "autodiff/sweeps/accumulation.h"
-#include "autodiff/sweeps/regions.h"
-#include "autodiff/sweeps/reverse_sweep.h"
+#include "autodiff/sweeps/made_definitions.h"
 #include "autodiff/updates/versions.h"
 #include "frontend/language/var.h"
 #include "graph/define.h"
-#include "graph/function.h"
 #include "graph/own_reads.h"
 #include "ir/build.h"
 #include "ir/equal.h"
+#include "ir/lets.h"
+#include "ir/lists.h"
 #include "ir/memory_reads.h"
 #include "ir/variables.h"
 #include "ir/visit.h"
@@ -64,20 +63,14 @@ class SelectionFinder {
   }
 
   FuncPtr make_winner(const Expr& condition) const {
-    FuncPtr w = make_func(Role::Winner);
-    w->name = claim_name(f_->name + "_winner");
-    w->made->of = f_->name;
-    std::vector<Expr> args = variables_of(f_->args), initial;
-    FuncPtr before = stage_ > 1 ? clone_prefix(f_, stage_) : nullptr;
-    for (size_t k = 0; k < f_->types.size(); ++k) {
-      initial.push_back(before ? call_value(before, args, static_cast<int>(k))
-                               : f_->pure->values[k]);
-    }
+    FuncPtr w = make_func(Role::Winner, f_->name + "_winner", f_->name);
+    std::vector<Expr> args = variables_of(f_->args);
+    std::vector<Expr> initial =
+        stage_ > 1 ? values_of(clone_prefix(f_, stage_), args) : f_->pure->values;
     initial.push_back(make_const(Int(32), -1));
     define_pure(w, args, initial);
-    std::vector<Expr> values;
-    for (size_t k = 0; k < f_->types.size(); ++k)
-      values.push_back(call_instead(without_lets(definition_.values[k]), f_, w));
+    std::vector<Expr> values = mapped(
+        definition_.values, [&](const Expr& e) { return call_instead(without_lets(e), f_, w); });
     int index = static_cast<int>(f_->types.size());
     Expr old = call_value(w, definition_.args, index);
     values.push_back(

@@ -1,7 +1,5 @@
 #include "autodiff/updates/tape.h"
 
-#include <algorithm>
-
 #include "autodiff/sweeps/local_derivative.h"
 #include "autodiff/updates/recurrence.h"
 #include "autodiff/updates/tape_layout.h"
@@ -11,7 +9,7 @@
 #include "graph/define.h"
 #include "graph/function.h"
 #include "ir/build.h"
-#include "simplify/simplify.h"
+#include "ir/lists.h"
 
 namespace retrograde::ir {
 
@@ -52,20 +50,12 @@ class Tape {
 
   // A tape whose elements are those of `from`, and whose other slots are 0.
   FuncPtr begin_tape(const std::string& name, const FuncPtr& from) const {
-    FuncPtr tape = make_func(Role::Tape);
-    tape->made->of = f_->name;
-    tape->name = claim_name(name);
-    auto rdom = std::make_shared<ReductionDomainContents>();
-    rdom->frozen = true;
-    rdom->vars.push_back({unique_name("element"), make_zero(Int(32)), layout_.elements()});
-    const Expr number = variable(rdom->vars[0].var, Int(32), SymbolRef(rdom));
-    std::vector<Expr> zeros, values;
-    for (size_t k = 0; k < f_->types.size(); ++k) {
-      values.push_back(call_value(from, layout_.element(number), static_cast<int>(k)));
-      zeros.push_back(make_zero(values.back().type()));
-    }
-    define_pure(tape, layout_.with_pure(layout_.slot()), zeros);
-    append_update(tape, layout_.with_pure(number), values, rdom->vars, {});
+    FuncPtr tape = make_func(Role::Tape, name, f_->name);
+    const DomainPtr domain = make_domain();
+    const Expr number = add_loop(domain, "element", make_zero(Int(32)), layout_.elements());
+    define_pure(tape, layout_.with_pure(layout_.slot()), mapped(from->types, make_zero));
+    append_update(tape, layout_.with_pure(number), values_of(from, layout_.element(number)),
+                  domain->vars, {});
     return tape;
   }
 
@@ -76,12 +66,7 @@ class Tape {
 
   // a(i), for the iteration at hand.
   std::vector<Expr> saved_seeds() const {
-    std::vector<Expr> seeds;
-    for (size_t k = 0; k < f_->types.size(); ++k) {
-      seeds.push_back(f_->types[k].is_float() ? at(adjoint_, layout_.elements() + now_, k)
-                                              : Expr());
-    }
-    return seeds;
+    return c_.adjoints_at(adjoint_, layout_.with_pure(layout_.elements() + now_));
   }
 
   // ---- kept values ----
@@ -119,8 +104,7 @@ class Tape {
       result_.self_values[needed_[i]] =
           at(tape, kept_slot(kept_at_[i]), static_cast<size_t>(call->component));
     }
-    result_.helpers.push_back(before);
-    result_.helpers.push_back(tape);
+    append(result_.helpers, {before, tape});
     explain_kept(tape, width);
   }
 
@@ -136,11 +120,10 @@ class Tape {
   }
 
   void explain_kept(const FuncPtr& tape, int width) {
-    int bytes = 0;
-    for (Type t : f_->types) bytes += t.bytes();
-    explain(text("update ", c_.query.stage - 1, " overwrites values that its partials need: ",
-                 quoted(tape->name), " keeps ", width, width == 1 ? " place" : " places", " of ",
-                 bytes, " bytes in each iteration"));
+    c_.note(text(" overwrites values that its partials need: ", quoted(tape->name), " keeps ",
+                 width, width == 1 ? " place" : " places", " of ", total_bytes(f_->types),
+                 " bytes in each iteration"),
+            result_);
   }
 
   // Reads of f become reads of its elements on the tape.
@@ -150,9 +133,7 @@ class Tape {
     });
   }
   std::vector<Expr> all_values(const FuncPtr& tape, const Expr& slot) const {
-    std::vector<Expr> values;
-    for (size_t k = 0; k < f_->types.size(); ++k) values.push_back(at(tape, slot, k));
-    return values;
+    return values_of(tape, layout_.with_pure(slot));
   }
 
   SlotWrite write_step(const FuncPtr& tape) const {
@@ -187,23 +168,18 @@ class Tape {
       Expr term = cast_to(value.type(), leaf.adjoint);
       value = value + make_select(inside, term, make_zero(term.type()));
     }
-    Substitution reversed;
-    for (const ReductionVariable& r : c_.definition.rvars)
-      reversed[r.var] = mirrored(r, variable(r.var));
     Expr predicate = layout_.is_inside(c_.write);
     if (c_.domain.predicate.defined()) predicate = c_.domain.predicate && predicate;
-    append_steps(adjoint_, steps, reversed, predicate);
+    append_steps(adjoint_, steps, mirrored(c_.definition.rvars), predicate);
   }
 
   // One update: in step s of an iteration, step s's place gets its values.
   void append_steps(const FuncPtr& tape, const std::vector<SlotWrite>& steps,
                     const Substitution& reversed, const Expr& predicate) {
-    auto rdom = std::make_shared<ReductionDomainContents>();
-    rdom->frozen = true;
+    const DomainPtr domain = make_domain();
     int count = static_cast<int>(steps.size());
-    rdom->vars.push_back({unique_name("step"), make_zero(Int(32)), make_const(Int(32), count)});
-    Expr step = variable(rdom->vars[0].var, Int(32), SymbolRef(rdom));
-    const Substitution names = add_copies(rdom, c_.definition.rvars);
+    Expr step = add_loop(domain, "step", make_zero(Int(32)), make_const(Int(32), count));
+    const Substitution names = add_copies(domain, c_.definition.rvars);
     auto here = [&](const Expr& e) {
       Expr order = reversed.empty() ? e : substitute(e, reversed);
       return with_values(substitute(order, names), c_.query.f, {});
@@ -220,12 +196,11 @@ class Tape {
       values.push_back(chosen([&](const SlotWrite& s) { return cast_to(type, s.values[k]); }));
     }
     Expr place = chosen([](const SlotWrite& s) { return s.place; });
-    append_update(tape, layout_.with_pure(place), values, rdom->vars,
+    append_update(tape, layout_.with_pure(place), values, domain->vars,
                   predicate.defined() ? here(kept(predicate)) : Expr());
-    std::vector<Expr> loops;
-    for (const ReductionVariable& r : c_.definition.rvars) loops.push_back(r.extent);
-    tape->made->work = {
-        work_of(steps, tape, std::move(loops), [&](const Expr& e) { return kept(e); })};
+    tape->made->work = {work_of(steps, tape,
+                                mapped(c_.definition.rvars, &ReductionVariable::extent),
+                                [&](const Expr& e) { return kept(e); })};
   }
   Expr kept(const Expr& e) const { return replaced(e, result_.self_values); }
 
@@ -238,21 +213,12 @@ class Tape {
       Expr a = at(adjoint_, layout_.slot_of(c_.point), k);
       before.push_back(make_select(inside, a, make_zero(a.type())));
     }
-    result_.previous = make_adjoint(c_.query.target, name_before(*f_, c_.query.stage), {}, before);
-    result_.helpers.push_back(adjoint_);
-    result_.values = c_.values;
-    result_.keeps_steps = true;
-    result_.seeds = seeds_;
-    IterationDomain domain = c_.domain;
-    if (domain.predicate.defined())
-      domain.predicate = with_values(domain.predicate, c_.query.f, result_.self_values);
-    result_.domains = {domain};
-    explain(text("update ", c_.query.stage - 1, " is run backward one iteration after the other: ",
-                 quoted(adjoint_->name), " keeps the adjoint of each"));
-  }
-
-  void explain(const std::string& detail) {
-    result_.explanations.push_back({Explanation::Kind::Version, f_->name, detail});
+    c_.hand_over(adjoint_, seeds_, before, result_);
+    Expr& predicate = result_.domains[0].predicate;
+    predicate = with_values(predicate, c_.query.f, result_.self_values);
+    c_.note(text(" is run backward one iteration after the other: ", quoted(adjoint_->name),
+                 " keeps the adjoint of each"),
+            result_);
   }
 
   const UpdateContext& c_;

@@ -1,10 +1,10 @@
 #include "autodiff/updates/tape_layout.h"
 
-#include "autodiff/updates/numbering.h"
 #include "diagnostics/error.h"
 #include "frontend/language/var.h"
 #include "graph/define.h"
 #include "ir/build.h"
+#include "ir/lists.h"
 #include "ir/visit.h"
 #include "simplify/simplify.h"
 
@@ -22,7 +22,8 @@ TapeLayout::TapeLayout(const UpdateContext& context)
     : c_(context),
       box_(context.query.regions.of(context.f)),
       slot_(variable(unique_name("slot"))),
-      elements_(make_one(Int(32))) {
+      elements_(make_one(Int(32))),
+      scope_(scope_of(context.domain.vars)) {
   for (size_t d = 0; d < c_.pure.size(); ++d) {
     extents_.emplace_back();
     strides_.emplace_back();
@@ -33,12 +34,11 @@ TapeLayout::TapeLayout(const UpdateContext& context)
                   text("the region of ", quoted(c_.f->name), " has no bounds in dimension ", d),
                   "Clamp the index");
     }
-    extents_.back() = simplify(box_[d].max - box_[d].min + 1);
+    extents_.back() = extent_of(box_[d]);
     strides_.back() = elements_;
     check_numbers(c_, least_product(extents_), "the elements that an update may reach");
     elements_ = simplify(elements_ * extents_.back());
   }
-  for (const LoopVariable& v : c_.domain.vars) scope_.push(v.name, {v.min, v.max});
 }
 
 std::vector<Expr> TapeLayout::with_pure(const Expr& slot) const {
@@ -51,9 +51,7 @@ std::vector<Expr> TapeLayout::with_pure(const Expr& slot) const {
 }
 
 bool TapeLayout::is_always_inside(const Expr& index, size_t d) const {
-  Interval found = bounds_of(index, scope_);
-  return found.is_bounded() && can_prove(found.min >= box_[d].min) &&
-         can_prove(found.max <= box_[d].max);
+  return can_prove_inside(bounds_of(index, scope_), box_[d]);
 }
 
 Expr TapeLayout::slot_of(const std::vector<Expr>& args) const {
@@ -80,12 +78,9 @@ Expr TapeLayout::is_inside(const std::vector<Expr>& args) const {
 
 std::vector<Expr> TapeLayout::element(const Expr& any_number) const {
   Expr number = clamp(any_number, make_zero(Int(32)), elements_ - 1);
-  std::vector<Expr> point;
-  for (size_t d = 0; d < c_.pure.size(); ++d) {
-    point.push_back(c_.pure[d] ? c_.point[d]
-                               : simplify(number / strides_[d] % extents_[d] + box_[d].min));
-  }
-  return point;
+  return numbered(c_.pure.size(), [&](size_t d) {
+    return c_.pure[d] ? c_.point[d] : simplify(number / strides_[d] % extents_[d] + box_[d].min);
+  });
 }
 
 AdjointWork work_of(const std::vector<SlotWrite>& writes, const FuncPtr& func,

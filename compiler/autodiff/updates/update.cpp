@@ -9,7 +9,6 @@
 #include "autodiff/updates/selection.h"
 #include "autodiff/updates/tape.h"
 #include "autodiff/updates/update_context.h"
-#include "autodiff/updates/update_relations.h"
 #include "autodiff/updates/versions.h"
 #include "diagnostics/error.h"
 #include "ir/build.h"
@@ -27,8 +26,7 @@ class UpdateDifferentiation {
 
   UpdateAdjoint run() {
     check_predicate();
-    bool fixed_places =
-        std::none_of(c_.write.begin(), c_.write.end(), [&](const Expr& e) { return calls(e, f_); });
+    bool fixed_places = std::ranges::none_of(c_.write, [&](const Expr& e) { return calls(e, f_); });
     if (fixed_places && (accumulates() || selects() || is_recurrence())) return std::move(result_);
     if (wants_checkpoints(c_)) {
       differentiate_by_checkpoints(c_, result_);
@@ -71,8 +69,7 @@ class UpdateDifferentiation {
           return t.defined() && f.defined() ? make_select(n.condition, t, f) : Expr();
         },
         [&](const Call& n) -> Expr {
-          bool marker = n.call_type == CallType::Operator && op_info(n.op).cls == OpClass::Marker;
-          return marker && n.op != Op::stop_gradient ? added_to(n.args[0], k) : Expr();
+          return n.is_marker() && n.op != Op::stop_gradient ? added_to(n.args[0], k) : Expr();
         },
         [&](const ExprNode&) { return Expr(); });
   }
@@ -107,20 +104,20 @@ class UpdateDifferentiation {
     int index = selection->index_value;
     Expr is_winner = call_value(winner, c_.write, index) == mine;
     Expr untouched = call_value(winner, c_.point, index) < 0;
-    std::vector<Expr> initial;
-    for (size_t k = 0; k < c_.values.size(); ++k) {
+    std::vector<Expr> initial = values_of(result_.current.func, c_.point);
+    result_.values.resize(initial.size());
+    for (size_t k = 0; k < initial.size(); ++k) {
       const Expr& taken = selection->taken[k];
-      Expr a = call_value(result_.current.func, c_.point, static_cast<int>(k));
-      result_.values.push_back(
-          taken.defined() ? make_select(is_winner, taken, make_zero(taken.type())) : Expr());
-      initial.push_back(taken.defined() ? make_select(untouched, a, make_zero(a.type())) : a);
+      if (!taken.defined()) continue;
+      result_.values[k] = make_select(is_winner, taken, make_zero(taken.type()));
+      initial[k] = make_select(untouched, initial[k], make_zero(initial[k].type()));
     }
     result_.domains = {c_.domain};
-    result_.previous = make_adjoint(c_.query.target, name_before(*f_, c_.query.stage), {}, initial);
+    result_.previous = c_.adjoint_before(initial);
     result_.helpers.push_back(winner);
-    explain(Explanation::Kind::Version,
-            text("update ", c_.query.stage - 1, " selects: ", quoted(winner->name),
-                 " computes again which iteration wrote each element last"));
+    c_.note(text(" selects: ", quoted(winner->name),
+                 " computes again which iteration wrote each element last"),
+            result_);
     return true;
   }
 
@@ -139,23 +136,17 @@ class UpdateDifferentiation {
       return true;
     } catch (const isl::exception& e) {
       c_.query.versions = untouched;
-      explain(Explanation::Kind::Version,
-              text("update ", c_.query.stage - 1, ": isl gave up on its index sets: ", e.what()));
+      c_.note(text(": isl gave up on its index sets: ", e.what()), result_);
       return false;
     }
   }
 
   void explain_unused_budget() {
-    explain(Explanation::Kind::Performance,
-            text("update ", c_.query.stage - 1,
-                 " overwrites nothing that is needed: ", quoted(f_->name),
+    c_.note(text(" overwrites nothing that is needed: ", quoted(f_->name),
                  " keeps its steps along a dimension of its own, and the budget for checkpoints is "
                  "not used; written in place, as f(x) = g(f(x), t), it is run backward from kept "
-                 "states"));
-  }
-
-  void explain(Explanation::Kind kind, const std::string& detail) {
-    result_.explanations.push_back({kind, f_->name, detail});
+                 "states"),
+            result_, Explanation::Kind::Performance);
   }
 
   UpdateContext c_;

@@ -6,6 +6,7 @@
 #include "diagnostics/error.h"
 #include "graph/define.h"
 #include "ir/build.h"
+#include "ir/lists.h"
 #include "ir/print.h"
 #include "simplify/simplify.h"
 
@@ -22,15 +23,11 @@ std::string point_text(const std::string& name, const std::vector<Expr>& args) {
 }
 
 size_t place_number(std::vector<std::vector<Expr>>& places, const std::vector<Expr>& place) {
-  const auto known = std::find_if(places.begin(), places.end(),
-                                  [&](const auto& p) { return same_args(p, place); });
+  const auto known =
+      std::ranges::find_if(places, [&](const auto& p) { return same_args(p, place); });
   const size_t number = static_cast<size_t>(known - places.begin());
   if (known == places.end()) places.push_back(place);
   return number;
-}
-
-std::string name_before(const FuncContents& f, int stage) {
-  return f.name + "_adj_before_update" + std::to_string(stage - 1);
 }
 
 IterationDomain restricted(IterationDomain domain, const Expr& condition) {
@@ -154,13 +151,15 @@ SweepResult UpdateContext::sweep(const std::vector<Expr>& seeds) const {
       [&](const Expr& leaf) { return query.ranges.may_be_infinite(leaf); });
 }
 
+std::vector<Expr> UpdateContext::adjoints_at(const FuncPtr& adjoint,
+                                             const std::vector<Expr>& place) const {
+  return numbered(values.size(), [&](size_t k) {
+    return f->types[k].is_float() ? call_value(adjoint, place, static_cast<int>(k)) : Expr();
+  });
+}
+
 std::vector<Expr> UpdateContext::adjoints_at_write(const FuncPtr& adjoint) const {
-  std::vector<Expr> seeds;
-  for (size_t k = 0; k < values.size(); ++k) {
-    seeds.push_back(f->types[k].is_float() ? call_value(adjoint, write, static_cast<int>(k))
-                                           : Expr());
-  }
-  return seeds;
+  return adjoints_at(adjoint, write);
 }
 
 SweepResult UpdateContext::sweep_at_write(const FuncPtr& adjoint) const {
@@ -202,10 +201,30 @@ void UpdateContext::take_room(const FuncPtr& copy, const std::vector<Expr>& exte
 }
 
 std::vector<Expr> UpdateContext::extents() const {
-  std::vector<Expr> result;
-  for (const Interval& side : query.regions.of(f))
-    result.push_back(side.is_bounded() ? side.max - side.min + 1 : Expr());
-  return result;
+  return mapped(query.regions.of(f), [](const Interval& side) {
+    return side.is_bounded() ? side.max - side.min + 1 : Expr();
+  });
+}
+
+AdjointFunc UpdateContext::adjoint_before(const std::vector<Expr>& initial,
+                                          const std::vector<Contribution>& contributions) const {
+  return make_adjoint(query.target, text(f->name, "_adj_before_update", query.stage - 1),
+                      contributions, initial);
+}
+
+void UpdateContext::hand_over(const FuncPtr& steps, const std::vector<Expr>& seeds,
+                              const std::vector<Expr>& before, UpdateAdjoint& result) const {
+  result.previous = adjoint_before(before);
+  result.helpers.push_back(steps);
+  result.values = values;
+  result.keeps_steps = true;
+  result.seeds = seeds;
+  result.domains = {domain};
+}
+
+void UpdateContext::note(const std::string& what, UpdateAdjoint& result,
+                         Explanation::Kind kind) const {
+  result.explanations.push_back({kind, f->name, text("update ", query.stage - 1, what)});
 }
 
 Expr replaced(const Expr& e, const SelfValues& values) {

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "autodiff/sweeps/made_definitions.h"
 #include "autodiff/sweeps/reverse_sweep.h"
 #include "autodiff/updates/update.h"
 #include "graph/own_reads.h"
@@ -19,9 +20,6 @@ IterationDomain restricted(IterationDomain domain, const Expr& condition);
 
 // The number of a place among those known, which a new one joins: Tuples read several values at one.
 size_t place_number(std::vector<std::vector<Expr>>& places, const std::vector<Expr>& place);
-
-// Name of the adjoint of f before update definition number `stage` - 1.
-std::string name_before(const FuncContents& f, int stage);
 
 struct UpdateContext {
   explicit UpdateContext(const UpdateQuery& query);
@@ -38,6 +36,8 @@ struct UpdateContext {
   // Distinct reads of f on the right-hand side, those inside of another's index first.
   std::vector<Expr> self_reads() const;
   bool reads_self() const { return !self_reads().empty(); }
+  // Values of `adjoint` at a place; undefined for values of f that are no floats.
+  std::vector<Expr> adjoints_at(const FuncPtr& adjoint, const std::vector<Expr>& place) const;
   std::vector<Expr> adjoints_at_write(const FuncPtr& adjoint) const;
   // The values, with `seeds` as their adjoints (undefined: none), down to reads of f and to what is
   // wanted.
@@ -59,6 +59,17 @@ struct UpdateContext {
                  UpdateAdjoint& result) const;
   // Extents of what is read of f; undefined ones are not known.
   std::vector<Expr> extents() const;
+
+  // The adjoint of f before the update.
+  AdjointFunc adjoint_before(const std::vector<Expr>& initial,
+                             const std::vector<Contribution>& contributions = {}) const;
+  // The result where `steps` runs the iterations backward: `seeds`, its values at hand in each, and
+  // those `before` all of them.
+  void hand_over(const FuncPtr& steps, const std::vector<Expr>& seeds,
+                 const std::vector<Expr>& before, UpdateAdjoint& result) const;
+  // Explains the update, of which `what` goes on to tell.
+  void note(const std::string& what, UpdateAdjoint& result,
+            Explanation::Kind kind = Explanation::Kind::Version) const;
 };
 
 // What `values` has other expressions for becomes these.

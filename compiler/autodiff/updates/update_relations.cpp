@@ -1,6 +1,10 @@
 #include "autodiff/updates/update_relations.h"
 
+#include <ranges>
+
+#include "autodiff/inversion/isl_maps.h"
 #include "ir/build.h"
+#include "ir/conjuncts.h"
 #include "ir/variables.h"
 #include "ir/visit.h"
 
@@ -28,20 +32,11 @@ UpdateRelations::UpdateRelations(const IterationDomain& domain, const std::vecto
 isl::set UpdateRelations::domain_set(IslBridge& bridge, const IterationDomain& domain,
                                      bool& exact) const {
   isl::set result = bridge.universe();
-  for (int i = 0; i < bridge.rank(); ++i) {
-    const LoopVariable& v = domain.vars[static_cast<size_t>(i)];
-    if (v.min.defined()) result = result.intersect(bridge.dim(i).ge_set(bridge.bound(v.min)));
-    if (v.max.defined()) result = result.intersect(bridge.dim(i).le_set(bridge.bound(v.max)));
-  }
-  std::vector<Expr> open;
-  if (domain.predicate.defined()) open.push_back(domain.predicate);
-  while (!open.empty()) {
-    Expr e = open.back();
-    open.pop_back();
-    if (const auto* both = e.as<And>()) {
-      open.push_back(both->a);
-      open.push_back(both->b);
-    } else if (auto s = bridge.condition(e)) {
+  for (const isl::set& range : bridge.ranges_of(domain.vars)) result = result.intersect(range);
+  std::vector<Expr> conditions;
+  add_conjuncts(domain.predicate, conditions);
+  for (const Expr& e : conditions | std::views::reverse) {
+    if (auto s = bridge.condition(e)) {
       result = result.intersect(*s);
     } else {
       exact = false;
@@ -52,16 +47,12 @@ isl::set UpdateRelations::domain_set(IslBridge& bridge, const IterationDomain& d
 
 std::optional<isl::map> UpdateRelations::access(IslBridge& bridge,
                                                 const std::vector<Expr>& indices) const {
-  isl::map result = isl::manage(
-      isl_map_universe(isl_space_alloc(bridge.ctx(), 0, static_cast<unsigned>(bridge.rank()),
-                                       static_cast<unsigned>(indices.size()))));
-  for (size_t d = 0; d < indices.size(); ++d) {
-    auto e = bridge.affine(indices[d]);
+  const int dims = static_cast<int>(indices.size());
+  isl::map result = universe_map(bridge.ctx(), static_cast<size_t>(bridge.rank()), indices.size());
+  for (int d = 0; d < dims; ++d) {
+    auto e = bridge.affine(indices[static_cast<size_t>(d)]);
     if (!e) return std::nullopt;
-    isl_map* one = isl_map_from_pw_aff(e->copy());
-    one = isl_map_insert_dims(one, isl_dim_out, 1, static_cast<unsigned>(indices.size() - d - 1));
-    one = isl_map_insert_dims(one, isl_dim_out, 0, static_cast<unsigned>(d));
-    result = result.intersect(isl::manage(one));
+    result = result.intersect(output_equals(*e, d, dims));
   }
   return result;
 }
@@ -155,9 +146,8 @@ std::vector<ReverseLoop> UpdateRelations::first_guess() const {
 
 bool UpdateRelations::is_valid_order(const std::vector<ReverseLoop>& loops,
                                      const std::vector<Read>& reads) const {
-  int n = static_cast<int>(write_indices_.size());
-  isl::map same = isl::manage(isl_map_universe(
-      isl_space_alloc(bridge_.ctx(), 0, static_cast<unsigned>(n), static_cast<unsigned>(n))));
+  const size_t n = write_indices_.size();
+  isl::map same = universe_map(bridge_.ctx(), n, n);
   isl::map order = empty_like(same);  // {element read -> element written, which is visited earlier}
   for (auto l = loops.rbegin(); l != loops.rend(); ++l) {
     isl_map* step = l->descending

@@ -2,12 +2,11 @@
 
 #include <algorithm>
 
-#include "autodiff/sweeps/accumulation.h"
+#include "autodiff/sweeps/made_definitions.h"
 #include "diagnostics/error.h"
 #include "frontend/language/expr_ops.h"
 #include "frontend/language/var.h"
 #include "graph/define.h"
-#include "graph/function.h"
 #include "ir/build.h"
 #include "simplify/simplify.h"
 
@@ -23,9 +22,7 @@ constexpr const char* what_to_do =
 
 // In double: nothing overflows, and what is counted is exact as far as it matters.
 Expr bytes_of(const KeptVersions& versions) {
-  double size = 0;
-  for (Type t : versions.copy->types) size += t.bytes();
-  Expr bytes = make_const(Float(64), size);
+  Expr bytes = make_const(Float(64), static_cast<double>(total_bytes(versions.copy->types)));
   for (const Expr& any_extent : versions.extents) {
     if (!any_extent.defined()) return {};
     const Expr extent = simplify(any_extent);
@@ -70,9 +67,7 @@ FuncPtr VersionBudget::take(const KeptVersions& versions, std::vector<Explanatio
 
 // A scalar that is 0, or fails; the copy's pure definition reads it.
 FuncPtr VersionBudget::guard(const KeptVersions& versions, const Expr& bytes) const {
-  FuncPtr check = make_func(Role::VersionCheck);
-  check->name = claim_name(versions.copy->name + "_fits");
-  check->made->of = versions.primal;
+  FuncPtr check = make_func(Role::VersionCheck, versions.copy->name + "_fits", versions.primal);
   const Expr fits = bytes <= make_const(Float(64), static_cast<double>(rules_.bytes));
   const std::string asked = text("cannot ", versions.asked, ": ", rule(), ", but with those of ",
                                  quoted(versions.primal), " they are");

@@ -26,9 +26,9 @@ Expr iteration_number(const std::vector<ReductionVariable>& rvars);
 Expr iteration_count(const std::vector<ReductionVariable>& rvars);
 // What the loop is at when it runs backward, in the iteration that was `at` forward.
 Expr mirrored(const ReductionVariable& loop, const Expr& at);
+Substitution mirrored(const std::vector<ReductionVariable>& loops);  // each at its own variable
 // Adds loops over the same ranges to a domain: their variables, by those that they stand for.
-Substitution add_copies(const std::shared_ptr<ReductionDomainContents>& domain,
-                        const std::vector<ReductionVariable>& rvars);
+Substitution add_copies(const DomainPtr& domain, const std::vector<ReductionVariable>& rvars);
 // Steps of a loop differ in what they cost: only the one at hand is evaluated.
 Expr choose_step(const Expr& condition, const Expr& a, const Expr& b);
 

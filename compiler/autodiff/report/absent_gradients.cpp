@@ -1,0 +1,104 @@
+#include "autodiff/report/absent_gradients.h"
+
+#include "autodiff/report/zero_reasons.h"
+#include "autodiff/sweeps/custom_rules.h"
+#include "autodiff/sweeps/input_shape.h"
+#include "diagnostics/error.h"
+
+namespace retrograde::ir {
+
+namespace {
+
+class AbsentGradients {
+ public:
+  AbsentGradients(const AbsentQuery& query, SynthesisResult& result, SynthesisAccount& account)
+      : q_(query), result_(result), account_(account) {}
+
+  // What was asked for and got no contribution is zero, and says why.
+  void find_absent() {
+    for (const FuncPtr& f : q_.order) {
+      if (q_.covered.contains(f.get()) ||
+          result_.after_stage.contains({f.get(), f->stage_count() - 1}) ||
+          !is_wanted_zero(f.get(), f->name, is_floating(f->types), f->types[0]))
+        continue;
+      AdjointFunc zero = make_adjoint(q_.target_of(f.get()), f->name + "_adj", {});
+      for (int s = 0; s < f->stage_count(); ++s) result_.after_stage[{f.get(), s}] = zero.func;
+    }
+    for (const auto& p : parameters_of({q_.output})) {
+      if (result_.parameters.contains(p.get()) ||
+          !is_wanted_zero(p.get(), p->name, p->type.is_float(), p->type))
+        continue;
+      result_.parameters[p.get()] = make_adjoint(q_.target_of(p.get()), p->name + "_adj", {}).func;
+    }
+  }
+  // What was asked for and has nothing to do with the output.
+  void find_strangers() {
+    std::unordered_set<const Symbol*> reached;
+    for (const FuncPtr& f : q_.order) reached.insert(f.get());
+    for (const auto& p : parameters_of({q_.output})) reached.insert(p.get());
+    std::map<std::string, const Symbol*> strangers;  // by name: in an order that is always the same
+    for (const Symbol* symbol : q_.options.requested) {
+      if (symbol && !reached.contains(symbol)) strangers[shape_of(symbol).name] = symbol;
+    }
+    for (const auto& [name, symbol] : strangers) {
+      const InputShape shape = shape_of(symbol);
+      account_.add(Explanation::Kind::Zero, shape.name, "the output does not depend on it");
+      if (!shape.is_floating()) continue;
+      const auto* f = dynamic_cast<const FuncContents*>(symbol);
+      if (!f) result_.parameters[symbol] = zero_derivative(*symbol, "_adj");
+      for (int s = 0; f && s < f->stage_count(); ++s)
+        result_.after_stage[{f, s}] = zero_derivative(*symbol, "_adj");
+    }
+  }
+
+ private:
+  std::string without_path(const Symbol* symbol) const {
+    std::string result = "the output does not depend on its value by a differentiable path";
+    const char* separator = ": ";
+    for (const std::string& reason : zero_reasons(symbol, q_.order, [&](const FuncContents& f) {
+           return result_.after_stage.contains({&f, f.stage_count() - 1}) && !zero_.contains(&f);
+         })) {
+      result += separator + reason;
+      separator = "; ";
+    }
+    return result;
+  }
+  // Whether its gradient is a zero that somebody may ask for.
+  bool is_wanted_zero(const Symbol* symbol, const std::string& name, bool floating, Type type) {
+    if (!floating) {
+      account_.add(Explanation::Kind::Zero, name,
+                   "its type is " + to_string(type) + ": integers have no derivative");
+    } else if (q_.active.cancels(symbol)) {
+      account_.add(
+          Explanation::Kind::Zero, name,
+          "the output is the same for all of its values: it is what a softmax, a log-sum-exp or "
+          "a norm is shifted or scaled by, which cancels");
+      return true;
+    } else if (auto left = q_.options.left_out.find(symbol); left != q_.options.left_out.end()) {
+      account_.add(Explanation::Kind::NotRequested, name, "left out: " + left->second);
+    } else if (!q_.active.contains(symbol)) {
+      account_.add(Explanation::Kind::NotRequested, name,
+                   "nothing that was requested depends on it");
+    } else {
+      account_.add(Explanation::Kind::Zero, name, without_path(symbol));
+      zero_.insert(symbol);
+      return true;
+    }
+    return false;
+  }
+
+  const AbsentQuery& q_;
+  SynthesisResult& result_;
+  SynthesisAccount& account_;
+  std::unordered_set<const Symbol*> zero_;  // by no path
+};
+
+}  // namespace
+
+void explain_absent(const AbsentQuery& query, SynthesisResult& result, SynthesisAccount& account) {
+  AbsentGradients gradients(query, result, account);
+  gradients.find_absent();
+  gradients.find_strangers();
+}
+
+}  // namespace retrograde::ir

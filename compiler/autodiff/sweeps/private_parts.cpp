@@ -1,0 +1,235 @@
+#include "autodiff/sweeps/private_parts.h"
+
+#include <algorithm>
+
+#include "autodiff/sweeps/blocked_sums.h"
+#include "ir/build.h"
+#include "ir/print.h"
+#include "simplify/simplify.h"
+
+namespace retrograde::ir {
+
+namespace {
+
+// Parts of a privatised accumulation: enough for the threads of today's machines, few enough to sum
+// and to store.
+constexpr int part_count = 32;
+// Setting parts to zero and summing them may cost as much as this many elements an iteration; with
+// fewer parts than the least, a scatter stays one.
+constexpr double elements_an_iteration = 4;
+constexpr int least_parts = 4;
+// Elements of one part of a scatter, lanes included, that stay in a near cache.
+constexpr double near_elements = 1 << 14;
+// Bytes that all parts of one adjoint may take: what a large target has no room for is accumulated
+// in place, in parallel over its pure dimensions only.
+constexpr double private_bytes = 64 << 20;
+// Below so many elements, with so many iterations each, the pure dimensions alone do not fill a
+// machine: one tile of registers holds them, or a few do.
+constexpr double one_tile = 64, few_elements = 1024, many_iterations = 4096;
+// That a lane of a part adds up where there are several tiles, so that parts cost little beside it.
+constexpr double terms_a_lane = 8;
+// Iterations from which on lanes of their own are worth setting to zero and adding up.
+constexpr double lanes_pay = 16 * lane_count;
+
+class PartSizes {
+ public:
+  PartSizes(const AdjointTarget& target, const std::vector<Type>& types)
+      : target_(target), types_(types) {}
+
+  bool sums_many_terms(const Gather& g) const {
+    return g.rdom && (is_few_elements(g) || iterations_of(g, many_terms) >= many_terms);
+  }
+  // Whether the elements alone give too little to do in parallel, and each sums over many
+  // iterations.
+  bool is_worth_splitting(const Iterations& update) const {
+    const Gather& g = update.over;
+    return g.rdom && (leaves_lanes_idle(update) || is_few_elements(g));
+  }
+  bool is_few_elements(const Gather& g) const {
+    if (elements_of(g) > few_elements) return false;
+    if (parts_of(g) < least_parts) return false;
+    const double iterations = iterations_of(g, many_iterations);
+    const bool has_pure_dimension = std::ranges::find(g.pure, true) != g.pure.end();
+    return iterations >= (has_pure_dimension ? many_iterations : part_count * lane_count);
+  }
+  // Whether vectors of elements are worse than vectors of terms: rows of elements are shorter than
+  // one, as in a small kernel with many channels, or lie across what is read, as in a layer that
+  // mixes channels; while each element sums over long rows.
+  bool leaves_lanes_idle(const Iterations& update) const {
+    const Gather& g = update.over;
+    if (g.scatters || g.pure.empty() || target_.region.size() != g.pure.size()) return false;
+    const auto row = as_const_int(g.rdom->vars[0].extent);
+    const bool is_short = extent_of(target_.region[0]) * 2 <= lane_count;
+    return g.pure[0] && (is_short || reads_across(update)) && (!row || *row >= lane_count) &&
+           elements_of(g) <= near_elements && iterations_of(g, many_iterations) >= lanes_pay;
+  }
+  // Whether all that is read for neighbouring elements lies apart, and that for neighbouring terms
+  // together.
+  bool reads_across(const Iterations& update) const {
+    const std::string &row = target_.args[0], &term = update.rvars[0].var;
+    bool along = false, across = false;
+    const auto note = [&](const Expr& e) {
+      const auto* call = e.as<Call>();
+      if (!call || call->call_type == CallType::Operator || call->args.empty()) return true;
+      along |= uses_variable(call->args[0], row);
+      across |= uses_variable(call->args[0], term) &&
+                std::any_of(call->args.begin() + 1, call->args.end(),
+                            [&](const Expr& arg) { return uses_variable(arg, row); });
+      return true;
+    };
+    for (const Expr& sum : update.all.sums) {
+      if (sum.defined()) walk(sum, note);
+    }
+    return across && !along;
+  }
+  // Each part of a scatter holds every element that it may reach: the more elements for the
+  // iterations, the fewer parts. A power of two. One: there are only lanes. Where sizes are known
+  // at run time only, the most there may be.
+  int parts_of(const Gather& g) const {
+    if (!g.scatters && elements_of(g) > few_elements) return 1;
+    if (!g.scatters && elements_of(g) > one_tile) return parts_of_a_tile(g);
+    if (!g.scatters || target_.region.size() != g.pure.size()) return part_count;
+    const double elements = elements_of_target();
+    if (elements >= unknown_elements) return part_count;
+    const double most = iterations_of(g, many_iterations) * elements_of(g) * elements_an_iteration /
+                        std::max(elements, 1.0);
+    int parts = part_count;
+    while ((parts > most || parts * elements * bytes_an_element() > private_bytes) && parts > 1)
+      parts /= 2;
+    return parts;
+  }
+  // Parts for the threads of elements that a few tiles of registers hold: each has lanes of its own
+  // for every element, which are set to zero and added up.
+  int parts_of_a_tile(const Gather& g) const {
+    int parts = part_count;
+    while (parts > 1 && iterations_of(g, many_iterations) < parts * lane_count * terms_a_lane)
+      parts /= 2;
+    return parts;
+  }
+  double bytes_an_element() const { return total_bytes(types_); }
+  // `parts_of`, or as many of them as fit at run time.
+  Expr part_count_of(const Gather& g) const {
+    const Expr most = make_const(Int(32), parts_of(g));
+    if (!g.scatters || target_.region.size() != g.pure.size() ||
+        elements_of_target() < unknown_elements)
+      return most;
+    Expr fit = make_const(Int(64), static_cast<int64_t>(private_bytes / bytes_an_element()));
+    for (const LoopVariable& v : target_.region) {
+      if (!v.range().is_bounded()) return most;
+      fit = fit / max(cast_to(Int(64), v.max - v.min + 1), make_one(Int(64)));
+    }
+    return simplify(cast_to(Int(32), min(max(fit, make_one(Int(64))), cast_to(Int(64), most))));
+  }
+  // Lanes let a gather add in vectors. In a scatter, neighbouring iterations often meet in one
+  // element, and would wait for each other: lanes have elements of their own where these are few.
+  bool has_lanes(const Gather& g) const {
+    if (!g.scatters) return true;
+    if (target_.region.size() != g.pure.size()) return false;
+    const double elements = elements_of_target() * lane_count;
+    const double iterations = iterations_of(g, many_iterations) * elements_of(g);
+    return elements <= near_elements && elements * parts_of(g) <= iterations;
+  }
+  std::string note(const Gather& g, const Expr& count) const {
+    const double bytes = elements_of_target() * bytes_an_element();
+    if (!g.scatters || as_const_int(count) == 1) return "";
+    const std::string number = is_const(count) ? print(count) : text("at most ", parts_of(g));
+    const std::string each =
+        bytes >= unknown_elements ? "" : text(" of ", static_cast<int64_t>(bytes), " bytes each");
+    return text("accumulated in ", number, " private parts", each, ", as many as fit ",
+                static_cast<int64_t>(private_bytes), " bytes");
+  }
+
+ private:
+  double elements_of_target() const {
+    double elements = 1;
+    for (const LoopVariable& v : target_.region) elements *= extent_of(v);
+    return elements;
+  }
+  // A loop of unknown extent counts as `unknown` iterations.
+  static double iterations_of(const Gather& g, double unknown) {
+    double iterations = 1;
+    for (const ReductionVariable& r : g.rdom->vars) {
+      auto extent = as_const_int(r.extent);
+      iterations *= extent ? static_cast<double>(*extent) : unknown;
+    }
+    return iterations;
+  }
+  // Elements that the pure dimensions of the update run over; a great many when unknown.
+  double elements_of(const Gather& g) const {
+    double elements = 1;
+    for (size_t d = 0; d < g.pure.size(); ++d) {
+      if (!g.pure[d]) continue;
+      if (target_.region.size() != g.pure.size()) return unknown_elements;
+      elements *= extent_of(target_.region[d]);
+    }
+    return elements;
+  }
+  static double extent_of(const LoopVariable& v) {
+    auto extent = constant_extent(v.range());
+    return extent ? static_cast<double>(*extent) : unknown_elements;
+  }
+
+  const AdjointTarget& target_;
+  const std::vector<Type>& types_;
+};
+
+}  // namespace
+
+bool sums_many_terms(const Gather& g, const AdjointTarget& target, const std::vector<Type>& types) {
+  return PartSizes(target, types).sums_many_terms(g);
+}
+
+std::optional<PartPlan> plan_parts(const Iterations& update, const AdjointTarget& target,
+                                   const std::vector<Type>& types) {
+  const PartSizes sizes(target, types);
+  if (!sizes.is_worth_splitting(update)) return std::nullopt;
+  const Gather& g = update.over;
+  const Expr count = sizes.part_count_of(g);
+  return PartPlan{sizes.parts_of(g) > 1, count, sizes.has_lanes(g), sizes.note(g, count)};
+}
+
+// x = (part * chunk + rho) * lanes + lane for the outermost variable when it is the innermost too;
+// else lanes split the innermost and parts the outermost variable. Beyond the end the place is
+// clamped: what it reads must exist even where the condition is false. Both are cut off the steady
+// state, whose accumulators stay in registers.
+Slice slice_of(const Iterations& update, const Expr& lane, const Expr& part, const Expr& parts,
+               bool in_blocks) {
+  Slice slice;
+  slice.rvars = update.rvars;
+  const DomainPtr rdom = make_domain();
+  const size_t last = slice.rvars.size() - (update.has_taps ? 2 : 1);
+  for (size_t i = 0; i < slice.rvars.size(); ++i) {
+    ReductionVariable& r = slice.rvars[i];
+    std::string old = r.var;
+    Expr all = r.extent, min = r.min;
+    r = {unique_name(old), make_zero(Int(32)), all};
+    const bool in_parts = i == last && part.defined(), in_lanes = i == 0 && lane.defined();
+    if (in_lanes) r.extent = simplify((r.extent + (lane_count - 1)) / lane_count);
+    if (in_parts) r.extent = simplify((r.extent + (parts - 1)) / parts);
+    if ((in_parts || in_lanes) && in_blocks) r.extent = in_whole_blocks(r.extent);
+    Expr at = loop_variable(rdom, r.var);
+    if (in_parts) at = part * r.extent + at;
+    if (in_lanes) at = at * lane_count + lane;
+    if (in_parts || in_lanes) {
+      slice.conditions.push_back(likely(at < all));
+      at = binary(Kind::Min, likely(at), all - 1);
+      if (!as_const_int(all)) at = max(at, make_zero(Int(32)));  // it may be 0
+    }
+    slice.place[old] = min + at;
+  }
+  rdom->vars = slice.rvars;
+  return slice;
+}
+
+std::vector<Expr> parts_point(const Gather& g, const std::vector<Expr>& element, const Expr& lane,
+                              const Expr& part) {
+  std::vector<Expr> point;
+  if (lane.defined()) point.push_back(lane);
+  for (size_t d = 0; d < element.size(); ++d) {
+    if (g.scatters || g.pure[d]) point.push_back(element[d]);
+  }
+  if (part.defined()) point.push_back(part);
+  return point;
+}
+
+}  // namespace retrograde::ir
