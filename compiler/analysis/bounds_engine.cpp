@@ -174,8 +174,7 @@ Interval BoundsEngine::atom_bounds(const Expr& e) {
 // int(abs(a)): ends of the unsigned value in between say nothing of the sign when they are symbols.
 Interval BoundsEngine::cast_bounds(Type type, const Expr& value) {
   const auto* call = value.as<Call>();
-  if (call && (call->is_op(Op::abs) || call->is_op(Op::absd)) && call->args[0].type() == type &&
-      type.is_int()) {
+  if (call && call->is_op(Op::abs, Op::absd) && call->args[0].type() == type && type.is_int()) {
     return call->is_op(Op::abs)
                ? interval_abs(type, type, bounds(call->args[0]))
                : interval_absd(type, type, bounds(call->args[0]), bounds(call->args[1]));

@@ -58,8 +58,8 @@ class FootprintCollector {
       engine.bind(*let);
       return visit(let->body, engine);
     }
+    if (const Call* branch = as_op(e, Op::if_then_else)) return visit_branches(*branch, engine);
     const Call* call = e.as<Call>();
-    if (call && call->is_op(Op::if_then_else)) return visit_branches(*call, engine);
     if (call && (call->call_type == CallType::Func || call->call_type == CallType::Image))
       add(*call, engine);
     for_each_child(e, [&](const Expr& child) { visit(child, engine); });

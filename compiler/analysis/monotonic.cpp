@@ -99,7 +99,7 @@ class Direction {
 
   Monotonic of_call(const Expr& e, const Call& n) {
     if (n.is_likely()) return of(n.args[0]);
-    if (n.is_op(Op::promise_clamped) || n.is_op(Op::unsafe_promise_clamped))
+    if (n.is_op(Op::promise_clamped, Op::unsafe_promise_clamped))
       return both(of(n.args[0]), both(of(n.args[1]), of(n.args[2])));
     return constant_or_unknown(e);
   }

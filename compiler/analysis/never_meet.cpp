@@ -14,7 +14,6 @@
 
 #include "analysis/linear.h"
 #include "ir/build.h"
-#include "ir/conjuncts.h"
 #include "ir/equal.h"
 #include "ir/visit.h"
 

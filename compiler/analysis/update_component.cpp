@@ -7,9 +7,7 @@
 namespace retrograde::ir {
 
 bool is_bitwise(const Expr& e) {
-  const Call* call = e.as<Call>();
-  return call && (call->is_op(Op::bitwise_and) || call->is_op(Op::bitwise_or) ||
-                  call->is_op(Op::bitwise_xor) || call->is_op(Op::bitwise_not));
+  return as_op(e, Op::bitwise_and, Op::bitwise_or, Op::bitwise_xor, Op::bitwise_not);
 }
 
 // ---- the update as a function of x and of unknowns g ----

@@ -11,7 +11,6 @@
 #include "autodiff/sweeps/synthesis.h"
 #include "ir/build.h"
 #include "ir/lists.h"
-#include "ir/variables.h"
 #include "simplify/simplify.h"
 
 namespace retrograde {

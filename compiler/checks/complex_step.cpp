@@ -9,7 +9,6 @@
 #include "graph/define.h"
 #include "ir/build.h"
 #include "ir/print.h"
-#include "ir/variables.h"
 
 namespace retrograde::checks {
 

@@ -8,7 +8,6 @@
 #include "graph/define.h"
 #include "graph/function.h"
 #include "ir/build.h"
-#include "ir/variables.h"
 
 namespace retrograde::ir {
 

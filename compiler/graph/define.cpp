@@ -17,7 +17,6 @@
 #include "ir/lists.h"
 #include "ir/literal.h"
 #include "ir/print.h"
-#include "ir/variables.h"
 #include "ir/visit.h"
 
 namespace retrograde::ir {
@@ -169,8 +168,8 @@ void freeze(const Names& names) {
 // A random number depends on the Func, the stage and the point where it is evaluated.
 Expr bind_random(const Expr& e, const std::vector<Expr>& point) {
   return rewrite(e, [&](const Expr& part, const auto& recurse) -> Expr {
-    const Call* call = part.as<Call>();
-    if (!call || !call->is_op(Op::random) || call->args.size() != 1) return {};
+    const Call* call = as_op(part, Op::random);
+    if (!call || call->args.size() != 1) return {};
     std::vector<Expr> words{recurse(call->args[0])};
     append(words, point);
     return call_op(Op::random, call->type, std::move(words));
@@ -178,10 +177,7 @@ Expr bind_random(const Expr& e, const std::vector<Expr>& point) {
 }
 
 bool has_random(const std::vector<Expr>& values) {
-  const auto is_random = [](const Expr& e) {
-    const Call* call = e.as<Call>();
-    return call && call->is_op(Op::random);
-  };
+  const auto is_random = [](const Call& call) { return call.is_op(Op::random); };
   return std::ranges::any_of(values, [&](const Expr& value) { return any_node(value, is_random); });
 }
 

@@ -24,11 +24,9 @@
 #include "graph/reduction_leaves.h"
 #include "graph/rfactor.h"
 #include "ir/build.h"
-#include "ir/conjuncts.h"
 #include "ir/lists.h"
 #include "ir/memory_reads.h"
 #include "ir/print.h"
-#include "ir/variables.h"
 #include "ir/visit.h"
 
 namespace retrograde::ir {

@@ -13,7 +13,6 @@
 #include "ir/build.h"
 #include "ir/lists.h"
 #include "ir/print.h"
-#include "ir/variables.h"
 #include "ir/visit.h"
 
 namespace retrograde {

@@ -27,12 +27,8 @@ struct Operation {
   bool is_sub = false;
 };
 std::optional<Operation> operation(const Expr& e) {
-  if (const auto* call = e.as<Call>()) {
-    const bool is_bitwise =
-        call->is_op(Op::bitwise_and) || call->is_op(Op::bitwise_or) || call->is_op(Op::bitwise_xor);
-    if (!is_bitwise) return std::nullopt;
+  if (const Call* call = as_op(e, Op::bitwise_and, Op::bitwise_or, Op::bitwise_xor))
     return Operation{Kind::Call, call->op, call->args[0], call->args[1]};
-  }
   const Kind kind = e.kind();
   const bool is_sub = kind == Kind::Sub;
   const bool known = is_sub || kind == Kind::Add || kind == Kind::Mul || kind == Kind::Min ||

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "ir/lists.h"
 #include "ir/print.h"
 #include "ir/scalar.h"
 #include "ir/visit.h"
@@ -113,6 +114,10 @@ bool is_const_int(const Expr& e, int64_t value) { return as_const_int(e) == valu
 
 Expr variable(const std::string& name, Type type, SymbolRef symbol) {
   return make_node<Variable>(type, name, std::move(symbol));
+}
+
+std::vector<Expr> variables_of(const std::vector<std::string>& names) {
+  return mapped(names, [](const std::string& name) { return variable(name); });
 }
 
 // ---- binary nodes ----
@@ -463,6 +468,16 @@ Expr conjunction(const std::vector<Expr>& terms) {
   Expr result;
   for (const Expr& term : terms) result = result.defined() ? binary(Kind::And, result, term) : term;
   return result.defined() ? result : const_true();
+}
+
+void add_conjuncts(const Expr& e, std::vector<Expr>& conjuncts) {
+  if (!e.defined()) return;
+  if (const And* both = e.as<And>()) {
+    add_conjuncts(both->a, conjuncts);
+    add_conjuncts(both->b, conjuncts);
+  } else {
+    conjuncts.push_back(e);
+  }
 }
 
 void add_term(Expr& sum, const Expr& term) { sum = sum.defined() ? sum + term : term; }

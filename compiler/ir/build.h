@@ -37,6 +37,8 @@ bool is_const_false(const Expr& e);
 bool is_const_int(const Expr& e, int64_t value);
 
 Expr variable(const std::string& name, Type type = Int(32), SymbolRef symbol = {});
+// An int32 variable for each name: the arguments of a Func as its definition names them.
+std::vector<Expr> variables_of(const std::vector<std::string>& names);
 // `a` and `b` already of one type (lanes too, but a scalar is broadcast).
 Expr binary(Kind kind, Expr a, Expr b);
 Expr logical_not(Expr a);
@@ -62,6 +64,8 @@ Expr call_image(const std::string& name, Type type, std::vector<Expr> args, Symb
 // Requires: every operand must be a defined expression.
 Expr likely(Expr e);
 Expr conjunction(const std::vector<Expr>& terms);  // true when empty
+// Appends the conditions that all hold where e does; none where e is undefined.
+void add_conjuncts(const Expr& e, std::vector<Expr>& conjuncts);
 // One more term of a sum, which is undefined as long as it has none.
 void add_term(Expr& sum, const Expr& term);
 

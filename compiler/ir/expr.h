@@ -268,9 +268,12 @@ enum class CallType : uint8_t {
 };
 struct Call : ExprNode {
   RETROGRADE_NODE(Call, call_type, op, name, component, args)
-  bool is_op(Op which) const { return call_type == CallType::Operator && op == which; }
+  template <class... Ops>
+  bool is_op(Ops... which) const {
+    return call_type == CallType::Operator && ((op == which) || ...);
+  }
   bool is_marker() const { return op_info(op).cls == OpClass::Marker; }
-  bool is_likely() const { return is_op(Op::likely) || is_op(Op::likely_if_innermost); }
+  bool is_likely() const { return is_op(Op::likely, Op::likely_if_innermost); }
   const CallType call_type;
   const Op op;             // Op::none unless Operator
   const std::string name;  // of the Func, image or C function; the operator's name for operators
@@ -278,10 +281,11 @@ struct Call : ExprNode {
   const int component;  // which value of a Tuple-valued Func
   const SymbolRef symbol;
 };
-// The call of this operator; null when `e` is none.
-inline const Call* as_op(const Expr& e, Op op) {
+// The call of one of these operators; null when `e` is none.
+template <class... Ops>
+const Call* as_op(const Expr& e, Ops... which) {
   const Call* call = e.as<Call>();
-  return call && call->is_op(op) ? call : nullptr;
+  return call && call->is_op(which...) ? call : nullptr;
 }
 inline bool is_undef(const Expr& e) { return as_op(e, Op::undef) != nullptr; }
 struct Let : ExprNode {

@@ -42,16 +42,8 @@ bool is_trivial(const Expr& e) {
   return e.type().is_handle() || (e.kind() == Kind::Call && e.as<Call>()->args.empty());
 }
 
-const Call* as_if_then_else(const Expr& e) {
-  const auto* call = e.as<Call>();
-  return call && call->is_op(Op::if_then_else) ? call : nullptr;
-}
-
 // What a strict_float rounds stays inside of it: named outside, it might be contracted there.
-bool is_strict(const Expr& e) {
-  const auto* call = e.as<Call>();
-  return call && call->is_op(Op::strict_float);
-}
+bool is_strict(const Expr& e) { return as_op(e, Op::strict_float); }
 
 // Counts the parents of each node among what is evaluated for certain.
 class UseCounter {
@@ -67,7 +59,7 @@ class UseCounter {
  private:
   void count(const Expr& e) {
     if (uses_[e.get()]++ > 0) return;
-    if (const Call* branch = as_if_then_else(e)) {
+    if (const Call* branch = as_op(e, Op::if_then_else)) {
       count(branch->args[0]);  // the arms run only when chosen
     } else if (!is_strict(e)) {
       for_each_child(e, [&](const Expr& child) { count(child); });
@@ -83,14 +75,13 @@ SharedLets make_lets(const std::vector<Expr>& es);
 
 class LetMaker : public Rewriter {
  public:
-  LetMaker(const UseCounter& uses, std::vector<std::pair<std::string, Expr>>& lets)
-      : uses_(uses), lets_(lets) {}
+  LetMaker(const UseCounter& uses, Lets& lets) : uses_(uses), lets_(lets) {}
 
  protected:
   using Rewriter::rewrite;
   Expr rewrite(const Expr& e) override {
     if (is_strict(e)) return name(e, e);
-    const Call* choice = as_if_then_else(e);
+    const Call* choice = as_op(e, Op::if_then_else);
     return name(e, choice ? branch(*choice) : children(e));
   }
 
@@ -130,7 +121,7 @@ class LetMaker : public Rewriter {
   }
 
   const UseCounter& uses_;
-  std::vector<std::pair<std::string, Expr>>& lets_;
+  Lets& lets_;
   Namer named_{*this};
 };
 

@@ -1,9 +1,7 @@
 // Sharing made explicit and back: a DAG of shared nodes <-> nested Lets.
 #pragma once
 
-#include <vector>
-
-#include "ir/expr.h"
+#include "ir/build.h"
 
 namespace retrograde::ir {
 
@@ -15,7 +13,7 @@ Expr introduce_lets(const Expr& e);
 // The same for several expressions that are evaluated together: `lets` outermost first, each
 // visible in the later ones and in the values.
 struct SharedLets {
-  std::vector<std::pair<std::string, Expr>> lets;
+  Lets lets;
   std::vector<Expr> values;
 };
 SharedLets introduce_lets(const std::vector<Expr>& es);

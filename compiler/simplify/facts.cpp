@@ -451,7 +451,7 @@ int64_t Facts::eliminate_structure(const Sum& sum, int& budget) {
     }
     const auto* call = term.atom.as<Call>();
     if (call && call->is_likely()) return replace(sum, term, call->args[0], budget);
-    if (call && (call->is_op(Op::promise_clamped) || call->is_op(Op::unsafe_promise_clamped))) {
+    if (call && call->is_op(Op::promise_clamped, Op::unsafe_promise_clamped)) {
       return std::min(replace(sum, term, call->args[0], budget),
                       replace(sum, term, call->args[term.factor > 0 ? 2 : 1], budget));
     }

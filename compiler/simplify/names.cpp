@@ -9,7 +9,6 @@
 #include <algorithm>
 
 #include "ir/build.h"
-#include "ir/conjuncts.h"
 #include "ir/visit.h"
 #include "simplify/simplifier.h"
 

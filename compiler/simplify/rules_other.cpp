@@ -189,7 +189,7 @@ bool is_trivial_value(const Expr& e) {
 
 // Nested lets are handled in a loop: their number is not bounded by the C++ stack.
 Expr Simplifier::let(const Expr& e) {
-  std::vector<std::pair<std::string, Expr>> kept;
+  Lets kept;
   std::vector<std::unique_ptr<Binding>> bindings;
   Expr body = e;
   while (const auto* n = body.as<Let>()) {

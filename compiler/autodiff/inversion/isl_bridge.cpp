@@ -131,8 +131,8 @@ std::optional<isl::pw_aff> IslBridge::binary(const Binary& b, const Expr& e) {
 
 // int(abs(a)) and int(absd(a, b)): the unsigned value in between is converted back.
 std::optional<isl::pw_aff> IslBridge::absolute(const Cast& c) {
-  const auto* call = c.value.as<Call>();
-  if (!call || !(call->is_op(Op::abs) || call->is_op(Op::absd))) return std::nullopt;
+  const auto* call = as_op(c.value, Op::abs, Op::absd);
+  if (!call) return std::nullopt;
   if (!call->args[0].type().is_int() || call->args[0].type().bits() < 32 || !c.type.is_int())
     return std::nullopt;
   auto a = affine(call->args[0]);
@@ -147,7 +147,7 @@ std::optional<isl::pw_aff> IslBridge::absolute(const Cast& c) {
 
 // Shifts and masks by constants: multiples, floors and moduli of powers of two.
 std::optional<isl::pw_aff> IslBridge::bits(const Call& c, const Expr& e) {
-  const bool shifts = c.is_op(Op::shift_left) || c.is_op(Op::shift_right);
+  const bool shifts = c.is_op(Op::shift_left, Op::shift_right);
   if (!(shifts || c.is_op(Op::bitwise_and)) || !e.type().is_int() || e.type().bits() < 32)
     return obstacle(e);
   const std::optional<int64_t> amount = as_const_int(c.args[1]);

@@ -6,7 +6,6 @@
 #include "analysis/linear.h"
 #include "autodiff/updates/update_context.h"
 #include "ir/build.h"
-#include "ir/conjuncts.h"
 #include "ir/visit.h"
 #include "simplify/simplify.h"
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "ir/build.h"
+#include "ir/memory_reads.h"
 #include "ir/print.h"
 #include "ir/visit.h"
 

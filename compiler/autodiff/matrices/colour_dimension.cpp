@@ -10,7 +10,6 @@
 #include "graph/own_reads.h"
 #include "ir/build.h"
 #include "ir/lists.h"
-#include "ir/variables.h"
 #include "ir/visit.h"
 
 namespace retrograde::ir {

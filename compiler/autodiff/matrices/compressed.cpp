@@ -9,7 +9,6 @@
 #include "graph/define.h"
 #include "ir/build.h"
 #include "ir/lists.h"
-#include "ir/variables.h"
 #include "ir/visit.h"
 #include "simplify/simplify.h"
 

@@ -10,7 +10,6 @@
 #include "ir/build.h"
 #include "ir/equal.h"
 #include "ir/markers.h"
-#include "ir/variables.h"
 #include "simplify/simplify.h"
 
 namespace retrograde::ir {

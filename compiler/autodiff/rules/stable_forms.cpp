@@ -18,8 +18,7 @@ Expr exp_of_one_plus_exp(const Expr& e) {
   const auto* sum = e.as<Add>();
   if (!sum || !(is_one(sum->a) || is_one(sum->b))) return {};
   Expr other = is_one(sum->a) ? sum->b : sum->a;
-  const auto* call = other.as<Call>();
-  return call && call->is_op(Op::exp) ? other : Expr();
+  return as_op(other, Op::exp) ? other : Expr();
 }
 
 // e / (1 + e), for e up to infinity.
@@ -60,7 +59,7 @@ StableForm log_sum_exp(const Expr& sum) {
   std::vector<Expr> terms;
   for (const Expr& term : terms_of(sum)) {
     if (is_const(term)) continue;
-    const Call* e = as_operator(term, Op::exp);
+    const Call* e = as_op(term, Op::exp);
     if (!e) return {};
     terms.push_back(term);
     result.operands.push_back(e->args[0]);
@@ -87,14 +86,14 @@ StableForm share(const Expr& v, const Div& quotient) {
   const Expr &a = quotient.a, &sum = quotient.b;
   std::vector<Expr> terms = terms_of(sum);
   auto own = std::ranges::find_if(terms, [&](const Expr& t) {
-    const Call* magnitude = as_operator(t, Op::abs);
+    const Call* magnitude = as_op(t, Op::abs);
     return equal(t, a) || (magnitude && equal(magnitude->args[0], a));
   });
   if (is_const(a) || terms.size() < 2 || own == terms.end()) return {};
   terms.erase(own);
   StableForm result;
   auto add = [&](const Expr& e, const Expr& by_argument, const Expr& by_value) {
-    const Call* exponential = as_operator(e, Op::exp);
+    const Call* exponential = as_op(e, Op::exp);
     result.add(exponential ? exponential->args[0] : e,
                strong(exponential ? by_argument : by_value));
   };
@@ -146,7 +145,7 @@ StableForm ratio_of_sums(const Div& quotient) {
       add_term(sum, make_const(t.term.type(), c) * ratio(u.term, quotient.b));
     }
     if (!sum.defined()) continue;
-    const Call* e = as_operator(t.term, Op::exp);
+    const Call* e = as_op(t.term, Op::exp);
     result.add(e ? e->args[0] : t.term,
                strong(e ? sum * ratio(t.term, quotient.b) : sum / quotient.b));
   }
@@ -184,7 +183,7 @@ std::optional<double> multiple_of(const Expr& a, const Expr& b) {
 // v = c b log(b):      dv/db = c (log(b) + 1): in log(b) + b / b the quotient 1 / b overflows
 // v = c p log(p / q):  dv/dp = c (log(p / q) + 1), dv/dq = -c p / q
 StableForm entropy(const Expr& factor, const Expr& logarithm) {
-  const Call* log = as_operator(logarithm, Op::log);
+  const Call* log = as_op(logarithm, Op::log);
   if (!log) return {};
   const auto* quotient = log->args[0].as<Div>();
   std::optional<double> c = multiple_of(factor, log->args[0]);
@@ -208,13 +207,13 @@ StableForm of_product(const Mul& product) {
 
 // exp(-|d|) where e is log(1 + exp(-|d|)).
 Expr decay_of(const Expr& e) {
-  const Call* log = as_operator(e, Op::log);
+  const Call* log = as_op(e, Op::log);
   return log ? exp_of_one_plus_exp(log->args[0]) : Expr();
 }
 // Whether e is exp(-|a - b|); without the difference where b is 0.
 bool is_decay_by(const Expr& e, const Expr& a, const Expr& b) {
   const Expr exponent = e.as<Call>()->args[0], size = without_sign(exponent);
-  const Call* distance = as_operator(size, Op::abs);
+  const Call* distance = as_op(size, Op::abs);
   if (!distance || size.same_as(exponent)) return false;
   const Expr& d = distance->args[0];
   const auto* difference = d.as<Sub>();
@@ -288,7 +287,7 @@ StableForm stable_form(const Expr& e) {
     const StableForm form = smooth_maximum(e);
     return !form.is_found() ? sum_that_cancels(e) : form;
   }
-  if (const Call* log = as_operator(e, Op::log)) {
+  if (const Call* log = as_op(e, Op::log)) {
     const StableForm quotient = log_of_quotient(log->args[0]);
     return !quotient.is_found() ? log_sum_exp(log->args[0]) : quotient;
   }
@@ -296,7 +295,7 @@ StableForm stable_form(const Expr& e) {
     const StableForm form = of_product(*product);
     if (form.is_found()) return form;
   }
-  if (const Call* arctangent = as_operator(e, Op::atan)) return angle(arctangent->args[0]);
+  if (const Call* arctangent = as_op(e, Op::atan)) return angle(arctangent->args[0]);
   const StableForm norm = norm_form(e);
   return !norm.is_found() ? normalised_form(e) : norm;
 }

@@ -15,7 +15,7 @@ namespace {
 // a where e is a * a or pow(a, 2).
 Expr square_root_of(const Expr& e) {
   if (const auto* product = e.as<Mul>()) return equal(product->a, product->b) ? product->a : Expr();
-  const Call* power = as_operator(e, Op::pow);
+  const Call* power = as_op(e, Op::pow);
   return power && as_const_float(power->args[1]) == 2.0 ? power->args[0] : Expr();
 }
 
@@ -34,8 +34,8 @@ std::vector<Expr> components_of(const Expr& sum) {
 }
 
 std::vector<Expr> components_of_norm(const Expr& e) {
-  if (const Call* hypot = as_operator(e, Op::hypot)) return hypot->args;
-  const Call* root = as_operator(e, Op::sqrt);
+  if (const Call* hypot = as_op(e, Op::hypot)) return hypot->args;
+  const Call* root = as_op(e, Op::sqrt);
   return root ? components_of(root->args[0]) : std::vector<Expr>{};
 }
 
@@ -108,9 +108,8 @@ StableForm of_quotient(const Div& quotient) {
 std::vector<Expr> components_of_reciprocal(const Expr& e) {
   const auto* quotient = e.as<Div>();
   if (quotient && is_one(quotient->a)) return components_of_norm(quotient->b);
-  if (const Call* inverse = as_operator(e, Op::fast_inverse_sqrt))
-    return components_of(inverse->args[0]);
-  const Call* power = as_operator(e, Op::pow);
+  if (const Call* inverse = as_op(e, Op::fast_inverse_sqrt)) return components_of(inverse->args[0]);
+  const Call* power = as_op(e, Op::pow);
   const bool is_root = power && as_const_float(power->args[1]) == -0.5;
   return is_root ? components_of(power->args[0]) : std::vector<Expr>{};
 }
@@ -134,7 +133,7 @@ StableForm of_reciprocal(const Expr& e) {
 
 // v = |a|:  d/da_i = a_i / |a|. With a constant among the squares these do not underflow.
 StableForm norm_form(const Expr& e) {
-  const Call* root = as_operator(e, Op::sqrt);
+  const Call* root = as_op(e, Op::sqrt);
   StableForm result{root ? components_of(root->args[0]) : std::vector<Expr>{}, {}};
   if (std::ranges::any_of(result.operands, [](const Expr& a) { return is_const(a); })) return {};
   if (!result.is_found()) return {};

@@ -9,11 +9,6 @@ namespace {
 constexpr size_t most_terms = 4;
 }
 
-const Call* as_operator(const Expr& e, Op op) {
-  const auto* call = e.as<Call>();
-  return call && call->is_op(op) ? call : nullptr;
-}
-
 Expr without_sign(const Expr& e) {
   const auto* difference = e.as<Sub>();
   return difference && is_zero(difference->a) ? difference->b : e;

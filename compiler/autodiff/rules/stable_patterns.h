@@ -8,9 +8,6 @@
 
 namespace retrograde::ir {
 
-// The call of the operator, or null.
-const Call* as_operator(const Expr& e, Op op);
-
 // e, or what it is the negation of.
 Expr without_sign(const Expr& e);
 // 1 where w is x, -1 where it is -x, 0 where it is neither.

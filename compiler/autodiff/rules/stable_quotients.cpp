@@ -38,7 +38,7 @@ Vanishing exp_minus_one(const Expr& n, const Expr& x) {
   const double t = is_one(difference->b) ? 1 : -1;
   if (t < 0 && !is_one(difference->a)) return {};
   const Expr& power = t > 0 ? difference->a : difference->b;
-  const Call* exponential = as_operator(power, Op::exp);
+  const Call* exponential = as_op(power, Op::exp);
   const double s = exponential ? sign_between(exponential->args[0], x) : 0;
   if (s == 0) return {};
   std::vector<double> series;
@@ -52,7 +52,7 @@ Vanishing exp_minus_one(const Expr& n, const Expr& x) {
 // N = log(1 + w), w = s x; with q = w / (2 + w), w = 2 q / (1 - q):  log(1 + w) = 2 (q + q^3 / 3 +
 // ...), d(N / x)/dx = -(1 - q)^2 / 2 (1 / (1 + q) + q (1/3 + q^2 / 5 + ...))
 Vanishing log_of_one_plus(const Expr& n, const Expr& x) {
-  const Call* logarithm = as_operator(n, Op::log);
+  const Call* logarithm = as_op(n, Op::log);
   if (!logarithm) return {};
   const Expr &inside = logarithm->args[0], one = make_one(x.type()), two = one + one;
   const auto* sum = inside.as<Add>();
@@ -96,7 +96,7 @@ StableForm vanishing_quotient(const Expr& v, const Div& quotient) {
 // v = sin(x) / x:  dv/dx = (cos(x) - v) / x, which cancels near 0: sum of (-1)^k 2k x^(2k-1) /
 // (2k+1)!
 StableForm sine_quotient(const Expr& v, const Div& quotient) {
-  const Call* sine = as_operator(quotient.a, Op::sin);
+  const Call* sine = as_op(quotient.a, Op::sin);
   const Expr& x = quotient.b;
   if (!sine || !equal(sine->args[0], x)) return {};
   std::vector<double> series;

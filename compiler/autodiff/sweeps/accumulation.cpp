@@ -12,9 +12,7 @@
 #include "frontend/language/var.h"
 #include "graph/define.h"
 #include "ir/build.h"
-#include "ir/conjuncts.h"
 #include "ir/lists.h"
-#include "ir/variables.h"
 #include "simplify/simplify.h"
 
 namespace retrograde::ir {
@@ -30,9 +28,8 @@ bool is_range_condition(const Expr& e) {
         k == Kind::LT || k == Kind::LE || k == Kind::GT || k == Kind::GE || k == Kind::And;
     bool arithmetic =
         k == Kind::Add || k == Kind::Sub || k == Kind::Mul || k == Kind::Min || k == Kind::Max;
-    const auto* call = node.as<Call>();
-    bool marker = call && call->is_op(Op::likely);
-    result &= ordered || arithmetic || marker || k == Kind::Variable || k == Kind::IntImm;
+    result &= ordered || arithmetic || as_op(node, Op::likely) || k == Kind::Variable ||
+              k == Kind::IntImm;
     return result;
   });
   return result;

@@ -13,7 +13,6 @@
 #include "graph/names.h"
 #include "ir/build.h"
 #include "ir/lists.h"
-#include "ir/variables.h"
 #include "simplify/simplify.h"
 
 namespace retrograde::ir {

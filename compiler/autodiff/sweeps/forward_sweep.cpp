@@ -38,7 +38,7 @@ class ForwardSweep {
   }
 
   void visit(const Expr& e) {
-    if (is_undef(e)) {
+    if (as_op(e, Op::undef)) {
       if (e.type().is_float()) tangents_[e.get()] = call_op(Op::undef, adjoint_type(e.type()), {});
       undefs_.insert(e.get());
       return;

@@ -5,7 +5,6 @@
 #include <unordered_set>
 
 #include "ir/build.h"
-#include "ir/conjuncts.h"
 #include "ir/equal.h"
 #include "ir/markers.h"
 #include "simplify/simplify.h"

@@ -24,11 +24,10 @@ bool makes_risky(const Expr& e) {
 void for_each_operand(const Expr& e, ExprVisit visit) {
   const auto* cast = e.as<Cast>();
   if (cast && !cast->value.type().is_float()) return;
-  const auto* call = e.as<Call>();
   if (const auto* choice = e.as<Select>()) {
     visit(choice->when_true);
     visit(choice->when_false);
-  } else if (call && call->is_op(Op::if_then_else)) {
+  } else if (const auto* call = as_op(e, Op::if_then_else)) {
     visit(call->args[1]);
     visit(call->args[2]);
   } else if (!is_leaf(e)) {

@@ -5,6 +5,7 @@
 
 #include "autodiff/updates/update_context.h"
 #include "ir/build.h"
+#include "ir/lets.h"
 
 namespace retrograde::ir {
 
@@ -12,10 +13,6 @@ namespace {
 
 // Of a read at a corner of a box in two dimensions.
 constexpr size_t most_pieces = 4;
-
-bool is_marker(const Call& call) {
-  return call.call_type == CallType::Operator && op_info(call.op).cls == OpClass::Marker;
-}
 
 // Whether each index is a function of one variable, of another one each: neither a diagonal nor a
 // slice, of whose Func most elements are never read.
@@ -40,7 +37,7 @@ bool is_look_up(const Expr& value, const std::vector<std::string>& args) {
   }
   const auto* call = value.as<Call>();
   if (!call) return false;
-  if (is_marker(*call)) return is_look_up(call->args[0], args);
+  if (call->is_marker()) return is_look_up(call->args[0], args);
   return call->call_type != CallType::Operator && call->type.is_float() &&
          maps_coordinates(*call, args);
 }

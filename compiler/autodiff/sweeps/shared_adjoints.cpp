@@ -17,7 +17,6 @@
 #include "ir/build.h"
 #include "ir/lists.h"
 #include "ir/print.h"
-#include "ir/variables.h"
 #include "simplify/simplify.h"
 
 namespace retrograde::ir {

@@ -12,7 +12,6 @@
 #include "ir/build.h"
 #include "ir/lists.h"
 #include "ir/memory_reads.h"
-#include "ir/variables.h"
 
 namespace retrograde::ir {
 

@@ -10,7 +10,6 @@
 #include "ir/lets.h"
 #include "ir/lists.h"
 #include "ir/memory_reads.h"
-#include "ir/variables.h"
 #include "ir/visit.h"
 
 namespace retrograde::ir {

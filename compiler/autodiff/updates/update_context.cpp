@@ -60,10 +60,9 @@ PartlyDefined chosen_part(const Expr& condition, const Expr& if_true, const Expr
 PartlyDefined defined_part(const Expr& e) {
   if (!mentions_undef(e)) return {const_true(), e};
   if (const auto* s = e.as<Select>()) return chosen_part(s->condition, s->when_true, s->when_false);
-  const Call* call = e.as<Call>();
-  if (call && call->is_op(Op::if_then_else))
+  if (const Call* call = as_op(e, Op::if_then_else))
     return chosen_part(call->args[0], call->args[1], call->args[2]);
-  if (call && call->is_op(Op::undef)) return {const_false(), e};
+  if (as_op(e, Op::undef)) return {const_false(), e};
   Expr where = const_true();
   Expr value = map_children(e, [&](const Expr& child) {
     PartlyDefined part = defined_part(child);

@@ -4,8 +4,6 @@
 
 #include "autodiff/inversion/isl_maps.h"
 #include "ir/build.h"
-#include "ir/conjuncts.h"
-#include "ir/variables.h"
 #include "ir/visit.h"
 
 namespace retrograde::ir {

@@ -7,7 +7,6 @@
 #include "ir/build.h"
 #include "ir/equal.h"
 #include "ir/lists.h"
-#include "ir/variables.h"
 #include "simplify/simplify.h"
 
 namespace retrograde::ir {

@@ -3,8 +3,8 @@
 
 #include "frontend/language/func.h"
 #include "graph/define.h"
+#include "ir/build.h"
 #include "ir/print.h"
-#include "ir/variables.h"
 
 namespace retrograde {
 

@@ -18,7 +18,6 @@
 #include "ir/build.h"
 #include "ir/memory_reads.h"
 #include "ir/print.h"
-#include "ir/variables.h"
 #include "ir/visit.h"
 
 namespace retrograde {

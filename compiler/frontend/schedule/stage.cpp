@@ -1,6 +1,8 @@
 // stage.cpp -- what schedules of loops are made of; graph/give_directive.h has the rules.
 #include "frontend/schedule/stage.h"
 
+#include <algorithm>
+
 #include "frontend/language/func.h"
 #include "graph/define.h"
 #include "graph/rfactor.h"
@@ -39,7 +41,7 @@ retrograde::LoopLevel level_of(const Stage& stage, const VarOrRVar& var) {
 
 void check_tile(const SchedulePlace& place, const std::vector<VarOrRVar>& loops,
                 const std::vector<size_t>& sizes) {
-  if (sizes == std::vector<size_t>(sizes.size(), loops.size())) return;
+  if (std::ranges::all_of(sizes, [&](size_t n) { return n == loops.size(); })) return;
   user_error(text("tile ", as_list(loops), " of ", place.name()), "all lists have one length",
              text("they have ", loops.size(), " loops, ", sizes[0], " outer and ", sizes[1],
                   " inner names, ", sizes[2], " factors and ", sizes[3], " tail strategies"),

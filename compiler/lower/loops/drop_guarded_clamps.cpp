@@ -25,7 +25,6 @@
 
 #include "analysis/linear.h"
 #include "ir/build.h"
-#include "ir/conjuncts.h"
 #include "ir/lets.h"
 #include "ir/memory_reads.h"
 #include "ir/visit.h"

@@ -34,7 +34,6 @@
 #include <vector>
 
 #include "ir/build.h"
-#include "ir/conjuncts.h"
 #include "ir/equal.h"
 #include "ir/visit.h"
 #include "lower/nests/copy_statement.h"

@@ -4,8 +4,6 @@
 #include <unordered_set>
 
 #include "ir/build.h"
-#include "ir/conjuncts.h"
-#include "ir/variables.h"
 #include "ir/visit.h"
 #include "lower/nests/resolve_undef.h"
 #include "simplify/cse.h"
