@@ -33,7 +33,7 @@ double operations_of(const Expr& node) {
   if (call && call->call_type != CallType::Operator) return 1;
   if (!node.type().is_float()) return 0;
   const Work work = work_of(node);
-  return std::max(work.adds, work.mults) + 4 * (work.functions + (divides(node) ? 1 : 0));
+  return std::max(work.adds, work.mults) + work.function_adds + (divides(node) ? 4 : 0);
 }
 
 }  // namespace retrograde::ir

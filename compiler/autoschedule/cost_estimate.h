@@ -16,9 +16,9 @@ inline constexpr double way_to_memory = 24;
 // (ir/operators.def). Integers are indices and borders, mostly simplified away: only where floats
 // take part is there work.
 Work work_of(const Expr& node);
-// The same in operations of a vectorized loop: a read is one, a function four, and a division as many
-// more than a multiplication; multiplications come with an addition each, and comparisons with the
-// choice that they decide.
+// The same in operations of a vectorized loop: a read is one, a function as many additions as it takes
+// as long as, and a division four more than a multiplication; multiplications come with an addition
+// each, and comparisons with the choice that they decide.
 double operations_of(const Expr& node);
 
 }  // namespace retrograde::ir

@@ -147,24 +147,24 @@ constexpr OpError arithmetic{.kind = OpError::Kind::Arithmetic};
 constexpr OpError library(double ulp_float32, double ulp_float64, int ulp_elsewhere = 4) {
   return {OpError::Kind::Library, ulp_float32, ulp_float64, ulp_elsewhere};
 }
-constexpr OpError approximates(Op of) {
-  return {.kind = OpError::Kind::Approximates, .of = of};
-}
+constexpr OpError approximates(Op of) { return {.kind = OpError::Kind::Approximates, .of = of}; }
 
 constexpr Real same{Rises, StaysFinite, NoNan, NeverLevel, NoPoles, exact};
 constexpr Real steps = same;
 constexpr Real discrete{Turns, StaysFinite, NoNan, NeverLevel, NoPoles, exact};
 
-constexpr Work no_work{0, 0, 0}, one_add{1, 0, 0}, two_adds{2, 0, 0}, function{0, 0, 1};
+constexpr Work no_work{0, 0, 0}, one_add{1, 0, 0}, two_adds{2, 0, 0};
+// A function that takes as long as so many additions.
+constexpr Work function(int adds) { return {0, 0, 1, adds}; }
 
 constexpr OpInfo op_table[] = {
-#define RETROGRADE_OP(name, arity, cls, value, ...)                                     \
-  {#name, arity, cls,                                                                   \
-   []([[maybe_unused]] const Scalar& a, [[maybe_unused]] const Scalar& b,               \
-      [[maybe_unused]] const Scalar& c, [[maybe_unused]] Type type) -> Scalar {         \
-     [[maybe_unused]] const double x = a.f, y = b.f;                                    \
-     return result(type, value);                                                        \
-   },                                                                                   \
+#define RETROGRADE_OP(name, arity, cls, value, ...)                             \
+  {#name, arity, cls,                                                           \
+   []([[maybe_unused]] const Scalar& a, [[maybe_unused]] const Scalar& b,       \
+      [[maybe_unused]] const Scalar& c, [[maybe_unused]] Type type) -> Scalar { \
+     [[maybe_unused]] const double x = a.f, y = b.f;                            \
+     return result(type, value);                                                \
+   },                                                                           \
    __VA_ARGS__},
 #include "ir/operators.def"
     {"none", 0, Internal, [](const Scalar& a, const Scalar&, const Scalar&, Type) { return a; },

@@ -98,6 +98,7 @@ struct Work {
   int adds = -1;       // + and -, and what costs as little: comparisons, choices, rounding
   int mults = -1;      // * and /
   int functions = -1;  // sqrt, exp, sin and the like
+  int function_adds = 0;  // that the functions take as long as, in vectors of float32
 };
 
 // Beyond giving a value.
@@ -138,7 +139,8 @@ constexpr const char* unstated_column(const OpInfo& row) {
   if (real.levels == Levels{}) return "levels";
   if (real.poles == PartialPoles{}) return "poles";
   if (real.error.kind == OpError::Kind{}) return "error";
-  if (row.work.functions < 0) return "work";
+  if (row.work.functions < 0 || (row.work.functions > 0) != (row.work.function_adds > 0))
+    return "work";
   return row.conduct == Conduct{} ? "conduct" : nullptr;
 }
 
