@@ -11,16 +11,21 @@ namespace retrograde::codegen {
 
 using namespace ir;
 
-Value* FunctionGenerator::remembered(Memo MemoFrame::*memo, const Expr& e,
-                                     Value* (FunctionGenerator::*make)(const Expr&)) {
-  std::vector<MemoFrame>& frames = frame_.memo;
+Value* FunctionGenerator::known(Memo MemoFrame::*memo, const Expr& e) const {
+  const std::vector<MemoFrame>& frames = frame_.memo;
   for (size_t i = frames.size(); i-- > 0;) {
     const auto found = (frames[i].*memo).find(e.get());
     if (found != (frames[i].*memo).end()) return found->second.value;
     if (!frames[i].sees_outer) break;
   }
+  return nullptr;
+}
+
+Value* FunctionGenerator::remembered(Memo MemoFrame::*memo, const Expr& e,
+                                     Value* (FunctionGenerator::*make)(const Expr&)) {
+  if (Value* value = known(memo, e)) return value;
   Value* result = (this->*make)(e);
-  if (e.kind() != Kind::Variable) (frames.back().*memo)[e.get()] = {e, result};
+  if (e.kind() != Kind::Variable) (frame_.memo.back().*memo)[e.get()] = {e, result};
   return result;
 }
 
@@ -128,11 +133,6 @@ Value* FunctionGenerator::make(const Let& e) {
   const MemoScope scope(*this, false);
   frame_.memo.back().lets[e.name] = e.value.get();
   return value(e.body);
-}
-
-Value* FunctionGenerator::make(const Select& e) {
-  Value *condition = value(e.condition), *a = value(e.when_true), *b = value(e.when_false);
-  return b_.CreateSelect(condition, a, b);
 }
 
 // base + stride * k for k in [0, lanes), each a vector when base is one.

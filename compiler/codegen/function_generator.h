@@ -156,6 +156,8 @@ class FunctionGenerator {
   // expressions.cpp
   Value* value(const Expr& e);
   Value* value_alone(const Expr& e);  // in a scope of its own
+  // Null: the node has none yet.
+  Value* known(Memo MemoFrame::*memo, const Expr& e) const;
   // Of a node that has one already, or what `make` gives.
   Value* remembered(Memo MemoFrame::*memo, const Expr& e,
                     Value* (FunctionGenerator::*make)(const Expr&));
@@ -172,7 +174,6 @@ class FunctionGenerator {
   Value* make(const ir::Ramp& e);
   Value* make(const ir::Shuffle& e);
   Value* make(const ir::VectorReduce& e);
-  Value* make(const ir::Select& e);
   Value* make_immediate(const Expr& e);
   Value* make_value(const Expr& e);
   Value* string_constant(const std::string& text);
@@ -188,6 +189,11 @@ class FunctionGenerator {
   // narrow_products.cpp
   Value* reduced_in_part(const ir::VectorReduce& e);
   Value* sum_of_products(const Expr& e);
+
+  // costly_arms.cpp
+  bool is_costly(const Expr& arm) const;
+  Value* value_where(Value* wanted, const Expr& arm, Value* otherwise);
+  Value* make(const ir::Select& e);
 
   // strong_products.cpp
   Value* sum_with_strong_product(const ir::Binary& e);

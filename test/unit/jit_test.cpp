@@ -288,6 +288,22 @@ TEST(Codegen, StrongMultiplicationIsMasked) {
   expect_mentions(assembly, {"{z}"});
 }
 
+// What no lane wants is jumped over, where it takes long.
+TEST(Codegen, CostlyArmsAreBehindABranch) {
+  LoweredFunction f = vector_sum();
+  const Expr index = make_ramp(variable("x") * 16, 1, 16);
+  const Expr in = make_load(Float(32, 16), "in", index);
+  const Expr is_wanted = binary(Kind::LT, in, make_zero(in.type()));
+  const auto tests_a_mask = [&](const Expr& arm) {
+    f.body = make_for("x", 0, 16, ForType::Serial,
+                      make_store("out", make_select(is_wanted, arm, in), index));
+    return codegen::compile_assembly(f, options_for("x86-64-linux-avx512_skylake"))
+               .find("kortest") != std::string::npos;
+  };
+  EXPECT_TRUE(tests_a_mask(call_op(Op::pow, {in, in + 1.0f})));
+  EXPECT_FALSE(tests_a_mask(in * in + 1.0f));
+}
+
 // acc + strong_mul(a, b) and acc - strong_mul(a, b): no multiplication of its own.
 TEST(Codegen, SumsOfStrongProductsFuse) {
   LoweredFunction f = vector_sum();
