@@ -18,6 +18,7 @@ constexpr int part_count = 32;
 // fewer parts than the least, a scatter stays one.
 constexpr double elements_an_iteration = 4;
 constexpr int least_parts = 4;
+constexpr int64_t enough_tasks = 8;
 // Elements of one part of a scatter, lanes included, that stay in a near cache.
 constexpr double near_elements = 1 << 14;
 // Bytes that all parts of one adjoint may take: what a large target has no room for is accumulated
@@ -188,22 +189,37 @@ std::optional<PartPlan> plan_parts(const Iterations& update, const AdjointTarget
   return PartPlan{sizes.parts_of(g) > 1, count, sizes.has_lanes(g), sizes.note(g, count)};
 }
 
-// x = (part * chunk + rho) * lanes + lane for the outermost variable when it is the innermost too;
-// else lanes split the innermost and parts the outermost variable. Beyond the end the place is
-// clamped: what it reads must exist even where the condition is false. Both are cut off the steady
-// state, whose accumulators stay in registers.
+// The loop whose iterations are dealt out to parts: the outermost that makes enough tasks, so that a
+// part reads what lies together; where none does, the longest.
+static size_t loop_in_parts(const Iterations& update) {
+  const size_t count = update.rvars.size() - (update.has_taps ? 1 : 0);
+  const auto extent = [&](size_t i) {
+    return as_const_int(update.rvars[i].extent).value_or(INT64_MAX);
+  };
+  size_t longest = count - 1;
+  for (size_t i = count; i-- > 0;) {
+    if (extent(i) >= enough_tasks) return i;
+    if (extent(i) > extent(longest)) longest = i;
+  }
+  return longest;
+}
+
+// x = (part * chunk + rho) * lanes + lane for the variable in parts when it is the innermost too;
+// else lanes split the innermost variable. Beyond the end the place is clamped: what it reads must
+// exist even where the condition is false. Both are cut off the steady state, whose accumulators stay
+// in registers.
 Slice slice_of(const Iterations& update, const Expr& lane, const Expr& part, const Expr& parts,
                bool in_blocks) {
   Slice slice;
   slice.rvars = update.rvars;
   const DomainPtr rdom = make_domain();
-  const size_t last = slice.rvars.size() - (update.has_taps ? 2 : 1);
+  const size_t cut = loop_in_parts(update);
   for (size_t i = 0; i < slice.rvars.size(); ++i) {
     ReductionVariable& r = slice.rvars[i];
     std::string old = r.var;
     Expr all = r.extent, min = r.min;
     r = {unique_name(old), make_zero(Int(32)), all};
-    const bool in_parts = i == last && part.defined(), in_lanes = i == 0 && lane.defined();
+    const bool in_parts = i == cut && part.defined(), in_lanes = i == 0 && lane.defined();
     if (in_lanes) r.extent = simplify((r.extent + (lane_count - 1)) / lane_count);
     if (in_parts) r.extent = simplify((r.extent + (parts - 1)) / parts);
     if ((in_parts || in_lanes) && in_blocks) r.extent = in_whole_blocks(r.extent);
