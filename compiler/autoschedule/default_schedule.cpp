@@ -13,6 +13,7 @@
 #include "autoschedule/only_reader.h"
 #include "autoschedule/placement_limits.h"
 #include "autoschedule/reduction_slices.h"
+#include "autoschedule/row_order.h"
 #include "autoschedule/scatter_schedule.h"
 #include "autoschedule/scatter_slices.h"
 #include "autoschedule/slices.h"
@@ -304,6 +305,7 @@ void give_default_schedule(const std::vector<FuncPtr>& outputs, const VectorUnit
   const Readers readers(outputs, stored);  // before anything is moved
   compute_in_slices(readers, stored, whole, sizes);
   compute_in_reductions(readers, stored, whole, sizes);
+  run_along_rows(given, sizes);
   join_sweeps(outputs, given, sizes);
   for (const FuncPtr& f : order) {  // so that the log tells of every Func
     const bool is_output = std::find(outputs.begin(), outputs.end(), f) != outputs.end();

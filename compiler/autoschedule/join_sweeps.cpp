@@ -106,14 +106,11 @@ bool depends_on(const FuncPtr& f, const FuncPtr& other) {
   return std::find(order.begin(), order.end(), other) != order.end();
 }
 
-// The innermost loop that is none: inside of it are vectors and what is unrolled. It must be one of a
-// reduction, or have one inside of it.
+// The innermost loop around vectors and what is unrolled.
 std::optional<VarOrRVar> innermost_loop(const Sweep& sweep) {
-  bool reduces = false;
   for (const Dim& loop : sweep.loops()) {
-    reduces |= loop.is_reduction;
-    if (loop.runs == ForType::Vectorized || loop.runs == ForType::Unrolled) continue;
-    return reduces ? std::optional(VarOrRVar(loop.var, loop.is_reduction)) : std::nullopt;
+    if (loop.runs != ForType::Vectorized && loop.runs != ForType::Unrolled)
+      return VarOrRVar(loop.var, loop.is_reduction);
   }
   return std::nullopt;
 }

@@ -164,6 +164,7 @@ void cut_into_strips(const Reader& reader, const Move& move) {
   }
   const Var strips(move.along), row(inner_loop(*reader.func, reader.stage, move.along));
   stage.split(strips, strips, row, static_cast<int>(move.rows), TailStrategy::GuardWithIf);
+  stage.serial(row);  // the strips are the tasks
   order.push_back(row);
   for (const std::string& var : move.slices) order.push_back(RVar(var));
   order.push_back(strips);

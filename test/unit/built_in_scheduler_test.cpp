@@ -200,6 +200,57 @@ TEST(SumsOverALargeFunc, RunTogether) {
 
 TEST(SumsOverALargeFunc, RunApartWhereItIsSmall) { EXPECT_FALSE(TwoSums(3).run_together()); }
 
+// Two sums over planes that are kept.
+struct Planes {
+  explicit Planes(int planes) {
+    RDom near(-1, 3), each(0, planes);
+    windows(x, y, d) = 0.0f;
+    windows(x, y, d) += picture(clamp(x + near, 0, side - 1), clamp(y, 0, side - 1)) *
+                        picture(clamp(x, 0, side - 1), clamp(y + d, 0, side - 1));
+    sums(x, y) = 0.0f;
+    sums(x, y) += windows(x, y, each);
+    squares(x, y) = 0.0f;
+    squares(x, y) += windows(x, y, each) * windows(x, y, each);
+    out(x, y) = squares(x, y) - sums(x, y);
+    out.bound(x, 0, side).bound(y, 0, side);
+    for (int py = 0; py < side; py++) {
+      for (int px = 0; px < side; px++) picture(px, py) = static_cast<float>((px * 5 + py * 3) % 9);
+    }
+  }
+  // Innermost first: whether each is one over planes.
+  std::vector<bool> loops_of_sums() {
+    Pipeline(out).auto_schedule(get_host_target());
+    std::vector<bool> result;
+    for (const ir::Dim& loop : sums.update().get_schedule().dims)
+      result.push_back(loop.is_reduction);
+    return result;
+  }
+  static constexpr int side = 264;
+  Var x{"x"}, y{"y"}, d{"d"};
+  Buffer<float> picture{side, side};
+  Func windows{"windows"}, sums{"sums"}, squares{"squares"}, out{"out"};
+};
+
+TEST(SumsOverPlanes, GoAlongTheirRows) {
+  Planes scheduled(64), plain(64);
+  EXPECT_EQ(scheduled.loops_of_sums(), (std::vector<bool>{false, false, true, false}));
+  const auto is_joined = [](const Func& f) {
+    return f.function()->stage(1).schedule.fuse_level.kind == ir::LoopLevel::Kind::At;
+  };
+  EXPECT_NE(is_joined(scheduled.sums), is_joined(scheduled.squares)) << "one joins the other";
+  constexpr int side = Planes::side;
+  for (Func* f : {&plain.windows, &plain.sums, &plain.squares}) f->compute_root();
+  const Buffer<float> found = scheduled.out.realize({side, side}),
+                      expected = plain.out.realize({side, side});
+  for (int y = 0; y < side; y++) {
+    for (int x = 0; x < side; x++) ASSERT_EQ(found(x, y), expected(x, y)) << x << ", " << y;
+  }
+}
+
+TEST(SumsOverPlanes, KeepTheirSumsInRegistersWhereThereAreFew) {
+  EXPECT_EQ(Planes(8).loops_of_sums(), (std::vector<bool>{true, false, false, false}));
+}
+
 TEST_F(BuiltInScheduler, KeepsWhatAUserScheduled) {
   heavy.compute_at(blur, y).vectorize(x, 4);
   blur.compute_root().reorder(y, x);
