@@ -1,6 +1,7 @@
 #include "autoschedule/default_schedule.h"
 
 #include <algorithm>
+#include <functional>
 #include <optional>
 #include <unordered_set>
 
@@ -11,6 +12,7 @@
 #include "autoschedule/loop_order.h"
 #include "autoschedule/new_loop.h"
 #include "autoschedule/only_reader.h"
+#include "autoschedule/packed_operand.h"
 #include "autoschedule/placement_limits.h"
 #include "autoschedule/reduction_slices.h"
 #include "autoschedule/row_order.h"
@@ -107,13 +109,10 @@ class LoopChooser {
       return tile(*d);
     if (!scatters && schedule_look_ups(f_, index_, stage_, lanes, sizes_)) return;
     if (!scatters && pure_[0] == 0 && tile_in_registers()) return;
-    const bool reduces = !definition().rvars.empty();
-    if (pure_.size() > 1 || (reduces && pure_[0] != 0)) stage_.parallel(variable_of(pure_.back()));
-    // Few private parts may be left where the target is large.
-    if (f_.made && f_.made->has_parts && pure_.size() > 1 && pure_[pure_.size() - 2] != 0)
-      stage_.parallel(variable_of(pure_[pure_.size() - 2]));
+    make_tasks();
     if (pure_[0] != 0) return;
     vectorize(stage_, variable_of(0), lanes, TailStrategy::GuardWithIf);
+    const bool reduces = !definition().rvars.empty();
     if (pure_.size() == 1 && reduces) stage_.parallel(variable_of(0));  // of the vectors
   }
 
@@ -122,12 +121,42 @@ class LoopChooser {
   Var variable_of(size_t dimension) const { return Var(f_.args[dimension]); }
   Var inside(const Var& loop) const { return Var(inner_loop(f_, index_, loop.name())); }
 
+  // The outermost loop, and those inside of it while their iterations are few; not that of the
+  // vectors. How many private parts there are may be known at run time only: few, where the target
+  // is large.
+  void make_tasks() {
+    const int64_t unknown = f_.made && f_.made->has_parts ? 1 : enough_tasks;
+    int64_t tasks = 1;
+    for (size_t i = pure_.size(); i-- > 0 && tasks < enough_tasks && pure_[i] != 0;) {
+      stage_.parallel(variable_of(pure_[i]));
+      tasks *= sizes_.extent(f_, pure_[i]).value_or(unknown);
+    }
+  }
+
   // Whether there is a tile.
   bool tile_in_registers() {
     const auto tile = tile_of(f_, definition());
     if (!tile) return false;
-    run_in_parallel(cut(*tile));
+    const auto packed = packed_operand(f_, definition(), *tile, lanes, sizes_);
+    std::vector<VarOrRVar> loops = cut(*tile, {}, packed.has_value());
+    if (packed) loops = pack_inside(*packed, loops);
+    run_in_parallel(loops);
     return true;
+  }
+
+  // Of the loops over tiles, those that do not move the operand come first. The result: the others.
+  std::vector<VarOrRVar> pack_inside(const PackedOperand& operand,
+                                     const std::vector<VarOrRVar>& loops) {
+    const auto moves = [&](const VarOrRVar& loop) {
+      const auto arg = std::find(f_.args.begin(), f_.args.end(), loop.name());
+      return bool(operand.depends_on[static_cast<size_t>(arg - f_.args.begin())]);
+    };
+    std::vector<VarOrRVar> order = loops;
+    const auto first = std::stable_partition(order.begin(), order.end(), std::not_fn(moves));
+    stage_.reorder(order);
+    const std::vector<VarOrRVar> outside(first, order.end());
+    pack(function_, operand, Var(outside[0].name()), lanes);
+    return outside;
   }
 
   void run_in_parallel(const std::vector<VarOrRVar>& loops) {
@@ -143,7 +172,9 @@ class LoopChooser {
   // Its loops stand inside of those of the reduction; those over tiles outside, of the sides first,
   // so that what the last dimensions run over stays in the cache; `between` just inside of those of
   // the reduction. The result: those outside.
-  std::vector<VarOrRVar> cut(const RegisterTile& tile, const std::vector<size_t>& between = {}) {
+  // `is_whole`: vectors of one row are one loop, of which bounds know where its guard ends it.
+  std::vector<VarOrRVar> cut(const RegisterTile& tile, const std::vector<size_t>& between = {},
+                             bool is_whole = false) {
     std::vector<VarOrRVar> inner, outer;
     const auto cut = [&](size_t d, int64_t size) {
       const Var all = variable_of(d), part = inside(all);
@@ -166,7 +197,7 @@ class LoopChooser {
     }
     order.insert(order.end(), outer.begin(), outer.end());
     stage_.reorder(order);
-    if (tile.vectors > 1) {
+    if (tile.vectors > 1 && !is_whole) {
       const Var vector(new_loop(f_, index_, "vector"));
       stage_.split(inner[0], inner[0], vector, lanes).vectorize(vector).unroll(inner[0]);
     } else {

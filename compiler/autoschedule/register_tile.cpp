@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <unordered_set>
 
+#include "autoschedule/cost_estimate.h"
 #include "graph/own_reads.h"
 #include "ir/build.h"
 #include "ir/visit.h"
@@ -72,11 +73,13 @@ int64_t sums_of(const RegisterTile& tile) {
 }
 
 // In one iteration of the reduction: an operand once for all of the tile that it does not depend on.
+// Of vectors that lie next to each other only the first comes from afar.
 double loads_of(const RegisterTile& tile, const std::vector<Operand>& operands) {
   double loads = 0;
   for (const Operand& operand : operands) {
-    const double lines = operand.is_far ? far_lines : split_lines;
-    double count = operand.depends_on[0] ? lines * static_cast<double>(tile.vectors) : 1;
+    const double first = operand.is_far ? far_lines : split_lines;
+    double count =
+        operand.depends_on[0] ? first + split_lines * static_cast<double>(tile.vectors - 1) : 1;
     for (const RegisterTile::Side& side : tile.sides)
       count *= operand.depends_on[side.dimension] ? static_cast<double>(side.size) : 1;
     loads += count;
@@ -84,11 +87,36 @@ double loads_of(const RegisterTile& tile, const std::vector<Operand>& operands) 
   return loads;
 }
 
+// Whether something that is loaded is used more than once in the tile.
+bool shares_loads(const RegisterTile& tile, const std::vector<Operand>& operands) {
+  const auto is_shared = [&](const Operand& operand) {
+    return !operand.depends_on[0] ||
+           std::any_of(tile.sides.begin(), tile.sides.end(), [&](const RegisterTile::Side& side) {
+             return !operand.depends_on[side.dimension];
+           });
+  };
+  return std::any_of(operands.begin(), operands.end(), is_shared);
+}
+
+// That the functions of a term take, of which nothing is shared.
+double adds_of_functions(const Definition& stage) {
+  double adds = 0;
+  std::unordered_set<const ExprNode*> seen;
+  for (const Expr& value : stage.values) {
+    walk(value, [&](const Expr& e) {
+      if (!seen.insert(e.get()).second) return false;
+      adds += work_of(e).function_adds;
+      return true;
+    });
+  }
+  return adds;
+}
+
 // For each product of a vector.
-double cycles(const RegisterTile& tile, const std::vector<Operand>& operands) {
+double cycles(const RegisterTile& tile, const std::vector<Operand>& operands, double adds) {
   const auto sums = static_cast<double>(sums_of(tile));
-  return std::max(
-      {loads_of(tile, operands) / sums / loads_a_cycle, 1 / products_a_cycle, latency / sums});
+  return std::max({loads_of(tile, operands) / sums / loads_a_cycle, (1 + adds) / products_a_cycle,
+                   latency / sums});
 }
 
 // Iterations of the tile for each that has an element.
@@ -145,17 +173,22 @@ std::optional<RegisterTile> register_tile(const FuncContents& f, const Definitio
   for (size_t d = f.args.size() - numbers; d-- > 1;) {
     if (is_pure_position(f, stage, d)) sides.push_back(d);
   }
+  const double adds = adds_of_functions(stage);
   RegisterTile best;
   const auto cost = [&](const RegisterTile& tile) {
-    return cycles(tile, *operands) * iterations_an_element(tile, lanes, f, sizes);
+    return cycles(tile, *operands, adds) * iterations_an_element(tile, lanes, f, sizes);
   };
   double least = cost(best) * worth_while;
   const auto consider = [&](RegisterTile tile) {
     const double needed = cost(tile);
-    const bool is_better = needed < least || (needed == least && sums_of(best) > sums_of(tile));
-    const bool reuses = loads_of(tile, *operands) <
-                        static_cast<double>(sums_of(tile)) * loads_of(RegisterTile(), *operands);
-    if (sums_of(tile) * bytes > unit.accumulator_bytes || !is_better || !reuses) return;
+    // Of equals, fewer registers; of the same, those of one row.
+    const bool is_better =
+        needed < least ||
+        (needed == least && (sums_of(tile) < sums_of(best) ||
+                             (sums_of(tile) == sums_of(best) && tile.vectors > best.vectors)));
+    if (sums_of(tile) * bytes > unit.accumulator_bytes || !is_better ||
+        !shares_loads(tile, *operands))
+      return;
     best = std::move(tile);
     least = needed;
   };

@@ -34,8 +34,9 @@ struct RegisterTile {
 // the dimension has at most. Where sizes are known, the tile fits them: what of its registers lies
 // beyond the end counts as lost.
 // Model: two loads and two multiply-adds a cycle, of which each sum takes one every four cycles; a
-// vector, whose place is any, counts as two loads (vector units of x86-64 since 2015), as four where
-// each iteration reads another row.
+// vector, whose place is any, counts as two loads (vector units of x86-64 since 2015), the first of a
+// row as four where each iteration reads another row. Functions in the terms take what they take, so
+// that a tile which only hides latency is none.
 std::optional<RegisterTile> register_tile(const FuncContents& f, const Definition& stage, int lanes,
                                           int64_t vectors, const VectorUnit& unit,
                                           const SizeEstimate& sizes = {});

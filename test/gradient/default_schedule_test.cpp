@@ -392,22 +392,26 @@ TEST_F(DefaultSchedule, SumsOfShiftedRowsAreTakenRowByRow) {
   EXPECT_FALSE(shifts(2));
 }
 
-// The rows of the matrix on the right, each from a place of its own, are used for eight rows of the
-// result; where they lie side by side, for four.
+// The rows of the matrix on the right, each from a place of its own, are used for more of the result
+// than where they lie side by side; and of a row, more vectors are taken at once.
 TEST_F(DefaultSchedule, TilesUseWhatComesFromAfarMoreOften) {
   Buffer<float> matrix(64, 64), line(256);
   RDom k(0, 64);
-  const auto rows_of = [&](const Func& f) {
+  const auto tile_of = [&](const Func& f) {
     const auto tile = ir::register_tile(*f.function(), f.function()->stage(1), 16, 4, {},
                                         ir::SizeEstimate({f.function()}));
-    return tile && tile->sides.size() == 1 ? tile->sides[0].size : 0;
+    return tile.value_or(ir::RegisterTile());
   };
   Func far("far"), near("near");
   far(x, y) += matrix(k, y) * matrix(x, k);
   near(x, y) += matrix(k, y) * line(x + k);
   for (Func f : {far, near}) f.set_estimates({{0, 64}, {0, 64}});
-  EXPECT_EQ(rows_of(far), 8);
-  EXPECT_EQ(rows_of(near), 4);
+  const ir::RegisterTile from_afar = tile_of(far), side_by_side = tile_of(near);
+  ASSERT_EQ(from_afar.sides.size(), 1u);
+  ASSERT_EQ(side_by_side.sides.size(), 1u);
+  EXPECT_GT(from_afar.vectors * from_afar.sides[0].size,
+            side_by_side.vectors * side_by_side.sides[0].size);
+  EXPECT_EQ(from_afar.vectors, 4);
 }
 
 TEST_F(DefaultSchedule, TilesFitTheRegisters) {
@@ -429,6 +433,81 @@ TEST_F(DefaultSchedule, TilesFitTheRegisters) {
     EXPECT_LE(sums(bytes), bytes);
   }
   EXPECT_EQ(sums(64), 0) << "no tile of one vector";
+}
+
+// The log of the schedule that all of `output` gets, and whether its values are those without one.
+std::string log_of(const Func& output, const std::vector<int32_t>& sizes) {
+  const ir::GraphCopy copy = ir::copy_graph({output.function()});
+  Pipeline plain(Func(copy.outputs[0])), pipeline(output);
+  plain.unscheduled();
+  const Buffer<float> expected = plain.realize(sizes)[0];
+  for (size_t d = 0; d < sizes.size(); ++d)
+    Func(output).set_estimate(output.args()[d], 0, sizes[d]);
+  pipeline.auto_schedule(get_host_target());
+  const Buffer<float> found = pipeline.realize(sizes)[0];
+  found.for_each_element([&](const int* at) {
+    EXPECT_NEAR(found(at), expected(at), 1e-5 * (1 + std::abs(expected(at))));
+  });
+  return pipeline.schedule_log().to_text();
+}
+
+// A layer that mixes channels: a tile reads a piece of each plane, for every channel of the result
+// again. What is inline is computed once an element of the copy.
+TEST_F(DefaultSchedule, WhatATileReadsFromManyPlanesIsPacked) {
+  const Buffer<float> image = gradient::random_image({125, 12, 32}, -1, 1, 1);
+  const Buffer<float> weights = gradient::random_image({32, 32}, -1, 1, 2);
+  Var c("c");
+  RDom k(0, 32);
+  Func inner("inner"), mixed("mixed");
+  inner(x, y, c) = max(image(x, y, c), 0.0f);
+  mixed(x, y, c) += weights(k, c) * inner(x, y, k);
+  const std::string log = log_of(mixed, {125, 12, 32});
+  EXPECT_NE(log.find("inner.in(inner_in_mixed"), std::string::npos) << log;
+}
+
+// Few tiles use what one has read: its rows are in the cache yet.
+TEST_F(DefaultSchedule, WhatFewTilesUseIsNotPacked) {
+  const Buffer<float> image = gradient::random_image({128, 12, 32}, -1, 1, 1);
+  const Buffer<float> weights = gradient::random_image({32, 8}, -1, 1, 2);
+  Var c("c");
+  RDom k(0, 32);
+  Func inner("inner"), mixed("mixed");
+  inner(x, y, c) = max(image(x, y, c), 0.0f);
+  mixed(x, y, c) += weights(k, c) * inner(x, y, k);
+  EXPECT_EQ(log_of(mixed, {128, 12, 8}).find("inner_in_mixed"), std::string::npos);
+}
+
+// Three planes are too few tasks: their rows are tasks, too.
+TEST_F(DefaultSchedule, FewPlanesAreCutIntoTasksOfRows) {
+  const Buffer<float> image = gradient::random_image({40, 30, 3}, -1, 1, 1);
+  const Buffer<float> seed = gradient::random_image({40, 30, 3}, -1, 1, 2);
+  Var c("c");
+  Func square("square");
+  square(x, y, c) = image(x, y, c) * image(x, y, c);
+  Func gradient = propagate_adjoints(square, seed)(image);
+  const std::vector<ir::Dim> loops = scheduled(gradient, gradient).pure->schedule.dims;
+  ASSERT_GE(loops.size(), 3u);
+  EXPECT_EQ(loops[loops.size() - 1].runs, ForType::Parallel);
+  EXPECT_EQ(loops[loops.size() - 2].runs, ForType::Parallel);
+}
+
+// The parts of a sum over three long planes are rows, which are many, and not planes.
+TEST_F(DefaultSchedule, PartsOfASumAreManyWhereItsLastLoopIsShort) {
+  const Buffer<float> image = gradient::random_image({64, 320, 3}, 0.5f, 1, 1);
+  Buffer<float> gamma(1);
+  gamma.fill(0.7f);
+  Var c("c");
+  RDom r(0, 64, 0, 320, 0, 3);
+  Func corrected("corrected"), sum("sum");
+  corrected(x, y, c) = pow(image(x, y, c), gamma(0));
+  sum() += corrected(r.x, r.y, r.z);
+  const Derivative d = propagate_adjoints(sum);
+  const Func by_gamma = d(gamma);
+  for (const ir::FuncPtr& f : ir::topological_order({by_gamma.function()})) {
+    if (!f->made || !f->made->has_parts) continue;
+    const std::string last = ir::print(f->updates[0].rvars.back().extent);
+    EXPECT_EQ(last, "3") << "all planes belong to each part";
+  }
 }
 
 // By the two coordinates at which an image is read: both sum over what four corners hold.

@@ -1,0 +1,190 @@
+#include "autoschedule/packed_operand.h"
+
+#include <algorithm>
+#include <cmath>
+#include <unordered_map>
+
+#include "analysis/linear.h"
+#include "autoschedule/new_loop.h"
+#include "autoschedule/read_estimate.h"
+#include "graph/give_directive.h"
+#include "graph/own_reads.h"
+#include "ir/build.h"
+#include "ir/lets.h"
+#include "ir/visit.h"
+#include "simplify/simplify.h"
+
+namespace retrograde::ir {
+
+namespace {
+
+constexpr int64_t most_elements = 16384;  // of a copy: half of a second-level cache, at the most
+constexpr int64_t many_rows = 16;         // more than a set of the first-level cache holds lines
+constexpr double least_uses = 4;          // of an element of the copy
+constexpr double least_tiles = 4;   // that use one copy: with fewer, its rows stay in the cache
+constexpr double enough_tasks = 8;  // loops that copies are made in
+
+// How far each loop of a tile runs.
+using Extents = std::unordered_map<std::string, int64_t>;
+
+int64_t size_in(const RegisterTile& tile, size_t dimension, int lanes) {
+  if (dimension == 0) return tile.vectors * lanes;
+  for (const RegisterTile::Side& side : tile.sides) {
+    if (side.dimension == dimension) return side.size;
+  }
+  return 1;
+}
+
+// nullopt: a loop of the reduction has no constant extent.
+std::optional<Extents> extents_of(const FuncContents& f, const Definition& update,
+                                  const RegisterTile& tile, int lanes) {
+  Extents extents;
+  for (size_t d = 0; d < f.args.size(); ++d) extents[f.args[d]] = size_in(tile, d, lanes);
+  for (const ReductionVariable& r : update.rvars) {
+    const auto extent = as_const_int(simplify(r.extent));
+    if (!extent || *extent <= 0) return std::nullopt;
+    extents[r.var] = *extent;
+  }
+  return extents;
+}
+
+// The values that an index takes in a tile; nullopt: it is not linear.
+std::optional<int64_t> span_of(const Expr& index, const Extents& extents) {
+  std::vector<std::string> names;
+  for (const auto& [name, extent] : extents) names.push_back(name);
+  const auto form = decompose(index, names);
+  if (!form || any_node(form->rest, [](const Call&) { return true; })) return std::nullopt;
+  int64_t span = 1;
+  for (const auto& [name, coefficient] : form->coefficients)
+    span += std::abs(coefficient) * (extents.at(name) - 1);
+  return span;
+}
+
+class Candidate {
+ public:
+  Candidate(const Call& call, const FuncContents& f, const Definition& update,
+            const RegisterTile& tile, int lanes, const SizeEstimate& sizes, const Extents& extents)
+      : f_(f), update_(update), tile_(tile), lanes_(lanes), sizes_(sizes), extents_(extents) {
+    for (const Expr& arg : call.args) index_.push_back(place(arg));
+    for (const std::string& arg : f.args) depends_on_.push_back(moves(arg));
+  }
+
+  bool is_worth_packing() const {
+    const auto elements = lanes_run_along_rows() ? elements_of_piece() : std::nullopt;
+    if (!elements || rows() < many_rows || tiles(false) < least_tiles || tiles(true) < enough_tasks)
+      return false;
+    return loads_of_a_tile() * tiles(false) * lanes_ >= least_uses * static_cast<double>(*elements);
+  }
+  const std::vector<bool>& depends_on() const { return depends_on_; }
+
+ private:
+  Expr place(const Expr& arg) const {
+    return unclamped(without_lets(arg), [&](const Expr& e) {
+      return std::any_of(extents_.begin(), extents_.end(),
+                         [&](const auto& loop) { return uses_variable(e, loop.first); });
+    });
+  }
+  bool moves(const std::string& var) const {
+    return std::any_of(index_.begin(), index_.end(),
+                       [&](const Expr& e) { return uses_variable(e, var); });
+  }
+
+  // The first index, and no other, is the next for the next lane.
+  bool lanes_run_along_rows() const {
+    for (size_t d = 0; d < index_.size(); ++d) {
+      const auto form = decompose(index_[d], {f_.args[0]});
+      if (!form || form->coefficients[0].second != (d == 0 ? 1 : 0)) return false;
+    }
+    return true;
+  }
+
+  std::optional<int64_t> elements_of_piece() const {
+    int64_t elements = 1;
+    for (const Expr& index : index_) {
+      const auto span = span_of(index, extents_);
+      if (!span || *span > most_elements) return std::nullopt;
+      elements *= *span;
+      if (elements > most_elements) return std::nullopt;
+    }
+    return elements;
+  }
+
+  // That the reduction reads for one element of the tile.
+  int64_t rows() const {
+    int64_t rows = 1;
+    for (const ReductionVariable& r : update_.rvars) {
+      const bool is_row = std::any_of(index_.begin() + 1, index_.end(),
+                                      [&](const Expr& e) { return uses_variable(e, r.var); });
+      if (is_row) rows *= extents_.at(r.var);
+    }
+    return rows;
+  }
+
+  // Of vectors.
+  double loads_of_a_tile() const {
+    double loads = static_cast<double>(tile_.vectors);
+    for (const ReductionVariable& r : update_.rvars)
+      loads *= static_cast<double>(extents_.at(r.var));
+    for (size_t d = 1; d < f_.args.size(); ++d)
+      loads *= depends_on_[d] ? static_cast<double>(size_in(tile_, d, lanes_)) : 1;
+    return loads;
+  }
+
+  // Along the dimensions beyond the first that move the piece, or along the others: so many use one.
+  double tiles(bool that_move) const {
+    double tiles = 1;
+    for (size_t d = 1; d < f_.args.size(); ++d) {
+      const auto size = static_cast<double>(size_in(tile_, d, lanes_));
+      const double unknown = that_move ? enough_tasks * size : 1;
+      const auto extent = sizes_.extent(f_, d);
+      if (depends_on_[d] == that_move)
+        tiles *= std::ceil((extent ? static_cast<double>(*extent) : unknown) / size);
+    }
+    return tiles;
+  }
+
+  const FuncContents& f_;
+  const Definition& update_;
+  const RegisterTile& tile_;
+  const int lanes_;
+  const SizeEstimate& sizes_;
+  const Extents& extents_;
+  std::vector<Expr> index_;
+  std::vector<bool> depends_on_;
+};
+
+// A Func of one definition that nobody has placed inside of another.
+FuncPtr source_of(const Call& call, const FuncContents& f) {
+  const FuncPtr source = call.call_type == CallType::Func ? func_of(call) : nullptr;
+  if (!source || source.get() == &f || source->is_extern()) return nullptr;
+  return source->schedule.compute_level.kind == LoopLevel::Kind::At ? nullptr : source;
+}
+
+}  // namespace
+
+std::optional<PackedOperand> packed_operand(const FuncContents& f, const Definition& update,
+                                            const RegisterTile& tile, int lanes,
+                                            const SizeEstimate& sizes) {
+  const auto extents = extents_of(f, update, tile, lanes);
+  if (!extents) return std::nullopt;
+  std::unordered_map<const FuncContents*, int> reads;
+  std::optional<PackedOperand> result;
+  walk_definition(update, [&](const Expr& e) {
+    const auto* call = e.as<Call>();
+    const FuncPtr source = call ? source_of(*call, f) : nullptr;
+    if (!source) return;
+    ++reads[source.get()];
+    const Candidate candidate(*call, f, update, tile, lanes, sizes, *extents);
+    if (!result && candidate.is_worth_packing()) result = {source, candidate.depends_on()};
+  });
+  // Of several reads the copy would hold what lies between them.
+  return result && reads[result->source.get()] == 1 ? result : std::nullopt;
+}
+
+void pack(const FuncPtr& f, const PackedOperand& operand, const Var& loop, int lanes) {
+  Func copy = Func(operand.source).in(Func(f));
+  copy.compute_at(Func(f), loop);
+  vectorize(Stage(copy.function(), 0), copy.args()[0], lanes, TailStrategy::GuardWithIf);
+}
+
+}  // namespace retrograde::ir

@@ -1,0 +1,36 @@
+// packed_operand.h -- what a tile of sums reads across the rows of its source, copied to where it lies
+// together.
+//
+//   mixed(x, y, c) += weight(k, c) * inner(x, y, k)
+//
+// A tile of mixed reads a piece of each of 64 planes of inner: pieces that lie a power of two apart,
+// often, and then in one set of the cache, for each tile of c again. The copy holds the pieces of
+// all k for the x of the tile, is made once for all c, and fits in the nearest cache. Where vectors
+// run across the rows, as in  product(j, i) += key(k, j) * query(k, i),  the copy is transposed.
+// What is computed inline is computed once an element of the copy.
+// Source: K. Goto and R. van de Geijn, Anatomy of High-Performance Matrix Multiplication, ACM TOMS 34
+// (2008), sections 4 and 5; theirs packs operands of matrix products, this what any linear index
+// reads. Not done: what vectors read across the rows of its source, which a copy could transpose.
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "autoschedule/register_tile.h"
+#include "frontend/language/func.h"
+
+namespace retrograde::ir {
+
+struct PackedOperand {
+  FuncPtr source;
+  std::vector<bool> depends_on;  // by dimension of the Func: what moves the piece
+};
+
+// The operand of the update that is worth it, when the update has the tile; nullopt: none.
+std::optional<PackedOperand> packed_operand(const FuncContents& f, const Definition& update,
+                                            const RegisterTile& tile, int lanes,
+                                            const SizeEstimate& sizes);
+// For each iteration of a loop of f, inside of which only dimensions run that do not move it.
+void pack(const FuncPtr& f, const PackedOperand& operand, const Var& loop, int lanes);
+
+}  // namespace retrograde::ir
