@@ -2,7 +2,9 @@
 // survives its text.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <filesystem>
+#include <string>
 
 #include "programs/cases.h"
 #include "programs/compare.h"
@@ -11,8 +13,11 @@ namespace programs {
 
 namespace {
 
+// Of the running test alone: others run at the same time.
 std::filesystem::path scratch() {
-  const auto folder = std::filesystem::path(testing::TempDir()) / "programs";
+  std::string test = testing::UnitTest::GetInstance()->current_test_info()->name();
+  std::replace(test.begin(), test.end(), '/', '_');
+  const auto folder = std::filesystem::path(testing::TempDir()) / "programs" / test;
   std::filesystem::create_directories(folder);
   return folder;
 }
