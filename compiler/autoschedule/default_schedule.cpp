@@ -37,7 +37,6 @@ namespace {
 
 constexpr int lanes = 16;
 constexpr int64_t small_shift = 16;  // values of a dimension, such as the taps of a filter
-constexpr int64_t enough_tasks = 8;
 
 // The dimension along which what is read lies next to each other in memory.
 size_t innermost_dimension(const Call& call) {

@@ -30,11 +30,7 @@ class Inliner {
  private:
   FuncPtr inlined(const Call& call) const {
     const FuncPtr callee = call.call_type == CallType::Func ? func_of(call) : nullptr;
-    const bool is_inlined = callee && callee->is_pure() && !callee->is_extern() &&
-                            callee->schedule.compute_level.kind == LoopLevel::Kind::Inlined;
-    return is_inlined && std::find(stored_.begin(), stored_.end(), callee) == stored_.end()
-               ? callee
-               : nullptr;
+    return callee && is_computed_inline(callee, stored_) ? callee : nullptr;
   }
   static Expr value_of(const FuncContents& callee, const Call& call) {
     Substitution args;
@@ -47,6 +43,12 @@ class Inliner {
 };
 
 }  // namespace
+
+bool is_computed_inline(const FuncPtr& f, const std::vector<FuncPtr>& stored) {
+  return f->is_pure() && !f->is_extern() &&
+         f->schedule.compute_level.kind == LoopLevel::Kind::Inlined &&
+         std::find(stored.begin(), stored.end(), f) == stored.end();
+}
 
 std::vector<Expr> roots_with_inlined(const Definition& stage, const std::vector<FuncPtr>& stored) {
   Inliner inliner(stored);

@@ -21,8 +21,7 @@ namespace {
 constexpr int64_t most_elements = 16384;  // of a copy: half of a second-level cache, at the most
 constexpr int64_t many_rows = 16;         // more than a set of the first-level cache holds lines
 constexpr double least_uses = 4;          // of an element of the copy
-constexpr double least_tiles = 4;   // that use one copy: with fewer, its rows stay in the cache
-constexpr double enough_tasks = 8;  // loops that copies are made in
+constexpr double least_tiles = 4;  // that use one copy: with fewer, its rows stay in the cache
 
 // How far each loop of a tile runs.
 using Extents = std::unordered_map<std::string, int64_t>;
@@ -135,7 +134,7 @@ class Candidate {
     double tiles = 1;
     for (size_t d = 1; d < f_.args.size(); ++d) {
       const auto size = static_cast<double>(size_in(tile_, d, lanes_));
-      const double unknown = that_move ? enough_tasks * size : 1;
+      const double unknown = that_move ? static_cast<double>(enough_tasks) * size : 1;
       const auto extent = sizes_.extent(f_, d);
       if (depends_on_[d] == that_move)
         tiles *= std::ceil((extent ? static_cast<double>(*extent) : unknown) / size);

@@ -28,10 +28,7 @@ class Reads {
  public:
   Reads(const std::vector<FuncPtr>& outputs, const std::vector<FuncPtr>& stored) {
     for (const FuncPtr& f : topological_order(outputs)) {
-      const bool is_stored = std::find(stored.begin(), stored.end(), f) != stored.end();
-      const bool is_inlined = !is_stored && f->is_pure() && !f->is_extern() &&
-                              f->schedule.compute_level.kind == LoopLevel::Kind::Inlined;
-      if (is_inlined) continue;
+      if (is_computed_inline(f, stored)) continue;
       for (int s = 0; s < f->stage_count(); ++s) {
         for (const Expr& root : roots_with_inlined(f->stage(s), stored)) note(f, root);
       }

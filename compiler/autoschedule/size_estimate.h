@@ -13,6 +13,8 @@
 
 namespace retrograde::ir {
 
+// Iterations of loops that run in parallel: no thread of a few waits long for the others.
+inline constexpr int64_t enough_tasks = 8;
 // More bytes than stay in the caches near a core.
 inline constexpr int64_t more_than_caches = 16 << 20;
 

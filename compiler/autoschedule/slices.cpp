@@ -15,7 +15,6 @@ namespace retrograde::ir {
 
 namespace {
 
-constexpr int64_t tasks = 8;  // iterations of the outermost loop, which runs in parallel
 // At least; rows alone are too little work for an allocation.
 constexpr size_t slice_dimensions = 2;
 
@@ -30,7 +29,7 @@ class Slicer {
     size_t left = f->args.size();
     for (auto dim = loops.dims.rbegin(); dim != loops.dims.rend(); ++dim) {
       const auto extent = extent_of(reader, *dim);
-      const bool is_enough = extent && *extent >= (result ? 2 : tasks);
+      const bool is_enough = extent && *extent >= (result ? 2 : enough_tasks);
       if (!is_enough || left <= slice_dimensions || !is_sliced(*f, reader, dim->var)) break;
       result = dim->var;
       --left;

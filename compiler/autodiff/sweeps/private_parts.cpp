@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "autodiff/sweeps/blocked_sums.h"
+#include "autoschedule/size_estimate.h"
 #include "ir/build.h"
 #include "ir/print.h"
 #include "simplify/simplify.h"
@@ -18,7 +19,6 @@ constexpr int part_count = 32;
 // fewer parts than the least, a scatter stays one.
 constexpr double elements_an_iteration = 4;
 constexpr int least_parts = 4;
-constexpr int64_t enough_tasks = 8;
 // Elements of one part of a scatter, lanes included, that stay in a near cache.
 constexpr double near_elements = 1 << 14;
 // Bytes that all parts of one adjoint may take: what a large target has no room for is accumulated
