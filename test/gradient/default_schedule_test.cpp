@@ -451,30 +451,27 @@ std::string log_of(const Func& output, const std::vector<int32_t>& sizes) {
   return pipeline.schedule_log().to_text();
 }
 
-// A layer that mixes channels: a tile reads a piece of each plane, for every channel of the result
-// again. What is inline is computed once an element of the copy.
-TEST_F(DefaultSchedule, WhatATileReadsFromManyPlanesIsPacked) {
-  const Buffer<float> image = gradient::random_image({125, 12, 32}, -1, 1, 1);
-  const Buffer<float> weights = gradient::random_image({32, 32}, -1, 1, 2);
-  Var c("c");
+// The log of a layer that mixes 32 channels of an image so wide: a tile reads a piece of each plane,
+// for every channel of the result again. What is inline is computed once an element of the copy.
+std::string log_of_mixing(int width, int channels) {
+  const Buffer<float> image = gradient::random_image({width, 12, 32}, -1, 1, 1);
+  const Buffer<float> weights = gradient::random_image({32, channels}, -1, 1, 2);
+  Var x("x"), y("y"), c("c");
   RDom k(0, 32);
   Func inner("inner"), mixed("mixed");
   inner(x, y, c) = max(image(x, y, c), 0.0f);
   mixed(x, y, c) += weights(k, c) * inner(x, y, k);
-  const std::string log = log_of(mixed, {125, 12, 32});
+  return log_of(mixed, {width, 12, channels});
+}
+
+TEST_F(DefaultSchedule, WhatATileReadsFromManyPlanesIsPacked) {
+  const std::string log = log_of_mixing(125, 32);
   EXPECT_NE(log.find("inner.in(inner_in_mixed"), std::string::npos) << log;
 }
 
 // Few tiles use what one has read: its rows are in the cache yet.
 TEST_F(DefaultSchedule, WhatFewTilesUseIsNotPacked) {
-  const Buffer<float> image = gradient::random_image({128, 12, 32}, -1, 1, 1);
-  const Buffer<float> weights = gradient::random_image({32, 8}, -1, 1, 2);
-  Var c("c");
-  RDom k(0, 32);
-  Func inner("inner"), mixed("mixed");
-  inner(x, y, c) = max(image(x, y, c), 0.0f);
-  mixed(x, y, c) += weights(k, c) * inner(x, y, k);
-  EXPECT_EQ(log_of(mixed, {128, 12, 8}).find("inner_in_mixed"), std::string::npos);
+  EXPECT_EQ(log_of_mixing(128, 8).find("inner_in_mixed"), std::string::npos);
 }
 
 // Three planes are too few tasks: their rows are tasks, too.
@@ -499,15 +496,18 @@ TEST_F(DefaultSchedule, PartsOfASumAreManyWhereItsLastLoopIsShort) {
   Var c("c");
   RDom r(0, 64, 0, 320, 0, 3);
   Func corrected("corrected"), sum("sum");
-  corrected(x, y, c) = pow(image(x, y, c), gamma(0));
+  corrected(x, y, c) = pow(image(x, y, c), gamma(Expr(0)));
   sum() += corrected(r.x, r.y, r.z);
   const Derivative d = propagate_adjoints(sum);
   const Func by_gamma = d(gamma);
+  bool has_parts = false;
   for (const ir::FuncPtr& f : ir::topological_order({by_gamma.function()})) {
     if (!f->made || !f->made->has_parts) continue;
+    has_parts = true;
     const std::string last = ir::print(f->updates[0].rvars.back().extent);
     EXPECT_EQ(last, "3") << "all planes belong to each part";
   }
+  EXPECT_TRUE(has_parts);
 }
 
 // By the two coordinates at which an image is read: both sum over what four corners hold.
