@@ -11,33 +11,35 @@ namespace {
 
 class AbsentGradients {
  public:
-  AbsentGradients(const AbsentQuery& query, SynthesisResult& result, SynthesisAccount& account)
-      : q_(query), result_(result), account_(account) {}
+  AbsentGradients(const Primal& primal, const std::unordered_set<const Symbol*>& covered,
+                  SynthesisResult& result, SynthesisAccount& account)
+      : primal_(primal), covered_(covered), result_(result), account_(account) {}
 
   // What was asked for and got no contribution is zero, and says why.
   void find_absent() {
-    for (const FuncPtr& f : q_.order) {
-      if (q_.covered.contains(f.get()) ||
+    for (const FuncPtr& f : primal_.order) {
+      if (covered_.contains(f.get()) ||
           result_.after_stage.contains({f.get(), f->stage_count() - 1}) ||
           !is_wanted_zero(f.get(), f->name, is_floating(f->types), f->types[0]))
         continue;
-      AdjointFunc zero = make_adjoint(q_.target_of(f.get()), f->name + "_adj", {});
+      AdjointFunc zero = make_adjoint(primal_.target_of(f.get()), f->name + "_adj", {});
       for (int s = 0; s < f->stage_count(); ++s) result_.after_stage[{f.get(), s}] = zero.func;
     }
-    for (const auto& p : parameters_of({q_.output})) {
+    for (const auto& p : parameters_of({primal_.seed.output})) {
       if (result_.parameters.contains(p.get()) ||
           !is_wanted_zero(p.get(), p->name, p->type.is_float(), p->type))
         continue;
-      result_.parameters[p.get()] = make_adjoint(q_.target_of(p.get()), p->name + "_adj", {}).func;
+      result_.parameters[p.get()] =
+          make_adjoint(primal_.target_of(p.get()), p->name + "_adj", {}).func;
     }
   }
   // What was asked for and has nothing to do with the output.
   void find_strangers() {
     std::unordered_set<const Symbol*> reached;
-    for (const FuncPtr& f : q_.order) reached.insert(f.get());
-    for (const auto& p : parameters_of({q_.output})) reached.insert(p.get());
+    for (const FuncPtr& f : primal_.order) reached.insert(f.get());
+    for (const auto& p : parameters_of({primal_.seed.output})) reached.insert(p.get());
     std::map<std::string, const Symbol*> strangers;  // by name: in an order that is always the same
-    for (const Symbol* symbol : q_.options.requested) {
+    for (const Symbol* symbol : primal_.options.requested) {
       if (symbol && !reached.contains(symbol)) strangers[shape_of(symbol).name] = symbol;
     }
     for (const auto& [name, symbol] : strangers) {
@@ -55,7 +57,8 @@ class AbsentGradients {
   std::string without_path(const Symbol* symbol) const {
     std::string result = "the output does not depend on its value by a differentiable path";
     const char* separator = ": ";
-    for (const std::string& reason : zero_reasons(symbol, q_.order, [&](const FuncContents& f) {
+    for (const std::string& reason :
+         zero_reasons(symbol, primal_.order, [&](const FuncContents& f) {
            return result_.after_stage.contains({&f, f.stage_count() - 1}) && !zero_.contains(&f);
          })) {
       result += separator + reason;
@@ -68,15 +71,16 @@ class AbsentGradients {
     if (!floating) {
       account_.add(Explanation::Kind::Zero, name,
                    "its type is " + to_string(type) + ": integers have no derivative");
-    } else if (q_.active.cancels(symbol)) {
+    } else if (primal_.active.cancels(symbol)) {
       account_.add(
           Explanation::Kind::Zero, name,
           "the output is the same for all of its values: it is what a softmax, a log-sum-exp or "
           "a norm is shifted or scaled by, which cancels");
       return true;
-    } else if (auto left = q_.options.left_out.find(symbol); left != q_.options.left_out.end()) {
+    } else if (auto left = primal_.options.left_out.find(symbol);
+               left != primal_.options.left_out.end()) {
       account_.add(Explanation::Kind::NotRequested, name, "left out: " + left->second);
-    } else if (!q_.active.contains(symbol)) {
+    } else if (!primal_.active.contains(symbol)) {
       account_.add(Explanation::Kind::NotRequested, name,
                    "nothing that was requested depends on it");
     } else {
@@ -87,7 +91,8 @@ class AbsentGradients {
     return false;
   }
 
-  const AbsentQuery& q_;
+  const Primal& primal_;
+  const std::unordered_set<const Symbol*>& covered_;
   SynthesisResult& result_;
   SynthesisAccount& account_;
   std::unordered_set<const Symbol*> zero_;  // by no path
@@ -95,8 +100,9 @@ class AbsentGradients {
 
 }  // namespace
 
-void explain_absent(const AbsentQuery& query, SynthesisResult& result, SynthesisAccount& account) {
-  AbsentGradients gradients(query, result, account);
+void explain_absent(const Primal& primal, const std::unordered_set<const Symbol*>& covered,
+                    SynthesisResult& result, SynthesisAccount& account) {
+  AbsentGradients gradients(primal, covered, result, account);
   gradients.find_absent();
   gradients.find_strangers();
 }
