@@ -27,23 +27,16 @@
 #include "lower/statement_passes.h"
 
 #include <algorithm>
-#include <cstdlib>
-#include <optional>
-#include <set>
-#include <unordered_map>
-#include <unordered_set>
 
 #include "diagnostics/error.h"
 #include "ir/atomic_update.h"
 #include "ir/build.h"
-#include "ir/equal.h"
 #include "ir/memory_reads.h"
 #include "ir/print.h"
 #include "ir/visit.h"
 #include "lower/nests/copy_statement.h"
 #include "lower/statement_rewriter.h"
-#include "lower/vectors/reductions.h"
-#include "lower/vectors/widen_expr.h"
+#include "lower/vectors/vector_stores.h"
 #include "simplify/simplify.h"
 
 namespace retrograde::ir {
@@ -52,67 +45,67 @@ namespace {
 
 constexpr int max_lanes = 4096;
 
-// ---- facts of a loop body ----
+// ---- lane by lane ----
 
-struct BodyFacts {
-  std::unordered_map<std::string, int>
-      loads;  // nodes that load from a buffer, counted once per statement
-  std::unordered_set<std::string> allocated;  // inside the body
-  std::unordered_map<std::string, int> stores;
-  std::unordered_set<std::string> produced;  // Funcs computed inside the body
-  // Of stores f[i] = f[i] op g: their loads of f, and which operations there are.
-  std::unordered_map<std::string, int> update_loads;
-  std::unordered_map<std::string, std::set<std::pair<Kind, Op>>> update_operations;
+// What one iteration has around the current statement, as far as it varies.
+struct Surroundings {
+  Lets lets;
+  std::vector<Expr> conditions;  // that make up the mask
 };
 
-void count_loads(const Expr& e, std::unordered_map<std::string, int>& loads) {
-  walk(e, [&](const Load& load) { ++loads[load.name]; });
+bool can_recompute(const Surroundings& around) {
+  auto is_pure = [](const Expr& e) {
+    return !has_effects(e) && !reads_memory(e, MemoryReads::Loads);
+  };
+  return std::all_of(around.lets.begin(), around.lets.end(),
+                     [&](const auto& let) { return is_pure(let.second); }) &&
+         std::all_of(around.conditions.begin(), around.conditions.end(), is_pure);
 }
 
-int own_loads(const Store& n) {
-  std::unordered_map<std::string, int> loads;
-  count_loads(n.value, loads);
-  count_loads(n.index, loads);
-  return loads[n.name];
+// Accesses of allocations that exist once per lane, as seen by one lane.
+Stmt with_own_elements(const Stmt& s, const Expr& lane, const Widener& widen) {
+  if (widen.wide_allocations().empty()) return s;
+  const auto own = [&](const Expr& index) {
+    Expr scaled = binary(Kind::Mul, index, make_const(index.type(), widen.iterations()));
+    return binary(Kind::Add, scaled,
+                  make_broadcast(cast_to(index.type().element_of(), lane), index.type().lanes()));
+  };
+  const Stmt loads = rewrite(s, [&](const Expr& e, const auto& recurse) {
+    const Expr copy = map_children(e, recurse);
+    const Load* n = copy.as<Load>();
+    if (!n || !widen.is_wide_allocation(n->name)) return copy;
+    return make_load(n->type, n->name, own(n->index), n->predicate, n->symbol);
+  });
+  return rewrite_statements(loads, [&](const Stmt& part, auto& all) {
+    const Store* n = part.as<Store>();
+    if (!n || !widen.is_wide_allocation(n->name)) return all.children(part);
+    return make_store(n->name, n->value, own(n->index), n->predicate, n->symbol);
+  });
 }
 
-void find_store_facts(const Store& n, BodyFacts& facts) {
-  ++facts.stores[n.name];
-  if (auto update = find_atomic_update(n)) {
-    facts.update_loads[n.name] += own_loads(n);
-    facts.update_operations[n.name].insert({update->kind, update->op});
+Stmt lane_loop(const Stmt& s, const For& loop, const Surroundings& around, const Widener& widen,
+               FreshNames& fresh) {
+  Stmt body = make_lets(around.lets, make_if(conjunction(around.conditions), s));
+  std::string lane = fresh(loop.name);
+  Expr number = binary(Kind::Sub, variable(lane), loop.min);
+  body = with_own_elements(body, number, widen);
+  body = copy_statement(body, fresh, {{loop.name, variable(lane)}});
+  return make_for(lane, loop.min, make_const(loop.min.type(), widen.iterations()), ForType::Serial,
+                  body);
+}
+
+Stmt lane_copies(const Stmt& s, const Widener& widen, FreshNames& fresh) {
+  std::vector<Stmt> copies;
+  for (int i = 0; i < widen.iterations(); ++i) {
+    Substitution values;
+    for (const auto& [name, wide] : widen.bound()) {
+      values[name] = extract_iteration(wide, i, wide.type().lanes() / widen.iterations());
+    }
+    Stmt copy = copy_statement(with_own_elements(s, Expr(i), widen), fresh, values);
+    const Expr& mask = widen.mask();
+    copies.push_back(mask.defined() ? make_if(extract_iteration(mask, i, 1), copy) : copy);
   }
-}
-
-void find_facts(const Stmt& s, BodyFacts& facts) {
-  if (!s.defined()) return;
-  if (const Allocate* a = s.as<Allocate>()) facts.allocated.insert(a->name);
-  if (const Store* store = s.as<Store>()) find_store_facts(*store, facts);
-  const ProducerConsumer* p = s.as<ProducerConsumer>();
-  if (p && p->produces) facts.produced.insert(p->name);
-  for_each_child(
-      s, [&](const Expr& e) { count_loads(e, facts.loads); },
-      [&](const Stmt& child) { find_facts(child, facts); });
-}
-
-// A Func computed in every iteration into storage that all of them share: where their regions
-// overlap, an iteration initializes again what another has updated, so they must not be
-// interleaved.
-bool recomputes_shared_updates(const BodyFacts& facts) {
-  for (const auto& [buffer, count] : facts.stores) {
-    if (count < 2 || facts.allocated.count(buffer)) continue;
-    if (facts.produced.count(buffer) || facts.produced.count(buffer.substr(0, buffer.rfind('.'))))
-      return true;
-  }
-  return false;
-}
-
-// Of scalars, by an operator that vectors are reduced by.
-std::optional<UpdateChain> find_reduction(const Store& store) {
-  auto chain = find_update_chain(store);
-  const bool is_reduced =
-      chain && chain->kind != Kind::Call && !chain->own.as<Load>()->predicate.defined();
-  return is_reduced ? chain : std::nullopt;
+  return make_block(std::move(copies));
 }
 
 // ---- one loop ----
@@ -121,21 +114,23 @@ class LoopVectorizer {
  public:
   LoopVectorizer(const For& loop, int iterations, FreshNames& fresh)
       : loop_(loop),
-        iterations_(iterations),
         fresh_(fresh),
-        widen_(loop.name, loop.min, iterations, fresh) {
-    find_facts(loop.body, facts_);
-    must_stay_serial_ = recomputes_shared_updates(facts_);
-  }
+        widen_(loop.name, loop.min, iterations, fresh),
+        stores_(loop, widen_, fresh) {}
 
   Stmt run() {
-    Stmt body = must_stay_serial_ ? Stmt() : visit(loop_.body);
-    if (!must_stay_serial_) return body;
+    Stmt body = stores_.must_stay_serial() ? Stmt() : visit(loop_.body);
+    if (!stores_.must_stay_serial()) return body;
     return make_for(loop_.name, loop_.min, loop_.extent, ForType::Serial, loop_.body);
   }
 
  private:
-  bool varies(const Expr& e) { return e.defined() && !widen_(e).same_as(e); }
+  // A loop over the lanes when everything the statement needs of its surroundings can be computed
+  // again, else one copy of the statement per lane, which takes its operands out of the vectors.
+  Stmt lane_by_lane(const Stmt& s) {
+    return can_recompute(around_) ? lane_loop(s, loop_, around_, widen_, fresh_)
+                                  : lane_copies(s, widen_, fresh_);
+  }
 
   Stmt visit(const Stmt& s) {
     if (!s.defined()) return s;
@@ -147,8 +142,9 @@ class LoopVectorizer {
         [&](const Store& n) { return visit_store(s, n); },
         [&](const Atomic& n) { return visit_atomic(s, n); },
         [&](const Assert& n) {
-          return varies(n.condition) || varies(n.error) || widen_.mask().defined() ? lane_by_lane(s)
-                                                                                   : s;
+          return widen_.varies(n.condition) || widen_.varies(n.error) || widen_.mask().defined()
+                     ? lane_by_lane(s)
+                     : s;
         },
         [&](const Evaluate& n) {
           return has_effects(n.value) ? lane_by_lane(s) : make_evaluate(Expr(0));
@@ -164,9 +160,9 @@ class LoopVectorizer {
     if (has_effects(n.value) || tells_of_some_lanes(n.value)) return lane_by_lane(s);
     Expr value = widen_(n.value);
     if (value.same_as(n.value)) return make_let(n.name, n.value, visit(n.body));
-    lets_.emplace_back(n.name, n.value);
+    around_.lets.emplace_back(n.name, n.value);
     Stmt result = is_affine(value) ? bind_ramp(n, *value.as<Ramp>()) : bind_vector(n, value);
-    lets_.pop_back();
+    around_.lets.pop_back();
     return result;
   }
 
@@ -194,7 +190,7 @@ class LoopVectorizer {
   // ---- control ----
 
   Stmt visit_for(const Stmt& s, const For& n) {
-    if (varies(n.min) || varies(n.extent)) return lane_by_lane(s);
+    if (widen_.varies(n.min) || widen_.varies(n.extent)) return lane_by_lane(s);
     Stmt body = visit(n.body);
     if (body.same_as(n.body)) return s;
     // Vectors are not handed to other threads.
@@ -222,11 +218,11 @@ class LoopVectorizer {
     if (!branch.defined()) return branch;
     Expr outer = widen_.mask();
     Expr mask = outer.defined() ? binary(Kind::And, outer, condition) : condition;
-    conditions_.push_back(scalar_condition);
+    around_.conditions.push_back(scalar_condition);
     widen_.set_mask(mask);
     Stmt body = visit(branch);
     widen_.set_mask(outer);
-    conditions_.pop_back();
+    around_.conditions.pop_back();
     if (!body.defined() || !needs_an_active_lane(body)) return body;
     return make_if(make_vector_reduce(Kind::Or, mask, 1), body);
   }
@@ -240,9 +236,10 @@ class LoopVectorizer {
   }
 
   Stmt visit_allocate(const Stmt& s, const Allocate& n) {
-    if (varies(n.elements)) return lane_by_lane(s);
+    if (widen_.varies(n.elements)) return lane_by_lane(s);
     widen_.bind_allocation(n.name);
-    Expr elements = binary(Kind::Mul, n.elements, make_const(n.elements.type(), iterations_));
+    Expr elements =
+        binary(Kind::Mul, n.elements, make_const(n.elements.type(), widen_.iterations()));
     return make_allocate(n.name, n.type, n.memory, elements, visit(n.body));
   }
 
@@ -257,189 +254,24 @@ class LoopVectorizer {
   Stmt visit_store(const Stmt& s, const Store& n) {
     if (has_effects(n.value) || has_effects(n.index) || tells_of_some_lanes(n.value))
       return lane_by_lane(s);
-    int lanes = n.index.type().lanes();
-    if (widen_.is_wide_allocation(n.name)) {
-      return make_store(n.name, widen_.spread(n.value), widen_.index_in_wide_allocation(n.index),
-                        widen_.masked(n.predicate, lanes), n.symbol);
-    }
-    if (varies(n.index)) {
-      Expr index = widen_(n.index);
-      const bool may_meet = !hits_each_element_once(index);
-      if (may_meet) {
-        if (auto update = as_plain_update(n)) return update_in_order(n, index, *update);
-        require_no_load(n.name, 0);
-      }
-      return make_store(n.name, widen_.spread(n.value), index, widen_.masked(n.predicate, lanes),
-                        n.symbol);
-    }
-    if (auto reduction = find_reduction(n)) return store_reduction(s, n, *reduction);
-    require_no_load(n.name, 0);
-    bool is_same = !varies(n.value) && !varies(n.predicate);
-    return is_same ? s : lane_by_lane(s);  // the last lane wins
+    const Stmt stored = stores_.store(s, n);
+    return stored.defined() ? stored : lane_by_lane(s);
   }
 
-  // f[i] = f[i] op g, where nothing else in the body reads f but updates by the same operation.
-  std::optional<AtomicUpdate> as_plain_update(const Store& n) const {
-    if (!n.index.type().is_scalar() || n.predicate.defined() || !n.value.type().is_scalar())
-      return std::nullopt;
-    auto update = find_atomic_update(n);
-    if (!update || facts_.loads.at(n.name) > facts_.update_loads.at(n.name) ||
-        facts_.update_operations.at(n.name).size() > 1)
-      return std::nullopt;
-    return update;
-  }
-
-  // Places and operands are vectors; the elements change one after the other, in the order of the
-  // lanes, as several may be the same.
-  Stmt update_in_order(const Store& n, const Expr& index, const AtomicUpdate& update) {
-    Expr operand = widen_.spread(update.operand);
-    const std::string places = fresh_(loop_.name + ".places"),
-                      terms = fresh_(loop_.name + ".terms");
-    std::vector<Stmt> stores;
-    for (int i = 0; i < iterations_; ++i) {
-      Expr place = extract_iteration(variable(places, index.type()), i, 1);
-      Expr term = extract_iteration(variable(terms, operand.type()), i, 1);
-      Expr old = make_load(n.value.type(), n.name, place, {}, n.symbol);
-      Stmt store = make_store(n.name, updated(update, old, term), place, {}, n.symbol);
-      const Expr& mask = widen_.mask();
-      stores.push_back(mask.defined() ? make_if(extract_iteration(mask, i, 1), store) : store);
-    }
-    return make_let(places, index, make_let(terms, operand, make_block(std::move(stores))));
-  }
-
-  // One operation on the element stays a vector, whose lanes may hit one element: it is stored lane
-  // by lane. Anything else runs lane by lane altogether.
+  // One operation on the element stays a vector. Anything else runs lane by lane altogether.
   Stmt visit_atomic(const Stmt& s, const Atomic& n) {
     const Store* store = n.body.as<Store>();
     if (store && widen_.is_wide_allocation(store->name)) return visit_store(n.body, *store);
     if (!store || !find_atomic_update(*store) || has_effects(store->value)) return lane_by_lane(s);
-    if (!varies(store->index)) return make_atomic(n.name, visit_store(n.body, *store));
-    require_no_load(store->name, own_loads(*store));
-    const int lanes = store->index.type().lanes();
-    return make_atomic(n.name,
-                       make_store(store->name, widen_.spread(store->value), widen_(store->index),
-                                  widen_.masked(store->predicate, lanes), store->symbol));
-  }
-
-  // A buffer that several lanes store to may be read by nothing but the `own` loads of the store
-  // itself.
-  void require_no_load(const std::string& buffer, int own) {
-    auto it = facts_.loads.find(buffer);
-    must_stay_serial_ |= it != facts_.loads.end() && it->second > own;
-  }
-
-  // Of a nest of ramps with known strides one must step over all of the other.
-  static bool hits_each_element_once(const Expr& index) {
-    const Ramp* ramp = index.as<Ramp>();
-    if (!ramp || is_zero(ramp->stride)) return false;
-    if (ramp->base.type().is_scalar()) return true;
-    const Ramp* inner = ramp->base.as<Ramp>();
-    if (!inner || !hits_each_element_once(ramp->base)) return false;
-    auto outer_step = as_const_int(ramp->stride), inner_step = as_const_int(inner->stride);
-    if (!outer_step || !inner_step) return true;
-    return std::abs(*outer_step) >= std::abs(*inner_step) * inner->lanes ||
-           std::abs(*inner_step) >= std::abs(*outer_step) * ramp->lanes;
-  }
-
-  Stmt store_reduction(const Stmt& s, const Store& n, const UpdateChain& reduction) {
-    require_no_load(n.name, own_loads(n));
-    if (must_stay_serial_) return s;
-    Expr active = widen_.masked(varies(n.predicate) ? n.predicate : Expr(), n.value.type().lanes());
-    Expr result = reduction.own;
-    for (const UpdateChain::Term& term : reduction.terms) {
-      Expr reduced = reduce(reduction.kind, term.value, active);
-      result = binary(term.is_negated ? Kind::Sub : reduction.kind, result, reduced);
-    }
-    Expr predicate = varies(n.predicate) ? Expr() : n.predicate;
-    return make_store(n.name, result, n.index, predicate, n.symbol);
-  }
-
-  // The terms of all iterations, combined lane by lane of the statement.
-  Expr reduce(Kind kind, const Expr& term, const Expr& active) {
-    int lanes = term.type().lanes();
-    Expr wide = widen_.spread(term);
-    if (active.defined()) wide = make_select(active, wide, identity_of(kind, wide.type()));
-    if (lanes > 1) {  // iteration-major to lane-major: the groups that are reduced lie side by side
-      std::vector<int> indices;
-      for (int lane = 0; lane < lanes; ++lane) {
-        for (int iteration = 0; iteration < iterations_; ++iteration)
-          indices.push_back(iteration * lanes + lane);
-      }
-      wide = make_shuffle({wide}, indices);
-    }
-    return make_vector_reduce(kind, wide, lanes);
-  }
-
-  // ---- lane by lane ----
-
-  // A loop over the lanes when everything the statement needs of its surroundings can be computed
-  // again, else one copy of the statement per lane, which takes its operands out of the vectors.
-  Stmt lane_by_lane(const Stmt& s) { return can_recompute() ? lane_loop(s) : lane_copies(s); }
-
-  bool can_recompute() const {
-    auto is_pure = [](const Expr& e) {
-      return !has_effects(e) && !reads_memory(e, MemoryReads::Loads);
-    };
-    return std::all_of(lets_.begin(), lets_.end(),
-                       [&](const auto& let) { return is_pure(let.second); }) &&
-           std::all_of(conditions_.begin(), conditions_.end(), is_pure);
-  }
-
-  Stmt lane_loop(const Stmt& s) {
-    Stmt body = make_lets(lets_, make_if(conjunction(conditions_), s));
-    std::string lane = fresh_(loop_.name);
-    Expr number = binary(Kind::Sub, variable(lane), loop_.min);
-    body = with_own_elements(body, number);
-    body = copy_statement(body, fresh_, {{loop_.name, variable(lane)}});
-    return make_for(lane, loop_.min, make_const(loop_.min.type(), iterations_), ForType::Serial,
-                    body);
-  }
-
-  Stmt lane_copies(const Stmt& s) {
-    std::vector<Stmt> copies;
-    for (int i = 0; i < iterations_; ++i) {
-      Substitution values;
-      for (const auto& [name, wide] : widen_.bound()) {
-        values[name] = extract_iteration(wide, i, narrow_lanes(wide));
-      }
-      Stmt copy = copy_statement(with_own_elements(s, Expr(i)), fresh_, values);
-      const Expr& mask = widen_.mask();
-      copies.push_back(mask.defined() ? make_if(extract_iteration(mask, i, 1), copy) : copy);
-    }
-    return make_block(std::move(copies));
-  }
-
-  int narrow_lanes(const Expr& wide) const { return wide.type().lanes() / iterations_; }
-
-  // Accesses of allocations that exist once per lane, as seen by one lane.
-  Stmt with_own_elements(const Stmt& s, const Expr& lane) const {
-    if (widen_.wide_allocations().empty()) return s;
-    const auto own = [&](const Expr& index) {
-      Expr scaled = binary(Kind::Mul, index, make_const(index.type(), iterations_));
-      return binary(Kind::Add, scaled,
-                    make_broadcast(cast_to(index.type().element_of(), lane), index.type().lanes()));
-    };
-    const Stmt loads = rewrite(s, [&](const Expr& e, const auto& recurse) {
-      const Expr copy = map_children(e, recurse);
-      const Load* n = copy.as<Load>();
-      if (!n || !widen_.is_wide_allocation(n->name)) return copy;
-      return make_load(n->type, n->name, own(n->index), n->predicate, n->symbol);
-    });
-    return rewrite_statements(loads, [&](const Stmt& part, auto& all) {
-      const Store* n = part.as<Store>();
-      if (!n || !widen_.is_wide_allocation(n->name)) return all.children(part);
-      return make_store(n->name, n->value, own(n->index), n->predicate, n->symbol);
-    });
+    if (!widen_.varies(store->index)) return make_atomic(n.name, visit_store(n.body, *store));
+    return make_atomic(n.name, stores_.atomic_update(*store));
   }
 
   const For& loop_;
-  const int iterations_;
   FreshNames& fresh_;
   Widener widen_;
-  BodyFacts facts_;
-  Lets lets_;  // around the current statement, those that vary, as one iteration has them
-  std::vector<Expr> conditions_;  // of one iteration, that make up the mask
-  bool must_stay_serial_ = false;
+  VectorStores stores_;
+  Surroundings around_;
 };
 
 // ---- all loops ----

@@ -33,6 +33,8 @@ class Widener {
   // Always with N*L lanes.
   Expr spread(const Expr& e);
   int iterations() const { return iterations_; }
+  // False for an undefined one.
+  bool varies(const Expr& e) { return e.defined() && !(*this)(e).same_as(e); }
 
   // A name bound outside of expressions: from now on `e` stands for the variable in all iterations.
   void bind(const std::string& name, const Expr& wide) { wide_values_[name] = wide; }
