@@ -28,6 +28,7 @@
 #include "lower/loops/fork_async.h"
 
 #include <algorithm>
+#include <optional>
 #include <set>
 #include <utility>
 
@@ -61,6 +62,13 @@ bool uses_func(const Stmt& s, const std::string& func) {
   return any_node(
       s, [&](const Expr& node) { return reads_func(node, func); },
       [&](const Stmt& part) { return writes_func(part, func); });
+}
+
+bool own_parts_use(const Stmt& s, const std::string& func) {
+  bool found = false;
+  for_each_child(
+      s, [&](const Expr& e) { found = found || uses_func(e, func); }, [](const Stmt&) {});
+  return found;
 }
 
 using Names = std::set<std::string>;
@@ -139,6 +147,192 @@ bool has_loop_around(const Stmt& s, const std::string& func) {
   return found;
 }
 
+// Whether anything reads a Func that is computed together with this one.
+bool is_group_read(const Stmt& s, const std::string& func) {
+  Names group = {func};
+  walk(
+      s, [](const Expr&) { return false; },
+      [&](const Stmt& part) {
+        const ProducerConsumer* n = as_producer(part);
+        const Names names = n ? group_of(*n) : Names();
+        if (names.count(func)) group.insert(names.begin(), names.end());
+        return !names.count(func);
+      });
+  return std::any_of(group.begin(), group.end(),
+                     [&](const std::string& other) { return is_read_outside(s, other); });
+}
+
+// Places outside of the statement in which its Funcs lie, by their original names.
+Names places_of(const Stmt& s, const Program& program) {
+  Names places, inside;
+  if (!s.defined()) return places;
+  for (const std::string& name : realized_in(s)) inside.insert(program.original(name));
+  for (const std::string& name : inside) {
+    const LoopedFunc* f = program.find(name);
+    if (f && is_hoisted(*f) && !inside.count(place_name(name))) places.insert(place_name(name));
+  }
+  return places;
+}
+
+// Whether the statement has to do with what was realized under this name: a Func or a place.
+bool needs(const Stmt& s, const std::string& name, const Program& program) {
+  return s.defined() && (uses_func(s, name) || places_of(s, program).count(program.original(name)));
+}
+
+[[noreturn]] void refuse_loops(const std::string& func, const std::string& evidence,
+                               const char* instead) {
+  unsupported(
+      text("compute ", quoted(func), " async"),
+      "the loops between storage and computation of an async Func are serial and always run",
+      evidence, instead);
+}
+
+// ---- the two branches ----
+
+// What each branch of a Fork keeps of the code where an async Func lives: just the work of the
+// producer and what it needs; everything else.
+class AsyncBranches {
+ public:
+  // `room`: how many iterations the producer may be ahead (AsyncRoom); none: it runs once.
+  // `forked`: the async Funcs around.
+  AsyncBranches(const Realize& n, std::optional<int> room, const std::vector<std::string>& forked,
+                const Program& program, Semaphores& semaphores)
+      : n_(n), room_(room), forked_(forked), program_(program), semaphores_(semaphores) {}
+
+  // Undefined where nothing is left.
+  Stmt producer, consumer;
+  void split() {
+    made_ = {n_.name};
+    producer = only_producer(n_.body);
+    while (add_what_is_read()) producer = only_producer(n_.body);
+    made_.erase(n_.name);
+    consumer = without_unread(without_producer(n_.body, n_.name), made_);
+    check_is_apart();
+  }
+
+ private:
+  // Funcs that are computed beside this one and that its producer reads.
+  bool add_what_is_read() {
+    const size_t before = made_.size();
+    walk(
+        n_.body, [](const Expr&) { return false; },
+        [&](const Stmt& part) {
+          const ProducerConsumer* other = as_producer(part);
+          if (!other || (other->name != n_.name && produces(part, n_.name))) return true;
+          const Names group = group_of(*other);
+          if (std::any_of(group.begin(), group.end(),
+                          [&](const std::string& func) { return uses_func(producer, func); }))
+            made_.insert(group.begin(), group.end());
+          return false;
+        });
+    return made_.size() > before;
+  }
+
+  // Without the computation of those that nothing reads.
+  Stmt without_unread(Stmt s, Names funcs) {
+    for (auto it = funcs.begin(); s.defined() && it != funcs.end();) {
+      if (!produces(s, *it) || is_group_read(s, *it)) {
+        ++it;
+        continue;
+      }
+      s = without_producer(s, *it);
+      funcs.erase(it);
+      it = funcs.begin();
+    }
+    return s;
+  }
+
+  // Both branches may compute a Func, in its own loops or in those of another, only where each has
+  // storage for it.
+  void check_is_apart() const {
+    const std::string name = quoted(program_.original(n_.name));
+    const Names inside = realized_in(n_.body);
+    Names computed = produced_in(producer);
+    computed.insert(made_.begin(), made_.end());
+    computed.erase(n_.name);
+    for (const std::string& other : computed) {
+      const LoopedFunc* f = program_.find(other);
+      const bool is_output = f && f->is_output && is_read_outside(producer, other);
+      if (inside.count(other) || (!is_output && !produces(consumer, other))) continue;
+      user_error(text("compute ", name, " async"),
+                 "what an async Func and its consumer both read is stored no further out than the "
+                 "async Func, or computed outside of the loops that they share",
+                 text(quoted(program_.original(other)),
+                      " is computed in these loops and stored around ", name),
+                 text("Compute ", quoted(program_.original(other)), " at root, store it where ",
+                      name, " is stored, or call async() on it"));
+    }
+  }
+
+  // A loop around what is left of its body, the innermost one around the producer with the waits of
+  // a branch.
+  Stmt around_loop(const For& n, Stmt body, bool of_producer) {
+    if (room_ && produces(n.body, n_.name) && !has_loop_around(n.body, n_.name)) {
+      const Semaphore before = of_producer ? Space : Ready, after = of_producer ? Ready : Space;
+      std::vector<Stmt> stmts;
+      if (before == Ready || *room_ > 0) stmts.push_back(semaphores_.acquire(n_.name, before));
+      if (body.defined()) stmts.push_back(body);
+      if (after == Ready || *room_ > 0) stmts.push_back(Semaphores::release(n_.name, after));
+      body = make_block(std::move(stmts));
+    }
+    return make_for(n.name, n.min, n.extent, n.runs, body, n.partition);
+  }
+
+  // The control of a statement around what `part` leaves of its parts; undefined without any.
+  Stmt around(const Stmt& s, FunctionRef<Stmt(const Stmt&)> part) const {
+    const Stmt result = map_children(s, part);
+    const Realize* n = result.defined() ? result.as<Realize>() : nullptr;
+    return n && !needs(n->body, n->name, program_) ? n->body : result;
+  }
+
+  // Just the work of the producer and of what it needs, and the control around. Undefined where
+  // there is none.
+  Stmt only_producer(const Stmt& s) {
+    if (!s.defined() || !produces_any(s, made_)) return {};
+    if (const ProducerConsumer* n = as_producer(s); n && made_.count(n->name)) return s;
+    const auto part = [&](const Stmt& child) { return only_producer(child); };
+    if (const Block* n = s.as<Block>()) {
+      const auto is_wait = [&](const Stmt& child) {
+        return std::any_of(forked_.begin(), forked_.end(), [&](const std::string& func) {
+          return Semaphores::is_step(child, func);
+        });
+      };
+      std::vector<Stmt> stmts;
+      for (const Stmt& child : n->stmts) stmts.push_back(is_wait(child) ? child : part(child));
+      return make_block(std::move(stmts));
+    }
+    if (const For* n = s.as<For>()) {
+      if (n->runs != ForType::Serial && produces(n->body, n_.name)) {
+        refuse_loops(program_.original(n_.name),
+                     text("the loop ", describe_loop(n->name), " is not serial"),
+                     "Store the Func inside of that loop");
+      }
+      return around_loop(*n, part(n->body), true);
+    }
+    if (const ProducerConsumer* n = s.as<ProducerConsumer>()) return part(n->body);
+    return around(s, part);
+  }
+
+  // Everything but the work of the producer of a Func.
+  Stmt without_producer(const Stmt& s, const std::string& func) {
+    if (!s.defined() || !produces(s, func)) return s;
+    if (is_producer_of(s, func)) return {};
+    const auto part = [&](const Stmt& child) { return without_producer(child, func); };
+    const For* n = s.as<For>();
+    if (n && func == n_.name) return around_loop(*n, part(n->body), false);
+    return around(s, part);
+  }
+
+  const Realize& n_;
+  const std::optional<int> room_;
+  const std::vector<std::string>& forked_;
+  const Program& program_;
+  Semaphores& semaphores_;
+  Names made_;  // computed by the producer's branch
+};
+
+// ---- all async Funcs ----
+
 class AsyncForker : public StatementRewriter {
  public:
   AsyncForker(const Stmt& s, const Program& program, const AsyncRoom& room)
@@ -191,94 +385,18 @@ class AsyncForker : public StatementRewriter {
 
   // ---- the two branches ----
 
-  struct Branches {
-    Stmt producer, consumer;
-  };
-
-  Branches branches_of(const Realize& n, bool loops, int room) {
-    Names made = {n.name};
-    Stmt producer = only_producer(n.body, n.name, made, loops, room);
-    while (add_what_is_read(n, producer, made))
-      producer = only_producer(n.body, n.name, made, loops, room);
-    Stmt consumer = without_producer(n.body, n.name, loops, room);
-    made.erase(n.name);
-    consumer = without_unread(consumer, made);
-    check_is_apart(n, made, producer, consumer);
-    share_waits(producer, consumer);
-    return {with_own_places(producer, consumer), consumer};
-  }
-
-  // Funcs that are computed beside `n` and that its producer reads.
-  static bool add_what_is_read(const Realize& n, const Stmt& producer, Names& made) {
-    const size_t before = made.size();
-    walk(
-        n.body, [](const Expr&) { return false; },
-        [&](const Stmt& part) {
-          const ProducerConsumer* other = as_producer(part);
-          if (!other || (other->name != n.name && produces(part, n.name))) return true;
-          const Names group = group_of(*other);
-          if (std::any_of(group.begin(), group.end(),
-                          [&](const std::string& func) { return uses_func(producer, func); }))
-            made.insert(group.begin(), group.end());
-          return false;
-        });
-    return made.size() > before;
-  }
-
-  // Whether anything reads a Func that is computed together with this one.
-  static bool is_group_read(const Stmt& s, const std::string& func) {
-    Names group = {func};
-    walk(
-        s, [](const Expr&) { return false; },
-        [&](const Stmt& part) {
-          const ProducerConsumer* n = as_producer(part);
-          const Names names = n ? group_of(*n) : Names();
-          if (names.count(func)) group.insert(names.begin(), names.end());
-          return !names.count(func);
-        });
-    return std::any_of(group.begin(), group.end(),
-                       [&](const std::string& other) { return is_read_outside(s, other); });
-  }
-
-  // Without the computation of those that nothing reads.
-  Stmt without_unread(Stmt s, Names funcs) {
-    for (auto it = funcs.begin(); s.defined() && it != funcs.end();) {
-      if (!produces(s, *it) || is_group_read(s, *it)) {
-        ++it;
-        continue;
-      }
-      s = without_producer(s, *it, false);
-      funcs.erase(it);
-      it = funcs.begin();
-    }
-    return s;
-  }
-
-  // Both branches may compute a Func, in its own loops or in those of another, only where each has
-  // storage for it.
-  void check_is_apart(const Realize& n, const Names& made, const Stmt& producer,
-                      const Stmt& consumer) const {
-    const Names inside = realized_in(n.body);
-    Names computed = produced_in(producer);
-    computed.insert(made.begin(), made.end());
-    computed.erase(n.name);
-    for (const std::string& other : computed) {
-      const LoopedFunc* f = program_.find(other);
-      const bool is_output = f && f->is_output && is_read_outside(producer, other);
-      if (inside.count(other) || (!is_output && !produces(consumer, other))) continue;
-      user_error(text("compute ", quoted(original(n.name)), " async"),
-                 "what an async Func and its consumer both read is stored no further out than the "
-                 "async Func, or computed outside of the loops that they share",
-                 text(quoted(original(other)), " is computed in these loops and stored around ",
-                      quoted(original(n.name))),
-                 text("Compute ", quoted(original(other)), " at root, store it where ",
-                      quoted(original(n.name)), " is stored, or call async() on it"));
-    }
+  // `room`: none where the producer runs once.
+  AsyncBranches branches_of(const Realize& n, std::optional<int> room) {
+    AsyncBranches branches(n, room, forked_, program_, semaphores_);
+    branches.split();
+    share_waits(branches.producer, branches.consumer);
+    branches.producer = with_own_places(branches.producer, branches.consumer);
+    return branches;
   }
 
   // Memory that both branches would hoist theirs to.
   Stmt with_own_places(Stmt producer, const Stmt& consumer) const {
-    const Names here = places_of(producer), there = places_of(consumer);
+    const Names here = places_of(producer, program_), there = places_of(consumer, program_);
     for (const std::string& place : here) {
       const auto around = around_.find(place);
       if (!there.count(place) || around == around_.end()) continue;
@@ -288,24 +406,7 @@ class AsyncForker : public StatementRewriter {
     return producer;
   }
 
-  // Places outside of the statement in which its Funcs lie, by their original names.
-  Names places_of(const Stmt& s) const {
-    Names places, inside;
-    if (!s.defined()) return places;
-    for (const std::string& name : realized_in(s)) inside.insert(original(name));
-    for (const std::string& name : inside) {
-      const LoopedFunc* f = program_.find(name);
-      if (f && is_hoisted(*f) && !inside.count(place_name(name))) places.insert(place_name(name));
-    }
-    return places;
-  }
-
-  // Whether the statement has to do with what was realized under this name: a Func or a place.
-  bool needs(const Stmt& s, const std::string& name) const {
-    return s.defined() && (uses_func(s, name) || places_of(s).count(original(name)));
-  }
-
-  Stmt forked(const Realize& n, int room, const Branches& branches) {
+  Stmt forked(const Realize& n, int room, const AsyncBranches& branches) {
     readers_[n.name] = 1;
     forked_.push_back(n.name);
     const Stmt consumer = (*this)(branches.consumer);
@@ -318,7 +419,7 @@ class AsyncForker : public StatementRewriter {
   // ---- produced once ----
 
   Stmt fork_once(const Realize& n) {
-    Branches branches = branches_of(n, false, 0);
+    AsyncBranches branches = branches_of(n, std::nullopt);
     if (!branches.consumer.defined()) return children(n.body);
     branches.producer = make_block({branches.producer, Semaphores::release(n.name, Ready)});
     branches.consumer = acquired_late(branches.consumer, n.name);
@@ -349,22 +450,7 @@ class AsyncForker : public StatementRewriter {
     return make_block({semaphores_.acquire(func, Ready), s});
   }
 
-  static bool own_parts_use(const Stmt& s, const std::string& func) {
-    bool found = false;
-    for_each_child(
-        s, [&](const Expr& e) { found = found || uses_func(e, func); }, [](const Stmt&) {});
-    return found;
-  }
-
   // ---- produced in a loop ----
-
-  [[noreturn]] void refuse_loops(const std::string& func, const std::string& evidence,
-                                 const char* instead) const {
-    unsupported(
-        text("compute ", quoted(original(func)), " async"),
-        "the loops between storage and computation of an async Func are serial and always run",
-        evidence, instead);
-  }
 
   // The branch that produces would wait for ever for a consumer that is in the cache.
   void check_is_consumed(const Realize& n) const {
@@ -376,7 +462,7 @@ class AsyncForker : public StatementRewriter {
               !produces(around->body, n.name))
             return true;
           refuse_loops(
-              n.name,
+              original(n.name),
               text("they are those of ", quoted(original(around->name)), ", which is memoized"),
               "Store the Func inside of that loop, or do not memoize the other");
         });
@@ -386,7 +472,7 @@ class AsyncForker : public StatementRewriter {
     check_is_consumed(n);
     const auto found = room_.find(original(n.name));
     const int room = found == room_.end() ? 1 : found->second;
-    return forked(n, room, branches_of(n, true, room));
+    return forked(n, room, branches_of(n, room));
   }
 
   // The handshake of an async Func around belongs to the branch that reads it. Where both do, one of
@@ -401,88 +487,16 @@ class AsyncForker : public StatementRewriter {
       if (in_producer && in_consumer) {
         Stmt& other = producer_waits && !consumer_waits ? consumer : producer;
         if (!producer_waits || !consumer_waits) other = acquired_late(other, outer);
-        other = for_one_reader(other, outer, readers_.at(outer)++);
+        const int reader = readers_.at(outer)++;
+        other = Semaphores::replace_steps(other, outer, [&](const Stmt& step) {
+          return semaphores_.of_reader(step, outer, reader);
+        });
       } else if (producer_waits && consumer_waits) {
         Stmt& other = in_producer ? consumer : producer;
         other =
             Semaphores::replace_steps(other, outer, [](const Stmt&) { return make_evaluate(0); });
       }
     }
-  }
-
-  Stmt for_one_reader(const Stmt& s, const std::string& func, int reader) {
-    return Semaphores::replace_steps(
-        s, func, [&](const Stmt& step) { return semaphores_.of_reader(step, func, reader); });
-  }
-
-  // The body of the innermost loop around the producer, with its waits.
-  Stmt shake_hands(const Stmt& body, const std::string& func, bool produces, int room) {
-    const Semaphore before = produces ? Space : Ready, after = produces ? Ready : Space;
-    std::vector<Stmt> stmts;
-    if (before == Ready || room > 0) stmts.push_back(semaphores_.acquire(func, before));
-    if (body.defined()) stmts.push_back(body);
-    if (after == Ready || room > 0) stmts.push_back(Semaphores::release(func, after));
-    return make_block(std::move(stmts));
-  }
-
-  bool is_innermost_around(const For& n, const std::string& func) const {
-    return produces(n.body, func) && !has_loop_around(n.body, func);
-  }
-
-  void check_serial(const For& n, const std::string& func) const {
-    if (n.runs == ForType::Serial) return;
-    refuse_loops(func, text("the loop ", describe_loop(n.name), " is not serial"),
-                 "Store the Func inside of that loop");
-  }
-
-  // Just the work of the producer and of what it needs, and the control around. Undefined where
-  // there is none.
-  Stmt only_producer(const Stmt& s, const std::string& func, const Names& made, bool loops,
-                     int room = 0) {
-    if (!s.defined() || !produces_any(s, made)) return {};
-    if (const ProducerConsumer* n = as_producer(s); n && made.count(n->name)) return s;
-    const auto part = [&](const Stmt& child) {
-      return only_producer(child, func, made, loops, room);
-    };
-    if (const Block* n = s.as<Block>()) {
-      std::vector<Stmt> stmts;
-      for (const Stmt& child : n->stmts) stmts.push_back(is_wait(child) ? child : part(child));
-      return make_block(std::move(stmts));
-    }
-    if (const For* n = s.as<For>()) {
-      if (produces(n->body, func)) check_serial(*n, func);
-      return around_loop(*n, part(n->body), func, true, loops, room);
-    }
-    if (const ProducerConsumer* n = s.as<ProducerConsumer>()) return part(n->body);
-    return around(s, part);
-  }
-
-  // A loop around what is left of its body, with the waits of a branch where it has them.
-  Stmt around_loop(const For& n, Stmt body, const std::string& func, bool of_producer, bool loops,
-                   int room) {
-    if (loops && is_innermost_around(n, func)) body = shake_hands(body, func, of_producer, room);
-    return make_for(n.name, n.min, n.extent, n.runs, body, n.partition);
-  }
-
-  // The control of a statement around what `part` leaves of its parts; undefined without any.
-  Stmt around(const Stmt& s, FunctionRef<Stmt(const Stmt&)> part) const {
-    const Stmt result = map_children(s, part);
-    const Realize* n = result.defined() ? result.as<Realize>() : nullptr;
-    return n && !needs(n->body, n->name) ? n->body : result;
-  }
-
-  bool is_wait(const Stmt& s) const {
-    return std::any_of(forked_.begin(), forked_.end(),
-                       [&](const std::string& func) { return Semaphores::is_step(s, func); });
-  }
-
-  // Everything but the work of the producer.
-  Stmt without_producer(const Stmt& s, const std::string& func, bool loops, int room = 0) {
-    if (!s.defined() || !produces(s, func)) return s;
-    if (is_producer_of(s, func)) return {};
-    const auto part = [&](const Stmt& child) { return without_producer(child, func, loops, room); };
-    if (const For* n = s.as<For>()) return around_loop(*n, part(n->body), func, false, loops, room);
-    return around(s, part);
   }
 };
 
