@@ -22,50 +22,32 @@ constexpr double fold_tolerance = 2.5;
 // of its own.
 constexpr double short_interior = 4;
 
-class GroupInverter {
- public:
-  GroupInverter(const Group& group, const std::vector<Expr>& fixed, unsigned long operations)
-      : context_(operations),
-        group_(group),
-        bridge_(context_, names_of(group.vars)),
-        domain_(bridge_.universe()),
-        not_empty_(bridge_.universe()) {
-    for (const Expr& e : fixed) bridge_.make_parameter(e);
-    for (const Expr& index : group.indices) affine_.push_back(*bridge_.affine(index));
+// Which points of a group's stage read which elements, and over what.
+struct GroupRelation {
+  GroupRelation(const Group& group, const std::vector<Expr>& fixed, unsigned long operations)
+      : context(operations),
+        group(group),
+        bridge(context, names_of(group.vars)),
+        domain(bridge.universe()),
+        not_empty(bridge.universe()) {
+    for (const Expr& e : fixed) bridge.make_parameter(e);
+    for (const Expr& index : group.indices) affine.push_back(*bridge.affine(index));
     build_domain();
   }
 
-  std::vector<GroupPiece> run() {
-    return mapped(choose_pieces(), [&](const isl::map& piece) { return emit(piece); });
-  }
+  IslContext context;  // outlives every isl object below
+  const Group& group;
+  IslBridge bridge;
+  isl::set domain, box;             // with and without the predicate
+  isl::set not_empty;               // where the target has elements
+  std::vector<isl::set> own_range;  // of each variable alone
+  std::vector<isl::pw_aff> affine;  // the indices
 
- private:
-  int var_count() const { return static_cast<int>(group_.vars.size()); }
-  int index_count() const { return static_cast<int>(group_.indices.size()); }
-
-  void build_domain() {
-    own_range_ = bridge_.ranges_of(group_.vars);
-    for (const isl::set& range : own_range_) domain_ = domain_.intersect(range);
-    std::vector<isl::set> conditions;
-    for (const Expr& e : group_.predicate) conditions.push_back(*bridge_.condition(e));
-    for (const LoopVariable& v : group_.region) assume_not_empty(v);
-    domain_ = domain_.intersect(not_empty_);
-    box_ = domain_;
-    for (const isl::set& s : conditions) domain_ = coalesced(domain_.intersect(s));
-  }
-
-  // Where the target has no element there is nothing to do. Ends over parameters of their own, as
-  // those that isl cannot follow, say nothing about the others, and would make the search longer.
-  void assume_not_empty(const LoopVariable& v) {
-    if (!v.min.defined() || !v.max.defined()) return;
-    const size_t known = bridge_.parameters().size();
-    isl::pw_aff min = bridge_.bound(v.min), max = bridge_.bound(v.max);
-    if (bridge_.parameters().size() == known) not_empty_ = not_empty_.intersect(min.le_set(max));
-  }
-
+  int var_count() const { return static_cast<int>(group.vars.size()); }
+  int index_count() const { return static_cast<int>(group.indices.size()); }
   // {z -> y} over all of z: the domain is not applied.
-  isl::map relation_of(const std::vector<isl::pw_aff>& indices) const {
-    isl::map result = universe_map(bridge_.ctx(), group_.vars.size(), group_.indices.size());
+  isl::map values_of(const std::vector<isl::pw_aff>& indices) const {
+    isl::map result = universe_map(bridge.ctx(), group.vars.size(), group.indices.size());
     for (int d = 0; d < index_count(); ++d) {
       result = result.intersect(output_equals(indices[static_cast<size_t>(d)], d, index_count()));
     }
@@ -73,168 +55,224 @@ class GroupInverter {
   }
 
   FibrePlan plan(const isl::map& piece) {
-    return plan_fibre({group_.vars, bridge_, box_, own_range_}, piece);
+    return plan_fibre({group.vars, bridge, box, own_range}, piece);
   }
 
-  // The relation split where the indices' pieces differ, or whole where that costs little.
-  std::vector<isl::map> choose_pieces() {
-    isl::map whole = coalesced(relation_of(affine_).intersect_domain(domain_));
-    std::vector<isl::map> split = split_pieces();
-    if (split.empty()) return {};  // no point of the stage reads anything
-    if (split.size() == 1) return {whole};
-    FibrePlan all = plan(whole);
-    if (all.free_vars.empty()) return {whole};
-    double interior = 0;
-    for (const isl::map& piece : split) {
-      FibrePlan p = plan(piece);
-      if (!has_fixed_index(piece)) interior = std::max(interior, p.cost);
-    }
-    bool folds = interior > 1 && all.cost <= fold_tolerance * interior &&
-                 (interior >= short_interior || in_one_piece(all));
-    return folds ? std::vector<isl::map>{whole} : split;
+ private:
+  void build_domain() {
+    own_range = bridge.ranges_of(group.vars);
+    for (const isl::set& range : own_range) domain = domain.intersect(range);
+    std::vector<isl::set> conditions;
+    for (const Expr& e : group.predicate) conditions.push_back(*bridge.condition(e));
+    for (const LoopVariable& v : group.region) assume_not_empty(v);
+    domain = domain.intersect(not_empty);
+    box = domain;
+    for (const isl::set& s : conditions) domain = coalesced(domain.intersect(s));
   }
 
-  // Whether the places that are read are the same sums all over the domain. Where they are not,
-  // every vector of the interior would choose between those of the borders.
-  static bool in_one_piece(const FibrePlan& plan) {
-    return std::ranges::all_of(plan.coordinates,
-                               [](const FibreCoordinate& c) { return pieces_of(c.value) == 1; });
+  // Where the target has no element there is nothing to do. Ends over parameters of their own, as
+  // those that isl cannot follow, say nothing about the others, and would make the search longer.
+  void assume_not_empty(const LoopVariable& v) {
+    if (!v.min.defined() || !v.max.defined()) return;
+    const size_t known = bridge.parameters().size();
+    isl::pw_aff min = bridge.bound(v.min), max = bridge.bound(v.max);
+    if (bridge.parameters().size() == known) not_empty = not_empty.intersect(min.le_set(max));
   }
+};
 
-  std::vector<isl::map> split_pieces() const {
-    struct Part {
-      isl::set where;
-      std::vector<isl::pw_aff> indices;
-    };
-    std::vector<Part> parts{{domain_, {}}};
-    for (const isl::pw_aff& index : affine_) {
-      std::vector<Part> next;
-      for (const Part& part : parts) {
-        index.foreach_piece([&](isl::set where, isl::multi_aff value) {
-          isl::set both = coalesced(part.where.intersect(where));
-          if (both.is_empty()) return;
-          next.push_back({both, part.indices});
-          next.back().indices.push_back(isl::pw_aff(value.at(0)));
-        });
-      }
-      parts = std::move(next);
-    }
-    std::vector<isl::map> result;
+// ---- pieces ----
+
+// The index in dimension d when it is the same for all points of the piece: a function of the
+// parameters.
+std::optional<isl::pw_aff> fixed_index(const isl::map& piece, int d) {
+  isl::map one = only_output(piece, d);
+  int n = isl_map_dim(one.get(), isl_dim_in);
+  isl::map constant =
+      isl::manage(isl_map_project_out(one.copy(), isl_dim_in, 0, static_cast<unsigned>(n)));
+  if (!is_single_valued(constant)) return std::nullopt;
+  isl::pw_aff value = *function_of(constant);
+  if (pieces_of(value) != 1) return std::nullopt;
+  // Without the conditions on parameters under which the piece has points at all.
+  isl::pw_aff total;
+  value.foreach_piece([&](isl::set, isl::multi_aff a) { total = isl::pw_aff(a.at(0)); });
+  return total;
+}
+
+bool has_fixed_index(const isl::map& piece, int index_count) {
+  for (int d = 0; d < index_count; ++d) {
+    if (fixed_index(piece, d)) return true;
+  }
+  return false;
+}
+
+std::vector<isl::map> split_pieces(const GroupRelation& relation) {
+  struct Part {
+    isl::set where;
+    std::vector<isl::pw_aff> indices;
+  };
+  std::vector<Part> parts{{relation.domain, {}}};
+  for (const isl::pw_aff& index : relation.affine) {
+    std::vector<Part> next;
     for (const Part& part : parts) {
-      // A union of disjoint sets (x < 0 or x >= n) is cheaper as two boxes.
-      isl_set* disjoint = isl_set_make_disjoint(part.where.copy());
-      isl::set sets = coalesced(isl::manage(disjoint));
-      isl::map values = relation_of(part.indices);
-      sets.foreach_basic_set(
-          [&](isl::basic_set b) { result.push_back(values.intersect_domain(isl::set(b))); });
+      index.foreach_piece([&](isl::set where, isl::multi_aff value) {
+        isl::set both = coalesced(part.where.intersect(where));
+        if (both.is_empty()) return;
+        next.push_back({both, part.indices});
+        next.back().indices.push_back(isl::pw_aff(value.at(0)));
+      });
     }
-    return result;
+    parts = std::move(next);
   }
-
-  bool has_fixed_index(const isl::map& piece) const {
-    for (int d = 0; d < index_count(); ++d) {
-      if (fixed_index(piece, d)) return true;
-    }
-    return false;
+  std::vector<isl::map> result;
+  for (const Part& part : parts) {
+    // A union of disjoint sets (x < 0 or x >= n) is cheaper as two boxes.
+    isl_set* disjoint = isl_set_make_disjoint(part.where.copy());
+    isl::set sets = coalesced(isl::manage(disjoint));
+    isl::map values = relation.values_of(part.indices);
+    sets.foreach_basic_set(
+        [&](isl::basic_set b) { result.push_back(values.intersect_domain(isl::set(b))); });
   }
-  // The index in dimension d when it is the same for all points of the piece: a function of the
-  // parameters.
-  std::optional<isl::pw_aff> fixed_index(const isl::map& piece, int d) const {
-    isl::map one = only_output(piece, d);
-    int n = isl_map_dim(one.get(), isl_dim_in);
-    isl::map constant =
-        isl::manage(isl_map_project_out(one.copy(), isl_dim_in, 0, static_cast<unsigned>(n)));
-    if (!is_single_valued(constant)) return std::nullopt;
-    isl::pw_aff value = *function_of(constant);
-    if (pieces_of(value) != 1) return std::nullopt;
-    // Without the conditions on parameters under which the piece has points at all.
-    isl::pw_aff total;
-    value.foreach_piece([&](isl::set, isl::multi_aff a) { total = isl::pw_aff(a.at(0)); });
-    return total;
+  return result;
+}
+
+// Whether the places that are read are the same sums all over the domain. Where they are not,
+// every vector of the interior would choose between those of the borders.
+bool in_one_piece(const FibrePlan& plan) {
+  return std::ranges::all_of(plan.coordinates,
+                             [](const FibreCoordinate& c) { return pieces_of(c.value) == 1; });
+}
+
+// The relation split where the indices' pieces differ, or whole where that costs little.
+std::vector<isl::map> choose_pieces(GroupRelation& relation) {
+  isl::map whole = coalesced(relation.values_of(relation.affine).intersect_domain(relation.domain));
+  std::vector<isl::map> split = split_pieces(relation);
+  if (split.empty()) return {};  // no point of the stage reads anything
+  if (split.size() == 1) return {whole};
+  FibrePlan all = relation.plan(whole);
+  if (all.free_vars.empty()) return {whole};
+  double interior = 0;
+  for (const isl::map& piece : split) {
+    FibrePlan p = relation.plan(piece);
+    if (!has_fixed_index(piece, relation.index_count())) interior = std::max(interior, p.cost);
   }
+  bool folds = interior > 1 && all.cost <= fold_tolerance * interior &&
+               (interior >= short_interior || in_one_piece(all));
+  return folds ? std::vector<isl::map>{whole} : split;
+}
 
-  // ---- expressions ----
+// ---- expressions ----
 
-  GroupPiece emit(const isl::map& piece) {
-    FibrePlan p = plan(piece);
+// y_d as a function on the plan's space.
+isl::pw_aff element_dim(const isl::set& space, int d) {
+  isl_local_space* local = isl_local_space_from_space(isl_set_get_space(space.get()));
+  return isl::manage(isl_pw_aff_var_on_domain(local, isl_dim_set, static_cast<unsigned>(d)));
+}
+// The function on a space with more inputs at the end.
+isl::pw_aff pad(const isl::pw_aff& e, const isl::set& space) {
+  int have = isl_pw_aff_dim(e.get(), isl_dim_in), want = isl_set_dim(space.get(), isl_dim_set);
+  return isl::manage(isl_pw_aff_insert_dims(e.copy(), isl_dim_in, static_cast<unsigned>(have),
+                                            static_cast<unsigned>(want - have)));
+}
+// An expression of the parameters alone, as a function on the plan's space.
+isl::pw_aff constant_on(const isl::set& space, const isl::pw_aff& e) {
+  const auto have = static_cast<unsigned>(isl_pw_aff_dim(e.get(), isl_dim_in));
+  return pad(isl::manage(isl_pw_aff_drop_dims(e.copy(), isl_dim_in, 0, have)), space);
+}
+
+// One piece in terms of the elements that it reads.
+class PieceExpressions {
+ public:
+  PieceExpressions(GroupRelation& relation, const isl::map& piece)
+      : r_(relation), piece_(piece), plan_(relation.plan(piece)) {}
+
+  GroupPiece emit() {
     GroupPiece g;
-    std::vector<Expr> names = element_names(piece, g);
-    for (int v : p.free_vars) {
-      const LoopVariable& loop = group_.vars[static_cast<size_t>(v)];
-      const FibreCoordinate& c = p.coordinates[static_cast<size_t>(v)];
+    std::vector<Expr> names = element_names(g);
+    for (int v : plan_.free_vars) {
+      const LoopVariable& loop = r_.group.vars[static_cast<size_t>(v)];
+      const FibreCoordinate& c = plan_.coordinates[static_cast<size_t>(v)];
       g.free.push_back(
           {v, c.extent == unbounded ? extent_of(loop.range()) : make_const(Int(32), c.extent)});
       names.push_back(variable(rho_name(loop.name)));
     }
-    for (int j = 0; j < var_count(); ++j) {
-      const FibreCoordinate& c = p.coordinates[static_cast<size_t>(j)];
-      g.iteration[group_.vars[static_cast<size_t>(j)].name] =
-          simplify(bridge_.to_expr(c.value, names));
+    for (int j = 0; j < r_.var_count(); ++j) {
+      const FibreCoordinate& c = plan_.coordinates[static_cast<size_t>(j)];
+      g.iteration[r_.group.vars[static_cast<size_t>(j)].name] =
+          simplify(r_.bridge.to_expr(c.value, names));
     }
-    add_predicate(piece, p, g, names);
+    add_predicate(g, names);
     protect(g);
     return g;
   }
 
+ private:
   // y: names of elements, or the fixed index.
-  std::vector<Expr> element_names(const isl::map& piece, GroupPiece& g) {
-    for (int d = 0; d < index_count(); ++d) {
-      auto fixed = fixed_index(piece, d);
-      g.lhs.push_back(fixed ? simplify(bridge_.to_expr(*fixed))
-                            : variable(element_name(group_.dims[static_cast<size_t>(d)])));
+  std::vector<Expr> element_names(GroupPiece& g) {
+    for (int d = 0; d < r_.index_count(); ++d) {
+      auto fixed = fixed_index(piece_, d);
+      g.lhs.push_back(fixed ? simplify(r_.bridge.to_expr(*fixed))
+                            : variable(element_name(r_.group.dims[static_cast<size_t>(d)])));
       g.pure.push_back(!fixed);
     }
     return g.lhs;
   }
 
-  void add_predicate(const isl::map& piece, const FibrePlan& p, GroupPiece& g,
-                     const std::vector<Expr>& names) {
-    isl::set context = rho_box(p).intersect(fixed_elements(piece, p));
-    isl::set needed = coalesced(p.valid.gist(context));
+  void add_predicate(GroupPiece& g, const std::vector<Expr>& names) {
+    isl::set context = rho_box().intersect(fixed_elements());
+    isl::set needed = coalesced(plan_.valid.gist(context));
     needed = isl::manage(isl_set_gist_params(needed.release(), assumed().release()));
     // Coalescing leaves unions that are one basic set all the same.
     isl::set hull = isl::manage(isl_set_from_basic_set(isl_set_simple_hull(needed.copy())));
     if (hull.is_equal(needed)) needed = hull;
     if (isl_set_plain_is_universe(needed.get()) != isl_bool_true)
-      g.predicate.push_back(bridge_.to_expr(needed, names));
+      g.predicate.push_back(r_.bridge.to_expr(needed, names));
   }
 
   // What holds wherever a gather adds anything: the adjoints that it reads are 0 where a stage's
   // pure variables have no value. A reduction domain may be empty, and what is read is not 0 then.
   isl::set assumed() const {
-    isl::set pure = not_empty_;
-    for (size_t i = 0; i < group_.vars.size(); ++i) {
-      if (!group_.vars[i].is_reduction) pure = pure.intersect(own_range_[i]);
+    isl::set pure = r_.not_empty;
+    for (size_t i = 0; i < r_.group.vars.size(); ++i) {
+      if (!r_.group.vars[i].is_reduction) pure = pure.intersect(r_.own_range[i]);
     }
     return isl::manage(isl_set_params(pure.release()));
   }
 
-  isl::set rho_box(const FibrePlan& p) const {
-    isl::set box = isl::manage(isl_set_universe(isl_set_get_space(p.valid.get())));
-    for (size_t k = 0; k < p.free_vars.size(); ++k) {
-      const FibreCoordinate& c = p.coordinates[static_cast<size_t>(p.free_vars[k])];
-      unsigned at = static_cast<unsigned>(index_count()) + static_cast<unsigned>(k);
+  isl::set whole_space() const {
+    return isl::manage(isl_set_universe(isl_set_get_space(plan_.valid.get())));
+  }
+
+  isl::set rho_box() const {
+    isl::set box = whole_space();
+    for (size_t k = 0; k < plan_.free_vars.size(); ++k) {
+      const FibreCoordinate& c = plan_.coordinates[static_cast<size_t>(plan_.free_vars[k])];
+      unsigned at = static_cast<unsigned>(r_.index_count()) + static_cast<unsigned>(k);
       isl_set* s = isl_set_lower_bound_si(box.release(), isl_dim_set, at, 0);
       if (c.extent != unbounded) {
         s = isl_set_upper_bound_val(s, isl_dim_set, at,
-                                    isl_val_int_from_si(bridge_.ctx(), c.extent - 1));
+                                    isl_val_int_from_si(r_.bridge.ctx(), c.extent - 1));
       }
       box = isl::manage(s);
       if (c.extent == unbounded) {
         // rho runs over the variable's own range: base + rho <= max.
-        isl::map at_most = output_equals(pad(c.value, box), p.free_vars[k], var_count());
+        isl::map at_most = output_equals(pad(c.value, box), plan_.free_vars[k], r_.var_count());
         isl::map in_range =
-            at_most.intersect_range(own_range_[static_cast<size_t>(p.free_vars[k])]);
+            at_most.intersect_range(r_.own_range[static_cast<size_t>(plan_.free_vars[k])]);
         box = box.intersect(in_range.domain());
       }
     }
     return box;
   }
-  // The function on a space with more inputs at the end.
-  static isl::pw_aff pad(const isl::pw_aff& e, const isl::set& space) {
-    int have = isl_pw_aff_dim(e.get(), isl_dim_in), want = isl_set_dim(space.get(), isl_dim_set);
-    return isl::manage(isl_pw_aff_insert_dims(e.copy(), isl_dim_in, static_cast<unsigned>(have),
-                                              static_cast<unsigned>(want - have)));
+
+  // {y : y_d is the index that all points of the piece share}
+  isl::set fixed_elements() const {
+    isl::set result = whole_space();
+    for (int d = 0; d < r_.index_count(); ++d) {
+      if (auto fixed = fixed_index(piece_, d)) {
+        result = result.intersect(element_dim(result, d).eq_set(constant_on(result, *fixed)));
+      }
+    }
+    return result;
   }
 
   // Where the predicate is false the point found may lie outside the domain, and what is read there
@@ -243,12 +281,12 @@ class GroupInverter {
   // constants the simplifier drops these clamps again.
   void protect(GroupPiece& g) const {
     Scope<Interval> scope;
-    for (int d : group_.dims) scope.push(element_name(d), Interval::everything());
+    for (int d : r_.group.dims) scope.push(element_name(d), Interval::everything());
     for (const auto& free : g.free) {
-      const std::string& name = group_.vars[static_cast<size_t>(free.var)].name;
+      const std::string& name = r_.group.vars[static_cast<size_t>(free.var)].name;
       scope.push(rho_name(name), {make_zero(Int(32)), simplify(free.extent - 1)});
     }
-    for (const LoopVariable& v : group_.vars) {
+    for (const LoopVariable& v : r_.group.vars) {
       Expr& e = g.iteration[v.name];
       if (is_const(e)) continue;
       Interval range = bounds_of(e, scope);
@@ -264,39 +302,9 @@ class GroupInverter {
     }
   }
 
-  // y_d as a function on the plan's space.
-  static isl::pw_aff element_dim(const isl::set& space, int d) {
-    isl_local_space* local = isl_local_space_from_space(isl_set_get_space(space.get()));
-    return isl::manage(isl_pw_aff_var_on_domain(local, isl_dim_set, static_cast<unsigned>(d)));
-  }
-  // An expression of the parameters alone, as a function on the plan's space.
-  static isl::pw_aff constant_on(const isl::set& space, const isl::pw_aff& e) {
-    int have = isl_pw_aff_dim(e.get(), isl_dim_in), want = isl_set_dim(space.get(), isl_dim_set);
-    isl_pw_aff* moved = isl_pw_aff_drop_dims(e.copy(), isl_dim_in, 0, static_cast<unsigned>(have));
-    return isl::manage(isl_pw_aff_insert_dims(moved, isl_dim_in, 0, static_cast<unsigned>(want)));
-  }
-  static isl::set whole_space(const FibrePlan& p) {
-    return isl::manage(isl_set_universe(isl_set_get_space(p.valid.get())));
-  }
-
-  // {y : y_d is the index that all points of the piece share}
-  isl::set fixed_elements(const isl::map& piece, const FibrePlan& p) const {
-    isl::set result = whole_space(p);
-    for (int d = 0; d < index_count(); ++d) {
-      if (auto fixed = fixed_index(piece, d)) {
-        result = result.intersect(element_dim(result, d).eq_set(constant_on(result, *fixed)));
-      }
-    }
-    return result;
-  }
-
-  IslContext context_;  // outlives every isl object below
-  const Group& group_;
-  IslBridge bridge_;
-  isl::set domain_, box_;            // with and without the predicate
-  isl::set not_empty_;               // where the target has elements
-  std::vector<isl::set> own_range_;  // of each variable alone
-  std::vector<isl::pw_aff> affine_;  // the indices
+  GroupRelation& r_;
+  const isl::map& piece_;
+  const FibrePlan plan_;
 };
 
 }  // namespace
@@ -306,7 +314,9 @@ std::string rho_name(const std::string& stage_var) { return "rho$" + stage_var; 
 
 std::vector<GroupPiece> invert_group(const Group& group, const std::vector<Expr>& fixed,
                                      unsigned long operations) {
-  return GroupInverter(group, fixed, operations).run();
+  GroupRelation relation(group, fixed, operations);
+  return mapped(choose_pieces(relation),
+                [&](const isl::map& piece) { return PieceExpressions(relation, piece).emit(); });
 }
 
 }  // namespace retrograde::ir
