@@ -12,6 +12,7 @@
 // parallel loop orders everything else.
 #include <unordered_set>
 
+#include "codegen/access.h"
 #include "codegen/function_generator.h"
 #include "diagnostics/error.h"
 #include "ir/atomic_update.h"
@@ -26,7 +27,9 @@ using namespace ir;
 using BinOp = llvm::AtomicRMWInst::BinOp;
 constexpr auto relaxed = llvm::AtomicOrdering::Monotonic;
 
-static BinOp instruction_for(const AtomicUpdate& update, Type type) {
+namespace {
+
+BinOp instruction_for(const AtomicUpdate& update, Type type) {
   if (type.is_bool()) return BinOp::BAD_BINOP;
   if (type.is_float())
     return update.kind != Kind::Add || is_half(type) ? BinOp::BAD_BINOP
@@ -47,74 +50,29 @@ static BinOp instruction_for(const AtomicUpdate& update, Type type) {
   }
 }
 
-void FunctionGenerator::make(const Atomic& s) {
-  const auto* store = s.body.as<Store>();
-  if (store && is_one_word(store->value.type())) return atomic_store(*store);
-  const Store* first = nullptr;
-  walk(
-      s.body, [](const Expr&) { return false; },
-      [&](const Stmt& part) {
-        if (!first) first = part.as<Store>();
-        return !first;
-      });
-  if (first) locked(s, *first);
-}
-
-void FunctionGenerator::atomic_store(const Store& s) {
-  const MemoScope scope(*this, false);
-  const Type element = s.value.type().element_of();
-  const auto update = find_atomic_update(s);
-  if (!update) return compare_and_swap(s);
-  Value* operand = value(update->operand);
-  Value* predicate = predicate_value(s.predicate);
-  const int lanes = s.value.type().lanes();
-  Value* indices = lanes == 1 ? index64(s.index) : index_vector(s.index);
-  const Storage& to = storage(s.name);
-  const BinOp op = instruction_for(*update, element);
-  for (int i = 0; i < lanes; i++) {
-    Value* index = b_.CreateSExt(lane(e_, indices, i), b_.getInt64Ty());
-    Value* one = lane(e_, operand, i);
-    const auto apply = [&] {
-      Value* pointer = element_pointer(to, element, index);
-      if (op != BinOp::BAD_BINOP) return atomic_instruction({op, pointer, one}, to);
-      compare_and_swap(element, pointer, to, [&](Value* old) {
-        if (update->op != Op::none)
-          return simple_operator(e_, update->op, element, {element, element}, {old, one});
-        return binary(e_, update->is_negated ? Kind::Sub : update->kind, element, old, one);
-      });
-    };
-    predicate ? if_true(lane(e_, predicate, i), apply) : apply();
-  }
-}
-
-void FunctionGenerator::atomic_instruction(const AtomicLane& lane, const Storage& to) {
-  tagged(b_.CreateAtomicRMW(lane.op, lane.pointer, lane.operand, llvm::MaybeAlign(), relaxed), to);
-}
-
 // Stores updated(old) where old was, as often as it takes until it still is there.
-void FunctionGenerator::compare_and_swap(Type type, Value* pointer, const Storage& to,
-                                         const std::function<Value*(Value*)>& updated) {
-  auto* memory = memory_type(e_, type);
+void compare_and_swap(FunctionContext& c, Type type, Value* pointer, const Storage& to,
+                      const std::function<Value*(Value*)>& updated) {
+  auto* memory = memory_type(c.e, type);
   const auto bytes = static_cast<uint64_t>(type.bytes());
-  auto* word = b_.getIntNTy(static_cast<unsigned>(8 * bytes));
-  auto* first = tagged(b_.CreateAlignedLoad(word, pointer, llvm::Align(bytes)), to);
+  auto* word = c.b.getIntNTy(static_cast<unsigned>(8 * bytes));
+  auto* first = tagged(c.b.CreateAlignedLoad(word, pointer, llvm::Align(bytes)), to);
   first->setAtomic(relaxed);
-  llvm::BasicBlock *before = b_.GetInsertBlock(), *attempt = new_block("attempt"),
-                   *after = new_block("updated");
-  b_.CreateBr(attempt);
-  b_.SetInsertPoint(attempt);
-  llvm::PHINode* old = b_.CreatePHI(word, 2);
+  llvm::BasicBlock *before = c.b.GetInsertBlock(), *attempt = c.new_block("attempt"),
+                   *after = c.new_block("updated");
+  c.b.CreateBr(attempt);
+  c.b.SetInsertPoint(attempt);
+  llvm::PHINode* old = c.b.CreatePHI(word, 2);
   old->addIncoming(first, before);
-  Value* next = to_memory(type, updated(from_memory(type, b_.CreateBitCast(old, memory))));
-  auto* swap = tagged(b_.CreateAtomicCmpXchg(pointer, old, b_.CreateBitCast(next, word),
-                                             llvm::Align(bytes), relaxed, relaxed),
+  Value* next =
+      to_memory(c.e, type, updated(from_memory(c.e, type, c.b.CreateBitCast(old, memory))));
+  auto* swap = tagged(c.b.CreateAtomicCmpXchg(pointer, old, c.b.CreateBitCast(next, word),
+                                              llvm::Align(bytes), relaxed, relaxed),
                       to);
-  old->addIncoming(b_.CreateExtractValue(swap, 0), b_.GetInsertBlock());
-  b_.CreateCondBr(b_.CreateExtractValue(swap, 1), after, attempt);
-  b_.SetInsertPoint(after);
+  old->addIncoming(c.b.CreateExtractValue(swap, 0), c.b.GetInsertBlock());
+  c.b.CreateCondBr(c.b.CreateExtractValue(swap, 1), after, attempt);
+  c.b.SetInsertPoint(after);
 }
-
-namespace {
 
 // Nodes on a way from an expression down to a load of the stored element.
 struct OwnLoads {
@@ -154,28 +112,66 @@ void independent_parts(const Expr& e, OwnLoads& own, std::unordered_set<const Ex
   for_each_child(e, [&](const Expr& child) { independent_parts(child, own, seen, parts); });
 }
 
-}  // namespace
-
-void FunctionGenerator::compare_and_swap(const Store& s) {
+void compare_and_swap(Values& values, const Store& s) {
+  FunctionContext& c = values.c;
   const Type type = s.value.type();
   RETROGRADE_ASSERT(type.is_scalar(), "an atomic vector update of ", quoted(s.name),
                     " that is no single operation");
-  Value* predicate = predicate_value(s.predicate);
-  Value* index = index64(s.index);
+  Value* predicate = values.predicate(s.predicate);
+  Value* index = values.index64(s.index);
   const auto update = [&] {
     OwnLoads own(s);
     std::unordered_set<const ExprNode*> seen;
     std::vector<Expr> parts;
     independent_parts(s.value, own, seen, parts);
-    for (const Expr& part : parts) value(part);
-    const Storage& to = storage(s.name);
-    compare_and_swap(type, element_pointer(to, type, index), to, [&](Value* old) {
-      const MemoScope attempt(*this, true);
-      for (const Expr& node : own.nodes) frame_.memo.back().values[node.get()] = {node, old};
-      return value(s.value);
+    for (const Expr& part : parts) values.of(part);
+    const Storage& to = c.storage(s.name);
+    compare_and_swap(c, type, element_pointer(c.e, to, type, index), to, [&](Value* old) {
+      const MemoScope attempt(c.frame, true);
+      for (const Expr& node : own.nodes) c.frame.memo.back().values[node.get()] = {node, old};
+      return values.of(s.value);
     });
   };
-  predicate ? if_true(predicate, update) : update();
+  predicate ? c.if_true(predicate, update) : update();
+}
+
+}  // namespace
+
+void atomic_store(Values& values, const Store& s) {
+  FunctionContext& c = values.c;
+  const MemoScope scope(c.frame, false);
+  const Type element = s.value.type().element_of();
+  const auto update = find_atomic_update(s);
+  if (!update) return compare_and_swap(values, s);
+  Value* operand = values.of(update->operand);
+  Value* predicate = values.predicate(s.predicate);
+  const int lanes = s.value.type().lanes();
+  Value* indices = lanes == 1 ? values.index64(s.index) : values.index_vector(s.index);
+  const Storage& to = c.storage(s.name);
+  const BinOp op = instruction_for(*update, element);
+  for (int i = 0; i < lanes; i++) {
+    Value* index = c.b.CreateSExt(lane(c.e, indices, i), c.b.getInt64Ty());
+    Value* one = lane(c.e, operand, i);
+    const auto apply = [&] {
+      Value* pointer = element_pointer(c.e, to, element, index);
+      if (op != BinOp::BAD_BINOP)
+        return void(tagged(c.b.CreateAtomicRMW(op, pointer, one, llvm::MaybeAlign(), relaxed), to));
+      compare_and_swap(c, element, pointer, to, [&](Value* old) {
+        if (update->op != Op::none)
+          return simple_operator(c.e, update->op, element, {element, element}, {old, one});
+        return binary(c.e, update->is_negated ? Kind::Sub : update->kind, element, old, one);
+      });
+    };
+    predicate ? c.if_true(lane(c.e, predicate, i), apply) : apply();
+  }
+}
+
+void FunctionGenerator::make(const Atomic& s) {
+  const auto* store = s.body.as<Store>();
+  if (store && is_one_word(store->value.type())) return atomic_store(values_, *store);
+  const Store* first = nullptr;
+  any_stmt(s.body, [&](const Stmt& part) { return (first = part.as<Store>()) != nullptr; });
+  if (first) locked(s, *first);
 }
 
 // The address is known before the lock: what the index is made of is bound inside.
@@ -185,14 +181,15 @@ void FunctionGenerator::locked(const Atomic& s, const Store& first) {
     lets[let->name] = substitute(let->value, lets);
   Value* element;
   {
-    const MemoScope scope(*this, false);
+    const MemoScope scope(c_.frame, false);
     const Expr index = substitute(first.index, lets);
     RETROGRADE_ASSERT(index.type().is_scalar(), "a lock for a vector of ", quoted(s.name));
-    element = element_pointer(storage(first.name), first.value.type().element_of(), index64(index));
+    element = element_pointer(e_, c_.storage(first.name), first.value.type().element_of(),
+                              values_.index64(index));
   }
-  call_runtime("retrograde_lock_element", b_.getVoidTy(), {element});
+  c_.call_runtime("retrograde_lock_element", b_.getVoidTy(), {element});
   statement(s.body);
-  call_runtime("retrograde_unlock_element", b_.getVoidTy(), {element});
+  c_.call_runtime("retrograde_unlock_element", b_.getVoidTy(), {element});
 }
 
 }  // namespace retrograde::codegen

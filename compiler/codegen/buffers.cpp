@@ -1,7 +1,7 @@
 // Fields of halide_buffer_t.
 #include <HalideRuntime.h>
 
-#include "codegen/function_generator.h"
+#include "codegen/calls.h"
 #include "diagnostics/error.h"
 #include "ir/build.h"
 
@@ -11,55 +11,55 @@ using namespace ir;
 
 static_assert(sizeof(halide_type_t) == 4 && sizeof(halide_dimension_t) == 16);
 
-bool FunctionGenerator::is_buffer_operator(Op op) const {
-  return op >= Op::buffer_host && op <= Op::buffer_is_query;
-}
+bool is_buffer_operator(Op op) { return op >= Op::buffer_host && op <= Op::buffer_is_query; }
 
 // Pixels never overlap the descriptors, so their stores do not force these loads to be repeated.
-Value* FunctionGenerator::buffer_field(Value* buffer, llvm::Type* type, int64_t offset) {
-  Value* pointer = b_.CreateConstGEP1_64(b_.getInt8Ty(), buffer, static_cast<uint64_t>(offset));
-  auto* load = b_.CreateLoad(type, pointer);
-  load->setMetadata(llvm::LLVMContext::MD_tbaa, alias_tag("buffer descriptors"));
+static Value* load_field(FunctionContext& c, llvm::Type* type, Value* pointer,
+                         const char* name = "") {
+  auto* load = c.b.CreateLoad(type, pointer, name);
+  load->setMetadata(llvm::LLVMContext::MD_tbaa, alias_tag(c.e, "buffer descriptors"));
   return load;
 }
 
-Value* FunctionGenerator::dimension_pointer(Value* buffer, Value* dimension, int64_t offset) {
-  Value* dims = buffer_field(buffer, b_.getPtrTy(), offsetof(halide_buffer_t, dim));
-  Value* index = b_.CreateIntCast(dimension, b_.getInt64Ty(), true);
+static Value* buffer_field(FunctionContext& c, Value* buffer, llvm::Type* type, uint64_t offset) {
+  return load_field(c, type, c.b.CreateConstGEP1_64(c.b.getInt8Ty(), buffer, offset));
+}
+
+static Value* dimension_pointer(FunctionContext& c, Value* buffer, Value* dimension,
+                                int64_t offset) {
+  Value* dims = buffer_field(c, buffer, c.b.getPtrTy(), offsetof(halide_buffer_t, dim));
+  Value* index = c.b.CreateIntCast(dimension, c.b.getInt64Ty(), true);
   Value* bytes =
-      b_.CreateAdd(b_.CreateMul(index, int64(sizeof(halide_dimension_t))), int64(offset));
-  return b_.CreateGEP(b_.getInt8Ty(), dims, bytes);
+      c.b.CreateAdd(c.b.CreateMul(index, c.int64(sizeof(halide_dimension_t))), c.int64(offset));
+  return c.b.CreateGEP(c.b.getInt8Ty(), dims, bytes);
 }
 
 // Null for a null buffer, without a branch: the address that is read is then that of a constant.
-Value* FunctionGenerator::host_pointer(Value* buffer) {
-  auto* type = b_.getPtrTy();
-  auto* zero = e_.module.getGlobalVariable("no_host", true);
+Value* host_pointer(FunctionContext& c, Value* buffer) {
+  auto* type = c.b.getPtrTy();
+  auto* zero = c.e.module.getGlobalVariable("no_host", true);
   if (!zero) {
-    zero = new llvm::GlobalVariable(e_.module, type, true, llvm::GlobalValue::PrivateLinkage,
-                                    null_pointer(), "no_host");
+    zero = new llvm::GlobalVariable(c.e.module, type, true, llvm::GlobalValue::PrivateLinkage,
+                                    c.null_pointer(), "no_host");
   }
-  Value* field = b_.CreateConstGEP1_64(b_.getInt8Ty(), buffer, offsetof(halide_buffer_t, host));
-  auto* load = b_.CreateLoad(
-      type, b_.CreateSelect(b_.CreateICmpEQ(buffer, null_pointer()), zero, field), "host");
-  load->setMetadata(llvm::LLVMContext::MD_tbaa, alias_tag("buffer descriptors"));
-  return load;
+  Value* field = c.b.CreateConstGEP1_64(c.b.getInt8Ty(), buffer, offsetof(halide_buffer_t, host));
+  return load_field(
+      c, type, c.b.CreateSelect(c.b.CreateICmpEQ(buffer, c.null_pointer()), zero, field), "host");
 }
 
-Value* FunctionGenerator::buffer_operator(const Call& e) {
-  Value* buffer = value(e.args[0]);
-  const auto dimension_field = [&](int64_t offset) -> Value* {
-    auto* load =
-        b_.CreateLoad(b_.getInt32Ty(), dimension_pointer(buffer, value(e.args[1]), offset));
-    load->setMetadata(llvm::LLVMContext::MD_tbaa, alias_tag("buffer descriptors"));
-    return convert(e_, e.type, Int(32), load);
+Value* buffer_operator(Values& values, const Call& e) {
+  FunctionContext& c = values.c;
+  Value* buffer = values.of(e.args[0]);
+  const auto dimension_field = [&](int64_t offset) {
+    Value* pointer = dimension_pointer(c, buffer, values.of(e.args[1]), offset);
+    return convert(c.e, e.type, Int(32), load_field(c, c.b.getInt32Ty(), pointer));
   };
-  const auto int_field = [&](int64_t offset) {
-    return convert(e_, e.type, UInt(32), buffer_field(buffer, b_.getInt32Ty(), offset));
+  const auto int_field = [&](uint64_t offset) {
+    return convert(c.e, e.type, UInt(32), buffer_field(c, buffer, c.b.getInt32Ty(), offset));
   };
   switch (e.op) {
     case Op::buffer_host:
-      return host_pointer(buffer);
+      return host_pointer(c, buffer);
     case Op::buffer_min:
       return dimension_field(offsetof(halide_dimension_t, min));
     case Op::buffer_extent:
@@ -71,11 +71,11 @@ Value* FunctionGenerator::buffer_operator(const Call& e) {
     case Op::buffer_type:
       return int_field(offsetof(halide_buffer_t, type));
     case Op::buffer_is_null:
-      return b_.CreateICmpEQ(buffer, null_pointer());
+      return c.b.CreateICmpEQ(buffer, c.null_pointer());
     case Op::buffer_is_query: {
-      Value* device = buffer_field(buffer, b_.getInt64Ty(), offsetof(halide_buffer_t, device));
-      return b_.CreateAnd(b_.CreateICmpEQ(host_pointer(buffer), null_pointer()),
-                          b_.CreateICmpEQ(device, b_.getInt64(0)));
+      Value* device = buffer_field(c, buffer, c.b.getInt64Ty(), offsetof(halide_buffer_t, device));
+      return c.b.CreateAnd(c.b.CreateICmpEQ(host_pointer(c, buffer), c.null_pointer()),
+                           c.b.CreateICmpEQ(device, c.b.getInt64(0)));
     }
     default:
       internal_error("no such buffer operator");

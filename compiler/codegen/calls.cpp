@@ -1,7 +1,10 @@
 // Calls: operators whose arguments are not simply evaluated, and C functions.
-#include "codegen/function_generator.h"
+#include "codegen/calls.h"
+
+#include "codegen/access.h"
 #include "diagnostics/error.h"
 #include "ir/build.h"
+#include "ir/lists.h"
 #include "ir/random.h"
 #include "retrograde_runtime.h"
 
@@ -9,25 +12,84 @@ namespace retrograde::codegen {
 
 using namespace ir;
 
-Value* FunctionGenerator::make(const Call& e) {
-  switch (e.call_type) {
-    case CallType::Operator:
-      return operator_call(e);
-    case CallType::Extern:
-      return extern_call(e);
-    default:
-      internal_error("call of " + quoted(e.name) +
-                     " reached code generation: lowering replaces it by loads");
+// Lane by lane: the C function knows no vectors.
+static Value* extern_call(Values& values, const Call& e) {
+  FunctionContext& c = values.c;
+  std::vector<Value*> args;
+  std::vector<llvm::Type*> params;
+  for (const Expr& arg : e.args) {
+    args.push_back(values.of(arg));
+    params.push_back(llvm_type(c.e, arg.type().element_of()));
   }
+  auto* type = llvm::FunctionType::get(llvm_type(c.e, e.type.element_of()), params, false);
+  auto callee = c.e.module.getOrInsertFunction(e.name, type);
+  std::vector<Value*> lanes;
+  for (int i = 0; i < e.type.lanes(); i++) {
+    std::vector<Value*> lane_args;
+    for (Value* arg : args) lane_args.push_back(lane(c.e, arg, i));
+    lanes.push_back(c.b.CreateCall(callee, lane_args));
+  }
+  return from_lanes(c.e, lanes);
 }
 
-static std::vector<Type> types_of(const std::vector<Expr>& args) {
-  std::vector<Type> types;
-  for (const Expr& arg : args) types.push_back(arg.type());
-  return types;
+static Value* branch_value(Values& values, const Expr& condition, const Expr& then_value,
+                           const Expr& else_value) {
+  FunctionContext& c = values.c;
+  Value* test = values.of(condition);
+  if (test->getType()->isVectorTy()) {
+    Value *a = values.of(then_value), *b = values.of(else_value);
+    return c.b.CreateSelect(test, a, b);
+  }
+  return c.chosen(
+      test, [&] { return values.of(then_value); }, [&] { return values.of(else_value); });
 }
 
-Value* FunctionGenerator::operator_call(const Call& e) {
+// (condition, value, message...). All lanes must hold.
+static Value* require(Values& values, const Call& e) {
+  FunctionContext& c = values.c;
+  Value* condition = values.of(e.args[0]);
+  if (condition->getType()->isVectorTy()) condition = c.b.CreateAndReduce(condition);
+  c.fail_unless(condition, [&] {
+    const auto* error = e.args.size() == 3 ? e.args[2].as<Call>() : nullptr;
+    if (error && error->is_op(Op::error))
+      return values.of(e.args[2]);  // lowering's, with its own code
+    return report_error(values,
+                        c.b.getInt32(static_cast<uint32_t>(retrograde_error_requirement_failed)),
+                        e.args, 2, " ");
+  });
+  return values.of(e.args[1]);
+}
+
+// ir/random.h in vectors.
+static Value* random(Values& values, const Call& e) {
+  FunctionContext& c = values.c;
+  const Type word = UInt(32, e.type.lanes());
+  llvm::Type* type = llvm_type(c.e, word);
+  const auto constant = [&](uint32_t number) { return llvm::ConstantInt::get(type, number); };
+  const auto xor_shifted = [&](Value* v, uint32_t bits) {
+    return c.b.CreateXor(v, c.b.CreateLShr(v, constant(bits)));
+  };
+  Value* state = constant(random_seed);
+  for (const Expr& arg : e.args) {
+    RETROGRADE_ASSERT(arg.type().is_int_or_uint(), "seed of type ", to_string(arg.type()));
+    Value* seed = convert(c.e, UInt(32, arg.type().lanes()), arg.type(), values.of(arg));
+    if (lanes_of(seed) != word.lanes()) seed = splat(c.e, seed, word.lanes());
+    state = c.b.CreateAdd(c.b.CreateXor(state, seed), constant(random_seed));
+    state = c.b.CreateMul(xor_shifted(state, 16), constant(random_multiplier_1));
+    state = c.b.CreateMul(xor_shifted(state, 15), constant(random_multiplier_2));
+    state = xor_shifted(state, 15);
+  }
+  if (!e.type.is_float()) {
+    RETROGRADE_ASSERT(e.type.bits() <= 32, "random number of type ", to_string(e.type));
+    return c.b.CreateTrunc(state, llvm_type(c.e, e.type));
+  }
+  const Type single = Float(32, e.type.lanes());
+  Value* number = convert(c.e, single, word, c.b.CreateLShr(state, constant(8)));
+  return convert(c.e, e.type, single, c.b.CreateFMul(number, float_constant(number, 0x1p-24)));
+}
+
+static Value* operator_call(Values& values, const Call& e) {
+  FunctionContext& c = values.c;
   switch (e.op) {
     case Op::likely:
     case Op::likely_if_innermost:
@@ -35,119 +97,61 @@ Value* FunctionGenerator::operator_call(const Call& e) {
     case Op::unsafe_promise_clamped:
     case Op::stop_gradient:
     case Op::memoize_tag:
-      return value(e.args[0]);
+      return values.of(e.args[0]);
     case Op::strict_float: {
-      const Contraction off(e_, false);
-      const MemoScope scope(*this, false);  // values that may be contracted stay outside
-      return value(e.args[0]);
+      const Contraction off(c.e, false);
+      const MemoScope scope(c.frame, false);  // values that may be contracted stay outside
+      return values.of(e.args[0]);
     }
     case Op::undef:
-      return llvm::Constant::getNullValue(llvm_type(e_, e.type));
+      return llvm::Constant::getNullValue(llvm_type(c.e, e.type));
     case Op::print:
     case Op::print_when:
-      return print_call(e);
+      return print_call(values, e);
     case Op::require:
-      return require(e);
+      return require(values, e);
     case Op::random:
-      return random(e);
+      return random(values, e);
     case Op::if_then_else:
-      return branch_value(e.args[0], e.args[1], e.args[2]);
+      return branch_value(values, e.args[0], e.args[1], e.args[2]);
     case Op::error:
-      return report_error(value(e.args[0]), e.args, 1, "");
+      return report_error(values, values.of(e.args[0]), e.args, 1, "");
     case Op::runtime_call:
-      return runtime_call(e);
+      return runtime_call(values, e);
     case Op::pack:
-      return pack(e.args);
+      return pack(values, e.args);
     case Op::prefetch:
-      return prefetch(e);
+      return prefetch(values, e);
     case Op::trace:
-      return trace(e);
+      return trace(values, e);
     case Op::address_of: {
       const auto* load = e.args[0].as<Load>();
       RETROGRADE_ASSERT(load != nullptr, "address of something that is no load");
-      return element_pointer(storage(load->name), load->type.element_of(), index64(load->index));
+      return element_pointer(c.e, c.storage(load->name), load->type.element_of(),
+                             values.index64(load->index));
     }
     default:
       break;
   }
-  if (is_buffer_operator(e.op)) return buffer_operator(e);
-  std::vector<Value*> args;
-  for (const Expr& arg : e.args) args.push_back(value(arg));
-  if (is_math_operator(e.op)) return math_operator(e_, e.op, e.type, args);
-  if (is_fast_operator(e.op)) return fast_operator(e_, e.op, e.type, args);
-  Value* result = simple_operator(e_, e.op, e.type, types_of(e.args), args);
+  if (is_buffer_operator(e.op)) return buffer_operator(values, e);
+  const auto args = mapped(e.args, [&](const Expr& arg) { return values.of(arg); });
+  if (is_math_operator(e.op)) return math_operator(c.e, e.op, e.type, args);
+  if (is_fast_operator(e.op)) return fast_operator(c.e, e.op, e.type, args);
+  Value* result = simple_operator(c.e, e.op, e.type, mapped(e.args, &Expr::type), args);
   RETROGRADE_ASSERT(result != nullptr, "no code for operator ", op_info(e.op).name);
   return result;
 }
 
-// Lane by lane: the C function knows no vectors.
-Value* FunctionGenerator::extern_call(const Call& e) {
-  std::vector<Value*> args;
-  std::vector<llvm::Type*> params;
-  for (const Expr& arg : e.args) {
-    args.push_back(value(arg));
-    params.push_back(llvm_type(e_, arg.type().element_of()));
+Value* called(Values& values, const Call& e) {
+  switch (e.call_type) {
+    case CallType::Operator:
+      return operator_call(values, e);
+    case CallType::Extern:
+      return extern_call(values, e);
+    default:
+      internal_error("call of " + quoted(e.name) +
+                     " reached code generation: lowering replaces it by loads");
   }
-  auto* type = llvm::FunctionType::get(llvm_type(e_, e.type.element_of()), params, false);
-  auto callee = e_.module.getOrInsertFunction(e.name, type);
-  std::vector<Value*> lanes;
-  for (int i = 0; i < e.type.lanes(); i++) {
-    std::vector<Value*> lane_args;
-    for (Value* arg : args) lane_args.push_back(lane(e_, arg, i));
-    lanes.push_back(b_.CreateCall(callee, lane_args));
-  }
-  return from_lanes(e_, lanes);
-}
-
-Value* FunctionGenerator::branch_value(const Expr& condition, const Expr& then_value,
-                                       const Expr& else_value) {
-  Value* test = value(condition);
-  if (test->getType()->isVectorTy()) {
-    Value *a = value(then_value), *b = value(else_value);
-    return b_.CreateSelect(test, a, b);
-  }
-  return chosen(
-      test, [&] { return value(then_value); }, [&] { return value(else_value); });
-}
-
-// (condition, value, message...). All lanes must hold.
-Value* FunctionGenerator::require(const Call& e) {
-  Value* condition = value(e.args[0]);
-  if (condition->getType()->isVectorTy()) condition = b_.CreateAndReduce(condition);
-  fail_unless(condition, [&] {
-    const auto* error = e.args.size() == 3 ? e.args[2].as<Call>() : nullptr;
-    if (error && error->is_op(Op::error)) return value(e.args[2]);  // lowering's, with its own code
-    return report_error(b_.getInt32(static_cast<uint32_t>(retrograde_error_requirement_failed)),
-                        e.args, 2, " ");
-  });
-  return value(e.args[1]);
-}
-
-// ir/random.h in vectors.
-Value* FunctionGenerator::random(const Call& e) {
-  const Type word = UInt(32, e.type.lanes());
-  llvm::Type* type = llvm_type(e_, word);
-  const auto constant = [&](uint32_t number) { return llvm::ConstantInt::get(type, number); };
-  const auto xor_shifted = [&](Value* v, uint32_t bits) {
-    return b_.CreateXor(v, b_.CreateLShr(v, constant(bits)));
-  };
-  Value* state = constant(random_seed);
-  for (const Expr& arg : e.args) {
-    RETROGRADE_ASSERT(arg.type().is_int_or_uint(), "seed of type ", to_string(arg.type()));
-    Value* seed = convert(e_, UInt(32, arg.type().lanes()), arg.type(), value(arg));
-    if (lanes_of(seed) != word.lanes()) seed = splat(e_, seed, word.lanes());
-    state = b_.CreateAdd(b_.CreateXor(state, seed), constant(random_seed));
-    state = b_.CreateMul(xor_shifted(state, 16), constant(random_multiplier_1));
-    state = b_.CreateMul(xor_shifted(state, 15), constant(random_multiplier_2));
-    state = xor_shifted(state, 15);
-  }
-  if (!e.type.is_float()) {
-    RETROGRADE_ASSERT(e.type.bits() <= 32, "random number of type ", to_string(e.type));
-    return b_.CreateTrunc(state, llvm_type(e_, e.type));
-  }
-  const Type single = Float(32, e.type.lanes());
-  Value* number = convert(e_, single, word, b_.CreateLShr(state, constant(8)));
-  return convert(e_, e.type, single, b_.CreateFMul(number, float_constant(number, 0x1p-24)));
 }
 
 }  // namespace retrograde::codegen

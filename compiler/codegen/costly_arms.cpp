@@ -9,7 +9,7 @@
 // computed again.
 #include <unordered_set>
 
-#include "codegen/function_generator.h"
+#include "codegen/values.h"
 #include "ir/visit.h"
 
 namespace retrograde::codegen {
@@ -27,12 +27,12 @@ static int function_adds(const Expr& e) {
 }
 
 // Whether functions that have no value yet make the arm worth a branch.
-bool FunctionGenerator::is_costly(const Expr& arm) const {
+static bool is_costly(const Values& values, const Expr& arm) {
   if (!arm.type().is_float()) return false;
   std::unordered_set<const ExprNode*> seen;
   int adds = 0;
   walk(arm, [&](const Expr& e) {
-    const bool is_new = seen.size() < most_nodes && !known(&MemoFrame::values, e) && seen.insert(e.get()).second;
+    const bool is_new = seen.size() < most_nodes && !values.known(e) && seen.insert(e.get()).second;
     if (is_new) adds += function_adds(e);
     return is_new;
   });
@@ -40,29 +40,22 @@ bool FunctionGenerator::is_costly(const Expr& arm) const {
 }
 
 // The arm, where a lane of `wanted` is true; else `otherwise`.
-Value* FunctionGenerator::value_where(Value* wanted, const Expr& arm, Value* otherwise) {
-  Value* any = wanted->getType()->isVectorTy() ? b_.CreateOrReduce(wanted) : wanted;
-  llvm::BasicBlock *before = b_.GetInsertBlock(), *end = nullptr;
-  Value* computed = nullptr;
-  if_true(any, [&] {
-    computed = value(arm);
-    end = b_.GetInsertBlock();
-  });
-  llvm::PHINode* result = b_.CreatePHI(computed->getType(), 2);
-  result->addIncoming(computed, end);
-  result->addIncoming(otherwise, before);
-  return result;
+static Value* value_where(Values& values, Value* wanted, const Expr& arm, Value* otherwise) {
+  Value* any = wanted->getType()->isVectorTy() ? values.c.b.CreateOrReduce(wanted) : wanted;
+  return values.c.value_if(
+      any, [&] { return values.of(arm); }, otherwise);
 }
 
-Value* FunctionGenerator::make(const Select& e) {
-  Value* condition = value(e.condition);
-  const bool is_costly_a = is_costly(e.when_true), is_costly_b = is_costly(e.when_false);
-  Value* a = is_costly_a ? nullptr : value(e.when_true);
-  Value* b = is_costly_b ? nullptr : value(e.when_false);
-  const auto nothing = [&] { return llvm::Constant::getNullValue(llvm_type(e_, e.type)); };
-  if (!a) a = value_where(condition, e.when_true, b ? b : nothing());
-  if (!b) b = value_where(b_.CreateNot(condition), e.when_false, a);
-  return b_.CreateSelect(condition, a, b);
+Value* selected(Values& values, const Select& e) {
+  Value* condition = values.of(e.condition);
+  const bool is_costly_a = is_costly(values, e.when_true),
+             is_costly_b = is_costly(values, e.when_false);
+  Value* a = is_costly_a ? nullptr : values.of(e.when_true);
+  Value* b = is_costly_b ? nullptr : values.of(e.when_false);
+  const auto nothing = [&] { return llvm::Constant::getNullValue(llvm_type(values.c.e, e.type)); };
+  if (!a) a = value_where(values, condition, e.when_true, b ? b : nothing());
+  if (!b) b = value_where(values, values.c.b.CreateNot(condition), e.when_false, a);
+  return values.c.b.CreateSelect(condition, a, b);
 }
 
 }  // namespace retrograde::codegen

@@ -54,6 +54,8 @@ Value* float_constant(llvm::Type* type, double value);
 Value* bits_as_float(Emitter& e, Value* integer);  // i32 to float, i64 to double, lanes kept
 Value* bits_as_integer(Emitter& e, Value* number);
 bool is_half(Type type);  // float16 or bfloat16
+Value* from_memory(Emitter& e, Type type, Value* value);
+Value* to_memory(Emitter& e, Type type, Value* value);
 
 // ---- vectors.cpp ----
 Value* splat(Emitter& e, Value* scalar, int lanes);      // the scalar itself when lanes is 1

@@ -9,6 +9,7 @@
 // statement fails, the runtime closes them, so that the other one does not wait for ever.
 #include <set>
 
+#include "codegen/access.h"
 #include "codegen/function_generator.h"
 #include "ir/build.h"
 #include "ir/visit.h"
@@ -45,22 +46,23 @@ void FunctionGenerator::make(const Fork& s) {
   auto* pointer = b_.getPtrTy();
   std::vector<Value*> semaphores;
   {
-    const MemoScope scope(*this, false);
+    const MemoScope scope(c_.frame, false);
     for (const Load* load : semaphores_in(s)) {
-      const auto found = frame_.storages.find(load->name);
-      if (found == frame_.storages.end()) continue;  // lives inside of a branch
-      semaphores.push_back(element_pointer(found->second, load->type, index64(load->index)));
+      const auto found = c_.frame.storages.find(load->name);
+      if (found == c_.frame.storages.end()) continue;  // lives inside of a branch
+      semaphores.push_back(
+          element_pointer(e_, found->second, load->type, values_.index64(load->index)));
     }
   }
   const auto count = static_cast<int64_t>(semaphores.size());
-  Value* list = entry_alloca(pointer, std::max<int64_t>(count, 1), "semaphores");
+  Value* list = c_.entry_alloca(pointer, std::max<int64_t>(count, 1), "semaphores");
   for (unsigned i = 0; i < semaphores.size(); i++)
     b_.CreateStore(semaphores[i], b_.CreateConstGEP1_64(pointer, list, i));
   const Task first = outline(s.first, "fork"), rest = outline(s.rest, "join");
-  Value* code = call_runtime("retrograde_fork", b_.getInt32Ty(),
-                             {first.function, first.closure, rest.function, rest.closure, list,
-                              b_.getInt32(semaphores.size())});
-  fail_unless(b_.CreateICmpEQ(code, b_.getInt32(0)), [&] { return code; });
+  Value* code = c_.call_runtime("retrograde_fork", b_.getInt32Ty(),
+                                {first.function, first.closure, rest.function, rest.closure, list,
+                                 b_.getInt32(semaphores.size())});
+  c_.fail_unless(b_.CreateICmpEQ(code, b_.getInt32(0)), [&] { return code; });
 }
 
 }  // namespace retrograde::codegen

@@ -13,15 +13,19 @@
 // predicate is off count for neither end.
 #include <llvm/IR/IntrinsicsX86.h>
 
-#include "codegen/function_generator.h"
+#include "codegen/access.h"
 #include "ir/build.h"
 
 namespace retrograde::codegen {
 
 using namespace ir;
 
+namespace {
+
+constexpr int most_coordinate_nodes = 64;  // larger ones are looked at as a whole
+
 // The shuffle of a whole register of such elements by numbers of their width, if the machine has it.
-static llvm::Intrinsic::ID shuffle_by_numbers(const Machine& machine, int bits, int lanes) {
+llvm::Intrinsic::ID shuffle_by_numbers(const Machine& machine, int bits, int lanes) {
   switch (bits * lanes) {
     case 128:
       if (bits == 8 && machine.has_avx512_bytes())
@@ -52,11 +56,12 @@ static llvm::Intrinsic::ID shuffle_by_numbers(const Machine& machine, int bits, 
 
 // Whether a coordinate goes up from lane to lane, by at most one each time; nothing where it may do
 // anything else. `room`: nodes that may be looked at.
-std::optional<bool> FunctionGenerator::climbs(const Expr& e, int& room) const {
+std::optional<bool> climbs(const Frame& frame, const Expr& e, int& room) {
   if (--room < 0) return std::nullopt;
   if (const auto* name = e.as<Variable>()) {
-    const auto known = frame_.coordinates.find(name->name);
-    return known == frame_.coordinates.end() ? std::nullopt : climbs(known->second.index, room);
+    const auto known = frame.coordinates.find(name->name);
+    return known == frame.coordinates.end() ? std::nullopt
+                                            : climbs(frame, known->second.index, room);
   }
   if (const auto* ramp = e.as<Ramp>()) {
     const bool is_dense = ramp->base.type().is_scalar() && is_one(ramp->stride);
@@ -65,7 +70,8 @@ std::optional<bool> FunctionGenerator::climbs(const Expr& e, int& room) const {
   if (const auto* splat = e.as<Broadcast>())
     return splat->value.type().is_scalar() ? std::optional(false) : std::nullopt;
   const auto* n = e.as<Binary>();
-  const auto a = n ? climbs(n->a, room) : std::nullopt, b = a ? climbs(n->b, room) : std::nullopt;
+  const auto a = n ? climbs(frame, n->a, room) : std::nullopt,
+             b = a ? climbs(frame, n->b, room) : std::nullopt;
   if (!b) return std::nullopt;
   const bool either = *a || *b;
   switch (e.kind()) {
@@ -83,103 +89,113 @@ std::optional<bool> FunctionGenerator::climbs(const Expr& e, int& room) const {
   }
 }
 
-// The value of one lane of what climbs() knows.
-Value* FunctionGenerator::at_lane(const Expr& e, Value* lane) {
-  if (const auto* name = e.as<Variable>())
-    return at_lane(frame_.coordinates.at(name->name).index, lane);
-  if (const auto* ramp = e.as<Ramp>()) return b_.CreateAdd(value(ramp->base), lane);
-  if (const auto* splat = e.as<Broadcast>()) return value(splat->value);
-  const auto* n = e.as<Binary>();
-  return binary(e_, e.kind(), Int(32), at_lane(n->a, lane), at_lane(n->b, lane));
-}
-
 // The coordinate less what is the same in all lanes: loops that change only that keep the rest.
-Expr FunctionGenerator::climbing_part(const Expr& e) const {
+Expr climbing_part(const Frame& frame, const Expr& e) {
   if (const auto* name = e.as<Variable>())
-    return climbing_part(frame_.coordinates.at(name->name).index);
+    return climbing_part(frame, frame.coordinates.at(name->name).index);
   if (e.kind() != Kind::Add && e.kind() != Kind::Sub) return e;
   const auto* n = e.as<Binary>();
   int room = most_coordinate_nodes;
-  return climbing_part(*climbs(n->a, room) ? n->a : n->b);
-}
-
-// Null where the index is no such ramp, or the machine does as well by a gather.
-Value* FunctionGenerator::load_held(const Storage& from, Type type, const Expr& index,
-                                    Value* predicate) {
-  int room = most_coordinate_nodes;
-  if (index.type().element_of() != Int(32) || !climbs(index, room).value_or(false)) return nullptr;
-  const int lanes = type.lanes(), bits = 8 * type.bytes();
-  const int piece = std::min(lanes, e_.machine.vector_bits / bits);
-  if (lanes % piece == 0 && shuffle_by_numbers(e_.machine, bits, piece)) {
-    std::vector<Value*> parts;
-    for (int start = 0; start < lanes; start += piece) {
-      Value* mask = predicate ? slice(e_, predicate, start, piece) : nullptr;
-      parts.push_back(load_spread(from, type.with_lanes(piece), index, start, mask));
-    }
-    return concat(e_, parts);
-  }
-  if (e_.machine.gathers(type)) return nullptr;
-  return load_dense_or_gather(from, type, index, predicate);
-}
-
-// Lanes `start` and following, of a type that fills a register.
-Value* FunctionGenerator::load_spread(const Storage& from, Type type, const Expr& index, int start,
-                                      Value* predicate) {
-  const int lanes = type.lanes();
-  const Expr climbing = climbing_part(index);
-  Value* base = at_lane(climbing, b_.getInt32(static_cast<uint32_t>(start)));
-  llvm::Type* number = b_.getIntNTy(static_cast<unsigned>(8 * type.bytes()));
-  const auto step_at = [&](Value* lane) {
-    Value* at = b_.CreateAdd(b_.getInt32(static_cast<uint32_t>(start)), lane);
-    Value* step = b_.CreateSub(at_lane(climbing, at), base);
-    return splat(e_, b_.CreateIntCast(step, number, true), lanes);
-  };
-  const Ends ends = ends_of(predicate, lanes);
-  Value* element = iota(e_, number, lanes);
-  Value* mask = b_.CreateICmpSLE(element, step_at(ends.last));
-  if (predicate) {
-    mask = b_.CreateAnd(mask, b_.CreateICmpSGE(element, step_at(ends.first)));
-    mask = b_.CreateAnd(mask, splat(e_, b_.CreateOrReduce(predicate), lanes));
-  }
-  Value* first = at_lane(index, b_.getInt32(static_cast<uint32_t>(start)));
-  Value* spread =
-      to_memory(type, load_dense(from, type, b_.CreateSExt(first, b_.getInt64Ty()), mask));
-  Value* steps = b_.CreateSub(slice(e_, value(climbing), start, lanes), splat(e_, base, lanes));
-  llvm::Type* numbers = with_lanes(number, lanes);
-  Value* shuffled = b_.CreateIntrinsic(
-      shuffle_by_numbers(e_.machine, 8 * type.bytes(), lanes), {},
-      {b_.CreateBitCast(spread, numbers), b_.CreateIntCast(steps, numbers, true)});
-  if (predicate)
-    shuffled = b_.CreateSelect(predicate, shuffled, llvm::Constant::getNullValue(numbers));
-  return from_memory(type, b_.CreateBitCast(shuffled, spread->getType()));
+  return climbing_part(frame, *climbs(frame, n->a, room) ? n->a : n->b);
 }
 
 // The first and the last lane that is on. Where none is, they are lanes all the same.
-FunctionGenerator::Ends FunctionGenerator::ends_of(Value* predicate, int lanes) {
-  if (!predicate) return {b_.getInt32(0), b_.getInt32(static_cast<uint32_t>(lanes - 1))};
+struct Ends {
+  Value *first, *last;
+};
+Ends ends_of(llvm::IRBuilder<>& b, Value* predicate, int lanes) {
+  if (!predicate) return {b.getInt32(0), b.getInt32(static_cast<uint32_t>(lanes - 1))};
   const auto width = static_cast<unsigned>(lanes);
-  Value* on = b_.CreateBitCast(predicate, b_.getIntNTy(width));
+  Value* on = b.CreateBitCast(predicate, b.getIntNTy(width));
   const auto zeros = [&](llvm::Intrinsic::ID count, const llvm::APInt& at_least) {
-    Value* some = b_.CreateOr(on, llvm::ConstantInt::get(b_.getContext(), at_least));
-    Value* number = b_.CreateBinaryIntrinsic(count, some, b_.getTrue());
-    return b_.CreateIntCast(number, b_.getInt32Ty(), false);
+    Value* some = b.CreateOr(on, llvm::ConstantInt::get(b.getContext(), at_least));
+    Value* number = b.CreateBinaryIntrinsic(count, some, b.getTrue());
+    return b.CreateIntCast(number, b.getInt32Ty(), false);
   };
   Value* after = zeros(llvm::Intrinsic::ctlz, llvm::APInt(width, 1));
   return {zeros(llvm::Intrinsic::cttz, llvm::APInt::getSignMask(width)),
-          b_.CreateSub(b_.getInt32(width - 1), after)};
+          b.CreateSub(b.getInt32(width - 1), after)};
 }
 
-Value* FunctionGenerator::load_dense_or_gather(const Storage& from, Type type, const Expr& index,
-                                               Value* predicate) {
+// The value of one lane of what climbs() knows.
+Value* at_lane(Values& values, const Expr& e, Value* lane) {
+  if (const auto* name = e.as<Variable>())
+    return at_lane(values, values.c.frame.coordinates.at(name->name).index, lane);
+  if (const auto* ramp = e.as<Ramp>()) return values.c.b.CreateAdd(values.of(ramp->base), lane);
+  if (const auto* splat = e.as<Broadcast>()) return values.of(splat->value);
+  const auto* n = e.as<Binary>();
+  return binary(values.c.e, e.kind(), Int(32), at_lane(values, n->a, lane),
+                at_lane(values, n->b, lane));
+}
+
+// Lanes `start` and following, of a type that fills a register.
+Value* load_spread(Values& values, const Storage& from, Type type, const Expr& index, int start,
+                   Value* predicate) {
+  FunctionContext& c = values.c;
   const int lanes = type.lanes();
-  Value* indices = value(index);
-  Value *first = at_lane(index, b_.getInt32(0)),
-        *last = at_lane(index, b_.getInt32(static_cast<uint32_t>(lanes - 1)));
-  Value* steps = b_.CreateSub(last, first);
-  return chosen(
-      b_.CreateICmpEQ(steps, int_constant(steps, lanes - 1)),
-      [&] { return load_dense(from, type, b_.CreateSExt(first, b_.getInt64Ty()), predicate); },
-      [&] { return gather_compactly(from, type, indices, predicate); });
+  const Expr climbing = climbing_part(c.frame, index);
+  Value* base = at_lane(values, climbing, c.b.getInt32(static_cast<uint32_t>(start)));
+  llvm::Type* number = c.b.getIntNTy(static_cast<unsigned>(8 * type.bytes()));
+  const auto step_at = [&](Value* lane) {
+    Value* at = c.b.CreateAdd(c.b.getInt32(static_cast<uint32_t>(start)), lane);
+    Value* step = c.b.CreateSub(at_lane(values, climbing, at), base);
+    return splat(c.e, c.b.CreateIntCast(step, number, true), lanes);
+  };
+  const Ends ends = ends_of(c.b, predicate, lanes);
+  Value* element = iota(c.e, number, lanes);
+  Value* mask = c.b.CreateICmpSLE(element, step_at(ends.last));
+  if (predicate) {
+    mask = c.b.CreateAnd(mask, c.b.CreateICmpSGE(element, step_at(ends.first)));
+    mask = c.b.CreateAnd(mask, splat(c.e, c.b.CreateOrReduce(predicate), lanes));
+  }
+  Value* first = at_lane(values, index, c.b.getInt32(static_cast<uint32_t>(start)));
+  Value* loaded = to_memory(
+      c.e, type, load_dense(c, from, type, c.b.CreateSExt(first, c.b.getInt64Ty()), mask));
+  Value* steps =
+      c.b.CreateSub(slice(c.e, values.of(climbing), start, lanes), splat(c.e, base, lanes));
+  llvm::Type* numbers = with_lanes(number, lanes);
+  Value* shuffled = c.b.CreateIntrinsic(
+      shuffle_by_numbers(c.e.machine, 8 * type.bytes(), lanes), {},
+      {c.b.CreateBitCast(loaded, numbers), c.b.CreateIntCast(steps, numbers, true)});
+  if (predicate)
+    shuffled = c.b.CreateSelect(predicate, shuffled, llvm::Constant::getNullValue(numbers));
+  return from_memory(c.e, type, c.b.CreateBitCast(shuffled, loaded->getType()));
+}
+
+Value* load_dense_or_gather(Values& values, const Storage& from, Type type, const Expr& index,
+                            Value* predicate) {
+  FunctionContext& c = values.c;
+  const int lanes = type.lanes();
+  Value* indices = values.of(index);
+  Value *first = at_lane(values, index, c.b.getInt32(0)),
+        *last = at_lane(values, index, c.b.getInt32(static_cast<uint32_t>(lanes - 1)));
+  Value* steps = c.b.CreateSub(last, first);
+  return c.chosen(
+      c.b.CreateICmpEQ(steps, int_constant(steps, lanes - 1)),
+      [&] { return load_dense(c, from, type, c.b.CreateSExt(first, c.b.getInt64Ty()), predicate); },
+      [&] { return gather_compactly(c, from, type, indices, predicate); });
+}
+
+}  // namespace
+
+Value* load_held(Values& values, const Storage& from, Type type, const Expr& index,
+                 Value* predicate) {
+  FunctionContext& c = values.c;
+  int room = most_coordinate_nodes;
+  if (index.type().element_of() != Int(32) || !climbs(c.frame, index, room).value_or(false))
+    return nullptr;
+  const int lanes = type.lanes(), bits = 8 * type.bytes();
+  const int piece = std::min(lanes, c.e.machine.vector_bits / bits);
+  if (lanes % piece == 0 && shuffle_by_numbers(c.e.machine, bits, piece)) {
+    std::vector<Value*> parts;
+    for (int start = 0; start < lanes; start += piece) {
+      Value* mask = predicate ? slice(c.e, predicate, start, piece) : nullptr;
+      parts.push_back(load_spread(values, from, type.with_lanes(piece), index, start, mask));
+    }
+    return concat(c.e, parts);
+  }
+  if (c.e.machine.gathers(type)) return nullptr;
+  return load_dense_or_gather(values, from, type, index, predicate);
 }
 
 }  // namespace retrograde::codegen

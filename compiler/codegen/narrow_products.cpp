@@ -5,7 +5,7 @@
 //   int32(a) * k + int32(b) * l          neighbours in the interleaved vectors a0 b0 a1 b1 ... and
 //                                        k l k l ...; worth it where k and l are the same in all
 //                                        lanes
-#include "codegen/function_generator.h"
+#include "codegen/values.h"
 #include "ir/build.h"
 #include "ir/narrow_product.h"
 
@@ -18,14 +18,13 @@ constexpr int min_lanes = 8;
 // Longer sums are taken as they stand; so a sum of shared sums costs no more than this.
 constexpr size_t max_terms = 64;
 
-// What is to be reduced, some of it done already.
-Value* FunctionGenerator::reduced_in_part(const VectorReduce& e) {
+Value* reduced_in_part(Values& values, const VectorReduce& e) {
   const bool has_pairs = e.value.type().lanes() / e.type.lanes() % 2 == 0;
-  if (e.op == Kind::Add && has_pairs && e_.machine.is_x86()) {
+  if (e.op == Kind::Add && has_pairs && values.c.e.machine.is_x86()) {
     if (const auto product = as_narrow_product(e.value))
-      return add_products_in_pairs(e_, value(product->a), value(product->b));
+      return add_products_in_pairs(values.c.e, values.of(product->a), values.of(product->b));
   }
-  return value(e.value);
+  return values.of(e.value);
 }
 
 // The terms of a sum; false when there are too many.
@@ -42,14 +41,13 @@ static bool is_scaled(const Expr& e) {
   return product && (product->a.as<Broadcast>() || product->b.as<Broadcast>());
 }
 
-// The sum when it has products to be added in pairs, else null. Its terms may be added in any
-// order: what overflows is undefined, and wraps.
-Value* FunctionGenerator::sum_of_products(const Expr& e) {
+// The terms of the sum may be added in any order: what overflows is undefined, and wraps.
+Value* sum_of_products(Values& values, const Expr& e) {
   const Type type = e.type();
   const bool may_have_pairs = e.kind() == Kind::Add && type.element_of() == Int(32) &&
                               type.lanes() >= min_lanes && type.lanes() % 2 == 0;
   std::vector<Expr> terms, others;
-  if (!may_have_pairs || !e_.machine.is_x86() || !split_sum(e, terms)) return nullptr;
+  if (!may_have_pairs || !values.c.e.machine.is_x86() || !split_sum(e, terms)) return nullptr;
   std::vector<NarrowProduct> products;
   for (const Expr& term : terms) {
     const auto product = is_scaled(term) ? as_narrow_product(term) : std::nullopt;
@@ -57,18 +55,19 @@ Value* FunctionGenerator::sum_of_products(const Expr& e) {
   }
   if (products.size() < 2) return nullptr;
   Value* sum = nullptr;
-  const auto add = [&](Value* part) { sum = sum ? b_.CreateAdd(sum, part) : part; };
+  const auto add = [&](Value* part) { sum = sum ? values.c.b.CreateAdd(sum, part) : part; };
   for (size_t i = 0; i + 1 < products.size(); i += 2) {
     const NarrowProduct &one = products[i], &other = products[i + 1];
-    add(add_products_in_pairs(e_, interleave(e_, {value(one.a), value(other.a)}),
-                              interleave(e_, {value(one.b), value(other.b)})));
+    add(add_products_in_pairs(values.c.e,
+                              interleave(values.c.e, {values.of(one.a), values.of(other.a)}),
+                              interleave(values.c.e, {values.of(one.b), values.of(other.b)})));
   }
   if (products.size() % 2) {
     const NarrowProduct& last = products.back();
-    add(b_.CreateMul(convert(e_, type, last.a.type(), value(last.a)),
-                     convert(e_, type, last.b.type(), value(last.b))));
+    add(values.c.b.CreateMul(convert(values.c.e, type, last.a.type(), values.of(last.a)),
+                             convert(values.c.e, type, last.b.type(), values.of(last.b))));
   }
-  for (const Expr& other : others) add(value(other));
+  for (const Expr& other : others) add(values.of(other));
   return sum;
 }
 

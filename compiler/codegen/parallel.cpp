@@ -41,21 +41,21 @@ FunctionGenerator::Task FunctionGenerator::outline(const Stmt& body, const std::
   std::vector<std::string> variables, storages;
   std::vector<Value*> captured;
   for (const std::string& variable : uses.variables) {
-    const auto found = frame_.variables.find(variable);
-    if (found == frame_.variables.end() || variable == index) continue;
+    const auto found = c_.frame.variables.find(variable);
+    if (found == c_.frame.variables.end() || variable == index) continue;
     variables.push_back(variable);
     captured.push_back(found->second);
   }
   for (const std::string& storage : uses.storages) {
-    const auto found = frame_.storages.find(storage);
-    if (found == frame_.storages.end()) continue;
+    const auto found = c_.frame.storages.find(storage);
+    if (found == c_.frame.storages.end()) continue;
     storages.push_back(storage);
     captured.push_back(found->second.base);
   }
   std::vector<llvm::Type*> fields;
   for (Value* v : captured) fields.push_back(v->getType());
   auto* closure_type = llvm::StructType::get(e_.context(), fields);
-  Value* closure = entry_alloca(closure_type, 1, name + ".closure");
+  Value* closure = c_.entry_alloca(closure_type, 1, name + ".closure");
   for (unsigned i = 0; i < captured.size(); i++) {
     b_.CreateStore(captured[i], b_.CreateStructGEP(closure_type, closure, i));
   }
@@ -68,40 +68,39 @@ FunctionGenerator::Task FunctionGenerator::outline(const Stmt& body, const std::
   auto* task =
       llvm::Function::Create(task_type, llvm::GlobalValue::InternalLinkage, task_name, e_.module);
   const llvm::IRBuilderBase::InsertPointGuard guard(b_);
-  Frame outer = std::move(frame_);
-  frame_ = {};
-  begin_function(task);
-  frame_.memo.push_back({{}, {}, false});
+  Frame outer = std::move(c_.frame);
+  c_.frame = {};
+  c_.begin(task);
   for (unsigned i = 0; i < captured.size(); i++) {
     Value* field = b_.CreateStructGEP(closure_type, task->getArg(2), i);
     auto* load = b_.CreateLoad(fields[i], field);
     load->setMetadata(llvm::LLVMContext::MD_invariant_load, llvm::MDNode::get(e_.context(), {}));
     if (i < variables.size()) {
-      frame_.variables[variables[i]] = load;
+      c_.frame.variables[variables[i]] = load;
     } else {
       const std::string& storage = storages[i - variables.size()];
-      frame_.storages[storage] = {load, nullptr, outer.storages[storage].alias};
+      c_.frame.storages[storage] = {load, nullptr, outer.storages[storage].alias};
     }
   }
   if (!index.empty())
-    frame_.variables[index] = b_.CreateIntCast(task->getArg(1), llvm_type(e_, index_type), true);
+    c_.frame.variables[index] = b_.CreateIntCast(task->getArg(1), llvm_type(e_, index_type), true);
   statement(body);
-  finish_function();
-  frame_ = std::move(outer);
+  c_.finish();
+  c_.frame = std::move(outer);
   return {task, closure};
 }
 
 void FunctionGenerator::parallel_loop(const For& s) {
   Value *min, *extent;
   {
-    const MemoScope scope(*this, false);
-    min = b_.CreateIntCast(value(s.min), b_.getInt32Ty(), true);
-    extent = b_.CreateIntCast(value(s.extent), b_.getInt32Ty(), true);
+    const MemoScope scope(c_.frame, false);
+    min = b_.CreateIntCast(values_.of(s.min), b_.getInt32Ty(), true);
+    extent = b_.CreateIntCast(values_.of(s.extent), b_.getInt32Ty(), true);
   }
   const Task task = outline(s.body, s.name, s.name, s.min.type());
-  Value* code = call_runtime("retrograde_parallel_for", b_.getInt32Ty(),
-                             {task.function, min, extent, task.closure});
-  fail_unless(b_.CreateICmpEQ(code, b_.getInt32(0)), [&] { return code; });
+  Value* code = c_.call_runtime("retrograde_parallel_for", b_.getInt32Ty(),
+                                {task.function, min, extent, task.closure});
+  c_.fail_unless(b_.CreateICmpEQ(code, b_.getInt32(0)), [&] { return code; });
 }
 
 }  // namespace retrograde::codegen

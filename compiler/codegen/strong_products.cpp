@@ -13,7 +13,7 @@
 // Algorithms, 2nd ed., section 2.6).
 #include <llvm/IR/Intrinsics.h>
 
-#include "codegen/function_generator.h"
+#include "codegen/values.h"
 
 namespace retrograde::codegen {
 
@@ -30,25 +30,26 @@ static bool is_running_sum(const Expr& e) {
          (sum->kind == Kind::Add && as_strong_product(sum->a) && is_running_sum(sum->b));
 }
 
-// The sum when it is one with a strong product that may fuse, else null.
-Value* FunctionGenerator::sum_with_strong_product(const Binary& e) {
+Value* sum_with_strong_product(Values& values, const Binary& e) {
   const bool is_sum = e.kind == Kind::Add || e.kind == Kind::Sub;
   const Type type = e.a.type();
-  if (!is_sum || !type.is_float() || is_half(type) || !b_.getFastMathFlags().allowContract())
+  if (!is_sum || !type.is_float() || is_half(type) ||
+      !values.c.b.getFastMathFlags().allowContract())
     return nullptr;
   const Call* product = as_strong_product(e.b);
   const bool is_second = product != nullptr;
   if (!is_second && e.kind == Kind::Add) product = as_strong_product(e.a);
   if (!product || !is_running_sum(is_second ? e.a : e.b)) return nullptr;
-  Value* sum = value(is_second ? e.a : e.b);
-  Value *a = value(product->args[0]), *b = value(product->args[1]);
-  Value *zero = float_constant(a, 0.0), *counts = b_.CreateFCmpUNE(a, zero);
+  Value* sum = values.of(is_second ? e.a : e.b);
+  Value *a = values.of(product->args[0]), *b = values.of(product->args[1]);
+  Value *zero = float_constant(a, 0.0), *counts = values.c.b.CreateFCmpUNE(a, zero);
   const auto fused = [&](Value* factor) -> Value* {
-    Value* first = e.kind == Kind::Sub ? b_.CreateFNeg(a) : a;
-    return b_.CreateIntrinsic(llvm::Intrinsic::fmuladd, {a->getType()}, {first, factor, sum});
+    Value* first = e.kind == Kind::Sub ? values.c.b.CreateFNeg(a) : a;
+    return values.c.b.CreateIntrinsic(llvm::Intrinsic::fmuladd, {a->getType()},
+                                      {first, factor, sum});
   };
-  if (e_.machine.has_avx512()) return b_.CreateSelect(counts, fused(b), sum);
-  return fused(b_.CreateSelect(counts, b, zero));
+  if (values.c.e.machine.has_avx512()) return values.c.b.CreateSelect(counts, fused(b), sum);
+  return fused(values.c.b.CreateSelect(counts, b, zero));
 }
 
 }  // namespace retrograde::codegen

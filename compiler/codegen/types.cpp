@@ -61,4 +61,12 @@ Value* bits_as_integer(Emitter& e, Value* number) {
   return e.b.CreateBitCast(number, with_lanes(e.b.getIntNTy(bits), lanes_of(number)));
 }
 
+Value* from_memory(Emitter& e, Type type, Value* v) {
+  return type.is_bool() ? e.b.CreateICmpNE(v, int_constant(v, 0)) : v;
+}
+
+Value* to_memory(Emitter& e, Type type, Value* v) {
+  return type.is_bool() ? e.b.CreateZExt(v, with_lanes(e.b.getInt8Ty(), lanes_of(v))) : v;
+}
+
 }  // namespace retrograde::codegen
