@@ -77,7 +77,7 @@ void schedule_sum(const Func& loss) {
 
 // Of everything but the final sum.
 void schedule_primal(const Func& loss) {
-  for (const ir::FuncPtr& contents : ir::topological_order({loss.function()})) {
+  for (const graph::FuncPtr& contents : graph::topological_order({loss.function()})) {
     if (contents == loss.function() || contents->is_pure()) continue;
     Func f(contents);
     f.compute_root();

@@ -155,8 +155,8 @@ class TimeTable {
 
 // ---- IR text ----
 
-const ir::StatementPass& find_pass(const std::string& name) {
-  const ir::StatementPass* pass = ir::find_statement_pass(name);
+const lower::StatementPass& find_pass(const std::string& name) {
+  const lower::StatementPass* pass = lower::find_statement_pass(name);
   if (pass) return *pass;
   user_error(text("run the pass ", quoted(name)), "a pass must be one of those that --list names");
 }
@@ -164,31 +164,33 @@ const ir::StatementPass& find_pass(const std::string& name) {
 void run_expr(const Options& options) {
   if (options.passes != std::vector<std::string>{"simplify"})
     user_error("read one expression", "only the pass \"simplify\" takes one");
-  std::cout << ir::simplify(ir::parse_expr(read_all(options.file))) << "\n";
+  std::cout << simplification::simplify(ir::parse_expr(read_all(options.file))) << "\n";
 }
 
 void run_graph(const Options& options) {
-  ir::Graph graph = ir::parse_graph(read_all(options.file));
-  ir::validate(graph, "parse_graph");
+  graph::Graph graph = graph::parse_graph(read_all(options.file));
+  graph::validate(graph, "parse_graph");
   if (!options.log.empty()) {
-    graph = ir::graph_of(ir::with_log(ScheduleLog::parse(read_all(options.log)), graph.outputs));
-    ir::validate(graph, "with_log");
+    graph =
+        graph::graph_of(graph::with_log(ScheduleLog::parse(read_all(options.log)), graph.outputs));
+    graph::validate(graph, "with_log");
   }
   for (const std::string& name : options.passes) {
-    const ir::GraphPass* pass = ir::find_graph_pass(name);
+    const autodiff::GraphPass* pass = autodiff::find_graph_pass(name);
     if (!pass) {
       user_error(text("run the pass ", quoted(name), " on a graph"),
                  "it must be one from graph to graph, as --list marks them");
     }
-    graph = ir::graph_of(pass->run(graph.outputs));
-    ir::validate(graph, name);
+    graph = graph::graph_of(pass->run(graph.outputs));
+    graph::validate(graph, name);
   }
   if (options.stop_after.empty()) {
-    std::cout << ir::to_text(graph);
+    std::cout << graph::to_text(graph);
     return;
   }
-  ir::LowerOptions lowering{get_host_target(), true, {}, options.stop_after};
-  std::cout << ir::lower("graph", graph.outputs, ir::infer_arguments(graph.outputs), lowering).body;
+  lower::LowerOptions lowering{get_host_target(), true, {}, options.stop_after};
+  std::cout
+      << lower::lower("graph", graph.outputs, lower::infer_arguments(graph.outputs), lowering).body;
 }
 
 void run_passes(const Options& options) {
@@ -272,10 +274,12 @@ int run_program(const Options& options) {
 int run(const Options& options) {
   if (!options.program.empty()) return run_program(options);
   if (options.lists) {
-    for (const ir::GraphPass& pass : ir::graph_passes()) std::cout << pass.name << " (--graph)\n";
-    for (const ir::StatementPass& pass : ir::statement_passes()) std::cout << pass.name << "\n";
+    for (const autodiff::GraphPass& pass : autodiff::graph_passes())
+      std::cout << pass.name << " (--graph)\n";
+    for (const lower::StatementPass& pass : lower::statement_passes())
+      std::cout << pass.name << "\n";
   } else if (options.lists_pipeline) {
-    for (const std::string& name : ir::pass_names()) std::cout << name << "\n";
+    for (const std::string& name : lower::pass_names()) std::cout << name << "\n";
   } else if (options.is_graph) {
     run_graph(options);
   } else {

@@ -9,7 +9,7 @@
 #include "ir/print.h"
 #include "ir/visit.h"
 
-namespace retrograde::ir {
+namespace retrograde::analysis {
 
 namespace {
 
@@ -197,4 +197,4 @@ AssociativityProof prove_associative(const std::vector<Expr>& values,
   return Prover(values, xs).run();
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::analysis

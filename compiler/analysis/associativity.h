@@ -22,7 +22,7 @@
 
 #include "ir/expr.h"
 
-namespace retrograde::ir {
+namespace retrograde::analysis {
 
 struct AssociativeOp {
   std::vector<std::string> xs, ys;  // names of the operands' values
@@ -45,4 +45,4 @@ struct AssociativityProof {
 AssociativityProof prove_associative(const std::vector<Expr>& values,
                                      const std::vector<std::string>& xs);
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::analysis

@@ -6,7 +6,7 @@
 #include "ir/build.h"
 #include "ir/visit.h"
 
-namespace retrograde::ir {
+namespace retrograde::analysis {
 
 namespace {
 
@@ -361,4 +361,4 @@ bool holds_always(const std::vector<Atom>& atoms, bool bitwise, bool ignore_ties
   return CaseSplit(atoms, bitwise, ignore_ties, claim).holds(CaseFacts());
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::analysis

@@ -15,7 +15,7 @@
 
 #include "ir/expr.h"
 
-namespace retrograde::ir {
+namespace retrograde::analysis {
 
 // A sum of products of atoms, each with its coefficient. Coefficients wrap like integers do.
 using Monomial = std::vector<int>;  // atoms, sorted; with repetition
@@ -85,4 +85,4 @@ using LawClaim = std::function<bool(LawEvaluator&)>;
 bool holds_always(const std::vector<Atom>& atoms, bool bitwise, bool ignore_ties,
                   const LawClaim& claim);
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::analysis

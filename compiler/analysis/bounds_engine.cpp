@@ -12,7 +12,7 @@
 #include "ir/scalar.h"
 #include "ir/visit.h"
 
-namespace retrograde::ir {
+namespace retrograde::analysis {
 
 BoundsEngine::BoundsEngine(const Scope<Interval>& variables, const ValueBounds* values)
     : shared_(std::make_shared<Shared>(Shared{values})), scope_(&variables) {}
@@ -480,4 +480,4 @@ Interval BoundsEngine::bounds_by_rule(const Call& call) {
   }
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::analysis

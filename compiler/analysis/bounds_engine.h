@@ -21,7 +21,7 @@
 #include "ir/expr.h"
 #include "ir/node_memo.h"
 
-namespace retrograde::ir {
+namespace retrograde::analysis {
 
 class BoundsEngine {
  public:
@@ -91,4 +91,4 @@ class BoundsEngine {
   std::vector<Child> children_;
 };
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::analysis

@@ -6,7 +6,7 @@
 #include "ir/build.h"
 #include "ir/visit.h"
 
-namespace retrograde::ir {
+namespace retrograde::analysis {
 
 namespace {
 
@@ -314,4 +314,4 @@ std::optional<Accepted> prove(const Component& c) {
   return {};
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::analysis

@@ -8,7 +8,7 @@
 
 #include "analysis/update_component.h"
 
-namespace retrograde::ir {
+namespace retrograde::analysis {
 
 // What an element of an identity may be.
 enum class Unit : uint8_t { Zero, One, Highest, Lowest, True, False, Ones, Any };
@@ -29,4 +29,4 @@ struct Accepted {
 // the update; values stay the same.
 std::optional<Accepted> prove(const Component& c);
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::analysis

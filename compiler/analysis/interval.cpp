@@ -7,7 +7,7 @@
 #include "ir/build.h"
 #include "ir/visit.h"
 
-namespace retrograde::ir {
+namespace retrograde::analysis {
 
 namespace {
 
@@ -111,4 +111,4 @@ void merge_footprints(std::map<std::string, Footprint>& into,
   }
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::analysis

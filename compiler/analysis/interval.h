@@ -10,7 +10,7 @@
 #include "analysis/scope.h"
 #include "ir/interval.h"
 
-namespace retrograde::ir {
+namespace retrograde::analysis {
 
 Interval hull(const Interval& a, const Interval& b);  // smallest interval around both
 Interval intersection(const Interval& a, const Interval& b);
@@ -43,4 +43,4 @@ std::map<std::string, Footprint> footprints(const Expr& e, const Scope<Interval>
 void merge_footprints(std::map<std::string, Footprint>& into,
                       const std::map<std::string, Footprint>& from);
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::analysis

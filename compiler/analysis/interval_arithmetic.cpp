@@ -11,7 +11,7 @@
 #include "ir/build.h"
 #include "ir/scalar.h"
 
-namespace retrograde::ir {
+namespace retrograde::analysis {
 
 namespace {
 
@@ -413,4 +413,4 @@ Interval interval_monotone(Op op, Type type, const Interval& v) {
   return without_nan({end(v.min), end(v.max)});
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::analysis

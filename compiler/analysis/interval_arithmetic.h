@@ -7,7 +7,7 @@
 #include "analysis/interval.h"
 #include "ir/expr.h"
 
-namespace retrograde::ir {
+namespace retrograde::analysis {
 
 Interval type_range(
     Type type);  // of an element: bool and integers below 32 bits are bounded, floats are not
@@ -34,4 +34,4 @@ Interval interval_shift(Op op, Type type, const Interval& a, const Interval& amo
 // A function that never decreases and maps no number to NaN: both ends through it.
 Interval interval_monotone(Op op, Type type, const Interval& v);
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::analysis

@@ -7,7 +7,7 @@
 #include "ir/build.h"
 #include "ir/node_memo.h"
 
-namespace retrograde::ir {
+namespace retrograde::analysis {
 
 namespace {
 
@@ -217,4 +217,4 @@ Expr canonical_div(const Expr& e, int64_t divisor) {
   return canonical(binary(Kind::Div, e, make_const(e.type(), divisor)));
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::analysis

@@ -13,7 +13,7 @@
 #include "ir/expr.h"
 #include "ir/sum.h"
 
-namespace retrograde::ir {
+namespace retrograde::analysis {
 
 // The type is Int of 32 or 64 bits, scalar.
 bool has_linear_form(Type type);
@@ -58,4 +58,4 @@ struct Solution {
 std::optional<Solution> solve_for(const Expr& condition, const std::string& variable,
                                   const Scope<Interval>& inner);
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::analysis

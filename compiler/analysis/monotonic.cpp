@@ -8,7 +8,7 @@
 #include "ir/node_memo.h"
 #include "ir/visit.h"
 
-namespace retrograde::ir {
+namespace retrograde::analysis {
 namespace {
 
 Monotonic reversed(Monotonic m) {
@@ -111,4 +111,4 @@ Monotonic monotonic(const Expr& e, const std::string& variable) {
   return Direction(variable).of(e);
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::analysis

@@ -9,10 +9,10 @@
 
 #include "ir/expr.h"
 
-namespace retrograde::ir {
+namespace retrograde::analysis {
 
 enum class Monotonic : uint8_t { Constant, Increasing, Decreasing, Unknown };
 
 Monotonic monotonic(const Expr& e, const std::string& variable);
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::analysis

@@ -17,7 +17,7 @@
 #include "ir/equal.h"
 #include "ir/visit.h"
 
-namespace retrograde::ir {
+namespace retrograde::analysis {
 
 namespace {
 
@@ -233,4 +233,4 @@ bool can_prove_never_meet(const MeetingPoints& points, const std::string& loop,
   return true;
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::analysis

@@ -14,7 +14,7 @@
 
 #include "ir/expr.h"
 
-namespace retrograde::ir {
+namespace retrograde::analysis {
 
 // Points of a loop nest: variables with their ranges, and conditions that hold at each of them.
 struct MeetingPoints {
@@ -31,4 +31,4 @@ struct MeetingPoints {
 bool can_prove_never_meet(const MeetingPoints& points, const std::string& loop,
                           const std::vector<Expr>& a, const std::vector<Expr>& b);
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::analysis

@@ -9,7 +9,7 @@
 #include "ir/scalar.h"
 #include "ir/visit.h"
 
-namespace retrograde::ir {
+namespace retrograde::analysis {
 
 namespace {
 
@@ -69,4 +69,4 @@ class Signs {
 
 bool is_nonnegative_or_nan(const Expr& e) { return Signs().nonnegative(e); }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::analysis

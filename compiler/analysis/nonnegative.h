@@ -4,9 +4,9 @@
 
 #include "ir/expr.h"
 
-namespace retrograde::ir {
+namespace retrograde::analysis {
 
 // False means unknown. Linear in the nodes of `e`.
 bool is_nonnegative_or_nan(const Expr& e);
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::analysis

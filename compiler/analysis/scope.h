@@ -5,7 +5,7 @@
 #include <unordered_map>
 #include <vector>
 
-namespace retrograde::ir {
+namespace retrograde::analysis {
 
 template <class T>
 class Scope {
@@ -29,4 +29,4 @@ class Scope {
   std::unordered_map<std::string, std::vector<T>> bindings_;
 };
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::analysis

@@ -16,7 +16,7 @@
 #include "ir/build.h"
 #include "ir/visit.h"
 
-namespace retrograde::ir {
+namespace retrograde::analysis {
 
 namespace {
 
@@ -216,4 +216,4 @@ std::optional<LinearDecomposition> decompose(const Expr& e,
   return result;
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::analysis

@@ -4,7 +4,7 @@
 #include "ir/equal.h"
 #include "ir/visit.h"
 
-namespace retrograde::ir {
+namespace retrograde::analysis {
 
 bool is_bitwise(const Expr& e) {
   return as_op(e, Op::bitwise_and, Op::bitwise_or, Op::bitwise_xor, Op::bitwise_not);
@@ -106,4 +106,4 @@ std::vector<std::vector<int>> components_of(const std::vector<Expr>& values,
   return components;
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::analysis

@@ -13,7 +13,7 @@
 #include "ir/expr.h"
 #include "ir/node_memo.h"
 
-namespace retrograde::ir {
+namespace retrograde::analysis {
 
 bool is_bitwise(const Expr& e);
 
@@ -55,4 +55,4 @@ struct Component {
   Type type(size_t i) const { return update[i].type(); }
 };
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::analysis

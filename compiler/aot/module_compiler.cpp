@@ -254,11 +254,12 @@ class AheadOfTime : public ModuleCompiler {
                             const std::vector<ir::LoweredArgument>& inputs,
                             const Target& target) override {
     codegen::machine_for(target, false);  // says what cannot be compiled for before any work
-    ir::LowerOptions options;
+    lower::LowerOptions options;
     options.target = pipeline.traced(target);
-    return ir::lower(pipeline.name,
-                     ir::schedule_unscheduled(pipeline.outputs, ir::vector_unit_of(options.target)),
-                     inputs, options);
+    return lower::lower(pipeline.name,
+                        autoschedule::schedule_unscheduled(
+                            pipeline.outputs, autoschedule::vector_unit_of(options.target)),
+                        inputs, options);
   }
 
   std::vector<uint8_t> object(const Module& module) override {

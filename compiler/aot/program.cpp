@@ -72,7 +72,8 @@ void set_symbols(Signature& signature, const std::string& name, const Target& ta
 
 const halide_buffer_t* embedded_buffer(const ir::LoweredArgument& argument,
                                        const std::string& function) {
-  const auto parameter = std::dynamic_pointer_cast<ir::ParameterContents>(argument.symbol.lock());
+  const auto parameter =
+      std::dynamic_pointer_cast<graph::ParameterContents>(argument.symbol.lock());
   if (parameter && parameter->is_literal && parameter->buffer && parameter->buffer->host)
     return parameter->buffer;
   user_error("compile the function " + quoted(function),

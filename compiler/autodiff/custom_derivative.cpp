@@ -10,16 +10,18 @@ namespace retrograde {
 
 namespace {
 
+using namespace autodiff;
+
 bool is_given_twice(const std::vector<AdjointInput>& inputs, size_t i) {
   return std::any_of(inputs.begin(), inputs.begin() + static_cast<std::ptrdiff_t>(i),
                      [&](const AdjointInput& a) { return a.symbol() == inputs[i].symbol(); });
 }
 
-bool depends_on(const Func& func, const ir::Symbol* symbol) {
-  for (const ir::FuncPtr& f : ir::topological_order({func.function()})) {
+bool depends_on(const Func& func, const Symbol* symbol) {
+  for (const FuncPtr& f : topological_order({func.function()})) {
     if (f.get() == symbol) return true;
   }
-  for (const auto& p : ir::parameters_of({func.function()})) {
+  for (const auto& p : parameters_of({func.function()})) {
     if (p.get() == symbol) return true;
   }
   return false;
@@ -30,7 +32,7 @@ void check_func(const std::string& asked, const Func& func, bool has_rule) {
     user_error(asked, "a rule belongs to a Func that is defined",
                quoted(func.name()) + " has no definition", "Define it first");
   }
-  ir::check_is_floating(asked, func.types(), "its type is", "Convert it to float");
+  check_is_floating(asked, func.types(), "its type is", "Convert it to float");
   if (!has_rule) {
     user_error(asked, "a rule is a function", "there is none",
                "Give a function of the context that returns what the derivative is");
@@ -40,15 +42,15 @@ void check_func(const std::string& asked, const Func& func, bool has_rule) {
 void check_inputs(const std::string& asked, const Func& func,
                   const std::vector<AdjointInput>& inputs) {
   for (size_t i = 0; i < inputs.size(); ++i) {
-    const ir::Symbol* symbol = inputs[i].symbol().get();
-    ir::InputShape shape = ir::shape_of(symbol);
+    const Symbol* symbol = inputs[i].symbol().get();
+    InputShape shape = shape_of(symbol);
     if (shape.types.empty()) {
       user_error(asked, "its inputs must be defined",
                  text("input ", i, " has no ", shape.name.empty() ? "memory" : "definition"),
                  "Define them first");
     }
-    ir::check_is_floating(asked, shape.types, text("the input ", quoted(shape.name), " has type"),
-                          "Leave it out: nothing is propagated to integers");
+    check_is_floating(asked, shape.types, text("the input ", quoted(shape.name), " has type"),
+                      "Leave it out: nothing is propagated to integers");
     if (is_given_twice(inputs, i)) {
       user_error(asked, "each input is listed once", text(quoted(shape.name), " is there twice"),
                  "Leave one out");
@@ -64,14 +66,13 @@ void check_inputs(const std::string& asked, const Func& func,
   }
 }
 
-ir::CustomDerivatives rules_of(const Func& func) {
+CustomDerivatives rules_of(const Func& func) {
   const auto& now = func.function()->custom_derivatives;
-  return now ? *now : ir::CustomDerivatives();
+  return now ? *now : CustomDerivatives();
 }
 
-void set_rules(const Func& func, ir::CustomDerivatives rules) {
-  func.function()->custom_derivatives =
-      std::make_shared<const ir::CustomDerivatives>(std::move(rules));
+void set_rules(const Func& func, CustomDerivatives rules) {
+  func.function()->custom_derivatives = std::make_shared<const CustomDerivatives>(std::move(rules));
 }
 
 }  // namespace
@@ -89,16 +90,16 @@ Region AdjointContext::region_of(const AdjointInput& input) const {
 }
 
 AdjointContribution AdjointContribution::zero(AdjointInput input) {
-  AdjointContribution result(std::move(input), Func(std::make_shared<ir::FuncContents>()));
+  AdjointContribution result(std::move(input), Func(std::make_shared<FuncContents>()));
   result.is_zero = true;
   return result;
 }
 
 bool TangentContext::moves(const AdjointInput& input) const {
-  const ir::Symbol* symbol = input.symbol().get();
+  const Symbol* symbol = input.symbol().get();
   if (std::ranges::none_of(inputs_,
                            [&](const AdjointInput& i) { return i.symbol().get() == symbol; })) {
-    ir::InputShape shape = ir::shape_of(symbol);
+    InputShape shape = shape_of(symbol);
     user_error("propagate tangents through " + quoted(func_.name()),
                "a rule asks for the tangents of its inputs",
                text(quoted(shape.name), " is not listed"), "List it in custom_tangent");
@@ -107,8 +108,8 @@ bool TangentContext::moves(const AdjointInput& input) const {
 }
 
 Func TangentContext::tangent(const AdjointInput& input) const {
-  const ir::Symbol* symbol = input.symbol().get();
-  if (!moves(input)) return Func(ir::zero_derivative(*symbol, "_tan"));
+  const Symbol* symbol = input.symbol().get();
+  if (!moves(input)) return Func(zero_derivative(*symbol, "_tan"));
   return std::ranges::find_if(moving_, [&](const auto& m) { return m.first == symbol; })->second;
 }
 
@@ -122,7 +123,7 @@ void custom_adjoint(const Func& func, const std::vector<AdjointInput>& inputs, C
                quoted(func.name()) + " has definitions, which say it",
                "Leave the last argument out");
   }
-  ir::CustomDerivatives rules = rules_of(func);
+  CustomDerivatives rules = rules_of(func);
   rules.adjoint_inputs = inputs;
   rules.adjoint = std::move(rule);
   rules.reads = std::move(reads);
@@ -133,7 +134,7 @@ void custom_tangent(const Func& func, const std::vector<AdjointInput>& inputs, C
   std::string asked = "give " + quoted(func.name()) + " a custom tangent";
   check_func(asked, func, rule != nullptr);
   check_inputs(asked, func, inputs);
-  ir::CustomDerivatives rules = rules_of(func);
+  CustomDerivatives rules = rules_of(func);
   rules.tangent_inputs = inputs;
   rules.tangent = std::move(rule);
   set_rules(func, std::move(rules));

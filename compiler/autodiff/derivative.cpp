@@ -17,6 +17,8 @@ namespace retrograde {
 
 namespace {
 
+using namespace autodiff;
+
 std::string asked_of_adjoints(const Func& output) {
   return "propagate adjoints from " + quoted(output.name());
 }
@@ -25,11 +27,11 @@ void check_loss(const Func& output) {
   if (!output.defined())
     user_error(asked_of_adjoints(output), "the output must be defined", "it has no definition",
                "Define it first");
-  ir::check_is_floating(asked_of_adjoints(output), output.types(), "its type is",
-                        "Convert it to float where the gradient starts");
+  check_is_floating(asked_of_adjoints(output), output.types(), "its type is",
+                    "Convert it to float where the gradient starts");
 }
 
-ir::CheckpointBudget budget_of(const AdjointOptions& options) {
+CheckpointBudget budget_of(const AdjointOptions& options) {
   const char* asked = "propagate adjoints with a budget for checkpoints";
   if (options.checkpoint_states && options.checkpoint_bytes)
     user_error(asked, "a budget is a number of states or of bytes",
@@ -44,8 +46,8 @@ ir::CheckpointBudget budget_of(const AdjointOptions& options) {
   return {options.checkpoint_states.value_or(0), options.checkpoint_bytes.value_or(0)};
 }
 
-ir::VersionRules rules_of(const AdjointOptions& options) {
-  using Keep = ir::VersionRules::Keep;
+VersionRules rules_of(const AdjointOptions& options) {
+  using Keep = VersionRules::Keep;
   if (options.version_bytes < 0)
     user_error("propagate adjoints with a budget for versions", "a budget is a number of bytes",
                text("version_bytes is ", options.version_bytes), "Give 0 or more");
@@ -55,8 +57,8 @@ ir::VersionRules rules_of(const AdjointOptions& options) {
   return {keep, options.version_bytes};
 }
 
-ir::SynthesisOptions to_synthesis(const AdjointOptions& options) {
-  ir::SynthesisOptions result;
+SynthesisOptions to_synthesis(const AdjointOptions& options) {
+  SynthesisOptions result;
   result.versions = rules_of(options);
   result.only_requested = !options.wrt.empty();
   result.checkpoints = budget_of(options);
@@ -66,12 +68,12 @@ ir::SynthesisOptions to_synthesis(const AdjointOptions& options) {
 
 Expr seed_value(const Func& output, size_t k, const Expr& value) {
   Type type = output.types()[k];
-  return type.is_float() ? ir::cast_to(ir::adjoint_type(type), value) : Expr();
+  return type.is_float() ? cast_to(adjoint_type(type), value) : Expr();
 }
 
-Derivative run(const ir::Seed& seed, const AdjointOptions& options) {
-  const ir::SynthesisOptions how = to_synthesis(options);
-  auto result = std::make_shared<ir::SynthesisResult>(ir::synthesize_what_can_be(seed, how));
+Derivative run(const Seed& seed, const AdjointOptions& options) {
+  const SynthesisOptions how = to_synthesis(options);
+  auto result = std::make_shared<SynthesisResult>(synthesize_what_can_be(seed, how));
   for (const AdjointInput& input : options.wrt) result->requested.push_back(input.symbol());
   return Derivative(result);
 }
@@ -93,25 +95,25 @@ void check_dimensions(const Func& output, size_t bounds, int adjoint,
 
 }  // namespace
 
-Derivative::Derivative(std::shared_ptr<const ir::SynthesisResult> result)
+Derivative::Derivative(std::shared_ptr<const SynthesisResult> result)
     : result_(std::move(result)), zeros_(std::make_shared<ZeroGradients>()) {}
 
-Func Derivative::absent(const std::shared_ptr<const ir::Symbol>& symbol,
+Func Derivative::absent(const std::shared_ptr<const Symbol>& symbol,
                         const std::string& name) const {
   return Func(zeros_->find(symbol, name, result_->explanations));
 }
 
-bool Derivative::output_uses(const ir::FuncContents& f) const {
-  const std::vector<ir::FuncPtr> order = ir::topological_order({result_->output.func});
-  return std::ranges::any_of(order, [&](const ir::FuncPtr& used) { return used.get() == &f; });
+bool Derivative::output_uses(const FuncContents& f) const {
+  const std::vector<FuncPtr> order = topological_order({result_->output.func});
+  return std::ranges::any_of(order, [&](const FuncPtr& used) { return used.get() == &f; });
 }
 
 bool Derivative::has(const AdjointInput& input) const {
-  const ir::Symbol* symbol = input.symbol().get();
-  const auto* f = dynamic_cast<const ir::FuncContents*>(symbol);
+  const Symbol* symbol = input.symbol().get();
+  const auto* f = dynamic_cast<const FuncContents*>(symbol);
   if (!f) return result_->parameters.contains(symbol);
   if (result_->after_stage.contains({symbol, f->stage_count() - 1})) return true;
-  const auto image = ir::image_read_by(*f);
+  const auto image = image_read_by(*f);
   return image && result_->parameters.contains(image.get());
 }
 
@@ -126,10 +128,10 @@ Func Derivative::operator()(const Func& func, int update_id) const {
                text("it has ", func.num_update_definitions(), " updates, the first is 0"),
                "Name one of them, or -1 for the pure definition");
   }
-  const ir::FuncContents& f = *func.function();
+  const FuncContents& f = *func.function();
   auto it = result_->after_stage.find({&f, update_id + 1});
   if (it != result_->after_stage.end()) return Func(it->second);
-  const auto image = ir::image_read_by(f);
+  const auto image = image_read_by(f);
   return image && !output_uses(f) ? of_parameter(image) : absent(func.function(), f.name);
 }
 
@@ -143,11 +145,11 @@ Func Derivative::accumulator(const Func& adjoint) const {
 }
 
 Func Derivative::of(const AdjointInput& input) const {
-  if (auto f = std::dynamic_pointer_cast<ir::FuncContents>(input.symbol())) return adjoint(Func(f));
-  return of_parameter(std::dynamic_pointer_cast<const ir::ParameterContents>(input.symbol()));
+  if (auto f = std::dynamic_pointer_cast<FuncContents>(input.symbol())) return adjoint(Func(f));
+  return of_parameter(std::dynamic_pointer_cast<const ParameterContents>(input.symbol()));
 }
 
-Func Derivative::of_parameter(const std::shared_ptr<const ir::ParameterContents>& parameter) const {
+Func Derivative::of_parameter(const std::shared_ptr<const ParameterContents>& parameter) const {
   auto it = result_->parameters.find(parameter.get());
   return it == result_->parameters.end() ? absent(parameter, parameter->name) : Func(it->second);
 }
@@ -164,23 +166,23 @@ std::vector<Func> Derivative::funcs() const {
 
 std::vector<Explanation> Derivative::explanations() const {
   std::vector<Explanation> all = result_->explanations;
-  ir::append(all, zeros_->explanations());
+  append(all, zeros_->explanations());
   return all;
 }
 
 std::vector<Explanation> Derivative::costs() const {
   GradientOperations counts = operations();
-  return ir::explain_costs(result_->output, result_->gradients, counts.primal, counts.gradient);
+  return explain_costs(result_->output, result_->gradients, counts.primal, counts.gradient);
 }
 
 std::string Derivative::explain(Detail detail) const {
   std::vector<Explanation> all = explanations();
-  ir::append(all, costs());
+  append(all, costs());
   return to_string(all, detail);
 }
 
 GradientOperations Derivative::operations() const {
-  return {ir::count_operations({result_->output}), ir::count_operations(result_->gradients)};
+  return {count_operations({result_->output}), count_operations(result_->gradients)};
 }
 
 std::optional<double> GradientOperations::ratio() const {
@@ -203,11 +205,10 @@ Derivative propagate_adjoints(const Func& output, const Func& adjoint, const Reg
                     quoted(output.name()), " has ", output.outputs()),
                "Define it as a Tuple of as many values, zeros for what does not count");
   }
-  ir::Seed seed{output.function(), ir::box_of(output_bounds), {}};
+  Seed seed{output.function(), box_of(output_bounds), {}};
   for (size_t k = 0; k < output.types().size(); ++k) {
     seed.values.push_back(seed_value(
-        output, k,
-        adjoint(ir::variables_of(output.function()->args)).element(static_cast<int>(k))));
+        output, k, adjoint(variables_of(output.function()->args)).element(static_cast<int>(k))));
   }
   return run(seed, options);
 }
@@ -223,10 +224,10 @@ Derivative propagate_adjoints(const Func& output, const Buffer<float>& adjoint,
   Region region;
   for (int d = 0; d < adjoint.dimensions(); ++d)
     region.push_back({Expr(adjoint.min(d)), Expr(adjoint.extent(d))});
-  ir::Seed seed{output.function(), ir::box_of(region), {}};
+  Seed seed{output.function(), box_of(region), {}};
   auto parameter = adjoint.parameter();
-  Expr value = ir::call_image(parameter->name, parameter->type,
-                              ir::variables_of(output.function()->args), ir::SymbolRef(parameter));
+  Expr value = call_image(parameter->name, parameter->type, variables_of(output.function()->args),
+                          SymbolRef(parameter));
   for (size_t k = 0; k < output.types().size(); ++k)
     seed.values.push_back(seed_value(output, k, value));
   return run(seed, options);
@@ -246,8 +247,7 @@ Derivative propagate_adjoints(const Func& output, const AdjointOptions& options)
                "Sum its elements up in a Func without dimensions, as in loss() += f(r.x, r.y), or "
                "give the adjoint of each element: propagate_adjoints(f, adjoint, bounds)");
   }
-  return run({output.function(), {}, {seed_value(output, 0, ir::make_one(output.type()))}},
-             options);
+  return run({output.function(), {}, {seed_value(output, 0, make_one(output.type()))}}, options);
 }
 
 }  // namespace retrograde

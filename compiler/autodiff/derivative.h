@@ -25,7 +25,7 @@
 
 namespace retrograde {
 
-namespace ir {
+namespace autodiff {
 struct SynthesisResult;
 }
 
@@ -36,7 +36,7 @@ class ZeroGradients;
 // request: by all images and parameters), each as a pipeline of its own. What the gradients read of
 // the primal counts among theirs.
 struct GradientOperations {
-  ir::OperationCount primal, gradient;
+  autodiff::OperationCount primal, gradient;
   // gradient over primal; nothing where a count depends on extents known at run time only. The
   // cheap-gradient principle bounds it by a small constant, whatever the number of inputs.
   std::optional<double> ratio() const;
@@ -44,7 +44,7 @@ struct GradientOperations {
 
 class Derivative {
  public:
-  explicit Derivative(std::shared_ptr<const ir::SynthesisResult> result);
+  explicit Derivative(std::shared_ptr<const autodiff::SynthesisResult> result);
 
   // The adjoint of `func` as it is after update definition `update_id`; -1: after its pure
   // definition. For a Func that is only accumulated into, all of these are the same. A Func that
@@ -89,10 +89,10 @@ class Derivative {
   GradientOperations operations() const;
 
  private:
-  Func of_parameter(const std::shared_ptr<const ir::ParameterContents>& parameter) const;
+  Func of_parameter(const std::shared_ptr<const graph::ParameterContents>& parameter) const;
   Func absent(const std::shared_ptr<const ir::Symbol>& symbol, const std::string& name) const;
-  bool output_uses(const ir::FuncContents& f) const;
-  std::shared_ptr<const ir::SynthesisResult> result_;
+  bool output_uses(const graph::FuncContents& f) const;
+  std::shared_ptr<const autodiff::SynthesisResult> result_;
   std::shared_ptr<ZeroGradients> zeros_;  // that were looked up
 };
 
@@ -132,8 +132,8 @@ class AdjointInput {
 // depend on the values of the Func that it updates.
 struct AdjointOptions {
   Overwritten overwritten = Overwritten::Auto;
-  int64_t version_bytes = ir::default_version_bytes;  // 256 MiB; under Overwritten::Auto
-  std::vector<AdjointInput> wrt = {};                 // only these gradients are wanted; empty: all
+  int64_t version_bytes = autodiff::default_version_bytes;  // 256 MiB; under Overwritten::Auto
+  std::vector<AdjointInput> wrt = {};  // only these gradients are wanted; empty: all
   // A budget for loops over time: updates whose outermost reduction variable is time, run n times,
   // which overwrite values that their partials need. Instead of all n versions, a few states of the
   // Func are kept, and the steps between them are computed again: with s states the least number of

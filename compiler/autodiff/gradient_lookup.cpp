@@ -30,10 +30,10 @@ Facts facts_about(const std::string& name, const std::vector<Explanation>& all) 
 
 }  // namespace
 
-ir::FuncPtr ZeroGradients::find(const std::shared_ptr<const ir::Symbol>& symbol,
-                                const std::string& name, const std::vector<Explanation>& facts) {
+graph::FuncPtr ZeroGradients::find(const std::shared_ptr<const ir::Symbol>& symbol,
+                                   const std::string& name, const std::vector<Explanation>& facts) {
   const std::lock_guard lock(mutex_);
-  ir::FuncPtr& zero = zeros_[symbol];
+  graph::FuncPtr& zero = zeros_[symbol];
   if (zero) return zero;
   const Facts known = facts_about(name, facts);
   if (!known.is_zero) {
@@ -44,7 +44,7 @@ ir::FuncPtr ZeroGradients::find(const std::shared_ptr<const ir::Symbol>& symbol,
   if (known.text.empty()) {
     explanations_.push_back({Explanation::Kind::Zero, name, "the output does not depend on it"});
   }
-  return zero = ir::zero_derivative(*symbol, "_adj");
+  return zero = autodiff::zero_derivative(*symbol, "_adj");
 }
 
 std::vector<Explanation> ZeroGradients::explanations() const {
@@ -52,7 +52,7 @@ std::vector<Explanation> ZeroGradients::explanations() const {
   return explanations_;
 }
 
-namespace ir {
+namespace autodiff {
 
 std::shared_ptr<const ParameterContents> image_read_by(const FuncContents& f) {
   if (!f.is_pure() || f.is_extern() || f.types.size() != 1) return nullptr;
@@ -67,5 +67,5 @@ std::shared_ptr<const ParameterContents> image_read_by(const FuncContents& f) {
   return image;
 }
 
-}  // namespace ir
+}  // namespace autodiff
 }  // namespace retrograde

@@ -19,21 +19,21 @@ class ZeroGradients {
  public:
   // `facts`: what synthesis said.  CompileError when they say that there is a gradient which was
   // not built.
-  ir::FuncPtr find(const std::shared_ptr<const ir::Symbol>& symbol, const std::string& name,
-                   const std::vector<Explanation>& facts);
+  graph::FuncPtr find(const std::shared_ptr<const ir::Symbol>& symbol, const std::string& name,
+                      const std::vector<Explanation>& facts);
   std::vector<Explanation> explanations() const;
 
  private:
   mutable std::mutex mutex_;
   // Nothing else may hold what was looked up: the next one must not get its address.
-  std::map<std::shared_ptr<const ir::Symbol>, ir::FuncPtr> zeros_;
+  std::map<std::shared_ptr<const ir::Symbol>, graph::FuncPtr> zeros_;
   std::vector<Explanation> explanations_;
 };
 
-namespace ir {
+namespace autodiff {
 
 // The image that a Func reads point by point and does nothing else: f(x, y) = im(x, y); else null.
 std::shared_ptr<const ParameterContents> image_read_by(const FuncContents& f);
 
-}  // namespace ir
+}  // namespace autodiff
 }  // namespace retrograde

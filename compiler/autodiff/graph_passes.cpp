@@ -8,7 +8,7 @@
 #include "graph/copy_graph.h"
 #include "graph/wrappers.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 namespace {
 
@@ -48,4 +48,4 @@ const GraphPass* find_graph_pass(const std::string& name) {
   return found == all.end() ? nullptr : &*found;
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

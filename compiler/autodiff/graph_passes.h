@@ -6,7 +6,7 @@
 
 #include "graph/graph.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 struct GraphPass {
   const char* name;
@@ -16,4 +16,4 @@ struct GraphPass {
 const std::vector<GraphPass>& graph_passes();
 const GraphPass* find_graph_pass(const std::string& name);  // null when there is none
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

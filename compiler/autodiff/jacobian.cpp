@@ -14,7 +14,7 @@
 
 namespace retrograde {
 
-namespace ir {
+namespace autodiff {
 
 struct JacobianResult {
   std::string asked, explanation;
@@ -25,51 +25,45 @@ struct JacobianResult {
   Region band_offsets;
 };
 
-}  // namespace ir
+}  // namespace autodiff
 
 namespace {
 
-using ir::both;
-using ir::Compressed;
-using ir::direction;
-using ir::expressions;
-using ir::flat;
-using ir::variables;
+using namespace autodiff;
 
 // Zeros of the shape of an input or output: a seed to be replaced.
 Func placeholder(const std::string& name, int dimensions, Type type) {
   Func f(name);
   f(variables("x", static_cast<size_t>(dimensions))) =
-      ir::make_zero(type.is_float() ? type : Float(32));
+      make_zero(type.is_float() ? type : Float(32));
   return f;
 }
 
-ir::InputShape checked_input(const std::string& asked, const AdjointInput& input) {
-  ir::InputShape shape = ir::shape_of(input.symbol().get());
+InputShape checked_input(const std::string& asked, const AdjointInput& input) {
+  InputShape shape = shape_of(input.symbol().get());
   if (shape.types.empty()) {
     user_error(asked, "what to differentiate by must be defined",
                shape.name.empty() ? "it has no memory and no type"
                                   : quoted(shape.name) + " has no definition",
                "Define it first");
   }
-  ir::check_is_floating(asked, shape.types, quoted(shape.name) + " has type",
-                        "Convert it to float in a Func, and differentiate by that");
+  check_is_floating(asked, shape.types, quoted(shape.name) + " has type",
+                    "Convert it to float in a Func, and differentiate by that");
   return shape;
 }
 
 // Elements of the input that a region of the output depends on, and that exist; flat.
-ir::Box box_of_input(const Func& output, const ir::Box& region, const AdjointInput& input,
-                     const ir::InputShape& shape) {
-  ir::Regions regions(ir::topological_order({output.function()}), region);
-  ir::Box box = regions.of(input.symbol().get());
+Box box_of_input(const Func& output, const Box& region, const AdjointInput& input,
+                 const InputShape& shape) {
+  Regions regions(topological_order({output.function()}), region);
+  Box box = regions.of(input.symbol().get());
   box.resize(static_cast<size_t>(shape.dimensions));
-  auto p = std::dynamic_pointer_cast<ir::ParameterContents>(input.symbol());
+  auto p = std::dynamic_pointer_cast<ParameterContents>(input.symbol());
   if (!p || !p->is_literal || !p->buffer) return flat(box, shape);
   for (size_t d = 0; d < box.size(); ++d) {
     const halide_dimension_t& dim = p->buffer->dim[d];
-    ir::Interval own{ir::make_const(Int(32), dim.min),
-                     ir::make_const(Int(32), dim.min + dim.extent - 1)};
-    box[d] = ir::intersection(box[d], own);
+    Interval own{make_const(Int(32), dim.min), make_const(Int(32), dim.min + dim.extent - 1)};
+    box[d] = intersection(box[d], own);
   }
   return flat(box, shape);
 }
@@ -81,8 +75,8 @@ struct Candidate {
   bool by_rows = false;
 };
 
-Candidate by_columns(const Func& output, const AdjointInput& input, const ir::InputShape& shape,
-                     const ir::Box& rows, const ir::Box& columns) {
+Candidate by_columns(const Func& output, const AdjointInput& input, const InputShape& shape,
+                     const Box& rows, const Box& columns) {
   Func seed = placeholder(shape.name + "_seed", flat(shape).dimensions, flat(shape).types[0]);
   Func tangent = propagate_tangents(output, {{input, direction(seed, shape)}})(output);
   return {Compressed::make({.output = tangent.function(),
@@ -92,8 +86,8 @@ Candidate by_columns(const Func& output, const AdjointInput& input, const ir::In
           false};
 }
 
-Candidate by_rows(const Func& output, const AdjointInput& input, const ir::InputShape& shape,
-                  const ir::Box& rows, const ir::Box& columns, const Region& bounds,
+Candidate by_rows(const Func& output, const AdjointInput& input, const InputShape& shape,
+                  const Box& rows, const Box& columns, const Region& bounds,
                   Overwritten overwritten, int64_t most) {
   Func seed = placeholder(output.name() + "_seed", output.dimensions(), output.types()[0]);
   Func adjoint =
@@ -108,8 +102,8 @@ Candidate by_rows(const Func& output, const AdjointInput& input, const ir::Input
 }
 
 // Fewer colours; the other way where one is not possible.
-Candidate best(const Func& output, const AdjointInput& input, const ir::InputShape& shape,
-               const ir::Box& rows, const ir::Box& columns, const Region& bounds,
+Candidate best(const Func& output, const AdjointInput& input, const InputShape& shape,
+               const Box& rows, const Box& columns, const Region& bounds,
                const JacobianOptions& options) {
   Candidate result;
   if (options.compression == Compression::Rows)
@@ -148,7 +142,7 @@ struct Entries {
     const std::vector<Expr>& column = candidate.by_rows ? y : x;
     std::vector<Expr> values;
     for (size_t k = 0; k < types.size(); ++k) {
-      Expr zero = ir::make_zero(types[k]);
+      Expr zero = make_zero(types[k]);
       if (!all.defined()) {
         values.push_back(zero);
         continue;
@@ -169,7 +163,7 @@ void define(Func f, const std::vector<Var>& vars, const std::vector<Expr>& value
   }
 }
 
-void make_band(ir::JacobianResult& result, const Entries& entries, size_t dims,
+void make_band(JacobianResult& result, const Entries& entries, size_t dims,
                const std::string& name) {
   auto offsets = entries.candidate.compressed->offsets();
   if (!offsets) return;
@@ -186,16 +180,16 @@ void make_band(ir::JacobianResult& result, const Entries& entries, size_t dims,
   define(result.band, both(y, k), entries.at(expressions(y), x));
 }
 
-std::shared_ptr<ir::JacobianResult> result_of(const std::string& asked, const Candidate& candidate,
-                                              const std::vector<Type>& types, int output_dims,
-                                              int input_dims, const std::string& name) {
-  auto result = std::make_shared<ir::JacobianResult>();
+std::shared_ptr<JacobianResult> result_of(const std::string& asked, const Candidate& candidate,
+                                          const std::vector<Type>& types, int output_dims,
+                                          int input_dims, const std::string& name) {
+  auto result = std::make_shared<JacobianResult>();
   result->asked = asked;
   result->by_rows = candidate.by_rows;
   result->colours = candidate.compressed->colours();
   result->coloured_dimensions = static_cast<size_t>(candidate.by_rows ? output_dims : input_dims);
-  ir::FuncPtr all = candidate.compressed->evaluate();
-  Entries entries{candidate, all ? Func(all) : Func(std::make_shared<ir::FuncContents>()), types};
+  FuncPtr all = candidate.compressed->evaluate();
+  Entries entries{candidate, all ? Func(all) : Func(std::make_shared<FuncContents>()), types};
   result->compressed = entries.all;
   std::vector<Var> y = variables("y", static_cast<size_t>(output_dims)),
                    x = variables("x", static_cast<size_t>(input_dims));
@@ -210,17 +204,15 @@ std::shared_ptr<ir::JacobianResult> result_of(const std::string& asked, const Ca
   return result;
 }
 
-std::vector<Type> derivative_types(const Func& f) {
-  return ir::mapped(f.types(), ir::adjoint_type);
-}
+std::vector<Type> derivative_types(const Func& f) { return mapped(f.types(), adjoint_type); }
 
 // ---- second derivatives ----
 
 // The gradient by one input, and how it moves along a seed of another.
 struct SecondOrder {
   Func gradient, seed, moved;
-  ir::InputShape row_shape, column_shape;  // flat
-  ir::Box rows, columns;
+  InputShape row_shape, column_shape;  // flat
+  Box rows, columns;
 };
 SecondOrder second_order(const std::string& asked, const Func& loss, const AdjointInput& rows,
                          const AdjointInput& columns, Overwritten overwritten) {
@@ -238,7 +230,7 @@ SecondOrder second_order(const std::string& asked, const Func& loss, const Adjoi
                        flat(s.column_shape).types[0]);
   s.moved =
       propagate_tangents(s.gradient, {{columns, direction(s.seed, s.column_shape)}})(s.gradient);
-  ir::Box point(static_cast<size_t>(loss.dimensions()), ir::Interval::point(Expr(0)));
+  Box point(static_cast<size_t>(loss.dimensions()), Interval::point(Expr(0)));
   s.rows = box_of_input(loss, point, rows, s.row_shape);
   s.columns = box_of_input(loss, point, columns, s.column_shape);
   s.row_shape = flat(s.row_shape);
@@ -250,16 +242,16 @@ SecondOrder second_order(const std::string& asked, const Func& loss, const Adjoi
 // rules or stop_gradient stand for derivatives.
 bool is_a_gradient(const Func& loss) {
   bool result = true;
-  for (const ir::FuncPtr& f : ir::topological_order({loss.function()})) {
+  for (const FuncPtr& f : topological_order({loss.function()})) {
     result &= f->custom_derivatives == nullptr;
-    walk(*f, [&](const ir::Call& call) { result &= !call.is_op(ir::Op::stop_gradient); });
+    walk(*f, [&](const Call& call) { result &= !call.is_op(Op::stop_gradient); });
   }
   return result;
 }
 
 }  // namespace
 
-Jacobian::Jacobian(std::shared_ptr<const ir::JacobianResult> result) : result_(std::move(result)) {}
+Jacobian::Jacobian(std::shared_ptr<const JacobianResult> result) : result_(std::move(result)) {}
 
 int Jacobian::colours() const { return static_cast<int>(result_->colours.count()); }
 bool Jacobian::by_rows() const { return result_->by_rows; }
@@ -291,7 +283,7 @@ std::string Jacobian::explain() const { return result_->explanation; }
 Jacobian jacobian(const Func& output, const AdjointInput& input, const Region& output_bounds,
                   const JacobianOptions& options) {
   std::string asked = "make the Jacobian of " + quoted(output.name());
-  if (!output.defined() || !ir::is_floating(output.types())) {
+  if (!output.defined() || !is_floating(output.types())) {
     user_error(
         asked, "only floating-point values that are defined have derivatives",
         output.defined() ? "its type is " + to_string(output.types()[0]) : "it has no definition",
@@ -307,8 +299,8 @@ Jacobian jacobian(const Func& output, const AdjointInput& input, const Region& o
     unsupported(asked, "rows are compressed of an output of one value",
                 text("it has ", output.outputs()), "Use Compression::Columns");
   }
-  ir::InputShape shape = checked_input(asked, input);
-  ir::Box rows = ir::box_of(output_bounds), columns = box_of_input(output, rows, input, shape);
+  InputShape shape = checked_input(asked, input);
+  Box rows = box_of(output_bounds), columns = box_of_input(output, rows, input, shape);
   Candidate candidate = best(output, input, shape, rows, columns, output_bounds, options);
   RETROGRADE_ASSERT(candidate.compressed, "a Jacobian without colours");
   return Jacobian(result_of(asked, candidate, derivative_types(output), output.dimensions(),
@@ -347,14 +339,14 @@ HessianDiagonal hessian_diagonal(const Func& loss, const AdjointInput& wrt,
                                       .diagonal_only = true});
   HessianDiagonal result;
   result.colours = static_cast<int>(compressed->colours().count());
-  ir::FuncPtr all = compressed->evaluate();
-  result.compressed = all ? Func(all) : Func(std::make_shared<ir::FuncContents>());
+  FuncPtr all = compressed->evaluate();
+  result.compressed = all ? Func(all) : Func(std::make_shared<FuncContents>());
   result.diagonal = Func(loss.name() + "_hessian_diagonal");
   std::vector<Var> x = variables("x", static_cast<size_t>(s.row_shape.dimensions));
   std::vector<Expr> place = expressions(x);
   place.push_back(compressed->colours().of(expressions(x)));
   result.diagonal(x) =
-      all ? Expr(result.compressed(place)) : ir::make_zero(derivative_types(s.gradient)[0]);
+      all ? Expr(result.compressed(place)) : make_zero(derivative_types(s.gradient)[0]);
   return result;
 }
 

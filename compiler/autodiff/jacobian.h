@@ -20,7 +20,7 @@
 
 namespace retrograde {
 
-namespace ir {
+namespace autodiff {
 struct JacobianResult;
 }
 
@@ -35,7 +35,7 @@ struct JacobianOptions {
 
 class Jacobian {
  public:
-  explicit Jacobian(std::shared_ptr<const ir::JacobianResult> result);
+  explicit Jacobian(std::shared_ptr<const autodiff::JacobianResult> result);
 
   // How many products are evaluated.
   int colours() const;
@@ -57,7 +57,7 @@ class Jacobian {
   std::string explain() const;
 
  private:
-  std::shared_ptr<const ir::JacobianResult> result_;
+  std::shared_ptr<const autodiff::JacobianResult> result_;
 };
 
 // Of `output` over output_bounds (min and extent in each dimension) by an input. One of several

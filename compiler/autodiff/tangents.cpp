@@ -10,6 +10,8 @@ namespace retrograde {
 
 namespace {
 
+using namespace autodiff;
+
 std::string asked_of_tangents(const Func& output) {
   return "propagate tangents to " + quoted(output.name());
 }
@@ -19,12 +21,12 @@ void check_moves(const Func& output) {
     user_error(asked_of_tangents(output), "the output must be defined", "it has no definition",
                "Define it first");
   }
-  ir::check_is_floating(asked_of_tangents(output), output.types(), "its type is",
-                        "Convert it to float");
+  check_is_floating(asked_of_tangents(output), output.types(), "its type is",
+                    "Convert it to float");
 }
 
-ir::InputShape shape_of(const Func& output, const ir::Symbol* symbol) {
-  ir::InputShape shape = ir::shape_of(symbol);
+InputShape shape_of(const Func& output, const Symbol* symbol) {
+  InputShape shape = autodiff::shape_of(symbol);
   if (shape.types.empty()) {
     user_error(asked_of_tangents(output), "what moves must be defined",
                shape.name.empty() ? "an input has no memory and no type"
@@ -34,13 +36,12 @@ ir::InputShape shape_of(const Func& output, const ir::Symbol* symbol) {
   return shape;
 }
 
-void check_direction(const Func& output, const ir::InputShape& shape, const Func& tangent) {
+void check_direction(const Func& output, const InputShape& shape, const Func& tangent) {
   if (tangent.defined()) {
-    ir::check_is_floating(asked_of_tangents(output), shape.types, quoted(shape.name) + " has type",
-                          "Convert it to float in a Func, and give that a direction");
+    check_is_floating(asked_of_tangents(output), shape.types, quoted(shape.name) + " has type",
+                      "Convert it to float in a Func, and give that a direction");
   }
-  ir::check_shape(asked_of_tangents(output), "a direction", "what moves", shape,
-                  *tangent.function());
+  check_shape(asked_of_tangents(output), "a direction", "what moves", shape, *tangent.function());
 }
 
 }  // namespace
@@ -58,18 +59,18 @@ Func Direction::as_func(const Buffer<>& buffer) {
     args.emplace_back(vars.back());
   }
   auto parameter = buffer.parameter();
-  f(vars) = ir::call_image(parameter->name, parameter->type, args, ir::SymbolRef(parameter));
+  f(vars) = call_image(parameter->name, parameter->type, args, SymbolRef(parameter));
   return f;
 }
 
-Tangents::Tangents(std::shared_ptr<const ir::TangentResult> result) : result_(std::move(result)) {}
+Tangents::Tangents(std::shared_ptr<const TangentResult> result) : result_(std::move(result)) {}
 
 Func Tangents::operator()(const Func& func) const {
   const auto& order = result_->order;
   if (std::ranges::find(order, func.function()) == order.end())
-    return Func(std::make_shared<ir::FuncContents>());
+    return Func(std::make_shared<FuncContents>());
   auto found = result_->tangents.find(func.function().get());
-  return found == result_->tangents.end() ? Func(ir::zero_tangent(*func.function()))
+  return found == result_->tangents.end() ? Func(zero_tangent(*func.function()))
                                           : Func(found->second);
 }
 
@@ -83,10 +84,10 @@ Tangents propagate_tangents(const Func& output, const std::vector<Direction>& di
     user_error(asked_of_tangents(output), "something has to move", "there is no direction",
                "Give each input that moves with its direction");
   }
-  ir::Directions by_symbol;
+  Directions by_symbol;
   for (const Direction& d : directions) {
-    const ir::Symbol* symbol = d.input.symbol().get();
-    ir::InputShape shape = shape_of(output, symbol);
+    const Symbol* symbol = d.input.symbol().get();
+    InputShape shape = shape_of(output, symbol);
     check_direction(output, shape, d.tangent);
     if (!by_symbol.emplace(symbol, d.tangent.function()).second) {
       user_error(asked_of_tangents(output), "each input has one direction",
@@ -94,7 +95,7 @@ Tangents propagate_tangents(const Func& output, const std::vector<Direction>& di
     }
   }
   return Tangents(
-      std::make_shared<ir::TangentResult>(ir::synthesize_tangents(output.function(), by_symbol)));
+      std::make_shared<TangentResult>(synthesize_tangents(output.function(), by_symbol)));
 }
 
 }  // namespace retrograde

@@ -19,7 +19,7 @@
 
 namespace retrograde {
 
-namespace ir {
+namespace autodiff {
 struct TangentResult;
 }
 
@@ -43,7 +43,7 @@ struct Direction {
 
 class Tangents {
  public:
-  explicit Tangents(std::shared_ptr<const ir::TangentResult> result);
+  explicit Tangents(std::shared_ptr<const autodiff::TangentResult> result);
 
   // The derivative of `func` along the directions: its dimensions; a value for each of its values,
   // float32 where that is narrower or an integer (whose tangent is 0). Zero everywhere when nothing
@@ -59,7 +59,7 @@ class Tangents {
   }
 
  private:
-  std::shared_ptr<const ir::TangentResult> result_;
+  std::shared_ptr<const autodiff::TangentResult> result_;
 };
 
 // The tangents of `output` and of everything between it and the directions.

@@ -10,7 +10,7 @@
 #include "graph/schedule_log.h"
 #include "graph/wrappers.h"
 
-namespace retrograde::ir {
+namespace retrograde::autoschedule {
 
 namespace {
 
@@ -35,4 +35,4 @@ void schedule_all(const Pipeline& pipeline, const Target& target, const MachineP
 
 }  // namespace
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autoschedule

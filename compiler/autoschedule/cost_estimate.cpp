@@ -5,7 +5,7 @@
 #include "ir/build.h"
 #include "ir/visit.h"
 
-namespace retrograde::ir {
+namespace retrograde::autoschedule {
 
 Work work_of(const Expr& node) {
   bool floating = node.type().is_float();
@@ -36,4 +36,4 @@ double operations_of(const Expr& node) {
   return std::max(work.adds, work.mults) + work.function_adds + (divides(node) ? 4 : 0);
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autoschedule

@@ -4,7 +4,7 @@
 
 #include "ir/expr.h"
 
-namespace retrograde::ir {
+namespace retrograde::autoschedule {
 
 // Operations up to which a value is computed again rather than stored.
 inline constexpr double cheap = 6;
@@ -21,4 +21,4 @@ Work work_of(const Expr& node);
 // each, and comparisons with the choice that they decide.
 double operations_of(const Expr& node);
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autoschedule

@@ -14,7 +14,7 @@
 #include "ir/visit.h"
 #include "simplify/simplify.h"
 
-namespace retrograde::ir {
+namespace retrograde::autoschedule {
 
 namespace {
 
@@ -101,7 +101,7 @@ void cut(const FuncPtr& f, int stage) {
   factor(update, lane, row);
   update.split(row, row, group, groups, TailStrategy::GuardWithIf);
   factor(update, lane, group);
-  if (f->schedule.compute_level.kind == LoopLevel::Kind::Inlined) Func(f).compute_root();
+  if (f->schedule.compute_level.kind == graph::LoopLevel::Kind::Inlined) Func(f).compute_root();
 }
 
 }  // namespace
@@ -116,4 +116,4 @@ void cut_reductions(const std::vector<FuncPtr>& outputs, const SizeEstimate& siz
   }
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autoschedule

@@ -16,11 +16,11 @@
 #include "autoschedule/size_estimate.h"
 #include "graph/function.h"
 
-namespace retrograde::ir {
+namespace retrograde::autoschedule {
 
 // Factors long associative updates of one element, or of a number that is known to be small
 // (rfactor.h), of Funcs of this graph that nobody scheduled. `but`: not of these.
 void cut_reductions(const std::vector<FuncPtr>& outputs, const SizeEstimate& sizes,
                     const std::unordered_set<const Symbol*>& but = {});
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autoschedule

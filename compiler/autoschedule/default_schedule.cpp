@@ -31,7 +31,7 @@
 #include "ir/memory_reads.h"
 #include "ir/visit.h"
 
-namespace retrograde::ir {
+namespace retrograde::autoschedule {
 
 namespace {
 
@@ -339,7 +339,7 @@ void give_default_schedule(const std::vector<FuncPtr>& outputs, const VectorUnit
   join_sweeps(outputs, given, sizes);
   for (const FuncPtr& f : order) {  // so that the log tells of every Func
     const bool is_output = std::find(outputs.begin(), outputs.end(), f) != outputs.end();
-    const bool is_inlined = f->schedule.compute_level.kind == LoopLevel::Kind::Inlined;
+    const bool is_inlined = f->schedule.compute_level.kind == graph::LoopLevel::Kind::Inlined;
     if (is_inlined && !is_touched(*f) && f->is_pure() && !is_output) Func(f).compute_inline();
   }
 }
@@ -360,4 +360,4 @@ std::vector<FuncPtr> schedule_unscheduled(const std::vector<FuncPtr>& outputs,
   return result;
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autoschedule

@@ -15,7 +15,7 @@
 #include "autoschedule/register_tile.h"
 #include "graph/function.h"
 
-namespace retrograde::ir {
+namespace retrograde::autoschedule {
 
 // Of which Funcs of a graph: adjoints and what is computed with them, or all.
 enum class Scheduling : uint8_t { Gradients, Everything };
@@ -29,4 +29,4 @@ void give_default_schedule(const std::vector<FuncPtr>& outputs, const VectorUnit
 std::vector<FuncPtr> schedule_unscheduled(const std::vector<FuncPtr>& outputs,
                                           const VectorUnit& unit = {});
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autoschedule

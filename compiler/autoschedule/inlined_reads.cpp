@@ -7,7 +7,7 @@
 #include "ir/lets.h"
 #include "ir/visit.h"
 
-namespace retrograde::ir {
+namespace retrograde::autoschedule {
 
 namespace {
 
@@ -46,7 +46,7 @@ class Inliner {
 
 bool is_computed_inline(const FuncPtr& f, const std::vector<FuncPtr>& stored) {
   return f->is_pure() && !f->is_extern() &&
-         f->schedule.compute_level.kind == LoopLevel::Kind::Inlined &&
+         f->schedule.compute_level.kind == graph::LoopLevel::Kind::Inlined &&
          std::find(stored.begin(), stored.end(), f) == stored.end();
 }
 
@@ -57,4 +57,4 @@ std::vector<Expr> roots_with_inlined(const Definition& stage, const std::vector<
   return roots;
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autoschedule

@@ -5,7 +5,7 @@
 
 #include "graph/function.h"
 
-namespace retrograde::ir {
+namespace retrograde::autoschedule {
 
 // Whether readers of f compute it themselves. `stored`: those that will be at root, whether they are
 // scheduled yet or not.
@@ -16,4 +16,4 @@ bool is_computed_inline(const FuncPtr& f, const std::vector<FuncPtr>& stored);
 std::vector<Expr> roots_with_inlined(const Definition& stage,
                                      const std::vector<FuncPtr>& stored = {});
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autoschedule

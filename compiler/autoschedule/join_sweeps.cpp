@@ -14,7 +14,7 @@
 #include "ir/memory_reads.h"
 #include "ir/visit.h"
 
-namespace retrograde::ir {
+namespace retrograde::autoschedule {
 
 namespace {
 
@@ -123,7 +123,7 @@ void join_sweeps(const std::vector<FuncPtr>& outputs, const std::vector<FuncPtr>
   for (const FuncPtr& f : topological_order(outputs)) hosts.insert(f->schedule.compute_level.func);
   std::vector<Sweep> sweeps;
   for (const FuncPtr& f : funcs) {
-    const bool is_at_root = f->schedule.compute_level.kind == LoopLevel::Kind::Root;
+    const bool is_at_root = f->schedule.compute_level.kind == graph::LoopLevel::Kind::Root;
     if (!is_at_root || hosts.contains(f->name)) continue;
     if (f->stage_count() != 2 || f->updates[0].rvars.empty()) continue;
     Sweep sweep{f, 1, looked_up_in(*f, f->updates[0], sizes)};
@@ -143,4 +143,4 @@ void join_sweeps(const std::vector<FuncPtr>& outputs, const std::vector<FuncPtr>
   }
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autoschedule

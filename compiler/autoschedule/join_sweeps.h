@@ -13,11 +13,11 @@
 #include "autoschedule/size_estimate.h"
 #include "graph/function.h"
 
-namespace retrograde::ir {
+namespace retrograde::autoschedule {
 
 // Of those of the Funcs, all of which this scheduler has given loops, that are at root and have
 // nothing computed in their loops. Producers first.
 void join_sweeps(const std::vector<FuncPtr>& outputs, const std::vector<FuncPtr>& funcs,
                  const SizeEstimate& sizes);
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autoschedule

@@ -8,7 +8,7 @@
 #include "graph/give_directive.h"
 #include "graph/inlined_size.h"
 
-namespace retrograde::ir {
+namespace retrograde::autoschedule {
 
 namespace {
 
@@ -38,7 +38,7 @@ std::vector<FuncPtr> large_bodies(const std::vector<FuncPtr>& outputs,
   std::vector<FuncPtr> result;
   for (const FuncPtr& f : order) {
     const bool is_inlined = f->is_pure() && !has_place.contains(f.get()) &&
-                            f->schedule.compute_level.kind == LoopLevel::Kind::Inlined;
+                            f->schedule.compute_level.kind == graph::LoopLevel::Kind::Inlined;
     if (!is_inlined) continue;
     const double nodes = sizes.nodes(*f);
     if (nodes > most_nodes && reads[f.get()] > 1 && can_move(f))
@@ -49,4 +49,4 @@ std::vector<FuncPtr> large_bodies(const std::vector<FuncPtr>& outputs,
   return result;
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autoschedule

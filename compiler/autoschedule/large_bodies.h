@@ -11,11 +11,11 @@
 
 #include "graph/function.h"
 
-namespace retrograde::ir {
+namespace retrograde::autoschedule {
 
 // Which, beside those that are `stored` anyway: untouched, with bounds that are known without
 // running, no loops around them.
 std::vector<FuncPtr> large_bodies(const std::vector<FuncPtr>& outputs,
                                   const std::vector<FuncPtr>& stored);
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autoschedule

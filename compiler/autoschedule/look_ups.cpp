@@ -13,7 +13,7 @@
 #include "ir/memory_reads.h"
 #include "ir/visit.h"
 
-namespace retrograde::ir {
+namespace retrograde::autoschedule {
 
 namespace {
 
@@ -166,4 +166,4 @@ bool schedule_look_ups(const FuncContents& f, int index, Stage& stage, int lanes
   return true;
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autoschedule

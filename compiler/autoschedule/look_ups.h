@@ -15,11 +15,11 @@
 #include "frontend/schedule/stage.h"
 #include "graph/function.h"
 
-namespace retrograde::ir {
+namespace retrograde::autoschedule {
 
 // Gives the stage its loops, with so many lanes along its first dimension; false: it is none of
 // these.
 bool schedule_look_ups(const FuncContents& f, int index, Stage& stage, int lanes,
                        const SizeEstimate& sizes);
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autoschedule

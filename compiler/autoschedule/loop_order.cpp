@@ -8,7 +8,7 @@
 #include "graph/own_reads.h"
 #include "ir/visit.h"
 
-namespace retrograde::ir {
+namespace retrograde::autoschedule {
 
 namespace {
 
@@ -62,4 +62,4 @@ bool shifts_reads(const FuncContents& f, const Definition& update, size_t dimens
   return shifts;
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autoschedule

@@ -5,7 +5,7 @@
 
 #include "graph/function.h"
 
-namespace retrograde::ir {
+namespace retrograde::autoschedule {
 
 // The reduction variables of an update, innermost first: those that move along rows of what is read
 // inside of those that move from row to row or from plane to plane; otherwise as they stand. Only
@@ -16,4 +16,4 @@ std::vector<ReductionVariable> reduction_loops(const FuncContents& f, const Defi
 // has the dimension and another variable, such as the pixel and the tap of a stencil.
 bool shifts_reads(const FuncContents& f, const Definition& update, size_t dimension);
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autoschedule

@@ -4,7 +4,7 @@
 
 #include "graph/names.h"
 
-namespace retrograde::ir {
+namespace retrograde::autoschedule {
 
 std::string new_loop(const FuncContents& f, int stage, std::string wanted) {
   const std::vector<Dim>& loops = f.stage(stage).schedule.dims;
@@ -27,4 +27,4 @@ void vectorize(Stage stage, const VarOrRVar& loop, int lanes, TailStrategy tail)
   stage.split(loop, loop, inner, lanes, tail).vectorize(inner);
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autoschedule

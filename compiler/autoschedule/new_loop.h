@@ -7,7 +7,7 @@
 #include "frontend/schedule/stage.h"
 #include "graph/function.h"
 
-namespace retrograde::ir {
+namespace retrograde::autoschedule {
 
 // `wanted`, with more behind it where that is a loop of the stage or a variable of the Func.
 std::string new_loop(const FuncContents& f, int stage, std::string wanted);
@@ -16,4 +16,4 @@ std::string inner_loop(const FuncContents& f, int stage, const std::string& spli
 // stage.vectorize(loop, lanes, tail), where the new loop is called so.
 void vectorize(Stage stage, const VarOrRVar& loop, int lanes, TailStrategy tail);
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autoschedule

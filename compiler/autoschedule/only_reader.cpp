@@ -5,7 +5,7 @@
 #include "graph/own_reads.h"
 #include "ir/visit.h"
 
-namespace retrograde::ir {
+namespace retrograde::autoschedule {
 
 Readers::Readers(const std::vector<FuncPtr>& outputs, const std::vector<FuncPtr>& stored) {
   for (const FuncPtr& f : outputs) outputs_.insert(f.get());
@@ -13,8 +13,8 @@ Readers::Readers(const std::vector<FuncPtr>& outputs, const std::vector<FuncPtr>
   for (const FuncPtr& f : topological_order(outputs)) {
     for (const FuncPtr& callee : direct_callees(*f)) readers_[callee.get()].push_back(f);
     const bool is_block = f->made && f->made->blocks > 0;  // see default_schedule.cpp
-    for (const LoopLevel& level : {f->schedule.compute_level, f->schedule.store_level}) {
-      if (level.kind == LoopLevel::Kind::At && !is_block) hosts_.insert(level.func);
+    for (const graph::LoopLevel& level : {f->schedule.compute_level, f->schedule.store_level}) {
+      if (level.kind == graph::LoopLevel::Kind::At && !is_block) hosts_.insert(level.func);
     }
   }
 }
@@ -46,4 +46,4 @@ bool is_split(const Definition& stage, const std::string& var) {
   });
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autoschedule

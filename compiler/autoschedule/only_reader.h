@@ -10,7 +10,7 @@
 
 #include "graph/function.h"
 
-namespace retrograde::ir {
+namespace retrograde::autoschedule {
 
 // The only stage that reads a Func.
 struct Reader {
@@ -42,4 +42,4 @@ class Readers {
 // Whether a loop of the stage was split, or comes from a split.
 bool is_split(const Definition& stage, const std::string& var);
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autoschedule

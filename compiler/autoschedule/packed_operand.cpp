@@ -14,7 +14,7 @@
 #include "ir/visit.h"
 #include "simplify/simplify.h"
 
-namespace retrograde::ir {
+namespace retrograde::autoschedule {
 
 namespace {
 
@@ -156,7 +156,7 @@ class Candidate {
 FuncPtr source_of(const Call& call, const FuncContents& f) {
   const FuncPtr source = call.call_type == CallType::Func ? func_of(call) : nullptr;
   if (!source || source.get() == &f || source->is_extern()) return nullptr;
-  return source->schedule.compute_level.kind == LoopLevel::Kind::At ? nullptr : source;
+  return source->schedule.compute_level.kind == graph::LoopLevel::Kind::At ? nullptr : source;
 }
 
 }  // namespace
@@ -186,4 +186,4 @@ void pack(const FuncPtr& f, const PackedOperand& operand, const Var& loop, int l
   vectorize(Stage(copy.function(), 0), copy.args()[0], lanes, TailStrategy::GuardWithIf);
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autoschedule

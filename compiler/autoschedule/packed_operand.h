@@ -19,7 +19,7 @@
 #include "autoschedule/register_tile.h"
 #include "frontend/language/func.h"
 
-namespace retrograde::ir {
+namespace retrograde::autoschedule {
 
 struct PackedOperand {
   FuncPtr source;
@@ -33,4 +33,4 @@ std::optional<PackedOperand> packed_operand(const FuncContents& f, const Definit
 // For each iteration of a loop of f, inside of which only dimensions run that do not move it.
 void pack(const FuncPtr& f, const PackedOperand& operand, const Var& loop, int lanes);
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autoschedule

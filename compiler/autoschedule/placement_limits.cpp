@@ -11,7 +11,7 @@
 #include "ir/build.h"
 #include "ir/lets.h"
 
-namespace retrograde::ir {
+namespace retrograde::autoschedule {
 
 namespace {
 
@@ -63,7 +63,7 @@ class KnownRegions {
   std::unordered_map<const Symbol*, std::vector<bool>> known_;
 };
 
-bool is_loop(const LoopLevel& level) { return level.kind == LoopLevel::Kind::At; }
+bool is_loop(const graph::LoopLevel& level) { return level.kind == graph::LoopLevel::Kind::At; }
 
 // The Funcs inside of whose loops something is computed that each Func reads, itself aside.
 std::unordered_map<const Symbol*, std::set<std::string>> levels_read(
@@ -72,9 +72,9 @@ std::unordered_map<const Symbol*, std::set<std::string>> levels_read(
   for (const FuncPtr& f : order) {
     std::set<std::string>& levels = result[f.get()];
     for (const FuncPtr& callee : direct_callees(*f)) {
-      const LoopLevel& at = callee->schedule.compute_level;
+      const graph::LoopLevel& at = callee->schedule.compute_level;
       if (is_loop(at)) levels.insert(at.func);
-      if (at.kind != LoopLevel::Kind::Inlined) continue;
+      if (at.kind != graph::LoopLevel::Kind::Inlined) continue;
       const std::set<std::string>& inside = result[callee.get()];
       levels.insert(inside.begin(), inside.end());
     }
@@ -91,12 +91,12 @@ PlacementLimits placement_limits(const std::vector<FuncPtr>& order) {
   for (const FuncPtr& f : order) by_name[f->name] = f.get();
   const KnownRegions regions(order);
   const auto levels = levels_read(order);
-  const auto note = [&](const LoopLevel& level, std::unordered_set<const Symbol*>& where) {
+  const auto note = [&](const graph::LoopLevel& level, std::unordered_set<const Symbol*>& where) {
     if (is_loop(level) && by_name.count(level.func)) where.insert(by_name[level.func]);
   };
   for (const FuncPtr& f : order) {
     if (!regions.are_known(*f) || !levels.at(f.get()).empty()) limits.stay.insert(f.get());
-    for (const LoopLevel& level :
+    for (const graph::LoopLevel& level :
          {f->schedule.compute_level, f->schedule.store_level, f->schedule.hoist_level})
       note(level, limits.levels);
     // Their loops run as one.
@@ -109,4 +109,4 @@ PlacementLimits placement_limits(const std::vector<FuncPtr>& order) {
   return limits;
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autoschedule

@@ -7,7 +7,7 @@
 
 #include "graph/function.h"
 
-namespace retrograde::ir {
+namespace retrograde::autoschedule {
 
 struct PlacementLimits {
   // At root they would be computed over a region without bounds, or would read what is computed
@@ -20,4 +20,4 @@ struct PlacementLimits {
 // `order`: producers before consumers.
 PlacementLimits placement_limits(const std::vector<FuncPtr>& order);
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autoschedule

@@ -13,7 +13,7 @@
 #include "ir/visit.h"
 #include "simplify/simplify.h"
 
-namespace retrograde::ir {
+namespace retrograde::autoschedule {
 
 namespace {
 
@@ -127,4 +127,4 @@ Expr unclamped(const Expr& e, const std::function<bool(const Expr&)>& moves) {
   return moves(n->a) ? e : unclamped(n->b, moves);
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autoschedule

@@ -6,7 +6,7 @@
 
 #include "graph/function.h"
 
-namespace retrograde::ir {
+namespace retrograde::autoschedule {
 
 // `reader` has the stage. A guess where data decide the place, or extents are known at run time
 // only.
@@ -15,4 +15,4 @@ double reads_an_element(const Call& call, const FuncContents& reader, const Defi
 // An index, or the terms of one, without markers and without clamps to what does not move.
 Expr unclamped(const Expr& e, const std::function<bool(const Expr&)>& moves);
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autoschedule

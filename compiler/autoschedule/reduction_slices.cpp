@@ -18,7 +18,7 @@
 #include "ir/lets.h"
 #include "simplify/simplify.h"
 
-namespace retrograde::ir {
+namespace retrograde::autoschedule {
 
 namespace {
 
@@ -175,8 +175,9 @@ void cut_into_strips(const Reader& reader, const Move& move) {
 // own.
 void run_serially(const FuncPtr& f, const std::vector<FuncPtr>& stored) {
   for (const FuncPtr& inner : stored) {
-    const ir::LoopLevel& level = inner->schedule.compute_level;
-    if (level.kind == LoopLevel::Kind::At && level.func == f->name) run_serially(inner, stored);
+    const graph::LoopLevel& level = inner->schedule.compute_level;
+    if (level.kind == graph::LoopLevel::Kind::At && level.func == f->name)
+      run_serially(inner, stored);
   }
   for (int s = 0; s < f->stage_count(); ++s) {
     const std::vector<Dim> loops = f->stage(s).schedule.dims;
@@ -193,7 +194,7 @@ void compute_in_reductions(const Readers& readers, const std::vector<FuncPtr>& s
                            const std::unordered_set<const Symbol*>& but,
                            const SizeEstimate& sizes) {
   const auto is_at_root = [](const FuncPtr& f) {
-    return f->schedule.compute_level.kind == LoopLevel::Kind::Root;
+    return f->schedule.compute_level.kind == graph::LoopLevel::Kind::Root;
   };
   const auto may_move = [&](const FuncPtr& f) {
     const bool is_partial = f->made && (f->made->lanes > 0 || f->made->has_parts);
@@ -217,4 +218,4 @@ void compute_in_reductions(const Readers& readers, const std::vector<FuncPtr>& s
   }
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autoschedule

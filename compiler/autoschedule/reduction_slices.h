@@ -19,11 +19,11 @@
 #include "autoschedule/size_estimate.h"
 #include "graph/function.h"
 
-namespace retrograde::ir {
+namespace retrograde::autoschedule {
 
 // Of the Funcs, all of which this scheduler has given loops, those at root that are larger than
 // caches and have one reader, which is one of them. `but`: none of these, as a reader neither.
 void compute_in_reductions(const Readers& readers, const std::vector<FuncPtr>& stored,
                            const std::unordered_set<const Symbol*>& but, const SizeEstimate& sizes);
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autoschedule

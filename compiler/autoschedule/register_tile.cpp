@@ -8,7 +8,7 @@
 #include "ir/build.h"
 #include "ir/visit.h"
 
-namespace retrograde::ir {
+namespace retrograde::autoschedule {
 
 namespace {
 
@@ -206,4 +206,4 @@ std::optional<RegisterTile> register_tile(const FuncContents& f, const Definitio
   return best.sides.empty() ? std::nullopt : std::optional(best);
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autoschedule

@@ -9,7 +9,7 @@
 #include "graph/function.h"
 #include "ir/target.h"
 
-namespace retrograde::ir {
+namespace retrograde::autoschedule {
 
 // What the machine's vector unit has. Default: 32 registers of 64 bytes.
 struct VectorUnit {
@@ -41,4 +41,4 @@ std::optional<RegisterTile> register_tile(const FuncContents& f, const Definitio
                                           int64_t vectors, const VectorUnit& unit,
                                           const SizeEstimate& sizes = {});
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autoschedule

@@ -12,7 +12,7 @@
 #include "ir/lets.h"
 #include "simplify/simplify.h"
 
-namespace retrograde::ir {
+namespace retrograde::autoschedule {
 
 namespace {
 
@@ -25,7 +25,7 @@ class MemoryLoads {
 
   bool come_from_memory(const FuncPtr& f) {
     if (sizes_.bytes(*f) < more_than_caches) return false;
-    if (f->schedule.compute_level.kind != LoopLevel::Kind::Inlined) return true;
+    if (f->schedule.compute_level.kind != graph::LoopLevel::Kind::Inlined) return true;
     const auto [known, is_new] = by_inlining_.try_emplace(f.get(), false);
     if (!is_new) return known->second;
     bool found = false;
@@ -92,7 +92,7 @@ void move_out(const FuncPtr& f, int stage, const std::unordered_set<std::string>
 void run_along_rows(const std::vector<FuncPtr>& funcs, const SizeEstimate& sizes) {
   MemoryLoads memory(sizes);
   for (const FuncPtr& f : funcs) {
-    if (f->schedule.compute_level.kind != LoopLevel::Kind::Root) continue;
+    if (f->schedule.compute_level.kind != graph::LoopLevel::Kind::Root) continue;
     for (int s = 1; s < f->stage_count(); ++s) {
       const auto planes = planes_of(*f, f->stage(s), memory);
       if (iterations_of(f->stage(s), planes) >= many_streams && runs_row_by_row(*f, f->stage(s)))
@@ -101,4 +101,4 @@ void run_along_rows(const std::vector<FuncPtr>& funcs, const SizeEstimate& sizes
   }
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autoschedule

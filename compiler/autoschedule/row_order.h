@@ -14,9 +14,9 @@
 #include "autoschedule/size_estimate.h"
 #include "graph/function.h"
 
-namespace retrograde::ir {
+namespace retrograde::autoschedule {
 
 // Of those of the Funcs, all of which this scheduler has given loops, that are at root.
 void run_along_rows(const std::vector<FuncPtr>& funcs, const SizeEstimate& sizes);
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autoschedule

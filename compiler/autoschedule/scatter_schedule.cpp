@@ -12,7 +12,7 @@
 #include "ir/memory_reads.h"
 #include "ir/visit.h"
 
-namespace retrograde::ir {
+namespace retrograde::autoschedule {
 
 namespace {
 
@@ -269,4 +269,4 @@ void unroll_taps(const Definition& update, Stage& stage) {
   for (const VarOrRVar& tap : loops_of(update, true)) stage.unroll(tap);
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autoschedule

@@ -18,7 +18,7 @@
 #include "frontend/schedule/stage.h"
 #include "graph/function.h"
 
-namespace retrograde::ir {
+namespace retrograde::autoschedule {
 
 // Taps of one loop: it is unrolled.
 inline constexpr int most_taps = 16;
@@ -53,4 +53,4 @@ void schedule_scatter_in_order(const FuncContents& f, int index, Stage& stage);
 // Elsewhere: one sweep for each tap, which then knows its place.
 void unroll_taps(const Definition& update, Stage& stage);
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autoschedule

@@ -14,7 +14,7 @@
 #include "ir/build.h"
 #include "ir/visit.h"
 
-namespace retrograde::ir {
+namespace retrograde::autoschedule {
 
 namespace {
 
@@ -155,4 +155,4 @@ void schedule_slices(const ScatterSlices& slices) {
   Func(slices.scatter).compute_at(Func(f), lanes);
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autoschedule

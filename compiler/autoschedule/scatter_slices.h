@@ -18,7 +18,7 @@
 #include "autoschedule/size_estimate.h"
 #include "graph/function.h"
 
-namespace retrograde::ir {
+namespace retrograde::autoschedule {
 
 struct ScatterSlices {
   FuncPtr scatter, reader;
@@ -49,4 +49,4 @@ class SlicedScatters {
 // computed from now on.
 void schedule_slices(const ScatterSlices& slices);
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autoschedule

@@ -8,7 +8,7 @@
 #include "ir/lets.h"
 #include "simplify/simplify.h"
 
-namespace retrograde::ir {
+namespace retrograde::autoschedule {
 
 namespace {
 
@@ -126,4 +126,4 @@ int64_t SizeEstimate::bytes(const FuncContents& f) const {
   return result;
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autoschedule

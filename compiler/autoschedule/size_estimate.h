@@ -11,7 +11,7 @@
 #include "analysis/interval.h"
 #include "graph/function.h"
 
-namespace retrograde::ir {
+namespace retrograde::autoschedule {
 
 // Iterations of loops that run in parallel: no thread of a few waits long for the others.
 inline constexpr int64_t enough_tasks = 8;
@@ -31,4 +31,4 @@ class SizeEstimate {
   std::unordered_map<const Symbol*, Box> boxes_;  // with constant ends; undefined: not known
 };
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autoschedule

@@ -11,7 +11,7 @@
 #include "ir/build.h"
 #include "ir/lets.h"
 
-namespace retrograde::ir {
+namespace retrograde::autoschedule {
 
 namespace {
 
@@ -93,4 +93,4 @@ void compute_in_slices(const Readers& readers, const std::vector<FuncPtr>& store
   }
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autoschedule

@@ -18,7 +18,7 @@
 #include "autoschedule/size_estimate.h"
 #include "graph/function.h"
 
-namespace retrograde::ir {
+namespace retrograde::autoschedule {
 
 // Moves those of the Funcs, all of which this scheduler has computed at root and given loops, into
 // the loops of their only reader, if that is one of them, too. `but`: none of these, as a reader
@@ -26,4 +26,4 @@ namespace retrograde::ir {
 void compute_in_slices(const Readers& readers, const std::vector<FuncPtr>& stored,
                        const std::unordered_set<const Symbol*>& but, const SizeEstimate& sizes);
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autoschedule

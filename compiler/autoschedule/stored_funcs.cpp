@@ -12,7 +12,7 @@
 #include "ir/build.h"
 #include "ir/visit.h"
 
-namespace retrograde::ir {
+namespace retrograde::autoschedule {
 
 namespace {
 
@@ -130,7 +130,7 @@ class StorageChooser {
     auto found = uses_.find(call->symbol.raw());
     auto callee = std::dynamic_pointer_cast<FuncContents>(call->symbol.lock());
     bool stored = !callee || !callee->is_pure() || stored_.contains(callee.get()) ||
-                  callee->schedule.compute_level.kind != LoopLevel::Kind::Inlined;
+                  callee->schedule.compute_level.kind != graph::LoopLevel::Kind::Inlined;
     return stored || found == uses_.end() ? 1 : found->second.operations;
   }
 
@@ -167,4 +167,4 @@ std::vector<FuncPtr> stored_in_all(const std::vector<FuncPtr>& outputs,
   return with_large_bodies(outputs, StorageChooser(outputs, &limits).choose());
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autoschedule

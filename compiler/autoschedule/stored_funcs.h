@@ -15,7 +15,7 @@
 #include "autoschedule/placement_limits.h"
 #include "graph/function.h"
 
-namespace retrograde::ir {
+namespace retrograde::autoschedule {
 
 bool is_differentiated(const std::vector<FuncPtr>& outputs);  // whether an adjoint is among them
 
@@ -26,4 +26,4 @@ std::vector<FuncPtr> stored_by_default(const std::vector<FuncPtr>& outputs);
 std::vector<FuncPtr> stored_in_all(const std::vector<FuncPtr>& outputs,
                                    const PlacementLimits& limits);
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autoschedule

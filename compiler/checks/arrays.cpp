@@ -47,7 +47,7 @@ size_t count(const Shape& shape) {
   return n;
 }
 
-Shape shape_of_bound(const ir::ParameterContents& p) {
+Shape shape_of_bound(const ParameterContents& p) {
   Shape shape;
   for (int d = 0; p.buffer && d < p.dimensions; ++d) {
     shape.mins.push_back(Buffer<>(*p.buffer).dim(d).min());
@@ -69,8 +69,8 @@ Shape shape_of_output(const Func& output, const std::vector<int>& mins,
   return {mins.empty() ? std::vector<int>(dims, 0) : mins, sizes};
 }
 
-ir::Box box_of(const Shape& shape) {
-  ir::Box box;
+analysis::Box box_of(const Shape& shape) {
+  analysis::Box box;
   for (size_t d = 0; d < shape.mins.size(); ++d)
     box.push_back({Expr(shape.mins[d]), Expr(shape.mins[d] + shape.extents[d] - 1)});
   return box;
@@ -83,13 +83,14 @@ Region region_of(const Shape& shape) {
   return region;
 }
 
-std::optional<Shape> constant_shape(const ir::Box& box) {
+std::optional<Shape> constant_shape(const analysis::Box& box) {
   constexpr double most_elements = 1e7;
   Shape shape;
   double elements = 1;
   for (const ir::Interval& i : box) {
     if (!i.is_bounded()) return std::nullopt;
-    auto min = ir::as_const_int(ir::simplify(i.min)), max = ir::as_const_int(ir::simplify(i.max));
+    auto min = ir::as_const_int(simplification::simplify(i.min)),
+         max = ir::as_const_int(simplification::simplify(i.max));
     if (!min || !max || *max < *min) return std::nullopt;
     shape.mins.push_back(static_cast<int>(*min));
     shape.extents.push_back(static_cast<int>(*max - *min + 1));
@@ -212,17 +213,17 @@ std::vector<int> place_of(size_t i, const Shape& shape) {
 
 void Input::set_wide(const Values& to) {
   if (own->is_buffer) return fill(buffer, to);
-  ir::set_scalar(*wide, ir::Scalar::of_float(Float(64), to[0]));
+  frontend::set_scalar(*wide, ir::Scalar::of_float(Float(64), to[0]));
 }
 
 void Input::set_own(const Values& to) {
-  if (!own->is_buffer) return ir::set_scalar(*own, ir::Scalar::of_float(own->type, to[0]));
+  if (!own->is_buffer) return frontend::set_scalar(*own, ir::Scalar::of_float(own->type, to[0]));
   Buffer<> bound(*own->buffer);
   fill(bound, to);
 }
 
-Input bind_wide(const std::shared_ptr<ir::ParameterContents>& own,
-                const std::shared_ptr<ir::ParameterContents>& wide, const std::string& asked) {
+Input bind_wide(const std::shared_ptr<ParameterContents>& own,
+                const std::shared_ptr<ParameterContents>& wide, const std::string& asked) {
   Input input{own, wide, shape_of_bound(*own), {}, {}};
   if (own->is_buffer ? own->buffer == nullptr : !own->value) {
     call_error(asked, "every input must be bound", retrograde::quoted(own->name) + " is not",

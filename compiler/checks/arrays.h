@@ -31,16 +31,16 @@ struct Shape {
   std::vector<int> mins, extents;
 };
 size_t count(const Shape& shape);
-Shape shape_of_bound(const ir::ParameterContents& p);  // none of a scalar, or where none is bound
+Shape shape_of_bound(const ParameterContents& p);  // none of a scalar, or where none is bound
 // `mins` may be empty: zeros. CompileError, with an example of the call `function`, when one does
 // not fit the output.
 Shape shape_of_output(const Func& output, const std::vector<int>& mins,
                       const std::vector<int>& sizes, const std::string& asked,
                       const std::string& function);
-ir::Box box_of(const Shape& shape);
+analysis::Box box_of(const Shape& shape);
 Region region_of(const Shape& shape);
 // Nothing when the box is not of constants, or too large to look at.
-std::optional<Shape> constant_shape(const ir::Box& box);
+std::optional<Shape> constant_shape(const analysis::Box& box);
 
 Buffer<> new_buffer(Type type, const Shape& shape);
 // Of floats of any width.
@@ -81,7 +81,7 @@ std::vector<int> place_of(size_t i, const Shape& shape);
 
 // One floating input, as it is bound, and its copy in double.
 struct Input {
-  std::shared_ptr<ir::ParameterContents> own, wide;
+  std::shared_ptr<ParameterContents> own, wide;
   Shape shape;
   Values values;    // as bound when the check began
   Buffer<> buffer;  // behind `wide`; undefined for scalars
@@ -90,7 +90,7 @@ struct Input {
   void set_own(const Values& to);  // rounds; of a buffer: in the memory that the user bound
 };
 // RuntimeError, that one cannot do what is `asked`, when it is not bound.
-Input bind_wide(const std::shared_ptr<ir::ParameterContents>& own,
-                const std::shared_ptr<ir::ParameterContents>& wide, const std::string& asked);
+Input bind_wide(const std::shared_ptr<ParameterContents>& own,
+                const std::shared_ptr<ParameterContents>& wide, const std::string& asked);
 
 }  // namespace retrograde::checks

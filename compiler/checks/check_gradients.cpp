@@ -22,6 +22,7 @@ namespace retrograde {
 namespace {
 
 using namespace checks;
+using checks::Values;
 using Clock = std::chrono::steady_clock;
 
 // The complex step, relative to the input's size: its square vanishes beside 1, and exists.
@@ -53,9 +54,9 @@ class Checker {
         shape_(shape_of_output(output, options.mins, sizes, asked(), "check_gradients")),
         options_(options),
         random_(options.seed) {
-    ir::widen({output.function()});  // says what has no meaning in double before all else
+    widen({output.function()});  // says what has no meaning in double before all else
     draw_weights();
-    for (const auto& p : ir::parameters_of({output.function()})) {
+    for (const auto& p : parameters_of({output.function()})) {
       if (p->type.is_float()) own_inputs_.push_back(p);
     }
     check_wrt();
@@ -153,15 +154,15 @@ class Checker {
     const AdjointOptions store{.overwritten = Overwritten::Store};
     own_ =
         std::make_unique<Derivative>(propagate_adjoints(output_, seed(output_), bounds(), store));
-    std::vector<ir::FuncPtr> all{output_.function()};
+    std::vector<FuncPtr> all{output_.function()};
     if (has_rules()) add_adjoints(all);
-    widened_ = ir::widen(all);
+    widened_ = widen(all);
     wide_output_ = Func(widened_.funcs.at(output_.function().get()));
     if (!has_rules()) {
       wide_ = std::make_unique<Derivative>(
           propagate_adjoints(wide_output_, seed(wide_output_), bounds(), store));
     }
-    for (const auto& p : ir::parameters_of(all)) bind(p);
+    for (const auto& p : parameters_of(all)) bind(p);
     report_.primal_seconds = timed_warm([&] { return realize_values(output_, shape_); }).seconds;
     complex_ = complex_graph(wide_output_);
     report_.complex_step_refused = complex_.refused;
@@ -170,13 +171,13 @@ class Checker {
   // Rules of the user are made of Funcs in the user's precision. They are checked by giving those a
   // meaning in double, constants as they are; all else is differentiated in double.
   bool has_rules() const {
-    const auto order = ir::topological_order({output_.function()});
+    const auto order = topological_order({output_.function()});
     return std::any_of(order.begin(), order.end(),
-                       [](const ir::FuncPtr& f) { return f->custom_derivatives != nullptr; });
+                       [](const FuncPtr& f) { return f->custom_derivatives != nullptr; });
   }
-  void add_adjoints(std::vector<ir::FuncPtr>& to) const {
+  void add_adjoints(std::vector<FuncPtr>& to) const {
     for (const auto& p : own_inputs_) to.push_back(own_->of(AdjointInput(p)).function());
-    for (const ir::FuncPtr& f : ir::topological_order({output_.function()})) {
+    for (const FuncPtr& f : topological_order({output_.function()})) {
       if (own_->has(Func(f))) to.push_back(own_->adjoint(Func(f)).function());
     }
   }
@@ -186,7 +187,7 @@ class Checker {
     return Func(widened_.funcs.at(own_->of(input).function().get()));
   }
   // Beside the inputs: weights, and what rules of the user read.
-  void bind(const std::shared_ptr<ir::ParameterContents>& p) {
+  void bind(const std::shared_ptr<ParameterContents>& p) {
     auto wide = widened_.parameters.find(p.get());
     if (wide == widened_.parameters.end()) return;
     Input bound = bind_wide(p, wide->second, asked());
@@ -196,15 +197,15 @@ class Checker {
 
   // In double. Definitions say it where no rule of the user does.
   Func tangent(const Input& input, const Buffer<>& direction) const {
-    for (const ir::FuncPtr& f : ir::topological_order({output_.function()})) {
-      if (ir::has_custom_tangent(*f)) return tangent_by_rules(input, direction);
+    for (const FuncPtr& f : topological_order({output_.function()})) {
+      if (autodiff::has_custom_tangent(*f)) return tangent_by_rules(input, direction);
     }
     return propagate_tangents(wide_output_, {{AdjointInput(input.wide), direction}})(wide_output_);
   }
   Func tangent_by_rules(const Input& input, const Buffer<>& direction) const {
     Func own = propagate_tangents(output_, {{AdjointInput(input.own), direction}})(output_);
-    ir::Widened widened = ir::widen({own.function()});
-    for (const auto& p : ir::parameters_of({own.function()})) {
+    Widened widened = widen({own.function()});
+    for (const auto& p : parameters_of({own.function()})) {
       auto wide = widened.parameters.find(p.get());
       if (wide == widened.parameters.end()) continue;
       if (p == direction.parameter()) {
@@ -331,8 +332,8 @@ class Checker {
   // ---- where the digits go ----
 
   void compare_funcs() {
-    auto order = ir::topological_order({output_.function()});
-    ir::Regions regions(order, box_of(shape_));
+    auto order = topological_order({output_.function()});
+    autodiff::Regions regions(order, box_of(shape_));
     const auto errors = func_errors(order, regions);
     std::map<const ir::Symbol*, double> inherited;
     double most = 4;  // an adjoint that only rounds loses less than this
@@ -340,8 +341,7 @@ class Checker {
       const double before = inherited[f->get()];
       const auto found = errors.find(f->get());
       const double error = found == errors.end() ? before : found->second;
-      for (const ir::FuncPtr& callee : ir::direct_callees(**f))
-        worsen(inherited[callee.get()], error);
+      for (const FuncPtr& callee : direct_callees(**f)) worsen(inherited[callee.get()], error);
       if (found == errors.end()) continue;
       double eps = std::numeric_limits<float>::epsilon();
       double lost = error / std::max(before, eps);
@@ -351,11 +351,11 @@ class Checker {
   }
 
   // The worst of the adjoint's values; of Funcs that have one over a known region.
-  std::map<const ir::Symbol*, double> func_errors(const std::vector<ir::FuncPtr>& order,
-                                                  const ir::Regions& regions) {
+  std::map<const ir::Symbol*, double> func_errors(const std::vector<FuncPtr>& order,
+                                                  const autodiff::Regions& regions) {
     std::vector<const ir::Symbol*> funcs;
     Batch own, wide;
-    for (const ir::FuncPtr& f : order) {
+    for (const FuncPtr& f : order) {
       auto shape = constant_shape(regions.of(f.get()));
       Func adjoint = own_->adjoint(Func(f));
       if (!shape || shape->extents.size() != f->args.size() || !adjoint.defined()) continue;
@@ -382,10 +382,10 @@ class Checker {
   Shape shape_;
   GradientCheckOptions options_;
   std::mt19937_64 random_;
-  std::vector<std::shared_ptr<ir::ParameterContents>> own_inputs_;
+  std::vector<std::shared_ptr<ParameterContents>> own_inputs_;
   std::vector<Values> weights_;
   std::unique_ptr<Derivative> own_, wide_;  // wide_: null where rules of the user take part
-  ir::Widened widened_;
+  Widened widened_;
   Func wide_output_;
   std::vector<Input> inputs_, imaginary_;
   ComplexGraph complex_;

@@ -16,6 +16,7 @@ namespace retrograde {
 namespace {
 
 using namespace checks;
+using checks::Values;
 using Limits = std::numeric_limits<float>;
 
 // Of the largest, smallest normal and smallest number of a type. Doubles are taken to the ends of
@@ -108,12 +109,12 @@ class StabilityChecker {
   }
 
   void watch() {
-    auto order = ir::topological_order({output_.function()});
-    ir::widen({output_.function()});  // says what has no meaning in double before anything is bound
-    ir::Regions regions(order, box_of(shape_));
+    auto order = topological_order({output_.function()});
+    widen({output_.function()});  // says what has no meaning in double before anything is bound
+    autodiff::Regions regions(order, box_of(shape_));
     Derivative derivative = adjoints();
     std::vector<Watched> adjoints;
-    for (const ir::FuncPtr& f : order) {
+    for (const FuncPtr& f : order) {
       const Func primal(f);
       auto shape = shape_of(*f, regions);
       if (!shape) continue;
@@ -125,7 +126,7 @@ class StabilityChecker {
       }
     }
     watched_.insert(watched_.end(), adjoints.rbegin(), adjoints.rend());
-    for (const auto& p : ir::parameters_of({output_.function()})) {
+    for (const auto& p : parameters_of({output_.function()})) {
       if (!p->type.is_float()) continue;
       if (derivative.has(AdjointInput(p)))
         watched_.push_back({p->name, true, derivative.of(AdjointInput(p)), shape_of_bound(*p)});
@@ -133,7 +134,7 @@ class StabilityChecker {
     widen_watched();
   }
 
-  std::optional<Shape> shape_of(const ir::FuncContents& f, const ir::Regions& regions) {
+  std::optional<Shape> shape_of(const FuncContents& f, const autodiff::Regions& regions) {
     auto leave_out = [&](const char* reason) {
       report_.left_out.push_back({f.name, reason});
       return std::nullopt;
@@ -148,14 +149,14 @@ class StabilityChecker {
   }
 
   void widen_watched() {
-    std::vector<ir::FuncPtr> all{output_.function()};
+    std::vector<FuncPtr> all{output_.function()};
     for (const Watched& w : watched_) all.push_back(w.own.function());
-    ir::Widened widened = ir::widen(all, {amount_, seed_});
+    Widened widened = widen(all, {amount_, seed_});
     for (const Watched& w : watched_) {
       own_.add(w.own, w.shape);
       wide_.add(Func(widened.funcs.at(w.own.function().get())), w.shape);
     }
-    for (const auto& p : ir::parameters_of({output_.function()})) {
+    for (const auto& p : parameters_of({output_.function()})) {
       if (p->type.is_float())
         inputs_.push_back(bind_wide(p, widened.parameters.at(p.get()), asked_));
     }

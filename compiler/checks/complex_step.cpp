@@ -14,8 +14,6 @@ namespace retrograde::checks {
 
 namespace {
 
-using namespace ir;
-
 // Thrown inside, and caught by complex_graph.
 struct Refused {
   std::string why;
@@ -122,7 +120,8 @@ class Complexifier {
         define_pure(to, args, values);
       } else {
         Definition real_parts = map_exprs(d, [&](const Expr& e) { return of(e).re; });
-        append_update(to, real_parts.args, values, real_parts.rvars, real_parts.predicate);
+        autodiff::append_update(to, real_parts.args, values, real_parts.rvars,
+                                real_parts.predicate);
       }
     }
   }
@@ -130,7 +129,7 @@ class Complexifier {
   Complex of(const Expr& root) {
     const Expr e = without_lets(root);
     kept_.push_back(e);  // so that the addresses in memo_ stay theirs
-    for (const Expr& node : post_order({e})) {
+    for (const Expr& node : autodiff::post_order({e})) {
       if (!memo_.contains(node.get())) memo_.emplace(node.get(), made(node));
     }
     return memo_.at(e.get());

@@ -22,7 +22,7 @@ namespace retrograde::checks {
 struct ComplexGraph {
   Func output;  // values: real and imaginary part in turn; integers alone
   // Behind each floating input: its imaginary part; unbound.
-  std::map<const ir::Symbol*, std::shared_ptr<ir::ParameterContents>> imaginary;
+  std::map<const ir::Symbol*, std::shared_ptr<graph::ParameterContents>> imaginary;
   std::string refused;  // why there is no graph; empty when there is one
 };
 

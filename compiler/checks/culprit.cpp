@@ -18,9 +18,9 @@ constexpr size_t most_operations = 400, most_evaluations = 2'000'000;
 
 // Floating nodes, operands first, that do not read f itself; both arms of a selection are
 // evaluated.
-std::vector<Expr> operations_of(const Expr& value, const ir::FuncContents& f) {
+std::vector<Expr> operations_of(const Expr& value, const FuncContents& f) {
   std::vector<Expr> result;
-  for (const Expr& e : ir::post_order({ir::without_lets(value)})) {
+  for (const Expr& e : autodiff::post_order({ir::without_lets(value)})) {
     if (e.type().is_float() && !e.as<ir::FloatImm>() && !ir::calls(e, &f)) result.push_back(e);
   }
   return result;
@@ -35,9 +35,8 @@ struct Run {
 
 // Nothing when there are very many, when the loops have no constant bounds, or when where it writes
 // is not the element at hand by its form.
-std::optional<Run> run_of(const ir::FuncContents& f, int stage, int value,
-                          const std::vector<int>& at) {
-  const ir::Definition& d = f.stage(stage);
+std::optional<Run> run_of(const FuncContents& f, int stage, int value, const std::vector<int>& at) {
+  const Definition& d = f.stage(stage);
   Run run{operations_of(d.values[static_cast<size_t>(value)], f), {{0}, {}}, {}};
   run.shape.extents.push_back(static_cast<int>(run.operations.size()));
   if (run.operations.size() > most_operations) return std::nullopt;
@@ -46,8 +45,9 @@ std::optional<Run> run_of(const ir::FuncContents& f, int stage, int value,
     if (stage > 0 && !(v && v->name == f.args[k])) return std::nullopt;
     run.place[f.args[k]] = Expr(at[k]);
   }
-  for (const ir::ReductionVariable& r : d.rvars) {
-    auto min = ir::as_const_int(ir::simplify(r.min)), n = ir::as_const_int(ir::simplify(r.extent));
+  for (const ReductionVariable& r : d.rvars) {
+    auto min = ir::as_const_int(simplification::simplify(r.min)),
+         n = ir::as_const_int(simplification::simplify(r.extent));
     if (!min || !n || *n < 1) return std::nullopt;
     run.shape.mins.push_back(static_cast<int>(*min));
     run.shape.extents.push_back(static_cast<int>(*n));
@@ -57,11 +57,11 @@ std::optional<Run> run_of(const ir::FuncContents& f, int stage, int value,
 }
 
 // The i-th of the operations at an iteration, all in one Func.
-Func probe(const ir::Definition& d, const Run& run) {
+Func probe(const Definition& d, const Run& run) {
   Var i("i");
   std::vector<Var> args{i};
   ir::Substitution here = run.place;
-  for (const ir::ReductionVariable& r : d.rvars) {
+  for (const ReductionVariable& r : d.rvars) {
     args.emplace_back("r" + std::to_string(args.size()));
     here[r.var] = args.back();
   }
@@ -80,11 +80,11 @@ Func probe(const ir::Definition& d, const Run& run) {
 std::string described(const Expr& e, const ir::Substitution& place) {
   const ir::Call* call = e.as<ir::Call>();
   if (!call || call->call_type != ir::CallType::Image) return text(e);
-  return text(ir::simplify(ir::substitute(e, place)), ", an input");
+  return text(simplification::simplify(ir::substitute(e, place)), ", an input");
 }
 
 // " in update 0 at r = 3"; nothing for the pure definition.
-std::string where(const ir::Definition& d, int stage, const std::vector<int>& at) {
+std::string where(const Definition& d, int stage, const std::vector<int>& at) {
   if (stage == 0) return "";
   std::string result = text(", in update ", stage - 1);
   for (size_t k = 0; k < d.rvars.size(); ++k)
@@ -93,12 +93,12 @@ std::string where(const ir::Definition& d, int stage, const std::vector<int>& at
 }
 
 // Of one definition; empty when all are finite, nothing when that cannot be looked at.
-std::optional<std::string> culprit_in(const ir::FuncContents& f, int stage, int value,
+std::optional<std::string> culprit_in(const FuncContents& f, int stage, int value,
                                       const std::vector<int>& at) {
   auto run = run_of(f, stage, value, at);
   if (!run) return std::nullopt;
   if (run->operations.empty()) return "";
-  const ir::Definition& d = f.stage(stage);
+  const Definition& d = f.stage(stage);
   const Values values = realize(probe(d, *run), run->shape);
   for (size_t n = 0; n < values.size(); ++n) {
     if (std::isfinite(values[n])) continue;
@@ -114,7 +114,7 @@ std::optional<std::string> culprit_in(const ir::FuncContents& f, int stage, int 
 }  // namespace
 
 std::string culprit(const Func& f, int value, const std::vector<int>& at) {
-  const ir::FuncContents& contents = *f.function();
+  const FuncContents& contents = *f.function();
   if (contents.is_extern()) return "";
   bool all_seen = true;
   for (int s = 0; s < contents.stage_count(); ++s) {

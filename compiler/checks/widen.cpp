@@ -9,7 +9,7 @@
 #include "graph/function.h"
 #include "ir/build.h"
 
-namespace retrograde::ir {
+namespace retrograde::checks {
 
 namespace {
 
@@ -52,7 +52,7 @@ class Widening {
       if (s == 0) {
         define_pure(to, args, d.values);
       } else {
-        append_update(to, d.args, d.values, d.rvars, d.predicate);
+        autodiff::append_update(to, d.args, d.values, d.rvars, d.predicate);
       }
     }
   }
@@ -151,4 +151,4 @@ Widened widen(const std::vector<FuncPtr>& outputs, const Rounding& rounding) {
   return Widening(outputs, rounding).take();
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::checks

@@ -14,7 +14,7 @@
 
 #include "graph/function.h"
 
-namespace retrograde::ir {
+namespace retrograde::checks {
 
 struct Widened {
   std::map<const Symbol*, FuncPtr> funcs;
@@ -30,4 +30,4 @@ struct Rounding {
 // Unsupported: C functions, extern stages, and the bits of floats.
 Widened widen(const std::vector<FuncPtr>& outputs, const Rounding& rounding = {});
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::checks

@@ -265,7 +265,7 @@ std::vector<Argument> GeneratorBase::input_arguments() const {
                    quoted(input->name()) + " was given a value from C++",
                    "Take build_module() of a generator without inputs set");
       }
-      arguments.push_back(ir::argument_of(*value.parameter));
+      arguments.push_back(frontend::argument_of(*value.parameter));
     }
   }
   return arguments;

@@ -18,7 +18,7 @@ InputValue InputValue::of_expr(const Expr& e) {
   return value;
 }
 
-InputValue InputValue::of_image(std::shared_ptr<ir::ParameterContents> image) {
+InputValue InputValue::of_image(std::shared_ptr<graph::ParameterContents> image) {
   InputValue value;
   value.kind = IOKind::Buffer;
   value.parameter = std::move(image);
@@ -46,7 +46,7 @@ void GeneratorInputBase::make_parameters() {
     InputValue value;
     value.kind = kind();
     if (kind() == IOKind::Scalar) {
-      value.parameter = ir::make_scalar_parameter(type(), element_name(i));
+      value.parameter = frontend::make_scalar_parameter(type(), element_name(i));
       value.expr = ir::variable(value.parameter->name, type(), ir::SymbolRef(value.parameter));
       describe(*value.parameter);
     } else {

@@ -21,13 +21,13 @@ namespace internal {
 // One element of an input: a parameter of the compiled function, or a value given from C++.
 struct InputValue {
   IOKind kind = IOKind::Scalar;
-  std::shared_ptr<ir::ParameterContents> parameter;  // null for a Func or Expr given from C++
-  Func func;                                         // of a Function
-  Expr expr;                                         // of a Scalar
+  std::shared_ptr<graph::ParameterContents> parameter;  // null for a Func or Expr given from C++
+  Func func;                                            // of a Function
+  Expr expr;                                            // of a Scalar
 
   static InputValue of_func(const Func& f);
   static InputValue of_expr(const Expr& e);
-  static InputValue of_image(std::shared_ptr<ir::ParameterContents> image);
+  static InputValue of_image(std::shared_ptr<graph::ParameterContents> image);
   std::vector<Type> types() const;
   int dims() const;
 };
@@ -47,7 +47,7 @@ class GeneratorInputBase : public GeneratorPort {
   GeneratorInputBase(Declared declared, IOKind kind, Declared said, bool is_array);
   virtual void values_changed() = 0;
   // Default, limits and estimate of a scalar's parameter.
-  virtual void describe(ir::ParameterContents&) const {}
+  virtual void describe(graph::ParameterContents&) const {}
   void check_ready() const;  // CompileError before generate()
   // Of the dimension that the Func of an image or Func has under this name.
   void set_estimate_of(const Var& var, const Expr& min, const Expr& extent) const;
@@ -82,7 +82,7 @@ class InputElements : public GeneratorInputBase {
     check_ready();
     check_index(i);
     if (const auto& p = values()[i].parameter)
-      ir::set_limit(*p, &ir::ParameterContents::estimate, value);
+      frontend::set_limit(*p, &graph::ParameterContents::estimate, value);
   }
 
  private:
@@ -104,12 +104,12 @@ class ScalarElements : public InputElements<T> {
     max_ = max;
     has_limits_ = true;
   }
-  void describe(ir::ParameterContents& parameter) const override {
-    if (has_default_) ir::set_scalar(parameter, ir::to_scalar(default_));
+  void describe(graph::ParameterContents& parameter) const override {
+    if (has_default_) frontend::set_scalar(parameter, frontend::to_scalar(default_));
     if constexpr (std::is_arithmetic_v<Value>) {
       if (!has_limits_) return;
-      ir::set_limit(parameter, &ir::ParameterContents::min_value, Expr(min_));
-      ir::set_limit(parameter, &ir::ParameterContents::max_value, Expr(max_));
+      frontend::set_limit(parameter, &graph::ParameterContents::min_value, Expr(min_));
+      frontend::set_limit(parameter, &graph::ParameterContents::max_value, Expr(max_));
     }
   }
 

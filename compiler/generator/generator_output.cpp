@@ -18,8 +18,8 @@ Func GeneratorOutputBase::make_func(size_t i) const {
 }
 
 void GeneratorOutputBase::declare(const Func& f, size_t i) const {
-  ir::FuncContents& contents = *f.function();
-  contents.name = ir::claim_name(element_name(i));
+  graph::FuncContents& contents = *f.function();
+  contents.name = graph::claim_name(element_name(i));
   if (!types_defined() || !dims_defined()) return;
   contents.required_types = types();
   contents.required_dimensions = dims();

@@ -80,13 +80,13 @@ Module GeneratorBase::build_gradient_module(const std::string& function_name) {
   check_differentiable(all, name_);
 
   std::vector<Func> gradients;
-  std::set<const ir::FuncContents*> seen;
+  std::set<const graph::FuncContents*> seen;
   for (const GeneratorOutputBase* output : members_.outputs) {
     const std::vector<Func> funcs = output->funcs();
     for (size_t i = 0; i < funcs.size(); i++) {
       const std::string of = output->element_name(i);
       const ImageParam seed(funcs[i].type(), funcs[i].dimensions(), "_grad_loss_for_" + of);
-      arguments.push_back(ir::argument_of(*seed.parameter()));
+      arguments.push_back(frontend::argument_of(*seed.parameter()));
       names.push_back("_grad_loss_for_" + of);
       std::optional<Derivative> derivative;
       if (funcs[i].type().is_float())

@@ -6,7 +6,7 @@
 #include "ir/lists.h"
 #include "ir/print.h"
 
-namespace retrograde::ir {
+namespace retrograde::graph {
 
 namespace {
 
@@ -33,7 +33,7 @@ AssociativityProof prove_associative(const FuncContents& f, const Definition& up
       return variable(xs[call.component], call.type);
     });
   };
-  return prove_associative(mapped(update.values, over_xs), xs);
+  return analysis::prove_associative(mapped(update.values, over_xs), xs);
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::graph

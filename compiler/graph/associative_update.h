@@ -4,10 +4,10 @@
 #include "analysis/associativity.h"
 #include "graph/function.h"
 
-namespace retrograde::ir {
+namespace retrograde::graph {
 
 // The update as f(x) = op(f(x), e): its references to f are all to the point that it writes, and op
 // is proven associative.
 AssociativityProof prove_associative(const FuncContents& f, const Definition& update);
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::graph

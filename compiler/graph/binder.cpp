@@ -7,7 +7,7 @@
 #include "ir/build.h"
 #include "ir/visit.h"
 
-namespace retrograde::ir {
+namespace retrograde::graph {
 
 namespace {
 
@@ -87,4 +87,4 @@ SymbolRef Binder::symbol_of(const std::string& name) const {
   return buffer ? SymbolRef(buffer) : SymbolRef();
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::graph

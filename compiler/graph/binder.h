@@ -7,7 +7,7 @@
 
 #include "graph/function.h"
 
-namespace retrograde::ir {
+namespace retrograde::graph {
 
 using ParameterPtr = std::shared_ptr<ParameterContents>;
 
@@ -42,4 +42,4 @@ class Binder {
   DomainPtr domain_;
 };
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::graph

@@ -9,7 +9,7 @@
 #include "ir/literal.h"
 #include "ir/print.h"
 
-namespace retrograde::ir {
+namespace retrograde::graph {
 
 namespace {
 
@@ -204,4 +204,4 @@ void check_func_directive(const SchedulePlace& place, Directive& directive) {
   std::visit([&](auto& d) { check(d, *place.f); }, directive);
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::graph

@@ -14,7 +14,7 @@
 #include "ir/literal.h"
 #include "ir/print.h"
 
-namespace retrograde::ir {
+namespace retrograde::graph {
 
 namespace {
 
@@ -441,4 +441,4 @@ void check_stage_directive(const SchedulePlace& place, Directive& directive) {
   std::visit([&](auto& d) { check(d, place); }, directive);
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::graph

@@ -3,7 +3,7 @@
 #include "ir/build.h"
 #include "ir/visit.h"
 
-namespace retrograde::ir {
+namespace retrograde::graph {
 
 namespace {
 
@@ -57,4 +57,4 @@ class Copier : public Rewriter {
 
 GraphCopy copy_graph(const std::vector<FuncPtr>& outputs) { return Copier().run(outputs); }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::graph

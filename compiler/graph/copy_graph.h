@@ -7,7 +7,7 @@
 
 #include "graph/function.h"
 
-namespace retrograde::ir {
+namespace retrograde::graph {
 
 struct GraphCopy {
   std::vector<FuncPtr> outputs;
@@ -18,4 +18,4 @@ struct GraphCopy {
 // original. Expressions that definitions share stay shared. Wrappers are to have been applied.
 GraphCopy copy_graph(const std::vector<FuncPtr>& outputs);
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::graph

@@ -19,7 +19,7 @@
 #include "ir/print.h"
 #include "ir/visit.h"
 
-namespace retrograde::ir {
+namespace retrograde::graph {
 
 namespace {
 
@@ -460,4 +460,4 @@ void define_update(const FuncPtr& f, const std::vector<Expr>& raw_args,
   f->version++;
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::graph

@@ -6,7 +6,7 @@
 
 #include "graph/function.h"
 
-namespace retrograde::ir {
+namespace retrograde::graph {
 
 // f(args) = values as the first definition. `args` must be distinct plain Vars.
 void define_pure(const FuncPtr& f, const std::vector<Expr>& args, const std::vector<Expr>& values);
@@ -34,4 +34,4 @@ std::string stage_name(const FuncContents& f, int stage);
 // of a definition for another owner goes through this: `to` takes the place of `from`.
 Expr redirect_calls(const Expr& e, const FuncPtr& from, const FuncPtr& to, bool weak);
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::graph

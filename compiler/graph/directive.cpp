@@ -7,7 +7,7 @@
 #include "ir/build.h"
 #include "ir/lists.h"
 
-namespace retrograde::ir {
+namespace retrograde::graph {
 
 namespace {
 
@@ -343,4 +343,4 @@ std::vector<Directive> directives_of(const FuncContents& f) {
   return log;
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::graph

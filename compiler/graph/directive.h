@@ -19,7 +19,7 @@
 #include "graph/schedule.h"
 #include "ir/expr.h"
 
-namespace retrograde::ir {
+namespace retrograde::graph {
 
 struct Definition;
 struct FuncContents;
@@ -234,4 +234,4 @@ std::vector<Directive> directives_of(const StageLoops& schedule, const std::vect
 // Directives that make the schedule of the Func, stages aside, out of none.
 std::vector<Directive> directives_of(const FuncContents& f);
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::graph

@@ -6,7 +6,7 @@
 
 #include "graph/schedule.h"
 
-namespace retrograde::ir {
+namespace retrograde::graph {
 
 inline constexpr std::array tail_choices{"RoundUp",
                                          "GuardWithIf",
@@ -50,4 +50,4 @@ const char* choice_name(E value) {
   return Choices<E>::names[static_cast<size_t>(value)];
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::graph

@@ -10,7 +10,7 @@
 #include "graph/directive.h"
 #include "ir/visit.h"
 
-namespace retrograde::ir {
+namespace retrograde::graph {
 
 // Calls `visit` with every name and every expression of a directive, by reference.
 template <typename Visit>
@@ -45,4 +45,4 @@ void visit_names(Directive& directive, const Visit& visit) {
   NameVisitor<Visit>{visit}(directive);
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::graph

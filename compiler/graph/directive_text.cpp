@@ -9,7 +9,7 @@
 #include "ir/print.h"
 #include "ir/text.h"
 
-namespace retrograde::ir {
+namespace retrograde::graph {
 
 namespace {
 
@@ -179,4 +179,4 @@ bool equal(const Directive& a, const Directive& b) {
       a);
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::graph

@@ -6,7 +6,7 @@
 
 #include "graph/directive.h"
 
-namespace retrograde::ir {
+namespace retrograde::graph {
 
 std::string to_text(const Directive& directive);
 
@@ -20,4 +20,4 @@ bool equal(const Directive& a, const Directive& b);
 std::vector<Expr> parse_arguments(const std::string& line);
 std::string print_argument(const Expr& e);  // "_" when undefined
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::graph

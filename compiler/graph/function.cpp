@@ -10,7 +10,7 @@
 #include "graph/wrappers.h"
 #include "ir/print.h"
 
-namespace retrograde::ir {
+namespace retrograde::graph {
 
 namespace {
 
@@ -289,4 +289,4 @@ std::vector<ParameterPtr> parameters_of(const std::vector<FuncPtr>& outputs) {
   return parameters;
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::graph

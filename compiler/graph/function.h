@@ -19,11 +19,16 @@
 
 namespace retrograde {
 
+// What a user gave for autodiff to use instead of the definitions (autodiff/custom_derivative.h).
+namespace autodiff {
+struct CustomDerivatives;
+}
+
 // How the symbol of an extern stage is named. Default: as the target says (C, unless it has
 // c_plus_plus_name_mangling).
 enum class NameMangling : uint8_t { Default, C, CPlusPlus };
 
-namespace ir {
+namespace graph {
 
 // Of one value of each type.
 int total_bytes(const std::vector<Type>& types);
@@ -58,9 +63,6 @@ struct ExternDefinition {
   NameMangling mangling = NameMangling::Default;
 };
 
-// What a user gave for autodiff to use instead of the definitions (autodiff/custom_derivative.h).
-struct CustomDerivatives;
-
 // Pipeline::add_requirement: calls fail with the message unless it holds.
 struct Requirement {
   Expr condition;             // of parameters only
@@ -87,7 +89,8 @@ struct FuncContents : Symbol, std::enable_shared_from_this<FuncContents> {
   std::string debug_file;  // debug_to_file: written after it is computed; empty: not
   // When set, `pure` has args but no values and no loops, and there are no updates.
   std::optional<ExternDefinition> extern_definition;
-  std::shared_ptr<const CustomDerivatives> custom_derivatives;  // null: none; clones share it
+  // Null: none; clones share it.
+  std::shared_ptr<const autodiff::CustomDerivatives> custom_derivatives;
   // Func::in and clone_in: consumers named here read the wrapper instead; "" stands for all others.
   std::map<std::string, std::shared_ptr<FuncContents>> wrappers;
   // Type the user asked for in the declaration (Func f(type, dims)), empty when none
@@ -143,5 +146,5 @@ bool any_node(const Definition& definition, Fs&&... fs) {
 // Scalar and buffer parameters reached from the outputs, in first-use order.
 std::vector<std::shared_ptr<ParameterContents>> parameters_of(const std::vector<FuncPtr>& outputs);
 
-}  // namespace ir
+}  // namespace graph
 }  // namespace retrograde

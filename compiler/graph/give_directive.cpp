@@ -2,7 +2,7 @@
 
 #include <atomic>
 
-namespace retrograde::ir {
+namespace retrograde::graph {
 
 namespace {
 
@@ -117,4 +117,4 @@ bool is_touched(const FuncContents& f) {
   return false;
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::graph

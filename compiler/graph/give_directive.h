@@ -10,7 +10,7 @@
 
 #include "graph/function.h"
 
-namespace retrograde::ir {
+namespace retrograde::graph {
 
 // Whose schedule: that of a Func, of one of its stages, or of a specialization of that.
 struct SchedulePlace {
@@ -47,4 +47,4 @@ void check_is_defined(const FuncContents& f, const std::string& asked);
 void check_stage_directive(const SchedulePlace& place, Directive& directive);
 void check_func_directive(const SchedulePlace& place, Directive& directive);
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::graph

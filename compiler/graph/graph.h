@@ -35,7 +35,7 @@
 
 #include "graph/function.h"
 
-namespace retrograde::ir {
+namespace retrograde::graph {
 
 struct Graph {
   std::vector<FuncPtr> outputs;
@@ -61,4 +61,4 @@ std::string difference(const Graph& a, const Graph& b);
 // names is there.
 void validate(const Graph& graph, const std::string& after_pass);
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::graph

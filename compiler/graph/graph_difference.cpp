@@ -2,7 +2,7 @@
 #include "graph/graph.h"
 #include "graph/graph_lines.h"
 
-namespace retrograde::ir {
+namespace retrograde::graph {
 
 std::string difference(const Graph& a, const Graph& b) {
   const std::vector<Line> as = lines_of(to_text(a)), bs = lines_of(to_text(b));
@@ -22,4 +22,4 @@ std::string difference(const Graph& a, const Graph& b) {
   return "";
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::graph

@@ -6,7 +6,7 @@
 #include "ir/parse.h"
 #include "ir/text.h"
 
-namespace retrograde::ir {
+namespace retrograde::graph {
 
 std::vector<Line> lines_of(const std::string& text) {
   std::vector<Line> lines;
@@ -51,4 +51,4 @@ std::vector<Type> types_of(const Line& line, const std::string& list) {
   return types;
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::graph

@@ -6,7 +6,7 @@
 
 #include "ir/type.h"
 
-namespace retrograde::ir {
+namespace retrograde::graph {
 
 struct Line {
   int number = 0;
@@ -22,4 +22,4 @@ std::vector<Line> lines_of(const std::string& text);  // those that say somethin
 std::string unquoted(const Line& line, const std::string& word);
 std::vector<Type> types_of(const Line& line, const std::string& list);  // "float32, int8"
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::graph

@@ -2,7 +2,7 @@
 
 #include "graph/own_reads.h"
 
-namespace retrograde::ir {
+namespace retrograde::graph {
 
 std::unordered_map<const Symbol*, int> func_calls(const FuncContents& f) {
   std::unordered_map<const Symbol*, int> calls;
@@ -41,4 +41,4 @@ FuncPtr InlinedSizes::largest_part(const FuncContents& f) const {
   return result;
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::graph

@@ -6,7 +6,7 @@
 
 #include "graph/function.h"
 
-namespace retrograde::ir {
+namespace retrograde::graph {
 
 class InlinedSizes {
  public:
@@ -24,4 +24,4 @@ class InlinedSizes {
 // Different nodes that are calls of other Funcs, by callee.
 std::unordered_map<const Symbol*, int> func_calls(const FuncContents& f);
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::graph

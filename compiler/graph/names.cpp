@@ -8,7 +8,7 @@
 #include "ir/lists.h"
 #include "ir/visit.h"
 
-namespace retrograde::ir {
+namespace retrograde::graph {
 
 namespace {
 
@@ -76,4 +76,4 @@ int implicit_index(const std::string& name) {
   return std::all_of(name.begin() + 1, name.end(), is_digit) ? std::stoi(name.substr(1)) : -1;
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::graph

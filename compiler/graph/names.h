@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-namespace retrograde::ir {
+namespace retrograde::graph {
 
 // `wanted` when no entity of this process has that name yet, else a fresh one that begins with it.
 // Characters that a C identifier cannot hold become underscores.
@@ -24,4 +24,4 @@ std::string implicit_name(int n);
 std::vector<std::string> implicit_names(int count);
 int implicit_index(const std::string& name);  // -1: not implicit
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::graph

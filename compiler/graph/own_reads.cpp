@@ -6,7 +6,7 @@
 #include "ir/equal.h"
 #include "ir/lists.h"
 
-namespace retrograde::ir {
+namespace retrograde::graph {
 
 bool is_call_of(const Call& call, const Symbol* f) {
   return call.call_type == CallType::Func && call.symbol.raw() == f;
@@ -73,4 +73,4 @@ Expr read_elsewhere(const FuncContents& f, const Definition& update) {
   return {};
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::graph

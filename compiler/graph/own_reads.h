@@ -7,7 +7,7 @@
 #include "graph/function.h"
 #include "ir/visit.h"
 
-namespace retrograde::ir {
+namespace retrograde::graph {
 
 bool is_call_of(const Call& call, const Symbol* f);
 // The call of the Func that `e` is; null when it is none.
@@ -32,4 +32,4 @@ bool is_pure_position(const FuncContents& f, const Definition& definition, size_
 // Whether `e` is the old value of the element written: its value number k, or (-1) any.
 bool is_old_value(const Expr& e, const FuncContents& f, const Definition& update, int k = -1);
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::graph

@@ -13,7 +13,7 @@
 
 struct halide_buffer_t;
 
-namespace retrograde::ir {
+namespace retrograde::graph {
 
 // Parameter of the compiled function: scalar (Param), image (ImageParam), or an embedded Buffer.
 struct BufferConstraint {
@@ -44,4 +44,4 @@ struct ParameterContents : Symbol {
   std::shared_ptr<FuncContents> func;
 };
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::graph

@@ -14,7 +14,7 @@
 #include "ir/print.h"
 #include "ir/text.h"
 
-namespace retrograde::ir {
+namespace retrograde::graph {
 
 namespace {
 
@@ -431,4 +431,4 @@ class GraphReader {
 
 Graph parse_graph(const std::string& text) { return GraphReader(text).run(); }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::graph

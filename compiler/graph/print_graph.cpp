@@ -5,7 +5,7 @@
 #include "ir/print.h"
 #include "ir/text.h"
 
-namespace retrograde::ir {
+namespace retrograde::graph {
 
 namespace {
 
@@ -199,4 +199,4 @@ Graph graph_of(const std::vector<FuncPtr>& outputs) {
 
 std::string to_text(const Graph& graph) { return GraphPrinter().run(graph); }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::graph

@@ -7,7 +7,7 @@
 
 #include "ir/expr.h"
 
-namespace retrograde::ir {
+namespace retrograde::graph {
 
 enum class Role : uint8_t {
 #define RETROGRADE_ROLE(Name, text) Name,
@@ -61,4 +61,4 @@ struct Provenance {
                    // which number blocks
 };
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::graph

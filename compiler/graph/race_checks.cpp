@@ -10,7 +10,7 @@
 #include "ir/visit.h"
 #include "simplify/simplify.h"
 
-namespace retrograde::ir {
+namespace retrograde::graph {
 
 namespace {
 
@@ -63,4 +63,4 @@ bool can_prove_commutative(const FuncContents& f, const Definition& update) {
   return proof.op && proof.op->commutative && !proof.op->breaks_ties;
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::graph

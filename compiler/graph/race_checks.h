@@ -5,7 +5,7 @@
 
 #include "graph/function.h"
 
-namespace retrograde::ir {
+namespace retrograde::graph {
 
 // Whether iterations of `rvar` touch different elements: no iteration writes what another one, with
 // another value of `rvar`, reads or writes, whatever the values of the other variables are
@@ -21,4 +21,4 @@ bool can_prove_commutative(const FuncContents& f, const Definition& update);
 // the update never writes; undefined when there is none.
 Expr read_of_other_element(const FuncContents& f, const Definition& update);
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::graph

@@ -3,7 +3,7 @@
 #include "ir/build.h"
 #include "ir/visit.h"
 
-namespace retrograde::ir {
+namespace retrograde::graph {
 
 DomainPtr make_domain(std::vector<ReductionVariable> loops) {
   const auto domain = std::make_shared<ReductionDomainContents>();
@@ -38,4 +38,4 @@ Expr rebind_symbol(const Expr& e, const Symbol* from, const SymbolRef& to) {
   });
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::graph

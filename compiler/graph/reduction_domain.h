@@ -7,7 +7,7 @@
 
 #include "ir/expr.h"
 
-namespace retrograde::ir {
+namespace retrograde::graph {
 
 // Reduction variables innermost first, as listed in the RDom.
 struct ReductionVariable {
@@ -37,4 +37,4 @@ Expr rebind_symbol(const Expr& e, const SymbolRef& symbol);
 // With the variables of the symbol `from` referring to another.
 Expr rebind_symbol(const Expr& e, const Symbol* from, const SymbolRef& to);
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::graph

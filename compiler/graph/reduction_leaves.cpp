@@ -2,7 +2,7 @@
 
 #include "diagnostics/error.h"
 
-namespace retrograde::ir {
+namespace retrograde::graph {
 
 namespace {
 
@@ -93,4 +93,4 @@ Leaves leaves_of(const Definition& update, const StageLoops& schedule, const std
   return LeafFinder(update, schedule, asked).take();
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::graph

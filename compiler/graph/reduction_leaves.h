@@ -12,7 +12,7 @@
 #include "ir/build.h"
 #include "ir/visit.h"
 
-namespace retrograde::ir {
+namespace retrograde::graph {
 
 // A reduction loop as a variable.
 struct Leaf {
@@ -33,4 +33,4 @@ struct Leaves {
 // CompileError, for what `asked` wants, when a reduction variable is fused with a pure one.
 Leaves leaves_of(const Definition& update, const StageLoops& schedule, const std::string& asked);
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::graph

@@ -29,7 +29,7 @@
 #include "ir/print.h"
 #include "ir/visit.h"
 
-namespace retrograde::ir {
+namespace retrograde::graph {
 
 namespace {
 
@@ -345,4 +345,4 @@ FuncPtr factor_out(const SchedulePlace& place, const Preserved& preserved,
   return made;
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::graph

@@ -7,7 +7,7 @@
 
 #include "graph/give_directive.h"
 
-namespace retrograde::ir {
+namespace retrograde::graph {
 
 // The new Func, which reduces over the loops that are not named, separately for each value of those
 // that are: these become the variables beside them. `wanted`: its name, made unique; empty: that of
@@ -16,4 +16,4 @@ FuncPtr factor_out(const SchedulePlace& place,
                    const std::vector<std::pair<NamedLoop, std::string>>& preserved,
                    const std::string& wanted = "");
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::graph

@@ -33,7 +33,7 @@ enum class LoopAlignStrategy : uint8_t { AlignStart, AlignEnd, NoAlign, Auto };
 // What prefetch does with the part of its region that lies outside of the data.
 enum class PrefetchBoundStrategy : uint8_t { Clamp, GuardWithIf, NonFaulting };
 
-namespace ir {
+namespace graph {
 
 struct Split {
   enum class Kind : uint8_t { Split, Fuse, Rename };
@@ -143,5 +143,5 @@ struct TraceSchedule {
   std::vector<std::string> tags;
 };
 
-}  // namespace ir
+}  // namespace graph
 }  // namespace retrograde

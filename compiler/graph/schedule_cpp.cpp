@@ -15,7 +15,7 @@
 
 namespace retrograde {
 
-namespace ir {
+namespace graph {
 
 namespace {
 
@@ -261,8 +261,8 @@ class CppPrinter {
 
 }  // namespace
 
-}  // namespace ir
+}  // namespace graph
 
-std::string ScheduleLog::to_cpp() const { return ir::CppPrinter(*this).run(); }
+std::string ScheduleLog::to_cpp() const { return graph::CppPrinter(*this).run(); }
 
 }  // namespace retrograde

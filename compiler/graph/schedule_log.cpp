@@ -23,7 +23,7 @@
 
 namespace retrograde {
 
-namespace ir {
+namespace graph {
 
 namespace {
 
@@ -274,15 +274,17 @@ std::vector<FuncPtr> with_log(const ScheduleLog& log, const std::vector<FuncPtr>
   return copies;
 }
 
-}  // namespace ir
+}  // namespace graph
 
 // ---- text ----
 
 namespace {
 
+using namespace graph;
+
 // blur.update(0).specialization(1).
 std::string place_text(const ScheduleLog::Entry& entry) {
-  std::string out = ir::quote_name(entry.func) + ".";
+  std::string out = quote_name(entry.func) + ".";
   if (entry.stage > 0) out += text("update(", entry.stage - 1, ").");
   for (const int step : entry.special) out += text("specialization(", step, ").");
   return out;
@@ -300,7 +302,7 @@ bool take(std::string& rest, const std::string& word, int& number) {
   return true;
 }
 
-ScheduleLog::Entry parse_entry(const ir::Line& line) {
+ScheduleLog::Entry parse_entry(const Line& line) {
   const size_t quote = line.whole[0] == '`' ? line.whole.find('`', 1) : 0;
   const size_t dot = line.whole.find('.', quote == std::string::npos ? 0 : quote);
   if (dot != std::string::npos && dot > 0) {
@@ -311,9 +313,9 @@ ScheduleLog::Entry parse_entry(const ir::Line& line) {
     int number = -1;
     take(rest, "update", number);
     for (int step = 0; take(rest, "specialization", step);) entry.special.push_back(step);
-    if (const auto directive = ir::parse_directive(rest)) {
+    if (const auto directive = parse_directive(rest)) {
       entry.directive = *directive;
-      if (ir::is_of_stage(*directive) || number >= 0) entry.stage = number + 1;
+      if (is_of_stage(*directive) || number >= 0) entry.stage = number + 1;
       return entry;
     }
   }
@@ -326,18 +328,19 @@ ScheduleLog::Entry parse_entry(const ir::Line& line) {
 
 bool ScheduleLog::Entry::operator==(const Entry& other) const {
   return func == other.func && stage == other.stage && special == other.special &&
-         ir::equal(directive, other.directive);
+         graph::equal(directive, other.directive);
 }
 
 std::string ScheduleLog::to_text() const {
   std::string out;
-  for (const Entry& entry : entries) out += place_text(entry) + ir::to_text(entry.directive) + "\n";
+  for (const Entry& entry : entries)
+    out += place_text(entry) + graph::to_text(entry.directive) + "\n";
   return out;
 }
 
 ScheduleLog ScheduleLog::parse(const std::string& text) {
   ScheduleLog log;
-  for (const ir::Line& line : ir::lines_of(text)) log.entries.push_back(parse_entry(line));
+  for (const Line& line : lines_of(text)) log.entries.push_back(parse_entry(line));
   return log;
 }
 
@@ -356,9 +359,9 @@ namespace {
 
 bool mentions(const ScheduleLog::Entry& entry, const std::string& name) {
   bool found = entry.func == name;
-  ir::Directive copy = entry.directive;
-  ir::visit_names(copy, ir::Overloaded{[&](ir::NamedFunc& f) { found |= f == name; },
-                                       [&](ir::LoopLevel& level) { found |= level.func == name; }});
+  Directive copy = entry.directive;
+  visit_names(copy, Overloaded{[&](NamedFunc& f) { found |= f == name; },
+                               [&](graph::LoopLevel& level) { found |= level.func == name; }});
   return found;
 }
 
@@ -369,21 +372,21 @@ bool is_below(const ScheduleLog::Entry& entry, const ScheduleLog::Entry& place) 
 }
 
 // What becomes of loops whose directive goes: the loop that was there before, or none ("").
-std::map<std::string, std::string> loops_without(const ir::Directive& directive) {
+std::map<std::string, std::string> loops_without(const Directive& directive) {
   std::map<std::string, std::string> loops;
-  if (const auto* split = std::get_if<ir::SplitLoop>(&directive)) {
+  if (const auto* split = std::get_if<SplitLoop>(&directive)) {
     loops = {{split->inner, ""}};
     loops[split->outer] = split->old;
-  } else if (const auto* fuse = std::get_if<ir::FuseLoops>(&directive)) {
+  } else if (const auto* fuse = std::get_if<FuseLoops>(&directive)) {
     loops[fuse->fused] = fuse->inner;
-  } else if (const auto* rename = std::get_if<ir::RenameLoop>(&directive)) {
+  } else if (const auto* rename = std::get_if<RenameLoop>(&directive)) {
     loops[rename->renamed] = rename->old;
   }
   return loops;
 }
 
 // Whether all that it names is still there.
-bool rename_loops(ir::Directive& directive, const ScheduleLog::Entry& gone, bool is_stage,
+bool rename_loops(Directive& directive, const ScheduleLog::Entry& gone, bool is_stage,
                   const std::map<std::string, std::string>& loops) {
   bool is_whole = true;
   const auto rename = [&](std::string& name) {
@@ -392,18 +395,18 @@ bool rename_loops(ir::Directive& directive, const ScheduleLog::Entry& gone, bool
     is_whole &= !found->second.empty();
     name = found->second;
   };
-  if (auto* reorder = std::get_if<ir::ReorderLoops>(&directive); reorder && is_stage) {
-    std::erase_if(reorder->loops, [&](const ir::NamedLoop& loop) {
+  if (auto* reorder = std::get_if<ReorderLoops>(&directive); reorder && is_stage) {
+    std::erase_if(reorder->loops, [&](const NamedLoop& loop) {
       const auto found = loops.find(loop);
       return found != loops.end() && found->second.empty();
     });
   }
-  ir::visit_names(directive, ir::Overloaded{[&](ir::NamedLoop& loop) {
-                                              if (is_stage) rename(loop);
-                                            },
-                                            [&](ir::LoopLevel& level) {
-                                              if (level.func == gone.func) rename(level.var);
-                                            }});
+  visit_names(directive, Overloaded{[&](NamedLoop& loop) {
+                                      if (is_stage) rename(loop);
+                                    },
+                                    [&](graph::LoopLevel& level) {
+                                      if (level.func == gone.func) rename(level.var);
+                                    }});
   return is_whole;
 }
 
@@ -412,11 +415,11 @@ bool rename_loops(ir::Directive& directive, const ScheduleLog::Entry& gone, bool
 ScheduleLog ScheduleLog::without(size_t index) const {
   const Entry& gone = entries[index];
   ScheduleLog log = first(index);
-  const std::string made = ir::made_by(gone.directive);
-  const bool is_factored = std::holds_alternative<ir::FactorOut>(gone.directive);
+  const std::string made = made_by(gone.directive);
+  const bool is_factored = std::holds_alternative<FactorOut>(gone.directive);
   const auto loops = loops_without(gone.directive);
   int special = -1;  // the number of the specialization that goes
-  if (std::holds_alternative<ir::Specialize>(gone.directive)) {
+  if (std::holds_alternative<Specialize>(gone.directive)) {
     special = static_cast<int>(std::ranges::count_if(log.entries, [&](auto& e) {
       return e.directive.index() == gone.directive.index() && e.func == gone.func &&
              e.stage == gone.stage && e.special == gone.special;

@@ -27,7 +27,7 @@ class ScheduleLog {
     std::string func;               // whose schedule
     int stage = -1;                 // -1: of the Func as a whole
     std::vector<int> special = {};  // of the stage's specializations: which, and of that one which
-    ir::Directive directive;
+    graph::Directive directive;
     bool operator==(const Entry& other) const;
   };
   std::vector<Entry> entries;
@@ -50,7 +50,7 @@ class ScheduleLog {
   bool operator==(const ScheduleLog& other) const { return entries == other.entries; }
 };
 
-namespace ir {
+namespace graph {
 
 // What was given to the Funcs of this graph.
 ScheduleLog schedule_log(const std::vector<FuncPtr>& outputs);
@@ -59,5 +59,5 @@ void apply_log(const ScheduleLog& log, const std::vector<FuncPtr>& outputs);
 // A pass from graph to graph: a copy of it with all of that given.
 std::vector<FuncPtr> with_log(const ScheduleLog& log, const std::vector<FuncPtr>& outputs);
 
-}  // namespace ir
+}  // namespace graph
 }  // namespace retrograde

@@ -9,7 +9,7 @@
 #include "ir/print.h"
 #include "ir/visit.h"
 
-namespace retrograde::ir {
+namespace retrograde::graph {
 
 namespace {
 
@@ -144,4 +144,4 @@ void validate(const Graph& graph, const std::string& after_pass) {
   GraphValidator(graph, after_pass).run();
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::graph

@@ -17,7 +17,7 @@
 
 namespace retrograde {
 
-namespace ir {
+namespace graph {
 
 namespace {
 
@@ -320,6 +320,6 @@ FuncPtr func_of_image(const std::shared_ptr<ParameterContents>& image) {
   return owning(image, image->func);
 }
 
-}  // namespace ir
+}  // namespace graph
 
 }  // namespace retrograde

@@ -14,7 +14,7 @@
 
 #include "graph/function.h"
 
-namespace retrograde::ir {
+namespace retrograde::graph {
 
 // `outputs` as they are when nothing is wrapped; otherwise outputs of a copy of the graph, in which
 // users read wrappers. CompileError when a Func is wrapped in another that does not read it.
@@ -34,4 +34,4 @@ FuncPtr clone_of(const FuncPtr& f, const std::string& name);
 // The Func that reads an image point by point, the same for each call.
 FuncPtr func_of_image(const std::shared_ptr<ParameterContents>& image);
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::graph

@@ -6,6 +6,8 @@
 #include <string>
 #include <type_traits>
 
+#include "ir/rooms.h"
+
 struct halide_type_t;
 enum halide_type_code_t : uint8_t;
 

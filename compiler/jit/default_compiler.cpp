@@ -111,11 +111,12 @@ class JitCompiler : public Compiler {
  public:
   std::shared_ptr<CompiledPipeline> compile(const PipelineSpec& pipeline,
                                             const Target& target) override {
-    ir::LowerOptions options;
+    lower::LowerOptions options;
     options.target = pipeline.traced(target);
-    ir::LoweredFunction function = ir::lower(
-        pipeline.name, ir::schedule_unscheduled(pipeline.outputs, ir::vector_unit_of(target)),
-        ir::infer_arguments(pipeline.outputs), options);
+    ir::LoweredFunction function = lower::lower(
+        pipeline.name,
+        autoschedule::schedule_unscheduled(pipeline.outputs, autoschedule::vector_unit_of(target)),
+        lower::infer_arguments(pipeline.outputs), options);
     jit::Options code_options;
     code_options.externs = pipeline.externs;
     auto code = jit::compile(function, target, code_options);
@@ -124,8 +125,8 @@ class JitCompiler : public Compiler {
   }
 
   std::string loop_nest(const PipelineSpec& pipeline, const Target& target) override {
-    return ir::loop_nest_text(
-        ir::schedule_unscheduled(pipeline.outputs, ir::vector_unit_of(target)));
+    return lower::loop_nest_text(
+        autoschedule::schedule_unscheduled(pipeline.outputs, autoschedule::vector_unit_of(target)));
   }
 };
 

@@ -9,7 +9,7 @@
 #include "ir/lowered_function.h"
 #include "ir/target.h"
 
-namespace retrograde::ir {
+namespace retrograde::lower {
 
 #ifdef RETROGRADE_VALIDATE
 constexpr bool validates_passes = true;
@@ -40,4 +40,4 @@ std::string loop_nest_text(const std::vector<FuncPtr>& outputs);
 // Names of the passes in order.
 std::vector<std::string> pass_names();
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::lower

@@ -28,7 +28,7 @@
 #include "lower/vectors/vectorize_inner_loops.h"
 #include "simplify/simplify.h"
 
-namespace retrograde::ir {
+namespace retrograde::lower {
 namespace {
 
 struct Lowering {
@@ -257,4 +257,4 @@ std::vector<std::string> pass_names() {
   return names;
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::lower

@@ -11,7 +11,7 @@
 
 #include "graph/function.h"
 
-namespace retrograde::ir {
+namespace retrograde::lower {
 
 // A Func that gets loops of its own. Expressions are DAGs over the names that the user wrote: pure
 // variables, reduction variables, parameters.
@@ -25,7 +25,7 @@ struct LoopedFunc {
   // A Func with updates whose schedule says inline: it has no single value to substitute, so it is
   // computed in the innermost loop of every stage that uses it.
   bool is_computed_innermost() const {
-    return schedule.compute_level.kind == LoopLevel::Kind::Inlined;
+    return schedule.compute_level.kind == graph::LoopLevel::Kind::Inlined;
   }
 };
 
@@ -58,4 +58,4 @@ std::string place_name(const std::string& func);
 // "f.s1.": what the names of loops and bounds of a stage begin with.
 std::string stage_prefix(const std::string& func, int stage);
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::lower

@@ -7,7 +7,7 @@
 
 #include "ir/build.h"
 
-namespace retrograde::ir {
+namespace retrograde::lower {
 
 inline Expr call_runtime(const char* function, std::vector<Expr> args, Type type = Int(32)) {
   args.insert(args.begin(), Expr(function));
@@ -26,4 +26,4 @@ inline Expr pack(std::vector<Expr> values) {
 }
 inline Expr null_handle() { return reinterpret_as(Handle(), make_uint_const(UInt(64), 0)); }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::lower

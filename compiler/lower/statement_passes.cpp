@@ -5,7 +5,7 @@
 #include "lower/vectors/vectorize_inner_loops.h"
 #include "simplify/simplify.h"
 
-namespace retrograde::ir {
+namespace retrograde::lower {
 
 const std::vector<StatementPass>& statement_passes() {
   static const std::vector<StatementPass> passes = {
@@ -48,4 +48,4 @@ const StatementPass* find_statement_pass(const std::string& name) {
   return nullptr;
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::lower

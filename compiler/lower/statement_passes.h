@@ -8,7 +8,7 @@
 
 #include "ir/expr.h"
 
-namespace retrograde::ir {
+namespace retrograde::lower {
 
 // ---- loops/: FlatStorage, before vectorization -> the same phase ----
 
@@ -69,4 +69,4 @@ struct StatementPass {
 const std::vector<StatementPass>& statement_passes();
 const StatementPass* find_statement_pass(const std::string& name);  // null when there is none
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::lower

@@ -5,7 +5,7 @@
 
 #include "ir/visit.h"
 
-namespace retrograde::ir {
+namespace retrograde::lower {
 
 class StatementRewriter : public Rewriter {
  protected:
@@ -32,4 +32,4 @@ Stmt rewrite_statements(const Stmt& s, Step step) {
   return StatementSteps<Step>(std::move(step))(s);
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::lower

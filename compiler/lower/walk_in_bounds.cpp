@@ -2,7 +2,7 @@
 
 #include "ir/build.h"
 
-namespace retrograde::ir {
+namespace retrograde::lower {
 
 namespace {
 
@@ -50,4 +50,4 @@ void walk_in_bounds(const Stmt& s, FunctionRef<void(const Expr&, const Scope<Int
   if (s.defined()) BoundsWalk(on_expr, on_stmt).visit(s);
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::lower

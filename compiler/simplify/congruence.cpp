@@ -15,7 +15,7 @@
 #include "ir/visit.h"
 #include "simplify/facts.h"
 
-namespace retrograde::ir {
+namespace retrograde::simplification {
 
 namespace {
 
@@ -119,4 +119,4 @@ Congruence Facts::congruence_of_node(const Expr& e) {
   }
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::simplification

@@ -10,7 +10,7 @@
 #include "ir/lists.h"
 #include "ir/visit.h"
 
-namespace retrograde::ir {
+namespace retrograde::simplification {
 
 namespace {
 
@@ -168,4 +168,4 @@ Expr introduce_lets(const Expr& e) { return wrap(introduce_lets(std::vector<Expr
 
 Expr expand_lets(const Expr& e) { return LetExpander()(e); }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::simplification

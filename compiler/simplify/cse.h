@@ -3,7 +3,7 @@
 
 #include "ir/build.h"
 
-namespace retrograde::ir {
+namespace retrograde::simplification {
 
 // Sub-expressions that occur more than once (structurally; leaves and trivial operations excepted)
 // become Lets around the expression, with fresh names. What only an arm of if_then_else computes
@@ -21,4 +21,4 @@ SharedLets introduce_lets(const std::vector<Expr>& es);
 // Replaces Lets by sharing: the result has none. Linear in the number of nodes.
 Expr expand_lets(const Expr& e);
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::simplification

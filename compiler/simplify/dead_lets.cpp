@@ -6,7 +6,7 @@
 #include "ir/visit.h"
 #include "simplify/simplifier.h"
 
-namespace retrograde::ir {
+namespace retrograde::simplification {
 
 namespace {
 
@@ -59,4 +59,4 @@ class DeadLets : public Rewriter {
 Expr drop_dead_lets(const Expr& e) { return DeadLets()(e); }
 Stmt drop_dead_lets(const Stmt& s) { return DeadLets()(s); }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::simplification

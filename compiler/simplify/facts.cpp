@@ -13,7 +13,7 @@
 #include "ir/scalar.h"
 #include "ir/visit.h"
 
-namespace retrograde::ir {
+namespace retrograde::simplification {
 
 // ---- constant ranges ----
 
@@ -481,4 +481,4 @@ int64_t Facts::eliminate_variable(const Sum& sum, int& budget) {
   return replace(sum, *innermost, innermost->factor > 0 ? bounds->max : bounds->min, budget);
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::simplification

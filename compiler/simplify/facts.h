@@ -11,7 +11,7 @@
 #include "ir/node_memo.h"
 #include "ir/sum.h"
 
-namespace retrograde::ir {
+namespace retrograde::simplification {
 
 // Of the values of a type.
 ConstantRange range_of(Type type);
@@ -126,4 +126,4 @@ class Facts {
   int next_order_ = 0;
 };
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::simplification

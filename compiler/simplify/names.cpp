@@ -12,7 +12,7 @@
 #include "ir/visit.h"
 #include "simplify/simplifier.h"
 
-namespace retrograde::ir {
+namespace retrograde::simplification {
 
 namespace {
 
@@ -137,4 +137,4 @@ void Simplifier::unlearn_numbers(const std::vector<std::string>& learned) {
   meanings_.clear();
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::simplification

@@ -1,10 +1,10 @@
 // Comparisons. Of index types everything becomes a question about one sum: sum < 0 or sum == 0.
 #include "ir/build.h"
-#include "ir/scalar.h"
 #include "ir/equal.h"
+#include "ir/scalar.h"
 #include "simplify/simplifier.h"
 
-namespace retrograde::ir {
+namespace retrograde::simplification {
 
 namespace {
 
@@ -223,4 +223,4 @@ Expr Simplifier::compare_vectors(Kind kind, const Expr& a, const Expr& b) {
   return low >= slack ? const_false(lanes) : Expr();
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::simplification

@@ -6,7 +6,7 @@
 #include "ir/scalar.h"
 #include "simplify/simplifier.h"
 
-namespace retrograde::ir {
+namespace retrograde::simplification {
 
 Expr Simplifier::div(const Expr& a, const Expr& b) {
   const std::optional<int64_t> c = as_const_int(b);
@@ -190,4 +190,4 @@ Expr Simplifier::mod_vector(const Ramp& a, int64_t c) {
   return {};
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::simplification

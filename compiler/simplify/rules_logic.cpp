@@ -4,7 +4,7 @@
 #include "ir/equal.h"
 #include "simplify/simplifier.h"
 
-namespace retrograde::ir {
+namespace retrograde::simplification {
 
 namespace {
 
@@ -129,4 +129,4 @@ Expr Simplifier::select(const Expr& condition, const Expr& t, const Expr& f) {
   return make_select(condition, t, f);
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::simplification

@@ -5,7 +5,7 @@
 #include "ir/equal.h"
 #include "simplify/simplifier.h"
 
-namespace retrograde::ir {
+namespace retrograde::simplification {
 
 namespace {
 
@@ -80,4 +80,4 @@ Expr Simplifier::min_max(Kind kind, const Expr& a, const Expr& b) {
   return apply(Kind::Add, nest(kind, operands), rebuild(common));
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::simplification

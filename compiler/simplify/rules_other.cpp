@@ -6,7 +6,7 @@
 #include "ir/visit.h"
 #include "simplify/simplifier.h"
 
-namespace retrograde::ir {
+namespace retrograde::simplification {
 
 // ---- casts ----
 
@@ -215,4 +215,4 @@ bool has_effect(const Expr& e) {
       e, [&](const Call& call) { return call.call_type == CallType::Extern || acts(call.op); });
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::simplification

@@ -5,7 +5,7 @@
 #include "ir/build.h"
 #include "simplify/simplifier.h"
 
-namespace retrograde::ir {
+namespace retrograde::simplification {
 
 namespace {
 
@@ -239,4 +239,4 @@ Expr Simplifier::float_arithmetic(Kind kind, const Expr& a, const Expr& b) {
   return swap ? binary(kind, b, a) : binary(kind, a, b);
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::simplification

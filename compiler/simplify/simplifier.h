@@ -15,11 +15,11 @@
 #include <unordered_set>
 
 #include "ir/expr.h"
+#include "ir/sum.h"
 #include "simplify/facts.h"
 #include "simplify/simplify.h"
-#include "ir/sum.h"
 
-namespace retrograde::ir {
+namespace retrograde::simplification {
 
 class Simplifier {
  public:
@@ -151,4 +151,4 @@ bool is_trivial_value(const Expr& e);
 Expr drop_dead_lets(const Expr& e);
 Stmt drop_dead_lets(const Stmt& s);
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::simplification

@@ -6,7 +6,7 @@
 #include "ir/visit.h"
 #include "simplify/simplifier.h"
 
-namespace retrograde::ir {
+namespace retrograde::simplification {
 
 Expr simplify(const Expr& e, const BoundsMap& bounds) {
   if (!e.defined()) return e;
@@ -172,4 +172,4 @@ Simplifier::Given::~Given() {
   owner_.unlearn_numbers(learned_);
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::simplification

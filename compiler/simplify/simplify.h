@@ -13,7 +13,7 @@
 
 #include "ir/interval.h"
 
-namespace retrograde::ir {
+namespace retrograde::simplification {
 
 // What variables lie between. Ends may mention other variables.
 using BoundsMap = std::unordered_map<std::string, Interval>;
@@ -28,4 +28,4 @@ Stmt simplify(const Stmt& s);
 // False means: not known.
 bool can_prove(const Expr& condition, const BoundsMap& bounds = {});
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::simplification

@@ -5,7 +5,7 @@
 #include "ir/visit.h"
 #include "simplify/simplifier.h"
 
-namespace retrograde::ir {
+namespace retrograde::simplification {
 
 Stmt Simplifier::operator()(const Stmt& s) {
   if (!s.defined()) return s;
@@ -143,4 +143,4 @@ Stmt Simplifier::provide(const Stmt& s, const Provide& n) {
   return children(s);
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::simplification

@@ -18,12 +18,7 @@
 
 namespace retrograde::oracle {
 
-using ir::FuncContents;
-using ir::FuncPtr;
-using ir::Kind;
-using ir::Op;
-using ir::ParameterContents;
-using ir::Scalar;
+using namespace graph;
 
 namespace {
 
@@ -87,22 +82,22 @@ struct Frame {
     Value value;
     uint64_t epoch = 0;  // when it was computed
   };
-  ir::Definition definition;                       // without lets
+  Definition definition;                           // without lets
   std::vector<bool> is_pure_arg;                   // args[d] is the pure variable d itself
   std::unordered_map<std::string, size_t> places;  // of its variables in the point
-  std::unordered_map<const ir::ExprNode*, Slot> slots;
+  std::unordered_map<const ExprNode*, Slot> slots;
   uint64_t epoch = 0;
   Point point;  // pure args, then rvars
 };
 
 Frame frame_of(const FuncContents& func, int stage) {
   Frame frame;
-  frame.definition = map_exprs(func.stage(stage), ir::without_lets);
+  frame.definition = map_exprs(func.stage(stage), without_lets);
   for (const std::string& arg : func.args) frame.places.emplace(arg, frame.places.size());
   for (const auto& rvar : frame.definition.rvars)
     frame.places.emplace(rvar.var, frame.places.size());
   for (size_t d = 0; d < func.args.size(); ++d) {
-    const auto* variable = frame.definition.args[d].as<ir::Variable>();
+    const auto* variable = frame.definition.args[d].as<Variable>();
     frame.is_pure_arg.push_back(variable && variable->name == func.args[d]);
   }
   frame.point.resize(frame.places.size());
@@ -151,7 +146,7 @@ class Interpreter::Impl {
   explicit Impl(InterpreterOptions options) : options_(options) {}
 
   InterpreterOptions options_;
-  std::map<const ir::Symbol*, Hull> touched_;
+  std::map<const Symbol*, Hull> touched_;
   uint64_t operations_ = 0;
 
   std::vector<Array> realize(const std::vector<FuncPtr>& funcs,
@@ -401,31 +396,31 @@ class Interpreter::Impl {
   Value evaluate(Frame& frame, const Expr& e) {
     check_work();
     return match(
-        e, [&](const ir::Variable& n) { return variable(frame, e, n); },
-        [&](const ir::Cast& n) {
+        e, [&](const Variable& n) { return variable(frame, e, n); },
+        [&](const Cast& n) {
           ++operations_;
           return apply_cast(options_.rounding, widened(n.type), get(frame, n.value));
         },
-        [&](const ir::Reinterpret& n) { return reinterpret(frame, n); },
-        [&](const ir::Binary& n) { return binary(frame, n); },
-        [&](const ir::Not& n) {
+        [&](const Reinterpret& n) { return reinterpret(frame, n); },
+        [&](const Binary& n) { return binary(frame, n); },
+        [&](const Not& n) {
           ++operations_;
           return apply_not(get(frame, n.a));
         },
-        [&](const ir::Select& n) { return select(frame, n.condition, n.when_true, n.when_false); },
-        [&](const ir::Call& n) { return call(frame, n); },
-        [&](const ir::ExprNode&) { return constant(e); });
+        [&](const Select& n) { return select(frame, n.condition, n.when_true, n.when_false); },
+        [&](const Call& n) { return call(frame, n); },
+        [&](const ExprNode&) { return constant(e); });
   }
 
   Value constant(const Expr& e) const {
-    const auto scalar = e.type().is_scalar() ? ir::as_scalar(e) : std::nullopt;
+    const auto scalar = e.type().is_scalar() ? as_scalar(e) : std::nullopt;
     if (!scalar) internal_error("not part of an algorithm: " + ir::print(e));
     Value result{*scalar};
     result.scalar.type = widened(e.type());
     return result;
   }
 
-  Value variable(const Frame& frame, const Expr& e, const ir::Variable& n) const {
+  Value variable(const Frame& frame, const Expr& e, const Variable& n) const {
     const auto place = frame.places.find(n.name);
     if (place != frame.places.end()) return {Scalar::of_int(Int(32), frame.point[place->second])};
     const auto* parameter = dynamic_cast<const ParameterContents*>(n.symbol.raw());
@@ -434,7 +429,7 @@ class Interpreter::Impl {
   }
 
   // An arm of && and || that decides alone keeps the other from being evaluated.
-  Value binary(Frame& frame, const ir::Binary& n) {
+  Value binary(Frame& frame, const Binary& n) {
     ++operations_;
     const Value& a = get(frame, n.a);
     if ((n.kind == Kind::And || n.kind == Kind::Or) && !a.is_undef()) {
@@ -457,22 +452,22 @@ class Interpreter::Impl {
     return stable || value.is_undef() ? value : Value::unstable(value.scalar);
   }
 
-  Value reinterpret(Frame& frame, const ir::Reinterpret& n) {
+  Value reinterpret(Frame& frame, const Reinterpret& n) {
     ++operations_;
     const Value exact = apply_cast(options_.rounding, n.value.type(), get(frame, n.value));
     return apply_cast(options_.rounding, widened(n.type), apply_reinterpret(n.type, exact));
   }
 
-  Value call(Frame& frame, const ir::Call& n) {
+  Value call(Frame& frame, const Call& n) {
     switch (n.call_type) {
-      case ir::CallType::Func:
+      case CallType::Func:
         return func_call(frame, n);
-      case ir::CallType::Image:
+      case CallType::Image:
         return image_call(frame, n);
-      case ir::CallType::Extern:
+      case CallType::Extern:
         unsupported("interpret a call of " + quoted(n.name),
                     "a value is computed by operators, not by C functions");
-      case ir::CallType::Operator:
+      case CallType::Operator:
         break;
     }
     switch (n.op) {
@@ -493,24 +488,24 @@ class Interpreter::Impl {
     }
   }
 
-  Value random(Frame& frame, const ir::Call& n) {
+  Value random(Frame& frame, const Call& n) {
     std::vector<uint32_t> words;
     bool stable = true;
     for (const Value& word : all_of(frame, n.args)) {
       words.push_back(static_cast<uint32_t>(word.scalar.u));
       stable &= word.is_stable();
     }
-    const uint32_t bits = ir::random_bits(words.data(), static_cast<int>(words.size()));
-    const Scalar number = n.type.is_float() ? Scalar::of_float(n.type, ir::random_float(bits))
+    const uint32_t bits = random_bits(words.data(), static_cast<int>(words.size()));
+    const Scalar number = n.type.is_float() ? Scalar::of_float(n.type, random_float(bits))
                                             : Scalar::of_uint(UInt(32), bits);
     return steady(apply_cast(Rounding::Strict, widened(n.type), {number}), stable);
   }
 
-  Value require(Frame& frame, const ir::Call& n) {
+  Value require(Frame& frame, const Call& n) {
     if (get(frame, n.args[0]).scalar.as_bool()) return get(frame, n.args[1]);
     std::string message;
     for (size_t i = 2; i < n.args.size(); ++i) {
-      const auto* words = n.args[i].as<ir::StringImm>();
+      const auto* words = n.args[i].as<StringImm>();
       message += text(message.empty() ? "" : " ",
                       words ? words->value : text(get(frame, n.args[i]).scalar.as_double()));
     }
@@ -532,7 +527,7 @@ class Interpreter::Impl {
   }
 
   // "in.extent.1"
-  static Value buffer_fact(const ParameterContents& p, const ir::Variable& n) {
+  static Value buffer_fact(const ParameterContents& p, const Variable& n) {
     const std::string fact = n.name.substr(p.name.size());
     const size_t dot = fact.rfind('.');
     const int d = std::stoi(fact.substr(dot + 1));
@@ -552,14 +547,14 @@ class Interpreter::Impl {
     return point;
   }
 
-  Value func_call(Frame& frame, const ir::Call& n) {
+  Value func_call(Frame& frame, const Call& n) {
     bool stable = true;
     const Point point = coordinates(frame, n.args, stable);
     FuncState& callee = state_of(*static_cast<const FuncContents*>(n.symbol.raw()));
     return steady(read(callee, point, n.component), stable);
   }
 
-  Value image_call(Frame& frame, const ir::Call& n) {
+  Value image_call(Frame& frame, const Call& n) {
     bool stable = true;
     const Point point = coordinates(frame, n.args, stable);
     const auto& p = *static_cast<const ParameterContents*>(n.symbol.raw());

@@ -37,12 +37,12 @@ class Interpreter {
 
   // One Array for each value of the Func. RuntimeError: an image read outside of its bounds, an
   // unbound parameter, a require that fails.
-  std::vector<Array> realize(const ir::FuncPtr& func, const Region& region);
-  std::vector<Array> realize(const std::vector<ir::FuncPtr>& funcs,
+  std::vector<Array> realize(const graph::FuncPtr& func, const Region& region);
+  std::vector<Array> realize(const std::vector<graph::FuncPtr>& funcs,
                              const std::vector<Region>& regions);
 
   // The smallest box around the elements of an image that were read so far; no extents when none.
-  Region touched(const ir::ParameterContents& image) const;
+  Region touched(const graph::ParameterContents& image) const;
 
  private:
   class Impl;

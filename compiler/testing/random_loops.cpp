@@ -40,18 +40,18 @@ class LoopScheduler {
     for (int i = 0; i < splits; ++i) split(random_.below(static_cast<int>(loops_.size())));
     if (random_.chance(20)) fuse();
     if (has_reduction() && context_.is_associative && random_.chance(50)) make_atomic();
-    if (has_reduction() && random_.chance(5)) add(ir::AllowRaces{});
+    if (has_reduction() && random_.chance(5)) add(graph::AllowRaces{});
     if (random_.chance(50)) reorder();
     if (context_.may_specialize && random_.chance(12)) specialize();
     run_kinds();
     if (random_.chance(8)) partition();
-    if (has_failing_specialization_) add(ir::SpecializeFail{"no specialization fits"});
+    if (has_failing_specialization_) add(graph::SpecializeFail{"no specialization fits"});
     variants_.insert(variants_.begin(), loops_);
     return variants_;
   }
 
  private:
-  void add(ir::Directive directive) {
+  void add(graph::Directive directive) {
     log_.entries.push_back({place_.func, place_.stage, place_.special, std::move(directive)});
   }
 
@@ -77,7 +77,7 @@ class LoopScheduler {
       if (i > 0 && condition == variant_condition_) continue;
       variant_condition_ = condition;
       has_failing_specialization_ |= condition == selector_.value && random_.chance(20);
-      add(ir::Specialize{selector_.parameter == condition});
+      add(graph::Specialize{selector_.parameter == condition});
       ScheduleLog::Entry place = place_;
       place.special.push_back(static_cast<int>(variants_.size()));
       LoopScheduler inner(loops_, context_, selector_, place, random_, names_, log_);
@@ -101,7 +101,7 @@ class LoopScheduler {
     Loop outer = old, inner = old;
     outer.name = outer_name;
     inner.name = names_.fresh(stem(old) + "i");
-    add(ir::SplitLoop{old.name, outer.name, inner.name, factor, choose_tail(old, factor)});
+    add(graph::SplitLoop{old.name, outer.name, inner.name, factor, choose_tail(old, factor)});
     outer.is_original = inner.is_original = false;
     outer.extent =
         old.extent == unknown_extent ? unknown_extent : (old.extent + factor - 1) / factor;
@@ -163,7 +163,7 @@ class LoopScheduler {
     fused.name = names_.fresh(fused.is_reduction ? "rrt" : "t");
     const bool known = inner.extent != unknown_extent && outer.extent != unknown_extent;
     fused.extent = known ? inner.extent * outer.extent : unknown_extent;
-    add(ir::FuseLoops{inner.name, outer.name, fused.name});
+    add(graph::FuseLoops{inner.name, outer.name, fused.name});
     loops_[at] = fused;
     loops_.erase(loops_.begin() + at + 1);
   }
@@ -171,7 +171,7 @@ class LoopScheduler {
   void rename() {
     Loop& loop = loops_[random_loop()];
     const std::string name = names_.fresh(stem(loop) + "n");
-    add(ir::RenameLoop{loop.name, name});
+    add(graph::RenameLoop{loop.name, name});
     loop.name = name;
   }
 
@@ -183,7 +183,7 @@ class LoopScheduler {
     }
     if (!context_.is_associative) restore_reduction_order(shuffled);
     loops_ = std::move(shuffled);
-    ir::ReorderLoops order;
+    graph::ReorderLoops order;
     for (const Loop& loop : loops_) order.loops.emplace_back(loop.name);
     add(std::move(order));
   }
@@ -226,7 +226,7 @@ class LoopScheduler {
 
   void set_type(int at, ForType type) {
     loops_[at].type = type;
-    add(ir::RunLoop{loops_[at].name, type});
+    add(graph::RunLoop{loops_[at].name, type});
   }
 
   // As vectorize(x, 8) and its like do, where the outer loop keeps the name.
@@ -261,13 +261,13 @@ class LoopScheduler {
   void make_serial() { set_type(random_loop(), ForType::Serial); }
 
   void make_atomic() {
-    add(ir::MakeAtomic{});
+    add(graph::MakeAtomic{});
     for (Loop& loop : loops_) loop.is_independent = true;
   }
 
   void partition() {
     const Loop& loop = loops_[random_loop()];
-    add(ir::PartitionLoop{loop.name, random_.chance(50) ? Partition::Never : Partition::Always});
+    add(graph::PartitionLoop{loop.name, random_.chance(50) ? Partition::Never : Partition::Always});
   }
 
   Loops loops_;
@@ -287,13 +287,13 @@ struct Origin {
   std::string variable;
   int extent = unknown_extent;
 };
-std::map<std::string, Origin> origins_of(const ir::Definition& definition) {
+std::map<std::string, Origin> origins_of(const graph::Definition& definition) {
   std::map<std::string, Origin> origins;
-  for (const ir::ReductionVariable& v : definition.rvars) {
+  for (const graph::ReductionVariable& v : definition.rvars) {
     const auto extent = ir::as_const_int(v.extent);
     origins[v.var] = {v.var, static_cast<int>(extent.value_or(unknown_extent))};
   }
-  for (const ir::Split& split : definition.schedule.splits) {
+  for (const graph::Split& split : definition.schedule.splits) {
     const Origin old = origins[split.old_var];
     const auto factor = split.factor.defined() ? ir::as_const_int(split.factor) : std::nullopt;
     const int f = static_cast<int>(factor.value_or(1));
@@ -305,17 +305,17 @@ std::map<std::string, Origin> origins_of(const ir::Definition& definition) {
 
 }  // namespace
 
-Loops loops_of(const ir::FuncContents& f, int stage) {
-  const ir::Definition& definition = f.stage(stage);
+Loops loops_of(const graph::FuncContents& f, int stage) {
+  const graph::Definition& definition = f.stage(stage);
   std::map<std::string, Origin> origins = origins_of(definition);
   Loops loops;
-  for (const ir::Dim& dim : definition.schedule.dims) {
-    Loop loop{ir::without_numbers(dim.var)};
+  for (const graph::Dim& dim : definition.schedule.dims) {
+    Loop loop{graph::without_numbers(dim.var)};
     loop.is_reduction = dim.is_reduction;
     if (dim.is_reduction) {
       const Origin& origin = origins[dim.var];
       loop.extent = origin.extent;
-      loop.is_independent = ir::can_prove_race_free(f, definition, origin.variable);
+      loop.is_independent = graph::can_prove_race_free(f, definition, origin.variable);
     } else {
       loop.dimension =
           static_cast<int>(std::find(f.args.begin(), f.args.end(), dim.var) - f.args.begin());
@@ -325,9 +325,9 @@ Loops loops_of(const ir::FuncContents& f, int stage) {
   return loops;
 }
 
-bool is_associative_update(const ir::FuncContents& f, int stage) {
+bool is_associative_update(const graph::FuncContents& f, int stage) {
   if (stage == 0) return false;
-  const ir::AssociativityProof proof = ir::prove_associative(f, f.stage(stage));
+  const analysis::AssociativityProof proof = graph::prove_associative(f, f.stage(stage));
   if (!proof.op || !proof.op->commutative || proof.op->breaks_ties) return false;
   return std::all_of(proof.op->values.begin(), proof.op->values.end(), [](const Expr& value) {
     return !value.type().is_float() || value.as<ir::Min>() || value.as<ir::Max>();

@@ -35,11 +35,11 @@ struct StageContext {
 using LoopVariants = std::vector<Loops>;
 
 // The loops that a stage has now.
-Loops loops_of(const ir::FuncContents& f, int stage);
+Loops loops_of(const graph::FuncContents& f, int stage);
 
 // Whether an update combines each element with something that does not read the Func, by an
 // operator that is associative and commutative bit for bit.
-bool is_associative_update(const ir::FuncContents& f, int stage);
+bool is_associative_update(const graph::FuncContents& f, int stage);
 
 // Fresh names for loops.
 struct LoopNames {

@@ -22,6 +22,8 @@ namespace retrograde::fuzz {
 
 namespace {
 
+using namespace graph;
+
 constexpr int max_reads_inlined = 40;
 constexpr int max_nesting = 3;       // of Funcs computed in loops of each other
 constexpr int ample_storage = 1024;  // more than any dimension ever needs
@@ -77,22 +79,22 @@ class Scheduler {
   // Those that the outputs need, with the Funcs of boundary conditions and inline reductions left
   // out: those stand for what they read.
   void find_funcs() {
-    compiled_ = ir::apply_wrappers(ir::with_log(log_, outputs_of(program_)));
+    compiled_ = apply_wrappers(with_log(log_, outputs_of(program_)));
     std::set<std::string> known;
     for (const Func& f : program_.funcs) known.insert(name_of(*f.function()));
-    for (const ScheduleLog::Entry& entry : log_.entries) known.insert(ir::made_by(entry.directive));
+    for (const ScheduleLog::Entry& entry : log_.entries) known.insert(made_by(entry.directive));
     funcs_.clear();
     std::map<std::string, int> alike;  // a log cannot tell them apart
-    const std::vector<ir::FuncPtr> all = ir::topological_order(compiled_);
-    for (const ir::FuncPtr& f : all) ++alike[name_of(*f)];
-    for (const ir::FuncPtr& f : all) {
+    const std::vector<FuncPtr> all = topological_order(compiled_);
+    for (const FuncPtr& f : all) ++alike[name_of(*f)];
+    for (const FuncPtr& f : all) {
       if (known.count(name_of(*f)) && alike[name_of(*f)] == 1) funcs_.push_back(f);
     }
   }
 
   int count() const { return static_cast<int>(funcs_.size()); }
-  const ir::FuncContents& func(int f) const { return *funcs_[f]; }
-  static std::string name_of(const ir::FuncContents& f) { return ir::without_numbers(f.name); }
+  const FuncContents& func(int f) const { return *funcs_[f]; }
+  static std::string name_of(const FuncContents& f) { return without_numbers(f.name); }
   std::string name(int f) const { return name_of(func(f)); }
   int stages(int f) const { return func(f).stage_count(); }
   bool is_pure(int f) const { return func(f).updates.empty(); }
@@ -103,15 +105,15 @@ class Scheduler {
 
   // Calls `visit` with each Func, by its number, and each image (-1) that the stage reads;
   // `direct`: itself, not through a Func that nobody schedules, each of which is looked into once.
-  using Seen = std::set<const ir::FuncContents*>;
+  using Seen = std::set<const FuncContents*>;
   template <typename Visit>
-  void for_each_read(const ir::FuncContents& f, int stage, const Visit& visit, bool direct = true,
+  void for_each_read(const FuncContents& f, int stage, const Visit& visit, bool direct = true,
                      Seen&& seen = {}) const {
-    walk(f.stage(stage), [&](const ir::Call& call) {
+    walk(f.stage(stage), [&](const Call& call) {
       if (call.symbol.raw() == &f) return;
-      if (call.call_type == ir::CallType::Image) visit(-1, call, direct);
-      if (call.call_type != ir::CallType::Func) return;
-      const ir::FuncPtr callee = ir::func_of(call);
+      if (call.call_type == CallType::Image) visit(-1, call, direct);
+      if (call.call_type != CallType::Func) return;
+      const FuncPtr callee = func_of(call);
       const auto known = std::find(funcs_.begin(), funcs_.end(), callee);
       if (known != funcs_.end()) {
         visit(static_cast<int>(known - funcs_.begin()), call, direct);
@@ -123,7 +125,7 @@ class Scheduler {
   }
   std::set<int> producers_of_stage(int f, int stage) const {
     std::set<int> producers;
-    for_each_read(func(f), stage, [&](int p, const ir::Call&, bool) {
+    for_each_read(func(f), stage, [&](int p, const Call&, bool) {
       if (p >= 0) producers.insert(p);
     });
     return producers;
@@ -150,7 +152,7 @@ class Scheduler {
     return order;
   }
 
-  void add(int f, ir::Directive directive, int stage = -1) {
+  void add(int f, Directive directive, int stage = -1) {
     log_.entries.push_back({name(f), stage, {}, std::move(directive)});
   }
 
@@ -178,17 +180,17 @@ class Scheduler {
   void wrap(int f, std::set<std::string>& wrapped) {
     std::vector<int> users;
     for (int g = 0; g < count(); ++g) {
-      const auto callees = ir::direct_callees(func(g));
+      const auto callees = direct_callees(func(g));
       if (std::find(callees.begin(), callees.end(), funcs_[f]) != callees.end()) users.push_back(g);
     }
     if (users.empty()) return;
     const bool clones = random_.chance(30), for_all = !clones && random_.chance(40);
     const int user = random_.pick(users);
     const std::string made = names_.fresh("w");
-    std::vector<ir::NamedFunc> named;
+    std::vector<NamedFunc> named;
     if (!for_all) named.emplace_back(name(user));
     wrapped.insert({name(f), name(user)});
-    add(f, clones ? ir::Directive(ir::Clone{made, named}) : ir::Directive(ir::Wrap{made, named}));
+    add(f, clones ? Directive(Clone{made, named}) : Directive(Wrap{made, named}));
   }
 
   void factor(int f, int stage) {
@@ -198,12 +200,11 @@ class Scheduler {
     if (loops.empty()) return;
     std::string kept = random_.pick(loops).name;
     if (random_.chance(50)) {
-      const ir::SplitLoop split{kept, names_.fresh("rro"), names_.fresh("rri"),
-                                random_.between(2, 4)};
+      const SplitLoop split{kept, names_.fresh("rro"), names_.fresh("rri"), random_.between(2, 4)};
       add(f, split, stage);
       kept = random_.chance(50) ? split.outer : split.inner;
     }
-    add(f, ir::FactorOut{names_.fresh("p"), {{kept, names_.fresh("u")}}}, stage);
+    add(f, FactorOut{names_.fresh("p"), {{kept, names_.fresh("u")}}}, stage);
   }
 
   // ---- each Func ----
@@ -219,9 +220,9 @@ class Scheduler {
       choose_storage(f);
     }
     if (!random_.chance(5)) return;
-    add(f, ir::TraceLoads{});
-    add(f, ir::TraceStores{});
-    add(f, ir::TraceRealizations{});
+    add(f, TraceLoads{});
+    add(f, TraceStores{});
+    add(f, TraceRealizations{});
   }
 
   bool is_inlined(int f) const { return placements_[f].where == Where::Inlined; }
@@ -230,7 +231,7 @@ class Scheduler {
     const Loops loops = loops_of(func(f), stage);
     if (stage == 0 && is_shared(f)) {
       loops_[f][stage] = {shared_loops_};
-      for (ir::Directive& directive : std::vector(shared_directives_)) add(f, directive, 0);
+      for (Directive& directive : std::vector(shared_directives_)) add(f, directive, 0);
     } else if (is_inlined(f)) {
       loops_[f][stage] = {loops};
     } else {
@@ -268,9 +269,9 @@ class Scheduler {
     if (is_inlined(f)) return;
     for (int s = is_shared(f) ? 1 : 0; s < stages(f); ++s) {
       std::vector<std::string> sources;
-      for_each_read(func(f), s, [&](int p, const ir::Call& call, bool direct) {
+      for_each_read(func(f), s, [&](int p, const Call& call, bool direct) {
         if (direct && (p < 0 || placements_[p].where == Where::Root))
-          sources.push_back(ir::without_numbers(call.name));
+          sources.push_back(without_numbers(call.name));
       });
       if (!sources.empty() && random_.chance(12)) prefetch(f, s, random_.pick(sources));
     }
@@ -285,8 +286,7 @@ class Scheduler {
     if (candidates.empty()) return;
     const size_t at = random_.below(static_cast<int>(candidates.size()));
     const size_t from = random_.chance(60) ? at : candidates.size() - 1;
-    add(f, ir::PrefetchData{source, candidates[at], candidates[from], random_.between(1, 3)},
-        stage);
+    add(f, PrefetchData{source, candidates[at], candidates[from], random_.between(1, 3)}, stage);
   }
 
   // ---- stages that share loops ----
@@ -319,20 +319,20 @@ class Scheduler {
     Loop& outermost = shared_loops_.back();
     if (random_.chance(40)) {
       const std::string outer = names_.fresh("co"), inner = names_.fresh("ci");
-      shared_directives_.push_back(ir::SplitLoop{outermost.name, outer, inner,
-                                                 random_.between(2, 5), TailStrategy::GuardWithIf});
+      shared_directives_.push_back(SplitLoop{outermost.name, outer, inner, random_.between(2, 5),
+                                             TailStrategy::GuardWithIf});
       outermost.name = inner;
       shared_loops_.push_back({outer});
     }
     if (random_.chance(40)) {
       shared_loops_.back().type = ForType::Parallel;
-      shared_directives_.push_back(ir::RunLoop{shared_loops_.back().name, ForType::Parallel});
+      shared_directives_.push_back(RunLoop{shared_loops_.back().name, ForType::Parallel});
     }
     companions_.push_back({f, g, random_.pick(shared_loops_).name});
   }
 
   void join(const Companion& c) {
-    ir::ComputeWith with{{{ir::LoopLevel::Kind::At, name(c.with), c.loop, 0}}};
+    ComputeWith with{{{graph::LoopLevel::Kind::At, name(c.with), c.loop, 0}}};
     const auto align = static_cast<LoopAlignStrategy>(random_.below(4));
     if (align != LoopAlignStrategy::Auto) {
       for (const Loop& loop : shared_loops_) with.align.emplace_back(loop.name, align);
@@ -359,7 +359,7 @@ class Scheduler {
   int reads_of(int f) const {
     int reads = 1;
     for (int s = 0; s < stages(f); ++s) {
-      for_each_read(func(f), s, [&](int p, const ir::Call&, bool) { reads += p >= 0; });
+      for_each_read(func(f), s, [&](int p, const Call&, bool) { reads += p >= 0; });
     }
     return reads;
   }
@@ -374,11 +374,11 @@ class Scheduler {
     if (inlines) {
       placements_[f].where = Where::Inlined;
       inlined_reads_ *= cost;
-      if (is_pure(f) && random_.chance(50)) add(f, ir::ComputeAt{});
+      if (is_pure(f) && random_.chance(50)) add(f, ComputeAt{});
     } else if (choice < 75 && !is_shared(f) && place_at(f)) {
       return;
     } else {
-      add(f, ir::ComputeAt{{root}});
+      add(f, ComputeAt{{root}});
     }
   }
 
@@ -432,10 +432,10 @@ class Scheduler {
     return true;
   }
 
-  static inline const ir::LoopLevel root{ir::LoopLevel::Kind::Root, "", "", -1};
-  ir::LoopLevel loop_level(const Level& level) const {
+  static inline const graph::LoopLevel root{graph::LoopLevel::Kind::Root, "", "", -1};
+  graph::LoopLevel loop_level(const Level& level) const {
     if (level.func < 0) return root;
-    return {ir::LoopLevel::Kind::At, name(level.func), level.name, -1};
+    return {graph::LoopLevel::Kind::At, name(level.func), level.name, -1};
   }
 
   bool place_at(int f) {
@@ -453,7 +453,7 @@ class Scheduler {
     placements_[f].where = Where::At;
     placements_[f].compute = around[compute];
     if (random_.chance(55)) choose_store_level(f, around, compute);
-    add(f, ir::ComputeAt{{loop_level(around[compute])}});
+    add(f, ComputeAt{{loop_level(around[compute])}});
     return true;
   }
 
@@ -486,9 +486,9 @@ class Scheduler {
     placements_[f].stored_outside = true;
     if (random_.chance(20)) {
       const int hoist = random_.between(store, static_cast<int>(legal.size()) - 1);
-      add(f, ir::HoistStorage{{loop_level(legal[hoist])}});
+      add(f, HoistStorage{{loop_level(legal[hoist])}});
     }
-    add(f, ir::StoreAt{{loop_level(legal[store])}});
+    add(f, StoreAt{{loop_level(legal[store])}});
   }
 
   // Specializations may order loops in other ways: then not known.
@@ -505,7 +505,7 @@ class Scheduler {
 
   // What they hold is no part of a memoized Func's key.
   bool reads_image_parameters() const {
-    const auto parameters = ir::parameters_of({funcs_.begin(), funcs_.end()});
+    const auto parameters = parameters_of({funcs_.begin(), funcs_.end()});
     return std::any_of(parameters.begin(), parameters.end(),
                        [](const auto& p) { return p->is_buffer && !p->is_literal; });
   }
@@ -513,28 +513,27 @@ class Scheduler {
   std::string random_dimension(int f) { return random_.pick(func(f).args); }
 
   void choose_storage(int f) {
-    if (random_.chance(10)) add(f, ir::StoreIn{MemoryType::Heap});
+    if (random_.chance(10)) add(f, StoreIn{MemoryType::Heap});
     const bool stored_outside = placements_[f].stored_outside;
     const bool memoized =
         !stored_outside && random_.chance(8) && !is_shared(f) && !reads_image_parameters();
-    if (memoized) add(f, ir::Memoize{});
-    if (!memoized && random_.chance(8) && !is_shared(f)) add(f, ir::Async{});
+    if (memoized) add(f, Memoize{});
+    if (!memoized && random_.chance(8) && !is_shared(f)) add(f, Async{});
     if (dimensions(f) == 0) return;
     if (!memoized && random_.chance(12)) {
       const int alignment = random_.pick(std::vector<int>{2, 4, 16, 5});
-      add(f, ir::AlignStorage{random_dimension(f), alignment});
+      add(f, AlignStorage{random_dimension(f), alignment});
     }
-    if (!memoized && random_.chance(4))
-      add(f, ir::BoundStorage{random_dimension(f), ample_storage});
+    if (!memoized && random_.chance(4)) add(f, BoundStorage{random_dimension(f), ample_storage});
     if (stored_outside && random_.chance(20)) {
       const int factor = random_.pick(std::vector<int>{64, 128, 256});
-      add(f, ir::FoldStorage{random_dimension(f), factor});
+      add(f, FoldStorage{random_dimension(f), factor});
     }
     if (random_.chance(8)) {
       const int modulus = random_.between(2, 5);
-      add(f, ir::AlignBounds{random_dimension(f), modulus, random_.below(modulus)});
+      add(f, AlignBounds{random_dimension(f), modulus, random_.below(modulus)});
     }
-    if (random_.chance(5)) add(f, ir::AlignBounds{random_dimension(f), random_.between(2, 5), {}});
+    if (random_.chance(5)) add(f, AlignBounds{random_dimension(f), random_.between(2, 5), {}});
     if (dimensions(f) > 1 && random_.chance(15)) reorder_storage(f);
   }
 
@@ -543,7 +542,7 @@ class Scheduler {
     for (size_t i = order.size() - 1; i > 0; --i) {
       std::swap(order[i], order[random_.below(static_cast<int>(i) + 1)]);
     }
-    add(f, ir::ReorderStorage{order});
+    add(f, ReorderStorage{order});
   }
 
   // Promises about an output hold for each region that it is computed over.
@@ -554,14 +553,14 @@ class Scheduler {
       add(f, promise(func(f).args[d], regions[0].mins[d], regions[0].extents[d]));
   }
 
-  ir::Directive promise(const std::string& dimension, int min, int extent) {
-    if (random_.chance(60)) return ir::BoundDimension{dimension, min, extent};
-    if (random_.chance(50)) return ir::BoundDimension{dimension, {}, extent};
+  Directive promise(const std::string& dimension, int min, int extent) {
+    if (random_.chance(60)) return BoundDimension{dimension, min, extent};
+    if (random_.chance(50)) return BoundDimension{dimension, {}, extent};
     for (int modulus = 5; modulus > 1; --modulus) {
       const int remainder = ((min % modulus) + modulus) % modulus;
-      if (extent % modulus == 0) return ir::AlignBounds{dimension, modulus, remainder};
+      if (extent % modulus == 0) return AlignBounds{dimension, modulus, remainder};
     }
-    return ir::BoundDimension{dimension, {}, extent};
+    return BoundDimension{dimension, {}, extent};
   }
 
   const RandomProgram& program_;
@@ -569,13 +568,13 @@ class Scheduler {
   LoopNames names_;
   ScheduleLog log_;
   Selector selector_;
-  std::vector<ir::FuncPtr> compiled_, funcs_;  // the outputs; all, producers first
+  std::vector<FuncPtr> compiled_, funcs_;  // the outputs; all, producers first
   std::vector<std::vector<LoopVariants>> loops_;
   std::vector<std::set<Site>> sites_;
   std::vector<Placement> placements_;
   std::vector<Companion> companions_;
   Loops shared_loops_;
-  std::vector<ir::Directive> shared_directives_;
+  std::vector<Directive> shared_directives_;
   int inlined_reads_ = 1;
 };
 

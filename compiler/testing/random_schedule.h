@@ -13,7 +13,7 @@ ScheduleLog random_schedule(const RandomProgram& program, Choices& choices);
 
 // Gives it to the Funcs of a program.
 inline void apply(const ScheduleLog& log, const RandomProgram& program) {
-  ir::apply_log(log, outputs_of(program));
+  graph::apply_log(log, outputs_of(program));
 }
 
 }  // namespace retrograde::fuzz

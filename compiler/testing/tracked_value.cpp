@@ -9,9 +9,7 @@
 
 namespace retrograde::oracle {
 
-using ir::Kind;
-using ir::Op;
-using ir::Scalar;
+using namespace ir;
 
 namespace {
 

@@ -21,7 +21,7 @@ std::vector<HostBuffer> run_in_retrograde(const std::string& name, bool schedule
 std::vector<retrograde::oracle::Array> interpret(const std::string& name) {
   using namespace retrograde;
   const in_retrograde::Built built = in_retrograde::find_case(name).build(false);
-  std::vector<ir::FuncPtr> funcs;
+  std::vector<graph::FuncPtr> funcs;
   std::vector<oracle::Region> regions;
   for (size_t i = 0; i < built.outputs.size(); ++i) {
     funcs.push_back(built.outputs[i].function());

@@ -282,7 +282,7 @@ TEST(DefinitionErrors, RecursionAmongFuncs) {
   b(x) = a(x);
   a.function()->pure->values[0] = b(x);
   expect_error({"circle", "\"circle_b\" -> \"circle_a\""},
-               [&] { ir::topological_order({b.function()}); });
+               [&] { graph::topological_order({b.function()}); });
   a.function()->pure->values[0] = x;
 }
 

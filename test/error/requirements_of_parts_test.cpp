@@ -46,7 +46,7 @@ TEST_F(RequirementsOfParts, Handles) {
   expect("it needs outputs", [&] { Pipeline().outputs(); });
   expect("its outputs are different Funcs", [&] { Pipeline({f, f}); });
   expect("it is a Func or an image that is prefetched",
-         [&] { f.prefetch(std::shared_ptr<ir::ParameterContents>(), x, x); });
+         [&] { f.prefetch(std::shared_ptr<graph::ParameterContents>(), x, x); });
 }
 
 // ---- compiled functions ----

@@ -285,7 +285,7 @@ TEST_F(Rules, HandlersThatComeInPairs) {
 TEST_F(Rules, ExternsAreCFunctions) {
   expect<Unsupported>("what a pipeline calls by name is a C function", [&] { JITExtern e(f); });
   expect("its arguments have the types that it was declared with",
-         [&] { ir::checked_extern_call("abs", Int(32), {Int(32)}, {Expr(1.5f)}); });
+         [&] { frontend::checked_extern_call("abs", Int(32), {Int(32)}, {Expr(1.5f)}); });
 }
 
 TEST_F(Rules, CallablesTakeWhatTheyWereCompiledFor) {
@@ -389,7 +389,7 @@ TEST_F(Rules, CallsOfFuncsWithoutDefinition) {
       ir::call_func("nobody", Int(32), {x}, 0, ir::SymbolRef(nobody.function()));
   expect("every Func that is used needs a definition", [&] { g.realize({4}); });
   expect("a Func is updated after its first definition",
-         [&] { ir::define_update(nobody.function(), {x}, {1}); });
+         [&] { graph::define_update(nobody.function(), {x}, {1}); });
 }
 
 TEST_F(Rules, StagesThatShareLoops) {

@@ -15,7 +15,7 @@
 #include "autodiff/rules/derivative_rules.h"
 #include "ir/build.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 namespace {
 
 std::string cell(const std::string& text) {
@@ -111,4 +111,4 @@ TEST_F(DerivativesPage, holds_the_reasons_of_operators_without_partials) {
 }
 
 }  // namespace
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

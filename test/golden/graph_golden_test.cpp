@@ -16,7 +16,7 @@
 #include "graph/schedule_log.h"
 #include "support/same_numbers.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 namespace {
 
 namespace fs = std::filesystem;
@@ -75,4 +75,4 @@ TEST(GraphPasses, AreAllTested) {
 }
 
 }  // namespace
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

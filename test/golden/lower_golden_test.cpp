@@ -19,7 +19,7 @@
 #include "ir/validate.h"
 #include "lower/statement_passes.h"
 
-namespace retrograde::ir {
+namespace retrograde::lower {
 namespace {
 
 namespace fs = std::filesystem;
@@ -110,4 +110,4 @@ TEST(UnrollLoops, CopiesOfAChoiceFromManyArmsTakeAStepEach) {
 }
 
 }  // namespace
-}  // namespace retrograde::ir
+}  // namespace retrograde::lower

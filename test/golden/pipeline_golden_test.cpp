@@ -16,7 +16,7 @@
 #include "lower/statement_passes.h"
 #include "support/same_numbers.h"
 
-namespace retrograde::ir {
+namespace retrograde::lower {
 namespace {
 
 namespace fs = std::filesystem;
@@ -88,4 +88,4 @@ TEST(PassesOfThePipeline, AreAllTested) {
 }
 
 }  // namespace
-}  // namespace retrograde::ir
+}  // namespace retrograde::lower

@@ -49,9 +49,9 @@ struct Program {
   }
 };
 
-ir::Graph fresh_graph() {
-  static const std::string text = ir::to_text(ir::graph_of({Program().out.function()}));
-  return ir::parse_graph(same_numbers(text));
+graph::Graph fresh_graph() {
+  static const std::string text = graph::to_text(graph::graph_of({Program().out.function()}));
+  return graph::parse_graph(same_numbers(text));
 }
 
 std::vector<std::string> lines_of(const std::string& text) {
@@ -99,20 +99,21 @@ TEST(ScheduleLogs, AreGraphsAndCpp) {
     SCOPED_TRACE(log.to_text());
     SCOPED_TRACE(log.to_text());
     EXPECT_EQ(ScheduleLog::parse(log.to_text()), log);
-    const ir::Graph graph = fresh_graph();
-    const std::string before = ir::to_text(graph);
-    ir::apply_log(log, graph.outputs);
-    const ir::Graph scheduled = ir::graph_of(graph.outputs);
-    ir::validate(scheduled, "apply_log");
-    EXPECT_EQ(same_numbers(ir::schedule_log(graph.outputs).to_text()), log.to_text());
+    const graph::Graph graph = fresh_graph();
+    const std::string before = graph::to_text(graph);
+    graph::apply_log(log, graph.outputs);
+    const graph::Graph scheduled = graph::graph_of(graph.outputs);
+    graph::validate(scheduled, "apply_log");
+    EXPECT_EQ(same_numbers(graph::schedule_log(graph.outputs).to_text()), log.to_text());
     all += "---- log\n" + log.to_text() + "---- graph\n" +
-           same_numbers(news(before, ir::to_text(scheduled))) + "---- C++\n" + log.to_cpp() + "\n";
+           same_numbers(news(before, graph::to_text(scheduled))) + "---- C++\n" + log.to_cpp() +
+           "\n";
   }
   expect_file("directives.out", all);
 }
 
 TEST(ScheduleLogs, EveryDirectiveHasACase) {
-  const std::vector<std::string> names = ir::directive_names();
+  const std::vector<std::string> names = graph::directive_names();
   std::set<std::string> missing(names.begin(), names.end());
   for (const ScheduleLog& log : logs()) {
     for (const ScheduleLog::Entry& entry : log.entries) missing.erase(name_of(entry.directive));
@@ -190,7 +191,7 @@ g.update(0).allow_race_conditions()
   pipeline.apply_schedule(log);
   EXPECT_EQ(same_numbers(pipeline.schedule_log().to_text()), schedule);
   const auto text_of = [](const Func& out) {
-    return same_numbers(ir::to_text(ir::graph_of({out.function()})));
+    return same_numbers(graph::to_text(graph::graph_of({out.function()})));
   };
   EXPECT_EQ(text_of(other.out), text_of(program.out));
 }
@@ -271,7 +272,7 @@ TEST(ScheduleLogs, SayWhatIsWrong) {
   expect_error({"line 2", "every line is a directive of a Func", "f.swap(x)"},
                [] { ScheduleLog::parse("f.compute_at(root)\nf.swap(x)"); });
   const auto refused = [](const std::string& log) {
-    return error_of([&] { ir::apply_log(ScheduleLog::parse(log), fresh_graph().outputs); });
+    return error_of([&] { graph::apply_log(ScheduleLog::parse(log), fresh_graph().outputs); });
   };
   expect_mentions(refused("k.compute_at(root)"),
                   {"every Func that it names is one of the program", "none is called \"k\""});
@@ -288,15 +289,15 @@ TEST(ScheduleLogs, RandomSchedulesAreReplayed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     fuzz::Choices choices(seed);
     const auto program = fuzz::make_program(choices, fuzz::Style::pipelines());
-    const std::vector<ir::FuncPtr> outputs = fuzz::outputs_of(program);
-    const ir::Graph fresh = ir::parse_graph(ir::to_text(ir::graph_of(outputs)));
+    const std::vector<graph::FuncPtr> outputs = fuzz::outputs_of(program);
+    const graph::Graph fresh = graph::parse_graph(graph::to_text(graph::graph_of(outputs)));
     fuzz::apply(fuzz::random_schedule(program, choices), program);
-    const ScheduleLog log = ir::schedule_log(outputs);
+    const ScheduleLog log = graph::schedule_log(outputs);
     SCOPED_TRACE(log.to_text());
     EXPECT_EQ(ScheduleLog::parse(log.to_text()), log);
-    ASSERT_NO_THROW(ir::apply_log(log, fresh.outputs)) << log.to_text();
-    ASSERT_EQ(same_numbers(ir::to_text(ir::graph_of(fresh.outputs))),
-              same_numbers(ir::to_text(ir::graph_of(outputs))))
+    ASSERT_NO_THROW(graph::apply_log(log, fresh.outputs)) << log.to_text();
+    ASSERT_EQ(same_numbers(graph::to_text(graph::graph_of(fresh.outputs))),
+              same_numbers(graph::to_text(graph::graph_of(outputs))))
         << log.to_text();
   }
 }

@@ -191,14 +191,14 @@ std::string as_code(const char* text) {
 }
 
 std::string statement_text(const std::vector<Func>& outputs, View view) {
-  std::vector<ir::FuncPtr> funcs;
+  std::vector<graph::FuncPtr> funcs;
   for (const Func& f : outputs) funcs.push_back(f.function());
   std::string result;
-  ir::LowerOptions options;
+  lower::LowerOptions options;
   options.stop_after = view;
   // Loops that no directive speaks of stay as they are.
   options.target = Target("x86-64-linux-disable_llvm_loop_opt");
-  ir::LoweredFunction lowered = ir::lower("f", funcs, ir::infer_arguments(funcs), options);
+  ir::LoweredFunction lowered = lower::lower("f", funcs, lower::infer_arguments(funcs), options);
   return ir::print(lowered.body);
 }
 

@@ -16,7 +16,7 @@
 #include "ir/scalar.h"
 #include "support/errors.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 namespace {
 
 using Env = std::map<std::string, int64_t>;
@@ -517,4 +517,4 @@ TEST(AccessInversion, RandomQuasiAffineAccessesAgreeWithEnumeration) {
 }
 
 }  // namespace
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

@@ -60,12 +60,12 @@ Work work_of_chain(int stages) {
   work["propagate_adjoints"] = lap();
   Pipeline({loss, gradient}).auto_schedule(get_jit_target_from_environment());
   work["auto_schedule"] = lap();
-  const std::vector<ir::FuncPtr> outputs =
-      ir::schedule_unscheduled({loss.function(), gradient.function()});
+  const std::vector<graph::FuncPtr> outputs =
+      autoschedule::schedule_unscheduled({loss.function(), gradient.function()});
   work["schedule_unscheduled"] = lap();
-  ir::LowerOptions options;
+  lower::LowerOptions options;
   options.observe = [&](const std::string& pass, double, const Stmt&) { work[pass] = lap(); };
-  ir::lower("chain", outputs, ir::infer_arguments(outputs), options);
+  lower::lower("chain", outputs, lower::infer_arguments(outputs), options);
   return work;
 }
 

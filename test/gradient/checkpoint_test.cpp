@@ -297,7 +297,7 @@ TEST(Checkpoints, OperationsFollowTheSchedule) {
   for (int s : {1, 4, 10, 100}) {
     Program p = pushed(100);
     Derivative d = propagate_adjoints(p.loss, {.wrt = {p.inputs[0]}, .checkpoint_states = s});
-    double again = static_cast<double>(ir::revolve_advances(100, s));
+    double again = static_cast<double>(autodiff::revolve_advances(100, s));
     // 7 sines in each step that is run: for the loss, again, and to reverse it; there a cosine,
     // too.
     EXPECT_EQ(d.operations().gradient.nonlinear().value(), 7 * (100 + again + 100 + 100));
@@ -415,7 +415,7 @@ TEST(Checkpoints, AtRunTimeStepsAreComputedAgainAsOftenAsTheBinomialBoundSays) {
       n.set(steps);
       evaluations = 0;
       gradient.realize({1});
-      EXPECT_EQ(evaluations, steps + ir::revolve_advances(steps, s) + steps)
+      EXPECT_EQ(evaluations, steps + autodiff::revolve_advances(steps, s) + steps)
           << steps << " steps, " << s << " states";
     }
   }

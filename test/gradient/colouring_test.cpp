@@ -14,7 +14,7 @@
 #include "frontend/language/func.h"
 #include "support/errors.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 namespace {
 
 using Differences = std::vector<std::vector<int64_t>>;
@@ -251,4 +251,4 @@ TEST(Compression, IsFoundOrRefusedForAnyNumberOfOperations) {
 }
 
 }  // namespace
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

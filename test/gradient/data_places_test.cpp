@@ -66,17 +66,17 @@ std::string plain(const std::string& text) {
 }
 
 std::string log_of(const std::vector<Func>& outputs) {
-  std::vector<ir::FuncPtr> funcs;
+  std::vector<graph::FuncPtr> funcs;
   for (const Func& f : outputs) funcs.push_back(f.function());
-  return plain(ir::schedule_log(ir::schedule_unscheduled(funcs)).to_text());
+  return plain(graph::schedule_log(autoschedule::schedule_unscheduled(funcs)).to_text());
 }
 
 // A copy in which every sum is at root, in plain loops.
 Pipeline in_plain_loops(const std::vector<Func>& outputs) {
-  std::vector<ir::FuncPtr> funcs;
+  std::vector<graph::FuncPtr> funcs;
   for (const Func& f : outputs) funcs.push_back(f.function());
-  const std::vector<ir::FuncPtr> copies = ir::copy_graph(funcs).outputs;
-  for (const ir::FuncPtr& f : ir::topological_order(copies)) {
+  const std::vector<graph::FuncPtr> copies = graph::copy_graph(funcs).outputs;
+  for (const graph::FuncPtr& f : graph::topological_order(copies)) {
     if (!f->is_pure()) Func(f).compute_root();
   }
   Pipeline pipeline(std::vector<Func>(copies.begin(), copies.end()));
@@ -135,7 +135,7 @@ TEST(ScatterSlices, AreNotOfWhatFitsACache) {
 TEST(ScatterSlices, AreNotWhereSeveralReadThem) {
   Warp warp(136, 128);
   std::vector<Func> outputs = warp.outputs();
-  Func sum = Func(ir::direct_callees(*outputs[0].function())[0]);
+  Func sum = Func(graph::direct_callees(*outputs[0].function())[0]);
   ASSERT_NE(sum.name().find("_sum"), std::string::npos);
   Var x("x"), y("y"), c("c");
   Func other("other");
@@ -195,7 +195,8 @@ TEST(SumsOfParts, LieAsTheParts) {
   Func adjoint = d(grid);
   adjoint.set_estimates({{0, cells}, {0, cells}, {0, 8}, {0, 12}});
   std::vector<std::string> layouts;
-  for (const ir::FuncPtr& f : ir::topological_order(ir::schedule_unscheduled({adjoint.function()})))
+  for (const graph::FuncPtr& f :
+       graph::topological_order(autoschedule::schedule_unscheduled({adjoint.function()})))
     if (!f->schedule.storage_dims.empty() && f->schedule.storage_dims[0] != f->args[0])
       layouts.push_back(f->name);
   ASSERT_EQ(layouts.size(), 2u) << log_of({adjoint});
@@ -217,7 +218,7 @@ TEST(TransposedReads, AreSeenThroughWhatIsInline) {
   sum() = 0.0f;
   sum() += scaled(r.x, r.y) * other(r.x, r.y);
   const Derivative d = propagate_adjoints(sum);
-  const ir::FuncPtr adjoint = ir::schedule_unscheduled({d(image).function()})[0];
+  const graph::FuncPtr adjoint = autoschedule::schedule_unscheduled({d(image).function()})[0];
   ASSERT_EQ(adjoint->pure->schedule.dims.size(), 4u) << log_of({d(image)});
 }
 

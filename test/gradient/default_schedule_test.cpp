@@ -28,14 +28,15 @@ struct DefaultSchedule : ::testing::Test {
     loss() += blur(r.x, r.y) * blur(r.x, r.y);
   }
   // `f` as it is compiled in the pipeline of `output`.
-  static ir::FuncContents scheduled(const Func& output, const Func& f) {
-    const auto funcs = ir::topological_order(ir::schedule_unscheduled({output.function()}));
+  static graph::FuncContents scheduled(const Func& output, const Func& f) {
+    const auto funcs =
+        graph::topological_order(autoschedule::schedule_unscheduled({output.function()}));
     const auto found = std::find_if(funcs.begin(), funcs.end(),
-                                    [&](const ir::FuncPtr& g) { return g->name == f.name(); });
-    return found == funcs.end() ? ir::FuncContents() : **found;
+                                    [&](const graph::FuncPtr& g) { return g->name == f.name(); });
+    return found == funcs.end() ? graph::FuncContents() : **found;
   }
   static bool is_stored(const Func& output, const Func& f) {
-    return scheduled(output, f).schedule.compute_level.kind == ir::LoopLevel::Kind::Root;
+    return scheduled(output, f).schedule.compute_level.kind == graph::LoopLevel::Kind::Root;
   }
 
   Buffer<float> a{32, 32};
@@ -44,7 +45,7 @@ struct DefaultSchedule : ::testing::Test {
 };
 
 TEST_F(DefaultSchedule, LeavesPipelinesWithoutAdjointsAlone) {
-  EXPECT_EQ(ir::schedule_unscheduled({loss.function()})[0], loss.function());
+  EXPECT_EQ(autoschedule::schedule_unscheduled({loss.function()})[0], loss.function());
 }
 
 // Levels, each of half the sides of the one before, put together again: f3 is copied 27 times into
@@ -76,9 +77,10 @@ struct UnscheduledPyramid : DefaultSchedule {
     a.for_each_element([&](int i, int j) { a(i, j) = static_cast<float>((7 * i + 13 * j) % 31); });
   }
   size_t stored() const {
-    const auto all = ir::topological_order(ir::schedule_unscheduled({funcs.back().function()}));
-    return std::count_if(all.begin(), all.end(), [](const ir::FuncPtr& f) {
-      return f->schedule.compute_level.kind == ir::LoopLevel::Kind::Root;
+    const auto all =
+        graph::topological_order(autoschedule::schedule_unscheduled({funcs.back().function()}));
+    return std::count_if(all.begin(), all.end(), [](const graph::FuncPtr& f) {
+      return f->schedule.compute_level.kind == graph::LoopLevel::Kind::Root;
     });
   }
 
@@ -125,10 +127,10 @@ TEST_F(UnscheduledPyramid, ThatIsReadAnywhereStaysInline) {
 TEST_F(DefaultSchedule, StoresWhatIsReadOftenAndCosts) {
   Derivative d = propagate_adjoints(loss);
   ASSERT_TRUE(is_stored(d(a), heavy));
-  const std::vector<ir::Dim> loops = scheduled(d(a), heavy).pure->schedule.dims;
+  const std::vector<graph::Dim> loops = scheduled(d(a), heavy).pure->schedule.dims;
   EXPECT_EQ(loops.back().runs, ForType::Parallel);
   EXPECT_EQ(loops.front().runs, ForType::Vectorized);
-  EXPECT_EQ(heavy.function()->schedule.compute_level.kind, ir::LoopLevel::Kind::Inlined)
+  EXPECT_EQ(heavy.function()->schedule.compute_level.kind, graph::LoopLevel::Kind::Inlined)
       << "the Func itself is not changed";
 }
 
@@ -155,12 +157,13 @@ TEST_F(DefaultSchedule, ALossThatIsCutLeavesTheRestOfThePrimalToTheSchedule) {
   sum() = 0.0f;
   sum() += costly(r.x, r.y) * costly(r.x + 1, r.y);
   Derivative d = propagate_adjoints(sum);
-  const auto funcs =
-      ir::topological_order(ir::schedule_unscheduled({sum.function(), d(wide).function()}));
-  const auto found = std::find_if(funcs.begin(), funcs.end(),
-                                  [&](const ir::FuncPtr& g) { return g->name == costly.name(); });
+  const auto funcs = graph::topological_order(
+      autoschedule::schedule_unscheduled({sum.function(), d(wide).function()}));
+  const auto found = std::find_if(funcs.begin(), funcs.end(), [&](const graph::FuncPtr& g) {
+    return g->name == costly.name();
+  });
   ASSERT_NE(found, funcs.end());
-  EXPECT_EQ((*found)->schedule.compute_level.kind, ir::LoopLevel::Kind::Root);
+  EXPECT_EQ((*found)->schedule.compute_level.kind, graph::LoopLevel::Kind::Root);
 }
 
 void expect_all_likely(const Expr& condition) {
@@ -183,7 +186,7 @@ TEST_F(DefaultSchedule, ConditionsOfAGatherOverAStencilAreTestedInItsBordersOnly
   f(x, y) += wide(x + taps, y) * weights(taps);
   sum() = 0.0f;
   sum() += f(r.x, r.y) * f(r.x, r.y);
-  const ir::FuncPtr adjoint = propagate_adjoints(sum)(wide).function();
+  const graph::FuncPtr adjoint = propagate_adjoints(sum)(wide).function();
   ASSERT_TRUE(adjoint->updates.back().predicate.defined());
   expect_all_likely(adjoint->updates.back().predicate);
 }
@@ -198,7 +201,7 @@ TEST_F(DefaultSchedule, ConditionsOfATriangleAreNoBorders) {
   f(t.y) += wide(t.x);
   sum() = 0.0f;
   sum() += f(r) * f(r);
-  const ir::FuncPtr adjoint = propagate_adjoints(sum)(wide).function();
+  const graph::FuncPtr adjoint = propagate_adjoints(sum)(wide).function();
   const Expr& predicate = adjoint->updates.back().predicate;
   ASSERT_TRUE(predicate.defined());
   std::vector<Expr> conjuncts{predicate};
@@ -229,7 +232,7 @@ TEST_F(DefaultSchedule, ScattersRunInVectorsThatKeepTheirOrder) {
   sum() = 0.0f;
   sum() += rows(clamp(place(r.x, r.y), 0, 639), r.y);
   Derivative d = propagate_adjoints(sum);
-  const ir::FuncContents gradient = scheduled(d(rows), d(rows));
+  const graph::FuncContents gradient = scheduled(d(rows), d(rows));
   ASSERT_EQ(gradient.stage_count(), 2);
   EXPECT_EQ(gradient.stage(1).schedule.dims.front().runs, ForType::Vectorized);
   EXPECT_EQ(gradient.stage(1).schedule.dims.back().runs, ForType::Parallel);
@@ -325,8 +328,8 @@ TEST_F(DefaultSchedule, CornersOfACellAreTapsOfOneScatter) {
     Derivative d = propagate_adjoints(warp.loss);
     Func adjoint = d(warp.image);
     size_t scatters = 0;
-    for (const ir::FuncPtr& f : ir::topological_order({adjoint.function()})) {
-      for (const ir::Definition& update : f->updates)
+    for (const graph::FuncPtr& f : graph::topological_order({adjoint.function()})) {
+      for (const graph::Definition& update : f->updates)
         scatters += update.rvars.size() > 2 && update.rvars.back().var.rfind("tap", 0) == 0;
     }
     EXPECT_EQ(scatters, 1u);
@@ -356,7 +359,7 @@ TEST_F(DefaultSchedule, ReductionsKeepATileOfTheirSumsInRegisters) {
   layer(x, y, c) = 0.0f;
   layer(x, y, c) += kernels(r.x, r.y, r.z, c) * image(x + r.x, y + r.y, r.z);
   Derivative d = propagate_adjoints(layer, seed);
-  const std::vector<ir::Dim> loops = scheduled(d(image), d(image)).updates.back().schedule.dims;
+  const std::vector<graph::Dim> loops = scheduled(d(image), d(image)).updates.back().schedule.dims;
   ASSERT_GE(loops.size(), 5u);
   EXPECT_EQ(loops[0].runs, ForType::Vectorized);
   EXPECT_EQ(loops[1].runs, ForType::Unrolled);
@@ -377,15 +380,15 @@ TEST_F(DefaultSchedule, SumsOfShiftedRowsAreTakenRowByRow) {
   decayed(x, y, c) = 0.5f * decayed(x, y, c) + image(x + r.y, y + r.z, r.x);
   const auto order = [](const Func& f) {
     std::vector<std::string> names;
-    for (const ir::ReductionVariable& loop :
-         ir::reduction_loops(*f.function(), f.function()->stage(1)))
+    for (const graph::ReductionVariable& loop :
+         autoschedule::reduction_loops(*f.function(), f.function()->stage(1)))
       names.push_back(loop.var);
     return names;
   };
   EXPECT_EQ(order(layer), (std::vector<std::string>{r.y.name(), r.z.name(), r.x.name()}));
   EXPECT_EQ(order(decayed), (std::vector<std::string>{r.x.name(), r.y.name(), r.z.name()}));
   const auto shifts = [&](size_t d) {
-    return ir::shifts_reads(*layer.function(), layer.function()->stage(1), d);
+    return autoschedule::shifts_reads(*layer.function(), layer.function()->stage(1), d);
   };
   EXPECT_TRUE(shifts(0));
   EXPECT_TRUE(shifts(1));
@@ -398,15 +401,15 @@ TEST_F(DefaultSchedule, TilesUseWhatComesFromAfarMoreOften) {
   Buffer<float> matrix(64, 64), line(256);
   RDom k(0, 64);
   const auto tile_of = [&](const Func& f) {
-    const auto tile = ir::register_tile(*f.function(), f.function()->stage(1), 16, 4, {},
-                                        ir::SizeEstimate({f.function()}));
-    return tile.value_or(ir::RegisterTile());
+    const auto tile = autoschedule::register_tile(*f.function(), f.function()->stage(1), 16, 4, {},
+                                                  autoschedule::SizeEstimate({f.function()}));
+    return tile.value_or(autoschedule::RegisterTile());
   };
   Func far("far"), near("near");
   far(x, y) += matrix(k, y) * matrix(x, k);
   near(x, y) += matrix(k, y) * line(x + k);
   for (Func f : {far, near}) f.set_estimates({{0, 64}, {0, 64}});
-  const ir::RegisterTile from_afar = tile_of(far), side_by_side = tile_of(near);
+  const autoschedule::RegisterTile from_afar = tile_of(far), side_by_side = tile_of(near);
   ASSERT_EQ(from_afar.sides.size(), 1u);
   ASSERT_EQ(side_by_side.sides.size(), 1u);
   EXPECT_GT(from_afar.vectors * from_afar.sides[0].size,
@@ -419,12 +422,12 @@ TEST_F(DefaultSchedule, TilesFitTheRegisters) {
   RDom k(0, 64);
   Buffer<float> left(64, 64), right(64, 64);
   product(x, y) += left(k, y) * right(x, k);
-  const ir::FuncContents& f = *product.function();
+  const graph::FuncContents& f = *product.function();
   const auto sums = [&](int64_t bytes) {
-    const auto tile = ir::register_tile(f, f.stage(1), 16, 4, {bytes});
+    const auto tile = autoschedule::register_tile(f, f.stage(1), 16, 4, {bytes});
     int64_t count = tile ? tile->vectors : 0;
     if (tile) {
-      for (const ir::RegisterTile::Side& side : tile->sides) count *= side.size;
+      for (const autoschedule::RegisterTile::Side& side : tile->sides) count *= side.size;
     }
     return count * 64;
   };
@@ -437,7 +440,7 @@ TEST_F(DefaultSchedule, TilesFitTheRegisters) {
 
 // The log of the schedule that all of `output` gets, and whether its values are those without one.
 std::string log_of(const Func& output, const std::vector<int32_t>& sizes) {
-  const ir::GraphCopy copy = ir::copy_graph({output.function()});
+  const graph::GraphCopy copy = graph::copy_graph({output.function()});
   Pipeline plain(Func(copy.outputs[0])), pipeline(output);
   plain.unscheduled();
   const Buffer<float> expected = plain.realize(sizes)[0];
@@ -482,7 +485,7 @@ TEST_F(DefaultSchedule, FewPlanesAreCutIntoTasksOfRows) {
   Func square("square");
   square(x, y, c) = image(x, y, c) * image(x, y, c);
   Func gradient = propagate_adjoints(square, seed)(image);
-  const std::vector<ir::Dim> loops = scheduled(gradient, gradient).pure->schedule.dims;
+  const std::vector<graph::Dim> loops = scheduled(gradient, gradient).pure->schedule.dims;
   ASSERT_GE(loops.size(), 3u);
   EXPECT_EQ(loops[loops.size() - 1].runs, ForType::Parallel);
   EXPECT_EQ(loops[loops.size() - 2].runs, ForType::Parallel);
@@ -501,7 +504,7 @@ TEST_F(DefaultSchedule, PartsOfASumAreManyWhereItsLastLoopIsShort) {
   const Derivative d = propagate_adjoints(sum);
   const Func by_gamma = d(gamma);
   bool has_parts = false;
-  for (const ir::FuncPtr& f : ir::topological_order({by_gamma.function()})) {
+  for (const graph::FuncPtr& f : graph::topological_order({by_gamma.function()})) {
     if (!f->made || !f->made->has_parts) continue;
     has_parts = true;
     const std::string last = ir::print(f->updates[0].rvars.back().extent);
@@ -527,7 +530,7 @@ TEST_F(DefaultSchedule, SumsThatLookTheSamePlacesUpShareTheirLoops) {
   const Derivative d = propagate_adjoints(warped, seed);
   Func by_flow = d(flow);
   const Buffer<float> apart = [&] {
-    const ir::GraphCopy copy = ir::copy_graph({by_flow.function()});
+    const graph::GraphCopy copy = graph::copy_graph({by_flow.function()});
     Pipeline pipeline(Func(copy.outputs[0]));
     pipeline.unscheduled();
     return Buffer<float>(pipeline.realize({size, size, 2})[0]);
@@ -548,8 +551,9 @@ TEST_F(DefaultSchedule, TilesFitTheSizesThatAreKnown) {
   RDom k(0, 64);
   product(x, y) += left(y, k) * right(x, k);
   product.set_estimates({{0, 64}, {0, 11}});
-  const auto tile = ir::register_tile(*product.function(), product.function()->stage(1), 16, 4, {},
-                                      ir::SizeEstimate({product.function()}));
+  const auto tile =
+      autoschedule::register_tile(*product.function(), product.function()->stage(1), 16, 4, {},
+                                  autoschedule::SizeEstimate({product.function()}));
   ASSERT_TRUE(tile.has_value());
   ASSERT_EQ(tile->sides.size(), 1u);
   EXPECT_EQ(tile->sides[0].size, 11) << "no rest";
@@ -566,14 +570,14 @@ TEST_F(DefaultSchedule, SizesFollowFromThoseOfTheOutputs) {
   second(x, y) = 0.0f;
   second(x, y) += first(x + r, y);
   second.set_estimate(x, 0, 40);
-  const ir::SizeEstimate sizes({second.function()});
+  const autoschedule::SizeEstimate sizes({second.function()});
   EXPECT_EQ(sizes.extent(*second.function(), 0), 40);
   EXPECT_EQ(sizes.extent(*second.function(), 1), std::nullopt);
   EXPECT_EQ(sizes.extent(*first.function(), 0), 42);
   EXPECT_EQ(sizes.extent(*edge.function(), 0), 83);
   EXPECT_EQ(sizes.extent(*edge.function(), 1), std::nullopt);
   second.set_estimate(y, 0, 30);
-  EXPECT_EQ(ir::SizeEstimate({second.function()}).extent(*edge.function(), 1), 30);
+  EXPECT_EQ(autoschedule::SizeEstimate({second.function()}).extent(*edge.function(), 1), 30);
 }
 
 TEST_F(DefaultSchedule, SumsToAFewElementsAreCut) {
@@ -634,7 +638,7 @@ TEST_F(DefaultSchedule, BordersReadMoreOftenLeaveThePlacesOfTheInteriorAlone) {
   inside(x, y) = small(x, y);
   large(x, y) = inside(clamp(x / 2 - 1, 0, 63), y);
   Func adjoint = propagate_adjoints(large, seed)(inside);
-  for (const ir::Definition& update : adjoint.function()->updates)
+  for (const graph::Definition& update : adjoint.function()->updates)
     for (const Expr& value : update.values) EXPECT_FALSE(has_select(value)) << print(value);
   const Buffer<float> gradient = adjoint.realize({64, 5});
   for (int j = 0; j < 5; ++j) {
@@ -647,11 +651,12 @@ TEST_F(DefaultSchedule, BordersReadMoreOftenLeaveThePlacesOfTheInteriorAlone) {
 
 // Reads of `read` in the last stage of `reader`.
 double reads(const Func& reader, const Func& read) {
-  const ir::FuncContents& f = *reader.function();
-  const ir::Definition& stage = f.stage(f.stage_count() - 1);
+  const graph::FuncContents& f = *reader.function();
+  const graph::Definition& stage = f.stage(f.stage_count() - 1);
   double total = 0;
   walk(stage, [&](const ir::Call& call) {
-    if (call.symbol.raw() == read.function().get()) total += ir::reads_an_element(call, f, stage);
+    if (call.symbol.raw() == read.function().get())
+      total += autoschedule::reads_an_element(call, f, stage);
   });
   return total;
 }
@@ -713,7 +718,7 @@ TEST_F(DefaultSchedule, TilesWhatItReadsAcross) {
   sum() = 0.0f;
   sum() += a(r.y, r.x) * b(r.x, r.y);
   Derivative d = propagate_adjoints(sum);
-  const std::vector<ir::Dim> loops = scheduled(d(a), d(a)).pure->schedule.dims;
+  const std::vector<graph::Dim> loops = scheduled(d(a), d(a)).pure->schedule.dims;
   ASSERT_EQ(loops.size(), 4u);
   EXPECT_EQ(loops[0].runs, ForType::Vectorized);
   EXPECT_EQ(loops[3].runs, ForType::Parallel);
@@ -727,7 +732,7 @@ TEST_F(DefaultSchedule, TilesAPlaneThatIsReadAcross) {
   sum() = 0.0f;
   sum() += planes(r.y, r.x, 0) * planes(r.y, r.x, 20) * a(r.x, r.y);
   Func gradient = propagate_adjoints(sum)(planes);
-  const ir::FuncContents adjoint = scheduled(gradient, gradient);
+  const graph::FuncContents adjoint = scheduled(gradient, gradient);
   ASSERT_EQ(adjoint.stage_count(), 3);
   ASSERT_EQ(adjoint.stage(1).schedule.dims.size(), 4u);
   EXPECT_EQ(adjoint.stage(1).schedule.dims[3].runs, ForType::Parallel);

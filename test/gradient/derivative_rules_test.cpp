@@ -19,7 +19,7 @@
 #include "support/errors.h"
 #include "support/evaluate.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 namespace {
 
 constexpr double inf = std::numeric_limits<double>::infinity();
@@ -434,4 +434,4 @@ TEST(FrontEndAlone, SaysWhatToLink) {
 }
 
 }  // namespace
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

@@ -260,7 +260,7 @@ TEST(ExtremeOperands, EveryOperatorWithPartialsIsListed) {
   for (const Row& row : rows()) listed.insert(row.name);
   for (int i = 0; i < ir::op_count; ++i) {
     const Op op = static_cast<Op>(i);
-    if (ir::derivative_rule(op).cls != ir::RuleClass::Smooth) continue;
+    if (autodiff::derivative_rule(op).cls != autodiff::RuleClass::Smooth) continue;
     EXPECT_TRUE(listed.contains(ir::op_info(op).name)) << ir::op_info(op).name;
   }
 }

@@ -32,7 +32,7 @@ class Invariance : public ::testing::Test {
     return loss;
   }
   static bool cancels(const Func& m, const Func& loss) {
-    return ir::cancelling_funcs(ir::topological_order({loss.function()}))
+    return autodiff::cancelling_funcs(graph::topological_order({loss.function()}))
         .contains(m.function().get());
   }
   // In double.

@@ -10,16 +10,16 @@ namespace {
 
 Var x("x"), y("y");
 
-ir::OperationCount count(const Func& f, int extent) {
-  return ir::count_operations({{f.function(), {{Expr(0), Expr(extent - 1)}}}});
+autodiff::OperationCount count(const Func& f, int extent) {
+  return autodiff::count_operations({{f.function(), {{Expr(0), Expr(extent - 1)}}}});
 }
-double value(const ir::Count& c) { return c.value().value_or(-1); }
+double value(const autodiff::Count& c) { return c.value().value_or(-1); }
 
 TEST(OperationCount, EachElementOfAStencilCountsItsWork) {
   Buffer<float> a = line(10);
   Func f("f");
   f(x) = (a(x) + a(x + 1)) * 0.5f + exp(a(x));  // a(x) is loaded once
-  ir::OperationCount c = count(f, 8);
+  autodiff::OperationCount c = count(f, 8);
   EXPECT_EQ(value(c.moves()), 8 * 3);
   EXPECT_EQ(value(c.adds()), 8 * 2);
   EXPECT_EQ(value(c.mults()), 8 * 1);
@@ -41,7 +41,7 @@ TEST(OperationCount, AReductionRunsOverItsDomain) {
   RDom r(0, 3);
   f(x) = 0.0f;
   f(x) += a(x + r) * a(r);
-  ir::OperationCount c = count(f, 5);
+  autodiff::OperationCount c = count(f, 5);
   EXPECT_EQ(value(c.mults()), 5 * 3);
   EXPECT_EQ(value(c.adds()), 5 * 3);
   EXPECT_EQ(value(c.moves()), 5 + 5 * 3 * 4);  // store 0; load f, a, a, store f
@@ -52,12 +52,12 @@ TEST(OperationCount, WhatIsComputedAgainCountsAtEachRead) {
   Func f("f"), g("g");
   f(x) = sqrt(a(x));
   g(x) = f(x) + f(x + 1);
-  ir::OperationCount inlined = count(g, 6);
+  autodiff::OperationCount inlined = count(g, 6);
   EXPECT_EQ(value(inlined.nonlinear()), 12);
   EXPECT_EQ(value(inlined.find(f.function().get())->evaluations), 12);
   EXPECT_EQ(value(inlined.bytes()), 24);
   f.compute_root();
-  ir::OperationCount stored = count(g, 6);
+  autodiff::OperationCount stored = count(g, 6);
   EXPECT_EQ(value(stored.nonlinear()), 7);
   EXPECT_EQ(value(stored.bytes()), 24 + 28);
 }
@@ -82,7 +82,7 @@ TEST(OperationCount, ExtentsOfRunTimeStaySymbols) {
   RDom r(0, n);
   f() = 0.0f;
   f() += a(r) * 2.0f;
-  ir::OperationCount c = ir::count_operations({{f.function(), {}}});
+  autodiff::OperationCount c = autodiff::count_operations({{f.function(), {}}});
   EXPECT_FALSE(c.mults().value());
   EXPECT_EQ(c.mults().text(), "n");
   EXPECT_EQ(c.moves().text(), "1 + 3*n");

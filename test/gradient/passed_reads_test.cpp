@@ -155,11 +155,12 @@ TEST(PassedReads, OnlyFuncsThatReadOneElementLookUp) {
   diagonal(x) = plane(x, x);
   slice(x) = plane(x, 2);
   turned(x, y) = plane(y, -x);
-  EXPECT_TRUE(ir::is_look_up(*turned.function()));
+  EXPECT_TRUE(autodiff::is_look_up(*turned.function()));
   for (const Func& other : {f, twice, scaled, placed, diagonal, slice})
-    EXPECT_FALSE(ir::is_look_up(*other.function())) << other.name();
-  EXPECT_TRUE(ir::is_look_up(*BoundaryConditions::repeat_edge(f, {{0, 4}}).function()));
-  EXPECT_TRUE(ir::is_look_up(*BoundaryConditions::constant_exterior(f, 1.0f, {{0, 4}}).function()));
+    EXPECT_FALSE(autodiff::is_look_up(*other.function())) << other.name();
+  EXPECT_TRUE(autodiff::is_look_up(*BoundaryConditions::repeat_edge(f, {{0, 4}}).function()));
+  EXPECT_TRUE(
+      autodiff::is_look_up(*BoundaryConditions::constant_exterior(f, 1.0f, {{0, 4}}).function()));
 }
 
 }  // namespace

@@ -31,41 +31,42 @@ TEST_P(Suite, GradientIsRight) {
 }
 
 TEST_P(Suite, GraphsAreTheirText) {
-  std::vector<ir::FuncPtr> outputs{program.loss.function()};
+  std::vector<graph::FuncPtr> outputs{program.loss.function()};
   Derivative d = propagate_adjoints(program.loss);
   for (const Buffer<float>& input : program.inputs) outputs.push_back(d(input).function());
-  const ir::Graph graph = ir::graph_of(outputs);
-  ir::validate(graph, "propagate_adjoints");
-  EXPECT_EQ(ir::difference(ir::parse_graph(ir::to_text(graph)), graph), "") << ir::to_text(graph);
-  for (const ir::FuncPtr& f : graph.funcs) {
+  const graph::Graph graph = graph::graph_of(outputs);
+  graph::validate(graph, "propagate_adjoints");
+  EXPECT_EQ(graph::difference(graph::parse_graph(graph::to_text(graph)), graph), "")
+      << graph::to_text(graph);
+  for (const graph::FuncPtr& f : graph.funcs) {
     // What several adjoints share is of none of them.
-    if (f->made && f->made->role != ir::Role::SharedValue) EXPECT_NE(f->made->of, "") << f->name;
+    if (f->made && f->made->role != graph::Role::SharedValue) EXPECT_NE(f->made->of, "") << f->name;
   }
 }
 
 // What is given to a gradient is given to its text alike.
 TEST_P(Suite, SchedulesAreReplayed) {
-  std::vector<ir::FuncPtr> outputs{program.loss.function()};
+  std::vector<graph::FuncPtr> outputs{program.loss.function()};
   Derivative d = propagate_adjoints(program.loss);
   for (const Buffer<float>& input : program.inputs) outputs.push_back(d(input).function());
-  const ir::Graph graph = ir::graph_of(outputs);
-  const ir::Graph fresh = ir::parse_graph(ir::to_text(graph));
-  const size_t own = ir::schedule_log(outputs).size();
-  for (const ir::FuncPtr& f : graph.funcs) {
-    ir::give_directive({f}, ir::ComputeAt{{{ir::LoopLevel::Kind::Root, "", "", -1}}});
+  const graph::Graph graph = graph::graph_of(outputs);
+  const graph::Graph fresh = graph::parse_graph(graph::to_text(graph));
+  const size_t own = graph::schedule_log(outputs).size();
+  for (const graph::FuncPtr& f : graph.funcs) {
+    graph::give_directive({f}, graph::ComputeAt{{{graph::LoopLevel::Kind::Root, "", "", -1}}});
     for (int s = 0; s < f->stage_count(); ++s) {
       if (f->stage(s).schedule.dims.empty()) continue;
-      const ir::Dim outermost = f->stage(s).schedule.dims.back();
-      ir::give_directive({f, s}, ir::SplitLoop{outermost.var, "ro", "ri", 4});
+      const graph::Dim outermost = f->stage(s).schedule.dims.back();
+      graph::give_directive({f, s}, graph::SplitLoop{outermost.var, "ro", "ri", 4});
       if (!outermost.is_reduction)
-        ir::give_directive({f, s}, ir::RunLoop{{"ro"}, ForType::Parallel});
+        graph::give_directive({f, s}, graph::RunLoop{{"ro"}, ForType::Parallel});
     }
   }
-  ScheduleLog log = ir::schedule_log(outputs);
+  ScheduleLog log = graph::schedule_log(outputs);
   EXPECT_EQ(ScheduleLog::parse(log.to_text()), log);
   log.entries.erase(log.entries.begin(), log.entries.begin() + static_cast<long>(own));
-  ir::apply_log(log, fresh.outputs);
-  EXPECT_EQ(ir::difference(ir::graph_of(fresh.outputs), ir::graph_of(outputs)), "");
+  graph::apply_log(log, fresh.outputs);
+  EXPECT_EQ(graph::difference(graph::graph_of(fresh.outputs), graph::graph_of(outputs)), "");
 }
 
 class CheckedSuite : public Suite {};

@@ -79,8 +79,8 @@ Program long_sum() {
   return {loss, propagate_adjoints(loss, {.wrt = {image}})(image)};
 }
 
-std::vector<ir::FuncPtr> functions(const Program& program) {
-  std::vector<ir::FuncPtr> result;
+std::vector<graph::FuncPtr> functions(const Program& program) {
+  std::vector<graph::FuncPtr> result;
   for (const Func& f : program) result.push_back(f.function());
   return result;
 }
@@ -89,19 +89,20 @@ class ScheduleReplay : public ::testing::TestWithParam<Case> {};
 
 TEST_P(ScheduleReplay, GivesTheSameLoopNests) {
   const Program program = GetParam().build(), again = GetParam().build();
-  const auto scheduled = ir::schedule_unscheduled(functions(program));
-  const ScheduleLog log = ir::schedule_log(scheduled);
+  const auto scheduled = autoschedule::schedule_unscheduled(functions(program));
+  const ScheduleLog log = graph::schedule_log(scheduled);
   EXPECT_GT(log.size(), 5u);
   EXPECT_EQ(ScheduleLog::parse(log.to_text()), log);
 
   Pipeline pipeline(again);
   pipeline.apply_schedule(ScheduleLog::parse(log.to_text()));
   EXPECT_EQ(same_numbers(pipeline.schedule_log().to_text()), same_numbers(log.to_text()));
-  const std::string text = same_numbers(ir::to_text(ir::graph_of(scheduled)));
-  EXPECT_EQ(same_numbers(ir::to_text(ir::graph_of(functions(again)))), text);
-  const auto compiled = ir::apply_wrappers(scheduled);
-  EXPECT_EQ(same_numbers(ir::to_text(ir::graph_of(ir::schedule_unscheduled(functions(again))))),
-            same_numbers(ir::to_text(ir::graph_of(compiled))))
+  const std::string text = same_numbers(graph::to_text(graph::graph_of(scheduled)));
+  EXPECT_EQ(same_numbers(graph::to_text(graph::graph_of(functions(again)))), text);
+  const auto compiled = graph::apply_wrappers(scheduled);
+  EXPECT_EQ(same_numbers(graph::to_text(
+                graph::graph_of(autoschedule::schedule_unscheduled(functions(again))))),
+            same_numbers(graph::to_text(graph::graph_of(compiled))))
       << "and nothing is left to schedule";
   EXPECT_EQ(same_numbers(pipeline.loop_nest()), same_numbers(Pipeline(program).loop_nest()));
 }
@@ -110,16 +111,16 @@ TEST_P(ScheduleReplay, GivesTheSameLoopNests) {
 TEST(ScheduleOfAGradient, IsStatements) {
   const std::string file = std::string(RETROGRADE_TEST_DIR) + "/golden/schedule_log/gradient.inc";
   const Program first = conv_layer(), program = conv_layer();
-  const auto scheduled = ir::schedule_unscheduled(functions(first));
-  const ScheduleLog log = ir::schedule_log(scheduled);
+  const auto scheduled = autoschedule::schedule_unscheduled(functions(first));
+  const ScheduleLog log = graph::schedule_log(scheduled);
   const std::string statements = same_numbers(log.to_cpp());
   if (std::getenv("RETROGRADE_UPDATE_GOLDEN")) std::ofstream(file) << statements;
   std::ifstream in(file);
   EXPECT_EQ(statements, std::string(std::istreambuf_iterator<char>(in), {}));
 
   const auto called = [&](const std::string& name) {
-    for (const ir::FuncPtr& f : ir::topological_order(functions(program))) {
-      if (ir::without_numbers(f->name) == name) return Func(f);
+    for (const graph::FuncPtr& f : graph::topological_order(functions(program))) {
+      if (graph::without_numbers(f->name) == name) return Func(f);
     }
     return Func();
   };
@@ -128,8 +129,8 @@ TEST(ScheduleOfAGradient, IsStatements) {
        filter_adj_parts = called("filter_adj_parts"), filter_adj = called("filter_adj"),
        bias_adj_parts = called("bias_adj_parts"), bias_adj = called("bias_adj");
 #include "golden/schedule_log/gradient.inc"
-  EXPECT_EQ(same_numbers(ir::to_text(ir::graph_of(functions(program)))),
-            same_numbers(ir::to_text(ir::graph_of(scheduled))));
+  EXPECT_EQ(same_numbers(graph::to_text(graph::graph_of(functions(program)))),
+            same_numbers(graph::to_text(graph::graph_of(scheduled))));
 }
 
 INSTANTIATE_TEST_SUITE_P(Gradients, ScheduleReplay,

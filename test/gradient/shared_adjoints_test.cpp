@@ -52,14 +52,14 @@ TEST(SharedAdjoints, AnInnerAdjointThatSeveralInputsNeedIsKept) {
   EXPECT_EQ(inner.outputs(), 1) << "that of drive()";
   expect_mentions(d.explain(Detail::All),
                   {"keeps 1 inner adjoint of each iteration, from which 3"});
-  const ir::OperationCount count = d.operations().gradient;
-  const ir::FuncOperations* kept = count.find(inner.function().get());
+  const autodiff::OperationCount count = d.operations().gradient;
+  const autodiff::FuncOperations* kept = count.find(inner.function().get());
   ASSERT_NE(kept, nullptr);
   EXPECT_TRUE(kept->stored);
   for (const Buffer<float>& b : {s.input, s.weight, s.bias}) {
-    const ir::FuncOperations* gradient = count.find(d(b).function().get());
+    const autodiff::FuncOperations* gradient = count.find(d(b).function().get());
     ASSERT_NE(gradient, nullptr);
-    for (const ir::StageOperations& stage : gradient->stages)
+    for (const autodiff::StageOperations& stage : gradient->stages)
       EXPECT_EQ(stage.each.nonlinear, 0) << b.name();
   }
 }
@@ -97,13 +97,13 @@ TEST(SharedAdjoints, AnAccumulationKeepsNothingForEachOfItsTerms) {
 // a(i - 3) stands under a condition: the primal reads it from 0 on.
 struct Guarded : ::testing::Test {
   Guarded() {
-    using namespace ir;
+    using namespace autodiff;
     adjoint->name = "adjoint", a->name = "a", b->name = "b", c->name = "c";
     for (const FuncPtr& f : {adjoint, a, b, c}) define_pure(f, {variable("i")}, {Expr(0.0f)});
   }
-  Expr read(const ir::FuncPtr& f, const Expr& i) { return ir::call_value(f, {i}, 0); }
-  ir::SharedAdjoints share(int first) {
-    using namespace ir;
+  Expr read(const graph::FuncPtr& f, const Expr& i) { return autodiff::call_value(f, {i}, 0); }
+  autodiff::SharedAdjoints share(int first) {
+    using namespace autodiff;
     const Expr i = variable("i"), seed = read(adjoint, i);
     Expr inner = seed;
     for (int k = 0; k < 40; ++k) inner = inner * read(a, i - 3) + Expr(1.0f);
@@ -112,8 +112,10 @@ struct Guarded : ::testing::Test {
     const Regions regions({a, b, c}, {{a.get(), {{Expr(0), Expr(9)}}}});
     return share_adjoints("inner", {{{"i", Expr(first), Expr(9)}}, {}}, leaves, {seed}, regions);
   }
-  ir::FuncPtr adjoint = ir::make_func(ir::Role::Adjoint), a = std::make_shared<ir::FuncContents>(),
-              b = std::make_shared<ir::FuncContents>(), c = std::make_shared<ir::FuncContents>();
+  graph::FuncPtr adjoint = graph::make_func(graph::Role::Adjoint),
+                 a = std::make_shared<graph::FuncContents>(),
+                 b = std::make_shared<graph::FuncContents>(),
+                 c = std::make_shared<graph::FuncContents>();
 };
 
 TEST_F(Guarded, WhatIsReadInTheWholeDomainMayBeKept) { EXPECT_NE(share(3).func, nullptr); }

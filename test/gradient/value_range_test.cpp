@@ -8,7 +8,7 @@
 namespace retrograde::gradient {
 namespace {
 
-using ir::ValueRange;
+using autodiff::ValueRange;
 
 class ValueRanges : public ::testing::Test {
  protected:
@@ -17,7 +17,7 @@ class ValueRanges : public ::testing::Test {
   Buffer<uint8_t> bytes = Buffer<uint8_t>(8);
 
   static ValueRange range_of(const Func& f) {
-    const ir::ValueRanges ranges(ir::topological_order({f.function()}));
+    const autodiff::ValueRanges ranges(graph::topological_order({f.function()}));
     return ranges.of(f(std::vector<Expr>(static_cast<size_t>(f.dimensions()), Expr(0))));
   }
   // By way of another Func.

@@ -24,7 +24,7 @@ ScheduleLog part_of(const ScheduleLog& log, Choices& choices) {
     if (seen.insert(entry.func).second && choices.below(2) == 0) kept.insert(entry.func);
     if (!kept.count(entry.func)) continue;
     part.entries.push_back(entry);
-    if (const std::string made = ir::made_by(entry.directive); !made.empty()) {
+    if (const std::string made = graph::made_by(entry.directive); !made.empty()) {
       seen.insert(made);
       kept.insert(made);
     }

@@ -41,7 +41,7 @@ Scheduled make(Choices& choices) {
 }
 
 bool take(const std::string& name, const std::string& directive) {
-  const std::vector<std::string> known = ir::directive_names();
+  const std::vector<std::string> known = graph::directive_names();
   if (std::find(known.begin(), known.end(), directive) == known.end()) return false;
   if (name == "--without") without.push_back(directive);
   if (name == "--only") only = directive;

@@ -10,7 +10,7 @@
 #include "ir/print.h"
 #include "ir/visit.h"
 
-namespace retrograde::ir {
+namespace retrograde::analysis {
 namespace {
 
 const std::vector<std::string> names = {"x", "y", "z"};
@@ -163,4 +163,4 @@ TEST(IntervalProperty, SolutionsHold) {
 }
 
 }  // namespace
-}  // namespace retrograde::ir
+}  // namespace retrograde::analysis

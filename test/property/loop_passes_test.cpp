@@ -13,7 +13,7 @@
 #include "lower/vectors/vectorize_inner_loops.h"
 #include "property/statement_evaluator.h"
 
-namespace retrograde::ir {
+namespace retrograde::lower {
 namespace {
 
 constexpr int width = 24, height = 6,
@@ -404,4 +404,4 @@ TEST_P(LoopPasses, KeepWhatProgramsCompute) {
 INSTANTIATE_TEST_SUITE_P(Seeds, LoopPasses, testing::Range(0, 8));
 
 }  // namespace
-}  // namespace retrograde::ir
+}  // namespace retrograde::lower

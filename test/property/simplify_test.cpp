@@ -75,7 +75,7 @@ void check_random(Type type, int depth, uint32_t first_seed, int count, Inputs i
   for (uint32_t seed = first_seed; seed < first_seed + static_cast<uint32_t>(count); ++seed) {
     RandomIr random(seed);
     const Expr before = random.expr(type, depth);
-    const Expr after = ir::simplify(before);
+    const Expr after = simplification::simplify(before);
     ASSERT_EQ(before.type(), after.type()) << before << "\n" << after;
     compared += compare_at_points(random, before, after, inputs, 12);
     ASSERT_FALSE(testing::Test::HasFailure()) << "seed " << seed;
@@ -120,12 +120,12 @@ TEST(SimplifyRandom, KeepsVectors) {
 // Variables within given bounds, some of them symbolic: y in [x, x + 9].
 TEST(SimplifyRandom, KeepsExpressionsWithinGivenBounds) {
   const Expr x = ir::variable("x");
-  const ir::BoundsMap bounds = {
+  const simplification::BoundsMap bounds = {
       {"x", {Expr(0), Expr(15)}}, {"y", {x, x + 9}}, {"z", {Expr(), Expr(4)}}};
   for (uint32_t seed = 1; seed <= 8000; ++seed) {
     RandomIr random(seed);
     const Expr before = random.expr(seed % 2 ? Bool() : Int(32), 3);
-    const Expr after = ir::simplify(before, bounds);
+    const Expr after = simplification::simplify(before, bounds);
     for (int i = 0; i < 12; ++i) {
       std::map<std::string, Scalar> values = random_inputs(random, before, Inputs::Ordinary);
       const int at_x = random.below(16);
@@ -148,8 +148,8 @@ TEST(SimplifyRandom, IsStable) {
   int changed = 0;
   for (uint32_t seed = 1; seed <= 2000; ++seed) {
     RandomIr random(seed);
-    const Expr once = ir::simplify(random.expr(Int(32), 3));
-    changed += !ir::simplify(once).same_as(once);
+    const Expr once = simplification::simplify(random.expr(Int(32), 3));
+    changed += !simplification::simplify(once).same_as(once);
   }
   EXPECT_LT(changed, 100) << "of 2000 expressions simplify further the second time";
 }
@@ -158,8 +158,8 @@ TEST(CseRandom, LetsAndSharingMeanTheSame) {
   for (uint32_t seed = 1; seed <= 3000; ++seed) {
     RandomIr random(seed);
     const Expr before = random.expr(seed % 3 ? Int(32) : Float(32), 5);
-    compare_at_points(random, before, ir::introduce_lets(before), Inputs::Ordinary, 3);
-    compare_at_points(random, before, ir::expand_lets(before), Inputs::Ordinary, 3);
+    compare_at_points(random, before, simplification::introduce_lets(before), Inputs::Ordinary, 3);
+    compare_at_points(random, before, simplification::expand_lets(before), Inputs::Ordinary, 3);
     ASSERT_FALSE(testing::Test::HasFailure()) << "seed " << seed;
   }
 }

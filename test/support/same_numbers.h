@@ -19,7 +19,7 @@ inline std::string same_numbers(const std::string& text) {
   std::string result;
   auto at = text.begin();
   for (std::sregex_iterator it(text.begin(), text.end(), name), end; it != end; ++it) {
-    const std::string found = it->str(2), plain = ir::without_numbers(found);
+    const std::string found = it->str(2), plain = graph::without_numbers(found);
     result.append(at, text.begin() + it->position(2));
     at = text.begin() + it->position(2) + it->length(2);
     auto& seen = numbers[plain];

@@ -10,7 +10,7 @@
 #include "ir/print.h"
 #include "support/errors.h"
 
-namespace retrograde::ir {
+namespace retrograde::graph {
 namespace {
 
 Expr v(const char* name, Type type = Int(32)) { return variable(name, type); }
@@ -147,4 +147,4 @@ TEST(Associativity, RefusesWhatIsNotAssociative) {
 }
 
 }  // namespace
-}  // namespace retrograde::ir
+}  // namespace retrograde::graph

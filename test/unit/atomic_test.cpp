@@ -24,7 +24,7 @@ Buffer<int> indices() {
 
 // The loop over the reduction variable `index` runs as `type`, under atomic().
 void atomic(Func& f, ForType type, int index = 0) {
-  ir::Definition& update = f.function()->updates[0];
+  graph::Definition& update = f.function()->updates[0];
   update.schedule.atomic = true;
   update.schedule.is_given = true;
   update.schedule.dims[static_cast<size_t>(index)].runs = type;
@@ -183,10 +183,10 @@ TEST(Atomic, VectorizedOverPointsAndParallelOverTheReduction) {
     Func f("f");
     f(x) = 1;
     f(x) = chain ? f(x) * 3 + x * min(r, 1 + x * x) : f(x) + x * r;
-    ir::Definition& update = f.function()->updates[0];
+    graph::Definition& update = f.function()->updates[0];
     f.update().split(x, xo, xi, 8, TailStrategy::GuardWithIf).reorder(xi, r, xo).vectorize(xi);
     update.schedule.atomic = true;
-    for (ir::Dim& dim : update.schedule.dims) {
+    for (graph::Dim& dim : update.schedule.dims) {
       if (dim.is_reduction && !chain) dim.runs = ForType::Parallel;
     }
     Buffer<int> out = f.realize({width});
@@ -202,7 +202,7 @@ TEST(Atomic, VectorizedOverPointsAndParallelOverTheReduction) {
 
 TEST(Atomic, AllocationsInsideTheLoopNeedNoAtomic) {
   const auto lowered = [](const std::string& text) {
-    return ir::print(ir::lower_atomics(ir::parse_stmt(text)));
+    return ir::print(lower::lower_atomics(ir::parse_stmt(text)));
   };
   const std::string own = lowered(
       "parallel for (i, 0, 8) { allocate f[int64(4)]:int32 auto { atomic f { f[0] = f[0] + i } } "

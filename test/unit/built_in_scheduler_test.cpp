@@ -22,7 +22,7 @@ struct BuiltInScheduler : ::testing::Test {
   }
   std::string schedule() { return Pipeline(out).auto_schedule(get_host_target()).schedule_source; }
   static bool is_at_root(const Func& f) {
-    return f.function()->schedule.compute_level.kind == ir::LoopLevel::Kind::Root;
+    return f.function()->schedule.compute_level.kind == graph::LoopLevel::Kind::Root;
   }
   static ForType outermost(const Func& f) { return f.get_schedule().dims.back().runs; }
   static ForType innermost(const Func& f) { return f.get_schedule().dims.front().runs; }
@@ -61,7 +61,7 @@ struct Shifted {
       for (int px = 0; px < 64; px++) picture(px, py) = static_cast<float>((px * 7 + py * 13) % 11);
     }
   }
-  ir::LoopLevel place_of_rows() {
+  graph::LoopLevel place_of_rows() {
     Pipeline(out).auto_schedule(get_host_target());
     return rows.function()->schedule.compute_level;
   }
@@ -72,8 +72,8 @@ struct Shifted {
 
 TEST(SlicesOfAFunc, AreComputedInTheLoopsOfTheirOnlyReader) {
   Shifted scheduled(11), plain(11);
-  const ir::LoopLevel place = scheduled.place_of_rows();
-  ASSERT_EQ(place.kind, ir::LoopLevel::Kind::At);
+  const graph::LoopLevel place = scheduled.place_of_rows();
+  ASSERT_EQ(place.kind, graph::LoopLevel::Kind::At);
   EXPECT_EQ(place.func, scheduled.windows.name());
   EXPECT_EQ(place.var, "d");
   const Buffer<float> found = scheduled.out.realize({50, 30}),
@@ -84,17 +84,17 @@ TEST(SlicesOfAFunc, AreComputedInTheLoopsOfTheirOnlyReader) {
 }
 
 TEST(SlicesOfAFunc, AreNotWhereThereAreTooFewForTheThreads) {
-  EXPECT_EQ(Shifted(4).place_of_rows().kind, ir::LoopLevel::Kind::Root);
+  EXPECT_EQ(Shifted(4).place_of_rows().kind, graph::LoopLevel::Kind::Root);
 }
 
 TEST(SlicesOfAFunc, AreNotWhereSeveralReadThem) {
   Shifted program(11);
   program.out(program.x, program.y) += program.rows(program.x, program.y, 3);
-  EXPECT_EQ(program.place_of_rows().kind, ir::LoopLevel::Kind::Root);
+  EXPECT_EQ(program.place_of_rows().kind, graph::LoopLevel::Kind::Root);
 }
 
 TEST(SlicesOfAFunc, AreNotWhereAnIterationReadsTwo) {
-  EXPECT_EQ(Shifted(11, 2).place_of_rows().kind, ir::LoopLevel::Kind::Root);
+  EXPECT_EQ(Shifted(11, 2).place_of_rows().kind, graph::LoopLevel::Kind::Root);
 }
 
 // A window around each pixel for each of many shifts, of which the sum at two places is wanted.
@@ -115,7 +115,7 @@ struct ShiftedWindows {
         picture(px, py) = static_cast<float>((px * 7 + py * 13) % 11);
     }
   }
-  ir::LoopLevel place_of_windows() {
+  graph::LoopLevel place_of_windows() {
     Pipeline(out).auto_schedule(get_host_target());
     return windows.function()->schedule.compute_level;
   }
@@ -127,11 +127,11 @@ struct ShiftedWindows {
 
 TEST(SlicesOfAReduction, AreComputedInItsLoopsForStripsOfTheResult) {
   ShiftedWindows scheduled(8), plain(8);
-  const ir::LoopLevel place = scheduled.place_of_windows();
-  ASSERT_EQ(place.kind, ir::LoopLevel::Kind::At);
+  const graph::LoopLevel place = scheduled.place_of_windows();
+  ASSERT_EQ(place.kind, graph::LoopLevel::Kind::At);
   EXPECT_EQ(place.func, scheduled.out.name());
   EXPECT_EQ(place.stage, 1);
-  const std::vector<ir::Dim> loops = scheduled.out.update().get_schedule().dims;
+  const std::vector<graph::Dim> loops = scheduled.out.update().get_schedule().dims;
   EXPECT_EQ(loops.back().runs, ForType::Parallel);
   EXPECT_TRUE(loops[loops.size() - 2].is_reduction && loops[loops.size() - 3].is_reduction);
   constexpr int side = ShiftedWindows::side;
@@ -144,18 +144,18 @@ TEST(SlicesOfAReduction, AreComputedInItsLoopsForStripsOfTheResult) {
 }
 
 TEST(SlicesOfAReduction, AreNotWhereTheyAreFewOrFit) {
-  EXPECT_EQ(ShiftedWindows(2).place_of_windows().kind, ir::LoopLevel::Kind::Root);
-  EXPECT_EQ(ShiftedWindows(4).place_of_windows().kind, ir::LoopLevel::Kind::Root);
+  EXPECT_EQ(ShiftedWindows(2).place_of_windows().kind, graph::LoopLevel::Kind::Root);
+  EXPECT_EQ(ShiftedWindows(4).place_of_windows().kind, graph::LoopLevel::Kind::Root);
 }
 
 TEST(SlicesOfAReduction, AreNotWhereAStripReadsManyMoreRows) {
-  EXPECT_EQ(ShiftedWindows(8, 9).place_of_windows().kind, ir::LoopLevel::Kind::Root);
+  EXPECT_EQ(ShiftedWindows(8, 9).place_of_windows().kind, graph::LoopLevel::Kind::Root);
 }
 
 TEST(SlicesOfAReduction, AreNotWhereSeveralReadThem) {
   ShiftedWindows program(8);
   program.out(program.x, program.y) += program.windows(program.x, program.y, 3, 3);
-  EXPECT_EQ(program.place_of_windows().kind, ir::LoopLevel::Kind::Root);
+  EXPECT_EQ(program.place_of_windows().kind, graph::LoopLevel::Kind::Root);
 }
 
 // Two sums over what both would load from memory, or compute again.
@@ -177,7 +177,7 @@ struct TwoSums {
   }
   bool run_together() {
     Pipeline(out).auto_schedule(get_host_target());
-    return weighted.function()->stage(1).schedule.fuse_level.kind == ir::LoopLevel::Kind::At;
+    return weighted.function()->stage(1).schedule.fuse_level.kind == graph::LoopLevel::Kind::At;
   }
   static constexpr int side = 264;
   Var x{"x"}, y{"y"}, u{"u"}, v{"v"};
@@ -221,7 +221,7 @@ struct Planes {
   std::vector<bool> loops_of_sums() {
     Pipeline(out).auto_schedule(get_host_target());
     std::vector<bool> result;
-    for (const ir::Dim& loop : sums.update().get_schedule().dims)
+    for (const graph::Dim& loop : sums.update().get_schedule().dims)
       result.push_back(loop.is_reduction);
     return result;
   }
@@ -235,7 +235,7 @@ TEST(SumsOverPlanes, GoAlongTheirRows) {
   Planes scheduled(64), plain(64);
   EXPECT_EQ(scheduled.loops_of_sums(), (std::vector<bool>{false, false, true, false}));
   const auto is_joined = [](const Func& f) {
-    return f.function()->stage(1).schedule.fuse_level.kind == ir::LoopLevel::Kind::At;
+    return f.function()->stage(1).schedule.fuse_level.kind == graph::LoopLevel::Kind::At;
   };
   EXPECT_NE(is_joined(scheduled.sums), is_joined(scheduled.squares)) << "one joins the other";
   constexpr int side = Planes::side;

@@ -19,14 +19,14 @@ namespace retrograde {
 namespace {
 
 std::vector<std::string> assembly(const Func& f, const std::string& target) {
-  const std::vector<ir::FuncPtr> outputs{f.function()};
-  ir::LowerOptions lowering;
+  const std::vector<graph::FuncPtr> outputs{f.function()};
+  lower::LowerOptions lowering;
   lowering.target = Target(target);
   codegen::Options options;
   options.target = Target(target);
   options.tune_for_host = false;
   const ir::LoweredFunction lowered =
-      ir::lower("f", outputs, ir::infer_arguments(outputs), lowering);
+      lower::lower("f", outputs, lower::infer_arguments(outputs), lowering);
   std::istringstream text(codegen::compile_assembly(lowered, options));
   std::vector<std::string> lines;
   for (std::string line; std::getline(text, line);) lines.push_back(line);

@@ -29,15 +29,15 @@ class ComputeWith : public testing::Test {
 
   // Names as in the test, without what makes them unique.
   static std::string nest_of(const Func& f) {
-    return std::regex_replace(ir::loop_nest_text({f.function()}), std::regex("\\$[0-9]+"), "");
+    return std::regex_replace(lower::loop_nest_text({f.function()}), std::regex("\\$[0-9]+"), "");
   }
 
   static int count(const Func& output, const char* stop_after,
                    const std::function<bool(const Stmt&)>& is_counted) {
-    ir::LowerOptions options;
+    lower::LowerOptions options;
     options.stop_after = stop_after;
-    ir::LoweredFunction lowered =
-        ir::lower("test", {output.function()}, ir::infer_arguments({output.function()}), options);
+    ir::LoweredFunction lowered = lower::lower(
+        "test", {output.function()}, lower::infer_arguments({output.function()}), options);
     int found = 0;
     ir::walk(
         lowered.body, [](const Expr&) { return true; },

@@ -73,7 +73,7 @@ EXPORTED int extern_test_twice(int value) { return 2 * value; }
 namespace retrograde {
 namespace {
 
-using Kind = ir::ExternArgument::Kind;
+using Kind = graph::ExternArgument::Kind;
 
 TEST(ExternStage, AnOutputWithoutInputs) {
   Var x("x");

@@ -34,7 +34,7 @@ struct FakeCompiler : Compiler {
     compilations++;
     target = wanted;
     auto result = std::make_shared<FakePipeline>();
-    for (const auto& p : ir::parameters_of(pipeline.outputs)) {
+    for (const auto& p : graph::parameters_of(pipeline.outputs)) {
       using Kind = ir::LoweredArgument::Kind;
       result->args.push_back({p->name, p->is_buffer ? Kind::InputBuffer : Kind::Scalar, p->type,
                               p->dimensions, ir::SymbolRef(p)});
@@ -425,7 +425,7 @@ TEST(Buffers, InExpressionsTheyAreLoads) {
   const ir::Call* call = e.as<ir::Call>();
   ASSERT_TRUE(call);
   EXPECT_EQ(call->call_type, ir::CallType::Image);
-  auto parameter = std::dynamic_pointer_cast<ir::ParameterContents>(call->symbol.lock());
+  auto parameter = std::dynamic_pointer_cast<graph::ParameterContents>(call->symbol.lock());
   ASSERT_TRUE(parameter);
   EXPECT_EQ(parameter->buffer, b.raw_buffer());
   EXPECT_EQ(b.parameter(), parameter);
@@ -440,7 +440,7 @@ TEST(Buffers, AnExprKeepsItsBufferAlive) {
     e = b(x);
   }
   auto parameter =
-      std::dynamic_pointer_cast<ir::ParameterContents>(e.as<ir::Call>()->symbol.lock());
+      std::dynamic_pointer_cast<graph::ParameterContents>(e.as<ir::Call>()->symbol.lock());
   EXPECT_EQ(reinterpret_cast<int*>(parameter->buffer->host)[2], 11);
 }
 

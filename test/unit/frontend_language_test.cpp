@@ -237,7 +237,7 @@ TEST(Definitions, TuplesHoldSeveralValues) {
 }
 
 TEST(Definitions, AFuncDoesNotOwnItselfThroughItsUpdates) {
-  std::weak_ptr<ir::FuncContents> watched;
+  std::weak_ptr<graph::FuncContents> watched;
   {
     Var x("x");
     RDom r(0, 4, 0, 4);
@@ -251,7 +251,7 @@ TEST(Definitions, AFuncDoesNotOwnItselfThroughItsUpdates) {
 }
 
 TEST(Definitions, NorThroughADomainThatReadsIt) {
-  std::weak_ptr<ir::FuncContents> watched;
+  std::weak_ptr<graph::FuncContents> watched;
   {
     Var x("x");
     Func f;
@@ -285,7 +285,7 @@ TEST(Definitions, PredicatesOfADomainBelongToTheUpdate) {
   r.where(r.x != 3);
   Func f;
   f(x) += r.x;
-  const ir::Definition& update = f.function()->updates[0];
+  const graph::Definition& update = f.function()->updates[0];
   ASSERT_TRUE(update.predicate.defined());
   EXPECT_EQ(update.rvars.size(), 2u);
   EXPECT_TRUE(ir::uses_variable(update.predicate, r.y.name()));
@@ -316,7 +316,7 @@ TEST(Definitions, FuncsAreOrderedProducersFirst) {
   b(x) = a(x) + a(x + 1);
   c(x) = b(x) + a(x);
   std::vector<std::string> names;
-  for (const auto& f : ir::topological_order({c.function()})) names.push_back(f->name);
+  for (const auto& f : graph::topological_order({c.function()})) names.push_back(f->name);
   EXPECT_EQ(names, (std::vector<std::string>{"order_a", "order_b", "order_c"}));
 }
 
@@ -325,7 +325,7 @@ TEST(Definitions, ALongChainOfFuncsIsOrderedWithoutDeepRecursion) {
   std::vector<Func> chain(20000);
   chain[0](x) = x;
   for (size_t i = 1; i < chain.size(); i++) chain[i](x) = chain[i - 1](x) + 1;
-  EXPECT_EQ(ir::topological_order({chain.back().function()}).size(), chain.size());
+  EXPECT_EQ(graph::topological_order({chain.back().function()}).size(), chain.size());
 }
 
 TEST(Definitions, SharedSubexpressionsAreVisitedOnce) {
@@ -337,7 +337,7 @@ TEST(Definitions, SharedSubexpressionsAreVisitedOnce) {
   Func g;
   g(x) = 0;
   g(x) += e;
-  EXPECT_EQ(ir::direct_callees(*g.function()).size(), 0u);
+  EXPECT_EQ(graph::direct_callees(*g.function()).size(), 0u);
 }
 
 // ---- parameters ----
@@ -351,7 +351,7 @@ TEST(Parameters, AreFoundInFirstUseOrder) {
   f(x) = in(x)*gain;
   g(x) = f(x) + table(clamp(x, 0, 15)) + in.width();
   std::vector<std::string> names;
-  for (const auto& p : ir::parameters_of({g.function()})) names.push_back(p->name);
+  for (const auto& p : graph::parameters_of({g.function()})) names.push_back(p->name);
   EXPECT_EQ(names, (std::vector<std::string>{"in_p", "gain_p", "table_p"}));
   EXPECT_EQ(g.infer_arguments().size(), 2u);  // the table is part of the program
 }
@@ -382,7 +382,7 @@ TEST(Parameters, FactsOfShapesAreExprs) {
 TEST(InlineReductions, ExtremesStartFromTheLimitsOfTheType) {
   RDom r(0, 5);
   const auto initial = [](const Expr& e) {
-    return ir::func_of(*e.as<ir::Call>())->pure->values[0];
+    return graph::func_of(*e.as<ir::Call>())->pure->values[0];
   };
   EXPECT_EQ(*ir::as_const_int(initial(maximum(cast<int8_t>(r)))), -128);
   EXPECT_EQ(*ir::as_const_int(initial(minimum(cast<uint8_t>(r)))), 255);
@@ -398,7 +398,7 @@ TEST(InlineReductions, SumMakesAFuncWithAnUpdate) {
   Expr e = sum(f(x + r), "blur_sum");
   const ir::Call* call = e.as<ir::Call>();
   ASSERT_TRUE(call);
-  auto made = ir::func_of(*call);
+  auto made = graph::func_of(*call);
   EXPECT_EQ(made->name, "blur_sum");
   EXPECT_EQ(made->args, std::vector<std::string>{"x"});
   EXPECT_EQ(made->updates.size(), 1u);
@@ -417,7 +417,7 @@ TEST(InlineReductions, OuterReductionVariablesBecomeArguments) {
 TEST(InlineReductions, ANamedDomainIsRunOverEvenIfUnused) {
   RDom r(0, 5);
   Expr e = sum(r, Expr(1));
-  auto made = ir::func_of(*e.as<ir::Call>());
+  auto made = graph::func_of(*e.as<ir::Call>());
   EXPECT_EQ(made->updates[0].rvars.size(), 1u);
 }
 
@@ -503,7 +503,7 @@ TEST(Schedules, StorageFollowsComputationUnlessAskedFor) {
   EXPECT_EQ(f.function()->schedule.store_level.var, "y");
   EXPECT_EQ(f.function()->schedule.compute_level.var, "x");
   f.compute_root();
-  EXPECT_EQ(f.function()->schedule.compute_level.kind, ir::LoopLevel::Kind::Root);
+  EXPECT_EQ(f.function()->schedule.compute_level.kind, graph::LoopLevel::Kind::Root);
 }
 
 TEST(Schedules, IndependentReductionLoopsMayRunInParallel) {

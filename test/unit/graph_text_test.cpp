@@ -12,19 +12,19 @@
 namespace retrograde {
 namespace {
 
-using ir::difference;
-using ir::Graph;
-using ir::graph_of;
-using ir::parse_graph;
-using ir::to_text;
+using graph::difference;
+using graph::Graph;
+using graph::graph_of;
+using graph::parse_graph;
+using graph::to_text;
 
-void expect_round_trip(const std::vector<ir::FuncPtr>& outputs) {
+void expect_round_trip(const std::vector<graph::FuncPtr>& outputs) {
   const Graph graph = graph_of(outputs);
   const std::string text = to_text(graph);
   const Graph again = parse_graph(text);
   EXPECT_EQ(difference(graph, again), "") << text << "\nread back as\n" << to_text(again);
-  ir::validate(graph, "test");
-  ir::validate(again, "parse_graph");
+  graph::validate(graph, "test");
+  graph::validate(again, "parse_graph");
 }
 
 const char* const blur = R"(image uint8 input(2)
@@ -60,7 +60,7 @@ output blur
 
 TEST(GraphText, PrintsWhatItReads) {
   const Graph graph = parse_graph(blur);
-  ir::validate(graph, "parse_graph");
+  graph::validate(graph, "parse_graph");
   EXPECT_EQ(to_text(graph), blur);
   EXPECT_EQ(graph.funcs.size(), 2u);
   EXPECT_EQ(graph.parameters.size(), 2u);
@@ -177,7 +177,7 @@ TEST(GraphText, WhatIsReadIsThere) {
 TEST(GraphText, BrokenGraphsAreBlamedOnThePass) {
   const auto expect_broken = [](const std::string& text, const char* rule) {
     const Graph graph = parse_graph(text);
-    const auto check = [&] { ir::validate(graph, "some_pass"); };
+    const auto check = [&] { graph::validate(graph, "some_pass"); };
     expect_error<InternalError>({rule, "some_pass"}, check);
   };
   expect_broken(with("value 0f", "value 0"), "values have the types of the Func");

@@ -303,7 +303,7 @@ TEST(Parameters, OfScalarsHaveLimitsAndAnEstimate) {
   of_p.set_scalar(5);
   expect_error<RuntimeError>({"\"p\"", "4"}, [&] { f.realize({3}); });
   EXPECT_TRUE(of_p.same_as(p.parameter()));
-  const std::shared_ptr<retrograde::ir::ParameterContents> contents = of_p;
+  const std::shared_ptr<retrograde::graph::ParameterContents> contents = of_p;
   EXPECT_EQ(contents, p.parameter());
 }
 

@@ -23,10 +23,10 @@ class HoistStorage : public testing::Test {
   // Loops around the only allocation, and its elements when constant.
   static std::pair<int, int64_t> allocation(const Func& output) {
     std::pair<int, int64_t> result{-1, -1};
-    ir::LowerOptions options;
+    lower::LowerOptions options;
     options.stop_after = "simplify_storage";
-    ir::LoweredFunction lowered =
-        ir::lower("test", {output.function()}, ir::infer_arguments({output.function()}), options);
+    ir::LoweredFunction lowered = lower::lower(
+        "test", {output.function()}, lower::infer_arguments({output.function()}), options);
     std::function<void(const Stmt&, int)> visit = [&](const Stmt& s, int loops) {
       if (const ir::Allocate* n = s.as<ir::Allocate>())
         result = {loops, ir::as_const_int(n->elements).value_or(-1)};

@@ -8,7 +8,7 @@
 #include "ir/build.h"
 #include "ir/print.h"
 
-namespace retrograde::ir {
+namespace retrograde::analysis {
 namespace {
 
 Expr var(const char* name) { return variable(name, Int(32)); }
@@ -202,4 +202,4 @@ TEST_F(IntervalTest, ConditionsAreSolved) {
 }
 
 }  // namespace
-}  // namespace retrograde::ir
+}  // namespace retrograde::analysis

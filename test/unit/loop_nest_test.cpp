@@ -7,7 +7,7 @@
 namespace retrograde {
 namespace {
 
-std::string nest_of(const Func& f) { return ir::loop_nest_text({f.function()}); }
+std::string nest_of(const Func& f) { return lower::loop_nest_text({f.function()}); }
 
 // Names are unique in the process ("f", "f$1"), so the text is compared with every "$N" taken out.
 std::string without_numbers(const std::string& text) {

@@ -16,7 +16,7 @@ TEST(MakeNamesUnique, RenamesAllButTheFirstBinding) {
       "realize f(int32) auto [0, 4] { for (x, 0, 4) { f(x) = {x} } "
       "realize f(int32) auto [0, 2] { f(1) = {3} out(0) = {f(1).0:int32} } out(1) = {f(2).0:int32} "
       "}");
-  ir::UniqueNames unique = ir::make_names_unique(s);
+  lower::UniqueNames unique = lower::make_names_unique(s);
   std::string text = ir::print(unique.stmt);
   expect_mentions(text, {"for (x.$1, 0, 4)", "f(x.$1) = {x.$1}", "f.$1(1) = {3}",
                          "out(0) = {f.$1(1)", "out(1) = {f(2)"});

@@ -41,7 +41,7 @@ TEST(PassObserver, IsToldOfEveryPass) {
     });
     f.compile_jit();
   }
-  std::vector<std::string> wanted = ir::pass_names();
+  std::vector<std::string> wanted = lower::pass_names();
   ASSERT_GE(passes.size(), wanted.size());
   EXPECT_TRUE(std::equal(wanted.begin(), wanted.end(), passes.begin()));
   EXPECT_GT(seconds, 0.0);
@@ -114,7 +114,7 @@ TEST_F(Opt, ShowsWhatAProgramCompiles) {
       opt("--time-passes --dump-after=flatten_storage -- " RETROGRADE_THIS_PROGRAM
           " --gtest_filter=PassObserver.IsToldNothingAfterItsEnd");
   EXPECT_TRUE(has(result, "after flatten_storage of watched")) << result;
-  for (const std::string& pass : ir::pass_names()) EXPECT_TRUE(has(result, pass)) << pass;
+  for (const std::string& pass : lower::pass_names()) EXPECT_TRUE(has(result, pass)) << pass;
   EXPECT_TRUE(has(result, "llvm_optimize")) << result;
   EXPECT_FALSE(has(result, "after build_loop_nests")) << result;
 }

@@ -10,15 +10,15 @@ namespace retrograde {
 namespace {
 
 std::string lowered(const Func& f, const std::string& pass) {
-  ir::LowerOptions options;
+  lower::LowerOptions options;
   options.target = get_jit_target_from_environment();
   options.validate = true;
   std::string result;
   options.observe = [&](const std::string& name, double, const Stmt& s) {
     if (name == pass) result = ir::print(s);
   };
-  const std::vector<ir::FuncPtr> outputs = {f.function()};
-  ir::lower("f", outputs, ir::infer_arguments(outputs), options);
+  const std::vector<graph::FuncPtr> outputs = {f.function()};
+  lower::lower("f", outputs, lower::infer_arguments(outputs), options);
   return result;
 }
 

@@ -32,8 +32,8 @@ Drawn draw(Choices choices, const Style& style = Style::pipelines()) {
 // that are called alike, updates, predicates.
 Counts counts_of(const RandomProgram& program) {
   Counts counts;
-  for (const ir::FuncPtr& f : ir::topological_order(outputs_of(program))) {
-    std::string name = ir::without_numbers(f->name);
+  for (const graph::FuncPtr& f : graph::topological_order(outputs_of(program))) {
+    std::string name = graph::without_numbers(f->name);
     name.erase(std::find_if(name.begin(), name.end(), isdigit), name.end());
     ++counts["Func " + name];
     counts["update"] += f->stage_count() - 1;
@@ -66,8 +66,8 @@ const std::vector<std::string> structures{"Func f",         "Func level",  "Func
 size_t longest_nesting(const ScheduleLog& schedule) {
   std::map<std::string, std::string> around;  // the Func in whose loops one is computed
   for (const ScheduleLog::Entry& entry : schedule.entries) {
-    const auto* at = std::get_if<ir::ComputeAt>(&entry.directive);
-    if (at && at->level.kind == ir::LoopLevel::Kind::At) around[entry.func] = at->level.func;
+    const auto* at = std::get_if<graph::ComputeAt>(&entry.directive);
+    if (at && at->level.kind == graph::LoopLevel::Kind::At) around[entry.func] = at->level.func;
   }
   size_t longest = 0;
   for (const auto& [func, next] : around) {
@@ -142,9 +142,9 @@ TEST(RandomPrograms, CoverEveryDirectiveAndPlacement) {
   for (uint64_t seed = 0; seed < 400; ++seed) {
     for (const ScheduleLog::Entry& entry : draw(Choices(seed)).schedule.entries) {
       std::string name = name_of(entry.directive);
-      if (const auto* run = std::get_if<ir::RunLoop>(&entry.directive))
+      if (const auto* run = std::get_if<graph::RunLoop>(&entry.directive))
         name += std::to_string(static_cast<int>(run->kind));
-      if (const auto* at = std::get_if<ir::ComputeAt>(&entry.directive))
+      if (const auto* at = std::get_if<graph::ComputeAt>(&entry.directive))
         name += std::to_string(static_cast<int>(at->level.kind));
       ++seen[name + (entry.special.empty() ? "" : " of a specialization")];
     }
@@ -152,7 +152,7 @@ TEST(RandomPrograms, CoverEveryDirectiveAndPlacement) {
   // What changes nothing that a program computes.
   const std::set<std::string> without{"unscheduled",   "set_estimate", "add_trace_tag",
                                       "debug_to_file", "run",          "compute_at"};
-  std::vector<std::string> wanted = ir::directive_names();
+  std::vector<std::string> wanted = graph::directive_names();
   std::erase_if(wanted, [&](const std::string& name) { return without.count(name) != 0; });
   wanted.insert(wanted.end(), {"run0", "run1", "run2", "run3", "compute_at0", "compute_at1",
                                "compute_at2", "split of a specialization",
@@ -167,7 +167,7 @@ TEST(RandomPrograms, AreValidGraphs) {
       SCOPED_TRACE("seed " + std::to_string(seed));
       Choices choices(seed);
       const RandomProgram program = make_program(choices, style);
-      ASSERT_NO_THROW(ir::validate(ir::graph_of(outputs_of(program)), "make_program"));
+      ASSERT_NO_THROW(graph::validate(graph::graph_of(outputs_of(program)), "make_program"));
     }
   }
 }

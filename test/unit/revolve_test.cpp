@@ -7,7 +7,7 @@
 #include <algorithm>
 #include <map>
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 namespace {
 
 using Kind = RevolveAction::Kind;
@@ -77,4 +77,4 @@ TEST(Revolve, WithRoomForAllStatesNothingButTheFirstRunIsComputed) {
 TEST(Revolve, MillionsOfStatesNeedNoDeepStack) { EXPECT_EQ(run(2000000, 2000000), 1999999); }
 
 }  // namespace
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

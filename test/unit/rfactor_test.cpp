@@ -182,7 +182,7 @@ TEST_F(Rfactor, KeptCoordinatesStay) {
           Func partial = f.update().rfactor(r.y, u);
           partial.compute_root();
           const ir::Variable* kept = f.update_args()[1].as<ir::Variable>();
-          EXPECT_TRUE(kept && ir::domain_of(*kept));
+          EXPECT_TRUE(kept && graph::domain_of(*kept));
         }
         return f;
       },

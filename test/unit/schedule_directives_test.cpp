@@ -21,7 +21,7 @@ struct Directives : testing::Test {
     f(x, y) = x + y;
     g(x, y) = f(x, y) + f(x + 1, y);
   }
-  const ir::FuncPlacement& schedule(const Func& func) { return func.function()->schedule; }
+  const graph::FuncPlacement& schedule(const Func& func) { return func.function()->schedule; }
 };
 
 // ---- loop levels ----
@@ -39,7 +39,7 @@ TEST_F(Directives, ALevelMayBeSetLater) {
   EXPECT_EQ(result(2, 3), 2 + 3 + 3 + 3);
   compute.set(LoopLevel::root());
   store.set(LoopLevel::root());
-  EXPECT_EQ(schedule(f).compute_level.kind, ir::LoopLevel::Kind::Root);
+  EXPECT_EQ(schedule(f).compute_level.kind, graph::LoopLevel::Kind::Root);
   EXPECT_EQ(Buffer<int>(g.realize({4, 4}))(2, 3), 11);
 }
 
@@ -68,7 +68,7 @@ TEST_F(Directives, StoringFollowsComputing) {
   f.compute_at(g, x);
   EXPECT_EQ(schedule(f).store_level.var, x.name());
   f.store_root().compute_at(g, y);
-  EXPECT_EQ(schedule(f).store_level.kind, ir::LoopLevel::Kind::Root);
+  EXPECT_EQ(schedule(f).store_level.kind, graph::LoopLevel::Kind::Root);
   EXPECT_EQ(schedule(f).compute_level.var, y.name());
 }
 
@@ -185,7 +185,7 @@ TEST_F(Directives, SpecializationsNest) {
   Stage outer = f.specialize(n > 8);
   outer.specialize(m > 8).parallel(y);
   outer.vectorize(x, 4);
-  const ir::StageLoops& first = f.get_schedule().specializations[0];
+  const graph::StageLoops& first = f.get_schedule().specializations[0];
   ASSERT_EQ(first.specializations.size(), 1u);
   EXPECT_EQ(first.dims.size(), 3u);
   EXPECT_EQ(first.specializations[0].dims.size(), 2u);
@@ -257,7 +257,7 @@ TEST_F(Directives, ComputeWithNamesALoopOfAnotherFunc) {
   Func h("h");
   h(x, y) = x;
   h.compute_with(f, y, {{y, LoopAlignStrategy::AlignEnd}});
-  const ir::StageLoops& now = h.get_schedule();
+  const graph::StageLoops& now = h.get_schedule();
   EXPECT_EQ(now.fuse_level.func, f.name());
   EXPECT_EQ(now.fuse_level.stage, 0);
   EXPECT_EQ(now.fuse_alignment.at("y"), LoopAlignStrategy::AlignEnd);

@@ -14,7 +14,7 @@
 namespace retrograde {
 namespace {
 
-using namespace ir;
+using namespace simplification;
 
 struct Rule {
   const char *before, *after;

@@ -29,10 +29,10 @@ void count_line(void*, const char* text) {
 // Elements allocated for a Func, when that is a constant.
 int64_t stored_elements(const Func& output, const std::string& name) {
   int64_t elements = -1;
-  ir::LowerOptions options;
+  lower::LowerOptions options;
   options.stop_after = "simplify_storage";
-  ir::LoweredFunction lowered =
-      ir::lower("test", {output.function()}, ir::infer_arguments({output.function()}), options);
+  ir::LoweredFunction lowered = lower::lower("test", {output.function()},
+                                             lower::infer_arguments({output.function()}), options);
   ir::walk(
       lowered.body, [](const Expr&) { return false; },
       [&](const Stmt& s) {

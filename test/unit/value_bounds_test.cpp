@@ -11,7 +11,7 @@ namespace {
 Var x("x");
 
 ir::Interval bounds_of_func(const Func& f) {
-  ir::ValueBounds bounds = ir::value_bounds(ir::inline_functions({f.function()}));
+  analysis::ValueBounds bounds = lower::value_bounds(lower::inline_functions({f.function()}));
   return bounds[{f.name(), 0}];
 }
 

@@ -12,11 +12,11 @@ namespace {
 
 // The names of what `reader` reads in the graph that is compiled for `output`.
 std::vector<std::string> read_by(const Func& output, const std::string& reader) {
-  const auto outputs = ir::apply_wrappers({output.function()});
-  for (const ir::FuncPtr& f : ir::topological_order(outputs)) {
+  const auto outputs = graph::apply_wrappers({output.function()});
+  for (const graph::FuncPtr& f : graph::topological_order(outputs)) {
     if (f->name != reader) continue;
     std::vector<std::string> names;
-    for (const ir::FuncPtr& callee : ir::direct_callees(*f)) names.push_back(callee->name);
+    for (const graph::FuncPtr& callee : graph::direct_callees(*f)) names.push_back(callee->name);
     return names;
   }
   return {"no such Func"};
@@ -46,7 +46,7 @@ TEST_F(Wrappers, OneUser) {
   EXPECT_EQ(read_by(h, g.name()), Names{w.name()});
   EXPECT_EQ(read_by(h, w.name()), Names{f.name()});
   EXPECT_EQ(read_by(h, h.name()), (Names{f.name(), g.name()}));
-  EXPECT_EQ(ir::direct_callees(*g.function())[0]->name, f.name());  // the user's own stays
+  EXPECT_EQ(graph::direct_callees(*g.function())[0]->name, f.name());  // the user's own stays
   f.compute_root();
   g.compute_root();
   w.compute_at(g, y).vectorize(x, 4);
@@ -176,7 +176,7 @@ TEST_F(Wrappers, AWrapperGivenAfterCompilingTakesEffect) {
 
 // A wrapper's handle keeps the wrapped Func alive, and nothing keeps itself alive.
 TEST_F(Wrappers, Ownership) {
-  std::weak_ptr<ir::FuncContents> wrapped, wrapper;
+  std::weak_ptr<graph::FuncContents> wrapped, wrapper;
   {
     Func out("out");
     {

@@ -12,7 +12,7 @@
 #include "ir/print.h"
 #include "simplify/simplify.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 std::vector<std::string> names_of(const std::vector<LoopVariable>& vars) {
   return mapped(vars, &LoopVariable::name);
@@ -134,7 +134,7 @@ class Inverter {
       walk(e, [&](const Call& call) {
         if (call.call_type != CallType::Operator) data.insert(quoted(call.name));
       });
-      std::string reason = data.empty() ? quoted(print(e)) + " in an index is not affine" : "";
+      std::string reason = data.empty() ? quoted(ir::print(e)) + " in an index is not affine" : "";
       for (const std::string& name : data)
         reason += (reason.empty() ? "an index depends on " : ", ") + name;
       note_ += (note_.empty() ? "" : "; ") + reason;
@@ -407,4 +407,4 @@ Inversion invert_access(const AccessQuery& query) {
   }
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

@@ -22,7 +22,7 @@
 #include "ir/expr.h"
 #include "ir/visit.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 // min <= name <= max; an undefined end is unbounded.
 struct LoopVariable {
@@ -84,4 +84,4 @@ Inversion invert_access(const AccessQuery& query);
 // parallel.
 Gather scatter_access(const AccessQuery& query);
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

@@ -9,7 +9,7 @@
 #include "ir/build.h"
 #include "simplify/simplify.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 namespace {
 
@@ -189,4 +189,4 @@ FibrePlan plan_fibre(const FibreSpace& space, const isl::map& piece) {
   return FibrePlanner(space).plan(piece);
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

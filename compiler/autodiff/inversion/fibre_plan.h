@@ -9,7 +9,7 @@
 #include "autodiff/inversion/group_inversion.h"
 #include "autodiff/inversion/isl_bridge.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 constexpr int64_t unbounded = -1;
 
@@ -44,4 +44,4 @@ FibrePlan plan_fibre(const FibreSpace& space, const isl::map& piece);
 unsigned pieces_of(const isl::pw_aff& e);
 std::optional<isl::pw_aff> function_of(const isl::map& one_output);  // that it is
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

@@ -11,7 +11,7 @@
 #include "ir/lists.h"
 #include "simplify/simplify.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 namespace {
 
@@ -319,4 +319,4 @@ std::vector<GroupPiece> invert_group(const Group& group, const std::vector<Expr>
                 [&](const isl::map& piece) { return PieceExpressions(relation, piece).emit(); });
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

@@ -6,7 +6,7 @@
 
 #include "autodiff/inversion/access_inversion.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 // One way in which the elements of a group's dimensions are read.
 struct GroupPiece {
@@ -42,4 +42,4 @@ struct Group {
 std::vector<GroupPiece> invert_group(const Group& group, const std::vector<Expr>& fixed,
                                      unsigned long operations);
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

@@ -6,7 +6,7 @@
 #include "ir/build.h"
 #include "simplify/simplify.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 namespace {
 
@@ -55,4 +55,4 @@ Inversion invert_or_scatter(const AccessQuery& any_query, unsigned long operatio
                static_cast<int64_t>(*points), " points")};
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

@@ -4,7 +4,7 @@
 
 #include "autodiff/inversion/access_inversion.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 // The inversion of the query, or the scatter where the gathers would run more than `dearer` times
 // as many iterations as the stage has points; `note` says so. A gather is parallel and writes each
@@ -20,4 +20,4 @@ constexpr unsigned long least_operations = 125'000;
 Inversion invert_or_scatter(const AccessQuery& query,
                             unsigned long operations = worthwhile_operations);
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

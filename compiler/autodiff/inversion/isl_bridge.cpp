@@ -8,7 +8,7 @@
 #include "ir/lists.h"
 #include "ir/visit.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 IslContext::IslContext(unsigned long max_operations) : ctx(isl_ctx_alloc()) {
   isl_options_set_on_error(ctx, ISL_ON_ERROR_CONTINUE);
@@ -444,4 +444,4 @@ Expr IslBridge::to_expr(const isl::set& s, const std::vector<Expr>& names) const
   return result;
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

@@ -22,7 +22,7 @@
 #include "ir/expr.h"
 #include "ir/node_memo.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 struct IslContext {
   explicit IslContext(unsigned long max_operations = isl_operations);
@@ -139,4 +139,4 @@ class IslBridge {
   NodeMemo<std::optional<isl::pw_aff>> known_;  // of nodes seen: expressions share them
 };
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

@@ -2,7 +2,7 @@
 
 #include "autodiff/inversion/isl_bridge.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 namespace {
 
@@ -41,4 +41,4 @@ bool is_single_valued(const isl::map& m) {
   return result;
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

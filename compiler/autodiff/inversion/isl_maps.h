@@ -3,7 +3,7 @@
 
 #include <isl/cpp.h>
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 // All pairs of tuples of such lengths, and none of them.
 isl::map universe_map(isl_ctx* ctx, size_t in, size_t out);
@@ -14,4 +14,4 @@ isl::map only_output(const isl::map& m, int which);
 isl::map output_equals(const isl::pw_aff& e, int which, int n);
 bool is_single_valued(const isl::map& m);
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

@@ -4,7 +4,7 @@
 
 #include "autodiff/inversion/isl_bridge.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 namespace {
 
@@ -58,4 +58,4 @@ std::optional<Points> points_of(const isl::set& s, int64_t most) {
   return std::move(into.points);
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

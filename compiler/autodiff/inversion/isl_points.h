@@ -9,7 +9,7 @@
 
 #include "simplify/facts.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 // Least and largest of each coordinate; nullopt when one has no bound, or the set is empty.
 std::optional<std::vector<ConstantRange>> ranges_of(const isl::set& s);
@@ -18,4 +18,4 @@ std::optional<std::vector<ConstantRange>> ranges_of(const isl::set& s);
 // long to find.
 std::optional<std::vector<std::vector<int64_t>>> points_of(const isl::set& s, int64_t most);
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

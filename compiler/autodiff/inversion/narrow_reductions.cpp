@@ -9,7 +9,7 @@
 #include "ir/visit.h"
 #include "simplify/simplify.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 namespace {
 
@@ -69,4 +69,4 @@ void narrow_reductions(Gather& g, const std::vector<std::string>& target_args) {
   if (g.rdom && g.predicate.defined()) Narrower(g, target_args).run();
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

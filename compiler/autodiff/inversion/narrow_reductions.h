@@ -9,10 +9,10 @@
 
 #include "autodiff/inversion/access_inversion.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 // In place: the gather's reduction domain must be its own. Constant extents stay: their loops are
 // unrolled, with their conditions.
 void narrow_reductions(Gather& g, const std::vector<std::string>& target_args);
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

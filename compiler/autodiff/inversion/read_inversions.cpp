@@ -7,7 +7,7 @@
 #include "ir/print.h"
 #include "ir/visit.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 namespace {
 
@@ -27,7 +27,7 @@ Expr where_it_counts(const Expr& adjoint) {
 // All that the inversion depends on.
 std::string text_of(const AccessQuery& query) {
   std::string text;
-  const auto add = [&](const Expr& e) { text += (e.defined() ? print(e) : "_") + ","; };
+  const auto add = [&](const Expr& e) { text += (e.defined() ? ir::print(e) : "_") + ","; };
   const auto add_all = [&](const std::vector<LoopVariable>& vars) {
     for (const LoopVariable& v : vars) {
       text += v.name + (v.is_reduction ? ":" : "=");
@@ -72,8 +72,8 @@ const Inversion* ReadInversions::where_selected(const FuncContents& f, const Sym
 const Inversion& ReadInversions::find(const FuncContents& f, const Symbol& symbol,
                                       const AccessQuery& query) {
   std::string key = std::to_string(reinterpret_cast<uintptr_t>(&symbol));
-  for (const Expr& e : query.indices) key += "," + print(e);
-  if (query.domain.predicate.defined()) key += "|" + print(query.domain.predicate);
+  for (const Expr& e : query.indices) key += "," + ir::print(e);
+  if (query.domain.predicate.defined()) key += "|" + ir::print(query.domain.predicate);
   for (const LoopVariable& v : query.domain.vars) key += ";" + v.name;
   key += f.name;
   auto [it, is_new] = found_.try_emplace(key);
@@ -87,4 +87,4 @@ const Inversion& ReadInversions::find(const FuncContents& f, const Symbol& symbo
   return it->second;
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

@@ -8,7 +8,7 @@
 #include "autodiff/inversion/inversion_cost.h"
 #include "graph/function.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 class ReadInversions {
  public:
@@ -29,4 +29,4 @@ class ReadInversions {
   unsigned long operations_ = worthwhile_operations;  // for the next
 };
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

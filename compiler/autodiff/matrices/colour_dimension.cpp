@@ -12,7 +12,7 @@
 #include "ir/lists.h"
 #include "ir/visit.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 namespace {
 
@@ -74,4 +74,4 @@ FuncPtr with_seeds(const FuncPtr& output, const FuncPtr& seed, const FuncPtr& se
   return Lifter(seed, seeds).run(output);
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

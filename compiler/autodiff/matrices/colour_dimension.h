@@ -10,9 +10,9 @@
 
 #include "graph/function.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 // `output` with seed' in place of `seed`. Unsupported when an extern stage depends on the seed.
 FuncPtr with_seeds(const FuncPtr& output, const FuncPtr& seed, const FuncPtr& seeds);
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

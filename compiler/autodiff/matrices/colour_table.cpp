@@ -7,7 +7,7 @@
 #include "ir/build.h"
 #include "ir/lists.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 namespace {
 
@@ -155,4 +155,4 @@ std::optional<ColourTable> colour_table(const isl::map& pattern, bool symmetric,
   return result;
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

@@ -10,7 +10,7 @@
 #include "autodiff/matrices/colouring.h"
 #include "frontend/data/buffer.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 struct ColourTable {
   Buffer<int> colours;  // over a box around the columns
@@ -35,4 +35,4 @@ struct Colours {
   }
 };
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

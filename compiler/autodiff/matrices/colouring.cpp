@@ -4,7 +4,7 @@
 
 #include "ir/build.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 namespace {
 
@@ -98,4 +98,4 @@ Colouring one_colour_each(const std::vector<int64_t>& extents) {
   return result;
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

@@ -21,7 +21,7 @@
 
 #include "ir/expr.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 struct Colouring {
   std::vector<int64_t> factors;  // one a dimension, in [0, count)
@@ -38,4 +38,4 @@ std::optional<Colouring> smallest_colouring(const std::vector<std::vector<int64_
 // One colour an element of a box: factors are the products of the extents before.
 Colouring one_colour_each(const std::vector<int64_t>& extents);
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

@@ -12,7 +12,7 @@
 #include "ir/visit.h"
 #include "simplify/simplify.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 namespace {
 
@@ -186,4 +186,4 @@ std::optional<std::vector<ConstantRange>> Compressed::offsets() const {
   });
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

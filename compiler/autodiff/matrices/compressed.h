@@ -12,7 +12,7 @@
 #include "autodiff/matrices/dependence.h"
 #include "graph/function.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 struct CompressionQuery {
   FuncPtr output, seed;        // of the linear pipeline
@@ -54,4 +54,4 @@ class Compressed {
   Colours colours_;
 };
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

@@ -13,7 +13,7 @@
 #include "ir/visit.h"
 #include "simplify/simplify.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 namespace {
 
@@ -293,4 +293,4 @@ isl::map Dependence::inside(const Box& of_f, const Box& of_source) const {
                        .intersect_range(box_set(context_.ctx, of_source, dims(isl_dim_out))));
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

@@ -17,7 +17,7 @@
 #include "autodiff/inversion/isl_bridge.h"
 #include "graph/function.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 class Dependence {
  public:
@@ -36,4 +36,4 @@ class Dependence {
   isl::map map_;
 };
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

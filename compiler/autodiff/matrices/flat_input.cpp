@@ -2,7 +2,7 @@
 
 #include "ir/build.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 std::vector<Expr> expressions(const std::vector<Var>& vars) { return {vars.begin(), vars.end()}; }
 std::vector<Var> variables(const std::string& base, size_t n) {
@@ -56,4 +56,4 @@ Func direction(const Func& seed, const InputShape& shape) {
   return result;
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

@@ -13,7 +13,7 @@
 #include "autodiff/sweeps/input_shape.h"
 #include "frontend/language/func.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 InputShape flat(const InputShape& shape);
 Box flat(Box box, const InputShape& shape);
@@ -30,4 +30,4 @@ std::vector<Var> variables(const std::string& base, size_t n);
 std::vector<Var> both(std::vector<Var> a, const std::vector<Var>& b);
 std::vector<Expr> expressions(const std::vector<Var>& vars);
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

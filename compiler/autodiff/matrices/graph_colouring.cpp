@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <numeric>
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 namespace {
 
@@ -117,4 +117,4 @@ bool is_alone(const Adjacency& graph, const VertexColours& colours, int i, int j
   return true;
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

@@ -8,7 +8,7 @@
 
 #include <vector>
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 // Vertex -> its neighbours, ascending, without itself.
 using Adjacency = std::vector<std::vector<int>>;
@@ -28,4 +28,4 @@ VertexColours star_colouring(const Adjacency& graph);
 // Whether column j is alone of its colour in row i, for a neighbour j of i.
 bool is_alone(const Adjacency& graph, const VertexColours& colours, int i, int j);
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

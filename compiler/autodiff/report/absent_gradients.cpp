@@ -5,7 +5,7 @@
 #include "autodiff/sweeps/input_shape.h"
 #include "diagnostics/error.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 namespace {
 
@@ -107,4 +107,4 @@ void explain_absent(const Primal& primal, const std::unordered_set<const Symbol*
   gradients.find_strangers();
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

@@ -5,10 +5,10 @@
 #include "autodiff/report/synthesis_account.h"
 #include "autodiff/sweeps/primal.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 // `covered`: inside of a custom adjoint that was used.
 void explain_absent(const Primal& primal, const std::unordered_set<const Symbol*>& covered,
                     SynthesisResult& result, SynthesisAccount& account);
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

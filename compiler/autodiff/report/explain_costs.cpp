@@ -6,7 +6,7 @@
 #include "diagnostics/error.h"
 #include "graph/function.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 namespace {
 
@@ -17,7 +17,7 @@ std::string counted(const Count& count, const char* what) {
 }
 
 const char* reason_to_store(const FuncContents& f) {
-  if (f.schedule.compute_level.kind != LoopLevel::Kind::Inlined) return "by its schedule";
+  if (f.schedule.compute_level.kind != graph::LoopLevel::Kind::Inlined) return "by its schedule";
   if (f.is_extern()) return "as a C function fills it";
   if (!f.is_pure()) return "as it has updates";
   return "as it is wanted itself or read often";
@@ -35,7 +35,7 @@ Explanation stored(const FuncOperations& f) {
 // A Func of the program with updates that nobody scheduled.
 bool is_stored_by_default(const FuncOperations& f) {
   return f.stored && !f.func->made && !f.func->is_pure() && !f.is_extern &&
-         f.func->schedule.compute_level.kind == LoopLevel::Kind::Inlined;
+         f.func->schedule.compute_level.kind == graph::LoopLevel::Kind::Inlined;
 }
 Explanation computed_once(const FuncOperations& f) {
   return {
@@ -123,4 +123,4 @@ std::vector<Explanation> explain_costs(const WantedFunc& output,
   return result;
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

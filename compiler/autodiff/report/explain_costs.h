@@ -7,7 +7,7 @@
 #include "autodiff/report/explain.h"
 #include "autodiff/report/operation_count.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 // `primal` and `gradient`: counts of the output alone, and of the gradients alone. Funcs in the
 // order in which the gradient computes them, then what it needs nothing of, then the sums; where it
@@ -17,4 +17,4 @@ std::vector<Explanation> explain_costs(const WantedFunc& output,
                                        const OperationCount& primal,
                                        const OperationCount& gradient);
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

@@ -17,7 +17,7 @@
 #include "ir/visit.h"
 #include "simplify/simplify.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 namespace {
 
@@ -84,7 +84,7 @@ class Counter {
 
   bool is_stored(const FuncPtr& f) const {
     return !f->is_pure() || stored_by_default_.contains(f.get()) ||
-           f->schedule.compute_level.kind != LoopLevel::Kind::Inlined ||
+           f->schedule.compute_level.kind != graph::LoopLevel::Kind::Inlined ||
            std::ranges::find(outputs_, f) != outputs_.end();
   }
 
@@ -199,7 +199,7 @@ Count Count::points(const Box& box) {
     if (auto constant = as_const_int(extent)) {
       factor *= static_cast<double>(std::max<int64_t>(*constant, 0));
     } else {
-      symbols.push_back(print(extent));
+      symbols.push_back(ir::print(extent));
     }
   }
   if (symbols.empty()) return factor;
@@ -292,4 +292,4 @@ OperationCount count_operations(const std::vector<WantedFunc>& outputs) {
   return Counter(outputs).run();
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

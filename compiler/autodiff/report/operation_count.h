@@ -20,7 +20,7 @@
 #include "analysis/interval.h"
 #include "graph/function.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 // In one iteration of a stage.
 struct Operations {
@@ -91,4 +91,4 @@ struct WantedFunc {
 // What it takes to compute `outputs` together, as one pipeline.
 OperationCount count_operations(const std::vector<WantedFunc>& outputs);
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

@@ -7,7 +7,7 @@
 #include "ir/lists.h"
 #include "simplify/simplify.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 namespace {
 
@@ -63,4 +63,4 @@ void SynthesisAccount::built(const AdjointFunc& adjoint, const std::string& prim
   }
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

@@ -8,7 +8,7 @@
 #include "autodiff/report/explain.h"
 #include "autodiff/sweeps/accumulation.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 class SynthesisAccount {
  public:
@@ -24,4 +24,4 @@ class SynthesisAccount {
   std::vector<Explanation> lines_;
 };
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

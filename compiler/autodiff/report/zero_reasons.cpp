@@ -7,7 +7,7 @@
 #include "ir/build.h"
 #include "ir/print.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 namespace {
 
@@ -88,4 +88,4 @@ std::vector<std::string> zero_reasons(const Symbol* input, const std::vector<Fun
   return reasons;
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

@@ -10,11 +10,11 @@
 #include "graph/function.h"
 #include "ir/visit.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 // One clause a reader, at most a few: "\"f\" reads it in floor, whose derivative is 0". `order`:
 // the graph; has_adjoint: whether something other than zero reaches a Func of it.
 std::vector<std::string> zero_reasons(const Symbol* input, const std::vector<FuncPtr>& order,
                                       FunctionRef<bool(const FuncContents&)> has_adjoint);
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

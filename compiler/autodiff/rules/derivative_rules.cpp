@@ -12,7 +12,7 @@
 #include "ir/build.h"
 #include "ir/scalar.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 namespace {
 
@@ -438,4 +438,4 @@ Expr times_partial(const Expr& adjoint, const Partial& partial) {
                      call_op(Op::strong_mul, product.type(), {factor, adjoint}), product);
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

@@ -7,7 +7,7 @@
 
 #include "ir/expr.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 enum class RuleClass : uint8_t {
   Smooth,    // has partials
@@ -70,4 +70,4 @@ bool levels_off(Op op);
 // adjoint * partial, by the partial's strength; `adjoint` and the result are of the adjoint type.
 Expr times_partial(const Expr& adjoint, const Partial& partial);
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

@@ -12,7 +12,7 @@
 #include "ir/markers.h"
 #include "simplify/simplify.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 namespace {
 
@@ -343,4 +343,4 @@ std::unordered_set<const Symbol*> cancelling_funcs(const std::vector<FuncPtr>& o
   return result;
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

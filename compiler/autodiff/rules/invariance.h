@@ -24,9 +24,9 @@
 
 #include "graph/function.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 // Of `order`, producers before consumers, the output last: Funcs that cancel.
 std::unordered_set<const Symbol*> cancelling_funcs(const std::vector<FuncPtr>& order);
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

@@ -9,7 +9,7 @@
 #include "ir/build.h"
 #include "ir/equal.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 namespace {
 
@@ -300,4 +300,4 @@ StableForm stable_form(const Expr& e) {
   return !norm.is_found() ? normalised_form(e) : norm;
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

@@ -26,7 +26,7 @@
 #include "autodiff/rules/derivative_rules.h"
 #include "ir/expr.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 struct StableForm {
   std::vector<Expr> operands;  // inner expressions; empty: `e` has none of the shapes
@@ -40,4 +40,4 @@ struct StableForm {
 };
 StableForm stable_form(const Expr& e);
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

@@ -8,7 +8,7 @@
 #include "ir/build.h"
 #include "ir/equal.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 namespace {
 
@@ -169,4 +169,4 @@ std::vector<Expr> angle_gradient(const Expr& y, const Expr& x) {
   return {partial(along_x), partial(-along_y)};
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

@@ -7,7 +7,7 @@
 #include "autodiff/rules/stable_forms.h"
 #include "ir/expr.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 // Of sqrt(a * a + b * b + ...).
 StableForm norm_form(const Expr& e);
@@ -22,4 +22,4 @@ std::vector<Expr> unit_vector(const std::vector<Expr>& a);
 // The partials of atan2(y, x) by y and x: 0 at the origin and where an operand is infinite.
 std::vector<Expr> angle_gradient(const Expr& y, const Expr& x);
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

@@ -3,7 +3,7 @@
 #include "ir/build.h"
 #include "ir/equal.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 namespace {
 constexpr size_t most_terms = 4;
@@ -55,4 +55,4 @@ std::vector<Expr> terms_of(const Expr& sum) {
   return terms;
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

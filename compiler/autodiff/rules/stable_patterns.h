@@ -6,7 +6,7 @@
 #include "autodiff/rules/derivative_rules.h"
 #include "ir/expr.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 // e, or what it is the negation of.
 Expr without_sign(const Expr& e);
@@ -23,4 +23,4 @@ struct SignedTerm {
 // The same through differences.
 std::vector<SignedTerm> signed_terms_of(const Expr& sum);
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

@@ -6,7 +6,7 @@
 #include "ir/build.h"
 #include "ir/equal.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 namespace {
 
@@ -115,4 +115,4 @@ StableForm quotient_form(const Expr& e, const Div& quotient) {
   return !sine.is_found() ? vanishing_quotient(e, quotient) : sine;
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

@@ -6,9 +6,9 @@
 #include "autodiff/rules/stable_forms.h"
 #include "ir/expr.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 // Of e, which is the quotient.
 StableForm quotient_form(const Expr& e, const Div& quotient);
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

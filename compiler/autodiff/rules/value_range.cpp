@@ -8,7 +8,7 @@
 #include "ir/equal.h"
 #include "ir/lists.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 namespace {
 
@@ -219,4 +219,4 @@ void ValueRanges::add(const FuncPtr& f) {
   }
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

@@ -15,7 +15,7 @@
 #include "graph/function.h"
 #include "ir/interval.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 struct ValueRange : IntervalOf<double> {
   bool infinite = false;  // -inf if `min` is -inf, inf if `max` is inf
@@ -37,4 +37,4 @@ class ValueRanges {
   std::unordered_map<const Symbol*, std::vector<ValueRange>> funcs_;
 };
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

@@ -15,7 +15,7 @@
 #include "ir/lists.h"
 #include "simplify/simplify.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 namespace {
 
@@ -282,4 +282,4 @@ AdjointFunc make_adjoint(const AdjointTarget& target, const std::string& name,
   return Builder(target, name).build(contributions, initial);
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

@@ -33,7 +33,7 @@
 #include "autodiff/inversion/access_inversion.h"
 #include "graph/function.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 struct Contribution {
   int component = 0;
@@ -66,4 +66,4 @@ AdjointFunc make_adjoint(const AdjointTarget& target, const std::string& name,
                          const std::vector<Contribution>& contributions,
                          const std::vector<Expr>& initial = {});
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

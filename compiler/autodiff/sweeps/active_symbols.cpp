@@ -7,7 +7,7 @@
 #include "autodiff/sweeps/input_shape.h"
 #include "ir/visit.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 const ParameterContents* as_parameter(const Symbol* symbol) {
   return dynamic_cast<const ParameterContents*>(symbol);
@@ -67,4 +67,4 @@ bool ActiveSymbols::reads_active(const Definition& definition) const {
                   [&](const Expr& e) { return (e.as<Call>() || e.as<Variable>()) && contains(e); });
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

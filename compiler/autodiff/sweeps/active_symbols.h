@@ -7,7 +7,7 @@
 
 #include "autodiff/sweeps/synthesis.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 // Of a symbol that is an image or scalar parameter; else null.
 const ParameterContents* as_parameter(const Symbol* symbol);
@@ -36,4 +36,4 @@ class ActiveSymbols {
   std::unordered_set<const Symbol*> cancelling_, active_, passing_;
 };
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

@@ -9,7 +9,7 @@
 #include "ir/lists.h"
 #include "simplify/simplify.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 namespace {
 
@@ -123,4 +123,4 @@ std::optional<SumOfBlocks> sum_in_blocks(const std::string& name, const std::str
   return result;
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

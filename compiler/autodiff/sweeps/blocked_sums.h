@@ -18,7 +18,7 @@
 
 #include "graph/function.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 // Terms of a block, one after the other; lanes have blocks of their own.
 inline constexpr int block_terms = 16;
@@ -40,4 +40,4 @@ std::optional<SumOfBlocks> sum_in_blocks(const std::string& name, const std::str
                                          const std::vector<ReductionVariable>& rvars,
                                          const std::vector<Expr>& terms, const Expr& predicate);
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

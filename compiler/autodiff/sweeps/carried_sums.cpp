@@ -9,7 +9,7 @@
 #include "ir/build.h"
 #include "ir/node_memo.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 namespace {
 
@@ -165,4 +165,4 @@ Expr carried_in_double(const Expr& term, const FuncPtr& rounded, const FuncPtr& 
   return InDouble(rounded, exact).of(term);
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

@@ -12,7 +12,7 @@
 
 #include "autodiff/updates/update_context.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 // Elements from which sums are carried in double: fewer in float32 are wrong by at most 4e-6 of the
 // sum of absolute values, n * 2^-24.
@@ -28,4 +28,4 @@ bool carries_sums(const std::vector<Expr>& terms, const FuncContents* carried);
 // rounds `exact`.
 Expr carried_in_double(const Expr& term, const FuncPtr& rounded, const FuncPtr& exact);
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

@@ -6,7 +6,7 @@
 #include "diagnostics/error.h"
 #include "ir/build.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 void Contributions::add_pointwise(const Symbol* symbol, const std::vector<std::string>& args,
                                   const Box& box, const std::vector<LoopVariable>& read,
@@ -66,4 +66,4 @@ const Inversion& Contributions::inversion_of(const FuncContents& reader, const L
   return inversions_.of(reader, *symbol, query, leaf.adjoint);
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

@@ -11,7 +11,7 @@
 #include "autodiff/sweeps/passed_reads.h"
 #include "autodiff/sweeps/primal.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 class Contributions {
  public:
@@ -45,4 +45,4 @@ class Contributions {
   PassedReads passed_;
 };
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

@@ -15,7 +15,7 @@
 #include "ir/lists.h"
 #include "simplify/simplify.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 namespace {
 
@@ -254,4 +254,4 @@ FuncPtr zero_derivative(const Symbol& symbol, const std::string& suffix) {
   return zero;
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

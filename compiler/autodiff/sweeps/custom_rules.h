@@ -9,7 +9,7 @@
 #include "autodiff/sweeps/regions.h"
 #include "ir/visit.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 // What FuncContents::custom_derivatives points to. Never changed once it is there.
 struct CustomDerivatives {
@@ -60,4 +60,4 @@ FuncPtr run_custom_tangent(const FuncPtr& f, FunctionRef<FuncPtr(const Symbol*)>
 // Zeros in the shape of an input, under its name and `suffix`.
 FuncPtr zero_derivative(const Symbol& symbol, const std::string& suffix);
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

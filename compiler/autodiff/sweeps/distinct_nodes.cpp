@@ -5,7 +5,7 @@
 #include "ir/print.h"
 #include "ir/visit.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 namespace {
 
@@ -14,7 +14,7 @@ std::string key_of(const Expr& shallow) {
   const auto* call = shallow.as<Call>();
   const auto* v = shallow.as<Variable>();
   const Symbol* symbol = call ? call->symbol.raw() : v ? v->symbol.raw() : nullptr;
-  return print(shallow) + "@" + std::to_string(reinterpret_cast<uintptr_t>(symbol));
+  return ir::print(shallow) + "@" + std::to_string(reinterpret_cast<uintptr_t>(symbol));
 }
 
 }  // namespace
@@ -43,4 +43,4 @@ std::vector<Expr> with_equal_nodes_shared(const std::vector<Expr>& roots) {
   return result;
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

@@ -7,7 +7,7 @@
 
 #include "ir/expr.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 class DistinctNodes {
  public:
@@ -28,4 +28,4 @@ class DistinctNodes {
 // they are, inside too: others look for them, and an index that is built again may be simplified.
 std::vector<Expr> with_equal_nodes_shared(const std::vector<Expr>& roots);
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

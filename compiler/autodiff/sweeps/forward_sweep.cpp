@@ -5,7 +5,7 @@
 #include "diagnostics/error.h"
 #include "ir/build.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 namespace {
 
@@ -149,4 +149,4 @@ ForwardResult sweep_forward(const std::vector<Expr>& values,
   return ForwardSweep(values, tangent_of, is_infinite_leaf).run(values);
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

@@ -14,7 +14,7 @@
 
 #include "autodiff/sweeps/local_derivative.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 struct ForwardResult {
   std::vector<Expr> tangents;   // one a value, of its adjoint type; undefined: identically zero
@@ -30,4 +30,4 @@ ForwardResult sweep_forward(const std::vector<Expr>& values,
                             FunctionRef<Expr(const Expr&)> tangent_of,
                             FunctionRef<bool(const Expr&)> is_infinite_leaf);
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

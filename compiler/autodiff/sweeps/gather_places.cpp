@@ -6,7 +6,7 @@
 #include "ir/build.h"
 #include "simplify/simplify.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 namespace {
 
@@ -60,4 +60,4 @@ Gather with_safe_places(const Gather& gather, const AdjointTarget& target) {
   return with_fixed_places_inside(with_few_elements_pure(gather, target), target);
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

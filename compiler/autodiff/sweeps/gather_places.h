@@ -6,8 +6,8 @@
 
 #include "autodiff/sweeps/accumulation.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 Gather with_safe_places(const Gather& gather, const AdjointTarget& target);
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

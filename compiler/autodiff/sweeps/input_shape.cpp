@@ -4,13 +4,13 @@
 
 #include "diagnostics/error.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 bool is_floating(const std::vector<Type>& types) {
   return std::ranges::any_of(types, [](Type t) { return t.is_float(); });
 }
 
-bool InputShape::is_floating() const { return ir::is_floating(types); }
+bool InputShape::is_floating() const { return autodiff::is_floating(types); }
 
 void check_is_floating(const std::string& asked, const std::vector<Type>& types,
                        const std::string& whose, const std::string& what_to_do) {
@@ -54,4 +54,4 @@ void check_shape(const std::string& asked, const std::string& what, const std::s
   }
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

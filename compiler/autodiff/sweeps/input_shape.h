@@ -6,7 +6,7 @@
 
 #include "graph/function.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 struct InputShape {
   std::string name;
@@ -27,4 +27,4 @@ void check_is_floating(const std::string& asked, const std::vector<Type>& types,
 void check_shape(const std::string& asked, const std::string& what, const std::string& of,
                  const InputShape& shape, const FuncContents& given);
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

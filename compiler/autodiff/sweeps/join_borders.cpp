@@ -9,7 +9,7 @@
 #include "ir/markers.h"
 #include "simplify/simplify.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 namespace {
 
@@ -131,4 +131,4 @@ void join_borders(std::vector<Contribution>& contributions, const AdjointTarget&
   contributions = std::move(result);
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

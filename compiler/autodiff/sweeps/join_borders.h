@@ -12,9 +12,9 @@
 
 #include "autodiff/sweeps/accumulation.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 // In place: fewer contributions that add the same.
 void join_borders(std::vector<Contribution>& contributions, const AdjointTarget& target);
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

@@ -3,7 +3,7 @@
 #include "autodiff/time/overwrite_time.h"
 #include "diagnostics/error.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 namespace {
 
@@ -55,4 +55,4 @@ SynthesisResult synthesize_what_can_be(const Seed& seed, const SynthesisOptions&
   }
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

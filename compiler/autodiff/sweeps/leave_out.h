@@ -6,10 +6,10 @@
 
 #include "autodiff/sweeps/synthesis.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 // As synthesize_adjoints or, with a budget for checkpoints, synthesize_folded. What these refuse,
 // this refuses, unless it is for a scalar parameter that was not requested.
 SynthesisResult synthesize_what_can_be(const Seed& seed, const SynthesisOptions& options);
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

@@ -6,7 +6,7 @@
 #include "diagnostics/error.h"
 #include "ir/build.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 namespace {
 
@@ -228,4 +228,4 @@ AdjointTraits traits_of(const Expr& adjoint) {
   return result;
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

@@ -17,7 +17,7 @@
 #include "ir/lets.h"
 #include "ir/visit.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 // Children before parents, each node once. Undefined roots are skipped.
 std::vector<Expr> post_order(const std::vector<Expr>& roots);
@@ -86,4 +86,4 @@ LocalDerivative local_derivative(const Expr& e, const ExprFacts& facts);
 // Here or in a Func between here and the output. A seed that the user gives counts as masked.
 AdjointTraits traits_of(const Expr& adjoint);
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

@@ -6,7 +6,7 @@
 #include "ir/build.h"
 #include "ir/lists.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 Expr call_value(const FuncPtr& f, const std::vector<Expr>& args, int index) {
   return call_func(f->name, f->types.at(static_cast<size_t>(index)), args, index, SymbolRef(f));
@@ -61,4 +61,4 @@ void append_sums(const FuncPtr& f, const std::vector<Expr>& args, const std::vec
   append_update(f, args, std::move(values), rvars, predicate);
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

@@ -5,7 +5,7 @@
 
 #include "graph/function.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 // A call of value `index` of f.
 Expr call_value(const FuncPtr& f, const std::vector<Expr>& args, int index);
@@ -23,4 +23,4 @@ void append_sums(const FuncPtr& f, const std::vector<Expr>& args, const std::vec
 // What `values` do to adjoints concerns all that f passes on.
 void note_traits(const FuncPtr& f, const std::vector<Expr>& values);
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

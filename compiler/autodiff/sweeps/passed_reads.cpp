@@ -7,7 +7,7 @@
 #include "ir/build.h"
 #include "ir/lets.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 namespace {
 
@@ -69,4 +69,4 @@ const std::vector<PassedRead>& PassedReads::of(const Symbol* symbol) const {
   return found == reads_.end() || closed_.contains(symbol) ? none : found->second;
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

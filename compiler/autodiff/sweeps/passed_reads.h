@@ -23,7 +23,7 @@
 #include "autodiff/sweeps/reverse_sweep.h"
 #include "graph/function.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 // Of a Func by a stage of `reader`, over the variables of `domain`.
 struct PassedRead {
@@ -55,4 +55,4 @@ class PassedReads {
   std::unordered_set<const Symbol*> closed_;
 };
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

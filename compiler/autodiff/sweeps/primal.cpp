@@ -6,7 +6,7 @@
 #include "ir/build.h"
 #include "ir/lists.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 Primal::Primal(const Seed& seed, const SynthesisOptions& options)
     : seed(seed),
@@ -61,4 +61,4 @@ SweepResult Primal::sweep(const std::vector<Expr>& values, const std::vector<Exp
       [&](const Expr& leaf) { return ranges.may_be_infinite(leaf); });
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

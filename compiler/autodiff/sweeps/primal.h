@@ -8,7 +8,7 @@
 #include "autodiff/sweeps/active_symbols.h"
 #include "autodiff/sweeps/reverse_sweep.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 struct Primal {
   Primal(const Seed& seed, const SynthesisOptions& options);
@@ -32,4 +32,4 @@ struct Primal {
                     const Symbol* except = nullptr) const;
 };
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

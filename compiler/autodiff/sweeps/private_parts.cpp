@@ -8,7 +8,7 @@
 #include "ir/print.h"
 #include "simplify/simplify.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 namespace {
 
@@ -133,7 +133,7 @@ class PartSizes {
   std::string note(const Gather& g, const Expr& count) const {
     const double bytes = elements_of_target() * bytes_an_element();
     if (!g.scatters || as_const_int(count) == 1) return "";
-    const std::string number = is_const(count) ? print(count) : text("at most ", parts_of(g));
+    const std::string number = is_const(count) ? ir::print(count) : text("at most ", parts_of(g));
     const std::string each =
         bytes >= unknown_elements ? "" : text(" of ", static_cast<int64_t>(bytes), " bytes each");
     return text("accumulated in ", number, " private parts", each, ", as many as fit ",
@@ -248,4 +248,4 @@ std::vector<Expr> parts_point(const Gather& g, const std::vector<Expr>& element,
   return point;
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

@@ -7,7 +7,7 @@
 
 #include "autodiff/sweeps/taps.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 // Elements of a part's vector: neighbouring iterations accumulate apart.
 inline constexpr int lane_count = 16;
@@ -44,4 +44,4 @@ Slice slice_of(const Iterations& update, const Expr& lane, const Expr& part, con
 std::vector<Expr> parts_point(const Gather& g, const std::vector<Expr>& element, const Expr& lane,
                               const Expr& part);
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

@@ -8,7 +8,7 @@
 #include "ir/lets.h"
 #include "simplify/simplify.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 namespace {
 
@@ -137,4 +137,4 @@ Box box_of(const Region& region) {
   return box;
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

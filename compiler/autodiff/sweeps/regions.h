@@ -11,7 +11,7 @@
 #include "frontend/language/rdom.h"
 #include "graph/function.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 class Regions {
  public:
@@ -42,4 +42,4 @@ class Regions {
 // A region in whole numbers, min and max of each dimension.
 Box box_of(const Region& region);
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

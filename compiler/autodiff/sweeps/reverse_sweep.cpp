@@ -6,7 +6,7 @@
 #include "autodiff/sweeps/distinct_nodes.h"
 #include "ir/build.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 namespace {
 
@@ -104,4 +104,4 @@ SweepResult sweep_reverse(const std::vector<Expr>& values, const std::vector<Exp
   return ReverseSweep(values, seeds, is_wanted, is_infinite_leaf).run();
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

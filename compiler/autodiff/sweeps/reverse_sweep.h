@@ -16,7 +16,7 @@
 #include "ir/expr.h"
 #include "ir/visit.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 // A leaf that was reached: a Call of a Func or image, or the Variable of a scalar parameter.
 struct LeafAdjoint {
@@ -36,4 +36,4 @@ SweepResult sweep_reverse(const std::vector<Expr>& values, const std::vector<Exp
                           FunctionRef<bool(const Expr&)> is_wanted,
                           FunctionRef<bool(const Expr&)> is_infinite_leaf);
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

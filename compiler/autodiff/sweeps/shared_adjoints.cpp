@@ -19,7 +19,7 @@
 #include "ir/print.h"
 #include "simplify/simplify.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 namespace {
 
@@ -35,9 +35,9 @@ std::vector<Expr> adjoints_of(const std::vector<LeafAdjoint>& leaves) {
 // What is read, and where; values of a Tuple have their place in common.
 std::string place_of(const Expr& leaf) {
   const auto* call = leaf.as<Call>();
-  if (!call) return print(leaf);
+  if (!call) return ir::print(leaf);
   std::string place = std::to_string(reinterpret_cast<uintptr_t>(call->symbol.raw()));
-  for (const Expr& arg : call->args) place += "," + print(arg);
+  for (const Expr& arg : call->args) place += "," + ir::print(arg);
   return place;
 }
 
@@ -214,4 +214,4 @@ SharedAdjoints share_adjoints(const std::string& name, const IterationDomain& do
   return result;
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

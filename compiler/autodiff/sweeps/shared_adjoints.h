@@ -20,7 +20,7 @@
 #include "autodiff/sweeps/regions.h"
 #include "autodiff/sweeps/reverse_sweep.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 struct SharedAdjoints {
   FuncPtr func;                // null: nothing is worth it
@@ -33,4 +33,4 @@ SharedAdjoints share_adjoints(const std::string& name, const IterationDomain& do
                               const std::vector<LeafAdjoint>& leaves,
                               const std::vector<Expr>& seeds, const Regions& regions);
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

@@ -14,7 +14,7 @@
 #include "ir/lists.h"
 #include "simplify/simplify.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 namespace {
 
@@ -267,4 +267,4 @@ SynthesisResult synthesize_adjoints(const Seed& seed, const SynthesisOptions& op
   return Synthesis(seed, options).run();
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

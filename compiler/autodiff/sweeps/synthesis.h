@@ -27,7 +27,7 @@
 #include "autodiff/updates/version_budget.h"
 #include "graph/function.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 struct SynthesisOptions {
   VersionRules versions;
@@ -60,4 +60,4 @@ struct SynthesisResult {
 
 SynthesisResult synthesize_adjoints(const Seed& seed, const SynthesisOptions& options);
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

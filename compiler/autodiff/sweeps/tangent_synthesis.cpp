@@ -13,7 +13,7 @@
 #include "ir/lists.h"
 #include "ir/memory_reads.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 namespace {
 
@@ -283,4 +283,4 @@ TangentResult synthesize_tangents(const FuncPtr& output, const Directions& direc
   return TangentSynthesis(output, directions).run();
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

@@ -20,7 +20,7 @@
 #include "autodiff/report/explain.h"
 #include "graph/function.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 // By what each input is perturbed: a Func with its dimensions, and one value for each of its
 // values. That of a Func is added to its values after the last definition.
@@ -37,4 +37,4 @@ TangentResult synthesize_tangents(const FuncPtr& output, const Directions& direc
 // The tangent of a Func that has none: zeros.
 FuncPtr zero_tangent(const FuncContents& f);
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

@@ -10,7 +10,7 @@
 #include "ir/lists.h"
 #include "ir/print.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 std::string shape_of(const Gather& g, bool with_places) {
   Substitution canonical;
@@ -18,12 +18,12 @@ std::string shape_of(const Gather& g, bool with_places) {
   if (g.rdom) {
     for (size_t i = 0; i < g.rdom->vars.size(); ++i) {
       canonical[g.rdom->vars[i].var] = variable("rho" + std::to_string(i));
-      key += print(g.rdom->vars[i].min) + ":" + print(g.rdom->vars[i].extent) + ";";
+      key += ir::print(g.rdom->vars[i].min) + ":" + ir::print(g.rdom->vars[i].extent) + ";";
     }
   }
   for (size_t d = 0; d < g.lhs.size(); ++d)
-    key += with_places || g.pure[d] ? print(substitute(g.lhs[d], canonical)) + "," : "?,";
-  if (g.predicate.defined()) key += "|" + print(substitute(g.predicate, canonical));
+    key += with_places || g.pure[d] ? ir::print(substitute(g.lhs[d], canonical)) + "," : "?,";
+  if (g.predicate.defined()) key += "|" + ir::print(substitute(g.predicate, canonical));
   return key;
 }
 
@@ -137,4 +137,4 @@ std::vector<Iterations> updates_of(const std::vector<Contribution>& contribution
   return mapped(join_taps(group_updates(contributions, values)), over_taps);
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

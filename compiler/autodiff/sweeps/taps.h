@@ -7,7 +7,7 @@
 
 #include "autodiff/sweeps/accumulation.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 // One place of an update, as one corner of a cell between which a pixel is read.
 struct Tap {
@@ -32,4 +32,4 @@ std::string shape_of(const Gather& g, bool with_places = true);
 // Of the contributions that are not pointwise, to a Func of so many values.
 std::vector<Iterations> updates_of(const std::vector<Contribution>& contributions, size_t values);
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

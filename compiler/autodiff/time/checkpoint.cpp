@@ -13,7 +13,7 @@
 #include "ir/print.h"
 #include "simplify/simplify.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 namespace {
 
@@ -212,8 +212,8 @@ class CheckpointedLoop {
     std::string what = "no value of it is needed, none is kept";
     if (plan_.needs_values())
       what = text("from ", kept_text(), ", ", again_text(), " computed again beside the ",
-                  print(plan_.steps), " that are reversed");
-    c_.note(text(" is a loop of ", print(plan_.steps), " steps that ", quoted(machine_->name),
+                  ir::print(plan_.steps), " that are reversed");
+    c_.note(text(" is a loop of ", ir::print(plan_.steps), " steps that ", quoted(machine_->name),
                  " runs backward: ", what),
             result_);
   }
@@ -223,7 +223,7 @@ class CheckpointedLoop {
                 bytes ? text(" of ", *bytes, " bytes") : std::string());
   }
   std::string again_text() const {
-    if (plan_.constant_steps) return text(print(table_.count(Action::Advance)), " steps");
+    if (plan_.constant_steps) return text(ir::print(table_.count(Action::Advance)), " steps");
     return text("each step at most r times, as ", quoted(table_.made_by->name),
                 " finds at run time,");
   }
@@ -252,4 +252,4 @@ void differentiate_by_checkpoints(const UpdateContext& context, UpdateAdjoint& r
   CheckpointedLoop(context, result).run();
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

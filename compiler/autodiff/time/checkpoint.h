@@ -19,7 +19,7 @@
 
 #include "autodiff/updates/update_context.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 // Whether the update is a loop over time whose values are lost, and a budget was given.
 bool wants_checkpoints(const UpdateContext& context);
@@ -28,4 +28,4 @@ bool wants_checkpoints(const UpdateContext& context);
 // known at run time only is no obstacle: the pipeline makes its table then (checkpoint_actions.h).
 void differentiate_by_checkpoints(const UpdateContext& context, UpdateAdjoint& result);
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

@@ -16,7 +16,7 @@
 
 #include "graph/function.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 // What one pass over the inner loops does; Idle: nothing.
 enum class Action : int { Idle = -1, Store, Restore, Advance, Record, Adjoint };
@@ -44,4 +44,4 @@ int most_steps_at_run_time(int states);
 // States that a table made at run time may use: it has a column for each.
 inline constexpr int most_states_at_run_time = 1 << 16;
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

@@ -10,7 +10,7 @@
 #include "graph/function.h"
 #include "ir/build.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 namespace {
 
@@ -199,4 +199,4 @@ ActionTable action_table(const Expr& steps, int states, const std::string& name)
   return ActionsFunc(steps, states, name).table();
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

@@ -11,7 +11,7 @@
 #include "ir/print.h"
 #include "simplify/simplify.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 namespace {
 
@@ -138,7 +138,7 @@ class Planner {
       if (!calls(index, f_)) return;
       unsupported(
           c_.asked(), "a checkpointed loop forgets the values that its steps saw",
-          text("where ", print(leaf.leaf), " is read depends on values of ", quoted(f_->name)),
+          text("where ", ir::print(leaf.leaf), " is read depends on values of ", quoted(f_->name)),
           "Leave out the budget and pass AdjointOptions{.overwritten = "
           "Overwritten::Store}");
     });
@@ -165,4 +165,4 @@ CheckpointPlan plan_checkpoints(const UpdateContext& context, const TapeLayout& 
   return Planner(context, layout, machine).run(adjoint);
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

@@ -9,7 +9,7 @@
 #include "autodiff/updates/update_context.h"
 #include "graph/function.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 struct CheckpointPlan {
   // What iterations contribute at one place of another Func or image.
@@ -45,4 +45,4 @@ struct CheckpointPlan {
 CheckpointPlan plan_checkpoints(const UpdateContext& context, const TapeLayout& layout,
                                 const FuncPtr& adjoint, const FuncPtr& machine);
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

@@ -6,7 +6,7 @@
 #include "ir/build.h"
 #include "simplify/simplify.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 CheckpointSlots::CheckpointSlots(const UpdateContext& context, const TapeLayout& layout,
                                  const CheckpointPlan& plan, const FuncPtr& machine)
@@ -64,4 +64,4 @@ std::vector<Expr> CheckpointSlots::all_values(const Expr& slot) const {
   return values_of(machine_, layout_.with_pure(slot));
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

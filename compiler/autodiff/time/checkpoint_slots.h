@@ -6,7 +6,7 @@
 
 #include "autodiff/time/checkpoint_plan.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 class CheckpointSlots {
  public:
@@ -42,4 +42,4 @@ class CheckpointSlots {
   std::vector<Expr> given_;
 };
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

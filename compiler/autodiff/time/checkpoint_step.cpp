@@ -3,7 +3,7 @@
 #include "frontend/language/expr_ops.h"
 #include "ir/build.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 namespace {
 
@@ -115,4 +115,4 @@ std::vector<SlotWrite> adjoint_writes(const UpdateContext& context, const Checkp
   return CheckpointStep(context, plan, slots).backward();
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

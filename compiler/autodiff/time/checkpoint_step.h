@@ -5,7 +5,7 @@
 
 #include "autodiff/time/checkpoint_slots.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 // Forward: the values that are needed later are noted; the last one is the step's own write.
 std::vector<SlotWrite> record_writes(const UpdateContext& context, const CheckpointPlan& plan,
@@ -14,4 +14,4 @@ std::vector<SlotWrite> record_writes(const UpdateContext& context, const Checkpo
 std::vector<SlotWrite> adjoint_writes(const UpdateContext& context, const CheckpointPlan& plan,
                                       const CheckpointSlots& slots);
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

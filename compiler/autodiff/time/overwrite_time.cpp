@@ -12,7 +12,7 @@
 #include "ir/print.h"
 #include "simplify/simplify.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 namespace {
 
@@ -187,4 +187,4 @@ SynthesisResult synthesize_folded(const Seed& seed, SynthesisOptions options) {
   return result;
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

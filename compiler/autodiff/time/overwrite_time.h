@@ -16,10 +16,10 @@
 
 #include "autodiff/sweeps/synthesis.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 // synthesize_adjoints of the program folded. Adjoints of copies stand for those of their Funcs;
 // folded Funcs have none, and explanations say so. A Func that was requested is not folded.
 SynthesisResult synthesize_folded(const Seed& seed, SynthesisOptions options);
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 int64_t revolve_steps_within(int64_t states, int64_t repetitions) {
   constexpr int64_t enough = int64_t{1} << 40;
@@ -95,4 +95,4 @@ std::vector<RevolveAction> revolve_schedule(int steps, int states) {
   return std::move(Schedule(steps, std::min(states, steps)).actions);
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

@@ -11,7 +11,7 @@
 #include <cstdint>
 #include <vector>
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 struct RevolveAction {
   enum class Kind : uint8_t {
@@ -35,4 +35,4 @@ int64_t revolve_advances(int64_t steps, int64_t states);
 // The actions that reverse steps - 1, ..., 0, starting from state 0, with slots 0, ..., states - 1.
 std::vector<RevolveAction> revolve_schedule(int steps, int states);
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

@@ -7,7 +7,7 @@
 #include "ir/build.h"
 #include "simplify/simplify.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 namespace {
 
@@ -164,4 +164,4 @@ std::optional<TimeAxis> find_time_axis(const UpdateContext& c, const std::vector
   }
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

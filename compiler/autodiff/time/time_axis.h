@@ -8,7 +8,7 @@
 
 #include "autodiff/updates/update_context.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 struct TimeAxis {
   size_t dim = 0;
@@ -25,4 +25,4 @@ struct TimeAxis {
 // That of the last update of c.f; nullopt: it has none, or somebody in `order` reads more of it.
 std::optional<TimeAxis> find_time_axis(const UpdateContext& c, const std::vector<FuncPtr>& order);
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

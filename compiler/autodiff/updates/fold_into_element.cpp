@@ -11,7 +11,7 @@
 #include "ir/lists.h"
 #include "ir/visit.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 namespace {
 
@@ -133,4 +133,4 @@ void differentiate_fold(const UpdateContext& context, UpdateAdjoint& result) {
   Fold(context, result).run();
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

@@ -13,11 +13,11 @@
 
 #include "autodiff/updates/update_context.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 // Whether all iterations that reach an element write and read that one only.
 bool is_fold(const UpdateContext& context);
 // Throws when a value is needed that was overwritten and may not be kept.
 void differentiate_fold(const UpdateContext& context, UpdateAdjoint& result);
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

@@ -7,7 +7,7 @@
 #include "ir/lists.h"
 #include "simplify/simplify.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 double least_product(const std::vector<Expr>& extents) {
   double product = 1;
@@ -30,4 +30,4 @@ void check_numbers(const UpdateContext& context, double count, const std::string
               "outermost loop is time, give a budget: AdjointOptions::checkpoint_states");
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

@@ -12,7 +12,7 @@
 #include "ir/lists.h"
 #include "simplify/simplify.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 namespace {
 
@@ -344,4 +344,4 @@ bool FinalValues::contains(const Expr& e) {
   }
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

@@ -6,7 +6,7 @@
 #include "autodiff/updates/update_context.h"
 #include "autodiff/updates/update_relations.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 // Overwriting and recurrences of update.h, where every place is quasi-affine and no element is
 // written twice, unless nothing reads it. Returns false, and leaves `result` alone, for any other
@@ -28,4 +28,4 @@ class FinalValues {
   std::unique_ptr<UpdateRelations> relations_;  // null: isl gave up
 };
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

@@ -12,7 +12,7 @@
 #include "ir/memory_reads.h"
 #include "ir/visit.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 namespace {
 
@@ -89,4 +89,4 @@ std::optional<Selection> find_selection(const FuncPtr& f, int stage) {
   return SelectionFinder(f, stage).find();
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

@@ -7,7 +7,7 @@
 
 #include "graph/function.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 // winner runs the update again and remembers the number of the iteration that wrote each element
 // last, -1: none.
@@ -18,4 +18,4 @@ struct Selection {
 };
 std::optional<Selection> find_selection(const FuncPtr& f, int stage);
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

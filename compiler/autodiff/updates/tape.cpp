@@ -11,7 +11,7 @@
 #include "ir/build.h"
 #include "ir/lists.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 namespace {
 
@@ -238,4 +238,4 @@ void differentiate_by_tape(const UpdateContext& context, UpdateAdjoint& result) 
   Tape(context, result).run();
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

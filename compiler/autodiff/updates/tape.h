@@ -16,9 +16,9 @@
 
 #include "autodiff/updates/update_context.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 // Throws when a value is needed that was overwritten and may not be kept.
 void differentiate_by_tape(const UpdateContext& context, UpdateAdjoint& result);
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

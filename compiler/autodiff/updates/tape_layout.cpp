@@ -8,7 +8,7 @@
 #include "ir/visit.h"
 #include "simplify/simplify.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 namespace {
 
@@ -96,4 +96,4 @@ AdjointWork work_of(const std::vector<SlotWrite>& writes, const FuncPtr& func,
   return work;
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

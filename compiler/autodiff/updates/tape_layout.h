@@ -6,7 +6,7 @@
 #include "autodiff/updates/numbering.h"
 #include "autodiff/updates/versions.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 // place <- values
 struct SlotWrite {
@@ -44,4 +44,4 @@ class TapeLayout {
   Scope<Interval> scope_;                // ranges of the update's variables
 };
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

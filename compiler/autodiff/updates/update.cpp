@@ -14,7 +14,7 @@
 #include "ir/build.h"
 #include "ir/print.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 namespace {
 
@@ -160,4 +160,4 @@ UpdateAdjoint differentiate_update(const UpdateQuery& query) {
   return UpdateDifferentiation(query).run();
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

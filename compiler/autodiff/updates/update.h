@@ -36,7 +36,7 @@
 #include "autodiff/updates/version_budget.h"
 #include "ir/equal.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 // What a read of an updated Func by itself is in a partial, where it is not the final value.
 using SelfValues = std::map<Expr, Expr, StructuralLess>;
@@ -81,4 +81,4 @@ struct UpdateAdjoint {
 
 UpdateAdjoint differentiate_update(const UpdateQuery& query);
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

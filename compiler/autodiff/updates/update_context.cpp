@@ -10,7 +10,7 @@
 #include "ir/print.h"
 #include "simplify/simplify.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 bool depends_on_data(const Expr& e) {
   return any_node(e, [&](const Call& call) { return call.call_type != CallType::Operator; });
@@ -18,7 +18,7 @@ bool depends_on_data(const Expr& e) {
 
 std::string point_text(const std::string& name, const std::vector<Expr>& args) {
   std::string out = quoted(name) + "(";
-  for (size_t i = 0; i < args.size(); ++i) out += (i ? ", " : "") + print(args[i]);
+  for (size_t i = 0; i < args.size(); ++i) out += (i ? ", " : "") + ir::print(args[i]);
   return out + ")";
 }
 
@@ -98,7 +98,7 @@ UpdateContext::UpdateContext(const UpdateQuery& query)
 }
 
 std::string UpdateContext::asked() const {
-  std::string right = listed(definition.values, [](const Expr& v) { return print(v); });
+  std::string right = listed(definition.values, [](const Expr& v) { return ir::print(v); });
   if (right.size() > 200) right = right.substr(0, 200) + "...";
   return "differentiate the update " + point_text(f->name, write) + " = " + right;
 }
@@ -239,4 +239,4 @@ Expr with_values(const Expr& e, const FuncPtr& f, const SelfValues& self_values)
   return redirect_calls(replaced(e, self_values), f, f, false);
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

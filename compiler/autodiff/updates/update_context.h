@@ -11,7 +11,7 @@
 #include "graph/own_reads.h"
 #include "ir/memory_reads.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 bool depends_on_data(const Expr& e);  // calls a Func or reads an image
 std::string point_text(const std::string& name, const std::vector<Expr>& args);
@@ -78,4 +78,4 @@ Expr replaced(const Expr& e, const SelfValues& values);
 // final values; f is then owned by that Func.
 Expr with_values(const Expr& e, const FuncPtr& f, const SelfValues& self_values);
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

@@ -6,7 +6,7 @@
 #include "ir/build.h"
 #include "ir/visit.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 namespace {
 
@@ -174,4 +174,4 @@ std::optional<std::vector<ReverseLoop>> UpdateRelations::reverse_order(
   return std::nullopt;
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

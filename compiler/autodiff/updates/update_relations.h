@@ -7,7 +7,7 @@
 #include "autodiff/inversion/access_inversion.h"
 #include "autodiff/inversion/isl_bridge.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 // Order in which the reverse recurrence visits the elements: location dimensions innermost first.
 struct ReverseLoop {
@@ -66,4 +66,4 @@ class UpdateRelations {
   bool predicate_is_affine_ = true;
 };
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

@@ -10,7 +10,7 @@
 #include "ir/build.h"
 #include "simplify/simplify.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 namespace {
 
@@ -72,9 +72,10 @@ FuncPtr VersionBudget::guard(const KeptVersions& versions, const Expr& bytes) co
   const std::string asked = text("cannot ", versions.asked, ": ", rule(), ", but with those of ",
                                  quoted(versions.primal), " they are");
   define_pure(check, {},
-              {require_values(fits, {Expr(0), Expr(asked), cast_to(Int(64), bytes),
-                                     Expr(text("bytes. ", what_to_do, "."))})});
-  check->schedule.compute_level.kind = check->schedule.store_level.kind = LoopLevel::Kind::Root;
+              {frontend::require_values(fits, {Expr(0), Expr(asked), cast_to(Int(64), bytes),
+                                               Expr(text("bytes. ", what_to_do, "."))})});
+  check->schedule.compute_level.kind = check->schedule.store_level.kind =
+      graph::LoopLevel::Kind::Root;
   check->frozen = true;
   for (Expr& value : versions.copy->pure->values) {
     value = make_select(call_value(check, {}, 0) != 0, make_zero(value.type()), value);
@@ -94,4 +95,4 @@ void VersionBudget::refuse(const KeptVersions& versions, const std::string& evid
   user_error(versions.asked, rule(), evidence, what_to_do);
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

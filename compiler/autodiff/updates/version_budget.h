@@ -13,7 +13,7 @@
 #include "autodiff/report/explain.h"
 #include "graph/function.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 inline constexpr int64_t default_version_bytes = int64_t{256} << 20;
 
@@ -49,4 +49,4 @@ class VersionBudget {
   Expr taken_;  // bytes; undefined: none
 };
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

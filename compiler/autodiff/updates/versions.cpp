@@ -9,7 +9,7 @@
 #include "ir/lists.h"
 #include "simplify/simplify.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 FuncPtr clone_prefix(const FuncPtr& f, int stages, const std::string& name, Role role,
                      ExprMap map) {
@@ -69,4 +69,4 @@ Expr choose_step(const Expr& condition, const Expr& a, const Expr& b) {
   return equal(a, b) ? a : call_op(Op::if_then_else, a.type(), {condition, a, b});
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

@@ -7,7 +7,7 @@
 #include "graph/function.h"
 #include "ir/visit.h"
 
-namespace retrograde::ir {
+namespace retrograde::autodiff {
 
 constexpr auto same_expr = [](const Expr& e) { return e; };
 
@@ -32,4 +32,4 @@ Substitution add_copies(const DomainPtr& domain, const std::vector<ReductionVari
 // Steps of a loop differ in what they cost: only the one at hand is evaluated.
 Expr choose_step(const Expr& condition, const Expr& a, const Expr& b);
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::autodiff

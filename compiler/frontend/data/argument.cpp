@@ -20,9 +20,9 @@ bool same(const Region& a, const Region& b) {
 }
 
 // Empty unless every dimension has an estimate.
-Region estimated_region(const ir::ParameterContents& parameter) {
+Region estimated_region(const graph::ParameterContents& parameter) {
   Region region;
-  for (const ir::BufferConstraint& dim : parameter.constraints) {
+  for (const graph::BufferConstraint& dim : parameter.constraints) {
     if (!dim.min_estimate.defined() || !dim.extent_estimate.defined()) return {};
     region.push_back({dim.min_estimate, dim.extent_estimate});
   }
@@ -56,7 +56,7 @@ bool operator==(const Argument& a, const Argument& b) {
          a.argument_estimates == b.argument_estimates;
 }
 
-namespace ir {
+namespace frontend {
 
 Argument argument_of(const ParameterContents& parameter) {
   ArgumentEstimates estimates;
@@ -72,5 +72,5 @@ Argument argument_of(const ParameterContents& parameter) {
   return {parameter.name, Argument::InputScalar, parameter.type, 0, estimates};
 }
 
-}  // namespace ir
+}  // namespace frontend
 }  // namespace retrograde

@@ -44,9 +44,9 @@ struct Argument {
   friend bool operator==(const Argument& a, const Argument& b);
 };
 
-namespace ir {
+namespace frontend {
 // An input; name, limits, value and estimates are taken from the parameter.
 Argument argument_of(const ParameterContents& parameter);
-}  // namespace ir
+}  // namespace frontend
 
 }  // namespace retrograde

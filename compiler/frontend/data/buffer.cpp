@@ -49,7 +49,7 @@ Type from_halide_type(halide_type_t type) {
   }
 }
 
-namespace ir {
+namespace frontend {
 
 namespace {
 
@@ -235,5 +235,5 @@ Expr buffer_access(const std::shared_ptr<BufferContents>& contents, const std::v
   return call_image(parameter->name, parameter->type, std::move(at), SymbolRef(parameter));
 }
 
-}  // namespace ir
+}  // namespace frontend
 }  // namespace retrograde

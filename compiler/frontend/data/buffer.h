@@ -46,7 +46,7 @@ Type from_halide_type(halide_type_t type);
 template <typename T = void, int Dims = Runtime::AnyDims>
 class Buffer;
 
-namespace ir {
+namespace frontend {
 
 // What all handles to one buffer share.
 struct BufferContents {
@@ -107,7 +107,7 @@ template <typename First, typename Second, typename... Rest>
 struct AreSizes<First, Second, Rest...>
     : std::bool_constant<std::is_convertible_v<First, int> && AreSizes<Second, Rest...>::value> {};
 
-}  // namespace ir
+}  // namespace frontend
 
 // Requires: the handle must have a buffer; an extent is not negative; its elements must fit the
 // address space; its elements must fit the memory of this machine; a storage order names each
@@ -150,53 +150,56 @@ class Buffer {
       : Buffer(adopt(Runtime::Buffer<>(buffer), name)) {}
 
   template <typename... Args>
-  requires(ir::AreSizes<Args...>::value && !std::is_void_v<T>) explicit Buffer(int first,
-                                                                               Args&&... rest) {
-    const ir::NamedSizes given(first, std::forward<Args>(rest)...);
-    *this = adopt(ir::allocate_buffer(static_halide_type(), given.sizes), given.name);
+  requires(frontend::AreSizes<Args...>::value &&
+           !std::is_void_v<T>) explicit Buffer(int first, Args&&... rest) {
+    const frontend::NamedSizes given(first, std::forward<Args>(rest)...);
+    *this = adopt(frontend::allocate_buffer(static_halide_type(), given.sizes), given.name);
   }
   template <typename... Args>
-  requires(ir::AreSizes<Args...>::value) explicit Buffer(Type type, int first, Args&&... rest) {
-    const ir::NamedSizes given(first, std::forward<Args>(rest)...);
-    *this = adopt(ir::allocate_buffer(to_halide_type(type), given.sizes), given.name);
+  requires(frontend::AreSizes<Args...>::value) explicit Buffer(Type type, int first,
+                                                               Args&&... rest) {
+    const frontend::NamedSizes given(first, std::forward<Args>(rest)...);
+    *this = adopt(frontend::allocate_buffer(to_halide_type(type), given.sizes), given.name);
   }
   // Requires: an extent is not negative; its elements must fit the address space; its elements must
   // fit the memory of this machine.
   explicit Buffer(const std::vector<int>& sizes, const std::string& name = "")
-      : Buffer(adopt(ir::allocate_buffer(static_halide_type(), sizes), name)) {}
+      : Buffer(adopt(frontend::allocate_buffer(static_halide_type(), sizes), name)) {}
   explicit Buffer(Type type, const std::vector<int>& sizes, const std::string& name = "")
-      : Buffer(adopt(ir::allocate_buffer(to_halide_type(type), sizes), name)) {}
+      : Buffer(adopt(frontend::allocate_buffer(to_halide_type(type), sizes), name)) {}
   // storage_order: dimensions, innermost in memory first.
   // Requires: a storage order names each dimension once.
   explicit Buffer(const std::vector<int>& sizes, const std::vector<int>& storage_order,
                   const std::string& name = "")
-      : Buffer(adopt(ir::allocate_buffer(static_halide_type(), sizes, storage_order), name)) {}
+      : Buffer(adopt(frontend::allocate_buffer(static_halide_type(), sizes, storage_order), name)) {
+  }
   explicit Buffer(Type type, const std::vector<int>& sizes, const std::vector<int>& storage_order,
                   const std::string& name = "")
-      : Buffer(adopt(ir::allocate_buffer(to_halide_type(type), sizes, storage_order), name)) {}
+      : Buffer(adopt(frontend::allocate_buffer(to_halide_type(type), sizes, storage_order), name)) {
+  }
 
   // Around memory of someone else, dense, which must live as long as the Buffer.
   template <typename Array, size_t N>
   explicit Buffer(Array (&values)[N], const std::string& name = "")
       : Buffer(adopt(untyped(Runtime::Buffer<T>(values)), name)) {}
   template <typename... Args>
-  requires(ir::AreSizes<Args...>::value && !std::is_void_v<T>) explicit Buffer(T* data, int first,
-                                                                               Args&&... rest) {
-    const ir::NamedSizes given(first, std::forward<Args>(rest)...);
-    *this = adopt(ir::wrap_memory(static_halide_type(), data, given.sizes), given.name);
+  requires(frontend::AreSizes<Args...>::value &&
+           !std::is_void_v<T>) explicit Buffer(T* data, int first, Args&&... rest) {
+    const frontend::NamedSizes given(first, std::forward<Args>(rest)...);
+    *this = adopt(frontend::wrap_memory(static_halide_type(), data, given.sizes), given.name);
   }
   explicit Buffer(T* data, const std::vector<int>& sizes,
                   const std::string& name = "") requires(!std::is_void_v<T>)
-      : Buffer(adopt(ir::wrap_memory(static_halide_type(), data, sizes), name)) {}
+      : Buffer(adopt(frontend::wrap_memory(static_halide_type(), data, sizes), name)) {}
   template <typename... Args>
-  requires(ir::AreSizes<Args...>::value) explicit Buffer(Type type, VoidLikeT* data, int first,
-                                                         Args&&... rest) {
-    const ir::NamedSizes given(first, std::forward<Args>(rest)...);
-    *this = adopt(ir::wrap_memory(to_halide_type(type), data, given.sizes), given.name);
+  requires(frontend::AreSizes<Args...>::value) explicit Buffer(Type type, VoidLikeT* data,
+                                                               int first, Args&&... rest) {
+    const frontend::NamedSizes given(first, std::forward<Args>(rest)...);
+    *this = adopt(frontend::wrap_memory(to_halide_type(type), data, given.sizes), given.name);
   }
   explicit Buffer(Type type, VoidLikeT* data, const std::vector<int>& sizes,
                   const std::string& name = "")
-      : Buffer(adopt(ir::wrap_memory(to_halide_type(type), data, sizes), name)) {}
+      : Buffer(adopt(frontend::wrap_memory(to_halide_type(type), data, sizes), name)) {}
   // Any strides: `shape` holds min, extent and stride of each dimension.
   explicit Buffer(T* data, int dimensions, const halide_dimension_t* shape,
                   const std::string& name = "") requires(!std::is_void_v<T>)
@@ -211,33 +214,37 @@ class Buffer {
             name)) {}
 
   // Another handle to buffers that exist.
-  explicit Buffer(std::shared_ptr<ir::BufferContents> contents) : contents_(std::move(contents)) {
+  explicit Buffer(std::shared_ptr<frontend::BufferContents> contents)
+      : contents_(std::move(contents)) {
     check_type();
   }
 
   static Buffer make_scalar(const std::string& name = "") {
-    return adopt(ir::allocate_buffer(static_halide_type(), {}), name);
+    return adopt(frontend::allocate_buffer(static_halide_type(), {}), name);
   }
   static Buffer<> make_scalar(Type type, const std::string& name = "") {
-    return Buffer<>(ir::allocate_buffer(to_halide_type(type), {}), name);
+    return Buffer<>(frontend::allocate_buffer(to_halide_type(type), {}), name);
   }
   static Buffer make_scalar(T* data, const std::string& name = "") requires(!std::is_void_v<T>) {
-    return adopt(ir::wrap_memory(static_halide_type(), data, {}), name);
+    return adopt(frontend::wrap_memory(static_halide_type(), data, {}), name);
   }
   // Three dimensions, the last one (channels) innermost in memory.
   static Buffer make_interleaved(int width, int height, int channels,
                                  const std::string& name = "") {
-    return adopt(ir::allocate_buffer(static_halide_type(), {width, height, channels}, {2, 0, 1}),
-                 name);
+    return adopt(
+        frontend::allocate_buffer(static_halide_type(), {width, height, channels}, {2, 0, 1}),
+        name);
   }
   static Buffer<> make_interleaved(Type type, int width, int height, int channels,
                                    const std::string& name = "") {
-    return Buffer<>(ir::allocate_buffer(to_halide_type(type), {width, height, channels}, {2, 0, 1}),
-                    name);
+    return Buffer<>(
+        frontend::allocate_buffer(to_halide_type(type), {width, height, channels}, {2, 0, 1}),
+        name);
   }
   static Buffer make_interleaved(T* data, int width, int height, int channels,
                                  const std::string& name = "") requires(!std::is_void_v<T>) {
-    ir::check_sizes(static_halide_type(), {width, height, channels}, "make an interleaved Buffer");
+    frontend::check_sizes(static_halide_type(), {width, height, channels},
+                          "make an interleaved Buffer");
     return adopt(untyped(Runtime::Buffer<T>::make_interleaved(data, width, height, channels)),
                  name);
   }
@@ -277,9 +284,9 @@ class Buffer {
   const halide_buffer_t* raw_buffer() const { return checked("raw_buffer")->buffer.raw_buffer(); }
   operator Runtime::Buffer<T>&() { return *get(); }
   operator const Runtime::Buffer<T>&() const { return *get(); }
-  std::shared_ptr<ir::ParameterContents> parameter() const {
+  std::shared_ptr<graph::ParameterContents> parameter() const {
     checked("parameter");
-    return ir::BufferContents::parameter(contents_);
+    return frontend::BufferContents::parameter(contents_);
   }
 
   // ---- shape ----
@@ -314,7 +321,7 @@ class Buffer {
   // ---- changing the shape, for all handles ----
   // Requires: a dimension is numbered from 0; a crop or slice lies inside the buffer.
   void crop(int d, int min, int extent) {
-    ir::check_crop(runtime(), name(), d, min, extent);
+    frontend::check_crop(runtime(), name(), d, min, extent);
     contents_->buffer.crop(d, min, extent);
   }
   void crop(const std::vector<std::pair<int, int>>& box) {
@@ -322,13 +329,13 @@ class Buffer {
   }
   // Requires: a dimension is numbered from 0; a crop or slice lies inside the buffer.
   void slice(int d, int position) {
-    ir::check_crop(runtime(), name(), d, position, 1);
+    frontend::check_crop(runtime(), name(), d, position, 1);
     contents_->buffer.slice(d, position);
   }
   void slice(int d) { slice(d, min(d)); }
   // Requires: a new dimension stands before, between or behind those that are there.
   void embed(int d, int position = 0) {
-    ir::check_embed(runtime(), name(), d);
+    frontend::check_embed(runtime(), name(), d);
     contents_->buffer.embed(d, position);
   }
   // Requires: a dimension is numbered from 0.
@@ -356,12 +363,12 @@ class Buffer {
   }
   // Requires: a storage order names each dimension once.
   void transpose(const std::vector<int>& order) {
-    ir::check_storage_order(order, dimensions(),
-                            "transpose the Buffer " + retrograde::quoted(name()));
+    frontend::check_storage_order(order, dimensions(),
+                                  "transpose the Buffer " + retrograde::quoted(name()));
     contents_->buffer.transpose(order);
   }
   void add_dimension() { checked("add_dimension")->buffer.add_dimension(); }
-  void allocate() { ir::allocate_host(checked("allocate")->buffer); }
+  void allocate() { frontend::allocate_host(checked("allocate")->buffer); }
   void deallocate() { checked("deallocate")->buffer.deallocate(); }
   void reset() { contents_.reset(); }
 
@@ -440,13 +447,13 @@ class Buffer {
   // Requires: all Buffers have the same extents.
   template <typename Fn, typename... Others>
   Buffer& for_each_value(Fn&& f, Others... others) {
-    (ir::check_same_shape(runtime(), name(), others.runtime()), ...);
+    (frontend::check_same_shape(runtime(), name(), others.runtime()), ...);
     get()->for_each_value(std::forward<Fn>(f), (*others.get())...);
     return *this;
   }
   template <typename Fn, typename... Others>
   const Buffer& for_each_value(Fn&& f, Others... others) const {
-    (ir::check_same_shape(runtime(), name(), others.runtime()), ...);
+    (frontend::check_same_shape(runtime(), name(), others.runtime()), ...);
     get()->for_each_value(std::forward<Fn>(f), (*others.get())...);
     return *this;
   }
@@ -480,17 +487,17 @@ class Buffer {
   requires((std::is_convertible_v<Args, Expr> && ...)) Expr operator()(const Expr& first,
                                                                        Args&&... rest) const {
     checked("operator()");
-    return ir::buffer_access(contents_, {first, Expr(std::forward<Args>(rest))...});
+    return frontend::buffer_access(contents_, {first, Expr(std::forward<Args>(rest))...});
   }
   Expr operator()(const std::vector<Expr>& args) const {
     checked("operator()");
-    return ir::buffer_access(contents_, args);
+    return frontend::buffer_access(contents_, args);
   }
   // Not of braces, whose elements are Exprs: {x, 0}.
   template <std::same_as<Var> V>
   Expr operator()(const std::vector<V>& args) const {
     checked("operator()");
-    return ir::buffer_access(contents_, std::vector<Expr>(args.begin(), args.end()));
+    return frontend::buffer_access(contents_, std::vector<Expr>(args.begin(), args.end()));
   }
 
   // ---- devices: for generated code on a GPU ----
@@ -500,24 +507,24 @@ class Buffer {
   void device_deallocate() { runtime_mutable().device_deallocate(); }
   // Names of Halide's that do nothing here.
   // Requires: buffers have memory of the CPU only (Unsupported).
-  int copy_to_device(const Target& = Target()) { ir::no_device("copy_to_device"); }
-  int copy_to_device(DeviceAPI, const Target& = Target()) { ir::no_device("copy_to_device"); }
-  int device_malloc(const Target& = Target()) { ir::no_device("device_malloc"); }
-  int device_malloc(DeviceAPI, const Target& = Target()) { ir::no_device("device_malloc"); }
+  int copy_to_device(const Target& = Target()) { frontend::no_device("copy_to_device"); }
+  int copy_to_device(DeviceAPI, const Target& = Target()) { frontend::no_device("copy_to_device"); }
+  int device_malloc(const Target& = Target()) { frontend::no_device("device_malloc"); }
+  int device_malloc(DeviceAPI, const Target& = Target()) { frontend::no_device("device_malloc"); }
   int device_wrap_native(DeviceAPI, uint64_t, const Target& = Target()) {
-    ir::no_device("device_wrap_native");
+    frontend::no_device("device_wrap_native");
   }
-  int device_detach_native() { ir::no_device("device_detach_native"); }
+  int device_detach_native() { frontend::no_device("device_detach_native"); }
   bool has_device_allocation() const { return runtime().has_device_allocation(); }
   bool device_dirty() const { return runtime().device_dirty(); }
   bool host_dirty() const { return runtime().host_dirty(); }
   void set_host_dirty(bool dirty = true) { runtime_mutable().set_host_dirty(dirty); }
   void set_device_dirty(bool dirty = true) { runtime_mutable().set_device_dirty(dirty); }
 
-  const std::shared_ptr<ir::BufferContents>& contents() const { return contents_; }
+  const std::shared_ptr<frontend::BufferContents>& contents() const { return contents_; }
 
  private:
-  std::shared_ptr<ir::BufferContents> contents_;
+  std::shared_ptr<frontend::BufferContents> contents_;
 
   template <typename T2, int D2, int S2>
   static Runtime::Buffer<> untyped(Runtime::Buffer<T2, D2, S2> buffer) {
@@ -527,7 +534,7 @@ class Buffer {
   }
   static Buffer adopt(Runtime::Buffer<> buffer, const std::string& name) {
     Buffer result;
-    result.contents_ = std::make_shared<ir::BufferContents>(std::move(buffer), name);
+    result.contents_ = std::make_shared<frontend::BufferContents>(std::move(buffer), name);
     result.check_type();
     return result;
   }
@@ -535,14 +542,15 @@ class Buffer {
     if (!contents_) return;
     halide_type_t type{};
     if constexpr (!std::is_void_v<Bare>) type = static_halide_type();
-    ir::check_convertible(contents_->buffer, contents_->name, type, std::is_void_v<Bare>, Dims);
+    frontend::check_convertible(contents_->buffer, contents_->name, type, std::is_void_v<Bare>,
+                                Dims);
   }
-  const std::shared_ptr<ir::BufferContents>& checked(const char* method) const {
-    if (!contents_) ir::undefined_buffer(method);
+  const std::shared_ptr<frontend::BufferContents>& checked(const char* method) const {
+    if (!contents_) frontend::undefined_buffer(method);
     return contents_;
   }
   void check_dimension(int d, const char* method) const {
-    ir::check_dimension(runtime(), name(), d, method);
+    frontend::check_dimension(runtime(), name(), d, method);
   }
   const Runtime::Buffer<>& runtime() const { return checked("shape")->buffer; }
   Runtime::Buffer<>& runtime_mutable() { return checked("device")->buffer; }
@@ -551,7 +559,7 @@ class Buffer {
       requires(!std::is_void_v<T>) {
     const halide_buffer_t& raw = *checked("operator()")->buffer.raw_buffer();
 #ifndef NDEBUG
-    ir::check_in_bounds(contents_->buffer, contents_->name, at, count);
+    frontend::check_in_bounds(contents_->buffer, contents_->name, at, count);
 #endif
     ptrdiff_t offset = 0;
     for (int d = 0; d < std::min(count, raw.dimensions); d++)

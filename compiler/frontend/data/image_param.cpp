@@ -14,8 +14,8 @@ namespace retrograde {
 
 namespace {
 
-std::shared_ptr<ir::ParameterContents> make_parameter(Type type, int dimensions,
-                                                      const std::string& name) {
+std::shared_ptr<graph::ParameterContents> make_parameter(Type type, int dimensions,
+                                                         const std::string& name) {
   const std::string asked = "make the ImageParam " + quoted(name);
   if (type.is_handle() || !type.is_scalar() || type.bits() == 0) {
     user_error(asked, "its elements are numbers", "the type is " + to_string(type),
@@ -24,7 +24,7 @@ std::shared_ptr<ir::ParameterContents> make_parameter(Type type, int dimensions,
   if (dimensions < 0)
     user_error(asked, "dimensions are not negative", text("they are ", dimensions),
                "Give 0 or more");
-  auto result = std::make_shared<ir::ParameterContents>();
+  auto result = std::make_shared<graph::ParameterContents>();
   result->name = name;
   result->type = type;
   result->is_buffer = true;
@@ -44,7 +44,7 @@ Expr as_size(const Expr& e, const std::string& asked) {
 
 }  // namespace
 
-Dimension::Dimension(std::shared_ptr<ir::ParameterContents> parameter, int d)
+Dimension::Dimension(std::shared_ptr<graph::ParameterContents> parameter, int d)
     : parameter_(std::move(parameter)), d_(d) {
   if (d_ >= 0 && d_ < parameter_->dimensions) return;
   user_error(text("use dimension ", d_, " of ", quoted(parameter_->name)),
@@ -61,13 +61,13 @@ Expr Dimension::min() const { return fact("min"); }
 Expr Dimension::extent() const { return fact("extent"); }
 Expr Dimension::stride() const { return fact("stride"); }
 
-void Dimension::set(Expr ir::BufferConstraint::*field, Expr value, const char* which) {
+void Dimension::set(Expr graph::BufferConstraint::*field, Expr value, const char* which) {
   const std::string asked =
       text("set the ", which, " of dimension ", d_, " of ", quoted(parameter_->name));
   value = as_size(value, asked);
-  if (value.defined()) ir::check_over_parameters(value, "a promise", asked);
+  if (value.defined()) graph::check_over_parameters(value, "a promise", asked);
   auto constant = value.defined() ? ir::as_const_int(value) : std::nullopt;
-  if (constant && *constant < 0 && field == &ir::BufferConstraint::extent) {
+  if (constant && *constant < 0 && field == &graph::BufferConstraint::extent) {
     user_error(asked, "an extent is not negative", text("it is ", *constant), "Give 0 or more");
   }
   // A promise about an entity in terms of itself is kept weakly: it must not own itself.
@@ -84,18 +84,18 @@ void Dimension::set(Expr ir::BufferConstraint::*field, Expr value, const char* w
 }
 
 Dimension& Dimension::set_min(Expr min) {
-  set(&ir::BufferConstraint::min, std::move(min), "min");
+  set(&graph::BufferConstraint::min, std::move(min), "min");
   return *this;
 }
 
 Dimension& Dimension::set_extent(Expr extent) {
-  set(&ir::BufferConstraint::extent, std::move(extent), "extent");
+  set(&graph::BufferConstraint::extent, std::move(extent), "extent");
   return *this;
 }
 
 Dimension& Dimension::set_stride(Expr stride) {
   constraint().any_stride = !stride.defined();
-  set(&ir::BufferConstraint::stride, std::move(stride), "stride");
+  set(&graph::BufferConstraint::stride, std::move(stride), "stride");
   return *this;
 }
 
@@ -104,12 +104,12 @@ Dimension& Dimension::set_bounds(Expr min, Expr extent) {
 }
 
 Dimension& Dimension::set_estimate(Expr min, Expr extent) {
-  set(&ir::BufferConstraint::min_estimate, std::move(min), "estimate of the min");
-  set(&ir::BufferConstraint::extent_estimate, std::move(extent), "estimate of the extent");
+  set(&graph::BufferConstraint::min_estimate, std::move(min), "estimate of the min");
+  set(&graph::BufferConstraint::extent_estimate, std::move(extent), "estimate of the extent");
   return *this;
 }
 
-ir::ParameterContents& OutputImageParam::checked() const {
+graph::ParameterContents& OutputImageParam::checked() const {
   if (!parameter_) {
     user_error("use an ImageParam", "it needs a type and dimensions",
                "it was constructed without them",
@@ -123,7 +123,7 @@ Dimension OutputImageParam::dim(int i) const {
   return Dimension(parameter_, i);
 }
 
-void ir::check_estimates(const std::string& name, int dimensions, const Region& estimates) {
+void frontend::check_estimates(const std::string& name, int dimensions, const Region& estimates) {
   if (static_cast<int>(estimates.size()) == dimensions) return;
   user_error(
       "set estimates of " + quoted(name), "there is one for each dimension",
@@ -132,7 +132,7 @@ void ir::check_estimates(const std::string& name, int dimensions, const Region& 
 }
 
 OutputImageParam& OutputImageParam::set_estimates(const Region& estimates) {
-  ir::check_estimates(name(), dimensions(), estimates);
+  frontend::check_estimates(name(), dimensions(), estimates);
   for (int d = 0; d < dimensions(); d++) dim(d).set_estimate(estimates[d].min, estimates[d].extent);
   return *this;
 }
@@ -167,10 +167,10 @@ ImageParam::ImageParam(Type type, int dimensions) : ImageParam(type, dimensions,
 
 ImageParam::ImageParam(Type type, int dimensions, const std::string& name)
     : OutputImageParam(make_parameter(
-          type, dimensions, name.empty() ? ir::unique_name("p") : ir::claim_parameter_name(name))) {
-}
+          type, dimensions,
+          name.empty() ? ir::unique_name("p") : graph::claim_parameter_name(name))) {}
 
-void ir::check_image(const ir::ParameterContents& parameter, const Buffer<>& buffer) {
+void frontend::check_image(const graph::ParameterContents& parameter, const Buffer<>& buffer) {
   const std::string asked = "set the ImageParam " + quoted(parameter.name);
   if (buffer.type() != parameter.type) {
     user_error(asked, "the buffer's elements are of the parameter's type",
@@ -187,15 +187,15 @@ void ir::check_image(const ir::ParameterContents& parameter, const Buffer<>& buf
 }
 
 void ImageParam::set(const Buffer<>& buffer) {
-  ir::ParameterContents& parameter = checked();
+  graph::ParameterContents& parameter = checked();
   if (!buffer.defined()) return reset();
-  ir::check_image(parameter, buffer);
+  frontend::check_image(parameter, buffer);
   parameter.buffer_owner = buffer.contents();
   parameter.buffer = buffer.contents()->buffer.raw_buffer();
 }
 
 Buffer<> ImageParam::get() const {
-  auto contents = std::static_pointer_cast<ir::BufferContents>(checked().buffer_owner);
+  auto contents = std::static_pointer_cast<frontend::BufferContents>(checked().buffer_owner);
   return contents ? Buffer<>(contents) : Buffer<>();
 }
 
@@ -205,15 +205,15 @@ void ImageParam::reset() {
 }
 
 Expr ImageParam::access(const std::vector<Expr>& args) const {
-  const ir::ParameterContents& parameter = checked();
-  std::vector<Expr> at = ir::access_coordinates(args, parameter.dimensions,
-                                                "the ImageParam " + quoted(parameter.name));
+  const graph::ParameterContents& parameter = checked();
+  std::vector<Expr> at = frontend::access_coordinates(args, parameter.dimensions,
+                                                      "the ImageParam " + quoted(parameter.name));
   return ir::call_image(parameter.name, parameter.type, std::move(at), ir::SymbolRef(parameter_));
 }
 
 ImageParam::operator Func() const {
   checked();
-  return Func(ir::func_of_image(parameter_));
+  return Func(graph::func_of_image(parameter_));
 }
 
 Func ImageParam::in(const Func& f) { return Func(*this).in(f); }

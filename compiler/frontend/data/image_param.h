@@ -20,7 +20,7 @@ class Func;
 // Requires: a dimension is numbered from 0.
 class Dimension {
  public:
-  Dimension(std::shared_ptr<ir::ParameterContents> parameter, int d);
+  Dimension(std::shared_ptr<graph::ParameterContents> parameter, int d);
   Expr min() const;
   Expr extent() const;
   Expr max() const { return min() + extent() - 1; }
@@ -41,10 +41,10 @@ class Dimension {
   Dimension dim(int d) const { return Dimension(parameter_, d); }
 
  private:
-  ir::BufferConstraint& constraint() const { return parameter_->constraints[d_]; }
+  graph::BufferConstraint& constraint() const { return parameter_->constraints[d_]; }
   Expr fact(const char* which) const;
-  void set(Expr ir::BufferConstraint::*field, Expr value, const char* which);
-  std::shared_ptr<ir::ParameterContents> parameter_;
+  void set(Expr graph::BufferConstraint::*field, Expr value, const char* which);
+  std::shared_ptr<graph::ParameterContents> parameter_;
   int d_;
 };
 
@@ -53,7 +53,7 @@ class Dimension {
 class OutputImageParam {
  public:
   OutputImageParam() = default;
-  explicit OutputImageParam(std::shared_ptr<ir::ParameterContents> parameter)
+  explicit OutputImageParam(std::shared_ptr<graph::ParameterContents> parameter)
       : parameter_(std::move(parameter)) {}
   bool defined() const { return parameter_ != nullptr; }
   const std::string& name() const { return checked().name; }
@@ -76,19 +76,19 @@ class OutputImageParam {
   int host_alignment() const;
   // Requires: buffers of arguments are memory of the CPU (Unsupported).
   OutputImageParam& store_in(MemoryType memory);
-  operator Argument() const { return ir::argument_of(checked()); }
-  const std::shared_ptr<ir::ParameterContents>& parameter() const { return parameter_; }
+  operator Argument() const { return frontend::argument_of(checked()); }
+  const std::shared_ptr<graph::ParameterContents>& parameter() const { return parameter_; }
 
  protected:
-  ir::ParameterContents& checked() const;
-  std::shared_ptr<ir::ParameterContents> parameter_;
+  graph::ParameterContents& checked() const;
+  std::shared_ptr<graph::ParameterContents> parameter_;
 };
 
-namespace ir {
+namespace frontend {
 // CompileError when the buffer's type or dimensions are not the parameter's.
 void check_image(const ParameterContents& parameter, const Buffer<>& buffer);
 void check_estimates(const std::string& name, int dimensions, const Region& estimates);
-}  // namespace ir
+}  // namespace frontend
 
 class ImageParam : public OutputImageParam {
  public:
@@ -98,7 +98,7 @@ class ImageParam : public OutputImageParam {
   ImageParam(Type type, int dimensions, const std::string& name);
   ImageParam(Type type, int dimensions, std::nullptr_t) = delete;
 
-  explicit ImageParam(std::shared_ptr<ir::ParameterContents> parameter)
+  explicit ImageParam(std::shared_ptr<graph::ParameterContents> parameter)
       : OutputImageParam(std::move(parameter)) {}
 
   // The buffer of the next calls.

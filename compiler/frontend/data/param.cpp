@@ -6,7 +6,7 @@
 #include "ir/print.h"
 #include "ir/visit.h"
 
-namespace retrograde::ir {
+namespace retrograde::frontend {
 
 std::shared_ptr<ParameterContents> make_scalar_parameter(Type type, const std::string& name) {
   auto result = std::make_shared<ParameterContents>();
@@ -56,4 +56,4 @@ Scalar get_scalar(const ParameterContents& parameter, Type type) {
   return *parameter.value;
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::frontend

@@ -14,7 +14,7 @@
 
 namespace retrograde {
 
-namespace ir {
+namespace frontend {
 std::shared_ptr<ParameterContents> make_scalar_parameter(Type type, const std::string& name);
 // The value as the parameter's type holds it; CompileError when that cannot.
 Scalar converted_scalar(const ParameterContents& parameter, const Scalar& value);
@@ -53,7 +53,7 @@ T from_scalar(const Scalar& value) {
     return static_cast<T>(value.u);
   }
 }
-}  // namespace ir
+}  // namespace frontend
 
 template <typename T = void>
 class Param {
@@ -67,15 +67,16 @@ class Param {
   static Type static_type() { return type_of<T>(); }
 
   // Requires: its type is a scalar.
-  Param() requires has_static_type : parameter_(ir::make_scalar_parameter(type_of<T>(), "")) {}
+  Param() requires has_static_type : parameter_(frontend::make_scalar_parameter(type_of<T>(), "")) {
+  }
   explicit Param(const std::string& name) requires has_static_type
-      : parameter_(ir::make_scalar_parameter(type_of<T>(), name)) {}
-  template <ir::TextPointer Text>
+      : parameter_(frontend::make_scalar_parameter(type_of<T>(), name)) {}
+  template <frontend::TextPointer Text>
   requires has_static_type explicit Param(const Text& name)
-      : Param(ir::name_from(name, "a Param")) {}
+      : Param(frontend::name_from(name, "a Param")) {}
   explicit Param(std::nullptr_t) requires(std::is_pointer_v<T>) = delete;
   explicit Param(Type type, const std::string& name = "") requires(!has_static_type)
-      : parameter_(ir::make_scalar_parameter(type, name)) {}
+      : parameter_(frontend::make_scalar_parameter(type, name)) {}
   Param(Type type, std::nullptr_t) = delete;
   explicit Param(Value value) requires(has_static_type && !std::is_pointer_v<T>) : Param() {
     set(value);
@@ -103,12 +104,12 @@ class Param {
   // Requires: a value must have been set; the types must agree.
   template <typename V = Value>
   V get() const {
-    return ir::from_scalar<V>(ir::get_scalar(*parameter_, type_of<V>()));
+    return frontend::from_scalar<V>(frontend::get_scalar(*parameter_, type_of<V>()));
   }
   // Requires: the value must fit the parameter's type.
   template <typename V>
   void set(const V& value) {
-    ir::set_scalar(*parameter_, ir::to_scalar(value));
+    frontend::set_scalar(*parameter_, frontend::to_scalar(value));
   }
   // Limits that every call is checked against, and that the compiler relies on.
   // Requires: limits are numbers; a limit is a value of the parameter's type; a limit has one value
@@ -118,20 +119,20 @@ class Param {
     set_max_value(max);
   }
   void set_min_value(const Expr& min) {
-    ir::set_limit(*parameter_, &ir::ParameterContents::min_value, min);
+    frontend::set_limit(*parameter_, &graph::ParameterContents::min_value, min);
   }
   void set_max_value(const Expr& max) {
-    ir::set_limit(*parameter_, &ir::ParameterContents::max_value, max);
+    frontend::set_limit(*parameter_, &graph::ParameterContents::max_value, max);
   }
   Expr min_value() const { return parameter_->min_value; }  // undefined: no limit
   Expr max_value() const { return parameter_->max_value; }  // undefined: no limit
   template <typename V>
   void set_estimate(const V& value) {
-    ir::set_limit(*parameter_, &ir::ParameterContents::estimate, Expr(value));
+    frontend::set_limit(*parameter_, &graph::ParameterContents::estimate, Expr(value));
   }
   operator Expr() const { return ir::variable(name(), type(), ir::SymbolRef(parameter_)); }
-  operator Argument() const { return ir::argument_of(*parameter_); }
-  const std::shared_ptr<ir::ParameterContents>& parameter() const { return parameter_; }
+  operator Argument() const { return frontend::argument_of(*parameter_); }
+  const std::shared_ptr<graph::ParameterContents>& parameter() const { return parameter_; }
 
  private:
   void check_type(Type other) const {
@@ -143,7 +144,7 @@ class Param {
                  "Use it as what it is");
     }
   }
-  std::shared_ptr<ir::ParameterContents> parameter_;
+  std::shared_ptr<graph::ParameterContents> parameter_;
 };
 
 }  // namespace retrograde

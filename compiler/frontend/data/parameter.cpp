@@ -16,10 +16,10 @@ Parameter::Parameter(const Type& type, bool is_buffer, int dimensions, const std
     user_error("make a Parameter of a scalar", "a scalar has no dimensions",
                text("it was given ", dimensions), "Give 0, or say that it is a buffer");
   }
-  contents_ = ir::make_scalar_parameter(type, name);
+  contents_ = frontend::make_scalar_parameter(type, name);
 }
 
-ir::ParameterContents& Parameter::checked(const char* asked) const {
+graph::ParameterContents& Parameter::checked(const char* asked) const {
   if (!contents_) {
     user_error(std::string(asked) + " a Parameter", "it stands for a Param or an ImageParam",
                "it was made without one", "Take it from parameter(), or give it a type");
@@ -27,8 +27,8 @@ ir::ParameterContents& Parameter::checked(const char* asked) const {
   return *contents_;
 }
 
-ir::ParameterContents& Parameter::checked_scalar(const char* asked) const {
-  ir::ParameterContents& contents = checked(asked);
+graph::ParameterContents& Parameter::checked_scalar(const char* asked) const {
+  graph::ParameterContents& contents = checked(asked);
   if (contents.is_buffer) {
     user_error(std::string(asked) + " the Parameter " + quoted(contents.name),
                "this is for scalars", "it is a buffer", "Use buffer() and set_buffer()");
@@ -45,22 +45,22 @@ ImageParam Parameter::image(const char* asked) const {
 }
 
 Expr Parameter::scalar_expr() const {
-  return ir::to_expr(ir::get_scalar(checked_scalar("take the value of"), contents_->type));
+  return ir::to_expr(frontend::get_scalar(checked_scalar("take the value of"), contents_->type));
 }
 
 void Parameter::set_min_value(const Expr& min) {
-  ir::set_limit(checked_scalar("limit"), &ir::ParameterContents::min_value, min);
+  frontend::set_limit(checked_scalar("limit"), &graph::ParameterContents::min_value, min);
 }
 void Parameter::set_max_value(const Expr& max) {
-  ir::set_limit(checked_scalar("limit"), &ir::ParameterContents::max_value, max);
+  frontend::set_limit(checked_scalar("limit"), &graph::ParameterContents::max_value, max);
 }
 void Parameter::set_estimate(const Expr& value) {
-  ir::set_limit(checked_scalar("estimate"), &ir::ParameterContents::estimate, value);
+  frontend::set_limit(checked_scalar("estimate"), &graph::ParameterContents::estimate, value);
 }
 
 }  // namespace retrograde
 
-void retrograde::ir::refuse_serialization(const char* asked) {
+void retrograde::frontend::refuse_serialization(const char* asked) {
   unsupported(asked, "pipelines live in the process that defines them",
               "a graph of Funcs has no form as bytes",
               "Compile it ahead of time with compile_to_static_library(), or name a folder for the "

@@ -14,7 +14,7 @@ namespace retrograde {
 class Parameter {
  public:
   Parameter() = default;
-  Parameter(std::shared_ptr<ir::ParameterContents> contents) : contents_(std::move(contents)) {}
+  Parameter(std::shared_ptr<graph::ParameterContents> contents) : contents_(std::move(contents)) {}
   Parameter(const Type& type, bool is_buffer, int dimensions)
       : Parameter(type, is_buffer, dimensions, "") {}
   // Requires: a scalar has no dimensions.
@@ -32,11 +32,12 @@ class Parameter {
   // Requires: this is for scalars.
   template <typename T>
   T scalar() const {
-    return ir::from_scalar<T>(ir::get_scalar(checked_scalar("take the value of"), type_of<T>()));
+    return frontend::from_scalar<T>(
+        frontend::get_scalar(checked_scalar("take the value of"), type_of<T>()));
   }
   template <typename T>
   void set_scalar(const T& value) {
-    ir::set_scalar(checked_scalar("set the value of"), ir::to_scalar(value));
+    frontend::set_scalar(checked_scalar("set the value of"), frontend::to_scalar(value));
   }
   Expr scalar_expr() const;
   void set_min_value(const Expr& min);
@@ -56,14 +57,14 @@ class Parameter {
   int host_alignment() const { return image("look at").host_alignment(); }
   void set_host_alignment(int bytes) { image("align").set_host_alignment(bytes); }
 
-  const std::shared_ptr<ir::ParameterContents>& contents() const { return contents_; }
-  operator std::shared_ptr<ir::ParameterContents>() const { return contents_; }
+  const std::shared_ptr<graph::ParameterContents>& contents() const { return contents_; }
+  operator std::shared_ptr<graph::ParameterContents>() const { return contents_; }
 
  private:
-  ir::ParameterContents& checked(const char* asked) const;
-  ir::ParameterContents& checked_scalar(const char* asked) const;
+  graph::ParameterContents& checked(const char* asked) const;
+  graph::ParameterContents& checked_scalar(const char* asked) const;
   ImageParam image(const char* asked) const;
-  std::shared_ptr<ir::ParameterContents> contents_;
+  std::shared_ptr<graph::ParameterContents> contents_;
 };
 
 }  // namespace retrograde

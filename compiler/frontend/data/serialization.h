@@ -11,22 +11,22 @@
 
 namespace retrograde {
 
-namespace ir {
+namespace frontend {
 [[noreturn]] void refuse_serialization(const char* asked);
 }
 
 // Requires: pipelines live in the process that defines them (Unsupported).
 template <typename... Args>
 void serialize_pipeline(const Pipeline&, Args&&...) {
-  ir::refuse_serialization("serialize a Pipeline");
+  frontend::refuse_serialization("serialize a Pipeline");
 }
 template <typename... Args>
 Pipeline deserialize_pipeline(Args&&...) {
-  ir::refuse_serialization("deserialize a Pipeline");
+  frontend::refuse_serialization("deserialize a Pipeline");
 }
 template <typename... Args>
 std::map<std::string, Parameter> deserialize_parameters(Args&&...) {
-  ir::refuse_serialization("deserialize the parameters of a Pipeline");
+  frontend::refuse_serialization("deserialize the parameters of a Pipeline");
 }
 
 }  // namespace retrograde

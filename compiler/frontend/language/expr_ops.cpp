@@ -8,9 +8,9 @@
 
 namespace retrograde {
 
+using frontend::check_defined;
+using frontend::check_integer;
 using ir::call_op;
-using ir::check_defined;
-using ir::check_integer;
 using ir::Op;
 
 [[noreturn]] static void type_error(const char* what, const std::string& rule, const Expr& e,
@@ -18,13 +18,13 @@ using ir::Op;
   user_error(text("apply ", what, " to ", e), rule, "its type is " + to_string(e.type()), instead);
 }
 
-void ir::check_defined(const Expr& e, const char* what) {
+void frontend::check_defined(const Expr& e, const char* what) {
   if (e.defined()) return;
   user_error(text("apply ", what), "every operand must be a defined expression",
              "one of them was never assigned", "Assign the Expr before its use");
 }
 
-void ir::check_integer(const Expr& e, const char* what) {
+void frontend::check_integer(const Expr& e, const char* what) {
   check_defined(e, what);
   if (!e.type().is_int_or_uint()) type_error(what, "it takes integers", e);
 }
@@ -383,7 +383,7 @@ Expr stop_gradient(Expr e) { return marked(Op::stop_gradient, e); }
 
 Expr undef(Type type) { return call_op(Op::undef, type, {}); }
 
-namespace ir {
+namespace frontend {
 
 namespace {
 
@@ -411,5 +411,5 @@ Expr require_values(Expr condition, std::vector<Expr> values) {
   return call_with(Op::require, {std::move(condition)}, values);
 }
 
-}  // namespace ir
+}  // namespace frontend
 }  // namespace retrograde

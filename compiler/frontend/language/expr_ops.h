@@ -209,7 +209,7 @@ Expr undef() {
 }
 
 // ---- effects ----
-namespace ir {
+namespace frontend {
 inline void collect_parts(std::vector<Expr>&) {}
 template <typename... Rest>
 void collect_parts(std::vector<Expr>& parts, Expr first, Rest&&... rest) {
@@ -222,36 +222,36 @@ Expr require_values(Expr condition, std::vector<Expr> values);
 // Of an operand of `what`.
 void check_defined(const Expr& e, const char* what);
 void check_integer(const Expr& e, const char* what);
-}  // namespace ir
+}  // namespace frontend
 // The first value; prints all of them, a line for each evaluation.
 // Requires: it gives the value of its first argument; every operand must be a defined expression.
-inline Expr print(const std::vector<Expr>& values) { return ir::print_values(values); }
+inline Expr print(const std::vector<Expr>& values) { return frontend::print_values(values); }
 template <typename First, typename... Rest>
 requires(std::is_convertible_v<First, Expr>) Expr print(First&& first, Rest&&... rest) {
   std::vector<Expr> values{Expr(std::forward<First>(first))};
-  ir::collect_parts(values, std::forward<Rest>(rest)...);
-  return ir::print_values(std::move(values));
+  frontend::collect_parts(values, std::forward<Rest>(rest)...);
+  return frontend::print_values(std::move(values));
 }
 // Requires: its condition is of type bool.
 inline Expr print_when(Expr condition, const std::vector<Expr>& values) {
-  return ir::print_values_when(std::move(condition), values);
+  return frontend::print_values_when(std::move(condition), values);
 }
 template <typename... Rest>
 Expr print_when(Expr condition, Expr first, Rest&&... rest) {
   std::vector<Expr> values{std::move(first)};
-  ir::collect_parts(values, std::forward<Rest>(rest)...);
-  return ir::print_values_when(std::move(condition), std::move(values));
+  frontend::collect_parts(values, std::forward<Rest>(rest)...);
+  return frontend::print_values_when(std::move(condition), std::move(values));
 }
 // The value where the condition holds; elsewhere the call of the pipeline fails with the message.
 // Requires: its condition is of type bool.
 inline Expr require(Expr condition, const std::vector<Expr>& value_and_message) {
-  return ir::require_values(std::move(condition), value_and_message);
+  return frontend::require_values(std::move(condition), value_and_message);
 }
 template <typename... Rest>
 Expr require(Expr condition, Expr value, Rest&&... message) {
   std::vector<Expr> values{std::move(value)};
-  ir::collect_parts(values, std::forward<Rest>(message)...);
-  return ir::require_values(std::move(condition), std::move(values));
+  frontend::collect_parts(values, std::forward<Rest>(message)...);
+  return frontend::require_values(std::move(condition), std::move(values));
 }
 
 }  // namespace retrograde

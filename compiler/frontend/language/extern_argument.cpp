@@ -8,19 +8,19 @@
 
 namespace retrograde {
 
-ExternFuncArgument::ExternFuncArgument(ir::FuncPtr func) : defined_(true) {
-  contents.kind = ir::ExternArgument::Kind::Func;
+ExternFuncArgument::ExternFuncArgument(graph::FuncPtr func) : defined_(true) {
+  contents.kind = graph::ExternArgument::Kind::Func;
   contents.func = std::move(func);
 }
 
 ExternFuncArgument::ExternFuncArgument(Expr e) : defined_(true) {
-  contents.kind = ir::ExternArgument::Kind::Expr;
+  contents.kind = graph::ExternArgument::Kind::Expr;
   contents.expr = std::move(e);
 }
 
-ExternFuncArgument::ExternFuncArgument(std::shared_ptr<ir::ParameterContents> image)
+ExternFuncArgument::ExternFuncArgument(std::shared_ptr<graph::ParameterContents> image)
     : defined_(true) {
-  contents.kind = ir::ExternArgument::Kind::Buffer;
+  contents.kind = graph::ExternArgument::Kind::Buffer;
   contents.buffer = std::move(image);
 }
 
@@ -43,7 +43,7 @@ void Func::define_extern(const std::string& function_name,
     unsupported(asked, "extern stages run on the CPU", "another device was named",
                 "Leave the device out");
   }
-  ir::ExternDefinition definition;
+  graph::ExternDefinition definition;
   definition.function = function_name;
   definition.mangling = mangling;
   for (const ExternFuncArgument& arg : args) {
@@ -54,7 +54,7 @@ void Func::define_extern(const std::string& function_name,
   }
   std::vector<std::string> variables;
   for (const Var& var : arguments) variables.push_back(var.name());
-  ir::define_extern(func_, std::move(definition), types, variables, asked);
+  graph::define_extern(func_, std::move(definition), types, variables, asked);
 }
 
 const std::string& Func::extern_function_name() const {
@@ -66,7 +66,7 @@ const std::string& Func::extern_function_name() const {
   return func_->extern_definition->function;
 }
 
-namespace ir {
+namespace graph {
 
 // 1. It has no definition yet. 2. There is a name, and a type. 3. The variables differ. 4. Funcs
 // among the arguments are defined. 5. Exprs are scalars over parameters.
@@ -112,5 +112,5 @@ void define_extern(const FuncPtr& f, ExternDefinition definition, const std::vec
   f->version++;
 }
 
-}  // namespace ir
+}  // namespace graph
 }  // namespace retrograde

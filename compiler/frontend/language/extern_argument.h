@@ -14,7 +14,7 @@ namespace retrograde {
 // Requires: every argument is a defined expression.
 struct ExternFuncArgument {
   ExternFuncArgument() = default;
-  ExternFuncArgument(ir::FuncPtr func);
+  ExternFuncArgument(graph::FuncPtr func);
   template <typename T, int Dims>
   ExternFuncArgument(const Buffer<T, Dims>& buffer) : ExternFuncArgument(buffer.parameter()) {}
   ExternFuncArgument(Expr e);
@@ -22,22 +22,22 @@ struct ExternFuncArgument {
   ExternFuncArgument(const Param<T>& param) : ExternFuncArgument(Expr(param)) {}
   ExternFuncArgument(int e) : ExternFuncArgument(Expr(e)) {}
   ExternFuncArgument(float e) : ExternFuncArgument(Expr(e)) {}
-  ExternFuncArgument(std::shared_ptr<ir::ParameterContents> image);
+  ExternFuncArgument(std::shared_ptr<graph::ParameterContents> image);
   ExternFuncArgument(const OutputImageParam& image) : ExternFuncArgument(image.parameter()) {}
 
   bool defined() const { return defined_; }
-  bool is_func() const { return defined_ && contents.kind == ir::ExternArgument::Kind::Func; }
-  bool is_expr() const { return defined_ && contents.kind == ir::ExternArgument::Kind::Expr; }
+  bool is_func() const { return defined_ && contents.kind == graph::ExternArgument::Kind::Func; }
+  bool is_expr() const { return defined_ && contents.kind == graph::ExternArgument::Kind::Expr; }
   bool is_buffer() const {
-    return defined_ && contents.kind == ir::ExternArgument::Kind::Buffer &&
+    return defined_ && contents.kind == graph::ExternArgument::Kind::Buffer &&
            contents.buffer->is_literal;
   }
   bool is_image_param() const {
-    return defined_ && contents.kind == ir::ExternArgument::Kind::Buffer &&
+    return defined_ && contents.kind == graph::ExternArgument::Kind::Buffer &&
            !contents.buffer->is_literal;
   }
 
-  ir::ExternArgument contents;
+  graph::ExternArgument contents;
 
  private:
   bool defined_ = false;

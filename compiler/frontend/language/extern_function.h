@@ -8,11 +8,11 @@
 
 namespace retrograde {
 
-namespace ir {
+namespace frontend {
 // UserError when the arguments have other types than the function.
 Expr checked_extern_call(const std::string& function, Type result, const std::vector<Type>& types,
                          const std::vector<Expr>& args);
-}  // namespace ir
+}  // namespace frontend
 
 // function(args...), a C function from Ts... to R of this process, or of the JIT externs. It is
 // taken to depend on its arguments alone; a vector calls it lane by lane.
@@ -21,7 +21,7 @@ Expr checked_extern_call(const std::string& function, Type result, const std::ve
 template <typename R, typename... Ts, typename... Args>
 Expr call_c_function(const std::string& function, const Args&... args) {
   static_assert(sizeof...(Ts) == sizeof...(Args), "one type for each argument");
-  return ir::checked_extern_call(function, type_of<R>(), {type_of<Ts>()...}, {Expr(args)...});
+  return frontend::checked_extern_call(function, type_of<R>(), {type_of<Ts>()...}, {Expr(args)...});
 }
 
 }  // namespace retrograde

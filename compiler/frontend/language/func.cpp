@@ -10,14 +10,14 @@ namespace retrograde {
 
 namespace {
 
-ir::FuncPtr make_func(const std::string& unique_name, std::source_location where = {}) {
-  auto contents = std::make_shared<ir::FuncContents>();
+graph::FuncPtr make_func(const std::string& unique_name, std::source_location where = {}) {
+  auto contents = std::make_shared<graph::FuncContents>();
   contents->name = unique_name;
   contents->declared_at = {where.file_name(), static_cast<int>(where.line())};
   return contents;
 }
 
-void check_not_extern(const ir::FuncContents& f, const std::string& asked) {
+void check_not_extern(const graph::FuncContents& f, const std::string& asked) {
   if (!f.is_extern()) return;
   user_error(asked, "its values are expressions",
              "the C function " + quoted(f.extern_definition->function) + " computes them",
@@ -31,7 +31,7 @@ void check_not_extern(const ir::FuncContents& f, const std::string& asked) {
 Func::Func(std::source_location where) : func_(make_func(ir::unique_name("f"), where)) {}
 
 Func::Func(const std::string& name, std::source_location where)
-    : func_(make_func(name.empty() ? ir::unique_name("f") : ir::claim_name(name), where)) {}
+    : func_(make_func(name.empty() ? ir::unique_name("f") : graph::claim_name(name), where)) {}
 
 Func::Func(Type required_type, int required_dimensions, const std::string& name)
     : Func(std::vector<Type>{required_type}, required_dimensions, name) {}
@@ -51,7 +51,7 @@ Func::Func(const Expr& e) : Func() { (*this)(_) = e; }
 
 // ---- accessors ----
 
-void Func::check_defined(const std::string& asked) const { ir::check_is_defined(*func_, asked); }
+void Func::check_defined(const std::string& asked) const { graph::check_is_defined(*func_, asked); }
 
 std::vector<Var> Func::args() const {
   return std::vector<Var>(func_->args.begin(), func_->args.end());
@@ -78,9 +78,9 @@ const Type& Func::type() const {
   return func_->types[0];
 }
 
-std::string Func::source_location() const { return ir::source_location_of(*func_); }
+std::string Func::source_location() const { return graph::source_location_of(*func_); }
 
-const ir::Definition& Func::checked_update(int index, const char* asked) const {
+const graph::Definition& Func::checked_update(int index, const char* asked) const {
   if (index >= 0 && index < num_update_definitions()) return func_->updates[index];
   user_error(text(asked, " ", index, " of ", quoted(name())), "updates are numbered from 0",
              text("it has ", num_update_definitions(), " update definitions"), "Name one of them");
@@ -90,7 +90,7 @@ const ir::Definition& Func::checked_update(int index, const char* asked) const {
 std::vector<Expr> Func::update_args(int index) const {
   std::vector<Expr> result;
   for (const Expr& arg : checked_update(index, "take the arguments of update").args) {
-    result.push_back(ir::redirect_calls(arg, func_, func_, false));
+    result.push_back(graph::redirect_calls(arg, func_, func_, false));
   }
   return result;
 }
@@ -107,16 +107,16 @@ Expr Func::update_value(int index) const {
 Tuple Func::update_values(int index) const {
   std::vector<Expr> result;
   for (const Expr& value : checked_update(index, "take the values of update").values) {
-    result.push_back(ir::redirect_calls(value, func_, func_, false));
+    result.push_back(graph::redirect_calls(value, func_, func_, false));
   }
   return Tuple(result);
 }
 
 std::vector<RVar> Func::rvars(int index) const {
-  const ir::Definition& update = checked_update(index, "take the reduction variables of update");
-  std::shared_ptr<ir::ReductionDomainContents> domain;
+  const graph::Definition& update = checked_update(index, "take the reduction variables of update");
+  std::shared_ptr<graph::ReductionDomainContents> domain;
   walk(update, [&](const ir::Variable& v) {
-    if (!domain) domain = ir::domain_of(v);
+    if (!domain) domain = graph::domain_of(v);
   });
   std::vector<RVar> result;
   for (size_t i = 0; i < update.rvars.size(); i++)
@@ -165,7 +165,7 @@ std::vector<OutputImageParam> Func::output_buffers() const {
 
 // ---- schedule ----
 
-ir::SchedulePlace Func::loops() const {
+graph::SchedulePlace Func::loops() const {
   check_defined("schedule " + quoted(name()));
   return {func_, 0};
 }
@@ -173,11 +173,11 @@ ir::SchedulePlace Func::loops() const {
 Func& Func::reorder_storage(const std::vector<Var>& dims) {
   std::vector<std::string> names;
   for (const Var& dim : dims) names.push_back(dim.name());
-  return give(ir::ReorderStorage{std::move(names)});
+  return give(graph::ReorderStorage{std::move(names)});
 }
 
 Func& Func::set_estimates(const Region& estimates) {
-  ir::check_estimates(name(), dimensions(), estimates);
+  frontend::check_estimates(name(), dimensions(), estimates);
   const std::vector<Var> variables = args();
   for (int d = 0; d < dimensions(); d++)
     set_estimate(variables[d], estimates[d].min, estimates[d].extent);

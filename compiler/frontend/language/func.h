@@ -37,9 +37,9 @@ class Func : public LoopDirectives<Func>, public Runnable<Func> {
   // Requires: a name is text.
   explicit Func(const std::string& name,
                 std::source_location where = std::source_location::current());
-  template <ir::TextPointer T>
+  template <frontend::TextPointer T>
   explicit Func(const T& name, std::source_location where = std::source_location::current())
-      : Func(ir::name_from(name, "a Func"), where) {}
+      : Func(frontend::name_from(name, "a Func"), where) {}
   explicit Func(std::nullptr_t) = delete;  // and of a literal 0: Func(Expr(0)) is a constant
   // Definitions must have these types and dimensions.
   // Requires: dimensions are not negative; a definition has the dimensions that the Func was
@@ -48,7 +48,7 @@ class Func : public LoopDirectives<Func>, public Runnable<Func> {
   Func(const std::vector<Type>& required_types, int required_dimensions,
        const std::string& name = "");
   explicit Func(const Expr& e);  // f(_) = e
-  explicit Func(ir::FuncPtr contents) : func_(std::move(contents)) {}
+  explicit Func(graph::FuncPtr contents) : func_(std::move(contents)) {}
   template <typename T, int Dims>
   explicit Func(const Buffer<T, Dims>& image) : Func() {
     (*this)(_) = image(_);
@@ -92,7 +92,7 @@ class Func : public LoopDirectives<Func>, public Runnable<Func> {
   // Requires: a Func that define_extern defines has one.
   const std::string& extern_function_name() const;
   std::string source_location() const;  // of its declaration: "blur.cpp:12"
-  const ir::FuncPtr& function() const { return func_; }
+  const graph::FuncPtr& function() const { return func_; }
   // One function, two handles.
   bool same_as(const Func& other) const { return func_ == other.func_; }
 
@@ -186,7 +186,9 @@ class Func : public LoopDirectives<Func>, public Runnable<Func> {
   // Requires: a Func must be stored and computed at a loop that encloses every use of it, and its
   // compute level; the level is set before the pipeline is compiled; the region of a Func that its
   // consumers read must be bounded.
-  Func& compute_at(const LoopLevel& level) { return give(ir::ComputeAt{{{}, level.contents()}}); }
+  Func& compute_at(const LoopLevel& level) {
+    return give(graph::ComputeAt{{{}, level.contents()}});
+  }
   // Its storage lives for the whole of that loop, which is around the compute level; what is there
   // already is not computed again, and storage is folded where that suffices.
   // g.store_root().compute_at(f, y), with f(x, y) = g(x, y) + g(x, y + 1):
@@ -199,7 +201,7 @@ class Func : public LoopDirectives<Func>, public Runnable<Func> {
   Func& store_at(const Func& f, const RVar& var) { return store_at(LoopLevel(f, var)); }
   // Requires: only what is computed somewhere has storage of its own; iterations of a parallel loop
   // must not share the storage of what each of them computes.
-  Func& store_at(const LoopLevel& level) { return give(ir::StoreAt{{{}, level.contents()}}); }
+  Func& store_at(const LoopLevel& level) { return give(graph::StoreAt{{{}, level.contents()}}); }
   // Where its memory is allocated: at this level, around the store level, once for all iterations
   // in between. What is computed does not change.
   //   for y:                            allocate g
@@ -210,12 +212,12 @@ class Func : public LoopDirectives<Func>, public Runnable<Func> {
   // Requires: storage is hoisted to a loop that encloses its store level; the size of hoisted
   // storage is known outside of the loops it is hoisted over.
   Func& hoist_storage(const LoopLevel& level) {
-    return give(ir::HoistStorage{{{}, level.contents()}});
+    return give(graph::HoistStorage{{{}, level.contents()}});
   }
   Func& hoist_storage_root() { return hoist_storage(LoopLevel::root()); }
   // In which memory.
   // Requires: storage lies in memory that the CPU has (Unsupported).
-  Func& store_in(MemoryType memory) { return give(ir::StoreIn{memory}); }
+  Func& store_in(MemoryType memory) { return give(graph::StoreIn{memory}); }
   // Dimensions innermost in memory first. reorder_storage(c, x, y):
   //   g[x + w * y + w * h * c]    =>    g[c + 3 * x + 3 * w * y]
   // Requires: each must be one of its dimensions; each dimension is named once.
@@ -232,7 +234,7 @@ class Func : public LoopDirectives<Func>, public Runnable<Func> {
   // int32; the alignment has one value in each call: it is made of parameters and facts about
   // buffers.
   Func& align_storage(const Var& dim, const Expr& alignment) {
-    return give(ir::AlignStorage{dim.name(), alignment});
+    return give(graph::AlignStorage{dim.name(), alignment});
   }
   // Storage of this extent, coordinates taken modulo it: right when no more is alive at a time,
   // which is checked. fold_storage(y, 2):   g[x, y]  =>  g[x, y % 2]
@@ -241,14 +243,14 @@ class Func : public LoopDirectives<Func>, public Runnable<Func> {
   // is made of parameters and facts about buffers; storage that the compiler lays out can be folded
   // or bounded.
   Func& fold_storage(const Var& dim, const Expr& extent, bool fold_forward = true) {
-    return give(ir::FoldStorage{dim.name(), extent, fold_forward});
+    return give(graph::FoldStorage{dim.name(), extent, fold_forward});
   }
   // Storage of this extent whatever the bounds say; a call that needs more fails.
   //   allocate g[n']   =>   assert(n' <= bound); allocate g[bound]
   // Requires: the bound is at least 1 and fits an int32; storage that the compiler lays out can be
   // folded or bounded.
   Func& bound_storage(const Var& dim, const Expr& bound) {
-    return give(ir::BoundStorage{dim.name(), bound});
+    return give(graph::BoundStorage{dim.name(), bound});
   }
   // Keeps results in the runtime's cache, under the values of all parameters it depends on.
   //   produce g   =>   if not in cache: produce g, put it in
@@ -257,14 +259,14 @@ class Func : public LoopDirectives<Func>, public Runnable<Func> {
   // an output is computed by every call; a memoized Func must be computed whole, where its storage
   // begins.
   Func& memoize(const EvictionKey& eviction_key = EvictionKey()) {
-    return give(ir::Memoize{eviction_key.key()});
+    return give(graph::Memoize{eviction_key.key()});
   }
   // Computed by a thread of its own, at most as far ahead of its users as storage allows.
   //   produce g; consume g   =>   fork { produce g, signal } and { wait, consume g }
   // Requires: what an async Func and its consumer both read is stored no further out than the async
   // Func, or computed outside of the loops that they share; the loops between storage and
   // computation of an async Func are serial and always run (Unsupported).
-  Func& async() { return give(ir::Async{}); }
+  Func& async() { return give(graph::Async{}); }
 
   // ---- what is known of its size ----
 
@@ -275,7 +277,7 @@ class Func : public LoopDirectives<Func>, public Runnable<Func> {
   // defined expression; bounds are integers; an extent is not negative; a bound has one value in
   // each call: it is made of parameters and facts about buffers.
   Func& bound(const Var& var, Expr min, Expr extent) {
-    return give(ir::BoundDimension{var.name(), std::move(min), std::move(extent)});
+    return give(graph::BoundDimension{var.name(), std::move(min), std::move(extent)});
   }
   // A promise about the extent only: loops are of this constant extent.
   Func& bound_extent(const Var& var, Expr extent) { return bound(var, {}, std::move(extent)); }
@@ -284,7 +286,7 @@ class Func : public LoopDirectives<Func>, public Runnable<Func> {
   // Requires: the modulus is at least 1 and fits an int32; the remainder is an integer; the extent
   // is a multiple of the modulus; min % modulus is the remainder.
   Func& align_bounds(const Var& var, Expr modulus, Expr remainder = 0) {
-    return give(ir::AlignBounds{var.name(), std::move(modulus), std::move(remainder)});
+    return give(graph::AlignBounds{var.name(), std::move(modulus), std::move(remainder)});
   }
   // The same for the extent only: the min stays.
   Func& align_extent(const Var& var, Expr modulus) {
@@ -292,7 +294,7 @@ class Func : public LoopDirectives<Func>, public Runnable<Func> {
   }
   // A guess, for schedulers.
   Func& set_estimate(const Var& var, const Expr& min, const Expr& extent) {
-    return give(ir::Estimate{var.name(), min, extent});
+    return give(graph::Estimate{var.name(), min, extent});
   }
   // Requires: there is one for each dimension.
   Func& set_estimates(const Region& estimates);
@@ -301,14 +303,14 @@ class Func : public LoopDirectives<Func>, public Runnable<Func> {
 
   // Reports to the trace handler: each load of a value, each store, and when it begins and ends to
   // be produced and consumed. Tags come with each report.
-  Func& trace_loads() { return give(ir::TraceLoads{}); }
-  Func& trace_stores() { return give(ir::TraceStores{}); }
-  Func& trace_realizations() { return give(ir::TraceRealizations{}); }
-  Func& add_trace_tag(const std::string& tag) { return give(ir::AddTraceTag{tag}); }
+  Func& trace_loads() { return give(graph::TraceLoads{}); }
+  Func& trace_stores() { return give(graph::TraceStores{}); }
+  Func& trace_realizations() { return give(graph::TraceRealizations{}); }
+  Func& add_trace_tag(const std::string& tag) { return give(graph::AddTraceTag{tag}); }
   // Writes what was computed to a file, in NumPy's format (.npy) or raw (.tmp).
   // Requires: the file has a name; a file holds one value of each point (Unsupported); the name's
   // end says in which format (Unsupported); its format has the type of the elements (Unsupported).
-  void debug_to_file(const std::string& filename) { give(ir::DebugToFile{filename}); }
+  void debug_to_file(const std::string& filename) { give(graph::DebugToFile{filename}); }
 
   // ---- loops: of the first definition here, of updates through update(i); see loop_directives.h ----
   Stage update(int index = 0);
@@ -316,18 +318,18 @@ class Func : public LoopDirectives<Func>, public Runnable<Func> {
   operator Stage() const { return Stage(loops().f, 0); }
 
  private:
-  ir::FuncPtr func_;
+  graph::FuncPtr func_;
   Pipeline pipeline_;
 
   friend class LoopDirectives<Func>;
   friend class Runnable<Func>;
-  ir::SchedulePlace loops() const;  // of the first definition
-  Func& give(ir::Directive directive) {
-    ir::give_directive({func_}, std::move(directive));
+  graph::SchedulePlace loops() const;  // of the first definition
+  Func& give(graph::Directive directive) {
+    graph::give_directive({func_}, std::move(directive));
     return *this;
   }
   void check_defined(const std::string& asked) const;
-  const ir::Definition& checked_update(int index, const char* asked) const;
+  const graph::Definition& checked_update(int index, const char* asked) const;
   Func wrap(const std::vector<Func>& users, const std::string& name, bool clone) const;
   Pipeline& pipeline_to(const char* asked);
 };

@@ -16,7 +16,7 @@ Expr subtract(Expr a, Expr b) { return std::move(a) - std::move(b); }
 Expr multiply(Expr a, Expr b) { return std::move(a) * std::move(b); }
 Expr divide(Expr a, Expr b) { return std::move(a) / std::move(b); }
 
-void check_one_value(const ir::FuncContents& f) {
+void check_one_value(const graph::FuncContents& f) {
   if (f.types.size() == 1) return;
   user_error("use " + quoted(f.name) + "(...) as one expression",
              "a Func of several values is a Tuple at each point",
@@ -59,24 +59,24 @@ Expr Tuple::operator[](size_t i) const {
 // _ on the left stands for as many dimensions as are missing, or in a first definition for the
 // implicit variables that the right-hand side uses.
 std::vector<Expr> FuncRef::left_args(const std::vector<Expr>& values) const {
-  if (ir::placeholder_position(args_) < 0) return args_;
+  if (frontend::placeholder_position(args_) < 0) return args_;
   const int given = static_cast<int>(args_.size()) - 1;
-  int count = ir::implicit_count(values);
+  int count = frontend::implicit_count(values);
   if (func_->is_defined())
     count = func_->dimensions() - given;
   else if (func_->required_dimensions >= 0)
     count = func_->required_dimensions - given;
-  return ir::expand_placeholder(args_, std::max(count, 0));
+  return frontend::expand_placeholder(args_, std::max(count, 0));
 }
 
 Stage FuncRef::define(const std::vector<Expr>& values) {
   const std::vector<Expr> args = left_args(values);
-  if (ir::names_several_points(args) || ir::names_several_points(values)) {
-    ir::define_several_points(func_, args, values);
+  if (frontend::names_several_points(args) || frontend::names_several_points(values)) {
+    frontend::define_several_points(func_, args, values);
   } else if (func_->is_defined()) {
-    ir::define_update(func_, args, values);
+    graph::define_update(func_, args, values);
   } else {
-    ir::define_pure(func_, args, values);
+    graph::define_pure(func_, args, values);
   }
   return Stage(func_, func_->stage_count() - 1);
 }
@@ -103,7 +103,7 @@ void FuncRef::define_initial(const std::vector<Expr>& args, const std::vector<Ex
         func_->required_types.size() == values.size() ? func_->required_types[i] : values[i].type();
     initial_values.push_back(ir::make_const(type, initial));
   }
-  ir::define_pure(func_, pure_args, initial_values);
+  graph::define_pure(func_, pure_args, initial_values);
 }
 
 Stage FuncRef::update(const std::vector<Expr>& values, int initial, Combine combine) {
@@ -153,7 +153,7 @@ Expr FuncRef::element(int i) const {
                "Give a number below that");
   }
   std::vector<Expr> at =
-      ir::access_coordinates(args_, func_->dimensions(), "the Func " + quoted(func_->name));
+      frontend::access_coordinates(args_, func_->dimensions(), "the Func " + quoted(func_->name));
   return ir::call_func(func_->name, func_->types[i], std::move(at), i, ir::SymbolRef(func_));
 }
 

@@ -16,7 +16,7 @@ class FuncTupleElementRef;
 // definition. f(x) += e on an undefined f first defines it as 0 (for *= and /= as 1) everywhere.
 class FuncRef {
  public:
-  FuncRef(ir::FuncPtr func, std::vector<Expr> args)
+  FuncRef(graph::FuncPtr func, std::vector<Expr> args)
       : func_(std::move(func)), args_(std::move(args)) {}
 
   // Requires: every argument on the left-hand side must be a defined expression; a definition has
@@ -52,7 +52,7 @@ class FuncRef {
   operator Expr() const;                        // of a Func with one value
   FuncTupleElementRef operator[](int i) const;  // one value of a Tuple-valued Func
   size_t size() const;                          // number of values
-  const ir::FuncPtr& function() const { return func_; }
+  const graph::FuncPtr& function() const { return func_; }
 
   // One value of the Func here, whatever their number.
   // Requires: the values of a point are numbered from 0.
@@ -67,7 +67,7 @@ class FuncRef {
   void define_initial(const std::vector<Expr>& args, const std::vector<Expr>& values,
                       int initial) const;
 
-  ir::FuncPtr func_;
+  graph::FuncPtr func_;
   std::vector<Expr>
       args_;  // as written: the placeholder _ is expanded when it is known for how many
 };
@@ -98,7 +98,7 @@ class FuncTupleElementRef {
   Stage operator/=(const Expr& value) { return *this = Expr(*this) / value; }
   operator Expr() const { return ref_.element(index_); }
   int index() const { return index_; }
-  const ir::FuncPtr& function() const { return ref_.function(); }
+  const graph::FuncPtr& function() const { return ref_.function(); }
 
  private:
   FuncRef ref_;

@@ -12,7 +12,7 @@ namespace retrograde {
 
 namespace {
 
-using DomainPtr = std::shared_ptr<ir::ReductionDomainContents>;
+using DomainPtr = std::shared_ptr<graph::ReductionDomainContents>;
 
 // An inline reduction, taken apart.
 struct Reduction {
@@ -58,7 +58,7 @@ class Finder {
 
   void choose_domain() {
     for (const ir::Variable* v : free_) {
-      DomainPtr domain = ir::domain_of(*v);
+      DomainPtr domain = graph::domain_of(*v);
       if (!domain) continue;
       if (domain_ && domain != domain_) {
         user_error("reduce with " + name_, "it runs over one RDom",
@@ -76,7 +76,7 @@ class Finder {
 
   void add_argument(const ir::Variable& v, Reduction& result) {
     if (let_bound_.count(v.name)) return;
-    const DomainPtr domain = ir::domain_of(v);
+    const DomainPtr domain = graph::domain_of(v);
     if (domain == domain_ && domain) return;
     if (!v.symbol.defined()) {
       result.args.push_back(ir::variable(v.name));

@@ -14,7 +14,7 @@
 
 namespace retrograde {
 
-namespace ir {
+namespace frontend {
 template <typename E>
 concept ReducedValue = std::is_convertible_v<E, Expr> && !std::is_convertible_v<E, const RDom&>;
 }
@@ -25,7 +25,7 @@ concept ReducedValue = std::is_convertible_v<E, Expr> && !std::is_convertible_v<
   Result name(Expr e, const std::string& func_name = #name);                     \
   Result name(const RDom& domain, Expr e, const std::string& func_name = #name); \
   /* a literal 0 names nothing */                                                \
-  template <ir::ReducedValue E>                                                  \
+  template <frontend::ReducedValue E>                                            \
   Result name(const E& e, std::nullptr_t) = delete;                              \
   Result name(const RDom& domain, Expr e, std::nullptr_t) = delete;              \
   Result name(Expr e, const Func& func);                                         \

@@ -19,8 +19,8 @@ struct Division {
   Expr numerator, divisor;
 
   Division(const Expr& n, const Expr& d, const char* what) {
-    ir::check_defined(n, what);
-    ir::check_defined(d, what);
+    frontend::check_defined(n, what);
+    frontend::check_defined(d, what);
     const std::string asked = text("apply ", what, " to ", n, " and ", d);
     if (!n.type().is_int_or_uint() || n.type().bits() < 8 || n.type().bits() > 32) {
       user_error(asked, "the numerator is an integer of 8, 16 or 32 bits",
@@ -82,17 +82,17 @@ Type match_operands(Expr& a, Expr& b, const char* what) {
 namespace {
 
 void check_integers(const Expr& a, const Expr& b, const char* what) {
-  ir::check_defined(a, what);
-  ir::check_defined(b, what);
-  ir::check_integer(a, what);
-  ir::check_integer(b, what);
+  frontend::check_defined(a, what);
+  frontend::check_defined(b, what);
+  frontend::check_integer(a, what);
+  frontend::check_integer(b, what);
 }
 
 int widest(const Expr& a, const Expr& b) { return std::max(a.type().bits(), b.type().bits()); }
 
 Type wide_type(const Expr& a, const Expr& b, const char* what) {
-  ir::check_defined(a, what);
-  ir::check_defined(b, what);
+  frontend::check_defined(a, what);
+  frontend::check_defined(b, what);
   const int bits = 2 * widest(a, b);
   if (bits > 64) {
     user_error(text("apply ", what, " to ", a, " and ", b), "its result has at most 64 bits",
@@ -161,8 +161,8 @@ Expr halving_sub(Expr a, Expr b) {
 // ---- parts of a number ----
 
 Expr extract_bits(Type type, const Expr& e, const Expr& lowest) {
-  ir::check_defined(e, "extract_bits");
-  ir::check_integer(lowest, "extract_bits");
+  frontend::check_defined(e, "extract_bits");
+  frontend::check_integer(lowest, "extract_bits");
   const Type bits = e.type().with_code(TypeCode::UInt);
   return reinterpret(
       type, cast(type.with_code(TypeCode::UInt), reinterpret(bits, e) >> cast(bits, lowest)));

@@ -21,7 +21,7 @@ Func lambda(const Var& x, Rest&&... rest) {
   return f;
 }
 
-namespace ir {
+namespace frontend {
 template <typename T>
 void check_evaluates_to(const Expr& e) {
   if (e.defined() && e.type() == type_of<T>()) return;
@@ -35,13 +35,13 @@ inline void check_count(size_t values, size_t results) {
              text("it has ", values, " values and was given ", results, " results"),
              "Give the address of that many variables");
 }
-}  // namespace ir
+}  // namespace frontend
 
 // Compiles and runs an expression without free variables.
 // Requires: it must be of that type.
 template <typename T>
 T evaluate(const Expr& e) {
-  ir::check_evaluates_to<T>(e);
+  frontend::check_evaluates_to<T>(e);
   Func f;
   f() = e;
   Buffer<T> result = f.realize();
@@ -51,9 +51,9 @@ T evaluate(const Expr& e) {
 // Requires: there is one result for each value.
 template <typename... Results>
 requires(sizeof...(Results) >= 1) void evaluate(const Tuple& values, Results*... results) {
-  ir::check_count(values.size(), sizeof...(Results));
+  frontend::check_count(values.size(), sizeof...(Results));
   size_t i = 0;
-  (ir::check_evaluates_to<Results>(values[i++]), ...);
+  (frontend::check_evaluates_to<Results>(values[i++]), ...);
   Func f;
   f() = values;
   Realization realization = f.realize();

@@ -29,7 +29,7 @@ Expr checked_bound(const Expr& e, const std::string& domain, const char* which) 
                text(e, " has type ", to_string(e.type())), "Convert it with cast<int>");
   }
   walk(e, [&](const ir::Variable& v) {
-    if (!v.symbol.defined() || ir::domain_of(v)) {
+    if (!v.symbol.defined() || graph::domain_of(v)) {
       user_error(asked, "its bounds must be known before any loop starts",
                  text("its ", which, " uses ", quoted(v.name)),
                  "Make the domain as large as it can get and leave points out with where()");
@@ -55,10 +55,10 @@ RVar::RVar(const std::string& name) : name_(name) {
   static_cast<void>(Var(name.substr(name.rfind('.') + 1)));
 }
 
-RVar::RVar(std::shared_ptr<ir::ReductionDomainContents> domain, int index)
+RVar::RVar(std::shared_ptr<graph::ReductionDomainContents> domain, int index)
     : name_(domain->vars.at(index).var), domain_(std::move(domain)), index_(index) {}
 
-const ir::ReductionVariable& RVar::variable(const char* asked) const {
+const graph::ReductionVariable& RVar::variable(const char* asked) const {
   if (!domain_) {
     user_error(text(asked, " of the RVar ", quoted(name_)),
                "only a variable of an RDom has a range", "it is a name for schedules",
@@ -85,11 +85,11 @@ RDom::RDom(const OutputImageParam& image) {
 }
 
 void RDom::initialize(const Region& region, const std::string& name) {
-  const std::string unique = name.empty() ? ir::unique_name("r") : ir::claim_name(name);
+  const std::string unique = name.empty() ? ir::unique_name("r") : graph::claim_name(name);
   if (region.empty())
     user_error("make the RDom " + quoted(unique), "a reduction domain has at least one variable",
                "the region has no dimensions", "Give a min and an extent for each variable");
-  domain_ = std::make_shared<ir::ReductionDomainContents>();
+  domain_ = std::make_shared<graph::ReductionDomainContents>();
   for (size_t i = 0; i < region.size(); i++) {
     Expr min = checked_bound(region[i].min, unique, "min");
     Expr extent = checked_bound(region[i].extent, unique, "extent");
@@ -145,7 +145,7 @@ void RDom::where(Expr predicate) {
                "Compare it with something");
   }
   // Weak: the domain must not own itself through its predicate.
-  predicate = ir::rebind_symbol(predicate, ir::SymbolRef::weak(domain_));
+  predicate = graph::rebind_symbol(predicate, ir::SymbolRef::weak(domain_));
   domain_->predicate = domain_->predicate.defined() ? domain_->predicate && predicate : predicate;
 }
 

@@ -27,22 +27,22 @@ class RVar {
  public:
   RVar();  // a fresh name
   explicit RVar(const std::string& name);
-  template <ir::TextPointer T>
-  explicit RVar(const T& name) : RVar(ir::name_from(name, "an RVar")) {}
+  template <frontend::TextPointer T>
+  explicit RVar(const T& name) : RVar(frontend::name_from(name, "an RVar")) {}
   explicit RVar(std::nullptr_t) = delete;
-  RVar(std::shared_ptr<ir::ReductionDomainContents> domain, int index);
+  RVar(std::shared_ptr<graph::ReductionDomainContents> domain, int index);
 
   const std::string& name() const { return name_; }
   // Requires: only a variable of an RDom has a range.
   Expr min() const;     // where its range begins
   Expr extent() const;  // how many values it takes
   operator Expr() const;
-  const std::shared_ptr<ir::ReductionDomainContents>& domain() const { return domain_; }
+  const std::shared_ptr<graph::ReductionDomainContents>& domain() const { return domain_; }
 
  private:
-  const ir::ReductionVariable& variable(const char* asked) const;
+  const graph::ReductionVariable& variable(const char* asked) const;
   std::string name_;
-  std::shared_ptr<ir::ReductionDomainContents> domain_;
+  std::shared_ptr<graph::ReductionDomainContents> domain_;
   int index_ = -1;
 };
 
@@ -65,7 +65,7 @@ class RDom {
   RDom(const Buffer<T, Dims>& buffer);  // all of its elements
   RDom(const OutputImageParam& image);
   // Not of braces, which hold a min and an extent.
-  template <std::same_as<std::shared_ptr<ir::ReductionDomainContents>> Domain>
+  template <std::same_as<std::shared_ptr<graph::ReductionDomainContents>> Domain>
   explicit RDom(const Domain& domain) : domain_(domain) {
     name_variables();
   }
@@ -83,7 +83,7 @@ class RDom {
   // Requires: the RDom was given a domain; the predicate must be a defined expression; a
   // predicate is of type bool; a predicate is given before the domain's first use in a definition.
   void where(Expr predicate);
-  const std::shared_ptr<ir::ReductionDomainContents>& domain() const { return domain_; }
+  const std::shared_ptr<graph::ReductionDomainContents>& domain() const { return domain_; }
 
   RVar x, y, z, w;  // the first four variables
 
@@ -98,7 +98,7 @@ class RDom {
     region.push_back({min, extent});
     collect(region, std::forward<Args>(rest)...);
   }
-  std::shared_ptr<ir::ReductionDomainContents> domain_;
+  std::shared_ptr<graph::ReductionDomainContents> domain_;
 };
 
 std::ostream& operator<<(std::ostream& out, const RVar& var);

@@ -28,7 +28,7 @@ void check_uses_parameters_only(const Expr& part, const std::string& asked) {
 }  // namespace
 
 void Pipeline::add_requirement(const Expr& condition, const std::vector<Expr>& message) {
-  const ir::FuncPtr first = spec().outputs[0];
+  const graph::FuncPtr first = spec().outputs[0];
   if (!condition.defined() || !condition.type().is_bool() || !condition.type().is_scalar()) {
     user_error("add a requirement to the Pipeline of " + quoted(first->name),
                "a requirement is a condition of type bool",

@@ -47,7 +47,7 @@ Expr pack(const char* name, const std::vector<Expr>& points) {
 Expr scatter(const std::vector<Expr>& points) { return pack(scatter_name, points); }
 Expr gather(const std::vector<Expr>& points) { return pack(gather_name, points); }
 
-namespace ir {
+namespace frontend {
 
 namespace {
 
@@ -144,7 +144,7 @@ class SeveralPoints {
                   quoted(f_->name) + " reads itself",
                   "Read another Func, or give the iterations a dimension of their own");
     const FuncPtr before = clone_of(f_, f_->name + "_before");
-    before->schedule.compute_level.kind = LoopLevel::Kind::Root;
+    before->schedule.compute_level.kind = graph::LoopLevel::Kind::Root;
     before->schedule.store_level = before->schedule.compute_level;
     for (std::vector<Expr>* exprs : {&args_, &values_}) {
       for (Expr& e : *exprs) e = redirect_calls(e, f_, before, false);
@@ -187,5 +187,5 @@ void define_several_points(const FuncPtr& f, const std::vector<Expr>& args,
   SeveralPoints(f, args, values).define();
 }
 
-}  // namespace ir
+}  // namespace frontend
 }  // namespace retrograde

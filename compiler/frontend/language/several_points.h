@@ -5,7 +5,7 @@
 
 #include "graph/function.h"
 
-namespace retrograde::ir {
+namespace retrograde::frontend {
 
 // Whether scatter() or gather() stands in one of them.
 bool names_several_points(const std::vector<Expr>& exprs);
@@ -14,4 +14,4 @@ bool names_several_points(const std::vector<Expr>& exprs);
 void define_several_points(const FuncPtr& f, const std::vector<Expr>& args,
                            const std::vector<Expr>& values);
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::frontend

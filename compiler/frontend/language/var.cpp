@@ -31,13 +31,13 @@ const std::string& checked_name(const std::string& name) {
 
 }  // namespace
 
-namespace ir {
+namespace frontend {
 std::string name_from(const char* text, const char* of) {
   if (text) return text;
   user_error(retrograde::text("name ", of), "a name is text", "the pointer to it is null",
              "Give it a text, or none at all");
 }
-}  // namespace ir
+}  // namespace frontend
 
 // Counted by themselves: print_loop_nest shows "v$0" as v0, and so on.
 Var::Var() : expr_() {
@@ -48,11 +48,11 @@ Var::Var() : expr_() {
 
 Var::Var(const std::string& name) : name_(checked_name(name)), expr_(ir::variable(name_)) {}
 
-Var Var::implicit(int n) { return Var(ir::implicit_name(n)); }
+Var Var::implicit(int n) { return Var(graph::implicit_name(n)); }
 
 std::ostream& operator<<(std::ostream& out, const Var& var) { return out << var.name(); }
 
-namespace ir {
+namespace frontend {
 
 namespace {
 
@@ -114,5 +114,5 @@ int implicit_count(const std::vector<Expr>& values) {
   return count;
 }
 
-}  // namespace ir
+}  // namespace frontend
 }  // namespace retrograde

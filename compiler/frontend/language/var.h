@@ -13,22 +13,22 @@
 
 namespace retrograde {
 
-namespace ir {
+namespace frontend {
 // A pointer to text. A literal 0, which converts to every pointer, is none: it means a number.
 template <typename T>
 concept TextPointer = std::is_same_v < std::decay_t<T>,
 const char* > || std::is_same_v<std::decay_t<T>, char*>;
 // CompileError when there is no text. `of` names what it is for: "a Var".
 std::string name_from(const char* text, const char* of);
-}  // namespace ir
+}  // namespace frontend
 
 class Var {
  public:
   Var();  // a fresh name
   // Requires: the name of a Var is an identifier: letters, digits, _ and $; a name is text.
   Var(const std::string& name);
-  template <ir::TextPointer T>
-  Var(const T& name) : Var(ir::name_from(name, "a Var")) {}
+  template <frontend::TextPointer T>
+  Var(const T& name) : Var(frontend::name_from(name, "a Var")) {}
   explicit Var(std::nullptr_t) = delete;  // and of a literal 0
 
   const std::string& name() const { return name_; }                      // all that a Var is
@@ -36,16 +36,16 @@ class Var {
 
   // _0, _1 ...: what the placeholder _ stands for, dimension by dimension.
   static Var implicit(int n);
-  static bool is_implicit(const std::string& name) { return ir::implicit_index(name) >= 0; }
+  static bool is_implicit(const std::string& name) { return graph::implicit_index(name) >= 0; }
   // -1: not implicit
-  static int implicit_index(const std::string& name) { return ir::implicit_index(name); }
-  static bool is_placeholder(const std::string& name) { return ir::is_placeholder(name); }
+  static int implicit_index(const std::string& name) { return graph::implicit_index(name); }
+  static bool is_placeholder(const std::string& name) { return graph::is_placeholder(name); }
   bool is_implicit() const { return is_implicit(name_); }
   int implicit_index() const { return implicit_index(name_); }
   bool is_placeholder() const { return is_placeholder(name_); }
 
   // A loop of one iteration around all others of a stage.
-  static Var outermost() { return Var(ir::outermost_loop); }
+  static Var outermost() { return Var(graph::outermost_loop); }
 
   operator const Expr&() const { return expr_; }
 
@@ -75,7 +75,7 @@ inline constexpr ImplicitVar<9> _9;
 
 std::ostream& operator<<(std::ostream& out, const Var& var);
 
-namespace ir {
+namespace frontend {
 
 // Arguments of an access with the placeholder _ replaced by `count` implicit variables. Position of
 // the placeholder, or -1, goes to `placeholder`.
@@ -88,5 +88,5 @@ std::vector<Expr> access_coordinates(const std::vector<Expr>& args, int dimensio
 // One more than the largest implicit variable used; 0 when none is.
 int implicit_count(const std::vector<Expr>& values);
 
-}  // namespace ir
+}  // namespace frontend
 }  // namespace retrograde

@@ -4,7 +4,7 @@
 
 #include <cstdio>
 
-namespace retrograde::ir {
+namespace retrograde::frontend {
 
 uint64_t scalar_bits(const Scalar& value) {
   if (!value.type.is_float()) return value.u;
@@ -169,4 +169,4 @@ int call(const CompiledPipeline& code, const JITHandlers& own, void* const* argv
       "Look the code up in HalideRuntime.h; a handler of errors gets its text", code_returned);
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::frontend

@@ -8,7 +8,7 @@
 #include "frontend/run/compiler_interface.h"
 #include "frontend/run/param_map.h"
 
-namespace retrograde::ir {
+namespace retrograde::frontend {
 
 // Checks that do not depend on the code: null, type, dimensions, extents, memory. RuntimeError.
 void check_buffer(const halide_buffer_t* buffer, const std::string& name, Type type, int dimensions,
@@ -54,4 +54,4 @@ class Arguments {
 int call(const CompiledPipeline& code, const JITHandlers& own, void* const* argv,
          const std::string& asked, JITUserContext* user);
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::frontend

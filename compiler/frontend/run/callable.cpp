@@ -9,7 +9,7 @@ namespace retrograde {
 
 namespace {
 
-using ParameterPtr = std::shared_ptr<ir::ParameterContents>;
+using ParameterPtr = std::shared_ptr<graph::ParameterContents>;
 
 // One argument of the function, and where compiled code has it.
 struct Place {
@@ -22,7 +22,7 @@ struct Place {
 };
 
 ParameterPtr parameter_of(const ir::LoweredArgument& arg) {
-  return std::dynamic_pointer_cast<ir::ParameterContents>(arg.symbol.lock());
+  return std::dynamic_pointer_cast<graph::ParameterContents>(arg.symbol.lock());
 }
 
 Place place_of(const ir::LoweredArgument& arg, size_t position) {
@@ -120,17 +120,18 @@ int Callable::call(JITUserContext* context, const std::vector<Value>& values) co
   for (size_t i = 0; i < values.size(); i++) {
     const Place& place = contents_->places[i];
     if (place.is_buffer) {
-      ir::check_buffer(values[i].buffer, place.name, place.type, place.dimensions, false, asked);
+      frontend::check_buffer(values[i].buffer, place.name, place.type, place.dimensions, false,
+                             asked);
       argv[place.position] = values[i].buffer;
       continue;
     }
-    if (place.parameter) ir::check_limits(*place.parameter, values[i].scalar, asked);
-    scalars[i] = ir::scalar_bits(values[i].scalar);
+    if (place.parameter) frontend::check_limits(*place.parameter, values[i].scalar, asked);
+    scalars[i] = frontend::scalar_bits(values[i].scalar);
     argv[place.position] = &scalars[i];
   }
   for (const Place& literal : contents_->literals)
     argv[literal.position] = literal.parameter->buffer;
-  return ir::call(*contents_->code, contents_->handlers, argv.data(), asked, context);
+  return frontend::call(*contents_->code, contents_->handlers, argv.data(), asked, context);
 }
 
 }  // namespace retrograde

@@ -77,7 +77,7 @@ class Callable {
   template <typename T>
   requires(std::is_arithmetic_v<T> || std::is_pointer_v<T> || SmallFloatType<T>) static Value
       value_of(const T& value) {
-    return {nullptr, ir::to_scalar(value), false, type_of<T>(), -1};
+    return {nullptr, frontend::to_scalar(value), false, type_of<T>(), -1};
   }
 
   template <typename T>

@@ -12,7 +12,7 @@
 namespace retrograde {
 namespace {
 
-using ParameterPtr = std::shared_ptr<ir::ParameterContents>;
+using ParameterPtr = std::shared_ptr<graph::ParameterContents>;
 using Files = std::map<OutputFileType, std::string>;
 
 // Names of Funcs may hold what a C identifier cannot.
@@ -69,7 +69,7 @@ ir::LoweredArgument lowered_argument(const Argument& argument, const ParameterPt
 class Inputs {
  public:
   Inputs(const PipelineSpec& pipeline, const std::vector<Argument>& args, std::string asked)
-      : asked_(std::move(asked)), parameters_(ir::parameters_of(pipeline.outputs)) {
+      : asked_(std::move(asked)), parameters_(graph::parameters_of(pipeline.outputs)) {
     std::set<std::string> names;
     for (const Argument& argument : args) {
       check(argument, names);
@@ -78,7 +78,7 @@ class Inputs {
     for (const ParameterPtr& parameter : parameters_) {
       if (names.count(parameter->name)) continue;
       if (!parameter->is_literal) missing(*parameter);
-      inputs.push_back(lowered_argument(ir::argument_of(*parameter), parameter));
+      inputs.push_back(lowered_argument(frontend::argument_of(*parameter), parameter));
     }
   }
   std::vector<ir::LoweredArgument> inputs;
@@ -114,7 +114,7 @@ class Inputs {
                "List the Param, ImageParam or Buffer itself");
   }
 
-  [[noreturn]] void missing(const ir::ParameterContents& parameter) const {
+  [[noreturn]] void missing(const graph::ParameterContents& parameter) const {
     user_error(asked_, "the list of arguments holds every Param and ImageParam that it uses",
                text("it uses the ", parameter.is_buffer ? "ImageParam " : "Param ",
                     quoted(parameter.name), ", which is not listed"),
@@ -126,21 +126,21 @@ Argument user_context_argument() { return {"__user_context", Argument::InputScal
 
 Argument output_argument(const ir::LoweredArgument& lowered) {
   Argument result(lowered.name, Argument::OutputBuffer, lowered.type, lowered.dimensions);
-  const auto parameter = std::dynamic_pointer_cast<ir::ParameterContents>(lowered.symbol.lock());
-  if (parameter) result.argument_estimates = ir::argument_of(*parameter).argument_estimates;
+  const auto parameter = std::dynamic_pointer_cast<graph::ParameterContents>(lowered.symbol.lock());
+  if (parameter) result.argument_estimates = frontend::argument_of(*parameter).argument_estimates;
   return result;
 }
 
 // Estimates given to the Func serve its output buffer.
-void add_estimates(const std::vector<ir::FuncPtr>& outputs, std::vector<Argument>& args) {
+void add_estimates(const std::vector<graph::FuncPtr>& outputs, std::vector<Argument>& args) {
   for (Argument& argument : args) {
     if (!argument.is_output() || !argument.argument_estimates.buffer_estimates.empty()) continue;
-    for (const ir::FuncPtr& f : outputs) {
+    for (const graph::FuncPtr& f : outputs) {
       const std::string stem = argument.name.substr(0, argument.name.rfind('.'));
       if (f->name != argument.name && f->name != stem) continue;
       Region region;
       for (const std::string& var : f->args) {
-        for (const ir::Bound& bound : f->schedule.estimates) {
+        for (const graph::Bound& bound : f->schedule.estimates) {
           if (bound.var == var && bound.min.defined()) region.push_back({bound.min, bound.extent});
         }
       }
@@ -172,7 +172,7 @@ Module Pipeline::module(const std::vector<Argument>& args, const std::string& fu
       function.args.push_back(output_argument(argument));
   }
   add_estimates(pipeline.outputs, function.args);
-  ir::tell_warnings(pipeline.outputs);
+  frontend::tell_warnings(pipeline.outputs);
   Module module(name, target);
   module.append(function);
   return module;
@@ -180,7 +180,7 @@ Module Pipeline::module(const std::vector<Argument>& args, const std::string& fu
 
 // ---- files ----
 
-namespace ir {
+namespace frontend {
 
 Files file_and_header(OutputFileType type, const std::string& prefix, const Target& target) {
   const std::string extension = internal::get_output_info(target).at(type).extension;
@@ -195,6 +195,6 @@ void compile_multitarget(OutputFileType type, const std::string& prefix,
                                   file_and_header(type, prefix, baseline), targets, suffixes, make);
 }
 
-}  // namespace ir
+}  // namespace frontend
 
 }  // namespace retrograde

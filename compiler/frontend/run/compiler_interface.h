@@ -19,7 +19,7 @@ namespace retrograde {
 
 struct PipelineSpec {
   std::string name;
-  std::vector<ir::FuncPtr> outputs;
+  std::vector<graph::FuncPtr> outputs;
   std::map<std::string, void*> externs = {};  // C functions by name, before those of the process
   bool is_traced = false;                     // a call tells when it begins and ends
 

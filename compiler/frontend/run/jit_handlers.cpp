@@ -8,7 +8,7 @@
 
 namespace retrograde {
 
-void ir::check_allocator(bool allocates, bool frees) {
+void frontend::check_allocator(bool allocates, bool frees) {
   if (allocates == frees) return;
   user_error("set a custom allocator", "allocation and release come together",
              allocates ? "no function to free was given" : "no function to allocate was given",
@@ -25,8 +25,8 @@ static Pipeline supported_extern(Pipeline pipeline) {
 JITExtern::JITExtern(Pipeline pipeline) : pipeline_(supported_extern(std::move(pipeline))) {}
 JITExtern::JITExtern(const Func& func) : JITExtern(Pipeline(func)) {}
 
-Expr ir::checked_extern_call(const std::string& function, Type result,
-                             const std::vector<Type>& types, const std::vector<Expr>& args) {
+Expr frontend::checked_extern_call(const std::string& function, Type result,
+                                   const std::vector<Type>& types, const std::vector<Expr>& args) {
   const std::string asked = "call the C function " + quoted(function);
   for (size_t i = 0; i < args.size(); i++) {
     if (!args[i].defined())

@@ -9,18 +9,18 @@ const ParamMap& ParamMap::empty_map() {
 }
 
 const ParamMap::Entry* ParamMap::find(
-    const std::shared_ptr<ir::ParameterContents>& parameter) const {
+    const std::shared_ptr<graph::ParameterContents>& parameter) const {
   const auto found = entries_.find(parameter);
   return found == entries_.end() ? nullptr : &found->second;
 }
 
-ir::Scalar ParamMap::checked(const ir::ParameterContents& parameter, const ir::Scalar& value) {
-  return ir::converted_scalar(parameter, value);
+ir::Scalar ParamMap::checked(const graph::ParameterContents& parameter, const ir::Scalar& value) {
+  return frontend::converted_scalar(parameter, value);
 }
 
 Buffer<> ParamMap::checked(const ImageParam& image, const Buffer<>& buffer) {
   image.name();  // an error where it has none
-  if (buffer.defined()) ir::check_image(*image.parameter(), buffer);
+  if (buffer.defined()) frontend::check_image(*image.parameter(), buffer);
   return buffer;
 }
 

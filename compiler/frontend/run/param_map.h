@@ -33,7 +33,7 @@ class ParamMap {
   struct ParamMapping {
     template <typename T, typename V>
     ParamMapping(const Param<T>& param, const V& value) : parameter(param.parameter()) {
-      entry.value = checked(*parameter, ir::to_scalar(value));
+      entry.value = checked(*parameter, frontend::to_scalar(value));
     }
     template <typename T, int Dims>
     ParamMapping(const ImageParam& image, const Buffer<T, Dims>& buffer)
@@ -45,7 +45,7 @@ class ParamMap {
       checked(image, {});
       entry.receive = [buffer](const Buffer<>& made) { *buffer = made; };
     }
-    std::shared_ptr<ir::ParameterContents> parameter;
+    std::shared_ptr<graph::ParameterContents> parameter;
     Entry entry;
   };
 
@@ -67,12 +67,12 @@ class ParamMap {
   size_t size() const { return entries_.size(); }  // how many parameters it gives values to
   static const ParamMap& empty_map();
   // Null when the map says nothing of it.
-  const Entry* find(const std::shared_ptr<ir::ParameterContents>& parameter) const;
+  const Entry* find(const std::shared_ptr<graph::ParameterContents>& parameter) const;
 
  private:
-  static ir::Scalar checked(const ir::ParameterContents& parameter, const ir::Scalar& value);
+  static ir::Scalar checked(const graph::ParameterContents& parameter, const ir::Scalar& value);
   static Buffer<> checked(const ImageParam& image, const Buffer<>& buffer);
-  std::map<std::shared_ptr<ir::ParameterContents>, Entry> entries_;
+  std::map<std::shared_ptr<graph::ParameterContents>, Entry> entries_;
 };
 
 }  // namespace retrograde

@@ -15,19 +15,20 @@ namespace retrograde {
 
 namespace {
 
-using ParameterPtr = std::shared_ptr<ir::ParameterContents>;
+using ParameterPtr = std::shared_ptr<graph::ParameterContents>;
 
 // What compiled code was made from. Equal stamps: nothing that it depends on has changed.
 struct Stamp {
-  std::vector<std::pair<ir::FuncPtr, uint64_t>> funcs;
+  std::vector<std::pair<graph::FuncPtr, uint64_t>> funcs;
   std::vector<std::pair<ParameterPtr, uint64_t>> parameters;
 
-  static Stamp of(const std::vector<ir::FuncPtr>& outputs) {
+  static Stamp of(const std::vector<graph::FuncPtr>& outputs) {
     Stamp result;
-    for (const ir::FuncPtr& f : ir::functions_of(outputs)) result.funcs.emplace_back(f, f->version);
-    for (const ParameterPtr& p : ir::parameters_of(outputs))
+    for (const graph::FuncPtr& f : graph::functions_of(outputs))
+      result.funcs.emplace_back(f, f->version);
+    for (const ParameterPtr& p : graph::parameters_of(outputs))
       result.parameters.emplace_back(p, p->version);
-    for (const ir::FuncPtr& f : outputs) {
+    for (const graph::FuncPtr& f : outputs) {
       for (const ParameterPtr& p : f->outputs) result.parameters.emplace_back(p, p->version);
     }
     return result;
@@ -43,8 +44,8 @@ struct Stamp {
   }
 };
 
-std::string names_of(const std::vector<ir::FuncPtr>& outputs) {
-  return listed(outputs, [](const ir::FuncPtr& f) { return quoted(f->name); });
+std::string names_of(const std::vector<graph::FuncPtr>& outputs) {
+  return listed(outputs, [](const graph::FuncPtr& f) { return quoted(f->name); });
 }
 
 bool same_shape(const halide_buffer_t& a, const std::vector<halide_dimension_t>& shape) {
@@ -84,7 +85,7 @@ void crop_to(Runtime::Buffer<>& buffer, const std::vector<int32_t>& sizes) {
 }  // namespace
 
 struct Pipeline::Contents {
-  std::vector<ir::FuncPtr> outputs;
+  std::vector<graph::FuncPtr> outputs;
   JITHandlers handlers;
   std::map<std::string, JITExtern> externs;
   bool is_traced = false;
@@ -114,7 +115,7 @@ Pipeline::Pipeline(const std::vector<Func>& outputs) : contents_(std::make_share
   if (outputs.empty())
     user_error("make a Pipeline", "a Pipeline has at least one output", "it was given none",
                "Give the Funcs that are wanted");
-  std::unordered_set<const ir::FuncContents*> seen;
+  std::unordered_set<const graph::FuncContents*> seen;
   for (const Func& f : outputs) {
     if (!f.defined()) {
       user_error("make a Pipeline of " + quoted(f.name()), "an output needs a definition",
@@ -136,13 +137,13 @@ Pipeline::Contents& Pipeline::checked() const {
 }
 
 void Pipeline::unscheduled() {
-  for (const ir::FuncPtr& f : ir::topological_order(checked().outputs)) {
-    if (!ir::is_touched(*f)) ir::give_directive({f, 0}, ir::Unscheduled{});
+  for (const graph::FuncPtr& f : graph::topological_order(checked().outputs)) {
+    if (!graph::is_touched(*f)) graph::give_directive({f, 0}, graph::Unscheduled{});
   }
 }
 
-ScheduleLog Pipeline::schedule_log() const { return ir::schedule_log(checked().outputs); }
-void Pipeline::apply_schedule(const ScheduleLog& log) { ir::apply_log(log, checked().outputs); }
+ScheduleLog Pipeline::schedule_log() const { return graph::schedule_log(checked().outputs); }
+void Pipeline::apply_schedule(const ScheduleLog& log) { graph::apply_log(log, checked().outputs); }
 
 PipelineSpec Pipeline::spec() const {
   PipelineSpec result{checked().outputs[0]->name, contents_->outputs};
@@ -154,12 +155,12 @@ PipelineSpec Pipeline::spec() const {
 
 std::vector<Func> Pipeline::outputs() const {
   std::vector<Func> result;
-  for (const ir::FuncPtr& f : checked().outputs) result.push_back(Func(f));
+  for (const graph::FuncPtr& f : checked().outputs) result.push_back(Func(f));
   return result;
 }
 
 Func Pipeline::get_func(size_t index) const {
-  const std::vector<ir::FuncPtr> order = ir::topological_order(checked().outputs);
+  const std::vector<graph::FuncPtr> order = graph::topological_order(checked().outputs);
   if (index >= order.size()) {
     user_error(text("take Func ", index, " of a Pipeline"), "Funcs are numbered from 0",
                text("it has ", order.size(), " Funcs"), "Give a smaller number");
@@ -179,9 +180,9 @@ const std::map<std::string, JITExtern>& Pipeline::externs() const { return check
 
 std::vector<Argument> Pipeline::infer_arguments() const {
   std::vector<Argument> result;
-  for (const ParameterPtr& p : ir::parameters_of(checked().outputs)) {
+  for (const ParameterPtr& p : graph::parameters_of(checked().outputs)) {
     if (p->is_literal) continue;  // part of the program, not of its interface
-    result.push_back(ir::argument_of(*p));
+    result.push_back(frontend::argument_of(*p));
   }
   return result;
 }
@@ -199,7 +200,7 @@ std::shared_ptr<CompiledPipeline> Pipeline::compiled(const Target& wanted) const
     contents.stamp = Stamp::of(contents.outputs);
     contents.compiled = default_compiler().compile(spec(), target);
     contents.target = target;
-    ir::tell_warnings(contents.outputs);
+    frontend::tell_warnings(contents.outputs);
   }
   return contents.compiled;
 }
@@ -228,7 +229,7 @@ std::vector<Buffer<>> Pipeline::make_outputs(const std::vector<int32_t>& sizes,
                                              bool with_memory) const {
   const std::string asked = "realize " + names_of(checked().outputs);
   std::vector<Buffer<>> result;
-  for (const ir::FuncPtr& f : contents_->outputs) {
+  for (const graph::FuncPtr& f : contents_->outputs) {
     if (static_cast<int>(sizes.size()) != f->dimensions()) {
       call_error(asked, "it takes one size for each dimension",
                  text(quoted(f->name), " has ", f->dimensions(), " dimensions and was given ",
@@ -241,9 +242,9 @@ std::vector<Buffer<>> Pipeline::make_outputs(const std::vector<int32_t>& sizes,
                  text("the size of dimension ", d, " is ", sizes[d]), "Give sizes of at least 0");
     }
     for (const Type& type : f->types) {
-      ir::check_sizes(to_halide_type(type), sizes, asked);
+      frontend::check_sizes(to_halide_type(type), sizes, asked);
       Runtime::Buffer<> buffer(to_halide_type(type), nullptr, sizes);
-      if (with_memory) ir::allocate_host(buffer);
+      if (with_memory) frontend::allocate_host(buffer);
       result.push_back(Buffer<>(buffer));
     }
   }
@@ -252,7 +253,7 @@ std::vector<Buffer<>> Pipeline::make_outputs(const std::vector<int32_t>& sizes,
 
 // The values of a Tuple are computed point by point.
 static void check_one_shape(const halide_buffer_t& first, const halide_buffer_t& other,
-                            const ir::FuncContents& f, const std::string& asked) {
+                            const graph::FuncContents& f, const std::string& asked) {
   for (int d = 0; d < f.dimensions(); d++) {
     const halide_dimension_t &a = first.dim[d], &b = other.dim[d];
     if (a.min == b.min && a.extent == b.extent) continue;
@@ -271,17 +272,18 @@ std::vector<halide_buffer_t*> Pipeline::checked_outputs(const RealizationArg& gi
   const std::string asked = "realize " + names_of(checked().outputs);
   const std::vector<halide_buffer_t*>& buffers = given.buffers();
   size_t count = 0;
-  for (const ir::FuncPtr& f : contents_->outputs) count += f->types.size();
+  for (const graph::FuncPtr& f : contents_->outputs) count += f->types.size();
   if (buffers.size() != count) {
     call_error(asked, "it takes one buffer for each value of each output",
                text("there are ", count, " and ", buffers.size(), " were given"),
                "Give that many buffers");
   }
   size_t i = 0;
-  for (const ir::FuncPtr& f : contents_->outputs) {
+  for (const graph::FuncPtr& f : contents_->outputs) {
     const halide_buffer_t* first = buffers[i];
     for (const ParameterPtr& value : f->outputs) {
-      ir::check_buffer(buffers[i], value->name, value->type, f->dimensions(), with_memory, asked);
+      frontend::check_buffer(buffers[i], value->name, value->type, f->dimensions(), with_memory,
+                             asked);
       check_one_shape(*first, *buffers[i++], *f, asked);
     }
   }
@@ -295,8 +297,8 @@ void Pipeline::run(JITUserContext* context, const RealizationArg& given, const T
   const std::vector<halide_buffer_t*> outputs = checked_outputs(given, true);
   const auto code = compiled(target);
   const std::string asked = "realize " + names_of(contents_->outputs);
-  ir::Arguments arguments(*code, outputs, false, asked, map);
-  ir::call(*code, contents_->handlers, arguments.argv(), asked, context);
+  frontend::Arguments arguments(*code, outputs, false, asked, map);
+  frontend::call(*code, contents_->handlers, arguments.argv(), asked, context);
 }
 
 Realization Pipeline::run(JITUserContext* context, const std::vector<int32_t>& sizes,
@@ -305,16 +307,16 @@ Realization Pipeline::run(JITUserContext* context, const std::vector<int32_t>& s
   RealizationArg outputs(buffers);
   const auto code = compiled(target);
   const std::string asked = "realize " + names_of(contents_->outputs);
-  ir::Arguments arguments(*code, outputs.buffers(), false, asked, map);
+  frontend::Arguments arguments(*code, outputs.buffers(), false, asked, map);
   const auto call = [&] {
-    return ir::call(*code, contents_->handlers, arguments.argv(), asked, context) == 0;
+    return frontend::call(*code, contents_->handlers, arguments.argv(), asked, context) == 0;
   };
   // Without memory the call is a query of what the outputs must be; no elements need none.
   const bool is_empty = std::find(sizes.begin(), sizes.end(), 0) != sizes.end();
   const bool succeeds = is_empty || contents_->target.has_feature(Target::NoBoundsQuery) || call();
   for (Buffer<>& buffer : buffers) {
     enlarge_to(*buffer.get(), sizes);
-    ir::allocate_host(*buffer.get());
+    frontend::allocate_host(*buffer.get());
   }
   if (succeeds) call();
   for (Buffer<>& buffer : buffers) crop_to(*buffer.get(), sizes);
@@ -328,14 +330,14 @@ void Pipeline::infer(JITUserContext* context, const std::vector<halide_buffer_t*
   constexpr int max_rounds = 16;
   const auto code = compiled(target);
   const std::string asked = "infer the input bounds of " + names_of(contents_->outputs);
-  ir::Arguments arguments(*code, outputs, true, asked, map);
+  frontend::Arguments arguments(*code, outputs, true, asked, map);
   if (arguments.queries().empty()) return;
   for (int round = 0;; round++) {
     std::vector<std::vector<halide_dimension_t>> before;
     for (auto& [parameter, buffer] : arguments.queries()) {
       before.emplace_back(buffer.raw_buffer()->dim, buffer.raw_buffer()->dim + buffer.dimensions());
     }
-    ir::call(*code, contents_->handlers, arguments.argv(), asked, context);
+    frontend::call(*code, contents_->handlers, arguments.argv(), asked, context);
     bool settled = true;
     for (size_t i = 0; i < before.size(); i++) {
       settled = settled && same_shape(*arguments.queries()[i].buffer.raw_buffer(), before[i]);
@@ -348,12 +350,12 @@ void Pipeline::infer(JITUserContext* context, const std::vector<halide_buffer_t*
     }
   }
   for (auto& [parameter, buffer] : arguments.queries()) {
-    ir::check_buffer(buffer.raw_buffer(), parameter->name, parameter->type, parameter->dimensions,
-                     false, asked);
+    frontend::check_buffer(buffer.raw_buffer(), parameter->name, parameter->type,
+                           parameter->dimensions, false, asked);
     std::vector<int> extents;
     for (int d = 0; d < buffer.dimensions(); d++) extents.push_back(buffer.dim(d).extent());
-    ir::check_sizes(buffer.type(), extents, asked);
-    ir::allocate_host(buffer);
+    frontend::check_sizes(buffer.type(), extents, asked);
+    frontend::allocate_host(buffer);
     if (const ParamMap::Entry* entry = map.find(parameter))
       entry->receive(Buffer<>(buffer));
     else

@@ -43,7 +43,7 @@ class RealizationArg {
   std::vector<halide_buffer_t*> raw_;
 };
 
-namespace ir {
+namespace frontend {
 
 // Handlers of Halide's older interface take the context as a void*: the same call.
 template <typename To, typename From>
@@ -61,7 +61,7 @@ void compile_multitarget(OutputFileType type, const std::string& prefix,
                          const std::vector<Target>& targets,
                          const std::vector<std::string>& suffixes, const ModuleFactory& make);
 
-}  // namespace ir
+}  // namespace frontend
 
 template <class Self>
 class Runnable {
@@ -139,26 +139,26 @@ class Runnable {
 
   // ---- what compiled code calls back ----
   void set_error_handler(void (*handler)(void*, const char*)) {
-    ir::set_handler(handlers().custom_error, handler);
+    frontend::set_handler(handlers().custom_error, handler);
   }
   // Requires: allocation and release come together.
   void set_custom_allocator(void* (*malloc)(void*, size_t), void (*free)(void*, void*)) {
-    ir::check_allocator(malloc, free);
-    ir::set_handler(handlers().custom_malloc, malloc);
-    ir::set_handler(handlers().custom_free, free);
+    frontend::check_allocator(malloc, free);
+    frontend::set_handler(handlers().custom_malloc, malloc);
+    frontend::set_handler(handlers().custom_free, free);
   }
   void set_custom_do_task(int (*handler)(void*, int (*)(void*, int, uint8_t*), int, uint8_t*)) {
-    ir::set_handler(handlers().custom_do_task, handler);
+    frontend::set_handler(handlers().custom_do_task, handler);
   }
   void set_custom_do_par_for(int (*handler)(void*, int (*)(void*, int, uint8_t*), int, int,
                                             uint8_t*)) {
-    ir::set_handler(handlers().custom_do_par_for, handler);
+    frontend::set_handler(handlers().custom_do_par_for, handler);
   }
   void set_custom_trace(int (*handler)(void*, const halide_trace_event_t*)) {
-    ir::set_handler(handlers().custom_trace, handler);
+    frontend::set_handler(handlers().custom_trace, handler);
   }
   void set_custom_print(void (*handler)(void*, const char*)) {
-    ir::set_handler(handlers().custom_print, handler);
+    frontend::set_handler(handlers().custom_print, handler);
   }
   // What the C functions that the pipeline calls by name are; others are looked up in the process.
   // Requires: what a pipeline calls by name is a C function (Unsupported).
@@ -242,27 +242,27 @@ class Runnable {
   void compile_to_file(const std::string& filename_prefix, const Args& args,
                        const std::string& function_name = "",
                        const Target& target = get_target_from_environment()) {
-    compile_to(ir::file_and_header(OutputFileType::object, filename_prefix, target), args,
+    compile_to(frontend::file_and_header(OutputFileType::object, filename_prefix, target), args,
                function_name, target);
   }
   // prefix.a, with the runtime unless the target says no_runtime, and prefix.h
   void compile_to_static_library(const std::string& filename_prefix, const Args& args,
                                  const std::string& function_name = "",
                                  const Target& target = get_target_from_environment()) {
-    compile_to(ir::file_and_header(OutputFileType::static_library, filename_prefix, target), args,
-               function_name, target);
+    compile_to(frontend::file_and_header(OutputFileType::static_library, filename_prefix, target),
+               args, function_name, target);
   }
   // The first target that the machine can run decides at run time; see compile_multitarget.
   void compile_to_multitarget_static_library(const std::string& filename_prefix, const Args& args,
                                              const std::vector<Target>& targets) {
-    ir::compile_multitarget(OutputFileType::static_library, filename_prefix, targets, {},
-                            modules_of(args));
+    frontend::compile_multitarget(OutputFileType::static_library, filename_prefix, targets, {},
+                                  modules_of(args));
   }
   void compile_to_multitarget_object_files(const std::string& filename_prefix, const Args& args,
                                            const std::vector<Target>& targets,
                                            const std::vector<std::string>& suffixes) {
-    ir::compile_multitarget(OutputFileType::object, filename_prefix, targets, suffixes,
-                            modules_of(args));
+    frontend::compile_multitarget(OutputFileType::object, filename_prefix, targets, suffixes,
+                                  modules_of(args));
   }
 
  private:

@@ -18,7 +18,7 @@
 #include "ir/print.h"
 #include "ir/visit.h"
 
-namespace retrograde::ir {
+namespace retrograde::frontend {
 namespace {
 
 // Whether it stores every element anew, whatever was there.
@@ -152,16 +152,16 @@ void tell_warnings(const std::vector<FuncPtr>& outputs) {
   for (const std::string& warning : warnings_of(outputs)) listener(warning);
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::frontend
 
 namespace retrograde {
 
 std::vector<std::string> warnings_of(const Pipeline& pipeline) {
-  return ir::warnings_of(pipeline.spec().outputs);
+  return frontend::warnings_of(pipeline.spec().outputs);
 }
 
 WarningScope::WarningScope(std::function<void(const std::string&)> tell)
-    : tell_(std::move(tell)), outer_(std::exchange(ir::listener, tell_)) {}
-WarningScope::~WarningScope() { ir::listener = std::move(outer_); }
+    : tell_(std::move(tell)), outer_(std::exchange(frontend::listener, tell_)) {}
+WarningScope::~WarningScope() { frontend::listener = std::move(outer_); }
 
 }  // namespace retrograde

@@ -32,10 +32,10 @@ class WarningScope {
   std::function<void(const std::string&)> tell_, outer_;
 };
 
-namespace ir {
+namespace frontend {
 std::vector<std::string> warnings_of(const std::vector<FuncPtr>& outputs);
 // To the scope around, if there is one.
 void tell_warnings(const std::vector<FuncPtr>& outputs);
-}  // namespace ir
+}  // namespace frontend
 
 }  // namespace retrograde

@@ -22,7 +22,7 @@ namespace retrograde {
 class Func;
 class Stage;
 
-namespace ir {
+namespace frontend {
 
 // What the methods below are made of.
 ReorderLoops reorder_of(const std::vector<VarOrRVar>& vars);
@@ -38,7 +38,7 @@ PrefetchData prefetch_of(const SchedulePlace& place,
                                 const std::vector<VarOrRVar>& loops, const char* where,
                                 DeviceAPI device);
 
-}  // namespace ir
+}  // namespace frontend
 
 // Requires: a name must be a loop of this stage; the loops of a stage have different names; only
 // what is computed somewhere has loops; a size has one value in each call: it is made of parameters
@@ -58,7 +58,7 @@ class LoopDirectives {
   // variable runs exactly over its domain; an update definition does not run a point twice.
   Self& split(const VarOrRVar& old, const VarOrRVar& outer, const VarOrRVar& inner,
               const Expr& factor, TailStrategy tail = TailStrategy::Auto) {
-    return give(ir::SplitLoop{old.name(), outer.name(), inner.name(), factor, tail});
+    return give(graph::SplitLoop{old.name(), outer.name(), inner.name(), factor, tail});
   }
   //   for y in [0, m):           for t in [0, n * m):
   //     for x in [0, n):    =>     body(t % n, t / n)
@@ -67,12 +67,12 @@ class LoopDirectives {
   // that counts as a reduction loop.
   // Requires: it takes two loops.
   Self& fuse(const VarOrRVar& inner, const VarOrRVar& outer, const VarOrRVar& fused) {
-    return give(ir::FuseLoops{inner.name(), outer.name(), fused.name()});
+    return give(graph::FuseLoops{inner.name(), outer.name(), fused.name()});
   }
   //   for x:          for t:
   //     body(x)   =>    body(t)
   Self& rename(const VarOrRVar& old_name, const VarOrRVar& new_name) {
-    return give(ir::RenameLoop{old_name.name(), new_name.name()});
+    return give(graph::RenameLoop{old_name.name(), new_name.name()});
   }
   // Innermost first; loops that are not named keep their places. reorder(y, x):
   //   for y:            for x:
@@ -81,7 +81,7 @@ class LoopDirectives {
   // Reduction loops change places among each other only where that is known to change no result.
   // Requires: each loop is named once; the order of reduction loops may change only where it
   // changes no result.
-  Self& reorder(const std::vector<VarOrRVar>& vars) { return give(ir::reorder_of(vars)); }
+  Self& reorder(const std::vector<VarOrRVar>& vars) { return give(frontend::reorder_of(vars)); }
   template <typename... Rest>
   requires((std::is_convertible_v<Rest, VarOrRVar> &&
             ...)) Self& reorder(const VarOrRVar& x, const VarOrRVar& y, Rest&&... rest) {
@@ -108,7 +108,8 @@ class LoopDirectives {
   Self& tile(const std::vector<VarOrRVar>& previous, const std::vector<VarOrRVar>& outers,
              const std::vector<VarOrRVar>& inners, const std::vector<Expr>& factors,
              const std::vector<TailStrategy>& tails) {
-    ir::check_tile(place(), previous, {outers.size(), inners.size(), factors.size(), tails.size()});
+    frontend::check_tile(place(), previous,
+                         {outers.size(), inners.size(), factors.size(), tails.size()});
     for (size_t i = 0; i < previous.size(); i++)
       split(previous[i], outers[i], inners[i], factors[i], tails[i]);
     std::vector<VarOrRVar> order = inners;
@@ -128,27 +129,29 @@ class LoopDirectives {
 
   // ---- how a loop runs ----
 
-  Self& serial(const VarOrRVar& var) { return give(ir::RunLoop{var.name(), ForType::Serial}); }
+  Self& serial(const VarOrRVar& var) { return give(graph::RunLoop{var.name(), ForType::Serial}); }
   //   for y:          parallel for y:      iterations are shared out to threads
   //     body(y)   =>    body(y)
   // A loop over a reduction variable only where its iterations are independent, the update is
   // atomic(), or race conditions are allowed.
   // Requires: iterations that run at the same time must not touch the same element; a parallel loop
   // is not inside of a vectorized one.
-  Self& parallel(const VarOrRVar& var) { return give(ir::RunLoop{var.name(), ForType::Parallel}); }
+  Self& parallel(const VarOrRVar& var) {
+    return give(graph::RunLoop{var.name(), ForType::Parallel});
+  }
   //   for x in [0, 4):      body(ramp(0, 1, 4))
   //     body(x)         =>
   // Of a loop of constant extent; the same rule for reduction variables.
   // Requires: iterations that run at the same time must not touch the same element; the extent of a
   // vectorized loop must be a constant; vectors have at most 4096 lanes.
   Self& vectorize(const VarOrRVar& var) {
-    return give(ir::RunLoop{var.name(), ForType::Vectorized});
+    return give(graph::RunLoop{var.name(), ForType::Vectorized});
   }
   //   for x in [0, 2):      body(0)
   //     body(x)         =>  body(1)
   // Of a loop of constant extent.
   // Requires: the extent of an unrolled loop must be a constant, or have a constant above it.
-  Self& unroll(const VarOrRVar& var) { return give(ir::RunLoop{var.name(), ForType::Unrolled}); }
+  Self& unroll(const VarOrRVar& var) { return give(graph::RunLoop{var.name(), ForType::Unrolled}); }
   // The same after a split; the outer loop keeps the name of `var`, except that a parallel loop is
   // the outer one.
   //   parallel(y, 4):            vectorize(x, 8), unroll(x, 8):
@@ -158,16 +161,16 @@ class LoopDirectives {
   Self& parallel(const VarOrRVar& var, const Expr& task_size,
                  TailStrategy tail = TailStrategy::Auto) {
     check_run(var, ForType::Parallel);
-    return split(var, var, ir::fresh_like(var), task_size, tail).parallel(var);
+    return split(var, var, frontend::fresh_like(var), task_size, tail).parallel(var);
   }
   Self& vectorize(const VarOrRVar& var, const Expr& factor,
                   TailStrategy tail = TailStrategy::Auto) {
     check_run(var, ForType::Vectorized);
-    const VarOrRVar lanes = ir::fresh_like(var);
+    const VarOrRVar lanes = frontend::fresh_like(var);
     return split(var, var, lanes, factor, tail).vectorize(lanes);
   }
   Self& unroll(const VarOrRVar& var, const Expr& factor, TailStrategy tail = TailStrategy::Auto) {
-    const VarOrRVar copies = ir::fresh_like(var);
+    const VarOrRVar copies = frontend::fresh_like(var);
     return split(var, var, copies, factor, tail).unroll(copies);
   }
   // Whether boundary conditions and tails get loops of their own:
@@ -177,7 +180,7 @@ class LoopDirectives {
   // Auto leaves it to the compiler, Never keeps one loop, Always cuts wherever a test can be
   // removed.
   Self& partition(const VarOrRVar& var, Partition partition) {
-    return give(ir::PartitionLoop{var.name(), partition});
+    return give(graph::PartitionLoop{var.name(), partition});
   }
   Self& never_partition(const std::vector<VarOrRVar>& vars) {
     return partition_all(vars, Partition::Never);
@@ -185,8 +188,8 @@ class LoopDirectives {
   Self& always_partition(const std::vector<VarOrRVar>& vars) {
     return partition_all(vars, Partition::Always);
   }
-  Self& never_partition_all() { return never_partition(ir::loops_at(place())); }
-  Self& always_partition_all() { return always_partition(ir::loops_at(place())); }
+  Self& never_partition_all() { return never_partition(frontend::loops_at(place())); }
+  Self& always_partition_all() { return always_partition(frontend::loops_at(place())); }
   template <typename... Rest>
   requires((std::is_convertible_v<Rest, VarOrRVar> &&
             ...)) Self& never_partition(const VarOrRVar& x, Rest&&... rest) {
@@ -213,11 +216,11 @@ class LoopDirectives {
   // its Func but the one that it writes; the values of a Tuple are updated under a lock, which must
   // not be left (Unsupported).
   Self& atomic(bool override_associativity_test = false) {
-    return give(ir::MakeAtomic{override_associativity_test});
+    return give(graph::MakeAtomic{override_associativity_test});
   }
   // Loops over reduction variables may run in parallel or as vectors although their iterations
   // touch the same elements: results may then be any of those that races give.
-  Self& allow_race_conditions() { return give(ir::AllowRaces{}); }
+  Self& allow_race_conditions() { return give(graph::AllowRaces{}); }
 
   // ---- where it runs ----
 
@@ -242,24 +245,24 @@ class LoopDirectives {
   // reads; Funcs that share loops are computed whenever any of them is needed (Unsupported).
   Self& compute_with(const LoopLevel& level,
                      const std::vector<std::pair<VarOrRVar, LoopAlignStrategy>>& align) {
-    ir::ComputeWith with{{{}, level.contents()}};
+    graph::ComputeWith with{{{}, level.contents()}};
     for (const auto& [var, strategy] : align) with.align.emplace_back(var.name(), strategy);
     return give(std::move(with));
   }
   Self& compute_with(const LoopLevel& level, LoopAlignStrategy align = LoopAlignStrategy::Auto) {
     std::vector<std::pair<VarOrRVar, LoopAlignStrategy>> all;
-    for (const VarOrRVar& loop : ir::loops_at(place())) {
+    for (const VarOrRVar& loop : frontend::loops_at(place())) {
       if (align != LoopAlignStrategy::Auto) all.emplace_back(loop, align);
     }
     return compute_with(level, all);
   }
   Self& compute_with(const Stage& stage, const VarOrRVar& var,
                      const std::vector<std::pair<VarOrRVar, LoopAlignStrategy>>& align) {
-    return compute_with(ir::level_of(stage, var), align);
+    return compute_with(frontend::level_of(stage, var), align);
   }
   Self& compute_with(const Stage& stage, const VarOrRVar& var,
                      LoopAlignStrategy align = LoopAlignStrategy::Auto) {
-    return compute_with(ir::level_of(stage, var), align);
+    return compute_with(frontend::level_of(stage, var), align);
   }
 
   // A second schedule for when `condition`, over parameters only, holds: the returned stage, which
@@ -276,7 +279,7 @@ class LoopDirectives {
   // When none of the conditions holds, the call fails with this message instead of running the
   // general schedule.
   // Requires: the message says something; specialize_fail is the last of a stage's specializations.
-  void specialize_fail(const std::string& message) { give(ir::SpecializeFail{message}); }
+  void specialize_fail(const std::string& message) { give(graph::SpecializeFail{message}); }
 
   // Fetches into the cache what iteration `from + offset` reads of an image or Func, at every
   // iteration of `at`, which is `from` or a loop inside of it. g.prefetch(f, x, x, 2):
@@ -287,14 +290,14 @@ class LoopDirectives {
   // happens at is the one it counts from, or inside of it; the offset is an integer.
   Self& prefetch(const Func& f, const VarOrRVar& at, const VarOrRVar& from, Expr offset = 1,
                  PrefetchBoundStrategy strategy = PrefetchBoundStrategy::GuardWithIf) {
-    return give(
-        ir::prefetch_of(place(), f, {{}, at.name(), from.name(), std::move(offset), strategy}));
+    return give(frontend::prefetch_of(place(), f,
+                                      {{}, at.name(), from.name(), std::move(offset), strategy}));
   }
-  Self& prefetch(const std::shared_ptr<ir::ParameterContents>& image, const VarOrRVar& at,
+  Self& prefetch(const std::shared_ptr<graph::ParameterContents>& image, const VarOrRVar& at,
                  const VarOrRVar& from, Expr offset = 1,
                  PrefetchBoundStrategy strategy = PrefetchBoundStrategy::GuardWithIf) {
-    return give(
-        ir::prefetch_of(place(), image, {{}, at.name(), from.name(), std::move(offset), strategy}));
+    return give(frontend::prefetch_of(place(), image,
+                                      {{}, at.name(), from.name(), std::move(offset), strategy}));
   }
   template <typename T>
   requires requires(const T& image) { image.parameter(); }
@@ -335,17 +338,18 @@ class LoopDirectives {
     refuse_gpu("tile", "for a GPU", x, inner, rest...);
   }
   Self& hexagon(const VarOrRVar& x = Var::outermost()) {
-    ir::refuse_device(place(), "run the loop", {x}, "on a Hexagon accelerator", DeviceAPI::Hexagon);
+    frontend::refuse_device(place(), "run the loop", {x}, "on a Hexagon accelerator",
+                            DeviceAPI::Hexagon);
   }
 
-  void unscheduled() { give(ir::Unscheduled{}); }  // says that no directive was forgotten
-  const ir::StageLoops& get_schedule() const { return place().schedule(); }
+  void unscheduled() { give(graph::Unscheduled{}); }  // says that no directive was forgotten
+  const graph::StageLoops& get_schedule() const { return place().schedule(); }
 
  private:
   Self& self() { return static_cast<Self&>(*this); }
-  ir::SchedulePlace place() const { return static_cast<const Self&>(*this).loops(); }
-  Self& give(ir::Directive directive) {
-    ir::give_directive(place(), std::move(directive));
+  graph::SchedulePlace place() const { return static_cast<const Self&>(*this).loops(); }
+  Self& give(graph::Directive directive) {
+    graph::give_directive(place(), std::move(directive));
     return self();
   }
   Self& partition_all(const std::vector<VarOrRVar>& vars, Partition how) {
@@ -354,8 +358,8 @@ class LoopDirectives {
   }
   // What is asked for is refused before the loop is split.
   void check_run(const VarOrRVar& var, ForType kind) const {
-    ir::Directive run = ir::RunLoop{var.name(), kind};
-    ir::check_directive(place(), run);
+    graph::Directive run = graph::RunLoop{var.name(), kind};
+    graph::check_directive(place(), run);
   }
   // Of what such a directive is given, the loops and the device are named.
   template <typename... Given>
@@ -367,7 +371,7 @@ class LoopDirectives {
       if constexpr (std::is_same_v<T, DeviceAPI>) device = argument;
     };
     (note(given), ...);
-    ir::refuse_device(place(), verb, loops, where, device);
+    frontend::refuse_device(place(), verb, loops, where, device);
   }
 };
 

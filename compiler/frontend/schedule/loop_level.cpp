@@ -5,20 +5,20 @@
 
 namespace retrograde {
 
-LoopLevel::LoopLevel() : contents_(std::make_shared<ir::LoopLevelContents>()) {}
+LoopLevel::LoopLevel() : contents_(std::make_shared<graph::LoopLevelContents>()) {}
 
-LoopLevel::LoopLevel(ir::LoopLevel level) : LoopLevel() {
+LoopLevel::LoopLevel(graph::LoopLevel level) : LoopLevel() {
   contents_->level = std::move(level);
   contents_->defined = true;
 }
 
 LoopLevel::LoopLevel(const Func& f, const VarOrRVar& var, int stage_index)
-    : LoopLevel(ir::LoopLevel{ir::LoopLevel::Kind::At, f.name(), var.name(), stage_index}) {}
+    : LoopLevel(graph::LoopLevel{graph::LoopLevel::Kind::At, f.name(), var.name(), stage_index}) {}
 
-LoopLevel LoopLevel::inlined() { return LoopLevel(ir::LoopLevel{}); }
+LoopLevel LoopLevel::inlined() { return LoopLevel(graph::LoopLevel{}); }
 
 LoopLevel LoopLevel::root() {
-  return LoopLevel(ir::LoopLevel{ir::LoopLevel::Kind::Root, "", "", -1});
+  return LoopLevel(graph::LoopLevel{graph::LoopLevel::Kind::Root, "", "", -1});
 }
 
 void LoopLevel::set(const LoopLevel& other) {
@@ -38,7 +38,7 @@ LoopLevel& LoopLevel::lock() {
   return *this;
 }
 
-const ir::LoopLevel& LoopLevel::level() const {
+const graph::LoopLevel& LoopLevel::level() const {
   if (!contents_->defined) {
     user_error("use a loop level", "a level is a loop, root or inlined",
                "it was made without a loop and never set", "Set it: level.set(LoopLevel(f, x))");
@@ -46,8 +46,8 @@ const ir::LoopLevel& LoopLevel::level() const {
   return contents_->level;
 }
 
-const ir::LoopLevel& LoopLevel::loop(const char* asked) const {
-  if (level().kind != ir::LoopLevel::Kind::At)
+const graph::LoopLevel& LoopLevel::loop(const char* asked) const {
+  if (level().kind != graph::LoopLevel::Kind::At)
     user_error(asked, "the level is a loop of a Func", "it is " + quoted(to_string()),
                "Ask is_root() and is_inlined() first");
   return level();
@@ -62,11 +62,11 @@ int LoopLevel::stage_index() const { return loop("take the stage of a loop level
 
 std::string LoopLevel::to_string() const {
   switch (level().kind) {
-    case ir::LoopLevel::Kind::Inlined:
+    case graph::LoopLevel::Kind::Inlined:
       return "inlined";
-    case ir::LoopLevel::Kind::Root:
+    case graph::LoopLevel::Kind::Root:
       return "root";
-    case ir::LoopLevel::Kind::At:
+    case graph::LoopLevel::Kind::At:
       return level().func + "." + level().var;
   }
   internal_error("a loop level of unknown kind");

@@ -33,9 +33,10 @@ class LoopLevel {
   LoopLevel& lock();  // set() is an error from now on
 
   bool defined() const { return contents_->defined; }  // whether it was set
-  bool is_inlined() const { return level().kind == ir::LoopLevel::Kind::Inlined; }  // in each use
+  // in each use
+  bool is_inlined() const { return level().kind == graph::LoopLevel::Kind::Inlined; }
   // Outside of all loops.
-  bool is_root() const { return level().kind == ir::LoopLevel::Kind::Root; }
+  bool is_root() const { return level().kind == graph::LoopLevel::Kind::Root; }
   // Requires: the level is a loop of a Func.
   std::string func() const;       // whose loop it is
   VarOrRVar var() const;          // which loop it is
@@ -44,13 +45,13 @@ class LoopLevel {
   bool operator==(const LoopLevel& other) const { return level() == other.level(); }
   bool operator!=(const LoopLevel& other) const { return !(*this == other); }
 
-  const std::shared_ptr<ir::LoopLevelContents>& contents() const { return contents_; }
+  const std::shared_ptr<graph::LoopLevelContents>& contents() const { return contents_; }
 
  private:
-  explicit LoopLevel(ir::LoopLevel level);
-  const ir::LoopLevel& level() const;  // CompileError when undefined
-  const ir::LoopLevel& loop(const char* asked) const;
-  std::shared_ptr<ir::LoopLevelContents> contents_;
+  explicit LoopLevel(graph::LoopLevel level);
+  const graph::LoopLevel& level() const;  // CompileError when undefined
+  const graph::LoopLevel& loop(const char* asked) const;
+  std::shared_ptr<graph::LoopLevelContents> contents_;
 };
 
 }  // namespace retrograde

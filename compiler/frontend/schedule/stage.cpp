@@ -17,7 +17,7 @@ std::string as_list(const std::vector<VarOrRVar>& vars) {
 
 }  // namespace
 
-namespace ir {
+namespace frontend {
 
 ReorderLoops reorder_of(const std::vector<VarOrRVar>& vars) {
   ReorderLoops order;
@@ -82,23 +82,23 @@ void refuse_device(const SchedulePlace& place, const char* verb,
               "Use parallel, vectorize and tile instead");
 }
 
-}  // namespace ir
+}  // namespace frontend
 
-std::string Stage::name() const { return ir::stage_name(*place_.f, place_.stage); }
-std::string Stage::source_location() const { return ir::source_location_of(*place_.f); }
-std::vector<VarOrRVar> Stage::split_vars() const { return ir::loops_at(place_); }
+std::string Stage::name() const { return graph::stage_name(*place_.f, place_.stage); }
+std::string Stage::source_location() const { return graph::source_location_of(*place_.f); }
+std::vector<VarOrRVar> Stage::split_vars() const { return frontend::loops_at(place_); }
 
 std::string Stage::dump_argument_list() const {
-  return listed(get_schedule().dims, [](const ir::Dim& dim) { return dim.var; });
+  return listed(get_schedule().dims, [](const graph::Dim& dim) { return dim.var; });
 }
 
 Func Stage::rfactor(const RVar& r, const Var& v) {
   return rfactor(std::vector<std::pair<RVar, Var>>{{r, v}});
 }
 Func Stage::rfactor(const std::vector<std::pair<RVar, Var>>& preserved) {
-  std::vector<std::pair<ir::NamedLoop, std::string>> names;
+  std::vector<std::pair<graph::NamedLoop, std::string>> names;
   for (const auto& [rvar, var] : preserved) names.emplace_back(rvar.name(), var.name());
-  return Func(ir::factor_out(place_, names));
+  return Func(graph::factor_out(place_, names));
 }
 
 }  // namespace retrograde

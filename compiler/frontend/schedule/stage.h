@@ -13,12 +13,12 @@ class Stage : public LoopDirectives<Stage> {
  public:
   // `specialization`: which of the stage's schedules; see StageLoops::specializations. Empty:
   // the general one.
-  Stage(ir::FuncPtr func, int index, std::vector<int> specialization = {})
+  Stage(graph::FuncPtr func, int index, std::vector<int> specialization = {})
       : place_{std::move(func), index, std::move(specialization)} {}
 
   // "blur", "blur.update(0)"
   std::string name() const;
-  const ir::FuncPtr& function() const { return place_.f; }
+  const graph::FuncPtr& function() const { return place_.f; }
   int index() const { return place_.stage; }
   std::string dump_argument_list() const;     // the loops, innermost first
   std::vector<VarOrRVar> split_vars() const;  // the same as variables
@@ -47,17 +47,17 @@ class Stage : public LoopDirectives<Stage> {
 
  private:
   friend class LoopDirectives<Stage>;
-  const ir::SchedulePlace& loops() const { return place_; }
+  const graph::SchedulePlace& loops() const { return place_; }
 
-  ir::SchedulePlace place_;
+  graph::SchedulePlace place_;
 };
 using ScheduleHandle = Stage;
 
 template <class Self>
 Stage LoopDirectives<Self>::specialize(const Expr& condition) {
-  give(ir::Specialize{condition});
-  ir::SchedulePlace special = place();
-  special.special.push_back(ir::specialization_for(special.schedule(), condition));
+  give(graph::Specialize{condition});
+  graph::SchedulePlace special = place();
+  special.special.push_back(graph::specialization_for(special.schedule(), condition));
   return Stage(special.f, special.stage, special.special);
 }
 

@@ -19,7 +19,7 @@
 #include "ir/visit.h"
 #include "lower/statement_rewriter.h"
 
-namespace retrograde::ir {
+namespace retrograde::lower {
 namespace {
 
 Expr without_last_bit(const Expr& value) {
@@ -57,4 +57,4 @@ Stmt fuzz_float_stores(const Stmt& all) {
   });
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::lower

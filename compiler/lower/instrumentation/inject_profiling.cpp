@@ -24,7 +24,7 @@
 #include "lower/runtime_call.h"
 #include "lower/statement_rewriter.h"
 
-namespace retrograde::ir {
+namespace retrograde::lower {
 
 namespace {
 
@@ -146,4 +146,4 @@ Stmt inject_profiling(const Stmt& s, const Program& program, const std::string& 
   return wrap_work(s, wrap);
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::lower

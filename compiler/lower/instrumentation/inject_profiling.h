@@ -6,8 +6,8 @@
 
 #include "lower/program.h"
 
-namespace retrograde::ir {
+namespace retrograde::lower {
 
 Stmt inject_profiling(const Stmt& s, const Program& program, const std::string& pipeline);
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::lower

@@ -29,7 +29,7 @@
 #include "lower/walk_in_bounds.h"
 #include "simplify/simplify.h"
 
-namespace retrograde::ir {
+namespace retrograde::lower {
 
 namespace {
 
@@ -312,4 +312,4 @@ void inject_tracing(LoopNests& nests, const Program& program, const std::string&
                make_block(std::move(all)));
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::lower

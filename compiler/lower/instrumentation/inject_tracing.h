@@ -7,10 +7,10 @@
 #include "lower/nests/build_loop_nests.h"
 #include "lower/program.h"
 
-namespace retrograde::ir {
+namespace retrograde::lower {
 
 // Changes nests.body; names need not be unique yet.
 void inject_tracing(LoopNests& nests, const Program& program, const std::string& pipeline,
                     const Target& target);
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::lower

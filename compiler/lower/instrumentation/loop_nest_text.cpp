@@ -15,7 +15,7 @@
 #include "lower/nests/inline_functions.h"
 #include "simplify/simplify.h"
 
-namespace retrograde::ir {
+namespace retrograde::lower {
 namespace {
 
 const char* keyword(ForType type) { return type == ForType::Serial ? "for" : for_name(type); }
@@ -221,4 +221,4 @@ std::string loop_nest_text(const std::vector<FuncPtr>& outputs) {
   return loop_nest_text(program);
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::lower

@@ -8,8 +8,8 @@
 
 #include "lower/program.h"
 
-namespace retrograde::ir {
+namespace retrograde::lower {
 
 std::string loop_nest_text(const Program& program);
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::lower

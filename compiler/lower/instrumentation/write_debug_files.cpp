@@ -18,7 +18,7 @@
 #include "lower/runtime_call.h"
 #include "lower/statement_rewriter.h"
 
-namespace retrograde::ir {
+namespace retrograde::lower {
 
 namespace {
 
@@ -83,4 +83,4 @@ Stmt write_debug_files(const Stmt& all, const Program& program) {
   });
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::lower

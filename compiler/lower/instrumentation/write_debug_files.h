@@ -3,8 +3,8 @@
 
 #include "lower/program.h"
 
-namespace retrograde::ir {
+namespace retrograde::lower {
 
 Stmt write_debug_files(const Stmt& s, const Program& program);
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::lower

@@ -5,7 +5,7 @@
 #include "ir/build.h"
 #include "ir/visit.h"
 
-namespace retrograde::ir {
+namespace retrograde::lower {
 
 // The value for which a select takes its first arm, where its condition is about the variable.
 std::optional<int64_t> ChoiceArms::case_of(const Expr& e) const {
@@ -46,4 +46,4 @@ Stmt ChoiceArms::choose(const Stmt& body, int64_t value) {
   return rewrite(body, [&](const Expr& e, const auto& recurse) { return recurse(arm(e, value)); });
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::lower

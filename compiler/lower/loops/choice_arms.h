@@ -11,7 +11,7 @@
 
 #include "ir/expr.h"
 
-namespace retrograde::ir {
+namespace retrograde::lower {
 
 // Remembers the choices of one body, which must outlive it.
 class ChoiceArms {
@@ -36,4 +36,4 @@ class ChoiceArms {
   std::unordered_map<const ExprNode*, Table> tables_;  // of choices by their first select
 };
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::lower

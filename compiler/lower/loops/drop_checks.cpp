@@ -22,7 +22,7 @@
 #include "lower/statement_rewriter.h"
 #include "retrograde_runtime.h"
 
-namespace retrograde::ir {
+namespace retrograde::lower {
 namespace {
 
 bool is_query(const Expr& e) {
@@ -86,4 +86,4 @@ Stmt drop_asserts(const Stmt& all) {
   });
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::lower

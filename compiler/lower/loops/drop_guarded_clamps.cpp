@@ -29,7 +29,7 @@
 #include "ir/memory_reads.h"
 #include "ir/visit.h"
 
-namespace retrograde::ir {
+namespace retrograde::lower {
 
 namespace {
 
@@ -128,4 +128,4 @@ class ClampDropper : public Rewriter {
 
 Stmt drop_guarded_clamps(const Stmt& s) { return ClampDropper()(s); }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::lower

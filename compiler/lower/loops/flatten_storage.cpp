@@ -29,7 +29,7 @@
 #include "lower/nests/copy_statement.h"
 #include "lower/nests/resolve_undef.h"
 
-namespace retrograde::ir {
+namespace retrograde::lower {
 
 namespace {
 
@@ -243,4 +243,4 @@ Stmt flatten_storage(const Stmt& s, const StorageLayouts& layouts) {
   return Flattener(s, layouts)(s);
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::lower

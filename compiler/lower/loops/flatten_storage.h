@@ -8,7 +8,7 @@
 
 #include "ir/expr.h"
 
-namespace retrograde::ir {
+namespace retrograde::lower {
 
 // How the storage of a Func is laid out. Empty vectors: dimension 0 innermost, nothing wraps
 // around.
@@ -30,4 +30,4 @@ using StorageLayouts = std::map<std::string, StorageLayout>;  // by Func; a miss
 //   image "in"               the same: buffer "in"
 Stmt flatten_storage(const Stmt& s, const StorageLayouts& layouts = {});
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::lower

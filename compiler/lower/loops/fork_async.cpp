@@ -39,7 +39,7 @@
 #include "lower/nests/make_names_unique.h"
 #include "lower/statement_rewriter.h"
 
-namespace retrograde::ir {
+namespace retrograde::lower {
 
 namespace {
 
@@ -513,4 +513,4 @@ Stmt fork_async(const Stmt& s, Program& program, const AsyncRoom& room) {
   return unique.stmt;
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::lower

@@ -30,7 +30,7 @@
 #include "ir/visit.h"
 #include "lower/statement_rewriter.h"
 
-namespace retrograde::ir {
+namespace retrograde::lower {
 
 namespace {
 
@@ -136,4 +136,4 @@ Stmt free_early(const Stmt& s) {
   });
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::lower

@@ -22,7 +22,7 @@
 #include "lower/walk_in_bounds.h"
 #include "simplify/simplify.h"
 
-namespace retrograde::ir {
+namespace retrograde::lower {
 
 namespace {
 
@@ -229,4 +229,4 @@ Stmt lower_prefetches(const Stmt& s, const Program& program) {
   });
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::lower

@@ -19,7 +19,7 @@
 #include "ir/visit.h"
 #include "simplify/simplify.h"
 
-namespace retrograde::ir {
+namespace retrograde::lower {
 
 namespace {
 
@@ -90,4 +90,4 @@ class IndexJoiner : public Rewriter {
 
 Stmt join_indices(const Stmt& s) { return s.defined() ? IndexJoiner()(s) : s; }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::lower

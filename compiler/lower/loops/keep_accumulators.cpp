@@ -39,7 +39,7 @@
 #include "lower/nests/copy_statement.h"
 #include "lower/statement_rewriter.h"
 
-namespace retrograde::ir {
+namespace retrograde::lower {
 
 namespace {
 
@@ -257,4 +257,4 @@ Stmt keep_accumulators(const Stmt& s, const std::function<bool(const For&)>& is_
   return s.defined() ? KeepAccumulators(s, is_pure)(s) : s;
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::lower

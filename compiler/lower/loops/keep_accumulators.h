@@ -5,9 +5,9 @@
 
 #include "ir/expr.h"
 
-namespace retrograde::ir {
+namespace retrograde::lower {
 
 // Loops to Loops. `is_pure`: whether the iterations of a loop store to different elements.
 Stmt keep_accumulators(const Stmt& s, const std::function<bool(const For&)>& is_pure);
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::lower

@@ -25,7 +25,7 @@
 #include "ir/visit.h"
 #include "lower/statement_rewriter.h"
 
-namespace retrograde::ir {
+namespace retrograde::lower {
 
 namespace {
 
@@ -103,4 +103,4 @@ Stmt lower_atomics(const Stmt& s) {
   });
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::lower

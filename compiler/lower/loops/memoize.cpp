@@ -26,7 +26,7 @@
 #include "ir/visit.h"
 #include "lower/runtime_call.h"
 
-namespace retrograde::ir {
+namespace retrograde::lower {
 
 namespace {
 
@@ -270,4 +270,4 @@ Stmt memoize(const Stmt& s, const Program& program, const std::string& function,
   return any ? Memoizer(program, function, target, folds)(s) : s;
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::lower

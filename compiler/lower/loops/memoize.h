@@ -8,7 +8,7 @@
 #include "ir/target.h"
 #include "lower/program.h"
 
-namespace retrograde::ir {
+namespace retrograde::lower {
 
 // By original name: what each dimension of its storage folds by, undefined where it does not.
 using StorageFolds = std::map<std::string, std::vector<Expr>>;
@@ -21,4 +21,4 @@ Stmt with_key_region(const std::string& func, const Box& read, Stmt storage);
 Stmt memoize(const Stmt& s, const Program& program, const std::string& function,
              const Target& target, const StorageFolds& folds);
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::lower

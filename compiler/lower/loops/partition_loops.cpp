@@ -47,7 +47,7 @@
 #include "lower/statement_rewriter.h"
 #include "simplify/simplify.h"
 
-namespace retrograde::ir {
+namespace retrograde::lower {
 
 namespace {
 
@@ -253,4 +253,4 @@ Stmt partition_loops(const Stmt& s) {
   return without_likely(Partitioner(s)(s));
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::lower

@@ -4,7 +4,7 @@
 #include "lower/runtime_call.h"
 #include "lower/statement_rewriter.h"
 
-namespace retrograde::ir {
+namespace retrograde::lower {
 
 namespace {
 
@@ -91,4 +91,4 @@ Stmt Semaphores::around(const Stmt& fork, const std::string& func, int room, int
                       {Range{0, per_reader * readers}}, make_block(stmts));
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::lower

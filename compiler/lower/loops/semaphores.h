@@ -9,7 +9,7 @@
 #include "ir/visit.h"
 #include "lower/nests/copy_statement.h"
 
-namespace retrograde::ir {
+namespace retrograde::lower {
 
 // Of one reader; those of the next follow.
 enum Semaphore { Ready = 0, Space = 1 };
@@ -38,4 +38,4 @@ class Semaphores {
   FreshNames fresh_;
 };
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::lower

@@ -6,7 +6,7 @@
 #include "ir/build.h"
 #include "simplify/simplify.h"
 
-namespace retrograde::ir {
+namespace retrograde::lower {
 
 namespace {
 
@@ -242,4 +242,4 @@ bool SteadyRewriter::is_about_tiles(const std::unordered_set<std::string>& names
   return longest >= thick_loop && points >= thick_points;
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::lower

@@ -11,7 +11,7 @@
 #include "ir/markers.h"
 #include "ir/visit.h"
 
-namespace retrograde::ir {
+namespace retrograde::lower {
 
 bool is_likely(const Call* call);
 bool is_serial(const For& loop);  // or parallel: it runs one iteration after the other
@@ -94,4 +94,4 @@ class SteadyRewriter : public Rewriter {
   std::unordered_map<const ExprNode*, Mark> marks_;  // of nodes of the body, which outlives this
 };
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::lower

@@ -40,7 +40,7 @@
 #include "lower/statement_rewriter.h"
 #include "simplify/simplify.h"
 
-namespace retrograde::ir {
+namespace retrograde::lower {
 
 namespace {
 
@@ -211,4 +211,4 @@ Stmt trim_loops(const Stmt& s) {
   });
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::lower

@@ -31,7 +31,7 @@
 #include "simplify/facts.h"
 #include "simplify/simplify.h"
 
-namespace retrograde::ir {
+namespace retrograde::lower {
 
 namespace {
 
@@ -116,4 +116,4 @@ class Unroller : public StatementRewriter {
 
 Stmt unroll_loops(const Stmt& s) { return has_loops(s, ForType::Unrolled) ? Unroller(s)(s) : s; }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::lower

@@ -11,7 +11,7 @@
 #include "retrograde_runtime.h"
 #include "simplify/simplify.h"
 
-namespace retrograde::ir {
+namespace retrograde::lower {
 namespace {
 
 Expr handle_of(const std::string& buffer) { return variable(buffer + ".buffer", Handle()); }
@@ -400,4 +400,4 @@ Stmt add_argument_checks(const LoopNests& nests, const std::vector<LoweredArgume
   return Checks(nests, args, program).build();
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::lower

@@ -17,7 +17,7 @@
 #include "ir/lowered_function.h"
 #include "lower/nests/build_loop_nests.h"
 
-namespace retrograde::ir {
+namespace retrograde::lower {
 
 Stmt add_argument_checks(const LoopNests& nests, const std::vector<LoweredArgument>& args,
                          const Program& program);
@@ -25,4 +25,4 @@ Stmt add_argument_checks(const LoopNests& nests, const std::vector<LoweredArgume
 // Whether the statement does nothing but ask the runtime for such a check and leave when it fails.
 bool is_check_by_runtime(const Stmt& s);
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::lower

@@ -7,7 +7,7 @@
 #include "lower/nests/nest_emitter.h"
 #include "lower/nests/shared_loops.h"
 
-namespace retrograde::ir {
+namespace retrograde::lower {
 
 Box buffer_box(const std::string& buffer, int dimensions) {
   Box box;
@@ -137,4 +137,4 @@ LoopNests build_loop_nests(const Program& program, const LoopNestOptions& option
   return NestEmitter(program, options).emit();
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::lower

@@ -28,7 +28,7 @@
 #include "analysis/interval.h"
 #include "lower/program.h"
 
-namespace retrograde::ir {
+namespace retrograde::lower {
 
 using Requirements = std::map<std::string, Footprint>;  // box read of each Func and image
 
@@ -56,4 +56,4 @@ LoopNests build_loop_nests(const Program& program, const LoopNestOptions& option
 // "out" -> [out.min.d, out.min.d + out.extent.d - 1] in every dimension
 Box buffer_box(const std::string& buffer, int dimensions);
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::lower

@@ -3,7 +3,7 @@
 #include "ir/build.h"
 #include "simplify/simplify.h"
 
-namespace retrograde::ir {
+namespace retrograde::lower {
 
 Expr ComputePlace::name(const std::string& name, const Expr& value, bool always) {
   if (!always && (is_const(value) || value.as<Variable>())) return value;
@@ -75,4 +75,4 @@ Box ComputePlace::expand(const Box& box, const Scope<Interval>& parts) {
   return result;
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::lower

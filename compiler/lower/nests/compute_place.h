@@ -15,7 +15,7 @@
 #include "ir/visit.h"
 #include "lower/nests/sliding_window.h"
 
-namespace retrograde::ir {
+namespace retrograde::lower {
 
 class ComputePlace {
  public:
@@ -48,4 +48,4 @@ class ComputePlace {
   Box expand(const Box& box, const Scope<Interval>& parts);
 };
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::lower

@@ -5,7 +5,7 @@
 #include "diagnostics/error.h"
 #include "ir/build.h"
 
-namespace retrograde::ir {
+namespace retrograde::lower {
 
 namespace {
 
@@ -128,4 +128,4 @@ std::string describe_loop(const std::string& loop) {
                            : text + " (update " + std::to_string(std::stoi(name.stage) - 1) + ")";
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::lower

@@ -11,7 +11,7 @@
 #include "ir/expr.h"
 #include "ir/visit.h"
 
-namespace retrograde::ir {
+namespace retrograde::lower {
 
 // Makes names that occur nowhere in a statement: "f.s0.x" and "f.s0.x.$1" give "f.s0.x.$2",
 // "f.s0.x.$3", ...
@@ -40,4 +40,4 @@ LoopName decode_loop_name(const std::string& loop);
 // `"x" of "f"`, with the stage when it is an update.
 std::string describe_loop(const std::string& loop);
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::lower

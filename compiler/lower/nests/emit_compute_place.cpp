@@ -9,7 +9,7 @@
 #include "lower/nests/promised_bounds.h"
 #include "simplify/simplify.h"
 
-namespace retrograde::ir {
+namespace retrograde::lower {
 
 // A Func whose values nothing reads here is not computed, also when others run with it elsewhere.
 std::vector<int> NestEmitter::needed_of(const FusedGroup& group, const Emitted& code) const {
@@ -213,4 +213,4 @@ Box NestEmitter::output_box(const LoopedFunc& f, const Box& read) {
   return buffer_box(value_buffer_name(*f.func, 0), f.func->dimensions());
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::lower

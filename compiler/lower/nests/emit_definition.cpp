@@ -9,7 +9,7 @@
 #include "simplify/cse.h"
 #include "simplify/simplify.h"
 
-namespace retrograde::ir {
+namespace retrograde::lower {
 namespace {
 
 bool is_comparison(const Expr& e) {
@@ -128,4 +128,4 @@ bool never_stores(const LoopedFunc& f, int stage, const Requirements& uses) {
   return f.stages[stage].predicate.defined() && !uses.count(f.name());
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::lower

@@ -13,7 +13,7 @@
 #include "lower/nests/build_loop_nests.h"
 #include "lower/nests/stage_nest.h"
 
-namespace retrograde::ir {
+namespace retrograde::lower {
 
 // if (guards && predicate) { lets; Provide }
 Stmt emit_definition(const LoopedFunc& f, int stage, const StageNest& nest);
@@ -35,4 +35,4 @@ Box read_inside(const LoopedFunc& f, int stage, const Domain& domain, const Valu
 // computed anywhere.
 bool never_stores(const LoopedFunc& f, int stage, const Requirements& uses);
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::lower

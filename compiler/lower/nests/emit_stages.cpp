@@ -13,7 +13,7 @@
 #include "lower/nests/specialize.h"
 #include "simplify/simplify.h"
 
-namespace retrograde::ir {
+namespace retrograde::lower {
 
 namespace {
 
@@ -238,4 +238,4 @@ Emitted NestEmitter::emit_stage(const FusedNest& nest, std::vector<NestStage>& s
   return code;
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::lower

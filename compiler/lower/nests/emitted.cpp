@@ -3,7 +3,7 @@
 #include "ir/build.h"
 #include "simplify/simplify.h"
 
-namespace retrograde::ir {
+namespace retrograde::lower {
 
 void map_boxes(Needs& needs, const std::function<Box(const Box&)>& map) {
   for (auto& [name, use] : needs.uses) use.box = map(use.box);
@@ -65,4 +65,4 @@ void wrap(const Loop& loop, Emitted& code) {
   code.has_vectors |= loop.runs == ForType::Vectorized;
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::lower

@@ -10,7 +10,7 @@
 #include "lower/nests/build_loop_nests.h"
 #include "lower/nests/stage_nest.h"
 
-namespace retrograde::ir {
+namespace retrograde::lower {
 
 // Boxes of what a statement reads and of what is computed in it. They speak of names that are bound
 // outside the statement, except for `unranged` loops, over which they are still to be extended.
@@ -56,4 +56,4 @@ void wrap(const Loop& loop, Emitted& code);
 
 Box simplified(Box box);
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::lower

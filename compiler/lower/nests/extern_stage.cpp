@@ -7,7 +7,7 @@
 #include "ir/visit.h"
 #include "lower/runtime_call.h"
 
-namespace retrograde::ir {
+namespace retrograde::lower {
 
 namespace {
 
@@ -222,4 +222,4 @@ ExternStage emit_extern_stage(const Program& program, const LoopedFunc& f, const
   return Emitter(program, f, region).emit();
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::lower

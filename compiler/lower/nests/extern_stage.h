@@ -20,7 +20,7 @@
 #include "lower/nests/stage_nest.h"
 #include "lower/program.h"
 
-namespace retrograde::ir {
+namespace retrograde::lower {
 
 struct ExternStage {
   Stmt call;
@@ -35,4 +35,4 @@ Expr packed_buffer(Type type, const Expr& host, const std::vector<Range>& region
 // `region`: what is to be computed, by the Func's args.
 ExternStage emit_extern_stage(const Program& program, const LoopedFunc& f, const Domain& region);
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::lower

@@ -6,7 +6,7 @@
 #include "diagnostics/error.h"
 #include "lower/nests/fusing_checks.h"
 
-namespace retrograde::ir {
+namespace retrograde::lower {
 
 namespace {
 
@@ -209,4 +209,4 @@ FusedGroup part_of(const FusedGroup& group, const std::vector<int>& kept) {
   return result;
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::lower

@@ -15,7 +15,7 @@
 
 #include "lower/program.h"
 
-namespace retrograde::ir {
+namespace retrograde::lower {
 
 struct FusedStage {
   int func = 0;  // in Program::funcs
@@ -49,4 +49,4 @@ std::vector<FusedGroup> fused_groups(const Program& program);
 // alone.
 FusedGroup part_of(const FusedGroup& group, const std::vector<int>& kept);
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::lower

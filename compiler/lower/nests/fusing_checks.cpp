@@ -9,7 +9,7 @@
 #include "ir/visit.h"
 #include "lower/nests/specialize.h"
 
-namespace retrograde::ir {
+namespace retrograde::lower {
 
 namespace {
 
@@ -335,4 +335,4 @@ void check_groups_have_order(const Program& program, const std::vector<FusedGrou
              text(needs, ", which need ", names_of(again), " again"), "Drop one compute_with");
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::lower

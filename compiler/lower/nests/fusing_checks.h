@@ -5,7 +5,7 @@
 
 #include "lower/nests/fused_groups.h"
 
-namespace retrograde::ir {
+namespace retrograde::lower {
 
 // One compute_with: a stage runs in `depth` outermost loops of another.
 struct Joining {
@@ -40,4 +40,4 @@ void check_group(const Program& program, const FusedGroup& group);
 // Funcs that the definitions of f call, in first-use order.
 std::vector<int> callees_of(const Program& program, int f);
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::lower

@@ -13,7 +13,7 @@
 #include "lower/nests/resolve_undef.h"
 #include "lower/nests/strict_indices.h"
 
-namespace retrograde::ir {
+namespace retrograde::lower {
 
 std::string value_buffer_name(const FuncContents& f, int index) {
   return f.types.size() == 1 ? f.name : f.name + "." + std::to_string(index);
@@ -122,4 +122,4 @@ Program inline_functions(const std::vector<FuncPtr>& unwrapped) {
   return program;
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::lower

@@ -13,8 +13,8 @@
 
 #include "lower/program.h"
 
-namespace retrograde::ir {
+namespace retrograde::lower {
 
 Program inline_functions(const std::vector<FuncPtr>& outputs);
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::lower

@@ -6,7 +6,7 @@
 #include "ir/build.h"
 #include "lower/nests/copy_statement.h"
 
-namespace retrograde::ir {
+namespace retrograde::lower {
 namespace {
 
 using Renamings = std::unordered_map<std::string, std::string>;  // those in force
@@ -115,4 +115,4 @@ UniqueNames make_names_unique(const Stmt& s) {
   return {stmt, std::move(uniquifier.original)};
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::lower

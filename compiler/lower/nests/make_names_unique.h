@@ -16,7 +16,7 @@
 
 #include "ir/expr.h"
 
-namespace retrograde::ir {
+namespace retrograde::lower {
 
 struct UniqueNames {
   Stmt stmt;
@@ -24,4 +24,4 @@ struct UniqueNames {
 };
 UniqueNames make_names_unique(const Stmt& s);
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::lower

@@ -5,7 +5,7 @@
 #include "retrograde_runtime.h"
 #include "simplify/simplify.h"
 
-namespace retrograde::ir {
+namespace retrograde::lower {
 
 std::string consumers_of(const Program& program, const LoopedFunc& f) {
   std::string names;
@@ -132,4 +132,4 @@ Stmt storage_check(const LoopedFunc& f, int d, const Expr& needed, const Expr& p
                         " are needed. Pass a larger extent to bound_storage.");
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::lower

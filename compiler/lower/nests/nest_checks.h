@@ -5,7 +5,7 @@
 #include "lower/nests/build_loop_nests.h"
 #include "lower/nests/stage_nest.h"
 
-namespace retrograde::ir {
+namespace retrograde::lower {
 
 // Funcs whose definitions read f, quoted, for messages.
 std::string consumers_of(const Program& program, const LoopedFunc& f);
@@ -25,4 +25,4 @@ Stmt bound_check(const LoopedFunc& f, int d, const Interval& required, const Int
 Stmt fold_check(const LoopedFunc& f, int d, const Expr& touched, const Expr& factor);
 Stmt storage_check(const LoopedFunc& f, int d, const Expr& needed, const Expr& promised);
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::lower

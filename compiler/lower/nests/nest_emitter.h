@@ -17,7 +17,7 @@
 #include "lower/nests/stage_nest.h"
 #include "lower/nests/value_bounds.h"
 
-namespace retrograde::ir {
+namespace retrograde::lower {
 
 class NestEmitter {
  public:
@@ -119,4 +119,4 @@ class NestEmitter {
                      ComputePlace& home);
 };
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::lower

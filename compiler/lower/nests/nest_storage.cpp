@@ -8,7 +8,7 @@
 #include "lower/nests/nest_checks.h"
 #include "simplify/simplify.h"
 
-namespace retrograde::ir {
+namespace retrograde::lower {
 
 namespace {
 
@@ -202,4 +202,4 @@ Stmt NestStorage::realize_stored(Emitted& code,
   return stmt;
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::lower

@@ -12,7 +12,7 @@
 #include "lower/nests/emitted.h"
 #include "lower/nests/storage_folding.h"
 
-namespace retrograde::ir {
+namespace retrograde::lower {
 
 // Loops between the site and the storage of f, innermost first.
 std::vector<Loop> loops_to_storage(const LoopedFunc& f, const ComputePlace& site);
@@ -33,7 +33,7 @@ class NestStorage {
   // Whether anything is stored at a loop.
   bool is_site(const LoopedFunc& f, const Loop& loop) const;
   // Allocates around the statement what is stored at this level, which it has in `storage`.
-  Stmt realize_stored(Emitted& code, const std::function<bool(const LoopLevel&)>& is_here);
+  Stmt realize_stored(Emitted& code, const std::function<bool(const graph::LoopLevel&)>& is_here);
   // The Func whose storage an entry of Emitted::storage is, or is the place of.
   const LoopedFunc* stored_func(const std::string& name) const;
 
@@ -49,4 +49,4 @@ class NestStorage {
   void note_folds(const LoopedFunc& f, std::vector<Fold> folds);
 };
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::lower

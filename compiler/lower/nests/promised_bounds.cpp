@@ -7,7 +7,7 @@
 #include "lower/nests/nest_checks.h"
 #include "simplify/simplify.h"
 
-namespace retrograde::ir {
+namespace retrograde::lower {
 
 namespace {
 
@@ -37,4 +37,4 @@ void apply_promised_bounds(const LoopedFunc& f, Box& box, std::vector<Stmt>& che
   }
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::lower

@@ -4,7 +4,7 @@
 #include "graph/define.h"
 #include "graph/names.h"
 
-namespace retrograde::ir {
+namespace retrograde::lower {
 
 namespace {
 
@@ -121,4 +121,4 @@ void resolve_outermost_levels(Program& program) {
   }
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::lower

@@ -3,7 +3,7 @@
 
 #include "lower/program.h"
 
-namespace retrograde::ir {
+namespace retrograde::lower {
 
 // CompileError for schedules that contradict themselves; Unsupported for memory of devices.
 void refuse_unsupported(const Program& program);
@@ -15,4 +15,4 @@ void check_inlined(const FuncContents& f, const FuncPlacement& schedule);
 // Var::outermost() as a level means outside of all loops of the Func: where that one is computed.
 void resolve_outermost_levels(Program& program);
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::lower

@@ -10,7 +10,7 @@
 #include "ir/print.h"
 #include "ir/visit.h"
 
-namespace retrograde::ir {
+namespace retrograde::lower {
 
 namespace {
 
@@ -164,4 +164,4 @@ void resolve_undef(Program& program) {
   }
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::lower

@@ -9,8 +9,8 @@
 
 #include "lower/program.h"
 
-namespace retrograde::ir {
+namespace retrograde::lower {
 
 void resolve_undef(Program& program);
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::lower

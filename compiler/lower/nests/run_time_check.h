@@ -5,7 +5,7 @@
 
 #include "ir/build.h"
 
-namespace retrograde::ir {
+namespace retrograde::lower {
 
 // Unless it holds, the call fails with the code, and a message of these parts.
 template <class... Parts>
@@ -15,4 +15,4 @@ Stmt run_time_check(Expr holds, int code, Parts&&... message) {
       call_op(Op::error, Int(32), {Expr(int32_t{code}), Expr(std::forward<Parts>(message))...}));
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::lower

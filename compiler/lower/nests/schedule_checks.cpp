@@ -4,7 +4,7 @@
 #include "lower/nests/run_time_check.h"
 #include "retrograde_runtime.h"
 
-namespace retrograde::ir {
+namespace retrograde::lower {
 namespace {
 
 class SizeChecks {
@@ -54,4 +54,4 @@ std::vector<Stmt> schedule_checks(const Program& program) {
   return std::move(all.checks);
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::lower

@@ -9,9 +9,9 @@
 #include "ir/expr.h"
 #include "lower/program.h"
 
-namespace retrograde::ir {
+namespace retrograde::lower {
 
 // Assertions over parameters; none for what is constant, which the directives check.
 std::vector<Stmt> schedule_checks(const Program& program);
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::lower

@@ -10,7 +10,7 @@
 #include "ir/visit.h"
 #include "simplify/simplify.h"
 
-namespace retrograde::ir {
+namespace retrograde::lower {
 
 namespace {
 
@@ -93,4 +93,4 @@ std::vector<std::pair<std::string, Expr>> share_parameters(Program& program) {
   return std::move(sharer.names);
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::lower

@@ -19,9 +19,9 @@
 
 #include "lower/program.h"
 
-namespace retrograde::ir {
+namespace retrograde::lower {
 
 // Each may use those before it.
 std::vector<std::pair<std::string, Expr>> share_parameters(Program& program);
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::lower

@@ -7,7 +7,7 @@
 #include "ir/visit.h"
 #include "simplify/simplify.h"
 
-namespace retrograde::ir {
+namespace retrograde::lower {
 
 namespace {
 
@@ -256,4 +256,4 @@ void merge_strands(Emitted& code) {
   code.strands.clear();
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::lower

@@ -22,7 +22,7 @@
 #include "lower/nests/compute_place.h"
 #include "lower/nests/emitted.h"
 
-namespace retrograde::ir {
+namespace retrograde::lower {
 
 // Loops around a statement, innermost first; what is known of the names in their ranges.
 struct SharedLoops {
@@ -47,4 +47,4 @@ void gather_storage(Emitted& code, SharedLoops around, size_t inner,
 // No loops are shared any more.
 void merge_strands(Emitted& code);
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::lower

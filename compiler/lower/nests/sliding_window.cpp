@@ -9,7 +9,7 @@
 #include "ir/visit.h"
 #include "simplify/simplify.h"
 
-namespace retrograde::ir {
+namespace retrograde::lower {
 
 BoundsMap facts_of(const std::vector<Loop>& loops) {
   BoundsMap facts;
@@ -196,4 +196,4 @@ std::vector<Slide> slides_of(const LoopedFunc& f, const Box& box, const std::vec
   return slides;
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::lower

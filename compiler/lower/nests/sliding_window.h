@@ -22,7 +22,7 @@
 #include "lower/nests/stage_nest.h"
 #include "simplify/simplify.h"
 
-namespace retrograde::ir {
+namespace retrograde::lower {
 
 // What is known of the variables of `loops`.
 BoundsMap facts_of(const std::vector<Loop>& loops);
@@ -42,4 +42,4 @@ struct Slide {
 std::vector<Slide> slides_of(const LoopedFunc& f, const Box& box, const std::vector<Loop>& loops,
                              const std::vector<Loop>& around, int lead);
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::lower

@@ -8,7 +8,7 @@
 #include "retrograde_runtime.h"
 #include "simplify/simplify.h"
 
-namespace retrograde::ir {
+namespace retrograde::lower {
 namespace {
 
 // A condition that is known, taken apart.
@@ -101,4 +101,4 @@ Stmt fail_specialized(const LoopedFunc& f, const std::string& message) {
                              ". Pass arguments that one of them fits, or drop specialize_fail."));
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::lower

@@ -15,7 +15,7 @@
 
 #include "lower/program.h"
 
-namespace retrograde::ir {
+namespace retrograde::lower {
 
 struct Variant {
   Expr condition;       // of this one, when none before it held; undefined: always
@@ -33,4 +33,4 @@ std::vector<const StageLoops*> schedules_of(const StageLoops& schedule);
 // What a call reports that comes to a specialize_fail.
 Stmt fail_specialized(const LoopedFunc& f, const std::string& message);
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::lower

@@ -8,7 +8,7 @@
 #include "lower/program.h"
 #include "simplify/simplify.h"
 
-namespace retrograde::ir {
+namespace retrograde::lower {
 
 Interval Loop::range() const { return {min, simplify(min + extent - 1)}; }
 
@@ -243,4 +243,4 @@ bool covers_exactly(const LoopedFunc& f, int stage, const std::string& var, cons
          can_prove(reached.max < first + extent, facts);
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::lower

@@ -14,7 +14,7 @@
 #include "ir/visit.h"
 #include "lower/program.h"
 
-namespace retrograde::ir {
+namespace retrograde::lower {
 
 struct Loop {
   std::string var;   // as the user names it: "xo"
@@ -45,4 +45,4 @@ StageNest build_stage_nest(const LoopedFunc& f, int stage, const Domain& domain)
 // beyond.
 bool covers_exactly(const LoopedFunc& f, int stage, const std::string& var, const Expr& extent);
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::lower

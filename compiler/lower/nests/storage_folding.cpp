@@ -9,7 +9,7 @@
 #include "ir/visit.h"
 #include "simplify/simplify.h"
 
-namespace retrograde::ir {
+namespace retrograde::lower {
 namespace {
 
 constexpr int64_t largest_fold = 1024;
@@ -95,4 +95,4 @@ std::vector<Fold> folds_of(const LoopedFunc& f, const std::vector<FoldingLoop>& 
   return Folder(f, slides, around, is_vectorized).over(loops);
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::lower

@@ -18,7 +18,7 @@
 
 #include "lower/nests/sliding_window.h"
 
-namespace retrograde::ir {
+namespace retrograde::lower {
 
 // A loop between computation and storage, with what one iteration of it touches.
 struct FoldingLoop {
@@ -36,4 +36,4 @@ std::vector<Fold> folds_of(const LoopedFunc& f, const std::vector<FoldingLoop>& 
                            const std::vector<Slide>& slides, const std::vector<Loop>& around,
                            bool is_vectorized);
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::lower

@@ -7,7 +7,7 @@
 #include "ir/build.h"
 #include "ir/visit.h"
 
-namespace retrograde::ir {
+namespace retrograde::lower {
 
 namespace {
 
@@ -63,4 +63,4 @@ void make_indices_strict(Program& program) {
   }
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::lower

@@ -17,8 +17,8 @@
 
 #include "lower/program.h"
 
-namespace retrograde::ir {
+namespace retrograde::lower {
 
 void make_indices_strict(Program& program);
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::lower

@@ -4,7 +4,7 @@
 
 #include "ir/visit.h"
 
-namespace retrograde::ir {
+namespace retrograde::lower {
 namespace {
 
 // What an end may not mention outside of its definition: coordinates.
@@ -51,4 +51,4 @@ ValueBounds value_bounds(const Program& program) {
   return known;
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::lower

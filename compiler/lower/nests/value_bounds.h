@@ -9,8 +9,8 @@
 #include "analysis/interval.h"
 #include "lower/program.h"
 
-namespace retrograde::ir {
+namespace retrograde::lower {
 
 ValueBounds value_bounds(const Program& program);
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::lower

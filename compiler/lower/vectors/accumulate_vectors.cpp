@@ -35,7 +35,7 @@
 #include "lower/statement_rewriter.h"
 #include "lower/vectors/reductions.h"
 
-namespace retrograde::ir {
+namespace retrograde::lower {
 
 namespace {
 
@@ -286,4 +286,4 @@ Stmt accumulate_vectors(const Stmt& all) {
   });
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::lower

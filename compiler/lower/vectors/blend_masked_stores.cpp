@@ -38,7 +38,7 @@
 #include "lower/vectors/widen_expr.h"
 #include "simplify/simplify.h"
 
-namespace retrograde::ir {
+namespace retrograde::lower {
 
 namespace {
 
@@ -262,4 +262,4 @@ class BlendMaskedStores : public Rewriter {
 
 Stmt blend_masked_stores(const Stmt& s) { return s.defined() ? BlendMaskedStores()(s) : s; }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::lower

@@ -23,7 +23,7 @@
 #include "ir/visit.h"
 #include "lower/vectors/strided_loads.h"
 
-namespace retrograde::ir {
+namespace retrograde::lower {
 
 namespace {
 
@@ -107,4 +107,4 @@ class LoadSharer : public Rewriter {
 
 Stmt deinterleave_loads(const Stmt& s) { return s.defined() ? LoadSharer()(s) : s; }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::lower

@@ -37,7 +37,7 @@
 #include "lower/nests/copy_statement.h"
 #include "simplify/simplify.h"
 
-namespace retrograde::ir {
+namespace retrograde::lower {
 
 namespace {
 
@@ -417,4 +417,4 @@ class Interleaver : public Rewriter {
 
 Stmt interleave_vectors(const Stmt& s) { return s.defined() ? Interleaver(s)(s) : s; }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::lower

@@ -4,7 +4,7 @@
 #include "diagnostics/error.h"
 #include "ir/build.h"
 
-namespace retrograde::ir {
+namespace retrograde::lower {
 
 namespace {
 
@@ -32,4 +32,4 @@ Expr identity_of(Kind op, Type type) {
   return make_broadcast(scalar_identity(op, type.element_of()), type.lanes());
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::lower

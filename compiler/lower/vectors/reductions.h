@@ -3,9 +3,9 @@
 
 #include "ir/expr.h"
 
-namespace retrograde::ir {
+namespace retrograde::lower {
 
 // x op identity == x, bit for bit; a broadcast when the type has lanes.
 Expr identity_of(Kind op, Type type);
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::lower

@@ -3,7 +3,7 @@
 #include "ir/build.h"
 #include "simplify/simplify.h"
 
-namespace retrograde::ir {
+namespace retrograde::lower {
 
 namespace {
 
@@ -33,4 +33,4 @@ void add_to_family(StridedLoad load, std::vector<StridedFamily>& families) {
   families.push_back({load});
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::lower

@@ -7,7 +7,7 @@
 
 #include "ir/visit.h"
 
-namespace retrograde::ir {
+namespace retrograde::lower {
 
 struct StridedLoad {
   Expr load, base;
@@ -23,4 +23,4 @@ using StridedFamily = std::vector<StridedLoad>;
 // Into the family that it belongs to, or one of its own.
 void add_to_family(StridedLoad load, std::vector<StridedFamily>& families);
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::lower

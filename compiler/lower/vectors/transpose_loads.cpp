@@ -27,7 +27,7 @@
 #include "lower/statement_rewriter.h"
 #include "lower/vectors/strided_loads.h"
 
-namespace retrograde::ir {
+namespace retrograde::lower {
 
 namespace {
 
@@ -170,4 +170,4 @@ class Transposer : public StatementRewriter {
 
 Stmt transpose_loads(const Stmt& s) { return s.defined() ? Transposer(s)(s) : s; }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::lower

@@ -5,7 +5,7 @@
 #include "ir/build.h"
 #include "ir/visit.h"
 
-namespace retrograde::ir {
+namespace retrograde::lower {
 
 namespace {
 
@@ -169,4 +169,4 @@ Expr VectorStores::reduce(Kind kind, const Expr& term, const Expr& active) {
   return make_vector_reduce(kind, wide, lanes);
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::lower

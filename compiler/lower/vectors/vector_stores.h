@@ -13,7 +13,7 @@
 #include "lower/vectors/reductions.h"
 #include "lower/vectors/widen_expr.h"
 
-namespace retrograde::ir {
+namespace retrograde::lower {
 
 // What a loop body does to a buffer.
 struct BufferFacts {
@@ -53,4 +53,4 @@ class VectorStores {
   bool must_stay_serial_;
 };
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::lower

@@ -34,7 +34,7 @@
 #include "lower/statement_rewriter.h"
 #include "simplify/simplify.h"
 
-namespace retrograde::ir {
+namespace retrograde::lower {
 
 namespace {
 
@@ -268,4 +268,4 @@ Stmt vectorize_inner_loops(const Stmt& all, const InnerLoops& loops) {
   });
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::lower

@@ -5,7 +5,7 @@
 
 #include "ir/expr.h"
 
-namespace retrograde::ir {
+namespace retrograde::lower {
 
 struct InnerLoops {
   int vector_bytes = 32;
@@ -17,4 +17,4 @@ struct InnerLoops {
 // FlatStorage, after unrolling -> FlatStorage.
 Stmt vectorize_inner_loops(const Stmt& s, const InnerLoops& loops);
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::lower

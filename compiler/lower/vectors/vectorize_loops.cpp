@@ -39,7 +39,7 @@
 #include "lower/vectors/vector_stores.h"
 #include "simplify/simplify.h"
 
-namespace retrograde::ir {
+namespace retrograde::lower {
 
 namespace {
 
@@ -316,4 +316,4 @@ Stmt vectorize_loops(const Stmt& s) {
   return result.defined() ? result : make_evaluate(Expr(0));
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::lower

@@ -6,7 +6,7 @@
 
 #include "diagnostics/error.h"
 
-namespace retrograde::ir {
+namespace retrograde::lower {
 
 namespace {
 
@@ -372,4 +372,4 @@ Expr Widener::widen_shuffle(const Expr& e, const Shuffle& n) {
   return make_shuffle(std::move(vectors), std::move(indices));
 }
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::lower

@@ -13,7 +13,7 @@
 #include "ir/expr.h"
 #include "lower/nests/copy_statement.h"
 
-namespace retrograde::ir {
+namespace retrograde::lower {
 
 // Lanes [iteration*L, iteration*L + L) of a vector of N*L lanes.
 Expr extract_iteration(const Expr& wide, int iteration, int narrow_lanes);
@@ -84,4 +84,4 @@ class Widener {
   std::unordered_set<std::string> wide_allocations_, widened_lets_;
 };
 
-}  // namespace retrograde::ir
+}  // namespace retrograde::lower

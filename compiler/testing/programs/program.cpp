@@ -168,14 +168,14 @@ RandomProgram make_program(Choices& choices, const Style& style) {
   return program;
 }
 
-std::vector<ir::FuncPtr> outputs_of(const RandomProgram& program) {
-  std::vector<ir::FuncPtr> outputs;
+std::vector<graph::FuncPtr> outputs_of(const RandomProgram& program) {
+  std::vector<graph::FuncPtr> outputs;
   for (const Func& f : program.outputs) outputs.push_back(f.function());
   return outputs;
 }
 
 std::string to_text(const RandomProgram& program, const ScheduleLog& schedule) {
-  std::string result = ir::to_text(ir::graph_of(outputs_of(program)));
+  std::string result = graph::to_text(graph::graph_of(outputs_of(program)));
   if (schedule.size() > 0) result += "schedule\n" + schedule.to_text();
   for (const auto& run : program.runs) {
     for (size_t o = 0; o < run.size(); ++o) {

@@ -96,7 +96,7 @@ constexpr int natural_size = 5;
 // UserError: the program is no legal one.
 RandomProgram make_program(Choices& choices, const Style& style);
 
-std::vector<ir::FuncPtr> outputs_of(const RandomProgram& program);
+std::vector<graph::FuncPtr> outputs_of(const RandomProgram& program);
 
 // As text that opt reads: the graph; then the schedule, and the regions of each run.
 std::string to_text(const RandomProgram& program, const ScheduleLog& schedule = {});

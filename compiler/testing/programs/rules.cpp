@@ -114,7 +114,7 @@ void Maker::add_custom() {
   f(vars) = Tuple(values);
   if (is_sine) return give_closed_rule(f, source);
   std::vector<AdjointInput> inputs;
-  const auto parameters = ir::parameters_of({source.function()});
+  const auto parameters = graph::parameters_of({source.function()});
   auto add = [&](const AdjointInput& input) {
     const bool is_read = std::any_of(parameters.begin(), parameters.end(), [&](const auto& p) {
       return p.get() == input.symbol().get();

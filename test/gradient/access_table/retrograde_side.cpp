@@ -19,14 +19,14 @@ static bool depends_on_reduction(const Expr& e) {
   ir::walk(e, [&](const Expr& node) {
     const auto* v = node.as<ir::Variable>();
     const auto* call = node.as<ir::Call>();
-    found |= v && dynamic_cast<ir::ReductionDomainContents*>(v->symbol.raw());
+    found |= v && dynamic_cast<graph::ReductionDomainContents*>(v->symbol.raw());
     found |= call && call->call_type != ir::CallType::Operator;
     return !found;
   });
   return found;
 }
 static long iterations_of(const RVar& r) {
-  auto n = ir::as_const_int(ir::simplify(r.extent()));
+  auto n = ir::as_const_int(simplification::simplify(r.extent()));
   return n ? static_cast<long>(*n) : -1;
 }
 

@@ -106,10 +106,10 @@ class AutoScheduled {
   }
 
   Pipeline copy() const {
-    std::vector<ir::FuncPtr> functions;
+    std::vector<graph::FuncPtr> functions;
     for (const Func& f : outputs_) functions.push_back(f.function());
     std::vector<Func> result;
-    for (const ir::FuncPtr& f : ir::copy_graph(functions).outputs) result.emplace_back(f);
+    for (const graph::FuncPtr& f : graph::copy_graph(functions).outputs) result.emplace_back(f);
     return Pipeline(result);
   }
 

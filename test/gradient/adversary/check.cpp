@@ -116,7 +116,7 @@ class Judge {
   // The adjoint of a Func against the tangent of what comes after it.
   void compare_along_func() {
     if (p_.funcs.size() < 2) return;
-    const std::vector<ir::FuncPtr> order = ir::topological_order({p_.output().function()});
+    const std::vector<graph::FuncPtr> order = graph::topological_order({p_.output().function()});
     const Func f = p_.funcs[static_cast<size_t>(s_.weights.next() > 0) * (p_.funcs.size() - 2)];
     if (std::find(order.begin(), order.end(), f.function()) == order.end()) return;
     for (const Type& t : f.types()) {
@@ -134,15 +134,16 @@ class Judge {
   }
   // What is read of f; none when it has no constant bounds or is never read.
   std::optional<oracle::Region> region_of(const Func& f,
-                                          const std::vector<ir::FuncPtr>& order) const {
-    ir::Box box;
-    for (const Range& r : s_.bounds()) box.push_back({r.min, ir::simplify(r.min + r.extent - 1)});
-    const ir::Regions regions(order, box);
+                                          const std::vector<graph::FuncPtr>& order) const {
+    analysis::Box box;
+    for (const Range& r : s_.bounds())
+      box.push_back({r.min, simplification::simplify(r.min + r.extent - 1)});
+    const autodiff::Regions regions(order, box);
     oracle::Region region;
     for (const ir::Interval& side : regions.of(f.function().get())) {
       if (!side.is_bounded()) return {};
-      const auto low = ir::as_const_int(ir::simplify(side.min)),
-                 high = ir::as_const_int(ir::simplify(side.max));
+      const auto low = ir::as_const_int(simplification::simplify(side.min)),
+                 high = ir::as_const_int(simplification::simplify(side.max));
       if (!low || !high || *high < *low || *high - *low > 4096) return {};
       region.mins.push_back(static_cast<int>(*low));
       region.extents.push_back(static_cast<int>(*high - *low + 1));

@@ -19,7 +19,7 @@ double extrapolated(const double (&slopes)[3], double first, double second) {
 }
 
 void for_each_node(const Func& output, ir::FunctionRef<void(const Expr&)> visit) {
-  for (const ir::FuncPtr& f : ir::topological_order({output.function()}))
+  for (const graph::FuncPtr& f : graph::topological_order({output.function()}))
     walk(*f, [&](const Expr& e) { return visit(e), true; });
 }
 

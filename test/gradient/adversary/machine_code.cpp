@@ -92,7 +92,7 @@ class Compiled {
   // A copy of the gradient, with a schedule for those of the Funcs that it is made of.
   static Func scheduled(const std::pair<Func, oracle::Region>& gradient,
                         const std::vector<Func>& funcs, Choices& choices) {
-    const ir::GraphCopy copy = ir::copy_graph({gradient.first.function()});
+    const graph::GraphCopy copy = graph::copy_graph({gradient.first.function()});
     fuzz::RandomProgram program;
     program.outputs = {Func(copy.outputs[0])};
     program.runs = {{gradient.second}};

@@ -169,9 +169,9 @@ Buffer<> room_for(const Type& type, const oracle::Region& region) {
 
 bool uses_fast_functions(const Func& output) {
   bool found = false;
-  for (const ir::FuncPtr& f : ir::topological_order({output.function()})) {
+  for (const graph::FuncPtr& f : graph::topological_order({output.function()})) {
     for (int s = 0; s < f->stage_count(); ++s) {
-      ir::for_each_expr(f->stage(s), [&](const Expr& root) {
+      graph::for_each_expr(f->stage(s), [&](const Expr& root) {
         ir::walk(root, [&](const Expr& e) {
           const auto* call = e.as<ir::Call>();
           found |= call && call->call_type == ir::CallType::Operator &&

@@ -48,10 +48,10 @@ using Gradient = std::array<Expr, leaf_count>;  // undefined: 0
 
 Gradient by_reverse_sweep(const Expr& e) {
   Gradient result;
-  const auto swept = ir::sweep_reverse(
+  const auto swept = autodiff::sweep_reverse(
       {e}, {ir::make_one(e.type())}, [](const Expr&) { return true; },
       [](const Expr&) { return false; });
-  for (const ir::LeafAdjoint& leaf : swept.leaves)
+  for (const autodiff::LeafAdjoint& leaf : swept.leaves)
     result[static_cast<size_t>(leaf.leaf.as<ir::Variable>()->name[0] - 'x')] = leaf.adjoint;
   return result;
 }
@@ -63,7 +63,8 @@ Gradient by_forward_sweep(const Expr& e) {
       const auto* v = leaf.as<ir::Variable>();
       return v && v->name == leaf_names[k] ? ir::make_one(leaf.type()) : Expr();
     };
-    result[k] = ir::sweep_forward({e}, seed, [](const Expr&) { return false; }).tangents.front();
+    result[k] =
+        autodiff::sweep_forward({e}, seed, [](const Expr&) { return false; }).tangents.front();
   }
   return result;
 }

@@ -201,8 +201,8 @@ class Evaluation {
 }  // namespace
 
 TrueGradient true_gradient(const Expr& any, const Place& at, uint64_t seed) {
-  const Expr e = ir::with_equal_nodes_shared({any}).front();
-  const std::vector<Expr> order = ir::post_order({e});
+  const Expr e = autodiff::with_equal_nodes_shared({any}).front();
+  const std::vector<Expr> order = autodiff::post_order({e});
   TrueGradient result;
   Evaluation exact(order, at, 0, seed);
   if (!exact.run()) return result;

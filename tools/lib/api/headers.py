@@ -1,9 +1,9 @@
 """Names and requirements: what the headers declare, and what their comments say of it.
 
-Names are what stands in namespace retrograde outside of `ir` and `detail`. Each is explained by the comment
-above or behind it, else by the one above its group of lines, else by the header's title. Requirements stand in
-comments behind "Requires:", a rule after the other, with the kind of the error in parentheses where it is no
-CompileError:
+Names are what stands in namespace retrograde outside of the rooms of `ir/rooms.h` and `detail`. Each is explained
+by the comment above or behind it, else by the one above its group of lines, else by the header's title.
+Requirements stand in comments behind "Requires:", a rule after the other, with the kind of the error in parentheses
+where it is no CompileError:
 
     // Takes one row. Requires: a crop or slice lies inside the buffer; it must have memory (RuntimeError).
 """
@@ -13,7 +13,8 @@ from api.choices import (HEADER_FOLDERS, INTERNAL_HEADERS, INTERNAL_NAMES, INTER
                          SHOWN_BY)
 from api.cpp_text import TOKEN, closing, one_line, without_comments
 
-HIDDEN_SPACES = {"ir", "detail", "oracle"}
+HIDDEN_SPACES = {"ir", "simplification", "analysis", "graph", "frontend", "autoschedule", "autodiff", "lower",
+                 "checks", "detail", "oracle"}
 PREPROCESSOR = re.compile(r"^[ \t]*#(?:.*\\\n)*.*$", re.M)
 OPERATOR = re.compile(r"\boperator\s*(\(\)|\[\]|[^\s\w(]+)\s*\(")
 SECTION = re.compile(r"-{3,}\s*(.*?)\s*-{3,}$")
