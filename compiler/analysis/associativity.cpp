@@ -161,8 +161,7 @@ class Prover {
 
   // The group and all that have an unknown in common with it: x -> a x + b composes only as a pair.
   std::vector<int> with_sharing(const std::vector<std::vector<int>>& groups, size_t k) const {
-    std::vector<Component> components;
-    for (const auto& group : groups) components.push_back(component(group));
+    const auto components = mapped(groups, [&](const auto& group) { return component(group); });
     std::vector<bool> taken(groups.size());
     std::vector<size_t> queue{k};
     taken[k] = true;

@@ -71,8 +71,7 @@ int as_atom(const Polynomial& p) {
 
 Order CaseFacts::order(int a, int b) const {
   if (a == b) return Order::Equal;
-  const auto found = orders_.find({a, b});
-  return found == orders_.end() ? Order::Unknown : found->second;
+  return value_or(orders_, {a, b}, Order::Unknown);
 }
 
 bool CaseFacts::set(int a, int b, Order order) {
@@ -148,8 +147,7 @@ bool LawEvaluator::equal(const LawValue& a, const LawValue& b) const {
 }
 
 const LawValue& LawEvaluator::get(const Expr& e) {
-  const auto found = memo_.find(e.get());
-  if (found != memo_.end()) return found->second;
+  if (const auto* found = find_or_null(memo_, e.get())) return *found;
   LawValue result = evaluate(e);
   return memo_[e.get()] = std::move(result);
 }

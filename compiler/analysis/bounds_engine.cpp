@@ -371,9 +371,8 @@ void BoundsEngine::narrow_nonpositive(const Sum& form, Narrowed& narrowed) {
       Expr numerator = to_expr(limit);
       if (numerator.defined()) implied.min = canonical_div(numerator, -c);
     }
-    auto it = narrowed.variables.find(v->name);
     narrowed.variables[v->name] =
-        intersection(it == narrowed.variables.end() ? *old : it->second, implied);
+        intersection(value_or(narrowed.variables, v->name, *old), implied);
   }
   if (loose > 1) narrowed.facts.push_back(form);
 }

@@ -154,18 +154,16 @@ class Laws {
     LawEnvironment environment;
     bind_values(environment, component_.xs, x);
     bind_values(environment, component_.ys, y);
-    Values result;
-    for (const Expr& value : candidate_.values) result.push_back(e.value(value, environment));
-    return result;
+    return mapped(candidate_.values,
+                  [&](const Expr& value) { return e.value(value, environment); });
   }
 
   Values update(LawEvaluator& e, const Values& x) const {
     LawEnvironment environment;
     bind_values(environment, component_.xs, x);
     bind_values(environment, g_names_, values(e, g_));
-    Values result;
-    for (const Expr& value : component_.update) result.push_back(e.value(value, environment));
-    return result;
+    return mapped(component_.update,
+                  [&](const Expr& value) { return e.value(value, environment); });
   }
 
   static bool same(LawEvaluator& e, const Values& a, const Values& b) {

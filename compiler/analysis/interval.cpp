@@ -76,8 +76,7 @@ class FootprintCollector {
   }
 
   void add(const Call& call, BoundsEngine& engine) {
-    Box box;
-    for (const Expr& arg : call.args) box.push_back(engine.bounds(arg));
+    Box box = mapped(call.args, [&](const Expr& arg) { return engine.bounds(arg); });
     Footprint& footprint = found_[call.name];
     footprint.box = hull(footprint.box, box);
     footprint.is_image = call.call_type == CallType::Image;

@@ -118,7 +118,7 @@ class Point {
   // does not vary is read from what is complete.
   Sum atom(const Expr& e) {
     Known& known = uses_any_variable(e, varying_) ? own_ : shared_;
-    if (const auto found = known.find(e); found != known.end()) return found->second;
+    if (const auto* found = find_or_null(known, e)) return *found;
     const Sum sum = new_atom(e);
     return known.emplace(e, sum).first->second;
   }

@@ -70,10 +70,9 @@ std::string statement_text(const Module& module) {
 }
 
 std::vector<aot::DeclaredFunction> declared_functions(const Module& module) {
-  std::vector<aot::DeclaredFunction> result;
-  for (const internal::LoweredFunc& function : aot::exported_functions(module))
-    result.push_back({function.name, aot::signature_of(function, module)});
-  return result;
+  return ir::mapped(aot::exported_functions(module), [&](const internal::LoweredFunc& function) {
+    return aot::DeclaredFunction{function.name, aot::signature_of(function, module)};
+  });
 }
 
 std::string page_text(const Module& module, const std::string& assembly) {

@@ -41,10 +41,9 @@ std::vector<std::pair<int64_t, int64_t>> constant_region(const Region& region) {
 
 ExportArgument export_argument(const Argument& argument,
                                const std::map<std::string, std::string>& names) {
-  const auto renamed = names.find(argument.name);
   const ArgumentEstimates& known = argument.argument_estimates;
   ExportArgument result;
-  result.name = renamed == names.end() ? argument.name : renamed->second;
+  result.name = ir::value_or(names, argument.name, argument.name);
   result.kind = static_cast<ExportArgument::Kind>(argument.kind);
   result.type = argument.type;
   result.dimensions = argument.dimensions;
@@ -88,8 +87,7 @@ codegen::Export export_of(const internal::LoweredFunc& function, const Module& m
   result.function = index;
   result.signature = signature_of(function, module);
   for (const ir::LoweredArgument& argument : function.lowered.args) {
-    const auto found = std::find_if(function.args.begin(), function.args.end(),
-                                    [&](const Argument& a) { return a.name == argument.name; });
+    const auto found = std::ranges::find(function.args, argument.name, &Argument::name);
     codegen::Source source;
     if (found == function.args.end()) {
       source.embedded = embedded_buffer(argument, function.name);

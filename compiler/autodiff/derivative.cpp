@@ -10,7 +10,6 @@
 #include "autodiff/sweeps/regions.h"
 #include "autodiff/sweeps/synthesis.h"
 #include "ir/build.h"
-#include "ir/lists.h"
 #include "simplify/simplify.h"
 
 namespace retrograde {

@@ -8,7 +8,6 @@
 #include "autodiff/tangents.h"
 #include "diagnostics/error.h"
 #include "ir/build.h"
-#include "ir/lists.h"
 #include "ir/visit.h"
 #include "simplify/simplify.h"
 

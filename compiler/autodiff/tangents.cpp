@@ -69,9 +69,8 @@ Func Tangents::operator()(const Func& func) const {
   const auto& order = result_->order;
   if (std::ranges::find(order, func.function()) == order.end())
     return Func(std::make_shared<FuncContents>());
-  auto found = result_->tangents.find(func.function().get());
-  return found == result_->tangents.end() ? Func(zero_tangent(*func.function()))
-                                          : Func(found->second);
+  const auto* found = ir::find_or_null(result_->tangents, func.function().get());
+  return Func(found ? *found : zero_tangent(*func.function()));
 }
 
 std::vector<Func> Tangents::funcs() const { return {result_->funcs.begin(), result_->funcs.end()}; }

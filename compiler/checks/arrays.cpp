@@ -77,10 +77,9 @@ analysis::Box box_of(const Shape& shape) {
 }
 
 Region region_of(const Shape& shape) {
-  Region region;
-  for (size_t d = 0; d < shape.mins.size(); ++d)
-    region.push_back({shape.mins[d], shape.extents[d]});
-  return region;
+  return ir::numbered(shape.mins.size(), [&](size_t d) {
+    return Range{shape.mins[d], shape.extents[d]};
+  });
 }
 
 std::optional<Shape> constant_shape(const analysis::Box& box) {
@@ -147,12 +146,10 @@ double held_by(Type type, double v) {
 Values realize(Func f, const Shape& shape) { return realize_values(std::move(f), shape)[0]; }
 
 std::vector<Values> realize_values(Func f, const Shape& shape) {
-  std::vector<Buffer<>> out;
-  for (Type t : f.types()) out.push_back(new_buffer(t, shape));
+  std::vector<Buffer<>> out = ir::mapped(f.types(), [&](Type t) { return new_buffer(t, shape); });
   f.realize(Realization(out));
-  std::vector<Values> result;
-  for (const Buffer<>& b : out) result.push_back(is_checkable(b.type()) ? values_of(b) : Values());
-  return result;
+  return ir::mapped(
+      out, [&](const Buffer<>& b) { return is_checkable(b.type()) ? values_of(b) : Values(); });
 }
 
 void Batch::add(const Func& f, const Shape& shape) {

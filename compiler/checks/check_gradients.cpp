@@ -191,8 +191,7 @@ class Checker {
     auto wide = widened_.parameters.find(p.get());
     if (wide == widened_.parameters.end()) return;
     Input bound = bind_wide(p, wide->second, asked());
-    if (std::find(own_inputs_.begin(), own_inputs_.end(), p) != own_inputs_.end())
-      inputs_.push_back(bound);
+    if (std::ranges::find(own_inputs_, p) != own_inputs_.end()) inputs_.push_back(bound);
   }
 
   // In double. Definitions say it where no rule of the user does.
@@ -339,10 +338,9 @@ class Checker {
     double most = 4;  // an adjoint that only rounds loses less than this
     for (auto f = order.rbegin(); f != order.rend(); ++f) {
       const double before = inherited[f->get()];
-      const auto found = errors.find(f->get());
-      const double error = found == errors.end() ? before : found->second;
+      const double error = ir::value_or(errors, f->get(), before);
       for (const FuncPtr& callee : direct_callees(**f)) worsen(inherited[callee.get()], error);
-      if (found == errors.end()) continue;
+      if (!errors.contains(f->get())) continue;
       double eps = std::numeric_limits<float>::epsilon();
       double lost = error / std::max(before, eps);
       report_.funcs.push_back({(*f)->name, error, lost});

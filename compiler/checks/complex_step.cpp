@@ -188,9 +188,7 @@ class Complexifier {
   }
 
   std::vector<Expr> real_args(const Call& c) {
-    std::vector<Expr> args;
-    for (const Expr& a : c.args) args.push_back(operand(a).re);
-    return args;
+    return ir::mapped(c.args, [&](const Expr& a) { return operand(a).re; });
   }
   Complex read(const Call& c) {
     const FuncPtr from = func_of(c);
@@ -228,8 +226,7 @@ class Complexifier {
   }
 
   Complex of_operator(const Call& c) {
-    std::vector<Complex> x;
-    for (const Expr& a : c.args) x.push_back(operand(a));
+    const std::vector<Complex> x = ir::mapped(c.args, [&](const Expr& a) { return operand(a); });
     switch (c.op) {
       case Op::exp:
         return exponential(x[0]);

@@ -19,11 +19,9 @@ constexpr size_t most_operations = 400, most_evaluations = 2'000'000;
 // Floating nodes, operands first, that do not read f itself; both arms of a selection are
 // evaluated.
 std::vector<Expr> operations_of(const Expr& value, const FuncContents& f) {
-  std::vector<Expr> result;
-  for (const Expr& e : autodiff::post_order({ir::without_lets(value)})) {
-    if (e.type().is_float() && !e.as<ir::FloatImm>() && !ir::calls(e, &f)) result.push_back(e);
-  }
-  return result;
+  return ir::filtered(autodiff::post_order({ir::without_lets(value)}), [&](const Expr& e) {
+    return e.type().is_float() && !e.as<ir::FloatImm>() && !ir::calls(e, &f);
+  });
 }
 
 // One definition of f at one element: all iterations of its reduction.

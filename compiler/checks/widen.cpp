@@ -111,8 +111,7 @@ class Widening {
   }
 
   Expr call(const Call& c, const Recurse& recurse) {
-    std::vector<Expr> args;
-    for (const Expr& a : c.args) args.push_back(recurse(a));
+    const std::vector<Expr> args = mapped(c.args, recurse);
     switch (c.call_type) {
       case CallType::Operator:
         return operation(c, args);

@@ -80,8 +80,7 @@ struct OwnLoads {
   std::vector<Expr> nodes;
 
   bool depends(const Expr& e) {
-    const auto found = known_.find(e.get());
-    if (found != known_.end()) return found->second;
+    if (const auto* found = ir::find_or_null(known_, e.get())) return *found;
     const auto* load = e.as<Load>();
     bool result = load && load->name == store_.name && equal(load->index, store_.index);
     if (result) nodes.push_back(e);

@@ -4,7 +4,6 @@
 #include "codegen/access.h"
 #include "diagnostics/error.h"
 #include "ir/build.h"
-#include "ir/lists.h"
 #include "ir/random.h"
 #include "retrograde_runtime.h"
 

@@ -52,8 +52,7 @@ FunctionGenerator::Task FunctionGenerator::outline(const Stmt& body, const std::
     storages.push_back(storage);
     captured.push_back(found->second.base);
   }
-  std::vector<llvm::Type*> fields;
-  for (Value* v : captured) fields.push_back(v->getType());
+  const auto fields = ir::mapped(captured, [&](Value* v) { return v->getType(); });
   auto* closure_type = llvm::StructType::get(e_.context(), fields);
   Value* closure = c_.entry_alloca(closure_type, 1, name + ".closure");
   for (unsigned i = 0; i < captured.size(); i++) {

@@ -89,8 +89,7 @@ void split_into_bitcode(llvm::Module& module, unsigned parts, const UsePart& use
   for (unsigned part = 0; part < parts; part++) {
     llvm::ValueToValueMapTy copies;
     const auto belongs_here = [&](const llvm::GlobalValue* value) {
-      const auto found = part_of.find(value);
-      return is_local_constant(*value) || (found == part_of.end() ? 0 : found->second) == part;
+      return is_local_constant(*value) || ir::value_or(part_of, value, 0) == part;
     };
     const std::unique_ptr<llvm::Module> copy = llvm::CloneModule(module, copies, belongs_here);
     erase_unused_constants(*copy);

@@ -35,12 +35,10 @@ Value* splat(Emitter& e, Value* scalar, int lanes) {
 }
 
 Value* iota(Emitter& e, llvm::Type* scalar, int lanes) {
-  std::vector<llvm::Constant*> values;
-  for (int i = 0; i < lanes; i++) {
-    values.push_back(scalar->isFloatingPointTy()
-                         ? llvm::ConstantFP::get(scalar, i)
-                         : llvm::ConstantInt::get(scalar, static_cast<uint64_t>(i)));
-  }
+  const std::vector<llvm::Constant*> values = ir::numbered(lanes, [&](int i) {
+    return scalar->isFloatingPointTy() ? llvm::ConstantFP::get(scalar, i)
+                                       : llvm::ConstantInt::get(scalar, static_cast<uint64_t>(i));
+  });
   (void)e;
   return lanes == 1 ? values[0] : llvm::ConstantVector::get(values);
 }
@@ -84,8 +82,7 @@ Value* pick_lanes(Emitter& e, const std::vector<Value*>& vectors, const std::vec
   const int lanes = lanes_of(vectors[0]);
   std::vector<int> used;
   for (int index : indices) {
-    if (std::find(used.begin(), used.end(), index / lanes) == used.end())
-      used.push_back(index / lanes);
+    if (std::ranges::find(used, index / lanes) == used.end()) used.push_back(index / lanes);
   }
   const auto vector = [&](size_t i) { return vectors[static_cast<size_t>(used[i])]; };
   Value* second = used.size() > 1 ? vector(1) : vector(0);

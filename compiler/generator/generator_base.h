@@ -253,8 +253,7 @@ void GeneratorBase::set_input(size_t i, const A& arg) {
 
 template <typename A>
 void GeneratorBase::set_input(size_t i, const std::vector<A>& args) {
-  std::vector<InputValue> values;
-  for (const A& arg : args) values.push_back(input_value(*find_input(i), arg));
+  auto values = ir::mapped(args, [&](const A& arg) { return input_value(*find_input(i), arg); });
   set_input_values(i, std::move(values));
 }
 

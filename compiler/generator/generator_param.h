@@ -228,9 +228,8 @@ internal::GeneratorParamBase::InCpp GeneratorParam<T>::in_cpp() const {
   if constexpr (is_text) {
     return {"std::string", internal::cpp_literal(value_), {}};
   } else if constexpr (std::is_enum_v<T>) {
-    std::vector<std::string> choices;
-    for (const auto& choice : choices_) choices.push_back(choice.first);
-    return {"", to_string(), choices};
+    return {"", to_string(),
+            ir::mapped(choices_, [&](const auto& choice) { return choice.first; })};
   } else if constexpr (std::is_same_v<T, Type>) {
     return {"::retrograde::Type", internal::cpp_type(value_), {}, "::retrograde::to_string"};
   } else if constexpr (std::is_same_v<T, LoopLevel>) {

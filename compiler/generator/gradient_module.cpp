@@ -18,10 +18,9 @@ namespace retrograde::internal {
 namespace {
 
 Region region_of(const ImageParam& image) {
-  Region region;
-  for (int d = 0; d < image.dimensions(); d++)
-    region.push_back({image.dim(d).min(), image.dim(d).extent()});
-  return region;
+  return ir::numbered(image.dimensions(), [&](int d) {
+    return Range{image.dim(d).min(), image.dim(d).extent()};
+  });
 }
 
 // Every output has one value, and at least one of them is of floats.
@@ -44,8 +43,7 @@ void check_differentiable(const std::vector<Func>& outputs, const std::string& g
 }
 
 Func zeros(const ImageParam& image) {
-  std::vector<Var> at;
-  for (int d = 0; d < image.dimensions(); d++) at.push_back(Var::implicit(d));
+  const auto at = ir::numbered(image.dimensions(), [&](int d) { return Var::implicit(d); });
   Func f("zeros");
   f(at) = cast(image.type(), 0);
   return f;

@@ -3,7 +3,6 @@
 #include "diagnostics/error.h"
 #include "graph/own_reads.h"
 #include "ir/build.h"
-#include "ir/lists.h"
 #include "ir/print.h"
 
 namespace retrograde::graph {

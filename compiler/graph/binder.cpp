@@ -24,8 +24,8 @@ ParameterPtr NamedEntities::buffer_of_fact(const std::string& name) const {
     const size_t at = name.rfind(fact);
     if (at == std::string::npos) continue;
     const std::string buffer = name.substr(0, at);
-    if (const auto found = parameters.find(buffer); found != parameters.end()) return found->second;
-    if (const auto found = outputs.find(buffer); found != outputs.end()) return found->second;
+    if (const auto* found = find_or_null(parameters, buffer)) return *found;
+    if (const auto* found = find_or_null(outputs, buffer)) return *found;
   }
   return nullptr;
 }

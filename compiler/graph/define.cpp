@@ -14,7 +14,6 @@
 #include "graph/names.h"
 #include "graph/own_reads.h"
 #include "ir/build.h"
-#include "ir/lists.h"
 #include "ir/literal.h"
 #include "ir/print.h"
 #include "ir/visit.h"
@@ -24,9 +23,7 @@ namespace retrograde::graph {
 namespace {
 
 std::string list(const std::vector<Expr>& exprs) {
-  std::string out = "(";
-  for (size_t i = 0; i < exprs.size(); i++) out += text(i ? ", " : "", exprs[i]);
-  return out + ")";
+  return "(" + listed(exprs, [](const Expr& e) { return text(e); }) + ")";
 }
 
 // What is being defined, for messages: "define "f"(x, r.x)".
@@ -446,10 +443,7 @@ void define_update(const FuncPtr& f, const std::vector<Expr>& raw_args,
   check_self_calls(site, names, pure);
 
   freeze(names);
-  std::vector<std::string> variables;
-  for (const std::string& name : pure) {
-    if (!name.empty()) variables.push_back(name);
-  }
+  auto variables = filtered(pure, [&](const std::string& name) { return !name.empty(); });
   if (domain) {
     for (const ReductionVariable& rvar : domain->vars) variables.push_back(rvar.var);
   }

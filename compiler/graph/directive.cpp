@@ -5,7 +5,6 @@
 #include "diagnostics/error.h"
 #include "graph/function.h"
 #include "ir/build.h"
-#include "ir/lists.h"
 
 namespace retrograde::graph {
 
@@ -200,9 +199,7 @@ Directive directive_of(const Split& split) {
 }
 
 std::vector<NamedLoop> loop_names(const std::vector<Dim>& loops) {
-  std::vector<NamedLoop> names;
-  for (const Dim& loop : loops) names.push_back(loop.var);
-  return names;
+  return mapped(loops, [](const Dim& loop) { return NamedLoop(loop.var); });
 }
 
 void add_loops(const StageLoops& schedule, const std::vector<Dim>& first,

@@ -20,10 +20,7 @@ double InlinedSizes::nodes(const FuncContents& f) const {
   double total = 0;
   for (int s = 0; s < f.stage_count(); ++s)
     walk_definition(f.stage(s), [&](const Expr&) { ++total; });
-  for (const auto& [callee, calls] : func_calls(f)) {
-    const auto found = nodes_.find(callee);
-    if (found != nodes_.end()) total += calls * found->second;
-  }
+  for (const auto& [callee, calls] : func_calls(f)) total += calls * value_or(nodes_, callee, 0);
   return total;
 }
 

@@ -5,7 +5,6 @@
 #include <mutex>
 #include <unordered_map>
 
-#include "ir/lists.h"
 #include "ir/visit.h"
 
 namespace retrograde::graph {

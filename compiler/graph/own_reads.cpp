@@ -4,7 +4,6 @@
 #include <unordered_set>
 
 #include "ir/equal.h"
-#include "ir/lists.h"
 
 namespace retrograde::graph {
 

@@ -80,10 +80,8 @@ class GraphPrinter {
   // ---- Funcs ----
 
   void print(const FuncContents& f) {
-    std::string args, types;
-    for (const std::string& arg : f.args) args += (args.empty() ? "" : ", ") + quote_name(arg);
-    for (const Type& type : f.types) types += ", " + to_string(type);
-    line("func ", quote_name(f.name), "(", args, ")", types.empty() ? "" : " " + types.substr(2));
+    line("func ", quote_name(f.name), "(", listed(f.args, quote_name), ")",
+         f.types.empty() ? "" : " ", listed(f.types, [](Type type) { return to_string(type); }));
     indented([&] {
       if (f.made) print(*f.made);
       if (f.extern_definition) print(*f.extern_definition);

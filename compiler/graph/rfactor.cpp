@@ -24,7 +24,6 @@
 #include "graph/reduction_leaves.h"
 #include "graph/rfactor.h"
 #include "ir/build.h"
-#include "ir/lists.h"
 #include "ir/memory_reads.h"
 #include "ir/print.h"
 #include "ir/visit.h"
@@ -208,11 +207,9 @@ class Factoring {
 
   // Conditions that hold for a whole partial result.
   std::vector<Expr> common_conditions() const {
-    std::vector<Expr> result;
-    for (const Expr& e : conjuncts_) {
-      if (!uses_removed(e) && !reads_memory(e, MemoryReads::Functions)) result.push_back(e);
-    }
-    return result;
+    return filtered(conjuncts_, [&](const Expr& e) {
+      return !uses_removed(e) && !reads_memory(e, MemoryReads::Functions);
+    });
   }
 
   // A coordinate may stand as it is when every value of the kept variables that passes the

@@ -8,7 +8,6 @@
 #include "graph/directive_choices.h"
 #include "graph/names.h"
 #include "graph/schedule_log.h"
-#include "ir/lists.h"
 #include "ir/print.h"
 #include "ir/text.h"
 #include "ir/visit.h"

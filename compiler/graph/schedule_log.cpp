@@ -17,7 +17,6 @@
 #include "graph/rfactor.h"
 #include "graph/wrappers.h"
 #include "ir/build.h"
-#include "ir/lists.h"
 #include "ir/text.h"
 #include "ir/visit.h"
 
@@ -162,7 +161,7 @@ class Replay {
   }
 
   FuncPtr func_or_none(const std::string& name) {
-    if (const auto made = made_.find(name); made != made_.end()) return made->second;
+    if (const auto* made = find_or_null(made_, name)) return *made;
     if (const std::string* same = in_log_.same_place(name, in_program_))
       return names_.funcs.at(*same);
     if (const auto* found = meant(names_.funcs, name, [](const auto& f) { return f.first; }))

@@ -11,7 +11,6 @@
 #include "graph/names.h"
 #include "graph/own_reads.h"
 #include "ir/build.h"
-#include "ir/lists.h"
 #include "ir/print.h"
 #include "ir/visit.h"
 

@@ -5,7 +5,6 @@
 #include <cmath>
 #include <limits>
 
-#include "ir/lists.h"
 #include "ir/print.h"
 #include "ir/scalar.h"
 #include "ir/visit.h"
@@ -373,9 +372,8 @@ Expr make_shuffle(std::vector<Expr> vectors, std::vector<int> indices) {
 
 Expr make_interleaved(const std::vector<Expr>& vectors) {
   const int count = static_cast<int>(vectors.size()), lanes = vectors[0].type().lanes();
-  std::vector<int> indices;
-  for (int i = 0; i < lanes * count; ++i) indices.push_back(i % count * lanes + i / count);
-  return make_shuffle(vectors, std::move(indices));
+  return make_shuffle(
+      vectors, numbered(lanes * count, [&](int i) { return i % count * lanes + i / count; }));
 }
 
 Expr make_vector_reduce(Kind op, Expr value, int result_lanes) {

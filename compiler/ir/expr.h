@@ -13,6 +13,7 @@
 #include <utility>
 #include <vector>
 
+#include "ir/lists.h"
 #include "ir/operators.h"
 #include "ir/type.h"
 

@@ -1,4 +1,4 @@
-// Lists made of lists.
+// Lists made of lists, and what a map knows. With expr.h: whoever works on expressions has them.
 #pragma once
 
 #include <functional>
@@ -11,21 +11,52 @@ namespace retrograde::ir {
 template <class List, class F>
 auto mapped(const List& list, F&& f) {
   std::vector<std::decay_t<decltype(std::invoke(f, *list.begin()))>> result;
+  result.reserve(list.size());
   for (const auto& one : list) result.push_back(std::invoke(f, one));
   return result;
 }
 
 // f(0), ..., f(count - 1)
-template <class F>
-auto numbered(size_t count, F&& f) {
+template <class Count, class F>
+auto numbered(Count count, F&& f) {
   std::vector<std::decay_t<decltype(f(count))>> result;
-  for (size_t i = 0; i < count; ++i) result.push_back(f(i));
+  for (Count i = 0; i < count; ++i) result.push_back(f(i));
+  return result;
+}
+
+// Those of which `f`, a function or a member, is true, in order.
+template <class List, class F>
+auto filtered(const List& list, F&& f) {
+  std::vector<std::decay_t<decltype(*list.begin())>> result;
+  for (const auto& one : list) {
+    if (std::invoke(f, one)) result.push_back(one);
+  }
   return result;
 }
 
 template <class T>
 void append(std::vector<T>& list, const std::vector<T>& more) {
   list.insert(list.end(), more.begin(), more.end());
+}
+
+template <class Map>
+auto keys_of(const Map& map) {
+  return mapped(map, &Map::value_type::first);
+}
+
+// The value of the key in the map; null when it has none.
+template <class Map>
+auto find_or_null(Map& map, const typename Map::key_type& key) {
+  const auto found = map.find(key);
+  return found == map.end() ? nullptr : &found->second;
+}
+
+// The same, or `otherwise`.
+template <class Map>
+typename Map::mapped_type value_or(const Map& map, const typename Map::key_type& key,
+                                   const typename Map::mapped_type& otherwise) {
+  const auto* found = find_or_null(map, key);
+  return found ? *found : otherwise;
 }
 
 }  // namespace retrograde::ir

@@ -14,7 +14,7 @@ class NodeMemo {
   // What is known of the node, or else what `find_out` gives, which may ask for others.
   template <class FindOut>
   T get(const Expr& e, const FindOut& find_out) {
-    if (const auto found = known_.find(e.get()); found != known_.end()) return found->second.second;
+    if (const auto* found = find_or_null(known_, e.get())) return found->second;
     T result = find_out();
     known_.emplace(e.get(), std::pair(e, result));
     return result;

@@ -189,8 +189,7 @@ Op op_from_name(const std::string& name) {
     for (int i = 0; i < op_count; ++i) result.emplace(op_table[i].name, static_cast<Op>(i));
     return result;
   }();
-  const auto found = by_name.find(name);
-  return found == by_name.end() ? Op::none : found->second;
+  return value_or(by_name, name, Op::none);
 }
 
 int passed_operand(Op op) {

@@ -123,13 +123,12 @@ int64_t Sum::fit(__int128 value) {
 }
 
 void Sum::add(const Expr& atom, int64_t factor) {
-  const auto place = is_linear ? std::lower_bound(terms.begin(), terms.end(), atom,
-                                                  [](const Term& term, const Expr& sought) {
-                                                    return compare(term.atom, sought) < 0;
-                                                  })
-                               : std::find_if(terms.begin(), terms.end(), [&](const Term& term) {
-                                   return equal(term.atom, atom);
-                                 });
+  const auto place =
+      is_linear
+          ? std::lower_bound(
+                terms.begin(), terms.end(), atom,
+                [](const Term& term, const Expr& sought) { return compare(term.atom, sought) < 0; })
+          : std::ranges::find_if(terms, [&](const Term& term) { return equal(term.atom, atom); });
   const bool is_known = place != terms.end() && equal(place->atom, atom);
   const int64_t fitted = fit(__int128{is_known ? place->factor : 0} + factor);
   if (!is_known) {

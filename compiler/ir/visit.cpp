@@ -65,10 +65,7 @@ struct ChildMap {
   }
   template <class T>
   std::vector<T> operator()(const std::vector<T>& children) {
-    std::vector<T> result;
-    result.reserve(children.size());
-    for (const T& child : children) result.push_back((*this)(child));
-    return result;
+    return mapped(children, *this);
   }
   template <class T>
   const T& operator()(const T& other) {
@@ -338,8 +335,7 @@ Tree substituted(const Tree& tree, const Substitution& values) {
   if (values.empty()) return tree;
   return rewrite(tree, [&](const Expr& e, const auto&) {
     const auto* var = e.as<Variable>();
-    const auto found = var ? values.find(var->name) : values.end();
-    return found == values.end() ? Expr() : found->second;
+    return var ? value_or(values, var->name, {}) : Expr();
   });
 }
 

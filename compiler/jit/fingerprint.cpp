@@ -61,8 +61,7 @@ class Writer {
   }
 
   uint64_t number(const Expr& e) {
-    const auto found = numbers_.find(e.get());
-    if (found != numbers_.end()) return found->second;
+    if (const auto* found = ir::find_or_null(numbers_, e.get())) return *found;
     std::vector<uint64_t> children;
     for_each_child(e, [&](const Expr& child) { children.push_back(number(child)); });
     add(e.kind(), e.type().key());

@@ -89,8 +89,7 @@ class Cache {
   // The function that is kept: another thread may have been faster.
   Handle insert(const Fingerprint& key, Handle function) {
     const std::lock_guard lock(mutex_);
-    const auto found = index_.find(key);
-    if (found != index_.end()) return found->second->second;
+    if (const auto* found = ir::find_or_null(index_, key)) return (*found)->second;
     entries_.emplace_front(key, function);
     index_[key] = entries_.begin();
     if (entries_.size() > cache_capacity) {

@@ -171,10 +171,9 @@ constexpr Pass passes[] = {
 };
 
 std::vector<std::string> names_of(const std::vector<LoweredArgument>& args) {
-  std::vector<std::string> names;
-  for (const LoweredArgument& arg : args)
-    names.push_back(arg.is_buffer() ? arg.name + ".buffer" : arg.name);
-  return names;
+  return mapped(args, [&](const LoweredArgument& arg) {
+    return arg.is_buffer() ? arg.name + ".buffer" : arg.name;
+  });
 }
 
 void append_outputs(const std::vector<FuncPtr>& outputs, std::vector<LoweredArgument>& args) {
@@ -212,8 +211,7 @@ namespace {
 
 void check_stop(const std::string& stop_after) {
   const std::vector<std::string> names = pass_names();
-  if (stop_after.empty() || std::find(names.begin(), names.end(), stop_after) != names.end())
-    return;
+  if (stop_after.empty() || std::ranges::find(names, stop_after) != names.end()) return;
   const std::string known = listed(names);
   user_error("stop lowering after " + quoted(stop_after), "lowering stops after one of its passes",
              "they are " + known, "Name one of them, or none to run them all");

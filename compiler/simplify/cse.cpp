@@ -7,7 +7,6 @@
 
 #include "ir/build.h"
 #include "ir/equal.h"
-#include "ir/lists.h"
 #include "ir/visit.h"
 
 namespace retrograde::simplification {
@@ -51,10 +50,7 @@ class UseCounter {
   explicit UseCounter(const std::vector<Expr>& es) {
     for (const Expr& e : es) count(e);
   }
-  bool is_shared(const Expr& e) const {
-    const auto it = uses_.find(e.get());
-    return it != uses_.end() && it->second > 1;
-  }
+  bool is_shared(const Expr& e) const { return value_or(uses_, e.get(), 0) > 1; }
 
  private:
   void count(const Expr& e) {
@@ -135,10 +131,7 @@ class LetExpander : public Rewriter {
       values_[let->name] = (*this)(let->value);
       return (*this)(let->body);
     }
-    if (const auto* var = e.as<Variable>()) {
-      const auto found = values_.find(var->name);
-      return found == values_.end() ? e : found->second;
-    }
+    if (const auto* var = e.as<Variable>()) return value_or(values_, var->name, e);
     return children(e);
   }
 

@@ -34,8 +34,7 @@ bool is_steady(const Expr& value) {
 
 std::optional<Sum> Simplifier::find_meaning(const Expr& atom) {
   const std::string& name = atom.as<Variable>()->name;
-  const auto replaced = replacements_.find(name);
-  const Expr value = replaced == replacements_.end() ? facts_.value_of(name) : replaced->second;
+  const Expr value = value_or(replacements_, name, facts_.value_of(name));
   if (!value.defined() || value.type() != atom.type() || !is_steady(value)) return std::nullopt;
   const Sum sum = sum_of(value);
   Sum opened = constant_sum(atom.type(), sum.constant);
@@ -63,10 +62,7 @@ const Sum* Simplifier::meaning(const Expr& atom) {
 // Opens one name where fewer terms remain, or two of which something cancels.
 bool Simplifier::cancel_names(Sum& sum) {
   if (!is_index_type(sum.type) || sum.type.is_vector() || sum.terms.size() < 2) return false;
-  std::vector<Term> named;
-  for (const Term& term : sum.terms) {
-    if (meaning(term.atom)) named.push_back(term);
-  }
+  const auto named = filtered(sum.terms, [&](const Term& term) { return meaning(term.atom); });
   const auto open = [&](Sum& in, const Term& term) {
     in.add(term.atom, -term.factor);
     in.add(*meaning(term.atom), term.factor);

@@ -70,8 +70,7 @@ Expr Simplifier::min_max(Kind kind, const Expr& a, const Expr& b) {
   }
   if (operands.size() == 1) return operands[0];
   if (!is_index_type(a.type()) || a.type().is_vector()) return nest(kind, operands);
-  std::vector<Sum> sums;
-  for (const Expr& operand : operands) sums.push_back(sum_of(operand));
+  auto sums = mapped(operands, [&](const Expr& operand) { return sum_of(operand); });
   const Sum common = take_common(sums);
   const bool valid =
       common.valid && std::ranges::all_of(sums, [](const Sum& s) { return s.valid; });

@@ -43,13 +43,12 @@ Simplifier::Simplifier(const BoundsMap& bounds) {
 
 Expr Simplifier::operator()(const Expr& e) {
   if (const auto* var = e.as<Variable>()) {
-    const auto found = replacements_.find(var->name);
-    if (found != replacements_.end()) return found->second;
+    if (const auto* found = find_or_null(replacements_, var->name)) return *found;
     const Expr number = number_of(e);
     return number.defined() ? number : e;
   }
   if (e.kind() <= Kind::StringImm) return e;
-  if (const auto found = memo_.find(e.get()); found != memo_.end()) return found->second.value;
+  if (const auto* found = find_or_null(memo_, e.get())) return found->value;
   Expr result = node(e);
   if (equal(result, e)) result = e;
   memo_.emplace(e.get(), Entry{e, result});

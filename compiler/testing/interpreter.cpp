@@ -220,8 +220,7 @@ class Interpreter::Impl {
   }
 
   const std::vector<Value>& pure_values(FuncState& f, const Point& point) {
-    auto it = f.memo.find(point);
-    if (it != f.memo.end()) return it->second;
+    if (const auto* it = ir::find_or_null(f.memo, point)) return *it;
     std::vector<Value> values = evaluate_pure(f, point);
     check_size(f, f.memo.size());
     return f.memo.emplace(point, std::move(values)).first->second;
@@ -361,8 +360,7 @@ class Interpreter::Impl {
 
   void store(FuncState& f, Island& island, const Point& point, const std::vector<Value>& values,
              bool unsure) {
-    const bool nothing =
-        std::all_of(values.begin(), values.end(), [](const Value& v) { return v.is_undef(); });
+    const bool nothing = std::ranges::all_of(values, [](const Value& v) { return v.is_undef(); });
     if (nothing) return;
     const Point place = pick(point, f.scattered_dims);
     if (island.grows_on_store) island.reached.include(place);
@@ -388,9 +386,7 @@ class Interpreter::Impl {
   }
 
   std::vector<Value> all_of(Frame& frame, const std::vector<Expr>& exprs) {
-    std::vector<Value> result;
-    for (const Expr& e : exprs) result.push_back(get(frame, e));
-    return result;
+    return ir::mapped(exprs, [&](const Expr& e) { return get(frame, e); });
   }
 
   Value evaluate(Frame& frame, const Expr& e) {

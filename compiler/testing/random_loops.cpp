@@ -317,8 +317,7 @@ Loops loops_of(const graph::FuncContents& f, int stage) {
       loop.extent = origin.extent;
       loop.is_independent = graph::can_prove_race_free(f, definition, origin.variable);
     } else {
-      loop.dimension =
-          static_cast<int>(std::find(f.args.begin(), f.args.end(), dim.var) - f.args.begin());
+      loop.dimension = static_cast<int>(std::ranges::find(f.args, dim.var) - f.args.begin());
     }
     loops.push_back(loop);
   }

@@ -99,9 +99,7 @@ class Scheduler {
   int stages(int f) const { return func(f).stage_count(); }
   bool is_pure(int f) const { return func(f).updates.empty(); }
   int dimensions(int f) const { return func(f).dimensions(); }
-  bool is_output(int f) const {
-    return std::find(compiled_.begin(), compiled_.end(), funcs_[f]) != compiled_.end();
-  }
+  bool is_output(int f) const { return std::ranges::find(compiled_, funcs_[f]) != compiled_.end(); }
 
   // Calls `visit` with each Func, by its number, and each image (-1) that the stage reads;
   // `direct`: itself, not through a Func that nobody schedules, each of which is looked into once.
@@ -421,8 +419,7 @@ class Scheduler {
   bool is_legal_level(const Level& level) const {
     for (int s = 0; s < stages(level.func); ++s) {
       for (const Loops& loops : loops_[level.func][s]) {
-        const auto at = std::find_if(loops.begin(), loops.end(),
-                                     [&](const Loop& loop) { return loop.name == level.name; });
+        const auto at = std::ranges::find(loops, level.name, &Loop::name);
         if ((s == level.stage) == (at == loops.end())) return false;
         if (std::any_of(at, loops.end(),
                         [](const Loop& loop) { return loop.type == ForType::Vectorized; }))

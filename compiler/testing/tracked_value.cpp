@@ -115,9 +115,7 @@ bool same_value(const Scalar& a, const Scalar& b) {
 }
 
 std::vector<Scalar> scalars_of(const std::vector<Value>& values) {
-  std::vector<Scalar> result;
-  for (const Value& value : values) result.push_back(value.scalar);
-  return result;
+  return ir::mapped(values, &Value::scalar);
 }
 
 // Moves one operand at a time to the ends of its uncertainty and adds up what the result does.

@@ -8,7 +8,6 @@
 #include "autodiff/inversion/isl_maps.h"
 #include "autodiff/inversion/narrow_reductions.h"
 #include "ir/build.h"
-#include "ir/lists.h"
 #include "ir/print.h"
 #include "simplify/simplify.h"
 

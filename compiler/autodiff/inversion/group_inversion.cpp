@@ -8,7 +8,6 @@
 #include "autodiff/inversion/isl_bridge.h"
 #include "autodiff/inversion/isl_maps.h"
 #include "ir/build.h"
-#include "ir/lists.h"
 #include "simplify/simplify.h"
 
 namespace retrograde::autodiff {

@@ -5,7 +5,6 @@
 #include <isl/options.h>
 
 #include "ir/build.h"
-#include "ir/lists.h"
 #include "ir/visit.h"
 
 namespace retrograde::autodiff {

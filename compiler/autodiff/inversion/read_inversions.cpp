@@ -45,8 +45,7 @@ std::string text_of(const AccessQuery& query) {
 }
 
 bool has_domains(const Inversion& inversion) {
-  return std::any_of(inversion.gathers.begin(), inversion.gathers.end(),
-                     [](const Gather& g) { return g.rdom != nullptr; });
+  return std::ranges::any_of(inversion.gathers, [](const Gather& g) { return g.rdom != nullptr; });
 }
 
 }  // namespace

@@ -9,7 +9,6 @@
 #include "graph/define.h"
 #include "graph/own_reads.h"
 #include "ir/build.h"
-#include "ir/lists.h"
 #include "ir/visit.h"
 
 namespace retrograde::autodiff {
@@ -26,8 +25,7 @@ class Lifter {
     for (const FuncPtr& f : topological_order({output})) {
       if (!lifted_.contains(f.get()) && depends(*f)) lift(f);
     }
-    auto found = lifted_.find(output.get());
-    return found == lifted_.end() ? nullptr : found->second;
+    return value_or(lifted_, output.get(), nullptr);
   }
 
  private:

@@ -5,7 +5,6 @@
 #include "autodiff/inversion/isl_points.h"
 #include "autodiff/matrices/graph_colouring.h"
 #include "ir/build.h"
-#include "ir/lists.h"
 
 namespace retrograde::autodiff {
 
@@ -59,8 +58,8 @@ Expr read(const Buffer<int>& table, const std::vector<Expr>& at) {
 
 using Entries = std::vector<std::pair<int, int>>;  // row, column
 
-Entries numbered(const std::vector<std::vector<int64_t>>& points, const Numbering& rows,
-                 const Numbering& columns) {
+Entries entries_at(const std::vector<std::vector<int64_t>>& points, const Numbering& rows,
+                   const Numbering& columns) {
   Entries result;
   for (const auto& p : points)
     result.push_back({rows.number(p.data()), columns.number(p.data() + rows.ranges.size())});
@@ -140,7 +139,7 @@ std::optional<ColourTable> colour_table(const isl::map& pattern, bool symmetric,
   if (rows.size() > many_entries || columns.size() > many_entries) return std::nullopt;
   auto points = points_of(pattern.wrap().flatten(), many_entries);
   if (!points) return std::nullopt;
-  Entries list = numbered(*points, rows, columns);
+  Entries list = entries_at(*points, rows, columns);
   if (!symmetric) {
     VertexColours colours =
         colour_columns(rows_of(list, rows.size()), static_cast<int>(columns.size()));

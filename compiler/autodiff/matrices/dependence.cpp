@@ -189,9 +189,7 @@ class Composer {
     if (std::ranges::none_of(callees, [&](const FuncPtr& callee) { return depends(callee.get()); }))
       return {empty_map(context_.ctx, f.args.size(), dims())};
     if (f.is_pure() && f.types.size() > 1) {
-      std::vector<isl::map> result;
-      for (size_t k = 0; k < f.types.size(); ++k) result.push_back(tidy(of_stage(f, 0, k)));
-      return result;
+      return numbered(f.types.size(), [&](size_t k) { return tidy(of_stage(f, 0, k)); });
     }
     isl::map result = empty_map(context_.ctx, f.args.size(), dims());
     for (int s = 0; s < f.stage_count(); ++s) result = result.unite(of_stage(f, s, std::nullopt));

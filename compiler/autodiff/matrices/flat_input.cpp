@@ -6,9 +6,7 @@ namespace retrograde::autodiff {
 
 std::vector<Expr> expressions(const std::vector<Var>& vars) { return {vars.begin(), vars.end()}; }
 std::vector<Var> variables(const std::string& base, size_t n) {
-  std::vector<Var> result;
-  for (size_t d = 0; d < n; ++d) result.emplace_back(base + std::to_string(d));
-  return result;
+  return numbered(n, [&](size_t d) { return Var(base + std::to_string(d)); });
 }
 std::vector<Var> both(std::vector<Var> a, const std::vector<Var>& b) {
   a.insert(a.end(), b.begin(), b.end());

@@ -48,8 +48,7 @@ class StarColouring {
       : graph_(graph), colours_(graph.size(), -1), forbidden_(graph.size()) {}
 
   VertexColours run() {
-    std::vector<size_t> degrees;
-    for (const auto& neighbours : graph_) degrees.push_back(neighbours.size());
+    const auto degrees = mapped(graph_, [&](const auto& neighbours) { return neighbours.size(); });
     for (int v : largest_first(degrees)) {
       forbidden_.start(v);
       for (int w : near(v)) forbid_by(v, w);

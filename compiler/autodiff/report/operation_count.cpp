@@ -12,7 +12,6 @@
 #include "autoschedule/stored_funcs.h"
 #include "diagnostics/error.h"
 #include "ir/build.h"
-#include "ir/lists.h"
 #include "ir/print.h"
 #include "ir/visit.h"
 #include "simplify/simplify.h"

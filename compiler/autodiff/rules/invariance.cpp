@@ -330,8 +330,7 @@ std::unordered_set<const Symbol*> cancelling_funcs(const std::vector<FuncPtr>& o
   std::unordered_set<const Symbol*> result;
   const Suspects suspects = suspects_among(order);
   if (suspects.subtracted.empty() && suspects.divisors.empty()) return result;
-  std::vector<std::vector<std::shared_ptr<Symbol>>> reads;
-  for (const FuncPtr& f : order) reads.push_back(read_by(*f));
+  const auto reads = mapped(order, [&](const FuncPtr& f) { return read_by(*f); });
   Propagation propagation(order, reads);
   for (size_t i = 0; i + 1 < order.size(); ++i) {
     const Symbol* f = order[i].get();

@@ -64,9 +64,8 @@ Vanishing log_of_one_plus(const Expr& n, const Expr& x) {
   const double s = w.defined() ? sign_between(w, x) : 0;
   if (s == 0) return {};
   const Expr q = w / (two + w);
-  std::vector<double> series;
-  for (size_t k = 0; k < terms_for(x.type(), 8, 17); ++k)
-    series.push_back(1 / static_cast<double>(2 * k + 3));
+  const std::vector<double> series = numbered(
+      terms_for(x.type(), 8, 17), [&](size_t k) { return 1 / static_cast<double>(2 * k + 3); });
   const Expr rest = one / (one + q) + q * polynomial(series, q * q);
   const Expr slope = make_const(x.type(), s) / inside;
   return {slope, slope / n, make_const(x.type(), -0.5) * ((one - q) * (one - q)) * rest};

@@ -6,7 +6,6 @@
 #include "autodiff/sweeps/local_derivative.h"
 #include "ir/build.h"
 #include "ir/equal.h"
-#include "ir/lists.h"
 
 namespace retrograde::autodiff {
 

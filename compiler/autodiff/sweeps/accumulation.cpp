@@ -12,7 +12,6 @@
 #include "frontend/language/var.h"
 #include "graph/define.h"
 #include "ir/build.h"
-#include "ir/lists.h"
 #include "simplify/simplify.h"
 
 namespace retrograde::autodiff {

@@ -6,7 +6,6 @@
 #include "graph/define.h"
 #include "graph/names.h"
 #include "ir/build.h"
-#include "ir/lists.h"
 #include "simplify/simplify.h"
 
 namespace retrograde::autodiff {

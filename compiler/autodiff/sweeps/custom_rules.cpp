@@ -12,7 +12,6 @@
 #include "graph/function.h"
 #include "graph/names.h"
 #include "ir/build.h"
-#include "ir/lists.h"
 #include "simplify/simplify.h"
 
 namespace retrograde::autodiff {

@@ -32,10 +32,7 @@ class ForwardSweep {
   }
 
  private:
-  Expr tangent(const Expr& e) const {
-    auto found = tangents_.find(e.get());
-    return found == tangents_.end() ? Expr() : found->second;
-  }
+  Expr tangent(const Expr& e) const { return value_or(tangents_, e.get(), {}); }
 
   void visit(const Expr& e) {
     if (as_op(e, Op::undef)) {

@@ -20,14 +20,12 @@ std::vector<Expr> conjuncts_of(const Expr& predicate) {
 }
 
 bool contains(const std::vector<Expr>& conjuncts, const Expr& e) {
-  return std::any_of(conjuncts.begin(), conjuncts.end(),
-                     [&](const Expr& other) { return equal(e, other); });
+  return std::ranges::any_of(conjuncts, [&](const Expr& other) { return equal(e, other); });
 }
 
 bool say_the_same(const std::vector<Expr>& a, const std::vector<Expr>& b) {
   const auto all_in = [](const auto& some, const auto& others) {
-    return std::all_of(some.begin(), some.end(),
-                       [&](const Expr& e) { return contains(others, e); });
+    return std::ranges::all_of(some, [&](const Expr& e) { return contains(others, e); });
   };
   return all_in(a, b) && all_in(b, a);
 }
@@ -126,8 +124,7 @@ void join_borders(std::vector<Contribution>& contributions, const AdjointTarget&
     }
   }
   if (left.size() == all) return;
-  std::vector<Contribution> result;
-  for (const Contribution* c : left) result.push_back(*c);
+  std::vector<Contribution> result = mapped(left, [&](const Contribution* c) { return *c; });
   contributions = std::move(result);
 }
 

@@ -4,7 +4,6 @@
 #include "graph/define.h"
 #include "graph/directive.h"
 #include "ir/build.h"
-#include "ir/lists.h"
 
 namespace retrograde::autodiff {
 

@@ -4,7 +4,6 @@
 #include "autodiff/sweeps/input_shape.h"
 #include "autodiff/updates/update_context.h"
 #include "ir/build.h"
-#include "ir/lists.h"
 
 namespace retrograde::autodiff {
 

@@ -109,8 +109,8 @@ void Regions::add_extern_arguments(const FuncContents& f) {
 
 const Box& Regions::of(const Symbol* symbol) const {
   static const Box nothing;
-  auto found = boxes_.find(symbol);
-  return found == boxes_.end() ? nothing : found->second;
+  const Box* found = find_or_null(boxes_, symbol);
+  return found ? *found : nothing;
 }
 
 std::vector<LoopVariable> Regions::loop_variables(const Symbol* symbol,

@@ -15,7 +15,6 @@
 #include "graph/define.h"
 #include "graph/function.h"
 #include "ir/build.h"
-#include "ir/lists.h"
 #include "ir/print.h"
 #include "simplify/simplify.h"
 

@@ -11,7 +11,6 @@
 #include "autodiff/updates/versions.h"
 #include "diagnostics/error.h"
 #include "ir/build.h"
-#include "ir/lists.h"
 #include "simplify/simplify.h"
 
 namespace retrograde::autodiff {

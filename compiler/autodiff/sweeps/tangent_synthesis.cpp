@@ -10,7 +10,6 @@
 #include "frontend/language/var.h"
 #include "graph/define.h"
 #include "ir/build.h"
-#include "ir/lists.h"
 #include "ir/memory_reads.h"
 
 namespace retrograde::autodiff {
@@ -176,8 +175,7 @@ class TangentSynthesis {
 
   FuncPtr differentiate_by_rule(const FuncPtr& f) {
     auto found_in = [](const auto& tangents, const Symbol* symbol) {
-      auto found = tangents.find(symbol);
-      return found == tangents.end() ? FuncPtr() : found->second;
+      return value_or(tangents, symbol, {});
     };
     FuncPtr own = run_custom_tangent(
         f,

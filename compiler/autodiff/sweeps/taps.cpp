@@ -7,7 +7,6 @@
 #include "autoschedule/scatter_schedule.h"
 #include "ir/build.h"
 #include "ir/equal.h"
-#include "ir/lists.h"
 #include "ir/print.h"
 
 namespace retrograde::autodiff {

@@ -9,7 +9,6 @@
 #include "frontend/language/var.h"
 #include "graph/define.h"
 #include "ir/build.h"
-#include "ir/lists.h"
 #include "ir/print.h"
 #include "simplify/simplify.h"
 

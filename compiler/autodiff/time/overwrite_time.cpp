@@ -8,7 +8,6 @@
 #include "graph/function.h"
 #include "graph/own_reads.h"
 #include "ir/build.h"
-#include "ir/lists.h"
 #include "ir/print.h"
 #include "simplify/simplify.h"
 
@@ -165,10 +164,7 @@ class Folder {
 SynthesisResult synthesize_folded(const Seed& seed, SynthesisOptions options) {
   Folder folder(seed, options);
   folder.run();
-  auto copy_of = [&](const Symbol* f) {
-    auto found = folder.copies.find(f);
-    return found == folder.copies.end() ? nullptr : found->second;
-  };
+  auto copy_of = [&](const Symbol* f) { return value_or(folder.copies, f, nullptr); };
   FuncPtr output = copy_of(seed.output.get());
   if (!output) return synthesize_adjoints(seed, options);
   for (const auto& [f, copy] : folder.copies) {

@@ -8,7 +8,6 @@
 #include "graph/define.h"
 #include "graph/function.h"
 #include "ir/build.h"
-#include "ir/lists.h"
 #include "ir/visit.h"
 
 namespace retrograde::autodiff {

@@ -4,7 +4,6 @@
 
 #include "diagnostics/error.h"
 #include "ir/build.h"
-#include "ir/lists.h"
 #include "simplify/simplify.h"
 
 namespace retrograde::autodiff {

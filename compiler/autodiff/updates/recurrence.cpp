@@ -9,7 +9,6 @@
 #include "autodiff/updates/versions.h"
 #include "frontend/language/var.h"
 #include "ir/build.h"
-#include "ir/lists.h"
 #include "simplify/simplify.h"
 
 namespace retrograde::autodiff {

@@ -8,7 +8,6 @@
 #include "ir/build.h"
 #include "ir/equal.h"
 #include "ir/lets.h"
-#include "ir/lists.h"
 #include "ir/memory_reads.h"
 #include "ir/visit.h"
 

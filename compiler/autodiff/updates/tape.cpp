@@ -9,7 +9,6 @@
 #include "graph/define.h"
 #include "graph/function.h"
 #include "ir/build.h"
-#include "ir/lists.h"
 
 namespace retrograde::autodiff {
 

@@ -4,7 +4,6 @@
 #include "frontend/language/var.h"
 #include "graph/define.h"
 #include "ir/build.h"
-#include "ir/lists.h"
 #include "ir/visit.h"
 #include "simplify/simplify.h"
 

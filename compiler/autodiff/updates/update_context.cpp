@@ -6,7 +6,6 @@
 #include "diagnostics/error.h"
 #include "graph/define.h"
 #include "ir/build.h"
-#include "ir/lists.h"
 #include "ir/print.h"
 #include "simplify/simplify.h"
 
@@ -17,9 +16,7 @@ bool depends_on_data(const Expr& e) {
 }
 
 std::string point_text(const std::string& name, const std::vector<Expr>& args) {
-  std::string out = quoted(name) + "(";
-  for (size_t i = 0; i < args.size(); ++i) out += (i ? ", " : "") + ir::print(args[i]);
-  return out + ")";
+  return quoted(name) + "(" + listed(args, [](const Expr& arg) { return ir::print(arg); }) + ")";
 }
 
 size_t place_number(std::vector<std::vector<Expr>>& places, const std::vector<Expr>& place) {

@@ -6,7 +6,6 @@
 #include "graph/own_reads.h"
 #include "ir/build.h"
 #include "ir/equal.h"
-#include "ir/lists.h"
 #include "simplify/simplify.h"
 
 namespace retrograde::autodiff {

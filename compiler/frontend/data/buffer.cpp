@@ -112,8 +112,7 @@ Runtime::Buffer<> allocate_buffer(halide_type_t type, const std::vector<int>& si
     return buffer;
   }
   check_storage_order(storage_order, static_cast<int>(sizes.size()), "make a Buffer");
-  std::vector<int> in_memory;
-  for (int d : storage_order) in_memory.push_back(sizes[d]);
+  const std::vector<int> in_memory = mapped(storage_order, [&](int d) { return sizes[d]; });
   Runtime::Buffer<> buffer(type, nullptr, in_memory);
   buffer.transpose(storage_order);
   allocate_host(buffer);

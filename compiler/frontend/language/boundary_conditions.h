@@ -44,11 +44,9 @@ Func func_of(const T& image) {
 }
 template <Image T>
 Region bounds_of(const T& image) {
-  Region bounds;
-  for (int d = 0; d < image.dimensions(); d++) {
-    bounds.push_back({Expr(image.dim(d).min()), Expr(image.dim(d).extent())});
-  }
-  return bounds;
+  return ir::numbered(image.dimensions(), [&](int d) {
+    return Range{Expr(image.dim(d).min()), Expr(image.dim(d).extent())};
+  });
 }
 // min, extent, min, extent ...
 inline void collect(Region&) {}

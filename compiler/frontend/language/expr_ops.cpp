@@ -166,10 +166,9 @@ Tuple select(const Tuple& condition, const Tuple& when_true, const Tuple& when_f
                     when_false.size(), " elements"),
                "Give Tuples of one size");
   }
-  std::vector<Expr> result;
-  for (size_t i = 0; i < condition.size(); i++)
-    result.push_back(select(condition[i], when_true[i], when_false[i]));
-  return Tuple(result);
+  return Tuple(ir::numbered(condition.size(), [&](size_t i) {
+    return select(condition[i], when_true[i], when_false[i]);
+  }));
 }
 
 Tuple select(const Expr& condition, const Tuple& when_true, const Tuple& when_false) {

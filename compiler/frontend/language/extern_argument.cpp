@@ -28,8 +28,7 @@ void Func::define_extern(const std::string& function_name,
                          const std::vector<ExternFuncArgument>& args,
                          const std::vector<Type>& types, int dimensionality, NameMangling mangling,
                          DeviceAPI device) {
-  std::vector<Var> arguments;
-  for (int d = 0; d < dimensionality; d++) arguments.push_back(Var::implicit(d));
+  const auto arguments = ir::numbered(dimensionality, [&](int d) { return Var::implicit(d); });
   define_extern(function_name, args, types, arguments, mangling, device);
 }
 
@@ -52,8 +51,7 @@ void Func::define_extern(const std::string& function_name,
                  "Give each a value");
     definition.args.push_back(arg.contents);
   }
-  std::vector<std::string> variables;
-  for (const Var& var : arguments) variables.push_back(var.name());
+  const auto variables = ir::mapped(arguments, [&](const Var& var) { return var.name(); });
   graph::define_extern(func_, std::move(definition), types, variables, asked);
 }
 

@@ -88,11 +88,9 @@ const graph::Definition& Func::checked_update(int index, const char* asked) cons
 
 // What leaves the Func may outlive it: references to it are strong again.
 std::vector<Expr> Func::update_args(int index) const {
-  std::vector<Expr> result;
-  for (const Expr& arg : checked_update(index, "take the arguments of update").args) {
-    result.push_back(graph::redirect_calls(arg, func_, func_, false));
-  }
-  return result;
+  return ir::mapped(
+      checked_update(index, "take the arguments of update").args,
+      [&](const Expr& arg) { return graph::redirect_calls(arg, func_, func_, false); });
 }
 
 Expr Func::update_value(int index) const {
@@ -105,11 +103,9 @@ Expr Func::update_value(int index) const {
 }
 
 Tuple Func::update_values(int index) const {
-  std::vector<Expr> result;
-  for (const Expr& value : checked_update(index, "take the values of update").values) {
-    result.push_back(graph::redirect_calls(value, func_, func_, false));
-  }
-  return Tuple(result);
+  return Tuple(ir::mapped(
+      checked_update(index, "take the values of update").values,
+      [&](const Expr& value) { return graph::redirect_calls(value, func_, func_, false); }));
 }
 
 std::vector<RVar> Func::rvars(int index) const {
@@ -118,10 +114,8 @@ std::vector<RVar> Func::rvars(int index) const {
   walk(update, [&](const ir::Variable& v) {
     if (!domain) domain = graph::domain_of(v);
   });
-  std::vector<RVar> result;
-  for (size_t i = 0; i < update.rvars.size(); i++)
-    result.push_back(RVar(domain, static_cast<int>(i)));
-  return result;
+  return ir::numbered(update.rvars.size(),
+                      [&](size_t i) { return RVar(domain, static_cast<int>(i)); });
 }
 
 // ---- running it ----
@@ -158,9 +152,7 @@ OutputImageParam Func::output_buffer() const {
 
 std::vector<OutputImageParam> Func::output_buffers() const {
   check_defined("use the output buffers of " + quoted(name()));
-  std::vector<OutputImageParam> result;
-  for (const auto& output : func_->outputs) result.push_back(OutputImageParam(output));
-  return result;
+  return ir::mapped(func_->outputs, [&](const auto& output) { return OutputImageParam(output); });
 }
 
 // ---- schedule ----
@@ -171,9 +163,7 @@ graph::SchedulePlace Func::loops() const {
 }
 
 Func& Func::reorder_storage(const std::vector<Var>& dims) {
-  std::vector<std::string> names;
-  for (const Var& dim : dims) names.push_back(dim.name());
-  return give(graph::ReorderStorage{std::move(names)});
+  return give(graph::ReorderStorage{ir::mapped(dims, [&](const Var& dim) { return dim.name(); })});
 }
 
 Func& Func::set_estimates(const Region& estimates) {

@@ -114,10 +114,9 @@ Stage FuncRef::update(const std::vector<Expr>& values, int initial, Combine comb
                text("it has ", func_->types.size(), " and the right-hand side ", values.size()),
                "Give as many values");
   }
-  std::vector<Expr> combined;
-  for (size_t i = 0; i < values.size(); i++)
-    combined.push_back(combine(here.element(static_cast<int>(i)), values[i]));
-  return here.define(combined);
+  return here.define(ir::numbered(values.size(), [&](size_t i) {
+    return combine(here.element(static_cast<int>(i)), values[i]);
+  }));
 }
 
 Stage FuncRef::operator=(const Expr& value) { return define({value}); }
@@ -176,11 +175,9 @@ FuncTupleElementRef::FuncTupleElementRef(FuncRef ref, int index) : ref_(ref), in
 // The other values are written back as they are: the definition stays a plain one of all values.
 Stage FuncTupleElementRef::operator=(const Expr& value) {
   FuncRef here(ref_.func_, ref_.left_args({value}));
-  std::vector<Expr> values;
-  for (size_t i = 0; i < here.size(); i++) {
-    values.push_back(static_cast<int>(i) == index_ ? value : here.element(static_cast<int>(i)));
-  }
-  return here.define(values);
+  return here.define(ir::numbered(here.size(), [&](size_t i) {
+    return static_cast<int>(i) == index_ ? value : here.element(static_cast<int>(i));
+  }));
 }
 
 }  // namespace retrograde

@@ -133,8 +133,7 @@ class SeveralPoints {
   }
 
   bool reads_itself(const std::vector<Expr>& exprs) const {
-    return std::any_of(exprs.begin(), exprs.end(),
-                       [&](const Expr& e) { return calls(e, f_.get()); });
+    return std::ranges::any_of(exprs, [&](const Expr& e) { return calls(e, f_.get()); });
   }
 
   void read_what_was_before() {
@@ -152,9 +151,7 @@ class SeveralPoints {
   }
 
   std::vector<Expr> at_point(const std::vector<Expr>& exprs) const {
-    std::vector<Expr> result;
-    for (const Expr& e : exprs) result.push_back(rebound(chosen(e)));
-    return result;
+    return mapped(exprs, [&](const Expr& e) { return rebound(chosen(e)); });
   }
   // The points of e; one for all where it names none.
   Expr chosen(const Expr& e) const {

@@ -10,8 +10,7 @@ const ParamMap& ParamMap::empty_map() {
 
 const ParamMap::Entry* ParamMap::find(
     const std::shared_ptr<graph::ParameterContents>& parameter) const {
-  const auto found = entries_.find(parameter);
-  return found == entries_.end() ? nullptr : &found->second;
+  return ir::find_or_null(entries_, parameter);
 }
 
 ir::Scalar ParamMap::checked(const graph::ParameterContents& parameter, const ir::Scalar& value) {

@@ -154,9 +154,7 @@ PipelineSpec Pipeline::spec() const {
 }
 
 std::vector<Func> Pipeline::outputs() const {
-  std::vector<Func> result;
-  for (const graph::FuncPtr& f : checked().outputs) result.push_back(Func(f));
-  return result;
+  return ir::mapped(checked().outputs, [&](const graph::FuncPtr& f) { return Func(f); });
 }
 
 Func Pipeline::get_func(size_t index) const {

@@ -5,9 +5,8 @@
 namespace retrograde {
 
 Func Func::wrap(const std::vector<Func>& users, const std::string& name, bool clone) const {
-  std::vector<graph::FuncPtr> contents;
-  for (const Func& user : users) contents.push_back(user.function());
-  return Func(graph::wrapper_of(func_, contents, name, clone));
+  return Func(graph::wrapper_of(
+      func_, ir::mapped(users, [&](const Func& user) { return user.function(); }), name, clone));
 }
 
 Func Func::in(const Func& f) { return wrap({f}, name() + "_in_" + f.name(), false); }

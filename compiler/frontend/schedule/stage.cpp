@@ -26,9 +26,8 @@ ReorderLoops reorder_of(const std::vector<VarOrRVar>& vars) {
 }
 
 std::vector<VarOrRVar> loops_at(const SchedulePlace& place) {
-  std::vector<VarOrRVar> loops;
-  for (const Dim& dim : place.schedule().dims) loops.emplace_back(dim.var, dim.is_reduction);
-  return loops;
+  return mapped(place.schedule().dims,
+                [&](const Dim& dim) { return VarOrRVar(dim.var, dim.is_reduction); });
 }
 
 VarOrRVar fresh_like(const VarOrRVar& var) {

@@ -75,10 +75,7 @@ class Profiling : public StatementRewriter {
     return make_evaluate(call_runtime("retrograde_profiler_thread", {run(), Expr(change)}));
   }
 
-  int number_of(const std::string& name) const {
-    const auto it = numbers_.find(name);
-    return it == numbers_.end() ? 0 : it->second;
-  }
+  int number_of(const std::string& name) const { return value_or(numbers_, name, 0); }
 
   Stmt produce(const ProducerConsumer& n) {
     const int outer = current_;

@@ -73,8 +73,7 @@ Box region_stored(const Stmt& s, const std::string& func) {
       [&](const Stmt& part, const Scope<Interval>& scope) {
         const auto* n = part.as<Provide>();
         if (!n || n->name != func) return;
-        Box point;
-        for (const Expr& arg : n->args) point.push_back(bounds_of(arg, scope));
+        const Box point = mapped(n->args, [&](const Expr& arg) { return bounds_of(arg, scope); });
         box = hull(box, point);
       });
   return box;
@@ -293,10 +292,8 @@ void inject_tracing(LoopNests& nests, const Program& program, const std::string&
   std::vector<Stmt> types, tags;
   for (const LoopedFunc& f : program.funcs) {
     if (!tracer.traces(f.name())) continue;
-    const auto known = regions.find(f.name());
     const Box box = f.is_output ? buffer_box(value_buffer_name(*f.func, 0), f.func->dimensions())
-                    : known == regions.end() ? Box{}
-                                             : known->second;
+                                : value_or(regions, f.name(), {});
     types.push_back(type_tag(f, box));
     for (const std::string& tag : f.func->trace.tags)
       tags.push_back(make_evaluate(

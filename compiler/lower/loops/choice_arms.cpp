@@ -38,8 +38,7 @@ Expr ChoiceArms::arm(const Expr& e, int64_t value) {
   auto found = tables_.find(e.get());
   if (found == tables_.end()) found = tables_.emplace(e.get(), table_of(e)).first;
   const Table& table = found->second;
-  const auto own = table.arms.find(value);
-  return own == table.arms.end() ? table.otherwise : own->second;
+  return value_or(table.arms, value, table.otherwise);
 }
 
 Stmt ChoiceArms::choose(const Stmt& body, int64_t value) {

@@ -66,8 +66,7 @@ Stmt drop_bounds_query(const Stmt& all) {
     const auto* branch = s.as<IfThenElse>();
     const std::vector<Expr> queries = branch ? queries_in(branch->condition) : std::vector<Expr>();
     if (queries.empty()) return rewriter.children(s);
-    std::vector<Stmt> parts;
-    for (const Expr& query : queries) parts.push_back(refuse(query));
+    std::vector<Stmt> parts = mapped(queries, [&](const Expr& query) { return refuse(query); });
     if (branch->when_false.defined()) parts.push_back(branch->when_false);
     return make_block(parts);
   });

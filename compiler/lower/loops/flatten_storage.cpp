@@ -78,7 +78,7 @@ class Flattener : public Rewriter {
       return children(e);
     bool is_func = call->call_type == CallType::Func;
     std::string buffer = is_func ? element_of(call->name, call->component) : call->name;
-    Expr index = index_of(is_func ? call->name : "", buffer, mapped(call->args));
+    Expr index = index_of(is_func ? call->name : "", buffer, mapped(call->args, *this));
     return make_load(call->type, buffer, index, {}, is_func ? SymbolRef() : call->symbol);
   }
 
@@ -89,17 +89,9 @@ class Flattener : public Rewriter {
   }
 
  private:
-  std::vector<Expr> mapped(const std::vector<Expr>& es) {
-    std::vector<Expr> result;
-    for (const Expr& e : es) result.push_back((*this)(e));
-    return result;
-  }
-
   std::string element_of(const std::string& func, int component) const {
-    auto it = usage_.value_counts.find(func);
-    auto place = memory_of_.find(func);
-    return element_name(place == memory_of_.end() ? func : place->second,
-                        it == usage_.value_counts.end() ? 1 : it->second, component);
+    return element_name(value_or(memory_of_, func, func), value_or(usage_.value_counts, func, 1),
+                        component);
   }
 
   // `func` is empty for images.
@@ -198,7 +190,7 @@ class Flattener : public Rewriter {
   // ---- Provide ----
 
   Stmt store(const Provide& n) {
-    std::vector<Expr> values = mapped(n.values), args = mapped(n.args);
+    std::vector<Expr> values = mapped(n.values, *this), args = mapped(n.args, *this);
     Expr predicate = (*this)(n.predicate);
     Lets bindings;
     if (values.size() > 1) bind_operands(n, values, args, predicate, bindings);

@@ -180,9 +180,7 @@ class Kept : public Rewriter {
   }
   Stmt rewrite(const Stmt& s) override {
     if (s.get() != update_.provide) return children(s);
-    std::vector<Expr> values;
-    for (const Expr& value : update_.provide->values) values.push_back((*this)(value));
-    return make_provide(name_, values, args_);
+    return make_provide(name_, mapped(update_.provide->values, *this), args_);
   }
 
  private:

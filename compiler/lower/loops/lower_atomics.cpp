@@ -86,8 +86,7 @@ Stmt lower_atomics(const Stmt& s) {
   std::unordered_map<std::string, int> depth_of;
   const auto is_shared = [&](const Stmt& body) {
     for (const std::string& name : stored_in(body)) {
-      const auto found = depth_of.find(name);
-      if (depth > (found == depth_of.end() ? 0 : found->second)) return true;
+      if (depth > value_or(depth_of, name, 0)) return true;
     }
     return false;
   };

@@ -74,9 +74,7 @@ Stmt Semaphores::of_reader(const Stmt& step, const std::string& func, int reader
 Stmt Semaphores::for_readers(const Stmt& producer, const std::string& func, int readers) {
   if (readers == 1) return producer;
   return replace_steps(producer, func, [&](const Stmt& step) {
-    std::vector<Stmt> stmts;
-    for (int i = 0; i < readers; i++) stmts.push_back(of_reader(step, func, i));
-    return make_block(stmts);
+    return make_block(numbered(readers, [&](int i) { return of_reader(step, func, i); }));
   });
 }
 

@@ -85,10 +85,7 @@ SteadyRewriter::SteadyRewriter(const For& loop, const PartitionContext& outer, b
 
 Expr SteadyRewriter::rewrite(const Expr& e) {
   if (const Let* n = e.as<Let>()) return rewrite_let(e, *n);
-  if (const Variable* v = e.as<Variable>()) {
-    auto it = decided_lets_.find(v->name);
-    return it == decided_lets_.end() ? e : it->second;
-  }
+  if (const Variable* v = e.as<Variable>()) return value_or(decided_lets_, v->name, e);
   Expr copy = children(e);
   if (const Call* n = e.as<Call>(); is_likely(n) && e.type().is_bool() && is_mark(*n)) {
     return holds(copy.as<Call>()->args[0], true, true) ? const_true() : copy;
@@ -168,7 +165,7 @@ Expr SteadyRewriter::rewrite_select(const Select& n, const Expr& copy) {
 
 // Whether e is computed from something marked, not counting what it loads.
 SteadyRewriter::Mark SteadyRewriter::mark(const Expr& e) {
-  if (auto it = marks_.find(e.get()); it != marks_.end()) return it->second;
+  if (const auto* it = find_or_null(marks_, e.get())) return *it;
   const auto decided = [&](const Expr& a, const Expr& b) {
     return std::max(mark(a), mark(b)) == Mark::None ? Mark::None : Mark::Decided;
   };
@@ -179,11 +176,7 @@ SteadyRewriter::Mark SteadyRewriter::mark(const Expr& e) {
     return n.kind == Kind::Mod && strongest == Mark::Decided ? Mark::None : strongest;
   };
   const Mark result = match(
-      e,
-      [&](const Variable& n) {
-        auto it = marked_lets_.find(n.name);
-        return it == marked_lets_.end() ? Mark::None : it->second;
-      },
+      e, [&](const Variable& n) { return value_or(marked_lets_, n.name, Mark::None); },
       [&](const Call& n) {
         if (is_likely(&n)) return is_mark(n) ? Mark::Likely : mark(n.args[0]);
         bool is_promise = n.is_op(Op::promise_clamped) || n.is_op(Op::unsafe_promise_clamped);
@@ -216,9 +209,8 @@ bool SteadyRewriter::holds(const Expr& condition, bool is_true, bool is_choice) 
 }
 
 void SteadyRewriter::count_saving(const std::unordered_set<std::string>& names, bool is_choice) {
-  const bool over_lanes = std::any_of(lanes_.begin(), lanes_.end(), [&](const std::string& lane) {
-    return names.count(lane) != 0;
-  });
+  const bool over_lanes =
+      std::ranges::any_of(lanes_, [&](const std::string& lane) { return names.count(lane) != 0; });
   if (inside_lanes_ || over_lanes) {
     steady_.saving.always_pays = true;
     return;

@@ -81,8 +81,7 @@ Emitted NestEmitter::emit_children(const std::vector<int>& children, Emitted cod
                                    std::vector<Loop>& loops, size_t i, ComputePlace& home) {
   if (children.empty()) return code;
   if (!code.strands.empty()) {
-    std::vector<std::string> names;
-    for (int c : children) names.push_back(program_.funcs[c].name());
+    const auto names = mapped(children, [&](int c) { return program_.funcs[c].name(); });
     gather_uses(code, {loops, home}, i, names, [&](const std::string& name) {
       return !is_stored_where_computed(*program_.find(name));
     });

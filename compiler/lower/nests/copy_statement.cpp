@@ -78,10 +78,7 @@ class Copier : public Rewriter {
     auto [it, is_new] = names_.emplace(name, "");
     if (is_new) it->second = fresh(name);
   }
-  const std::string& name_of(const std::string& name) const {
-    auto it = names_.find(name);
-    return it == names_.end() ? name : it->second;
-  }
+  std::string name_of(const std::string& name) const { return value_or(names_, name, name); }
 
   const Substitution& values_;
   std::unordered_map<std::string, std::string> names_;

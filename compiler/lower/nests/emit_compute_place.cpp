@@ -13,12 +13,9 @@ namespace retrograde::lower {
 
 // A Func whose values nothing reads here is not computed, also when others run with it elsewhere.
 std::vector<int> NestEmitter::needed_of(const FusedGroup& group, const Emitted& code) const {
-  std::vector<int> needed;
-  for (const int f : group.funcs) {
-    if (program_.funcs[f].is_output || code.uses.count(program_.funcs[f].name()))
-      needed.push_back(f);
-  }
-  return needed;
+  return filtered(group.funcs, [&](const int f) {
+    return program_.funcs[f].is_output || code.uses.count(program_.funcs[f].name());
+  });
 }
 
 Emitted NestEmitter::emit_place(const std::vector<int>& children, Emitted code,
@@ -125,8 +122,7 @@ NestEmitter::Wanted NestEmitter::slide_together(std::vector<Member>& members,
                                                 ComputePlace& site) const {
   Wanted all{0, 0};
   for (size_t i = 0; i < members.size(); i++) {
-    const auto found = wanted.find(members[i].f->name());
-    const Wanted own = found == wanted.end() ? Wanted() : found->second;
+    const Wanted own = value_or(wanted, members[i].f->name(), {});
     all.first = std::max(all.first, own.first);
     all.last = i == 0 ? own.last : std::min(all.last, own.last);
   }

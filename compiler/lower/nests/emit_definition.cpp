@@ -94,8 +94,7 @@ bool depends_on_every_value(const Definition& definition) {
   return any_node(definition, [](const Call& call) {
     if (call.call_type == CallType::Operator)
       return op_info(call.op).cls == OpClass::Effect && !call.is_op(Op::random);
-    return call.call_type == CallType::Extern ||
-           std::any_of(call.args.begin(), call.args.end(), reads_memory);
+    return call.call_type == CallType::Extern || std::ranges::any_of(call.args, reads_memory);
   });
 }
 

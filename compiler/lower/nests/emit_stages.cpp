@@ -23,9 +23,7 @@ Domain bind_domain(const LoopedFunc& f, int s, Box& need, const std::vector<Slid
   Domain domain;
   const std::string prefix = stage_prefix(f.name(), s);
   for (size_t d = 0; d < need.size(); d++) {
-    auto slide = std::find_if(slides.begin(), slides.end(), [&](const Slide& candidate) {
-      return candidate.dimension == static_cast<int>(d);
-    });
+    auto slide = std::ranges::find(slides, static_cast<int>(d), &Slide::dimension);
     const std::string& arg = f.func->args[d];
     domain[arg] = slide == slides.end() ? site.bind(prefix + arg, need[d])
                                         : site.bind_part(prefix + arg, *slide, need[d]);

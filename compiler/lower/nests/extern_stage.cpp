@@ -70,9 +70,7 @@ class Emitter {
 
   static bool is_func(const ExternArgument& arg) { return arg.kind == ExternArgument::Kind::Func; }
 
-  bool has_funcs() const {
-    return std::any_of(definition_.args.begin(), definition_.args.end(), is_func);
-  }
+  bool has_funcs() const { return std::ranges::any_of(definition_.args, is_func); }
 
   void check() const {
     const std::string asked =

@@ -99,8 +99,7 @@ class Grouping {
     while (result.size() < nests.size()) {
       const size_t before = result.size();
       for (size_t n = 0; n < nests.size(); n++) {
-        if (done[n] || !std::all_of(nests[n].stages.begin(), nests[n].stages.end(), is_ready))
-          continue;
+        if (done[n] || !std::ranges::all_of(nests[n].stages, is_ready)) continue;
         done[n] = true;
         result.push_back(nests[n]);
       }

@@ -217,9 +217,8 @@ std::vector<Joining> joinings_of(const Program& program) {
       const StageLoops& other = schedule_of(program, joining.with, joining.with_stage);
       joining.depth = depth_of(other, level.var);
       for (int d = 1; d <= joining.depth; d++) {
-        const auto it = own.fuse_alignment.find(loop_at(own, d).var);
-        joining.align.push_back(it == own.fuse_alignment.end() ? LoopAlignStrategy::Auto
-                                                               : it->second);
+        joining.align.push_back(
+            value_or(own.fuse_alignment, loop_at(own, d).var, LoopAlignStrategy::Auto));
       }
       joinings.push_back(std::move(joining));
     }

@@ -102,9 +102,8 @@ Program inline_functions(const std::vector<FuncPtr>& unwrapped) {
   for (const FuncPtr& f : topological_order(outputs)) {
     bool is_output = std::find(outputs.begin(), outputs.end(), f) != outputs.end();
     check_size(*f, sizes);
-    std::vector<Definition> stages;
-    for (int i = 0; i < f->stage_count(); i++)
-      stages.push_back(map_exprs(f->stage(i), std::ref(inliner)));
+    std::vector<Definition> stages = numbered(
+        f->stage_count(), [&](int i) { return map_exprs(f->stage(i), std::ref(inliner)); });
     if (is_inlined(*f, f->schedule, is_output)) {
       check_inlined(*f, f->schedule);
       inlined[f.get()] = {f->args, stages[0].values};

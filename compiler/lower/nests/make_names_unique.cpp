@@ -11,9 +11,8 @@ namespace {
 
 using Renamings = std::unordered_map<std::string, std::string>;  // those in force
 
-const std::string& current(const Renamings& renamings, const std::string& name) {
-  auto it = renamings.find(name);
-  return it == renamings.end() ? name : it->second;
+std::string current(const Renamings& renamings, const std::string& name) {
+  return value_or(renamings, name, name);
 }
 
 // "f.stride.1" of a Func that is "f.$1" here.
@@ -21,8 +20,8 @@ std::string renamed_fact(const Renamings& renamings, const std::string& name) {
   for (const char* fact : {".stride.", ".min.", ".extent."}) {
     const size_t at = name.rfind(fact);
     if (at == std::string::npos) continue;
-    const auto it = renamings.find(name.substr(0, at));
-    if (it != renamings.end()) return it->second + name.substr(at);
+    if (const auto* now = find_or_null(renamings, name.substr(0, at)))
+      return *now + name.substr(at);
   }
   return {};
 }
@@ -87,8 +86,7 @@ class Uniquifier {
   // A name from here to the end of its scope.
   struct Binding {
     Binding(Uniquifier& owner, const std::string& name) : owner(owner), name(name), unique(name) {
-      auto outer_entry = owner.renamings_.find(name);
-      if (outer_entry != owner.renamings_.end()) outer = outer_entry->second;
+      if (const auto* now = find_or_null(owner.renamings_, name)) outer = *now;
       owner.renamings_.erase(name);
       if (owner.bound_.insert(name).second) return;
       unique = owner.fresh_(name);

@@ -117,9 +117,7 @@ void NestStorage::note_async_room(const LoopedFunc& f, const std::vector<Slide>&
   int room = slides.empty() ? 1 : 0;
   for (size_t d = 0; d < folds.size(); d++) {
     if (!folds[d].factor.defined()) continue;
-    auto slide = std::find_if(slides.begin(), slides.end(), [&](const Slide& candidate) {
-      return candidate.dimension == static_cast<int>(d);
-    });
+    auto slide = std::ranges::find(slides, static_cast<int>(d), &Slide::dimension);
     const auto extent = [](const Interval& side) {
       return as_const_int(simplify(without_likely(side.max - side.min + 1)));
     };

@@ -23,8 +23,7 @@ Interval aligned(Interval range, const Bound& bound) {
 
 void apply_promised_bounds(const LoopedFunc& f, Box& box, std::vector<Stmt>& checks) {
   for (const Bound& bound : f.schedule.bounds) {
-    size_t d =
-        std::find(f.func->args.begin(), f.func->args.end(), bound.var) - f.func->args.begin();
+    size_t d = std::ranges::find(f.func->args, bound.var) - f.func->args.begin();
     RETROGRADE_ASSERT(d < box.size(), "bound on an unknown dimension");
     if (bound.extent.defined()) {
       Interval promised;

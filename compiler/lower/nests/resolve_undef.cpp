@@ -53,11 +53,7 @@ std::optional<Choice> as_choice(const Expr& e) {
 class WhereDefined {
  public:
   Expr operator()(const Expr& e) {
-    auto it = memo_.find(e.get());
-    if (it != memo_.end()) return it->second.where;
-    Expr where = compute(e);
-    memo_.emplace(e.get(), Entry{e, where});
-    return where;
+    return memo_.get(e, [&] { return compute(e); });
   }
 
  private:
@@ -84,10 +80,7 @@ class WhereDefined {
     return both(where, either(both(c, a), both(logical_not(c), b)));
   }
 
-  struct Entry {
-    Expr key, where;
-  };
-  std::unordered_map<const ExprNode*, Entry> memo_;
+  NodeMemo<Expr> memo_;
 };
 
 // An equal value where it is defined; what is never defined is never chosen.
@@ -158,8 +151,7 @@ class StageResolver {
 void resolve_undef(Program& program) {
   for (LoopedFunc& f : program.funcs) {
     for (Definition& stage : f.stages) {
-      if (std::any_of(stage.values.begin(), stage.values.end(), mentions_undef))
-        StageResolver(f, stage).run();
+      if (std::ranges::any_of(stage.values, mentions_undef)) StageResolver(f, stage).run();
     }
   }
 }

@@ -33,8 +33,7 @@ class ParameterSharer : public Rewriter {
  private:
   std::map<Expr, Expr, StructuralLess> known_;
   std::unordered_set<std::string> made_;
-  std::unordered_map<const ExprNode*, int> sizes_;  // 0: not of parameters alone
-  std::vector<Expr> kept_;                          // whose addresses stand in sizes_
+  NodeMemo<int> sizes_;
 
   static bool is_arithmetic(const Expr& e) { return e.as<Binary>() || e.as<Select>(); }
 
@@ -45,22 +44,20 @@ class ParameterSharer : public Rewriter {
 
   // Of integers and conditions of parameters alone; 0 for any other expression.
   int tree_size(const Expr& e) {
-    if (const auto found = sizes_.find(e.get()); found != sizes_.end()) return found->second;
+    return sizes_.get(e, [&] { return counted(e); });
+  }
+  int counted(const Expr& e) {
+    if (const auto* v = e.as<Variable>()) return is_parameter(*v) ? 1 : 0;
+    if (is_const(e)) return 1;
+    const bool followed = is_arithmetic(e) || e.as<Not>() || e.as<Cast>();
+    bool uniform = followed && !e.type().is_float();
     int size = 1;
-    if (const auto* v = e.as<Variable>()) {
-      size = is_parameter(*v) ? 1 : 0;
-    } else if (!is_const(e)) {
-      const bool followed = is_arithmetic(e) || e.as<Not>() || e.as<Cast>();
-      bool uniform = followed && !e.type().is_float();
-      for_each_child(e, [&](const Expr& child) {
-        const int below = uniform ? tree_size(child) : 0;
-        uniform &= below > 0;
-        size = std::min(size + below, 1 << 20);
-      });
-      if (!uniform) size = 0;
-    }
-    kept_.push_back(e);
-    return sizes_[e.get()] = size;
+    for_each_child(e, [&](const Expr& child) {
+      const int below = uniform ? tree_size(child) : 0;
+      uniform &= below > 0;
+      size = std::min(size + below, 1 << 20);
+    });
+    return uniform ? size : 0;
   }
 
   Expr named(const Expr& e) {

@@ -43,7 +43,7 @@ Definition assuming(const Definition& definition, const Expr& condition, bool va
   take_apart(condition, value, known, constants);
   StepRewriter under([&](const Expr& e, const auto&) -> Expr {
     if (const Variable* v = e.as<Variable>()) {
-      if (const auto it = constants.find(v->name); it != constants.end()) return it->second;
+      if (const auto* it = find_or_null(constants, v->name)) return *it;
     }
     if (!e.type().is_bool() || !e.type().is_scalar()) return {};
     for (const Known& fact : known) {

@@ -26,9 +26,8 @@ class Folder {
 
   std::vector<Fold> over(const std::vector<FoldingLoop>& loops) {
     for (auto it = loops.rbegin(); it != loops.rend(); ++it) {
-      bool hands_on = std::any_of(slides_.begin(), slides_.end(), [&](const Slide& slide) {
-        return slide.loop.name == it->loop.name;
-      });
+      bool hands_on = std::ranges::any_of(
+          slides_, [&](const Slide& slide) { return slide.loop.name == it->loop.name; });
       for (int d = static_cast<int>(folds_.size()) - 1; d >= 0; d--) fold(d, *it, hands_on);
       if (hands_on) break;
     }

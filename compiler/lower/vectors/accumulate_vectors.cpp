@@ -49,12 +49,11 @@ std::optional<UpdateChain> as_chain(const Store& store) {
   if (!chain || chain->kind == Kind::Call || chain->own.as<Load>()->predicate.defined())
     return std::nullopt;
   const auto* first = chain->terms[0].value.as<VectorReduce>();
-  const bool is_reduced =
-      std::all_of(chain->terms.begin(), chain->terms.end(), [&](const UpdateChain::Term& term) {
-        const auto* reduce = term.value.as<VectorReduce>();
-        return reduce && first && reduce->op == chain->kind &&
-               reduce->value.type() == first->value.type();
-      });
+  const bool is_reduced = std::ranges::all_of(chain->terms, [&](const UpdateChain::Term& term) {
+    const auto* reduce = term.value.as<VectorReduce>();
+    return reduce && first && reduce->op == chain->kind &&
+           reduce->value.type() == first->value.type();
+  });
   return is_reduced ? chain : std::nullopt;
 }
 
@@ -77,11 +76,9 @@ class LoopReductions {
 
   // Those that nothing else in the loop could see.
   std::vector<Candidate> found() const {
-    std::vector<Candidate> result;
-    for (const Candidate& candidate : candidates_) {
-      if (!others_.count(candidate.store->name)) result.push_back(candidate);
-    }
-    return result;
+    return filtered(candidates_, [&](const Candidate& candidate) {
+      return !others_.count(candidate.store->name);
+    });
   }
 
  private:
@@ -222,10 +219,8 @@ class Accumulator {
                              store_.symbol);
     if (const auto* atomic = candidate_.whole.as<Atomic>())
       result = make_atomic(atomic->name, result);
-    std::vector<Expr> conditions;
-    for (const Expr& condition : candidate_.conditions) {
-      if (!is_const_true(condition)) conditions.push_back(condition);
-    }
+    const std::vector<Expr> conditions = filtered(
+        candidate_.conditions, [&](const Expr& condition) { return !is_const_true(condition); });
     return conditions.empty() ? result : make_if(conjunction(conditions), result);
   }
 

@@ -167,8 +167,7 @@ class BlendMaskedStores : public Rewriter {
     const auto* both = condition.kind() == Kind::And ? condition.as<Binary>() : nullptr;
     if (both) return is_known(both->a) && is_known(both->b);
     return is_const_true(condition) ||
-           std::any_of(known_.begin(), known_.end(),
-                       [&](const Expr& other) { return equal(condition, other); });
+           std::ranges::any_of(known_, [&](const Expr& other) { return equal(condition, other); });
   }
 
   Expr visit_load(const Expr& e, const Load& n) {

@@ -93,9 +93,8 @@ class LoadSharer : public Rewriter {
   }
 
   static Expr pick(const std::vector<Expr>& whole, const StridedLoad& load, int64_t first) {
-    std::vector<int> indices;
-    for (int i = 0; i < load.load.type().lanes(); ++i)
-      indices.push_back(static_cast<int>(first + i * load.stride));
+    std::vector<int> indices = numbered(
+        load.load.type().lanes(), [&](int i) { return static_cast<int>(first + i * load.stride); });
     return make_shuffle(whole, std::move(indices));
   }
 

@@ -92,8 +92,7 @@ class LaneSplitter {
  public:
   Pattern pattern(const Expr& e) {
     if (e.type().is_scalar()) return {};
-    const auto found = patterns_.find(e.get());
-    if (found != patterns_.end()) return found->second.pattern;
+    if (const auto* found = find_or_null(patterns_, e.get())) return found->pattern;
     Pattern result = find_pattern(e);
     if (result.kind == Pattern::Periodic && e.type().lanes() % result.period != 0)
       result.kind = Pattern::Whole;
@@ -184,11 +183,7 @@ class LaneSplitter {
 
   Expr part(const Expr& e) {
     if (e.type().is_scalar()) return e;
-    const auto found = memo_.find(e.get());
-    if (found != memo_.end()) return found->second;
-    Expr result = make_part(e);
-    memo_.emplace(e.get(), result);
-    return result;
+    return memo_.get(e, [&] { return make_part(e); });
   }
 
   Expr make_part(const Expr& e) {
@@ -223,8 +218,7 @@ class LaneSplitter {
           return make_load(n.type.with_lanes(lanes), n.name, part(n.index), predicate, n.symbol);
         },
         [&](const Call& n) {
-          std::vector<Expr> args;
-          for (const Expr& arg : n.args) args.push_back(part(arg));
+          std::vector<Expr> args = mapped(n.args, [&](const Expr& arg) { return part(arg); });
           return call_op(n.op, n.type.with_lanes(lanes), std::move(args));
         },
         [&](const ExprNode&) -> Expr { internal_error("interleave_vectors: no parts"); });
@@ -235,8 +229,7 @@ class LaneSplitter {
     const int count = static_cast<int>(parts.size()), step = period_ / count;
     const Expr& whole_part = parts.at(static_cast<size_t>(first_ % count));
     if (step == 1) return whole_part;
-    std::vector<int> indices;
-    for (int i = 0; i < lanes; i++) indices.push_back(first_ / count + i * step);
+    std::vector<int> indices = numbered(lanes, [&](int i) { return first_ / count + i * step; });
     return make_shuffle({whole_part}, std::move(indices));
   }
 
@@ -258,7 +251,7 @@ class LaneSplitter {
   std::unordered_map<const ExprNode*, Entry> patterns_;
   std::unordered_map<std::string, Named> names_;
   int first_ = 0, period_ = 1;
-  std::unordered_map<const ExprNode*, Expr> memo_;
+  NodeMemo<Expr> memo_;
 };
 
 // Stores with the lets around each, that may become one.

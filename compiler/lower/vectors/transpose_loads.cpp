@@ -116,8 +116,7 @@ class Transposer : public StatementRewriter {
     const Stmt stores = make_block(run.stmts);
     if (blocks.empty()) return stores;
     return make_lets(blocks, ir::rewrite(stores, [&](const Expr& e, const auto&) {
-                       const auto found = replacements.find(e.get());
-                       return found == replacements.end() ? Expr() : found->second;
+                       return value_or(replacements, e.get(), {});
                      }));
   }
 

@@ -63,18 +63,11 @@ class Movements {
   explicit Movements(const std::string& variable) : variable_(variable) {}
 
   void bind(const std::string& name, const Expr& value) { lets_[name] = value; }
-  const Expr* value_of(const std::string& name) const {
-    const auto found = lets_.find(name);
-    return found == lets_.end() ? nullptr : &found->second;
-  }
+  const Expr* value_of(const std::string& name) const { return find_or_null(lets_, name); }
 
   // nullopt: it varies in another way.
   MaybeMovement of(const Expr& e) {
-    const auto found = memo_.find(e.get());
-    if (found != memo_.end()) return found->second;
-    const MaybeMovement result = find(e);
-    memo_.emplace(e.get(), result);
-    return result;
+    return memo_.get(e, [&] { return find(e); });
   }
 
  private:
@@ -127,8 +120,8 @@ class Movements {
   }
 
   const std::string variable_;
-  std::unordered_map<std::string, Expr> lets_;               // that the body binds
-  std::unordered_map<const ExprNode*, MaybeMovement> memo_;  // keys live as long as the loop
+  std::unordered_map<std::string, Expr> lets_;  // that the body binds
+  NodeMemo<MaybeMovement> memo_;
 };
 
 // Whether lanes pay for the body of a loop, and how many.
@@ -153,8 +146,7 @@ class BodyCheck {
 
   bool visit(const Stmt& s) {
     if (const auto* block = s.as<Block>())
-      return std::all_of(block->stmts.begin(), block->stmts.end(),
-                         [&](const Stmt& part) { return visit(part); });
+      return std::ranges::all_of(block->stmts, [&](const Stmt& part) { return visit(part); });
     if (const auto* let = s.as<LetStmt>()) {
       movements_.bind(let->name, let->value);
       return has_vector_form(let->value) && visit(let->body);

@@ -128,15 +128,8 @@ Widener::Widener(const std::string& variable, const Expr& min, int iterations, F
 
 Expr Widener::operator()(const Expr& e) {
   if (!e.defined()) return e;
-  if (const Variable* v = e.as<Variable>()) {
-    auto it = wide_values_.find(v->name);
-    return it == wide_values_.end() ? e : it->second;
-  }
-  auto it = memo_.find(e.get());
-  if (it != memo_.end()) return it->second.value;
-  Expr result = widen(e);
-  memo_.emplace(e.get(), Entry{e, result});
-  return result;
+  if (const Variable* v = e.as<Variable>()) return value_or(wide_values_, v->name, e);
+  return memo_.get(e, [&] { return widen(e); });
 }
 
 Expr Widener::spread(const Expr& e) {
@@ -277,8 +270,7 @@ Expr Widener::widen_call(const Expr& e, const Call& n) {
   if (n.call_type == CallType::Extern) return widen_extern(n);
   RETROGRADE_ASSERT(n.call_type == CallType::Operator, "a call of ", n.name,
                     " in the phase FlatStorage");
-  std::vector<Expr> args;
-  for (const Expr& arg : n.args) args.push_back(spread(arg));
+  std::vector<Expr> args = mapped(n.args, [&](const Expr& arg) { return spread(arg); });
   return call_op(n.op, n.type.with_lanes(n.type.lanes() * iterations_), std::move(args));
 }
 
@@ -319,8 +311,7 @@ Expr Widener::widen_extern(const Call& n) {
   std::vector<int> indices(n.type.lanes() * iterations_);
   std::iota(indices.begin(), indices.end(), 0);
   for (int lane : indices) {
-    std::vector<Expr> scalars;
-    for (const Expr& arg : args) scalars.push_back(extract_iteration(arg, lane, 1));
+    auto scalars = mapped(args, [&](const Expr& arg) { return extract_iteration(arg, lane, 1); });
     results.push_back(call_extern(n.name, n.type.element_of(), std::move(scalars)));
   }
   return make_lets(lets, make_shuffle(std::move(results), std::move(indices)));

@@ -76,10 +76,7 @@ class Widener {
   Expr mask_;
   bool may_run_nowhere_ =
       false;  // inside an arm of if_then_else: even what does not vary is loaded under the mask
-  struct Entry {
-    Expr key, value;
-  };
-  std::unordered_map<const ExprNode*, Entry> memo_;
+  NodeMemo<Expr> memo_;
   std::unordered_map<std::string, Expr> wide_values_;
   std::unordered_set<std::string> wide_allocations_, widened_lets_;
 };

@@ -169,9 +169,7 @@ RandomProgram make_program(Choices& choices, const Style& style) {
 }
 
 std::vector<graph::FuncPtr> outputs_of(const RandomProgram& program) {
-  std::vector<graph::FuncPtr> outputs;
-  for (const Func& f : program.outputs) outputs.push_back(f.function());
-  return outputs;
+  return ir::mapped(program.outputs, [&](const Func& f) { return f.function(); });
 }
 
 std::string to_text(const RandomProgram& program, const ScheduleLog& schedule) {

@@ -10,8 +10,7 @@ namespace retrograde::fuzz {
 namespace {
 
 bool is_floating(const Func& f) {
-  return std::all_of(f.types().begin(), f.types().end(),
-                     [](const Type& t) { return t.is_float(); });
+  return std::ranges::all_of(f.types(), [](const Type& t) { return t.is_float(); });
 }
 
 // The derivative of `source` by its inputs, synthesized: what a rule of a copy of it gives.
@@ -116,9 +115,8 @@ void Maker::add_custom() {
   std::vector<AdjointInput> inputs;
   const auto parameters = graph::parameters_of({source.function()});
   auto add = [&](const AdjointInput& input) {
-    const bool is_read = std::any_of(parameters.begin(), parameters.end(), [&](const auto& p) {
-      return p.get() == input.symbol().get();
-    });
+    const bool is_read = std::ranges::any_of(
+        parameters, [&](const auto& p) { return p.get() == input.symbol().get(); });
     if (is_read) inputs.push_back(input);
   };
   for (size_t i = 0; i < p_.images.size(); ++i) add(p_.image(i));

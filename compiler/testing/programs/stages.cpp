@@ -236,10 +236,9 @@ void Maker::add_output() {
   const std::vector<Var> vars = first_variables(c_.between(1, s_.has_runs ? 3 : 2));
   Point at{{vars.begin(), vars.end()}, {}, Func(), {}};
   const Func last = p_.funcs.back();
-  std::vector<Expr> place;
-  for (int d = 0; d < last.dimensions(); ++d)
-    place.push_back(d < static_cast<int>(vars.size()) ? Expr(vars[static_cast<size_t>(d)])
-                                                      : Expr(1));
+  const std::vector<Expr> place = ir::numbered(last.dimensions(), [&](int d) {
+    return d < static_cast<int>(vars.size()) ? Expr(vars[static_cast<size_t>(d)]) : Expr(1);
+  });
   const Type type = s_.has_integers ? c_.pick(s_.value_types) : Float(32);
   Expr result = converted(type, last(place).element(0));
   if (last.outputs() == 2 && type.is_float())
@@ -284,8 +283,7 @@ void Maker::add_loop() {
     at.is_pure[0] = false;
   }
   at.all.push_back(r[r.dimensions() - 1]);
-  std::vector<Expr> next;
-  for (int k = 0; k < f.outputs(); ++k) next.push_back(stepped(f, k, at));
+  const auto next = ir::numbered(f.outputs(), [&](int k) { return stepped(f, k, at); });
   f(at.write) = Tuple(next);
   finish(f);
   p_.has_loop = true;
