@@ -2,7 +2,6 @@
 #include "analysis/linear.h"
 
 #include <algorithm>
-#include <unordered_map>
 
 #include "ir/build.h"
 #include "ir/node_memo.h"

@@ -1,8 +1,6 @@
 // Sums in linear form first, so that a variable that cancels is gone; then a rule for each atom.
 #include "analysis/monotonic.h"
 
-#include <unordered_map>
-
 #include "analysis/linear.h"
 #include "ir/build.h"
 #include "ir/node_memo.h"

@@ -1,7 +1,6 @@
 #include "analysis/nonnegative.h"
 
 #include <algorithm>
-#include <unordered_map>
 
 #include "ir/build.h"
 #include "ir/equal.h"

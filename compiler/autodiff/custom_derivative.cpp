@@ -18,13 +18,9 @@ bool is_given_twice(const std::vector<AdjointInput>& inputs, size_t i) {
 }
 
 bool depends_on(const Func& func, const Symbol* symbol) {
-  for (const FuncPtr& f : topological_order({func.function()})) {
-    if (f.get() == symbol) return true;
-  }
-  for (const auto& p : parameters_of({func.function()})) {
-    if (p.get() == symbol) return true;
-  }
-  return false;
+  const auto is_it = [&](const auto& read) { return read.get() == symbol; };
+  return std::ranges::any_of(topological_order({func.function()}), is_it) ||
+         std::ranges::any_of(parameters_of({func.function()}), is_it);
 }
 
 void check_func(const std::string& asked, const Func& func, bool has_rule) {

@@ -8,6 +8,7 @@
 #include <llvm/Target/TargetMachine.h>
 #include <llvm/TargetParser/Host.h>
 
+#include <algorithm>
 #include <mutex>
 
 #include "diagnostics/error.h"
@@ -18,10 +19,7 @@ namespace {
 using F = Target::Feature;
 
 bool has_any(const Target& target, std::initializer_list<F> features) {
-  for (F feature : features) {
-    if (target.has_feature(feature)) return true;
-  }
-  return false;
+  return std::ranges::any_of(features, [&](F feature) { return target.has_feature(feature); });
 }
 
 bool has_skylake(const Target& t) {

@@ -109,11 +109,10 @@ constexpr int chunk_bits = 128;  // instructions that unpack lanes do not look a
 // The lanes of two vectors by turns, within each chunk: of its lower half, or of its upper half.
 Value* unpack(Emitter& e, Value* a, Value* b, int chunk, bool upper) {
   const int lanes = lanes_of(a);
-  std::vector<int> indices;
-  for (int i = 0; i < lanes; i++) {
+  const auto indices = ir::numbered(lanes, [&](int i) {
     const int source = i / chunk * chunk + (upper ? chunk / 2 : 0) + i % chunk / 2;
-    indices.push_back(i % 2 ? lanes + source : source);
-  }
+    return i % 2 ? lanes + source : source;
+  });
   return shuffle(e, a, b, indices);
 }
 

@@ -29,9 +29,8 @@ std::vector<std::string> words_between_commas(const std::string& text) {
 std::string names_of(const std::vector<std::string>& names) { return listed(names, quoted); }
 
 std::vector<std::string> emit_names() {
-  std::vector<std::string> names;
-  for (const auto& [type, info] : get_output_info(get_host_target())) names.push_back(info.name);
-  return names;
+  return ir::mapped(get_output_info(get_host_target()),
+                    [](const auto& output) { return output.second.name; });
 }
 
 OutputFileType read_emit_type(const std::string& word) {

@@ -9,7 +9,6 @@
 // CompileError that lists what is allowed.
 #pragma once
 
-#include <algorithm>
 #include <charconv>
 #include <map>
 #include <optional>

@@ -45,9 +45,7 @@ void GeneratorRegistry::unregister_factory(const std::string& name) {
 
 std::vector<std::string> GeneratorRegistry::enumerate() {
   std::lock_guard lock(registered().mutex);
-  std::vector<std::string> names;
-  for (const auto& [name, factory] : registered().factories) names.push_back(name);
-  return names;
+  return ir::keys_of(registered().factories);
 }
 
 std::unique_ptr<GeneratorBase> GeneratorRegistry::create(const std::string& name,

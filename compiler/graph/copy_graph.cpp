@@ -13,7 +13,7 @@ class Copier : public Rewriter {
   GraphCopy run(const std::vector<FuncPtr>& outputs) {
     for (const FuncPtr& f : topological_order(outputs)) copy(f);
     for (const FuncPtr& output : outputs) copies_.outputs.push_back(copies_.of.at(output.get()));
-    for (const auto& entry : copies_.of) redirect_prefetches(*entry.second);
+    for (const auto& entry : copies_.of) redirect_prefetches(*entry.second, copies_.of);
     return std::move(copies_);
   }
 
@@ -40,20 +40,19 @@ class Copier : public Rewriter {
     }
   }
 
-  void redirect_prefetches(FuncContents& f) const {
-    for (int s = 0; s < f.stage_count(); ++s) {
-      for (PrefetchDirective& prefetch : f.stage(s).schedule.prefetches) {
-        const auto* source = static_cast<const FuncContents*>(prefetch.symbol.raw());
-        if (const auto found = copies_.of.find(source); found != copies_.of.end())
-          prefetch.symbol = SymbolRef::weak(found->second);
-      }
-    }
-  }
-
   GraphCopy copies_;
 };
 
 }  // namespace
+
+void redirect_prefetches(FuncContents& f, const FuncCopies& copies) {
+  for (int s = 0; s < f.stage_count(); ++s) {
+    for (PrefetchDirective& prefetch : f.stage(s).schedule.prefetches) {
+      const auto* source = static_cast<const FuncContents*>(prefetch.symbol.raw());
+      if (const auto* copy = find_or_null(copies, source)) prefetch.symbol = SymbolRef::weak(*copy);
+    }
+  }
+}
 
 GraphCopy copy_graph(const std::vector<FuncPtr>& outputs) { return Copier().run(outputs); }
 

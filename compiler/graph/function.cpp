@@ -176,6 +176,10 @@ void for_each_expr(const Definition& definition, const std::function<void(const 
   visit_exprs(definition, visit);
 }
 
+void for_each_expr(const FuncContents& f, const std::function<void(const Expr&)>& visit) {
+  for (int s = 0; s < f.stage_count(); ++s) for_each_expr(f.stage(s), visit);
+}
+
 Definition map_exprs(const Definition& definition, const std::function<Expr(const Expr&)>& map) {
   Definition result = definition;
   visit_exprs(result, [&](Expr& e) { e = map(e); });
@@ -273,9 +277,7 @@ std::vector<ParameterPtr> parameters_of(const std::vector<FuncPtr>& outputs) {
     for (const ParameterPtr& parameter : output->outputs) collector.exclude(parameter);
   }
   for (const FuncPtr& f : functions_of(outputs)) {
-    for (int i = 0; i < f->stage_count(); i++) {
-      for_each_expr(f->stage(i), [&](const Expr& e) { collector.add_expr(e); });
-    }
+    for_each_expr(*f, [&](const Expr& e) { collector.add_expr(e); });
     collector.add_schedule(*f);
   }
   for (const FuncPtr& output : outputs) {

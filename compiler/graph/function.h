@@ -126,6 +126,8 @@ std::vector<FuncPtr> topological_order(const std::vector<FuncPtr>& outputs);
 std::vector<FuncPtr> direct_callees(const FuncContents& f);
 // Visits every expression of a definition: args, values, predicate, rvar bounds.
 void for_each_expr(const Definition& definition, const std::function<void(const Expr&)>& visit);
+// The same of all definitions of a Func.
+void for_each_expr(const FuncContents& f, const std::function<void(const Expr&)>& visit);
 Definition map_exprs(const Definition& definition, const std::function<Expr(const Expr&)>& map);
 // As of one expression (ir/visit.h), for all of a definition, and of a Func.
 template <class... Fs>

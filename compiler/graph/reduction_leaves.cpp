@@ -23,10 +23,7 @@ class LeafFinder {
   Leaves leaves_;
 
   Leaf* find(const std::string& loop) {
-    for (Leaf& leaf : leaves_.all) {
-      if (leaf.loop == loop) return &leaf;
-    }
-    return nullptr;
+    return first_where(leaves_.all, [&](const Leaf& leaf) { return leaf.loop == loop; });
   }
 
   void apply(const Split& split) {

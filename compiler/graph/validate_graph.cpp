@@ -84,9 +84,7 @@ class GraphValidator {
   void check_names(const FuncContents& f, const Expr& root,
                    std::unordered_set<std::string> bound) const {
     walk(root, [&](const Let& let) { bound.insert(let.name); });
-    std::unordered_set<const ExprNode*> seen;
     walk(root, [&](const Expr& e) {
-      if (!seen.insert(e.get()).second) return false;
       if (const Variable* v = e.as<Variable>()) {
         require(
             bound.count(v->name) || (v->symbol.defined() && known_.count(v->symbol.raw())), f,

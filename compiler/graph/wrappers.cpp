@@ -2,10 +2,10 @@
 
 #include <algorithm>
 #include <set>
-#include <unordered_map>
 #include <unordered_set>
 
 #include "diagnostics/error.h"
+#include "graph/copy_graph.h"
 #include "graph/define.h"
 #include "graph/give_directive.h"
 #include "graph/names.h"
@@ -54,12 +54,12 @@ class Wrapping {
     for (size_t i = 0; i < queue_.size(); i++) redirect(*queue_[i]);
     check_used();
     for (const FuncContents* f : queue_) copies_[f]->wrappers.clear();
-    for (const FuncContents* f : queue_) redirect_prefetches(*copies_[f]);
+    for (const FuncContents* f : queue_) redirect_prefetches(*copies_[f], copies_);
     return result;
   }
 
  private:
-  std::unordered_map<const Symbol*, FuncPtr> copies_;
+  FuncCopies copies_;
   std::vector<const FuncContents*> queue_;
   std::set<std::pair<const FuncContents*, std::string>>
       used_;  // Func and the user it is wrapped in
@@ -106,15 +106,6 @@ class Wrapping {
       return call_func(callee->name, call->type, call->args, call->component,
                        self ? SymbolRef::weak(callee) : SymbolRef(callee));
     });
-  }
-
-  void redirect_prefetches(FuncContents& f) {
-    for (int s = 0; s < f.stage_count(); s++) {
-      for (PrefetchDirective& prefetch : f.stage(s).schedule.prefetches) {
-        const auto copy = copies_.find(prefetch.symbol.raw());
-        if (copy != copies_.end()) prefetch.symbol = SymbolRef::weak(copy->second);
-      }
-    }
   }
 
   void check_used() const {

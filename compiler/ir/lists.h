@@ -34,6 +34,15 @@ auto filtered(const List& list, F&& f) {
   return result;
 }
 
+// The first of which `f`, a function or a member, is true; null when there is none.
+template <class List, class F>
+auto first_where(List& list, F&& f) -> decltype(&*list.begin()) {
+  for (auto& one : list) {
+    if (std::invoke(f, one)) return &one;
+  }
+  return nullptr;
+}
+
 template <class T>
 void append(std::vector<T>& list, const std::vector<T>& more) {
   list.insert(list.end(), more.begin(), more.end());

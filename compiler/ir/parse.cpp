@@ -2,6 +2,7 @@
 // without parentheses, with C's precedence.
 #include "ir/parse.h"
 
+#include <algorithm>
 #include <charconv>
 #include <limits>
 #include <optional>
@@ -418,13 +419,8 @@ class Parser {
   }
   bool is_loop() const {
     if (is("for")) return true;
-    for (Partition partition : {Partition::Never, Partition::Always}) {
-      if (is(partition_name(partition))) return true;
-    }
-    for (ForType type : for_types) {
-      if (is(for_name(type))) return true;
-    }
-    return false;
+    if (is(partition_name(Partition::Never)) || is(partition_name(Partition::Always))) return true;
+    return std::ranges::any_of(for_types, [&](ForType type) { return is(for_name(type)); });
   }
   Stmt loop() {
     Partition partition = Partition::Auto;

@@ -96,10 +96,7 @@ std::vector<Expr> operands_of(Kind kind, const Expr& e) {
 }
 
 const Term* Sum::find(const Expr& atom) const {
-  for (const Term& term : terms) {
-    if (equal(term.atom, atom)) return &term;
-  }
-  return nullptr;
+  return first_where(terms, [&](const Term& term) { return equal(term.atom, atom); });
 }
 
 int64_t Sum::factor_of(const std::string& variable) const {

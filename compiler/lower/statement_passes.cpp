@@ -42,10 +42,8 @@ const std::vector<StatementPass>& statement_passes() {
 }
 
 const StatementPass* find_statement_pass(const std::string& name) {
-  for (const StatementPass& pass : statement_passes()) {
-    if (name == pass.name) return &pass;
-  }
-  return nullptr;
+  return first_where(statement_passes(),
+                     [&](const StatementPass& pass) { return name == pass.name; });
 }
 
 }  // namespace retrograde::lower

@@ -92,8 +92,7 @@ class Simplifier {
   Stmt loop(const Stmt& s, const For& n);
   Stmt block(const Stmt& s, const Block& n);
   Stmt branches(const Stmt& s, const IfThenElse& n);
-  Stmt store(const Stmt& s, const Store& n);
-  Stmt provide(const Stmt& s, const Provide& n);
+  Stmt write(const Stmt& s, const Expr& predicate);
   int64_t most_elements(const Expr& count);
   Stmt allocate(const Allocate& n, const Stmt& simplified);
   Stmt children(const Stmt& s);

@@ -12,9 +12,10 @@ Stmt Simplifier::operator()(const Stmt& s) {
   return match(
       s, [&](const LetStmt&) { return let_stmt(s); }, [&](const For& n) { return loop(s, n); },
       [&](const IfThenElse& n) { return branches(s, n); },
-      [&](const Block& n) { return block(s, n); }, [&](const Store& n) { return store(s, n); },
+      [&](const Block& n) { return block(s, n); },
+      [&](const Store& n) { return write(s, n.predicate); },
       [&](const Allocate& n) { return allocate(n, children(s)); },
-      [&](const Provide& n) { return provide(s, n); },
+      [&](const Provide& n) { return write(s, n.predicate); },
       [&](const Assert& n) {
         const Expr condition = (*this)(n.condition);
         if (is_const_true(condition)) return Stmt();
@@ -133,13 +134,9 @@ Stmt Simplifier::allocate(const Allocate& n, const Stmt& simplified) {
   return make_allocate(a->name, a->type, a->memory, make_const(a->elements.type(), most), a->body);
 }
 
-Stmt Simplifier::store(const Stmt& s, const Store& n) {
-  if (n.predicate.defined() && is_const_false((*this)(n.predicate))) return {};
-  return children(s);
-}
-
-Stmt Simplifier::provide(const Stmt& s, const Provide& n) {
-  if (n.predicate.defined() && is_const_false((*this)(n.predicate))) return {};
+// A Store or Provide.
+Stmt Simplifier::write(const Stmt& s, const Expr& predicate) {
+  if (predicate.defined() && is_const_false((*this)(predicate))) return {};
   return children(s);
 }
 

@@ -290,10 +290,8 @@ class Scheduler {
   // ---- stages that share loops ----
 
   bool depends(int f, int on) const {
-    for (const int p : producers_of(f)) {
-      if (p == on || depends(p, on)) return true;
-    }
-    return false;
+    return std::ranges::any_of(producers_of(f),
+                               [&](const int p) { return p == on || depends(p, on); });
   }
   bool is_shared(int f) const {
     return std::any_of(companions_.begin(), companions_.end(),
@@ -399,10 +397,7 @@ class Scheduler {
 
   // Of a Func whose outer loops are another's.
   const Companion* companion_of_guest(int f) const {
-    for (const Companion& companion : companions_) {
-      if (companion.func == f) return &companion;
-    }
-    return nullptr;
+    return ir::first_where(companions_, [&](const Companion& c) { return c.func == f; });
   }
 
   // Shared loops are named by the Func that they are of, as far as that one is scheduled already.

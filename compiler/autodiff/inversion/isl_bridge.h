@@ -13,7 +13,6 @@
 #include <set>
 #include <string>
 #include <type_traits>
-#include <unordered_map>
 #include <vector>
 
 #include "autodiff/inversion/access_inversion.h"
@@ -111,10 +110,6 @@ class IslBridge {
   Expr to_expr(const isl::set& s, const std::vector<Expr>& names) const;  // true for the universe
   // An expression over the parameters only (a pw_aff without dimensions).
   Expr to_expr(const isl::pw_aff& e) const { return to_expr(e, {}); }
-  // Replaces a fixed sub-expression by its value at the point that the caller has found.
-  void set_parameter_value(const std::string& name, const Expr& value) {
-    parameters_[name] = value;
-  }
   const std::map<std::string, Expr>& parameters() const { return parameters_; }
 
  private:

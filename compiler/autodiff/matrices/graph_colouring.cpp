@@ -110,10 +110,9 @@ VertexColours star_colouring(const Adjacency& graph) { return StarColouring(grap
 bool is_alone(const Adjacency& graph, const VertexColours& colours, int i, int j) {
   int wanted = colours.of[static_cast<size_t>(j)];
   if (wanted == colours.of[static_cast<size_t>(i)]) return false;  // the diagonal entry of row i
-  for (int k : graph[static_cast<size_t>(i)]) {
-    if (k != j && colours.of[static_cast<size_t>(k)] == wanted) return false;
-  }
-  return true;
+  return std::ranges::none_of(graph[static_cast<size_t>(i)], [&](int k) {
+    return k != j && colours.of[static_cast<size_t>(k)] == wanted;
+  });
 }
 
 }  // namespace retrograde::autodiff

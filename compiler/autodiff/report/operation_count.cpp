@@ -281,10 +281,7 @@ Count OperationCount::bytes() const {
 }
 
 const FuncOperations* OperationCount::find(const FuncContents* f) const {
-  for (const FuncOperations& entry : funcs) {
-    if (entry.func.get() == f) return &entry;
-  }
-  return nullptr;
+  return first_where(funcs, [&](const FuncOperations& entry) { return entry.func.get() == f; });
 }
 
 OperationCount count_operations(const std::vector<WantedFunc>& outputs) {

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <unordered_map>
 
 #include "autodiff/sweeps/made_definitions.h"
 #include "graph/own_reads.h"

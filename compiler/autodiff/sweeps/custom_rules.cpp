@@ -36,8 +36,7 @@ std::shared_ptr<Symbol> read_symbol(const Expr& e) {
 class Readers {
  public:
   explicit Readers(const FuncContents& f) : f_(f) {
-    for (int s = 0; s < f.stage_count(); ++s)
-      for_each_expr(f.stage(s), [&](const Expr& e) { add_expr(e); });
+    for_each_expr(f, [&](const Expr& e) { add_expr(e); });
     if (!f.extern_definition) return;
     for (const ExternArgument& a : f.extern_definition->args) {
       if (a.func) add(a.func);

@@ -76,12 +76,10 @@ void Regions::add_func(const FuncPtr& f) {
   for (int s = f->stage_count() - 1; s >= 0; --s) {
     const Definition& definition = f->stage(s);
     Scope<Interval> scope = scope_of(loops_of(*f, definition, boxes_[f.get()]));
-    Box written;
-    for (size_t d = 0; d < f->args.size(); ++d) {
+    const Box written = numbered(f->args.size(), [&](size_t d) {
       const Interval mine = boxes_[f.get()][d];
-      written.push_back(is_pure_position(*f, definition, d) ? mine
-                                                            : bounds_of(definition.args[d], scope));
-    }
+      return is_pure_position(*f, definition, d) ? mine : bounds_of(definition.args[d], scope);
+    });
     if (s > 0) grow(f.get(), or_else(written, boxes_[f.get()]));
     const bool has_known_reads = is_output || !read_elsewhere(*f, definition).defined();
     for_each_expr(definition, [&](const Expr& e) {
@@ -129,12 +127,10 @@ IterationDomain Regions::domain(const FuncContents& f, int stage) const {
 }
 
 Box box_of(const Region& region) {
-  Box box;
-  for (const Range& r : region) {
+  return mapped(region, [&](const Range& r) {
     Expr min = cast_to(Int(32), r.min);
-    box.push_back({min, simplify(min + cast_to(Int(32), r.extent) - 1)});
-  }
-  return box;
+    return Interval{min, simplify(min + cast_to(Int(32), r.extent) - 1)};
+  });
 }
 
 }  // namespace retrograde::autodiff

@@ -142,8 +142,7 @@ class Folder {
 
   void copy_if_changed(const FuncPtr& f) {
     bool changed = false;
-    for (int s = 0; s < f->stage_count(); ++s)
-      for_each_expr(f->stage(s), [&](const Expr& e) { changed |= !redirected(e).same_as(e); });
+    for_each_expr(*f, [&](const Expr& e) { changed |= !redirected(e).same_as(e); });
     if (!changed) return;
     FuncPtr g = clone(f, f->stage_count(), f->name);
     copies[f.get()] = g;

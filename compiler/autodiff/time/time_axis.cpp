@@ -122,9 +122,7 @@ class TimeAxisFinder {
     int64_t window = 0;
     for (const FuncPtr& g : order_) {
       if (g.get() == f_) continue;
-      for (int s = 0; s < g->stage_count(); ++s) {
-        for_each_expr(g->stage(s), [&](const Expr& e) { window = std::max(window, read_by(e)); });
-      }
+      for_each_expr(*g, [&](const Expr& e) { window = std::max(window, read_by(e)); });
     }
     if (window == 0 || window > most_slots) return false;
     // What is read from before the first step must be there at the start.

@@ -77,12 +77,10 @@ Expr as_int(const Expr& e) { return ir::int32_literal(e, "apply a boundary condi
 Func remap(const Func& source, const Region& bounds, CoordinateMap map, const char* name) {
   check(source, bounds, name);
   const std::vector<Var> args = source.args();
-  std::vector<Expr> at;
-  for (size_t d = 0; d < args.size(); d++) {
+  const std::vector<Expr> at = ir::numbered(args.size(), [&](size_t d) {
     const bool mapped = d < bounds.size() && is_bounded(bounds[d]);
-    at.push_back(mapped ? map(args[d], as_int(bounds[d].min), as_int(bounds[d].extent))
-                        : Expr(args[d]));
-  }
+    return mapped ? map(args[d], as_int(bounds[d].min), as_int(bounds[d].extent)) : Expr(args[d]);
+  });
   Func result(name);
   result(args) = source(at);
   return result;

@@ -1,6 +1,7 @@
 // pipeline.cpp -- compiling on demand, the buffers of the outputs, bounds queries.
 #include "frontend/run/pipeline.h"
 
+#include <algorithm>
 #include <iostream>
 #include <mutex>
 #include <unordered_set>
@@ -34,13 +35,8 @@ struct Stamp {
     return result;
   }
   bool is_current() const {
-    for (const auto& [f, version] : funcs) {
-      if (f->version != version) return false;
-    }
-    for (const auto& [p, version] : parameters) {
-      if (p->version != version) return false;
-    }
-    return true;
+    const auto is_same = [](const auto& seen) { return seen.first->version == seen.second; };
+    return std::ranges::all_of(funcs, is_same) && std::ranges::all_of(parameters, is_same);
   }
 };
 

@@ -9,6 +9,7 @@
 //   f.specialize(true)                     a condition that no call decides
 #include "frontend/run/warnings.h"
 
+#include <algorithm>
 #include <utility>
 
 #include "diagnostics/error.h"
@@ -28,10 +29,8 @@ bool overwrites_all(const FuncContents& f, const Definition& update) {
     const auto* variable = update.args[d].as<Variable>();
     if (!variable || variable->name != f.args[d]) return false;
   }
-  for (const Expr& value : update.values) {
-    if (is_undef(value) || calls(value, &f)) return false;
-  }
-  return true;
+  return std::ranges::none_of(
+      update.values, [&](const Expr& value) { return is_undef(value) || calls(value, &f); });
 }
 
 std::string words_for_stage(const FuncContents& f, int stage) {

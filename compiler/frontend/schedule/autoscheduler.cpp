@@ -72,9 +72,7 @@ void add_autoscheduler(const std::string& name, const AutoSchedulerFn& scheduler
 
 std::vector<std::string> autoscheduler_names() {
   std::lock_guard lock(loaded().mutex);
-  std::vector<std::string> names;
-  for (const auto& [name, scheduler] : loaded().by_name) names.push_back(name);
-  return names;
+  return ir::keys_of(loaded().by_name);
 }
 
 void set_default_autoscheduler_name(const std::string& name) {

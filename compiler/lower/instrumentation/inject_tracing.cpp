@@ -201,13 +201,11 @@ class Tracer : public Rewriter {
   }
 
   std::vector<Range> region_of(const ProducerConsumer& n) {
-    std::vector<Range> region;
-    for (const Interval& side : region_stored(n.body, n.name)) {
+    return mapped(region_stored(n.body, n.name), [&](const Interval& side) {
       const bool known = side.is_bounded();
-      region.push_back({known ? simplify(side.min) : Expr(0),
-                        known ? simplify(side.max - side.min + 1) : Expr(0)});
-    }
-    return region;
+      return Range{known ? simplify(side.min) : Expr(0),
+                   known ? simplify(side.max - side.min + 1) : Expr(0)};
+    });
   }
 
   template <class Make>

@@ -1,7 +1,5 @@
 #include "lower/loops/choice_arms.h"
 
-#include <functional>
-
 #include "ir/build.h"
 #include "ir/visit.h"
 

@@ -17,7 +17,6 @@
 
 #include <unordered_map>
 #include <unordered_set>
-#include <vector>
 
 #include "diagnostics/error.h"
 #include "ir/atomic_update.h"

@@ -48,8 +48,7 @@ class Dependencies {
  private:
   void visit(const FuncContents& f) {
     if (!funcs_.insert(&f).second) return;
-    for (int s = 0; s < f.stage_count(); s++)
-      for_each_expr(f.stage(s), [&](const Expr& e) { visit(e); });
+    for_each_expr(f, [&](const Expr& e) { visit(e); });
     if (!f.extern_definition) return;
     for (const ExternArgument& arg : f.extern_definition->args) {
       if (arg.func) visit(*arg.func);

@@ -10,12 +10,10 @@
 namespace retrograde::lower {
 
 Box buffer_box(const std::string& buffer, int dimensions) {
-  Box box;
-  for (int d = 0; d < dimensions; d++) {
+  return numbered(dimensions, [&](int d) {
     Expr min = variable(text(buffer, ".min.", d));
-    box.push_back({min, min + variable(text(buffer, ".extent.", d)) - 1});
-  }
-  return box;
+    return Interval{min, min + variable(text(buffer, ".extent.", d)) - 1};
+  });
 }
 
 NestEmitter::NestEmitter(const Program& program, const LoopNestOptions& options)

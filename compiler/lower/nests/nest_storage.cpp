@@ -34,10 +34,8 @@ std::vector<Loop> loops_to_storage(const LoopedFunc& f, const ComputePlace& site
 namespace {
 
 const StorageRule* rule_of(const LoopedFunc& f, size_t d) {
-  for (const StorageRule& rule : f.schedule.storage_rules) {
-    if (rule.var == f.func->args[d]) return &rule;
-  }
-  return nullptr;
+  return first_where(f.schedule.storage_rules,
+                     [&](const StorageRule& rule) { return rule.var == f.func->args[d]; });
 }
 
 void apply(const StorageRule& rule, const LoopedFunc& f, size_t d, Range& range, Expr& factor,
