@@ -473,9 +473,8 @@ class Buffer {
   // an exception.
   // Requires: an access gives one coordinate for each dimension; the buffer must have memory; a
   // coordinate lies inside the buffer, or one past its end.
-  template <typename... Ints>
-  requires(std::is_convertible_v<Ints, int>&&...) decltype(auto) operator()(int first,
-                                                                            Ints... rest) const {
+  template <std::convertible_to<int>... Ints>
+  decltype(auto) operator()(int first, Ints... rest) const {
     const int at[] = {first, static_cast<int>(rest)...};
     return element(at, 1 + static_cast<int>(sizeof...(rest)));
   }
@@ -483,9 +482,8 @@ class Buffer {
   decltype(auto) operator()(const int* at) const { return element(at, dimensions()); }
 
   // The load of an element, inside an Expr.
-  template <typename... Args>
-  requires((std::is_convertible_v<Args, Expr> && ...)) Expr operator()(const Expr& first,
-                                                                       Args&&... rest) const {
+  template <std::convertible_to<Expr>... Args>
+  Expr operator()(const Expr& first, Args&&... rest) const {
     checked("operator()");
     return frontend::buffer_access(contents_, {first, Expr(std::forward<Args>(rest))...});
   }

@@ -108,8 +108,8 @@ class ImageParam : public OutputImageParam {
   Buffer<> get() const;
   void reset();  // no buffer for the next calls
 
-  template <typename... Args>
-  requires((std::is_convertible_v<Args, Expr> && ...)) Expr operator()(Args&&... args) const {
+  template <std::convertible_to<Expr>... Args>
+  Expr operator()(Args&&... args) const {
     return access({Expr(std::forward<Args>(args))...});
   }
   Expr operator()(const std::vector<Expr>& args) const { return access(args); }

@@ -194,8 +194,8 @@ Expr strict_float(Expr e);  // no contraction to FMA inside
 // The value, which a memoized Func's cache knows by `key`: what an image holds is no part of the
 // cache's key by itself. Keys are made of Params and constants.
 Expr memoize_tag(Expr value, const std::vector<Expr>& key);
-template <typename... Keys>
-requires(std::is_convertible_v<Keys, Expr>&&...) Expr memoize_tag(Expr value, Keys&&... key) {
+template <std::convertible_to<Expr>... Keys>
+Expr memoize_tag(Expr value, Keys&&... key) {
   return memoize_tag(std::move(value), std::vector<Expr>{Expr(std::forward<Keys>(key))...});
 }
 Expr stop_gradient(Expr e);  // a constant as far as derivatives go
@@ -226,8 +226,8 @@ void check_integer(const Expr& e, const char* what);
 // The first value; prints all of them, a line for each evaluation.
 // Requires: it gives the value of its first argument; every operand must be a defined expression.
 inline Expr print(const std::vector<Expr>& values) { return frontend::print_values(values); }
-template <typename First, typename... Rest>
-requires(std::is_convertible_v<First, Expr>) Expr print(First&& first, Rest&&... rest) {
+template <std::convertible_to<Expr> First, typename... Rest>
+Expr print(First&& first, Rest&&... rest) {
   std::vector<Expr> values{Expr(std::forward<First>(first))};
   frontend::collect_parts(values, std::forward<Rest>(rest)...);
   return frontend::print_values(std::move(values));

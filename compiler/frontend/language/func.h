@@ -54,8 +54,8 @@ class Func : public LoopDirectives<Func>, public Runnable<Func> {
     (*this)(_) = image(_);
   }
 
-  template <typename... Args>
-  requires((std::is_convertible_v<Args, Expr> && ...)) FuncRef operator()(Args&&... args) const {
+  template <std::convertible_to<Expr>... Args>
+  FuncRef operator()(Args&&... args) const {
     return FuncRef(func_, {Expr(std::forward<Args>(args))...});
   }
   // Requires: a coordinate must be a defined expression; coordinates are integers; an access gives
@@ -222,9 +222,8 @@ class Func : public LoopDirectives<Func>, public Runnable<Func> {
   //   g[x + w * y + w * h * c]    =>    g[c + 3 * x + 3 * w * y]
   // Requires: each must be one of its dimensions; each dimension is named once.
   Func& reorder_storage(const std::vector<Var>& dims);
-  template <typename... Rest>
-  requires((std::is_convertible_v<Rest, Var> &&
-            ...)) Func& reorder_storage(const Var& x, const Var& y, Rest&&... rest) {
+  template <std::convertible_to<Var>... Rest>
+  Func& reorder_storage(const Var& x, const Var& y, Rest&&... rest) {
     return reorder_storage(std::vector<Var>{x, y, Var(std::forward<Rest>(rest))...});
   }
   // The extent of this dimension in storage grows to a multiple of `alignment`, so that every line

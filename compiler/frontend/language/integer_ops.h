@@ -59,14 +59,12 @@ Expr user_context_value();
 // on what stood there (Unsupported).
 Expr scatter(const std::vector<Expr>& points);
 Expr gather(const std::vector<Expr>& points);
-template <typename... Points>
-requires((std::is_convertible_v<Points, Expr> && ...)) Expr
-    scatter(const Expr& first, Points&&... others) {
+template <std::convertible_to<Expr>... Points>
+Expr scatter(const Expr& first, Points&&... others) {
   return scatter(std::vector<Expr>{first, Expr(std::forward<Points>(others))...});
 }
-template <typename... Points>
-requires((std::is_convertible_v<Points, Expr> && ...)) Expr
-    gather(const Expr& first, Points&&... others) {
+template <std::convertible_to<Expr>... Points>
+Expr gather(const Expr& first, Points&&... others) {
   return gather(std::vector<Expr>{first, Expr(std::forward<Points>(others))...});
 }
 

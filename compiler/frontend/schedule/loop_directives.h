@@ -82,9 +82,8 @@ class LoopDirectives {
   // Requires: each loop is named once; the order of reduction loops may change only where it
   // changes no result.
   Self& reorder(const std::vector<VarOrRVar>& vars) { return give(frontend::reorder_of(vars)); }
-  template <typename... Rest>
-  requires((std::is_convertible_v<Rest, VarOrRVar> &&
-            ...)) Self& reorder(const VarOrRVar& x, const VarOrRVar& y, Rest&&... rest) {
+  template <std::convertible_to<VarOrRVar>... Rest>
+  Self& reorder(const VarOrRVar& x, const VarOrRVar& y, Rest&&... rest) {
     return reorder(std::vector<VarOrRVar>{x, y, VarOrRVar(std::forward<Rest>(rest))...});
   }
   // Splits both and runs block after block: loops xi, yi, xo, yo, innermost first.
@@ -190,14 +189,12 @@ class LoopDirectives {
   }
   Self& never_partition_all() { return never_partition(frontend::loops_at(place())); }
   Self& always_partition_all() { return always_partition(frontend::loops_at(place())); }
-  template <typename... Rest>
-  requires((std::is_convertible_v<Rest, VarOrRVar> &&
-            ...)) Self& never_partition(const VarOrRVar& x, Rest&&... rest) {
+  template <std::convertible_to<VarOrRVar>... Rest>
+  Self& never_partition(const VarOrRVar& x, Rest&&... rest) {
     return never_partition(std::vector<VarOrRVar>{x, VarOrRVar(std::forward<Rest>(rest))...});
   }
-  template <typename... Rest>
-  requires((std::is_convertible_v<Rest, VarOrRVar> &&
-            ...)) Self& always_partition(const VarOrRVar& x, Rest&&... rest) {
+  template <std::convertible_to<VarOrRVar>... Rest>
+  Self& always_partition(const VarOrRVar& x, Rest&&... rest) {
     return always_partition(std::vector<VarOrRVar>{x, VarOrRVar(std::forward<Rest>(rest))...});
   }
 
