@@ -54,21 +54,20 @@ Complex square_root(const Complex& a) {
   Expr re = real_op(Op::sqrt, (modulus(a) + a.re) * 0.5);
   return {re, a.im / (re * 2.0)};
 }
+Expr product_of(Op of_re, Op of_im, const Complex& a) {
+  return real_op(of_re, a.re) * real_op(of_im, a.im);
+}
 Complex sine(const Complex& a) {
-  return {real_op(Op::sin, a.re) * real_op(Op::cosh, a.im),
-          real_op(Op::cos, a.re) * real_op(Op::sinh, a.im)};
+  return {product_of(Op::sin, Op::cosh, a), product_of(Op::cos, Op::sinh, a)};
 }
 Complex cosine(const Complex& a) {
-  return {real_op(Op::cos, a.re) * real_op(Op::cosh, a.im),
-          zero() - real_op(Op::sin, a.re) * real_op(Op::sinh, a.im)};
+  return {product_of(Op::cos, Op::cosh, a), zero() - product_of(Op::sin, Op::sinh, a)};
 }
 Complex hyperbolic_sine(const Complex& a) {
-  return {real_op(Op::sinh, a.re) * real_op(Op::cos, a.im),
-          real_op(Op::cosh, a.re) * real_op(Op::sin, a.im)};
+  return {product_of(Op::sinh, Op::cos, a), product_of(Op::cosh, Op::sin, a)};
 }
 Complex hyperbolic_cosine(const Complex& a) {
-  return {real_op(Op::cosh, a.re) * real_op(Op::cos, a.im),
-          real_op(Op::sinh, a.re) * real_op(Op::sin, a.im)};
+  return {product_of(Op::cosh, Op::cos, a), product_of(Op::sinh, Op::sin, a)};
 }
 // For a real base that is not negative, or a real integer power.
 Complex power(const Complex& a, const Complex& p) {

@@ -35,21 +35,9 @@ nlohmann::json json_of(const StabilityReport::FuncResult& f) {
 }  // namespace
 
 const char* to_string(Extreme extreme) {
-  switch (extreme) {
-    case Extreme::Zeros:
-      return "zeros";
-    case Extreme::Denormals:
-      return "denormals";
-    case Extreme::Huge:
-      return "huge";
-    case Extreme::Tiny:
-      return "tiny";
-    case Extreme::Infinities:
-      return "infinities";
-    case Extreme::NaNs:
-      return "NaNs";
-  }
-  return "";
+  static constexpr const char* names[] = {"zeros", "denormals",  "huge",
+                                          "tiny",  "infinities", "NaNs"};
+  return names[static_cast<int>(extreme)];
 }
 
 std::string StabilityReport::to_json() const {

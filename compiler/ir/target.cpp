@@ -434,28 +434,20 @@ bool Target::get_runtime_compatible_target(const Target& other, Target& result) 
 }
 
 Target::Feature target_feature_for_device_api(DeviceAPI device) {
-  switch (device) {
-    case DeviceAPI::CUDA:
-      return Target::CUDA;
-    case DeviceAPI::OpenCL:
-      return Target::OpenCL;
-    case DeviceAPI::OpenGLCompute:
-      return Target::OpenGLCompute;
-    case DeviceAPI::Metal:
-      return Target::Metal;
-    case DeviceAPI::Hexagon:
-      return Target::HVX_128;
-    case DeviceAPI::HexagonDma:
-      return Target::HexagonDma;
-    case DeviceAPI::D3D12Compute:
-      return Target::D3D12Compute;
-    case DeviceAPI::Vulkan:
-      return Target::Vulkan;
-    case DeviceAPI::WebGPU:
-      return Target::WebGPU;
-    default:
-      return Target::FeatureEnd;
+  static constexpr std::pair<DeviceAPI, Target::Feature> features[] = {
+      {DeviceAPI::CUDA, Target::CUDA},
+      {DeviceAPI::OpenCL, Target::OpenCL},
+      {DeviceAPI::OpenGLCompute, Target::OpenGLCompute},
+      {DeviceAPI::Metal, Target::Metal},
+      {DeviceAPI::Hexagon, Target::HVX_128},
+      {DeviceAPI::HexagonDma, Target::HexagonDma},
+      {DeviceAPI::D3D12Compute, Target::D3D12Compute},
+      {DeviceAPI::Vulkan, Target::Vulkan},
+      {DeviceAPI::WebGPU, Target::WebGPU}};
+  for (const auto& [api, feature] : features) {
+    if (api == device) return feature;
   }
+  return Target::FeatureEnd;
 }
 
 bool host_supports_target_device(const Target& target) { return !target.has_gpu_feature(); }

@@ -1,7 +1,6 @@
 // inline_reductions.cpp -- finds what an inline reduction runs over, and what its Func depends on.
 #include "frontend/language/inline_reductions.h"
 
-#include <algorithm>
 #include <unordered_set>
 
 #include "frontend/language/integer_ops.h"
@@ -111,44 +110,25 @@ Expr mention_domain(const Expr& e, const Reduction& reduction) {
   return select(Expr(r) >= r.min(), e, ir::make_zero(e.type()));
 }
 
-enum class Fold { Sum, SaturatingSum, Product, Maximum, Minimum };
+// What a reduction begins with, and how it takes one more value.
+struct Fold {
+  Expr (*initial)(Type);
+  Expr (*combine)(Expr, Expr);
+};
+constexpr Fold sum_fold{ir::make_zero, [](Expr a, Expr b) { return a + b; }};
+constexpr Fold saturating_fold{ir::make_zero, [](Expr a, Expr b) { return saturating_add(a, b); }};
+constexpr Fold product_fold{ir::make_one, [](Expr a, Expr b) { return a * b; }};
+constexpr Fold maximum_fold{[](Type type) { return Expr(type.min()); },
+                            [](Expr a, Expr b) { return max(a, b); }};
+constexpr Fold minimum_fold{[](Type type) { return Expr(type.max()); },
+                            [](Expr a, Expr b) { return min(a, b); }};
 
-Expr initial_value(Fold fold, Type type) {
-  switch (fold) {
-    case Fold::Sum:
-    case Fold::SaturatingSum:
-      return ir::make_zero(type);
-    case Fold::Product:
-      return ir::make_one(type);
-    case Fold::Maximum:
-      return type.min();
-    case Fold::Minimum:
-      return type.max();
-  }
-  internal_error("a fold of unknown kind");
-}
-
-Expr combine(Fold fold, Expr a, Expr b) {
-  switch (fold) {
-    case Fold::Sum:
-      return a + b;
-    case Fold::SaturatingSum:
-      return saturating_add(a, b);
-    case Fold::Product:
-      return a * b;
-    case Fold::Maximum:
-      return max(a, b);
-    case Fold::Minimum:
-      return min(a, b);
-  }
-  internal_error("a fold of unknown kind");
-}
-
-Expr reduce(Fold fold, const DomainPtr& domain, const Expr& e, const Func& f, const char* name) {
+Expr reduce(const Fold& fold, const DomainPtr& domain, const Expr& e, const Func& f,
+            const char* name) {
   check_undefined(f, name);
   const Reduction reduction = find_reduction(domain, e, name);
-  f(reduction.args) = initial_value(fold, e.type());
-  f(reduction.args) = combine(fold, f(reduction.args), mention_domain(reduction.body, reduction));
+  f(reduction.args) = fold.initial(e.type());
+  f(reduction.args) = fold.combine(f(reduction.args), mention_domain(reduction.body, reduction));
   return f(reduction.at);
 }
 
@@ -185,11 +165,11 @@ Tuple reduce_place(bool is_max, const DomainPtr& domain, const Expr& e, const Fu
   Result name(const RDom& domain, Expr e, const Func& func) {                               \
     return function(kind, domain.domain(), e, func, #name);                                 \
   }
-RETROGRADE_DEFINE_REDUCTION(Expr, sum, reduce, Fold::Sum)
-RETROGRADE_DEFINE_REDUCTION(Expr, saturating_sum, reduce, Fold::SaturatingSum)
-RETROGRADE_DEFINE_REDUCTION(Expr, product, reduce, Fold::Product)
-RETROGRADE_DEFINE_REDUCTION(Expr, maximum, reduce, Fold::Maximum)
-RETROGRADE_DEFINE_REDUCTION(Expr, minimum, reduce, Fold::Minimum)
+RETROGRADE_DEFINE_REDUCTION(Expr, sum, reduce, sum_fold)
+RETROGRADE_DEFINE_REDUCTION(Expr, saturating_sum, reduce, saturating_fold)
+RETROGRADE_DEFINE_REDUCTION(Expr, product, reduce, product_fold)
+RETROGRADE_DEFINE_REDUCTION(Expr, maximum, reduce, maximum_fold)
+RETROGRADE_DEFINE_REDUCTION(Expr, minimum, reduce, minimum_fold)
 RETROGRADE_DEFINE_REDUCTION(Tuple, argmax, reduce_place, true)
 RETROGRADE_DEFINE_REDUCTION(Tuple, argmin, reduce_place, false)
 #undef RETROGRADE_DEFINE_REDUCTION
