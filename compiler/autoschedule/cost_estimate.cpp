@@ -1,6 +1,7 @@
 #include "autoschedule/cost_estimate.h"
 
 #include <algorithm>
+#include <unordered_set>
 
 #include "ir/build.h"
 #include "ir/visit.h"
@@ -34,6 +35,57 @@ double operations_of(const Expr& node) {
   if (!node.type().is_float()) return 0;
   const Work work = work_of(node);
   return std::max(work.adds, work.mults) + work.function_adds + (divides(node) ? 4 : 0);
+}
+
+namespace {
+
+bool is_read(const Expr& node) {
+  const auto* call = node.as<Call>();
+  return call && call->call_type != CallType::Operator;
+}
+
+double integer_operations(const Expr& node) {
+  const bool computes = node.as<Binary>() || node.as<Select>() || node.as<Call>();
+  return computes ? node.type().bits() / 32.0 : 0;
+}
+
+}  // namespace
+
+double operations_of_values(const std::vector<Expr>& values,
+                            FunctionRef<double(const Call&)> of_call) {
+  double total = 0;
+  std::unordered_set<const ExprNode*> seen;
+  const auto count_index = [&](const Expr& e) {
+    if (!seen.insert(e.get()).second) return false;
+    total += is_read(e) ? of_call(*e.as<Call>()) : operations_of(e);
+    return true;
+  };
+  for (const Expr& value : values) {
+    const bool counts_integers = !value.type().is_float();
+    walk(value, [&](const Expr& e) {
+      if (!seen.insert(e.get()).second) return false;
+      if (is_read(e)) {
+        total += of_call(*e.as<Call>());
+        for (const Expr& index : e.as<Call>()->args) walk(index, count_index);
+        return false;
+      }
+      const bool is_integer = !e.type().is_float();
+      total += counts_integers && is_integer ? integer_operations(e) : operations_of(e);
+      return true;
+    });
+  }
+  return total;
+}
+
+int bits_of_values(const std::vector<Expr>& values) {
+  int bits = 1;
+  for (const Expr& value : values) {
+    walk(value, [&](const Expr& e) {
+      if (!is_const(e)) bits = std::max(bits, e.type().bits());
+      return !is_read(e);
+    });
+  }
+  return bits;
 }
 
 }  // namespace retrograde::autoschedule

@@ -2,7 +2,10 @@
 // that differentiation makes only where they pay.
 #pragma once
 
+#include <vector>
+
 #include "ir/expr.h"
+#include "ir/visit.h"
 
 namespace retrograde::autoschedule {
 
@@ -20,5 +23,11 @@ Work work_of(const Expr& node);
 // as long as, and a division four more than a multiplication; multiplications come with an addition
 // each, and comparisons with the choice that they decide.
 double operations_of(const Expr& node);
+// Of all that values of a Func are made of, each node once; of a call of a Func or of an image what
+// `of_call` says, beside its indices. Integer values are work, too: a vector holds more of narrow ones.
+double operations_of_values(const std::vector<Expr>& values,
+                            FunctionRef<double(const Call&)> of_call);
+// Of the widest number that a value is made of, indices aside.
+int bits_of_values(const std::vector<Expr>& values);
 
 }  // namespace retrograde::autoschedule

@@ -5,6 +5,7 @@
 #include <optional>
 #include <unordered_set>
 
+#include "autoschedule/cost_estimate.h"
 #include "autoschedule/cut_reductions.h"
 #include "autoschedule/inlined_reads.h"
 #include "autoschedule/join_sweeps.h"
@@ -20,6 +21,7 @@
 #include "autoschedule/scatter_slices.h"
 #include "autoschedule/slices.h"
 #include "autoschedule/stored_funcs.h"
+#include "autoschedule/strips.h"
 #include "diagnostics/large_stack.h"
 #include "frontend/language/func.h"
 #include "frontend/language/rdom.h"
@@ -36,6 +38,7 @@ namespace retrograde::autoschedule {
 namespace {
 
 constexpr int lanes = 16;
+constexpr int scan_vectors = 8;      // of a row, in a block of columns
 constexpr int64_t small_shift = 16;  // values of a dimension, such as the taps of a filter
 
 // The dimension along which what is read lies next to each other in memory.
@@ -108,9 +111,10 @@ class LoopChooser {
       return tile(*d);
     if (!scatters && schedule_look_ups(f_, index_, stage_, lanes, sizes_)) return;
     if (!scatters && pure_[0] == 0 && tile_in_registers()) return;
+    if (pure_[0] == 0 && scans_rows()) return cut_scan();
     make_tasks();
     if (pure_[0] != 0) return;
-    vectorize(stage_, variable_of(0), lanes, TailStrategy::GuardWithIf);
+    vectorize(stage_, variable_of(0), lanes_of_values(), TailStrategy::GuardWithIf);
     const bool reduces = !definition().rvars.empty();
     if (pure_.size() == 1 && reduces) stage_.parallel(variable_of(0));  // of the vectors
   }
@@ -119,6 +123,11 @@ class LoopChooser {
   const Definition& definition() const { return f_.stage(index_); }
   Var variable_of(size_t dimension) const { return Var(f_.args[dimension]); }
   Var inside(const Var& loop) const { return Var(inner_loop(f_, index_, loop.name())); }
+
+  // A register of narrow numbers holds more of them.
+  int lanes_of_values() const {
+    return std::clamp(lanes * 32 / bits_of_values(definition().values), lanes, 4 * lanes);
+  }
 
   // The outermost loop, and those inside of it while their iterations are few; not that of the
   // vectors. How many private parts there are may be known at run time only: few, where the target
@@ -130,6 +139,34 @@ class LoopChooser {
       stage_.parallel(variable_of(pure_[i]));
       tasks *= sizes_.extent(f_, pure_[i]).value_or(unknown);
     }
+  }
+
+  // Whether an update takes elements of other rows that it has made before.
+  bool scans_rows() const {
+    const Definition& update = definition();
+    if (index_ == 0 || !read_elsewhere(f_, update).defined()) return false;
+    const auto moves_row = [&](const ReductionVariable& r) {
+      return std::any_of(update.args.begin() + 1, update.args.end(),
+                         [&](const Expr& arg) { return uses_variable(arg, r.var); });
+    };
+    return !update.rvars.empty() &&
+           std::all_of(update.rvars.begin(), update.rvars.end(), moves_row);
+  }
+
+  // Row after row, in blocks of columns that are the tasks: a row of one is a few lines of a cache.
+  void cut_scan() {
+    const Var x = variable_of(0), vectors = inside(x);
+    const Var lane(new_loop(f_, index_, "lane"));
+    stage_.split(x, x, vectors, scan_vectors * lanes, TailStrategy::GuardWithIf);
+    stage_.split(vectors, vectors, lane, lanes, TailStrategy::GuardWithIf).vectorize(lane);
+    std::vector<VarOrRVar> order{lane, vectors};
+    for (const ReductionVariable& r : definition().rvars) order.push_back(RVar(r.var));
+    order.push_back(x);
+    for (size_t d : pure_) {
+      if (d != 0) order.push_back(variable_of(d));
+    }
+    stage_.reorder(order).parallel(x);
+    make_tasks();
   }
 
   // Whether there is a tile.
@@ -333,6 +370,7 @@ void give_default_schedule(const std::vector<FuncPtr>& outputs, const VectorUnit
     given.push_back(f);
   }
   const Readers readers(outputs, stored);  // before anything is moved
+  compute_in_strips(outputs, given, whole, sizes);
   compute_in_slices(readers, stored, whole, sizes);
   compute_in_reductions(readers, stored, whole, sizes);
   run_along_rows(given, sizes);

@@ -5,6 +5,7 @@
 #include <string>
 #include <unordered_set>
 
+#include "autoschedule/only_reader.h"
 #include "frontend/language/func.h"
 #include "frontend/language/rdom.h"
 #include "frontend/schedule/stage.h"
@@ -123,8 +124,7 @@ void join_sweeps(const std::vector<FuncPtr>& outputs, const std::vector<FuncPtr>
   for (const FuncPtr& f : topological_order(outputs)) hosts.insert(f->schedule.compute_level.func);
   std::vector<Sweep> sweeps;
   for (const FuncPtr& f : funcs) {
-    const bool is_at_root = f->schedule.compute_level.kind == graph::LoopLevel::Kind::Root;
-    if (!is_at_root || hosts.contains(f->name)) continue;
+    if (!is_at_root(*f) || hosts.contains(f->name)) continue;
     if (f->stage_count() != 2 || f->updates[0].rvars.empty()) continue;
     Sweep sweep{f, 1, looked_up_in(*f, f->updates[0], sizes)};
     if (!sweep.looked_up.empty()) sweeps.push_back(std::move(sweep));

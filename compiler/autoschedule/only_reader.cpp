@@ -39,6 +39,10 @@ std::optional<Reader> Readers::only_reader(const FuncPtr& f) const {
   return reader.stage >= 0 ? std::optional(std::move(reader)) : std::nullopt;
 }
 
+bool is_at_root(const FuncContents& f) {
+  return f.schedule.compute_level.kind == graph::LoopLevel::Kind::Root;
+}
+
 bool is_split(const Definition& stage, const std::string& var) {
   const auto& splits = stage.schedule.splits;
   return std::any_of(splits.begin(), splits.end(), [&](const Split& split) {

@@ -39,6 +39,7 @@ class Readers {
   std::unordered_set<std::string> hosts_;
 };
 
+bool is_at_root(const FuncContents& f);
 // Whether a loop of the stage was split, or comes from a split.
 bool is_split(const Definition& stage, const std::string& var);
 

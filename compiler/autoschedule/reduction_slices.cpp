@@ -193,19 +193,16 @@ void run_serially(const FuncPtr& f, const std::vector<FuncPtr>& stored) {
 void compute_in_reductions(const Readers& readers, const std::vector<FuncPtr>& stored,
                            const std::unordered_set<const Symbol*>& but,
                            const SizeEstimate& sizes) {
-  const auto is_at_root = [](const FuncPtr& f) {
-    return f->schedule.compute_level.kind == graph::LoopLevel::Kind::Root;
-  };
   const auto may_move = [&](const FuncPtr& f) {
     const bool is_partial = f->made && (f->made->lanes > 0 || f->made->has_parts);
     return f->args.size() > image_dimensions && !f->is_extern() && !is_partial &&
-           !but.contains(f.get()) && is_at_root(f);
+           !but.contains(f.get()) && is_at_root(*f);
   };
   std::unordered_set<const Symbol*> cut;  // readers whose loops are strips now
   for (const FuncPtr& f : stored) {
     if (!may_move(f) || !readers.is_inside(f) || readers.is_output(f)) continue;
     const auto reader = readers.only_reader(f);
-    if (!reader || !is_at_root(reader->func) || but.contains(reader->func.get()) ||
+    if (!reader || !is_at_root(*reader->func) || but.contains(reader->func.get()) ||
         cut.contains(reader->func.get()))
       continue;
     const auto move = ReductionSlicer(f, *reader, sizes).find();

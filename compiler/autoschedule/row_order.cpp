@@ -5,6 +5,7 @@
 #include <unordered_map>
 #include <unordered_set>
 
+#include "autoschedule/only_reader.h"
 #include "frontend/language/rdom.h"
 #include "frontend/schedule/stage.h"
 #include "graph/own_reads.h"
@@ -92,7 +93,7 @@ void move_out(const FuncPtr& f, int stage, const std::unordered_set<std::string>
 void run_along_rows(const std::vector<FuncPtr>& funcs, const SizeEstimate& sizes) {
   MemoryLoads memory(sizes);
   for (const FuncPtr& f : funcs) {
-    if (f->schedule.compute_level.kind != graph::LoopLevel::Kind::Root) continue;
+    if (!is_at_root(*f)) continue;
     for (int s = 1; s < f->stage_count(); ++s) {
       const auto planes = planes_of(*f, f->stage(s), memory);
       if (iterations_of(f->stage(s), planes) >= many_streams && runs_row_by_row(*f, f->stage(s)))

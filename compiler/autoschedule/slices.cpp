@@ -85,9 +85,10 @@ void compute_in_slices(const Readers& readers, const std::vector<FuncPtr>& store
   };
   const Slicer slicer(sizes);
   for (const FuncPtr& f : stored) {
-    if (!may_have_slices(f) || !readers.is_inside(f) || readers.is_output(f)) continue;
+    if (!is_at_root(*f) || !may_have_slices(f) || !readers.is_inside(f) || readers.is_output(f))
+      continue;
     const auto reader = readers.only_reader(f);
-    if (!reader || but.contains(reader->func.get())) continue;
+    if (!reader || !is_at_root(*reader->func) || but.contains(reader->func.get())) continue;
     if (const auto loop = slicer.loop(f, *reader))
       Func(f).compute_at(retrograde::LoopLevel(Func(reader->func), Var(*loop), reader->stage));
   }

@@ -113,22 +113,12 @@ class StorageChooser {
     return total;
   }
   double operations(const Definition& stage) const {
-    double total = 0;
-    std::unordered_set<const ExprNode*> seen;
-    for (const Expr& value : stage.values) {
-      walk(value, [&](const Expr& e) {
-        if (!seen.insert(e.get()).second) return false;
-        total += cost_of(e);
-        return true;
-      });
-    }
-    return total;
+    return operations_of_values(stage.values, [&](const Call& call) { return cost_of(call); });
   }
-  double cost_of(const Expr& e) const {
-    const auto* call = e.as<Call>();
-    if (!call || call->call_type != CallType::Func) return operations_of(e);
-    auto found = uses_.find(call->symbol.raw());
-    auto callee = std::dynamic_pointer_cast<FuncContents>(call->symbol.lock());
+  double cost_of(const Call& call) const {
+    if (call.call_type != CallType::Func) return 1;
+    auto found = uses_.find(call.symbol.raw());
+    auto callee = std::dynamic_pointer_cast<FuncContents>(call.symbol.lock());
     bool stored = !callee || !callee->is_pure() || stored_.contains(callee.get()) ||
                   callee->schedule.compute_level.kind != graph::LoopLevel::Kind::Inlined;
     return stored || found == uses_.end() ? 1 : found->second.operations;

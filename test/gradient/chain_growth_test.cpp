@@ -40,7 +40,7 @@ Work work_of_chain(int stages) {
     before = now;
     return static_cast<double>(bytes);
   };
-  constexpr int side = 256;
+  constexpr int side = 1024;  // stages in strips, however many
   Buffer<float> image(side, side);
   Var x("x"), y("y");
   Func last("stage");

@@ -3,6 +3,10 @@
 
 #include <retrograde/retrograde.h>
 
+#include <functional>
+#include <utility>
+#include <vector>
+
 #include "graph/graph.h"
 #include "ir/target.h"
 #include "support/errors.h"
@@ -249,6 +253,114 @@ TEST(SumsOverPlanes, GoAlongTheirRows) {
 
 TEST(SumsOverPlanes, KeepTheirSumsInRegistersWhereThereAreFew) {
   EXPECT_EQ(Planes(8).loops_of_sums(), (std::vector<bool>{true, false, false, false}));
+}
+
+// A heavy image, and what reads it.
+struct Rows {
+  using Read = std::function<Expr(const Func& image, const Var& x, const Var& y)>;
+  explicit Rows(const Read& read, int side = 1024) {
+    const auto at = [&](const Expr& px, const Expr& py) {
+      return picture(clamp(px, 0, 63), clamp(py, 0, 63));
+    };
+    image(x, y) = exp(at(x, y)) * sin(at(x + 1, y - 1)) + cos(at(x - 1, y + 1));
+    out(x, y) = read(image, x, y);
+    out.set_estimate(x, 0, side).set_estimate(y, 0, side);
+    for (int py = 0; py < 64; py++) {
+      for (int px = 0; px < 64; px++) picture(px, py) = static_cast<float>((px * 7 + py * 13) % 11);
+    }
+  }
+  graph::LoopLevel place_of_image() {
+    Pipeline(out).auto_schedule(get_host_target());
+    return image.function()->schedule.compute_level;
+  }
+  Var x{"x"}, y{"y"};
+  Buffer<float> picture{64, 64};
+  Func image{"image"}, out{"out"};
+};
+
+void expect_rows_in_strips(const Rows::Read& read) {
+  Rows scheduled(read), plain(read);
+  const graph::LoopLevel place = scheduled.place_of_image();
+  ASSERT_EQ(place.kind, graph::LoopLevel::Kind::At);
+  EXPECT_EQ(place.func, scheduled.out.name());
+  EXPECT_EQ(place.var, "yi");
+  EXPECT_EQ(scheduled.image.function()->schedule.store_level.var, "y");
+  for (const auto& [width, height] : {std::pair(50, 45), std::pair(3, 1)}) {
+    const Buffer<float> found = scheduled.out.realize({width, height}),
+                        expected = plain.out.realize({width, height});
+    for (int y = 0; y < height; y++) {
+      for (int x = 0; x < width; x++) ASSERT_EQ(found(x, y), expected(x, y)) << x << ", " << y;
+    }
+  }
+}
+
+TEST(StripsOfRows, KeepTheWindowThatAStencilReads) {
+  expect_rows_in_strips([](const Func& f, const Var& x, const Var& y) {
+    return f(x - 1, y - 1) + f(x + 1, y) + f(x, y + 2);
+  });
+}
+
+TEST(StripsOfRows, KeepItThroughWhatIsInline) {
+  expect_rows_in_strips([](const Func& f, const Var& x, const Var& y) {
+    Func twice("twice");
+    twice(x, y) = f(x, y) + f(x, y + 1);
+    return twice(x, y - 1) - twice(x + 1, y);
+  });
+}
+
+TEST(StripsOfRows, KeepItWhereRowsAreSkippedOrRepeated) {
+  expect_rows_in_strips([](const Func& f, const Var& x, const Var& y) {
+    Expr sum = 0.0f;
+    for (int j = -1; j <= 2; j++) sum += f(2 * x - 1, 2 * y + j) + f(2 * x + 1, 2 * y + j);
+    return sum;
+  });
+  expect_rows_in_strips([](const Func& f, const Var& x, const Var& y) {
+    return f(x / 2, y / 2) + 0.5f * f(x / 2, y / 2 + 2 * (y % 2) - 1) + f(x / 2 + 1, y / 2);
+  });
+}
+
+TEST(StripsOfRows, AreNotForWhatStaysInACache) {
+  const auto read = [](const Func& f, const Var& x, const Var& y) { return f(x, y) + f(x, y + 1); };
+  EXPECT_EQ(Rows(read, 256).place_of_image().kind, graph::LoopLevel::Kind::Root);
+}
+
+TEST(StripsOfRows, AreNotAcrossRows) {
+  const auto turned = [](const Func& f, const Var& x, const Var& y) {
+    return f(y, x) + f(y + 1, x);
+  };
+  EXPECT_EQ(Rows(turned).place_of_image().kind, graph::LoopLevel::Kind::Root);
+  const auto upside_down = [](const Func& f, const Var& x, const Var& y) {
+    return f(x, 2000 - y) + f(x + 1, y);
+  };
+  EXPECT_EQ(Rows(upside_down).place_of_image().kind, graph::LoopLevel::Kind::Root);
+}
+
+TEST(StripsOfRows, AreNotWhereSeveralReadThem) {
+  const auto read = [](const Func& f, const Var& x, const Var& y) {
+    RDom r(0, 100);
+    Func sums("sums");
+    sums(x) = 0.0f;
+    sums(x) += f(x, r);
+    return f(x, y) + f(x, y + 1) + sums(x);
+  };
+  EXPECT_EQ(Rows(read).place_of_image().kind, graph::LoopLevel::Kind::Root);
+}
+
+TEST(StripsOfRows, AreThoseOfAChainAsLongAsItsWindowsFit) {
+  Var x("x"), y("y");
+  std::vector<Func> stages(30);
+  stages[0](x, y) = exp(cast<float>(x)) + exp(cast<float>(y));
+  for (size_t s = 1; s < stages.size(); s++) {
+    Func& f = stages[s - 1];
+    stages[s](x, y) = exp(f(x - 1, y) + f(x + 1, y) + f(x, y - 1) + f(x, y + 1));
+  }
+  stages.back().set_estimate(x, 0, 2048).set_estimate(y, 0, 2048);
+  Pipeline(stages.back()).auto_schedule(get_host_target());
+  int at_root = 0;
+  for (const Func& f : stages)
+    at_root += f.function()->schedule.compute_level.kind == graph::LoopLevel::Kind::Root;
+  EXPECT_GE(at_root, 2);
+  EXPECT_LE(at_root, 8);
 }
 
 TEST_F(BuiltInScheduler, KeepsWhatAUserScheduled) {

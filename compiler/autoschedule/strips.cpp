@@ -1,0 +1,386 @@
+#include "autoschedule/strips.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <memory>
+#include <optional>
+#include <set>
+#include <string>
+#include <unordered_map>
+
+#include "autoschedule/cost_estimate.h"
+#include "autoschedule/inlined_reads.h"
+#include "autoschedule/new_loop.h"
+#include "autoschedule/only_reader.h"
+#include "autoschedule/read_window.h"
+#include "frontend/language/func.h"
+#include "frontend/schedule/loop_level.h"
+#include "frontend/schedule/stage.h"
+#include "graph/own_reads.h"
+#include "ir/build.h"
+#include "ir/visit.h"
+
+namespace retrograde::autoschedule {
+
+namespace {
+
+constexpr double window_bytes = 384 << 10;  // of a group: half of a cache near a core
+constexpr int64_t unknown_extent = 1024;    // of rows and columns of an image
+constexpr int64_t enough_strips = 16;       // each is a task
+constexpr size_t most_members = 8;  // bounds of each are computed from those of all behind it
+constexpr double least_rows = 8, rows_a_halo = 8;
+constexpr int64_t least_bytes = 1 << 20;  // less stays in the caches on its way
+
+// How a Func's dimension moves with the loops of the last of its group.
+struct Along {
+  std::optional<size_t> loop;  // a dimension of the last; none: the same for all of its iterations
+  double scale = 0, low = 0, high = 0;
+  std::set<size_t> unknown;  // dimensions of the last that move it as data say
+
+  bool is_same_element() const { return loop && scale == 1 && low == high; }
+  double size() const { return high - low + 1; }
+};
+using Windows = std::vector<Along>;  // of the dimensions of a Func
+
+// StripReads of other stored Funcs by a stage, through what is computed inline.
+struct StripReads {
+  FuncPtr reader;
+  std::vector<Expr> calls;
+};
+
+// Who reads what is stored.
+class StripReaders {
+ public:
+  explicit StripReaders(const std::vector<FuncPtr>& outputs) {
+    for (const FuncPtr& f : topological_order(outputs)) {
+      const auto is_inlined = [&](const FuncPtr& g) {
+        return is_computed_inline(g, {}) &&
+               std::find(outputs.begin(), outputs.end(), g) == outputs.end();
+      };
+      if (is_inlined(f)) continue;
+      if (f->is_extern()) hide(f);
+      for (int s = 0; s < f->stage_count(); ++s) note(f, f->stage(s));
+    }
+  }
+
+  const std::vector<StripReads>& of(const FuncPtr& f) { return reads_[f.get()]; }
+  // What is read by a copy of a body too many cannot be told.
+  bool is_hidden(const FuncPtr& f) const { return hidden_.contains(f.get()); }
+
+ private:
+  void note(const FuncPtr& f, const Definition& stage) {
+    std::unordered_set<const ExprNode*> seen;
+    for (const Expr& root : roots_with_inlined(stage)) {
+      walk(root, [&](const Expr& e) {
+        if (!seen.insert(e.get()).second) return false;
+        const auto* call = e.as<Call>();
+        const FuncPtr callee = call && call->call_type == CallType::Func ? func_of(*call) : nullptr;
+        if (!callee || callee == f) return true;
+        if (is_computed_inline(callee, {}))
+          hide(callee);
+        else
+          add(callee, f, e);
+        return true;
+      });
+    }
+  }
+  void add(const FuncPtr& callee, const FuncPtr& reader, const Expr& call) {
+    std::vector<StripReads>& all = reads_[callee.get()];
+    if (all.empty() || all.back().reader != reader) all.push_back({reader, {}});
+    all.back().calls.push_back(call);
+  }
+  void hide(const FuncPtr& inlined) {
+    for (const FuncPtr& callee : direct_callees(*inlined)) {
+      if (hidden_.insert(callee.get()).second && is_computed_inline(callee, {})) hide(callee);
+    }
+  }
+
+  std::unordered_map<const Symbol*, std::vector<StripReads>> reads_;
+  std::unordered_set<const Symbol*> hidden_;
+};
+
+// The loops of the last Func of a group, by dimension.
+struct StripLoops {
+  size_t row = 0;               // which is cut into strips
+  std::vector<size_t> outside;  // of the strips
+  int64_t rows = 0;             // of a strip
+};
+
+class Group {
+ public:
+  Group(FuncPtr last, const SizeEstimate& sizes) : last_(std::move(last)), sizes_(sizes) {
+    for (size_t d = 0; d < last_->args.size(); ++d) own_.push_back({d, 1, 0, 0, {}});
+  }
+
+  const FuncPtr& last() const { return last_; }
+  const std::vector<FuncPtr>& members() const { return members_; }
+  const StripLoops& loops() const { return *loops_; }
+
+  // Whether it has joined: all of its reads are by Funcs of this group.
+  bool join(const FuncPtr& f, const std::vector<StripReads>& reads) {
+    const auto windows = windows_of(*f, reads);
+    if (!windows || members_.size() == most_members) return false;
+    windows_[f.get()] = *windows;
+    members_.push_back(f);
+    const auto loops = loops_of_all();
+    if (loops && pays(*f, *windows, *loops)) {
+      loops_ = loops;
+      return true;
+    }
+    members_.pop_back();
+    windows_.erase(f.get());
+    return false;
+  }
+
+ private:
+  const Windows& of(const FuncPtr& f) const { return f == last_ ? own_ : windows_.at(f.get()); }
+
+  std::optional<Windows> windows_of(const FuncContents& f,
+                                    const std::vector<StripReads>& reads) const {
+    std::optional<Windows> all;
+    for (const StripReads& by : reads) {
+      for (const Expr& call : by.calls) {
+        const auto windows = windows_of(*call.as<Call>(), *by.reader);
+        if (!windows || (all && !widen(*all, *windows))) return std::nullopt;
+        if (!all) all = windows;
+      }
+    }
+    return all && is_one_to_one(*all) && f.args.size() == all->size() ? all : std::nullopt;
+  }
+  std::optional<Windows> windows_of(const Call& call, const FuncContents& reader) const {
+    const auto found = windows_.find(&reader);
+    const Windows& outer = &reader == last_.get() ? own_ : found->second;
+    Windows result;
+    for (const Expr& arg : call.args) {
+      const auto along = along_of(arg, reader, outer);
+      if (!along) return std::nullopt;
+      result.push_back(*along);
+    }
+    return result;
+  }
+  // Of an index in a reader, whose own dimensions move as `outer` says.
+  static std::optional<Along> along_of(const Expr& index, const FuncContents& reader,
+                                       const Windows& outer) {
+    const auto window = read_window(index, reader, *reader.pure);
+    if (!window) return moved_by_data(index, reader, outer);
+    Along along{std::nullopt, 0, window->low, window->high, {}};
+    if (window->loop.empty()) return along;
+    const auto d = std::find(reader.args.begin(), reader.args.end(), window->loop);
+    const Along& by = outer[static_cast<size_t>(d - reader.args.begin())];
+    const double scale = window->scale;
+    if (scale <= 0) return std::nullopt;
+    return Along{by.loop, by.scale * scale, by.low * scale + window->low,
+                 by.high * scale + window->high, by.unknown};
+  }
+  static Along moved_by_data(const Expr& index, const FuncContents& reader, const Windows& outer) {
+    Along along;
+    for (size_t d = 0; d < outer.size(); ++d) {
+      if (!uses_variable(index, reader.args[d])) continue;
+      along.unknown.insert(outer[d].unknown.begin(), outer[d].unknown.end());
+      if (outer[d].loop) along.unknown.insert(*outer[d].loop);
+    }
+    return along;
+  }
+  static bool widen(Windows& all, const Windows& by) {
+    for (size_t d = 0; d < all.size(); ++d) {
+      if (all[d].loop != by[d].loop || all[d].scale != by[d].scale) return false;
+      all[d].unknown.insert(by[d].unknown.begin(), by[d].unknown.end());
+      all[d].low = std::min(all[d].low, by[d].low);
+      all[d].high = std::max(all[d].high, by[d].high);
+    }
+    return true;
+  }
+  static bool is_one_to_one(const Windows& windows) {
+    std::unordered_set<size_t> seen;
+    return std::all_of(windows.begin(), windows.end(), [&](const Along& along) {
+      return !along.loop || seen.insert(*along.loop).second;
+    });
+  }
+
+  // Of the member, the dimension that a loop of the last moves.
+  static const Along* moved_by(const Windows& windows, size_t loop) {
+    const auto found = std::find_if(windows.begin(), windows.end(),
+                                    [&](const Along& along) { return along.loop == loop; });
+    return found == windows.end() ? nullptr : &*found;
+  }
+  // Whether it holds for the dimension of every member that the loop moves; also that there is one.
+  template <typename Holds>
+  bool all_moved_by(size_t loop, Holds holds) const {
+    return std::all_of(members_.begin(), members_.end(), [&](const FuncPtr& f) {
+      const Windows& windows = windows_.at(f.get());
+      const Along* along = moved_by(windows, loop);
+      const bool is_known = std::none_of(windows.begin(), windows.end(), [&](const Along& each) {
+        return each.unknown.contains(loop);
+      });
+      return along && is_known && holds(*along);
+    });
+  }
+
+  // Rows are cut along the outermost dimension in which windows overlap, or, without one, which moves
+  // all; what each iteration has for itself stays outside.
+  std::optional<StripLoops> loops_of_all() const {
+    StripLoops loops;
+    const auto anything = [](const Along&) { return true; };
+    const auto same = [](const Along& along) { return along.is_same_element(); };
+    for (size_t d = last_->args.size(); d-- > 1 && loops.row == 0;) {
+      if (all_moved_by(d, anything) && !all_moved_by(d, same)) loops.row = d;
+    }
+    for (size_t d = last_->args.size(); d-- > 1 && loops.row == 0;) {
+      if (all_moved_by(d, same)) loops.row = d;
+    }
+    if (loops.row == 0) return std::nullopt;
+    int64_t tasks = 1;
+    for (size_t d = 1; d < last_->args.size(); ++d) {
+      if (d == loops.row || !all_moved_by(d, same)) continue;
+      loops.outside.push_back(d);
+      tasks *= sizes_.extent(*last_, d).value_or(1);
+    }
+    loops.rows = rows_of(loops.row, tasks);
+    const bool fits = bytes_of_windows(loops) <= window_bytes && are_rows(loops);
+    return fits ? std::optional(loops) : std::nullopt;
+  }
+
+  // The vectors of every member run along rows.
+  bool are_rows(const StripLoops& loops) const {
+    return std::all_of(members_.begin(), members_.end(), [&](const FuncPtr& f) {
+      const Along& first = windows_.at(f.get())[0];
+      return !first.loop || !is_cut_by(*first.loop, loops);
+    });
+  }
+  static bool is_cut_by(size_t loop, const StripLoops& loops) {
+    return loop == loops.row ||
+           std::find(loops.outside.begin(), loops.outside.end(), loop) != loops.outside.end();
+  }
+
+  int64_t rows_of(size_t row, int64_t tasks) const {
+    double halo = 0;  // in rows of the last
+    for (const FuncPtr& f : members_) {
+      const Along* along = moved_by(windows_.at(f.get()), row);
+      halo = std::max(halo, (along->high - along->low) / along->scale);
+    }
+    const double all = static_cast<double>(sizes_.extent(*last_, row).value_or(unknown_extent));
+    const double most = std::max(least_rows, all * static_cast<double>(tasks) / enough_strips);
+    return static_cast<int64_t>(std::ceil(std::clamp(halo * rows_a_halo, least_rows, most)));
+  }
+
+  double bytes_of_windows(const StripLoops& loops) const {
+    double total = 0;
+    for (const FuncPtr& f : members_) {
+      double bytes = 0;
+      for (const Type& type : f->types) bytes += type.bytes();
+      const Windows& windows = windows_.at(f.get());
+      for (size_t d = 0; d < windows.size(); ++d) {
+        const bool is_cut = windows[d].loop && is_cut_by(*windows[d].loop, loops);
+        bytes *=
+            is_cut
+                ? std::ceil(windows[d].size())
+                : static_cast<double>(sizes_.extent(*f, d).value_or(
+                      windows[d].loop ? unknown_extent : static_cast<int64_t>(windows[d].size())));
+      }
+      total += bytes;
+    }
+    return total;
+  }
+
+  // What is computed twice at borders, beside the way to memory.
+  bool pays(const FuncContents& f, const Windows& windows, const StripLoops& loops) const {
+    const int64_t bytes = sizes_.bytes(f);
+    if (bytes > 0 && bytes < least_bytes) return false;
+    const Along& row = *moved_by(windows, loops.row);
+    const double own = static_cast<double>(loops.rows) * row.scale;
+    const double twice = std::max(0.0, row.size() - row.scale) / own;
+    const double operations =
+        operations_of_values(roots_with_inlined(*f.pure), [](const Call&) { return 1.0; });
+    return operations * twice < way_to_memory;
+  }
+
+  const FuncPtr last_;
+  const SizeEstimate& sizes_;
+  Windows own_;
+  std::vector<FuncPtr> members_;
+  std::unordered_map<const Symbol*, Windows> windows_;
+  std::optional<StripLoops> loops_;
+};
+
+// Vectors along rows, the first dimension, are all that was cut off.
+// Adjoints are left: each is read within its domain alone, and such bounds, one inside of the other,
+// are long to compute.
+bool has_plain_rows(const FuncContents& f) {
+  const StageLoops& loops = f.pure->schedule;
+  return !f.made && f.is_pure() && !f.is_extern() && f.args.size() > 1 &&
+         loops.splits.size() == 1 && loops.splits[0].old_var == f.args[0] &&
+         loops.splits[0].outer == f.args[0];
+}
+
+void run_serially(const FuncPtr& f) {
+  const std::vector<Dim> loops = f->pure->schedule.dims;
+  for (const Dim& loop : loops) {
+    if (loop.runs == ForType::Parallel) Stage(f, 0).serial(Var(loop.var));
+  }
+}
+
+void give_strips(const Group& group) {
+  const FuncPtr& last = group.last();
+  const StripLoops& loops = group.loops();
+  const auto name = [&](size_t d) { return last->args[d]; };
+  const auto is_outside = [&](const std::string& var) {
+    return var == name(loops.row) || std::any_of(loops.outside.begin(), loops.outside.end(),
+                                                 [&](size_t d) { return var == name(d); });
+  };
+  run_serially(last);
+  Stage stage(last, 0);
+  const Var strips(name(loops.row)), row(inner_loop(*last, 0, strips.name()));
+  std::vector<VarOrRVar> order;
+  for (const Dim& loop : last->pure->schedule.dims) {
+    if (!is_outside(loop.var)) order.push_back(Var(loop.var));
+  }
+  stage.split(strips, strips, row, static_cast<int>(loops.rows), TailStrategy::GuardWithIf);
+  order.push_back(row);
+  order.push_back(strips);
+  for (size_t d : loops.outside) order.push_back(Var(name(d)));
+  stage.reorder(order).parallel(strips);
+  for (size_t d : loops.outside) stage.parallel(Var(name(d)));
+  for (const FuncPtr& f : group.members()) {
+    run_serially(f);
+    Func(f).store_at(Func(last), strips).compute_at(Func(last), row);
+  }
+}
+
+}  // namespace
+
+void compute_in_strips(const std::vector<FuncPtr>& outputs, const std::vector<FuncPtr>& given,
+                       const std::unordered_set<const Symbol*>& but, const SizeEstimate& sizes) {
+  StripReaders readers(outputs);
+  const Readers hosts(outputs, given);
+  std::unordered_map<const Symbol*, Group*> group_of;
+  std::vector<std::unique_ptr<Group>> groups;
+  const auto may_run_in_strips = [&](const FuncPtr& f) {
+    return has_plain_rows(*f) && is_at_root(*f) && hosts.is_inside(f) && !but.contains(f.get());
+  };
+  const auto group_that_reads = [&](const std::vector<StripReads>& reads) -> Group* {
+    Group* only = nullptr;
+    for (const StripReads& by : reads) {
+      const auto found = group_of.find(by.reader.get());
+      if (found == group_of.end() || (only && found->second != only)) return nullptr;
+      only = found->second;
+    }
+    return only;
+  };
+  for (auto it = given.rbegin(); it != given.rend(); ++it) {
+    const FuncPtr& f = *it;
+    if (!may_run_in_strips(f)) continue;
+    const std::vector<StripReads>& reads = readers.of(f);
+    Group* group = hosts.is_output(f) || readers.is_hidden(f) ? nullptr : group_that_reads(reads);
+    if (!group || !group->join(f, reads)) {
+      groups.push_back(std::make_unique<Group>(f, sizes));
+      group = groups.back().get();
+    }
+    group_of[f.get()] = group;
+  }
+  for (const auto& group : groups) {
+    if (!group->members().empty()) give_strips(*group);
+  }
+}
+
+}  // namespace retrograde::autoschedule
