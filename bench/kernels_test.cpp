@@ -8,6 +8,7 @@
 #include "pairs/options.h"
 #include "pairs/pair.h"
 #include "pairs/report.h"
+#include "pairs/worker.h"
 
 namespace bench {
 
@@ -32,6 +33,30 @@ INSTANTIATE_TEST_SUITE_P(Forward, Kernel, testing::ValuesIn(kernel_names()),
                          [](const auto& test) { return test.param; });
 
 INSTANTIATE_TEST_SUITE_P(Gradient, Kernel, testing::ValuesIn(gradient_names()),
+                         [](const auto& test) { return test.param; });
+
+// Outputs of our worker, scheduled by hand or by the autoscheduler of that name.
+std::vector<Values> outputs_of(const std::string& kernel, const std::string& schedule) {
+  const auto scratch = std::filesystem::path(testing::TempDir()) / ("auto_" + kernel + schedule);
+  std::filesystem::create_directories(scratch);
+  WorkerCommand command{std::filesystem::path(BENCH_PROGRAMS) / "bench_kernels_retrograde",
+                        {kernel, "small", "2"}};
+  if (!schedule.empty()) command.arguments.push_back(schedule);
+  Worker worker(Side::Retrograde, command, 2);
+  worker.run();
+  const std::vector<Values> outputs = worker.outputs(scratch);
+  std::filesystem::remove_all(scratch);
+  return outputs;
+}
+
+class AutoscheduledKernel : public testing::TestWithParam<std::string> {};
+
+TEST_P(AutoscheduledKernel, GivesWhatItGivesByHand) {
+  EXPECT_LE(max_relative_error(outputs_of(GetParam(), "Retrograde"), outputs_of(GetParam(), "")),
+            1e-4);
+}
+
+INSTANTIATE_TEST_SUITE_P(Forward, AutoscheduledKernel, testing::ValuesIn(kernel_names()),
                          [](const auto& test) { return test.param; });
 
 TEST(MaxRelativeError, IsRelativeToTheLargerOfElementAndScale) {

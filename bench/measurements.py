@@ -105,6 +105,25 @@ def operators(report):
             f"\nGeometric mean of our time over that of the best other: {geometric_mean(ratios):.2f}.\n")
 
 
+def autoscheduled(report):
+    def cell(value):
+        return "failed" if value is None else f"{value:.3g}"
+
+    rows, by_hand, halide = [], [], []
+    for r in report["kernels"]:
+        rows.append([r["kernel"], cell(r["retrograde_ms"]), cell(r["by_hand_ms"]),
+                     *(cell(t) for t in r["halide_ms"].values()), cell(r["bound_ms"])])
+        by_hand.append(r["retrograde_ms"] / r["by_hand_ms"])
+        if r["halide_best_ms"]:
+            halide.append(r["retrograde_ms"] / r["halide_best_ms"])
+    head = ["kernel, ms", "Retrograde's autoscheduler", "Retrograde by hand",
+            *(f"Halide {report['versions'].get('halide', '')}, {s}" for s in report["kernels"][0]["halide_ms"]),
+            "bound"]
+    beside = f", over that of Halide's best {geometric_mean(halide):.2f}" if halide else ""
+    return (table(head, rows) + f"\nGeometric mean of our time over that by hand: "
+            f"{geometric_mean(by_hand):.2f}{beside}.\n")
+
+
 def demo(report):
     halide = report["halide_ms_per_step"]
     rows = [["one training step", ms(report["ms_per_step"])],
@@ -127,7 +146,8 @@ def compile_time(report):
 
 SECTIONS = {"demo": demo, "kernels": pairs, "gradient_peers": pairs, "programs": programs,
             "programs_second": programs, "programs_gradients": programs, "gradients": gradients,
-            "pytorch_peers": pytorch, "operators": operators, "compile_time": compile_time}
+            "pytorch_peers": pytorch, "operators": operators, "autoscheduled": autoscheduled,
+            "compile_time": compile_time}
 
 
 def this_machine():

@@ -75,6 +75,21 @@ Kernel gradients_of(const Setup& setup, const Func& output, const std::vector<in
   return kernel;
 }
 
+void schedule_kernel(Kernel& kernel, const Setup& setup) {
+  size_t next = 0;
+  for (Func output : kernel.pipeline.outputs()) {
+    const Buffer<>& values = kernel.outputs.at(next);
+    next += output.outputs();
+    Region all;
+    for (int d = 0; d < values.dimensions(); d++)
+      all.push_back({values.dim(d).min(), values.dim(d).extent()});
+    output.set_estimates(all);
+  }
+  const Stopwatch searching;
+  schedule(kernel.pipeline, setup);
+  kernel.search_seconds = searching.seconds();
+}
+
 Buffer<real> make_noise(const std::vector<int>& sizes, uint32_t which) {
   Buffer<real> noise(sizes);
   for (size_t i = 0; i < noise.number_of_elements(); i++) {

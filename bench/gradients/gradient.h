@@ -12,6 +12,9 @@ namespace kernels {
 // ../operators/schedules.cpp.
 void schedule(Halide::Pipeline& pipeline, const Setup& setup);
 
+// A forward pipeline that has no schedule.
+void schedule_kernel(Kernel& kernel, const Setup& setup);
+
 // The gradients of the sum of seed * output by each of `by`, in that order; inputs are `by`, what is
 // `fixed` (no gradient is asked by it) and the seed. `operations` are those of all that is computed. Source of Li2018: Li et al., Differentiable
 // Programming for Image Processing and Deep Learning in Halide, SIGGRAPH 2018, section 5.

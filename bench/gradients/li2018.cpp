@@ -4,7 +4,9 @@
 namespace kernels {
 
 #ifdef BENCH_RETROGRADE
-void schedule(Halide::Pipeline&, const Setup&) {}
+void schedule(Halide::Pipeline& pipeline, const Setup& setup) {
+  if (!setup.by_hand()) pipeline.auto_schedule(setup.target);
+}
 #else
 void schedule(Halide::Pipeline& pipeline, const Setup& setup) {
   Halide::load_plugin(BENCH_LI2018);

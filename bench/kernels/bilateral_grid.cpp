@@ -78,15 +78,17 @@ Kernel bilateral_grid(const Setup& setup) {
   result(x, y) = mean.value / mean.weight;
 
   const int lanes = setup.lanes<float>();
-  splat.compute_root().parallel(row).vectorize(bin, lanes);
-  splat.update().reorder(pixel.x, pixel.y, column, row).parallel(row);
-  grid.compute_root().parallel(row).vectorize(bin, lanes);
-  by_column.compute_at(grid, column).vectorize(bin, lanes);
-  by_row.compute_at(grid, row).vectorize(bin, lanes);
-  result.split(y, strip, y, cell).parallel(strip).vectorize(x, lanes);
+  if (setup.by_hand()) {
+    splat.compute_root().parallel(row).vectorize(bin, lanes);
+    splat.update().reorder(pixel.x, pixel.y, column, row).parallel(row);
+    grid.compute_root().parallel(row).vectorize(bin, lanes);
+    by_column.compute_at(grid, column).vectorize(bin, lanes);
+    by_row.compute_at(grid, row).vectorize(bin, lanes);
+    result.split(y, strip, y, cell).parallel(strip).vectorize(x, lanes);
+  }
 
   Buffer<float> image = make_image<float>({width, height});
-  input.set(image);
+  bind(input, image);
   Buffer<float> output(width, height);
   const double cells = static_cast<double>(width / cell) * (height / cell) * (bins + 1);
   return {Pipeline(result), {image}, {output}, (3 + 32.0) * width * height + 54 * cells};

@@ -22,11 +22,13 @@ Kernel box_blur(const Setup& setup) {
   mean(x, y, c) = total / cast<uint16_t>(25);
 
   const int lanes = setup.lanes<uint16_t>();
-  mean.split(y, y, yi, 64).parallel(y).parallel(c).vectorize(x, lanes);
-  row_sum.store_at(mean, y).compute_at(mean, yi).vectorize(x, lanes);
+  if (setup.by_hand()) {
+    mean.split(y, y, yi, 64).parallel(y).parallel(c).vectorize(x, lanes);
+    row_sum.store_at(mean, y).compute_at(mean, yi).vectorize(x, lanes);
+  }
 
   Buffer<uint16_t> image = make_image<uint16_t>({width, height, planes}, 2600);
-  input.set(image);
+  bind(input, image);
   Buffer<uint16_t> result(width, height, planes);
   return {Pipeline(mean), {image}, {result}, 9.0 * width * height * planes};
 }

@@ -89,26 +89,28 @@ Kernel camera_pipe(const Setup& setup) {
   sharp(x, y, c) = cast<uint8_t>(clamp(wide(0, 0) + ((3 * (wide(0, 0) - smooth)) >> 2), 0, 255));
 
   const int lanes = setup.lanes<uint16_t>();
-  Var xi("xi"), pair("pair");
-  sharp.bound(c, 0, 3).split(y, y, yi, 64).split(yi, yi, yii, 2);
-  sharp.reorder(x, c, yii, yi, y).parallel(y).vectorize(x, lanes);
-  curve.compute_root();
-  // Two rows a step, always an even one and the odd one after it.
-  toned.store_at(sharp, y).compute_at(sharp, yi).align_bounds(y, 2);
-  toned.bound(c, 0, 3).reorder(c, x, y).unroll(c).vectorize(x, lanes);
-  mosaic.compute_at(sharp, yi).align_bounds(x, 2).align_bounds(y, 2).bound(c, 0, 3);
-  mosaic.split(x, x, xi, 2).split(y, y, pair, 2).reorder(xi, pair, c, x, y);
-  mosaic.unroll(xi).unroll(pair).unroll(c).vectorize(x, lanes);
-  sites.compute_at(sharp, yi).bound(c, 0, 12).reorder(c, x, y).unroll(c).vectorize(x, lanes);
-  green_r.store_at(sharp, y).compute_at(sharp, yi).vectorize(x, lanes);
-  green_b.store_at(sharp, y).compute_at(sharp, yi).vectorize(x, lanes);
-  planes.store_at(sharp, y).compute_at(sharp, yi);
-  planes.bound(c, 0, 4).reorder(c, x, y).unroll(c).vectorize(x, lanes);
-  sound.store_at(sharp, y).compute_at(sharp, yi).vectorize(x, lanes);
+  if (setup.by_hand()) {
+    Var xi("xi"), pair("pair");
+    sharp.bound(c, 0, 3).split(y, y, yi, 64).split(yi, yi, yii, 2);
+    sharp.reorder(x, c, yii, yi, y).parallel(y).vectorize(x, lanes);
+    curve.compute_root();
+    // Two rows a step, always an even one and the odd one after it.
+    toned.store_at(sharp, y).compute_at(sharp, yi).align_bounds(y, 2);
+    toned.bound(c, 0, 3).reorder(c, x, y).unroll(c).vectorize(x, lanes);
+    mosaic.compute_at(sharp, yi).align_bounds(x, 2).align_bounds(y, 2).bound(c, 0, 3);
+    mosaic.split(x, x, xi, 2).split(y, y, pair, 2).reorder(xi, pair, c, x, y);
+    mosaic.unroll(xi).unroll(pair).unroll(c).vectorize(x, lanes);
+    sites.compute_at(sharp, yi).bound(c, 0, 12).reorder(c, x, y).unroll(c).vectorize(x, lanes);
+    green_r.store_at(sharp, y).compute_at(sharp, yi).vectorize(x, lanes);
+    green_b.store_at(sharp, y).compute_at(sharp, yi).vectorize(x, lanes);
+    planes.store_at(sharp, y).compute_at(sharp, yi);
+    planes.bound(c, 0, 4).reorder(c, x, y).unroll(c).vectorize(x, lanes);
+    sound.store_at(sharp, y).compute_at(sharp, yi).vectorize(x, lanes);
+  }
 
   Buffer<uint16_t> mosaic_image =
       make_image<uint16_t>({width + 2 * border, height + 2 * border}, 1023);
-  raw.set(mosaic_image);
+  bind(raw, mosaic_image);
   Buffer<uint8_t> output(width, height, 3);
   return {Pipeline(sharp), {mosaic_image}, {output}, (8 + 20 + 24 + 30.0) * width * height};
 }

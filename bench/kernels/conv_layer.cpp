@@ -23,12 +23,18 @@ Kernel conv_layer(const Setup& setup) {
   layer(out, x, y, which) = max(sums(out, x, y, which) + offset(out), 0.0f);
 
   const int lanes = setup.lanes<float>(), pixels = 8;
-  layer.bound(out, 0, features).split(x, x, pixel, pixels);
-  layer.reorder(out, pixel, x, y, which).vectorize(out, lanes).unroll(out).unroll(pixel);
-  layer.fuse(y, which, y).parallel(y);
-  sums.compute_at(layer, x).bound_extent(out, features).vectorize(out, lanes).unroll(out).unroll(x);
-  sums.update().split(out, out, lane, lanes).vectorize(lane);
-  sums.update().reorder(lane, out, x, in, dx, dy, y, which).unroll(out).unroll(x);
+  if (setup.by_hand()) {
+    layer.bound(out, 0, features).split(x, x, pixel, pixels);
+    layer.reorder(out, pixel, x, y, which).vectorize(out, lanes).unroll(out).unroll(pixel);
+    layer.fuse(y, which, y).parallel(y);
+    sums.compute_at(layer, x)
+        .bound_extent(out, features)
+        .vectorize(out, lanes)
+        .unroll(out)
+        .unroll(x);
+    sums.update().split(out, out, lane, lanes).vectorize(lane);
+    sums.update().reorder(lane, out, x, in, dx, dy, y, which).unroll(out).unroll(x);
+  }
 
   // The picture lies in a frame of zeros.
   Buffer<float> image = make_image<float>({features, width + 2, height + 2, batch});
@@ -40,9 +46,9 @@ Kernel conv_layer(const Setup& setup) {
   weights.for_each_value([](float& w) { w = (w - 0.5f) * 0.2f; });
   weights.set_min(std::vector<int>{0, 0, -reach, -reach});
   Buffer<float> offsets = make_image<float>({features});
-  pictures.set(image);
-  kernel.set(weights);
-  offset.set(offsets);
+  bind(pictures, image);
+  bind(kernel, weights);
+  bind(offset, offsets);
   Buffer<float> output(features, width, height, batch);
   return {Pipeline(layer),
           {image, weights, offsets},

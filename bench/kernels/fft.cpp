@@ -32,7 +32,9 @@ constexpr int length = 256;
 // the frequency (the order of Stockham's method). After s of them a point is (x, i, k, o, n): i
 // holds the s - 1 digits of the frequency that were there before, k the newest one, o the digits of
 // y that are left; kept in that order, it lies at (o * 4 + k) * 4^(s - 1) + i.
-Func transform_columns(const Func& f, const Func& twiddle, int lanes, const std::string& name) {
+Func transform_columns(const Func& f, const Func& twiddle, const Setup& setup,
+                       const std::string& name) {
+  const int lanes = setup.lanes<float>();
   Var x("x"), y("y"), n("n"), i("i"), k("k"), o("o"), xi("xi"), yo("yo"), yi("yi");
   Var strip("strip");
   Func transposed(name);
@@ -63,12 +65,14 @@ Func transform_columns(const Func& f, const Func& twiddle, int lanes, const std:
   FuncRef last = passes.back()(y, x % (length / 4), x / (length / 4), 0, n);
   transposed(x, y, n) = Tuple(last[0], last[1]);
 
-  transposed.compute_root().bound(x, 0, length).bound(y, 0, length);
-  transposed.split(y, strip, yo, lanes).split(yo, yo, yi, 8).split(x, x, xi, lanes);
-  transposed.reorder(xi, yi, x, yo, strip, n).vectorize(xi).unroll(yi).parallel(n);
-  for (int s = 0; s < 4; s++) {
-    passes[s].compute_at(transposed, strip).reorder(x, k, i, o, n).vectorize(x, lanes).unroll(k);
-    butterflies[s].compute_at(passes[s], i).vectorize(x, lanes);
+  if (setup.by_hand()) {
+    transposed.compute_root().bound(x, 0, length).bound(y, 0, length);
+    transposed.split(y, strip, yo, lanes).split(yo, yo, yi, 8).split(x, x, xi, lanes);
+    transposed.reorder(xi, yi, x, yo, strip, n).vectorize(xi).unroll(yi).parallel(n);
+    for (int s = 0; s < 4; s++) {
+      passes[s].compute_at(transposed, strip).reorder(x, k, i, o, n).vectorize(x, lanes).unroll(k);
+      butterflies[s].compute_at(passes[s], i).vectorize(x, lanes);
+    }
   }
   return transposed;
 }
@@ -83,14 +87,13 @@ Kernel fft(const Setup& setup) {
   source(x, y, n) = Tuple(input(x, y, n, 0), input(x, y, n, 1));
   Expr angle = cast<float>(k) * static_cast<float>(-2 * 3.14159265358979 / length);
   twiddle(k) = Tuple(cos(angle), sin(angle));
-  const int lanes = setup.lanes<float>();
-  twiddle.compute_root().vectorize(k, lanes);
+  if (setup.by_hand()) twiddle.compute_root().vectorize(k, setup.lanes<float>());
 
-  Func columns = transform_columns(source, twiddle, lanes, "columns");
-  Func rows = transform_columns(columns, twiddle, lanes, "rows");
+  Func columns = transform_columns(source, twiddle, setup, "columns");
+  Func rows = transform_columns(columns, twiddle, setup, "rows");
 
   Buffer<float> pictures = make_image<float>({length, length, batch, 2});
-  input.set(pictures);
+  bind(input, pictures);
   Buffer<float> re(length, length, batch), im(length, length, batch);
   // 4 passes of 64 butterflies along 2 x 256 lines; 16 additions and 3 complex products each.
   return {Pipeline(rows), {pictures}, {re, im}, 2.0 * 256 * 64 * (4 * 16 + 3 * 3 * 6) * batch};

@@ -37,11 +37,13 @@ Kernel harris_corners(const Setup& setup) {
   response(x, y) = xx * yy - xy * xy - 0.04f * trace * trace;
 
   const int lanes = setup.lanes<float>();
-  response.tile(x, y, tx, ty, 256, 32).parallel(y).vectorize(tx, lanes);
-  for (Func f : {grey, slope_x, slope_y}) f.compute_at(response, x).vectorize(x, lanes);
+  if (setup.by_hand()) {
+    response.tile(x, y, tx, ty, 256, 32).parallel(y).vectorize(tx, lanes);
+    for (Func f : {grey, slope_x, slope_y}) f.compute_at(response, x).vectorize(x, lanes);
+  }
 
   Buffer<float> image = make_image<float>({width, height, 3});
-  input.set(image);
+  bind(input, image);
   Buffer<float> result(width, height);
   return {Pipeline(response), {image}, {result}, (5 + 14 + 54 + 7.0) * width * height};
 }

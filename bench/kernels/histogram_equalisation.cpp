@@ -27,19 +27,21 @@ Kernel histogram_equalisation(const Setup& setup) {
   result(x, y, c) = cast<uint8_t>(clamp(cast<int16_t>(input(x, y, c)) + change, 0, 255));
 
   const int lanes = setup.lanes<uint8_t>();
-  luminance.compute_root().parallel(y, rows).vectorize(x, lanes);
-  RVar ro("ro"), ri("ri");
-  histogram.compute_root().vectorize(i, 16);
-  Func partial = histogram.update().split(r.y, ro, ri, rows).rfactor(ro, s);
-  partial.compute_root().vectorize(i, 16).update().parallel(s);
-  histogram.update().reorder(i, ro).vectorize(i, 16);
-  sum.compute_root();
-  curve.compute_root().vectorize(i, 16);
-  result.bound(c, 0, 3).split(y, y, yi, rows).reorder(c, x, yi, y).unroll(c);
-  result.parallel(y).vectorize(x, 32);
+  if (setup.by_hand()) {
+    luminance.compute_root().parallel(y, rows).vectorize(x, lanes);
+    RVar ro("ro"), ri("ri");
+    histogram.compute_root().vectorize(i, 16);
+    Func partial = histogram.update().split(r.y, ro, ri, rows).rfactor(ro, s);
+    partial.compute_root().vectorize(i, 16).update().parallel(s);
+    histogram.update().reorder(i, ro).vectorize(i, 16);
+    sum.compute_root();
+    curve.compute_root().vectorize(i, 16);
+    result.bound(c, 0, 3).split(y, y, yi, rows).reorder(c, x, yi, y).unroll(c);
+    result.parallel(y).vectorize(x, 32);
+  }
 
   Buffer<uint8_t> image = make_image<uint8_t>({width, height, 3}, 180);
-  input.set(image);
+  bind(input, image);
   Buffer<uint8_t> output(width, height, 3);
   return {Pipeline(result), {image}, {output}, (2 * 6 + 1 + 3.0) * width * height};
 }

@@ -31,13 +31,14 @@ struct Setup {
   int threads = 1;
   bool primal = false;       // of a gradient: the program itself, without a schedule
   bool is_operator = false;  // a gradient, and the program's output as the last
-  std::string schedule;      // of an operator, by Halide: see ../operators/schedules.cpp
+  std::string schedule;      // whose; see ../operators/schedules.cpp. Of a kernel: or by hand
 
   // Lanes of a full vector register.
   template <typename T>
   int lanes() const {
     return target.natural_vector_size<T>();
   }
+  bool by_hand() const { return schedule.empty(); }
   int size(int full, int quick) const { return small ? quick : full; }
 };
 
@@ -66,6 +67,14 @@ class Stopwatch {
 #include "../list.def"
 #define OPERATOR(name) Kernel name(const Setup& setup);
 #include "../operators/list.def"
+
+// Reads `values`; an autoscheduler may count on their size.
+template <typename T>
+void bind(Halide::ImageParam& input, const Halide::Buffer<T>& values) {
+  input.set(values);
+  for (int d = 0; d < values.dimensions(); d++)
+    input.dim(d).set_estimate(values.dim(d).min(), values.dim(d).extent());
+}
 
 // Values from 0 to just below `limit`.
 template <typename T>

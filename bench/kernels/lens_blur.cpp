@@ -36,16 +36,18 @@ Kernel lens_blur(const Setup& setup) {
       mux(c, {gathered(x, y)[0], gathered(x, y)[1], gathered(x, y)[2]}) / gathered(x, y)[3];
 
   const int lanes = setup.lanes<float>();
-  disc.compute_root().parallel(y, 32).vectorize(x, lanes);
-  result.bound(c, 0, 3).split(y, y, yi, 16).reorder(c, x, yi, y).unroll(c);
-  result.parallel(y).vectorize(x, lanes);
-  gathered.compute_at(result, x).vectorize(x, lanes);
-  gathered.update().reorder(x, r.x, r.y).vectorize(x, lanes);
+  if (setup.by_hand()) {
+    disc.compute_root().parallel(y, 32).vectorize(x, lanes);
+    result.bound(c, 0, 3).split(y, y, yi, 16).reorder(c, x, yi, y).unroll(c);
+    result.parallel(y).vectorize(x, lanes);
+    gathered.compute_at(result, x).vectorize(x, lanes);
+    gathered.update().reorder(x, r.x, r.y).vectorize(x, lanes);
+  }
 
   Buffer<float> image = make_image<float>({width, height, 3});
   Buffer<float> distances = make_image<float>({width, height});
-  picture.set(image);
-  depth.set(distances);
+  bind(picture, image);
+  bind(depth, distances);
   Buffer<float> output(width, height, 3);
   const double window = (2 * reach + 1) * (2 * reach + 1);
   return {Pipeline(result), {image, distances}, {output}, 8 * window * width * height};

@@ -69,12 +69,13 @@ Kernel local_laplacian(const Setup& setup) {
 
   const int lanes = setup.lanes<float>();
   auto in_strips = [&](Func f, int rows) {
+    if (!setup.by_hand()) return;
     f.compute_root().split(y, y, yi, rows).parallel(y).vectorize(x, lanes);
   };
   Func grey_pyramid[levels], pyramid[levels], enhanced[levels];
   grey_pyramid[0] = grey;
   pyramid[0] = remapped;
-  grey.compute_root().split(y, y, yi, 32).parallel(y).vectorize(x, lanes);
+  in_strips(grey, 32);
   for (int j = 1; j < levels; j++) {
     Reduced g = reduced(grey_pyramid[j - 1], {}, "grey_" + std::to_string(j));
     Reduced p = reduced(pyramid[j - 1], {k}, "pyramid_" + std::to_string(j));
@@ -82,7 +83,9 @@ Kernel local_laplacian(const Setup& setup) {
     pyramid[j] = p.result;
     const int rows = j < 5 ? 8 : 4;
     in_strips(g.result, rows);
-    p.result.compute_root().split(y, y, yi, rows).parallel(y).parallel(k).vectorize(x, lanes);
+    in_strips(p.result, rows);
+    if (!setup.by_hand()) continue;
+    p.result.parallel(k);
     p.by_row.compute_at(p.result, yi).vectorize(x, lanes);
   }
 
@@ -109,10 +112,12 @@ Kernel local_laplacian(const Setup& setup) {
   // Colours keep their differences from grey.
   Func result("result");
   result(x, y, c) = clamp(input(x, y, c) + enhanced[0](x, y) - grey(x, y), 0.0f, 1.0f);
-  result.bound(c, 0, 3).split(y, y, yi, 32).reorder(x, c, yi, y).parallel(y).vectorize(x, lanes);
+  if (setup.by_hand()) {
+    result.bound(c, 0, 3).split(y, y, yi, 32).reorder(x, c, yi, y).parallel(y).vectorize(x, lanes);
+  }
 
   Buffer<float> image = make_image<float>({width, height, 3});
-  input.set(image);
+  bind(input, image);
   Buffer<float> output(width, height, 3);
   // Levels add up to 4/3 of the first: remapping, reducing and expanding for each brightness.
   return {Pipeline(result),

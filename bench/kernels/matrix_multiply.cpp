@@ -14,24 +14,30 @@ Kernel matrix_multiply(const Setup& setup) {
   ImageParam a(Float(32), 2, "a"), b(Float(32), 2, "b");
   Var i("i"), j("j"), k("k"), p("p"), io("io"), jo("jo"), ii("ii"), ji("ji"), iv("iv");
 
-  Func packed("packed"), product("product"), result("result");
+  Func product("product"), result("result");
   RDom r(0, n);
-  packed(i, k, p) = b(p * panel + i, k);
-  product(i, j, p) = 0.0f;
-  product(i, j, p) += a(r, j) * packed(i, r, p);
-  result(i, j) = product(i % panel, j, i / panel);
+  if (setup.by_hand()) {
+    Func packed("packed");
+    packed(i, k, p) = b(p * panel + i, k);
+    product(i, j, p) = 0.0f;
+    product(i, j, p) += a(r, j) * packed(i, r, p);
+    result(i, j) = product(i % panel, j, i / panel);
 
-  result.bound(i, 0, n).bound(j, 0, n);
-  result.tile(i, j, io, jo, ii, ji, panel, rows).reorder(ii, ji, jo, io).parallel(io);
-  result.split(ii, ii, iv, lanes).vectorize(iv).unroll(ii).unroll(ji);
-  product.bound(i, 0, panel).compute_at(result, jo);
-  product.split(i, i, iv, lanes).vectorize(iv).unroll(i).unroll(j);
-  product.update().split(i, i, iv, lanes).reorder(iv, i, j, r).vectorize(iv).unroll(i).unroll(j);
-  packed.compute_root().bound(i, 0, panel).parallel(p).vectorize(i, lanes);
+    result.bound(i, 0, n).bound(j, 0, n);
+    result.tile(i, j, io, jo, ii, ji, panel, rows).reorder(ii, ji, jo, io).parallel(io);
+    result.split(ii, ii, iv, lanes).vectorize(iv).unroll(ii).unroll(ji);
+    product.bound(i, 0, panel).compute_at(result, jo);
+    product.split(i, i, iv, lanes).vectorize(iv).unroll(i).unroll(j);
+    product.update().split(i, i, iv, lanes).reorder(iv, i, j, r).vectorize(iv).unroll(i).unroll(j);
+    packed.compute_root().bound(i, 0, panel).parallel(p).vectorize(i, lanes);
+  } else {
+    product(i, j) += a(r, j) * b(i, r);
+    result(i, j) = product(i, j);
+  }
 
   Buffer<float> first = make_image<float>({n, n}), second = make_image<float>({n, n});
-  a.set(first);
-  b.set(second);
+  bind(a, first);
+  bind(b, second);
   Buffer<float> c(n, n);
   return {Pipeline(result), {first, second}, {c}, 2.0 * n * n * n};
 }

@@ -36,13 +36,15 @@ Kernel max_filter(const Setup& setup) {
   result(x, y, c) = max(source(x - radius, y, c), source(x, y, c));
 
   const int lanes = setup.lanes<float>();
-  result.split(y, y, yi, 64).parallel(y).parallel(c).vectorize(x, lanes);
-  for (Func f : doubling_y) f.store_at(result, y).compute_at(result, yi).vectorize(x, lanes);
-  column.compute_at(result, yi).vectorize(x, lanes);
-  for (Func f : doubling_x) f.compute_at(result, yi).vectorize(x, lanes);
+  if (setup.by_hand()) {
+    result.split(y, y, yi, 64).parallel(y).parallel(c).vectorize(x, lanes);
+    for (Func f : doubling_y) f.store_at(result, y).compute_at(result, yi).vectorize(x, lanes);
+    column.compute_at(result, yi).vectorize(x, lanes);
+    for (Func f : doubling_x) f.compute_at(result, yi).vectorize(x, lanes);
+  }
 
   Buffer<float> image = make_image<float>({width, height, planes});
-  input.set(image);
+  bind(input, image);
   Buffer<float> output(width, height, planes);
   return {Pipeline(result), {image}, {output}, 10.0 * width * height * planes};
 }

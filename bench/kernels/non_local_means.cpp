@@ -50,14 +50,16 @@ Kernel non_local_means(const Setup& setup) {
   denoised(x, y, c) = mux(c, {mean(x, y)[0], mean(x, y)[1], mean(x, y)[2]}) / mean(x, y)[3];
 
   const int lanes = setup.lanes<float>();
-  denoised.bound(c, 0, 3).tile(x, y, px, py, 96, 16).reorder(c, px, py, x, y);
-  denoised.unroll(c).vectorize(px, lanes).parallel(y);
-  mean.compute_at(denoised, x).vectorize(x, lanes);
-  mean.update().reorder(x, y, offset.x, offset.y).vectorize(x, lanes);
-  for (Func f : {distance, in_row}) f.compute_at(mean, offset.x).vectorize(x, lanes);
+  if (setup.by_hand()) {
+    denoised.bound(c, 0, 3).tile(x, y, px, py, 96, 16).reorder(c, px, py, x, y);
+    denoised.unroll(c).vectorize(px, lanes).parallel(y);
+    mean.compute_at(denoised, x).vectorize(x, lanes);
+    mean.update().reorder(x, y, offset.x, offset.y).vectorize(x, lanes);
+    for (Func f : {distance, in_row}) f.compute_at(mean, offset.x).vectorize(x, lanes);
+  }
 
   Buffer<float> image = make_image<float>({width, height, 3});
-  noisy.set(image);
+  bind(noisy, image);
   Buffer<float> output(width, height, 3);
   return {Pipeline(denoised), {image}, {output}, 49 * (8 + 8 + 12 + 7.0) * width * height};
 }

@@ -47,7 +47,9 @@ Kernel pyramid_interpolation(const Setup& setup) {
   Var x("x"), y("y"), c("c"), row("row");
   const int lanes = setup.lanes<float>();
   auto made_in_strips = [&](Func& f, int rows) {
-    f.compute_root().split(y, y, row, rows).parallel(y).vectorize(x, lanes);
+    if (setup.by_hand()) {
+      f.compute_root().split(y, y, row, rows).parallel(y).vectorize(x, lanes);
+    }
   };
 
   Func extended = BoundaryConditions::repeat_edge(picture), known[levels];
@@ -74,16 +76,18 @@ Kernel pyramid_interpolation(const Setup& setup) {
   Func result("result");
   const Pixel last = filled(x, y);
   result(x, y, c) = mux(c, {last.red, last.green, last.blue}) / max(last.trust, 1e-6f);
-  result.bound(c, 0, 3).reorder(c, x, y).unroll(c).vectorize(x, lanes);
-  result.split(y, y, row, 32).parallel(y);
-  filled.compute_at(result, row);
+  if (setup.by_hand()) {
+    result.bound(c, 0, 3).reorder(c, x, y).unroll(c).vectorize(x, lanes);
+    result.split(y, y, row, 32).parallel(y);
+    filled.compute_at(result, row);
+  }
 
   Buffer<float> image = make_image<float>({width, height, 4});
   // Holes of all sizes: a pixel is trusted, or not.
   for (int j = 0; j < height; j++) {
     for (int i = 0; i < width; i++) image(i, j, 3) = image(i, j, 3) > 0.6f ? 1.0f : 0.0f;
   }
-  picture.set(image);
+  bind(picture, image);
   Buffer<float> output(width, height, 3);
   // Of each level: a quarter of a pull (18 operations), two mixtures and a blend (20).
   const double pixels = static_cast<double>(width) * height;

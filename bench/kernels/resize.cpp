@@ -61,14 +61,16 @@ Kernel resize(const Setup& setup) {
   Var x("x"), y("y"), k("k"), yi("yi");
   std::vector<Func> results;
   for (Resized& part : parts) {
-    part.weights.compute_root().reorder_storage(x, k).reorder(x, k).vectorize(x, lanes);
-    part.result.compute_root().split(y, y, yi, 32).parallel(y).vectorize(x, lanes);
-    part.along_y.compute_at(part.result, yi).vectorize(x, lanes);
+    if (setup.by_hand()) {
+      part.weights.compute_root().reorder_storage(x, k).reorder(x, k).vectorize(x, lanes);
+      part.result.compute_root().split(y, y, yi, 32).parallel(y).vectorize(x, lanes);
+      part.along_y.compute_at(part.result, yi).vectorize(x, lanes);
+    }
     results.push_back(part.result);
   }
 
   Buffer<float> image = make_image<float>({width * 2 / 3, height * 2 / 3});
-  input.set(image);
+  bind(input, image);
   Buffer<float> out_linear(width, height), out_cubic(width, height), out_lanczos(width, height);
   return {Pipeline(results),
           {image},

@@ -25,14 +25,16 @@ Kernel stencil_chain(const Setup& setup) {
   }
 
   const int lanes = setup.lanes<float>();
-  for (int last = group; last <= stages; last += group) {
-    stage[last].compute_root().split(y, y, yi, 64).parallel(y).vectorize(x, lanes);
-    for (int s = last - group + 1; s < last; s++)
-      stage[s].store_at(stage[last], y).compute_at(stage[last], yi).vectorize(x, lanes);
+  if (setup.by_hand()) {
+    for (int last = group; last <= stages; last += group) {
+      stage[last].compute_root().split(y, y, yi, 64).parallel(y).vectorize(x, lanes);
+      for (int s = last - group + 1; s < last; s++)
+        stage[s].store_at(stage[last], y).compute_at(stage[last], yi).vectorize(x, lanes);
+    }
   }
 
   Buffer<float> image = make_image<float>({width, height});
-  input.set(image);
+  bind(input, image);
   Buffer<float> output(width, height);
   return {Pipeline(stage.back()), {image}, {output}, 11.0 * stages * width * height};
 }

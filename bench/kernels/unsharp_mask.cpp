@@ -38,13 +38,15 @@ Kernel unsharp_mask(const Setup& setup) {
   sharp(x, y, c) = clamp(gain(x, y) * input(x, y, c), 0.0f, 1.0f);
 
   const int lanes = setup.lanes<float>();
-  sharp.bound(c, 0, 3).split(y, y, yi, 32).reorder(x, c, yi, y).parallel(y).vectorize(x, lanes);
-  luminance.store_at(sharp, y).compute_at(sharp, yi).vectorize(x, lanes);
-  blur_y.compute_at(sharp, yi).vectorize(x, lanes);
-  gain.compute_at(sharp, yi).vectorize(x, lanes);
+  if (setup.by_hand()) {
+    sharp.bound(c, 0, 3).split(y, y, yi, 32).reorder(x, c, yi, y).parallel(y).vectorize(x, lanes);
+    luminance.store_at(sharp, y).compute_at(sharp, yi).vectorize(x, lanes);
+    blur_y.compute_at(sharp, yi).vectorize(x, lanes);
+    gain.compute_at(sharp, yi).vectorize(x, lanes);
+  }
 
   Buffer<float> image = make_image<float>({width, height, 3});
-  input.set(image);
+  bind(input, image);
   Buffer<float> result(width, height, 3);
   return {Pipeline(sharp), {image}, {result}, (5 + 14 + 14 + 6 + 9.0) * width * height};
 }

@@ -52,10 +52,12 @@ Kernel wavelet(const Setup& setup) {
              h[0] * at(3, along_x);
     };
     level(x, y, b) = mux(b, {low(0), low(1), high(0), high(1)});
-    level.compute_root().bound(b, 0, 4).split(y, y, yi, 16).reorder(x, b, yi, y).unroll(b);
-    level.parallel(y).vectorize(x, lanes);
-    rows.store_at(level, y).compute_at(level, yi).bound(b, 0, 2).reorder(b, x, y).unroll(b);
-    rows.vectorize(x, lanes);
+    if (setup.by_hand()) {
+      level.compute_root().bound(b, 0, 4).split(y, y, yi, 16).reorder(x, b, yi, y).unroll(b);
+      level.parallel(y).vectorize(x, lanes);
+      rows.store_at(level, y).compute_at(level, yi).bound(b, 0, 2).reorder(b, x, y).unroll(b);
+      rows.vectorize(x, lanes);
+    }
     averages(x, y) = level(x, y, 0);
     source = averages;
     bands.push_back(level);
@@ -86,16 +88,18 @@ Kernel wavelet(const Setup& setup) {
     level_out(x, y) = inverse([&](const Expr& p) { return Expr(columns(p, y, 0)); },
                               [&](const Expr& p) { return Expr(columns(p, y, 1)); }, x / 2, x % 2);
     // Even and odd points beside each other.
-    level_out.compute_root().align_bounds(x, 2).align_bounds(y, 2);
-    level_out.split(y, y, yi, 16).split(yi, yi, yii, 2).split(x, x, xi, 2);
-    level_out.reorder(xi, x, yii, yi, y).unroll(xi).vectorize(x, lanes).parallel(y);
-    columns.compute_at(level_out, yi).align_bounds(y, 2).bound(b, 0, 2).reorder(y, b, x);
-    columns.unroll(y, 2).unroll(b).vectorize(x, lanes);
+    if (setup.by_hand()) {
+      level_out.compute_root().align_bounds(x, 2).align_bounds(y, 2);
+      level_out.split(y, y, yi, 16).split(yi, yi, yii, 2).split(x, x, xi, 2);
+      level_out.reorder(xi, x, yii, yi, y).unroll(xi).vectorize(x, lanes).parallel(y);
+      columns.compute_at(level_out, yi).align_bounds(y, 2).bound(b, 0, 2).reorder(y, b, x);
+      columns.unroll(y, 2).unroll(b).vectorize(x, lanes);
+    }
     better = level_out;
   }
 
   Buffer<float> image = make_image<float>({width, height});
-  input.set(image);
+  bind(input, image);
   Buffer<float> output(width, height);
   return {Pipeline(better), {image}, {output}, 4.0 / 3 * (2 * 14 + 3) * width * height};
 }

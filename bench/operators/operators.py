@@ -49,8 +49,8 @@ def saved_arrays(path):
     with open(path, "rb") as file:
         data, at = file.read(), 0
     while at < len(data):
-        _, bits, count = struct.unpack_from("<iiq", data, at)
-        yield np.frombuffer(data, f"f{bits // 8}", count, at + 16).astype(np.float64)
+        code, bits, count = struct.unpack_from("<iiq", data, at)
+        yield np.frombuffer(data, f"{'iuf'[code]}{bits // 8}", count, at + 16).astype(np.float64)
         at += 16 + count * bits // 8
 
 
@@ -154,14 +154,15 @@ def version(kind):
     return os.path.basename(found[0]).split("-")[1].removesuffix(".dist") if found else None
 
 
-def build_halide_worker():
-    """From one text that includes all others: most of its compilation is that of Halide.h."""
+def build_halide_worker(what, files, definition):
+    """From one text that includes all others: most of its compilation is that of Halide.h. `files` hold
+    what is run, relative to bench/."""
     halide = os.path.join(site_packages(), "halide")
     libraries = os.path.join(halide, "lib64")
-    sources = ["gradients/gradient.cpp", "gradients/slope.cpp", "operators/schedules.cpp",
-               *(f"operators/{name}.cpp" for name in operator_names()), "pairs/worker_main.cpp"]
+    sources = ["gradients/gradient.cpp", "gradients/slope.cpp", "operators/schedules.cpp", *files,
+               "pairs/worker_main.cpp"]
     text = "".join(f'#include "{os.path.dirname(HERE)}/{source}"\n' for source in sources)
-    unit, worker = (os.path.join(PEERS, "operators_halide" + end) for end in (".cpp", ""))
+    unit, worker = (os.path.join(PEERS, what + "_halide" + end) for end in (".cpp", ""))
     with open(unit, "w", encoding="utf-8") as file:
         file.write(text)
     if os.path.exists(worker):
@@ -169,7 +170,7 @@ def build_halide_worker():
                      for file in glob.glob(os.path.join(os.path.dirname(HERE), folder, "*.*")))
         if newest < os.path.getmtime(worker):
             return worker
-    subprocess.run(["g++", "-std=c++20", "-O1", "-DBENCH_OPERATORS",
+    subprocess.run(["g++", "-std=c++20", "-O1", "-D" + definition,
                     f'-DBENCH_HALIDE_PLUGINS="{libraries}"', f"-I{halide}/include", unit, "-o", worker,
                     f"-L{libraries}", "-lHalide", f"-Wl,-rpath,{libraries}"], check=True)
     return worker
@@ -354,7 +355,8 @@ def main():
         make_peers(options.kinds)
         versions = {kind: version(kind) for kind in options.kinds}
     if "halide" in options.kinds:
-        options.halide_worker = build_halide_worker()
+        options.halide_worker = build_halide_worker(
+            "operators", [f"operators/{name}.cpp" for name in operator_names()], "BENCH_OPERATORS")
     machine = json.loads(subprocess.check_output(
         [os.path.join(options.programs, "bench_machine"), str(options.threads)]))
     report = {"machine": machine, "versions": versions, "operators": []}

@@ -12,6 +12,7 @@
 #include <stdexcept>
 #include <string>
 
+#include "../gradients/gradient.h"
 #include "../gradients/slope.h"
 #include "process_memory.h"
 #include "worker_protocol.h"
@@ -21,7 +22,9 @@ namespace {
 kernels::Kernel make_kernel(const std::string& name, const kernels::Setup& setup) {
 #define KERNEL(known) \
   if (name == #known) return kernels::known(setup);
+#ifndef BENCH_FORWARD  // which has no gradients
 #define GRADIENT(known) KERNEL(known)
+#endif
 #define OPERATOR(known) KERNEL(known)
 #ifdef BENCH_OPERATORS
 #include "../operators/list.def"
@@ -57,6 +60,7 @@ class Worker {
     setup_.is_operator = true;
 #endif
     kernel_ = make_kernel(name, setup_);
+    if (!setup_.is_operator && !setup_.by_hand()) kernels::schedule_kernel(kernel_, setup_);
   }
 
   void compile() {
