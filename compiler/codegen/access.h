@@ -21,9 +21,9 @@ namespace retrograde::codegen {
 // ---- access.cpp: indices and addresses ----
 
 std::optional<LinearIndex> as_linear(const Frame& frame, const Expr& index);
-// Null where the index is none.
+// A ramp of scalars; null where the index is none.
 const ir::Ramp* as_scalar_ramp(const Expr& index);
-// The pieces of a ramp of vectors, as indices of their own; empty when `index` is none.
+// The pieces of a ramp of vectors, as indices of their own; empty where the index is none.
 std::vector<Expr> pieces_of(const Expr& index);
 Coordinate coordinate_of(const Frame& frame, const Expr& index);
 
@@ -42,11 +42,11 @@ Instruction* tagged(Instruction* instruction, const Storage& storage) {
 Value* load(Values& values, const ir::Load& e);
 Value* load_dense(FunctionContext& c, const Storage& from, Type type, Value* first,
                   Value* predicate);
-// As much code as for one lane.
+// In a loop over the lanes: as much code as one lane takes.
 Value* gather_compactly(FunctionContext& c, const Storage& from, Type type, Value* indices,
                         Value* predicate);
-// Null where the index is no ramp that a bound holds inside of an image, or the
-// machine does as well by a gather.
+// Null where the index is no ramp that a bound holds inside of an image, or the machine does as well
+// by a gather.
 Value* load_held(Values& values, const Storage& from, Type type, const Expr& index,
                  Value* predicate);
 

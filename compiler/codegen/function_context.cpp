@@ -18,13 +18,12 @@ void FunctionContext::begin(llvm::Function* function) {
   frame.context = function->getArg(0);
   frame.context->setName("context");
   frame.entry = llvm::BasicBlock::Create(e.context(), "entry", function);
-  llvm::BasicBlock* body = new_block("body");
-  b.SetInsertPoint(body);
+  b.SetInsertPoint(new_block("body"));
   frame.memo.push_back({{}, {}, false});
 }
 
-void FunctionContext::finish() {
-  b.CreateRet(b.getInt32(0));
+void FunctionContext::finish(Value* code) {
+  b.CreateRet(code);
   Value* count = int64(frame.owned_count);
   if (frame.error_exit) {
     b.SetInsertPoint(frame.error_exit);

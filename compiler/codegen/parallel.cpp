@@ -84,7 +84,7 @@ FunctionGenerator::Task FunctionGenerator::outline(const Stmt& body, const std::
   if (!index.empty())
     c_.frame.variables[index] = b_.CreateIntCast(task->getArg(1), llvm_type(e_, index_type), true);
   statement(body);
-  c_.finish();
+  c_.finish(b_.getInt32(0));
   c_.frame = std::move(outer);
   return {task, closure};
 }

@@ -52,7 +52,7 @@ void FunctionGenerator::generate() {
   c_.begin(function);
   bind_arguments();
   if (source_.body.defined()) statement(source_.body);
-  c_.finish();
+  c_.finish(b_.getInt32(0));
   make_argv_wrapper(function);
 }
 
@@ -72,9 +72,7 @@ void FunctionGenerator::make_argv_wrapper(llvm::Function* function) {
       pointer = from_memory(e_, arg.type, b_.CreateLoad(memory_type(e_, arg.type), pointer));
     args.push_back(pointer);
   }
-  b_.CreateRet(b_.CreateCall(function, args));
-  b_.SetInsertPoint(c_.frame.entry);
-  b_.CreateBr(&*std::next(wrapper->begin()));
+  c_.finish(b_.CreateCall(function, args));
 }
 
 void FunctionGenerator::make(const Assert& s) {

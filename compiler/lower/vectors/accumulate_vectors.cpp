@@ -45,9 +45,8 @@ const VectorReduce& reduce_of(const UpdateChain::Term& term) {
 
 // f[i] op reduce(x) op reduce(y) ..., of vectors of one type
 std::optional<UpdateChain> as_chain(const Store& store) {
-  auto chain = find_update_chain(store);
-  if (!chain || chain->kind == Kind::Call || chain->own.as<Load>()->predicate.defined())
-    return std::nullopt;
+  auto chain = find_vector_reduction(store);
+  if (!chain) return std::nullopt;
   const auto* first = chain->terms[0].value.as<VectorReduce>();
   const bool is_reduced = std::ranges::all_of(chain->terms, [&](const UpdateChain::Term& term) {
     const auto* reduce = term.value.as<VectorReduce>();

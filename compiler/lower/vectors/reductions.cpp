@@ -32,4 +32,11 @@ Expr identity_of(Kind op, Type type) {
   return make_broadcast(scalar_identity(op, type.element_of()), type.lanes());
 }
 
+std::optional<UpdateChain> find_vector_reduction(const Store& store) {
+  auto chain = find_update_chain(store);
+  const bool is_reduced =
+      chain && chain->kind != Kind::Call && !chain->own.as<Load>()->predicate.defined();
+  return is_reduced ? chain : std::nullopt;
+}
+
 }  // namespace retrograde::lower

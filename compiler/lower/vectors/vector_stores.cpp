@@ -48,14 +48,6 @@ bool recomputes_shared_updates(const BodyFacts& facts) {
   return false;
 }
 
-// Of scalars, by an operator that vectors are reduced by.
-std::optional<UpdateChain> find_reduction(const Store& store) {
-  auto chain = find_update_chain(store);
-  const bool is_reduced =
-      chain && chain->kind != Kind::Call && !chain->own.as<Load>()->predicate.defined();
-  return is_reduced ? chain : std::nullopt;
-}
-
 // Of a nest of ramps with known strides one must step over all of the other.
 bool hits_each_element_once(const Expr& index) {
   const Ramp* ramp = index.as<Ramp>();
@@ -93,7 +85,7 @@ Stmt VectorStores::store(const Stmt& s, const Store& n) {
     return make_store(n.name, widen_.spread(n.value), index, widen_.masked(n.predicate, lanes),
                       n.symbol);
   }
-  if (auto reduction = find_reduction(n)) return store_reduction(s, n, *reduction);
+  if (auto reduction = find_vector_reduction(n)) return store_reduction(s, n, *reduction);
   require_no_load(n.name, 0);
   bool is_same = !widen_.varies(n.value) && !widen_.varies(n.predicate);
   return is_same ? s : Stmt();  // the last lane wins

@@ -9,7 +9,6 @@
 #include <unordered_set>
 #include <utility>
 
-#include "ir/atomic_update.h"
 #include "lower/vectors/reductions.h"
 #include "lower/vectors/widen_expr.h"
 
