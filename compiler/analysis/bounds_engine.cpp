@@ -125,7 +125,8 @@ Interval BoundsEngine::sum_of_bounds(const Sum& form) {
   return result;
 }
 
-// c*y - c*k*(y / k)  is  c*(y % k): two correlated terms become one.
+// c*y - c*k*(y / k)  is  c*(y % k): two correlated terms become one. So do those of a part of y that
+// varies:  a + k*((b - a) / k), where the last of tiles begins, is  b - (b - a) % k, whatever a is.
 Sum BoundsEngine::with_remainders(Sum form) {
   for (const Term& term : std::vector<Term>(form.terms)) {
     const Div* div = term.atom.as<Div>();
@@ -133,14 +134,15 @@ Sum BoundsEngine::with_remainders(Sum form) {
     if (!k || *k <= 0 || term.factor % *k != 0) continue;
     int64_t c = -term.factor / *k;
     Sum y = linear_form(div->a);
-    bool contains = !y.terms.empty();
+    bool contains_all = !y.terms.empty(), contains_varying = false;
     for (const Term& part : y.terms) {
-      bool found = false;
-      for (const Term& t : form.terms)
-        found |= t.atom.same_as(part.atom) && t.factor == __int128{c} * part.factor;
-      contains &= found;
+      const bool found = std::ranges::any_of(form.terms, [&](const Term& t) {
+        return t.atom.same_as(part.atom) && t.factor == __int128{c} * part.factor;
+      });
+      contains_all &= found;
+      contains_varying |= found && varies(part.atom);
     }
-    if (!contains) continue;
+    if (!contains_all && !contains_varying) continue;
     form = plus(form, y, -c);
     form = plus(form, linear_form(term.atom), -term.factor);
     form = plus(form, linear_form(binary(Kind::Mod, div->a, div->b)), c);

@@ -69,6 +69,17 @@ TEST_F(IntervalTest, RemainderWithinOnePeriodIsTight) {
   EXPECT_EQ(bounds(var("near") % 8), "[2, 5]");
 }
 
+// Of tiles from a to b, each of 16, the last begins at or before b, wherever they begin.
+TEST_F(IntervalTest, TheLastOfTilesBeginsBeforeTheirEnd) {
+  scope.push("a", {0, 48});
+  scope.push("b", {n + 15, n + 63});
+  const Expr a = var("a"), b = var("b"), from = var("from");
+  EXPECT_EQ(bounds(a + (b - a) / 16 * 16), "[n, (n + 63)]");
+  EXPECT_EQ(bounds(from + (b - from) / 16 * 16),
+            "[(from + ((((n - from) + 15) / 16) * 16)), ((from + ((((n - from) + 15) / 16) * 16)) "
+            "+ 48)]");
+}
+
 TEST_F(IntervalTest, ClampBoundsTheUnbounded) {
   EXPECT_EQ(bounds(clamp(anything, 0, 255)), "[0, 255]");
   Expr loaded = call_image("in", Float(32), {x}, {});

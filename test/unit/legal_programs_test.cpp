@@ -319,6 +319,24 @@ TEST(InputRegions, StayWhereValuesArePlaces) {
   EXPECT_EQ(inferred_extent(f, in, 12), 16);
 }
 
+TEST(InputRegions, OfGuardedTilesInsideOfGuardedTilesEndWithThem) {
+  Var y("y"), xi("xi"), yi("yi"), tile("tile");
+  ImageParam in(Float(32), 2, "in");
+  Func f("f"), turned("turned");
+  f(x, y) = in(x, y) * 2.0f;
+  turned(x, y) = f(y, x);
+  turned.split(y, y, yi, 16, TailStrategy::GuardWithIf);
+  turned.split(y, y, tile, 4, TailStrategy::GuardWithIf);
+  f.split(x, x, xi, 16, TailStrategy::GuardWithIf).vectorize(xi).compute_at(turned, y);
+  Buffer<float> image(100, 70);
+  image.for_each_element([&](int px, int py) { image(px, py) = static_cast<float>(px * 70 + py); });
+  in.set(image);
+  const Buffer<float> out = turned.realize({70, 100});
+  for (int py = 0; py < 100; py++) {
+    for (int px = 0; px < 70; px++) ASSERT_EQ(out(px, py), 2 * image(py, px));
+  }
+}
+
 // ---- promises ----
 
 TEST(Promises, MaySpeakOfThemselves) {
