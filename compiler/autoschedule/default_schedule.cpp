@@ -5,6 +5,7 @@
 #include <optional>
 #include <unordered_set>
 
+#include "autoschedule/column_blocks.h"
 #include "autoschedule/cost_estimate.h"
 #include "autoschedule/cut_reductions.h"
 #include "autoschedule/inlined_reads.h"
@@ -370,6 +371,7 @@ void give_default_schedule(const std::vector<FuncPtr>& outputs, const VectorUnit
     given.push_back(f);
   }
   const Readers readers(outputs, stored);  // before anything is moved
+  compute_in_column_blocks(readers, stored, whole, sizes);
   compute_in_strips(outputs, given, whole, sizes);
   compute_in_slices(readers, stored, whole, sizes);
   compute_in_reductions(readers, stored, whole, sizes);

@@ -27,4 +27,14 @@ void vectorize(Stage stage, const VarOrRVar& loop, int lanes, TailStrategy tail)
   stage.split(loop, loop, inner, lanes, tail).vectorize(inner);
 }
 
+void run_serially(const FuncPtr& f) {
+  for (int s = 0; s < f->stage_count(); ++s) {
+    const std::vector<Dim> loops = f->stage(s).schedule.dims;
+    for (const Dim& loop : loops) {
+      if (loop.runs == ForType::Parallel)
+        Stage(f, s).serial(VarOrRVar(loop.var, loop.is_reduction));
+    }
+  }
+}
+
 }  // namespace retrograde::autoschedule

@@ -16,4 +16,7 @@ std::string inner_loop(const FuncContents& f, int stage, const std::string& spli
 // stage.vectorize(loop, lanes, tail), where the new loop is called so.
 void vectorize(Stage stage, const VarOrRVar& loop, int lanes, TailStrategy tail);
 
+// Of all stages of f: what runs inside of tasks is no set of tasks of its own.
+void run_serially(const FuncPtr& f);
+
 }  // namespace retrograde::autoschedule

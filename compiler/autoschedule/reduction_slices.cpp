@@ -171,21 +171,14 @@ void cut_into_strips(const Reader& reader, const Move& move) {
   stage.reorder(order);
 }
 
-// Strips are the tasks: what is computed for one of them, and in its loops, is no set of tasks of its
-// own.
+// With what is computed in its loops.
 void run_serially(const FuncPtr& f, const std::vector<FuncPtr>& stored) {
   for (const FuncPtr& inner : stored) {
     const graph::LoopLevel& level = inner->schedule.compute_level;
     if (level.kind == graph::LoopLevel::Kind::At && level.func == f->name)
       run_serially(inner, stored);
   }
-  for (int s = 0; s < f->stage_count(); ++s) {
-    const std::vector<Dim> loops = f->stage(s).schedule.dims;
-    for (const Dim& loop : loops) {
-      if (loop.runs == ForType::Parallel)
-        Stage(f, s).serial(VarOrRVar(loop.var, loop.is_reduction));
-    }
-  }
+  autoschedule::run_serially(f);
 }
 
 }  // namespace

@@ -30,7 +30,7 @@ class Slicer {
     for (auto dim = loops.dims.rbegin(); dim != loops.dims.rend(); ++dim) {
       const auto extent = extent_of(reader, *dim);
       const bool is_enough = extent && *extent >= (result ? 2 : enough_tasks);
-      if (!is_enough || left <= slice_dimensions || !is_sliced(*f, reader, dim->var)) break;
+      if (!is_enough || left <= slice_dimensions || !sliced_by(*f, reader, dim->var)) break;
       result = dim->var;
       --left;
     }
@@ -48,32 +48,31 @@ class Slicer {
     return is_pure_position(g, stage, d) ? sizes_.extent(g, d) : std::nullopt;
   }
 
-  // Every read has the variable as one and the same index, and in no other; along it each element is
-  // computed for itself.
-  static bool is_sliced(const FuncContents& f, const Reader& reader, const std::string& var) {
-    const auto moves = [&](const Expr& e) { return uses_variable(e, var); };
-    std::optional<size_t> dimension;
-    for (const Call* read : reader.reads) {
-      for (size_t d = 0; d < read->args.size(); ++d) {
-        const Expr index = without_lets(read->args[d]);
-        if (!moves(index)) continue;
-        const auto* variable = unclamped(index, moves).as<Variable>();
-        if (!variable || variable->name != var || dimension.value_or(d) != d) return false;
-        dimension = d;
-      }
-      const bool is_used = dimension && moves(read->args[*dimension]);
-      if (!is_used) return false;
-    }
-    for (int s = 0; dimension && s < f.stage_count(); ++s) {
-      if (!is_pure_position(f, f.stage(s), *dimension)) return false;
-    }
-    return dimension.has_value();
-  }
-
   const SizeEstimate& sizes_;
 };
 
 }  // namespace
+
+std::optional<size_t> sliced_by(const FuncContents& f, const Reader& reader,
+                                const std::string& var) {
+  const auto moves = [&](const Expr& e) { return uses_variable(e, var); };
+  std::optional<size_t> dimension;
+  for (const Call* read : reader.reads) {
+    for (size_t d = 0; d < read->args.size(); ++d) {
+      const Expr index = without_lets(read->args[d]);
+      if (!moves(index)) continue;
+      const auto* variable = unclamped(index, moves).as<Variable>();
+      if (!variable || variable->name != var || dimension.value_or(d) != d) return std::nullopt;
+      dimension = d;
+    }
+    const bool is_used = dimension && moves(read->args[*dimension]);
+    if (!is_used) return std::nullopt;
+  }
+  for (int s = 0; dimension && s < f.stage_count(); ++s) {
+    if (!is_pure_position(f, f.stage(s), *dimension)) return std::nullopt;
+  }
+  return dimension;
+}
 
 void compute_in_slices(const Readers& readers, const std::vector<FuncPtr>& stored,
                        const std::unordered_set<const Symbol*>& but, const SizeEstimate& sizes) {

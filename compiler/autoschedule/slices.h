@@ -11,6 +11,8 @@
 // each dx and dy.
 #pragma once
 
+#include <optional>
+#include <string>
 #include <unordered_set>
 #include <vector>
 
@@ -25,5 +27,10 @@ namespace retrograde::autoschedule {
 // neither.
 void compute_in_slices(const Readers& readers, const std::vector<FuncPtr>& stored,
                        const std::unordered_set<const Symbol*>& but, const SizeEstimate& sizes);
+
+// Whether every read of f has the variable as one and the same index, but for clamps, and in no other;
+// along it each element of f is computed for itself. The result: which index.
+std::optional<size_t> sliced_by(const FuncContents& f, const Reader& reader,
+                                const std::string& var);
 
 }  // namespace retrograde::autoschedule

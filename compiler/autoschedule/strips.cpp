@@ -313,13 +313,6 @@ bool has_plain_rows(const FuncContents& f) {
          loops.splits[0].outer == f.args[0];
 }
 
-void run_serially(const FuncPtr& f) {
-  const std::vector<Dim> loops = f->pure->schedule.dims;
-  for (const Dim& loop : loops) {
-    if (loop.runs == ForType::Parallel) Stage(f, 0).serial(Var(loop.var));
-  }
-}
-
 void give_strips(const Group& group) {
   const FuncPtr& last = group.last();
   const StripLoops& loops = group.loops();

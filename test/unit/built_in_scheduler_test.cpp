@@ -363,6 +363,56 @@ TEST(StripsOfRows, AreThoseOfAChainAsLongAsItsWindowsFit) {
   EXPECT_LE(at_root, 8);
 }
 
+// Sums down the columns of an image and back up, turned.
+struct TurnedScan {
+  explicit TurnedScan(int columns, int rows) {
+    RDom down(1, rows - 1);
+    sums(x, y, c) = cast<float>((x * 7 + y * 13 + c) % 11);
+    sums(x, down, c) = 0.5f * sums(x, down - 1, c) + sums(x, down, c);
+    turned(x, y, c) = sums(y, x, c);
+    turned.set_estimate(x, 0, rows).set_estimate(y, 0, columns).set_estimate(c, 0, 3);
+  }
+  graph::LoopLevel place_of_sums() {
+    Pipeline(turned).auto_schedule(get_host_target());
+    return sums.function()->schedule.compute_level;
+  }
+  Var x{"x"}, y{"y"}, c{"c"};
+  Func sums{"sums"}, turned{"turned"};
+};
+
+TEST(BlocksOfColumns, RunInTheLoopsOfTheirOnlyReader) {
+  TurnedScan scheduled(1100, 900), plain(1100, 900);
+  const graph::LoopLevel place = scheduled.place_of_sums();
+  ASSERT_EQ(place.kind, graph::LoopLevel::Kind::At);
+  EXPECT_EQ(place.func, scheduled.turned.name());
+  EXPECT_EQ(place.var, "y");
+  const Buffer<float> found = scheduled.turned.realize({900, 75, 2}),
+                      expected = plain.turned.realize({900, 75, 2});
+  found.for_each_element(
+      [&](int px, int py, int pc) { ASSERT_EQ(found(px, py, pc), expected(px, py, pc)); });
+}
+
+TEST(BlocksOfColumns, AreNotWhereTheyWouldNotFit) {
+  EXPECT_EQ(TurnedScan(1100, 4000).place_of_sums().kind, graph::LoopLevel::Kind::Root);
+}
+
+TEST(BlocksOfColumns, AreNotWhereTheScanFits) {
+  EXPECT_EQ(TurnedScan(200, 300).place_of_sums().kind, graph::LoopLevel::Kind::Root);
+}
+
+TEST(BlocksOfColumns, AreNotWhereSeveralReadThem) {
+  TurnedScan program(1100, 900);
+  Func both("both");
+  both(program.x, program.y, program.c) = program.turned(program.x, program.y, program.c) +
+                                          program.sums(program.x, program.y, program.c);
+  both.set_estimate(program.x, 0, 900)
+      .set_estimate(program.y, 0, 900)
+      .set_estimate(program.c, 0, 3);
+  program.turned.compute_root();
+  Pipeline(both).auto_schedule(get_host_target());
+  EXPECT_EQ(program.sums.function()->schedule.compute_level.kind, graph::LoopLevel::Kind::Root);
+}
+
 TEST_F(BuiltInScheduler, KeepsWhatAUserScheduled) {
   heavy.compute_at(blur, y).vectorize(x, 4);
   blur.compute_root().reorder(y, x);
