@@ -80,6 +80,7 @@ double operations_of_values(const std::vector<Expr>& values,
 int bits_of_values(const std::vector<Expr>& values) {
   int bits = 1;
   for (const Expr& value : values) {
+    bits = std::max(bits, value.type().bits());
     walk(value, [&](const Expr& e) {
       if (!is_const(e)) bits = std::max(bits, e.type().bits());
       return !is_read(e);
