@@ -19,6 +19,12 @@ namespace {
 constexpr int64_t columns = 64;             // of a block: four lines of a cache in each row
 constexpr int64_t block_bytes = 512 << 10;  // at most, of a cache near a core
 
+// A sum keeps its tile in registers, and has no use for a block of its own.
+bool is_scan(const FuncContents& f) {
+  return std::ranges::any_of(
+      f.updates, [&](const Definition& update) { return read_elsewhere(f, update).defined(); });
+}
+
 struct Blocks {
   std::string column;                // the reader's variable that is cut into blocks
   int64_t tiles = 1;                 // of its inner loop, in a block
@@ -106,7 +112,7 @@ void compute_in_column_blocks(const Readers& readers, const std::vector<FuncPtr>
                               const SizeEstimate& sizes) {
   std::unordered_set<const Symbol*> cut;
   for (const FuncPtr& f : stored) {
-    const bool may_move = !f->is_pure() && !f->made && is_at_root(*f) && readers.is_inside(f) &&
+    const bool may_move = is_scan(*f) && !f->made && is_at_root(*f) && readers.is_inside(f) &&
                           !readers.is_output(f) && !but.contains(f.get());
     const auto reader = may_move ? readers.only_reader(f) : std::nullopt;
     if (!reader || !reader->func->is_pure() || !is_at_root(*reader->func) ||

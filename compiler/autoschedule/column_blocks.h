@@ -20,7 +20,7 @@
 
 namespace retrograde::autoschedule {
 
-// Of the Funcs, which this scheduler has computed at root and given loops, those with updates.
+// Of the Funcs, which this scheduler has computed at root and given loops, the scans.
 // `but`: none of these, as a reader neither.
 void compute_in_column_blocks(const Readers& readers, const std::vector<FuncPtr>& stored,
                               const std::unordered_set<const Symbol*>& but,

@@ -396,6 +396,18 @@ TEST(BlocksOfColumns, AreNotWhereTheyWouldNotFit) {
   EXPECT_EQ(TurnedScan(1100, 4000).place_of_sums().kind, graph::LoopLevel::Kind::Root);
 }
 
+TEST(BlocksOfColumns, AreNotOfSums) {
+  Var x("x"), y("y");
+  Func means("means"), out("out");
+  RDom r(0, 9);
+  means(x, y) = 0.0f;
+  means(x, y) += cast<float>(x + r) * y;
+  out(x, y) = means(y, x);
+  out.set_estimate(x, 0, 2000).set_estimate(y, 0, 2000);
+  Pipeline(out).auto_schedule(get_host_target());
+  EXPECT_EQ(means.function()->schedule.compute_level.kind, graph::LoopLevel::Kind::Root);
+}
+
 TEST(BlocksOfColumns, AreNotWhereTheScanFits) {
   EXPECT_EQ(TurnedScan(200, 300).place_of_sums().kind, graph::LoopLevel::Kind::Root);
 }
