@@ -64,7 +64,8 @@ def measure(name, options, machine):
 
 def figures(name, workers, machine, error):
     done = {w.name: w.median() for w in workers if w.median() is not None}
-    halide = {s: done.get(s) for s in SCHEDULES}
+    started = {w.name for w in workers}
+    halide = {s: done.get(s) for s in SCHEDULES if s in started}
     best = min((s for s in halide if halide[s]), key=halide.get, default=None)
     compile_s, _, moved, operations, _, search_s = workers[0].ready
     return {"kernel": name, "retrograde_ms": done["retrograde"], "by_hand_ms": done["by_hand"],
