@@ -55,6 +55,9 @@ def measure(name, options, machine):
                               seconds=operators.SEARCH_SECONDS) for s in SCHEDULES]
         try:
             operators.run_in_turn(workers, options.rounds)
+            for worker in workers[:2]:
+                if worker.failure:
+                    sys.exit(f"{name}, {worker.name}: {worker.failure}")
             return figures(name, workers, machine, error_of(workers[:2], scratch))
         finally:
             for worker in workers:

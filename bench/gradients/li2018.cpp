@@ -1,4 +1,5 @@
-// li2018.cpp -- how gradients are scheduled: by Halide 14 with Li2018, by Retrograde as they come.
+// li2018.cpp -- how gradients are scheduled: by Halide 14 with Li2018, by Retrograde as they come;
+// and by its autoscheduler kernels without their schedules.
 #include "gradient.h"
 
 namespace kernels {

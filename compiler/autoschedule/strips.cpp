@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
 #include <memory>
 #include <optional>
 #include <set>
@@ -43,7 +42,7 @@ struct Along {
 };
 using Windows = std::vector<Along>;  // of the dimensions of a Func
 
-// StripReads of other stored Funcs by a stage, through what is computed inline.
+// Reads of a stored Func by another, through what is computed inline.
 struct StripReads {
   FuncPtr reader;
   std::vector<Expr> calls;
@@ -134,7 +133,9 @@ class Group {
   }
 
  private:
-  const Windows& of(const FuncPtr& f) const { return f == last_ ? own_ : windows_.at(f.get()); }
+  const Windows& of(const FuncContents& f) const {
+    return &f == last_.get() ? own_ : windows_.at(&f);
+  }
 
   std::optional<Windows> windows_of(const FuncContents& f,
                                     const std::vector<StripReads>& reads) const {
@@ -149,11 +150,9 @@ class Group {
     return all && is_one_to_one(*all) && f.args.size() == all->size() ? all : std::nullopt;
   }
   std::optional<Windows> windows_of(const Call& call, const FuncContents& reader) const {
-    const auto found = windows_.find(&reader);
-    const Windows& outer = &reader == last_.get() ? own_ : found->second;
     Windows result;
     for (const Expr& arg : call.args) {
-      const auto along = along_of(arg, reader, outer);
+      const auto along = along_of(arg, reader, of(reader));
       if (!along) return std::nullopt;
       result.push_back(*along);
     }
