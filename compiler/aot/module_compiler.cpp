@@ -255,10 +255,11 @@ class AheadOfTime : public ModuleCompiler {
     codegen::machine_for(target, false);  // says what cannot be compiled for before any work
     lower::LowerOptions options;
     options.target = pipeline.traced(target);
-    return lower::lower(pipeline.name,
-                        autoschedule::schedule_unscheduled(
-                            pipeline.outputs, autoschedule::vector_unit_of(options.target)),
-                        inputs, options);
+    return lower::lower(
+        pipeline.name,
+        autoschedule::schedule_unscheduled(
+            pipeline.outputs, autoschedule::vector_unit_of(options.target), pipeline.autoschedule),
+        inputs, options);
   }
 
   std::vector<uint8_t> object(const Module& module) override {

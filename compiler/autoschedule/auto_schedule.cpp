@@ -14,13 +14,15 @@ namespace retrograde::autoschedule {
 
 namespace {
 
-void schedule_all(const Pipeline& pipeline, const Target& target, const MachineParams&,
+void schedule_all(const Pipeline& pipeline, const Target& target, const MachineParams& machine,
                   AutoSchedulerResults* results) {
-  const std::vector<FuncPtr> outputs = pipeline.spec().outputs;
+  const PipelineSpec spec = pipeline.spec();
+  const std::vector<FuncPtr>& outputs = spec.outputs;
   run_on_large_stack([&] {
     const std::vector<FuncPtr> copy = copy_graph(apply_wrappers(outputs)).outputs;
     const auto given = static_cast<std::ptrdiff_t>(schedule_log(copy).size());
-    give_default_schedule(copy, vector_unit_of(target), Scheduling::Everything);
+    give_default_schedule(copy, {vector_unit_of(target), spec.autoschedule, machine},
+                          Scheduling::Everything);
     ScheduleLog log = schedule_log(copy);
     log.entries.erase(log.entries.begin(), log.entries.begin() + given);
     apply_log(log, outputs);

@@ -39,7 +39,7 @@ class BlockFinder {
   std::optional<Blocks> find() const {
     Blocks result;
     int64_t bytes = sizes_.bytes(f_), tasks = 1;
-    if (bytes < more_than_caches / 4) return std::nullopt;
+    if (bytes < sizes_.machine().more_than_caches / 4) return std::nullopt;
     for (const std::string& var : g_.args) {
       const auto d = sliced_by(f_, reader_, var);
       const auto extent = d ? sizes_.extent(f_, *d) : std::nullopt;
@@ -57,7 +57,8 @@ class BlockFinder {
         bytes /= *extent;
       }
     }
-    const bool pays = !result.column.empty() && tasks >= enough_tasks && bytes <= block_bytes;
+    const bool pays =
+        !result.column.empty() && tasks >= sizes_.machine().enough_tasks && bytes <= block_bytes;
     return pays ? std::optional(result) : std::nullopt;
   }
 

@@ -5,6 +5,7 @@
 #include <optional>
 #include <unordered_set>
 
+#include "autoschedule/chosen_places.h"
 #include "autoschedule/column_blocks.h"
 #include "autoschedule/cost_estimate.h"
 #include "autoschedule/cut_reductions.h"
@@ -23,6 +24,7 @@
 #include "autoschedule/slices.h"
 #include "autoschedule/stored_funcs.h"
 #include "autoschedule/strips.h"
+#include "autoschedule/task_sizes.h"
 #include "diagnostics/large_stack.h"
 #include "frontend/language/func.h"
 #include "frontend/language/rdom.h"
@@ -93,24 +95,27 @@ FuncPtr block_of(const Definition& stage) {
 // iterations are independent whatever the stage does.
 class LoopChooser {
  public:
-  LoopChooser(const FuncPtr& f, int stage, const VectorUnit& unit, const SizeEstimate& sizes)
-      : function_(f), f_(*f), index_(stage), stage_(f, stage), unit_(unit), sizes_(sizes) {
+  LoopChooser(const FuncPtr& f, int stage, const ScheduleRequest& request,
+              const SizeEstimate& sizes)
+      : function_(f), f_(*f), index_(stage), stage_(f, stage), request_(request), sizes_(sizes) {
     for (size_t d = 0; d < f_.args.size(); ++d) {
       if (is_pure_position(f_, definition(), d)) pure_.push_back(d);
     }
   }
 
   void give() {
-    const bool scatters = scatters_in_order(f_, definition());
+    const bool may_scatter = makes(Decision::ScatterStrategy);
+    const bool scatters = may_scatter && scatters_in_order(f_, definition());
     if (scatters)
       schedule_scatter_in_order(f_, index_, stage_);
-    else
+    else if (may_scatter)
       unroll_taps(definition(), stage_);
     if (const FuncPtr block = block_of(definition())) return give_blocks(block);
     if (pure_.empty()) return;
-    if (auto d = pure_[0] == 0 ? transposed_dimension(f_, definition()) : std::nullopt)
+    const bool stages = makes(Decision::LayoutStaging);
+    if (auto d = stages && pure_[0] == 0 ? transposed_dimension(f_, definition()) : std::nullopt)
       return tile(*d);
-    if (!scatters && schedule_look_ups(f_, index_, stage_, lanes, sizes_)) return;
+    if (stages && !scatters && schedule_look_ups(f_, index_, stage_, lanes, sizes_)) return;
     if (!scatters && pure_[0] == 0 && tile_in_registers()) return;
     if (pure_[0] == 0 && scans_rows()) return cut_scan();
     make_tasks();
@@ -121,6 +126,7 @@ class LoopChooser {
   }
 
  private:
+  bool makes(Decision decision) const { return !request_.options.without.contains(decision); }
   const Definition& definition() const { return f_.stage(index_); }
   Var variable_of(size_t dimension) const { return Var(f_.args[dimension]); }
   Var inside(const Var& loop) const { return Var(inner_loop(f_, index_, loop.name())); }
@@ -134,9 +140,10 @@ class LoopChooser {
   // vectors. How many private parts there are may be known at run time only: few, where the target
   // is large.
   void make_tasks() {
-    const int64_t unknown = f_.made && f_.made->has_parts ? 1 : enough_tasks;
+    const int64_t unknown = f_.made && f_.made->has_parts ? 1 : sizes_.machine().enough_tasks;
     int64_t tasks = 1;
-    for (size_t i = pure_.size(); i-- > 0 && tasks < enough_tasks && pure_[i] != 0;) {
+    for (size_t i = pure_.size();
+         i-- > 0 && tasks < sizes_.machine().enough_tasks && pure_[i] != 0;) {
       stage_.parallel(variable_of(pure_[i]));
       tasks *= sizes_.extent(f_, pure_[i]).value_or(unknown);
     }
@@ -174,7 +181,9 @@ class LoopChooser {
   bool tile_in_registers() {
     const auto tile = tile_of(f_, definition());
     if (!tile) return false;
-    const auto packed = packed_operand(f_, definition(), *tile, lanes, sizes_);
+    const auto packed = makes(Decision::LayoutStaging)
+                            ? packed_operand(f_, definition(), *tile, lanes, sizes_)
+                            : std::nullopt;
     std::vector<VarOrRVar> loops = cut(*tile, {}, packed.has_value());
     if (packed) loops = pack_inside(*packed, loops);
     run_in_parallel(loops);
@@ -202,8 +211,9 @@ class LoopChooser {
   }
 
   std::optional<RegisterTile> tile_of(const FuncContents& f, const Definition& reduction) const {
+    if (!makes(Decision::RegisterTiles)) return std::nullopt;
     const bool has_lanes = f.made && f.made->lanes > 0;
-    return register_tile(f, reduction, lanes, has_lanes ? 1 : 4, unit_, sizes_);
+    return register_tile(f, reduction, lanes, has_lanes ? 1 : 4, request_.unit, sizes_);
   }
 
   // Its loops stand inside of those of the reduction; those over tiles outside, of the sides first,
@@ -265,7 +275,7 @@ class LoopChooser {
         size = side.dimension == d ? side.size : size;
       const auto arg = std::find(block.args.begin(), block.args.end(), f_.args[d]);
       const auto in_block = static_cast<size_t>(arg - block.args.begin());
-      const int64_t extent = sizes_.extent(f_, d).value_or(enough_tasks * size);
+      const int64_t extent = sizes_.extent(f_, d).value_or(sizes_.machine().enough_tasks * size);
       const bool is_shift = size == 1 && extent <= small_shift && sizes_.extent(f_, d) &&
                             arg != block.args.end() &&
                             shifts_reads(block, block.updates[0], in_block);
@@ -274,7 +284,7 @@ class LoopChooser {
       else
         tasks *= (extent + size - 1) / size;
     }
-    return tasks >= enough_tasks ? shifts : std::vector<size_t>();
+    return tasks >= sizes_.machine().enough_tasks ? shifts : std::vector<size_t>();
   }
 
   // The sums of a tile: a block of each after the other, in registers, is added to what memory
@@ -286,7 +296,8 @@ class LoopChooser {
     const std::vector<size_t> shifts = shifts_of(*block, own);
     compute_block(block, shifts);
     run_in_parallel(cut(own, shifts));
-    for (int s = 0; s < block->stage_count(); ++s) LoopChooser(block, s, unit_, sizes_).cut(tile);
+    for (int s = 0; s < block->stage_count(); ++s)
+      LoopChooser(block, s, request_, sizes_).cut(tile);
   }
 
   // For each iteration of the innermost loop outside of the tile.
@@ -316,16 +327,16 @@ class LoopChooser {
   const FuncContents& f_;
   const int index_;
   Stage stage_;
-  const VectorUnit& unit_;
+  const ScheduleRequest& request_;
   const SizeEstimate& sizes_;
   std::vector<size_t> pure_;  // dimensions
 };
 
 // Pure Funcs.
-void compute_at_root(const std::vector<FuncPtr>& funcs, const VectorUnit& unit) {
+void compute_at_root(const std::vector<FuncPtr>& funcs, const ScheduleRequest& request) {
   for (const FuncPtr& f : funcs) {
     Func(f).compute_root();
-    LoopChooser(f, 0, unit, SizeEstimate()).give();
+    LoopChooser(f, 0, request, SizeEstimate()).give();
   }
 }
 
@@ -346,37 +357,55 @@ bool schedule_scatter(const FuncPtr& f, const SlicedScatters& slices, const Size
   return true;
 }
 
+// What is computed in the loops of others, and which loops are shared.
+void move_and_join(const std::vector<FuncPtr>& outputs, const std::vector<FuncPtr>& stored,
+                   const std::vector<FuncPtr>& given,
+                   const std::unordered_set<const Symbol*>& whole, const SizeEstimate& sizes,
+                   const std::set<Decision>& without) {
+  const Readers readers(outputs, stored);  // before anything is moved
+  const bool slices = !without.contains(Decision::Slices);
+  if (slices) compute_in_column_blocks(readers, stored, whole, sizes);
+  if (!without.contains(Decision::Strips)) compute_in_strips(outputs, given, whole, sizes);
+  if (slices) compute_in_slices(readers, stored, whole, sizes);
+  if (slices) compute_in_reductions(readers, stored, whole, sizes);
+  if (!without.contains(Decision::LayoutStaging)) run_along_rows(given, sizes);
+  if (!without.contains(Decision::JoinSweeps)) join_sweeps(outputs, given, sizes);
+}
+
 }  // namespace
 
-void give_default_schedule(const std::vector<FuncPtr>& outputs, const VectorUnit& unit,
+void give_default_schedule(const std::vector<FuncPtr>& outputs, const ScheduleRequest& request,
                            Scheduling what) {
   const std::vector<FuncPtr> order = topological_order(outputs);
   PlacementLimits limits;
-  if (what == Scheduling::Everything) limits = placement_limits(order);
+  if (what == Scheduling::Everything || has_chosen_places(request.options))
+    limits = placement_limits(order);
+  const ChosenPlaces chosen = chosen_places(outputs, limits, request.options);
+  if (what != Scheduling::Everything) limits = PlacementLimits();
   std::unordered_set<const Symbol*> whole = limits.stay;
   whole.insert(limits.levels.begin(), limits.levels.end());
   // Before sums are cut: what that schedules would pass for the user's.
-  const std::vector<FuncPtr> stored =
-      what == Scheduling::Everything ? stored_in_all(outputs, limits) : stored_by_default(outputs);
-  const SizeEstimate sizes(outputs);
-  cut_reductions(outputs, sizes, whole);
-  const SlicedScatters slices(outputs, stored, whole, sizes);
+  const std::vector<FuncPtr> stored = what == Scheduling::Everything
+                                          ? stored_in_all(outputs, limits, chosen)
+                                          : stored_by_default(outputs, chosen);
+  const SizeEstimate sizes(outputs, limits_of(request));
+  const auto makes = [&](Decision d) { return !request.options.without.contains(d); };
+  TaskSizes tasks(order);
+  if (makes(Decision::CutReductions)) cut_reductions(outputs, sizes, whole);
+  const bool slices_scatters = makes(Decision::ScatterStrategy) && makes(Decision::Slices);
+  const SlicedScatters slices(outputs, slices_scatters ? stored : std::vector<FuncPtr>(), whole,
+                              sizes);
   std::vector<FuncPtr> given;  // loops, at root
   for (const FuncPtr& f : stored) {
     if (is_touched(*f)) continue;
     Func(f).compute_root();
     if (f->is_extern() || limits.levels.contains(f.get())) continue;
-    if (schedule_scatter(f, slices, sizes)) continue;
-    for (int s = 0; s < f->stage_count(); ++s) LoopChooser(f, s, unit, sizes).give();
+    if (makes(Decision::ScatterStrategy) && schedule_scatter(f, slices, sizes)) continue;
+    for (int s = 0; s < f->stage_count(); ++s) LoopChooser(f, s, request, sizes).give();
     given.push_back(f);
   }
-  const Readers readers(outputs, stored);  // before anything is moved
-  compute_in_column_blocks(readers, stored, whole, sizes);
-  compute_in_strips(outputs, given, whole, sizes);
-  compute_in_slices(readers, stored, whole, sizes);
-  compute_in_reductions(readers, stored, whole, sizes);
-  run_along_rows(given, sizes);
-  join_sweeps(outputs, given, sizes);
+  move_and_join(outputs, stored, given, whole, sizes, request.options.without);
+  tasks.limit(outputs, request);
   for (const FuncPtr& f : order) {  // so that the log tells of every Func
     const bool is_output = std::find(outputs.begin(), outputs.end(), f) != outputs.end();
     const bool is_inlined = f->schedule.compute_level.kind == graph::LoopLevel::Kind::Inlined;
@@ -385,16 +414,18 @@ void give_default_schedule(const std::vector<FuncPtr>& outputs, const VectorUnit
 }
 
 std::vector<FuncPtr> schedule_unscheduled(const std::vector<FuncPtr>& outputs,
-                                          const VectorUnit& unit) {
+                                          const VectorUnit& unit,
+                                          const AutoscheduleOptions& options) {
+  const ScheduleRequest request{unit, options, {}};
   std::vector<FuncPtr> result;
   run_on_large_stack([&] {
     result = apply_wrappers(outputs);
     if (is_differentiated(result)) {
       result = copy_graph(result).outputs;
-      give_default_schedule(result, unit, Scheduling::Gradients);
+      give_default_schedule(result, request, Scheduling::Gradients);
     } else if (!stored_by_default(result).empty()) {
       result = copy_graph(result).outputs;
-      compute_at_root(stored_by_default(result), unit);
+      compute_at_root(stored_by_default(result), request);
     }
   });
   return result;

@@ -13,6 +13,8 @@
 #include <vector>
 
 #include "autoschedule/register_tile.h"
+#include "frontend/schedule/autoschedule_options.h"
+#include "frontend/schedule/autoscheduler.h"
 #include "graph/function.h"
 
 namespace retrograde::autoschedule {
@@ -20,13 +22,21 @@ namespace retrograde::autoschedule {
 // Of which Funcs of a graph: adjoints and what is computed with them, or all.
 enum class Scheduling : uint8_t { Gradients, Everything };
 
+// What a schedule is made for, and what its user said of it.
+struct ScheduleRequest {
+  VectorUnit unit = {};
+  AutoscheduleOptions options = {};
+  MachineParams machine = {};
+};
+
 // Gives the directives to the Funcs of this graph, whose wrappers have been applied.
-void give_default_schedule(const std::vector<FuncPtr>& outputs, const VectorUnit& unit,
+void give_default_schedule(const std::vector<FuncPtr>& outputs, const ScheduleRequest& request,
                            Scheduling what);
 
 // The pass: the outputs with their wrappers applied, or, where there are adjoints, those of a copy
 // of the graph that has its schedule. What lowering is given.
 std::vector<FuncPtr> schedule_unscheduled(const std::vector<FuncPtr>& outputs,
-                                          const VectorUnit& unit = {});
+                                          const VectorUnit& unit = {},
+                                          const AutoscheduleOptions& options = {});
 
 }  // namespace retrograde::autoschedule

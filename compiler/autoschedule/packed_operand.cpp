@@ -70,7 +70,8 @@ class Candidate {
 
   bool is_worth_packing() const {
     const auto elements = lanes_run_along_rows() ? elements_of_piece() : std::nullopt;
-    if (!elements || rows() < many_rows || tiles(false) < least_tiles || tiles(true) < enough_tasks)
+    if (!elements || rows() < many_rows || tiles(false) < least_tiles ||
+        tiles(true) < sizes_.machine().enough_tasks)
       return false;
     return loads_of_a_tile() * tiles(false) * lanes_ >= least_uses * static_cast<double>(*elements);
   }
@@ -134,7 +135,8 @@ class Candidate {
     double tiles = 1;
     for (size_t d = 1; d < f_.args.size(); ++d) {
       const auto size = static_cast<double>(size_in(tile_, d, lanes_));
-      const double unknown = that_move ? static_cast<double>(enough_tasks) * size : 1;
+      const double unknown =
+          that_move ? static_cast<double>(sizes_.machine().enough_tasks) * size : 1;
       const auto extent = sizes_.extent(f_, d);
       if (depends_on_[d] == that_move)
         tiles *= std::ceil((extent ? static_cast<double>(*extent) : unknown) / size);

@@ -50,7 +50,7 @@ class ReductionSlicer {
       slices *= *extent;
     }
     if (slices < enough_slices || f_.args.size() < move.slices.size() + image_dimensions ||
-        sizes_.bytes(f_) < more_than_caches || !has_plain_loops())
+        sizes_.bytes(f_) < sizes_.machine().more_than_caches || !has_plain_loops())
       return std::nullopt;
     move.along = stage_.schedule.dims.back().var;
     const auto along = std::find(reader_.func->args.begin(), reader_.func->args.end(), move.along);

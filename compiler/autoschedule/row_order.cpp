@@ -25,7 +25,7 @@ class MemoryLoads {
   explicit MemoryLoads(const SizeEstimate& sizes) : sizes_(sizes) {}
 
   bool come_from_memory(const FuncPtr& f) {
-    if (sizes_.bytes(*f) < more_than_caches) return false;
+    if (sizes_.bytes(*f) < sizes_.machine().more_than_caches) return false;
     if (f->schedule.compute_level.kind != graph::LoopLevel::Kind::Inlined) return true;
     const auto [known, is_new] = by_inlining_.try_emplace(f.get(), false);
     if (!is_new) return known->second;

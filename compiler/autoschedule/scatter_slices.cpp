@@ -85,7 +85,7 @@ std::optional<ScatterSlices> slices_of(const FuncPtr& scatter, ScatterLanes lane
                                        const std::vector<Reads::Read>& reads,
                                        const SizeEstimate& sizes) {
   const int64_t bytes = sizes.bytes(*scatter);
-  if (bytes < more_than_caches || reads.empty()) return std::nullopt;
+  if (bytes < sizes.machine().more_than_caches || reads.empty()) return std::nullopt;
   const FuncPtr& reader = reads[0].reader;
   const bool is_only = std::all_of(reads.begin(), reads.end(),
                                    [&](const Reads::Read& r) { return r.reader == reader; });

@@ -88,7 +88,8 @@ Scope<Interval> scope_of(const FuncContents& f, const Definition& stage, const B
 
 }  // namespace
 
-SizeEstimate::SizeEstimate(const std::vector<FuncPtr>& outputs) {
+SizeEstimate::SizeEstimate(const std::vector<FuncPtr>& outputs, const MachineLimits& machine)
+    : machine_(machine) {
   const Scope<Interval> parameters = parameter_scope(outputs);
   const std::vector<FuncPtr> order = topological_order(outputs);
   for (auto it = order.rbegin(); it != order.rend(); ++it) {

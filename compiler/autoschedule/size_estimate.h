@@ -13,21 +13,26 @@
 
 namespace retrograde::autoschedule {
 
-// Iterations of loops that run in parallel: no thread of a few waits long for the others.
-inline constexpr int64_t enough_tasks = 8;
-// More bytes than stay in the caches near a core.
-inline constexpr int64_t more_than_caches = 16 << 20;
+// What sizes are weighed against.
+struct MachineLimits {
+  // Iterations of loops that run in parallel: no thread of a few waits long for the others.
+  int64_t enough_tasks = 8;
+  // More bytes than stay in the caches near a core.
+  int64_t more_than_caches = 16 << 20;
+};
 
 class SizeEstimate {
  public:
   SizeEstimate() = default;  // nothing is known
-  explicit SizeEstimate(const std::vector<FuncPtr>& outputs);
+  explicit SizeEstimate(const std::vector<FuncPtr>& outputs, const MachineLimits& machine = {});
   // Elements of a dimension that are computed; nullopt: not known.
   std::optional<int64_t> extent(const FuncContents& f, size_t dimension) const;
   // Of all that is computed; 0 where some extent is not known.
   int64_t bytes(const FuncContents& f) const;
+  const MachineLimits& machine() const { return machine_; }
 
  private:
+  MachineLimits machine_;
   std::unordered_map<const Symbol*, Box> boxes_;  // with constant ends; undefined: not known
 };
 

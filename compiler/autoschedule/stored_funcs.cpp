@@ -48,8 +48,9 @@ bool is_adjoint(const FuncPtr& f) { return f->made.has_value(); }
 class StorageChooser {
  public:
   // `limits`: null where the pipeline is compiled as it is.
-  StorageChooser(const std::vector<FuncPtr>& outputs, const PlacementLimits* limits)
-      : outputs_(outputs), order_(topological_order(outputs)), limits_(limits) {}
+  StorageChooser(const std::vector<FuncPtr>& outputs, const PlacementLimits* limits,
+                 const ChosenPlaces& chosen)
+      : outputs_(outputs), order_(topological_order(outputs)), limits_(limits), chosen_(chosen) {}
 
   std::vector<FuncPtr> choose() {
     for (const FuncPtr& f : order_) count_reads(*f);
@@ -68,8 +69,10 @@ class StorageChooser {
       stored |= left_inline ? computes_more_than_is_read(*f) : is_output(f) || !f->is_pure();
       if (limits_) {
         stored |= limits_->need_root.contains(f.get()) || limits_->levels.contains(f.get());
-        stored &= !limits_->stay.contains(f.get());
+        stored &= !limits_->stay.contains(f.get()) || is_output(f);  // which is at root anyway
       }
+      stored |= chosen_.store.contains(f.get());
+      stored &= !chosen_.inlined.contains(f.get());
       if (!stored || is_block_of_one(f)) continue;
       stored_.insert(f.get());
       result.push_back(f);
@@ -127,14 +130,16 @@ class StorageChooser {
   const std::vector<FuncPtr>& outputs_;
   const std::vector<FuncPtr> order_;
   const PlacementLimits* const limits_;
+  const ChosenPlaces& chosen_;
   std::unordered_map<const Symbol*, Use> uses_;
   std::unordered_map<const Symbol*, std::unordered_set<const FuncContents*>> readers_;
   std::unordered_set<const FuncContents*> stored_;
 };
 
 std::vector<FuncPtr> with_large_bodies(const std::vector<FuncPtr>& outputs,
-                                       std::vector<FuncPtr> stored) {
+                                       std::vector<FuncPtr> stored, const ChosenPlaces& chosen) {
   const std::vector<FuncPtr> large = large_bodies(outputs, stored);
+  check_inlined_bodies(chosen, large);
   stored.insert(stored.end(), large.begin(), large.end());
   return stored;
 }
@@ -146,15 +151,16 @@ bool is_differentiated(const std::vector<FuncPtr>& outputs) {
   return std::any_of(order.begin(), order.end(), is_adjoint);
 }
 
-std::vector<FuncPtr> stored_by_default(const std::vector<FuncPtr>& outputs) {
+std::vector<FuncPtr> stored_by_default(const std::vector<FuncPtr>& outputs,
+                                       const ChosenPlaces& chosen) {
   std::vector<FuncPtr> pays;
-  if (is_differentiated(outputs)) pays = StorageChooser(outputs, nullptr).choose();
-  return with_large_bodies(outputs, std::move(pays));
+  if (is_differentiated(outputs)) pays = StorageChooser(outputs, nullptr, chosen).choose();
+  return with_large_bodies(outputs, std::move(pays), chosen);
 }
 
 std::vector<FuncPtr> stored_in_all(const std::vector<FuncPtr>& outputs,
-                                   const PlacementLimits& limits) {
-  return with_large_bodies(outputs, StorageChooser(outputs, &limits).choose());
+                                   const PlacementLimits& limits, const ChosenPlaces& chosen) {
+  return with_large_bodies(outputs, StorageChooser(outputs, &limits, chosen).choose(), chosen);
 }
 
 }  // namespace retrograde::autoschedule

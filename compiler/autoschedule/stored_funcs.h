@@ -12,6 +12,7 @@
 
 #include <vector>
 
+#include "autoschedule/chosen_places.h"
 #include "autoschedule/placement_limits.h"
 #include "graph/function.h"
 
@@ -21,9 +22,10 @@ bool is_differentiated(const std::vector<FuncPtr>& outputs);  // whether an adjo
 
 // In a pipeline without adjoints, which is left as it is, only what inlining would copy without end
 // (large_bodies.h).
-std::vector<FuncPtr> stored_by_default(const std::vector<FuncPtr>& outputs);
+std::vector<FuncPtr> stored_by_default(const std::vector<FuncPtr>& outputs,
+                                       const ChosenPlaces& chosen = {});
 // Where all of the pipeline is to be scheduled: what a user left alone is not meant to be inlined.
 std::vector<FuncPtr> stored_in_all(const std::vector<FuncPtr>& outputs,
-                                   const PlacementLimits& limits);
+                                   const PlacementLimits& limits, const ChosenPlaces& chosen = {});
 
 }  // namespace retrograde::autoschedule

@@ -270,7 +270,8 @@ std::vector<Argument> GeneratorBase::input_arguments() const {
   return arguments;
 }
 
-void GeneratorBase::auto_schedule_pipeline(const Pipeline& pipeline) const {
+void GeneratorBase::auto_schedule_pipeline(Pipeline& pipeline) const {
+  pipeline.set_autoschedule(autoschedule_options);
   if (auto_schedule)
     pipeline.auto_schedule(auto_schedule.scheduler(), get_target(), get_machine_params());
 }

@@ -176,6 +176,9 @@ class GeneratorBase : public NamesInterface {
   GeneratorParam<Target> target{"target", Target()};
   AutoScheduleParam auto_schedule;
   GeneratorParam<MachineParams> machine_params{"machine_params", MachineParams::generic()};
+  // As text: autoschedule_options=without=strips+slices,threads=4.
+  GeneratorParam<AutoscheduleOptions> autoschedule_options{"autoschedule_options",
+                                                           AutoscheduleOptions()};
 
  private:
   enum class Phase { Created, Configuring, Configured, Generated, Scheduled };
@@ -190,7 +193,7 @@ class GeneratorBase : public NamesInterface {
   void check_configuring(const char* role, const std::string& name) const;
   void adopt(GeneratorPort* extra) { extra->generator_ = this; }
   void add_requirements(Pipeline& pipeline) const;
-  void auto_schedule_pipeline(const Pipeline& pipeline) const;
+  void auto_schedule_pipeline(Pipeline& pipeline) const;
   std::vector<Argument> input_arguments() const;
   std::vector<std::string> input_names() const;
   std::vector<ImageParam> image_inputs(std::vector<std::string>& names) const;

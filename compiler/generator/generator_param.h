@@ -16,6 +16,7 @@
 #include <type_traits>
 
 #include "frontend/language/func.h"
+#include "frontend/schedule/autoschedule_options.h"
 #include "frontend/schedule/autoscheduler.h"
 #include "ir/print.h"
 
@@ -179,7 +180,7 @@ class GeneratorParam : public internal::GeneratorParamBase {
   }
 };
 
-// The overloads for MachineParams and Target report what is wrong with the text themselves.
+// The overloads for MachineParams, Target and AutoscheduleOptions report what is wrong with the text themselves.
 template <typename T>
 void GeneratorParam<T>::set_from_string(const std::string& text) {
   check_writable();
@@ -196,6 +197,8 @@ void GeneratorParam<T>::set_from_string(const std::string& text) {
     value = internal::read_loop_level(text);
   } else if constexpr (std::is_same_v<T, Target> || std::is_same_v<T, MachineParams>) {
     value = T(text);
+  } else if constexpr (std::is_same_v<T, AutoscheduleOptions>) {
+    value = T::from_string(text);
   } else {
     static_assert(is_number, "a GeneratorParam cannot be of this type");
     value = internal::read_number<T>(text);

@@ -115,7 +115,8 @@ class JitCompiler : public Compiler {
     options.target = pipeline.traced(target);
     ir::LoweredFunction function = lower::lower(
         pipeline.name,
-        autoschedule::schedule_unscheduled(pipeline.outputs, autoschedule::vector_unit_of(target)),
+        autoschedule::schedule_unscheduled(pipeline.outputs, autoschedule::vector_unit_of(target),
+                                           pipeline.autoschedule),
         lower::infer_arguments(pipeline.outputs), options);
     jit::Options code_options;
     code_options.externs = pipeline.externs;
@@ -125,8 +126,8 @@ class JitCompiler : public Compiler {
   }
 
   std::string loop_nest(const PipelineSpec& pipeline, const Target& target) override {
-    return lower::loop_nest_text(
-        autoschedule::schedule_unscheduled(pipeline.outputs, autoschedule::vector_unit_of(target)));
+    return lower::loop_nest_text(autoschedule::schedule_unscheduled(
+        pipeline.outputs, autoschedule::vector_unit_of(target), pipeline.autoschedule));
   }
 };
 

@@ -40,6 +40,12 @@ TEST_F(RequirementsOfParts, Handles) {
   expect("the handle must have a buffer", [&] { Buffer<int>().width(); });
   expect("they are the threads, the bytes of the last-level cache and the cost of a load",
          [&] { MachineParams("16,huge"); });
+  expect("options of the autoscheduler are parts of a name and a value",
+         [&] { AutoscheduleOptions::from_string("speed=high"); });
+  expect("the decisions of the autoscheduler have names",
+         [&] { AutoscheduleOptions::from_string("without=stripes"); });
+  expect("threads are a whole number, 0 or more",
+         [&] { AutoscheduleOptions::from_string("threads=-1"); });
   expect("it stands for a Param or an ImageParam", [&] { Parameter().name(); });
   Param<int> gain("gain");
   expect("this is for buffers", [&] { Parameter(gain.parameter()).buffer(); });

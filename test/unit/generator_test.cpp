@@ -349,6 +349,15 @@ TEST(Generator, AutoScheduleNeedsNoPlugin) {
   EXPECT_GT(sum->get_pipeline().schedule_log().size(), 0u);
 }
 
+TEST(Generator, OptionsOfTheAutoschedulerAreAParam) {
+  const GeneratorContext context(Target("x86-64-linux"));
+  auto sum = context.create<Sum>();
+  sum->set_generator_param_values(
+      {{"auto_schedule", "true"}, {"autoschedule_options", "without=task_sizes,threads=1"}});
+  sum->build_module("sum");
+  EXPECT_EQ(sum->get_pipeline().loop_nest().find("parallel"), std::string::npos);
+}
+
 class Guarded : public Generator<Guarded> {
  public:
   Input<Buffer<float, 1>> in{"in"};

@@ -198,7 +198,7 @@ static size_t loop_in_parts(const Iterations& update) {
   };
   size_t longest = count - 1;
   for (size_t i = count; i-- > 0;) {
-    if (extent(i) >= enough_tasks) return i;
+    if (extent(i) >= MachineLimits().enough_tasks) return i;
     if (extent(i) > extent(longest)) longest = i;
   }
   return longest;

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "frontend/run/jit_handlers.h"
+#include "frontend/schedule/autoschedule_options.h"
 #include "graph/function.h"
 #include "ir/lowered_function.h"
 #include "ir/target.h"
@@ -22,6 +23,7 @@ struct PipelineSpec {
   std::vector<graph::FuncPtr> outputs;
   std::map<std::string, void*> externs = {};  // C functions by name, before those of the process
   bool is_traced = false;                     // a call tells when it begins and ends
+  AutoscheduleOptions autoschedule = {};      // for what nobody scheduled
 
   Target traced(Target target) const {
     if (is_traced) target.set_feature(Target::TracePipeline);

@@ -85,6 +85,7 @@ struct Pipeline::Contents {
   JITHandlers handlers;
   std::map<std::string, JITExtern> externs;
   bool is_traced = false;
+  AutoscheduleOptions autoschedule;
   std::mutex mutex;
   // The latest compilation.
   std::shared_ptr<CompiledPipeline> compiled;
@@ -134,7 +135,9 @@ Pipeline::Contents& Pipeline::checked() const {
 
 void Pipeline::unscheduled() {
   for (const graph::FuncPtr& f : graph::topological_order(checked().outputs)) {
-    if (!graph::is_touched(*f)) graph::give_directive({f, 0}, graph::Unscheduled{});
+    if (graph::is_touched(*f)) continue;
+    for (int s = 0; s < std::max(f->stage_count(), 1); ++s)
+      graph::give_directive({f, s}, graph::Unscheduled{});
   }
 }
 
@@ -146,6 +149,7 @@ PipelineSpec Pipeline::spec() const {
   for (const auto& [name, function] : contents_->externs)
     result.externs[name] = function.extern_c_function().address();
   result.is_traced = contents_->is_traced;
+  result.autoschedule = contents_->autoschedule;
   return result;
 }
 
@@ -167,6 +171,12 @@ JITHandlers& Pipeline::jit_handlers() { return checked().handlers; }
 void Pipeline::set_externs(const std::map<std::string, JITExtern>& externs) {
   std::lock_guard lock(checked().mutex);
   contents_->externs = externs;
+  contents_->compiled.reset();
+}
+
+void Pipeline::set_autoschedule_options(const AutoscheduleOptions& options) {
+  std::lock_guard lock(checked().mutex);
+  contents_->autoschedule = options;
   contents_->compiled.reset();
 }
 

@@ -12,6 +12,7 @@
 #include "frontend/run/module.h"
 #include "frontend/run/param_map.h"
 #include "frontend/run/runnable.h"
+#include "frontend/schedule/autoschedule_options.h"
 #include "frontend/schedule/autoscheduler.h"
 #include "graph/schedule_log.h"
 
@@ -62,6 +63,12 @@ class Pipeline : public Runnable<Pipeline> {
   AutoSchedulerResults auto_schedule(const std::string& name, const Target& target,
                                      const MachineParams& machine = {}) const;
   AutoSchedulerResults auto_schedule(const Target& target, const MachineParams& machine = {}) const;
+  // By the built-in one, which these options say more to.
+  // Requires: options of the autoscheduler name Funcs of the pipeline; a Func is stored or inlined;
+  // what is inlined has one pure definition and is no output; what is inlined stays small enough to
+  // compile; what is stored has bounds that are known.
+  AutoSchedulerResults auto_schedule(const Target& target, const AutoscheduleOptions& options,
+                                     const MachineParams& machine = {}) const;
   // Its Funcs that got no directive stay without: gradients are computed where they are read, too.
   void unscheduled();
   static void add_autoscheduler(const std::string& name, const AutoSchedulerFn& scheduler) {
@@ -92,6 +99,7 @@ class Pipeline : public Runnable<Pipeline> {
   Module module(const std::vector<Argument>& args, const std::string& function_name,
                 const Target& target, LinkageType linkage) const;
   void set_externs(const std::map<std::string, JITExtern>& externs);
+  void set_autoschedule_options(const AutoscheduleOptions& options);
   const std::map<std::string, JITExtern>& externs() const;
   std::vector<Buffer<>> make_outputs(const std::vector<int32_t>& sizes, bool with_memory) const;
   std::vector<halide_buffer_t*> checked_outputs(const RealizationArg& outputs,

@@ -12,6 +12,7 @@
 #include "frontend/run/jit_handlers.h"
 #include "frontend/run/module.h"
 #include "frontend/run/param_map.h"
+#include "frontend/schedule/autoschedule_options.h"
 
 namespace retrograde {
 
@@ -135,6 +136,13 @@ class Runnable {
   Callable compile_to_callable(const Args& args,
                                const Target& target = get_jit_target_from_environment()) {
     return pipeline_to("compile ").callable(args, target);
+  }
+
+  // How what nobody scheduled of a gradient is scheduled whenever it is compiled from now on, and
+  // what auto_schedule() without options of its own does. Those who want no schedule at all:
+  // Pipeline::unscheduled().
+  void set_autoschedule(const AutoscheduleOptions& options) {
+    pipeline_to("set options of the autoscheduler for ").set_autoschedule_options(options);
   }
 
   // ---- what compiled code calls back ----

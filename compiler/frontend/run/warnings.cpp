@@ -7,12 +7,14 @@
 //   f.update().atomic() alone              nothing runs at the same time
 //   RDom r(0, 0)                           the update never runs
 //   f.specialize(true)                     a condition that no call decides
+//   a gradient without a schedule          the compiler chooses one
 #include "frontend/run/warnings.h"
 
 #include <algorithm>
 #include <utility>
 
 #include "diagnostics/error.h"
+#include "graph/give_directive.h"
 #include "graph/wrappers.h"
 #include "ir/build.h"
 #include "ir/memory_reads.h"
@@ -37,6 +39,18 @@ std::string words_for_stage(const FuncContents& f, int stage) {
   return stage == 0 ? quoted(f.name) : text("update ", stage - 1, " of ", quoted(f.name));
 }
 
+// How many Funcs nobody scheduled, where adjoints are among them.
+size_t unscheduled_beside_adjoints(const std::vector<FuncPtr>& funcs) {
+  size_t count = 0;
+  bool has_adjoints = false;
+  for (const FuncPtr& f : funcs) {
+    if (is_touched(*f) || f->is_extern()) continue;
+    ++count;
+    has_adjoints = has_adjoints || f->made;
+  }
+  return has_adjoints ? count : 0;
+}
+
 class Findings {
  public:
   explicit Findings(std::vector<std::string>& messages) : messages_(messages) {}
@@ -49,6 +63,15 @@ class Findings {
       find_empty_domain(f, s);
       find_idle(f, s, f.stage(s).schedule);
     }
+  }
+
+  void note_default_schedule(const std::vector<FuncPtr>& funcs, const FuncContents& output) {
+    const size_t count = unscheduled_beside_adjoints(funcs);
+    if (count == 0) return;
+    add("performance note: the compiler schedules the gradient " + quoted(output.name),
+        text("of its ", funcs.size(), " Funcs ", count, " have no directive, adjoints among them"),
+        "Give them schedules, call Pipeline::auto_schedule() to see and edit what it chooses, say "
+        "set_autoschedule() how it is to choose, or Pipeline::unscheduled() for no schedule");
   }
 
  private:
@@ -137,7 +160,9 @@ class Findings {
 std::vector<std::string> warnings_of(const std::vector<FuncPtr>& outputs) {
   std::vector<std::string> messages;
   Findings findings(messages);
-  for (const FuncPtr& f : functions_of(outputs)) findings.look_at(*f);
+  const std::vector<FuncPtr> funcs = functions_of(outputs);
+  for (const FuncPtr& f : funcs) findings.look_at(*f);
+  findings.note_default_schedule(funcs, *outputs[0]);
   return messages;
 }
 

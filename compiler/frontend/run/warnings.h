@@ -1,5 +1,6 @@
 // warnings.h -- what is legal in a pipeline but hardly meant: definitions that no result needs,
-// updates without a schedule beside definitions that have one, loops that run once as vectors.
+// updates without a schedule beside definitions that have one, loops that run once as vectors. And
+// what is slower than it need be: a gradient that nobody scheduled, as a performance note.
 //
 //   {
 //     WarningScope scope([](const std::string& warning) { log(warning); });

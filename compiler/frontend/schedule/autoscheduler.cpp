@@ -9,6 +9,7 @@
 #include <set>
 
 #include "diagnostics/error.h"
+#include "frontend/language/func.h"
 #include "frontend/run/pipeline.h"
 
 namespace retrograde {
@@ -111,6 +112,15 @@ void load_plugin(const std::string& library) {
 }
 
 // ---- of a pipeline ----
+
+// Its Funcs are shared, its options are not.
+AutoSchedulerResults Pipeline::auto_schedule(const Target& target,
+                                             const AutoscheduleOptions& options,
+                                             const MachineParams& machine) const {
+  Pipeline with_options(outputs());
+  with_options.set_autoschedule(options);
+  return with_options.auto_schedule(built_in_autoscheduler, target, machine);
+}
 
 AutoSchedulerResults Pipeline::auto_schedule(const std::string& name, const Target& target,
                                              const MachineParams& machine) const {

@@ -1,8 +1,9 @@
 // autoscheduler.h -- functions that schedule a whole pipeline, by name.
 //
 // One is built in: pipeline.auto_schedule(target). It computes at root, in parallel and vectorized,
-// what is dear to compute again, inlines the rest, and keeps what a user scheduled. Others live in
-// libraries of their own, plugins, which register them when they are loaded:
+// what is dear to compute again, inlines the rest, and keeps what a user scheduled; what else it is
+// told: autoschedule_options.h. Of the machine it takes threads and the last-level cache, unless they
+// are the generic ones. Others live in libraries of their own, plugins, which register them when they are loaded:
 // load_plugin("libgreedy.so"); pipeline.auto_schedule("Greedy", target).
 #pragma once
 
@@ -30,6 +31,7 @@ struct MachineParams {
   explicit MachineParams(const std::string& text);
   static MachineParams generic() { return {}; }
   std::string to_string() const;
+  friend bool operator==(const MachineParams&, const MachineParams&) = default;
 };
 
 struct AutoSchedulerResults {

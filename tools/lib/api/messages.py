@@ -3,7 +3,7 @@ import re
 
 from api.cpp_text import TOKEN, arguments, one_line, pieces, unescape, without_comments
 
-FOLDERS = ["graph", "frontend", "generator", "autodiff", "checks", "lower", "ir", "jit", "aot"]
+FOLDERS = ["graph", "frontend", "generator", "autoschedule", "autodiff", "checks", "lower", "ir", "jit", "aot"]
 # IR as text is for tools and tests; its errors are one rule at each place of a text.
 INTERNAL_FILES = {"ir/lexer.cpp", "ir/parse.cpp"}
 # What raises an error: which of its arguments is the rule, and the kind.

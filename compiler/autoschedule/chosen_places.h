@@ -1,0 +1,25 @@
+// chosen_places.h -- which Funcs a user wants to be stored or inlined, by name.
+#pragma once
+
+#include <unordered_set>
+#include <vector>
+
+#include "autoschedule/placement_limits.h"
+#include "frontend/schedule/autoschedule_options.h"
+#include "graph/function.h"
+
+namespace retrograde::autoschedule {
+
+struct ChosenPlaces {
+  std::unordered_set<const Symbol*> store, inlined;
+};
+
+bool has_chosen_places(const AutoscheduleOptions& options);
+// UserError where a name is none of the pipeline's, or a Func cannot be where it is wanted. Funcs with
+// a directive keep theirs, whatever the options say.
+ChosenPlaces chosen_places(const std::vector<FuncPtr>& outputs, const PlacementLimits& limits,
+                           const AutoscheduleOptions& options);
+// The same for what inlining would copy without end.
+void check_inlined_bodies(const ChosenPlaces& chosen, const std::vector<FuncPtr>& large);
+
+}  // namespace retrograde::autoschedule

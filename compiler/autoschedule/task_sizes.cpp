@@ -1,0 +1,53 @@
+#include "autoschedule/task_sizes.h"
+
+#include <algorithm>
+
+#include "frontend/language/rdom.h"
+#include "frontend/schedule/stage.h"
+
+namespace retrograde::autoschedule {
+
+namespace {
+
+constexpr int64_t tasks_a_thread = 4;
+
+// All but the first of them, from the outermost on.
+void keep_parallel(const FuncPtr& f, int stage, int kept) {
+  const std::vector<Dim> loops = f->stage(stage).schedule.dims;
+  for (auto loop = loops.rbegin(); loop != loops.rend(); ++loop) {
+    if (loop->runs == ForType::Parallel && kept-- <= 0)
+      Stage(f, stage).serial(VarOrRVar(loop->var, loop->is_reduction));
+  }
+}
+
+}  // namespace
+
+int threads_of(const ScheduleRequest& request) {
+  if (request.options.threads > 0) return request.options.threads;
+  return request.machine == MachineParams::generic() ? 0 : std::max(request.machine.parallelism, 0);
+}
+
+MachineLimits limits_of(const ScheduleRequest& request) {
+  MachineLimits limits;
+  limits.enough_tasks = std::max(limits.enough_tasks, tasks_a_thread * threads_of(request));
+  limits.more_than_caches =
+      static_cast<int64_t>(std::min<uint64_t>(request.machine.last_level_cache_size, INT64_MAX));
+  return limits;
+}
+
+TaskSizes::TaskSizes(const std::vector<FuncPtr>& order) {
+  for (const FuncPtr& f : order) {
+    if (is_touched(*f)) touched_.insert(f.get());
+  }
+}
+
+void TaskSizes::limit(const std::vector<FuncPtr>& outputs, const ScheduleRequest& request) const {
+  const bool is_one_thread = threads_of(request) == 1;
+  if (!is_one_thread && !request.options.without.contains(Decision::TaskSizes)) return;
+  for (const FuncPtr& f : topological_order(outputs)) {
+    if (touched_.contains(f.get()) || f->is_extern()) continue;
+    for (int s = 0; s < f->stage_count(); ++s) keep_parallel(f, s, is_one_thread ? 0 : 1);
+  }
+}
+
+}  // namespace retrograde::autoschedule

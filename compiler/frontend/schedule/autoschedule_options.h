@@ -1,0 +1,67 @@
+// autoschedule_options.h -- what the built-in autoscheduler is told: which of its decisions it may
+// make, what it stores and inlines, for how many threads.
+//
+//   AutoscheduleOptions options;
+//   options.without = {Decision::Strips};
+//   options.store = {blurred, "heavy"};
+//   pipeline.auto_schedule(target, options);   // all of a pipeline, now
+//   gradient.set_autoschedule(options);        // what nobody scheduled of a gradient, when compiled
+//
+// Whatever it is told, its schedule is legal and the results are right; Funcs that were given a
+// directive keep their schedules.
+#pragma once
+
+#include <cstdint>
+#include <set>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace retrograde {
+
+class Func;
+
+// What the autoscheduler decides beyond which Funcs are computed at root, and that their rows are
+// vectors and their outermost loops tasks.
+enum class Decision : uint8_t {
+  ScatterStrategy,  // sums at places that data decide: their layout, lanes and unrolled taps
+  CutReductions,    // sums to a few elements in lanes and rows, which are tasks
+  RegisterTiles,    // how many sums of a reduction are kept in registers
+  LayoutStaging,  // copies of what lies apart, square tiles of transposed reads, planes that share
+                  // places that data decide, sums along the rows of what they read
+  JoinSweeps,     // reductions that load the same in the same loops
+  Slices,         // what one Func alone reads slice by slice, in its loops
+  TaskSizes,      // parallel loops beyond the outermost, where that is short
+  Strips          // chains of stencils in strips, with windows of rows
+};
+const std::vector<Decision>& all_decisions();
+// In small letters: "cut_reductions".
+std::string to_string(Decision decision);
+
+// A Func of a pipeline, by itself or by its name.
+struct FuncName {
+  FuncName(const Func& func);
+  FuncName(std::string name) : name(std::move(name)) {}
+  FuncName(const char* name) : name(name) {}
+  friend bool operator==(const FuncName&, const FuncName&) = default;
+
+  std::string name;
+};
+
+struct AutoscheduleOptions {
+  std::set<Decision> without = {};     // not made
+  std::vector<FuncName> store = {};    // computed at root
+  std::vector<FuncName> inlined = {};  // computed where they are read
+  // That run at once: loops are cut into four tasks for each, 8 at least; of one thread none is
+  // parallel. 0: what the MachineParams say, if these are not the generic ones; else 8 tasks.
+  int threads = 0;
+
+  friend bool operator==(const AutoscheduleOptions&, const AutoscheduleOptions&) = default;
+  // As parts with commas between: "without=strips+slices,store=blurred+heavy,inline=brighter,threads=4".
+  std::string to_string() const;
+  // Requires: options of the autoscheduler are parts of a name and a value; the decisions of the
+  // autoscheduler have names; threads are a whole number, 0 or more.
+  static AutoscheduleOptions from_string(const std::string& text);
+};
+
+}  // namespace retrograde

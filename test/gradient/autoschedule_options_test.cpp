@@ -1,0 +1,377 @@
+// The autoscheduler under options: without each of its decisions, with Funcs to store and to inline,
+// for so many threads. Schedules are legal, and results those of the interpreter.
+#include "frontend/schedule/autoschedule_options.h"
+
+#include <gtest/gtest.h>
+
+#include <functional>
+#include <map>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "autodiff/derivative.h"
+#include "frontend/language/func.h"
+#include "frontend/run/pipeline.h"
+#include "frontend/run/warnings.h"
+#include "gradient/gradient_check.h"
+#include "graph/copy_graph.h"
+#include "ir/target.h"
+#include "support/errors.h"
+#include "support/same_numbers.h"
+
+namespace retrograde {
+namespace {
+
+using gradient::random_image;
+
+struct Program {
+  std::vector<Func> outputs;
+  std::vector<std::vector<int>> sizes;
+  bool has_estimates = true;
+};
+
+// Smoothed down and across, of which a weighted sum of squares is wanted.
+Program stencils() {
+  const Buffer<float> image = random_image({90, 70}, -1, 1, 1);
+  Var x("x"), y("y");
+  Func padded = BoundaryConditions::repeat_edge(image);
+  Func across("across"), down("down"), curved("curved");
+  across(x, y) = exp(padded(x - 1, y)) + padded(x, y) * padded(x + 1, y);
+  down(x, y) = across(x, y - 1) * 0.25f + across(x, y) * 0.5f + across(x, y + 1) * 0.25f;
+  curved(x, y) = sin(down(x - 1, y)) + cos(down(x + 1, y + 1));
+  const Func loss = gradient::weighted_sum(curved, {80, 60});
+  return {{loss, propagate_adjoints(loss)(image)}, {{}, {90, 70}}};
+}
+
+// The same way forward alone, of an image of any size.
+Program smoothing() {
+  ImageParam image(Float(32), 2);
+  image.set(random_image({70, 50}, -1, 1, 1));
+  Var x("x"), y("y");
+  Func sharp("sharp"), across("across"), down("down");
+  sharp(x, y) = exp(image(x, y));
+  across(x, y) = sin(sharp(x, y)) + sin(sharp(x + 1, y)) * sharp(x + 2, y);
+  down(x, y) = across(x, y) * across(x, y + 1) + across(x, y + 2);
+  return {{down}, {{60, 40}}, false};
+}
+
+// Layers that mix channels.
+Program convolution() {
+  const Buffer<float> image = random_image({40, 24, 6}, -1, 1, 1);
+  const Buffer<float> weights = random_image({3, 3, 6, 8}, -1, 1, 2);
+  const Buffer<float> seed = random_image({38, 22, 8}, -1, 1, 3);
+  Var x("x"), y("y"), c("c");
+  RDom k(0, 3, 0, 3, 0, 6);
+  Func layer("layer");
+  layer(x, y, c) = 0.0f;
+  layer(x, y, c) += weights(k.x, k.y, k.z, c) * image(x + k.x, y + k.y, k.z);
+  const Derivative d = propagate_adjoints(layer, seed);
+  return {{layer, d(image), d(weights)}, {{38, 22, 8}, {40, 24, 6}, {3, 3, 6, 8}}};
+}
+
+// Products of many rows, of which tiles read pieces.
+Program product() {
+  const Buffer<float> left = random_image({96, 80}, -1, 1, 1);
+  const Buffer<float> right = random_image({64, 96}, -1, 1, 2);
+  Var x("x"), y("y");
+  RDom k(0, 96);
+  Func squared("squared"), sums("sums");
+  squared(x, y) = right(x, y) * right(x, y);
+  sums(x, y) += left(k, y) * squared(x, k);
+  const Derivative d = propagate_adjoints(gradient::weighted_sum(sums, {64, 80}));
+  return {{sums, d(left), d(right)}, {{64, 80}, {96, 80}, {64, 96}}};
+}
+
+// An image read at places that data decide.
+Program warp() {
+  const int size = 40, channels = 16;
+  const Buffer<float> image = random_image({size, size, channels}, -1, 1, 1);
+  const Buffer<float> flow = random_image({size, size, 2}, -5, 5, 2);
+  const Buffer<float> seed = random_image({size, size, channels}, -1, 1, 3);
+  Var x("x"), y("y"), c("c");
+  Func u("u"), v("v"), warped("warped");
+  u(x, y) = clamp(x + flow(x, y, 0), 0.0f, size - 1.0f);
+  v(x, y) = clamp(y + flow(x, y, 1), 0.0f, size - 1.0f);
+  const Expr i = min(cast<int>(u(x, y)), size - 2), j = min(cast<int>(v(x, y)), size - 2);
+  warped(x, y, c) =
+      lerp(lerp(image(i, j, c), image(i + 1, j, c), u(x, y) - i),
+           lerp(image(i, j + 1, c), image(i + 1, j + 1, c), u(x, y) - i), v(x, y) - j);
+  const Derivative d = propagate_adjoints(warped, seed);
+  return {{warped, d(image), d(flow)},
+          {{size, size, channels}, {size, size, channels}, {size, size, 2}}};
+}
+
+// Differences of an image to itself, shifted, each smoothed; few planes, and transposed reads.
+Program shifts() {
+  const Buffer<float> image = random_image({44, 30}, -1, 1, 1);
+  Var x("x"), y("y"), s("s");
+  RDom near(-1, 3), each(0, 9);
+  Func across("across"), smooth("smooth"), out("out");
+  const Expr xc = clamp(x, 0, 43), yc = clamp(y, 0, 29);
+  across(x, y, s) = 0.0f;
+  across(x, y, s) += exp(image(clamp(x + near + s - 4, 0, 43), yc) - image(xc, yc));
+  smooth(x, y, s) = 0.0f;
+  smooth(x, y, s) += across(x, y + near, s);
+  out(x, y) = 0.0f;
+  out(x, y) += smooth(y, x, each) * cast<float>(each + 1);
+  const Derivative d = propagate_adjoints(gradient::weighted_sum(out, {30, 44}));
+  return {{out, d(image)}, {{30, 44}, {44, 30}}};
+}
+
+const std::map<std::string, std::function<Program()>>& programs() {
+  static const std::map<std::string, std::function<Program()>> all{
+      {"stencils", stencils}, {"smoothing", smoothing}, {"convolution", convolution},
+      {"product", product},   {"warp", warp},           {"shifts", shifts}};
+  return all;
+}
+
+// Values of all outputs, evaluated point by point in double.
+const std::vector<oracle::Array>& expected_of(const std::string& name) {
+  static std::map<std::string, std::vector<oracle::Array>> known;
+  std::vector<oracle::Array>& result = known[name];
+  if (!result.empty()) return result;
+  const Program program = programs().at(name)();
+  for (size_t i = 0; i < program.outputs.size(); ++i) {
+    oracle::Region region;
+    region.mins.assign(program.sizes[i].size(), 0);
+    region.extents.assign(program.sizes[i].begin(), program.sizes[i].end());
+    result.push_back(gradient::evaluate(program.outputs[i], region));
+  }
+  return result;
+}
+
+std::vector<Buffer<>> buffers_of(const Program& program) {
+  std::vector<Buffer<>> buffers;
+  for (const std::vector<int>& sizes : program.sizes) buffers.push_back(Buffer<float>(sizes));
+  return buffers;
+}
+
+void expect_right(const std::string& name, Pipeline pipeline, const std::string& how) {
+  const std::vector<oracle::Array>& expected = expected_of(name);
+  std::vector<Buffer<>> found = buffers_of(programs().at(name)());
+  pipeline.realize(found);
+  for (size_t i = 0; i < found.size(); ++i) {
+    size_t next = 0, wrong = 0;
+    Buffer<float>(found[i]).get()->for_each_value([&](float value) {
+      const double wanted = expected[i].values[next++].scalar.as_double();
+      if (!(std::abs(value - wanted) <= 1e-4 * (1 + std::abs(wanted)))) ++wrong;
+    });
+    EXPECT_EQ(wrong, 0u) << "output " << i << " of " << name << " " << how;
+  }
+}
+
+void set_estimates(const Program& program) {
+  for (size_t i = 0; i < program.outputs.size(); ++i) {
+    Func output = program.outputs[i];
+    for (size_t d = 0; d < program.sizes[i].size(); ++d)
+      output.set_estimate(output.args()[d], 0, program.sizes[i][d]);
+  }
+}
+
+// Of a machine with small caches, so that small programs meet the rules for large ones.
+const MachineParams small_machine(2, 8 << 10, 40);
+
+std::string log_without(const std::string& name, const std::set<Decision>& without) {
+  const Program program = programs().at(name)();
+  if (program.has_estimates) set_estimates(program);
+  AutoscheduleOptions options;
+  options.without = without;
+  const Pipeline pipeline(program.outputs);
+  pipeline.auto_schedule(get_host_target(), options, small_machine);
+  std::string how = "scheduled without";
+  for (Decision decision : without) how += " " + to_string(decision);
+  expect_right(name, pipeline, how);
+  return same_numbers(pipeline.schedule_log().to_text());
+}
+
+class Without : public ::testing::TestWithParam<Decision> {};
+
+TEST_P(Without, SchedulesAreLegalAndRight) {
+  static std::map<std::string, std::string> with_all;
+  bool changes = false;
+  for (const auto& [name, make] : programs()) {
+    if (with_all[name].empty()) with_all[name] = log_without(name, {});
+    changes |= with_all[name] != log_without(name, {GetParam()});
+  }
+  EXPECT_TRUE(changes) << "no program shows what " << to_string(GetParam()) << " decides";
+}
+
+TEST_P(Without, GradientsAreCompiledSo) {
+  for (const auto& [name, make] : programs()) {
+    const Program program = make();
+    Pipeline pipeline(program.outputs);
+    AutoscheduleOptions options;
+    options.without = {GetParam()};
+    pipeline.set_autoschedule(options);
+    expect_right(name, pipeline, "compiled without " + to_string(GetParam()));
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Each, Without, ::testing::ValuesIn(all_decisions()),
+                         [](const auto& info) { return to_string(info.param); });
+
+TEST(AutoscheduleOptions, WithoutAnyDecision) {
+  for (const auto& [name, make] : programs())
+    log_without(name, {all_decisions().begin(), all_decisions().end()});
+}
+
+struct Places : ::testing::Test {
+  Places() {
+    cheap(x, y) = image(x, y) * 2.0f;
+    heavy(x, y) = exp(cheap(x, y)) * sin(cheap(x, y));
+    out(x, y) = heavy(x, y) + heavy(x + 1, y) + heavy(x, y + 1);
+    sums(x) += out(x, rows);
+  }
+  std::string scheduled(const AutoscheduleOptions& options) {
+    return Pipeline(sums).auto_schedule(get_host_target(), options).schedule_source;
+  }
+  static bool is_at_root(const Func& f) {
+    return f.function()->schedule.compute_level.kind == graph::LoopLevel::Kind::Root;
+  }
+  Buffer<float> image = random_image({40, 40}, -1, 1, 1);
+  Var x{"x"}, y{"y"};
+  RDom rows{0, 30};
+  Func cheap{"cheap"}, heavy{"heavy"}, out{"out"}, sums{"sums"};
+};
+
+TEST_F(Places, FuncsAreStoredAndInlinedAsTold) {
+  AutoscheduleOptions options;
+  options.store = {FuncName(cheap)};
+  options.inlined = {FuncName(heavy.name())};
+  EXPECT_EQ(options.store[0], FuncName(cheap.name()));
+  EXPECT_EQ(options.inlined[0].name, heavy.name());
+  scheduled(options);
+  EXPECT_TRUE(is_at_root(cheap));
+  EXPECT_FALSE(is_at_root(heavy));
+}
+
+TEST_F(Places, WhatAUserScheduledStays) {
+  heavy.compute_root().vectorize(x, 4);
+  AutoscheduleOptions options;
+  options.inlined = {heavy};
+  const std::string source = scheduled(options);
+  EXPECT_TRUE(is_at_root(heavy));
+  EXPECT_EQ(source.find("heavy."), std::string::npos) << source;
+}
+
+// rule: options of the autoscheduler name Funcs of the pipeline
+// rule: what is inlined has one pure definition and is no output
+TEST_F(Places, RefuseWhatCannotBe) {
+  const auto refuse = [&](const AutoscheduleOptions& options,
+                          std::initializer_list<std::string_view> words) {
+    try {
+      scheduled(options);
+      ADD_FAILURE() << "no error";
+    } catch (const CompileError& error) {
+      expect_mentions(error.what(), words);
+    }
+  };
+  refuse({.store = {"hevy"}},
+         {"\"hevy\"", "options of the autoscheduler name Funcs of the pipeline", heavy.name()});
+  refuse({.inlined = {sums}},
+         {sums.name(), "what is inlined has one pure definition and is no output", "output"});
+  refuse({.store = {heavy}, .inlined = {heavy}}, {heavy.name(), "a Func is stored or inlined"});
+}
+
+TEST_F(Places, BoundsOfWhatIsStoredAreKnown) {
+  ImageParam places(Int(32), 1);
+  Func read("read");
+  read(x) = cheap(places(x), 0) + places(x);
+  AutoscheduleOptions options;
+  options.store = {cheap};
+  try {
+    Pipeline(read).auto_schedule(get_host_target(), options);
+    ADD_FAILURE() << "no error";
+  } catch (const CompileError& error) {
+    expect_mentions(error.what(), {cheap.name(), "what is stored has bounds that are known"});
+  }
+}
+
+// Each level reads the one before at nine places: seven of them are 9^7 copies.
+TEST_F(Places, BodiesThatGrowWithoutEndAreNotInlined) {
+  Func last = cheap;
+  AutoscheduleOptions options;
+  for (int i = 0; i < 7; ++i) {
+    Func next("level");
+    Expr sum = 0.0f;
+    for (int k = 0; k < 9; ++k) sum += last(x + k % 3, y + k / 3) * last(x - k, y);
+    next(x, y) = sum;
+    if (i > 0) options.inlined.emplace_back(last);
+    last = next;
+  }
+  try {
+    Pipeline(last).auto_schedule(get_host_target(), options);
+    ADD_FAILURE() << "no error";
+  } catch (const CompileError& error) {
+    expect_mentions(error.what(), {"what is inlined stays small enough to compile"});
+  }
+}
+
+size_t count_of(const std::string& word, const std::string& text) {
+  size_t count = 0;
+  for (size_t at = text.find(word); at != std::string::npos; at = text.find(word, at + 1)) ++count;
+  return count;
+}
+
+TEST_F(Places, LoopsAreTasksForSoManyThreads) {
+  const auto parallel_loops = [&](const AutoscheduleOptions& options,
+                                  const MachineParams& machine) {
+    Func planes("planes");
+    Var c("c"), n("n");
+    planes(x, y, c, n) = exp(image(x, y)) * cast<float>(c + n);
+    planes.set_estimates({{0, 40}, {0, 40}, {0, 4}, {0, 3}});
+    Pipeline pipeline(planes);
+    pipeline.auto_schedule(get_host_target(), options, machine);
+    return count_of("parallel", pipeline.loop_nest());
+  };
+  const MachineParams generic = MachineParams::generic();
+  EXPECT_EQ(parallel_loops({}, generic), 2u) << "12 tasks are enough for a few threads";
+  EXPECT_EQ(parallel_loops({.threads = 1}, generic), 0u);
+  EXPECT_EQ(parallel_loops({.threads = 16}, generic), 3u);
+  EXPECT_EQ(parallel_loops({}, MachineParams(16, 1 << 20, 40)), 3u);
+  EXPECT_EQ(parallel_loops({.without = {Decision::TaskSizes}}, generic), 1u);
+  EXPECT_EQ(parallel_loops({.threads = 2}, MachineParams(16, 1 << 20, 40)), 2u);
+}
+
+TEST_F(Places, OptionsAreText) {
+  AutoscheduleOptions options;
+  options.without = {Decision::Strips, Decision::Slices};
+  options.store = {heavy, "a$1"};
+  options.inlined = {"cheap"};
+  options.threads = 3;
+  EXPECT_EQ(options.to_string(),
+            "without=slices+strips,store=" + heavy.name() + "+a$1,inline=cheap,threads=3");
+  EXPECT_EQ(AutoscheduleOptions::from_string(options.to_string()), options);
+  EXPECT_EQ(AutoscheduleOptions::from_string(""), AutoscheduleOptions());
+}
+
+// What is compiled is compiled again when its options change.
+TEST_F(Places, OptionsOfAGradientTakeEffectWhenItIsCompiledNext) {
+  Func gradient = propagate_adjoints(gradient::weighted_sum(sums, {30}))(image);
+  const std::string before = gradient.loop_nest();
+  EXPECT_NE(before.find("parallel"), std::string::npos);
+  const Buffer<float> first = gradient.realize({40, 40});
+  gradient.set_autoschedule({.threads = 1});
+  EXPECT_EQ(gradient.loop_nest().find("parallel"), std::string::npos) << gradient.loop_nest();
+  const Buffer<float> second = gradient.realize({40, 40});
+  second.for_each_element([&](int i, int j) {
+    EXPECT_NEAR(first(i, j), second(i, j), 1e-4 * (1 + std::abs(first(i, j))));
+  });
+}
+
+TEST_F(Places, ACompiledGradientThatNobodyScheduledIsNoted) {
+  Func gradient = propagate_adjoints(gradient::weighted_sum(sums, {30}))(image);
+  std::vector<std::string> told;
+  WarningScope scope([&](const std::string& warning) { told.push_back(warning); });
+  gradient.compile_jit();
+  ASSERT_EQ(told.size(), 1u);
+  expect_mentions(told[0], {"performance", gradient.name(), "auto_schedule", "set_autoschedule",
+                            "unscheduled()"});
+  Pipeline chosen(gradient);
+  chosen.unscheduled();
+  EXPECT_TRUE(warnings_of(chosen).empty());
+}
+
+}  // namespace
+}  // namespace retrograde
