@@ -15,6 +15,8 @@ namespace {
 constexpr size_t most_terms = 32;
 // Operands of nested min (max) that are compared with each other.
 constexpr size_t max_operands = 8;
+// Pairs of sums that are looked at to compare two.
+constexpr int most_compared = 64;
 
 bool is_nothing(const Sum& f) { return f.terms.empty() && f.constant == 0; }
 
@@ -129,7 +131,7 @@ std::optional<FloorQuotient> as_quotient(const Sum& f) {
   return numerator.valid ? std::optional(FloorQuotient{numerator, *k}) : std::nullopt;
 }
 
-// Not positive: a <= b for certain. Not negative: a >= b.
+// Not positive: a <= b for certain.
 std::optional<int64_t> sign_of_difference(const Sum& a, const Sum& b) {
   if (auto d = difference(a, b)) return d;
   auto x = as_quotient(a), y = as_quotient(b);
@@ -137,20 +139,47 @@ std::optional<int64_t> sign_of_difference(const Sum& a, const Sum& b) {
   return difference(x->numerator, y->numerator);
 }
 
-// Whether min(kept, dropped) == kept for certain (for max with the order reversed). Looks through
-// one level of the opposite operator: min(a, max(a, b)) == a.
-bool makes_redundant(Kind kind, const Sum& kept, const Sum& dropped) {
-  auto wins = [&](int64_t difference) {
-    return kind == Kind::Min ? difference <= 0 : difference >= 0;
+// What a sum is the smaller or the larger of, besides a constant; nothing: it is no such sum.
+struct Extreme {
+  Kind kind;
+  Sum a, b;
+};
+// `end`: what a value is that is promised to lie in a range, the smaller of itself and the upper end
+// of it, or the larger of itself and the lower one.
+std::optional<Extreme> as_extreme(const Sum& f, Kind end) {
+  if (f.terms.size() != 1 || f.terms[0].factor != 1) return std::nullopt;
+  const Expr& atom = f.terms[0].atom;
+  const auto shifted = [&](Kind kind, const Expr& a, const Expr& b) {
+    Extreme result{kind, linear_form(a), linear_form(b)};
+    for (Sum* operand : {&result.a, &result.b}) operand->add_constant(f.constant);
+    return result;
   };
-  if (auto d = sign_of_difference(kept, dropped)) return wins(*d);
-  std::vector<Sum> inner;
-  add_operands(kind == Kind::Min ? Kind::Max : Kind::Min, dropped, inner);
-  if (inner.size() < 2) return false;
-  return std::ranges::any_of(inner, [&](const Sum& operand) {
-    auto d = difference(kept, operand);
-    return d && wins(*d);
-  });
+  if (atom.kind() == Kind::Min || atom.kind() == Kind::Max)
+    return shifted(atom.kind(), atom.as<Binary>()->a, atom.as<Binary>()->b);
+  const auto* call = atom.as<Call>();
+  if (!call || !call->is_op(Op::promise_clamped, Op::unsafe_promise_clamped)) return std::nullopt;
+  return shifted(end, call->args[0], call->args[end == Kind::Min ? 2 : 1]);
+}
+
+// Whether a <= b for certain. A largest is at most b where all of its operands are, and a is at most
+// a smallest where it is at most all of its operands: nothing is lost by that, so that it comes
+// first. Then one operand of a smallest, or of a largest, is enough. (Whitman, Free lattices, 1941.)
+bool is_at_most(const Sum& a, const Sum& b, int& budget) {
+  if (--budget < 0) return false;
+  if (const auto d = sign_of_difference(a, b)) return *d <= 0;
+  const auto of_a = as_extreme(a, Kind::Min), of_b = as_extreme(b, Kind::Max);
+  const auto is_left = [&](const Sum& x) { return is_at_most(x, b, budget); };
+  const auto is_right = [&](const Sum& x) { return is_at_most(a, x, budget); };
+  if (of_a && of_a->kind == Kind::Max) return is_left(of_a->a) && is_left(of_a->b);
+  if (of_b && of_b->kind == Kind::Min) return is_right(of_b->a) && is_right(of_b->b);
+  return (of_a && (is_left(of_a->a) || is_left(of_a->b))) ||
+         (of_b && (is_right(of_b->a) || is_right(of_b->b)));
+}
+
+// min(kept, dropped) == kept where kept <= dropped, max(kept, dropped) == kept where it is not below.
+bool makes_redundant(Kind kind, const Sum& kept, const Sum& dropped) {
+  int budget = most_compared;
+  return kind == Kind::Min ? is_at_most(kept, dropped, budget) : is_at_most(dropped, kept, budget);
 }
 
 void add_unless_redundant(Kind kind, const Sum& candidate, std::vector<Sum>& kept) {

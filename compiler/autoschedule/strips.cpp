@@ -27,7 +27,7 @@ namespace {
 constexpr double window_bytes = 384 << 10;  // of a group: half of a cache near a core
 constexpr int64_t unknown_extent = 1024;    // of rows and columns of an image
 constexpr int64_t enough_strips = 16;       // each is a task
-constexpr size_t most_members = 8;  // bounds of each are computed from those of all behind it
+constexpr size_t most_members = 8;
 constexpr double least_rows = 8, rows_a_halo = 8;
 constexpr int64_t least_bytes = 1 << 20;  // less stays in the caches on its way
 
@@ -303,13 +303,10 @@ class Group {
 };
 
 // Vectors along rows, the first dimension, are all that was cut off.
-// Adjoints are left: each is read within its domain alone, and such bounds, one inside of the other,
-// are long to compute.
 bool has_plain_rows(const FuncContents& f) {
   const StageLoops& loops = f.pure->schedule;
-  return !f.made && f.is_pure() && !f.is_extern() && f.args.size() > 1 &&
-         loops.splits.size() == 1 && loops.splits[0].old_var == f.args[0] &&
-         loops.splits[0].outer == f.args[0];
+  return f.is_pure() && !f.is_extern() && f.args.size() > 1 && loops.splits.size() == 1 &&
+         loops.splits[0].old_var == f.args[0] && loops.splits[0].outer == f.args[0];
 }
 
 void give_strips(const Group& group) {

@@ -434,26 +434,42 @@ int64_t Facts::eliminate_division(const Sum& sum, const Term& term, const Div& n
   return replaced.valid ? search(replaced, budget) : infinity;
 }
 
-// Replaces the first term with something to choose from or to look through.
+namespace {
+
+// A term that is one of two values: `either` bounds it, or only both together do.
+struct Choice {
+  Expr a, b;
+  bool either;
+};
+std::optional<Choice> choice_of(const Term& term) {
+  const Kind kind = term.atom.kind();
+  if (kind == Kind::Min || kind == Kind::Max) {
+    const auto* n = term.atom.as<Binary>();
+    return Choice{n->a, n->b, (kind == Kind::Min) == (term.factor > 0)};
+  }
+  if (const auto* n = term.atom.as<Select>()) return Choice{n->when_true, n->when_false, false};
+  const auto* call = term.atom.as<Call>();
+  if (!call || !call->is_op(Op::promise_clamped, Op::unsafe_promise_clamped)) return std::nullopt;
+  return Choice{call->args[0], call->args[term.factor > 0 ? 2 : 1], true};
+}
+
+}  // namespace
+
+// Replaces the first term with something to look through or to choose from. Where both values must
+// do, nothing is lost, so that these come first: max(e, 0) - max(e + 1, 0) is at most 0 because
+// e - max(e + 1, 0) is and 0 - max(e + 1, 0) is, by another value of the second each.
 int64_t Facts::eliminate_structure(const Sum& sum, int& budget) {
   for (const Term& term : sum.terms) {
-    const Kind kind = term.atom.kind();
-    if (kind == Kind::Min || kind == Kind::Max) {
-      const auto* n = term.atom.as<Binary>();
-      const int64_t a = replace(sum, term, n->a, budget), b = replace(sum, term, n->b, budget);
-      const bool either = (kind == Kind::Min) == (term.factor > 0);
-      return either ? std::min(a, b) : std::max(a, b);
-    }
-    if (const auto* n = term.atom.as<Select>()) {
-      const int64_t a = replace(sum, term, n->when_true, budget),
-                    b = replace(sum, term, n->when_false, budget);
-      return std::max(a, b);
-    }
     const auto* call = term.atom.as<Call>();
     if (call && call->is_likely()) return replace(sum, term, call->args[0], budget);
-    if (call && call->is_op(Op::promise_clamped, Op::unsafe_promise_clamped)) {
-      return std::min(replace(sum, term, call->args[0], budget),
-                      replace(sum, term, call->args[term.factor > 0 ? 2 : 1], budget));
+  }
+  for (const bool either : {false, true}) {
+    for (const Term& term : sum.terms) {
+      const std::optional<Choice> choice = choice_of(term);
+      if (!choice || choice->either != either) continue;
+      const int64_t a = replace(sum, term, choice->a, budget),
+                    b = replace(sum, term, choice->b, budget);
+      return either ? std::min(a, b) : std::max(a, b);
     }
   }
   for (const Term& term : sum.terms) {  // last: what is inside of the others may cancel it

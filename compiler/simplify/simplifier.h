@@ -37,6 +37,10 @@ class Simplifier {
   Expr div(const Expr& a, const Expr& b);
   Expr mod(const Expr& a, const Expr& b);
   Expr min_max(Kind kind, const Expr& a, const Expr& b);
+  Expr distribute_min_max(Kind kind, const std::vector<Expr>& operands);
+  bool is_dominated(Kind kind, const Expr& x, const Expr& y);
+  void add_operand(Kind kind, const Expr& operand, std::vector<Expr>& operands);
+  std::vector<Expr> shifted_operands(Kind kind, const Expr& e);
   Expr equals(const Expr& a, const Expr& b);
   Expr less(Kind kind, const Expr& a, const Expr& b);  // LT or LE
   Expr logical(Kind kind, const Expr& a, const Expr& b);

@@ -363,6 +363,52 @@ TEST(StripsOfRows, AreThoseOfAChainAsLongAsItsWindowsFit) {
   EXPECT_LE(at_root, 8);
 }
 
+// A chain whose edges go on outside, from an image to how far its end is from it.
+struct ClampedChain {
+  explicit ClampedChain(int steps) {
+    for (int py = 0; py < height; py++) {
+      for (int px = 0; px < width; px++)
+        picture(px, py) = static_cast<float>((px * 7 + py * 13) % 11);
+    }
+    Func state("state");
+    state(x, y) = picture(x, y);
+    for (int step = 0; step < steps; step++) {
+      const Func f = BoundaryConditions::repeat_edge(state, {{0, width}, {0, height}});
+      Func next("next");
+      next(x, y) = 0.25f * (f(x - 1, y) + f(x + 1, y) + f(x, y - 1) + f(x, y + 1));
+      state = next;
+    }
+    RDom r(0, width, 0, height);
+    loss() = 0.0f;
+    loss() += state(r.x, r.y) * state(r.x, r.y) * 0.5f;
+    gradient = propagate_adjoints(loss)(picture);
+    gradient.set_estimates({{0, width}, {0, height}});
+  }
+  static constexpr int width = 520, height = 531;
+  Var x{"x"}, y{"y"};
+  Buffer<float> picture{width, height};
+  Func loss{"loss"}, gradient;
+};
+
+TEST(StripsOfRows, AreThoseOfAChainsAdjoints) {
+  ClampedChain scheduled(7), plain(7);
+  Pipeline(scheduled.gradient).auto_schedule(get_host_target());
+  int in_strips = 0;
+  for (const graph::FuncPtr& f : graph::topological_order({scheduled.gradient.function()})) {
+    in_strips += f->made && f->schedule.compute_level.kind == graph::LoopLevel::Kind::At;
+  }
+  EXPECT_GE(in_strips, 5);
+  const std::vector<int> sizes{ClampedChain::width, ClampedChain::height};
+  const Buffer<float> found = scheduled.gradient.realize(sizes);
+  for (const graph::FuncPtr& f : graph::topological_order({plain.gradient.function()}))
+    Func(f).compute_root();
+  const Buffer<float> expected = plain.gradient.realize(sizes);
+  found.for_each_element([&](int px, int py) {
+    EXPECT_NEAR(found(px, py), expected(px, py), 1e-6f * std::abs(expected(px, py)))
+        << px << ", " << py;
+  });
+}
+
 // Sums down the columns of an image and back up, turned.
 struct TurnedScan {
   explicit TurnedScan(int columns, int rows) {

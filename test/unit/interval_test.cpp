@@ -182,6 +182,19 @@ TEST_F(IntervalTest, LinearFormsGatherTerms) {
   EXPECT_FALSE(decompose(x * x, {"x"}));
 }
 
+// One bounds the other through operands of both.
+TEST_F(IntervalTest, MinAndMaxOfClampsKeepTheOneThatDecides) {
+  const Expr below = canonical_max(n - 2, 0), above = canonical_max(n - 1, 0);
+  EXPECT_EQ(print(canonical_min(above, below)), print(below));
+  EXPECT_EQ(constant_difference(canonical_max(below, above), canonical_max(0, n - 1)), 0);
+  const Expr clamped = min(max(n - 1, 0), 9), next = min(max(n, 0), 9);
+  EXPECT_EQ(print(canonical_min(clamped, next)), print(clamped));
+  const Expr promised = call_op(Op::promise_clamped, Int(32), {n, 0, 9});
+  EXPECT_EQ(print(canonical_max(promised - 1, min(max(promised, 0), 9))),
+            print(min(max(promised, 0), 9)));
+  EXPECT_EQ(print(canonical_min(above, max(xmin - 2, 0))), print(min(above, max(xmin - 2, 0))));
+}
+
 // Where a number would not fit 64 bits nothing is known, and nothing overflows.
 TEST_F(IntervalTest, NumbersAtTheEndOfInt64) {
   constexpr int64_t most = INT64_MAX;

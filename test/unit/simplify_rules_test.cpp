@@ -81,6 +81,18 @@ TEST(Simplify, DecidesMinAndMax) {
   keep({"max(min(x + 1, n - 1), 0)", "min(f:float32, g:float32)"});
 }
 
+// Regions of stencils that read each other within their domains.
+TEST(Simplify, MakesOneClampOfClampsInOneAnother) {
+  check({{"min(max(x - 1, 0), max(x - 2, 0))", "max(x - 2, 0)"},
+         {"max(min(max(x, 0), 9), min(max(x - 1, 0), 9))", "min(max(x, 0), 9)"},
+         {"max(max(x, 0) - 1, y)", "max(max(y, x - 1), -1)"},
+         {"max(min(max(x - 1, 0), 9) - 1, 0)", "min(max(x - 2, 0), 8)"},
+         {"min(max(min(max(max(x - 1, 0) - 1, 0), 9) - 1, 0), 7)", "min(max(x - 3, 0), 7)"},
+         {"min(x, 9) <= min(x - 1, 9) + 1", "true"},
+         {"min(max(x - 1, 0), 9) <= min(max(x, 0), 9)", "true"}});
+  keep({"max(min(n, max(x - 1, 0)) - 1, 0)", "min(max(y, 0), max(x - 1, 0))"});
+}
+
 TEST(Simplify, DecidesComparisons) {
   check({{"x + 3 < y + 5", "x <= y + 1"},
          {"x*8 + 7 <= x*8", "false"},

@@ -110,6 +110,35 @@ TEST_F(SlidingWindow, FillsTheWindowBeforeASplitThatStaysInside) {
   }
 }
 
+// Where all of them stay inside of an image, the first rows and the last are read again and again. In
+// strips of 8 rows, a strip computes anew what it needs beyond itself, and no row twice.
+TEST_F(SlidingWindow, ClampedChainsInStripsComputeEachRowOnceAStrip) {
+  Func out = expect_same([&](bool scheduled) {
+    Func f("f"), g("g"), h("h"), out("out");
+    const auto inside = [](const Expr& e) { return clamp(e, 0, height - 1); };
+    f(x, y) = counted("f", x * 3 + y * y);
+    g(x, y) = counted("g", f(x, inside(y - 1)) + f(x, inside(y + 1)) * 2);
+    h(x, y) = counted("h", g(x, inside(y - 1)) - g(x, inside(y)) * 3 + g(x, inside(y + 1)));
+    out(x, y) = h(x, inside(y - 1)) + h(x, inside(y + 1));
+    out.bound(x, 0, width);
+    if (scheduled) {
+      out.split(y, yo, yi, 8, TailStrategy::GuardWithIf);
+      for (Func* stage : {&f, &g, &h}) stage->store_at(out, yo).compute_at(out, yi);
+    }
+    return out;
+  });
+  const auto rows = [](int beyond) {
+    int count = 0;
+    for (int first = 0; first < height; first += 8)
+      count += std::min(first + 7 + beyond, height - 1) - std::max(first - beyond, 0) + 1;
+    return count;
+  };
+  EXPECT_EQ(computed["h"], width * rows(1));
+  EXPECT_EQ(computed["g"], width * rows(2));
+  EXPECT_EQ(computed["f"], width * rows(3));
+  for (const char* name : {"f", "g", "h"}) EXPECT_EQ(stored_elements(out, name), width * 4) << name;
+}
+
 TEST_F(SlidingWindow, SlidesInBothDimensions) {
   expect_same([&](bool scheduled) {
     Func f("f"), g("g");

@@ -28,6 +28,9 @@
 //         intervals is the steady state. Inner loops are then partitioned in the steady state
 //         only; in the rest too where the rest may be large (a border of whole tiles) and the body
 //         is small.
+//         Conditions that an inner loop decides, too, are left to it where a copy of a large body
+//         would save no more than a branch a row: to a loop over the rows of a strip, and to a long
+//         loop along a row beside rows of other Funcs.
 //         A loop is cut only if that saves something that is worth the copies (`Saving` in
 //         steady_state.h), or if the schedule says always.
 // Not done: a condition that both this loop and an inner loop of unknown extent decide: it is left
@@ -53,21 +56,11 @@ namespace {
 
 // Border bodies with more nodes than this are not partitioned further.
 constexpr int small_body = 1500;
-// Both borders of bodies with more nodes than this are one loop, where the order allows it.
-constexpr int costly_border = 200;
 // An operation less an iteration is worth a copy of a body that has up to this many nodes.
 constexpr int nodes_an_operation = 64;
 
 bool contains_likely(const Stmt& s) {
   return any_node(s, [](const Call& call) { return is_likely(&call); });
-}
-
-int node_count(const Stmt& s) {
-  int count = 0;
-  auto visit = [&](const auto&) { return ++count, true; };
-  walk(
-      s, [&](const Expr& e) { return visit(e); }, [&](const Stmt& child) { return visit(child); });
-  return count;
 }
 
 bool contains_loop(const Stmt& s) {

@@ -15,6 +15,8 @@ namespace {
 constexpr int64_t thick_loop = 8;
 // ... and at least this many points in all: a tile then, and not a stencil or a vector.
 constexpr int64_t thick_points = 32;
+// Iterations of an inner loop beside which its own borders are nothing.
+constexpr int64_t long_row = 16;
 
 // A loop whose extent varies has at most so many iterations if it follows what is unrolled around
 // it: what is prepared for its copies, say. No more than they does it count as a loop.
@@ -33,6 +35,19 @@ bool contains_serial_loop(const Stmt& s) {
     const For* loop = part.as<For>();
     return loop && is_serial(*loop) && !is_short(*loop, lets);
   });
+}
+
+// Rows of several Funcs, say: serial loops without others inside.
+bool has_several_rows(const Stmt& s) {
+  int rows = 0;
+  walk(
+      s, [](const Expr&) { return false; },
+      [&](const Stmt& part) {
+        const For* loop = part.as<For>();
+        rows += loop && is_serial(*loop) && !contains_serial_loop(loop->body);
+        return rows < 2;
+      });
+  return rows >= 2;
 }
 
 bool is_pure(const Expr& e) {
@@ -76,11 +91,20 @@ void PartitionContext::add_loop(const For& loop) {
             {bounds_of(expand(loop.min), ranges_).min, bounds_of(expand(last), ranges_).max});
 }
 
+int node_count(const Stmt& s) {
+  int count = 0;
+  const auto visit = [&](const auto&) { return ++count, true; };
+  walk(
+      s, [&](const Expr& e) { return visit(e); }, [&](const Stmt& child) { return visit(child); });
+  return count;
+}
+
 SteadyRewriter::SteadyRewriter(const For& loop, const PartitionContext& outer, bool inside_lanes)
     : loop_(loop),
       context_(outer),
       inside_lanes_(inside_lanes),
       has_inner_loops_(contains_serial_loop(loop.body)),
+      has_costly_rows_(has_several_rows(loop.body) && node_count(loop.body) > costly_border),
       dependent_{loop.name} {}
 
 Expr SteadyRewriter::rewrite(const Expr& e) {
@@ -139,10 +163,19 @@ Stmt SteadyRewriter::rewrite_loop(const Stmt& s, const For& n) {
   if (n.runs == ForType::Vectorized) lanes_.insert(n.name);
   if (!is_serial(n)) return children(s);
   inner_serial_.insert(n.name);
+  if (extent && decides_alone(n, *extent)) decide_alone_.insert(n.name);
   enclosing_.push_back(n.name);
   Stmt copy = children(s);
   enclosing_.pop_back();
   return copy;
+}
+
+// What another copy of the body of this loop would save is a branch in each iteration of that one,
+// or, where other loops stand beside it, in each of its rows.
+bool SteadyRewriter::decides_alone(const For& n, int64_t extent) const {
+  if (contains_serial_loop(n.body))
+    return extent >= thick_loop && node_count(n.body) > costly_border;
+  return extent >= long_row && has_costly_rows_;
 }
 
 Expr SteadyRewriter::rewrite_extreme(const Binary& n, const Expr& copy) {
@@ -193,7 +226,11 @@ SteadyRewriter::Mark SteadyRewriter::mark(const Expr& e) {
 // choice skips what it does not choose, where an extreme is but an operation.
 bool SteadyRewriter::holds(const Expr& condition, bool is_true, bool is_choice) {
   Expr expanded = context_.expand(is_true ? condition : logical_not(condition));
-  if (!uses_any_variable(expanded, dependent_)) return false;
+  const std::unordered_set<std::string> names = variables_of(expanded);
+  const auto is_in = [&](const std::string& name) { return names.count(name) != 0; };
+  if (std::ranges::none_of(dependent_, is_in)) return false;
+  const bool is_in_row = !enclosing_.empty() && decide_alone_.contains(enclosing_.back());
+  if (is_in_row || std::ranges::any_of(decide_alone_, is_in)) return false;
   auto solution = solve_for(expanded, loop_.name, context_.ranges());
   if (!solution) return false;
   ++steady_.solved;
@@ -202,7 +239,6 @@ bool SteadyRewriter::holds(const Expr& condition, bool is_true, bool is_choice) 
     steady_.needed = steady_.needed.defined() ? binary(Kind::And, steady_.needed, solution->needed)
                                               : solution->needed;
   }
-  const std::unordered_set<std::string> names = variables_of(expanded);
   steady_.has_thick_border |= is_about_tiles(names);
   count_saving(names, is_choice);
   return true;

@@ -16,6 +16,10 @@ namespace retrograde::lower {
 bool is_likely(const Call* call);
 bool is_serial(const For& loop);  // or parallel: it runs one iteration after the other
 
+// Of bodies with more nodes than this, a copy costs more than a branch in each iteration.
+inline constexpr int costly_border = 200;
+int node_count(const Stmt& s);
+
 // Names whose values a solution may not mention: what a let stands for, and between what a loop
 // variable lies.
 class PartitionContext {
@@ -71,6 +75,7 @@ class SteadyRewriter : public Rewriter {
   Expr rewrite_let(const Expr& e, const Let& n);
   Expr bind(const std::string& name, const Expr& original);
   Stmt rewrite_loop(const Stmt& s, const For& n);
+  bool decides_alone(const For& n, int64_t extent) const;
   Expr rewrite_extreme(const Binary& n, const Expr& copy);
   Expr rewrite_select(const Select& n, const Expr& copy);
   bool is_mark(const Call& call) const { return call.is_op(Op::likely) || inner_serial_.empty(); }
@@ -82,12 +87,13 @@ class SteadyRewriter : public Rewriter {
   const For& loop_;
   PartitionContext context_;
   const bool inside_lanes_;
-  const bool has_inner_loops_;
+  const bool has_inner_loops_, has_costly_rows_;
   SteadyState steady_;
   std::unordered_set<std::string>
       dependent_;  // the loop's variable, and those of inner loops that start from it
   std::unordered_set<std::string> inner_serial_, lanes_;
-  std::vector<std::string> enclosing_;  // inner serial loops around the place of the walk
+  std::unordered_set<std::string> decide_alone_;  // of these, what their own borders are
+  std::vector<std::string> enclosing_;            // inner serial loops around the place of the walk
   std::unordered_map<std::string, int64_t> inner_extents_;  // constant ones
   std::unordered_map<std::string, Mark> marked_lets_;
   std::unordered_map<std::string, Expr> decided_lets_;

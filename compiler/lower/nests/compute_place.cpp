@@ -23,19 +23,30 @@ Range ComputePlace::bind(const std::string& name, Interval& range) {
   return {range.min, extent};
 }
 
+namespace {
+
+// An end of what an iteration computes: that of what it touches, where there is no choice.
+Interval end_of_part(const Expr& end, const Expr& touched_end, const Interval& touched) {
+  return end.same_as(touched_end) ? Interval::point(end) : touched;
+}
+
+}  // namespace
+
 Range ComputePlace::bind_part(const std::string& name, const Slide& slide, Interval& range) {
-  Expr extent = simplify(slide.part.max - slide.part.min + 1);
+  const auto& [part, touched] = std::pair(slide.part, slide.touched);
+  Expr extent = simplify(part.max - part.min + 1);
   Interval whole = slide.whole;
-  range.min = this->name(name + ".min", slide.part.min, true);
+  range.min = this->name(name + ".min", part.min, true);
   if (is_const(extent)) {
     range.max = simplify(range.min + extent - 1);
     whole.max = simplify(whole.max - extent + 1);
-    note_part(range.min, whole, slide.starts_whole ? whole : Interval::point(slide.part.min));
+    const Interval first{touched.min, simplify(touched.max - extent + 1)};
+    note_part(range.min, whole, end_of_part(part.min, touched.min, first));
   } else {
-    range.max = this->name(name + ".max", slide.part.max, true);
+    range.max = this->name(name + ".max", part.max, true);
     extent = simplify(range.max - range.min + 1);
-    note_part(range.min, whole, slide.starts_whole ? whole : Interval::point(slide.part.min));
-    note_part(range.max, whole, slide.starts_whole ? whole : Interval::point(slide.part.max));
+    note_part(range.min, whole, end_of_part(part.min, touched.min, touched));
+    note_part(range.max, whole, end_of_part(part.max, touched.max, touched));
   }
   return {range.min, extent};
 }

@@ -29,6 +29,7 @@ Interval without_promises(const Interval& part) {
 }
 
 constexpr int longest_warm_up = 256;
+constexpr int longest_reach = 16;   // of the first part that is worth a smaller window
 constexpr int undecided_steps = 4;  // of a warm-up whose length is not a constant so far
 
 bool can_slide_over(const Loop& loop) {
@@ -55,9 +56,11 @@ class Slider {
   std::optional<Slide> over(const Loop& loop, bool is_directly_around, int lead) {
     int d = only_moving_dimension(loop.name);
     if (d < 0 || slid_[d] || !is_pure_in(f_, d)) return {};
-    Slide slide{d, loop, 0, false, box_[d], {}};
+    Slide slide{d, loop, 0, box_[d], {}, {}};
     if (!moves_one_way(slide)) return {};
-    if (!(is_directly_around && start_early(slide, lead)) && !start_whole(slide, lead)) return {};
+    if (!(is_directly_around && start_early(slide, lead)) &&
+        !start_whole(slide, lead, is_directly_around))
+      return {};
     if (!stays_inside(slide)) return {};
     slid_[d] = true;
     return slide;
@@ -140,27 +143,60 @@ class Slider {
       if (ahead && *ahead < 0) return false;
       if (!ahead || *ahead > 0) continue;
       slide.lead = k;
-      slide.part = without_promises(from(*fresh));
+      slide.part = slide.touched = without_promises(from(*fresh));
       return true;
     }
     return false;
   }
 
-  bool start_whole(Slide& slide, int lead) const {
+  // The front of an iteration before the first, and whether it is at `first` or beyond it.
+  Expr front_at(const Slide& slide, int lead) const {
+    return substitute(front_, slide.loop.name, simplify(slide.loop.min - lead));
+  }
+  bool reaches(const Expr& front, const Expr& first) const {
+    const Expr is_there = is_upwards_ ? front >= first : front <= first;
+    return can_prove(ir::without_promises(without_likely(is_there)), facts_);
+  }
+  // A clamp may keep parts from beginning before the first iteration's box. But the earliest
+  // iteration whose front is not before it has the fewest values to compute at once.
+  int earliest_start(const Slide& slide, int lead, const Expr& first) const {
+    int k = lead;
+    while (k < lead + longest_warm_up && difference(front_at(slide, k), first) != 0 &&
+           reaches(front_at(slide, k + 1), first))
+      k++;
+    return k;
+  }
+
+  // How far behind its front the first part begins, at most: where a chain stays inside of an image,
+  // a coordinate for each Func behind it at the border, and none elsewhere.
+  std::optional<int> reach_of_first_part(const Slide& slide, const Expr& first) const {
+    const Expr front = front_at(slide, slide.lead);
+    for (int reach = 0; reach <= longest_reach; reach++) {
+      const Expr end = is_upwards_ ? first + reach : first - reach;
+      if (reaches(end, front)) return reach;
+    }
+    return {};
+  }
+  Expr at_least_as_far_back(const Expr& fresh, int reach) const {
+    const Expr behind = make_const(Int(32), reach);
+    return simplify(is_upwards_ ? min(fresh, front_ - behind) : max(fresh, front_ + behind));
+  }
+
+  bool start_whole(Slide& slide, int lead, bool is_directly_around) const {
     auto fresh = fresh_part(slide);
     if (!fresh) return false;
-    const Expr start = simplify(slide.loop.min - lead);
-    Expr first = back_;
-    if (lead > 0) {
-      first = simplify(substitute(back_, slide.loop.name, slide.loop.min));
-      Expr reached = substitute(front_, slide.loop.name, start);
-      auto beyond = difference(reached, first);
-      if (!beyond || *beyond < -1) return false;
-    }
-    slide.lead = lead;
-    slide.starts_whole = true;
+    Expr first = simplify(substitute(back_, slide.loop.name, slide.loop.min));
+    if (lead > 0 && !reaches(front_at(slide, lead), is_upwards_ ? first - 1 : first + 1))
+      return false;
+    slide.lead = is_directly_around ? earliest_start(slide, lead, first) : lead;
+    slide.touched = slide.whole;
+    if (slide.lead == 0)
+      first = back_;
+    else if (const auto reach = reach_of_first_part(slide, first))
+      slide.touched = without_promises(from(at_least_as_far_back(*fresh, *reach)));
+    const Expr start = simplify(slide.loop.min - slide.lead);
     slide.part = from(select(variable(slide.loop.name) <= start, first, *fresh));
-    if (lead > 0) slide.part = without_promises(slide.part);
+    if (slide.lead > 0) slide.part = without_promises(slide.part);
     return true;
   }
 

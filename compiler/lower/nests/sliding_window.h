@@ -9,8 +9,9 @@
 // Method: along a serial loop on which the required box depends in one dimension only, and whose
 //         ends there never move back, what earlier iterations computed is kept. The loop starts
 //         early enough that the new parts alone add up to what its first iteration needs; where
-//         they do not add up exactly, or the loop is not the one directly around, the first
-//         iteration computes its whole box instead.
+//         they do not add up exactly, as where clamps stop at a border, the first iteration
+//         computes all from there on that it needs: few, when it is early enough, too. Where the loop
+//         is not the one directly around, that is its whole box.
 // Legal:  every update is pure in the dimension; no loop of f runs past the part that it is given.
 // Source: the scheduling model of Ragan-Kelley et al., PLDI 2013, section 4.3; starting loops early
 //         is known from later versions of its compiler. Tests: test/unit/sliding_window_test.cpp.
@@ -30,10 +31,10 @@ BoundsMap facts_of(const std::vector<Loop>& loops);
 struct Slide {
   int dimension = 0;
   Loop loop;
-  int lead = 0;  // iterations before the loop's first in which the Func is computed already
-  bool starts_whole = false;  // the first iteration computes all that it needs
-  Interval whole;             // what an iteration needs
-  Interval part;              // what it computes
+  int lead = 0;      // iterations before the loop's first in which the Func is computed already
+  Interval whole;    // what an iteration needs
+  Interval part;     // what it computes
+  Interval touched;  // no less than the part, without the choice between the first and others
 };
 
 // `box`: what one iteration needs of f. `loops`: between f's computation and its storage, innermost
