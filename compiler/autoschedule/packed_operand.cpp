@@ -9,6 +9,7 @@
 #include "autoschedule/read_estimate.h"
 #include "graph/give_directive.h"
 #include "graph/own_reads.h"
+#include "graph/wrappers.h"
 #include "ir/build.h"
 #include "ir/lets.h"
 #include "ir/visit.h"
@@ -69,13 +70,26 @@ class Candidate {
   }
 
   bool is_worth_packing() const {
-    const auto elements = lanes_run_along_rows() ? elements_of_piece() : std::nullopt;
-    if (!elements || rows() < many_rows || tiles(false) < least_tiles ||
-        tiles(true) < sizes_.machine().enough_tasks)
-      return false;
-    return loads_of_a_tile() * tiles(false) * lanes_ >= least_uses * static_cast<double>(*elements);
+    const auto lanes_along = lane_dimension();
+    const auto elements = lanes_along ? elements_of_piece() : std::nullopt;
+    if (!elements || tiles(true) < sizes_.machine().enough_tasks) return false;
+    // Lanes that run across rows are loaded one by one, wherever they lie.
+    const bool is_near = *lanes_along == 0 && (rows() < many_rows || tiles(false) < least_tiles);
+    return !is_near &&
+           loads_of_a_tile() * tiles(false) * lanes_ >= least_uses * static_cast<double>(*elements);
   }
   const std::vector<bool>& depends_on() const { return depends_on_; }
+  // The index, one and no other, that is the next for the next lane.
+  std::optional<size_t> lane_dimension() const {
+    std::optional<size_t> found;
+    for (size_t d = 0; d < index_.size(); ++d) {
+      const auto form = decompose(index_[d], {f_.args[0]});
+      const int64_t step = form ? form->coefficients[0].second : 2;
+      if (step != 0 && (step != 1 || found)) return std::nullopt;
+      if (step == 1) found = d;
+    }
+    return found;
+  }
 
  private:
   Expr place(const Expr& arg) const {
@@ -87,15 +101,6 @@ class Candidate {
   bool moves(const std::string& var) const {
     return std::any_of(index_.begin(), index_.end(),
                        [&](const Expr& e) { return uses_variable(e, var); });
-  }
-
-  // The first index, and no other, is the next for the next lane.
-  bool lanes_run_along_rows() const {
-    for (size_t d = 0; d < index_.size(); ++d) {
-      const auto form = decompose(index_[d], {f_.args[0]});
-      if (!form || form->coefficients[0].second != (d == 0 ? 1 : 0)) return false;
-    }
-    return true;
   }
 
   std::optional<int64_t> elements_of_piece() const {
@@ -154,11 +159,36 @@ class Candidate {
   std::vector<bool> depends_on_;
 };
 
-// A Func of one definition that nobody has placed inside of another.
+// A Func that nobody has placed inside of another.
 FuncPtr source_of(const Call& call, const FuncContents& f) {
   const FuncPtr source = call.call_type == CallType::Func ? func_of(call) : nullptr;
   if (!source || source.get() == &f || source->is_extern()) return nullptr;
   return source->schedule.compute_level.kind == graph::LoopLevel::Kind::At ? nullptr : source;
+}
+
+std::shared_ptr<graph::ParameterContents> image_of(const Call& call, const FuncContents& f) {
+  if (call.call_type != CallType::Image || f.copied_inputs.contains(call.name)) return nullptr;
+  return std::static_pointer_cast<graph::ParameterContents>(call.symbol.lock());
+}
+
+// Lanes along the rows of the copy; where those are not the rows of the source, blocks of as many
+// rows are loaded whole and turned in registers.
+void schedule_copy(Func copy, size_t lane_dimension, int lanes) {
+  const std::vector<Var> args = copy.args();
+  const Var row = args[lane_dimension];
+  if (lane_dimension != 0) {
+    std::vector<Var> storage{row};
+    for (const Var& arg : args) {
+      if (!arg.same_as(row)) storage.push_back(arg);
+    }
+    copy.reorder_storage(storage);
+    const Var in_block(inner_loop(*copy.function(), 0, args[0].name()));
+    Stage(copy.function(), 0)
+        .split(args[0], args[0], in_block, lanes, TailStrategy::GuardWithIf)
+        .reorder(in_block, row)
+        .unroll(in_block);
+  }
+  vectorize(Stage(copy.function(), 0), row, lanes, TailStrategy::GuardWithIf);
 }
 
 }  // namespace
@@ -168,24 +198,32 @@ std::optional<PackedOperand> packed_operand(const FuncContents& f, const Definit
                                             const SizeEstimate& sizes) {
   const auto extents = extents_of(f, update, tile, lanes);
   if (!extents) return std::nullopt;
-  std::unordered_map<const FuncContents*, int> reads;
+  std::unordered_map<std::string, int> reads;
   std::optional<PackedOperand> result;
+  std::string packed;
   walk_definition(update, [&](const Expr& e) {
     const auto* call = e.as<Call>();
-    const FuncPtr source = call ? source_of(*call, f) : nullptr;
-    if (!source) return;
-    ++reads[source.get()];
+    if (!call) return;
+    const FuncPtr source = source_of(*call, f);
+    const auto image = image_of(*call, f);
+    if (!source && !image) return;
+    ++reads[call->name];
     const Candidate candidate(*call, f, update, tile, lanes, sizes, *extents);
-    if (!result && candidate.is_worth_packing()) result = {source, candidate.depends_on()};
+    if (result || !candidate.is_worth_packing()) return;
+    result = {source, image, *candidate.lane_dimension(), candidate.depends_on()};
+    packed = call->name;
   });
   // Of several reads the copy would hold what lies between them.
-  return result && reads[result->source.get()] == 1 ? result : std::nullopt;
+  return result && reads[packed] == 1 ? result : std::nullopt;
 }
 
 void pack(const FuncPtr& f, const PackedOperand& operand, const Var& loop, int lanes) {
-  Func copy = Func(operand.source).in(Func(f));
+  Func copy =
+      operand.source
+          ? Func(operand.source).in(Func(f))
+          : Func(graph::copied_input(f, operand.image, operand.image->name + "_in_" + f->name));
   copy.compute_at(Func(f), loop);
-  vectorize(Stage(copy.function(), 0), copy.args()[0], lanes, TailStrategy::GuardWithIf);
+  schedule_copy(copy, operand.lane_dimension, lanes);
 }
 
 }  // namespace retrograde::autoschedule

@@ -10,7 +10,7 @@
 // What is computed inline is computed once an element of the copy.
 // Source: K. Goto and R. van de Geijn, Anatomy of High-Performance Matrix Multiplication, ACM TOMS 34
 // (2008), sections 4 and 5; theirs packs operands of matrix products, this what any linear index
-// reads. Not done: what vectors read across the rows of its source, which a copy could transpose.
+// reads, of Funcs and of images.
 #pragma once
 
 #include <optional>
@@ -22,7 +22,9 @@
 namespace retrograde::autoschedule {
 
 struct PackedOperand {
-  FuncPtr source;
+  FuncPtr source;  // or:
+  std::shared_ptr<graph::ParameterContents> image;
+  size_t lane_dimension = 0;     // of the source: the next lane reads the next along it
   std::vector<bool> depends_on;  // by dimension of the Func: what moves the piece
 };
 

@@ -199,6 +199,12 @@ struct Clone {
   std::vector<NamedFunc> users;
 };
 
+struct CopyInput {  // of an image that this Func reads
+  RETROGRADE_DIRECTIVE("copy_input", made, image)
+  std::string made;
+  NamedFunc image;
+};
+
 #undef RETROGRADE_DIRECTIVE
 
 using Directive =
@@ -206,7 +212,8 @@ using Directive =
                  AllowRaces, Unscheduled, PrefetchData, ComputeWith, Specialize, SpecializeFail,
                  FactorOut, ComputeAt, StoreAt, HoistStorage, StoreIn, ReorderStorage, AlignStorage,
                  BoundStorage, FoldStorage, Memoize, Async, BoundDimension, AlignBounds, Estimate,
-                 TraceLoads, TraceStores, TraceRealizations, AddTraceTag, DebugToFile, Wrap, Clone>;
+                 TraceLoads, TraceStores, TraceRealizations, AddTraceTag, DebugToFile, Wrap, Clone,
+                 CopyInput>;
 bool is_of_stage(const Directive& directive);  // not of the Func as a whole
 const char* name_of(const Directive& directive);
 std::vector<std::string> directive_names();

@@ -93,6 +93,8 @@ struct FuncContents : Symbol, std::enable_shared_from_this<FuncContents> {
   std::shared_ptr<const autodiff::CustomDerivatives> custom_derivatives;
   // Func::in and clone_in: consumers named here read the wrapper instead; "" stands for all others.
   std::map<std::string, std::shared_ptr<FuncContents>> wrappers;
+  // Func::copy_input: images named here are read through these Funcs.
+  std::map<std::string, std::shared_ptr<FuncContents>> copied_inputs;
   // Type the user asked for in the declaration (Func f(type, dims)), empty when none
   std::vector<Type> required_types;
   int required_dimensions = -1;

@@ -39,7 +39,8 @@ class GraphReader {
     if (line.word == "image" || line.word == "buffer") make_buffer(line);
     if (line.word == "param") make_param(line);
     if (line.word == "func") make_func(line);
-    if (line.word == "wrapper") pending_.push_back(line), owners_.push_back(f_);
+    if (line.word == "wrapper" || line.word == "copied_input")
+      pending_.push_back(line), owners_.push_back(f_);
     if (line.word == "reader") pending_.push_back(line), readers_.push_back(parameter_);
   }
 
@@ -115,10 +116,11 @@ class GraphReader {
         continue;
       }
       const size_t space = line.rest.find(' ');
-      if (space == std::string::npos) fail(line, "a user, or _, and a wrapper");
-      const std::string user = line.rest.substr(0, space);
-      owners_[owner++]->wrappers[user == "_" ? "" : unquoted(line, user)] =
-          func_named(line, line.rest.substr(space + 1));
+      if (space == std::string::npos) fail(line, "a user, an image or _, and a Func");
+      const std::string of = line.rest.substr(0, space);
+      FuncContents& f = *owners_[owner++];
+      auto& kept = line.word == "wrapper" ? f.wrappers : f.copied_inputs;
+      kept[of == "_" ? "" : unquoted(line, of)] = func_named(line, line.rest.substr(space + 1));
     }
     pending_.clear();
   }
@@ -210,7 +212,8 @@ class GraphReader {
     } else if (line.word == "schedule") {
       finish_definition();
       scheduling_ = true;
-    } else if (line.word != "wrapper" && line.word != "custom_derivatives") {
+    } else if (line.word != "wrapper" && line.word != "copied_input" &&
+               line.word != "custom_derivatives") {
       return reads_made(line) || reads_extern(line);
     }
     return true;

@@ -92,6 +92,8 @@ class GraphPrinter {
       print_schedule(f);
       for (const auto& [user, wrapper] : f.wrappers)
         line("wrapper ", user.empty() ? "_" : quote_name(user), " ", quote_name(wrapper->name));
+      for (const auto& [image, copy] : f.copied_inputs)
+        line("copied_input ", quote_name(image), " ", quote_name(copy->name));
       if (f.custom_derivatives) line("custom_derivatives");
     });
   }

@@ -164,6 +164,7 @@ class CppPrinter {
   }
   std::string statement(const Wrap& d) { return made_by(d.name, d.made, d.users); }
   std::string statement(const Clone& d) { return made_by(d.name, d.made, d.users); }
+  std::string statement(const CopyInput& d) { return made_by(d.name, d.made, {d.image}); }
   std::string made_by(const char* method, const std::string& made,
                       const std::vector<NamedFunc>& users) {
     made_[made] = {entry_->func, -1};

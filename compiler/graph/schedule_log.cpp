@@ -112,6 +112,9 @@ class Replay {
     } else if (const auto* clone = std::get_if<Clone>(&directive)) {
       make(clone->made,
            wrapper_of(place.f, funcs(clone->users), without_numbers(clone->made), true));
+    } else if (const auto* copy = std::get_if<CopyInput>(&directive)) {
+      make(copy->made,
+           copied_input(place.f, image_of_program(copy->image), without_numbers(copy->made)));
     } else if (const auto* factor = std::get_if<FactorOut>(&directive)) {
       make(factor->made, factor_out(place, factor->preserved, without_numbers(factor->made)));
     } else {
@@ -182,6 +185,12 @@ class Replay {
   ParameterPtr image(const std::string& name) const {
     const auto* found = meant(names_.parameters, name, [](const auto& p) { return p.first; });
     return found && found->second->is_buffer ? found->second : nullptr;
+  }
+  ParameterPtr image_of_program(const std::string& name) const {
+    if (const ParameterPtr found = image(name)) return found;
+    user_error(asked, "every image that it names is one of the program",
+               text("none is called ", quoted(name)),
+               "Apply it to the program that it was taken from, or cut what is said of that image");
   }
   // What is prefetched need not be of the program.
   NamedFunc func_or_image(const std::string& name) {

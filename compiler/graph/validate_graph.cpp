@@ -58,6 +58,8 @@ class GraphValidator {
     for (int s = 0; s < f.stage_count(); ++s) check(f, f.stage(s), s > 0);
     for (const auto& entry : f.wrappers)
       require(known_.count(entry.second.get()) != 0, f, "a wrapper is a Func of the graph");
+    for (const auto& entry : f.copied_inputs)
+      require(known_.count(entry.second.get()) != 0, f, "a copied input is a Func of the graph");
   }
 
   void check(const FuncContents& f, const Definition& stage, bool is_update) const {

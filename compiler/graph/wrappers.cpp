@@ -41,9 +41,10 @@ const FuncContents* resolve(const FuncContents* f, const FuncContents& user,
 
 // The Func that stands for an image in what `user` reads; null when it reads the image itself, as
 // that Func does and its copies do.
-const FuncContents* reader_of_image(const Call& call, const FuncContents& user) {
+FuncPtr reader_of_image(const Call& call, const FuncContents& user) {
   const auto* image = static_cast<const ParameterContents*>(call.symbol.raw());
-  return !image->func || image->func->name == user.name ? nullptr : image->func.get();
+  if (const FuncPtr* copy = find_or_null(user.copied_inputs, image->name)) return *copy;
+  return !image->func || image->func->name == user.name ? nullptr : image->func;
 }
 
 class Wrapping {
@@ -53,7 +54,10 @@ class Wrapping {
         mapped(outputs, [&](const FuncPtr& output) { return copy_of(output.get()); });
     for (size_t i = 0; i < queue_.size(); i++) redirect(*queue_[i]);
     check_used();
-    for (const FuncContents* f : queue_) copies_[f]->wrappers.clear();
+    for (const FuncContents* f : queue_) {
+      copies_[f]->wrappers.clear();
+      copies_[f]->copied_inputs.clear();
+    }
     for (const FuncContents* f : queue_) redirect_prefetches(*copies_[f], copies_);
     return result;
   }
@@ -99,7 +103,7 @@ class Wrapping {
       const FuncContents* target = nullptr;
       if (call->call_type == CallType::Func)
         target = static_cast<const FuncContents*>(call->symbol.raw());
-      if (call->call_type == CallType::Image) target = reader_of_image(*call, f);
+      if (call->call_type == CallType::Image) target = reader_of_image(*call, f).get();
       if (!target) return mapped;
       const FuncPtr callee = read_by(target, f);
       const bool self = target == &f;
@@ -129,9 +133,9 @@ std::vector<FuncPtr> image_readers(const FuncContents& f) {
   for (int s = 0; s < f.stage_count(); s++) {
     walk_definition(f.stage(s), [&](const Expr& e) {
       const Call* call = e.as<Call>();
-      if (!call || call->call_type != CallType::Image || !reader_of_image(*call, f)) return;
-      const auto& reader = static_cast<const ParameterContents*>(call->symbol.raw())->func;
-      if (std::ranges::find(readers, reader) == readers.end()) readers.push_back(reader);
+      if (!call || call->call_type != CallType::Image) return;
+      const FuncPtr reader = reader_of_image(*call, f);
+      if (reader && std::ranges::find(readers, reader) == readers.end()) readers.push_back(reader);
     });
   }
   return readers;
@@ -147,6 +151,7 @@ FuncPtr clone_of(const FuncPtr& f, const std::string& name) {
   FuncPtr clone = std::make_shared<FuncContents>(*f);
   clone->name = claim_name(name);
   clone->wrappers.clear();
+  clone->copied_inputs.clear();
   clone->log.clear();  // it starts with the schedule so far
   clone->outputs.clear();
   make_outputs(*clone);
@@ -160,7 +165,7 @@ FuncPtr clone_of(const FuncPtr& f, const std::string& name) {
 std::vector<FuncPtr> apply_wrappers(const std::vector<FuncPtr>& outputs) {
   for (const FuncPtr& f : topological_order(outputs)) {
     const auto readers = image_readers(*f);
-    if (!f->wrappers.empty() ||
+    if (!f->wrappers.empty() || !f->copied_inputs.empty() ||
         std::ranges::any_of(readers, [](const FuncPtr& r) { return is_scheduled(*r); })) {
       return Wrapping().apply(outputs);
     }
@@ -181,6 +186,7 @@ std::vector<FuncPtr> functions_of(const std::vector<FuncPtr>& outputs) {
   for (size_t i = 0; i < found.size(); i++) {
     const FuncPtr f = found[i];
     for (const auto& entry : f->wrappers) add(entry.second);
+    for (const auto& entry : f->copied_inputs) add(entry.second);
     for (const FuncPtr& reader : image_readers(*f)) add(reader);
   }
   return found;
@@ -297,14 +303,49 @@ FuncPtr wrapper_of(const FuncPtr& handle, const std::vector<FuncPtr>& users,
   return owning(handle, wrapper);
 }
 
+namespace {
+
+// reader(_0, _1) = image(_0, _1)
+FuncPtr reader_of(const std::shared_ptr<ParameterContents>& image, const std::string& name,
+                  const SymbolRef& symbol) {
+  auto reader = std::make_shared<FuncContents>();
+  reader->name = claim_name(name);
+  const std::vector<Expr> args = variables_of(implicit_names(image->dimensions));
+  define_pure(reader, args, {call_image(image->name, image->type, args, symbol)});
+  reader->frozen = true;
+  return reader;
+}
+
+bool reads_image(const FuncContents& f, const std::string& image) {
+  bool found = false;
+  walk(f,
+       [&](const Call& call) { found |= call.call_type == CallType::Image && call.name == image; });
+  return found;
+}
+
+}  // namespace
+
+FuncPtr copied_input(const FuncPtr& handle, const std::shared_ptr<ParameterContents>& image,
+                     const std::string& name) {
+  const FuncPtr user = handle->shared_from_this();
+  const std::string asked =
+      text("copy the input ", quoted(image->name), " for ", quoted(user->name));
+  if (!user->is_defined() || user->is_extern() || !reads_image(*user, image->name))
+    user_error(asked, "an input is copied for a Func that reads it",
+               text("no definition of ", quoted(user->name), " reads ", quoted(image->name)),
+               "Name an image that it reads");
+  FuncPtr& copy = user->copied_inputs[image->name];
+  if (!copy) {
+    copy = reader_of(image, name, SymbolRef(image));
+    user->frozen = true;  // what it reads stays what it is
+    log_directive({user}, CopyInput{copy->name, image->name});
+  }
+  return owning(handle, copy);
+}
+
 FuncPtr func_of_image(const std::shared_ptr<ParameterContents>& image) {
   if (!image->func) {
-    auto reader = std::make_shared<FuncContents>();
-    reader->name = claim_name(image->name + "_im");
-    const std::vector<Expr> args = variables_of(implicit_names(image->dimensions));
-    define_pure(reader, args, {call_image(image->name, image->type, args, SymbolRef::weak(image))});
-    reader->frozen = true;
-    image->func = reader;
+    image->func = reader_of(image, image->name + "_im", SymbolRef::weak(image));
     image->version++;
   }
   return owning(image, image->func);

@@ -6,6 +6,9 @@
 // compiling starts by copying the graph with all references redirected. Values stay the same, so
 // what evaluates or differentiates definitions need not know of wrappers.
 //
+// Images have no place for that, since programs share them: a user keeps by their names what it reads
+// in their stead (copied_inputs).
+//
 // Ownership: f owns its wrappers, and they refer to f weakly. The handles that users get own both.
 #pragma once
 
@@ -30,6 +33,10 @@ FuncPtr wrapper_of(const FuncPtr& f, const std::vector<FuncPtr>& users, const st
 
 // The same definitions and schedule under another name.
 FuncPtr clone_of(const FuncPtr& f, const std::string& name);
+
+// The Func through which `user` reads the image, made when there is none.
+FuncPtr copied_input(const FuncPtr& user, const std::shared_ptr<ParameterContents>& image,
+                     const std::string& name);
 
 // The Func that reads an image point by point, the same for each call.
 FuncPtr func_of_image(const std::shared_ptr<ParameterContents>& image);

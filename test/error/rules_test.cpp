@@ -191,6 +191,8 @@ TEST_F(Rules, Wrappers) {
   other(x, y) = reader(x, y);
   expect("a Func is wrapped in the Funcs that read it", [&] { f.in(reader); });
   expect("a Func is wrapped in the Funcs that read it", [&] { f.in(f); });
+  expect("an input is copied for a Func that reads it", [&] { f.copy_input(Buffer<int>(4)); });
+  expect("an input has a type and dimensions", [&] { f.copy_input(ImageParam()); });
 }
 
 TEST_F(Rules, RegionsThatDataDecide) {

@@ -172,6 +172,8 @@ f.compute_with(loop(f_clone_in_h, x, 0), y, AlignEnd, x, AlignStart)
 f.async()
 f.unscheduled()
 f.memoize(_)
+f.copy_input(input_in_f, input)
+input_in_f.compute_at(root)
 g.update(0).atomic(true)
 g.update(0).allow_race_conditions()
 )";

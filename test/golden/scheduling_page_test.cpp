@@ -130,6 +130,10 @@ const std::vector<Directive>& place_directives() {
               TWO_FUNCS, (g.compute_root(); g.in(f).compute_at(f, y))),
     DIRECTIVE("clone_in", "A copy of a Func for some of its users.", Loops, TWO_FUNCS,
               (g.clone_in(f).compute_root())),
+    DIRECTIVE("copy_input", "A copy of an image for the Func that reads it.", Loops,
+              (Func f("f"); ImageParam image(Int(32), 2, "image");
+               f(x, y) = max(image(x, y), image(x, y + 2))),
+              (f.copy_input(image).compute_at(f, y))),
     DIRECTIVE("bound", "A promise of what is computed; a call that needs more fails.", Loops,
               ONE_FUNC, (f.bound(x, 0, 64))),
     DIRECTIVE("align_extent", "Computes more, so that the extent is a multiple.", Loops, TWO_FUNCS,

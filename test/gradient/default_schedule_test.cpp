@@ -472,6 +472,20 @@ TEST_F(DefaultSchedule, WhatATileReadsFromManyPlanesIsPacked) {
   EXPECT_NE(log.find("inner.in(inner_in_mixed"), std::string::npos) << log;
 }
 
+// Lanes across the rows of an image read each element from a line of its own: the copy is turned.
+TEST_F(DefaultSchedule, WhatLanesReadAcrossRowsIsCopiedTurned) {
+  for (const auto& [rows, columns] : {std::pair{64, 256}, std::pair{60, 299}}) {
+    const Buffer<float> keys = gradient::random_image({rows, columns}, -1, 1, 1);
+    const Buffer<float> queries = gradient::random_image({rows, columns}, -1, 1, 2);
+    Func product("product");
+    RDom k(0, rows);
+    product(x, y) += keys(k, x) * queries(k, y);
+    const std::string log = log_of(product, {columns, columns});
+    EXPECT_NE(log.find("product.copy_input("), std::string::npos) << log;
+    EXPECT_NE(log.find("reorder_storage"), std::string::npos) << log;
+  }
+}
+
 // Few tiles use what one has read: its rows are in the cache yet.
 TEST_F(DefaultSchedule, WhatFewTilesUseIsNotPacked) {
   EXPECT_EQ(log_of_mixing(128, 8).find("inner_in_mixed"), std::string::npos);

@@ -103,6 +103,7 @@ TEST(GraphText, WhatTheFrontEndWritesIsItsText) {
   g.compute_root().update().rfactor(r.y, u).compute_root().vectorize(x, 8);
   f.in(h).compute_at(h, y).memoize();
   input.in(f).compute_root();
+  f.copy_input(weights).compute_at(f, y);
   pair.clone_in(h).compute_root().async();
   h.tile(x, y, xi, yi, 8, 4).vectorize(xi).parallel(y).prefetch(input, y, y, 2);
   h.specialize(gain > 2.0f).never_partition(x).unroll(yi);

@@ -217,6 +217,64 @@ TEST_F(Wrappers, AWrapperInAnotherPipelineIsLeftAlone) {
   expect_right();
 }
 
+// Two readers of an image, of which one reads a copy that is laid out in columns.
+struct CopiedInput : testing::Test {
+  ImageParam image{Int(32), 2, "image"};
+  Buffer<int> table{8};
+  Func turned{"turned"}, plain{"plain"};
+  Var x{"x"}, y{"y"};
+  CopiedInput() {
+    for (int i = 0; i < 8; ++i) table(i) = 100 * i;
+    turned(x, y) = image(y, x) + table(x % 8);
+    plain(x, y) = image(x, y) + turned(x, y);
+  }
+  void expect_right() {
+    Buffer<int> data(9, 9);
+    data.for_each_element([&](int i, int j) { data(i, j) = i * i + 31 * j; });
+    image.set(data);
+    const Buffer<int> result = plain.realize({9, 9});
+    result.for_each_element(
+        [&](int i, int j) { ASSERT_EQ(result(i, j), data(i, j) + data(j, i) + table(i % 8)); });
+  }
+};
+
+TEST_F(CopiedInput, IsReadByItsReaderAlone) {
+  Func copy = turned.copy_input(image);
+  turned.compute_root();
+  copy.compute_at(turned, y).reorder_storage({copy.args()[1], copy.args()[0]});
+  EXPECT_EQ(read_by(plain, turned.name()), Names{copy.name()});
+  EXPECT_EQ(read_by(plain, plain.name()), Names{turned.name()});
+  EXPECT_TRUE(read_by(plain, copy.name()).empty());
+  EXPECT_TRUE(turned.copy_input(image).same_as(copy));
+  expect_right();
+}
+
+TEST_F(CopiedInput, OfABufferThatTheProgramNames) {
+  Func copy = turned.copy_input(table);
+  copy.compute_root();
+  turned.compute_root();
+  EXPECT_EQ(read_by(plain, turned.name()), Names{copy.name()});
+  expect_right();
+}
+
+// Who reads the image through its own Func does so in the copy, too.
+TEST_F(CopiedInput, ReadsTheFuncOfTheImage) {
+  Func all = image.in();
+  all.compute_root();
+  Func copy = turned.copy_input(image);
+  copy.compute_root();
+  turned.compute_root();
+  EXPECT_EQ(read_by(plain, turned.name()), Names{copy.name()});
+  EXPECT_EQ(read_by(plain, copy.name()).size(), 1u);
+  expect_right();
+}
+
+TEST_F(CopiedInput, RefusesWhatIsNotRead) {
+  expect_error({"copied for a Func that reads it", "turned"},
+               [&] { turned.copy_input(Buffer<int>(3)); });
+  expect_error({"copied for a Func that reads it"}, [&] { Func("undefined").copy_input(image); });
+}
+
 TEST_F(Wrappers, RefusesSharingInPart) {
   f.in({g, h});
   expect_error({"share", "\"" /* names */, "together"}, [&] { f.in(g); });

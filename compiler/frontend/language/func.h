@@ -162,6 +162,15 @@ class Func : public LoopDirectives<Func>, public Runnable<Func> {
   //   h(x) = g(x)                       f(x) = g_clone_in_f(x);  h(x) = g(x)
   Func clone_in(const Func& f);
   Func clone_in(const std::vector<Func>& fs);
+  // What this Func reads of an image, an ImageParam or a Buffer that the program names, in a Func of
+  // its own: a copy that can be laid out and computed like any other Func. For this reader alone;
+  // others, and other programs that read the image, do not see it. A Buffer has no in(f).
+  //   f(x) = image(3 * x)         =>    image_in_f(x) = image(x)
+  //                                     f(x) = image_in_f(3 * x)
+  // Asked for again it is the same Func.
+  // Requires: an input is copied for a Func that reads it; an input has a type and dimensions.
+  Func copy_input(const ImageParam& image);
+  Func copy_input(const Buffer<>& image);
   // Requires: storage lies in the memory of the CPU (Unsupported).
   Func copy_to_device(DeviceAPI device = DeviceAPI::Default_GPU);
   Func copy_to_host();
@@ -330,6 +339,7 @@ class Func : public LoopDirectives<Func>, public Runnable<Func> {
   void check_defined(const std::string& asked) const;
   const graph::Definition& checked_update(int index, const char* asked) const;
   Func wrap(const std::vector<Func>& users, const std::string& name, bool clone) const;
+  Func copied(const std::shared_ptr<graph::ParameterContents>& image) const;
   Pipeline& pipeline_to(const char* asked);
 };
 

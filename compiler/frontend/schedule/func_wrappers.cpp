@@ -13,6 +13,15 @@ Func Func::in(const Func& f) { return wrap({f}, name() + "_in_" + f.name(), fals
 Func Func::in() { return wrap({}, name() + "_global_wrapper", false); }
 Func Func::clone_in(const Func& f) { return wrap({f}, name() + "_clone_in_" + f.name(), true); }
 
+Func Func::copy_input(const ImageParam& image) { return copied(image.parameter()); }
+Func Func::copy_input(const Buffer<>& image) { return copied(image.parameter()); }
+Func Func::copied(const std::shared_ptr<graph::ParameterContents>& image) const {
+  if (!image)
+    user_error("copy an input for " + quoted(name()), "an input has a type and dimensions",
+               "this one was not constructed so", "Construct it: ImageParam in(Float(32), 2)");
+  return Func(graph::copied_input(func_, image, image->name + "_in_" + name()));
+}
+
 Func Func::in(const std::vector<Func>& fs) {
   if (fs.empty()) {
     user_error("wrap " + quoted(name()), "at least one user is named", "the list is empty",
