@@ -76,7 +76,47 @@ Interval BoundsEngine::ramp_bounds(const Ramp& ramp) {
 Interval BoundsEngine::sum_bounds(const Sum& form) {
   if (!form.valid) return Interval::everything();
   const std::optional<Interval> known = bounds_by_facts(form);
-  return known ? *known : sum_of_bounds(form);
+  if (known) return *known;
+  const std::optional<Interval> apart = bounds_by_sides(form);
+  return apart ? *apart : sum_of_bounds(form);
+}
+
+// Whether something that varies is in both, and less of it in their sum; in sides of sides, too.
+bool BoundsEngine::shares_varying(const Sum& rest, const Sum& side, int64_t factor) {
+  return std::ranges::any_of(side.terms, [&](const Term& part) {
+    const Expr& atom = part.atom;
+    if (!varies(atom)) return false;
+    const int64_t sign = (part.factor > 0) == (factor > 0) ? 1 : -1;
+    if (atom.kind() == Kind::Min || atom.kind() == Kind::Max) {
+      const auto& op = *atom.as<Binary>();
+      return shares_varying(rest, linear_form(op.a), sign) ||
+             shares_varying(rest, linear_form(op.b), sign);
+    }
+    return std::ranges::any_of(rest.terms, [&](const Term& t) {
+      return t.atom.same_as(atom) && (t.factor > 0) != (sign > 0);
+    });
+  });
+}
+
+// 16*x + 8*min(d - 2*x, 1)  is  min(8*d, 16*x + 8): ends of x and of the minimum apart would add up
+// to more. The same of max. Each step takes one of them away; a few steps, since each doubles the work.
+std::optional<Interval> BoundsEngine::bounds_by_sides(const Sum& form) {
+  for (const Term& term : form.terms) {
+    const Expr& atom = term.atom;
+    if (atom.kind() != Kind::Min && atom.kind() != Kind::Max) continue;
+    const auto& op = *atom.as<Binary>();
+    const Sum rest = plus(form, linear_form(atom), -term.factor);
+    const Sum a = linear_form(op.a), b = linear_form(op.b);
+    if (!rest.valid || !a.valid || !b.valid || sides_taken_ >= most_sides) continue;
+    if (!shares_varying(rest, a, term.factor) && !shares_varying(rest, b, term.factor)) continue;
+    ++sides_taken_;
+    const Interval x = sum_bounds(with_remainders(plus(rest, a, term.factor)));
+    const Interval y = sum_bounds(with_remainders(plus(rest, b, term.factor)));
+    --sides_taken_;
+    const bool is_least = (atom.kind() == Kind::Min) == (term.factor > 0);
+    return is_least ? interval_min(x, y) : interval_max(x, y);
+  }
+  return std::nullopt;
 }
 
 // Where x + y <= 29 is known, x + y + z lies below 29 + z. The ends of x and y apart, 29 - y and

@@ -52,6 +52,8 @@ class BoundsEngine {
   Interval sum_bounds(const Sum& form);
   Interval sum_of_bounds(const Sum& form);
   std::optional<Interval> bounds_by_facts(const Sum& form);
+  std::optional<Interval> bounds_by_sides(const Sum& form);
+  bool shares_varying(const Sum& rest, const Sum& side, int64_t factor);
   Sum with_remainders(Sum form);
   Interval bounds_of_atom(const Expr& atom);
   Interval atom_bounds(const Expr& e);
@@ -79,6 +81,8 @@ class BoundsEngine {
   Scope<Interval> scope_;
   BoundsEngine* outer_ = nullptr;  // without the condition
   std::vector<Sum> facts_;         // of the condition
+  static constexpr int most_sides = 3;
+  int sides_taken_ = 0;  // of minima and maxima, by who calls
   NodeMemo<Interval> memo_;
   NodeMemo<Interval> atoms_;  // the same for what is no sum
   NodeMemo<bool> varies_;

@@ -135,10 +135,12 @@ class Candidate {
     return loads;
   }
 
-  // Along the dimensions beyond the first that move the piece, or along the others: so many use one.
+  // Along the dimensions that move the piece, whose loops are the tasks, of the first only where there
+  // is no other; or along the others: so many use one.
   double tiles(bool that_move) const {
+    const bool is_alone = std::count(depends_on_.begin(), depends_on_.end(), true) == 1;
     double tiles = 1;
-    for (size_t d = 1; d < f_.args.size(); ++d) {
+    for (size_t d = that_move && is_alone ? 0 : 1; d < f_.args.size(); ++d) {
       const auto size = static_cast<double>(size_in(tile_, d, lanes_));
       const double unknown =
           that_move ? static_cast<double>(sizes_.machine().enough_tasks) * size : 1;

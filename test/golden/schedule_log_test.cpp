@@ -271,6 +271,9 @@ TEST(ScheduleLogs, HoldWhatWasGiven) {
 }
 
 TEST(ScheduleLogs, SayWhatIsWrong) {
+  expect_error({"every image that it names is one of the program", "\"other\""}, [] {
+    Pipeline(Program().out).apply_schedule(ScheduleLog::parse("f.copy_input(copy, other)\n"));
+  });
   expect_error({"line 2", "every line is a directive of a Func", "f.swap(x)"},
                [] { ScheduleLog::parse("f.compute_at(root)\nf.swap(x)"); });
   const auto refused = [](const std::string& log) {

@@ -53,6 +53,14 @@ TEST_F(IntervalTest, CorrelatedTermsCancel) {
   EXPECT_EQ(bounds((x + i) * 2 - x * 2), "[0, 14]");
 }
 
+// The last vector of the last tile begins within what the tiles cover.
+TEST_F(IntervalTest, SidesOfAMinimumCancelWithWhatStandsBesideIt) {
+  EXPECT_EQ(bounds(i * 16 + min(40 - i * 16, 8)), "[8, 40]");
+  EXPECT_EQ(bounds(i * 16 + max(min(5 - i * 2, 1), 0) * 8), "[8, 112]");
+  EXPECT_EQ(bounds(i - max(i - 3, 0)), "[0, 3]");
+  EXPECT_EQ(bounds(i + max(i, 3)), "[3, 14]");  // they do not cancel
+}
+
 TEST_F(IntervalTest, DivisionTakesOutMultiples) {
   EXPECT_EQ(bounds((n * 8 + i) / 8), interval(n, n));
   EXPECT_EQ(bounds((n * 8 + i) % 8), "[0, 7]");

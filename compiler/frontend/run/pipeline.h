@@ -81,7 +81,8 @@ class Pipeline : public Runnable<Pipeline> {
   // ---- schedules as values; see schedule_log.h ----
   ScheduleLog schedule_log() const;  // what was given to its Funcs, in the order given
   // Gives all of a log to the Funcs of the same names.
-  // Requires: every Func that it names is one of the program; what a directive is given to is
+  // Requires: every Func that it names is one of the program; every image that it names is one of
+  // the program; what a directive is given to is
   // there.
   void apply_schedule(const ScheduleLog& log);
 
