@@ -28,6 +28,11 @@ constexpr double window_bytes = 384 << 10;  // of a group: half of a cache near 
 constexpr int64_t unknown_extent = 1024;    // of rows and columns of an image
 constexpr int64_t enough_strips = 16;       // each is a task
 constexpr size_t most_members = 8;
+// What several of a group read, as a sum reads all steps of a chain. If it did not join, no Func behind
+// it would either, and the images of all would be held until the group has run: so it may have more
+// company, and rows that wait for the last reader in a cache farther away.
+constexpr size_t most_with_shared = 24;
+constexpr double shared_window_bytes = 4 << 20;
 constexpr double least_rows = 8, rows_a_halo = 8;
 constexpr int64_t least_bytes = 1 << 20;  // less stays in the caches on its way
 
@@ -35,10 +40,13 @@ constexpr int64_t least_bytes = 1 << 20;  // less stays in the caches on its way
 struct Along {
   std::optional<size_t> loop;  // a dimension of the last; none: the same for all of its iterations
   double scale = 0, low = 0, high = 0;
+  double kept = 0;  // the lowest that a reader takes in an iteration that computes the highest
   std::set<size_t> unknown;  // dimensions of the last that move it as data say
 
   bool is_same_element() const { return loop && scale == 1 && low == high; }
   double size() const { return high - low + 1; }
+  // In storage that wraps around after a power of two.
+  double rows_kept() const { return std::exp2(std::ceil(std::log2(high - kept + 1))); }
 };
 using Windows = std::vector<Along>;  // of the dimensions of a Func
 
@@ -109,7 +117,7 @@ struct StripLoops {
 class Group {
  public:
   Group(FuncPtr last, const SizeEstimate& sizes) : last_(std::move(last)), sizes_(sizes) {
-    for (size_t d = 0; d < last_->args.size(); ++d) own_.push_back({d, 1, 0, 0, {}});
+    for (size_t d = 0; d < last_->args.size(); ++d) own_.push_back({d, 1, 0, 0, 0, {}});
   }
 
   const FuncPtr& last() const { return last_; }
@@ -119,10 +127,11 @@ class Group {
   // Whether it has joined: all of its reads are by Funcs of this group.
   bool join(const FuncPtr& f, const std::vector<StripReads>& reads) {
     const auto windows = windows_of(*f, reads);
-    if (!windows || members_.size() == most_members) return false;
+    const bool is_shared = reads.size() > 1;
+    if (!windows || members_.size() >= (is_shared ? most_with_shared : most_members)) return false;
     windows_[f.get()] = *windows;
     members_.push_back(f);
-    const auto loops = loops_of_all();
+    const auto loops = loops_of_all(is_shared ? shared_window_bytes : window_bytes);
     if (loops && pays(*f, *windows, *loops)) {
       loops_ = loops;
       return true;
@@ -163,14 +172,18 @@ class Group {
                                        const Windows& outer) {
     const auto window = read_window(index, reader, *reader.pure);
     if (!window) return moved_by_data(index, reader, outer);
-    Along along{std::nullopt, 0, window->low, window->high, {}};
+    Along along{std::nullopt, 0, window->low, window->high, window->low, {}};
     if (window->loop.empty()) return along;
     const auto d = std::find(reader.args.begin(), reader.args.end(), window->loop);
     const Along& by = outer[static_cast<size_t>(d - reader.args.begin())];
     const double scale = window->scale;
     if (scale <= 0) return std::nullopt;
-    return Along{by.loop, by.scale * scale, by.low * scale + window->low,
-                 by.high * scale + window->high, by.unknown};
+    return Along{by.loop,
+                 by.scale * scale,
+                 by.low * scale + window->low,
+                 by.high * scale + window->high,
+                 by.high * scale + window->low,
+                 by.unknown};
   }
   static Along moved_by_data(const Expr& index, const FuncContents& reader, const Windows& outer) {
     Along along;
@@ -187,6 +200,7 @@ class Group {
       all[d].unknown.insert(by[d].unknown.begin(), by[d].unknown.end());
       all[d].low = std::min(all[d].low, by[d].low);
       all[d].high = std::max(all[d].high, by[d].high);
+      all[d].kept = std::min(all[d].kept, by[d].kept);
     }
     return true;
   }
@@ -218,7 +232,7 @@ class Group {
 
   // Rows are cut along the outermost dimension in which windows overlap, or, without one, which moves
   // all; what each iteration has for itself stays outside.
-  std::optional<StripLoops> loops_of_all() const {
+  std::optional<StripLoops> loops_of_all(double most_bytes) const {
     StripLoops loops;
     const auto anything = [](const Along&) { return true; };
     const auto same = [](const Along& along) { return along.is_same_element(); };
@@ -236,7 +250,7 @@ class Group {
       tasks *= sizes_.extent(*last_, d).value_or(1);
     }
     loops.rows = rows_of(loops.row, tasks);
-    const bool fits = bytes_of_windows(loops) <= window_bytes && are_rows(loops);
+    const bool fits = bytes_of_windows(loops) <= most_bytes && are_rows(loops);
     return fits ? std::optional(loops) : std::nullopt;
   }
 
@@ -273,7 +287,7 @@ class Group {
         const bool is_cut = windows[d].loop && is_cut_by(*windows[d].loop, loops);
         bytes *=
             is_cut
-                ? std::ceil(windows[d].size())
+                ? windows[d].rows_kept()
                 : static_cast<double>(sizes_.extent(*f, d).value_or(
                       windows[d].loop ? unknown_extent : static_cast<int64_t>(windows[d].size())));
       }

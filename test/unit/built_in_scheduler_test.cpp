@@ -363,26 +363,34 @@ TEST(StripsOfRows, AreThoseOfAChainAsLongAsItsWindowsFit) {
   EXPECT_LE(at_root, 8);
 }
 
-// A chain whose edges go on outside, from an image to how far its end is from it.
-struct ClampedChain {
-  explicit ClampedChain(int steps) {
+// Steps from an image to how far the last of them is from zero, and the gradient by the image.
+struct Steps {
+  using Step =
+      std::function<Expr(const Func& state, const Func& image, const Var& x, const Var& y)>;
+  Steps(int count, const Step& step) {
     for (int py = 0; py < height; py++) {
       for (int px = 0; px < width; px++)
-        picture(px, py) = static_cast<float>((px * 7 + py * 13) % 11);
+        picture(px, py) = static_cast<float>((px * 7 + py * 13) % 11) / 8;
     }
-    Func state("state");
-    state(x, y) = picture(x, y);
-    for (int step = 0; step < steps; step++) {
-      const Func f = BoundaryConditions::repeat_edge(state, {{0, width}, {0, height}});
-      Func next("next");
-      next(x, y) = 0.25f * (f(x - 1, y) + f(x + 1, y) + f(x, y - 1) + f(x, y + 1));
-      state = next;
+    Func image("image");
+    image(x, y) = BoundaryConditions::repeat_edge(picture)(x, y);
+    std::vector<Func> states{image};
+    for (int s = 0; s < count; s++) {
+      states.emplace_back("state");
+      states.back()(x, y) = step(states[static_cast<size_t>(s)], image, x, y);
     }
     RDom r(0, width, 0, height);
     loss() = 0.0f;
-    loss() += state(r.x, r.y) * state(r.x, r.y) * 0.5f;
+    loss() += states.back()(r.x, r.y) * states.back()(r.x, r.y) * 0.5f;
     gradient = propagate_adjoints(loss)(picture);
     gradient.set_estimates({{0, width}, {0, height}});
+  }
+  std::vector<graph::FuncPtr> funcs() const {
+    return graph::topological_order({gradient.function()});
+  }
+  Buffer<float> found() { return gradient.realize({width, height}); }
+  static Func edge(const Func& f) {
+    return BoundaryConditions::repeat_edge(f, {{0, width}, {0, height}});
   }
   static constexpr int width = 520, height = 531;
   Var x{"x"}, y{"y"};
@@ -390,23 +398,40 @@ struct ClampedChain {
   Func loss{"loss"}, gradient;
 };
 
-TEST(StripsOfRows, AreThoseOfAChainsAdjoints) {
-  ClampedChain scheduled(7), plain(7);
+void expect_adjoints_in_strips(int steps, int least, const Steps::Step& step) {
+  Steps scheduled(steps, step), plain(steps, step);
   Pipeline(scheduled.gradient).auto_schedule(get_host_target());
   int in_strips = 0;
-  for (const graph::FuncPtr& f : graph::topological_order({scheduled.gradient.function()})) {
-    in_strips += f->made && f->schedule.compute_level.kind == graph::LoopLevel::Kind::At;
+  for (const graph::FuncPtr& f : scheduled.funcs())
+    in_strips += f->made && f->schedule.store_level.kind == graph::LoopLevel::Kind::At;
+  EXPECT_GE(in_strips, least);
+  for (const graph::FuncPtr& f : plain.funcs()) Func(f).compute_root();
+  const Buffer<float> found = scheduled.found(), expected = plain.found();
+  for (int py = 0; py < Steps::height; py++) {
+    for (int px = 0; px < Steps::width; px++)
+      ASSERT_NEAR(found(px, py), expected(px, py), 1e-5f) << px << ", " << py;
   }
-  EXPECT_GE(in_strips, 5);
-  const std::vector<int> sizes{ClampedChain::width, ClampedChain::height};
-  const Buffer<float> found = scheduled.gradient.realize(sizes);
-  for (const graph::FuncPtr& f : graph::topological_order({plain.gradient.function()}))
-    Func(f).compute_root();
-  const Buffer<float> expected = plain.gradient.realize(sizes);
-  found.for_each_element([&](int px, int py) {
-    EXPECT_NEAR(found(px, py), expected(px, py), 1e-6f * std::abs(expected(px, py)))
-        << px << ", " << py;
+}
+
+TEST(StripsOfRows, AreThoseOfTheAdjointsOfAChain) {
+  expect_adjoints_in_strips(7, 6, [](const Func& state, const Func&, const Var& x, const Var& y) {
+    const Func f = Steps::edge(state);
+    return 0.25f * (f(x - 1, y) + f(x + 1, y) + f(x, y - 1) + f(x, y + 1));
   });
+  expect_adjoints_in_strips(6, 5, [](const Func& f, const Func&, const Var& x, const Var& y) {
+    const Expr sum = 0.2f * (f(x - 1, y) + 2 * f(x, y) + f(x + 1, y) + f(x, y + 1));
+    return sum / (1.0f + sum * sum);
+  });
+}
+
+// The gradient by the image reads the adjoints of all steps: one that is not in its strips, nor any
+// before it, would be held as a whole image.
+TEST(StripsOfRows, AreThoseOfAllStepsThatASumReads) {
+  expect_adjoints_in_strips(
+      14, 13, [](const Func& state, const Func& image, const Var& x, const Var& y) {
+        const Func f = Steps::edge(state);
+        return 0.25f * (f(x - 1, y) + f(x + 1, y) + f(x, y - 1) + f(x, y + 1) - image(x, y));
+      });
 }
 
 // Sums down the columns of an image and back up, turned.
