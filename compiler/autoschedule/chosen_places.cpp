@@ -100,6 +100,16 @@ ChosenPlaces chosen_places(const std::vector<FuncPtr>& outputs, const PlacementL
   return chosen;
 }
 
+std::unordered_set<const Symbol*> with_names(const std::vector<FuncPtr>& outputs,
+                                             const std::set<std::string>& names) {
+  std::unordered_set<const Symbol*> result;
+  if (names.empty()) return result;
+  for (const FuncPtr& f : topological_order(outputs)) {
+    if (names.contains(f->name)) result.insert(f.get());
+  }
+  return result;
+}
+
 void check_inlined_bodies(const ChosenPlaces& chosen, const std::vector<FuncPtr>& large) {
   for (const FuncPtr& f : large) {
     if (!chosen.inlined.contains(f.get())) continue;

@@ -1,6 +1,8 @@
 // chosen_places.h -- which Funcs a user wants to be stored or inlined, by name.
 #pragma once
 
+#include <set>
+#include <string>
 #include <unordered_set>
 #include <vector>
 
@@ -12,6 +14,7 @@ namespace retrograde::autoschedule {
 
 struct ChosenPlaces {
   std::unordered_set<const Symbol*> store, inlined;
+  std::unordered_set<const Symbol*> recomputed;  // inlined where that can be: see memory_budget.h
 };
 
 bool has_chosen_places(const AutoscheduleOptions& options);
@@ -19,6 +22,9 @@ bool has_chosen_places(const AutoscheduleOptions& options);
 // a directive keep theirs, whatever the options say.
 ChosenPlaces chosen_places(const std::vector<FuncPtr>& outputs, const PlacementLimits& limits,
                            const AutoscheduleOptions& options);
+// Those with these names: computed where they are read, unless their bodies get too large.
+std::unordered_set<const Symbol*> with_names(const std::vector<FuncPtr>& outputs,
+                                             const std::set<std::string>& names);
 // The same for what inlining would copy without end.
 void check_inlined_bodies(const ChosenPlaces& chosen, const std::vector<FuncPtr>& large);
 

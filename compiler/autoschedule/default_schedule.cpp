@@ -13,6 +13,7 @@
 #include "autoschedule/join_sweeps.h"
 #include "autoschedule/look_ups.h"
 #include "autoschedule/loop_order.h"
+#include "autoschedule/memory_budget.h"
 #include "autoschedule/new_loop.h"
 #include "autoschedule/only_reader.h"
 #include "autoschedule/packed_operand.h"
@@ -374,13 +375,14 @@ void move_and_join(const std::vector<FuncPtr>& outputs, const std::vector<FuncPt
 
 }  // namespace
 
-void give_default_schedule(const std::vector<FuncPtr>& outputs, const ScheduleRequest& request,
-                           Scheduling what) {
+SizeEstimate give_default_schedule(const std::vector<FuncPtr>& outputs,
+                                   const ScheduleRequest& request, Scheduling what) {
   const std::vector<FuncPtr> order = topological_order(outputs);
   PlacementLimits limits;
   if (what == Scheduling::Everything || has_chosen_places(request.options))
     limits = placement_limits(order);
-  const ChosenPlaces chosen = chosen_places(outputs, limits, request.options);
+  ChosenPlaces chosen = chosen_places(outputs, limits, request.options);
+  chosen.recomputed = with_names(outputs, request.recomputed);
   if (what != Scheduling::Everything) limits = PlacementLimits();
   std::unordered_set<const Symbol*> whole = limits.stay;
   whole.insert(limits.levels.begin(), limits.levels.end());
@@ -388,7 +390,7 @@ void give_default_schedule(const std::vector<FuncPtr>& outputs, const ScheduleRe
   const std::vector<FuncPtr> stored = what == Scheduling::Everything
                                           ? stored_in_all(outputs, limits, chosen)
                                           : stored_by_default(outputs, chosen);
-  const SizeEstimate sizes(outputs, limits_of(request));
+  SizeEstimate sizes(outputs, limits_of(request));
   const auto makes = [&](Decision d) { return !request.options.without.contains(d); };
   TaskSizes tasks(order);
   if (makes(Decision::CutReductions)) cut_reductions(outputs, sizes, whole);
@@ -411,6 +413,7 @@ void give_default_schedule(const std::vector<FuncPtr>& outputs, const ScheduleRe
     const bool is_inlined = f->schedule.compute_level.kind == graph::LoopLevel::Kind::Inlined;
     if (is_inlined && !is_touched(*f) && f->is_pure() && !is_output) Func(f).compute_inline();
   }
+  return sizes;
 }
 
 std::vector<FuncPtr> schedule_unscheduled(const std::vector<FuncPtr>& outputs,
@@ -421,8 +424,7 @@ std::vector<FuncPtr> schedule_unscheduled(const std::vector<FuncPtr>& outputs,
   run_on_large_stack([&] {
     result = apply_wrappers(outputs);
     if (is_differentiated(result)) {
-      result = copy_graph(result).outputs;
-      give_default_schedule(result, request, Scheduling::Gradients);
+      result = schedule_within_budget(result, request, Scheduling::Gradients).outputs;
     } else if (!stored_by_default(result).empty()) {
       result = copy_graph(result).outputs;
       compute_at_root(stored_by_default(result), request);

@@ -10,6 +10,8 @@
 // reduction_slices.h).
 #pragma once
 
+#include <set>
+#include <string>
 #include <vector>
 
 #include "autoschedule/register_tile.h"
@@ -27,11 +29,13 @@ struct ScheduleRequest {
   VectorUnit unit = {};
   AutoscheduleOptions options = {};
   MachineParams machine = {};
+  std::set<std::string> recomputed = {};  // of what is stored else: see memory_budget.h
 };
 
-// Gives the directives to the Funcs of this graph, whose wrappers have been applied.
-void give_default_schedule(const std::vector<FuncPtr>& outputs, const ScheduleRequest& request,
-                           Scheduling what);
+// Gives the directives to the Funcs of this graph, whose wrappers have been applied. The result: how
+// large these Funcs are; of those that the schedule makes, which are small, nothing is known.
+SizeEstimate give_default_schedule(const std::vector<FuncPtr>& outputs,
+                                   const ScheduleRequest& request, Scheduling what);
 
 // The pass: the outputs with their wrappers applied, or, where there are adjoints, those of a copy
 // of the graph that has its schedule. What lowering is given.

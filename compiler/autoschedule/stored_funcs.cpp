@@ -20,14 +20,9 @@ namespace {
 constexpr double explosion = 500;
 constexpr int64_t unknown_iterations = 8;
 
-struct Use {
-  double reads = 0;
-  double operations = 0;  // of one value, with what is inlined into it
-};
-
 // Beyond the first, each read computes the value again: more than a few operations, and all
 // together more than it takes to bring the value to memory and back.
-bool is_worth_storing(const Use& use, double free_operations) {
+bool is_worth_storing(const StorageUse& use, double free_operations) {
   return use.reads > 1.5 && use.operations > free_operations &&
          (use.reads - 1) * use.operations > way_to_memory;
 }
@@ -52,6 +47,8 @@ class StorageChooser {
                  const ChosenPlaces& chosen)
       : outputs_(outputs), order_(topological_order(outputs)), limits_(limits), chosen_(chosen) {}
 
+  const std::unordered_map<const Symbol*, StorageUse>& uses() const { return uses_; }
+
   std::vector<FuncPtr> choose() {
     for (const FuncPtr& f : order_) count_reads(*f);
     const bool by_hand =
@@ -72,7 +69,7 @@ class StorageChooser {
         stored &= !limits_->stay.contains(f.get()) || is_output(f);  // which is at root anyway
       }
       stored |= chosen_.store.contains(f.get());
-      stored &= !chosen_.inlined.contains(f.get());
+      stored &= !chosen_.inlined.contains(f.get()) && !chosen_.recomputed.contains(f.get());
       if (!stored || is_block_of_one(f)) continue;
       stored_.insert(f.get());
       result.push_back(f);
@@ -131,7 +128,7 @@ class StorageChooser {
   const std::vector<FuncPtr> order_;
   const PlacementLimits* const limits_;
   const ChosenPlaces& chosen_;
-  std::unordered_map<const Symbol*, Use> uses_;
+  std::unordered_map<const Symbol*, StorageUse> uses_;
   std::unordered_map<const Symbol*, std::unordered_set<const FuncContents*>> readers_;
   std::unordered_set<const FuncContents*> stored_;
 };
@@ -156,6 +153,13 @@ std::vector<FuncPtr> stored_by_default(const std::vector<FuncPtr>& outputs,
   std::vector<FuncPtr> pays;
   if (is_differentiated(outputs)) pays = StorageChooser(outputs, nullptr, chosen).choose();
   return with_large_bodies(outputs, std::move(pays), chosen);
+}
+
+std::unordered_map<const Symbol*, StorageUse> uses_of_stored(const std::vector<FuncPtr>& outputs,
+                                                             const ChosenPlaces& chosen) {
+  StorageChooser chooser(outputs, nullptr, chosen);
+  chooser.choose();
+  return chooser.uses();
 }
 
 std::vector<FuncPtr> stored_in_all(const std::vector<FuncPtr>& outputs,

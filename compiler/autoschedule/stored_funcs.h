@@ -10,6 +10,7 @@
 // would run for each element.
 #pragma once
 
+#include <unordered_map>
 #include <vector>
 
 #include "autoschedule/chosen_places.h"
@@ -24,6 +25,14 @@ bool is_differentiated(const std::vector<FuncPtr>& outputs);  // whether an adjo
 // (large_bodies.h).
 std::vector<FuncPtr> stored_by_default(const std::vector<FuncPtr>& outputs,
                                        const ChosenPlaces& chosen = {});
+// How often an element of a Func is read, and what it takes to compute it, with what is inlined into
+// it.
+struct StorageUse {
+  double reads = 0;
+  double operations = 0;
+};
+std::unordered_map<const Symbol*, StorageUse> uses_of_stored(const std::vector<FuncPtr>& outputs,
+                                                             const ChosenPlaces& chosen);
 // Where all of the pipeline is to be scheduled: what a user left alone is not meant to be inlined.
 std::vector<FuncPtr> stored_in_all(const std::vector<FuncPtr>& outputs,
                                    const PlacementLimits& limits, const ChosenPlaces& chosen = {});

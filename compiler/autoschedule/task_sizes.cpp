@@ -9,8 +9,6 @@ namespace retrograde::autoschedule {
 
 namespace {
 
-constexpr int64_t tasks_a_thread = 4;
-
 // All but the first of them, from the outermost on.
 void keep_parallel(const FuncPtr& f, int stage, int kept) {
   const std::vector<Dim> loops = f->stage(stage).schedule.dims;

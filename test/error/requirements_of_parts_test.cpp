@@ -44,7 +44,7 @@ TEST_F(RequirementsOfParts, Handles) {
          [&] { AutoscheduleOptions::from_string("speed=high"); });
   expect("the decisions of the autoscheduler have names",
          [&] { AutoscheduleOptions::from_string("without=stripes"); });
-  expect("threads are a whole number, 0 or more",
+  expect("threads and bytes are whole numbers, 0 or more",
          [&] { AutoscheduleOptions::from_string("threads=-1"); });
   expect("it stands for a Param or an ImageParam", [&] { Parameter().name(); });
   Param<int> gain("gain");

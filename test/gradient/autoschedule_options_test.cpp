@@ -340,8 +340,9 @@ TEST_F(Places, OptionsAreText) {
   options.store = {heavy, "a$1"};
   options.inlined = {"cheap"};
   options.threads = 3;
-  EXPECT_EQ(options.to_string(),
-            "without=slices+strips,store=" + heavy.name() + "+a$1,inline=cheap,threads=3");
+  options.memory_budget = 5000000000;
+  EXPECT_EQ(options.to_string(), "without=slices+strips,store=" + heavy.name() +
+                                     "+a$1,inline=cheap,threads=3,memory=5000000000");
   EXPECT_EQ(AutoscheduleOptions::from_string(options.to_string()), options);
   EXPECT_EQ(AutoscheduleOptions::from_string(""), AutoscheduleOptions());
 }

@@ -56,11 +56,14 @@ class OptionsReader {
     } else if (key == "inline") {
       for (const std::string& name : split_at(value, '+')) options.inlined.emplace_back(name);
     } else if (key == "threads") {
-      options.threads = number(value);
+      options.threads = number<int>(value);
+    } else if (key == "memory") {
+      options.memory_budget = number<int64_t>(value);
     } else {
       user_error(
           asked_, "options of the autoscheduler are parts of a name and a value",
-          quoted(part) + " is none: names are \"without\", \"store\", \"inline\" and \"threads\"",
+          quoted(part) +
+              " is none: names are \"without\", \"store\", \"inline\", \"threads\" and \"memory\"",
           "Write for example without=strips+slices,threads=4");
     }
   }
@@ -75,13 +78,14 @@ class OptionsReader {
     return all_decisions()[static_cast<size_t>(found - names.begin())];
   }
 
-  int number(const std::string& value) const {
-    int result = -1;
+  template <typename T>
+  T number(const std::string& value) const {
+    T result = -1;
     const char* end = value.data() + value.size();
     const auto [stop, error] = std::from_chars(value.data(), end, result);
     if (error != std::errc() || stop != end || result < 0) {
-      user_error(asked_, "threads are a whole number, 0 or more", quoted(value) + " is none",
-                 "Write for example threads=4");
+      user_error(asked_, "threads and bytes are whole numbers, 0 or more",
+                 quoted(value) + " is none", "Write for example threads=4");
     }
     return result;
   }
@@ -119,6 +123,8 @@ std::string AutoscheduleOptions::to_string() const {
   add("inline");
   if (threads != 0) names.push_back(std::to_string(threads));
   add("threads");
+  if (memory_budget != 0) names.push_back(std::to_string(memory_budget));
+  add("memory");
   return joined(parts, ',');
 }
 

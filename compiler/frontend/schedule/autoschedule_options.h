@@ -55,12 +55,17 @@ struct AutoscheduleOptions {
   // That run at once: loops are cut into four tasks for each, 8 at least; of one thread none is
   // parallel. 0: what the MachineParams say, if these are not the generic ones; else 8 tasks.
   int threads = 0;
+  // That a call takes at most, inputs and outputs too: where more would be alive at once, Funcs are
+  // computed again instead of stored, as far as that goes. Sizes that are not known count as nothing.
+  // 0: inputs, outputs and twice the largest Func of the program that is differentiated; and what
+  // stays in the caches; and nothing is computed again that takes much longer than its way to memory.
+  int64_t memory_budget = 0;
 
   friend bool operator==(const AutoscheduleOptions&, const AutoscheduleOptions&) = default;
-  // As parts with commas between: "without=strips+slices,store=blurred+heavy,inline=brighter,threads=4".
+  // As parts with commas between: "without=strips+slices,store=blurred+heavy,inline=brighter,threads=4,memory=64000000".
   std::string to_string() const;
   // Requires: options of the autoscheduler are parts of a name and a value; the decisions of the
-  // autoscheduler have names; threads are a whole number, 0 or more.
+  // autoscheduler have names; threads and bytes are whole numbers, 0 or more.
   static AutoscheduleOptions from_string(const std::string& text);
 };
 

@@ -40,6 +40,10 @@ struct AutoSchedulerResults {
   std::string machine_params_string;
   std::string schedule_source;  // the schedule as C++
   std::vector<uint8_t> featurization;
+  // Of the built-in scheduler: the bytes that a call takes at most, inputs and outputs too, and what
+  // was allowed. They may be more: then no schedule that it knows takes less. Sizes that are not known
+  // count as nothing.
+  int64_t memory_bytes = 0, memory_budget_bytes = 0;
 };
 
 using AutoSchedulerFn =

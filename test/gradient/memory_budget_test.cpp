@@ -1,0 +1,199 @@
+// The memory that scheduled gradients take: what the scheduler says it is, and what a budget does to
+// it, both as the allocations of the run.
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <cstdlib>
+#include <functional>
+#include <vector>
+
+#include "autodiff/derivative.h"
+#include "frontend/language/func.h"
+#include "frontend/run/pipeline.h"
+#include "gradient/gradient_check.h"
+#include "graph/copy_graph.h"
+#include "ir/target.h"
+
+namespace retrograde {
+namespace {
+
+using gradient::random_image;
+
+// Bytes that compiled code has allocated and not freed, now and at the most.
+struct Allocations {
+  static constexpr size_t header = 128;  // also the alignment
+  static inline std::atomic<int64_t> now{0}, most{0};
+  static void* take(void*, size_t bytes) {
+    const size_t rounded = (bytes + 2 * header - 1) / header * header;
+    auto* block = static_cast<char*>(std::aligned_alloc(header, rounded));
+    *reinterpret_cast<int64_t*>(block) = static_cast<int64_t>(bytes);
+    const int64_t after = now += static_cast<int64_t>(bytes);
+    for (int64_t seen = most; seen < after && !most.compare_exchange_weak(seen, after);) {
+    }
+    return block + header;
+  }
+  static void give_back(void*, void* block) {
+    if (!block) return;
+    char* begin = static_cast<char*>(block) - header;
+    now -= *reinterpret_cast<int64_t*>(begin);
+    std::free(begin);
+  }
+};
+
+struct Program {
+  std::vector<Func> outputs;
+  std::vector<std::vector<int>> sizes;
+  std::vector<Buffer<float>> inputs;
+
+  int64_t callers_bytes() const {
+    int64_t bytes = 0;
+    for (const Buffer<float>& input : inputs) bytes += static_cast<int64_t>(input.size_in_bytes());
+    for (const std::vector<int>& size : sizes) {
+      int64_t elements = 1;
+      for (int n : size) elements *= n;
+      bytes += elements * 4;
+    }
+    return bytes;
+  }
+  Pipeline copy() const {
+    std::vector<graph::FuncPtr> functions;
+    for (const Func& f : outputs) functions.push_back(f.function());
+    std::vector<Func> copies;
+    for (const graph::FuncPtr& f : graph::copy_graph(functions).outputs) copies.emplace_back(f);
+    for (size_t i = 0; i < copies.size(); ++i) {
+      for (size_t d = 0; d < sizes[i].size(); ++d)
+        copies[i].set_estimate(copies[i].args()[d], 0, sizes[i][d]);
+    }
+    return Pipeline(copies);
+  }
+  std::vector<Buffer<>> buffers() const {
+    std::vector<Buffer<>> result;
+    for (const std::vector<int>& size : sizes) result.push_back(Buffer<float>(size));
+    return result;
+  }
+};
+
+// Several planes of weights, each of which several sums read.
+Program weighted(int planes) {
+  const Buffer<float> image = random_image({160, 120}, 0, 1, 1);
+  Var x("x"), y("y"), p("p");
+  Func f = BoundaryConditions::repeat_edge(image);
+  RDom near(-1, 3, -1, 3), all(0, planes);
+  Func distance("distance"), weight("weight"), weights("weights"), values("values"), out("out");
+  distance(x, y, p) = 0.0f;
+  distance(x, y, p) += pow(f(x + near.x, y + near.y) - f(x + near.x + p, y + near.y), 2);
+  weight(x, y, p) = exp(-distance(x, y, p));
+  weights(x, y) = 0.0f;
+  weights(x, y) += weight(x, y, all);
+  values(x, y) = 0.0f;
+  values(x, y) += weight(x, y, all) * f(x + all, y);
+  out(x, y) = values(x, y) / weights(x, y);
+  const Derivative d = propagate_adjoints(out, random_image({160, 120}, -1, 1, 2));
+  return {{out, d(image)}, {{160, 120}, {160, 120}}, {image}};
+}
+
+// Steps of which each reads the one before, and its gradient all of them.
+Program steps(int count) {
+  const Buffer<float> image = random_image({200, 150}, 0, 1, 1);
+  Var x("x"), y("y");
+  Func state("state");
+  state(x, y) = image(x, y);
+  for (int i = 0; i < count; ++i) {
+    Func f = BoundaryConditions::repeat_edge(state, {{0, 200}, {0, 150}}), next("state");
+    next(x, y) = sin(f(x - 1, y) + f(x + 1, y)) * f(x, y) + cos(f(x, y + 1));
+    state = next;
+  }
+  const Derivative d = propagate_adjoints(state, random_image({200, 150}, -1, 1, 2));
+  return {{state, d(image)}, {{200, 150}, {200, 150}}, {image}};
+}
+
+struct Outcome {
+  AutoSchedulerResults said;
+  int64_t allocated = 0;  // at the most
+  std::vector<Buffer<>> results;
+};
+
+Outcome run(const Program& program, const AutoscheduleOptions& options) {
+  Outcome result;
+  Pipeline pipeline = program.copy();
+  result.said =
+      pipeline.auto_schedule(get_jit_target_from_environment(), options,
+                             MachineParams(2, 64 << 10, 40));  // few bytes stay in its caches
+  pipeline.set_custom_allocator(Allocations::take, Allocations::give_back);
+  result.results = program.buffers();
+  Allocations::most = Allocations::now.load();
+  const int64_t before = Allocations::now;
+  pipeline.realize(result.results);
+  EXPECT_EQ(Allocations::now, before);
+  result.allocated = Allocations::most - before;
+  return result;
+}
+
+void expect_same(const Outcome& a, const Outcome& b) {
+  for (size_t i = 0; i < a.results.size(); ++i) {
+    Buffer<float> first = a.results[i], second = b.results[i];
+    first.for_each_element([&](const int* at) {
+      EXPECT_NEAR(first(at), second(at), 1e-4 * (1 + std::abs(second(at))));
+    });
+  }
+}
+
+// Names of the programs do not matter: what is alive is.
+TEST(MemoryBudget, WhatIsSaidIsWhatIsAllocated) {
+  for (const Program& program : {weighted(4), weighted(12), steps(3), steps(9)}) {
+    const Outcome found = run(program, {});
+    const int64_t said = found.said.memory_bytes - program.callers_bytes();
+    EXPECT_GT(said, 0);
+    EXPECT_LT(found.allocated, 1.2 * static_cast<double>(said) + 65536);
+    EXPECT_GT(found.allocated, 0.7 * static_cast<double>(said) - 65536);
+  }
+}
+
+TEST(MemoryBudget, IsKeptByComputingAgain) {
+  const Program program = weighted(12);
+  AutoscheduleOptions options;
+  options.memory_budget = int64_t(1) << 40;
+  const Outcome large = run(program, options);
+  options.memory_budget = large.said.memory_bytes - large.allocated / 4;
+  const Outcome small = run(program, options);
+  EXPECT_LE(small.said.memory_bytes, options.memory_budget);
+  EXPECT_EQ(small.said.memory_budget_bytes, options.memory_budget);
+  EXPECT_LE(small.allocated, large.allocated * 3 / 4 + 65536);
+  expect_same(small, large);
+}
+
+TEST(MemoryBudget, WhatCannotBeKeptIsSaidAndRuns) {
+  const Program program = steps(6);
+  AutoscheduleOptions options;
+  options.memory_budget = int64_t(1) << 40;
+  const Outcome large = run(program, options);
+  options.memory_budget = 1;
+  const Outcome small = run(program, options);
+  EXPECT_GT(small.said.memory_bytes, small.said.memory_budget_bytes);
+  EXPECT_LE(small.said.memory_bytes, large.said.memory_bytes);
+  expect_same(small, large);
+}
+
+// By default inputs, outputs and twice the largest Func of the program, where that is more than what
+// stays in the caches.
+TEST(MemoryBudget, IsTwiceTheLargestFuncByDefault) {
+  const Program program = weighted(12);
+  const Outcome found = run(program, {});
+  const int64_t seed = 160 * 120 * 4, planes = 160 * 120 * 12 * 4;
+  EXPECT_EQ(found.said.memory_budget_bytes, program.callers_bytes() + seed + 2 * planes);
+}
+
+TEST(MemoryBudget, SaysNothingOfUnknownSizes) {
+  ImageParam image(Float(32), 2);
+  Var x("x"), y("y");
+  Func a("a"), b("b");
+  a(x, y) = exp(image(x, y));
+  b(x, y) = a(x, y) + a(x + 1, y) + a(x, y + 1);
+  AutoscheduleOptions options;
+  options.memory_budget = 1;
+  Pipeline(b).auto_schedule(get_host_target(), options);
+  EXPECT_NE(a.function()->schedule.compute_level.kind, graph::LoopLevel::Kind::Inlined);
+}
+
+}  // namespace
+}  // namespace retrograde
