@@ -35,6 +35,19 @@ INSTANTIATE_TEST_SUITE_P(Forward, Kernel, testing::ValuesIn(kernel_names()),
 INSTANTIATE_TEST_SUITE_P(Gradient, Kernel, testing::ValuesIn(gradient_names()),
                          [](const auto& test) { return test.param; });
 
+class GradientKernel : public testing::TestWithParam<std::string> {};
+
+TEST_P(GradientKernel, HasTheSameBitsOnAnyThreads) {
+  const auto scratch = std::filesystem::path(testing::TempDir()) / ("threads_" + GetParam());
+  std::filesystem::create_directories(scratch);
+  Worker worker(Side::Retrograde, {GetParam(), true, 5, true}, BENCH_PROGRAMS);
+  EXPECT_TRUE(has_same_bits_on({1, 2, 3, 5, 5}, worker, scratch));
+  std::filesystem::remove_all(scratch);
+}
+
+INSTANTIATE_TEST_SUITE_P(Gradient, GradientKernel, testing::ValuesIn(gradient_names()),
+                         [](const auto& test) { return test.param; });
+
 // Outputs of our worker, scheduled by hand or by the autoscheduler of that name.
 std::vector<Values> outputs_of(const std::string& kernel, const std::string& schedule) {
   const auto scratch = std::filesystem::path(testing::TempDir()) / ("auto_" + kernel + schedule);

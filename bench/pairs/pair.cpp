@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <cstring>
 #include <limits>
 #include <thread>
 
@@ -51,6 +52,23 @@ double max_relative_error(const std::vector<Values>& a, const std::vector<Values
     for (size_t i = 0; i < u.size(); i++) most = std::max(most, relative_error(u[i], v[i], scale));
   }
   return most;
+}
+
+bool has_same_bits_on(const std::vector<int>& threads, Worker& worker,
+                      const std::filesystem::path& scratch) {
+  std::vector<Values> first;
+  for (const int n : threads) {
+    worker.set_threads(n);
+    worker.run();
+    std::vector<Values> found = worker.outputs(scratch);
+    if (first.empty()) first = found;
+    for (size_t i = 0; i < first.size(); i++) {
+      const std::vector<double>&a = first[i].elements, &b = found.at(i).elements;
+      if (a.size() != b.size() || std::memcmp(a.data(), b.data(), a.size() * sizeof a[0]) != 0)
+        return false;
+    }
+  }
+  return true;
 }
 
 double tolerance(const PairResult& result) { return result.integers ? 0 : 1e-4; }

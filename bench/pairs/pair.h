@@ -34,6 +34,9 @@ struct PairResult {
 // b's output: a small difference of large numbers counts by what it was made from. Infinite when
 // shapes differ or a NaN stands on one side alone.
 double max_relative_error(const std::vector<Values>& a, const std::vector<Values>& b);
+// Whether a worker of ours, started for the most threads, gives the same bits with any number of them.
+bool has_same_bits_on(const std::vector<int>& threads, Worker& worker,
+                      const std::filesystem::path& scratch);
 // The largest max_relative_error for which both sides have computed the same.
 double tolerance(const PairResult& result);
 // The slope error from which a gradient counts as wrong.

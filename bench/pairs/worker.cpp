@@ -100,6 +100,8 @@ void Worker::fail(const std::string& what) const {
   throw WorkerError((side_ == Side::Halide ? "Halide 14: " : "Retrograde: ") + what);
 }
 
+void Worker::set_threads(int threads) { ask("threads " + std::to_string(threads), "set"); }
+
 double Worker::run() { return ask("run", "ran").at(0); }
 
 std::vector<Values> Worker::outputs(const std::filesystem::path& scratch) {

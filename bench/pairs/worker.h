@@ -45,6 +45,8 @@ class Worker {
   Worker(Side side, const WorkerCommand& command, int threads);
 
   double run();  // seconds
+  // Of the runs to come, as many as it was started for at most. Of ours only.
+  void set_threads(int threads);
   // By way of a file in `scratch`.
   std::vector<Values> outputs(const std::filesystem::path& scratch);
   // Of a gradient: how far it is from differences of its own program (../gradients/slope.h), or of

@@ -64,9 +64,7 @@ class Worker {
   }
 
   void compile() {
-#ifdef BENCH_RETROGRADE
-    kernel_.pipeline.jit_handlers().thread_limit = threads_;  // Halide 14 reads HL_NUM_THREADS
-#endif
+    limit_threads(threads_);
     const kernels::Stopwatch compiling;
     kernel_.pipeline.compile_jit(target_);
     const double seconds = compiling.seconds();
@@ -76,6 +74,11 @@ class Worker {
     compile_peak_mb_ = bench::status_mb("VmHWM");
     bench::forget_peak();
     resident_mb_ = bench::status_mb("VmRSS");
+  }
+
+  void set_threads(int threads) {
+    limit_threads(threads);
+    std::cout << "set" << std::endl;
   }
 
   void run() {
@@ -117,6 +120,12 @@ class Worker {
   }
 
  private:
+  void limit_threads([[maybe_unused]] int threads) {
+#ifdef BENCH_RETROGRADE
+    kernel_.pipeline.jit_handlers().thread_limit = threads;  // Halide 14 reads HL_NUM_THREADS
+#endif
+  }
+
   static void write(const std::string& path, const std::vector<Halide::Buffer<>>& buffers) {
     std::ofstream file(path, std::ios::binary);
     for (const auto& buffer : buffers) {
@@ -151,6 +160,7 @@ void serve(Worker& worker) {
     std::string order, path;
     words >> order >> path;
     if (order == "run") worker.run();
+    if (order == "threads") worker.set_threads(std::stoi(path));
     if (order == "save") worker.save(path);
     if (order == "inputs") worker.save_inputs(path);
     if (order == "slope") worker.tell_slope();

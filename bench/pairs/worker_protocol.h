@@ -9,6 +9,7 @@
 //                                                  gradients are by, the seed last
 //   driver  slope [PATH]  worker  slope ERROR      of a gradient that has run, see slope.h; PATH is
 //                                                  the library of its program, if that is another
+//   driver  threads N     worker  set              for runs to come; ours only
 //   driver  memory        worker  memory PEAK_MB RUN_MB
 //
 // START_SECONDS: compiling and running a first, trivial pipeline, which makes each compiler set up
