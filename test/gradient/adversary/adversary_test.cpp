@@ -15,7 +15,7 @@ namespace retrograde::gradient {
 namespace {
 
 constexpr unsigned programs_per_shard = 15, shards = 16, one_compiled_of = 8;
-constexpr unsigned scheduled_per_shard = 10, shards_scheduled = 6;
+constexpr unsigned scheduled_per_shard = 5, shards_scheduled = 6;
 
 class Adversary : public ::testing::TestWithParam<unsigned> {};
 

@@ -1,5 +1,9 @@
 // fuzz_schedules -- looks for programs whose gradients the compiler schedules wrongly; its
-// arguments: support/fuzz.h.
+// arguments: support/fuzz.h, and
+//
+//   --memory PERCENT    a large program that uses more than so much of its memory is a finding
+#include <cstdlib>
+
 #include "gradient/adversary/auto_scheduled.h"
 #include "support/fuzz.h"
 
@@ -9,6 +13,12 @@ int main(int argc, char** argv) {
                                       .text = auto_scheduled_text,
                                       .limits = {60, 240, 0},
                                       .most_refused = 1.0 / 3,
-                                      .compile = 25},
+                                      .compile = 25,
+                                      .take =
+                                          [](const std::string& name, const std::string& value) {
+                                            if (name != "--memory") return false;
+                                            limit_memory(std::atoi(value.c_str()));
+                                            return true;
+                                          }},
                                      argc, argv);
 }

@@ -1,0 +1,55 @@
+// A random program and all of its gradients as one pipeline.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "frontend/data/realization.h"
+#include "frontend/run/pipeline.h"
+#include "gradient/adversary/probe.h"
+
+namespace retrograde::gradient {
+
+using Buffers = std::vector<Buffer<>>;
+
+// How the region of the program's output is said.
+enum class Extents : uint8_t {
+  Constant,
+  One,         // element in each dimension
+  Parameters,  // known when it runs
+  Huge,        // so many elements along the last dimension that it is compiled only
+  Estimated    // parameters, with estimates that are wrong
+};
+
+class GradientPipeline {
+ public:
+  // The program must outlive it.
+  GradientPipeline(const AdversaryProgram& program, Extents extents);
+
+  // A fresh copy of all, scheduled by nobody.
+  Pipeline copy() const;
+  // Of a copy that is scheduled: the same at root in serial loops, but for what is inlined there.
+  Pipeline in_serial_loops_like(const std::vector<graph::FuncPtr>& scheduled) const;
+  Pipeline own() const { return Pipeline(outputs_); }
+
+  const std::vector<Func>& outputs() const { return outputs_; }
+  const std::vector<oracle::Region>& regions() const { return regions_; }
+  // Into memory that holds something else before.
+  Buffers realize(Pipeline pipeline, JITUserContext* context) const;
+  // Of the largest Func of the program whose size is known; of inputs and outputs.
+  int64_t largest_bytes() const;
+  int64_t callers_bytes() const;
+
+ private:
+  Region bounds() const;
+  void add(const Func& f, const oracle::Region& region);
+  Buffer<float> seed(int k) const;
+
+  const AdversaryProgram& p_;
+  const Extents extents_;
+  std::vector<Buffer<float>> seeds_;
+  std::vector<Func> outputs_;
+  std::vector<oracle::Region> regions_;
+};
+
+}  // namespace retrograde::gradient
