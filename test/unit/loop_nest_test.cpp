@@ -116,5 +116,29 @@ TEST(LoopNest, computes_a_reduction_in_the_innermost_loop_of_its_consumer) {
             "      g(...) = ...\n");
 }
 
+// The memory of temp is free before that of other is needed.
+TEST(LoopNest, computes_an_output_as_soon_as_what_it_reads_is_there) {
+  Func temp("temp"), other("other"), early("early"), late("late");
+  Var x("x");
+  temp(x) = x * x;
+  other(x) = x + x;
+  late(x) = other(x) * 3;
+  early(x) = temp(x) + 1;
+  temp.compute_root();
+  other.compute_root();
+  Func both("both");
+  both(x) = late(x) + temp(x);
+  const std::string nest =
+      without_numbers(lower::loop_nest_text({both.function(), early.function()}));
+  EXPECT_LT(nest.find("produce early"), nest.find("produce both")) << nest;
+  EXPECT_LT(nest.find("produce temp"), nest.find("produce early")) << nest;
+  EXPECT_NE(nest.find("produce both"), std::string::npos) << nest;
+  Func last("last");
+  last(x) = other(x) - 1;
+  const std::string order =
+      without_numbers(lower::loop_nest_text({early.function(), last.function(), both.function()}));
+  EXPECT_LT(order.find("produce early"), order.find("produce other")) << order;
+}
+
 }  // namespace
 }  // namespace retrograde
