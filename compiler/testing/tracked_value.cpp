@@ -160,7 +160,8 @@ double own_error(Op op, Rounding rounding, const std::vector<Value>& args, const
     return std::ldexp(std::max(std::fabs(r), 1.0), -fast_bits);
   if (error.kind == ir::OpError::Kind::Library) return error.ulp_elsewhere * ulp(result.type, r);
   if (op == Op::lerp) {
-    return 2 * ulp(result.type, std::max(args[0].scalar.as_double(), args[1].scalar.as_double()));
+    return 2 * ulp(result.type, std::max(std::fabs(args[0].scalar.as_double()),
+                                         std::fabs(args[1].scalar.as_double())));
   }
   if (op == Op::strong_mul) {
     return rounding_residual(Kind::Mul, args[0].scalar, args[1].scalar, result);

@@ -176,6 +176,13 @@ TEST(TrackedValue, BoundCoversContractionAcrossANarrowingCast) {
   EXPECT_EQ(value_at(f, 0, Rounding::Strict).error, 0);
 }
 
+// The larger operand decides, of either sign.
+TEST(TrackedValue, BoundCoversTheRoundingOfALerpOfNegatives) {
+  Func f("f");
+  f(x) = lerp(Expr(-0.514f), select(x == 0, -0.01f, -0.02f), 0.25f);
+  EXPECT_GE(value_at(f, 0, Rounding::Contraction).error, 0x1p-24);
+}
+
 TEST(TrackedValue, DecisionWithinTheErrorIsUnstable) {
   Func third, f;
   third(x) = cast<float>(x) * 0.1f;
