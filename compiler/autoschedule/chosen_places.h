@@ -14,7 +14,8 @@ namespace retrograde::autoschedule {
 
 struct ChosenPlaces {
   std::unordered_set<const Symbol*> store, inlined;
-  std::unordered_set<const Symbol*> recomputed;  // inlined where that can be: see memory_budget.h
+  // Inlined or stored where that can be: see ScheduleRequest.
+  std::unordered_set<const Symbol*> recomputed, preferred;
 };
 
 bool has_chosen_places(const AutoscheduleOptions& options);

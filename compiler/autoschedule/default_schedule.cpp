@@ -383,6 +383,7 @@ SizeEstimate give_default_schedule(const std::vector<FuncPtr>& outputs,
     limits = placement_limits(order);
   ChosenPlaces chosen = chosen_places(outputs, limits, request.options);
   chosen.recomputed = with_names(outputs, request.recomputed);
+  chosen.preferred = with_names(outputs, request.stored);
   if (what != Scheduling::Everything) limits = PlacementLimits();
   std::unordered_set<const Symbol*> whole = limits.stay;
   whole.insert(limits.levels.begin(), limits.levels.end());

@@ -29,7 +29,9 @@ struct ScheduleRequest {
   VectorUnit unit = {};
   AutoscheduleOptions options = {};
   MachineParams machine = {};
-  std::set<std::string> recomputed = {};  // of what is stored else: see memory_budget.h
+  // What a search or a budget (memory_budget.h) wants computed where it is read, and what stored,
+  // where that can be.
+  std::set<std::string> recomputed = {}, stored = {};
 };
 
 // Gives the directives to the Funcs of this graph, whose wrappers have been applied. The result: how

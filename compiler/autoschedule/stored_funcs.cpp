@@ -64,6 +64,7 @@ class StorageChooser {
       bool stored =
           is_worth_storing(uses_[f.get()], left_inline && f->is_pure() ? explosion : cheap);
       stored |= left_inline ? computes_more_than_is_read(*f) : is_output(f) || !f->is_pure();
+      stored |= chosen_.preferred.contains(f.get());
       if (limits_) {
         stored |= limits_->need_root.contains(f.get()) || limits_->levels.contains(f.get());
         stored &= !limits_->stay.contains(f.get()) || is_output(f);  // which is at root anyway
