@@ -1,5 +1,6 @@
-// schedules.cpp -- how operators are scheduled: by Retrograde as they come; by Halide as the worker's
-// last argument says, with one of its autoschedulers or by hand: everything at root.
+// schedules.cpp -- how operators are scheduled, as the worker's last argument says: by Retrograde as
+// they come, or under options of its autoscheduler ("without=strips"); by Halide with one of its
+// autoschedulers or by hand: everything at root.
 #include "../gradients/gradient.h"
 
 namespace kernels {
@@ -8,7 +9,9 @@ using namespace Halide;
 
 #ifdef BENCH_RETROGRADE
 
-void schedule(Pipeline&, const Setup&) {}
+void schedule(Pipeline& pipeline, const Setup& setup) {
+  pipeline.set_autoschedule(retrograde::AutoscheduleOptions::from_string(setup.schedule));
+}
 
 #else
 
