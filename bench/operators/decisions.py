@@ -14,7 +14,7 @@ import sys
 import operators
 
 DECISIONS = ["scatter_strategy", "cut_reductions", "register_tiles", "layout_staging", "join_sweeps", "slices",
-             "task_sizes", "strips"]
+             "task_sizes", "strips", "choices"]
 
 
 def measure(name, options):

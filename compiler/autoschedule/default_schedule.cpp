@@ -5,12 +5,14 @@
 #include <optional>
 #include <unordered_set>
 
+#include "autoschedule/choices.h"
 #include "autoschedule/chosen_places.h"
 #include "autoschedule/column_blocks.h"
 #include "autoschedule/cost_estimate.h"
 #include "autoschedule/cut_reductions.h"
 #include "autoschedule/inlined_reads.h"
 #include "autoschedule/join_sweeps.h"
+#include "autoschedule/lane_dimension.h"
 #include "autoschedule/look_ups.h"
 #include "autoschedule/loop_order.h"
 #include "autoschedule/memory_budget.h"
@@ -26,6 +28,7 @@
 #include "autoschedule/stored_funcs.h"
 #include "autoschedule/strips.h"
 #include "autoschedule/task_sizes.h"
+#include "autoschedule/tile_chains.h"
 #include "diagnostics/large_stack.h"
 #include "frontend/language/func.h"
 #include "frontend/language/rdom.h"
@@ -124,6 +127,23 @@ class LoopChooser {
     vectorize(stage_, variable_of(0), lanes_of_values(), TailStrategy::GuardWithIf);
     const bool reduces = !definition().rvars.empty();
     if (pure_.size() == 1 && reduces) stage_.parallel(variable_of(0));  // of the vectors
+  }
+
+  // Of a pure Func: rows, in memory too, along another dimension than the first.
+  void give_along(size_t dimension) {
+    std::vector<Var> order{variable_of(dimension)};
+    for (size_t d = 0; d < f_.args.size(); ++d) {
+      if (d != dimension) order.push_back(variable_of(d));
+    }
+    Func(function_).reorder_storage(order);
+    stage_.reorder(std::vector<VarOrRVar>(order.begin(), order.end()));
+    int64_t tasks = 1;
+    for (size_t d = f_.args.size(); d-- > 0 && tasks < sizes_.machine().enough_tasks;) {
+      if (d == dimension) continue;
+      stage_.parallel(variable_of(d));
+      tasks *= sizes_.extent(f_, d).value_or(sizes_.machine().enough_tasks);
+    }
+    vectorize(stage_, order[0], lanes_of_values(), TailStrategy::GuardWithIf);
   }
 
  private:
@@ -358,17 +378,26 @@ bool schedule_scatter(const FuncPtr& f, const SlicedScatters& slices, const Size
   return true;
 }
 
+std::vector<FuncPtr> pure_primal(std::vector<FuncPtr> funcs) {
+  std::erase_if(funcs, [](const FuncPtr& f) { return !f->is_pure() || f->made; });
+  return funcs;
+}
+
 // What is computed in the loops of others, and which loops are shared.
 void move_and_join(const std::vector<FuncPtr>& outputs, const std::vector<FuncPtr>& stored,
                    const std::vector<FuncPtr>& given,
                    const std::unordered_set<const Symbol*>& whole, const SizeEstimate& sizes,
                    const std::set<Decision>& without) {
   const Readers readers(outputs, stored);  // before anything is moved
+  if (!without.contains(Decision::Choices)) compute_beside_choices(readers, given, whole);
   const bool slices = !without.contains(Decision::Slices);
   if (slices) compute_in_column_blocks(readers, stored, whole, sizes);
+  if (slices) compute_in_tiles(outputs, readers, given, whole, sizes);
+  // Of chains of stencils, before these are put into strips of their own.
+  if (slices) compute_in_reductions(outputs, readers, pure_primal(stored), whole, sizes);
   if (!without.contains(Decision::Strips)) compute_in_strips(outputs, given, whole, sizes);
   if (slices) compute_in_slices(readers, stored, whole, sizes);
-  if (slices) compute_in_reductions(readers, stored, whole, sizes);
+  if (slices) compute_in_reductions(outputs, readers, stored, whole, sizes);
   if (!without.contains(Decision::LayoutStaging)) run_along_rows(given, sizes);
   if (!without.contains(Decision::JoinSweeps)) join_sweeps(outputs, given, sizes);
 }
@@ -388,25 +417,34 @@ SizeEstimate give_default_schedule(const std::vector<FuncPtr>& outputs,
   std::unordered_set<const Symbol*> whole = limits.stay;
   whole.insert(limits.levels.begin(), limits.levels.end());
   // Before sums are cut: what that schedules would pass for the user's.
-  const std::vector<FuncPtr> stored = what == Scheduling::Everything
-                                          ? stored_in_all(outputs, limits, chosen)
-                                          : stored_by_default(outputs, chosen);
-  SizeEstimate sizes(outputs, limits_of(request));
   const auto makes = [&](Decision d) { return !request.options.without.contains(d); };
+  const FixedDimensions fixed(outputs);
+  const bool may_choose = makes(Decision::Choices);
+  const std::vector<FuncPtr> stored =
+      what == Scheduling::Everything
+          ? stored_in_all(outputs, limits, chosen, may_choose ? &fixed : nullptr)
+          : stored_by_default(outputs, chosen);
+  SizeEstimate sizes(outputs, limits_of(request));
   TaskSizes tasks(order);
   if (makes(Decision::CutReductions)) cut_reductions(outputs, sizes, whole);
   const bool slices_scatters = makes(Decision::ScatterStrategy) && makes(Decision::Slices);
   const SlicedScatters slices(outputs, slices_scatters ? stored : std::vector<FuncPtr>(), whole,
                               sizes);
+  const LaneDimensions along(
+      outputs, makes(Decision::LayoutStaging) ? stored : std::vector<FuncPtr>(), lanes, sizes);
   std::vector<FuncPtr> given;  // loops, at root
   for (const FuncPtr& f : stored) {
     if (is_touched(*f)) continue;
     Func(f).compute_root();
     if (f->is_extern() || limits.levels.contains(f.get())) continue;
     if (makes(Decision::ScatterStrategy) && schedule_scatter(f, slices, sizes)) continue;
-    for (int s = 0; s < f->stage_count(); ++s) LoopChooser(f, s, request, sizes).give();
+    if (const size_t d = along.of(*f); d > 0)
+      LoopChooser(f, 0, request, sizes).give_along(d);
+    else
+      for (int s = 0; s < f->stage_count(); ++s) LoopChooser(f, s, request, sizes).give();
     given.push_back(f);
   }
+  if (may_choose) unroll_choices(given, fixed, sizes);
   move_and_join(outputs, stored, given, whole, sizes, request.options.without);
   tasks.limit(outputs, request);
   for (const FuncPtr& f : order) {  // so that the log tells of every Func

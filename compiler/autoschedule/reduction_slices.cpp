@@ -8,6 +8,8 @@
 #include "autoschedule/new_loop.h"
 #include "autoschedule/only_reader.h"
 #include "autoschedule/read_estimate.h"
+#include "autoschedule/slices.h"
+#include "autoschedule/stored_reads.h"
 #include "frontend/language/func.h"
 #include "frontend/language/rdom.h"
 #include "frontend/schedule/loop_level.h"
@@ -181,30 +183,105 @@ void run_serially(const FuncPtr& f, const std::vector<FuncPtr>& stored) {
   autoschedule::run_serially(f);
 }
 
-}  // namespace
+// A Func that has moved, in turn a reader of slices.
+struct Moved {
+  FuncPtr func;
+  retrograde::LoopLevel level;
+  std::vector<size_t> dimensions;  // that the loops move: of slices, and of strips
+};
 
-void compute_in_reductions(const Readers& readers, const std::vector<FuncPtr>& stored,
-                           const std::unordered_set<const Symbol*>& but,
-                           const SizeEstimate& sizes) {
-  const auto may_move = [&](const FuncPtr& f) {
+// Whether the loops of slices or of strips move this index of a read.
+bool is_moved_by_all(const Reader& reader, size_t d, const Move& move) {
+  return std::all_of(reader.reads.begin(), reader.reads.end(), [&](const Call* read) {
+    return uses_variable(read->args[d], move.along) ||
+           std::any_of(move.slices.begin(), move.slices.end(),
+                       [&](const std::string& var) { return uses_variable(read->args[d], var); });
+  });
+}
+
+class ReductionMover {
+ public:
+  ReductionMover(const std::vector<FuncPtr>& outputs, const Readers& readers,
+                 const std::vector<FuncPtr>& stored, const std::unordered_set<const Symbol*>& but,
+                 const SizeEstimate& sizes)
+      : readers_(readers), stored_(stored), but_(but), sizes_(sizes), reads_(outputs) {}
+
+  void move_into_reduction(const FuncPtr& f) {
+    const auto reader = only_reader(f);
+    if (!reader || !is_at_root(*reader->func) || cut_.contains(reader->func.get())) return;
+    const auto move = ReductionSlicer(f, *reader, sizes_).find();
+    if (!move) return;
+    cut_.insert(reader->func.get());
+    cut_into_strips(*reader, *move);
+    const retrograde::LoopLevel level(Func(reader->func), RVar(move->slices[0]), reader->stage);
+    std::vector<size_t> dimensions;
+    for (size_t d = 0; d < f->args.size(); ++d) {
+      if (is_moved_by_all(*reader, d, *move)) dimensions.push_back(d);
+    }
+    place(f, level, std::move(dimensions));
+  }
+
+  // In the loops that its reader has moved into.
+  void move_behind(const FuncPtr& f) {
+    const auto reader = only_reader(f);
+    const auto found = std::find_if(moved_.begin(), moved_.end(), [&](const Moved& moved) {
+      return reader && moved.func == reader->func;
+    });
+    if (found == moved_.end()) return;
+    std::vector<size_t> dimensions;
+    for (const size_t d : found->dimensions) {
+      const auto own = sliced_by(*f, *reader, reader->func->args[d]);
+      if (!own) return;
+      dimensions.push_back(*own);
+    }
+    place(f, found->level, std::move(dimensions));
+  }
+
+  bool may_move(const FuncPtr& f) const {
     const bool is_partial = f->made && (f->made->lanes > 0 || f->made->has_parts);
     return f->args.size() > image_dimensions && !f->is_extern() && !is_partial &&
-           !but.contains(f.get()) && is_at_root(*f);
-  };
-  std::unordered_set<const Symbol*> cut;  // readers whose loops are strips now
+           !but_.contains(f.get()) && is_at_root(*f) && readers_.is_inside(f) &&
+           !readers_.is_output(f) && sizes_.bytes(*f) >= sizes_.machine().more_than_caches;
+  }
+
+ private:
+  std::optional<Reader> only_reader(const FuncPtr& f) const {
+    const std::vector<StoredRead>& all = reads_.of(f);
+    if (all.size() != 1 || reads_.is_hidden(f) || !readers_.is_inside(all[0].reader) ||
+        but_.contains(all[0].reader.get()))
+      return std::nullopt;
+    Reader reader{all[0].reader, all[0].stage, {}};
+    for (const Expr& call : all[0].calls) reader.reads.push_back(call.as<Call>());
+    return reader;
+  }
+
+  void place(const FuncPtr& f, const retrograde::LoopLevel& level, std::vector<size_t> dimensions) {
+    run_serially(f, stored_);
+    Func(f).compute_at(level);
+    moved_.push_back({f, level, std::move(dimensions)});
+  }
+
+  const Readers& readers_;
+  const std::vector<FuncPtr>& stored_;
+  const std::unordered_set<const Symbol*>& but_;
+  const SizeEstimate& sizes_;
+  const StoredReads reads_;
+  std::unordered_set<const Symbol*> cut_;  // readers whose loops are strips now
+  std::vector<Moved> moved_;
+};
+
+}  // namespace
+
+void compute_in_reductions(const std::vector<FuncPtr>& outputs, const Readers& readers,
+                           const std::vector<FuncPtr>& stored,
+                           const std::unordered_set<const Symbol*>& but,
+                           const SizeEstimate& sizes) {
+  ReductionMover mover(outputs, readers, stored, but, sizes);
   for (const FuncPtr& f : stored) {
-    if (!may_move(f) || !readers.is_inside(f) || readers.is_output(f)) continue;
-    const auto reader = readers.only_reader(f);
-    if (!reader || !is_at_root(*reader->func) || but.contains(reader->func.get()) ||
-        cut.contains(reader->func.get()))
-      continue;
-    const auto move = ReductionSlicer(f, *reader, sizes).find();
-    if (!move) continue;
-    cut.insert(reader->func.get());
-    cut_into_strips(*reader, *move);
-    run_serially(f, stored);
-    Func(f).compute_at(
-        retrograde::LoopLevel(Func(reader->func), RVar(move->slices[0]), reader->stage));
+    if (mover.may_move(f)) mover.move_into_reduction(f);
+  }
+  for (auto f = stored.rbegin(); f != stored.rend(); ++f) {  // readers first
+    if (mover.may_move(*f)) mover.move_behind(*f);
   }
 }
 

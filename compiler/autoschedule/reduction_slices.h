@@ -9,7 +9,8 @@
 //                                                for y, x: sums += ...
 //
 // Of `term` there is a strip of one image for each thread instead of an image for each r. A strip
-// computes a few rows more than its own where a slice is read at several.
+// computes a few rows more than its own where a slice is read at several. What `term` alone reads slice
+// by slice in turn is computed there, too.
 #pragma once
 
 #include <unordered_set>
@@ -22,8 +23,10 @@
 namespace retrograde::autoschedule {
 
 // Of the Funcs, all of which this scheduler has given loops, those at root that are larger than
-// caches and have one reader, which is one of them. `but`: none of these, as a reader neither.
-void compute_in_reductions(const Readers& readers, const std::vector<FuncPtr>& stored,
+// caches and have one reader, directly or through what is computed inline, which is one of them.
+// `but`: none of these, as a reader neither.
+void compute_in_reductions(const std::vector<FuncPtr>& outputs, const Readers& readers,
+                           const std::vector<FuncPtr>& stored,
                            const std::unordered_set<const Symbol*>& but, const SizeEstimate& sizes);
 
 }  // namespace retrograde::autoschedule

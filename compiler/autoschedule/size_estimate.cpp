@@ -12,14 +12,6 @@ namespace retrograde::autoschedule {
 
 namespace {
 
-Interval constant_ends(const Interval& i) {
-  const auto constant = [](const Expr& end) {
-    const Expr simple = end.defined() ? simplify(end) : end;
-    return simple.defined() && as_const_int(simple) ? simple : Expr();
-  };
-  return {constant(i.min), constant(i.max)};
-}
-
 Interval interval_of(const Expr& min, const Expr& extent) {
   return {min, min.defined() && extent.defined() ? min + extent - 1 : Expr()};
 }
@@ -111,6 +103,14 @@ SizeEstimate::SizeEstimate(const std::vector<FuncPtr>& outputs, const MachineLim
       });
     }
   }
+}
+
+Interval constant_ends(const Interval& i) {
+  const auto constant = [](const Expr& end) {
+    const Expr simple = end.defined() ? simplify(end) : end;
+    return simple.defined() && as_const_int(simple) ? simple : Expr();
+  };
+  return {constant(i.min), constant(i.max)};
 }
 
 std::optional<int64_t> SizeEstimate::extent(const FuncContents& f, size_t dimension) const {

@@ -21,6 +21,9 @@ struct MachineLimits {
   int64_t more_than_caches = 16 << 20;
 };
 
+// The ends that are constants.
+Interval constant_ends(const Interval& i);
+
 class SizeEstimate {
  public:
   SizeEstimate() = default;  // nothing is known

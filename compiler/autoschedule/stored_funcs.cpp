@@ -4,6 +4,7 @@
 #include <unordered_map>
 #include <unordered_set>
 
+#include "autoschedule/choices.h"
 #include "autoschedule/cost_estimate.h"
 #include "autoschedule/large_bodies.h"
 #include "autoschedule/read_estimate.h"
@@ -24,7 +25,12 @@ constexpr int64_t unknown_iterations = 8;
 // together more than it takes to bring the value to memory and back.
 bool is_worth_storing(const StorageUse& use, double free_operations) {
   return use.reads > 1.5 && use.operations > free_operations &&
-         (use.reads - 1) * use.operations > way_to_memory;
+         (use.reads - 1) * use.operations > way_to_memory * use.share_of_way;
+}
+
+// Each read would compute all that it chooses from.
+bool is_worth_choosing_once(const StorageUse& use) {
+  return use.operations * (1 - 1 / use.alternatives) > cheap;
 }
 
 // Whether an element takes others of the Func: an update writes where its reduction variables or
@@ -42,10 +48,14 @@ bool is_adjoint(const FuncPtr& f) { return f->made.has_value(); }
 
 class StorageChooser {
  public:
-  // `limits`: null where the pipeline is compiled as it is.
+  // `limits`: null where the pipeline is compiled as it is. `fixed`: null where choices stay.
   StorageChooser(const std::vector<FuncPtr>& outputs, const PlacementLimits* limits,
-                 const ChosenPlaces& chosen)
-      : outputs_(outputs), order_(topological_order(outputs)), limits_(limits), chosen_(chosen) {}
+                 const ChosenPlaces& chosen, const FixedDimensions* fixed = nullptr)
+      : outputs_(outputs),
+        order_(topological_order(outputs)),
+        limits_(limits),
+        chosen_(chosen),
+        fixed_(fixed) {}
 
   const std::unordered_map<const Symbol*, StorageUse>& uses() const { return uses_; }
 
@@ -57,6 +67,7 @@ class StorageChooser {
     std::vector<FuncPtr> result;
     for (const FuncPtr& f : order_) {  // producers first: the cost of what is inlined is known
       uses_[f.get()].operations = operations(*f);
+      uses_[f.get()].share_of_way = share_of_way(*f);
       if (is_touched(*f)) continue;
       // Who schedules the primal means an untouched primal Func to be inlined, unless that
       // explodes.
@@ -65,6 +76,7 @@ class StorageChooser {
           is_worth_storing(uses_[f.get()], left_inline && f->is_pure() ? explosion : cheap);
       stored |= left_inline ? computes_more_than_is_read(*f) : is_output(f) || !f->is_pure();
       stored |= chosen_.preferred.contains(f.get());
+      stored |= is_worth_choosing_once(uses_[f.get()]);
       if (limits_) {
         stored |= limits_->need_root.contains(f.get()) || limits_->levels.contains(f.get());
         stored &= !limits_->stay.contains(f.get()) || is_output(f);  // which is at root anyway
@@ -90,16 +102,37 @@ class StorageChooser {
     return found != readers_.end() && found->second.size() == 1;
   }
 
+  static double share_of_way(const FuncContents& f) {
+    double bytes = 0;
+    for (const Type& type : f.types) bytes += type.bytes();
+    return std::min(1.0, bytes / 4);
+  }
+
   void count_reads(const FuncContents& f) {
     for (int s = 0; s < f.stage_count(); ++s) {
       walk_definition(f.stage(s), [&](const Expr& e) {
         const auto* call = e.as<Call>();
         if (call && call->call_type == CallType::Func && call->symbol.raw() != &f) {
-          uses_[call->symbol.raw()].reads += reads_an_element(*call, f, f.stage(s));
+          StorageUse& use = uses_[call->symbol.raw()];
+          use.reads += reads_an_element(*call, f, f.stage(s));
+          if (fixed_) use.alternatives = std::max(use.alternatives, alternatives(*call, f));
           readers_[call->symbol.raw()].insert(&f);
         }
       });
     }
+  }
+
+  // Of what a Func chooses, by dimensions that the reader's loops or data move, not constants.
+  double alternatives(const Call& call, const FuncContents& reader) const {
+    const FuncPtr callee = func_of(call);
+    double result = 1;
+    for (const size_t d : chosen_dimensions(*callee, *fixed_, ChoicesOf::ItsOwn)) {
+      const bool is_decided =
+          std::none_of(reader.args.begin(), reader.args.end(),
+                       [&](const std::string& arg) { return uses_variable(call.args[d], arg); });
+      if (!is_decided) result *= static_cast<double>(fixed_->of(*callee, d)->extent);
+    }
+    return result;
   }
 
   // Of an element, when nothing is stored.
@@ -129,6 +162,7 @@ class StorageChooser {
   const std::vector<FuncPtr> order_;
   const PlacementLimits* const limits_;
   const ChosenPlaces& chosen_;
+  const FixedDimensions* const fixed_;
   std::unordered_map<const Symbol*, StorageUse> uses_;
   std::unordered_map<const Symbol*, std::unordered_set<const FuncContents*>> readers_;
   std::unordered_set<const FuncContents*> stored_;
@@ -164,8 +198,10 @@ std::unordered_map<const Symbol*, StorageUse> uses_of_stored(const std::vector<F
 }
 
 std::vector<FuncPtr> stored_in_all(const std::vector<FuncPtr>& outputs,
-                                   const PlacementLimits& limits, const ChosenPlaces& chosen) {
-  return with_large_bodies(outputs, StorageChooser(outputs, &limits, chosen).choose(), chosen);
+                                   const PlacementLimits& limits, const ChosenPlaces& chosen,
+                                   const FixedDimensions* fixed) {
+  return with_large_bodies(outputs, StorageChooser(outputs, &limits, chosen, fixed).choose(),
+                           chosen);
 }
 
 }  // namespace retrograde::autoschedule

@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "autoschedule/chosen_places.h"
+#include "autoschedule/fixed_dimensions.h"
 #include "autoschedule/placement_limits.h"
 #include "graph/function.h"
 
@@ -29,12 +30,16 @@ std::vector<FuncPtr> stored_by_default(const std::vector<FuncPtr>& outputs,
 // it.
 struct StorageUse {
   double reads = 0;
+  double alternatives = 1;  // that a read chooses from, where it does not say which
   double operations = 0;
+  double share_of_way = 1;  // to memory: narrow values are shorter on it, as they are in vectors
 };
 std::unordered_map<const Symbol*, StorageUse> uses_of_stored(const std::vector<FuncPtr>& outputs,
                                                              const ChosenPlaces& chosen);
-// Where all of the pipeline is to be scheduled: what a user left alone is not meant to be inlined.
+// Where all of the pipeline is to be scheduled: what a user left alone is not meant to be inlined. Nor
+// is what chooses along a dimension, `fixed`, where its readers do not say which: see choices.h.
 std::vector<FuncPtr> stored_in_all(const std::vector<FuncPtr>& outputs,
-                                   const PlacementLimits& limits, const ChosenPlaces& chosen = {});
+                                   const PlacementLimits& limits, const ChosenPlaces& chosen = {},
+                                   const FixedDimensions* fixed = nullptr);
 
 }  // namespace retrograde::autoschedule

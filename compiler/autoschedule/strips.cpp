@@ -13,6 +13,7 @@
 #include "autoschedule/new_loop.h"
 #include "autoschedule/only_reader.h"
 #include "autoschedule/read_window.h"
+#include "autoschedule/stored_reads.h"
 #include "frontend/language/func.h"
 #include "frontend/schedule/loop_level.h"
 #include "frontend/schedule/stage.h"
@@ -50,63 +51,6 @@ struct Along {
 };
 using Windows = std::vector<Along>;  // of the dimensions of a Func
 
-// Reads of a stored Func by another, through what is computed inline.
-struct StripReads {
-  FuncPtr reader;
-  std::vector<Expr> calls;
-};
-
-// Who reads what is stored.
-class StripReaders {
- public:
-  explicit StripReaders(const std::vector<FuncPtr>& outputs) {
-    for (const FuncPtr& f : topological_order(outputs)) {
-      const auto is_inlined = [&](const FuncPtr& g) {
-        return is_computed_inline(g, {}) &&
-               std::find(outputs.begin(), outputs.end(), g) == outputs.end();
-      };
-      if (is_inlined(f)) continue;
-      if (f->is_extern()) hide(f);
-      for (int s = 0; s < f->stage_count(); ++s) note(f, f->stage(s));
-    }
-  }
-
-  const std::vector<StripReads>& of(const FuncPtr& f) { return reads_[f.get()]; }
-  // What is read by a copy of a body too many cannot be told.
-  bool is_hidden(const FuncPtr& f) const { return hidden_.contains(f.get()); }
-
- private:
-  void note(const FuncPtr& f, const Definition& stage) {
-    std::unordered_set<const ExprNode*> seen;
-    for (const Expr& root : roots_with_inlined(stage)) {
-      walk(root, [&](const Expr& e) {
-        if (!seen.insert(e.get()).second) return false;
-        const auto* call = e.as<Call>();
-        const FuncPtr callee = call && call->call_type == CallType::Func ? func_of(*call) : nullptr;
-        if (!callee || callee == f) return true;
-        if (is_computed_inline(callee, {}))
-          hide(callee);
-        else
-          add(callee, f, e);
-        return true;
-      });
-    }
-  }
-  void add(const FuncPtr& callee, const FuncPtr& reader, const Expr& call) {
-    std::vector<StripReads>& all = reads_[callee.get()];
-    if (all.empty() || all.back().reader != reader) all.push_back({reader, {}});
-    all.back().calls.push_back(call);
-  }
-  void hide(const FuncPtr& inlined) {
-    for (const FuncPtr& callee : direct_callees(*inlined)) {
-      if (hidden_.insert(callee.get()).second && is_computed_inline(callee, {})) hide(callee);
-    }
-  }
-
-  std::unordered_map<const Symbol*, std::vector<StripReads>> reads_;
-  std::unordered_set<const Symbol*> hidden_;
-};
-
 // The loops of the last Func of a group, by dimension.
 struct StripLoops {
   size_t row = 0;               // which is cut into strips
@@ -125,7 +69,7 @@ class Group {
   const StripLoops& loops() const { return *loops_; }
 
   // Whether it has joined: all of its reads are by Funcs of this group.
-  bool join(const FuncPtr& f, const std::vector<StripReads>& reads) {
+  bool join(const FuncPtr& f, const std::vector<StoredRead>& reads) {
     const auto windows = windows_of(*f, reads);
     const bool is_shared = reads.size() > 1;
     if (!windows || members_.size() >= (is_shared ? most_with_shared : most_members)) return false;
@@ -147,9 +91,9 @@ class Group {
   }
 
   std::optional<Windows> windows_of(const FuncContents& f,
-                                    const std::vector<StripReads>& reads) const {
+                                    const std::vector<StoredRead>& reads) const {
     std::optional<Windows> all;
-    for (const StripReads& by : reads) {
+    for (const StoredRead& by : reads) {
       for (const Expr& call : by.calls) {
         const auto windows = windows_of(*call.as<Call>(), *by.reader);
         if (!windows || (all && !widen(*all, *windows))) return std::nullopt;
@@ -354,16 +298,16 @@ void give_strips(const Group& group) {
 
 void compute_in_strips(const std::vector<FuncPtr>& outputs, const std::vector<FuncPtr>& given,
                        const std::unordered_set<const Symbol*>& but, const SizeEstimate& sizes) {
-  StripReaders readers(outputs);
+  const StoredReads readers(outputs);
   const Readers hosts(outputs, given);
   std::unordered_map<const Symbol*, Group*> group_of;
   std::vector<std::unique_ptr<Group>> groups;
   const auto may_run_in_strips = [&](const FuncPtr& f) {
     return has_plain_rows(*f) && is_at_root(*f) && hosts.is_inside(f) && !but.contains(f.get());
   };
-  const auto group_that_reads = [&](const std::vector<StripReads>& reads) -> Group* {
+  const auto group_that_reads = [&](const std::vector<StoredRead>& reads) -> Group* {
     Group* only = nullptr;
-    for (const StripReads& by : reads) {
+    for (const StoredRead& by : reads) {
       const auto found = group_of.find(by.reader.get());
       if (found == group_of.end() || (only && found->second != only)) return nullptr;
       only = found->second;
@@ -373,7 +317,7 @@ void compute_in_strips(const std::vector<FuncPtr>& outputs, const std::vector<Fu
   for (auto it = given.rbegin(); it != given.rend(); ++it) {
     const FuncPtr& f = *it;
     if (!may_run_in_strips(f)) continue;
-    const std::vector<StripReads>& reads = readers.of(f);
+    const std::vector<StoredRead>& reads = readers.of(f);
     Group* group = hosts.is_output(f) || readers.is_hidden(f) ? nullptr : group_that_reads(reads);
     if (!group || !group->join(f, reads)) {
       groups.push_back(std::make_unique<Group>(f, sizes));

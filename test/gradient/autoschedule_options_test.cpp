@@ -102,6 +102,19 @@ Program warp() {
           {{size, size, channels}, {size, size, channels}, {size, size, 2}}};
 }
 
+// A choice among sums and differences, read at constants.
+Program bands() {
+  const Buffer<float> image = random_image({60, 40}, -1, 1, 1);
+  Var x("x"), y("y"), b("b");
+  Func padded = BoundaryConditions::repeat_edge(image);
+  Func band("band"), out("out");
+  const Expr first = exp(padded(2 * x, y)), second = exp(padded(2 * x + 1, y));
+  band(x, y, b) = mux(b, {first + second, first - second, first * second});
+  out(x, y) = band(x, y, 0) * band(x + 1, y, 2) + band(x, y + 1, 1) * band(x, y, 2);
+  const Func loss = gradient::weighted_sum(out, {28, 38});
+  return {{loss, propagate_adjoints(loss)(image)}, {{}, {60, 40}}};
+}
+
 // Differences of an image to itself, shifted, each smoothed; few planes, and transposed reads.
 Program shifts() {
   const Buffer<float> image = random_image({44, 30}, -1, 1, 1);
@@ -122,7 +135,8 @@ Program shifts() {
 const std::map<std::string, std::function<Program()>>& programs() {
   static const std::map<std::string, std::function<Program()>> all{
       {"stencils", stencils}, {"smoothing", smoothing}, {"convolution", convolution},
-      {"product", product},   {"warp", warp},           {"shifts", shifts}};
+      {"product", product},   {"warp", warp},           {"shifts", shifts},
+      {"bands", bands}};
   return all;
 }
 

@@ -14,8 +14,8 @@ namespace {
 // In the order of the decisions.
 const std::vector<std::string>& names_of_decisions() {
   static const std::vector<std::string> names{
-      "scatter_strategy", "cut_reductions", "register_tiles", "layout_staging",
-      "join_sweeps",      "slices",         "task_sizes",     "strips"};
+      "scatter_strategy", "cut_reductions", "register_tiles", "layout_staging", "join_sweeps",
+      "slices",           "task_sizes",     "strips",         "choices"};
   return names;
 }
 
@@ -96,10 +96,10 @@ class OptionsReader {
 }  // namespace
 
 const std::vector<Decision>& all_decisions() {
-  static const std::vector<Decision> all{Decision::ScatterStrategy, Decision::CutReductions,
-                                         Decision::RegisterTiles,   Decision::LayoutStaging,
-                                         Decision::JoinSweeps,      Decision::Slices,
-                                         Decision::TaskSizes,       Decision::Strips};
+  static const std::vector<Decision> all{
+      Decision::ScatterStrategy, Decision::CutReductions, Decision::RegisterTiles,
+      Decision::LayoutStaging,   Decision::JoinSweeps,    Decision::Slices,
+      Decision::TaskSizes,       Decision::Strips,        Decision::Choices};
   return all;
 }
 

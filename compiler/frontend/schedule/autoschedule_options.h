@@ -32,7 +32,8 @@ enum class Decision : uint8_t {
   JoinSweeps,     // reductions that load the same in the same loops
   Slices,         // what one Func alone reads slice by slice, in its loops
   TaskSizes,      // parallel loops beyond the outermost, where that is short
-  Strips          // chains of stencils in strips, with windows of rows
+  Strips,         // chains of stencils in strips, with windows of rows
+  Choices         // a copy of the body for each value of a small dimension that chooses
 };
 const std::vector<Decision>& all_decisions();
 // In small letters: "cut_reductions".

@@ -1,0 +1,268 @@
+// What the built-in autoscheduler does with forward programs: choices along small dimensions, rows along
+// long ones, chains behind transposed reads, slices that a reduction reads through what is inline.
+#include <gtest/gtest.h>
+
+#include <retrograde/retrograde.h>
+
+#include <algorithm>
+#include <vector>
+
+#include "graph/graph.h"
+
+namespace retrograde {
+namespace {
+
+Buffer<float> some_picture(int width, int height) {
+  Buffer<float> picture(width, height);
+  for (int y = 0; y < height; y++) {
+    for (int x = 0; x < width; x++)
+      picture(x, y) = static_cast<float>((x * 7 + y * 13 + x * y % 5) % 31) * 0.125f;
+  }
+  return picture;
+}
+
+struct Source {
+  Expr operator()(const Expr& x, const Expr& y) const {
+    return picture(clamp(x, 0, picture.width() - 1), clamp(y, 0, picture.height() - 1));
+  }
+  Buffer<float> picture = some_picture(300, 280);
+};
+
+// A program by itself and under the autoscheduler.
+template <class Program>
+struct Scheduled {
+  Scheduled() { Pipeline(program.out).auto_schedule(get_host_target()); }
+
+  void expect_same_values(const std::vector<int>& sizes) {
+    Program plain;
+    const Buffer<float> found = program.out.realize(sizes), expected = plain.out.realize(sizes);
+    int wrong = 0;
+    expected.for_each_element([&](const int* at) {
+      wrong += std::abs(found(at) - expected(at)) > 1e-4f * (1 + std::abs(expected(at)));
+    });
+    EXPECT_EQ(wrong, 0);
+  }
+
+  Program program;
+};
+
+const std::vector<graph::Dim>& loops_of(const Func& f) { return f.function()->pure->schedule.dims; }
+bool is_unrolled(const Func& f, const std::string& var) {
+  return std::any_of(loops_of(f).begin(), loops_of(f).end(), [&](const graph::Dim& loop) {
+    return loop.var == var && loop.runs == ForType::Unrolled;
+  });
+}
+bool is_inside_of(const Func& f, const Func& host) {
+  const graph::LoopLevel& level = f.function()->schedule.compute_level;
+  return level.kind == graph::LoopLevel::Kind::At && level.func == host.name();
+}
+
+struct Opponents {
+  Opponents() {
+    opponent(x, y, c) = mux(c, {source(x, y) + source(x + 1, y), source(x, y) - source(x + 1, y),
+                                source(x, y) * source(x, y + 1)});
+    Expr sum = sqrt(abs(opponent(x, y, 0) * opponent(x - 1, y, 2))) + opponent(x + 1, y, 1);
+    for (int k = 1; k < 4; k++) sum += opponent(x + k, y, 0) * opponent(x, y + k, 2);
+    out(x, y) = sum;
+  }
+  Source source;
+  Var x{"x"}, y{"y"}, c{"c"};
+  Func opponent{"opponent"}, out{"out"};
+};
+
+// Sums and differences of pairs, put beside each other again.
+struct Pairs {
+  Pairs() {
+    const Expr a = source(2 * x, y), b = source(2 * x + 1, y);
+    halves(x, y, k) = select(k == 0, exp(-a) + b, a - sqrt(abs(b) + 1.0f));
+    out(x, y) = halves(x / 2, y, x % 2);
+  }
+  Source source;
+  Var x{"x"}, y{"y"}, k{"k"};
+  Func halves{"halves"}, out{"out"};
+};
+
+// By data, which a clamp keeps among a few.
+struct Levels {
+  Levels() {
+    level(x, y, k) = select(k < 2, exp(-source(x, y)) * k, sqrt(source(x, y) + k));
+    const Expr which = clamp(cast<int>(source(x, y) * 2.0f), 0, 3);
+    out(x, y) = level(x, y, which) + level(x + 1, y, 3 - which);
+  }
+  Source source;
+  Var x{"x"}, y{"y"}, k{"k"};
+  Func level{"level"}, out{"out"};
+};
+
+TEST(Choices, AreUnrolledAlongDimensionsThatConstantsFix) {
+  Scheduled<Opponents> of;
+  EXPECT_TRUE(is_unrolled(of.program.opponent, "c"));
+  of.expect_same_values({101, 37});
+}
+
+TEST(Choices, AreMadeOnceWhereTheReadersLoopsMoveThem) {
+  Scheduled<Pairs> of;
+  EXPECT_TRUE(is_unrolled(of.program.halves, "k"));
+  of.expect_same_values({101, 37});
+}
+
+TEST(Choices, AreFixedByClampsOfWhatDataDecide) {
+  Scheduled<Levels> of;
+  EXPECT_TRUE(is_unrolled(of.program.level, "k"));
+  of.expect_same_values({101, 37});
+}
+
+TEST(Choices, StayWhereSizesDecideHowManyThereAre) {
+  Opponents program;
+  Func all("all");
+  all(program.x, program.y, program.c) = program.opponent(program.x, program.y, program.c);
+  all.set_estimate(program.c, 0, 3);
+  Pipeline({program.out, all}).auto_schedule(get_host_target());
+  EXPECT_FALSE(is_unrolled(program.opponent, "c"));
+}
+
+TEST(Choices, StayWhereTheyAreSwitchedOff) {
+  Opponents program;
+  AutoscheduleOptions options;
+  options.without = {Decision::Choices};
+  Pipeline(program.out).auto_schedule(get_host_target(), options);
+  EXPECT_FALSE(is_unrolled(program.opponent, "c"));
+}
+
+struct Taps {
+  Taps() {
+    taps(k, x) = exp(-cast<float>(k * k) * (1.0f + source(x, 0)));
+    Expr sum = 0.0f;
+    for (int i = 0; i < 4; i++) sum += taps(i, x) * source(x + i, y);
+    out(x, y) = sum;
+    out.set_estimate(x, 0, 250).set_estimate(y, 0, 200);
+  }
+  Source source;
+  Var k{"k"}, x{"x"}, y{"y"};
+  Func taps{"taps"}, out{"out"};
+};
+
+// Two numbers of each pixel, beside each other.
+struct Slopes {
+  Slopes() {
+    slope(c, x, y) = sqrt(abs(source(x + c, y + 1 - c) - source(x, y)) + 0.5f) * exp(-source(x, y));
+    out(x, y) = slope(0, x, y) * slope(1, x, y) + slope(0, x + 1, y) + slope(1, x, y + 1);
+    out.set_estimate(x, 0, 250).set_estimate(y, 0, 200);
+  }
+  Source source;
+  Var c{"c"}, x{"x"}, y{"y"};
+  Func slope{"slope"}, out{"out"};
+};
+
+TEST(LaneDimensions, AreTheLongOnesThatReadersRunAlong) {
+  Scheduled<Taps> taps;
+  EXPECT_EQ(taps.program.taps.function()->schedule.storage_dims[0], "x");
+  EXPECT_EQ(loops_of(taps.program.taps)[0].runs, ForType::Vectorized);
+  taps.expect_same_values({101, 37});
+  Scheduled<Slopes> slopes;
+  EXPECT_EQ(slopes.program.slope.function()->schedule.storage_dims[0], "x");
+  slopes.expect_same_values({101, 37});
+}
+
+TEST(LaneDimensions, AreOfWhatASumOfAllReadsToo) {
+  const auto sum_of = [](bool is_scheduled) {
+    Slopes program;
+    Func total("total");
+    RDom r(0, 100, 0, 50);
+    total() = 0.0f;
+    total() += program.slope(0, r.x, r.y) * program.slope(1, r.x, r.y) + program.slope(0, r.y, r.x);
+    if (is_scheduled) Pipeline(total).auto_schedule(get_host_target());
+    return Buffer<float>(total.realize())();
+  };
+  EXPECT_NEAR(sum_of(true) / sum_of(false), 1, 1e-4);
+}
+
+TEST(LaneDimensions, AreTheFirstWhereReadersRunAlongIt) {
+  Taps program;
+  Func all("all");
+  all(program.k, program.x) = program.taps(program.k, program.x) * 2.0f;
+  all.set_estimate(program.k, 0, 4).set_estimate(program.x, 0, 250);
+  Pipeline({program.out, all}).auto_schedule(get_host_target());
+  EXPECT_EQ(program.taps.function()->schedule.storage_dims[0], "k");
+}
+
+// Columns of each picture of a batch, in another order, as rows.
+struct Turned {
+  Turned() {
+    heavy(x, y, n) = exp(-source(x + n, y)) + sqrt(source(x, y + n) + 1.0f);
+    shuffled(x, y, n) = sin(heavy(x, (y * 5) % 64, n)) * heavy(x, 63 - y, n);
+    out(x, y, n) = shuffled(y, x, n) + shuffled(y, (x + 1) % 64, n);
+    out.bound(x, 0, 64).bound(y, 0, 128).bound(n, 0, 40);
+  }
+  Source source;
+  Var x{"x"}, y{"y"}, n{"n"};
+  Func heavy{"heavy"}, shuffled{"shuffled"}, out{"out"};
+};
+
+// Column sums of blocks of rows, of which the columns become rows.
+struct TurnedSums {
+  TurnedSums() {
+    part(x, i, k) = exp(-source(x, 8 * i + k)) + source(x, 8 * i + k + 1);
+    out(x, y) = part(y, x / 8, x % 8) + part(y, x / 8, 7 - x % 8) + part(y, 63 - x / 8, 3);
+    out.bound(x, 0, 512).bound(y, 0, 700);
+  }
+  Source source;
+  Var x{"x"}, y{"y"}, i{"i"}, k{"k"};
+  Func part{"part"}, out{"out"};
+};
+
+TEST(ChainsBehindTiles, RunInTheRowsOfTiles) {
+  Scheduled<Turned> turned;
+  EXPECT_TRUE(is_inside_of(turned.program.shuffled, turned.program.out));
+  EXPECT_TRUE(is_inside_of(turned.program.heavy, turned.program.out));
+  turned.expect_same_values({64, 128, 40});
+  Scheduled<TurnedSums> sums;
+  EXPECT_TRUE(is_inside_of(sums.program.part, sums.program.out));
+  sums.expect_same_values({512, 700});
+}
+
+// How alike windows around two pixels are, by offset: what is inline stands between.
+struct Likenesses {
+  Likenesses() {
+    const RDom each(0, 8, 0, 8);
+    difference(x, y, u, v) = exp(-abs(source(x + u, y + v) - source(x, y)));
+    windows(x, y, u, v) =
+        exp(difference(x - 1, y, u, v) + difference(x, y, u, v) + difference(x + 1, y, u, v));
+    weight(x, y, u, v) =
+        1.0f / (windows(x, y - 1, u, v) + windows(x, y, u, v) + windows(x, y + 1, u, v));
+    out(x, y) = 0.0f;
+    out(x, y) += weight(x, y, each.x, each.y) * source(x + each.x, y + each.y);
+    out.bound(x, 0, 280).bound(y, 0, 270);
+  }
+  Source source;
+  Var x{"x"}, y{"y"}, u{"u"}, v{"v"};
+  Func difference{"difference"}, windows{"windows"}, weight{"weight"}, out{"out"};
+};
+
+// The cost of each of many depths, of which a soft minimum is taken.
+struct Depths {
+  Depths() {
+    const RDom depth(0, 64);
+    cost(x, y, d) = sqrt(abs(source(x + d, y) - source(x, y)) + 0.25f) + exp(-source(x + d, y));
+    blurred(x, y, d) = cost(x, y - 1, d) + 2.0f * cost(x, y, d) + cost(x, y + 1, d);
+    out(x, y) = 0.0f;
+    out(x, y) += exp(-blurred(x, y, depth)) * cast<float>(depth);
+    out.bound(x, 0, 280).bound(y, 0, 270);
+  }
+  Source source;
+  Var x{"x"}, y{"y"}, d{"d"};
+  Func cost{"cost"}, blurred{"blurred"}, out{"out"};
+};
+
+TEST(SlicesReadThroughInlinedFuncs, AreComputedInTheReductionWithTheirChain) {
+  Scheduled<Likenesses> likenesses;
+  EXPECT_TRUE(is_inside_of(likenesses.program.windows, likenesses.program.out));
+  EXPECT_TRUE(is_inside_of(likenesses.program.difference, likenesses.program.out));
+  likenesses.expect_same_values({280, 270});
+  Scheduled<Depths> depths;
+  EXPECT_TRUE(is_inside_of(depths.program.cost, depths.program.out));
+  depths.expect_same_values({280, 270});
+}
+
+}  // namespace
+}  // namespace retrograde
