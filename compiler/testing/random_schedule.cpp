@@ -160,6 +160,7 @@ class Scheduler {
     std::set<std::string> wrapped;
     for (int f = 0; f < count(); ++f) {
       if (random_.chance(8)) wrap(f, wrapped);
+      if (random_.chance(5)) copy_input(f, wrapped);
     }
     for (int f = 0; f < count(); ++f) {
       // Wrappers are made for users by name: those of an update that is cut would go astray.
@@ -189,6 +190,16 @@ class Scheduler {
     if (!for_all) named.emplace_back(name(user));
     wrapped.insert({name(f), name(user)});
     add(f, clones ? Directive(Clone{made, named}) : Directive(Wrap{made, named}));
+  }
+
+  void copy_input(int f, std::set<std::string>& wrapped) {
+    std::vector<std::string> images;
+    walk(func(f), [&](const Call& call) {
+      if (call.call_type == CallType::Image) images.push_back(call.name);
+    });
+    if (images.empty() || func(f).is_extern()) return;
+    wrapped.insert(name(f));
+    add(f, CopyInput{names_.fresh("w"), NamedFunc(random_.pick(images))});
   }
 
   void factor(int f, int stage) {
