@@ -113,6 +113,21 @@ class Worker {
     std::cout << "slope " << kernels::slope_error(kernel_, primal, target_) << std::endl;
   }
 
+#ifdef BENCH_RETROGRADE
+  // Predicted and measured time of every stage, as JSON.
+  void explain(const std::string& path, double seconds) {
+    Halide::ExplainOptions options;
+    options.measure = seconds > 0;
+    options.seconds = seconds;
+    options.threads = threads_;
+    const auto report = kernel_.pipeline.explain_schedule(kernel_.outputs, target_, options);
+    std::ofstream file(path);
+    file << report.to_json();
+    if (!file.flush()) throw std::runtime_error("cannot write \"" + path + "\"");
+    std::cout << "explained" << std::endl;
+  }
+#endif
+
   void tell_memory() const {
     const double run_peak = bench::status_mb("VmHWM");
     std::cout << "memory " << std::max(compile_peak_mb_, run_peak) << " "
@@ -163,6 +178,10 @@ void serve(Worker& worker) {
     if (order == "threads") worker.set_threads(std::stoi(path));
     if (order == "save") worker.save(path);
     if (order == "inputs") worker.save_inputs(path);
+#ifdef BENCH_RETROGRADE
+    double seconds = 0;
+    if (order == "explain" && words >> seconds) worker.explain(path, seconds);
+#endif
     if (order == "slope") worker.tell_slope();
     if (order == "memory") worker.tell_memory();
   }

@@ -10,6 +10,7 @@
 //   driver  slope [PATH]  worker  slope ERROR      of a gradient that has run, see slope.h; PATH is
 //                                                  the library of its program, if that is another
 //   driver  threads N     worker  set              for runs to come; ours only
+//   driver  explain PATH SECONDS  worker explained   Retrograde: the schedule's report, as JSON
 //   driver  memory        worker  memory PEAK_MB RUN_MB
 //
 // START_SECONDS: compiling and running a first, trivial pipeline, which makes each compiler set up

@@ -14,4 +14,5 @@ namespace retrograde::autoschedule { using namespace graph; }
 namespace retrograde::autodiff { using namespace autoschedule; }
 namespace retrograde::lower { using namespace graph; }
 namespace retrograde::checks { using namespace graph; }
+namespace retrograde::tuning { using namespace graph; }
 // clang-format on

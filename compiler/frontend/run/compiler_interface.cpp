@@ -10,8 +10,14 @@ namespace retrograde {
               "it is linked with the front end alone", "Link libretrograde");
 }
 
-// Weak: the definitions of compiler/jit and compiler/aot win wherever they are linked in.
+// Weak: the definitions of compiler/jit, compiler/aot and compiler/tuning win wherever they are linked in.
 __attribute__((weak)) Compiler& default_compiler() { no_compiler(); }
 __attribute__((weak)) ModuleCompiler& module_compiler() { no_compiler(); }
+__attribute__((weak)) ScheduleReport explain_schedule(const PipelineSpec&,
+                                                      const std::vector<halide_buffer_t*>&,
+                                                      const Target&, const ExplainOptions&,
+                                                      const JITHandlers&) {
+  no_compiler();
+}
 
 }  // namespace retrograde

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "frontend/run/jit_handlers.h"
+#include "frontend/run/schedule_report.h"
 #include "frontend/schedule/autoschedule_options.h"
 #include "graph/function.h"
 #include "ir/lowered_function.h"
@@ -64,6 +65,11 @@ class Compiler {
 };
 
 Compiler& default_compiler();  // defined by compiler/jit
+
+// Pipeline::explain_schedule; defined by compiler/tuning. No outputs: as estimates say.
+ScheduleReport explain_schedule(const PipelineSpec& pipeline,
+                                const std::vector<halide_buffer_t*>& outputs, const Target& target,
+                                const ExplainOptions& options, const JITHandlers& handlers);
 
 class Module;
 enum class OutputFileType;

@@ -294,6 +294,26 @@ std::vector<halide_buffer_t*> Pipeline::checked_outputs(const RealizationArg& gi
   return buffers;
 }
 
+// ---- what a schedule costs ----
+
+ScheduleReport Pipeline::explain_schedule(const Target& target, const std::vector<int32_t>& sizes,
+                                          const ExplainOptions& options) const {
+  std::vector<Buffer<>> buffers;
+  if (!sizes.empty()) buffers = make_outputs(sizes, options.measure);
+  const RealizationArg outputs(buffers);
+  return retrograde::explain_schedule(
+      spec(), outputs.buffers(), target.has_unknowns() ? get_jit_target_from_environment() : target,
+      options, contents_->handlers);
+}
+
+ScheduleReport Pipeline::explain_schedule(const RealizationArg& outputs, const Target& target,
+                                          const ExplainOptions& options) const {
+  return retrograde::explain_schedule(
+      spec(), checked_outputs(outputs, options.measure),
+      target.has_unknowns() ? get_jit_target_from_environment() : target, options,
+      contents_->handlers);
+}
+
 // ---- calling ----
 
 void Pipeline::run(JITUserContext* context, const RealizationArg& given, const Target& target,

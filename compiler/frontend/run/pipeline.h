@@ -12,6 +12,7 @@
 #include "frontend/run/module.h"
 #include "frontend/run/param_map.h"
 #include "frontend/run/runnable.h"
+#include "frontend/run/schedule_report.h"
 #include "frontend/schedule/autoschedule_options.h"
 #include "frontend/schedule/autoscheduler.h"
 #include "graph/schedule_log.h"
@@ -85,6 +86,18 @@ class Pipeline : public Runnable<Pipeline> {
   // the program; what a directive is given to is
   // there.
   void apply_schedule(const ScheduleLog& log);
+
+  // ---- what a schedule costs; see schedule_report.h ----
+  // For outputs over [0, size) in each dimension, all of one shape; without sizes, as their
+  // estimates say.
+  // Requires: it takes one size for each dimension (RuntimeError); sizes are not negative
+  // (RuntimeError).
+  ScheduleReport explain_schedule(const Target& target = Target(),
+                                  const std::vector<int32_t>& sizes = {},
+                                  const ExplainOptions& options = {}) const;
+  // For such buffers, into which it is run where times are measured.
+  ScheduleReport explain_schedule(const RealizationArg& outputs, const Target& target = Target(),
+                                  const ExplainOptions& options = {}) const;
 
   PipelineSpec spec() const;
 

@@ -35,6 +35,8 @@ SHOWN_BY = {
     "GeneratorInput": r"Input<", "GeneratorOutputBase": r"Output<", "GeneratorOutput": r"Output<",
     "GeneratorParamBase": r"GeneratorParam<", "GeneratorBase": r"Generator<|apply\(|GeneratorRegistry",
     "VarOrRVar": r"Var", "ExternSignature": r"JITExtern", "ExternCFunction": r"JITExtern", "ImplicitVar": r"\b_\d?\b",
+    "ExplainOptions": r"explain_schedule", "ScheduleReport": r"explain_schedule",
+    "ScheduleReport::Stage": r"explain_schedule",
     "GradientCheckOptions": r"check_gradients", "GradientReport::Step": r"check_gradients",
     "GradientReport::Method": r"check_gradients", "GradientReport::FuncError": r"check_gradients",
     "StabilityOptions": r"check_stability", "StabilityReport::LeftOut": r"check_stability",

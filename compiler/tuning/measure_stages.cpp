@@ -1,0 +1,93 @@
+#include "tuning/measure_stages.h"
+
+#include <HalideRuntime.h>
+
+#include <algorithm>
+#include <chrono>
+#include <limits>
+
+#include "frontend/run/call.h"
+#include "ir/visit.h"
+#include "jit/jit.h"
+#include "lower/lower.h"
+#include "retrograde_runtime.h"
+
+namespace retrograde::tuning {
+
+namespace {
+
+using Clock = std::chrono::steady_clock;
+constexpr int fewest_runs = 5;
+
+double seconds_since(Clock::time_point begin) {
+  return std::chrono::duration<double>(Clock::now() - begin).count();
+}
+
+void keep_message(retrograde_context* context, int, const char* message) {
+  static_cast<CallContext*>(context->user_data)->error = message;
+}
+
+// Compiled code that leaves what the profiler found where it is.
+class ProfiledPipeline : public CompiledPipeline {
+ public:
+  ProfiledPipeline(const ir::LoweredFunction& function, const Target& target,
+                   const std::map<std::string, void*>& externs)
+      : arguments_(function.args) {
+    jit::Options options;
+    options.externs = externs;
+    code_ = jit::compile(function, target, options);
+  }
+  const std::vector<ir::LoweredArgument>& arguments() const override { return arguments_; }
+  int run(void* const* argv, CallContext& caller) const override {
+    retrograde_context context = {};
+    context.error_handler = keep_message;
+    context.thread_limit = caller.thread_limit;
+    context.user_data = &caller;
+    return code_->call(&context, const_cast<void**>(argv));
+  }
+
+ private:
+  const std::vector<ir::LoweredArgument> arguments_;
+  std::shared_ptr<const jit::CompiledFunction> code_;
+};
+
+}  // namespace
+
+MeasuredStages measure_stages(const PipelineSpec& pipeline,
+                              const std::vector<graph::FuncPtr>& scheduled,
+                              const std::vector<halide_buffer_t*>& outputs, const Target& target,
+                              const ExplainOptions& options, const JITHandlers& handlers) {
+  // A name of its own keeps what it finds apart from what else runs under the profiler.
+  const std::string name = ir::unique_name(pipeline.name + "_explained");
+  lower::LowerOptions lowering;
+  lowering.target = target.with_feature(Target::Profile);
+  const ir::LoweredFunction function =
+      lower::lower(name, scheduled, lower::infer_arguments(pipeline.outputs), lowering);
+  const ProfiledPipeline code(function, lowering.target, pipeline.externs);
+  const std::string asked = "measure the stages of " + retrograde::quoted(pipeline.name);
+  frontend::Arguments arguments(code, outputs, false, asked, ParamMap::empty_map());
+  JITHandlers used = handlers;
+  if (options.threads > 0) used.thread_limit = options.threads;
+  const auto call = [&] {
+    const auto begin = Clock::now();
+    frontend::call(code, used, arguments.argv(), asked, nullptr);
+    return seconds_since(begin);
+  };
+  MeasuredStages result;
+  result.total_seconds = std::numeric_limits<double>::infinity();
+  const auto begin = Clock::now();
+  int runs = 0;
+  for (; runs < fewest_runs || seconds_since(begin) < options.seconds; runs++)
+    result.total_seconds = std::min(result.total_seconds, call());
+  const halide_profiler_pipeline_stats* stats = retrograde_profiler_pipeline(name.c_str());
+  if (!stats || stats->time == 0) return result;
+  // The shares are of all runs, the time is that of the fastest.
+  for (int i = 0; i < stats->num_funcs; i++) {
+    const double share =
+        static_cast<double>(stats->funcs[i].time) / static_cast<double>(stats->time);
+    result.seconds[stats->funcs[i].name] += share * result.total_seconds;
+  }
+  return result;
+}
+
+}  // namespace retrograde::tuning
