@@ -24,8 +24,11 @@ bool is_of_name(char c) {
 }
 
 // Funcs that a schedule makes have another number in each copy of a graph: all names but those known
-// are numbered anew, in their order.
-std::string with_stable_names(const std::string& text, const std::set<std::string>& known) {
+// are numbered anew, in their order; the first of a name in the process has no number yet.
+std::string with_stable_names(const ScheduleLog& log, const std::set<std::string>& known) {
+  const std::string text = log.to_text();
+  std::set<std::string> made;
+  for (const ScheduleLog::Entry& entry : log.entries) made.insert(made_by(entry.directive));
   std::map<std::string, std::map<std::string, size_t>> numbers;
   std::string result;
   for (size_t at = 0; at < text.size();) {
@@ -35,7 +38,7 @@ std::string with_stable_names(const std::string& text, const std::set<std::strin
     const size_t dollar = name.find('$');
     if (end == at) {
       result += text[end++];
-    } else if (dollar == std::string::npos || known.contains(name)) {
+    } else if (known.contains(name) || (dollar == std::string::npos && !made.contains(name))) {
       result += name;
     } else {
       const std::string plain = name.substr(0, dollar);
@@ -103,7 +106,7 @@ class Search {
   }
 
   std::string text_of(const SearchedSchedule& s) const {
-    return with_stable_names(schedule_log(s.graph.outputs).to_text(), names_);
+    return with_stable_names(schedule_log(s.graph.outputs), names_);
   }
 
   // The two best.
@@ -203,8 +206,8 @@ std::string difference_of(const ScheduleLog& first, const ScheduleLog& second) {
   for (const std::string& name : funcs_of(first)) {
     if (others.contains(name)) both.insert(name);
   }
-  const std::string a = with_stable_names(first.to_text(), both);
-  const std::string b = with_stable_names(second.to_text(), both);
+  const std::string a = with_stable_names(first, both);
+  const std::string b = with_stable_names(second, both);
   return only_in(a, b, "- ") + only_in(b, a, "+ ");
 }
 
