@@ -41,6 +41,10 @@ struct Program {
     auto it = renamed.find(name);
     return it == renamed.end() ? name : it->second;
   }
+  // After the order of `funcs` has changed.
+  void number() {
+    for (size_t f = 0; f < funcs.size(); ++f) index_of[funcs[f].name()] = static_cast<int>(f);
+  }
   const LoopedFunc* find(const std::string& name) const {
     auto it = index_of.find(original(name));
     return it == index_of.end() ? nullptr : &funcs[it->second];

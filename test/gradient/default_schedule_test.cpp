@@ -533,14 +533,7 @@ TEST_F(DefaultSchedule, SumsThatLookTheSamePlacesUpShareTheirLoops) {
   const Buffer<float> image = gradient::random_image({size, size, channels}, -1, 1, 1);
   const Buffer<float> flow = gradient::random_image({size, size, 2}, -5, 5, 2);
   const Buffer<float> seed = gradient::random_image({size, size, channels}, -1, 1, 3);
-  Var c("c");
-  Func u("u"), v("v"), warped("warped");
-  u(x, y) = clamp(x + flow(x, y, 0), 0.0f, size - 1.0f);
-  v(x, y) = clamp(y + flow(x, y, 1), 0.0f, size - 1.0f);
-  const Expr i = min(cast<int>(u(x, y)), size - 2), j = min(cast<int>(v(x, y)), size - 2);
-  warped(x, y, c) =
-      lerp(lerp(image(i, j, c), image(i + 1, j, c), u(x, y) - i),
-           lerp(image(i, j + 1, c), image(i + 1, j + 1, c), u(x, y) - i), v(x, y) - j);
+  const Func warped = gradient::bilinear_warp(image, flow);
   const Derivative d = propagate_adjoints(warped, seed);
   Func by_flow = d(flow);
   const Buffer<float> apart = [&] {

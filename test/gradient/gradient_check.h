@@ -157,4 +157,19 @@ inline void expect_gradient(const Func& loss, Buffer<float>& image,
   expect_gradient(loss, d, image);
 }
 
+// An image read at places that data decide, between its pixels: by image(i, j, c) and flow(x, y, 0..1)
+// in pixels, both of `size` by `size`.
+inline Func bilinear_warp(const Buffer<float>& image, const Buffer<float>& flow) {
+  const int size = image.dim(0).extent();
+  Var x("x"), y("y"), c("c");
+  Func u("u"), v("v"), warped("warped");
+  u(x, y) = clamp(x + flow(x, y, 0), 0.0f, size - 1.0f);
+  v(x, y) = clamp(y + flow(x, y, 1), 0.0f, size - 1.0f);
+  const Expr i = min(cast<int>(u(x, y)), size - 2), j = min(cast<int>(v(x, y)), size - 2);
+  warped(x, y, c) =
+      lerp(lerp(image(i, j, c), image(i + 1, j, c), u(x, y) - i),
+           lerp(image(i, j + 1, c), image(i + 1, j + 1, c), u(x, y) - i), v(x, y) - j);
+  return warped;
+}
+
 }  // namespace retrograde::gradient

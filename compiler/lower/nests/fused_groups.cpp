@@ -163,8 +163,7 @@ void order_fused_groups(Program& program) {
   std::vector<LoopedFunc> ordered;
   for (const int f : GroupOrder(program, groups).funcs()) ordered.push_back(program.funcs[f]);
   program.funcs = std::move(ordered);
-  for (size_t f = 0; f < program.funcs.size(); f++)
-    program.index_of[program.funcs[f].name()] = static_cast<int>(f);
+  program.number();
 }
 
 std::vector<FusedGroup> fused_groups(const Program& program) { return Grouping(program).groups(); }
