@@ -4,15 +4,18 @@
     pytorch_peers.py WORKER [--program NAME] [--rounds N] [--threads N] [--small] [--output FILE]
 
 WORKER is bench_kernels_retrograde, asked as ../pairs/worker_protocol.h says; PyTorch runs in this
-process. Both run in turn, on the same inputs and as many threads. PyTorch's programs are what its
-users write: the operators of torch.nn.functional where there is one, autograd for the gradients. Its
-time is that of the forward and the backward pass (autograd needs both), ours that of the gradients
-with what they need of the program. Error: the largest |ours - theirs| / max(|theirs|, root mean
-square), as in ../README.md.
+process, that of the virtual environment of ../operators/operators.py, which is made when it is not
+there. All run in turn, on the same inputs and as many threads. PyTorch's programs are what its users
+write: the operators of torch.nn.functional where there is one, autograd for the gradients, as they
+are and through torch.compile. Its time is that of the forward and the backward pass (autograd needs
+both), ours that of the gradients with what they need of the program. Error: the largest
+|ours - theirs| / max(|theirs|, root mean square), as in ../README.md; theirs is the eager one.
 """
 import argparse
 import json
+import logging
 import os
+import signal
 import statistics
 import struct
 import subprocess
@@ -20,12 +23,19 @@ import sys
 import tempfile
 import time
 
+sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "operators"))
+import operators
+
 try:
-    import numpy as np
     import torch
-    import torch.nn.functional as F
-except ImportError as missing:
-    sys.exit(f"pytorch_peers.py: {missing}. Install Debian's python3-torch and python3-numpy.")
+except ImportError:
+    if sys.prefix == operators.PEERS:
+        raise
+    operators.make_peers(["pytorch"])
+    python = os.path.join(operators.PEERS, "bin", "python")
+    os.execv(python, [python, *sys.argv])
+import numpy as np
+import torch.nn.functional as F
 
 
 # ---- the inputs of kernel.h and gradient.cpp ----
@@ -180,14 +190,19 @@ PROGRAMS = [convolution_layer, bilateral_slice, deconvolution, recursive_filter,
             cross_entropy, normalisation, denoising, laplacian_pyramid]
 
 
-# ---- both sides ----
+# ---- the sides ----
+
+COMPILE_SECONDS = 60
 
 class PyTorch:
-    def __init__(self, program, small):
+    def __init__(self, program, small, compiled=False):
         inputs, self.program = program(lambda full, quick: quick if small else full)
         self.inputs = [x.requires_grad_() for x in inputs]
         with torch.no_grad():
             self.seed = seed_of(self.program(*self.inputs))
+        if compiled:
+            torch._dynamo.reset()
+            self.program = torch.compile(self.program)
 
     def run(self):
         start = time.perf_counter()
@@ -241,20 +256,49 @@ def largest_error(ours, theirs):
     return worst
 
 
+def compiled_side(program, options):
+    """None where torch.compile has not the program within COMPILE_SECONDS: a scan is as many operators
+    as it has rows."""
+    def too_long(*_):
+        raise TimeoutError(f"not compiled within {COMPILE_SECONDS} s")
+
+    logging.disable(logging.CRITICAL)  # of a compiler that is interrupted
+    before = signal.signal(signal.SIGALRM, too_long)
+    signal.alarm(COMPILE_SECONDS)
+    try:
+        side = PyTorch(program, options.small, compiled=True)
+        side.run()
+        return side, None
+    except Exception as failed:
+        return None, str(failed).split("\n")[0]
+    finally:
+        signal.alarm(0)
+        signal.signal(signal.SIGALRM, before)
+
+
+def run_in_turn(sides, rounds):
+    times = [[] for _ in sides]
+    for i in range(rounds):
+        for k in range(len(sides)):
+            at = (i + k) % len(sides)
+            times[at].append(operators.last_of_turn(sides[at].run) * 1e3)
+    return [statistics.median(t) for t in times]
+
+
 def measure(program, options):
     theirs = PyTorch(program, options.small)
+    compiled, failure = compiled_side(program, options)
     ours = Retrograde(options.worker, program, options.small, options.threads)
     theirs.run(), ours.run()
-    times = [], []
-    for i in range(options.rounds):
-        for side in ((0, 1), (1, 0))[i % 2]:
-            time.sleep(0.0005)  # threads of the other side keep looking for work for a moment
-            times[side].append((ours, theirs)[side].run() * 1e3)
+    a, b, *c = run_in_turn([ours, theirs] + ([compiled] if compiled else []), options.rounds)
     error = largest_error(ours.outputs(), theirs.gradients)
     ours.close()
-    a, b = (statistics.median(t) for t in times)
-    print(f"{program.__name__:20} {a:10.2f} {b:10.2f} {a / b:8.3f} {error:10.1e}", flush=True)
-    return {"program": program.__name__, "retrograde_ms": a, "pytorch_ms": b, "ratio": a / b,
+    best = min([b, *c])
+    c = c[0] if c else None
+    print(f"{program.__name__:20} {a:10.2f} {b:10.2f} {format(c, '10.2f') if c else '         -'} "
+          f"{a / best:8.3f} {error:10.1e}", flush=True)
+    return {"program": program.__name__, "retrograde_ms": a, "pytorch_ms": b,
+            "pytorch_compiled_ms": c, "compile_failure": failure, "ratio": a / best,
             "max_relative_error": error}
 
 
@@ -269,7 +313,7 @@ def main():
     options = parser.parse_args()
     torch.set_num_threads(options.threads)
     print(f"PyTorch {torch.__version__}, {options.threads} threads")
-    print(f"{'program':20} {'ours ms':>10} {'PyTorch':>10} {'ratio':>8} {'error':>10}")
+    print(f"{'program':20} {'ours ms':>10} {'PyTorch':>10} {'compiled':>10} {'ratio':>8} {'error':>10}")
     rows = [measure(p, options) for p in PROGRAMS
             if options.program in (None, p.__name__)]
     mean = float(np.exp(np.mean([np.log(r["ratio"]) for r in rows])))

@@ -34,6 +34,9 @@ PYTORCH = "torch==2.13.0"
 SCHEDULES = ["Adams2019", "Li2018", "Mullapudi2016", "root"]  # of Halide
 SEARCH_SECONDS = 60  # for a schedule of Halide's, compilation included
 RUN_SECONDS = 240  # for one run of a worker, and for torch.compile
+PAUSE_SECONDS = 0.03  # before a turn: threads of OpenMP that have no work look for some for so long
+WARM_SECONDS = 0.02  # of untimed runs in a turn: after the pause caches and clocks are not as in use
+COLD_SECONDS = 0.2  # a run that takes this long needs none
 PEER_SECONDS = 8  # for all rounds of a worker that is slow; it runs at least once
 
 
@@ -43,6 +46,18 @@ def operator_names():
 
 
 # ---- workers ----
+
+def last_of_turn(run):
+    """Seconds of one run as it is where run after run is made: `run` gives those of one."""
+    time.sleep(PAUSE_SECONDS)
+    spent = 0
+    while True:
+        seconds = run()
+        if spent >= WARM_SECONDS or seconds >= COLD_SECONDS:
+            return seconds
+        spent += seconds
+
+
 
 def saved_arrays(path):
     """Those in a file of OutputHeaders and elements."""
@@ -117,7 +132,7 @@ class Worker:
         self.close()
 
     def run(self):
-        self.times.append(self.ask("run", "ran")[0] * 1e3)
+        self.times.append(last_of_turn(lambda: self.ask("run", "ran")[0]) * 1e3)
 
     def has_enough(self):
         return self.failure or sum(self.times) > PEER_SECONDS * 1e3
@@ -208,7 +223,6 @@ def run_in_turn(workers, rounds):
             worker = workers[(i + at) % len(workers)]
             if worker.has_enough():
                 continue
-            time.sleep(0.001)  # threads of the one before keep looking for work for a moment
             try:
                 worker.run()
                 if at < 0 and not worker.has_enough():

@@ -207,7 +207,7 @@ class LoopChooser {
                             : std::nullopt;
     std::vector<VarOrRVar> loops = cut(*tile, {}, packed.has_value());
     if (packed) loops = pack_inside(*packed, loops);
-    run_in_parallel(loops);
+    run_in_parallel(loops, *tile);
     return true;
   }
 
@@ -226,9 +226,29 @@ class LoopChooser {
     return outside;
   }
 
-  void run_in_parallel(const std::vector<VarOrRVar>& loops) {
+  // The outermost of them, and where that may be short the next one too: a loop in parallel inside of
+  // another is launched for each of its iterations.
+  void run_in_parallel(const std::vector<VarOrRVar>& loops, const RegisterTile& tile) {
     stage_.parallel(loops.back());
-    if (loops.size() > 2) stage_.parallel(loops[loops.size() - 2]);  // the last may be short
+    if (loops.size() > 2 && iterations_of(loops.back(), tile) < sizes_.machine().enough_tasks)
+      stage_.parallel(loops[loops.size() - 2]);
+  }
+
+  // Of a loop over tiles; 0: not known.
+  int64_t iterations_of(const VarOrRVar& loop, const RegisterTile& tile) const {
+    const auto arg = std::find(f_.args.begin(), f_.args.end(), loop.name());
+    if (arg == f_.args.end()) return 0;
+    const auto dimension = static_cast<size_t>(arg - f_.args.begin());
+    const int64_t size = size_along(tile, dimension);
+    return (sizes_.extent(f_, dimension).value_or(0) + size - 1) / size;
+  }
+
+  static int64_t size_along(const RegisterTile& tile, size_t dimension) {
+    if (dimension == 0) return tile.vectors * lanes;
+    for (const RegisterTile::Side& side : tile.sides) {
+      if (side.dimension == dimension) return side.size;
+    }
+    return 1;
   }
 
   std::optional<RegisterTile> tile_of(const FuncContents& f, const Definition& reduction) const {
@@ -291,9 +311,7 @@ class LoopChooser {
     std::vector<size_t> shifts;
     int64_t tasks = 1;
     for (size_t d : pure_) {
-      int64_t size = d == 0 ? tile.vectors * lanes : 1;
-      for (const RegisterTile::Side& side : tile.sides)
-        size = side.dimension == d ? side.size : size;
+      const int64_t size = size_along(tile, d);
       const auto arg = std::find(block.args.begin(), block.args.end(), f_.args[d]);
       const auto in_block = static_cast<size_t>(arg - block.args.begin());
       const int64_t extent = sizes_.extent(f_, d).value_or(sizes_.machine().enough_tasks * size);
@@ -316,7 +334,7 @@ class LoopChooser {
     const RegisterTile own = renumbered(tile, *block);
     const std::vector<size_t> shifts = shifts_of(*block, own);
     compute_block(block, shifts);
-    run_in_parallel(cut(own, shifts));
+    run_in_parallel(cut(own, shifts), own);
     for (int s = 0; s < block->stage_count(); ++s)
       LoopChooser(block, s, request_, sizes_).cut(tile);
   }
