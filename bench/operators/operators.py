@@ -2,7 +2,7 @@
 """operators.py -- operators with all their gradients beside the newest Halide and PyTorch, in one run.
 
     operators.py PROGRAMS [--operator NAME]... [--quick] [--rounds N] [--threads N]
-                 [--peers none|halide|pytorch|all] [--output FILE] [--add] [--small]
+                 [--peers none|halide|pytorch|all] [--output FILE] [--add] [--small] [--search]
 
 PROGRAMS is the folder of bench_operators_retrograde and bench_machine. The others come from the Python
 package index into a virtual environment, out/bench/peers, made when it is not there: the wheel of
@@ -33,6 +33,7 @@ PEERS = os.path.join(ROOT, "out", "bench", "peers")
 PYTORCH = "torch==2.13.0"
 SCHEDULES = ["Adams2019", "Li2018", "Mullapudi2016", "root"]  # of Halide
 SEARCH_SECONDS = 60  # for a schedule of Halide's, compilation included
+SEARCHED = "retrograde_search"  # ours, with AutoscheduleOptions::search
 RUN_SECONDS = 240  # for one run of a worker, and for torch.compile
 PAUSE_SECONDS = 0.03  # before a turn: threads of OpenMP that have no work look for some for so long
 WARM_SECONDS = 0.02  # of untimed runs in a turn: after the pause caches and clocks are not as in use
@@ -85,6 +86,7 @@ class Worker:
 
     def __init__(self, name, command, threads, seconds):
         self.name, self.line, self.times, self.failure = name, b"", [], None
+        self.command = command
         self.said = tempfile.TemporaryFile()
         self.process = subprocess.Popen(
             command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self.said, bufsize=0,
@@ -202,6 +204,8 @@ def start_workers(name, options, scratch):
 
     workers = [start("retrograde", [os.path.join(options.programs, "bench_operators_retrograde"),
                                     name, size, threads])]
+    if options.search:
+        workers.append(start(SEARCHED, [*workers[0].command, "search=true"]))
     path = os.path.join(scratch, "inputs")
     shapes = [str(int(n)) for n in workers[0].ask("inputs " + path, "saved")]
     if options.halide_worker:
@@ -278,6 +282,10 @@ def figures(name, workers, errors, machine, scratch):
         row |= {"compile_s": compile_s + derive_s, "search_s": search_s, "bytes": moved,
                 "operations": operations,
                 "bound_ms": 1e3 * max(moved / machine["bytes_per_second"], operations / machine["flops"])}
+    if SEARCHED in by_name:
+        row["searched_ms"] = done.get(SEARCHED)
+        if not by_name[SEARCHED].failure:
+            row["search_s"] = by_name[SEARCHED].ready[5]
     row["halide_compile_s"] = {s: w.ready[0] + w.ready[4] for s in halide
                                if not (w := by_name[s]).failure}
     row["halide_search_s"] = {s: w.ready[5] for s in halide if not (w := by_name[s]).failure}
@@ -322,7 +330,8 @@ def is_wrong(row):
     """A pipeline of ours that fails, or whose results are not those in float64."""
     if row["retrograde_ms"] is None:
         return True
-    return not (row["norm_error"] or 0) <= 1e-3
+    searched = row["errors"].get(SEARCHED)
+    return not (max(row["norm_error"] or 0, *(searched["norm"] if searched else [0]))) <= 1e-3
 
 
 def line(row):
@@ -333,7 +342,9 @@ def line(row):
     return (f"{row['operator']:22}{cell(row['retrograde_ms'])}{cell(row['halide_best_ms'])}"
             f"{cell(row['pytorch_ms'])}{cell(row['pytorch_compiled_ms'])}{cell(row.get('bound_ms'))}"
             f"{cell(row['peak_mb'], '8.0f')}{cell(row['norm_error'], '10.1e')}  {halide}"
-            f"{'  WRONG' if is_wrong(row) else ''}")
+            + (f"  searched {cell(row['searched_ms'], '6.2f')} in {cell(row.get('search_s'), '4.1f')} s"
+               if "searched_ms" in row else "")
+            + ("  WRONG" if is_wrong(row) else ""))
 
 
 def write(path, report):
@@ -350,6 +361,7 @@ def read_options():
     parser.add_argument("--rounds", type=int, help="timed runs of each, 15 when not given")
     parser.add_argument("--threads", type=int, default=2)
     parser.add_argument("--peers", choices=["none", "halide", "pytorch", "all"], default="all")
+    parser.add_argument("--search", action="store_true", help="ours also by a search, beside the rules")
     parser.add_argument("--small", action="store_true", help="sizes for a check of the results")
     parser.add_argument("--add", action="store_true", help="keep other operators of an earlier report")
     parser.add_argument("--output", default="operators.json")

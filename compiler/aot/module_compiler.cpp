@@ -11,7 +11,7 @@
 #include "aot/merge_objects.h"
 #include "aot/program.h"
 #include "aot/runtime_object.h"
-#include "autoschedule/default_schedule.h"
+#include "autoschedule/choose_schedule.h"
 #include "codegen/archive.h"
 #include "codegen/machine.h"
 #include "diagnostics/error.h"
@@ -255,11 +255,9 @@ class AheadOfTime : public ModuleCompiler {
     codegen::machine_for(target, false);  // says what cannot be compiled for before any work
     lower::LowerOptions options;
     options.target = pipeline.traced(target);
-    return lower::lower(
-        pipeline.name,
-        autoschedule::schedule_unscheduled(
-            pipeline.outputs, autoschedule::vector_unit_of(options.target), pipeline.autoschedule),
-        inputs, options);
+    return lower::lower(pipeline.name,
+                        autoschedule::choose_schedule(pipeline, options.target).graph.outputs,
+                        inputs, options);
   }
 
   std::vector<uint8_t> object(const Module& module) override {

@@ -1,9 +1,8 @@
 // auto_schedule.cpp -- the scheduler of Pipeline::auto_schedule() where no plugin was asked for.
 //
-// It gives the default schedule (default_schedule.h), within the memory budget, to a copy of the graph. What the log of the
-// copy holds beyond that of the pipeline is then given to the pipeline, and is the source.
-#include "autoschedule/default_schedule.h"
-#include "autoschedule/memory_budget.h"
+// It gives a schedule (choose_schedule.h) to a copy of the graph. What the log of the copy holds beyond
+// that of the pipeline is then given to the pipeline, and is the source.
+#include "autoschedule/choose_schedule.h"
 #include "diagnostics/large_stack.h"
 #include "frontend/run/pipeline.h"
 #include "frontend/schedule/autoscheduler.h"
@@ -22,14 +21,17 @@ void schedule_all(const Pipeline& pipeline, const Target& target, const MachineP
   run_on_large_stack([&] {
     const std::vector<FuncPtr> wrapped = apply_wrappers(outputs);
     const auto given = static_cast<std::ptrdiff_t>(schedule_log(wrapped).size());
-    const ScheduledGraph scheduled = schedule_within_budget(
-        wrapped, {vector_unit_of(target), spec.autoschedule, machine}, Scheduling::Everything);
+    ChosenSchedule chosen =
+        choose_schedule(wrapped, {vector_unit_of(target), spec.autoschedule, machine},
+                        Scheduling::Everything, target);
+    const ScheduledGraph& scheduled = chosen.graph;
     ScheduleLog log = schedule_log(scheduled.outputs);
     log.entries.erase(log.entries.begin(), log.entries.begin() + given);
     apply_log(log, outputs);
     results->schedule_source = log.to_cpp();
     results->memory_bytes = scheduled.memory.bytes;
     results->memory_budget_bytes = scheduled.memory.budget_bytes;
+    results->search = std::move(chosen.search);
   });
 }
 

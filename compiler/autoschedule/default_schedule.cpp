@@ -1,10 +1,12 @@
 #include "autoschedule/default_schedule.h"
 
 #include <algorithm>
+#include <cmath>
 #include <functional>
 #include <optional>
 #include <unordered_set>
 
+#include "autoschedule/atomic_scatters.h"
 #include "autoschedule/choices.h"
 #include "autoschedule/chosen_places.h"
 #include "autoschedule/column_blocks.h"
@@ -254,7 +256,10 @@ class LoopChooser {
   std::optional<RegisterTile> tile_of(const FuncContents& f, const Definition& reduction) const {
     if (!makes(Decision::RegisterTiles)) return std::nullopt;
     const bool has_lanes = f.made && f.made->lanes > 0;
-    return register_tile(f, reduction, lanes, has_lanes ? 1 : 4, request_.unit, sizes_);
+    VectorUnit unit = request_.unit;
+    unit.accumulator_bytes =
+        static_cast<int64_t>(std::ldexp(unit.accumulator_bytes, request_.scales.register_tile));
+    return register_tile(f, reduction, lanes, has_lanes ? 1 : 4, unit, sizes_);
   }
 
   // Its loops stand inside of those of the reduction; those over tiles outside, of the sides first,
@@ -450,17 +455,24 @@ SizeEstimate give_default_schedule(const std::vector<FuncPtr>& outputs,
                               sizes);
   const LaneDimensions along(
       outputs, makes(Decision::LayoutStaging) ? stored : std::vector<FuncPtr>(), lanes, sizes);
+  const AtomicScatters atomic(outputs, stored, whole, request, sizes);
   std::vector<FuncPtr> given;  // loops, at root
   for (const FuncPtr& f : stored) {
     if (is_touched(*f)) continue;
     Func(f).compute_root();
-    if (f->is_extern() || limits.levels.contains(f.get())) continue;
-    if (makes(Decision::ScatterStrategy) && schedule_scatter(f, slices, sizes)) continue;
+    if (f->is_extern() || limits.levels.contains(f.get()) || atomic.schedule(f)) continue;
+    if (makes(Decision::ScatterStrategy) && schedule_scatter(f, slices, sizes)) {
+      if (atomic.is_part(*f)) run_serially(f);
+      continue;
+    }
     if (const size_t d = along.of(*f); d > 0)
       LoopChooser(f, 0, request, sizes).give_along(d);
     else
       for (int s = 0; s < f->stage_count(); ++s) LoopChooser(f, s, request, sizes).give();
-    given.push_back(f);
+    if (atomic.is_part(*f))
+      run_serially(f);
+    else
+      given.push_back(f);
   }
   if (may_choose) unroll_choices(given, fixed, sizes);
   move_and_join(outputs, stored, given, whole, sizes, request.options.without);

@@ -24,6 +24,15 @@ namespace retrograde::autoschedule {
 // Of which Funcs of a graph: adjoints and what is computed with them, or all.
 enum class Scheduling : uint8_t { Gradients, Everything };
 
+// What the rules choose by a number of theirs: how often a search doubles it; -1: half of it.
+struct ScheduleScales {
+  int register_tile = 0;  // bytes of sums in registers
+  int tasks = 0;          // that make enough of them
+  int strip_rows = 0;
+  int caches = 0;  // bytes that stay in them
+  friend bool operator==(const ScheduleScales&, const ScheduleScales&) = default;
+};
+
 // What a schedule is made for, and what its user said of it.
 struct ScheduleRequest {
   VectorUnit unit = {};
@@ -32,6 +41,7 @@ struct ScheduleRequest {
   // What a search or a budget (memory_budget.h) wants computed where it is read, and what stored,
   // where that can be.
   std::set<std::string> recomputed = {}, stored = {};
+  ScheduleScales scales = {};
 };
 
 // Gives the directives to the Funcs of this graph, whose wrappers have been applied. The result: how

@@ -110,7 +110,7 @@ class BudgetedSchedule {
 
   int64_t threads() const {
     const int said = threads_of(request_);
-    return said > 0 ? said : limits_of(request_).enough_tasks / tasks_a_thread;
+    return said > 0 ? said : MachineLimits().enough_tasks / tasks_a_thread;
   }
 
   int64_t budget(const std::vector<FuncPtr>& outputs, int64_t callers,

@@ -10,7 +10,7 @@ namespace retrograde::autoschedule {
 
 namespace {
 
-using Kind = graph::LoopLevel::Kind;
+using LevelKind = graph::LoopLevel::Kind;
 
 // When each Func is computed and read last, as places in the order of the graph.
 class Lives {
@@ -32,14 +32,14 @@ class Lives {
   const std::vector<FuncPtr>& order() const { return order_; }
   size_t last(size_t f) const { return last_[f]; }
   static bool is_inlined(const FuncContents& f) {
-    return f.is_pure() && f.schedule.compute_level.kind == Kind::Inlined;
+    return f.is_pure() && f.schedule.compute_level.kind == LevelKind::Inlined;
   }
   // The Func at root in whose loops f is stored: itself, or another.
   size_t nest(size_t f) const {
     for (size_t steps = 0; steps < order_.size(); ++steps) {
       const graph::LoopLevel& level = order_[f]->schedule.compute_level;
       const auto host = by_name_.find(level.func);
-      if (level.kind != Kind::At || host == by_name_.end()) break;
+      if (level.kind != LevelKind::At || host == by_name_.end()) break;
       f = host->second;
     }
     return f;
@@ -47,7 +47,8 @@ class Lives {
   const FuncContents* host_of(const FuncContents& f) const {
     const graph::LoopLevel& level = f.schedule.compute_level;
     const auto host = by_name_.find(level.func);
-    return level.kind == Kind::At && host != by_name_.end() ? order_[host->second].get() : nullptr;
+    return level.kind == LevelKind::At && host != by_name_.end() ? order_[host->second].get()
+                                                                 : nullptr;
   }
 
  private:
@@ -88,8 +89,9 @@ int64_t bytes_of(const FuncContents& f, const Lives& lives, const SizeEstimate& 
   const int64_t all = sizes.bytes(f);
   const FuncContents* host = lives.host_of(f);
   if (!host) return all;
-  const graph::LoopLevel& level =
-      f.schedule.store_level.kind == Kind::At ? f.schedule.store_level : f.schedule.compute_level;
+  const graph::LoopLevel& level = f.schedule.store_level.kind == LevelKind::At
+                                      ? f.schedule.store_level
+                                      : f.schedule.compute_level;
   double iterations = 1;
   for (int s = 0; s < host->stage_count(); ++s)
     iterations = std::max(iterations, iterations_around(*host, host->stage(s), level.var, sizes));

@@ -180,12 +180,13 @@ void schedule_scatter_lanes(const FuncPtr& f, const ScatterLanes& lanes, const S
     schedule_update(f, s, roles, lanes.width, in_slices, sizes);
 }
 
+bool is_scatter(const FuncContents& f, const Definition& update) { return scatters(f, update); }
+std::vector<VarOrRVar> loops_of_taps(const Definition& update) { return loops_of(update, true); }
+std::vector<VarOrRVar> loops_but_taps(const Definition& update) { return loops_of(update, false); }
+
 // ---- sums of parts ----
 
-namespace {
-
-// The parts that an update adds to its own element, number after number.
-FuncPtr parts_of(const FuncContents& f, const Definition& update) {
+FuncPtr parts_of_sum(const FuncContents& f, const Definition& update) {
   if (update.predicate.defined() || update.rvars.size() != 1) return nullptr;
   FuncPtr parts;
   for (const Expr& value : update.values) {
@@ -202,6 +203,8 @@ FuncPtr parts_of(const FuncContents& f, const Definition& update) {
   return parts;
 }
 
+namespace {
+
 // Dimensions, innermost first; empty where they lie as they stand.
 std::vector<size_t> storage_order(const FuncContents& f) {
   std::vector<size_t> order;
@@ -217,7 +220,7 @@ std::vector<size_t> storage_order(const FuncContents& f) {
 std::optional<std::vector<size_t>> layout_of_parts(const FuncContents& f) {
   std::optional<std::vector<size_t>> layout;
   for (const Definition& update : f.updates) {
-    const FuncPtr parts = parts_of(f, update);
+    const FuncPtr parts = parts_of_sum(f, update);
     std::vector<size_t> order = parts ? storage_order(*parts) : std::vector<size_t>();
     if (order.empty() || order.back() != f.args.size()) return std::nullopt;
     order.pop_back();

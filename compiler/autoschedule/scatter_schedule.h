@@ -45,6 +45,15 @@ std::optional<std::vector<size_t>> layout_of_parts(const FuncContents& f);
 void schedule_sum_of_parts(const FuncPtr& f, const std::vector<size_t>& layout,
                            const SizeEstimate& sizes);
 
+// The parts that an update adds to its own element, number after number; null: it does something else.
+FuncPtr parts_of_sum(const FuncContents& f, const Definition& update);
+
+// Whether an update adds to places that data decide.
+bool is_scatter(const FuncContents& f, const Definition& update);
+// Loops whose values pick one of a few places, and all others.
+std::vector<VarOrRVar> loops_of_taps(const Definition& update);
+std::vector<VarOrRVar> loops_but_taps(const Definition& update);
+
 // Whether the stage adds to places that data decide, along the first dimension too, over a loop that
 // is worth vectors of iterations.
 bool scatters_in_order(const FuncContents& f, const Definition& stage);

@@ -15,6 +15,7 @@ namespace retrograde::autoschedule {
 namespace {
 
 constexpr size_t beam = 3;         // schedules that a step goes on from
+constexpr int most_doublings = 2;  // or halvings, of a number of the rules
 constexpr size_t most_places = 6;  // Funcs whose place is varied
 constexpr size_t most_tried = 96, fewest_tried = 12;
 constexpr size_t funcs_tried = 6000;  // in all schedules together
@@ -60,6 +61,7 @@ class Search {
     for (const FuncPtr& f : topological_order(outputs)) names_.insert(f->name);
     most_bytes_ = std::max(rules.graph.memory.bytes, rules.graph.memory.budget_bytes);
     result_.cost_of_rules = rules.cost;
+    result_.rules = rules;
     places_ = places_of(request);
     keep(std::move(rules));
   }
@@ -92,17 +94,17 @@ class Search {
 
   void try_step(const ScheduleRequest& request, std::vector<SearchedSchedule>& next) {
     if (left_ == 0) return;
-    SearchedSchedule candidate = scheduled(request);
-    const bool is_new = seen_.insert(text_of(candidate)).second;
-    if (!is_new || candidate.graph.memory.bytes > most_bytes_) return;
-    --left_;
     try {
+      SearchedSchedule candidate = scheduled(request);
+      const bool is_new = seen_.insert(text_of(candidate)).second;
+      if (!is_new || candidate.graph.memory.bytes > most_bytes_) return;
+      --left_;
       candidate.cost = cost_(candidate.graph.outputs);
-    } catch (const UserError&) {
-      return;
+      next.push_back(candidate);
+      keep(std::move(candidate));
+    } catch (const Error&) {
+      // Cannot be given, or lowered: that of the rules can.
     }
-    next.push_back(candidate);
-    keep(std::move(candidate));
   }
 
   std::string text_of(const SearchedSchedule& s) const {
@@ -142,12 +144,20 @@ class Search {
            std::ranges::any_of(request.options.inlined, is_it);
   }
 
-  // One decision, or one place, otherwise; a user's own are left.
+  // One decision, number or place otherwise; a user's own are left.
   std::vector<ScheduleRequest> steps_from(const ScheduleRequest& request) const {
     std::vector<ScheduleRequest> steps;
     for (Decision decision : all_decisions()) {
       ScheduleRequest step = request;
       if (step.options.without.insert(decision).second) steps.push_back(std::move(step));
+    }
+    for (int ScheduleScales::*scale : {&ScheduleScales::register_tile, &ScheduleScales::tasks,
+                                       &ScheduleScales::strip_rows, &ScheduleScales::caches}) {
+      for (const int doublings : {-1, 1}) {
+        ScheduleRequest step = request;
+        step.scales.*scale += doublings;
+        if (std::abs(step.scales.*scale) <= most_doublings) steps.push_back(std::move(step));
+      }
     }
     for (const std::string& name : places_) {
       ScheduleRequest again = request, stored = request;

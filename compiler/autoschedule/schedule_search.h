@@ -4,7 +4,8 @@
 //                             => without join_sweeps 9.4 ms  => without strips, f stored      9.0 ms
 //                                weight again        9.0 ms     ...
 //
-// A beam search over what the rules decide: each decision made or not, and, of the Funcs that it
+// A beam search over what the rules decide: each decision made or not; numbers of theirs doubled or
+// halved (tiles of registers, tasks, rows of strips, bytes of caches); and, of the Funcs that it
 // matters most for, stored or computed again. It begins with what the rules choose and each step
 // changes one of these, so that the result is never worse than theirs by the cost; it ends where a
 // step brings nothing, or after so many schedules, never by the clock: the same program has the same
@@ -26,7 +27,8 @@
 
 namespace retrograde::autoschedule {
 
-// Of a scheduled graph, the less the better; where it throws a UserError the schedule is left out.
+// Of a scheduled graph, the less the better; where it throws, the schedule is left out; that of the
+// rules cannot be: search_schedule throws what its cost does.
 using ScheduleCost = std::function<double(const std::vector<FuncPtr>& outputs)>;
 
 struct SearchedSchedule {
@@ -37,6 +39,7 @@ struct SearchedSchedule {
 
 struct ScheduleSearch {
   SearchedSchedule best, runner_up;  // the latter without a graph where there was no other schedule
+  SearchedSchedule rules;            // where it began
   double cost_of_rules = 0;
   size_t tried = 0;  // different schedules
 };

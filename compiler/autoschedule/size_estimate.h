@@ -19,6 +19,8 @@ struct MachineLimits {
   int64_t enough_tasks = 8;
   // More bytes than stay in the caches near a core.
   int64_t more_than_caches = 16 << 20;
+  // Of the rows of a strip, beside those that the rules choose.
+  double strip_rows = 1;
 };
 
 // The ends that are constants.

@@ -218,7 +218,8 @@ class Group {
     }
     const double all = static_cast<double>(sizes_.extent(*last_, row).value_or(unknown_extent));
     const double most = std::max(least_rows, all * static_cast<double>(tasks) / enough_strips);
-    return static_cast<int64_t>(std::ceil(std::clamp(halo * rows_a_halo, least_rows, most)));
+    const double rows = std::clamp(halo * rows_a_halo, least_rows, most);
+    return static_cast<int64_t>(std::ceil(rows * sizes_.machine().strip_rows));
   }
 
   double bytes_of_windows(const StripLoops& loops) const {

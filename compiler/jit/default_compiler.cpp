@@ -1,6 +1,6 @@
 // default_compiler.cpp -- what the front end's realize() reaches: lowering, then machine code in
 // this process.
-#include "autoschedule/default_schedule.h"
+#include "autoschedule/choose_schedule.h"
 #include "frontend/run/compiler_interface.h"
 #include "jit/jit.h"
 #include "lower/lower.h"
@@ -113,11 +113,9 @@ class JitCompiler : public Compiler {
                                             const Target& target) override {
     lower::LowerOptions options;
     options.target = pipeline.traced(target);
-    ir::LoweredFunction function = lower::lower(
-        pipeline.name,
-        autoschedule::schedule_unscheduled(pipeline.outputs, autoschedule::vector_unit_of(target),
-                                           pipeline.autoschedule),
-        lower::infer_arguments(pipeline.outputs), options);
+    ir::LoweredFunction function =
+        lower::lower(pipeline.name, autoschedule::choose_schedule(pipeline, target).graph.outputs,
+                     lower::infer_arguments(pipeline.outputs), options);
     jit::Options code_options;
     code_options.externs = pipeline.externs;
     auto code = jit::compile(function, target, code_options);
@@ -126,8 +124,7 @@ class JitCompiler : public Compiler {
   }
 
   std::string loop_nest(const PipelineSpec& pipeline, const Target& target) override {
-    return lower::loop_nest_text(autoschedule::schedule_unscheduled(
-        pipeline.outputs, autoschedule::vector_unit_of(target), pipeline.autoschedule));
+    return lower::loop_nest_text(autoschedule::choose_schedule(pipeline, target).graph.outputs);
   }
 };
 

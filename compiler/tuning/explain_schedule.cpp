@@ -6,7 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
-#include "autoschedule/default_schedule.h"
+#include "autoschedule/choose_schedule.h"
 #include "frontend/data/buffer.h"
 #include "frontend/run/compiler_interface.h"
 #include "graph/schedule_log.h"
@@ -100,8 +100,9 @@ std::string megabytes(double bytes) {
 ScheduleReport explain_schedule(const PipelineSpec& pipeline,
                                 const std::vector<halide_buffer_t*>& outputs, const Target& target,
                                 const ExplainOptions& options, const JITHandlers& handlers) {
-  const auto scheduled = autoschedule::schedule_unscheduled(
-      pipeline.outputs, autoschedule::vector_unit_of(target), pipeline.autoschedule);
+  autoschedule::ChosenSchedule chosen =
+      autoschedule::choose_schedule(pipeline, target, options.runner_up);
+  const std::vector<graph::FuncPtr>& scheduled = chosen.graph.outputs;
   std::vector<BufferShape> shapes;
   for (const halide_buffer_t* buffer : outputs) shapes.push_back(tuning::shape_of(*buffer));
   if (shapes.empty()) shapes = tuning::output_shapes(scheduled);
@@ -114,6 +115,7 @@ ScheduleReport explain_schedule(const PipelineSpec& pipeline,
   ScheduleReport report;
   report.schedule = graph::schedule_log(scheduled).to_cpp();
   report.machine = machine.name;
+  report.search = std::move(chosen.search);
   std::vector<std::string> funcs;
   for (const graph::FuncPtr& f : graph::topological_order(scheduled)) funcs.push_back(f->name);
   add_stages(tuning::predict(function, tuning::program_sizes(function, shapes), machine, threads),
@@ -150,7 +152,18 @@ std::string ScheduleReport::to_string() const {
   }
   row("total", milliseconds(predicted_ms), milliseconds(measured_ms), "", "");
   out << "first call: " << milliseconds(first_call_ms) << " ms more, for new memory\n";
-  out << "machine: " << machine << "\n";
+  out << "machine: " << machine << "\n" << search.to_string();
+  return out.str();
+}
+
+std::string SearchedSchedules::to_string() const {
+  std::ostringstream out;
+  if (!note.empty()) out << note << "\n";
+  if (tried == 0) return out.str();
+  out << "searched: " << tried << " schedules; this one " << milliseconds(predicted_ms)
+      << " ms, that of the rules " << milliseconds(rules_ms) << " ms\n";
+  if (!runner_up_ms) return out.str();
+  out << "runner-up: " << milliseconds(runner_up_ms) << " ms\n" << runner_up;
   return out.str();
 }
 
@@ -162,7 +175,14 @@ std::string ScheduleReport::to_json() const {
                {"predicted_ms", predicted_ms},
                {"first_call_ms", first_call_ms},
                {"measured_ms", optional(measured_ms)},
-               {"stages", Json::array()}};
+               {"stages", Json::array()},
+               {"search",
+                {{"tried", search.tried},
+                 {"rules_ms", search.rules_ms},
+                 {"predicted_ms", search.predicted_ms},
+                 {"runner_up_ms", optional(search.runner_up_ms)},
+                 {"runner_up", search.runner_up},
+                 {"note", search.note}}}};
   for (const Stage& stage : stages) {
     json["stages"].push_back({{"name", stage.name},
                               {"predicted_ms", stage.predicted_ms},

@@ -348,10 +348,26 @@ TEST_F(Places, OptionsAreText) {
   options.inlined = {"cheap"};
   options.threads = 3;
   options.memory_budget = 5000000000;
+  options.search = true;
+  options.deterministic = false;
   EXPECT_EQ(options.to_string(), "without=slices+strips,store=" + heavy.name() +
-                                     "+a$1,inline=cheap,threads=3,memory=5000000000");
+                                     "+a$1,inline=cheap,threads=3,memory=5000000000,"
+                                     "search=true,deterministic=false");
   EXPECT_EQ(AutoscheduleOptions::from_string(options.to_string()), options);
   EXPECT_EQ(AutoscheduleOptions::from_string(""), AutoscheduleOptions());
+}
+
+// rule: search and deterministic are true or false
+TEST(AutoscheduleOptions, RefuseTruthInOtherWords) {
+  for (const std::string part : {"search=yes", "deterministic=", "search"}) {
+    try {
+      AutoscheduleOptions::from_string(part);
+      ADD_FAILURE() << part;
+    } catch (const CompileError& error) {
+      expect_mentions(error.what(),
+                      {part, "search and deterministic are true or false", "search=true"});
+    }
+  }
 }
 
 // What is compiled is compiled again when its options change.

@@ -19,5 +19,9 @@ __attribute__((weak)) ScheduleReport explain_schedule(const PipelineSpec&,
                                                       const JITHandlers&) {
   no_compiler();
 }
+__attribute__((weak)) double predicted_seconds(const std::vector<graph::FuncPtr>&, const Target&,
+                                               int) {
+  no_compiler();
+}
 
 }  // namespace retrograde

@@ -71,6 +71,11 @@ ScheduleReport explain_schedule(const PipelineSpec& pipeline,
                                 const std::vector<halide_buffer_t*>& outputs, const Target& target,
                                 const ExplainOptions& options, const JITHandlers& handlers);
 
+// Of a graph with its schedule, for a search: by estimates of all sizes. 0 threads: those of the
+// machine. Defined by compiler/tuning. Errors: those of lowering.
+double predicted_seconds(const std::vector<graph::FuncPtr>& scheduled, const Target& target,
+                         int threads);
+
 class Module;
 enum class OutputFileType;
 

@@ -19,6 +19,22 @@ struct ExplainOptions {
   bool measure = false;
   double seconds = 2;  // that it runs, at least 5 times
   int threads = 0;     // 0: all
+  // Which other schedule the model thinks best, as AutoscheduleOptions::search would find it, and
+  // what it takes. Of what was scheduled with that option it is told anyway.
+  bool runner_up = false;
+};
+
+// What a search for a schedule found (AutoscheduleOptions::search).
+struct SearchedSchedules {
+  size_t tried = 0;                       // different schedules; 0: none was searched for
+  double rules_ms = 0, predicted_ms = 0;  // of what the rules choose, and of what was taken
+  std::optional<double> runner_up_ms;
+  std::string
+      runner_up;     // directives that differ: "- " before those of the schedule that was taken,
+                     // "+ " before those of the runner-up
+  std::string note;  // why there was no search, though it was asked for
+
+  std::string to_string() const;
 };
 
 struct ScheduleReport {
@@ -36,6 +52,7 @@ struct ScheduleReport {
   double predicted_ms = 0;
   double first_call_ms = 0;           // more, in a first call, for memory that is new
   std::optional<double> measured_ms;  // of the fastest run
+  SearchedSchedules search;
 
   std::string to_string() const;
   std::string to_json() const;

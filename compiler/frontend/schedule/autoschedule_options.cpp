@@ -59,11 +59,16 @@ class OptionsReader {
       options.threads = number<int>(value);
     } else if (key == "memory") {
       options.memory_budget = number<int64_t>(value);
+    } else if (key == "search") {
+      options.search = truth(value);
+    } else if (key == "deterministic") {
+      options.deterministic = truth(value);
     } else {
       user_error(
           asked_, "options of the autoscheduler are parts of a name and a value",
           quoted(part) +
-              " is none: names are \"without\", \"store\", \"inline\", \"threads\" and \"memory\"",
+              " is none: names are \"without\", \"store\", \"inline\", \"threads\", \"memory\", "
+              "\"search\" and \"deterministic\"",
           "Write for example without=strips+slices,threads=4");
     }
   }
@@ -76,6 +81,14 @@ class OptionsReader {
                  quoted(name) + " is none of " + listed(names, quoted), "Name one of these");
     }
     return all_decisions()[static_cast<size_t>(found - names.begin())];
+  }
+
+  bool truth(const std::string& value) const {
+    if (value != "true" && value != "false") {
+      user_error(asked_, "search and deterministic are true or false",
+                 quoted(value) + " is neither", "Write for example search=true");
+    }
+    return value == "true";
   }
 
   template <typename T>
@@ -125,6 +138,10 @@ std::string AutoscheduleOptions::to_string() const {
   add("threads");
   if (memory_budget != 0) names.push_back(std::to_string(memory_budget));
   add("memory");
+  if (search) names.emplace_back("true");
+  add("search");
+  if (!deterministic) names.emplace_back("false");
+  add("deterministic");
   return joined(parts, ',');
 }
 

@@ -1,5 +1,5 @@
 // autoschedule_options.h -- what the built-in autoscheduler is told: which of its decisions it may
-// make, what it stores and inlines, for how many threads.
+// make, what it stores and inlines, for how many threads, whether it searches.
 //
 //   AutoscheduleOptions options;
 //   options.without = {Decision::Strips};
@@ -61,12 +61,22 @@ struct AutoscheduleOptions {
   // 0: inputs, outputs and twice the largest Func of the program that is differentiated; and what
   // stays in the caches; and nothing is computed again that takes much longer than its way to memory.
   int64_t memory_budget = 0;
+  // The rules' schedule is where a beam search begins, over what they decide, by the time that a model
+  // of the machine predicts (docs/autoscheduler.md). It takes seconds, wants sizes that are known or
+  // estimated, and never takes a schedule that the model says is slower. The same program, options
+  // and figures of the machine have the same schedule; another machine, or number of threads, may have
+  // another, and with it other last bits.
+  bool search = false;
+  // false: sums at places that data decide may be atomic() updates, in parallel, where that takes
+  // less memory or makes the only tasks. Then bits may differ from run to run.
+  bool deterministic = true;
 
   friend bool operator==(const AutoscheduleOptions&, const AutoscheduleOptions&) = default;
-  // As parts with commas between: "without=strips+slices,store=blurred+heavy,inline=brighter,threads=4,memory=64000000".
+  // As parts with commas between: "without=strips+slices,store=blurred+heavy,inline=brighter,threads=4,memory=64000000,search=true,deterministic=false".
   std::string to_string() const;
   // Requires: options of the autoscheduler are parts of a name and a value; the decisions of the
-  // autoscheduler have names; threads and bytes are whole numbers, 0 or more.
+  // autoscheduler have names; threads and bytes are whole numbers, 0 or more; search and deterministic
+  // are true or false.
   static AutoscheduleOptions from_string(const std::string& text);
 };
 

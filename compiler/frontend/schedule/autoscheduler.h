@@ -12,6 +12,7 @@
 #include <string>
 #include <vector>
 
+#include "frontend/run/schedule_report.h"
 #include "ir/target.h"
 
 namespace retrograde {
@@ -44,6 +45,7 @@ struct AutoSchedulerResults {
   // was allowed. They may be more: then no schedule that it knows takes less. Sizes that are not known
   // count as nothing.
   int64_t memory_bytes = 0, memory_budget_bytes = 0;
+  SearchedSchedules search;  // with AutoscheduleOptions::search
 };
 
 using AutoSchedulerFn =

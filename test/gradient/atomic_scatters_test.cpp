@@ -1,0 +1,137 @@
+// Sums at places that data decide where bits may differ from run to run: parts live one for each
+// thread, large scatters run in parallel; and where they may not, neither happens.
+#include "autoschedule/atomic_scatters.h"
+
+#include <gtest/gtest.h>
+
+#include <cstring>
+#include <random>
+
+#include "autodiff/derivative.h"
+#include "frontend/include/retrograde/retrograde.h"
+
+namespace retrograde {
+namespace {
+
+Buffer<int> random_places(int count, int below) {
+  Buffer<int> places(count);
+  std::mt19937 random(7);
+  for (int i = 0; i < count; ++i)
+    places(i) = static_cast<int>(random() % static_cast<unsigned>(below));
+  return places;
+}
+Buffer<float> numbers(int count) {
+  Buffer<float> values(count);
+  for (int i = 0; i < count; ++i) values(i) = static_cast<float>(i % 37) / 37 + 0.01f;
+  return values;
+}
+
+AutoscheduleOptions in_any_order() {
+  AutoscheduleOptions options;
+  options.deterministic = false;
+  return options;
+}
+
+// A table of a million floats, read at so many places: its gradient is a scatter in eight parts.
+struct TableGradient {
+  static constexpr int elements = 1 << 20, reads = 2 << 20;
+  Buffer<float> table = numbers(elements), weights = numbers(reads);
+  Buffer<int> places = random_places(reads, elements);
+  Func read{"read"}, gradient;
+  TableGradient() {
+    Var x("x");
+    read(x) = table(clamp(places(x), 0, elements - 1));
+    gradient = propagate_adjoints(read, weights)(table);
+  }
+  Buffer<float> realized(const Pipeline& pipeline, int threads = 0) const {
+    Pipeline mine = pipeline;
+    mine.jit_handlers().thread_limit = threads;
+    return mine.realize({elements});
+  }
+  // One term after the other, in double.
+  std::vector<double> expected() const {
+    std::vector<double> sums(elements);
+    for (int i = 0; i < reads; ++i) sums[static_cast<size_t>(places(i))] += weights(i);
+    return sums;
+  }
+};
+
+size_t count_wrong(const Buffer<float>& found, const std::vector<double>& expected) {
+  size_t wrong = 0;
+  for (int i = 0; i < found.width(); ++i) {
+    const double wanted = expected[static_cast<size_t>(i)];
+    if (!(std::abs(found(i) - wanted) <= 1e-5 * (1 + std::abs(wanted)))) ++wrong;
+  }
+  return wrong;
+}
+
+TEST(AtomicScatters, PartsOfALargeSumLiveOneForEachThread) {
+  const TableGradient fixed, any;
+  const Pipeline ordered(fixed.gradient), atomic(any.gradient);
+  const auto before = ordered.auto_schedule(get_host_target(), AutoscheduleOptions());
+  const auto after = atomic.auto_schedule(get_host_target(), in_any_order());
+  EXPECT_EQ(before.schedule_source.find("atomic"), std::string::npos);
+  EXPECT_NE(after.schedule_source.find("atomic"), std::string::npos) << after.schedule_source;
+  // Parts are 8 MB each, in double.
+  EXPECT_LT(after.memory_bytes, before.memory_bytes - (32 << 20));
+  EXPECT_EQ(count_wrong(any.realized(atomic), any.expected()), 0u);
+  EXPECT_EQ(count_wrong(fixed.realized(ordered), fixed.expected()), 0u);
+}
+
+TEST(AtomicScatters, AreNeverChosenWhereBitsAreToBeTheSame) {
+  const TableGradient program;
+  const Pipeline pipeline(program.gradient);
+  const Buffer<float> one = program.realized(pipeline, 1), two = program.realized(pipeline, 2);
+  EXPECT_EQ(std::memcmp(one.data(), two.data(), one.size_in_bytes()), 0);
+}
+
+TEST(AtomicScatters, GradientsAreCompiledSoToo) {
+  const TableGradient program;
+  Pipeline pipeline(program.gradient);
+  pipeline.set_autoschedule(in_any_order());
+  EXPECT_EQ(count_wrong(program.realized(pipeline), program.expected()), 0u);
+}
+
+// Forward, as a user writes it: it has no parts.
+struct Histogram {
+  Func sums{"sums"};
+  Histogram(const Buffer<int>& places, const Buffer<float>& weights, int bins) {
+    Var x("x");
+    RDom r(0, places.width());
+    sums(x) = 0.0f;
+    sums(clamp(places(r), 0, bins - 1)) += weights(r);
+    sums.set_estimate(x, 0, bins);
+  }
+};
+
+TEST(AtomicScatters, ALargeScatterRunsInParallel) {
+  constexpr int bins = 1 << 16, count = (1 << 18) + 5;
+  const Buffer<int> places = random_places(count, bins);
+  const Buffer<float> weights = numbers(count);
+  std::vector<double> expected(bins);
+  for (int i = 0; i < count; ++i) expected[static_cast<size_t>(places(i))] += weights(i);
+  const Histogram program(places, weights, bins);
+  const Pipeline pipeline(program.sums);
+  const auto results = pipeline.auto_schedule(get_host_target(), in_any_order());
+  EXPECT_NE(results.schedule_source.find("atomic"), std::string::npos) << results.schedule_source;
+  EXPECT_NE(results.schedule_source.find("parallel"), std::string::npos) << results.schedule_source;
+  const Buffer<float> found = Pipeline(pipeline).realize({bins});
+  EXPECT_EQ(count_wrong(found, expected), 0u);
+}
+
+TEST(AtomicScatters, FewElementsAreNotFoughtFor) {
+  const Histogram program(random_places(1 << 18, 256), numbers(1 << 18), 256);
+  const auto results = Pipeline(program.sums).auto_schedule(get_host_target(), in_any_order());
+  EXPECT_EQ(results.schedule_source.find("atomic"), std::string::npos) << results.schedule_source;
+}
+
+TEST(AtomicScatters, OneThreadNeedsNone) {
+  const TableGradient program;
+  AutoscheduleOptions options = in_any_order();
+  options.threads = 1;
+  const auto results = Pipeline(program.gradient).auto_schedule(get_host_target(), options);
+  EXPECT_EQ(results.schedule_source.find("atomic"), std::string::npos) << results.schedule_source;
+}
+
+}  // namespace
+}  // namespace retrograde
