@@ -41,9 +41,8 @@ static bool is_costly(const Values& values, const Expr& arm) {
 
 // The arm, where a lane of `wanted` is true; else `otherwise`.
 static Value* value_where(Values& values, Value* wanted, const Expr& arm, Value* otherwise) {
-  Value* any = wanted->getType()->isVectorTy() ? values.c.b.CreateOrReduce(wanted) : wanted;
   return values.c.value_if(
-      any, [&] { return values.of(arm); }, otherwise);
+      any_lane(values.c.e, wanted), [&] { return values.of(arm); }, otherwise);
 }
 
 Value* selected(Values& values, const Select& e) {

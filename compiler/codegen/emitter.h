@@ -59,6 +59,8 @@ Value* to_memory(Emitter& e, Type type, Value* value);
 
 // ---- vectors.cpp ----
 Value* splat(Emitter& e, Value* scalar, int lanes);      // the scalar itself when lanes is 1
+// Whether a lane of a mask is on; of a scalar, itself.
+Value* any_lane(Emitter& e, Value* mask);
 Value* iota(Emitter& e, llvm::Type* scalar, int lanes);  // 0, 1, 2 ... of an integer or float type
 Value* slice(Emitter& e, Value* vector, int start, int lanes);  // past the end: any value
 Value* concat(Emitter& e, std::vector<Value*> parts);

@@ -185,6 +185,10 @@ Value* Values::make(const Shuffle& e) {
 
 Value* Values::make(const VectorReduce& e) {
   const Type element = e.type.element_of();
+  if (e.type.is_bool() && e.type.is_scalar() && e.op == Kind::Or)
+    return any_lane(c.e, of(e.value));
+  if (e.type.is_bool() && e.type.is_scalar() && e.op == Kind::And)
+    return c.b.CreateNot(any_lane(c.e, c.b.CreateNot(of(e.value))));
   return reduce_groups(c.e, reduced_in_part(*this, e), e.type.lanes(), [&](Value* a, Value* b) {
     return binary(c.e, e.op, element.with_lanes(lanes_of(a)), a, b);
   });

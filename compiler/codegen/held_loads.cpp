@@ -146,7 +146,7 @@ Value* load_spread(Values& values, const Storage& from, Type type, const Expr& i
   Value* mask = c.b.CreateICmpSLE(element, step_at(ends.last));
   if (predicate) {
     mask = c.b.CreateAnd(mask, c.b.CreateICmpSGE(element, step_at(ends.first)));
-    mask = c.b.CreateAnd(mask, splat(c.e, c.b.CreateOrReduce(predicate), lanes));
+    mask = c.b.CreateAnd(mask, splat(c.e, any_lane(c.e, predicate), lanes));
   }
   Value* first = at_lane(values, index, c.b.getInt32(static_cast<uint32_t>(start)));
   Value* loaded = to_memory(

@@ -81,7 +81,7 @@ Value* load_apart(FunctionContext& c, const Storage& from, Type type, Value* fir
 // of one a lane.
 Value* where_any(FunctionContext& c, Type type, Value* indices, Value* predicate,
                  const std::function<Value*(Value* safe)>& load) {
-  return c.value_if(c.b.CreateOrReduce(predicate), [&] {
+  return c.value_if(any_lane(c.e, predicate), [&] {
     Value* bits = c.b.CreateBitCast(predicate, c.b.getIntNTy(static_cast<unsigned>(type.lanes())));
     Value* first = c.b.CreateBinaryIntrinsic(llvm::Intrinsic::cttz, bits, c.b.getTrue());
     Value* index = splat(c.e, c.b.CreateExtractElement(indices, first), type.lanes());
@@ -194,7 +194,7 @@ Value* load_linear(Values& values, const Storage& from, Type type, const LinearI
   const int lanes = type.lanes();
   const int64_t stride = index.stride, last = stride * (lanes - 1);
   if (stride == 0) {
-    Value* any = predicate ? c.b.CreateOrReduce(predicate) : nullptr;
+    Value* any = predicate ? any_lane(c.e, predicate) : nullptr;
     return splat(c.e, load_scalar(c, from, type.element_of(), first, any), lanes);
   }
   if (stride == 1) return load_dense(c, from, type, first, predicate);

@@ -34,6 +34,13 @@ Value* splat(Emitter& e, Value* scalar, int lanes) {
   return lanes == 1 ? scalar : e.b.CreateVectorSplat(static_cast<unsigned>(lanes), scalar);
 }
 
+Value* any_lane(Emitter& e, Value* mask) {
+  const auto* vector = llvm::dyn_cast<llvm::FixedVectorType>(mask->getType());
+  if (!vector) return mask;
+  Value* bits = e.b.CreateBitCast(mask, e.b.getIntNTy(vector->getNumElements()));
+  return e.b.CreateIsNotNull(bits);
+}
+
 Value* iota(Emitter& e, llvm::Type* scalar, int lanes) {
   const std::vector<llvm::Constant*> values = ir::numbered(lanes, [&](int i) {
     return scalar->isFloatingPointTy() ? llvm::ConstantFP::get(scalar, i)

@@ -23,7 +23,7 @@
 //         serial loops or for none, as those of tails do, also stand around the copies; others
 //         only around the update, so that a point may be written that was not: by what it holds.
 //         No other task writes it, since all parallel loops around are over pure variables.
-// Not done: more elements than registers hold; Funcs whose storage has a small constant size.
+// Not done: more elements than registers hold; Funcs all of which fit registers as they are.
 // Source: scalar replacement (Callahan, Carr and Kennedy, PLDI 1990).
 // Tests: test/golden/lower/keep_accumulators/, codegen_idioms_test.
 #include "lower/loops/keep_accumulators.h"
@@ -230,9 +230,14 @@ class KeepAccumulators : public StatementRewriter {
  private:
   // In registers already, when its accesses have constant indices.
   Stmt in_storage(const Realize& realize, const Stmt& s) {
-    const bool is_small = std::all_of(realize.bounds.begin(), realize.bounds.end(),
-                                      [](const Range& r) { return as_const_int(r.extent); });
-    if (is_small) small_.insert(realize.name);
+    int64_t bytes = 0;
+    for (const Type& type : realize.types) bytes += type.bytes();
+    for (const Range& r : realize.bounds) {
+      const int64_t extent = as_const_int(r.extent).value_or(register_file + 1);
+      bytes =
+          std::min(bytes, register_file + 1) * std::clamp<int64_t>(extent, 0, register_file + 1);
+    }
+    if (bytes <= register_file) small_.insert(realize.name);
     return children(s);
   }
 
