@@ -5,7 +5,9 @@
 #include "autodiff/report/absent_gradients.h"
 #include "autodiff/sweeps/contributions.h"
 #include "autodiff/sweeps/custom_rules.h"
+#include "autodiff/sweeps/distinct_nodes.h"
 #include "autodiff/sweeps/input_shape.h"
+#include "autodiff/sweeps/kept_values.h"
 #include "autodiff/sweeps/shared_adjoints.h"
 #include "autodiff/updates/update_context.h"
 #include "autodiff/updates/versions.h"
@@ -125,7 +127,7 @@ class Synthesis {
       record(*f, s - 1, adjoint);
     }
     if (contributions_.pass_on(*f)) return;
-    contribute_stage(f, mapped(f->pure->values, without_lets),
+    contribute_stage(f, with_equal_nodes_shared(mapped(f->pure->values, without_lets)),
                      primal_.adjoints_at_write(*f, 0, adjoint.func), primal_.regions.domain(*f, 0),
                      {}, false);
   }
@@ -212,7 +214,8 @@ class Synthesis {
     SweepResult sweep = primal_.sweep(values, seeds, f.get());
     for (const std::string& note : sweep.notes)
       account_.add(Explanation::Kind::Zero, f->name, note);
-    for (LeafAdjoint& leaf : sweep.leaves) leaf = with_self_values(leaf, f, self_values);
+    for (LeafAdjoint& leaf : sweep.leaves)
+      leaf = with_kept_values(with_self_values(leaf, f, self_values), f, values);
     if (keeps_steps) {
       add_sharing(f, sweep.leaves, seeds, domain);
     } else {
