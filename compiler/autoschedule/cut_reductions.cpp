@@ -56,7 +56,7 @@ bool is_long_sum(const FuncContents& f, const Definition& update, const SizeEsti
 }
 
 // Partial results of the update for each value of two of its loops, of which the first is lanes.
-void factor(Stage update, const RVar& lane, const RVar& row) {
+FuncPtr factor(Stage update, const RVar& lane, const RVar& row) {
   const FuncContents& f = *update.function();
   const Var u(new_loop(f, update.index(), "lanes")), v(new_loop(f, update.index(), "parts"));
   Func parts = update.rfactor({{lane, u}, {row, v}});
@@ -75,18 +75,31 @@ void factor(Stage update, const RVar& lane, const RVar& row) {
   vectorize(Stage(parts.function(), 0), u, lanes_of_a_sum, TailStrategy::Auto);
   parts.update().reorder(order).parallel(v);
   vectorize(parts.update(), u, lanes_of_a_sum, TailStrategy::GuardWithIf);
+  return parts.function();
 }
 
-// The loop that is cut into lanes, and the one whose iterations are tasks: itself, in blocks, where
-// no other is long.
-void cut(const FuncPtr& f, int stage) {
-  const std::vector<ReductionVariable> rvars = f->stage(stage).rvars;
+// Of the reduction variables, by number: that which is cut into lanes, and that whose iterations are
+// tasks; the same where no other is long.
+struct Cut {
   size_t lanes = 0, rows = 0;
-  while (lanes + 1 < rvars.size() && extent_of(rvars[lanes]) < lanes_of_a_sum) ++lanes;
+};
+
+Cut cut_of(const std::vector<ReductionVariable>& rvars) {
+  Cut cut;
+  while (cut.lanes + 1 < rvars.size() && extent_of(rvars[cut.lanes]) < lanes_of_a_sum) ++cut.lanes;
+  cut.rows = cut.lanes;
   for (size_t i = 0; i < rvars.size(); ++i) {
-    const bool is_longer = rows == lanes || extent_of(rvars[i]) > extent_of(rvars[rows]);
-    if (i != lanes && is_longer && extent_of(rvars[i]) >= short_loop) rows = i;
+    const bool is_longer =
+        cut.rows == cut.lanes || extent_of(rvars[i]) > extent_of(rvars[cut.rows]);
+    if (i != cut.lanes && is_longer && extent_of(rvars[i]) >= short_loop) cut.rows = i;
   }
+  return cut;
+}
+
+// The sums of each iteration of the loop of tasks, or of each block of a single loop.
+FuncPtr cut(const FuncPtr& f, int stage) {
+  const std::vector<ReductionVariable> rvars = f->stage(stage).rvars;
+  const auto [lanes, rows] = cut_of(rvars);
   Stage update(f, stage);
   const RVar all(rvars[lanes].var), lane(new_loop(*f, stage, "lane")),
       group(new_loop(*f, stage, "group"));
@@ -98,13 +111,24 @@ void cut(const FuncPtr& f, int stage) {
   } else {
     update.split(all, all, lane, lanes_of_a_sum, TailStrategy::GuardWithIf);
   }
-  factor(update, lane, row);
+  const FuncPtr sums = factor(update, lane, row);
   update.split(row, row, group, groups, TailStrategy::GuardWithIf);
   factor(update, lane, group);
   if (f->schedule.compute_level.kind == graph::LoopLevel::Kind::Inlined) Func(f).compute_root();
+  return sums;
 }
 
 }  // namespace
+
+std::optional<std::string> rows_of_sum(const FuncPtr& f, int stage, const SizeEstimate& sizes) {
+  const Definition& update = f->stage(stage);
+  if (stage == 0 || !is_long_sum(*f, update, sizes)) return std::nullopt;
+  const auto [lanes, rows] = cut_of(update.rvars);
+  if (rows == lanes) return std::nullopt;
+  return update.rvars[rows].var;
+}
+
+FuncPtr sum_rows(const FuncPtr& f, int stage) { return cut(f, stage); }
 
 void cut_reductions(const std::vector<FuncPtr>& outputs, const SizeEstimate& sizes,
                     const std::unordered_set<const Symbol*>& but) {

@@ -10,6 +10,8 @@
 // threads.
 #pragma once
 
+#include <optional>
+#include <string>
 #include <unordered_set>
 #include <vector>
 
@@ -22,5 +24,11 @@ namespace retrograde::autoschedule {
 // (rfactor.h), of Funcs of this graph that nobody scheduled. `but`: not of these.
 void cut_reductions(const std::vector<FuncPtr>& outputs, const SizeEstimate& sizes,
                     const std::unordered_set<const Symbol*>& but = {});
+
+// The reduction variable of a long sum that is cut into rows, each a task; nullopt: it is no such
+// sum, or has a single loop.
+std::optional<std::string> rows_of_sum(const FuncPtr& f, int stage, const SizeEstimate& sizes);
+// Cuts it. The result: the Func with the sums of each row, in lanes; its last loop is over rows.
+FuncPtr sum_rows(const FuncPtr& f, int stage);
 
 }  // namespace retrograde::autoschedule

@@ -24,6 +24,7 @@
 #include "autoschedule/placement_limits.h"
 #include "autoschedule/reduction_slices.h"
 #include "autoschedule/row_order.h"
+#include "autoschedule/row_sweeps.h"
 #include "autoschedule/scatter_schedule.h"
 #include "autoschedule/scatter_slices.h"
 #include "autoschedule/slices.h"
@@ -443,13 +444,16 @@ SizeEstimate give_default_schedule(const std::vector<FuncPtr>& outputs,
   const auto makes = [&](Decision d) { return !request.options.without.contains(d); };
   const FixedDimensions fixed(outputs);
   const bool may_choose = makes(Decision::Choices);
-  const std::vector<FuncPtr> stored =
+  std::vector<FuncPtr> stored =
       what == Scheduling::Everything
           ? stored_in_all(outputs, limits, chosen, may_choose ? &fixed : nullptr)
           : stored_by_default(outputs, chosen);
   SizeEstimate sizes(outputs, limits_of(request));
   TaskSizes tasks(order);
-  if (makes(Decision::CutReductions)) cut_reductions(outputs, sizes, whole);
+  if (makes(Decision::CutReductions)) {
+    if (makes(Decision::JoinSweeps)) sweep_rows(outputs, stored, whole, sizes);
+    cut_reductions(outputs, sizes, whole);
+  }
   const bool slices_scatters = makes(Decision::ScatterStrategy) && makes(Decision::Slices);
   const SlicedScatters slices(outputs, slices_scatters ? stored : std::vector<FuncPtr>(), whole,
                               sizes);
