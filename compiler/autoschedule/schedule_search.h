@@ -27,8 +27,8 @@
 
 namespace retrograde::autoschedule {
 
-// Of a scheduled graph, the less the better; where it throws, the schedule is left out; that of the
-// rules cannot be: search_schedule throws what its cost does.
+// Of a scheduled graph, the less the better. Several threads ask at once. Where it throws, the schedule
+// is left out; that of the rules cannot be: search_schedule throws what its cost does.
 using ScheduleCost = std::function<double(const std::vector<FuncPtr>& outputs)>;
 
 struct SearchedSchedule {

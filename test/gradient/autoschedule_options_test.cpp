@@ -223,6 +223,22 @@ TEST(AutoscheduleOptions, WithoutAnyDecision) {
     log_without(name, {all_decisions().begin(), all_decisions().end()});
 }
 
+TEST(AutoscheduleOptions, SearchedSchedulesAreRightAndPredictedNoSlower) {
+  for (const auto& [name, make] : programs()) {
+    const Program program = make();
+    set_estimates(program);
+    AutoscheduleOptions options;
+    options.search = true;
+    options.deterministic = false;
+    const Pipeline pipeline(program.outputs);
+    const SearchedSchedules found =
+        pipeline.auto_schedule(get_host_target(), options, small_machine).search;
+    expect_right(name, pipeline, "searched");
+    EXPECT_GT(found.tried, 1u) << name << ": " << found.note;
+    EXPECT_LE(found.predicted_ms, found.rules_ms) << name;
+  }
+}
+
 struct Places : ::testing::Test {
   Places() {
     cheap(x, y) = image(x, y) * 2.0f;

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <chrono>
 
 #include "autodiff/derivative.h"
@@ -90,14 +91,14 @@ TEST_F(SearchOfSchedules, IsTheSameEachTime) {
 
 TEST_F(SearchOfSchedules, TriesAsManyAsItIsToldAndLeavesTheGraphAlone) {
   const std::string before = log_of(outputs);
-  int asked = 0;
+  std::atomic<int> asked = 0;
   search([&](const Funcs&) { return static_cast<double>(100 - asked++); }, 5);
   EXPECT_EQ(asked, 6) << "with that of the rules";
   EXPECT_EQ(log_of(outputs), before);
 }
 
 TEST_F(SearchOfSchedules, LeavesOutWhatCannotBeCompiled) {
-  int asked = 0;
+  std::atomic<int> asked = 0;
   const ScheduleSearch found = search([&](const Funcs&) -> double {
     if (asked++ > 0) user_error("compile it", "a made-up rule", "a made-up reason", "Nothing");
     return 3;
