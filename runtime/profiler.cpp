@@ -1,15 +1,21 @@
-// A sampling profiler: what Func each running pipeline is in, looked at every millisecond.
+// A sampling profiler: what Func each thread of a running pipeline is in, looked at every millisecond.
 //
-// Running code only stores a number, so that it is hardly slower. One thread looks at all runs; it
-// starts with the first and ends with the last, so that nothing runs while nobody is profiled. What
-// was found is kept by pipeline, in the structs of HalideRuntime.h.
+// Running code only stores a number in its thread's place, so that it is hardly slower. One thread
+// looks at all runs; it starts with the first and ends with the last, so that nothing runs while nobody
+// is profiled. The times between two looks are random, exponentially distributed: then each moment of a
+// run is as likely as any other to be looked at, however short the run is and whatever it repeats
+// ("Poisson arrivals see time averages", R. Wolff, Operations Research 30, 1982). A look is shared by the
+// threads that are at work; the time of a pipeline is shared by its Funcs as the looks are. What was
+// found is kept by pipeline, in the structs of HalideRuntime.h.
 #include <HalideRuntime.h>
 
 #include <algorithm>
 #include <atomic>
+#include <bit>
 #include <chrono>
 #include <condition_variable>
 #include <cstring>
+#include <deque>
 #include <memory>
 #include <mutex>
 #include <new>
@@ -34,6 +40,7 @@ struct Pipeline {
   std::string name;
   std::vector<std::string> func_names;
   std::vector<halide_profiler_func_stats> funcs;
+  std::vector<double> looks;  // by Func
   halide_profiler_pipeline_stats stats = {};
 
   void link(Pipeline* next) {
@@ -60,15 +67,72 @@ struct Memory {
   }
 };
 
+struct Run;
+
+// Where one thread says what it computes, on a line of the cache that no other thread writes.
+struct alignas(64) Place {
+  static constexpr int32_t idle = -1;
+  int32_t current = idle;  // first: generated code knows the place by its address
+  int32_t outer_func = idle;
+  Place* outer = nullptr;  // of the same thread, which waits
+  Run* run = nullptr;
+
+  int32_t read() { return std::atomic_ref(current).load(std::memory_order_relaxed); }
+  void write(int32_t func) { std::atomic_ref(current).store(func, std::memory_order_relaxed); }
+};
+
 // One call.
 struct Run {
   Run(Pipeline& pipeline, size_t count) : pipeline(pipeline), memory(count) {}
   Pipeline& pipeline;
-  std::atomic<int32_t> current{0}, threads{1};
+  std::mutex mutex;  // of the places
+  std::deque<Place> places;
+  std::vector<Place*> free_places;
   std::vector<Memory> memory;  // by Func
   Memory all;
-  Clock::time_point begin = Clock::now(), sampled = begin;
+  Clock::time_point begin = Clock::now();
+
+  Place* take_place() {
+    const std::lock_guard lock(mutex);
+    if (free_places.empty()) {
+      free_places.reserve(places.size() + 1);  // so that giving one back never fails
+      free_places.push_back(&places.emplace_back());
+      places.back().run = this;
+    }
+    Place* place = free_places.back();
+    free_places.pop_back();
+    return place;
+  }
+  void give_back(Place* place) {
+    const std::lock_guard lock(mutex);
+    place->write(Place::idle);
+    free_places.push_back(place);
+  }
 };
+
+thread_local Place* place_of_thread = nullptr;  // the innermost
+thread_local Place nowhere;                     // of a run that is not profiled
+
+int32_t* enter_thread(Run* run, int32_t func) {
+  if (!run) return &nowhere.current;
+  Place* place = run->take_place();
+  place->outer = place_of_thread;
+  if (Place* outer = place->outer) {
+    place->outer_func = outer->read();
+    outer->write(Place::idle);
+  }
+  place->write(func);
+  place_of_thread = place;
+  return &place->current;
+}
+
+void leave_thread(int32_t* at) {
+  if (!at || at == &nowhere.current) return;
+  Place* place = reinterpret_cast<Place*>(at);
+  place_of_thread = place->outer;
+  if (place->outer) place->outer->write(place->outer_func);
+  place->run->give_back(place);
+}
 
 class Profiler {
  public:
@@ -84,9 +148,7 @@ class Profiler {
     std::thread finished;
     {
       const std::lock_guard lock(mutex_);
-      const auto now = Clock::now();
-      sample(*run, now, false);
-      keep(*run, now);
+      keep(*run, Clock::now());
       std::erase_if(runs_, [&](const auto& other) { return other.get() == run; });
       if (runs_.empty()) finished = stop();
     }
@@ -97,6 +159,7 @@ class Profiler {
     const std::lock_guard lock(mutex_);
     for (auto& pipeline : pipelines_) {
       for (size_t i = 0; i < pipeline->funcs.size(); i++) pipeline->funcs[i] = {};
+      pipeline->looks.assign(pipeline->funcs.size(), 0);
       pipeline->stats = {};
     }
     link();
@@ -129,6 +192,7 @@ class Profiler {
   std::vector<std::unique_ptr<Run>> runs_;
   std::thread thread_;
   uint64_t generation_ = 0;  // of the sampling thread
+  uint64_t random_ = 1;
 
   static halide_profiler_state initial_state() {
     halide_profiler_state state = {};
@@ -151,6 +215,7 @@ class Profiler {
     pipeline->name = name;
     pipeline->func_names = std::move(names);
     pipeline->funcs.resize(pipeline->func_names.size());
+    pipeline->looks.resize(pipeline->func_names.size());
     pipelines_.insert(pipelines_.begin(), std::move(pipeline));
     link();
     return *pipelines_.front();
@@ -178,34 +243,60 @@ class Profiler {
   void look(uint64_t generation) {
     std::unique_lock lock(mutex_);
     while (generation == generation_) {
-      wake_.wait_for(lock, std::chrono::milliseconds(std::max(1, state_.sleep_time)));
-      const auto now = Clock::now();
-      for (auto& run : runs_) sample(*run, now, true);
+      const auto until = Clock::now() + next_wait();
+      if (wake_.wait_until(lock, until, [&] { return generation != generation_; })) return;
+      for (auto& run : runs_) look_at(*run);
     }
   }
 
-  // The time since the last look went to the Func that is seen now.
-  static void sample(Run& run, Clock::time_point now, bool is_look) {
-    const uint64_t elapsed = nanoseconds(now - run.sampled);
-    run.sampled = now;
-    const auto threads =
-        static_cast<uint64_t>(std::max(1, run.threads.load(std::memory_order_relaxed)));
+  // Exponentially distributed, of mean sleep_time.
+  std::chrono::microseconds next_wait() {
+    random_ = random_ * 6364136223846793005u + 1442695040888963407u;  // D. Knuth, MMIX
+    // -log2 of a number in (0, 1] with these bits, linear between powers of two: libm is not linked.
+    const int halvings = std::countl_zero(random_ | 1);
+    const double rest = static_cast<double>(random_ << halvings << 1) * 0x1p-64;
+    const double mean = 1000.0 * std::max(1, state_.sleep_time);
+    return std::chrono::microseconds(static_cast<int64_t>((halvings + 1 - rest) * 0.6931 * mean));
+  }
+
+  static void look_at(Run& run) {
+    const std::lock_guard lock(run.mutex);
+    std::vector<uint64_t> threads(run.pipeline.funcs.size());
+    uint64_t all = 0;
+    for (Place& place : run.places) {
+      const int32_t func = place.read();
+      if (func < 0) continue;
+      threads[static_cast<size_t>(func)]++;
+      all++;
+    }
+    if (all == 0) threads[0] = all = 1;
     auto& stats = run.pipeline.stats;
-    auto& func =
-        run.pipeline.funcs[static_cast<size_t>(run.current.load(std::memory_order_relaxed))];
-    func.time += elapsed;
-    if (!is_look) return;
-    func.active_threads_numerator += threads;
-    func.active_threads_denominator++;
-    stats.active_threads_numerator += threads;
+    for (size_t i = 0; i < threads.size(); i++) {
+      if (threads[i] == 0) continue;
+      auto& func = run.pipeline.funcs[i];
+      run.pipeline.looks[i] += static_cast<double>(threads[i]) / static_cast<double>(all);
+      func.active_threads_numerator += threads[i];
+      func.active_threads_denominator++;
+    }
+    stats.active_threads_numerator += all;
     stats.active_threads_denominator++;
     stats.samples++;
+  }
+
+  // What was never looked at is overhead: nothing is known of it.
+  static void share_time(Pipeline& pipeline) {
+    const auto time = static_cast<double>(pipeline.stats.time);
+    const int looks = pipeline.stats.samples;
+    for (size_t i = 0; i < pipeline.funcs.size(); i++)
+      pipeline.funcs[i].time = looks ? static_cast<uint64_t>(time * pipeline.looks[i] / looks) : 0;
+    if (looks == 0) pipeline.funcs[0].time = pipeline.stats.time;
   }
 
   static void keep(const Run& run, Clock::time_point now) {
     auto& stats = run.pipeline.stats;
     stats.time += nanoseconds(now - run.begin);
     stats.runs++;
+    share_time(run.pipeline);
     const auto add = [](auto& to, const Memory& from) {
       to.memory_peak =
           std::max(to.memory_peak, static_cast<uint64_t>(std::max<int64_t>(0, from.peak)));
@@ -284,13 +375,16 @@ void* retrograde_profiler_begin(retrograde_context*, const char* pipeline, const
   }
 }
 
-int32_t retrograde_profiler_enter(retrograde_context*, void* run, int32_t func) {
-  if (run) static_cast<rt::Run*>(run)->current.store(func, std::memory_order_relaxed);
-  return 0;
+int32_t* retrograde_profiler_thread(retrograde_context*, void* run, int32_t func) {
+  try {
+    return rt::enter_thread(static_cast<rt::Run*>(run), func);
+  } catch (const std::bad_alloc&) {  // then this thread is not seen
+    return rt::enter_thread(nullptr, func);
+  }
 }
 
-int32_t retrograde_profiler_thread(retrograde_context*, void* run, int32_t change) {
-  if (run) static_cast<rt::Run*>(run)->threads.fetch_add(change, std::memory_order_relaxed);
+int32_t retrograde_profiler_leave(retrograde_context*, int32_t* place) {
+  rt::leave_thread(place);
   return 0;
 }
 

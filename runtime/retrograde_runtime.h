@@ -162,10 +162,12 @@ int32_t retrograde_answer_query(retrograde_context*, struct halide_buffer_t* buf
                                 int32_t dimensions, const int32_t* sides);
 
 /* The profiler. A run begins with the names of Funcs, one a line; afterwards they are numbers. Null
- * stands for a run that is not profiled. */
+ * stands for a run that is not profiled. Each thread that works for it gets a place, never null, in which
+ * it keeps the number of what it computes: generated code stores there itself. A thread that gets
+ * another place, for work inside of work, computes nothing in the one before until it has left the other. */
 void* retrograde_profiler_begin(retrograde_context*, const char* pipeline, const char* funcs);
-int32_t retrograde_profiler_enter(retrograde_context*, void* run, int32_t func);
-int32_t retrograde_profiler_thread(retrograde_context*, void* run, int32_t change);
+int32_t* retrograde_profiler_thread(retrograde_context*, void* run, int32_t func);
+int32_t retrograde_profiler_leave(retrograde_context*, int32_t* place);
 int32_t retrograde_profiler_memory(retrograde_context*, void* run, int32_t func, int64_t change);
 int32_t retrograde_profiler_end(retrograde_context*, void* run);
 

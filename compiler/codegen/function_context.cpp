@@ -27,9 +27,8 @@ void FunctionContext::finish(Value* code) {
   Value* count = int64(frame.owned_count);
   if (frame.error_exit) {
     b.SetInsertPoint(frame.error_exit);
-    if (frame.profiler_slot)
-      call_runtime("retrograde_profiler_end", b.getInt32Ty(),
-                   {b.CreateLoad(b.getPtrTy(), frame.profiler_slot)});
+    for (auto due = frame.farewells.rbegin(); due != frame.farewells.rend(); ++due)
+      call_runtime(due->function, b.getInt32Ty(), {b.CreateLoad(b.getPtrTy(), due->argument)});
     if (frame.owned_slots)
       call_runtime("retrograde_free_all", b.getVoidTy(), {frame.owned_slots, count});
     b.CreateRet(frame.error_code);
@@ -40,7 +39,7 @@ void FunctionContext::finish(Value* code) {
     b.CreateMemSet(frame.owned_slots, b.getInt8(0), static_cast<uint64_t>(8 * frame.owned_count),
                    llvm::Align(8));
   }
-  if (frame.profiler_slot) b.CreateStore(null_pointer(), frame.profiler_slot);
+  for (const auto& due : frame.farewells) b.CreateStore(null_pointer(), due.argument);
   b.CreateBr(&*std::next(frame.function->begin()));
 }
 

@@ -51,8 +51,14 @@ struct Frame {
   llvm::PHINode* error_code = nullptr;
   llvm::AllocaInst* owned_slots = nullptr;  // an array of pointers, as long as the function needs
   int64_t owned_count = 0;
-  llvm::AllocaInst* profiler_slot = nullptr;  // a run to end when the function leaves early
-  int64_t stack_bytes = 0;                    // of allocations
+  // What is to be told to the profiler when the function leaves early: a function of the runtime, and
+  // where its argument is while that is due, else null.
+  struct Farewell {
+    std::string function;
+    llvm::AllocaInst* argument;
+  };
+  std::vector<Farewell> farewells;
+  int64_t stack_bytes = 0;  // of allocations
   std::array<llvm::AllocaInst*, 2> scratch = {};
   std::vector<MemoFrame> memo;
   std::unordered_map<std::string, Value*> variables;

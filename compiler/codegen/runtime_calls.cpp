@@ -9,23 +9,57 @@ namespace retrograde::codegen {
 
 using namespace ir;
 
+namespace {
+
+struct ProfilerCall {
+  const char *begins, *ends;
+};
+constexpr ProfilerCall profiler_calls[] = {
+    {"retrograde_profiler_begin", "retrograde_profiler_end"},
+    {"retrograde_profiler_thread", "retrograde_profiler_leave"},
+};
+
+// What was begun is ended by a function that leaves early, too.
+void keep_farewell(FunctionContext& c, const std::string& name, Value* result) {
+  for (const ProfilerCall& call : profiler_calls) {
+    if (name == call.begins) {
+      c.frame.farewells.push_back({call.ends, c.entry_alloca(c.b.getPtrTy(), 1, "profiled")});
+      c.b.CreateStore(result, c.frame.farewells.back().argument);
+    }
+    if (name != call.ends) continue;
+    // Calls are nested: the latest of the kind that is still due ends.
+    for (auto due = c.frame.farewells.rbegin(); due != c.frame.farewells.rend(); ++due) {
+      if (due->function != name) continue;
+      c.b.CreateStore(c.null_pointer(), due->argument);
+      break;
+    }
+  }
+}
+
+// (place, func): one store, which no other access waits for and which stays where it is.
+Value* enter(Values& values, const Call& e) {
+  FunctionContext& c = values.c;
+  llvm::StoreInst* store =
+      c.b.CreateAlignedStore(values.of(e.args[2]), values.of(e.args[1]), llvm::Align(4), true);
+  store->setMetadata(llvm::LLVMContext::MD_tbaa, alias_tag(c.e, "places of the profiler"));
+  return c.b.getInt32(0);
+}
+
+}  // namespace
+
 // (function, args...): function(context, args...).
 Value* runtime_call(Values& values, const Call& e) {
   FunctionContext& c = values.c;
   const auto* name = e.args[0].as<StringImm>();
   RETROGRADE_ASSERT(name != nullptr, "a runtime call of no name");
+  if (name->value == "retrograde_profiler_enter") return enter(values, e);
   std::vector<Value*> args;
   for (size_t i = 1; i < e.args.size(); i++) {
     RETROGRADE_ASSERT(e.args[i].type().is_scalar(), "a vector goes to ", name->value);
     args.push_back(values.of(e.args[i]));
   }
   Value* result = c.call_runtime(name->value, llvm_type(c.e, e.type), args);
-  if (name->value == "retrograde_profiler_begin") {
-    c.frame.profiler_slot = c.entry_alloca(c.b.getPtrTy(), 1, "profiled");
-    c.b.CreateStore(result, c.frame.profiler_slot);
-  } else if (name->value == "retrograde_profiler_end" && c.frame.profiler_slot) {
-    c.b.CreateStore(c.null_pointer(), c.frame.profiler_slot);
-  }
+  keep_farewell(c, name->value, result);
   return result;
 }
 

@@ -32,8 +32,8 @@ void add_runtime(Table& table) {
   table["retrograde_lock_element"] = pointer(retrograde_lock_element);
   table["retrograde_unlock_element"] = pointer(retrograde_unlock_element);
   table["retrograde_profiler_begin"] = pointer(retrograde_profiler_begin);
-  table["retrograde_profiler_enter"] = pointer(retrograde_profiler_enter);
   table["retrograde_profiler_thread"] = pointer(retrograde_profiler_thread);
+  table["retrograde_profiler_leave"] = pointer(retrograde_profiler_leave);
   table["retrograde_profiler_memory"] = pointer(retrograde_profiler_memory);
   table["retrograde_profiler_end"] = pointer(retrograde_profiler_end);
   table["retrograde_debug_to_file"] = pointer(retrograde_debug_to_file);
@@ -67,20 +67,21 @@ void add_libm(Table& table) {
   RETROGRADE_UNARY(acos)
   RETROGRADE_UNARY(acosh)
   RETROGRADE_UNARY(asin)
-  RETROGRADE_UNARY(asinh) RETROGRADE_UNARY(atan) RETROGRADE_UNARY(atanh) RETROGRADE_UNARY(cbrt)
-      RETROGRADE_UNARY(ceil) RETROGRADE_UNARY(cos) RETROGRADE_UNARY(cosh) RETROGRADE_UNARY(
-          erf) RETROGRADE_UNARY(erfc) RETROGRADE_UNARY(exp) RETROGRADE_UNARY(exp2)
-          RETROGRADE_UNARY(expm1) RETROGRADE_UNARY(fabs) RETROGRADE_UNARY(floor) RETROGRADE_UNARY(
-              lgamma) RETROGRADE_UNARY(log) RETROGRADE_UNARY(log10) RETROGRADE_UNARY(log1p)
-              RETROGRADE_UNARY(log2) RETROGRADE_UNARY(nearbyint) RETROGRADE_UNARY(rint)
-                  RETROGRADE_UNARY(round) RETROGRADE_UNARY(roundeven) RETROGRADE_UNARY(sin)
-                      RETROGRADE_UNARY(sinh) RETROGRADE_UNARY(sqrt) RETROGRADE_UNARY(tan)
-                          RETROGRADE_UNARY(tanh) RETROGRADE_UNARY(tgamma) RETROGRADE_UNARY(trunc)
-                              RETROGRADE_BINARY(atan2) RETROGRADE_BINARY(copysign)
-                                  RETROGRADE_BINARY(fdim) RETROGRADE_BINARY(fmax) RETROGRADE_BINARY(
-                                      fmin) RETROGRADE_BINARY(fmod) RETROGRADE_BINARY(hypot)
-                                      RETROGRADE_BINARY(nextafter) RETROGRADE_BINARY(pow)
-                                          RETROGRADE_BINARY(remainder)
+  RETROGRADE_UNARY(asinh)
+  RETROGRADE_UNARY(atan)
+  RETROGRADE_UNARY(atanh) RETROGRADE_UNARY(cbrt) RETROGRADE_UNARY(ceil) RETROGRADE_UNARY(
+      cos) RETROGRADE_UNARY(cosh) RETROGRADE_UNARY(erf) RETROGRADE_UNARY(erfc) RETROGRADE_UNARY(exp)
+      RETROGRADE_UNARY(exp2) RETROGRADE_UNARY(expm1) RETROGRADE_UNARY(fabs) RETROGRADE_UNARY(floor)
+          RETROGRADE_UNARY(lgamma) RETROGRADE_UNARY(log) RETROGRADE_UNARY(log10) RETROGRADE_UNARY(
+              log1p) RETROGRADE_UNARY(log2) RETROGRADE_UNARY(nearbyint) RETROGRADE_UNARY(rint)
+              RETROGRADE_UNARY(round) RETROGRADE_UNARY(roundeven) RETROGRADE_UNARY(sin)
+                  RETROGRADE_UNARY(sinh) RETROGRADE_UNARY(sqrt) RETROGRADE_UNARY(tan)
+                      RETROGRADE_UNARY(tanh) RETROGRADE_UNARY(tgamma) RETROGRADE_UNARY(trunc)
+                          RETROGRADE_BINARY(atan2) RETROGRADE_BINARY(copysign)
+                              RETROGRADE_BINARY(fdim) RETROGRADE_BINARY(fmax)
+                                  RETROGRADE_BINARY(fmin) RETROGRADE_BINARY(fmod)
+                                      RETROGRADE_BINARY(hypot) RETROGRADE_BINARY(nextafter)
+                                          RETROGRADE_BINARY(pow) RETROGRADE_BINARY(remainder)
 #undef RETROGRADE_UNARY
 #undef RETROGRADE_BINARY
                                               table["fma"] =

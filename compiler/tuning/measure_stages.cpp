@@ -11,6 +11,7 @@
 #include "jit/jit.h"
 #include "lower/lower.h"
 #include "retrograde_runtime.h"
+#include "tuning/compiled_once.h"
 
 namespace retrograde::tuning {
 
@@ -23,32 +24,17 @@ double seconds_since(Clock::time_point begin) {
   return std::chrono::duration<double>(Clock::now() - begin).count();
 }
 
-void keep_message(retrograde_context* context, int, const char* message) {
-  static_cast<CallContext*>(context->user_data)->error = message;
-}
-
-// Compiled code that leaves what the profiler found where it is.
-class ProfiledPipeline : public CompiledPipeline {
+// Keeps the profiler's thread between runs, which else start and end it each.
+class ProfilerSession {
  public:
-  ProfiledPipeline(const ir::LoweredFunction& function, const Target& target,
-                   const std::map<std::string, void*>& externs)
-      : arguments_(function.args) {
-    jit::Options options;
-    options.externs = externs;
-    code_ = jit::compile(function, target, options);
-  }
-  const std::vector<ir::LoweredArgument>& arguments() const override { return arguments_; }
-  int run(void* const* argv, CallContext& caller) const override {
-    retrograde_context context = {};
-    context.error_handler = keep_message;
-    context.thread_limit = caller.thread_limit;
-    context.user_data = &caller;
-    return code_->call(&context, const_cast<void**>(argv));
-  }
+  explicit ProfilerSession(const std::string& name)
+      : run_(retrograde_profiler_begin(nullptr, name.c_str(), "overhead")) {}
+  ProfilerSession(const ProfilerSession&) = delete;
+  ProfilerSession& operator=(const ProfilerSession&) = delete;
+  ~ProfilerSession() { retrograde_profiler_end(nullptr, run_); }
 
  private:
-  const std::vector<ir::LoweredArgument> arguments_;
-  std::shared_ptr<const jit::CompiledFunction> code_;
+  void* run_;
 };
 
 }  // namespace
@@ -63,7 +49,7 @@ MeasuredStages measure_stages(const PipelineSpec& pipeline,
   lowering.target = target.with_feature(Target::Profile);
   const ir::LoweredFunction function =
       lower::lower(name, scheduled, lower::infer_arguments(pipeline.outputs), lowering);
-  const ProfiledPipeline code(function, lowering.target, pipeline.externs);
+  const CompiledOnce code(function, lowering.target, pipeline.externs);
   const std::string asked = "measure the stages of " + retrograde::quoted(pipeline.name);
   frontend::Arguments arguments(code, outputs, false, asked, ParamMap::empty_map());
   JITHandlers used = handlers;
@@ -75,6 +61,7 @@ MeasuredStages measure_stages(const PipelineSpec& pipeline,
   };
   MeasuredStages result;
   result.total_seconds = std::numeric_limits<double>::infinity();
+  const ProfilerSession session(name + "_runs");
   const auto begin = Clock::now();
   int runs = 0;
   for (; runs < fewest_runs || seconds_since(begin) < options.seconds; runs++)

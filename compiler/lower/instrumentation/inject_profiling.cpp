@@ -4,15 +4,20 @@
 // Out: Vector; the same stores in the same order.
 //
 //   allocate f[n] {              let profiler.run = begin("pipeline", "overhead\nf\ng")
-//     produce f { P }              allocate f[n] { memory(f, 4 n)
-//     produce g { C }       =>       enter(f) P enter(overhead)
-//   }                                enter(g) C enter(overhead)
+//     produce f { P }            let profiler.place = thread(profiler.run, overhead)
+//     produce g { C }       =>     allocate f[n] { memory(f, 4 n)
+//   }                                enter(profiler.place, f) P enter(profiler.place, overhead)
+//                                    enter(profiler.place, g) C enter(profiler.place, overhead)
 //                                  memory(f, -4 n) }
-//                                end(profiler.run)
+//                                leave(profiler.place) end(profiler.run)
 //
-// Method: what is entered is a number that a sampling thread of the runtime reads; entering costs a
-//         call and a store. Bodies of parallel loops enter again, since their threads may come from
-//         elsewhere. Code generation ends the run when the function leaves early.
+// Method: each thread has a place of its own, in which it writes the number of what it computes and
+//         which a sampling thread of the runtime reads. Entering is one store, which code generation
+//         emits in place: stages in innermost tiles, of a few nanoseconds, take no longer for being
+//         told apart, and sums around them stay in registers. Bodies of parallel loops and forks get
+//         their thread's place. Code generation leaves it, and ends the run, when the function leaves
+//         early. Blocks that fit the stack are not counted as memory: telling of one in an innermost
+//         tile would take longer than to fill it.
 // Source: the sampling profiler that Halide's documentation describes. Tests:
 //         test/golden/pipeline/inject_profiling/, test/unit/profiler_test.cpp.
 #include "lower/instrumentation/inject_profiling.h"
@@ -29,8 +34,17 @@ namespace retrograde::lower {
 namespace {
 
 const char* const run_name = "profiler.run";
+const char* const place_name = "profiler.place";
+constexpr int64_t stack_block_bytes = 16 << 10;
 
 Expr run() { return variable(run_name, Handle()); }
+
+// Code generation puts most such blocks on the stack.
+bool is_small(const Allocate& n) {
+  const auto elements = as_const_int(n.elements);
+  const int64_t element_bytes = int64_t{n.type.bytes()} * n.type.lanes();
+  return elements && n.memory != MemoryType::Heap && *elements <= stack_block_bytes / element_bytes;
+}
 
 class Profiling : public StatementRewriter {
  public:
@@ -44,13 +58,26 @@ class Profiling : public StatementRewriter {
   }
   std::string names;  // by number
 
+  // What one thread runs: in a place of its own.
+  Stmt on_a_thread(const Stmt& s) {
+    const std::string outer = place_;
+    place_ = places_ == 0 ? place_name : place_name + ("." + std::to_string(places_));
+    places_++;
+    const Expr place =
+        call_runtime("retrograde_profiler_thread", {run(), Expr(current_)}, Handle());
+    const Stmt body = (*this)(s);
+    const Stmt leave = make_evaluate(call_runtime("retrograde_profiler_leave", {this->place()}));
+    const Stmt result = make_let(place_, place, make_block({body, leave}));
+    place_ = outer;
+    return result;
+  }
+
  protected:
   Stmt rewrite(const Stmt& s) override {
     if (const ProducerConsumer* n = s.as<ProducerConsumer>(); n && n->produces) return produce(*n);
     if (const For* n = s.as<For>(); n && n->runs == ForType::Parallel)
-      return map_children(s, [&](const Stmt& body) { return on_a_thread((*this)(body)); });
-    if (const Fork* n = s.as<Fork>())
-      return make_fork(on_a_thread((*this)(n->first)), (*this)(n->rest));
+      return map_children(s, [&](const Stmt& body) { return on_a_thread(body); });
+    if (const Fork* n = s.as<Fork>()) return make_fork(on_a_thread(n->first), (*this)(n->rest));
     if (const Allocate* n = s.as<Allocate>()) return allocate(*n);
     return children(s);
   }
@@ -58,6 +85,8 @@ class Profiling : public StatementRewriter {
  private:
   std::map<std::string, int> numbers_;  // of Funcs, and of the memory of their values
   int current_ = 0;
+  std::string place_;  // the variable of this thread's
+  int places_ = 0;
 
   void add(const LoopedFunc& f, const std::string& name) {
     const auto it = numbers_.find(f.name());
@@ -68,11 +97,9 @@ class Profiling : public StatementRewriter {
   }
   int next_ = 1;
 
-  static Stmt enter(int number) {
-    return make_evaluate(call_runtime("retrograde_profiler_enter", {run(), Expr(number)}));
-  }
-  static Stmt thread(int change) {
-    return make_evaluate(call_runtime("retrograde_profiler_thread", {run(), Expr(change)}));
+  Expr place() const { return variable(place_, Handle()); }
+  Stmt enter(int number) const {
+    return make_evaluate(call_runtime("retrograde_profiler_enter", {place(), Expr(number)}));
   }
 
   int number_of(const std::string& name) const { return value_or(numbers_, name, 0); }
@@ -85,11 +112,8 @@ class Profiling : public StatementRewriter {
     return make_producer_consumer(n.name, true, body);
   }
 
-  Stmt on_a_thread(const Stmt& body) const {
-    return make_block({thread(1), enter(current_), body, thread(-1)});
-  }
-
   Stmt allocate(const Allocate& n) {
+    if (is_small(n)) return make_allocate(n.name, n.type, n.memory, n.elements, (*this)(n.body));
     const Expr bytes = n.elements * make_const(Int(64), n.type.bytes());
     const auto memory = [&](const Expr& change) {
       return make_evaluate(
@@ -137,7 +161,7 @@ Stmt inject_profiling(const Stmt& s, const Program& program, const std::string& 
     const Expr begin = call_runtime("retrograde_profiler_begin",
                                     {Expr(pipeline), Expr(profiling.names)}, Handle());
     return make_let(run_name, begin,
-                    make_block({profiling(work),
+                    make_block({profiling.on_a_thread(work),
                                 make_evaluate(call_runtime("retrograde_profiler_end", {run()}))}));
   };
   return wrap_work(s, wrap);
