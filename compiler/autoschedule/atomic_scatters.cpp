@@ -72,7 +72,7 @@ AtomicScatters::AtomicScatters(const std::vector<FuncPtr>& outputs,
     : is_on_(!request.options.deterministic && threads_of(request) != 1 &&
              !request.options.without.contains(Decision::ScatterStrategy)),
       sizes_(sizes) {
-  if (!is_on_) return;
+  if (!is_on_ || !request.atomic_parts) return;
   const Readers readers(outputs, stored);
   const auto is_free = [&](const FuncPtr& f) { return !is_touched(*f) && !but.contains(f.get()); };
   for (const FuncPtr& sum : stored) {

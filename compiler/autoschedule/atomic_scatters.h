@@ -1,8 +1,8 @@
 // atomic_scatters.h -- sums at places that data decide, by atomic updates, where bits may differ from
 // run to run (AutoscheduleOptions::deterministic = false).
 //
-// Private parts that are more than the caches hold live one for each thread, not all at once: each is
-// added to the sum as soon as it is full.
+// Private parts live one for each thread, not all at once, where all take more memory than the budget
+// allows: each is added to the sum as soon as it is full.
 //
 //   parallel part: for r: parts(i(r), part) += ...     parallel part:
 //   parallel x: for part: sum(x) += parts(x, part)  =>   for r: parts(i(r)) += ...
@@ -12,8 +12,9 @@
 //
 //   for r: f(i(r)) += term(r)    =>    parallel r: atomic: f(i(r)) += term(r)
 //
-// The adds of the first are one for each element of each part, of the second one for each iteration:
-// these take a processor some nanoseconds each, while threads seldom meet. So the sum has to be large.
+// The adds of the first are one for each element of each part, some nanoseconds each: it takes two or
+// three times as long, and parts that the caches hold are left. Those of the second are one for each
+// iteration, as without: it gains as long as threads seldom meet, so that the sum has to be large.
 #pragma once
 
 #include <unordered_map>

@@ -42,6 +42,9 @@ struct ScheduleRequest {
   // where that can be.
   std::set<std::string> recomputed = {}, stored = {};
   ScheduleScales scales = {};
+  // Private parts one for each thread, added up by atomic updates (atomic_scatters.h): what a budget
+  // wants of a schedule whose bits may differ.
+  bool atomic_parts = false;
 };
 
 // Gives the directives to the Funcs of this graph, whose wrappers have been applied. The result: how

@@ -29,6 +29,7 @@ Buffer<float> numbers(int count) {
 AutoscheduleOptions in_any_order() {
   AutoscheduleOptions options;
   options.deterministic = false;
+  options.memory_budget = 48 << 20;
   return options;
 }
 
@@ -78,9 +79,21 @@ TEST(AtomicScatters, PartsOfALargeSumLiveOneForEachThread) {
   EXPECT_EQ(count_wrong(fixed.realized(ordered), fixed.expected()), 0u);
 }
 
+TEST(AtomicScatters, PartsAreKeptWhereTheyAreWithinTheBudget) {
+  const TableGradient program;
+  AutoscheduleOptions options = in_any_order();
+  options.memory_budget = 0;
+  const auto results = Pipeline(program.gradient).auto_schedule(get_host_target(), options);
+  EXPECT_EQ(results.schedule_source.find("atomic"), std::string::npos) << results.schedule_source;
+}
+
 TEST(AtomicScatters, AreNeverChosenWhereBitsAreToBeTheSame) {
   const TableGradient program;
+  AutoscheduleOptions options;
+  options.memory_budget = 48 << 20;
   const Pipeline pipeline(program.gradient);
+  const auto results = pipeline.auto_schedule(get_host_target(), options);
+  EXPECT_EQ(results.schedule_source.find("atomic"), std::string::npos) << results.schedule_source;
   const Buffer<float> one = program.realized(pipeline, 1), two = program.realized(pipeline, 2);
   EXPECT_EQ(std::memcmp(one.data(), two.data(), one.size_in_bytes()), 0);
 }
