@@ -6,6 +6,7 @@
 #   retrograde_dep_halide_runtime  HalideRuntime.h and HalideBuffer.h, headers only
 #   retrograde_dep_halide          the Halide 14 compiler, for tests and benchmarks only
 #   retrograde_dep_image           OpenImageIO, for apps
+#   retrograde_dep_sqlite         for tools/tune
 #   retrograde_dep_cli, retrograde_dep_json   command lines and reports, for apps
 find_package(PkgConfig REQUIRED)
 find_package(Threads REQUIRED)
@@ -65,3 +66,9 @@ target_include_directories(retrograde_dep_cli SYSTEM INTERFACE ${RETROGRADE_CLI_
 find_path(RETROGRADE_JSON_INCLUDE nlohmann/json.hpp REQUIRED)
 add_library(retrograde_dep_json INTERFACE)
 target_include_directories(retrograde_dep_json SYSTEM INTERFACE ${RETROGRADE_JSON_INCLUDE})
+
+find_path(RETROGRADE_SQLITE_INCLUDE sqlite3.h REQUIRED)
+find_library(RETROGRADE_SQLITE_LIBRARY sqlite3 REQUIRED)
+add_library(retrograde_dep_sqlite INTERFACE)
+target_include_directories(retrograde_dep_sqlite SYSTEM INTERFACE ${RETROGRADE_SQLITE_INCLUDE})
+target_link_libraries(retrograde_dep_sqlite INTERFACE ${RETROGRADE_SQLITE_LIBRARY})

@@ -3,6 +3,7 @@
 // It gives a schedule (choose_schedule.h) to a copy of the graph. What the log of the copy holds beyond
 // that of the pipeline is then given to the pipeline, and is the source.
 #include "autoschedule/choose_schedule.h"
+#include "autoschedule/keep_graph.h"
 #include "diagnostics/large_stack.h"
 #include "frontend/run/pipeline.h"
 #include "frontend/schedule/autoscheduler.h"
@@ -19,6 +20,7 @@ void schedule_all(const Pipeline& pipeline, const Target& target, const MachineP
   const PipelineSpec spec = pipeline.spec();
   const std::vector<FuncPtr>& outputs = spec.outputs;
   run_on_large_stack([&] {
+    keep_graph(spec.name, outputs);
     const std::vector<FuncPtr> wrapped = apply_wrappers(outputs);
     const auto given = static_cast<std::ptrdiff_t>(schedule_log(wrapped).size());
     ChosenSchedule chosen =

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <optional>
 
+#include "autoschedule/keep_graph.h"
 #include "autoschedule/schedule_search.h"
 #include "autoschedule/stored_funcs.h"
 #include "autoschedule/task_sizes.h"
@@ -113,6 +114,7 @@ ChosenSchedule choose_schedule(const std::vector<FuncPtr>& outputs, const Schedu
 ChosenSchedule choose_schedule(const PipelineSpec& pipeline, const Target& target,
                                bool wants_runner_up) {
   const ScheduleRequest request{vector_unit_of(target), pipeline.autoschedule, {}};
+  keep_graph(pipeline.name, pipeline.outputs);
   ChosenSchedule result;
   if (!request.options.search && !wants_runner_up) {
     result.graph.outputs = schedule_unscheduled(pipeline.outputs, request.unit, request.options);

@@ -32,8 +32,8 @@ bool is_of_name(char c) {
   return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '_' || c == '$';
 }
 
-// Funcs that a schedule makes have another number in each copy of a graph: all names but those known
-// are numbered anew, in their order; the first of a name in the process has no number yet.
+}  // namespace
+
 std::string with_stable_names(const ScheduleLog& log, const std::set<std::string>& known) {
   const std::string text = log.to_text();
   std::set<std::string> made;
@@ -58,6 +58,8 @@ std::string with_stable_names(const ScheduleLog& log, const std::set<std::string
   }
   return result;
 }
+
+namespace {
 
 // work(i) for each i below `count`, by several threads.
 void in_parallel(size_t count, const std::function<void(size_t)>& work) {

@@ -52,6 +52,11 @@ size_t candidates_for(size_t funcs);
 ScheduleSearch search_schedule(const std::vector<FuncPtr>& outputs, const ScheduleRequest& request,
                                Scheduling what, const ScheduleCost& cost, size_t candidates = 0);
 
+// Its text, the same of each copy of a graph. Funcs that a schedule makes have another number in each:
+// all names but those known are numbered anew, in their order; the first of a name in the process has
+// no number yet.
+std::string with_stable_names(const ScheduleLog& log, const std::set<std::string>& known);
+
 // Directives that only one of them has, a line each: "- " for the first, "+ " for the second.
 std::string difference_of(const ScheduleLog& first, const ScheduleLog& second);
 

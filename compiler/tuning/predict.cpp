@@ -1,6 +1,7 @@
 #include "tuning/predict.h"
 
 #include <algorithm>
+#include <memory>
 #include <numeric>
 
 #include "tuning/memory_traffic.h"
@@ -30,10 +31,29 @@ double compute_ns(const Work& work, const Machine& m) {
   return std::max(slowest + not_overlapped * (all - slowest), chains);
 }
 
+// What does not depend on times, only on how large vectors and caches are.
+struct Program {
+  WorkTree tree;
+  std::vector<std::vector<Traffic>> behind;  // by level, by stage
+
+  Program(const LoweredFunction& function, const ProgramSizes& sizes, const Machine& machine,
+          int threads)
+      : tree(work_tree(function, sizes, {machine.vector_bytes, machine.registers, threads})) {
+    const MemoryTraffic traffic(tree);
+    for (size_t level = 0; level + 1 < Machine::level_count; level++)
+      behind.push_back(traffic.behind(machine.levels[level].bytes));
+    behind.emplace_back(tree.stages.size());  // nothing lies behind memory
+  }
+};
+
 class Predictor {
  public:
-  Predictor(const WorkTree& tree, const Machine& machine)
-      : tree_(tree), machine_(machine), stages_(tree.stages.size()) {
+  Predictor(const Program& program, const Machine& machine)
+      : tree_(program.tree),
+        behind_(program.behind),
+        machine_(machine),
+        stages_(program.tree.stages.size()) {
+    const WorkTree& tree = tree_;
     for (size_t s = 0; s < stages_.size(); s++) stages_[s].name = tree.stages[s];
   }
 
@@ -58,6 +78,7 @@ class Predictor {
 
  private:
   const WorkTree& tree_;
+  const std::vector<std::vector<Traffic>>& behind_;
   const Machine& machine_;
   std::vector<StagePrediction> stages_;
 
@@ -78,15 +99,10 @@ class Predictor {
   }
 
   void add_traffic() {
-    const MemoryTraffic traffic(tree_);
-    std::vector<std::vector<Traffic>> behind;
-    for (size_t level = 0; level + 1 < Machine::level_count; level++)
-      behind.push_back(traffic.behind(machine_.levels[level].bytes));
-    behind.emplace_back(tree_.stages.size());  // nothing lies behind memory
     for (size_t level = 1; level < Machine::level_count; level++) {
       const Machine::Level& from = machine_.levels[level];
       for (size_t s = 0; s < stages_.size(); s++) {
-        const Traffic &in = behind[level - 1][s], &out = behind[level][s];
+        const Traffic &in = behind_[level - 1][s], &out = behind_[level][s];
         const double serial = std::max(0.0, in.serial_bytes - out.serial_bytes);
         const double parallel = std::max(0.0, in.parallel_bytes - out.parallel_bytes);
         stages_[s].bytes[level] += serial + parallel;
@@ -112,16 +128,30 @@ std::string StagePrediction::bound_by() const {
   return names[longest - memory_seconds.begin()];
 }
 
+namespace {
+
+Prediction predict(const Program& program, const Machine& machine, int threads) {
+  Machine shared = machine;
+  if (threads == 1) {
+    for (Machine::Level& level : shared.levels) level.all_threads = level.one_thread;
+  }
+  return Predictor(program, shared).predict();
+}
+
+}  // namespace
+
 Prediction predict(const LoweredFunction& function, const ProgramSizes& sizes,
                    const Machine& machine, int threads) {
   const int used = threads > 0 ? threads : machine.threads;
-  Machine shared = machine;
-  if (used == 1) {
-    for (Machine::Level& level : shared.levels) level.all_threads = level.one_thread;
-  }
-  const TreeOptions options{machine.vector_bytes, machine.registers, used};
-  const WorkTree tree = work_tree(function, sizes, options);
-  return Predictor(tree, shared).predict();
+  return predict(Program(function, sizes, machine, used), machine, used);
+}
+
+std::function<double(const Machine&)> seconds_predictor(const LoweredFunction& function,
+                                                        const ProgramSizes& sizes,
+                                                        const Machine& machine, int threads) {
+  const int used = threads > 0 ? threads : machine.threads;
+  const auto program = std::make_shared<Program>(function, sizes, machine, used);
+  return [=](const Machine& m) { return predict(*program, m, used).seconds; };
 }
 
 double predicted_seconds(const LoweredFunction& function, const ProgramSizes& sizes,

@@ -7,6 +7,7 @@
 #pragma once
 
 #include <array>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -38,6 +39,10 @@ struct Prediction {
 // the function, not to what it computes. The same function gives the same numbers.
 Prediction predict(const LoweredFunction& function, const ProgramSizes& sizes,
                    const Machine& machine, int threads = 0);
+// The same for other figures of a machine whose vectors, registers and caches are as large: quick.
+std::function<double(const Machine&)> seconds_predictor(const LoweredFunction& function,
+                                                        const ProgramSizes& sizes,
+                                                        const Machine& machine, int threads = 0);
 double predicted_seconds(const LoweredFunction& function, const ProgramSizes& sizes,
                          const Machine& machine, int threads = 0);
 

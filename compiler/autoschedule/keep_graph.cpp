@@ -1,0 +1,79 @@
+#include "autoschedule/keep_graph.h"
+
+#include <HalideRuntime.h>
+
+#include <algorithm>
+#include <cctype>
+#include <cstdint>
+#include <cstdlib>
+#include <fstream>
+#include <iomanip>
+#include <map>
+#include <sstream>
+
+#include "autoschedule/stored_funcs.h"
+#include "diagnostics/error.h"
+#include "graph/give_directive.h"
+#include "graph/graph.h"
+#include "graph/parameter_contents.h"
+#include "ir/text.h"
+
+namespace retrograde::autoschedule {
+
+namespace {
+
+std::string header_of(const graph::ParameterContents& p) {
+  return (p.is_literal ? "buffer " : "image ") + to_string(p.type) + " " + ir::quote_name(p.name) +
+         "(" + std::to_string(p.dimensions) + ")";
+}
+
+// By the line that begins an image, what its buffer says. Text of the graph has no data.
+std::map<std::string, std::string> sizes_of_bound(const graph::Graph& graph) {
+  std::map<std::string, std::string> result;
+  for (const auto& p : graph.parameters) {
+    if (!p->is_buffer || !p->buffer) continue;
+    std::string lines;
+    for (int d = 0; d < p->buffer->dimensions; d++)
+      lines += text("  estimates(", d, ", ", p->buffer->dim[d].min, ", ", p->buffer->dim[d].extent,
+                    ")\n");
+    result[header_of(*p)] = lines;
+  }
+  return result;
+}
+
+std::string text_with_sizes(const std::vector<FuncPtr>& outputs) {
+  const graph::Graph graph = graph::graph_of(outputs);
+  const auto sizes = sizes_of_bound(graph);
+  std::istringstream lines(graph::to_text(graph));
+  std::string result;
+  for (std::string line; std::getline(lines, line);) {
+    result += line + "\n";
+    if (const auto found = sizes.find(line); found != sizes.end()) result += found->second;
+  }
+  return result;
+}
+
+std::string file_name(const std::string& name, const std::string& contents) {
+  uint64_t hash = 14695981039346656037u;  // FNV-1a
+  for (const char c : contents) hash = (hash ^ static_cast<unsigned char>(c)) * 1099511628211u;
+  std::string plain = name;
+  for (char& c : plain) {
+    if (!std::isalnum(static_cast<unsigned char>(c))) c = '_';
+  }
+  std::ostringstream out;
+  out << plain << "-" << std::hex << std::setw(16) << std::setfill('0') << hash << ".graph";
+  return out.str();
+}
+
+}  // namespace
+
+void keep_graph(const std::string& name, const std::vector<FuncPtr>& outputs) {
+  const char* folder = std::getenv("RETROGRADE_GRAPHS");
+  if (!folder || !*folder) return;
+  const auto is_left = [](const FuncPtr& f) { return !f->is_extern() && !is_touched(*f); };
+  if (std::ranges::none_of(topological_order(outputs), is_left)) return;
+  const std::string contents = text_with_sizes(outputs);
+  std::ofstream(std::string(folder) + "/" + file_name(name, contents)) << contents;
+}
+
+}  // namespace retrograde::autoschedule

@@ -1,0 +1,65 @@
+// database.h -- what was measured, in SQLite: whoever stops in the middle goes on from there.
+//
+//   machine      the processor
+//   program      a graph by the hash of its text
+//   candidate    a schedule of a program: its log, and the graph with it
+//   measurement  of a candidate on a machine with so many threads, by this version of the compiler:
+//                seconds, or why there are none
+//
+// Each measurement is a transaction of its own.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+struct sqlite3;
+
+namespace retrograde::tune {
+
+struct Measurement {
+  double seconds = 0;
+  int runs = 0;
+  double predicted_seconds = 0;
+  std::string error;  // not empty: it could not be compiled or run
+};
+
+// A candidate that was measured.
+struct Measured {
+  int64_t program = 0;
+  std::string program_name, log, graph;
+  Measurement measurement;
+};
+
+class Database {
+ public:
+  // Makes the file where there is none.
+  // Requires: the file is a database of tools/tune, of this version.
+  explicit Database(const std::string& path);
+  Database(const Database&) = delete;
+  Database& operator=(const Database&) = delete;
+  ~Database();
+
+  // The numbers of what is there afterwards.
+  int64_t machine(const std::string& name);
+  int64_t program(const std::string& name, const std::string& text);
+  int64_t candidate(int64_t program, const std::string& log, const std::string& graph);
+
+  std::optional<Measurement> measurement(int64_t candidate, int64_t machine, int threads);
+  void keep(int64_t candidate, int64_t machine, int threads, const Measurement& measurement);
+  // Those with seconds, the fastest of a program first.
+  std::vector<Measured> measured(int64_t machine, int threads);
+
+ private:
+  const std::string path_;
+  sqlite3* handle_ = nullptr;
+
+  [[noreturn]] void fail(const std::string& evidence, const std::string& instead) const;
+  void run(const char* sql);
+  int64_t number(const char* sql);
+  void check_kind();
+  friend class Statement;
+};
+
+}  // namespace retrograde::tune

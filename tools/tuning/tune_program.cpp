@@ -1,0 +1,191 @@
+#include "tune_program.h"
+
+#include <algorithm>
+#include <chrono>
+#include <fstream>
+#include <iomanip>
+#include <mutex>
+#include <ostream>
+#include <set>
+#include <thread>
+#include <tuple>
+
+#include "autoschedule/schedule_search.h"
+#include "diagnostics/error.h"
+#include "diagnostics/large_stack.h"
+#include "frontend/run/compiler_interface.h"
+#include "graph/graph.h"
+#include "graph/wrappers.h"
+#include "tuning/machine.h"
+#include "tuning/measure_schedule.h"
+
+namespace retrograde::tune {
+
+namespace {
+
+using graph::FuncPtr;
+using Clock = std::chrono::steady_clock;
+constexpr double hopeless = 3;  // times the best: not worth a second run
+
+struct Candidate {
+  std::vector<FuncPtr> outputs;
+  std::string log;  // with names that are the same in each run
+  double predicted_seconds = 0;
+};
+
+// What the search costs, the rules' schedule first, then by predicted time. Several threads of the
+// search ask at once.
+class Candidates {
+ public:
+  explicit Candidates(const std::vector<FuncPtr>& outputs) : outputs_(outputs) {
+    for (const FuncPtr& f : graph::topological_order(outputs)) known_.insert(f->name);
+  }
+
+  std::vector<Candidate> find(const Target& target, int threads) {
+    autoschedule::ScheduleRequest request{autoschedule::vector_unit_of(target), {}, {}};
+    request.options.threads = threads;
+    const auto cost = [&](const std::vector<FuncPtr>& scheduled) {
+      const double seconds = predicted_seconds(scheduled, target, threads);
+      add(scheduled, seconds);
+      return seconds;
+    };
+    autoschedule::search_schedule(outputs_, request, autoschedule::Scheduling::Everything, cost);
+    std::sort(found_.begin() + 1, found_.end(), [](const Candidate& a, const Candidate& b) {
+      return std::tie(a.predicted_seconds, a.log) < std::tie(b.predicted_seconds, b.log);
+    });
+    return std::move(found_);
+  }
+
+ private:
+  const std::vector<FuncPtr>& outputs_;
+  std::set<std::string> known_;  // names of the graph without a schedule
+  std::mutex mutex_;
+  std::vector<Candidate> found_;
+
+  void add(const std::vector<FuncPtr>& scheduled, double seconds) {
+    std::string log = autoschedule::with_stable_names(graph::schedule_log(scheduled), known_);
+    const std::lock_guard lock(mutex_);
+    found_.push_back({scheduled, std::move(log), seconds});
+  }
+};
+
+Measurement measure(const Candidate& candidate, const Target& target, const Options& options,
+                    double best_seconds) {
+  Measurement result;
+  result.predicted_seconds = candidate.predicted_seconds;
+  try {
+    tuning::MeasureOptions measuring;
+    measuring.seconds = options.run_seconds;
+    measuring.threads = options.threads;
+    measuring.hopeless_seconds = best_seconds * hopeless;
+    const auto measured = tuning::measure_schedule(candidate.outputs, target, measuring);
+    result.seconds = measured.seconds;
+    result.runs = measured.runs;
+  } catch (const Error& error) {
+    result.error = error.what();
+  }
+  return result;
+}
+
+void write_file(const std::string& path, const std::string& contents) {
+  std::ofstream file(path);
+  file << contents;
+  if (file.flush()) return;
+  user_error("write " + retrograde::quoted(path), "the file must be writable", "writing it failed",
+             "Name another folder");
+}
+
+std::string in_milliseconds(double seconds) {
+  std::ostringstream out;
+  out << std::fixed << std::setprecision(seconds < 1e-3 ? 4 : 2) << 1e3 * seconds << " ms";
+  return out.str();
+}
+
+// One program and what is known of it.
+class Session {
+ public:
+  Session(const std::string& name, const std::string& text, const Options& options,
+          Database& database, std::ostream& out)
+      : name_(name), options_(options), database_(database), out_(out) {
+    program_ = database.program(name, text);
+    machine_ = database.machine(tuning::processor_name());
+    graph::Graph graph = graph::parse_graph(text);
+    graph::validate(graph, "parse_graph");
+    outputs_ = graph::apply_wrappers(graph.outputs);
+    tuning::bind_sample_inputs(outputs_);
+  }
+
+  void run() {
+    const std::vector<Candidate> all = Candidates(outputs_).find(target_, threads_of(options_));
+    out_ << name_ << ": " << all.size() << " schedules\n";
+    const auto begin = Clock::now();
+    for (size_t i = 0; i < all.size(); i++) {
+      const std::chrono::duration<double> spent = Clock::now() - begin;
+      const bool may_measure =
+          spent.count() < options_.seconds && (options_.limit == 0 || measured_ < options_.limit);
+      look_at(all[i], i == 0, may_measure);
+    }
+    tell();
+  }
+
+ private:
+  const std::string name_;
+  const Options& options_;
+  Database& database_;
+  std::ostream& out_;
+  const Target target_ = get_jit_target_from_environment();
+  int64_t program_ = 0, machine_ = 0;
+  std::vector<FuncPtr> outputs_;
+  int measured_ = 0, known_ = 0, left_ = 0;
+  double best_seconds_ = 0, rules_seconds_ = 0;  // 0: none yet
+  std::vector<FuncPtr> best_;
+
+  void look_at(const Candidate& candidate, bool is_of_rules, bool may_measure) {
+    const int64_t id = database_.candidate(program_, candidate.log,
+                                           graph::to_text(graph::graph_of(candidate.outputs)));
+    auto found = database_.measurement(id, machine_, threads_of(options_));
+    if (found) {
+      known_++;
+    } else if (may_measure) {
+      found = measure(candidate, target_, options_, best_seconds_);
+      database_.keep(id, machine_, threads_of(options_), *found);
+      measured_++;
+      out_ << "  predicted " << in_milliseconds(found->predicted_seconds) << ", measured "
+           << (found->error.empty() ? in_milliseconds(found->seconds) : found->error) << std::endl;
+    } else {
+      left_++;
+    }
+    if (!found || !found->error.empty()) return;
+    if (is_of_rules) rules_seconds_ = found->seconds;
+    if (best_seconds_ != 0 && found->seconds >= best_seconds_) return;
+    best_seconds_ = found->seconds;
+    best_ = candidate.outputs;
+  }
+
+  void tell() {
+    out_ << "  measured now: " << measured_ << ", before: " << known_ << ", left: " << left_
+         << "\n";
+    if (best_.empty()) return;
+    out_ << "  best: " << in_milliseconds(best_seconds_);
+    if (rules_seconds_ > 0) out_ << ", the rules': " << in_milliseconds(rules_seconds_);
+    out_ << "\n";
+    if (options_.output.empty()) return;
+    const ScheduleLog log = graph::schedule_log(best_);
+    write_file(options_.output + "/" + name_ + ".schedule", log.to_text());
+    write_file(options_.output + "/" + name_ + ".cpp", log.to_cpp());
+  }
+};
+
+}  // namespace
+
+int threads_of(const Options& options) {
+  if (options.threads > 0) return options.threads;
+  return std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+}
+
+void tune_program(const std::string& name, const std::string& text, const Options& options,
+                  Database& database, std::ostream& out) {
+  run_on_large_stack([&] { Session(name, text, options, database, out).run(); });
+}
+
+}  // namespace retrograde::tune
