@@ -1,9 +1,11 @@
 #include "autoschedule/memory_estimate.h"
 
 #include <algorithm>
+#include <set>
 #include <string>
 #include <unordered_map>
 
+#include "graph/computing_order.h"
 #include "ir/build.h"
 
 namespace retrograde::autoschedule {
@@ -12,37 +14,39 @@ namespace {
 
 using LevelKind = graph::LoopLevel::Kind;
 
-// When each Func is computed and read last, as places in the order of the graph.
+bool is_inlined(const FuncContents& f, bool is_output) {
+  return !is_output && f.is_pure() && f.schedule.compute_level.kind == LevelKind::Inlined;
+}
+
+// When each Func that is not inlined is computed and read last, as places in the order of lowering.
 class Lives {
  public:
-  explicit Lives(const std::vector<FuncPtr>& outputs) : order_(topological_order(outputs)) {
-    for (size_t i = 0; i < order_.size(); ++i) by_name_[order_[i]->name] = i;
+  explicit Lives(const std::vector<FuncPtr>& outputs) {
+    find_computed(outputs);
+    put_in_order();
     last_.resize(order_.size());
-    for (const FuncPtr& f : outputs) last_[by_name_.at(f->name)] = order_.size();
-    for (size_t i = order_.size(); i-- > 0;) {
-      const size_t at = is_inlined(*order_[i]) ? last_[i] : nest(i);
+    for (size_t i = 0; i < order_.size(); ++i) {
+      const size_t at = nest(i);
       last_[i] = std::max(last_[i], at);
-      for (const FuncPtr& callee : direct_callees(*order_[i])) {
-        size_t& last = last_[by_name_.at(callee->name)];
+      for (const size_t callee : computed_[number_[i]].callees) {
+        size_t& last = last_[place_[callee]];
         last = std::max(last, at);
       }
     }
   }
 
   const std::vector<FuncPtr>& order() const { return order_; }
-  size_t last(size_t f) const { return last_[f]; }
-  static bool is_inlined(const FuncContents& f) {
-    return f.is_pure() && f.schedule.compute_level.kind == LevelKind::Inlined;
-  }
-  // The Func at root in whose loops f is stored: itself, or another.
-  size_t nest(size_t f) const {
+  bool is_output(size_t i) const { return computed_[number_[i]].is_output; }
+  size_t last(size_t i) const { return last_[i]; }
+  // The Func at root in whose loops one is stored: itself, or another.
+  size_t nest(size_t i) const {
     for (size_t steps = 0; steps < order_.size(); ++steps) {
-      const graph::LoopLevel& level = order_[f]->schedule.compute_level;
+      const graph::LoopLevel& level = order_[i]->schedule.compute_level;
       const auto host = by_name_.find(level.func);
       if (level.kind != LevelKind::At || host == by_name_.end()) break;
-      f = host->second;
+      i = host->second;
     }
-    return f;
+    return i;
   }
   const FuncContents* host_of(const FuncContents& f) const {
     const graph::LoopLevel& level = f.schedule.compute_level;
@@ -52,7 +56,42 @@ class Lives {
   }
 
  private:
-  const std::vector<FuncPtr> order_;
+  // What is not inlined, and what each reads of that, directly or through what is.
+  void find_computed(const std::vector<FuncPtr>& outputs) {
+    std::unordered_map<const FuncContents*, std::set<size_t>> reads;
+    for (const FuncPtr& f : topological_order(outputs)) {
+      std::set<size_t>& own = reads[f.get()];
+      for (const FuncPtr& callee : direct_callees(*f)) {
+        const auto& further = reads[callee.get()];
+        own.insert(further.begin(), further.end());
+      }
+      const bool is_output = std::ranges::find(outputs, f) != outputs.end();
+      if (is_inlined(*f, is_output)) continue;
+      computed_.push_back({{own.begin(), own.end()}, {}, f->args.size(), is_output});
+      own = {funcs_.size()};
+      by_name_[f->name] = funcs_.size();
+      funcs_.push_back(f);
+    }
+    for (size_t f = 0; f < funcs_.size(); ++f) {
+      const graph::LoopLevel& level = funcs_[f]->schedule.compute_level;
+      const auto host = by_name_.find(level.func);
+      if (level.kind == LevelKind::At && host != by_name_.end()) computed_[f].host = host->second;
+    }
+  }
+  void put_in_order() {
+    number_ = graph::computing_order(computed_);
+    place_.resize(number_.size());
+    for (size_t i = 0; i < number_.size(); ++i) {
+      place_[number_[i]] = i;
+      order_.push_back(funcs_[number_[i]]);
+      by_name_[order_.back()->name] = i;
+    }
+  }
+
+  std::vector<FuncPtr> funcs_;                 // producers before consumers
+  std::vector<graph::ComputedFunc> computed_;  // of each of them
+  std::vector<size_t> number_, place_;         // of each place: the Func's; and back
+  std::vector<FuncPtr> order_;
   std::unordered_map<std::string, size_t> by_name_;
   std::vector<size_t> last_;
 };
@@ -111,8 +150,7 @@ MemoryEstimate estimate_memory(const std::vector<FuncPtr>& outputs, const SizeEs
   std::vector<Life> all;
   std::vector<int64_t> change(order.size() + 1);
   for (size_t i = 0; i < order.size(); ++i) {
-    const bool is_output = std::find(outputs.begin(), outputs.end(), order[i]) != outputs.end();
-    if (is_output || Lives::is_inlined(*order[i])) continue;
+    if (lives.is_output(i)) continue;
     const size_t first = lives.nest(i), last = std::max(first, lives.last(i));
     const int64_t bytes = bytes_of(*order[i], lives, sizes, threads);
     all.push_back({first, last, {order[i], bytes}});

@@ -4,8 +4,8 @@
 //
 //   computing b: a, b      c: a, b, c      out: a, c         the most: a, b and c
 //
-// A Func at root lives from where it is computed, in the order of the graph, to the last loop nest
-// that reads it, as lowering frees it. What is computed in the loops of another Func lives as long as
+// A Func at root lives from where it is computed, in the order of lowering (graph/computing_order.h),
+// to the last loop nest that reads it, as lowering frees it. What is computed in the loops of another Func lives as long as
 // these, a slice for each thread. Inputs and outputs are the caller's.
 #pragma once
 

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "autoschedule/read_estimate.h"
+#include "autoschedule/running_sums.h"
 #include "frontend/language/func.h"
 #include "frontend/schedule/loop_level.h"
 #include "graph/own_reads.h"
@@ -87,7 +88,9 @@ void compute_in_slices(const Readers& readers, const std::vector<FuncPtr>& store
     if (!is_at_root(*f) || !may_have_slices(f) || !readers.is_inside(f) || readers.is_output(f))
       continue;
     const auto reader = readers.only_reader(f);
-    if (!reader || !is_at_root(*reader->func) || but.contains(reader->func.get())) continue;
+    if (!reader || !is_at_root(*reader->func) || but.contains(reader->func.get()) ||
+        is_running_sum(*f, *reader->func))
+      continue;
     if (const auto loop = slicer.loop(f, *reader))
       Func(f).compute_at(retrograde::LoopLevel(Func(reader->func), Var(*loop), reader->stage));
   }

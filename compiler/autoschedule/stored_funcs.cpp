@@ -8,6 +8,7 @@
 #include "autoschedule/cost_estimate.h"
 #include "autoschedule/large_bodies.h"
 #include "autoschedule/read_estimate.h"
+#include "autoschedule/running_sums.h"
 #include "graph/give_directive.h"
 #include "graph/own_reads.h"
 #include "ir/build.h"
@@ -77,6 +78,7 @@ class StorageChooser {
       stored |= left_inline ? computes_more_than_is_read(*f) : is_output(f) || !f->is_pure();
       stored |= chosen_.preferred.contains(f.get());
       stored |= is_worth_choosing_once(uses_[f.get()]);
+      stored |= is_stored_running_sum(f);
       if (limits_) {
         stored |= limits_->need_root.contains(f.get()) || limits_->levels.contains(f.get());
         stored &= !limits_->stay.contains(f.get()) || is_output(f);  // which is at root anyway
@@ -93,6 +95,18 @@ class StorageChooser {
  private:
   bool is_output(const FuncPtr& f) const {
     return std::find(outputs_.begin(), outputs_.end(), f) != outputs_.end();
+  }
+
+  // Whether more adjoints of those that are stored can go once it is there.
+  bool is_stored_running_sum(const FuncPtr& f) const {
+    const auto found = readers_.find(f.get());
+    if (found == readers_.end() || found->second.size() != 1 ||
+        !is_running_sum(*f, **found->second.begin()))
+      return false;
+    const std::vector<FuncPtr> summed = summed_adjoints(*f);
+    return std::count_if(summed.begin(), summed.end(), [&](const FuncPtr& g) {
+             return !g->is_pure() || stored_.contains(g.get());
+           }) >= static_cast<std::ptrdiff_t>(least_summed);
   }
 
   // A block of a sum is computed where it is added up: see default_schedule.cpp.

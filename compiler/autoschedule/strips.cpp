@@ -13,6 +13,7 @@
 #include "autoschedule/new_loop.h"
 #include "autoschedule/only_reader.h"
 #include "autoschedule/read_window.h"
+#include "autoschedule/running_sums.h"
 #include "autoschedule/stored_reads.h"
 #include "frontend/language/func.h"
 #include "frontend/schedule/loop_level.h"
@@ -32,7 +33,7 @@ constexpr size_t most_members = 8;
 // What several of a group read, as a sum reads all steps of a chain. If it did not join, no Func behind
 // it would either, and the images of all would be held until the group has run: so it may have more
 // company, and rows that wait for the last reader in a cache farther away.
-constexpr size_t most_with_shared = 24;
+constexpr size_t most_with_shared = 32;
 constexpr double shared_window_bytes = 4 << 20;
 constexpr double least_rows = 8, rows_a_halo = 8;
 constexpr int64_t least_bytes = 1 << 20;  // less stays in the caches on its way
@@ -295,37 +296,79 @@ void give_strips(const Group& group) {
   }
 }
 
+class Grouping {
+ public:
+  // `but`: none of these, as the last of a group neither.
+  Grouping(const std::vector<FuncPtr>& outputs, const std::vector<FuncPtr>& given,
+           const std::unordered_set<const Symbol*>& but, const SizeEstimate& sizes)
+      : given_(given), readers_(outputs), hosts_(outputs, given), but_(but), sizes_(sizes) {}
+
+  // `apart`: Funcs that join no others.
+  std::vector<std::unique_ptr<Group>> groups(const std::unordered_set<const Symbol*>& apart) {
+    std::vector<std::unique_ptr<Group>> groups;
+    group_of_.clear();
+    for (auto it = given_.rbegin(); it != given_.rend(); ++it) {
+      const FuncPtr& f = *it;
+      if (!may_run_in_strips(f)) continue;
+      const std::vector<StoredRead>& reads = readers_.of(f);
+      const bool is_alone = hosts_.is_output(f) || readers_.is_hidden(f) || apart.contains(f.get());
+      Group* group = is_alone ? nullptr : group_that_reads(reads);
+      if (!group || !group->join(f, reads)) {
+        groups.push_back(std::make_unique<Group>(f, sizes_));
+        group = groups.back().get();
+      }
+      group_of_[f.get()] = group;
+    }
+    return groups;
+  }
+
+  // Running sums of the groups just made that keep others, which did not join, alive for these.
+  std::unordered_set<const Symbol*> that_keep_others(
+      const std::vector<std::unique_ptr<Group>>& groups) const {
+    std::unordered_set<const Symbol*> result;
+    for (const auto& group : groups) {
+      for (const FuncPtr& f : group->members()) {
+        if (!is_running_sum(*f, *readers_.of(f)[0].reader)) continue;
+        const auto is_outside = [&](const FuncPtr& g) {
+          const auto found = group_of_.find(g.get());
+          return found == group_of_.end() || found->second != group.get();
+        };
+        if (std::ranges::any_of(summed_adjoints(*f), is_outside)) result.insert(f.get());
+      }
+    }
+    return result;
+  }
+
+ private:
+  bool may_run_in_strips(const FuncPtr& f) const {
+    return has_plain_rows(*f) && is_at_root(*f) && hosts_.is_inside(f) && !but_.contains(f.get());
+  }
+  Group* group_that_reads(const std::vector<StoredRead>& reads) const {
+    Group* only = nullptr;
+    for (const StoredRead& by : reads) {
+      const auto found = group_of_.find(by.reader.get());
+      if (found == group_of_.end() || (only && found->second != only)) return nullptr;
+      only = found->second;
+    }
+    return only;
+  }
+
+  const std::vector<FuncPtr>& given_;
+  const StoredReads readers_;
+  const Readers hosts_;
+  const std::unordered_set<const Symbol*>& but_;
+  const SizeEstimate& sizes_;
+  std::unordered_map<const Symbol*, Group*> group_of_;
+};
+
 }  // namespace
 
 void compute_in_strips(const std::vector<FuncPtr>& outputs, const std::vector<FuncPtr>& given,
                        const std::unordered_set<const Symbol*>& but, const SizeEstimate& sizes) {
-  const StoredReads readers(outputs);
-  const Readers hosts(outputs, given);
-  std::unordered_map<const Symbol*, Group*> group_of;
-  std::vector<std::unique_ptr<Group>> groups;
-  const auto may_run_in_strips = [&](const FuncPtr& f) {
-    return has_plain_rows(*f) && is_at_root(*f) && hosts.is_inside(f) && !but.contains(f.get());
-  };
-  const auto group_that_reads = [&](const std::vector<StoredRead>& reads) -> Group* {
-    Group* only = nullptr;
-    for (const StoredRead& by : reads) {
-      const auto found = group_of.find(by.reader.get());
-      if (found == group_of.end() || (only && found->second != only)) return nullptr;
-      only = found->second;
-    }
-    return only;
-  };
-  for (auto it = given.rbegin(); it != given.rend(); ++it) {
-    const FuncPtr& f = *it;
-    if (!may_run_in_strips(f)) continue;
-    const std::vector<StoredRead>& reads = readers.of(f);
-    Group* group = hosts.is_output(f) || readers.is_hidden(f) ? nullptr : group_that_reads(reads);
-    if (!group || !group->join(f, reads)) {
-      groups.push_back(std::make_unique<Group>(f, sizes));
-      group = groups.back().get();
-    }
-    group_of[f.get()] = group;
-  }
+  Grouping grouping(outputs, given, but, sizes);
+  auto groups = grouping.groups({});
+  const auto apart = grouping.that_keep_others(groups);
+  if (!apart.empty()) groups = grouping.groups(apart);
   for (const auto& group : groups) {
     if (!group->members().empty()) give_strips(*group);
   }

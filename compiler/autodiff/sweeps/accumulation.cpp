@@ -9,6 +9,7 @@
 #include "autodiff/sweeps/join_borders.h"
 #include "autodiff/sweeps/made_definitions.h"
 #include "autodiff/sweeps/private_parts.h"
+#include "autodiff/sweeps/running_sums.h"
 #include "frontend/language/var.h"
 #include "graph/define.h"
 #include "ir/build.h"
@@ -108,7 +109,12 @@ class Builder {
   AdjointFunc build(const std::vector<Contribution>& contributions,
                     const std::vector<Expr>& initial) {
     const std::vector<Iterations> updates = updates_of(contributions, types_.size());
-    if (std::ranges::any_of(updates, [&](const Iterations& u) { return is_long(u); })) widen();
+    const bool goes_on_wide =
+        !contributions.empty() &&
+        std::ranges::any_of(initial, [&](const Expr& e) { return is_wider(e); });
+    if (goes_on_wide ||
+        std::ranges::any_of(updates, [&](const Iterations& u) { return is_long(u); }))
+      widen();
     result_.func = new_func(is_wide_ ? claim_name(name_ + "_sum") : name_,
                             is_wide_ ? Role::Accumulator : Role::Adjoint);
     define_pointwise(contributions, initial);
@@ -127,6 +133,11 @@ class Builder {
   }
 
  private:
+  // A running sum in double goes on in double.
+  bool is_wider(const Expr& value) const {
+    return value.defined() &&
+           std::ranges::all_of(types_, [&](Type t) { return value.type().bits() > t.bits(); });
+  }
   bool is_long(const Iterations& update) const {
     return sums_many_terms(update.over, target_, types_);
   }
@@ -174,10 +185,14 @@ class Builder {
   void define_pointwise(const std::vector<Contribution>& contributions,
                         const std::vector<Expr>& initial) {
     std::vector<Expr> values(types_.size());
-    for (size_t k = 0; k < initial.size(); ++k) values[k] = initial[k];
+    for (size_t k = 0; k < initial.size(); ++k) {
+      if (initial[k].defined()) values[k] = cast_to(types_[k], initial[k]);
+    }
     for (const Contribution& c : contributions) {
       if (!c.gather.is_pointwise()) continue;
-      add_term(values[static_cast<size_t>(c.component)], masked(c.gather.predicate, c.adjoint));
+      const auto k = static_cast<size_t>(c.component);
+      const Expr term = masked(c.gather.predicate, c.adjoint);
+      add_term(values[k], values[k].defined() ? cast_to(values[k].type(), term) : term);
     }
     for (size_t k = 0; k < values.size(); ++k) {
       values[k] = values[k].defined() ? cast_to(types_[k], values[k]) : make_zero(types_[k]);
@@ -272,13 +287,39 @@ class Builder {
 
 }  // namespace
 
-AdjointFunc make_adjoint(const AdjointTarget& target, const std::string& name,
-                         const std::vector<Contribution>& given, const std::vector<Expr>& initial) {
-  std::vector<Contribution> contributions = given;
+namespace {
+
+AdjointFunc make_sum(const AdjointTarget& target, const std::string& name,
+                     std::vector<Contribution> contributions, const std::vector<Expr>& initial) {
   join_borders(contributions, target);
   share_domains(contributions);
   for (Contribution& c : contributions) c.gather = with_safe_places(c.gather, target);
   return Builder(target, name).build(contributions, initial);
+}
+
+}  // namespace
+
+AdjointFunc make_adjoint(const AdjointTarget& target, const std::string& name,
+                         const std::vector<Contribution>& contributions,
+                         const std::vector<Expr>& initial) {
+  std::vector<std::vector<Contribution>> groups = running_groups(contributions);
+  std::vector<Expr> so_far = initial;
+  std::vector<FuncPtr> helpers;
+  std::vector<std::string> notes;
+  const std::vector<Expr> args = variables_of(target.args);
+  for (size_t g = 0; g + 1 < groups.size(); ++g) {
+    const AdjointFunc sum = make_sum(target, name + "_so_far", std::move(groups[g]), so_far);
+    append(helpers, sum.helpers);
+    append(notes, sum.notes);
+    if (!sum.accumulator) helpers.push_back(sum.func);
+    so_far = values_of(sum.accumulator ? sum.accumulator : sum.func, args);
+  }
+  AdjointFunc result = make_sum(target, name, std::move(groups.back()), so_far);
+  append(helpers, result.helpers);
+  append(notes, result.notes);
+  result.helpers = std::move(helpers);
+  result.notes = std::move(notes);
+  return result;
 }
 
 }  // namespace retrograde::autodiff

@@ -9,7 +9,7 @@
 #include "graph/wrappers.h"
 #include "ir/visit.h"
 #include "lower/nests/fused_groups.h"
-#include "lower/nests/output_order.h"
+#include "lower/nests/memory_order.h"
 #include "lower/nests/refuse_unsupported.h"
 #include "lower/nests/resolve_undef.h"
 #include "lower/nests/strict_indices.h"
@@ -116,7 +116,7 @@ Program inline_functions(const std::vector<FuncPtr>& unwrapped) {
   }
   resolve_outermost_levels(program);
   refuse_unsupported(program);
-  compute_outputs_early(program);
+  order_for_memory(program);
   order_fused_groups(program);
   resolve_undef(program);
   make_indices_strict(program);
