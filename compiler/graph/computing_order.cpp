@@ -1,6 +1,7 @@
 #include "graph/computing_order.h"
 
 #include <algorithm>
+#include <numeric>
 #include <set>
 
 namespace retrograde::graph {
@@ -9,7 +10,7 @@ namespace {
 
 constexpr std::ptrdiff_t many_callees = 4;
 constexpr size_t image_dimensions = 2;  // what has fewer counts as no memory
-constexpr size_t most_orders = 8;       // that are tried
+constexpr size_t most_outputs = 8;      // that are tried as the first
 // Of what the order of the graph keeps at once; it stays for less, as users expect it.
 constexpr double worth_share = 0.9;
 
@@ -44,12 +45,19 @@ class Nests {
     for (size_t n = 0; n < nests_.size(); ++n) nests_[n].callees.erase(n);
   }
 
-  // That of the graph, but for an output that comes first.
-  Order order_from(std::optional<size_t> first) const {
+  // That of the graph.
+  Order own_order() const {
+    Order order(nests_.size());
+    std::iota(order.begin(), order.end(), size_t(0));
+    return with_early(order);
+  }
+  // The same but for what an output needs, which comes first: of what a nest reads, the first in the
+  // order of the graph before the others, or the last.
+  Order order_from(size_t output, bool is_last_first) const {
     Order order;
     std::vector<char> seen(nests_.size());
-    if (first) visit(*first, seen, order);
-    for (size_t n = 0; n < nests_.size(); ++n) visit(n, seen, order);
+    visit(output, is_last_first, seen, order);
+    for (size_t n = 0; n < nests_.size(); ++n) visit(n, false, seen, order);
     return with_early(order);
   }
   std::vector<size_t> outputs() const {
@@ -93,10 +101,15 @@ class Nests {
     return f;
   }
 
-  void visit(size_t n, std::vector<char>& seen, Order& order) const {
+  void visit(size_t n, bool is_last_first, std::vector<char>& seen, Order& order) const {
     if (seen[n]) return;
     seen[n] = 1;
-    for (const size_t callee : nests_[n].callees) visit(callee, seen, order);
+    const auto visit_callee = [&](size_t callee) { visit(callee, is_last_first, seen, order); };
+    const std::set<size_t>& callees = nests_[n].callees;
+    if (is_last_first)
+      std::for_each(callees.rbegin(), callees.rend(), visit_callee);
+    else
+      std::for_each(callees.begin(), callees.end(), visit_callee);
     order.push_back(n);
   }
 
@@ -135,16 +148,18 @@ class Nests {
 
 std::vector<size_t> computing_order(const std::vector<ComputedFunc>& funcs) {
   const Nests nests(funcs);
-  Order best = nests.order_from({});
+  Order best = nests.own_order();
   double bound = worth_share * static_cast<double>(nests.most_alive(best));
   std::vector<size_t> outputs = nests.outputs();
-  outputs.resize(std::min(outputs.size(), most_orders));
+  outputs.resize(std::min(outputs.size(), most_outputs));
   for (const size_t output : outputs) {
-    Order order = nests.order_from(output);
-    const auto alive = static_cast<double>(nests.most_alive(order));
-    if (alive >= bound) continue;
-    best = std::move(order);
-    bound = alive;
+    for (const bool is_last_first : {false, true}) {
+      Order order = nests.order_from(output, is_last_first);
+      const auto alive = static_cast<double>(nests.most_alive(order));
+      if (alive >= bound) continue;
+      best = std::move(order);
+      bound = alive;
+    }
   }
   return nests.funcs_in(best);
 }

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
+#include <cmath>
 #include <cstdlib>
 #include <functional>
 #include <vector>
@@ -107,6 +108,27 @@ Program steps(int count) {
   return {{state, d(image)}, {{200, 150}, {200, 150}}, {image}};
 }
 
+// Steps of a linear iteration, each of which reads the right-hand side.
+Program relaxed(int count) {
+  const Buffer<float> rhs = random_image({200, 150}, 0, 1, 1);
+  Var x("x"), y("y");
+  Func state("state"), start = BoundaryConditions::repeat_edge(rhs);
+  state(x, y) = rhs(x, y);
+  for (int i = 0; i < count; ++i) {
+    Func f = BoundaryConditions::repeat_edge(state, {{0, 200}, {0, 150}}), next("state");
+    next(x, y) = 0.2f * (f(x - 1, y) + f(x + 1, y) + f(x, y - 1) + f(x, y + 1)) + start(x, y);
+    state = next;
+  }
+  const Derivative d = propagate_adjoints(state, random_image({200, 150}, -1, 1, 2));
+  return {{state, d(rhs)}, {{200, 150}, {200, 150}}, {rhs}};
+}
+
+double product(const Buffer<float>& a, const Buffer<float>& b) {
+  double sum = 0;
+  a.for_each_element([&](const int* at) { sum += double(a(at)) * b(at); });
+  return sum;
+}
+
 struct Outcome {
   AutoSchedulerResults said;
   int64_t allocated = 0;  // at the most
@@ -140,7 +162,7 @@ void expect_same(const Outcome& a, const Outcome& b) {
 
 // Names of the programs do not matter: what is alive is.
 TEST(MemoryBudget, WhatIsSaidIsWhatIsAllocated) {
-  for (const Program& program : {weighted(4), weighted(12), steps(3), steps(9)}) {
+  for (const Program& program : {weighted(4), weighted(12), steps(3), steps(9), relaxed(24)}) {
     const Outcome found = run(program, {});
     const int64_t said = found.said.memory_bytes - program.callers_bytes();
     EXPECT_GT(said, 0);
@@ -181,6 +203,21 @@ TEST(MemoryBudget, IsTwiceTheLargestFuncByDefault) {
   const Outcome found = run(program, {});
   const int64_t seed = 160 * 120 * 4, planes = 160 * 120 * 12 * 4;
   EXPECT_EQ(found.said.memory_budget_bytes, program.callers_bytes() + seed + 2 * planes);
+}
+
+// The sum of their adjoints is made as they are: what is alive at once is the same for more steps.
+// A linear program's output is its derivative at the input: <A b, s> = <b, A^T s>.
+TEST(MemoryBudget, AdjointsOfStepsAreAddedUpWhenTheyAreMade) {
+  const Outcome few = run(relaxed(12), {}), many = run(relaxed(36), {});
+  const int64_t image = 200 * 150 * 4;
+  EXPECT_LT(many.allocated, few.allocated + image);
+  EXPECT_LT(many.allocated, 12 * image);
+  const Buffer<float> rhs = random_image({200, 150}, 0, 1, 1),
+                      seed = random_image({200, 150}, -1, 1, 2);
+  for (const Outcome& found : {few, many}) {
+    const double forward = product(found.results[0], seed), back = product(found.results[1], rhs);
+    EXPECT_NEAR(forward, back, 1e-4 * std::abs(forward) + 1e-2);
+  }
 }
 
 TEST(MemoryBudget, SaysNothingOfUnknownSizes) {
