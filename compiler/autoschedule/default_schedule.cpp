@@ -22,6 +22,7 @@
 #include "autoschedule/only_reader.h"
 #include "autoschedule/packed_operand.h"
 #include "autoschedule/placement_limits.h"
+#include "autoschedule/reduction_chunks.h"
 #include "autoschedule/reduction_slices.h"
 #include "autoschedule/row_order.h"
 #include "autoschedule/row_sweeps.h"
@@ -214,7 +215,8 @@ class LoopChooser {
     return true;
   }
 
-  // Of the loops over tiles, those that do not move the operand come first. The result: the others.
+  // Of the loops over tiles, those that do not move the operand come first. The result: the others,
+  // around the blocks of the reduction, where one copy is of a block.
   std::vector<VarOrRVar> pack_inside(const PackedOperand& operand,
                                      const std::vector<VarOrRVar>& loops) {
     const auto moves = [&](const VarOrRVar& loop) {
@@ -223,9 +225,15 @@ class LoopChooser {
     };
     std::vector<VarOrRVar> order = loops;
     const auto first = std::stable_partition(order.begin(), order.end(), std::not_fn(moves));
-    stage_.reorder(order);
     const std::vector<VarOrRVar> outside(first, order.end());
-    pack(function_, operand, Var(outside[0].name()), lanes);
+    VarOrRVar level = outside[0];
+    if (operand.block) {
+      const RVar iteration(operand.block->loop), blocks(new_loop(f_, index_, "blocks"));
+      stage_.split(iteration, blocks, iteration, static_cast<int>(operand.block->iterations));
+      level = *order.insert(first, blocks);
+    }
+    stage_.reorder(order);
+    pack(function_, operand, retrograde::LoopLevel(Func(function_), level), lanes);
     return outside;
   }
 
@@ -340,9 +348,26 @@ class LoopChooser {
     const RegisterTile own = renumbered(tile, *block);
     const std::vector<size_t> shifts = shifts_of(*block, own);
     compute_block(block, shifts);
-    run_in_parallel(cut(own, shifts), own);
+    const std::vector<VarOrRVar> tiles = cut(own, shifts);
+    if (makes(Decision::LayoutStaging)) cut_into_chunks(*block, tiles, own);
+    run_in_parallel(tiles, own);
     for (int s = 0; s < block->stage_count(); ++s)
       LoopChooser(block, s, request_, sizes_).cut(tile);
+  }
+
+  // The loops over tiles stand inside of those over chunks of the reduction.
+  void cut_into_chunks(const FuncContents& block, const std::vector<VarOrRVar>& tiles,
+                       const RegisterTile& tile) {
+    const std::vector<ReductionVariable> loops = reduction_loops(f_, definition());
+    const auto chunk = reduction_chunk(f_, block, loops[0], tile, lanes, sizes_);
+    if (!chunk) return;
+    const RVar iteration(loops[0].var), chunks(new_loop(f_, index_, "chunks"));
+    stage_.split(iteration, chunks, iteration, static_cast<int>(*chunk));
+    std::vector<VarOrRVar> order{iteration};
+    order.insert(order.end(), tiles.begin(), tiles.end());
+    order.push_back(chunks);
+    for (size_t i = 1; i < loops.size(); ++i) order.push_back(RVar(loops[i].var));
+    stage_.reorder(order);
   }
 
   // For each iteration of the innermost loop outside of the tile.

@@ -5,8 +5,10 @@
 #include <unordered_map>
 
 #include "analysis/linear.h"
+#include "autoschedule/loop_order.h"
 #include "autoschedule/new_loop.h"
 #include "autoschedule/read_estimate.h"
+#include "autoschedule/reduction_chunks.h"
 #include "graph/give_directive.h"
 #include "graph/own_reads.h"
 #include "graph/wrappers.h"
@@ -22,6 +24,7 @@ namespace {
 constexpr int64_t most_elements = 16384;  // of a copy: half of a second-level cache, at the most
 constexpr int64_t many_rows = 16;         // more than a set of the first-level cache holds lines
 constexpr double least_uses = 4;          // of an element of the copy
+constexpr int64_t least_block = 64;       // iterations: sums are fetched and put back for each
 constexpr double least_tiles = 4;  // that use one copy: with fewer, its rows stay in the cache
 
 // How far each loop of a tile runs.
@@ -74,10 +77,12 @@ class Candidate {
     const auto elements = lanes_along ? elements_of_piece() : std::nullopt;
     if (!elements || tiles(true) < sizes_.machine().enough_tasks) return false;
     // Lanes that run across rows are loaded one by one, wherever they lie.
-    const bool is_near = *lanes_along == 0 && (rows() < many_rows || tiles(false) < least_tiles);
+    const bool is_near = *lanes_along == 0 && (rows() < many_rows || tiles(false) < least_tiles ||
+                                               lies_together_already());
     return !is_near &&
            loads_of_a_tile() * tiles(false) * lanes_ >= least_uses * static_cast<double>(*elements);
   }
+  bool fits() const { return elements_of_piece().has_value(); }
   const std::vector<bool>& depends_on() const { return depends_on_; }
   // The index, one and no other, that is the next for the next lane.
   std::optional<size_t> lane_dimension() const {
@@ -112,6 +117,17 @@ class Candidate {
       if (elements > most_elements) return std::nullopt;
     }
     return elements;
+  }
+
+  // Whole rows, one after the other.
+  bool lies_together_already() const {
+    const auto width = sizes_.extent(f_, 0);
+    const auto is_moved = [&](const Expr& index) {
+      return std::any_of(update_.rvars.begin(), update_.rvars.end(),
+                         [&](const ReductionVariable& r) { return uses_variable(index, r.var); });
+    };
+    return width && *width <= size_in(tile_, 0, lanes_) && index_.size() > 1 &&
+           !is_moved(index_[0]) && std::none_of(index_.begin() + 2, index_.end(), is_moved);
   }
 
   // That the reduction reads for one element of the tile.
@@ -193,6 +209,28 @@ void schedule_copy(Func copy, size_t lane_dimension, int lanes) {
   vectorize(Stage(copy.function(), 0), row, lanes, TailStrategy::GuardWithIf);
 }
 
+// Of a read. Where the copy of all of the reduction is too large: of as many iterations of the outermost
+// loop as fit, and divide it.
+std::optional<PackedOperand> packed_read(const Call& call, const FuncContents& f,
+                                         const Definition& update, const RegisterTile& tile,
+                                         int lanes, const SizeEstimate& sizes, Extents extents) {
+  const auto candidate = [&] { return Candidate(call, f, update, tile, lanes, sizes, extents); };
+  PackedOperand result;
+  const std::string loop = reduction_loops(f, update).back().var;
+  const int64_t all = extents.at(loop);
+  if (!candidate().lane_dimension()) return std::nullopt;
+  while (!candidate().fits()) {
+    const int64_t last = extents[loop];
+    extents[loop] = largest_part(all, std::min(last - 1, most_elements));
+    if (extents[loop] < least_block || extents[loop] == last) return std::nullopt;
+    result.block = PackedOperand::Block{loop, extents[loop]};
+  }
+  if (!candidate().is_worth_packing()) return std::nullopt;
+  result.lane_dimension = *candidate().lane_dimension();
+  result.depends_on = candidate().depends_on();
+  return result;
+}
+
 }  // namespace
 
 std::optional<PackedOperand> packed_operand(const FuncContents& f, const Definition& update,
@@ -210,21 +248,24 @@ std::optional<PackedOperand> packed_operand(const FuncContents& f, const Definit
     const auto image = image_of(*call, f);
     if (!source && !image) return;
     ++reads[call->name];
-    const Candidate candidate(*call, f, update, tile, lanes, sizes, *extents);
-    if (result || !candidate.is_worth_packing()) return;
-    result = {source, image, *candidate.lane_dimension(), candidate.depends_on()};
+    if (result) return;
+    result = packed_read(*call, f, update, tile, lanes, sizes, *extents);
+    if (!result) return;
+    result->source = source;
+    result->image = image;
     packed = call->name;
   });
   // Of several reads the copy would hold what lies between them.
   return result && reads[packed] == 1 ? result : std::nullopt;
 }
 
-void pack(const FuncPtr& f, const PackedOperand& operand, const Var& loop, int lanes) {
+void pack(const FuncPtr& f, const PackedOperand& operand, const retrograde::LoopLevel& loop,
+          int lanes) {
   Func copy =
       operand.source
           ? Func(operand.source).in(Func(f))
           : Func(graph::copied_input(f, operand.image, operand.image->name + "_in_" + f->name));
-  copy.compute_at(Func(f), loop);
+  copy.compute_at(loop);
   schedule_copy(copy, operand.lane_dimension, lanes);
 }
 

@@ -7,17 +7,20 @@
 // often, and then in one set of the cache, for each tile of c again. The copy holds the pieces of
 // all k for the x of the tile, is made once for all c, and fits in the nearest cache. Where vectors
 // run across the rows, as in  product(j, i) += key(k, j) * query(k, i),  the copy is transposed.
-// What is computed inline is computed once an element of the copy.
+// What is computed inline is computed once an element of the copy. Where a piece of all k is too large,
+// it is of a block of them: all tiles of c add up the terms of one block before the next is copied.
 // Source: K. Goto and R. van de Geijn, Anatomy of High-Performance Matrix Multiplication, ACM TOMS 34
 // (2008), sections 4 and 5; theirs packs operands of matrix products, this what any linear index
 // reads, of Funcs and of images.
 #pragma once
 
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "autoschedule/register_tile.h"
 #include "frontend/language/func.h"
+#include "frontend/schedule/loop_level.h"
 
 namespace retrograde::autoschedule {
 
@@ -26,6 +29,11 @@ struct PackedOperand {
   std::shared_ptr<graph::ParameterContents> image;
   size_t lane_dimension = 0;     // of the source: the next lane reads the next along it
   std::vector<bool> depends_on;  // by dimension of the Func: what moves the piece
+  struct Block {
+    std::string loop;  // of the reduction, its outermost
+    int64_t iterations;
+  };
+  std::optional<Block> block;  // that a copy is of; nullopt: all of the reduction
 };
 
 // The operand of the update that is worth it, when the update has the tile; nullopt: none.
@@ -33,6 +41,7 @@ std::optional<PackedOperand> packed_operand(const FuncContents& f, const Definit
                                             const RegisterTile& tile, int lanes,
                                             const SizeEstimate& sizes);
 // For each iteration of a loop of f, inside of which only dimensions run that do not move it.
-void pack(const FuncPtr& f, const PackedOperand& operand, const Var& loop, int lanes);
+void pack(const FuncPtr& f, const PackedOperand& operand, const retrograde::LoopLevel& loop,
+          int lanes);
 
 }  // namespace retrograde::autoschedule

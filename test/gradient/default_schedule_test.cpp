@@ -486,6 +486,36 @@ TEST_F(DefaultSchedule, WhatLanesReadAcrossRowsIsCopiedTurned) {
   }
 }
 
+// A panel of all rows is too large to stay in a near cache: one of a block of them is copied at once.
+TEST_F(DefaultSchedule, PanelsOfLongProductsArePackedBlockByBlock) {
+  constexpr int rows = 40, inner = 500, columns = 512;
+  const Buffer<float> left = gradient::random_image({inner, rows}, -1, 1, 1);
+  const Buffer<float> right = gradient::random_image({columns, inner}, -1, 1, 2);
+  Func product("product");
+  RDom k(0, inner);
+  product(x, y) += left(k, y) * right(x, k);
+  const std::string log = log_of(product, {columns, rows});
+  EXPECT_NE(log.find(".copy_input("), std::string::npos) << log;
+  EXPECT_NE(log.find("blocks"), std::string::npos) << log;
+}
+
+// Each tile of the weights' gradient would read all of the image: it does so in chunks of rows.
+TEST_F(DefaultSchedule, TilesOfLongSumsShareChunksOfLargeImages) {
+  constexpr int channels = 64;
+  const auto log_for = [&](int width, int height) {
+    const Buffer<float> image = gradient::random_image({width, height, channels}, -1, 1, 1);
+    const Buffer<float> weights = gradient::random_image({channels, channels}, -1, 1, 2);
+    const Buffer<float> seed = gradient::random_image({width, height, channels}, -1, 1, 3);
+    Var x("x"), y("y"), c("c");
+    RDom k(0, channels);
+    Func mixed("mixed");
+    mixed(x, y, c) += weights(k, c) * image(x, y, k);
+    return log_of(propagate_adjoints(mixed, seed)(weights), {channels, channels});
+  };
+  EXPECT_NE(log_for(128, 48).find("chunks"), std::string::npos);
+  EXPECT_EQ(log_for(32, 32).find("chunks"), std::string::npos) << "caches hold it";
+}
+
 // Few tiles use what one has read: its rows are in the cache yet.
 TEST_F(DefaultSchedule, WhatFewTilesUseIsNotPacked) {
   EXPECT_EQ(log_of_mixing(128, 8).find("inner_in_mixed"), std::string::npos);
