@@ -67,71 +67,76 @@ struct Memory {
   }
 };
 
-struct Run;
-
-// Where one thread says what it computes, on a line of the cache that no other thread writes.
+// Where one thread says what it computes, on a line of the cache that no other thread writes. A thread
+// that gets work inside of its work keeps what it was in before; it computes nothing there.
 struct alignas(64) Place {
   static constexpr int32_t idle = -1;
+  struct Outer {
+    Place* place;
+    int32_t func;
+  };
   int32_t current = idle;  // first: generated code knows the place by its address
-  int32_t outer_func = idle;
-  Place* outer = nullptr;  // of the same thread, which waits
-  Run* run = nullptr;
+  std::thread::id owner = std::this_thread::get_id();
+  std::vector<Outer> outer;
 
   int32_t read() { return std::atomic_ref(current).load(std::memory_order_relaxed); }
   void write(int32_t func) { std::atomic_ref(current).store(func, std::memory_order_relaxed); }
 };
 
+uint64_t next_serial() {
+  static std::atomic<uint64_t> last{0};
+  return ++last;
+}
+
 // One call.
 struct Run {
   Run(Pipeline& pipeline, size_t count) : pipeline(pipeline), memory(count) {}
   Pipeline& pipeline;
+  const uint64_t serial = next_serial();
   std::mutex mutex;  // of the places
   std::deque<Place> places;
-  std::vector<Place*> free_places;
   std::vector<Memory> memory;  // by Func
   Memory all;
   Clock::time_point begin = Clock::now();
 
-  Place* take_place() {
+  Place* place_of_this_thread() {
     const std::lock_guard lock(mutex);
-    if (free_places.empty()) {
-      free_places.reserve(places.size() + 1);  // so that giving one back never fails
-      free_places.push_back(&places.emplace_back());
-      places.back().run = this;
+    for (Place& place : places) {
+      if (place.owner == std::this_thread::get_id()) return &place;
     }
-    Place* place = free_places.back();
-    free_places.pop_back();
-    return place;
-  }
-  void give_back(Place* place) {
-    const std::lock_guard lock(mutex);
-    place->write(Place::idle);
-    free_places.push_back(place);
+    return &places.emplace_back();
   }
 };
 
-thread_local Place* place_of_thread = nullptr;  // the innermost
-thread_local Place nowhere;                     // of a run that is not profiled
+thread_local Place* innermost = nullptr;  // that the thread is in
+thread_local Place nowhere;               // of a run that is not profiled
+
+// A loop of many short tasks asks for the same place again and again: without a lock.
+struct LatestPlace {
+  uint64_t run = 0;
+  Place* place = nullptr;  // as long as that run lives
+};
+thread_local LatestPlace latest;
 
 int32_t* enter_thread(Run* run, int32_t func) {
   if (!run) return &nowhere.current;
-  Place* place = run->take_place();
-  place->outer = place_of_thread;
-  if (Place* outer = place->outer) {
-    place->outer_func = outer->read();
-    outer->write(Place::idle);
-  }
+  if (latest.run != run->serial) latest = {run->serial, run->place_of_this_thread()};
+  Place* place = latest.place;
+  place->outer.push_back({innermost, innermost ? innermost->read() : Place::idle});
+  if (innermost) innermost->write(Place::idle);
   place->write(func);
-  place_of_thread = place;
+  innermost = place;
   return &place->current;
 }
 
 void leave_thread(int32_t* at) {
   if (!at || at == &nowhere.current) return;
   Place* place = reinterpret_cast<Place*>(at);
-  place_of_thread = place->outer;
-  if (place->outer) place->outer->write(place->outer_func);
-  place->run->give_back(place);
+  const Place::Outer outer = place->outer.back();
+  place->outer.pop_back();
+  place->write(Place::idle);
+  innermost = outer.place;
+  if (innermost) innermost->write(outer.func);
 }
 
 class Profiler {

@@ -109,6 +109,13 @@ TEST(Profiler, ThreadsShareTheTimeAndWhoWaitsForWorkOfItsOwnHasNone) {
   other.join();
   retrograde_profiler_leave(nullptr, inner);
   EXPECT_EQ(std::atomic_ref(*outer).load(), 1);
+  // Work of another run inside: its place is another one, and this one waits.
+  void* other_run = retrograde_profiler_begin(nullptr, "other", "overhead");
+  int32_t* elsewhere = retrograde_profiler_thread(nullptr, other_run, 0);
+  EXPECT_LT(std::atomic_ref(*outer).load(), 0);
+  retrograde_profiler_leave(nullptr, elsewhere);
+  retrograde_profiler_end(nullptr, other_run);
+  EXPECT_EQ(std::atomic_ref(*outer).load(), 1);
   retrograde_profiler_leave(nullptr, outer);
   retrograde_profiler_end(nullptr, run);
   const auto* stats = retrograde_profiler_pipeline("shared");

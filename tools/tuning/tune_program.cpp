@@ -25,6 +25,7 @@ namespace {
 
 using graph::FuncPtr;
 using Clock = std::chrono::steady_clock;
+constexpr double warm_up = 4;   // times what a schedule runs, before the first
 constexpr double hopeless = 3;  // times the best: not worth a second run
 
 struct Candidate {
@@ -147,6 +148,7 @@ class Session {
     if (found) {
       known_++;
     } else if (may_measure) {
+      if (measured_ == 0) wake(candidate);
       found = measure(candidate, target_, options_, best_seconds_);
       database_.keep(id, machine_, threads_of(options_), *found);
       measured_++;
@@ -160,6 +162,13 @@ class Session {
     if (best_seconds_ != 0 && found->seconds >= best_seconds_) return;
     best_seconds_ = found->seconds;
     best_ = candidate.outputs;
+  }
+
+  // The first runs of a process are slower than all others, for longer than one schedule runs.
+  void wake(const Candidate& candidate) const {
+    Options longer = options_;
+    longer.run_seconds *= warm_up;
+    measure(candidate, target_, longer, 0);
   }
 
   void tell() {
