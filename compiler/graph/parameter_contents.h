@@ -36,8 +36,9 @@ struct ParameterContents : Symbol {
   halide_buffer_t* buffer = nullptr;   // currently bound; null when unset
   bool is_literal = false;             // a Buffer named in the program, not an ImageParam
   int host_alignment =
-      0;                 // promise, in bytes, about the address of element min; 0: the type's size
-  uint64_t version = 0;  // grows when anything but the value or the bound buffer changes
+      0;  // promise, in bytes, about the address of element min; 0: the type's size
+  bool is_finite = false;  // promise: no call's values are infinite or NaN
+  uint64_t version = 0;    // grows when anything but the value or the bound buffer changes
   TraceSchedule trace;
   // The Func that an ImageParam converts to: what reads the image reads it instead. Null when
   // nobody asked for it.

@@ -156,6 +156,8 @@ class GraphReader {
       p.max_value = expr(line);
     } else if (line.word == "estimate") {
       p.estimate = expr(line);
+    } else if (line.word == "finite") {
+      p.is_finite = true;
     } else if (line.word != "reader") {
       return reads_constraint(line, p) || reads_trace(line, p.trace);
     }

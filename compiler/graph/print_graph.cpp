@@ -49,6 +49,7 @@ class GraphPrinter {
       line_if("at_most", p.max_value);
       line_if("estimate", p.estimate);
       print_constraints(p);
+      if (p.is_finite) line("finite");
       if (p.func) line("reader ", quote_name(p.func->name));
       print(p.trace);
     });

@@ -47,7 +47,7 @@ struct Smoothing {
 
 // What the schedule made has numbers in its names that differ from build to build.
 std::string without_numbers(const std::string& source) {
-  return std::regex_replace(source, std::regex("_[0-9][0-9]+"), "_");
+  return std::regex_replace(source, std::regex("_[0-9][0-9]+"), "");
 }
 
 void expect_close(const Buffer<float>& a, const Buffer<float>& b) {

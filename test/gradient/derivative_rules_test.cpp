@@ -9,6 +9,7 @@
 #include <map>
 #include <string>
 
+#include "autodiff/rules/value_range.h"
 #include "autodiff/sweeps/reverse_sweep.h"
 #include "diagnostics/error.h"
 #include "frontend/language/func.h"
@@ -32,13 +33,13 @@ Scalar eval(const Expr& e, const Env& env) {
   return test::Evaluator(values)(e).at(0);
 }
 
-const auto no_leaf = [](const Expr&) { return false; };
+const ValueRanges nothing_known;
 
 // Leaves are Variables that count as reads of images: every one is wanted.
 Env gradient(const Expr& e, const Env& env, double seed = 1) {
   SweepResult sweep = sweep_reverse(
       {e}, {make_const(adjoint_type(e.type()), seed)},
-      [](const Expr& leaf) { return leaf.as<Variable>() != nullptr; }, no_leaf);
+      [](const Expr& leaf) { return leaf.as<Variable>() != nullptr; }, nothing_known);
   Env result;
   for (const auto& [name, value] : env) result[name] = 0;
   for (const LeafAdjoint& leaf : sweep.leaves) {
@@ -302,7 +303,7 @@ TEST(DerivativeRules, CallsOfCFunctionsAreRefusedOnlyWhereTheGradientIsWanted) {
   SweepResult sweep = sweep_reverse(
       {call * y}, {num(1)},
       [](const Expr& leaf) { return leaf.as<Variable>() && leaf.as<Variable>()->name == "y"; },
-      no_leaf);
+      nothing_known);
   EXPECT_EQ(sweep.leaves.size(), 1u);
 }
 
@@ -311,7 +312,7 @@ TEST(DerivativeRules, EqualNodesAreOne) {
   auto leaf = [] { return op(Op::exp, {variable("x", f64) * num(2)}); };
   SweepResult sweep = sweep_reverse(
       {leaf() * y, leaf() + y}, {num(3), num(5)},
-      [](const Expr& e) { return e.as<Variable>() != nullptr; }, no_leaf);
+      [](const Expr& e) { return e.as<Variable>() != nullptr; }, nothing_known);
   ASSERT_EQ(sweep.leaves.size(), 2u);
   const Env at{{"x", 0.5}, {"y", 7}};
   for (const LeafAdjoint& found : sweep.leaves) {
@@ -329,7 +330,7 @@ TEST(DerivativeRules, ReadsOfTwoImagesOfOneNameAreTwo) {
   };
   SweepResult sweep = sweep_reverse(
       {read(a) * read(b)}, {num(1)}, [](const Expr& e) { return e.as<Call>() != nullptr; },
-      no_leaf);
+      nothing_known);
   EXPECT_EQ(sweep.leaves.size(), 2u);
 }
 
@@ -337,7 +338,7 @@ TEST(DerivativeRules, ReadsOfTwoImagesOfOneNameAreTwo) {
 TEST(DerivativeRules, LeavesStayAsTheyAre) {
   const Expr read = call_image("image", f64, {variable("i") - variable("i")}, {});
   SweepResult sweep = sweep_reverse(
-      {read * y}, {num(1)}, [](const Expr& e) { return e.as<Call>() != nullptr; }, no_leaf);
+      {read * y}, {num(1)}, [](const Expr& e) { return e.as<Call>() != nullptr; }, nothing_known);
   ASSERT_EQ(sweep.leaves.size(), 1u);
   EXPECT_TRUE(equal(sweep.leaves[0].leaf, read)) << sweep.leaves[0].leaf;
 }

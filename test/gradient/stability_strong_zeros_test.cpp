@@ -97,6 +97,34 @@ TEST_F(StrongZeros, StandOnlyWhereAFactorMayBeInfinite) {
   EXPECT_TRUE(has_strong_zeros(select(b(x) > 1, b(x), 3.0f))) << "a choice of what memory holds";
 }
 
+// Which lets products fuse with the sums that they are added to.
+TEST_F(StrongZeros, StandNotWhereAUserPromisesThatFactorsAreFinite) {
+  ImageParam plain(Float(32), 1, "plain"), promised(Float(32), 1, "promised");
+  promised.promise_finite();
+  const auto has_strong_zeros = [&](const Expr& factor) {
+    Func f("f");
+    f(x) = select(a(x) > 0, a(x) * factor, 0.0f);
+    const Func gradient = propagate_adjoints(sum_of(f))(a);
+    return graph::to_text(graph::graph_of({gradient.function()})).find("strong_mul") !=
+           std::string::npos;
+  };
+  const auto through = [&](const Expr& value) {
+    Func held("held");
+    held(x) = value;
+    return held(x);
+  };
+  EXPECT_TRUE(has_strong_zeros(plain(x)));
+  EXPECT_FALSE(has_strong_zeros(promised(x)));
+  EXPECT_FALSE(has_strong_zeros(promised(x) * 2.0f)) << "inside of one expression";
+  Func exterior = BoundaryConditions::constant_exterior(promised, 0.0f, {{0, 4}});
+  EXPECT_FALSE(has_strong_zeros(exterior(x - 1)));
+  EXPECT_FALSE(has_strong_zeros(through(clamp(promised(x), -1.0f, 1.0f))));
+  EXPECT_TRUE(has_strong_zeros(through(select(a(x) > 1, promised(x), plain(x)))));
+  EXPECT_TRUE(has_strong_zeros(through(select(a(x) > 1, promised(x), inf))));
+  EXPECT_TRUE(has_strong_zeros(through(promised(x) * promised(x)))) << "which may overflow";
+  EXPECT_TRUE(has_strong_zeros(through(cast<float>(cast<float16_t>(promised(x))))));
+}
+
 TEST_F(StrongZeros, StandOnlyWhereAnInfiniteFactorMayMeetASlopeOfZero) {
   const auto has_strong_zeros = [&](const Expr& factor, bool levels_off) {
     Func held("held"), product("product"), f("f");

@@ -29,9 +29,11 @@ void expect_round_trip(const std::vector<graph::FuncPtr>& outputs) {
 
 const char* const blur = R"(image uint8 input(2)
   dim(0, 0, _, 1)
+  finite
 param float32 gain
   value 1.5f
   at_least 0f
+  finite
 func in32(x, y) float32
   define
     value float32(image input(x, y):uint8)
@@ -164,7 +166,7 @@ TEST(GraphText, BadTextSaysWhere) {
                [] { parse_graph(with("split(x, xo, xi, 8", "split(x, xo, 8")); });
   expect_error({"one of the choices", "its arguments are those of directive.h"},
                [] { parse_graph(with("GuardWithIf", "Guard")); });
-  expect_error({"line 15"}, [] { parse_graph(with("    value 0f", "    vallue 0f")); });
+  expect_error({"line 17"}, [] { parse_graph(with("    value 0f", "    vallue 0f")); });
 }
 
 TEST(GraphText, WhatIsReadIsThere) {

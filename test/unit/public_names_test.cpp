@@ -6,6 +6,7 @@
 
 #include "frontend/schedule/autoscheduler.h"
 #include "generator/registry.h"
+#include "graph/graph.h"
 #include "support/errors.h"
 
 using namespace retrograde;
@@ -151,6 +152,10 @@ TEST_F(FuncNames, ParamsTellTheirTypeAndLimits) {
   EXPECT_EQ(Param<float>::static_type(), Float(32));
   p.set_min_value(0.5f);
   EXPECT_EQ(*ir::as_const_float(p.min_value()), 0.5);
+  p.promise_finite();
+  Func f("f");
+  f() = p;
+  EXPECT_NE(graph::to_text(graph::graph_of({f.function()})).find("\n  finite\n"), std::string::npos);
   EXPECT_EQ(ParamMap::empty_map().size(), 0u);
   EXPECT_EQ(ParamMap::empty_map().find(p.parameter()), nullptr);
   const ParamMap::ParamMapping mapping(p, 2.0f);

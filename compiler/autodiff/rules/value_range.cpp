@@ -202,8 +202,37 @@ std::vector<ValueRange> ValueRanges::of_stage(const Definition& stage) const {
   return mapped(stage.values, [&](const Expr& value) { return of(without_lets(value)); });
 }
 
+bool ValueRanges::is_promised_finite(const Expr& leaf) const {
+  const auto* call = leaf.as<Call>();
+  if (!call) return false;
+  if (call->call_type == CallType::Func) return promised_.contains(call->symbol.raw());
+  const auto* image = dynamic_cast<const ParameterContents*>(call->symbol.raw());
+  return image && image->is_finite;
+}
+
+// Whether it chooses among constants and what is promised to be finite, and computes nothing that
+// could overflow.
+bool ValueRanges::only_passes_on(const Expr& value) const {
+  if (auto number = as_const_float(value)) return std::isfinite(*number);
+  if (!value.type().is_float()) return true;
+  if (is_leaf(value)) return is_promised_finite(value);
+  if (const auto* choice = value.as<Select>())
+    return only_passes_on(choice->when_true) && only_passes_on(choice->when_false);
+  if (const auto* cast = value.as<Cast>())
+    return value.type().can_represent(cast->value.type()) && only_passes_on(cast->value);
+  if (const auto* e = value.as<Binary>(); e && (e->kind == Kind::Min || e->kind == Kind::Max))
+    return only_passes_on(e->a) && only_passes_on(e->b);
+  const auto* call = value.as<Call>();
+  const int passed = call && call->call_type == CallType::Operator ? passed_operand(call->op) : -1;
+  return passed >= 0 && only_passes_on(call->args[static_cast<size_t>(passed)]);
+}
+
 void ValueRanges::add(const FuncPtr& f) {
   if (f->is_extern()) return;
+  const auto passes_on = [&](const Expr& value) { return only_passes_on(without_lets(value)); };
+  const bool is_promised =
+      f->updates.empty() && std::all_of(f->pure->values.begin(), f->pure->values.end(), passes_on);
+  if (is_promised) promised_.insert(f.get());
   std::vector<ValueRange>& own = funcs_[f.get()];
   own = of_stage(*f->pure);
   for (bool grows = true; grows;) {

@@ -12,12 +12,11 @@ namespace {
 class ForwardSweep {
  public:
   ForwardSweep(const std::vector<Expr>& values, FunctionRef<Expr(const Expr&)> tangent_of,
-               FunctionRef<bool(const Expr&)> is_infinite_leaf)
+               const ValueRanges& ranges)
       : order_(post_order(values)),
         tangent_of_(tangent_of),
         facts_(
-            order_, [&](const Expr& leaf) { return tangent_of(leaf).defined(); },
-            is_infinite_leaf) {
+            order_, [&](const Expr& leaf) { return tangent_of(leaf).defined(); }, ranges) {
     result_.notes = facts_.notes();
   }
 
@@ -141,9 +140,8 @@ class ForwardSweep {
 }  // namespace
 
 ForwardResult sweep_forward(const std::vector<Expr>& values,
-                            FunctionRef<Expr(const Expr&)> tangent_of,
-                            FunctionRef<bool(const Expr&)> is_infinite_leaf) {
-  return ForwardSweep(values, tangent_of, is_infinite_leaf).run(values);
+                            FunctionRef<Expr(const Expr&)> tangent_of, const ValueRanges& ranges) {
+  return ForwardSweep(values, tangent_of, ranges).run(values);
 }
 
 }  // namespace retrograde::autodiff

@@ -23,11 +23,10 @@ struct ForwardResult {
   AdjointTraits traits;         // of all tangents
 };
 
-// `tangent_of` gives the tangent of a leaf, undefined where it has none; `is_infinite_leaf` as in
-// ExprFacts. undef has tangent undef, so that a tangent is stored exactly where its value is.
+// `tangent_of` gives the tangent of a leaf, undefined where it has none. undef has tangent undef, so
+// that a tangent is stored exactly where its value is.
 // Throws Unsupported on an operator without a rule between a value and a leaf with a tangent.
 ForwardResult sweep_forward(const std::vector<Expr>& values,
-                            FunctionRef<Expr(const Expr&)> tangent_of,
-                            FunctionRef<bool(const Expr&)> is_infinite_leaf);
+                            FunctionRef<Expr(const Expr&)> tangent_of, const ValueRanges& ranges);
 
 }  // namespace retrograde::autodiff

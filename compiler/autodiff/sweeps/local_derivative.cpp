@@ -129,19 +129,20 @@ bool is_leaf(const Expr& e) {
 }
 
 ExprFacts::ExprFacts(const std::vector<Expr>& order, FunctionRef<bool(const Expr&)> is_wanted,
-                     FunctionRef<bool(const Expr&)> is_infinite_leaf) {
-  for (const Expr& e : order) classify(e, is_wanted, is_infinite_leaf);
+                     const ValueRanges& ranges) {
+  for (const Expr& e : order) classify(e, is_wanted, ranges);
 }
 
 void ExprFacts::classify(const Expr& e, FunctionRef<bool(const Expr&)> is_wanted,
-                         FunctionRef<bool(const Expr&)> is_infinite_leaf) {
+                         const ValueRanges& ranges) {
   const bool floating = e.type().is_float();
   bool active = false;
   Finiteness own{.risky = makes_risky(e)};
   for_each_operand(e, [&](const Expr& operand) { own.add(classified_.at(operand.get())); });
   if (is_leaf(e)) {
     active = floating && is_wanted(e);
-    own = {.read = e.as<Variable>() == nullptr, .infinite = floating && is_infinite_leaf(e)};
+    own = {.read = e.as<Variable>() == nullptr && !ranges.is_promised_finite(e),
+           .infinite = floating && ranges.may_be_infinite(e)};
   } else {
     for_each_child(e, [&](const Expr& child) { active |= is_active(child); });
     if (active && !floating) {  // derivatives pass through floating values only

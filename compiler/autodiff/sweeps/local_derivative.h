@@ -19,6 +19,8 @@
 
 namespace retrograde::autodiff {
 
+class ValueRanges;
+
 // Children before parents, each node once. Undefined roots are skipped.
 std::vector<Expr> post_order(const std::vector<Expr>& roots);
 
@@ -41,10 +43,9 @@ struct Finiteness {
 // What is true of the nodes of a DAG.
 class ExprFacts {
  public:
-  // `order`: children before parents. `is_wanted` says by which leaves to differentiate,
-  // `is_infinite_leaf` which may be infinite at finite inputs.
+  // `order`: children before parents. `is_wanted` says by which leaves to differentiate.
   ExprFacts(const std::vector<Expr>& order, FunctionRef<bool(const Expr&)> is_wanted,
-            FunctionRef<bool(const Expr&)> is_infinite_leaf);
+            const ValueRanges& ranges);
 
   // Depends on a wanted leaf by a path of floating values.
   bool is_active(const Expr& e) const { return active_.contains(e.get()); }
@@ -54,8 +55,7 @@ class ExprFacts {
   const std::set<std::string>& notes() const { return notes_; }
 
  private:
-  void classify(const Expr& e, FunctionRef<bool(const Expr&)> is_wanted,
-                FunctionRef<bool(const Expr&)> is_infinite_leaf);
+  void classify(const Expr& e, FunctionRef<bool(const Expr&)> is_wanted, const ValueRanges& ranges);
   std::unordered_map<const ExprNode*, Finiteness> classified_;
   std::unordered_set<const ExprNode*> active_;
   std::set<std::string> notes_;

@@ -57,7 +57,7 @@ SweepResult Primal::sweep(const std::vector<Expr>& values, const std::vector<Exp
       [&](const Expr& leaf) {
         return active.contains(leaf) && (!except || symbol_of(leaf) != except);
       },
-      [&](const Expr& leaf) { return ranges.may_be_infinite(leaf); });
+      ranges);
 }
 
 }  // namespace retrograde::autodiff

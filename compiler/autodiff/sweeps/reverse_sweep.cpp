@@ -13,11 +13,10 @@ namespace {
 class ReverseSweep {
  public:
   ReverseSweep(const std::vector<Expr>& values, const std::vector<Expr>& seeds,
-               FunctionRef<bool(const Expr&)> is_wanted,
-               FunctionRef<bool(const Expr&)> is_infinite_leaf)
+               FunctionRef<bool(const Expr&)> is_wanted, const ValueRanges& ranges)
       : values_(with_equal_nodes_shared(values)),
         order_(post_order(values_)),
-        facts_(order_, is_wanted, is_infinite_leaf) {
+        facts_(order_, is_wanted, ranges) {
     result_.notes = facts_.notes();
     for (size_t i = 0; i < values.size(); ++i) {
       if (values_[i].defined() && seeds[i].defined())
@@ -99,9 +98,8 @@ class ReverseSweep {
 }  // namespace
 
 SweepResult sweep_reverse(const std::vector<Expr>& values, const std::vector<Expr>& seeds,
-                          FunctionRef<bool(const Expr&)> is_wanted,
-                          FunctionRef<bool(const Expr&)> is_infinite_leaf) {
-  return ReverseSweep(values, seeds, is_wanted, is_infinite_leaf).run();
+                          FunctionRef<bool(const Expr&)> is_wanted, const ValueRanges& ranges) {
+  return ReverseSweep(values, seeds, is_wanted, ranges).run();
 }
 
 }  // namespace retrograde::autodiff

@@ -29,11 +29,9 @@ struct SweepResult {
   std::set<std::string> notes;      // operators through which the gradient is zero
 };
 
-// `values` with adjoints `seeds` (undefined: none). `is_wanted` says which leaves to collect,
-// `is_infinite_leaf` as in ExprFacts.
+// `values` with adjoints `seeds` (undefined: none). `is_wanted` says which leaves to collect.
 // Throws Unsupported on an operator without a rule between a value and a wanted leaf.
 SweepResult sweep_reverse(const std::vector<Expr>& values, const std::vector<Expr>& seeds,
-                          FunctionRef<bool(const Expr&)> is_wanted,
-                          FunctionRef<bool(const Expr&)> is_infinite_leaf);
+                          FunctionRef<bool(const Expr&)> is_wanted, const ValueRanges& ranges);
 
 }  // namespace retrograde::autodiff

@@ -97,8 +97,7 @@ class FuncTangent {
   ForwardResult sweep(int s, const std::vector<Expr>& values,
                       FunctionRef<Expr(const Expr&)> tangent_of) const {
     try {
-      return sweep_forward(values, tangent_of,
-                           [&](const Expr& leaf) { return ranges_.may_be_infinite(leaf); });
+      return sweep_forward(values, tangent_of, ranges_);
     } catch (const Unsupported& e) {  // an expression does not know where it stands
       Message m = e.message();
       m.asked += " in " + quoted(stage_name(*f_, s));

@@ -144,7 +144,7 @@ std::vector<Expr> UpdateContext::needed_reads(const SweepResult& sweep) const {
 SweepResult UpdateContext::sweep(const std::vector<Expr>& seeds) const {
   return sweep_reverse(
       values, seeds, [&](const Expr& leaf) { return as_call_of(leaf, f) || query.is_wanted(leaf); },
-      [&](const Expr& leaf) { return query.ranges.may_be_infinite(leaf); });
+      query.ranges);
 }
 
 std::vector<Expr> UpdateContext::adjoints_at(const FuncPtr& adjoint,

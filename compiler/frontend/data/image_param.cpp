@@ -150,6 +150,12 @@ OutputImageParam& OutputImageParam::set_host_alignment(int bytes) {
   return *this;
 }
 
+ImageParam& ImageParam::promise_finite() {
+  checked().is_finite = true;
+  checked().version++;
+  return *this;
+}
+
 int OutputImageParam::host_alignment() const {
   return std::max(checked().host_alignment, checked().type.bytes());
 }

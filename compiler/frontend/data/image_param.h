@@ -107,6 +107,10 @@ class ImageParam : public OutputImageParam {
   void set(const Buffer<>& buffer);
   Buffer<> get() const;
   void reset();  // no buffer for the next calls
+  // A promise that no element is infinite or NaN in any call. Products with adjoints that may be 0
+  // are then plain ones, which fuse with sums; where it is broken, gradients are NaN where they would
+  // be 0. Affects what is differentiated after it.
+  ImageParam& promise_finite();
 
   template <std::convertible_to<Expr>... Args>
   Expr operator()(Args&&... args) const {

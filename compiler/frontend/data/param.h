@@ -124,6 +124,12 @@ class Param {
   void set_max_value(const Expr& max) {
     frontend::set_limit(*parameter_, &graph::ParameterContents::max_value, max);
   }
+  // A promise that no call's value is infinite or NaN, as of ImageParam. Derivatives take that for
+  // granted of every Param.
+  void promise_finite() {
+    parameter_->is_finite = true;
+    parameter_->version++;
+  }
   Expr min_value() const { return parameter_->min_value; }  // undefined: no limit
   Expr max_value() const { return parameter_->max_value; }  // undefined: no limit
   template <typename V>

@@ -48,9 +48,8 @@ using Gradient = std::array<Expr, leaf_count>;  // undefined: 0
 
 Gradient by_reverse_sweep(const Expr& e) {
   Gradient result;
-  const auto swept = autodiff::sweep_reverse(
-      {e}, {ir::make_one(e.type())}, [](const Expr&) { return true; },
-      [](const Expr&) { return false; });
+  const auto swept =
+      autodiff::sweep_reverse({e}, {ir::make_one(e.type())}, [](const Expr&) { return true; }, {});
   for (const autodiff::LeafAdjoint& leaf : swept.leaves)
     result[static_cast<size_t>(leaf.leaf.as<ir::Variable>()->name[0] - 'x')] = leaf.adjoint;
   return result;
@@ -63,8 +62,7 @@ Gradient by_forward_sweep(const Expr& e) {
       const auto* v = leaf.as<ir::Variable>();
       return v && v->name == leaf_names[k] ? ir::make_one(leaf.type()) : Expr();
     };
-    result[k] =
-        autodiff::sweep_forward({e}, seed, [](const Expr&) { return false; }).tangents.front();
+    result[k] = autodiff::sweep_forward({e}, seed, {}).tangents.front();
   }
   return result;
 }
