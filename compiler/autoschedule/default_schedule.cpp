@@ -12,6 +12,7 @@
 #include "autoschedule/column_blocks.h"
 #include "autoschedule/cost_estimate.h"
 #include "autoschedule/cut_reductions.h"
+#include "autoschedule/cut_scatters.h"
 #include "autoschedule/inlined_reads.h"
 #include "autoschedule/join_sweeps.h"
 #include "autoschedule/lane_dimension.h"
@@ -123,7 +124,8 @@ class LoopChooser {
     const bool stages = makes(Decision::LayoutStaging);
     if (auto d = stages && pure_[0] == 0 ? transposed_dimension(f_, definition()) : std::nullopt)
       return tile(*d);
-    if (stages && !scatters && schedule_look_ups(f_, index_, stage_, lanes, sizes_)) return;
+    if (stages && !scatters && schedule_look_ups(f_, index_, stage_, lanes_of_values(), sizes_))
+      return;
     if (!scatters && pure_[0] == 0 && tile_in_registers()) return;
     if (pure_[0] == 0 && scans_rows()) return cut_scan();
     make_tasks();
@@ -432,6 +434,18 @@ std::vector<FuncPtr> pure_primal(std::vector<FuncPtr> funcs) {
   return funcs;
 }
 
+// Sums to a few elements. What has its loops after that is no longer among the stored.
+void cut_sums(const std::vector<FuncPtr>& outputs, std::vector<FuncPtr>& stored,
+              const std::unordered_set<const Symbol*>& whole, const ChosenPlaces& chosen,
+              const SizeEstimate& sizes, const std::set<Decision>& without) {
+  if (without.contains(Decision::CutReductions)) return;
+  std::unordered_set<const Symbol*> kept = whole;  // at root
+  kept.insert(chosen.store.begin(), chosen.store.end());
+  if (!without.contains(Decision::JoinSweeps)) sweep_rows(outputs, stored, kept, sizes);
+  cut_reductions(outputs, sizes, whole);
+  if (!without.contains(Decision::ScatterStrategy)) cut_scatters(outputs, sizes, whole);
+}
+
 // What is computed in the loops of others, and which loops are shared.
 void move_and_join(const std::vector<FuncPtr>& outputs, const std::vector<FuncPtr>& stored,
                    const std::vector<FuncPtr>& given,
@@ -475,10 +489,7 @@ SizeEstimate give_default_schedule(const std::vector<FuncPtr>& outputs,
           : stored_by_default(outputs, chosen);
   SizeEstimate sizes(outputs, limits_of(request));
   TaskSizes tasks(order);
-  if (makes(Decision::CutReductions)) {
-    if (makes(Decision::JoinSweeps)) sweep_rows(outputs, stored, whole, sizes);
-    cut_reductions(outputs, sizes, whole);
-  }
+  cut_sums(outputs, stored, whole, chosen, sizes, request.options.without);
   const bool slices_scatters = makes(Decision::ScatterStrategy) && makes(Decision::Slices);
   const SlicedScatters slices(outputs, slices_scatters ? stored : std::vector<FuncPtr>(), whole,
                               sizes);

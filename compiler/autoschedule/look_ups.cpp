@@ -56,6 +56,15 @@ bool numbers_planes(const std::vector<std::vector<Expr>>& look_ups, const std::s
   });
 }
 
+// Whether planes by the variable have the same value of each read: neither places nor planes of these
+// depend on it.
+bool leaves_alone(const std::vector<std::vector<Expr>>& look_ups, const std::string& var) {
+  return std::none_of(look_ups.begin(), look_ups.end(), [&](const std::vector<Expr>& indices) {
+    return std::any_of(indices.begin(), indices.end(),
+                       [&](const Expr& index) { return uses_variable(index, var); });
+  });
+}
+
 // The loop over planes, and how many there are.
 struct Planes {
   VarOrRVar loop;
@@ -67,9 +76,12 @@ std::optional<Planes> pure_planes(const FuncContents& f, const Definition& stage
                                   const SizeEstimate& sizes) {
   for (size_t d = 1; d < f.args.size(); ++d) {
     const auto count = sizes.extent(f, d);
-    const bool is_plane =
-        count && *count > 1 && is_pure_position(f, stage, d) && numbers_planes(look_ups, f.args[d]);
-    if (is_plane) return Planes{Var(f.args[d]), *count};
+    if (!count || *count <= 1 || !is_pure_position(f, stage, d)) continue;
+    // One value for all planes pays by itself, where they are few.
+    const bool shares_places =
+        look_ups.size() >= fewest_look_ups && numbers_planes(look_ups, f.args[d]);
+    if (shares_places || (*count <= few_planes && leaves_alone(look_ups, f.args[d])))
+      return Planes{Var(f.args[d]), *count};
   }
   return std::nullopt;
 }
@@ -152,12 +164,13 @@ bool schedule_look_ups(const FuncContents& f, int index, Stage& stage, int lanes
   const Definition& definition = f.stage(index);
   if (f.args.size() < 2 || !is_pure_everywhere(f, definition)) return false;
   const auto look_ups = look_ups_of(f, definition);
-  if (look_ups.size() < fewest_look_ups) return false;
+  if (look_ups.empty()) return false;
   if (definition.rvars.empty()) {
     const auto planes = pure_planes(f, definition, look_ups, sizes);
     if (planes) PlaneLoops(f, index, stage, lanes).give_elements(*planes, sizes);
     return planes.has_value();
   }
+  if (look_ups.size() < fewest_look_ups) return false;
   const auto planes = summed_planes(definition, look_ups);
   const auto rows = sizes.extent(f, 1);
   if (!planes || !rows) return false;

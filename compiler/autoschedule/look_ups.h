@@ -4,6 +4,7 @@
 //   warped(x, y, c) = lerp(image(i(x, y), j(x, y), c), ...)      for y, x: 2 of c, unrolled
 //   u_adj(x, y) += seed(x, y, c) * (image(i(x, y) + 1, j(x, y), c) - ...)
 //                        for y by 32: for c by 2: for y, x: 2 of c, unrolled
+//   toned(x, y, c) = picture(x, y, c) + curve(brightness(x, y))  for y, x: all of few c, unrolled
 //
 // A place costs more than what is read there: a few planes at once share it, few enough that the rows
 // around a place stay in the near cache of all of them. Where the planes are terms of a sum, they are

@@ -4,6 +4,7 @@
 
 #include "autodiff/tangents.h"
 #include "gradient/gradient_check.h"
+#include "graph/graph.h"
 
 namespace retrograde::gradient {
 namespace {

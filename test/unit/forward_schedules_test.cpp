@@ -1,5 +1,6 @@
 // What the built-in autoscheduler does with forward programs: choices along small dimensions, rows along
-// long ones, chains behind transposed reads, slices that a reduction reads through what is inline.
+// long ones, chains behind transposed reads, slices that a reduction reads through what is inline,
+// parts of sums at places that data decide.
 #include <gtest/gtest.h>
 
 #include <retrograde/retrograde.h>
@@ -262,6 +263,40 @@ TEST(SlicesReadThroughInlinedFuncs, AreComputedInTheReductionWithTheirChain) {
   Scheduled<Depths> depths;
   EXPECT_TRUE(is_inside_of(depths.program.cost, depths.program.out));
   depths.expect_same_values({280, 270});
+}
+
+// How many pixels have a brightness below that of this one, and the mean of what pixels as bright
+// have beside them.
+struct Histograms {
+  Histograms() {
+    const RDom r(0, 300, 0, 280), up(1, 63);
+    const auto level = [&](const Expr& x, const Expr& y) {
+      return clamp(cast<int>(source(x, y) * 16.0f), 0, 63);
+    };
+    counts(i) = 0;
+    counts(level(r.x, r.y)) += 1;
+    below(i) = counts(i);
+    below(up) += below(up - 1);
+    beside(i) = 0.0f;
+    beside(level(r.x, r.y)) += source(r.x + 1, r.y);
+    out(i) = cast<float>(below(i)) + beside(i) / max(counts(i), 1);
+    out.bound(i, 0, 64);
+  }
+  Source source;
+  Var i{"i"};
+  Func counts{"counts"}, below{"below"}, beside{"beside"}, out{"out"};
+};
+
+bool adds_parts(const Func& f) {
+  const std::vector<graph::Dim>& loops = f.function()->updates[0].schedule.dims;
+  return f.function()->updates[0].rvars.size() == 1 && loops.front().runs == ForType::Vectorized;
+}
+
+TEST(ScattersToFewElements, HavePrivateParts) {
+  Scheduled<Histograms> histograms;
+  EXPECT_TRUE(adds_parts(histograms.program.counts));
+  EXPECT_TRUE(adds_parts(histograms.program.beside));
+  histograms.expect_same_values({64});
 }
 
 }  // namespace

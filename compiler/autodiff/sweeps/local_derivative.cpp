@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "autodiff/rules/stable_forms.h"
+#include "autodiff/rules/value_range.h"
 #include "diagnostics/error.h"
 #include "ir/build.h"
 

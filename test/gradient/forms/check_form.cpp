@@ -6,6 +6,7 @@
 #include <sstream>
 
 #include "autodiff/derivative.h"
+#include "autodiff/rules/value_range.h"
 #include "autodiff/sweeps/forward_sweep.h"
 #include "autodiff/sweeps/local_derivative.h"
 #include "autodiff/sweeps/reverse_sweep.h"
