@@ -30,7 +30,7 @@ constexpr double window_bytes = 384 << 10;  // of a group: half of a cache near 
 constexpr int64_t unknown_extent = 1024;    // of rows and columns of an image
 constexpr int64_t enough_strips = 16;       // each is a task
 constexpr size_t most_members = 8;
-// What several of a group read, as a sum reads all steps of a chain. If it did not join, no Func behind
+// What several of a group read, as a sum reads all steps of a chain, and a part of such a sum. If it did not join, no Func behind
 // it would either, and the images of all would be held until the group has run: so it may have more
 // company, and rows that wait for the last reader in a cache farther away.
 constexpr size_t most_with_shared = 32;
@@ -72,7 +72,7 @@ class Group {
   // Whether it has joined: all of its reads are by Funcs of this group.
   bool join(const FuncPtr& f, const std::vector<StoredRead>& reads) {
     const auto windows = windows_of(*f, reads);
-    const bool is_shared = reads.size() > 1;
+    const bool is_shared = reads.size() > 1 || is_running_sum(*f, *reads[0].reader);
     if (!windows || members_.size() >= (is_shared ? most_with_shared : most_members)) return false;
     windows_[f.get()] = *windows;
     members_.push_back(f);
@@ -322,7 +322,8 @@ class Grouping {
     return groups;
   }
 
-  // Running sums of the groups just made that keep others, which did not join, alive for these.
+  // Running sums of the groups just made that keep others, which did not join, alive for these: more
+  // than one, which is what a sum at root takes itself.
   std::unordered_set<const Symbol*> that_keep_others(
       const std::vector<std::unique_ptr<Group>>& groups) const {
     std::unordered_set<const Symbol*> result;
@@ -333,7 +334,7 @@ class Grouping {
           const auto found = group_of_.find(g.get());
           return found == group_of_.end() || found->second != group.get();
         };
-        if (std::ranges::any_of(summed_adjoints(*f), is_outside)) result.insert(f.get());
+        if (std::ranges::count_if(summed_adjoints(*f), is_outside) > 1) result.insert(f.get());
       }
     }
     return result;
