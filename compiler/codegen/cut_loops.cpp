@@ -37,13 +37,14 @@ unsigned length_of(const llvm::Loop& loop) {
 // Of a loop as serial_loop makes it, which counts from `first` while the next is less than `end`.
 uint64_t iterations_of(const llvm::Loop& loop) {
   using namespace llvm::PatternMatch;
+  namespace pattern = llvm::PatternMatch;  // ir has a match, too
   const llvm::BasicBlock* latch = loop.getLoopLatch();
   const auto* counter = llvm::dyn_cast<llvm::PHINode>(&loop.getHeader()->front());
   llvm::ICmpInst::Predicate predicate;
   llvm::Value *next, *end;
   if (!latch || !counter ||
-      !match(latch->getTerminator(),
-             m_Br(m_ICmp(predicate, m_Value(next), m_Value(end)), m_BasicBlock(), m_BasicBlock())))
+      !pattern::match(latch->getTerminator(), m_Br(m_ICmp(predicate, m_Value(next), m_Value(end)),
+                                                   m_BasicBlock(), m_BasicBlock())))
     return unknown_iterations;
   const llvm::ConstantInt *first, *last;
   const llvm::Value* start = nullptr;
@@ -55,7 +56,7 @@ uint64_t iterations_of(const llvm::Loop& loop) {
     return static_cast<uint64_t>(
         std::max<int64_t>(last->getSExtValue() - first->getSExtValue(), 1));
   llvm::ConstantInt* extent;
-  if (start && match(end, m_Add(m_Specific(start), m_ConstantInt(extent))))
+  if (start && pattern::match(end, m_Add(m_Specific(start), m_ConstantInt(extent))))
     return static_cast<uint64_t>(std::max<int64_t>(extent->getSExtValue(), 1));
   return unknown_iterations;
 }
