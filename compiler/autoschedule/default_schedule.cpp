@@ -252,16 +252,8 @@ class LoopChooser {
     const auto arg = std::find(f_.args.begin(), f_.args.end(), loop.name());
     if (arg == f_.args.end()) return 0;
     const auto dimension = static_cast<size_t>(arg - f_.args.begin());
-    const int64_t size = size_along(tile, dimension);
+    const int64_t size = tile.size_along(dimension, lanes);
     return (sizes_.extent(f_, dimension).value_or(0) + size - 1) / size;
-  }
-
-  static int64_t size_along(const RegisterTile& tile, size_t dimension) {
-    if (dimension == 0) return tile.vectors * lanes;
-    for (const RegisterTile::Side& side : tile.sides) {
-      if (side.dimension == dimension) return side.size;
-    }
-    return 1;
   }
 
   std::optional<RegisterTile> tile_of(const FuncContents& f, const Definition& reduction) const {
@@ -327,7 +319,7 @@ class LoopChooser {
     std::vector<size_t> shifts;
     int64_t tasks = 1;
     for (size_t d : pure_) {
-      const int64_t size = size_along(tile, d);
+      const int64_t size = tile.size_along(d, lanes);
       const auto arg = std::find(block.args.begin(), block.args.end(), f_.args[d]);
       const auto in_block = static_cast<size_t>(arg - block.args.begin());
       const int64_t extent = sizes_.extent(f_, d).value_or(sizes_.machine().enough_tasks * size);

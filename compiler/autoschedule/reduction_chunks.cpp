@@ -100,8 +100,7 @@ class ChunkReads {
 
 double tiles_along(const FuncContents& sums, size_t d, const RegisterTile& tile, int lanes,
                    const SizeEstimate& sizes) {
-  int64_t size = d == 0 ? tile.vectors * lanes : 1;
-  for (const RegisterTile::Side& side : tile.sides) size = side.dimension == d ? side.size : size;
+  const int64_t size = tile.size_along(d, lanes);
   const int64_t extent = sizes.extent(sums, d).value_or(1);
   return std::ceil(static_cast<double>(extent) / static_cast<double>(size));
 }

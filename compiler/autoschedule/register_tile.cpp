@@ -206,4 +206,12 @@ std::optional<RegisterTile> register_tile(const FuncContents& f, const Definitio
   return best.sides.empty() ? std::nullopt : std::optional(best);
 }
 
+int64_t RegisterTile::size_along(size_t dimension, int lanes) const {
+  if (dimension == 0) return vectors * lanes;
+  for (const Side& side : sides) {
+    if (side.dimension == dimension) return side.size;
+  }
+  return 1;
+}
+
 }  // namespace retrograde::autoschedule

@@ -27,6 +27,8 @@ struct RegisterTile {
     int64_t size;
   };
   std::vector<Side> sides;
+  // Elements along a dimension, of vectors of so many lanes along the first.
+  int64_t size_along(size_t dimension, int lanes) const;
 };
 
 // The tile with the fewest cycles for each product; nullopt: none is better than one vector, or the

@@ -33,6 +33,11 @@ AutoscheduleOptions in_any_order() {
   return options;
 }
 
+void expect_none(const Func& f, const AutoscheduleOptions& options) {
+  const auto results = Pipeline(f).auto_schedule(get_host_target(), options);
+  EXPECT_EQ(results.schedule_source.find("atomic"), std::string::npos) << results.schedule_source;
+}
+
 // A table of a million floats, read at so many places: its gradient is a scatter in eight parts.
 struct TableGradient {
   static constexpr int elements = 1 << 20, reads = 2 << 20;
@@ -83,8 +88,7 @@ TEST(AtomicScatters, PartsAreKeptWhereTheyAreWithinTheBudget) {
   const TableGradient program;
   AutoscheduleOptions options = in_any_order();
   options.memory_budget = 0;
-  const auto results = Pipeline(program.gradient).auto_schedule(get_host_target(), options);
-  EXPECT_EQ(results.schedule_source.find("atomic"), std::string::npos) << results.schedule_source;
+  expect_none(program.gradient, options);
 }
 
 TEST(AtomicScatters, AreNeverChosenWhereBitsAreToBeTheSame) {
@@ -134,16 +138,14 @@ TEST(AtomicScatters, ALargeScatterRunsInParallel) {
 
 TEST(AtomicScatters, FewElementsAreNotFoughtFor) {
   const Histogram program(random_places(1 << 18, 256), numbers(1 << 18), 256);
-  const auto results = Pipeline(program.sums).auto_schedule(get_host_target(), in_any_order());
-  EXPECT_EQ(results.schedule_source.find("atomic"), std::string::npos) << results.schedule_source;
+  expect_none(program.sums, in_any_order());
 }
 
 TEST(AtomicScatters, OneThreadNeedsNone) {
   const TableGradient program;
   AutoscheduleOptions options = in_any_order();
   options.threads = 1;
-  const auto results = Pipeline(program.gradient).auto_schedule(get_host_target(), options);
-  EXPECT_EQ(results.schedule_source.find("atomic"), std::string::npos) << results.schedule_source;
+  expect_none(program.gradient, options);
 }
 
 }  // namespace

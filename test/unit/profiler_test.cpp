@@ -53,10 +53,10 @@ TEST(Profiler, TimeGoesToTheFuncThatTakesIt) {
   void* run = retrograde_profiler_begin(&context, "pipeline", funcs);
   int32_t* place = retrograde_profiler_thread(&context, run, 1);
   retrograde_profiler_memory(&context, run, 1, 1000);
-  std::this_thread::sleep_for(std::chrono::milliseconds(60));
+  std::this_thread::sleep_for(std::chrono::milliseconds(180));
   std::atomic_ref(*place).store(2);
   retrograde_profiler_memory(&context, run, 2, 500);
-  std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  std::this_thread::sleep_for(std::chrono::milliseconds(60));
   retrograde_profiler_memory(&context, run, 1, -1000);
   retrograde_profiler_leave(&context, place);
   retrograde_profiler_end(&context, run);
@@ -64,10 +64,10 @@ TEST(Profiler, TimeGoesToTheFuncThatTakesIt) {
   ASSERT_NE(stats, nullptr);
   ASSERT_EQ(stats->num_funcs, 3);
   EXPECT_EQ(stats->runs, 1);
-  EXPECT_GE(stats->time, 80000000u);
+  EXPECT_GE(stats->time, 240000000u);
   EXPECT_STREQ(stats->funcs[1].name, "a");
   EXPECT_GT(stats->funcs[1].time, stats->funcs[2].time);
-  EXPECT_GE(stats->funcs[2].time, 5000000u);
+  EXPECT_GE(stats->funcs[2].time, 30000000u);  // half; looks come at random
   EXPECT_EQ(stats->funcs[1].memory_peak, 1000u);
   EXPECT_EQ(stats->funcs[2].num_allocs, 1);
   EXPECT_EQ(stats->memory_peak, 1500u);
