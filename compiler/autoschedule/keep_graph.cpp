@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cctype>
-#include <cstdint>
 #include <cstdlib>
 #include <fstream>
 #include <iomanip>
@@ -13,6 +12,7 @@
 
 #include "autoschedule/stored_funcs.h"
 #include "diagnostics/error.h"
+#include "diagnostics/text_hash.h"
 #include "graph/give_directive.h"
 #include "graph/graph.h"
 #include "graph/parameter_contents.h"
@@ -54,14 +54,13 @@ std::string text_with_sizes(const std::vector<FuncPtr>& outputs) {
 }
 
 std::string file_name(const std::string& name, const std::string& contents) {
-  uint64_t hash = 14695981039346656037u;  // FNV-1a
-  for (const char c : contents) hash = (hash ^ static_cast<unsigned char>(c)) * 1099511628211u;
   std::string plain = name;
   for (char& c : plain) {
     if (!std::isalnum(static_cast<unsigned char>(c))) c = '_';
   }
   std::ostringstream out;
-  out << plain << "-" << std::hex << std::setw(16) << std::setfill('0') << hash << ".graph";
+  out << plain << "-" << std::hex << std::setw(16) << std::setfill('0') << text_hash(contents)
+      << ".graph";
   return out.str();
 }
 

@@ -3,6 +3,7 @@
 #include <sqlite3.h>
 
 #include "diagnostics/error.h"
+#include "diagnostics/text_hash.h"
 
 namespace retrograde::tune {
 
@@ -31,11 +32,8 @@ const char* const tables = R"(
   commit;
 )";
 
-// FNV-1a.
 std::string hash_of(const std::string& text) {
-  uint64_t hash = 14695981039346656037u;
-  for (const char c : text) hash = (hash ^ static_cast<unsigned char>(c)) * 1099511628211u;
-  return std::to_string(hash) + "-" + std::to_string(text.size());
+  return std::to_string(text_hash(text)) + "-" + std::to_string(text.size());
 }
 
 }  // namespace

@@ -1,0 +1,16 @@
+// text_hash.h -- a number for a text, the same on all machines: names of files, keys of tables.
+#pragma once
+
+#include <cstdint>
+#include <string_view>
+
+namespace retrograde {
+
+// FNV-1a, 64 bits.
+constexpr uint64_t text_hash(std::string_view text) {
+  uint64_t hash = 14695981039346656037u;
+  for (const char c : text) hash = (hash ^ static_cast<unsigned char>(c)) * 1099511628211u;
+  return hash;
+}
+
+}  // namespace retrograde
