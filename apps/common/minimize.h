@@ -1,0 +1,73 @@
+// minimize.h -- one interface to all optimizers of a smooth function of many variables.
+//
+//   adam                Adam (adam.h)
+//   lbfgs               L-BFGS with a Wolfe line search, by Ceres (S. Agarwal, K. Mierle)
+//   conjugate_gradient  non-linear conjugate gradients (Polak-Ribiere), by Ceres
+//   newton_cg           truncated Newton: J. Nocedal, S. Wright, Numerical Optimization, 2nd edition,
+//                       algorithm 7.1, on Hessian-vector products
+//
+// All of them stop after so many steps or seconds, when the gradient is small, when the callback or a
+// signal says so (stop.h), and give the best point that was met. Of values that are not finite nothing is
+// learned: the step is shortened, and counted as refused.
+#pragma once
+
+#include <functional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "common/adam.h"
+
+namespace apps {
+
+struct Problem {
+  size_t size = 0;
+  // The loss at x; where `gradient` is not empty, also its gradient.
+  std::function<double(std::span<const double> x, std::span<double> gradient)> evaluate;
+  // H(x) v, for newton_cg only.
+  std::function<void(std::span<const double> x, std::span<const double> v,
+                     std::span<double> product)>
+      hessian_product = {};
+};
+
+enum class Method { Adam, Lbfgs, ConjugateGradient, NewtonCg };
+std::string name_of(Method method);  // "adam", "lbfgs", "conjugate_gradient", "newton_cg"
+// Throws retrograde::UserError for any other name.
+Method method_named(const std::string& name);
+
+struct MinimizeOptions {
+  Method method = Method::Lbfgs;
+  long steps = 100;
+  double seconds = 0;                 // 0: no limit
+  double gradient_tolerance = 1e-10;  // of its largest element
+  double loss_tolerance = 0;          // relative change over a step; 0: go on
+  double rate = 1e-2;                 // of Adam
+  AdamOptions adam = {};
+  bool safeguard = true;  // false only to show what it is for
+};
+
+// The loss after a step (0: at the start) and the seconds since the start.
+struct LossSample {
+  long step;
+  double seconds;
+  double loss;
+};
+
+struct Minimum {
+  std::vector<double> x;  // the best point, and its loss
+  double loss = 0;
+  std::vector<LossSample> series;  // one for each step
+  long steps = 0, evaluations = 0, products = 0, refused = 0;
+  double seconds = 0;
+  bool stopped = false;  // by a signal
+  std::string ended;     // why, in words
+};
+
+// Called after each step with the best point so far; false ends the run.
+using StepCallback = std::function<bool(const LossSample& sample, std::span<const double> best)>;
+
+// Throws retrograde::UserError when the loss is not finite at the start.
+Minimum minimize(const Problem& problem, std::span<const double> start,
+                 const MinimizeOptions& options, const StepCallback& callback = {});
+
+}  // namespace apps

@@ -1,0 +1,44 @@
+// state.h -- what a run needs to go on where it was: the file behind --resume.
+//
+//   apps::State state{.program = "lens", .step = 120};
+//   state.arrays["curvatures"] = values;      // doubles hold floats exactly
+//   adam.save(state, "adam");
+//   apps::write_state(folder / "state.bin", state);
+//
+// One binary file, written whole or not at all: magic, version, program, step, words, named arrays, and
+// a CRC-32 of all of it. A file that is damaged, truncated, of another program or no state at all is a
+// UserError in one line, and nothing of it is used.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <random>
+#include <span>
+#include <string>
+#include <vector>
+
+namespace apps {
+
+struct State {
+  std::string program;
+  int64_t step = 0;
+  double seconds = 0;                             // that the steps have taken so far
+  std::map<std::string, std::string> words = {};  // names of methods, random generators ...
+  std::map<std::string, std::vector<double>> arrays = {};
+
+  // The array of that name and size. Throws retrograde::UserError when there is none.
+  const std::vector<double>& array(const std::string& name, size_t size) const;
+  void put(const std::string& name, std::span<const float> values);
+  void get(const std::string& name, std::span<float> values) const;
+
+  void put(const std::string& name, const std::mt19937_64& random);
+  void get(const std::string& name, std::mt19937_64& random) const;
+};
+
+void write_state(const std::filesystem::path& path, const State& state);
+
+// Throws retrograde::UserError unless the file is a whole state of this program.
+State read_state(const std::filesystem::path& path, const std::string& program);
+
+}  // namespace apps
