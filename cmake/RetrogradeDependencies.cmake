@@ -7,6 +7,7 @@
 #   retrograde_dep_halide          the Halide 14 compiler, for tests and benchmarks only
 #   retrograde_dep_image           OpenImageIO, for apps
 #   retrograde_dep_sqlite         for tools/tune
+#   retrograde_dep_ceres           L-BFGS and conjugate gradients, for apps
 #   retrograde_dep_cli, retrograde_dep_json   command lines and reports, for apps
 find_package(PkgConfig REQUIRED)
 find_package(Threads REQUIRED)
@@ -58,6 +59,18 @@ target_link_libraries(retrograde_dep_halide INTERFACE ${RETROGRADE_HALIDE_LIBRAR
 pkg_check_modules(OIIO REQUIRED IMPORTED_TARGET OpenImageIO)
 add_library(retrograde_dep_image INTERFACE)
 target_link_libraries(retrograde_dep_image INTERFACE PkgConfig::OIIO)
+
+# By hand: its CMake package wants the development packages of all that Ceres itself uses. The gradient
+# solver's headers need only those of glog and Eigen.
+find_path(RETROGRADE_CERES_INCLUDE ceres/gradient_problem_solver.h REQUIRED)
+find_path(RETROGRADE_EIGEN_INCLUDE Eigen/Core PATH_SUFFIXES eigen3 REQUIRED)
+find_library(RETROGRADE_CERES_LIBRARY ceres REQUIRED)
+find_library(RETROGRADE_GLOG_LIBRARY glog REQUIRED)
+add_library(retrograde_dep_ceres INTERFACE)
+target_include_directories(retrograde_dep_ceres SYSTEM INTERFACE ${RETROGRADE_CERES_INCLUDE}
+  ${RETROGRADE_EIGEN_INCLUDE})
+target_link_libraries(retrograde_dep_ceres INTERFACE ${RETROGRADE_CERES_LIBRARY}
+  ${RETROGRADE_GLOG_LIBRARY})
 
 find_path(RETROGRADE_CLI_INCLUDE CLI/CLI.hpp REQUIRED)
 add_library(retrograde_dep_cli INTERFACE)

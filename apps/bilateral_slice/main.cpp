@@ -1,12 +1,7 @@
 // main.cpp -- bilateral_slice: learn a photographic look. See README.md beside this file.
-#include <tbb/global_control.h>
-
 #include <algorithm>
 #include <chrono>
-#include <csignal>
 #include <cstdio>
-#include <exception>
-#include <new>
 #include <string>
 #include <vector>
 
@@ -15,6 +10,7 @@
 #include "common/plots.h"
 #include "common/process.h"
 #include "common/progress.h"
+#include "common/run_app.h"
 #include "diagnostics/error.h"
 #include "fit.h"
 #include "gradient_check.h"
@@ -29,12 +25,6 @@ using retrograde::text;
 namespace {
 
 using Planes = std::vector<float>;
-
-std::string one_line(std::string text) {
-  while (!text.empty() && text.back() == '\n') text.pop_back();
-  std::replace(text.begin(), text.end(), '\n', ' ');
-  return text;
-}
 
 // Three colour planes, and a fourth of ones when `homogeneous`.
 Planes to_planes(const apps::Image& image, bool homogeneous) {
@@ -165,8 +155,7 @@ void check_gradients(const Options& options, const Pair& pair) {
 
 void run(const Options& options) {
   apps::require_writable_folder(options.output);
-  const tbb::global_control threads(tbb::global_control::max_allowed_parallelism,
-                                    static_cast<size_t>(options.threads));
+  const apps::ThreadLimit threads(options.threads);
   const auto start = std::chrono::steady_clock::now();
   Pair pair = read_pair(options);
   if (options.check_gradients) return check_gradients(options, pair);
@@ -190,24 +179,7 @@ void run(const Options& options) {
 }  // namespace bilateral_slice
 
 int main(int argc, char** argv) {
-  // A reader that goes away and a file that grows too large are errors of a call, not signals.
-  std::signal(SIGPIPE, SIG_IGN);
-  std::signal(SIGXFSZ, SIG_IGN);
-  try {
-    if (const auto options = bilateral_slice::read_options(argc, argv)) {
-      bilateral_slice::run(*options);
-    }
-    return 0;
-  } catch (const std::bad_alloc&) {
-    std::fputs(
-        "bilateral_slice: cannot hold the images: a run needs memory for some forty floats a "
-        "pixel; none was left. Make the images smaller.\n",
-        stderr);
-  } catch (const retrograde::InternalError& error) {
-    std::fprintf(stderr, "bilateral_slice: %s\n",
-                 error.what());  // with all that a bug report needs
-  } catch (const std::exception& error) {
-    std::fprintf(stderr, "bilateral_slice: %s\n", bilateral_slice::one_line(error.what()).c_str());
-  }
-  return 1;
+  return apps::run_app("bilateral_slice", argc, argv, [](int c, char** v) {
+    if (const auto options = bilateral_slice::read_options(c, v)) bilateral_slice::run(*options);
+  });
 }

@@ -27,6 +27,28 @@ json curve_of(const Series& series) {
   return {{"seconds", seconds}, {"psnr_db", psnr}, {"compile_seconds", series.compile_seconds}};
 }
 
+// What the page of all demos shows of it (common/make_index.py).
+json pictures() {
+  return {{{"file", "input.png"}, {"caption", "the photo"}},
+          {{"file", "target.png"}, {"caption", "the look that it was given"}},
+          {{"file", "result.png"}, {"caption", "what was learned of it"}},
+          {{"file", "error_against_time.png"}, {"caption", "error against run time"}}};
+}
+
+json numbers_of(const Report& report, const Fit& fit) {
+  json numbers = {
+      {{"name", "PSNR"},
+       {"before", report.psnr_initial_db},
+       {"value", report.psnr_final_db},
+       {"unit", "dB"}},
+      {{"name", "a step"}, {"value", fit.ours.median_ms()}, {"unit", "ms"}},
+      {{"name", "gradient check"}, {"value", report.gradient_check.max_relative_error}}};
+  if (!fit.peer.seconds.empty())
+    numbers.push_back(
+        {{"name", "a step of Halide 14"}, {"value", fit.peer.median_ms()}, {"unit", "ms"}});
+  return numbers;
+}
+
 json or_null(bool known, double value) { return known ? json(value) : json(nullptr); }
 
 }  // namespace
@@ -39,6 +61,9 @@ void write_report(const std::filesystem::path& path, const Report& report, const
   const bool has_peer = !fit.peer.seconds.empty();
   const double ours = fit.ours.median_ms(), peer = has_peer ? fit.peer.median_ms() : 0;
   json out = {
+      {"program", "bilateral_slice"},
+      {"pictures", pictures()},
+      {"numbers", numbers_of(report, fit)},
       {"width", report.shape.width},
       {"height", report.shape.height},
       {"grid", {report.shape.grid_x, report.shape.grid_y, report.shape.grid_z, 12}},

@@ -40,9 +40,9 @@ double relative_error(std::span<const double> own, std::span<const double> exact
 
 struct StabilityRow {
   std::string name;
-  double primal_error = 0, gradient_error = 0;           // float32 against double, worst
-  std::optional<long> diverges_plain, diverges_guarded;  // nothing: it does not
-  long steps = 0;                                        // that were tried
+  double primal_error = 0, gradient_error = 0;                     // float32 against double, worst
+  std::optional<long> diverges_plain = {}, diverges_guarded = {};  // nothing: it does not
+  long steps = 0;                                                  // that were tried
 };
 Table stability_table(const std::vector<StabilityRow>& rows);
 

@@ -7,7 +7,11 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
+#include <cstdlib>
+#include <fstream>
+#include <iterator>
 #include <memory>
 #include <string>
 
@@ -49,7 +53,9 @@ class QuietErrors {
   int kept_;
 };
 
-std::unique_ptr<OIIO::ImageInput> open_image(const std::filesystem::path& path) {
+// `raw_mosaic`: of a RAW file what the sensor saw, without demosaicing.
+std::unique_ptr<OIIO::ImageInput> open_image(const std::filesystem::path& path,
+                                             bool raw_mosaic = false) {
   std::error_code failed;
   if (!std::filesystem::is_regular_file(path, failed)) {
     refuse_read(path, "an input must be an image file",
@@ -58,6 +64,7 @@ std::unique_ptr<OIIO::ImageInput> open_image(const std::filesystem::path& path) 
   }
   OIIO::ImageSpec config;
   config["oiio:UnassociatedAlpha"] = 1;  // colours as stored, not multiplied by alpha
+  if (raw_mosaic) config["raw:Demosaic"] = "none";
   auto input = OIIO::ImageInput::open(path.string(), &config);
   if (!input) {
     refuse_read(path, "an input must be an image that OpenImageIO decodes", OIIO::geterror(),
@@ -84,34 +91,19 @@ int sample_bits(const OIIO::ImageSpec& spec) {
   return spec.format.basesize() > 1 ? 16 : 8;
 }
 
-// One or two channels are gray and alpha; of more, the first three are the colours.
-void spread_channels(const std::vector<float>& from, int channels, std::vector<float>& to) {
-  const size_t pixels = from.size() / channels;
-  for (size_t p = 0; p < pixels; ++p) {
-    for (int c = 0; c < 3; ++c) to[3 * p + c] = from[p * channels + (channels < 3 ? 0 : c)];
-  }
-}
-
-}  // namespace
-
-Image read_image(const std::filesystem::path& path) {
-  const QuietErrors quiet;
-  auto input = open_image(path);
-  const OIIO::ImageSpec spec = input->spec();
-  check_size(path, spec);
-  Image image{spec.width, spec.height, sample_bits(spec), {}};
-  const int channels = std::min(spec.nchannels, spec.nchannels < 3 ? 1 : 3);
+// The first `channels` of the file, every sample finite.
+Image read_open(const std::filesystem::path& path, OIIO::ImageInput& input, int channels) {
+  const OIIO::ImageSpec spec = input.spec();
+  Image image{spec.width, spec.height, sample_bits(spec), {}, channels};
   image.pixels.resize(image.elems());
-  std::vector<float> raw(static_cast<size_t>(spec.width) * spec.height * channels);
-  if (!input->read_image(0, 0, 0, channels, OIIO::TypeDesc::FLOAT, raw.data())) {
-    refuse_read(path, "an input must be a whole image", input->geterror(),
+  if (!input.read_image(0, 0, 0, channels, OIIO::TypeDesc::FLOAT, image.pixels.data())) {
+    refuse_read(path, "an input must be a whole image", input.geterror(),
                 "The file is damaged or truncated: fetch it again");
   }
-  spread_channels(raw, channels, image.pixels);
   const auto bad = std::find_if(image.pixels.begin(), image.pixels.end(),
                                 [](float v) { return !std::isfinite(v); });
   if (bad != image.pixels.end()) {
-    const long pixel = (bad - image.pixels.begin()) / 3;
+    const long pixel = (bad - image.pixels.begin()) / channels;
     refuse_read(path, "every sample must be a finite number",
                 text("pixel (", pixel % image.width, ", ", pixel / image.width, ") holds ", *bad),
                 "Mend the image first");
@@ -119,22 +111,128 @@ Image read_image(const std::filesystem::path& path) {
   return image;
 }
 
-void write_png(const std::filesystem::path& path, const Image& image) {
-  const bool deep = image.bits > 8;
-  OIIO::ImageSpec spec(image.width, image.height, 3,
-                       deep ? OIIO::TypeDesc::UINT16 : OIIO::TypeDesc::UINT8);
-  // Encoded in memory, so that only write_file, which checks every call, touches the disk.
+Image spread_gray(const Image& gray) {
+  Image image{gray.width, gray.height, gray.bits, {}};
+  image.pixels.resize(image.elems());
+  for (size_t n = 0; n < image.pixels.size(); ++n) image.pixels[n] = gray.pixels[n / 3];
+  return image;
+}
+
+std::string lower_suffix(const std::filesystem::path& path) {
+  std::string suffix = path.extension().string();
+  for (char& c : suffix) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  return suffix;
+}
+
+// What a file with this suffix stores.
+OIIO::TypeDesc stored_type(const std::filesystem::path& path, const std::string& suffix, int bits) {
+  if (suffix == ".exr" || suffix == ".tif" || suffix == ".tiff" || suffix == ".hdr")
+    return OIIO::TypeDesc::FLOAT;
+  if (suffix == ".png") return bits > 8 ? OIIO::TypeDesc::UINT16 : OIIO::TypeDesc::UINT8;
+  if (suffix == ".jpg" || suffix == ".jpeg") return OIIO::TypeDesc::UINT8;
+  retrograde::call_error(text("write ", retrograde::quoted(path.string())),
+                         "an image's suffix says how it is stored",
+                         suffix.empty() ? "it has none" : text("nothing is known of ", suffix),
+                         "Give .png, .exr, .tif, .hdr or .jpg");
+}
+
+[[noreturn]] void refuse_encoding(const std::filesystem::path& path, const std::string& suffix,
+                                  std::string evidence) {
+  while (!evidence.empty() && evidence.back() == '\n') evidence.pop_back();
+  retrograde::call_error(text("write ", retrograde::quoted(path.string())),
+                         text("OpenImageIO must be able to encode ", suffix, " of such an image"),
+                         evidence, "Give another suffix, or install OpenImageIO with that plugin");
+}
+
+// Encoded in memory, so that only write_file, which checks every call, touches the disk; through a
+// scratch file where a plugin cannot do that.
+std::string encode(const std::filesystem::path& path, const std::string& suffix,
+                   const Image& image) {
+  const OIIO::ImageSpec spec(image.width, image.height, image.channels,
+                             stored_type(path, suffix, image.bits));
+  auto output = OIIO::ImageOutput::create(suffix.substr(1));
+  if (!output) refuse_encoding(path, suffix, OIIO::geterror());
   std::vector<unsigned char> bytes;
   OIIO::Filesystem::IOVecOutput memory(bytes);
-  auto output = OIIO::ImageOutput::create("png");
-  if (!output || !output->set_ioproxy(&memory) || !output->open(path.filename().string(), spec) ||
-      !output->write_image(OIIO::TypeDesc::FLOAT, image.pixels.data()) || !output->close()) {
-    retrograde::call_error(
-        text("write ", retrograde::quoted(path.string())), "OpenImageIO must be able to encode PNG",
-        output ? output->geterror() : OIIO::geterror(), "Install OpenImageIO with its PNG plugin");
+  const bool in_memory = output->supports("ioproxy");
+  std::string scratch =
+      (std::filesystem::temp_directory_path() / ("image.XXXXXX" + suffix)).string();
+  if (in_memory) {
+    output->set_ioproxy(&memory);
+  } else {
+    const int file = ::mkstemps(scratch.data(), static_cast<int>(suffix.size()));
+    if (file >= 0) ::close(file);
   }
+  const bool good = output->open(in_memory ? path.filename().string() : scratch, spec) &&
+                    output->write_image(OIIO::TypeDesc::FLOAT, image.pixels.data()) &&
+                    output->close();
+  const std::string evidence = good ? std::string() : output->geterror();
   output.reset();
-  write_file(path, {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
+  std::string whole(bytes.begin(), bytes.end());
+  if (!in_memory) {
+    std::ifstream file(scratch, std::ios::binary);
+    whole.assign(std::istreambuf_iterator<char>(file), {});
+    ::unlink(scratch.c_str());
+  }
+  if (!good) refuse_encoding(path, suffix, evidence);
+  return whole;
+}
+
+}  // namespace
+
+Image read_image(const std::filesystem::path& path) {
+  const QuietErrors quiet;
+  const auto input = open_image(path);
+  check_size(path, input->spec());
+  // One or two channels are gray and alpha; of more, the first three are the colours.
+  const bool gray = input->spec().nchannels < 3;
+  const Image image = read_open(path, *input, gray ? 1 : 3);
+  return gray ? spread_gray(image) : image;
+}
+
+Image read_channels(const std::filesystem::path& path) {
+  const QuietErrors quiet;
+  const auto input = open_image(path);
+  check_size(path, input->spec());
+  return read_open(path, *input, input->spec().nchannels);
+}
+
+Mosaic read_mosaic(const std::filesystem::path& path) {
+  const QuietErrors quiet;
+  const auto input = open_image(path, true);
+  const OIIO::ImageSpec& spec = input->spec();
+  check_size(path, spec);
+  if (spec.nchannels != 1) {
+    refuse_read(path, "a mosaic has one channel, as a sensor or a gray image has",
+                text("it has ", spec.nchannels), "Give a RAW photograph or a gray image");
+  }
+  const std::string pattern = spec.get_string_attribute("raw:FilterPattern");
+  return {read_open(path, *input, 1), pattern};
+}
+
+std::vector<std::filesystem::path> images_in(const std::filesystem::path& folder) {
+  std::vector<std::filesystem::path> found;
+  std::error_code failed;
+  for (const auto& entry : std::filesystem::directory_iterator(folder, failed)) {
+    const QuietErrors quiet;
+    if (entry.is_regular_file() && OIIO::ImageInput::open(entry.path().string()))
+      found.push_back(entry.path());
+  }
+  std::sort(found.begin(), found.end());
+  OIIO::geterror();  // what it says of other files is of no interest
+  if (!found.empty()) return found;
+  retrograde::call_error(text("read images of ", retrograde::quoted(folder.string())),
+                         "it must be a folder with images in it",
+                         failed ? failed.message() : std::string("none of its files is one"),
+                         "Give a folder of photographs");
+}
+
+void write_image(const std::filesystem::path& path, const Image& image) {
+  write_file(path, encode(path, lower_suffix(path), image));
+}
+
+void write_png(const std::filesystem::path& path, const Image& image) {
+  write_file(path, encode(path, ".png", image));
 }
 
 }  // namespace apps

@@ -23,7 +23,7 @@ namespace apps {
 struct Problem {
   size_t size = 0;
   // The loss at x; where `gradient` is not empty, also its gradient.
-  std::function<double(std::span<const double> x, std::span<double> gradient)> evaluate;
+  std::function<double(std::span<const double> x, std::span<double> gradient)> evaluate = {};
   // H(x) v, for newton_cg only.
   std::function<void(std::span<const double> x, std::span<const double> v,
                      std::span<double> product)>
@@ -43,7 +43,8 @@ struct MinimizeOptions {
   double loss_tolerance = 0;          // relative change over a step; 0: go on
   double rate = 1e-2;                 // of Adam
   AdamOptions adam = {};
-  bool safeguard = true;  // false only to show what it is for
+  bool safeguard = true;    // false only to show what it is for
+  Adam* moments = nullptr;  // Adam goes on with these, which the caller saves; its steps count
 };
 
 // The loss after a step (0: at the start) and the seconds since the start.

@@ -1,3 +1,4 @@
+// plots.cpp -- see plots.h.
 #include "common/plots.h"
 
 #include <cstdlib>
@@ -13,8 +14,10 @@ namespace {
 
 std::filesystem::path find_script(const std::string& script_name) {
   const auto here = program_folder();
+  // Installed; beside the program; and where the build keeps those that all apps and tests share.
   for (const auto& place :
-       {here / ".." / "share" / "retrograde" / script_name, here / script_name}) {
+       {here / ".." / "share" / "retrograde" / script_name, here / script_name,
+        here / ".." / "common" / script_name, here / ".." / "apps" / "common" / script_name}) {
     if (std::filesystem::exists(place)) return place;
   }
   return script_name;
@@ -47,6 +50,10 @@ void draw_plot(const std::string& script_name, const std::filesystem::path& repo
                       : text(find_python(), " did not start"),
       "Install python3-matplotlib, or set RETROGRADE_PYTHON to a Python that has it; all other "
       "results are written");
+}
+
+void draw_plots(const std::filesystem::path& report) {
+  draw_plot("plot_series.py", report, report.parent_path());
 }
 
 }  // namespace apps

@@ -11,4 +11,7 @@ namespace apps {
 void draw_plot(const std::string& script, const std::filesystem::path& report,
                const std::filesystem::path& plot);
 
+// Draws what report.json lists under "plots", each beside it, by plot_series.py.
+void draw_plots(const std::filesystem::path& report);
+
 }  // namespace apps

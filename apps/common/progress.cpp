@@ -21,11 +21,25 @@ Progress::~Progress() {
 }
 
 void Progress::show(int done, const std::string& note) {
+  if (first_ < 0) {
+    first_ = done;
+    started_ = std::chrono::steady_clock::now();
+  }
   if (terminal_) return draw_bar(done, note);
   if (done < next_line_ && done < total_) return;
-  std::fprintf(out_, "%d of %d  %s\n", done, total_, note.c_str());
+  std::fprintf(out_, "%d of %d  %s%s\n", done, total_, note.c_str(), time_left(done).c_str());
   const int every = std::max(total_ / lines_in_all, 1);
   next_line_ = (done / every + 1) * every;
+}
+
+std::string Progress::time_left(int done) const {
+  if (done <= first_ || done >= total_) return {};
+  const std::chrono::duration<double> taken = std::chrono::steady_clock::now() - started_;
+  const double left = taken.count() * (total_ - done) / (done - first_);
+  char text[48];
+  std::snprintf(text, sizeof text, left < 90 ? "  %.0f s left" : "  %.0f min left",
+                left < 90 ? left : left / 60);
+  return text;
 }
 
 void Progress::draw_bar(int done, const std::string& note) {
@@ -34,7 +48,8 @@ void Progress::draw_bar(int done, const std::string& note) {
   next_draw_ = now + redraw_every;
   const int filled = static_cast<int>(static_cast<long>(bar_width) * done / total_);
   const std::string bar = std::string(filled, '#') + std::string(bar_width - filled, '.');
-  std::fprintf(out_, "\r[%s] %d of %d  %s\x1b[K", bar.c_str(), done, total_, note.c_str());
+  std::fprintf(out_, "\r[%s] %d of %d  %s%s\x1b[K", bar.c_str(), done, total_, note.c_str(),
+               time_left(done).c_str());
   std::fflush(out_);
   open_ = true;
 }

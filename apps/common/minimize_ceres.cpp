@@ -1,0 +1,81 @@
+// minimize_ceres.cpp -- L-BFGS and non-linear conjugate gradients of Ceres' gradient solver.
+//
+// Its line search shortens a step whose value is not finite: that is the safeguard. Where a line search
+// fails though the run has come forward, the solver begins again from the best point, with an empty
+// memory: an approximation of the Hessian that no longer fits is the usual cause.
+#include <ceres/gradient_problem.h>
+#include <ceres/gradient_problem_solver.h>
+#include <glog/logging.h>
+
+#include "common/minimize_run.h"
+
+namespace apps {
+
+namespace {
+
+class CeresLoss : public ceres::FirstOrderFunction {
+ public:
+  explicit CeresLoss(MinimizeRun& run) : run_(run) {}
+
+  bool Evaluate(const double* x, double* loss, double* gradient) const override {
+    const size_t size = run_.problem().size;
+    const std::span<double> g = gradient ? std::span(gradient, size) : std::span<double>();
+    *loss = run_.evaluate({x, size}, g);
+    return all_finite(*loss, g);
+  }
+  int NumParameters() const override { return static_cast<int>(run_.problem().size); }
+
+ private:
+  MinimizeRun& run_;
+};
+
+class CeresSteps : public ceres::IterationCallback {
+ public:
+  explicit CeresSteps(MinimizeRun& run) : run_(run) {}
+
+  ceres::CallbackReturnType operator()(const ceres::IterationSummary& summary) override {
+    // Iteration 0 is the start.
+    if (summary.iteration == 0) return ceres::SOLVER_CONTINUE;
+    return run_.ends_after_step(summary.cost, {}) ? ceres::SOLVER_TERMINATE_SUCCESSFULLY
+                                                  : ceres::SOLVER_CONTINUE;
+  }
+
+ private:
+  MinimizeRun& run_;
+};
+
+ceres::GradientProblemSolver::Options ceres_options(const MinimizeOptions& options, long steps) {
+  ceres::GradientProblemSolver::Options out;
+  out.line_search_direction_type =
+      options.method == Method::Lbfgs ? ceres::LBFGS : ceres::NONLINEAR_CONJUGATE_GRADIENT;
+  out.nonlinear_conjugate_gradient_type = ceres::POLAK_RIBIERE;
+  out.line_search_type = ceres::WOLFE;
+  out.max_num_iterations = static_cast<int>(steps);
+  out.gradient_tolerance = options.gradient_tolerance;
+  out.function_tolerance = options.loss_tolerance;
+  out.parameter_tolerance = 1e-16;
+  out.logging_type = ceres::SILENT;
+  return out;
+}
+
+}  // namespace
+
+void run_ceres(MinimizeRun& run, std::vector<double> x) {
+  // What it logs about a failed line search is in our report; nothing goes to standard error.
+  FLAGS_minloglevel = google::GLOG_FATAL;
+  const ceres::GradientProblem problem(new CeresLoss(run));
+  CeresSteps steps(run);
+  while (!run.ended()) {
+    const double before = run.found().loss;
+    auto options = ceres_options(run.options(), run.steps_left());
+    options.callbacks.push_back(&steps);
+    ceres::GradientProblemSolver::Summary summary;
+    ceres::Solve(options, problem, x.data(), &summary);
+    if (run.ended()) return;
+    if (summary.termination_type == ceres::CONVERGENCE) return run.end("it converged");
+    if (!(run.found().loss < before)) return run.end("no step along the line is lower");
+    x = run.found().x;
+  }
+}
+
+}  // namespace apps
