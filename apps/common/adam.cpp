@@ -39,7 +39,7 @@ bool Adam::step_of(std::span<T> x, double loss, std::span<const T> gradient) {
   RETROGRADE_ASSERT(x.size() == first_.size() && gradient.size() == first_.size(),
                     "Adam is one of ", first_.size(), " numbers");
   if (options_.safeguard) {
-    const bool finite = std::isfinite(loss) &&
+    const bool finite = std::isfinite(loss) && !(loss > options_.explosion * lowest_) &&
                         std::all_of(gradient.begin(), gradient.end(),
                                     [](T g) { return std::isfinite(static_cast<double>(g)); });
     if (!finite) {
@@ -47,6 +47,7 @@ bool Adam::step_of(std::span<T> x, double loss, std::span<const T> gradient) {
       return false;
     }
     before_.assign(x.begin(), x.end());
+    lowest_ = std::min(lowest_, loss);
   }
   const double factor = rate_factor();
   const auto t = static_cast<double>(++steps_);
@@ -79,17 +80,18 @@ void Adam::save(State& state, const std::string& name) const {
   state.arrays[name + ".second"] = second_;
   state.arrays[name + ".before"] = before_.empty() ? first_ : before_;
   state.arrays[name + ".counts"] = {static_cast<double>(steps_), static_cast<double>(refused_),
-                                    halvings_};
+                                    halvings_, lowest_};
 }
 
 void Adam::restore(const State& state, const std::string& name) {
-  const std::vector<double>& counts = state.array(name + ".counts", 3);
+  const std::vector<double>& counts = state.array(name + ".counts", 4);
   first_ = state.array(name + ".first", first_.size());
   second_ = state.array(name + ".second", second_.size());
   if (counts[0] > 0) before_ = state.array(name + ".before", first_.size());
   steps_ = static_cast<long>(counts[0]);
   refused_ = static_cast<long>(counts[1]);
   halvings_ = counts[2];
+  lowest_ = counts[3];
 }
 
 }  // namespace apps

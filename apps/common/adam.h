@@ -4,12 +4,13 @@
 //   m <- b1 m + (1 - b1) g,   v <- b2 v + (1 - b2) g^2,
 //   x <- x - rate(t) m / (1 - b1^t) / (sqrt(v / (1 - b2^t)) + epsilon)
 //
-// The safeguard is ours: where the loss or an element of the gradient is not finite, nothing is learned
-// from it. x goes back to where the last finite gradient was met, the moments are halved, as is the rate
+// The safeguard is ours: where the loss or an element of the gradient is not finite, or the loss has exploded
+// (AdamOptions::explosion), nothing is learned from it. x goes back to where the last finite gradient was met, the moments are halved, as is the rate
 // for all steps to come, and the refusal is counted. So a step that leaves the domain of the model is taken
 // back and tried again at half the length.
 #pragma once
 
+#include <cmath>
 #include <functional>
 #include <span>
 #include <string>
@@ -29,6 +30,8 @@ struct AdamOptions {
   // A factor on all rates by the number of the step, from 0; empty: 1.
   std::function<double(long step)> schedule = {};
   bool safeguard = true;
+  // A loss over so many times the lowest so far counts as not finite.
+  double explosion = INFINITY;
 };
 
 // From 1 at the first step to `last` at the last, by a constant factor.
@@ -61,6 +64,7 @@ class Adam {
   std::vector<double> first_, second_, before_;  // moments; the last x that had a finite gradient
   long steps_ = 0, refused_ = 0;
   double halvings_ = 1;
+  double lowest_ = INFINITY;  // loss so far
 };
 
 }  // namespace apps

@@ -99,10 +99,15 @@ void measure_divergence(StabilityRow& row, const Problem& problem, std::span<con
   options.safeguard = false;
   row.diverges_plain = diverging_step(minimize(problem, start, options).series);
   options.safeguard = true;
-  // A refused step is taken back: what counts is where the run is, not what it tried.
+  // A refused step is taken back: what counts is where the run stands, not what it tried.
   std::vector<LossSample> kept;
-  for (const LossSample& sample : minimize(problem, start, options).series)
-    if (std::isfinite(sample.loss)) kept.push_back(sample);
+  double lowest = INFINITY;
+  for (const LossSample& sample : minimize(problem, start, options).series) {
+    const bool refused =
+        !std::isfinite(sample.loss) || sample.loss > options.adam.explosion * lowest;
+    if (!refused) kept.push_back(sample);
+    lowest = std::fmin(lowest, sample.loss);
+  }
   row.diverges_guarded = diverging_step(kept);
 }
 

@@ -14,6 +14,7 @@
 #include <iterator>
 #include <memory>
 #include <string>
+#include <utility>
 
 #include "common/files.h"
 #include "diagnostics/error.h"
@@ -111,6 +112,18 @@ Image read_open(const std::filesystem::path& path, OIIO::ImageInput& input, int 
   return image;
 }
 
+// Row by row what OpenImageIO 2.4 names clockwise, and later ones row by row. Where LibRaw counts the two greens
+// apart, 2.4 takes their numbers for those of complementary colours, which sensors have not had since 2001.
+std::string bayer_pattern(const std::string& named) {
+  static const std::pair<const char*, const char*> names[] = {
+      {"RGBG", "RGGB"}, {"GMCY", "RGGB"}, {"GRGB", "GRBG"}, {"BGRG", "BGGR"}, {"GBGR", "GBRG"},
+      {"RGGB", "RGGB"}, {"GRBG", "GRBG"}, {"BGGR", "BGGR"}, {"GBRG", "GBRG"}};
+  for (const auto& [from, to] : names) {
+    if (named == from) return to;
+  }
+  return {};
+}
+
 Image spread_gray(const Image& gray) {
   Image image{gray.width, gray.height, gray.bits, {}};
   image.pixels.resize(image.elems());
@@ -206,8 +219,8 @@ Mosaic read_mosaic(const std::filesystem::path& path) {
     refuse_read(path, "a mosaic has one channel, as a sensor or a gray image has",
                 text("it has ", spec.nchannels), "Give a RAW photograph or a gray image");
   }
-  const std::string pattern = spec.get_string_attribute("raw:FilterPattern");
-  return {read_open(path, *input, 1), pattern};
+  return {read_open(path, *input, 1),
+          bayer_pattern(spec.get_string_attribute("raw:FilterPattern"))};
 }
 
 std::vector<std::filesystem::path> images_in(const std::filesystem::path& folder) {
@@ -225,6 +238,58 @@ std::vector<std::filesystem::path> images_in(const std::filesystem::path& folder
                          "it must be a folder with images in it",
                          failed ? failed.message() : std::string("none of its files is one"),
                          "Give a folder of photographs");
+}
+
+namespace {
+
+// What a pixel of the result takes from the pixels of a line, from `first` on; the weights sum to 1.
+struct Tap {
+  int first;
+  std::vector<float> weights;
+};
+
+std::vector<Tap> taps_of(int from, int to) {
+  std::vector<Tap> taps;
+  const double step = static_cast<double>(from) / to, reach = std::max(step, 1.0);
+  for (int n = 0; n < to; ++n) {
+    const double middle = (n + 0.5) * step - 0.5;
+    Tap tap{static_cast<int>(std::ceil(middle - reach)), {}};
+    double sum = 0;
+    for (int k = tap.first; k <= middle + reach; ++k) {
+      const double weight = std::max(1 - std::abs(k - middle) / reach, 0.0);
+      tap.weights.push_back(static_cast<float>(weight));
+      sum += weight;
+    }
+    for (float& weight : tap.weights) weight /= static_cast<float>(sum);
+    taps.push_back(std::move(tap));
+  }
+  return taps;
+}
+
+// Along x; the image comes out transposed, so that twice is along both.
+Image resized_and_transposed(const Image& image, int width) {
+  Image out{image.height, width, image.bits, {}, image.channels};
+  out.pixels.resize(out.elems());
+  const std::vector<Tap> taps = taps_of(image.width, width);
+  const int channels = image.channels;
+  for (int x = 0; x < width; ++x) {
+    const Tap& tap = taps[x];
+    for (int y = 0; y < image.height; ++y) {
+      float* to = &out.pixels[(static_cast<size_t>(x) * image.height + y) * channels];
+      for (size_t k = 0; k < tap.weights.size(); ++k) {
+        const int at = std::clamp(tap.first + static_cast<int>(k), 0, image.width - 1);
+        const float* from = &image.pixels[(static_cast<size_t>(y) * image.width + at) * channels];
+        for (int c = 0; c < channels; ++c) to[c] += tap.weights[k] * from[c];
+      }
+    }
+  }
+  return out;
+}
+
+}  // namespace
+
+Image resized(const Image& image, int width, int height) {
+  return resized_and_transposed(resized_and_transposed(image, width), height);
 }
 
 void write_image(const std::filesystem::path& path, const Image& image) {

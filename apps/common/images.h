@@ -41,6 +41,10 @@ Mosaic read_mosaic(const std::filesystem::path& path);
 // retrograde::UserError when it is no folder or holds none.
 std::vector<std::filesystem::path> images_in(const std::filesystem::path& folder);
 
+// The image at another size: a triangle filter, as wide as a pixel of the coarser of the two (P. Heckbert,
+// Fundamentals of Texture Mapping and Image Warping, 1989, section 3.5), edges repeated.
+Image resized(const Image& image, int width, int height);
+
 // By the suffix: .png with 8 bits a sample, or 16 when the image came with more than 8 (clamped to
 // [0, 1]); .exr, .tif, .tiff and .hdr as floats, .jpg with 8 bits. Throws retrograde::UserError;
 // see write_file.

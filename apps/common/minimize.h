@@ -42,6 +42,7 @@ struct MinimizeOptions {
   double gradient_tolerance = 1e-10;  // of its largest element
   double loss_tolerance = 0;          // relative change over a step; 0: go on
   double rate = 1e-2;                 // of Adam
+  int memory = 20;                    // steps that L-BFGS remembers
   AdamOptions adam = {};
   bool safeguard = true;    // false only to show what it is for
   Adam* moments = nullptr;  // Adam goes on with these, which the caller saves; its steps count

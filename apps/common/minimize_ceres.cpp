@@ -49,6 +49,7 @@ ceres::GradientProblemSolver::Options ceres_options(const MinimizeOptions& optio
   out.line_search_direction_type =
       options.method == Method::Lbfgs ? ceres::LBFGS : ceres::NONLINEAR_CONJUGATE_GRADIENT;
   out.nonlinear_conjugate_gradient_type = ceres::POLAK_RIBIERE;
+  out.max_lbfgs_rank = options.memory;
   out.line_search_type = ceres::WOLFE;
   out.max_num_iterations = static_cast<int>(steps);
   out.gradient_tolerance = options.gradient_tolerance;

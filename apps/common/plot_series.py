@@ -22,23 +22,25 @@ def drawable(series, plot):
 
 
 def add_series(axes, series, plot):
+    """Whether there was anything to draw."""
     points = list(drawable(series, plot))
     xs, ys = [p[1] for p in points], [p[2] for p in points]
     if not series["labels"]:
         axes.plot(xs, ys, label=series["name"], marker="." if len(points) < 3 else None)
-        return
+        return bool(points)
     axes.plot(xs, ys, "o", label=series["name"])
     for n, x, y in points:
         axes.annotate(series["labels"][n], (x, y), textcoords="offset points", xytext=(5, 4), fontsize=8)
+    return bool(points)
 
 
 def draw(plot, path):
     figure, axes = plt.subplots(figsize=(8, 5), dpi=120)
-    for series in plot["series"]:
-        add_series(axes, series, plot)
-    if plot["log_x"]:
+    # Axes without a point cannot be logarithmic.
+    drawn = [add_series(axes, series, plot) for series in plot["series"]]
+    if plot["log_x"] and any(drawn):
         axes.set_xscale("log")
-    if plot["log_y"]:
+    if plot["log_y"] and any(drawn):
         axes.set_yscale("log")
     axes.set_xlabel(plot["x_label"])
     axes.set_ylabel(plot["y_label"])

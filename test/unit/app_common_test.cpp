@@ -259,6 +259,16 @@ TEST_F(AppReport, HasACommonHeadAndAPlot) {
   EXPECT_EQ(plot.height, 600);
 }
 
+TEST_F(AppReport, APlotWithoutPointsIsDrawnToo) {
+  apps::CommonOptions options;
+  options.output = folder_.path();
+  apps::Report report("none", options);
+  report.add_plot(
+      {.title = "nothing", .log_x = true, .log_y = true, .series = {{"empty", {}, {}}}});
+  report.write(0, false);
+  EXPECT_EQ(apps::read_image(folder_.path() / "error_vs_time.png").width, 960);
+}
+
 TEST_F(AppReport, TablesBecomeMarkdown) {
   const apps::Table table{"t", {"a", "b"}, {{"x", 0.00012345}, {3, nullptr}}};
   EXPECT_EQ(table.to_markdown(), "| a | b |\n|---|---|\n| x | 0.0001234 |\n| 3 | - |\n");

@@ -15,6 +15,96 @@ namespace {
 
 namespace fs = std::filesystem;
 
+// A RAW file as small as one can be: Adobe's DNG (Digital Negative Specification 1.4, chapter 4), which is
+// TIFF with the tags of a colour filter array. The samples are those of a sensor "RGGB".
+class SmallDng {
+ public:
+  SmallDng(int width, int height, const std::vector<uint16_t>& samples) {
+    number(254, 4, {0});  // the full image
+    number(256, 4, {static_cast<uint32_t>(width)});
+    number(257, 4, {static_cast<uint32_t>(height)});
+    number(258, 3, {16});
+    number(259, 3, {1});
+    number(262, 3, {32803});  // a colour filter array
+    words(271, "Retrograde");
+    words(272, "Test");
+    const size_t place = number(273, 4, {0});
+    number(274, 3, {1});
+    number(277, 3, {1});
+    number(278, 4, {static_cast<uint32_t>(height)});
+    number(279, 4, {static_cast<uint32_t>(2 * samples.size())});
+    number(284, 3, {1});
+    number(33421, 3, {2, 2});
+    number(33422, 1, {0, 1, 1, 2});
+    number(50706, 1, {1, 4, 0, 0});
+    words(50708, "Retrograde Test");
+    number(50710, 1, {0, 1, 2});  // red, green, blue
+    number(50711, 3, {1});
+    number(50714, 3, {0});
+    number(50717, 4, {65535});
+    number(50721, 10, {1, 1, 0, 1, 0, 1, 0, 1, 1, 1, 0, 1, 0, 1, 0, 1, 1, 1});
+    number(50728, 5, {1, 1, 1, 1, 1, 1});
+    number(50778, 3, {21});
+    finish(place, samples);
+  }
+  const std::string& bytes() const { return bytes_; }
+
+ private:
+  struct Entry {
+    uint16_t tag, type;
+    uint32_t count;
+    std::string data;
+  };
+  size_t number(uint16_t tag, uint16_t type, const std::vector<uint32_t>& values) {
+    const size_t each = type == 1 ? 1 : type == 3 ? 2 : 4;
+    const size_t parts = type == 5 || type == 10 ? 2 : 1;  // rationals
+    Entry entry{tag, type, static_cast<uint32_t>(values.size() / parts), {}};
+    for (const uint32_t value : values)
+      entry.data.append(reinterpret_cast<const char*>(&value), each);  // little-endian
+    entries_.push_back(entry);
+    return entries_.size() - 1;
+  }
+  void words(uint16_t tag, const std::string& text) {
+    entries_.push_back({tag, 2, static_cast<uint32_t>(text.size() + 1), text + '\0'});
+  }
+  template <typename T>
+  void append(T value) {
+    bytes_.append(reinterpret_cast<const char*>(&value), sizeof value);
+  }
+  // Head, directory, what does not fit into its entries, samples.
+  void finish(size_t place, const std::vector<uint16_t>& samples) {
+    const uint32_t behind = 8 + 2 + 12 * static_cast<uint32_t>(entries_.size()) + 4;
+    std::string rest;
+    for (Entry& entry : entries_) entry.data.resize(std::max<size_t>(entry.data.size(), 4));
+    uint32_t after = behind;
+    for (const Entry& entry : entries_)
+      after += entry.data.size() > 4 ? static_cast<uint32_t>(entry.data.size() + 1) / 2 * 2 : 0;
+    entries_[place].data.assign(reinterpret_cast<const char*>(&after), 4);
+    bytes_ = "II*";
+    bytes_ += '\0';
+    append<uint32_t>(8);
+    append(static_cast<uint16_t>(entries_.size()));
+    for (const Entry& entry : entries_) {
+      append(entry.tag);
+      append(entry.type);
+      append(entry.count);
+      if (entry.data.size() == 4) {
+        bytes_ += entry.data;
+        continue;
+      }
+      append(static_cast<uint32_t>(behind + rest.size()));
+      rest += entry.data;
+      if (rest.size() % 2) rest += '\0';
+    }
+    append<uint32_t>(0);
+    bytes_ += rest;
+    for (const uint16_t sample : samples) append(sample);
+  }
+
+  std::vector<Entry> entries_;
+  std::string bytes_;
+};
+
 void expect_pixels(const apps::Image& image, const std::vector<float>& expected) {
   ASSERT_EQ(image.pixels.size(), expected.size());
   for (size_t n = 0; n < expected.size(); ++n) EXPECT_FLOAT_EQ(image.pixels[n], expected[n]);
@@ -132,6 +222,36 @@ TEST_F(AppImages, AGrayImageIsAMosaic) {
   EXPECT_NEAR(mosaic.image.pixels[1], 0.25f, 1e-4);
   EXPECT_THROW(apps::read_mosaic(store("b.png", 1, 1, 3, OIIO::TypeDesc::UINT8, {0, 0, 0})),
                retrograde::UserError);
+}
+
+TEST_F(AppImages, ARawFileGivesWhatTheSensorSawOrAPhotograph) {
+  const int width = 64, height = 48;
+  std::vector<uint16_t> samples;
+  for (int n = 0; n < width * height; ++n)
+    samples.push_back(static_cast<uint16_t>(10000 + n % width * 500 + n / width * 100));
+  apps::write_file(folder_ / "a.dng", SmallDng(width, height, samples).bytes());
+  const apps::Mosaic mosaic = apps::read_mosaic(folder_ / "a.dng");
+  EXPECT_EQ(mosaic.pattern, "RGGB");
+  ASSERT_EQ(mosaic.image.pixels.size(), samples.size());
+  for (size_t n = 0; n < samples.size(); ++n)
+    EXPECT_NEAR(mosaic.image.pixels[n], static_cast<float>(samples[n]) / 65535.0f, 1e-6) << n;
+  const apps::Image photo = apps::read_image(folder_ / "a.dng");
+  EXPECT_EQ(photo.width, width);
+  EXPECT_EQ(photo.channels, 3);
+}
+
+TEST_F(AppImages, ResizingKeepsMeansAndRamps) {
+  apps::Image ramp{12, 6, 32, {}, 2};
+  for (int y = 0; y < 6; ++y)
+    for (int x = 0; x < 12; ++x) ramp.pixels.insert(ramp.pixels.end(), {x / 12.0f, y / 6.0f});
+  EXPECT_EQ(apps::resized(ramp, 12, 6).pixels, ramp.pixels);
+  const apps::Image half = apps::resized(ramp, 6, 3);
+  ASSERT_EQ(half.width, 6);
+  ASSERT_EQ(half.height, 3);
+  for (int x = 1; x < 5; ++x) EXPECT_NEAR(half.pixels[2 * (6 + x)], (2 * x + 0.5f) / 12, 1e-6);
+  EXPECT_NEAR(half.pixels[2 * (6 + 2) + 1], 2.5f / 6, 1e-6);
+  const apps::Image twice = apps::resized(ramp, 24, 12);
+  for (int x = 2; x < 22; ++x) EXPECT_NEAR(twice.pixels[2 * (24 * 5 + x)], (x - 0.5f) / 24, 1e-6);
 }
 
 TEST_F(AppImages, AFolderGivesItsImagesInOrder) {

@@ -180,6 +180,15 @@ TEST(AppAdam, ARefusedStepIsTakenBackAndHalved) {
   EXPECT_GT(x[0], 4.5);
 }
 
+TEST(AppAdam, ALossThatExplodesIsRefusedWhereThatIsAskedFor) {
+  apps::Adam adam({{1, 1.0}}, {.explosion = 100});
+  std::vector<double> x{5};
+  EXPECT_TRUE(adam.step(x, 2.0, std::vector<double>{1}));
+  EXPECT_TRUE(adam.step(x, 199.0, std::vector<double>{1}));
+  EXPECT_FALSE(adam.step(x, 201.0, std::vector<double>{1}));
+  EXPECT_EQ(adam.refused(), 1);
+}
+
 TEST(AppAdam, WithoutSafeguardANaNStays) {
   apps::Adam adam({{1, 1.0}}, {.safeguard = false});
   std::vector<double> x{5};
