@@ -9,7 +9,9 @@
 #include <chrono>
 #include <cmath>
 #include <numeric>
+#include <string>
 
+#include "common/stop.h"
 #include "diagnostics/error.h"
 #include "peer.h"
 #include "render.h"
@@ -84,6 +86,27 @@ class PeerRun {
   std::optional<Peer> peer_;
 };
 
+apps::State state_of(const Trainer& trainer) {
+  apps::State state;
+  state.program = "bilateral_slice";
+  state.step = trainer.steps();
+  int n = 0;
+  for (const Trainer::Buffer& buffer : trainer.state())
+    state.arrays["array" + std::to_string(n++)].assign(buffer.begin(), buffer.end());
+  return state;
+}
+
+void restore(Trainer& trainer, const apps::State& state) {
+  int n = 0;
+  for (Trainer::Buffer& buffer : trainer.state()) {
+    const auto& from = state.array("array" + std::to_string(n++),
+                                   static_cast<size_t>(buffer.number_of_elements()));
+    size_t at = 0;
+    for (float& value : buffer) value = static_cast<float>(from[at++]);
+  }
+  trainer.set_steps(static_cast<int>(state.step));
+}
+
 }  // namespace
 
 void Series::add(double step_loss, double step_seconds) {
@@ -96,6 +119,7 @@ double Series::total_seconds() const {
 }
 
 double Series::median_ms() const {
+  if (seconds.empty()) return 0;  // a run that was resumed at its end
   std::vector<double> sorted = seconds;
   const auto middle = sorted.begin() + static_cast<long>(sorted.size() / 2);
   std::nth_element(sorted.begin(), middle, sorted.end());
@@ -108,9 +132,14 @@ Fit fit(const Shape& shape, std::vector<float>& photo, std::vector<float>& targe
   const auto start = Clock::now();
   Trainer trainer(shape, photo.data(), target.data(), options.threads);
   fit.ours.compile_seconds = seconds_since(start);
+  if (options.resume) restore(trainer, *options.resume);
   PeerRun peer(shape, photo, target, options, fit);
 
-  for (int first = 0; first < options.steps; first += block_steps) {
+  const auto time_is_over = [&] {
+    return options.seconds > 0 && fit.ours.total_seconds() >= options.seconds;
+  };
+  for (int first = trainer.steps();
+       first < options.steps && !apps::stop_requested() && !time_is_over(); first += block_steps) {
     const int count = std::min(block_steps, options.steps - first);
     for (int step = first; step < first + count; ++step) {
       const auto before = Clock::now();
@@ -120,6 +149,9 @@ Fit fit(const Shape& shape, std::vector<float>& photo, std::vector<float>& targe
     }
     peer.run_block(first, count);
   }
+  fit.stopped = apps::stop_requested();
+  fit.state = state_of(trainer);
+  fit.look = look_of(shape, trainer);
   fit.result.resize(3 * shape.pixels());
   render(shape, photo.data(), trainer.grid(), trainer.mix(), trainer.curve(), fit.result.data());
   return fit;

@@ -5,18 +5,25 @@
 #include <string>
 #include <vector>
 
+#include "batch.h"
+#include "common/checks.h"
 #include "common/files.h"
 #include "common/images.h"
 #include "common/plots.h"
 #include "common/process.h"
 #include "common/progress.h"
+#include "common/report.h"
 #include "common/run_app.h"
+#include "common/state.h"
 #include "diagnostics/error.h"
 #include "fit.h"
 #include "gradient_check.h"
+#include "look.h"
 #include "options.h"
+#include "pairs.h"
 #include "report.h"
-#include "tone_edit.h"
+#include "stability.h"
+#include "training_pipeline.h"
 
 namespace bilateral_slice {
 
@@ -24,100 +31,39 @@ using retrograde::text;
 
 namespace {
 
-using Planes = std::vector<float>;
-
-// Three colour planes, and a fourth of ones when `homogeneous`.
-Planes to_planes(const apps::Image& image, bool homogeneous) {
-  const long pixels = static_cast<long>(image.width) * image.height;
-  Planes planes((homogeneous ? 4 : 3) * pixels, 1.0f);
-  for (int c = 0; c < 3; ++c) {
-    for (long p = 0; p < pixels; ++p) planes[c * pixels + p] = image.pixels[3 * p + c];
-  }
-  return planes;
+Pair read_given_pair(const Options& options) {
+  Pair pair = read_pair(options.input, options.target);
+  if (options.grid > 0) pair.shape.grid_x = pair.shape.grid_y = options.grid;
+  return pair;
 }
 
 void write_planes(const std::filesystem::path& path, const Shape& shape, const Planes& planes,
                   int bits) {
-  apps::Image image{shape.width, shape.height, bits, {}};
-  image.pixels.resize(image.elems());
-  for (int c = 0; c < 3; ++c) {
-    for (long p = 0; p < shape.pixels(); ++p) {
-      image.pixels[3 * p + c] = planes[c * shape.pixels() + p];
-    }
-  }
-  apps::write_png(path, image);
-}
-
-double mean_squared_difference(const Planes& a, const Planes& b, long samples) {
-  double sum = 0;
-  for (long n = 0; n < samples; ++n) {
-    const double d = static_cast<double>(a[n]) - b[n];
-    sum += d * d;
-  }
-  return sum / static_cast<double>(samples);
-}
-
-// The photo, and what it shall look like.
-struct Pair {
-  Shape shape;
-  int bits = 8;
-  Planes photo, target;
-};
-
-void require_same_size(const Options& options, const apps::Image& a, const apps::Image& b) {
-  if (a.width == b.width && a.height == b.height) return;
-  retrograde::call_error(
-      text("learn how ", retrograde::quoted(options.input.string()), " becomes ",
-           retrograde::quoted(options.target.string())),
-      "input and target must have the same size",
-      text("they have ", a.width, " x ", a.height, " and ", b.width, " x ", b.height, " pixels"),
-      "Resize or crop one of them");
-}
-
-apps::Image read_photo(const std::filesystem::path& path) {
-  apps::Image image = apps::read_image(path);
-  if (image.width < 4 || image.height < 4) {
-    retrograde::call_error(
-        text("learn a look from ", retrograde::quoted(path.string())),
-        "a grid is interpolated along both axes: a photo has at least 4 x 4 pixels",
-        text("it has ", image.width, " x ", image.height), "Give a larger photo");
-  }
-  return image;
-}
-
-Pair read_pair(const Options& options) {
-  Pair pair;
-  const apps::Image input = read_photo(options.input);
-  pair.shape = {.width = input.width, .height = input.height};
-  pair.bits = input.bits;
-  if (options.target.empty()) {
-    pair.photo = to_planes(input, true);
-    pair.target.resize(3 * pair.shape.pixels());
-    tone_edit(pair.shape, pair.photo.data(), pair.target.data());
-    return pair;
-  }
-  const apps::Image target = apps::read_image(options.target);
-  require_same_size(options, input, target);
-  pair.bits = std::max(input.bits, target.bits);
-  pair.photo = to_planes(input, true);
-  pair.target = to_planes(target, false);
-  return pair;
+  apps::write_png(path, to_image(shape, planes, bits));
 }
 
 Fit fit_with_progress(const Options& options, Pair& pair) {
-  apps::Progress progress(stderr, options.steps);
-  return fit(pair.shape, pair.photo, pair.target,
-             {options.steps, options.threads, options.halide_seconds}, [&](int step, double loss) {
-               char note[32];
-               std::snprintf(note, sizeof note, "%.2f dB", psnr_db(loss));
-               progress.show(step, note);
-             });
+  apps::Progress progress(stderr, static_cast<int>(options.steps));
+  FitOptions how;
+  how.steps = static_cast<int>(options.steps);
+  how.threads = options.threads;
+  how.seconds = options.seconds;
+  how.peer_seconds = options.halide_seconds;
+  if (options.resume)
+    how.resume = apps::read_state(options.output / "state.bin", "bilateral_slice");
+  return fit(pair.shape, pair.photo, pair.target, how, [&](int step, double loss) {
+    char note[32];
+    std::snprintf(note, sizeof note, "%.2f dB", psnr_db(loss));
+    progress.show(step, note);
+  });
 }
 
 void write_results(const Options& options, const Pair& pair, const Fit& fit, const Report& report) {
   write_planes(options.output / "input.png", pair.shape, pair.photo, pair.bits);
   write_planes(options.output / "target.png", pair.shape, pair.target, pair.bits);
   write_planes(options.output / "result.png", pair.shape, fit.result, pair.bits);
+  write_look(options.output / "look.bin", fit.look);
+  apps::write_state(options.output / "state.bin", fit.state);
   write_report(options.output / "report.json", report, fit);
   apps::draw_plot("plot_error_against_time.py", options.output / "report.json",
                   options.output / "error_against_time.png");
@@ -131,7 +77,7 @@ void print_summary(const Options& options, const Report& report, const Fit& fit)
     std::printf(", Halide 14 %.1f ms: %.2f times", fit.peer.median_ms(),
                 fit.peer.median_ms() / fit.ours.median_ms());
   }
-  std::printf("\nresults in %s\n", options.output.c_str());
+  std::printf("%s\nresults in %s\n", fit.stopped ? "; it was stopped" : "", options.output.c_str());
   if (!fit.why_no_peer.empty()) std::fprintf(stderr, "%s\n", fit.why_no_peer.c_str());
 }
 
@@ -153,11 +99,40 @@ void check_gradients(const Options& options, const Pair& pair) {
               plot.c_str());
 }
 
+// --apply
+void apply_look(const Options& options) {
+  const Look look = read_look(options.apply);
+  const apps::Image photo = apps::read_image(options.input);
+  const Shape shape{.width = photo.width, .height = photo.height};
+  Planes planes = to_planes(photo, true);
+  write_planes(options.output / "result.png", shape, through_look(look, shape, planes), photo.bits);
+  std::printf("the photo through the look is %s\n", (options.output / "result.png").c_str());
+}
+
+void explain(const Pair& pair) {
+  std::printf("a grid of %d x %d x %d nodes over %d x %d pixels\n%s\n", pair.shape.grid_x,
+              pair.shape.grid_y, pair.shape.grid_z, pair.shape.width, pair.shape.height,
+              TrainingPipeline(pair.shape).adjoints.explain().c_str());
+}
+
+// --check-stability
+void write_stability(const Options& options) {
+  apps::Report report("bilateral_slice", options);
+  const apps::Table table = apps::stability_table(check_stability());
+  report.add_table(table);
+  report.write(0, false);
+  std::fputs(table.to_markdown().c_str(), stdout);
+}
+
 void run(const Options& options) {
   apps::require_writable_folder(options.output);
   const apps::ThreadLimit threads(options.threads);
   const auto start = std::chrono::steady_clock::now();
-  Pair pair = read_pair(options);
+  if (!options.apply.empty()) return apply_look(options);
+  if (!options.pairs.empty()) return learn_from_pairs(options);
+  if (options.check_stability) return write_stability(options);
+  Pair pair = read_given_pair(options);
+  if (options.explain) explain(pair);
   if (options.check_gradients) return check_gradients(options, pair);
   Report report;
   report.shape = pair.shape;

@@ -4,14 +4,15 @@
 #include <filesystem>
 #include <optional>
 
+#include "common/options.h"
+
 namespace bilateral_slice {
 
-struct Options {
-  std::filesystem::path input, output;
+struct Options : apps::CommonOptions {
   std::filesystem::path target;  // empty: the built-in edit
-  int steps = 200;
-  int threads = 0;
-  bool check_gradients = false;  // instead of learning
+  std::filesystem::path pairs;   // a folder to learn one look from
+  std::filesystem::path apply;   // a look that was learned, for --input
+  int grid = 0;                  // nodes along each side of the photo; 0: 64, or 3 for many photos
   double halide_seconds = 90;    // the peer stops after this long; 0 leaves it out
 };
 

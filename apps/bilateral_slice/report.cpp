@@ -69,6 +69,7 @@ void write_report(const std::filesystem::path& path, const Report& report, const
       {"grid", {report.shape.grid_x, report.shape.grid_y, report.shape.grid_z, 12}},
       {"threads", report.threads},
       {"steps", fit.ours.seconds.size()},
+      {"stopped", fit.stopped},
       {"seconds", report.seconds},
       {"ms_per_step", ours},
       {"psnr_initial_db", report.psnr_initial_db},

@@ -39,6 +39,23 @@ void Trainer::start_from_identity() {
   curve_[0].value(0) = 1.0f;
 }
 
+void Trainer::set_pair(float* photo, float* target) {
+  const Shape& shape = training_.model.shape;
+  photo_ = Buffer(photo, shape.width, shape.height, 4);
+  target_ = Buffer(target, shape.width, shape.height, 3);
+  training_.model.photo.set(photo_);
+  training_.model.target.set(target_);
+}
+
+std::vector<Trainer::Buffer> Trainer::state() const {
+  std::vector<Buffer> all;
+  for (const State* state : {&grid_, &mix_, &curve_}) {
+    const Moments& now = (*state)[now_];
+    all.insert(all.end(), {now.value, now.moment, now.square});
+  }
+  return all;
+}
+
 void Trainer::bind(Learned& learned, const State& state) {
   learned.value.set(state[now_].value);
   learned.moment.set(state[now_].moment);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <vector>
 
 #include "training_pipeline.h"
 
@@ -13,6 +14,9 @@ class Trainer {
   // look is the identity, with the mean of the colours as guide.
   Trainer(const Shape& shape, float* photo, float* target, int threads);
 
+  // Goes on with another pair of the same shape.
+  void set_pair(float* photo, float* target);
+
   // One step of Adam at this rate. Returns the loss before it.
   double step(float rate);
 
@@ -20,6 +24,12 @@ class Trainer {
   const Buffer& grid() const { return grid_[now_].value; }
   const Buffer& mix() const { return mix_[now_].value; }
   const Buffer& curve() const { return curve_[now_].value; }
+
+  // All that the next step reads: grid, mix and curve, each with its moments. Who fills them in says
+  // how many steps led there.
+  std::vector<Buffer> state() const;
+  int steps() const { return steps_; }
+  void set_steps(int steps) { steps_ = steps; }
 
  private:
   struct Moments {

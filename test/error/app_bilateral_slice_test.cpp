@@ -163,6 +163,32 @@ TEST_F(BilateralSliceErrors, InputAndOutputAreNeeded) {
   expect_refused({"understand the command line", "--output is required"});
 }
 
+TEST_F(BilateralSliceErrors, AFolderTakesThePlaceOfThePhoto) {
+  run_on(photo_, "--pairs " + folder_.string());
+  expect_refused({"--pairs takes its place", "both are given"});
+  run("--output " + out().string() + " --pairs " + (folder_ / "nowhere").string());
+  expect_refused({"must be a folder with images in it"});
+  fs::create_directories(folder_ / "alone");
+  fs::copy_file(photo_, folder_ / "alone" / "photo.png");
+  run("--output " + out().string() + " --pairs " + (folder_ / "alone").string());
+  expect_refused({"learned from and others held out", "it has 1"});
+  expect_no_results();
+}
+
+TEST_F(BilateralSliceErrors, OtherFilesAreNoLooks) {
+  run_on(photo_, "--apply " + photo_.string());
+  expect_refused({"photo.png", "does not begin as a state does"});
+  run_on(photo_, "--apply " + (folder_ / "nowhere").string());
+  expect_refused({"no such file can be read"});
+  expect_no_results();
+}
+
+TEST_F(BilateralSliceErrors, ARunThatNeverWasCannotGoOn) {
+  run_on(photo_, "--resume");
+  expect_refused({"resume from", "state.bin"});
+  expect_no_results();
+}
+
 TEST_F(BilateralSliceErrors, UnknownOptionsAreRefused) {
   run_on(photo_, "--sepia");
   expect_refused({"understand the command line", "--sepia"});

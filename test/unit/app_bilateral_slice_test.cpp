@@ -100,6 +100,49 @@ TEST_F(BilateralSlice, TheResultDoesNotDependOnTheThreads) {
   EXPECT_EQ(run(one)["retrograde"]["psnr_db"], run(three)["retrograde"]["psnr_db"]);
 }
 
+TEST_F(BilateralSlice, GoesOnWhereItWasToTheSameResult) {
+  const auto photo = write_photo("photo.png", 64, 48);
+  const std::vector<std::string> common{"--input",          photo, "--threads", "1",
+                                        "--halide-seconds", "0"};
+  const auto with = [&](std::vector<std::string> more) {
+    more.insert(more.begin(), common.begin(), common.end());
+    return run(more);
+  };
+  const auto whole = with({"--steps", "20"});
+  // A tenth of a microsecond is over after the first block of five steps.
+  EXPECT_EQ(with({"--steps", "20", "--seconds", "1e-7"})["steps"], 5);
+  const auto rest = with({"--steps", "20", "--resume"});
+  EXPECT_EQ(rest["steps"], 15);
+  EXPECT_EQ(rest["psnr_final_db"], whole["psnr_final_db"]);
+}
+
+TEST_F(BilateralSlice, StopsInGoodOrder) {
+  const auto photo = write_photo("photo.png", 64, 48);
+  const apps::Outcome outcome = apps::run_program(
+      {"timeout", "--preserve-status", "-s", "INT", "3", BILATERAL_SLICE_PROGRAM, "--input", photo,
+       "--output", folder_ / "out", "--steps", "1000000", "--halide-seconds", "0"});
+  EXPECT_EQ(outcome.status, 0) << outcome.output;
+  EXPECT_NE(outcome.output.find("it was stopped"), std::string::npos) << outcome.output;
+  std::ifstream file(folder_ / "out" / "report.json");
+  EXPECT_EQ(nlohmann::json::parse(file)["stopped"], true);
+}
+
+TEST_F(BilateralSlice, ItsGradientIsStableWhereTheGridIsEmpty) {
+  const apps::Outcome outcome =
+      apps::run_program({BILATERAL_SLICE_PROGRAM, "--output", folder_ / "out", "--input",
+                         write_photo("photo.png", 8, 8), "--check-stability"});
+  ASSERT_EQ(outcome.status, 0) << outcome.output;
+  std::ifstream file(folder_ / "out" / "report.json");
+  const auto rows = nlohmann::json::parse(file)["tables"][0]["rows"];
+  EXPECT_GE(rows.size(), 7u);
+  for (const auto& row : rows) {
+    ASSERT_TRUE(row[1].is_number()) << row.dump();
+    EXPECT_LT(row[1], 1e-4) << row.dump();
+    EXPECT_LT(row[2], 1e-3) << row.dump();
+    EXPECT_EQ(row[4], "never") << row.dump();
+  }
+}
+
 TEST_F(BilateralSlice, ChecksItsGradientsInsteadOfLearning) {
   const auto photo = write_photo("photo.png", 60, 50);
   const apps::Outcome outcome =

@@ -1,0 +1,34 @@
+// pairs.h -- photographs as planes, and what they shall look like.
+#pragma once
+
+#include <filesystem>
+#include <vector>
+
+#include "common/images.h"
+#include "shape.h"
+
+namespace bilateral_slice {
+
+using Planes = std::vector<float>;
+
+// The photo, and what it shall look like. Layouts as for Trainer.
+struct Pair {
+  Shape shape;
+  int bits = 8;
+  Planes photo, target;
+};
+
+// Three colour planes, and a fourth of ones when `homogeneous`.
+Planes to_planes(const apps::Image& image, bool homogeneous);
+apps::Image to_image(const Shape& shape, const Planes& planes, int bits);
+
+// Without a target: the built-in edit. Throws retrograde::UserError when an image cannot be read, is too
+// small, or the sizes differ.
+Pair read_pair(const std::filesystem::path& photo, const std::filesystem::path& target);
+
+// Both at another size.
+Pair resized(const Pair& pair, int width, int height);
+
+double mean_squared_difference(const Planes& a, const Planes& b, long samples);
+
+}  // namespace bilateral_slice
