@@ -1,0 +1,117 @@
+// options.cpp -- see options.h.
+#include "options.h"
+
+#include <CLI/CLI.hpp>
+#include <string>
+
+#include "diagnostics/error.h"
+
+namespace fluid {
+
+using retrograde::quoted;
+using retrograde::text;
+
+namespace {
+
+struct Words {
+  std::vector<std::string> methods{"adam"};
+  std::string solver = "direct";
+};
+
+void add_scene_options(CLI::App& cli, Options& o) {
+  cli.add_option("--start", o.start,
+                 "picture of the smoke at the start; without it, a disc with the input's amount");
+  cli.add_option("--frames", o.frames, "frames from the start to the picture")
+      ->capture_default_str();
+  cli.add_option("--cells", o.cells, "cells along the longer side; 0: the picture's pixels")
+      ->capture_default_str();
+  cli.add_option("--force-nodes", o.force_nodes,
+                 "nodes of the force along the longer side; 0: one in each cell")
+      ->capture_default_str();
+  cli.add_option("--force-from", o.force_from, "state.bin of a run whose force is taken");
+  cli.add_option("--swirl", o.swirl, "speed of a vortex at the start, sides a second")
+      ->capture_default_str();
+  cli.add_option("--time-step", o.physics.time_step, "seconds a frame")->capture_default_str();
+  cli.add_option("--viscosity", o.physics.viscosity, "sides squared a second; 0: none")
+      ->capture_default_str();
+  cli.add_option("--diffusion", o.physics.diffusion, "of the smoke, alike; 0: none")
+      ->capture_default_str();
+}
+
+void add_solution_options(CLI::App& cli, Options& o, Words& words) {
+  cli.add_option("--reach", o.reach, "how far off smoke is told where to go, in sides")
+      ->capture_default_str();
+  cli.add_option("--effort", o.effort, "weight of the mean squared force")->capture_default_str();
+  cli.add_option("--method", words.methods,
+                 "adam, lbfgs or conjugate_gradient; of several the best result counts")
+      ->delimiter(',')
+      ->capture_default_str();
+  cli.add_option("--rate", o.rate, "of Adam: how far the force moves in a step")
+      ->capture_default_str();
+  cli.add_option("--solver", words.solver, "of pressure and diffusion: direct or jacobi")
+      ->capture_default_str();
+  cli.add_option("--iterations", o.iterations, "of jacobi")->capture_default_str();
+}
+
+Solver solver_named(const std::string& name) {
+  if (name == "direct") return Solver::Direct;
+  if (name == "jacobi") return Solver::Jacobi;
+  retrograde::call_error(text("solve by ", quoted(name)), "a solver is direct or jacobi",
+                         "this is neither", "Give one of these names");
+}
+
+// What is optimized as a logarithm needs a start over 0.
+void require_start(const Options& o, const char* group, const char* option, double value) {
+  if (!apps::optimizes(o.common, group) || value > 0) return;
+  retrograde::call_error(
+      text("optimize the ", group, " from ", option, " ", value),
+      "it is changed by factors, so that it stays positive",
+      "there are no factors that lead away from 0",
+      text("Give ", option, " a small number over 0, or leave ", group, " out of --optimize"));
+}
+
+void check(const Options& o) {
+  apps::require_in_range("--frames", o.frames, 1, 100'000);
+  if (o.cells != 0) apps::require_in_range("--cells", o.cells, 4, 10'000);
+  if (o.force_nodes != 0) apps::require_in_range("--force-nodes", o.force_nodes, 2, 10'000);
+  apps::require_in_range("--swirl", o.swirl, -1e3, 1e3);
+  apps::require_in_range("--time-step", o.physics.time_step, 1e-9, 1e6);
+  apps::require_in_range("--viscosity", o.physics.viscosity, 0, 1e9);
+  apps::require_in_range("--diffusion", o.physics.diffusion, 0, 1e9);
+  apps::require_in_range("--reach", o.reach, 0, 10);
+  apps::require_in_range("--effort", o.effort, 0, 1e6);
+  apps::require_in_range("--rate", o.rate, 1e-9, 1e6);
+  apps::require_in_range("--iterations", o.iterations, 1, 1000);
+  require_start(o, "viscosity", "--viscosity", o.physics.viscosity);
+  require_start(o, "diffusion", "--diffusion", o.physics.diffusion);
+  for (const apps::Method method : o.methods) {
+    if (method != apps::Method::NewtonCg) continue;
+    retrograde::call_error("optimize by \"newton_cg\"", "it needs products with second derivatives",
+                           "a simulation gives first derivatives only",
+                           "Give adam, lbfgs or conjugate_gradient");
+  }
+}
+
+}  // namespace
+
+std::optional<Options> read_options(int argc, char** argv) {
+  Options options;
+  Words words;
+  CLI::App cli(
+      "Finds the force, and what of viscosity, diffusion and time step may move, that brings smoke "
+      "in a closed box to the shape of a picture.");
+  apps::add_common_options(cli, options.common,
+                           {.input_text = "the picture that the smoke shall be at the end",
+                            .steps = 150,
+                            .memory_mb = 1000,
+                            .optimize = {"force", "viscosity", "diffusion", "time_step"}});
+  add_scene_options(cli, options);
+  add_solution_options(cli, options, words);
+  if (!apps::parse_command_line(cli, argc, argv, options.common)) return std::nullopt;
+  for (const std::string& name : words.methods) options.methods.push_back(apps::method_named(name));
+  options.solver = solver_named(words.solver);
+  check(options);
+  return options;
+}
+
+}  // namespace fluid

@@ -1,0 +1,64 @@
+// simulation.h -- frames and their vector-Jacobian products, compiled, on states in memory.
+#pragma once
+
+#include <array>
+#include <optional>
+#include <vector>
+
+#include "match.h"
+#include "scene.h"
+
+namespace fluid {
+
+// Between two frames; the adjoint of it has the same shape.
+template <typename T>
+struct State {
+  explicit State(const FrameShape& shape);
+  void copy_from(const State& other);
+  void fill(T value);
+
+  retrograde::Buffer<T> x, y, density;
+};
+
+// The smoke and the vortex of a scene.
+template <typename T>
+State<T> start_state(const Scene& scene);
+
+template <typename T>
+class Simulation {
+ public:
+  explicit Simulation(const Scene& scene);
+
+  // From one state to the next. `force`: the elements of this frame.
+  void advance(const Physics& physics, const State<T>& from, T* force, State<T>& to);
+
+  // The same backward: `seed` is the adjoint of the state after the frame, `result` becomes that of
+  // the state before it, and `by_force`, if the force is wanted, that of the force. Adds to
+  // `by_physics` what time step, viscosity and diffusion get.
+  void reverse(const Physics& physics, const State<T>& before, T* force, const State<T>& seed,
+               State<T>& result, T* by_force, std::array<double, 3>& by_physics);
+
+  // How far it is from the target, and the derivative by the density.
+  struct Distance {
+    double loss, difference;
+  };
+  Distance compare(const State<T>& state);
+  Distance compare(const State<T>& state, retrograde::Buffer<T>& gradient);
+
+  // What is not compiled yet; otherwise the first call of each pipeline does.
+  void compile();
+  const FrameAdjoint& adjoint() const { return adjoint_; }
+
+ private:
+  void bind(const Frame& frame, const Physics& physics, const State<T>& state, T* force);
+
+  FrameShape shape_;
+  FrameAdjoint::Wanted wanted_;
+  Frame frame_;
+  FrameAdjoint adjoint_;
+  Match match_;
+  retrograde::Buffer<T> target_, no_force_;
+  retrograde::Pipeline forward_, backward_, distance_, slope_;
+};
+
+}  // namespace fluid
