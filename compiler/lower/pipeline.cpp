@@ -159,6 +159,7 @@ constexpr Pass passes[] = {
     {"transpose_loads", Phase::Vector, alone<transpose_loads>},
     {"deinterleave_loads", Phase::Vector, alone<deinterleave_loads>},
     {"simplify_vectors", Phase::Vector, run_simplify},
+    {"try_plain_products", Phase::Vector, alone<try_plain_products>},
     {"blend_masked_stores", Phase::Vector, alone<blend_masked_stores>},
     {"fuzz_float_stores", Phase::Vector, wanted<Target::FuzzFloatStores, fuzz_float_stores>},
     {"inject_profiling", Phase::Vector,

@@ -30,6 +30,7 @@ const std::vector<StatementPass>& statement_passes() {
       {"transpose_loads", transpose_loads},
       {"drop_guarded_clamps", drop_guarded_clamps},
       {"trim_loops", trim_loops},
+      {"try_plain_products", try_plain_products},
       {"unroll_loops", unroll_loops},
       {"vectorize_inner_loops",  // every loop taken for one over a pure variable
        [](const Stmt& s) {

@@ -351,6 +351,7 @@ KnownValue KnownValues::call_value(const Call& call) {
   if (call.is_op(Op::buffer_is_null, Op::buffer_is_query)) return condition(0);
   for (const Expr& arg : call.args) args.push_back(of(arg));
   if (call.is_op(Op::runtime_call)) return constant(0);
+  if (call.is_op(Op::is_nan)) return condition(0);
   KnownValue result = unknown(call.type);
   if (call.is_op(Op::if_then_else))
     result = choice_of(args[0], args[1], args[2]);

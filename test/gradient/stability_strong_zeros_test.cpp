@@ -333,6 +333,39 @@ TEST_F(StrongZeros, AnInfiniteFactorOfAMaximumThatIsConstant) {
   expect(f, a, {0, 3, 0, 5});
 }
 
+// Sums in registers try plain products first. Rows of seeds that are 0 meet infinities and NaNs;
+// sizes that tiles divide, and sizes that they do not.
+TEST_F(StrongZeros, SumsOfProductsInRegisters) {
+  for (const int size : {64, 45}) {
+    Buffer<float> weight(size, size), image(size, size), seed(size, size);
+    weight.for_each_element([&](int k, int y) {
+      weight(k, y) = y % 8 == 3 ? (k % 2 ? inf : nan) : static_cast<float>((k * 7 + y * 5) % 9 - 4);
+    });
+    seed.for_each_element([&](int x, int y) {
+      seed(x, y) = y % 8 == 3 ? 0.0f : static_cast<float>((x * 3 + y) % 5 - 2);
+    });
+    image.fill(1);
+    Var y("y");
+    RDom k(0, size, "k");
+    Func product("product");
+    product(x, y) = 0.0f;
+    product(x, y) += weight(k, y) * image(x, k);
+    Buffer<float> found = propagate_adjoints(product, seed)(image).realize({size, size});
+    found.for_each_element([&](int x, int k) {
+      float expected = 0;
+      for (int row = 0; row < size; ++row)
+        expected += row % 8 == 3 ? 0.0f : seed(x, row) * weight(k, row);
+      ASSERT_EQ(found(x, k), expected) << x << " " << k;
+    });
+    seed(5, 3) = 1;  // now it does meet them
+    found = propagate_adjoints(product, seed)(image).realize({size, size});
+    found.for_each_element([&](int x, int k) {
+      ASSERT_EQ(std::isnan(found(x, k)), x == 5 && k % 2 == 0) << x << " " << k;
+      ASSERT_EQ(std::isinf(found(x, k)), x == 5 && k % 2 == 1) << x << " " << k;
+    });
+  }
+}
+
 TEST_F(StrongZeros, NaNsThatTheOutputUsesStay) {
   set(a, {-1, 4, 1, 1});
   set(b, {2, 2, 2, 2});
