@@ -30,6 +30,7 @@
 #include "autoschedule/scatter_schedule.h"
 #include "autoschedule/scatter_slices.h"
 #include "autoschedule/slices.h"
+#include "autoschedule/start_in_tiles.h"
 #include "autoschedule/stored_funcs.h"
 #include "autoschedule/strips.h"
 #include "autoschedule/task_sizes.h"
@@ -228,6 +229,7 @@ class LoopChooser {
     std::vector<VarOrRVar> order = loops;
     const auto first = std::stable_partition(order.begin(), order.end(), std::not_fn(moves));
     const std::vector<VarOrRVar> outside(first, order.end());
+    if (operand.rows) return pack_rows(operand, std::move(order), outside);
     VarOrRVar level = outside[0];
     if (operand.block) {
       const RVar iteration(operand.block->loop), blocks(new_loop(f_, index_, "blocks"));
@@ -236,6 +238,17 @@ class LoopChooser {
     }
     stage_.reorder(order);
     pack(function_, operand, retrograde::LoopLevel(Func(function_), level), lanes);
+    return outside;
+  }
+
+  // One copy for several rows of tiles: their loop stands inside of those that move the operand.
+  std::vector<VarOrRVar> pack_rows(const PackedOperand& operand, std::vector<VarOrRVar> order,
+                                   const std::vector<VarOrRVar>& outside) {
+    const Var rows = variable_of(operand.rows->dimension), row = inside(rows);
+    stage_.split(rows, rows, row, static_cast<int>(operand.rows->count), TailStrategy::GuardWithIf);
+    order.insert(order.end() - static_cast<long>(outside.size()), row);
+    stage_.reorder(order);
+    pack(function_, operand, retrograde::LoopLevel(Func(function_), outside[0]), lanes);
     return outside;
   }
 
@@ -396,6 +409,23 @@ class LoopChooser {
   std::vector<size_t> pure_;  // dimensions
 };
 
+// The updates before what they start from: a sum that gets tiles starts in them (`started`), when it
+// is known which loops they end up in.
+void give_loops(const FuncPtr& f, const ScheduleRequest& request, const SizeEstimate& sizes,
+                std::vector<FuncPtr>& started) {
+  for (int s = 1; s < f->stage_count(); ++s) LoopChooser(f, s, request, sizes).give();
+  if (!request.options.without.contains(Decision::RegisterTiles) && has_tiles(*f))
+    started.push_back(f);
+  else
+    LoopChooser(f, 0, request, sizes).give();
+}
+
+void start_sums(const FuncPtr& f, const ScheduleRequest& request, const SizeEstimate& sizes) {
+  if (has_tiles(*f)) return start_in_tiles(f, lanes);
+  LoopChooser(f, 0, request, sizes).give();
+  if (!is_at_root(*f)) run_serially(f);
+}
+
 // Pure Funcs.
 void compute_at_root(const std::vector<FuncPtr>& funcs, const ScheduleRequest& request) {
   for (const FuncPtr& f : funcs) {
@@ -488,7 +518,8 @@ SizeEstimate give_default_schedule(const std::vector<FuncPtr>& outputs,
   const LaneDimensions along(
       outputs, makes(Decision::LayoutStaging) ? stored : std::vector<FuncPtr>(), lanes, sizes);
   const AtomicScatters atomic(outputs, stored, whole, request, sizes);
-  std::vector<FuncPtr> given;  // loops, at root
+  std::vector<FuncPtr> given;    // loops, at root
+  std::vector<FuncPtr> started;  // sums of these, in their tiles
   for (const FuncPtr& f : stored) {
     if (is_touched(*f)) continue;
     Func(f).compute_root();
@@ -500,7 +531,7 @@ SizeEstimate give_default_schedule(const std::vector<FuncPtr>& outputs,
     if (const size_t d = along.of(*f); d > 0)
       LoopChooser(f, 0, request, sizes).give_along(d);
     else
-      for (int s = 0; s < f->stage_count(); ++s) LoopChooser(f, s, request, sizes).give();
+      give_loops(f, request, sizes, started);
     if (atomic.is_part(*f))
       run_serially(f);
     else
@@ -508,6 +539,7 @@ SizeEstimate give_default_schedule(const std::vector<FuncPtr>& outputs,
   }
   if (may_choose) unroll_choices(given, fixed, sizes);
   move_and_join(outputs, stored, given, whole, sizes, request.options.without);
+  for (const FuncPtr& f : started) start_sums(f, request, sizes);
   tasks.limit(outputs, request);
   for (const FuncPtr& f : order) {  // so that the log tells of every Func
     const bool is_output = std::find(outputs.begin(), outputs.end(), f) != outputs.end();

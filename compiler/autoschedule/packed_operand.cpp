@@ -25,6 +25,8 @@ constexpr int64_t most_elements = 16384;  // of a copy: half of a second-level c
 constexpr int64_t many_rows = 16;         // more than a set of the first-level cache holds lines
 constexpr double least_uses = 4;          // of an element of the copy
 constexpr int64_t least_block = 64;       // iterations: sums are fetched and put back for each
+constexpr int64_t most_rows = 8;          // of tiles that share a copy
+constexpr double worth_sharing = 0.75;    // of what is copied for each alone
 constexpr double least_tiles = 4;  // that use one copy: with fewer, its rows stay in the cache
 
 // How far each loop of a tile runs.
@@ -83,6 +85,30 @@ class Candidate {
            loads_of_a_tile() * tiles(false) * lanes_ >= least_uses * static_cast<double>(*elements);
   }
   bool fits() const { return elements_of_piece().has_value(); }
+  // The dimension and count of tiles that leave the least to copy for each of them.
+  std::optional<PackedOperand::Rows> rows_that_share() const {
+    const auto alone = elements_of_piece();
+    std::optional<PackedOperand::Rows> best;
+    double least = static_cast<double>(alone.value_or(0)) * worth_sharing;
+    for (size_t d = 1; alone && d < f_.args.size(); ++d) {
+      const auto extent = sizes_.extent(f_, d);
+      if (!depends_on_[d] || size_in(tile_, d, lanes_) != 1 || !extent) continue;
+      for (int64_t count = 2; count <= most_rows && *extent % count == 0; count *= 2) {
+        Extents together = extents_;
+        together[f_.args[d]] = count;
+        const auto elements = Candidate(*this, together).elements_of_piece();
+        const double each =
+            elements ? static_cast<double>(*elements) / static_cast<double>(count) : least;
+        const bool is_small = elements && *elements <= most_elements / 2;
+        const bool leaves_tasks =
+            tiles(true) >= static_cast<double>(count * sizes_.machine().enough_tasks);
+        if (!is_small || !leaves_tasks || each >= least) continue;
+        best = PackedOperand::Rows{d, count};
+        least = each;
+      }
+    }
+    return best;
+  }
   const std::vector<bool>& depends_on() const { return depends_on_; }
   // The index, one and no other, that is the next for the next lane.
   std::optional<size_t> lane_dimension() const {
@@ -97,6 +123,17 @@ class Candidate {
   }
 
  private:
+  // The same read, in other loops.
+  Candidate(const Candidate& other, const Extents& extents)
+      : f_(other.f_),
+        update_(other.update_),
+        tile_(other.tile_),
+        lanes_(other.lanes_),
+        sizes_(other.sizes_),
+        extents_(extents),
+        index_(other.index_),
+        depends_on_(other.depends_on_) {}
+
   Expr place(const Expr& arg) const {
     return unclamped(without_lets(arg), [&](const Expr& e) {
       return std::any_of(extents_.begin(), extents_.end(),
@@ -228,6 +265,7 @@ std::optional<PackedOperand> packed_read(const Call& call, const FuncContents& f
   if (!candidate().is_worth_packing()) return std::nullopt;
   result.lane_dimension = *candidate().lane_dimension();
   result.depends_on = candidate().depends_on();
+  if (!result.block) result.rows = candidate().rows_that_share();
   return result;
 }
 

@@ -34,6 +34,13 @@ struct PackedOperand {
     int64_t iterations;
   };
   std::optional<Block> block;  // that a copy is of; nullopt: all of the reduction
+  // Tiles next to each other read much of the same along it, as rows of a stencil do: one copy
+  // serves so many of them.
+  struct Rows {
+    size_t dimension;
+    int64_t count;
+  };
+  std::optional<Rows> rows;
 };
 
 // The operand of the update that is worth it, when the update has the tile; nullopt: none.

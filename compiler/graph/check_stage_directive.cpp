@@ -190,16 +190,21 @@ std::string level_text(const LoopLevel& level) {
                                            : quoted("inlined");
 }
 
-// 1. The level is a loop. 2. It is of another Func.
-void check_fuse_level(const std::string& stage, const std::string& func, const LoopLevel& level) {
-  const std::string asked = text("compute ", quoted(stage), " with ", level_text(level));
+// 1. The level is a loop. 2. It is of another Func, or of the stage before.
+void check_fuse_level(const SchedulePlace& at, const LoopLevel& level) {
+  const std::string asked =
+      text("compute ", quoted(stage_name(*at.f, at.stage)), " with ", level_text(level));
   if (level.kind != LoopLevel::Kind::At) {
     user_error(asked, "a stage joins the loops of another one down to a loop",
                "the level is " + level_text(level), "Name a stage and one of its loops");
   }
-  if (level.func == func) {
-    user_error(asked, "the stages belong to different Funcs", "both are of " + quoted(func),
-               "Stages of one Func run in their order");
+  if (level.func == at.f->name && (at.stage == 0 || level.stage != at.stage - 1)) {
+    user_error(asked, "of its own Func, a stage joins the one before it",
+               text("the level is of ", level.stage < 0 ? std::string("no stage by name")
+                                                        : quoted(stage_name(*at.f, level.stage))),
+               at.stage == 0
+                   ? std::string("Stages of one Func run in their order")
+                   : text("Name the stage before: ", quoted(stage_name(*at.f, at.stage - 1))));
   }
 }
 
@@ -346,12 +351,13 @@ void check(PrefetchData& prefetch, const SchedulePlace& at) {
   prefetch.offset = int32_literal(offset, asked);
 }
 
-// 1. The level is a loop. 2. It is of another Func: now, or when the level is set. 3. This stage has
+// 1. The level is a loop. 2. It is of another Func or of the stage before: now, or when the level is
+// set. 3. This stage has
 // no specializations and is no extern stage. Whether the loops agree and nothing depends on each
 // other is checked when the whole schedule is known.
 void check(ComputeWith& with, const SchedulePlace& at) {
   const bool is_known = !with.from || with.from->defined;
-  if (is_known) check_fuse_level(stage_name(*at.f, at.stage), at.f->name, with.level);
+  if (is_known) check_fuse_level(at, with.level);
   const std::string asked =
       text("compute ", at.name(), " with ", is_known ? level_text(with.level) : "another stage");
   if (at.f->is_extern()) {

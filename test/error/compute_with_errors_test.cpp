@@ -69,6 +69,52 @@ TEST_F(ComputeWithErrors, TwoStagesOfOneFuncInOneNest) {
   expect_refused({"one after another"});
 }
 
+// rule: of its own Func, a stage joins the one before it
+TEST_F(ComputeWithErrors, AStageThatIsNotTheOneBefore) {
+  f(x, y) += 1;
+  f(x, y) *= 2;
+  expect_error({"of its own Func, a stage joins the one before it", "update(0)"},
+               [&] { f.update(1).compute_with(f, y); });
+  expect_error({"Stages of one Func run in their order"}, [&] { f.compute_with(f.update(0), y); });
+}
+
+// rule: stages of one Func that share loops touch the same elements in each iteration
+TEST_F(ComputeWithErrors, AnUpdateThatReadsOrWritesElsewhere) {
+  RDom r(1, 7, "r");
+  f(r, y) += f(r - 1, y);
+  f.update().compute_with(f, y);
+  expect_refused({"touch the same elements in each iteration", "it writes to", "along \"x\""});
+}
+
+TEST_F(ComputeWithErrors, TilesOfOtherSizes) {
+  f(x, y) += 1;
+  f.split(y, y, xo, 4, TailStrategy::GuardWithIf);
+  f.update().split(y, y, xi, 8).reorder(x, xi, y).compute_with(f, y);
+  expect_refused({"touch the same elements", "split in another way"});
+}
+
+TEST_F(ComputeWithErrors, TilesThatOverlap) {
+  f(x, y) += 1;
+  f.split(y, y, xo, 4, TailStrategy::ShiftInwards);
+  f.update().split(y, y, xi, 4).reorder(x, xi, y).compute_with(f, y);
+  expect_refused({"touch the same elements", "lets tiles overlap", "GuardWithIf"});
+}
+
+TEST_F(ComputeWithErrors, FusedLoopsOfOneFunc) {
+  f(x, y) += 1;
+  f.fuse(x, y, xo);
+  f.update().fuse(x, y, xo).compute_with(f, xo);
+  expect_refused({"touch the same elements", "is fused of several"});
+}
+
+TEST_F(ComputeWithErrors, AStageBeforeThatIsSpecialized) {
+  Param<bool> p("p");
+  f(x, y) += 1;
+  f.specialize(p);
+  f.update().compute_with(f, y);
+  expect_refused({"touch the same elements", "specializations"});
+}
+
 TEST_F(ComputeWithErrors, OtherPlaces) {
   g.compute_with(f, y);
   g.compute_at(out, y);
@@ -151,7 +197,7 @@ TEST_F(ComputeWithErrors, ALevelThatIsNeverSet) {
   LoopLevel level;
   g.compute_with(level);
   expect_refused({"is set before the pipeline is compiled", "never was"});
-  expect_error({"different Funcs"}, [&] { level.set(LoopLevel(g, x)); });
+  expect_error({"of its own Func"}, [&] { level.set(LoopLevel(g, x)); });
 }
 
 TEST_F(ComputeWithErrors, AProducerAtALoopOfTheGuest) {

@@ -472,6 +472,26 @@ TEST_F(DefaultSchedule, WhatATileReadsFromManyPlanesIsPacked) {
   EXPECT_NE(log.find("inner.in(inner_in_mixed"), std::string::npos) << log;
 }
 
+// A pass of its own would write all of the sums, for the tiles to read.
+TEST_F(DefaultSchedule, SumsStartInTheirTiles) {
+  const std::string log = log_of_mixing(125, 32);
+  EXPECT_NE(log.find(".update(0).compute_with(loop(mixed"), std::string::npos) << log;
+}
+
+// Each row of the result reads three of the image, of which two are those of the next one.
+TEST_F(DefaultSchedule, RowsOfAStencilShareWhatIsPacked) {
+  const Buffer<float> image = gradient::random_image({128, 130, 32}, -1, 1, 1);
+  const Buffer<float> weights = gradient::random_image({3, 3, 32, 32}, -1, 1, 2);
+  Var x("x"), y("y"), c("c");
+  RDom r(0, 3, 0, 3, 0, 32);
+  Func inner("inner"), filtered("filtered");
+  inner(x, y, c) = max(image(x, y, c), 0.0f);
+  filtered(x, y, c) += weights(r.x, r.y, r.z, c) * inner(x + r.x, y + r.y, r.z);
+  const std::string log = log_of(filtered, {125, 128, 32});
+  EXPECT_NE(log.find("_in_filtered"), std::string::npos) << log;
+  EXPECT_NE(log.find(".update(0).split(y, y, yi, 4"), std::string::npos) << log;
+}
+
 // Lanes across the rows of an image read each element from a line of its own: the copy is turned.
 TEST_F(DefaultSchedule, WhatLanesReadAcrossRowsIsCopiedTurned) {
   for (const auto& [rows, columns] : {std::pair{64, 256}, std::pair{60, 299}}) {

@@ -392,5 +392,123 @@ TEST_F(ComputeWith, TheFirstStageMayBeSpecialized) {
   }
 }
 
+// ---- an update in the loops of the stage before it ----
+
+TEST_F(ComputeWith, AnUpdateStartsInItsTile) {
+  Func f("f"), out("out");
+  RDom r(0, 3, "r");
+  f(x, y) = 1;
+  f(x, y) += x * r + y;
+  out(x, y) = f(x, y);
+  f.compute_root();
+  f.update().compute_with(f, y);
+  EXPECT_EQ(nest_of(out), R"(produce f:
+  for y:
+    for x:
+      f(...) = ...
+    for x:
+      for r in [0, 2]:
+        f(...) = ...
+consume f:
+  produce out:
+    for y:
+      for x:
+        out(...) = ...
+)");
+}
+
+// Tiles do not divide the Func; tails of both stages end where it does.
+TEST_F(ComputeWith, TilesOfAnUpdateEndTogether) {
+  expect_same([&](bool together) {
+    Func f("f"), out("out");
+    RDom r(0, 5, "r");
+    f(x, y) = x - y;
+    f(x, y) += (x + 1) * r + y;
+    f(x, y) *= 3;
+    out(x, y) = f(x, y);
+    f.compute_root();
+    f.tile(x, y, xo, yo, xi, yi, 8, 4).vectorize(xi);
+    f.update(0).tile(x, y, xo, yo, xi, yi, 8, 4, TailStrategy::GuardWithIf);
+    f.update(0).reorder(xi, yi, r, xo, yo).parallel(yo).vectorize(xi).unroll(yi);
+    f.update(1).tile(x, y, xo, yo, xi, yi, 8, 4, TailStrategy::GuardWithIf).parallel(yo);
+    if (together) {
+      f.parallel(yo);
+      f.update(0).compute_with(f, xo);
+      f.update(1).compute_with(f.update(0), yo);
+    }
+    return out;
+  });
+}
+
+// What slides is computed once by both stages.
+TEST_F(ComputeWith, AnUpdateThatSlidesStartsInItsPart) {
+  expect_same([&](bool together) {
+    Func f("f"), out("out");
+    RDom r(0, 4, "r");
+    f(x, y) = x + 2 * y;
+    f(x, y) += x * r - y;
+    out(x, y) = f(x, y) + f(x, y + 1) + f(x, y + 2);
+    f.store_root().compute_at(out, y);
+    if (together) f.update().compute_with(f, y);
+    return out;
+  });
+}
+
+// The loops may be those of a third Func.
+TEST_F(ComputeWith, AnUpdateFollowsItsFuncIntoOtherLoops) {
+  expect_same([&](bool together) {
+    Func f("f"), g("g"), out("out");
+    RDom r(0, 4, "r");
+    g(x, y) = x - y;
+    f(x, y) = x + 2 * y;
+    f(x, y) += x * r - y;
+    out(x, y) = f(x, y + 3) + g(x, y);
+    f.compute_root();
+    g.compute_root();
+    if (together) {
+      f.compute_with(g, y, LoopAlignStrategy::AlignStart);
+      f.update().compute_with(f, y);
+    }
+    return out;
+  });
+}
+
+// A tile that needs something computed in it, for either stage or for the update alone.
+TEST_F(ComputeWith, ProducersInTilesOfAnUpdateAlone) {
+  expect_same([&](bool together) {
+    Func p("p"), f("f"), out("out");
+    RDom r(0, 4, "r");
+    p(x, y) = x * y + 3;
+    f(x, y) = x;
+    f(x, y) += p(x + r, y + 1);
+    out(x, y) = f(x, y);
+    f.compute_root().split(y, y, yi, 4, TailStrategy::GuardWithIf);
+    f.update().split(y, y, yi, 4).reorder(x, yi, r, y);
+    p.compute_at(LoopLevel(f, y, 1));
+    if (together) f.update().compute_with(f, y);
+    return out;
+  });
+}
+
+TEST_F(ComputeWith, ProducersInTilesOfAnUpdate) {
+  expect_same([&](bool together) {
+    Func p("p"), f("f"), out("out");
+    RDom r(0, 4, "r");
+    p(x, y) = x * y + 3;
+    f(x, y) = p(x, y);
+    f(x, y) += p(x + r, y + 1);
+    out(x, y) = f(x, y);
+    f.compute_root().split(y, y, yi, 4, TailStrategy::GuardWithIf);
+    f.update().split(y, y, yi, 4).reorder(x, yi, r, y);
+    if (together) {
+      f.update().compute_with(f, y);
+      p.compute_at(f, y);
+    } else {
+      p.compute_root();
+    }
+    return out;
+  });
+}
+
 }  // namespace
 }  // namespace retrograde

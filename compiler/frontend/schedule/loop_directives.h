@@ -225,12 +225,15 @@ class LoopDirectives {
   //   for y: for x: f(x, y)               for y:
   //   for y: for x: g(x, y)          =>     for x: f(x, y)
   //   g.compute_with(f, y)                  for x: g(x, y)
-  // Both are computed at the same place, and neither reads the other. Where their ranges differ the
+  // Both are computed at the same place, and neither reads the other. An update may join the stage
+  // before it, f.update().compute_with(Stage(f), y), so that sums start where they are in the cache:
+  // each iteration then touches what the stage before has made in it, and nothing else. Where their ranges differ the
   // common loop covers both, shifted as `align` says, and each runs only within its own:
   // AlignStart lets the ranges begin together, AlignEnd end together, NoAlign and Auto shift
   // nothing. The stage that joins has no specializations.
-  // Requires: a stage joins the loops of another one down to a loop; the stages belong to different
-  // Funcs; the stage has loops; a stage that joins the loops of another one has no specializations;
+  // Requires: a stage joins the loops of another one down to a loop; of its own Func, a
+  // stage joins the one before it; stages of one Func that share loops touch the same elements in
+  // each iteration; the stage has loops; a stage that joins the loops of another one has no specializations;
   // the loop level is set before the pipeline is compiled; both stages belong to the pipeline and
   // are computed somewhere; both stages have loops; both stages are computed at one place; both
   // stages are computed at the same place; compute_with names one stage; the level is a loop of

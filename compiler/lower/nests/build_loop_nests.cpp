@@ -5,6 +5,7 @@
 #include "ir/build.h"
 #include "lower/nests/nest_checks.h"
 #include "lower/nests/nest_emitter.h"
+#include "lower/nests/own_joining.h"
 #include "lower/nests/shared_loops.h"
 
 namespace retrograde::lower {
@@ -67,12 +68,11 @@ std::vector<int> NestEmitter::computed_innermost_in(const LoopedFunc& f) const {
 std::vector<int> NestEmitter::children_at(const LoopedFunc& f, int s, const Loop& loop) const {
   auto it = at_.find({f.name(), loop.var});
   if (it == at_.end()) return {};
-  std::vector<int> children;
-  for (int index : it->second) {
-    int stage = program_.funcs[index].schedule.compute_level.stage;
-    if (stage < 0 || stage == s) children.push_back(index);
-  }
-  return children;
+  const int last = last_stage_in(f, s, loop.var);
+  return filtered(it->second, [&](const int index) {
+    const int stage = program_.funcs[index].schedule.compute_level.stage;
+    return stage < 0 || (s <= stage && stage <= last);
+  });
 }
 
 Emitted NestEmitter::emit_children(const std::vector<int>& children, Emitted code,
@@ -99,9 +99,10 @@ Emitted NestEmitter::store_here(const LoopedFunc& f, int s, Emitted code, std::v
                                 size_t i, ComputePlace& home) {
   const Loop& loop = loops[i];
   if (!storage_.is_site(f, loop)) return code;
+  const int last = last_stage_in(f, s, loop.var);
   const auto is_here = [&](const LoopLevel& level) {
     return level.kind == LoopLevel::Kind::At && level.func == f.name() && level.var == loop.var &&
-           (level.stage < 0 || level.stage == s);
+           (level.stage < 0 || (s <= level.stage && level.stage <= last));
   };
   gather_storage(code, {loops, home}, i, [&](const std::string& name) {
     const FuncPlacement& schedule = storage_.stored_func(name)->schedule;

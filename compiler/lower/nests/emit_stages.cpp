@@ -1,6 +1,7 @@
 // The stages of a group: their regions, last nest first, and the loops of each nest, from the
 // innermost body of every stage up to the place where the group is computed.
 #include <algorithm>
+#include <map>
 
 #include "diagnostics/error.h"
 #include "ir/build.h"
@@ -17,6 +18,14 @@ namespace retrograde::lower {
 
 namespace {
 
+void bind_reductions(const LoopedFunc& f, int s, Domain& domain, ComputePlace& site) {
+  for (const ReductionVariable& r : f.stages[s].rvars) {
+    Expr min = cast(Int(32), r.min), extent = cast(Int(32), r.extent);
+    Interval range{min, simplify(min + extent - 1)};
+    domain[r.var] = site.bind(stage_prefix(f.name(), s) + r.var, range);
+  }
+}
+
 // Names the region of a stage, and gives it in terms of the names. `need` becomes the same.
 Domain bind_domain(const LoopedFunc& f, int s, Box& need, const std::vector<Slide>& slides,
                    ComputePlace& site) {
@@ -28,11 +37,15 @@ Domain bind_domain(const LoopedFunc& f, int s, Box& need, const std::vector<Slid
     domain[arg] = slide == slides.end() ? site.bind(prefix + arg, need[d])
                                         : site.bind_part(prefix + arg, *slide, need[d]);
   }
-  for (const ReductionVariable& r : f.stages[s].rvars) {
-    Expr min = cast(Int(32), r.min), extent = cast(Int(32), r.extent);
-    Interval range{min, simplify(min + extent - 1)};
-    domain[r.var] = site.bind(prefix + r.var, range);
-  }
+  bind_reductions(f, s, domain, site);
+  return domain;
+}
+
+// Of a stage that a later one of its Func shares loops with.
+Domain domain_of_earlier(const LoopedFunc& f, int s, const Domain& later, ComputePlace& site) {
+  Domain domain;
+  for (const std::string& arg : f.func->args) domain[arg] = later.at(arg);
+  bind_reductions(f, s, domain, site);
   return domain;
 }
 
@@ -47,13 +60,21 @@ Emitted NestEmitter::emit_members(const FusedGroup& group, std::vector<Member>& 
     return members[it - group.funcs.begin()];
   };
   for (size_t n = group.nests.size(); n-- > 0;) {
-    std::vector<NestStage> stages;
-    for (const FusedStage& stage : group.nests[n].stages) {
-      Member& member = member_of(stage);
-      const bool is_last = stage.stage + 1 == static_cast<int>(member.f->stages.size());
-      Domain domain = bind_domain(*member.f, stage.stage, member.need,
-                                  is_last ? member.slides : std::vector<Slide>(), site);
-      stages.push_back({member.f, stage.stage, std::move(domain)});
+    // Of one Func the last first: what slides is a part for the stages before it, too, and those that
+    // share its loops run over the same region, by the same names.
+    const std::vector<FusedStage>& fused = group.nests[n].stages;
+    std::vector<NestStage> stages(fused.size());
+    std::map<int, Domain> bound;  // by Func
+    for (size_t i = fused.size(); i-- > 0;) {
+      Member& member = member_of(fused[i]);
+      const bool is_last = fused[i].stage + 1 == static_cast<int>(member.f->stages.size());
+      const auto same = bound.find(fused[i].func);
+      Domain domain = same == bound.end()
+                          ? bind_domain(*member.f, fused[i].stage, member.need,
+                                        is_last ? member.slides : std::vector<Slide>(), site)
+                          : domain_of_earlier(*member.f, fused[i].stage, same->second, site);
+      bound[fused[i].func] = domain;
+      stages[i] = {member.f, fused[i].stage, std::move(domain)};
     }
     Emitted code = stages[0].f->func->is_extern()
                        ? emit_extern(*stages[0].f, stages[0].domain, site)

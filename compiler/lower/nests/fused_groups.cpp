@@ -5,6 +5,7 @@
 
 #include "diagnostics/error.h"
 #include "lower/nests/fusing_checks.h"
+#include "lower/nests/own_joining.h"
 
 namespace retrograde::lower {
 
@@ -85,13 +86,22 @@ class Grouping {
     return true;
   }
 
+  // The first of the stages that run in each other's loops, up to this one.
+  int first_joined(const FusedStage& stage) const {
+    int first = stage.stage;
+    for (auto it = joinings_.find({stage.func, first}); it != joinings_.end() && is_own(it->second);
+         it = joinings_.find({stage.func, first}))
+      --first;
+    return first;
+  }
+
   // A nest runs when the stages before its own have run.
   std::vector<FusedNest> in_order(std::vector<FusedNest> nests,
                                   const std::map<Place, Place>& found) const {
     std::vector<FusedNest> result;
     std::vector<bool> done(nests.size(), false);
     const auto is_ready = [&](const FusedStage& stage) {
-      for (int s = 0; s < stage.stage; s++) {
+      for (int s = 0; s < first_joined(stage); s++) {
         if (!done[found.at({stage.func, s}).first]) return false;
       }
       return true;

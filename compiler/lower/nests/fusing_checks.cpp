@@ -7,6 +7,7 @@
 #include "graph/define.h"
 #include "ir/text.h"
 #include "ir/visit.h"
+#include "lower/nests/own_joining.h"
 #include "lower/nests/specialize.h"
 
 namespace retrograde::lower {
@@ -217,8 +218,10 @@ std::vector<Joining> joinings_of(const Program& program) {
       const StageLoops& other = schedule_of(program, joining.with, joining.with_stage);
       joining.depth = depth_of(other, level.var);
       for (int d = 1; d <= joining.depth; d++) {
-        joining.align.push_back(
-            value_or(own.fuse_alignment, loop_at(own, d).var, LoopAlignStrategy::Auto));
+        const auto asked =
+            value_or(own.fuse_alignment, loop_at(own, d).var, LoopAlignStrategy::Auto);
+        // Both have one range; what shifts the stage before shifts this one, too.
+        joining.align.push_back(is_own(joining) ? LoopAlignStrategy::AlignStart : asked);
       }
       joinings.push_back(std::move(joining));
     }
@@ -234,7 +237,10 @@ void check_joinings(const Program& program) {
     }
   }
   const std::vector<Joining> joinings = joinings_of(program);
-  for (const Joining& joining : joinings) check_ends(program, joining, joinings);
+  for (const Joining& joining : joinings) {
+    check_ends(program, joining, joinings);
+    if (is_own(joining)) check_own_joining(program, joining);
+  }
 }
 
 std::vector<int> callees_of(const Program& program, int f) {

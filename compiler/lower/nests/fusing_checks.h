@@ -21,17 +21,18 @@ std::vector<Joining> joinings_of(const Program& program);
 // if its Func has several; 2. both are computed, at the same place, by loops; 3. the loops down to
 // the level have the same names and kinds; 4. neither Func is memoized or asynchronous, and nothing
 // is prefetched at a shared loop of the stage that joins; 5. no stage joins itself by way of
-// others.
+// others; 6. an update that joins the stage before it touches in each iteration what that has made
+// there (own_joining.h).
 void check_joinings(const Program& program);
 
-// 6. No Func of a group needs another one of it.
+// 7. No Func of a group needs another one of it.
 void check_group(const Program& program, const FusedGroup& group);
 
 // What follows throws.
-// 7. Stages of one Func run in their order. `stages`: of a nest that has to wait for itself.
+// 8. Stages of one Func run in their order. `stages`: of a nest that has to wait for itself.
 [[noreturn]] void check_order_of_stages(const Program& program,
                                         const std::vector<FusedStage>& stages);
-// 8. Groups do not need each other. `path`: groups, each of which needs the next, and the last
+// 9. Groups do not need each other. `path`: groups, each of which needs the next, and the last
 // needs `again`, which is one of them.
 [[noreturn]] void check_groups_have_order(const Program& program,
                                           const std::vector<FusedGroup>& groups,

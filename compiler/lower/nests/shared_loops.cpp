@@ -4,6 +4,7 @@
 
 #include "diagnostics/error.h"
 #include "ir/build.h"
+#include "ir/equal.h"
 #include "ir/visit.h"
 #include "simplify/simplify.h"
 
@@ -16,11 +17,13 @@ bool is_known(ComputePlace& home, const Expr& condition) {
 }
 
 Expr smaller(ComputePlace& home, const Expr& a, const Expr& b) {
+  if (equal(a, b)) return a;
   if (is_known(home, a <= b)) return a;
   return is_known(home, b <= a) ? b : simplify(min(a, b));
 }
 
 Expr larger(ComputePlace& home, const Expr& a, const Expr& b) {
+  if (equal(a, b)) return a;
   if (is_known(home, a >= b)) return a;
   return is_known(home, b >= a) ? b : simplify(max(a, b));
 }
@@ -32,8 +35,10 @@ Interval shifted(const Interval& range, const Expr& shift) {
 // Where a loop variable that takes all values of `all` is inside of its own range.
 void add_conditions(ComputePlace& home, const Expr& value, const Interval& own, const Interval& all,
                     std::vector<Expr>& conditions) {
-  if (!is_known(home, own.min <= all.min)) conditions.push_back(likely(value >= own.min));
-  if (!is_known(home, own.max >= all.max)) conditions.push_back(likely(value <= own.max));
+  if (!equal(own.min, all.min) && !is_known(home, own.min <= all.min))
+    conditions.push_back(likely(value >= own.min));
+  if (!equal(own.max, all.max) && !is_known(home, own.max >= all.max))
+    conditions.push_back(likely(value <= own.max));
 }
 
 Loop& loop_from_inside(std::vector<Loop>& loops, int depth) { return loops[loops.size() - depth]; }

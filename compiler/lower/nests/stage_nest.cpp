@@ -5,6 +5,7 @@
 #include "diagnostics/error.h"
 #include "ir/build.h"
 #include "ir/visit.h"
+#include "lower/nests/own_joining.h"
 #include "lower/program.h"
 #include "simplify/simplify.h"
 
@@ -58,7 +59,9 @@ class NestBuilder {
       : definition_(f.stages[stage]),
         prefix_(stage_prefix(f.name(), stage)),
         is_update_(stage > 0),
-        may_run_past_the_end_(stage == 0 && has_room_of_its_own(f) && reads_nothing(definition_)),
+        hosts_updates_(hosts_own_updates(f, stage)),
+        may_run_past_the_end_(stage == 0 && !hosts_updates_ && has_room_of_its_own(f) &&
+                              reads_nothing(definition_)),
         ranges_(domain) {}
 
   StageNest build() {
@@ -73,7 +76,7 @@ class NestBuilder {
  private:
   const Definition& definition_;
   const std::string prefix_;
-  const bool is_update_, may_run_past_the_end_;
+  const bool is_update_, hosts_updates_, may_run_past_the_end_;
   bool rounds_up_ = false;
   Domain ranges_;  // of every variable that exists after the splits so far
   std::vector<std::vector<Derived>> derived_;  // by split; what one of them derives is one step
@@ -107,8 +110,10 @@ class NestBuilder {
     if (is_zero(simplify(extent % split.factor))) return TailStrategy::RoundUp;  // there is no tail
     if (split.tail != TailStrategy::Auto) return split.tail;
     if (may_run_past_the_end_) return TailStrategy::RoundUp;
-    // An update may read what it writes, so no point of it may run twice.
-    return is_update_ || split.exact ? TailStrategy::GuardWithIf : TailStrategy::ShiftInwards;
+    // An update may read what it writes, so no point of it may run twice; nor may one that has
+    // been added to.
+    const bool runs_once = is_update_ || hosts_updates_ || split.exact;
+    return runs_once ? TailStrategy::GuardWithIf : TailStrategy::ShiftInwards;
   }
 
   void apply_split(const Split& split) {

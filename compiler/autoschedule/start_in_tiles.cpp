@@ -1,0 +1,122 @@
+#include "autoschedule/start_in_tiles.h"
+
+#include <algorithm>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "autoschedule/new_loop.h"
+#include "frontend/schedule/stage.h"
+#include "graph/own_reads.h"
+#include "ir/build.h"
+
+namespace retrograde::autoschedule {
+
+namespace {
+
+// A loop over a dimension, over its parts, or over one of these.
+struct TileLoop {
+  Dim loop;
+  std::string dimension;
+  const Split* split;  // of the dimension; null: none
+};
+
+// nullopt: it is of the reduction, runs over lanes, or its dimension was cut in more than one place.
+std::optional<TileLoop> tile_loop(const FuncContents& f, const Definition& stage, const Dim& loop) {
+  const bool runs = loop.runs == ForType::Serial || loop.runs == ForType::Parallel;
+  if (loop.is_reduction || !runs) return std::nullopt;
+  TileLoop result{loop, loop.var, nullptr};
+  for (const Split& made : stage.schedule.splits) {
+    if (made.outer == loop.var || made.inner == loop.var) result.dimension = made.old_var;
+  }
+  int cuts = 0;
+  for (const Split& made : stage.schedule.splits) {
+    if (made.old_var != result.dimension && made.outer != result.dimension) continue;
+    const bool is_plain = made.kind == Split::Kind::Split && made.outer == made.old_var &&
+                          made.tail == TailStrategy::GuardWithIf;
+    result.split = is_plain ? &made : nullptr;
+    cuts += is_plain ? 1 : 2;
+  }
+  const auto arg = std::find(f.args.begin(), f.args.end(), result.dimension);
+  const bool is_pure =
+      arg != f.args.end() && is_pure_position(f, stage, static_cast<size_t>(arg - f.args.begin()));
+  return is_pure && cuts <= 1 ? std::optional(result) : std::nullopt;
+}
+
+// Of a stage, the outermost first, up to the first that is none.
+std::vector<TileLoop> tile_loops(const FuncContents& f, const Definition& stage) {
+  std::vector<TileLoop> result;
+  const std::vector<Dim>& dims = stage.schedule.dims;
+  for (auto loop = dims.rbegin(); loop != dims.rend(); ++loop) {
+    const auto tile = tile_loop(f, stage, *loop);
+    const bool is_part = tile && tile->loop.var != tile->dimension;
+    const bool follows = std::any_of(result.begin(), result.end(), [&](const TileLoop& outer) {
+      return tile && outer.dimension == tile->dimension;
+    });
+    if (!tile || is_part != follows) break;
+    result.push_back(*tile);
+  }
+  return result;
+}
+
+bool has_reduction_inside(const Definition& stage, size_t shared) {
+  const std::vector<Dim>& dims = stage.schedule.dims;
+  return std::any_of(dims.begin(), dims.end() - static_cast<long>(shared),
+                     [](const Dim& loop) { return loop.is_reduction; });
+}
+
+}  // namespace
+
+bool has_tiles(const FuncContents& f) {
+  if (f.updates.empty() || f.updates[0].schedule.fuse_level.kind == graph::LoopLevel::Kind::At)
+    return false;
+  const Definition& update = f.updates[0];
+  const std::vector<TileLoop> tiles = tile_loops(f, update);
+  const bool cuts = std::any_of(tiles.begin(), tiles.end(),
+                                [](const TileLoop& tile) { return tile.split != nullptr; });
+  bool stays = !read_elsewhere(f, update).defined();
+  for (size_t d = 0; d < f.args.size(); ++d) stays &= is_pure_position(f, update, d);
+  return cuts && stays && has_reduction_inside(update, tiles.size());
+}
+
+void start_in_tiles(const FuncPtr& f, int lanes) {
+  const std::vector<TileLoop> tiles = tile_loops(*f, f->updates[0]);
+  Stage start(f, 0);
+  std::map<std::string, std::string> inside;  // of the loops over tiles, by dimension
+  std::vector<VarOrRVar> shared;
+  for (const TileLoop& tile : tiles) {
+    shared.insert(shared.begin(), Var(tile.loop.var));
+    std::string& part = inside[tile.dimension];
+    if (tile.loop.var != tile.dimension) {
+      part.clear();
+    } else if (tile.split) {
+      part = tile.split->inner;
+      start.split(Var(tile.dimension), Var(tile.dimension), Var(part), tile.split->factor,
+                  TailStrategy::GuardWithIf);
+    }
+  }
+  std::vector<VarOrRVar> order;
+  for (const std::string& arg : f->args) {
+    const auto part = inside.find(arg);
+    const std::string loop = part == inside.end() ? arg : part->second;
+    if (!loop.empty()) order.emplace_back(Var(loop));
+  }
+  const bool has_rows = inside.find(f->args[0]) == inside.end() || !inside[f->args[0]].empty();
+  const std::vector<VarOrRVar> held = order;
+  order.insert(order.end(), shared.begin(), shared.end());
+  start.reorder(order);
+  const bool is_one_vector = std::any_of(tiles.begin(), tiles.end(), [&](const TileLoop& tile) {
+    return tile.split && tile.dimension == f->args[0] && is_const_int(tile.split->factor, lanes);
+  });
+  if (has_rows && is_one_vector)
+    start.vectorize(held.front());
+  else if (has_rows)
+    vectorize(start, held.front(), lanes, TailStrategy::GuardWithIf);
+  for (const TileLoop& tile : tiles) {
+    if (tile.loop.runs == ForType::Parallel) start.parallel(Var(tile.loop.var));
+  }
+  Stage(f, 1).compute_with(start, shared.front());
+}
+
+}  // namespace retrograde::autoschedule

@@ -1,0 +1,21 @@
+// start_in_tiles -- sums start where their tiles are added up, not in a pass of their own.
+//
+//   f = 0 over all, then f += ... tile by tile   =>   for each tile: f = 0, f += ...
+//
+// The pass would write all of f to memory and the tiles read it again: of a sum of few terms, as of
+// a convolution's, that is a good part of its time.
+#pragma once
+
+#include "graph/function.h"
+
+namespace retrograde::autoschedule {
+
+// Whether the first update of f has loops over tiles of the result outside of those of its
+// reduction, so that what comes before can share them.
+bool has_tiles(const FuncContents& f);
+
+// Gives the pure stage, which has no directives, the loops over tiles of the first update, and puts
+// that into them. `lanes`: of the vectors.
+void start_in_tiles(const FuncPtr& f, int lanes);
+
+}  // namespace retrograde::autoschedule
