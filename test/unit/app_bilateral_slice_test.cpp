@@ -127,6 +127,40 @@ TEST_F(BilateralSlice, StopsInGoodOrder) {
   EXPECT_EQ(nlohmann::json::parse(file)["stopped"], true);
 }
 
+// One curve for all photos: what was learned from four of them suits the two held out, and a seventh.
+TEST_F(BilateralSlice, LearnsOneLookFromAFolderAndAppliesIt) {
+  const fs::path pairs = folder_ / "pairs";
+  fs::create_directories(pairs / "target");
+  for (int n = 0; n < 7; ++n) {
+    const std::string name = "p" + std::to_string(n) + ".png";
+    write_photo("pairs/" + name, 60 + 8 * n, 50);
+    write_photo("pairs/target/" + name, 60 + 8 * n, 50, 0.5f);
+  }
+  const std::vector<std::string> command{BILATERAL_SLICE_PROGRAM, "--output", folder_ / "out"};
+  auto learn = command;
+  learn.insert(learn.end(), {"--pairs", pairs, "--steps", "250", "--explain"});
+  const apps::Outcome learned = apps::run_program(learn);
+  ASSERT_EQ(learned.status, 0) << learned.output;
+  std::ifstream file(folder_ / "out" / "report.json");
+  const auto own = nlohmann::json::parse(file)["bilateral_slice"];
+  EXPECT_EQ(own["photographs"], 5);
+  EXPECT_EQ(own["held_out"], 2);
+  EXPECT_GT(own["psnr_held_out_db"], own["psnr_held_out_before_db"].get<double>() + 6);
+  const auto photo = write_photo("new.png", 81, 43),
+             wanted = write_photo("wanted.png", 81, 43, 0.5f);
+  auto apply = command;
+  apply.insert(apply.end(), {"--apply", folder_ / "out" / "look.bin", "--input", photo});
+  const apps::Outcome applied = apps::run_program(apply);
+  ASSERT_EQ(applied.status, 0) << applied.output;
+  const apps::Image result = apps::read_image(folder_ / "out" / "result.png"),
+                    target = apps::read_image(wanted);
+  ASSERT_EQ(result.pixels.size(), target.pixels.size());
+  double sum = 0;
+  for (size_t n = 0; n < target.pixels.size(); ++n)
+    sum += std::pow(result.pixels[n] - target.pixels[n], 2);
+  EXPECT_LT(sum / static_cast<double>(target.pixels.size()), 2e-3);  // 27 dB
+}
+
 TEST_F(BilateralSlice, ItsGradientIsStableWhereTheGridIsEmpty) {
   const apps::Outcome outcome =
       apps::run_program({BILATERAL_SLICE_PROGRAM, "--output", folder_ / "out", "--input",
