@@ -1,0 +1,21 @@
+// medians.h -- the median of 3 x 3 pixels.
+//
+// Each column is sorted once for the three windows that it lies in. The median of all nine is the middle one of
+// the largest low, the middle middle and the smallest high (J. Smith, Implementing median filters in XC4000E
+// FPGAs, Xcell 23, 1996).
+#pragma once
+
+#include <retrograde/retrograde.h>
+
+#include <string>
+#include <vector>
+
+namespace demosaic {
+
+namespace lang = retrograde;
+
+// Of f(x, y, ...), whose other variables are `rest`.
+lang::Func median_3x3(const lang::Func& f, const lang::Var& x, const lang::Var& y,
+                      const std::vector<lang::Var>& rest, const std::string& name);
+
+}  // namespace demosaic
