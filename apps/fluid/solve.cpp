@@ -58,11 +58,9 @@ Expr constant(Type scalar, double value) { return retrograde::cast(scalar, Expr(
 
 // The sum of the four neighbours of f(x, y).
 Expr neighbours(const Func& f, const System& s, const Var& x, const Var& y) {
-  const auto inside = [](const Expr& n, const Axis& axis) {
-    return retrograde::clamp(n, 0, axis.samples - 1);
-  };
-  return f(inside(x - 1, s.x), y) + f(inside(x + 1, s.x), y) + f(x, inside(y - 1, s.y)) +
-         f(x, inside(y + 1, s.y));
+  const Func e =
+      retrograde::BoundaryConditions::repeat_edge(f, {{0, s.x.samples}, {0, s.y.samples}});
+  return e(x - 1, y) + e(x + 1, y) + e(x, y - 1) + e(x, y + 1);
 }
 
 // 0 on walls that hold zeros, `value` elsewhere.

@@ -199,7 +199,8 @@ TEST(FluidFrame, AWaveOfSmokeFadesAsTheImplicitStepSays) {
 
 TEST(FluidFrame, IterationsComeNearToTheDirectSolution) {
   Scene direct = with_all_stages(scene_of(6, 5, 2, 2));
-  direct.physics = {0.05, 1e-2, 1e-2};
+  direct.physics = {0.05, 0, 1e-2};
+  direct.shape.has_viscosity = direct.wanted.viscosity = false;
   Scene iterated = direct;
   iterated.shape.solver = Solver::Jacobi;
   iterated.shape.iterations = 10;
@@ -260,7 +261,7 @@ TEST(FluidGradient, WithoutAForceIsRight) {
 TEST(FluidGradient, ThroughIterationsIsRight) {
   Scene scene = with_all_stages(scene_of(7, 8, 3, 3));
   scene.shape.solver = Solver::Jacobi;
-  scene.shape.iterations = 3;
+  scene.shape.iterations = 2;
   expect_right_gradients(scene, 4);
 }
 
@@ -270,6 +271,7 @@ TEST(FluidGradient, HasTheSameBitsForEveryNumberOfKeptStates) {
   std::vector<double> all(x.size()), few(x.size());
   control.keep_states(9);
   const double loss = control.loss(x, all);
+  EXPECT_EQ(control.loss(x), loss);  // and so does the loss without it
   for (const int slots : {1, 2, 3, 5}) {
     control.keep_states(slots);
     ASSERT_EQ(control.slots(), slots);
@@ -278,18 +280,11 @@ TEST(FluidGradient, HasTheSameBitsForEveryNumberOfKeptStates) {
   }
 }
 
-TEST(FluidGradient, TheLossWithAndWithoutItIsTheSame) {
-  Control<float> control(with_all_stages(scene_of(12, 12, 4, 3)));
-  const auto x = random_point(control.variables(), 17);
-  std::vector<double> gradient(x.size());
-  EXPECT_EQ(control.loss(x), control.loss(x, gradient));
-}
-
 // ---- stability ----
 
 TEST(FluidStability, SixDecadesOfEverythingStayFinite) {
   const auto rows =
-      check_stability(with_all_stages(scene_of(12, 12, 3, 3)), 19, [](int, int, auto) {});
+      check_stability(with_all_stages(scene_of(9, 8, 2, 3)), 19, [](int, int, auto) {});
   ASSERT_EQ(rows.size(), 21u);
   for (const apps::StabilityRow& row : rows) {
     EXPECT_TRUE(std::isfinite(row.primal_error)) << row.name;
