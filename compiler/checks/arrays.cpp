@@ -6,6 +6,8 @@
 #include "diagnostics/error.h"
 #include "frontend/data/image_param.h"
 #include "frontend/data/param.h"
+#include "graph/copy_graph.h"
+#include "graph/give_directive.h"
 #include "ir/build.h"
 #include "simplify/simplify.h"
 
@@ -150,6 +152,18 @@ std::vector<Values> realize_values(Func f, const Shape& shape) {
   f.realize(Realization(out));
   return ir::mapped(
       out, [&](const Buffer<>& b) { return is_checkable(b.type()) ? values_of(b) : Values(); });
+}
+
+Func scheduled_for(const Func& f, const Shape& shape) {
+  for (const FuncPtr& each : topological_order({f.function()})) {
+    if (is_touched(*each) || each->is_extern()) return f;
+  }
+  Func copy(graph::copy_graph({f.function()}).outputs[0]);
+  const std::vector<Var> args = copy.args();
+  for (size_t d = 0; d < args.size(); ++d)
+    copy.set_estimate(args[d], shape.mins[d], shape.extents[d]);
+  Pipeline(copy).auto_schedule(get_jit_target_from_environment());
+  return copy;
 }
 
 void Batch::add(const Func& f, const Shape& shape) {

@@ -49,6 +49,10 @@ void fill(Buffer<>& buffer, const Values& values);
 Values realize(Func f, const Shape& shape);
 // One array for each value of the Func; empty for those that are no floats.
 std::vector<Values> realize_values(Func f, const Shape& shape);
+// What computes the values of `f` over the shape: `f` itself, or, where nobody scheduled any of its
+// Funcs, a copy of them with the built-in schedule. Reductions that read reductions are computed
+// again for each read otherwise.
+Func scheduled_for(const Func& f, const Shape& shape);
 // Many Funcs in one run, so that what they share is compiled and computed once. One after the other
 // when that does not work: together they are very large, one reads another outside of its shape, or
 // what was inlined into one would have to be stored for two.

@@ -163,10 +163,14 @@ class Checker {
           propagate_adjoints(wide_output_, seed(wide_output_), bounds(), store));
     }
     for (const auto& p : parameters_of(all)) bind(p);
-    report_.primal_seconds = timed_warm([&] { return realize_values(output_, shape_); }).seconds;
+    const Func primal = scheduled_for(output_, shape_);
+    report_.primal_seconds = timed_warm([&] { return realize_values(primal, shape_); }).seconds;
+    wide_primal_ = scheduled_for(wide_output_, shape_);
     complex_ = complex_graph(wide_output_);
     report_.complex_step_refused = complex_.refused;
-    if (complex_.refused.empty()) bind_imaginary();
+    if (!complex_.refused.empty()) return;
+    bind_imaginary();
+    complex_primal_ = scheduled_for(complex_.output, shape_);
   }
   // Rules of the user are made of Funcs in the user's precision. They are checked by giving those a
   // meaning in double, constants as they are; all else is differentiated in double.
@@ -226,7 +230,7 @@ class Checker {
       Values moved = input.values;
       for (size_t i = 0; i < moved.size(); ++i) moved[i] += step * v[i];
       input.set_wide(moved);
-      return weighted(realize_values(wide_output_, shape_));
+      return weighted(realize_values(wide_primal_, shape_));
     };
     auto slope = timed([&] { return (at(h) - at(-h)) / (2 * h); });
     input.set_wide(input.values);
@@ -277,7 +281,7 @@ class Checker {
     for (double& s : step) s *= h;
     moved.set_wide(step);
     auto result = timed_warm([&] {
-      std::vector<Values> parts = realize_values(complex_.output, shape_), imaginary;
+      std::vector<Values> parts = realize_values(complex_primal_, shape_), imaginary;
       for (size_t k = 0, at = 0; k < weights_.size(); ++k) {
         const bool is_float = !weights_[k].empty();
         imaginary.push_back(is_float ? parts[at + 1] : Values());
@@ -384,7 +388,7 @@ class Checker {
   std::vector<Values> weights_;
   std::unique_ptr<Derivative> own_, wide_;  // wide_: null where rules of the user take part
   Widened widened_;
-  Func wide_output_;
+  Func wide_output_, wide_primal_, complex_primal_;  // the last two are what runs
   std::vector<Input> inputs_, imaginary_;
   ComplexGraph complex_;
   GradientReport report_;

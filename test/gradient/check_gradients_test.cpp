@@ -107,6 +107,27 @@ TEST_F(CheckGradients, OutputsWithDimensionsAndUpdates) {
   EXPECT_LT(report.worst_error, 1e-8) << report.to_json();
 }
 
+// What nobody scheduled is not computed again for each read: four filters in a row would take 25^4
+// terms for each element.
+TEST_F(CheckGradients, FiltersOfFiltersThatNobodyScheduled) {
+  const Buffer<float> picture = random_image({40, 40}, 0.1, 0.5, 2);
+  Buffer<float> weights = random_image({5, 5}, 0.03, 0.05, 3);
+  Func stage("stage"), loss("loss");
+  stage(x, y) = picture(x, y);
+  for (int s = 0; s < 4; ++s) {
+    Func next("next");
+    RDom r(0, 5, 0, 5);
+    next(x, y) = 0.0f;
+    next(x, y) += weights(r.x, r.y) * stage(x + r.x, y + r.y) * stage(x + r.x, y + r.y);
+    stage = next;
+  }
+  RDom all(0, 12, 0, 12);
+  loss() = 0.0f;
+  loss() += stage(all.x, all.y);
+  const GradientReport report = check_gradients(loss, {}, {.directions = 1, .wrt = {weights}});
+  EXPECT_LT(report.worst_error, 1e-7) << report.to_json();
+}
+
 TEST_F(CheckGradients, AWrongGradientIsFound) {
   Func f("f");
   f(x, y) = image(x, y) * image(x, y) + stop_gradient(image(x, y) * 0.01f);
