@@ -39,7 +39,8 @@ bool Adam::step_of(std::span<T> x, double loss, std::span<const T> gradient) {
   RETROGRADE_ASSERT(x.size() == first_.size() && gradient.size() == first_.size(),
                     "Adam is one of ", first_.size(), " numbers");
   if (options_.safeguard) {
-    const bool finite = std::isfinite(loss) && !(loss > options_.explosion * lowest_) &&
+    const bool explodes = lowest_ > 0 && loss > options_.explosion * lowest_;
+    const bool finite = std::isfinite(loss) && !explodes &&
                         std::all_of(gradient.begin(), gradient.end(),
                                     [](T g) { return std::isfinite(static_cast<double>(g)); });
     if (!finite) {

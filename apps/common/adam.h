@@ -30,7 +30,7 @@ struct AdamOptions {
   // A factor on all rates by the number of the step, from 0; empty: 1.
   std::function<double(long step)> schedule = {};
   bool safeguard = true;
-  // A loss over so many times the lowest so far counts as not finite.
+  // A loss over so many times the lowest so far, where that is above 0, counts as not finite.
   double explosion = INFINITY;
 };
 

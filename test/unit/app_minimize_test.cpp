@@ -189,6 +189,17 @@ TEST(AppAdam, ALossThatExplodesIsRefusedWhereThatIsAskedFor) {
   EXPECT_EQ(adam.refused(), 1);
 }
 
+// A logarithm, or a negative of what is to grow.
+TEST(AppAdam, LossesBelowZeroAreLossesLikeOthers) {
+  for (const double explosion : {100.0, static_cast<double>(INFINITY)}) {
+    apps::Adam adam({{1, 1.0}}, {.explosion = explosion});
+    std::vector<double> x{5};
+    for (const double loss : {2.0, 0.0, -3.0, -2.0, -40.0})
+      EXPECT_TRUE(adam.step(x, loss, std::vector<double>{1})) << loss << " " << explosion;
+    EXPECT_FALSE(adam.step(x, NAN, std::vector<double>{1}));
+  }
+}
+
 TEST(AppAdam, WithoutSafeguardANaNStays) {
   apps::Adam adam({{1, 1.0}}, {.safeguard = false});
   std::vector<double> x{5};
