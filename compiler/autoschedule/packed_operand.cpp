@@ -32,19 +32,11 @@ constexpr double least_tiles = 4;  // that use one copy: with fewer, its rows st
 // How far each loop of a tile runs.
 using Extents = std::unordered_map<std::string, int64_t>;
 
-int64_t size_in(const RegisterTile& tile, size_t dimension, int lanes) {
-  if (dimension == 0) return tile.vectors * lanes;
-  for (const RegisterTile::Side& side : tile.sides) {
-    if (side.dimension == dimension) return side.size;
-  }
-  return 1;
-}
-
 // nullopt: a loop of the reduction has no constant extent.
 std::optional<Extents> extents_of(const FuncContents& f, const Definition& update,
                                   const RegisterTile& tile, int lanes) {
   Extents extents;
-  for (size_t d = 0; d < f.args.size(); ++d) extents[f.args[d]] = size_in(tile, d, lanes);
+  for (size_t d = 0; d < f.args.size(); ++d) extents[f.args[d]] = tile.size_along(d, lanes);
   for (const ReductionVariable& r : update.rvars) {
     const auto extent = as_const_int(simplify(r.extent));
     if (!extent || *extent <= 0) return std::nullopt;
@@ -92,7 +84,7 @@ class Candidate {
     double least = static_cast<double>(alone.value_or(0)) * worth_sharing;
     for (size_t d = 1; alone && d < f_.args.size(); ++d) {
       const auto extent = sizes_.extent(f_, d);
-      if (!depends_on_[d] || size_in(tile_, d, lanes_) != 1 || !extent) continue;
+      if (!depends_on_[d] || tile_.size_along(d, lanes_) != 1 || !extent) continue;
       for (int64_t count = 2; count <= most_rows && *extent % count == 0; count *= 2) {
         Extents together = extents_;
         together[f_.args[d]] = count;
@@ -163,7 +155,7 @@ class Candidate {
       return std::any_of(update_.rvars.begin(), update_.rvars.end(),
                          [&](const ReductionVariable& r) { return uses_variable(index, r.var); });
     };
-    return width && *width <= size_in(tile_, 0, lanes_) && index_.size() > 1 &&
+    return width && *width <= tile_.size_along(0, lanes_) && index_.size() > 1 &&
            !is_moved(index_[0]) && std::none_of(index_.begin() + 2, index_.end(), is_moved);
   }
 
@@ -184,7 +176,7 @@ class Candidate {
     for (const ReductionVariable& r : update_.rvars)
       loads *= static_cast<double>(extents_.at(r.var));
     for (size_t d = 1; d < f_.args.size(); ++d)
-      loads *= depends_on_[d] ? static_cast<double>(size_in(tile_, d, lanes_)) : 1;
+      loads *= depends_on_[d] ? static_cast<double>(tile_.size_along(d, lanes_)) : 1;
     return loads;
   }
 
@@ -194,7 +186,7 @@ class Candidate {
     const bool is_alone = std::count(depends_on_.begin(), depends_on_.end(), true) == 1;
     double tiles = 1;
     for (size_t d = that_move && is_alone ? 0 : 1; d < f_.args.size(); ++d) {
-      const auto size = static_cast<double>(size_in(tile_, d, lanes_));
+      const auto size = static_cast<double>(tile_.size_along(d, lanes_));
       const double unknown =
           that_move ? static_cast<double>(sizes_.machine().enough_tasks) * size : 1;
       const auto extent = sizes_.extent(f_, d);

@@ -7,7 +7,7 @@
 // the elements that the stage before has made in the same iteration, and no others: the loops are
 // the same parts of the same dimensions, the stage before makes no element twice, and the update
 // changes each element by what that holds alone.
-// Tests: test/unit/own_joining_test.cpp, test/error/compute_with_errors_test.cpp.
+// Tests: test/unit/compute_with_test.cpp, test/error/compute_with_errors_test.cpp.
 #pragma once
 
 #include <string>
