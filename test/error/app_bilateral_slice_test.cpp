@@ -10,21 +10,16 @@
 #include <sstream>
 
 #include "common/images.h"
-#include "support/temporary_folder.h"
+#include "support/app_errors.h"
 
 namespace {
 
 namespace fs = std::filesystem;
 
-std::string contents(const fs::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  std::ostringstream text;
-  text << file.rdbuf();
-  return text.str();
-}
-
-class BilateralSliceErrors : public testing::Test {
+class BilateralSliceErrors : public AppErrors {
  protected:
+  BilateralSliceErrors() : AppErrors("bilateral_slice", BILATERAL_SLICE_PROGRAM) {}
+
   void SetUp() override { photo_ = write_photo("photo.png", 12, 10); }
 
   fs::path write_photo(const std::string& name, int width, int height) {
@@ -38,51 +33,12 @@ class BilateralSliceErrors : public testing::Test {
     return folder_ / name;
   }
 
-  // Runs the program through the shell, after `before`, and keeps its status and messages.
-  void run(const std::string& arguments, const std::string& before = "") {
-    const std::string command = before + " " BILATERAL_SLICE_PROGRAM " " + arguments + " >" +
-                                (folder_ / "stdout").string() + " 2>" +
-                                (folder_ / "stderr").string();
-    const int status = std::system(command.c_str());
-    status_ = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
-    message_ = contents(folder_ / "stderr");
-  }
-
   void run_on(const fs::path& input, const std::string& more = "") {
     run("--halide-seconds 0 --input " + input.string() + " --output " + out().string() + " " +
         more);
   }
 
-  // The last line of standard error is the message; before it there may be lines of progress.
-  void expect_refused(const std::vector<std::string>& parts, bool after_progress = false) {
-    EXPECT_EQ(status_, 1) << message_;
-    ASSERT_FALSE(message_.empty());
-    EXPECT_EQ(message_.back(), '\n');
-    if (!after_progress) {
-      EXPECT_EQ(std::count(message_.begin(), message_.end(), '\n'), 1) << message_;
-    }
-    const size_t start = message_.rfind('\n', message_.size() - 2);
-    const std::string line = message_.substr(start == std::string::npos ? 0 : start + 1);
-    EXPECT_TRUE(line.starts_with("bilateral_slice: cannot ")) << line;
-    for (const std::string& part : parts) {
-      EXPECT_NE(line.find(part), std::string::npos) << "no \"" << part << "\" in: " << line;
-    }
-  }
-
-  void expect_no_results() {
-    if (!fs::exists(out())) return;
-    for (const auto& entry : fs::directory_iterator(out())) {
-      ADD_FAILURE() << "left behind: " << entry.path();
-    }
-  }
-
-  fs::path out() const { return folder_ / "out"; }
-
-  const TemporaryFolder temporary_;
-  const fs::path& folder_ = temporary_.path();
   fs::path photo_;
-  int status_ = 0;
-  std::string message_;
 };
 
 TEST_F(BilateralSliceErrors, AMissingImageIsNamed) {

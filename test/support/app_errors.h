@@ -1,0 +1,73 @@
+// app_errors.h -- an app run on bad input: it says one line in four parts, ends with status 1, and leaves
+// no result behind.
+#pragma once
+
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "support/temporary_folder.h"
+
+class AppErrors : public testing::Test {
+ protected:
+  AppErrors(std::string name, std::string program)
+      : name_(std::move(name)), program_(std::move(program)) {}
+
+  static std::string contents(const std::filesystem::path& path) {
+    std::ifstream file(path, std::ios::binary);
+    std::ostringstream text;
+    text << file.rdbuf();
+    return text.str();
+  }
+
+  // Runs the program through the shell, after `before`, and keeps its status and messages.
+  void run(const std::string& arguments, const std::string& before = "") {
+    const std::string command = before + " " + program_ + " " + arguments + " >" +
+                                (folder_ / "stdout").string() + " 2>" +
+                                (folder_ / "stderr").string();
+    const int status = std::system(command.c_str());
+    status_ = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
+    message_ = contents(folder_ / "stderr");
+  }
+
+  // The last line of standard error is the message; before it there may be lines of progress.
+  void expect_refused(const std::vector<std::string>& parts, bool after_progress = false) {
+    EXPECT_EQ(status_, 1) << message_;
+    ASSERT_FALSE(message_.empty());
+    EXPECT_EQ(message_.back(), '\n');
+    if (!after_progress) {
+      EXPECT_EQ(std::count(message_.begin(), message_.end(), '\n'), 1) << message_;
+    }
+    const size_t start = message_.rfind('\n', message_.size() - 2);
+    const std::string line = message_.substr(start == std::string::npos ? 0 : start + 1);
+    EXPECT_TRUE(line.starts_with(name_ + ": cannot ")) << line;
+    for (const std::string& part : parts) {
+      EXPECT_NE(line.find(part), std::string::npos) << "no \"" << part << "\" in: " << line;
+    }
+  }
+
+  void expect_no_results() {
+    if (!std::filesystem::exists(out())) return;
+    for (const auto& entry : std::filesystem::directory_iterator(out())) {
+      ADD_FAILURE() << "left behind: " << entry.path();
+    }
+  }
+
+  std::filesystem::path out() const { return folder_ / "out"; }
+
+  const TemporaryFolder temporary_;
+  const std::filesystem::path& folder_ = temporary_.path();
+  int status_ = 0;
+  std::string message_;
+
+ private:
+  const std::string name_, program_;
+};
