@@ -9,6 +9,7 @@
 #include "graph/wrappers.h"
 #include "ir/visit.h"
 #include "lower/nests/fused_groups.h"
+#include "lower/nests/likely_clamps.h"
 #include "lower/nests/memory_order.h"
 #include "lower/nests/refuse_unsupported.h"
 #include "lower/nests/resolve_undef.h"
@@ -120,6 +121,7 @@ Program inline_functions(const std::vector<FuncPtr>& unwrapped) {
   order_fused_groups(program);
   resolve_undef(program);
   make_indices_strict(program);
+  mark_likely_clamps(program);
   return program;
 }
 

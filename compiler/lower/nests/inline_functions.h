@@ -6,7 +6,7 @@
 // Method: producers first, so that what is substituted has no inlined call left; memoised by node
 //         identity, so a definition stays a DAG of linear size however often an argument is used.
 //         Then every undef is known, and resolve_undef says where nothing is stored, and so are all
-//         coordinates (strict_indices).
+//         coordinates (strict_indices), of which some are clamped (likely_clamps).
 // Not done: Funcs with updates (see LoopedFunc::is_computed_innermost) and outputs.
 // Source: folklore. Tests: test/unit/loop_nest_test.cpp, test/property.
 #pragma once
