@@ -13,6 +13,11 @@ import os
 import re
 import sys
 
+HERE = os.path.dirname(os.path.abspath(__file__))
+sys.path += [HERE, os.path.join(HERE, "operators")]
+import decisions  # noqa: E402
+import model  # noqa: E402
+
 
 def geometric_mean(ratios):
     ratios = list(ratios)
@@ -149,7 +154,8 @@ def compile_time(report):
 SECTIONS = {"demo": demo, "kernels": pairs, "gradient_peers": pairs, "programs": programs,
             "programs_second": programs, "programs_gradients": programs, "gradients": gradients,
             "pytorch_peers": pytorch, "operators": operators, "autoscheduled": autoscheduled,
-            "compile_time": compile_time}
+            "compile_time": compile_time, "model": model.table,
+            "decisions": lambda report: decisions.table(report) + "\n"}
 
 
 def this_machine():

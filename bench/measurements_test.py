@@ -8,6 +8,9 @@ import tempfile
 import unittest
 
 here = os.path.dirname(os.path.abspath(__file__))
+sys.path += [os.path.join(here, "operators")]
+import decisions  # noqa: E402
+
 PAGE = ("# Page\n\nBy hand.\n\n<!-- measured: programs -->\nold figures\n<!-- end of section -->\n\n"
         "<!-- measured: gradients -->\nkept\n<!-- end of section -->\nLast.\n")
 PROGRAMS = {"programs": [
@@ -71,6 +74,22 @@ class Measurements(unittest.TestCase):
         self.assertIn("| conv | 8 | 2 | 4 | – | root | 1 | 90 / 50 / – | 0.75 s | 2e-06 |", page)
         self.assertIn("| warp | failed |", page)
         self.assertIn("best other: 4.00.", page)
+
+    def test_a_model_says_how_it_orders_all_stages(self):
+        row = {"program": "blur", "kind": "kernels", "predicted_ms": 3.0, "measured_ms": 4.0,
+               "pairs": [[1.0, 1.5], [2.0, 2.5]], "rank_correlation": 1.0}
+        other = {**row, "program": "warp", "kind": "operators", "pairs": [[0.5, 9.0]], "rank_correlation": None}
+        page = self.record("model", {"programs": [row, other]}, PAGE.replace("programs", "model"))
+        self.assertIn("| blur (kernel) | 2 | 1.00 | 3.00 | 4.00 |\n| warp (operator) | 1 | - | 3.00 | 4.00 |\n"
+                      "| all | 3 | -0.50 |", page)
+
+    def test_decisions_are_medians_beside_all_of_them(self):
+        report = {"warp": {"": [1.0, 2.0, 9.0], "slices": [4.0], "all": None}}
+        report["warp"].update({key: [2.0] for key in decisions.DECISIONS if key != "slices"})
+        page = self.record("decisions", report, PAGE.replace("programs", "decisions"))
+        self.assertIn("| with every decision | 2.0 |", page)
+        self.assertIn("| without `slices` | 4.0 (×2.00) |", page)
+        self.assertIn("| without all of them | failed |", page)
 
     def test_a_section_that_the_page_lacks_is_an_error_that_changes_nothing(self):
         self.assertEqual(self.record("kernels", [PAIR]), PAGE)

@@ -108,6 +108,24 @@ def number(value):
     return "-" if value is None else f"{value:.2f}"
 
 
+HEAD = "| program | stages | rank correlation | predicted ms | measured ms |\n|---|---|---|---|---|"
+
+
+def line(row):
+    return (f"| {row['program']} ({row['kind'][:-1]}) | {len(row['pairs'])} | {number(row['rank_correlation'])} | "
+            f"{row['predicted_ms']:.2f} | {row['measured_ms']:.2f} |")
+
+
+def last_line(rows):
+    every = [p for row in rows for p in row["pairs"]]
+    totals = [(row["predicted_ms"], row["measured_ms"]) for row in rows]
+    return f"| all | {len(every)} | {number(spearman(every))} | of totals | {number(spearman(totals))} |"
+
+
+def table(report):
+    return "\n".join([HEAD, *map(line, report["programs"]), last_line(report["programs"])]) + "\n"
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("programs")
@@ -118,7 +136,7 @@ def main():
     parser.add_argument("--plot")
     options = parser.parse_args()
     rows = []
-    print("| program | stages | rank correlation | predicted ms | measured ms |\n|---|---|---|---|---|")
+    print(HEAD)
     for kind, name in programs():
         if options.program and name not in options.program:
             continue
@@ -129,13 +147,10 @@ def main():
         pairs = pairs_of(report)
         row = {"program": name, "kind": kind, "pairs": pairs, "rank_correlation": spearman(pairs), **report}
         rows.append(row)
-        print(f"| {name} ({kind[:-1]}) | {len(pairs)} | {number(row['rank_correlation'])} | "
-              f"{report['predicted_ms']:.2f} | {report['measured_ms']:.2f} |", flush=True)
+        print(line(row), flush=True)
         with open(options.output, "w", encoding="utf-8") as file:
             json.dump({"programs": rows}, file, indent=1)
-    every = [p for row in rows for p in row["pairs"]]
-    totals = [(row["predicted_ms"], row["measured_ms"]) for row in rows]
-    print(f"| all | {len(every)} | {number(spearman(every))} | of totals | {number(spearman(totals))} |")
+    print(last_line(rows))
     if options.plot and rows:
         draw(rows, options.plot)
     sys.exit(0 if rows else 1)
