@@ -19,6 +19,7 @@ namespace {
 
 // Iterations of a loop, or reads of a reduction, of which nothing is known.
 constexpr double several = 8;
+constexpr double sums_at_once = 16;  // in registers
 
 struct Loop {
   std::string name;
@@ -76,21 +77,22 @@ std::optional<double> iterations_a_value(const Expr& any_index, std::vector<Loop
   }
   auto form = decompose(index, names_of(loops));
   if (!form) return std::nullopt;
-  double iterations = 1, reach = 1, steps = 1;
-  bool is_long = false;
+  double iterations = 1, reach = 1;
+  // Of the long ones, those of larger steps go over what the one of the smallest leaves, as the parts of a
+  // sum go over its rows.
+  std::optional<double> smallest_step;
   for (size_t i = 0; i < loops.size(); ++i) {
     const double step = std::abs(static_cast<double>(form->coefficients[i].second));
     if (step == 0 || loops[i].is_decided) continue;
     loops[i].is_used = true;
-    is_long |= loops[i].is_long;
     if (loops[i].is_long) {
-      steps *= step;
+      smallest_step = std::min(smallest_step.value_or(step), step);
     } else {
       iterations *= loops[i].extent;
       reach += step * (loops[i].extent - 1);
     }
   }
-  return is_long ? iterations / steps : std::max(1.0, iterations / reach);
+  return smallest_step ? iterations / *smallest_step : std::max(1.0, iterations / reach);
 }
 
 }  // namespace
@@ -109,10 +111,13 @@ double reads_an_element(const Call& call, const FuncContents& reader, const Defi
     reads *= *found;
     if (Loop* decided = only_loop(arg, loops)) decided->is_decided = true;
   }
+  double repeats = 1;
   for (const Loop& loop : loops) {
-    if (!loop.is_used) reads *= loop.extent;
+    if (!loop.is_used) repeats *= loop.extent;
   }
-  return reads;
+  // A block of a sum is made for several elements at once, in registers, from one read.
+  if (reader.made && reader.made->blocks > 0) repeats = std::max(1.0, repeats / sums_at_once);
+  return reads * repeats;
 }
 
 Expr unclamped(const Expr& e, const std::function<bool(const Expr&)>& moves) {

@@ -721,7 +721,8 @@ double reads(const Func& reader, const Func& read) {
 TEST_F(DefaultSchedule, KnowsHowOftenAnElementIsRead) {
   Func pointwise("pointwise"), twice("twice"), halves("halves"), up("up"), stencil("stencil"),
       strided("strided"), image_sum("image_sum"), along("along"), clamped("clamped"),
-      shifted("shifted"), inside("inside");
+      shifted("shifted"), inside("inside"), parts("parts");
+  Var part("part");
   RDom r(0, 5), strip(0, 8), image(0, 30, 0, 40);
   pointwise(x, y) = heavy(y, x + 3);
   twice(x, y) = heavy(x, y) + heavy(x + 1, y);
@@ -752,6 +753,31 @@ TEST_F(DefaultSchedule, KnowsHowOftenAnElementIsRead) {
   EXPECT_EQ(reads(clamped, heavy), 5);
   EXPECT_EQ(reads(shifted, heavy), 40 + 15) << "one index says which, the other loop is idle";
   EXPECT_EQ(reads(inside, heavy), 5);
+  parts(x, y, part) = heavy(x, 16 * part + y);
+  EXPECT_EQ(reads(parts, heavy), 1) << "y goes over the rows of a part";
+}
+
+// Each of six sums over the pixels takes the adjoint of a place, which looks the image up four times.
+TEST_F(DefaultSchedule, WhatManyCutSumsReadIsStored) {
+  ImageParam image(Float(32), 2, "image"), motion(Float(32), 1, "motion");
+  Func u("u"), v("v"), seen("seen"), error("error");
+  const Expr across = cast<float>(x) / 512.0f, down = cast<float>(y) / 512.0f;
+  u(x, y) = 512.0f * (motion(0) * across + motion(1) * down + motion(2));
+  v(x, y) = 512.0f * (motion(3) * across + motion(4) * down + motion(5));
+  const Expr i = clamp(cast<int>(floor(u(x, y))), 0, 510),
+             j = clamp(cast<int>(floor(v(x, y))), 0, 510);
+  const Expr s = u(x, y) - cast<float>(i), t = v(x, y) - cast<float>(j);
+  seen(x, y) =
+      lerp(lerp(image(i, j), image(i + 1, j), s), lerp(image(i, j + 1), image(i + 1, j + 1), s), t);
+  const RDom r(0, 512, 0, 512);
+  error() = 0.0f;
+  error() += seen(r.x, r.y) * seen(r.x, r.y);
+  image.dim(0).set_bounds(0, 512), image.dim(1).set_bounds(0, 512), motion.dim(0).set_bounds(0, 6);
+  AdjointOptions options;
+  options.wrt = {motion};
+  const Derivative d = propagate_adjoints(error, options);
+  EXPECT_TRUE(is_stored(d(motion), d.adjoint(u)));
+  EXPECT_TRUE(is_stored(d(motion), d.adjoint(v)));
 }
 
 TEST_F(DefaultSchedule, StoresADivisionThatIsReadOften) {
