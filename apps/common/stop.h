@@ -1,8 +1,8 @@
 // stop.h -- Ctrl-C ends a run in good order.
 //
 // The first SIGINT or SIGTERM only sets a flag: loops ask stop_requested() after each step, and the
-// program then writes its best result so far and its report, and ends with status 0. The second one
-// ends the program at once, as if nobody had asked for signals.
+// program then writes its best result so far and its report, and ends with status 0. A second one, 0.2 s
+// later at least, ends the program at once, as if nobody had asked for signals.
 #pragma once
 
 namespace apps {

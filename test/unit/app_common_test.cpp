@@ -3,9 +3,11 @@
 #include <signal.h>
 
 #include <CLI/CLI.hpp>
+#include <chrono>
 #include <fstream>
 #include <iterator>
 #include <nlohmann/json.hpp>
+#include <thread>
 
 #include "common/files.h"
 #include "common/images.h"
@@ -168,11 +170,21 @@ TEST(AppStop, ASignalSetsTheFlag) {
   apps::request_stop(false);
 }
 
+// As timeout(1) sends it, to a program and to the program's group.
+TEST(AppStop, ASignalSentTwiceAtOnceIsOne) {
+  apps::catch_stop_signals();
+  ::raise(SIGINT);
+  ::raise(SIGINT);
+  EXPECT_TRUE(apps::stop_requested());
+  apps::request_stop(false);
+}
+
 TEST(AppStopDeathTest, TheSecondSignalEnds) {
   EXPECT_EXIT(
       {
         apps::catch_stop_signals();
         ::raise(SIGINT);
+        std::this_thread::sleep_for(std::chrono::milliseconds(250));
         ::raise(SIGINT);
       },
       testing::KilledBySignal(SIGINT), "");
