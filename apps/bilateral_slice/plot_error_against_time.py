@@ -4,13 +4,9 @@
 usage: plot_error_against_time.py report.json plot.png
 """
 import json
-import os
 import sys
 
-import matplotlib
-
-matplotlib.use("Agg")
-import matplotlib.pyplot as plt  # noqa: E402
+from figures import plt, save
 
 
 def add_curve(axes, name, curve, ms_per_step):
@@ -31,14 +27,7 @@ def draw(report, path):
     axes.grid(alpha=0.3)
     axes.legend(loc="lower right")
     figure.tight_layout()
-    # Whole or not at all: drawn beside the plot, then renamed.
-    temporary = f"{path}.{os.getpid()}.tmp"
-    try:
-        figure.savefig(temporary, format="png")
-        os.replace(temporary, path)
-    finally:
-        if os.path.exists(temporary):
-            os.remove(temporary)
+    save(figure, path)
 
 
 def main():

@@ -7,10 +7,7 @@ import json
 import os
 import sys
 
-import matplotlib
-
-matplotlib.use("Agg")
-import matplotlib.pyplot as plt  # noqa: E402
+from figures import plt, save
 
 
 def drawable(series, plot):
@@ -49,15 +46,7 @@ def draw(plot, path):
     if any(series["name"] for series in plot["series"]):
         axes.legend()
     figure.tight_layout()
-    # Whole or not at all: drawn beside the plot, then renamed.
-    temporary = f"{path}.{os.getpid()}.tmp"
-    try:
-        figure.savefig(temporary, format="png")
-        os.replace(temporary, path)
-    finally:
-        plt.close(figure)
-        if os.path.exists(temporary):
-            os.remove(temporary)
+    save(figure, path)
 
 
 def main():

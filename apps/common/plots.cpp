@@ -14,10 +14,9 @@ namespace {
 
 std::filesystem::path find_script(const std::string& script_name) {
   const auto here = program_folder();
-  // Installed; beside the program; and where the build keeps those that all apps and tests share.
-  for (const auto& place :
-       {here / ".." / "share" / "retrograde" / script_name, here / script_name,
-        here / ".." / "common" / script_name, here / ".." / "apps" / "common" / script_name}) {
+  // Of what is installed, and of the build's tests; and of the build's programs, apps/NAME/NAME.
+  for (const auto& above : {here / "..", here / ".." / ".."}) {
+    const auto place = above / "share" / "retrograde" / script_name;
     if (std::filesystem::exists(place)) return place;
   }
   return script_name;

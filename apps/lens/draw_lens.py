@@ -7,26 +7,11 @@ import json
 import os
 import sys
 
-import matplotlib
-
-matplotlib.use("Agg")
-import matplotlib.pyplot as plt  # noqa: E402
+from figures import plt, save
 
 WAVELENGTH_COLOURS = ["#2255cc", "#229944", "#cc3322"]
 FIELD_COLOURS = ["#1f77b4", "#2ca02c", "#ff7f0e", "#d62728"]
 GLASS = "#cfe3f2"
-
-
-def save(figure, path):
-    # Whole or not at all: drawn beside the picture, then renamed.
-    temporary = f"{path}.{os.getpid()}.tmp"
-    try:
-        figure.savefig(temporary, format="png")
-        os.replace(temporary, path)
-    finally:
-        plt.close(figure)
-        if os.path.exists(temporary):
-            os.remove(temporary)
 
 
 def draw_glass(axes, profiles):

@@ -235,7 +235,7 @@ class AppReport : public testing::Test {
   }
 
   static std::string script() {
-    return (apps::program_folder() / ".." / "apps" / "common" / "make_index.py").string();
+    return (apps::program_folder() / ".." / "share" / "retrograde" / "make_index.py").string();
   }
   apps::Outcome make_index() {
     return apps::run_program({"/usr/bin/python3", script(), folder_.path()});
