@@ -8,6 +8,7 @@
 #   retrograde_dep_image           OpenImageIO, for apps
 #   retrograde_dep_sqlite         for tools/tune
 #   retrograde_dep_ceres           L-BFGS and conjugate gradients, for apps
+#   retrograde_dep_opencv          features and homographies of images, for apps
 #   retrograde_dep_cli, retrograde_dep_json   command lines and reports, for apps
 find_package(PkgConfig REQUIRED)
 find_package(Threads REQUIRED)
@@ -71,6 +72,15 @@ target_include_directories(retrograde_dep_ceres SYSTEM INTERFACE ${RETROGRADE_CE
   ${RETROGRADE_EIGEN_INCLUDE})
 target_link_libraries(retrograde_dep_ceres INTERFACE ${RETROGRADE_CERES_LIBRARY}
   ${RETROGRADE_GLOG_LIBRARY})
+
+# By hand: its CMake package comes only with the development packages of all of OpenCV.
+find_path(RETROGRADE_OPENCV_INCLUDE opencv2/calib3d.hpp PATH_SUFFIXES opencv4 REQUIRED)
+add_library(retrograde_dep_opencv INTERFACE)
+target_include_directories(retrograde_dep_opencv SYSTEM INTERFACE ${RETROGRADE_OPENCV_INCLUDE})
+foreach(module calib3d features2d core)
+  find_library(RETROGRADE_OPENCV_${module} opencv_${module} REQUIRED)
+  target_link_libraries(retrograde_dep_opencv INTERFACE ${RETROGRADE_OPENCV_${module}})
+endforeach()
 
 find_path(RETROGRADE_CLI_INCLUDE CLI/CLI.hpp REQUIRED)
 add_library(retrograde_dep_cli INTERFACE)

@@ -1,72 +1,18 @@
 #include "one_picture.h"
 
-#include <algorithm>
-#include <cctype>
 #include <cmath>
 
 #include "common/images.h"
 #include "demosaicker.h"
 #include "diagnostics/error.h"
 #include "photographs.h"
+#include "sensor.h"
 
 namespace demosaic {
 
-using retrograde::quoted;
 using retrograde::text;
 
 namespace {
-
-// A mosaic that begins with red: others get a mirrored column, row or both put before them.
-struct Sensor {
-  int width = 0, height = 0, bits = 16;
-  int left = 0, top = 0;       // what was put before
-  std::vector<float> samples;  // in sRGB's encoding
-};
-
-bool is_raw(const std::filesystem::path& path) {
-  static const std::vector<std::string> suffixes{".dng", ".cr2", ".cr3", ".nef", ".arw",
-                                                 ".orf", ".raf", ".rw2", ".pef", ".srw"};
-  std::string suffix = path.extension().string();
-  for (char& c : suffix) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  return std::find(suffixes.begin(), suffixes.end(), suffix) != suffixes.end();
-}
-
-Sensor begin_with_red(const apps::Image& mosaic, const std::string& pattern, bool is_light) {
-  const int left = pattern[0] == 'G' ? (pattern[1] == 'R' ? 1 : 0) : (pattern[0] == 'B' ? 1 : 0);
-  const int top = pattern[0] == 'G' ? (pattern[1] == 'R' ? 0 : 1) : (pattern[0] == 'B' ? 1 : 0);
-  Sensor sensor{mosaic.width + left, mosaic.height + top, mosaic.bits, left, top, {}};
-  for (int y = 0; y < sensor.height; ++y) {
-    for (int x = 0; x < sensor.width; ++x) {
-      const auto from = static_cast<size_t>(mirrored(y - top, mosaic.height)) *
-                            static_cast<size_t>(mosaic.width) +
-                        static_cast<size_t>(mirrored(x - left, mosaic.width));
-      const float value = mosaic.pixels[from];
-      sensor.samples.push_back(is_light ? encoded(value) : std::clamp(value, 0.0f, 1.0f));
-    }
-  }
-  return sensor;
-}
-
-Sensor read_sensor(const Options& options) {
-  const auto& path = options.common.input;
-  const apps::Mosaic mosaic = apps::read_mosaic(path);
-  const std::string pattern = options.pattern.empty() ? mosaic.pattern : options.pattern;
-  const std::string colours = "RGGB GRBG GBRG BGGR";
-  if (pattern.size() != 4 || colours.find(pattern) == std::string::npos) {
-    retrograde::call_error(text("demosaic ", quoted(path.string())),
-                           "a mosaic begins with RGGB, GRBG, GBRG or BGGR",
-                           pattern.empty() ? std::string("the file does not say with which")
-                                           : text("the file says ", quoted(pattern)),
-                           "Give --mosaic with the colours of its first two rows");
-  }
-  if (mosaic.image.width < 2 || mosaic.image.height < 2) {
-    retrograde::call_error(
-        text("demosaic ", quoted(path.string())), "a mosaic needs a whole cell, 2 x 2 samples",
-        text("it has ", mosaic.image.width, " x ", mosaic.image.height), "Give a larger one");
-  }
-  // What a sensor measures is linear in light.
-  return begin_with_red(mosaic.image, pattern, is_raw(path) || mosaic.image.bits == 32);
-}
 
 void write_planes(const Options& options, const std::string& name, const Sensor& size,
                   std::span<const float> planes) {
@@ -98,7 +44,7 @@ void write_result(const Options& options, const Sensor& sensor, const std::vecto
 }
 
 void demosaic_mosaic(const Options& options, const Weights& weights, apps::Report& report) {
-  Sensor sensor = read_sensor(options);
+  Sensor sensor = read_sensor(options.common.input, options.pattern);
   Demosaicker method = Demosaicker::relaxed(weights, options.common.threads);
   const auto planes = method.run(sensor.samples, sensor.width, sensor.height);
   write_result(options, sensor, planes);

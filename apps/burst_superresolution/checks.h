@@ -1,0 +1,18 @@
+// checks.h -- --check-gradients and --check-stability of burst_superresolution, on a small part of a burst.
+#pragma once
+
+#include <vector>
+
+#include "burst.h"
+#include "common/checks.h"
+
+namespace burst {
+
+// By the picture and by the homographies, with all features, away from kinks.
+std::vector<apps::GradientRow> check_gradients(const Burst& burst, uint64_t seed);
+
+// Homographies that are nearly singular or look beyond the picture, identical frames, saturated and black ones:
+// float32 against double, and Adam with a large rate.
+std::vector<apps::StabilityRow> check_stability(const Burst& burst, uint64_t seed, int threads);
+
+}  // namespace burst

@@ -1,0 +1,209 @@
+// fit.cpp -- see fit.h.
+#include "fit.h"
+
+#include <algorithm>
+#include <chrono>
+#include <optional>
+
+#include "common/adam.h"
+#include "common/state.h"
+#include "common/stop.h"
+#include "diagnostics/error.h"
+#include "quality.h"
+
+namespace burst {
+
+using retrograde::quoted;
+using retrograde::text;
+
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+constexpr const char* program = "burst_superresolution";
+constexpr double save_every_seconds = 20;
+constexpr long looks = 60;  // at the truth, over the whole run
+constexpr double explosion = 10;
+
+double seconds_since(Clock::time_point start) {
+  return std::chrono::duration<double>(Clock::now() - start).count();
+}
+
+// What must be the same for a run to go on.
+std::string problem_of(const Options& options, const Burst& burst, double smoothness) {
+  return text(options.common.input.filename().string(), ", ", burst.frames(), " frames of ",
+              burst.size.width, " x ", burst.size.height, ", seed ", options.common.seed,
+              ", smoothness ", smoothness, ", optimizing ", options.moves.image ? "the image " : "",
+              options.moves.homographies ? "the motion" : "");
+}
+
+class Optimization {
+ public:
+  Optimization(const Options& options, const Burst& burst, const Prepared& prepared,
+               Evaluator<float>& evaluator)
+      : options_(options),
+        burst_(burst),
+        evaluator_(evaluator),
+        problem_(problem_of(options, burst, prepared.smoothness)),
+        x_(joined(prepared.first, prepared.homographies)),
+        gradient_(x_.size()),
+        adam_({{evaluator.shape().image_elems(), image_rate},
+               {evaluator.shape().motion_elems(), motion_rate}},
+              {.schedule = apps::exponential_schedule(options.common.steps, last_rate),
+               .explosion = explosion}) {
+    if (options.common.resume) resume();
+  }
+
+  Fit run(const std::function<void(const Sample&)>& shown) {
+    auto saved = Clock::now();
+    while (step()) {
+      shown(fit_.series.back());
+      if (seconds_since(saved) < save_every_seconds) continue;
+      save();
+      saved = Clock::now();
+    }
+    shown(fit_.series.back());
+    save();
+    fit_.refused = adam_.refused();
+    fit_.stopped = apps::stop_requested();
+    fit_.ms_per_step = 1e3 * median_step_seconds();
+    return std::move(fit_);
+  }
+
+ private:
+  std::filesystem::path file() const { return options_.common.output / "state.bin"; }
+
+  bool is_over() const {
+    const double limit = options_.common.seconds;
+    return fit_.steps >= options_.common.steps || apps::stop_requested() ||
+           (limit > 0 && fit_.seconds >= limit);
+  }
+
+  // The loss where the run is, and unless it is over, a step from there.
+  bool step() {
+    const auto start = Clock::now();
+    const double loss = evaluator_.evaluate(x_, gradient_);
+    if (loss < fit_.loss) {
+      fit_.loss = loss;
+      fit_.x = x_;
+    }
+    if (fit_.series.empty() && !std::isfinite(loss)) refuse_start(loss);
+    const bool over = is_over();
+    look(loss, over);
+    if (over) return false;
+    adam_.step(std::span<float>(x_), loss, std::span<const float>(gradient_));
+    step_seconds_.push_back(seconds_since(start) - looking_);
+    fit_.seconds += step_seconds_.back();
+    ++fit_.steps;
+    return true;
+  }
+
+  // Its time does not count.
+  void look(double loss, bool over) {
+    const auto start = Clock::now();
+    Sample sample{fit_.steps, fit_.seconds, loss};
+    const long every = std::max(options_.common.steps / looks, 1L);
+    if (burst_.truth && (fit_.steps % every == 0 || over)) {
+      const Shape& shape = evaluator_.shape();
+      Fit now;
+      now.x = x_;
+      sample.psnr_db = psnr_db(now.picture(shape), *burst_.truth, shape.size);
+      if (shape.frames > 1) {
+        sample.motion_error =
+            motion_error(now.homographies(shape), burst_.truth->homographies, shape.size).mean;
+      }
+    }
+    // Where a run went on, its first sample is the last one's.
+    if (!fit_.series.empty() && fit_.series.back().step == sample.step) fit_.series.pop_back();
+    fit_.series.push_back(sample);
+    looking_ = seconds_since(start);
+  }
+
+  [[noreturn]] static void refuse_start(double loss) {
+    retrograde::call_error("optimize from this start", "the loss must be finite there",
+                           text("it is ", loss), "Give other frames");
+  }
+
+  double median_step_seconds() {
+    if (step_seconds_.empty()) return 0;
+    const auto middle = step_seconds_.begin() + static_cast<long>(step_seconds_.size() / 2);
+    std::nth_element(step_seconds_.begin(), middle, step_seconds_.end());
+    return *middle;
+  }
+
+  void save() const {
+    apps::State state{.program = program, .step = fit_.steps, .seconds = fit_.seconds};
+    state.words["problem"] = problem_;
+    state.put("x", x_);
+    state.put("best", fit_.x);
+    state.arrays["best_loss"] = {fit_.loss};
+    std::vector<double> series;
+    for (const Sample& s : fit_.series) {
+      series.insert(series.end(),
+                    {static_cast<double>(s.step), s.seconds, s.loss, s.psnr_db, s.motion_error});
+    }
+    state.arrays["series"] = series;
+    adam_.save(state, "adam");
+    apps::write_state(file(), state);
+  }
+
+  void resume() {
+    const apps::State state = apps::read_state(file(), program);
+    const auto before = state.words.find("problem");
+    if (before == state.words.end() || before->second != problem_) {
+      retrograde::call_error(
+          text("go on with ", quoted(file().string())), "a run goes on with what it began with",
+          text("it began with ", before == state.words.end() ? "nothing" : before->second,
+               "; this is ", problem_),
+          "Give the same options, or leave --resume out");
+    }
+    state.get("x", std::span<float>(x_));
+    fit_.x.resize(x_.size());
+    state.get("best", std::span<float>(fit_.x));
+    fit_.loss = state.array("best_loss", 1)[0];
+    const auto series = state.arrays.find("series");
+    for (size_t n = 0; series != state.arrays.end() && n + 4 < series->second.size(); n += 5) {
+      const double* s = series->second.data() + n;
+      fit_.series.push_back({static_cast<long>(s[0]), s[1], s[2], s[3], s[4]});
+    }
+    adam_.restore(state, "adam");
+    fit_.steps = state.step;
+    fit_.seconds = state.seconds;
+  }
+
+  const Options& options_;
+  const Burst& burst_;
+  Evaluator<float>& evaluator_;
+  const std::string problem_;
+  std::vector<float> x_, gradient_;
+  apps::Adam adam_;
+  Fit fit_;
+  std::vector<double> step_seconds_;
+  double looking_ = 0;
+};
+
+}  // namespace
+
+std::vector<Homography> Fit::homographies(const Shape& shape) const {
+  std::vector<Homography> out(static_cast<size_t>(shape.frames));
+  auto from = x.begin() + static_cast<long>(shape.image_elems());
+  for (Homography& h : out) {
+    std::copy_n(from, h.size(), h.begin());
+    from += homography_params;
+  }
+  return out;
+}
+
+std::vector<float> joined(std::span<const float> picture,
+                          std::span<const Homography> homographies) {
+  std::vector<float> x(picture.begin(), picture.end());
+  for (const Homography& h : homographies) x.insert(x.end(), h.begin(), h.end());
+  return x;
+}
+
+Fit fit(const Options& options, const Burst& burst, const Prepared& prepared,
+        Evaluator<float>& evaluator, const std::function<void(const Sample&)>& shown) {
+  return Optimization(options, burst, prepared, evaluator).run(shown);
+}
+
+}  // namespace burst

@@ -1,0 +1,52 @@
+// fit.h -- the optimization: steps of Adam on the picture and the homographies, from a start, until they are done,
+// the seconds are over or somebody stops it.
+#pragma once
+
+#include <functional>
+#include <limits>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "burst.h"
+#include "evaluator.h"
+#include "options.h"
+#include "prepare.h"
+
+namespace burst {
+
+// Of Adam, for the first step; they fall by a constant factor to `last_rate` of it.
+inline constexpr double image_rate = 1e-2, motion_rate = 1e-4, last_rate = 0.1;
+
+// After so many steps; quality where the truth is known, else NaN.
+struct Sample {
+  long step = 0;
+  double seconds = 0;  // of optimizing
+  double loss = 0;
+  double psnr_db = std::numeric_limits<double>::quiet_NaN();
+  double motion_error = std::numeric_limits<double>::quiet_NaN();  // pixels, mean
+};
+
+struct Fit {
+  std::vector<float> x;  // the best point: the picture, then the homographies (evaluator.h)
+  double loss = std::numeric_limits<double>::infinity();
+  std::vector<Sample> series;  // from the start on
+  long steps = 0, refused = 0;
+  double seconds = 0, ms_per_step = 0;  // the median
+  bool stopped = false;
+
+  std::span<const float> picture(const Shape& shape) const {
+    return std::span(x).first(shape.image_elems());
+  }
+  std::vector<Homography> homographies(const Shape& shape) const;
+};
+
+// x of a picture and homographies.
+std::vector<float> joined(std::span<const float> picture, std::span<const Homography> homographies);
+
+// Keeps options.common.output / "state.bin" as new as twenty seconds, and writes it at the end; --resume goes on
+// from it. `shown` gets each step's sample. Throws retrograde::Error.
+Fit fit(const Options& options, const Burst& burst, const Prepared& prepared,
+        Evaluator<float>& evaluator, const std::function<void(const Sample&)>& shown);
+
+}  // namespace burst

@@ -1,0 +1,76 @@
+// options.cpp -- see options.h.
+#include "options.h"
+
+#include <CLI/CLI.hpp>
+
+#include "diagnostics/error.h"
+
+namespace burst {
+
+namespace {
+
+constexpr long usual_steps = 300;
+constexpr const char* image_group = "image";
+constexpr const char* motion_group = "homographies";
+constexpr const char* both_groups = "both";
+
+void add_simulation_options(CLI::App& cli, Simulation& s) {
+  cli.add_option("--frames", s.frames, "of a photograph: how many frames are made of it")
+      ->capture_default_str();
+  cli.add_option("--shake", s.shake, "how far the camera moves between them, in pixels")
+      ->capture_default_str();
+  cli.add_option("--rotation", s.rotation, "and how far it turns, in degrees")
+      ->capture_default_str();
+  cli.add_option("--noise", s.noise, "standard deviation of each sample; 1 is white")
+      ->capture_default_str();
+  cli.add_option("--frame-size", s.frame_size,
+                 "frames have so many pixels along each side at most; 0: what the photograph gives")
+      ->capture_default_str();
+}
+
+void check(const Options& options) {
+  const Simulation& s = options.simulation;
+  apps::require_in_range("--frames", s.frames, 1, 1000);
+  apps::require_in_range("--shake", s.shake, 0, 1000);
+  apps::require_in_range("--rotation", s.rotation, 0, 20);
+  apps::require_in_range("--noise", s.noise, 0, 1);
+  if (s.frame_size != 0) apps::require_in_range("--frame-size", s.frame_size, least_side, 100'000);
+  if (options.smoothness) apps::require_in_range("--lambda", *options.smoothness, 0, 1e6);
+}
+
+Moves moves_of(const apps::CommonOptions& common) {
+  const bool both = apps::optimizes(common, both_groups);
+  return {both || apps::optimizes(common, image_group),
+          both || apps::optimizes(common, motion_group)};
+}
+
+}  // namespace
+
+std::optional<Options> read_options(int argc, char** argv) {
+  Options options;
+  CLI::App cli(
+      "Makes one colour picture of a burst of mosaics that a shaken camera took: the picture and "
+      "every frame's homography are found together, by gradient descent.");
+  apps::add_common_options(
+      cli, options.common,
+      {.input_text = "a folder of RAW frames (or images of one channel, with --mosaic), or a "
+                     "photograph, of which a burst is made whose truth is known",
+       .steps = usual_steps,
+       .optimize = {image_group, motion_group, both_groups}});
+  options.common.optimize = {both_groups};
+  add_simulation_options(cli, options.simulation);
+  cli.add_option(
+      "--mosaic", options.pattern,
+      "the colours of the first two rows of a folder's frames, as RGGB; RAW files say it");
+  cli.add_option("--lambda", options.smoothness,
+                 "weight of the differences of neighbours; without it, by the noise of the frames");
+  cli.add_flag("--write-frames", options.write_frames,
+               "the frames, too, as images of one channel, RGGB");
+  if (!apps::parse_command_line(cli, argc, argv, options.common)) return std::nullopt;
+  options.moves = moves_of(options.common);
+  options.simulation.seed = options.common.seed;
+  check(options);
+  return options;
+}
+
+}  // namespace burst

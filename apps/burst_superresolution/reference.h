@@ -1,0 +1,22 @@
+// reference.h -- the objective and its gradient again in plain C++ and double, pixel by pixel, derived by hand:
+// what the pipeline is tested against.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "objective.h"
+
+namespace burst::reference {
+
+struct Value {
+  double loss = 0;
+  std::vector<double> sampled;   // [frames, height, width]; 0 where a pixel lies beyond the picture
+  std::vector<double> gradient;  // by x, of all homographies
+};
+
+// x: the picture [3, height, width], then the homographies [frames, 8]. samples: [frames, height, width].
+Value objective(const Shape& shape, double smoothness, std::span<const double> x,
+                std::span<const float> samples);
+
+}  // namespace burst::reference
