@@ -13,7 +13,14 @@ namespace burst {
 namespace {
 
 constexpr int part_width = 24, part_height = 20, part_frames = 3;
-constexpr double smoothness = 1e-2;
+// Of both kinds.
+Smoothness part_smoothness() {
+  Smoothness smoothness;
+  for (const Colours colours : {Colours::Rgb, Colours::Opponent}) {
+    for (const auto& axis : axes_of(colours)) smoothness.push_back({axis, 1e-2});
+  }
+  return smoothness;
+}
 
 // A point and the frames that it is measured by.
 struct Case {
@@ -96,6 +103,10 @@ void bind(Objective& objective, const Shape& shape, const Case& at) {
   objective.image.set(filled<T>({width, height, 3}, all.first(shape.image_elems())));
   objective.homographies.set(
       filled<T>({homography_params, shape.frames}, all.subspan(shape.image_elems())));
+  std::vector<float> weights;
+  for (const ColourAxis& axis : part_smoothness())
+    weights.push_back(static_cast<float>(axis.weight));
+  objective.weights.set(filled<T>({static_cast<int>(weights.size())}, weights));
   objective.frames.set(filled<T>({width, height, shape.frames}, at.samples));
 }
 
@@ -186,7 +197,7 @@ apps::Problem problem_of(Evaluator<float>& evaluator) {
 
 std::vector<apps::GradientRow> check_gradients(const Burst& burst, uint64_t seed) {
   const Shape shape = part_shape(burst);
-  Objective objective(shape, smoothness);
+  Objective objective(shape, part_smoothness());
   bind<float>(objective, shape, ordinary(burst, seed));
   return apps::gradient_rows(retrograde::check_gradients(
       objective.loss, {}, {.wrt = {objective.image, objective.homographies}}));
@@ -194,9 +205,9 @@ std::vector<apps::GradientRow> check_gradients(const Burst& burst, uint64_t seed
 
 std::vector<apps::StabilityRow> check_stability(const Burst& burst, uint64_t seed, int threads) {
   const Shape shape = part_shape(burst);
-  Evaluator<float> in_float(shape, smoothness, {}, threads);
-  Evaluator<double> in_double(shape, smoothness, {}, threads);
-  Objective own(shape, smoothness), exact(shape, smoothness, lang::Float(64));
+  Evaluator<float> in_float(shape, part_smoothness(), {}, threads);
+  Evaluator<double> in_double(shape, part_smoothness(), {}, threads);
+  Objective own(shape, part_smoothness()), exact(shape, part_smoothness(), lang::Float(64));
   const apps::Problem problem = problem_of(in_float);
   std::vector<apps::StabilityRow> rows;
   for (const auto& [name, change] : hard_cases()) {

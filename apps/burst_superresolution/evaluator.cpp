@@ -3,16 +3,18 @@
 
 #include <algorithm>
 #include <chrono>
+#include <utility>
 
 #include "demosaic/demosaicker.h"
 
 namespace burst {
 
-std::vector<std::string> left_out(const Shape& shape, double smoothness, const Moves& moves) {
+std::vector<std::string> left_out(const Shape& shape, const Smoothness& smoothness,
+                                  const Moves& moves) {
   std::vector<std::string> out;
   if (shape.frames == 1)
     out.push_back("homographies and interpolation: there is one frame, which lies on the picture");
-  if (smoothness == 0) out.push_back("differences of neighbours: the smoothness has no weight");
+  if (smoothness.empty()) out.push_back("differences of neighbours: the smoothness has no weight");
   if (!moves.image) out.push_back("the adjoint of the picture, a scatter: it does not move");
   if (!moves.homographies && shape.frames > 1)
     out.push_back("the adjoints of places and homographies: they do not move");
@@ -20,11 +22,13 @@ std::vector<std::string> left_out(const Shape& shape, double smoothness, const M
 }
 
 template <typename T>
-Evaluator<T>::Evaluator(const Shape& shape, double smoothness, const Moves& moves, int threads)
+Evaluator<T>::Evaluator(const Shape& shape, const Smoothness& smoothness, const Moves& moves,
+                        int threads)
     : shape_(shape),
       moves_{moves.image, moves.homographies && shape.frames > 1},
       objective_(shape, smoothness, lang::type_of<T>()),
       adjoints_(differentiate()) {
+  set_smoothness(smoothness);
   const auto start = std::chrono::steady_clock::now();
   pipeline_ = lang::Pipeline(outputs());
   const auto target = lang::get_jit_target_from_environment();
@@ -55,6 +59,15 @@ void Evaluator<T>::set_frames(std::span<const float> samples) {
   lang::Buffer<T> frames(std::vector<int>{shape_.size.width, shape_.size.height, shape_.frames});
   std::copy(samples.begin(), samples.end(), frames.begin());
   objective_.frames.set(frames);
+}
+
+template <typename T>
+void Evaluator<T>::set_smoothness(const Smoothness& smoothness) {
+  if (smoothness.empty()) return;
+  lang::Buffer<T> weights(static_cast<int>(smoothness.size()));
+  for (size_t a = 0; a < smoothness.size(); ++a)
+    weights(static_cast<int>(a)) = static_cast<T>(smoothness[a].weight);
+  objective_.weights.set(weights);
 }
 
 template <typename T>

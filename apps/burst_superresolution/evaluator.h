@@ -15,18 +15,22 @@ struct Moves {
 };
 
 // What of the whole method is not in the compiled code, and why; a line each.
-std::vector<std::string> left_out(const Shape& shape, double smoothness, const Moves& moves);
+std::vector<std::string> left_out(const Shape& shape, const Smoothness& smoothness,
+                                  const Moves& moves);
 
 // T: float, or double for checks.
 template <typename T>
 class Evaluator {
  public:
-  Evaluator(const Shape& shape, double smoothness, const Moves& moves, int threads);
+  // Compiled for what of the smoothness there is; its weights may change.
+  Evaluator(const Shape& shape, const Smoothness& smoothness, const Moves& moves, int threads);
 
   const Shape& shape() const { return shape_; }
   size_t size() const { return shape_.image_elems() + shape_.motion_elems(); }
 
   void set_frames(std::span<const float> samples);  // [frames, height, width]
+  // Other weights of the same axes.
+  void set_smoothness(const Smoothness& smoothness);
 
   // x: the picture [3, height, width], then the homographies [frames, 8]; the gradient alike. Of what does not
   // move, and of the first homography, it is 0.

@@ -29,11 +29,16 @@ double seconds_since(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
 }
 
+std::string text_of(const Smoothness& smoothness) {
+  return retrograde::listed(smoothness, [](const ColourAxis& axis) { return text(axis.weight); });
+}
+
 // What must be the same for a run to go on.
-std::string problem_of(const Options& options, const Burst& burst, double smoothness) {
+std::string problem_of(const Options& options, const Burst& burst, const Smoothness& smoothness) {
   return text(options.common.input.filename().string(), ", ", burst.frames(), " frames of ",
               burst.size.width, " x ", burst.size.height, ", seed ", options.common.seed,
-              ", smoothness ", smoothness, ", optimizing ", options.moves.image ? "the image " : "",
+              ", smoothness ", text_of(smoothness), ", optimizing ",
+              options.moves.image ? "the image " : "",
               options.moves.homographies ? "the motion" : "");
 }
 

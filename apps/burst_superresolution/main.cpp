@@ -6,6 +6,7 @@
 #include "common/progress.h"
 #include "common/run_app.h"
 #include "options.h"
+#include "pilot.h"
 #include "results.h"
 
 namespace burst {
@@ -68,10 +69,11 @@ void run(const Options& options) {
     return write_table(options, apps::stability_table(rows));
   }
   apps::Report report(name, options.common);
-  const Prepared prepared = prepare(burst, options.smoothness, options.common.threads);
+  Prepared prepared = prepare(burst, options.colours, options.lambda, options.common.threads);
   Evaluator<float> evaluator({burst.size, burst.frames()}, prepared.smoothness, options.moves,
                              options.common.threads);
   evaluator.set_frames(burst.samples);
+  choose_smoothness(options, burst, prepared, evaluator);
   if (options.common.explain) print_explanation(options, prepared, evaluator);
   const Fit fit = fit_with_progress(options, burst, prepared, evaluator);
   const Run done{options, burst, prepared, evaluator, fit, evaluator.compile_seconds()};

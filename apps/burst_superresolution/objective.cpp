@@ -6,10 +6,11 @@ namespace burst {
 using lang::Expr;
 using lang::RDom;
 
-Objective::Objective(const Shape& shape, double smoothness, lang::Type scalar)
+Objective::Objective(const Shape& shape, const Smoothness& smoothness, lang::Type scalar)
     : image(scalar, 3, "image"),
       homographies(scalar, 2, "homographies"),
       frames(scalar, 3, "frames"),
+      weights(scalar, 1, "weights"),
       shape_(shape),
       scalar_(scalar) {
   if (shape.frames > 1) define_shift();
@@ -62,18 +63,29 @@ void Objective::define_sampled() {
   residual(x_, y_, i_) = lang::select(seen, sampled(x_, y_, i_) - frames(x_, y_, i_), number(0));
 }
 
-void Objective::define_loss(double smoothness) {
-  const int width = shape_.size.width, height = shape_.size.height;
-  const RDom r(0, width, 0, height, 0, shape_.frames, "sample");
+void Objective::define_loss(const Smoothness& smoothness) {
+  const RDom r(0, shape_.size.width, 0, shape_.size.height, 0, shape_.frames, "sample");
   loss() = number(0);
   loss() += residual(r.x, r.y, r.z) * residual(r.x, r.y, r.z);
-  if (smoothness == 0) return;
-  const RDom across(0, width - 1, 0, height, 0, 3, "across");
-  const RDom down(0, width, 0, height - 1, 0, 3, "down");
-  const Expr step_x = image(across.x + 1, across.y, across.z) - image(across.x, across.y, across.z);
-  const Expr step_y = image(down.x, down.y + 1, down.z) - image(down.x, down.y, down.z);
-  loss() += number(smoothness) * lang::abs(step_x);
-  loss() += number(smoothness) * lang::abs(step_y);
+  for (size_t a = 0; a < smoothness.size(); ++a)
+    add_differences(smoothness[a], weights(static_cast<int>(a)));
+}
+
+void Objective::add_differences(const ColourAxis& axis, const Expr& weight) {
+  const auto along = [&](const Expr& x, const Expr& y) {
+    Expr sum;
+    for (int c = 0; c < 3; ++c) {
+      const double share = axis.along[static_cast<size_t>(c)];
+      if (share == 0) continue;
+      const Expr term = share == 1 ? Expr(image(x, y, c)) : number(share) * image(x, y, c);
+      sum = sum.defined() ? sum + term : term;
+    }
+    return sum;
+  };
+  const int width = shape_.size.width, height = shape_.size.height;
+  const RDom across(0, width - 1, 0, height, "across"), down(0, width, 0, height - 1, "down");
+  loss() += weight * lang::abs(along(across.x + 1, across.y) - along(across.x, across.y));
+  loss() += weight * lang::abs(along(down.x, down.y + 1) - along(down.x, down.y));
 }
 
 }  // namespace burst

@@ -2,7 +2,7 @@
 //
 //   place(x, y, i)    where pixel (x, y) of frame i lies in the picture: its homography (homography.h)
 //   sampled(x, y, i)  the picture there, bilinear, in the colour that the mosaic has at (x, y): M H_i R
-//   loss              sum (sampled - frames)^2  +  smoothness (sum |dR/dx| + sum |dR/dy|)
+//   loss              sum (sampled - frames)^2  +  sum over axes a of  weight_a (sum |da.R/dx| + sum |da.R/dy|)
 //
 // A pixel that lies beyond the picture counts nothing. The gradient by the picture is a scatter to places that
 // data decide; that by the homographies is eight sums over each frame. At the kinks, derivatives are those of
@@ -11,11 +11,22 @@
 
 #include <retrograde/retrograde.h>
 
+#include <array>
+#include <vector>
+
 #include "homography.h"
 
 namespace burst {
 
 namespace lang = retrograde;
+
+// A direction in colour space, a unit vector, and the weight of the differences of neighbours along it.
+struct ColourAxis {
+  std::array<double, 3> along{};
+  double weight = 0;
+};
+// Red, green and blue by themselves, or light and two differences of colours; none: no smoothness.
+using Smoothness = std::vector<ColourAxis>;
 
 struct Shape {
   FrameSize size;
@@ -26,19 +37,22 @@ struct Shape {
 };
 
 struct Objective {
-  // With one frame there are no homographies, with no smoothness no differences, in what is compiled.
-  Objective(const Shape& shape, double smoothness, lang::Type scalar = lang::Float(32));
+  // With one frame there are no homographies, with no axes no differences, in what is compiled. The weights are
+  // inputs.
+  Objective(const Shape& shape, const Smoothness& smoothness, lang::Type scalar = lang::Float(32));
 
   lang::ImageParam image;         // [3, height, width]
   lang::ImageParam homographies;  // [frames, 8]
   lang::ImageParam frames;        // [frames, height, width]
+  lang::ImageParam weights;       // of the axes, in their order
   lang::Func shift_x{"shift_x"}, shift_y{"shift_y"}, depth{"depth"};
   lang::Func sampled{"sampled"}, residual{"residual"}, loss{"loss"};
 
  private:
   void define_shift();
   void define_sampled();
-  void define_loss(double smoothness);
+  void define_loss(const Smoothness& smoothness);
+  void add_differences(const ColourAxis& axis, const lang::Expr& weight);
   lang::Expr number(double value) const;
 
   Shape shape_;

@@ -35,7 +35,14 @@ void check(const Options& options) {
   apps::require_in_range("--rotation", s.rotation, 0, 20);
   apps::require_in_range("--noise", s.noise, 0, 1);
   if (s.frame_size != 0) apps::require_in_range("--frame-size", s.frame_size, least_side, 100'000);
-  if (options.smoothness) apps::require_in_range("--lambda", *options.smoothness, 0, 1e6);
+  if (options.lambda) apps::require_in_range("--lambda", *options.lambda, 0, 1e6);
+}
+
+Colours colours_named(const std::string& name) {
+  if (name == "rgb") return Colours::Rgb;
+  if (name == "opponent") return Colours::Opponent;
+  retrograde::call_error(retrograde::text("smooth the colours ", retrograde::quoted(name)),
+                         "they are rgb or opponent", "this is neither", "Give one of these names");
 }
 
 Moves moves_of(const apps::CommonOptions& common) {
@@ -62,12 +69,17 @@ std::optional<Options> read_options(int argc, char** argv) {
   cli.add_option(
       "--mosaic", options.pattern,
       "the colours of the first two rows of a folder's frames, as RGGB; RAW files say it");
-  cli.add_option("--lambda", options.smoothness,
+  cli.add_option("--lambda", options.lambda,
                  "weight of the differences of neighbours; without it, by the noise of the frames");
+  std::string colours = "rgb";
+  cli.add_option("--colours", colours,
+                 "whose differences: rgb, or opponent (light and two differences of colours)")
+      ->capture_default_str();
   cli.add_flag("--write-frames", options.write_frames,
                "the frames, too, as images of one channel, RGGB");
   if (!apps::parse_command_line(cli, argc, argv, options.common)) return std::nullopt;
   options.moves = moves_of(options.common);
+  options.colours = colours_named(colours);
   options.simulation.seed = options.common.seed;
   check(options);
   return options;

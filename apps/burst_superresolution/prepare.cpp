@@ -7,7 +7,6 @@
 #include "average.h"
 #include "demosaic/demosaicker.h"
 #include "diagnostics/error.h"
-#include "noise.h"
 #include "registration.h"
 
 namespace burst {
@@ -39,7 +38,7 @@ std::vector<float> demosaicked(demosaic::Demosaicker& ahd, const Burst& burst, i
 
 }  // namespace
 
-Prepared prepare(Burst& burst, std::optional<double> smoothness, int threads) {
+Prepared prepare(Burst& burst, Colours colours, std::optional<double> lambda, int threads) {
   const Stopwatch watch;
   Prepared prepared;
   prepared.noise = estimate_noise(burst);
@@ -68,8 +67,7 @@ Prepared prepare(Burst& burst, std::optional<double> smoothness, int threads) {
   prepared.average = average.take();
   prepared.seconds_to_average = watch.seconds();
   prepared.smoothness =
-      smoothness ? *smoothness
-                 : smoothness_for(prepared.noise, mean_difference(prepared.average, burst.size));
+      smoothness_for(prepared.noise, prepared.average, burst.size, colours, lambda);
   prepared.seconds = watch.seconds();
   return prepared;
 }

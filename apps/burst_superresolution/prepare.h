@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "burst.h"
+#include "noise.h"
 
 namespace burst {
 
@@ -13,14 +14,15 @@ struct Prepared {
       first;  // the first frame, demosaicked by AHD (apps/demosaic): [3, height, width]
   std::vector<float> average;            // the bicubic average of all frames
   std::vector<Homography> homographies;  // of each frame
-  double noise = 0, smoothness = 0;
+  double noise = 0;
+  Smoothness smoothness;
   // Since the frames were there.
   double seconds_to_first = 0, seconds_to_average = 0, seconds = 0;
 };
 
 // Frames that cannot be aligned are left out of the burst, which then has a note of it; but where they are, up to
-// noise, what the first is, their motion is none. `smoothness`: given, or as noise.h has it. Throws
+// noise, what the first is, their motion is none. The weights of the smoothness are those of noise.h. Throws
 // retrograde::Error.
-Prepared prepare(Burst& burst, std::optional<double> smoothness, int threads);
+Prepared prepare(Burst& burst, Colours colours, std::optional<double> lambda, int threads);
 
 }  // namespace burst

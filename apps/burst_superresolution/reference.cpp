@@ -37,13 +37,11 @@ class Sum {
     }
   }
 
-  void add_differences(double smoothness) {
-    for (int c = 0; c < 3; ++c) {
-      for (int y = 0; y < size_.height; ++y) {
-        for (int x = 0; x < size_.width; ++x) {
-          if (x + 1 < size_.width) add_difference(smoothness, at(x, y, c), at(x + 1, y, c));
-          if (y + 1 < size_.height) add_difference(smoothness, at(x, y, c), at(x, y + 1, c));
-        }
+  void add_differences(const ColourAxis& axis) {
+    for (int y = 0; y < size_.height; ++y) {
+      for (int x = 0; x < size_.width; ++x) {
+        if (x + 1 < size_.width) add_difference(axis, at(x, y, 0), at(x + 1, y, 0));
+        if (y + 1 < size_.height) add_difference(axis, at(x, y, 0), at(x, y + 1, 0));
       }
     }
   }
@@ -98,12 +96,17 @@ class Sum {
     for (size_t k = 0; k < terms.size(); ++k) value_.gradient[to + k] += terms[k];
   }
 
-  void add_difference(double smoothness, size_t from, size_t to) {
-    const double step = x_[to] - x_[from];
-    value_.loss += smoothness * std::abs(step);
+  // Between two pixels, by where their red is.
+  void add_difference(const ColourAxis& axis, size_t from, size_t to) {
+    double step = 0;
+    for (size_t c = 0; c < 3; ++c)
+      step += axis.along[c] * (x_[to + c * size_.pixels()] - x_[from + c * size_.pixels()]);
+    value_.loss += axis.weight * std::abs(step);
     const double sign = step > 0 ? 1 : step < 0 ? -1 : 0;
-    value_.gradient[to] += smoothness * sign;
-    value_.gradient[from] -= smoothness * sign;
+    for (size_t c = 0; c < 3; ++c) {
+      value_.gradient[to + c * size_.pixels()] += axis.weight * sign * axis.along[c];
+      value_.gradient[from + c * size_.pixels()] -= axis.weight * sign * axis.along[c];
+    }
   }
 
   const Shape& shape_;
@@ -115,11 +118,11 @@ class Sum {
 
 }  // namespace
 
-Value objective(const Shape& shape, double smoothness, std::span<const double> x,
+Value objective(const Shape& shape, const Smoothness& smoothness, std::span<const double> x,
                 std::span<const float> samples) {
   Sum sum(shape, x, samples);
   for (int n = 0; n < shape.frames; ++n) sum.add_frame(n);
-  sum.add_differences(smoothness);
+  for (const ColourAxis& axis : smoothness) sum.add_differences(axis);
   return sum.take();
 }
 

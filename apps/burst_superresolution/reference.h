@@ -16,7 +16,7 @@ struct Value {
 };
 
 // x: the picture [3, height, width], then the homographies [frames, 8]. samples: [frames, height, width].
-Value objective(const Shape& shape, double smoothness, std::span<const double> x,
+Value objective(const Shape& shape, const Smoothness& smoothness, std::span<const double> x,
                 std::span<const float> samples);
 
 }  // namespace burst::reference

@@ -155,7 +155,8 @@ void enter_run(const Run& run, apps::Report& report) {
   report.own["width"] = shape.size.width;
   report.own["height"] = shape.size.height;
   report.own["noise"] = run.prepared.noise;
-  report.own["lambda"] = run.prepared.smoothness;
+  for (const ColourAxis& axis : run.prepared.smoothness)
+    report.own["lambda"].push_back(axis.weight);
   report.own["loss"] = run.fit.loss;
   report.own["ms_per_step"] = run.fit.ms_per_step;
   report.own["refused_steps"] = run.fit.refused;
@@ -167,6 +168,16 @@ void enter_run(const Run& run, apps::Report& report) {
   for (const std::string& note : run.burst.notes) report.add_note(note);
   if (run.fit.stopped)
     report.add_note("It was stopped before its end; this is the best until then.");
+}
+
+std::string weights_of(const Smoothness& smoothness) {
+  std::string weights;
+  for (const ColourAxis& axis : smoothness) {
+    char weight[32];
+    std::snprintf(weight, sizeof weight, "%.4f", axis.weight);
+    weights += (weights.empty() ? "" : ", ") + std::string(weight);
+  }
+  return weights.empty() ? "none" : weights;
 }
 
 }  // namespace
@@ -183,9 +194,9 @@ void write_results(const Run& run, apps::Report& report) {
 
 void print_summary(const Run& run) {
   for (const std::string& note : run.burst.notes) std::printf("%s\n", note.c_str());
-  std::printf("%d frames of %d x %d, noise %.4f, lambda %.4f: loss %.5g after %ld steps%s\n",
+  std::printf("%d frames of %d x %d, noise %.4f, smoothness %s: loss %.5g after %ld steps%s\n",
               run.burst.frames(), run.burst.size.width, run.burst.size.height, run.prepared.noise,
-              run.prepared.smoothness, run.fit.loss, run.fit.steps,
+              weights_of(run.prepared.smoothness).c_str(), run.fit.loss, run.fit.steps,
               run.fit.stopped ? "; it was stopped" : "");
   for (const Method& m : methods_of(run)) {
     if (run.burst.truth)

@@ -19,7 +19,7 @@ struct Simulation {
   double rotation = 1;  // degrees
   double zoom = 0.002;  // relative
   double tilt = 0.002;  // h6 and h7
-  double noise = 0.02;  // standard deviation of each sample
+  double noise = 0.01;  // standard deviation of each sample
   int frame_size =
       0;  // frames are cut to so many pixels along each side at most; 0: as large as may be
   uint64_t seed = 1;

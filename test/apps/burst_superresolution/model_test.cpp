@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <random>
 
 #include "burst_superresolution/average.h"
@@ -81,10 +82,10 @@ TEST(Homography, ErrorIsADistanceInPixels) {
 TEST(Homography, ShakenCamerasDoNotMirrorOrZoomFar) {
   EXPECT_TRUE(is_small_motion({}, frame_size));
   EXPECT_TRUE(is_small_motion(some_homography(4, 0.05), frame_size));
-  EXPECT_FALSE(is_small_motion({-2, 0, 0, 0, 0, 0, 0, 0}, frame_size));        // mirrored
-  EXPECT_FALSE(is_small_motion({1, 0, 0, 0, 1, 0, 0, 0}, frame_size));         // four times as large
-  EXPECT_FALSE(is_small_motion({-0.5, 0, 0, 0, -0.5, 0, 0, 0}, frame_size));   // a fourth
-  EXPECT_FALSE(is_small_motion({0, 0, 0, 0, 0, 0, 0.9, 0}, frame_size));       // tilted
+  EXPECT_FALSE(is_small_motion({-2, 0, 0, 0, 0, 0, 0, 0}, frame_size));       // mirrored
+  EXPECT_FALSE(is_small_motion({1, 0, 0, 0, 1, 0, 0, 0}, frame_size));        // four times as large
+  EXPECT_FALSE(is_small_motion({-0.5, 0, 0, 0, -0.5, 0, 0, 0}, frame_size));  // a fourth
+  EXPECT_FALSE(is_small_motion({0, 0, 0, 0, 0, 0, 0.9, 0}, frame_size));      // tilted
   EXPECT_FALSE(is_small_motion({0, 0, 0, 0, 0, 0, std::nan(""), 0}, frame_size));
 }
 
@@ -127,8 +128,8 @@ TEST(Simulation, EveryFrameSeesAllThatCounts) {
   for (const Homography& h : burst.truth->homographies) {
     EXPECT_TRUE(is_small_motion(h, burst.size));
     const Homography to_frame = inverse(h, burst.size);
-    for (const auto& [x, y] : {std::pair{border, border}, {right, border}, {border, bottom},
-                               {right, bottom}}) {
+    for (const auto& [x, y] :
+         {std::pair{border, border}, {right, border}, {border, bottom}, {right, bottom}}) {
       const Place at = place_of(to_frame, burst.size, x, y);
       EXPECT_GE(at.x, 0);
       EXPECT_GE(at.y, 0);
@@ -157,26 +158,60 @@ TEST(Noise, IsFoundWhateverThePicture) {
   EXPECT_EQ(estimate_noise(black), 0);
 }
 
-TEST(Noise, AsksForSmoothness) {
-  EXPECT_DOUBLE_EQ(smoothness_for(0.02, 0.04), 0.02);
-  EXPECT_GT(smoothness_for(0.04, 0.04), smoothness_for(0.02, 0.04));
-  EXPECT_GT(smoothness_for(0.02, 0.01), smoothness_for(0.02, 0.04));
-  EXPECT_EQ(smoothness_for(0, 0.04), 1e-3);
-  EXPECT_TRUE(std::isfinite(smoothness_for(0.02, 0)));
+// 0.1 from each pixel to the next along x, in gray.
+std::vector<float> gray_ramp(const FrameSize& size) {
+  std::vector<float> planes(3 * size.pixels());
+  for (size_t n = 0; n < planes.size(); ++n)
+    planes[n] = 0.1f * static_cast<float>(n % static_cast<size_t>(size.width));
+  return planes;
 }
 
 TEST(Noise, DifferencesAreThoseOfNeighbours) {
   const FrameSize size{4, 3};
-  std::vector<float> planes(36);
-  for (size_t n = 0; n < planes.size(); ++n) planes[n] = 0.1f * static_cast<float>(n % 4);
-  EXPECT_NEAR(mean_difference(planes, size), 0.05, 1e-7);  // 0.1 along x, 0 along y
+  const auto ramp = gray_ramp(size);
+  EXPECT_NEAR(mean_difference(ramp, size, {0, 1, 0}), 0.05, 1e-7);  // 0.1 along x, 0 along y
+  const auto opponent = axes_of(Colours::Opponent);
+  EXPECT_NEAR(mean_difference(ramp, size, opponent[0]), 0.05 * std::sqrt(3.0), 1e-7);
+  EXPECT_NEAR(mean_difference(ramp, size, opponent[1]), 0, 1e-7);
+  EXPECT_NEAR(mean_difference(ramp, size, opponent[2]), 0, 1e-7);
+}
+
+TEST(Noise, ColoursAreAtRightAngles) {
+  for (const Colours colours : {Colours::Rgb, Colours::Opponent}) {
+    const auto axes = axes_of(colours);
+    for (size_t a = 0; a < 3; ++a) {
+      for (size_t b = 0; b < 3; ++b) {
+        double product = 0;
+        for (size_t c = 0; c < 3; ++c) product += axes[a][c] * axes[b][c];
+        EXPECT_NEAR(product, a == b ? 1 : 0, 1e-15);
+      }
+    }
+  }
+}
+
+TEST(Noise, AsksForSmoothness) {
+  const FrameSize size{8, 6};
+  const auto ramp = gray_ramp(size);
+  const auto weight = [&](double noise, std::optional<double> given) {
+    return smoothness_for(noise, ramp, size, Colours::Rgb, given).at(2).weight;
+  };
+  EXPECT_NEAR(weight(0.02, {}), 0.016, 1e-8);  // 2 0.02^2 / 0.05
+  EXPECT_NEAR(weight(0.04, {}), 0.064, 1e-8);
+  EXPECT_EQ(weight(0, {}), 1e-3);
+  EXPECT_EQ(weight(0.02, 0.5), 0.5);
+  EXPECT_TRUE(smoothness_for(0.02, ramp, size, Colours::Rgb, 0.0).empty());
+  const auto opponent = smoothness_for(0.02, ramp, size, Colours::Opponent, {});
+  EXPECT_TRUE(std::isfinite(opponent[1].weight));  // of differences that are 0
+  EXPECT_GT(opponent[1].weight, opponent[0].weight);
+  const auto given = smoothness_for(0.02, ramp, size, Colours::Opponent, 0.5);
+  EXPECT_NEAR(given[1].weight / given[0].weight, opponent[1].weight / opponent[0].weight, 1e-6);
 }
 
 TEST(Registration, FindsWhereAFrameLies) {
   const Burst burst =
       simulate(scene(260, 220), {.frames = 3, .shake = 6, .rotation = 2, .noise = 0.01});
   Burst copy = burst;
-  const Prepared prepared = prepare(copy, {}, 2);
+  const Prepared prepared = prepare(copy, Colours::Rgb, {}, 2);
   ASSERT_EQ(copy.frames(), 3);
   const MotionError error =
       motion_error(prepared.homographies, burst.truth->homographies, burst.size);
@@ -203,7 +238,7 @@ TEST(Prepare, LeavesOutWhatCannotBeAligned) {
   for (size_t n = 2 * pixels; n < 3 * pixels; ++n)
     burst.samples[n] = static_cast<float>(random() % 1000) / 1000;
   const Homography last = burst.truth->homographies[3];
-  const Prepared prepared = prepare(burst, {}, 2);
+  const Prepared prepared = prepare(burst, Colours::Rgb, {}, 2);
   EXPECT_EQ(burst.frames(), 3);
   EXPECT_EQ(prepared.homographies.size(), 3u);
   EXPECT_EQ(burst.samples.size(), 3 * pixels);
@@ -217,7 +252,7 @@ TEST(Prepare, KeepsIdenticalFramesWithoutFeatures) {
   burst.size = {32, 32};
   burst.names = {"a", "b"};
   burst.samples.assign(2 * 32 * 32, 0.5f);
-  const Prepared prepared = prepare(burst, {}, 2);
+  const Prepared prepared = prepare(burst, Colours::Rgb, {}, 2);
   EXPECT_EQ(burst.frames(), 2);
   EXPECT_EQ(prepared.homographies[1], Homography{});
   for (const float value : prepared.average) EXPECT_NEAR(value, 0.5, 1e-3);
@@ -265,8 +300,7 @@ Point random_point(const Shape& shape, double strength) {
   std::mt19937 random(17);
   const auto unit = [&] { return static_cast<double>(random() % 65536) / 65536; };
   Point point{shape, {}, {}};
-  for (size_t n = 0; n < shape.image_elems(); ++n)
-    point.x.push_back(static_cast<float>(unit()));
+  for (size_t n = 0; n < shape.image_elems(); ++n) point.x.push_back(static_cast<float>(unit()));
   for (int n = 0; n < shape.frames; ++n) {
     for (const double h : some_homography(100 + static_cast<unsigned>(n), strength))
       point.x.push_back(static_cast<float>(h));
@@ -294,21 +328,29 @@ void expect_near(std::span<const double> own, std::span<const double> exact, dou
   EXPECT_LE(apps::relative_error(own, exact), limit);
 }
 
+// All three colours, each in another way.
+Smoothness smoothness(double weight) {
+  Smoothness all;
+  for (const auto& axis : axes_of(Colours::Opponent)) all.push_back({axis, weight *= 1.5});
+  all.push_back({{0, 1, 0}, weight});
+  return all;
+}
+
 class ObjectiveTest : public testing::TestWithParam<double> {};
 
 TEST_P(ObjectiveTest, IsThatOfTheReference) {
   const Shape shape{frame_size, 4};
   const Point point = random_point(shape, GetParam());
-  const auto exact = reference::objective(shape, 0.02, point.x, point.samples);
+  const auto exact = reference::objective(shape, smoothness(0.02), point.x, point.samples);
   const auto expected = without_first(shape, exact.gradient);
   const size_t image = shape.image_elems();
   double loss = 0;
-  Evaluator<double> in_double(shape, 0.02, {}, 2);
+  Evaluator<double> in_double(shape, smoothness(0.02), {}, 2);
   const auto wide = gradient_at(in_double, point, &loss);
   EXPECT_NEAR(loss, exact.loss, 1e-11 * exact.loss);
   expect_near(std::span(wide).first(image), std::span(expected).first(image), 1e-11);
   expect_near(std::span(wide).subspan(image), std::span(expected).subspan(image), 1e-11);
-  Evaluator<float> in_float(shape, 0.02, {}, 2);
+  Evaluator<float> in_float(shape, smoothness(0.02), {}, 2);
   const auto own = gradient_at(in_float, point, &loss);
   EXPECT_NEAR(loss, exact.loss, 1e-5 * exact.loss);
   expect_near(std::span(own).first(image), std::span(expected).first(image), 1e-3);
@@ -322,9 +364,9 @@ TEST(Objective, WithoutMotionOrSmoothnessIsThatOfTheReference) {
   for (const int frames : {1, 3}) {
     const Shape shape{{18, 16}, frames};
     const Point point = random_point(shape, frames == 1 ? 0 : 0.05);
-    const auto exact = reference::objective(shape, 0, point.x, point.samples);
+    const auto exact = reference::objective(shape, {}, point.x, point.samples);
     const auto expected = without_first(shape, exact.gradient);
-    Evaluator<double> evaluator(shape, 0, {}, 2);
+    Evaluator<double> evaluator(shape, {}, {}, 2);
     double loss = 0;
     const auto own = gradient_at(evaluator, point, &loss);
     EXPECT_NEAR(loss, exact.loss, 1e-11 * exact.loss);
@@ -337,23 +379,26 @@ TEST(Objective, WhatDoesNotMoveHasNoGradient) {
   const Point point = random_point(shape, 0.05);
   const size_t image = shape.image_elems();
   double loss = 0;
-  Evaluator<double> all(shape, 0.01, {}, 2);
+  Evaluator<double> all(shape, smoothness(0.01), {}, 2);
   const auto whole = gradient_at(all, point, &loss);
-  Evaluator<double> picture(shape, 0.01, {true, false}, 2), motion(shape, 0.01, {false, true}, 2);
+  Evaluator<double> picture(shape, smoothness(0.01), {true, false}, 2),
+      motion(shape, smoothness(0.01), {false, true}, 2);
   const auto by_picture = gradient_at(picture, point, &loss);
   const auto by_motion = gradient_at(motion, point, &loss);
   expect_near(std::span(by_picture).first(image), std::span(whole).first(image), 1e-12);
   expect_near(std::span(by_motion).subspan(image), std::span(whole).subspan(image), 1e-12);
   const auto is_zero = [](double v) { return v == 0; };
-  EXPECT_TRUE(std::all_of(by_picture.begin() + static_cast<long>(image), by_picture.end(), is_zero));
-  EXPECT_TRUE(std::all_of(by_motion.begin(), by_motion.begin() + static_cast<long>(image), is_zero));
+  EXPECT_TRUE(
+      std::all_of(by_picture.begin() + static_cast<long>(image), by_picture.end(), is_zero));
+  EXPECT_TRUE(
+      std::all_of(by_motion.begin(), by_motion.begin() + static_cast<long>(image), is_zero));
 }
 
 TEST(Objective, SaysWhatItLeavesOut) {
-  EXPECT_TRUE(left_out({frame_size, 3}, 0.1, {}).empty());
-  EXPECT_EQ(left_out({frame_size, 1}, 0, {}).size(), 2u);
-  EXPECT_EQ(left_out({frame_size, 3}, 0.1, {false, true}).size(), 1u);
-  EXPECT_EQ(left_out({frame_size, 3}, 0, {true, false}).size(), 2u);
+  EXPECT_TRUE(left_out({frame_size, 3}, smoothness(0.1), {}).empty());
+  EXPECT_EQ(left_out({frame_size, 1}, {}, {}).size(), 2u);
+  EXPECT_EQ(left_out({frame_size, 3}, smoothness(0.1), {false, true}).size(), 1u);
+  EXPECT_EQ(left_out({frame_size, 3}, {}, {true, false}).size(), 2u);
 }
 
 TEST(Checks, GradientsAreRight) {

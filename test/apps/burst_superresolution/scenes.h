@@ -1,6 +1,7 @@
 // scenes.h -- pictures with something to see everywhere, at several scales, for tests of bursts.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 
 #include "demosaic/photographs.h"
@@ -29,9 +30,9 @@ inline demosaic::Photograph scene(int width, int height, unsigned seed = 1) {
         const double inside = radius - std::hypot(x - x0, y - y0);
         const double share = inside > 1 ? 1 : inside < -1 ? 0 : (inside + 1) / 2;
         for (size_t c = 0; c < 3; ++c) {
-          float& value = picture.planes[c * pixels +
-                                        static_cast<size_t>(y) * static_cast<size_t>(width) +
-                                        static_cast<size_t>(x)];
+          float& value =
+              picture.planes[c * pixels + static_cast<size_t>(y) * static_cast<size_t>(width) +
+                             static_cast<size_t>(x)];
           value += static_cast<float>(share * (0.1 + 0.8 * colours[c] - value));
         }
       }

@@ -1,0 +1,213 @@
+// burst_superresolution, the program: from a photograph or a folder of mosaics to pictures and a report; what the
+// optimization gains; what stops it and goes on.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "burst_superresolution/fit.h"
+#include "burst_superresolution/quality.h"
+#include "common/images.h"
+#include "common/process.h"
+#include "common/stop.h"
+#include "scenes.h"
+#include "support/temporary_folder.h"
+
+namespace {
+
+namespace fs = std::filesystem;
+using namespace burst;
+using burst_test::scene;
+using nlohmann::json;
+
+class BurstRun : public testing::Test {
+ protected:
+  BurstRun() { options_.common.output = folder_.path(); }
+
+  // 110 x 90 pixels of a scene.
+  void simulate_burst(int frames, double noise) {
+    options_.simulation = {.frames = frames, .shake = 4, .noise = noise, .seed = 3};
+    burst_ = simulate(scene(140, 120), options_.simulation);
+    prepared_ = prepare(burst_, options_.colours, {}, 2);
+    ASSERT_EQ(burst_.frames(), frames);
+  }
+  Shape shape() const { return {burst_.size, burst_.frames()}; }
+
+  Fit fit_for(long steps, bool resume = false) {
+    options_.common.steps = steps;
+    options_.common.resume = resume;
+    Evaluator<float> evaluator(shape(), prepared_.smoothness, options_.moves, 2);
+    evaluator.set_frames(burst_.samples);
+    return fit(options_, burst_, prepared_, evaluator, shown_);
+  }
+  double db(std::span<const float> planes) { return psnr_db(planes, *burst_.truth, burst_.size); }
+
+  const TemporaryFolder folder_;
+  Options options_;
+  Burst burst_;
+  Prepared prepared_;
+  std::function<void(const Sample&)> shown_ = [](const Sample&) {};
+};
+
+TEST_F(BurstRun, GainsTwoDecibelsAndFindsTheMotion) {
+  simulate_burst(9, 0.01);
+  const Fit found = fit_for(80);
+  const double best = std::max(db(prepared_.first), db(prepared_.average));
+  EXPECT_GE(db(found.picture(shape())), best + 2);
+  EXPECT_LT(found.loss, found.series.front().loss);
+  const auto& truth = burst_.truth->homographies;
+  const double before = motion_error(prepared_.homographies, truth, burst_.size).mean;
+  EXPECT_LT(motion_error(found.homographies(shape()), truth, burst_.size).mean, 0.7 * before);
+  EXPECT_EQ(found.refused, 0);
+}
+
+TEST_F(BurstRun, MovesOnlyWhatIsNamed) {
+  simulate_burst(4, 0.01);
+  options_.moves = {true, false};
+  const Fit picture = fit_for(5);
+  for (size_t n = 0; n < 4; ++n) {
+    for (size_t k = 0; k < 8; ++k) {
+      EXPECT_EQ(static_cast<float>(picture.homographies(shape())[n][k]),
+                static_cast<float>(prepared_.homographies[n][k]));
+    }
+  }
+  options_.moves = {false, true};
+  const Fit motion = fit_for(5);
+  EXPECT_TRUE(std::equal(prepared_.first.begin(), prepared_.first.end(), motion.x.begin()));
+  EXPECT_LT(motion.loss, motion.series.front().loss);
+}
+
+TEST_F(BurstRun, GoesOnAsIfItHadNotStopped) {
+  simulate_burst(3, 0.01);
+  shown_ = [](const Sample& sample) {
+    if (sample.step == 6) apps::request_stop();
+  };
+  const Fit half = fit_for(12);
+  apps::request_stop(false);
+  EXPECT_TRUE(half.stopped);
+  EXPECT_LE(half.steps, 7);
+  shown_ = [](const Sample&) {};
+  const Fit rest = fit_for(12, true);
+  EXPECT_EQ(rest.steps, 12);
+  EXPECT_EQ(rest.series.size(), 13u);
+  fs::remove(folder_.path() / "state.bin");
+  const Fit whole = fit_for(12);
+  EXPECT_EQ(rest.x, whole.x);
+}
+
+TEST_F(BurstRun, RefusesTheStateOfAnotherRun) {
+  simulate_burst(3, 0.01);
+  fit_for(2);
+  options_.common.seed = 77;
+  EXPECT_THROW(fit_for(4, true), retrograde::UserError);
+}
+
+class BurstProgram : public testing::Test {
+ protected:
+  // Writes a scene as a picture and gives its name.
+  fs::path photograph(int width, int height) {
+    const auto picture = scene(width, height);
+    apps::write_image(folder_.path() / "scene.png",
+                      demosaic::image_of(width, height, 8, picture.planes));
+    return folder_.path() / "scene.png";
+  }
+
+  std::string run(const fs::path& input, const fs::path& out,
+                  const std::vector<std::string>& more) {
+    std::vector<std::string> words{BURST_PROGRAM, "--input", input,       "--output", out,
+                                   "--steps",     "12",      "--threads", "2"};
+    words.insert(words.end(), more.begin(), more.end());
+    const apps::Outcome outcome = apps::run_program(words);
+    EXPECT_EQ(outcome.status, 0) << outcome.output;
+    return outcome.output;
+  }
+  static json report(const fs::path& out) {
+    std::ifstream file(out / "report.json");
+    return json::parse(file)["burst_superresolution"];
+  }
+
+  const TemporaryFolder folder_;
+};
+
+TEST_F(BurstProgram, MakesAPictureAndAReport) {
+  const fs::path out = folder_.path() / "out";
+  run(photograph(120, 110), out, {"--frames", "4", "--shake", "3"});
+  for (const char* name : {"result.png", "ahd.png", "average.png", "truth.png", "frame.png",
+                           "enlarged.png", "homographies.json", "state.bin", "error_vs_time.png",
+                           "psnr_vs_time.png", "motion_vs_time.png"})
+    EXPECT_TRUE(fs::exists(out / name)) << name;
+  const json own = report(out);
+  EXPECT_GT(own["psnr_db"]["ours"], own["psnr_db"]["AHD of the first frame"]);
+  EXPECT_EQ(own["frames"].size(), 4u);
+  const apps::Image result = apps::read_image(out / "result.png");
+  EXPECT_EQ(result.width, own["width"]);
+  EXPECT_EQ(result.height, own["height"]);
+}
+
+// What was written as mosaics is read again, and gives the same picture but for 16 bits.
+TEST_F(BurstProgram, ReadsAFolderOfMosaics) {
+  const fs::path one = folder_.path() / "one", two = folder_.path() / "two";
+  run(photograph(110, 100), one, {"--frames", "3", "--shake", "3", "--write-frames"});
+  run(one / "frames", two, {"--mosaic", "RGGB"});
+  const apps::Image a = apps::read_image(one / "result.png"),
+                    b = apps::read_image(two / "result.png");
+  ASSERT_EQ(a.pixels.size(), b.pixels.size());
+  double sum = 0;
+  for (size_t n = 0; n < a.pixels.size(); ++n) sum += std::abs(a.pixels[n] - b.pixels[n]);
+  EXPECT_LT(sum / static_cast<double>(a.pixels.size()), 0.004);
+  EXPECT_FALSE(report(two).contains("psnr_db"));
+  EXPECT_EQ(report(two)["frames"][2], "frame_02.png");
+}
+
+// A sensor that begins with another colour: its first red sample is where the picture begins.
+TEST_F(BurstProgram, CutsFramesAtTheirFirstRedSample) {
+  const fs::path frames = folder_.path() / "frames", out = folder_.path() / "out";
+  fs::create_directory(frames);
+  const auto picture = scene(61, 51);
+  for (const char* name : {"a.png", "b.png"}) {
+    apps::Image mosaic{61, 51, 16, {}, 1};
+    for (int y = 0; y < 51; ++y) {
+      for (int x = 0; x < 61; ++x)
+        mosaic.pixels.push_back(picture.at(x, y, demosaic::colour_at(x + 1, y + 1)));
+    }
+    apps::write_image(frames / name, mosaic);
+  }
+  run(frames, out, {"--mosaic", "BGGR"});
+  EXPECT_EQ(report(out)["width"], 60);
+  EXPECT_EQ(report(out)["height"], 50);
+  const apps::Image result = apps::read_image(out / "result.png");
+  double sum = 0;
+  for (int y = 4; y < 46; ++y) {
+    for (int x = 4; x < 56; ++x) {
+      for (int c = 0; c < 3; ++c)
+        sum += std::abs(result.pixels[static_cast<size_t>(3 * (60 * y + x) + c)] -
+                        picture.at(x + 1, y + 1, c));
+    }
+  }
+  EXPECT_LT(sum / (42 * 52 * 3), 0.03);
+}
+
+TEST_F(BurstProgram, OneFrameIsEnough) {
+  const fs::path out = folder_.path() / "out";
+  const std::string said =
+      run(photograph(90, 80), out, {"--frames", "1", "--lambda", "0", "--explain"});
+  EXPECT_NE(said.find("left out: homographies and interpolation"), std::string::npos) << said;
+  EXPECT_NE(said.find("left out: differences of neighbours"), std::string::npos) << said;
+}
+
+TEST_F(BurstProgram, SecondsEndARun) {
+  const fs::path out = folder_.path() / "out";
+  run(photograph(90, 80), out, {"--frames", "2", "--steps", "100000", "--seconds", "0.3"});
+  EXPECT_LT(report(out)["seconds"]["optimize"], 2);
+}
+
+TEST_F(BurstProgram, ChecksWriteTables) {
+  const fs::path out = folder_.path() / "out";
+  const std::string said = run(photograph(90, 80), out, {"--frames", "3", "--check-stability"});
+  EXPECT_NE(said.find("horizon through the frames"), std::string::npos) << said;
+  EXPECT_TRUE(fs::exists(out / "report.json"));
+}
+
+}  // namespace
