@@ -5,6 +5,13 @@
 
 namespace burst {
 
+namespace {
+
+// Pixels; the inverse of the identity may miss a border by some bits.
+constexpr double rounding = 1e-6;
+
+}  // namespace
+
 BicubicAverage::BicubicAverage(const FrameSize& size)
     : size_(size), sums_(3 * size.pixels(), 0.0f), counts_(size.pixels(), 0) {}
 
@@ -16,7 +23,9 @@ void BicubicAverage::add(std::span<const float> frame, const Homography& homogra
 void BicubicAverage::add_row(std::span<const float> frame, const Homography& to_frame, int y) {
   for (int x = 0; x < size_.width; ++x) {
     const Place at = place_of(to_frame, size_, x, y);
-    if (!(at.x >= 0 && at.x <= size_.width - 1 && at.y >= 0 && at.y <= size_.height - 1)) continue;
+    const bool inside = at.x >= -rounding && at.x <= size_.width - 1 + rounding &&
+                        at.y >= -rounding && at.y <= size_.height - 1 + rounding;
+    if (!inside) continue;
     const size_t pixel =
         static_cast<size_t>(y) * static_cast<size_t>(size_.width) + static_cast<size_t>(x);
     ++counts_[pixel];

@@ -13,12 +13,9 @@ namespace burst {
 namespace {
 
 constexpr int part_width = 24, part_height = 20, part_frames = 3;
-// Of both kinds.
 Smoothness part_smoothness() {
   Smoothness smoothness;
-  for (const Colours colours : {Colours::Rgb, Colours::Opponent}) {
-    for (const auto& axis : axes_of(colours)) smoothness.push_back({axis, 1e-2});
-  }
+  for (const auto& axis : axes_of(Colours::Opponent)) smoothness.push_back({axis, 1e-2});
   return smoothness;
 }
 
@@ -200,7 +197,7 @@ std::vector<apps::GradientRow> check_gradients(const Burst& burst, uint64_t seed
   Objective objective(shape, part_smoothness());
   bind<float>(objective, shape, ordinary(burst, seed));
   return apps::gradient_rows(retrograde::check_gradients(
-      objective.loss, {}, {.wrt = {objective.image, objective.homographies}}));
+      objective.loss, {}, {.directions = 2, .wrt = {objective.image, objective.homographies}}));
 }
 
 std::vector<apps::StabilityRow> check_stability(const Burst& burst, uint64_t seed, int threads) {

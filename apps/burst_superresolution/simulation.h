@@ -15,11 +15,11 @@ namespace burst {
 
 struct Simulation {
   int frames = 13;
-  double shake = 8;     // pixels, along x and y each
-  double rotation = 1;  // degrees
-  double zoom = 0.002;  // relative
-  double tilt = 0.002;  // h6 and h7
-  double noise = 0.01;  // standard deviation of each sample
+  double shake = 8;      // pixels, along x and y each
+  double rotation = 1;   // degrees
+  double zoom = 0.002;   // relative
+  double tilt = 0.002;   // h6 and h7
+  double noise = 0.005;  // standard deviation of each sample
   int frame_size =
       0;  // frames are cut to so many pixels along each side at most; 0: as large as may be
   uint64_t seed = 1;
