@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <optional>
 
 #include "burst_superresolution/fit.h"
 #include "burst_superresolution/pilot.h"
@@ -33,50 +34,59 @@ class BurstRun : public testing::Test {
     burst_ = simulate(scene(140, 120), options_.simulation);
     prepared_ = prepare(burst_, options_.colours, {}, 2);
     ASSERT_EQ(burst_.frames(), frames);
+    compile();
+  }
+  void compile() {
+    evaluator_.emplace(shape(), prepared_.smoothness, options_.moves, 2);
+    evaluator_->set_frames(burst_.samples);
   }
   Shape shape() const { return {burst_.size, burst_.frames()}; }
 
   Fit fit_for(long steps, bool resume = false) {
     options_.common.steps = steps;
     options_.common.resume = resume;
-    Evaluator<float> evaluator(shape(), prepared_.smoothness, options_.moves, 2);
-    evaluator.set_frames(burst_.samples);
-    choose_smoothness(options_, burst_, prepared_, evaluator);
-    return fit(options_, burst_, prepared_, evaluator, shown_);
+    return fit(options_, burst_, prepared_, *evaluator_, shown_);
   }
   double db(std::span<const float> planes) { return psnr_db(planes, *burst_.truth, burst_.size); }
+  double error_of(const std::vector<Homography>& found) {
+    return motion_error(found, burst_.truth->homographies, burst_.size).mean;
+  }
 
   const TemporaryFolder folder_;
   Options options_;
   Burst burst_;
   Prepared prepared_;
+  std::optional<Evaluator<float>> evaluator_;
   std::function<void(const Sample&)> shown_ = [](const Sample&) {};
 };
 
 TEST_F(BurstRun, GainsTwoDecibelsAndFindsTheMotion) {
   simulate_burst(9, 0.005);
-  const Fit found = fit_for(80);
+  choose_smoothness(options_, burst_, prepared_, *evaluator_);
   EXPECT_NEAR(prepared_.noise, 0.005, 0.003);
+  // A fourth of a pixel beside where SIFT found them.
+  for (size_t n = 1; n < 9; ++n) prepared_.homographies[n][2] += 0.25 / burst_.size.scale();
+  const Fit found = fit_for(100);
   const double best = std::max(db(prepared_.first), db(prepared_.average));
   EXPECT_GE(db(found.picture(shape())), best + 2);
   EXPECT_LT(found.loss, found.series.front().loss);
-  const auto& truth = burst_.truth->homographies;
-  const double before = motion_error(prepared_.homographies, truth, burst_.size).mean;
-  EXPECT_LT(motion_error(found.homographies(shape()), truth, burst_.size).mean, 0.7 * before);
+  EXPECT_LT(error_of(found.homographies(shape())), 0.5 * error_of(prepared_.homographies));
   EXPECT_EQ(found.refused, 0);
 }
 
 TEST_F(BurstRun, MovesOnlyWhatIsNamed) {
-  simulate_burst(4, 0.01);
+  simulate_burst(3, 0.01);
   options_.moves = {true, false};
+  compile();
   const Fit picture = fit_for(5);
-  for (size_t n = 0; n < 4; ++n) {
+  for (size_t n = 0; n < 3; ++n) {
     for (size_t k = 0; k < 8; ++k) {
       EXPECT_EQ(static_cast<float>(picture.homographies(shape())[n][k]),
                 static_cast<float>(prepared_.homographies[n][k]));
     }
   }
   options_.moves = {false, true};
+  compile();
   const Fit motion = fit_for(5);
   EXPECT_TRUE(std::equal(prepared_.first.begin(), prepared_.first.end(), motion.x.begin()));
   EXPECT_LT(motion.loss, motion.series.front().loss);
@@ -95,16 +105,9 @@ TEST_F(BurstRun, GoesOnAsIfItHadNotStopped) {
   const Fit rest = fit_for(12, true);
   EXPECT_EQ(rest.steps, 12);
   EXPECT_EQ(rest.series.size(), 13u);
-  fs::remove(folder_.path() / "state.bin");
-  const Fit whole = fit_for(12);
-  EXPECT_EQ(rest.x, whole.x);
-}
-
-TEST_F(BurstRun, RefusesTheStateOfAnotherRun) {
-  simulate_burst(3, 0.01);
-  fit_for(2);
-  options_.common.seed = 77;
-  EXPECT_THROW(fit_for(4, true), retrograde::UserError);
+  EXPECT_EQ(rest.x, fit_for(12).x);
+  options_.common.seed = 77;  // another burst
+  EXPECT_THROW(fit_for(14, true), retrograde::UserError);
 }
 
 class BurstProgram : public testing::Test {
