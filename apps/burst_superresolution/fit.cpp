@@ -29,17 +29,15 @@ double seconds_since(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
 }
 
-std::string text_of(const Smoothness& smoothness) {
-  return retrograde::listed(smoothness, [](const ColourAxis& axis) { return text(axis.weight); });
-}
-
-// What must be the same for a run to go on.
-std::string problem_of(const Options& options, const Burst& burst, const Smoothness& smoothness) {
+// What must be the same for a run to go on. The weights that the noise asks for follow from the rest.
+std::string problem_of(const Options& options, const Burst& burst) {
   return text(options.common.input.filename().string(), ", ", burst.frames(), " frames of ",
-              burst.size.width, " x ", burst.size.height, ", seed ", options.common.seed,
-              ", smoothness ", text_of(smoothness), ", optimizing ",
+              burst.size.width, " x ", burst.size.height, ", noise ",
+              burst.truth ? burst.truth->noise : 0, ", seed ", options.common.seed, ", lambda ",
+              options.lambda ? text(*options.lambda) : std::string("by the noise"), ", ",
+              options.colours == Colours::Rgb ? "rgb" : "opponent", ", optimizing ",
               options.moves.image ? "the image " : "",
-              options.moves.homographies ? "the motion" : "");
+              options.moves.homographies ? "the homographies" : "");
 }
 
 class Optimization {
@@ -49,7 +47,7 @@ class Optimization {
       : options_(options),
         burst_(burst),
         evaluator_(evaluator),
-        problem_(problem_of(options, burst, prepared.smoothness)),
+        problem_(problem_of(options, burst)),
         x_(joined(prepared.first, prepared.homographies)),
         gradient_(x_.size()),
         adam_({{evaluator.shape().image_elems(), image_rate},
