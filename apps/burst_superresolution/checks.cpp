@@ -12,7 +12,7 @@ namespace burst {
 
 namespace {
 
-constexpr int part_width = 20, part_height = 16, part_frames = 3;
+constexpr int part_width = 24, part_height = 20, part_frames = 3;
 Smoothness part_smoothness() {
   Smoothness smoothness;
   for (const auto& axis : axes_of(Colours::Opponent)) smoothness.push_back({axis, 1e-2});
