@@ -2,6 +2,7 @@
 #include "checks.h"
 
 #include <algorithm>
+#include <cmath>
 #include <functional>
 #include <random>
 

@@ -3,7 +3,7 @@
 
 #include <algorithm>
 #include <chrono>
-#include <optional>
+#include <cmath>
 
 #include "common/adam.h"
 #include "common/state.h"

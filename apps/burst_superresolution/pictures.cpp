@@ -1,6 +1,7 @@
 // pictures.cpp -- see pictures.h.
 #include "pictures.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "common/images.h"
