@@ -3,13 +3,13 @@
 
 usage: check_report.py report.json [--times]
 
-On the held-out photographs the shipped variant of nine filters beats AHD by 0.75 dB, and what two minutes
+On the held-out photographs the shipped variant of nine filters beats AHD by 0.8 dB, and what two minutes
 learn from scratch by 0.6 dB. --times: it also takes less than 40 ms per megapixel, on two cores at rest.
 """
 import json
 import sys
 
-SHIPPED_GAIN_DB, LEARNED_GAIN_DB, MOST_MS = 0.75, 0.6, 40
+SHIPPED_GAIN_DB, LEARNED_GAIN_DB, MOST_MS = 0.8, 0.6, 40
 
 
 def main():

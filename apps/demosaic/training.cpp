@@ -133,18 +133,25 @@ size_t TrainingPipeline::stages() const {
   return count;
 }
 
-// A square of a photograph, seen in one of eight ways.
+// A square of a photograph, seen in one of eight ways and in other colours.
 struct Sampler::Piece {
   const Photograph* photograph;
   int left, top, side;
   bool turned, flip_x, flip_y;
+  ColourMatrix colours;
 
   float at(int x, int y, int c) const {
     if (flip_x) x = side - 1 - x;
     if (flip_y) y = side - 1 - y;
     if (turned) std::swap(x, y);
-    return photograph->at(mirrored(left + x, photograph->width),
-                          mirrored(top + y, photograph->height), c);
+    const int column = mirrored(left + x, photograph->width);
+    const int row = mirrored(top + y, photograph->height);
+    float value = 0;
+    for (int from = 0; from < 3; ++from) {
+      value += colours[static_cast<size_t>(c)][static_cast<size_t>(from)] *
+               photograph->at(column, row, from);
+    }
+    return std::clamp(value, 0.0f, 1.0f);
   }
 };
 
@@ -154,6 +161,27 @@ Sampler::Sampler(const std::vector<Photograph>& photographs, uint64_t seed)
 // Not a distribution of the standard library, whose numbers differ between libraries.
 size_t Sampler::below(size_t n) { return random_() % n; }
 
+float Sampler::between(float least, float most) {
+  constexpr size_t steps = 1 << 20;
+  return least + (most - least) * static_cast<float>(below(steps + 1)) / static_cast<float>(steps);
+}
+
+// Another light, more or less colour, and in half of all cases red for blue: the mosaic treats them alike.
+Sampler::ColourMatrix Sampler::other_colours() {
+  constexpr float grey[3] = {0.299f, 0.587f, 0.114f};  // luma of ITU-R BT.601
+  const float saturation = between(0.8f, 1.5f);
+  const bool exchange = below(2) == 1;
+  ColourMatrix matrix;
+  for (size_t c = 0; c < 3; ++c) {
+    const float gain = between(0.8f, 1.1f);
+    for (size_t from = 0; from < 3; ++from) {
+      const size_t source = exchange ? 2 - from : from;
+      matrix[c][source] = gain * ((1 - saturation) * grey[from] + (c == from ? saturation : 0));
+    }
+  }
+  return matrix;
+}
+
 Sampler::Piece Sampler::piece(int side) {
   const Photograph& photograph = photographs_[below(photographs_.size())];
   const auto place = [&](int size) {
@@ -161,7 +189,8 @@ Sampler::Piece Sampler::piece(int side) {
   };
   const int left = place(photograph.width), top = place(photograph.height);
   const size_t way = below(8);
-  return {&photograph, left, top, side, (way & 1) != 0, (way & 2) != 0, (way & 4) != 0};
+  return {&photograph,    left,           top, side, (way & 1) != 0, (way & 2) != 0,
+          (way & 4) != 0, other_colours()};
 }
 
 Batch Sampler::draw(const Shape& shape, const BatchShape& size) {

@@ -2,12 +2,13 @@
 //
 //   loss = mean over the pixels of a batch and their three colours of (image - truth)^2
 //
-// A batch is square pieces of photographs, each at a random place, mirrored and turned at random, and
-// only then sampled as a mosaic. Around the cells that count lies the margin that they read.
+// A batch is square pieces of photographs, each at a random place, mirrored, turned and its colours
+// changed at random, and only then sampled as a mosaic. Around the cells that count lies the margin that they read.
 #pragma once
 
 #include <retrograde/retrograde.h>
 
+#include <array>
 #include <cstdint>
 #include <random>
 #include <string>
@@ -73,8 +74,11 @@ class Sampler {
 
  private:
   struct Piece;
+  using ColourMatrix = std::array<std::array<float, 3>, 3>;  // [to, from]
   Piece piece(int side);
+  ColourMatrix other_colours();
   size_t below(size_t n);
+  float between(float least, float most);
 
   const std::vector<Photograph>& photographs_;
   std::mt19937_64 random_;
