@@ -133,7 +133,13 @@ TEST(Profiler, RunsShorterThanTheTimeBetweenLooksAreSeen) {
     while (std::chrono::steady_clock::now() - start < time) {
     }
   };
-  while (std::chrono::steady_clock::now() - begin < std::chrono::milliseconds(400)) {
+  const auto is_seen = [](int func) {
+    const auto* stats = retrograde_profiler_pipeline("short");
+    return stats && stats->funcs[func].time > stats->time / 8;
+  };
+  // On a busy machine the thread that looks waits for its turn: then for longer.
+  for (int n = 0; n < 1000 || !is_seen(1) || !is_seen(2); ++n) {
+    if (std::chrono::steady_clock::now() - begin > std::chrono::seconds(20)) break;
     void* run = retrograde_profiler_begin(nullptr, "short", "overhead\nfirst\nsecond");
     int32_t* place = retrograde_profiler_thread(nullptr, run, 1);
     busy(std::chrono::microseconds(200));
@@ -142,10 +148,8 @@ TEST(Profiler, RunsShorterThanTheTimeBetweenLooksAreSeen) {
     retrograde_profiler_leave(nullptr, place);
     retrograde_profiler_end(nullptr, run);
   }
-  const auto* stats = retrograde_profiler_pipeline("short");
-  ASSERT_NE(stats, nullptr);
-  EXPECT_GT(stats->funcs[1].time, stats->time / 8);
-  EXPECT_GT(stats->funcs[2].time, stats->time / 8);
+  EXPECT_TRUE(is_seen(1));
+  EXPECT_TRUE(is_seen(2));
 }
 
 TEST(Profiler, AnErrorEndsTheRun) {
