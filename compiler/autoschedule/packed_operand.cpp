@@ -27,7 +27,7 @@ constexpr double least_uses = 4;          // of an element of the copy
 constexpr int64_t least_block = 64;       // iterations: sums are fetched and put back for each
 constexpr int64_t most_rows = 8;          // of tiles that share a copy
 constexpr double worth_sharing = 0.75;    // of what is copied for each alone
-constexpr double least_tiles = 4;  // that use one copy: with fewer, its rows stay in the cache
+constexpr double least_tiles = 8;  // that use one copy: with fewer, its rows stay in the cache
 
 // How far each loop of a tile runs.
 using Extents = std::unordered_map<std::string, int64_t>;
