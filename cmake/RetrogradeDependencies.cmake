@@ -95,3 +95,5 @@ find_library(RETROGRADE_SQLITE_LIBRARY sqlite3 REQUIRED)
 add_library(retrograde_dep_sqlite INTERFACE)
 target_include_directories(retrograde_dep_sqlite SYSTEM INTERFACE ${RETROGRADE_SQLITE_INCLUDE})
 target_link_libraries(retrograde_dep_sqlite INTERFACE ${RETROGRADE_SQLITE_LIBRARY})
+
+find_package(Boost REQUIRED COMPONENTS context)  # Boost::context, fibers of the simulated device

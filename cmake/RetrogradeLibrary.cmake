@@ -38,7 +38,7 @@ target_link_libraries(retrograde_halide_compat INTERFACE retrograde)
 
 include(CMakePackageConfigHelpers)
 set(package_dir ${CMAKE_INSTALL_LIBDIR}/cmake/retrograde)
-install(TARGETS retrograde retrograde_halide_compat retrograde_static_runtime
+install(TARGETS retrograde retrograde_halide_compat retrograde_static_runtime retrograde_simt
   retrograde_run_gen_main
   EXPORT retrogradeTargets)
 install(EXPORT retrogradeTargets NAMESPACE retrograde:: DESTINATION ${package_dir})

@@ -178,6 +178,36 @@ const char* retrograde_error_name(int32_t code) {
       return "buffer argument is null";
     case retrograde_error_debug_to_file_failed:
       return "a file cannot be written";
+    case retrograde_error_copy_to_host_failed:
+      return "copy to the host failed";
+    case retrograde_error_copy_to_device_failed:
+      return "copy to the device failed";
+    case retrograde_error_device_malloc_failed:
+      return "no memory on the device";
+    case retrograde_error_device_sync_failed:
+      return "waiting for the device failed";
+    case retrograde_error_device_free_failed:
+      return "freeing device memory failed";
+    case retrograde_error_no_device_interface:
+      return "no device interface";
+    case retrograde_error_device_run_failed:
+      return "a kernel cannot run";
+    case retrograde_error_device_wrap_native_failed:
+      return "wrapping device memory failed";
+    case retrograde_error_device_detach_native_failed:
+      return "detaching device memory failed";
+    case retrograde_error_device_interface_no_device:
+      return "a device interface without device memory";
+    case retrograde_error_host_and_device_dirty:
+      return "newer on the host and on the device";
+    case retrograde_error_buffer_is_null:
+      return "buffer is null";
+    case retrograde_error_device_buffer_copy_failed:
+      return "copying a buffer failed";
+    case retrograde_error_device_crop_failed:
+      return "cropping device memory failed";
+    case retrograde_error_incompatible_device_interface:
+      return "another device interface";
     case retrograde_error_internal:
       return "internal error";
     case retrograde_error_unaligned_host_ptr:

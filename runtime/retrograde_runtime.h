@@ -38,14 +38,29 @@ enum retrograde_error_code {
   retrograde_error_out_of_memory = -11,
   retrograde_error_buffer_argument_is_null = -12,
   retrograde_error_debug_to_file_failed = -13,
+  retrograde_error_copy_to_host_failed = -14,
+  retrograde_error_copy_to_device_failed = -15,
+  retrograde_error_device_malloc_failed = -16,
+  retrograde_error_device_sync_failed = -17,
+  retrograde_error_device_free_failed = -18,
+  retrograde_error_no_device_interface = -19,
   retrograde_error_internal = -22,
+  retrograde_error_device_run_failed = -23,
   retrograde_error_unaligned_host_ptr = -24,
   retrograde_error_bad_fold = -25,
   retrograde_error_fold_factor_too_small = -26,
   retrograde_error_requirement_failed = -27,
   retrograde_error_extents_negative = -28,
   retrograde_error_specialize_fail = -31,
+  retrograde_error_device_wrap_native_failed = -32,
+  retrograde_error_device_detach_native_failed = -33,
   retrograde_error_host_is_null = -34,
+  retrograde_error_device_interface_no_device = -36,
+  retrograde_error_host_and_device_dirty = -37,
+  retrograde_error_buffer_is_null = -38,
+  retrograde_error_device_buffer_copy_failed = -39,
+  retrograde_error_device_crop_failed = -41,
+  retrograde_error_incompatible_device_interface = -42,
   retrograde_error_bad_dimensions = -43,
   retrograde_error_device_dirty_with_no_device_support = -44,
   retrograde_error_storage_bound_too_small = -45
@@ -56,6 +71,16 @@ struct halide_trace_event_t; /* of HalideRuntime.h */
 
 /* One iteration of a parallel loop. */
 typedef int32_t (*retrograde_task)(struct retrograde_context*, int32_t index, uint8_t* closure);
+
+/* On which device and stream a call works; a null member is the default's. They give 0, or a code. */
+typedef struct retrograde_gpu_handlers {
+  /* The CUcontext. Default: that of the device that is asked for (halide_set_gpu_device,
+   * HL_GPU_DEVICE); else the thread's current one; else the primary one of the last device. */
+  int32_t (*acquire_context)(struct retrograde_context*, void** cuda_context, int32_t create);
+  int32_t (*release_context)(struct retrograde_context*);
+  /* The CUstream: the only one used. Default: the context's default stream. */
+  int32_t (*get_stream)(struct retrograde_context*, void* cuda_context, void** stream);
+} retrograde_gpu_handlers;
 
 /* What one call, or a family of calls, of generated code may use. A field that is null or zero
  * means the default. The handlers get the context that the generated function was called with. */
@@ -84,6 +109,8 @@ typedef struct retrograde_context {
   /* Told of every event of a traced pipeline, from any thread; gives the event's number, which
    * later events name as their parent. Default: retrograde_default_trace. */
   int32_t (*trace_handler)(struct retrograde_context*, const struct halide_trace_event_t*);
+  /* Default: null, as if all members were. */
+  const retrograde_gpu_handlers* gpu_handlers;
 } retrograde_context;
 
 /* ---- called by generated code ---- */

@@ -68,6 +68,30 @@ int32_t hand_on_loop(retrograde_context* context, retrograde_task task, int32_t 
                                            reinterpret_cast<uint8_t*>(&wrapped));
 }
 
+int32_t hand_on_acquire(retrograde_context* context, void** cuda_context, int32_t create) {
+  CallContext& caller = caller_of(context);
+  return caller.handlers.custom_cuda_acquire_context(caller.user_context, cuda_context,
+                                                     create != 0);
+}
+
+int32_t hand_on_release(retrograde_context* context) {
+  CallContext& caller = caller_of(context);
+  return caller.handlers.custom_cuda_release_context(caller.user_context);
+}
+
+int32_t hand_on_get_stream(retrograde_context* context, void* cuda_context, void** stream) {
+  CallContext& caller = caller_of(context);
+  return caller.handlers.custom_cuda_get_stream(caller.user_context, cuda_context, stream);
+}
+
+retrograde_gpu_handlers gpu_handlers_for(const JITHandlers& handlers) {
+  retrograde_gpu_handlers given = {};
+  if (handlers.custom_cuda_acquire_context) given.acquire_context = hand_on_acquire;
+  if (handlers.custom_cuda_release_context) given.release_context = hand_on_release;
+  if (handlers.custom_cuda_get_stream) given.get_stream = hand_on_get_stream;
+  return given;
+}
+
 retrograde_context context_for(const CallContext& caller) {
   const JITHandlers& handlers = caller.handlers;
   retrograde_context context = {};
@@ -93,6 +117,8 @@ class JitPipeline : public CompiledPipeline {
 
   int run(void* const* argv, CallContext& caller) const override {
     CallState state{context_for(caller), &caller};
+    const retrograde_gpu_handlers gpu_handlers = gpu_handlers_for(caller.handlers);
+    state.context.gpu_handlers = &gpu_handlers;
     const int code = code_->call(&state.context, const_cast<void**>(argv));
     if (is_profiled_) {
       retrograde_profiler_report(&state.context);

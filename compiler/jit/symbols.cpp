@@ -7,6 +7,7 @@
 #include <map>
 
 #include "codegen/sleef_library.h"
+#include "gpu/gpu_calls.h"
 #include "inquiries.h"
 #include "retrograde_runtime.h"
 
@@ -51,6 +52,19 @@ void add_runtime(Table& table) {
   table["retrograde_semaphore_release"] = pointer(retrograde_semaphore_release);
 }
 
+void add_gpu(Table& table) {
+  table["retrograde_gpu_interface"] = pointer(retrograde_gpu_interface);
+  table["retrograde_gpu_initialize_kernels"] = pointer(retrograde_gpu_initialize_kernels);
+  table["retrograde_gpu_run"] = pointer(retrograde_gpu_run);
+  table["retrograde_gpu_finalize_kernels"] = pointer(retrograde_gpu_finalize_kernels);
+  table["retrograde_gpu_malloc"] = pointer(retrograde_gpu_malloc);
+  table["retrograde_gpu_free"] = pointer(retrograde_gpu_free);
+  table["retrograde_gpu_copy_to_device"] = pointer(retrograde_gpu_copy_to_device);
+  table["retrograde_gpu_copy_to_host"] = pointer(retrograde_gpu_copy_to_host);
+  table["retrograde_gpu_sync"] = pointer(retrograde_gpu_sync);
+  table["retrograde_gpu_buffer_copy"] = pointer(retrograde_gpu_buffer_copy);
+}
+
 void add_libc(Table& table) {
   table["memcpy"] = pointer<void*(void*, const void*, size_t)>(std::memcpy);
   table["memmove"] = pointer<void*(void*, const void*, size_t)>(std::memmove);
@@ -92,6 +106,7 @@ void add_libm(Table& table) {
 Table make_table() {
   Table table;
   add_runtime(table);
+  add_gpu(table);
   add_libc(table);
   add_libm(table);
   return table;

@@ -7,6 +7,7 @@
 #ifndef RETROGRADE_GPU_CALLS_H
 #define RETROGRADE_GPU_CALLS_H
 
+#include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 
@@ -49,6 +50,28 @@ int32_t retrograde_gpu_sync(retrograde_context*, struct halide_buffer_t*);
 /* Every element of `to` from the same coordinates of `from`; `to` on the device or on the host. */
 int32_t retrograde_gpu_buffer_copy(retrograde_context*, struct halide_buffer_t* from,
                                    int32_t to_device, struct halide_buffer_t* to);
+
+/* Gives the memory that is kept for later calls back to the driver, on the device of this call. */
+int32_t retrograde_gpu_release_unused(retrograde_context*);
+/* For all devices: kernels are unloaded, unused memory is freed, and where none is left in use, the
+ * primary contexts are let go. Not while anything runs. */
+int32_t retrograde_gpu_release(retrograde_context*);
+
+/* Device memory from the program's own allocator from now on, in the order of the stream; null: from
+ * the driver again. `allocate` gives null when there is none; `release` gives 0. Both get the caller's
+ * user context, and are called from any thread. */
+typedef void* (*retrograde_device_allocate_t)(void* user_context, size_t bytes, void* stream);
+typedef int32_t (*retrograde_device_release_t)(void* user_context, void* address, size_t bytes,
+                                               void* stream);
+void retrograde_set_device_allocator(retrograde_device_allocate_t, retrograde_device_release_t);
+
+/* ---- in the static runtime alone ---- */
+
+/* On which context and stream a call works. A program that defines one of these has its own called; it
+ * may also set handlers (HalideRuntimeCuda.h). They give 0, or a code. */
+int halide_cuda_acquire_context(void* user_context, void** context, bool create);
+int halide_cuda_release_context(void* user_context);
+int halide_cuda_get_stream(void* user_context, void* context, void** stream);
 
 #ifdef __cplusplus
 }

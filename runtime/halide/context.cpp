@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <cstring>
 
+#include "halide/gpu_handlers.h"
 #include "halide/weak.h"
 #include "retrograde_runtime.h"
 
@@ -69,5 +70,6 @@ void retrograde_begin_call(retrograde_context* context, void* user_context) {
   context->free_handler = release;
   context->parallel_handler = run_parallel;
   context->trace_handler = trace;
+  context->gpu_handlers = retrograde::runtime::halide_gpu_handlers();
   context->user_data = user_context;
 }

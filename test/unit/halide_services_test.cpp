@@ -157,9 +157,21 @@ TEST_F(HalideServices, ACopyThatDoesNotFitIsRefused) {
   EXPECT_EQ(copy(from, from), halide_error_code_no_device_interface);
 }
 
-TEST_F(HalideServices, NoDeviceMemoryIsEverKept) {
-  EXPECT_EQ(halide_reuse_device_allocations(nullptr, true), 0);
+int pools_released = 0;
+
+TEST_F(HalideServices, DeviceMemoryIsKeptUnlessItIsForbidden) {
+  static halide_device_allocation_pool pool = {[](void*) {
+                                                 pools_released++;
+                                                 return 0;
+                                               },
+                                               nullptr};
+  halide_register_device_allocation_pool(&pool);
+  EXPECT_TRUE(halide_can_reuse_device_allocations(nullptr));
+  EXPECT_EQ(halide_reuse_device_allocations(nullptr, false), 0);
   EXPECT_FALSE(halide_can_reuse_device_allocations(nullptr));
+  EXPECT_EQ(pools_released, 1);
+  EXPECT_EQ(halide_reuse_device_allocations(nullptr, true), 0);
+  EXPECT_EQ(pools_released, 1);
 }
 
 // ---- the profiler's state ----

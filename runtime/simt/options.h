@@ -1,0 +1,8 @@
+// Settings of the simulated device, from the environment until a program sets them.
+#pragma once
+
+#include "simt/simt_driver.h"
+
+namespace retrograde::simt {
+retrograde_simt_options& options();
+}  // namespace retrograde::simt

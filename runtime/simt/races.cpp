@@ -1,0 +1,99 @@
+#include "simt/races.h"
+
+#include <algorithm>
+
+namespace retrograde::simt {
+namespace {
+
+constexpr uint8_t other_threads = 1, other_warps = 2, other_blocks = 4;
+uint32_t warp_of(const Moment& moment) { return moment.thread / 32u; }
+
+// Whether all that `before` stands for came before `now`.
+bool is_ordered(const Moment& before, const Moment& now) {
+  if (before.interval == 0) return true;
+  if ((before.spread & other_blocks) || before.block != now.block) return false;
+  if (before.interval != now.interval) return true;
+  if (before.spread & other_warps) return false;
+  const bool by_warp = warp_of(before) == warp_of(now) && before.part != now.part;
+  return by_warp || (before.thread == now.thread && !(before.spread & other_threads));
+}
+
+// Adds an access to those that a moment stands for.
+void add(Moment& all, const Moment& now) {
+  uint8_t spread = all.spread & other_blocks;
+  if (all.interval != 0) {
+    if (all.block != now.block) {
+      spread |= other_blocks;
+    } else if (all.interval == now.interval) {
+      spread |= all.spread & other_warps;
+      if (warp_of(all) != warp_of(now))
+        spread |= other_warps;
+      else if (all.part == now.part)
+        spread |= (all.spread & other_threads) | (all.thread != now.thread ? other_threads : 0);
+    }
+  }
+  all = now;
+  all.spread = spread;
+}
+
+void look(Conflict& conflict, const Moment& before, const Moment& now, const char* did) {
+  if (!conflict.is_there && !is_ordered(before, now)) conflict = {true, before, did};
+}
+
+Conflict record_in(Cell& cell, Access access, const Moment& now) {
+  Conflict conflict;
+  look(conflict, cell.write, now, "store");
+  if (access != Access::load) look(conflict, cell.read, now, "load");
+  if (access != Access::atomic) look(conflict, cell.atomic, now, "atomic update");
+  add(access == Access::load ? cell.read : access == Access::store ? cell.write : cell.atomic, now);
+  return conflict;
+}
+
+}  // namespace
+
+Shadow::Page& Shadow::page_of(uint64_t word) {
+  const uint64_t number = word / page_words;
+  if (last_ && last_number_ == number) return *last_;
+  std::unique_ptr<Page>& page = pages_[number];
+  if (!page) page = std::make_unique<Page>();
+  if (page->generation != generation_) {
+    std::fill_n(page->words, page_words, Cell());
+    page->parts.clear();
+    page->generation = generation_;
+  }
+  last_ = page.get();
+  last_number_ = number;
+  return *last_;
+}
+
+Conflict Shadow::record_word(uint64_t begin, uint64_t end, Access access, const Moment& now) {
+  Page& page = page_of(begin / 4);
+  const auto index = static_cast<uint32_t>(begin / 4 % page_words);
+  Cell& whole = page.words[index];
+  auto parts = page.parts.empty() ? page.parts.end() : page.parts.find(index);
+  if (parts == page.parts.end()) {
+    if (end - begin == 4) return record_in(whole, access, now);
+    parts = page.parts.emplace(index, std::make_unique<Cell[]>(4)).first;
+    std::fill_n(parts->second.get(), 4, whole);
+  }
+  Conflict first;
+  for (uint64_t byte = begin; byte < end; byte++) {
+    const Conflict found = record_in(parts->second[byte % 4], access, now);
+    if (found.is_there && !first.is_there) first = found;
+  }
+  return first;
+}
+
+Conflict Shadow::record(uint64_t address, int32_t bytes, Access access, const Moment& now) {
+  Conflict first;
+  const uint64_t end = address + static_cast<uint64_t>(bytes);
+  while (address < end) {
+    const uint64_t word_end = std::min(end, (address / 4 + 1) * 4);
+    const Conflict found = record_word(address, word_end, access, now);
+    if (found.is_there && !first.is_there) first = found;
+    address = word_end;
+  }
+  return first;
+}
+
+}  // namespace retrograde::simt

@@ -1,0 +1,141 @@
+// What the tests of the GPU runtime share: a pipeline of one kernel as generated code would run it, and
+// a test that wants nothing left on the simulated device afterwards.
+#pragma once
+
+#include <HalideBuffer.h>
+#include <HalideRuntimeCuda.h>
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <string>
+
+#include "gpu/gpu_calls.h"
+#include "support/gpu_kernels.h"
+#include "support/simulated_driver.h"
+
+namespace gpu_testing {
+
+namespace cuda = retrograde::cuda;
+using gpu_kernels::Image;
+using Halide::Runtime::Buffer;
+
+inline thread_local std::string errors;
+
+inline const halide_device_interface_t* device() { return halide_cuda_device_interface(); }
+
+inline Buffer<float> ramp(int width, int height = 1) {
+  Buffer<float> b(width, height);
+  b.for_each_element([&](int x, int y) { b(x, y) = static_cast<float>(x + 1000 * y); });
+  b.set_host_dirty();
+  return b;
+}
+
+// The host's element: writable access would set host_dirty.
+template <typename T>
+T at(const Buffer<T>& b, int x, int y) {
+  return b(x, y);
+}
+
+// Other elements on the host, which do not count as newer.
+template <typename T>
+void spoil_host(Buffer<T>& b) {
+  b.fill(static_cast<T>(-1));
+  b.set_host_dirty(false);
+}
+
+// The kernels of one pipeline, as generated code has them.
+struct Saxpy {
+  Image image{gpu_kernels::saxpy_kernel()};
+  void* state = nullptr;
+  ~Saxpy() { retrograde_gpu_forget_kernels(image.source()); }
+
+  int load(void* user = nullptr) {
+    return halide_cuda_initialize_kernels(user, &state, image.source(), Image::bytes);
+  }
+  int launch(halide_buffer_t* x, halide_buffer_t* y, float a, int n, void* user = nullptr) {
+    size_t sizes[] = {8, 8, 4, 4, 0};
+    void* args[] = {x, y, &a, &n};
+    int8_t is_buffer[] = {1, 1, 0, 0, 0};
+    const int blocks = (n + 127) / 128;
+    return halide_cuda_run(user, state, "saxpy", blocks, 1, 1, 128, 1, 1, 0, sizes, args,
+                           is_buffer);
+  }
+  // y = a x + y, with y left on the device.
+  int run(halide_buffer_t* x, halide_buffer_t* y, float a, void* user = nullptr) {
+    int code = load(user);
+    if (code == 0) code = halide_copy_to_device(user, x, device());
+    if (code == 0) code = halide_copy_to_device(user, y, device());
+    if (code == 0) code = launch(x, y, a, static_cast<int>(y->number_of_elements()), user);
+    if (code == 0) y->set_device_dirty();
+    halide_cuda_finalize_kernels(user, state);
+    return code;
+  }
+};
+
+// Everything that a handler was told, and nothing left behind.
+class GpuRuntime : public testing::Test {
+ protected:
+  GpuRuntime() {
+    setenv("RETROGRADE_GPU", "simulated", 1);
+    errors.clear();
+    halide_set_error_handler([](void*, const char* text) { errors += text; });
+  }
+  ~GpuRuntime() override {
+    retrograde_simt_call_off();
+    halide_set_gpu_device(0);
+    halide_set_cuda_acquire_context(nullptr);
+    halide_set_cuda_get_stream(nullptr);
+    retrograde_set_device_allocator(nullptr, nullptr);
+    halide_reuse_device_allocations(nullptr, true);
+    halide_device_release(nullptr, device());
+    EXPECT_EQ(live_objects().allocations, 0);
+    EXPECT_EQ(live_objects().modules, 0);
+    EXPECT_EQ(live_objects().contexts, 0);
+    halide_set_error_handler(nullptr);
+  }
+  void expect_error(int code, int expected, std::initializer_list<const char*> parts) {
+    EXPECT_EQ(code, expected) << errors;
+    for (const char* part : parts)
+      EXPECT_NE(errors.find(part), std::string::npos) << part << "\nin: " << errors;
+    errors.clear();
+  }
+  SimulatedOptions options;
+};
+
+inline void expect_saxpy(const Buffer<float>& y, float a) {
+  for (int i = 0; i < y.width(); i++)
+    ASSERT_EQ(y(i, 0), a * static_cast<float>(i) + static_cast<float>(i)) << i;
+}
+
+// One stream, created in the context that a call asks for.
+inline cuda::Context user_context_made = nullptr;
+inline cuda::Stream user_stream = nullptr;
+inline int acquire_users(void*, void** context, bool) {
+  *context = user_context_made;
+  return 0;
+}
+inline int get_users_stream(void*, void* context, void** stream) {
+  EXPECT_EQ(context, user_context_made);
+  *stream = user_stream;
+  return 0;
+}
+
+// A context and a stream of the program's, which it hands to the runtime.
+class GivenStream {
+ public:
+  GivenStream() {
+    EXPECT_EQ(cuda::cuInit(0), cuda::success);
+    EXPECT_EQ(cuda::cuCtxCreate_v2(&user_context_made, 0, 0), cuda::success);
+    EXPECT_EQ(cuda::cuStreamCreate(&user_stream, 1), cuda::success);
+    halide_set_cuda_acquire_context(acquire_users);
+    halide_set_cuda_get_stream(get_users_stream);
+  }
+  ~GivenStream() {
+    halide_device_release(nullptr, device());
+    halide_set_cuda_acquire_context(nullptr);
+    halide_set_cuda_get_stream(nullptr);
+    EXPECT_EQ(cuda::cuCtxDestroy_v2(user_context_made), cuda::success);
+  }
+};
+
+}  // namespace gpu_testing
