@@ -48,6 +48,16 @@ target_compile_options(retrograde_dep_halide_runtime INTERFACE
   "SHELL:-idirafter ${RETROGRADE_HALIDE_RUNTIME_INCLUDE}")
 target_link_libraries(retrograde_dep_halide_runtime INTERFACE ${CMAKE_DL_LIBS})
 
+find_path(RETROGRADE_JSON_INCLUDE nlohmann/json.hpp REQUIRED)
+add_library(retrograde_dep_json INTERFACE)
+target_include_directories(retrograde_dep_json SYSTEM INTERFACE ${RETROGRADE_JSON_INCLUDE})
+
+find_package(Boost REQUIRED COMPONENTS context)  # Boost::context, fibers of the simulated device
+
+# What follows is for applications, tools, tests and benchmarks.
+if(NOT RETROGRADE_PROGRAMS)
+  return()
+endif()
 find_library(RETROGRADE_HALIDE_LIBRARY NAMES Halide14 REQUIRED)
 get_filename_component(retrograde_halide_folder ${RETROGRADE_HALIDE_LIBRARY} DIRECTORY)
 find_library(RETROGRADE_HALIDE_LI2018 NAMES autoschedule_li2018
@@ -86,14 +96,8 @@ find_path(RETROGRADE_CLI_INCLUDE CLI/CLI.hpp REQUIRED)
 add_library(retrograde_dep_cli INTERFACE)
 target_include_directories(retrograde_dep_cli SYSTEM INTERFACE ${RETROGRADE_CLI_INCLUDE})
 
-find_path(RETROGRADE_JSON_INCLUDE nlohmann/json.hpp REQUIRED)
-add_library(retrograde_dep_json INTERFACE)
-target_include_directories(retrograde_dep_json SYSTEM INTERFACE ${RETROGRADE_JSON_INCLUDE})
-
 find_path(RETROGRADE_SQLITE_INCLUDE sqlite3.h REQUIRED)
 find_library(RETROGRADE_SQLITE_LIBRARY sqlite3 REQUIRED)
 add_library(retrograde_dep_sqlite INTERFACE)
 target_include_directories(retrograde_dep_sqlite SYSTEM INTERFACE ${RETROGRADE_SQLITE_INCLUDE})
 target_link_libraries(retrograde_dep_sqlite INTERFACE ${RETROGRADE_SQLITE_LIBRARY})
-
-find_package(Boost REQUIRED COMPONENTS context)  # Boost::context, fibers of the simulated device

@@ -1,0 +1,32 @@
+// bind_all.h -- the parts of the module, in the order in which their classes are known to each other's signatures.
+#pragma once
+
+#include <pybind11/pybind11.h>
+
+namespace retrograde::python {
+
+void bind_errors(pybind11::module_& module);
+void bind_enumerations(pybind11::module_& module);
+void bind_types(pybind11::module_& module);
+void bind_target(pybind11::module_& module);
+void bind_expr(pybind11::module_& module);
+void bind_variables(pybind11::module_& module);
+void bind_expr_functions(pybind11::module_& module);
+void bind_integer_functions(pybind11::module_& module);
+void bind_buffer(pybind11::module_& module);
+void bind_param(pybind11::module_& module);
+void bind_image_param(pybind11::module_& module);
+void bind_func(pybind11::module_& module);
+void bind_func_ref(pybind11::module_& module);
+void bind_func_schedule(pybind11::module_& module);
+void bind_func_running(pybind11::module_& module);
+void bind_stage(pybind11::module_& module);
+void bind_pipeline(pybind11::module_& module);
+void bind_derivative(pybind11::module_& module);
+void bind_tangents(pybind11::module_& module);
+void bind_boundary_conditions(pybind11::module_& module);
+void bind_inline_reductions(pybind11::module_& module);
+// The operators of Python for everything that stands for an Expr: once the classes are there.
+void bind_operators(pybind11::module_& module);
+
+}  // namespace retrograde::python

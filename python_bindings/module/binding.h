@@ -1,0 +1,100 @@
+// binding.h -- what every file of the extension module uses: classes and functions that take their docstrings from
+// the headers' comments, and the conversions of casters.h.
+//
+// One file binds one header or topic, so that they compile side by side in little memory. bind_all.h lists them.
+#pragma once
+
+#include <pybind11/pybind11.h>
+#include <pybind11/stl.h>
+
+#include <initializer_list>
+#include <string>
+#include <utility>
+
+#include "casters.h"
+
+namespace retrograde::python {
+
+namespace py = pybind11;
+
+// What the headers say of "Func::compute_root", from the table that tools/make_docs.py writes of them; the first of
+// these scopes that has the name. "" where none has.
+const char* documentation(std::initializer_list<const char*> scopes, const std::string& name);
+inline const char* documentation(const std::string& name) { return documentation({""}, name); }
+
+// A class whose methods are documented where the C++ class of the same name, or one of `inherited`, is.
+template <class T, class... Options>
+class Class : public py::class_<T, Options...> {
+  using Base = py::class_<T, Options...>;
+
+ public:
+  template <class... Extra>
+  Class(py::handle scope, const char* name, std::initializer_list<const char*> inherited,
+        const Extra&... extra)
+      : Base(scope, name, documentation(name), extra...), scopes_{name} {
+    scopes_.insert(scopes_.end(), inherited.begin(), inherited.end());
+  }
+  Class(py::handle scope, const char* name) : Class(scope, name, {}) {}
+  // One that another file made, to add to.
+  struct Made {
+    py::object cls;
+  };
+  Class(const Made& made, const char* name, std::initializer_list<const char*> inherited)
+      : Base(py::reinterpret_borrow<Base>(made.cls)), scopes_{name} {
+    scopes_.insert(scopes_.end(), inherited.begin(), inherited.end());
+  }
+
+  template <class F, class... Extra>
+  Class& def(const char* name, F&& f, const Extra&... extra) {
+    Base::def(name, std::forward<F>(f), doc(name), extra...);
+    return *this;
+  }
+  // Constructors and what else pybind11 makes of one.
+  template <class... Args, class... Extra>
+  Class& def(const py::detail::initimpl::constructor<Args...>& init, const Extra&... extra) {
+    Base::def(init, doc(scopes_[0]), extra...);
+    return *this;
+  }
+  template <class... Args, class... Extra>
+  Class& def(py::detail::initimpl::factory<Args...>&& init, const Extra&... extra) {
+    Base::def(std::move(init), doc(scopes_[0]), extra...);
+    return *this;
+  }
+  template <class F, class... Extra>
+  Class& def_static(const char* name, F&& f, const Extra&... extra) {
+    Base::def_static(name, std::forward<F>(f), doc(name), extra...);
+    return *this;
+  }
+  template <class F>
+  Class& def_readwrite(const char* name, F field) {
+    Base::def_readwrite(name, field, doc(name));
+    return *this;
+  }
+  template <class F>
+  Class& def_readonly(const char* name, F field) {
+    Base::def_readonly(name, field, doc(name));
+    return *this;
+  }
+  template <class F>
+  Class& def_property_readonly(const char* name, F&& get) {
+    Base::def_property_readonly(name, std::forward<F>(get), doc(name));
+    return *this;
+  }
+
+ private:
+  const char* doc(const std::string& name) const {
+    for (const char* scope : scopes_) {
+      if (const char* text = documentation({scope}, name); *text) return text;
+    }
+    return "";
+  }
+  std::vector<const char*> scopes_;
+};
+
+// A function of the module, documented as the C++ function of its name.
+template <class F, class... Extra>
+void def(py::module_& module, const char* name, F&& f, const Extra&... extra) {
+  module.def(name, std::forward<F>(f), documentation(name), extra...);
+}
+
+}  // namespace retrograde::python

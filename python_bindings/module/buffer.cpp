@@ -1,0 +1,390 @@
+// buffer.cpp -- Buffer: elements, shapes, and the arrays of Python that share its memory.
+#include <pybind11/functional.h>
+
+#include "bind_all.h"
+#include "binding.h"
+#include "buffer_memory.h"
+#include "frontend/data/param.h"
+#include "numbers.h"
+
+namespace retrograde::python {
+
+namespace {
+
+// ---- elements ----
+
+bool are_numbers(const py::tuple& index) {
+  for (py::handle i : index) {
+    if (!PyIndex_Check(i.ptr()) || py::isinstance<Expr>(i)) return false;
+  }
+  return true;
+}
+
+py::tuple as_tuple(const py::object& index) {
+  return py::isinstance<py::tuple>(index) ? py::tuple(index) : py::make_tuple(index);
+}
+
+char* address(const Buffer<>& buffer, const py::tuple& index) {
+  std::vector<int> at;
+  for (py::handle i : index) at.push_back(i.cast<int>());
+  if (static_cast<int>(at.size()) != buffer.dimensions()) {
+    user_error("access the Buffer " + quoted(buffer.name()),
+               "an access gives one coordinate for each dimension",
+               text("it has ", buffer.dimensions(), " dimensions and was given ", at.size(),
+                    " coordinates"),
+               "Give that many coordinates");
+  }
+  frontend::check_in_bounds(buffer.contents()->buffer, buffer.name(), at.data(),
+                            static_cast<int>(at.size()));
+  int64_t elements = 0;
+  for (int d = 0; d < buffer.dimensions(); d++) {
+    // One past the end is a place that C++ may point to, but no element.
+    if (at[d] >= buffer.min(d) + buffer.extent(d))
+      throw py::index_error("the coordinate lies outside of the Buffer");
+    elements += static_cast<int64_t>(at[d] - buffer.min(d)) * buffer.stride(d);
+  }
+  return reinterpret_cast<char*>(buffer.raw_buffer()->host) + elements * buffer.type().bytes();
+}
+
+template <class T>
+T read(const char* from) {
+  T value;
+  std::memcpy(&value, from, sizeof(T));
+  return value;
+}
+
+ir::Scalar load(Type type, const char* from) {
+  const auto bits = [&]() -> uint64_t {
+    switch (type.bytes()) {
+      case 1:
+        return read<uint8_t>(from);
+      case 2:
+        return read<uint16_t>(from);
+      case 4:
+        return read<uint32_t>(from);
+      default:
+        return read<uint64_t>(from);
+    }
+  };
+  return type.is_uint()
+             ? ir::Scalar::of_uint(type, bits())
+             : ir::eval_reinterpret(type, ir::Scalar::of_uint(UInt(type.bits()), bits()));
+}
+
+void store(Type type, char* to, const ir::Scalar& value) {
+  const uint64_t bits =
+      type.is_float() ? ir::eval_reinterpret(UInt(type.bits()), value).u : value.u;
+  std::memcpy(to, &bits, type.bytes());  // this machine is little-endian
+}
+
+// buffer[x, y]: an element for numbers, the load of one for Exprs.
+py::object get_item(const Buffer<>& buffer, const py::object& index) {
+  const py::tuple at = as_tuple(index);
+  if (!are_numbers(at)) return py::cast(buffer(coordinates(index)));
+  return object_of(load(buffer.type(), address(buffer, at)));
+}
+
+void set_item(const Buffer<>& buffer, const py::object& index, const py::object& value) {
+  check_writable(buffer, "store an element of the Buffer " + quoted(buffer.name()));
+  char* const to = address(buffer, as_tuple(index));
+  store(buffer.type(), to, scalar_of(buffer.type(), value));
+}
+
+void fill(const Buffer<>& buffer, const py::object& value) {
+  check_writable(buffer, "fill the Buffer " + quoted(buffer.name()));
+  const Type type = buffer.type();
+  const ir::Scalar scalar = scalar_of(type, value);
+  char* const base = reinterpret_cast<char*>(buffer.raw_buffer()->host);
+  buffer.get()->for_each_element([&](const int* at) {
+    int64_t elements = 0;
+    for (int d = 0; d < buffer.dimensions(); d++) {
+      elements += static_cast<int64_t>(at[d] - buffer.min(d)) * buffer.stride(d);
+    }
+    store(type, base + elements * type.bytes(), scalar);
+  });
+}
+
+// ---- shapes ----
+
+Buffer<> bits_of(const Buffer<>& buffer) {
+  Runtime::Buffer<> same = buffer.contents()->buffer;
+  same.raw_buffer()->type = to_halide_type(UInt(8 * buffer.type().bytes()));
+  return with_owner_of(buffer, Buffer<>(same));
+}
+
+template <class Change>
+Buffer<> changed(const Buffer<>& buffer, Change change) {
+  Buffer<> result = buffer.alias();
+  change(result);
+  return with_owner_of(buffer, result);
+}
+
+py::object shape(const Buffer<>& buffer) {
+  py::list result;
+  for (int d = buffer.dimensions(); d-- > 0;) result.append(buffer.extent(d));
+  return py::tuple(result);
+}
+
+using Box = std::vector<std::pair<int, int>>;
+
+void bind_shapes(Class<Buffer<>>& c) {
+  c.def("crop", py::overload_cast<int, int, int>(&Buffer<>::crop), py::arg("dimension"),
+        py::arg("min"), py::arg("extent"))
+      .def("crop", py::overload_cast<const Box&>(&Buffer<>::crop), py::arg("box"))
+      .def("slice", py::overload_cast<int, int>(&Buffer<>::slice), py::arg("dimension"),
+           py::arg("position"))
+      .def("slice", py::overload_cast<int>(&Buffer<>::slice), py::arg("dimension"))
+      .def("embed", &Buffer<>::embed, py::arg("dimension"), py::arg("position") = 0)
+      .def("translate", py::overload_cast<int, int>(&Buffer<>::translate), py::arg("dimension"),
+           py::arg("delta"))
+      .def("translate", py::overload_cast<const std::vector<int>&>(&Buffer<>::translate),
+           py::arg("delta"))
+      .def(
+          "set_min", [](Buffer<>& b, const std::vector<int>& mins) { b.set_min(mins); },
+          py::arg("mins"))
+      .def("transpose", py::overload_cast<int, int>(&Buffer<>::transpose), py::arg("d1"),
+           py::arg("d2"))
+      .def("transpose", py::overload_cast<const std::vector<int>&>(&Buffer<>::transpose),
+           py::arg("order"))
+      .def("add_dimension", &Buffer<>::add_dimension)
+      .def("allocate", &Buffer<>::allocate)
+      .def("deallocate", &Buffer<>::deallocate)
+      .def("reset", &Buffer<>::reset)
+      .def(
+          "cropped",
+          [](const Buffer<>& b, int d, int min, int extent) {
+            return changed(b, [&](Buffer<>& to) { to.crop(d, min, extent); });
+          },
+          py::arg("dimension"), py::arg("min"), py::arg("extent"))
+      .def(
+          "cropped",
+          [](const Buffer<>& b, const Box& box) {
+            return changed(b, [&](Buffer<>& to) { to.crop(box); });
+          },
+          py::arg("box"))
+      .def(
+          "sliced",
+          [](const Buffer<>& b, int d, std::optional<int> position) {
+            return changed(b, [&](Buffer<>& to) { to.slice(d, position.value_or(b.min(d))); });
+          },
+          py::arg("dimension"), py::arg("position") = py::none())
+      .def(
+          "embedded",
+          [](const Buffer<>& b, int d, int position) {
+            return changed(b, [&](Buffer<>& to) { to.embed(d, position); });
+          },
+          py::arg("dimension"), py::arg("position") = 0)
+      .def(
+          "translated",
+          [](const Buffer<>& b, int d, int delta) {
+            return changed(b, [&](Buffer<>& to) { to.translate(d, delta); });
+          },
+          py::arg("dimension"), py::arg("delta"))
+      .def(
+          "translated",
+          [](const Buffer<>& b, const std::vector<int>& delta) {
+            return changed(b, [&](Buffer<>& to) { to.translate(delta); });
+          },
+          py::arg("delta"))
+      .def(
+          "transposed",
+          [](const Buffer<>& b, int d1, int d2) {
+            return changed(b, [&](Buffer<>& to) { to.transpose(d1, d2); });
+          },
+          py::arg("d1"), py::arg("d2"))
+      .def("alias", [](const Buffer<>& b) { return changed(b, [](Buffer<>&) {}); });
+}
+
+void bind_facts(Class<Buffer<>>& c) {
+  c.def("defined", &Buffer<>::defined)
+      .def("name", &Buffer<>::name)
+      .def("set_name", &Buffer<>::set_name, py::arg("name"))
+      .def(
+          "same_as", [](const Buffer<>& a, const Buffer<>& b) { return a.same_as(b); },
+          py::arg("other"))
+      .def("type", &Buffer<>::type)
+      .def("dimensions", &Buffer<>::dimensions)
+      .def(
+          "dim", [](const Buffer<>& b, int d) { return Runtime::Buffer<>::Dimension(b.dim(d)); },
+          py::arg("dimension"))
+      .def("min", &Buffer<>::min, py::arg("dimension"))
+      .def("extent", &Buffer<>::extent, py::arg("dimension"))
+      .def("stride", &Buffer<>::stride, py::arg("dimension"))
+      .def("width", &Buffer<>::width)
+      .def("height", &Buffer<>::height)
+      .def("channels", &Buffer<>::channels)
+      .def("left", &Buffer<>::left)
+      .def("right", &Buffer<>::right)
+      .def("top", &Buffer<>::top)
+      .def("bottom", &Buffer<>::bottom)
+      .def("number_of_elements", &Buffer<>::number_of_elements)
+      .def("size_in_bytes", &Buffer<>::size_in_bytes)
+      .def(
+          "contains", [](const Buffer<>& b, const std::vector<int>& at) { return b.contains(at); },
+          py::arg("at"))
+      .def("is_read_only", &is_read_only)
+      .def_property_readonly("shape", &shape)
+      .def("host_dirty", &Buffer<>::host_dirty)
+      .def("set_host_dirty", &Buffer<>::set_host_dirty, py::arg("dirty") = true)
+      .def("device_dirty", &Buffer<>::device_dirty)
+      .def("set_device_dirty", &Buffer<>::set_device_dirty, py::arg("dirty") = true)
+      .def("has_device_allocation", &Buffer<>::has_device_allocation)
+      .def("copy_to_host", &Buffer<>::copy_to_host)
+      .def("device_sync", &Buffer<>::device_sync)
+      .def("device_free", &Buffer<>::device_free)
+      .def("copy_to_device", [](Buffer<>& b) { return b.copy_to_device(); });
+}
+
+std::string repr(const Buffer<>& b) {
+  if (!b.defined()) return "<retrograde.Buffer, undefined>";
+  std::string out = "<retrograde.Buffer " + quoted(b.name()) + " " + to_string(b.type());
+  for (int d = 0; d < b.dimensions(); d++) {
+    out += text(d == 0 ? " over " : " x ", "[", b.min(d), ", ", b.min(d) + b.extent(d), ")");
+  }
+  return out + ">";
+}
+
+void bind_elements(Class<Buffer<>>& c) {
+  c.def("copy", [](const Buffer<>& b) { return b.copy(); })
+      .def("copy_to_planar", [](const Buffer<>& b) { return b.copy_to_planar(); })
+      .def("copy_to_interleaved", [](const Buffer<>& b) { return b.copy_to_interleaved(); })
+      .def(
+          "copy_from",
+          [](Buffer<>& b, const Buffer<>& source) {
+            check_writable(b, "copy into the Buffer " + quoted(b.name()));
+            b.copy_from(source);
+          },
+          py::arg("source"))
+      .def(
+          "fill", [](const Buffer<>& b, const py::object& value) { return fill(b, value), b; },
+          py::arg("value"))
+      .def(
+          "all_equal",
+          [](const Buffer<>& b, const py::object& value) {
+            const ir::Scalar wanted = scalar_of(b.type(), value);
+            bool equal = true;
+            const char* const base = reinterpret_cast<const char*>(b.raw_buffer()->host);
+            b.get()->for_each_element([&](const int* at) {
+              int64_t elements = 0;
+              for (int d = 0; d < b.dimensions(); d++)
+                elements += static_cast<int64_t>(at[d] - b.min(d)) * b.stride(d);
+              equal = equal &&
+                      ir::eval_binary(ir::Kind::EQ,
+                                      load(b.type(), base + elements * b.type().bytes()), wanted)
+                          .as_bool();
+            });
+            return equal;
+          },
+          py::arg("value"))
+      .def(
+          "for_each_element",
+          [](const Buffer<>& b, const py::function& f) {
+            b.get()->for_each_element([&](const int* at) {
+              py::tuple point(b.dimensions());
+              for (int d = 0; d < b.dimensions(); d++) point[d] = at[d];
+              f(*point);
+            });
+            return b;
+          },
+          py::arg("function"))
+      .def("__getitem__", &get_item, py::arg("index"))
+      .def("__setitem__", &set_item, py::arg("index"), py::arg("value"))
+      .def("__call__", [](const Buffer<>& b, const py::args& index) { return get_item(b, index); })
+      .def("bits", &bits_of)
+      .def("__repr__", &repr);
+}
+
+void bind_arrays(Class<Buffer<>>& c) {
+  c.def(
+       "__dlpack__",
+       [](const Buffer<>& b, const py::object& stream, const py::object& max_version,
+          const py::object& device, const py::object& copy) {
+         if (!stream.is_none())
+           throw py::buffer_error("the memory is the CPU's, which has no streams");
+         const bool wants_other_device = !device.is_none() && !device.equal(py::make_tuple(1, 0));
+         if (wants_other_device) throw py::buffer_error("the memory is the CPU's");
+         const bool versioned =
+             !max_version.is_none() && py::tuple(max_version)[0].cast<int>() >= 1;
+         const bool copies = !copy.is_none() && copy.cast<bool>();
+         return dlpack_capsule(copies ? b.copy() : b, versioned);
+       },
+       py::kw_only(), py::arg("stream") = py::none(), py::arg("max_version") = py::none(),
+       py::arg("dl_device") = py::none(), py::arg("copy") = py::none())
+      .def("__dlpack_device__", [](const Buffer<>&) { return py::make_tuple(1, 0); })
+      .def_property_readonly("__array_interface__", [](const Buffer<>& b) {
+        using namespace py::literals;
+        const ArrayMemory memory = memory_of(b);
+        const std::string format = format_of(memory.type);
+        if (format.empty())
+          throw py::attribute_error("no array of NumPy has elements of type " +
+                                    to_string(memory.type));
+        const char kind = memory.type.is_bool()   ? 'b'
+                          : memory.type.is_int()  ? 'i'
+                          : memory.type.is_uint() ? 'u'
+                                                  : 'f';
+        return py::dict(
+            "version"_a = 3, "shape"_a = py::tuple(py::cast(memory.shape)),
+            "typestr"_a = text(memory.type.bytes() == 1 ? '|' : '<', kind, memory.type.bytes()),
+            "data"_a = py::make_tuple(reinterpret_cast<uintptr_t>(memory.data), memory.read_only),
+            "strides"_a = py::tuple(py::cast(memory.strides_bytes)));
+      });
+}
+
+void bind_dimension(py::module_& m) {
+  using Dimension = Runtime::Buffer<>::Dimension;
+  py::class_<Dimension>(m, "BufferDimension")
+      .def("min", &Dimension::min)
+      .def("extent", &Dimension::extent)
+      .def("max", &Dimension::max)
+      .def("stride", &Dimension::stride);
+}
+
+}  // namespace
+
+void bind_buffer(py::module_& m) {
+  bind_dimension(m);
+  Class<Buffer<>> c(m, "Buffer", {}, py::buffer_protocol());
+  c.def(py::init<>())
+      .def(py::init([](const Buffer<>& other) { return other; }), py::arg("buffer"))
+      .def(py::init([](const py::object& array, const std::string& name,
+                       const std::optional<Type>& type) {
+             std::optional<ArrayMemory> memory = array_memory(array);
+             if (!memory)
+               throw py::type_error("a Buffer is made of an array, or of a type and sizes");
+             if (type && type->bytes() == memory->type.bytes())
+               memory->type = *type;
+             else if (type)
+               throw py::type_error("the elements of the array have another size than " +
+                                    to_string(*type));
+             return buffer_of(*memory, name);
+           }),
+           py::arg("array"), py::arg("name") = "", py::arg("type") = py::none())
+      .def(py::init<Type, const std::vector<int>&, const std::string&>(), py::arg("type"),
+           py::arg("sizes"), py::arg("name") = "")
+      .def(py::init<Type, const std::vector<int>&, const std::vector<int>&, const std::string&>(),
+           py::arg("type"), py::arg("sizes"), py::arg("storage_order"), py::arg("name") = "")
+      .def_static(
+          "make_scalar",
+          [](Type type, const std::string& name) { return Buffer<>::make_scalar(type, name); },
+          py::arg("type"), py::arg("name") = "")
+      .def_static(
+          "make_interleaved",
+          [](Type type, int width, int height, int channels, const std::string& name) {
+            return Buffer<>::make_interleaved(type, width, height, channels, name);
+          },
+          py::arg("type"), py::arg("width"), py::arg("height"), py::arg("channels"),
+          py::arg("name") = "")
+      .def_static(
+          "make_with_shape_of",
+          [](const Buffer<>& source, const std::string& name) {
+            return Buffer<>::make_with_shape_of(source, name);
+          },
+          py::arg("source"), py::arg("name") = "");
+  bind_facts(c);
+  bind_shapes(c);
+  bind_elements(c);
+  bind_arrays(c);
+  add_buffer_protocol(c);
+}
+
+}  // namespace retrograde::python

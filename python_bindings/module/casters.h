@@ -1,0 +1,107 @@
+// casters.h -- what stands for what in a call: a number or a Var for an Expr, an array for a Buffer, a pair for a
+// Range, a dtype for a Type. Every file that binds anything sees these, so that there is one rule for all.
+//
+// A caster tries the class itself first. What else it takes is looked at only where pybind11 allows conversions, in
+// its second pass over overloads; errors on the way (a Func that is read before it is defined) are thrown, not hidden
+// behind "incompatible arguments".
+#pragma once
+
+#include <pybind11/pybind11.h>
+#include <pybind11/stl.h>
+
+#include <optional>
+#include <vector>
+
+#include "autodiff/tangents.h"
+#include "frontend/data/buffer.h"
+#include "frontend/language/func.h"
+#include "frontend/language/var_or_rvar.h"
+
+namespace retrograde::python {
+
+namespace py = pybind11;
+
+// Nothing where the object cannot stand for one.
+std::optional<Expr> expr_from(py::handle object);
+std::optional<Tuple> tuple_from(py::handle object);
+std::optional<VarOrRVar> loop_from(py::handle object);
+std::optional<Range> range_from(py::handle object);
+std::optional<Type> type_from(py::handle object);
+std::optional<Buffer<>> buffer_from(py::handle object);
+std::optional<Func> func_from(py::handle object);
+std::optional<AdjointInput> adjoint_input_from(py::handle object);
+std::optional<Direction> direction_from(py::handle object);
+std::optional<Argument> argument_from(py::handle object);
+
+py::object object_of(const VarOrRVar& loop);
+
+// A Python number takes the type of what stands beside it: of the first operand that is an Expr already, where it
+// fits; a float the widest floating type among them, or float32. NumPy's scalars have types of their own.
+std::vector<Expr> operands(const std::vector<py::object>& objects);
+// The same of what an element of type `type` is given.
+Expr operand_for(Type type, py::handle object);
+// A Python int or float, which has no type of its own here.
+bool is_plain_number(py::handle object);
+
+// f[x, y]: one coordinate or a tuple of them; `...` stands for the placeholder _.
+std::vector<Expr> coordinates(py::handle index);
+
+}  // namespace retrograde::python
+
+namespace pybind11::detail {
+
+// The class itself, or what `from` makes of an object.
+template <class T, std::optional<T> (*from)(handle)>
+class converting_caster : public type_caster_base<T> {
+ public:
+  bool load(handle source, bool convert) {
+    if (type_caster_base<T>::load(source, false)) return true;
+    if (!convert || !source || source.is_none()) return false;
+    made_ = from(source);
+    if (!made_) return false;
+    this->value = &*made_;
+    return true;
+  }
+
+ private:
+  std::optional<T> made_;
+};
+
+#define RETROGRADE_CONVERTING_CASTER(T, from) \
+  template <>                                 \
+  class type_caster<T> : public converting_caster<T, &retrograde::python::from> {}
+RETROGRADE_CONVERTING_CASTER(retrograde::Expr, expr_from);
+RETROGRADE_CONVERTING_CASTER(retrograde::Tuple, tuple_from);
+RETROGRADE_CONVERTING_CASTER(retrograde::Range, range_from);
+RETROGRADE_CONVERTING_CASTER(retrograde::Type, type_from);
+RETROGRADE_CONVERTING_CASTER(retrograde::Buffer<>, buffer_from);
+RETROGRADE_CONVERTING_CASTER(retrograde::Func, func_from);
+RETROGRADE_CONVERTING_CASTER(retrograde::AdjointInput, adjoint_input_from);
+RETROGRADE_CONVERTING_CASTER(retrograde::Direction, direction_from);
+RETROGRADE_CONVERTING_CASTER(retrograde::Argument, argument_from);
+#undef RETROGRADE_CONVERTING_CASTER
+
+// Not a class in Python: a Var, an RVar, or an RDom of one variable.
+template <>
+class type_caster<retrograde::VarOrRVar> {
+ public:
+  static constexpr auto name = const_name("VarOrRVar");
+  template <class T>
+  using cast_op_type = movable_cast_op_type<T>;
+
+  bool load(handle source, bool) {
+    value_ = retrograde::python::loop_from(source);
+    return value_.has_value();
+  }
+  static handle cast(const retrograde::VarOrRVar& loop, return_value_policy, handle) {
+    return retrograde::python::object_of(loop).release();
+  }
+  operator retrograde::VarOrRVar*() { return &*value_; }
+  operator retrograde::VarOrRVar&() { return *value_; }
+  operator retrograde::VarOrRVar&&() && { return std::move(*value_); }
+
+ private:
+  std::optional<retrograde::VarOrRVar> value_;
+};
+
+}  // namespace pybind11::detail

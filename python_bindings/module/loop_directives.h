@@ -1,0 +1,171 @@
+// loop_directives.h -- the directives that Func and Stage have in common.
+#pragma once
+
+#include <vector>
+
+#include "binding.h"
+#include "frontend/language/func.h"
+
+namespace retrograde::python {
+
+using Alignment = std::vector<std::pair<VarOrRVar, LoopAlignStrategy>>;
+
+// reorder(x, y) and reorder([x, y])
+inline std::vector<VarOrRVar> loops_of(const py::args& args) {
+  std::vector<VarOrRVar> loops;
+  const auto add = [&](const auto& self, py::handle object) -> void {
+    if (py::isinstance<py::list>(object) || py::isinstance<py::tuple>(object)) {
+      for (py::handle one : object) self(self, one);
+      return;
+    }
+    const std::optional<VarOrRVar> loop = loop_from(object);
+    if (!loop) throw py::type_error("a loop is a Var, an RVar or an RDom of one variable");
+    loops.push_back(*loop);
+  };
+  for (py::handle object : args) add(add, object);
+  return loops;
+}
+
+template <class Self>
+void bind_loop_shapes(Class<Self>& c) {
+  using py::arg;
+  constexpr auto automatic = TailStrategy::Auto;
+  c.def("split", &Self::split, arg("old"), arg("outer"), arg("inner"), arg("factor"),
+        arg("tail") = automatic)
+      .def("fuse", &Self::fuse, arg("inner"), arg("outer"), arg("fused"))
+      .def("rename", &Self::rename, arg("old_name"), arg("new_name"))
+      .def("reorder",
+           [](Self& s, const py::args& loops) -> Self& { return s.reorder(loops_of(loops)); })
+      .def(
+          "tile",
+          [](Self& s, VarOrRVar x, VarOrRVar y, VarOrRVar xo, VarOrRVar yo, VarOrRVar xi,
+             VarOrRVar yi, Expr xfactor, Expr yfactor, TailStrategy tail) -> Self& {
+            return s.tile(x, y, xo, yo, xi, yi, xfactor, yfactor, tail);
+          },
+          arg("x"), arg("y"), arg("xo"), arg("yo"), arg("xi"), arg("yi"), arg("xfactor"),
+          arg("yfactor"), arg("tail") = automatic)
+      .def(
+          "tile",
+          [](Self& s, VarOrRVar x, VarOrRVar y, VarOrRVar xi, VarOrRVar yi, Expr xfactor,
+             Expr yfactor,
+             TailStrategy tail) -> Self& { return s.tile(x, y, xi, yi, xfactor, yfactor, tail); },
+          arg("x"), arg("y"), arg("xi"), arg("yi"), arg("xfactor"), arg("yfactor"),
+          arg("tail") = automatic)
+      .def(
+          "tile",
+          [](Self& s, const std::vector<VarOrRVar>& previous, const std::vector<VarOrRVar>& outers,
+             const std::vector<VarOrRVar>& inners, const std::vector<Expr>& factors,
+             TailStrategy tail) -> Self& {
+            return s.tile(previous, outers, inners, factors, tail);
+          },
+          arg("previous"), arg("outers"), arg("inners"), arg("factors"), arg("tail") = automatic)
+      .def(
+          "tile",
+          [](Self& s, const std::vector<VarOrRVar>& previous, const std::vector<VarOrRVar>& inners,
+             const std::vector<Expr>& factors,
+             TailStrategy tail) -> Self& { return s.tile(previous, inners, factors, tail); },
+          arg("previous"), arg("inners"), arg("factors"), arg("tail") = automatic);
+}
+
+template <class Self>
+void bind_loop_kinds(Class<Self>& c) {
+  using py::arg;
+  constexpr auto automatic = TailStrategy::Auto;
+  using OneLoop = Self& (Self::*)(const VarOrRVar&);
+  using Split = Self& (Self::*)(const VarOrRVar&, const Expr&, TailStrategy);
+  c.def("serial", &Self::serial, arg("var"))
+      .def("parallel", static_cast<OneLoop>(&Self::parallel), arg("var"))
+      .def("vectorize", static_cast<OneLoop>(&Self::vectorize), arg("var"))
+      .def("unroll", static_cast<OneLoop>(&Self::unroll), arg("var"))
+      .def("parallel", static_cast<Split>(&Self::parallel), arg("var"), arg("task_size"),
+           arg("tail") = automatic)
+      .def("vectorize", static_cast<Split>(&Self::vectorize), arg("var"), arg("factor"),
+           arg("tail") = automatic)
+      .def("unroll", static_cast<Split>(&Self::unroll), arg("var"), arg("factor"),
+           arg("tail") = automatic)
+      .def("partition", &Self::partition, arg("var"), arg("partition"))
+      .def("never_partition",
+           [](Self& s, const py::args& v) -> Self& { return s.never_partition(loops_of(v)); })
+      .def("always_partition",
+           [](Self& s, const py::args& v) -> Self& { return s.always_partition(loops_of(v)); })
+      .def("never_partition_all", &Self::never_partition_all)
+      .def("always_partition_all", &Self::always_partition_all)
+      .def("atomic", &Self::atomic, arg("override_associativity_test") = false)
+      .def("allow_race_conditions", &Self::allow_race_conditions)
+      .def("unscheduled", &Self::unscheduled);
+}
+
+template <class Self>
+void bind_loop_places(Class<Self>& c) {
+  using py::arg;
+  constexpr auto automatic = LoopAlignStrategy::Auto;
+  constexpr auto guarded = PrefetchBoundStrategy::GuardWithIf;
+  c.def(
+       "compute_with",
+       [](Self& s, const LoopLevel& level, LoopAlignStrategy align) -> Self& {
+         return s.compute_with(level, align);
+       },
+       arg("level"), arg("align") = automatic)
+      .def(
+          "compute_with",
+          [](Self& s, const LoopLevel& level, const Alignment& align) -> Self& {
+            return s.compute_with(level, align);
+          },
+          arg("level"), arg("align"))
+      .def(
+          "compute_with",
+          [](Self& s, const Stage& stage, VarOrRVar var, LoopAlignStrategy align) -> Self& {
+            return s.compute_with(stage, var, align);
+          },
+          arg("stage"), arg("var"), arg("align") = automatic)
+      .def(
+          "compute_with",
+          [](Self& s, const Stage& stage, VarOrRVar var, const Alignment& align) -> Self& {
+            return s.compute_with(stage, var, align);
+          },
+          arg("stage"), arg("var"), arg("align"))
+      .def("specialize", &Self::specialize, arg("condition"))
+      .def("specialize_fail", &Self::specialize_fail, arg("message"))
+      .def(
+          "prefetch",
+          [](Self& s, const ImageParam& image, VarOrRVar at, VarOrRVar from, Expr offset,
+             PrefetchBoundStrategy strategy) -> Self& {
+            return s.prefetch(image, at, from, offset, strategy);
+          },
+          arg("image"), arg("at"), arg("from_"), arg("offset") = Expr(1), arg("strategy") = guarded)
+      .def(
+          "prefetch",
+          [](Self& s, const Func& f, VarOrRVar at, VarOrRVar from, Expr offset,
+             PrefetchBoundStrategy strategy) -> Self& {
+            return s.prefetch(f, at, from, offset, strategy);
+          },
+          arg("f"), arg("at"), arg("from_"), arg("offset") = Expr(1), arg("strategy") = guarded)
+      .def(
+          "gpu_threads", [](Self& s, VarOrRVar x) -> Self& { return s.gpu_threads(x); }, arg("x"))
+      .def(
+          "gpu_lanes", [](Self& s, VarOrRVar x) -> Self& { return s.gpu_lanes(x); }, arg("x"))
+      .def(
+          "gpu_blocks", [](Self& s, VarOrRVar x) -> Self& { return s.gpu_blocks(x); }, arg("x"))
+      .def("gpu_single_thread", [](Self& s) -> Self& { return s.gpu_single_thread(); })
+      .def(
+          "gpu",
+          [](Self& s, VarOrRVar block, VarOrRVar thread) -> Self& { return s.gpu(block, thread); },
+          arg("block"), arg("thread"))
+      .def(
+          "gpu_tile",
+          [](Self& s, VarOrRVar x, VarOrRVar inner, const py::args&) -> Self& {
+            return s.gpu_tile(x, inner);
+          },
+          arg("x"), arg("inner"))
+      .def(
+          "hexagon", [](Self& s, VarOrRVar x) -> Self& { return s.hexagon(x); }, arg("x"));
+}
+
+template <class Self>
+void bind_loop_directives(Class<Self>& c) {
+  bind_loop_shapes(c);
+  bind_loop_kinds(c);
+  bind_loop_places(c);
+}
+
+}  // namespace retrograde::python

@@ -1,0 +1,32 @@
+// module.cpp -- the extension module retrograde._retrograde.
+#include "bind_all.h"
+#include "binding.h"
+
+PYBIND11_MODULE(_retrograde, module) {
+  using namespace retrograde::python;
+  module.attr("__version__") = RETROGRADE_VERSION;
+  module.doc() =
+      "Array pipelines whose first product is the gradient: the names of the C++ library.";
+  bind_errors(module);
+  bind_enumerations(module);
+  bind_types(module);
+  bind_target(module);
+  bind_expr(module);
+  bind_variables(module);
+  bind_buffer(module);
+  bind_param(module);
+  bind_image_param(module);
+  bind_func_ref(module);
+  bind_stage(module);
+  bind_func(module);
+  bind_func_schedule(module);
+  bind_func_running(module);
+  bind_pipeline(module);
+  bind_derivative(module);
+  bind_tangents(module);
+  bind_expr_functions(module);
+  bind_integer_functions(module);
+  bind_boundary_conditions(module);
+  bind_inline_reductions(module);
+  bind_operators(module);
+}

@@ -1,0 +1,184 @@
+// numbers.cpp -- see numbers.h, and operands() of casters.h.
+#include "numbers.h"
+
+#include <algorithm>
+
+#include "casters.h"
+#include "ir/build.h"
+
+namespace retrograde::python {
+
+namespace {
+
+[[noreturn]] void too_large(py::handle number, const std::string& type) {
+  PyErr_SetString(PyExc_OverflowError,
+                  (std::string(py::repr(number)) + " does not fit " + type).c_str());
+  throw py::error_already_set();
+}
+
+bool is_numpy_scalar(py::handle object) {
+  return py::hasattr(object, "dtype") && py::hasattr(object, "item") &&
+         py::hasattr(object, "shape") && py::len(object.attr("shape")) == 0;
+}
+
+// An int that fits 64 bits, signed or not.
+struct Integer {
+  bool is_negative = false;
+  uint64_t bits = 0;  // two's complement
+  int64_t as_signed() const { return static_cast<int64_t>(bits); }
+  bool fits_signed() const { return is_negative || bits <= static_cast<uint64_t>(INT64_MAX); }
+};
+
+Integer integer_of(py::handle object) {
+  int overflow = 0;
+  const long long value = PyLong_AsLongLongAndOverflow(object.ptr(), &overflow);
+  if (overflow == 0) {
+    if (value == -1 && PyErr_Occurred()) throw py::error_already_set();
+    return {value < 0, static_cast<uint64_t>(value)};
+  }
+  if (overflow < 0) too_large(object, "64 bits");
+  const unsigned long long large = PyLong_AsUnsignedLongLong(object.ptr());
+  if (PyErr_Occurred()) {
+    PyErr_Clear();
+    too_large(object, "64 bits");
+  }
+  return {false, large};
+}
+
+Expr integer_constant(py::handle object) {
+  const Integer value = integer_of(object);
+  if (!value.fits_signed()) return ir::make_uint_const(UInt(64), value.bits);
+  const int64_t number = value.as_signed();
+  return ir::make_const(Int(32).can_represent(number) ? Int(32) : Int(64), number);
+}
+
+std::optional<Expr> numpy_constant(py::handle object) {
+  const std::optional<Type> type = type_from(object.attr("dtype"));
+  if (!type) return {};
+  return ir::to_expr(scalar_of(*type, object.attr("item")()));
+}
+
+// A plain number in the type of an operand beside it; as it is where it does not fit.
+Expr beside(Type type, py::handle number) {
+  if (PyFloat_Check(number.ptr())) {
+    const double value = PyFloat_AS_DOUBLE(number.ptr());
+    if (type.is_float() && (type.can_represent(value) || value != value)) {
+      return ir::make_const(type.element_of(), value);
+    }
+    return type.is_float() && type.bits() < 32 ? ir::make_const(Float(32), value)
+                                               : *number_from(number);
+  }
+  const Integer value = integer_of(number);
+  const bool fits =
+      value.fits_signed() ? type.can_represent(value.as_signed()) : type.can_represent(value.bits);
+  if (!fits || type.is_handle() || type.is_bool()) return integer_constant(number);
+  if (type.is_float()) {
+    return ir::make_const(type.element_of(), value.fits_signed()
+                                                 ? static_cast<double>(value.as_signed())
+                                                 : static_cast<double>(value.bits));
+  }
+  if (type.is_uint()) return ir::make_uint_const(type.element_of(), value.bits);
+  return ir::make_const(type.element_of(), value.as_signed());
+}
+
+// What plain ints and plain floats become beside these.
+struct Beside {
+  std::optional<Type> any, floating;
+};
+
+Beside types_of(const std::vector<std::optional<Expr>>& typed) {
+  Beside result;
+  for (const std::optional<Expr>& e : typed) {
+    if (!e || !e->defined()) continue;
+    const Type type = e->type();
+    if (type.is_bool() || type.is_handle()) continue;  // a condition
+    if (!result.any || (type.is_float() && !result.any->is_float())) result.any = type;
+    if (type.is_float() && (!result.floating || type.bits() > result.floating->bits())) {
+      result.floating = type;
+    }
+  }
+  return result;
+}
+
+}  // namespace
+
+bool is_plain_number(py::handle object) {
+  if (PyBool_Check(object.ptr())) return false;
+  if (PyLong_Check(object.ptr())) return true;
+  return PyFloat_Check(object.ptr()) && !is_numpy_scalar(object);  // np.float64 is a float
+}
+
+std::optional<Expr> number_from(py::handle object) {
+  if (PyBool_Check(object.ptr())) return Expr(object.ptr() == Py_True);
+  if (PyLong_Check(object.ptr())) return integer_constant(object);
+  if (is_numpy_scalar(object)) return numpy_constant(object);
+  if (PyFloat_Check(object.ptr())) {
+    return Expr(static_cast<float>(PyFloat_AS_DOUBLE(object.ptr())));
+  }
+  return {};
+}
+
+std::vector<Expr> operands(const std::vector<py::object>& objects) {
+  std::vector<std::optional<Expr>> typed;
+  for (const py::object& object : objects) {
+    if (is_plain_number(object)) {
+      typed.emplace_back();
+      continue;
+    }
+    typed.push_back(expr_from(object));
+    if (!typed.back()) {
+      throw py::type_error(
+          "an operand is a number, a Var, a Func at a point or another Expr, not " +
+          std::string(py::str(py::type::of(object))));
+    }
+  }
+  const Beside types = types_of(typed);
+  std::vector<Expr> result;
+  for (size_t i = 0; i < objects.size(); i++) {
+    const bool is_float = PyFloat_Check(objects[i].ptr());
+    const std::optional<Type>& type = is_float ? types.floating : types.any;
+    result.push_back(typed[i] ? *typed[i]
+                     : type   ? beside(*type, objects[i])
+                              : *number_from(objects[i]));
+  }
+  return result;
+}
+
+Expr operand_for(Type type, py::handle object) {
+  if (is_plain_number(object)) return beside(type, object);
+  if (const std::optional<Expr> expr = expr_from(object)) return *expr;
+  throw py::type_error("a value is a number, a Var, a Func at a point or another Expr, not " +
+                       std::string(py::str(py::type::of(object))));
+}
+
+ir::Scalar scalar_of(Type type, py::handle number) {
+  const py::object plain = is_numpy_scalar(number) ? py::object(number.attr("item")())
+                                                   : py::reinterpret_borrow<py::object>(number);
+  if (type.is_float()) return ir::Scalar::of_float(type, plain.cast<double>());
+  if (PyFloat_Check(plain.ptr())) {
+    if (!PyObject_RichCompareBool(plain.ptr(), plain.attr("__floor__")().ptr(), Py_EQ)) {
+      throw py::type_error(std::string(py::repr(plain)) + " is not a value of type " +
+                           to_string(type));
+    }
+    return scalar_of(type, plain.attr("__int__")());
+  }
+  if (!PyLong_Check(plain.ptr())) {
+    throw py::type_error("a value of type " + to_string(type) + " is a number, not " +
+                         std::string(py::str(py::type::of(plain))));
+  }
+  const Integer value = integer_of(plain);
+  const bool fits =
+      value.fits_signed() ? type.can_represent(value.as_signed()) : type.can_represent(value.bits);
+  if (!fits) too_large(plain, to_string(type));
+  return type.is_uint() ? ir::Scalar::of_uint(type, value.bits)
+                        : ir::Scalar::of_int(type, value.as_signed());
+}
+
+py::object object_of(const ir::Scalar& value) {
+  if (value.type.is_bool()) return py::bool_(value.u != 0);
+  if (value.type.is_float()) return py::float_(value.f);
+  if (value.type.is_int()) return py::int_(value.i);
+  return py::int_(value.u);
+}
+
+}  // namespace retrograde::python

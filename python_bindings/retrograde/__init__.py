@@ -1,0 +1,24 @@
+"""Array pipelines whose first product is the gradient.
+
+    import numpy, retrograde as rg
+    x, y = rg.Var("x"), rg.Var("y")
+    f = rg.Func("f")
+    f[x, y] = x + 10 * y
+    a = numpy.asarray(f.realize([4, 3]))     # a[y, x] == f[x, y], always
+
+Names are those of the C++ library, whose documentation they carry; what they mean in Python alone is said in
+python_bindings/README.md.
+"""
+from ._errors import CompileError, Error, InternalError, RuntimeError, Unsupported, UserError
+from . import _retrograde
+from ._retrograde import *
+
+# Names that Python itself has: reached as retrograde.sum, never brought in by `import *`.
+_BUILTIN = {"RuntimeError", "abs", "max", "min", "pow", "print", "round", "sum"}
+for _name in ("abs", "max", "min", "pow", "print", "round", "sum", "_"):
+    globals()[_name] = getattr(_retrograde, _name)
+for _n in range(10):
+    globals()[f"_{_n}"] = getattr(_retrograde, f"_{_n}")
+__all__ = ["CompileError", "Error", "InternalError", "Unsupported", "UserError", "_"] + [
+    _name for _name in dir(_retrograde) if not _name.startswith("_") and _name not in _BUILTIN]
+__version__ = _retrograde.__version__

@@ -1,0 +1,93 @@
+"""Errors are exceptions of Python with the four parts of their messages."""
+import builtins
+import pickle
+import unittest
+
+import numpy as np
+import retrograde as rg
+
+x, y = rg.Var("x"), rg.Var("y")
+
+
+class Classes(unittest.TestCase):
+    def test_programs_catch_them_as_what_they_are(self):
+        self.assertTrue(issubclass(rg.CompileError, rg.UserError) and issubclass(rg.UserError, rg.Error))
+        self.assertTrue(issubclass(rg.RuntimeError, builtins.RuntimeError))
+        self.assertTrue(issubclass(rg.Unsupported, NotImplementedError))
+
+    def test_four_parts(self):
+        f = rg.Func("f")
+        f[x] = 0
+        r = rg.RDom([(1, 9)], "r")
+        f[r] = f[r - 1] + 1
+        with self.assertRaises(rg.CompileError) as caught:
+            f.update().vectorize(r)
+        error = caught.exception
+        self.assertRegex(error.asked, 'vectorize "f.*" over "r')
+        self.assertIn("same element", error.rule)
+        self.assertTrue(error.evidence and error.instead)
+        for part in (error.asked, error.rule, error.evidence):
+            self.assertIn(part, str(error))
+
+    def test_errors_of_calls_carry_their_code(self):
+        image = rg.ImageParam("float32", 1, "image")
+        f = rg.Func("f")
+        f[x] = image[x + 5]
+        image.set(np.zeros(4, np.float32))
+        with self.assertRaisesRegex(rg.RuntimeError, "image") as caught:
+            f.realize([4])
+        self.assertNotEqual(caught.exception.code, 0)
+
+    def test_unsupported(self):
+        f = rg.Func("f")
+        f[x] = 0
+        with self.assertRaisesRegex(rg.Unsupported, "CPU"):
+            f.gpu_blocks(x)
+
+    def test_they_can_be_pickled(self):
+        try:
+            rg.Func("f").realize([1])
+        except rg.Error as error:
+            again = pickle.loads(pickle.dumps(error))
+            self.assertEqual((type(again), str(again), again.rule), (type(error), str(error), error.rule))
+
+
+class OnTheWayIn(unittest.TestCase):
+    """What conversions of arguments find is told, not hidden behind 'incompatible arguments'."""
+
+    def test_a_func_that_is_read_before_it_is_defined(self):
+        f = rg.Func("later")
+        for use in (lambda: rg.sqrt(f[x]), lambda: f[x] + 1, lambda: rg.select(f[x] > 0, 1, 2), lambda: rg.Expr(f[x])):
+            with self.assertRaisesRegex(rg.CompileError, "later.*defined"):
+                use()
+
+    def test_arrays_that_are_none_of_numbers(self):
+        f = rg.Func("f")
+        f[x] = 0
+        with self.assertRaisesRegex(rg.CompileError, "numbers in the order of bytes"):
+            f.realize(np.zeros(3, "complex128"))
+
+    def test_wrong_types_of_arrays(self):
+        f = rg.Func("f")
+        f[x] = 0
+        with self.assertRaisesRegex(rg.RuntimeError, "right element type"):
+            f.realize(np.zeros(3, np.float32))
+        with self.assertRaisesRegex(rg.RuntimeError, "number of dimensions"):
+            f.realize(np.zeros((3, 3), np.int32))
+        image = rg.ImageParam("float32", 2)
+        with self.assertRaisesRegex(rg.CompileError, "elements are of the parameter's type"):
+            image.set(np.zeros((3, 3)))
+
+    def test_coordinates(self):
+        f = rg.Func("f")
+        f[x] = 0
+        with self.assertRaisesRegex(TypeError, "a coordinate is"):
+            f[1:2]
+        with self.assertRaises(rg.CompileError):
+            rg.Expr(f[0.5])
+        with self.assertRaisesRegex(rg.CompileError, "one coordinate for each dimension"):
+            rg.Expr(f[1, 2])
+
+
+if __name__ == "__main__":
+    unittest.main()
