@@ -3,6 +3,7 @@
     pip install .                                         # in a virtual environment
     pip install --no-build-isolation --no-index .         # with Debian's packages alone (tools/packages.list)
 
+RETROGRADE_RUNTIME_ONLY=1 leaves the compiler out: retrograde.runtime, which is Python alone.
 RETROGRADE_BUILD_DIR names a build of this checkout to take them from, instead of one of its own (preset `wheel`, in
 out/python-build).
 """
@@ -12,7 +13,6 @@ import subprocess
 import sys
 from pathlib import Path
 
-import pybind11
 from setuptools import Extension, setup
 from setuptools.command.build_ext import build_ext
 
@@ -29,6 +29,7 @@ class BuildByCMake(build_ext):
         given = os.environ.get("RETROGRADE_BUILD_DIR")
         build = Path(given) if given else ROOT / OUT / "cmake"
         if not given:
+            import pybind11
             subprocess.run(
                 ["cmake", "--preset", "wheel", "-B", build.resolve(), "-D", f"Python_EXECUTABLE={sys.executable}",
                  "-D", f"pybind11_DIR={pybind11.get_cmake_dir()}"],
@@ -39,12 +40,24 @@ class BuildByCMake(build_ext):
                         "--prefix", Path(self.build_lib).resolve()], check=True)
 
 
+def parts():
+    if os.environ.get("RETROGRADE_RUNTIME_ONLY") == "1":
+        names = ("__init__", "_errors", "runtime")
+        return {"py_modules": [f"retrograde.{name}" for name in names],
+                "package_dir": {"retrograde": "python_bindings/retrograde"}}
+    return {"ext_modules": [Extension("retrograde._retrograde", sources=[])], "cmdclass": {"build_ext": BuildByCMake}}
+
+
+def platform_tag():
+    """For the C library of this machine and later ones."""
+    libc = os.confstr("CS_GNU_LIBC_VERSION").split()[1].replace(".", "_")
+    return f"manylinux_{libc}_{os.uname().machine}"
+
+
+def options():
+    made = {"build": {"build_base": str(OUT / "build")}, "egg_info": {"egg_base": str(OUT)}}
+    return made if "py_modules" in parts() else made | {"bdist_wheel": {"plat_name": platform_tag()}}
+
+
 (ROOT / OUT).mkdir(parents=True, exist_ok=True)
-setup(
-    version=version(),
-    packages=[],
-    ext_modules=[Extension("retrograde._retrograde", sources=[])],
-    cmdclass={"build_ext": BuildByCMake},
-    options={"build": {"build_base": str(OUT / "build")}, "egg_info": {"egg_base": str(OUT)}},
-    zip_safe=False,
-)
+setup(version=version(), packages=[], options=options(), zip_safe=False, **parts())

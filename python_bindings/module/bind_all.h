@@ -24,6 +24,15 @@ void bind_stage(pybind11::module_& module);
 void bind_pipeline(pybind11::module_& module);
 void bind_derivative(pybind11::module_& module);
 void bind_tangents(pybind11::module_& module);
+void bind_custom_derivative(pybind11::module_& module);
+void bind_checks(pybind11::module_& module);
+void bind_autoschedule(pybind11::module_& module);
+void bind_schedule_log(pybind11::module_& module);
+void bind_module_files(pybind11::module_& module);
+void bind_callable(pybind11::module_& module);
+void bind_externs(pybind11::module_& module);
+void bind_handlers(pybind11::module_& module);
+void bind_watching(pybind11::module_& module);
 void bind_boundary_conditions(pybind11::module_& module);
 void bind_inline_reductions(pybind11::module_& module);
 // The operators of Python for everything that stands for an Expr: once the classes are there.

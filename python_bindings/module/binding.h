@@ -75,6 +75,11 @@ class Class : public py::class_<T, Options...> {
     Base::def_readonly(name, field, doc(name));
     return *this;
   }
+  template <class Get, class Set>
+  Class& def_property(const char* name, Get&& get, Set&& set) {
+    Base::def_property(name, std::forward<Get>(get), std::forward<Set>(set), doc(name));
+    return *this;
+  }
   template <class F>
   Class& def_property_readonly(const char* name, F&& get) {
     Base::def_property_readonly(name, std::forward<F>(get), doc(name));

@@ -310,6 +310,12 @@ void bind_arrays(Class<Buffer<>>& c) {
        },
        py::kw_only(), py::arg("stream") = py::none(), py::arg("max_version") = py::none(),
        py::arg("dl_device") = py::none(), py::arg("copy") = py::none())
+      // Where the buffer protocol has no word for the elements; NumPy would make an array of one object.
+      .def("__array__",
+           [](const Buffer<>& b, const py::args&, const py::kwargs&) -> py::object {
+             throw py::type_error("no array of NumPy has elements of type " +
+                                  to_string(memory_of(b).type) + ": see Buffer.bits()");
+           })
       .def("__dlpack_device__", [](const Buffer<>&) { return py::make_tuple(1, 0); })
       .def_property_readonly("__array_interface__", [](const Buffer<>& b) {
         using namespace py::literals;

@@ -114,6 +114,17 @@ void bind_describing(FuncClass& c) {
       });
 }
 
+// Its value as a number, or of a Tuple as a tuple of them.
+py::object evaluated(const Tuple& values) {
+  Func f("evaluated");
+  f() = values;
+  const py::object result = py::cast(f).attr("realize")();
+  if (!py::isinstance<py::tuple>(result)) return result[py::tuple()];
+  py::list numbers;
+  for (py::handle one : result) numbers.append(one[py::tuple()]);
+  return py::tuple(numbers);
+}
+
 }  // namespace
 
 void bind_func(py::module_& m) {
@@ -129,6 +140,8 @@ void bind_func(py::module_& m) {
     f(coordinates(args[py::slice(0, static_cast<py::ssize_t>(args.size()) - 1, 1)])) = value;
     return located(f);
   });
+  def(m, "evaluate", &evaluated, py::arg("value"));
+  def(m, "evaluate_may_gpu", &evaluated, py::arg("value"));
 }
 
 }  // namespace retrograde::python

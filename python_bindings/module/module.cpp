@@ -24,6 +24,15 @@ PYBIND11_MODULE(_retrograde, module) {
   bind_pipeline(module);
   bind_derivative(module);
   bind_tangents(module);
+  bind_custom_derivative(module);
+  bind_checks(module);
+  bind_autoschedule(module);
+  bind_schedule_log(module);
+  bind_module_files(module);
+  bind_callable(module);
+  bind_externs(module);
+  bind_handlers(module);
+  bind_watching(module);
   bind_expr_functions(module);
   bind_integer_functions(module);
   bind_boundary_conditions(module);

@@ -154,7 +154,11 @@ Expr operand_for(Type type, py::handle object) {
 ir::Scalar scalar_of(Type type, py::handle number) {
   const py::object plain = is_numpy_scalar(number) ? py::object(number.attr("item")())
                                                    : py::reinterpret_borrow<py::object>(number);
-  if (type.is_float()) return ir::Scalar::of_float(type, plain.cast<double>());
+  if (type.is_float()) {
+    const double value = PyFloat_AsDouble(plain.ptr());
+    if (value == -1 && PyErr_Occurred()) throw py::error_already_set();
+    return ir::Scalar::of_float(type, value);
+  }
   if (PyFloat_Check(plain.ptr())) {
     if (!PyObject_RichCompareBool(plain.ptr(), plain.attr("__floor__")().ptr(), Py_EQ)) {
       throw py::type_error(std::string(py::repr(plain)) + " is not a value of type " +

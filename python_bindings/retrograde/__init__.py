@@ -7,18 +7,31 @@
     a = numpy.asarray(f.realize([4, 3]))     # a[y, x] == f[x, y], always
 
 Names are those of the C++ library, whose documentation they carry; what they mean in Python alone is said in
-python_bindings/README.md.
+python_bindings/README.md. `retrograde.runtime` runs what was compiled ahead of time, and needs nothing of the compiler.
 """
-from ._errors import CompileError, Error, InternalError, RuntimeError, Unsupported, UserError
-from . import _retrograde
-from ._retrograde import *
+import importlib.util as _util
 
+from ._errors import CompileError, Error, InternalError, RuntimeError, Unsupported, UserError
+
+__all__ = ["CompileError", "Error", "InternalError", "Unsupported", "UserError"]
 # Names that Python itself has: reached as retrograde.sum, never brought in by `import *`.
 _BUILTIN = {"RuntimeError", "abs", "max", "min", "pow", "print", "round", "sum"}
-for _name in ("abs", "max", "min", "pow", "print", "round", "sum", "_"):
-    globals()[_name] = getattr(_retrograde, _name)
-for _n in range(10):
-    globals()[f"_{_n}"] = getattr(_retrograde, f"_{_n}")
-__all__ = ["CompileError", "Error", "InternalError", "Unsupported", "UserError", "_"] + [
-    _name for _name in dir(_retrograde) if not _name.startswith("_") and _name not in _BUILTIN]
-__version__ = _retrograde.__version__
+
+if _util.find_spec("retrograde._retrograde") is None:
+    def __getattr__(name):
+        raise AttributeError(f"retrograde.{name}: this installation has the runtime alone, retrograde.runtime")
+else:
+    from . import _retrograde
+    from ._retrograde import *
+    from . import _display
+    from ._command_line import main
+    from ._generator import *
+    from ._linking import *
+
+    for _name in ("abs", "max", "min", "pow", "print", "round", "sum", "_"):
+        globals()[_name] = getattr(_retrograde, _name)
+    for _n in range(10):
+        globals()[f"_{_n}"] = getattr(_retrograde, f"_{_n}")
+    __all__ += ["_", "main"] + _generator.__all__ + _linking.__all__ + [
+        _name for _name in dir(_retrograde) if not _name.startswith("_") and _name not in _BUILTIN]
+    __version__ = _retrograde.__version__

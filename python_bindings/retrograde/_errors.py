@@ -37,3 +37,9 @@ class InternalError(Error):
 
 for _class in (Error, UserError, CompileError, RuntimeError, Unsupported, InternalError):
     _class.__module__ = "retrograde"
+
+def error(cls, asked, rule, evidence, instead):
+    """An exception of this class with the four parts, and their text."""
+    made = cls(f"cannot {asked}: {rule}; {evidence}. {instead}.")
+    made.asked, made.rule, made.evidence, made.instead = asked, rule, evidence, instead
+    return made

@@ -40,6 +40,17 @@ def docstring(reader, name):
     return text if text.endswith((".", ":", ")", "\n")) or not text else text + "."
 
 
+def snake(name):
+    return re.sub(r"(?<=[a-z])(?=[A-Z])", "_", name).lower()
+
+
+def with_title(reader, name, text):
+    """Of the class that the header is called after, what the header says of it goes first."""
+    is_named_so = name.kind in ("class", "struct") and snake(name.name) == Path(reader.header).stem and not name.scope
+    title = reader.title() if is_named_so else ""
+    return f"{title[:1].upper()}{title[1:]}.\n\n{text}".strip() if title and title not in text else text
+
+
 def docstrings(root):
     sys.path.insert(0, str(root / "tools/lib"))
     from api.choices import INTERNAL_HEADERS
@@ -49,7 +60,7 @@ def docstrings(root):
     for header in public_headers(root) + [h for h in more if h not in public_headers(root)]:
         reader = HeaderReader(root, header)
         for name in reader.read():
-            text = docstring(reader, name)
+            text = with_title(reader, name, docstring(reader, name))
             # Of overloads the one that says most; a comment of its own before that of a group.
             if len(text) > len(found.get(name.full, "")):
                 found[name.full] = text

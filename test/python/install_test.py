@@ -45,6 +45,29 @@ class Install(unittest.TestCase):
             run(python, "-m", "pip", "uninstall", "-y", "retrograde")
             self.assertEqual(sorted(p.name for p in site.iterdir()), before)
 
+    def test_the_runtime_alone(self):
+        with tempfile.TemporaryDirectory() as folder:
+            venv = Path(folder, "venv")
+            run(sys.executable, "-m", "venv", "--system-site-packages", venv)
+            command = [venv / "bin/python", "-m", "pip", "install", "--no-build-isolation", "--no-index", "--no-deps", ROOT]
+            run("env", "RETROGRADE_RUNTIME_ONLY=1", *command, cwd=folder)
+            program = "from retrograde import runtime; import retrograde; print(retrograde.__file__, runtime.Function)"
+            self.assertIn(str(venv), run(venv / "bin/python", "-c", program, cwd=folder))
+            package = next(venv.glob("lib/*/site-packages/retrograde"))
+            self.assertEqual([p.name for p in package.iterdir() if p.suffix == ".so"], [])
+
+    def test_a_wheel(self):
+        """One of this machine's C library and interpreter, with all that the package is made of."""
+        with tempfile.TemporaryDirectory() as folder:
+            run(sys.executable, "-m", "pip", "wheel", "--no-build-isolation", "--no-index", "--no-deps", "-w", folder, ROOT)
+            wheel, = Path(folder).iterdir()
+            glibc = os.confstr("CS_GNU_LIBC_VERSION").split()[1].replace(".", "_")
+            self.assertRegex(wheel.name, rf"retrograde-[\d.]+-cp3\d+-cp3\d+-manylinux_{glibc}_{os.uname().machine}.whl")
+            names = run(sys.executable, "-m", "zipfile", "-l", wheel)
+            for part in ("retrograde/libretrograde.so.0 ", "retrograde/runtime.py", "retrograde/py.typed",
+                         "retrograde/__init__.pyi"):
+                self.assertIn(part, names)
+
     def test_a_build_of_its_own_is_configured(self):
         """What setup.py asks of CMake where no build is named; building it takes minutes, and is no other build."""
         with tempfile.TemporaryDirectory() as build:

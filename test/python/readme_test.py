@@ -24,7 +24,7 @@ class Readmes(unittest.TestCase):
         self.assertLessEqual(len(lines), 10)
 
     def test_the_package_s(self):
-        self.run_all("python_bindings/README.md", 1)
+        self.run_all("python_bindings/README.md", 2)
 
 
 if __name__ == "__main__":

@@ -19,6 +19,10 @@
 
 namespace retrograde {
 
+namespace frontend {
+struct DynamicCall;  // of other languages, which know at run time how many arguments there are
+}
+
 class Callable {
  public:
   Callable() = default;
@@ -51,6 +55,7 @@ class Callable {
 
  private:
   friend class Pipeline;
+  friend struct frontend::DynamicCall;
   struct Contents;
 
   template <typename... Args>

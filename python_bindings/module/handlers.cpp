@@ -1,0 +1,79 @@
+// handlers.cpp -- what compiled code calls back: `print` is a function of Python; the others are C functions, of
+// ctypes or by their address.
+#include "frontend/run/jit_handlers.h"
+
+#include "bind_all.h"
+#include "binding.h"
+#include "c_address.h"
+#include "callback.h"
+#include "func_class.h"
+#include "runnable.h"
+
+namespace retrograde::python {
+
+namespace {
+
+using py::arg;
+
+// The attribute is the address, None where the runtime's own is called. What is set is kept by who has the handlers.
+template <class Pointer>
+void bind_pointer(Class<JITHandlers>& c, const char* name, Pointer JITHandlers::*field) {
+  c.def_property(
+      name,
+      [field](const JITHandlers& h) -> std::optional<uintptr_t> {
+        if (!(h.*field)) return std::nullopt;
+        return reinterpret_cast<uintptr_t>(h.*field);
+      },
+      py::cpp_function(
+          [field](JITHandlers& h, const py::object& function) {
+            h.*field = reinterpret_cast<Pointer>(address_of(function));
+          },
+          py::keep_alive<1, 2>()));
+}
+
+// realize() tells Python what a handler of Python's raised, once it is back: it may be on any thread.
+std::function<void(const char*)> printer_of(const std::optional<py::function>& print) {
+  if (!print) return nullptr;
+  return [print = Callback(*print)](const char* message) {
+    try {
+      print.call<void>(std::string(message));
+    } catch (py::error_already_set& error) {
+      const py::gil_scoped_acquire acquire;
+      error.discard_as_unraisable("the print handler of a pipeline");
+    }
+  };
+}
+
+void bind_class(py::module_& m) {
+  Class<JITHandlers> c(m, "JITHandlers");
+  bind_pointer(c, "custom_print", &JITHandlers::custom_print);
+  bind_pointer(c, "custom_malloc", &JITHandlers::custom_malloc);
+  bind_pointer(c, "custom_free", &JITHandlers::custom_free);
+  bind_pointer(c, "custom_do_task", &JITHandlers::custom_do_task);
+  bind_pointer(c, "custom_do_par_for", &JITHandlers::custom_do_par_for);
+  bind_pointer(c, "custom_error", &JITHandlers::custom_error);
+  bind_pointer(c, "custom_trace", &JITHandlers::custom_trace);
+  bind_pointer(c, "custom_get_symbol", &JITHandlers::custom_get_symbol);
+  bind_pointer(c, "custom_load_library", &JITHandlers::custom_load_library);
+  bind_pointer(c, "custom_get_library_symbol", &JITHandlers::custom_get_library_symbol);
+  bind_pointer(c, "custom_cuda_acquire_context", &JITHandlers::custom_cuda_acquire_context);
+  bind_pointer(c, "custom_cuda_release_context", &JITHandlers::custom_cuda_release_context);
+  bind_pointer(c, "custom_cuda_get_stream", &JITHandlers::custom_cuda_get_stream);
+  c.def_readwrite("thread_limit", &JITHandlers::thread_limit);
+  c.def_property(
+      "print", [](const JITHandlers& h) { return static_cast<bool>(h.print); },
+      [](JITHandlers& h, const std::optional<py::function>& print) {
+        h.print = printer_of(print);
+      });
+}
+
+}  // namespace
+
+void bind_handlers(py::module_& m) {
+  bind_class(m);
+  constexpr auto inside = py::return_value_policy::reference_internal;
+  reopened<Func>(m, "Func", {"Pipeline"}).def("jit_handlers", &Func::jit_handlers, inside);
+  reopened<Pipeline>(m, "Pipeline", {}).def("jit_handlers", &Pipeline::jit_handlers, inside);
+}
+
+}  // namespace retrograde::python

@@ -1,0 +1,84 @@
+// schedule_log.cpp -- schedules as values, and what they cost.
+#include "bind_all.h"
+#include "binding.h"
+#include "func_class.h"
+#include "runnable.h"
+
+namespace retrograde::python {
+
+namespace {
+
+using py::arg;
+
+void bind_log(py::module_& m) {
+  Class<ScheduleLog>(m, "ScheduleLog")
+      .def(py::init<>())
+      .def_static("parse", &ScheduleLog::parse, arg("text"))
+      .def("to_text", &ScheduleLog::to_text)
+      .def("to_cpp", &ScheduleLog::to_cpp)
+      .def("size", &ScheduleLog::size)
+      .def("first", &ScheduleLog::first, arg("count"))
+      .def("of", &ScheduleLog::of, arg("func"))
+      .def("without", &ScheduleLog::without, arg("index"))
+      .def("__len__", &ScheduleLog::size)
+      .def("__str__", &ScheduleLog::to_text)
+      .def(
+          "__eq__", [](const ScheduleLog& a, const ScheduleLog& b) { return a == b; },
+          py::is_operator());
+}
+
+void bind_report(py::module_& m) {
+  Class<ExplainOptions>(m, "ExplainOptions")
+      .def(py::init([](bool measure, double seconds, int threads, bool runner_up) {
+             return ExplainOptions{measure, seconds, threads, runner_up};
+           }),
+           py::kw_only(), arg("measure") = false, arg("seconds") = 2.0, arg("threads") = 0,
+           arg("runner_up") = false)
+      .def_readwrite("measure", &ExplainOptions::measure)
+      .def_readwrite("seconds", &ExplainOptions::seconds)
+      .def_readwrite("threads", &ExplainOptions::threads)
+      .def_readwrite("runner_up", &ExplainOptions::runner_up);
+  Class<ScheduleReport> report(m, "ScheduleReport");
+  using Stage = ScheduleReport::Stage;
+  Class<Stage>(report, "Stage", {"ScheduleReport::Stage"})
+      .def_readonly("name", &Stage::name)
+      .def_readonly("predicted_ms", &Stage::predicted_ms)
+      .def_readonly("bound_by", &Stage::bound_by)
+      .def_readonly("bytes", &Stage::bytes)
+      .def_readonly("memory_bytes", &Stage::memory_bytes)
+      .def_readonly("measured_ms", &Stage::measured_ms);
+  report.def_readonly("schedule", &ScheduleReport::schedule)
+      .def_readonly("machine", &ScheduleReport::machine)
+      .def_readonly("stages", &ScheduleReport::stages)
+      .def_readonly("predicted_ms", &ScheduleReport::predicted_ms)
+      .def_readonly("first_call_ms", &ScheduleReport::first_call_ms)
+      .def_readonly("measured_ms", &ScheduleReport::measured_ms)
+      .def_readonly("search", &ScheduleReport::search)
+      .def("to_string", &ScheduleReport::to_string)
+      .def("to_json", &ScheduleReport::to_json)
+      .def("__str__", &ScheduleReport::to_string);
+}
+
+ScheduleReport explained(const Pipeline& pipeline, const Target& target, const py::object& outputs,
+                         const ExplainOptions& options) {
+  const Outputs to = outputs_from(outputs, "explain the schedule");
+  if (to.are_buffers()) allow_strides(pipeline.outputs(), to.buffers);
+  return unlocked([=](const Interruption&) {
+    if (!to.are_buffers()) return pipeline.explain_schedule(target, to.sizes, options);
+    return pipeline.explain_schedule(RealizationArg(to.buffers), target, options);
+  });
+}
+
+}  // namespace
+
+void bind_schedule_log(py::module_& m) {
+  bind_log(m);
+  bind_report(m);
+  reopened<Pipeline>(m, "Pipeline", {})
+      .def("schedule_log", &Pipeline::schedule_log)
+      .def("apply_schedule", &Pipeline::apply_schedule, arg("log"))
+      .def("explain_schedule", &explained, arg("target") = Target(), arg("outputs") = py::list(),
+           arg("options") = ExplainOptions());
+}
+
+}  // namespace retrograde::python

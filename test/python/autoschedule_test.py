@@ -1,0 +1,105 @@
+"""Schedules that nobody writes, schedules as values, and what they cost."""
+import unittest
+
+import numpy as np
+import retrograde as rg
+
+x, y = rg.Var("x"), rg.Var("y")
+HOST = rg.get_host_target()
+
+
+def blur():
+    image = rg.ImageParam("float32", 2, "image")
+    horizontal, vertical = rg.Func("horizontal"), rg.Func("vertical")
+    horizontal[x, y] = image[x, y] + image[x + 1, y]
+    vertical[x, y] = horizontal[x, y] + horizontal[x, y + 1]
+    vertical.set_estimates([(0, 256), (0, 256)])
+    image.set_estimates([(0, 257), (0, 257)])
+    image.set(np.arange(257 * 257, dtype=np.float32).reshape(257, 257) % 17)
+    return image, horizontal, vertical
+
+
+class Autoschedules(unittest.TestCase):
+    def check_result(self, image, vertical):
+        a = np.asarray(image.get())
+        want = a[:-1, :-1] + a[:-1, 1:] + a[1:, :-1] + a[1:, 1:]
+        np.testing.assert_array_equal(vertical.realize([256, 256]), want)
+
+    def test_by_rules(self):
+        image, horizontal, vertical = blur()
+        results = rg.Pipeline(vertical).auto_schedule(HOST)
+        self.assertEqual(results.scheduler_name, rg.built_in_autoscheduler)
+        self.assertIn("vectorize", results.schedule_source)
+        self.assertGreater(results.memory_bytes, 0)
+        self.check_result(image, vertical)
+
+    def test_options(self):
+        image, horizontal, vertical = blur()
+        options = rg.AutoscheduleOptions(without=[rg.Decision.strips], store=[horizontal], threads=2)
+        rg.Pipeline(vertical).auto_schedule(HOST, options)
+        self.assertIn("horizontal.compute_at(LoopLevel::root())", rg.Pipeline(vertical).schedule_log().to_cpp())
+        self.check_result(image, vertical)
+        again = rg.AutoscheduleOptions.from_string(options.to_string())
+        self.assertEqual(again, options)
+        self.assertEqual((again.store, again.threads, again.without), ([horizontal.name()], 2, {rg.Decision.strips}))
+        self.assertEqual(len(rg.all_decisions()), 9)
+        vertical.set_autoschedule(options)
+        with self.assertRaisesRegex(rg.CompileError, "options of the autoscheduler"):
+            rg.AutoscheduleOptions.from_string("slow=true")
+
+    def test_of_a_user_s_own(self):
+        image, horizontal, vertical = blur()
+
+        def scheduler(pipeline, target, machine, results):
+            for f in pipeline.outputs():
+                f.vectorize(f.args()[0], 4)
+            results.schedule_source = f"for {machine.parallelism} threads"
+
+        rg.add_autoscheduler("Mine", scheduler)
+        self.assertIn("Mine", rg.autoscheduler_names())
+        results = rg.Pipeline(vertical).auto_schedule("Mine", HOST, rg.MachineParams(3, 1 << 20, 40))
+        self.assertEqual(results.schedule_source, "for 3 threads")
+        self.assertIn("vectorized", vertical.loop_nest())
+        self.check_result(image, vertical)
+        rg.add_autoscheduler("Mine", None)
+        self.assertNotIn("Mine", rg.autoscheduler_names())
+        with self.assertRaisesRegex(rg.CompileError, "loaded from a plugin before it is used"):
+            rg.Pipeline(vertical).auto_schedule("Mine", HOST)
+        with self.assertRaisesRegex(rg.CompileError, "shared library that can be opened"):
+            rg.load_plugin("/no/such/plugin.so")
+        rg.set_default_autoscheduler_name("")
+        self.assertEqual(rg.default_autoscheduler_name(), rg.built_in_autoscheduler)
+        self.assertEqual(rg.MachineParams("3,1048576,40"), rg.MachineParams(3, 1 << 20, 40))
+
+
+class Logs(unittest.TestCase):
+    def test_a_schedule_is_a_value(self):
+        image, horizontal, vertical = blur()
+        horizontal.compute_root().vectorize(x, 8)
+        vertical.parallel(y)
+        log = rg.Pipeline(vertical).schedule_log()
+        self.assertEqual(len(log), log.size())
+        self.assertEqual(rg.ScheduleLog.parse(log.to_text()), log)
+        self.assertEqual(len(log.first(1)), 1)
+        self.assertTrue(0 < len(log.of(horizontal.name())) < len(log))
+        self.assertLess(len(log.without(0)), len(log))
+        image, horizontal, vertical = blur()
+        rg.Pipeline(vertical).apply_schedule(log)
+        self.assertIn("parallel", vertical.loop_nest())
+
+    def test_what_it_costs(self):
+        image, horizontal, vertical = blur()
+        horizontal.compute_root()
+        report = rg.Pipeline(vertical).explain_schedule(HOST, [256, 256])
+        self.assertGreater(report.predicted_ms, 0)
+        self.assertIsNone(report.measured_ms)
+        self.assertTrue({s.name for s in report.stages} >= {horizontal.name(), vertical.name()})
+        self.assertIn("horizontal.compute_at(LoopLevel::root())", report.schedule)
+        out = np.zeros((256, 256), np.float32)
+        measured = rg.Pipeline(vertical).explain_schedule(HOST, out, rg.ExplainOptions(measure=True, seconds=0.05))
+        self.assertGreater(measured.measured_ms, 0)
+        self.assertTrue(out.any() and str(measured) and measured.to_json())
+
+
+if __name__ == "__main__":
+    unittest.main()
