@@ -1,0 +1,51 @@
+// deconvolver.h -- a method on a problem: all of its stages, which somebody may watch and stop.
+#pragma once
+
+#include <functional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "solver.h"
+#include "weights.h"
+
+namespace deconvolution {
+
+struct Method {
+  std::string name;
+  Weights weights;
+};
+
+// The original numbers, the tuned ones, and those that were learned, as they come with the program.
+std::vector<Method> shipped_methods();
+
+inline constexpr Accuracy usual_accuracy{.iterations = 30, .tolerance = 1e-3};
+
+class Deconvolver {
+ public:
+  Deconvolver(Method method, const Extent& extent, int threads,
+              const Accuracy& accuracy = usual_accuracy);
+
+  const std::string& name() const { return method_.name; }
+  int iterations() const { return accuracy_.iterations * method_.weights.stages; }  // at most
+  const Shape& shape() const { return method_.weights.shape; }
+  // Another one whose weights have the same shape.
+  void use(Method method) { method_ = std::move(method); }
+
+  // After each iteration: how many there were, and the images [count, full height, full width]. False stops,
+  // and the images are the result.
+  using Watch = std::function<bool(int iterations, const lang::Buffer<float>& images)>;
+
+  // [count, height, width]
+  std::vector<float> run(const Problem& problem, const Watch& watch = {});
+  // What each stage made of it, at the last run.
+  const std::vector<std::vector<float>>& stages() const { return stages_; }
+
+ private:
+  Method method_;
+  Accuracy accuracy_;
+  Solver<float> solver_;
+  std::vector<std::vector<float>> stages_;
+};
+
+}  // namespace deconvolution

@@ -1,0 +1,72 @@
+// objective.h -- what is learned: a loss of the last stage's image, and its gradient by the numbers of all stages.
+//
+//   loss = mean over the images of 10 log10(mean of (image - truth)^2 + 0.002), decibels
+//
+// A stage's image x minimizes its energy, so that the gradient g(x; numbers, before) is 0 there. When a number
+// moves, x follows so that it stays 0: H dx = -dg. With q, the loss' gradient by x, and H lambda = -q,
+//
+//   d loss = lambda . dg = d(lambda . g),   lambda held fixed
+//
+// lambda . g is the energy's tangent along lambda (propagate_tangents); its gradient by the stage's numbers and by
+// the image before comes from propagate_adjoints. So a stage costs one solution more, with the same compiled step,
+// and no iterate is kept. What an inexact solution costs: with residuals r of x and s of lambda, the derivative is off by
+// terms of first order in |r| and |s|; README.md says what that amounts to. (Differentiating each
+// iteration would keep all of them, and take the conjugate gradients' own a and b along.)
+#pragma once
+
+#include <memory>
+
+#include "simulation.h"
+#include "weights.h"
+
+namespace deconvolution {
+
+// Stages whose numbers get a gradient, and the last one that is run.
+struct Range {
+  int first = 0, last = 0;
+};
+
+template <typename T>
+class Objective {
+ public:
+  using Image = std::vector<T>;
+
+  Objective(const Shape& shape, const Extent& extent, int threads);
+
+  void set(const Simulated& batch);
+  const Accuracy& accuracy() const { return accuracy_; }
+  void set(const Accuracy& accuracy) { accuracy_ = accuracy; }
+
+  // `numbers` and `gradient` are those of all stages, one after the other; the gradient by what is not in
+  // `learned` is 0. Without a gradient only the loss.
+  double evaluate(std::span<const T> numbers, std::span<T> gradient, const Range& learned);
+  // Of the last stage, at the last evaluation.
+  const Image& image() const { return images_.back(); }
+
+  std::string explain() const { return adjoints_->explain(); }
+  double compile_seconds() const { return compile_seconds_; }
+
+ private:
+  void compile_loss(int threads);
+  void compile_slope(int threads);
+  double loss_and_gradient(const Image& image, Image& gradient);
+  // Adds the gradient by a stage's numbers; gives that by the image before.
+  Image back_through(const Image& image, const Image& before, const Image& lambda,
+                     std::span<T> gradient);
+
+  Extent extent_;
+  Solver<T> solver_;
+  Stage stage_;
+  lang::ImageParam lambda_, truth_, result_;
+  std::unique_ptr<lang::Derivative> adjoints_;
+  lang::Pipeline loss_, slope_;
+  Accuracy accuracy_;
+  Image first_;
+  std::vector<Image> images_;  // the first, then one after each stage
+  double compile_seconds_ = 0;
+};
+
+extern template class Objective<float>;
+extern template class Objective<double>;
+
+}  // namespace deconvolution

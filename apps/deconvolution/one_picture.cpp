@@ -1,0 +1,218 @@
+// one_picture.cpp -- see one_picture.h.
+#include "one_picture.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+
+#include "common/images.h"
+#include "common/progress.h"
+#include "common/stop.h"
+#include "diagnostics/error.h"
+#include "simulation.h"
+
+namespace deconvolution {
+
+using retrograde::text;
+
+namespace {
+
+constexpr int channels = 3;
+constexpr size_t watched = 1;  // green, whose quality is on the plot
+
+double seconds_since(std::chrono::steady_clock::time_point start) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+// What is to be deconvolved, a problem for each channel.
+struct Picture {
+  std::vector<Simulated> channels;  // without a truth if it came blurred
+  int bits = 8;
+  bool has_truth = true;
+  const Extent& extent() const { return channels.front().problem.extent; }
+};
+
+void require_size(const Options& options, const demosaic::Photograph& photograph, int least) {
+  if (photograph.width >= least && photograph.height >= least) return;
+  retrograde::call_error(
+      text("deconvolve ", retrograde::quoted(options.common.input.string())),
+      text("a picture has ", least, " pixels along each side for this point-spread function"),
+      text("it has ", photograph.width, " x ", photograph.height),
+      "Give a larger picture or a smaller function");
+}
+
+Picture read_picture(const Options& options) {
+  constexpr int least = 16;
+  const Psf psf = psf_of(options.psf);
+  const auto photograph = demosaic::read_photograph(options.common.input);
+  require_size(options, photograph, least + (options.blurred ? 0 : psf.size - 1));
+  Picture picture{{}, photograph.bits, !options.blurred};
+  Random random(options.common.seed);
+  for (int c = 0; c < channels; ++c) {
+    const Plane plane = channel_of(photograph, c);
+    Simulated& to = picture.channels.emplace_back();
+    if (picture.has_truth) {
+      to.add(plane, psf, options.noise, random);
+    } else {
+      to.problem = {{plane.width, plane.height, 1, psf.size},
+                    plane.samples,
+                    psf.samples,
+                    {static_cast<float>(options.noise)}};
+    }
+  }
+  return picture;
+}
+
+using Planes = std::vector<std::vector<float>>;
+
+double psnr_of(const Picture& picture, const Planes& planes) {
+  std::vector<float> image, truth;
+  for (size_t c = 0; c < channels; ++c) {
+    image.insert(image.end(), planes[c].begin(), planes[c].end());
+    truth.insert(truth.end(), picture.channels[c].truth.begin(), picture.channels[c].truth.end());
+  }
+  return psnr_db(image, truth);
+}
+
+apps::Image image_of(const Picture& picture, const Planes& planes, bool as_light) {
+  const Extent& e = picture.extent();
+  apps::Image image{e.width, e.height, picture.bits, {}};
+  for (size_t k = 0; k < planes.front().size(); ++k) {
+    for (const auto& plane : planes) {
+      image.pixels.push_back(as_light ? demosaic::decoded(plane[k]) : plane[k]);
+    }
+  }
+  return image;
+}
+
+void write_psf(const Options& options) {
+  const Psf psf = psf_of(options.psf);
+  const float brightest = *std::max_element(psf.samples.begin(), psf.samples.end());
+  apps::Image image{psf.size, psf.size, 8, {}};
+  for (const float value : psf.samples)
+    image.pixels.insert(image.pixels.end(), 3, value / brightest);
+  apps::write_image(options.common.output / "psf.png", image);
+}
+
+// The methods on one picture, their clock and their curves.
+class Run {
+ public:
+  Run(const Options& options, const std::vector<Method>& methods, apps::Report& report)
+      : options_(options), methods_(methods), report_(report), picture_(read_picture(options)) {}
+
+  long run() {
+    show_blurred();
+    int total = 0;
+    for (const Method& m : methods_) total += channels * iterations_of(m);
+    apps::Progress progress(stderr, total);
+    for (const Method& m : methods_) {
+      deconvolve(m, progress);
+      if (is_over()) break;
+    }
+    enter();
+    return done_;
+  }
+
+ private:
+  int iterations_of(const Method& m) const { return options_.iterations * m.weights.stages; }
+  bool is_over() const {
+    const double limit = options_.common.seconds;
+    return apps::stop_requested() || (limit > 0 && seconds_since(start_) >= limit);
+  }
+
+  void show_blurred() {
+    Planes blurred, truth;
+    for (const Simulated& s : picture_.channels) {
+      blurred.push_back(s.problem.blurred);
+      truth.push_back(s.truth);
+    }
+    write("blurred.png", blurred);
+    write_psf(options_);
+    report_.add_picture("psf.png", "the point-spread function, enlarged by your viewer");
+    if (!picture_.has_truth) return report_.add_picture("blurred.png", "the input");
+    blurred_db_ = psnr_of(picture_, blurred);
+    write("truth.png", truth);
+    report_.add_picture("truth.png", "the photograph");
+    show("blurred.png", "blurred", blurred_db_);
+    report_.own["picture"]["blurred"] = blurred_db_;
+  }
+
+  // A channel that is not reached stays blurred.
+  void deconvolve(const Method& method, apps::Progress& progress) {
+    Deconvolver deconvolver(method, picture_.extent(), options_.common.threads,
+                            {options_.iterations, usual_accuracy.tolerance});
+    Planes planes;
+    apps::PlotSeries series{method.name, {}, {}};
+    const auto begin = std::chrono::steady_clock::now();
+    for (size_t c = 0; c < channels; ++c) {
+      const Simulated& channel = picture_.channels[c];
+      if (is_over()) {
+        planes.push_back(channel.problem.blurred);
+        continue;
+      }
+      const long before = done_;
+      const auto channel_start = std::chrono::steady_clock::now();
+      planes.push_back(deconvolver.run(channel.problem, [&](int count, const auto& images) {
+        progress.show(static_cast<int>(before) + count, method.name);
+        if (c == watched && picture_.has_truth) {
+          const std::vector<float> now(images.begin(), images.end());
+          series.x.push_back(seconds_since(channel_start));
+          series.y.push_back(psnr_db(cropped(now, channel.problem.extent), channel.truth));
+        }
+        return !is_over();
+      }));
+      done_ = before + iterations_of(method);
+    }
+    keep(method, planes, seconds_since(begin));
+    if (!series.x.empty()) series_.push_back(series);
+  }
+
+  void keep(const Method& method, const Planes& planes, double seconds) {
+    const bool last = &method == &methods_.back() || is_over();
+    const std::string file = last ? "result.png" : method.name + ".png";
+    write(file, planes);
+    if (last && picture_.bits == 32)
+      apps::write_image(options_.common.output / "result.exr", image_of(picture_, planes, true));
+    report_.own["seconds"][method.name] = seconds;
+    if (!picture_.has_truth) return report_.add_picture(file, method.name);
+    const double db = psnr_of(picture_, planes);
+    report_.own["picture"][method.name] = db;
+    show(file, method.name, db);
+    if (last) report_.add_number("PSNR of the picture", db, "dB", blurred_db_);
+  }
+
+  void enter() {
+    report_.own["width"] = picture_.extent().width;
+    report_.own["height"] = picture_.extent().height;
+    if (series_.empty()) return;
+    report_.add_plot({.title = "green channel, as conjugate gradients go on",
+                      .y_label = "PSNR [dB]",
+                      .series = series_});
+  }
+
+  void show(const std::string& file, const std::string& name, double db) {
+    report_.add_picture(file, text(name, ", ", std::round(100 * db) / 100, " dB"));
+  }
+  void write(const std::string& file, const Planes& planes) const {
+    apps::Image image = image_of(picture_, planes, false);
+    apps::write_image(options_.common.output / file, image);
+  }
+
+  const Options& options_;
+  const std::vector<Method>& methods_;
+  apps::Report& report_;
+  Picture picture_;
+  std::vector<apps::PlotSeries> series_;
+  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+  long done_ = 0;
+  double blurred_db_ = 0;
+};
+
+}  // namespace
+
+long deconvolve_input(const Options& options, const std::vector<Method>& methods,
+                      apps::Report& report) {
+  return Run(options, methods, report).run();
+}
+
+}  // namespace deconvolution

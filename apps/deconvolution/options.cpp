@@ -1,0 +1,95 @@
+// options.cpp -- see options.h.
+#include "options.h"
+
+#include <CLI/CLI.hpp>
+
+#include "diagnostics/error.h"
+#include "weights.h"
+
+namespace deconvolution {
+
+namespace {
+
+constexpr long usual_steps = 2000;
+
+[[noreturn]] void refuse(const std::string& rule, const std::string& evidence,
+                         const std::string& instead) {
+  retrograde::call_error("understand the command line", rule, evidence, instead);
+}
+
+void require_sources(const Options& options) {
+  const bool no_input = options.common.input.empty(), no_dataset = options.dataset.empty();
+  if (no_input && no_dataset) {
+    refuse("there must be a picture to deconvolve or photographs to learn from",
+           "neither --input nor --dataset was given", "Give one of them, or both");
+  }
+  if (no_dataset && (options.compare || options.tune || options.common.resume)) {
+    refuse("--compare, --tune and --resume are about photographs", "there is no --dataset",
+           "Give a folder of them");
+  }
+}
+
+void require_ranges(const Options& options) {
+  apps::require_in_range("--noise", options.noise, 1e-4, 0.5);
+  apps::require_in_range("--iterations", options.iterations, 1, 10'000);
+  apps::require_in_range("--filters", options.shape.filters, 1, 64);
+  apps::require_in_range("--size", options.shape.size, 3, 11);
+  apps::require_in_range("--bumps", options.shape.bumps, 1, 12);
+  apps::require_in_range("--stages", options.stages, 1, 16);
+  if (options.shape.size % 2 == 0) {
+    refuse("filters have an odd number of samples along a side",
+           retrograde::text("--size is ", options.shape.size), "Give 3, 5 or 7");
+  }
+}
+
+void add_learning_options(CLI::App& cli, Options& options) {
+  cli.add_option("--dataset", options.dataset,
+                 "a folder of photographs: learns from most of them, measures on the others "
+                 "(photographs.txt in it may say which)");
+  cli.add_option("--filters", options.shape.filters, "filters of a stage that is learned")
+      ->capture_default_str();
+  cli.add_option("--size", options.shape.size, "samples along a filter")->capture_default_str();
+  cli.add_option("--bumps", options.shape.bumps, "of the mixture that shrinks derivatives")
+      ->capture_default_str();
+  cli.add_option("--stages", options.stages, "how many are learned")->capture_default_str();
+  cli.add_flag("--compare", options.compare,
+               "measures what comes with the program on the dataset and learns nothing");
+  cli.add_flag("--brief", options.brief,
+               "leaves out what was tuned and learned before and comes with the program");
+  cli.add_flag("--tune", options.tune,
+               "scans the numbers of the original method on the dataset; writes tuned.json");
+}
+
+}  // namespace
+
+std::optional<Options> read_options(int argc, char** argv) {
+  Options options;
+  CLI::App cli(
+      "Makes blurred photographs sharp whose point-spread function is known: by sparse adaptive "
+      "priors in two stages, and by four stages whose filters, weights, shrinkage and smoothing "
+      "are learned from photographs.");
+  apps::add_common_options(
+      cli, options.common,
+      {.needs_input = false,
+       .input_text = "a photograph, which is blurred first, or with --blurred one that is",
+       .steps = usual_steps,
+       .optimize = group_names});
+  cli.add_option("--psf", options.psf,
+                 "the point-spread function: disc:RADIUS, motion:SIZE[:SEED] or an image")
+      ->capture_default_str();
+  cli.add_option("--noise", options.noise, "its standard deviation; 1 is white")
+      ->capture_default_str();
+  cli.add_flag("--blurred", options.blurred, "the input is blurred already, by --psf");
+  cli.add_option("--iterations", options.iterations, "conjugate gradients of a stage, at most")
+      ->capture_default_str();
+  cli.add_option("--weights", options.weights,
+                 "that an earlier run wrote, instead of those that come with the program; "
+                 "learning goes on from them");
+  add_learning_options(cli, options);
+  if (!apps::parse_command_line(cli, argc, argv, options.common)) return std::nullopt;
+  require_sources(options);
+  require_ranges(options);
+  return options;
+}
+
+}  // namespace deconvolution

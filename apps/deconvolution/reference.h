@@ -1,0 +1,44 @@
+// reference.h -- a stage again, in plain C++ and double: what the pipelines are tested against. Slow.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "solver.h"
+#include "weights.h"
+
+namespace deconvolution {
+
+// Numbers of one stage in the order of Array; images are [count, full height, full width].
+struct Reference {
+  Reference(const Shape& shape, const Problem& problem, std::span<const float> numbers);
+
+  std::vector<double> cleaned(const std::vector<double>& before) const;
+  // [count, filters, rows, columns], where filters lie within the image.
+  std::vector<double> target(const std::vector<double>& before) const;
+  double energy(const std::vector<double>& image, const std::vector<double>& before) const;
+  // By the image, by hand.
+  std::vector<double> gradient(const std::vector<double>& image,
+                               const std::vector<double>& before) const;
+  // By conjugate gradients on the gradient above, until nothing is left.
+  std::vector<double> minimum(const std::vector<double>& before) const;
+
+ private:
+  using Doubles = std::vector<double>;
+  size_t at(int x, int y, int n) const;
+  size_t inner(int x, int y, int f, int n) const;
+  double filter(int u, int v, int f) const;
+  double weight(int f, int n) const;
+  double shrunk(double d, int f) const;
+  Doubles responses(const Doubles& image) const;
+  Doubles residual(const Doubles& image) const;
+  Doubles gradient_of(const Doubles& residual, const Doubles& miss) const;
+
+  Shape shape_;
+  const Problem& problem_;
+  Extent extent_;
+  int rows_, columns_;  // of responses
+  Doubles filters_, log_weights_, shrinkage_, smoothing_;
+};
+
+}  // namespace deconvolution

@@ -1,0 +1,166 @@
+// deconvolution, the program: from a photograph or a folder of them to pictures, weights and a report; what stops it
+// and goes on.
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "common/images.h"
+#include "common/process.h"
+#include "common/stop.h"
+#include "deconvolution/checks.h"
+#include "deconvolution/learn.h"
+#include "deconvolution/one_picture.h"
+#include "deconvolution/tune.h"
+#include "scenes.h"
+#include "support/temporary_folder.h"
+
+namespace {
+
+namespace fs = std::filesystem;
+using namespace deconvolution;
+using deconvolution_test::scene;
+using nlohmann::json;
+
+class DeconvolutionProgram : public testing::Test {
+ protected:
+  // Writes a scene as a picture.
+  fs::path photograph(const std::string& name, int width, int height, int variant = 0) {
+    const auto picture = scene(width, height, variant);
+    apps::write_image(folder_.path() / name, demosaic::image_of(width, height, 8, picture.planes));
+    return folder_.path() / name;
+  }
+  fs::path photographs() {
+    fs::create_directory(folder_.path() / "set");
+    for (int k = 0; k < 3; ++k)
+      photograph("set/" + std::to_string(k) + ".png", 100 + 2 * k, 102, k);
+    return folder_.path() / "set";
+  }
+
+  void run(const std::vector<std::string>& more) {
+    std::vector<std::string> words{DECONVOLUTION_PROGRAM, "--output", out(), "--threads", "2"};
+    words.insert(words.end(), more.begin(), more.end());
+    const apps::Outcome outcome = apps::run_program(words);
+    EXPECT_EQ(outcome.status, 0) << outcome.output;
+  }
+  json report() const {
+    std::ifstream file(out() / "report.json");
+    return json::parse(file)["deconvolution"];
+  }
+  void expect_files(const std::vector<std::string>& names) const {
+    for (const std::string& name : names) EXPECT_TRUE(fs::exists(out() / name)) << name;
+  }
+  fs::path out() const { return folder_.path() / "out"; }
+
+  const TemporaryFolder folder_;
+};
+
+TEST_F(DeconvolutionProgram, BlursAPhotographAndMakesItSharp) {
+  run({"--input", photograph("a.png", 90, 70), "--psf", "disc:2.5"});
+  expect_files({"truth.png", "blurred.png", "psf.png", "original.png", "tuned.png", "result.png",
+                "error_vs_time.png"});
+  const json own = report();
+  EXPECT_GT(own["picture"]["original"], own["picture"]["blurred"]);
+  EXPECT_GT(own["picture"]["learned"], own["picture"]["original"]);
+  // A disc of this radius has five samples a side, and two pixels of each border are not seen.
+  EXPECT_EQ(own["width"], 86);
+  EXPECT_EQ(own["height"], 66);
+  EXPECT_EQ(apps::read_image(out() / "result.png").width, 86);
+}
+
+TEST_F(DeconvolutionProgram, TakesABlurredOneAndAFunctionAsAnImage) {
+  apps::Image psf{3, 3, 8, std::vector<float>(27, 0.5f)};
+  apps::write_image(folder_.path() / "psf.png", psf);
+  run({"--input", photograph("a.png", 41, 33), "--psf", folder_.path() / "psf.png", "--blurred"});
+  expect_files({"blurred.png", "result.png"});
+  EXPECT_FALSE(fs::exists(out() / "truth.png"));
+  EXPECT_EQ(apps::read_image(out() / "result.png").width, 41);
+  EXPECT_FALSE(report().contains("picture"));
+}
+
+TEST_F(DeconvolutionProgram, PicturesOfFloatsStayFloats) {
+  apps::Image image{40, 36, 32, {}};
+  for (int k = 0; k < 40 * 36 * 3; ++k)
+    image.pixels.push_back(0.2f + 0.3f * static_cast<float>(k / 60 % 2));
+  apps::write_image(folder_.path() / "light.exr", image);
+  run({"--input", folder_.path() / "light.exr", "--psf", "disc:1.5"});
+  const apps::Image result = apps::read_image(out() / "result.exr");
+  EXPECT_EQ(result.bits, 32);
+  EXPECT_NEAR(result.pixels[3 * (17 * 38 + 19)], 0.35, 0.2);
+}
+
+TEST_F(DeconvolutionProgram, LearnsAndMeasures) {
+  run({"--dataset", photographs(), "--filters", "5", "--size", "3", "--bumps", "2", "--stages", "2",
+       "--steps", "4", "--brief"});
+  expect_files({"weights.json", "state.bin", "error_vs_time.png", "psnr_vs_time.png"});
+  EXPECT_EQ(read_weights(out() / "weights.json").stages, 2);
+  json own = report();
+  EXPECT_GT(own["held_out"]["learned, 4 steps"], own["held_out"]["blurred"]);
+  EXPECT_EQ(own["refused_steps"], 0);
+}
+
+TEST_F(DeconvolutionProgram, GoesOnAndStopsWithWhatItHas) {
+  Options options;
+  options.common.output = out();
+  options.common.steps = 3;
+  options.shape = {.filters = 2, .size = 3, .bumps = 1};
+  options.stages = 1;
+  fs::create_directory(out());
+  const demosaic::Dataset dataset{{scene(90, 90)}, {scene(80, 80, 1)}, ""};
+  const Gallery gallery(dataset.held_out, 0.01, 40);
+  apps::Report report("deconvolution", options.common);
+  EXPECT_EQ(learn(options, dataset, gallery, report).steps, 3);
+  options.common.steps = 50;
+  options.common.resume = true;
+  apps::request_stop();
+  const Learned learned = learn(options, dataset, gallery, report);
+  apps::request_stop(false);
+  EXPECT_TRUE(learned.stopped);
+  EXPECT_EQ(learned.steps, 3);
+  EXPECT_TRUE(fs::exists(out() / "weights.json"));
+}
+
+TEST_F(DeconvolutionProgram, LeavesThePictureThatItHas) {
+  Options options;
+  options.common.input = photograph("a.png", 60, 50);
+  options.common.output = out();
+  options.psf = "disc:2";
+  fs::create_directory(out());
+  apps::Report report("deconvolution", options.common);
+  apps::request_stop();
+  const std::vector<Method> methods{{"original", original()}, {"again", original()}};
+  EXPECT_EQ(deconvolve_input(options, methods, report), 0);
+  EXPECT_EQ(apps::read_image(out() / "result.png").width, 56);
+  apps::request_stop(false);
+  EXPECT_FALSE(fs::exists(out() / "again.png"));
+}
+
+TEST_F(DeconvolutionProgram, ChecksItself) {
+  const fs::path input = photograph("a.png", 60, 50);
+  run({"--input", input, "--check-gradients"});
+  EXPECT_TRUE(fs::exists(out() / "report.json"));
+}
+
+TEST_F(DeconvolutionProgram, SurvivesExtremes) {
+  // Where there is hardly any noise, float32 is too short for what is hardly seen.
+  for (const apps::StabilityRow& row : stability_rows(1, 2, 2)) {
+    EXPECT_LT(row.primal_error, 0.1) << row.name;
+    EXPECT_FALSE(std::isnan(row.gradient_error)) << row.name;
+  }
+}
+
+TEST(Gallery, MeasuresOnTheMiddleOfEachPhotograph) {
+  const Gallery gallery({scene(80, 90), scene(100, 70, 1)}, 0.01, 256);
+  EXPECT_EQ(gallery.extent().width, 70 - 18);
+  EXPECT_EQ(gallery.extent().count, 4);
+  const Measured measured = gallery.measure({{"original", original()}}, 2).front();
+  EXPECT_GT(measured.mean_db, gallery.blurred_db());
+  EXPECT_EQ(measured.stages_db.size(), 2u);
+  EXPECT_EQ(measured.stages_db.back(), measured.mean_db);
+  const apps::Table table = table_of(gallery.blurred_db(), {measured});
+  EXPECT_EQ(table.rows.size(), 2u);
+  EXPECT_EQ(details_of(gallery, {measured}).rows.size(), 2u + 4u);
+}
+
+}  // namespace
