@@ -8,6 +8,7 @@
 #include <span>
 
 #include "common/report.h"
+#include "inexact.h"
 #include "training.h"
 
 namespace deconvolution {
@@ -245,12 +246,14 @@ apps::StabilityRow stability_of(const Frame& frame, uint64_t seed, long steps,
   return row;
 }
 
-void finish(const Options& options, const apps::Table& table) {
+void finish(const Options& options, const std::vector<apps::Table>& tables) {
   apps::Report report("deconvolution", options.common);
-  report.add_table(table);
+  for (const apps::Table& table : tables) {
+    report.add_table(table);
+    std::printf("%s", table.to_markdown().c_str());
+  }
   report.write(0, false);
-  std::printf("%sreport in %s\n", table.to_markdown().c_str(),
-              (options.common.output / "report.json").c_str());
+  std::printf("report in %s\n", (options.common.output / "report.json").c_str());
 }
 
 std::vector<demosaic::Photograph> photographs_of(const Options& options) {
@@ -274,23 +277,33 @@ void check_gradients(const Options& options) {
   auto rows = energy_gradients(photographs, options.common.seed);
   for (auto& row : loss_gradients(photographs, options.common.seed, options.common.threads))
     rows.push_back(std::move(row));
-  finish(options, apps::gradient_table(rows));
+  const Weights weights =
+      options.weights.empty() ? learned_weights() : read_weights(options.weights);
+  finish(options,
+         {apps::gradient_table(rows),
+          inexact_solutions(photographs, weights, options.common.seed, options.common.threads)});
   apps::require_gradients(rows);
 }
 
 void check_stability(const Options& options) {
   constexpr long steps = 60;
-  finish(options,
-         apps::stability_table(stability_rows(options.common.seed, options.common.threads, steps)));
+  finish(
+      options,
+      {apps::stability_table(stability_rows(options.common.seed, options.common.threads, steps))});
 }
 
 void explain(const Options& options) {
-  const Objective<float> objective(options.shape, BatchShape{}.extent(), options.common.threads);
-  std::printf("%s\n", objective.explain().c_str());
+  const Extent extent = BatchShape{}.extent();
+  const Objective<float> all(options.shape, extent, options.common.threads);
+  const Objective<float> chosen(options.shape, extent, options.common.threads,
+                                arrays_of(options.common.optimize));
+  std::printf("%s\n", chosen.explain().c_str());
   for (const std::string& group : group_names) {
     if (apps::optimizes(options.common, group)) continue;
-    std::printf("does not move: %s, which --optimize does not name\n", group.c_str());
+    std::printf("left out: the gradient by %s, which --optimize does not name\n", group.c_str());
   }
+  std::printf("the gradient of a stage has %zu Funcs; that by every group would have %zu\n",
+              chosen.stages(), all.stages());
   std::printf("left out where a picture is deconvolved: the loss, and all of this\n");
 }
 

@@ -16,8 +16,8 @@ namespace deconvolution {
 namespace {
 
 constexpr const char* program = "deconvolution";
-constexpr int looks =
-    20;  // at the held-out photographs, over the whole run, each with a state that is saved
+// At the held-out photographs, over the whole run; at each the state is saved, too.
+constexpr long looks = 20, least_between = 25;
 
 double seconds_since(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
@@ -65,7 +65,7 @@ class Run {
 
   Learned run() {
     apps::Progress progress(stderr, static_cast<int>(options_.common.steps));
-    const long every = std::max(options_.common.steps / looks, 1L);
+    const long every = std::max(options_.common.steps / looks, least_between);
     look();
     while (!is_over()) {
       step();
@@ -77,9 +77,8 @@ class Run {
       std::snprintf(note, sizeof note, "held out %.2f dB", quality_.y.back());
       progress.show(static_cast<int>(steps_), note);
     }
-    look();
+    Measured measured = look();
     save();
-    Measured measured = held_out_.measure(method_);
     return {trainer_.weights(), std::move(measured), steps_, apps::stop_requested()};
   }
 
@@ -115,10 +114,12 @@ class Run {
   }
 
   // Its time does not count as learning.
-  void look() {
+  Measured look() {
     method_.use({retrograde::text("learned, ", steps_, " steps"), trainer_.weights()});
+    Measured measured = held_out_.measure(method_);
     quality_.x.push_back(seconds_);
-    quality_.y.push_back(held_out_.measure(method_).mean_db);
+    quality_.y.push_back(measured.mean_db);
+    return measured;
   }
 
   void save() {

@@ -32,8 +32,10 @@ std::vector<int> full_sizes(const Extent& e) { return {e.full_width(), e.full_he
 }  // namespace
 
 template <typename T>
-Objective<T>::Objective(const Shape& shape, const Extent& extent, int threads)
+Objective<T>::Objective(const Shape& shape, const Extent& extent, int threads,
+                        std::vector<Array> arrays)
     : extent_(extent),
+      arrays_(std::move(arrays)),
       solver_(shape, extent, threads),
       stage_(shape, extent, lang::type_of<T>()),
       lambda_(lang::type_of<T>(), 3, "lambda"),
@@ -71,12 +73,19 @@ void Objective<T>::compile_slope(int threads) {
   const Func slope =
       lang::propagate_tangents(stage_.energy, {{stage_.image, direction}})(stage_.energy);
   lang::AdjointOptions options{.wrt = {stage_.before}};
-  for (const lang::ImageParam& array : stage_.arrays) options.wrt.emplace_back(array);
+  for (const Array array : arrays_) options.wrt.emplace_back(stage_.of(array));
   adjoints_ = std::make_unique<lang::Derivative>(lang::propagate_adjoints(slope, options));
   std::vector<Func> outputs{(*adjoints_)(stage_.before)};
-  for (const lang::ImageParam& array : stage_.arrays) outputs.push_back((*adjoints_)(array));
+  for (const Array array : arrays_) outputs.push_back((*adjoints_)(stage_.of(array)));
   slope_ = lang::Pipeline(outputs);
   compile(slope_, threads);
+}
+
+template <typename T>
+size_t Objective<T>::stages() const {
+  const auto funcs = adjoints_->funcs();
+  return static_cast<size_t>(
+      std::count_if(funcs.begin(), funcs.end(), [](const Func& f) { return f.defined(); }));
 }
 
 template <typename T>
@@ -108,7 +117,8 @@ typename Objective<T>::Image Objective<T>::back_through(const Image& image, cons
   Buffer<T> by_before(sizes);
   std::vector<Buffer<>> outputs{by_before};
   for (const Array array : all_arrays) {
-    outputs.push_back(Buffer<T>(gradient.data(), sizes_of(stage_.shape, array)));
+    if (std::find(arrays_.begin(), arrays_.end(), array) != arrays_.end())
+      outputs.push_back(Buffer<T>(gradient.data(), sizes_of(stage_.shape, array)));
     gradient = gradient.subspan(elements_of(stage_.shape, array));
   }
   slope_.realize(lang::Realization(outputs));

@@ -31,19 +31,22 @@ class Objective {
  public:
   using Image = std::vector<T>;
 
-  Objective(const Shape& shape, const Extent& extent, int threads);
+  // With the gradient by these arrays of each stage; there is none by others in what is compiled.
+  Objective(const Shape& shape, const Extent& extent, int threads,
+            std::vector<Array> arrays = {all_arrays.begin(), all_arrays.end()});
 
   void set(const Simulated& batch);
   const Accuracy& accuracy() const { return accuracy_; }
   void set(const Accuracy& accuracy) { accuracy_ = accuracy; }
 
   // `numbers` and `gradient` are those of all stages, one after the other; the gradient by what is not in
-  // `learned` is 0. Without a gradient only the loss.
+  // `learned`, or of other arrays, is 0. Without a gradient only the loss.
   double evaluate(std::span<const T> numbers, std::span<T> gradient, const Range& learned);
   // Of the last stage, at the last evaluation.
   const Image& image() const { return images_.back(); }
 
   std::string explain() const { return adjoints_->explain(); }
+  size_t stages() const;  // Funcs of the gradient of a stage
   double compile_seconds() const { return compile_seconds_; }
 
  private:
@@ -55,6 +58,7 @@ class Objective {
                      std::span<T> gradient);
 
   Extent extent_;
+  std::vector<Array> arrays_;
   Solver<T> solver_;
   Stage stage_;
   lang::ImageParam lambda_, truth_, result_;

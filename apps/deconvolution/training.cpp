@@ -37,9 +37,10 @@ double rate_of(Array array) {
 std::vector<apps::AdamGroup> adam_groups(const Weights& weights,
                                          const std::vector<std::string>& groups) {
   std::vector<apps::AdamGroup> result;
+  const auto moving = arrays_of(groups);
   for (int stage = 0; stage < weights.stages; ++stage) {
     for (const Array array : all_arrays) {
-      const bool moves = std::find(groups.begin(), groups.end(), name_of(array)) != groups.end();
+      const bool moves = std::find(moving.begin(), moving.end(), array) != moving.end();
       result.push_back({elements_of(weights.shape, array), moves ? rate_of(array) : 0.0});
     }
   }
@@ -125,8 +126,8 @@ Trainer::Trainer(const Weights& start, const std::vector<demosaic::Photograph>& 
       weights_(start),
       gradient_(start.values.size()),
       sampler_(photographs, options.seed),
-      objective_(
-          std::make_unique<Objective<float>>(start.shape, options.batch.extent(), options.threads)),
+      objective_(std::make_unique<Objective<float>>(start.shape, options.batch.extent(),
+                                                    options.threads, arrays_of(options.groups))),
       adam_(std::make_unique<apps::Adam>(
           adam_groups(start, options.groups),
           apps::AdamOptions{.schedule = rate_schedule(options.steps, apart_ * start.stages)})) {

@@ -134,6 +134,15 @@ void read_array(const std::filesystem::path& path, const nlohmann::json& stage, 
 
 std::string name_of(Array array) { return group_names[static_cast<size_t>(array)]; }
 
+std::vector<Array> arrays_of(const std::vector<std::string>& groups) {
+  std::vector<Array> arrays;
+  for (const Array array : all_arrays) {
+    if (std::find(groups.begin(), groups.end(), name_of(array)) != groups.end())
+      arrays.push_back(array);
+  }
+  return arrays;
+}
+
 Weights::Weights(const Shape& shape, int stages)
     : shape(shape), stages(stages), values(elements_of(shape) * static_cast<size_t>(stages)) {}
 

@@ -13,6 +13,7 @@ namespace deconvolution {
 // What --optimize names.
 inline const std::vector<std::string> group_names{"filters", "weights", "shrinkage", "smoothing"};
 std::string name_of(Array array);  // the same words
+std::vector<Array> arrays_of(const std::vector<std::string>& groups);
 
 struct Weights {
   Weights(const Shape& shape, int stages);
