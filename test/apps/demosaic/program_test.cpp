@@ -14,6 +14,7 @@
 #include "demosaic/measure.h"
 #include "demosaic/photographs.h"
 #include "demosaic/reference.h"
+#include "demosaic/shipped.h"
 #include "demosaic/training.h"
 #include "support/temporary_folder.h"
 
@@ -163,6 +164,17 @@ TEST(DemosaicWeights, AreKeptInAFile) {
   }
 }
 
+// Whole arrays of finite numbers, as read_weights() holds files to, under the name of their shape.
+TEST(DemosaicWeights, EveryShippedFileLoads) {
+  size_t files = 0;
+  for (const auto& entry : fs::directory_iterator(DEMOSAIC_WEIGHTS)) {
+    const Shape shape = read_weights(entry.path()).shape;
+    EXPECT_EQ(entry.path().filename().string(), weights_file(shape));
+    ++files;
+  }
+  EXPECT_EQ(files, 6u) << "2, 9 and 15 filters, of 5 x 5 and 7 x 7";
+}
+
 class DemosaicLearning : public testing::Test {
  protected:
   Trainer::Options options(int threads = 2) const {
@@ -262,6 +274,15 @@ TEST_F(DemosaicProgram, DemosaicsAPictureInThreeWays) {
     const apps::Image image = apps::read_image(out() / name);
     EXPECT_EQ(image.width, 50) << name;
     EXPECT_EQ(image.height, 41) << name;
+  }
+}
+
+TEST_F(DemosaicProgram, TakesTheShippedWeightsOfItsShape) {
+  const fs::path in = write("in.png", picture(40, 40));
+  for (const auto& [filters, size] : {std::pair{"2", "7"}, {"15", "5"}}) {
+    const auto report = run({"--input", in, "--filters", filters, "--size", size});
+    const std::string name = std::string("relaxed ") + filters + " " + size + "x" + size;
+    EXPECT_TRUE(report["demosaic"]["picture"].contains(name)) << report["demosaic"].dump();
   }
 }
 
