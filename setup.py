@@ -35,7 +35,7 @@ class BuildByCMake(build_ext):
                  "-D", f"pybind11_DIR={pybind11.get_cmake_dir()}"],
                 cwd=ROOT, check=True)
         subprocess.run(["cmake", "--build", build, "--parallel", str(os.cpu_count()),
-                        "--target", "retrograde_python"], check=True)
+                        "--target", "python_package"], check=True)
         subprocess.run(["cmake", "--install", build, "--component", "python", "--strip",
                         "--prefix", Path(self.build_lib).resolve()], check=True)
 

@@ -26,8 +26,8 @@ import enum
 from . import _retrograde as rg
 from ._errors import CompileError, error
 
-__all__ = ["create_callable_from_generator", "Generator", "GeneratorParam", "InputBuffer", "InputScalar", "OutputBuffer", "OutputScalar", "generator",
-           "generators"]
+__all__ = ["Generator", "GeneratorParam", "InputBuffer", "InputScalar", "OutputBuffer", "OutputScalar",
+           "create_callable_from_generator", "generator", "generators"]
 
 generators = {}  # by name: what @generator registered
 

@@ -54,6 +54,12 @@ class halide_filter_metadata_t(Structure):
                 ("target", c_char_p), ("name", c_char_p)]
 
 
+class halide_trace_event_t(Structure):
+    _fields_ = [("func", c_char_p), ("value", c_void_p), ("coordinates", POINTER(c_int32)), ("trace_tag", c_char_p),
+                ("type", halide_type_t), ("event", c_int32), ("parent_id", c_int32), ("value_index", c_int32),
+                ("dimensions", c_int32)]
+
+
 INT, UINT, FLOAT, HANDLE, BFLOAT = range(5)
 ERROR_HANDLER = CFUNCTYPE(None, c_void_p, c_char_p)
 

@@ -70,8 +70,8 @@ class Writer:
         text = re.sub(r"retrograde\._retrograde\.", "", text.strip())
         text = re.sub(r"\bTuple\[", "tuple_of[", text)
         text = re.sub(r"\bCallable\b(?=\[)", "function", text)
-        text = re.sub(r"\b(std::|retrograde::|py::|pybind11::)[\w:<>, ]*|\b(handle|object|function|iterable|args|kwargs|capsule)\b",
-                      "Any", text)
+        text = re.sub(r"\b(std::|retrograde::|py::|pybind11::)[\w:<>, ]*", "Any", text)
+        text = re.sub(r"\b(handle|object|function|iterable|args|kwargs|capsule)\b", "Any", text)
         if not re.fullmatch(r"[\w\s\[\],.]+", text):
             return "Any"
         if is_argument:
@@ -163,9 +163,9 @@ class Writer:
             return self.class_(name, value, indent)
         if isinstance(value, property):
             text = inspect.getdoc(value) or ""
-            return self.lines.append(f"{indent}@property\n{indent}def {name}(self) -> Any:\n" + self.docstring(text, indent)
-                                     + (f"{indent}@{name}.setter\n{indent}def {name}(self, value: Any) -> None: ...\n"
-                                        if value.fset else ""))
+            setter = f"{indent}@{name}.setter\n{indent}def {name}(self, value: Any) -> None: ...\n" if value.fset else ""
+            head = f"{indent}@property\n{indent}def {name}(self) -> Any:\n"
+            return self.lines.append(head + self.docstring(text, indent) + setter)
         if isinstance(value, staticmethod) or type(value).__name__ == "builtin_function_or_method":
             return self.function(name, getattr(cls, name), indent, "staticmethod")
         if callable(value):

@@ -1,5 +1,6 @@
 """pip installs, runs and uninstalls the package in a fresh virtual environment, with Debian's packages alone."""
 import os
+import re
 import subprocess
 import sys
 import tempfile
@@ -85,6 +86,15 @@ class Install(unittest.TestCase):
         loaded = run("ldd", module)
         line = next(line for line in loaded.splitlines() if "libretrograde" in line)
         self.assertIn(str(package), line)
+        self.check_library(package / "libretrograde.so.0")
+
+    def check_library(self, library):
+        """LLVM is inside and hidden; what it needs beyond the C library lies beside it."""
+        needed = re.findall(r"NEEDED.*\[(.*)\]", run("readelf", "-d", library))
+        outside = [n for n in needed if not re.match(r"lib(c|m|dl|rt|pthread|gcc_s|stdc\+\+)\.so|ld-linux", n)]
+        self.assertTrue(all((library.parent / n).exists() for n in outside), outside)
+        shown = run("nm", "-DC", "--defined-only", library)
+        self.assertNotRegex(shown, r" [TV] (llvm::|LLVM)")
 
 
 if __name__ == "__main__":
