@@ -2,21 +2,21 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
-#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <limits>
 
 #include "common/images.h"
-#include "common/process.h"
-#include "support/temporary_folder.h"
+#include "support/app_errors.h"
 
 namespace {
 
 namespace fs = std::filesystem;
 
-class DemosaicErrors : public testing::Test {
+class DemosaicErrors : public AppErrors {
  protected:
+  DemosaicErrors() : AppErrors("demosaic", DEMOSAIC_PROGRAM) {}
+
   fs::path write(const std::string& name, int width, int height) {
     apps::Image image{width, height, 8, {}};
     uint32_t noise = 1;
@@ -28,20 +28,12 @@ class DemosaicErrors : public testing::Test {
     return folder_ / name;
   }
 
-  void refused(std::vector<std::string> words, const std::vector<std::string>& parts) {
-    words.insert(words.begin(), DEMOSAIC_PROGRAM);
-    const apps::Outcome outcome = apps::run_program(words);
-    EXPECT_EQ(outcome.status, 1) << outcome.output;
-    const std::string& line = outcome.output;
-    EXPECT_EQ(std::count(line.begin(), line.end(), '\n'), 1) << line;
-    EXPECT_TRUE(line.starts_with("demosaic: cannot ")) << line;
-    for (const std::string& part : parts) {
-      EXPECT_NE(line.find(part), std::string::npos) << "no \"" << part << "\" in: " << line;
-    }
-    if (!fs::exists(out())) return;
-    for (const auto& entry : fs::directory_iterator(out())) {
-      ADD_FAILURE() << "left behind: " << entry.path();
-    }
+  void refused(const std::vector<std::string>& words, const std::vector<std::string>& parts) {
+    std::string line;
+    for (const std::string& word : words) line += word + " ";
+    run(line);
+    expect_refused(parts);
+    expect_no_results();
   }
 
   void refused_input(const fs::path& input, const std::vector<std::string>& parts,
@@ -50,11 +42,6 @@ class DemosaicErrors : public testing::Test {
     words.insert(words.end(), more.begin(), more.end());
     refused(words, parts);
   }
-
-  fs::path out() const { return folder_ / "out"; }
-
-  const TemporaryFolder temporary_;
-  const fs::path& folder_ = temporary_.path();
 };
 
 TEST_F(DemosaicErrors, MissingAndDamagedPictures) {

@@ -2,20 +2,20 @@
 // and no results.
 #include <gtest/gtest.h>
 
-#include <algorithm>
 #include <fstream>
 #include <nlohmann/json.hpp>
 
-#include "common/process.h"
-#include "support/temporary_folder.h"
+#include "support/app_errors.h"
 
 namespace {
 
 namespace fs = std::filesystem;
 using nlohmann::json;
 
-class AppLensErrors : public testing::Test {
+class AppLensErrors : public AppErrors {
  protected:
+  AppLensErrors() : AppErrors("lens", LENS_PROGRAM) {}
+
   static json tessar() {
     std::ifstream file(LENS_PRESCRIPTIONS "/tessar_1903.json");
     return json::parse(file);
@@ -23,24 +23,18 @@ class AppLensErrors : public testing::Test {
 
   void refuse_text(const std::string& text, const std::vector<std::string>& parts,
                    const std::vector<std::string>& more = {}) {
-    const fs::path input = folder_.path() / "lens.json", out = folder_.path() / "out";
+    const fs::path input = folder_ / "lens.json";
     std::ofstream(input) << text;
-    std::vector<std::string> command{LENS_PROGRAM, "--input", input, "--output", out};
-    command.insert(command.end(), more.begin(), more.end());
-    const apps::Outcome outcome = apps::run_program(command);
-    EXPECT_EQ(outcome.status, 1) << outcome.output;
-    EXPECT_EQ(std::count(outcome.output.begin(), outcome.output.end(), '\n'), 1) << outcome.output;
-    EXPECT_TRUE(outcome.output.starts_with("lens: cannot ")) << outcome.output;
-    for (const std::string& part : parts)
-      EXPECT_NE(outcome.output.find(part), std::string::npos) << part << " in: " << outcome.output;
-    EXPECT_TRUE(!fs::exists(out) || fs::is_empty(out));
+    std::string line = "--input " + input.string() + " --output " + out().string();
+    for (const std::string& word : more) line += " " + word;
+    run(line);
+    expect_refused(parts);
+    expect_no_results();
   }
   void refuse(const json& lens, const std::vector<std::string>& parts,
               const std::vector<std::string>& more = {}) {
     refuse_text(lens.dump(), parts, more);
   }
-
-  const TemporaryFolder folder_;
 };
 
 TEST_F(AppLensErrors, OtherFilesAreNoPrescriptions) {
@@ -109,10 +103,9 @@ TEST_F(AppLensErrors, OptionsHaveRanges) {
 }
 
 TEST_F(AppLensErrors, AMissingFileIsNamed) {
-  const apps::Outcome outcome = apps::run_program(
-      {LENS_PROGRAM, "--input", folder_.path() / "none", "--output", folder_.path() / "out"});
-  EXPECT_EQ(outcome.status, 1);
-  EXPECT_NE(outcome.output.find("no such file can be read"), std::string::npos) << outcome.output;
+  run("--input " + (folder_ / "none").string() + " --output " + out().string());
+  expect_refused({"no such file can be read"});
+  expect_no_results();
 }
 
 }  // namespace
