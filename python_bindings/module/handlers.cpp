@@ -13,8 +13,6 @@ namespace retrograde::python {
 
 namespace {
 
-using py::arg;
-
 // The attribute is the address, None where the runtime's own is called. What is set is kept by who has the handlers.
 template <class Pointer>
 void bind_pointer(Class<JITHandlers>& c, const char* name, Pointer JITHandlers::*field) {

@@ -38,4 +38,12 @@ PYBIND11_MODULE(_retrograde, module) {
   bind_boundary_conditions(module);
   bind_inline_reductions(module);
   bind_operators(module);
+  // What Halide's Python package calls otherwise than its C++.
+  const auto also = [&](const char* name, const char* cls, const char* member) {
+    module.attr(name) = module.attr(cls).attr(member);
+  };
+  also("TargetOS", "Target", "OS");
+  also("TargetArch", "Target", "Arch");
+  also("TargetFeature", "Target", "Feature");
+  also("ArgumentKind", "Argument", "Kind");
 }

@@ -13,7 +13,8 @@ import importlib.util as _util
 
 from ._errors import CompileError, Error, InternalError, RuntimeError, Unsupported, UserError
 
-__all__ = ["CompileError", "Error", "InternalError", "Unsupported", "UserError"]
+HalideError = Error  # as Halide's package calls it
+__all__ = ["CompileError", "Error", "HalideError", "InternalError", "Unsupported", "UserError"]
 # Names that Python itself has: reached as retrograde.sum, never brought in by `import *`.
 _BUILTIN = {"RuntimeError", "abs", "max", "min", "pow", "print", "round", "sum"}
 

@@ -193,7 +193,9 @@ class Writer:
         for name, value in sorted(vars(self.module).items()):
             if name.startswith("__"):
                 continue
-            if inspect.isclass(value):
+            if inspect.isclass(value) and value.__qualname__ != name:
+                self.lines.append(f"{name} = {value.__qualname__}\n")
+            elif inspect.isclass(value):
                 self.class_(name, value)
             elif inspect.ismodule(value):
                 self.submodule(name, value)
@@ -208,7 +210,7 @@ def package_stub(module):
     hidden = sorted(n for n in dir(module) if n.startswith("_") and not n.startswith("__"))
     return ("from ._retrograde import *\n"
             + "".join(f"from ._retrograde import {name} as {name}\n" for name in hidden)
-            + "from ._errors import CompileError as CompileError, Error as Error, InternalError as InternalError\n"
+            + "from ._errors import Error as HalideError\nfrom ._errors import CompileError as CompileError, Error as Error, InternalError as InternalError\n"
               "from ._errors import RuntimeError as RuntimeError, Unsupported as Unsupported, UserError as UserError\n"
               "from ._command_line import main as main\nfrom ._generator import *\nfrom ._linking import *\n\n"
               "__version__: str\n")

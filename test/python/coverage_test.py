@@ -71,6 +71,16 @@ class Names(unittest.TestCase):
         self.assertTrue(all(len(why) > 10 for pattern, why in reasons()))
 
 
+class HalidesNames(unittest.TestCase):
+    def test_that_differ_from_those_of_its_cpp(self):
+        self.assertIs(rg.TargetArch, rg.Target.Arch)
+        self.assertIs(rg.TargetOS.Linux, rg.Target.OS.Linux)
+        self.assertIs(rg.TargetFeature.AVX2, rg.Target.Feature.AVX2)
+        self.assertIs(rg.ArgumentKind, rg.Argument.Kind)
+        with self.assertRaises(rg.HalideError):
+            rg.Func("undefined").realize([3])
+
+
 class Docstrings(unittest.TestCase):
     def test_come_from_the_headers(self):
         self.assertIn("gradient", rg.propagate_adjoints.__doc__)

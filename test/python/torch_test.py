@@ -1,4 +1,6 @@
 """Operators of PyTorch: values, gradients of every order, tensors of all kinds. Skipped where there is no PyTorch."""
+import re
+import textwrap
 import threading
 import unittest
 
@@ -30,6 +32,14 @@ class Operators(unittest.TestCase):
         self.assertTrue(torch.allclose(taps.grad, torch.stack([image[n:n + 6].sum() for n in range(3)])))
         self.assertIsNone(image.grad)
         self.assertEqual(set(op._gradients), {(1,)})  # of what was asked for, and nothing else
+
+    def test_the_ten_lines_of_its_documentation(self):
+        import retrograde.torch
+        program = re.findall(r"^    .*$", retrograde.torch.__doc__, re.M)
+        self.assertLessEqual(len(program), 10)
+        names = {}
+        exec(textwrap.dedent("\n".join(program)), names)
+        self.assertEqual(names["weights"].grad.shape, (3,))
 
     def test_of_every_order(self):
         image = torch.rand(6, dtype=torch.float64, requires_grad=True)
