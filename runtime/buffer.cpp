@@ -70,15 +70,18 @@ bool has_elements(const halide_buffer_t& buffer) {
 }
 
 int32_t check_memory(retrograde_context* context, const halide_buffer_t& buffer, const char* name,
-                     bool is_output, int64_t alignment) {
-  if (!buffer.host && has_elements(buffer)) {
+                     int32_t rules, int64_t alignment) {
+  const bool is_output = rules & retrograde_region_is_written;
+  const bool may_be_on_device = rules & retrograde_region_on_device;
+  const bool is_there = buffer.host || (may_be_on_device && buffer.device);
+  if (!is_there && has_elements(buffer)) {
     return retrograde_report_error(
         context, retrograde_error_host_is_null,
         "cannot run: data must be in memory of the host; the host pointer of the buffer \"%s\" is "
         "null, and it is on a device. Copy it to the host first.",
         name);
   }
-  if (!is_output && buffer.device_dirty()) {
+  if (!is_output && !may_be_on_device && buffer.device_dirty()) {
     return retrograde_report_error(context, retrograde_error_device_dirty_with_no_device_support,
                                    "cannot run: data must be in memory of the host; the buffer "
                                    "\"%s\" says that the newer copy "
@@ -173,8 +176,7 @@ int32_t retrograde_check_region(retrograde_context* context, const halide_buffer
                                 const char* name, int32_t rules, int32_t alignment,
                                 int32_t dimensions, const int32_t* used) {
   const bool is_output = rules & retrograde_region_is_written;
-  if (const int32_t code = rt::check_memory(context, *buffer, name, is_output, alignment))
-    return code;
+  if (const int32_t code = rt::check_memory(context, *buffer, name, rules, alignment)) return code;
   if (const int32_t code = rt::check_span(context, *buffer, name)) return code;
   if (const int32_t code =
           rt::check_box(context, *buffer, name, is_output, static_cast<uint32_t>(dimensions), used))

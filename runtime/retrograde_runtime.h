@@ -179,7 +179,8 @@ int32_t retrograde_check_shape(retrograde_context*, const struct halide_buffer_t
  * `dimensions`, `used` has the first and the last coordinate. */
 enum {
   retrograde_region_is_written = 1, /* else it is read */
-  retrograde_region_is_dense = 2    /* the stride of dimension 0 must be 1 */
+  retrograde_region_is_dense = 2,   /* the stride of dimension 0 must be 1 */
+  retrograde_region_on_device = 4   /* the pipeline has kernels: data may be on a device */
 };
 int32_t retrograde_check_region(retrograde_context*, const struct halide_buffer_t* buffer,
                                 const char* name, int32_t rules, int32_t alignment,

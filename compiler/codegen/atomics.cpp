@@ -147,7 +147,11 @@ void atomic_store(Values& values, const Store& s) {
   const int lanes = s.value.type().lanes();
   Value* indices = lanes == 1 ? values.index64(s.index) : values.index_vector(s.index);
   const Storage& to = c.storage(s.name);
-  const BinOp op = instruction_for(*update, element);
+  BinOp op = instruction_for(*update, element);
+  if (op == BinOp::FSub && c.e.machine.is_device()) {  // no device subtracts
+    op = BinOp::FAdd;
+    operand = c.b.CreateFNeg(operand);
+  }
   for (int i = 0; i < lanes; i++) {
     Value* index = c.b.CreateSExt(lane(c.e, indices, i), c.b.getInt64Ty());
     Value* one = lane(c.e, operand, i);
@@ -170,7 +174,14 @@ void FunctionGenerator::make(const Atomic& s) {
   if (store && is_one_word(store->value.type())) return atomic_store(values_, *store);
   const Store* first = nullptr;
   any_stmt(s.body, [&](const Stmt& part) { return (first = part.as<Store>()) != nullptr; });
-  if (first) locked(s, *first);
+  if (!first) return;
+  if (device_) {
+    unsupported("update " + quoted(s.name) + " atomically on a GPU",
+                "a kernel updates one value of at most 64 bits at a time",
+                "the values of a Tuple are updated together, which takes a lock",
+                "Reduce with rfactor, or update a Func for each value");
+  }
+  locked(s, *first);
 }
 
 // The address is known before the lock: what the index is made of is bound inside.

@@ -7,6 +7,7 @@
 #include <llvm/Support/raw_ostream.h>
 
 #include <algorithm>
+#include <cstdlib>
 #include <exception>
 #include <system_error>
 #include <thread>
@@ -59,7 +60,8 @@ auto with_generated(const Program& program, const Options& options, bool keep_na
                     const Use& use) {
   decltype(use(std::declval<Unit&>(), std::declval<const Machine&>())) result;
   run_on_large_stack([&] {
-    const Machine machine = machine_for(options.target, options.tune_for_host);
+    Machine machine = machine_for(options.target, options.tune_for_host);
+    machine.wants_executor = options.kernels_for_executor;
     const bool is_empty = program.functions.empty();
     Unit unit(machine, is_empty ? "retrograde" : program.functions[0].name, keep_names);
     generate(program, machine, unit);
@@ -168,6 +170,11 @@ Module compile_for_here(Unit& unit, const Machine& machine, const Options& optio
 }
 
 }  // namespace
+
+bool is_gpu_simulated() {
+  const char* driver = std::getenv("RETROGRADE_GPU");
+  return driver && std::string(driver) == "simulated";
+}
 
 Module compile_object(const ir::LoweredFunction& function, const Options& options) {
   return with_generated(

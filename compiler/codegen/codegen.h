@@ -15,12 +15,17 @@
 
 namespace retrograde::codegen {
 
+// Whether RETROGRADE_GPU is "simulated".
+bool is_gpu_simulated();
+
 struct Options {
   Target target = get_host_target();
   // Choose instructions for the processor that this runs on, within the target's features.
   bool tune_for_host = true;
   // 0: straight from the IR; 1: what the passes of optimize.cpp make of it.
   int optimization_level = 1;
+  // Kernels for the executor, too, which RETROGRADE_GPU=simulated asks for.
+  bool kernels_for_executor = is_gpu_simulated();
   // Into how many parts a program is cut, which are compiled at the same time. 0: what its size
   // suggests; of compile_object, at most the machine's cores.
   unsigned parts = 0;

@@ -15,15 +15,17 @@ namespace retrograde::codegen {
 void FunctionContext::begin(llvm::Function* function) {
   set_target(e, function);
   frame.function = function;
-  frame.context = function->getArg(0);
-  frame.context->setName("context");
+  if (!e.machine.is_device()) {
+    frame.context = function->getArg(0);
+    frame.context->setName("context");
+  }
   frame.entry = llvm::BasicBlock::Create(e.context(), "entry", function);
   b.SetInsertPoint(new_block("body"));
   frame.memo.push_back({{}, {}, false});
 }
 
 void FunctionContext::finish(Value* code) {
-  b.CreateRet(code);
+  code ? b.CreateRet(code) : b.CreateRetVoid();
   Value* count = int64(frame.owned_count);
   if (frame.error_exit) {
     b.SetInsertPoint(frame.error_exit);

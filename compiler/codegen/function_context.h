@@ -93,7 +93,7 @@ struct FunctionContext {
   Frame frame;
 
   void begin(llvm::Function* function);
-  void finish(Value* code);  // that it returns at the end
+  void finish(Value* code);  // that it returns at the end; null: nothing
   llvm::BasicBlock* new_block(const std::string& name);
   llvm::AllocaInst* entry_alloca(llvm::Type* type, int64_t count, const std::string& name);
   void fail(Value* code);  // leaves the function; the insertion point is a dead end afterwards

@@ -3,11 +3,13 @@
 //   function_context.h  the LLVM function that is being written: names, branches, leaving early
 //   values.h            expressions; each shared node once
 //   access.h            loads and stores: which vectors of addresses are dense, strided, or neither
+//   kernels.h           kernels, which the same statements make for devices
 //   calls.h             operators that need more than their arguments' values; the runtime
 #pragma once
 
 #include <string>
 
+#include "codegen/kernels.h"
 #include "codegen/values.h"
 #include "ir/lowered_function.h"
 
@@ -15,9 +17,12 @@ namespace retrograde::codegen {
 
 class FunctionGenerator {
  public:
-  FunctionGenerator(Emitter& emitter, const ir::LoweredFunction& function);
+  // `device`: for kernels of the function alone.
+  FunctionGenerator(Emitter& emitter, const ir::LoweredFunction& function,
+                    DeviceTarget* device = nullptr);
   // Adds `name` and `name_argv` to the module.
   void generate();
+  llvm::Function* generate_kernel(KernelUse& kernel);
 
  private:
   // statements.cpp: loops, branches, allocations, assertions
@@ -52,9 +57,25 @@ class FunctionGenerator {
   void make(const ir::Atomic& s);
   void locked(const ir::Atomic& s, const ir::Store& first);
 
+  // launch.cpp: kernels as the host sees them
+  void make(const ir::Launch& s);
+  void run(const KernelUse& kernel, const std::vector<Value*>& blocks, Value* shared_bytes);
+  void check_call(const std::string& function, const std::vector<Value*>& args);
+  Value* buffer_behind(const std::string& storage);
+  llvm::Constant* constant_table(llvm::Type* type, const std::vector<llvm::Constant*>& entries);
+
+  // kernel_body.cpp
+  unsigned site_metadata();
+  void enter_site(const Stmt& s);
+  void barrier(const ir::Evaluate& s);
+  Storage allocate_in_kernel(const ir::Allocate& s);
+
   Emitter& e_;
   llvm::IRBuilder<>& b_;
   const ir::LoweredFunction& source_;
+  DeviceTarget* const device_;  // of a kernel, else null
+  KernelUse* kernel_ = nullptr;
+  KernelSet kernels_;
   FunctionContext c_;
   Values values_{c_};
   int parallel_loops_ = 0;

@@ -100,10 +100,10 @@ Expr climbing_part(const Frame& frame, const Expr& e) {
 }
 
 // The first and the last lane that is on. Where none is, they are lanes all the same.
-struct Ends {
+struct LaneEnds {
   Value *first, *last;
 };
-Ends ends_of(llvm::IRBuilder<>& b, Value* predicate, int lanes) {
+LaneEnds ends_of(llvm::IRBuilder<>& b, Value* predicate, int lanes) {
   if (!predicate) return {b.getInt32(0), b.getInt32(static_cast<uint32_t>(lanes - 1))};
   const auto width = static_cast<unsigned>(lanes);
   Value* on = b.CreateBitCast(predicate, b.getIntNTy(width));
@@ -141,7 +141,7 @@ Value* load_spread(Values& values, const Storage& from, Type type, const Expr& i
     Value* step = c.b.CreateSub(at_lane(values, climbing, at), base);
     return splat(c.e, c.b.CreateIntCast(step, number, true), lanes);
   };
-  const Ends ends = ends_of(c.b, predicate, lanes);
+  const LaneEnds ends = ends_of(c.b, predicate, lanes);
   Value* element = iota(c.e, number, lanes);
   Value* mask = c.b.CreateICmpSLE(element, step_at(ends.last));
   if (predicate) {

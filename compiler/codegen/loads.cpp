@@ -12,8 +12,24 @@ using namespace ir;
 // Fewer lanes are not worth a loop.
 constexpr int min_loop_lanes = 8;
 
+// A kernel's accesses under a mask, lane by lane: the executor is told of those that happen.
+static Value* load_lanes_under(FunctionContext& c, const Storage& from, Type type, Value* first,
+                               Value* predicate) {
+  std::vector<Value*> lanes;
+  for (int i = 0; i < type.lanes(); ++i) {
+    Value* pointer = element_pointer(c.e, from, type, c.b.CreateAdd(first, c.int64(i)));
+    lanes.push_back(c.value_if(lane(c.e, predicate, i), [&]() -> Value* {
+      return tagged(c.b.CreateAlignedLoad(memory_type(c.e, type), pointer, alignment_of(type)),
+                    from);
+    }));
+  }
+  return from_memory(c.e, type, from_lanes(c.e, lanes));
+}
+
 Value* load_dense(FunctionContext& c, const Storage& from, Type type, Value* first,
                   Value* predicate) {
+  if (predicate && c.e.machine.is_device())
+    return load_lanes_under(c, from, type, first, predicate);
   const int native = native_lanes(c.e.machine, type), lanes = type.lanes();
   if (!predicate && lanes > native) {
     std::vector<Value*> parts;

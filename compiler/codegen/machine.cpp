@@ -67,6 +67,10 @@ void initialize_llvm() {
     LLVMInitializeAArch64Target();
     LLVMInitializeAArch64TargetMC();
     LLVMInitializeAArch64AsmPrinter();
+    LLVMInitializeNVPTXTargetInfo();
+    LLVMInitializeNVPTXTarget();
+    LLVMInitializeNVPTXTargetMC();
+    LLVMInitializeNVPTXAsmPrinter();
   });
 }
 
@@ -179,6 +183,21 @@ Machine machine_for(const Target& target, bool tune_for_host) {
   if (const std::string name = target.processor_name(); !name.empty() && machine.is_x86())
     machine.tune_cpu = name == "k8_sse3" ? "k8-sse3" : name;
   machine.gathers_fast = gathers_fast(machine);
+  return machine;
+}
+
+// PTX of version 7.8 is what drivers from CUDA 11.8 on take.
+Machine device_machine(const Machine& host, Machine::Device device) {
+  Machine machine = host;
+  machine.device = device;
+  machine.vector_bits = 128;  // the widest access of a thread
+  machine.gathers_fast = false;
+  machine.has_sleef = false;
+  if (device != Machine::Device::Nvptx) return machine;
+  machine.triple = "nvptx64-nvidia-cuda";
+  machine.cpu = "sm_" + std::to_string(host.target.cuda_capability());
+  machine.features = "+ptx78";
+  machine.tune_cpu = "";
   return machine;
 }
 

@@ -21,12 +21,19 @@ struct Machine {
   // time for AArch64 needs no library that its toolchains lack.
   bool has_sleef = true;
 
-  bool is_x86() const { return target.arch == Target::X86; }
+  // Of code for kernels; the target is the host's.
+  enum class Device : uint8_t { None, Nvptx, Simt };
+  Device device = Device::None;
+  bool is_device() const { return device != Device::None; }
+  // Whether kernels are compiled for the executor, too.
+  bool wants_executor = false;
+
+  bool is_x86() const { return target.arch == Target::X86 && !is_device(); }
   bool has_avx512() const;  // F at least
   bool has_avx2() const;
-  bool has_fma() const;       // as the vector math sees it: FMA with AVX2, or AArch64
-  bool has_rounding() const;  // of floats to whole numbers, as an instruction
-  bool has_f16c() const;      // half to float conversion as an instruction
+  bool has_fma() const;           // as the vector math sees it: FMA with AVX2, or AArch64
+  bool has_rounding() const;      // of floats to whole numbers, as an instruction
+  bool has_f16c() const;          // half to float conversion as an instruction
   bool has_avx512_words() const;  // AVX-512 of integers of 8 and 16 bits (BW)
   bool has_avx512_bytes() const;  // shuffles of bytes by numbers (VBMI)
   // Whether it has an instruction for loads from anywhere.
@@ -44,6 +51,8 @@ struct Machine {
 
 // Unsupported for targets that no back end exists for.
 Machine machine_for(const Target& target, bool tune_for_host);
+// For the kernels of functions that are made for `host`.
+Machine device_machine(const Machine& host, Machine::Device device);
 std::unique_ptr<llvm::TargetMachine> make_target_machine(const Machine& machine);
 
 }  // namespace retrograde::codegen

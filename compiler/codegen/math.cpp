@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "codegen/constant_math.h"
+#include "codegen/device_math.h"
 #include "codegen/emitter.h"
 #include "codegen/math_table.h"
 #include "diagnostics/error.h"
@@ -64,7 +65,10 @@ Value* call_by_pieces(Emitter& e, const MathFunction& function, const Args& args
               useful = std::min(lanes, total - start);
     Args piece_args;
     for (Value* arg : args) piece_args.push_back(padded_slice(e, arg, start, lanes));
-    const std::string name = e.machine.math_symbol(function.stem, function.precision, bits, lanes);
+    const std::string name =
+        e.machine.is_device()
+            ? device_math_symbol(function.stem, bits, static_cast<int>(args.size()))
+            : e.machine.math_symbol(function.stem, function.precision, bits, lanes);
     Value* piece =
         e.b.CreateCall(declare_pure(e, name, with_lanes(scalar, lanes), args.size()), piece_args);
     pieces.push_back(slice(e, piece, 0, useful));
@@ -119,6 +123,7 @@ Value* math_operator(Emitter& e, Op op, Type type, const Args& args) {
   const MathFunction& function = *find_math_function(op);
   Value* result = call_by_pieces(e, function, args);
   const double limit = type.bits() == 32 ? function.float32_limit : function.float64_limit;
+  if (e.machine.is_device()) return result;
   return limit == 0 ? result : with_limit(e, function, args[0], result, limit);
 }
 

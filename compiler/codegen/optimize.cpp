@@ -129,7 +129,7 @@ class MarkSmallLoops : public llvm::PassInfoMixin<MarkSmallLoops> {
   }
 };
 
-static llvm::FunctionPassManager pipeline() {
+static llvm::FunctionPassManager pipeline(bool is_nvptx) {
   llvm::FunctionPassManager passes;
   passes.addPass(llvm::SROAPass(llvm::SROAOptions::ModifyCFG));
   passes.addPass(llvm::EarlyCSEPass(true));
@@ -148,7 +148,7 @@ static llvm::FunctionPassManager pipeline() {
   passes.addPass(llvm::InstCombinePass());
   passes.addPass(llvm::SimplifyCFGPass());
   passes.addPass(llvm::ADCEPass());
-  passes.addPass(FenceLongBlocks());
+  if (!is_nvptx) passes.addPass(FenceLongBlocks());  // which has no fences
   return passes;
 }
 
@@ -163,7 +163,7 @@ void optimize(llvm::Module& module, llvm::TargetMachine& machine) {
   builder.registerFunctionAnalyses(functions);
   builder.registerLoopAnalyses(loops);
   builder.crossRegisterProxies(loops, functions, call_graph, modules);
-  llvm::FunctionPassManager passes = pipeline();
+  llvm::FunctionPassManager passes = pipeline(machine.getTargetTriple().isNVPTX());
   for (llvm::Function& function : module) {
     if (!function.isDeclaration()) passes.run(function, functions);
   }

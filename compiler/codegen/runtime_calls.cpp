@@ -17,6 +17,7 @@ struct ProfilerCall {
 constexpr ProfilerCall profiler_calls[] = {
     {"retrograde_profiler_begin", "retrograde_profiler_end"},
     {"retrograde_profiler_thread", "retrograde_profiler_leave"},
+    {"retrograde_device_buffer", "retrograde_device_buffer_free"},
 };
 
 // What was begun is ended by a function that leaves early, too.

@@ -21,8 +21,14 @@ constexpr StackLimit asked_for{256 << 10, 512 << 10};   // of those that ask for
 constexpr int64_t stack_padding_bytes = 64;             // readable past the end, as on the heap
 }  // namespace
 
-FunctionGenerator::FunctionGenerator(Emitter& emitter, const LoweredFunction& function)
-    : e_(emitter), b_(emitter.b), source_(function), c_(emitter, function.name) {}
+FunctionGenerator::FunctionGenerator(Emitter& emitter, const LoweredFunction& function,
+                                     DeviceTarget* device)
+    : e_(emitter),
+      b_(emitter.b),
+      source_(function),
+      device_(device),
+      kernels_(emitter, function),
+      c_(emitter, function.name) {}
 
 // ---- functions ----
 
@@ -54,6 +60,7 @@ void FunctionGenerator::generate() {
   if (source_.body.defined()) statement(source_.body);
   c_.finish(b_.getInt32(0));
   make_argv_wrapper(function);
+  kernels_.finish();
 }
 
 // args[i] is the buffer, or points to the scalar.
@@ -101,6 +108,7 @@ void FunctionGenerator::make(const IfThenElse& s) {
 // ---- statements ----
 
 void FunctionGenerator::statement(const Stmt& s) {
+  enter_site(s);
   match(
       s, [&](const LetStmt& let) { make(let); }, [&](const Assert& a) { make(a); },
       [&](const ProducerConsumer& p) { statement(p.body); }, [&](const For& f) { make(f); },
@@ -110,7 +118,12 @@ void FunctionGenerator::statement(const Stmt& s) {
         for (const Stmt& part : block.stmts) statement(part);
       },
       [&](const IfThenElse& branch) { make(branch); }, [&](const Fork& f) { make(f); },
-      [&](const Atomic& a) { make(a); }, [&](const Evaluate& e) { values_.alone(e.value); },
+      [&](const Atomic& a) { make(a); }, [&](const Launch& l) { make(l); },
+      [&](const Evaluate& e) {
+        if (as_op(e.value, Op::gpu_barrier) || as_op(e.value, Op::gpu_warp_barrier))
+          return barrier(e);
+        values_.alone(e.value);
+      },
       [&](const StmtNode& node) {
         throw InternalError(
             text(kind_name(node.kind), " reached code generation: lowering replaces it"), "codegen",
@@ -217,6 +230,10 @@ void FunctionGenerator::free_owned(Storage& owned) {
 }
 
 void FunctionGenerator::make(const Allocate& s) {
+  if (device_) {
+    c_.frame.storages[s.name] = allocate_in_kernel(s);
+    return statement(s.body);
+  }
   const auto elements = as_const_int(s.elements);
   const bool on_stack = elements && fits_stack(s, *elements);
   c_.frame.storages[s.name] = on_stack ? allocate_on_stack(s, *elements) : allocate_on_heap(s);

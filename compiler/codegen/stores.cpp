@@ -17,6 +17,12 @@ void store_scalar(FunctionContext& c, const Storage& to, Type type, Value* index
 
 void store_dense(FunctionContext& c, const Storage& to, Type type, Value* first, Value* stored,
                  Value* predicate) {
+  if (predicate && c.e.machine.is_device()) {
+    for (int i = 0; i < type.lanes(); ++i)
+      store_scalar(c, to, type.element_of(), c.b.CreateAdd(first, c.int64(i)), lane(c.e, stored, i),
+                   lane(c.e, predicate, i));
+    return;
+  }
   const int native = native_lanes(c.e.machine, type), lanes = type.lanes();
   if (!predicate && lanes > native) {
     for (int at = 0; at < lanes; at += native) {

@@ -8,6 +8,7 @@
 #include "graph/associative_update.h"
 #include "graph/define.h"
 #include "graph/give_directive.h"
+#include "graph/names.h"
 #include "graph/race_checks.h"
 #include "ir/build.h"
 #include "ir/equal.h"
@@ -316,11 +317,13 @@ void check(ReorderLoops& reorder, const SchedulePlace& at) {
 }
 
 void check(RunLoop& run, const SchedulePlace& at) {
-  static constexpr const char* verbs[] = {"serialize", "parallelize", "vectorize", "unroll"};
+  static constexpr const char* verbs[] = {
+      "serialize ",         "parallelize ",        "vectorize ",       "unroll ",
+      "run GPU blocks of ", "run GPU threads of ", "run GPU lanes of "};
   const std::string asked =
-      text(verbs[static_cast<int>(run.kind)], " ", at.name(), " over ", quoted(run.loop));
-  loop_index(at, run.loop, asked);
-  if (run.kind == ForType::Parallel || run.kind == ForType::Vectorized)
+      text(verbs[static_cast<int>(run.kind)], at.name(), " over ", quoted(run.loop));
+  if (run.loop != outermost_loop || run.kind != ForType::GpuBlock) loop_index(at, run.loop, asked);
+  if (runs_at_once(run.kind) || run.kind == ForType::Vectorized)
     check_race_free(at, run.loop, asked);
 }
 

@@ -4,6 +4,7 @@
 
 #include "diagnostics/error.h"
 #include "graph/function.h"
+#include "graph/names.h"
 #include "ir/build.h"
 
 namespace retrograde::graph {
@@ -16,6 +17,10 @@ size_t place_of(const StageLoops& schedule, const std::string& loop) {
   }
   RETROGRADE_ASSERT(false, "a directive names ", quoted(loop), ", which is no loop of its stage");
   return 0;
+}
+
+bool has_outermost(const std::vector<Dim>& dims) {
+  return !dims.empty() && dims.back().var == outermost_loop;
 }
 
 // ---- loops ----
@@ -67,7 +72,10 @@ void give(const ReorderLoops& reorder, StageLoops& schedule) {
   for (size_t i = 0; i < sorted.size(); ++i) schedule.dims[sorted[i]] = before[places[i]];
 }
 
+// The outermost loop, which runs once, is there where a directive says how.
 void give(const RunLoop& run, StageLoops& schedule) {
+  if (run.loop == outermost_loop && !has_outermost(schedule.dims))
+    schedule.dims.push_back({outermost_loop});
   schedule.dims[place_of(schedule, run.loop)].runs = run.kind;
 }
 void give(const PartitionLoop& partition, StageLoops& schedule) {
@@ -208,6 +216,10 @@ void add_loops(const StageLoops& schedule, const std::vector<Dim>& first,
   built.dims = first;
   for (const Split& split : schedule.splits) {
     log.push_back(directive_of(split));
+    apply_directive(log.back(), built);
+  }
+  if (has_outermost(schedule.dims)) {
+    log.push_back(RunLoop{std::string(outermost_loop), schedule.dims.back().runs});
     apply_directive(log.back(), built);
   }
   if (loop_names(built.dims) != loop_names(schedule.dims)) {

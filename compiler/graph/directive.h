@@ -60,7 +60,7 @@ struct ReorderLoops {  // innermost first; loops that are not named keep their p
   RETROGRADE_DIRECTIVE("reorder", loops)
   std::vector<NamedLoop> loops;
 };
-struct RunLoop {  // serial, parallel, vectorized or unrolled
+struct RunLoop {  // serial, parallel, vectorized, unrolled, or over parts of a GPU
   RETROGRADE_DIRECTIVE("run", loop, kind)
   NamedLoop loop;
   ForType kind = ForType::Serial;

@@ -17,7 +17,8 @@ inline constexpr std::array tail_choices{"RoundUp",
                                          "ShiftInwardsAndBlend",
                                          "ShiftInwards",
                                          "Auto"};
-inline constexpr std::array loop_choices{"Serial", "Parallel", "Vectorized", "Unrolled"};
+inline constexpr std::array loop_choices{"Serial",   "Parallel",  "Vectorized", "Unrolled",
+                                         "GpuBlock", "GpuThread", "GpuLane"};
 inline constexpr std::array partition_choices{"Auto", "Never", "Always"};
 inline constexpr std::array memory_choices{"Auto",        "Heap",      "Stack",
                                            "Register",    "GPUShared", "GPUTexture",

@@ -146,7 +146,8 @@ class CppPrinter {
     return call(d.name, {cpp(d.old), cpp(d.renamed)});
   }
   std::string statement(const RunLoop& d) {
-    static constexpr const char* methods[] = {"serial", "parallel", "vectorize", "unroll"};
+    static constexpr const char* methods[] = {"serial",     "parallel",    "vectorize", "unroll",
+                                              "gpu_blocks", "gpu_threads", "gpu_lanes"};
     return call(methods[static_cast<int>(d.kind)], {cpp(d.loop)});
   }
   std::string statement(const ComputeWith& d) {

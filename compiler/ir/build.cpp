@@ -512,6 +512,13 @@ Stmt make_for(const std::string& name, Expr min, Expr extent, ForType type, Stmt
   return make_node<For>(name, std::move(min), std::move(extent), type, std::move(body), partition);
 }
 
+Stmt make_launch(const std::string& kernel, std::vector<Expr> blocks, std::vector<int> threads,
+                 Expr shared_bytes, Stmt body) {
+  if (!body.defined()) return {};
+  return make_node<Launch>(kernel, std::move(blocks), std::move(threads), std::move(shared_bytes),
+                           std::move(body));
+}
+
 Stmt make_store(const std::string& name, Expr value, Expr index, Expr predicate, SymbolRef symbol) {
   if (value.type().is_scalar()) value = make_broadcast(std::move(value), index.type().lanes());
   if (predicate.defined() && is_const_true(predicate)) predicate = {};
@@ -531,10 +538,11 @@ Stmt make_realize(const std::string& name, std::vector<Type> types, MemoryType m
   return make_node<Realize>(name, std::move(types), memory, std::move(bounds), std::move(body));
 }
 
-Stmt make_allocate(const std::string& name, Type type, MemoryType memory, Expr elements,
-                   Stmt body) {
+Stmt make_allocate(const std::string& name, Type type, MemoryType memory, Expr elements, Stmt body,
+                   Expr offset) {
   if (!body.defined()) return {};
-  return make_node<Allocate>(name, type, memory, std::move(elements), std::move(body));
+  return make_node<Allocate>(name, type, memory, std::move(elements), std::move(offset),
+                             std::move(body));
 }
 
 Stmt make_free(const std::string& name) { return make_node<Free>(name); }

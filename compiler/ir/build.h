@@ -76,6 +76,8 @@ Expr make_lets(const Lets& lets, Expr body);
 Stmt make_lets(const Lets& lets, Stmt body);
 Stmt make_assert(Expr condition, Expr error);
 Stmt make_producer_consumer(const std::string& name, bool produces, Stmt body);
+Stmt make_launch(const std::string& kernel, std::vector<Expr> blocks, std::vector<int> threads,
+                 Expr shared_bytes, Stmt body);
 Stmt make_for(const std::string& name, Expr min, Expr extent, ForType type, Stmt body,
               Partition partition = Partition::Auto);
 Stmt make_store(const std::string& name, Expr value, Expr index, Expr predicate = {},
@@ -84,7 +86,8 @@ Stmt make_provide(const std::string& name, std::vector<Expr> values, std::vector
                   Expr predicate = {});
 Stmt make_realize(const std::string& name, std::vector<Type> types, MemoryType memory,
                   std::vector<Range> bounds, Stmt body);
-Stmt make_allocate(const std::string& name, Type type, MemoryType memory, Expr elements, Stmt body);
+Stmt make_allocate(const std::string& name, Type type, MemoryType memory, Expr elements, Stmt body,
+                   Expr offset = {});
 Stmt make_free(const std::string& name);
 Stmt make_block(std::vector<Stmt>
                     stmts);  // flattens, drops undefined; undefined when empty; the one when single

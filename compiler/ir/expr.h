@@ -125,10 +125,23 @@ struct Range {
   Expr min, extent;
 };
 
-enum class ForType : uint8_t { Serial, Parallel, Vectorized, Unrolled };
+// GpuBlock, GpuThread and GpuLane: iterations are blocks of a grid, threads of a block, lanes of a warp.
+enum class ForType : uint8_t {
+  Serial,
+  Parallel,
+  Vectorized,
+  Unrolled,
+  GpuBlock,
+  GpuThread,
+  GpuLane
+};
+constexpr bool is_gpu(ForType type) { return type >= ForType::GpuBlock; }
+constexpr bool is_gpu_thread(ForType type) { return type > ForType::GpuBlock; }
+// Whether iterations may run at the same time, each on its own.
+constexpr bool runs_at_once(ForType type) { return type == ForType::Parallel || is_gpu(type); }
 // Whether a loop is cut into a steady state without boundary tests and the parts around it.
 enum class Partition : uint8_t { Auto, Never, Always };
-// GPU and accelerator memories parse and are refused where code is made for a CPU.
+// Register and GPUShared are memories of a GPU's kernels; those of accelerators parse and are refused.
 enum class MemoryType : uint8_t {
   Auto,
   Heap,
@@ -358,11 +371,12 @@ struct Realize : StmtNode {  // Loops phase: storage for a Func over a box, aliv
 };
 struct Allocate
     : StmtNode {  // FlatStorage phase: `elements` (int64) elements of `type`, alive during body
-  RETROGRADE_NODE(Allocate, name, type, memory, elements, body)
+  RETROGRADE_NODE(Allocate, name, type, memory, elements, offset, body)
   const std::string name;
   const Type type;
   const MemoryType memory;
   const Expr elements;
+  const Expr offset;  // GPUShared in a Launch: in bytes, where in the shared memory; else undefined
   const Stmt body;
 };
 struct Free : StmtNode {  // no use of the allocation follows; at most one on every path of its
@@ -400,6 +414,22 @@ struct Prefetch : StmtNode {  // Loops phase: fetch a box of a Func or image int
   const std::vector<Range> bounds;
   const SymbolRef symbol;  // the image; undefined for a Func
 };
+
+// FlatStorage and Vector: runs a kernel, `threads` of which, in each of x, y, z, are a block, and blocks
+// a grid. The body is that of every thread, which knows its place by the names of launch_index; what it
+// uses of its surroundings, variables and memory, are the kernel's arguments. `shared_bytes` (int32): of
+// memory that the threads of a block share; the body's allocations of GPUShared lie there.
+struct Launch : StmtNode {
+  RETROGRADE_NODE(Launch, name, blocks, threads, shared_bytes, body)
+  const std::string name;
+  const std::vector<Expr> blocks;
+  const std::vector<int> threads;
+  const Expr shared_bytes;
+  const Stmt body;
+};
+// Variables (int32) of a launch's body: where the thread stands in its block, or its block in the grid.
+std::string thread_index(const std::string& kernel, int dimension);
+std::string block_index(const std::string& kernel, int dimension);
 
 #undef RETROGRADE_NODE
 #undef RETROGRADE_FIELDS

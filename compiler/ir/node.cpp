@@ -16,6 +16,14 @@ const char* kind_name(Kind kind) {
   return names[static_cast<int>(kind)];
 }
 
+static constexpr const char* axes[] = {".x", ".y", ".z"};
+std::string thread_index(const std::string& kernel, int dimension) {
+  return kernel + ".thread" + axes[dimension];
+}
+std::string block_index(const std::string& kernel, int dimension) {
+  return kernel + ".block" + axes[dimension];
+}
+
 namespace {
 
 void destroy(const Node* node) {

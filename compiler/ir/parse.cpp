@@ -21,8 +21,9 @@ namespace {
 // The C++ stack bounds how deep a text may nest.
 constexpr int max_depth = 2000;
 
-constexpr ForType for_types[] = {ForType::Serial, ForType::Parallel, ForType::Vectorized,
-                                 ForType::Unrolled};
+constexpr ForType for_types[] = {ForType::Serial,   ForType::Parallel, ForType::Vectorized,
+                                 ForType::Unrolled, ForType::GpuBlock, ForType::GpuThread,
+                                 ForType::GpuLane};
 
 // The type that a suffix names: "_u8", "_f64", or "f" for float32.
 std::optional<Type> suffix_type(const std::string& suffix) {
@@ -415,6 +416,7 @@ class Parser {
       return make_fork(first, block());
     }
     if (accept("prefetch")) return prefetch();
+    if (accept("launch")) return launch();
     return store_or_provide();
   }
   bool is_loop() const {
@@ -437,6 +439,20 @@ class Parser {
     expect(",");
     Expr min = expr_before(","), extent = expr_before(")");
     return make_for(variable, min, extent, runs, block(), partition);
+  }
+  Stmt launch() {
+    const std::string kernel = name();
+    expect("blocks");
+    std::vector<Expr> blocks = arguments(3);
+    expect("threads");
+    const Token at = token_;
+    expect("(");
+    std::vector<int> threads = several([&] { return integer(); });
+    expect(")");
+    if (threads.size() != 3) Lexer::fail(at, "3 numbers of threads");
+    expect("shared");
+    std::vector<Expr> shared = arguments(1);
+    return make_launch(kernel, std::move(blocks), std::move(threads), shared[0], block());
   }
   Stmt realize() {
     const std::string func = name();
@@ -467,7 +483,8 @@ class Parser {
     expect(":");
     const Type element = type();
     const MemoryType where = memory();
-    return make_allocate(buffer, element, where, elements, block());
+    const Expr offset = accept("at") ? expr() : Expr();
+    return make_allocate(buffer, element, where, elements, block(), offset);
   }
   Stmt if_stmt() {
     expect("(");

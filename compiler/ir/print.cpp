@@ -15,9 +15,11 @@
 //   let t = v                                        its body is the rest of the block
 //   assert(c, e)  free a  evaluate v  a[i if p] = v  f(x, y if p) = {u, v}
 //   produce f {..}  consume f {..}  if (c) {..} else {..}  {..}
-//   for (x, min, extent) {..}                        serial, or with parallel, vectorized, unrolled
+//   for (x, min, extent) {..}                        serial, or with parallel, vectorized, unrolled,
+//                                                    gpu_block, gpu_thread, gpu_lane
+//   launch k blocks(x, y, z) threads(32, 8, 1) shared(bytes) {..}
 //   realize f(float32, int8) auto [min, extent], [min, extent] {..}
-//   allocate a[elements]:float32 heap {..}
+//   allocate a[elements]:float32 heap {..}           of a kernel's shared memory: gpu_shared at bytes {..}
 #include "ir/print.h"
 
 #include <charconv>
@@ -244,7 +246,9 @@ class StmtPrinter {
         },
         [&](const Allocate& n) {
           write("allocate ", quote_name(n.name), "[", n.elements, "]:", to_string(n.type), " ",
-                memory_name(n.memory), Body{n.body});
+                memory_name(n.memory));
+          if (n.offset.defined()) write(" at ", n.offset);
+          put(Body{n.body});
         },
         [&](const Free& n) { write("free ", quote_name(n.name)); },
         [&](const IfThenElse& n) {
@@ -256,6 +260,11 @@ class StmtPrinter {
         [&](const Fork& n) { write("fork", Body{n.first}, " and", Body{n.rest}); },
         [&](const Prefetch& n) {
           write("prefetch ", quote_name(n.name), "(", to_string(n.type), ")", n.bounds);
+        },
+        [&](const Launch& n) {
+          write("launch ", quote_name(n.name), " blocks(", n.blocks, ") threads(",
+                listed(n.threads, [](int count) { return std::to_string(count); }), ") shared(",
+                n.shared_bytes, ")", Body{n.body});
         },
         [&](const StmtNode& n) { put(kind_name(n.kind)); });
     if (s.kind() != Kind::LetStmt) put("\n");

@@ -416,6 +416,17 @@ int Target::get_cuda_capability_lower_bound() const {
   return 20;
 }
 
+int Target::cuda_capability() const {
+  constexpr std::pair<Feature, int> capabilities[] = {
+      {CUDACapability90, 90}, {CUDACapability86, 86}, {CUDACapability80, 80},
+      {CUDACapability75, 75}, {CUDACapability70, 70}, {CUDACapability61, 61},
+      {CUDACapability50, 50}};
+  for (const auto& [feature, capability] : capabilities) {
+    if (has_feature(feature)) return capability;
+  }
+  return 75;
+}
+
 bool Target::get_runtime_compatible_target(const Target& other, Target& result) const {
   if (arch != other.arch || os != other.os || bits != other.bits) return false;
   // What changes the functions that a runtime offers. The rest is code that the runtime never sees.

@@ -135,6 +135,8 @@ struct Target {
   bool supports_device_api(DeviceAPI device) const;
   // A device that its features ask for, any one of several; None without.
   DeviceAPI get_required_device_api() const;
+  // What kernels are compiled for: 75 for cuda_capability_75, the highest that it says; 75 when none.
+  int cuda_capability() const;
   int get_cuda_capability_lower_bound() const;  // 75 for cuda_capability_75; 20 when it says none
   // The first part that no code can be generated for, such as "cuda"; empty when there is none.
   std::string unsupported_part() const;

@@ -8,7 +8,8 @@
 namespace retrograde::ir {
 
 const char* for_name(ForType type) {
-  static constexpr const char* names[] = {"serial", "parallel", "vectorized", "unrolled"};
+  static constexpr const char* names[] = {"serial",    "parallel",   "vectorized", "unrolled",
+                                          "gpu_block", "gpu_thread", "gpu_lane"};
   return names[static_cast<int>(type)];
 }
 

@@ -1,6 +1,7 @@
 // The rules of each phase, checked in one walk over the statement.
 #include "ir/validate.h"
 
+#include <list>
 #include <unordered_set>
 
 #include "diagnostics/error.h"
@@ -69,7 +70,7 @@ class Validator {
           only_in_loops(s);
           check_bounds(s, n.bounds);
         },
-        [](const StmtNode&) {});
+        [&](const Launch& n) { check_launch(s, n); }, [](const StmtNode&) {});
   }
 
  private:
@@ -197,8 +198,30 @@ class Validator {
     const bool gone = n.runs == ForType::Vectorized || n.runs == ForType::Unrolled;
     require(phase_ != Phase::Vector || !gone, s,
             "no vectorized or unrolled loop is left in the phase Vector");
+    require(!in_kernel_ || !is_gpu(n.runs), s, "a kernel has no loops over blocks and threads");
     const Binding binding(*this, n.name, s);
     check(n.body);
+  }
+  void check_launch(const Stmt& s, const Launch& n) {
+    only_in_flat(s);
+    require(!in_kernel_, s, "a kernel launches none");
+    require(n.blocks.size() == 3 && n.threads.size() == 3, s, "grids and blocks have 3 dimensions");
+    for (const Expr& count : n.blocks) {
+      check(count);
+      require(count.type() == Int(32), s, "a number of blocks is an int32");
+    }
+    check(n.shared_bytes);
+    require(n.shared_bytes.type() == Int(32), s, "a number of bytes is an int32");
+    in_kernel_ = true;
+    {
+      std::list<Binding> indices;
+      for (int d = 0; d < 3; ++d) {
+        indices.emplace_back(*this, thread_index(n.name, d), s);
+        indices.emplace_back(*this, block_index(n.name, d), s);
+      }
+      check(n.body);
+    }
+    in_kernel_ = false;
   }
   void check_store(const Stmt& s, const Store& n) {
     only_in_flat(s);
@@ -245,12 +268,21 @@ class Validator {
     check(n.elements);
     require(n.elements.type() == Int(64), s, "the size of an Allocate is an int64");
     require(n.type.is_scalar(), s, "an Allocate holds scalars");
+    check_offset(s, n);
     if (!allocated_.insert(n.name).second)
       fail(s, "names are unique: two allocations are called " + quoted(n.name));
     live_.insert(n.name);
     check(n.body);
     live_.erase(n.name);
     checked_.clear();
+  }
+  void check_offset(const Stmt& s, const Allocate& n) {
+    const bool has_place = in_kernel_ && n.memory == MemoryType::GPUShared;
+    require(n.offset.defined() == has_place, s,
+            "what lies in a kernel's shared memory, and nothing else, has a place there");
+    if (!has_place) return;
+    check(n.offset);
+    require(n.offset.type() == Int(32), s, "an offset is an int32");
   }
   void check_free(const Stmt& s, const Free& n) {
     only_in_flat(s);
@@ -296,6 +328,7 @@ class Validator {
       fail(node, std::string(kind_name(node.kind())) + " belongs to the phase FlatStorage");
   }
 
+  bool in_kernel_ = false;
   const Stmt& before_;
   const Phase phase_;
   const std::string pass_;

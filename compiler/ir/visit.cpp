@@ -178,7 +178,12 @@ Stmt map_children(const Stmt& s, ChildMap mapped) {
         return mapped.of(s, make_realize, n.name, n.types, n.memory, n.bounds, n.body);
       },
       [&](const Allocate& n) {
-        return mapped.of(s, make_allocate, n.name, n.type, n.memory, n.elements, n.body);
+        const auto make = [](auto name, Type type, MemoryType memory, Expr elements, Expr offset,
+                             Stmt body) {
+          return make_allocate(name, type, memory, std::move(elements), std::move(body),
+                               std::move(offset));
+        };
+        return mapped.of(s, make, n.name, n.type, n.memory, n.elements, n.offset, n.body);
       },
       [&](const Free& n) { return mapped.of(s, make_free, n.name); },
       [&](const Block& n) { return mapped.of(s, make_block, n.stmts); },
@@ -190,6 +195,9 @@ Stmt map_children(const Stmt& s, ChildMap mapped) {
       [&](const Fork& n) { return mapped.of(s, make_fork, n.first, n.rest); },
       [&](const Prefetch& n) {
         return mapped.of(s, make_prefetch, n.name, n.type, n.bounds, n.symbol);
+      },
+      [&](const Launch& n) {
+        return mapped.of(s, make_launch, n.name, n.blocks, n.threads, n.shared_bytes, n.body);
       },
       [&](const StmtNode&) { return s; });
 }

@@ -1,5 +1,7 @@
 // default_compiler.cpp -- what the front end's realize() reaches: lowering, then machine code in
 // this process.
+#include <HalideRuntime.h>
+
 #include "autoschedule/choose_schedule.h"
 #include "frontend/run/compiler_interface.h"
 #include "jit/jit.h"
@@ -110,8 +112,11 @@ retrograde_context context_for(const CallContext& caller) {
 class JitPipeline : public CompiledPipeline {
  public:
   JitPipeline(std::vector<ir::LoweredArgument> arguments,
-              std::shared_ptr<const jit::CompiledFunction> code, bool is_profiled)
-      : arguments_(std::move(arguments)), code_(std::move(code)), is_profiled_(is_profiled) {}
+              std::shared_ptr<const jit::CompiledFunction> code, const Target& target)
+      : arguments_(std::move(arguments)),
+        code_(std::move(code)),
+        is_profiled_(target.has_feature(Target::Profile)),
+        writes_on_host_(!target.has_gpu_feature()) {}
 
   const std::vector<ir::LoweredArgument>& arguments() const override { return arguments_; }
 
@@ -120,6 +125,7 @@ class JitPipeline : public CompiledPipeline {
     const retrograde_gpu_handlers gpu_handlers = gpu_handlers_for(caller.handlers);
     state.context.gpu_handlers = &gpu_handlers;
     const int code = code_->call(&state.context, const_cast<void**>(argv));
+    if (code == 0 && writes_on_host_) mark_written(argv);
     if (is_profiled_) {
       retrograde_profiler_report(&state.context);
       retrograde_profiler_reset();
@@ -128,9 +134,19 @@ class JitPipeline : public CompiledPipeline {
   }
 
  private:
+  // For copies to a device.
+  void mark_written(void* const* argv) const {
+    for (size_t i = 0; i < arguments_.size(); i++) {
+      if (arguments_[i].kind != ir::LoweredArgument::Kind::OutputBuffer) continue;
+      auto* buffer = static_cast<halide_buffer_t*>(argv[i]);
+      if (buffer->host) buffer->set_host_dirty();
+    }
+  }
+
   const std::vector<ir::LoweredArgument> arguments_;
   const std::shared_ptr<const jit::CompiledFunction> code_;
   const bool is_profiled_;  // then every call tells of its profile
+  const bool writes_on_host_;
 };
 
 class JitCompiler : public Compiler {
@@ -145,8 +161,7 @@ class JitCompiler : public Compiler {
     jit::Options code_options;
     code_options.externs = pipeline.externs;
     auto code = jit::compile(function, target, code_options);
-    return std::make_shared<JitPipeline>(std::move(function.args), std::move(code),
-                                         target.has_feature(Target::Profile));
+    return std::make_shared<JitPipeline>(std::move(function.args), std::move(code), target);
   }
 
   std::string loop_nest(const PipelineSpec& pipeline, const Target& target) override {

@@ -248,6 +248,7 @@ std::string disk_cache_key(const ir::LoweredFunction& function, const codegen::O
                                   machine.tune_cpu, machine.features})
     content += number(part.size()) + part;
   content += number(static_cast<uint64_t>(options.optimization_level));
+  content += number(static_cast<uint64_t>(options.kernels_for_executor));
   run_on_large_stack([&] { content += fingerprint_text(function); });
   std::string digits;
   for (const char byte : sha256(content)) {

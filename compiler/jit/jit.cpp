@@ -10,6 +10,8 @@
 #include "diagnostics/error.h"
 #include "diagnostics/large_stack.h"
 #include "diagnostics/pass_observer.h"
+#include "gpu/gpu_calls.h"
+#include "ir/visit.h"
 #include "jit/disk_cache.h"
 #include "jit/fingerprint.h"
 #include "jit/linker.h"
@@ -17,6 +19,12 @@
 
 namespace retrograde::jit {
 namespace {
+
+bool launches_kernels(const ir::LoweredFunction& function) {
+  bool found = false;
+  ir::walk(function.body, [&](const ir::Launch&) { found = true; });
+  return found;
+}
 
 class Compiled : public CompiledFunction {
  public:
@@ -27,9 +35,14 @@ class Compiled : public CompiledFunction {
     object_ = link(code.object, code.function, externs);
     address_ = object_->find(code.function);
     argv_ = reinterpret_cast<Argv*>(object_->find(code.function + "_argv"));
+    if (launches_kernels(function)) kernels_ = object_->find(code.function + ".kernels.image");
     times_.link_seconds =
         std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     tell_pass_observers({function.name, "link", times_.link_seconds, {}});
+  }
+  // What devices hold of it goes before its code does.
+  ~Compiled() override {
+    if (kernels_) retrograde_gpu_forget_kernels(kernels_);
   }
   int call(retrograde_context* context, void** args) const override { return argv_(context, args); }
   void* address() const override { return address_; }
@@ -62,6 +75,7 @@ class Compiled : public CompiledFunction {
   std::unique_ptr<LinkedObject> object_;
   void* address_ = nullptr;
   Argv* argv_ = nullptr;
+  void* kernels_ = nullptr;
   CompileTimes times_;
 };
 
@@ -137,6 +151,7 @@ Fingerprint key_of(const ir::LoweredFunction& function, const codegen::Options& 
   run_on_large_stack([&] { key = fingerprint(function); });
   key.add(options.target.to_string());
   key.add(static_cast<uint64_t>(options.optimization_level));
+  key.add(static_cast<uint64_t>(options.kernels_for_executor));
   for (const auto& [name, address] : externs) {
     key.add(name);
     key.add(reinterpret_cast<uint64_t>(address));

@@ -8,6 +8,7 @@
 #include "ir/build.h"
 #include "ir/print.h"
 #include "ir/validate.h"
+#include "lower/device/make_kernels.h"
 #include "lower/instrumentation/inject_profiling.h"
 #include "lower/instrumentation/inject_tracing.h"
 #include "lower/instrumentation/loop_nest_text.h"
@@ -23,6 +24,7 @@
 #include "lower/nests/copy_statement.h"
 #include "lower/nests/inline_functions.h"
 #include "lower/nests/make_names_unique.h"
+#include "lower/nests/refuse_unsupported.h"
 #include "lower/nests/share_parameters.h"
 #include "lower/statement_passes.h"
 #include "lower/vectors/vectorize_inner_loops.h"
@@ -66,14 +68,15 @@ StorageLayouts storage_layouts(const Lowering& lowering) {
 
 Stmt nest_loops(Lowering& lowering, const Stmt&) {
   lowering.program = inline_functions(lowering.outputs);
+  check_devices(lowering.program, lowering.options.target);
   const auto shared = share_parameters(lowering.program);
   LoopNests nests = build_loop_nests(lowering.program);
   nests.bounds.insert(nests.bounds.begin(), shared.begin(), shared.end());
   lowering.folds = nests.folds;
   lowering.async_room = nests.async_room;
   inject_tracing(nests, lowering.program, lowering.name, lowering.options.target);
-  UniqueNames unique =
-      make_names_unique(add_argument_checks(nests, lowering.args, lowering.program));
+  UniqueNames unique = make_names_unique(add_argument_checks(
+      nests, lowering.args, lowering.program, lowering.options.target.has_feature(Target::CUDA)));
   lowering.program.renamed = std::move(unique.original);
   return unique.stmt;
 }
@@ -116,6 +119,14 @@ Stmt alone(Lowering&, const Stmt& s) {
 template <Target::Feature feature, Stmt (*pass)(const Stmt&)>
 Stmt wanted(Lowering& lowering, const Stmt& s) {
   return lowering.options.target.has_feature(feature) ? pass(s) : s;
+}
+
+std::vector<std::string> buffer_names(const std::vector<LoweredArgument>& args) {
+  std::vector<std::string> names;
+  for (const LoweredArgument& arg : args) {
+    if (arg.is_buffer()) names.push_back(arg.name);
+  }
+  return names;
 }
 
 constexpr Pass passes[] = {
@@ -162,6 +173,10 @@ constexpr Pass passes[] = {
     {"try_plain_products", Phase::Vector, alone<try_plain_products>},
     {"blend_masked_stores", Phase::Vector, alone<blend_masked_stores>},
     {"fuzz_float_stores", Phase::Vector, wanted<Target::FuzzFloatStores, fuzz_float_stores>},
+    {"make_kernels", Phase::Vector,
+     [](Lowering& lowering, const Stmt& s) {
+       return make_kernels(s, lowering.options.target, buffer_names(lowering.args));
+     }},
     {"inject_profiling", Phase::Vector,
      [](Lowering& lowering, const Stmt& s) {
        if (!lowering.options.target.has_feature(Target::Profile)) return s;

@@ -94,6 +94,7 @@ class Simplifier {
   // ---- statements ----
   Stmt let_stmt(const Stmt& s);
   Stmt loop(const Stmt& s, const For& n);
+  Stmt launch(const Launch& n);
   Stmt block(const Stmt& s, const Block& n);
   Stmt branches(const Stmt& s, const IfThenElse& n);
   Stmt write(const Stmt& s, const Expr& predicate);

@@ -1,5 +1,6 @@
 // Statements: loop bounds, conditions and asserts are known inside what they guard.
 #include <algorithm>
+#include <list>
 
 #include "ir/build.h"
 #include "ir/visit.h"
@@ -11,6 +12,7 @@ Stmt Simplifier::operator()(const Stmt& s) {
   if (!s.defined()) return s;
   return match(
       s, [&](const LetStmt&) { return let_stmt(s); }, [&](const For& n) { return loop(s, n); },
+      [&](const Launch& n) { return launch(n); },
       [&](const IfThenElse& n) { return branches(s, n); },
       [&](const Block& n) { return block(s, n); },
       [&](const Store& n) { return write(s, n.predicate); },
@@ -54,7 +56,9 @@ Stmt Simplifier::let_stmt(const Stmt& s) {
 Stmt Simplifier::loop(const Stmt& s, const For& n) {
   const Expr min = (*this)(n.min), extent = (*this)(n.extent);
   if (is_const_true(less(Kind::LE, extent, make_zero(extent.type())))) return {};
-  if (is_const_int(extent, 1)) return let_stmt(Stmt(make_node<LetStmt>(n.name, min, n.body)));
+  // The grid and its blocks keep their shape.
+  if (is_const_int(extent, 1) && !is_gpu(n.runs))
+    return let_stmt(Stmt(make_node<LetStmt>(n.name, min, n.body)));
   Stmt body;
   ++loops_around_;
   {
@@ -66,6 +70,23 @@ Stmt Simplifier::loop(const Stmt& s, const For& n) {
   --loops_around_;
   if (min.same_as(n.min) && extent.same_as(n.extent) && body.same_as(n.body)) return s;
   return make_for(n.name, min, extent, n.runs, std::move(body), n.partition);
+}
+
+Stmt Simplifier::launch(const Launch& n) {
+  std::vector<Expr> blocks = mapped(n.blocks, [&](const Expr& count) { return (*this)(count); });
+  Expr shared_bytes = (*this)(n.shared_bytes);
+  const Expr zero = 0;
+  std::list<Binding> indices;
+  for (int d = 0; d < 3; ++d) {
+    const auto i = static_cast<size_t>(d);
+    indices.emplace_back(*this, thread_index(n.name, d), zero, Expr(n.threads[i] - 1), Expr());
+    indices.emplace_back(*this, block_index(n.name, d), zero, sub(blocks[i], Expr(1)), Expr());
+  }
+  ++loops_around_;
+  Stmt body = (*this)(n.body);
+  --loops_around_;
+  return make_launch(n.name, std::move(blocks), n.threads, std::move(shared_bytes),
+                     std::move(body));
 }
 
 // What follows an assert may rely on it, to the end of the block.
@@ -131,7 +152,8 @@ Stmt Simplifier::allocate(const Allocate& n, const Stmt& simplified) {
     return simplified;
   const int64_t most = most_elements(a->elements);
   if (most > most_stack_bytes / (a->type.bytes() * a->type.lanes())) return simplified;
-  return make_allocate(a->name, a->type, a->memory, make_const(a->elements.type(), most), a->body);
+  return make_allocate(a->name, a->type, a->memory, make_const(a->elements.type(), most), a->body,
+                       a->offset);
 }
 
 // A Store or Provide.

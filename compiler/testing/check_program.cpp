@@ -69,6 +69,9 @@ std::vector<GuardedOutput> run(Pipeline& compiled, const Regions& regions,
     }
   }
   compiled.realize(buffers, target);
+  for (Buffer<>& buffer : buffers) {
+    if (buffer.device_dirty()) buffer.copy_to_host();
+  }
   return outputs;
 }
 
@@ -103,19 +106,37 @@ void compare_outputs(const Regions& regions, const RandomProgram& program,
   }
 }
 
+// Where kernels run, races and accesses out of bounds are errors of the run; too little memory is not.
+bool is_finding(const RuntimeError& error, const Target& target) {
+  const std::string_view message = error.what();
+  const auto says = [&](const char* words) {
+    return message.find(words) != std::string_view::npos;
+  };
+  return target.has_feature(Target::CUDA) && !says("bytes of shared memory") &&
+         !says("OUT_OF_MEMORY");
+}
+
 int ignore_event(void*, const halide_trace_event_t*) { return 0; }
 
 }  // namespace
 
 Judged check_program(const RandomProgram& program, const ScheduleLog& schedule,
                      const Target& target) {
+  return check_with_schedule(
+      program, [&] { apply(schedule, program); }, target);
+}
+
+Judged check_with_schedule(const RandomProgram& program, const std::function<void()>& schedule,
+                           const Target& target) {
   Judged judged;
   try {
-    apply(schedule, program);
+    schedule();
     Pipeline compiled(program.outputs);
     compiled.set_custom_trace(ignore_event);
     for (const Regions& regions : program.runs)
       compare_outputs(regions, program, run(compiled, regions, program, target), judged);
+  } catch (const RuntimeError& error) {
+    judged = {is_finding(error, target) ? Judgement::Broken : Judgement::Refused, error.what()};
   } catch (const UserError& error) {
     judged = {Judgement::Refused, error.what()};
   } catch (const Unsupported& error) {

@@ -1,6 +1,8 @@
 // One program against the oracle: builds it, schedules it, runs the machine code, compares.
 #pragma once
 
+#include <functional>
+
 #include "ir/target.h"
 #include "testing/judgement.h"
 #include "testing/random_schedule.h"
@@ -12,5 +14,8 @@ namespace retrograde::fuzz {
 // program has the schedule afterwards. Counts: "values", and those "unstable", which say nothing.
 Judged check_program(const RandomProgram& program, const ScheduleLog& schedule,
                      const Target& target);
+// The same; `schedule` gives the schedule.
+Judged check_with_schedule(const RandomProgram& program, const std::function<void()>& schedule,
+                           const Target& target);
 
 }  // namespace retrograde::fuzz

@@ -186,7 +186,7 @@ class TreeBuilder {
   void visit_loop(const For& n) {
     const KnownValue min = values_.of(n.min), extent = values_.of(n.extent);
     if (extent.at < 1) return;
-    const bool parallel = n.runs == ForType::Parallel;
+    const bool parallel = runs_at_once(n.runs);
     open(parallel ? WorkNode::Kind::Parallel : WorkNode::Kind::Loop, n.name, extent.at);
     values_.enter(n.name, min, extent.at, around_.stored.at(&n));
     visit(n.body);

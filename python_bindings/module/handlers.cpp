@@ -13,7 +13,8 @@ namespace retrograde::python {
 
 namespace {
 
-// The attribute is the address, None where the runtime's own is called. What is set is kept by who has the handlers.
+// The attribute is the address, None where the runtime's own is called. What is set stays for good: compiled code
+// calls it while anyone, in C++ too, has the Func or Pipeline, which no object of Python's sees the end of.
 template <class Pointer>
 void bind_pointer(Class<JITHandlers>& c, const char* name, Pointer JITHandlers::*field) {
   c.def_property(
@@ -22,11 +23,10 @@ void bind_pointer(Class<JITHandlers>& c, const char* name, Pointer JITHandlers::
         if (!(h.*field)) return std::nullopt;
         return reinterpret_cast<uintptr_t>(h.*field);
       },
-      py::cpp_function(
-          [field](JITHandlers& h, const py::object& function) {
-            h.*field = reinterpret_cast<Pointer>(address_of(function));
-          },
-          py::keep_alive<1, 2>()));
+      [field](JITHandlers& h, const py::object& function) {
+        h.*field = reinterpret_cast<Pointer>(address_of(function));
+        py::object(function).release();
+      });
 }
 
 // realize() tells Python what a handler of Python's raised, once it is back: it may be on any thread.

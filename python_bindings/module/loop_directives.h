@@ -141,24 +141,56 @@ void bind_loop_places(Class<Self>& c) {
           },
           arg("f"), arg("at"), arg("from_"), arg("offset") = Expr(1), arg("strategy") = guarded)
       .def(
-          "gpu_threads", [](Self& s, VarOrRVar x) -> Self& { return s.gpu_threads(x); }, arg("x"))
-      .def(
-          "gpu_lanes", [](Self& s, VarOrRVar x) -> Self& { return s.gpu_lanes(x); }, arg("x"))
-      .def(
-          "gpu_blocks", [](Self& s, VarOrRVar x) -> Self& { return s.gpu_blocks(x); }, arg("x"))
-      .def("gpu_single_thread", [](Self& s) -> Self& { return s.gpu_single_thread(); })
-      .def(
-          "gpu",
-          [](Self& s, VarOrRVar block, VarOrRVar thread) -> Self& { return s.gpu(block, thread); },
-          arg("block"), arg("thread"))
-      .def(
-          "gpu_tile",
-          [](Self& s, VarOrRVar x, VarOrRVar inner, const py::args&) -> Self& {
-            return s.gpu_tile(x, inner);
-          },
-          arg("x"), arg("inner"))
-      .def(
           "hexagon", [](Self& s, VarOrRVar x) -> Self& { return s.hexagon(x); }, arg("x"));
+}
+
+template <class Self>
+void bind_loops_on_gpus(Class<Self>& c) {
+  using py::arg;
+  using V = const VarOrRVar&;
+  using E = const Expr&;
+  using Tail = TailStrategy;
+  constexpr auto automatic = TailStrategy::Auto;
+  constexpr auto any = DeviceAPI::Default_GPU;
+  const auto by_dimensions = [&](const char* name, auto one, auto two, auto three) {
+    c.def(name, one, arg("x"), arg("device") = any)
+        .def(name, two, arg("x"), arg("y"), arg("device") = any)
+        .def(name, three, arg("x"), arg("y"), arg("z"), arg("device") = any);
+  };
+  by_dimensions("gpu_blocks", py::overload_cast<V, DeviceAPI>(&Self::gpu_blocks),
+                py::overload_cast<V, V, DeviceAPI>(&Self::gpu_blocks),
+                py::overload_cast<V, V, V, DeviceAPI>(&Self::gpu_blocks));
+  by_dimensions("gpu_threads", py::overload_cast<V, DeviceAPI>(&Self::gpu_threads),
+                py::overload_cast<V, V, DeviceAPI>(&Self::gpu_threads),
+                py::overload_cast<V, V, V, DeviceAPI>(&Self::gpu_threads));
+  c.def("gpu_lanes", &Self::gpu_lanes, arg("x"), arg("device") = any)
+      .def("gpu_single_thread", &Self::gpu_single_thread, arg("device") = any)
+      .def("gpu", py::overload_cast<V, V, DeviceAPI>(&Self::gpu), arg("block_x"), arg("thread_x"),
+           arg("device") = any)
+      .def("gpu", py::overload_cast<V, V, V, V, DeviceAPI>(&Self::gpu), arg("block_x"),
+           arg("block_y"), arg("thread_x"), arg("thread_y"), arg("device") = any)
+      .def("gpu", py::overload_cast<V, V, V, V, V, V, DeviceAPI>(&Self::gpu), arg("block_x"),
+           arg("block_y"), arg("block_z"), arg("thread_x"), arg("thread_y"), arg("thread_z"),
+           arg("device") = any)
+      .def("gpu_tile", py::overload_cast<V, V, E, Tail, DeviceAPI>(&Self::gpu_tile), arg("x"),
+           arg("tx"), arg("x_size"), arg("tail") = automatic, arg("device") = any)
+      .def("gpu_tile", py::overload_cast<V, V, V, E, Tail, DeviceAPI>(&Self::gpu_tile), arg("x"),
+           arg("bx"), arg("tx"), arg("x_size"), arg("tail") = automatic, arg("device") = any)
+      .def("gpu_tile", py::overload_cast<V, V, V, V, E, E, Tail, DeviceAPI>(&Self::gpu_tile),
+           arg("x"), arg("y"), arg("tx"), arg("ty"), arg("x_size"), arg("y_size"),
+           arg("tail") = automatic, arg("device") = any)
+      .def("gpu_tile", py::overload_cast<V, V, V, V, V, V, E, E, Tail, DeviceAPI>(&Self::gpu_tile),
+           arg("x"), arg("y"), arg("bx"), arg("by"), arg("tx"), arg("ty"), arg("x_size"),
+           arg("y_size"), arg("tail") = automatic, arg("device") = any)
+      .def("gpu_tile",
+           py::overload_cast<V, V, V, V, V, V, E, E, E, Tail, DeviceAPI>(&Self::gpu_tile), arg("x"),
+           arg("y"), arg("z"), arg("tx"), arg("ty"), arg("tz"), arg("x_size"), arg("y_size"),
+           arg("z_size"), arg("tail") = automatic, arg("device") = any)
+      .def("gpu_tile",
+           py::overload_cast<V, V, V, V, V, V, V, V, V, E, E, E, Tail, DeviceAPI>(&Self::gpu_tile),
+           arg("x"), arg("y"), arg("z"), arg("bx"), arg("by"), arg("bz"), arg("tx"), arg("ty"),
+           arg("tz"), arg("x_size"), arg("y_size"), arg("z_size"), arg("tail") = automatic,
+           arg("device") = any);
 }
 
 template <class Self>
@@ -166,6 +198,7 @@ void bind_loop_directives(Class<Self>& c) {
   bind_loop_shapes(c);
   bind_loop_kinds(c);
   bind_loop_places(c);
+  bind_loops_on_gpus(c);
 }
 
 }  // namespace retrograde::python

@@ -102,6 +102,7 @@ void bind_facts(Class<Target>& c) {
            py::arg("type"), py::arg("device"))
       .def("supports_device_api", &Target::supports_device_api, py::arg("device"))
       .def("get_required_device_api", &Target::get_required_device_api)
+      .def("cuda_capability", &Target::cuda_capability)
       .def("get_cuda_capability_lower_bound", &Target::get_cuda_capability_lower_bound)
       .def("unsupported_part", &Target::unsupported_part)
       .def("supported", &Target::supported)

@@ -131,7 +131,7 @@ TEST_F(AotErrors, OutputsThatOnlyGeneratorsHave) {
 
 TEST_F(AotErrors, TargetsWithoutACodeGenerator) {
   for (const char* name : {"riscv-64-linux", "x86-64-windows", "arm-32-linux", "mips-32-linux",
-                           "wasm-32-wasmrt", "x86-64-linux-cuda", "arm-64-linux-sve2"}) {
+                           "wasm-32-wasmrt", "x86-64-linux-opencl", "arm-64-linux-sve2"}) {
     expect_error<Unsupported>({name, "\""}, [&] {
       f.compile_to_file(path("a"), {in, gain}, "a", Target(name));
     });

@@ -147,11 +147,13 @@ TEST_F(Rules, SpecializationsHaveConditions) {
 }
 
 TEST_F(Rules, Devices) {
-  expect<Unsupported>("loops run on the CPU", [&] { f.gpu_blocks(x); });
-  expect<Unsupported>("storage lies in memory that the CPU has", [&] {
+  expect<Unsupported>("loops run on the CPU or a CUDA device", [&] { f.hexagon(x); });
+  expect<Unsupported>("code for GPUs is made for CUDA",
+                      [&] { f.gpu_blocks(x, DeviceAPI::OpenCL); });
+  expect<Unsupported>("storage lies in memory that a CPU or a CUDA device has", [&] {
     Func g("g");
     g(x, y) = f(x, y);
-    f.compute_root().store_in(MemoryType::GPUShared);
+    f.compute_root().store_in(MemoryType::GPUTexture);
     g.realize({4, 4});
   });
 }

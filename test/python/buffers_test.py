@@ -124,10 +124,16 @@ class Shapes(unittest.TestCase):
         b.allocate()
         self.assertEqual(memoryview(b).shape, (4,))
 
-    def test_devices_are_not_there(self):
+    def test_devices_are_there_or_said_not_to_be(self):
         self.assertFalse(self.b.has_device_allocation())
-        with self.assertRaises(rg.Unsupported):
+        self.b.set_host_dirty()
+        try:
             self.b.copy_to_device()
+        except rg.Error as error:
+            self.assertRegex(str(error), "cuda")
+            self.assertFalse(self.b.has_device_allocation())
+        else:
+            self.assertTrue(self.b.has_device_allocation())
 
 
 if __name__ == "__main__":

@@ -81,6 +81,28 @@ class Directives(unittest.TestCase):
         b.compute_with(a, x, rg.LoopAlignStrategy.AlignStart)
         b.compute_with(rg.LoopLevel(a, y), [(y, rg.LoopAlignStrategy.NoAlign)])
 
+    def test_loops_on_gpus(self):
+        def loops(schedule):
+            g, f = blur()
+            schedule(f)
+            return rg.Pipeline(f).schedule_log().to_text().splitlines()
+
+        xi, yi = rg.Var("xi"), rg.Var("yi")
+        for schedule, threads in (
+            (lambda f: f.gpu_tile(x, y, xi, yi, 8, 4, rg.TailStrategy.GuardWithIf), 2),
+            (lambda f: f.gpu_tile(x, xi, 8), 1),
+            (lambda f: f.gpu(y, x), 1),
+            (lambda f: f.gpu_blocks(y).gpu_lanes(x), 0),
+            (lambda f: f.gpu_single_thread(), 0),
+        ):
+            text = "\n".join(loops(schedule))
+            self.assertIn("GpuBlock", text)
+            self.assertEqual(text.count("GpuThread"), threads, text)
+        g, f = blur()
+        f.gpu_tile(x, y, xi, yi, 8, 4)
+        with self.assertRaisesRegex(rg.CompileError, "the target has a GPU"):
+            f.realize([16, 16])
+
     def test_memoize_and_prefetch(self):
         g, f = blur()
         g.compute_root().memoize(rg.EvictionKey(rg.Expr(3)))

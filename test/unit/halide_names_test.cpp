@@ -302,13 +302,14 @@ TEST(Predicates, MayReadWhatTheyGuard) {
 
 // ---- what is refused ----
 
-// rule: buffers have memory of the CPU only
 // rule: buffers of arguments are memory of the CPU
 // rule: storage lies in the memory of the CPU
 TEST(Refusals, SayWhatIsNotThere) {
   Buffer<float> buffer(3);
-  expect_error<Unsupported>({"copy_to_device", "memory of the CPU"},
-                            [&] { buffer.copy_to_device(Target()); });
+  expect_error<Unsupported>({"copy_to_device", "devices are CUDA's"},
+                            [&] { buffer.copy_to_device(DeviceAPI::Metal); });
+  expect_error<CompileError>({"device_malloc", "a GPU must be named"},
+                             [&] { buffer.device_malloc(DeviceAPI::Host); });
 }
 
 }  // namespace

@@ -204,9 +204,7 @@ TEST(Visit, AnyStmtLooksAtNoExpressions) {
   const Stmt loop =
       make_for("i", 0, 8, ForType::Serial, make_store("out", variable("x"), variable("i")));
   const auto is_store = [](const Stmt& s) { return s.kind() == Kind::Store; };
-  const auto is_x = [](const Expr& e) {
-    return e.as<Variable>() && e.as<Variable>()->name == "x";
-  };
+  const auto is_x = [](const Expr& e) { return e.as<Variable>() && e.as<Variable>()->name == "x"; };
   EXPECT_TRUE(any_stmt(loop, is_store));
   EXPECT_FALSE(any_stmt(loop, [](const Stmt& s) { return s.kind() == Kind::Assert; }));
   EXPECT_TRUE(any_node(loop, is_x, [](const Stmt&) { return false; }));
@@ -244,9 +242,11 @@ TEST(Target, EveryFeatureHasANameOfItsOwn) {
 
 TEST(Target, SaysWhatNoCodeIsGeneratedFor) {
   EXPECT_TRUE(get_host_target().supported());
-  EXPECT_EQ(Target("x86-64-linux-cuda").unsupported_part(), "cuda");
+  EXPECT_EQ(Target("x86-64-linux-opencl").unsupported_part(), "opencl");
   EXPECT_TRUE(Target("x86-64-linux-cuda").has_gpu_feature());
   EXPECT_EQ(Target("x86-64-windows").unsupported_part(), "windows");
+  EXPECT_EQ(Target("x86-64-linux-cuda").cuda_capability(), 75);
+  EXPECT_EQ(Target("x86-64-linux-cuda-cuda_capability_86").cuda_capability(), 86);
   EXPECT_EQ(Target("hexagon-32-qurt-hvx").unsupported_part(), "qurt");
 }
 

@@ -38,7 +38,7 @@ Stmt random_stmt(test::RandomIr& random, int depth) {
   const std::string name = "n" + std::to_string(random.below(1000));
   if (depth <= 0)
     return make_store(name, e(Float(32)), e(), random.chance(30) ? e(Bool()) : Expr());
-  switch (random.below(16)) {
+  switch (random.below(18)) {
     case 0:
       return ir::make_let(name, e(), inner());
     case 1:
@@ -47,7 +47,7 @@ Stmt random_stmt(test::RandomIr& random, int depth) {
     case 2:
       return make_producer_consumer(name, random.chance(50), inner());
     case 3:
-      return make_for(name, e(), e(), static_cast<ForType>(random.below(4)), inner(),
+      return make_for(name, e(), e(), static_cast<ForType>(random.below(7)), inner(),
                       static_cast<Partition>(random.below(3)));
     case 4:
       return make_store(name, e(Int(32, 4)), e(Int(32, 4)),
@@ -74,6 +74,10 @@ Stmt random_stmt(test::RandomIr& random, int depth) {
       return make_fork(inner(), inner());
     case 14:
       return make_prefetch(name, Float(32), {{e(), e()}});
+    case 15:
+      return make_launch(name, {e(), e(), e()}, {1 + random.below(64), 2, 1}, e(), inner());
+    case 16:
+      return make_allocate(name, Float(32), MemoryType::GPUShared, e(), inner(), e());
     default:
       return make_block({inner(), inner(), inner()});
   }

@@ -80,9 +80,7 @@ TEST(BufferNames, MemoryIsTheHosts) {
   EXPECT_EQ(b.device_sync(), 0);
   EXPECT_EQ(b.device_free(), 0);
   b.device_deallocate();
-  EXPECT_THROW(b.device_malloc(), Unsupported);
-  EXPECT_THROW(b.device_wrap_native(DeviceAPI::CUDA, 0), Unsupported);
-  EXPECT_THROW(b.device_detach_native(), Unsupported);
+  EXPECT_EQ(b.device_detach_native(), 0);
 }
 
 // ---- Funcs, variables, references ----
@@ -155,7 +153,8 @@ TEST_F(FuncNames, ParamsTellTheirTypeAndLimits) {
   p.promise_finite();
   Func f("f");
   f() = p;
-  EXPECT_NE(graph::to_text(graph::graph_of({f.function()})).find("\n  finite\n"), std::string::npos);
+  EXPECT_NE(graph::to_text(graph::graph_of({f.function()})).find("\n  finite\n"),
+            std::string::npos);
   EXPECT_EQ(ParamMap::empty_map().size(), 0u);
   EXPECT_EQ(ParamMap::empty_map().find(p.parameter()), nullptr);
   const ParamMap::ParamMapping mapping(p, 2.0f);

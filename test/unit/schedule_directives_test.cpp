@@ -143,8 +143,10 @@ TEST_F(Directives, InlinedFuncsHaveNoStorageOrLoops) {
 }
 
 TEST_F(Directives, MemoryOfDevicesIsUnsupported) {
-  f.compute_root().store_in(MemoryType::GPUShared);
+  f.compute_root().store_in(MemoryType::GPUTexture);
   EXPECT_THROW(g.realize({4, 4}), Unsupported);
+  f.store_in(MemoryType::GPUShared);
+  EXPECT_THROW(g.realize({4, 4}), UserError);
   ImageParam image(Int(32), 1, "image");
   EXPECT_THROW(image.store_in(MemoryType::GPUTexture), Unsupported);
 }
@@ -304,16 +306,28 @@ TEST_F(Directives, AParallelLoopIsNotInsideOfAVectorizedOne) {
       {"parallelize", "inside of the vectorized loop", "Reorder"});
 }
 
-TEST_F(Directives, GPUsAreUnsupported) {
-  EXPECT_THROW(f.gpu_tile(x, y, xo, xi, 8, 8), Unsupported);
-  EXPECT_THROW(f.gpu_threads(x), Unsupported);
-  EXPECT_THROW(f.gpu_blocks(x, y), Unsupported);
-  EXPECT_THROW(f.gpu(x, y), Unsupported);
-  EXPECT_THROW(f.gpu_lanes(x), Unsupported);
-  EXPECT_THROW(f.gpu_single_thread(), Unsupported);
+TEST_F(Directives, LoopsRunOverBlocksAndThreads) {
+  const auto runs = [&](int loop) { return f.get_schedule().dims[loop].runs; };
+  f.gpu_tile(x, y, xo, xi, 8, 8);
+  EXPECT_EQ(runs(0), ForType::GpuThread);
+  EXPECT_EQ(runs(1), ForType::GpuThread);
+  EXPECT_EQ(runs(2), ForType::GpuBlock);
+  EXPECT_EQ(runs(3), ForType::GpuBlock);
+  EXPECT_TRUE(is_gpu(runs(2)) && !is_gpu_thread(runs(2)) && is_gpu_thread(runs(0)));
+  EXPECT_TRUE(runs_at_once(runs(0)) && !runs_at_once(ForType::Vectorized));
+  f.gpu_lanes(xo);
+  EXPECT_EQ(runs(0), ForType::GpuLane);
+  Func h("h");
+  h(x, y) = x + y;
+  h.gpu(y, x);
+  EXPECT_EQ(h.get_schedule().dims[0].runs, ForType::GpuThread);
+  EXPECT_EQ(h.get_schedule().dims[1].runs, ForType::GpuBlock);
+  g.gpu_single_thread();
+  EXPECT_EQ(g.get_schedule().dims.back().runs, ForType::GpuBlock);
+  EXPECT_EQ(g.get_schedule().dims.size(), 3u);
   EXPECT_THROW(f.hexagon(), Unsupported);
   EXPECT_THROW(f.copy_to_device(), Unsupported);
-  expect_refused([&] { f.gpu_threads(x); }, {"\"x\"", "GPU", "parallel"});
+  expect_refused([&] { f.gpu_threads(Var("nowhere")); }, {"\"nowhere\"", "must be a loop"});
 }
 
 // ---- extern stages ----

@@ -155,11 +155,6 @@ void check_convertible(const Runtime::Buffer<>& buffer, const std::string& name,
   }
 }
 
-void no_device(const char* method) {
-  unsupported(text("call ", method, "() on a Buffer"), "buffers have memory of the CPU only", "",
-              "Leave it out");
-}
-
 void undefined_buffer(const char* method) {
   user_error(text("call ", method, "() of a Buffer"), "the handle must have a buffer",
              "it was never given one", "Construct the Buffer with sizes, or assign one");

@@ -18,6 +18,7 @@
 #include <utility>
 #include <vector>
 
+#include "frontend/data/devices.h"
 #include "frontend/language/expr_ops.h"
 #include "frontend/language/rdom.h"
 #include "frontend/language/var.h"
@@ -51,6 +52,8 @@ namespace frontend {
 // What all handles to one buffer share.
 struct BufferContents {
   BufferContents(Runtime::Buffer<> buffer, const std::string& name);
+  ~BufferContents() { leave_device(buffer); }
+  BufferContents(const BufferContents&) = delete;
   Runtime::Buffer<> buffer;
   std::string name;
   // The parameter that stands for `contents` in Exprs, made on first use.
@@ -74,7 +77,6 @@ void check_sizes(halide_type_t type, const std::vector<int>& sizes, const std::s
 void check_convertible(const Runtime::Buffer<>& buffer, const std::string& name, halide_type_t type,
                        bool any_type, int dimensions);
 [[noreturn]] void undefined_buffer(const char* method);
-[[noreturn]] void no_device(const char* method);
 void check_dimension(const Runtime::Buffer<>& buffer, const std::string& name, int d,
                      const char* method);
 void check_storage_order(const std::vector<int>& order, int dimensions, const std::string& asked);
@@ -341,6 +343,7 @@ class Buffer {
   // Requires: a dimension is numbered from 0.
   void translate(int d, int delta) {
     check_dimension(d, "translate");
+    check_on_host("translate");
     contents_->buffer.translate(d, delta);
   }
   void translate(const std::vector<int>& delta) {
@@ -353,6 +356,7 @@ class Buffer {
   }
   void set_min(const std::vector<int>& mins) {
     if (!mins.empty()) check_dimension(static_cast<int>(mins.size()) - 1, "set_min");
+    check_on_host("set_min");
     contents_->buffer.set_min(mins);
   }
   // Requires: a dimension is numbered from 0.
@@ -413,11 +417,17 @@ class Buffer {
 
   // ---- elements ----
   // New memory, same elements.
-  Buffer<Bare, Dims> copy() const { return Buffer<Bare, Dims>(untyped(get()->copy())); }
+  // Requires: its newest elements must be on the host (RuntimeError).
+  Buffer<Bare, Dims> copy() const {
+    check_on_host("copy");
+    return Buffer<Bare, Dims>(untyped(get()->copy()));
+  }
   Buffer<Bare, Dims> copy_to_planar() const {
+    check_on_host("copy_to_planar");
     return Buffer<Bare, Dims>(untyped(get()->copy_to_planar()));
   }
   Buffer<Bare, Dims> copy_to_interleaved() const {
+    check_on_host("copy_to_interleaved");
     return Buffer<Bare, Dims>(untyped(get()->copy_to_interleaved()));
   }
   // Into this buffer, where the two overlap.
@@ -432,27 +442,35 @@ class Buffer {
                " and ", dimensions(), " of ", to_string(type())),
           "Copy into a Buffer of the same type and dimensions");
     }
+    check_on_host("copy_from");
+    source.check_on_host("copy_from");
     get()->copy_from(*source.get());
   }
   template <typename ValueOrFn>
   Buffer& fill(ValueOrFn&& value) {
+    check_on_host("fill");
     get()->fill(std::forward<ValueOrFn>(value));
     return *this;
   }
   template <typename V>
   bool all_equal(V value) const {
+    check_on_host("all_equal");
     return get()->all_equal(static_cast<Bare>(value));
   }
   // f(element of this, elements of the others at the same place...)
   // Requires: all Buffers have the same extents.
   template <typename Fn, typename... Others>
   Buffer& for_each_value(Fn&& f, Others... others) {
+    check_on_host("for_each_value");
+    (others.check_on_host("for_each_value"), ...);
     (frontend::check_same_shape(runtime(), name(), others.runtime()), ...);
     get()->for_each_value(std::forward<Fn>(f), (*others.get())...);
     return *this;
   }
   template <typename Fn, typename... Others>
   const Buffer& for_each_value(Fn&& f, Others... others) const {
+    check_on_host("for_each_value");
+    (others.check_on_host("for_each_value"), ...);
     (frontend::check_same_shape(runtime(), name(), others.runtime()), ...);
     get()->for_each_value(std::forward<Fn>(f), (*others.get())...);
     return *this;
@@ -472,7 +490,8 @@ class Buffer {
   // The element at a point. Checked unless NDEBUG is set, as Halide::Runtime::Buffer does, but by
   // an exception.
   // Requires: an access gives one coordinate for each dimension; the buffer must have memory; a
-  // coordinate lies inside the buffer, or one past its end.
+  // coordinate lies inside the buffer, or one past its end; its newest elements must be on the host
+  // (RuntimeError).
   template <std::convertible_to<int>... Ints>
   decltype(auto) operator()(int first, Ints... rest) const {
     const int at[] = {first, static_cast<int>(rest)...};
@@ -498,26 +517,52 @@ class Buffer {
     return frontend::buffer_access(contents_, std::vector<Expr>(args.begin(), args.end()));
   }
 
-  // ---- devices: for generated code on a GPU ----
-  int copy_to_host() { return runtime_mutable().copy_to_host(); }
-  int device_sync() { return runtime_mutable().device_sync(); }
-  int device_free() { return runtime_mutable().device_free(); }
-  void device_deallocate() { runtime_mutable().device_deallocate(); }
-  // Names of Halide's that do nothing here.
-  // Requires: buffers have memory of the CPU only (Unsupported).
-  int copy_to_device(const Target& = Target()) { frontend::no_device("copy_to_device"); }
-  int copy_to_device(DeviceAPI, const Target& = Target()) { frontend::no_device("copy_to_device"); }
-  int device_malloc(const Target& = Target()) { frontend::no_device("device_malloc"); }
-  int device_malloc(DeviceAPI, const Target& = Target()) { frontend::no_device("device_malloc"); }
-  int device_wrap_native(DeviceAPI, uint64_t, const Target& = Target()) {
-    frontend::no_device("device_wrap_native");
+  // ---- devices: copies of the elements on a GPU ----
+  // host_dirty: the host's elements are newer than the device's; device_dirty: the other way round. Copies
+  // are made where they say so. Results are 0; what goes wrong is a RuntimeError with the runtime's
+  // text.
+  int copy_to_host() { return on_device("copy_to_host").copy_to_host(); }
+  int device_sync() { return on_device("device_sync").sync(); }
+  // Requires: only memory that the Buffer allocated is freed (RuntimeError); no other Buffer may use its
+  // device memory (RuntimeError).
+  int device_free() { return on_device("device_free").free(); }
+  // As if the handle had never had device memory; what was newer there is lost.
+  void device_deallocate() { frontend::leave_device(checked("device_deallocate")->buffer); }
+  // Device memory comes with the first copy.
+  // Requires: devices are CUDA's (Unsupported); a GPU must be named.
+  int copy_to_device(const Target& target = Target()) {
+    return copy_to_device(DeviceAPI::Default_GPU, target);
   }
-  int device_detach_native() { frontend::no_device("device_detach_native"); }
+  int copy_to_device(DeviceAPI device, const Target& target = Target()) {
+    return on_device("copy_to_device").copy_to_device(device, target);
+  }
+  // Memory on the device, unless there is some.
+  int device_malloc(const Target& target = Target()) {
+    return device_malloc(DeviceAPI::Default_GPU, target);
+  }
+  int device_malloc(DeviceAPI device, const Target& target = Target()) {
+    return on_device("device_malloc").allocate(device, target);
+  }
+  // The Buffer's device memory is what is at this device address, which stays the caller's.
+  // Requires: a Buffer has one device memory at a time (RuntimeError).
+  int device_wrap_native(DeviceAPI device, uint64_t handle, const Target& target = Target()) {
+    return on_device("device_wrap_native").wrap(device, handle, target);
+  }
+  // Requires: only memory that was wrapped is detached (RuntimeError).
+  int device_detach_native() { return on_device("device_detach_native").detach(); }
   bool has_device_allocation() const { return runtime().has_device_allocation(); }
   bool device_dirty() const { return runtime().device_dirty(); }
   bool host_dirty() const { return runtime().host_dirty(); }
-  void set_host_dirty(bool dirty = true) { runtime_mutable().set_host_dirty(dirty); }
-  void set_device_dirty(bool dirty = true) { runtime_mutable().set_device_dirty(dirty); }
+  // Requires: its newest elements must be on the host (RuntimeError); its newest elements must not be on
+  // the host alone (RuntimeError).
+  void set_host_dirty(bool dirty = true) {
+    if (dirty) on_device("set_host_dirty").check_not_newer_on_device();
+    contents_->buffer.set_host_dirty(dirty);
+  }
+  void set_device_dirty(bool dirty = true) {
+    if (dirty) on_device("set_device_dirty").check_not_newer_on_host();
+    contents_->buffer.set_device_dirty(dirty);
+  }
 
   const std::shared_ptr<frontend::BufferContents>& contents() const { return contents_; }
 
@@ -551,14 +596,24 @@ class Buffer {
     frontend::check_dimension(runtime(), name(), d, method);
   }
   const Runtime::Buffer<>& runtime() const { return checked("shape")->buffer; }
-  Runtime::Buffer<>& runtime_mutable() { return checked("device")->buffer; }
+  frontend::DeviceCall on_device(const char* method) const {
+    checked(method);
+    return {contents_->buffer, contents_->name, method};
+  }
+  // Of what reads or writes elements on the host, or moves coordinates, which drops device memory.
+  void check_on_host(const char* method) const { on_device(method).check_not_newer_on_device(); }
 
   std::add_lvalue_reference_t<T> element(const int* at, int count) const
       requires(!std::is_void_v<T>) {
-    const halide_buffer_t& raw = *checked("operator()")->buffer.raw_buffer();
+    halide_buffer_t& raw = *checked("operator()")->buffer.raw_buffer();
 #ifndef NDEBUG
     frontend::check_in_bounds(contents_->buffer, contents_->name, at, count);
+    if (raw.device_dirty()) check_on_host("operator()");
 #endif
+    // Who gets a reference may write. Looked at first: a store would be one for each element.
+    if constexpr (!std::is_const_v<T>) {
+      if (!raw.host_dirty()) raw.set_host_dirty();
+    }
     ptrdiff_t offset = 0;
     for (int d = 0; d < std::min(count, raw.dimensions); d++)
       offset += static_cast<ptrdiff_t>(raw.dim[d].stride) * (at[d] - raw.dim[d].min);

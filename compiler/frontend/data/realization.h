@@ -30,7 +30,11 @@ class Realization {
     check_one_value();
     return buffers_[0].template as<T, Dims>();
   }
-  int device_sync() { return 0; }  // all memory is the host's
+  // Waits for the work on devices that uses its Buffers.
+  int device_sync() {
+    for (Buffer<>& buffer : buffers_) buffer.device_sync();
+    return 0;
+  }
 
  private:
   size_t checked(size_t i) const;

@@ -225,7 +225,9 @@ class Func : public LoopDirectives<Func>, public Runnable<Func> {
   }
   Func& hoist_storage_root() { return hoist_storage(LoopLevel::root()); }
   // In which memory.
-  // Requires: storage lies in memory that the CPU has (Unsupported).
+  // Requires: storage lies in memory that a CPU or a CUDA device has (Unsupported); shared memory is that
+  // of the threads of a block; a block has at most as many bytes of it as the target says; a thread
+  // reads of its registers what it stored itself.
   Func& store_in(MemoryType memory) { return give(graph::StoreIn{memory}); }
   // Dimensions innermost in memory first. reorder_storage(c, x, y):
   //   g[x + w * y + w * h * c]    =>    g[c + 3 * x + 3 * w * y]

@@ -343,6 +343,7 @@ Realization Pipeline::run(JITUserContext* context, const std::vector<int32_t>& s
     frontend::allocate_host(*buffer.get());
   }
   if (succeeds) call();
+  for (Buffer<>& buffer : buffers) buffer.copy_to_host();
   for (Buffer<>& buffer : buffers) crop_to(*buffer.get(), sizes);
   return Realization(std::move(buffers));
 }

@@ -34,9 +34,8 @@ void check_tile(const SchedulePlace& place, const std::vector<VarOrRVar>& loops,
 PrefetchData prefetch_of(const SchedulePlace& place, const Func& f, PrefetchData prefetch);
 PrefetchData prefetch_of(const SchedulePlace& place,
                          const std::shared_ptr<ParameterContents>& image, PrefetchData prefetch);
-[[noreturn]] void refuse_device(const SchedulePlace& place, const char* verb,
-                                const std::vector<VarOrRVar>& loops, const char* where,
-                                DeviceAPI device);
+void check_device(const SchedulePlace& place, const std::vector<VarOrRVar>& loops,
+                  DeviceAPI device);
 
 }  // namespace frontend
 
@@ -312,34 +311,120 @@ class LoopDirectives {
     return prefetch(source, var, var, Expr(offset), strategy);
   }
 
-  // ---- GPUs and accelerators: Unsupported ----
-  // Requires: loops run on the CPU (Unsupported).
-  template <typename... Rest>
-  Self& gpu_threads(const VarOrRVar& x, const Rest&... rest) {
-    refuse_gpu("map", "to GPU threads", x, rest...);
+  // ---- GPUs ----
+  //
+  // Loops over blocks, the outer ones, become the grid of a kernel, and loops over threads in them its
+  // blocks; of each kind at most three, the innermost of which is x. What is between and inside of
+  // them stays loops:
+  //   gpu_blocks(xo), gpu_threads(xi):
+  //   for xo:              kernel<<<extent of xo, extent of xi>>>:
+  //     for xi:        =>    body(block.x, thread.x)
+  //       body(xo, xi)
+  // Funcs computed at a loop over blocks, or at a loop in it, are computed by all threads of the block
+  // and lie in memory that these share; what is computed inside of threads is a thread's own.
+  // The target has the feature CUDA. Only CUDA devices are known (Unsupported).
+
+  // Loops whose iterations are threads of a block: at most 1,024 altogether.
+  // Requires: iterations that run at the same time must not touch the same element; a directive for
+  // GPUs names a GPU; code for GPUs is made for CUDA (Unsupported); the target has a GPU; threads belong
+  // to blocks; blocks consist of threads; threads compute vectors, and no vector has threads; a kernel
+  // computes, and calls nothing of the host (Unsupported); kernels are launched by one thread of the
+  // host (Unsupported).
+  Self& gpu_threads(const VarOrRVar& x, DeviceAPI device = DeviceAPI::Default_GPU) {
+    return run_on_gpu(ForType::GpuThread, {x}, device);
   }
-  template <typename... Rest>
-  Self& gpu_lanes(const VarOrRVar& x, const Rest&... rest) {
-    refuse_gpu("map", "to GPU lanes", x, rest...);
+  Self& gpu_threads(const VarOrRVar& x, const VarOrRVar& y,
+                    DeviceAPI device = DeviceAPI::Default_GPU) {
+    return run_on_gpu(ForType::GpuThread, {x, y}, device);
   }
+  Self& gpu_threads(const VarOrRVar& x, const VarOrRVar& y, const VarOrRVar& z,
+                    DeviceAPI device = DeviceAPI::Default_GPU) {
+    return run_on_gpu(ForType::GpuThread, {x, y, z}, device);
+  }
+  // A loop whose iterations are lanes of a warp: the innermost over threads, of an extent of at most 32.
+  // What gpu_threads requires.
+  Self& gpu_lanes(const VarOrRVar& x, DeviceAPI device = DeviceAPI::Default_GPU) {
+    return run_on_gpu(ForType::GpuLane, {x}, device);
+  }
+  // Loops whose iterations are blocks of a grid.
+  // What gpu_threads requires.
+  Self& gpu_blocks(const VarOrRVar& x, DeviceAPI device = DeviceAPI::Default_GPU) {
+    return run_on_gpu(ForType::GpuBlock, {x}, device);
+  }
+  Self& gpu_blocks(const VarOrRVar& x, const VarOrRVar& y,
+                   DeviceAPI device = DeviceAPI::Default_GPU) {
+    return run_on_gpu(ForType::GpuBlock, {x, y}, device);
+  }
+  Self& gpu_blocks(const VarOrRVar& x, const VarOrRVar& y, const VarOrRVar& z,
+                   DeviceAPI device = DeviceAPI::Default_GPU) {
+    return run_on_gpu(ForType::GpuBlock, {x, y, z}, device);
+  }
+  // Blocks and threads at once.
+  Self& gpu(const VarOrRVar& block_x, const VarOrRVar& thread_x,
+            DeviceAPI device = DeviceAPI::Default_GPU) {
+    return gpu_blocks(block_x, device).gpu_threads(thread_x, device);
+  }
+  Self& gpu(const VarOrRVar& block_x, const VarOrRVar& block_y, const VarOrRVar& thread_x,
+            const VarOrRVar& thread_y, DeviceAPI device = DeviceAPI::Default_GPU) {
+    return gpu_blocks(block_x, block_y, device).gpu_threads(thread_x, thread_y, device);
+  }
+  Self& gpu(const VarOrRVar& block_x, const VarOrRVar& block_y, const VarOrRVar& block_z,
+            const VarOrRVar& thread_x, const VarOrRVar& thread_y, const VarOrRVar& thread_z,
+            DeviceAPI device = DeviceAPI::Default_GPU) {
+    return gpu_blocks(block_x, block_y, block_z, device)
+        .gpu_threads(thread_x, thread_y, thread_z, device);
+  }
+  // The whole stage in one thread of one block.
+  // Requires: code for GPUs is made for CUDA (Unsupported).
   Self& gpu_single_thread(DeviceAPI device = DeviceAPI::Default_GPU) {
-    refuse_gpu("run", "on a single GPU thread", device);
+    return run_on_gpu(ForType::GpuBlock, {Var::outermost()}, device);
   }
-  template <typename... Rest>
-  Self& gpu_blocks(const VarOrRVar& x, const Rest&... rest) {
-    refuse_gpu("map", "to GPU blocks", x, rest...);
+  // Tiles, a block each, a thread for each of their points; blocks keep the names of the loops where
+  // none are given. gpu_tile(x, y, xi, yi, 16, 8):
+  //   for y:                 gpu_block for y, x:
+  //     for x:         =>      gpu_thread for yi in [0, 8), xi in [0, 16):
+  //       body(x, y)             body(16 * x + xi, 8 * y + yi)
+  Self& gpu_tile(const VarOrRVar& x, const VarOrRVar& bx, const VarOrRVar& tx, const Expr& x_size,
+                 TailStrategy tail = TailStrategy::Auto,
+                 DeviceAPI device = DeviceAPI::Default_GPU) {
+    return split(x, bx, tx, x_size, tail).gpu(bx, tx, device);
   }
-  template <typename... Rest>
-  Self& gpu(const VarOrRVar& block, const VarOrRVar& thread, const Rest&... rest) {
-    refuse_gpu("map", "to a GPU", block, thread, rest...);
+  Self& gpu_tile(const VarOrRVar& x, const VarOrRVar& tx, const Expr& x_size,
+                 TailStrategy tail = TailStrategy::Auto,
+                 DeviceAPI device = DeviceAPI::Default_GPU) {
+    return gpu_tile(x, x, tx, x_size, tail, device);
   }
-  template <typename... Rest>
-  Self& gpu_tile(const VarOrRVar& x, const VarOrRVar& inner, const Rest&... rest) {
-    refuse_gpu("tile", "for a GPU", x, inner, rest...);
+  Self& gpu_tile(const VarOrRVar& x, const VarOrRVar& y, const VarOrRVar& bx, const VarOrRVar& by,
+                 const VarOrRVar& tx, const VarOrRVar& ty, const Expr& x_size, const Expr& y_size,
+                 TailStrategy tail = TailStrategy::Auto,
+                 DeviceAPI device = DeviceAPI::Default_GPU) {
+    return tile(x, y, bx, by, tx, ty, x_size, y_size, tail).gpu(bx, by, tx, ty, device);
   }
+  Self& gpu_tile(const VarOrRVar& x, const VarOrRVar& y, const VarOrRVar& tx, const VarOrRVar& ty,
+                 const Expr& x_size, const Expr& y_size, TailStrategy tail = TailStrategy::Auto,
+                 DeviceAPI device = DeviceAPI::Default_GPU) {
+    return gpu_tile(x, y, x, y, tx, ty, x_size, y_size, tail, device);
+  }
+  Self& gpu_tile(const VarOrRVar& x, const VarOrRVar& y, const VarOrRVar& z, const VarOrRVar& bx,
+                 const VarOrRVar& by, const VarOrRVar& bz, const VarOrRVar& tx, const VarOrRVar& ty,
+                 const VarOrRVar& tz, const Expr& x_size, const Expr& y_size, const Expr& z_size,
+                 TailStrategy tail = TailStrategy::Auto,
+                 DeviceAPI device = DeviceAPI::Default_GPU) {
+    return tile({x, y, z}, {bx, by, bz}, {tx, ty, tz}, {x_size, y_size, z_size}, tail)
+        .gpu(bx, by, bz, tx, ty, tz, device);
+  }
+  Self& gpu_tile(const VarOrRVar& x, const VarOrRVar& y, const VarOrRVar& z, const VarOrRVar& tx,
+                 const VarOrRVar& ty, const VarOrRVar& tz, const Expr& x_size, const Expr& y_size,
+                 const Expr& z_size, TailStrategy tail = TailStrategy::Auto,
+                 DeviceAPI device = DeviceAPI::Default_GPU) {
+    return gpu_tile(x, y, z, x, y, z, tx, ty, tz, x_size, y_size, z_size, tail, device);
+  }
+
+  // ---- accelerators: Unsupported ----
+  // Requires: loops run on the CPU or a CUDA device (Unsupported).
   Self& hexagon(const VarOrRVar& x = Var::outermost()) {
-    frontend::refuse_device(place(), "run the loop", {x}, "on a Hexagon accelerator",
-                            DeviceAPI::Hexagon);
+    frontend::check_device(place(), {x}, DeviceAPI::Hexagon);
+    return self();
   }
 
   void unscheduled() { give(graph::Unscheduled{}); }  // says that no directive was forgotten
@@ -361,17 +446,12 @@ class LoopDirectives {
     graph::Directive run = graph::RunLoop{var.name(), kind};
     graph::check_directive(place(), run);
   }
-  // Of what such a directive is given, the loops and the device are named.
-  template <typename... Given>
-  [[noreturn]] void refuse_gpu(const char* verb, const char* where, const Given&... given) const {
-    std::vector<VarOrRVar> loops;
-    DeviceAPI device = DeviceAPI::Default_GPU;
-    const auto note = [&]<typename T>(const T& argument) {
-      if constexpr (std::is_convertible_v<T, VarOrRVar>) loops.push_back(argument);
-      if constexpr (std::is_same_v<T, DeviceAPI>) device = argument;
-    };
-    (note(given), ...);
-    frontend::refuse_device(place(), verb, loops, where, device);
+  // All are checked before the first is given.
+  Self& run_on_gpu(ForType kind, const std::vector<VarOrRVar>& loops, DeviceAPI device) {
+    frontend::check_device(place(), loops, device);
+    for (const VarOrRVar& loop : loops) check_run(loop, kind);
+    for (const VarOrRVar& loop : loops) give(graph::RunLoop{loop.name(), kind});
+    return self();
   }
 };
 

@@ -70,15 +70,22 @@ PrefetchData prefetch_of(const SchedulePlace& place,
   return prefetch;
 }
 
-// Directives for GPUs and accelerators are declared so that programs written for them build.
-void refuse_device(const SchedulePlace& place, const char* verb,
-                   const std::vector<VarOrRVar>& loops, const char* where, DeviceAPI device) {
-  unsupported(text(verb, " ", loops.empty() ? place.name() : as_list(loops), " ", where),
-              "loops run on the CPU",
-              text("stage ", place.name(), " is to run on ",
-                   device == DeviceAPI::Hexagon ? "a Hexagon accelerator" : "a GPU",
-                   ", and no code is generated for it"),
-              "Use parallel, vectorize and tile instead");
+// Directives for other devices are declared so that programs written for them build.
+void check_device(const SchedulePlace& place, const std::vector<VarOrRVar>& loops,
+                  DeviceAPI device) {
+  if (device == DeviceAPI::Default_GPU || device == DeviceAPI::CUDA) return;
+  const std::string asked = text("run ", as_list(loops), " of ", place.name(), " on ");
+  if (device == DeviceAPI::Hexagon) {
+    unsupported(asked + "a Hexagon accelerator", "loops run on the CPU or a CUDA device",
+                "no code is generated for Hexagon", "Use parallel, vectorize and tile instead");
+  }
+  if (device == DeviceAPI::Host || device == DeviceAPI::None) {
+    user_error(asked + "a GPU", "a directive for GPUs names a GPU", "it names the host",
+               "Leave the device out, or use parallel, vectorize and tile");
+  }
+  unsupported(asked + "a GPU", "code for GPUs is made for CUDA",
+              "the directive names another kind of device",
+              "Leave the device out, or give DeviceAPI::CUDA");
 }
 
 }  // namespace frontend

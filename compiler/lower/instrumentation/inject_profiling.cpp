@@ -75,7 +75,7 @@ class Profiling : public StatementRewriter {
  protected:
   Stmt rewrite(const Stmt& s) override {
     if (const ProducerConsumer* n = s.as<ProducerConsumer>(); n && n->produces) return produce(*n);
-    if (const For* n = s.as<For>(); n && n->runs == ForType::Parallel)
+    if (const For* n = s.as<For>(); n && runs_at_once(n->runs))
       return map_children(s, [&](const Stmt& body) { return on_a_thread(body); });
     if (const Fork* n = s.as<Fork>()) return make_fork(on_a_thread(n->first), (*this)(n->rest));
     if (const Allocate* n = s.as<Allocate>()) return allocate(*n);

@@ -129,7 +129,8 @@ Stmt free_early(const Stmt& s) {
     }
     if (const Allocate* a = node.as<Allocate>()) {
       frees.push_back(all(a->body));
-      return make_allocate(a->name, a->type, a->memory, a->elements, make_block(std::move(frees)));
+      return make_allocate(a->name, a->type, a->memory, a->elements, make_block(std::move(frees)),
+                           a->offset);
     }
     frees.insert(frees.begin(), all.children(node));
     return make_block(std::move(frees));

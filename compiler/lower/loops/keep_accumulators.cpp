@@ -221,7 +221,7 @@ class KeepAccumulators : public StatementRewriter {
         return kept(s, std::move(*update));
     }
     const bool outside = shares_;
-    shares_ |= loop->runs == ForType::Parallel && !is_pure_(*loop);
+    shares_ |= runs_at_once(loop->runs) && !is_pure_(*loop);
     Stmt result = children(s);
     shares_ = outside;
     return result;

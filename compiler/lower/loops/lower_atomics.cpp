@@ -93,7 +93,7 @@ Stmt lower_atomics(const Stmt& s) {
     if (const Atomic* n = node.as<Atomic>()) return is_shared(n->body) ? narrowed(*n) : n->body;
     if (const Allocate* n = node.as<Allocate>()) depth_of[n->name] = depth;
     const For* loop = node.as<For>();
-    const bool is_parallel = node.kind() == Kind::Fork || (loop && loop->runs == ForType::Parallel);
+    const bool is_parallel = node.kind() == Kind::Fork || (loop && runs_at_once(loop->runs));
     depth += is_parallel;
     Stmt result = all.children(node);
     depth -= is_parallel;

@@ -157,7 +157,7 @@ class Partitioner : public StatementRewriter {
     if (!ends.begin.defined() && !ends.end.defined() && !steady.needed.defined()) {
       return make_for(loop.name, loop.min, loop.extent, loop.runs, steady_body);
     }
-    const bool stays_one = loop.runs == ForType::Parallel || steady.has_thick_border ||
+    const bool stays_one = runs_at_once(loop.runs) || steady.has_thick_border ||
                            has_costly_borders_in_order(loop, rest, ends);
     return stays_one ? branch_inside(loop, steady_body, rest, ends, steady.needed)
                      : three_loops(loop, steady_body, rest, ends, steady.needed);

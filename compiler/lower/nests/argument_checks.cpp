@@ -25,8 +25,13 @@ constexpr const char *check_shape = "retrograde_check_shape",
 
 class Checks {
  public:
-  Checks(const LoopNests& nests, const std::vector<LoweredArgument>& args, const Program& program)
-      : nests_(nests), args_(args), program_(program), actual_(names_of_actual_facts()) {}
+  Checks(const LoopNests& nests, const std::vector<LoweredArgument>& args, const Program& program,
+         bool has_device)
+      : nests_(nests),
+        args_(args),
+        program_(program),
+        has_device_(has_device),
+        actual_(names_of_actual_facts()) {}
 
   Stmt build() {
     std::vector<Stmt> shape_checks;
@@ -53,6 +58,7 @@ class Checks {
   const LoopNests& nests_;
   const std::vector<LoweredArgument>& args_;
   const Program& program_;
+  const bool has_device_;
   const Substitution actual_;
 
   // Where a fact was promised, the code below uses the promise, and the check compares it with the
@@ -330,10 +336,11 @@ class Checks {
     checks.insert(checks.end(), of_promises.begin(), of_promises.end());
   }
 
-  static int32_t region_rules(const LoweredArgument& arg) {
+  int32_t region_rules(const LoweredArgument& arg) const {
     const bool is_output = arg.kind == LoweredArgument::Kind::OutputBuffer;
     return (is_output ? retrograde_region_is_written : 0) |
-           (is_dense(arg) ? retrograde_region_is_dense : 0);
+           (is_dense(arg) ? retrograde_region_is_dense : 0) |
+           (has_device_ ? retrograde_region_on_device : 0);
   }
   // As buffers are unless someone says otherwise.
   static bool is_dense(const LoweredArgument& arg) {
@@ -396,8 +403,8 @@ bool is_check_by_runtime(const Stmt& s) {
 }
 
 Stmt add_argument_checks(const LoopNests& nests, const std::vector<LoweredArgument>& args,
-                         const Program& program) {
-  return Checks(nests, args, program).build();
+                         const Program& program, bool has_device) {
+  return Checks(nests, args, program, has_device).build();
 }
 
 }  // namespace retrograde::lower

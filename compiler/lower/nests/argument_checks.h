@@ -19,8 +19,9 @@
 
 namespace retrograde::lower {
 
+// `has_device`: data may lie on a device alone.
 Stmt add_argument_checks(const LoopNests& nests, const std::vector<LoweredArgument>& args,
-                         const Program& program);
+                         const Program& program, bool has_device);
 
 // Whether the statement does nothing but ask the runtime for such a check and leave when it fails.
 bool is_check_by_runtime(const Stmt& s);

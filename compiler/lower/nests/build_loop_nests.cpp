@@ -114,7 +114,7 @@ Emitted NestEmitter::store_here(const LoopedFunc& f, int s, Emitted code, std::v
 }
 
 void NestEmitter::check_parallel(const LoopedFunc& f, const Loop& loop, const Emitted& code) const {
-  if (loop.runs != ForType::Parallel) return;
+  if (!runs_at_once(loop.runs)) return;
   const auto check = [&](const Needs& needs) {
     if (needs.storage.empty()) return;
     check_no_shared_storage(f, loop, storage_.stored_func(needs.storage.begin()->first)->name());

@@ -61,7 +61,7 @@ void wrap(const Loop& loop, Emitted& code) {
     strand.at.pop_back();
   }
   code.has_loops |=
-      loop.runs == ForType::Parallel || (loop.runs == ForType::Serial && !is_one(loop.extent));
+      runs_at_once(loop.runs) || (loop.runs == ForType::Serial && !is_one(loop.extent));
   code.has_vectors |= loop.runs == ForType::Vectorized;
 }
 

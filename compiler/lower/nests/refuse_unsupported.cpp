@@ -1,5 +1,7 @@
 #include "lower/nests/refuse_unsupported.h"
 
+#include <algorithm>
+
 #include "diagnostics/error.h"
 #include "graph/define.h"
 #include "graph/names.h"
@@ -9,16 +11,15 @@ namespace retrograde::lower {
 namespace {
 
 bool is_memory_of_device(MemoryType memory) {
-  return memory == MemoryType::GPUShared || memory == MemoryType::GPUTexture ||
-         memory == MemoryType::LockedCache || memory == MemoryType::VTCM ||
-         memory == MemoryType::AMXTile;
+  return memory == MemoryType::GPUTexture || memory == MemoryType::LockedCache ||
+         memory == MemoryType::VTCM || memory == MemoryType::AMXTile;
 }
 
 void refuse_memory_of_devices(const LoopedFunc& f) {
   if (is_memory_of_device(f.schedule.memory)) {
     unsupported(text("store ", quoted(f.name()), " in memory of a device"),
-                "storage lies in memory that the CPU has",
-                "store_in named memory of GPUs or accelerators, and code is made for a CPU",
+                "storage lies in memory that a CPU or a CUDA device has",
+                "store_in named textures or the memory of accelerators",
                 "Use MemoryType::Auto, Heap or Stack");
   }
 }
@@ -33,7 +34,30 @@ void check_level_is_set(const LoopedFunc& f, const std::shared_ptr<LoopLevelCont
              "Set it: level.set(LoopLevel(f, x))");
 }
 
+// 1. Loops over blocks are around those over threads. 2. Neither is inside of a vectorized loop.
+void check_gpu_loops(const LoopedFunc& f, int stage, const StageLoops& schedule) {
+  const Dim *blocks = nullptr, *on_gpu = nullptr;  // the last of each that was met
+  const std::string name = quoted(stage_name(*f.func, stage));
+  for (const Dim& dim : schedule.dims) {  // innermost first
+    if (is_gpu_thread(dim.runs) && blocks) {
+      user_error(text("run GPU threads of ", name, " over ", quoted(dim.var)),
+                 "blocks consist of threads",
+                 text("the loop over blocks ", quoted(blocks->var), " is inside of it"),
+                 text("Reorder ", quoted(dim.var), " inwards"));
+    }
+    if (dim.runs == ForType::Vectorized && on_gpu) {
+      user_error(text("vectorize ", name, " over ", quoted(dim.var)),
+                 "threads compute vectors, and no vector has threads",
+                 text("the loop over threads or blocks ", quoted(on_gpu->var), " is inside of it"),
+                 text("Reorder ", quoted(dim.var), " inwards"));
+    }
+    if (is_gpu(dim.runs)) on_gpu = &dim;
+    if (dim.runs == ForType::GpuBlock) blocks = &dim;
+  }
+}
+
 void check_loops(const LoopedFunc& f, int stage, const StageLoops& schedule) {
+  check_gpu_loops(f, stage, schedule);
   const Dim* parallel = nullptr;
   for (const Dim& dim : schedule.dims) {  // innermost first
     if (dim.runs == ForType::Parallel) parallel = &dim;
@@ -57,6 +81,25 @@ void refuse_unsupported(const Program& program) {
     for (size_t s = 0; s < f.stages.size(); s++)
       check_loops(f, static_cast<int>(s), f.stages[s].schedule);
     refuse_memory_of_devices(f);
+  }
+}
+
+static bool has_gpu_loops(const StageLoops& schedule) {
+  return std::ranges::any_of(schedule.dims, [](const Dim& dim) { return is_gpu(dim.runs); }) ||
+         std::ranges::any_of(schedule.specializations, has_gpu_loops);
+}
+
+void check_devices(const Program& program, const Target& target) {
+  if (target.has_feature(Target::CUDA)) return;
+  for (const LoopedFunc& f : program.funcs) {
+    for (size_t s = 0; s < f.stages.size(); s++) {
+      if (!has_gpu_loops(f.stages[s].schedule)) continue;
+      user_error(text("run ", quoted(stage_name(*f.func, static_cast<int>(s))), " on a GPU"),
+                 "the target has a GPU",
+                 text("it is ", quoted(target.to_string()), ", which has none"),
+                 "Add Target::CUDA to the target: get_host_target().with_feature(Target::CUDA), or "
+                 "HL_JIT_TARGET=host-cuda");
+    }
   }
 }
 
@@ -84,7 +127,8 @@ void check_inlined(const FuncContents& f, const FuncPlacement& schedule) {
   }
   for (const Dim& dim : f.pure->schedule.dims) {
     if (dim.runs == ForType::Serial) continue;
-    const char* verb = dim.runs == ForType::Parallel     ? "parallelize "
+    const char* verb = is_gpu(dim.runs)                  ? "run on a GPU "
+                       : dim.runs == ForType::Parallel   ? "parallelize "
                        : dim.runs == ForType::Vectorized ? "vectorize "
                                                          : "unroll ";
     user_error(text(verb, quoted(f.name), " over ", quoted(dim.var)),

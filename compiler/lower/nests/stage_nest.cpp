@@ -3,6 +3,7 @@
 #include <optional>
 
 #include "diagnostics/error.h"
+#include "graph/names.h"
 #include "ir/build.h"
 #include "ir/visit.h"
 #include "lower/nests/own_joining.h"
@@ -84,6 +85,8 @@ class NestBuilder {
   Expr loop_variable(const std::string& var) const { return variable(prefix_ + var); }
 
   Loop loop_of(const Dim& dim) const {
+    if (dim.var == outermost_loop)
+      return {dim.var, prefix_ + dim.var, 0, 1, dim.runs, dim.partition, {}};
     auto it = ranges_.find(dim.var);
     RETROGRADE_ASSERT(it != ranges_.end(), "loop over a variable that does not exist: " + dim.var);
     return {dim.var, prefix_ + dim.var, it->second.min, it->second.extent, dim.runs, dim.partition,

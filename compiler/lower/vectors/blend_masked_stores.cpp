@@ -112,7 +112,7 @@ class BlendMaskedStores : public Rewriter {
     return match(
         s, [&](const Allocate& n) { return visit_allocate(s, n); },
         [&](const Store& n) { return n.predicate.defined() ? visit_store(s, n) : children(s); },
-        [&](const For& n) { return n.runs == ForType::Parallel ? in_task(s) : children(s); },
+        [&](const For& n) { return runs_at_once(n.runs) ? in_task(s) : children(s); },
         [&](const Fork&) { return in_task(s); }, [&](const Atomic&) { return s; },
         [&](const IfThenElse& n) { return visit_if(n); },
         [&](const Block& n) { return visit_block(s, n); },

@@ -1,0 +1,56 @@
+// kernels.h -- the kernels of one lowered function, as its launches ask for them: their code for devices
+// and, where asked for, for the executor; and the image that holds both (runtime/gpu/gpu_image.h).
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "codegen/device_target.h"
+#include "ir/lowered_function.h"
+
+namespace retrograde::codegen {
+
+struct KernelUse {
+  // What the kernel is given: a variable, or the first element of storage.
+  struct Argument {
+    std::string name;
+    Type type;  // of storage: of anything
+    bool is_storage = false, is_written = false;
+    int32_t bytes() const { return is_storage ? 8 : type.bytes(); }
+  };
+  std::string name;  // in the image
+  Stmt launch;
+  std::vector<Argument> arguments;
+  std::vector<std::string> sites;  // statements as text, told of by the executor; found on the way
+  bool suspends = false;           // it has barriers
+};
+
+class KernelSet {
+ public:
+  KernelSet(Emitter& host, const ir::LoweredFunction& function) : host_(host), source_(function) {}
+  bool empty() const { return kernels_.empty(); }
+  KernelUse& add(const Stmt& launch, std::vector<KernelUse::Argument> arguments);
+  // The image, and the word that its loaded form hangs on.
+  llvm::GlobalVariable* image();
+  llvm::GlobalVariable* state();
+  int64_t image_bytes() const;
+  // Gives the image its contents.
+  void finish();
+
+ private:
+  std::string ptx();
+  void compile_for_executor(std::vector<llvm::Function*>& functions);
+  llvm::Constant* described(const KernelUse& kernel, llvm::Function* simt);
+  llvm::Constant* text(const std::string& bytes);
+  llvm::Constant* table(llvm::Type* element, const std::vector<llvm::Constant*>& entries);
+  llvm::GlobalVariable* own_global(llvm::Type* type, const char* what);
+  llvm::StructType* image_type() const;
+
+  Emitter& host_;
+  const ir::LoweredFunction& source_;
+  std::vector<std::unique_ptr<KernelUse>> kernels_;
+  llvm::GlobalVariable *image_ = nullptr, *state_ = nullptr;
+};
+
+}  // namespace retrograde::codegen

@@ -1,0 +1,274 @@
+#include "lower/device/thread_elements.h"
+
+#include <algorithm>
+#include <functional>
+#include <map>
+
+#include "analysis/linear.h"
+#include "ir/visit.h"
+#include "simplify/facts.h"
+#include "simplify/simplify.h"
+
+namespace retrograde::lower {
+
+namespace {
+
+using Digit = ThreadElements::Digit;
+
+// A place in a loop, as it appears in an index.
+struct Place {
+  Expr value;  // from 0
+  int64_t factor = 1, extent = 1;
+  int thread = -1;
+};
+struct AccessIndex {
+  std::vector<Place> places;
+  int64_t constant = 0;
+  int64_t lane_stride = 0, lanes = 1;  // of a ramp
+};
+
+struct LoopAround {
+  std::string name;
+  Expr min;  // in terms of what is around the loop
+  int64_t extent = 0;
+  int thread = -1;
+};
+
+std::optional<int64_t> largest_extent(const Expr& extent) {
+  if (const auto constant = as_const_int(extent)) return *constant;
+  simplification::Facts facts;
+  const int64_t most = std::min(facts.range(extent).max, facts.upper_bound(ir::sum_of(extent)));
+  constexpr int64_t unknown = int64_t{1} << 30;
+  return most < unknown ? std::optional(most) : std::nullopt;
+}
+
+// Walks a kernel's body; `on_access` is told the index of each access and gives the new one.
+class AccessWalker : public Rewriter {
+ public:
+  using OnAccess = std::function<Expr(const AccessWalker&, const Expr& index)>;
+  AccessWalker(const Kernel& kernel, const std::string& storage, OnAccess on_access)
+      : kernel_(kernel), storage_(storage), on_access_(std::move(on_access)) {}
+
+  // Null: not a sum of places.
+  std::optional<AccessIndex> split(const Expr& index) const {
+    AccessIndex result;
+    Expr base = index;
+    if (const auto* ramp = index.as<Ramp>()) {
+      const auto stride = as_const_int(ramp->stride);
+      if (!stride || *stride <= 0) return std::nullopt;
+      result.lane_stride = *stride;
+      result.lanes = ramp->lanes;
+      base = ramp->base;
+    }
+    if (!base.type().is_scalar()) return std::nullopt;
+    base = in_full(base);
+    // Inner loops first: where they begin may depend on outer ones.
+    std::vector<std::string> names;
+    for (auto loop = loops_.rbegin(); loop != loops_.rend(); ++loop) {
+      if (!uses_variable(base, loop->name)) continue;
+      names.push_back(loop->name + ".place");
+      base = substitute(base, loop->name, loop->min + variable(names.back()));
+    }
+    const auto sum = analysis::decompose(simplify(base), names);
+    if (!sum) return std::nullopt;
+    const auto constant = as_const_int(simplify(sum->rest));
+    if (!constant || *constant < 0) return std::nullopt;
+    result.constant = *constant;
+    for (const auto& [name, factor] : sum->coefficients) {
+      const auto loop = std::ranges::find_if(
+          loops_, [&, &name = name](const LoopAround& l) { return l.name + ".place" == name; });
+      if (factor < 0 || loop->extent <= 0) return std::nullopt;
+      if (factor == 0) continue;
+      result.places.push_back(
+          {variable(loop->name) - loop->min, factor, loop->extent, loop->thread});
+    }
+    return result;
+  }
+
+ protected:
+  Expr rewrite(const Expr& e) override {
+    if (const auto* let = e.as<Let>()) lets_[let->name] = let->value;
+    const auto* load = e.as<Load>();
+    if (!load || load->name != storage_) return children(e);
+    return make_load(load->type, load->name, on_access_(*this, load->index),
+                     (*this)(load->predicate), load->symbol);
+  }
+
+  Stmt rewrite(const Stmt& s) override {
+    if (const auto* let = s.as<LetStmt>()) lets_[let->name] = let->value;
+    if (const auto* loop = s.as<For>()) return in_loop(s, *loop);
+    const auto* store = s.as<Store>();
+    if (!store || store->name != storage_) return children(s);
+    const Expr value = (*this)(store->value), predicate = (*this)(store->predicate);
+    return make_store(store->name, value, on_access_(*this, store->index), predicate,
+                      store->symbol);
+  }
+
+ private:
+  Stmt in_loop(const Stmt& s, const For& loop) {
+    LoopAround around{loop.name, in_full(loop.min),
+                      largest_extent(in_full(loop.extent)).value_or(0)};
+    if (is_gpu_thread(loop.runs)) around.thread = thread_depth(loop.body);
+    loops_.push_back(std::move(around));
+    Stmt result = children(s);
+    loops_.pop_back();
+    return result;
+  }
+
+  Expr in_full(const Expr& e) const {
+    Substitution needed;
+    walk(e, [&](const Variable& v) {
+      const auto value = lets_.find(v.name);
+      if (value != lets_.end() && !needed.count(v.name)) needed[v.name] = in_full(value->second);
+    });
+    return needed.empty() ? e : substitute(e, needed);
+  }
+
+  const Kernel& kernel_;
+  const std::string& storage_;
+  const OnAccess on_access_;
+  std::vector<LoopAround> loops_;  // outermost first
+  Substitution lets_;
+};
+
+class ElementsFinder {
+ public:
+  ElementsFinder(const Kernel& kernel, const std::string& storage)
+      : kernel_(kernel), storage_(storage) {}
+
+  std::optional<ThreadElements> find() {
+    AccessWalker(kernel_, storage_, [&](const AccessWalker& walker, const Expr& index) {
+      if (auto access = walker.split(index)) {
+        accesses_.push_back(std::move(*access));
+      } else {
+        fails_ = true;
+      }
+      return index;
+    })(kernel_.body);
+    if (fails_ || !gather_threads()) return std::nullopt;
+    for (const AccessIndex& access : accesses_) {
+      if (!gather_others(access)) return std::nullopt;
+    }
+    return numbered();
+  }
+
+  // A constant as places between those of the threads: by factor.
+  static std::optional<std::map<int64_t, int64_t>> places_of(int64_t constant,
+                                                             const std::vector<Digit>& threads) {
+    std::map<int64_t, int64_t> places;
+    for (auto thread = threads.rbegin(); thread != threads.rend(); ++thread) {
+      const int64_t above = thread->factor * thread->extent;
+      if (constant >= above) places[above] = constant / above;
+      constant %= above;
+      if (constant >= thread->factor) return std::nullopt;
+    }
+    if (constant > 0) places[1] = constant;
+    return places;
+  }
+
+ private:
+  // Each dimension with more than one thread has one factor, in all accesses.
+  bool gather_threads() {
+    for (int d = 0; d < 3; ++d) {
+      if (kernel_.threads[static_cast<size_t>(d)] == 1) continue;
+      Digit digit{0, 1, d};
+      for (const AccessIndex& access : accesses_) {
+        const auto place = std::ranges::find(access.places, d, &Place::thread);
+        if (place == access.places.end()) return false;
+        if (digit.factor != 0 && digit.factor != place->factor) return false;
+        digit.factor = place->factor;
+        digit.extent = std::max(digit.extent, place->extent);
+      }
+      if (digit.factor != 0) threads_.push_back(digit);
+    }
+    std::ranges::sort(threads_, {}, &Digit::factor);
+    return true;
+  }
+
+  bool gather_others(const AccessIndex& access) {
+    const auto grow = [&](int64_t factor, int64_t extent) {
+      others_[factor] = std::max(others_[factor], extent);
+    };
+    const auto constant = places_of(access.constant, threads_);
+    if (!constant) return false;
+    for (const auto& [factor, value] : *constant) grow(factor, value + 1);
+    if (access.lanes > 1) grow(access.lane_stride, access.lanes);
+    for (const Place& place : access.places) {
+      if (place.thread < 0 || kernel_.threads[static_cast<size_t>(place.thread)] == 1)
+        grow(place.factor, place.extent);
+    }
+    return true;
+  }
+
+  std::optional<ThreadElements> numbered() const {
+    ThreadElements result;
+    result.digits = threads_;
+    for (const auto& [factor, extent] : others_) result.digits.push_back({factor, extent});
+    std::ranges::stable_sort(result.digits, {}, &Digit::factor);
+    int64_t largest = 0;  // that the smaller ones add up to
+    for (Digit& digit : result.digits) {
+      if (digit.factor <= largest) return std::nullopt;
+      largest += digit.factor * (digit.extent - 1);
+      digit.own_factor = result.own_count;
+      int64_t own = digit.extent;
+      if (digit.thread >= 0) {
+        const int64_t threads = kernel_.threads[static_cast<size_t>(digit.thread)];
+        own = (digit.extent + threads - 1) / threads;
+      }
+      result.own_count *= own;
+    }
+    return result;
+  }
+
+  const Kernel& kernel_;
+  const std::string& storage_;
+  std::vector<AccessIndex> accesses_;
+  bool fails_ = false;
+  std::vector<Digit> threads_;
+  std::map<int64_t, int64_t> others_;  // extents by factor
+};
+
+}  // namespace
+
+std::optional<ThreadElements> find_thread_elements(const Kernel& kernel,
+                                                   const std::string& storage) {
+  return ElementsFinder(kernel, storage).find();
+}
+
+Stmt in_own_numbers(const Kernel& kernel, const std::string& storage,
+                    const ThreadElements& elements) {
+  std::vector<Digit> threads;
+  std::ranges::copy_if(elements.digits, std::back_inserter(threads),
+                       [](const Digit& digit) { return digit.thread >= 0; });
+  const auto digit_of = [&](int64_t factor, int thread) {
+    return *std::ranges::find_if(elements.digits, [&](const Digit& digit) {
+      return digit.factor == factor && digit.thread == thread;
+    });
+  };
+  const auto number = [&](const AccessWalker& walker, const Expr& index) {
+    const AccessIndex access = *walker.split(index);
+    Expr own = 0;
+    for (const Place& place : access.places) {
+      const int64_t threads_there =
+          place.thread < 0 ? 1 : kernel.threads[static_cast<size_t>(place.thread)];
+      if (threads_there == 1) {
+        own = own + place.value * static_cast<int>(digit_of(place.factor, -1).own_factor);
+        continue;
+      }
+      const Digit& digit = digit_of(place.factor, place.thread);
+      if (digit.extent <= threads_there) continue;
+      own =
+          own + place.value / static_cast<int>(threads_there) * static_cast<int>(digit.own_factor);
+    }
+    const auto constant = ElementsFinder::places_of(access.constant, threads);
+    for (const auto& [factor, value] : *constant)
+      own = own + static_cast<int>(value * digit_of(factor, -1).own_factor);
+    own = simplify(cast_to(index.type().element_of(), own));
+    if (access.lanes == 1) return own;
+    const auto stride = digit_of(access.lane_stride, -1).own_factor;
+    return make_ramp(own, make_const(own.type(), stride), static_cast<int>(access.lanes));
+  };
+  return AccessWalker(kernel, storage, number)(kernel.body);
+}
+
+}  // namespace retrograde::lower

@@ -1,0 +1,64 @@
+#include "gpu/kernel_storage.h"
+
+#include <HalideRuntime.h>
+
+#include <cstdlib>
+#include <new>
+
+namespace {
+
+// What a pipeline stores for itself is empty at first, unlike the buffers that it is given.
+constexpr uint64_t is_own_storage = uint64_t{1} << 32;
+
+struct OwnBuffer {
+  halide_buffer_t buffer = {};
+  halide_dimension_t dimension = {};
+};
+
+}  // namespace
+
+halide_buffer_t* retrograde_device_buffer(retrograde_context* context, void* host, int64_t elements,
+                                          uint32_t type) {
+  auto* own = new (std::nothrow) OwnBuffer;
+  if (!own) {
+    retrograde_allocation_error(context, "a buffer on a device", 1, sizeof(OwnBuffer));
+    return nullptr;
+  }
+  halide_buffer_t& buffer = own->buffer;
+  buffer.host = static_cast<uint8_t*>(host);
+  buffer.type =
+      halide_type_t(static_cast<halide_type_code_t>(type & 0xff),
+                    static_cast<uint8_t>((type >> 8) & 0xff), static_cast<uint16_t>(type >> 16));
+  buffer.dimensions = 1;
+  buffer.dim = &own->dimension;
+  own->dimension = halide_dimension_t(0, static_cast<int32_t>(elements), 1);
+  buffer.flags = is_own_storage;
+  return &buffer;
+}
+
+int32_t retrograde_device_buffer_free(retrograde_context* context, halide_buffer_t* buffer) {
+  if (!buffer) return 0;
+  const int32_t code = buffer->device ? retrograde_gpu_free(context, buffer) : 0;
+  delete reinterpret_cast<OwnBuffer*>(buffer);
+  return code;
+}
+
+int32_t retrograde_to_device(retrograde_context* context, halide_buffer_t* buffer) {
+  const bool is_given = !(buffer->flags & is_own_storage);
+  if (is_given && !buffer->device && buffer->host) buffer->set_host_dirty(true);
+  return retrograde_gpu_copy_to_device(context, buffer);
+}
+
+int32_t retrograde_device_changed(retrograde_context*, halide_buffer_t* buffer) {
+  buffer->set_device_dirty(true);
+  return 0;
+}
+
+int32_t retrograde_to_host(retrograde_context* context, halide_buffer_t* buffer) {
+  return buffer->device_dirty() ? retrograde_gpu_copy_to_host(context, buffer) : 0;
+}
+
+int32_t retrograde_host_changed(retrograde_context*, halide_buffer_t* buffer) {
+  if (buffer->device || (buffer->flags & is_own_storage)) buffer->set_host_dirty(true);
+  return 0;
+}

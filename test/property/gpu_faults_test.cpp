@@ -1,0 +1,225 @@
+// What the simulated device is for: kernels with a fault put in, such as a lowering with a bug would make
+// them: a barrier left out, arrays of shared memory that overlap, a condition lost. Some do no harm (a barrier
+// between accesses that do not meet). One is real where some order of threads gives something else; each
+// real one is found in the first run that looks for races, whatever its order.
+#include <gtest/gtest.h>
+#include <retrograde/retrograde.h>
+
+#include <cstdlib>
+#include <map>
+
+#include "ir/build.h"
+#include "ir/print.h"
+#include "ir/visit.h"
+#include "jit/jit.h"
+#include "simt/simt_driver.h"
+
+namespace retrograde {
+namespace {
+
+// Before anything asks for a device.
+[[maybe_unused]] const int simulated = setenv("RETROGRADE_GPU", "simulated", 1);
+
+constexpr int width = 37, height = 21;
+
+Target with_gpu() {
+  return get_host_target().with_feature(Target::CUDA).with_feature(Target::CUDACapability80);
+}
+
+// ---- programs ----
+
+struct Made {
+  ImageParam in{Float(32), 2, "in"};
+  Func out{"out"};
+  Var x{"x"}, y{"y"}, xi{"xi"}, yi{"yi"}, u{"u"};
+
+  // Sizes of tiles come from the seed.
+  explicit Made(int seed) {
+    const int tile_x = 4 + seed * 3 % 13, tile_y = 2 + seed * 5 % 7;
+    seed % 3 == 0 ? two_stages(tile_x, tile_y) : seed % 3 == 1 ? product(tile_y) : in_turns(tile_x);
+  }
+
+  void two_stages(int tile_x, int tile_y) {
+    Func rows("rows"), columns("columns");
+    rows(x, y) = in(x, y) + 2.0f * in(x + 1, y);
+    columns(x, y) = rows(x, y) + 3.0f * rows(x, y + 1);
+    out(x, y) = columns(x, y) * columns(x + 1, y + 1);
+    out.gpu_tile(x, y, xi, yi, tile_x, tile_y, TailStrategy::GuardWithIf);
+    columns.compute_at(out, x).gpu_threads(x, y);
+    rows.compute_at(out, x).gpu_threads(x, y);
+  }
+
+  void product(int tile) {
+    RDom r(0, 16, "r");
+    RVar ro("ro"), ri("ri");
+    Func sum("sum"), left("left"), right("right");
+    left(x, y) = in(x, y);
+    right(x, y) = in(y, x);
+    sum(x, y) = 0.0f;
+    sum(x, y) += left(r, y) * right(x, r);
+    out(x, y) = sum(x, y);
+    out.gpu_tile(x, y, xi, yi, tile, tile, TailStrategy::GuardWithIf);
+    sum.compute_at(out, x).store_in(MemoryType::GPUShared).gpu_threads(x, y);
+    sum.update().split(r, ro, ri, 4).reorder(ri, x, y, ro).gpu_threads(x, y);
+    left.compute_at(sum, ro).gpu_threads(x, y);
+    right.compute_at(sum, ro).gpu_threads(x, y);
+  }
+
+  void in_turns(int tile) {
+    Func line("line");
+    line(x, y) = in(x, y) * 2.0f;
+    out(x, y) = line(x, y) + line(x + 3, y) + line(x + 1, y);
+    out.gpu_tile(x, y, xi, yi, tile, 1, TailStrategy::GuardWithIf);
+    line.compute_at(out, x).split(x, x, u, 3, TailStrategy::GuardWithIf).gpu_threads(u);
+  }
+};
+
+// ---- faults ----
+
+bool is_barrier(const Stmt& s) {
+  const auto* call = s.as<ir::Evaluate>();
+  return call && ir::as_op(call->value, ir::Op::gpu_barrier);
+}
+
+// A condition on which iteration or thread it is.
+bool is_guard(const Stmt& s) {
+  const auto* choice = s.as<ir::IfThenElse>();
+  return choice && !choice->when_false.defined() &&
+         ir::any_node(choice->condition, [](const ir::Variable& v) {
+           return v.name.find("thread.") != std::string::npos ||
+                  v.name.find("block.") != std::string::npos;
+         });
+}
+
+bool is_shared(const Stmt& s) {
+  const auto* n = s.as<ir::Allocate>();
+  return n && n->memory == MemoryType::GPUShared && ir::as_const_int(n->offset).value_or(0) > 0;
+}
+
+// Puts the fault of this number in, counted over the function.
+class FaultMaker : public ir::Rewriter {
+ public:
+  explicit FaultMaker(int wanted) : wanted_(wanted) {}
+  std::string fault, kind;
+
+ protected:
+  Stmt rewrite(const Stmt& s) override {
+    if (s.kind() == ir::Kind::Launch) {
+      in_kernel_ = true;
+      Stmt result = children(s);
+      in_kernel_ = false;
+      return result;
+    }
+    if (!in_kernel_ || !(is_barrier(s) || is_guard(s) || is_shared(s))) return children(s);
+    if (number_++ != wanted_) return children(s);
+    if (is_barrier(s)) {
+      fault = kind = "barrier";
+      return ir::make_evaluate(0);
+    }
+    if (const auto* choice = s.as<ir::IfThenElse>()) {
+      kind = "condition";
+      fault = ir::print(choice->condition);
+      return choice->when_true;
+    }
+    const auto& n = *s.as<ir::Allocate>();
+    kind = "overlap";
+    fault = n.name;
+    return ir::make_allocate(n.name, n.type, n.memory, n.elements, n.body, 0);
+  }
+  Expr rewrite(const Expr& e) override { return e; }
+
+ private:
+  const int wanted_;
+  int number_ = 0;
+  bool in_kernel_ = false;
+};
+
+// ---- runs ----
+
+struct Result {
+  int code = 0;
+  std::vector<float> values;
+  bool operator==(const Result&) const = default;
+};
+
+void choose(int order, uint64_t seed, bool find_races) {
+  retrograde_simt_options options;
+  retrograde_simt_get_options(&options);
+  options.order = order;
+  options.seed = seed;
+  options.find_races = find_races;
+  retrograde_simt_set_options(&options);
+}
+
+Result run(const ir::LoweredFunction& function, int order, bool find_races = true,
+           uint64_t seed = 0) {
+  choose(order, seed, find_races);
+  Buffer<float> in(width + 40, height + 40), out(width, height);
+  in.for_each_element(
+      [&](int x, int y) { in(x, y) = static_cast<float>((x * 7 + y * 31) % 64 + 1); });
+  out.fill(-1);
+  std::vector<void*> args = {in.raw_buffer(), out.raw_buffer()};
+  Result result;
+  const auto code = jit::compile(function, with_gpu());
+  result.code = code->call(nullptr, args.data());
+  if (result.code == 0) {
+    try {
+      out.copy_to_host();
+      result.values.assign(out.begin(), out.end());
+    } catch (const RuntimeError&) {
+      result.code = 1;
+    }
+  }
+  in.device_deallocate();
+  out.device_deallocate();
+  // A device that has failed is used again.
+  const auto* device = get_device_interface_for_device_api(DeviceAPI::CUDA);
+  if (result.code != 0) device->device_release(nullptr, device);
+  return result;
+}
+
+bool is_real(const ir::LoweredFunction& wrong, const Result& expected) {
+  constexpr uint64_t random_orders = 8;
+  for (const int order :
+       {retrograde_simt_forward, retrograde_simt_reverse, retrograde_simt_warp_ahead}) {
+    if (!(run(wrong, order, false) == expected)) return true;
+  }
+  for (uint64_t seed = 1; seed <= random_orders; ++seed) {
+    if (!(run(wrong, retrograde_simt_random, false, seed) == expected)) return true;
+  }
+  return false;
+}
+
+TEST(GpuFaults, AreFound) {
+  constexpr int wanted = 200;
+  std::map<std::string, int> kinds;
+  int faults = 0, harmless = 0;
+  for (int seed = 0; faults < wanted; ++seed) {
+    Made made(seed);
+    const Module module = made.out.compile_to_module({made.in}, "out", with_gpu());
+    const ir::LoweredFunction right = module.functions()[0].lowered;
+    const int order = seed % 4;
+    const Result expected = run(right, order);
+    ASSERT_EQ(expected.code, 0) << "without a fault, seed " << seed;
+    for (int number = 0; faults < wanted; ++number) {
+      FaultMaker maker(number);
+      ir::LoweredFunction wrong = right;
+      wrong.body = maker(right.body);
+      if (maker.fault.empty()) break;
+      if (!is_real(wrong, expected)) {
+        ++harmless;
+        continue;
+      }
+      ++faults;
+      ++kinds[maker.kind];
+      EXPECT_FALSE(run(wrong, order) == expected)
+          << "seed " << seed << ", not found: " << maker.kind << " " << maker.fault;
+    }
+  }
+  choose(retrograde_simt_forward, 0, true);
+  for (const char* kind : {"barrier", "overlap", "condition"}) EXPECT_GE(kinds[kind], 20) << kind;
+  EXPECT_LT(harmless, 2 * faults) << "few of the faults are any";
+}
+
+}  // namespace
+}  // namespace retrograde

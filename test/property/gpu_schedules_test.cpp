@@ -1,0 +1,51 @@
+// Random pipelines under random GPU schedules: kernels on the simulated device agree with the
+// interpreter in every order of threads, and race nowhere. test/property/fuzz_gpu.cpp goes on from here.
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+
+#include "ir/target.h"
+#include "simt/simt_driver.h"
+#include "testing/check_program.h"
+#include "testing/random_gpu_schedule.h"
+
+namespace retrograde::fuzz {
+namespace {
+
+[[maybe_unused]] const int simulated = setenv("RETROGRADE_GPU", "simulated", 1);
+
+constexpr uint64_t first_seed = 5000;
+constexpr int programs_per_order = 40;
+constexpr double max_refused_fraction = 0.1;
+
+class GpuSchedules : public ::testing::TestWithParam<int> {};
+
+TEST_P(GpuSchedules, KernelsAgreeWithTheInterpreter) {
+  retrograde_simt_options options;
+  retrograde_simt_get_options(&options);
+  options.order = GetParam();
+  retrograde_simt_set_options(&options);
+  const Target target =
+      get_host_target().with_feature(Target::CUDA).with_feature(Target::CUDACapability80);
+  uint64_t compared = 0;
+  int refused = 0;
+  for (int i = 0; i < programs_per_order; ++i) {
+    const uint64_t seed = first_seed + static_cast<uint64_t>(GetParam() * programs_per_order + i);
+    Choices choices(seed);
+    const RandomProgram program = make_program(choices, Style::pipelines());
+    Judged judged = check_with_schedule(
+        program, [&] { schedule_on_gpu(program, choices); }, target);
+    compared += judged.counts["values"];
+    refused += judged.judgement == Judgement::Refused;
+    EXPECT_LE(judged.judgement, Judgement::Refused)
+        << "seed " << seed << " is " << name_of(judged.judgement) << ": " << judged.detail << "\n"
+        << to_text(program) << "Shrink it: fuzz_gpu --seed " << seed;
+  }
+  EXPECT_LE(refused, max_refused_fraction * programs_per_order);
+  EXPECT_GT(compared, 0u);
+}
+
+INSTANTIATE_TEST_SUITE_P(Order, GpuSchedules, ::testing::Range(0, 4));
+
+}  // namespace
+}  // namespace retrograde::fuzz

@@ -1,0 +1,130 @@
+// Programs with GPU schedules on the simulated device: in every order of threads they give what the CPU
+// gives and race nowhere, those that stream ask for few sectors of memory, and whatever call of the driver
+// fails, it is an error, nothing is left behind, and the next run is right.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdlib>
+
+#include "simt/simt_driver.h"
+#include "support/gpu_programs.h"
+
+namespace {
+
+using namespace retrograde;
+
+// Before anything asks for a device.
+[[maybe_unused]] const int simulated = setenv("RETROGRADE_GPU", "simulated", 1);
+
+constexpr int invalid_value = 1, out_of_memory = 2;  // CUresult
+
+Target with_gpu() {
+  return get_host_target().with_feature(Target::CUDA).with_feature(Target::CUDACapability80);
+}
+
+void set(int order, bool profile) {
+  retrograde_simt_options options;
+  retrograde_simt_get_options(&options);
+  options.order = order;
+  options.profile = profile;
+  retrograde_simt_set_options(&options);
+}
+
+// Both round differently: other orders of sums, other functions.
+void expect_close(const Buffer<float>& got, const Buffer<float>& expected) {
+  ASSERT_EQ(got.number_of_elements(), expected.number_of_elements());
+  for (size_t i = 0; i < got.number_of_elements(); ++i) {
+    const float wanted = expected.data()[i];
+    ASSERT_NEAR(got.data()[i], wanted, 2e-5f * std::max(1.0f, std::abs(wanted))) << "element " << i;
+  }
+}
+
+class GpuPrograms : public testing::TestWithParam<gpu_programs::Program> {
+ protected:
+  void TearDown() override { set(retrograde_simt_forward, false); }
+  Buffer<float> on_cpu() const {
+    return GetParam().build(false).realize(GetParam().sizes, get_host_target());
+  }
+};
+
+TEST_P(GpuPrograms, GiveWhatTheCpuGives) {
+  const Buffer<float> expected = on_cpu();
+  Func f = GetParam().build(true);
+  for (int order = retrograde_simt_forward; order <= retrograde_simt_warp_ahead; ++order) {
+    set(order, false);
+    const Buffer<float> got = f.realize(GetParam().sizes, with_gpu());
+    expect_close(got, expected);
+  }
+}
+
+class GpuStreams : public GpuPrograms {};
+
+TEST_P(GpuStreams, AskForFewSectors) {
+  Func f = GetParam().build(true);
+  set(retrograde_simt_forward, true);
+  retrograde_simt_reset_profile();
+  f.realize(GetParam().sizes, with_gpu());
+  retrograde_simt_profile profile = {};
+  ASSERT_TRUE(retrograde_simt_get_profile(nullptr, &profile));
+  EXPECT_GT(profile.ideal_sectors, 0);
+  EXPECT_LE(static_cast<double>(profile.global_sectors),
+            1.1 * static_cast<double>(profile.ideal_sectors))
+      << profile.global_sectors << " sectors, " << profile.ideal_sectors << " had they been dense";
+}
+
+int64_t live_bytes() {
+  retrograde_simt_live live;
+  retrograde_simt_count_live(&live);
+  return live.allocated_bytes;
+}
+
+TEST_P(GpuPrograms, SurviveEachFailureOfTheDriver) {
+  Func f = GetParam().build(true);
+  const Buffer<float> expected = f.realize(GetParam().sizes, with_gpu());
+  // What is kept for later runs is let go of, so that it is not taken for what was left behind.
+  const auto kept = [] {
+    const auto* device = get_device_interface_for_device_api(DeviceAPI::CUDA);
+    device->device_release(nullptr, device);
+    return live_bytes();
+  };
+  const int64_t before = kept();
+  int failures = 0;
+  for (int i = 0;; ++i) {
+    const char* function = retrograde_simt_function(i);
+    if (!function) break;
+    const int64_t first = retrograde_simt_call_count(function);
+    f.realize(GetParam().sizes, with_gpu());
+    const int64_t calls = retrograde_simt_call_count(function) - first;
+    kept();
+    for (int64_t nth = 1; nth <= calls; ++nth) {
+      retrograde_simt_fail_call(function, nth, nth % 2 ? invalid_value : out_of_memory);
+      try {
+        const Buffer<float> got = f.realize(GetParam().sizes, with_gpu());
+        expect_close(got, expected);  // what is asked of a device may be done without
+      } catch (const RuntimeError& error) {
+        EXPECT_NE(std::string(error.what()).find(function), std::string::npos) << error.what();
+        ++failures;
+      }
+      retrograde_simt_call_off();
+      EXPECT_EQ(kept(), before) << "left behind when call " << nth << " of " << function
+                                << " failed";
+      const Buffer<float> after = f.realize(GetParam().sizes, with_gpu());
+      expect_close(after, expected);
+      kept();
+    }
+  }
+  EXPECT_GT(failures, 5);
+}
+
+std::vector<gpu_programs::Program> streaming() {
+  std::vector<gpu_programs::Program> programs = gpu_programs::all();
+  std::erase_if(programs, [](const auto& program) { return !program.is_streaming; });
+  return programs;
+}
+
+INSTANTIATE_TEST_SUITE_P(Programs, GpuStreams, testing::ValuesIn(streaming()),
+                         [](const auto& program) { return program.param.name; });
+INSTANTIATE_TEST_SUITE_P(Programs, GpuPrograms, testing::ValuesIn(gpu_programs::all()),
+                         [](const auto& program) { return program.param.name; });
+
+}  // namespace

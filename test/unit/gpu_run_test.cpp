@@ -1,0 +1,226 @@
+// Pipelines with GPU schedules, run by the simulated device, give what the CPU gives.
+#include <gtest/gtest.h>
+#include <retrograde/retrograde.h>
+
+#include <cstdlib>
+#include <functional>
+
+namespace retrograde {
+namespace {
+
+// Before anything asks for a device.
+[[maybe_unused]] const int simulated = setenv("RETROGRADE_GPU", "simulated", 1);
+
+Target with_gpu() {
+  return get_host_target().with_feature(Target::CUDA).with_feature(Target::CUDACapability80);
+}
+
+Buffer<float> ramp(int width, int height) {
+  Buffer<float> image(width, height);
+  image.for_each_element([&](int x, int y) { image(x, y) = float((x * 7 + y * 13) % 101) / 8; });
+  return image;
+}
+
+// A pipeline is built twice, scheduled for the GPU once.
+using Build = std::function<Func(bool on_gpu)>;
+void agrees(const Build& build, const std::vector<int>& sizes) {
+  Buffer<float> expected = build(false).realize(sizes, get_host_target());
+  Buffer<float> got = build(true).realize(sizes, with_gpu());
+  ASSERT_EQ(got.number_of_elements(), expected.number_of_elements());
+  for (size_t i = 0; i < got.number_of_elements(); ++i)
+    ASSERT_EQ(got.data()[i], expected.data()[i]) << "element " << i;
+}
+
+class GpuRun : public testing::Test {
+ protected:
+  Var x{"x"}, y{"y"}, xi{"xi"}, yi{"yi"}, u{"u"};
+};
+
+TEST_F(GpuRun, PointsOfTiles) {
+  const Buffer<float> in = ramp(100, 60);
+  agrees(
+      [&](bool on_gpu) {
+        Func out("out");
+        out(x, y) = in(x, y) * 2.0f + 1.0f;
+        if (on_gpu) out.gpu_tile(x, y, xi, yi, 16, 8);
+        return out;
+      },
+      {100, 60});
+}
+
+TEST_F(GpuRun, TailsOfEveryKind) {
+  const Buffer<float> in = ramp(101, 61);
+  for (const TailStrategy tail : {TailStrategy::GuardWithIf, TailStrategy::ShiftInwards}) {
+    agrees(
+        [&](bool on_gpu) {
+          Func out("out");
+          out(x, y) = in(x, y) * 2.0f + 1.0f;
+          if (on_gpu) out.gpu_tile(x, y, xi, yi, 16, 8, tail);
+          return out;
+        },
+        {101, 61});
+  }
+}
+
+TEST_F(GpuRun, ATileInSharedMemory) {
+  const Buffer<float> in = ramp(130, 70);
+  agrees(
+      [&](bool on_gpu) {
+        Func rows("rows"), out("out");
+        rows(x, y) = in(x, y) + in(x + 1, y) + in(x + 2, y);
+        out(x, y) = rows(x, y) + rows(x, y + 1) + rows(x, y + 2);
+        if (on_gpu) {
+          out.gpu_tile(x, y, xi, yi, 16, 8);
+          rows.compute_at(out, x).gpu_threads(x, y);
+        }
+        return out;
+      },
+      {128, 68});
+}
+
+TEST_F(GpuRun, ProductsOfMatrices) {
+  const Buffer<float> a = ramp(48, 64), b = ramp(64, 48);
+  agrees(
+      [&](bool on_gpu) {
+        RDom r(0, 48, "r");
+        RVar ro("ro"), ri("ri");
+        Func sum("sum"), out("out"), left("left"), right("right");
+        left(x, y) = a(x, y);
+        right(x, y) = b(x, y);
+        sum(x, y) = 0.0f;
+        sum(x, y) += left(r, y) * right(x, r);
+        out(x, y) = sum(x, y);
+        if (on_gpu) {
+          out.gpu_tile(x, y, xi, yi, 16, 16);
+          sum.compute_at(out, x).store_in(MemoryType::Register).gpu_threads(x, y);
+          sum.update().split(r, ro, ri, 16).reorder(ri, x, y, ro).gpu_threads(x, y);
+          left.compute_at(sum, ro).gpu_threads(x, y);
+          right.compute_at(sum, ro).gpu_threads(x, y);
+        }
+        return out;
+      },
+      {64, 64});
+}
+
+TEST_F(GpuRun, TheHostComputesBetweenKernels) {
+  const Buffer<float> in = ramp(100, 1);
+  agrees(
+      [&](bool on_gpu) {
+        Func first("first"), second("second"), out("out");
+        first(x) = in(x, 0) * 3.0f;
+        second(x) = first(x) + 1.0f;
+        out(x) = second(x) * first(x);
+        first.compute_root();
+        second.compute_root();
+        if (on_gpu) {
+          first.gpu_tile(x, xi, 32);
+          out.gpu_tile(x, xi, 32);
+        }
+        return out;
+      },
+      {100});
+}
+
+TEST_F(GpuRun, UpdatesAreKernelsOfTheirOwn) {
+  const Buffer<float> in = ramp(64, 40);
+  agrees(
+      [&](bool on_gpu) {
+        RDom r(0, 40, "r");
+        Func out("out");
+        out(x) = 1.0f;
+        out(x) += in(x, r);
+        if (on_gpu) {
+          out.gpu_tile(x, xi, 16);
+          out.update().gpu_tile(x, xi, 16);
+        }
+        return out;
+      },
+      {64});
+}
+
+TEST_F(GpuRun, VectorsInsideOfThreads) {
+  const Buffer<float> in = ramp(128, 32);
+  agrees(
+      [&](bool on_gpu) {
+        Func out("out");
+        out(x, y) = in(x, y) + in(x, y) * in(x, y);
+        if (on_gpu) out.vectorize(x, 4).gpu_tile(x, y, xi, yi, 8, 4);
+        return out;
+      },
+      {128, 32});
+}
+
+TEST_F(GpuRun, FewerThreadsThanIterationsTakeTurns) {
+  const Buffer<float> in = ramp(200, 1);
+  agrees(
+      [&](bool on_gpu) {
+        Func sums("sums"), out("out");
+        sums(x) = in(x, 0) + 1.0f;
+        out(x) = sums(x) + sums(x + 9) + sums(x + 50);
+        if (on_gpu) {
+          out.gpu_tile(x, xi, 32, TailStrategy::RoundUp);
+          sums.compute_at(out, x).split(x, x, u, 16).gpu_threads(u);
+        }
+        return out;
+      },
+      {128});
+}
+
+TEST_F(GpuRun, AHistogramByAtomicUpdates) {
+  const Buffer<float> in = ramp(256, 16);
+  agrees(
+      [&](bool on_gpu) {
+        RDom r(0, 256, 0, 16, "r");
+        Func counts("counts"), out("out");
+        counts(x) = 0;
+        counts(clamp(cast<int>(in(r.x, r.y)), 0, 15)) += 1;
+        out(x) = cast<float>(counts(x));
+        counts.compute_root();
+        if (on_gpu) {
+          RVar ro("ro"), ri("ri");
+          counts.gpu_tile(x, xi, 16);
+          counts.update().atomic().split(r.x, ro, ri, 32).gpu_blocks(r.y, ro).gpu_threads(ri);
+        }
+        return out;
+      },
+      {16});
+}
+
+TEST_F(GpuRun, OneThreadDoesAll) {
+  const Buffer<float> in = ramp(40, 1);
+  agrees(
+      [&](bool on_gpu) {
+        RDom r(1, 39, "r");
+        Func out("out");
+        out(x) = in(x, 0);
+        out(r) += out(r - 1);
+        if (on_gpu) {
+          out.gpu_tile(x, xi, 8);
+          out.update().gpu_single_thread();
+        }
+        return out;
+      },
+      {40});
+}
+
+TEST_F(GpuRun, GradientsRunOnGpus) {
+  const Buffer<float> in = ramp(66, 34);
+  agrees(
+      [&](bool on_gpu) {
+        Func image("image"), blurred("blurred"), loss("loss");
+        RDom r(0, 64, 0, 32, "r");
+        image(x, y) = in(x, y);
+        blurred(x, y) = image(x, y) + image(x + 1, y) + image(x, y + 2);
+        loss() = 0.0f;
+        loss() += blurred(r.x, r.y) * blurred(r.x, r.y);
+        Derivative d = propagate_adjoints(loss);
+        Func gradient = d(image);
+        image.compute_root();
+        if (on_gpu) gradient.gpu_tile(x, y, xi, yi, 16, 8);
+        return gradient;
+      },
+      {66, 34});
+}
+
+}  // namespace
+}  // namespace retrograde
