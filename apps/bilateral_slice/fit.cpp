@@ -12,6 +12,7 @@
 #include <string>
 
 #include "common/stop.h"
+#include "common/timing.h"
 #include "diagnostics/error.h"
 #include "peer.h"
 #include "render.h"
@@ -25,10 +26,6 @@ constexpr int block_steps = 5;
 constexpr float first_rate = 0.03f, last_rate = 0.003f;
 
 using Clock = std::chrono::steady_clock;
-
-double seconds_since(Clock::time_point start) {
-  return std::chrono::duration<double>(Clock::now() - start).count();
-}
 
 float rate_of(int step, int steps) {
   return first_rate * std::pow(last_rate / first_rate, static_cast<float>(step) / steps);
@@ -119,11 +116,7 @@ double Series::total_seconds() const {
 }
 
 double Series::median_ms() const {
-  if (seconds.empty()) return 0;  // a run that was resumed at its end
-  std::vector<double> sorted = seconds;
-  const auto middle = sorted.begin() + static_cast<long>(sorted.size() / 2);
-  std::nth_element(sorted.begin(), middle, sorted.end());
-  return 1e3 * *middle;
+  return 1e3 * apps::median(seconds);  // 0 for a run that was resumed at its end
 }
 
 Fit fit(const Shape& shape, std::vector<float>& photo, std::vector<float>& target,
@@ -131,7 +124,7 @@ Fit fit(const Shape& shape, std::vector<float>& photo, std::vector<float>& targe
   Fit fit;
   const auto start = Clock::now();
   Trainer trainer(shape, photo.data(), target.data(), options.threads);
-  fit.ours.compile_seconds = seconds_since(start);
+  fit.ours.compile_seconds = apps::seconds_since(start);
   if (options.resume) restore(trainer, *options.resume);
   PeerRun peer(shape, photo, target, options, fit);
 
@@ -144,7 +137,7 @@ Fit fit(const Shape& shape, std::vector<float>& photo, std::vector<float>& targe
     for (int step = first; step < first + count; ++step) {
       const auto before = Clock::now();
       const double loss = trainer.step(rate_of(step, options.steps));
-      fit.ours.add(loss, seconds_since(before));
+      fit.ours.add(loss, apps::seconds_since(before));
       progress(step + 1, loss);
     }
     peer.run_block(first, count);

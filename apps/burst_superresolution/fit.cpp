@@ -8,6 +8,7 @@
 #include "common/adam.h"
 #include "common/state.h"
 #include "common/stop.h"
+#include "common/timing.h"
 #include "diagnostics/error.h"
 #include "quality.h"
 
@@ -24,10 +25,6 @@ constexpr const char* program = "burst_superresolution";
 constexpr double save_every_seconds = 20;
 constexpr long looks = 60;  // at the truth, over the whole run
 constexpr double explosion = 10;
-
-double seconds_since(Clock::time_point start) {
-  return std::chrono::duration<double>(Clock::now() - start).count();
-}
 
 // What must be the same for a run to go on. The weights that the noise asks for follow from the rest.
 std::string problem_of(const Options& options, const Burst& burst) {
@@ -61,7 +58,7 @@ class Optimization {
     auto saved = Clock::now();
     while (step()) {
       shown(fit_.series.back());
-      if (seconds_since(saved) < save_every_seconds) continue;
+      if (apps::seconds_since(saved) < save_every_seconds) continue;
       save();
       saved = Clock::now();
     }
@@ -69,7 +66,7 @@ class Optimization {
     save();
     fit_.refused = adam_.refused();
     fit_.stopped = apps::stop_requested();
-    fit_.ms_per_step = 1e3 * median_step_seconds();
+    fit_.ms_per_step = 1e3 * apps::median(step_seconds_);
     return std::move(fit_);
   }
 
@@ -95,7 +92,7 @@ class Optimization {
     look(loss, over);
     if (over) return false;
     adam_.step(std::span<float>(x_), loss, std::span<const float>(gradient_));
-    step_seconds_.push_back(seconds_since(start) - looking_);
+    step_seconds_.push_back(apps::seconds_since(start) - looking_);
     fit_.seconds += step_seconds_.back();
     ++fit_.steps;
     return true;
@@ -119,19 +116,12 @@ class Optimization {
     // Where a run went on, its first sample is the last one's.
     if (!fit_.series.empty() && fit_.series.back().step == sample.step) fit_.series.pop_back();
     fit_.series.push_back(sample);
-    looking_ = seconds_since(start);
+    looking_ = apps::seconds_since(start);
   }
 
   [[noreturn]] static void refuse_start(double loss) {
     retrograde::call_error("optimize from this start", "the loss must be finite there",
                            text("it is ", loss), "Give other frames");
-  }
-
-  double median_step_seconds() {
-    if (step_seconds_.empty()) return 0;
-    const auto middle = step_seconds_.begin() + static_cast<long>(step_seconds_.size() / 2);
-    std::nth_element(step_seconds_.begin(), middle, step_seconds_.end());
-    return *middle;
   }
 
   void save() const {

@@ -8,6 +8,7 @@
 
 #include "common/progress.h"
 #include "common/stop.h"
+#include "common/timing.h"
 #include "diagnostics/error.h"
 #include "training.h"
 
@@ -18,17 +19,6 @@ namespace {
 constexpr const char* program = "deconvolution";
 // At the held-out photographs, over the whole run; at each the state is saved, too.
 constexpr long looks = 20, least_between = 25;
-
-double seconds_since(std::chrono::steady_clock::time_point start) {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-}
-
-double median(std::vector<double> values) {
-  if (values.empty()) return 0;
-  const auto middle = values.begin() + static_cast<long>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 // Read before anything is compiled, so that a bad one is told at once.
 std::optional<apps::State> state_of(const Options& options) {
@@ -91,7 +81,7 @@ class Run {
                      .y_label = "PSNR [dB]",
                      .series = {quality_}});
     report.own["refused_steps"] = trainer_.adam().refused();
-    report.own["ms_per_step"] = 1e3 * median(step_seconds_);
+    report.own["ms_per_step"] = 1e3 * apps::median(step_seconds_);
     report.own["compile_seconds"] = trainer_.compile_seconds();
   }
 
@@ -105,7 +95,7 @@ class Run {
   void step() {
     const auto start = std::chrono::steady_clock::now();
     const double loss = trainer_.step();
-    step_seconds_.push_back(seconds_since(start));
+    step_seconds_.push_back(apps::seconds_since(start));
     seconds_ += step_seconds_.back();
     smooth_ = steps_ > 0 ? 0.98 * smooth_ + 0.02 * loss : loss;
     ++steps_;

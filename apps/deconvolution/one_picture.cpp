@@ -8,6 +8,7 @@
 #include "common/images.h"
 #include "common/progress.h"
 #include "common/stop.h"
+#include "common/timing.h"
 #include "diagnostics/error.h"
 #include "simulation.h"
 
@@ -19,10 +20,6 @@ namespace {
 
 constexpr int channels = 3;
 constexpr size_t watched = 1;  // green, whose quality is on the plot
-
-double seconds_since(std::chrono::steady_clock::time_point start) {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-}
 
 // What is to be deconvolved, a problem for each channel.
 struct Picture {
@@ -117,7 +114,7 @@ class Run {
   int iterations_of(const Method& m) const { return options_.iterations * m.weights.stages; }
   bool is_over() const {
     const double limit = options_.common.seconds;
-    return apps::stop_requested() || (limit > 0 && seconds_since(start_) >= limit);
+    return apps::stop_requested() || (limit > 0 && apps::seconds_since(start_) >= limit);
   }
 
   void show_blurred() {
@@ -156,14 +153,14 @@ class Run {
         progress.show(static_cast<int>(before) + count, method.name);
         if (c == watched && picture_.has_truth) {
           const std::vector<float> now(images.begin(), images.end());
-          series.x.push_back(seconds_since(channel_start));
+          series.x.push_back(apps::seconds_since(channel_start));
           series.y.push_back(psnr_db(cropped(now, channel.problem.extent), channel.truth));
         }
         return !is_over();
       }));
       done_ = before + iterations_of(method);
     }
-    keep(method, planes, seconds_since(begin));
+    keep(method, planes, apps::seconds_since(begin));
     if (!series.x.empty()) series_.push_back(series);
   }
 

@@ -8,6 +8,7 @@
 
 #include "common/progress.h"
 #include "common/stop.h"
+#include "common/timing.h"
 #include "training.h"
 
 namespace demosaic {
@@ -16,17 +17,6 @@ namespace {
 
 constexpr const char* program = "demosaic";
 constexpr int looks = 40;  // at the held-out photographs, over the whole run
-
-double seconds_since(std::chrono::steady_clock::time_point start) {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-}
-
-double median(std::vector<double> values) {
-  if (values.empty()) return 0;
-  const auto middle = values.begin() + static_cast<long>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 // Read before anything is compiled, so that a bad one is told at once.
 std::optional<apps::State> state_of(const Options& options) {
@@ -63,7 +53,7 @@ class Run {
     }
     if (quality_.x.back() != seconds_) look();
     save();
-    return {trainer_.weights(), steps_, seconds_, 1e3 * median(step_seconds_),
+    return {trainer_.weights(), steps_, seconds_, 1e3 * apps::median(step_seconds_),
             apps::stop_requested()};
   }
 
@@ -89,7 +79,7 @@ class Run {
   void step() {
     const auto start = std::chrono::steady_clock::now();
     const double loss = trainer_.step();
-    step_seconds_.push_back(seconds_since(start));
+    step_seconds_.push_back(apps::seconds_since(start));
     seconds_ += step_seconds_.back();
     ++steps_;
     smooth_ = smooth_ > 0 ? 0.98 * smooth_ + 0.02 * loss : loss;
@@ -152,10 +142,10 @@ apps::Table time_steps(const Options& options, const Dataset& dataset) {
     for (int step = 0; step < timed; ++step) {
       const auto start = std::chrono::steady_clock::now();
       trainer.step();
-      seconds.push_back(seconds_since(start));
+      seconds.push_back(apps::seconds_since(start));
     }
     table.rows.push_back({groups.size() > 1 ? std::string("all") : groups[0], trainer.stages(),
-                          1e3 * median(seconds)});
+                          1e3 * apps::median(seconds)});
   }
   return table;
 }

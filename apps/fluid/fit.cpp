@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "common/stop.h"
+#include "common/timing.h"
 #include "diagnostics/error.h"
 
 namespace fluid {
@@ -214,13 +215,7 @@ const MethodRun& Fit::best() const {
   });
 }
 
-double Fit::median_gradient_seconds() const {
-  if (gradient_seconds.empty()) return 0;
-  std::vector<double> sorted = gradient_seconds;
-  const auto middle = sorted.begin() + static_cast<long>(sorted.size() / 2);
-  std::nth_element(sorted.begin(), middle, sorted.end());
-  return *middle;
-}
+double Fit::median_gradient_seconds() const { return apps::median(gradient_seconds); }
 
 Fit optimize(const Options& options, Control<float>& control, const std::vector<double>& start,
              const std::function<void(const std::string&, long, double)>& shown) {
