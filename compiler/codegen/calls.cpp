@@ -14,13 +14,6 @@ using namespace ir;
 // Lane by lane: the C function knows no vectors.
 static Value* extern_call(Values& values, const Call& e) {
   FunctionContext& c = values.c;
-  if (c.e.machine.is_device()) {
-    unsupported("call the C function " + quoted(e.name) + " on a GPU",
-                "kernels call no functions of the host",
-                "a loop over GPU blocks is around the call",
-                "Compute the Func that calls it on the host: leave out its gpu_ directives, and "
-                "compute it at the root");
-  }
   std::vector<Value*> args;
   std::vector<llvm::Type*> params;
   for (const Expr& arg : e.args) {

@@ -11,10 +11,10 @@ using namespace ir;
 
 namespace {
 
-struct ProfilerCall {
+struct PairedCall {
   const char *begins, *ends;
 };
-constexpr ProfilerCall profiler_calls[] = {
+constexpr PairedCall paired_calls[] = {
     {"retrograde_profiler_begin", "retrograde_profiler_end"},
     {"retrograde_profiler_thread", "retrograde_profiler_leave"},
     {"retrograde_device_buffer", "retrograde_device_buffer_free"},
@@ -22,9 +22,9 @@ constexpr ProfilerCall profiler_calls[] = {
 
 // What was begun is ended by a function that leaves early, too.
 void keep_farewell(FunctionContext& c, const std::string& name, Value* result) {
-  for (const ProfilerCall& call : profiler_calls) {
+  for (const PairedCall& call : paired_calls) {
     if (name == call.begins) {
-      c.frame.farewells.push_back({call.ends, c.entry_alloca(c.b.getPtrTy(), 1, "profiled")});
+      c.frame.farewells.push_back({call.ends, c.entry_alloca(c.b.getPtrTy(), 1, "due")});
       c.b.CreateStore(result, c.frame.farewells.back().argument);
     }
     if (name != call.ends) continue;

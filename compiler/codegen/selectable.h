@@ -15,7 +15,7 @@ const std::vector<llvm::Intrinsic::ID>& selectable_intrinsics();
 
 // The first thing in `module` that NVPTX does not select, or selects and gets wrong: fences, calls of what
 // the module has no code for, remainders of floats (quotients beyond 2^24 are rounded), atomics that are more
-// than relaxed (they become relaxed), 16-byte integers and floats. Empty: there is none.
+// than relaxed (they become relaxed), floats of 16 bytes, variables of the host. Empty: there is none.
 std::string find_unselectable(const llvm::Module& module);
 
 }  // namespace retrograde::codegen
