@@ -13,6 +13,7 @@
 #include "ir/print.h"
 #include "ir/visit.h"
 #include "lower/device/kernel.h"
+#include "lower/in_full.h"
 #include "lower/nests/copy_statement.h"
 #include "lower/statement_rewriter.h"
 #include "simplify/facts.h"
@@ -182,15 +183,6 @@ class MemoryChooser : public StatementRewriter {
 };
 
 }  // namespace
-
-Expr in_full(const Expr& e, const Substitution& lets) {
-  Substitution needed;
-  walk(e, [&](const Variable& v) {
-    const auto value = lets.find(v.name);
-    if (value != lets.end() && !needed.count(v.name)) needed[v.name] = in_full(value->second, lets);
-  });
-  return needed.empty() ? e : substitute(e, needed);
-}
 
 void choose_threads(Kernel& kernel) {
   ThreadChooser(kernel).choose();

@@ -21,7 +21,6 @@
 
 #include "ir/build.h"
 #include "ir/expr.h"
-#include "ir/visit.h"
 
 namespace retrograde::lower {
 
@@ -38,9 +37,6 @@ struct Kernel {
   std::vector<Heap> heap;
   Stmt body;
 };
-
-// `e` with the values of `lets` in it, and theirs.
-Expr in_full(const Expr& e, const Substitution& lets);
 
 // Whether loops over threads are in the statement.
 bool has_threads(const Stmt& s);

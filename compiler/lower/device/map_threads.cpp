@@ -13,6 +13,7 @@
 #include "diagnostics/error.h"
 #include "ir/visit.h"
 #include "lower/device/kernel.h"
+#include "lower/in_full.h"
 #include "lower/nests/copy_statement.h"
 #include "simplify/facts.h"
 #include "simplify/simplify.h"

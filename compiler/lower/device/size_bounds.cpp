@@ -3,6 +3,7 @@
 #include <limits>
 
 #include "ir/build.h"
+#include "lower/in_full.h"
 #include "simplify/simplify.h"
 
 namespace retrograde::lower {

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "analysis/interval.h"
+#include "ir/visit.h"
 #include "lower/device/kernel.h"
 #include "simplify/facts.h"
 

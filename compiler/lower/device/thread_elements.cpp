@@ -6,6 +6,7 @@
 
 #include "analysis/linear.h"
 #include "ir/visit.h"
+#include "lower/in_full.h"
 #include "simplify/facts.h"
 #include "simplify/simplify.h"
 
@@ -61,7 +62,7 @@ class AccessWalker : public Rewriter {
       base = ramp->base;
     }
     if (!base.type().is_scalar()) return std::nullopt;
-    base = in_full(base);
+    base = in_full(base, lets_);
     // Inner loops first: where they begin may depend on outer ones.
     std::vector<std::string> names;
     for (auto loop = loops_.rbegin(); loop != loops_.rend(); ++loop) {
@@ -106,22 +107,13 @@ class AccessWalker : public Rewriter {
 
  private:
   Stmt in_loop(const Stmt& s, const For& loop) {
-    LoopAround around{loop.name, in_full(loop.min),
-                      largest_extent(in_full(loop.extent)).value_or(0)};
+    LoopAround around{loop.name, in_full(loop.min, lets_),
+                      largest_extent(in_full(loop.extent, lets_)).value_or(0)};
     if (is_gpu_thread(loop.runs)) around.thread = thread_depth(loop.body);
     loops_.push_back(std::move(around));
     Stmt result = children(s);
     loops_.pop_back();
     return result;
-  }
-
-  Expr in_full(const Expr& e) const {
-    Substitution needed;
-    walk(e, [&](const Variable& v) {
-      const auto value = lets_.find(v.name);
-      if (value != lets_.end() && !needed.count(v.name)) needed[v.name] = in_full(value->second);
-    });
-    return needed.empty() ? e : substitute(e, needed);
   }
 
   const Kernel& kernel_;

@@ -25,6 +25,7 @@
 #include "ir/build.h"
 #include "ir/print.h"
 #include "ir/visit.h"
+#include "lower/in_full.h"
 #include "lower/loops/choice_arms.h"
 #include "lower/nests/copy_statement.h"
 #include "lower/statement_rewriter.h"
@@ -76,21 +77,11 @@ class Unroller : public StatementRewriter {
                       under(!choice.condition, choice.when_false));
   }
 
-  // In terms of names that are not bound by lets.
-  Expr in_full(const Expr& e) const {
-    Substitution needed;
-    walk(e, [&](const Variable& v) {
-      const auto value = values_.find(v.name);
-      if (value != values_.end() && !needed.count(v.name)) needed[v.name] = in_full(value->second);
-    });
-    return needed.empty() ? e : substitute(e, needed);
-  }
-
   // A constant that the extent does not exceed where the loop runs.
   std::optional<int64_t> largest(const Expr& extent) const {
     Facts facts;
-    for (const Expr& condition : conditions_) facts.assume(simplify(in_full(condition)));
-    const Expr value = simplify(in_full(extent));
+    for (const Expr& condition : conditions_) facts.assume(simplify(in_full(condition, values_)));
+    const Expr value = simplify(in_full(extent, values_));
     const int64_t most = std::min(facts.range(value).max, facts.upper_bound(sum_of(value)));
     return most <= most_guarded ? std::optional(std::max<int64_t>(most, 0)) : std::nullopt;
   }
