@@ -34,9 +34,10 @@ Table gradient_table(const std::vector<GradientRow>& rows);
 // Throws retrograde::UserError when an error is larger than its limit, or no number.
 void require_gradients(const std::vector<GradientRow>& rows);
 
-// max |a - b| / max |b|: 0 where both are all zeros, NaN where a value is not finite in `own` but in
-// `exact`. Elements that are not finite in both alike do not count.
-double relative_error(std::span<const double> own, std::span<const double> exact);
+// max |a - b| / max(max |b|, least): 0 where both are all zeros, NaN where a value is not finite in `own`
+// but in `exact`. Elements that are not finite in both alike do not count. `least`: what is smaller is
+// nothing, as a gradient is of which rounding alone is left.
+double relative_error(std::span<const double> own, std::span<const double> exact, double least = 0);
 
 struct StabilityRow {
   std::string name;

@@ -18,23 +18,46 @@ def drawable(series, plot):
         yield n, x, y
 
 
-def add_series(axes, series, plot):
-    """Whether there was anything to draw."""
+# Where a label may stand beside its point, in points; the nearest place that is free is taken.
+PLACES = [(side * (5 + 3 * far), up * (5 + 9 * far) - 3) for far in range(5) for side in (1, -1) for up in (0, 1, -1)]
+
+
+def place_labels(figure, axes, labels):
+    """Each beside its point, over no other label and no other point, where there is such a place."""
+    renderer = figure.canvas.get_renderer()
+    dots = [axes.transData.transform((x, y)) for _, x, y in labels]
+    frame, taken = axes.get_window_extent(renderer), []
+    for n, (text, x, y) in enumerate(labels):
+        for dx, dy in PLACES:
+            label = axes.annotate(text, (x, y), textcoords="offset points", xytext=(dx, dy), fontsize=8,
+                                  ha="left" if dx > 0 else "right",
+                                  arrowprops={"arrowstyle": "-", "lw": 0.4} if abs(dy) > 12 else None)
+            box = label.get_window_extent(renderer)
+            is_free = (frame.x0 <= box.x0 and box.x1 <= frame.x1 and not any(box.overlaps(other) for other in taken)
+                       and not any(box.contains(*dot) for m, dot in enumerate(dots) if m != n))
+            if is_free or (dx, dy) == PLACES[-1]:
+                taken.append(box)
+                break
+            label.remove()
+
+
+def add_series(axes, series, plot, labels):
+    """Whether there was anything to draw; what is to be written beside its points goes into labels."""
     points = list(drawable(series, plot))
     xs, ys = [p[1] for p in points], [p[2] for p in points]
     if not series["labels"]:
         axes.plot(xs, ys, label=series["name"], marker="." if len(points) < 3 else None)
         return bool(points)
     axes.plot(xs, ys, "o", label=series["name"])
-    for n, x, y in points:
-        axes.annotate(series["labels"][n], (x, y), textcoords="offset points", xytext=(5, 4), fontsize=8)
+    labels += [(series["labels"][n], x, y) for n, x, y in points]
     return bool(points)
 
 
 def draw(plot, path):
     figure, axes = plt.subplots(figsize=(8, 5), dpi=120)
     # Axes without a point cannot be logarithmic.
-    drawn = [add_series(axes, series, plot) for series in plot["series"]]
+    labels = []
+    drawn = [add_series(axes, series, plot, labels) for series in plot["series"]]
     if plot["log_x"] and any(drawn):
         axes.set_xscale("log")
     if plot["log_y"] and any(drawn):
@@ -46,6 +69,7 @@ def draw(plot, path):
     if any(series["name"] for series in plot["series"]):
         axes.legend()
     figure.tight_layout()
+    place_labels(figure, axes, labels)
     save(figure, path)
 
 

@@ -230,6 +230,8 @@ TEST(AppChecks, ErrorsAreRelativeToTheLargest) {
   EXPECT_TRUE(std::isnan(apps::relative_error(lost, exact)));
   const std::vector<double> zeros{0, 0, 0};
   EXPECT_EQ(apps::relative_error(zeros, zeros), 0);
+  const std::vector<double> rounding{1e-12, -1e-12, 0};
+  EXPECT_NEAR(apps::relative_error(rounding, zeros, 1e-6), 1e-6, 1e-12);
 }
 
 TEST(AppChecks, DivergingIsNotComingBack) {
