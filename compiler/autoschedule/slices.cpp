@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <optional>
 #include <string>
+#include <unordered_map>
+#include <utility>
 
 #include "autoschedule/read_estimate.h"
 #include "autoschedule/running_sums.h"
@@ -23,7 +25,9 @@ class Slicer {
  public:
   explicit Slicer(const SizeEstimate& sizes) : sizes_(sizes) {}
 
-  // The innermost of the reader's outer loops of which each iteration reads a slice of its own.
+  // The innermost of the reader's outer loops of which each iteration reads a slice of its own, of f and
+  // of all that is computed inside of f: of these, what does not move with the loop would be computed
+  // again in each iteration.
   std::optional<std::string> loop(const FuncPtr& f, const Reader& reader) const {
     const StageLoops& loops = reader.func->stage(reader.stage).schedule;
     std::optional<std::string> result;
@@ -31,14 +35,27 @@ class Slicer {
     for (auto dim = loops.dims.rbegin(); dim != loops.dims.rend(); ++dim) {
       const auto extent = extent_of(reader, *dim);
       const bool is_enough = extent && *extent >= (result ? 2 : sizes_.machine().enough_tasks);
-      if (!is_enough || left <= slice_dimensions || !sliced_by(*f, reader, dim->var)) break;
+      if (!is_enough || left <= slice_dimensions || !slices_all(*f, reader, dim->var)) break;
       result = dim->var;
       --left;
     }
     return result;
   }
 
+  void moved(const FuncPtr& f, const Reader& reader) {
+    inside_[reader.func.get()].emplace_back(f, reader);
+  }
+
  private:
+  bool slices_all(const FuncContents& f, const Reader& reader, const std::string& var) const {
+    const auto dimension = sliced_by(f, reader, var);
+    if (!dimension) return false;
+    const auto found = inside_.find(&f);
+    return found == inside_.end() || std::ranges::all_of(found->second, [&](const auto& member) {
+             return slices_all(*member.first, member.second, f.args[*dimension]);
+           });
+  }
+
   // Of a loop over one of the reader's pure variables as it stands.
   std::optional<int64_t> extent_of(const Reader& reader, const Dim& dim) const {
     const FuncContents& g = *reader.func;
@@ -50,6 +67,8 @@ class Slicer {
   }
 
   const SizeEstimate& sizes_;
+  // What has moved into the loops of a Func.
+  std::unordered_map<const Symbol*, std::vector<std::pair<FuncPtr, Reader>>> inside_;
 };
 
 }  // namespace
@@ -83,7 +102,7 @@ void compute_in_slices(const Readers& readers, const std::vector<FuncPtr>& store
     return f->args.size() > slice_dimensions && !f->is_extern() && !is_partial &&
            !but.contains(f.get());
   };
-  const Slicer slicer(sizes);
+  Slicer slicer(sizes);
   for (const FuncPtr& f : stored) {
     if (!is_at_root(*f) || !may_have_slices(f) || !readers.is_inside(f) || readers.is_output(f))
       continue;
@@ -91,8 +110,10 @@ void compute_in_slices(const Readers& readers, const std::vector<FuncPtr>& store
     if (!reader || !is_at_root(*reader->func) || but.contains(reader->func.get()) ||
         is_running_sum(*f, *reader->func))
       continue;
-    if (const auto loop = slicer.loop(f, *reader))
+    if (const auto loop = slicer.loop(f, *reader)) {
       Func(f).compute_at(retrograde::LoopLevel(Func(reader->func), Var(*loop), reader->stage));
+      slicer.moved(f, *reader);
+    }
   }
 }
 

@@ -7,7 +7,7 @@
 //                                               for y, x: across = ...
 //                                               for y, x: distance += ...
 //
-// No element is computed twice, and of `across` there is an image for each thread instead of one for
+// No element is computed twice, in chains of these neither, and of `across` there is an image for each thread instead of one for
 // each dx and dy.
 #pragma once
 

@@ -101,6 +101,39 @@ TEST(SlicesOfAFunc, AreNotWhereAnIterationReadsTwo) {
   EXPECT_EQ(Shifted(11, 2).place_of_rows().kind, graph::LoopLevel::Kind::Root);
 }
 
+// A histogram of each tile of several pictures, blurred along its bins, then along rows of tiles.
+struct BlurredHistograms {
+  BlurredHistograms() {
+    const RDom pixel(0, 4, 0, 4);
+    const auto value = [&](const Expr& px, const Expr& py) {
+      return (px * 7 + py * 13 + n) % bins;
+    };
+    counts(x, y, z, n) = 0.0f;
+    counts(x, y, value(4 * x + pixel.x, 4 * y + pixel.y), n) += 1.0f;
+    deep(x, y, z, n) = counts(x, y, clamp(z - 1, 0, bins - 1), n) + counts(x, y, z, n);
+    wide(x, y, z, n) = deep(x, y, z, n) + deep(x, y + 1, z, n);
+    out(x, y, z, n) = wide(x, y, z, n) + wide(x + 1, y, z, n);
+  }
+  static constexpr int bins = 24;
+  Var x{"x"}, y{"y"}, z{"z"}, n{"n"};
+  Func counts{"counts"}, deep{"deep"}, wide{"wide"}, out{"out"};
+};
+
+// Each bin of `wide` reads one of `deep`, but all of a histogram is made at once.
+TEST(SlicesOfAFunc, AreNotWhereWhatIsInsideThemWouldBeComputedAgain) {
+  BlurredHistograms scheduled, plain;
+  scheduled.out.set_estimates({{0, 12}, {0, 12}, {0, 24}, {0, 16}});
+  Pipeline(scheduled.out).auto_schedule(get_host_target());
+  const auto place = [](const Func& f) { return f.function()->schedule.compute_level; };
+  ASSERT_EQ(place(scheduled.counts).kind, graph::LoopLevel::Kind::At);
+  EXPECT_EQ(place(scheduled.counts).var, "n");
+  ASSERT_EQ(place(scheduled.deep).kind, graph::LoopLevel::Kind::At);
+  EXPECT_EQ(place(scheduled.deep).var, "n");
+  const Buffer<float> found = scheduled.out.realize({12, 12, 24, 16}),
+                      expected = plain.out.realize({12, 12, 24, 16});
+  expected.for_each_element([&](const int* at) { EXPECT_EQ(found(at), expected(at)); });
+}
+
 // A window around each pixel for each of many shifts, of which the sum at two places is wanted.
 struct ShiftedWindows {
   explicit ShiftedWindows(int shifts, int apart = 1) {
