@@ -145,9 +145,9 @@ double held_by(Type type, double v) {
   return ir::Scalar::of_float(type.bits() < 32 ? type : Float(32), v).as_double();
 }
 
-Values realize(Func f, const Shape& shape) { return realize_values(std::move(f), shape)[0]; }
+Values realize(Func& f, const Shape& shape) { return realize_values(f, shape)[0]; }
 
-std::vector<Values> realize_values(Func f, const Shape& shape) {
+std::vector<Values> realize_values(Func& f, const Shape& shape) {
   std::vector<Buffer<>> out = ir::mapped(f.types(), [&](Type t) { return new_buffer(t, shape); });
   f.realize(Realization(out));
   return ir::mapped(
@@ -208,7 +208,7 @@ std::vector<std::vector<Values>> Batch::realize() {
   if (entries_.empty()) return result;
   together_ = together_ && realize_together(result);
   if (together_) return result;
-  for (const Entry& e : entries_) result.push_back(realize_values(e.func, e.shape));
+  for (Entry& e : entries_) result.push_back(realize_values(e.func, e.shape));
   return result;
 }
 

@@ -46,9 +46,10 @@ Buffer<> new_buffer(Type type, const Shape& shape);
 // Of floats of any width.
 Values values_of(const Buffer<>& buffer);
 void fill(Buffer<>& buffer, const Values& values);
-Values realize(Func f, const Shape& shape);
+// By reference: what was compiled is kept in the Func, and a copy would be compiled again.
+Values realize(Func& f, const Shape& shape);
 // One array for each value of the Func; empty for those that are no floats.
-std::vector<Values> realize_values(Func f, const Shape& shape);
+std::vector<Values> realize_values(Func& f, const Shape& shape);
 // What computes the values of `f` over the shape: `f` itself, or, where nobody scheduled any of its
 // Funcs, a copy of them with the built-in schedule. Reductions that read reductions are computed
 // again for each read otherwise.

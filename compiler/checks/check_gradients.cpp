@@ -163,7 +163,7 @@ class Checker {
           propagate_adjoints(wide_output_, seed(wide_output_), bounds(), store));
     }
     for (const auto& p : parameters_of(all)) bind(p);
-    const Func primal = scheduled_for(output_, shape_);
+    Func primal = scheduled_for(output_, shape_);
     report_.primal_seconds = timed_warm([&] { return realize_values(primal, shape_); }).seconds;
     wide_primal_ = scheduled_for(wide_output_, shape_);
     complex_ = complex_graph(wide_output_);

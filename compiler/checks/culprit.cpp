@@ -97,7 +97,8 @@ std::optional<std::string> culprit_in(const FuncContents& f, int stage, int valu
   if (!run) return std::nullopt;
   if (run->operations.empty()) return "";
   const Definition& d = f.stage(stage);
-  const Values values = realize(probe(d, *run), run->shape);
+  Func looked_at = probe(d, *run);
+  const Values values = realize(looked_at, run->shape);
   for (size_t n = 0; n < values.size(); ++n) {
     if (std::isfinite(values[n])) continue;
     const std::vector<int> point = place_of(n, run->shape);

@@ -1,9 +1,11 @@
 // check_gradients finds right gradients right and wrong ones wrong. A wrong gradient is made with
 // stop_gradient, whose derivative is not that of the values; lost digits by a cancellation.
+#include <map>
 #include <nlohmann/json.hpp>
 
 #include "autodiff/custom_derivative.h"
 #include "checks/check_gradients.h"
+#include "diagnostics/pass_observer.h"
 #include "frontend/data/image_param.h"
 #include "frontend/data/param.h"
 #include "gradient/gradient_check.h"
@@ -46,6 +48,23 @@ TEST_F(CheckGradients, ARightGradientHasSmallErrors) {
   }
   EXPECT_GE(report.funcs.size(), 4u);
   EXPECT_EQ(report.complex_step_refused, "");
+}
+
+// Differences run the primal some seventy times.
+TEST_F(CheckGradients, NothingIsCompiledTwice) {
+  Func f("f"), loss("loss");
+  RDom all(0, 12, 0, 9);
+  f(x, y) = exp(image(x, y)) * gain;
+  loss() += f(all.x, all.y) * f(all.x, all.y);
+  std::map<std::string, int> compiled;
+  {
+    PassObserver observer([&](const PassReport& report) {
+      if (report.pass == "build_loop_nests") ++compiled[report.pipeline];
+    });
+    check_gradients(loss, {}, {.wrt = {image}});
+  }
+  EXPECT_GE(compiled.size(), 5u);
+  for (const auto& [pipeline, times] : compiled) EXPECT_EQ(times, 1) << pipeline;
 }
 
 // Every operator that has a complex form, and both kinds of stages.
