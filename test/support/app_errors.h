@@ -14,6 +14,7 @@
 #include <utility>
 #include <vector>
 
+#include "common/images.h"
 #include "support/temporary_folder.h"
 
 class AppErrors : public testing::Test {
@@ -59,6 +60,47 @@ class AppErrors : public testing::Test {
     for (const auto& entry : std::filesystem::directory_iterator(out())) {
       ADD_FAILURE() << "left behind: " << entry.path();
     }
+  }
+
+  // Runs it with these words: it refuses them so, and leaves no results.
+  void refused(const std::vector<std::string>& words, const std::vector<std::string>& parts) {
+    std::string line;
+    for (const std::string& word : words) line += " '" + word + "'";
+    run(line);
+    expect_refused(parts);
+    expect_no_results();
+  }
+
+  void refused_input(const std::filesystem::path& input, const std::vector<std::string>& parts,
+                     const std::vector<std::string>& more = {}) {
+    std::vector<std::string> words{"--input", input, "--output", out()};
+    words.insert(words.end(), more.begin(), more.end());
+    refused(words, parts);
+  }
+
+  // A picture of noise, which no compression makes small.
+  std::filesystem::path write_noise(const std::string& name, int width, int height,
+                                    int channels = 3) {
+    apps::Image image{width, height, 8, {}, channels};
+    uint32_t noise = 1;
+    for (long n = 0; n < image.elems(); ++n) {
+      noise = noise * 1664525 + 1013904223;
+      image.pixels.push_back(static_cast<float>(noise >> 24) / 255.0f);
+    }
+    std::filesystem::create_directories((folder_ / name).parent_path());
+    apps::write_image(folder_ / name, image);
+    return folder_ / name;
+  }
+
+  // What every app says to files that are no whole pictures.
+  void expect_refuses_damaged_pictures() {
+    refused_input(folder_ / "nowhere.png", {"nowhere.png", "must be an image file"});
+    std::ofstream(folder_ / "text.png") << "this is no picture";
+    refused_input(folder_ / "text.png", {"text.png", "OpenImageIO decodes"});
+    std::filesystem::copy_file(write_noise("whole.png", 300, 200), folder_ / "half.png");
+    std::filesystem::resize_file(folder_ / "half.png",
+                                 std::filesystem::file_size(folder_ / "half.png") / 2);
+    refused_input(folder_ / "half.png", {"half.png", "damaged or truncated"});
   }
 
   std::filesystem::path out() const { return folder_ / "out"; }

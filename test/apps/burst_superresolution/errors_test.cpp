@@ -16,15 +16,6 @@ class BurstErrors : public AppErrors {
  protected:
   BurstErrors() : AppErrors("burst_superresolution", BURST_PROGRAM) {}
 
-  fs::path write(const std::string& name, int width, int height, int channels = 3) {
-    apps::Image image{width, height, 8, {}, channels};
-    for (long n = 0; n < image.elems(); ++n)
-      image.pixels.push_back(static_cast<float>(n * 37 % 256) / 255);
-    fs::create_directories((folder_ / name).parent_path());
-    apps::write_image(folder_ / name, image);
-    return folder_ / name;
-  }
-
   void refused(const fs::path& input, const std::vector<std::string>& parts,
                const std::string& more = "") {
     run("--input " + input.string() + " --output " + out().string() + " " + more);
@@ -33,18 +24,11 @@ class BurstErrors : public AppErrors {
   }
 };
 
-TEST_F(BurstErrors, MissingAndDamagedFiles) {
-  refused(folder_ / "nowhere.png", {"nowhere.png", "must be an image file"});
-  std::ofstream(folder_ / "text.png") << "this is no picture";
-  refused(folder_ / "text.png", {"text.png", "OpenImageIO decodes"});
-  fs::copy_file(write("whole.png", 300, 200), folder_ / "half.png");
-  fs::resize_file(folder_ / "half.png", fs::file_size(folder_ / "half.png") / 2);
-  refused(folder_ / "half.png", {"half.png", "damaged or truncated"});
-}
+TEST_F(BurstErrors, MissingAndDamagedFiles) { expect_refuses_damaged_pictures(); }
 
 TEST_F(BurstErrors, PhotographsTooSmallToMoveIn) {
-  refused(write("dot.png", 1, 1), {"dot.png", "2 x 2 pixels", "it has 1 x 1"});
-  refused(write("small.png", 40, 40), {"small.png", "a border of", "40 x 40"});
+  refused(write_noise("dot.png", 1, 1), {"dot.png", "2 x 2 pixels", "it has 1 x 1"});
+  refused(write_noise("small.png", 40, 40), {"small.png", "a border of", "40 x 40"});
 }
 
 TEST_F(BurstErrors, NoNumbers) {
@@ -63,25 +47,25 @@ TEST_F(BurstErrors, HugePhotographs) {
 TEST_F(BurstErrors, FoldersWithoutFrames) {
   fs::create_directory(folder_ / "empty");
   refused(folder_ / "empty", {"empty", "a folder with images in it"});
-  write("colour/a.png", 32, 32);
+  write_noise("colour/a.png", 32, 32);
   refused(folder_ / "colour", {"a.png", "a mosaic has one channel"}, "--mosaic RGGB");
-  write("gray/a.png", 32, 32, 1);
+  write_noise("gray/a.png", 32, 32, 1);
   refused(folder_ / "gray", {"a.png", "the file does not say with which", "--mosaic"});
   refused(folder_ / "gray", {"RGBG"}, "--mosaic RGBG");
 }
 
 TEST_F(BurstErrors, FramesThatDoNotFit) {
-  write("two/a.png", 40, 32, 1);
-  write("two/b.png", 42, 32, 1);
+  write_noise("two/a.png", 40, 32, 1);
+  write_noise("two/b.png", 42, 32, 1);
   refused(folder_ / "two", {"b.png", "of one size", "42 x 32", "40 x 32"}, "--mosaic RGGB");
-  write("dots/a.png", 1, 1, 1);
+  write_noise("dots/a.png", 1, 1, 1);
   refused(folder_ / "dots", {"a.png", "2 x 2 samples"}, "--mosaic RGGB");
-  write("few/a.png", 17, 15, 1);
+  write_noise("few/a.png", 17, 15, 1);
   refused(folder_ / "few", {"a.png", "16 x 16 samples", "16 x 14"}, "--mosaic RGGB");
 }
 
 TEST_F(BurstErrors, OptionsOutOfRange) {
-  const fs::path in = write("in.png", 120, 120);
+  const fs::path in = write_noise("in.png", 120, 120);
   refused(in, {"--frames", "between 1 and 1000"}, "--frames 0");
   refused(in, {"--noise", "between 0 and 1"}, "--noise -0.1");
   refused(in, {"--lambda"}, "--lambda -1");
@@ -91,11 +75,12 @@ TEST_F(BurstErrors, OptionsOutOfRange) {
 }
 
 TEST_F(BurstErrors, NothingToResumeFrom) {
-  refused(write("in.png", 120, 120), {"state.bin", "Run without --resume"}, "--frames 2 --resume");
+  refused(write_noise("in.png", 120, 120), {"state.bin", "Run without --resume"},
+          "--frames 2 --resume");
 }
 
 TEST_F(BurstErrors, AFolderThatCannotBeWrittenTo) {
-  const fs::path in = write("in.png", 120, 120);
+  const fs::path in = write_noise("in.png", 120, 120);
   run("--input " + in.string() + " --output " + in.string());
   expect_refused({"in.png", "must be a folder"});
   run("--input " + in.string() + " --output /proc");

@@ -2,70 +2,28 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
-#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <limits>
 
 #include "common/images.h"
-#include "common/process.h"
-#include "scenes.h"
-#include "support/temporary_folder.h"
+#include "support/app_errors.h"
 
 namespace {
 
 namespace fs = std::filesystem;
 
-class DeconvolutionErrors : public testing::Test {
+class DeconvolutionErrors : public AppErrors {
  protected:
-  fs::path write(const std::string& name, int width, int height) {
-    const auto picture = deconvolution_test::scene(width, height);
-    apps::write_image(folder_ / name, demosaic::image_of(width, height, 8, picture.planes));
-    return folder_ / name;
-  }
-
-  void refused(std::vector<std::string> words, const std::vector<std::string>& parts) {
-    words.insert(words.begin(), DECONVOLUTION_PROGRAM);
-    const apps::Outcome outcome = apps::run_program(words);
-    EXPECT_EQ(outcome.status, 1) << outcome.output;
-    const std::string& line = outcome.output;
-    EXPECT_EQ(std::count(line.begin(), line.end(), '\n'), 1) << line;
-    EXPECT_TRUE(line.starts_with("deconvolution: cannot ")) << line;
-    for (const std::string& part : parts) {
-      EXPECT_NE(line.find(part), std::string::npos) << "no \"" << part << "\" in: " << line;
-    }
-    if (!fs::exists(out())) return;
-    for (const auto& entry : fs::directory_iterator(out())) {
-      ADD_FAILURE() << "left behind: " << entry.path();
-    }
-  }
-
-  void refused_input(const fs::path& input, const std::vector<std::string>& parts,
-                     const std::vector<std::string>& more = {}) {
-    std::vector<std::string> words{"--input", input, "--output", out()};
-    words.insert(words.end(), more.begin(), more.end());
-    refused(words, parts);
-  }
-
-  fs::path out() const { return folder_ / "out"; }
-
-  const TemporaryFolder temporary_;
-  const fs::path& folder_ = temporary_.path();
+  DeconvolutionErrors() : AppErrors("deconvolution", DECONVOLUTION_PROGRAM) {}
 };
 
-TEST_F(DeconvolutionErrors, MissingAndDamagedPictures) {
-  refused_input(folder_ / "nowhere.png", {"nowhere.png", "must be an image file"});
-  std::ofstream(folder_ / "text.png") << "this is no picture";
-  refused_input(folder_ / "text.png", {"text.png", "OpenImageIO decodes"});
-  fs::copy_file(write("whole.png", 300, 200), folder_ / "half.png");
-  fs::resize_file(folder_ / "half.png", fs::file_size(folder_ / "half.png") / 2);
-  refused_input(folder_ / "half.png", {"half.png", "damaged or truncated"});
-}
+TEST_F(DeconvolutionErrors, MissingAndDamagedPictures) { expect_refuses_damaged_pictures(); }
 
 TEST_F(DeconvolutionErrors, PicturesThatAreTooSmallOrNoNumbers) {
-  refused_input(write("dot.png", 1, 1), {"dot.png", "it has 1 x 1"});
-  refused_input(write("small.png", 40, 20), {"small.png", "34 pixels", "it has 40 x 20"});
-  refused_input(write("tiny.png", 10, 10), {"16 pixels", "it has 10 x 10"}, {"--blurred"});
+  refused_input(write_noise("dot.png", 1, 1), {"dot.png", "it has 1 x 1"});
+  refused_input(write_noise("small.png", 40, 20), {"small.png", "34 pixels", "it has 40 x 20"});
+  refused_input(write_noise("tiny.png", 10, 10), {"16 pixels", "it has 10 x 10"}, {"--blurred"});
   apps::Image image{40, 40, 32, std::vector<float>(4800, std::numeric_limits<float>::quiet_NaN())};
   apps::write_image(folder_ / "nan.exr", image);
   refused_input(folder_ / "nan.exr", {"nan.exr", "every sample must be a finite number"});
@@ -78,7 +36,7 @@ TEST_F(DeconvolutionErrors, HugePictures) {
 }
 
 TEST_F(DeconvolutionErrors, FunctionsThatAreNone) {
-  const fs::path in = write("in.png", 60, 60);
+  const fs::path in = write_noise("in.png", 60, 60);
   refused_input(in, {"\"disc:0\"", "its radius is 0"}, {"--psf", "disc:0"});
   refused_input(in, {"\"disc:x\"", "\"x\" is no number"}, {"--psf", "disc:x"});
   refused_input(in, {"its size is 8"}, {"--psf", "motion:8"});
@@ -89,7 +47,7 @@ TEST_F(DeconvolutionErrors, FunctionsThatAreNone) {
   apps::write_image(folder_ / "black.png", black);
   refused_input(in, {"black.png", "all of its samples are 0"}, {"--psf", folder_ / "black.png"});
   refused_input(in, {"large.png", "301 samples along a side"},
-                {"--psf", write("large.png", 300, 120)});
+                {"--psf", write_noise("large.png", 300, 120)});
   black.bits = 32;
   black.pixels[3] = -1;
   apps::write_image(folder_ / "negative.exr", black);
@@ -97,7 +55,7 @@ TEST_F(DeconvolutionErrors, FunctionsThatAreNone) {
 }
 
 TEST_F(DeconvolutionErrors, OptionsThatCannotBe) {
-  const fs::path in = write("in.png", 60, 60);
+  const fs::path in = write_noise("in.png", 60, 60);
   refused_input(in, {"--noise", "must lie between"}, {"--noise", "0"});
   refused_input(in, {"--size is 4"}, {"--size", "4"});
   refused_input(in, {"--filters"}, {"--filters", "0"});
@@ -108,7 +66,7 @@ TEST_F(DeconvolutionErrors, OptionsThatCannotBe) {
 }
 
 TEST_F(DeconvolutionErrors, WeightsThatAreNone) {
-  const fs::path in = write("in.png", 60, 60);
+  const fs::path in = write_noise("in.png", 60, 60);
   refused_input(in, {"nothing.json", "cannot be opened"}, {"--weights", folder_ / "nothing.json"});
   std::ofstream(folder_ / "half.json") << R"({"filters": 2, "size": 3, "bumps": 1, "stages": [)";
   refused_input(in, {"half.json", "every array whole"}, {"--weights", folder_ / "half.json"});
@@ -123,17 +81,17 @@ TEST_F(DeconvolutionErrors, WeightsThatAreNone) {
 TEST_F(DeconvolutionErrors, FoldersThatNothingCanBeLearnedFrom) {
   refused({"--dataset", folder_ / "none", "--output", out()}, {"none"});
   fs::create_directory(folder_ / "set");
-  write("set/a.png", 40, 40);
+  write_noise("set/a.png", 40, 40);
   refused({"--dataset", folder_ / "set", "--output", out()}, {"two at least", "Add photographs"});
-  write("set/b.png", 20, 40);
+  write_noise("set/b.png", 20, 40);
   refused({"--dataset", folder_ / "set", "--output", out()}, {"b.png", "it has 20 x 40"});
-  write("set/b.png", 40, 40);
+  write_noise("set/b.png", 40, 40);
   refused({"--dataset", folder_ / "set", "--output", out(), "--resume"},
           {"state.bin", "Run without --resume"});
 }
 
 TEST_F(DeconvolutionErrors, AFolderThatCannotBeWrittenTo) {
-  const fs::path in = write("in.png", 60, 60);
+  const fs::path in = write_noise("in.png", 60, 60);
   refused({"--input", in, "--output", in}, {"in.png", "must be a folder"});
   if (getuid() == 0) {
     refused({"--input", in, "--output", "/proc"}, {"Give a folder that you may write to"});

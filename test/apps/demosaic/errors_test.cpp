@@ -16,46 +16,13 @@ namespace fs = std::filesystem;
 class DemosaicErrors : public AppErrors {
  protected:
   DemosaicErrors() : AppErrors("demosaic", DEMOSAIC_PROGRAM) {}
-
-  fs::path write(const std::string& name, int width, int height) {
-    apps::Image image{width, height, 8, {}};
-    uint32_t noise = 1;
-    for (long n = 0; n < image.elems(); ++n) {
-      noise = noise * 1664525 + 1013904223;
-      image.pixels.push_back(static_cast<float>(noise >> 24) / 255.0f);
-    }
-    apps::write_image(folder_ / name, image);
-    return folder_ / name;
-  }
-
-  void refused(const std::vector<std::string>& words, const std::vector<std::string>& parts) {
-    std::string line;
-    for (const std::string& word : words) line += word + " ";
-    run(line);
-    expect_refused(parts);
-    expect_no_results();
-  }
-
-  void refused_input(const fs::path& input, const std::vector<std::string>& parts,
-                     const std::vector<std::string>& more = {}) {
-    std::vector<std::string> words{"--input", input, "--output", out()};
-    words.insert(words.end(), more.begin(), more.end());
-    refused(words, parts);
-  }
 };
 
-TEST_F(DemosaicErrors, MissingAndDamagedPictures) {
-  refused_input(folder_ / "nowhere.png", {"nowhere.png", "must be an image file"});
-  std::ofstream(folder_ / "text.png") << "this is no picture";
-  refused_input(folder_ / "text.png", {"text.png", "OpenImageIO decodes"});
-  fs::copy_file(write("whole.png", 300, 200), folder_ / "half.png");
-  fs::resize_file(folder_ / "half.png", fs::file_size(folder_ / "half.png") / 2);
-  refused_input(folder_ / "half.png", {"half.png", "damaged or truncated"});
-}
+TEST_F(DemosaicErrors, MissingAndDamagedPictures) { expect_refuses_damaged_pictures(); }
 
 TEST_F(DemosaicErrors, PicturesOfOnePixelOrNoNumbers) {
-  refused_input(write("dot.png", 1, 1), {"dot.png", "2 x 2 pixels", "it has 1 x 1"});
-  refused_input(write("line.png", 9, 1), {"line.png", "it has 9 x 1"});
+  refused_input(write_noise("dot.png", 1, 1), {"dot.png", "2 x 2 pixels", "it has 1 x 1"});
+  refused_input(write_noise("line.png", 9, 1), {"line.png", "it has 9 x 1"});
   apps::Image image{8, 8, 32, std::vector<float>(192, 0.5f)};
   image.pixels.assign(192, std::numeric_limits<float>::quiet_NaN());
   apps::write_image(folder_ / "nan.exr", image);
@@ -63,13 +30,13 @@ TEST_F(DemosaicErrors, PicturesOfOnePixelOrNoNumbers) {
 }
 
 TEST_F(DemosaicErrors, AMosaicNeedsOneChannelAndAPattern) {
-  const fs::path colour = write("colour.png", 8, 8);
+  const fs::path colour = write_noise("colour.png", 8, 8);
   refused_input(colour, {"colour.png"}, {"--mosaic", "RGGB"});
   refused_input(colour, {"--mosaic is \"RGBG\"", "Give one of these"}, {"--mosaic", "RGBG"});
 }
 
 TEST_F(DemosaicErrors, ShapesThatDoNotExist) {
-  const fs::path in = write("in.png", 8, 8);
+  const fs::path in = write_noise("in.png", 8, 8);
   refused_input(in, {"2, 9 or 15 filters", "--filters is 4"}, {"--filters", "4"});
   refused_input(in, {"5 x 5 or 7 x 7", "--size is 6"}, {"--size", "6"});
   refused_input(in, {"--optimize"}, {"--optimize", "everything"});
@@ -78,7 +45,7 @@ TEST_F(DemosaicErrors, ShapesThatDoNotExist) {
 }
 
 TEST_F(DemosaicErrors, WeightsThatAreNone) {
-  const fs::path in = write("in.png", 8, 8);
+  const fs::path in = write_noise("in.png", 8, 8);
   refused_input(in, {"nothing.json", "cannot be opened"}, {"--weights", folder_ / "nothing.json"});
   std::ofstream(folder_ / "half.json") << R"({"filters": 2, "size": 5, "green": [1, 2)";
   refused_input(in, {"half.json", "every array whole"}, {"--weights", folder_ / "half.json"});
@@ -89,7 +56,7 @@ TEST_F(DemosaicErrors, WeightsThatAreNone) {
 TEST_F(DemosaicErrors, FoldersThatNothingCanBeLearnedFrom) {
   refused({"--dataset", folder_ / "none", "--output", out()}, {"none"});
   fs::create_directory(folder_ / "set");
-  write("set/only.png", 40, 40);
+  write_noise("set/only.png", 40, 40);
   refused({"--dataset", folder_ / "set", "--output", out()}, {"two at least", "Add photographs"});
   std::ofstream(folder_ / "set" / "photographs.txt") << "learn only.png\n";
   refused({"--dataset", folder_ / "set", "--output", out()},
@@ -98,14 +65,14 @@ TEST_F(DemosaicErrors, FoldersThatNothingCanBeLearnedFrom) {
 
 TEST_F(DemosaicErrors, NothingToResumeFrom) {
   fs::create_directory(folder_ / "set");
-  write("set/a.png", 40, 40);
-  write("set/b.png", 40, 40);
+  write_noise("set/a.png", 40, 40);
+  write_noise("set/b.png", 40, 40);
   refused({"--dataset", folder_ / "set", "--output", out(), "--resume", "--filters", "2"},
           {"state.bin", "Run without --resume"});
 }
 
 TEST_F(DemosaicErrors, AFolderThatCannotBeWrittenTo) {
-  const fs::path in = write("in.png", 8, 8);
+  const fs::path in = write_noise("in.png", 8, 8);
   refused({"--input", in, "--output", in}, {"in.png", "must be a folder"});
   if (getuid() == 0) {
     refused({"--input", in, "--output", "/proc"}, {"Give a folder that you may write to"});
