@@ -9,7 +9,11 @@
 //    bounds, at points whose contribution is zero; a boundary condition makes these reads legal.
 // 3. The transforms along a row are a Func of their own for Retrograde, whose schedule keeps them
 //    in a buffer of a few pixels. Li2018 would store them for the whole photo, and be slower.
+// 4. Retrograde builds the gradients that are asked for; Halide builds all, and its pipeline runs
+//    those that are outputs.
 #pragma once
+
+#include <vector>
 
 #include "language.h"
 
@@ -31,6 +35,10 @@ inline lang::Func readable(const lang::ImageParam& image) {
   return lang::BoundaryConditions::repeat_edge(image);
 }
 
+inline lang::Derivative adjoints(const lang::Func& loss, const std::vector<lang::Func>&) {
+  return lang::propagate_adjoints(loss);
+}
+
 #else
 
 inline constexpr bool stage_transforms = true;
@@ -40,6 +48,11 @@ inline lang::Expr node(const lang::Var& x, int cell, const lang::Expr& r, int) {
 }
 
 inline lang::Func readable(const lang::ImageParam& image) { return image; }
+
+// The gradients of `loss` by these Funcs, at least.
+inline lang::Derivative adjoints(const lang::Func& loss, const std::vector<lang::Func>& by) {
+  return lang::propagate_adjoints(loss, {.wrt = {by.begin(), by.end()}});
+}
 
 #endif
 

@@ -17,6 +17,7 @@
 #include "peer.h"
 #include "render.h"
 #include "trainer.h"
+#include "trainer_state.h"
 
 namespace bilateral_slice {
 
@@ -44,6 +45,13 @@ class PeerRun {
           const FitOptions& options, Fit& fit)
       : options_(options), fit_(fit) {
     if (options.peer_seconds <= 0) return;
+    if (!options.moves.all() || options.start) {
+      fit_.why_no_peer =
+          "cannot measure Halide 14: its peer begins at the identity and moves grid, mix and "
+          "curve; "
+          "this run does something else. Leave out --optimize and --start to measure both.";
+      return;
+    }
     guarded([&] {
       const auto program = Peer::find();
       if (program.empty()) {
@@ -83,27 +91,6 @@ class PeerRun {
   std::optional<Peer> peer_;
 };
 
-apps::State state_of(const Trainer& trainer) {
-  apps::State state;
-  state.program = "bilateral_slice";
-  state.step = trainer.steps();
-  int n = 0;
-  for (const Trainer::Buffer& buffer : trainer.state())
-    state.arrays["array" + std::to_string(n++)].assign(buffer.begin(), buffer.end());
-  return state;
-}
-
-void restore(Trainer& trainer, const apps::State& state) {
-  int n = 0;
-  for (Trainer::Buffer& buffer : trainer.state()) {
-    const auto& from = state.array("array" + std::to_string(n++),
-                                   static_cast<size_t>(buffer.number_of_elements()));
-    size_t at = 0;
-    for (float& value : buffer) value = static_cast<float>(from[at++]);
-  }
-  trainer.set_steps(static_cast<int>(state.step));
-}
-
 }  // namespace
 
 void Series::add(double step_loss, double step_seconds) {
@@ -123,8 +110,9 @@ Fit fit(const Shape& shape, std::vector<float>& photo, std::vector<float>& targe
         const FitOptions& options, const std::function<void(int, double)>& progress) {
   Fit fit;
   const auto start = Clock::now();
-  Trainer trainer(shape, photo.data(), target.data(), options.threads);
+  Trainer trainer(shape, photo.data(), target.data(), options.threads, options.moves);
   fit.ours.compile_seconds = apps::seconds_since(start);
+  if (options.start) start_from(*options.start, trainer);
   if (options.resume) restore(trainer, *options.resume);
   PeerRun peer(shape, photo, target, options, fit);
 
@@ -145,7 +133,7 @@ Fit fit(const Shape& shape, std::vector<float>& photo, std::vector<float>& targe
   fit.stopped = apps::stop_requested();
   fit.state = state_of(trainer);
   fit.look = look_of(shape, trainer);
-  fit.result.resize(3 * shape.pixels());
+  fit.result.resize(shape.samples());
   render(shape, photo.data(), trainer.grid(), trainer.mix(), trainer.curve(), fit.result.data());
   return fit;
 }

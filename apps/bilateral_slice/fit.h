@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "common/state.h"
+#include "groups.h"
 #include "look.h"
 #include "shape.h"
 
@@ -26,15 +27,17 @@ struct Series {
 struct FitOptions {
   int steps = 0;
   int threads = 0;
-  double peer_seconds = 0;                 // no more blocks of the peer after this long; 0: no peer
-  double seconds = 0;                      // of our steps; 0: no limit
+  double peer_seconds = 0;  // no more blocks of the peer after this long; 0: no peer
+  double seconds = 0;       // of our steps; 0: no limit
+  Groups moves = {};
+  std::optional<Look> start = {};          // a look to begin with; without one, the identity
   std::optional<apps::State> resume = {};  // of an earlier run, which this one goes on with
 };
 
 struct Fit {
   Series ours, peer;          // peer is empty when it was left out
   std::string why_no_peer;    // not empty: the peer was asked for and could not be measured
-  std::vector<float> result;  // [3, height, width], the photo through the learned look
+  std::vector<float> result;  // [channels, height, width], the photo through the learned look
   Look look;
   apps::State state;     // for a run that goes on
   bool stopped = false;  // by a signal: what was learned until then is in here

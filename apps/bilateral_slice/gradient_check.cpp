@@ -6,6 +6,7 @@
 #include "gradient_check.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <functional>
 #include <numeric>
@@ -25,10 +26,10 @@ constexpr int directions = 3;          // per parameter array
 constexpr int single_parameters = 16;  // per parameter array, those with the largest gradients
 constexpr double grid_step = 1e-3, guide_step = 1e-6;
 
-Shape crop_shape(const Shape& whole) {
+Shape crop_shape(const Shape& whole, int side) {
   Shape crop = whole;
-  crop.width = std::min(whole.width, crop_width);
-  crop.height = std::min(whole.height, crop_height);
+  crop.width = std::min(whole.width, side > 0 ? side : crop_width);
+  crop.height = std::min(whole.height, side > 0 ? side : crop_height);
   crop.grid_x = crop.grid_y = 8;
   return crop;
 }
@@ -48,21 +49,44 @@ Values crop_planes(const Shape& whole, const Shape& crop, const float* from, int
 
 // A parameter array: its values, the gradient that the adjoint gave, and the step for differences.
 struct Parameters {
-  Values values;
-  Values gradient;
+  lang::ImageParam input;
+  std::vector<int> sizes;
+  bool moves;
   double step;
+  Values values = {}, gradient = {};
+
+  lang::Buffer<double> buffer(Values& of) const { return lang::Buffer<double>(of.data(), sizes); }
 };
+
+// Where the gradient is checked: element `n` of each array but for a little noise. Away from the identity.
+double start_of_grid(const Shape& shape, size_t n) {
+  const size_t i = n % shape.coefficients(), o = n / shape.coefficients() % shape.channels;
+  return i == o ? 1.0 : 0.0;
+}
+double start_of_mix(const Shape& shape, size_t n) {
+  return n < static_cast<size_t>(shape.channels) ? 0.9 / shape.channels : 0.05;
+}
+double start_of_curve(size_t n) { return n == 0 ? 0.9 : 0.0; }
 
 class Checker {
  public:
-  Checker(const Shape& shape, Values photo, Values target)
+  Checker(const Shape& shape, const Groups& moves, Values photo, Values target)
       : shape_(shape),
         model_(shape, lang::Float(64)),
-        adjoints_(lang::propagate_adjoints(model_.loss)),
+        adjoints_(model_.adjoints(moves)),
         photo_(std::move(photo)),
-        target_(std::move(target)) {
-    gradient_ = lang::Pipeline({model_.loss, adjoints_(model_.affine), adjoints_(model_.mixture),
-                                adjoints_(model_.slopes)});
+        target_(std::move(target)),
+        grid_{model_.grid,
+              {shape.coefficients(), shape.channels, shape.grid_z, shape.grid_x, shape.grid_y},
+              moves.grid,
+              grid_step},
+        mix_{model_.mix, {shape.coefficients()}, moves.mix, guide_step},
+        curve_{model_.curve, {shape.knots}, moves.curve, guide_step} {
+    std::vector<lang::Func> outputs{model_.loss};
+    if (moves.grid) outputs.push_back(adjoints_(model_.affine));
+    if (moves.mix) outputs.push_back(adjoints_(model_.mixture));
+    if (moves.curve) outputs.push_back(adjoints_(model_.slopes));
+    gradient_ = lang::Pipeline(outputs);
     loss_ = lang::Pipeline({model_.loss});
     schedule();
     start();
@@ -70,7 +94,7 @@ class Checker {
 
   GradientCheck run() {
     evaluate_gradient();
-    for (Parameters* p : {&grid_, &mix_, &curve_}) compare(*p);
+    for (Parameters* p : all_) compare(*p);
     return found_;
   }
 
@@ -83,41 +107,36 @@ class Checker {
          {model_.row_mixture, model_.row_slopes, model_.light, model_.guide, model_.depth,
           model_.row_grid, model_.plane, model_.result, model_.row_loss}) {
       f.compute_root();
-      lang::Func adjoint = adjoints_(f);
-      if (adjoint.defined()) adjoint.compute_root();
+      if (adjoints_.has(f)) adjoints_(f).compute_root();
     }
   }
 
   void start() {
     std::uniform_real_distribution<double> noise(-0.1, 0.1);
-    const auto fill = [&](Parameters& p, size_t size, double step, auto&& base) {
-      p = {Values(size), Values(size, 0.0), step};
-      for (size_t n = 0; n < size; ++n) p.values[n] = base(n) + noise(random_);
+    const auto fill = [&](Parameters& p, auto&& base) {
+      size_t size = 1;
+      for (const int extent : p.sizes) size *= static_cast<size_t>(extent);
+      p.gradient.assign(size, 0.0);
+      for (size_t n = 0; n < size; ++n) p.values.push_back(base(n) + noise(random_));
     };
-    fill(grid_, shape_.grid_elems(), grid_step,
-         [](size_t n) { return n % 4 == n / 4 % 3 ? 1.0 : 0.0; });
-    fill(mix_, 4, guide_step, [](size_t n) { return n < 3 ? 0.3 : 0.05; });
-    fill(curve_, shape_.knots, guide_step, [](size_t n) { return n == 0 ? 0.9 : 0.0; });
-  }
-
-  Buffer grid_buffer(Values& v) {
-    return Buffer(v.data(), std::vector<int>{4, 3, shape_.grid_z, shape_.grid_x, shape_.grid_y});
+    fill(grid_, [&](size_t n) { return start_of_grid(shape_, n); });
+    fill(mix_, [&](size_t n) { return start_of_mix(shape_, n); });
+    fill(curve_, start_of_curve);
   }
 
   void bind() {
-    model_.photo.set(Buffer(photo_.data(), shape_.width, shape_.height, 4));
-    model_.target.set(Buffer(target_.data(), shape_.width, shape_.height, 3));
-    model_.grid.set(grid_buffer(grid_.values));
-    model_.mix.set(Buffer(mix_.values.data(), 4));
-    model_.curve.set(Buffer(curve_.values.data(), shape_.knots));
+    model_.photo.set(Buffer(photo_.data(), shape_.width, shape_.height, shape_.coefficients()));
+    model_.target.set(Buffer(target_.data(), shape_.width, shape_.height, shape_.channels));
+    for (Parameters* p : all_) p->input.set(p->buffer(p->values));
   }
 
   void evaluate_gradient() {
     bind();
     Buffer loss = Buffer::make_scalar();
-    std::vector<lang::Buffer<>> outputs{loss, grid_buffer(grid_.gradient),
-                                        Buffer(mix_.gradient.data(), 4),
-                                        Buffer(curve_.gradient.data(), shape_.knots)};
+    std::vector<lang::Buffer<>> outputs{loss};
+    for (Parameters* p : all_) {
+      if (p->moves) outputs.push_back(p->buffer(p->gradient));
+    }
     gradient_.realize(lang::Realization(outputs));
   }
 
@@ -154,6 +173,13 @@ class Checker {
 
   void compare(Parameters& p) {
     const size_t size = p.values.size();
+    // Drawn also for what does not move, so that each group is always checked along the same.
+    std::normal_distribution<double> normal;
+    std::vector<Values> random_directions(directions, Values(size));
+    for (Values& direction : random_directions) {
+      for (double& value : direction) value = normal(random_);
+    }
+    if (!p.moves) return;
     std::vector<size_t> order(size);
     std::iota(order.begin(), order.end(), size_t{0});
     const size_t largest = std::min<size_t>(size, single_parameters);
@@ -167,12 +193,7 @@ class Checker {
       unit[order[n]] = 1.0;
       compare_along(p, unit, smallest);
     }
-    std::normal_distribution<double> normal;
-    for (int d = 0; d < directions; ++d) {
-      Values direction(size);
-      for (double& value : direction) value = normal(random_);
-      compare_along(p, direction, smallest);
-    }
+    for (const Values& direction : random_directions) compare_along(p, direction, smallest);
   }
 
   Shape shape_;
@@ -181,6 +202,7 @@ class Checker {
   lang::Pipeline gradient_, loss_;
   Values photo_, target_;
   Parameters grid_, mix_, curve_;
+  const std::array<Parameters*, 3> all_{&grid_, &mix_, &curve_};
   std::mt19937 random_{20};
   GradientCheck found_;
 };
@@ -188,8 +210,9 @@ class Checker {
 }  // namespace
 
 retrograde::GradientReport check_gradients_in_full(const Shape& shape, const float* photo,
-                                                   const float* target) {
-  const Shape crop = crop_shape(shape);
+                                                   const float* target,
+                                                   const CheckOptions& options) {
+  const Shape crop = crop_shape(shape, options.side);
   Model model(crop, lang::Float(32));
   std::mt19937 random(20);
   std::uniform_real_distribution<float> noise(-0.1f, 0.1f);
@@ -199,24 +222,30 @@ retrograde::GradientReport check_gradients_in_full(const Shape& shape, const flo
     buffer.for_each_value([&](float& value) { value = base(n++); });
     to.set(buffer);
   };
+  const auto near = [&](double base) { return static_cast<float>(base) + noise(random); };
   const auto image = [&](lang::ImageParam& to, const float* from, int planes) {
     const Values values = crop_planes(shape, crop, from, planes);
     bound(to, {crop.width, crop.height, planes},
           [&](size_t n) { return static_cast<float>(values[n]); });
   };
-  image(model.photo, photo, 4);
-  image(model.target, target, 3);
-  bound(model.grid, {4, 3, crop.grid_z, crop.grid_x, crop.grid_y},
-        [&](size_t n) { return (n % 4 == n / 4 % 3 ? 1.0f : 0.0f) + noise(random); });
-  bound(model.mix, {4}, [&](size_t n) { return (n < 3 ? 0.3f : 0.05f) + noise(random); });
-  bound(model.curve, {crop.knots},
-        [&](size_t n) { return (n == 0 ? 0.9f : 0.0f) + noise(random); });
-  return retrograde::check_gradients(model.loss, {}, {.wrt = {model.grid, model.mix, model.curve}});
+  image(model.photo, photo, crop.coefficients());
+  image(model.target, target, crop.channels);
+  bound(model.grid, {crop.coefficients(), crop.channels, crop.grid_z, crop.grid_x, crop.grid_y},
+        [&](size_t n) { return near(start_of_grid(crop, n)); });
+  bound(model.mix, {crop.coefficients()}, [&](size_t n) { return near(start_of_mix(crop, n)); });
+  bound(model.curve, {crop.knots}, [&](size_t n) { return near(start_of_curve(n)); });
+  std::vector<lang::AdjointInput> by;
+  if (options.moves.grid) by.emplace_back(model.grid);
+  if (options.moves.mix) by.emplace_back(model.mix);
+  if (options.moves.curve) by.emplace_back(model.curve);
+  return retrograde::check_gradients(model.loss, {}, {.wrt = by});
 }
 
-GradientCheck check_gradient(const Shape& shape, const float* photo, const float* target) {
-  const Shape crop = crop_shape(shape);
-  Checker checker(crop, crop_planes(shape, crop, photo, 4), crop_planes(shape, crop, target, 3));
+GradientCheck check_gradient(const Shape& shape, const float* photo, const float* target,
+                             const CheckOptions& options) {
+  const Shape crop = crop_shape(shape, options.side);
+  Checker checker(crop, options.moves, crop_planes(shape, crop, photo, crop.coefficients()),
+                  crop_planes(shape, crop, target, crop.channels));
   return checker.run();
 }
 

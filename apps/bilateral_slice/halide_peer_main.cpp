@@ -49,8 +49,12 @@ int serve() {
   std::FILE* answers = open_answers();
   PeerJob job;
   if (!answers || !receive(&job, 1)) return 2;
-  const Shape shape{job.width, job.height};
-  std::vector<float> photo(4 * shape.pixels()), target(3 * shape.pixels());
+  const Shape shape{.width = job.width,
+                    .height = job.height,
+                    .grid_x = job.grid_x,
+                    .grid_y = job.grid_y,
+                    .channels = job.channels};
+  std::vector<float> photo(shape.samples() + shape.pixels()), target(shape.samples());
   if (!receive(photo.data(), photo.size()) || !receive(target.data(), target.size())) return 2;
 
   const auto start = std::chrono::steady_clock::now();

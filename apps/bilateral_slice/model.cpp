@@ -38,7 +38,7 @@ void Model::define_parameters() {
 }
 
 void Model::define_guide(const Func& pixels) {
-  const RDom channel(0, 4, "channel"), knot(0, shape.knots, "knot");
+  const RDom channel(0, shape.coefficients(), "channel"), knot(0, shape.knots, "knot");
   light(x, y) = number(0);
   light(x, y) += row_mixture(channel, y) * pixels(x, y, channel);
   const Expr start = as_scalar(knot) * number(1.0 / shape.knots);
@@ -65,24 +65,32 @@ void Model::define_slice(const Func& pixels) {
   };
   plane(x, y, o, k) = number(0);
   if (dialect::stage_transforms) {
-    const RDom node(0, 2, "node"), r(0, 4, "r");
+    const RDom node(0, 2, "node"), r(0, shape.coefficients(), "r");
     transform(i, x, o, k, y) = number(0);
     transform(i, x, o, k, y) += at_node(i, node);
     plane(x, y, o, k) += pixels(x, y, r) * transform(r, x, o, k, y);
   } else {
-    const RDom r(0, 4, 0, 2, "r");
+    const RDom r(0, shape.coefficients(), 0, 2, "r");
     plane(x, y, o, k) += pixels(x, y, r.x) * at_node(r.x, r.y);
   }
   result(x, y, o) = (number(1) - along_z) * plane(x, y, o, 0) + along_z * plane(x, y, o, 1);
 }
 
 void Model::define_loss(const Func& wanted) {
-  const RDom sample(0, shape.width, 0, 3, "sample"), row(0, shape.height, "row");
+  const RDom sample(0, shape.width, 0, shape.channels, "sample"), row(0, shape.height, "row");
   const Expr error = result(sample.x, y, sample.y) - wanted(sample.x, y, sample.y);
   row_loss(y) = number(0);
   row_loss(y) += error * error;
   loss() = number(0);
-  loss() += row_loss(row) * number(1.0 / (3.0 * static_cast<double>(shape.pixels())));
+  loss() += row_loss(row) * number(1.0 / static_cast<double>(shape.samples()));
+}
+
+lang::Derivative Model::adjoints(const Groups& moves) const {
+  std::vector<Func> by;
+  if (moves.grid) by.push_back(affine);
+  if (moves.mix) by.push_back(mixture);
+  if (moves.curve) by.push_back(slopes);
+  return dialect::adjoints(loss, by);
 }
 
 }  // namespace bilateral_slice

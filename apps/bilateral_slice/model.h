@@ -12,9 +12,11 @@
 // That is trilinear interpolation of the grid, done one axis at a time: the step along y is shared
 // by a whole pixel row, so that a pixel reads four transforms and not eight. Pixel coordinates
 // enter the grid's indices as x / cell_width and y / cell_height only, so the grid's gradient is a
-// gather over (gx, gy); gz depends on data.
+// gather over (gx, gy); gz depends on data. A gray photo has (v, 1) in place of (r, g, b, 1): two
+// coefficients and one output.
 #pragma once
 
+#include "groups.h"
 #include "language.h"
 #include "shape.h"
 
@@ -27,11 +29,11 @@ struct Model {
   Shape shape;
   lang::Type scalar;
 
-  // Inputs. Homogeneous photo: plane 3 holds ones.
-  lang::ImageParam photo;   // [4, height, width], width innermost
-  lang::ImageParam target;  // [3, height, width]
-  lang::ImageParam grid;    // [grid_y, grid_x, grid_z, 3 (o), 4 (i)], i innermost
-  lang::ImageParam mix;     // [4]
+  // Inputs. Homogeneous photo: its last plane holds ones.
+  lang::ImageParam photo;   // [coefficients, height, width], width innermost
+  lang::ImageParam target;  // [channels, height, width]
+  lang::ImageParam grid;    // [grid_y, grid_x, grid_z, channels (o), coefficients (i)], i innermost
+  lang::ImageParam mix;     // [coefficients]
   lang::ImageParam curve;   // [knots]
 
   lang::Var x{"x"}, y{"y"}, i{"i"}, o{"o"}, k{"k"}, gx{"gx"}, gy{"gy"}, gz{"gz"};
@@ -43,6 +45,9 @@ struct Model {
   lang::Func light{"light"}, guide{"guide"}, depth{"depth"}, layer{"layer"};
   lang::Func row_grid{"row_grid"}, transform{"transform"}, plane{"plane"}, result{"result"};
   lang::Func row_loss{"row_loss"}, loss{"loss"};
+
+  // The gradients of the loss by what moves.
+  lang::Derivative adjoints(const Groups& moves) const;
 
  private:
   lang::Expr number(double value) const;

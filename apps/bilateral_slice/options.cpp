@@ -22,13 +22,33 @@ void check_work(const Options& options) {
 
 }  // namespace
 
+// The identity is the same in each layer of the grid: what the guide says then makes no difference.
+void check_groups(const Options& options) {
+  if (options.resume && !options.start.empty()) {
+    retrograde::call_error("understand the command line",
+                           "a run goes on from a state or begins with a look",
+                           "both --resume and --start are given", "Leave out one of them");
+  }
+  const bool learns = options.apply.empty() && !options.check_gradients &&
+                      !options.check_stability && !options.time_steps;
+  if (!learns || options.moves.grid || !options.start.empty() || options.resume) return;
+  retrograde::call_error(
+      "learn the guide alone",
+      "a guide matters where the layers of the grid differ, and the identity's are all alike",
+      "--optimize leaves out grid, and no look is given to begin with",
+      "Give --start LOOK, a look.bin that was learned, or add grid to --optimize");
+}
+
 std::optional<Options> read_options(int argc, char** argv) {
   Options options;
   CLI::App app(
       "Learns the look of edited photographs: a bilateral grid of colour transforms and a guide "
       "curve, fitted by Adam.");
   apps::add_common_options(app, options,
-                           {.needs_input = false, .input_text = "the photograph", .steps = 200});
+                           {.needs_input = false,
+                            .input_text = "the photograph",
+                            .steps = 200,
+                            .optimize = {"grid", "mix", "curve"}});
   app.add_option(
       "--target", options.target,
       "the edited photograph, of the same size; without it, a built-in local tone mapping");
@@ -37,14 +57,25 @@ std::optional<Options> read_options(int argc, char** argv) {
       "instead of --input: a folder of photographs, with a folder \"target\" in it of "
       "their edits under the same names (else the built-in one); one look for all of them");
   app.add_option("--apply", options.apply, "instead of learning: the look.bin for --input");
+  app.add_option("--start", options.start,
+                 "a look.bin to begin with, whose grid is taken; without it, the identity");
   app.add_option("--grid", options.grid, "nodes along each side; 0: 64, or 3 with --pairs")
       ->capture_default_str();
   app.add_option("--halide-seconds", options.halide_seconds,
                  "how long to measure the same with Halide 14; 0 to leave it out")
       ->capture_default_str();
+  app.add_option("--check-side", options.check_side,
+                 "pixels along each side of the crop that --check-gradients takes; 0: 96 x 80")
+      ->capture_default_str();
+  app.add_flag("--time-steps", options.time_steps,
+               "instead of learning: how long a step takes, by what moves and of a gray photo");
   if (!apps::parse_command_line(app, argc, argv, options)) return std::nullopt;
   check_work(options);
+  options.moves = {apps::optimizes(options, "grid"), apps::optimizes(options, "mix"),
+                   apps::optimizes(options, "curve")};
+  check_groups(options);
   apps::require_in_range("--halide-seconds", options.halide_seconds, 0, 1e6);
+  if (options.check_side != 0) apps::require_in_range("--check-side", options.check_side, 4, 96);
   if (options.grid != 0) apps::require_in_range("--grid", options.grid, 3, 256);
   return options;
 }

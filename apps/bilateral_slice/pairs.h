@@ -18,13 +18,20 @@ struct Pair {
   Planes photo, target;
 };
 
-// Three colour planes, and a fourth of ones when `homogeneous`.
-Planes to_planes(const apps::Image& image, bool homogeneous);
+// As it is stored: three channels, or one where there are no colours; alpha is left out. Throws
+// retrograde::UserError.
+apps::Image read_gray_or_colour(const std::filesystem::path& path);
+
+// A plane for each channel, and one of ones when `homogeneous`. A gray image has as many as are asked for.
+Planes to_planes(const apps::Image& image, int channels, bool homogeneous);
 apps::Image to_image(const Shape& shape, const Planes& planes, int bits);
 
-// Without a target: the built-in edit. Throws retrograde::UserError when an image cannot be read, is too
-// small, or the sizes differ.
+// Gray where neither image has colours. Without a target: the built-in edit. Throws retrograde::UserError
+// when an image cannot be read, is too small, or the sizes differ.
 Pair read_pair(const std::filesystem::path& photo, const std::filesystem::path& target);
+
+// A gray pair in three equal channels, which those of a colour photo go with.
+void make_colour(Pair& pair);
 
 // Both at another size.
 Pair resized(const Pair& pair, int width, int height);

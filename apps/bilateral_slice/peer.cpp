@@ -32,7 +32,7 @@ std::filesystem::path Peer::find() {
 Peer::Peer(const std::filesystem::path& program, const Shape& shape,
            const std::vector<float>& photo, const std::vector<float>& target, int threads)
     : child_(program, {}, {{"HL_NUM_THREADS", std::to_string(threads)}}) {
-  const PeerJob job{shape.width, shape.height, threads};
+  const PeerJob job{shape.width, shape.height, shape.channels, shape.grid_x, shape.grid_y, threads};
   require(child_.send(&job, sizeof job) &&
           child_.send(photo.data(), photo.size() * sizeof(float)) &&
           child_.send(target.data(), target.size() * sizeof(float)));

@@ -13,7 +13,7 @@
 namespace bilateral_slice {
 
 struct PeerJob {
-  int32_t width, height, threads;
+  int32_t width, height, channels, grid_x, grid_y, threads;
 };
 
 struct PeerReady {

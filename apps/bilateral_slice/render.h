@@ -6,7 +6,7 @@
 
 namespace bilateral_slice {
 
-// photo: [4, height, width] -> result: [3, height, width].
+// photo: [coefficients, height, width] -> result: [channels, height, width].
 void render(const Shape& shape, float* photo, const lang::Buffer<float>& grid,
             const lang::Buffer<float>& mix, const lang::Buffer<float>& curve, float* result);
 

@@ -7,6 +7,8 @@
 
 #include "common/files.h"
 #include "diagnostics/error.h"
+#include "explain.h"
+#include "trainer_state.h"
 
 namespace bilateral_slice {
 
@@ -66,7 +68,12 @@ void write_report(const std::filesystem::path& path, const Report& report, const
       {"numbers", numbers_of(report, fit)},
       {"width", report.shape.width},
       {"height", report.shape.height},
-      {"grid", {report.shape.grid_x, report.shape.grid_y, report.shape.grid_z, 12}},
+      {"channels", report.shape.channels},
+      {"grid",
+       {report.shape.grid_x, report.shape.grid_y, report.shape.grid_z,
+        report.shape.channels * report.shape.coefficients()}},
+      {"optimize", names_of(report.moves)},
+      {"left_out", left_out(report.shape, report.moves)},
       {"threads", report.threads},
       {"steps", fit.ours.seconds.size()},
       {"stopped", fit.stopped},

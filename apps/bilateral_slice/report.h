@@ -13,6 +13,7 @@ double psnr_db(double mean_squared_error);
 
 struct Report {
   Shape shape;
+  Groups moves;
   int threads = 0;
   double seconds = 0;  // the whole run, from the images read to the result rendered
   double psnr_initial_db = 0;

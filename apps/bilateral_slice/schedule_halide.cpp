@@ -1,4 +1,4 @@
-// schedule_halide.cpp -- Halide 14's own schedule for its own gradients: Li2018.
+// schedule_halide.cpp -- Halide 14's own schedule for its own gradients: Li2018. Everything moves.
 #include <string>
 
 #include "training_pipeline.h"
@@ -18,12 +18,14 @@ void estimate(Learned& learned, const Bounds& bounds) {
 
 void estimate_sizes(TrainingPipeline& training) {
   const Shape& shape = training.model.shape;
-  training.model.photo.set_estimates({{0, shape.width}, {0, shape.height}, {0, 4}});
-  training.model.target.set_estimates({{0, shape.width}, {0, shape.height}, {0, 3}});
-  estimate(training.grid,
-           {{0, 4}, {0, 3}, {0, shape.grid_z}, {0, shape.grid_x}, {0, shape.grid_y}});
-  estimate(training.mix, {{0, 4}});
-  estimate(training.curve, {{0, shape.knots}});
+  const int coefficients = shape.coefficients(), channels = shape.channels;
+  training.model.photo.set_estimates({{0, shape.width}, {0, shape.height}, {0, coefficients}});
+  training.model.target.set_estimates({{0, shape.width}, {0, shape.height}, {0, channels}});
+  estimate(
+      *training.grid,
+      {{0, coefficients}, {0, channels}, {0, shape.grid_z}, {0, shape.grid_x}, {0, shape.grid_y}});
+  estimate(*training.mix, {{0, coefficients}});
+  estimate(*training.curve, {{0, shape.knots}});
   training.rate.set_estimate(0.01f);
   training.m_scale.set_estimate(1.0f);
   training.v_scale.set_estimate(1.0f);

@@ -2,10 +2,11 @@
 //
 // Everything is done in parallel over pixel rows, except the grid's own gradient and step, which
 // are parallel over grid rows. What both directions need is stored once for the photo (the guide,
-// the two planes); transforms live in a buffer of 16 pixels. Directions of vectors:
+// the two planes); transforms live in a buffer of 16 pixels. A group of parameters that stays has no
+// adjoints, and neither has what only leads to it. Directions of vectors:
 //   along x     everything that is one value a pixel
-//   along i     a transform's coefficients: four are adjacent in the grid, and the pixels of a
-//               vector along x would come from different layers
+//   along i     a transform's coefficients: four are adjacent in the grid (two of gray), and the
+//               pixels of a vector along x would come from different layers
 //   along k     the curve's knots
 #include <algorithm>
 #include <iterator>
@@ -97,69 +98,96 @@ void schedule_forward(Model& m) {
       .parallel(m.y);
 }
 
+Func& bound_transform(const Model& m, Func& f) {
+  return f.bound(m.i, 0, m.shape.coefficients()).bound(m.o, 0, m.shape.channels);
+}
+
+// The inner loops of what gathers transforms of pixels. Of gray ones there is a single output, and no loop over it.
+std::vector<VarOrRVar> coefficients_and_outputs(const Model& m) {
+  if (m.shape.channels > 1) return {m.i, m.o};
+  return {m.i};
+}
+
 // A pixel adds to four transforms: layers k = 0, 1 of the nodes before and after it. These short
 // loops are unrolled around the vector, and the loop over the pixels of a cell runs around them.
 void schedule_row_gradient(const Model& m, Func rows) {
-  rows.compute_root().bound(m.i, 0, 4).bound(m.o, 0, 3).vectorize(m.i).unroll(m.o).parallel(m.y);
+  bound_transform(m, rows.compute_root()).vectorize(m.i).unroll(m.o).parallel(m.y);
   for (int u = 0; u < rows.num_update_definitions(); ++u) {
     const std::vector<lang::RVar> all = rows.rvars(u);
     std::vector<lang::RVar> inner, outer;
     std::partition_copy(all.begin(), all.end(), std::back_inserter(inner),
                         std::back_inserter(outer), is_short);
-    std::vector<VarOrRVar> order{m.i, m.o};
+    std::vector<VarOrRVar> order = coefficients_and_outputs(m);
     order.insert(order.end(), inner.begin(), inner.end());
     order.insert(order.end(), outer.begin(), outer.end());
     order.insert(order.end(), {m.gx, m.y});
     Stage update = rows.update(u);
-    update.reorder(order).vectorize(m.i).unroll(m.o).parallel(m.y);
+    update.reorder(order).vectorize(m.i).parallel(m.y);
+    if (m.shape.channels > 1) update.unroll(m.o);
     for (const lang::RVar& r : inner) update.unroll(r);
   }
 }
 
 void schedule_grid_gradient(const Model& m, Func grid) {
-  grid.compute_root().bound(m.i, 0, 4).bound(m.o, 0, 3).vectorize(m.i).parallel(m.gy);
+  bound_transform(m, grid.compute_root()).vectorize(m.i).parallel(m.gy);
   for (int u = 0; u < grid.num_update_definitions(); ++u) {
     grid.update(u).reorder(reductions_inside(grid, u, {m.gx, m.gy}));
-    grid.update(u).reorder(m.i, m.o, m.gz).vectorize(m.i).unroll(m.o).parallel(m.gy);
+    std::vector<VarOrRVar> order = coefficients_and_outputs(m);
+    order.emplace_back(m.gz);
+    grid.update(u).reorder(order).vectorize(m.i).parallel(m.gy);
+    if (m.shape.channels > 1) grid.update(u).unroll(m.o);
   }
 }
 
 void schedule_guide_gradient(TrainingPipeline& t) {
   const Model& m = t.model;
-  const Func guide = t.adjoints(m.guide), light = t.adjoints(m.light), depth = t.adjoints(m.depth);
+  const Func guide = t.adjoints(m.guide), depth = t.adjoints(m.depth);
   store_rows(guide, m.x, m.y);
-  store_rows(light, m.x, m.y);
-  unroll_reduction(light, 0, {m.x, m.y});
   Func(depth).compute_at(guide, m.y);
   vectorize_all(depth, m.x);
-  unroll_reduction(depth, 0, {m.x, m.y});
+  // A sum over outputs; of gray there is one.
+  if (depth.num_update_definitions() > 0) unroll_reduction(depth, 0, {m.x, m.y});
+}
 
-  // Sums over a row's pixels: in double on wide photos.
-  Func slopes = t.adjoints.accumulator(t.adjoints(m.row_slopes)),
-       mixture = t.adjoints.accumulator(t.adjoints(m.row_mixture));
+// Sums over a row's pixels are in double on wide photos.
+void schedule_curve_gradient(TrainingPipeline& t) {
+  const Model& m = t.model;
+  Func slopes = t.adjoints.accumulator(t.adjoints(m.row_slopes));
   slopes.compute_root().bound(m.k, 0, m.shape.knots).vectorize(m.k).parallel(m.y);
   slopes.update().reorder(m.k, slopes.rvars(0)[0], m.y).vectorize(m.k).parallel(m.y);
-  mixture.compute_root().bound(m.i, 0, 4).vectorize(m.i).parallel(m.y);
+  t.curve->gradient.compute_root();
+}
+
+void schedule_mix_gradient(TrainingPipeline& t) {
+  const Model& m = t.model;
+  const Func light = t.adjoints(m.light);
+  store_rows(light, m.x, m.y);
+  unroll_reduction(light, 0, {m.x, m.y});
+  Func mixture = t.adjoints.accumulator(t.adjoints(m.row_mixture));
+  mixture.compute_root().bound(m.i, 0, m.shape.coefficients()).vectorize(m.i).parallel(m.y);
   mixture.update().reorder(m.i, mixture.rvars(0)[0], m.y).vectorize(m.i).parallel(m.y);
-  t.mix.gradient.compute_root();
-  t.curve.gradient.compute_root();
+  t.mix->gradient.compute_root();
 }
 
 void schedule_backward(TrainingPipeline& t) {
   const Model& m = t.model;
   t.adjoints(m.row_loss).compute_root();
   store_rows(t.adjoints(m.result), m.x, m.y);
-  store_rows(t.adjoints(m.plane), m.x, m.y);
-  t.adjoints(m.transform).compute_inline();
-  schedule_row_gradient(m, t.adjoints(m.row_grid));
-  schedule_grid_gradient(m, t.grid.gradient);
-  schedule_guide_gradient(t);
+  if (t.grid) {
+    store_rows(t.adjoints(m.plane), m.x, m.y);
+    t.adjoints(m.transform).compute_inline();
+    schedule_row_gradient(m, t.adjoints(m.row_grid));
+    schedule_grid_gradient(m, t.grid->gradient);
+  }
+  if (t.curve || t.mix) schedule_guide_gradient(t);
+  if (t.curve) schedule_curve_gradient(t);
+  if (t.mix) schedule_mix_gradient(t);
 }
 
 void schedule_steps(TrainingPipeline& t) {
+  if (!t.grid) return;
   const Model& m = t.model;
-  t.grid.next.bound(m.i, 0, 4)
-      .bound(m.o, 0, 3)
+  bound_transform(m, t.grid->next)
       .bound(m.gz, 0, m.shape.grid_z)
       .bound(m.gx, 0, m.shape.grid_x)
       .bound(m.gy, 0, m.shape.grid_y)

@@ -13,12 +13,18 @@ struct Shape {
   int grid_x = 64;
   int grid_y = 64;
   int grid_z = 8;
-  int knots = 16;  // of the guide curve
+  int knots = 16;    // of the guide curve
+  int channels = 3;  // of the photo and of what it becomes; 1: gray
 
   int cell_width() const { return std::max((width - 1) / (grid_x - 1) + 1, 2); }
   int cell_height() const { return std::max((height - 1) / (grid_y - 1) + 1, 2); }
   long pixels() const { return static_cast<long>(width) * height; }
-  long grid_elems() const { return 12L * grid_z * grid_x * grid_y; }
+  long samples() const { return channels * pixels(); }
+  // Of a transform for one channel: all channels and a constant.
+  int coefficients() const { return channels + 1; }
+  long grid_elems() const {
+    return static_cast<long>(channels) * coefficients() * grid_z * grid_x * grid_y;
+  }
 };
 
 }  // namespace bilateral_slice

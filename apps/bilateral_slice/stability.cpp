@@ -20,7 +20,7 @@ template <typename T>
 class FlatModel {
  public:
   FlatModel() : model_(stability_shape, lang::type_of<T>()) {
-    const lang::Derivative adjoints = lang::propagate_adjoints(model_.loss);
+    const lang::Derivative adjoints = model_.adjoints({});
     pipeline_ = lang::Pipeline(
         {model_.loss, adjoints(model_.affine), adjoints(model_.mixture), adjoints(model_.slopes)});
   }

@@ -28,8 +28,12 @@ int radius(const Shape& shape) {
   return std::clamp(std::min(shape.width, shape.height) / 24, 2, 64);
 }
 
-Func luminance(const lang::ImageParam& photo) {
+Func luminance(const lang::ImageParam& photo, const Shape& shape) {
   Func f("luminance");
+  if (shape.channels == 1) {
+    f(x, y) = photo(x, y, 0);
+    return f;
+  }
   f(x, y) = 0.2126f * photo(x, y, 0) + 0.7152f * photo(x, y, 1) + 0.0722f * photo(x, y, 2);
   return f;
 }
@@ -71,7 +75,7 @@ Func guided_base(const Func& f, const Shape& shape) {
 
 void tone_edit(const Shape& shape, float* photo, float* edited) {
   lang::ImageParam input(lang::Float(32), 3, "photo");
-  const Func light = luminance(input);
+  const Func light = luminance(input, shape);
   Func tone("tone"), look("look"), out("edited");
   tone(x, y) = lang::log(light(x, y) + darkest);
   store(tone);
@@ -82,11 +86,13 @@ void tone_edit(const Shape& shape, float* photo, float* edited) {
   const Expr gain = look(x, y) / (light(x, y) + darkest);
   const Expr colour = input(x, y, c) * gain;
   const Expr gray = light(x, y) * gain;
-  out(x, y, c) = lang::clamp(gray + saturation * (colour - gray), 0.0f, 1.0f);
+  const Expr edited_sample =
+      shape.channels == 1 ? colour : gray + saturation * (colour - gray);  // gray has no saturation
+  out(x, y, c) = lang::clamp(edited_sample, 0.0f, 1.0f);
   out.vectorize(x, 8, guarded).parallel(y);
 
-  input.set(lang::Buffer<float>(photo, shape.width, shape.height, 4));
-  lang::Buffer<float> result(edited, shape.width, shape.height, 3);
+  input.set(lang::Buffer<float>(photo, shape.width, shape.height, shape.coefficients()));
+  lang::Buffer<float> result(edited, shape.width, shape.height, shape.channels);
   out.realize(result);
 }
 

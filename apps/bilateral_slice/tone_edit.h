@@ -11,7 +11,7 @@
 
 namespace bilateral_slice {
 
-// photo: [4, height, width] -> edited: [3, height, width], values in [0, 1].
+// photo: [coefficients, height, width] -> edited: [channels, height, width], values in [0, 1].
 void tone_edit(const Shape& shape, float* photo, float* edited);
 
 }  // namespace bilateral_slice

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <optional>
 #include <vector>
 
 #include "training_pipeline.h"
@@ -10,9 +11,9 @@ namespace bilateral_slice {
 
 class Trainer {
  public:
-  // photo: [4, height, width], target: [3, height, width]; both must outlive the trainer. The first
-  // look is the identity, with the mean of the colours as guide.
-  Trainer(const Shape& shape, float* photo, float* target, int threads);
+  // photo: [coefficients, height, width], target: [channels, height, width]; both must outlive the
+  // trainer. The first look is the identity, with the mean of the colours as guide.
+  Trainer(const Shape& shape, float* photo, float* target, int threads, const Groups& moves = {});
 
   // Goes on with another pair of the same shape.
   void set_pair(float* photo, float* target);
@@ -20,13 +21,17 @@ class Trainer {
   // One step of Adam at this rate. Returns the loss before it.
   double step(float rate);
 
+  const Shape& shape() const { return training_.model.shape; }
+  const lang::Derivative& adjoints() const { return training_.adjoints; }
+  Groups moves() const;
+
   using Buffer = lang::Buffer<float>;
   const Buffer& grid() const { return grid_[now_].value; }
   const Buffer& mix() const { return mix_[now_].value; }
   const Buffer& curve() const { return curve_[now_].value; }
 
-  // All that the next step reads: grid, mix and curve, each with its moments. Who fills them in says
-  // how many steps led there.
+  // All that the next step reads: grid, mix and curve, each with its two moments, which are undefined
+  // where it does not move. Who fills them in says how many steps led there.
   std::vector<Buffer> state() const;
   int steps() const { return steps_; }
   void set_steps(int steps) { steps_ = steps; }
@@ -35,12 +40,12 @@ class Trainer {
   struct Moments {
     Buffer value, moment, square;
   };
-  // A step reads one copy and writes the other.
+  // A step reads one copy and writes the other; of what does not move both are the same.
   using State = std::array<Moments, 2>;
 
-  static State zeros(const std::vector<int>& sizes);
+  static State zeros(const std::vector<int>& sizes, bool moves);
   void start_from_identity();
-  void bind(Learned& learned, const State& state);
+  void bind(lang::ImageParam& value, std::optional<Learned>& learned, const State& state);
 
   TrainingPipeline training_;
   Buffer photo_, target_, loss_;

@@ -26,25 +26,29 @@ Learned::Learned(const lang::ImageParam& value, const lang::Func& gradient,
       rate(rate),
       next(value.name() + "_next") {}
 
-TrainingPipeline::TrainingPipeline(const Shape& shape)
-    : model(shape, lang::Float(32)),
-      adjoints(lang::propagate_adjoints(model.loss)),
-      grid(model.grid, adjoints(model.affine), {model.i, model.o, model.gz, model.gx, model.gy}, 1),
-      mix(model.mix, adjoints(model.mixture), {model.i}, guide_rate),
-      curve(model.curve, adjoints(model.slopes), {model.k}, guide_rate) {
-  define_next(grid);
-  define_next(mix);
-  define_next(curve);
-  pipeline = lang::Pipeline({model.loss, grid.next, mix.next, curve.next});
+TrainingPipeline::TrainingPipeline(const Shape& shape, const Groups& moves)
+    : model(shape, lang::Float(32)), adjoints(model.adjoints(moves)) {
+  const Model& m = model;
+  if (moves.grid) grid = learn(m.grid, m.affine, {m.i, m.o, m.gz, m.gx, m.gy}, 1);
+  if (moves.mix) mix = learn(m.mix, m.mixture, {m.i}, guide_rate);
+  if (moves.curve) curve = learn(m.curve, m.slopes, {m.k}, guide_rate);
+  std::vector<lang::Func> outputs{m.loss};
+  for (const auto* learned : {&grid, &mix, &curve}) {
+    if (*learned) outputs.push_back((*learned)->next);
+  }
+  pipeline = lang::Pipeline(outputs);
 }
 
-void TrainingPipeline::define_next(Learned& learned) {
+Learned TrainingPipeline::learn(const lang::ImageParam& value, const lang::Func& parameter,
+                                std::vector<lang::Var> variables, float rate_factor) {
+  Learned learned(value, adjoints(parameter), std::move(variables), rate_factor);
   const auto& at = learned.at;
   const Expr g = learned.gradient(at);
   const Expr m = b1 * learned.moment(at) + (1 - b1) * g;
   const Expr v = b2 * learned.square(at) + (1 - b2) * g * g;
   const Expr move = m * m_scale / (lang::sqrt(v * v_scale) + tiny);
   learned.next(at) = lang::Tuple(learned.value(at) - learned.rate * rate * move, m, v);
+  return learned;
 }
 
 }  // namespace bilateral_slice

@@ -8,6 +8,7 @@
 // and v_scale are the bias corrections 1 / (1 - b^t), which the caller knows.
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "model.h"
@@ -29,16 +30,17 @@ struct Learned {
 };
 
 struct TrainingPipeline {
-  explicit TrainingPipeline(const Shape& shape);
+  explicit TrainingPipeline(const Shape& shape, const Groups& moves = {});
 
   Model model;
   lang::Derivative adjoints;
   lang::Param<float> rate{"rate"}, m_scale{"m_scale"}, v_scale{"v_scale"};
-  Learned grid, mix, curve;
-  lang::Pipeline pipeline;  // outputs: loss, grid.next, mix.next, curve.next
+  std::optional<Learned> grid, mix, curve;  // those that move
+  lang::Pipeline pipeline;                  // outputs: loss, then what is next of each of them
 
  private:
-  void define_next(Learned& learned);
+  Learned learn(const lang::ImageParam& value, const lang::Func& parameter,
+                std::vector<lang::Var> variables, float rate_factor);
 };
 
 // Schedules and compiles it for `threads` threads. One file a language: schedule_retrograde.cpp by
