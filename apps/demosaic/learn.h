@@ -12,8 +12,6 @@ namespace demosaic {
 struct Learned {
   Weights weights;
   long steps = 0;
-  double seconds = 0;
-  double ms_per_step = 0;  // the median
   bool stopped = false;
 };
 

@@ -77,7 +77,6 @@ void run(const Options& options) {
       weights = learned.weights;
       steps = learned.steps;
       stopped = learned.stopped;
-      report.own["ms_per_step"] = learned.ms_per_step;
       methods = measure_methods(held_out, options.common.threads, options.brief);
       Demosaicker method = Demosaicker::relaxed(*weights, options.common.threads);
       methods.push_back(held_out.measure(method));
