@@ -27,10 +27,9 @@ import time
 
 import numpy as np
 
+from peers import PEERS, make_peers, site_packages, version
+
 HERE = os.path.dirname(os.path.abspath(__file__))
-ROOT = os.path.dirname(os.path.dirname(HERE))
-PEERS = os.path.join(ROOT, "out", "bench", "peers")
-PYTORCH = "torch==2.13.0"
 SCHEDULES = ["Adams2019", "Li2018", "Mullapudi2016", "root"]  # of Halide
 SEARCH_SECONDS = 60  # for a schedule of Halide's, compilation included
 SEARCHED = "retrograde_search"  # ours, with AutoscheduleOptions::search
@@ -150,26 +149,6 @@ class Worker:
 
 
 # ---- what the peers need ----
-
-def site_packages():
-    return glob.glob(os.path.join(PEERS, "lib", "python3*", "site-packages"))[0]
-
-
-def make_peers(kinds):
-    wanted = {"halide": ["halide"], "pytorch": [PYTORCH, "numpy"]}
-    if not os.path.exists(os.path.join(PEERS, "bin", "pip")):
-        subprocess.run(["/usr/bin/python3", "-m", "venv", PEERS], check=True)
-    for kind in kinds:
-        if not version(kind):
-            pip = os.path.join(PEERS, "bin", "pip")
-            subprocess.run([pip, "install", "--quiet", *wanted[kind]], check=True)
-
-
-def version(kind):
-    name = {"halide": "halide", "pytorch": "torch"}[kind]
-    found = glob.glob(os.path.join(site_packages(), name + "-*.dist-info"))
-    return os.path.basename(found[0]).split("-")[1].removesuffix(".dist") if found else None
-
 
 def build_halide_worker(what, files, definition):
     """From one text that includes all others: most of its compilation is that of Halide.h. `files` hold

@@ -10,13 +10,18 @@
 
 namespace retrograde::python {
 
-inline void allow_stride_of(graph::ParameterContents& parameter, const Buffer<>& buffer) {
-  if (parameter.constraints.empty() || !buffer.defined() || buffer.dimensions() == 0) return;
+// Of dimension 0.
+inline void allow_stride(graph::ParameterContents& parameter, int stride, int extent) {
+  if (stride == 1 || extent <= 1 || parameter.constraints.empty()) return;
   graph::BufferConstraint& first = parameter.constraints[0];
-  if (buffer.stride(0) == 1 || buffer.extent(0) <= 1 || first.stride.defined() || first.any_stride)
-    return;
+  if (first.stride.defined() || first.any_stride) return;
   first.any_stride = true;
   parameter.version++;
+}
+
+inline void allow_stride_of(graph::ParameterContents& parameter, const Buffer<>& buffer) {
+  if (!buffer.defined() || buffer.dimensions() == 0) return;
+  allow_stride(parameter, buffer.stride(0), buffer.extent(0));
 }
 
 }  // namespace retrograde::python

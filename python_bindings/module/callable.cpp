@@ -1,6 +1,8 @@
 // callable.cpp -- Callable: a compiled pipeline as a function of its arguments and outputs.
 #include "frontend/run/callable.h"
 
+#include <chrono>
+
 #include "any_stride.h"
 #include "bind_all.h"
 #include "binding.h"
@@ -8,6 +10,8 @@
 #include "func_class.h"
 #include "numbers.h"
 #include "runnable.h"
+#include "tensor_memory.h"
+#include "unlocked.h"
 
 namespace retrograde::frontend {
 
@@ -15,6 +19,7 @@ namespace retrograde::frontend {
 struct DynamicCall {
   using Value = Callable::Value;
   static Value value_of(const Buffer<>& buffer) { return Callable::value_of(buffer); }
+  static Value value_of(const Runtime::Buffer<>& buffer) { return Callable::value_of(buffer); }
   static Value value_of(const ir::Scalar& scalar) {
     return {nullptr, scalar, false, scalar.type, -1};
   }
@@ -43,13 +48,13 @@ class Bound {
         args_(std::move(args)),
         parameters_(std::move(parameters)),
         outputs_(std::move(outputs)) {
-    callable_ = unlocked([compile = compile_](const Interruption&) { return compile(); });
+    compile_again();
+    for (const Argument& arg : args_) counts_ |= arg.is_scalar() && !arg.type.is_float();
   }
 
   void call(const py::args& given) {
     std::vector<Buffer<>> buffers(given.size());
     std::vector<DynamicCall::Value> values(given.size());
-    bool lifted = false;
     for (size_t i = 0; i < given.size(); i++) {
       if (i < args_.size() && args_[i].is_scalar()) {
         values[i] = DynamicCall::value_of(scalar_of(args_[i].type, given[i]));
@@ -57,32 +62,104 @@ class Bound {
       }
       buffers[i] = given[i].cast<Buffer<>>();
       if (i >= args_.size()) check_writable(buffers[i], "call a Callable");
-      lifted |= lift(i, buffers[i]);
+      lift(i, buffers[i]);
       values[i] = DynamicCall::value_of(buffers[i]);
     }
-    if (lifted)
-      callable_ = unlocked([compile = compile_](const Interruption&) { return compile(); });
+    if (count_lifted() != lifted_) compile_again();
     unlocked([callable = callable_, buffers, values](const Interruption&) {
       DynamicCall::call(callable, values);
     });
   }
 
- private:
-  bool lift(size_t i, const Buffer<>& buffer) const {
-    const size_t output = i - args_.size();
-    const Parameter parameter = i < args_.size()           ? parameters_[i]
-                                : output < outputs_.size() ? outputs_[output]
-                                                           : nullptr;
-    if (!parameter) return false;
-    const auto before = parameter->version;
-    allow_stride_of(*parameter, buffer);
-    return parameter->version != before;
+  // The same of tensors of PyTorch, whose element types are those of the pipeline: whoever calls has seen to that.
+  // Written for calls whose work is nothing.
+  void call_tensors(const py::args& given) {
+    if (given.size() != args_.size() + outputs_.size())
+      throw py::type_error("a Callable takes its arguments, then its output buffers");
+    auto kept = std::make_shared<Tensors>(given);
+    int64_t elements = 0;
+    for (size_t i = 0; i < given.size(); i++) {
+      if (i < args_.size() && args_[i].is_scalar()) {
+        kept->values[i] = DynamicCall::value_of(scalar_of(args_[i].type, given[i]));
+        continue;
+      }
+      const Parameter& parameter = parameter_of_argument(i);
+      Runtime::Buffer<>& buffer = kept->buffers[i];
+      buffer = buffer_of_tensor(given[i], i < args_.size() ? args_[i].type : parameter->type);
+      if (parameter && buffer.dimensions() > 0)
+        allow_stride(*parameter, buffer.dim(0).stride(), buffer.dim(0).extent());
+      elements += static_cast<int64_t>(buffer.number_of_elements());
+      kept->values[i] = DynamicCall::value_of(buffer);
+    }
+    if (count_lifted() != lifted_) compile_again();
+    run(elements, [callable = callable_, kept](const Interruption&) {
+      DynamicCall::call(callable, kept->values);
+    });
   }
+
+ private:
+  // What a call touches, for as long as it runs.
+  struct Tensors {
+    explicit Tensors(const py::args& given)
+        : owner(keep(given)), buffers(given.size()), values(given.size()) {}
+    Kept owner;
+    std::vector<Runtime::Buffer<>> buffers;
+    std::vector<DynamicCall::Value> values;
+  };
+
+  // Another thread for the sake of Ctrl-C costs more than a call that is over before anybody could press it. Such a
+  // call is one on no more elements than one that was seen to be short; a number among the arguments may be a count
+  // of loops, so then nothing is known.
+  template <class Work>
+  void run(int64_t elements, Work work) {
+    const bool may_be_short = !counts_ && elements <= most_short_elements;
+    const auto start = std::chrono::steady_clock::now();
+    if (may_be_short && elements <= short_elements_) {
+      py::gil_scoped_release release;
+      work(nullptr);
+      return;
+    }
+    unlocked(std::move(work));
+    if (may_be_short && std::chrono::steady_clock::now() - start < short_time)
+      short_elements_ = elements;
+  }
+
+  void compile_again() {
+    const size_t lifted = count_lifted();
+    callable_ = unlocked([compile = compile_](const Interruption&) { return compile(); });
+    lifted_ = lifted;
+  }
+
+  const Parameter& parameter_of_argument(size_t i) const {
+    return i < args_.size() ? parameters_[i] : outputs_[i - args_.size()];
+  }
+
+  void lift(size_t i, const Buffer<>& buffer) const {
+    if (i >= args_.size() + outputs_.size()) return;
+    if (const Parameter& parameter = parameter_of_argument(i)) allow_stride_of(*parameter, buffer);
+  }
+
+  // Parameters whose promise of a dense dimension 0 is lifted: by this Callable, or by another one that has them, too.
+  size_t count_lifted() const {
+    size_t count = 0;
+    for (const auto* parameters : {&parameters_, &outputs_}) {
+      for (const Parameter& parameter : *parameters)
+        count +=
+            parameter && !parameter->constraints.empty() && parameter->constraints[0].any_stride;
+    }
+    return count;
+  }
+
+  static constexpr auto short_time = std::chrono::milliseconds(1);
+  static constexpr int64_t most_short_elements = 1 << 16;
 
   Compile compile_;
   std::vector<Argument> args_;
   std::vector<Parameter> parameters_, outputs_;  // null: of a scalar
   Callable callable_;
+  size_t lifted_ = 0;            // when it was compiled
+  int64_t short_elements_ = -1;  // calls on so many were short
+  bool counts_ = false;          // whether an argument is a whole number
 };
 
 Parameter parameter_of(py::handle object) {
@@ -118,9 +195,10 @@ void bind_compile(Class<Self> c) {
 }  // namespace
 
 void bind_callable(py::module_& m) {
-  Class<Bound>(m, "Callable").def("__call__", &Bound::call).def("defined", [](const Bound&) {
-    return true;
-  });
+  Class<Bound>(m, "Callable")
+      .def("__call__", &Bound::call)
+      .def("_call_tensors", &Bound::call_tensors)
+      .def("defined", [](const Bound&) { return true; });
   bind_compile(reopened<Func>(m, "Func", {"Runnable"}));
   bind_compile(reopened<Pipeline>(m, "Pipeline", {"Runnable"}));
 }

@@ -1,0 +1,88 @@
+"""formulations.py -- the eight operators of definitions.py as users of PyTorch write them: the operators of
+torch.nn.functional where there is one, which compute many elements at a time where there is none."""
+import torch
+import torch.nn.functional as F
+
+from definitions import BINS, PATCH, SEARCH
+
+
+def _centres(size, like):
+    """Of pixels from -1 to 1, as grid_sample counts them."""
+    return (torch.arange(size, dtype=like.dtype) + 0.5) * (2 / size) - 1
+
+
+def bilateral_slice(image, guide, grid):
+    _, height, width = image.shape
+    x = _centres(width, image).expand(height, width)
+    y = _centres(height, image)[:, None].expand(height, width)
+    places = torch.stack([x, y, guide * 2 - 1], -1)[None, None]
+    affine = F.grid_sample(grid.flatten(0, 1)[None], places, padding_mode="border", align_corners=False)
+    affine = affine.view(3, 4, height, width)
+    return (affine[:, :3] * image).sum(1) + affine[:, 3]
+
+
+def flow_warp(image, flow):
+    _, height, width = image.shape
+    x = torch.arange(width, dtype=image.dtype) + flow[0]
+    y = torch.arange(height, dtype=image.dtype)[:, None] + flow[1]
+    places = torch.stack([x * (2 / (width - 1)) - 1, y * (2 / (height - 1)) - 1], -1)
+    return F.grid_sample(image[None], places[None], padding_mode="border", align_corners=True)[0]
+
+
+def spatial_transformer(images, transforms):
+    places = F.affine_grid(transforms, images.shape, align_corners=False)
+    return F.grid_sample(images, places, align_corners=False)
+
+
+def convolution(image, weights, bias):
+    return F.conv2d(image, weights, bias, padding=1)
+
+
+def tone_curve(image, curve):
+    last = len(curve) - 1
+    at = image.clamp(0, 1) * last
+    i = at.floor().long().clamp(0, last)
+    return torch.lerp(curve[i], curve[(i + 1).clamp(max=last)], at - i)
+
+
+def recursive_filter(image, mix):
+    """Along the rows, then along the columns: a lower triangular matrix of powers, which is what there is to be had
+    in one call."""
+    def matrix(size):
+        i = torch.arange(size, dtype=image.dtype)
+        apart = i[:, None] - i
+        powers = (1 - mix) ** apart.clamp(min=0)
+        first = (i == 0).to(image.dtype)
+        return torch.where(apart >= 0, powers * (mix + (1 - mix) * first), torch.zeros((), dtype=image.dtype))
+
+    height, width = image.shape
+    return matrix(height) @ image @ matrix(width).T
+
+
+def non_local_means(image, strength):
+    height, width = image.shape
+    margin, half = PATCH // 2, SEARCH // 2
+    # Patches repeat what the search sees: the edge of the image, at both of their places.
+    padded = F.pad(image[None, None], [margin + half] * 4, mode="replicate")[0, 0]
+    centre = padded[half:padded.shape[0] - half, half:padded.shape[1] - half]
+    weights = values = 0
+    for dy in range(SEARCH):
+        for dx in range(SEARCH):
+            moved = padded[dy:dy + centre.shape[0], dx:dx + centre.shape[1]]
+            distance = F.avg_pool2d(((centre - moved) ** 2)[None, None], PATCH, 1)[0, 0]
+            weight = torch.exp(-strength * distance)
+            weights = weights + weight
+            values = values + weight * moved[margin:margin + height, margin:margin + width]
+    return values / weights
+
+
+def soft_histogram(image):
+    at = (image.clamp(0, 1) * (BINS - 1)).flatten()
+    i = at.detach().floor().long().clamp(0, BINS - 1)
+    w = at - i
+    zeros = torch.zeros(BINS, dtype=image.dtype)
+    return zeros.index_add(0, i, 1 - w).index_add(0, (i + 1).clamp(max=BINS - 1), w)
+
+
+FORMULATIONS = {f.__name__: f for f in (bilateral_slice, flow_warp, spatial_transformer, convolution, tone_curve,
+                                        recursive_filter, non_local_means, soft_histogram)}

@@ -1,0 +1,64 @@
+// tensor_memory.cpp -- see tensor_memory.h.
+#include "tensor_memory.h"
+
+#include <climits>
+
+#include "casters.h"
+#include "diagnostics/error.h"
+
+namespace retrograde::python {
+
+namespace {
+
+// A name as the interpreter keeps it: looked up by address.
+struct Name {
+  explicit Name(const char* text) : object(PyUnicode_InternFromString(text)) {}
+  PyObject* object;
+};
+
+py::object checked(PyObject* made) {
+  if (!made) throw py::error_already_set();
+  return py::reinterpret_steal<py::object>(made);
+}
+
+int part(PyObject* number, const char* what) {
+  const long long value = PyLong_AsLongLong(number);
+  if (value == -1 && PyErr_Occurred()) throw py::error_already_set();
+  if (value > INT_MAX || value < INT_MIN) {
+    user_error("use the memory of a tensor as a Buffer", std::string(what) + " fit int32",
+               text("one is ", value), "Split the tensor");
+  }
+  return static_cast<int>(value);
+}
+
+alignas(64) char nothing[64];
+
+}  // namespace
+
+Runtime::Buffer<> buffer_of_tensor(py::handle tensor, Type type) {
+  static const Name data_ptr("data_ptr"), shape("shape"), stride("stride");
+  const py::object address = checked(PyObject_CallMethodNoArgs(tensor.ptr(), data_ptr.object));
+  const py::object sizes = checked(PyObject_GetAttr(tensor.ptr(), shape.object));
+  const py::object strides = checked(PyObject_CallMethodNoArgs(tensor.ptr(), stride.object));
+  const bool fits = PyTuple_Check(sizes.ptr()) && PyTuple_Check(strides.ptr()) &&
+                    PyTuple_GET_SIZE(sizes.ptr()) == PyTuple_GET_SIZE(strides.ptr());
+  if (!fits) throw py::type_error("the sizes and strides of a tensor are tuples of one length");
+  const auto rank = static_cast<int>(PyTuple_GET_SIZE(sizes.ptr()));
+  constexpr int most = 16;
+  if (rank > most) {
+    user_error("use the memory of a tensor as a Buffer",
+               text("it has at most ", most, " dimensions"), text("it has ", rank),
+               "Merge some, as with tensor.flatten()");
+  }
+  halide_dimension_t dimensions[most];
+  for (int axis = 0; axis < rank; axis++) {
+    dimensions[rank - 1 - axis] =
+        halide_dimension_t(0, part(PyTuple_GET_ITEM(sizes.ptr(), axis), "extents"),
+                           part(PyTuple_GET_ITEM(strides.ptr(), axis), "strides"));
+  }
+  void* data = PyLong_AsVoidPtr(address.ptr());
+  if (!data && PyErr_Occurred()) throw py::error_already_set();
+  return Runtime::Buffer<>(to_halide_type(type), data ? data : nothing, rank, dimensions);
+}
+
+}  // namespace retrograde::python

@@ -1,0 +1,210 @@
+"""What PyTorch is told of an operator, through torch.library.
+
+Two operators are registered for one of ours: `name(a, b, ...)`, and `name_derivative(tensors, path)`, which is all of its
+derivatives of every order and both modes (a path says which: Plan.derived). Both are registered when the operator is
+made, so that a compiled graph that PyTorch kept on disk finds them. Each has a kernel for
+
+    CPU            runs the pipeline
+    CUDA           says that there is none
+    Meta (fake)    the shapes and types of the results
+    Autograd       autograd.Function with backward and jvp, which call the derivative operator
+    Autocast       the types of the pipeline, whatever the mode says
+    vmap           a batched call: the kernels take batches as they are
+
+PyTorch 1.13 has no vmap and no functorch transforms of such operators; all else is the same there.
+"""
+import threading
+
+import torch
+from torch.autograd import forward_ad
+
+from .._errors import Unsupported, error
+from ._plan import GRADIENT, TANGENT
+
+if tuple(int(n) for n in torch.__version__.split(".")[:2]) < (1, 13):
+    raise error(Unsupported, "make operators of PyTorch", "it is PyTorch 1.13 or later", f"this is {torch.__version__}",
+                "Install a later one")
+
+_lock, _libraries, _names = threading.Lock(), {}, set()
+_HAS_FRAGMENTS = hasattr(torch.library, "register_fake")
+_enable_single_level = None
+if hasattr(torch, "func"):
+    from torch._functorch.utils import enable_single_level_autograd_function as _enable_single_level
+_set_fwd_grad_enabled = getattr(forward_ad, "_set_fwd_grad_enabled", None)
+
+
+def _library(namespace):
+    """The namespace's own, kept as long as the process lives: operators cannot be taken back."""
+    if namespace not in _libraries:
+        _libraries[namespace] = torch.library.Library(namespace, "FRAGMENT" if _HAS_FRAGMENTS else "DEF")
+    return _libraries[namespace]
+
+
+def register(operator):
+    """Defines both operators; returns the overloads that are called."""
+    namespace, name = operator.name.split("::")
+    with _lock:
+        if operator.name in _names or hasattr(getattr(torch.ops, namespace), name):
+            raise error(ValueError, f'register the operator "{operator.name}"', "a name is given once",
+                        "there is an operator of that name", "Choose another name, or leave it out")
+        _names.add(operator.name)
+        library = _library(namespace)
+        tags = {"tags": (torch.Tag.pt2_compliant_tag,)} if hasattr(torch.Tag, "pt2_compliant_tag") else {}
+        library.define(f"{name}({', '.join(f'Tensor {n}' for n in operator.argument_names)}) -> "
+                       + ("Tensor" if operator.single else f"({', '.join(['Tensor'] * operator.results)})"), **tags)
+        library.define(f"{name}_derivative(Tensor[] tensors, int[] path) -> Tensor[]", **tags)
+        Calls(operator, library, namespace, name)
+
+
+class Calls:
+    """The kernels of one operator, and the way into the dispatcher for both of its names. Inside, all calls are
+    (path, tensors) and give a list."""
+
+    def __init__(self, operator, library, namespace, name):
+        self.operator = operator
+        kernels = {"CPU": self.run, "CUDA": self.refuse, "Autograd": self.differentiate,
+                   "AutocastCPU": self.cast, "AutocastCUDA": self.cast}
+        for key, kernel in kernels.items():
+            library.impl(name, self.of_operator(kernel), key)
+            library.impl(name + "_derivative", of_derivative(kernel), key)
+        names = f"{namespace}::{name}", f"{namespace}::{name}_derivative"
+        if hasattr(torch.library, "register_fake"):
+            torch.library.register_fake(names[0], self.of_operator(self.fake), lib=library)
+            torch.library.register_fake(names[1], of_derivative(self.fake), lib=library)
+        else:
+            library.impl(name, self.of_operator(self.fake), "Meta")
+            library.impl(name + "_derivative", of_derivative(self.fake), "Meta")
+        if hasattr(torch.library, "register_vmap"):
+            torch.library.register_vmap(names[0], self.vmap_operator, lib=library)
+            torch.library.register_vmap(names[1], self.vmap_derivative, lib=library)
+        operators = getattr(torch.ops, namespace)
+        operator.overload = self.overload = getattr(operators, name).default
+        operator.derivative = self.derivative = getattr(operators, name + "_derivative").default
+
+    def of_operator(self, kernel):
+        if self.operator.single:
+            return lambda *tensors: kernel((), tensors)[0]
+        return lambda *tensors: tuple(kernel((), tensors))
+
+    def __call__(self, path, tensors):
+        """Through the dispatcher."""
+        if path:
+            return self.derivative(list(tensors), list(path))
+        result = self.overload(*tensors)
+        return [result] if self.operator.single else list(result)
+
+    # ---- the kernels ----
+
+    def run(self, path, tensors):
+        return self.operator.plan_for(path, tensors).run(tensors)
+
+    def fake(self, path, tensors):
+        return self.operator.plan(path, tensors).fake(tensors)
+
+    def refuse(self, path, tensors):
+        devices = ", ".join(f"{name} on {t.device}" for name, t in zip(self.operator.argument_names, tensors))
+        raise error(Unsupported, f'call the operator "{self.operator.name}"', "its pipeline runs on the CPU",
+                    f"given are {devices}", "Move the tensors with tensor.cpu()")
+
+    def differentiate(self, path, tensors):
+        if forward_ad._current_level < 0 and not (torch.is_grad_enabled() and any(t.requires_grad for t in tensors)):
+            guard = torch._C._AutoDispatchBelowAutograd()
+            try:
+                return self(path, tensors)
+            finally:
+                del guard
+        return list(_apply(self, path, tensors))
+
+    def cast(self, path, tensors):
+        dtypes = self.operator.plan(path, tensors).dtypes
+        cast = [t.to(dtype) if t.dtype.is_floating_point and dtype.is_floating_point else t
+                for t, dtype in zip(tensors, dtypes)]
+        with torch.autocast("cpu", enabled=False), torch.autocast("cuda", enabled=False):
+            return self(path, cast)
+
+    # ---- vmap: the vmapped dimension in front of the other batch dimensions ----
+
+    def vmap_operator(self, info, dims, *tensors):
+        results = self((), self._batched((), tensors, dims))
+        return (results[0], 0) if self.operator.single else (tuple(results), (0,) * len(results))
+
+    def vmap_derivative(self, info, dims, tensors, path):
+        results = self(path, self._batched(path, tensors, dims[0]))
+        return results, [0] * len(results)
+
+    def _batched(self, path, tensors, dims):
+        ranks = self.operator.plan(path, tensors).ranks
+        before = [t.dim() - rank - (dim is not None) for t, rank, dim in zip(tensors, ranks, dims)]
+        moved = []
+        for t, dim, has in zip(tensors, dims, before):
+            if dim is not None:
+                t = t.movedim(dim, 0)
+                t = t.reshape(t.shape[:1] + (1,) * (max(before) - has) + t.shape[1:])
+            moved.append(t)
+        return moved
+
+
+def of_derivative(kernel):
+    return lambda tensors, path: kernel(tuple(path), tensors)
+
+
+# ---- derivatives ----
+
+def _apply(calls, path, tensors):
+    """As autograd.Function.apply, but of one level of functorch's transforms: that of the kernel that calls it, while
+    inner levels come back through the dispatcher."""
+    modes = torch.is_grad_enabled(), forward_ad._is_fwd_grad_enabled() if _set_fwd_grad_enabled else None
+    apply = super(torch.autograd.Function, _Function).apply
+    if _enable_single_level and torch._C._are_functorch_transforms_active():
+        with _enable_single_level():
+            return apply(calls, path, modes, *tensors)
+    return apply(calls, path, modes, *tensors)
+
+
+def _mask(places):
+    return sum(1 << i for i in places)
+
+
+class _Function(torch.autograd.Function):
+    @staticmethod
+    def forward(ctx, calls, path, modes, *tensors):
+        ctx.calls, ctx.path = calls, path
+        ctx.set_materialize_grads(False)
+        ctx.save_for_backward(*tensors)
+        ctx.save_for_forward(*tensors)
+        # Autograd turns the modes off in here. They are those of inner levels as well, which are still to come.
+        with torch.set_grad_enabled(modes[0]):
+            if _set_fwd_grad_enabled is None:
+                return _below(calls, path, tensors)
+            with _set_fwd_grad_enabled(modes[1]):
+                return _below(calls, path, tensors)
+
+    @staticmethod
+    def backward(ctx, *seeds):
+        tensors = ctx.saved_tensors
+        wanted = [i for i, t in enumerate(tensors) if ctx.needs_input_grad[i + 3] and t.dtype.is_floating_point]
+        given = [i for i, seed in enumerate(seeds) if seed is not None and seed.dtype.is_floating_point]
+        results = [None] * len(tensors)
+        if wanted and given:
+            path = (*ctx.path, GRADIENT, _mask(wanted), _mask(given))
+            # Dense ones: autograd's seeds of sums have stride 0, for which pipelines would be compiled anew.
+            gradients = ctx.calls(path, [*tensors, *(seeds[i].contiguous() for i in given)])
+            for i, gradient in zip(wanted, gradients):
+                # Of an item that the batch shares.
+                results[i] = gradient if gradient.shape == tensors[i].shape else gradient.sum_to_size(tensors[i].shape)
+        return (None, None, None, *results)
+
+    @staticmethod
+    def jvp(ctx, _calls, _path, _modes, *tangents):
+        given = [i for i, t in enumerate(tangents) if t is not None]
+        path = (*ctx.path, TANGENT, _mask(given), 0)
+        moved = ctx.calls(path, [*ctx.saved_tensors, *(tangents[i] for i in given)])
+        return tuple(t if t.dtype.is_floating_point else None for t in moved)
+
+
+def _below(calls, path, tensors):
+    guard = torch._C._AutoDispatchBelowAutograd()
+    try:
+        return tuple(calls(path, tensors))
+    finally:
+        del guard

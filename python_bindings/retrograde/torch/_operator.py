@@ -1,0 +1,166 @@
+"""operator(): a pipeline as an operator of PyTorch."""
+import inspect
+import itertools
+import re
+import threading
+
+import torch
+
+from .. import _retrograde as rg
+from .._errors import CompileError, error
+from . import _library
+from ._plan import Plan, is_image
+
+_numbers = itertools.count()
+MOST_SIZES = 8  # for which an operator is compiled, each alone
+
+
+def operator(name, pipeline=None, inputs=None, outputs=None, *, sizes=None):
+    """An operator with the name "ns::name": a function of tensors for ImageParams, and of tensors or numbers for
+    Params, in the order of `inputs`. It gives a tensor for a Func, and a tuple of them for a list or a Pipeline.
+
+    `outputs` (or `sizes`): the sizes of the results in the order of Funcs, innermost first, of each where there are
+    several; or a function of the tensors that gives them; None: those of the first image. Under torch.compile with
+    dynamic shapes it should read t.shape, not len(t), which is a number of that one call.
+
+    Without a name, operator(pipeline, inputs, outputs) finds one.
+
+    `pipeline` may also be a function that gives (pipeline, inputs) or (pipeline, inputs, outputs): of an element type,
+    "float32", so that one definition is an operator on tensors of each floating-point type; the first tensor that is
+    of float32 in the definition for float32 says which. A function of two arguments, (type, shapes), is also called
+    with the shapes of tensors, as PyTorch orders them: what it defines is compiled for these alone, which is faster
+    than code for all. It is called with None for others, after MOST_SIZES of them."""
+    if not isinstance(name, str):
+        name, pipeline, inputs, outputs = None, name, pipeline, outputs if inputs is None else inputs
+    return Operator(name, pipeline, inputs, sizes if outputs is None else outputs)
+
+
+def _funcs(pipeline):
+    if isinstance(pipeline, rg.Func):
+        return [pipeline], True
+    return (pipeline.outputs() if isinstance(pipeline, rg.Pipeline) else list(pipeline)), False
+
+
+def _shapes(outputs, inputs, count):
+    """What Plan takes, of what users give."""
+    if outputs is None:
+        first = next((i for i, parameter in enumerate(inputs) if is_image(parameter)), None)
+        if first is None:
+            raise error(CompileError, "make an operator without images", "the sizes of its results are known",
+                        "there is no image whose sizes they could have", "Give `outputs`: their sizes")
+        return lambda tensors: [tuple(tensors[first].shape)] * count
+
+    def shapes(tensors):
+        given = outputs(*tensors) if callable(outputs) else outputs
+        each = given if given and isinstance(given[0], (list, tuple)) else [given] * count
+        return [tuple(reversed(one)) for one in each]
+
+    return shapes
+
+
+def _identifiers(names):
+    """Names of arguments of a schema: words, each once."""
+    made = []
+    for name in names:
+        word = re.sub(r"\W", "_", name)
+        word = word if re.match("[A-Za-z]", word) else "t" + word
+        made.append(word if word not in made else f"{word}_{len(made)}")
+    return made
+
+
+class Operator:
+    """See `operator`. `overload` and `derivative` are what torch.library knows."""
+
+    overload = derivative = None
+
+    def __init__(self, name, pipeline, inputs, outputs):
+        self._define, self._knows_sizes = None, False
+        if callable(pipeline) and not isinstance(pipeline, (rg.Func, rg.Pipeline)):
+            self._define, self._knows_sizes = pipeline, len(inspect.signature(pipeline).parameters) > 1
+            definition = pipeline("float32", None) if self._knows_sizes else pipeline("float32")
+        else:
+            definition = (pipeline, inputs, outputs)
+        self._plans, self._sized, self._lock = {}, {}, threading.Lock()
+        funcs, self.single = _funcs(definition[0])
+        self.name = name or f"retrograde::{re.sub(r'[^A-Za-z0-9]', '_', funcs[0].name())}_{next(_numbers)}"
+        if not re.fullmatch(r"[A-Za-z]\w*::[A-Za-z]\w*", self.name):
+            raise error(ValueError, f'make an operator "{self.name}"', 'a name is "namespace::name", of words',
+                        "this one is not", "Choose one like that")
+        plan = self._plan_of(definition)
+        self.results, self.argument_names = len(plan.outputs), _identifiers(plan.names)
+        # The tensor whose type chooses the definition.
+        self._by = next((i for i, d in enumerate(plan.dtypes) if d == torch.float32), None) if self._define else None
+        self._plans[torch.float32 if self._by is not None else None] = plan
+        self._parameters = plan
+        _library.register(self)
+
+    def _defined(self, dtype):
+        kind = str(dtype)[6:]
+        return self._define(kind, None) if self._knows_sizes else self._define(kind)
+
+    def _plan_of(self, definition, sizes=None):
+        pipeline, inputs, outputs = (*definition, None)[:3]
+        funcs, _ = _funcs(pipeline)
+        return Plan(self.name, funcs, inputs, _shapes(outputs, list(inputs), len(funcs)), sizes)
+
+    def plan_for(self, path, tensors):
+        """What runs for tensors of these types and sizes, which are known."""
+        if not self._knows_sizes or any(t.dim() < rank for t, rank in zip(tensors, self._parameters.ranks)):
+            return self.plan(path, tensors)
+        key = (tensors[self._by].dtype if self._by is not None else None,
+               *[t.shape if t.dim() == rank else t.shape[t.dim() - rank:]
+                 for t, rank in zip(tensors, self._parameters.ranks)])
+        plan = self._sized.get(key)
+        if plan is None:
+            generic = self.plan(path, tensors)  # first: it refuses types that there are none of
+            generic.check(tensors)
+            with self._lock:
+                if key not in self._sized:
+                    if len(self._sized) >= MOST_SIZES:
+                        return generic
+                    sizes = [tuple(size) for size in key[1:]]
+                    definition = self._define(str(key[0] or torch.float32)[6:], sizes)
+                    self._sized[key] = self._plan_of(definition, sizes)
+                plan = self._sized[key]
+        return plan.derived(path)
+
+    def plan(self, path, tensors):
+        """What runs for tensors of these types, and of any sizes."""
+        dtype = tensors[self._by].dtype if self._by is not None else None
+        if dtype is not None and not dtype.is_floating_point:
+            dtype = torch.float32  # refused there
+        plan = self._plans.get(dtype)
+        if plan is None:
+            with self._lock:
+                if dtype not in self._plans:
+                    self._plans[dtype] = self._plan_of(self._defined(dtype))
+                plan = self._plans[dtype]
+        return plan.derived(path)
+
+    def __call__(self, *tensors):
+        if len(tensors) == len(self.argument_names):
+            for tensor in tensors:
+                if not isinstance(tensor, torch.Tensor):
+                    tensors = self._as_tensors(tensors)
+                    break
+            return self.overload(*tensors)
+        raise error(TypeError, f'call the operator "{self.name}"', f"it takes {', '.join(self.argument_names)}",
+                    f"{len(tensors)} arguments are given", "Give one for each")
+
+    def _as_tensors(self, tensors):
+        """Numbers stand for Params."""
+        of = next((t.dtype for t in tensors if isinstance(t, torch.Tensor) and t.dtype.is_floating_point), None)
+        made = []
+        for tensor, dtype, parameter in zip(tensors, self._parameters.dtypes, self._parameters.inputs):
+            if not isinstance(tensor, torch.Tensor):
+                if is_image(parameter):
+                    raise error(TypeError, f'call the operator "{self.name}"', f"{parameter.name()} is a tensor",
+                                f"given is a {type(tensor).__name__}", "Make one of it with torch.tensor")
+                follows = self._define and dtype == torch.float32 and of
+                tensor = torch.tensor(tensor, dtype=of if follows else dtype)
+            made.append(tensor)
+        return made
+
+    def made(self):
+        """The paths of the derivatives that were made: Plan.derived."""
+        return sorted({path for plan in [*self._plans.values(), *self._sized.values()] for path in plan.made()})

@@ -1,0 +1,215 @@
+"""A pipeline as a function of tensors, with the pipelines of its derivatives.
+
+Tensors may have more dimensions than their parameters, in front of them: a batch. These are broadcast as PyTorch
+broadcasts, and each item of the batch is a call of its own.
+"""
+import itertools
+import threading
+
+import torch
+
+from .. import _retrograde as rg
+from .._errors import CompileError, error
+
+DTYPES = {torch.float16: rg.Float(16), torch.bfloat16: rg.BFloat(16), torch.float32: rg.Float(32),
+          torch.float64: rg.Float(64), torch.uint8: rg.UInt(8), torch.int8: rg.Int(8), torch.int16: rg.Int(16),
+          torch.int32: rg.Int(32), torch.int64: rg.Int(64), torch.bool: rg.Bool()}
+TYPES = {str(kind): dtype for dtype, kind in DTYPES.items()}
+GRADIENT, TANGENT = 0, 1  # the steps of a path: see Plan.derived
+_numbers = itertools.count()
+
+
+def dtype_of(thing):
+    """The element type of a Func or parameter as PyTorch's."""
+    if str(thing.type()) not in TYPES:
+        raise error(CompileError, f'make an operator of "{thing.name()}"', "its elements are those of a tensor",
+                    f"they are {thing.type()}", f"Use one of {', '.join(TYPES)}")
+    return TYPES[str(thing.type())]
+
+
+def bits(mask):
+    """The places of its ones."""
+    return [i for i in range(mask.bit_length()) if mask >> i & 1]
+
+
+def is_image(parameter):
+    return isinstance(parameter, rg.ImageParam)
+
+
+class Plan:
+    """Of Funcs, and the parameters that they read; `shapes`: those of the outputs, as PyTorch orders them, from the
+    tensors of one item; `sizes`: the shapes of the inputs where the plan is for these alone, or None; `order`: how many
+    times an operator was differentiated for it."""
+
+    def __init__(self, name, outputs, inputs, shapes, sizes=None, order=0):
+        self.name, self.outputs, self.inputs, self._shapes = name, list(outputs), list(inputs), shapes
+        self.sizes, self.order = sizes, order
+        for f in self.outputs:
+            if f.outputs() != 1:
+                raise error(CompileError, f'make an operator of "{f.name()}"', "a tensor holds one value at each point",
+                            f"it has {f.outputs()} values", "Give a Func for each of them")
+        self.names = [parameter.name() for parameter in self.inputs]
+        self.dtypes = [dtype_of(parameter) for parameter in self.inputs]
+        self.ranks = [parameter.dimensions() if is_image(parameter) else 0 for parameter in self.inputs]
+        self.result_dtypes = [dtype_of(f) for f in self.outputs]
+        self._images = [is_image(parameter) for parameter in self.inputs]
+        self._lock, self._callable, self._derived = threading.RLock(), None, {}
+        self._result_shapes = None
+        if sizes is not None:
+            self._result_shapes = shapes([torch.empty(size, dtype=dtype, device="meta")
+                                          for size, dtype in zip(sizes, self.dtypes)])
+            for parameter, size in zip(self.inputs, sizes):
+                _set_bounds(parameter, size)
+            for f, size in zip(self.outputs, self._result_shapes):
+                _set_bounds(f.output_buffer(), size)
+
+    # ---- what it is given ----
+
+    def check(self, tensors):
+        """The rules that shapes and types break before anything runs: TypeError."""
+        for tensor, dtype, rank in zip(tensors, self.dtypes, self.ranks):
+            if tensor.dtype != dtype or tensor.dim() < rank:
+                self._refuse(tensors)
+        if len(tensors) != len(self.inputs):
+            self._refuse(tensors)
+
+    def _refuse(self, tensors):
+        def shown(names, dtypes, shapes):
+            return ", ".join(f"{n}: {str(d)[6:]} {s}" for n, d, s in zip(names, dtypes, shapes))
+
+        names = self.names + [f"argument {i}" for i in range(len(self.names), len(tensors))]
+        raise error(TypeError, f'call the operator "{self.name}"',
+                    f"it takes {shown(self.names, self.dtypes, [f'over {rank} dimensions' for rank in self.ranks])}",
+                    f"given are {shown(names, [t.dtype for t in tensors], [list(t.shape) for t in tensors])}",
+                    "Convert them with tensor.to(dtype); dimensions in front of an image's own are a batch")
+
+    def batch(self, tensors):
+        """The sizes of the batch; () for none."""
+        leading = [t.shape[:t.dim() - rank] for t, rank in zip(tensors, self.ranks) if t.dim() > rank]
+        if not leading:
+            return ()
+        try:
+            return tuple(torch.broadcast_shapes(*leading))
+        except RuntimeError:
+            shapes = ", ".join(f"{name} {list(t.shape)}" for name, t in zip(self.names, tensors))
+            raise error(TypeError, f'call the operator "{self.name}" on a batch', "sizes of the batch are equal or 1",
+                        f"given are {shapes}", "Give each tensor the same leading sizes, or none") from None
+
+    def shapes(self, tensors, batch):
+        """Those of the results."""
+        if self._result_shapes is not None:
+            return [batch + shape for shape in self._result_shapes] if batch else self._result_shapes
+        if batch:
+            tensors = [torch.empty(t.shape[t.dim() - rank:], dtype=t.dtype, device="meta")
+                       for t, rank in zip(tensors, self.ranks)]
+        return [batch + shape for shape in self._shapes(tensors)]
+
+    # ---- what it does ----
+
+    def fake(self, tensors):
+        """Results without values, for those who ask what shapes they would have."""
+        self.check(tensors)
+        device = tensors[0].device if tensors else None
+        return [torch.empty(shape, dtype=dtype, device=device)
+                for shape, dtype in zip(self.shapes(tensors, self.batch(tensors)), self.result_dtypes)]
+
+    def run(self, tensors):
+        self.check(tensors)
+        batch = self.batch(tensors)
+        results = [torch.empty(shape, dtype=dtype)
+                   for shape, dtype in zip(self.shapes(tensors, batch), self.result_dtypes)]
+        if not batch:
+            self._call(tensors, results)
+        elif 0 not in batch:
+            wide = [t.expand(batch + tuple(t.shape[t.dim() - rank:])) for t, rank in zip(tensors, self.ranks)]
+            for at in itertools.product(*map(range, batch)):
+                self._call([t[at] for t in wide], [t[at] for t in results])
+        return results
+
+    def _call(self, tensors, results):
+        if self._callable is None:
+            with self._lock:
+                if self._callable is None:
+                    self._callable = self._compile()
+        self._callable._call_tensors(*(t if image else t.item() for t, image in zip(tensors, self._images)), *results)
+
+    def _compile(self):
+        """Funcs that nobody scheduled get a schedule."""
+        pipeline = rg.Pipeline(self.outputs)
+        # The region that register tiles read comes out too large where it is clamped to sizes that are not known, and in
+        # derivatives of gradients: what they read of a seed would be refused.
+        tiles = self.sizes is not None and self.order < 2
+        pipeline.set_autoschedule(rg.AutoscheduleOptions(without=[] if tiles else [rg.Decision.register_tiles]))
+        return pipeline.compile_to_callable(self.inputs)
+
+    # ---- its derivatives ----
+
+    def derived(self, path):
+        """The plan that a path leads to: steps of three numbers each.
+        GRADIENT, wanted, given: of the inputs and a seed for each of the outputs `given`, by the inputs `wanted`;
+        TANGENT, given, 0: of the inputs and a tangent for each of those `given`, all outputs' tangents.
+        Sets are the bits of a number."""
+        if not path:
+            return self
+        step = tuple(path[:3])
+        with self._lock:
+            if step not in self._derived:
+                make = self._gradient if step[0] == GRADIENT else self._tangent
+                self._derived[step] = make(bits(step[1]), bits(step[2]))
+        return self._derived[step].derived(path[3:])
+
+    def made(self):
+        """The paths of all derivatives that were made."""
+        return sorted(step + rest for step, plan in self._derived.items() for rest in [(), *plan.made()])
+
+    def _gradient(self, wanted, given):
+        by = [self.inputs[i] for i in wanted]
+        seeds, derivatives = [], []
+        for i in given:
+            f = self.outputs[i]
+            seed = rg.ImageParam(f.type(), f.dimensions(), f"seed_{next(_numbers)}")
+            if self.sizes is None:
+                bounds = [(seed.dim(d).min(), seed.dim(d).extent()) for d in range(seed.dimensions())]
+            else:
+                bounds = [(0, size) for size in reversed(self._result_shapes[i])]
+            seeds.append(seed)
+            derivatives.append(rg.propagate_adjoints(f, rg.Func(seed), bounds, rg.AdjointOptions(wrt=by)))
+        gradients = [_sum([d(parameter) for d in derivatives], parameter) for parameter in by]
+        sizes = None if self.sizes is None else [*self.sizes, *(self._result_shapes[i] for i in given)]
+        return Plan(f"{self.name}, gradient", gradients, self.inputs + seeds,
+                    lambda tensors: [tuple(tensors[i].shape) for i in wanted], sizes, self.order + 1)
+
+    def _tangent(self, given, _):
+        directions, tangents = [], []
+        for parameter in (self.inputs[i] for i in given):
+            dimensions = parameter.dimensions() if is_image(parameter) else 0
+            tangents.append(rg.ImageParam(parameter.type(), dimensions, f"tangent_{next(_numbers)}"))
+            directions.append(rg.Direction(parameter, rg.Func(tangents[-1])))
+        moved = [_as(f.type(), f.dimensions(), [rg.propagate_tangents(f, directions)(f)] if f.type().is_float() else [])
+                 for f in self.outputs]
+        count = len(self.inputs)
+        sizes = None if self.sizes is None else [*self.sizes, *(self.sizes[i] for i in given)]
+        return Plan(f"{self.name}, tangent", moved, self.inputs + tangents,
+                    lambda tensors: self._shapes(tensors[:count]), sizes, self.order + 1)
+
+
+def _set_bounds(buffer, size):
+    """Of an image or an output, as PyTorch orders its sizes."""
+    for d, extent in enumerate(reversed(size)):
+        buffer.dim(d).set_bounds(0, extent)
+
+
+def _sum(parts, parameter):
+    """One Func for each input, of its own type: parts may be shared, and wider."""
+    return _as(parameter.type(), parameter.dimensions() if is_image(parameter) else 0, parts)
+
+
+def _as(type, dimensions, parts):
+    total = rg.Func(f"derivative_{next(_numbers)}")
+    value = rg.cast(type, 0)
+    at = tuple(rg.Var(f"d{d}") for d in range(dimensions))
+    for part in parts:
+        if part.defined():
+            value = value + rg.cast(type, part[at])
+    total[at] = value
+    return total

@@ -1,0 +1,211 @@
+"""Eight operators (bench/torch/definitions.py) as PyTorch sees them: derivatives of both modes and orders, what opcheck
+checks, tensors of all kinds, torch.compile, vmap, and that training with them leaks nothing.
+
+    torch_operators_test.py OPERATOR [unittest's arguments]
+
+Ends with 77, which ctest counts as skipped, where there is no PyTorch."""
+import gc
+import os
+import resource
+import sys
+import unittest
+from pathlib import Path
+
+try:
+    import torch
+except ModuleNotFoundError:
+    print("skipped: there is no PyTorch for", sys.executable)
+    sys.exit(77)
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "bench" / "torch"))
+from definitions import OPERATORS
+from formulations import FORMULATIONS
+from retrograde.torch import operator
+
+NAME = sys.argv.pop(1)
+STEPS = int(os.environ.get("RETROGRADE_TORCH_STEPS", 1000))
+OP = operator(f"tests::{NAME}", OPERATORS[NAME])
+IS_NEW = hasattr(torch.library, "opcheck")
+
+
+def values(*shape, low=0.0, high=1.0, kind=torch.float64, seed=1):
+    generator = torch.Generator().manual_seed(seed)
+    return (low + (high - low) * torch.rand(shape, generator=generator, dtype=torch.float64)).to(kind)
+
+
+def off_grid(t, cells):
+    """Not at the kinks of what is linear between `cells` knots: finite differences see one side alone there."""
+    at = t * cells
+    return (at.floor() + (at - at.floor()) * 0.8 + 0.1) / cells
+
+
+def inputs(kind=torch.float64):
+    """Of the smallest size at which everything happens that can happen."""
+    transforms = torch.tensor([[[0.83, -0.21, 0.11], [0.17, 0.93, -0.07]], [[1.07, 0.05, -0.03], [-0.12, 0.71, 0.2]]])
+    made = {
+        "bilateral_slice": lambda: (values(3, 3, 4), off_grid(values(3, 4, seed=2) * 0.9 + 0.05, 3),
+                                    values(3, 4, 3, 2, 2, low=-1)),
+        "flow_warp": lambda: (values(2, 3, 4, low=-1), off_grid(values(2, 3, 4, low=-2, high=2, seed=2), 1)),
+        "spatial_transformer": lambda: (values(2, 2, 4, 3, low=-1), transforms.double()),
+        "convolution": lambda: (values(2, 2, 3, 4, low=-1), values(3, 2, 3, 3, low=-1), values(3)),
+        "tone_curve": lambda: (off_grid(values(3, 5), 3), values(4, low=-1, seed=2)),
+        "recursive_filter": lambda: (values(4, 5), torch.tensor(0.4, dtype=torch.float64)),
+        "non_local_means": lambda: (values(4, 5), torch.tensor(3.0, dtype=torch.float64)),
+        "soft_histogram": lambda: (off_grid(values(3, 4), 7),),
+    }[NAME]()
+    return tuple(t.to(kind) for t in made)
+
+
+def wanting(tensors):
+    return tuple(t.detach().requires_grad_() for t in tensors)
+
+
+def strided(t):
+    """The same values, every second of a larger tensor's, its axes in reverse, not from its start."""
+    if t.dim() == 0:
+        return t
+    wide = torch.full([2 * n + 1 for n in reversed(t.shape)], float("nan"), dtype=t.dtype)
+    view = wide[tuple(slice(1, None, 2) for _ in t.shape)].permute(*reversed(range(t.dim())))
+    view.copy_(t)
+    return view
+
+
+class Values(unittest.TestCase):
+    def check(self, tensors, close=1e-12):
+        result, want = OP(*tensors), FORMULATIONS[NAME](*tensors)
+        self.assertEqual((result.shape, result.dtype), (want.shape, want.dtype))
+        self.assertLessEqual((result - want).abs().max().item(), close * want.abs().max().item())
+
+    def test_of_both_types(self):
+        self.check(inputs())
+        self.check(inputs(torch.float32), close=2e-5)
+
+    def test_gradients_are_those_of_the_formulation(self):
+        ours, theirs = wanting(inputs()), wanting(inputs())
+        result, want = OP(*ours), FORMULATIONS[NAME](*theirs)
+        seed = values(*result.shape, low=-1, seed=3)
+        result.backward(seed)
+        want.backward(seed)
+        for a, b in zip(ours, theirs):
+            self.assertLessEqual((a.grad - b.grad).abs().max().item(), 1e-11 * b.grad.abs().max().item())
+
+    def test_tensors_of_any_strides(self):
+        want = OP(*inputs())
+        torch.testing.assert_close(OP(*(strided(t) for t in inputs())), want, rtol=0, atol=1e-14)
+        first, *rest = inputs()
+        expanded = first[..., :1].expand(first.shape) if first.dim() else first
+        torch.testing.assert_close(OP(expanded, *rest), OP(expanded.contiguous(), *rest), rtol=0, atol=1e-14)
+
+    def test_a_batch(self):
+        """The first tensor has one for each item, the others are shared."""
+        first, *rest = wanting(inputs())
+        batch = torch.stack([first, 0.9 * first + 0.01, first]).detach().requires_grad_()
+        result = OP(batch, *rest)
+        for one, item in zip(result, batch):
+            torch.testing.assert_close(one, OP(item, *rest), rtol=0, atol=0)
+        gradients = torch.autograd.grad(result.square().sum(), (batch, *rest))
+        singles = [torch.autograd.grad(OP(item, *rest).square().sum(), (item, *rest))
+                   for item in [b.detach().requires_grad_() for b in batch]]
+        torch.testing.assert_close(gradients[0], torch.stack([s[0] for s in singles]), rtol=0, atol=0)
+        for i in range(len(rest)):
+            torch.testing.assert_close(gradients[i + 1], sum(s[i + 1] for s in singles), rtol=1e-13, atol=1e-15)
+
+    def test_an_empty_batch(self):
+        first, *rest = inputs()
+        empty = first.new_empty(0, *first.shape).requires_grad_()
+        rest = wanting(rest)
+        result = OP(empty, *rest)
+        self.assertEqual(result.shape, (0, *OP(first, *rest).shape))
+        gradients = torch.autograd.grad(result.sum(), (empty, *rest))
+        self.assertEqual(gradients[0].shape, empty.shape)
+        for gradient, tensor in zip(gradients[1:], rest):
+            self.assertTrue(torch.equal(gradient, torch.zeros_like(tensor)))
+
+
+class Derivatives(unittest.TestCase):
+    def test_first(self):
+        self.assertTrue(torch.autograd.gradcheck(OP, wanting(inputs()), nondet_tol=0.0, check_forward_ad=True))
+
+    def test_second(self):
+        self.assertTrue(torch.autograd.gradgradcheck(OP, wanting(inputs()), nondet_tol=0.0))
+
+    def test_of_strided_expanded_and_batched_tensors(self):
+        first, *rest = inputs()
+        shared = torch.stack([first, first]).detach()
+        for given in ([strided(t) for t in (first, *rest)], [first[..., :1], *rest], [shared, *rest]):
+            def call(first_given, *others):
+                return OP(first_given.expand(*first_given.shape[:-1], inputs()[0].shape[-1]), *others)
+            with self.subTest(shapes=[t.shape for t in given]):
+                self.assertTrue(torch.autograd.gradcheck(call, wanting(given), nondet_tol=0.0, fast_mode=True))
+
+
+@unittest.skipUnless(IS_NEW, f"PyTorch {torch.__version__} has neither opcheck nor torch.compile")
+class TorchLibrary(unittest.TestCase):
+    def test_opcheck(self):
+        tensors = wanting(inputs())
+        torch.library.opcheck(OP.overload, tensors)
+        seed = torch.ones_like(OP(*tensors)).requires_grad_()
+        wanted = 2**len(tensors) - 1
+        torch.library.opcheck(OP.derivative, ([*tensors, seed], [0, wanted, 1]))
+        torch.library.opcheck(OP.derivative, ([*tensors, tensors[0]], [1, 1, 0]))
+
+    def test_vmap_is_a_loop(self):
+        first, *rest = inputs()
+        batch = torch.stack([first, 0.9 * first + 0.01], -1)
+        of_last = (batch.dim() - 1, *[None] * len(rest))
+        want = torch.stack([OP(batch[..., i].contiguous(), *rest) for i in range(2)])
+        self.assertTrue(torch.equal(torch.vmap(OP, of_last)(batch, *rest), want))
+
+        def loss(*tensors):
+            return OP(*tensors).square().sum()
+
+        by = tuple(range(1 + len(rest)))
+        got = torch.vmap(torch.func.grad(loss, by), of_last)(batch, *rest)
+        each = [torch.func.grad(loss, by)(batch[..., i].contiguous(), *rest) for i in range(2)]
+        for all_items, *items in zip(got, *each):
+            torch.testing.assert_close(all_items, torch.stack(items), rtol=0, atol=0)
+
+    def test_compiled_as_eager(self):
+        compiled = torch.compile(lambda *tensors: OP(*tensors).sin(), fullgraph=True, dynamic=True)
+        for more in range(3):
+            tensors = inputs(torch.float32)
+            if NAME != "bilateral_slice":
+                tensors = (torch.cat([tensors[0]] * (more + 1), -1), *tensors[1:])
+            if NAME == "flow_warp":
+                tensors = (tensors[0], torch.cat([tensors[1]] * (more + 1), -1))
+            ours, theirs = wanting(tensors), wanting(tensors)
+            a, b = compiled(*ours), OP(*theirs).sin()
+            torch.testing.assert_close(a, b, rtol=1e-6, atol=1e-6)
+            a.sum().backward()
+            b.sum().backward()
+            for one, other in zip(ours, theirs):
+                torch.testing.assert_close(one.grad, other.grad, rtol=1e-5, atol=1e-6)
+
+
+class Training(unittest.TestCase):
+    def test_leaks_nothing(self):
+        tensors = wanting(inputs(torch.float32))
+        optimizer = torch.optim.SGD(tensors, lr=1e-6)
+
+        def train(steps):
+            for _ in range(steps):
+                optimizer.zero_grad()
+                OP(*tensors).square().mean().backward()
+                optimizer.step()
+            gc.collect()
+            return len(gc.get_objects()), resource_kb()
+
+        train(50)
+        objects, kb = train(STEPS // 2)
+        objects_after, kb_after = train(STEPS // 2)
+        self.assertLessEqual(objects_after - objects, 10)
+        self.assertLessEqual(kb_after - kb, 1024)
+
+
+def resource_kb():
+    with open("/proc/self/statm", encoding="ascii") as file:
+        return int(file.read().split()[1]) * resource.getpagesize() // 1024
+
+
+if __name__ == "__main__":
+    unittest.main()
