@@ -30,7 +30,6 @@ _HAS_FRAGMENTS = hasattr(torch.library, "register_fake")
 _enable_single_level = None
 if hasattr(torch, "func"):
     from torch._functorch.utils import enable_single_level_autograd_function as _enable_single_level
-_set_fwd_grad_enabled = getattr(forward_ad, "_set_fwd_grad_enabled", None)
 
 
 def _library(namespace):
@@ -107,7 +106,7 @@ class Calls:
                     f"given are {devices}", "Move the tensors with tensor.cpu()")
 
     def differentiate(self, path, tensors):
-        if forward_ad._current_level < 0 and not (torch.is_grad_enabled() and any(t.requires_grad for t in tensors)):
+        if forward_ad._current_level < 0 and not (torch.is_grad_enabled() and _any_requires_grad(*tensors)):
             guard = torch._C._AutoDispatchBelowAutograd()
             try:
                 return self(path, tensors)
@@ -150,15 +149,24 @@ def of_derivative(kernel):
 
 # ---- derivatives ----
 
+def _each_requires_grad(*tensors):
+    for t in tensors:
+        if t.requires_grad:
+            return True
+    return False
+
+
+_any_requires_grad = getattr(torch._C, "_any_requires_grad", _each_requires_grad)
+
+
 def _apply(calls, path, tensors):
     """As autograd.Function.apply, but of one level of functorch's transforms: that of the kernel that calls it, while
     inner levels come back through the dispatcher."""
-    modes = torch.is_grad_enabled(), forward_ad._is_fwd_grad_enabled() if _set_fwd_grad_enabled else None
     apply = super(torch.autograd.Function, _Function).apply
-    if _enable_single_level and torch._C._are_functorch_transforms_active():
-        with _enable_single_level():
-            return apply(calls, path, modes, *tensors)
-    return apply(calls, path, modes, *tensors)
+    if _enable_single_level is None or not torch._C._are_functorch_transforms_active():
+        return apply(calls, path, None, *tensors)
+    with _enable_single_level():
+        return apply(calls, path, (torch.is_grad_enabled(), torch._C._is_fwd_grad_enabled()), *tensors)
 
 
 def _mask(places):
@@ -171,13 +179,13 @@ class _Function(torch.autograd.Function):
         ctx.calls, ctx.path = calls, path
         ctx.set_materialize_grads(False)
         ctx.save_for_backward(*tensors)
-        ctx.save_for_forward(*tensors)
+        if forward_ad._current_level >= 0:
+            ctx.save_for_forward(*tensors)
+        if modes is None:
+            return _below(calls, path, tensors)
         # Autograd turns the modes off in here. They are those of inner levels as well, which are still to come.
-        with torch.set_grad_enabled(modes[0]):
-            if _set_fwd_grad_enabled is None:
-                return _below(calls, path, tensors)
-            with _set_fwd_grad_enabled(modes[1]):
-                return _below(calls, path, tensors)
+        with torch.set_grad_enabled(modes[0]), forward_ad._set_fwd_grad_enabled(modes[1]):
+            return _below(calls, path, tensors)
 
     @staticmethod
     def backward(ctx, *seeds):

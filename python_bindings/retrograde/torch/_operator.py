@@ -105,11 +105,17 @@ class Operator:
 
     def plan_for(self, path, tensors):
         """What runs for tensors of these types and sizes, which are known."""
-        if not self._knows_sizes or any(t.dim() < rank for t, rank in zip(tensors, self._parameters.ranks)):
+        if not self._knows_sizes:
             return self.plan(path, tensors)
-        key = (tensors[self._by].dtype if self._by is not None else None,
-               *[t.shape if t.dim() == rank else t.shape[t.dim() - rank:]
-                 for t, rank in zip(tensors, self._parameters.ranks)])
+        key = [tensors[self._by].dtype if self._by is not None else None]
+        for t, rank in zip(tensors, self._parameters.ranks):
+            shape = t.shape
+            if len(shape) != rank:
+                if len(shape) < rank:
+                    return self.plan(path, tensors)  # which refuses it
+                shape = shape[len(shape) - rank:]
+            key.append(shape)
+        key = tuple(key)
         plan = self._sized.get(key)
         if plan is None:
             generic = self.plan(path, tensors)  # first: it refuses types that there are none of
@@ -122,7 +128,7 @@ class Operator:
                     definition = self._define(str(key[0] or torch.float32)[6:], sizes)
                     self._sized[key] = self._plan_of(definition, sizes)
                 plan = self._sized[key]
-        return plan.derived(path)
+        return plan.derived(path) if path else plan
 
     def plan(self, path, tensors):
         """What runs for tensors of these types, and of any sizes."""

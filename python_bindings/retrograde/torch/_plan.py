@@ -53,6 +53,7 @@ class Plan:
         self.ranks = [parameter.dimensions() if is_image(parameter) else 0 for parameter in self.inputs]
         self.result_dtypes = [dtype_of(f) for f in self.outputs]
         self._images = [is_image(parameter) for parameter in self.inputs]
+        self._has_numbers = not all(self._images)
         self._lock, self._callable, self._derived = threading.RLock(), None, {}
         self._result_shapes = None
         if sizes is not None:
@@ -66,12 +67,16 @@ class Plan:
     # ---- what it is given ----
 
     def check(self, tensors):
-        """The rules that shapes and types break before anything runs: TypeError."""
-        for tensor, dtype, rank in zip(tensors, self.dtypes, self.ranks):
-            if tensor.dtype != dtype or tensor.dim() < rank:
-                self._refuse(tensors)
+        """The rules that shapes and types break before anything runs: TypeError. Whether there is a batch."""
         if len(tensors) != len(self.inputs):
             self._refuse(tensors)
+        has_batch = False
+        for tensor, dtype, rank in zip(tensors, self.dtypes, self.ranks):
+            more = tensor.dim() - rank
+            if tensor.dtype is not dtype or more < 0:
+                self._refuse(tensors)
+            has_batch |= more > 0
+        return has_batch
 
     def _refuse(self, tensors):
         def shown(names, dtypes, shapes):
@@ -114,8 +119,7 @@ class Plan:
                 for shape, dtype in zip(self.shapes(tensors, self.batch(tensors)), self.result_dtypes)]
 
     def run(self, tensors):
-        self.check(tensors)
-        batch = self.batch(tensors)
+        batch = self.batch(tensors) if self.check(tensors) else ()
         results = [torch.empty(shape, dtype=dtype)
                    for shape, dtype in zip(self.shapes(tensors, batch), self.result_dtypes)]
         if not batch:
@@ -131,7 +135,9 @@ class Plan:
             with self._lock:
                 if self._callable is None:
                     self._callable = self._compile()
-        self._callable._call_tensors(*(t if image else t.item() for t, image in zip(tensors, self._images)), *results)
+        if self._has_numbers:
+            tensors = [t if image else t.item() for t, image in zip(tensors, self._images)]
+        self._callable._call_tensors(*tensors, *results)
 
     def _compile(self):
         """Funcs that nobody scheduled get a schedule."""
