@@ -82,6 +82,22 @@ def pytorch(report):
     return table(head, rows) + f"\nGeometric mean: {report['geometric_mean']:.2f}.\n"
 
 
+def torch_operators(report):
+    def cells(row, what):
+        times = [row.get(f"{side}_{what}_ms") for side in ("retrograde", "eager", "compiled")]
+        return [" / ".join("–" if t is None else f"{t:.3g}" for t in times),
+                f"{row[f'{what}_ratio']:.2f}" if f"{what}_ratio" in row else "–"]
+
+    rows = [[r["operator"], *cells(r, "forward"), *cells(r, "both"),
+             " / ".join(f"{r[f'{side}_error']:.0e}" if f"{side}_error" in r else "–"
+                        for side in ("retrograde", "eager", "compiled"))] for r in report["operators"]]
+    head = [f"ms: ours / PyTorch {report['pytorch']} / torch.compile", "forward", "times as fast",
+            "forward and backward", "times as fast", "error"]
+    return table(head, rows) + (f"\nGeometric means to the better of PyTorch's two: forward "
+                                f"{report['forward_geometric_mean']:.2f}, with backward "
+                                f"{report['both_geometric_mean']:.2f} times as fast.\n")
+
+
 def operators(report):
     def cell(value):
         return "–" if value is None else f"{value:.3g}"
@@ -153,7 +169,7 @@ def compile_time(report):
 
 SECTIONS = {"demo": demo, "kernels": pairs, "gradient_peers": pairs, "programs": programs,
             "programs_second": programs, "programs_gradients": programs, "gradients": gradients,
-            "pytorch_peers": pytorch, "operators": operators, "autoscheduled": autoscheduled,
+            "pytorch_peers": pytorch, "torch": torch_operators, "operators": operators, "autoscheduled": autoscheduled,
             "compile_time": compile_time, "model": model.table,
             "decisions": lambda report: decisions.table(report) + "\n"}
 

@@ -1,0 +1,211 @@
+#!/usr/bin/python3
+"""bench.py -- eight operators of PyTorch made of pipelines beside PyTorch's own, in one run.
+
+    bench.py PACKAGE [--operator NAME]... [--rounds N] [--threads N] [--small] [--output FILE] [--plot FILE]
+
+PACKAGE is the folder that holds the Python package. PyTorch is that of the virtual environment of
+../operators/peers.py, which is made when it is not there. What PyTorch has for the same (formulations.py) runs as it
+is and through torch.compile; all run in turn, on the same tensors and as many threads: forward alone, and forward
+with backward by all inputs. Errors are the largest |a - b| / max(|b|, root mean square of b) over the result and all
+gradients, b being PyTorch's own in float64. `ratio` is that of the better of PyTorch's two to ours.
+"""
+import argparse
+import json
+import math
+import os
+import statistics
+import sys
+import time
+import warnings
+from pathlib import Path
+
+HERE = Path(__file__).resolve().parent
+sys.path[:0] = [str(HERE), str(HERE.parent / "operators")]
+import peers
+
+PAUSE_SECONDS = 0.03  # before a turn: threads of OpenMP that have no work look for some for so long
+WARM_SECONDS = 0.02  # of untimed runs in a turn: after the pause caches and clocks are not as in use
+MOST_SECONDS = 3  # of all rounds of one that is slow
+
+
+def sized(small):
+    """The inputs of each operator, float64."""
+    import torch
+
+    generator = torch.Generator().manual_seed(7)
+
+    def values(*shape, low=0.0, high=1.0):
+        return low + (high - low) * torch.rand(shape, generator=generator, dtype=torch.float64)
+
+    n = 64 if small else 512
+    turn = torch.tensor([[0.9, -0.2, 0.05], [0.2, 0.9, -0.03]], dtype=torch.float64)
+    return {
+        "bilateral_slice": (values(3, 2 * n, 2 * n), values(2 * n, 2 * n), values(3, 4, 8, 16, 16, low=-1)),
+        "flow_warp": (values(16, n, n, low=-1), values(2, n, n, low=-9, high=9)),
+        "spatial_transformer": (values(4, 16, n, n, low=-1), turn + 0.03 * torch.arange(4.0)[:, None, None]),
+        "convolution": (values(4, 16, n // 2, n // 2, low=-1), values(16, 16, 3, 3, low=-0.2, high=0.2), values(16)),
+        "tone_curve": (values(2 * n, 2 * n), values(65)),
+        "recursive_filter": (values(2 * n, 2 * n), torch.tensor(0.4, dtype=torch.float64)),
+        "non_local_means": (values(n, n), torch.tensor(9.0, dtype=torch.float64)),
+        "soft_histogram": (values(2 * n, 2 * n),),
+    }
+
+
+class Side:
+    """One way to compute an operator, timed."""
+
+    def __init__(self, name, function, tensors):
+        self.name, self.function, self.tensors = name, function, tensors
+        self.forward_ms, self.both_ms, self.spent = [], [], 0.0
+
+    def forward(self):
+        import torch
+
+        with torch.no_grad():
+            return self.function(*self.tensors)
+
+    def both(self):
+        import torch
+
+        result = self.function(*self.tensors)
+        return [result.detach(), *torch.autograd.grad(result, self.tensors, self.seed)]
+
+    def timed(self, run, times):
+        if self.spent > MOST_SECONDS and times:
+            return
+        time.sleep(PAUSE_SECONDS)
+        warm = time.perf_counter()
+        while True:
+            start = time.perf_counter()
+            run()
+            end = time.perf_counter()
+            if end - warm > WARM_SECONDS:
+                break
+        times.append(1e3 * (end - start))
+        self.spent += end - warm
+
+
+def largest_error(results, exact):
+    worst = 0.0
+    for a, b in zip(results, exact):
+        scale = b.square().mean().sqrt().clamp(min=1e-300)
+        worst = max(worst, ((a.double() - b).abs() / b.abs().maximum(scale)).max().item())
+    return worst
+
+
+def measure(name, options):
+    import torch
+    from definitions import OPERATORS
+    from formulations import FORMULATIONS
+    from retrograde.torch import operator
+
+    exact_inputs = [t.requires_grad_() for t in sized(options.small)[name]]
+    exact = FORMULATIONS[name](*exact_inputs)
+    seed = 2 * torch.rand(exact.shape, generator=torch.Generator().manual_seed(3), dtype=torch.float64) - 1
+    exact = [exact.detach(), *torch.autograd.grad(exact, exact_inputs, seed)]
+    tensors = [t.detach().float().requires_grad_() for t in exact_inputs]
+    sides = [Side("retrograde", operator(f"bench::{name}", OPERATORS[name]), tensors),
+             Side("eager", FORMULATIONS[name], tensors),
+             Side("compiled", torch.compile(FORMULATIONS[name], fullgraph=True, dynamic=False), tensors)]
+    row, failures = {"operator": name, "sizes": [list(t.shape) for t in tensors]}, {}
+    for side in list(sides):
+        side.seed = seed.float()
+        start = time.perf_counter()
+        try:
+            row[f"{side.name}_error"] = largest_error(side.both(), exact)
+            side.forward()
+            row[f"{side.name}_first_s"] = time.perf_counter() - start
+        except Exception as problem:  # what a peer cannot do is in the report
+            failures[side.name] = " ".join(str(problem).split())[:400]
+            sides.remove(side)
+    for at in range(options.rounds):
+        for i in range(len(sides)):
+            side = sides[(i + at) % len(sides)]
+            side.timed(side.forward, side.forward_ms)
+            side.timed(side.both, side.both_ms)
+    for side in sides:
+        row[f"{side.name}_forward_ms"] = statistics.median(side.forward_ms)
+        row[f"{side.name}_both_ms"] = statistics.median(side.both_ms)
+    row["failures"] = failures
+    for what in ("forward", "both"):
+        theirs = [row[f"{s}_{what}_ms"] for s in ("eager", "compiled") if f"{s}_{what}_ms" in row]
+        if theirs and f"retrograde_{what}_ms" in row:
+            row[f"{what}_ratio"] = min(theirs) / row[f"retrograde_{what}_ms"]
+    return row
+
+
+def plot(report, path):
+    import matplotlib
+    matplotlib.use("Agg")
+    from matplotlib import pyplot
+
+    rows = report["operators"]
+    figure, axes = pyplot.subplots(1, 2, figsize=(11, 4), sharey=True)
+    for axis, what, title in zip(axes, ("forward", "both"), ("forward", "forward and backward")):
+        for i, side in enumerate(("retrograde", "eager", "compiled")):
+            axis.barh([y + 0.27 * (1 - i) for y in range(len(rows))], [r.get(f"{side}_{what}_ms", 0) for r in rows],
+                      0.25, label={"retrograde": "Retrograde", "eager": "PyTorch", "compiled": "torch.compile"}[side])
+        axis.set_xscale("log")
+        axis.set_xlabel(f"{title}, ms")
+        axis.set_yticks(range(len(rows)), [r["operator"] for r in rows])
+    axes[0].invert_yaxis()
+    axes[0].legend()
+    figure.tight_layout()
+    figure.savefig(path, dpi=110)
+
+
+def geometric_mean(values):
+    return math.exp(statistics.fmean(math.log(v) for v in values))
+
+
+def read_options():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("package")
+    parser.add_argument("--operator", action="append", dest="operators")
+    parser.add_argument("--rounds", type=int, default=9)
+    parser.add_argument("--threads", type=int, default=2)
+    parser.add_argument("--small", action="store_true")
+    parser.add_argument("--output", default="out/bench/torch.json")
+    parser.add_argument("--plot")
+    return parser.parse_args()
+
+
+def main():
+    options = read_options()
+    os.environ["HL_NUM_THREADS"] = os.environ["OMP_NUM_THREADS"] = str(options.threads)
+    if sys.prefix != peers.PEERS:
+        peers.make_peers(["pytorch"])
+        python = os.path.join(peers.PEERS, "bin", "python")
+        done = os.spawnv(os.P_WAIT, python, [python, *sys.argv])
+        if done == 0 and options.plot:  # with Debian's matplotlib
+            with open(options.output, encoding="utf-8") as file:
+                plot(json.load(file), options.plot)
+        sys.exit(done)
+    sys.path.insert(0, os.path.abspath(options.package))
+    warnings.filterwarnings("ignore")
+    import torch
+
+    torch.set_num_threads(options.threads)
+    report = {"pytorch": torch.__version__, "threads": options.threads, "operators": []}
+    print(f"PyTorch {torch.__version__}, {options.threads} threads; ms: ours, eager, torch.compile")
+    for name in options.operators or sized(True):
+        row = measure(name, options)
+        report["operators"].append(row)
+        with open(options.output, "w", encoding="utf-8") as file:
+            json.dump(report, file, indent=1)
+        cells = "".join(
+            "  " + what + "".join(f"{row.get(f'{side}_{what}_ms', float('nan')):9.2f}"
+                                  for side in ("retrograde", "eager", "compiled")) + f" ({row.get(what + '_ratio', 0):5.2f})"
+            for what in ("forward", "both"))
+        errors = " ".join(f"{row.get(f'{side}_error', float('nan')):.0e}" for side in ("retrograde", "eager", "compiled"))
+        print(f"{name:20}{cells}  errors {errors}", *row["failures"].items(), flush=True)
+    for what in ("forward", "both"):
+        ratios = [row[f"{what}_ratio"] for row in report["operators"] if f"{what}_ratio" in row]
+        report[f"{what}_geometric_mean"] = geometric_mean(ratios)
+        print(f"{what}: geometric mean {report[f'{what}_geometric_mean']:.2f}, least {min(ratios):.2f}")
+    with open(options.output, "w", encoding="utf-8") as file:
+        json.dump(report, file, indent=1)
+
+
+if __name__ == "__main__":
+    main()
