@@ -23,6 +23,7 @@ HERE = Path(__file__).resolve().parent
 sys.path[:0] = [str(HERE), str(HERE.parent / "operators")]
 import peers
 
+SIDES = ("retrograde", "eager", "compiled")
 PAUSE_SECONDS = 0.03  # before a turn: threads of OpenMP that have no work look for some for so long
 WARM_SECONDS = 0.02  # of untimed runs in a turn: after the pause caches and clocks are not as in use
 MOST_SECONDS = 3  # of all rounds of one that is slow
@@ -194,10 +195,9 @@ def main():
         with open(options.output, "w", encoding="utf-8") as file:
             json.dump(report, file, indent=1)
         cells = "".join(
-            "  " + what + "".join(f"{row.get(f'{side}_{what}_ms', float('nan')):9.2f}"
-                                  for side in ("retrograde", "eager", "compiled")) + f" ({row.get(what + '_ratio', 0):5.2f})"
-            for what in ("forward", "both"))
-        errors = " ".join(f"{row.get(f'{side}_error', float('nan')):.0e}" for side in ("retrograde", "eager", "compiled"))
+            "  " + what + "".join(f"{row.get(f'{side}_{what}_ms', float('nan')):9.2f}" for side in SIDES)
+            + f" ({row.get(what + '_ratio', 0):5.2f})" for what in ("forward", "both"))
+        errors = " ".join(f"{row.get(f'{side}_error', float('nan')):.0e}" for side in SIDES)
         print(f"{name:20}{cells}  errors {errors}", *row["failures"].items(), flush=True)
     for what in ("forward", "both"):
         ratios = [row[f"{what}_ratio"] for row in report["operators"] if f"{what}_ratio" in row]

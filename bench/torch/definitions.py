@@ -1,8 +1,9 @@
 """definitions.py -- eight operators of PyTorch as pipelines, for tests and for `tools/bench torch`.
 
 Each is a function of an element type, and of the shapes of the tensors where they are known, that gives what
-retrograde.torch.operator takes: the output, its inputs, and the output's sizes from the tensors. Dimensions are in the order of Funcs here, innermost
-first; what PyTorch has for the same stands in formulations.py, with the dimensions in reverse.
+retrograde.torch.operator takes: the output, its inputs, and the output's sizes from the tensors. Dimensions are in the
+order of Funcs here, innermost first; what PyTorch has for the same stands in formulations.py, with the dimensions in
+reverse.
 """
 import retrograde as rg
 

@@ -66,7 +66,7 @@ class Install(unittest.TestCase):
             self.assertRegex(wheel.name, rf"retrograde-[\d.]+-cp3\d+-cp3\d+-manylinux_{glibc}_{os.uname().machine}.whl")
             names = run(sys.executable, "-m", "zipfile", "-l", wheel)
             for part in ("retrograde/libretrograde.so.0 ", "retrograde/runtime.py", "retrograde/py.typed",
-                         "retrograde/__init__.pyi"):
+                         "retrograde/__init__.pyi", "retrograde/torch/_library.py"):
                 self.assertIn(part, names)
 
     def test_a_build_of_its_own_is_configured(self):

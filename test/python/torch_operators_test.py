@@ -121,6 +121,23 @@ class Values(unittest.TestCase):
         for gradient, tensor in zip(gradients[1:], rest):
             self.assertTrue(torch.equal(gradient, torch.zeros_like(tensor)))
 
+    def test_a_tensor_without_elements(self):
+        """Of the first dimension, which is outermost and no count that the operator wants to be more than 0."""
+        first, *rest = inputs()
+        shape = (0, *first.shape[1:]) if NAME in ("convolution", "spatial_transformer") else (*first.shape[:-1], 0)
+        if NAME == "spatial_transformer":
+            rest = [rest[0][:0]]
+        if NAME in ("bilateral_slice", "flow_warp"):
+            rest[0] = rest[0][..., :0]
+        empty, rest = first.new_empty(shape).requires_grad_(), wanting(rest)
+        result = OP(empty, *rest)
+        if NAME == "soft_histogram":
+            self.assertTrue(torch.equal(result, torch.zeros_like(result)))
+        else:
+            self.assertEqual(result.numel(), 0)
+        for gradient, tensor in zip(torch.autograd.grad(result.sum(), (empty, *rest)), (empty, *rest)):
+            self.assertTrue(torch.equal(gradient, torch.zeros_like(tensor)))
+
 
 class Derivatives(unittest.TestCase):
     def test_first(self):

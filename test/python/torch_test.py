@@ -192,6 +192,8 @@ class Operators(unittest.TestCase):
             self.assertTrue(all(has(name, key) for key in ("CPU", "CUDA", "Meta", "Autograd", "AutocastCPU")))
         meta = op(torch.rand(8, device="meta"), torch.rand(3, device="meta"))
         self.assertEqual((meta.shape, meta.device.type), ((6,), "meta"))
+        with self.assertRaisesRegex(TypeError, "image on meta, taps on cpu"):
+            op(torch.rand(8, device="meta"), torch.rand(3))
 
     def test_after_fork(self):
         op, image, taps = blur("float32"), torch.ones(8), torch.ones(3)

@@ -1,5 +1,5 @@
-"""Runs a test with the PyTorch 2 that `bench/operators/peers.py pytorch` installs under out/bench/peers, or ends with 77, which
-ctest counts as skipped, where that is not there.
+"""Runs a test with the PyTorch 2 that `bench/operators/peers.py pytorch` installs under out/bench/peers, or ends with
+77, which ctest counts as skipped, where that is not there.
 
     with_torch_2.py TEST [argument...]"""
 import os

@@ -1,7 +1,7 @@
 """What PyTorch is told of an operator, through torch.library.
 
-Two operators are registered for one of ours: `name(a, b, ...)`, and `name_derivative(tensors, path)`, which is all of its
-derivatives of every order and both modes (a path says which: Plan.derived). Both are registered when the operator is
+Two operators are registered for one of ours: `name(a, b, ...)`, and `name_derivative(tensors, path)`, which is all of
+its derivatives of every order and both modes (a path says which: Plan.derived). Both are registered when the operator is
 made, so that a compiled graph that PyTorch kept on disk finds them. Each has a kernel for
 
     CPU            runs the pipeline

@@ -120,6 +120,8 @@ class Operator:
         if plan is None:
             generic = self.plan(path, tensors)  # first: it refuses types that there are none of
             generic.check(tensors)
+            if any(0 in shape for shape in key[1:]):
+                return generic  # there is next to nothing to be done
             with self._lock:
                 if key not in self._sized:
                     if len(self._sized) >= MOST_SIZES:

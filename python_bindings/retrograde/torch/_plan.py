@@ -55,7 +55,7 @@ class Plan:
         self._images = [is_image(parameter) for parameter in self.inputs]
         self._has_numbers = not all(self._images)
         self._lock, self._callable, self._derived = threading.RLock(), None, {}
-        self._result_shapes = None
+        self._result_shapes, self._seeds = None, 0  # so many of the last inputs are seeds
         if sizes is not None:
             self._result_shapes = shapes([torch.empty(size, dtype=dtype, device="meta")
                                           for size, dtype in zip(sizes, self.dtypes)])
@@ -114,14 +114,21 @@ class Plan:
     def fake(self, tensors):
         """Results without values, for those who ask what shapes they would have."""
         self.check(tensors)
-        device = tensors[0].device if tensors else None
+        devices = {t.device for t, image in zip(tensors, self._images) if image}
+        if len(devices) > 1:
+            places = ", ".join(f"{name} on {t.device}" for name, t in zip(self.names, tensors))
+            raise error(TypeError, f'call the operator "{self.name}"', "its tensors are on one device",
+                        f"given are {places}", "Move them with tensor.to(device)")
+        device = devices.pop() if devices else None
         return [torch.empty(shape, dtype=dtype, device=device)
                 for shape, dtype in zip(self.shapes(tensors, self.batch(tensors)), self.result_dtypes)]
 
     def run(self, tensors):
         batch = self.batch(tensors) if self.check(tensors) else ()
-        results = [torch.empty(shape, dtype=dtype)
-                   for shape, dtype in zip(self.shapes(tensors, batch), self.result_dtypes)]
+        shapes = self.shapes(tensors, batch)
+        results = [torch.empty(shape, dtype=dtype) for shape, dtype in zip(shapes, self.result_dtypes)]
+        if self.sizes is None and self._is_trivial(tensors, results):
+            return results
         if not batch:
             self._call(tensors, results)
         elif 0 not in batch:
@@ -129,6 +136,15 @@ class Plan:
             for at in itertools.product(*map(range, batch)):
                 self._call([t[at] for t in wide], [t[at] for t in results])
         return results
+
+    def _is_trivial(self, tensors, results):
+        """Of no elements, or linear in tensors of none, a gradient by its seeds: then filled with zeros. The pipeline's
+        own loops may have no fewer than one iteration."""
+        if self._seeds and all(t.numel() == 0 for t in tensors[-self._seeds:]):
+            for result in results:
+                result.zero_()
+            return True
+        return all(result.numel() == 0 for result in results)
 
     def _call(self, tensors, results):
         if self._callable is None:
@@ -142,8 +158,8 @@ class Plan:
     def _compile(self):
         """Funcs that nobody scheduled get a schedule."""
         pipeline = rg.Pipeline(self.outputs)
-        # The region that register tiles read comes out too large where it is clamped to sizes that are not known, and in
-        # derivatives of gradients: what they read of a seed would be refused.
+        # The region that register tiles read comes out too large where it is clamped to sizes that are not known, and
+        # in derivatives of gradients: what they read of a seed would be refused.
         tiles = self.sizes is not None and self.order < 2
         pipeline.set_autoschedule(rg.AutoscheduleOptions(without=[] if tiles else [rg.Decision.register_tiles]))
         return pipeline.compile_to_callable(self.inputs)
@@ -182,8 +198,10 @@ class Plan:
             derivatives.append(rg.propagate_adjoints(f, rg.Func(seed), bounds, rg.AdjointOptions(wrt=by)))
         gradients = [_sum([d(parameter) for d in derivatives], parameter) for parameter in by]
         sizes = None if self.sizes is None else [*self.sizes, *(self._result_shapes[i] for i in given)]
-        return Plan(f"{self.name}, gradient", gradients, self.inputs + seeds,
+        plan = Plan(f"{self.name}, gradient", gradients, self.inputs + seeds,
                     lambda tensors: [tuple(tensors[i].shape) for i in wanted], sizes, self.order + 1)
+        plan._seeds = len(seeds)
+        return plan
 
     def _tangent(self, given, _):
         directions, tangents = [], []
