@@ -107,11 +107,7 @@ class Calls:
 
     def differentiate(self, path, tensors):
         if forward_ad._current_level < 0 and not (torch.is_grad_enabled() and _any_requires_grad(*tensors)):
-            guard = torch._C._AutoDispatchBelowAutograd()
-            try:
-                return self(path, tensors)
-            finally:
-                del guard
+            return _below(self, path, tensors)
         return list(_apply(self, path, tensors))
 
     def cast(self, path, tensors):
@@ -182,10 +178,10 @@ class _Function(torch.autograd.Function):
         if forward_ad._current_level >= 0:
             ctx.save_for_forward(*tensors)
         if modes is None:
-            return _below(calls, path, tensors)
+            return tuple(_below(calls, path, tensors))
         # Autograd turns the modes off in here. They are those of inner levels as well, which are still to come.
         with torch.set_grad_enabled(modes[0]), forward_ad._set_fwd_grad_enabled(modes[1]):
-            return _below(calls, path, tensors)
+            return tuple(_below(calls, path, tensors))
 
     @staticmethod
     def backward(ctx, *seeds):
@@ -210,9 +206,31 @@ class _Function(torch.autograd.Function):
         return tuple(t if t.dtype.is_floating_point else None for t in moved)
 
 
+# ---- the way down from autograd ----
+
+_dispatch_keys = getattr(torch._C, "_dispatch_keys", None)
+_HAS_KEYS = _dispatch_keys is not None and hasattr(torch._C.DispatchKeySet, "raw_repr")
+_are_transforms_active = getattr(torch._C, "_are_functorch_transforms_active", lambda: True)
+_count_modes = getattr(torch._C, "_len_torch_dispatch_stack", lambda: 1)
+_PLAIN = _dispatch_keys(torch.empty(0)).raw_repr() if _HAS_KEYS else None
+
+
+def _is_plain(tensors):
+    """Whether nothing is left to dispatch on but the CPU's kernel: dense tensors, no modes, no transforms."""
+    if _PLAIN is None or _count_modes() or _are_transforms_active():
+        return False
+    for t in tensors:
+        if _dispatch_keys(t).raw_repr() != _PLAIN:
+            return False
+    return True
+
+
 def _below(calls, path, tensors):
+    """The kernels behind autograd's; that of the CPU at once, where it is the one: dispatching costs more than it does."""
+    if _is_plain(tensors):
+        return calls.run(path, tensors)
     guard = torch._C._AutoDispatchBelowAutograd()
     try:
-        return tuple(calls(path, tensors))
+        return calls(path, tensors)
     finally:
         del guard
